@@ -11,6 +11,7 @@ from __future__ import annotations
 import re
 import warnings
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from os import PathLike
 from typing import TYPE_CHECKING
 
@@ -22,7 +23,7 @@ from phigen.errors import Diagnostic, SpecError
 from phigen.geometry.system import System, system_from_spec
 from phigen.spec import limits
 from phigen.spec.model import Extras, Spec
-from phigen.spec.names import ARGUMENT_HINT, ARGUMENTS, IDENTIFIER, SCHEMES, SPEC_NAME
+from phigen.spec.names import ARGUMENT_HINT, ARGUMENTS, IDENTIFIER, PROFILES, SCHEMES, SPEC_NAME
 from phigen.spec.taken import objection
 
 if TYPE_CHECKING:
@@ -54,21 +55,27 @@ def compile(
     *,
     scheme: str | None = None,
     tangent: bool = False,
+    profile: str | None = None,
 ) -> Solver:
     """A solver of a system: of one from `load` or `System.from_sympy`, of a spec, or of the path of a spec file.
 
     ``target`` is ``c``, ``numpy``, or ``auto``: C if there is a compiler, else NumPy with a `RuntimeWarning`. ``order``
     overrides the order of the spec, ``scheme`` (``series``, ``splitting``, ``auto``) its scheme; ``tangent`` asks for
-    `Solver.step_tangent`. Compiled C is cached by its content. Raises `SpecError`, `LimitError`, `CheckError` if the
-    mathematics is refuted, e.g. since π is not Poisson, and `ToolchainError` if C was asked for in vain,
-    or by naming a compiler in CC that does not work.
+    `Solver.step_tangent`, ``profile`` (``fast``, ``small``) overrides that of the C. Compiled C is cached by its
+    content. Raises `SpecError`, `LimitError`, `CheckError` if the mathematics is refuted, e.g. since π is not Poisson,
+    and `ToolchainError` if C was asked for in vain, or by naming a compiler in CC that does not work.
     """
     if target != "auto" and not registry.find(target).loader:
         runnable = ", ".join(registry.LOADABLE)
         raise ValueError(f"Python cannot run the target {target!r}; it can run {runnable}")
     if scheme is not None and scheme not in SCHEMES:
         raise ValueError(f"unknown scheme {scheme!r}; there are {', '.join(SCHEMES)}")
-    return solver_of(compilation_of(source, order, Extras(tangent=True) if tangent else None, scheme), target)
+    if profile is not None and profile not in PROFILES:
+        raise ValueError(f"unknown profile {profile!r}; there are {', '.join(PROFILES)}")
+    compilation = compilation_of(source, order, Extras(tangent=True) if tangent else None, scheme)
+    if profile is not None:
+        compilation = replace(compilation, program=replace(compilation.program, profile=profile))
+    return solver_of(compilation, target)
 
 
 def compilation_of(

@@ -105,6 +105,7 @@ def compile_spec(
         "licence": spec.license,
         "spec_sha256": spec.source_sha256,
         "extras": extras,
+        "profile": spec.profile,
     }
     if (scheme or spec.scheme) == "splitting":
         return _split(spec, source, order, described, clock)

@@ -37,8 +37,9 @@ hamiltonian: x1 + x2 + x3
 
 
 def plain(given: spec.Spec) -> spec.Spec:
-    """The spec with no gauge where it leaves that to phigen: tests/generated/test_gauge.py is about gauges."""
-    return replace(given, gauge="none") if given.gauge == "auto" else given
+    """The spec with all code for speed, and with no gauge where it leaves that to phigen: tests/generated/test_gauge.py
+    is about gauges, tests/generated/test_profiles.py about short code."""
+    return replace(given, profile="fast", gauge="none" if given.gauge == "auto" else given.gauge)
 
 
 def compile_text(text: str, order: int | None = None, scheme: str | None = None, **more: Any) -> Compilation:

@@ -8,26 +8,39 @@
  *   composition: suzuki, 5 stages of order 2
  *   one evaluation of the equation for p: 39 additions, 90 multiplications, 3 divisions
  *
- * spec: ablowitz_ladik3, sha256 a19d6edf1db5d8f1f730a954b05596f3772fa764597865f240bd9a4588aef6f0
+ * spec: ablowitz_ladik3, sha256 522a22e2eba41e15ba83081c2557c3d42d94541601f5914945494027ebf938e2
  * to regenerate: phigen build ablowitz_ladik3
  * DO NOT EDIT: change the spec and regenerate; edits are noticed by the checksum below.
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: b77bcc5e56e98fae1d681742f833b0173c6a6e792cca19867aaa36e71f8d3a74
+ *
+ *   1. The model
+ *   2. Compensated sums, linear equations
+ *   3. Starting guesses
+ *   4. The implicit step, along paths dm/dt = pi(m) p
+ *   5. The solver
+ *   6. Ensembles
+ * body-sha256: e0ba75231c122d7a6625c7b0f85a4b11fb3271985d987b4afa13292531b83993
  */
 #include "ablowitz_ladik3.h"
 
 #include <float.h>
-#include <limits.h>
 #include <math.h>
-#include <stdint.h>
 #include <string.h>
 
+/* ---- The model ---- */
 const ablowitz_ladik3_params ablowitz_ladik3_default_params = { 0 };
 
+enum { ablowitz_ladik3_MAX_ITERATIONS = 20 }; /* of an inner solve */
+/* most of the expansion of a path; one that needs more is cut into pieces */
+enum { ablowitz_ladik3_TERMS = 30 };
+enum { ablowitz_ladik3_SERIES = 27 }; /* of a path, those of the coordinates first */
+enum { ablowitz_ladik3_FIXED = 1 };   /* values that are constant along a path */
+
 /* A step of size h is the composition of these fractions of it. */
-static const double ablowitz_ladik3_fractions[5] = { 0.4144907717943757, 0.4144907717943757, -0.6579630871775028, 0.4144907717943757, 0.4144907717943757 };
+static const double ablowitz_ladik3_fractions[ablowitz_ladik3_STAGES] = { 0.4144907717943757,
+    0.4144907717943757, -0.6579630871775028, 0.4144907717943757, 0.4144907717943757 };
 
 /* everything that depends on parameters and step size only */
 static void ablowitz_ladik3_prepare(const ablowitz_ladik3_params *params, double h, double coef[restrict 3])
@@ -40,53 +53,27 @@ static void ablowitz_ladik3_prepare(const ablowitz_ladik3_params *params, double
 
 /* p = grad S_h(y), and the Jacobian 1 - Hess S_h(y) pi(y) / 2 of the equation for p, up to O(h^2) */
 static void ablowitz_ladik3_generate(const double coef[3], const double y[6], double slope[restrict 6],
-                                     double jacobian[restrict 36])
+    double jacobian[restrict 36])
 {
-    const double x1 = y[0];
-    const double y1 = y[1];
-    const double x2 = y[2];
-    const double y2 = y[3];
-    const double x3 = y[4];
-    const double y3 = y[5];
-    const double t1 = coef[1] * x2;
-    const double t2 = coef[1] * x3;
-    const double t3 = y1 * y1;
-    const double t4 = x1 * x1;
-    const double t5 = 1.0 / (t3 + (-1.0 + t4));
-    const double t6 = coef[1] * y3;
-    const double t7 = coef[1] * y2;
-    const double t8 = coef[1] * x1;
-    const double t9 = y2 * y2;
-    const double t10 = x2 * x2;
-    const double t11 = 1.0 / (t9 + (-1.0 + t10));
-    const double t12 = coef[1] * y1;
-    const double t13 = y3 * y3;
-    const double t14 = x3 * x3;
-    const double t15 = 1.0 / (t13 + (-1.0 + t14));
-    const double t16 = 1.0 - t4;
-    const double t17 = t3 - t16;
-    const double t18 = coef[2] * (x1 * y1 * (t5 * t5));
-    const double t19 = t16 - t3;
-    const double t20 = 1.0 - t10;
-    const double t21 = t20 - t9;
-    const double t22 = (-0.5) * (coef[1] * t21);
-    const double t23 = 1.0 - t14;
-    const double t24 = t23 - t13;
-    const double t25 = (-0.5) * (coef[1] * t24);
-    const double t26 = t9 - t20;
-    const double t27 = (-0.5) * (coef[1] * t26);
-    const double t28 = t13 - t23;
-    const double t29 = (-0.5) * (coef[1] * t28);
-    const double t30 = (-0.5) * (coef[1] * t19);
-    const double t31 = coef[2] * (x2 * y2 * (t11 * t11));
-    const double t32 = (-0.5) * (coef[1] * t17);
-    const double t33 = coef[2] * (x3 * y3 * (t15 * t15));
+    const double x1 = y[0], y1 = y[1], x2 = y[2], y2 = y[3], x3 = y[4], y3 = y[5];
+    /* slope */
+    const double t1 = coef[1] * x2, t2 = coef[1] * x3, t3 = y1 * y1, t4 = x1 * x1;
+    const double t5 = 1.0 / (t3 + (-1.0 + t4)), t6 = coef[1] * y3, t7 = coef[1] * y2;
+    const double t8 = coef[1] * x1, t9 = y2 * y2, t10 = x2 * x2, t11 = 1.0 / (t9 + (-1.0 + t10));
+    const double t12 = coef[1] * y1, t13 = y3 * y3, t14 = x3 * x3, t15 = 1.0 / (t13 + (-1.0 + t14));
     slope[0] = t1 + t2 + coef[0] * (x1 * t5);
     slope[1] = t6 + t7 + coef[0] * (y1 * t5);
     slope[2] = t8 + t2 + coef[0] * (x2 * t11);
     slope[3] = t6 + t12 + coef[0] * (y2 * t11);
     slope[4] = t1 + t8 + coef[0] * (x3 * t15);
     slope[5] = t12 + t7 + coef[0] * (y3 * t15);
+    /* jacobian */
+    const double t16 = 1.0 - t4, t17 = t3 - t16, t18 = coef[2] * (x1 * y1 * (t5 * t5));
+    const double t19 = t16 - t3, t20 = 1.0 - t10, t21 = t20 - t9, t22 = (-0.5) * (coef[1] * t21);
+    const double t23 = 1.0 - t14, t24 = t23 - t13, t25 = (-0.5) * (coef[1] * t24), t26 = t9 - t20;
+    const double t27 = (-0.5) * (coef[1] * t26), t28 = t13 - t23, t29 = (-0.5) * (coef[1] * t28);
+    const double t30 = (-0.5) * (coef[1] * t19), t31 = coef[2] * (x2 * y2 * (t11 * t11));
+    const double t32 = (-0.5) * (coef[1] * t17), t33 = coef[2] * (x3 * y3 * (t15 * t15));
     jacobian[0] = 1.0 - 0.5 * (t17 * t18);
     jacobian[1] = (-0.5) * (t19 * (t5 * (coef[0] + coef[2] * (t4 * t5))));
     jacobian[2] = 0.0;
@@ -125,244 +112,47 @@ static void ablowitz_ladik3_generate(const double coef[3], const double y[6], do
     jacobian[35] = 1.0 - 0.5 * (t24 * t33);
 }
 
-/* Solve matrix * solution = side, both overwritten, by elimination with partial pivoting. 0 if singular. */
-static int ablowitz_ladik3_solve(double matrix[36], double side[6])
+/* the Hamiltonian */
+double ablowitz_ladik3_hamiltonian(const ablowitz_ladik3_params *params, const double x[6])
 {
-    for (int k = 0; k < 6; ++k) {
-        int best = k;
-        for (int i = k + 1; i < 6; ++i)
-            if (fabs(matrix[i * 6 + k]) > fabs(matrix[best * 6 + k])) best = i;
-        const double pivot = matrix[best * 6 + k];
-        if (!(fabs(pivot) > 0.0)) return 0;
-        for (int j = k; j < 6 && best != k; ++j) {
-            const double swap = matrix[k * 6 + j];
-            matrix[k * 6 + j] = matrix[best * 6 + j];
-            matrix[best * 6 + j] = swap;
-        }
-        const double swap = side[k];
-        side[k] = side[best];
-        side[best] = swap;
-        for (int i = k + 1; i < 6; ++i) {
-            const double factor = matrix[i * 6 + k] / pivot;
-            for (int j = k + 1; j < 6; ++j) matrix[i * 6 + j] -= factor * matrix[k * 6 + j];
-            side[i] -= factor * side[k];
-        }
-    }
-    for (int i = 6 - 1; i >= 0; --i) {
-        for (int j = i + 1; j < 6; ++j) side[i] -= matrix[i * 6 + j] * side[j];
-        side[i] /= matrix[i * 6 + i];
-    }
-    return 1;
+    (void)params;
+    const double x1 = x[0], y1 = x[1], x2 = x[2], y2 = x[3], x3 = x[4], y3 = x[5];
+    const double t1 = log(1.0 - x1 * x1 - y1 * y1)
+        + (y1 * y3 + (x1 * x3 + (y2 * y3 + (x2 * x3 + (x1 * x2 + y1 * y2)))));
+    return log(1.0 - x3 * x3 - y3 * y3) + (log(1.0 - x2 * x2 - y2 * y2) + t1);
 }
 
-/* Whether a guess is where the next values may be. Recurrences that were fitted to little else than rest, near a saddle,
-   may lead anywhere; and far away the equation of a step has solutions that have nothing to do with the motion. */
-static int ablowitz_ladik3_near(const double guess[6], const double last[6])
+/* the Casimirs */
+void ablowitz_ladik3_casimirs(const ablowitz_ladik3_params *params, const double x[6], double out[])
 {
-    double distance = 0.0, size = 0.0;
-    for (int i = 0; i < 6; ++i) {
-        distance += fabs(guess[i] - last[i]);
-        size += fabs(last[i]);
-    }
-    return distance <= 4.0 * size;
+    (void)params, (void)x, (void)out;
 }
 
-/* The guess for the next value (y), from earlier ones; 0 if there is none. */
-static int ablowitz_ladik3_predict(const ablowitz_ladik3_memory *memory, double value[6])
+/* pi(x) grad H(x) */
+void ablowitz_ladik3_vector_field(const ablowitz_ladik3_params *params, const double x[6], double out[6])
 {
-    const int last = memory->count - 1;
-    double odd[6] = { 0.0 }, binomial = -1.0;
-    memset(value, 0, 6 * sizeof value[0]);
-    if (memory->fitting) {
-        for (int k = 0; k < memory->terms; k += 2)
-            for (int i = 0; i < 6; ++i) {
-                value[i] += memory->weight[k][i][0] * memory->past[last - k][i];
-                odd[i] += memory->weight[k + 1][i][0] * memory->past[last - 1 - k][i];
-            }
-        for (int i = 0; i < 6; ++i) value[i] += odd[i];
-    } else {
-        for (int k = 0; k < memory->order && k <= last; ++k) {
-            binomial *= -(double)(memory->order - k) / (k + 1);
-            for (int i = 0; i < 6; ++i) value[i] += binomial * memory->past[last - k][i];
-        }
-    }
-    return last >= 0 && ablowitz_ladik3_near(value, memory->past[last]);
+    (void)params;
+    const double x1 = x[0], y1 = x[1], x2 = x[2], y2 = x[3], x3 = x[4], y3 = x[5];
+    const double t1 = 1.0 - x1 * x1, t2 = y1 * y1, t3 = t1 - t2, t4 = 1.0 / t3, t5 = 1.0 - x2 * x2;
+    const double t6 = y2 * y2, t7 = t5 - t6, t8 = 1.0 / t7, t9 = 1.0 - x3 * x3, t10 = y3 * y3;
+    const double t11 = t9 - t10, t12 = 1.0 / t11;
+    out[0] = t3 * (y2 + y3 - 2.0 * (y1 * t4));
+    out[1] = (t2 - t1) * (x2 + x3 - 2.0 * (x1 * t4));
+    out[2] = t7 * (y1 + y3 - 2.0 * (y2 * t8));
+    out[3] = (t6 - t5) * (x1 + x3 - 2.0 * (x2 * t8));
+    out[4] = t11 * (y1 + y2 - 2.0 * (y3 * t12));
+    out[5] = (t10 - t9) * (x1 + x2 - 2.0 * (x3 * t12));
 }
 
-/* Choose the guess that would have been best for a value that took several iterations. */
-static void ablowitz_ladik3_judge(ablowitz_ladik3_memory *memory, const double value[6])
+/* ---- Compensated sums, linear equations ---- */
+/* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to
+   its last bit: were it rounded with the change, corrections of one sign would add up to a drift. 0, and x as
+   before, if the sum is not finite. */
+static int ablowitz_ladik3_advance(ablowitz_ladik3_solver *s, const double change[ablowitz_ladik3_DIM],
+    const double correction[ablowitz_ladik3_DIM])
 {
-    double row[8 + 1][6], guess[6], least = HUGE_VAL, fitted = HUGE_VAL;
-    const int rows = memory->count < 8 ? memory->count : 8;
-    memcpy(row[0], value, sizeof row[0]);
-    for (int k = 0; k < rows; ++k) memcpy(row[k + 1], memory->past[memory->count - 1 - k], sizeof row[0]);
-    for (int order = 1; order <= rows; ++order) { /* row[0] becomes the backward difference of this order */
-        double size = 0.0;
-        for (int k = 0; k <= rows - order; ++k)
-            for (int i = 0; i < 6; ++i) row[k][i] -= row[k + 1][i];
-        for (int i = 0; i < 6; ++i) size += fabs(row[0][i]);
-        if (size < least) {
-            least = size;
-            memory->order = order;
-        }
-    }
-    memory->fitting = memory->terms > 0;
-    if (memory->fitting && ablowitz_ladik3_predict(memory, guess)) {
-        fitted = 0.0;
-        for (int i = 0; i < 6; ++i) fitted += fabs(value[i] - guess[i]);
-    }
-    memory->fitting = memory->terms > 0 && fitted <= least;
-    if (memory->order == 0) memory->order = 1;
-}
-
-/* Make eight columns orthogonal to one, by the multiples of it that are put into r. Where that one is among the eight, those
-   up to it stay as they are, and inverse becomes one over its squared length. The number of rows is even. */
-static void ablowitz_ladik3_project(int rows, double (*one)[8], int column, double *inverse, double (*eight)[8], double r[8])
-{
-    double even[8] = { 0.0 }, odd[8] = { 0.0 };
-    for (int i = 0; i < rows; i += 2) {
-        const double entry = one[i][column], next = one[i + 1][column];
-        for (int l = 0; l < 8; ++l) even[l] += entry * eight[i][l];
-        for (int l = 0; l < 8; ++l) odd[l] += next * eight[i + 1][l];
-    }
-    for (int l = 0; l < 8; ++l) even[l] += odd[l];
-    if (one == eight) {
-        *inverse = even[column] > 0.0 ? 1.0 / even[column] : 0.0;
-        memset(even, 0, ((size_t)column + 1) * sizeof even[0]);
-    }
-    for (int l = 0; l < 8; ++l) r[l] = even[l] *= *inverse;
-    for (int i = 0; i < rows; ++i) {
-        const double entry = one[i][column];
-        for (int l = 0; l < 8; ++l) eight[i][l] -= entry * even[l];
-    }
-}
-
-/* By how much recurrences miss the last of these values. */
-static double ablowitz_ladik3_missed(const double *value, double (*weight)[8])
-{
-    enum { AHEAD = 1, WINDOW = 40, CHECKS = 8 };
-    double most = 0.0;
-    for (int i = 0; i < CHECKS; ++i) {
-        double guess[8] = { 0.0 };
-        for (int k = 0; k < WINDOW; ++k)
-            for (int l = 0; l < 8; ++l) guess[l] += weight[k][l] * value[i + WINDOW - 1 - k];
-        for (int l = 0; l < AHEAD; ++l) most = fmax(most, fabs(guess[l] - value[i + WINDOW + l]));
-    }
-    return most;
-}
-
-/* Fit the recurrences value[m + l] = sum of weight[k][..][l] * value[m - 1 - k], l = 0 ... 1 - 1, to the history of
-   a component: ridge least squares by modified Gram-Schmidt, the ridge at the level of rounding. Columns are taken in by
-   eights, until they leave next to nothing of the right-hand sides. How many past values are used; 0 if the recurrences do
-   not foresee the last values, which they were not fitted to. */
-static int ablowitz_ladik3_train(ablowitz_ladik3_memory *memory, int component)
-{
-    enum { AHEAD = 1, WINDOW = 40, ROWS = 64 };
-    double q[WINDOW / 8][ROWS + WINDOW][8], r[WINDOW / 8][WINDOW][8], inverse[WINDOW]; /* eight columns in each part */
-    double right[ROWS + WINDOW][8], weight[WINDOW][8], value[112], largest = 0.0, left = HUGE_VAL;
-    int terms = 0;
-    memset(q, 0, sizeof q);
-    memset(right, 0, sizeof right);
-    memset(weight, 0, sizeof weight);
-    for (int i = 0; i < 112; ++i) {
-        value[i] = memory->past[memory->count - 112 + i][component];
-        if (fabs(value[i]) > largest) largest = fabs(value[i]);
-    }
-    for (int i = 0; i < ROWS; ++i)
-        for (int l = 0; l < AHEAD; ++l) right[i][l] = value[i + WINDOW + l];
-    while (terms < WINDOW && left > 3e-12 * largest) {
-        const int part = terms / 8, rows = ROWS + terms + 8; /* further rows of the ridge are zero in these columns */
-        for (int i = 0; i < ROWS; ++i)
-            for (int l = 0; l < 8; ++l) q[part][i][l] = value[i + WINDOW - 1 - terms - l];
-        for (int l = 0; l < 8; ++l) q[part][ROWS + terms + l][l] = 1e-15 * largest;
-        for (int k = 0; k < terms; ++k) ablowitz_ladik3_project(rows, q[k / 8], k % 8, &inverse[k], q[part], r[part][k]);
-        for (int l = 0; l < 8; ++l, ++terms) {
-            ablowitz_ladik3_project(rows, q[part], l, &inverse[terms], q[part], r[part][terms]);
-            ablowitz_ladik3_project(rows, q[part], l, &inverse[terms], right, weight[terms]);
-        }
-        double sum[8] = { 0.0 };
-        for (int i = 0; i < ROWS; ++i)
-            for (int l = 0; l < 8; ++l) sum[l] += fabs(right[i][l]);
-        left = 0.0;
-        for (int l = 0; l < 8; ++l) left += sum[l] / ROWS;
-    }
-    for (int k = terms - 1; k >= 0; --k)
-        for (int j = k + 1; j < terms; ++j)
-            for (int l = 0; l < 8; ++l) weight[k][l] -= r[j / 8][k][j % 8] * weight[j][l];
-    for (int k = 0; k < WINDOW; ++k) memcpy(memory->weight[k][component], weight[k], AHEAD * sizeof(double));
-    return ablowitz_ladik3_missed(value + ROWS, weight) <= 1e-07 * largest ? terms : 0;
-}
-
-/* Drop what is old, if so many values would not fit into the history. */
-static void ablowitz_ladik3_make_room(ablowitz_ladik3_memory *memory, int values)
-{
-    if (memory->count + values <= 224) return;
-    memmove(memory->past, memory->past + memory->count - 112, 112 * sizeof memory->past[0]);
-    memory->count = 112;
-}
-
-/* Add a value to the history. */
-static void ablowitz_ladik3_record(ablowitz_ladik3_memory *memory, const double value[6])
-{
-    ablowitz_ladik3_make_room(memory, 1);
-    memcpy(memory->past[memory->count++], value, 6 * sizeof value[0]);
-}
-
-/* Fit the recurrence to the last values; with every time, wait longer before it is done again. */
-static void ablowitz_ladik3_fit(ablowitz_ladik3_memory *memory)
-{
-    int found = 1;
-    memory->terms = 0;
-    for (int i = 0; i < 6 && found; ++i) {
-        const int terms = ablowitz_ladik3_train(memory, i);
-        found = terms > 0;
-        if (terms > memory->terms) memory->terms = terms;
-    }
-    if (!found) memory->terms = 0;
-    memory->fitting = found;
-    ++memory->fits;
-    memory->slow = 0;
-    memory->patience = memory->patience < 10000 ? 2 * memory->patience + 150 : 20000;
-}
-
-/* Take in the solved value: what took one iteration needs no better guess. */
-static void ablowitz_ladik3_remember(ablowitz_ladik3_memory *memory, const double value[6], int iterations)
-{
-    if (iterations > 1) ablowitz_ladik3_judge(memory, value);
-    ablowitz_ladik3_record(memory, value);
-    memory->slow = iterations > 1 ? memory->slow + 1 : 0;
-    if (memory->slow > memory->patience && memory->count >= 112) ablowitz_ladik3_fit(memory);
-}
-
-/* Whether an increment is that of the motion. Where the step is too large, the equation may have been solved by a point far
-   away, at another energy, that has nothing to do with it. */
-static int ablowitz_ladik3_plausible(const ablowitz_ladik3_solver *s, int stage, const double increment[6])
-{
-    double moved = 0.0, size = 0.0, field[6], middle[6], end[6];
-    for (int i = 0; i < 6; ++i) {
-        moved += fabs(increment[i]);
-        size += fabs(s->x[i]);
-    }
-    if (moved <= 1.5 * size) return 1;
-    ablowitz_ladik3_vector_field(&s->params, s->x, field);
-    for (int i = 0; i < 6; ++i) {
-        size += fabs(ablowitz_ladik3_fractions[stage] * s->h * field[i]);
-        middle[i] = s->x[i] + 0.5 * increment[i];
-        end[i] = s->x[i] + increment[i];
-    }
-    if (moved <= 1.5 * size) return 1;
-    const double before = ablowitz_ladik3_hamiltonian(&s->params, s->x), after = ablowitz_ladik3_hamiltonian(&s->params, end);
-    const double scale = fabs(before) + fabs(ablowitz_ladik3_hamiltonian(&s->params, middle)) + fabs(after);
-    return fabs(after - before) <= 0.5 * scale;
-}
-
-/* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to its last
-   bit: were it rounded with the change, corrections of one sign would add up to a drift. 0, and x as before, if the
-   sum is not finite. */
-static int ablowitz_ladik3_advance(ablowitz_ladik3_solver *s, const double change[6], const double correction[6])
-{
-    double x[6], carry[6];
-    for (int i = 0; i < 6; ++i) {
+    double x[ablowitz_ladik3_DIM], carry[ablowitz_ladik3_DIM];
+    for (int i = 0; i < ablowitz_ladik3_DIM; ++i) {
         const double sum = s->x[i] + change[i], added = sum - s->x[i];
         const double lost = (s->x[i] - (sum - added)) + (change[i] - added);
         const double small = lost + (s->carry[i] + correction[i]);
@@ -375,6 +165,112 @@ static int ablowitz_ladik3_advance(ablowitz_ladik3_solver *s, const double chang
     return 1;
 }
 
+/* Solve matrix * solution = side, both overwritten, by elimination with partial pivoting. 0 if singular. */
+static int ablowitz_ladik3_solve(double matrix[ablowitz_ladik3_DIM * ablowitz_ladik3_DIM],
+    double side[ablowitz_ladik3_DIM])
+{
+    for (int k = 0; k < ablowitz_ladik3_DIM; ++k) {
+        int best = k;
+        for (int i = k + 1; i < ablowitz_ladik3_DIM; ++i)
+            if (fabs(matrix[i * ablowitz_ladik3_DIM + k]) > fabs(matrix[best * ablowitz_ladik3_DIM + k]))
+                best = i;
+        const double pivot = matrix[best * ablowitz_ladik3_DIM + k], last = side[k];
+        if (!(fabs(pivot) > 0.0)) return 0;
+        for (int j = k; j < ablowitz_ladik3_DIM && best != k; ++j) {
+            const double swap = matrix[k * ablowitz_ladik3_DIM + j];
+            matrix[k * ablowitz_ladik3_DIM + j] = matrix[best * ablowitz_ladik3_DIM + j];
+            matrix[best * ablowitz_ladik3_DIM + j] = swap;
+        }
+        side[k] = side[best];
+        side[best] = last;
+        for (int i = k + 1; i < ablowitz_ladik3_DIM; ++i) {
+            const double factor = matrix[i * ablowitz_ladik3_DIM + k] / pivot;
+            for (int j = k + 1; j < ablowitz_ladik3_DIM; ++j)
+                matrix[i * ablowitz_ladik3_DIM + j] -= factor * matrix[k * ablowitz_ladik3_DIM + j];
+            side[i] -= factor * side[k];
+        }
+    }
+    for (int i = ablowitz_ladik3_DIM - 1; i >= 0; --i) {
+        for (int j = i + 1; j < ablowitz_ladik3_DIM; ++j)
+            side[i] -= matrix[i * ablowitz_ladik3_DIM + j] * side[j];
+        side[i] /= matrix[i * ablowitz_ladik3_DIM + i];
+    }
+    return 1;
+}
+
+/* ---- Starting guesses ---- */
+/* How far from the last value a guess may be, in sizes of that value. */
+#define ablowitz_ladik3_REACH 4.0
+
+/* The guess for the next value from the last ones: the sum of their backward differences. 0 if there is none,
+   or if it is far away, where the equation of a step has solutions that have nothing to do with the motion.
+   */
+static int ablowitz_ladik3_predict(const ablowitz_ladik3_history *history, double value[ablowitz_ladik3_DIM])
+{
+    double distance = 0.0, size = 0.0;
+    for (int i = 0; i < ablowitz_ladik3_DIM; ++i) {
+        value[i] = 0.0;
+        for (int k = 0; k < history->order; ++k) value[i] += history->difference[k][i];
+        distance += fabs(value[i] - history->difference[0][i]);
+        size += fabs(history->difference[0][i]);
+    }
+    return history->order > 0 && distance <= ablowitz_ladik3_REACH * size;
+}
+
+/* Take in the solved value. The guess of order k missed it by its k-th difference: the next is of the best
+   order. */
+static void ablowitz_ladik3_remember(ablowitz_ladik3_history *history,
+    const double value[ablowitz_ladik3_DIM])
+{
+    double least = HUGE_VAL, next[ablowitz_ladik3_DIM];
+    memcpy(next, value, sizeof next);
+    for (int k = 0; k <= history->count && k < ablowitz_ladik3_DIFFERENCES; ++k) {
+        double size = 0.0;
+        for (int i = 0; i < ablowitz_ladik3_DIM; ++i) {
+            const double last = history->difference[k][i];
+            history->difference[k][i] = next[i];
+            size += fabs(next[i]);
+            next[i] -= last;
+        }
+        if (k > 0 && size < least) {
+            least = size;
+            history->order = k;
+        }
+    }
+    if (history->count == 0) history->order = 1;
+    if (history->count < ablowitz_ladik3_DIFFERENCES) ++history->count;
+}
+
+/* How far a step may lead, in sizes of the state and of what the vector field says, if the energy is lost;
+   and the part of the energy that counts as lost. */
+#define ablowitz_ladik3_PLAUSIBLE 1.5
+#define ablowitz_ladik3_LOST 0.5
+
+/* Whether an increment is that of the motion. Where the step is too large, the equation may have been solved
+   by a point far away, at another energy, that has nothing to do with it. */
+static int ablowitz_ladik3_plausible(const ablowitz_ladik3_solver *s, int stage,
+    const double increment[ablowitz_ladik3_DIM])
+{
+    double moved = 0.0, size = 0.0, field[ablowitz_ladik3_DIM], middle[ablowitz_ladik3_DIM],
+        end[ablowitz_ladik3_DIM];
+    for (int i = 0; i < ablowitz_ladik3_DIM; ++i) {
+        moved += fabs(increment[i]);
+        size += fabs(s->x[i]);
+    }
+    if (moved <= ablowitz_ladik3_PLAUSIBLE * size) return 1;
+    ablowitz_ladik3_vector_field(&s->params, s->x, field);
+    for (int i = 0; i < ablowitz_ladik3_DIM; ++i) {
+        size += fabs(ablowitz_ladik3_fractions[stage] * s->h * field[i]);
+        middle[i] = s->x[i] + 0.5 * increment[i];
+        end[i] = s->x[i] + increment[i];
+    }
+    if (moved <= ablowitz_ladik3_PLAUSIBLE * size) return 1;
+    const double before = ablowitz_ladik3_hamiltonian(&s->params, s->x), after =
+        ablowitz_ladik3_hamiltonian(&s->params, end);
+    const double scale = fabs(before) + fabs(ablowitz_ladik3_hamiltonian(&s->params, middle)) + fabs(after);
+    return fabs(after - before) <= ablowitz_ladik3_LOST * scale;
+}
+
 /* Coefficient k of the product of two Taylor series. */
 static double ablowitz_ladik3_taylor_product(const double *a, const double *b, int k)
 {
@@ -383,13 +279,79 @@ static double ablowitz_ladik3_taylor_product(const double *a, const double *b, i
     return sum;
 }
 
-/* Whether dm/dt = pi(m) p holds at a point m, where the expansion has the given slope: one with gaps between its terms,
-   like t + t^9, or across the kink of an absolute value, only looks as if it had converged. */
-static int ablowitz_ladik3_holds(const double *coef, const double p[6], const double m[6], const double slope[6])
+/* The first coefficients of the series of a path, those of the coordinates given. */
+static void ablowitz_ladik3_path_begin(const double *coef, const double p[6],
+    double s[27][ablowitz_ladik3_TERMS + 1], double f[1])
 {
     (void)coef;
-    double e[27], field[6], scale = 0.0;
-    memcpy(e, m, 6 * sizeof *e);
+    (void)f;
+    s[6][0] = s[0][0] * s[0][0];
+    s[7][0] = 1.0 - s[6][0];
+    s[8][0] = s[1][0] * s[1][0];
+    s[9][0] = s[7][0] - s[8][0];
+    s[10][0] = p[1] * s[9][0];
+    s[11][0] = s[8][0] - s[7][0];
+    s[12][0] = p[0] * s[11][0];
+    s[13][0] = s[2][0] * s[2][0];
+    s[14][0] = 1.0 - s[13][0];
+    s[15][0] = s[3][0] * s[3][0];
+    s[16][0] = s[14][0] - s[15][0];
+    s[17][0] = p[3] * s[16][0];
+    s[18][0] = s[15][0] - s[14][0];
+    s[19][0] = p[2] * s[18][0];
+    s[20][0] = s[4][0] * s[4][0];
+    s[21][0] = 1.0 - s[20][0];
+    s[22][0] = s[5][0] * s[5][0];
+    s[23][0] = s[21][0] - s[22][0];
+    s[24][0] = p[5] * s[23][0];
+    s[25][0] = s[22][0] - s[21][0];
+    s[26][0] = p[4] * s[25][0];
+}
+
+/* Coefficient k of the series, and with it coefficient k + 1 of the coordinates. */
+static void ablowitz_ladik3_path_order(const double *coef, const double p[6],
+    double s[27][ablowitz_ladik3_TERMS + 1], const double f[1], int k)
+{
+    (void)coef;
+    (void)f;
+    if (k > 0) {
+        s[6][k] = ablowitz_ladik3_taylor_product(s[0], s[0], k);
+        s[7][k] = -s[6][k];
+        s[8][k] = ablowitz_ladik3_taylor_product(s[1], s[1], k);
+        s[9][k] = s[7][k] - s[8][k];
+        s[10][k] = p[1] * s[9][k];
+        s[11][k] = s[8][k] - s[7][k];
+        s[12][k] = p[0] * s[11][k];
+        s[13][k] = ablowitz_ladik3_taylor_product(s[2], s[2], k);
+        s[14][k] = -s[13][k];
+        s[15][k] = ablowitz_ladik3_taylor_product(s[3], s[3], k);
+        s[16][k] = s[14][k] - s[15][k];
+        s[17][k] = p[3] * s[16][k];
+        s[18][k] = s[15][k] - s[14][k];
+        s[19][k] = p[2] * s[18][k];
+        s[20][k] = ablowitz_ladik3_taylor_product(s[4], s[4], k);
+        s[21][k] = -s[20][k];
+        s[22][k] = ablowitz_ladik3_taylor_product(s[5], s[5], k);
+        s[23][k] = s[21][k] - s[22][k];
+        s[24][k] = p[5] * s[23][k];
+        s[25][k] = s[22][k] - s[21][k];
+        s[26][k] = p[4] * s[25][k];
+    }
+    s[0][k + 1] = s[10][k] / (k + 1);
+    s[1][k + 1] = s[12][k] / (k + 1);
+    s[2][k + 1] = s[17][k] / (k + 1);
+    s[3][k + 1] = s[19][k] / (k + 1);
+    s[4][k + 1] = s[24][k] / (k + 1);
+    s[5][k + 1] = s[26][k] / (k + 1);
+}
+
+/* The slope of the path at a point m. */
+static void ablowitz_ladik3_path_field(const double *coef, const double p[6], const double m[6],
+    double field[6])
+{
+    double e[27];
+    (void)coef;
+    memcpy(e, m, 6 * sizeof e[0]);
     e[6] = e[0] * e[0];
     e[7] = 1.0 - e[6];
     e[8] = e[1] * e[1];
@@ -417,79 +379,48 @@ static int ablowitz_ladik3_holds(const double *coef, const double p[6], const do
     field[3] = e[19];
     field[4] = e[24];
     field[5] = e[26];
-    for (int i = 0; i < 6; ++i) scale += fabs(m[i]) + fabs(slope[i]);
-    for (int i = 0; i < 6; ++i)
+}
+
+/* ---- The implicit step, along paths dm/dt = pi(m) p ---- */
+enum {
+    ablowitz_ladik3_LONGEST_PATH = 128, /* pieces of a path, a power of 2 */
+    /* of all paths that are tried in a solve: steps that need more are wrong by as much as the state */
+    ablowitz_ladik3_MOST_PIECES = 512
+};
+
+/* Whether dm/dt = pi(m) p holds at a point m, where the expansion has the given slope: one with gaps between
+   its terms, like t + t^9, or across the kink of an absolute value, only looks as if it had converged. */
+static int ablowitz_ladik3_holds(const double *coef, const double p[ablowitz_ladik3_DIM],
+    const double m[ablowitz_ladik3_DIM], const double slope[ablowitz_ladik3_DIM])
+{
+    double field[ablowitz_ladik3_DIM], scale = 0.0;
+    ablowitz_ladik3_path_field(coef, p, m, field);
+    for (int i = 0; i < ablowitz_ladik3_DIM; ++i) scale += fabs(m[i]) + fabs(slope[i]);
+    for (int i = 0; i < ablowitz_ladik3_DIM; ++i)
         if (!(fabs(field[i] - slope[i]) <= 2e-15 * scale)) return 0;
     return 1;
 }
 
-/* The path dm/dt = pi(m) p, 0 <= t <= 1, from start, by its Taylor series: change is m(1) - start, mean the mean of
-   m - start. The number of terms follows from their size; 0 if 30 do not suffice. */
-static int ablowitz_ladik3_piece(const double *coef, const double p[6], const double start[6], double change[6],
-    double mean[6])
+/* A path for 0 <= t <= 1, from start, by its Taylor series: change is m(1) - start, mean the mean of m -
+   start. The number of terms follows from their size; 0 if ablowitz_ladik3_TERMS do not suffice. */
+static int ablowitz_ladik3_piece(const double *coef, const double p[ablowitz_ladik3_DIM],
+    const double start[ablowitz_ladik3_DIM], double change[ablowitz_ladik3_DIM],
+    double mean[ablowitz_ladik3_DIM])
 {
-    (void)coef;
-    double s[27][30 + 1], end[6], slope[6], norm = 0.0;
+    double series[ablowitz_ladik3_SERIES][ablowitz_ladik3_TERMS + 1], fixed[ablowitz_ladik3_FIXED],
+        end[ablowitz_ladik3_DIM], slope[ablowitz_ladik3_DIM], norm = 0.0;
     int small = 0;
-    for (int i = 0; i < 6; ++i) {
-        s[i][0] = start[i];
+    for (int i = 0; i < ablowitz_ladik3_DIM; ++i) {
+        series[i][0] = start[i];
         change[i] = mean[i] = slope[i] = 0.0;
         norm += fabs(start[i]);
     }
-    s[6][0] = s[0][0] * s[0][0];
-    s[7][0] = 1.0 - s[6][0];
-    s[8][0] = s[1][0] * s[1][0];
-    s[9][0] = s[7][0] - s[8][0];
-    s[10][0] = p[1] * s[9][0];
-    s[11][0] = s[8][0] - s[7][0];
-    s[12][0] = p[0] * s[11][0];
-    s[13][0] = s[2][0] * s[2][0];
-    s[14][0] = 1.0 - s[13][0];
-    s[15][0] = s[3][0] * s[3][0];
-    s[16][0] = s[14][0] - s[15][0];
-    s[17][0] = p[3] * s[16][0];
-    s[18][0] = s[15][0] - s[14][0];
-    s[19][0] = p[2] * s[18][0];
-    s[20][0] = s[4][0] * s[4][0];
-    s[21][0] = 1.0 - s[20][0];
-    s[22][0] = s[5][0] * s[5][0];
-    s[23][0] = s[21][0] - s[22][0];
-    s[24][0] = p[5] * s[23][0];
-    s[25][0] = s[22][0] - s[21][0];
-    s[26][0] = p[4] * s[25][0];
-    for (int k = 0; k < 30; ++k) {
-        if (k > 0) {
-            s[6][k] = ablowitz_ladik3_taylor_product(s[0], s[0], k);
-            s[7][k] = -s[6][k];
-            s[8][k] = ablowitz_ladik3_taylor_product(s[1], s[1], k);
-            s[9][k] = s[7][k] - s[8][k];
-            s[10][k] = p[1] * s[9][k];
-            s[11][k] = s[8][k] - s[7][k];
-            s[12][k] = p[0] * s[11][k];
-            s[13][k] = ablowitz_ladik3_taylor_product(s[2], s[2], k);
-            s[14][k] = -s[13][k];
-            s[15][k] = ablowitz_ladik3_taylor_product(s[3], s[3], k);
-            s[16][k] = s[14][k] - s[15][k];
-            s[17][k] = p[3] * s[16][k];
-            s[18][k] = s[15][k] - s[14][k];
-            s[19][k] = p[2] * s[18][k];
-            s[20][k] = ablowitz_ladik3_taylor_product(s[4], s[4], k);
-            s[21][k] = -s[20][k];
-            s[22][k] = ablowitz_ladik3_taylor_product(s[5], s[5], k);
-            s[23][k] = s[21][k] - s[22][k];
-            s[24][k] = p[5] * s[23][k];
-            s[25][k] = s[22][k] - s[21][k];
-            s[26][k] = p[4] * s[25][k];
-        }
-        s[0][k + 1] = s[10][k] / (k + 1);
-        s[1][k + 1] = s[12][k] / (k + 1);
-        s[2][k + 1] = s[17][k] / (k + 1);
-        s[3][k + 1] = s[19][k] / (k + 1);
-        s[4][k + 1] = s[24][k] / (k + 1);
-        s[5][k + 1] = s[26][k] / (k + 1);
+    ablowitz_ladik3_path_begin(coef, p, series, fixed);
+    for (int k = 0; k < ablowitz_ladik3_TERMS; ++k) {
+        ablowitz_ladik3_path_order(coef, p, series, fixed, k);
         int negligible = 1;
-        for (int i = 0; i < 6; ++i) {
-            const double term = s[i][k + 1];
+        for (int i = 0; i < ablowitz_ladik3_DIM; ++i) {
+            const double term = series[i][k + 1];
             change[i] += term;
             mean[i] += term / (k + 2);
             slope[i] += (k + 1) * term;
@@ -502,23 +433,26 @@ static int ablowitz_ladik3_piece(const double *coef, const double p[6], const do
     return 0;
 }
 
-/* The whole path from x, in 1, 2, 4, ... pieces until each expansion converges. Whatever p is, the end of the path
-   lies on the symplectic leaf of x. 0 if the path is too long or leaves the domain. *made counts all pieces. */
-static int ablowitz_ladik3_path(const double *coef, const double x[6], const double p[6], double change[6],
-    double mean[6], int *made)
+/* The whole path from x, in 1, 2, 4, ... pieces until each expansion converges. Whatever p is, the end of the
+   path lies on the symplectic leaf of x. 0 if the path is too long or leaves the domain. *made counts all
+   pieces. */
+static int ablowitz_ladik3_path(const double *coef, const double x[ablowitz_ladik3_DIM],
+    const double p[ablowitz_ladik3_DIM], double change[ablowitz_ladik3_DIM], double mean[ablowitz_ladik3_DIM],
+    int *made)
 {
-    for (int pieces = 1; pieces <= 128; pieces *= 2) {
-        double q[6], point[6], shift[6], local[6];
+    for (int pieces = 1; pieces <= ablowitz_ladik3_LONGEST_PATH; pieces *= 2) {
+        double q[ablowitz_ladik3_DIM], point[ablowitz_ladik3_DIM], shift[ablowitz_ladik3_DIM],
+            local[ablowitz_ladik3_DIM];
         int good = 1;
-        for (int i = 0; i < 6; ++i) {
+        for (int i = 0; i < ablowitz_ladik3_DIM; ++i) {
             q[i] = p[i] / pieces;
             change[i] = mean[i] = 0.0;
         }
         for (int piece = 0; piece < pieces && good; ++piece) {
-            for (int i = 0; i < 6; ++i) point[i] = x[i] + change[i];
+            for (int i = 0; i < ablowitz_ladik3_DIM; ++i) point[i] = x[i] + change[i];
             good = ablowitz_ladik3_piece(coef, q, point, shift, local);
             ++*made;
-            for (int i = 0; i < 6; ++i) {
+            for (int i = 0; i < ablowitz_ladik3_DIM; ++i) {
                 mean[i] += (change[i] + local[i]) / pieces;
                 change[i] += shift[i];
             }
@@ -530,47 +464,53 @@ static int ablowitz_ladik3_path(const double *coef, const double x[6], const dou
 
 /* The residual p - grad S_h(mean of the path) of the equation for p, with that mean y, the path's change of
    x and an approximate Jacobian of the residual. 0 if the path cannot be followed. */
-static int ablowitz_ladik3_residual(ablowitz_ladik3_solver *s, const double *coef, const double p[6], double y[6],
-    double residual[6], double change[6], double jacobian[36],
-    int *made)
+static int ablowitz_ladik3_residual(ablowitz_ladik3_solver *s, const double *coef,
+    const double p[ablowitz_ladik3_DIM], double y[ablowitz_ladik3_DIM], double residual[ablowitz_ladik3_DIM],
+    double change[ablowitz_ladik3_DIM], double jacobian[ablowitz_ladik3_DIM * ablowitz_ladik3_DIM], int *made)
 {
-    double mean[6];
+    double mean[ablowitz_ladik3_DIM];
     if (!ablowitz_ladik3_path(coef, s->x, p, change, mean, made)) return 0;
-    for (int i = 0; i < 6; ++i) y[i] = s->x[i] + mean[i];
+    for (int i = 0; i < ablowitz_ladik3_DIM; ++i) y[i] = s->x[i] + mean[i];
     ablowitz_ladik3_generate(coef, y, residual, jacobian);
-    for (int i = 0; i < 6; ++i) residual[i] = p[i] - residual[i];
+    for (int i = 0; i < ablowitz_ladik3_DIM; ++i) residual[i] = p[i] - residual[i];
     ++s->evaluations;
     return 1;
 }
 
 /* The Jacobian by differences, for steps so large that the approximate one does not contract. */
-static int ablowitz_ladik3_differences(ablowitz_ladik3_solver *s, const double *coef, const double p[6],
-    const double residual[6], double jacobian[36], int *made)
+static int ablowitz_ladik3_differences(ablowitz_ladik3_solver *s, const double *coef,
+    const double p[ablowitz_ladik3_DIM], const double residual[ablowitz_ladik3_DIM],
+    double jacobian[ablowitz_ladik3_DIM * ablowitz_ladik3_DIM], int *made)
 {
-    double q[6], y[6], moved[6], change[6], unused[36], norm = DBL_MIN;
-    for (int i = 0; i < 6; ++i) norm = fabs(p[i]) > norm ? fabs(p[i]) : norm;
-    for (int j = 0; j < 6; ++j) {
+    double q[ablowitz_ladik3_DIM], y[ablowitz_ladik3_DIM], moved[ablowitz_ladik3_DIM],
+        change[ablowitz_ladik3_DIM], unused[ablowitz_ladik3_DIM * ablowitz_ladik3_DIM], norm = DBL_MIN;
+    for (int i = 0; i < ablowitz_ladik3_DIM; ++i) norm = fabs(p[i]) > norm ? fabs(p[i]) : norm;
+    for (int j = 0; j < ablowitz_ladik3_DIM; ++j) {
         memcpy(q, p, sizeof q);
         q[j] += 1e-7 * norm;
         if (!ablowitz_ladik3_residual(s, coef, q, y, moved, change, unused, made)) return 0;
-        for (int i = 0; i < 6; ++i) jacobian[i * 6 + j] = (moved[i] - residual[i]) / (q[j] - p[j]);
+        for (int i = 0; i < ablowitz_ladik3_DIM; ++i)
+            jacobian[i * ablowitz_ladik3_DIM + j] = (moved[i] - residual[i]) / (q[j] - p[j]);
     }
     return 1;
 }
 
-/* Solve p = grad S_h(mean of the path from x under p) and move to the end of that path. Where that takes more than
-   512 pieces of paths, the step is so large that a solution would mean nothing. */
+/* Solve p = grad S_h(mean of the path from x under p) and move to the end of that path. Where that takes more
+   than ablowitz_ladik3_MOST_PIECES pieces of paths, the step is so large that a solution would mean nothing.
+   */
 static ablowitz_ladik3_status ablowitz_ladik3_attempt(ablowitz_ladik3_solver *s, int stage)
 {
-    const double *coef = s->coef[stage], none[6] = { 0.0 };
-    ablowitz_ladik3_memory *memory = &s->memory[stage];
-    double p[6], y[6], residual[6], change[6], jacobian[36], previous = HUGE_VAL;
-    if (!ablowitz_ladik3_predict(memory, y)) memcpy(y, s->x, sizeof y);
+    const double *coef = s->coef[stage], none[ablowitz_ladik3_DIM] = { 0.0 };
+    double p[ablowitz_ladik3_DIM], y[ablowitz_ladik3_DIM], residual[ablowitz_ladik3_DIM],
+        change[ablowitz_ladik3_DIM], jacobian[ablowitz_ladik3_DIM * ablowitz_ladik3_DIM], previous = HUGE_VAL;
+    if (!ablowitz_ladik3_predict(&s->history[stage], y)) memcpy(y, s->x, sizeof y);
     ablowitz_ladik3_generate(coef, y, p, jacobian);
-    for (int iteration = 0, made = 0; iteration < 20 && made <= 512; ++iteration) {
-        if (!ablowitz_ladik3_residual(s, coef, p, y, residual, change, jacobian, &made)) return ablowitz_ladik3_NO_CONVERGENCE;
+    for (int iteration = 0, made = 0; iteration < ablowitz_ladik3_MAX_ITERATIONS && made <=
+        ablowitz_ladik3_MOST_PIECES; ++iteration) {
+        if (!ablowitz_ladik3_residual(s, coef, p, y, residual, change, jacobian, &made))
+            return ablowitz_ladik3_NO_CONVERGENCE;
         double size = 0.0, norm = DBL_MIN;
-        for (int i = 0; i < 6; ++i) {
+        for (int i = 0; i < ablowitz_ladik3_DIM; ++i) {
             if (!isfinite(residual[i])) return ablowitz_ladik3_NOT_FINITE;
             size = fabs(residual[i]) > size ? fabs(residual[i]) : size;
             norm = fabs(p[i]) > norm ? fabs(p[i]) : norm;
@@ -580,48 +520,29 @@ static ablowitz_ladik3_status ablowitz_ladik3_attempt(ablowitz_ladik3_solver *s,
         if (size <= 4e-16 || (previous < 1e-12 && size > 0.25 * previous)) {
             if (!ablowitz_ladik3_plausible(s, stage, change)) return ablowitz_ladik3_NO_CONVERGENCE;
             if (!ablowitz_ladik3_advance(s, change, none)) return ablowitz_ladik3_NOT_FINITE;
-            ablowitz_ladik3_remember(memory, y, iteration);
+            ablowitz_ladik3_remember(&s->history[stage], y);
             return ablowitz_ladik3_OK;
         }
         const int slow = iteration >= 3 && size > 0.05 * previous;
-        if (slow && !ablowitz_ladik3_differences(s, coef, p, residual, jacobian, &made)) return ablowitz_ladik3_NO_CONVERGENCE;
+        if (slow && !ablowitz_ladik3_differences(s, coef, p, residual, jacobian, &made))
+            return ablowitz_ladik3_NO_CONVERGENCE;
         if (!ablowitz_ladik3_solve(jacobian, residual)) return ablowitz_ladik3_SINGULAR;
-        for (int i = 0; i < 6; ++i) p[i] -= residual[i];
+        for (int i = 0; i < ablowitz_ladik3_DIM; ++i) p[i] -= residual[i];
         previous = size;
     }
     return ablowitz_ladik3_NO_CONVERGENCE;
 }
 
-/* The 5 stages of one step. If one fails, the state is as before the step. */
-static ablowitz_ladik3_status ablowitz_ladik3_stages(ablowitz_ladik3_solver *s)
-{
-    double x[6], carry[6];
-    memcpy(x, s->x, sizeof x);
-    memcpy(carry, s->carry, sizeof carry);
-    for (int stage = 0; stage < 5; ++stage) {
-        ablowitz_ladik3_status status = ablowitz_ladik3_attempt(s, stage);
-        /* A guess from earlier steps may have misled it: once more without. */
-        if (status != ablowitz_ladik3_OK && s->memory[stage].count > 0) {
-            memset(&s->memory[stage], 0, sizeof s->memory[stage]);
-            status = ablowitz_ladik3_attempt(s, stage);
-        }
-        if (status != ablowitz_ladik3_OK) {
-            memcpy(s->x, x, sizeof x);
-            memcpy(s->carry, carry, sizeof carry);
-            return status;
-        }
-    }
-    return ablowitz_ladik3_OK;
-}
-
-/* All of ablowitz_ladik3_init but the gauge. The arguments may be parts of *s: they are read before it is written. */
-static ablowitz_ladik3_status ablowitz_ladik3_start(ablowitz_ladik3_solver *s, const ablowitz_ladik3_params *params, const double x0[6])
+/* ---- The solver ---- */
+/* The arguments may be parts of *s: they are read before it is written. */
+ablowitz_ladik3_status ablowitz_ladik3_init(ablowitz_ladik3_solver *s, const ablowitz_ladik3_params *params,
+    const double x0[ablowitz_ladik3_DIM])
 {
     if (s == NULL || x0 == NULL) return ablowitz_ladik3_BAD_ARGUMENT;
     const ablowitz_ladik3_params own = params != NULL ? *params : ablowitz_ladik3_default_params;
-    double x[6];
+    double x[ablowitz_ladik3_DIM];
     memcpy(x, x0, sizeof x);
-    for (int i = 0; i < 6; ++i)
+    for (int i = 0; i < ablowitz_ladik3_DIM; ++i)
         if (!isfinite(x[i])) return ablowitz_ladik3_BAD_ARGUMENT;
     memset(s, 0, sizeof *s);
     memcpy(s->x, x, sizeof s->x);
@@ -629,24 +550,46 @@ static ablowitz_ladik3_status ablowitz_ladik3_start(ablowitz_ladik3_solver *s, c
     return ablowitz_ladik3_OK;
 }
 
-ablowitz_ladik3_status ablowitz_ladik3_init(ablowitz_ladik3_solver *s, const ablowitz_ladik3_params *params,
-                                            const double x0[6])
-{
-    return ablowitz_ladik3_start(s, params, x0);
-}
-
 /* What depends on the step size; nothing where that is as before. */
 static ablowitz_ladik3_status ablowitz_ladik3_set_step(ablowitz_ladik3_solver *s, double h)
 {
     if (s == NULL || !isfinite(h)) return ablowitz_ladik3_BAD_ARGUMENT;
-    if (s->ready && memcmp(&h, &s->h, sizeof h) == 0) return ablowitz_ladik3_OK;
-    for (int stage = 0; stage < 5; ++stage)
+    if (s->prepared && memcmp(&h, &s->h, sizeof h) == 0) return ablowitz_ladik3_OK;
+    for (int stage = 0; stage < ablowitz_ladik3_STAGES; ++stage)
         ablowitz_ladik3_prepare(&s->params, ablowitz_ladik3_fractions[stage] * h, s->coef[stage]);
-    memset(s->memory, 0, sizeof s->memory);
-    for (int stage = 0; stage < 5; ++stage) s->memory[stage].patience = 150;
+    memset(&s->history, 0, sizeof s->history);
     s->h = h;
-    s->ready = 1;
+    s->t_before_h = s->t;
+    s->steps_before_h = s->steps;
+    s->prepared = 1;
     return ablowitz_ladik3_OK;
+}
+
+/* One stage. A guess from earlier steps may have misled it: then once more without. */
+static ablowitz_ladik3_status ablowitz_ladik3_stage(ablowitz_ladik3_solver *s, int stage)
+{
+    ablowitz_ladik3_status status = ablowitz_ladik3_attempt(s, stage);
+    if (status != ablowitz_ladik3_OK && s->history[stage].count > 0) {
+        memset(&s->history[stage], 0, sizeof s->history[stage]);
+        status = ablowitz_ladik3_attempt(s, stage);
+    }
+    return status;
+}
+
+/* The stages of one step. If one fails, the state is as before the step. */
+static ablowitz_ladik3_status ablowitz_ladik3_stages(ablowitz_ladik3_solver *s)
+{
+    double x[ablowitz_ladik3_DIM], carry[ablowitz_ladik3_DIM];
+    ablowitz_ladik3_status status = ablowitz_ladik3_OK;
+    memcpy(x, s->x, sizeof x);
+    memcpy(carry, s->carry, sizeof carry);
+    for (int stage = 0; stage < ablowitz_ladik3_STAGES && status == ablowitz_ladik3_OK; ++stage)
+        status = ablowitz_ladik3_stage(s, stage);
+    if (status != ablowitz_ladik3_OK) {
+        memcpy(s->x, x, sizeof x);
+        memcpy(s->carry, carry, sizeof carry);
+    }
+    return status;
 }
 
 ablowitz_ladik3_status ablowitz_ladik3_step(ablowitz_ladik3_solver *s, double h)
@@ -654,126 +597,53 @@ ablowitz_ladik3_status ablowitz_ladik3_step(ablowitz_ladik3_solver *s, double h)
     ablowitz_ladik3_status status = ablowitz_ladik3_set_step(s, h);
     if (status != ablowitz_ladik3_OK) return status;
     status = ablowitz_ladik3_stages(s);
-    if (status == ablowitz_ladik3_OK) ++s->steps;
+    if (status != ablowitz_ladik3_OK) return status;
+    ++s->steps;
+    s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
     return status;
 }
 
 ablowitz_ladik3_status ablowitz_ladik3_integrate(ablowitz_ladik3_solver *s, double h, size_t steps)
 {
     ablowitz_ladik3_status status = ablowitz_ladik3_set_step(s, h);
-    for (size_t k = 0; k < steps && status == ablowitz_ladik3_OK; ++k) status = ablowitz_ladik3_step(s, h);
+    for (; steps > 0 && status == ablowitz_ladik3_OK; --steps) status = ablowitz_ladik3_step(s, h);
     return status;
 }
 
+const char *ablowitz_ladik3_status_string(ablowitz_ladik3_status status)
+{
+    static const char *const text[] = {
+        "ok",
+        "no convergence: the step is too large",
+        "singular Newton matrix: the step is too large",
+        "not finite: overflow, or outside the domain",
+        "bad argument: a null pointer, or values that are not allowed"
+    };
+    return (unsigned)status <= ablowitz_ladik3_BAD_ARGUMENT ? text[status] : "unknown status";
+}
+
+size_t ablowitz_ladik3_solver_size(void) { return sizeof(ablowitz_ladik3_solver); }
+
+size_t ablowitz_ladik3_solver_steps_done(const ablowitz_ladik3_solver *s) { return s->steps; }
+
+/* ---- Ensembles ---- */
 ablowitz_ladik3_status ablowitz_ladik3_ensemble(const ablowitz_ladik3_params *params, double *x,
-                                                size_t members, double h, size_t steps, unsigned char *status)
+    size_t members, double h, size_t steps, unsigned char *status)
 {
     ablowitz_ladik3_status worst = isfinite(h) ? ablowitz_ladik3_OK : ablowitz_ladik3_BAD_ARGUMENT;
     const ablowitz_ladik3_params own = params != NULL ? *params : ablowitz_ladik3_default_params;
     if (x == NULL && members > 0) return ablowitz_ladik3_BAD_ARGUMENT;
     for (size_t m = 0; m < members; ++m) {
         ablowitz_ladik3_solver s;
-        double x0[6];
-        for (size_t i = 0; i < 6; ++i) x0[i] = x[i * members + m];
+        double x0[ablowitz_ladik3_DIM];
+        for (size_t i = 0; i < ablowitz_ladik3_DIM; ++i) x0[i] = x[i * members + m];
         ablowitz_ladik3_status member = ablowitz_ladik3_init(&s, &own, x0);
         if (member == ablowitz_ladik3_OK) {
             member = ablowitz_ladik3_integrate(&s, h, steps);
-            for (size_t i = 0; i < 6; ++i) x[i * members + m] = s.x[i];
+            for (size_t i = 0; i < ablowitz_ladik3_DIM; ++i) x[i * members + m] = s.x[i];
         }
         if (status != NULL) status[m] = (unsigned char)member;
         if (worst == ablowitz_ladik3_OK) worst = member;
     }
     return worst;
 }
-
-/* the Hamiltonian */
-static void ablowitz_ladik3_energy(const ablowitz_ladik3_params *params, const double x[6],
-                                   double energy[restrict 1])
-{
-    (void)params;
-    const double x1 = x[0];
-    const double y1 = x[1];
-    const double x2 = x[2];
-    const double y2 = x[3];
-    const double x3 = x[4];
-    const double y3 = x[5];
-    const double t1 = log(1.0 - x1 * x1 - y1 * y1) + (y1 * y3 + (x1 * x3 + (y2 * y3 + (x2 * x3 + (x1 * x2 + y1 * y2)))));
-    energy[0] = log(1.0 - x3 * x3 - y3 * y3) + (log(1.0 - x2 * x2 - y2 * y2) + t1);
-}
-
-/* the Casimirs */
-static void ablowitz_ladik3_casimir_values(const ablowitz_ladik3_params *params, const double x[6],
-                                           double out[restrict 1])
-{
-    (void)params;
-    (void)x;
-    (void)out;
-}
-
-/* pi(x) grad H(x) */
-static void ablowitz_ladik3_field(const ablowitz_ladik3_params *params, const double x[6],
-                                  double out[restrict 6])
-{
-    (void)params;
-    const double x1 = x[0];
-    const double y1 = x[1];
-    const double x2 = x[2];
-    const double y2 = x[3];
-    const double x3 = x[4];
-    const double y3 = x[5];
-    const double t1 = 1.0 - x1 * x1;
-    const double t2 = y1 * y1;
-    const double t3 = t1 - t2;
-    const double t4 = 1.0 / t3;
-    const double t5 = 1.0 - x2 * x2;
-    const double t6 = y2 * y2;
-    const double t7 = t5 - t6;
-    const double t8 = 1.0 / t7;
-    const double t9 = 1.0 - x3 * x3;
-    const double t10 = y3 * y3;
-    const double t11 = t9 - t10;
-    const double t12 = 1.0 / t11;
-    out[0] = t3 * (y2 + y3 - 2.0 * (y1 * t4));
-    out[1] = (t2 - t1) * (x2 + x3 - 2.0 * (x1 * t4));
-    out[2] = t7 * (y1 + y3 - 2.0 * (y2 * t8));
-    out[3] = (t6 - t5) * (x1 + x3 - 2.0 * (x2 * t8));
-    out[4] = t11 * (y1 + y2 - 2.0 * (y3 * t12));
-    out[5] = (t10 - t9) * (x1 + x2 - 2.0 * (x3 * t12));
-}
-
-double ablowitz_ladik3_hamiltonian(const ablowitz_ladik3_params *params, const double x[6])
-{
-    double energy[1];
-    ablowitz_ladik3_energy(params != NULL ? params : &ablowitz_ladik3_default_params, x, energy);
-    return energy[0];
-}
-
-void ablowitz_ladik3_casimirs(const ablowitz_ladik3_params *params, const double x[6], double out[])
-{
-    double value[1]; /* out may overlap x */
-    ablowitz_ladik3_casimir_values(params != NULL ? params : &ablowitz_ladik3_default_params, x, value);
-    for (int i = 0; i < 0; ++i) out[i] = value[i];
-}
-
-void ablowitz_ladik3_vector_field(const ablowitz_ladik3_params *params, const double x[6], double out[6])
-{
-    double value[6];
-    ablowitz_ladik3_field(params != NULL ? params : &ablowitz_ladik3_default_params, x, value);
-    memcpy(out, value, sizeof value);
-}
-
-const char *ablowitz_ladik3_status_string(ablowitz_ladik3_status status)
-{
-    switch (status) {
-    case ablowitz_ladik3_OK: return "ok";
-    case ablowitz_ladik3_NO_CONVERGENCE: return "no convergence: the step is too large";
-    case ablowitz_ladik3_SINGULAR: return "singular Newton matrix: the step is too large";
-    case ablowitz_ladik3_NOT_FINITE: return "not finite: overflow, or outside the domain";
-    case ablowitz_ladik3_BAD_ARGUMENT: return "bad argument: a null pointer, or values that are not allowed";
-    }
-    return "unknown status";
-}
-
-size_t ablowitz_ladik3_solver_size(void) { return sizeof(ablowitz_ladik3_solver); }
-
-size_t ablowitz_ladik3_solver_steps_done(const ablowitz_ladik3_solver *s) { return s->steps; }

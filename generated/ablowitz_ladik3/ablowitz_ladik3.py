@@ -7,17 +7,17 @@
 #   composition: suzuki, 5 stages of order 2
 #   one evaluation of the equation for p: 39 additions, 90 multiplications, 3 divisions
 #
-# spec: ablowitz_ladik3, sha256 a19d6edf1db5d8f1f730a954b05596f3772fa764597865f240bd9a4588aef6f0
+# spec: ablowitz_ladik3, sha256 522a22e2eba41e15ba83081c2557c3d42d94541601f5914945494027ebf938e2
 # to regenerate: phigen build ablowitz_ladik3
 # DO NOT EDIT: change the spec and regenerate; edits are noticed by the checksum below.
 #
 # SPDX-License-Identifier: 0BSD
 # This file belongs to whoever generated it; phigen claims no rights in it.
-# body-sha256: efa0f0b1a9f4f4101f9d7206994a6822927ee5b3c05ff06a55ed92c73c326c71
+# body-sha256: 0bb18ca16117ff67829ee5510c7e9d3655750fffb4279df8e2b4807fe55898c4
 import numpy as np
 
 VERSION = "0.1.0"
-SPEC_SHA256 = "a19d6edf1db5d8f1f730a954b05596f3772fa764597865f240bd9a4588aef6f0"
+SPEC_SHA256 = "522a22e2eba41e15ba83081c2557c3d42d94541601f5914945494027ebf938e2"
 DIM = 6
 ORDER = 4
 COORDINATES = ("x1", "y1", "x2", "y2", "x3", "y3",)

@@ -7,34 +7,42 @@
  *   step: implicit in p, each path followed by its Taylor series to round-off
  *   one evaluation of the equation for p: 55 additions, 83 multiplications
  *
- * spec: charged_particle, sha256 5546f846c6444f019b02059d5ab6cdbbca691ad1ca1e12be887fb75f3eaa0a40
+ * spec: charged_particle, sha256 6bda6268e8c6b32b81eb7049d472c6dd6ed8376176c222eb700c90680204f278
  * to regenerate: phigen build charged_particle
  * DO NOT EDIT: change the spec and regenerate; edits are noticed by the checksum below.
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: f7247cec73bbd4a23001f6137c6a651eb503e5782d1c8855c5e193079025b7d7
+ *
+ *   1. The model
+ *   2. Compensated sums, linear equations
+ *   3. Starting guesses
+ *   4. The implicit step, along paths dm/dt = pi(m) p
+ *   5. The solver
+ *   6. Ensembles
+ * body-sha256: ee3a7b2fb20a726f81b5008f3df1e26c78576c1ac5add14aeac295d4cad65fdb
  */
 #include "charged_particle.h"
 
 #include <float.h>
-#include <limits.h>
 #include <math.h>
-#include <stdint.h>
 #include <string.h>
 
+/* ---- The model ---- */
 const charged_particle_params charged_particle_default_params = { 0 };
 
-/* A step of size h is the composition of these fractions of it. */
-static const double charged_particle_fractions[1] = { 1.0 };
+enum { charged_particle_MAX_ITERATIONS = 20 }; /* of an inner solve */
+/* most of the expansion of a path; one that needs more is cut into pieces */
+enum { charged_particle_TERMS = 30 };
+enum { charged_particle_SERIES = 19 }; /* of a path, those of the coordinates first */
+enum { charged_particle_FIXED = 1 };   /* values that are constant along a path */
 
 /* everything that depends on parameters and step size only */
-static void charged_particle_prepare(const charged_particle_params *params, double h, double coef[restrict 14])
+static void charged_particle_prepare(const charged_particle_params *params, double h,
+    double coef[restrict 14])
 {
     (void)params;
-    const double t1 = h * h;
-    const double t2 = h * t1;
-    const double t3 = h * (1.0 / 5.0 + 1.0 / 150.0 * t1);
+    const double t1 = h * h, t2 = h * t1, t3 = h * (1.0 / 5.0 + 1.0 / 150.0 * t1);
     const double t4 = h * (0.5 + 1.0 / 60.0 * t1);
     coef[0] = (-1.0 / 60.0) * t2;
     coef[1] = 2.0 * (h * (1.0 / 10.0 + 1.0 / 600.0 * t1));
@@ -54,55 +62,30 @@ static void charged_particle_prepare(const charged_particle_params *params, doub
 
 /* p = grad S_h(y), and the Jacobian 1 - Hess S_h(y) pi(y) / 2 of the equation for p, up to O(h^2) */
 static void charged_particle_generate(const double coef[14], const double y[6], double slope[restrict 6],
-                                      double jacobian[restrict 36])
+    double jacobian[restrict 36])
 {
-    const double x = y[0];
-    const double y_ = y[1];
-    const double z = y[2];
-    const double u = y[3];
-    const double v = y[4];
-    const double w = y[5];
-    const double t1 = y_ * y_;
-    const double t2 = coef[0] + coef[0] * t1;
-    const double t3 = coef[2] * t1;
-    const double t4 = x * x;
-    const double t5 = coef[2] + coef[2] * t4;
-    const double t6 = t3 + t5;
-    const double t7 = u * t6;
-    const double t8 = coef[3] * y_ + t7;
-    const double t9 = v * t6;
-    const double t10 = coef[4] * x + t9;
-    const double t11 = u * t8 + (coef[1] + v * t10);
-    const double t12 = coef[5] + coef[5] * t4;
-    const double t13 = coef[6] * y_ + t7;
-    const double t14 = coef[7] * x + t9;
-    const double t15 = u * t13 + (coef[1] + v * t14);
-    const double t16 = coef[2] + coef[10] * t4;
-    const double t17 = coef[9] + t4 * t16;
-    const double t18 = coef[10] * t1;
-    const double t19 = t18 + t5;
-    const double t20 = coef[9] + t1 * (coef[2] + t18);
-    const double t21 = t3 + t16;
-    const double t22 = x * (t7 + t8);
-    const double t23 = 0.5 * t22;
-    const double t24 = t2 + x * (t9 + t10);
-    const double t25 = coef[2] * x;
-    const double t26 = t1 + (1.0 + t4);
-    const double t27 = coef[2] * y_;
-    const double t28 = 2.0 * (v * (v * t27));
-    const double t29 = 2.0 * (u * t27);
-    const double t30 = 2.0 * (v * (coef[0] * y_)) + x * (t28 + u * (coef[3] + t29));
-    const double t31 = t12 + y_ * (t7 + t13);
-    const double t32 = y_ * (t9 + t14);
-    const double t33 = 0.5 * t32;
-    const double t34 = t17 + y_ * (y_ * t19);
-    const double t35 = t20 + x * (x * t21);
+    const double x = y[0], y_ = y[1], z = y[2], u = y[3], v = y[4], w = y[5];
+    /* slope */
+    const double t1 = y_ * y_, t2 = coef[0] + coef[0] * t1, t3 = coef[2] * t1, t4 = x * x;
+    const double t5 = coef[2] + coef[2] * t4, t6 = t3 + t5, t7 = u * t6, t8 = coef[3] * y_ + t7;
+    const double t9 = v * t6, t10 = coef[4] * x + t9, t11 = u * t8 + (coef[1] + v * t10);
+    const double t12 = coef[5] + coef[5] * t4, t13 = coef[6] * y_ + t7, t14 = coef[7] * x + t9;
+    const double t15 = u * t13 + (coef[1] + v * t14), t16 = coef[2] + coef[10] * t4;
+    const double t17 = coef[9] + t4 * t16, t18 = coef[10] * t1, t19 = t18 + t5;
+    const double t20 = coef[9] + t1 * (coef[2] + t18), t21 = t3 + t16;
     slope[0] = v * t2 + x * t11;
     slope[1] = u * t12 + y_ * t15;
     slope[2] = coef[8] * z;
     slope[3] = u * t17 + y_ * (t12 + y_ * (coef[5] * y_ + u * t19));
     slope[4] = v * t20 + x * (t2 + x * (coef[0] * x + v * t21));
     slope[5] = coef[11] * w;
+    /* jacobian */
+    const double t22 = x * (t7 + t8), t23 = 0.5 * t22, t24 = t2 + x * (t9 + t10), t25 = coef[2] * x;
+    const double t26 = t1 + (1.0 + t4), t27 = coef[2] * y_, t28 = 2.0 * (v * (v * t27));
+    const double t29 = 2.0 * (u * t27);
+    const double t30 = 2.0 * (v * (coef[0] * y_)) + x * (t28 + u * (coef[3] + t29));
+    const double t31 = t12 + y_ * (t7 + t13), t32 = y_ * (t9 + t14), t33 = 0.5 * t32;
+    const double t34 = t17 + y_ * (y_ * t19), t35 = t20 + x * (x * t21);
     jacobian[0] = 1.0 + t23;
     jacobian[1] = 0.5 * t24;
     jacobian[2] = 0.0;
@@ -141,244 +124,43 @@ static void charged_particle_generate(const double coef[14], const double y[6], 
     jacobian[35] = 1.0;
 }
 
-/* Solve matrix * solution = side, both overwritten, by elimination with partial pivoting. 0 if singular. */
-static int charged_particle_solve(double matrix[36], double side[6])
+/* the Hamiltonian */
+double charged_particle_hamiltonian(const charged_particle_params *params, const double x[6])
 {
-    for (int k = 0; k < 6; ++k) {
-        int best = k;
-        for (int i = k + 1; i < 6; ++i)
-            if (fabs(matrix[i * 6 + k]) > fabs(matrix[best * 6 + k])) best = i;
-        const double pivot = matrix[best * 6 + k];
-        if (!(fabs(pivot) > 0.0)) return 0;
-        for (int j = k; j < 6 && best != k; ++j) {
-            const double swap = matrix[k * 6 + j];
-            matrix[k * 6 + j] = matrix[best * 6 + j];
-            matrix[best * 6 + j] = swap;
-        }
-        const double swap = side[k];
-        side[k] = side[best];
-        side[best] = swap;
-        for (int i = k + 1; i < 6; ++i) {
-            const double factor = matrix[i * 6 + k] / pivot;
-            for (int j = k + 1; j < 6; ++j) matrix[i * 6 + j] -= factor * matrix[k * 6 + j];
-            side[i] -= factor * side[k];
-        }
-    }
-    for (int i = 6 - 1; i >= 0; --i) {
-        for (int j = i + 1; j < 6; ++j) side[i] -= matrix[i * 6 + j] * side[j];
-        side[i] /= matrix[i * 6 + i];
-    }
-    return 1;
+    (void)params;
+    const double x_ = x[0], y = x[1], z = x[2], u = x[3], v = x[4], w = x[5];
+    return 1.0 / 10.0 * (2.0 * (z * z) + (x_ * x_ + y * y)) + 0.5 * (w * w + (v * v + u * u));
 }
 
-/* Whether a guess is where the next values may be. Recurrences that were fitted to little else than rest, near a saddle,
-   may lead anywhere; and far away the equation of a step has solutions that have nothing to do with the motion. */
-static int charged_particle_near(const double guess[6], const double last[6])
+/* the Casimirs */
+void charged_particle_casimirs(const charged_particle_params *params, const double x[6], double out[])
 {
-    double distance = 0.0, size = 0.0;
-    for (int i = 0; i < 6; ++i) {
-        distance += fabs(guess[i] - last[i]);
-        size += fabs(last[i]);
-    }
-    return distance <= 4.0 * size;
+    (void)params, (void)x, (void)out;
 }
 
-/* The guess for the next value (y), from earlier ones; 0 if there is none. */
-static int charged_particle_predict(const charged_particle_memory *memory, double value[6])
+/* pi(x) grad H(x) */
+void charged_particle_vector_field(const charged_particle_params *params, const double x[6], double out[6])
 {
-    const int last = memory->count - 1;
-    double odd[6] = { 0.0 }, binomial = -1.0;
-    memset(value, 0, 6 * sizeof value[0]);
-    if (memory->fitting) {
-        for (int k = 0; k < memory->terms; k += 2)
-            for (int i = 0; i < 6; ++i) {
-                value[i] += memory->weight[k][i][0] * memory->past[last - k][i];
-                odd[i] += memory->weight[k + 1][i][0] * memory->past[last - 1 - k][i];
-            }
-        for (int i = 0; i < 6; ++i) value[i] += odd[i];
-    } else {
-        for (int k = 0; k < memory->order && k <= last; ++k) {
-            binomial *= -(double)(memory->order - k) / (k + 1);
-            for (int i = 0; i < 6; ++i) value[i] += binomial * memory->past[last - k][i];
-        }
-    }
-    return last >= 0 && charged_particle_near(value, memory->past[last]);
+    (void)params;
+    const double x_ = x[0], y = x[1], z = x[2], u = x[3], v = x[4], w = x[5];
+    const double t1 = y * y + (1.0 + x_ * x_);
+    out[0] = u;
+    out[1] = v;
+    out[2] = w;
+    out[3] = v * t1 - 1.0 / 5.0 * x_;
+    out[4] = (-1.0 / 5.0) * y - u * t1;
+    out[5] = (-2.0 / 5.0) * z;
 }
 
-/* Choose the guess that would have been best for a value that took several iterations. */
-static void charged_particle_judge(charged_particle_memory *memory, const double value[6])
+/* ---- Compensated sums, linear equations ---- */
+/* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to
+   its last bit: were it rounded with the change, corrections of one sign would add up to a drift. 0, and x as
+   before, if the sum is not finite. */
+static int charged_particle_advance(charged_particle_solver *s, const double change[charged_particle_DIM],
+    const double correction[charged_particle_DIM])
 {
-    double row[8 + 1][6], guess[6], least = HUGE_VAL, fitted = HUGE_VAL;
-    const int rows = memory->count < 8 ? memory->count : 8;
-    memcpy(row[0], value, sizeof row[0]);
-    for (int k = 0; k < rows; ++k) memcpy(row[k + 1], memory->past[memory->count - 1 - k], sizeof row[0]);
-    for (int order = 1; order <= rows; ++order) { /* row[0] becomes the backward difference of this order */
-        double size = 0.0;
-        for (int k = 0; k <= rows - order; ++k)
-            for (int i = 0; i < 6; ++i) row[k][i] -= row[k + 1][i];
-        for (int i = 0; i < 6; ++i) size += fabs(row[0][i]);
-        if (size < least) {
-            least = size;
-            memory->order = order;
-        }
-    }
-    memory->fitting = memory->terms > 0;
-    if (memory->fitting && charged_particle_predict(memory, guess)) {
-        fitted = 0.0;
-        for (int i = 0; i < 6; ++i) fitted += fabs(value[i] - guess[i]);
-    }
-    memory->fitting = memory->terms > 0 && fitted <= least;
-    if (memory->order == 0) memory->order = 1;
-}
-
-/* Make eight columns orthogonal to one, by the multiples of it that are put into r. Where that one is among the eight, those
-   up to it stay as they are, and inverse becomes one over its squared length. The number of rows is even. */
-static void charged_particle_project(int rows, double (*one)[8], int column, double *inverse, double (*eight)[8], double r[8])
-{
-    double even[8] = { 0.0 }, odd[8] = { 0.0 };
-    for (int i = 0; i < rows; i += 2) {
-        const double entry = one[i][column], next = one[i + 1][column];
-        for (int l = 0; l < 8; ++l) even[l] += entry * eight[i][l];
-        for (int l = 0; l < 8; ++l) odd[l] += next * eight[i + 1][l];
-    }
-    for (int l = 0; l < 8; ++l) even[l] += odd[l];
-    if (one == eight) {
-        *inverse = even[column] > 0.0 ? 1.0 / even[column] : 0.0;
-        memset(even, 0, ((size_t)column + 1) * sizeof even[0]);
-    }
-    for (int l = 0; l < 8; ++l) r[l] = even[l] *= *inverse;
-    for (int i = 0; i < rows; ++i) {
-        const double entry = one[i][column];
-        for (int l = 0; l < 8; ++l) eight[i][l] -= entry * even[l];
-    }
-}
-
-/* By how much recurrences miss the last of these values. */
-static double charged_particle_missed(const double *value, double (*weight)[8])
-{
-    enum { AHEAD = 1, WINDOW = 40, CHECKS = 8 };
-    double most = 0.0;
-    for (int i = 0; i < CHECKS; ++i) {
-        double guess[8] = { 0.0 };
-        for (int k = 0; k < WINDOW; ++k)
-            for (int l = 0; l < 8; ++l) guess[l] += weight[k][l] * value[i + WINDOW - 1 - k];
-        for (int l = 0; l < AHEAD; ++l) most = fmax(most, fabs(guess[l] - value[i + WINDOW + l]));
-    }
-    return most;
-}
-
-/* Fit the recurrences value[m + l] = sum of weight[k][..][l] * value[m - 1 - k], l = 0 ... 1 - 1, to the history of
-   a component: ridge least squares by modified Gram-Schmidt, the ridge at the level of rounding. Columns are taken in by
-   eights, until they leave next to nothing of the right-hand sides. How many past values are used; 0 if the recurrences do
-   not foresee the last values, which they were not fitted to. */
-static int charged_particle_train(charged_particle_memory *memory, int component)
-{
-    enum { AHEAD = 1, WINDOW = 40, ROWS = 64 };
-    double q[WINDOW / 8][ROWS + WINDOW][8], r[WINDOW / 8][WINDOW][8], inverse[WINDOW]; /* eight columns in each part */
-    double right[ROWS + WINDOW][8], weight[WINDOW][8], value[112], largest = 0.0, left = HUGE_VAL;
-    int terms = 0;
-    memset(q, 0, sizeof q);
-    memset(right, 0, sizeof right);
-    memset(weight, 0, sizeof weight);
-    for (int i = 0; i < 112; ++i) {
-        value[i] = memory->past[memory->count - 112 + i][component];
-        if (fabs(value[i]) > largest) largest = fabs(value[i]);
-    }
-    for (int i = 0; i < ROWS; ++i)
-        for (int l = 0; l < AHEAD; ++l) right[i][l] = value[i + WINDOW + l];
-    while (terms < WINDOW && left > 3e-12 * largest) {
-        const int part = terms / 8, rows = ROWS + terms + 8; /* further rows of the ridge are zero in these columns */
-        for (int i = 0; i < ROWS; ++i)
-            for (int l = 0; l < 8; ++l) q[part][i][l] = value[i + WINDOW - 1 - terms - l];
-        for (int l = 0; l < 8; ++l) q[part][ROWS + terms + l][l] = 1e-15 * largest;
-        for (int k = 0; k < terms; ++k) charged_particle_project(rows, q[k / 8], k % 8, &inverse[k], q[part], r[part][k]);
-        for (int l = 0; l < 8; ++l, ++terms) {
-            charged_particle_project(rows, q[part], l, &inverse[terms], q[part], r[part][terms]);
-            charged_particle_project(rows, q[part], l, &inverse[terms], right, weight[terms]);
-        }
-        double sum[8] = { 0.0 };
-        for (int i = 0; i < ROWS; ++i)
-            for (int l = 0; l < 8; ++l) sum[l] += fabs(right[i][l]);
-        left = 0.0;
-        for (int l = 0; l < 8; ++l) left += sum[l] / ROWS;
-    }
-    for (int k = terms - 1; k >= 0; --k)
-        for (int j = k + 1; j < terms; ++j)
-            for (int l = 0; l < 8; ++l) weight[k][l] -= r[j / 8][k][j % 8] * weight[j][l];
-    for (int k = 0; k < WINDOW; ++k) memcpy(memory->weight[k][component], weight[k], AHEAD * sizeof(double));
-    return charged_particle_missed(value + ROWS, weight) <= 1e-07 * largest ? terms : 0;
-}
-
-/* Drop what is old, if so many values would not fit into the history. */
-static void charged_particle_make_room(charged_particle_memory *memory, int values)
-{
-    if (memory->count + values <= 224) return;
-    memmove(memory->past, memory->past + memory->count - 112, 112 * sizeof memory->past[0]);
-    memory->count = 112;
-}
-
-/* Add a value to the history. */
-static void charged_particle_record(charged_particle_memory *memory, const double value[6])
-{
-    charged_particle_make_room(memory, 1);
-    memcpy(memory->past[memory->count++], value, 6 * sizeof value[0]);
-}
-
-/* Fit the recurrence to the last values; with every time, wait longer before it is done again. */
-static void charged_particle_fit(charged_particle_memory *memory)
-{
-    int found = 1;
-    memory->terms = 0;
-    for (int i = 0; i < 6 && found; ++i) {
-        const int terms = charged_particle_train(memory, i);
-        found = terms > 0;
-        if (terms > memory->terms) memory->terms = terms;
-    }
-    if (!found) memory->terms = 0;
-    memory->fitting = found;
-    ++memory->fits;
-    memory->slow = 0;
-    memory->patience = memory->patience < 10000 ? 2 * memory->patience + 150 : 20000;
-}
-
-/* Take in the solved value: what took one iteration needs no better guess. */
-static void charged_particle_remember(charged_particle_memory *memory, const double value[6], int iterations)
-{
-    if (iterations > 1) charged_particle_judge(memory, value);
-    charged_particle_record(memory, value);
-    memory->slow = iterations > 1 ? memory->slow + 1 : 0;
-    if (memory->slow > memory->patience && memory->count >= 112) charged_particle_fit(memory);
-}
-
-/* Whether an increment is that of the motion. Where the step is too large, the equation may have been solved by a point far
-   away, at another energy, that has nothing to do with it. */
-static int charged_particle_plausible(const charged_particle_solver *s, int stage, const double increment[6])
-{
-    double moved = 0.0, size = 0.0, field[6], middle[6], end[6];
-    for (int i = 0; i < 6; ++i) {
-        moved += fabs(increment[i]);
-        size += fabs(s->x[i]);
-    }
-    if (moved <= 1.5 * size) return 1;
-    charged_particle_vector_field(&s->params, s->x, field);
-    for (int i = 0; i < 6; ++i) {
-        size += fabs(charged_particle_fractions[stage] * s->h * field[i]);
-        middle[i] = s->x[i] + 0.5 * increment[i];
-        end[i] = s->x[i] + increment[i];
-    }
-    if (moved <= 1.5 * size) return 1;
-    const double before = charged_particle_hamiltonian(&s->params, s->x), after = charged_particle_hamiltonian(&s->params, end);
-    const double scale = fabs(before) + fabs(charged_particle_hamiltonian(&s->params, middle)) + fabs(after);
-    return fabs(after - before) <= 0.5 * scale;
-}
-
-/* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to its last
-   bit: were it rounded with the change, corrections of one sign would add up to a drift. 0, and x as before, if the
-   sum is not finite. */
-static int charged_particle_advance(charged_particle_solver *s, const double change[6], const double correction[6])
-{
-    double x[6], carry[6];
-    for (int i = 0; i < 6; ++i) {
+    double x[charged_particle_DIM], carry[charged_particle_DIM];
+    for (int i = 0; i < charged_particle_DIM; ++i) {
         const double sum = s->x[i] + change[i], added = sum - s->x[i];
         const double lost = (s->x[i] - (sum - added)) + (change[i] - added);
         const double small = lost + (s->carry[i] + correction[i]);
@@ -391,6 +173,113 @@ static int charged_particle_advance(charged_particle_solver *s, const double cha
     return 1;
 }
 
+/* Solve matrix * solution = side, both overwritten, by elimination with partial pivoting. 0 if singular. */
+static int charged_particle_solve(double matrix[charged_particle_DIM * charged_particle_DIM],
+    double side[charged_particle_DIM])
+{
+    for (int k = 0; k < charged_particle_DIM; ++k) {
+        int best = k;
+        for (int i = k + 1; i < charged_particle_DIM; ++i)
+            if (fabs(matrix[i * charged_particle_DIM + k]) > fabs(matrix[best * charged_particle_DIM + k]))
+                best = i;
+        const double pivot = matrix[best * charged_particle_DIM + k], last = side[k];
+        if (!(fabs(pivot) > 0.0)) return 0;
+        for (int j = k; j < charged_particle_DIM && best != k; ++j) {
+            const double swap = matrix[k * charged_particle_DIM + j];
+            matrix[k * charged_particle_DIM + j] = matrix[best * charged_particle_DIM + j];
+            matrix[best * charged_particle_DIM + j] = swap;
+        }
+        side[k] = side[best];
+        side[best] = last;
+        for (int i = k + 1; i < charged_particle_DIM; ++i) {
+            const double factor = matrix[i * charged_particle_DIM + k] / pivot;
+            for (int j = k + 1; j < charged_particle_DIM; ++j)
+                matrix[i * charged_particle_DIM + j] -= factor * matrix[k * charged_particle_DIM + j];
+            side[i] -= factor * side[k];
+        }
+    }
+    for (int i = charged_particle_DIM - 1; i >= 0; --i) {
+        for (int j = i + 1; j < charged_particle_DIM; ++j)
+            side[i] -= matrix[i * charged_particle_DIM + j] * side[j];
+        side[i] /= matrix[i * charged_particle_DIM + i];
+    }
+    return 1;
+}
+
+/* ---- Starting guesses ---- */
+/* How far from the last value a guess may be, in sizes of that value. */
+#define charged_particle_REACH 4.0
+
+/* The guess for the next value from the last ones: the sum of their backward differences. 0 if there is none,
+   or if it is far away, where the equation of a step has solutions that have nothing to do with the motion.
+   */
+static int charged_particle_predict(const charged_particle_history *history,
+    double value[charged_particle_DIM])
+{
+    double distance = 0.0, size = 0.0;
+    for (int i = 0; i < charged_particle_DIM; ++i) {
+        value[i] = 0.0;
+        for (int k = 0; k < history->order; ++k) value[i] += history->difference[k][i];
+        distance += fabs(value[i] - history->difference[0][i]);
+        size += fabs(history->difference[0][i]);
+    }
+    return history->order > 0 && distance <= charged_particle_REACH * size;
+}
+
+/* Take in the solved value. The guess of order k missed it by its k-th difference: the next is of the best
+   order. */
+static void charged_particle_remember(charged_particle_history *history,
+    const double value[charged_particle_DIM])
+{
+    double least = HUGE_VAL, next[charged_particle_DIM];
+    memcpy(next, value, sizeof next);
+    for (int k = 0; k <= history->count && k < charged_particle_DIFFERENCES; ++k) {
+        double size = 0.0;
+        for (int i = 0; i < charged_particle_DIM; ++i) {
+            const double last = history->difference[k][i];
+            history->difference[k][i] = next[i];
+            size += fabs(next[i]);
+            next[i] -= last;
+        }
+        if (k > 0 && size < least) {
+            least = size;
+            history->order = k;
+        }
+    }
+    if (history->count == 0) history->order = 1;
+    if (history->count < charged_particle_DIFFERENCES) ++history->count;
+}
+
+/* How far a step may lead, in sizes of the state and of what the vector field says, if the energy is lost;
+   and the part of the energy that counts as lost. */
+#define charged_particle_PLAUSIBLE 1.5
+#define charged_particle_LOST 0.5
+
+/* Whether an increment is that of the motion. Where the step is too large, the equation may have been solved
+   by a point far away, at another energy, that has nothing to do with it. */
+static int charged_particle_plausible(const charged_particle_solver *s,
+    const double increment[charged_particle_DIM])
+{
+    double moved = 0.0, size = 0.0, field[charged_particle_DIM], middle[charged_particle_DIM],
+        end[charged_particle_DIM];
+    for (int i = 0; i < charged_particle_DIM; ++i) {
+        moved += fabs(increment[i]);
+        size += fabs(s->x[i]);
+    }
+    if (moved <= charged_particle_PLAUSIBLE * size) return 1;
+    charged_particle_vector_field(&s->params, s->x, field);
+    for (int i = 0; i < charged_particle_DIM; ++i) {
+        size += fabs(s->h * field[i]);
+        middle[i] = s->x[i] + 0.5 * increment[i];
+        end[i] = s->x[i] + increment[i];
+    }
+    if (moved <= charged_particle_PLAUSIBLE * size) return 1;
+    const double before = charged_particle_hamiltonian(&s->params, s->x), after =
+        charged_particle_hamiltonian(&s->params, end);
+    const double scale = fabs(before) + fabs(charged_particle_hamiltonian(&s->params, middle)) + fabs(after);
+    return fabs(after - before) <= charged_particle_LOST * scale;
+}
+
 /* Coefficient k of the product of two Taylor series. */
 static double charged_particle_taylor_product(const double *a, const double *b, int k)
 {
@@ -399,53 +288,12 @@ static double charged_particle_taylor_product(const double *a, const double *b, 
     return sum;
 }
 
-/* Whether dm/dt = pi(m) p holds at a point m, where the expansion has the given slope: one with gaps between its terms,
-   like t + t^9, or across the kink of an absolute value, only looks as if it had converged. */
-static int charged_particle_holds(const double *coef, const double p[6], const double m[6], const double slope[6])
+/* The first coefficients of the series of a path, those of the coordinates given. */
+static void charged_particle_path_begin(const double *coef, const double p[6],
+    double s[19][charged_particle_TERMS + 1], double f[1])
 {
     (void)coef;
-    const double f0 = -p[2];
-    double e[19], field[6], scale = 0.0;
-    memcpy(e, m, 6 * sizeof *e);
-    e[6] = e[1] * e[1];
-    e[7] = e[0] * e[0];
-    e[8] = 1.0 + e[7];
-    e[9] = e[6] + e[8];
-    e[10] = p[4] * e[9];
-    e[11] = e[10] - p[0];
-    e[12] = p[3] * e[9];
-    e[13] = p[1] + e[12];
-    e[14] = -e[13];
-    e[15] = p[3];
-    e[16] = p[4];
-    e[17] = p[5];
-    e[18] = f0;
-    field[0] = e[15];
-    field[1] = e[16];
-    field[2] = e[17];
-    field[3] = e[11];
-    field[4] = e[14];
-    field[5] = e[18];
-    for (int i = 0; i < 6; ++i) scale += fabs(m[i]) + fabs(slope[i]);
-    for (int i = 0; i < 6; ++i)
-        if (!(fabs(field[i] - slope[i]) <= 2e-15 * scale)) return 0;
-    return 1;
-}
-
-/* The path dm/dt = pi(m) p, 0 <= t <= 1, from start, by its Taylor series: change is m(1) - start, mean the mean of
-   m - start. The number of terms follows from their size; 0 if 30 do not suffice. */
-static int charged_particle_piece(const double *coef, const double p[6], const double start[6], double change[6],
-    double mean[6])
-{
-    (void)coef;
-    const double f0 = -p[2];
-    double s[19][30 + 1], end[6], slope[6], norm = 0.0;
-    int small = 0;
-    for (int i = 0; i < 6; ++i) {
-        s[i][0] = start[i];
-        change[i] = mean[i] = slope[i] = 0.0;
-        norm += fabs(start[i]);
-    }
+    f[0] = -p[2];
     s[6][0] = s[1][0] * s[1][0];
     s[7][0] = s[0][0] * s[0][0];
     s[8][0] = 1.0 + s[7][0];
@@ -458,32 +306,108 @@ static int charged_particle_piece(const double *coef, const double p[6], const d
     s[15][0] = p[3];
     s[16][0] = p[4];
     s[17][0] = p[5];
-    s[18][0] = f0;
-    for (int k = 0; k < 30; ++k) {
-        if (k > 0) {
-            s[6][k] = charged_particle_taylor_product(s[1], s[1], k);
-            s[7][k] = charged_particle_taylor_product(s[0], s[0], k);
-            s[8][k] = s[7][k];
-            s[9][k] = s[6][k] + s[8][k];
-            s[10][k] = p[4] * s[9][k];
-            s[11][k] = s[10][k];
-            s[12][k] = p[3] * s[9][k];
-            s[13][k] = s[12][k];
-            s[14][k] = -s[13][k];
-            s[15][k] = 0.0;
-            s[16][k] = 0.0;
-            s[17][k] = 0.0;
-            s[18][k] = 0.0;
-        }
-        s[0][k + 1] = s[15][k] / (k + 1);
-        s[1][k + 1] = s[16][k] / (k + 1);
-        s[2][k + 1] = s[17][k] / (k + 1);
-        s[3][k + 1] = s[11][k] / (k + 1);
-        s[4][k + 1] = s[14][k] / (k + 1);
-        s[5][k + 1] = s[18][k] / (k + 1);
+    s[18][0] = f[0];
+}
+
+/* Coefficient k of the series, and with it coefficient k + 1 of the coordinates. */
+static void charged_particle_path_order(const double *coef, const double p[6],
+    double s[19][charged_particle_TERMS + 1], const double f[1], int k)
+{
+    (void)coef;
+    (void)f;
+    if (k > 0) {
+        s[6][k] = charged_particle_taylor_product(s[1], s[1], k);
+        s[7][k] = charged_particle_taylor_product(s[0], s[0], k);
+        s[8][k] = s[7][k];
+        s[9][k] = s[6][k] + s[8][k];
+        s[10][k] = p[4] * s[9][k];
+        s[11][k] = s[10][k];
+        s[12][k] = p[3] * s[9][k];
+        s[13][k] = s[12][k];
+        s[14][k] = -s[13][k];
+        s[15][k] = 0.0;
+        s[16][k] = 0.0;
+        s[17][k] = 0.0;
+        s[18][k] = 0.0;
+    }
+    s[0][k + 1] = s[15][k] / (k + 1);
+    s[1][k + 1] = s[16][k] / (k + 1);
+    s[2][k + 1] = s[17][k] / (k + 1);
+    s[3][k + 1] = s[11][k] / (k + 1);
+    s[4][k + 1] = s[14][k] / (k + 1);
+    s[5][k + 1] = s[18][k] / (k + 1);
+}
+
+/* The slope of the path at a point m. */
+static void charged_particle_path_field(const double *coef, const double p[6], const double m[6],
+    double field[6])
+{
+    double e[19];
+    double f[1];
+    (void)coef;
+    f[0] = -p[2];
+    memcpy(e, m, 6 * sizeof e[0]);
+    e[6] = e[1] * e[1];
+    e[7] = e[0] * e[0];
+    e[8] = 1.0 + e[7];
+    e[9] = e[6] + e[8];
+    e[10] = p[4] * e[9];
+    e[11] = e[10] - p[0];
+    e[12] = p[3] * e[9];
+    e[13] = p[1] + e[12];
+    e[14] = -e[13];
+    e[15] = p[3];
+    e[16] = p[4];
+    e[17] = p[5];
+    e[18] = f[0];
+    field[0] = e[15];
+    field[1] = e[16];
+    field[2] = e[17];
+    field[3] = e[11];
+    field[4] = e[14];
+    field[5] = e[18];
+}
+
+/* ---- The implicit step, along paths dm/dt = pi(m) p ---- */
+enum {
+    charged_particle_LONGEST_PATH = 128, /* pieces of a path, a power of 2 */
+    /* of all paths that are tried in a solve: steps that need more are wrong by as much as the state */
+    charged_particle_MOST_PIECES = 512
+};
+
+/* Whether dm/dt = pi(m) p holds at a point m, where the expansion has the given slope: one with gaps between
+   its terms, like t + t^9, or across the kink of an absolute value, only looks as if it had converged. */
+static int charged_particle_holds(const double *coef, const double p[charged_particle_DIM],
+    const double m[charged_particle_DIM], const double slope[charged_particle_DIM])
+{
+    double field[charged_particle_DIM], scale = 0.0;
+    charged_particle_path_field(coef, p, m, field);
+    for (int i = 0; i < charged_particle_DIM; ++i) scale += fabs(m[i]) + fabs(slope[i]);
+    for (int i = 0; i < charged_particle_DIM; ++i)
+        if (!(fabs(field[i] - slope[i]) <= 2e-15 * scale)) return 0;
+    return 1;
+}
+
+/* A path for 0 <= t <= 1, from start, by its Taylor series: change is m(1) - start, mean the mean of m -
+   start. The number of terms follows from their size; 0 if charged_particle_TERMS do not suffice. */
+static int charged_particle_piece(const double *coef, const double p[charged_particle_DIM],
+    const double start[charged_particle_DIM], double change[charged_particle_DIM],
+    double mean[charged_particle_DIM])
+{
+    double series[charged_particle_SERIES][charged_particle_TERMS + 1], fixed[charged_particle_FIXED],
+        end[charged_particle_DIM], slope[charged_particle_DIM], norm = 0.0;
+    int small = 0;
+    for (int i = 0; i < charged_particle_DIM; ++i) {
+        series[i][0] = start[i];
+        change[i] = mean[i] = slope[i] = 0.0;
+        norm += fabs(start[i]);
+    }
+    charged_particle_path_begin(coef, p, series, fixed);
+    for (int k = 0; k < charged_particle_TERMS; ++k) {
+        charged_particle_path_order(coef, p, series, fixed, k);
         int negligible = 1;
-        for (int i = 0; i < 6; ++i) {
-            const double term = s[i][k + 1];
+        for (int i = 0; i < charged_particle_DIM; ++i) {
+            const double term = series[i][k + 1];
             change[i] += term;
             mean[i] += term / (k + 2);
             slope[i] += (k + 1) * term;
@@ -496,23 +420,26 @@ static int charged_particle_piece(const double *coef, const double p[6], const d
     return 0;
 }
 
-/* The whole path from x, in 1, 2, 4, ... pieces until each expansion converges. Whatever p is, the end of the path
-   lies on the symplectic leaf of x. 0 if the path is too long or leaves the domain. *made counts all pieces. */
-static int charged_particle_path(const double *coef, const double x[6], const double p[6], double change[6],
-    double mean[6], int *made)
+/* The whole path from x, in 1, 2, 4, ... pieces until each expansion converges. Whatever p is, the end of the
+   path lies on the symplectic leaf of x. 0 if the path is too long or leaves the domain. *made counts all
+   pieces. */
+static int charged_particle_path(const double *coef, const double x[charged_particle_DIM],
+    const double p[charged_particle_DIM], double change[charged_particle_DIM],
+    double mean[charged_particle_DIM], int *made)
 {
-    for (int pieces = 1; pieces <= 128; pieces *= 2) {
-        double q[6], point[6], shift[6], local[6];
+    for (int pieces = 1; pieces <= charged_particle_LONGEST_PATH; pieces *= 2) {
+        double q[charged_particle_DIM], point[charged_particle_DIM], shift[charged_particle_DIM],
+            local[charged_particle_DIM];
         int good = 1;
-        for (int i = 0; i < 6; ++i) {
+        for (int i = 0; i < charged_particle_DIM; ++i) {
             q[i] = p[i] / pieces;
             change[i] = mean[i] = 0.0;
         }
         for (int piece = 0; piece < pieces && good; ++piece) {
-            for (int i = 0; i < 6; ++i) point[i] = x[i] + change[i];
+            for (int i = 0; i < charged_particle_DIM; ++i) point[i] = x[i] + change[i];
             good = charged_particle_piece(coef, q, point, shift, local);
             ++*made;
-            for (int i = 0; i < 6; ++i) {
+            for (int i = 0; i < charged_particle_DIM; ++i) {
                 mean[i] += (change[i] + local[i]) / pieces;
                 change[i] += shift[i];
             }
@@ -524,47 +451,55 @@ static int charged_particle_path(const double *coef, const double x[6], const do
 
 /* The residual p - grad S_h(mean of the path) of the equation for p, with that mean y, the path's change of
    x and an approximate Jacobian of the residual. 0 if the path cannot be followed. */
-static int charged_particle_residual(charged_particle_solver *s, const double *coef, const double p[6], double y[6],
-    double residual[6], double change[6], double jacobian[36],
-    int *made)
+static int charged_particle_residual(charged_particle_solver *s, const double *coef,
+    const double p[charged_particle_DIM], double y[charged_particle_DIM],
+    double residual[charged_particle_DIM], double change[charged_particle_DIM],
+    double jacobian[charged_particle_DIM * charged_particle_DIM], int *made)
 {
-    double mean[6];
+    double mean[charged_particle_DIM];
     if (!charged_particle_path(coef, s->x, p, change, mean, made)) return 0;
-    for (int i = 0; i < 6; ++i) y[i] = s->x[i] + mean[i];
+    for (int i = 0; i < charged_particle_DIM; ++i) y[i] = s->x[i] + mean[i];
     charged_particle_generate(coef, y, residual, jacobian);
-    for (int i = 0; i < 6; ++i) residual[i] = p[i] - residual[i];
+    for (int i = 0; i < charged_particle_DIM; ++i) residual[i] = p[i] - residual[i];
     ++s->evaluations;
     return 1;
 }
 
 /* The Jacobian by differences, for steps so large that the approximate one does not contract. */
-static int charged_particle_differences(charged_particle_solver *s, const double *coef, const double p[6],
-    const double residual[6], double jacobian[36], int *made)
+static int charged_particle_differences(charged_particle_solver *s, const double *coef,
+    const double p[charged_particle_DIM], const double residual[charged_particle_DIM],
+    double jacobian[charged_particle_DIM * charged_particle_DIM], int *made)
 {
-    double q[6], y[6], moved[6], change[6], unused[36], norm = DBL_MIN;
-    for (int i = 0; i < 6; ++i) norm = fabs(p[i]) > norm ? fabs(p[i]) : norm;
-    for (int j = 0; j < 6; ++j) {
+    double q[charged_particle_DIM], y[charged_particle_DIM], moved[charged_particle_DIM],
+        change[charged_particle_DIM], unused[charged_particle_DIM * charged_particle_DIM], norm = DBL_MIN;
+    for (int i = 0; i < charged_particle_DIM; ++i) norm = fabs(p[i]) > norm ? fabs(p[i]) : norm;
+    for (int j = 0; j < charged_particle_DIM; ++j) {
         memcpy(q, p, sizeof q);
         q[j] += 1e-7 * norm;
         if (!charged_particle_residual(s, coef, q, y, moved, change, unused, made)) return 0;
-        for (int i = 0; i < 6; ++i) jacobian[i * 6 + j] = (moved[i] - residual[i]) / (q[j] - p[j]);
+        for (int i = 0; i < charged_particle_DIM; ++i)
+            jacobian[i * charged_particle_DIM + j] = (moved[i] - residual[i]) / (q[j] - p[j]);
     }
     return 1;
 }
 
-/* Solve p = grad S_h(mean of the path from x under p) and move to the end of that path. Where that takes more than
-   512 pieces of paths, the step is so large that a solution would mean nothing. */
-static charged_particle_status charged_particle_attempt(charged_particle_solver *s, int stage)
+/* Solve p = grad S_h(mean of the path from x under p) and move to the end of that path. Where that takes more
+   than charged_particle_MOST_PIECES pieces of paths, the step is so large that a solution would mean nothing.
+   */
+static charged_particle_status charged_particle_attempt(charged_particle_solver *s)
 {
-    const double *coef = s->coef[stage], none[6] = { 0.0 };
-    charged_particle_memory *memory = &s->memory[stage];
-    double p[6], y[6], residual[6], change[6], jacobian[36], previous = HUGE_VAL;
-    if (!charged_particle_predict(memory, y)) memcpy(y, s->x, sizeof y);
+    const double *coef = s->coef, none[charged_particle_DIM] = { 0.0 };
+    double p[charged_particle_DIM], y[charged_particle_DIM], residual[charged_particle_DIM],
+        change[charged_particle_DIM], jacobian[charged_particle_DIM * charged_particle_DIM], previous =
+        HUGE_VAL;
+    if (!charged_particle_predict(&s->history, y)) memcpy(y, s->x, sizeof y);
     charged_particle_generate(coef, y, p, jacobian);
-    for (int iteration = 0, made = 0; iteration < 20 && made <= 512; ++iteration) {
-        if (!charged_particle_residual(s, coef, p, y, residual, change, jacobian, &made)) return charged_particle_NO_CONVERGENCE;
+    for (int iteration = 0, made = 0; iteration < charged_particle_MAX_ITERATIONS && made <=
+        charged_particle_MOST_PIECES; ++iteration) {
+        if (!charged_particle_residual(s, coef, p, y, residual, change, jacobian, &made))
+            return charged_particle_NO_CONVERGENCE;
         double size = 0.0, norm = DBL_MIN;
-        for (int i = 0; i < 6; ++i) {
+        for (int i = 0; i < charged_particle_DIM; ++i) {
             if (!isfinite(residual[i])) return charged_particle_NOT_FINITE;
             size = fabs(residual[i]) > size ? fabs(residual[i]) : size;
             norm = fabs(p[i]) > norm ? fabs(p[i]) : norm;
@@ -572,50 +507,31 @@ static charged_particle_status charged_particle_attempt(charged_particle_solver 
         size /= norm;
         /* The second test: residuals no longer shrink, the solve has reached the level of rounding. */
         if (size <= 4e-16 || (previous < 1e-12 && size > 0.25 * previous)) {
-            if (!charged_particle_plausible(s, stage, change)) return charged_particle_NO_CONVERGENCE;
+            if (!charged_particle_plausible(s, change)) return charged_particle_NO_CONVERGENCE;
             if (!charged_particle_advance(s, change, none)) return charged_particle_NOT_FINITE;
-            charged_particle_remember(memory, y, iteration);
+            charged_particle_remember(&s->history, y);
             return charged_particle_OK;
         }
         const int slow = iteration >= 3 && size > 0.05 * previous;
-        if (slow && !charged_particle_differences(s, coef, p, residual, jacobian, &made)) return charged_particle_NO_CONVERGENCE;
+        if (slow && !charged_particle_differences(s, coef, p, residual, jacobian, &made))
+            return charged_particle_NO_CONVERGENCE;
         if (!charged_particle_solve(jacobian, residual)) return charged_particle_SINGULAR;
-        for (int i = 0; i < 6; ++i) p[i] -= residual[i];
+        for (int i = 0; i < charged_particle_DIM; ++i) p[i] -= residual[i];
         previous = size;
     }
     return charged_particle_NO_CONVERGENCE;
 }
 
-/* The 1 stages of one step. If one fails, the state is as before the step. */
-static charged_particle_status charged_particle_stages(charged_particle_solver *s)
-{
-    double x[6], carry[6];
-    memcpy(x, s->x, sizeof x);
-    memcpy(carry, s->carry, sizeof carry);
-    for (int stage = 0; stage < 1; ++stage) {
-        charged_particle_status status = charged_particle_attempt(s, stage);
-        /* A guess from earlier steps may have misled it: once more without. */
-        if (status != charged_particle_OK && s->memory[stage].count > 0) {
-            memset(&s->memory[stage], 0, sizeof s->memory[stage]);
-            status = charged_particle_attempt(s, stage);
-        }
-        if (status != charged_particle_OK) {
-            memcpy(s->x, x, sizeof x);
-            memcpy(s->carry, carry, sizeof carry);
-            return status;
-        }
-    }
-    return charged_particle_OK;
-}
-
-/* All of charged_particle_init but the gauge. The arguments may be parts of *s: they are read before it is written. */
-static charged_particle_status charged_particle_start(charged_particle_solver *s, const charged_particle_params *params, const double x0[6])
+/* ---- The solver ---- */
+/* The arguments may be parts of *s: they are read before it is written. */
+charged_particle_status charged_particle_init(charged_particle_solver *s,
+    const charged_particle_params *params, const double x0[charged_particle_DIM])
 {
     if (s == NULL || x0 == NULL) return charged_particle_BAD_ARGUMENT;
     const charged_particle_params own = params != NULL ? *params : charged_particle_default_params;
-    double x[6];
+    double x[charged_particle_DIM];
     memcpy(x, x0, sizeof x);
-    for (int i = 0; i < 6; ++i)
+    for (int i = 0; i < charged_particle_DIM; ++i)
         if (!isfinite(x[i])) return charged_particle_BAD_ARGUMENT;
     memset(s, 0, sizeof *s);
     memcpy(s->x, x, sizeof s->x);
@@ -623,140 +539,83 @@ static charged_particle_status charged_particle_start(charged_particle_solver *s
     return charged_particle_OK;
 }
 
-charged_particle_status charged_particle_init(charged_particle_solver *s,
-                                              const charged_particle_params *params, const double x0[6])
-{
-    return charged_particle_start(s, params, x0);
-}
-
 /* What depends on the step size; nothing where that is as before. */
 static charged_particle_status charged_particle_set_step(charged_particle_solver *s, double h)
 {
     if (s == NULL || !isfinite(h)) return charged_particle_BAD_ARGUMENT;
-    if (s->ready && memcmp(&h, &s->h, sizeof h) == 0) return charged_particle_OK;
-    for (int stage = 0; stage < 1; ++stage)
-        charged_particle_prepare(&s->params, charged_particle_fractions[stage] * h, s->coef[stage]);
-    memset(s->memory, 0, sizeof s->memory);
-    for (int stage = 0; stage < 1; ++stage) s->memory[stage].patience = 150;
+    if (s->prepared && memcmp(&h, &s->h, sizeof h) == 0) return charged_particle_OK;
+    charged_particle_prepare(&s->params, h, s->coef);
+    memset(&s->history, 0, sizeof s->history);
     s->h = h;
-    s->ready = 1;
+    s->t_before_h = s->t;
+    s->steps_before_h = s->steps;
+    s->prepared = 1;
     return charged_particle_OK;
+}
+
+/* One stage. A guess from earlier steps may have misled it: then once more without. */
+static charged_particle_status charged_particle_stage(charged_particle_solver *s)
+{
+    charged_particle_status status = charged_particle_attempt(s);
+    if (status != charged_particle_OK && s->history.count > 0) {
+        memset(&s->history, 0, sizeof s->history);
+        status = charged_particle_attempt(s);
+    }
+    return status;
 }
 
 charged_particle_status charged_particle_step(charged_particle_solver *s, double h)
 {
     charged_particle_status status = charged_particle_set_step(s, h);
     if (status != charged_particle_OK) return status;
-    status = charged_particle_stages(s);
-    if (status == charged_particle_OK) ++s->steps;
+    status = charged_particle_stage(s);
+    if (status != charged_particle_OK) return status;
+    ++s->steps;
+    s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
     return status;
 }
 
 charged_particle_status charged_particle_integrate(charged_particle_solver *s, double h, size_t steps)
 {
     charged_particle_status status = charged_particle_set_step(s, h);
-    for (size_t k = 0; k < steps && status == charged_particle_OK; ++k) status = charged_particle_step(s, h);
+    for (; steps > 0 && status == charged_particle_OK; --steps) status = charged_particle_step(s, h);
     return status;
 }
 
+const char *charged_particle_status_string(charged_particle_status status)
+{
+    static const char *const text[] = {
+        "ok",
+        "no convergence: the step is too large",
+        "singular Newton matrix: the step is too large",
+        "not finite: overflow, or outside the domain",
+        "bad argument: a null pointer, or values that are not allowed"
+    };
+    return (unsigned)status <= charged_particle_BAD_ARGUMENT ? text[status] : "unknown status";
+}
+
+size_t charged_particle_solver_size(void) { return sizeof(charged_particle_solver); }
+
+size_t charged_particle_solver_steps_done(const charged_particle_solver *s) { return s->steps; }
+
+/* ---- Ensembles ---- */
 charged_particle_status charged_particle_ensemble(const charged_particle_params *params, double *x,
-                                                  size_t members, double h, size_t steps,
-                                                  unsigned char *status)
+    size_t members, double h, size_t steps, unsigned char *status)
 {
     charged_particle_status worst = isfinite(h) ? charged_particle_OK : charged_particle_BAD_ARGUMENT;
     const charged_particle_params own = params != NULL ? *params : charged_particle_default_params;
     if (x == NULL && members > 0) return charged_particle_BAD_ARGUMENT;
     for (size_t m = 0; m < members; ++m) {
         charged_particle_solver s;
-        double x0[6];
-        for (size_t i = 0; i < 6; ++i) x0[i] = x[i * members + m];
+        double x0[charged_particle_DIM];
+        for (size_t i = 0; i < charged_particle_DIM; ++i) x0[i] = x[i * members + m];
         charged_particle_status member = charged_particle_init(&s, &own, x0);
         if (member == charged_particle_OK) {
             member = charged_particle_integrate(&s, h, steps);
-            for (size_t i = 0; i < 6; ++i) x[i * members + m] = s.x[i];
+            for (size_t i = 0; i < charged_particle_DIM; ++i) x[i * members + m] = s.x[i];
         }
         if (status != NULL) status[m] = (unsigned char)member;
         if (worst == charged_particle_OK) worst = member;
     }
     return worst;
 }
-
-/* the Hamiltonian */
-static void charged_particle_energy(const charged_particle_params *params, const double x[6],
-                                    double energy[restrict 1])
-{
-    (void)params;
-    const double x_ = x[0];
-    const double y = x[1];
-    const double z = x[2];
-    const double u = x[3];
-    const double v = x[4];
-    const double w = x[5];
-    energy[0] = 1.0 / 10.0 * (2.0 * (z * z) + (x_ * x_ + y * y)) + 0.5 * (w * w + (v * v + u * u));
-}
-
-/* the Casimirs */
-static void charged_particle_casimir_values(const charged_particle_params *params, const double x[6],
-                                            double out[restrict 1])
-{
-    (void)params;
-    (void)x;
-    (void)out;
-}
-
-/* pi(x) grad H(x) */
-static void charged_particle_field(const charged_particle_params *params, const double x[6],
-                                   double out[restrict 6])
-{
-    (void)params;
-    const double x_ = x[0];
-    const double y = x[1];
-    const double z = x[2];
-    const double u = x[3];
-    const double v = x[4];
-    const double w = x[5];
-    const double t1 = y * y + (1.0 + x_ * x_);
-    out[0] = u;
-    out[1] = v;
-    out[2] = w;
-    out[3] = v * t1 - 1.0 / 5.0 * x_;
-    out[4] = (-1.0 / 5.0) * y - u * t1;
-    out[5] = (-2.0 / 5.0) * z;
-}
-
-double charged_particle_hamiltonian(const charged_particle_params *params, const double x[6])
-{
-    double energy[1];
-    charged_particle_energy(params != NULL ? params : &charged_particle_default_params, x, energy);
-    return energy[0];
-}
-
-void charged_particle_casimirs(const charged_particle_params *params, const double x[6], double out[])
-{
-    double value[1]; /* out may overlap x */
-    charged_particle_casimir_values(params != NULL ? params : &charged_particle_default_params, x, value);
-    for (int i = 0; i < 0; ++i) out[i] = value[i];
-}
-
-void charged_particle_vector_field(const charged_particle_params *params, const double x[6], double out[6])
-{
-    double value[6];
-    charged_particle_field(params != NULL ? params : &charged_particle_default_params, x, value);
-    memcpy(out, value, sizeof value);
-}
-
-const char *charged_particle_status_string(charged_particle_status status)
-{
-    switch (status) {
-    case charged_particle_OK: return "ok";
-    case charged_particle_NO_CONVERGENCE: return "no convergence: the step is too large";
-    case charged_particle_SINGULAR: return "singular Newton matrix: the step is too large";
-    case charged_particle_NOT_FINITE: return "not finite: overflow, or outside the domain";
-    case charged_particle_BAD_ARGUMENT: return "bad argument: a null pointer, or values that are not allowed";
-    }
-    return "unknown status";
-}
-
-size_t charged_particle_solver_size(void) { return sizeof(charged_particle_solver); }
-
-size_t charged_particle_solver_steps_done(const charged_particle_solver *s) { return s->steps; }

@@ -6,17 +6,17 @@
 #   step: implicit in p, each path followed by its Taylor series to round-off
 #   one evaluation of the equation for p: 55 additions, 83 multiplications
 #
-# spec: charged_particle, sha256 5546f846c6444f019b02059d5ab6cdbbca691ad1ca1e12be887fb75f3eaa0a40
+# spec: charged_particle, sha256 6bda6268e8c6b32b81eb7049d472c6dd6ed8376176c222eb700c90680204f278
 # to regenerate: phigen build charged_particle
 # DO NOT EDIT: change the spec and regenerate; edits are noticed by the checksum below.
 #
 # SPDX-License-Identifier: 0BSD
 # This file belongs to whoever generated it; phigen claims no rights in it.
-# body-sha256: d289c9f59fbb6ab2d10ba4e6e1627cc530f46aabc3d9ac72a17145ec46633980
+# body-sha256: bbf575ced265e0602dc06863117d8fe12ebda4fb0c22016cec7b1d1d3085fb92
 import numpy as np
 
 VERSION = "0.1.0"
-SPEC_SHA256 = "5546f846c6444f019b02059d5ab6cdbbca691ad1ca1e12be887fb75f3eaa0a40"
+SPEC_SHA256 = "6bda6268e8c6b32b81eb7049d472c6dd6ed8376176c222eb700c90680204f278"
 DIM = 6
 ORDER = 4
 COORDINATES = ("x", "y", "z", "u", "v", "w",)

@@ -7,26 +7,34 @@
  *   step: implicit, Newton iteration with the analytic matrix
  *   one Newton iteration: 5 additions, 21 multiplications
  *
- * spec: cyclotron, sha256 f90648e1d73073a8c40c47224a26fb5233122a8f534d5506c6c46aeebf7dde47
+ * spec: cyclotron, sha256 28619749874f2e10947903325f521330765638e5d2fdca830ed74dadbaba7614
  * to regenerate: phigen build cyclotron
  * DO NOT EDIT: change the spec and regenerate; edits are noticed by the checksum below.
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 0fc64e607d2503f7e6626eb736a329c859d7b40ea09c02dd03d00f38eba0669a
+ *
+ *   1. The model
+ *   2. Compensated sums, linear equations
+ *   3. Starting guesses
+ *   4. The implicit step, by Newton's method
+ *   5. The solver
+ *   6. Ensembles
+ * body-sha256: e198402416a137736dbff1544999a1dd6b7bba371d0f1ba40e8eade2f192beb6
  */
 #include "cyclotron.h"
 
 #include <float.h>
-#include <limits.h>
 #include <math.h>
-#include <stdint.h>
 #include <string.h>
 
+/* ---- The model ---- */
 const cyclotron_params cyclotron_default_params = { 0 };
 
-/* A step of size h is the composition of these fractions of it. */
-static const double cyclotron_fractions[1] = { 1.0 };
+enum { cyclotron_MAX_ITERATIONS = 20 }; /* of an inner solve */
+
+/* A correction is accepted when the error that it leaves is estimated to be below this. */
+#define cyclotron_TOLERANCE 1e-20
 
 /* everything that depends on parameters and step size only */
 static void cyclotron_prepare(const cyclotron_params *params, double h, double coef[restrict 3])
@@ -41,26 +49,24 @@ static void cyclotron_prepare(const cyclotron_params *params, double h, double c
 /* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
    increment, all with the momenta p = grad S_h(y) */
 static void cyclotron_linearise(const double coef[3], const double y[3], double displacement[restrict 3],
-                                double increment[restrict 3], double jacobian[restrict 9],
-                                double increment_jacobian[restrict 9])
+    double increment[restrict 3], double jacobian[restrict 9], double increment_jacobian[restrict 9])
 {
-    const double u = y[0];
-    const double v = y[1];
-    const double b = y[2];
+    const double u = y[0], v = y[1], b = y[2];
+    /* momenta */
     const double t1 = coef[0] + coef[1] * (b * b);
     const double p_v = v * t1;
-    const double t2 = b * p_v;
     const double p_u = u * t1;
-    const double t3 = b * p_u;
-    const double t4 = b * t1;
-    const double t5 = b * (coef[2] * (b * v));
-    const double t6 = b * (coef[2] * (b * u));
+    /* displacement */
+    const double t2 = b * p_v, t3 = b * p_u;
     displacement[0] = (-0.5) * t2;
     displacement[1] = 0.5 * t3;
     displacement[2] = 0.0;
+    /* increment */
     increment[0] = t2;
     increment[1] = -t3;
     increment[2] = 0.0;
+    /* jacobian */
+    const double t4 = b * t1, t5 = b * (coef[2] * (b * v)), t6 = b * (coef[2] * (b * u));
     jacobian[0] = 1.0;
     jacobian[1] = (-0.5) * t4;
     jacobian[2] = (-0.5) * p_v - 0.5 * t5;
@@ -70,6 +76,7 @@ static void cyclotron_linearise(const double coef[3], const double y[3], double 
     jacobian[6] = 0.0;
     jacobian[7] = 0.0;
     jacobian[8] = 1.0;
+    /* increment jacobian */
     increment_jacobian[0] = 0.0;
     increment_jacobian[1] = t4;
     increment_jacobian[2] = t5 + p_v;
@@ -81,275 +88,59 @@ static void cyclotron_linearise(const double coef[3], const double y[3], double 
     increment_jacobian[8] = 0.0;
 }
 
-/* Solve matrix * solution = side, both overwritten, by elimination with partial pivoting. 0 if singular. */
-static int cyclotron_solve_pivoting(double matrix[9], double side[3])
-{
-    for (int k = 0; k < 3; ++k) {
-        int best = k;
-        for (int i = k + 1; i < 3; ++i)
-            if (fabs(matrix[i * 3 + k]) > fabs(matrix[best * 3 + k])) best = i;
-        const double pivot = matrix[best * 3 + k];
-        if (!(fabs(pivot) > 0.0)) return 0;
-        for (int j = k; j < 3 && best != k; ++j) {
-            const double swap = matrix[k * 3 + j];
-            matrix[k * 3 + j] = matrix[best * 3 + j];
-            matrix[best * 3 + j] = swap;
-        }
-        const double swap = side[k];
-        side[k] = side[best];
-        side[best] = swap;
-        for (int i = k + 1; i < 3; ++i) {
-            const double factor = matrix[i * 3 + k] / pivot;
-            for (int j = k + 1; j < 3; ++j) matrix[i * 3 + j] -= factor * matrix[k * 3 + j];
-            side[i] -= factor * side[k];
-        }
-    }
-    for (int i = 3 - 1; i >= 0; --i) {
-        for (int j = i + 1; j < 3; ++j) side[i] -= matrix[i * 3 + j] * side[j];
-        side[i] /= matrix[i * 3 + i];
-    }
-    return 1;
-}
-
 /* elimination without pivoting: the solution, and the reciprocals of the pivots */
 static void cyclotron_eliminate(const double matrix[9], const double side[3], double solution[restrict 3],
-                                double reciprocal[restrict 3])
+    double reciprocal[restrict 3])
 {
-    const double t1 = 1.0 / matrix[0];
-    const double t2 = 1.0 / matrix[8];
-    const double t3 = side[0] - side[2] * (matrix[2] * t2);
-    const double t4 = matrix[3] * t1;
+    /* solution */
+    const double t1 = 1.0 / matrix[0], t2 = 1.0 / matrix[8];
+    const double t3 = side[0] - side[2] * (matrix[2] * t2), t4 = matrix[3] * t1;
     const double t5 = 1.0 / (matrix[4] - matrix[1] * t4);
     const double t6 = t5 * (side[1] - side[2] * (matrix[5] * t2) - t4 * t3);
     solution[0] = t1 * (t3 - matrix[1] * t6);
     solution[1] = t6;
     solution[2] = side[2] * t2;
+    /* reciprocal */
     reciprocal[0] = t1;
     reciprocal[1] = t5;
     reciprocal[2] = t2;
 }
 
-/* Solve matrix * solution = side, both overwritten. The matrix is I + O(h), so elimination without pivoting
-   does unless a pivot is far from 1. 0 if singular. */
-static int cyclotron_solve(double matrix[9], double side[3])
+/* the Hamiltonian */
+double cyclotron_hamiltonian(const cyclotron_params *params, const double x[3])
 {
-    double solution[3], reciprocal[3], largest = 0.0;
-    cyclotron_eliminate(matrix, side, solution, reciprocal);
-    for (int i = 0; i < 3; ++i)
-        if (!(fabs(reciprocal[i]) <= largest)) largest = fabs(reciprocal[i]);
-    if (!(largest < 1e3)) return cyclotron_solve_pivoting(matrix, side);
-    memcpy(side, solution, sizeof solution);
-    return 1;
+    (void)params;
+    const double u = x[0], v = x[1];
+    return 0.5 * (v * v + u * u);
 }
 
-/* Whether a guess is where the next values may be. Recurrences that were fitted to little else than rest, near a saddle,
-   may lead anywhere; and far away the equation of a step has solutions that have nothing to do with the motion. */
-static int cyclotron_near(const double guess[3], const double last[3])
+/* the Casimirs */
+void cyclotron_casimirs(const cyclotron_params *params, const double x[3], double out[])
 {
-    double distance = 0.0, size = 0.0;
-    for (int i = 0; i < 3; ++i) {
-        distance += fabs(guess[i] - last[i]);
-        size += fabs(last[i]);
-    }
-    return distance <= 4.0 * size;
+    (void)params;
+    const double b = x[2];
+    out[0] = b;
 }
 
-/* The guess for the next value (y), from earlier ones; 0 if there is none. */
-static int cyclotron_predict(const cyclotron_memory *memory, double value[3])
+/* pi(x) grad H(x) */
+void cyclotron_vector_field(const cyclotron_params *params, const double x[3], double out[3])
 {
-    const int last = memory->count - 1;
-    double odd[3] = { 0.0 }, binomial = -1.0;
-    memset(value, 0, 3 * sizeof value[0]);
-    if (memory->fitting) {
-        for (int k = 0; k < memory->terms; k += 2)
-            for (int i = 0; i < 3; ++i) {
-                value[i] += memory->weight[k][i][0] * memory->past[last - k][i];
-                odd[i] += memory->weight[k + 1][i][0] * memory->past[last - 1 - k][i];
-            }
-        for (int i = 0; i < 3; ++i) value[i] += odd[i];
-    } else {
-        for (int k = 0; k < memory->order && k <= last; ++k) {
-            binomial *= -(double)(memory->order - k) / (k + 1);
-            for (int i = 0; i < 3; ++i) value[i] += binomial * memory->past[last - k][i];
-        }
-    }
-    return last >= 0 && cyclotron_near(value, memory->past[last]);
+    (void)params;
+    const double u = x[0], v = x[1], b = x[2];
+    out[0] = b * v;
+    out[1] = -(b * u);
+    out[2] = 0.0;
 }
 
-/* Choose the guess that would have been best for a value that took several iterations. */
-static void cyclotron_judge(cyclotron_memory *memory, const double value[3])
+/* ---- Compensated sums, linear equations ---- */
+/* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to
+   its last bit: were it rounded with the change, corrections of one sign would add up to a drift. 0, and x as
+   before, if the sum is not finite. */
+static int cyclotron_advance(cyclotron_solver *s, const double change[cyclotron_DIM],
+    const double correction[cyclotron_DIM])
 {
-    double row[8 + 1][3], guess[3], least = HUGE_VAL, fitted = HUGE_VAL;
-    const int rows = memory->count < 8 ? memory->count : 8;
-    memcpy(row[0], value, sizeof row[0]);
-    for (int k = 0; k < rows; ++k) memcpy(row[k + 1], memory->past[memory->count - 1 - k], sizeof row[0]);
-    for (int order = 1; order <= rows; ++order) { /* row[0] becomes the backward difference of this order */
-        double size = 0.0;
-        for (int k = 0; k <= rows - order; ++k)
-            for (int i = 0; i < 3; ++i) row[k][i] -= row[k + 1][i];
-        for (int i = 0; i < 3; ++i) size += fabs(row[0][i]);
-        if (size < least) {
-            least = size;
-            memory->order = order;
-        }
-    }
-    memory->fitting = memory->terms > 0;
-    if (memory->fitting && cyclotron_predict(memory, guess)) {
-        fitted = 0.0;
-        for (int i = 0; i < 3; ++i) fitted += fabs(value[i] - guess[i]);
-    }
-    memory->fitting = memory->terms > 0 && fitted <= least;
-    if (memory->order == 0) memory->order = 1;
-}
-
-/* Make eight columns orthogonal to one, by the multiples of it that are put into r. Where that one is among the eight, those
-   up to it stay as they are, and inverse becomes one over its squared length. The number of rows is even. */
-static void cyclotron_project(int rows, double (*one)[8], int column, double *inverse, double (*eight)[8], double r[8])
-{
-    double even[8] = { 0.0 }, odd[8] = { 0.0 };
-    for (int i = 0; i < rows; i += 2) {
-        const double entry = one[i][column], next = one[i + 1][column];
-        for (int l = 0; l < 8; ++l) even[l] += entry * eight[i][l];
-        for (int l = 0; l < 8; ++l) odd[l] += next * eight[i + 1][l];
-    }
-    for (int l = 0; l < 8; ++l) even[l] += odd[l];
-    if (one == eight) {
-        *inverse = even[column] > 0.0 ? 1.0 / even[column] : 0.0;
-        memset(even, 0, ((size_t)column + 1) * sizeof even[0]);
-    }
-    for (int l = 0; l < 8; ++l) r[l] = even[l] *= *inverse;
-    for (int i = 0; i < rows; ++i) {
-        const double entry = one[i][column];
-        for (int l = 0; l < 8; ++l) eight[i][l] -= entry * even[l];
-    }
-}
-
-/* By how much recurrences miss the last of these values. */
-static double cyclotron_missed(const double *value, double (*weight)[8])
-{
-    enum { AHEAD = 8, WINDOW = 40, CHECKS = 8 };
-    double most = 0.0;
-    for (int i = 0; i < CHECKS; ++i) {
-        double guess[8] = { 0.0 };
-        for (int k = 0; k < WINDOW; ++k)
-            for (int l = 0; l < 8; ++l) guess[l] += weight[k][l] * value[i + WINDOW - 1 - k];
-        for (int l = 0; l < AHEAD; ++l) most = fmax(most, fabs(guess[l] - value[i + WINDOW + l]));
-    }
-    return most;
-}
-
-/* Fit the recurrences value[m + l] = sum of weight[k][..][l] * value[m - 1 - k], l = 0 ... 8 - 1, to the history of
-   a component: ridge least squares by modified Gram-Schmidt, the ridge at the level of rounding. Columns are taken in by
-   eights, until they leave next to nothing of the right-hand sides. How many past values are used; 0 if the recurrences do
-   not foresee the last values, which they were not fitted to. */
-static int cyclotron_train(cyclotron_memory *memory, int component)
-{
-    enum { AHEAD = 8, WINDOW = 40, ROWS = 56 };
-    double q[WINDOW / 8][ROWS + WINDOW][8], r[WINDOW / 8][WINDOW][8], inverse[WINDOW]; /* eight columns in each part */
-    double right[ROWS + WINDOW][8], weight[WINDOW][8], value[111], largest = 0.0, left = HUGE_VAL;
-    int terms = 0;
-    memset(q, 0, sizeof q);
-    memset(right, 0, sizeof right);
-    memset(weight, 0, sizeof weight);
-    for (int i = 0; i < 111; ++i) {
-        value[i] = memory->past[memory->count - 111 + i][component];
-        if (fabs(value[i]) > largest) largest = fabs(value[i]);
-    }
-    for (int i = 0; i < ROWS; ++i)
-        for (int l = 0; l < AHEAD; ++l) right[i][l] = value[i + WINDOW + l];
-    while (terms < WINDOW && left > 3e-12 * largest) {
-        const int part = terms / 8, rows = ROWS + terms + 8; /* further rows of the ridge are zero in these columns */
-        for (int i = 0; i < ROWS; ++i)
-            for (int l = 0; l < 8; ++l) q[part][i][l] = value[i + WINDOW - 1 - terms - l];
-        for (int l = 0; l < 8; ++l) q[part][ROWS + terms + l][l] = 1e-15 * largest;
-        for (int k = 0; k < terms; ++k) cyclotron_project(rows, q[k / 8], k % 8, &inverse[k], q[part], r[part][k]);
-        for (int l = 0; l < 8; ++l, ++terms) {
-            cyclotron_project(rows, q[part], l, &inverse[terms], q[part], r[part][terms]);
-            cyclotron_project(rows, q[part], l, &inverse[terms], right, weight[terms]);
-        }
-        double sum[8] = { 0.0 };
-        for (int i = 0; i < ROWS; ++i)
-            for (int l = 0; l < 8; ++l) sum[l] += fabs(right[i][l]);
-        left = 0.0;
-        for (int l = 0; l < 8; ++l) left += sum[l] / ROWS;
-    }
-    for (int k = terms - 1; k >= 0; --k)
-        for (int j = k + 1; j < terms; ++j)
-            for (int l = 0; l < 8; ++l) weight[k][l] -= r[j / 8][k][j % 8] * weight[j][l];
-    for (int k = 0; k < WINDOW; ++k) memcpy(memory->weight[k][component], weight[k], AHEAD * sizeof(double));
-    return cyclotron_missed(value + ROWS, weight) <= 1e-07 * largest ? terms : 0;
-}
-
-/* Drop what is old, if so many values would not fit into the history. */
-static void cyclotron_make_room(cyclotron_memory *memory, int values)
-{
-    if (memory->count + values <= 222) return;
-    memmove(memory->past, memory->past + memory->count - 111, 111 * sizeof memory->past[0]);
-    memory->count = 111;
-}
-
-/* Add a value to the history. */
-static void cyclotron_record(cyclotron_memory *memory, const double value[3])
-{
-    cyclotron_make_room(memory, 1);
-    memcpy(memory->past[memory->count++], value, 3 * sizeof value[0]);
-}
-
-/* Fit the recurrence to the last values; with every time, wait longer before it is done again. */
-static void cyclotron_fit(cyclotron_memory *memory)
-{
-    int found = 1;
-    memory->terms = 0;
-    for (int i = 0; i < 3 && found; ++i) {
-        const int terms = cyclotron_train(memory, i);
-        found = terms > 0;
-        if (terms > memory->terms) memory->terms = terms;
-    }
-    if (!found) memory->terms = 0;
-    memory->fitting = found;
-    ++memory->fits;
-    memory->slow = 0;
-    memory->patience = memory->patience < 10000 ? 2 * memory->patience + 150 : 20000;
-}
-
-/* Take in the solved value: what took one iteration needs no better guess. */
-static void cyclotron_remember(cyclotron_memory *memory, const double value[3], int iterations)
-{
-    if (iterations > 1) cyclotron_judge(memory, value);
-    cyclotron_record(memory, value);
-    memory->slow = iterations > 1 ? memory->slow + 1 : 0;
-    if (memory->slow > memory->patience && memory->count >= 111) cyclotron_fit(memory);
-}
-
-/* Whether an increment is that of the motion. Where the step is too large, the equation may have been solved by a point far
-   away, at another energy, that has nothing to do with it. */
-static int cyclotron_plausible(const cyclotron_solver *s, int stage, const double increment[3])
-{
-    double moved = 0.0, size = 0.0, field[3], middle[3], end[3];
-    for (int i = 0; i < 3; ++i) {
-        moved += fabs(increment[i]);
-        size += fabs(s->x[i]);
-    }
-    if (moved <= 1.5 * size) return 1;
-    cyclotron_vector_field(&s->params, s->x, field);
-    for (int i = 0; i < 3; ++i) {
-        size += fabs(cyclotron_fractions[stage] * s->h * field[i]);
-        middle[i] = s->x[i] + 0.5 * increment[i];
-        end[i] = s->x[i] + increment[i];
-    }
-    if (moved <= 1.5 * size) return 1;
-    const double before = cyclotron_hamiltonian(&s->params, s->x), after = cyclotron_hamiltonian(&s->params, end);
-    const double scale = fabs(before) + fabs(cyclotron_hamiltonian(&s->params, middle)) + fabs(after);
-    return fabs(after - before) <= 0.5 * scale;
-}
-
-/* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to its last
-   bit: were it rounded with the change, corrections of one sign would add up to a drift. 0, and x as before, if the
-   sum is not finite. */
-static int cyclotron_advance(cyclotron_solver *s, const double change[3], const double correction[3])
-{
-    double x[3], carry[3];
-    for (int i = 0; i < 3; ++i) {
+    double x[cyclotron_DIM], carry[cyclotron_DIM];
+    for (int i = 0; i < cyclotron_DIM; ++i) {
         const double sum = s->x[i] + change[i], added = sum - s->x[i];
         const double lost = (s->x[i] - (sum - added)) + (change[i] - added);
         const double small = lost + (s->carry[i] + correction[i]);
@@ -362,87 +153,157 @@ static int cyclotron_advance(cyclotron_solver *s, const double change[3], const 
     return 1;
 }
 
-/* Size of a correction relative to each component of y, but no finer than 1e-6 of the largest; NaN or infinite if
-   the correction is. */
-static double cyclotron_size(const double y[3], const double delta[3])
+/* Newton matrices are I + O(h): a pivot whose reciprocal is larger than this is far from 1. */
+#define cyclotron_LARGEST_RECIPROCAL 1e3
+
+/* Solve matrix * solution = side, both overwritten. The matrix is I + O(h): 0 if a pivot is far from 1. */
+static int cyclotron_solve(double matrix[cyclotron_DIM * cyclotron_DIM], double side[cyclotron_DIM])
+{
+    double solution[cyclotron_DIM], reciprocal[cyclotron_DIM], largest = 0.0;
+    cyclotron_eliminate(matrix, side, solution, reciprocal);
+    for (int i = 0; i < cyclotron_DIM; ++i)
+        if (!(fabs(reciprocal[i]) <= largest)) largest = fabs(reciprocal[i]);
+    if (!(largest < cyclotron_LARGEST_RECIPROCAL)) return 0;
+    memcpy(side, solution, sizeof solution);
+    return 1;
+}
+
+/* ---- Starting guesses ---- */
+/* How far from the last value a guess may be, in sizes of that value. */
+#define cyclotron_REACH 4.0
+
+/* The guess for the next value from the last ones: the sum of their backward differences. 0 if there is none,
+   or if it is far away, where the equation of a step has solutions that have nothing to do with the motion.
+   */
+static int cyclotron_predict(const cyclotron_history *history, double value[cyclotron_DIM])
+{
+    double distance = 0.0, size = 0.0;
+    for (int i = 0; i < cyclotron_DIM; ++i) {
+        value[i] = 0.0;
+        for (int k = 0; k < history->order; ++k) value[i] += history->difference[k][i];
+        distance += fabs(value[i] - history->difference[0][i]);
+        size += fabs(history->difference[0][i]);
+    }
+    return history->order > 0 && distance <= cyclotron_REACH * size;
+}
+
+/* Take in the solved value. The guess of order k missed it by its k-th difference: the next is of the best
+   order. */
+static void cyclotron_remember(cyclotron_history *history, const double value[cyclotron_DIM])
+{
+    double least = HUGE_VAL, next[cyclotron_DIM];
+    memcpy(next, value, sizeof next);
+    for (int k = 0; k <= history->count && k < cyclotron_DIFFERENCES; ++k) {
+        double size = 0.0;
+        for (int i = 0; i < cyclotron_DIM; ++i) {
+            const double last = history->difference[k][i];
+            history->difference[k][i] = next[i];
+            size += fabs(next[i]);
+            next[i] -= last;
+        }
+        if (k > 0 && size < least) {
+            least = size;
+            history->order = k;
+        }
+    }
+    if (history->count == 0) history->order = 1;
+    if (history->count < cyclotron_DIFFERENCES) ++history->count;
+}
+
+/* How far a step may lead, in sizes of the state and of what the vector field says, if the energy is lost;
+   and the part of the energy that counts as lost. */
+#define cyclotron_PLAUSIBLE 1.5
+#define cyclotron_LOST 0.5
+
+/* Whether an increment is that of the motion. Where the step is too large, the equation may have been solved
+   by a point far away, at another energy, that has nothing to do with it. */
+static int cyclotron_plausible(const cyclotron_solver *s, const double increment[cyclotron_DIM])
+{
+    double moved = 0.0, size = 0.0, field[cyclotron_DIM], middle[cyclotron_DIM], end[cyclotron_DIM];
+    for (int i = 0; i < cyclotron_DIM; ++i) {
+        moved += fabs(increment[i]);
+        size += fabs(s->x[i]);
+    }
+    if (moved <= cyclotron_PLAUSIBLE * size) return 1;
+    cyclotron_vector_field(&s->params, s->x, field);
+    for (int i = 0; i < cyclotron_DIM; ++i) {
+        size += fabs(s->h * field[i]);
+        middle[i] = s->x[i] + 0.5 * increment[i];
+        end[i] = s->x[i] + increment[i];
+    }
+    if (moved <= cyclotron_PLAUSIBLE * size) return 1;
+    const double before = cyclotron_hamiltonian(&s->params, s->x), after = cyclotron_hamiltonian(&s->params,
+        end);
+    const double scale = fabs(before) + fabs(cyclotron_hamiltonian(&s->params, middle)) + fabs(after);
+    return fabs(after - before) <= cyclotron_LOST * scale;
+}
+
+/* ---- The implicit step, by Newton's method ---- */
+/* Components of y are measured no finer than by this part of the largest. */
+#define cyclotron_FLOOR 1e-6
+
+/* Size of a correction relative to each component of y; NaN or infinite if the correction is. */
+static double cyclotron_size(const double y[cyclotron_DIM], const double delta[cyclotron_DIM])
 {
     double norm = 0.0, size = 0.0;
-    for (int i = 0; i < 3; ++i) norm = fabs(y[i]) > norm ? fabs(y[i]) : norm;
-    for (int i = 0; i < 3; ++i) {
-        const double ratio = fabs(delta[i]) / (fabs(y[i]) + 1e-6 * norm + DBL_MIN);
+    for (int i = 0; i < cyclotron_DIM; ++i) norm = fabs(y[i]) > norm ? fabs(y[i]) : norm;
+    for (int i = 0; i < cyclotron_DIM; ++i) {
+        const double ratio = fabs(delta[i]) / (fabs(y[i]) + cyclotron_FLOOR * norm + DBL_MIN);
         if (!isfinite(ratio)) return ratio;
         size = ratio > size ? ratio : size;
     }
     return size;
 }
 
+/* Corrections below the first that shrink by less than the second have reached the level of rounding. */
+#define cyclotron_NEARLY_SOLVED 1e-8
+#define cyclotron_SHRINKING 0.25
+
 /* Solve (y - x) + displacement(y) = 0 for y by Newton's method from the extrapolated guess, and advance. The
-   increment is corrected to first order by the last Newton correction, so that correction costs no evaluation:
-   a correction is accepted when the error that remains after it, quadratic in it, is below 1e-20. */
-static cyclotron_status cyclotron_attempt(cyclotron_solver *s, int stage)
+   increment is corrected to first order by the last Newton correction, so that correction costs no
+   evaluation: a correction is accepted when the error that remains after it, quadratic in it, is below
+   cyclotron_TOLERANCE. */
+static cyclotron_status cyclotron_attempt(cyclotron_solver *s)
 {
-    const double *coef = s->coef[stage];
-    cyclotron_memory *memory = &s->memory[stage];
-    double y[3], delta[3], displacement[3], increment[3];
-    double jacobian[9], increment_jacobian[9];
-    if (!cyclotron_predict(memory, y)) memcpy(y, s->x, sizeof y);
-    double previous = HUGE_VAL;
-    for (int iteration = 0; iteration < 20; ++iteration) {
-        cyclotron_linearise(coef, y, displacement, increment, jacobian, increment_jacobian);
+    double y[cyclotron_DIM], delta[cyclotron_DIM], displacement[cyclotron_DIM], increment[cyclotron_DIM];
+    double jacobian[cyclotron_DIM * cyclotron_DIM], increment_jacobian[cyclotron_DIM * cyclotron_DIM],
+        previous = HUGE_VAL;
+    if (!cyclotron_predict(&s->history, y)) memcpy(y, s->x, sizeof y);
+    for (int iteration = 1; iteration <= cyclotron_MAX_ITERATIONS; ++iteration) {
+        cyclotron_linearise(s->coef, y, displacement, increment, jacobian, increment_jacobian);
         ++s->evaluations;
-        for (int i = 0; i < 3; ++i) delta[i] = ((y[i] - s->x[i]) + displacement[i]) - s->carry[i];
+        for (int i = 0; i < cyclotron_DIM; ++i) delta[i] = ((y[i] - s->x[i]) + displacement[i]) - s->carry[i];
         const int regular = cyclotron_solve(jacobian, delta);
-        const double size = cyclotron_size(y, delta);
+        const double size = cyclotron_size(y, delta), growth = size / (previous * previous);
         if (!isfinite(size)) return cyclotron_NOT_FINITE;
         if (!regular) return cyclotron_SINGULAR;
-        for (int i = 0; i < 3; ++i) y[i] -= delta[i];
-        const double growth = size / (previous * previous);
+        for (int i = 0; i < cyclotron_DIM; ++i) y[i] -= delta[i];
         const double remaining = size * size * (growth > 1.0 ? growth : 1.0);
-        /* The second test: corrections no longer shrink, the solve has reached the level of rounding. */
-        if (remaining <= 1e-20 || (previous < 1e-8 && size > 0.25 * previous)) {
-            double correction[3] = { 0.0 };
-            for (int i = 0; i < 3; ++i)
-                for (int j = 0; j < 3; ++j) correction[i] -= increment_jacobian[i * 3 + j] * delta[j];
-            if (!cyclotron_plausible(s, stage, increment)) return cyclotron_NO_CONVERGENCE;
-            if (!cyclotron_advance(s, increment, correction)) return cyclotron_NOT_FINITE;
-            cyclotron_remember(memory, y, iteration + 1);
-            return cyclotron_OK;
-        }
+        const int stalled = previous < cyclotron_NEARLY_SOLVED && size > cyclotron_SHRINKING * previous;
         previous = size;
+        if (!(remaining <= cyclotron_TOLERANCE || stalled)) continue;
+        double correction[cyclotron_DIM] = { 0.0 };
+        for (int i = 0; i < cyclotron_DIM; ++i)
+            for (int j = 0; j < cyclotron_DIM; ++j)
+                correction[i] -= increment_jacobian[i * cyclotron_DIM + j] * delta[j];
+        if (!cyclotron_plausible(s, increment)) return cyclotron_NO_CONVERGENCE;
+        if (!cyclotron_advance(s, increment, correction)) return cyclotron_NOT_FINITE;
+        cyclotron_remember(&s->history, y);
+        return cyclotron_OK;
     }
     return cyclotron_NO_CONVERGENCE;
 }
 
-/* The 1 stages of one step. If one fails, the state is as before the step. */
-static cyclotron_status cyclotron_stages(cyclotron_solver *s)
-{
-    double x[3], carry[3];
-    memcpy(x, s->x, sizeof x);
-    memcpy(carry, s->carry, sizeof carry);
-    for (int stage = 0; stage < 1; ++stage) {
-        cyclotron_status status = cyclotron_attempt(s, stage);
-        /* A guess from earlier steps may have misled it: once more without. */
-        if (status != cyclotron_OK && s->memory[stage].count > 0) {
-            memset(&s->memory[stage], 0, sizeof s->memory[stage]);
-            status = cyclotron_attempt(s, stage);
-        }
-        if (status != cyclotron_OK) {
-            memcpy(s->x, x, sizeof x);
-            memcpy(s->carry, carry, sizeof carry);
-            return status;
-        }
-    }
-    return cyclotron_OK;
-}
-
-/* All of cyclotron_init but the gauge. The arguments may be parts of *s: they are read before it is written. */
-static cyclotron_status cyclotron_start(cyclotron_solver *s, const cyclotron_params *params, const double x0[3])
+/* ---- The solver ---- */
+/* The arguments may be parts of *s: they are read before it is written. */
+cyclotron_status cyclotron_init(cyclotron_solver *s, const cyclotron_params *params,
+    const double x0[cyclotron_DIM])
 {
     if (s == NULL || x0 == NULL) return cyclotron_BAD_ARGUMENT;
     const cyclotron_params own = params != NULL ? *params : cyclotron_default_params;
-    double x[3];
+    double x[cyclotron_DIM];
     memcpy(x, x0, sizeof x);
-    for (int i = 0; i < 3; ++i)
+    for (int i = 0; i < cyclotron_DIM; ++i)
         if (!isfinite(x[i])) return cyclotron_BAD_ARGUMENT;
     memset(s, 0, sizeof *s);
     memcpy(s->x, x, sizeof s->x);
@@ -450,928 +311,83 @@ static cyclotron_status cyclotron_start(cyclotron_solver *s, const cyclotron_par
     return cyclotron_OK;
 }
 
-cyclotron_status cyclotron_init(cyclotron_solver *s, const cyclotron_params *params, const double x0[3])
-{
-    return cyclotron_start(s, params, x0);
-}
-
 /* What depends on the step size; nothing where that is as before. */
 static cyclotron_status cyclotron_set_step(cyclotron_solver *s, double h)
 {
     if (s == NULL || !isfinite(h)) return cyclotron_BAD_ARGUMENT;
-    if (s->ready && memcmp(&h, &s->h, sizeof h) == 0) return cyclotron_OK;
-    for (int stage = 0; stage < 1; ++stage)
-        cyclotron_prepare(&s->params, cyclotron_fractions[stage] * h, s->coef[stage]);
-    memset(s->memory, 0, sizeof s->memory);
-    for (int stage = 0; stage < 1; ++stage) s->memory[stage].patience = 150;
-    s->pause = 16;
-    s->setback = s->foreseeing = 0;
-    s->doubt = s->retry = 0;
-    s->effort = 0.0;
-    s->passes = INT_MAX;
+    if (s->prepared && memcmp(&h, &s->h, sizeof h) == 0) return cyclotron_OK;
+    cyclotron_prepare(&s->params, h, s->coef);
+    memset(&s->history, 0, sizeof s->history);
     s->h = h;
-    s->ready = 1;
+    s->t_before_h = s->t;
+    s->steps_before_h = s->steps;
+    s->prepared = 1;
     return cyclotron_OK;
+}
+
+/* One stage. A guess from earlier steps may have misled it: then once more without. */
+static cyclotron_status cyclotron_stage(cyclotron_solver *s)
+{
+    cyclotron_status status = cyclotron_attempt(s);
+    if (status != cyclotron_OK && s->history.count > 0) {
+        memset(&s->history, 0, sizeof s->history);
+        status = cyclotron_attempt(s);
+    }
+    return status;
 }
 
 cyclotron_status cyclotron_step(cyclotron_solver *s, double h)
 {
     cyclotron_status status = cyclotron_set_step(s, h);
     if (status != cyclotron_OK) return status;
-    status = cyclotron_stages(s);
-    if (status == cyclotron_OK) ++s->steps;
+    status = cyclotron_stage(s);
+    if (status != cyclotron_OK) return status;
+    ++s->steps;
+    s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
     return status;
 }
 
-/*
- * Eight at a time: below, the formulas of a step are evaluated for 8 steps of a trajectory, or members of an
- * ensemble, at once. Compilers make vector instructions of the loops over lanes.
- */
-enum { cyclotron_LANES = 8 };
-
-#if defined(__GNUC__)
-typedef double cyclotron_lanes[cyclotron_LANES] __attribute__((aligned(64))); /* a value in each lane */
-#else
-typedef double cyclotron_lanes[cyclotron_LANES];
-#endif
-
-#if defined(__clang__)
-#define cyclotron_EACH_LANE _Pragma("clang loop vectorize(assume_safety)")
-#pragma clang diagnostic push
-#pragma clang diagnostic ignored "-Wpass-failed"
-#elif defined(__GNUC__)
-#define cyclotron_EACH_LANE _Pragma("GCC ivdep") _Pragma("GCC unroll 1")
-#else
-#define cyclotron_EACH_LANE
-#endif
-
-/* What all blocks share: coefficients, the same in each lane, and the recurrences by which they are foreseen. */
-typedef struct {
-    int fits[1]; /* the fit that weight is of; -1 for none */
-    cyclotron_lanes coef[1][3], weight[1][40][3];
-} cyclotron_table;
-
-/* A stage in all lanes, linearised around y. */
-typedef struct {
-    cyclotron_lanes y[3], displacement[3], increment[3], residual[3];
-    /* a residual r of alpha(y) = x takes inverse r from y, and gain r from the increment */
-    cyclotron_lanes inverse[9], slope[9], gain[9];
-} cyclotron_model;
-
-/* cyclotron_linearise in all lanes. */
-static void cyclotron_linearise_lanes(cyclotron_lanes coef[restrict 3], cyclotron_lanes y[restrict 3],
-                                      cyclotron_lanes displacement[restrict 3],
-                                      cyclotron_lanes increment[restrict 3],
-                                      cyclotron_lanes jacobian[restrict 9],
-                                      cyclotron_lanes increment_jacobian[restrict 9])
-{
-    cyclotron_EACH_LANE
-    for (int lane = 0; lane < cyclotron_LANES; ++lane) {
-        const double u = y[0][lane];
-        const double v = y[1][lane];
-        const double b = y[2][lane];
-        const double t1 = coef[0][lane] + coef[1][lane] * (b * b);
-        const double p_v = v * t1;
-        const double t2 = b * p_v;
-        const double p_u = u * t1;
-        const double t3 = b * p_u;
-        const double t4 = b * t1;
-        const double t5 = b * (coef[2][lane] * (b * v));
-        const double t6 = b * (coef[2][lane] * (b * u));
-        displacement[0][lane] = (-0.5) * t2;
-        displacement[1][lane] = 0.5 * t3;
-        displacement[2][lane] = 0.0;
-        increment[0][lane] = t2;
-        increment[1][lane] = -t3;
-        increment[2][lane] = 0.0;
-        jacobian[0][lane] = 1.0;
-        jacobian[1][lane] = (-0.5) * t4;
-        jacobian[2][lane] = (-0.5) * p_v - 0.5 * t5;
-        jacobian[3][lane] = 0.5 * t4;
-        jacobian[4][lane] = 1.0;
-        jacobian[5][lane] = 0.5 * t6 + 0.5 * p_u;
-        jacobian[6][lane] = 0.0;
-        jacobian[7][lane] = 0.0;
-        jacobian[8][lane] = 1.0;
-        increment_jacobian[0][lane] = 0.0;
-        increment_jacobian[1][lane] = t4;
-        increment_jacobian[2][lane] = t5 + p_v;
-        increment_jacobian[3][lane] = -t4;
-        increment_jacobian[4][lane] = 0.0;
-        increment_jacobian[5][lane] = -(t6 + p_u);
-        increment_jacobian[6][lane] = 0.0;
-        increment_jacobian[7][lane] = 0.0;
-        increment_jacobian[8][lane] = 0.0;
-    }
-}
-
-/* cyclotron_evaluate in all lanes. */
-static void cyclotron_evaluate_lanes(cyclotron_lanes coef[restrict 3], cyclotron_lanes y[restrict 3],
-                                     cyclotron_lanes displacement[restrict 3],
-                                     cyclotron_lanes increment[restrict 3])
-{
-    cyclotron_EACH_LANE
-    for (int lane = 0; lane < cyclotron_LANES; ++lane) {
-        const double u = y[0][lane];
-        const double v = y[1][lane];
-        const double b = y[2][lane];
-        const double t1 = coef[0][lane] + coef[1][lane] * (b * b);
-        const double p_v = v * t1;
-        const double t2 = b * p_v;
-        const double p_u = u * t1;
-        const double t3 = b * p_u;
-        displacement[0][lane] = (-0.5) * t2;
-        displacement[1][lane] = 0.5 * t3;
-        displacement[2][lane] = 0.0;
-        increment[0][lane] = t2;
-        increment[1][lane] = -t3;
-        increment[2][lane] = 0.0;
-    }
-}
-
-/* cyclotron_invert in all lanes. */
-static void cyclotron_invert_lanes(cyclotron_lanes matrix[restrict 9], cyclotron_lanes slope[restrict 9],
-                                   cyclotron_lanes inverse[restrict 9], cyclotron_lanes gain[restrict 9],
-                                   cyclotron_lanes reciprocal[restrict 3])
-{
-    cyclotron_EACH_LANE
-    for (int lane = 0; lane < cyclotron_LANES; ++lane) {
-        const double t1 = 1.0 / matrix[0][lane];
-        const double t2 = matrix[1][lane] * t1;
-        const double t3 = 1.0 / (matrix[4][lane] - matrix[3][lane] * t2);
-        const double t4 = matrix[3][lane] * t1 * t3;
-        const double t5 = matrix[2][lane] * t1;
-        const double t6 = (matrix[5][lane] - matrix[3][lane] * t5) * t3;
-        const double t7 = t5 - t2 * t6;
-        const double t8 = matrix[7][lane] - matrix[6][lane] * t2;
-        const double t9 = 1.0 / (matrix[8][lane] - matrix[6][lane] * t5 - t8 * t6);
-        const double t10 = (t8 * t4 - matrix[6][lane] * t1) * t9;
-        const double t11 = t1 + t2 * t4 - t7 * t10;
-        const double t12 = t8 * t3 * t9;
-        const double t13 = t7 * t12 - t2 * t3;
-        const double t14 = t7 * t9;
-        const double t15 = t4 + t6 * t10;
-        const double t16 = t3 + t6 * t12;
-        const double t17 = t6 * t9;
-        inverse[0][lane] = t11;
-        inverse[1][lane] = t13;
-        inverse[2][lane] = -t14;
-        inverse[3][lane] = -t15;
-        inverse[4][lane] = t16;
-        inverse[5][lane] = -t17;
-        inverse[6][lane] = t10;
-        inverse[7][lane] = -t12;
-        inverse[8][lane] = t9;
-        gain[0][lane] = slope[2][lane] * t10 + (slope[0][lane] * t11 - slope[1][lane] * t15);
-        gain[1][lane] = slope[0][lane] * t13 + slope[1][lane] * t16 - slope[2][lane] * t12;
-        gain[2][lane] = slope[2][lane] * t9 - (slope[0][lane] * t14 + slope[1][lane] * t17);
-        gain[3][lane] = slope[5][lane] * t10 + (slope[3][lane] * t11 - slope[4][lane] * t15);
-        gain[4][lane] = slope[3][lane] * t13 + slope[4][lane] * t16 - slope[5][lane] * t12;
-        gain[5][lane] = slope[5][lane] * t9 - (slope[4][lane] * t17 + slope[3][lane] * t14);
-        gain[6][lane] = slope[8][lane] * t10 + (slope[6][lane] * t11 - slope[7][lane] * t15);
-        gain[7][lane] = slope[6][lane] * t13 + slope[7][lane] * t16 - slope[8][lane] * t12;
-        gain[8][lane] = slope[8][lane] * t9 - (slope[6][lane] * t14 + slope[7][lane] * t17);
-        reciprocal[0][lane] = t1;
-        reciprocal[1][lane] = t3;
-        reciprocal[2][lane] = t9;
-    }
-}
-
-/* Everything about a stage at the points y. The matrices are I + O(h): where a pivot is far from 1, all is infinite. */
-static void cyclotron_tabulate(cyclotron_lanes coef[restrict], cyclotron_model *model)
-{
-    cyclotron_lanes jacobian[9], reciprocal[3];
-    cyclotron_linearise_lanes(coef, model->y, model->displacement, model->increment, jacobian, model->slope);
-    cyclotron_invert_lanes(jacobian, model->slope, model->inverse, model->gain, reciprocal);
-    for (int i = 0; i < 3; ++i) {
-        cyclotron_EACH_LANE
-        for (int lane = 0; lane < cyclotron_LANES; ++lane)
-            model->inverse[i][lane] += fabs(reciprocal[i][lane]) < 1e3 ? 0.0 : HUGE_VAL;
-    }
-}
-
-/* cyclotron_size in all lanes, summed over the components. */
-static void cyclotron_sizes(cyclotron_lanes y[restrict 3], cyclotron_lanes delta[restrict 3],
-    cyclotron_lanes size)
-{
-    cyclotron_lanes norm = { 0.0 };
-    memset(size, 0, cyclotron_LANES * sizeof size[0]);
-    for (int i = 0; i < 3; ++i)
-        for (int lane = 0; lane < cyclotron_LANES; ++lane)
-            norm[lane] = 1e-6 * fabs(y[i][lane]) > norm[lane] ? 1e-6 * fabs(y[i][lane]) : norm[lane];
-    for (int i = 0; i < 3; ++i) {
-        cyclotron_EACH_LANE
-        for (int lane = 0; lane < cyclotron_LANES; ++lane)
-            size[lane] += fabs(delta[i][lane]) / (fabs(y[i][lane]) + norm[lane] + DBL_MIN);
-    }
-}
-
-/* Correct y by the residuals, with the inverse in the table, and measure the corrections. */
-static void cyclotron_correct(cyclotron_model *model, cyclotron_lanes size)
-{
-    cyclotron_lanes delta[3];
-    memset(delta, 0, sizeof delta);
-    for (int i = 0; i < 3; ++i)
-        for (int j = 0; j < 3; ++j) {
-            cyclotron_EACH_LANE
-            for (int lane = 0; lane < cyclotron_LANES; ++lane)
-                delta[i][lane] += model->inverse[i * 3 + j][lane] * model->residual[j][lane];
-        }
-    cyclotron_sizes(model->y, delta, size);
-    for (int i = 0; i < 3; ++i)
-        for (int lane = 0; lane < cyclotron_LANES; ++lane) model->y[i][lane] -= delta[i][lane];
-}
-
-/* The largest of the lanes, none of which is negative; infinite if one is not finite. As integers, the bits of such
-   numbers have their order, and those of what is no number are larger. */
-static double cyclotron_largest(const cyclotron_lanes size)
-{
-    uint64_t bits[8], most = 0;
-    double largest;
-    memcpy(bits, size, sizeof bits);
-    for (int lane = 0; lane < cyclotron_LANES; ++lane) most = bits[lane] > most ? bits[lane] : most;
-    memcpy(&largest, &most, sizeof largest);
-    return isfinite(largest) ? largest : HUGE_VAL;
-}
-
-/* cyclotron_near for the guesses of all lanes, seen from one value. */
-static int cyclotron_near_lanes(cyclotron_lanes y[restrict 3], const double last[3])
-{
-    cyclotron_lanes distance = { 0.0 };
-    double size = 0.0;
-    for (int i = 0; i < 3; ++i) {
-        size += fabs(last[i]);
-        cyclotron_EACH_LANE
-        for (int lane = 0; lane < cyclotron_LANES; ++lane) distance[lane] += fabs(y[i][lane] - last[i]);
-    }
-    return cyclotron_largest(distance) <= 4.0 * size;
-}
-
-/* What is left after a correction of this size: quadratic in it, where the matrices are of the points corrected; where
-   they are of points further off, by bend, also of the order of size times bend. bound is what the last pass left. */
-static double cyclotron_remaining(double size, double bend, double bound)
-{
-    const double growth = size / bound, left = size * (size + bend);
-    return growth > 1.0 ? growth * left : left;
-}
-
-/* The table of a stage, with its matrices or with those of the last pass. */
-static void cyclotron_update(cyclotron_lanes coef[restrict], cyclotron_model *model, int matrices)
-{
-    if (matrices)
-        cyclotron_tabulate(coef, model);
-    else
-        cyclotron_evaluate_lanes(coef, model->y, model->displacement, model->increment);
-}
-
-/* The steps of a block one after the other, each along the linear model of its lane. As X, the state with its carry, gains
-   increment - gain residual, the next residual follows from this one; X itself is added up apart. */
-static void cyclotron_chain(cyclotron_model model[1], double x[3], double carry[3])
-{
-    double residual[3], sum[3], small[3];
-    for (int i = 0; i < 3; ++i) {
-        residual[i] = ((model->y[i][0] - x[i]) + model->displacement[i][0]) - carry[i];
-        sum[i] = x[i];
-        small[i] = carry[i];
-    }
-    for (int k = 0; k < 1 * cyclotron_LANES; ++k) {
-        const int lane = k / 1, after = (k + 1) / 1 % cyclotron_LANES;
-        cyclotron_model *at = &model[k % 1], *next = &model[(k + 1) % 1];
-        double even[3] = { 0.0 }, odd[3] = { 0.0 }; /* two sums, so that no long chain of additions is waited for */
-        for (int i = 0; i < 3; ++i) {
-            at->residual[i][lane] = residual[i];
-            for (int j = 0; j < 3; j += 2) even[i] += at->gain[i * 3 + j][lane] * residual[j];
-            for (int j = 1; j < 3; j += 2) odd[i] += at->gain[i * 3 + j][lane] * residual[j];
-        }
-        for (int i = 0; i < 3; ++i) {
-            const double change = at->increment[i][lane], total = sum[i] + change, added = total - sum[i];
-            const double turn = (next->displacement[i][after] - at->displacement[i][lane]) - change;
-            const double moved = (next->y[i][after] - at->y[i][lane]) + turn;
-            residual[i] = ((moved + residual[i]) + odd[i]) + even[i];
-            small[i] += ((sum[i] - (total - added)) + (change - added)) - (even[i] + odd[i]);
-            sum[i] = total;
-        }
-    }
-    for (int i = 0; i < 3; ++i) {
-        x[i] = sum[i] + small[i];
-        carry[i] = small[i] - (x[i] - sum[i]);
-    }
-}
-
-/* Bring the table up to date: coefficients, and weights that were fitted since. */
-static void cyclotron_refresh(const cyclotron_solver *s, cyclotron_table *table)
-{
-    for (int stage = 0; stage < 1; ++stage) {
-        if (table->fits[stage] == s->memory[stage].fits) continue;
-        table->fits[stage] = s->memory[stage].fits;
-        for (int k = 0; k < 3; ++k)
-            for (int lane = 0; lane < cyclotron_LANES; ++lane) table->coef[stage][k][lane] = s->coef[stage][k];
-        memcpy(table->weight[stage], s->memory[stage].weight, (size_t)s->memory[stage].terms * sizeof table->weight[0][0]);
-    }
-}
-
-/* Guesses for the next cyclotron_LANES values of a stage, by its recurrences. */
-static void cyclotron_foresee(const cyclotron_memory *memory, cyclotron_lanes weight[restrict][3],
-    cyclotron_lanes y[restrict 3])
-{
-    const int last = memory->count - 1;
-    for (int i = 0; i < 3; ++i) {
-        cyclotron_lanes even = { 0.0 }, odd = { 0.0 };
-        for (int k = 0; k < memory->terms; k += 2) {
-            const double past = memory->past[last - k][i], earlier = memory->past[last - 1 - k][i];
-            cyclotron_EACH_LANE
-            for (int lane = 0; lane < cyclotron_LANES; ++lane) even[lane] += weight[k][i][lane] * past;
-            cyclotron_EACH_LANE
-            for (int lane = 0; lane < cyclotron_LANES; ++lane) odd[lane] += weight[k + 1][i][lane] * earlier;
-        }
-        cyclotron_EACH_LANE
-        for (int lane = 0; lane < cyclotron_LANES; ++lane) y[i][lane] = even[lane] + odd[lane];
-    }
-}
-
-/* cyclotron_record for the values of all lanes, one after the other. */
-static void cyclotron_record_lanes(cyclotron_memory *memory, cyclotron_lanes y[restrict 3])
-{
-    cyclotron_make_room(memory, cyclotron_LANES);
-    for (int lane = 0; lane < cyclotron_LANES; ++lane)
-        for (int i = 0; i < 3; ++i) memory->past[memory->count + lane][i] = y[i][lane];
-    memory->count += cyclotron_LANES;
-}
-
-/* Guesses where no recurrence is known: where alpha and beta have the means of steps by the classical Runge-Kutta
-   method, to leading order. */
-static void cyclotron_march(const cyclotron_solver *s, cyclotron_table *table, cyclotron_model model[1])
-{
-    static const double reach[4] = { 0.5, 0.5, 1.0, 0.0 }, weight[4] = { 1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0 };
-    double x[3], point[3], slope[3], mean[3];
-    memcpy(x, s->x, sizeof x);
-    for (int k = 0; k < 1 * cyclotron_LANES; ++k) {
-        const double h = cyclotron_fractions[k % 1] * s->h;
-        memcpy(point, x, sizeof x);
-        memset(mean, 0, sizeof mean);
-        for (int part = 0; part < 4; ++part) {
-            cyclotron_vector_field(&s->params, point, slope);
-            for (int i = 0; i < 3; ++i) {
-                mean[i] += weight[part] * slope[i];
-                point[i] = x[i] + h * reach[part] * slope[i];
-            }
-        }
-        for (int i = 0; i < 3; ++i) {
-            model[k % 1].y[i][k / 1] = x[i] + 0.5 * h * mean[i];
-            x[i] += h * mean[i];
-        }
-    }
-    for (int stage = 0; stage < 1; ++stage) {
-        cyclotron_model *at = &model[stage];
-        cyclotron_evaluate_lanes(table->coef[stage], at->y, at->displacement, at->increment);
-        for (int i = 0; i < 3; ++i) {
-            cyclotron_EACH_LANE
-            for (int lane = 0; lane < cyclotron_LANES; ++lane)
-                at->y[i][lane] -= at->displacement[i][lane] + 0.5 * at->increment[i][lane];
-        }
-    }
-}
-
-/* cyclotron_LANES steps at once: guess the points of all, and correct them together until the error that remains is as
-   small as after a single step. How many passes that took; 0, and the solver as before, where it takes more than most. */
-static int cyclotron_block(cyclotron_solver *s, cyclotron_table *table, int most)
-{
-    cyclotron_model model[1];
-    cyclotron_lanes sizes;
-    double x[3], carry[3], previous = HUGE_VAL, bend = 0.0, bound = HUGE_VAL;
-    int passes = 0, solved = 0;
-    if (!s->foreseeing) cyclotron_march(s, table, model);
-    for (int stage = 0; stage < 1; ++stage) {
-        if (s->foreseeing) cyclotron_foresee(&s->memory[stage], table->weight[stage], model[stage].y);
-        if (!cyclotron_near_lanes(model[stage].y, s->x)) return 0;
-    }
-    while (!solved) {
-        double size = 0.0;
-        const int matrices = previous > 1e-05;
-        for (int stage = 0; stage < 1; ++stage) cyclotron_update(table->coef[stage], &model[stage], matrices);
-        memcpy(x, s->x, sizeof x);
-        memcpy(carry, s->carry, sizeof carry);
-        cyclotron_chain(model, x, carry);
-        for (int stage = 0; stage < 1; ++stage) {
-            cyclotron_correct(&model[stage], sizes);
-            const double largest = cyclotron_largest(sizes);
-            size = largest > size ? largest : size;
-        }
-        s->evaluations += 1 * cyclotron_LANES;
-        bend = matrices ? 0.0 : bend + previous;
-        bound = cyclotron_remaining(size, bend, bound);
-        /* The second test: after the square of so small a correction there is rounding only. */
-        solved = bound <= 1e-20 || (previous < 1e-8 && size < 1e-10);
-        if ((++passes >= most || !(size < previous)) && !solved) return 0;
-        previous = size;
-    }
-    for (int stage = 0; stage < 1; ++stage)
-        if (!cyclotron_near_lanes(model[stage].y, s->x)) return 0;
-    for (int i = 0; i < 3; ++i)
-        if (!isfinite(x[i])) return 0;
-    memcpy(s->x, x, sizeof x);
-    memcpy(s->carry, carry, sizeof carry);
-    s->steps += cyclotron_LANES;
-    for (int stage = 0; stage < 1; ++stage) {
-        cyclotron_memory *memory = &s->memory[stage];
-        cyclotron_record_lanes(memory, model[stage].y);
-        memory->slow = passes > 1 ? memory->slow + cyclotron_LANES : 0;
-        if (memory->slow > memory->patience && s->foreseeing) cyclotron_fit(memory);
-    }
-    return passes;
-}
-
-/* Recurrences are given up for a while, the longer the more often that happens. */
-static void cyclotron_give_up(cyclotron_solver *s)
-{
-    s->foreseeing = s->setback = s->pause = 0;
-    s->doubt = 2 * s->doubt + 600;
-    s->retry = s->steps + s->doubt;
-}
-
-/* How the next block is guessed: by recurrences, fitted as soon as enough steps are to be made, or
-   have been, to repay that. */
-static void cyclotron_choose_guess(cyclotron_solver *s, size_t steps)
-{
-    for (int stage = 0; stage < 1; ++stage)
-        if (s->memory[stage].count < 111) {
-            s->foreseeing = 0;
-            return;
-        }
-    if (s->foreseeing || (steps < 600 && s->steps < 150) || s->steps < s->retry) return;
-    s->foreseeing = 1;
-    for (int stage = 0; stage < 1 && s->foreseeing; ++stage) {
-        cyclotron_fit(&s->memory[stage]);
-        s->foreseeing = s->memory[stage].terms > 0;
-    }
-    s->pause = cyclotron_LANES;
-    if (!s->foreseeing) cyclotron_give_up(s);
-}
-
-/* Learn from a block: after one that failed single steps are made, the more the more often that happens. Recurrences
-   that fail repeatedly, or need more passes than steps by Runge-Kutta did, are given up. */
-static void cyclotron_learn_from(cyclotron_solver *s, int passes)
-{
-    if (passes > 0) {
-        s->setback /= 2;
-    } else {
-        s->setback = 2 * s->setback + cyclotron_LANES > 1000 ? 1000 : 2 * s->setback + cyclotron_LANES;
-        s->pause = s->setback;
-    }
-    if (!s->foreseeing) {
-        s->passes = passes > 0 ? passes : INT_MAX;
-    } else if (passes > s->passes || s->setback > 5 * cyclotron_LANES) {
-        cyclotron_give_up(s);
-    }
-}
-
-/* A single step, and the running mean of the evaluations that a stage of one takes. */
-static cyclotron_status cyclotron_single(cyclotron_solver *s)
-{
-    const size_t before = s->evaluations;
-    const cyclotron_status status = cyclotron_step(s, s->h);
-    s->effort += 0.125 * ((double)(s->evaluations - before) / 1 - s->effort);
-    return status;
-}
-
-/* Blocks of steps where they cost less than single steps, with at most as many passes over a block as 2 for each
-   evaluation in a single step. The results differ by round-off only. */
 cyclotron_status cyclotron_integrate(cyclotron_solver *s, double h, size_t steps)
 {
-    cyclotron_table table;
     cyclotron_status status = cyclotron_set_step(s, h);
-    for (int stage = 0; stage < 1; ++stage) table.fits[stage] = -1;
-    while (status == cyclotron_OK && steps > 0) {
-        if (steps >= cyclotron_LANES && s->pause == 0) cyclotron_choose_guess(s, steps);
-        if (steps >= cyclotron_LANES && s->pause == 0) {
-            cyclotron_refresh(s, &table);
-            const int passes = cyclotron_block(s, &table, (int)(2 * s->effort + 0.5));
-            cyclotron_learn_from(s, passes);
-            if (passes > 0) steps -= cyclotron_LANES;
-        } else {
-            if (s->pause > 0) --s->pause;
-            status = cyclotron_single(s);
-            if (status == cyclotron_OK) --steps;
-        }
-    }
+    for (; steps > 0 && status == cyclotron_OK; --steps) status = cyclotron_step(s, h);
     return status;
-}
-
-/* Members of an ensemble, each in its lane. */
-typedef struct {
-    cyclotron_lanes x[3], carry[3], coef[1][3];
-    cyclotron_lanes past[1][111][3]; /* solved values, in a ring */
-    cyclotron_lanes weight[1][40][3]; /* of past values, the latest first, for the next */
-    int latest;     /* the row of the latest values */
-    int count;      /* rows in use */
-    int order[1];   /* how many of them the extrapolation uses */
-    int terms[1];   /* how many of them the recurrences use */
-    int fits;       /* how often recurrences have been fitted */
-    int fitting[1]; /* whether they are the better guess */
-    int slow;       /* how many of the last steps took more than one iteration */
-    int patience;   /* how many of those before recurrences are fitted again */
-    int active[8];  /* whether the lane has a member that has not failed */
-    size_t left[8]; /* steps that are still to be made, where one has */
-} cyclotron_group;
-
-/* The past values of a stage, the latest for k = 0. */
-static cyclotron_lanes *cyclotron_group_past(cyclotron_group *group, int stage, int k)
-{
-    const int row = group->latest + k;
-    return group->past[stage][row < 111 ? row : row - 111];
-}
-
-/* Guess the values of a stage by the recurrences of the members. */
-static void cyclotron_group_foresee(cyclotron_group *group, int stage, cyclotron_lanes y[restrict 3])
-{
-    memset(y, 0, 3 * sizeof y[0]);
-    for (int k = 0; k < group->terms[stage]; ++k) {
-        cyclotron_lanes *past = cyclotron_group_past(group, stage, k), *weight = group->weight[stage][k];
-        for (int i = 0; i < 3; ++i) {
-            cyclotron_EACH_LANE
-            for (int lane = 0; lane < cyclotron_LANES; ++lane) y[i][lane] += weight[i][lane] * past[i][lane];
-        }
-    }
-}
-
-/* Extrapolate the values of a stage. */
-static void cyclotron_group_extrapolate(cyclotron_group *group, int stage, cyclotron_lanes y[restrict 3])
-{
-    const int order = group->order[stage];
-    double binomial = -1.0;
-    memcpy(y, group->x, 3 * sizeof y[0]);
-    if (order > 0) memset(y, 0, 3 * sizeof y[0]);
-    for (int k = 0; k < order; ++k) {
-        cyclotron_lanes *past = cyclotron_group_past(group, stage, k);
-        binomial *= -(double)(order - k) / (k + 1);
-        for (int i = 0; i < 3; ++i) {
-            cyclotron_EACH_LANE
-            for (int lane = 0; lane < cyclotron_LANES; ++lane) y[i][lane] += binomial * past[i][lane];
-        }
-    }
-}
-
-/* The sum over members of the absolute values of all components. */
-static double cyclotron_group_sum(const cyclotron_group *group, cyclotron_lanes y[3])
-{
-    double sum = 0.0;
-    for (int i = 0; i < 3; ++i)
-        for (int lane = 0; lane < cyclotron_LANES; ++lane) sum += group->active[lane] ? fabs(y[i][lane]) : 0.0;
-    return sum;
-}
-
-static void cyclotron_group_subtract(cyclotron_lanes y[restrict 3], cyclotron_lanes other[restrict 3])
-{
-    for (int i = 0; i < 3; ++i) {
-        cyclotron_EACH_LANE
-        for (int lane = 0; lane < cyclotron_LANES; ++lane) y[i][lane] -= other[i][lane];
-    }
-}
-
-/* Choose the guess that would have been best for these values. */
-static void cyclotron_group_judge(cyclotron_group *group, int stage, cyclotron_lanes y[3])
-{
-    cyclotron_lanes row[8 + 1][3];
-    const int rows = group->count < 8 ? group->count : 8;
-    double least = HUGE_VAL;
-    memcpy(row[0], y, sizeof row[0]);
-    for (int k = 0; k < rows; ++k) memcpy(row[k + 1], cyclotron_group_past(group, stage, k), sizeof row[0]);
-    if (group->order[stage] == 0) group->order[stage] = 1;
-    for (int order = 1; order <= rows; ++order) { /* row[0] becomes the backward difference of this order */
-        for (int k = 0; k <= rows - order; ++k) cyclotron_group_subtract(row[k], row[k + 1]);
-        const double size = cyclotron_group_sum(group, row[0]);
-        if (size < least) {
-            least = size;
-            group->order[stage] = order;
-        }
-    }
-    if (group->terms[stage] == 0) return;
-    cyclotron_group_foresee(group, stage, row[0]);
-    cyclotron_group_subtract(row[0], y);
-    group->fitting[stage] = cyclotron_group_sum(group, row[0]) <= least;
-}
-
-/* Fit the recurrences of all members; with every time, wait longer before it is done again, and for long if it did not
-   help. */
-static void cyclotron_group_fit(cyclotron_group *group)
-{
-    cyclotron_memory memory;
-    const int helped = group->fits == 0 || group->fitting[0];
-    memory.count = 111;
-    for (int stage = 0; stage < 1; ++stage) {
-        int found = 1;
-        group->terms[stage] = 0;
-        for (int lane = 0; lane < cyclotron_LANES; ++lane)
-            for (int i = 0; i < 3 && group->active[lane] && found; ++i) {
-                for (int k = 0; k < 111; ++k)
-                    memory.past[111 - 1 - k][i] = cyclotron_group_past(group, stage, k)[i][lane];
-                const int terms = cyclotron_train(&memory, i);
-                found = terms > 0;
-                if (terms > group->terms[stage]) group->terms[stage] = terms;
-                for (int k = 0; k < 40; ++k) group->weight[stage][k][i][lane] = memory.weight[k][i][0];
-            }
-        if (!found) group->terms[stage] = 0;
-        group->fitting[stage] = found;
-    }
-    ++group->fits;
-    group->slow = 0;
-    group->patience = helped && group->patience < 10000 ? 2 * group->patience + 150 : 100 * 150;
-}
-
-/* Replace guesses that are not near the last values, as cyclotron_near has it, by these; lane by lane. */
-static void cyclotron_stay_near(cyclotron_lanes y[restrict 3], cyclotron_lanes last[restrict 3])
-{
-    cyclotron_lanes distance = { 0.0 }, size = { 0.0 };
-    for (int i = 0; i < 3; ++i) {
-        cyclotron_EACH_LANE
-        for (int lane = 0; lane < cyclotron_LANES; ++lane) {
-            distance[lane] += fabs(y[i][lane] - last[i][lane]);
-            size[lane] += fabs(last[i][lane]);
-        }
-    }
-    for (int i = 0; i < 3; ++i) {
-        cyclotron_EACH_LANE
-        for (int lane = 0; lane < cyclotron_LANES; ++lane)
-            y[i][lane] = distance[lane] <= 4.0 * size[lane] ? y[i][lane] : last[i][lane];
-    }
-}
-
-/* Whether lanes are still to be solved after a correction of this size; those where nothing is finite leave the group.
-   bound is what remains in each lane. */
-static int cyclotron_group_open(cyclotron_group *group, const cyclotron_lanes size, const cyclotron_lanes previous,
-    double bend, cyclotron_lanes bound)
-{
-    int open = 0;
-    cyclotron_EACH_LANE
-    for (int lane = 0; lane < cyclotron_LANES; ++lane)
-        bound[lane] = cyclotron_remaining(size[lane], bend, bound[lane]);
-    if (cyclotron_largest(bound) <= 1e-20) return 0;
-    for (int lane = 0; lane < cyclotron_LANES; ++lane) {
-        const int solved = bound[lane] <= 1e-20 || (previous[lane] < 1e-8 && size[lane] < 1e-10);
-        if (!isfinite(size[lane])) group->active[lane] = 0;
-        open += group->active[lane] && !solved;
-    }
-    return open;
-}
-
-/* The guess for a stage: recurrences, or extrapolation; the state for members where that is not near. */
-static void cyclotron_group_predict(cyclotron_group *group, int stage, cyclotron_lanes y[3])
-{
-    if (group->fitting[stage]) cyclotron_group_foresee(group, stage, y);
-    else cyclotron_group_extrapolate(group, stage, y);
-    cyclotron_stay_near(y, group->x);
-}
-
-/* Newton's method for a stage, until the slowest lane is solved. The number of iterations; where that is the most
-   allowed, lanes that are not solved leave the group. */
-static int cyclotron_group_solve(cyclotron_group *group, int stage, cyclotron_model *model)
-{
-    cyclotron_lanes size, previous, bound;
-    double largest = HUGE_VAL, bend = 0.0;
-    int iterations = 0, open = 1;
-    for (int lane = 0; lane < cyclotron_LANES; ++lane) size[lane] = bound[lane] = HUGE_VAL;
-    cyclotron_group_predict(group, stage, model->y);
-    for (; open > 0 && iterations < 20; ++iterations) {
-        memcpy(previous, size, sizeof size);
-        cyclotron_update(group->coef[stage], model, largest > 1e-05);
-        bend = largest > 1e-05 ? 0.0 : bend + largest;
-        for (int i = 0; i < 3; ++i) {
-            cyclotron_EACH_LANE
-            for (int lane = 0; lane < cyclotron_LANES; ++lane)
-                model->residual[i][lane] =
-                    ((model->y[i][lane] - group->x[i][lane]) + model->displacement[i][lane]) - group->carry[i][lane];
-        }
-        cyclotron_correct(model, size);
-        open = cyclotron_group_open(group, size, previous, bend, bound);
-        largest = cyclotron_largest(size);
-    }
-    for (int lane = 0; lane < cyclotron_LANES && open > 0; ++lane)
-        group->active[lane] = group->active[lane] && bound[lane] <= 1e-20;
-    return iterations;
-}
-
-/* Add the increments, corrected to first order, in compensated arithmetic as for a single step. */
-static void cyclotron_group_advance(cyclotron_lanes x[restrict 3], cyclotron_lanes carry[restrict 3],
-    cyclotron_model *model)
-{
-    for (int i = 0; i < 3; ++i)
-        for (int j = 0; j < 3; ++j) {
-            cyclotron_EACH_LANE
-            for (int lane = 0; lane < cyclotron_LANES; ++lane)
-                carry[i][lane] -= model->gain[i * 3 + j][lane] * model->residual[j][lane];
-        }
-    for (int i = 0; i < 3; ++i) {
-        cyclotron_EACH_LANE
-        for (int lane = 0; lane < cyclotron_LANES; ++lane) {
-            const double change = model->increment[i][lane], sum = x[i][lane] + change, added = sum - x[i][lane];
-            const double small = ((x[i][lane] - (sum - added)) + (change - added)) + carry[i][lane];
-            x[i][lane] = sum + small;
-            carry[i][lane] = small - (x[i][lane] - sum);
-        }
-    }
-}
-
-/* Members that failed, or whose state is not near the one before the step or not finite, keep that one, and leave. How many
-   stay. */
-static int cyclotron_group_leave(cyclotron_group *group, cyclotron_lanes x[3], cyclotron_lanes carry[3],
-    size_t remaining)
-{
-    cyclotron_lanes moved = { 0.0 }, size = { 0.0 }, bad;
-    int active = 0;
-    for (int i = 0; i < 3; ++i) {
-        cyclotron_EACH_LANE
-        for (int lane = 0; lane < cyclotron_LANES; ++lane) {
-            moved[lane] += fabs(group->x[i][lane] - x[i][lane]);
-            size[lane] += fabs(x[i][lane]);
-        }
-    }
-    for (int lane = 0; lane < cyclotron_LANES; ++lane) bad[lane] = moved[lane] <= 4.0 * size[lane] ? 0.0 : 1.0;
-    for (int lane = 0; lane < cyclotron_LANES; ++lane) active += group->active[lane];
-    if (active == cyclotron_LANES && !(cyclotron_largest(bad) > 0.0)) return active;
-    active = 0;
-    for (int lane = 0; lane < cyclotron_LANES; ++lane) {
-        group->active[lane] = group->active[lane] && !(bad[lane] > 0.0);
-        active += group->active[lane];
-        for (int i = 0; i < 3 && !group->active[lane]; ++i) {
-            group->x[i][lane] = x[i][lane];
-            group->carry[i][lane] = carry[i][lane];
-        }
-        if (!group->active[lane] && group->left[lane] == 0) group->left[lane] = remaining;
-    }
-    return active;
-}
-
-/* One step of all members, of as many as remain. How many members are left. */
-static int cyclotron_group_step(cyclotron_group *group, size_t remaining)
-{
-    cyclotron_lanes x[3], carry[3];
-    cyclotron_model model;
-    const int next = (group->latest > 0 ? group->latest : 111) - 1;
-    int most = 0;
-    memcpy(x, group->x, sizeof x);
-    memcpy(carry, group->carry, sizeof carry);
-    for (int stage = 0; stage < 1; ++stage) {
-        const int iterations = cyclotron_group_solve(group, stage, &model);
-        cyclotron_group_advance(group->x, group->carry, &model);
-        if (iterations > most) most = iterations;
-        if ((iterations > 1 && next % 8 == 0) || group->count < 8)
-            cyclotron_group_judge(group, stage, model.y);
-        memcpy(group->past[stage][next], model.y, sizeof model.y);
-    }
-    group->latest = next;
-    if (group->count < 111) ++group->count;
-    group->slow = most > 1 ? group->slow + 1 : 0;
-    if (group->slow > group->patience && group->count == 111 && remaining >= 600)
-        cyclotron_group_fit(group);
-    return cyclotron_group_leave(group, x, carry, remaining);
-}
-
-/* Put a member into a lane: its state, and its coefficients. */
-static cyclotron_status cyclotron_group_join(cyclotron_group *group, int lane, const cyclotron_params *params,
-    const double x0[3], double h)
-{
-    cyclotron_solver s;
-    cyclotron_status status = cyclotron_init(&s, params, x0);
-    if (status == cyclotron_OK) status = cyclotron_set_step(&s, h);
-    if (status != cyclotron_OK) return status;
-    for (int i = 0; i < 3; ++i) group->x[i][lane] = s.x[i];
-    for (int stage = 0; stage < 1; ++stage)
-        for (int k = 0; k < 3; ++k) group->coef[stage][k][lane] = s.coef[stage][k];
-    group->active[lane] = 1;
-    return status;
-}
-
-/* The steps that a member has still to make after it left the group, by itself. */
-static cyclotron_status cyclotron_group_finish(const cyclotron_group *group, int lane, const cyclotron_params *params,
-    double x[3], double h)
-{
-    cyclotron_solver s;
-    cyclotron_status status = cyclotron_init(&s, params, x);
-    if (status != cyclotron_OK) return status;
-    for (int i = 0; i < 3; ++i) s.carry[i] = group->carry[i][lane];
-    status = cyclotron_integrate(&s, h, group->left[lane]);
-    memcpy(x, s.x, sizeof s.x);
-    return status;
-}
-
-/* The members from first on, as many as there are lanes. The first status that is not OK. */
-static cyclotron_status cyclotron_group_run(const cyclotron_params *params, double *x, size_t members, size_t first,
-    double h, size_t steps, unsigned char *status)
-{
-    cyclotron_group group;
-    cyclotron_status worst = cyclotron_OK, member[8];
-    const int count = members - first < cyclotron_LANES ? (int)(members - first) : cyclotron_LANES;
-    double state[3];
-    size_t left = steps;
-    memset(&group, 0, sizeof group);
-    for (int lane = 0; lane < count; ++lane) {
-        for (size_t i = 0; i < 3; ++i) state[i] = x[i * members + first + (size_t)lane];
-        member[lane] = cyclotron_group_join(&group, lane, params, state, h);
-    }
-    for (int active = count; left > 0 && active > 2; --left) active = cyclotron_group_step(&group, left);
-    for (int lane = 0; lane < count; ++lane) {
-        if (group.active[lane]) group.left[lane] = left;
-        for (int i = 0; i < 3; ++i) state[i] = group.x[i][lane];
-        if (member[lane] == cyclotron_OK) {
-            if (group.left[lane] > 0) member[lane] = cyclotron_group_finish(&group, lane, params, state, h);
-            for (size_t i = 0; i < 3; ++i) x[i * members + first + (size_t)lane] = state[i];
-        }
-        if (status != NULL) status[first + (size_t)lane] = (unsigned char)member[lane];
-        if (worst == cyclotron_OK) worst = member[lane];
-    }
-    return worst;
-}
-
-cyclotron_status cyclotron_ensemble(const cyclotron_params *params, double *x, size_t members, double h,
-                                    size_t steps, unsigned char *status)
-{
-    cyclotron_status worst = isfinite(h) ? cyclotron_OK : cyclotron_BAD_ARGUMENT;
-    const cyclotron_params own = params != NULL ? *params : cyclotron_default_params;
-    size_t earliest = members;
-    if (x == NULL && members > 0) return cyclotron_BAD_ARGUMENT;
-#ifdef _OPENMP
-#pragma omp parallel for schedule(dynamic)
-#endif
-    for (size_t first = 0; first < members; first += cyclotron_LANES) {
-        const cyclotron_status group = cyclotron_group_run(&own, x, members, first, h, steps, status);
-        if (group == cyclotron_OK) continue;
-#ifdef _OPENMP
-#pragma omp critical
-#endif
-        if (first < earliest) {
-            earliest = first;
-            worst = group;
-        }
-    }
-    return worst;
-}
-
-#if defined(__clang__)
-#pragma clang diagnostic pop
-#endif
-
-/* the Hamiltonian */
-static void cyclotron_energy(const cyclotron_params *params, const double x[3], double energy[restrict 1])
-{
-    (void)params;
-    const double u = x[0];
-    const double v = x[1];
-    energy[0] = 0.5 * (v * v + u * u);
-}
-
-/* the Casimirs */
-static void cyclotron_casimir_values(const cyclotron_params *params, const double x[3], double out[restrict 1])
-{
-    (void)params;
-    const double b = x[2];
-    out[0] = b;
-}
-
-/* pi(x) grad H(x) */
-static void cyclotron_field(const cyclotron_params *params, const double x[3], double out[restrict 3])
-{
-    (void)params;
-    const double u = x[0];
-    const double v = x[1];
-    const double b = x[2];
-    out[0] = b * v;
-    out[1] = -(b * u);
-    out[2] = 0.0;
-}
-
-double cyclotron_hamiltonian(const cyclotron_params *params, const double x[3])
-{
-    double energy[1];
-    cyclotron_energy(params != NULL ? params : &cyclotron_default_params, x, energy);
-    return energy[0];
-}
-
-void cyclotron_casimirs(const cyclotron_params *params, const double x[3], double out[])
-{
-    double value[1]; /* out may overlap x */
-    cyclotron_casimir_values(params != NULL ? params : &cyclotron_default_params, x, value);
-    for (int i = 0; i < 1; ++i) out[i] = value[i];
-}
-
-void cyclotron_vector_field(const cyclotron_params *params, const double x[3], double out[3])
-{
-    double value[3];
-    cyclotron_field(params != NULL ? params : &cyclotron_default_params, x, value);
-    memcpy(out, value, sizeof value);
 }
 
 const char *cyclotron_status_string(cyclotron_status status)
 {
-    switch (status) {
-    case cyclotron_OK: return "ok";
-    case cyclotron_NO_CONVERGENCE: return "no convergence: the step is too large";
-    case cyclotron_SINGULAR: return "singular Newton matrix: the step is too large";
-    case cyclotron_NOT_FINITE: return "not finite: overflow, or outside the domain";
-    case cyclotron_BAD_ARGUMENT: return "bad argument: a null pointer, or values that are not allowed";
-    }
-    return "unknown status";
+    static const char *const text[] = {
+        "ok",
+        "no convergence: the step is too large",
+        "singular Newton matrix: the step is too large",
+        "not finite: overflow, or outside the domain",
+        "bad argument: a null pointer, or values that are not allowed"
+    };
+    return (unsigned)status <= cyclotron_BAD_ARGUMENT ? text[status] : "unknown status";
 }
 
 size_t cyclotron_solver_size(void) { return sizeof(cyclotron_solver); }
 
 size_t cyclotron_solver_steps_done(const cyclotron_solver *s) { return s->steps; }
+
+/* ---- Ensembles ---- */
+cyclotron_status cyclotron_ensemble(const cyclotron_params *params, double *x, size_t members, double h,
+    size_t steps, unsigned char *status)
+{
+    cyclotron_status worst = isfinite(h) ? cyclotron_OK : cyclotron_BAD_ARGUMENT;
+    const cyclotron_params own = params != NULL ? *params : cyclotron_default_params;
+    if (x == NULL && members > 0) return cyclotron_BAD_ARGUMENT;
+    for (size_t m = 0; m < members; ++m) {
+        cyclotron_solver s;
+        double x0[cyclotron_DIM];
+        for (size_t i = 0; i < cyclotron_DIM; ++i) x0[i] = x[i * members + m];
+        cyclotron_status member = cyclotron_init(&s, &own, x0);
+        if (member == cyclotron_OK) {
+            member = cyclotron_integrate(&s, h, steps);
+            for (size_t i = 0; i < cyclotron_DIM; ++i) x[i * members + m] = s.x[i];
+        }
+        if (status != NULL) status[m] = (unsigned char)member;
+        if (worst == cyclotron_OK) worst = member;
+    }
+    return worst;
+}

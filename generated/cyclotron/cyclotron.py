@@ -6,17 +6,17 @@
 #   step: implicit, Newton iteration with the analytic matrix
 #   one Newton iteration: 5 additions, 21 multiplications
 #
-# spec: cyclotron, sha256 f90648e1d73073a8c40c47224a26fb5233122a8f534d5506c6c46aeebf7dde47
+# spec: cyclotron, sha256 28619749874f2e10947903325f521330765638e5d2fdca830ed74dadbaba7614
 # to regenerate: phigen build cyclotron
 # DO NOT EDIT: change the spec and regenerate; edits are noticed by the checksum below.
 #
 # SPDX-License-Identifier: 0BSD
 # This file belongs to whoever generated it; phigen claims no rights in it.
-# body-sha256: 47ae55a383a3e006507b96075194db91eb6dfb74e97f30d18a849343fcc9d2b1
+# body-sha256: 41a87aa47e2b05ef68e866823fe602923a8d63d0ee9be2242b3a74e09415e0f1
 import numpy as np
 
 VERSION = "0.1.0"
-SPEC_SHA256 = "f90648e1d73073a8c40c47224a26fb5233122a8f534d5506c6c46aeebf7dde47"
+SPEC_SHA256 = "28619749874f2e10947903325f521330765638e5d2fdca830ed74dadbaba7614"
 DIM = 3
 ORDER = 4
 COORDINATES = ("u", "v", "b",)

@@ -7,26 +7,34 @@
  *   step: implicit, Newton iteration with the analytic matrix
  *   one Newton iteration: 21 additions, 54 multiplications
  *
- * spec: engel_geodesics, sha256 2c582262335611f49c35b4a01123706232a303c9bdbfdaca81a47840c54ec956
+ * spec: engel_geodesics, sha256 fb609c6d402d3a7fbfac0e7cda1d7e07e2dba9262c5dfd8f16d22d0ab34eeabc
  * to regenerate: phigen build engel_geodesics
  * DO NOT EDIT: change the spec and regenerate; edits are noticed by the checksum below.
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 0f50722cba372bc06e94c2f1163a934e0189564ea97003a818d408849a94d170
+ *
+ *   1. The model
+ *   2. Compensated sums, linear equations
+ *   3. Starting guesses
+ *   4. The implicit step, by Newton's method
+ *   5. The solver
+ *   6. Ensembles
+ * body-sha256: b2a11a9e3a5c50b93d1cb14d74bc531b1fc2590b735f84c1b7ffcc45cf099ee4
  */
 #include "engel_geodesics.h"
 
 #include <float.h>
-#include <limits.h>
 #include <math.h>
-#include <stdint.h>
 #include <string.h>
 
+/* ---- The model ---- */
 const engel_geodesics_params engel_geodesics_default_params = { 0 };
 
-/* A step of size h is the composition of these fractions of it. */
-static const double engel_geodesics_fractions[1] = { 1.0 };
+enum { engel_geodesics_MAX_ITERATIONS = 20 }; /* of an inner solve */
+
+/* A correction is accepted when the error that it leaves is estimated to be below this. */
+#define engel_geodesics_TOLERANCE 1e-20
 
 /* everything that depends on parameters and step size only */
 static void engel_geodesics_prepare(const engel_geodesics_params *params, double h, double coef[restrict 3])
@@ -40,43 +48,33 @@ static void engel_geodesics_prepare(const engel_geodesics_params *params, double
 
 /* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
    increment, all with the momenta p = grad S_h(y) */
-static void engel_geodesics_linearise(const double coef[3], const double y[4], double displacement[restrict 4],
-                                      double increment[restrict 4], double jacobian[restrict 16],
-                                      double increment_jacobian[restrict 16])
+static void engel_geodesics_linearise(const double coef[3], const double y[4],
+    double displacement[restrict 4], double increment[restrict 4], double jacobian[restrict 16],
+    double increment_jacobian[restrict 16])
 {
-    const double h1 = y[0];
-    const double h2 = y[1];
-    const double h3 = y[2];
-    const double h4 = y[3];
+    const double h1 = y[0], h2 = y[1], h3 = y[2], h4 = y[3];
+    /* momenta */
     const double t1 = coef[0] + coef[1] * (h3 * h3);
     const double p_h2 = h2 * t1;
     const double p_h1 = h1 * t1;
-    const double t2 = h4 * p_h1;
-    const double t3 = coef[1] * (h1 * h1) + coef[1] * (h2 * h2);
-    const double p_h3 = h3 * t3;
-    const double t4 = h4 * p_h3 + h3 * p_h2;
-    const double t5 = h3 * p_h1;
-    const double t6 = h4 * p_h2;
-    const double t7 = coef[2] * (h1 * h3);
-    const double t8 = h4 * t7;
-    const double t9 = 0.5 * t8;
-    const double t10 = 0.5 * h3;
-    const double t11 = (-1.0 / 12.0) * t2 - t10;
-    const double t12 = coef[2] * (h2 * h3);
-    const double t13 = h4 * t12;
-    const double t14 = h4 * t3;
-    const double t15 = t10 + 1.0 / 12.0 * (t2 + t2);
-    const double t16 = 0.5 * p_h1;
-    const double t17 = h4 * t1;
-    const double t18 = h3 * t1;
-    displacement[0] = (-1.0 / 12.0) * (p_h2 * t2) - 0.5 * t4;
-    displacement[1] = 0.5 * t5 + 1.0 / 12.0 * (p_h1 * t2);
-    displacement[2] = 0.5 * t2;
+    const double t2 = coef[1] * (h1 * h1) + coef[1] * (h2 * h2);
+    const double p_h3 = h3 * t2;
+    /* displacement */
+    const double t3 = h4 * p_h1, t4 = h4 * p_h3 + h3 * p_h2, t5 = h3 * p_h1;
+    displacement[0] = (-1.0 / 12.0) * (p_h2 * t3) - 0.5 * t4;
+    displacement[1] = 0.5 * t5 + 1.0 / 12.0 * (p_h1 * t3);
+    displacement[2] = 0.5 * t3;
     displacement[3] = 0.0;
+    /* increment */
     increment[0] = t4;
     increment[1] = -t5;
-    increment[2] = -t2;
+    increment[2] = -t3;
     increment[3] = 0.0;
+    /* jacobian */
+    const double t6 = h4 * p_h2, t7 = coef[2] * (h1 * h3), t8 = h4 * t7, t9 = 0.5 * t8;
+    const double t10 = 0.5 * h3, t11 = (-1.0 / 12.0) * t3 - t10, t12 = coef[2] * (h2 * h3);
+    const double t13 = h4 * t12, t14 = h4 * t2, t15 = t10 + 1.0 / 12.0 * (t3 + t3), t16 = 0.5 * p_h1;
+    const double t17 = h4 * t1;
     jacobian[0] = 1.0 + ((-1.0 / 12.0) * (t1 * t6) - t9);
     jacobian[1] = t1 * t11 - 0.5 * t13;
     jacobian[2] = t12 * t11 - 1.0 / 12.0 * (t7 * t6) - 0.5 * t14 - 0.5 * p_h2;
@@ -93,6 +91,8 @@ static void engel_geodesics_linearise(const double coef[3], const double y[4], d
     jacobian[13] = 0.0;
     jacobian[14] = 0.0;
     jacobian[15] = 1.0;
+    /* increment jacobian */
+    const double t18 = h3 * t1;
     increment_jacobian[0] = t8;
     increment_jacobian[1] = t13 + t18;
     increment_jacobian[2] = p_h2 + (h3 * t12 + t14);
@@ -111,48 +111,15 @@ static void engel_geodesics_linearise(const double coef[3], const double y[4], d
     increment_jacobian[15] = 0.0;
 }
 
-/* Solve matrix * solution = side, both overwritten, by elimination with partial pivoting. 0 if singular. */
-static int engel_geodesics_solve_pivoting(double matrix[16], double side[4])
-{
-    for (int k = 0; k < 4; ++k) {
-        int best = k;
-        for (int i = k + 1; i < 4; ++i)
-            if (fabs(matrix[i * 4 + k]) > fabs(matrix[best * 4 + k])) best = i;
-        const double pivot = matrix[best * 4 + k];
-        if (!(fabs(pivot) > 0.0)) return 0;
-        for (int j = k; j < 4 && best != k; ++j) {
-            const double swap = matrix[k * 4 + j];
-            matrix[k * 4 + j] = matrix[best * 4 + j];
-            matrix[best * 4 + j] = swap;
-        }
-        const double swap = side[k];
-        side[k] = side[best];
-        side[best] = swap;
-        for (int i = k + 1; i < 4; ++i) {
-            const double factor = matrix[i * 4 + k] / pivot;
-            for (int j = k + 1; j < 4; ++j) matrix[i * 4 + j] -= factor * matrix[k * 4 + j];
-            side[i] -= factor * side[k];
-        }
-    }
-    for (int i = 4 - 1; i >= 0; --i) {
-        for (int j = i + 1; j < 4; ++j) side[i] -= matrix[i * 4 + j] * side[j];
-        side[i] /= matrix[i * 4 + i];
-    }
-    return 1;
-}
-
 /* elimination without pivoting: the solution, and the reciprocals of the pivots */
 static void engel_geodesics_eliminate(const double matrix[16], const double side[4],
-                                      double solution[restrict 4], double reciprocal[restrict 4])
+    double solution[restrict 4], double reciprocal[restrict 4])
 {
-    const double t1 = 1.0 / matrix[5];
-    const double t2 = matrix[1] * t1;
-    const double t3 = 1.0 / (matrix[0] - matrix[4] * t2);
-    const double t4 = 1.0 / matrix[15];
-    const double t5 = side[1] - side[3] * (matrix[7] * t4);
+    /* solution */
+    const double t1 = 1.0 / matrix[5], t2 = matrix[1] * t1, t3 = 1.0 / (matrix[0] - matrix[4] * t2);
+    const double t4 = 1.0 / matrix[15], t5 = side[1] - side[3] * (matrix[7] * t4);
     const double t6 = side[0] - side[3] * (matrix[3] * t4) - t2 * t5;
-    const double t7 = matrix[2] - matrix[6] * t2;
-    const double t8 = matrix[8] * t3;
+    const double t7 = matrix[2] - matrix[6] * t2, t8 = matrix[8] * t3;
     const double t9 = 1.0 / (matrix[10] - t7 * t8);
     const double t10 = (side[2] - side[3] * (matrix[11] * t4) - t6 * t8) * t9;
     const double t11 = t3 * (t6 - t7 * t10);
@@ -160,233 +127,50 @@ static void engel_geodesics_eliminate(const double matrix[16], const double side
     solution[1] = t1 * (t5 - (matrix[6] * t10 + matrix[4] * t11));
     solution[2] = t10;
     solution[3] = side[3] * t4;
+    /* reciprocal */
     reciprocal[0] = t3;
     reciprocal[1] = t1;
     reciprocal[2] = t9;
     reciprocal[3] = t4;
 }
 
-/* Solve matrix * solution = side, both overwritten. The matrix is I + O(h), so elimination without pivoting
-   does unless a pivot is far from 1. 0 if singular. */
-static int engel_geodesics_solve(double matrix[16], double side[4])
+/* the Hamiltonian */
+double engel_geodesics_hamiltonian(const engel_geodesics_params *params, const double x[4])
 {
-    double solution[4], reciprocal[4], largest = 0.0;
-    engel_geodesics_eliminate(matrix, side, solution, reciprocal);
-    for (int i = 0; i < 4; ++i)
-        if (!(fabs(reciprocal[i]) <= largest)) largest = fabs(reciprocal[i]);
-    if (!(largest < 1e3)) return engel_geodesics_solve_pivoting(matrix, side);
-    memcpy(side, solution, sizeof solution);
-    return 1;
+    (void)params;
+    const double h1 = x[0], h2 = x[1];
+    return 0.5 * (h2 * h2 + h1 * h1);
 }
 
-/* Whether a guess is where the next values may be. Recurrences that were fitted to little else than rest, near a saddle,
-   may lead anywhere; and far away the equation of a step has solutions that have nothing to do with the motion. */
-static int engel_geodesics_near(const double guess[4], const double last[4])
+/* the Casimirs */
+void engel_geodesics_casimirs(const engel_geodesics_params *params, const double x[4], double out[])
 {
-    double distance = 0.0, size = 0.0;
-    for (int i = 0; i < 4; ++i) {
-        distance += fabs(guess[i] - last[i]);
-        size += fabs(last[i]);
-    }
-    return distance <= 4.0 * size;
+    (void)params;
+    const double h2 = x[1], h3 = x[2], h4 = x[3];
+    out[0] = h4;
+    out[1] = h3 * h3 - 2.0 * (h2 * h4);
 }
 
-/* The guess for the next value (y), from earlier ones; 0 if there is none. */
-static int engel_geodesics_predict(const engel_geodesics_memory *memory, double value[4])
+/* pi(x) grad H(x) */
+void engel_geodesics_vector_field(const engel_geodesics_params *params, const double x[4], double out[4])
 {
-    const int last = memory->count - 1;
-    double odd[4] = { 0.0 }, binomial = -1.0;
-    memset(value, 0, 4 * sizeof value[0]);
-    if (memory->fitting) {
-        for (int k = 0; k < memory->terms; k += 2)
-            for (int i = 0; i < 4; ++i) {
-                value[i] += memory->weight[k][i][0] * memory->past[last - k][i];
-                odd[i] += memory->weight[k + 1][i][0] * memory->past[last - 1 - k][i];
-            }
-        for (int i = 0; i < 4; ++i) value[i] += odd[i];
-    } else {
-        for (int k = 0; k < memory->order && k <= last; ++k) {
-            binomial *= -(double)(memory->order - k) / (k + 1);
-            for (int i = 0; i < 4; ++i) value[i] += binomial * memory->past[last - k][i];
-        }
-    }
-    return last >= 0 && engel_geodesics_near(value, memory->past[last]);
+    (void)params;
+    const double h1 = x[0], h2 = x[1], h3 = x[2], h4 = x[3];
+    out[0] = h2 * h3;
+    out[1] = -(h1 * h3);
+    out[2] = -(h1 * h4);
+    out[3] = 0.0;
 }
 
-/* Choose the guess that would have been best for a value that took several iterations. */
-static void engel_geodesics_judge(engel_geodesics_memory *memory, const double value[4])
+/* ---- Compensated sums, linear equations ---- */
+/* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to
+   its last bit: were it rounded with the change, corrections of one sign would add up to a drift. 0, and x as
+   before, if the sum is not finite. */
+static int engel_geodesics_advance(engel_geodesics_solver *s, const double change[engel_geodesics_DIM],
+    const double correction[engel_geodesics_DIM])
 {
-    double row[8 + 1][4], guess[4], least = HUGE_VAL, fitted = HUGE_VAL;
-    const int rows = memory->count < 8 ? memory->count : 8;
-    memcpy(row[0], value, sizeof row[0]);
-    for (int k = 0; k < rows; ++k) memcpy(row[k + 1], memory->past[memory->count - 1 - k], sizeof row[0]);
-    for (int order = 1; order <= rows; ++order) { /* row[0] becomes the backward difference of this order */
-        double size = 0.0;
-        for (int k = 0; k <= rows - order; ++k)
-            for (int i = 0; i < 4; ++i) row[k][i] -= row[k + 1][i];
-        for (int i = 0; i < 4; ++i) size += fabs(row[0][i]);
-        if (size < least) {
-            least = size;
-            memory->order = order;
-        }
-    }
-    memory->fitting = memory->terms > 0;
-    if (memory->fitting && engel_geodesics_predict(memory, guess)) {
-        fitted = 0.0;
-        for (int i = 0; i < 4; ++i) fitted += fabs(value[i] - guess[i]);
-    }
-    memory->fitting = memory->terms > 0 && fitted <= least;
-    if (memory->order == 0) memory->order = 1;
-}
-
-/* Make eight columns orthogonal to one, by the multiples of it that are put into r. Where that one is among the eight, those
-   up to it stay as they are, and inverse becomes one over its squared length. The number of rows is even. */
-static void engel_geodesics_project(int rows, double (*one)[8], int column, double *inverse, double (*eight)[8], double r[8])
-{
-    double even[8] = { 0.0 }, odd[8] = { 0.0 };
-    for (int i = 0; i < rows; i += 2) {
-        const double entry = one[i][column], next = one[i + 1][column];
-        for (int l = 0; l < 8; ++l) even[l] += entry * eight[i][l];
-        for (int l = 0; l < 8; ++l) odd[l] += next * eight[i + 1][l];
-    }
-    for (int l = 0; l < 8; ++l) even[l] += odd[l];
-    if (one == eight) {
-        *inverse = even[column] > 0.0 ? 1.0 / even[column] : 0.0;
-        memset(even, 0, ((size_t)column + 1) * sizeof even[0]);
-    }
-    for (int l = 0; l < 8; ++l) r[l] = even[l] *= *inverse;
-    for (int i = 0; i < rows; ++i) {
-        const double entry = one[i][column];
-        for (int l = 0; l < 8; ++l) eight[i][l] -= entry * even[l];
-    }
-}
-
-/* By how much recurrences miss the last of these values. */
-static double engel_geodesics_missed(const double *value, double (*weight)[8])
-{
-    enum { AHEAD = 8, WINDOW = 40, CHECKS = 8 };
-    double most = 0.0;
-    for (int i = 0; i < CHECKS; ++i) {
-        double guess[8] = { 0.0 };
-        for (int k = 0; k < WINDOW; ++k)
-            for (int l = 0; l < 8; ++l) guess[l] += weight[k][l] * value[i + WINDOW - 1 - k];
-        for (int l = 0; l < AHEAD; ++l) most = fmax(most, fabs(guess[l] - value[i + WINDOW + l]));
-    }
-    return most;
-}
-
-/* Fit the recurrences value[m + l] = sum of weight[k][..][l] * value[m - 1 - k], l = 0 ... 8 - 1, to the history of
-   a component: ridge least squares by modified Gram-Schmidt, the ridge at the level of rounding. Columns are taken in by
-   eights, until they leave next to nothing of the right-hand sides. How many past values are used; 0 if the recurrences do
-   not foresee the last values, which they were not fitted to. */
-static int engel_geodesics_train(engel_geodesics_memory *memory, int component)
-{
-    enum { AHEAD = 8, WINDOW = 40, ROWS = 56 };
-    double q[WINDOW / 8][ROWS + WINDOW][8], r[WINDOW / 8][WINDOW][8], inverse[WINDOW]; /* eight columns in each part */
-    double right[ROWS + WINDOW][8], weight[WINDOW][8], value[111], largest = 0.0, left = HUGE_VAL;
-    int terms = 0;
-    memset(q, 0, sizeof q);
-    memset(right, 0, sizeof right);
-    memset(weight, 0, sizeof weight);
-    for (int i = 0; i < 111; ++i) {
-        value[i] = memory->past[memory->count - 111 + i][component];
-        if (fabs(value[i]) > largest) largest = fabs(value[i]);
-    }
-    for (int i = 0; i < ROWS; ++i)
-        for (int l = 0; l < AHEAD; ++l) right[i][l] = value[i + WINDOW + l];
-    while (terms < WINDOW && left > 3e-12 * largest) {
-        const int part = terms / 8, rows = ROWS + terms + 8; /* further rows of the ridge are zero in these columns */
-        for (int i = 0; i < ROWS; ++i)
-            for (int l = 0; l < 8; ++l) q[part][i][l] = value[i + WINDOW - 1 - terms - l];
-        for (int l = 0; l < 8; ++l) q[part][ROWS + terms + l][l] = 1e-15 * largest;
-        for (int k = 0; k < terms; ++k) engel_geodesics_project(rows, q[k / 8], k % 8, &inverse[k], q[part], r[part][k]);
-        for (int l = 0; l < 8; ++l, ++terms) {
-            engel_geodesics_project(rows, q[part], l, &inverse[terms], q[part], r[part][terms]);
-            engel_geodesics_project(rows, q[part], l, &inverse[terms], right, weight[terms]);
-        }
-        double sum[8] = { 0.0 };
-        for (int i = 0; i < ROWS; ++i)
-            for (int l = 0; l < 8; ++l) sum[l] += fabs(right[i][l]);
-        left = 0.0;
-        for (int l = 0; l < 8; ++l) left += sum[l] / ROWS;
-    }
-    for (int k = terms - 1; k >= 0; --k)
-        for (int j = k + 1; j < terms; ++j)
-            for (int l = 0; l < 8; ++l) weight[k][l] -= r[j / 8][k][j % 8] * weight[j][l];
-    for (int k = 0; k < WINDOW; ++k) memcpy(memory->weight[k][component], weight[k], AHEAD * sizeof(double));
-    return engel_geodesics_missed(value + ROWS, weight) <= 1e-07 * largest ? terms : 0;
-}
-
-/* Drop what is old, if so many values would not fit into the history. */
-static void engel_geodesics_make_room(engel_geodesics_memory *memory, int values)
-{
-    if (memory->count + values <= 222) return;
-    memmove(memory->past, memory->past + memory->count - 111, 111 * sizeof memory->past[0]);
-    memory->count = 111;
-}
-
-/* Add a value to the history. */
-static void engel_geodesics_record(engel_geodesics_memory *memory, const double value[4])
-{
-    engel_geodesics_make_room(memory, 1);
-    memcpy(memory->past[memory->count++], value, 4 * sizeof value[0]);
-}
-
-/* Fit the recurrence to the last values; with every time, wait longer before it is done again. */
-static void engel_geodesics_fit(engel_geodesics_memory *memory)
-{
-    int found = 1;
-    memory->terms = 0;
-    for (int i = 0; i < 4 && found; ++i) {
-        const int terms = engel_geodesics_train(memory, i);
-        found = terms > 0;
-        if (terms > memory->terms) memory->terms = terms;
-    }
-    if (!found) memory->terms = 0;
-    memory->fitting = found;
-    ++memory->fits;
-    memory->slow = 0;
-    memory->patience = memory->patience < 10000 ? 2 * memory->patience + 150 : 20000;
-}
-
-/* Take in the solved value: what took one iteration needs no better guess. */
-static void engel_geodesics_remember(engel_geodesics_memory *memory, const double value[4], int iterations)
-{
-    if (iterations > 1) engel_geodesics_judge(memory, value);
-    engel_geodesics_record(memory, value);
-    memory->slow = iterations > 1 ? memory->slow + 1 : 0;
-    if (memory->slow > memory->patience && memory->count >= 111) engel_geodesics_fit(memory);
-}
-
-/* Whether an increment is that of the motion. Where the step is too large, the equation may have been solved by a point far
-   away, at another energy, that has nothing to do with it. */
-static int engel_geodesics_plausible(const engel_geodesics_solver *s, int stage, const double increment[4])
-{
-    double moved = 0.0, size = 0.0, field[4], middle[4], end[4];
-    for (int i = 0; i < 4; ++i) {
-        moved += fabs(increment[i]);
-        size += fabs(s->x[i]);
-    }
-    if (moved <= 1.5 * size) return 1;
-    engel_geodesics_vector_field(&s->params, s->x, field);
-    for (int i = 0; i < 4; ++i) {
-        size += fabs(engel_geodesics_fractions[stage] * s->h * field[i]);
-        middle[i] = s->x[i] + 0.5 * increment[i];
-        end[i] = s->x[i] + increment[i];
-    }
-    if (moved <= 1.5 * size) return 1;
-    const double before = engel_geodesics_hamiltonian(&s->params, s->x), after = engel_geodesics_hamiltonian(&s->params, end);
-    const double scale = fabs(before) + fabs(engel_geodesics_hamiltonian(&s->params, middle)) + fabs(after);
-    return fabs(after - before) <= 0.5 * scale;
-}
-
-/* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to its last
-   bit: were it rounded with the change, corrections of one sign would add up to a drift. 0, and x as before, if the
-   sum is not finite. */
-static int engel_geodesics_advance(engel_geodesics_solver *s, const double change[4], const double correction[4])
-{
-    double x[4], carry[4];
-    for (int i = 0; i < 4; ++i) {
+    double x[engel_geodesics_DIM], carry[engel_geodesics_DIM];
+    for (int i = 0; i < engel_geodesics_DIM; ++i) {
         const double sum = s->x[i] + change[i], added = sum - s->x[i];
         const double lost = (s->x[i] - (sum - added)) + (change[i] - added);
         const double small = lost + (s->carry[i] + correction[i]);
@@ -399,87 +183,165 @@ static int engel_geodesics_advance(engel_geodesics_solver *s, const double chang
     return 1;
 }
 
-/* Size of a correction relative to each component of y, but no finer than 1e-6 of the largest; NaN or infinite if
-   the correction is. */
-static double engel_geodesics_size(const double y[4], const double delta[4])
+/* Newton matrices are I + O(h): a pivot whose reciprocal is larger than this is far from 1. */
+#define engel_geodesics_LARGEST_RECIPROCAL 1e3
+
+/* Solve matrix * solution = side, both overwritten. The matrix is I + O(h): 0 if a pivot is far from 1. */
+static int engel_geodesics_solve(double matrix[engel_geodesics_DIM * engel_geodesics_DIM],
+    double side[engel_geodesics_DIM])
+{
+    double solution[engel_geodesics_DIM], reciprocal[engel_geodesics_DIM], largest = 0.0;
+    engel_geodesics_eliminate(matrix, side, solution, reciprocal);
+    for (int i = 0; i < engel_geodesics_DIM; ++i)
+        if (!(fabs(reciprocal[i]) <= largest)) largest = fabs(reciprocal[i]);
+    if (!(largest < engel_geodesics_LARGEST_RECIPROCAL)) return 0;
+    memcpy(side, solution, sizeof solution);
+    return 1;
+}
+
+/* ---- Starting guesses ---- */
+/* How far from the last value a guess may be, in sizes of that value. */
+#define engel_geodesics_REACH 4.0
+
+/* The guess for the next value from the last ones: the sum of their backward differences. 0 if there is none,
+   or if it is far away, where the equation of a step has solutions that have nothing to do with the motion.
+   */
+static int engel_geodesics_predict(const engel_geodesics_history *history, double value[engel_geodesics_DIM])
+{
+    double distance = 0.0, size = 0.0;
+    for (int i = 0; i < engel_geodesics_DIM; ++i) {
+        value[i] = 0.0;
+        for (int k = 0; k < history->order; ++k) value[i] += history->difference[k][i];
+        distance += fabs(value[i] - history->difference[0][i]);
+        size += fabs(history->difference[0][i]);
+    }
+    return history->order > 0 && distance <= engel_geodesics_REACH * size;
+}
+
+/* Take in the solved value. The guess of order k missed it by its k-th difference: the next is of the best
+   order. */
+static void engel_geodesics_remember(engel_geodesics_history *history,
+    const double value[engel_geodesics_DIM])
+{
+    double least = HUGE_VAL, next[engel_geodesics_DIM];
+    memcpy(next, value, sizeof next);
+    for (int k = 0; k <= history->count && k < engel_geodesics_DIFFERENCES; ++k) {
+        double size = 0.0;
+        for (int i = 0; i < engel_geodesics_DIM; ++i) {
+            const double last = history->difference[k][i];
+            history->difference[k][i] = next[i];
+            size += fabs(next[i]);
+            next[i] -= last;
+        }
+        if (k > 0 && size < least) {
+            least = size;
+            history->order = k;
+        }
+    }
+    if (history->count == 0) history->order = 1;
+    if (history->count < engel_geodesics_DIFFERENCES) ++history->count;
+}
+
+/* How far a step may lead, in sizes of the state and of what the vector field says, if the energy is lost;
+   and the part of the energy that counts as lost. */
+#define engel_geodesics_PLAUSIBLE 1.5
+#define engel_geodesics_LOST 0.5
+
+/* Whether an increment is that of the motion. Where the step is too large, the equation may have been solved
+   by a point far away, at another energy, that has nothing to do with it. */
+static int engel_geodesics_plausible(const engel_geodesics_solver *s,
+    const double increment[engel_geodesics_DIM])
+{
+    double moved = 0.0, size = 0.0, field[engel_geodesics_DIM], middle[engel_geodesics_DIM],
+        end[engel_geodesics_DIM];
+    for (int i = 0; i < engel_geodesics_DIM; ++i) {
+        moved += fabs(increment[i]);
+        size += fabs(s->x[i]);
+    }
+    if (moved <= engel_geodesics_PLAUSIBLE * size) return 1;
+    engel_geodesics_vector_field(&s->params, s->x, field);
+    for (int i = 0; i < engel_geodesics_DIM; ++i) {
+        size += fabs(s->h * field[i]);
+        middle[i] = s->x[i] + 0.5 * increment[i];
+        end[i] = s->x[i] + increment[i];
+    }
+    if (moved <= engel_geodesics_PLAUSIBLE * size) return 1;
+    const double before = engel_geodesics_hamiltonian(&s->params, s->x), after =
+        engel_geodesics_hamiltonian(&s->params, end);
+    const double scale = fabs(before) + fabs(engel_geodesics_hamiltonian(&s->params, middle)) + fabs(after);
+    return fabs(after - before) <= engel_geodesics_LOST * scale;
+}
+
+/* ---- The implicit step, by Newton's method ---- */
+/* Components of y are measured no finer than by this part of the largest. */
+#define engel_geodesics_FLOOR 1e-6
+
+/* Size of a correction relative to each component of y; NaN or infinite if the correction is. */
+static double engel_geodesics_size(const double y[engel_geodesics_DIM],
+    const double delta[engel_geodesics_DIM])
 {
     double norm = 0.0, size = 0.0;
-    for (int i = 0; i < 4; ++i) norm = fabs(y[i]) > norm ? fabs(y[i]) : norm;
-    for (int i = 0; i < 4; ++i) {
-        const double ratio = fabs(delta[i]) / (fabs(y[i]) + 1e-6 * norm + DBL_MIN);
+    for (int i = 0; i < engel_geodesics_DIM; ++i) norm = fabs(y[i]) > norm ? fabs(y[i]) : norm;
+    for (int i = 0; i < engel_geodesics_DIM; ++i) {
+        const double ratio = fabs(delta[i]) / (fabs(y[i]) + engel_geodesics_FLOOR * norm + DBL_MIN);
         if (!isfinite(ratio)) return ratio;
         size = ratio > size ? ratio : size;
     }
     return size;
 }
 
+/* Corrections below the first that shrink by less than the second have reached the level of rounding. */
+#define engel_geodesics_NEARLY_SOLVED 1e-8
+#define engel_geodesics_SHRINKING 0.25
+
 /* Solve (y - x) + displacement(y) = 0 for y by Newton's method from the extrapolated guess, and advance. The
-   increment is corrected to first order by the last Newton correction, so that correction costs no evaluation:
-   a correction is accepted when the error that remains after it, quadratic in it, is below 1e-20. */
-static engel_geodesics_status engel_geodesics_attempt(engel_geodesics_solver *s, int stage)
+   increment is corrected to first order by the last Newton correction, so that correction costs no
+   evaluation: a correction is accepted when the error that remains after it, quadratic in it, is below
+   engel_geodesics_TOLERANCE. */
+static engel_geodesics_status engel_geodesics_attempt(engel_geodesics_solver *s)
 {
-    const double *coef = s->coef[stage];
-    engel_geodesics_memory *memory = &s->memory[stage];
-    double y[4], delta[4], displacement[4], increment[4];
-    double jacobian[16], increment_jacobian[16];
-    if (!engel_geodesics_predict(memory, y)) memcpy(y, s->x, sizeof y);
-    double previous = HUGE_VAL;
-    for (int iteration = 0; iteration < 20; ++iteration) {
-        engel_geodesics_linearise(coef, y, displacement, increment, jacobian, increment_jacobian);
+    double y[engel_geodesics_DIM], delta[engel_geodesics_DIM], displacement[engel_geodesics_DIM],
+        increment[engel_geodesics_DIM];
+    double jacobian[engel_geodesics_DIM * engel_geodesics_DIM], increment_jacobian[engel_geodesics_DIM
+        * engel_geodesics_DIM], previous = HUGE_VAL;
+    if (!engel_geodesics_predict(&s->history, y)) memcpy(y, s->x, sizeof y);
+    for (int iteration = 1; iteration <= engel_geodesics_MAX_ITERATIONS; ++iteration) {
+        engel_geodesics_linearise(s->coef, y, displacement, increment, jacobian, increment_jacobian);
         ++s->evaluations;
-        for (int i = 0; i < 4; ++i) delta[i] = ((y[i] - s->x[i]) + displacement[i]) - s->carry[i];
+        for (int i = 0; i < engel_geodesics_DIM; ++i) delta[i] = ((y[i] - s->x[i]) + displacement[i])
+            - s->carry[i];
         const int regular = engel_geodesics_solve(jacobian, delta);
-        const double size = engel_geodesics_size(y, delta);
+        const double size = engel_geodesics_size(y, delta), growth = size / (previous * previous);
         if (!isfinite(size)) return engel_geodesics_NOT_FINITE;
         if (!regular) return engel_geodesics_SINGULAR;
-        for (int i = 0; i < 4; ++i) y[i] -= delta[i];
-        const double growth = size / (previous * previous);
+        for (int i = 0; i < engel_geodesics_DIM; ++i) y[i] -= delta[i];
         const double remaining = size * size * (growth > 1.0 ? growth : 1.0);
-        /* The second test: corrections no longer shrink, the solve has reached the level of rounding. */
-        if (remaining <= 1e-20 || (previous < 1e-8 && size > 0.25 * previous)) {
-            double correction[4] = { 0.0 };
-            for (int i = 0; i < 4; ++i)
-                for (int j = 0; j < 4; ++j) correction[i] -= increment_jacobian[i * 4 + j] * delta[j];
-            if (!engel_geodesics_plausible(s, stage, increment)) return engel_geodesics_NO_CONVERGENCE;
-            if (!engel_geodesics_advance(s, increment, correction)) return engel_geodesics_NOT_FINITE;
-            engel_geodesics_remember(memory, y, iteration + 1);
-            return engel_geodesics_OK;
-        }
+        const int stalled = previous < engel_geodesics_NEARLY_SOLVED && size > engel_geodesics_SHRINKING
+            * previous;
         previous = size;
+        if (!(remaining <= engel_geodesics_TOLERANCE || stalled)) continue;
+        double correction[engel_geodesics_DIM] = { 0.0 };
+        for (int i = 0; i < engel_geodesics_DIM; ++i)
+            for (int j = 0; j < engel_geodesics_DIM; ++j)
+                correction[i] -= increment_jacobian[i * engel_geodesics_DIM + j] * delta[j];
+        if (!engel_geodesics_plausible(s, increment)) return engel_geodesics_NO_CONVERGENCE;
+        if (!engel_geodesics_advance(s, increment, correction)) return engel_geodesics_NOT_FINITE;
+        engel_geodesics_remember(&s->history, y);
+        return engel_geodesics_OK;
     }
     return engel_geodesics_NO_CONVERGENCE;
 }
 
-/* The 1 stages of one step. If one fails, the state is as before the step. */
-static engel_geodesics_status engel_geodesics_stages(engel_geodesics_solver *s)
-{
-    double x[4], carry[4];
-    memcpy(x, s->x, sizeof x);
-    memcpy(carry, s->carry, sizeof carry);
-    for (int stage = 0; stage < 1; ++stage) {
-        engel_geodesics_status status = engel_geodesics_attempt(s, stage);
-        /* A guess from earlier steps may have misled it: once more without. */
-        if (status != engel_geodesics_OK && s->memory[stage].count > 0) {
-            memset(&s->memory[stage], 0, sizeof s->memory[stage]);
-            status = engel_geodesics_attempt(s, stage);
-        }
-        if (status != engel_geodesics_OK) {
-            memcpy(s->x, x, sizeof x);
-            memcpy(s->carry, carry, sizeof carry);
-            return status;
-        }
-    }
-    return engel_geodesics_OK;
-}
-
-/* All of engel_geodesics_init but the gauge. The arguments may be parts of *s: they are read before it is written. */
-static engel_geodesics_status engel_geodesics_start(engel_geodesics_solver *s, const engel_geodesics_params *params, const double x0[4])
+/* ---- The solver ---- */
+/* The arguments may be parts of *s: they are read before it is written. */
+engel_geodesics_status engel_geodesics_init(engel_geodesics_solver *s, const engel_geodesics_params *params,
+    const double x0[engel_geodesics_DIM])
 {
     if (s == NULL || x0 == NULL) return engel_geodesics_BAD_ARGUMENT;
     const engel_geodesics_params own = params != NULL ? *params : engel_geodesics_default_params;
-    double x[4];
+    double x[engel_geodesics_DIM];
     memcpy(x, x0, sizeof x);
-    for (int i = 0; i < 4; ++i)
+    for (int i = 0; i < engel_geodesics_DIM; ++i)
         if (!isfinite(x[i])) return engel_geodesics_BAD_ARGUMENT;
     memset(s, 0, sizeof *s);
     memcpy(s->x, x, sizeof s->x);
@@ -487,1008 +349,83 @@ static engel_geodesics_status engel_geodesics_start(engel_geodesics_solver *s, c
     return engel_geodesics_OK;
 }
 
-engel_geodesics_status engel_geodesics_init(engel_geodesics_solver *s, const engel_geodesics_params *params,
-                                            const double x0[4])
-{
-    return engel_geodesics_start(s, params, x0);
-}
-
 /* What depends on the step size; nothing where that is as before. */
 static engel_geodesics_status engel_geodesics_set_step(engel_geodesics_solver *s, double h)
 {
     if (s == NULL || !isfinite(h)) return engel_geodesics_BAD_ARGUMENT;
-    if (s->ready && memcmp(&h, &s->h, sizeof h) == 0) return engel_geodesics_OK;
-    for (int stage = 0; stage < 1; ++stage)
-        engel_geodesics_prepare(&s->params, engel_geodesics_fractions[stage] * h, s->coef[stage]);
-    memset(s->memory, 0, sizeof s->memory);
-    for (int stage = 0; stage < 1; ++stage) s->memory[stage].patience = 150;
-    s->pause = 16;
-    s->setback = s->foreseeing = 0;
-    s->doubt = s->retry = 0;
-    s->effort = 0.0;
-    s->passes = INT_MAX;
+    if (s->prepared && memcmp(&h, &s->h, sizeof h) == 0) return engel_geodesics_OK;
+    engel_geodesics_prepare(&s->params, h, s->coef);
+    memset(&s->history, 0, sizeof s->history);
     s->h = h;
-    s->ready = 1;
+    s->t_before_h = s->t;
+    s->steps_before_h = s->steps;
+    s->prepared = 1;
     return engel_geodesics_OK;
+}
+
+/* One stage. A guess from earlier steps may have misled it: then once more without. */
+static engel_geodesics_status engel_geodesics_stage(engel_geodesics_solver *s)
+{
+    engel_geodesics_status status = engel_geodesics_attempt(s);
+    if (status != engel_geodesics_OK && s->history.count > 0) {
+        memset(&s->history, 0, sizeof s->history);
+        status = engel_geodesics_attempt(s);
+    }
+    return status;
 }
 
 engel_geodesics_status engel_geodesics_step(engel_geodesics_solver *s, double h)
 {
     engel_geodesics_status status = engel_geodesics_set_step(s, h);
     if (status != engel_geodesics_OK) return status;
-    status = engel_geodesics_stages(s);
-    if (status == engel_geodesics_OK) ++s->steps;
+    status = engel_geodesics_stage(s);
+    if (status != engel_geodesics_OK) return status;
+    ++s->steps;
+    s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
     return status;
 }
 
-/*
- * Eight at a time: below, the formulas of a step are evaluated for 8 steps of a trajectory, or members of an
- * ensemble, at once. Compilers make vector instructions of the loops over lanes.
- */
-enum { engel_geodesics_LANES = 8 };
-
-#if defined(__GNUC__)
-typedef double engel_geodesics_lanes[engel_geodesics_LANES] __attribute__((aligned(64))); /* a value in each lane */
-#else
-typedef double engel_geodesics_lanes[engel_geodesics_LANES];
-#endif
-
-#if defined(__clang__)
-#define engel_geodesics_EACH_LANE _Pragma("clang loop vectorize(assume_safety)")
-#pragma clang diagnostic push
-#pragma clang diagnostic ignored "-Wpass-failed"
-#elif defined(__GNUC__)
-#define engel_geodesics_EACH_LANE _Pragma("GCC ivdep") _Pragma("GCC unroll 1")
-#else
-#define engel_geodesics_EACH_LANE
-#endif
-
-/* What all blocks share: coefficients, the same in each lane, and the recurrences by which they are foreseen. */
-typedef struct {
-    int fits[1]; /* the fit that weight is of; -1 for none */
-    engel_geodesics_lanes coef[1][3], weight[1][40][4];
-} engel_geodesics_table;
-
-/* A stage in all lanes, linearised around y. */
-typedef struct {
-    engel_geodesics_lanes y[4], displacement[4], increment[4], residual[4];
-    /* a residual r of alpha(y) = x takes inverse r from y, and gain r from the increment */
-    engel_geodesics_lanes inverse[16], slope[16], gain[16];
-} engel_geodesics_model;
-
-/* engel_geodesics_linearise in all lanes. */
-static void engel_geodesics_linearise_lanes(engel_geodesics_lanes coef[restrict 3],
-                                            engel_geodesics_lanes y[restrict 4],
-                                            engel_geodesics_lanes displacement[restrict 4],
-                                            engel_geodesics_lanes increment[restrict 4],
-                                            engel_geodesics_lanes jacobian[restrict 16],
-                                            engel_geodesics_lanes increment_jacobian[restrict 16])
-{
-    engel_geodesics_EACH_LANE
-    for (int lane = 0; lane < engel_geodesics_LANES; ++lane) {
-        const double h1 = y[0][lane];
-        const double h2 = y[1][lane];
-        const double h3 = y[2][lane];
-        const double h4 = y[3][lane];
-        const double t1 = coef[0][lane] + coef[1][lane] * (h3 * h3);
-        const double p_h2 = h2 * t1;
-        const double p_h1 = h1 * t1;
-        const double t2 = h4 * p_h1;
-        const double t3 = coef[1][lane] * (h1 * h1) + coef[1][lane] * (h2 * h2);
-        const double p_h3 = h3 * t3;
-        const double t4 = h4 * p_h3 + h3 * p_h2;
-        const double t5 = h3 * p_h1;
-        const double t6 = h4 * p_h2;
-        const double t7 = coef[2][lane] * (h1 * h3);
-        const double t8 = h4 * t7;
-        const double t9 = 0.5 * t8;
-        const double t10 = 0.5 * h3;
-        const double t11 = (-1.0 / 12.0) * t2 - t10;
-        const double t12 = coef[2][lane] * (h2 * h3);
-        const double t13 = h4 * t12;
-        const double t14 = h4 * t3;
-        const double t15 = t10 + 1.0 / 12.0 * (t2 + t2);
-        const double t16 = 0.5 * p_h1;
-        const double t17 = h4 * t1;
-        const double t18 = h3 * t1;
-        displacement[0][lane] = (-1.0 / 12.0) * (p_h2 * t2) - 0.5 * t4;
-        displacement[1][lane] = 0.5 * t5 + 1.0 / 12.0 * (p_h1 * t2);
-        displacement[2][lane] = 0.5 * t2;
-        displacement[3][lane] = 0.0;
-        increment[0][lane] = t4;
-        increment[1][lane] = -t5;
-        increment[2][lane] = -t2;
-        increment[3][lane] = 0.0;
-        jacobian[0][lane] = 1.0 + ((-1.0 / 12.0) * (t1 * t6) - t9);
-        jacobian[1][lane] = t1 * t11 - 0.5 * t13;
-        jacobian[2][lane] = t12 * t11 - 1.0 / 12.0 * (t7 * t6) - 0.5 * t14 - 0.5 * p_h2;
-        jacobian[3][lane] = (-1.0 / 12.0) * (p_h1 * p_h2) - 0.5 * p_h3;
-        jacobian[4][lane] = t1 * t15;
-        jacobian[5][lane] = 1.0;
-        jacobian[6][lane] = t16 + t7 * t15;
-        jacobian[7][lane] = 1.0 / 12.0 * (p_h1 * p_h1);
-        jacobian[8][lane] = 0.5 * t17;
-        jacobian[9][lane] = 0.0;
-        jacobian[10][lane] = 1.0 + t9;
-        jacobian[11][lane] = t16;
-        jacobian[12][lane] = 0.0;
-        jacobian[13][lane] = 0.0;
-        jacobian[14][lane] = 0.0;
-        jacobian[15][lane] = 1.0;
-        increment_jacobian[0][lane] = t8;
-        increment_jacobian[1][lane] = t13 + t18;
-        increment_jacobian[2][lane] = p_h2 + (h3 * t12 + t14);
-        increment_jacobian[3][lane] = p_h3;
-        increment_jacobian[4][lane] = -t18;
-        increment_jacobian[5][lane] = 0.0;
-        increment_jacobian[6][lane] = -(h3 * t7 + p_h1);
-        increment_jacobian[7][lane] = 0.0;
-        increment_jacobian[8][lane] = -t17;
-        increment_jacobian[9][lane] = 0.0;
-        increment_jacobian[10][lane] = -t8;
-        increment_jacobian[11][lane] = -p_h1;
-        increment_jacobian[12][lane] = 0.0;
-        increment_jacobian[13][lane] = 0.0;
-        increment_jacobian[14][lane] = 0.0;
-        increment_jacobian[15][lane] = 0.0;
-    }
-}
-
-/* engel_geodesics_evaluate in all lanes. */
-static void engel_geodesics_evaluate_lanes(engel_geodesics_lanes coef[restrict 3],
-                                           engel_geodesics_lanes y[restrict 4],
-                                           engel_geodesics_lanes displacement[restrict 4],
-                                           engel_geodesics_lanes increment[restrict 4])
-{
-    engel_geodesics_EACH_LANE
-    for (int lane = 0; lane < engel_geodesics_LANES; ++lane) {
-        const double h1 = y[0][lane];
-        const double h2 = y[1][lane];
-        const double h3 = y[2][lane];
-        const double h4 = y[3][lane];
-        const double t1 = coef[0][lane] + coef[1][lane] * (h3 * h3);
-        const double p_h2 = h2 * t1;
-        const double p_h1 = h1 * t1;
-        const double t2 = h4 * p_h1;
-        const double p_h3 = h3 * (coef[1][lane] * (h1 * h1) + coef[1][lane] * (h2 * h2));
-        const double t3 = h4 * p_h3 + h3 * p_h2;
-        const double t4 = h3 * p_h1;
-        displacement[0][lane] = (-1.0 / 12.0) * (p_h2 * t2) - 0.5 * t3;
-        displacement[1][lane] = 0.5 * t4 + 1.0 / 12.0 * (p_h1 * t2);
-        displacement[2][lane] = 0.5 * t2;
-        displacement[3][lane] = 0.0;
-        increment[0][lane] = t3;
-        increment[1][lane] = -t4;
-        increment[2][lane] = -t2;
-        increment[3][lane] = 0.0;
-    }
-}
-
-/* engel_geodesics_invert in all lanes. */
-static void engel_geodesics_invert_lanes(engel_geodesics_lanes matrix[restrict 16],
-                                         engel_geodesics_lanes slope[restrict 16],
-                                         engel_geodesics_lanes inverse[restrict 16],
-                                         engel_geodesics_lanes gain[restrict 16],
-                                         engel_geodesics_lanes reciprocal[restrict 4])
-{
-    engel_geodesics_EACH_LANE
-    for (int lane = 0; lane < engel_geodesics_LANES; ++lane) {
-        const double t1 = 1.0 / matrix[0][lane];
-        const double t2 = matrix[1][lane] * t1;
-        const double t3 = 1.0 / (matrix[5][lane] - matrix[4][lane] * t2);
-        const double t4 = matrix[4][lane] * t1 * t3;
-        const double t5 = matrix[2][lane] * t1;
-        const double t6 = (matrix[6][lane] - matrix[4][lane] * t5) * t3;
-        const double t7 = t5 - t2 * t6;
-        const double t8 = matrix[9][lane] - matrix[8][lane] * t2;
-        const double t9 = 1.0 / (matrix[10][lane] - matrix[8][lane] * t5 - t8 * t6);
-        const double t10 = (t8 * t4 - matrix[8][lane] * t1) * t9;
-        const double t11 = matrix[3][lane] * t1;
-        const double t12 = (matrix[7][lane] - matrix[4][lane] * t11) * t3;
-        const double t13 = (matrix[11][lane] - matrix[8][lane] * t11 - t8 * t12) * t9;
-        const double t14 = t11 - t2 * t12 - t7 * t13;
-        const double t15 = matrix[13][lane] - matrix[12][lane] * t2;
-        const double t16 = matrix[14][lane] - matrix[12][lane] * t5 - t15 * t6;
-        const double t17 = 1.0 / (matrix[15][lane] - matrix[12][lane] * t11 - t15 * t12 - t16 * t13);
-        const double t18 = (t15 * t4 - matrix[12][lane] * t1 - t16 * t10) * t17;
-        const double t19 = t1 + t2 * t4 - t7 * t10 - t14 * t18;
-        const double t20 = t8 * t3 * t9;
-        const double t21 = (t16 * t20 - t15 * t3) * t17;
-        const double t22 = t7 * t20 - t2 * t3 - t14 * t21;
-        const double t23 = t16 * t9 * t17;
-        const double t24 = t14 * t23 - t7 * t9;
-        const double t25 = t14 * t17;
-        const double t26 = t12 - t6 * t13;
-        const double t27 = t4 + t6 * t10 + t26 * t18;
-        const double t28 = t3 + t6 * t20 - t26 * t21;
-        const double t29 = t26 * t23 - t6 * t9;
-        const double t30 = t26 * t17;
-        const double t31 = t10 - t13 * t18;
-        const double t32 = t20 + t13 * t21;
-        const double t33 = t9 + t13 * t23;
-        const double t34 = t13 * t17;
-        inverse[0][lane] = t19;
-        inverse[1][lane] = t22;
-        inverse[2][lane] = t24;
-        inverse[3][lane] = -t25;
-        inverse[4][lane] = -t27;
-        inverse[5][lane] = t28;
-        inverse[6][lane] = t29;
-        inverse[7][lane] = -t30;
-        inverse[8][lane] = t31;
-        inverse[9][lane] = -t32;
-        inverse[10][lane] = t33;
-        inverse[11][lane] = -t34;
-        inverse[12][lane] = t18;
-        inverse[13][lane] = t21;
-        inverse[14][lane] = -t23;
-        inverse[15][lane] = t17;
-        gain[0][lane] = slope[0][lane] * t19 - slope[1][lane] * t27 + (slope[3][lane] * t18 + slope[2][lane] * t31);
-        gain[1][lane] = slope[0][lane] * t22 + slope[1][lane] * t28 + (slope[3][lane] * t21 - slope[2][lane] * t32);
-        gain[2][lane] = slope[2][lane] * t33 - slope[3][lane] * t23 + (slope[0][lane] * t24 + slope[1][lane] * t29);
-        gain[3][lane] = slope[3][lane] * t17 - slope[2][lane] * t34 - (slope[1][lane] * t30 + slope[0][lane] * t25);
-        gain[4][lane] = slope[4][lane] * t19 - slope[5][lane] * t27 + (slope[7][lane] * t18 + slope[6][lane] * t31);
-        gain[5][lane] = slope[7][lane] * t21 - slope[6][lane] * t32 + (slope[5][lane] * t28 + slope[4][lane] * t22);
-        gain[6][lane] = slope[6][lane] * t33 - slope[7][lane] * t23 + (slope[5][lane] * t29 + slope[4][lane] * t24);
-        gain[7][lane] = slope[7][lane] * t17 - slope[6][lane] * t34 - (slope[4][lane] * t25 + slope[5][lane] * t30);
-        gain[8][lane] = slope[11][lane] * t18 + slope[10][lane] * t31 + (slope[8][lane] * t19 - slope[9][lane] * t27);
-        gain[9][lane] = slope[9][lane] * t28 + slope[8][lane] * t22 + (slope[11][lane] * t21 - slope[10][lane] * t32);
-        gain[10][lane] = slope[10][lane] * t33 - slope[11][lane] * t23 + (slope[9][lane] * t29 + slope[8][lane] * t24);
-        gain[11][lane] = slope[11][lane] * t17 - slope[10][lane] * t34 - (slope[9][lane] * t30 + slope[8][lane] * t25);
-        gain[12][lane] = slope[15][lane] * t18 + slope[14][lane] * t31 + (slope[12][lane] * t19 - slope[13][lane] * t27);
-        gain[13][lane] = slope[13][lane] * t28 + slope[12][lane] * t22 + (slope[15][lane] * t21 - slope[14][lane] * t32);
-        gain[14][lane] = slope[14][lane] * t33 - slope[15][lane] * t23 + (slope[13][lane] * t29 + slope[12][lane] * t24);
-        gain[15][lane] = slope[15][lane] * t17 - slope[14][lane] * t34 - (slope[12][lane] * t25 + slope[13][lane] * t30);
-        reciprocal[0][lane] = t1;
-        reciprocal[1][lane] = t3;
-        reciprocal[2][lane] = t9;
-        reciprocal[3][lane] = t17;
-    }
-}
-
-/* Everything about a stage at the points y. The matrices are I + O(h): where a pivot is far from 1, all is infinite. */
-static void engel_geodesics_tabulate(engel_geodesics_lanes coef[restrict], engel_geodesics_model *model)
-{
-    engel_geodesics_lanes jacobian[16], reciprocal[4];
-    engel_geodesics_linearise_lanes(coef, model->y, model->displacement, model->increment, jacobian, model->slope);
-    engel_geodesics_invert_lanes(jacobian, model->slope, model->inverse, model->gain, reciprocal);
-    for (int i = 0; i < 4; ++i) {
-        engel_geodesics_EACH_LANE
-        for (int lane = 0; lane < engel_geodesics_LANES; ++lane)
-            model->inverse[i][lane] += fabs(reciprocal[i][lane]) < 1e3 ? 0.0 : HUGE_VAL;
-    }
-}
-
-/* engel_geodesics_size in all lanes, summed over the components. */
-static void engel_geodesics_sizes(engel_geodesics_lanes y[restrict 4], engel_geodesics_lanes delta[restrict 4],
-    engel_geodesics_lanes size)
-{
-    engel_geodesics_lanes norm = { 0.0 };
-    memset(size, 0, engel_geodesics_LANES * sizeof size[0]);
-    for (int i = 0; i < 4; ++i)
-        for (int lane = 0; lane < engel_geodesics_LANES; ++lane)
-            norm[lane] = 1e-6 * fabs(y[i][lane]) > norm[lane] ? 1e-6 * fabs(y[i][lane]) : norm[lane];
-    for (int i = 0; i < 4; ++i) {
-        engel_geodesics_EACH_LANE
-        for (int lane = 0; lane < engel_geodesics_LANES; ++lane)
-            size[lane] += fabs(delta[i][lane]) / (fabs(y[i][lane]) + norm[lane] + DBL_MIN);
-    }
-}
-
-/* Correct y by the residuals, with the inverse in the table, and measure the corrections. */
-static void engel_geodesics_correct(engel_geodesics_model *model, engel_geodesics_lanes size)
-{
-    engel_geodesics_lanes delta[4];
-    memset(delta, 0, sizeof delta);
-    for (int i = 0; i < 4; ++i)
-        for (int j = 0; j < 4; ++j) {
-            engel_geodesics_EACH_LANE
-            for (int lane = 0; lane < engel_geodesics_LANES; ++lane)
-                delta[i][lane] += model->inverse[i * 4 + j][lane] * model->residual[j][lane];
-        }
-    engel_geodesics_sizes(model->y, delta, size);
-    for (int i = 0; i < 4; ++i)
-        for (int lane = 0; lane < engel_geodesics_LANES; ++lane) model->y[i][lane] -= delta[i][lane];
-}
-
-/* The largest of the lanes, none of which is negative; infinite if one is not finite. As integers, the bits of such
-   numbers have their order, and those of what is no number are larger. */
-static double engel_geodesics_largest(const engel_geodesics_lanes size)
-{
-    uint64_t bits[8], most = 0;
-    double largest;
-    memcpy(bits, size, sizeof bits);
-    for (int lane = 0; lane < engel_geodesics_LANES; ++lane) most = bits[lane] > most ? bits[lane] : most;
-    memcpy(&largest, &most, sizeof largest);
-    return isfinite(largest) ? largest : HUGE_VAL;
-}
-
-/* engel_geodesics_near for the guesses of all lanes, seen from one value. */
-static int engel_geodesics_near_lanes(engel_geodesics_lanes y[restrict 4], const double last[4])
-{
-    engel_geodesics_lanes distance = { 0.0 };
-    double size = 0.0;
-    for (int i = 0; i < 4; ++i) {
-        size += fabs(last[i]);
-        engel_geodesics_EACH_LANE
-        for (int lane = 0; lane < engel_geodesics_LANES; ++lane) distance[lane] += fabs(y[i][lane] - last[i]);
-    }
-    return engel_geodesics_largest(distance) <= 4.0 * size;
-}
-
-/* What is left after a correction of this size: quadratic in it, where the matrices are of the points corrected; where
-   they are of points further off, by bend, also of the order of size times bend. bound is what the last pass left. */
-static double engel_geodesics_remaining(double size, double bend, double bound)
-{
-    const double growth = size / bound, left = size * (size + bend);
-    return growth > 1.0 ? growth * left : left;
-}
-
-/* The table of a stage, with its matrices or with those of the last pass. */
-static void engel_geodesics_update(engel_geodesics_lanes coef[restrict], engel_geodesics_model *model, int matrices)
-{
-    if (matrices)
-        engel_geodesics_tabulate(coef, model);
-    else
-        engel_geodesics_evaluate_lanes(coef, model->y, model->displacement, model->increment);
-}
-
-/* The steps of a block one after the other, each along the linear model of its lane. As X, the state with its carry, gains
-   increment - gain residual, the next residual follows from this one; X itself is added up apart. */
-static void engel_geodesics_chain(engel_geodesics_model model[1], double x[4], double carry[4])
-{
-    double residual[4], sum[4], small[4];
-    for (int i = 0; i < 4; ++i) {
-        residual[i] = ((model->y[i][0] - x[i]) + model->displacement[i][0]) - carry[i];
-        sum[i] = x[i];
-        small[i] = carry[i];
-    }
-    for (int k = 0; k < 1 * engel_geodesics_LANES; ++k) {
-        const int lane = k / 1, after = (k + 1) / 1 % engel_geodesics_LANES;
-        engel_geodesics_model *at = &model[k % 1], *next = &model[(k + 1) % 1];
-        double even[4] = { 0.0 }, odd[4] = { 0.0 }; /* two sums, so that no long chain of additions is waited for */
-        for (int i = 0; i < 4; ++i) {
-            at->residual[i][lane] = residual[i];
-            for (int j = 0; j < 4; j += 2) even[i] += at->gain[i * 4 + j][lane] * residual[j];
-            for (int j = 1; j < 4; j += 2) odd[i] += at->gain[i * 4 + j][lane] * residual[j];
-        }
-        for (int i = 0; i < 4; ++i) {
-            const double change = at->increment[i][lane], total = sum[i] + change, added = total - sum[i];
-            const double turn = (next->displacement[i][after] - at->displacement[i][lane]) - change;
-            const double moved = (next->y[i][after] - at->y[i][lane]) + turn;
-            residual[i] = ((moved + residual[i]) + odd[i]) + even[i];
-            small[i] += ((sum[i] - (total - added)) + (change - added)) - (even[i] + odd[i]);
-            sum[i] = total;
-        }
-    }
-    for (int i = 0; i < 4; ++i) {
-        x[i] = sum[i] + small[i];
-        carry[i] = small[i] - (x[i] - sum[i]);
-    }
-}
-
-/* Bring the table up to date: coefficients, and weights that were fitted since. */
-static void engel_geodesics_refresh(const engel_geodesics_solver *s, engel_geodesics_table *table)
-{
-    for (int stage = 0; stage < 1; ++stage) {
-        if (table->fits[stage] == s->memory[stage].fits) continue;
-        table->fits[stage] = s->memory[stage].fits;
-        for (int k = 0; k < 3; ++k)
-            for (int lane = 0; lane < engel_geodesics_LANES; ++lane) table->coef[stage][k][lane] = s->coef[stage][k];
-        memcpy(table->weight[stage], s->memory[stage].weight, (size_t)s->memory[stage].terms * sizeof table->weight[0][0]);
-    }
-}
-
-/* Guesses for the next engel_geodesics_LANES values of a stage, by its recurrences. */
-static void engel_geodesics_foresee(const engel_geodesics_memory *memory, engel_geodesics_lanes weight[restrict][4],
-    engel_geodesics_lanes y[restrict 4])
-{
-    const int last = memory->count - 1;
-    for (int i = 0; i < 4; ++i) {
-        engel_geodesics_lanes even = { 0.0 }, odd = { 0.0 };
-        for (int k = 0; k < memory->terms; k += 2) {
-            const double past = memory->past[last - k][i], earlier = memory->past[last - 1 - k][i];
-            engel_geodesics_EACH_LANE
-            for (int lane = 0; lane < engel_geodesics_LANES; ++lane) even[lane] += weight[k][i][lane] * past;
-            engel_geodesics_EACH_LANE
-            for (int lane = 0; lane < engel_geodesics_LANES; ++lane) odd[lane] += weight[k + 1][i][lane] * earlier;
-        }
-        engel_geodesics_EACH_LANE
-        for (int lane = 0; lane < engel_geodesics_LANES; ++lane) y[i][lane] = even[lane] + odd[lane];
-    }
-}
-
-/* engel_geodesics_record for the values of all lanes, one after the other. */
-static void engel_geodesics_record_lanes(engel_geodesics_memory *memory, engel_geodesics_lanes y[restrict 4])
-{
-    engel_geodesics_make_room(memory, engel_geodesics_LANES);
-    for (int lane = 0; lane < engel_geodesics_LANES; ++lane)
-        for (int i = 0; i < 4; ++i) memory->past[memory->count + lane][i] = y[i][lane];
-    memory->count += engel_geodesics_LANES;
-}
-
-/* Guesses where no recurrence is known: where alpha and beta have the means of steps by the classical Runge-Kutta
-   method, to leading order. */
-static void engel_geodesics_march(const engel_geodesics_solver *s, engel_geodesics_table *table, engel_geodesics_model model[1])
-{
-    static const double reach[4] = { 0.5, 0.5, 1.0, 0.0 }, weight[4] = { 1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0 };
-    double x[4], point[4], slope[4], mean[4];
-    memcpy(x, s->x, sizeof x);
-    for (int k = 0; k < 1 * engel_geodesics_LANES; ++k) {
-        const double h = engel_geodesics_fractions[k % 1] * s->h;
-        memcpy(point, x, sizeof x);
-        memset(mean, 0, sizeof mean);
-        for (int part = 0; part < 4; ++part) {
-            engel_geodesics_vector_field(&s->params, point, slope);
-            for (int i = 0; i < 4; ++i) {
-                mean[i] += weight[part] * slope[i];
-                point[i] = x[i] + h * reach[part] * slope[i];
-            }
-        }
-        for (int i = 0; i < 4; ++i) {
-            model[k % 1].y[i][k / 1] = x[i] + 0.5 * h * mean[i];
-            x[i] += h * mean[i];
-        }
-    }
-    for (int stage = 0; stage < 1; ++stage) {
-        engel_geodesics_model *at = &model[stage];
-        engel_geodesics_evaluate_lanes(table->coef[stage], at->y, at->displacement, at->increment);
-        for (int i = 0; i < 4; ++i) {
-            engel_geodesics_EACH_LANE
-            for (int lane = 0; lane < engel_geodesics_LANES; ++lane)
-                at->y[i][lane] -= at->displacement[i][lane] + 0.5 * at->increment[i][lane];
-        }
-    }
-}
-
-/* engel_geodesics_LANES steps at once: guess the points of all, and correct them together until the error that remains is as
-   small as after a single step. How many passes that took; 0, and the solver as before, where it takes more than most. */
-static int engel_geodesics_block(engel_geodesics_solver *s, engel_geodesics_table *table, int most)
-{
-    engel_geodesics_model model[1];
-    engel_geodesics_lanes sizes;
-    double x[4], carry[4], previous = HUGE_VAL, bend = 0.0, bound = HUGE_VAL;
-    int passes = 0, solved = 0;
-    if (!s->foreseeing) engel_geodesics_march(s, table, model);
-    for (int stage = 0; stage < 1; ++stage) {
-        if (s->foreseeing) engel_geodesics_foresee(&s->memory[stage], table->weight[stage], model[stage].y);
-        if (!engel_geodesics_near_lanes(model[stage].y, s->x)) return 0;
-    }
-    while (!solved) {
-        double size = 0.0;
-        const int matrices = previous > 1e-05;
-        for (int stage = 0; stage < 1; ++stage) engel_geodesics_update(table->coef[stage], &model[stage], matrices);
-        memcpy(x, s->x, sizeof x);
-        memcpy(carry, s->carry, sizeof carry);
-        engel_geodesics_chain(model, x, carry);
-        for (int stage = 0; stage < 1; ++stage) {
-            engel_geodesics_correct(&model[stage], sizes);
-            const double largest = engel_geodesics_largest(sizes);
-            size = largest > size ? largest : size;
-        }
-        s->evaluations += 1 * engel_geodesics_LANES;
-        bend = matrices ? 0.0 : bend + previous;
-        bound = engel_geodesics_remaining(size, bend, bound);
-        /* The second test: after the square of so small a correction there is rounding only. */
-        solved = bound <= 1e-20 || (previous < 1e-8 && size < 1e-10);
-        if ((++passes >= most || !(size < previous)) && !solved) return 0;
-        previous = size;
-    }
-    for (int stage = 0; stage < 1; ++stage)
-        if (!engel_geodesics_near_lanes(model[stage].y, s->x)) return 0;
-    for (int i = 0; i < 4; ++i)
-        if (!isfinite(x[i])) return 0;
-    memcpy(s->x, x, sizeof x);
-    memcpy(s->carry, carry, sizeof carry);
-    s->steps += engel_geodesics_LANES;
-    for (int stage = 0; stage < 1; ++stage) {
-        engel_geodesics_memory *memory = &s->memory[stage];
-        engel_geodesics_record_lanes(memory, model[stage].y);
-        memory->slow = passes > 1 ? memory->slow + engel_geodesics_LANES : 0;
-        if (memory->slow > memory->patience && s->foreseeing) engel_geodesics_fit(memory);
-    }
-    return passes;
-}
-
-/* Recurrences are given up for a while, the longer the more often that happens. */
-static void engel_geodesics_give_up(engel_geodesics_solver *s)
-{
-    s->foreseeing = s->setback = s->pause = 0;
-    s->doubt = 2 * s->doubt + 600;
-    s->retry = s->steps + s->doubt;
-}
-
-/* How the next block is guessed: by recurrences, fitted as soon as enough steps are to be made, or
-   have been, to repay that. */
-static void engel_geodesics_choose_guess(engel_geodesics_solver *s, size_t steps)
-{
-    for (int stage = 0; stage < 1; ++stage)
-        if (s->memory[stage].count < 111) {
-            s->foreseeing = 0;
-            return;
-        }
-    if (s->foreseeing || (steps < 600 && s->steps < 150) || s->steps < s->retry) return;
-    s->foreseeing = 1;
-    for (int stage = 0; stage < 1 && s->foreseeing; ++stage) {
-        engel_geodesics_fit(&s->memory[stage]);
-        s->foreseeing = s->memory[stage].terms > 0;
-    }
-    s->pause = engel_geodesics_LANES;
-    if (!s->foreseeing) engel_geodesics_give_up(s);
-}
-
-/* Learn from a block: after one that failed single steps are made, the more the more often that happens. Recurrences
-   that fail repeatedly, or need more passes than steps by Runge-Kutta did, are given up. */
-static void engel_geodesics_learn_from(engel_geodesics_solver *s, int passes)
-{
-    if (passes > 0) {
-        s->setback /= 2;
-    } else {
-        s->setback = 2 * s->setback + engel_geodesics_LANES > 1000 ? 1000 : 2 * s->setback + engel_geodesics_LANES;
-        s->pause = s->setback;
-    }
-    if (!s->foreseeing) {
-        s->passes = passes > 0 ? passes : INT_MAX;
-    } else if (passes > s->passes || s->setback > 5 * engel_geodesics_LANES) {
-        engel_geodesics_give_up(s);
-    }
-}
-
-/* A single step, and the running mean of the evaluations that a stage of one takes. */
-static engel_geodesics_status engel_geodesics_single(engel_geodesics_solver *s)
-{
-    const size_t before = s->evaluations;
-    const engel_geodesics_status status = engel_geodesics_step(s, s->h);
-    s->effort += 0.125 * ((double)(s->evaluations - before) / 1 - s->effort);
-    return status;
-}
-
-/* Blocks of steps where they cost less than single steps, with at most as many passes over a block as 2 for each
-   evaluation in a single step. The results differ by round-off only. */
 engel_geodesics_status engel_geodesics_integrate(engel_geodesics_solver *s, double h, size_t steps)
 {
-    engel_geodesics_table table;
     engel_geodesics_status status = engel_geodesics_set_step(s, h);
-    for (int stage = 0; stage < 1; ++stage) table.fits[stage] = -1;
-    while (status == engel_geodesics_OK && steps > 0) {
-        if (steps >= engel_geodesics_LANES && s->pause == 0) engel_geodesics_choose_guess(s, steps);
-        if (steps >= engel_geodesics_LANES && s->pause == 0) {
-            engel_geodesics_refresh(s, &table);
-            const int passes = engel_geodesics_block(s, &table, (int)(2 * s->effort + 0.5));
-            engel_geodesics_learn_from(s, passes);
-            if (passes > 0) steps -= engel_geodesics_LANES;
-        } else {
-            if (s->pause > 0) --s->pause;
-            status = engel_geodesics_single(s);
-            if (status == engel_geodesics_OK) --steps;
-        }
-    }
+    for (; steps > 0 && status == engel_geodesics_OK; --steps) status = engel_geodesics_step(s, h);
     return status;
-}
-
-/* Members of an ensemble, each in its lane. */
-typedef struct {
-    engel_geodesics_lanes x[4], carry[4], coef[1][3];
-    engel_geodesics_lanes past[1][111][4]; /* solved values, in a ring */
-    engel_geodesics_lanes weight[1][40][4]; /* of past values, the latest first, for the next */
-    int latest;     /* the row of the latest values */
-    int count;      /* rows in use */
-    int order[1];   /* how many of them the extrapolation uses */
-    int terms[1];   /* how many of them the recurrences use */
-    int fits;       /* how often recurrences have been fitted */
-    int fitting[1]; /* whether they are the better guess */
-    int slow;       /* how many of the last steps took more than one iteration */
-    int patience;   /* how many of those before recurrences are fitted again */
-    int active[8];  /* whether the lane has a member that has not failed */
-    size_t left[8]; /* steps that are still to be made, where one has */
-} engel_geodesics_group;
-
-/* The past values of a stage, the latest for k = 0. */
-static engel_geodesics_lanes *engel_geodesics_group_past(engel_geodesics_group *group, int stage, int k)
-{
-    const int row = group->latest + k;
-    return group->past[stage][row < 111 ? row : row - 111];
-}
-
-/* Guess the values of a stage by the recurrences of the members. */
-static void engel_geodesics_group_foresee(engel_geodesics_group *group, int stage, engel_geodesics_lanes y[restrict 4])
-{
-    memset(y, 0, 4 * sizeof y[0]);
-    for (int k = 0; k < group->terms[stage]; ++k) {
-        engel_geodesics_lanes *past = engel_geodesics_group_past(group, stage, k), *weight = group->weight[stage][k];
-        for (int i = 0; i < 4; ++i) {
-            engel_geodesics_EACH_LANE
-            for (int lane = 0; lane < engel_geodesics_LANES; ++lane) y[i][lane] += weight[i][lane] * past[i][lane];
-        }
-    }
-}
-
-/* Extrapolate the values of a stage. */
-static void engel_geodesics_group_extrapolate(engel_geodesics_group *group, int stage, engel_geodesics_lanes y[restrict 4])
-{
-    const int order = group->order[stage];
-    double binomial = -1.0;
-    memcpy(y, group->x, 4 * sizeof y[0]);
-    if (order > 0) memset(y, 0, 4 * sizeof y[0]);
-    for (int k = 0; k < order; ++k) {
-        engel_geodesics_lanes *past = engel_geodesics_group_past(group, stage, k);
-        binomial *= -(double)(order - k) / (k + 1);
-        for (int i = 0; i < 4; ++i) {
-            engel_geodesics_EACH_LANE
-            for (int lane = 0; lane < engel_geodesics_LANES; ++lane) y[i][lane] += binomial * past[i][lane];
-        }
-    }
-}
-
-/* The sum over members of the absolute values of all components. */
-static double engel_geodesics_group_sum(const engel_geodesics_group *group, engel_geodesics_lanes y[4])
-{
-    double sum = 0.0;
-    for (int i = 0; i < 4; ++i)
-        for (int lane = 0; lane < engel_geodesics_LANES; ++lane) sum += group->active[lane] ? fabs(y[i][lane]) : 0.0;
-    return sum;
-}
-
-static void engel_geodesics_group_subtract(engel_geodesics_lanes y[restrict 4], engel_geodesics_lanes other[restrict 4])
-{
-    for (int i = 0; i < 4; ++i) {
-        engel_geodesics_EACH_LANE
-        for (int lane = 0; lane < engel_geodesics_LANES; ++lane) y[i][lane] -= other[i][lane];
-    }
-}
-
-/* Choose the guess that would have been best for these values. */
-static void engel_geodesics_group_judge(engel_geodesics_group *group, int stage, engel_geodesics_lanes y[4])
-{
-    engel_geodesics_lanes row[8 + 1][4];
-    const int rows = group->count < 8 ? group->count : 8;
-    double least = HUGE_VAL;
-    memcpy(row[0], y, sizeof row[0]);
-    for (int k = 0; k < rows; ++k) memcpy(row[k + 1], engel_geodesics_group_past(group, stage, k), sizeof row[0]);
-    if (group->order[stage] == 0) group->order[stage] = 1;
-    for (int order = 1; order <= rows; ++order) { /* row[0] becomes the backward difference of this order */
-        for (int k = 0; k <= rows - order; ++k) engel_geodesics_group_subtract(row[k], row[k + 1]);
-        const double size = engel_geodesics_group_sum(group, row[0]);
-        if (size < least) {
-            least = size;
-            group->order[stage] = order;
-        }
-    }
-    if (group->terms[stage] == 0) return;
-    engel_geodesics_group_foresee(group, stage, row[0]);
-    engel_geodesics_group_subtract(row[0], y);
-    group->fitting[stage] = engel_geodesics_group_sum(group, row[0]) <= least;
-}
-
-/* Fit the recurrences of all members; with every time, wait longer before it is done again, and for long if it did not
-   help. */
-static void engel_geodesics_group_fit(engel_geodesics_group *group)
-{
-    engel_geodesics_memory memory;
-    const int helped = group->fits == 0 || group->fitting[0];
-    memory.count = 111;
-    for (int stage = 0; stage < 1; ++stage) {
-        int found = 1;
-        group->terms[stage] = 0;
-        for (int lane = 0; lane < engel_geodesics_LANES; ++lane)
-            for (int i = 0; i < 4 && group->active[lane] && found; ++i) {
-                for (int k = 0; k < 111; ++k)
-                    memory.past[111 - 1 - k][i] = engel_geodesics_group_past(group, stage, k)[i][lane];
-                const int terms = engel_geodesics_train(&memory, i);
-                found = terms > 0;
-                if (terms > group->terms[stage]) group->terms[stage] = terms;
-                for (int k = 0; k < 40; ++k) group->weight[stage][k][i][lane] = memory.weight[k][i][0];
-            }
-        if (!found) group->terms[stage] = 0;
-        group->fitting[stage] = found;
-    }
-    ++group->fits;
-    group->slow = 0;
-    group->patience = helped && group->patience < 10000 ? 2 * group->patience + 150 : 100 * 150;
-}
-
-/* Replace guesses that are not near the last values, as engel_geodesics_near has it, by these; lane by lane. */
-static void engel_geodesics_stay_near(engel_geodesics_lanes y[restrict 4], engel_geodesics_lanes last[restrict 4])
-{
-    engel_geodesics_lanes distance = { 0.0 }, size = { 0.0 };
-    for (int i = 0; i < 4; ++i) {
-        engel_geodesics_EACH_LANE
-        for (int lane = 0; lane < engel_geodesics_LANES; ++lane) {
-            distance[lane] += fabs(y[i][lane] - last[i][lane]);
-            size[lane] += fabs(last[i][lane]);
-        }
-    }
-    for (int i = 0; i < 4; ++i) {
-        engel_geodesics_EACH_LANE
-        for (int lane = 0; lane < engel_geodesics_LANES; ++lane)
-            y[i][lane] = distance[lane] <= 4.0 * size[lane] ? y[i][lane] : last[i][lane];
-    }
-}
-
-/* Whether lanes are still to be solved after a correction of this size; those where nothing is finite leave the group.
-   bound is what remains in each lane. */
-static int engel_geodesics_group_open(engel_geodesics_group *group, const engel_geodesics_lanes size, const engel_geodesics_lanes previous,
-    double bend, engel_geodesics_lanes bound)
-{
-    int open = 0;
-    engel_geodesics_EACH_LANE
-    for (int lane = 0; lane < engel_geodesics_LANES; ++lane)
-        bound[lane] = engel_geodesics_remaining(size[lane], bend, bound[lane]);
-    if (engel_geodesics_largest(bound) <= 1e-20) return 0;
-    for (int lane = 0; lane < engel_geodesics_LANES; ++lane) {
-        const int solved = bound[lane] <= 1e-20 || (previous[lane] < 1e-8 && size[lane] < 1e-10);
-        if (!isfinite(size[lane])) group->active[lane] = 0;
-        open += group->active[lane] && !solved;
-    }
-    return open;
-}
-
-/* The guess for a stage: recurrences, or extrapolation; the state for members where that is not near. */
-static void engel_geodesics_group_predict(engel_geodesics_group *group, int stage, engel_geodesics_lanes y[4])
-{
-    if (group->fitting[stage]) engel_geodesics_group_foresee(group, stage, y);
-    else engel_geodesics_group_extrapolate(group, stage, y);
-    engel_geodesics_stay_near(y, group->x);
-}
-
-/* Newton's method for a stage, until the slowest lane is solved. The number of iterations; where that is the most
-   allowed, lanes that are not solved leave the group. */
-static int engel_geodesics_group_solve(engel_geodesics_group *group, int stage, engel_geodesics_model *model)
-{
-    engel_geodesics_lanes size, previous, bound;
-    double largest = HUGE_VAL, bend = 0.0;
-    int iterations = 0, open = 1;
-    for (int lane = 0; lane < engel_geodesics_LANES; ++lane) size[lane] = bound[lane] = HUGE_VAL;
-    engel_geodesics_group_predict(group, stage, model->y);
-    for (; open > 0 && iterations < 20; ++iterations) {
-        memcpy(previous, size, sizeof size);
-        engel_geodesics_update(group->coef[stage], model, largest > 1e-05);
-        bend = largest > 1e-05 ? 0.0 : bend + largest;
-        for (int i = 0; i < 4; ++i) {
-            engel_geodesics_EACH_LANE
-            for (int lane = 0; lane < engel_geodesics_LANES; ++lane)
-                model->residual[i][lane] =
-                    ((model->y[i][lane] - group->x[i][lane]) + model->displacement[i][lane]) - group->carry[i][lane];
-        }
-        engel_geodesics_correct(model, size);
-        open = engel_geodesics_group_open(group, size, previous, bend, bound);
-        largest = engel_geodesics_largest(size);
-    }
-    for (int lane = 0; lane < engel_geodesics_LANES && open > 0; ++lane)
-        group->active[lane] = group->active[lane] && bound[lane] <= 1e-20;
-    return iterations;
-}
-
-/* Add the increments, corrected to first order, in compensated arithmetic as for a single step. */
-static void engel_geodesics_group_advance(engel_geodesics_lanes x[restrict 4], engel_geodesics_lanes carry[restrict 4],
-    engel_geodesics_model *model)
-{
-    for (int i = 0; i < 4; ++i)
-        for (int j = 0; j < 4; ++j) {
-            engel_geodesics_EACH_LANE
-            for (int lane = 0; lane < engel_geodesics_LANES; ++lane)
-                carry[i][lane] -= model->gain[i * 4 + j][lane] * model->residual[j][lane];
-        }
-    for (int i = 0; i < 4; ++i) {
-        engel_geodesics_EACH_LANE
-        for (int lane = 0; lane < engel_geodesics_LANES; ++lane) {
-            const double change = model->increment[i][lane], sum = x[i][lane] + change, added = sum - x[i][lane];
-            const double small = ((x[i][lane] - (sum - added)) + (change - added)) + carry[i][lane];
-            x[i][lane] = sum + small;
-            carry[i][lane] = small - (x[i][lane] - sum);
-        }
-    }
-}
-
-/* Members that failed, or whose state is not near the one before the step or not finite, keep that one, and leave. How many
-   stay. */
-static int engel_geodesics_group_leave(engel_geodesics_group *group, engel_geodesics_lanes x[4], engel_geodesics_lanes carry[4],
-    size_t remaining)
-{
-    engel_geodesics_lanes moved = { 0.0 }, size = { 0.0 }, bad;
-    int active = 0;
-    for (int i = 0; i < 4; ++i) {
-        engel_geodesics_EACH_LANE
-        for (int lane = 0; lane < engel_geodesics_LANES; ++lane) {
-            moved[lane] += fabs(group->x[i][lane] - x[i][lane]);
-            size[lane] += fabs(x[i][lane]);
-        }
-    }
-    for (int lane = 0; lane < engel_geodesics_LANES; ++lane) bad[lane] = moved[lane] <= 4.0 * size[lane] ? 0.0 : 1.0;
-    for (int lane = 0; lane < engel_geodesics_LANES; ++lane) active += group->active[lane];
-    if (active == engel_geodesics_LANES && !(engel_geodesics_largest(bad) > 0.0)) return active;
-    active = 0;
-    for (int lane = 0; lane < engel_geodesics_LANES; ++lane) {
-        group->active[lane] = group->active[lane] && !(bad[lane] > 0.0);
-        active += group->active[lane];
-        for (int i = 0; i < 4 && !group->active[lane]; ++i) {
-            group->x[i][lane] = x[i][lane];
-            group->carry[i][lane] = carry[i][lane];
-        }
-        if (!group->active[lane] && group->left[lane] == 0) group->left[lane] = remaining;
-    }
-    return active;
-}
-
-/* One step of all members, of as many as remain. How many members are left. */
-static int engel_geodesics_group_step(engel_geodesics_group *group, size_t remaining)
-{
-    engel_geodesics_lanes x[4], carry[4];
-    engel_geodesics_model model;
-    const int next = (group->latest > 0 ? group->latest : 111) - 1;
-    int most = 0;
-    memcpy(x, group->x, sizeof x);
-    memcpy(carry, group->carry, sizeof carry);
-    for (int stage = 0; stage < 1; ++stage) {
-        const int iterations = engel_geodesics_group_solve(group, stage, &model);
-        engel_geodesics_group_advance(group->x, group->carry, &model);
-        if (iterations > most) most = iterations;
-        if ((iterations > 1 && next % 8 == 0) || group->count < 8)
-            engel_geodesics_group_judge(group, stage, model.y);
-        memcpy(group->past[stage][next], model.y, sizeof model.y);
-    }
-    group->latest = next;
-    if (group->count < 111) ++group->count;
-    group->slow = most > 1 ? group->slow + 1 : 0;
-    if (group->slow > group->patience && group->count == 111 && remaining >= 800)
-        engel_geodesics_group_fit(group);
-    return engel_geodesics_group_leave(group, x, carry, remaining);
-}
-
-/* Put a member into a lane: its state, and its coefficients. */
-static engel_geodesics_status engel_geodesics_group_join(engel_geodesics_group *group, int lane, const engel_geodesics_params *params,
-    const double x0[4], double h)
-{
-    engel_geodesics_solver s;
-    engel_geodesics_status status = engel_geodesics_init(&s, params, x0);
-    if (status == engel_geodesics_OK) status = engel_geodesics_set_step(&s, h);
-    if (status != engel_geodesics_OK) return status;
-    for (int i = 0; i < 4; ++i) group->x[i][lane] = s.x[i];
-    for (int stage = 0; stage < 1; ++stage)
-        for (int k = 0; k < 3; ++k) group->coef[stage][k][lane] = s.coef[stage][k];
-    group->active[lane] = 1;
-    return status;
-}
-
-/* The steps that a member has still to make after it left the group, by itself. */
-static engel_geodesics_status engel_geodesics_group_finish(const engel_geodesics_group *group, int lane, const engel_geodesics_params *params,
-    double x[4], double h)
-{
-    engel_geodesics_solver s;
-    engel_geodesics_status status = engel_geodesics_init(&s, params, x);
-    if (status != engel_geodesics_OK) return status;
-    for (int i = 0; i < 4; ++i) s.carry[i] = group->carry[i][lane];
-    status = engel_geodesics_integrate(&s, h, group->left[lane]);
-    memcpy(x, s.x, sizeof s.x);
-    return status;
-}
-
-/* The members from first on, as many as there are lanes. The first status that is not OK. */
-static engel_geodesics_status engel_geodesics_group_run(const engel_geodesics_params *params, double *x, size_t members, size_t first,
-    double h, size_t steps, unsigned char *status)
-{
-    engel_geodesics_group group;
-    engel_geodesics_status worst = engel_geodesics_OK, member[8];
-    const int count = members - first < engel_geodesics_LANES ? (int)(members - first) : engel_geodesics_LANES;
-    double state[4];
-    size_t left = steps;
-    memset(&group, 0, sizeof group);
-    for (int lane = 0; lane < count; ++lane) {
-        for (size_t i = 0; i < 4; ++i) state[i] = x[i * members + first + (size_t)lane];
-        member[lane] = engel_geodesics_group_join(&group, lane, params, state, h);
-    }
-    for (int active = count; left > 0 && active > 2; --left) active = engel_geodesics_group_step(&group, left);
-    for (int lane = 0; lane < count; ++lane) {
-        if (group.active[lane]) group.left[lane] = left;
-        for (int i = 0; i < 4; ++i) state[i] = group.x[i][lane];
-        if (member[lane] == engel_geodesics_OK) {
-            if (group.left[lane] > 0) member[lane] = engel_geodesics_group_finish(&group, lane, params, state, h);
-            for (size_t i = 0; i < 4; ++i) x[i * members + first + (size_t)lane] = state[i];
-        }
-        if (status != NULL) status[first + (size_t)lane] = (unsigned char)member[lane];
-        if (worst == engel_geodesics_OK) worst = member[lane];
-    }
-    return worst;
-}
-
-engel_geodesics_status engel_geodesics_ensemble(const engel_geodesics_params *params, double *x,
-                                                size_t members, double h, size_t steps, unsigned char *status)
-{
-    engel_geodesics_status worst = isfinite(h) ? engel_geodesics_OK : engel_geodesics_BAD_ARGUMENT;
-    const engel_geodesics_params own = params != NULL ? *params : engel_geodesics_default_params;
-    size_t earliest = members;
-    if (x == NULL && members > 0) return engel_geodesics_BAD_ARGUMENT;
-#ifdef _OPENMP
-#pragma omp parallel for schedule(dynamic)
-#endif
-    for (size_t first = 0; first < members; first += engel_geodesics_LANES) {
-        const engel_geodesics_status group = engel_geodesics_group_run(&own, x, members, first, h, steps, status);
-        if (group == engel_geodesics_OK) continue;
-#ifdef _OPENMP
-#pragma omp critical
-#endif
-        if (first < earliest) {
-            earliest = first;
-            worst = group;
-        }
-    }
-    return worst;
-}
-
-#if defined(__clang__)
-#pragma clang diagnostic pop
-#endif
-
-/* the Hamiltonian */
-static void engel_geodesics_energy(const engel_geodesics_params *params, const double x[4],
-                                   double energy[restrict 1])
-{
-    (void)params;
-    const double h1 = x[0];
-    const double h2 = x[1];
-    energy[0] = 0.5 * (h2 * h2 + h1 * h1);
-}
-
-/* the Casimirs */
-static void engel_geodesics_casimir_values(const engel_geodesics_params *params, const double x[4],
-                                           double out[restrict 2])
-{
-    (void)params;
-    const double h2 = x[1];
-    const double h3 = x[2];
-    const double h4 = x[3];
-    out[0] = h4;
-    out[1] = h3 * h3 - 2.0 * (h2 * h4);
-}
-
-/* pi(x) grad H(x) */
-static void engel_geodesics_field(const engel_geodesics_params *params, const double x[4],
-                                  double out[restrict 4])
-{
-    (void)params;
-    const double h1 = x[0];
-    const double h2 = x[1];
-    const double h3 = x[2];
-    const double h4 = x[3];
-    out[0] = h2 * h3;
-    out[1] = -(h1 * h3);
-    out[2] = -(h1 * h4);
-    out[3] = 0.0;
-}
-
-double engel_geodesics_hamiltonian(const engel_geodesics_params *params, const double x[4])
-{
-    double energy[1];
-    engel_geodesics_energy(params != NULL ? params : &engel_geodesics_default_params, x, energy);
-    return energy[0];
-}
-
-void engel_geodesics_casimirs(const engel_geodesics_params *params, const double x[4], double out[])
-{
-    double value[2]; /* out may overlap x */
-    engel_geodesics_casimir_values(params != NULL ? params : &engel_geodesics_default_params, x, value);
-    for (int i = 0; i < 2; ++i) out[i] = value[i];
-}
-
-void engel_geodesics_vector_field(const engel_geodesics_params *params, const double x[4], double out[4])
-{
-    double value[4];
-    engel_geodesics_field(params != NULL ? params : &engel_geodesics_default_params, x, value);
-    memcpy(out, value, sizeof value);
 }
 
 const char *engel_geodesics_status_string(engel_geodesics_status status)
 {
-    switch (status) {
-    case engel_geodesics_OK: return "ok";
-    case engel_geodesics_NO_CONVERGENCE: return "no convergence: the step is too large";
-    case engel_geodesics_SINGULAR: return "singular Newton matrix: the step is too large";
-    case engel_geodesics_NOT_FINITE: return "not finite: overflow, or outside the domain";
-    case engel_geodesics_BAD_ARGUMENT: return "bad argument: a null pointer, or values that are not allowed";
-    }
-    return "unknown status";
+    static const char *const text[] = {
+        "ok",
+        "no convergence: the step is too large",
+        "singular Newton matrix: the step is too large",
+        "not finite: overflow, or outside the domain",
+        "bad argument: a null pointer, or values that are not allowed"
+    };
+    return (unsigned)status <= engel_geodesics_BAD_ARGUMENT ? text[status] : "unknown status";
 }
 
 size_t engel_geodesics_solver_size(void) { return sizeof(engel_geodesics_solver); }
 
 size_t engel_geodesics_solver_steps_done(const engel_geodesics_solver *s) { return s->steps; }
+
+/* ---- Ensembles ---- */
+engel_geodesics_status engel_geodesics_ensemble(const engel_geodesics_params *params, double *x,
+    size_t members, double h, size_t steps, unsigned char *status)
+{
+    engel_geodesics_status worst = isfinite(h) ? engel_geodesics_OK : engel_geodesics_BAD_ARGUMENT;
+    const engel_geodesics_params own = params != NULL ? *params : engel_geodesics_default_params;
+    if (x == NULL && members > 0) return engel_geodesics_BAD_ARGUMENT;
+    for (size_t m = 0; m < members; ++m) {
+        engel_geodesics_solver s;
+        double x0[engel_geodesics_DIM];
+        for (size_t i = 0; i < engel_geodesics_DIM; ++i) x0[i] = x[i * members + m];
+        engel_geodesics_status member = engel_geodesics_init(&s, &own, x0);
+        if (member == engel_geodesics_OK) {
+            member = engel_geodesics_integrate(&s, h, steps);
+            for (size_t i = 0; i < engel_geodesics_DIM; ++i) x[i * members + m] = s.x[i];
+        }
+        if (status != NULL) status[m] = (unsigned char)member;
+        if (worst == engel_geodesics_OK) worst = member;
+    }
+    return worst;
+}

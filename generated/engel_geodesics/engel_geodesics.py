@@ -6,17 +6,17 @@
 #   step: implicit, Newton iteration with the analytic matrix
 #   one Newton iteration: 21 additions, 54 multiplications
 #
-# spec: engel_geodesics, sha256 2c582262335611f49c35b4a01123706232a303c9bdbfdaca81a47840c54ec956
+# spec: engel_geodesics, sha256 fb609c6d402d3a7fbfac0e7cda1d7e07e2dba9262c5dfd8f16d22d0ab34eeabc
 # to regenerate: phigen build engel_geodesics
 # DO NOT EDIT: change the spec and regenerate; edits are noticed by the checksum below.
 #
 # SPDX-License-Identifier: 0BSD
 # This file belongs to whoever generated it; phigen claims no rights in it.
-# body-sha256: e156838f482569b9c61dbbc251fc017314511620def2431030d4ae366e33cfc4
+# body-sha256: 70721283fcaf85fa561058a9b56353a9fc6d5851eecbf97277c4abc0bf23f074
 import numpy as np
 
 VERSION = "0.1.0"
-SPEC_SHA256 = "2c582262335611f49c35b4a01123706232a303c9bdbfdaca81a47840c54ec956"
+SPEC_SHA256 = "fb609c6d402d3a7fbfac0e7cda1d7e07e2dba9262c5dfd8f16d22d0ab34eeabc"
 DIM = 4
 ORDER = 4
 COORDINATES = ("h1", "h2", "h3", "h4",)

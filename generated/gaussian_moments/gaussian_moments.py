@@ -6,17 +6,17 @@
 #   step: implicit, Newton iteration with the analytic matrix
 #   one Newton iteration: 90 additions, 157 multiplications, 2 functions
 #
-# spec: gaussian_moments, sha256 6a009ff88b586b301091f30b38504f8c7a68f169d883e9983e70897c25e6762b
+# spec: gaussian_moments, sha256 967874dae83dd8a6800d977c3a20ab90481f1a1e1820f485f001b0650f3fc9e7
 # to regenerate: phigen build gaussian_moments
 # DO NOT EDIT: change the spec and regenerate; edits are noticed by the checksum below.
 #
 # SPDX-License-Identifier: 0BSD
 # This file belongs to whoever generated it; phigen claims no rights in it.
-# body-sha256: 7019dfc28b71c6b8e2d1c74264ae5f522ca65e9ce9427c44dc5229123f9cf0ef
+# body-sha256: 9b85867ad06604723cc8619d6fed760eb577da7dd9fcf8b8e7cc691eba2472e3
 import numpy as np
 
 VERSION = "0.1.0"
-SPEC_SHA256 = "6a009ff88b586b301091f30b38504f8c7a68f169d883e9983e70897c25e6762b"
+SPEC_SHA256 = "967874dae83dd8a6800d977c3a20ab90481f1a1e1820f485f001b0650f3fc9e7"
 DIM = 3
 ORDER = 6
 COORDINATES = ("a", "b", "c",)

@@ -8,33 +8,46 @@
  *   composition: suzuki, 5 stages of order 2
  *   one evaluation of the equation for p: 14 additions, 68 multiplications, 4 divisions, 1 functions
  *
- * spec: guiding_centre, sha256 438d307684354c6dd6718258c2e26d813ea4fdcd1b1359994ab9d0f78c780fe5
+ * spec: guiding_centre, sha256 2fe2b1310137da070ce71887dcad93562dc0dd719fad890ce1b776e6af4b1570
  * to regenerate: phigen build guiding_centre
  * DO NOT EDIT: change the spec and regenerate; edits are noticed by the checksum below.
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: bbd486e0b43b5d6c4aefd13a310650a4db35db933d53a3b797dbe052036b3c6c
+ *
+ *   1. The model
+ *   2. Compensated sums, linear equations
+ *   3. Starting guesses
+ *   4. The implicit step, along paths dm/dt = pi(m) p
+ *   5. The solver
+ *   6. Ensembles
+ * body-sha256: f9cf52e51731929777933e7840ac1e6392f86e4cc2b48ae918c7c58d09de3c11
  */
 #include "guiding_centre.h"
 
 #include <float.h>
-#include <limits.h>
 #include <math.h>
-#include <stdint.h>
 #include <string.h>
 
+/* ---- The model ---- */
 const guiding_centre_params guiding_centre_default_params = { 0.5, 0.3, 0.2 };
 
-/* A step of size h is the composition of these fractions of it. */
-static const double guiding_centre_fractions[5] = { 0.4144907717943757, 0.4144907717943757, -0.6579630871775028, 0.4144907717943757, 0.4144907717943757 };
+enum { guiding_centre_MAX_ITERATIONS = 20 }; /* of an inner solve */
+/* most of the expansion of a path; one that needs more is cut into pieces */
+enum { guiding_centre_TERMS = 30 };
+enum { guiding_centre_SERIES = 55 }; /* of a path, those of the coordinates first */
+enum { guiding_centre_FIXED = 1 };   /* values that are constant along a path */
 
-/* Functions to be kept apart: very long ones compile in quadratic time. */
-#if defined(__GNUC__)
-#define guiding_centre_APART __attribute__((noinline))
-#else
-#define guiding_centre_APART
-#endif
+/* A step of size h is the composition of these fractions of it. */
+static const double guiding_centre_fractions[guiding_centre_STAGES] = { 0.4144907717943757,
+    0.4144907717943757, -0.6579630871775028, 0.4144907717943757, 0.4144907717943757 };
+
+/* Whether all parameters are finite, and positive where they have to be. */
+static int guiding_centre_allowed(const guiding_centre_params *params)
+{
+    return isfinite(params->kappa) && isfinite(params->mu) && params->mu > 0.0 && isfinite(params->k)
+        && params->k > 0.0;
+}
 
 /* everything that depends on parameters and step size only */
 static void guiding_centre_prepare(const guiding_centre_params *params, double h, double coef[restrict 5])
@@ -49,37 +62,23 @@ static void guiding_centre_prepare(const guiding_centre_params *params, double h
 
 /* p = grad S_h(y), and the Jacobian 1 - Hess S_h(y) pi(y) / 2 of the equation for p, up to O(h^2) */
 static void guiding_centre_generate(const double coef[5], const double y[4], double slope[restrict 4],
-                                    double jacobian[restrict 16])
+    double jacobian[restrict 16])
 {
-    const double x = y[0];
-    const double y_ = y[1];
-    const double z = y[2];
-    const double u = y[3];
-    const double t1 = 1.0 + coef[3] * (x * x + y_ * y_);
-    const double t2 = sqrt(t1);
-    const double t3 = 1.0 / t2;
-    const double t4 = t3 * (t3 * t3);
-    const double t5 = coef[3] * y_ * t4;
-    const double t6 = coef[0] * (x * t5);
-    const double t7 = coef[4] * u;
-    const double t8 = t2 + 2.0 * (t7 / t1);
-    const double t9 = 1.0 / (t2 * t8);
-    const double t10 = 0.5 * (t6 * t9);
-    const double t11 = coef[0] * (t3 - x * (coef[3] * x * t4));
-    const double t12 = coef[4] * x;
-    const double t13 = t12 * t9;
-    const double t14 = coef[4] * y_;
-    const double t15 = t14 * t9;
-    const double t16 = 1.0 + t7 * t4;
-    const double t17 = 1.0 / t8;
-    const double t18 = t12 * t16 * t17;
-    const double t19 = t14 * t16 * t17;
-    const double t20 = coef[0] * (t3 - y_ * t5);
-    const double t21 = t17 * (1.0 + u * (t4 * (coef[4] * (1.0 + t1))));
+    const double x = y[0], y_ = y[1], z = y[2], u = y[3];
+    /* slope */
+    const double t1 = 1.0 + coef[3] * (x * x + y_ * y_), t2 = sqrt(t1), t3 = 1.0 / t2;
     slope[0] = coef[0] * (x * t3);
     slope[1] = coef[0] * (y_ * t3);
     slope[2] = coef[1] * z;
     slope[3] = coef[2] * u;
+    /* jacobian */
+    const double t4 = t3 * (t3 * t3), t5 = coef[3] * y_ * t4, t6 = coef[0] * (x * t5);
+    const double t7 = coef[4] * u, t8 = t2 + 2.0 * (t7 / t1), t9 = 1.0 / (t2 * t8);
+    const double t10 = 0.5 * (t6 * t9), t11 = coef[0] * (t3 - x * (coef[3] * x * t4));
+    const double t12 = coef[4] * x, t13 = t12 * t9, t14 = coef[4] * y_, t15 = t14 * t9;
+    const double t16 = 1.0 + t7 * t4, t17 = 1.0 / t8, t18 = t12 * t16 * t17, t19 = t14 * t16 * t17;
+    const double t20 = coef[0] * (t3 - y_ * t5);
+    const double t21 = t17 * (1.0 + u * (t4 * (coef[4] * (1.0 + t1))));
     jacobian[0] = 1.0 + t10;
     jacobian[1] = 0.5 * (t11 * t9);
     jacobian[2] = (-0.5) * (t11 * t13 - t6 * t15);
@@ -98,289 +97,77 @@ static void guiding_centre_generate(const double coef[5], const double y[4], dou
     jacobian[15] = 1.0;
 }
 
-/* Solve matrix * solution = side, both overwritten, by elimination with partial pivoting. 0 if singular. */
-static int guiding_centre_solve_pivoting(double matrix[16], double side[4])
-{
-    for (int k = 0; k < 4; ++k) {
-        int best = k;
-        for (int i = k + 1; i < 4; ++i)
-            if (fabs(matrix[i * 4 + k]) > fabs(matrix[best * 4 + k])) best = i;
-        const double pivot = matrix[best * 4 + k];
-        if (!(fabs(pivot) > 0.0)) return 0;
-        for (int j = k; j < 4 && best != k; ++j) {
-            const double swap = matrix[k * 4 + j];
-            matrix[k * 4 + j] = matrix[best * 4 + j];
-            matrix[best * 4 + j] = swap;
-        }
-        const double swap = side[k];
-        side[k] = side[best];
-        side[best] = swap;
-        for (int i = k + 1; i < 4; ++i) {
-            const double factor = matrix[i * 4 + k] / pivot;
-            for (int j = k + 1; j < 4; ++j) matrix[i * 4 + j] -= factor * matrix[k * 4 + j];
-            side[i] -= factor * side[k];
-        }
-    }
-    for (int i = 4 - 1; i >= 0; --i) {
-        for (int j = i + 1; j < 4; ++j) side[i] -= matrix[i * 4 + j] * side[j];
-        side[i] /= matrix[i * 4 + i];
-    }
-    return 1;
-}
-
 /* elimination without pivoting: the solution, and the reciprocals of the pivots */
 static void guiding_centre_eliminate(const double matrix[16], const double side[4],
-                                     double solution[restrict 4], double reciprocal[restrict 4])
+    double solution[restrict 4], double reciprocal[restrict 4])
 {
-    const double t1 = 1.0 / matrix[0];
-    const double t2 = matrix[12] * t1;
-    const double t3 = matrix[4] * t1;
-    const double t4 = side[1] - side[0] * t3;
-    const double t5 = 1.0 / (matrix[5] - matrix[1] * t3);
-    const double t6 = (matrix[13] - matrix[1] * t2) * t5;
-    const double t7 = matrix[8] * t1;
-    const double t8 = (matrix[9] - matrix[1] * t7) * t5;
-    const double t9 = side[2] - side[0] * t7 - t4 * t8;
+    /* solution */
+    const double t1 = 1.0 / matrix[0], t2 = matrix[12] * t1, t3 = matrix[4] * t1;
+    const double t4 = side[1] - side[0] * t3, t5 = 1.0 / (matrix[5] - matrix[1] * t3);
+    const double t6 = (matrix[13] - matrix[1] * t2) * t5, t7 = matrix[8] * t1;
+    const double t8 = (matrix[9] - matrix[1] * t7) * t5, t9 = side[2] - side[0] * t7 - t4 * t8;
     const double t10 = matrix[6] - matrix[2] * t3;
     const double t11 = 1.0 / (matrix[10] - matrix[2] * t7 - t10 * t8);
     const double t12 = (matrix[14] - matrix[2] * t2 - t10 * t6) * t11;
-    const double t13 = matrix[7] - matrix[3] * t3;
-    const double t14 = matrix[11] - matrix[3] * t7 - t13 * t8;
+    const double t13 = matrix[7] - matrix[3] * t3, t14 = matrix[11] - matrix[3] * t7 - t13 * t8;
     const double t15 = 1.0 / (matrix[15] - matrix[3] * t2 - t13 * t6 - t14 * t12);
     const double t16 = (side[3] - side[0] * t2 - t4 * t6 - t9 * t12) * t15;
-    const double t17 = t11 * (t9 - t14 * t16);
-    const double t18 = t5 * (t4 - (t13 * t16 + t10 * t17));
+    const double t17 = t11 * (t9 - t14 * t16), t18 = t5 * (t4 - (t13 * t16 + t10 * t17));
     solution[0] = t1 * (side[0] - (matrix[3] * t16 + (matrix[2] * t17 + matrix[1] * t18)));
     solution[1] = t18;
     solution[2] = t17;
     solution[3] = t16;
+    /* reciprocal */
     reciprocal[0] = t1;
     reciprocal[1] = t5;
     reciprocal[2] = t11;
     reciprocal[3] = t15;
 }
 
-/* Solve matrix * solution = side, both overwritten. The matrix is I + O(h), so elimination without pivoting
-   does unless a pivot is far from 1. 0 if singular. */
-static int guiding_centre_solve(double matrix[16], double side[4])
+/* the Hamiltonian */
+double guiding_centre_hamiltonian(const guiding_centre_params *params, const double x[4])
 {
-    double solution[4], reciprocal[4], largest = 0.0;
-    guiding_centre_eliminate(matrix, side, solution, reciprocal);
-    for (int i = 0; i < 4; ++i)
-        if (!(fabs(reciprocal[i]) <= largest)) largest = fabs(reciprocal[i]);
-    if (!(largest < 1e3)) return guiding_centre_solve_pivoting(matrix, side);
-    memcpy(side, solution, sizeof solution);
-    return 1;
+    if (params == NULL) params = &guiding_centre_default_params;
+    const double kappa = params->kappa, mu = params->mu, k = params->k, x_ = x[0], y = x[1], z = x[2], u =
+        x[3];
+    const double t1 = 0.5 * (k * (z * z)) + (0.5 * (u * u) + mu * sqrt(1.0 + kappa * kappa * (x_ * x_ + y
+        * y)));
+    return t1;
 }
 
-/* Whether a guess is where the next values may be. Recurrences that were fitted to little else than rest, near a saddle,
-   may lead anywhere; and far away the equation of a step has solutions that have nothing to do with the motion. */
-static int guiding_centre_near(const double guess[4], const double last[4])
+/* the Casimirs */
+void guiding_centre_casimirs(const guiding_centre_params *params, const double x[4], double out[])
 {
-    double distance = 0.0, size = 0.0;
-    for (int i = 0; i < 4; ++i) {
-        distance += fabs(guess[i] - last[i]);
-        size += fabs(last[i]);
-    }
-    return distance <= 4.0 * size;
+    (void)params, (void)x, (void)out;
 }
 
-/* The guess for the next value (y), from earlier ones; 0 if there is none. */
-static int guiding_centre_predict(const guiding_centre_memory *memory, double value[4])
+/* pi(x) grad H(x) */
+void guiding_centre_vector_field(const guiding_centre_params *params, const double x[4], double out[4])
 {
-    const int last = memory->count - 1;
-    double odd[4] = { 0.0 }, binomial = -1.0;
-    memset(value, 0, 4 * sizeof value[0]);
-    if (memory->fitting) {
-        for (int k = 0; k < memory->terms; k += 2)
-            for (int i = 0; i < 4; ++i) {
-                value[i] += memory->weight[k][i][0] * memory->past[last - k][i];
-                odd[i] += memory->weight[k + 1][i][0] * memory->past[last - 1 - k][i];
-            }
-        for (int i = 0; i < 4; ++i) value[i] += odd[i];
-    } else {
-        for (int k = 0; k < memory->order && k <= last; ++k) {
-            binomial *= -(double)(memory->order - k) / (k + 1);
-            for (int i = 0; i < 4; ++i) value[i] += binomial * memory->past[last - k][i];
-        }
-    }
-    return last >= 0 && guiding_centre_near(value, memory->past[last]);
+    if (params == NULL) params = &guiding_centre_default_params;
+    const double kappa = params->kappa, mu = params->mu, k = params->k, x_ = x[0], y = x[1], z = x[2], u =
+        x[3];
+    const double t1 = k * z, t2 = kappa * x_, t3 = kappa * kappa, t4 = 1.0 + t3 * (x_ * x_ + y * y);
+    const double t5 = sqrt(t4), t6 = kappa * u, t7 = t5 + 2.0 * (t6 / t4), t8 = 1.0 / (t5 * t7);
+    const double t9 = t2 * t8, t10 = 1.0 / t5, t11 = t3 * (mu * t10), t12 = y * t11, t13 = kappa * y;
+    const double t14 = t10 * (t10 * t10), t15 = 1.0 + t6 * t14, t16 = 1.0 / t7;
+    const double t17 = t13 * t15 * t16, t18 = t2 * t15 * t16, t19 = x_ * t11, t20 = t13 * t8;
+    const double t21 = t16 * (1.0 + u * (t14 * (kappa * (1.0 + t4))));
+    out[0] = t1 * t9 - t12 * t8 - u * t17;
+    out[1] = u * t18 + (t19 * t8 + t1 * t20);
+    out[2] = u * t21 - (t12 * t20 + t19 * t9);
+    out[3] = t19 * t17 - t12 * t18 - t1 * t21;
 }
 
-/* Choose the guess that would have been best for a value that took several iterations. */
-static void guiding_centre_judge(guiding_centre_memory *memory, const double value[4])
+/* ---- Compensated sums, linear equations ---- */
+/* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to
+   its last bit: were it rounded with the change, corrections of one sign would add up to a drift. 0, and x as
+   before, if the sum is not finite. */
+static int guiding_centre_advance(guiding_centre_solver *s, const double change[guiding_centre_DIM],
+    const double correction[guiding_centre_DIM])
 {
-    double row[8 + 1][4], guess[4], least = HUGE_VAL, fitted = HUGE_VAL;
-    const int rows = memory->count < 8 ? memory->count : 8;
-    memcpy(row[0], value, sizeof row[0]);
-    for (int k = 0; k < rows; ++k) memcpy(row[k + 1], memory->past[memory->count - 1 - k], sizeof row[0]);
-    for (int order = 1; order <= rows; ++order) { /* row[0] becomes the backward difference of this order */
-        double size = 0.0;
-        for (int k = 0; k <= rows - order; ++k)
-            for (int i = 0; i < 4; ++i) row[k][i] -= row[k + 1][i];
-        for (int i = 0; i < 4; ++i) size += fabs(row[0][i]);
-        if (size < least) {
-            least = size;
-            memory->order = order;
-        }
-    }
-    memory->fitting = memory->terms > 0;
-    if (memory->fitting && guiding_centre_predict(memory, guess)) {
-        fitted = 0.0;
-        for (int i = 0; i < 4; ++i) fitted += fabs(value[i] - guess[i]);
-    }
-    memory->fitting = memory->terms > 0 && fitted <= least;
-    if (memory->order == 0) memory->order = 1;
-}
-
-/* Make eight columns orthogonal to one, by the multiples of it that are put into r. Where that one is among the eight, those
-   up to it stay as they are, and inverse becomes one over its squared length. The number of rows is even. */
-static void guiding_centre_project(int rows, double (*one)[8], int column, double *inverse, double (*eight)[8], double r[8])
-{
-    double even[8] = { 0.0 }, odd[8] = { 0.0 };
-    for (int i = 0; i < rows; i += 2) {
-        const double entry = one[i][column], next = one[i + 1][column];
-        for (int l = 0; l < 8; ++l) even[l] += entry * eight[i][l];
-        for (int l = 0; l < 8; ++l) odd[l] += next * eight[i + 1][l];
-    }
-    for (int l = 0; l < 8; ++l) even[l] += odd[l];
-    if (one == eight) {
-        *inverse = even[column] > 0.0 ? 1.0 / even[column] : 0.0;
-        memset(even, 0, ((size_t)column + 1) * sizeof even[0]);
-    }
-    for (int l = 0; l < 8; ++l) r[l] = even[l] *= *inverse;
-    for (int i = 0; i < rows; ++i) {
-        const double entry = one[i][column];
-        for (int l = 0; l < 8; ++l) eight[i][l] -= entry * even[l];
-    }
-}
-
-/* By how much recurrences miss the last of these values. */
-static double guiding_centre_missed(const double *value, double (*weight)[8])
-{
-    enum { AHEAD = 8, WINDOW = 40, CHECKS = 8 };
-    double most = 0.0;
-    for (int i = 0; i < CHECKS; ++i) {
-        double guess[8] = { 0.0 };
-        for (int k = 0; k < WINDOW; ++k)
-            for (int l = 0; l < 8; ++l) guess[l] += weight[k][l] * value[i + WINDOW - 1 - k];
-        for (int l = 0; l < AHEAD; ++l) most = fmax(most, fabs(guess[l] - value[i + WINDOW + l]));
-    }
-    return most;
-}
-
-/* Fit the recurrences value[m + l] = sum of weight[k][..][l] * value[m - 1 - k], l = 0 ... 8 - 1, to the history of
-   a component: ridge least squares by modified Gram-Schmidt, the ridge at the level of rounding. Columns are taken in by
-   eights, until they leave next to nothing of the right-hand sides. How many past values are used; 0 if the recurrences do
-   not foresee the last values, which they were not fitted to. */
-static int guiding_centre_train(guiding_centre_memory *memory, int component)
-{
-    enum { AHEAD = 8, WINDOW = 40, ROWS = 56 };
-    double q[WINDOW / 8][ROWS + WINDOW][8], r[WINDOW / 8][WINDOW][8], inverse[WINDOW]; /* eight columns in each part */
-    double right[ROWS + WINDOW][8], weight[WINDOW][8], value[111], largest = 0.0, left = HUGE_VAL;
-    int terms = 0;
-    memset(q, 0, sizeof q);
-    memset(right, 0, sizeof right);
-    memset(weight, 0, sizeof weight);
-    for (int i = 0; i < 111; ++i) {
-        value[i] = memory->past[memory->count - 111 + i][component];
-        if (fabs(value[i]) > largest) largest = fabs(value[i]);
-    }
-    for (int i = 0; i < ROWS; ++i)
-        for (int l = 0; l < AHEAD; ++l) right[i][l] = value[i + WINDOW + l];
-    while (terms < WINDOW && left > 3e-12 * largest) {
-        const int part = terms / 8, rows = ROWS + terms + 8; /* further rows of the ridge are zero in these columns */
-        for (int i = 0; i < ROWS; ++i)
-            for (int l = 0; l < 8; ++l) q[part][i][l] = value[i + WINDOW - 1 - terms - l];
-        for (int l = 0; l < 8; ++l) q[part][ROWS + terms + l][l] = 1e-15 * largest;
-        for (int k = 0; k < terms; ++k) guiding_centre_project(rows, q[k / 8], k % 8, &inverse[k], q[part], r[part][k]);
-        for (int l = 0; l < 8; ++l, ++terms) {
-            guiding_centre_project(rows, q[part], l, &inverse[terms], q[part], r[part][terms]);
-            guiding_centre_project(rows, q[part], l, &inverse[terms], right, weight[terms]);
-        }
-        double sum[8] = { 0.0 };
-        for (int i = 0; i < ROWS; ++i)
-            for (int l = 0; l < 8; ++l) sum[l] += fabs(right[i][l]);
-        left = 0.0;
-        for (int l = 0; l < 8; ++l) left += sum[l] / ROWS;
-    }
-    for (int k = terms - 1; k >= 0; --k)
-        for (int j = k + 1; j < terms; ++j)
-            for (int l = 0; l < 8; ++l) weight[k][l] -= r[j / 8][k][j % 8] * weight[j][l];
-    for (int k = 0; k < WINDOW; ++k) memcpy(memory->weight[k][component], weight[k], AHEAD * sizeof(double));
-    return guiding_centre_missed(value + ROWS, weight) <= 1e-07 * largest ? terms : 0;
-}
-
-/* Drop what is old, if so many values would not fit into the history. */
-static void guiding_centre_make_room(guiding_centre_memory *memory, int values)
-{
-    if (memory->count + values <= 222) return;
-    memmove(memory->past, memory->past + memory->count - 111, 111 * sizeof memory->past[0]);
-    memory->count = 111;
-}
-
-/* Add a value to the history. */
-static void guiding_centre_record(guiding_centre_memory *memory, const double value[4])
-{
-    guiding_centre_make_room(memory, 1);
-    memcpy(memory->past[memory->count++], value, 4 * sizeof value[0]);
-}
-
-/* Fit the recurrence to the last values; with every time, wait longer before it is done again. */
-static void guiding_centre_fit(guiding_centre_memory *memory)
-{
-    int found = 1;
-    memory->terms = 0;
-    for (int i = 0; i < 4 && found; ++i) {
-        const int terms = guiding_centre_train(memory, i);
-        found = terms > 0;
-        if (terms > memory->terms) memory->terms = terms;
-    }
-    if (!found) memory->terms = 0;
-    memory->fitting = found;
-    ++memory->fits;
-    memory->slow = 0;
-    memory->patience = memory->patience < 10000 ? 2 * memory->patience + 150 : 20000;
-}
-
-/* Take in the solved value: what took one iteration needs no better guess. */
-static void guiding_centre_remember(guiding_centre_memory *memory, const double value[4], int iterations)
-{
-    if (iterations > 1) guiding_centre_judge(memory, value);
-    guiding_centre_record(memory, value);
-    memory->slow = iterations > 1 ? memory->slow + 1 : 0;
-    if (memory->slow > memory->patience && memory->count >= 111) guiding_centre_fit(memory);
-}
-
-/* Whether an increment is that of the motion. Where the step is too large, the equation may have been solved by a point far
-   away, at another energy, that has nothing to do with it. */
-static int guiding_centre_plausible(const guiding_centre_solver *s, int stage, const double increment[4])
-{
-    double moved = 0.0, size = 0.0, field[4], middle[4], end[4];
-    for (int i = 0; i < 4; ++i) {
-        moved += fabs(increment[i]);
-        size += fabs(s->x[i]);
-    }
-    if (moved <= 1.5 * size) return 1;
-    guiding_centre_vector_field(&s->params, s->x, field);
-    for (int i = 0; i < 4; ++i) {
-        size += fabs(guiding_centre_fractions[stage] * s->h * field[i]);
-        middle[i] = s->x[i] + 0.5 * increment[i];
-        end[i] = s->x[i] + increment[i];
-    }
-    if (moved <= 1.5 * size) return 1;
-    const double before = guiding_centre_hamiltonian(&s->params, s->x), after = guiding_centre_hamiltonian(&s->params, end);
-    const double scale = fabs(before) + fabs(guiding_centre_hamiltonian(&s->params, middle)) + fabs(after);
-    return fabs(after - before) <= 0.5 * scale;
-}
-
-/* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to its last
-   bit: were it rounded with the change, corrections of one sign would add up to a drift. 0, and x as before, if the
-   sum is not finite. */
-static int guiding_centre_advance(guiding_centre_solver *s, const double change[4], const double correction[4])
-{
-    double x[4], carry[4];
-    for (int i = 0; i < 4; ++i) {
+    double x[guiding_centre_DIM], carry[guiding_centre_DIM];
+    for (int i = 0; i < guiding_centre_DIM; ++i) {
         const double sum = s->x[i] + change[i], added = sum - s->x[i];
         const double lost = (s->x[i] - (sum - added)) + (change[i] - added);
         const double small = lost + (s->carry[i] + correction[i]);
@@ -391,6 +178,94 @@ static int guiding_centre_advance(guiding_centre_solver *s, const double change[
     memcpy(s->x, x, sizeof x);
     memcpy(s->carry, carry, sizeof carry);
     return 1;
+}
+
+/* Newton matrices are I + O(h): a pivot whose reciprocal is larger than this is far from 1. */
+#define guiding_centre_LARGEST_RECIPROCAL 1e3
+
+/* Solve matrix * solution = side, both overwritten. The matrix is I + O(h): 0 if a pivot is far from 1. */
+static int guiding_centre_solve(double matrix[guiding_centre_DIM * guiding_centre_DIM],
+    double side[guiding_centre_DIM])
+{
+    double solution[guiding_centre_DIM], reciprocal[guiding_centre_DIM], largest = 0.0;
+    guiding_centre_eliminate(matrix, side, solution, reciprocal);
+    for (int i = 0; i < guiding_centre_DIM; ++i)
+        if (!(fabs(reciprocal[i]) <= largest)) largest = fabs(reciprocal[i]);
+    if (!(largest < guiding_centre_LARGEST_RECIPROCAL)) return 0;
+    memcpy(side, solution, sizeof solution);
+    return 1;
+}
+
+/* ---- Starting guesses ---- */
+/* How far from the last value a guess may be, in sizes of that value. */
+#define guiding_centre_REACH 4.0
+
+/* The guess for the next value from the last ones: the sum of their backward differences. 0 if there is none,
+   or if it is far away, where the equation of a step has solutions that have nothing to do with the motion.
+   */
+static int guiding_centre_predict(const guiding_centre_history *history, double value[guiding_centre_DIM])
+{
+    double distance = 0.0, size = 0.0;
+    for (int i = 0; i < guiding_centre_DIM; ++i) {
+        value[i] = 0.0;
+        for (int k = 0; k < history->order; ++k) value[i] += history->difference[k][i];
+        distance += fabs(value[i] - history->difference[0][i]);
+        size += fabs(history->difference[0][i]);
+    }
+    return history->order > 0 && distance <= guiding_centre_REACH * size;
+}
+
+/* Take in the solved value. The guess of order k missed it by its k-th difference: the next is of the best
+   order. */
+static void guiding_centre_remember(guiding_centre_history *history, const double value[guiding_centre_DIM])
+{
+    double least = HUGE_VAL, next[guiding_centre_DIM];
+    memcpy(next, value, sizeof next);
+    for (int k = 0; k <= history->count && k < guiding_centre_DIFFERENCES; ++k) {
+        double size = 0.0;
+        for (int i = 0; i < guiding_centre_DIM; ++i) {
+            const double last = history->difference[k][i];
+            history->difference[k][i] = next[i];
+            size += fabs(next[i]);
+            next[i] -= last;
+        }
+        if (k > 0 && size < least) {
+            least = size;
+            history->order = k;
+        }
+    }
+    if (history->count == 0) history->order = 1;
+    if (history->count < guiding_centre_DIFFERENCES) ++history->count;
+}
+
+/* How far a step may lead, in sizes of the state and of what the vector field says, if the energy is lost;
+   and the part of the energy that counts as lost. */
+#define guiding_centre_PLAUSIBLE 1.5
+#define guiding_centre_LOST 0.5
+
+/* Whether an increment is that of the motion. Where the step is too large, the equation may have been solved
+   by a point far away, at another energy, that has nothing to do with it. */
+static int guiding_centre_plausible(const guiding_centre_solver *s, int stage,
+    const double increment[guiding_centre_DIM])
+{
+    double moved = 0.0, size = 0.0, field[guiding_centre_DIM], middle[guiding_centre_DIM],
+        end[guiding_centre_DIM];
+    for (int i = 0; i < guiding_centre_DIM; ++i) {
+        moved += fabs(increment[i]);
+        size += fabs(s->x[i]);
+    }
+    if (moved <= guiding_centre_PLAUSIBLE * size) return 1;
+    guiding_centre_vector_field(&s->params, s->x, field);
+    for (int i = 0; i < guiding_centre_DIM; ++i) {
+        size += fabs(guiding_centre_fractions[stage] * s->h * field[i]);
+        middle[i] = s->x[i] + 0.5 * increment[i];
+        end[i] = s->x[i] + increment[i];
+    }
+    if (moved <= guiding_centre_PLAUSIBLE * size) return 1;
+    const double before = guiding_centre_hamiltonian(&s->params, s->x), after =
+        guiding_centre_hamiltonian(&s->params, end);
+    const double scale = fabs(before) + fabs(guiding_centre_hamiltonian(&s->params, middle)) + fabs(after);
+    return fabs(after - before) <= guiding_centre_LOST * scale;
 }
 
 /* Coefficient k of the product of two Taylor series. */
@@ -409,12 +284,134 @@ static double guiding_centre_taylor_power(const double *a, const double *b, doub
     return sum / k;
 }
 
-/* Whether dm/dt = pi(m) p holds at a point m, where the expansion has the given slope: one with gaps between its terms,
-   like t + t^9, or across the kink of an absolute value, only looks as if it had converged. */
-static int guiding_centre_holds(const double *coef, const double p[4], const double m[4], const double slope[4])
+/* The first coefficients of the series of a path, those of the coordinates given. */
+static void guiding_centre_path_begin(const double *coef, const double p[4],
+    double s[55][guiding_centre_TERMS + 1], double f[1])
 {
-    double e[55], field[4], scale = 0.0;
-    memcpy(e, m, 4 * sizeof *e);
+    (void)f;
+    s[4][0] = coef[4] * s[0][0];
+    s[5][0] = s[0][0] * s[0][0];
+    s[6][0] = s[1][0] * s[1][0];
+    s[7][0] = s[5][0] + s[6][0];
+    s[8][0] = coef[3] * s[7][0];
+    s[9][0] = 1.0 + s[8][0];
+    s[10][0] = sqrt(s[9][0]);
+    s[11][0] = coef[4] * s[3][0];
+    s[12][0] = 1.0 / s[9][0];
+    s[13][0] = s[11][0] * s[12][0];
+    s[14][0] = 2.0 * s[13][0];
+    s[15][0] = s[10][0] + s[14][0];
+    s[16][0] = s[10][0] * s[15][0];
+    s[17][0] = 1.0 / s[16][0];
+    s[18][0] = s[4][0] * s[17][0];
+    s[19][0] = p[2] * s[18][0];
+    s[20][0] = p[1] * s[17][0];
+    s[21][0] = s[19][0] - s[20][0];
+    s[22][0] = coef[4] * s[1][0];
+    s[23][0] = (1.0 / sqrt(s[9][0])) * (1.0 / sqrt(s[9][0])) / sqrt(s[9][0]);
+    s[24][0] = s[11][0] * s[23][0];
+    s[25][0] = 1.0 + s[24][0];
+    s[26][0] = s[22][0] * s[25][0];
+    s[27][0] = 1.0 / s[15][0];
+    s[28][0] = s[26][0] * s[27][0];
+    s[29][0] = p[3] * s[28][0];
+    s[30][0] = s[21][0] - s[29][0];
+    s[31][0] = s[4][0] * s[25][0];
+    s[32][0] = s[31][0] * s[27][0];
+    s[33][0] = p[3] * s[32][0];
+    s[34][0] = p[0] * s[17][0];
+    s[35][0] = s[22][0] * s[17][0];
+    s[36][0] = p[2] * s[35][0];
+    s[37][0] = s[34][0] + s[36][0];
+    s[38][0] = s[33][0] + s[37][0];
+    s[39][0] = 1.0 + s[9][0];
+    s[40][0] = coef[4] * s[39][0];
+    s[41][0] = s[23][0] * s[40][0];
+    s[42][0] = s[3][0] * s[41][0];
+    s[43][0] = 1.0 + s[42][0];
+    s[44][0] = s[27][0] * s[43][0];
+    s[45][0] = p[3] * s[44][0];
+    s[46][0] = p[1] * s[35][0];
+    s[47][0] = p[0] * s[18][0];
+    s[48][0] = s[46][0] + s[47][0];
+    s[49][0] = s[45][0] - s[48][0];
+    s[50][0] = p[0] * s[28][0];
+    s[51][0] = p[1] * s[32][0];
+    s[52][0] = s[50][0] - s[51][0];
+    s[53][0] = p[2] * s[44][0];
+    s[54][0] = s[52][0] - s[53][0];
+}
+
+/* Coefficient k of the series, and with it coefficient k + 1 of the coordinates. */
+static void guiding_centre_path_order(const double *coef, const double p[4],
+    double s[55][guiding_centre_TERMS + 1], const double f[1], int k)
+{
+    (void)f;
+    if (k > 0) {
+        s[4][k] = coef[4] * s[0][k];
+        s[5][k] = guiding_centre_taylor_product(s[0], s[0], k);
+        s[6][k] = guiding_centre_taylor_product(s[1], s[1], k);
+        s[7][k] = s[5][k] + s[6][k];
+        s[8][k] = coef[3] * s[7][k];
+        s[9][k] = s[8][k];
+        s[10][k] = (guiding_centre_taylor_power(s[9], s[10], 1.0 / 2.0, k)) / s[9][0];
+        s[11][k] = coef[4] * s[3][k];
+        s[12][k] = (guiding_centre_taylor_power(s[9], s[12], -1.0 / 1.0, k)) / s[9][0];
+        s[13][k] = guiding_centre_taylor_product(s[11], s[12], k);
+        s[14][k] = 2.0 * s[13][k];
+        s[15][k] = s[10][k] + s[14][k];
+        s[16][k] = guiding_centre_taylor_product(s[10], s[15], k);
+        s[17][k] = (guiding_centre_taylor_power(s[16], s[17], -1.0 / 1.0, k)) / s[16][0];
+        s[18][k] = guiding_centre_taylor_product(s[4], s[17], k);
+        s[19][k] = p[2] * s[18][k];
+        s[20][k] = p[1] * s[17][k];
+        s[21][k] = s[19][k] - s[20][k];
+        s[22][k] = coef[4] * s[1][k];
+        s[23][k] = (guiding_centre_taylor_power(s[9], s[23], -3.0 / 2.0, k)) / s[9][0];
+        s[24][k] = guiding_centre_taylor_product(s[11], s[23], k);
+        s[25][k] = s[24][k];
+        s[26][k] = guiding_centre_taylor_product(s[22], s[25], k);
+        s[27][k] = (guiding_centre_taylor_power(s[15], s[27], -1.0 / 1.0, k)) / s[15][0];
+        s[28][k] = guiding_centre_taylor_product(s[26], s[27], k);
+        s[29][k] = p[3] * s[28][k];
+        s[30][k] = s[21][k] - s[29][k];
+        s[31][k] = guiding_centre_taylor_product(s[4], s[25], k);
+        s[32][k] = guiding_centre_taylor_product(s[31], s[27], k);
+        s[33][k] = p[3] * s[32][k];
+        s[34][k] = p[0] * s[17][k];
+        s[35][k] = guiding_centre_taylor_product(s[22], s[17], k);
+        s[36][k] = p[2] * s[35][k];
+        s[37][k] = s[34][k] + s[36][k];
+        s[38][k] = s[33][k] + s[37][k];
+        s[39][k] = s[9][k];
+        s[40][k] = coef[4] * s[39][k];
+        s[41][k] = guiding_centre_taylor_product(s[23], s[40], k);
+        s[42][k] = guiding_centre_taylor_product(s[3], s[41], k);
+        s[43][k] = s[42][k];
+        s[44][k] = guiding_centre_taylor_product(s[27], s[43], k);
+        s[45][k] = p[3] * s[44][k];
+        s[46][k] = p[1] * s[35][k];
+        s[47][k] = p[0] * s[18][k];
+        s[48][k] = s[46][k] + s[47][k];
+        s[49][k] = s[45][k] - s[48][k];
+        s[50][k] = p[0] * s[28][k];
+        s[51][k] = p[1] * s[32][k];
+        s[52][k] = s[50][k] - s[51][k];
+        s[53][k] = p[2] * s[44][k];
+        s[54][k] = s[52][k] - s[53][k];
+    }
+    s[0][k + 1] = s[30][k] / (k + 1);
+    s[1][k + 1] = s[38][k] / (k + 1);
+    s[2][k + 1] = s[49][k] / (k + 1);
+    s[3][k + 1] = s[54][k] / (k + 1);
+}
+
+/* The slope of the path at a point m. */
+static void guiding_centre_path_field(const double *coef, const double p[4], const double m[4],
+    double field[4])
+{
+    double e[55];
+    memcpy(e, m, 4 * sizeof e[0]);
     e[4] = coef[4] * e[0];
     e[5] = e[0] * e[0];
     e[6] = e[1] * e[1];
@@ -470,136 +467,48 @@ static int guiding_centre_holds(const double *coef, const double p[4], const dou
     field[1] = e[38];
     field[2] = e[49];
     field[3] = e[54];
-    for (int i = 0; i < 4; ++i) scale += fabs(m[i]) + fabs(slope[i]);
-    for (int i = 0; i < 4; ++i)
+}
+
+/* ---- The implicit step, along paths dm/dt = pi(m) p ---- */
+enum {
+    guiding_centre_LONGEST_PATH = 128, /* pieces of a path, a power of 2 */
+    /* of all paths that are tried in a solve: steps that need more are wrong by as much as the state */
+    guiding_centre_MOST_PIECES = 512
+};
+
+/* Whether dm/dt = pi(m) p holds at a point m, where the expansion has the given slope: one with gaps between
+   its terms, like t + t^9, or across the kink of an absolute value, only looks as if it had converged. */
+static int guiding_centre_holds(const double *coef, const double p[guiding_centre_DIM],
+    const double m[guiding_centre_DIM], const double slope[guiding_centre_DIM])
+{
+    double field[guiding_centre_DIM], scale = 0.0;
+    guiding_centre_path_field(coef, p, m, field);
+    for (int i = 0; i < guiding_centre_DIM; ++i) scale += fabs(m[i]) + fabs(slope[i]);
+    for (int i = 0; i < guiding_centre_DIM; ++i)
         if (!(fabs(field[i] - slope[i]) <= 2e-15 * scale)) return 0;
     return 1;
 }
 
-/* The path dm/dt = pi(m) p, 0 <= t <= 1, from start, by its Taylor series: change is m(1) - start, mean the mean of
-   m - start. The number of terms follows from their size; 0 if 30 do not suffice. */
-static int guiding_centre_piece(const double *coef, const double p[4], const double start[4], double change[4],
-    double mean[4])
+/* A path for 0 <= t <= 1, from start, by its Taylor series: change is m(1) - start, mean the mean of m -
+   start. The number of terms follows from their size; 0 if guiding_centre_TERMS do not suffice. */
+static int guiding_centre_piece(const double *coef, const double p[guiding_centre_DIM],
+    const double start[guiding_centre_DIM], double change[guiding_centre_DIM],
+    double mean[guiding_centre_DIM])
 {
-    double s[55][30 + 1], end[4], slope[4], norm = 0.0;
+    double series[guiding_centre_SERIES][guiding_centre_TERMS + 1], fixed[guiding_centre_FIXED],
+        end[guiding_centre_DIM], slope[guiding_centre_DIM], norm = 0.0;
     int small = 0;
-    for (int i = 0; i < 4; ++i) {
-        s[i][0] = start[i];
+    for (int i = 0; i < guiding_centre_DIM; ++i) {
+        series[i][0] = start[i];
         change[i] = mean[i] = slope[i] = 0.0;
         norm += fabs(start[i]);
     }
-    s[4][0] = coef[4] * s[0][0];
-    s[5][0] = s[0][0] * s[0][0];
-    s[6][0] = s[1][0] * s[1][0];
-    s[7][0] = s[5][0] + s[6][0];
-    s[8][0] = coef[3] * s[7][0];
-    s[9][0] = 1.0 + s[8][0];
-    s[10][0] = sqrt(s[9][0]);
-    s[11][0] = coef[4] * s[3][0];
-    s[12][0] = 1.0 / s[9][0];
-    s[13][0] = s[11][0] * s[12][0];
-    s[14][0] = 2.0 * s[13][0];
-    s[15][0] = s[10][0] + s[14][0];
-    s[16][0] = s[10][0] * s[15][0];
-    s[17][0] = 1.0 / s[16][0];
-    s[18][0] = s[4][0] * s[17][0];
-    s[19][0] = p[2] * s[18][0];
-    s[20][0] = p[1] * s[17][0];
-    s[21][0] = s[19][0] - s[20][0];
-    s[22][0] = coef[4] * s[1][0];
-    s[23][0] = (1.0 / sqrt(s[9][0])) * (1.0 / sqrt(s[9][0])) / sqrt(s[9][0]);
-    s[24][0] = s[11][0] * s[23][0];
-    s[25][0] = 1.0 + s[24][0];
-    s[26][0] = s[22][0] * s[25][0];
-    s[27][0] = 1.0 / s[15][0];
-    s[28][0] = s[26][0] * s[27][0];
-    s[29][0] = p[3] * s[28][0];
-    s[30][0] = s[21][0] - s[29][0];
-    s[31][0] = s[4][0] * s[25][0];
-    s[32][0] = s[31][0] * s[27][0];
-    s[33][0] = p[3] * s[32][0];
-    s[34][0] = p[0] * s[17][0];
-    s[35][0] = s[22][0] * s[17][0];
-    s[36][0] = p[2] * s[35][0];
-    s[37][0] = s[34][0] + s[36][0];
-    s[38][0] = s[33][0] + s[37][0];
-    s[39][0] = 1.0 + s[9][0];
-    s[40][0] = coef[4] * s[39][0];
-    s[41][0] = s[23][0] * s[40][0];
-    s[42][0] = s[3][0] * s[41][0];
-    s[43][0] = 1.0 + s[42][0];
-    s[44][0] = s[27][0] * s[43][0];
-    s[45][0] = p[3] * s[44][0];
-    s[46][0] = p[1] * s[35][0];
-    s[47][0] = p[0] * s[18][0];
-    s[48][0] = s[46][0] + s[47][0];
-    s[49][0] = s[45][0] - s[48][0];
-    s[50][0] = p[0] * s[28][0];
-    s[51][0] = p[1] * s[32][0];
-    s[52][0] = s[50][0] - s[51][0];
-    s[53][0] = p[2] * s[44][0];
-    s[54][0] = s[52][0] - s[53][0];
-    for (int k = 0; k < 30; ++k) {
-        if (k > 0) {
-            s[4][k] = coef[4] * s[0][k];
-            s[5][k] = guiding_centre_taylor_product(s[0], s[0], k);
-            s[6][k] = guiding_centre_taylor_product(s[1], s[1], k);
-            s[7][k] = s[5][k] + s[6][k];
-            s[8][k] = coef[3] * s[7][k];
-            s[9][k] = s[8][k];
-            s[10][k] = (guiding_centre_taylor_power(s[9], s[10], 1.0 / 2.0, k)) / s[9][0];
-            s[11][k] = coef[4] * s[3][k];
-            s[12][k] = (guiding_centre_taylor_power(s[9], s[12], -1.0 / 1.0, k)) / s[9][0];
-            s[13][k] = guiding_centre_taylor_product(s[11], s[12], k);
-            s[14][k] = 2.0 * s[13][k];
-            s[15][k] = s[10][k] + s[14][k];
-            s[16][k] = guiding_centre_taylor_product(s[10], s[15], k);
-            s[17][k] = (guiding_centre_taylor_power(s[16], s[17], -1.0 / 1.0, k)) / s[16][0];
-            s[18][k] = guiding_centre_taylor_product(s[4], s[17], k);
-            s[19][k] = p[2] * s[18][k];
-            s[20][k] = p[1] * s[17][k];
-            s[21][k] = s[19][k] - s[20][k];
-            s[22][k] = coef[4] * s[1][k];
-            s[23][k] = (guiding_centre_taylor_power(s[9], s[23], -3.0 / 2.0, k)) / s[9][0];
-            s[24][k] = guiding_centre_taylor_product(s[11], s[23], k);
-            s[25][k] = s[24][k];
-            s[26][k] = guiding_centre_taylor_product(s[22], s[25], k);
-            s[27][k] = (guiding_centre_taylor_power(s[15], s[27], -1.0 / 1.0, k)) / s[15][0];
-            s[28][k] = guiding_centre_taylor_product(s[26], s[27], k);
-            s[29][k] = p[3] * s[28][k];
-            s[30][k] = s[21][k] - s[29][k];
-            s[31][k] = guiding_centre_taylor_product(s[4], s[25], k);
-            s[32][k] = guiding_centre_taylor_product(s[31], s[27], k);
-            s[33][k] = p[3] * s[32][k];
-            s[34][k] = p[0] * s[17][k];
-            s[35][k] = guiding_centre_taylor_product(s[22], s[17], k);
-            s[36][k] = p[2] * s[35][k];
-            s[37][k] = s[34][k] + s[36][k];
-            s[38][k] = s[33][k] + s[37][k];
-            s[39][k] = s[9][k];
-            s[40][k] = coef[4] * s[39][k];
-            s[41][k] = guiding_centre_taylor_product(s[23], s[40], k);
-            s[42][k] = guiding_centre_taylor_product(s[3], s[41], k);
-            s[43][k] = s[42][k];
-            s[44][k] = guiding_centre_taylor_product(s[27], s[43], k);
-            s[45][k] = p[3] * s[44][k];
-            s[46][k] = p[1] * s[35][k];
-            s[47][k] = p[0] * s[18][k];
-            s[48][k] = s[46][k] + s[47][k];
-            s[49][k] = s[45][k] - s[48][k];
-            s[50][k] = p[0] * s[28][k];
-            s[51][k] = p[1] * s[32][k];
-            s[52][k] = s[50][k] - s[51][k];
-            s[53][k] = p[2] * s[44][k];
-            s[54][k] = s[52][k] - s[53][k];
-        }
-        s[0][k + 1] = s[30][k] / (k + 1);
-        s[1][k + 1] = s[38][k] / (k + 1);
-        s[2][k + 1] = s[49][k] / (k + 1);
-        s[3][k + 1] = s[54][k] / (k + 1);
+    guiding_centre_path_begin(coef, p, series, fixed);
+    for (int k = 0; k < guiding_centre_TERMS; ++k) {
+        guiding_centre_path_order(coef, p, series, fixed, k);
         int negligible = 1;
-        for (int i = 0; i < 4; ++i) {
-            const double term = s[i][k + 1];
+        for (int i = 0; i < guiding_centre_DIM; ++i) {
+            const double term = series[i][k + 1];
             change[i] += term;
             mean[i] += term / (k + 2);
             slope[i] += (k + 1) * term;
@@ -612,23 +521,26 @@ static int guiding_centre_piece(const double *coef, const double p[4], const dou
     return 0;
 }
 
-/* The whole path from x, in 1, 2, 4, ... pieces until each expansion converges. Whatever p is, the end of the path
-   lies on the symplectic leaf of x. 0 if the path is too long or leaves the domain. *made counts all pieces. */
-static int guiding_centre_path(const double *coef, const double x[4], const double p[4], double change[4],
-    double mean[4], int *made)
+/* The whole path from x, in 1, 2, 4, ... pieces until each expansion converges. Whatever p is, the end of the
+   path lies on the symplectic leaf of x. 0 if the path is too long or leaves the domain. *made counts all
+   pieces. */
+static int guiding_centre_path(const double *coef, const double x[guiding_centre_DIM],
+    const double p[guiding_centre_DIM], double change[guiding_centre_DIM], double mean[guiding_centre_DIM],
+    int *made)
 {
-    for (int pieces = 1; pieces <= 128; pieces *= 2) {
-        double q[4], point[4], shift[4], local[4];
+    for (int pieces = 1; pieces <= guiding_centre_LONGEST_PATH; pieces *= 2) {
+        double q[guiding_centre_DIM], point[guiding_centre_DIM], shift[guiding_centre_DIM],
+            local[guiding_centre_DIM];
         int good = 1;
-        for (int i = 0; i < 4; ++i) {
+        for (int i = 0; i < guiding_centre_DIM; ++i) {
             q[i] = p[i] / pieces;
             change[i] = mean[i] = 0.0;
         }
         for (int piece = 0; piece < pieces && good; ++piece) {
-            for (int i = 0; i < 4; ++i) point[i] = x[i] + change[i];
+            for (int i = 0; i < guiding_centre_DIM; ++i) point[i] = x[i] + change[i];
             good = guiding_centre_piece(coef, q, point, shift, local);
             ++*made;
-            for (int i = 0; i < 4; ++i) {
+            for (int i = 0; i < guiding_centre_DIM; ++i) {
                 mean[i] += (change[i] + local[i]) / pieces;
                 change[i] += shift[i];
             }
@@ -640,47 +552,53 @@ static int guiding_centre_path(const double *coef, const double x[4], const doub
 
 /* The residual p - grad S_h(mean of the path) of the equation for p, with that mean y, the path's change of
    x and an approximate Jacobian of the residual. 0 if the path cannot be followed. */
-static int guiding_centre_residual(guiding_centre_solver *s, const double *coef, const double p[4], double y[4],
-    double residual[4], double change[4], double jacobian[16],
-    int *made)
+static int guiding_centre_residual(guiding_centre_solver *s, const double *coef,
+    const double p[guiding_centre_DIM], double y[guiding_centre_DIM], double residual[guiding_centre_DIM],
+    double change[guiding_centre_DIM], double jacobian[guiding_centre_DIM * guiding_centre_DIM], int *made)
 {
-    double mean[4];
+    double mean[guiding_centre_DIM];
     if (!guiding_centre_path(coef, s->x, p, change, mean, made)) return 0;
-    for (int i = 0; i < 4; ++i) y[i] = s->x[i] + mean[i];
+    for (int i = 0; i < guiding_centre_DIM; ++i) y[i] = s->x[i] + mean[i];
     guiding_centre_generate(coef, y, residual, jacobian);
-    for (int i = 0; i < 4; ++i) residual[i] = p[i] - residual[i];
+    for (int i = 0; i < guiding_centre_DIM; ++i) residual[i] = p[i] - residual[i];
     ++s->evaluations;
     return 1;
 }
 
 /* The Jacobian by differences, for steps so large that the approximate one does not contract. */
-static int guiding_centre_differences(guiding_centre_solver *s, const double *coef, const double p[4],
-    const double residual[4], double jacobian[16], int *made)
+static int guiding_centre_differences(guiding_centre_solver *s, const double *coef,
+    const double p[guiding_centre_DIM], const double residual[guiding_centre_DIM],
+    double jacobian[guiding_centre_DIM * guiding_centre_DIM], int *made)
 {
-    double q[4], y[4], moved[4], change[4], unused[16], norm = DBL_MIN;
-    for (int i = 0; i < 4; ++i) norm = fabs(p[i]) > norm ? fabs(p[i]) : norm;
-    for (int j = 0; j < 4; ++j) {
+    double q[guiding_centre_DIM], y[guiding_centre_DIM], moved[guiding_centre_DIM],
+        change[guiding_centre_DIM], unused[guiding_centre_DIM * guiding_centre_DIM], norm = DBL_MIN;
+    for (int i = 0; i < guiding_centre_DIM; ++i) norm = fabs(p[i]) > norm ? fabs(p[i]) : norm;
+    for (int j = 0; j < guiding_centre_DIM; ++j) {
         memcpy(q, p, sizeof q);
         q[j] += 1e-7 * norm;
         if (!guiding_centre_residual(s, coef, q, y, moved, change, unused, made)) return 0;
-        for (int i = 0; i < 4; ++i) jacobian[i * 4 + j] = (moved[i] - residual[i]) / (q[j] - p[j]);
+        for (int i = 0; i < guiding_centre_DIM; ++i)
+            jacobian[i * guiding_centre_DIM + j] = (moved[i] - residual[i]) / (q[j] - p[j]);
     }
     return 1;
 }
 
-/* Solve p = grad S_h(mean of the path from x under p) and move to the end of that path. Where that takes more than
-   512 pieces of paths, the step is so large that a solution would mean nothing. */
+/* Solve p = grad S_h(mean of the path from x under p) and move to the end of that path. Where that takes more
+   than guiding_centre_MOST_PIECES pieces of paths, the step is so large that a solution would mean nothing.
+   */
 static guiding_centre_status guiding_centre_attempt(guiding_centre_solver *s, int stage)
 {
-    const double *coef = s->coef[stage], none[4] = { 0.0 };
-    guiding_centre_memory *memory = &s->memory[stage];
-    double p[4], y[4], residual[4], change[4], jacobian[16], previous = HUGE_VAL;
-    if (!guiding_centre_predict(memory, y)) memcpy(y, s->x, sizeof y);
+    const double *coef = s->coef[stage], none[guiding_centre_DIM] = { 0.0 };
+    double p[guiding_centre_DIM], y[guiding_centre_DIM], residual[guiding_centre_DIM],
+        change[guiding_centre_DIM], jacobian[guiding_centre_DIM * guiding_centre_DIM], previous = HUGE_VAL;
+    if (!guiding_centre_predict(&s->history[stage], y)) memcpy(y, s->x, sizeof y);
     guiding_centre_generate(coef, y, p, jacobian);
-    for (int iteration = 0, made = 0; iteration < 20 && made <= 512; ++iteration) {
-        if (!guiding_centre_residual(s, coef, p, y, residual, change, jacobian, &made)) return guiding_centre_NO_CONVERGENCE;
+    for (int iteration = 0, made = 0; iteration < guiding_centre_MAX_ITERATIONS && made <=
+        guiding_centre_MOST_PIECES; ++iteration) {
+        if (!guiding_centre_residual(s, coef, p, y, residual, change, jacobian, &made))
+            return guiding_centre_NO_CONVERGENCE;
         double size = 0.0, norm = DBL_MIN;
-        for (int i = 0; i < 4; ++i) {
+        for (int i = 0; i < guiding_centre_DIM; ++i) {
             if (!isfinite(residual[i])) return guiding_centre_NOT_FINITE;
             size = fabs(residual[i]) > size ? fabs(residual[i]) : size;
             norm = fabs(p[i]) > norm ? fabs(p[i]) : norm;
@@ -690,62 +608,41 @@ static guiding_centre_status guiding_centre_attempt(guiding_centre_solver *s, in
         if (size <= 4e-16 || (previous < 1e-12 && size > 0.25 * previous)) {
             if (!guiding_centre_plausible(s, stage, change)) return guiding_centre_NO_CONVERGENCE;
             if (!guiding_centre_advance(s, change, none)) return guiding_centre_NOT_FINITE;
-            guiding_centre_remember(memory, y, iteration);
+            guiding_centre_remember(&s->history[stage], y);
             return guiding_centre_OK;
         }
         const int slow = iteration >= 3 && size > 0.05 * previous;
-        if (slow && !guiding_centre_differences(s, coef, p, residual, jacobian, &made)) return guiding_centre_NO_CONVERGENCE;
+        if (slow && !guiding_centre_differences(s, coef, p, residual, jacobian, &made))
+            return guiding_centre_NO_CONVERGENCE;
         if (!guiding_centre_solve(jacobian, residual)) return guiding_centre_SINGULAR;
-        for (int i = 0; i < 4; ++i) p[i] -= residual[i];
+        for (int i = 0; i < guiding_centre_DIM; ++i) p[i] -= residual[i];
         previous = size;
     }
     return guiding_centre_NO_CONVERGENCE;
 }
 
-/* The 5 stages of one step. If one fails, the state is as before the step. */
-static guiding_centre_status guiding_centre_stages(guiding_centre_solver *s)
-{
-    double x[4], carry[4];
-    memcpy(x, s->x, sizeof x);
-    memcpy(carry, s->carry, sizeof carry);
-    for (int stage = 0; stage < 5; ++stage) {
-        guiding_centre_status status = guiding_centre_attempt(s, stage);
-        /* A guess from earlier steps may have misled it: once more without. */
-        if (status != guiding_centre_OK && s->memory[stage].count > 0) {
-            memset(&s->memory[stage], 0, sizeof s->memory[stage]);
-            status = guiding_centre_attempt(s, stage);
-        }
-        if (status != guiding_centre_OK) {
-            memcpy(s->x, x, sizeof x);
-            memcpy(s->carry, carry, sizeof carry);
-            return status;
-        }
-    }
-    return guiding_centre_OK;
-}
-
-/* Whether steps can be made with these parameters: finite, positive where the spec says so, and with finite
-   coefficients for a step so short that it has no part in it. */
+/* ---- The solver ---- */
+/* Whether steps can be made with these parameters: allowed, and with finite coefficients for a step so short
+   that it has no part in it. */
 static int guiding_centre_admissible(const guiding_centre_params *params)
 {
-    double coef[5];
-    if (!(isfinite(params->kappa))) return 0;
-    if (!(isfinite(params->mu) && params->mu > 0.0)) return 0;
-    if (!(isfinite(params->k) && params->k > 0.0)) return 0;
+    double coef[guiding_centre_COEFFICIENTS];
+    if (!guiding_centre_allowed(params)) return 0;
     guiding_centre_prepare(params, 1e-100, coef);
-    for (int k = 0; k < 5; ++k)
+    for (int k = 0; k < guiding_centre_COEFFICIENTS; ++k)
         if (!isfinite(coef[k])) return 0;
     return 1;
 }
 
-/* All of guiding_centre_init but the gauge. The arguments may be parts of *s: they are read before it is written. */
-static guiding_centre_status guiding_centre_start(guiding_centre_solver *s, const guiding_centre_params *params, const double x0[4])
+/* The arguments may be parts of *s: they are read before it is written. */
+guiding_centre_status guiding_centre_init(guiding_centre_solver *s, const guiding_centre_params *params,
+    const double x0[guiding_centre_DIM])
 {
     if (s == NULL || x0 == NULL) return guiding_centre_BAD_ARGUMENT;
     const guiding_centre_params own = params != NULL ? *params : guiding_centre_default_params;
-    double x[4];
+    double x[guiding_centre_DIM];
     memcpy(x, x0, sizeof x);
-    for (int i = 0; i < 4; ++i)
+    for (int i = 0; i < guiding_centre_DIM; ++i)
         if (!isfinite(x[i])) return guiding_centre_BAD_ARGUMENT;
     if (!guiding_centre_admissible(&own)) return guiding_centre_BAD_ARGUMENT;
     memset(s, 0, sizeof *s);
@@ -754,29 +651,46 @@ static guiding_centre_status guiding_centre_start(guiding_centre_solver *s, cons
     return guiding_centre_OK;
 }
 
-guiding_centre_status guiding_centre_init(guiding_centre_solver *s, const guiding_centre_params *params,
-                                          const double x0[4])
-{
-    return guiding_centre_start(s, params, x0);
-}
-
 /* What depends on the step size; nothing where that is as before. */
 static guiding_centre_status guiding_centre_set_step(guiding_centre_solver *s, double h)
 {
     if (s == NULL || !isfinite(h)) return guiding_centre_BAD_ARGUMENT;
-    if (s->ready && memcmp(&h, &s->h, sizeof h) == 0) return guiding_centre_OK;
-    for (int stage = 0; stage < 5; ++stage)
+    if (s->prepared && memcmp(&h, &s->h, sizeof h) == 0) return guiding_centre_OK;
+    for (int stage = 0; stage < guiding_centre_STAGES; ++stage)
         guiding_centre_prepare(&s->params, guiding_centre_fractions[stage] * h, s->coef[stage]);
-    memset(s->memory, 0, sizeof s->memory);
-    for (int stage = 0; stage < 5; ++stage) s->memory[stage].patience = 150;
-    s->pause = 16;
-    s->setback = s->foreseeing = 0;
-    s->doubt = s->retry = 0;
-    s->effort = 0.0;
-    s->passes = INT_MAX;
+    memset(&s->history, 0, sizeof s->history);
     s->h = h;
-    s->ready = 1;
+    s->t_before_h = s->t;
+    s->steps_before_h = s->steps;
+    s->prepared = 1;
     return guiding_centre_OK;
+}
+
+/* One stage. A guess from earlier steps may have misled it: then once more without. */
+static guiding_centre_status guiding_centre_stage(guiding_centre_solver *s, int stage)
+{
+    guiding_centre_status status = guiding_centre_attempt(s, stage);
+    if (status != guiding_centre_OK && s->history[stage].count > 0) {
+        memset(&s->history[stage], 0, sizeof s->history[stage]);
+        status = guiding_centre_attempt(s, stage);
+    }
+    return status;
+}
+
+/* The stages of one step. If one fails, the state is as before the step. */
+static guiding_centre_status guiding_centre_stages(guiding_centre_solver *s)
+{
+    double x[guiding_centre_DIM], carry[guiding_centre_DIM];
+    guiding_centre_status status = guiding_centre_OK;
+    memcpy(x, s->x, sizeof x);
+    memcpy(carry, s->carry, sizeof carry);
+    for (int stage = 0; stage < guiding_centre_STAGES && status == guiding_centre_OK; ++stage)
+        status = guiding_centre_stage(s, stage);
+    if (status != guiding_centre_OK) {
+        memcpy(s->x, x, sizeof x);
+        memcpy(s->carry, carry, sizeof carry);
+    }
+    return status;
 }
 
 guiding_centre_status guiding_centre_step(guiding_centre_solver *s, double h)
@@ -784,2064 +698,53 @@ guiding_centre_status guiding_centre_step(guiding_centre_solver *s, double h)
     guiding_centre_status status = guiding_centre_set_step(s, h);
     if (status != guiding_centre_OK) return status;
     status = guiding_centre_stages(s);
-    if (status == guiding_centre_OK) ++s->steps;
+    if (status != guiding_centre_OK) return status;
+    ++s->steps;
+    s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
     return status;
 }
 
-/*
- * Eight at a time: below, the formulas of a step are evaluated for 8 steps of a trajectory, or members of an
- * ensemble, at once. Compilers make vector instructions of the loops over lanes.
- */
-enum { guiding_centre_LANES = 8 };
-
-#if defined(__GNUC__)
-typedef double guiding_centre_lanes[guiding_centre_LANES] __attribute__((aligned(64))); /* a value in each lane */
-#else
-typedef double guiding_centre_lanes[guiding_centre_LANES];
-#endif
-
-#if defined(__clang__)
-#define guiding_centre_EACH_LANE _Pragma("clang loop vectorize(assume_safety)")
-#pragma clang diagnostic push
-#pragma clang diagnostic ignored "-Wpass-failed"
-#elif defined(__GNUC__)
-#define guiding_centre_EACH_LANE _Pragma("GCC ivdep") _Pragma("GCC unroll 1")
-#else
-#define guiding_centre_EACH_LANE
-#endif
-
-/* What all blocks share: coefficients, the same in each lane, and the recurrences by which they are foreseen. */
-typedef struct {
-    int fits[5]; /* the fit that weight is of; -1 for none */
-    guiding_centre_lanes coef[5][5], weight[5][40][4];
-} guiding_centre_table;
-
-/* A stage in all lanes, linearised around y. */
-typedef struct {
-    guiding_centre_lanes y[4], displacement[4], increment[4], residual[4];
-    /* a residual r of alpha(y) = x takes inverse r from y, and gain r from the increment */
-    guiding_centre_lanes inverse[16], slope[16], gain[16];
-    guiding_centre_lanes middle[4]; /* of the path, less y */
-    guiding_centre_lanes alpha_y[16], increment_y[16]; /* of alpha and beta - alpha, with p held fixed */
-} guiding_centre_model;
-
-/* guiding_centre_curvature in all lanes. */
-static void guiding_centre_curvature_lanes(guiding_centre_lanes coef[restrict 5],
-                                           guiding_centre_lanes y[restrict 4],
-                                           guiding_centre_lanes slope[restrict 4],
-                                           guiding_centre_lanes slope_jacobian[restrict 16])
-{
-    guiding_centre_EACH_LANE
-    for (int lane = 0; lane < guiding_centre_LANES; ++lane) {
-        const double x = y[0][lane];
-        const double y_ = y[1][lane];
-        const double z = y[2][lane];
-        const double u = y[3][lane];
-        const double t1 = 1.0 / sqrt(1.0 + coef[3][lane] * (x * x + y_ * y_));
-        const double t2 = t1 * (t1 * t1);
-        const double t3 = coef[3][lane] * y_ * t2;
-        const double t4 = -(coef[0][lane] * (x * t3));
-        slope[0][lane] = coef[0][lane] * (x * t1);
-        slope[1][lane] = coef[0][lane] * (y_ * t1);
-        slope[2][lane] = coef[1][lane] * z;
-        slope[3][lane] = coef[2][lane] * u;
-        slope_jacobian[0][lane] = coef[0][lane] * (t1 - x * (coef[3][lane] * x * t2));
-        slope_jacobian[1][lane] = t4;
-        slope_jacobian[2][lane] = 0.0;
-        slope_jacobian[3][lane] = 0.0;
-        slope_jacobian[4][lane] = t4;
-        slope_jacobian[5][lane] = coef[0][lane] * (t1 - y_ * t3);
-        slope_jacobian[6][lane] = 0.0;
-        slope_jacobian[7][lane] = 0.0;
-        slope_jacobian[8][lane] = 0.0;
-        slope_jacobian[9][lane] = 0.0;
-        slope_jacobian[10][lane] = coef[1][lane];
-        slope_jacobian[11][lane] = 0.0;
-        slope_jacobian[12][lane] = 0.0;
-        slope_jacobian[13][lane] = 0.0;
-        slope_jacobian[14][lane] = 0.0;
-        slope_jacobian[15][lane] = coef[2][lane];
-    }
-}
-
-/* guiding_centre_momentum in all lanes. */
-static void guiding_centre_momentum_lanes(guiding_centre_lanes coef[restrict 5],
-                                          guiding_centre_lanes y[restrict 4],
-                                          guiding_centre_lanes slope[restrict 4])
-{
-    guiding_centre_EACH_LANE
-    for (int lane = 0; lane < guiding_centre_LANES; ++lane) {
-        const double x = y[0][lane];
-        const double y_ = y[1][lane];
-        const double z = y[2][lane];
-        const double u = y[3][lane];
-        const double t1 = 1.0 / sqrt(1.0 + coef[3][lane] * (x * x + y_ * y_));
-        slope[0][lane] = coef[0][lane] * (x * t1);
-        slope[1][lane] = coef[0][lane] * (y_ * t1);
-        slope[2][lane] = coef[1][lane] * z;
-        slope[3][lane] = coef[2][lane] * u;
-    }
-}
-
-/* guiding_centre_values in all lanes. */
-static void guiding_centre_values_lanes(guiding_centre_lanes coef[restrict 5],
-                                        guiding_centre_lanes p[restrict 4], guiding_centre_lanes m[restrict 4],
-                                        guiding_centre_lanes value[restrict 55],
-                                        guiding_centre_lanes fixed[restrict 1])
-{
-    (void)fixed;
-    guiding_centre_EACH_LANE
-    for (int lane = 0; lane < guiding_centre_LANES; ++lane) {
-        const double x = m[0][lane];
-        const double y = m[1][lane];
-        const double z = m[2][lane];
-        const double u = m[3][lane];
-        const double t1 = coef[4][lane] * x;
-        const double t2 = x * x;
-        const double t3 = y * y;
-        const double t4 = t2 + t3;
-        const double t5 = coef[3][lane] * t4;
-        const double t6 = 1.0 + t5;
-        const double t7 = sqrt(t6);
-        const double t8 = coef[4][lane] * u;
-        const double t9 = 1.0 / t6;
-        const double t10 = t8 * t9;
-        const double t11 = 2.0 * t10;
-        const double t12 = t7 + t11;
-        const double t13 = t7 * t12;
-        const double t14 = 1.0 / t13;
-        const double t15 = t1 * t14;
-        const double t16 = p[2][lane] * t15;
-        const double t17 = p[1][lane] * t14;
-        const double t18 = t16 - t17;
-        const double t19 = coef[4][lane] * y;
-        const double t20 = 1.0 / t7;
-        const double t21 = t20 * (t20 * t20);
-        const double t22 = t8 * t21;
-        const double t23 = 1.0 + t22;
-        const double t24 = t19 * t23;
-        const double t25 = 1.0 / t12;
-        const double t26 = t24 * t25;
-        const double t27 = p[3][lane] * t26;
-        const double t28 = t1 * t23;
-        const double t29 = t28 * t25;
-        const double t30 = p[3][lane] * t29;
-        const double t31 = p[0][lane] * t14;
-        const double t32 = t19 * t14;
-        const double t33 = p[2][lane] * t32;
-        const double t34 = t31 + t33;
-        const double t35 = 1.0 + t6;
-        const double t36 = coef[4][lane] * t35;
-        const double t37 = t21 * t36;
-        const double t38 = u * t37;
-        const double t39 = 1.0 + t38;
-        const double t40 = t25 * t39;
-        const double t41 = p[3][lane] * t40;
-        const double t42 = p[1][lane] * t32;
-        const double t43 = p[0][lane] * t15;
-        const double t44 = t42 + t43;
-        const double t45 = p[0][lane] * t26;
-        const double t46 = p[1][lane] * t29;
-        const double t47 = t45 - t46;
-        const double t48 = p[2][lane] * t40;
-        value[0][lane] = x;
-        value[1][lane] = y;
-        value[2][lane] = z;
-        value[3][lane] = u;
-        value[4][lane] = t1;
-        value[5][lane] = t2;
-        value[6][lane] = t3;
-        value[7][lane] = t4;
-        value[8][lane] = t5;
-        value[9][lane] = t6;
-        value[10][lane] = t7;
-        value[11][lane] = t8;
-        value[12][lane] = t9;
-        value[13][lane] = t10;
-        value[14][lane] = t11;
-        value[15][lane] = t12;
-        value[16][lane] = t13;
-        value[17][lane] = t14;
-        value[18][lane] = t15;
-        value[19][lane] = t16;
-        value[20][lane] = t17;
-        value[21][lane] = t18;
-        value[22][lane] = t19;
-        value[23][lane] = t21;
-        value[24][lane] = t22;
-        value[25][lane] = t23;
-        value[26][lane] = t24;
-        value[27][lane] = t25;
-        value[28][lane] = t26;
-        value[29][lane] = t27;
-        value[30][lane] = t18 - t27;
-        value[31][lane] = t28;
-        value[32][lane] = t29;
-        value[33][lane] = t30;
-        value[34][lane] = t31;
-        value[35][lane] = t32;
-        value[36][lane] = t33;
-        value[37][lane] = t34;
-        value[38][lane] = t30 + t34;
-        value[39][lane] = t35;
-        value[40][lane] = t36;
-        value[41][lane] = t37;
-        value[42][lane] = t38;
-        value[43][lane] = t39;
-        value[44][lane] = t40;
-        value[45][lane] = t41;
-        value[46][lane] = t42;
-        value[47][lane] = t43;
-        value[48][lane] = t44;
-        value[49][lane] = t41 - t44;
-        value[50][lane] = t45;
-        value[51][lane] = t46;
-        value[52][lane] = t47;
-        value[53][lane] = t48;
-        value[54][lane] = t47 - t48;
-    }
-}
-
-/* guiding_centre_slope_values_lanes_part1 (part 1 of 2) */
-guiding_centre_APART static void guiding_centre_slope_values_lanes_part1(
-                                                                         guiding_centre_lanes coef[restrict 5],
-                                                                         guiding_centre_lanes p[restrict 4],
-                                                                         guiding_centre_lanes value[restrict 55],
-                                                                         guiding_centre_lanes fixed[restrict 1],
-                                                                         guiding_centre_lanes slope[restrict 174],
-                                                                         guiding_centre_lanes slope_fixed[restrict 1],
-                                                                         guiding_centre_lanes work[restrict 22])
-{
-    (void)fixed;
-    (void)slope_fixed;
-    guiding_centre_EACH_LANE
-    for (int lane = 0; lane < guiding_centre_LANES; ++lane) {
-        const double t1 = 1.0 / value[16][lane];
-        const double t2 = t1 * t1;
-        work[6][lane] = coef[3][lane] * value[0][lane];
-        const double t4 = 1.0 / sqrt(value[9][lane]);
-        const double t5 = t4 * work[6][lane];
-        const double t6 = value[15][lane] * t5;
-        const double t7 = 1.0 / value[9][lane];
-        const double t8 = t7 * t7;
-        const double t9 = work[6][lane] * t8;
-        const double t10 = value[11][lane] * t9;
-        const double t11 = 4.0 * t10;
-        const double t12 = t5 - t11;
-        const double t13 = value[10][lane] * t12;
-        const double t14 = t6 + t13;
-        const double t15 = t2 * t14;
-        const double t16 = p[1][lane] * t15;
-        const double t17 = coef[4][lane] * value[17][lane];
-        const double t18 = value[4][lane] * t15;
-        work[10][lane] = t17 - t18;
-        const double t20 = p[2][lane] * work[10][lane];
-        const double t21 = t16 + t20;
-        const double t22 = t4 * t4;
-        const double t23 = t4 * (t22 * t22);
-        work[7][lane] = work[6][lane] * t23;
-        const double t25 = value[11][lane] * work[7][lane];
-        const double t26 = value[22][lane] * t25;
-        const double t27 = value[27][lane] * t26;
-        const double t28 = (-3.0) * t27;
-        const double t29 = 1.0 / value[15][lane];
-        const double t30 = t29 * t29;
-        work[8][lane] = t30 * t12;
-        const double t32 = value[26][lane] * work[8][lane];
-        work[17][lane] = t28 - t32;
-        const double t34 = p[3][lane] * work[17][lane];
-        work[11][lane] = coef[3][lane] * value[1][lane];
-        const double t36 = work[11][lane] * t4;
-        const double t37 = value[15][lane] * t36;
-        const double t38 = work[11][lane] * t8;
-        const double t39 = value[11][lane] * t38;
-        const double t40 = 4.0 * t39;
-        const double t41 = t36 - t40;
-        const double t42 = value[10][lane] * t41;
-        const double t43 = t37 + t42;
-        const double t44 = t2 * t43;
-        const double t45 = p[1][lane] * t44;
-        work[14][lane] = value[4][lane] * t44;
-        const double t47 = p[2][lane] * work[14][lane];
-        const double t48 = t45 - t47;
-        const double t49 = coef[4][lane] * value[25][lane];
-        work[12][lane] = work[11][lane] * t23;
-        const double t51 = value[11][lane] * work[12][lane];
-        const double t52 = value[22][lane] * t51;
-        const double t53 = 3.0 * t52;
-        const double t54 = t49 - t53;
-        const double t55 = value[27][lane] * t54;
-        work[13][lane] = t30 * t41;
-        const double t57 = value[26][lane] * work[13][lane];
-        work[19][lane] = t55 - t57;
-        const double t59 = p[3][lane] * work[19][lane];
-        const double t60 = coef[4][lane] * value[12][lane];
-        const double t61 = value[10][lane] * t60;
-        work[5][lane] = t2 * t61;
-        const double t63 = p[1][lane] * work[5][lane];
-        const double t64 = 2.0 * t63;
-        work[16][lane] = value[4][lane] * work[5][lane];
-        const double t66 = p[2][lane] * work[16][lane];
-        const double t67 = 2.0 * t66;
-        const double t68 = t64 - t67;
-        work[3][lane] = coef[4][lane] * value[23][lane];
-        const double t70 = value[22][lane] * work[3][lane];
-        const double t71 = value[27][lane] * t70;
-        work[4][lane] = t60 * t30;
-        const double t73 = value[26][lane] * work[4][lane];
-        const double t74 = 2.0 * t73;
-        work[21][lane] = t71 - t74;
-        const double t76 = p[3][lane] * work[21][lane];
-        const double t77 = value[4][lane] * t25;
-        const double t78 = 3.0 * t77;
-        const double t79 = t49 - t78;
-        const double t80 = value[27][lane] * t79;
-        const double t81 = value[31][lane] * work[8][lane];
-        work[18][lane] = t80 - t81;
-        const double t83 = p[3][lane] * work[18][lane];
-        const double t84 = p[0][lane] * t15;
-        work[9][lane] = value[22][lane] * t15;
-        const double t86 = p[2][lane] * work[9][lane];
-        const double t87 = t84 + t86;
-        const double t88 = value[4][lane] * t51;
-        const double t89 = value[27][lane] * t88;
-        const double t90 = (-3.0) * t89;
-        const double t91 = value[31][lane] * work[13][lane];
-        work[20][lane] = t90 - t91;
-        work[2][lane] = p[3][lane] * work[20][lane];
-        const double t94 = value[22][lane] * t44;
-        work[15][lane] = t17 - t94;
-        work[0][lane] = p[2][lane] * work[15][lane];
-        work[1][lane] = p[0][lane] * t44;
-        slope[168][lane] = -value[17][lane];
-        slope[169][lane] = -value[28][lane];
-        slope[170][lane] = -value[18][lane];
-        slope[171][lane] = -value[35][lane];
-        slope[172][lane] = -value[32][lane];
-        slope[173][lane] = -value[44][lane];
-        slope[0][lane] = t2;
-        slope[1][lane] = work[6][lane];
-        slope[2][lane] = t4;
-        slope[3][lane] = t5;
-        slope[4][lane] = t6;
-        slope[5][lane] = t8;
-        slope[6][lane] = t9;
-        slope[7][lane] = t10;
-        slope[8][lane] = t11;
-        slope[9][lane] = t12;
-        slope[10][lane] = t13;
-        slope[11][lane] = t14;
-        slope[12][lane] = t15;
-        slope[13][lane] = t16;
-        slope[14][lane] = t17;
-        slope[15][lane] = t18;
-        slope[16][lane] = work[10][lane];
-        slope[17][lane] = t20;
-        slope[18][lane] = t21;
-        slope[19][lane] = t23;
-        slope[20][lane] = work[7][lane];
-        slope[21][lane] = t25;
-        slope[22][lane] = t26;
-        slope[23][lane] = t27;
-        slope[24][lane] = t28;
-        slope[25][lane] = t30;
-        slope[26][lane] = work[8][lane];
-        slope[27][lane] = t32;
-        slope[28][lane] = work[17][lane];
-        slope[29][lane] = t34;
-        slope[30][lane] = t21 - t34;
-        slope[31][lane] = work[11][lane];
-        slope[32][lane] = t36;
-        slope[33][lane] = t37;
-        slope[34][lane] = t38;
-        slope[35][lane] = t39;
-        slope[36][lane] = t40;
-        slope[37][lane] = t41;
-        slope[38][lane] = t42;
-        slope[39][lane] = t43;
-        slope[40][lane] = t44;
-        slope[41][lane] = t45;
-        slope[42][lane] = work[14][lane];
-        slope[43][lane] = t47;
-        slope[44][lane] = t48;
-        slope[45][lane] = t49;
-        slope[46][lane] = work[12][lane];
-        slope[47][lane] = t51;
-        slope[48][lane] = t52;
-        slope[49][lane] = t53;
-        slope[50][lane] = t54;
-        slope[51][lane] = t55;
-        slope[52][lane] = work[13][lane];
-        slope[53][lane] = t57;
-        slope[54][lane] = work[19][lane];
-        slope[55][lane] = t59;
-        slope[56][lane] = t48 - t59;
-        slope[57][lane] = t60;
-        slope[58][lane] = t61;
-        slope[59][lane] = work[5][lane];
-        slope[60][lane] = t63;
-        slope[61][lane] = t64;
-        slope[62][lane] = work[16][lane];
-        slope[63][lane] = t66;
-        slope[64][lane] = t67;
-        slope[65][lane] = t68;
-        slope[66][lane] = work[3][lane];
-        slope[67][lane] = t70;
-        slope[68][lane] = t71;
-        slope[69][lane] = work[4][lane];
-        slope[70][lane] = t73;
-        slope[71][lane] = t74;
-        slope[72][lane] = work[21][lane];
-        slope[73][lane] = t76;
-        slope[74][lane] = t68 - t76;
-        slope[75][lane] = t77;
-        slope[76][lane] = t78;
-        slope[77][lane] = t79;
-        slope[78][lane] = t80;
-        slope[79][lane] = t81;
-        slope[80][lane] = work[18][lane];
-        slope[81][lane] = t83;
-        slope[82][lane] = t84;
-        slope[83][lane] = work[9][lane];
-        slope[84][lane] = t86;
-        slope[85][lane] = t87;
-        slope[86][lane] = t83 - t87;
-        slope[87][lane] = t88;
-        slope[88][lane] = t89;
-        slope[89][lane] = t90;
-        slope[90][lane] = t91;
-        slope[91][lane] = work[20][lane];
-        slope[92][lane] = work[2][lane];
-        slope[93][lane] = t94;
-        slope[94][lane] = work[15][lane];
-        slope[95][lane] = work[0][lane];
-        slope[96][lane] = work[1][lane];
-    }
-}
-
-/* guiding_centre_slope_values_lanes_part2 (part 2 of 2) */
-guiding_centre_APART static void guiding_centre_slope_values_lanes_part2(
-                                                                         guiding_centre_lanes coef[restrict 5],
-                                                                         guiding_centre_lanes p[restrict 4],
-                                                                         guiding_centre_lanes value[restrict 55],
-                                                                         guiding_centre_lanes fixed[restrict 1],
-                                                                         guiding_centre_lanes slope[restrict 174],
-                                                                         guiding_centre_lanes slope_fixed[restrict 1],
-                                                                         guiding_centre_lanes work[restrict 22])
-{
-    (void)fixed;
-    (void)slope_fixed;
-    guiding_centre_EACH_LANE
-    for (int lane = 0; lane < guiding_centre_LANES; ++lane) {
-        const double t98 = work[0][lane] - work[1][lane];
-        const double t99 = value[4][lane] * work[3][lane];
-        const double t100 = value[27][lane] * t99;
-        const double t101 = value[31][lane] * work[4][lane];
-        const double t102 = 2.0 * t101;
-        const double t103 = t100 - t102;
-        const double t104 = p[3][lane] * t103;
-        const double t105 = p[0][lane] * work[5][lane];
-        const double t106 = (-2.0) * t105;
-        const double t107 = value[22][lane] * work[5][lane];
-        const double t108 = p[2][lane] * t107;
-        const double t109 = 2.0 * t108;
-        const double t110 = t106 - t109;
-        const double t111 = coef[4][lane] * work[6][lane];
-        const double t112 = value[23][lane] * t111;
-        const double t113 = 2.0 * t112;
-        const double t114 = value[40][lane] * work[7][lane];
-        const double t115 = 3.0 * t114;
-        const double t116 = t113 - t115;
-        const double t117 = value[3][lane] * t116;
-        const double t118 = value[27][lane] * t117;
-        const double t119 = value[43][lane] * work[8][lane];
-        const double t120 = t118 - t119;
-        const double t121 = p[3][lane] * t120;
-        const double t122 = p[1][lane] * work[9][lane];
-        const double t123 = p[0][lane] * work[10][lane];
-        const double t124 = t122 - t123;
-        const double t125 = coef[4][lane] * work[11][lane];
-        const double t126 = value[23][lane] * t125;
-        const double t127 = 2.0 * t126;
-        const double t128 = value[40][lane] * work[12][lane];
-        const double t129 = 3.0 * t128;
-        const double t130 = t127 - t129;
-        const double t131 = value[3][lane] * t130;
-        const double t132 = value[27][lane] * t131;
-        const double t133 = value[43][lane] * work[13][lane];
-        const double t134 = t132 - t133;
-        const double t135 = p[3][lane] * t134;
-        const double t136 = p[0][lane] * work[14][lane];
-        const double t137 = p[1][lane] * work[15][lane];
-        const double t138 = t136 - t137;
-        const double t139 = value[27][lane] * value[41][lane];
-        const double t140 = value[43][lane] * work[4][lane];
-        const double t141 = 2.0 * t140;
-        const double t142 = t139 - t141;
-        const double t143 = p[3][lane] * t142;
-        const double t144 = p[1][lane] * t107;
-        const double t145 = 2.0 * t144;
-        const double t146 = p[0][lane] * work[16][lane];
-        const double t147 = 2.0 * t146;
-        const double t148 = t147 + t145;
-        const double t149 = p[0][lane] * work[17][lane];
-        const double t150 = p[1][lane] * work[18][lane];
-        const double t151 = t149 - t150;
-        const double t152 = p[2][lane] * t120;
-        const double t153 = p[0][lane] * work[19][lane];
-        const double t154 = p[1][lane] * work[20][lane];
-        const double t155 = t153 - t154;
-        const double t156 = p[2][lane] * t134;
-        const double t157 = p[0][lane] * work[21][lane];
-        const double t158 = p[1][lane] * t103;
-        const double t159 = t157 - t158;
-        const double t160 = p[2][lane] * t142;
-        slope[97][lane] = t98;
-        slope[98][lane] = work[2][lane] + t98;
-        slope[99][lane] = t99;
-        slope[100][lane] = t100;
-        slope[101][lane] = t101;
-        slope[102][lane] = t102;
-        slope[103][lane] = t103;
-        slope[104][lane] = t104;
-        slope[105][lane] = t105;
-        slope[106][lane] = t106;
-        slope[107][lane] = t107;
-        slope[108][lane] = t108;
-        slope[109][lane] = t109;
-        slope[110][lane] = t110;
-        slope[111][lane] = t104 + t110;
-        slope[112][lane] = t111;
-        slope[113][lane] = t112;
-        slope[114][lane] = t113;
-        slope[115][lane] = t114;
-        slope[116][lane] = t115;
-        slope[117][lane] = t116;
-        slope[118][lane] = t117;
-        slope[119][lane] = t118;
-        slope[120][lane] = t119;
-        slope[121][lane] = t120;
-        slope[122][lane] = t121;
-        slope[123][lane] = t122;
-        slope[124][lane] = t123;
-        slope[125][lane] = t124;
-        slope[126][lane] = t121 + t124;
-        slope[127][lane] = t125;
-        slope[128][lane] = t126;
-        slope[129][lane] = t127;
-        slope[130][lane] = t128;
-        slope[131][lane] = t129;
-        slope[132][lane] = t130;
-        slope[133][lane] = t131;
-        slope[134][lane] = t132;
-        slope[135][lane] = t133;
-        slope[136][lane] = t134;
-        slope[137][lane] = t135;
-        slope[138][lane] = t136;
-        slope[139][lane] = t137;
-        slope[140][lane] = t138;
-        slope[141][lane] = t135 + t138;
-        slope[142][lane] = t139;
-        slope[143][lane] = t140;
-        slope[144][lane] = t141;
-        slope[145][lane] = t142;
-        slope[146][lane] = t143;
-        slope[147][lane] = t144;
-        slope[148][lane] = t145;
-        slope[149][lane] = t146;
-        slope[150][lane] = t147;
-        slope[151][lane] = t148;
-        slope[152][lane] = t143 + t148;
-        slope[153][lane] = t149;
-        slope[154][lane] = t150;
-        slope[155][lane] = t151;
-        slope[156][lane] = t152;
-        slope[157][lane] = t151 - t152;
-        slope[158][lane] = t153;
-        slope[159][lane] = t154;
-        slope[160][lane] = t155;
-        slope[161][lane] = t156;
-        slope[162][lane] = t155 - t156;
-        slope[163][lane] = t157;
-        slope[164][lane] = t158;
-        slope[165][lane] = t159;
-        slope[166][lane] = t160;
-        slope[167][lane] = t159 - t160;
-    }
-}
-
-/* guiding_centre_slope_values in all lanes. */
-static void guiding_centre_slope_values_lanes(guiding_centre_lanes coef[restrict 5],
-                                              guiding_centre_lanes p[restrict 4],
-                                              guiding_centre_lanes value[restrict 55],
-                                              guiding_centre_lanes fixed[restrict 1],
-                                              guiding_centre_lanes slope[restrict 174],
-                                              guiding_centre_lanes slope_fixed[restrict 1])
-{
-    guiding_centre_lanes work[22];
-    guiding_centre_slope_values_lanes_part1(coef, p, value, fixed, slope, slope_fixed, work);
-    guiding_centre_slope_values_lanes_part2(coef, p, value, fixed, slope, slope_fixed, work);
-}
-
-/* guiding_centre_along_mean in all lanes. */
-static void guiding_centre_along_mean_lanes(guiding_centre_lanes even[restrict 32],
-                                            guiding_centre_lanes odd[restrict 32],
-                                            guiding_centre_lanes mean[restrict 32],
-                                            guiding_centre_lanes hessian[restrict 16],
-                                            guiding_centre_lanes alpha_y[restrict 16],
-                                            guiding_centre_lanes increment_y[restrict 16],
-                                            guiding_centre_lanes jacobian[restrict 16],
-                                            guiding_centre_lanes increment_jacobian[restrict 16],
-                                            guiding_centre_lanes reciprocal[restrict 4])
-{
-    guiding_centre_EACH_LANE
-    for (int lane = 0; lane < guiding_centre_LANES; ++lane) {
-        const double t1 = even[0][lane] - odd[0][lane];
-        const double t2 = 1.0 / mean[0][lane];
-        const double t3 = mean[1][lane] * t2;
-        const double t4 = 1.0 / (mean[9][lane] - mean[8][lane] * t3);
-        const double t5 = mean[8][lane] * t2 * t4;
-        const double t6 = mean[2][lane] * t2;
-        const double t7 = (mean[10][lane] - mean[8][lane] * t6) * t4;
-        const double t8 = t6 - t3 * t7;
-        const double t9 = mean[17][lane] - mean[16][lane] * t3;
-        const double t10 = 1.0 / (mean[18][lane] - mean[16][lane] * t6 - t9 * t7);
-        const double t11 = (t9 * t5 - mean[16][lane] * t2) * t10;
-        const double t12 = mean[3][lane] * t2;
-        const double t13 = (mean[11][lane] - mean[8][lane] * t12) * t4;
-        const double t14 = (mean[19][lane] - mean[16][lane] * t12 - t9 * t13) * t10;
-        const double t15 = t12 - t3 * t13 - t8 * t14;
-        const double t16 = mean[25][lane] - mean[24][lane] * t3;
-        const double t17 = mean[26][lane] - mean[24][lane] * t6 - t16 * t7;
-        const double t18 = 1.0 / (mean[27][lane] - mean[24][lane] * t12 - t16 * t13 - t17 * t14);
-        const double t19 = (t16 * t5 - mean[24][lane] * t2 - t17 * t11) * t18;
-        const double t20 = t2 + t3 * t5 - t8 * t11 - t15 * t19;
-        const double t21 = even[1][lane] - odd[1][lane];
-        const double t22 = t13 - t7 * t14;
-        const double t23 = t5 + t7 * t11 + t22 * t19;
-        const double t24 = even[3][lane] - odd[3][lane];
-        const double t25 = even[2][lane] - odd[2][lane];
-        const double t26 = t11 - t14 * t19;
-        const double t27 = t9 * t4 * t10;
-        const double t28 = (t17 * t27 - t16 * t4) * t18;
-        const double t29 = t8 * t27 - t3 * t4 - t15 * t28;
-        const double t30 = t4 + t7 * t27 - t22 * t28;
-        const double t31 = t27 + t14 * t28;
-        const double t32 = t17 * t10 * t18;
-        const double t33 = t15 * t32 - t8 * t10;
-        const double t34 = t22 * t32 - t7 * t10;
-        const double t35 = t10 + t14 * t32;
-        const double t36 = t14 * t18;
-        const double t37 = t22 * t18;
-        const double t38 = t15 * t18;
-        const double t39 = even[11][lane] - odd[11][lane];
-        const double t40 = even[10][lane] - odd[10][lane];
-        const double t41 = even[8][lane] - odd[8][lane];
-        const double t42 = even[9][lane] - odd[9][lane];
-        const double t43 = even[19][lane] - odd[19][lane];
-        const double t44 = even[18][lane] - odd[18][lane];
-        const double t45 = even[16][lane] - odd[16][lane];
-        const double t46 = even[17][lane] - odd[17][lane];
-        const double t47 = even[24][lane] - odd[24][lane];
-        const double t48 = even[25][lane] - odd[25][lane];
-        const double t49 = even[27][lane] - odd[27][lane];
-        const double t50 = even[26][lane] - odd[26][lane];
-        const double t51 = even[6][lane] - odd[6][lane];
-        const double t52 = even[7][lane] - odd[7][lane];
-        const double t53 = even[4][lane] - odd[4][lane];
-        const double t54 = even[5][lane] - odd[5][lane];
-        const double t55 = hessian[12][lane] * mean[31][lane] + hessian[8][lane] * mean[30][lane] + (hessian[4][lane] * mean[29][lane] + hessian[0][lane] * mean[28][lane]);
-        const double t56 = hessian[12][lane] * mean[23][lane] + hessian[8][lane] * mean[22][lane] + (hessian[4][lane] * mean[21][lane] + hessian[0][lane] * mean[20][lane]);
-        const double t57 = hessian[8][lane] * mean[14][lane] + hessian[12][lane] * mean[15][lane] + (hessian[4][lane] * mean[13][lane] + hessian[0][lane] * mean[12][lane]);
-        const double t58 = 1.0 - (hessian[0][lane] * mean[4][lane] + hessian[4][lane] * mean[5][lane] + (hessian[8][lane] * mean[6][lane] + hessian[12][lane] * mean[7][lane]));
-        const double t59 = t55 * t37 - t56 * t34 - (t57 * t30 + t58 * t23);
-        const double t60 = t58 * t20 - t57 * t29 + (t55 * t38 - t56 * t33);
-        const double t61 = t56 * t32 - t55 * t18 + (t58 * t19 - t57 * t28);
-        const double t62 = t57 * t31 + t58 * t26 + (t55 * t36 - t56 * t35);
-        const double t63 = hessian[8][lane] * t51 + hessian[12][lane] * t52 + (hessian[0][lane] * t53 + hessian[4][lane] * t54) + (t21 * t59 + t1 * t60 + (t24 * t61 + t25 * t62));
-        const double t64 = hessian[5][lane] * mean[21][lane] + hessian[1][lane] * mean[20][lane] + (hessian[9][lane] * mean[22][lane] + hessian[13][lane] * mean[23][lane]);
-        const double t65 = hessian[5][lane] * mean[29][lane] + hessian[1][lane] * mean[28][lane] + (hessian[13][lane] * mean[31][lane] + hessian[9][lane] * mean[30][lane]);
-        const double t66 = 1.0 - (hessian[1][lane] * mean[12][lane] + hessian[5][lane] * mean[13][lane] + (hessian[13][lane] * mean[15][lane] + hessian[9][lane] * mean[14][lane]));
-        const double t67 = hessian[13][lane] * mean[7][lane] + hessian[9][lane] * mean[6][lane] + (hessian[1][lane] * mean[4][lane] + hessian[5][lane] * mean[5][lane]);
-        const double t68 = t64 * t32 - t65 * t18 + (t66 * t28 - t67 * t19);
-        const double t69 = t65 * t36 - t64 * t35 - (t66 * t31 + t67 * t26);
-        const double t70 = t66 * t29 - t67 * t20 + (t65 * t38 - t64 * t33);
-        const double t71 = t65 * t37 - t64 * t34 + (t67 * t23 + t66 * t30);
-        const double t72 = hessian[13][lane] * t52 + hessian[9][lane] * t51 + (hessian[5][lane] * t54 + hessian[1][lane] * t53) + (t24 * t68 + t25 * t69 + (t1 * t70 + t21 * t71));
-        const double t73 = hessian[2][lane] * mean[28][lane] + hessian[6][lane] * mean[29][lane] + (hessian[14][lane] * mean[31][lane] + hessian[10][lane] * mean[30][lane]);
-        const double t74 = 1.0 - (hessian[2][lane] * mean[20][lane] + hessian[6][lane] * mean[21][lane] + (hessian[10][lane] * mean[22][lane] + hessian[14][lane] * mean[23][lane]));
-        const double t75 = hessian[2][lane] * mean[4][lane] + hessian[6][lane] * mean[5][lane] + (hessian[14][lane] * mean[7][lane] + hessian[10][lane] * mean[6][lane]);
-        const double t76 = hessian[6][lane] * mean[13][lane] + hessian[2][lane] * mean[12][lane] + (hessian[14][lane] * mean[15][lane] + hessian[10][lane] * mean[14][lane]);
-        const double t77 = t73 * t37 + t74 * t34 + (t75 * t23 - t76 * t30);
-        const double t78 = t73 * t38 + t74 * t33 - (t76 * t29 + t75 * t20);
-        const double t79 = t73 * t36 + t74 * t35 + (t76 * t31 - t75 * t26);
-        const double t80 = t76 * t28 + t75 * t19 + (t73 * t18 + t74 * t32);
-        const double t81 = hessian[10][lane] * t51 + hessian[14][lane] * t52 + (hessian[2][lane] * t53 + hessian[6][lane] * t54) + (t21 * t77 + t1 * t78 + (t25 * t79 - t24 * t80));
-        const double t82 = 1.0 - (hessian[11][lane] * mean[30][lane] + hessian[15][lane] * mean[31][lane] + (hessian[3][lane] * mean[28][lane] + hessian[7][lane] * mean[29][lane]));
-        const double t83 = hessian[11][lane] * mean[22][lane] + hessian[15][lane] * mean[23][lane] + (hessian[7][lane] * mean[21][lane] + hessian[3][lane] * mean[20][lane]);
-        const double t84 = hessian[11][lane] * mean[6][lane] + hessian[15][lane] * mean[7][lane] + (hessian[3][lane] * mean[4][lane] + hessian[7][lane] * mean[5][lane]);
-        const double t85 = hessian[11][lane] * mean[14][lane] + hessian[15][lane] * mean[15][lane] + (hessian[3][lane] * mean[12][lane] + hessian[7][lane] * mean[13][lane]);
-        const double t86 = t82 * t18 + t83 * t32 - (t84 * t19 + t85 * t28);
-        const double t87 = t85 * t31 - t84 * t26 - (t82 * t36 + t83 * t35);
-        const double t88 = t84 * t23 - t85 * t30 - (t82 * t37 + t83 * t34);
-        const double t89 = t82 * t38 + t83 * t33 + (t84 * t20 + t85 * t29);
-        const double t90 = hessian[3][lane] * t53 + hessian[7][lane] * t54 + (hessian[11][lane] * t51 + hessian[15][lane] * t52) + (t24 * t86 + t25 * t87 + (t21 * t88 - t1 * t89));
-        const double t91 = even[13][lane] - odd[13][lane];
-        const double t92 = even[12][lane] - odd[12][lane];
-        const double t93 = even[15][lane] - odd[15][lane];
-        const double t94 = even[14][lane] - odd[14][lane];
-        const double t95 = hessian[4][lane] * t91 + hessian[0][lane] * t92 + (hessian[12][lane] * t93 + hessian[8][lane] * t94) + (t39 * t61 + t40 * t62 + (t41 * t60 + t42 * t59));
-        const double t96 = hessian[9][lane] * t94 + hessian[13][lane] * t93 + (hessian[1][lane] * t92 + hessian[5][lane] * t91) + (t39 * t68 + t40 * t69 + (t41 * t70 + t42 * t71));
-        const double t97 = hessian[10][lane] * t94 + hessian[14][lane] * t93 + (hessian[6][lane] * t91 + hessian[2][lane] * t92) + (t40 * t79 - t39 * t80 + (t42 * t77 + t41 * t78));
-        const double t98 = hessian[15][lane] * t93 + hessian[11][lane] * t94 + (hessian[7][lane] * t91 + hessian[3][lane] * t92) + (t39 * t86 + t40 * t87 + (t42 * t88 - t41 * t89));
-        const double t99 = even[21][lane] - odd[21][lane];
-        const double t100 = even[20][lane] - odd[20][lane];
-        const double t101 = even[22][lane] - odd[22][lane];
-        const double t102 = even[23][lane] - odd[23][lane];
-        const double t103 = hessian[4][lane] * t99 + hessian[0][lane] * t100 + (hessian[8][lane] * t101 + hessian[12][lane] * t102) + (t43 * t61 + t44 * t62 + (t45 * t60 + t46 * t59));
-        const double t104 = hessian[9][lane] * t101 + hessian[13][lane] * t102 + (hessian[5][lane] * t99 + hessian[1][lane] * t100) + (t43 * t68 + t44 * t69 + (t46 * t71 + t45 * t70));
-        const double t105 = hessian[10][lane] * t101 + hessian[14][lane] * t102 + (hessian[6][lane] * t99 + hessian[2][lane] * t100) + (t44 * t79 - t43 * t80 + (t45 * t78 + t46 * t77));
-        const double t106 = hessian[3][lane] * t100 + hessian[7][lane] * t99 + (hessian[11][lane] * t101 + hessian[15][lane] * t102) + (t43 * t86 + t44 * t87 + (t46 * t88 - t45 * t89));
-        const double t107 = even[29][lane] - odd[29][lane];
-        const double t108 = even[28][lane] - odd[28][lane];
-        const double t109 = even[30][lane] - odd[30][lane];
-        const double t110 = even[31][lane] - odd[31][lane];
-        const double t111 = hessian[4][lane] * t107 + hessian[0][lane] * t108 + (hessian[8][lane] * t109 + hessian[12][lane] * t110) + (t49 * t61 + t50 * t62 + (t47 * t60 + t48 * t59));
-        const double t112 = hessian[9][lane] * t109 + hessian[13][lane] * t110 + (hessian[5][lane] * t107 + hessian[1][lane] * t108) + (t47 * t70 + t48 * t71 + (t49 * t68 + t50 * t69));
-        const double t113 = hessian[10][lane] * t109 + hessian[14][lane] * t110 + (hessian[6][lane] * t107 + hessian[2][lane] * t108) + (t50 * t79 - t49 * t80 + (t47 * t78 + t48 * t77));
-        const double t114 = hessian[3][lane] * t108 + hessian[7][lane] * t107 + (hessian[15][lane] * t110 + hessian[11][lane] * t109) + (t48 * t88 - t47 * t89 + (t49 * t86 + t50 * t87));
-        const double t115 = 2.0 * (hessian[0][lane] * odd[4][lane]) + 2.0 * (hessian[4][lane] * odd[5][lane]) + (2.0 * (hessian[8][lane] * odd[6][lane]) + 2.0 * (hessian[12][lane] * odd[7][lane])) + (2.0 * (odd[0][lane] * t60) + 2.0 * (odd[1][lane] * t59) + (2.0 * (odd[3][lane] * t61) + 2.0 * (odd[2][lane] * t62)));
-        const double t116 = 2.0 * (hessian[9][lane] * odd[6][lane]) + 2.0 * (hessian[13][lane] * odd[7][lane]) + (2.0 * (hessian[1][lane] * odd[4][lane]) + 2.0 * (hessian[5][lane] * odd[5][lane])) + (2.0 * (odd[0][lane] * t70) + 2.0 * (odd[1][lane] * t71) + (2.0 * (odd[3][lane] * t68) + 2.0 * (odd[2][lane] * t69)));
-        const double t117 = 2.0 * (hessian[2][lane] * odd[4][lane]) + 2.0 * (hessian[6][lane] * odd[5][lane]) + (2.0 * (hessian[14][lane] * odd[7][lane]) + 2.0 * (hessian[10][lane] * odd[6][lane])) + (2.0 * (odd[2][lane] * t79) - 2.0 * (odd[3][lane] * t80) + (2.0 * (odd[1][lane] * t77) + 2.0 * (odd[0][lane] * t78)));
-        const double t118 = 2.0 * (hessian[3][lane] * odd[4][lane]) + 2.0 * (hessian[7][lane] * odd[5][lane]) + (2.0 * (hessian[15][lane] * odd[7][lane]) + 2.0 * (hessian[11][lane] * odd[6][lane])) + (2.0 * (odd[1][lane] * t88) - 2.0 * (odd[0][lane] * t89) + (2.0 * (odd[3][lane] * t86) + 2.0 * (odd[2][lane] * t87)));
-        const double t119 = 2.0 * (hessian[0][lane] * odd[12][lane]) + 2.0 * (hessian[4][lane] * odd[13][lane]) + (2.0 * (hessian[8][lane] * odd[14][lane]) + 2.0 * (hessian[12][lane] * odd[15][lane])) + (2.0 * (odd[11][lane] * t61) + 2.0 * (odd[10][lane] * t62) + (2.0 * (odd[9][lane] * t59) + 2.0 * (odd[8][lane] * t60)));
-        const double t120 = 2.0 * (hessian[9][lane] * odd[14][lane]) + 2.0 * (hessian[13][lane] * odd[15][lane]) + (2.0 * (hessian[5][lane] * odd[13][lane]) + 2.0 * (hessian[1][lane] * odd[12][lane])) + (2.0 * (odd[11][lane] * t68) + 2.0 * (odd[10][lane] * t69) + (2.0 * (odd[8][lane] * t70) + 2.0 * (odd[9][lane] * t71)));
-        const double t121 = 2.0 * (hessian[2][lane] * odd[12][lane]) + 2.0 * (hessian[6][lane] * odd[13][lane]) + (2.0 * (hessian[14][lane] * odd[15][lane]) + 2.0 * (hessian[10][lane] * odd[14][lane])) + (2.0 * (odd[10][lane] * t79) - 2.0 * (odd[11][lane] * t80) + (2.0 * (odd[8][lane] * t78) + 2.0 * (odd[9][lane] * t77)));
-        const double t122 = 2.0 * (hessian[7][lane] * odd[13][lane]) + 2.0 * (hessian[3][lane] * odd[12][lane]) + (2.0 * (hessian[11][lane] * odd[14][lane]) + 2.0 * (hessian[15][lane] * odd[15][lane])) + (2.0 * (odd[9][lane] * t88) - 2.0 * (odd[8][lane] * t89) + (2.0 * (odd[11][lane] * t86) + 2.0 * (odd[10][lane] * t87)));
-        const double t123 = 2.0 * (hessian[12][lane] * odd[23][lane]) + 2.0 * (hessian[8][lane] * odd[22][lane]) + (2.0 * (hessian[4][lane] * odd[21][lane]) + 2.0 * (hessian[0][lane] * odd[20][lane])) + (2.0 * (odd[19][lane] * t61) + 2.0 * (odd[18][lane] * t62) + (2.0 * (odd[16][lane] * t60) + 2.0 * (odd[17][lane] * t59)));
-        const double t124 = 2.0 * (hessian[1][lane] * odd[20][lane]) + 2.0 * (hessian[5][lane] * odd[21][lane]) + (2.0 * (hessian[13][lane] * odd[23][lane]) + 2.0 * (hessian[9][lane] * odd[22][lane])) + (2.0 * (odd[19][lane] * t68) + 2.0 * (odd[18][lane] * t69) + (2.0 * (odd[16][lane] * t70) + 2.0 * (odd[17][lane] * t71)));
-        const double t125 = 2.0 * (hessian[6][lane] * odd[21][lane]) + 2.0 * (hessian[2][lane] * odd[20][lane]) + (2.0 * (hessian[10][lane] * odd[22][lane]) + 2.0 * (hessian[14][lane] * odd[23][lane])) + (2.0 * (odd[18][lane] * t79) - 2.0 * (odd[19][lane] * t80) + (2.0 * (odd[17][lane] * t77) + 2.0 * (odd[16][lane] * t78)));
-        const double t126 = 2.0 * (hessian[15][lane] * odd[23][lane]) + 2.0 * (hessian[11][lane] * odd[22][lane]) + (2.0 * (hessian[3][lane] * odd[20][lane]) + 2.0 * (hessian[7][lane] * odd[21][lane])) + (2.0 * (odd[19][lane] * t86) + 2.0 * (odd[18][lane] * t87) + (2.0 * (odd[17][lane] * t88) - 2.0 * (odd[16][lane] * t89)));
-        const double t127 = 2.0 * (hessian[0][lane] * odd[28][lane]) + 2.0 * (hessian[4][lane] * odd[29][lane]) + (2.0 * (hessian[12][lane] * odd[31][lane]) + 2.0 * (hessian[8][lane] * odd[30][lane])) + (2.0 * (odd[27][lane] * t61) + 2.0 * (odd[26][lane] * t62) + (2.0 * (odd[25][lane] * t59) + 2.0 * (odd[24][lane] * t60)));
-        const double t128 = 2.0 * (hessian[9][lane] * odd[30][lane]) + 2.0 * (hessian[13][lane] * odd[31][lane]) + (2.0 * (hessian[1][lane] * odd[28][lane]) + 2.0 * (hessian[5][lane] * odd[29][lane])) + (2.0 * (odd[27][lane] * t68) + 2.0 * (odd[26][lane] * t69) + (2.0 * (odd[24][lane] * t70) + 2.0 * (odd[25][lane] * t71)));
-        const double t129 = 2.0 * (hessian[10][lane] * odd[30][lane]) + 2.0 * (hessian[14][lane] * odd[31][lane]) + (2.0 * (hessian[2][lane] * odd[28][lane]) + 2.0 * (hessian[6][lane] * odd[29][lane])) + (2.0 * (odd[25][lane] * t77) + 2.0 * (odd[24][lane] * t78) + (2.0 * (odd[26][lane] * t79) - 2.0 * (odd[27][lane] * t80)));
-        const double t130 = 2.0 * (hessian[7][lane] * odd[29][lane]) + 2.0 * (hessian[3][lane] * odd[28][lane]) + (2.0 * (hessian[11][lane] * odd[30][lane]) + 2.0 * (hessian[15][lane] * odd[31][lane])) + (2.0 * (odd[25][lane] * t88) - 2.0 * (odd[24][lane] * t89) + (2.0 * (odd[27][lane] * t86) + 2.0 * (odd[26][lane] * t87)));
-        alpha_y[0][lane] = t1 * t20 - t21 * t23 + (t24 * t19 + t25 * t26);
-        alpha_y[1][lane] = t1 * t29 + t21 * t30 + (t24 * t28 - t25 * t31);
-        alpha_y[2][lane] = t1 * t33 + t21 * t34 + (t25 * t35 - t24 * t32);
-        alpha_y[3][lane] = t24 * t18 - t25 * t36 - (t21 * t37 + t1 * t38);
-        alpha_y[4][lane] = t39 * t19 + t40 * t26 + (t41 * t20 - t42 * t23);
-        alpha_y[5][lane] = t41 * t29 + t42 * t30 + (t39 * t28 - t40 * t31);
-        alpha_y[6][lane] = t42 * t34 + t41 * t33 + (t40 * t35 - t39 * t32);
-        alpha_y[7][lane] = t39 * t18 - t40 * t36 - (t41 * t38 + t42 * t37);
-        alpha_y[8][lane] = t43 * t19 + t44 * t26 + (t45 * t20 - t46 * t23);
-        alpha_y[9][lane] = t45 * t29 + t46 * t30 + (t43 * t28 - t44 * t31);
-        alpha_y[10][lane] = t45 * t33 + t46 * t34 + (t44 * t35 - t43 * t32);
-        alpha_y[11][lane] = t43 * t18 - t44 * t36 - (t46 * t37 + t45 * t38);
-        alpha_y[12][lane] = t47 * t20 - t48 * t23 + (t49 * t19 + t50 * t26);
-        alpha_y[13][lane] = t49 * t28 - t50 * t31 + (t48 * t30 + t47 * t29);
-        alpha_y[14][lane] = t50 * t35 - t49 * t32 + (t48 * t34 + t47 * t33);
-        alpha_y[15][lane] = t49 * t18 - t50 * t36 - (t48 * t37 + t47 * t38);
-        increment_y[0][lane] = 2.0 * (odd[0][lane] * t20) - 2.0 * (odd[1][lane] * t23) + (2.0 * (odd[3][lane] * t19) + 2.0 * (odd[2][lane] * t26));
-        increment_y[1][lane] = 2.0 * (odd[1][lane] * t30) + 2.0 * (odd[0][lane] * t29) + (2.0 * (odd[3][lane] * t28) - 2.0 * (odd[2][lane] * t31));
-        increment_y[2][lane] = 2.0 * (odd[1][lane] * t34) + 2.0 * (odd[0][lane] * t33) + (2.0 * (odd[2][lane] * t35) - 2.0 * (odd[3][lane] * t32));
-        increment_y[3][lane] = (-2.0) * (odd[0][lane] * t38) - 2.0 * (odd[1][lane] * t37) + (2.0 * (odd[3][lane] * t18) - 2.0 * (odd[2][lane] * t36));
-        increment_y[4][lane] = 2.0 * (odd[11][lane] * t19) + 2.0 * (odd[10][lane] * t26) + (2.0 * (odd[8][lane] * t20) - 2.0 * (odd[9][lane] * t23));
-        increment_y[5][lane] = 2.0 * (odd[9][lane] * t30) + 2.0 * (odd[8][lane] * t29) + (2.0 * (odd[11][lane] * t28) - 2.0 * (odd[10][lane] * t31));
-        increment_y[6][lane] = 2.0 * (odd[10][lane] * t35) - 2.0 * (odd[11][lane] * t32) + (2.0 * (odd[8][lane] * t33) + 2.0 * (odd[9][lane] * t34));
-        increment_y[7][lane] = (-2.0) * (odd[8][lane] * t38) - 2.0 * (odd[9][lane] * t37) + (2.0 * (odd[11][lane] * t18) - 2.0 * (odd[10][lane] * t36));
-        increment_y[8][lane] = 2.0 * (odd[19][lane] * t19) + 2.0 * (odd[18][lane] * t26) + (2.0 * (odd[16][lane] * t20) - 2.0 * (odd[17][lane] * t23));
-        increment_y[9][lane] = 2.0 * (odd[16][lane] * t29) + 2.0 * (odd[17][lane] * t30) + (2.0 * (odd[19][lane] * t28) - 2.0 * (odd[18][lane] * t31));
-        increment_y[10][lane] = 2.0 * (odd[18][lane] * t35) - 2.0 * (odd[19][lane] * t32) + (2.0 * (odd[16][lane] * t33) + 2.0 * (odd[17][lane] * t34));
-        increment_y[11][lane] = (-2.0) * (odd[16][lane] * t38) - 2.0 * (odd[17][lane] * t37) + (2.0 * (odd[19][lane] * t18) - 2.0 * (odd[18][lane] * t36));
-        increment_y[12][lane] = 2.0 * (odd[24][lane] * t20) - 2.0 * (odd[25][lane] * t23) + (2.0 * (odd[27][lane] * t19) + 2.0 * (odd[26][lane] * t26));
-        increment_y[13][lane] = 2.0 * (odd[24][lane] * t29) + 2.0 * (odd[25][lane] * t30) + (2.0 * (odd[27][lane] * t28) - 2.0 * (odd[26][lane] * t31));
-        increment_y[14][lane] = 2.0 * (odd[26][lane] * t35) - 2.0 * (odd[27][lane] * t32) + (2.0 * (odd[24][lane] * t33) + 2.0 * (odd[25][lane] * t34));
-        increment_y[15][lane] = (-2.0) * (odd[24][lane] * t38) - 2.0 * (odd[25][lane] * t37) + (2.0 * (odd[27][lane] * t18) - 2.0 * (odd[26][lane] * t36));
-        jacobian[0][lane] = t63;
-        jacobian[1][lane] = t72;
-        jacobian[2][lane] = t81;
-        jacobian[3][lane] = t90;
-        jacobian[4][lane] = t95;
-        jacobian[5][lane] = t96;
-        jacobian[6][lane] = t97;
-        jacobian[7][lane] = t98;
-        jacobian[8][lane] = t103;
-        jacobian[9][lane] = t104;
-        jacobian[10][lane] = t105;
-        jacobian[11][lane] = t106;
-        jacobian[12][lane] = t111;
-        jacobian[13][lane] = t112;
-        jacobian[14][lane] = t113;
-        jacobian[15][lane] = t114;
-        increment_jacobian[0][lane] = t115;
-        increment_jacobian[1][lane] = t116;
-        increment_jacobian[2][lane] = t117;
-        increment_jacobian[3][lane] = t118;
-        increment_jacobian[4][lane] = t119;
-        increment_jacobian[5][lane] = t120;
-        increment_jacobian[6][lane] = t121;
-        increment_jacobian[7][lane] = t122;
-        increment_jacobian[8][lane] = t123;
-        increment_jacobian[9][lane] = t124;
-        increment_jacobian[10][lane] = t125;
-        increment_jacobian[11][lane] = t126;
-        increment_jacobian[12][lane] = t127;
-        increment_jacobian[13][lane] = t128;
-        increment_jacobian[14][lane] = t129;
-        increment_jacobian[15][lane] = t130;
-        reciprocal[0][lane] = t2;
-        reciprocal[1][lane] = t4;
-        reciprocal[2][lane] = t10;
-        reciprocal[3][lane] = t18;
-    }
-}
-
-/* guiding_centre_invert in all lanes. */
-static void guiding_centre_invert_lanes(guiding_centre_lanes matrix[restrict 16],
-                                        guiding_centre_lanes slope[restrict 16],
-                                        guiding_centre_lanes inverse[restrict 16],
-                                        guiding_centre_lanes gain[restrict 16],
-                                        guiding_centre_lanes reciprocal[restrict 4])
-{
-    guiding_centre_EACH_LANE
-    for (int lane = 0; lane < guiding_centre_LANES; ++lane) {
-        const double t1 = 1.0 / matrix[0][lane];
-        const double t2 = matrix[1][lane] * t1;
-        const double t3 = 1.0 / (matrix[5][lane] - matrix[4][lane] * t2);
-        const double t4 = matrix[4][lane] * t1 * t3;
-        const double t5 = matrix[2][lane] * t1;
-        const double t6 = (matrix[6][lane] - matrix[4][lane] * t5) * t3;
-        const double t7 = t5 - t2 * t6;
-        const double t8 = matrix[9][lane] - matrix[8][lane] * t2;
-        const double t9 = 1.0 / (matrix[10][lane] - matrix[8][lane] * t5 - t8 * t6);
-        const double t10 = (t8 * t4 - matrix[8][lane] * t1) * t9;
-        const double t11 = matrix[3][lane] * t1;
-        const double t12 = (matrix[7][lane] - matrix[4][lane] * t11) * t3;
-        const double t13 = (matrix[11][lane] - matrix[8][lane] * t11 - t8 * t12) * t9;
-        const double t14 = t11 - t2 * t12 - t7 * t13;
-        const double t15 = matrix[13][lane] - matrix[12][lane] * t2;
-        const double t16 = matrix[14][lane] - matrix[12][lane] * t5 - t15 * t6;
-        const double t17 = 1.0 / (matrix[15][lane] - matrix[12][lane] * t11 - t15 * t12 - t16 * t13);
-        const double t18 = (t15 * t4 - matrix[12][lane] * t1 - t16 * t10) * t17;
-        const double t19 = t1 + t2 * t4 - t7 * t10 - t14 * t18;
-        const double t20 = t8 * t3 * t9;
-        const double t21 = (t16 * t20 - t15 * t3) * t17;
-        const double t22 = t7 * t20 - t2 * t3 - t14 * t21;
-        const double t23 = t16 * t9 * t17;
-        const double t24 = t14 * t23 - t7 * t9;
-        const double t25 = t14 * t17;
-        const double t26 = t12 - t6 * t13;
-        const double t27 = t4 + t6 * t10 + t26 * t18;
-        const double t28 = t3 + t6 * t20 - t26 * t21;
-        const double t29 = t26 * t23 - t6 * t9;
-        const double t30 = t26 * t17;
-        const double t31 = t10 - t13 * t18;
-        const double t32 = t20 + t13 * t21;
-        const double t33 = t9 + t13 * t23;
-        const double t34 = t13 * t17;
-        inverse[0][lane] = t19;
-        inverse[1][lane] = t22;
-        inverse[2][lane] = t24;
-        inverse[3][lane] = -t25;
-        inverse[4][lane] = -t27;
-        inverse[5][lane] = t28;
-        inverse[6][lane] = t29;
-        inverse[7][lane] = -t30;
-        inverse[8][lane] = t31;
-        inverse[9][lane] = -t32;
-        inverse[10][lane] = t33;
-        inverse[11][lane] = -t34;
-        inverse[12][lane] = t18;
-        inverse[13][lane] = t21;
-        inverse[14][lane] = -t23;
-        inverse[15][lane] = t17;
-        gain[0][lane] = slope[0][lane] * t19 - slope[1][lane] * t27 + (slope[3][lane] * t18 + slope[2][lane] * t31);
-        gain[1][lane] = slope[0][lane] * t22 + slope[1][lane] * t28 + (slope[3][lane] * t21 - slope[2][lane] * t32);
-        gain[2][lane] = slope[2][lane] * t33 - slope[3][lane] * t23 + (slope[0][lane] * t24 + slope[1][lane] * t29);
-        gain[3][lane] = slope[3][lane] * t17 - slope[2][lane] * t34 - (slope[1][lane] * t30 + slope[0][lane] * t25);
-        gain[4][lane] = slope[4][lane] * t19 - slope[5][lane] * t27 + (slope[7][lane] * t18 + slope[6][lane] * t31);
-        gain[5][lane] = slope[7][lane] * t21 - slope[6][lane] * t32 + (slope[5][lane] * t28 + slope[4][lane] * t22);
-        gain[6][lane] = slope[6][lane] * t33 - slope[7][lane] * t23 + (slope[5][lane] * t29 + slope[4][lane] * t24);
-        gain[7][lane] = slope[7][lane] * t17 - slope[6][lane] * t34 - (slope[4][lane] * t25 + slope[5][lane] * t30);
-        gain[8][lane] = slope[11][lane] * t18 + slope[10][lane] * t31 + (slope[8][lane] * t19 - slope[9][lane] * t27);
-        gain[9][lane] = slope[9][lane] * t28 + slope[8][lane] * t22 + (slope[11][lane] * t21 - slope[10][lane] * t32);
-        gain[10][lane] = slope[10][lane] * t33 - slope[11][lane] * t23 + (slope[9][lane] * t29 + slope[8][lane] * t24);
-        gain[11][lane] = slope[11][lane] * t17 - slope[10][lane] * t34 - (slope[9][lane] * t30 + slope[8][lane] * t25);
-        gain[12][lane] = slope[15][lane] * t18 + slope[14][lane] * t31 + (slope[12][lane] * t19 - slope[13][lane] * t27);
-        gain[13][lane] = slope[13][lane] * t28 + slope[12][lane] * t22 + (slope[15][lane] * t21 - slope[14][lane] * t32);
-        gain[14][lane] = slope[14][lane] * t33 - slope[15][lane] * t23 + (slope[13][lane] * t29 + slope[12][lane] * t24);
-        gain[15][lane] = slope[15][lane] * t17 - slope[14][lane] * t34 - (slope[12][lane] * t25 + slope[13][lane] * t30);
-        reciprocal[0][lane] = t1;
-        reciprocal[1][lane] = t3;
-        reciprocal[2][lane] = t9;
-        reciprocal[3][lane] = t17;
-    }
-}
-
-/* guiding_centre_size in all lanes, summed over the components. */
-static void guiding_centre_sizes(guiding_centre_lanes y[restrict 4], guiding_centre_lanes delta[restrict 4],
-    guiding_centre_lanes size)
-{
-    guiding_centre_lanes norm = { 0.0 };
-    memset(size, 0, guiding_centre_LANES * sizeof size[0]);
-    for (int i = 0; i < 4; ++i)
-        for (int lane = 0; lane < guiding_centre_LANES; ++lane)
-            norm[lane] = 1e-6 * fabs(y[i][lane]) > norm[lane] ? 1e-6 * fabs(y[i][lane]) : norm[lane];
-    for (int i = 0; i < 4; ++i) {
-        guiding_centre_EACH_LANE
-        for (int lane = 0; lane < guiding_centre_LANES; ++lane)
-            size[lane] += fabs(delta[i][lane]) / (fabs(y[i][lane]) + norm[lane] + DBL_MIN);
-    }
-}
-
-/* Correct y by the residuals, with the inverse in the table, and measure the corrections. */
-static void guiding_centre_correct(guiding_centre_model *model, guiding_centre_lanes size)
-{
-    guiding_centre_lanes delta[4];
-    memset(delta, 0, sizeof delta);
-    for (int i = 0; i < 4; ++i)
-        for (int j = 0; j < 4; ++j) {
-            guiding_centre_EACH_LANE
-            for (int lane = 0; lane < guiding_centre_LANES; ++lane)
-                delta[i][lane] += model->inverse[i * 4 + j][lane] * model->residual[j][lane];
-        }
-    guiding_centre_sizes(model->y, delta, size);
-    for (int i = 0; i < 4; ++i)
-        for (int lane = 0; lane < guiding_centre_LANES; ++lane) model->y[i][lane] -= delta[i][lane];
-}
-
-/* The largest of the lanes, none of which is negative; infinite if one is not finite. As integers, the bits of such
-   numbers have their order, and those of what is no number are larger. */
-static double guiding_centre_largest(const guiding_centre_lanes size)
-{
-    uint64_t bits[8], most = 0;
-    double largest;
-    memcpy(bits, size, sizeof bits);
-    for (int lane = 0; lane < guiding_centre_LANES; ++lane) most = bits[lane] > most ? bits[lane] : most;
-    memcpy(&largest, &most, sizeof largest);
-    return isfinite(largest) ? largest : HUGE_VAL;
-}
-
-/* guiding_centre_near for the guesses of all lanes, seen from one value. */
-static int guiding_centre_near_lanes(guiding_centre_lanes y[restrict 4], const double last[4])
-{
-    guiding_centre_lanes distance = { 0.0 };
-    double size = 0.0;
-    for (int i = 0; i < 4; ++i) {
-        size += fabs(last[i]);
-        guiding_centre_EACH_LANE
-        for (int lane = 0; lane < guiding_centre_LANES; ++lane) distance[lane] += fabs(y[i][lane] - last[i]);
-    }
-    return guiding_centre_largest(distance) <= 4.0 * size;
-}
-
-/* What is left after a correction of this size: quadratic in it, where the matrices are of the points corrected; where
-   they are of points further off, by bend, also of the order of size times bend. bound is what the last pass left. */
-static double guiding_centre_remaining(double size, double bend, double bound)
-{
-    const double growth = size / bound, left = size * (size + bend);
-    return growth > 1.0 ? growth * left : left;
-}
-
-/* The paths of all lanes as Taylor series about their middle, with half of p: they take the time from -1 to 1, and need
-   fewer terms than from their start. s[i][k] is coefficient k of series i, the coordinates first; slope goes on with the
-   entries of d(pi p)/dm and of pi, from which v follows, the derivatives along middle and p, row by row. */
-typedef struct {
-    guiding_centre_lanes p[4], fixed[1], slope_fixed[1], value[55];
-    guiding_centre_lanes s[55][16 + 1], slope[174][8 + 1];
-    guiding_centre_lanes v[8 + 1][32];
-    guiding_centre_lanes even[4], odd[4], mean[4]; /* sums of terms, those of even order also as means over time */
-    guiding_centre_lanes v_even[32], v_odd[32], v_mean[32];
-    guiding_centre_lanes unit[4]; /* what terms are multiplied by to be measured */
-    int terms; /* orders that are known */
-} guiding_centre_expansion;
-
-/* The largest of the lanes; what is not finite does not count: that lane has failed. */
-static double guiding_centre_largest_finite(const guiding_centre_lanes size)
-{
-    guiding_centre_lanes finite;
-    guiding_centre_EACH_LANE
-    for (int lane = 0; lane < guiding_centre_LANES; ++lane) finite[lane] = size[lane] <= DBL_MAX ? size[lane] : 0.0;
-    return guiding_centre_largest(finite);
-}
-
-/* Coefficient k >= 1 of the series that follow from those of the coordinates: sums over the orders between 0 and k,
-   then what else there is. */
-static void guiding_centre_follow(guiding_centre_lanes coef[restrict], guiding_centre_expansion *e, int k)
-{
-    const double share = 1.0 / k;
-    guiding_centre_lanes sum[19];
-    memset(sum, 0, sizeof sum);
-    for (int j = 1; j < k; ++j) {
-        guiding_centre_EACH_LANE
-        for (int lane = 0; lane < guiding_centre_LANES; ++lane) {
-            sum[0][lane] += e->s[0][j][lane] * e->s[0][k - j][lane];
-            sum[1][lane] += e->s[1][j][lane] * e->s[1][k - j][lane];
-            sum[2][lane] += ((1.0 / 2.0 + 1.0) * j - k) * e->s[9][j][lane] * e->s[10][k - j][lane];
-            sum[3][lane] += ((-1.0 / 1.0 + 1.0) * j - k) * e->s[9][j][lane] * e->s[12][k - j][lane];
-            sum[4][lane] += e->s[11][j][lane] * e->s[12][k - j][lane];
-            sum[5][lane] += e->s[10][j][lane] * e->s[15][k - j][lane];
-            sum[6][lane] += ((-1.0 / 1.0 + 1.0) * j - k) * e->s[16][j][lane] * e->s[17][k - j][lane];
-            sum[7][lane] += e->s[4][j][lane] * e->s[17][k - j][lane];
-            sum[8][lane] += ((-3.0 / 2.0 + 1.0) * j - k) * e->s[9][j][lane] * e->s[23][k - j][lane];
-            sum[9][lane] += e->s[11][j][lane] * e->s[23][k - j][lane];
-            sum[10][lane] += e->s[22][j][lane] * e->s[25][k - j][lane];
-            sum[11][lane] += ((-1.0 / 1.0 + 1.0) * j - k) * e->s[15][j][lane] * e->s[27][k - j][lane];
-            sum[12][lane] += e->s[26][j][lane] * e->s[27][k - j][lane];
-            sum[13][lane] += e->s[4][j][lane] * e->s[25][k - j][lane];
-            sum[14][lane] += e->s[31][j][lane] * e->s[27][k - j][lane];
-            sum[15][lane] += e->s[22][j][lane] * e->s[17][k - j][lane];
-            sum[16][lane] += e->s[23][j][lane] * e->s[40][k - j][lane];
-            sum[17][lane] += e->s[3][j][lane] * e->s[41][k - j][lane];
-            sum[18][lane] += e->s[27][j][lane] * e->s[43][k - j][lane];
-        }
-    }
-    guiding_centre_EACH_LANE
-    for (int lane = 0; lane < guiding_centre_LANES; ++lane) {
-        e->s[4][k][lane] = coef[4][lane] * e->s[0][k][lane];
-        e->s[5][k][lane] = sum[0][lane] + 2.0 * e->s[0][k][lane] * e->s[0][0][lane];
-        e->s[6][k][lane] = sum[1][lane] + 2.0 * e->s[1][k][lane] * e->s[1][0][lane];
-        e->s[7][k][lane] = e->s[5][k][lane] + e->s[6][k][lane];
-        e->s[8][k][lane] = coef[3][lane] * e->s[7][k][lane];
-        e->s[9][k][lane] = e->s[8][k][lane];
-        e->s[10][k][lane] = (share * sum[2][lane] + 1.0 / 2.0 * e->s[9][k][lane] * e->s[10][0][lane]) / e->s[9][0][lane];
-        e->s[11][k][lane] = coef[4][lane] * e->s[3][k][lane];
-        e->s[12][k][lane] = (share * sum[3][lane] + -1.0 / 1.0 * e->s[9][k][lane] * e->s[12][0][lane]) / e->s[9][0][lane];
-        e->s[13][k][lane] = sum[4][lane] + e->s[11][0][lane] * e->s[12][k][lane] + e->s[11][k][lane] * e->s[12][0][lane];
-        e->s[14][k][lane] = 2.0 * e->s[13][k][lane];
-        e->s[15][k][lane] = e->s[10][k][lane] + e->s[14][k][lane];
-        e->s[16][k][lane] = sum[5][lane] + e->s[10][0][lane] * e->s[15][k][lane] + e->s[10][k][lane] * e->s[15][0][lane];
-        e->s[17][k][lane] = (share * sum[6][lane] + -1.0 / 1.0 * e->s[16][k][lane] * e->s[17][0][lane]) / e->s[16][0][lane];
-        e->s[18][k][lane] = sum[7][lane] + e->s[4][0][lane] * e->s[17][k][lane] + e->s[4][k][lane] * e->s[17][0][lane];
-        e->s[19][k][lane] = e->p[2][lane] * e->s[18][k][lane];
-        e->s[20][k][lane] = e->p[1][lane] * e->s[17][k][lane];
-        e->s[21][k][lane] = e->s[19][k][lane] - e->s[20][k][lane];
-        e->s[22][k][lane] = coef[4][lane] * e->s[1][k][lane];
-        e->s[23][k][lane] = (share * sum[8][lane] + -3.0 / 2.0 * e->s[9][k][lane] * e->s[23][0][lane]) / e->s[9][0][lane];
-        e->s[24][k][lane] = sum[9][lane] + e->s[11][0][lane] * e->s[23][k][lane] + e->s[11][k][lane] * e->s[23][0][lane];
-        e->s[25][k][lane] = e->s[24][k][lane];
-        e->s[26][k][lane] = sum[10][lane] + e->s[22][0][lane] * e->s[25][k][lane] + e->s[22][k][lane] * e->s[25][0][lane];
-        e->s[27][k][lane] = (share * sum[11][lane] + -1.0 / 1.0 * e->s[15][k][lane] * e->s[27][0][lane]) / e->s[15][0][lane];
-        e->s[28][k][lane] = sum[12][lane] + e->s[26][0][lane] * e->s[27][k][lane] + e->s[26][k][lane] * e->s[27][0][lane];
-        e->s[29][k][lane] = e->p[3][lane] * e->s[28][k][lane];
-        e->s[30][k][lane] = e->s[21][k][lane] - e->s[29][k][lane];
-        e->s[31][k][lane] = sum[13][lane] + e->s[4][0][lane] * e->s[25][k][lane] + e->s[4][k][lane] * e->s[25][0][lane];
-        e->s[32][k][lane] = sum[14][lane] + e->s[31][0][lane] * e->s[27][k][lane] + e->s[31][k][lane] * e->s[27][0][lane];
-        e->s[33][k][lane] = e->p[3][lane] * e->s[32][k][lane];
-        e->s[34][k][lane] = e->p[0][lane] * e->s[17][k][lane];
-        e->s[35][k][lane] = sum[15][lane] + e->s[22][0][lane] * e->s[17][k][lane] + e->s[22][k][lane] * e->s[17][0][lane];
-        e->s[36][k][lane] = e->p[2][lane] * e->s[35][k][lane];
-        e->s[37][k][lane] = e->s[34][k][lane] + e->s[36][k][lane];
-        e->s[38][k][lane] = e->s[33][k][lane] + e->s[37][k][lane];
-        e->s[39][k][lane] = e->s[9][k][lane];
-        e->s[40][k][lane] = coef[4][lane] * e->s[39][k][lane];
-        e->s[41][k][lane] = sum[16][lane] + e->s[23][0][lane] * e->s[40][k][lane] + e->s[23][k][lane] * e->s[40][0][lane];
-        e->s[42][k][lane] = sum[17][lane] + e->s[3][0][lane] * e->s[41][k][lane] + e->s[3][k][lane] * e->s[41][0][lane];
-        e->s[43][k][lane] = e->s[42][k][lane];
-        e->s[44][k][lane] = sum[18][lane] + e->s[27][0][lane] * e->s[43][k][lane] + e->s[27][k][lane] * e->s[43][0][lane];
-        e->s[45][k][lane] = e->p[3][lane] * e->s[44][k][lane];
-        e->s[46][k][lane] = e->p[1][lane] * e->s[35][k][lane];
-        e->s[47][k][lane] = e->p[0][lane] * e->s[18][k][lane];
-        e->s[48][k][lane] = e->s[46][k][lane] + e->s[47][k][lane];
-        e->s[49][k][lane] = e->s[45][k][lane] - e->s[48][k][lane];
-        e->s[50][k][lane] = e->p[0][lane] * e->s[28][k][lane];
-        e->s[51][k][lane] = e->p[1][lane] * e->s[32][k][lane];
-        e->s[52][k][lane] = e->s[50][k][lane] - e->s[51][k][lane];
-        e->s[53][k][lane] = e->p[2][lane] * e->s[44][k][lane];
-        e->s[54][k][lane] = e->s[52][k][lane] - e->s[53][k][lane];
-    }
-}
-
-/* Coefficient k >= 1 of the further series: sums over the orders between 0 and k,
-   then what else there is. */
-static void guiding_centre_follow_slopes(guiding_centre_lanes coef[restrict], guiding_centre_expansion *e, int k)
-{
-    const double share = 1.0 / k;
-    guiding_centre_lanes sum[62];
-    memset(sum, 0, sizeof sum);
-    for (int j = 1; j < k; ++j) {
-        guiding_centre_EACH_LANE
-        for (int lane = 0; lane < guiding_centre_LANES; ++lane) {
-            sum[0][lane] += ((-2.0 / 1.0 + 1.0) * j - k) * e->s[16][j][lane] * e->slope[0][k - j][lane];
-            sum[1][lane] += ((-1.0 / 2.0 + 1.0) * j - k) * e->s[9][j][lane] * e->slope[2][k - j][lane];
-            sum[2][lane] += e->slope[1][j][lane] * e->slope[2][k - j][lane];
-            sum[3][lane] += e->slope[3][j][lane] * e->s[15][k - j][lane];
-            sum[4][lane] += ((-2.0 / 1.0 + 1.0) * j - k) * e->s[9][j][lane] * e->slope[5][k - j][lane];
-            sum[5][lane] += e->slope[1][j][lane] * e->slope[5][k - j][lane];
-            sum[6][lane] += e->s[11][j][lane] * e->slope[6][k - j][lane];
-            sum[7][lane] += e->s[10][j][lane] * e->slope[9][k - j][lane];
-            sum[8][lane] += e->slope[0][j][lane] * e->slope[11][k - j][lane];
-            sum[9][lane] += e->s[4][j][lane] * e->slope[12][k - j][lane];
-            sum[10][lane] += ((-5.0 / 2.0 + 1.0) * j - k) * e->s[9][j][lane] * e->slope[19][k - j][lane];
-            sum[11][lane] += e->slope[1][j][lane] * e->slope[19][k - j][lane];
-            sum[12][lane] += e->s[11][j][lane] * e->slope[20][k - j][lane];
-            sum[13][lane] += e->s[22][j][lane] * e->slope[21][k - j][lane];
-            sum[14][lane] += e->slope[22][j][lane] * e->s[27][k - j][lane];
-            sum[15][lane] += ((-2.0 / 1.0 + 1.0) * j - k) * e->s[15][j][lane] * e->slope[25][k - j][lane];
-            sum[16][lane] += e->slope[9][j][lane] * e->slope[25][k - j][lane];
-            sum[17][lane] += e->s[26][j][lane] * e->slope[26][k - j][lane];
-            sum[18][lane] += e->slope[31][j][lane] * e->slope[2][k - j][lane];
-            sum[19][lane] += e->slope[32][j][lane] * e->s[15][k - j][lane];
-            sum[20][lane] += e->slope[31][j][lane] * e->slope[5][k - j][lane];
-            sum[21][lane] += e->s[11][j][lane] * e->slope[34][k - j][lane];
-            sum[22][lane] += e->s[10][j][lane] * e->slope[37][k - j][lane];
-            sum[23][lane] += e->slope[0][j][lane] * e->slope[39][k - j][lane];
-            sum[24][lane] += e->s[4][j][lane] * e->slope[40][k - j][lane];
-            sum[25][lane] += e->slope[31][j][lane] * e->slope[19][k - j][lane];
-            sum[26][lane] += e->s[11][j][lane] * e->slope[46][k - j][lane];
-            sum[27][lane] += e->s[22][j][lane] * e->slope[47][k - j][lane];
-            sum[28][lane] += e->s[27][j][lane] * e->slope[50][k - j][lane];
-            sum[29][lane] += e->slope[37][j][lane] * e->slope[25][k - j][lane];
-            sum[30][lane] += e->s[26][j][lane] * e->slope[52][k - j][lane];
-            sum[31][lane] += e->s[10][j][lane] * e->slope[57][k - j][lane];
-            sum[32][lane] += e->slope[58][j][lane] * e->slope[0][k - j][lane];
-            sum[33][lane] += e->s[4][j][lane] * e->slope[59][k - j][lane];
-            sum[34][lane] += e->s[22][j][lane] * e->slope[66][k - j][lane];
-            sum[35][lane] += e->slope[67][j][lane] * e->s[27][k - j][lane];
-            sum[36][lane] += e->slope[57][j][lane] * e->slope[25][k - j][lane];
-            sum[37][lane] += e->s[26][j][lane] * e->slope[69][k - j][lane];
-            sum[38][lane] += e->s[4][j][lane] * e->slope[21][k - j][lane];
-            sum[39][lane] += e->s[27][j][lane] * e->slope[77][k - j][lane];
-            sum[40][lane] += e->s[31][j][lane] * e->slope[26][k - j][lane];
-            sum[41][lane] += e->s[22][j][lane] * e->slope[12][k - j][lane];
-            sum[42][lane] += e->s[4][j][lane] * e->slope[47][k - j][lane];
-            sum[43][lane] += e->slope[87][j][lane] * e->s[27][k - j][lane];
-            sum[44][lane] += e->s[31][j][lane] * e->slope[52][k - j][lane];
-            sum[45][lane] += e->s[22][j][lane] * e->slope[40][k - j][lane];
-            sum[46][lane] += e->s[4][j][lane] * e->slope[66][k - j][lane];
-            sum[47][lane] += e->slope[99][j][lane] * e->s[27][k - j][lane];
-            sum[48][lane] += e->s[31][j][lane] * e->slope[69][k - j][lane];
-            sum[49][lane] += e->s[22][j][lane] * e->slope[59][k - j][lane];
-            sum[50][lane] += e->slope[112][j][lane] * e->s[23][k - j][lane];
-            sum[51][lane] += e->slope[20][j][lane] * e->s[40][k - j][lane];
-            sum[52][lane] += e->s[3][j][lane] * e->slope[117][k - j][lane];
-            sum[53][lane] += e->s[27][j][lane] * e->slope[118][k - j][lane];
-            sum[54][lane] += e->s[43][j][lane] * e->slope[26][k - j][lane];
-            sum[55][lane] += e->slope[127][j][lane] * e->s[23][k - j][lane];
-            sum[56][lane] += e->s[40][j][lane] * e->slope[46][k - j][lane];
-            sum[57][lane] += e->s[3][j][lane] * e->slope[132][k - j][lane];
-            sum[58][lane] += e->s[27][j][lane] * e->slope[133][k - j][lane];
-            sum[59][lane] += e->s[43][j][lane] * e->slope[52][k - j][lane];
-        }
-        guiding_centre_EACH_LANE
-        for (int lane = 0; lane < guiding_centre_LANES; ++lane) {
-            sum[60][lane] += e->s[41][j][lane] * e->s[27][k - j][lane];
-            sum[61][lane] += e->s[43][j][lane] * e->slope[69][k - j][lane];
-        }
-    }
-    guiding_centre_EACH_LANE
-    for (int lane = 0; lane < guiding_centre_LANES; ++lane) {
-        e->slope[0][k][lane] = (share * sum[0][lane] + -2.0 / 1.0 * e->s[16][k][lane] * e->slope[0][0][lane]) / e->s[16][0][lane];
-        e->slope[1][k][lane] = coef[3][lane] * e->s[0][k][lane];
-        e->slope[2][k][lane] = (share * sum[1][lane] + -1.0 / 2.0 * e->s[9][k][lane] * e->slope[2][0][lane]) / e->s[9][0][lane];
-        e->slope[3][k][lane] = sum[2][lane] + e->slope[1][0][lane] * e->slope[2][k][lane] + e->slope[1][k][lane] * e->slope[2][0][lane];
-        e->slope[4][k][lane] = sum[3][lane] + e->slope[3][0][lane] * e->s[15][k][lane] + e->slope[3][k][lane] * e->s[15][0][lane];
-        e->slope[5][k][lane] = (share * sum[4][lane] + -2.0 / 1.0 * e->s[9][k][lane] * e->slope[5][0][lane]) / e->s[9][0][lane];
-        e->slope[6][k][lane] = sum[5][lane] + e->slope[1][0][lane] * e->slope[5][k][lane] + e->slope[1][k][lane] * e->slope[5][0][lane];
-        e->slope[7][k][lane] = sum[6][lane] + e->s[11][0][lane] * e->slope[6][k][lane] + e->s[11][k][lane] * e->slope[6][0][lane];
-        e->slope[8][k][lane] = 4.0 * e->slope[7][k][lane];
-        e->slope[9][k][lane] = e->slope[3][k][lane] - e->slope[8][k][lane];
-        e->slope[10][k][lane] = sum[7][lane] + e->s[10][0][lane] * e->slope[9][k][lane] + e->s[10][k][lane] * e->slope[9][0][lane];
-        e->slope[11][k][lane] = e->slope[4][k][lane] + e->slope[10][k][lane];
-        e->slope[12][k][lane] = sum[8][lane] + e->slope[0][0][lane] * e->slope[11][k][lane] + e->slope[0][k][lane] * e->slope[11][0][lane];
-        e->slope[13][k][lane] = e->p[1][lane] * e->slope[12][k][lane];
-        e->slope[14][k][lane] = coef[4][lane] * e->s[17][k][lane];
-        e->slope[15][k][lane] = sum[9][lane] + e->s[4][0][lane] * e->slope[12][k][lane] + e->s[4][k][lane] * e->slope[12][0][lane];
-        e->slope[16][k][lane] = e->slope[14][k][lane] - e->slope[15][k][lane];
-        e->slope[17][k][lane] = e->p[2][lane] * e->slope[16][k][lane];
-        e->slope[18][k][lane] = e->slope[13][k][lane] + e->slope[17][k][lane];
-        e->slope[19][k][lane] = (share * sum[10][lane] + -5.0 / 2.0 * e->s[9][k][lane] * e->slope[19][0][lane]) / e->s[9][0][lane];
-        e->slope[20][k][lane] = sum[11][lane] + e->slope[1][0][lane] * e->slope[19][k][lane] + e->slope[1][k][lane] * e->slope[19][0][lane];
-        e->slope[21][k][lane] = sum[12][lane] + e->s[11][0][lane] * e->slope[20][k][lane] + e->s[11][k][lane] * e->slope[20][0][lane];
-        e->slope[22][k][lane] = sum[13][lane] + e->s[22][0][lane] * e->slope[21][k][lane] + e->s[22][k][lane] * e->slope[21][0][lane];
-        e->slope[23][k][lane] = sum[14][lane] + e->slope[22][0][lane] * e->s[27][k][lane] + e->slope[22][k][lane] * e->s[27][0][lane];
-        e->slope[24][k][lane] = -3.0 * e->slope[23][k][lane];
-        e->slope[25][k][lane] = (share * sum[15][lane] + -2.0 / 1.0 * e->s[15][k][lane] * e->slope[25][0][lane]) / e->s[15][0][lane];
-        e->slope[26][k][lane] = sum[16][lane] + e->slope[9][0][lane] * e->slope[25][k][lane] + e->slope[9][k][lane] * e->slope[25][0][lane];
-        e->slope[27][k][lane] = sum[17][lane] + e->s[26][0][lane] * e->slope[26][k][lane] + e->s[26][k][lane] * e->slope[26][0][lane];
-        e->slope[28][k][lane] = e->slope[24][k][lane] - e->slope[27][k][lane];
-        e->slope[29][k][lane] = e->p[3][lane] * e->slope[28][k][lane];
-        e->slope[30][k][lane] = e->slope[18][k][lane] - e->slope[29][k][lane];
-        e->slope[31][k][lane] = coef[3][lane] * e->s[1][k][lane];
-        e->slope[32][k][lane] = sum[18][lane] + e->slope[31][0][lane] * e->slope[2][k][lane] + e->slope[31][k][lane] * e->slope[2][0][lane];
-        e->slope[33][k][lane] = sum[19][lane] + e->slope[32][0][lane] * e->s[15][k][lane] + e->slope[32][k][lane] * e->s[15][0][lane];
-        e->slope[34][k][lane] = sum[20][lane] + e->slope[31][0][lane] * e->slope[5][k][lane] + e->slope[31][k][lane] * e->slope[5][0][lane];
-        e->slope[35][k][lane] = sum[21][lane] + e->s[11][0][lane] * e->slope[34][k][lane] + e->s[11][k][lane] * e->slope[34][0][lane];
-        e->slope[36][k][lane] = 4.0 * e->slope[35][k][lane];
-        e->slope[37][k][lane] = e->slope[32][k][lane] - e->slope[36][k][lane];
-        e->slope[38][k][lane] = sum[22][lane] + e->s[10][0][lane] * e->slope[37][k][lane] + e->s[10][k][lane] * e->slope[37][0][lane];
-        e->slope[39][k][lane] = e->slope[33][k][lane] + e->slope[38][k][lane];
-        e->slope[40][k][lane] = sum[23][lane] + e->slope[0][0][lane] * e->slope[39][k][lane] + e->slope[0][k][lane] * e->slope[39][0][lane];
-        e->slope[41][k][lane] = e->p[1][lane] * e->slope[40][k][lane];
-        e->slope[42][k][lane] = sum[24][lane] + e->s[4][0][lane] * e->slope[40][k][lane] + e->s[4][k][lane] * e->slope[40][0][lane];
-        e->slope[43][k][lane] = e->p[2][lane] * e->slope[42][k][lane];
-        e->slope[44][k][lane] = e->slope[41][k][lane] - e->slope[43][k][lane];
-        e->slope[45][k][lane] = coef[4][lane] * e->s[25][k][lane];
-        e->slope[46][k][lane] = sum[25][lane] + e->slope[31][0][lane] * e->slope[19][k][lane] + e->slope[31][k][lane] * e->slope[19][0][lane];
-        e->slope[47][k][lane] = sum[26][lane] + e->s[11][0][lane] * e->slope[46][k][lane] + e->s[11][k][lane] * e->slope[46][0][lane];
-        e->slope[48][k][lane] = sum[27][lane] + e->s[22][0][lane] * e->slope[47][k][lane] + e->s[22][k][lane] * e->slope[47][0][lane];
-        e->slope[49][k][lane] = 3.0 * e->slope[48][k][lane];
-        e->slope[50][k][lane] = e->slope[45][k][lane] - e->slope[49][k][lane];
-        e->slope[51][k][lane] = sum[28][lane] + e->s[27][0][lane] * e->slope[50][k][lane] + e->s[27][k][lane] * e->slope[50][0][lane];
-        e->slope[52][k][lane] = sum[29][lane] + e->slope[37][0][lane] * e->slope[25][k][lane] + e->slope[37][k][lane] * e->slope[25][0][lane];
-        e->slope[53][k][lane] = sum[30][lane] + e->s[26][0][lane] * e->slope[52][k][lane] + e->s[26][k][lane] * e->slope[52][0][lane];
-        e->slope[54][k][lane] = e->slope[51][k][lane] - e->slope[53][k][lane];
-        e->slope[55][k][lane] = e->p[3][lane] * e->slope[54][k][lane];
-        e->slope[56][k][lane] = e->slope[44][k][lane] - e->slope[55][k][lane];
-        e->slope[57][k][lane] = coef[4][lane] * e->s[12][k][lane];
-        e->slope[58][k][lane] = sum[31][lane] + e->s[10][0][lane] * e->slope[57][k][lane] + e->s[10][k][lane] * e->slope[57][0][lane];
-        e->slope[59][k][lane] = sum[32][lane] + e->slope[58][0][lane] * e->slope[0][k][lane] + e->slope[58][k][lane] * e->slope[0][0][lane];
-    }
-    guiding_centre_EACH_LANE
-    for (int lane = 0; lane < guiding_centre_LANES; ++lane) {
-        e->slope[60][k][lane] = e->p[1][lane] * e->slope[59][k][lane];
-        e->slope[61][k][lane] = 2.0 * e->slope[60][k][lane];
-        e->slope[62][k][lane] = sum[33][lane] + e->s[4][0][lane] * e->slope[59][k][lane] + e->s[4][k][lane] * e->slope[59][0][lane];
-        e->slope[63][k][lane] = e->p[2][lane] * e->slope[62][k][lane];
-        e->slope[64][k][lane] = 2.0 * e->slope[63][k][lane];
-        e->slope[65][k][lane] = e->slope[61][k][lane] - e->slope[64][k][lane];
-        e->slope[66][k][lane] = coef[4][lane] * e->s[23][k][lane];
-        e->slope[67][k][lane] = sum[34][lane] + e->s[22][0][lane] * e->slope[66][k][lane] + e->s[22][k][lane] * e->slope[66][0][lane];
-        e->slope[68][k][lane] = sum[35][lane] + e->slope[67][0][lane] * e->s[27][k][lane] + e->slope[67][k][lane] * e->s[27][0][lane];
-        e->slope[69][k][lane] = sum[36][lane] + e->slope[57][0][lane] * e->slope[25][k][lane] + e->slope[57][k][lane] * e->slope[25][0][lane];
-        e->slope[70][k][lane] = sum[37][lane] + e->s[26][0][lane] * e->slope[69][k][lane] + e->s[26][k][lane] * e->slope[69][0][lane];
-        e->slope[71][k][lane] = 2.0 * e->slope[70][k][lane];
-        e->slope[72][k][lane] = e->slope[68][k][lane] - e->slope[71][k][lane];
-        e->slope[73][k][lane] = e->p[3][lane] * e->slope[72][k][lane];
-        e->slope[74][k][lane] = e->slope[65][k][lane] - e->slope[73][k][lane];
-        e->slope[75][k][lane] = sum[38][lane] + e->s[4][0][lane] * e->slope[21][k][lane] + e->s[4][k][lane] * e->slope[21][0][lane];
-        e->slope[76][k][lane] = 3.0 * e->slope[75][k][lane];
-        e->slope[77][k][lane] = e->slope[45][k][lane] - e->slope[76][k][lane];
-        e->slope[78][k][lane] = sum[39][lane] + e->s[27][0][lane] * e->slope[77][k][lane] + e->s[27][k][lane] * e->slope[77][0][lane];
-        e->slope[79][k][lane] = sum[40][lane] + e->s[31][0][lane] * e->slope[26][k][lane] + e->s[31][k][lane] * e->slope[26][0][lane];
-        e->slope[80][k][lane] = e->slope[78][k][lane] - e->slope[79][k][lane];
-        e->slope[81][k][lane] = e->p[3][lane] * e->slope[80][k][lane];
-        e->slope[82][k][lane] = e->p[0][lane] * e->slope[12][k][lane];
-        e->slope[83][k][lane] = sum[41][lane] + e->s[22][0][lane] * e->slope[12][k][lane] + e->s[22][k][lane] * e->slope[12][0][lane];
-        e->slope[84][k][lane] = e->p[2][lane] * e->slope[83][k][lane];
-        e->slope[85][k][lane] = e->slope[82][k][lane] + e->slope[84][k][lane];
-        e->slope[86][k][lane] = e->slope[81][k][lane] - e->slope[85][k][lane];
-        e->slope[87][k][lane] = sum[42][lane] + e->s[4][0][lane] * e->slope[47][k][lane] + e->s[4][k][lane] * e->slope[47][0][lane];
-        e->slope[88][k][lane] = sum[43][lane] + e->slope[87][0][lane] * e->s[27][k][lane] + e->slope[87][k][lane] * e->s[27][0][lane];
-        e->slope[89][k][lane] = -3.0 * e->slope[88][k][lane];
-        e->slope[90][k][lane] = sum[44][lane] + e->s[31][0][lane] * e->slope[52][k][lane] + e->s[31][k][lane] * e->slope[52][0][lane];
-        e->slope[91][k][lane] = e->slope[89][k][lane] - e->slope[90][k][lane];
-        e->slope[92][k][lane] = e->p[3][lane] * e->slope[91][k][lane];
-        e->slope[93][k][lane] = sum[45][lane] + e->s[22][0][lane] * e->slope[40][k][lane] + e->s[22][k][lane] * e->slope[40][0][lane];
-        e->slope[94][k][lane] = e->slope[14][k][lane] - e->slope[93][k][lane];
-        e->slope[95][k][lane] = e->p[2][lane] * e->slope[94][k][lane];
-        e->slope[96][k][lane] = e->p[0][lane] * e->slope[40][k][lane];
-        e->slope[97][k][lane] = e->slope[95][k][lane] - e->slope[96][k][lane];
-        e->slope[98][k][lane] = e->slope[92][k][lane] + e->slope[97][k][lane];
-        e->slope[99][k][lane] = sum[46][lane] + e->s[4][0][lane] * e->slope[66][k][lane] + e->s[4][k][lane] * e->slope[66][0][lane];
-        e->slope[100][k][lane] = sum[47][lane] + e->slope[99][0][lane] * e->s[27][k][lane] + e->slope[99][k][lane] * e->s[27][0][lane];
-        e->slope[101][k][lane] = sum[48][lane] + e->s[31][0][lane] * e->slope[69][k][lane] + e->s[31][k][lane] * e->slope[69][0][lane];
-        e->slope[102][k][lane] = 2.0 * e->slope[101][k][lane];
-        e->slope[103][k][lane] = e->slope[100][k][lane] - e->slope[102][k][lane];
-        e->slope[104][k][lane] = e->p[3][lane] * e->slope[103][k][lane];
-        e->slope[105][k][lane] = e->p[0][lane] * e->slope[59][k][lane];
-        e->slope[106][k][lane] = -2.0 * e->slope[105][k][lane];
-        e->slope[107][k][lane] = sum[49][lane] + e->s[22][0][lane] * e->slope[59][k][lane] + e->s[22][k][lane] * e->slope[59][0][lane];
-        e->slope[108][k][lane] = e->p[2][lane] * e->slope[107][k][lane];
-        e->slope[109][k][lane] = 2.0 * e->slope[108][k][lane];
-        e->slope[110][k][lane] = e->slope[106][k][lane] - e->slope[109][k][lane];
-        e->slope[111][k][lane] = e->slope[104][k][lane] + e->slope[110][k][lane];
-        e->slope[112][k][lane] = coef[4][lane] * e->slope[1][k][lane];
-        e->slope[113][k][lane] = sum[50][lane] + e->slope[112][0][lane] * e->s[23][k][lane] + e->slope[112][k][lane] * e->s[23][0][lane];
-        e->slope[114][k][lane] = 2.0 * e->slope[113][k][lane];
-        e->slope[115][k][lane] = sum[51][lane] + e->slope[20][0][lane] * e->s[40][k][lane] + e->slope[20][k][lane] * e->s[40][0][lane];
-        e->slope[116][k][lane] = 3.0 * e->slope[115][k][lane];
-        e->slope[117][k][lane] = e->slope[114][k][lane] - e->slope[116][k][lane];
-        e->slope[118][k][lane] = sum[52][lane] + e->s[3][0][lane] * e->slope[117][k][lane] + e->s[3][k][lane] * e->slope[117][0][lane];
-        e->slope[119][k][lane] = sum[53][lane] + e->s[27][0][lane] * e->slope[118][k][lane] + e->s[27][k][lane] * e->slope[118][0][lane];
-    }
-    guiding_centre_EACH_LANE
-    for (int lane = 0; lane < guiding_centre_LANES; ++lane) {
-        e->slope[120][k][lane] = sum[54][lane] + e->s[43][0][lane] * e->slope[26][k][lane] + e->s[43][k][lane] * e->slope[26][0][lane];
-        e->slope[121][k][lane] = e->slope[119][k][lane] - e->slope[120][k][lane];
-        e->slope[122][k][lane] = e->p[3][lane] * e->slope[121][k][lane];
-        e->slope[123][k][lane] = e->p[1][lane] * e->slope[83][k][lane];
-        e->slope[124][k][lane] = e->p[0][lane] * e->slope[16][k][lane];
-        e->slope[125][k][lane] = e->slope[123][k][lane] - e->slope[124][k][lane];
-        e->slope[126][k][lane] = e->slope[122][k][lane] + e->slope[125][k][lane];
-        e->slope[127][k][lane] = coef[4][lane] * e->slope[31][k][lane];
-        e->slope[128][k][lane] = sum[55][lane] + e->slope[127][0][lane] * e->s[23][k][lane] + e->slope[127][k][lane] * e->s[23][0][lane];
-        e->slope[129][k][lane] = 2.0 * e->slope[128][k][lane];
-        e->slope[130][k][lane] = sum[56][lane] + e->s[40][0][lane] * e->slope[46][k][lane] + e->s[40][k][lane] * e->slope[46][0][lane];
-        e->slope[131][k][lane] = 3.0 * e->slope[130][k][lane];
-        e->slope[132][k][lane] = e->slope[129][k][lane] - e->slope[131][k][lane];
-        e->slope[133][k][lane] = sum[57][lane] + e->s[3][0][lane] * e->slope[132][k][lane] + e->s[3][k][lane] * e->slope[132][0][lane];
-        e->slope[134][k][lane] = sum[58][lane] + e->s[27][0][lane] * e->slope[133][k][lane] + e->s[27][k][lane] * e->slope[133][0][lane];
-        e->slope[135][k][lane] = sum[59][lane] + e->s[43][0][lane] * e->slope[52][k][lane] + e->s[43][k][lane] * e->slope[52][0][lane];
-        e->slope[136][k][lane] = e->slope[134][k][lane] - e->slope[135][k][lane];
-        e->slope[137][k][lane] = e->p[3][lane] * e->slope[136][k][lane];
-        e->slope[138][k][lane] = e->p[0][lane] * e->slope[42][k][lane];
-        e->slope[139][k][lane] = e->p[1][lane] * e->slope[94][k][lane];
-        e->slope[140][k][lane] = e->slope[138][k][lane] - e->slope[139][k][lane];
-        e->slope[141][k][lane] = e->slope[137][k][lane] + e->slope[140][k][lane];
-        e->slope[142][k][lane] = sum[60][lane] + e->s[41][0][lane] * e->s[27][k][lane] + e->s[41][k][lane] * e->s[27][0][lane];
-        e->slope[143][k][lane] = sum[61][lane] + e->s[43][0][lane] * e->slope[69][k][lane] + e->s[43][k][lane] * e->slope[69][0][lane];
-        e->slope[144][k][lane] = 2.0 * e->slope[143][k][lane];
-        e->slope[145][k][lane] = e->slope[142][k][lane] - e->slope[144][k][lane];
-        e->slope[146][k][lane] = e->p[3][lane] * e->slope[145][k][lane];
-        e->slope[147][k][lane] = e->p[1][lane] * e->slope[107][k][lane];
-        e->slope[148][k][lane] = 2.0 * e->slope[147][k][lane];
-        e->slope[149][k][lane] = e->p[0][lane] * e->slope[62][k][lane];
-        e->slope[150][k][lane] = 2.0 * e->slope[149][k][lane];
-        e->slope[151][k][lane] = e->slope[148][k][lane] + e->slope[150][k][lane];
-        e->slope[152][k][lane] = e->slope[146][k][lane] + e->slope[151][k][lane];
-        e->slope[153][k][lane] = e->p[0][lane] * e->slope[28][k][lane];
-        e->slope[154][k][lane] = e->p[1][lane] * e->slope[80][k][lane];
-        e->slope[155][k][lane] = e->slope[153][k][lane] - e->slope[154][k][lane];
-        e->slope[156][k][lane] = e->p[2][lane] * e->slope[121][k][lane];
-        e->slope[157][k][lane] = e->slope[155][k][lane] - e->slope[156][k][lane];
-        e->slope[158][k][lane] = e->p[0][lane] * e->slope[54][k][lane];
-        e->slope[159][k][lane] = e->p[1][lane] * e->slope[91][k][lane];
-        e->slope[160][k][lane] = e->slope[158][k][lane] - e->slope[159][k][lane];
-        e->slope[161][k][lane] = e->p[2][lane] * e->slope[136][k][lane];
-        e->slope[162][k][lane] = e->slope[160][k][lane] - e->slope[161][k][lane];
-        e->slope[163][k][lane] = e->p[0][lane] * e->slope[72][k][lane];
-        e->slope[164][k][lane] = e->p[1][lane] * e->slope[103][k][lane];
-        e->slope[165][k][lane] = e->slope[163][k][lane] - e->slope[164][k][lane];
-        e->slope[166][k][lane] = e->p[2][lane] * e->slope[145][k][lane];
-        e->slope[167][k][lane] = e->slope[165][k][lane] - e->slope[166][k][lane];
-        e->slope[168][k][lane] = -e->s[17][k][lane];
-        e->slope[169][k][lane] = -e->s[28][k][lane];
-        e->slope[170][k][lane] = -e->s[18][k][lane];
-        e->slope[171][k][lane] = -e->s[35][k][lane];
-        e->slope[172][k][lane] = -e->s[32][k][lane];
-        e->slope[173][k][lane] = -e->s[44][k][lane];
-    }
-}
-
-/* Order k of the series, and with it order k + 1 of the coordinates. */
-static void guiding_centre_next_order(guiding_centre_lanes coef[restrict], guiding_centre_expansion *e, int k)
-{
-    static const int field[4] = { 30, 38, 49, 54 };
-    if (k > 0) guiding_centre_follow(coef, e, k);
-    for (int i = 0; i < 4; ++i) {
-        const double share = 1.0 / (k + 1);
-        guiding_centre_EACH_LANE
-        for (int lane = 0; lane < guiding_centre_LANES; ++lane) e->s[i][k + 1][lane] = share * e->s[field[i]][k][lane];
-    }
-}
-
-/* Begin to expand the paths with the middles m. */
-static void guiding_centre_begin(guiding_centre_lanes coef[restrict], guiding_centre_expansion *e, guiding_centre_lanes m[restrict 4])
-{
-    guiding_centre_lanes norm = { 0.0 };
-    guiding_centre_values_lanes(coef, e->p, m, e->value, e->fixed);
-    for (int i = 0; i < 55; ++i) memcpy(e->s[i][0], e->value[i], sizeof e->value[i]);
-    memset(e->even, 0, sizeof e->even);
-    memset(e->odd, 0, sizeof e->odd);
-    memset(e->mean, 0, sizeof e->mean);
-    guiding_centre_next_order(coef, e, 0);
-    e->terms = 0;
-    for (int i = 0; i < 4; ++i) {
-        guiding_centre_EACH_LANE
-        for (int lane = 0; lane < guiding_centre_LANES; ++lane) {
-            e->unit[i][lane] = fabs(m[i][lane]) + fabs(e->s[i][1][lane]) + DBL_MIN;
-            norm[lane] += e->unit[i][lane];
-        }
-    }
-    for (int i = 0; i < 4; ++i) {
-        guiding_centre_EACH_LANE
-        for (int lane = 0; lane < guiding_centre_LANES; ++lane) e->unit[i][lane] = 1.0 / (e->unit[i][lane] + 1e-5 * norm[lane]);
-    }
-}
-
-/* Add the terms of the odd order k and of the next; their size. */
-static double guiding_centre_add_terms(guiding_centre_expansion *e, int k)
-{
-    guiding_centre_lanes size = { 0.0 };
-    const double share = 1.0 / (k + 2);
-    for (int i = 0; i < 4; ++i) {
-        guiding_centre_EACH_LANE
-        for (int lane = 0; lane < guiding_centre_LANES; ++lane) {
-            const double odd = e->s[i][k][lane], even = e->s[i][k + 1][lane];
-            e->odd[i][lane] += odd;
-            e->even[i][lane] += even;
-            e->mean[i][lane] += share * even;
-            size[lane] += (fabs(odd) + fabs(even)) * e->unit[i][lane];
-        }
-    }
-    return guiding_centre_largest_finite(size);
-}
-
-/* Go on by two orders at a time, until these are below accuracy in all lanes that are finite, or 16 are known: whether
-   they suffice is checked at the ends. */
-static void guiding_centre_extend(guiding_centre_lanes coef[restrict], guiding_centre_expansion *e, double accuracy)
-{
-    double size = HUGE_VAL;
-    for (; e->terms < 16 && size > accuracy; e->terms += 2) {
-        if (e->terms > 0) guiding_centre_next_order(coef, e, e->terms);
-        guiding_centre_next_order(coef, e, e->terms + 1);
-        size = guiding_centre_add_terms(e, e->terms + 1);
-    }
-}
-
-/* guiding_centre_holds in all lanes, at one end of the paths, where the expansions have the given slope: infinite where the
-   equation does not hold. */
-static void guiding_centre_check_end(guiding_centre_lanes coef[restrict], guiding_centre_expansion *e, guiding_centre_lanes m[restrict 4],
-    guiding_centre_lanes slope[restrict 4], guiding_centre_lanes wrong)
-{
-    static const int field[4] = { 30, 38, 49, 54 };
-    guiding_centre_lanes value[55], fixed[1], scale = { 0.0 };
-    guiding_centre_values_lanes(coef, e->p, m, value, fixed);
-    for (int i = 0; i < 4; ++i) {
-        guiding_centre_EACH_LANE
-        for (int lane = 0; lane < guiding_centre_LANES; ++lane) scale[lane] += fabs(m[i][lane]) + fabs(slope[i][lane]);
-    }
-    for (int i = 0; i < 4; ++i) {
-        guiding_centre_EACH_LANE
-        for (int lane = 0; lane < guiding_centre_LANES; ++lane) {
-            const double off = fabs(value[field[i]][lane] - slope[i][lane]);
-            wrong[lane] += off <= 2e-15 * scale[lane] ? 0.0 : HUGE_VAL;
-        }
-    }
-}
-
-/* The same at both ends. */
-static void guiding_centre_check_ends(guiding_centre_lanes coef[restrict], guiding_centre_expansion *e, guiding_centre_lanes wrong)
-{
-    guiding_centre_lanes start[4], end[4], start_slope[4], end_slope[4];
-    for (int i = 0; i < 4; ++i) {
-        guiding_centre_lanes even = { 0.0 }, odd = { 0.0 };
-        for (int k = 1; k < e->terms; k += 2) {
-            guiding_centre_EACH_LANE
-            for (int lane = 0; lane < guiding_centre_LANES; ++lane) {
-                odd[lane] += k * e->s[i][k][lane];
-                even[lane] += (k + 1) * e->s[i][k + 1][lane];
-            }
-        }
-        guiding_centre_EACH_LANE
-        for (int lane = 0; lane < guiding_centre_LANES; ++lane) {
-            start[i][lane] = e->s[i][0][lane] + (e->even[i][lane] - e->odd[i][lane]);
-            end[i][lane] = e->s[i][0][lane] + (e->even[i][lane] + e->odd[i][lane]);
-            start_slope[i][lane] = odd[lane] - even[lane];
-            end_slope[i][lane] = odd[lane] + even[lane];
-        }
-    }
-    guiding_centre_check_end(coef, e, start, start_slope, wrong);
-    guiding_centre_check_end(coef, e, end, end_slope, wrong);
-}
-
-/* Begin to expand the paths with mean y, from their middles as far as these are known. */
-static void guiding_centre_begin_at(guiding_centre_lanes coef[restrict], const guiding_centre_model *model, guiding_centre_expansion *e)
-{
-    guiding_centre_lanes m[4];
-    for (int i = 0; i < 4; ++i) {
-        guiding_centre_EACH_LANE
-        for (int lane = 0; lane < guiding_centre_LANES; ++lane) m[i][lane] = model->y[i][lane] + model->middle[i][lane];
-    }
-    guiding_centre_begin(coef, e, m);
-}
-
-/* Find the middles by iteration, which gains some digits each time, with expansions as short as that allows; the last
-   can be gone on with. Infinite where that does not converge. */
-static void guiding_centre_settle(guiding_centre_lanes coef[restrict], guiding_centre_model *model, guiding_centre_expansion *e)
-{
-    guiding_centre_lanes size, norm;
-    double left = 1.0;
-    memset(model->middle, 0, sizeof model->middle);
-    for (int round = 0; left > 1e-9 && round < 12; ++round) {
-        for (int i = 0; i < 4 && round > 0; ++i) {
-            guiding_centre_EACH_LANE
-            for (int lane = 0; lane < guiding_centre_LANES; ++lane) model->middle[i][lane] = -e->mean[i][lane];
-        }
-        guiding_centre_begin_at(coef, model, e);
-        guiding_centre_extend(coef, e, 1e-4 * left);
-        memset(size, 0, sizeof size);
-        memset(norm, 0, sizeof norm);
-        for (int i = 0; i < 4; ++i) {
-            guiding_centre_EACH_LANE
-            for (int lane = 0; lane < guiding_centre_LANES; ++lane) {
-                size[lane] += fabs(model->middle[i][lane] + e->mean[i][lane]);
-                norm[lane] += fabs(model->y[i][lane]);
-            }
-        }
-        guiding_centre_EACH_LANE
-        for (int lane = 0; lane < guiding_centre_LANES; ++lane) size[lane] /= norm[lane] + DBL_MIN;
-        left = guiding_centre_largest_finite(size);
-        if (left > 1.0) left = 1.0;
-    }
-    for (int lane = 0; lane < guiding_centre_LANES && left > 1e-9; ++lane)
-        if (size[lane] > 1e-9) model->middle[0][lane] = HUGE_VAL;
-}
-
-/* Half of p: paths take the time from -1 to 1. */
-static void guiding_centre_halve(guiding_centre_lanes p[restrict 4])
-{
-    for (int i = 0; i < 4; ++i) {
-        guiding_centre_EACH_LANE
-        for (int lane = 0; lane < guiding_centre_LANES; ++lane) p[i][lane] *= 0.5;
-    }
-}
-
-/* alpha - y and beta - alpha to leading order, from one short expansion. */
-static void guiding_centre_evaluate_lanes(guiding_centre_lanes coef[restrict], guiding_centre_lanes y[restrict 4],
-    guiding_centre_lanes displacement[restrict 4], guiding_centre_lanes increment[restrict 4])
-{
-    guiding_centre_expansion e;
-    guiding_centre_momentum_lanes(coef, y, e.p);
-    guiding_centre_halve(e.p);
-    guiding_centre_begin(coef, &e, y);
-    guiding_centre_extend(coef, &e, 1e-6);
-    for (int i = 0; i < 4; ++i) {
-        guiding_centre_EACH_LANE
-        for (int lane = 0; lane < guiding_centre_LANES; ++lane) {
-            displacement[i][lane] = (e.even[i][lane] - e.odd[i][lane]) - e.mean[i][lane];
-            increment[i][lane] = 2.0 * e.odd[i][lane];
-        }
-    }
-}
-
-/* What order j of d(pi p)/dm contributes to order k + 1 of the derivatives. */
-static void guiding_centre_vary_by(guiding_centre_expansion *e, int j, int k)
-{
-    guiding_centre_lanes *from = e->v[k - j], *to = e->v[k + 1];
-    const double share = 1.0 / (k + 1);
-    guiding_centre_EACH_LANE
-    for (int lane = 0; lane < guiding_centre_LANES; ++lane) {
-        const double a00 = share * e->slope[30][j][lane];
-        const double a01 = share * e->slope[56][j][lane];
-        const double a03 = share * e->slope[74][j][lane];
-        const double a10 = share * e->slope[86][j][lane];
-        const double a11 = share * e->slope[98][j][lane];
-        const double a13 = share * e->slope[111][j][lane];
-        const double a20 = share * e->slope[126][j][lane];
-        const double a21 = share * e->slope[141][j][lane];
-        const double a23 = share * e->slope[152][j][lane];
-        const double a30 = share * e->slope[157][j][lane];
-        const double a31 = share * e->slope[162][j][lane];
-        const double a33 = share * e->slope[167][j][lane];
-        to[0][lane] += a00 * from[0][lane] + a01 * from[8][lane] + a03 * from[24][lane];
-        to[1][lane] += a00 * from[1][lane] + a01 * from[9][lane] + a03 * from[25][lane];
-        to[2][lane] += a00 * from[2][lane] + a01 * from[10][lane] + a03 * from[26][lane];
-        to[3][lane] += a00 * from[3][lane] + a01 * from[11][lane] + a03 * from[27][lane];
-        to[4][lane] += a00 * from[4][lane] + a01 * from[12][lane] + a03 * from[28][lane];
-        to[5][lane] += a00 * from[5][lane] + a01 * from[13][lane] + a03 * from[29][lane];
-        to[6][lane] += a00 * from[6][lane] + a01 * from[14][lane] + a03 * from[30][lane];
-        to[7][lane] += a00 * from[7][lane] + a01 * from[15][lane] + a03 * from[31][lane];
-        to[8][lane] += a10 * from[0][lane] + a11 * from[8][lane] + a13 * from[24][lane];
-        to[9][lane] += a10 * from[1][lane] + a11 * from[9][lane] + a13 * from[25][lane];
-        to[10][lane] += a10 * from[2][lane] + a11 * from[10][lane] + a13 * from[26][lane];
-        to[11][lane] += a10 * from[3][lane] + a11 * from[11][lane] + a13 * from[27][lane];
-        to[12][lane] += a10 * from[4][lane] + a11 * from[12][lane] + a13 * from[28][lane];
-        to[13][lane] += a10 * from[5][lane] + a11 * from[13][lane] + a13 * from[29][lane];
-        to[14][lane] += a10 * from[6][lane] + a11 * from[14][lane] + a13 * from[30][lane];
-        to[15][lane] += a10 * from[7][lane] + a11 * from[15][lane] + a13 * from[31][lane];
-        to[16][lane] += a20 * from[0][lane] + a21 * from[8][lane] + a23 * from[24][lane];
-        to[17][lane] += a20 * from[1][lane] + a21 * from[9][lane] + a23 * from[25][lane];
-        to[18][lane] += a20 * from[2][lane] + a21 * from[10][lane] + a23 * from[26][lane];
-        to[19][lane] += a20 * from[3][lane] + a21 * from[11][lane] + a23 * from[27][lane];
-        to[20][lane] += a20 * from[4][lane] + a21 * from[12][lane] + a23 * from[28][lane];
-        to[21][lane] += a20 * from[5][lane] + a21 * from[13][lane] + a23 * from[29][lane];
-        to[22][lane] += a20 * from[6][lane] + a21 * from[14][lane] + a23 * from[30][lane];
-        to[23][lane] += a20 * from[7][lane] + a21 * from[15][lane] + a23 * from[31][lane];
-        to[24][lane] += a30 * from[0][lane] + a31 * from[8][lane] + a33 * from[24][lane];
-        to[25][lane] += a30 * from[1][lane] + a31 * from[9][lane] + a33 * from[25][lane];
-        to[26][lane] += a30 * from[2][lane] + a31 * from[10][lane] + a33 * from[26][lane];
-        to[27][lane] += a30 * from[3][lane] + a31 * from[11][lane] + a33 * from[27][lane];
-        to[28][lane] += a30 * from[4][lane] + a31 * from[12][lane] + a33 * from[28][lane];
-        to[29][lane] += a30 * from[5][lane] + a31 * from[13][lane] + a33 * from[29][lane];
-        to[30][lane] += a30 * from[6][lane] + a31 * from[14][lane] + a33 * from[30][lane];
-        to[31][lane] += a30 * from[7][lane] + a31 * from[15][lane] + a33 * from[31][lane];
-    }
-}
-
-/* Order k + 1 of the derivatives; order 0 is 1 along the middle, and 0 along p. */
-static void guiding_centre_vary_order(guiding_centre_expansion *e, int k)
-{
-    guiding_centre_lanes *to = e->v[k + 1];
-    const double share = 1.0 / (k + 1);
-    memset(to, 0, 32 * sizeof to[0]);
-    guiding_centre_EACH_LANE
-    for (int lane = 0; lane < guiding_centre_LANES; ++lane) {
-        to[0][lane] += share * e->slope[30][k][lane];
-        to[1][lane] += share * e->slope[56][k][lane];
-        to[3][lane] += share * e->slope[74][k][lane];
-        to[8][lane] += share * e->slope[86][k][lane];
-        to[9][lane] += share * e->slope[98][k][lane];
-        to[11][lane] += share * e->slope[111][k][lane];
-        to[16][lane] += share * e->slope[126][k][lane];
-        to[17][lane] += share * e->slope[141][k][lane];
-        to[19][lane] += share * e->slope[152][k][lane];
-        to[24][lane] += share * e->slope[157][k][lane];
-        to[25][lane] += share * e->slope[162][k][lane];
-        to[27][lane] += share * e->slope[167][k][lane];
-        to[5][lane] += 0.5 * share * e->slope[168][k][lane];
-        to[6][lane] += 0.5 * share * e->s[18][k][lane];
-        to[7][lane] += 0.5 * share * e->slope[169][k][lane];
-        to[12][lane] += 0.5 * share * e->s[17][k][lane];
-        to[14][lane] += 0.5 * share * e->s[35][k][lane];
-        to[15][lane] += 0.5 * share * e->s[32][k][lane];
-        to[20][lane] += 0.5 * share * e->slope[170][k][lane];
-        to[21][lane] += 0.5 * share * e->slope[171][k][lane];
-        to[23][lane] += 0.5 * share * e->s[44][k][lane];
-        to[28][lane] += 0.5 * share * e->s[28][k][lane];
-        to[29][lane] += 0.5 * share * e->slope[172][k][lane];
-        to[30][lane] += 0.5 * share * e->slope[173][k][lane];
-    }
-    for (int j = 0; j < k; ++j) guiding_centre_vary_by(e, j, k);
-}
-
-/* Add the terms of the odd order k of the derivatives and of the next, and measure them: those along the middle beside 1,
-   those along p beside their first. */
-static void guiding_centre_add_slopes(guiding_centre_expansion *e, int k, guiding_centre_lanes size)
-{
-    guiding_centre_lanes parts[2] = { { 0.0 } }, first = { 0.0 };
-    const double share = 1.0 / (k + 2);
-    for (int i = 0; i < 32; ++i) {
-        const int part = i % 8 / 4;
-        guiding_centre_EACH_LANE
-        for (int lane = 0; lane < guiding_centre_LANES; ++lane) {
-            const double odd = e->v[k][i][lane], even = e->v[k + 1][i][lane];
-            e->v_odd[i][lane] += odd;
-            e->v_even[i][lane] += even;
-            e->v_mean[i][lane] += share * even;
-            parts[part][lane] += fabs(odd) + fabs(even);
-            first[lane] += fabs(e->v[1][i][lane]);
-        }
-    }
-    guiding_centre_EACH_LANE
-    for (int lane = 0; lane < guiding_centre_LANES; ++lane)
-        size[lane] = parts[0][lane] + parts[1][lane] / (first[lane] + DBL_MIN);
-}
-
-/* The derivatives of the paths along their middles and p, to seven digits: what that leaves of a correction is below
-   rounding when it is accepted. Infinite where 8 terms do not suffice. */
-static void guiding_centre_vary(guiding_centre_lanes coef[restrict], guiding_centre_expansion *e)
-{
-    guiding_centre_lanes slope[174], size;
-    double largest = 1.0, next = 1.0; /* the last two orders, and what is to be expected of the next */
-    guiding_centre_slope_values_lanes(coef, e->p, e->value, e->fixed, slope, e->slope_fixed);
-    for (int i = 0; i < 174; ++i) memcpy(e->slope[i][0], slope[i], sizeof slope[i]);
-    memset(e->v_even, 0, sizeof e->v_even);
-    memset(e->v_odd, 0, sizeof e->v_odd);
-    memset(e->v_mean, 0, sizeof e->v_mean);
-    for (int i = 0; i < 4; ++i) {
-        guiding_centre_EACH_LANE
-        for (int lane = 0; lane < guiding_centre_LANES; ++lane)
-            e->v_even[i * 8 + i][lane] = e->v_mean[i * 8 + i][lane] = 1.0;
-    }
-    for (int k = 0; k < 8 && next > 1e-07; ++k) {
-        if (k >= e->terms) guiding_centre_next_order(coef, e, k);
-        if (k > 0) guiding_centre_follow_slopes(coef, e, k);
-        guiding_centre_vary_order(e, k);
-        if (k % 2 == 0) continue;
-        guiding_centre_add_slopes(e, k, size);
-        const double previous = largest;
-        largest = guiding_centre_largest_finite(size);
-        next = largest * (largest / previous);
-    }
-    for (int lane = 0; lane < guiding_centre_LANES && next > 1e-07; ++lane)
-        if (size[lane] > 1e-07) e->v_mean[0][lane] = HUGE_VAL;
-}
-
-/* alpha - y and beta - alpha from an expansion whose mean misses y by little, to first order in that. */
-static void guiding_centre_read_ends(guiding_centre_model *model, guiding_centre_expansion *e, const guiding_centre_lanes wrong)
-{
-    guiding_centre_lanes miss[4];
-    for (int i = 0; i < 4; ++i) {
-        guiding_centre_EACH_LANE
-        for (int lane = 0; lane < guiding_centre_LANES; ++lane) {
-            miss[i][lane] = model->middle[i][lane] + e->mean[i][lane];
-            model->displacement[i][lane] = ((model->middle[i][lane] + e->even[i][lane]) - e->odd[i][lane]) + wrong[lane];
-            model->increment[i][lane] = 2.0 * e->odd[i][lane];
-            model->middle[i][lane] = -e->mean[i][lane];
-        }
-    }
-    for (int i = 0; i < 4; ++i)
-        for (int j = 0; j < 4; ++j) {
-            guiding_centre_EACH_LANE
-            for (int lane = 0; lane < guiding_centre_LANES; ++lane) {
-                model->displacement[i][lane] -= model->alpha_y[i * 4 + j][lane] * miss[j][lane];
-                model->increment[i][lane] -= model->increment_y[i * 4 + j][lane] * miss[j][lane];
-            }
-        }
-}
-
-/* The matrices of a stage, from the derivatives of the paths and the Hessian of S_h. */
-static void guiding_centre_linearise_paths(guiding_centre_lanes coef[restrict], guiding_centre_model *model, guiding_centre_expansion *e,
-    guiding_centre_lanes hessian[restrict 16])
-{
-    guiding_centre_lanes jacobian[16], reciprocal[2 * 4];
-    guiding_centre_vary(coef, e);
-    guiding_centre_along_mean_lanes(e->v_even, e->v_odd, e->v_mean, hessian, model->alpha_y, model->increment_y, jacobian,
-        model->slope, reciprocal);
-    guiding_centre_invert_lanes(jacobian, model->slope, model->inverse, model->gain, reciprocal + 4);
-    for (int i = 0; i < 2 * 4; ++i) {
-        guiding_centre_EACH_LANE
-        for (int lane = 0; lane < guiding_centre_LANES; ++lane)
-            model->inverse[i % 4][lane] += fabs(reciprocal[i][lane]) < 1e3 ? 0.0 : HUGE_VAL;
-    }
-}
-
-/* The table of a stage, with its matrices or with those of the last pass. */
-static void guiding_centre_update(guiding_centre_lanes coef[restrict], guiding_centre_model *model, int matrices)
-{
-    guiding_centre_expansion e;
-    guiding_centre_lanes hessian[16], wrong = { 0.0 };
-    if (matrices) guiding_centre_curvature_lanes(coef, model->y, e.p, hessian);
-    else guiding_centre_momentum_lanes(coef, model->y, e.p);
-    guiding_centre_halve(e.p);
-    if (matrices) guiding_centre_settle(coef, model, &e);
-    else guiding_centre_begin_at(coef, model, &e);
-    guiding_centre_extend(coef, &e, 1e-17);
-    guiding_centre_check_ends(coef, &e, wrong);
-    if (matrices) guiding_centre_linearise_paths(coef, model, &e, hessian);
-    guiding_centre_read_ends(model, &e, wrong);
-}
-
-/* The steps of a block one after the other, each along the linear model of its lane. As X, the state with its carry, gains
-   increment - gain residual, the next residual follows from this one; X itself is added up apart. */
-static void guiding_centre_chain(guiding_centre_model model[5], double x[4], double carry[4])
-{
-    double residual[4], sum[4], small[4];
-    for (int i = 0; i < 4; ++i) {
-        residual[i] = ((model->y[i][0] - x[i]) + model->displacement[i][0]) - carry[i];
-        sum[i] = x[i];
-        small[i] = carry[i];
-    }
-    for (int k = 0; k < 5 * guiding_centre_LANES; ++k) {
-        const int lane = k / 5, after = (k + 1) / 5 % guiding_centre_LANES;
-        guiding_centre_model *at = &model[k % 5], *next = &model[(k + 1) % 5];
-        double even[4] = { 0.0 }, odd[4] = { 0.0 }; /* two sums, so that no long chain of additions is waited for */
-        for (int i = 0; i < 4; ++i) {
-            at->residual[i][lane] = residual[i];
-            for (int j = 0; j < 4; j += 2) even[i] += at->gain[i * 4 + j][lane] * residual[j];
-            for (int j = 1; j < 4; j += 2) odd[i] += at->gain[i * 4 + j][lane] * residual[j];
-        }
-        for (int i = 0; i < 4; ++i) {
-            const double change = at->increment[i][lane], total = sum[i] + change, added = total - sum[i];
-            const double turn = (next->displacement[i][after] - at->displacement[i][lane]) - change;
-            const double moved = (next->y[i][after] - at->y[i][lane]) + turn;
-            residual[i] = ((moved + residual[i]) + odd[i]) + even[i];
-            small[i] += ((sum[i] - (total - added)) + (change - added)) - (even[i] + odd[i]);
-            sum[i] = total;
-        }
-    }
-    for (int i = 0; i < 4; ++i) {
-        x[i] = sum[i] + small[i];
-        carry[i] = small[i] - (x[i] - sum[i]);
-    }
-}
-
-/* Bring the table up to date: coefficients, and weights that were fitted since. */
-static void guiding_centre_refresh(const guiding_centre_solver *s, guiding_centre_table *table)
-{
-    for (int stage = 0; stage < 5; ++stage) {
-        if (table->fits[stage] == s->memory[stage].fits) continue;
-        table->fits[stage] = s->memory[stage].fits;
-        for (int k = 0; k < 5; ++k)
-            for (int lane = 0; lane < guiding_centre_LANES; ++lane) table->coef[stage][k][lane] = s->coef[stage][k];
-        memcpy(table->weight[stage], s->memory[stage].weight, (size_t)s->memory[stage].terms * sizeof table->weight[0][0]);
-    }
-}
-
-/* Guesses for the next guiding_centre_LANES values of a stage, by its recurrences. */
-static void guiding_centre_foresee(const guiding_centre_memory *memory, guiding_centre_lanes weight[restrict][4],
-    guiding_centre_lanes y[restrict 4])
-{
-    const int last = memory->count - 1;
-    for (int i = 0; i < 4; ++i) {
-        guiding_centre_lanes even = { 0.0 }, odd = { 0.0 };
-        for (int k = 0; k < memory->terms; k += 2) {
-            const double past = memory->past[last - k][i], earlier = memory->past[last - 1 - k][i];
-            guiding_centre_EACH_LANE
-            for (int lane = 0; lane < guiding_centre_LANES; ++lane) even[lane] += weight[k][i][lane] * past;
-            guiding_centre_EACH_LANE
-            for (int lane = 0; lane < guiding_centre_LANES; ++lane) odd[lane] += weight[k + 1][i][lane] * earlier;
-        }
-        guiding_centre_EACH_LANE
-        for (int lane = 0; lane < guiding_centre_LANES; ++lane) y[i][lane] = even[lane] + odd[lane];
-    }
-}
-
-/* guiding_centre_record for the values of all lanes, one after the other. */
-static void guiding_centre_record_lanes(guiding_centre_memory *memory, guiding_centre_lanes y[restrict 4])
-{
-    guiding_centre_make_room(memory, guiding_centre_LANES);
-    for (int lane = 0; lane < guiding_centre_LANES; ++lane)
-        for (int i = 0; i < 4; ++i) memory->past[memory->count + lane][i] = y[i][lane];
-    memory->count += guiding_centre_LANES;
-}
-
-/* Guesses where no recurrence is known: where alpha and beta have the means of steps by the classical Runge-Kutta
-   method, to leading order. */
-static void guiding_centre_march(const guiding_centre_solver *s, guiding_centre_table *table, guiding_centre_model model[5])
-{
-    static const double reach[4] = { 0.5, 0.5, 1.0, 0.0 }, weight[4] = { 1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0 };
-    double x[4], point[4], slope[4], mean[4];
-    memcpy(x, s->x, sizeof x);
-    for (int k = 0; k < 5 * guiding_centre_LANES; ++k) {
-        const double h = guiding_centre_fractions[k % 5] * s->h;
-        memcpy(point, x, sizeof x);
-        memset(mean, 0, sizeof mean);
-        for (int part = 0; part < 4; ++part) {
-            guiding_centre_vector_field(&s->params, point, slope);
-            for (int i = 0; i < 4; ++i) {
-                mean[i] += weight[part] * slope[i];
-                point[i] = x[i] + h * reach[part] * slope[i];
-            }
-        }
-        for (int i = 0; i < 4; ++i) {
-            model[k % 5].y[i][k / 5] = x[i] + 0.5 * h * mean[i];
-            x[i] += h * mean[i];
-        }
-    }
-    for (int stage = 0; stage < 5; ++stage) {
-        guiding_centre_model *at = &model[stage];
-        guiding_centre_evaluate_lanes(table->coef[stage], at->y, at->displacement, at->increment);
-        for (int i = 0; i < 4; ++i) {
-            guiding_centre_EACH_LANE
-            for (int lane = 0; lane < guiding_centre_LANES; ++lane)
-                at->y[i][lane] -= at->displacement[i][lane] + 0.5 * at->increment[i][lane];
-        }
-    }
-}
-
-/* guiding_centre_LANES steps at once: guess the points of all, and correct them together until the error that remains is as
-   small as after a single step. How many passes that took; 0, and the solver as before, where it takes more than most. */
-static int guiding_centre_block(guiding_centre_solver *s, guiding_centre_table *table, int most)
-{
-    guiding_centre_model model[5];
-    guiding_centre_lanes sizes;
-    double x[4], carry[4], previous = HUGE_VAL, bend = 0.0, bound = HUGE_VAL;
-    int passes = 0, solved = 0;
-    if (!s->foreseeing) guiding_centre_march(s, table, model);
-    for (int stage = 0; stage < 5; ++stage) {
-        if (s->foreseeing) guiding_centre_foresee(&s->memory[stage], table->weight[stage], model[stage].y);
-        if (!guiding_centre_near_lanes(model[stage].y, s->x)) return 0;
-    }
-    while (!solved) {
-        double size = 0.0;
-        const int matrices = previous > 1e-05;
-        for (int stage = 0; stage < 5; ++stage) guiding_centre_update(table->coef[stage], &model[stage], matrices);
-        memcpy(x, s->x, sizeof x);
-        memcpy(carry, s->carry, sizeof carry);
-        guiding_centre_chain(model, x, carry);
-        for (int stage = 0; stage < 5; ++stage) {
-            guiding_centre_correct(&model[stage], sizes);
-            const double largest = guiding_centre_largest(sizes);
-            size = largest > size ? largest : size;
-        }
-        s->evaluations += 5 * guiding_centre_LANES;
-        bend = matrices ? 0.0 : bend + previous;
-        bound = guiding_centre_remaining(size, bend, bound);
-        /* The second test: after the square of so small a correction there is rounding only. */
-        solved = bound <= 1e-20 || (previous < 1e-8 && size < 1e-10);
-        if ((++passes >= most || !(size < previous)) && !solved) return 0;
-        previous = size;
-    }
-    for (int stage = 0; stage < 5; ++stage)
-        if (!guiding_centre_near_lanes(model[stage].y, s->x)) return 0;
-    for (int i = 0; i < 4; ++i)
-        if (!isfinite(x[i])) return 0;
-    memcpy(s->x, x, sizeof x);
-    memcpy(s->carry, carry, sizeof carry);
-    s->steps += guiding_centre_LANES;
-    for (int stage = 0; stage < 5; ++stage) {
-        guiding_centre_memory *memory = &s->memory[stage];
-        guiding_centre_record_lanes(memory, model[stage].y);
-        memory->slow = passes > 1 ? memory->slow + guiding_centre_LANES : 0;
-        if (memory->slow > memory->patience && s->foreseeing) guiding_centre_fit(memory);
-    }
-    return passes;
-}
-
-/* Recurrences are given up for a while, the longer the more often that happens. */
-static void guiding_centre_give_up(guiding_centre_solver *s)
-{
-    s->foreseeing = s->setback = s->pause = 0;
-    s->doubt = 2 * s->doubt + 600;
-    s->retry = s->steps + s->doubt;
-}
-
-/* How the next block is guessed: by recurrences, fitted as soon as enough steps are to be made, or
-   have been, to repay that. */
-static void guiding_centre_choose_guess(guiding_centre_solver *s, size_t steps)
-{
-    for (int stage = 0; stage < 5; ++stage)
-        if (s->memory[stage].count < 111) {
-            s->foreseeing = 0;
-            return;
-        }
-    if (s->foreseeing || (steps < 600 && s->steps < 150) || s->steps < s->retry) return;
-    s->foreseeing = 1;
-    for (int stage = 0; stage < 5 && s->foreseeing; ++stage) {
-        guiding_centre_fit(&s->memory[stage]);
-        s->foreseeing = s->memory[stage].terms > 0;
-    }
-    s->pause = guiding_centre_LANES;
-    if (!s->foreseeing) guiding_centre_give_up(s);
-}
-
-/* Learn from a block: after one that failed single steps are made, the more the more often that happens. Recurrences
-   that fail repeatedly, or need more passes than steps by Runge-Kutta did, are given up. */
-static void guiding_centre_learn_from(guiding_centre_solver *s, int passes)
-{
-    if (passes > 0) {
-        s->setback /= 2;
-    } else {
-        s->setback = 2 * s->setback + guiding_centre_LANES > 1000 ? 1000 : 2 * s->setback + guiding_centre_LANES;
-        s->pause = s->setback;
-    }
-    if (!s->foreseeing) {
-        s->passes = passes > 0 ? passes : INT_MAX;
-    } else if (passes > s->passes || s->setback > 5 * guiding_centre_LANES) {
-        guiding_centre_give_up(s);
-    }
-}
-
-/* A single step, and the running mean of the evaluations that a stage of one takes. */
-static guiding_centre_status guiding_centre_single(guiding_centre_solver *s)
-{
-    const size_t before = s->evaluations;
-    const guiding_centre_status status = guiding_centre_step(s, s->h);
-    s->effort += 0.125 * ((double)(s->evaluations - before) / 5 - s->effort);
-    return status;
-}
-
-/* Blocks of steps where they cost less than single steps, with at most as many passes over a block as 1 for each
-   evaluation in a single step. The results differ by round-off only. */
 guiding_centre_status guiding_centre_integrate(guiding_centre_solver *s, double h, size_t steps)
 {
-    guiding_centre_table table;
     guiding_centre_status status = guiding_centre_set_step(s, h);
-    for (int stage = 0; stage < 5; ++stage) table.fits[stage] = -1;
-    while (status == guiding_centre_OK && steps > 0) {
-        if (steps >= guiding_centre_LANES && s->pause == 0) guiding_centre_choose_guess(s, steps);
-        if (steps >= guiding_centre_LANES && s->pause == 0) {
-            guiding_centre_refresh(s, &table);
-            const int passes = guiding_centre_block(s, &table, (int)(1 * s->effort + 0.5));
-            guiding_centre_learn_from(s, passes);
-            if (passes > 0) steps -= guiding_centre_LANES;
-        } else {
-            if (s->pause > 0) --s->pause;
-            status = guiding_centre_single(s);
-            if (status == guiding_centre_OK) --steps;
-        }
-    }
+    for (; steps > 0 && status == guiding_centre_OK; --steps) status = guiding_centre_step(s, h);
     return status;
 }
 
+const char *guiding_centre_status_string(guiding_centre_status status)
+{
+    static const char *const text[] = {
+        "ok",
+        "no convergence: the step is too large",
+        "singular Newton matrix: the step is too large",
+        "not finite: overflow, or outside the domain",
+        "bad argument: a null pointer, or values that are not allowed"
+    };
+    return (unsigned)status <= guiding_centre_BAD_ARGUMENT ? text[status] : "unknown status";
+}
+
+size_t guiding_centre_solver_size(void) { return sizeof(guiding_centre_solver); }
+
+size_t guiding_centre_solver_steps_done(const guiding_centre_solver *s) { return s->steps; }
+
+/* ---- Ensembles ---- */
 guiding_centre_status guiding_centre_ensemble(const guiding_centre_params *params, double *x, size_t members,
-                                              double h, size_t steps, unsigned char *status)
+    double h, size_t steps, unsigned char *status)
 {
     guiding_centre_status worst = isfinite(h) ? guiding_centre_OK : guiding_centre_BAD_ARGUMENT;
     const guiding_centre_params own = params != NULL ? *params : guiding_centre_default_params;
     if (x == NULL && members > 0) return guiding_centre_BAD_ARGUMENT;
     for (size_t m = 0; m < members; ++m) {
         guiding_centre_solver s;
-        double x0[4];
-        for (size_t i = 0; i < 4; ++i) x0[i] = x[i * members + m];
+        double x0[guiding_centre_DIM];
+        for (size_t i = 0; i < guiding_centre_DIM; ++i) x0[i] = x[i * members + m];
         guiding_centre_status member = guiding_centre_init(&s, &own, x0);
         if (member == guiding_centre_OK) {
             member = guiding_centre_integrate(&s, h, steps);
-            for (size_t i = 0; i < 4; ++i) x[i * members + m] = s.x[i];
+            for (size_t i = 0; i < guiding_centre_DIM; ++i) x[i * members + m] = s.x[i];
         }
         if (status != NULL) status[m] = (unsigned char)member;
         if (worst == guiding_centre_OK) worst = member;
     }
     return worst;
 }
-
-#if defined(__clang__)
-#pragma clang diagnostic pop
-#endif
-
-/* the Hamiltonian */
-static void guiding_centre_energy(const guiding_centre_params *params, const double x[4],
-                                  double energy[restrict 1])
-{
-    const double x_ = x[0];
-    const double y = x[1];
-    const double z = x[2];
-    const double u = x[3];
-    const double t1 = 0.5 * (params->k * (z * z)) + (0.5 * (u * u) + params->mu * sqrt(1.0 + params->kappa * params->kappa * (x_ * x_ + y * y)));
-    energy[0] = t1;
-}
-
-/* the Casimirs */
-static void guiding_centre_casimir_values(const guiding_centre_params *params, const double x[4],
-                                          double out[restrict 1])
-{
-    (void)params;
-    (void)x;
-    (void)out;
-}
-
-/* pi(x) grad H(x) */
-static void guiding_centre_field(const guiding_centre_params *params, const double x[4],
-                                 double out[restrict 4])
-{
-    const double x_ = x[0];
-    const double y = x[1];
-    const double z = x[2];
-    const double u = x[3];
-    const double t1 = params->k * z;
-    const double t2 = params->kappa * x_;
-    const double t3 = params->kappa * params->kappa;
-    const double t4 = 1.0 + t3 * (x_ * x_ + y * y);
-    const double t5 = sqrt(t4);
-    const double t6 = params->kappa * u;
-    const double t7 = t5 + 2.0 * (t6 / t4);
-    const double t8 = 1.0 / (t5 * t7);
-    const double t9 = t2 * t8;
-    const double t10 = 1.0 / t5;
-    const double t11 = t3 * (params->mu * t10);
-    const double t12 = y * t11;
-    const double t13 = params->kappa * y;
-    const double t14 = t10 * (t10 * t10);
-    const double t15 = 1.0 + t6 * t14;
-    const double t16 = 1.0 / t7;
-    const double t17 = t13 * t15 * t16;
-    const double t18 = t2 * t15 * t16;
-    const double t19 = x_ * t11;
-    const double t20 = t13 * t8;
-    const double t21 = t16 * (1.0 + u * (t14 * (params->kappa * (1.0 + t4))));
-    out[0] = t1 * t9 - t12 * t8 - u * t17;
-    out[1] = u * t18 + (t19 * t8 + t1 * t20);
-    out[2] = u * t21 - (t12 * t20 + t19 * t9);
-    out[3] = t19 * t17 - t12 * t18 - t1 * t21;
-}
-
-double guiding_centre_hamiltonian(const guiding_centre_params *params, const double x[4])
-{
-    double energy[1];
-    guiding_centre_energy(params != NULL ? params : &guiding_centre_default_params, x, energy);
-    return energy[0];
-}
-
-void guiding_centre_casimirs(const guiding_centre_params *params, const double x[4], double out[])
-{
-    double value[1]; /* out may overlap x */
-    guiding_centre_casimir_values(params != NULL ? params : &guiding_centre_default_params, x, value);
-    for (int i = 0; i < 0; ++i) out[i] = value[i];
-}
-
-void guiding_centre_vector_field(const guiding_centre_params *params, const double x[4], double out[4])
-{
-    double value[4];
-    guiding_centre_field(params != NULL ? params : &guiding_centre_default_params, x, value);
-    memcpy(out, value, sizeof value);
-}
-
-const char *guiding_centre_status_string(guiding_centre_status status)
-{
-    switch (status) {
-    case guiding_centre_OK: return "ok";
-    case guiding_centre_NO_CONVERGENCE: return "no convergence: the step is too large";
-    case guiding_centre_SINGULAR: return "singular Newton matrix: the step is too large";
-    case guiding_centre_NOT_FINITE: return "not finite: overflow, or outside the domain";
-    case guiding_centre_BAD_ARGUMENT: return "bad argument: a null pointer, or values that are not allowed";
-    }
-    return "unknown status";
-}
-
-size_t guiding_centre_solver_size(void) { return sizeof(guiding_centre_solver); }
-
-size_t guiding_centre_solver_steps_done(const guiding_centre_solver *s) { return s->steps; }

@@ -7,17 +7,17 @@
 #   composition: suzuki, 5 stages of order 2
 #   one evaluation of the equation for p: 14 additions, 68 multiplications, 4 divisions, 1 functions
 #
-# spec: guiding_centre, sha256 438d307684354c6dd6718258c2e26d813ea4fdcd1b1359994ab9d0f78c780fe5
+# spec: guiding_centre, sha256 2fe2b1310137da070ce71887dcad93562dc0dd719fad890ce1b776e6af4b1570
 # to regenerate: phigen build guiding_centre
 # DO NOT EDIT: change the spec and regenerate; edits are noticed by the checksum below.
 #
 # SPDX-License-Identifier: 0BSD
 # This file belongs to whoever generated it; phigen claims no rights in it.
-# body-sha256: d11c5b540cb3eeb9e72ed969982e5749125a4c256ce98e894cf67c8c4e7b0ee9
+# body-sha256: 6d6b3210fba3e5d813508aa9c35318474b49486b53a19ba03845a282b5b2c664
 import numpy as np
 
 VERSION = "0.1.0"
-SPEC_SHA256 = "438d307684354c6dd6718258c2e26d813ea4fdcd1b1359994ab9d0f78c780fe5"
+SPEC_SHA256 = "2fe2b1310137da070ce71887dcad93562dc0dd719fad890ce1b776e6af4b1570"
 DIM = 4
 ORDER = 4
 COORDINATES = ("x", "y", "z", "u",)

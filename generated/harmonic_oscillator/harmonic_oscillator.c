@@ -7,35 +7,47 @@
  *   step: implicit, Newton iteration with the analytic matrix
  *   one Newton iteration: 4 multiplications
  *
- * spec: harmonic_oscillator, sha256 e958e574b16698d4aa97a0da1c85512b881b696996c00f77d0b496af7d264769
+ * spec: harmonic_oscillator, sha256 8fea2d54be1733fb7959bf089f29b69f069d88cc4d415a7096ee372bcd8b8f90
  * to regenerate: phigen build harmonic_oscillator
  * DO NOT EDIT: change the spec and regenerate; edits are noticed by the checksum below.
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: f1f21172ce2c7f73a47517c7f7a19955e6b894378faa6ace1af182ee42351184
+ *
+ *   1. The model
+ *   2. Compensated sums, linear equations
+ *   3. Starting guesses
+ *   4. The implicit step, by Newton's method
+ *   5. The solver
+ *   6. Ensembles
+ * body-sha256: db12759604f9379b9b5a57c775b021ca66fae055b0acc5e1cf122572e502d1c1
  */
 #include "harmonic_oscillator.h"
 
 #include <float.h>
-#include <limits.h>
 #include <math.h>
-#include <stdint.h>
 #include <string.h>
 
+/* ---- The model ---- */
 const harmonic_oscillator_params harmonic_oscillator_default_params = { 1.0, 1.0 };
 
-/* A step of size h is the composition of these fractions of it. */
-static const double harmonic_oscillator_fractions[1] = { 1.0 };
+enum { harmonic_oscillator_MAX_ITERATIONS = 20 }; /* of an inner solve */
+
+/* A correction is accepted when the error that it leaves is estimated to be below this. */
+#define harmonic_oscillator_TOLERANCE 1e-20
+
+/* Whether all parameters are finite, and positive where they have to be. */
+static int harmonic_oscillator_allowed(const harmonic_oscillator_params *params)
+{
+    return isfinite(params->m) && params->m > 0.0 && isfinite(params->k) && params->k > 0.0;
+}
 
 /* everything that depends on parameters and step size only */
 static void harmonic_oscillator_prepare(const harmonic_oscillator_params *params, double h,
-                                        double coef[restrict 5])
+    double coef[restrict 5])
 {
-    const double t1 = 1.0 / params->m;
-    const double t2 = 0.5 + 1.0 / 24.0 * (t1 * (params->k * (h * h)));
-    const double t3 = h * params->k * t2;
-    const double t4 = h * t1 * t2;
+    const double t1 = 1.0 / params->m, t2 = 0.5 + 1.0 / 24.0 * (t1 * (params->k * (h * h)));
+    const double t3 = h * params->k * t2, t4 = h * t1 * t2;
     coef[0] = 2.0 * t3;
     coef[1] = 2.0 * t4;
     coef[2] = -t4;
@@ -46,292 +58,78 @@ static void harmonic_oscillator_prepare(const harmonic_oscillator_params *params
 /* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
    increment, all with the momenta p = grad S_h(y) */
 static void harmonic_oscillator_linearise(const double coef[5], const double y[2],
-                                          double displacement[restrict 2], double increment[restrict 2],
-                                          double jacobian[restrict 4], double increment_jacobian[restrict 4])
+    double displacement[restrict 2], double increment[restrict 2], double jacobian[restrict 4],
+    double increment_jacobian[restrict 4])
 {
-    const double q = y[0];
-    const double p = y[1];
+    const double q = y[0], p = y[1];
+    /* momenta */
     const double p_p = coef[1] * p;
     const double p_q = coef[0] * q;
+    /* displacement */
     displacement[0] = (-0.5) * p_p;
     displacement[1] = 0.5 * p_q;
+    /* increment */
     increment[0] = p_p;
     increment[1] = -p_q;
+    /* jacobian */
     jacobian[0] = 1.0;
     jacobian[1] = coef[2];
     jacobian[2] = coef[3];
     jacobian[3] = 1.0;
+    /* increment jacobian */
     increment_jacobian[0] = 0.0;
     increment_jacobian[1] = coef[1];
     increment_jacobian[2] = coef[4];
     increment_jacobian[3] = 0.0;
 }
 
-/* Solve matrix * solution = side, both overwritten, by elimination with partial pivoting. 0 if singular. */
-static int harmonic_oscillator_solve_pivoting(double matrix[4], double side[2])
-{
-    for (int k = 0; k < 2; ++k) {
-        int best = k;
-        for (int i = k + 1; i < 2; ++i)
-            if (fabs(matrix[i * 2 + k]) > fabs(matrix[best * 2 + k])) best = i;
-        const double pivot = matrix[best * 2 + k];
-        if (!(fabs(pivot) > 0.0)) return 0;
-        for (int j = k; j < 2 && best != k; ++j) {
-            const double swap = matrix[k * 2 + j];
-            matrix[k * 2 + j] = matrix[best * 2 + j];
-            matrix[best * 2 + j] = swap;
-        }
-        const double swap = side[k];
-        side[k] = side[best];
-        side[best] = swap;
-        for (int i = k + 1; i < 2; ++i) {
-            const double factor = matrix[i * 2 + k] / pivot;
-            for (int j = k + 1; j < 2; ++j) matrix[i * 2 + j] -= factor * matrix[k * 2 + j];
-            side[i] -= factor * side[k];
-        }
-    }
-    for (int i = 2 - 1; i >= 0; --i) {
-        for (int j = i + 1; j < 2; ++j) side[i] -= matrix[i * 2 + j] * side[j];
-        side[i] /= matrix[i * 2 + i];
-    }
-    return 1;
-}
-
 /* elimination without pivoting: the solution, and the reciprocals of the pivots */
 static void harmonic_oscillator_eliminate(const double matrix[4], const double side[2],
-                                          double solution[restrict 2], double reciprocal[restrict 2])
+    double solution[restrict 2], double reciprocal[restrict 2])
 {
-    const double t1 = 1.0 / matrix[0];
-    const double t2 = matrix[2] * t1;
-    const double t3 = 1.0 / (matrix[3] - matrix[1] * t2);
+    /* solution */
+    const double t1 = 1.0 / matrix[0], t2 = matrix[2] * t1, t3 = 1.0 / (matrix[3] - matrix[1] * t2);
     const double t4 = (side[1] - side[0] * t2) * t3;
     solution[0] = t1 * (side[0] - matrix[1] * t4);
     solution[1] = t4;
+    /* reciprocal */
     reciprocal[0] = t1;
     reciprocal[1] = t3;
 }
 
-/* Solve matrix * solution = side, both overwritten. The matrix is I + O(h), so elimination without pivoting
-   does unless a pivot is far from 1. 0 if singular. */
-static int harmonic_oscillator_solve(double matrix[4], double side[2])
+/* the Hamiltonian */
+double harmonic_oscillator_hamiltonian(const harmonic_oscillator_params *params, const double x[2])
 {
-    double solution[2], reciprocal[2], largest = 0.0;
-    harmonic_oscillator_eliminate(matrix, side, solution, reciprocal);
-    for (int i = 0; i < 2; ++i)
-        if (!(fabs(reciprocal[i]) <= largest)) largest = fabs(reciprocal[i]);
-    if (!(largest < 1e3)) return harmonic_oscillator_solve_pivoting(matrix, side);
-    memcpy(side, solution, sizeof solution);
-    return 1;
+    if (params == NULL) params = &harmonic_oscillator_default_params;
+    const double m = params->m, k = params->k, q = x[0], p = x[1];
+    return 0.5 * (p * p / m) + 0.5 * (k * (q * q));
 }
 
-/* Whether a guess is where the next values may be. Recurrences that were fitted to little else than rest, near a saddle,
-   may lead anywhere; and far away the equation of a step has solutions that have nothing to do with the motion. */
-static int harmonic_oscillator_near(const double guess[2], const double last[2])
+/* the Casimirs */
+void harmonic_oscillator_casimirs(const harmonic_oscillator_params *params, const double x[2], double out[])
 {
-    double distance = 0.0, size = 0.0;
-    for (int i = 0; i < 2; ++i) {
-        distance += fabs(guess[i] - last[i]);
-        size += fabs(last[i]);
-    }
-    return distance <= 4.0 * size;
+    (void)params, (void)x, (void)out;
 }
 
-/* The guess for the next value (y), from earlier ones; 0 if there is none. */
-static int harmonic_oscillator_predict(const harmonic_oscillator_memory *memory, double value[2])
+/* pi(x) grad H(x) */
+void harmonic_oscillator_vector_field(const harmonic_oscillator_params *params, const double x[2],
+    double out[2])
 {
-    const int last = memory->count - 1;
-    double odd[2] = { 0.0 }, binomial = -1.0;
-    memset(value, 0, 2 * sizeof value[0]);
-    if (memory->fitting) {
-        for (int k = 0; k < memory->terms; k += 2)
-            for (int i = 0; i < 2; ++i) {
-                value[i] += memory->weight[k][i][0] * memory->past[last - k][i];
-                odd[i] += memory->weight[k + 1][i][0] * memory->past[last - 1 - k][i];
-            }
-        for (int i = 0; i < 2; ++i) value[i] += odd[i];
-    } else {
-        for (int k = 0; k < memory->order && k <= last; ++k) {
-            binomial *= -(double)(memory->order - k) / (k + 1);
-            for (int i = 0; i < 2; ++i) value[i] += binomial * memory->past[last - k][i];
-        }
-    }
-    return last >= 0 && harmonic_oscillator_near(value, memory->past[last]);
+    if (params == NULL) params = &harmonic_oscillator_default_params;
+    const double m = params->m, k = params->k, q = x[0], p = x[1];
+    out[0] = p / m;
+    out[1] = -(k * q);
 }
 
-/* Choose the guess that would have been best for a value that took several iterations. */
-static void harmonic_oscillator_judge(harmonic_oscillator_memory *memory, const double value[2])
+/* ---- Compensated sums, linear equations ---- */
+/* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to
+   its last bit: were it rounded with the change, corrections of one sign would add up to a drift. 0, and x as
+   before, if the sum is not finite. */
+static int harmonic_oscillator_advance(harmonic_oscillator_solver *s,
+    const double change[harmonic_oscillator_DIM], const double correction[harmonic_oscillator_DIM])
 {
-    double row[8 + 1][2], guess[2], least = HUGE_VAL, fitted = HUGE_VAL;
-    const int rows = memory->count < 8 ? memory->count : 8;
-    memcpy(row[0], value, sizeof row[0]);
-    for (int k = 0; k < rows; ++k) memcpy(row[k + 1], memory->past[memory->count - 1 - k], sizeof row[0]);
-    for (int order = 1; order <= rows; ++order) { /* row[0] becomes the backward difference of this order */
-        double size = 0.0;
-        for (int k = 0; k <= rows - order; ++k)
-            for (int i = 0; i < 2; ++i) row[k][i] -= row[k + 1][i];
-        for (int i = 0; i < 2; ++i) size += fabs(row[0][i]);
-        if (size < least) {
-            least = size;
-            memory->order = order;
-        }
-    }
-    memory->fitting = memory->terms > 0;
-    if (memory->fitting && harmonic_oscillator_predict(memory, guess)) {
-        fitted = 0.0;
-        for (int i = 0; i < 2; ++i) fitted += fabs(value[i] - guess[i]);
-    }
-    memory->fitting = memory->terms > 0 && fitted <= least;
-    if (memory->order == 0) memory->order = 1;
-}
-
-/* Make eight columns orthogonal to one, by the multiples of it that are put into r. Where that one is among the eight, those
-   up to it stay as they are, and inverse becomes one over its squared length. The number of rows is even. */
-static void harmonic_oscillator_project(int rows, double (*one)[8], int column, double *inverse, double (*eight)[8], double r[8])
-{
-    double even[8] = { 0.0 }, odd[8] = { 0.0 };
-    for (int i = 0; i < rows; i += 2) {
-        const double entry = one[i][column], next = one[i + 1][column];
-        for (int l = 0; l < 8; ++l) even[l] += entry * eight[i][l];
-        for (int l = 0; l < 8; ++l) odd[l] += next * eight[i + 1][l];
-    }
-    for (int l = 0; l < 8; ++l) even[l] += odd[l];
-    if (one == eight) {
-        *inverse = even[column] > 0.0 ? 1.0 / even[column] : 0.0;
-        memset(even, 0, ((size_t)column + 1) * sizeof even[0]);
-    }
-    for (int l = 0; l < 8; ++l) r[l] = even[l] *= *inverse;
-    for (int i = 0; i < rows; ++i) {
-        const double entry = one[i][column];
-        for (int l = 0; l < 8; ++l) eight[i][l] -= entry * even[l];
-    }
-}
-
-/* By how much recurrences miss the last of these values. */
-static double harmonic_oscillator_missed(const double *value, double (*weight)[8])
-{
-    enum { AHEAD = 8, WINDOW = 40, CHECKS = 8 };
-    double most = 0.0;
-    for (int i = 0; i < CHECKS; ++i) {
-        double guess[8] = { 0.0 };
-        for (int k = 0; k < WINDOW; ++k)
-            for (int l = 0; l < 8; ++l) guess[l] += weight[k][l] * value[i + WINDOW - 1 - k];
-        for (int l = 0; l < AHEAD; ++l) most = fmax(most, fabs(guess[l] - value[i + WINDOW + l]));
-    }
-    return most;
-}
-
-/* Fit the recurrences value[m + l] = sum of weight[k][..][l] * value[m - 1 - k], l = 0 ... 8 - 1, to the history of
-   a component: ridge least squares by modified Gram-Schmidt, the ridge at the level of rounding. Columns are taken in by
-   eights, until they leave next to nothing of the right-hand sides. How many past values are used; 0 if the recurrences do
-   not foresee the last values, which they were not fitted to. */
-static int harmonic_oscillator_train(harmonic_oscillator_memory *memory, int component)
-{
-    enum { AHEAD = 8, WINDOW = 40, ROWS = 56 };
-    double q[WINDOW / 8][ROWS + WINDOW][8], r[WINDOW / 8][WINDOW][8], inverse[WINDOW]; /* eight columns in each part */
-    double right[ROWS + WINDOW][8], weight[WINDOW][8], value[111], largest = 0.0, left = HUGE_VAL;
-    int terms = 0;
-    memset(q, 0, sizeof q);
-    memset(right, 0, sizeof right);
-    memset(weight, 0, sizeof weight);
-    for (int i = 0; i < 111; ++i) {
-        value[i] = memory->past[memory->count - 111 + i][component];
-        if (fabs(value[i]) > largest) largest = fabs(value[i]);
-    }
-    for (int i = 0; i < ROWS; ++i)
-        for (int l = 0; l < AHEAD; ++l) right[i][l] = value[i + WINDOW + l];
-    while (terms < WINDOW && left > 3e-12 * largest) {
-        const int part = terms / 8, rows = ROWS + terms + 8; /* further rows of the ridge are zero in these columns */
-        for (int i = 0; i < ROWS; ++i)
-            for (int l = 0; l < 8; ++l) q[part][i][l] = value[i + WINDOW - 1 - terms - l];
-        for (int l = 0; l < 8; ++l) q[part][ROWS + terms + l][l] = 1e-15 * largest;
-        for (int k = 0; k < terms; ++k) harmonic_oscillator_project(rows, q[k / 8], k % 8, &inverse[k], q[part], r[part][k]);
-        for (int l = 0; l < 8; ++l, ++terms) {
-            harmonic_oscillator_project(rows, q[part], l, &inverse[terms], q[part], r[part][terms]);
-            harmonic_oscillator_project(rows, q[part], l, &inverse[terms], right, weight[terms]);
-        }
-        double sum[8] = { 0.0 };
-        for (int i = 0; i < ROWS; ++i)
-            for (int l = 0; l < 8; ++l) sum[l] += fabs(right[i][l]);
-        left = 0.0;
-        for (int l = 0; l < 8; ++l) left += sum[l] / ROWS;
-    }
-    for (int k = terms - 1; k >= 0; --k)
-        for (int j = k + 1; j < terms; ++j)
-            for (int l = 0; l < 8; ++l) weight[k][l] -= r[j / 8][k][j % 8] * weight[j][l];
-    for (int k = 0; k < WINDOW; ++k) memcpy(memory->weight[k][component], weight[k], AHEAD * sizeof(double));
-    return harmonic_oscillator_missed(value + ROWS, weight) <= 1e-07 * largest ? terms : 0;
-}
-
-/* Drop what is old, if so many values would not fit into the history. */
-static void harmonic_oscillator_make_room(harmonic_oscillator_memory *memory, int values)
-{
-    if (memory->count + values <= 222) return;
-    memmove(memory->past, memory->past + memory->count - 111, 111 * sizeof memory->past[0]);
-    memory->count = 111;
-}
-
-/* Add a value to the history. */
-static void harmonic_oscillator_record(harmonic_oscillator_memory *memory, const double value[2])
-{
-    harmonic_oscillator_make_room(memory, 1);
-    memcpy(memory->past[memory->count++], value, 2 * sizeof value[0]);
-}
-
-/* Fit the recurrence to the last values; with every time, wait longer before it is done again. */
-static void harmonic_oscillator_fit(harmonic_oscillator_memory *memory)
-{
-    int found = 1;
-    memory->terms = 0;
-    for (int i = 0; i < 2 && found; ++i) {
-        const int terms = harmonic_oscillator_train(memory, i);
-        found = terms > 0;
-        if (terms > memory->terms) memory->terms = terms;
-    }
-    if (!found) memory->terms = 0;
-    memory->fitting = found;
-    ++memory->fits;
-    memory->slow = 0;
-    memory->patience = memory->patience < 10000 ? 2 * memory->patience + 150 : 20000;
-}
-
-/* Take in the solved value: what took one iteration needs no better guess. */
-static void harmonic_oscillator_remember(harmonic_oscillator_memory *memory, const double value[2], int iterations)
-{
-    if (iterations > 1) harmonic_oscillator_judge(memory, value);
-    harmonic_oscillator_record(memory, value);
-    memory->slow = iterations > 1 ? memory->slow + 1 : 0;
-    if (memory->slow > memory->patience && memory->count >= 111) harmonic_oscillator_fit(memory);
-}
-
-/* Whether an increment is that of the motion. Where the step is too large, the equation may have been solved by a point far
-   away, at another energy, that has nothing to do with it. */
-static int harmonic_oscillator_plausible(const harmonic_oscillator_solver *s, int stage, const double increment[2])
-{
-    double moved = 0.0, size = 0.0, field[2], middle[2], end[2];
-    for (int i = 0; i < 2; ++i) {
-        moved += fabs(increment[i]);
-        size += fabs(s->x[i]);
-    }
-    if (moved <= 1.5 * size) return 1;
-    harmonic_oscillator_vector_field(&s->params, s->x, field);
-    for (int i = 0; i < 2; ++i) {
-        size += fabs(harmonic_oscillator_fractions[stage] * s->h * field[i]);
-        middle[i] = s->x[i] + 0.5 * increment[i];
-        end[i] = s->x[i] + increment[i];
-    }
-    if (moved <= 1.5 * size) return 1;
-    const double before = harmonic_oscillator_hamiltonian(&s->params, s->x), after = harmonic_oscillator_hamiltonian(&s->params, end);
-    const double scale = fabs(before) + fabs(harmonic_oscillator_hamiltonian(&s->params, middle)) + fabs(after);
-    return fabs(after - before) <= 0.5 * scale;
-}
-
-/* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to its last
-   bit: were it rounded with the change, corrections of one sign would add up to a drift. 0, and x as before, if the
-   sum is not finite. */
-static int harmonic_oscillator_advance(harmonic_oscillator_solver *s, const double change[2], const double correction[2])
-{
-    double x[2], carry[2];
-    for (int i = 0; i < 2; ++i) {
+    double x[harmonic_oscillator_DIM], carry[harmonic_oscillator_DIM];
+    for (int i = 0; i < harmonic_oscillator_DIM; ++i) {
         const double sum = s->x[i] + change[i], added = sum - s->x[i];
         const double lost = (s->x[i] - (sum - added)) + (change[i] - added);
         const double small = lost + (s->carry[i] + correction[i]);
@@ -344,100 +142,179 @@ static int harmonic_oscillator_advance(harmonic_oscillator_solver *s, const doub
     return 1;
 }
 
-/* Size of a correction relative to each component of y, but no finer than 1e-6 of the largest; NaN or infinite if
-   the correction is. */
-static double harmonic_oscillator_size(const double y[2], const double delta[2])
+/* Newton matrices are I + O(h): a pivot whose reciprocal is larger than this is far from 1. */
+#define harmonic_oscillator_LARGEST_RECIPROCAL 1e3
+
+/* Solve matrix * solution = side, both overwritten. The matrix is I + O(h): 0 if a pivot is far from 1. */
+static int harmonic_oscillator_solve(double matrix[harmonic_oscillator_DIM * harmonic_oscillator_DIM],
+    double side[harmonic_oscillator_DIM])
+{
+    double solution[harmonic_oscillator_DIM], reciprocal[harmonic_oscillator_DIM], largest = 0.0;
+    harmonic_oscillator_eliminate(matrix, side, solution, reciprocal);
+    for (int i = 0; i < harmonic_oscillator_DIM; ++i)
+        if (!(fabs(reciprocal[i]) <= largest)) largest = fabs(reciprocal[i]);
+    if (!(largest < harmonic_oscillator_LARGEST_RECIPROCAL)) return 0;
+    memcpy(side, solution, sizeof solution);
+    return 1;
+}
+
+/* ---- Starting guesses ---- */
+/* How far from the last value a guess may be, in sizes of that value. */
+#define harmonic_oscillator_REACH 4.0
+
+/* The guess for the next value from the last ones: the sum of their backward differences. 0 if there is none,
+   or if it is far away, where the equation of a step has solutions that have nothing to do with the motion.
+   */
+static int harmonic_oscillator_predict(const harmonic_oscillator_history *history,
+    double value[harmonic_oscillator_DIM])
+{
+    double distance = 0.0, size = 0.0;
+    for (int i = 0; i < harmonic_oscillator_DIM; ++i) {
+        value[i] = 0.0;
+        for (int k = 0; k < history->order; ++k) value[i] += history->difference[k][i];
+        distance += fabs(value[i] - history->difference[0][i]);
+        size += fabs(history->difference[0][i]);
+    }
+    return history->order > 0 && distance <= harmonic_oscillator_REACH * size;
+}
+
+/* Take in the solved value. The guess of order k missed it by its k-th difference: the next is of the best
+   order. */
+static void harmonic_oscillator_remember(harmonic_oscillator_history *history,
+    const double value[harmonic_oscillator_DIM])
+{
+    double least = HUGE_VAL, next[harmonic_oscillator_DIM];
+    memcpy(next, value, sizeof next);
+    for (int k = 0; k <= history->count && k < harmonic_oscillator_DIFFERENCES; ++k) {
+        double size = 0.0;
+        for (int i = 0; i < harmonic_oscillator_DIM; ++i) {
+            const double last = history->difference[k][i];
+            history->difference[k][i] = next[i];
+            size += fabs(next[i]);
+            next[i] -= last;
+        }
+        if (k > 0 && size < least) {
+            least = size;
+            history->order = k;
+        }
+    }
+    if (history->count == 0) history->order = 1;
+    if (history->count < harmonic_oscillator_DIFFERENCES) ++history->count;
+}
+
+/* How far a step may lead, in sizes of the state and of what the vector field says, if the energy is lost;
+   and the part of the energy that counts as lost. */
+#define harmonic_oscillator_PLAUSIBLE 1.5
+#define harmonic_oscillator_LOST 0.5
+
+/* Whether an increment is that of the motion. Where the step is too large, the equation may have been solved
+   by a point far away, at another energy, that has nothing to do with it. */
+static int harmonic_oscillator_plausible(const harmonic_oscillator_solver *s,
+    const double increment[harmonic_oscillator_DIM])
+{
+    double moved = 0.0, size = 0.0, field[harmonic_oscillator_DIM], middle[harmonic_oscillator_DIM],
+        end[harmonic_oscillator_DIM];
+    for (int i = 0; i < harmonic_oscillator_DIM; ++i) {
+        moved += fabs(increment[i]);
+        size += fabs(s->x[i]);
+    }
+    if (moved <= harmonic_oscillator_PLAUSIBLE * size) return 1;
+    harmonic_oscillator_vector_field(&s->params, s->x, field);
+    for (int i = 0; i < harmonic_oscillator_DIM; ++i) {
+        size += fabs(s->h * field[i]);
+        middle[i] = s->x[i] + 0.5 * increment[i];
+        end[i] = s->x[i] + increment[i];
+    }
+    if (moved <= harmonic_oscillator_PLAUSIBLE * size) return 1;
+    const double before = harmonic_oscillator_hamiltonian(&s->params, s->x), after =
+        harmonic_oscillator_hamiltonian(&s->params, end);
+    const double scale = fabs(before) + fabs(harmonic_oscillator_hamiltonian(&s->params, middle))
+        + fabs(after);
+    return fabs(after - before) <= harmonic_oscillator_LOST * scale;
+}
+
+/* ---- The implicit step, by Newton's method ---- */
+/* Components of y are measured no finer than by this part of the largest. */
+#define harmonic_oscillator_FLOOR 1e-6
+
+/* Size of a correction relative to each component of y; NaN or infinite if the correction is. */
+static double harmonic_oscillator_size(const double y[harmonic_oscillator_DIM],
+    const double delta[harmonic_oscillator_DIM])
 {
     double norm = 0.0, size = 0.0;
-    for (int i = 0; i < 2; ++i) norm = fabs(y[i]) > norm ? fabs(y[i]) : norm;
-    for (int i = 0; i < 2; ++i) {
-        const double ratio = fabs(delta[i]) / (fabs(y[i]) + 1e-6 * norm + DBL_MIN);
+    for (int i = 0; i < harmonic_oscillator_DIM; ++i) norm = fabs(y[i]) > norm ? fabs(y[i]) : norm;
+    for (int i = 0; i < harmonic_oscillator_DIM; ++i) {
+        const double ratio = fabs(delta[i]) / (fabs(y[i]) + harmonic_oscillator_FLOOR * norm + DBL_MIN);
         if (!isfinite(ratio)) return ratio;
         size = ratio > size ? ratio : size;
     }
     return size;
 }
 
+/* Corrections below the first that shrink by less than the second have reached the level of rounding. */
+#define harmonic_oscillator_NEARLY_SOLVED 1e-8
+#define harmonic_oscillator_SHRINKING 0.25
+
 /* Solve (y - x) + displacement(y) = 0 for y by Newton's method from the extrapolated guess, and advance. The
-   increment is corrected to first order by the last Newton correction, so that correction costs no evaluation:
-   a correction is accepted when the error that remains after it, quadratic in it, is below 1e-20. */
-static harmonic_oscillator_status harmonic_oscillator_attempt(harmonic_oscillator_solver *s, int stage)
+   increment is corrected to first order by the last Newton correction, so that correction costs no
+   evaluation: a correction is accepted when the error that remains after it, quadratic in it, is below
+   harmonic_oscillator_TOLERANCE. */
+static harmonic_oscillator_status harmonic_oscillator_attempt(harmonic_oscillator_solver *s)
 {
-    const double *coef = s->coef[stage];
-    harmonic_oscillator_memory *memory = &s->memory[stage];
-    double y[2], delta[2], displacement[2], increment[2];
-    double jacobian[4], increment_jacobian[4];
-    if (!harmonic_oscillator_predict(memory, y)) memcpy(y, s->x, sizeof y);
-    double previous = HUGE_VAL;
-    for (int iteration = 0; iteration < 20; ++iteration) {
-        harmonic_oscillator_linearise(coef, y, displacement, increment, jacobian, increment_jacobian);
+    double y[harmonic_oscillator_DIM], delta[harmonic_oscillator_DIM], displacement[harmonic_oscillator_DIM],
+        increment[harmonic_oscillator_DIM];
+    double jacobian[harmonic_oscillator_DIM * harmonic_oscillator_DIM],
+        increment_jacobian[harmonic_oscillator_DIM * harmonic_oscillator_DIM], previous = HUGE_VAL;
+    if (!harmonic_oscillator_predict(&s->history, y)) memcpy(y, s->x, sizeof y);
+    for (int iteration = 1; iteration <= harmonic_oscillator_MAX_ITERATIONS; ++iteration) {
+        harmonic_oscillator_linearise(s->coef, y, displacement, increment, jacobian, increment_jacobian);
         ++s->evaluations;
-        for (int i = 0; i < 2; ++i) delta[i] = ((y[i] - s->x[i]) + displacement[i]) - s->carry[i];
+        for (int i = 0; i < harmonic_oscillator_DIM; ++i) delta[i] = ((y[i] - s->x[i]) + displacement[i])
+            - s->carry[i];
         const int regular = harmonic_oscillator_solve(jacobian, delta);
-        const double size = harmonic_oscillator_size(y, delta);
+        const double size = harmonic_oscillator_size(y, delta), growth = size / (previous * previous);
         if (!isfinite(size)) return harmonic_oscillator_NOT_FINITE;
         if (!regular) return harmonic_oscillator_SINGULAR;
-        for (int i = 0; i < 2; ++i) y[i] -= delta[i];
-        const double growth = size / (previous * previous);
+        for (int i = 0; i < harmonic_oscillator_DIM; ++i) y[i] -= delta[i];
         const double remaining = size * size * (growth > 1.0 ? growth : 1.0);
-        /* The second test: corrections no longer shrink, the solve has reached the level of rounding. */
-        if (remaining <= 1e-20 || (previous < 1e-8 && size > 0.25 * previous)) {
-            double correction[2] = { 0.0 };
-            for (int i = 0; i < 2; ++i)
-                for (int j = 0; j < 2; ++j) correction[i] -= increment_jacobian[i * 2 + j] * delta[j];
-            if (!harmonic_oscillator_plausible(s, stage, increment)) return harmonic_oscillator_NO_CONVERGENCE;
-            if (!harmonic_oscillator_advance(s, increment, correction)) return harmonic_oscillator_NOT_FINITE;
-            harmonic_oscillator_remember(memory, y, iteration + 1);
-            return harmonic_oscillator_OK;
-        }
+        const int stalled = previous < harmonic_oscillator_NEARLY_SOLVED && size
+            > harmonic_oscillator_SHRINKING * previous;
         previous = size;
+        if (!(remaining <= harmonic_oscillator_TOLERANCE || stalled)) continue;
+        double correction[harmonic_oscillator_DIM] = { 0.0 };
+        for (int i = 0; i < harmonic_oscillator_DIM; ++i)
+            for (int j = 0; j < harmonic_oscillator_DIM; ++j)
+                correction[i] -= increment_jacobian[i * harmonic_oscillator_DIM + j] * delta[j];
+        if (!harmonic_oscillator_plausible(s, increment)) return harmonic_oscillator_NO_CONVERGENCE;
+        if (!harmonic_oscillator_advance(s, increment, correction)) return harmonic_oscillator_NOT_FINITE;
+        harmonic_oscillator_remember(&s->history, y);
+        return harmonic_oscillator_OK;
     }
     return harmonic_oscillator_NO_CONVERGENCE;
 }
 
-/* The 1 stages of one step. If one fails, the state is as before the step. */
-static harmonic_oscillator_status harmonic_oscillator_stages(harmonic_oscillator_solver *s)
-{
-    double x[2], carry[2];
-    memcpy(x, s->x, sizeof x);
-    memcpy(carry, s->carry, sizeof carry);
-    for (int stage = 0; stage < 1; ++stage) {
-        harmonic_oscillator_status status = harmonic_oscillator_attempt(s, stage);
-        /* A guess from earlier steps may have misled it: once more without. */
-        if (status != harmonic_oscillator_OK && s->memory[stage].count > 0) {
-            memset(&s->memory[stage], 0, sizeof s->memory[stage]);
-            status = harmonic_oscillator_attempt(s, stage);
-        }
-        if (status != harmonic_oscillator_OK) {
-            memcpy(s->x, x, sizeof x);
-            memcpy(s->carry, carry, sizeof carry);
-            return status;
-        }
-    }
-    return harmonic_oscillator_OK;
-}
-
-/* Whether steps can be made with these parameters: finite, positive where the spec says so, and with finite
-   coefficients for a step so short that it has no part in it. */
+/* ---- The solver ---- */
+/* Whether steps can be made with these parameters: allowed, and with finite coefficients for a step so short
+   that it has no part in it. */
 static int harmonic_oscillator_admissible(const harmonic_oscillator_params *params)
 {
-    double coef[5];
-    if (!(isfinite(params->m) && params->m > 0.0)) return 0;
-    if (!(isfinite(params->k) && params->k > 0.0)) return 0;
+    double coef[harmonic_oscillator_COEFFICIENTS];
+    if (!harmonic_oscillator_allowed(params)) return 0;
     harmonic_oscillator_prepare(params, 1e-100, coef);
-    for (int k = 0; k < 5; ++k)
+    for (int k = 0; k < harmonic_oscillator_COEFFICIENTS; ++k)
         if (!isfinite(coef[k])) return 0;
     return 1;
 }
 
-/* All of harmonic_oscillator_init but the gauge. The arguments may be parts of *s: they are read before it is written. */
-static harmonic_oscillator_status harmonic_oscillator_start(harmonic_oscillator_solver *s, const harmonic_oscillator_params *params, const double x0[2])
+/* The arguments may be parts of *s: they are read before it is written. */
+harmonic_oscillator_status harmonic_oscillator_init(harmonic_oscillator_solver *s,
+    const harmonic_oscillator_params *params, const double x0[harmonic_oscillator_DIM])
 {
     if (s == NULL || x0 == NULL) return harmonic_oscillator_BAD_ARGUMENT;
     const harmonic_oscillator_params own = params != NULL ? *params : harmonic_oscillator_default_params;
-    double x[2];
+    double x[harmonic_oscillator_DIM];
     memcpy(x, x0, sizeof x);
-    for (int i = 0; i < 2; ++i)
+    for (int i = 0; i < harmonic_oscillator_DIM; ++i)
         if (!isfinite(x[i])) return harmonic_oscillator_BAD_ARGUMENT;
     if (!harmonic_oscillator_admissible(&own)) return harmonic_oscillator_BAD_ARGUMENT;
     memset(s, 0, sizeof *s);
@@ -446,888 +323,85 @@ static harmonic_oscillator_status harmonic_oscillator_start(harmonic_oscillator_
     return harmonic_oscillator_OK;
 }
 
-harmonic_oscillator_status harmonic_oscillator_init(harmonic_oscillator_solver *s,
-                                                    const harmonic_oscillator_params *params,
-                                                    const double x0[2])
-{
-    return harmonic_oscillator_start(s, params, x0);
-}
-
 /* What depends on the step size; nothing where that is as before. */
 static harmonic_oscillator_status harmonic_oscillator_set_step(harmonic_oscillator_solver *s, double h)
 {
     if (s == NULL || !isfinite(h)) return harmonic_oscillator_BAD_ARGUMENT;
-    if (s->ready && memcmp(&h, &s->h, sizeof h) == 0) return harmonic_oscillator_OK;
-    for (int stage = 0; stage < 1; ++stage)
-        harmonic_oscillator_prepare(&s->params, harmonic_oscillator_fractions[stage] * h, s->coef[stage]);
-    memset(s->memory, 0, sizeof s->memory);
-    for (int stage = 0; stage < 1; ++stage) s->memory[stage].patience = 150;
-    s->pause = 16;
-    s->setback = s->foreseeing = 0;
-    s->doubt = s->retry = 0;
-    s->effort = 0.0;
-    s->passes = INT_MAX;
+    if (s->prepared && memcmp(&h, &s->h, sizeof h) == 0) return harmonic_oscillator_OK;
+    harmonic_oscillator_prepare(&s->params, h, s->coef);
+    memset(&s->history, 0, sizeof s->history);
     s->h = h;
-    s->ready = 1;
+    s->t_before_h = s->t;
+    s->steps_before_h = s->steps;
+    s->prepared = 1;
     return harmonic_oscillator_OK;
+}
+
+/* One stage. A guess from earlier steps may have misled it: then once more without. */
+static harmonic_oscillator_status harmonic_oscillator_stage(harmonic_oscillator_solver *s)
+{
+    harmonic_oscillator_status status = harmonic_oscillator_attempt(s);
+    if (status != harmonic_oscillator_OK && s->history.count > 0) {
+        memset(&s->history, 0, sizeof s->history);
+        status = harmonic_oscillator_attempt(s);
+    }
+    return status;
 }
 
 harmonic_oscillator_status harmonic_oscillator_step(harmonic_oscillator_solver *s, double h)
 {
     harmonic_oscillator_status status = harmonic_oscillator_set_step(s, h);
     if (status != harmonic_oscillator_OK) return status;
-    status = harmonic_oscillator_stages(s);
-    if (status == harmonic_oscillator_OK) ++s->steps;
+    status = harmonic_oscillator_stage(s);
+    if (status != harmonic_oscillator_OK) return status;
+    ++s->steps;
+    s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
     return status;
 }
 
-/*
- * Eight at a time: below, the formulas of a step are evaluated for 8 steps of a trajectory, or members of an
- * ensemble, at once. Compilers make vector instructions of the loops over lanes.
- */
-enum { harmonic_oscillator_LANES = 8 };
-
-#if defined(__GNUC__)
-typedef double harmonic_oscillator_lanes[harmonic_oscillator_LANES] __attribute__((aligned(64))); /* a value in each lane */
-#else
-typedef double harmonic_oscillator_lanes[harmonic_oscillator_LANES];
-#endif
-
-#if defined(__clang__)
-#define harmonic_oscillator_EACH_LANE _Pragma("clang loop vectorize(assume_safety)")
-#pragma clang diagnostic push
-#pragma clang diagnostic ignored "-Wpass-failed"
-#elif defined(__GNUC__)
-#define harmonic_oscillator_EACH_LANE _Pragma("GCC ivdep") _Pragma("GCC unroll 1")
-#else
-#define harmonic_oscillator_EACH_LANE
-#endif
-
-/* What all blocks share: coefficients, the same in each lane, and the recurrences by which they are foreseen. */
-typedef struct {
-    int fits[1]; /* the fit that weight is of; -1 for none */
-    harmonic_oscillator_lanes coef[1][5], weight[1][40][2];
-} harmonic_oscillator_table;
-
-/* A stage in all lanes, linearised around y. */
-typedef struct {
-    harmonic_oscillator_lanes y[2], displacement[2], increment[2], residual[2];
-    /* a residual r of alpha(y) = x takes inverse r from y, and gain r from the increment */
-    harmonic_oscillator_lanes inverse[4], slope[4], gain[4];
-} harmonic_oscillator_model;
-
-/* harmonic_oscillator_linearise in all lanes. */
-static void harmonic_oscillator_linearise_lanes(harmonic_oscillator_lanes coef[restrict 5],
-                                                harmonic_oscillator_lanes y[restrict 2],
-                                                harmonic_oscillator_lanes displacement[restrict 2],
-                                                harmonic_oscillator_lanes increment[restrict 2],
-                                                harmonic_oscillator_lanes jacobian[restrict 4],
-                                                harmonic_oscillator_lanes increment_jacobian[restrict 4])
+harmonic_oscillator_status harmonic_oscillator_integrate(harmonic_oscillator_solver *s, double h,
+    size_t steps)
 {
-    harmonic_oscillator_EACH_LANE
-    for (int lane = 0; lane < harmonic_oscillator_LANES; ++lane) {
-        const double q = y[0][lane];
-        const double p = y[1][lane];
-        const double p_p = coef[1][lane] * p;
-        const double p_q = coef[0][lane] * q;
-        displacement[0][lane] = (-0.5) * p_p;
-        displacement[1][lane] = 0.5 * p_q;
-        increment[0][lane] = p_p;
-        increment[1][lane] = -p_q;
-        jacobian[0][lane] = 1.0;
-        jacobian[1][lane] = coef[2][lane];
-        jacobian[2][lane] = coef[3][lane];
-        jacobian[3][lane] = 1.0;
-        increment_jacobian[0][lane] = 0.0;
-        increment_jacobian[1][lane] = coef[1][lane];
-        increment_jacobian[2][lane] = coef[4][lane];
-        increment_jacobian[3][lane] = 0.0;
-    }
-}
-
-/* harmonic_oscillator_evaluate in all lanes. */
-static void harmonic_oscillator_evaluate_lanes(harmonic_oscillator_lanes coef[restrict 5],
-                                               harmonic_oscillator_lanes y[restrict 2],
-                                               harmonic_oscillator_lanes displacement[restrict 2],
-                                               harmonic_oscillator_lanes increment[restrict 2])
-{
-    harmonic_oscillator_EACH_LANE
-    for (int lane = 0; lane < harmonic_oscillator_LANES; ++lane) {
-        const double q = y[0][lane];
-        const double p = y[1][lane];
-        const double p_p = coef[1][lane] * p;
-        const double p_q = coef[0][lane] * q;
-        displacement[0][lane] = (-0.5) * p_p;
-        displacement[1][lane] = 0.5 * p_q;
-        increment[0][lane] = p_p;
-        increment[1][lane] = -p_q;
-    }
-}
-
-/* harmonic_oscillator_invert in all lanes. */
-static void harmonic_oscillator_invert_lanes(harmonic_oscillator_lanes matrix[restrict 4],
-                                             harmonic_oscillator_lanes slope[restrict 4],
-                                             harmonic_oscillator_lanes inverse[restrict 4],
-                                             harmonic_oscillator_lanes gain[restrict 4],
-                                             harmonic_oscillator_lanes reciprocal[restrict 2])
-{
-    harmonic_oscillator_EACH_LANE
-    for (int lane = 0; lane < harmonic_oscillator_LANES; ++lane) {
-        const double t1 = 1.0 / matrix[0][lane];
-        const double t2 = matrix[1][lane] * t1;
-        const double t3 = 1.0 / (matrix[3][lane] - matrix[2][lane] * t2);
-        const double t4 = matrix[2][lane] * t1 * t3;
-        const double t5 = t1 + t2 * t4;
-        const double t6 = t2 * t3;
-        inverse[0][lane] = t5;
-        inverse[1][lane] = -t6;
-        inverse[2][lane] = -t4;
-        inverse[3][lane] = t3;
-        gain[0][lane] = slope[0][lane] * t5 - slope[1][lane] * t4;
-        gain[1][lane] = slope[1][lane] * t3 - slope[0][lane] * t6;
-        gain[2][lane] = slope[2][lane] * t5 - slope[3][lane] * t4;
-        gain[3][lane] = slope[3][lane] * t3 - slope[2][lane] * t6;
-        reciprocal[0][lane] = t1;
-        reciprocal[1][lane] = t3;
-    }
-}
-
-/* Everything about a stage at the points y. The matrices are I + O(h): where a pivot is far from 1, all is infinite. */
-static void harmonic_oscillator_tabulate(harmonic_oscillator_lanes coef[restrict], harmonic_oscillator_model *model)
-{
-    harmonic_oscillator_lanes jacobian[4], reciprocal[2];
-    harmonic_oscillator_linearise_lanes(coef, model->y, model->displacement, model->increment, jacobian, model->slope);
-    harmonic_oscillator_invert_lanes(jacobian, model->slope, model->inverse, model->gain, reciprocal);
-    for (int i = 0; i < 2; ++i) {
-        harmonic_oscillator_EACH_LANE
-        for (int lane = 0; lane < harmonic_oscillator_LANES; ++lane)
-            model->inverse[i][lane] += fabs(reciprocal[i][lane]) < 1e3 ? 0.0 : HUGE_VAL;
-    }
-}
-
-/* harmonic_oscillator_size in all lanes, summed over the components. */
-static void harmonic_oscillator_sizes(harmonic_oscillator_lanes y[restrict 2], harmonic_oscillator_lanes delta[restrict 2],
-    harmonic_oscillator_lanes size)
-{
-    harmonic_oscillator_lanes norm = { 0.0 };
-    memset(size, 0, harmonic_oscillator_LANES * sizeof size[0]);
-    for (int i = 0; i < 2; ++i)
-        for (int lane = 0; lane < harmonic_oscillator_LANES; ++lane)
-            norm[lane] = 1e-6 * fabs(y[i][lane]) > norm[lane] ? 1e-6 * fabs(y[i][lane]) : norm[lane];
-    for (int i = 0; i < 2; ++i) {
-        harmonic_oscillator_EACH_LANE
-        for (int lane = 0; lane < harmonic_oscillator_LANES; ++lane)
-            size[lane] += fabs(delta[i][lane]) / (fabs(y[i][lane]) + norm[lane] + DBL_MIN);
-    }
-}
-
-/* Correct y by the residuals, with the inverse in the table, and measure the corrections. */
-static void harmonic_oscillator_correct(harmonic_oscillator_model *model, harmonic_oscillator_lanes size)
-{
-    harmonic_oscillator_lanes delta[2];
-    memset(delta, 0, sizeof delta);
-    for (int i = 0; i < 2; ++i)
-        for (int j = 0; j < 2; ++j) {
-            harmonic_oscillator_EACH_LANE
-            for (int lane = 0; lane < harmonic_oscillator_LANES; ++lane)
-                delta[i][lane] += model->inverse[i * 2 + j][lane] * model->residual[j][lane];
-        }
-    harmonic_oscillator_sizes(model->y, delta, size);
-    for (int i = 0; i < 2; ++i)
-        for (int lane = 0; lane < harmonic_oscillator_LANES; ++lane) model->y[i][lane] -= delta[i][lane];
-}
-
-/* The largest of the lanes, none of which is negative; infinite if one is not finite. As integers, the bits of such
-   numbers have their order, and those of what is no number are larger. */
-static double harmonic_oscillator_largest(const harmonic_oscillator_lanes size)
-{
-    uint64_t bits[8], most = 0;
-    double largest;
-    memcpy(bits, size, sizeof bits);
-    for (int lane = 0; lane < harmonic_oscillator_LANES; ++lane) most = bits[lane] > most ? bits[lane] : most;
-    memcpy(&largest, &most, sizeof largest);
-    return isfinite(largest) ? largest : HUGE_VAL;
-}
-
-/* harmonic_oscillator_near for the guesses of all lanes, seen from one value. */
-static int harmonic_oscillator_near_lanes(harmonic_oscillator_lanes y[restrict 2], const double last[2])
-{
-    harmonic_oscillator_lanes distance = { 0.0 };
-    double size = 0.0;
-    for (int i = 0; i < 2; ++i) {
-        size += fabs(last[i]);
-        harmonic_oscillator_EACH_LANE
-        for (int lane = 0; lane < harmonic_oscillator_LANES; ++lane) distance[lane] += fabs(y[i][lane] - last[i]);
-    }
-    return harmonic_oscillator_largest(distance) <= 4.0 * size;
-}
-
-/* What is left after a correction of this size: quadratic in it, where the matrices are of the points corrected; where
-   they are of points further off, by bend, also of the order of size times bend. bound is what the last pass left. */
-static double harmonic_oscillator_remaining(double size, double bend, double bound)
-{
-    const double growth = size / bound, left = size * (size + bend);
-    return growth > 1.0 ? growth * left : left;
-}
-
-/* The table of a stage, with its matrices or with those of the last pass. */
-static void harmonic_oscillator_update(harmonic_oscillator_lanes coef[restrict], harmonic_oscillator_model *model, int matrices)
-{
-    if (matrices)
-        harmonic_oscillator_tabulate(coef, model);
-    else
-        harmonic_oscillator_evaluate_lanes(coef, model->y, model->displacement, model->increment);
-}
-
-/* The steps of a block one after the other, each along the linear model of its lane. As X, the state with its carry, gains
-   increment - gain residual, the next residual follows from this one; X itself is added up apart. */
-static void harmonic_oscillator_chain(harmonic_oscillator_model model[1], double x[2], double carry[2])
-{
-    double residual[2], sum[2], small[2];
-    for (int i = 0; i < 2; ++i) {
-        residual[i] = ((model->y[i][0] - x[i]) + model->displacement[i][0]) - carry[i];
-        sum[i] = x[i];
-        small[i] = carry[i];
-    }
-    for (int k = 0; k < 1 * harmonic_oscillator_LANES; ++k) {
-        const int lane = k / 1, after = (k + 1) / 1 % harmonic_oscillator_LANES;
-        harmonic_oscillator_model *at = &model[k % 1], *next = &model[(k + 1) % 1];
-        double even[2] = { 0.0 }, odd[2] = { 0.0 }; /* two sums, so that no long chain of additions is waited for */
-        for (int i = 0; i < 2; ++i) {
-            at->residual[i][lane] = residual[i];
-            for (int j = 0; j < 2; j += 2) even[i] += at->gain[i * 2 + j][lane] * residual[j];
-            for (int j = 1; j < 2; j += 2) odd[i] += at->gain[i * 2 + j][lane] * residual[j];
-        }
-        for (int i = 0; i < 2; ++i) {
-            const double change = at->increment[i][lane], total = sum[i] + change, added = total - sum[i];
-            const double turn = (next->displacement[i][after] - at->displacement[i][lane]) - change;
-            const double moved = (next->y[i][after] - at->y[i][lane]) + turn;
-            residual[i] = ((moved + residual[i]) + odd[i]) + even[i];
-            small[i] += ((sum[i] - (total - added)) + (change - added)) - (even[i] + odd[i]);
-            sum[i] = total;
-        }
-    }
-    for (int i = 0; i < 2; ++i) {
-        x[i] = sum[i] + small[i];
-        carry[i] = small[i] - (x[i] - sum[i]);
-    }
-}
-
-/* Bring the table up to date: coefficients, and weights that were fitted since. */
-static void harmonic_oscillator_refresh(const harmonic_oscillator_solver *s, harmonic_oscillator_table *table)
-{
-    for (int stage = 0; stage < 1; ++stage) {
-        if (table->fits[stage] == s->memory[stage].fits) continue;
-        table->fits[stage] = s->memory[stage].fits;
-        for (int k = 0; k < 5; ++k)
-            for (int lane = 0; lane < harmonic_oscillator_LANES; ++lane) table->coef[stage][k][lane] = s->coef[stage][k];
-        memcpy(table->weight[stage], s->memory[stage].weight, (size_t)s->memory[stage].terms * sizeof table->weight[0][0]);
-    }
-}
-
-/* Guesses for the next harmonic_oscillator_LANES values of a stage, by its recurrences. */
-static void harmonic_oscillator_foresee(const harmonic_oscillator_memory *memory, harmonic_oscillator_lanes weight[restrict][2],
-    harmonic_oscillator_lanes y[restrict 2])
-{
-    const int last = memory->count - 1;
-    for (int i = 0; i < 2; ++i) {
-        harmonic_oscillator_lanes even = { 0.0 }, odd = { 0.0 };
-        for (int k = 0; k < memory->terms; k += 2) {
-            const double past = memory->past[last - k][i], earlier = memory->past[last - 1 - k][i];
-            harmonic_oscillator_EACH_LANE
-            for (int lane = 0; lane < harmonic_oscillator_LANES; ++lane) even[lane] += weight[k][i][lane] * past;
-            harmonic_oscillator_EACH_LANE
-            for (int lane = 0; lane < harmonic_oscillator_LANES; ++lane) odd[lane] += weight[k + 1][i][lane] * earlier;
-        }
-        harmonic_oscillator_EACH_LANE
-        for (int lane = 0; lane < harmonic_oscillator_LANES; ++lane) y[i][lane] = even[lane] + odd[lane];
-    }
-}
-
-/* harmonic_oscillator_record for the values of all lanes, one after the other. */
-static void harmonic_oscillator_record_lanes(harmonic_oscillator_memory *memory, harmonic_oscillator_lanes y[restrict 2])
-{
-    harmonic_oscillator_make_room(memory, harmonic_oscillator_LANES);
-    for (int lane = 0; lane < harmonic_oscillator_LANES; ++lane)
-        for (int i = 0; i < 2; ++i) memory->past[memory->count + lane][i] = y[i][lane];
-    memory->count += harmonic_oscillator_LANES;
-}
-
-/* Guesses where no recurrence is known: where alpha and beta have the means of steps by the classical Runge-Kutta
-   method, to leading order. */
-static void harmonic_oscillator_march(const harmonic_oscillator_solver *s, harmonic_oscillator_table *table, harmonic_oscillator_model model[1])
-{
-    static const double reach[4] = { 0.5, 0.5, 1.0, 0.0 }, weight[4] = { 1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0 };
-    double x[2], point[2], slope[2], mean[2];
-    memcpy(x, s->x, sizeof x);
-    for (int k = 0; k < 1 * harmonic_oscillator_LANES; ++k) {
-        const double h = harmonic_oscillator_fractions[k % 1] * s->h;
-        memcpy(point, x, sizeof x);
-        memset(mean, 0, sizeof mean);
-        for (int part = 0; part < 4; ++part) {
-            harmonic_oscillator_vector_field(&s->params, point, slope);
-            for (int i = 0; i < 2; ++i) {
-                mean[i] += weight[part] * slope[i];
-                point[i] = x[i] + h * reach[part] * slope[i];
-            }
-        }
-        for (int i = 0; i < 2; ++i) {
-            model[k % 1].y[i][k / 1] = x[i] + 0.5 * h * mean[i];
-            x[i] += h * mean[i];
-        }
-    }
-    for (int stage = 0; stage < 1; ++stage) {
-        harmonic_oscillator_model *at = &model[stage];
-        harmonic_oscillator_evaluate_lanes(table->coef[stage], at->y, at->displacement, at->increment);
-        for (int i = 0; i < 2; ++i) {
-            harmonic_oscillator_EACH_LANE
-            for (int lane = 0; lane < harmonic_oscillator_LANES; ++lane)
-                at->y[i][lane] -= at->displacement[i][lane] + 0.5 * at->increment[i][lane];
-        }
-    }
-}
-
-/* harmonic_oscillator_LANES steps at once: guess the points of all, and correct them together until the error that remains is as
-   small as after a single step. How many passes that took; 0, and the solver as before, where it takes more than most. */
-static int harmonic_oscillator_block(harmonic_oscillator_solver *s, harmonic_oscillator_table *table, int most)
-{
-    harmonic_oscillator_model model[1];
-    harmonic_oscillator_lanes sizes;
-    double x[2], carry[2], previous = HUGE_VAL, bend = 0.0, bound = HUGE_VAL;
-    int passes = 0, solved = 0;
-    if (!s->foreseeing) harmonic_oscillator_march(s, table, model);
-    for (int stage = 0; stage < 1; ++stage) {
-        if (s->foreseeing) harmonic_oscillator_foresee(&s->memory[stage], table->weight[stage], model[stage].y);
-        if (!harmonic_oscillator_near_lanes(model[stage].y, s->x)) return 0;
-    }
-    while (!solved) {
-        double size = 0.0;
-        const int matrices = previous > 1e-05;
-        for (int stage = 0; stage < 1; ++stage) harmonic_oscillator_update(table->coef[stage], &model[stage], matrices);
-        memcpy(x, s->x, sizeof x);
-        memcpy(carry, s->carry, sizeof carry);
-        harmonic_oscillator_chain(model, x, carry);
-        for (int stage = 0; stage < 1; ++stage) {
-            harmonic_oscillator_correct(&model[stage], sizes);
-            const double largest = harmonic_oscillator_largest(sizes);
-            size = largest > size ? largest : size;
-        }
-        s->evaluations += 1 * harmonic_oscillator_LANES;
-        bend = matrices ? 0.0 : bend + previous;
-        bound = harmonic_oscillator_remaining(size, bend, bound);
-        /* The second test: after the square of so small a correction there is rounding only. */
-        solved = bound <= 1e-20 || (previous < 1e-8 && size < 1e-10);
-        if ((++passes >= most || !(size < previous)) && !solved) return 0;
-        previous = size;
-    }
-    for (int stage = 0; stage < 1; ++stage)
-        if (!harmonic_oscillator_near_lanes(model[stage].y, s->x)) return 0;
-    for (int i = 0; i < 2; ++i)
-        if (!isfinite(x[i])) return 0;
-    memcpy(s->x, x, sizeof x);
-    memcpy(s->carry, carry, sizeof carry);
-    s->steps += harmonic_oscillator_LANES;
-    for (int stage = 0; stage < 1; ++stage) {
-        harmonic_oscillator_memory *memory = &s->memory[stage];
-        harmonic_oscillator_record_lanes(memory, model[stage].y);
-        memory->slow = passes > 1 ? memory->slow + harmonic_oscillator_LANES : 0;
-        if (memory->slow > memory->patience && s->foreseeing) harmonic_oscillator_fit(memory);
-    }
-    return passes;
-}
-
-/* Recurrences are given up for a while, the longer the more often that happens. */
-static void harmonic_oscillator_give_up(harmonic_oscillator_solver *s)
-{
-    s->foreseeing = s->setback = s->pause = 0;
-    s->doubt = 2 * s->doubt + 600;
-    s->retry = s->steps + s->doubt;
-}
-
-/* How the next block is guessed: by recurrences, fitted as soon as enough steps are to be made, or
-   have been, to repay that. */
-static void harmonic_oscillator_choose_guess(harmonic_oscillator_solver *s, size_t steps)
-{
-    for (int stage = 0; stage < 1; ++stage)
-        if (s->memory[stage].count < 111) {
-            s->foreseeing = 0;
-            return;
-        }
-    if (s->foreseeing || (steps < 600 && s->steps < 150) || s->steps < s->retry) return;
-    s->foreseeing = 1;
-    for (int stage = 0; stage < 1 && s->foreseeing; ++stage) {
-        harmonic_oscillator_fit(&s->memory[stage]);
-        s->foreseeing = s->memory[stage].terms > 0;
-    }
-    s->pause = harmonic_oscillator_LANES;
-    if (!s->foreseeing) harmonic_oscillator_give_up(s);
-}
-
-/* Learn from a block: after one that failed single steps are made, the more the more often that happens. Recurrences
-   that fail repeatedly, or need more passes than steps by Runge-Kutta did, are given up. */
-static void harmonic_oscillator_learn_from(harmonic_oscillator_solver *s, int passes)
-{
-    if (passes > 0) {
-        s->setback /= 2;
-    } else {
-        s->setback = 2 * s->setback + harmonic_oscillator_LANES > 1000 ? 1000 : 2 * s->setback + harmonic_oscillator_LANES;
-        s->pause = s->setback;
-    }
-    if (!s->foreseeing) {
-        s->passes = passes > 0 ? passes : INT_MAX;
-    } else if (passes > s->passes || s->setback > 5 * harmonic_oscillator_LANES) {
-        harmonic_oscillator_give_up(s);
-    }
-}
-
-/* A single step, and the running mean of the evaluations that a stage of one takes. */
-static harmonic_oscillator_status harmonic_oscillator_single(harmonic_oscillator_solver *s)
-{
-    const size_t before = s->evaluations;
-    const harmonic_oscillator_status status = harmonic_oscillator_step(s, s->h);
-    s->effort += 0.125 * ((double)(s->evaluations - before) / 1 - s->effort);
-    return status;
-}
-
-/* Blocks of steps where they cost less than single steps, with at most as many passes over a block as 2 for each
-   evaluation in a single step. The results differ by round-off only. */
-harmonic_oscillator_status harmonic_oscillator_integrate(harmonic_oscillator_solver *s, double h, size_t steps)
-{
-    harmonic_oscillator_table table;
     harmonic_oscillator_status status = harmonic_oscillator_set_step(s, h);
-    for (int stage = 0; stage < 1; ++stage) table.fits[stage] = -1;
-    while (status == harmonic_oscillator_OK && steps > 0) {
-        if (steps >= harmonic_oscillator_LANES && s->pause == 0) harmonic_oscillator_choose_guess(s, steps);
-        if (steps >= harmonic_oscillator_LANES && s->pause == 0) {
-            harmonic_oscillator_refresh(s, &table);
-            const int passes = harmonic_oscillator_block(s, &table, (int)(2 * s->effort + 0.5));
-            harmonic_oscillator_learn_from(s, passes);
-            if (passes > 0) steps -= harmonic_oscillator_LANES;
-        } else {
-            if (s->pause > 0) --s->pause;
-            status = harmonic_oscillator_single(s);
-            if (status == harmonic_oscillator_OK) --steps;
-        }
-    }
+    for (; steps > 0 && status == harmonic_oscillator_OK; --steps) status = harmonic_oscillator_step(s, h);
     return status;
-}
-
-/* Members of an ensemble, each in its lane. */
-typedef struct {
-    harmonic_oscillator_lanes x[2], carry[2], coef[1][5];
-    harmonic_oscillator_lanes past[1][111][2]; /* solved values, in a ring */
-    harmonic_oscillator_lanes weight[1][40][2]; /* of past values, the latest first, for the next */
-    int latest;     /* the row of the latest values */
-    int count;      /* rows in use */
-    int order[1];   /* how many of them the extrapolation uses */
-    int terms[1];   /* how many of them the recurrences use */
-    int fits;       /* how often recurrences have been fitted */
-    int fitting[1]; /* whether they are the better guess */
-    int slow;       /* how many of the last steps took more than one iteration */
-    int patience;   /* how many of those before recurrences are fitted again */
-    int active[8];  /* whether the lane has a member that has not failed */
-    size_t left[8]; /* steps that are still to be made, where one has */
-} harmonic_oscillator_group;
-
-/* The past values of a stage, the latest for k = 0. */
-static harmonic_oscillator_lanes *harmonic_oscillator_group_past(harmonic_oscillator_group *group, int stage, int k)
-{
-    const int row = group->latest + k;
-    return group->past[stage][row < 111 ? row : row - 111];
-}
-
-/* Guess the values of a stage by the recurrences of the members. */
-static void harmonic_oscillator_group_foresee(harmonic_oscillator_group *group, int stage, harmonic_oscillator_lanes y[restrict 2])
-{
-    memset(y, 0, 2 * sizeof y[0]);
-    for (int k = 0; k < group->terms[stage]; ++k) {
-        harmonic_oscillator_lanes *past = harmonic_oscillator_group_past(group, stage, k), *weight = group->weight[stage][k];
-        for (int i = 0; i < 2; ++i) {
-            harmonic_oscillator_EACH_LANE
-            for (int lane = 0; lane < harmonic_oscillator_LANES; ++lane) y[i][lane] += weight[i][lane] * past[i][lane];
-        }
-    }
-}
-
-/* Extrapolate the values of a stage. */
-static void harmonic_oscillator_group_extrapolate(harmonic_oscillator_group *group, int stage, harmonic_oscillator_lanes y[restrict 2])
-{
-    const int order = group->order[stage];
-    double binomial = -1.0;
-    memcpy(y, group->x, 2 * sizeof y[0]);
-    if (order > 0) memset(y, 0, 2 * sizeof y[0]);
-    for (int k = 0; k < order; ++k) {
-        harmonic_oscillator_lanes *past = harmonic_oscillator_group_past(group, stage, k);
-        binomial *= -(double)(order - k) / (k + 1);
-        for (int i = 0; i < 2; ++i) {
-            harmonic_oscillator_EACH_LANE
-            for (int lane = 0; lane < harmonic_oscillator_LANES; ++lane) y[i][lane] += binomial * past[i][lane];
-        }
-    }
-}
-
-/* The sum over members of the absolute values of all components. */
-static double harmonic_oscillator_group_sum(const harmonic_oscillator_group *group, harmonic_oscillator_lanes y[2])
-{
-    double sum = 0.0;
-    for (int i = 0; i < 2; ++i)
-        for (int lane = 0; lane < harmonic_oscillator_LANES; ++lane) sum += group->active[lane] ? fabs(y[i][lane]) : 0.0;
-    return sum;
-}
-
-static void harmonic_oscillator_group_subtract(harmonic_oscillator_lanes y[restrict 2], harmonic_oscillator_lanes other[restrict 2])
-{
-    for (int i = 0; i < 2; ++i) {
-        harmonic_oscillator_EACH_LANE
-        for (int lane = 0; lane < harmonic_oscillator_LANES; ++lane) y[i][lane] -= other[i][lane];
-    }
-}
-
-/* Choose the guess that would have been best for these values. */
-static void harmonic_oscillator_group_judge(harmonic_oscillator_group *group, int stage, harmonic_oscillator_lanes y[2])
-{
-    harmonic_oscillator_lanes row[8 + 1][2];
-    const int rows = group->count < 8 ? group->count : 8;
-    double least = HUGE_VAL;
-    memcpy(row[0], y, sizeof row[0]);
-    for (int k = 0; k < rows; ++k) memcpy(row[k + 1], harmonic_oscillator_group_past(group, stage, k), sizeof row[0]);
-    if (group->order[stage] == 0) group->order[stage] = 1;
-    for (int order = 1; order <= rows; ++order) { /* row[0] becomes the backward difference of this order */
-        for (int k = 0; k <= rows - order; ++k) harmonic_oscillator_group_subtract(row[k], row[k + 1]);
-        const double size = harmonic_oscillator_group_sum(group, row[0]);
-        if (size < least) {
-            least = size;
-            group->order[stage] = order;
-        }
-    }
-    if (group->terms[stage] == 0) return;
-    harmonic_oscillator_group_foresee(group, stage, row[0]);
-    harmonic_oscillator_group_subtract(row[0], y);
-    group->fitting[stage] = harmonic_oscillator_group_sum(group, row[0]) <= least;
-}
-
-/* Fit the recurrences of all members; with every time, wait longer before it is done again, and for long if it did not
-   help. */
-static void harmonic_oscillator_group_fit(harmonic_oscillator_group *group)
-{
-    harmonic_oscillator_memory memory;
-    const int helped = group->fits == 0 || group->fitting[0];
-    memory.count = 111;
-    for (int stage = 0; stage < 1; ++stage) {
-        int found = 1;
-        group->terms[stage] = 0;
-        for (int lane = 0; lane < harmonic_oscillator_LANES; ++lane)
-            for (int i = 0; i < 2 && group->active[lane] && found; ++i) {
-                for (int k = 0; k < 111; ++k)
-                    memory.past[111 - 1 - k][i] = harmonic_oscillator_group_past(group, stage, k)[i][lane];
-                const int terms = harmonic_oscillator_train(&memory, i);
-                found = terms > 0;
-                if (terms > group->terms[stage]) group->terms[stage] = terms;
-                for (int k = 0; k < 40; ++k) group->weight[stage][k][i][lane] = memory.weight[k][i][0];
-            }
-        if (!found) group->terms[stage] = 0;
-        group->fitting[stage] = found;
-    }
-    ++group->fits;
-    group->slow = 0;
-    group->patience = helped && group->patience < 10000 ? 2 * group->patience + 150 : 100 * 150;
-}
-
-/* Replace guesses that are not near the last values, as harmonic_oscillator_near has it, by these; lane by lane. */
-static void harmonic_oscillator_stay_near(harmonic_oscillator_lanes y[restrict 2], harmonic_oscillator_lanes last[restrict 2])
-{
-    harmonic_oscillator_lanes distance = { 0.0 }, size = { 0.0 };
-    for (int i = 0; i < 2; ++i) {
-        harmonic_oscillator_EACH_LANE
-        for (int lane = 0; lane < harmonic_oscillator_LANES; ++lane) {
-            distance[lane] += fabs(y[i][lane] - last[i][lane]);
-            size[lane] += fabs(last[i][lane]);
-        }
-    }
-    for (int i = 0; i < 2; ++i) {
-        harmonic_oscillator_EACH_LANE
-        for (int lane = 0; lane < harmonic_oscillator_LANES; ++lane)
-            y[i][lane] = distance[lane] <= 4.0 * size[lane] ? y[i][lane] : last[i][lane];
-    }
-}
-
-/* Whether lanes are still to be solved after a correction of this size; those where nothing is finite leave the group.
-   bound is what remains in each lane. */
-static int harmonic_oscillator_group_open(harmonic_oscillator_group *group, const harmonic_oscillator_lanes size, const harmonic_oscillator_lanes previous,
-    double bend, harmonic_oscillator_lanes bound)
-{
-    int open = 0;
-    harmonic_oscillator_EACH_LANE
-    for (int lane = 0; lane < harmonic_oscillator_LANES; ++lane)
-        bound[lane] = harmonic_oscillator_remaining(size[lane], bend, bound[lane]);
-    if (harmonic_oscillator_largest(bound) <= 1e-20) return 0;
-    for (int lane = 0; lane < harmonic_oscillator_LANES; ++lane) {
-        const int solved = bound[lane] <= 1e-20 || (previous[lane] < 1e-8 && size[lane] < 1e-10);
-        if (!isfinite(size[lane])) group->active[lane] = 0;
-        open += group->active[lane] && !solved;
-    }
-    return open;
-}
-
-/* The guess for a stage: recurrences, or extrapolation; the state for members where that is not near. */
-static void harmonic_oscillator_group_predict(harmonic_oscillator_group *group, int stage, harmonic_oscillator_lanes y[2])
-{
-    if (group->fitting[stage]) harmonic_oscillator_group_foresee(group, stage, y);
-    else harmonic_oscillator_group_extrapolate(group, stage, y);
-    harmonic_oscillator_stay_near(y, group->x);
-}
-
-/* Newton's method for a stage, until the slowest lane is solved. The number of iterations; where that is the most
-   allowed, lanes that are not solved leave the group. */
-static int harmonic_oscillator_group_solve(harmonic_oscillator_group *group, int stage, harmonic_oscillator_model *model)
-{
-    harmonic_oscillator_lanes size, previous, bound;
-    double largest = HUGE_VAL, bend = 0.0;
-    int iterations = 0, open = 1;
-    for (int lane = 0; lane < harmonic_oscillator_LANES; ++lane) size[lane] = bound[lane] = HUGE_VAL;
-    harmonic_oscillator_group_predict(group, stage, model->y);
-    for (; open > 0 && iterations < 20; ++iterations) {
-        memcpy(previous, size, sizeof size);
-        harmonic_oscillator_update(group->coef[stage], model, largest > 1e-05);
-        bend = largest > 1e-05 ? 0.0 : bend + largest;
-        for (int i = 0; i < 2; ++i) {
-            harmonic_oscillator_EACH_LANE
-            for (int lane = 0; lane < harmonic_oscillator_LANES; ++lane)
-                model->residual[i][lane] =
-                    ((model->y[i][lane] - group->x[i][lane]) + model->displacement[i][lane]) - group->carry[i][lane];
-        }
-        harmonic_oscillator_correct(model, size);
-        open = harmonic_oscillator_group_open(group, size, previous, bend, bound);
-        largest = harmonic_oscillator_largest(size);
-    }
-    for (int lane = 0; lane < harmonic_oscillator_LANES && open > 0; ++lane)
-        group->active[lane] = group->active[lane] && bound[lane] <= 1e-20;
-    return iterations;
-}
-
-/* Add the increments, corrected to first order, in compensated arithmetic as for a single step. */
-static void harmonic_oscillator_group_advance(harmonic_oscillator_lanes x[restrict 2], harmonic_oscillator_lanes carry[restrict 2],
-    harmonic_oscillator_model *model)
-{
-    for (int i = 0; i < 2; ++i)
-        for (int j = 0; j < 2; ++j) {
-            harmonic_oscillator_EACH_LANE
-            for (int lane = 0; lane < harmonic_oscillator_LANES; ++lane)
-                carry[i][lane] -= model->gain[i * 2 + j][lane] * model->residual[j][lane];
-        }
-    for (int i = 0; i < 2; ++i) {
-        harmonic_oscillator_EACH_LANE
-        for (int lane = 0; lane < harmonic_oscillator_LANES; ++lane) {
-            const double change = model->increment[i][lane], sum = x[i][lane] + change, added = sum - x[i][lane];
-            const double small = ((x[i][lane] - (sum - added)) + (change - added)) + carry[i][lane];
-            x[i][lane] = sum + small;
-            carry[i][lane] = small - (x[i][lane] - sum);
-        }
-    }
-}
-
-/* Members that failed, or whose state is not near the one before the step or not finite, keep that one, and leave. How many
-   stay. */
-static int harmonic_oscillator_group_leave(harmonic_oscillator_group *group, harmonic_oscillator_lanes x[2], harmonic_oscillator_lanes carry[2],
-    size_t remaining)
-{
-    harmonic_oscillator_lanes moved = { 0.0 }, size = { 0.0 }, bad;
-    int active = 0;
-    for (int i = 0; i < 2; ++i) {
-        harmonic_oscillator_EACH_LANE
-        for (int lane = 0; lane < harmonic_oscillator_LANES; ++lane) {
-            moved[lane] += fabs(group->x[i][lane] - x[i][lane]);
-            size[lane] += fabs(x[i][lane]);
-        }
-    }
-    for (int lane = 0; lane < harmonic_oscillator_LANES; ++lane) bad[lane] = moved[lane] <= 4.0 * size[lane] ? 0.0 : 1.0;
-    for (int lane = 0; lane < harmonic_oscillator_LANES; ++lane) active += group->active[lane];
-    if (active == harmonic_oscillator_LANES && !(harmonic_oscillator_largest(bad) > 0.0)) return active;
-    active = 0;
-    for (int lane = 0; lane < harmonic_oscillator_LANES; ++lane) {
-        group->active[lane] = group->active[lane] && !(bad[lane] > 0.0);
-        active += group->active[lane];
-        for (int i = 0; i < 2 && !group->active[lane]; ++i) {
-            group->x[i][lane] = x[i][lane];
-            group->carry[i][lane] = carry[i][lane];
-        }
-        if (!group->active[lane] && group->left[lane] == 0) group->left[lane] = remaining;
-    }
-    return active;
-}
-
-/* One step of all members, of as many as remain. How many members are left. */
-static int harmonic_oscillator_group_step(harmonic_oscillator_group *group, size_t remaining)
-{
-    harmonic_oscillator_lanes x[2], carry[2];
-    harmonic_oscillator_model model;
-    const int next = (group->latest > 0 ? group->latest : 111) - 1;
-    int most = 0;
-    memcpy(x, group->x, sizeof x);
-    memcpy(carry, group->carry, sizeof carry);
-    for (int stage = 0; stage < 1; ++stage) {
-        const int iterations = harmonic_oscillator_group_solve(group, stage, &model);
-        harmonic_oscillator_group_advance(group->x, group->carry, &model);
-        if (iterations > most) most = iterations;
-        if ((iterations > 1 && next % 8 == 0) || group->count < 8)
-            harmonic_oscillator_group_judge(group, stage, model.y);
-        memcpy(group->past[stage][next], model.y, sizeof model.y);
-    }
-    group->latest = next;
-    if (group->count < 111) ++group->count;
-    group->slow = most > 1 ? group->slow + 1 : 0;
-    if (group->slow > group->patience && group->count == 111 && remaining >= 400)
-        harmonic_oscillator_group_fit(group);
-    return harmonic_oscillator_group_leave(group, x, carry, remaining);
-}
-
-/* Put a member into a lane: its state, and its coefficients. */
-static harmonic_oscillator_status harmonic_oscillator_group_join(harmonic_oscillator_group *group, int lane, const harmonic_oscillator_params *params,
-    const double x0[2], double h)
-{
-    harmonic_oscillator_solver s;
-    harmonic_oscillator_status status = harmonic_oscillator_init(&s, params, x0);
-    if (status == harmonic_oscillator_OK) status = harmonic_oscillator_set_step(&s, h);
-    if (status != harmonic_oscillator_OK) return status;
-    for (int i = 0; i < 2; ++i) group->x[i][lane] = s.x[i];
-    for (int stage = 0; stage < 1; ++stage)
-        for (int k = 0; k < 5; ++k) group->coef[stage][k][lane] = s.coef[stage][k];
-    group->active[lane] = 1;
-    return status;
-}
-
-/* The steps that a member has still to make after it left the group, by itself. */
-static harmonic_oscillator_status harmonic_oscillator_group_finish(const harmonic_oscillator_group *group, int lane, const harmonic_oscillator_params *params,
-    double x[2], double h)
-{
-    harmonic_oscillator_solver s;
-    harmonic_oscillator_status status = harmonic_oscillator_init(&s, params, x);
-    if (status != harmonic_oscillator_OK) return status;
-    for (int i = 0; i < 2; ++i) s.carry[i] = group->carry[i][lane];
-    status = harmonic_oscillator_integrate(&s, h, group->left[lane]);
-    memcpy(x, s.x, sizeof s.x);
-    return status;
-}
-
-/* The members from first on, as many as there are lanes. The first status that is not OK. */
-static harmonic_oscillator_status harmonic_oscillator_group_run(const harmonic_oscillator_params *params, double *x, size_t members, size_t first,
-    double h, size_t steps, unsigned char *status)
-{
-    harmonic_oscillator_group group;
-    harmonic_oscillator_status worst = harmonic_oscillator_OK, member[8];
-    const int count = members - first < harmonic_oscillator_LANES ? (int)(members - first) : harmonic_oscillator_LANES;
-    double state[2];
-    size_t left = steps;
-    memset(&group, 0, sizeof group);
-    for (int lane = 0; lane < count; ++lane) {
-        for (size_t i = 0; i < 2; ++i) state[i] = x[i * members + first + (size_t)lane];
-        member[lane] = harmonic_oscillator_group_join(&group, lane, params, state, h);
-    }
-    for (int active = count; left > 0 && active > 2; --left) active = harmonic_oscillator_group_step(&group, left);
-    for (int lane = 0; lane < count; ++lane) {
-        if (group.active[lane]) group.left[lane] = left;
-        for (int i = 0; i < 2; ++i) state[i] = group.x[i][lane];
-        if (member[lane] == harmonic_oscillator_OK) {
-            if (group.left[lane] > 0) member[lane] = harmonic_oscillator_group_finish(&group, lane, params, state, h);
-            for (size_t i = 0; i < 2; ++i) x[i * members + first + (size_t)lane] = state[i];
-        }
-        if (status != NULL) status[first + (size_t)lane] = (unsigned char)member[lane];
-        if (worst == harmonic_oscillator_OK) worst = member[lane];
-    }
-    return worst;
-}
-
-harmonic_oscillator_status harmonic_oscillator_ensemble(const harmonic_oscillator_params *params, double *x,
-                                                        size_t members, double h, size_t steps,
-                                                        unsigned char *status)
-{
-    harmonic_oscillator_status worst = isfinite(h) ? harmonic_oscillator_OK : harmonic_oscillator_BAD_ARGUMENT;
-    const harmonic_oscillator_params own = params != NULL ? *params : harmonic_oscillator_default_params;
-    size_t earliest = members;
-    if (x == NULL && members > 0) return harmonic_oscillator_BAD_ARGUMENT;
-#ifdef _OPENMP
-#pragma omp parallel for schedule(dynamic)
-#endif
-    for (size_t first = 0; first < members; first += harmonic_oscillator_LANES) {
-        const harmonic_oscillator_status group = harmonic_oscillator_group_run(&own, x, members, first, h, steps, status);
-        if (group == harmonic_oscillator_OK) continue;
-#ifdef _OPENMP
-#pragma omp critical
-#endif
-        if (first < earliest) {
-            earliest = first;
-            worst = group;
-        }
-    }
-    return worst;
-}
-
-#if defined(__clang__)
-#pragma clang diagnostic pop
-#endif
-
-/* the Hamiltonian */
-static void harmonic_oscillator_energy(const harmonic_oscillator_params *params, const double x[2],
-                                       double energy[restrict 1])
-{
-    const double q = x[0];
-    const double p = x[1];
-    energy[0] = 0.5 * (p * p / params->m) + 0.5 * (params->k * (q * q));
-}
-
-/* the Casimirs */
-static void harmonic_oscillator_casimir_values(const harmonic_oscillator_params *params, const double x[2],
-                                               double out[restrict 1])
-{
-    (void)params;
-    (void)x;
-    (void)out;
-}
-
-/* pi(x) grad H(x) */
-static void harmonic_oscillator_field(const harmonic_oscillator_params *params, const double x[2],
-                                      double out[restrict 2])
-{
-    const double q = x[0];
-    const double p = x[1];
-    out[0] = p / params->m;
-    out[1] = -(params->k * q);
-}
-
-double harmonic_oscillator_hamiltonian(const harmonic_oscillator_params *params, const double x[2])
-{
-    double energy[1];
-    harmonic_oscillator_energy(params != NULL ? params : &harmonic_oscillator_default_params, x, energy);
-    return energy[0];
-}
-
-void harmonic_oscillator_casimirs(const harmonic_oscillator_params *params, const double x[2], double out[])
-{
-    double value[1]; /* out may overlap x */
-    harmonic_oscillator_casimir_values(params != NULL ? params : &harmonic_oscillator_default_params, x, value);
-    for (int i = 0; i < 0; ++i) out[i] = value[i];
-}
-
-void harmonic_oscillator_vector_field(const harmonic_oscillator_params *params, const double x[2],
-                                      double out[2])
-{
-    double value[2];
-    harmonic_oscillator_field(params != NULL ? params : &harmonic_oscillator_default_params, x, value);
-    memcpy(out, value, sizeof value);
 }
 
 const char *harmonic_oscillator_status_string(harmonic_oscillator_status status)
 {
-    switch (status) {
-    case harmonic_oscillator_OK: return "ok";
-    case harmonic_oscillator_NO_CONVERGENCE: return "no convergence: the step is too large";
-    case harmonic_oscillator_SINGULAR: return "singular Newton matrix: the step is too large";
-    case harmonic_oscillator_NOT_FINITE: return "not finite: overflow, or outside the domain";
-    case harmonic_oscillator_BAD_ARGUMENT: return "bad argument: a null pointer, or values that are not allowed";
-    }
-    return "unknown status";
+    static const char *const text[] = {
+        "ok",
+        "no convergence: the step is too large",
+        "singular Newton matrix: the step is too large",
+        "not finite: overflow, or outside the domain",
+        "bad argument: a null pointer, or values that are not allowed"
+    };
+    return (unsigned)status <= harmonic_oscillator_BAD_ARGUMENT ? text[status] : "unknown status";
 }
 
 size_t harmonic_oscillator_solver_size(void) { return sizeof(harmonic_oscillator_solver); }
 
 size_t harmonic_oscillator_solver_steps_done(const harmonic_oscillator_solver *s) { return s->steps; }
+
+/* ---- Ensembles ---- */
+harmonic_oscillator_status harmonic_oscillator_ensemble(const harmonic_oscillator_params *params, double *x,
+    size_t members, double h, size_t steps, unsigned char *status)
+{
+    harmonic_oscillator_status worst = isfinite(h) ? harmonic_oscillator_OK
+        : harmonic_oscillator_BAD_ARGUMENT;
+    const harmonic_oscillator_params own = params != NULL ? *params : harmonic_oscillator_default_params;
+    if (x == NULL && members > 0) return harmonic_oscillator_BAD_ARGUMENT;
+    for (size_t m = 0; m < members; ++m) {
+        harmonic_oscillator_solver s;
+        double x0[harmonic_oscillator_DIM];
+        for (size_t i = 0; i < harmonic_oscillator_DIM; ++i) x0[i] = x[i * members + m];
+        harmonic_oscillator_status member = harmonic_oscillator_init(&s, &own, x0);
+        if (member == harmonic_oscillator_OK) {
+            member = harmonic_oscillator_integrate(&s, h, steps);
+            for (size_t i = 0; i < harmonic_oscillator_DIM; ++i) x[i * members + m] = s.x[i];
+        }
+        if (status != NULL) status[m] = (unsigned char)member;
+        if (worst == harmonic_oscillator_OK) worst = member;
+    }
+    return worst;
+}

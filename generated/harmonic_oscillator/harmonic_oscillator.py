@@ -6,17 +6,17 @@
 #   step: implicit, Newton iteration with the analytic matrix
 #   one Newton iteration: 4 multiplications
 #
-# spec: harmonic_oscillator, sha256 e958e574b16698d4aa97a0da1c85512b881b696996c00f77d0b496af7d264769
+# spec: harmonic_oscillator, sha256 8fea2d54be1733fb7959bf089f29b69f069d88cc4d415a7096ee372bcd8b8f90
 # to regenerate: phigen build harmonic_oscillator
 # DO NOT EDIT: change the spec and regenerate; edits are noticed by the checksum below.
 #
 # SPDX-License-Identifier: 0BSD
 # This file belongs to whoever generated it; phigen claims no rights in it.
-# body-sha256: 7e3892978dacfb99d9be8d621ebf7ee6560ca8541dc61e19977c005f16233510
+# body-sha256: 9e580bf9e697f2dd6ddf1f0dabfeb9390cd30503ab24b6bfacf1ca5a4594e705
 import numpy as np
 
 VERSION = "0.1.0"
-SPEC_SHA256 = "e958e574b16698d4aa97a0da1c85512b881b696996c00f77d0b496af7d264769"
+SPEC_SHA256 = "8fea2d54be1733fb7959bf089f29b69f069d88cc4d415a7096ee372bcd8b8f90"
 DIM = 2
 ORDER = 4
 COORDINATES = ("q", "p",)

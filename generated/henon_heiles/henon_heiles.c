@@ -7,40 +7,42 @@
  *   step: implicit, Newton iteration with the analytic matrix
  *   one Newton iteration: 51 additions, 75 multiplications
  *
- * spec: henon_heiles, sha256 3b53479fb609048cb8bda5e0894e3dd6f802eb94ddadc7eb330a09c40ce46449
+ * spec: henon_heiles, sha256 344c927b8e04345779f4c5f13f803b87485fa1196d3f3acdf913e1c4000a502e
  * to regenerate: phigen build henon_heiles
  * DO NOT EDIT: change the spec and regenerate; edits are noticed by the checksum below.
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 8e4f1e818b2e9b1822f219d05f3040a2e431cea97d8c60f2f4fdbf4d12186606
+ *
+ *   1. The model
+ *   2. Compensated sums, linear equations
+ *   3. Starting guesses
+ *   4. The implicit step, by Newton's method
+ *   5. The solver
+ *   6. Ensembles
+ * body-sha256: 0fc7f00d71084587b343d30631eb28d2545edba1ae3bb1b87d854733fd81c6a0
  */
 #include "henon_heiles.h"
 
 #include <float.h>
-#include <limits.h>
 #include <math.h>
-#include <stdint.h>
 #include <string.h>
 
+/* ---- The model ---- */
 const henon_heiles_params henon_heiles_default_params = { 0 };
 
-/* A step of size h is the composition of these fractions of it. */
-static const double henon_heiles_fractions[1] = { 1.0 };
+enum { henon_heiles_MAX_ITERATIONS = 20 }; /* of an inner solve */
+
+/* A correction is accepted when the error that it leaves is estimated to be below this. */
+#define henon_heiles_TOLERANCE 1e-20
 
 /* everything that depends on parameters and step size only */
 static void henon_heiles_prepare(const henon_heiles_params *params, double h, double coef[restrict 24])
 {
     (void)params;
-    const double t1 = h * h;
-    const double t2 = h * t1;
-    const double t3 = 1.0 / 24.0 * t1;
-    const double t4 = h * (t1 * t1);
-    const double t5 = h * (1.0 + t1 * (0.25 + 1.0 / 20.0 * t1));
-    const double t6 = t2 * (1.0 / 12.0 + t3);
-    const double t7 = 1.0 / 48.0 * t1;
-    const double t8 = t2 * (1.0 / 24.0 + t7);
-    const double t9 = t2 * (-1.0 / 12.0 - t7);
+    const double t1 = h * h, t2 = h * t1, t3 = 1.0 / 24.0 * t1, t4 = h * (t1 * t1);
+    const double t5 = h * (1.0 + t1 * (0.25 + 1.0 / 20.0 * t1)), t6 = t2 * (1.0 / 12.0 + t3);
+    const double t7 = 1.0 / 48.0 * t1, t8 = t2 * (1.0 / 24.0 + t7), t9 = t2 * (-1.0 / 12.0 - t7);
     const double t10 = t2 * (1.0 / 12.0 + t7);
     const double t11 = h * (-1.0 / 3.0 + t1 * (-1.0 / 12.0 - 1.0 / 60.0 * t1));
     coef[0] = t2 * (1.0 / 6.0 + t3);
@@ -72,53 +74,39 @@ static void henon_heiles_prepare(const henon_heiles_params *params, double h, do
 /* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
    increment, all with the momenta p = grad S_h(y) */
 static void henon_heiles_linearise(const double coef[24], const double y[4], double displacement[restrict 4],
-                                   double increment[restrict 4], double jacobian[restrict 16],
-                                   double increment_jacobian[restrict 16])
+    double increment[restrict 4], double jacobian[restrict 16], double increment_jacobian[restrict 16])
 {
-    const double x = y[0];
-    const double y_ = y[1];
-    const double px = y[2];
-    const double py = y[3];
-    const double t1 = py * x;
-    const double t2 = coef[0] + coef[1] * y_;
-    const double t3 = x * x;
+    const double x = y[0], y_ = y[1], px = y[2], py = y[3];
+    /* momenta */
+    const double t1 = py * x, t2 = coef[0] + coef[1] * y_, t3 = x * x;
     const double t4 = coef[2] + coef[4] * t3 + y_ * (coef[16] + coef[3] * y_);
     const double p_px = t1 * t2 + px * t4;
-    const double t5 = px * x;
-    const double t6 = coef[3] * t3;
-    const double t7 = coef[2] + t6 + y_ * (coef[17] + coef[4] * y_);
+    const double t5 = px * x, t6 = coef[3] * t3, t7 = coef[2] + t6 + y_ * (coef[17] + coef[4] * y_);
     const double p_py = t5 * t2 + py * t7;
-    const double t8 = px * py;
-    const double t9 = py * py;
-    const double t10 = px * px;
-    const double t11 = coef[3] * t9 + coef[4] * t10;
-    const double t12 = coef[9] * t3;
-    const double t13 = coef[5] + t12;
-    const double t14 = y_ * (coef[6] + coef[7] * y_);
+    const double t8 = px * py, t9 = py * py, t10 = px * px, t11 = coef[3] * t9 + coef[4] * t10;
+    const double t12 = coef[9] * t3, t13 = coef[5] + t12, t14 = y_ * (coef[6] + coef[7] * y_);
     const double p_x = t8 * t2 + x * (t11 + (coef[2] + coef[8] * t3) + y_ * (t13 + t14));
-    const double t15 = coef[1] * t8;
-    const double t16 = coef[4] * t9 + coef[3] * t10 + (coef[2] + coef[6] * t3);
-    const double p_y = coef[10] * t9 + coef[11] * t10 + x * (t15 + x * (coef[14] + t6)) + y_ * (t16 + y_ * (coef[12] + coef[15] * t3 + y_ * (coef[8] + coef[13] * y_)));
-    const double t17 = coef[21] * t5 + py * t2;
-    const double t18 = 0.5 * t17;
-    const double t19 = coef[1] * t1 + px * (coef[16] + coef[15] * y_);
-    const double t20 = x * t2;
-    const double t21 = (-0.5) * t20;
-    const double t22 = coef[15] * t1 + px * t2;
-    const double t23 = coef[1] * t5 + py * (coef[17] + coef[21] * y_);
-    const double t24 = 0.5 * t23;
-    const double t25 = t11 + (coef[2] + coef[18] * t3) + y_ * (coef[5] + coef[19] * t3 + t14);
-    const double t26 = t15 + x * (y_ * (coef[20] + coef[9] * y_) + t13);
-    const double t27 = 0.5 * t26;
-    const double t28 = t16 + y_ * (y_ * (coef[18] + coef[23] * y_) + (coef[22] + t12));
+    const double t15 = coef[1] * t8, t16 = coef[4] * t9 + coef[3] * t10 + (coef[2] + coef[6] * t3);
+    const double p_y = coef[10] * t9 + coef[11] * t10 + x * (t15 + x * (coef[14] + t6)) + y_
+        * (t16 + y_ * (coef[12] + coef[15] * t3 + y_ * (coef[8] + coef[13] * y_)));
+    /* displacement */
     displacement[0] = (-0.5) * p_px;
     displacement[1] = (-0.5) * p_py;
     displacement[2] = 0.5 * p_x;
     displacement[3] = 0.5 * p_y;
+    /* increment */
     increment[0] = p_px;
     increment[1] = p_py;
     increment[2] = -p_x;
     increment[3] = -p_y;
+    /* jacobian */
+    const double t17 = coef[21] * t5 + py * t2, t18 = 0.5 * t17;
+    const double t19 = coef[1] * t1 + px * (coef[16] + coef[15] * y_), t20 = x * t2;
+    const double t21 = (-0.5) * t20, t22 = coef[15] * t1 + px * t2;
+    const double t23 = coef[1] * t5 + py * (coef[17] + coef[21] * y_), t24 = 0.5 * t23;
+    const double t25 = t11 + (coef[2] + coef[18] * t3) + y_ * (coef[5] + coef[19] * t3 + t14);
+    const double t26 = t15 + x * (y_ * (coef[20] + coef[9] * y_) + t13), t27 = 0.5 * t26;
+    const double t28 = t16 + y_ * (y_ * (coef[18] + coef[23] * y_) + (coef[22] + t12));
     jacobian[0] = 1.0 - t18;
     jacobian[1] = (-0.5) * t19;
     jacobian[2] = (-0.5) * t4;
@@ -135,6 +123,7 @@ static void henon_heiles_linearise(const double coef[24], const double y[4], dou
     jacobian[13] = 0.5 * t28;
     jacobian[14] = 0.5 * t19;
     jacobian[15] = 1.0 + t24;
+    /* increment jacobian */
     increment_jacobian[0] = t17;
     increment_jacobian[1] = t19;
     increment_jacobian[2] = t4;
@@ -153,289 +142,68 @@ static void henon_heiles_linearise(const double coef[24], const double y[4], dou
     increment_jacobian[15] = -t23;
 }
 
-/* Solve matrix * solution = side, both overwritten, by elimination with partial pivoting. 0 if singular. */
-static int henon_heiles_solve_pivoting(double matrix[16], double side[4])
-{
-    for (int k = 0; k < 4; ++k) {
-        int best = k;
-        for (int i = k + 1; i < 4; ++i)
-            if (fabs(matrix[i * 4 + k]) > fabs(matrix[best * 4 + k])) best = i;
-        const double pivot = matrix[best * 4 + k];
-        if (!(fabs(pivot) > 0.0)) return 0;
-        for (int j = k; j < 4 && best != k; ++j) {
-            const double swap = matrix[k * 4 + j];
-            matrix[k * 4 + j] = matrix[best * 4 + j];
-            matrix[best * 4 + j] = swap;
-        }
-        const double swap = side[k];
-        side[k] = side[best];
-        side[best] = swap;
-        for (int i = k + 1; i < 4; ++i) {
-            const double factor = matrix[i * 4 + k] / pivot;
-            for (int j = k + 1; j < 4; ++j) matrix[i * 4 + j] -= factor * matrix[k * 4 + j];
-            side[i] -= factor * side[k];
-        }
-    }
-    for (int i = 4 - 1; i >= 0; --i) {
-        for (int j = i + 1; j < 4; ++j) side[i] -= matrix[i * 4 + j] * side[j];
-        side[i] /= matrix[i * 4 + i];
-    }
-    return 1;
-}
-
 /* elimination without pivoting: the solution, and the reciprocals of the pivots */
 static void henon_heiles_eliminate(const double matrix[16], const double side[4], double solution[restrict 4],
-                                   double reciprocal[restrict 4])
+    double reciprocal[restrict 4])
 {
-    const double t1 = 1.0 / matrix[0];
-    const double t2 = matrix[12] * t1;
-    const double t3 = matrix[4] * t1;
-    const double t4 = side[1] - side[0] * t3;
-    const double t5 = 1.0 / (matrix[5] - matrix[1] * t3);
-    const double t6 = (matrix[13] - matrix[1] * t2) * t5;
-    const double t7 = matrix[8] * t1;
-    const double t8 = (matrix[9] - matrix[1] * t7) * t5;
-    const double t9 = side[2] - side[0] * t7 - t4 * t8;
+    /* solution */
+    const double t1 = 1.0 / matrix[0], t2 = matrix[12] * t1, t3 = matrix[4] * t1;
+    const double t4 = side[1] - side[0] * t3, t5 = 1.0 / (matrix[5] - matrix[1] * t3);
+    const double t6 = (matrix[13] - matrix[1] * t2) * t5, t7 = matrix[8] * t1;
+    const double t8 = (matrix[9] - matrix[1] * t7) * t5, t9 = side[2] - side[0] * t7 - t4 * t8;
     const double t10 = matrix[6] - matrix[2] * t3;
     const double t11 = 1.0 / (matrix[10] - matrix[2] * t7 - t10 * t8);
     const double t12 = (matrix[14] - matrix[2] * t2 - t10 * t6) * t11;
-    const double t13 = matrix[7] - matrix[3] * t3;
-    const double t14 = matrix[11] - matrix[3] * t7 - t13 * t8;
+    const double t13 = matrix[7] - matrix[3] * t3, t14 = matrix[11] - matrix[3] * t7 - t13 * t8;
     const double t15 = 1.0 / (matrix[15] - matrix[3] * t2 - t13 * t6 - t14 * t12);
     const double t16 = (side[3] - side[0] * t2 - t4 * t6 - t9 * t12) * t15;
-    const double t17 = t11 * (t9 - t14 * t16);
-    const double t18 = t5 * (t4 - (t13 * t16 + t10 * t17));
+    const double t17 = t11 * (t9 - t14 * t16), t18 = t5 * (t4 - (t13 * t16 + t10 * t17));
     solution[0] = t1 * (side[0] - (matrix[3] * t16 + (matrix[2] * t17 + matrix[1] * t18)));
     solution[1] = t18;
     solution[2] = t17;
     solution[3] = t16;
+    /* reciprocal */
     reciprocal[0] = t1;
     reciprocal[1] = t5;
     reciprocal[2] = t11;
     reciprocal[3] = t15;
 }
 
-/* Solve matrix * solution = side, both overwritten. The matrix is I + O(h), so elimination without pivoting
-   does unless a pivot is far from 1. 0 if singular. */
-static int henon_heiles_solve(double matrix[16], double side[4])
+/* the Hamiltonian */
+double henon_heiles_hamiltonian(const henon_heiles_params *params, const double x[4])
 {
-    double solution[4], reciprocal[4], largest = 0.0;
-    henon_heiles_eliminate(matrix, side, solution, reciprocal);
-    for (int i = 0; i < 4; ++i)
-        if (!(fabs(reciprocal[i]) <= largest)) largest = fabs(reciprocal[i]);
-    if (!(largest < 1e3)) return henon_heiles_solve_pivoting(matrix, side);
-    memcpy(side, solution, sizeof solution);
-    return 1;
+    (void)params;
+    const double x_ = x[0], y = x[1], px = x[2], py = x[3];
+    const double t1 = x_ * x_, t2 = y * y;
+    return y * t1 + (0.5 * (px * px + py * py) + 0.5 * (t1 + t2)) - 1.0 / 3.0 * (y * t2);
 }
 
-/* Whether a guess is where the next values may be. Recurrences that were fitted to little else than rest, near a saddle,
-   may lead anywhere; and far away the equation of a step has solutions that have nothing to do with the motion. */
-static int henon_heiles_near(const double guess[4], const double last[4])
+/* the Casimirs */
+void henon_heiles_casimirs(const henon_heiles_params *params, const double x[4], double out[])
 {
-    double distance = 0.0, size = 0.0;
-    for (int i = 0; i < 4; ++i) {
-        distance += fabs(guess[i] - last[i]);
-        size += fabs(last[i]);
-    }
-    return distance <= 4.0 * size;
+    (void)params, (void)x, (void)out;
 }
 
-/* The guess for the next value (y), from earlier ones; 0 if there is none. */
-static int henon_heiles_predict(const henon_heiles_memory *memory, double value[4])
+/* pi(x) grad H(x) */
+void henon_heiles_vector_field(const henon_heiles_params *params, const double x[4], double out[4])
 {
-    const int last = memory->count - 1;
-    double odd[4] = { 0.0 }, binomial = -1.0;
-    memset(value, 0, 4 * sizeof value[0]);
-    if (memory->fitting) {
-        for (int k = 0; k < memory->terms; k += 2)
-            for (int i = 0; i < 4; ++i) {
-                value[i] += memory->weight[k][i][0] * memory->past[last - k][i];
-                odd[i] += memory->weight[k + 1][i][0] * memory->past[last - 1 - k][i];
-            }
-        for (int i = 0; i < 4; ++i) value[i] += odd[i];
-    } else {
-        for (int k = 0; k < memory->order && k <= last; ++k) {
-            binomial *= -(double)(memory->order - k) / (k + 1);
-            for (int i = 0; i < 4; ++i) value[i] += binomial * memory->past[last - k][i];
-        }
-    }
-    return last >= 0 && henon_heiles_near(value, memory->past[last]);
+    (void)params;
+    const double x_ = x[0], y = x[1], px = x[2], py = x[3];
+    out[0] = px;
+    out[1] = py;
+    out[2] = (-2.0) * (x_ * (0.5 + y));
+    out[3] = -(x_ * x_ + (y - y * y));
 }
 
-/* Choose the guess that would have been best for a value that took several iterations. */
-static void henon_heiles_judge(henon_heiles_memory *memory, const double value[4])
+/* ---- Compensated sums, linear equations ---- */
+/* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to
+   its last bit: were it rounded with the change, corrections of one sign would add up to a drift. 0, and x as
+   before, if the sum is not finite. */
+static int henon_heiles_advance(henon_heiles_solver *s, const double change[henon_heiles_DIM],
+    const double correction[henon_heiles_DIM])
 {
-    double row[8 + 1][4], guess[4], least = HUGE_VAL, fitted = HUGE_VAL;
-    const int rows = memory->count < 8 ? memory->count : 8;
-    memcpy(row[0], value, sizeof row[0]);
-    for (int k = 0; k < rows; ++k) memcpy(row[k + 1], memory->past[memory->count - 1 - k], sizeof row[0]);
-    for (int order = 1; order <= rows; ++order) { /* row[0] becomes the backward difference of this order */
-        double size = 0.0;
-        for (int k = 0; k <= rows - order; ++k)
-            for (int i = 0; i < 4; ++i) row[k][i] -= row[k + 1][i];
-        for (int i = 0; i < 4; ++i) size += fabs(row[0][i]);
-        if (size < least) {
-            least = size;
-            memory->order = order;
-        }
-    }
-    memory->fitting = memory->terms > 0;
-    if (memory->fitting && henon_heiles_predict(memory, guess)) {
-        fitted = 0.0;
-        for (int i = 0; i < 4; ++i) fitted += fabs(value[i] - guess[i]);
-    }
-    memory->fitting = memory->terms > 0 && fitted <= least;
-    if (memory->order == 0) memory->order = 1;
-}
-
-/* Make eight columns orthogonal to one, by the multiples of it that are put into r. Where that one is among the eight, those
-   up to it stay as they are, and inverse becomes one over its squared length. The number of rows is even. */
-static void henon_heiles_project(int rows, double (*one)[8], int column, double *inverse, double (*eight)[8], double r[8])
-{
-    double even[8] = { 0.0 }, odd[8] = { 0.0 };
-    for (int i = 0; i < rows; i += 2) {
-        const double entry = one[i][column], next = one[i + 1][column];
-        for (int l = 0; l < 8; ++l) even[l] += entry * eight[i][l];
-        for (int l = 0; l < 8; ++l) odd[l] += next * eight[i + 1][l];
-    }
-    for (int l = 0; l < 8; ++l) even[l] += odd[l];
-    if (one == eight) {
-        *inverse = even[column] > 0.0 ? 1.0 / even[column] : 0.0;
-        memset(even, 0, ((size_t)column + 1) * sizeof even[0]);
-    }
-    for (int l = 0; l < 8; ++l) r[l] = even[l] *= *inverse;
-    for (int i = 0; i < rows; ++i) {
-        const double entry = one[i][column];
-        for (int l = 0; l < 8; ++l) eight[i][l] -= entry * even[l];
-    }
-}
-
-/* By how much recurrences miss the last of these values. */
-static double henon_heiles_missed(const double *value, double (*weight)[8])
-{
-    enum { AHEAD = 8, WINDOW = 40, CHECKS = 8 };
-    double most = 0.0;
-    for (int i = 0; i < CHECKS; ++i) {
-        double guess[8] = { 0.0 };
-        for (int k = 0; k < WINDOW; ++k)
-            for (int l = 0; l < 8; ++l) guess[l] += weight[k][l] * value[i + WINDOW - 1 - k];
-        for (int l = 0; l < AHEAD; ++l) most = fmax(most, fabs(guess[l] - value[i + WINDOW + l]));
-    }
-    return most;
-}
-
-/* Fit the recurrences value[m + l] = sum of weight[k][..][l] * value[m - 1 - k], l = 0 ... 8 - 1, to the history of
-   a component: ridge least squares by modified Gram-Schmidt, the ridge at the level of rounding. Columns are taken in by
-   eights, until they leave next to nothing of the right-hand sides. How many past values are used; 0 if the recurrences do
-   not foresee the last values, which they were not fitted to. */
-static int henon_heiles_train(henon_heiles_memory *memory, int component)
-{
-    enum { AHEAD = 8, WINDOW = 40, ROWS = 56 };
-    double q[WINDOW / 8][ROWS + WINDOW][8], r[WINDOW / 8][WINDOW][8], inverse[WINDOW]; /* eight columns in each part */
-    double right[ROWS + WINDOW][8], weight[WINDOW][8], value[111], largest = 0.0, left = HUGE_VAL;
-    int terms = 0;
-    memset(q, 0, sizeof q);
-    memset(right, 0, sizeof right);
-    memset(weight, 0, sizeof weight);
-    for (int i = 0; i < 111; ++i) {
-        value[i] = memory->past[memory->count - 111 + i][component];
-        if (fabs(value[i]) > largest) largest = fabs(value[i]);
-    }
-    for (int i = 0; i < ROWS; ++i)
-        for (int l = 0; l < AHEAD; ++l) right[i][l] = value[i + WINDOW + l];
-    while (terms < WINDOW && left > 3e-12 * largest) {
-        const int part = terms / 8, rows = ROWS + terms + 8; /* further rows of the ridge are zero in these columns */
-        for (int i = 0; i < ROWS; ++i)
-            for (int l = 0; l < 8; ++l) q[part][i][l] = value[i + WINDOW - 1 - terms - l];
-        for (int l = 0; l < 8; ++l) q[part][ROWS + terms + l][l] = 1e-15 * largest;
-        for (int k = 0; k < terms; ++k) henon_heiles_project(rows, q[k / 8], k % 8, &inverse[k], q[part], r[part][k]);
-        for (int l = 0; l < 8; ++l, ++terms) {
-            henon_heiles_project(rows, q[part], l, &inverse[terms], q[part], r[part][terms]);
-            henon_heiles_project(rows, q[part], l, &inverse[terms], right, weight[terms]);
-        }
-        double sum[8] = { 0.0 };
-        for (int i = 0; i < ROWS; ++i)
-            for (int l = 0; l < 8; ++l) sum[l] += fabs(right[i][l]);
-        left = 0.0;
-        for (int l = 0; l < 8; ++l) left += sum[l] / ROWS;
-    }
-    for (int k = terms - 1; k >= 0; --k)
-        for (int j = k + 1; j < terms; ++j)
-            for (int l = 0; l < 8; ++l) weight[k][l] -= r[j / 8][k][j % 8] * weight[j][l];
-    for (int k = 0; k < WINDOW; ++k) memcpy(memory->weight[k][component], weight[k], AHEAD * sizeof(double));
-    return henon_heiles_missed(value + ROWS, weight) <= 1e-07 * largest ? terms : 0;
-}
-
-/* Drop what is old, if so many values would not fit into the history. */
-static void henon_heiles_make_room(henon_heiles_memory *memory, int values)
-{
-    if (memory->count + values <= 222) return;
-    memmove(memory->past, memory->past + memory->count - 111, 111 * sizeof memory->past[0]);
-    memory->count = 111;
-}
-
-/* Add a value to the history. */
-static void henon_heiles_record(henon_heiles_memory *memory, const double value[4])
-{
-    henon_heiles_make_room(memory, 1);
-    memcpy(memory->past[memory->count++], value, 4 * sizeof value[0]);
-}
-
-/* Fit the recurrence to the last values; with every time, wait longer before it is done again. */
-static void henon_heiles_fit(henon_heiles_memory *memory)
-{
-    int found = 1;
-    memory->terms = 0;
-    for (int i = 0; i < 4 && found; ++i) {
-        const int terms = henon_heiles_train(memory, i);
-        found = terms > 0;
-        if (terms > memory->terms) memory->terms = terms;
-    }
-    if (!found) memory->terms = 0;
-    memory->fitting = found;
-    ++memory->fits;
-    memory->slow = 0;
-    memory->patience = memory->patience < 10000 ? 2 * memory->patience + 150 : 20000;
-}
-
-/* Take in the solved value: what took one iteration needs no better guess. */
-static void henon_heiles_remember(henon_heiles_memory *memory, const double value[4], int iterations)
-{
-    if (iterations > 1) henon_heiles_judge(memory, value);
-    henon_heiles_record(memory, value);
-    memory->slow = iterations > 1 ? memory->slow + 1 : 0;
-    if (memory->slow > memory->patience && memory->count >= 111) henon_heiles_fit(memory);
-}
-
-/* Whether an increment is that of the motion. Where the step is too large, the equation may have been solved by a point far
-   away, at another energy, that has nothing to do with it. */
-static int henon_heiles_plausible(const henon_heiles_solver *s, int stage, const double increment[4])
-{
-    double moved = 0.0, size = 0.0, field[4], middle[4], end[4];
-    for (int i = 0; i < 4; ++i) {
-        moved += fabs(increment[i]);
-        size += fabs(s->x[i]);
-    }
-    if (moved <= 1.5 * size) return 1;
-    henon_heiles_vector_field(&s->params, s->x, field);
-    for (int i = 0; i < 4; ++i) {
-        size += fabs(henon_heiles_fractions[stage] * s->h * field[i]);
-        middle[i] = s->x[i] + 0.5 * increment[i];
-        end[i] = s->x[i] + increment[i];
-    }
-    if (moved <= 1.5 * size) return 1;
-    const double before = henon_heiles_hamiltonian(&s->params, s->x), after = henon_heiles_hamiltonian(&s->params, end);
-    const double scale = fabs(before) + fabs(henon_heiles_hamiltonian(&s->params, middle)) + fabs(after);
-    return fabs(after - before) <= 0.5 * scale;
-}
-
-/* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to its last
-   bit: were it rounded with the change, corrections of one sign would add up to a drift. 0, and x as before, if the
-   sum is not finite. */
-static int henon_heiles_advance(henon_heiles_solver *s, const double change[4], const double correction[4])
-{
-    double x[4], carry[4];
-    for (int i = 0; i < 4; ++i) {
+    double x[henon_heiles_DIM], carry[henon_heiles_DIM];
+    for (int i = 0; i < henon_heiles_DIM; ++i) {
         const double sum = s->x[i] + change[i], added = sum - s->x[i];
         const double lost = (s->x[i] - (sum - added)) + (change[i] - added);
         const double small = lost + (s->carry[i] + correction[i]);
@@ -448,87 +216,160 @@ static int henon_heiles_advance(henon_heiles_solver *s, const double change[4], 
     return 1;
 }
 
-/* Size of a correction relative to each component of y, but no finer than 1e-6 of the largest; NaN or infinite if
-   the correction is. */
-static double henon_heiles_size(const double y[4], const double delta[4])
+/* Newton matrices are I + O(h): a pivot whose reciprocal is larger than this is far from 1. */
+#define henon_heiles_LARGEST_RECIPROCAL 1e3
+
+/* Solve matrix * solution = side, both overwritten. The matrix is I + O(h): 0 if a pivot is far from 1. */
+static int henon_heiles_solve(double matrix[henon_heiles_DIM * henon_heiles_DIM],
+    double side[henon_heiles_DIM])
+{
+    double solution[henon_heiles_DIM], reciprocal[henon_heiles_DIM], largest = 0.0;
+    henon_heiles_eliminate(matrix, side, solution, reciprocal);
+    for (int i = 0; i < henon_heiles_DIM; ++i)
+        if (!(fabs(reciprocal[i]) <= largest)) largest = fabs(reciprocal[i]);
+    if (!(largest < henon_heiles_LARGEST_RECIPROCAL)) return 0;
+    memcpy(side, solution, sizeof solution);
+    return 1;
+}
+
+/* ---- Starting guesses ---- */
+/* How far from the last value a guess may be, in sizes of that value. */
+#define henon_heiles_REACH 4.0
+
+/* The guess for the next value from the last ones: the sum of their backward differences. 0 if there is none,
+   or if it is far away, where the equation of a step has solutions that have nothing to do with the motion.
+   */
+static int henon_heiles_predict(const henon_heiles_history *history, double value[henon_heiles_DIM])
+{
+    double distance = 0.0, size = 0.0;
+    for (int i = 0; i < henon_heiles_DIM; ++i) {
+        value[i] = 0.0;
+        for (int k = 0; k < history->order; ++k) value[i] += history->difference[k][i];
+        distance += fabs(value[i] - history->difference[0][i]);
+        size += fabs(history->difference[0][i]);
+    }
+    return history->order > 0 && distance <= henon_heiles_REACH * size;
+}
+
+/* Take in the solved value. The guess of order k missed it by its k-th difference: the next is of the best
+   order. */
+static void henon_heiles_remember(henon_heiles_history *history, const double value[henon_heiles_DIM])
+{
+    double least = HUGE_VAL, next[henon_heiles_DIM];
+    memcpy(next, value, sizeof next);
+    for (int k = 0; k <= history->count && k < henon_heiles_DIFFERENCES; ++k) {
+        double size = 0.0;
+        for (int i = 0; i < henon_heiles_DIM; ++i) {
+            const double last = history->difference[k][i];
+            history->difference[k][i] = next[i];
+            size += fabs(next[i]);
+            next[i] -= last;
+        }
+        if (k > 0 && size < least) {
+            least = size;
+            history->order = k;
+        }
+    }
+    if (history->count == 0) history->order = 1;
+    if (history->count < henon_heiles_DIFFERENCES) ++history->count;
+}
+
+/* How far a step may lead, in sizes of the state and of what the vector field says, if the energy is lost;
+   and the part of the energy that counts as lost. */
+#define henon_heiles_PLAUSIBLE 1.5
+#define henon_heiles_LOST 0.5
+
+/* Whether an increment is that of the motion. Where the step is too large, the equation may have been solved
+   by a point far away, at another energy, that has nothing to do with it. */
+static int henon_heiles_plausible(const henon_heiles_solver *s, const double increment[henon_heiles_DIM])
+{
+    double moved = 0.0, size = 0.0, field[henon_heiles_DIM], middle[henon_heiles_DIM], end[henon_heiles_DIM];
+    for (int i = 0; i < henon_heiles_DIM; ++i) {
+        moved += fabs(increment[i]);
+        size += fabs(s->x[i]);
+    }
+    if (moved <= henon_heiles_PLAUSIBLE * size) return 1;
+    henon_heiles_vector_field(&s->params, s->x, field);
+    for (int i = 0; i < henon_heiles_DIM; ++i) {
+        size += fabs(s->h * field[i]);
+        middle[i] = s->x[i] + 0.5 * increment[i];
+        end[i] = s->x[i] + increment[i];
+    }
+    if (moved <= henon_heiles_PLAUSIBLE * size) return 1;
+    const double before = henon_heiles_hamiltonian(&s->params, s->x), after =
+        henon_heiles_hamiltonian(&s->params, end);
+    const double scale = fabs(before) + fabs(henon_heiles_hamiltonian(&s->params, middle)) + fabs(after);
+    return fabs(after - before) <= henon_heiles_LOST * scale;
+}
+
+/* ---- The implicit step, by Newton's method ---- */
+/* Components of y are measured no finer than by this part of the largest. */
+#define henon_heiles_FLOOR 1e-6
+
+/* Size of a correction relative to each component of y; NaN or infinite if the correction is. */
+static double henon_heiles_size(const double y[henon_heiles_DIM], const double delta[henon_heiles_DIM])
 {
     double norm = 0.0, size = 0.0;
-    for (int i = 0; i < 4; ++i) norm = fabs(y[i]) > norm ? fabs(y[i]) : norm;
-    for (int i = 0; i < 4; ++i) {
-        const double ratio = fabs(delta[i]) / (fabs(y[i]) + 1e-6 * norm + DBL_MIN);
+    for (int i = 0; i < henon_heiles_DIM; ++i) norm = fabs(y[i]) > norm ? fabs(y[i]) : norm;
+    for (int i = 0; i < henon_heiles_DIM; ++i) {
+        const double ratio = fabs(delta[i]) / (fabs(y[i]) + henon_heiles_FLOOR * norm + DBL_MIN);
         if (!isfinite(ratio)) return ratio;
         size = ratio > size ? ratio : size;
     }
     return size;
 }
 
+/* Corrections below the first that shrink by less than the second have reached the level of rounding. */
+#define henon_heiles_NEARLY_SOLVED 1e-8
+#define henon_heiles_SHRINKING 0.25
+
 /* Solve (y - x) + displacement(y) = 0 for y by Newton's method from the extrapolated guess, and advance. The
-   increment is corrected to first order by the last Newton correction, so that correction costs no evaluation:
-   a correction is accepted when the error that remains after it, quadratic in it, is below 1e-20. */
-static henon_heiles_status henon_heiles_attempt(henon_heiles_solver *s, int stage)
+   increment is corrected to first order by the last Newton correction, so that correction costs no
+   evaluation: a correction is accepted when the error that remains after it, quadratic in it, is below
+   henon_heiles_TOLERANCE. */
+static henon_heiles_status henon_heiles_attempt(henon_heiles_solver *s)
 {
-    const double *coef = s->coef[stage];
-    henon_heiles_memory *memory = &s->memory[stage];
-    double y[4], delta[4], displacement[4], increment[4];
-    double jacobian[16], increment_jacobian[16];
-    if (!henon_heiles_predict(memory, y)) memcpy(y, s->x, sizeof y);
-    double previous = HUGE_VAL;
-    for (int iteration = 0; iteration < 20; ++iteration) {
-        henon_heiles_linearise(coef, y, displacement, increment, jacobian, increment_jacobian);
+    double y[henon_heiles_DIM], delta[henon_heiles_DIM], displacement[henon_heiles_DIM],
+        increment[henon_heiles_DIM];
+    double jacobian[henon_heiles_DIM * henon_heiles_DIM], increment_jacobian[henon_heiles_DIM
+        * henon_heiles_DIM], previous = HUGE_VAL;
+    if (!henon_heiles_predict(&s->history, y)) memcpy(y, s->x, sizeof y);
+    for (int iteration = 1; iteration <= henon_heiles_MAX_ITERATIONS; ++iteration) {
+        henon_heiles_linearise(s->coef, y, displacement, increment, jacobian, increment_jacobian);
         ++s->evaluations;
-        for (int i = 0; i < 4; ++i) delta[i] = ((y[i] - s->x[i]) + displacement[i]) - s->carry[i];
+        for (int i = 0; i < henon_heiles_DIM; ++i) delta[i] = ((y[i] - s->x[i]) + displacement[i])
+            - s->carry[i];
         const int regular = henon_heiles_solve(jacobian, delta);
-        const double size = henon_heiles_size(y, delta);
+        const double size = henon_heiles_size(y, delta), growth = size / (previous * previous);
         if (!isfinite(size)) return henon_heiles_NOT_FINITE;
         if (!regular) return henon_heiles_SINGULAR;
-        for (int i = 0; i < 4; ++i) y[i] -= delta[i];
-        const double growth = size / (previous * previous);
+        for (int i = 0; i < henon_heiles_DIM; ++i) y[i] -= delta[i];
         const double remaining = size * size * (growth > 1.0 ? growth : 1.0);
-        /* The second test: corrections no longer shrink, the solve has reached the level of rounding. */
-        if (remaining <= 1e-20 || (previous < 1e-8 && size > 0.25 * previous)) {
-            double correction[4] = { 0.0 };
-            for (int i = 0; i < 4; ++i)
-                for (int j = 0; j < 4; ++j) correction[i] -= increment_jacobian[i * 4 + j] * delta[j];
-            if (!henon_heiles_plausible(s, stage, increment)) return henon_heiles_NO_CONVERGENCE;
-            if (!henon_heiles_advance(s, increment, correction)) return henon_heiles_NOT_FINITE;
-            henon_heiles_remember(memory, y, iteration + 1);
-            return henon_heiles_OK;
-        }
+        const int stalled = previous < henon_heiles_NEARLY_SOLVED && size > henon_heiles_SHRINKING * previous;
         previous = size;
+        if (!(remaining <= henon_heiles_TOLERANCE || stalled)) continue;
+        double correction[henon_heiles_DIM] = { 0.0 };
+        for (int i = 0; i < henon_heiles_DIM; ++i)
+            for (int j = 0; j < henon_heiles_DIM; ++j)
+                correction[i] -= increment_jacobian[i * henon_heiles_DIM + j] * delta[j];
+        if (!henon_heiles_plausible(s, increment)) return henon_heiles_NO_CONVERGENCE;
+        if (!henon_heiles_advance(s, increment, correction)) return henon_heiles_NOT_FINITE;
+        henon_heiles_remember(&s->history, y);
+        return henon_heiles_OK;
     }
     return henon_heiles_NO_CONVERGENCE;
 }
 
-/* The 1 stages of one step. If one fails, the state is as before the step. */
-static henon_heiles_status henon_heiles_stages(henon_heiles_solver *s)
-{
-    double x[4], carry[4];
-    memcpy(x, s->x, sizeof x);
-    memcpy(carry, s->carry, sizeof carry);
-    for (int stage = 0; stage < 1; ++stage) {
-        henon_heiles_status status = henon_heiles_attempt(s, stage);
-        /* A guess from earlier steps may have misled it: once more without. */
-        if (status != henon_heiles_OK && s->memory[stage].count > 0) {
-            memset(&s->memory[stage], 0, sizeof s->memory[stage]);
-            status = henon_heiles_attempt(s, stage);
-        }
-        if (status != henon_heiles_OK) {
-            memcpy(s->x, x, sizeof x);
-            memcpy(s->carry, carry, sizeof carry);
-            return status;
-        }
-    }
-    return henon_heiles_OK;
-}
-
-/* All of henon_heiles_init but the gauge. The arguments may be parts of *s: they are read before it is written. */
-static henon_heiles_status henon_heiles_start(henon_heiles_solver *s, const henon_heiles_params *params, const double x0[4])
+/* ---- The solver ---- */
+/* The arguments may be parts of *s: they are read before it is written. */
+henon_heiles_status henon_heiles_init(henon_heiles_solver *s, const henon_heiles_params *params,
+    const double x0[henon_heiles_DIM])
 {
     if (s == NULL || x0 == NULL) return henon_heiles_BAD_ARGUMENT;
     const henon_heiles_params own = params != NULL ? *params : henon_heiles_default_params;
-    double x[4];
+    double x[henon_heiles_DIM];
     memcpy(x, x0, sizeof x);
-    for (int i = 0; i < 4; ++i)
+    for (int i = 0; i < henon_heiles_DIM; ++i)
         if (!isfinite(x[i])) return henon_heiles_BAD_ARGUMENT;
     memset(s, 0, sizeof *s);
     memcpy(s->x, x, sizeof s->x);
@@ -536,1023 +377,83 @@ static henon_heiles_status henon_heiles_start(henon_heiles_solver *s, const heno
     return henon_heiles_OK;
 }
 
-henon_heiles_status henon_heiles_init(henon_heiles_solver *s, const henon_heiles_params *params,
-                                      const double x0[4])
-{
-    return henon_heiles_start(s, params, x0);
-}
-
 /* What depends on the step size; nothing where that is as before. */
 static henon_heiles_status henon_heiles_set_step(henon_heiles_solver *s, double h)
 {
     if (s == NULL || !isfinite(h)) return henon_heiles_BAD_ARGUMENT;
-    if (s->ready && memcmp(&h, &s->h, sizeof h) == 0) return henon_heiles_OK;
-    for (int stage = 0; stage < 1; ++stage)
-        henon_heiles_prepare(&s->params, henon_heiles_fractions[stage] * h, s->coef[stage]);
-    memset(s->memory, 0, sizeof s->memory);
-    for (int stage = 0; stage < 1; ++stage) s->memory[stage].patience = 150;
-    s->pause = 16;
-    s->setback = s->foreseeing = 0;
-    s->doubt = s->retry = 0;
-    s->effort = 0.0;
-    s->passes = INT_MAX;
+    if (s->prepared && memcmp(&h, &s->h, sizeof h) == 0) return henon_heiles_OK;
+    henon_heiles_prepare(&s->params, h, s->coef);
+    memset(&s->history, 0, sizeof s->history);
     s->h = h;
-    s->ready = 1;
+    s->t_before_h = s->t;
+    s->steps_before_h = s->steps;
+    s->prepared = 1;
     return henon_heiles_OK;
+}
+
+/* One stage. A guess from earlier steps may have misled it: then once more without. */
+static henon_heiles_status henon_heiles_stage(henon_heiles_solver *s)
+{
+    henon_heiles_status status = henon_heiles_attempt(s);
+    if (status != henon_heiles_OK && s->history.count > 0) {
+        memset(&s->history, 0, sizeof s->history);
+        status = henon_heiles_attempt(s);
+    }
+    return status;
 }
 
 henon_heiles_status henon_heiles_step(henon_heiles_solver *s, double h)
 {
     henon_heiles_status status = henon_heiles_set_step(s, h);
     if (status != henon_heiles_OK) return status;
-    status = henon_heiles_stages(s);
-    if (status == henon_heiles_OK) ++s->steps;
+    status = henon_heiles_stage(s);
+    if (status != henon_heiles_OK) return status;
+    ++s->steps;
+    s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
     return status;
 }
 
-/*
- * Eight at a time: below, the formulas of a step are evaluated for 8 steps of a trajectory, or members of an
- * ensemble, at once. Compilers make vector instructions of the loops over lanes.
- */
-enum { henon_heiles_LANES = 8 };
-
-#if defined(__GNUC__)
-typedef double henon_heiles_lanes[henon_heiles_LANES] __attribute__((aligned(64))); /* a value in each lane */
-#else
-typedef double henon_heiles_lanes[henon_heiles_LANES];
-#endif
-
-#if defined(__clang__)
-#define henon_heiles_EACH_LANE _Pragma("clang loop vectorize(assume_safety)")
-#pragma clang diagnostic push
-#pragma clang diagnostic ignored "-Wpass-failed"
-#elif defined(__GNUC__)
-#define henon_heiles_EACH_LANE _Pragma("GCC ivdep") _Pragma("GCC unroll 1")
-#else
-#define henon_heiles_EACH_LANE
-#endif
-
-/* What all blocks share: coefficients, the same in each lane, and the recurrences by which they are foreseen. */
-typedef struct {
-    int fits[1]; /* the fit that weight is of; -1 for none */
-    henon_heiles_lanes coef[1][24], weight[1][40][4];
-} henon_heiles_table;
-
-/* A stage in all lanes, linearised around y. */
-typedef struct {
-    henon_heiles_lanes y[4], displacement[4], increment[4], residual[4];
-    /* a residual r of alpha(y) = x takes inverse r from y, and gain r from the increment */
-    henon_heiles_lanes inverse[16], slope[16], gain[16];
-} henon_heiles_model;
-
-/* henon_heiles_linearise in all lanes. */
-static void henon_heiles_linearise_lanes(henon_heiles_lanes coef[restrict 24],
-                                         henon_heiles_lanes y[restrict 4],
-                                         henon_heiles_lanes displacement[restrict 4],
-                                         henon_heiles_lanes increment[restrict 4],
-                                         henon_heiles_lanes jacobian[restrict 16],
-                                         henon_heiles_lanes increment_jacobian[restrict 16])
-{
-    henon_heiles_EACH_LANE
-    for (int lane = 0; lane < henon_heiles_LANES; ++lane) {
-        const double x = y[0][lane];
-        const double y_ = y[1][lane];
-        const double px = y[2][lane];
-        const double py = y[3][lane];
-        const double t1 = py * x;
-        const double t2 = coef[0][lane] + coef[1][lane] * y_;
-        const double t3 = x * x;
-        const double t4 = coef[2][lane] + coef[4][lane] * t3 + y_ * (coef[16][lane] + coef[3][lane] * y_);
-        const double p_px = t1 * t2 + px * t4;
-        const double t5 = px * x;
-        const double t6 = coef[3][lane] * t3;
-        const double t7 = coef[2][lane] + t6 + y_ * (coef[17][lane] + coef[4][lane] * y_);
-        const double p_py = t5 * t2 + py * t7;
-        const double t8 = px * py;
-        const double t9 = py * py;
-        const double t10 = px * px;
-        const double t11 = coef[3][lane] * t9 + coef[4][lane] * t10;
-        const double t12 = coef[9][lane] * t3;
-        const double t13 = coef[5][lane] + t12;
-        const double t14 = y_ * (coef[6][lane] + coef[7][lane] * y_);
-        const double p_x = t8 * t2 + x * (t11 + (coef[2][lane] + coef[8][lane] * t3) + y_ * (t13 + t14));
-        const double t15 = coef[1][lane] * t8;
-        const double t16 = coef[4][lane] * t9 + coef[3][lane] * t10 + (coef[2][lane] + coef[6][lane] * t3);
-        const double p_y = coef[10][lane] * t9 + coef[11][lane] * t10 + x * (t15 + x * (coef[14][lane] + t6)) + y_ * (t16 + y_ * (coef[12][lane] + coef[15][lane] * t3 + y_ * (coef[8][lane] + coef[13][lane] * y_)));
-        const double t17 = coef[21][lane] * t5 + py * t2;
-        const double t18 = 0.5 * t17;
-        const double t19 = coef[1][lane] * t1 + px * (coef[16][lane] + coef[15][lane] * y_);
-        const double t20 = x * t2;
-        const double t21 = (-0.5) * t20;
-        const double t22 = coef[15][lane] * t1 + px * t2;
-        const double t23 = coef[1][lane] * t5 + py * (coef[17][lane] + coef[21][lane] * y_);
-        const double t24 = 0.5 * t23;
-        const double t25 = t11 + (coef[2][lane] + coef[18][lane] * t3) + y_ * (coef[5][lane] + coef[19][lane] * t3 + t14);
-        const double t26 = t15 + x * (y_ * (coef[20][lane] + coef[9][lane] * y_) + t13);
-        const double t27 = 0.5 * t26;
-        const double t28 = t16 + y_ * (y_ * (coef[18][lane] + coef[23][lane] * y_) + (coef[22][lane] + t12));
-        displacement[0][lane] = (-0.5) * p_px;
-        displacement[1][lane] = (-0.5) * p_py;
-        displacement[2][lane] = 0.5 * p_x;
-        displacement[3][lane] = 0.5 * p_y;
-        increment[0][lane] = p_px;
-        increment[1][lane] = p_py;
-        increment[2][lane] = -p_x;
-        increment[3][lane] = -p_y;
-        jacobian[0][lane] = 1.0 - t18;
-        jacobian[1][lane] = (-0.5) * t19;
-        jacobian[2][lane] = (-0.5) * t4;
-        jacobian[3][lane] = t21;
-        jacobian[4][lane] = (-0.5) * t22;
-        jacobian[5][lane] = 1.0 - t24;
-        jacobian[6][lane] = t21;
-        jacobian[7][lane] = (-0.5) * t7;
-        jacobian[8][lane] = 0.5 * t25;
-        jacobian[9][lane] = t27;
-        jacobian[10][lane] = 1.0 + t18;
-        jacobian[11][lane] = 0.5 * t22;
-        jacobian[12][lane] = t27;
-        jacobian[13][lane] = 0.5 * t28;
-        jacobian[14][lane] = 0.5 * t19;
-        jacobian[15][lane] = 1.0 + t24;
-        increment_jacobian[0][lane] = t17;
-        increment_jacobian[1][lane] = t19;
-        increment_jacobian[2][lane] = t4;
-        increment_jacobian[3][lane] = t20;
-        increment_jacobian[4][lane] = t22;
-        increment_jacobian[5][lane] = t23;
-        increment_jacobian[6][lane] = t20;
-        increment_jacobian[7][lane] = t7;
-        increment_jacobian[8][lane] = -t25;
-        increment_jacobian[9][lane] = -t26;
-        increment_jacobian[10][lane] = -t17;
-        increment_jacobian[11][lane] = -t22;
-        increment_jacobian[12][lane] = -t26;
-        increment_jacobian[13][lane] = -t28;
-        increment_jacobian[14][lane] = -t19;
-        increment_jacobian[15][lane] = -t23;
-    }
-}
-
-/* henon_heiles_evaluate in all lanes. */
-static void henon_heiles_evaluate_lanes(henon_heiles_lanes coef[restrict 24], henon_heiles_lanes y[restrict 4],
-                                        henon_heiles_lanes displacement[restrict 4],
-                                        henon_heiles_lanes increment[restrict 4])
-{
-    henon_heiles_EACH_LANE
-    for (int lane = 0; lane < henon_heiles_LANES; ++lane) {
-        const double x = y[0][lane];
-        const double y_ = y[1][lane];
-        const double px = y[2][lane];
-        const double py = y[3][lane];
-        const double t1 = coef[0][lane] + coef[1][lane] * y_;
-        const double t2 = x * x;
-        const double p_px = py * x * t1 + px * (coef[2][lane] + coef[4][lane] * t2 + y_ * (coef[16][lane] + coef[3][lane] * y_));
-        const double t3 = coef[3][lane] * t2;
-        const double p_py = px * x * t1 + py * (coef[2][lane] + t3 + y_ * (coef[17][lane] + coef[4][lane] * y_));
-        const double t4 = px * py;
-        const double t5 = py * py;
-        const double t6 = px * px;
-        const double t7 = x * (coef[3][lane] * t5 + coef[4][lane] * t6 + (coef[2][lane] + coef[8][lane] * t2) + y_ * (coef[5][lane] + coef[9][lane] * t2 + y_ * (coef[6][lane] + coef[7][lane] * y_)));
-        const double p_x = t4 * t1 + t7;
-        const double t8 = y_ * (coef[4][lane] * t5 + coef[3][lane] * t6 + (coef[2][lane] + coef[6][lane] * t2) + y_ * (coef[12][lane] + coef[15][lane] * t2 + y_ * (coef[8][lane] + coef[13][lane] * y_)));
-        const double p_y = coef[10][lane] * t5 + coef[11][lane] * t6 + x * (coef[1][lane] * t4 + x * (coef[14][lane] + t3)) + t8;
-        displacement[0][lane] = (-0.5) * p_px;
-        displacement[1][lane] = (-0.5) * p_py;
-        displacement[2][lane] = 0.5 * p_x;
-        displacement[3][lane] = 0.5 * p_y;
-        increment[0][lane] = p_px;
-        increment[1][lane] = p_py;
-        increment[2][lane] = -p_x;
-        increment[3][lane] = -p_y;
-    }
-}
-
-/* henon_heiles_invert in all lanes. */
-static void henon_heiles_invert_lanes(henon_heiles_lanes matrix[restrict 16],
-                                      henon_heiles_lanes slope[restrict 16],
-                                      henon_heiles_lanes inverse[restrict 16],
-                                      henon_heiles_lanes gain[restrict 16],
-                                      henon_heiles_lanes reciprocal[restrict 4])
-{
-    henon_heiles_EACH_LANE
-    for (int lane = 0; lane < henon_heiles_LANES; ++lane) {
-        const double t1 = 1.0 / matrix[0][lane];
-        const double t2 = matrix[1][lane] * t1;
-        const double t3 = 1.0 / (matrix[5][lane] - matrix[4][lane] * t2);
-        const double t4 = matrix[4][lane] * t1 * t3;
-        const double t5 = matrix[2][lane] * t1;
-        const double t6 = (matrix[6][lane] - matrix[4][lane] * t5) * t3;
-        const double t7 = t5 - t2 * t6;
-        const double t8 = matrix[9][lane] - matrix[8][lane] * t2;
-        const double t9 = 1.0 / (matrix[10][lane] - matrix[8][lane] * t5 - t8 * t6);
-        const double t10 = (t8 * t4 - matrix[8][lane] * t1) * t9;
-        const double t11 = matrix[3][lane] * t1;
-        const double t12 = (matrix[7][lane] - matrix[4][lane] * t11) * t3;
-        const double t13 = (matrix[11][lane] - matrix[8][lane] * t11 - t8 * t12) * t9;
-        const double t14 = t11 - t2 * t12 - t7 * t13;
-        const double t15 = matrix[13][lane] - matrix[12][lane] * t2;
-        const double t16 = matrix[14][lane] - matrix[12][lane] * t5 - t15 * t6;
-        const double t17 = 1.0 / (matrix[15][lane] - matrix[12][lane] * t11 - t15 * t12 - t16 * t13);
-        const double t18 = (t15 * t4 - matrix[12][lane] * t1 - t16 * t10) * t17;
-        const double t19 = t1 + t2 * t4 - t7 * t10 - t14 * t18;
-        const double t20 = t8 * t3 * t9;
-        const double t21 = (t16 * t20 - t15 * t3) * t17;
-        const double t22 = t7 * t20 - t2 * t3 - t14 * t21;
-        const double t23 = t16 * t9 * t17;
-        const double t24 = t14 * t23 - t7 * t9;
-        const double t25 = t14 * t17;
-        const double t26 = t12 - t6 * t13;
-        const double t27 = t4 + t6 * t10 + t26 * t18;
-        const double t28 = t3 + t6 * t20 - t26 * t21;
-        const double t29 = t26 * t23 - t6 * t9;
-        const double t30 = t26 * t17;
-        const double t31 = t10 - t13 * t18;
-        const double t32 = t20 + t13 * t21;
-        const double t33 = t9 + t13 * t23;
-        const double t34 = t13 * t17;
-        inverse[0][lane] = t19;
-        inverse[1][lane] = t22;
-        inverse[2][lane] = t24;
-        inverse[3][lane] = -t25;
-        inverse[4][lane] = -t27;
-        inverse[5][lane] = t28;
-        inverse[6][lane] = t29;
-        inverse[7][lane] = -t30;
-        inverse[8][lane] = t31;
-        inverse[9][lane] = -t32;
-        inverse[10][lane] = t33;
-        inverse[11][lane] = -t34;
-        inverse[12][lane] = t18;
-        inverse[13][lane] = t21;
-        inverse[14][lane] = -t23;
-        inverse[15][lane] = t17;
-        gain[0][lane] = slope[0][lane] * t19 - slope[1][lane] * t27 + (slope[3][lane] * t18 + slope[2][lane] * t31);
-        gain[1][lane] = slope[0][lane] * t22 + slope[1][lane] * t28 + (slope[3][lane] * t21 - slope[2][lane] * t32);
-        gain[2][lane] = slope[2][lane] * t33 - slope[3][lane] * t23 + (slope[0][lane] * t24 + slope[1][lane] * t29);
-        gain[3][lane] = slope[3][lane] * t17 - slope[2][lane] * t34 - (slope[1][lane] * t30 + slope[0][lane] * t25);
-        gain[4][lane] = slope[4][lane] * t19 - slope[5][lane] * t27 + (slope[7][lane] * t18 + slope[6][lane] * t31);
-        gain[5][lane] = slope[7][lane] * t21 - slope[6][lane] * t32 + (slope[5][lane] * t28 + slope[4][lane] * t22);
-        gain[6][lane] = slope[6][lane] * t33 - slope[7][lane] * t23 + (slope[5][lane] * t29 + slope[4][lane] * t24);
-        gain[7][lane] = slope[7][lane] * t17 - slope[6][lane] * t34 - (slope[4][lane] * t25 + slope[5][lane] * t30);
-        gain[8][lane] = slope[11][lane] * t18 + slope[10][lane] * t31 + (slope[8][lane] * t19 - slope[9][lane] * t27);
-        gain[9][lane] = slope[9][lane] * t28 + slope[8][lane] * t22 + (slope[11][lane] * t21 - slope[10][lane] * t32);
-        gain[10][lane] = slope[10][lane] * t33 - slope[11][lane] * t23 + (slope[9][lane] * t29 + slope[8][lane] * t24);
-        gain[11][lane] = slope[11][lane] * t17 - slope[10][lane] * t34 - (slope[9][lane] * t30 + slope[8][lane] * t25);
-        gain[12][lane] = slope[15][lane] * t18 + slope[14][lane] * t31 + (slope[12][lane] * t19 - slope[13][lane] * t27);
-        gain[13][lane] = slope[13][lane] * t28 + slope[12][lane] * t22 + (slope[15][lane] * t21 - slope[14][lane] * t32);
-        gain[14][lane] = slope[14][lane] * t33 - slope[15][lane] * t23 + (slope[13][lane] * t29 + slope[12][lane] * t24);
-        gain[15][lane] = slope[15][lane] * t17 - slope[14][lane] * t34 - (slope[12][lane] * t25 + slope[13][lane] * t30);
-        reciprocal[0][lane] = t1;
-        reciprocal[1][lane] = t3;
-        reciprocal[2][lane] = t9;
-        reciprocal[3][lane] = t17;
-    }
-}
-
-/* Everything about a stage at the points y. The matrices are I + O(h): where a pivot is far from 1, all is infinite. */
-static void henon_heiles_tabulate(henon_heiles_lanes coef[restrict], henon_heiles_model *model)
-{
-    henon_heiles_lanes jacobian[16], reciprocal[4];
-    henon_heiles_linearise_lanes(coef, model->y, model->displacement, model->increment, jacobian, model->slope);
-    henon_heiles_invert_lanes(jacobian, model->slope, model->inverse, model->gain, reciprocal);
-    for (int i = 0; i < 4; ++i) {
-        henon_heiles_EACH_LANE
-        for (int lane = 0; lane < henon_heiles_LANES; ++lane)
-            model->inverse[i][lane] += fabs(reciprocal[i][lane]) < 1e3 ? 0.0 : HUGE_VAL;
-    }
-}
-
-/* henon_heiles_size in all lanes, summed over the components. */
-static void henon_heiles_sizes(henon_heiles_lanes y[restrict 4], henon_heiles_lanes delta[restrict 4],
-    henon_heiles_lanes size)
-{
-    henon_heiles_lanes norm = { 0.0 };
-    memset(size, 0, henon_heiles_LANES * sizeof size[0]);
-    for (int i = 0; i < 4; ++i)
-        for (int lane = 0; lane < henon_heiles_LANES; ++lane)
-            norm[lane] = 1e-6 * fabs(y[i][lane]) > norm[lane] ? 1e-6 * fabs(y[i][lane]) : norm[lane];
-    for (int i = 0; i < 4; ++i) {
-        henon_heiles_EACH_LANE
-        for (int lane = 0; lane < henon_heiles_LANES; ++lane)
-            size[lane] += fabs(delta[i][lane]) / (fabs(y[i][lane]) + norm[lane] + DBL_MIN);
-    }
-}
-
-/* Correct y by the residuals, with the inverse in the table, and measure the corrections. */
-static void henon_heiles_correct(henon_heiles_model *model, henon_heiles_lanes size)
-{
-    henon_heiles_lanes delta[4];
-    memset(delta, 0, sizeof delta);
-    for (int i = 0; i < 4; ++i)
-        for (int j = 0; j < 4; ++j) {
-            henon_heiles_EACH_LANE
-            for (int lane = 0; lane < henon_heiles_LANES; ++lane)
-                delta[i][lane] += model->inverse[i * 4 + j][lane] * model->residual[j][lane];
-        }
-    henon_heiles_sizes(model->y, delta, size);
-    for (int i = 0; i < 4; ++i)
-        for (int lane = 0; lane < henon_heiles_LANES; ++lane) model->y[i][lane] -= delta[i][lane];
-}
-
-/* The largest of the lanes, none of which is negative; infinite if one is not finite. As integers, the bits of such
-   numbers have their order, and those of what is no number are larger. */
-static double henon_heiles_largest(const henon_heiles_lanes size)
-{
-    uint64_t bits[8], most = 0;
-    double largest;
-    memcpy(bits, size, sizeof bits);
-    for (int lane = 0; lane < henon_heiles_LANES; ++lane) most = bits[lane] > most ? bits[lane] : most;
-    memcpy(&largest, &most, sizeof largest);
-    return isfinite(largest) ? largest : HUGE_VAL;
-}
-
-/* henon_heiles_near for the guesses of all lanes, seen from one value. */
-static int henon_heiles_near_lanes(henon_heiles_lanes y[restrict 4], const double last[4])
-{
-    henon_heiles_lanes distance = { 0.0 };
-    double size = 0.0;
-    for (int i = 0; i < 4; ++i) {
-        size += fabs(last[i]);
-        henon_heiles_EACH_LANE
-        for (int lane = 0; lane < henon_heiles_LANES; ++lane) distance[lane] += fabs(y[i][lane] - last[i]);
-    }
-    return henon_heiles_largest(distance) <= 4.0 * size;
-}
-
-/* What is left after a correction of this size: quadratic in it, where the matrices are of the points corrected; where
-   they are of points further off, by bend, also of the order of size times bend. bound is what the last pass left. */
-static double henon_heiles_remaining(double size, double bend, double bound)
-{
-    const double growth = size / bound, left = size * (size + bend);
-    return growth > 1.0 ? growth * left : left;
-}
-
-/* The table of a stage, with its matrices or with those of the last pass. */
-static void henon_heiles_update(henon_heiles_lanes coef[restrict], henon_heiles_model *model, int matrices)
-{
-    if (matrices)
-        henon_heiles_tabulate(coef, model);
-    else
-        henon_heiles_evaluate_lanes(coef, model->y, model->displacement, model->increment);
-}
-
-/* The steps of a block one after the other, each along the linear model of its lane. As X, the state with its carry, gains
-   increment - gain residual, the next residual follows from this one; X itself is added up apart. */
-static void henon_heiles_chain(henon_heiles_model model[1], double x[4], double carry[4])
-{
-    double residual[4], sum[4], small[4];
-    for (int i = 0; i < 4; ++i) {
-        residual[i] = ((model->y[i][0] - x[i]) + model->displacement[i][0]) - carry[i];
-        sum[i] = x[i];
-        small[i] = carry[i];
-    }
-    for (int k = 0; k < 1 * henon_heiles_LANES; ++k) {
-        const int lane = k / 1, after = (k + 1) / 1 % henon_heiles_LANES;
-        henon_heiles_model *at = &model[k % 1], *next = &model[(k + 1) % 1];
-        double even[4] = { 0.0 }, odd[4] = { 0.0 }; /* two sums, so that no long chain of additions is waited for */
-        for (int i = 0; i < 4; ++i) {
-            at->residual[i][lane] = residual[i];
-            for (int j = 0; j < 4; j += 2) even[i] += at->gain[i * 4 + j][lane] * residual[j];
-            for (int j = 1; j < 4; j += 2) odd[i] += at->gain[i * 4 + j][lane] * residual[j];
-        }
-        for (int i = 0; i < 4; ++i) {
-            const double change = at->increment[i][lane], total = sum[i] + change, added = total - sum[i];
-            const double turn = (next->displacement[i][after] - at->displacement[i][lane]) - change;
-            const double moved = (next->y[i][after] - at->y[i][lane]) + turn;
-            residual[i] = ((moved + residual[i]) + odd[i]) + even[i];
-            small[i] += ((sum[i] - (total - added)) + (change - added)) - (even[i] + odd[i]);
-            sum[i] = total;
-        }
-    }
-    for (int i = 0; i < 4; ++i) {
-        x[i] = sum[i] + small[i];
-        carry[i] = small[i] - (x[i] - sum[i]);
-    }
-}
-
-/* Bring the table up to date: coefficients, and weights that were fitted since. */
-static void henon_heiles_refresh(const henon_heiles_solver *s, henon_heiles_table *table)
-{
-    for (int stage = 0; stage < 1; ++stage) {
-        if (table->fits[stage] == s->memory[stage].fits) continue;
-        table->fits[stage] = s->memory[stage].fits;
-        for (int k = 0; k < 24; ++k)
-            for (int lane = 0; lane < henon_heiles_LANES; ++lane) table->coef[stage][k][lane] = s->coef[stage][k];
-        memcpy(table->weight[stage], s->memory[stage].weight, (size_t)s->memory[stage].terms * sizeof table->weight[0][0]);
-    }
-}
-
-/* Guesses for the next henon_heiles_LANES values of a stage, by its recurrences. */
-static void henon_heiles_foresee(const henon_heiles_memory *memory, henon_heiles_lanes weight[restrict][4],
-    henon_heiles_lanes y[restrict 4])
-{
-    const int last = memory->count - 1;
-    for (int i = 0; i < 4; ++i) {
-        henon_heiles_lanes even = { 0.0 }, odd = { 0.0 };
-        for (int k = 0; k < memory->terms; k += 2) {
-            const double past = memory->past[last - k][i], earlier = memory->past[last - 1 - k][i];
-            henon_heiles_EACH_LANE
-            for (int lane = 0; lane < henon_heiles_LANES; ++lane) even[lane] += weight[k][i][lane] * past;
-            henon_heiles_EACH_LANE
-            for (int lane = 0; lane < henon_heiles_LANES; ++lane) odd[lane] += weight[k + 1][i][lane] * earlier;
-        }
-        henon_heiles_EACH_LANE
-        for (int lane = 0; lane < henon_heiles_LANES; ++lane) y[i][lane] = even[lane] + odd[lane];
-    }
-}
-
-/* henon_heiles_record for the values of all lanes, one after the other. */
-static void henon_heiles_record_lanes(henon_heiles_memory *memory, henon_heiles_lanes y[restrict 4])
-{
-    henon_heiles_make_room(memory, henon_heiles_LANES);
-    for (int lane = 0; lane < henon_heiles_LANES; ++lane)
-        for (int i = 0; i < 4; ++i) memory->past[memory->count + lane][i] = y[i][lane];
-    memory->count += henon_heiles_LANES;
-}
-
-/* Guesses where no recurrence is known: where alpha and beta have the means of steps by the classical Runge-Kutta
-   method, to leading order. */
-static void henon_heiles_march(const henon_heiles_solver *s, henon_heiles_table *table, henon_heiles_model model[1])
-{
-    static const double reach[4] = { 0.5, 0.5, 1.0, 0.0 }, weight[4] = { 1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0 };
-    double x[4], point[4], slope[4], mean[4];
-    memcpy(x, s->x, sizeof x);
-    for (int k = 0; k < 1 * henon_heiles_LANES; ++k) {
-        const double h = henon_heiles_fractions[k % 1] * s->h;
-        memcpy(point, x, sizeof x);
-        memset(mean, 0, sizeof mean);
-        for (int part = 0; part < 4; ++part) {
-            henon_heiles_vector_field(&s->params, point, slope);
-            for (int i = 0; i < 4; ++i) {
-                mean[i] += weight[part] * slope[i];
-                point[i] = x[i] + h * reach[part] * slope[i];
-            }
-        }
-        for (int i = 0; i < 4; ++i) {
-            model[k % 1].y[i][k / 1] = x[i] + 0.5 * h * mean[i];
-            x[i] += h * mean[i];
-        }
-    }
-    for (int stage = 0; stage < 1; ++stage) {
-        henon_heiles_model *at = &model[stage];
-        henon_heiles_evaluate_lanes(table->coef[stage], at->y, at->displacement, at->increment);
-        for (int i = 0; i < 4; ++i) {
-            henon_heiles_EACH_LANE
-            for (int lane = 0; lane < henon_heiles_LANES; ++lane)
-                at->y[i][lane] -= at->displacement[i][lane] + 0.5 * at->increment[i][lane];
-        }
-    }
-}
-
-/* henon_heiles_LANES steps at once: guess the points of all, and correct them together until the error that remains is as
-   small as after a single step. How many passes that took; 0, and the solver as before, where it takes more than most. */
-static int henon_heiles_block(henon_heiles_solver *s, henon_heiles_table *table, int most)
-{
-    henon_heiles_model model[1];
-    henon_heiles_lanes sizes;
-    double x[4], carry[4], previous = HUGE_VAL, bend = 0.0, bound = HUGE_VAL;
-    int passes = 0, solved = 0;
-    if (!s->foreseeing) henon_heiles_march(s, table, model);
-    for (int stage = 0; stage < 1; ++stage) {
-        if (s->foreseeing) henon_heiles_foresee(&s->memory[stage], table->weight[stage], model[stage].y);
-        if (!henon_heiles_near_lanes(model[stage].y, s->x)) return 0;
-    }
-    while (!solved) {
-        double size = 0.0;
-        const int matrices = previous > 1e-05;
-        for (int stage = 0; stage < 1; ++stage) henon_heiles_update(table->coef[stage], &model[stage], matrices);
-        memcpy(x, s->x, sizeof x);
-        memcpy(carry, s->carry, sizeof carry);
-        henon_heiles_chain(model, x, carry);
-        for (int stage = 0; stage < 1; ++stage) {
-            henon_heiles_correct(&model[stage], sizes);
-            const double largest = henon_heiles_largest(sizes);
-            size = largest > size ? largest : size;
-        }
-        s->evaluations += 1 * henon_heiles_LANES;
-        bend = matrices ? 0.0 : bend + previous;
-        bound = henon_heiles_remaining(size, bend, bound);
-        /* The second test: after the square of so small a correction there is rounding only. */
-        solved = bound <= 1e-20 || (previous < 1e-8 && size < 1e-10);
-        if ((++passes >= most || !(size < previous)) && !solved) return 0;
-        previous = size;
-    }
-    for (int stage = 0; stage < 1; ++stage)
-        if (!henon_heiles_near_lanes(model[stage].y, s->x)) return 0;
-    for (int i = 0; i < 4; ++i)
-        if (!isfinite(x[i])) return 0;
-    memcpy(s->x, x, sizeof x);
-    memcpy(s->carry, carry, sizeof carry);
-    s->steps += henon_heiles_LANES;
-    for (int stage = 0; stage < 1; ++stage) {
-        henon_heiles_memory *memory = &s->memory[stage];
-        henon_heiles_record_lanes(memory, model[stage].y);
-        memory->slow = passes > 1 ? memory->slow + henon_heiles_LANES : 0;
-        if (memory->slow > memory->patience && s->foreseeing) henon_heiles_fit(memory);
-    }
-    return passes;
-}
-
-/* Recurrences are given up for a while, the longer the more often that happens. */
-static void henon_heiles_give_up(henon_heiles_solver *s)
-{
-    s->foreseeing = s->setback = s->pause = 0;
-    s->doubt = 2 * s->doubt + 600;
-    s->retry = s->steps + s->doubt;
-}
-
-/* How the next block is guessed: by recurrences, fitted as soon as enough steps are to be made, or
-   have been, to repay that. */
-static void henon_heiles_choose_guess(henon_heiles_solver *s, size_t steps)
-{
-    for (int stage = 0; stage < 1; ++stage)
-        if (s->memory[stage].count < 111) {
-            s->foreseeing = 0;
-            return;
-        }
-    if (s->foreseeing || (steps < 600 && s->steps < 150) || s->steps < s->retry) return;
-    s->foreseeing = 1;
-    for (int stage = 0; stage < 1 && s->foreseeing; ++stage) {
-        henon_heiles_fit(&s->memory[stage]);
-        s->foreseeing = s->memory[stage].terms > 0;
-    }
-    s->pause = henon_heiles_LANES;
-    if (!s->foreseeing) henon_heiles_give_up(s);
-}
-
-/* Learn from a block: after one that failed single steps are made, the more the more often that happens. Recurrences
-   that fail repeatedly, or need more passes than steps by Runge-Kutta did, are given up. */
-static void henon_heiles_learn_from(henon_heiles_solver *s, int passes)
-{
-    if (passes > 0) {
-        s->setback /= 2;
-    } else {
-        s->setback = 2 * s->setback + henon_heiles_LANES > 1000 ? 1000 : 2 * s->setback + henon_heiles_LANES;
-        s->pause = s->setback;
-    }
-    if (!s->foreseeing) {
-        s->passes = passes > 0 ? passes : INT_MAX;
-    } else if (passes > s->passes || s->setback > 5 * henon_heiles_LANES) {
-        henon_heiles_give_up(s);
-    }
-}
-
-/* A single step, and the running mean of the evaluations that a stage of one takes. */
-static henon_heiles_status henon_heiles_single(henon_heiles_solver *s)
-{
-    const size_t before = s->evaluations;
-    const henon_heiles_status status = henon_heiles_step(s, s->h);
-    s->effort += 0.125 * ((double)(s->evaluations - before) / 1 - s->effort);
-    return status;
-}
-
-/* Blocks of steps where they cost less than single steps, with at most as many passes over a block as 2 for each
-   evaluation in a single step. The results differ by round-off only. */
 henon_heiles_status henon_heiles_integrate(henon_heiles_solver *s, double h, size_t steps)
 {
-    henon_heiles_table table;
     henon_heiles_status status = henon_heiles_set_step(s, h);
-    for (int stage = 0; stage < 1; ++stage) table.fits[stage] = -1;
-    while (status == henon_heiles_OK && steps > 0) {
-        if (steps >= henon_heiles_LANES && s->pause == 0) henon_heiles_choose_guess(s, steps);
-        if (steps >= henon_heiles_LANES && s->pause == 0) {
-            henon_heiles_refresh(s, &table);
-            const int passes = henon_heiles_block(s, &table, (int)(2 * s->effort + 0.5));
-            henon_heiles_learn_from(s, passes);
-            if (passes > 0) steps -= henon_heiles_LANES;
-        } else {
-            if (s->pause > 0) --s->pause;
-            status = henon_heiles_single(s);
-            if (status == henon_heiles_OK) --steps;
-        }
-    }
+    for (; steps > 0 && status == henon_heiles_OK; --steps) status = henon_heiles_step(s, h);
     return status;
-}
-
-/* Members of an ensemble, each in its lane. */
-typedef struct {
-    henon_heiles_lanes x[4], carry[4], coef[1][24];
-    henon_heiles_lanes past[1][111][4]; /* solved values, in a ring */
-    henon_heiles_lanes weight[1][40][4]; /* of past values, the latest first, for the next */
-    int latest;     /* the row of the latest values */
-    int count;      /* rows in use */
-    int order[1];   /* how many of them the extrapolation uses */
-    int terms[1];   /* how many of them the recurrences use */
-    int fits;       /* how often recurrences have been fitted */
-    int fitting[1]; /* whether they are the better guess */
-    int slow;       /* how many of the last steps took more than one iteration */
-    int patience;   /* how many of those before recurrences are fitted again */
-    int active[8];  /* whether the lane has a member that has not failed */
-    size_t left[8]; /* steps that are still to be made, where one has */
-} henon_heiles_group;
-
-/* The past values of a stage, the latest for k = 0. */
-static henon_heiles_lanes *henon_heiles_group_past(henon_heiles_group *group, int stage, int k)
-{
-    const int row = group->latest + k;
-    return group->past[stage][row < 111 ? row : row - 111];
-}
-
-/* Guess the values of a stage by the recurrences of the members. */
-static void henon_heiles_group_foresee(henon_heiles_group *group, int stage, henon_heiles_lanes y[restrict 4])
-{
-    memset(y, 0, 4 * sizeof y[0]);
-    for (int k = 0; k < group->terms[stage]; ++k) {
-        henon_heiles_lanes *past = henon_heiles_group_past(group, stage, k), *weight = group->weight[stage][k];
-        for (int i = 0; i < 4; ++i) {
-            henon_heiles_EACH_LANE
-            for (int lane = 0; lane < henon_heiles_LANES; ++lane) y[i][lane] += weight[i][lane] * past[i][lane];
-        }
-    }
-}
-
-/* Extrapolate the values of a stage. */
-static void henon_heiles_group_extrapolate(henon_heiles_group *group, int stage, henon_heiles_lanes y[restrict 4])
-{
-    const int order = group->order[stage];
-    double binomial = -1.0;
-    memcpy(y, group->x, 4 * sizeof y[0]);
-    if (order > 0) memset(y, 0, 4 * sizeof y[0]);
-    for (int k = 0; k < order; ++k) {
-        henon_heiles_lanes *past = henon_heiles_group_past(group, stage, k);
-        binomial *= -(double)(order - k) / (k + 1);
-        for (int i = 0; i < 4; ++i) {
-            henon_heiles_EACH_LANE
-            for (int lane = 0; lane < henon_heiles_LANES; ++lane) y[i][lane] += binomial * past[i][lane];
-        }
-    }
-}
-
-/* The sum over members of the absolute values of all components. */
-static double henon_heiles_group_sum(const henon_heiles_group *group, henon_heiles_lanes y[4])
-{
-    double sum = 0.0;
-    for (int i = 0; i < 4; ++i)
-        for (int lane = 0; lane < henon_heiles_LANES; ++lane) sum += group->active[lane] ? fabs(y[i][lane]) : 0.0;
-    return sum;
-}
-
-static void henon_heiles_group_subtract(henon_heiles_lanes y[restrict 4], henon_heiles_lanes other[restrict 4])
-{
-    for (int i = 0; i < 4; ++i) {
-        henon_heiles_EACH_LANE
-        for (int lane = 0; lane < henon_heiles_LANES; ++lane) y[i][lane] -= other[i][lane];
-    }
-}
-
-/* Choose the guess that would have been best for these values. */
-static void henon_heiles_group_judge(henon_heiles_group *group, int stage, henon_heiles_lanes y[4])
-{
-    henon_heiles_lanes row[8 + 1][4];
-    const int rows = group->count < 8 ? group->count : 8;
-    double least = HUGE_VAL;
-    memcpy(row[0], y, sizeof row[0]);
-    for (int k = 0; k < rows; ++k) memcpy(row[k + 1], henon_heiles_group_past(group, stage, k), sizeof row[0]);
-    if (group->order[stage] == 0) group->order[stage] = 1;
-    for (int order = 1; order <= rows; ++order) { /* row[0] becomes the backward difference of this order */
-        for (int k = 0; k <= rows - order; ++k) henon_heiles_group_subtract(row[k], row[k + 1]);
-        const double size = henon_heiles_group_sum(group, row[0]);
-        if (size < least) {
-            least = size;
-            group->order[stage] = order;
-        }
-    }
-    if (group->terms[stage] == 0) return;
-    henon_heiles_group_foresee(group, stage, row[0]);
-    henon_heiles_group_subtract(row[0], y);
-    group->fitting[stage] = henon_heiles_group_sum(group, row[0]) <= least;
-}
-
-/* Fit the recurrences of all members; with every time, wait longer before it is done again, and for long if it did not
-   help. */
-static void henon_heiles_group_fit(henon_heiles_group *group)
-{
-    henon_heiles_memory memory;
-    const int helped = group->fits == 0 || group->fitting[0];
-    memory.count = 111;
-    for (int stage = 0; stage < 1; ++stage) {
-        int found = 1;
-        group->terms[stage] = 0;
-        for (int lane = 0; lane < henon_heiles_LANES; ++lane)
-            for (int i = 0; i < 4 && group->active[lane] && found; ++i) {
-                for (int k = 0; k < 111; ++k)
-                    memory.past[111 - 1 - k][i] = henon_heiles_group_past(group, stage, k)[i][lane];
-                const int terms = henon_heiles_train(&memory, i);
-                found = terms > 0;
-                if (terms > group->terms[stage]) group->terms[stage] = terms;
-                for (int k = 0; k < 40; ++k) group->weight[stage][k][i][lane] = memory.weight[k][i][0];
-            }
-        if (!found) group->terms[stage] = 0;
-        group->fitting[stage] = found;
-    }
-    ++group->fits;
-    group->slow = 0;
-    group->patience = helped && group->patience < 10000 ? 2 * group->patience + 150 : 100 * 150;
-}
-
-/* Replace guesses that are not near the last values, as henon_heiles_near has it, by these; lane by lane. */
-static void henon_heiles_stay_near(henon_heiles_lanes y[restrict 4], henon_heiles_lanes last[restrict 4])
-{
-    henon_heiles_lanes distance = { 0.0 }, size = { 0.0 };
-    for (int i = 0; i < 4; ++i) {
-        henon_heiles_EACH_LANE
-        for (int lane = 0; lane < henon_heiles_LANES; ++lane) {
-            distance[lane] += fabs(y[i][lane] - last[i][lane]);
-            size[lane] += fabs(last[i][lane]);
-        }
-    }
-    for (int i = 0; i < 4; ++i) {
-        henon_heiles_EACH_LANE
-        for (int lane = 0; lane < henon_heiles_LANES; ++lane)
-            y[i][lane] = distance[lane] <= 4.0 * size[lane] ? y[i][lane] : last[i][lane];
-    }
-}
-
-/* Whether lanes are still to be solved after a correction of this size; those where nothing is finite leave the group.
-   bound is what remains in each lane. */
-static int henon_heiles_group_open(henon_heiles_group *group, const henon_heiles_lanes size, const henon_heiles_lanes previous,
-    double bend, henon_heiles_lanes bound)
-{
-    int open = 0;
-    henon_heiles_EACH_LANE
-    for (int lane = 0; lane < henon_heiles_LANES; ++lane)
-        bound[lane] = henon_heiles_remaining(size[lane], bend, bound[lane]);
-    if (henon_heiles_largest(bound) <= 1e-20) return 0;
-    for (int lane = 0; lane < henon_heiles_LANES; ++lane) {
-        const int solved = bound[lane] <= 1e-20 || (previous[lane] < 1e-8 && size[lane] < 1e-10);
-        if (!isfinite(size[lane])) group->active[lane] = 0;
-        open += group->active[lane] && !solved;
-    }
-    return open;
-}
-
-/* The guess for a stage: recurrences, or extrapolation; the state for members where that is not near. */
-static void henon_heiles_group_predict(henon_heiles_group *group, int stage, henon_heiles_lanes y[4])
-{
-    if (group->fitting[stage]) henon_heiles_group_foresee(group, stage, y);
-    else henon_heiles_group_extrapolate(group, stage, y);
-    henon_heiles_stay_near(y, group->x);
-}
-
-/* Newton's method for a stage, until the slowest lane is solved. The number of iterations; where that is the most
-   allowed, lanes that are not solved leave the group. */
-static int henon_heiles_group_solve(henon_heiles_group *group, int stage, henon_heiles_model *model)
-{
-    henon_heiles_lanes size, previous, bound;
-    double largest = HUGE_VAL, bend = 0.0;
-    int iterations = 0, open = 1;
-    for (int lane = 0; lane < henon_heiles_LANES; ++lane) size[lane] = bound[lane] = HUGE_VAL;
-    henon_heiles_group_predict(group, stage, model->y);
-    for (; open > 0 && iterations < 20; ++iterations) {
-        memcpy(previous, size, sizeof size);
-        henon_heiles_update(group->coef[stage], model, largest > 1e-05);
-        bend = largest > 1e-05 ? 0.0 : bend + largest;
-        for (int i = 0; i < 4; ++i) {
-            henon_heiles_EACH_LANE
-            for (int lane = 0; lane < henon_heiles_LANES; ++lane)
-                model->residual[i][lane] =
-                    ((model->y[i][lane] - group->x[i][lane]) + model->displacement[i][lane]) - group->carry[i][lane];
-        }
-        henon_heiles_correct(model, size);
-        open = henon_heiles_group_open(group, size, previous, bend, bound);
-        largest = henon_heiles_largest(size);
-    }
-    for (int lane = 0; lane < henon_heiles_LANES && open > 0; ++lane)
-        group->active[lane] = group->active[lane] && bound[lane] <= 1e-20;
-    return iterations;
-}
-
-/* Add the increments, corrected to first order, in compensated arithmetic as for a single step. */
-static void henon_heiles_group_advance(henon_heiles_lanes x[restrict 4], henon_heiles_lanes carry[restrict 4],
-    henon_heiles_model *model)
-{
-    for (int i = 0; i < 4; ++i)
-        for (int j = 0; j < 4; ++j) {
-            henon_heiles_EACH_LANE
-            for (int lane = 0; lane < henon_heiles_LANES; ++lane)
-                carry[i][lane] -= model->gain[i * 4 + j][lane] * model->residual[j][lane];
-        }
-    for (int i = 0; i < 4; ++i) {
-        henon_heiles_EACH_LANE
-        for (int lane = 0; lane < henon_heiles_LANES; ++lane) {
-            const double change = model->increment[i][lane], sum = x[i][lane] + change, added = sum - x[i][lane];
-            const double small = ((x[i][lane] - (sum - added)) + (change - added)) + carry[i][lane];
-            x[i][lane] = sum + small;
-            carry[i][lane] = small - (x[i][lane] - sum);
-        }
-    }
-}
-
-/* Members that failed, or whose state is not near the one before the step or not finite, keep that one, and leave. How many
-   stay. */
-static int henon_heiles_group_leave(henon_heiles_group *group, henon_heiles_lanes x[4], henon_heiles_lanes carry[4],
-    size_t remaining)
-{
-    henon_heiles_lanes moved = { 0.0 }, size = { 0.0 }, bad;
-    int active = 0;
-    for (int i = 0; i < 4; ++i) {
-        henon_heiles_EACH_LANE
-        for (int lane = 0; lane < henon_heiles_LANES; ++lane) {
-            moved[lane] += fabs(group->x[i][lane] - x[i][lane]);
-            size[lane] += fabs(x[i][lane]);
-        }
-    }
-    for (int lane = 0; lane < henon_heiles_LANES; ++lane) bad[lane] = moved[lane] <= 4.0 * size[lane] ? 0.0 : 1.0;
-    for (int lane = 0; lane < henon_heiles_LANES; ++lane) active += group->active[lane];
-    if (active == henon_heiles_LANES && !(henon_heiles_largest(bad) > 0.0)) return active;
-    active = 0;
-    for (int lane = 0; lane < henon_heiles_LANES; ++lane) {
-        group->active[lane] = group->active[lane] && !(bad[lane] > 0.0);
-        active += group->active[lane];
-        for (int i = 0; i < 4 && !group->active[lane]; ++i) {
-            group->x[i][lane] = x[i][lane];
-            group->carry[i][lane] = carry[i][lane];
-        }
-        if (!group->active[lane] && group->left[lane] == 0) group->left[lane] = remaining;
-    }
-    return active;
-}
-
-/* One step of all members, of as many as remain. How many members are left. */
-static int henon_heiles_group_step(henon_heiles_group *group, size_t remaining)
-{
-    henon_heiles_lanes x[4], carry[4];
-    henon_heiles_model model;
-    const int next = (group->latest > 0 ? group->latest : 111) - 1;
-    int most = 0;
-    memcpy(x, group->x, sizeof x);
-    memcpy(carry, group->carry, sizeof carry);
-    for (int stage = 0; stage < 1; ++stage) {
-        const int iterations = henon_heiles_group_solve(group, stage, &model);
-        henon_heiles_group_advance(group->x, group->carry, &model);
-        if (iterations > most) most = iterations;
-        if ((iterations > 1 && next % 8 == 0) || group->count < 8)
-            henon_heiles_group_judge(group, stage, model.y);
-        memcpy(group->past[stage][next], model.y, sizeof model.y);
-    }
-    group->latest = next;
-    if (group->count < 111) ++group->count;
-    group->slow = most > 1 ? group->slow + 1 : 0;
-    if (group->slow > group->patience && group->count == 111 && remaining >= 800)
-        henon_heiles_group_fit(group);
-    return henon_heiles_group_leave(group, x, carry, remaining);
-}
-
-/* Put a member into a lane: its state, and its coefficients. */
-static henon_heiles_status henon_heiles_group_join(henon_heiles_group *group, int lane, const henon_heiles_params *params,
-    const double x0[4], double h)
-{
-    henon_heiles_solver s;
-    henon_heiles_status status = henon_heiles_init(&s, params, x0);
-    if (status == henon_heiles_OK) status = henon_heiles_set_step(&s, h);
-    if (status != henon_heiles_OK) return status;
-    for (int i = 0; i < 4; ++i) group->x[i][lane] = s.x[i];
-    for (int stage = 0; stage < 1; ++stage)
-        for (int k = 0; k < 24; ++k) group->coef[stage][k][lane] = s.coef[stage][k];
-    group->active[lane] = 1;
-    return status;
-}
-
-/* The steps that a member has still to make after it left the group, by itself. */
-static henon_heiles_status henon_heiles_group_finish(const henon_heiles_group *group, int lane, const henon_heiles_params *params,
-    double x[4], double h)
-{
-    henon_heiles_solver s;
-    henon_heiles_status status = henon_heiles_init(&s, params, x);
-    if (status != henon_heiles_OK) return status;
-    for (int i = 0; i < 4; ++i) s.carry[i] = group->carry[i][lane];
-    status = henon_heiles_integrate(&s, h, group->left[lane]);
-    memcpy(x, s.x, sizeof s.x);
-    return status;
-}
-
-/* The members from first on, as many as there are lanes. The first status that is not OK. */
-static henon_heiles_status henon_heiles_group_run(const henon_heiles_params *params, double *x, size_t members, size_t first,
-    double h, size_t steps, unsigned char *status)
-{
-    henon_heiles_group group;
-    henon_heiles_status worst = henon_heiles_OK, member[8];
-    const int count = members - first < henon_heiles_LANES ? (int)(members - first) : henon_heiles_LANES;
-    double state[4];
-    size_t left = steps;
-    memset(&group, 0, sizeof group);
-    for (int lane = 0; lane < count; ++lane) {
-        for (size_t i = 0; i < 4; ++i) state[i] = x[i * members + first + (size_t)lane];
-        member[lane] = henon_heiles_group_join(&group, lane, params, state, h);
-    }
-    for (int active = count; left > 0 && active > 2; --left) active = henon_heiles_group_step(&group, left);
-    for (int lane = 0; lane < count; ++lane) {
-        if (group.active[lane]) group.left[lane] = left;
-        for (int i = 0; i < 4; ++i) state[i] = group.x[i][lane];
-        if (member[lane] == henon_heiles_OK) {
-            if (group.left[lane] > 0) member[lane] = henon_heiles_group_finish(&group, lane, params, state, h);
-            for (size_t i = 0; i < 4; ++i) x[i * members + first + (size_t)lane] = state[i];
-        }
-        if (status != NULL) status[first + (size_t)lane] = (unsigned char)member[lane];
-        if (worst == henon_heiles_OK) worst = member[lane];
-    }
-    return worst;
-}
-
-henon_heiles_status henon_heiles_ensemble(const henon_heiles_params *params, double *x, size_t members,
-                                          double h, size_t steps, unsigned char *status)
-{
-    henon_heiles_status worst = isfinite(h) ? henon_heiles_OK : henon_heiles_BAD_ARGUMENT;
-    const henon_heiles_params own = params != NULL ? *params : henon_heiles_default_params;
-    size_t earliest = members;
-    if (x == NULL && members > 0) return henon_heiles_BAD_ARGUMENT;
-#ifdef _OPENMP
-#pragma omp parallel for schedule(dynamic)
-#endif
-    for (size_t first = 0; first < members; first += henon_heiles_LANES) {
-        const henon_heiles_status group = henon_heiles_group_run(&own, x, members, first, h, steps, status);
-        if (group == henon_heiles_OK) continue;
-#ifdef _OPENMP
-#pragma omp critical
-#endif
-        if (first < earliest) {
-            earliest = first;
-            worst = group;
-        }
-    }
-    return worst;
-}
-
-#if defined(__clang__)
-#pragma clang diagnostic pop
-#endif
-
-/* the Hamiltonian */
-static void henon_heiles_energy(const henon_heiles_params *params, const double x[4],
-                                double energy[restrict 1])
-{
-    (void)params;
-    const double x_ = x[0];
-    const double y = x[1];
-    const double px = x[2];
-    const double py = x[3];
-    const double t1 = x_ * x_;
-    const double t2 = y * y;
-    energy[0] = y * t1 + (0.5 * (px * px + py * py) + 0.5 * (t1 + t2)) - 1.0 / 3.0 * (y * t2);
-}
-
-/* the Casimirs */
-static void henon_heiles_casimir_values(const henon_heiles_params *params, const double x[4],
-                                        double out[restrict 1])
-{
-    (void)params;
-    (void)x;
-    (void)out;
-}
-
-/* pi(x) grad H(x) */
-static void henon_heiles_field(const henon_heiles_params *params, const double x[4], double out[restrict 4])
-{
-    (void)params;
-    const double x_ = x[0];
-    const double y = x[1];
-    const double px = x[2];
-    const double py = x[3];
-    out[0] = px;
-    out[1] = py;
-    out[2] = (-2.0) * (x_ * (0.5 + y));
-    out[3] = -(x_ * x_ + (y - y * y));
-}
-
-double henon_heiles_hamiltonian(const henon_heiles_params *params, const double x[4])
-{
-    double energy[1];
-    henon_heiles_energy(params != NULL ? params : &henon_heiles_default_params, x, energy);
-    return energy[0];
-}
-
-void henon_heiles_casimirs(const henon_heiles_params *params, const double x[4], double out[])
-{
-    double value[1]; /* out may overlap x */
-    henon_heiles_casimir_values(params != NULL ? params : &henon_heiles_default_params, x, value);
-    for (int i = 0; i < 0; ++i) out[i] = value[i];
-}
-
-void henon_heiles_vector_field(const henon_heiles_params *params, const double x[4], double out[4])
-{
-    double value[4];
-    henon_heiles_field(params != NULL ? params : &henon_heiles_default_params, x, value);
-    memcpy(out, value, sizeof value);
 }
 
 const char *henon_heiles_status_string(henon_heiles_status status)
 {
-    switch (status) {
-    case henon_heiles_OK: return "ok";
-    case henon_heiles_NO_CONVERGENCE: return "no convergence: the step is too large";
-    case henon_heiles_SINGULAR: return "singular Newton matrix: the step is too large";
-    case henon_heiles_NOT_FINITE: return "not finite: overflow, or outside the domain";
-    case henon_heiles_BAD_ARGUMENT: return "bad argument: a null pointer, or values that are not allowed";
-    }
-    return "unknown status";
+    static const char *const text[] = {
+        "ok",
+        "no convergence: the step is too large",
+        "singular Newton matrix: the step is too large",
+        "not finite: overflow, or outside the domain",
+        "bad argument: a null pointer, or values that are not allowed"
+    };
+    return (unsigned)status <= henon_heiles_BAD_ARGUMENT ? text[status] : "unknown status";
 }
 
 size_t henon_heiles_solver_size(void) { return sizeof(henon_heiles_solver); }
 
 size_t henon_heiles_solver_steps_done(const henon_heiles_solver *s) { return s->steps; }
+
+/* ---- Ensembles ---- */
+henon_heiles_status henon_heiles_ensemble(const henon_heiles_params *params, double *x, size_t members,
+    double h, size_t steps, unsigned char *status)
+{
+    henon_heiles_status worst = isfinite(h) ? henon_heiles_OK : henon_heiles_BAD_ARGUMENT;
+    const henon_heiles_params own = params != NULL ? *params : henon_heiles_default_params;
+    if (x == NULL && members > 0) return henon_heiles_BAD_ARGUMENT;
+    for (size_t m = 0; m < members; ++m) {
+        henon_heiles_solver s;
+        double x0[henon_heiles_DIM];
+        for (size_t i = 0; i < henon_heiles_DIM; ++i) x0[i] = x[i * members + m];
+        henon_heiles_status member = henon_heiles_init(&s, &own, x0);
+        if (member == henon_heiles_OK) {
+            member = henon_heiles_integrate(&s, h, steps);
+            for (size_t i = 0; i < henon_heiles_DIM; ++i) x[i * members + m] = s.x[i];
+        }
+        if (status != NULL) status[m] = (unsigned char)member;
+        if (worst == henon_heiles_OK) worst = member;
+    }
+    return worst;
+}

@@ -6,17 +6,17 @@
 #   step: implicit, Newton iteration with the analytic matrix
 #   one Newton iteration: 51 additions, 75 multiplications
 #
-# spec: henon_heiles, sha256 3b53479fb609048cb8bda5e0894e3dd6f802eb94ddadc7eb330a09c40ce46449
+# spec: henon_heiles, sha256 344c927b8e04345779f4c5f13f803b87485fa1196d3f3acdf913e1c4000a502e
 # to regenerate: phigen build henon_heiles
 # DO NOT EDIT: change the spec and regenerate; edits are noticed by the checksum below.
 #
 # SPDX-License-Identifier: 0BSD
 # This file belongs to whoever generated it; phigen claims no rights in it.
-# body-sha256: 6d0f4b0eeefb504d2dae55a99de011f76be97d38d00decdedc505b7de41697d3
+# body-sha256: 823ba5c3a9a6ef445bc3d25524ebf16fca57a51058157bdcc19c1b35c8de20ac
 import numpy as np
 
 VERSION = "0.1.0"
-SPEC_SHA256 = "3b53479fb609048cb8bda5e0894e3dd6f802eb94ddadc7eb330a09c40ce46449"
+SPEC_SHA256 = "344c927b8e04345779f4c5f13f803b87485fa1196d3f3acdf913e1c4000a502e"
 DIM = 4
 ORDER = 6
 COORDINATES = ("x", "y", "px", "py",)

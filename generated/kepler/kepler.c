@@ -7,26 +7,40 @@
  *   step: implicit, Newton iteration with the analytic matrix
  *   one Newton iteration: 376 additions, 560 multiplications, 2 divisions, 1 functions
  *
- * spec: kepler, sha256 4874dc0d710c60140708e41ebaf66583708ef198476a1827e3178a4de2a45e27
+ * spec: kepler, sha256 7d889f3f1aeb8f2269b42200556d64daeb9a92956762d91c1f8a8d00d84f48f2
  * to regenerate: phigen build kepler
  * DO NOT EDIT: change the spec and regenerate; edits are noticed by the checksum below.
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 6eef6fa9ebda155e17614be2059b1681638a60c59a30a4bf4b9c907c88cd13f4
+ *
+ *   1. The model
+ *   2. Compensated sums, linear equations
+ *   3. Starting guesses
+ *   4. The implicit step, by Newton's method
+ *   5. The solver
+ *   6. Ensembles
+ * body-sha256: 3e3760f883f90fb56212036607145ef7f3a4baf0ba6fa7ab81c286e460570e04
  */
 #include "kepler.h"
 
 #include <float.h>
-#include <limits.h>
 #include <math.h>
-#include <stdint.h>
 #include <string.h>
 
+/* ---- The model ---- */
 const kepler_params kepler_default_params = { 1.0 };
 
-/* A step of size h is the composition of these fractions of it. */
-static const double kepler_fractions[1] = { 1.0 };
+enum { kepler_MAX_ITERATIONS = 20 }; /* of an inner solve */
+
+/* A correction is accepted when the error that it leaves is estimated to be below this. */
+#define kepler_TOLERANCE 1e-20
+
+/* Whether all parameters are finite, and positive where they have to be. */
+static int kepler_allowed(const kepler_params *params)
+{
+    return isfinite(params->mu) && params->mu > 0.0;
+}
 
 /* Functions to be kept apart: very long ones compile in quadratic time. */
 #if defined(__GNUC__)
@@ -38,62 +52,22 @@ static const double kepler_fractions[1] = { 1.0 };
 /* everything that depends on parameters and step size only */
 static void kepler_prepare(const kepler_params *params, double h, double coef[restrict 118])
 {
-    const double t1 = h * params->mu;
-    const double t2 = h * h;
-    const double t3 = h * t2;
-    const double t4 = params->mu * t3;
-    const double t5 = (-0.125) * t4;
-    const double t6 = h * (t2 * t2);
-    const double t7 = params->mu * params->mu;
-    const double t8 = t6 * t7;
-    const double t9 = (-1.0 / 40.0) * t8;
-    const double t10 = t9 - 1.0 / 80.0 * t8;
-    const double t11 = params->mu * t6;
-    const double t12 = 0.0234375 * t11;
-    const double t13 = t5 - 0.25 * t4;
-    const double t14 = t9 - 7.0 / 80.0 * t8;
-    const double t15 = 0.09375 * t11;
-    const double t16 = t15 + 0.046875 * t11;
-    const double t17 = t15 + t12;
-    const double t18 = t3 * t7;
-    const double t19 = params->mu * t7 * t6;
-    const double t20 = (-3.0 / 80.0) * t19 - 1.0 / 20.0 * t19;
-    const double t21 = 0.625 * t4;
-    const double t22 = 7.0 / 20.0 * t8;
-    const double t23 = 11.0 / 80.0 * t8;
-    const double t24 = t22 + t23;
-    const double t25 = (-0.328125) * t11;
-    const double t26 = 1.0 / 20.0 * t8;
-    const double t27 = t23 + t26;
-    const double t28 = 0.65625 * t11;
-    const double t29 = t25 - t28;
-    const double t30 = 1.25 * t4;
-    const double t31 = 3.0 / 5.0 * t8;
-    const double t32 = 33.0 / 80.0 * t8 + t31;
-    const double t33 = (-0.65625) * t11;
-    const double t34 = t33 - t28;
-    const double t35 = (-1.375) * t8;
-    const double t36 = 1.96875 * t11;
-    const double t37 = t22 + 11.0 / 40.0 * t8;
-    const double t38 = t25 - 0.21875 * t11;
-    const double t39 = 2.953125 * t11;
-    const double t40 = 8.0 * t10;
-    const double t41 = (-0.1640625) * t11;
-    const double t42 = 8.0 * t14;
-    const double t43 = 11.0 * t20;
-    const double t44 = (-10.0) * t24;
-    const double t45 = 2.0625 * t8;
-    const double t46 = (-10.0) * t27;
-    const double t47 = (-10.0) * t32;
-    const double t48 = 5.90625 * t11;
-    const double t49 = 2.75 * t8;
-    const double t50 = (-0.5) * t18;
-    const double t51 = 3.0 / 40.0 * t19;
-    const double t52 = (-0.5) * t8;
-    const double t53 = (-10.0) * t37;
-    const double t54 = 2.0 * t24;
-    const double t55 = 2.0 * t27;
-    const double t56 = 2.0 * t29;
+    const double t1 = h * params->mu, t2 = h * h, t3 = h * t2, t4 = params->mu * t3;
+    const double t5 = (-0.125) * t4, t6 = h * (t2 * t2), t7 = params->mu * params->mu, t8 = t6 * t7;
+    const double t9 = (-1.0 / 40.0) * t8, t10 = t9 - 1.0 / 80.0 * t8, t11 = params->mu * t6;
+    const double t12 = 0.0234375 * t11, t13 = t5 - 0.25 * t4, t14 = t9 - 7.0 / 80.0 * t8;
+    const double t15 = 0.09375 * t11, t16 = t15 + 0.046875 * t11, t17 = t15 + t12, t18 = t3 * t7;
+    const double t19 = params->mu * t7 * t6, t20 = (-3.0 / 80.0) * t19 - 1.0 / 20.0 * t19;
+    const double t21 = 0.625 * t4, t22 = 7.0 / 20.0 * t8, t23 = 11.0 / 80.0 * t8, t24 = t22 + t23;
+    const double t25 = (-0.328125) * t11, t26 = 1.0 / 20.0 * t8, t27 = t23 + t26;
+    const double t28 = 0.65625 * t11, t29 = t25 - t28, t30 = 1.25 * t4, t31 = 3.0 / 5.0 * t8;
+    const double t32 = 33.0 / 80.0 * t8 + t31, t33 = (-0.65625) * t11, t34 = t33 - t28;
+    const double t35 = (-1.375) * t8, t36 = 1.96875 * t11, t37 = t22 + 11.0 / 40.0 * t8;
+    const double t38 = t25 - 0.21875 * t11, t39 = 2.953125 * t11, t40 = 8.0 * t10;
+    const double t41 = (-0.1640625) * t11, t42 = 8.0 * t14, t43 = 11.0 * t20, t44 = (-10.0) * t24;
+    const double t45 = 2.0625 * t8, t46 = (-10.0) * t27, t47 = (-10.0) * t32, t48 = 5.90625 * t11;
+    const double t49 = 2.75 * t8, t50 = (-0.5) * t18, t51 = 3.0 / 40.0 * t19, t52 = (-0.5) * t8;
+    const double t53 = (-10.0) * t37, t54 = 2.0 * t24, t55 = 2.0 * t27, t56 = 2.0 * t29;
     const double t57 = 1.375 * t8;
     coef[0] = t1;
     coef[1] = t5;
@@ -218,178 +192,171 @@ static void kepler_prepare(const kepler_params *params, double h, double coef[re
 /* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
    increment, all with the momenta p = grad S_h(y) (part 1 of 2) */
 kepler_APART static void kepler_linearise_part1(const double coef[118], const double y[4],
-                                                double displacement[restrict 4], double increment[restrict 4],
-                                                double jacobian[restrict 16],
-                                                double increment_jacobian[restrict 16],
-                                                double work[restrict 36])
+    double displacement[restrict 4], double increment[restrict 4], double jacobian[restrict 16],
+    double increment_jacobian[restrict 16], double work[restrict 36])
 {
-    const double x = y[0];
-    const double y_ = y[1];
-    const double px = y[2];
-    const double py = y[3];
+    const double x = y[0], y_ = y[1], px = y[2], py = y[3];
     work[19] = x * x;
     work[7] = y_ * y_;
-    const double t3 = work[19] + work[7];
-    work[9] = 1.0 / sqrt(t3);
-    const double t5 = work[9] * work[9];
-    work[32] = work[9] * t5;
-    work[33] = 1.0 / t3;
-    const double t8 = x * y_;
-    work[26] = py * t8;
+    const double t1 = work[19] + work[7];
+    work[9] = 1.0 / sqrt(t1);
+    const double t2 = work[9] * work[9];
+    work[32] = work[9] * t2;
+    work[33] = 1.0 / t1;
+    const double t3 = x * y_;
+    work[26] = py * t3;
     work[6] = py * py;
-    const double t11 = coef[39] * work[6];
+    const double t4 = coef[39] * work[6];
     work[5] = px * px;
-    const double t13 = coef[39] * work[5];
-    const double t14 = coef[18] * work[19];
-    const double t15 = px * work[7];
-    const double t16 = coef[22] * work[6];
-    const double t17 = coef[40] * work[9];
-    const double t18 = t16 + t17;
+    const double t5 = coef[39] * work[5], t6 = coef[18] * work[19], t7 = px * work[7];
+    const double t8 = coef[22] * work[6], t9 = coef[40] * work[9], t10 = t8 + t9;
     work[3] = y_ * (py * work[6]);
-    const double t20 = px * y_;
-    const double t21 = py * t20;
-    const double t22 = py * y_;
-    const double t23 = px * x;
-    const double t24 = y_ * work[7];
-    const double t25 = py * t24;
-    const double t26 = coef[25] * work[9];
-    const double t27 = coef[27] * work[6] + t26;
-    const double t28 = t8 * (py * work[9]);
-    const double t29 = coef[23] * work[6];
-    const double t30 = t29 + t26;
-    const double t31 = work[7] * t30;
-    const double t32 = coef[23] * t21;
-    const double t33 = coef[27] * work[5] + t26;
-    const double t34 = work[9] * (t25 * t27 + x * (coef[25] * t28 + px * (t31 + x * (t32 + x * t33))));
-    const double t35 = x * (coef[22] * work[3] + px * (coef[41] * t21 + x * (coef[43] * work[5] + t16)) + work[9] * (coef[20] * t22 + coef[42] * t23 + t34));
-    const double t36 = coef[37] * px + work[33] * (coef[18] * work[26] + px * (t11 + (t13 + t14)) + work[9] * (coef[38] * px + work[9] * (t15 * t18 + t35)));
-    const double p_px = coef[36] * px + work[32] * t36;
-    const double t37 = px * t8;
-    const double t38 = t13 + coef[18] * work[7];
-    const double t39 = py * work[19];
-    const double t40 = coef[22] * work[5];
-    const double t41 = t40 + t17;
-    const double t42 = coef[41] * work[6];
-    const double t43 = t42 + t40;
-    const double t44 = t39 * t41 + y_ * (coef[43] * work[3] + px * (coef[22] * t21 + x * t43) + work[9] * (coef[20] * t23 + coef[42] * t22 + t34));
-    const double p_py = coef[36] * py + work[32] * (coef[37] * py + work[33] * (coef[18] * t37 + py * (t11 + t38) + work[9] * (coef[38] * py + work[9] * t44)));
-    const double t45 = coef[1] * work[6];
-    const double t46 = coef[4] * work[5];
-    const double t47 = t40 + t16;
-    const double t48 = work[9] * (coef[20] + work[7] * (work[9] * t27));
-    const double t49 = coef[10] * work[7];
-    const double t50 = coef[3] * work[6];
-    const double t51 = coef[19] * work[26];
+    const double t11 = px * y_, t12 = py * t11, t13 = py * y_, t14 = px * x, t15 = y_ * work[7];
+    const double t16 = py * t15, t17 = coef[25] * work[9], t18 = coef[27] * work[6] + t17;
+    const double t19 = t3 * (py * work[9]), t20 = coef[23] * work[6], t21 = t20 + t17;
+    const double t22 = work[7] * t21, t23 = coef[23] * t12, t24 = coef[27] * work[5] + t17;
+    const double t25 = work[9] * (t16 * t18 + x * (coef[25] * t19 + px * (t22 + x * (t23 + x * t24))));
+    const double t26 = x * (coef[22] * work[3] + px * (coef[41] * t12 + x * (coef[43] * work[5] + t8))
+        + work[9] * (coef[20] * t13 + coef[42] * t14 + t25));
+    const double t27 = coef[37] * px + work[33] * (coef[18] * work[26] + px * (t4 + (t5 + t6)) + work[9]
+        * (coef[38] * px + work[9] * (t7 * t10 + t26)));
+    const double p_px = coef[36] * px + work[32] * t27;
+    const double t28 = px * t3, t29 = t5 + coef[18] * work[7], t30 = py * work[19];
+    const double t31 = coef[22] * work[5], t32 = t31 + t9, t33 = coef[41] * work[6], t34 = t33 + t31;
+    const double t35 = t30 * t32 + y_ * (coef[43] * work[3] + px * (coef[22] * t12 + x * t34) + work[9]
+        * (coef[20] * t14 + coef[42] * t13 + t25));
+    const double p_py = coef[36] * py + work[32] * (coef[37] * py + work[33] * (coef[18] * t28 + py
+        * (t4 + t29) + work[9] * (coef[38] * py + work[9] * t35)));
+    const double t36 = coef[1] * work[6], t37 = coef[4] * work[5], t38 = t31 + t8;
+    const double t39 = work[9] * (coef[20] + work[7] * (work[9] * t18)), t40 = coef[10] * work[7];
+    const double t41 = coef[3] * work[6], t42 = coef[19] * work[26];
     work[27] = coef[6] * work[6];
-    const double t53 = coef[10] * work[19];
-    const double t54 = coef[7] * work[5];
-    const double t55 = coef[8] * work[7];
+    const double t43 = coef[10] * work[19], t44 = coef[7] * work[5], t45 = coef[8] * work[7];
     work[31] = coef[8] * work[19];
-    const double t57 = t55 + work[31];
-    const double t58 = coef[2] * work[6] + coef[5] * work[5];
+    const double t46 = t45 + work[31], t47 = coef[2] * work[6] + coef[5] * work[5];
     work[1] = work[6] * work[6] * work[7];
-    work[2] = work[6] * t15;
-    const double t61 = coef[23] * work[3];
-    const double t62 = coef[12] * work[6];
-    const double t63 = coef[13] * work[5] + coef[11] * work[6];
-    const double t64 = coef[21] * t21;
-    const double t65 = coef[15] * work[33];
-    const double t66 = coef[16] * work[9];
-    const double t67 = coef[9] + work[7] * (t65 + work[6] * (coef[17] * work[6] + t66));
-    const double t68 = py * (px * t24);
-    const double t69 = coef[26] * work[9];
-    const double t70 = coef[28] * work[6] + t69;
-    work[22] = coef[9] + work[19] * (t65 + work[5] * (coef[17] * work[5] + t66));
-    work[23] = py * t23;
-    const double t73 = coef[28] * work[5] + t69;
-    const double t74 = work[5] * work[6];
-    const double t75 = t68 * t70 + x * (work[22] + y_ * (work[23] * t73 + y_ * (coef[35] * t74 + work[9] * (coef[16] * work[6] + (coef[16] * work[5] + coef[34] * work[9])))));
-    const double t76 = work[9] * (work[7] * t67 + x * t75);
-    const double t77 = coef[30] + coef[12] * work[1] + px * (coef[14] * work[2] + x * (t61 + px * (coef[24] * t21 + x * (coef[33] * work[5] + t62)))) + work[9] * (work[7] * t63 + x * (t64 + x * (coef[32] * work[5] + coef[31] * work[6])) + t76);
-    const double t78 = t21 * (t47 + t48) + x * (work[6] * (t49 + t50) + px * (t51 + px * (work[27] + (t53 + t54))) + work[9] * (t57 + t58 + work[9] * t77));
-    const double p_x = work[32] * (coef[0] * x + work[33] * (coef[18] * t21 + x * (t45 + t46) + work[9] * (coef[29] * x + work[9] * t78)));
+    work[2] = work[6] * t7;
+    const double t48 = coef[23] * work[3], t49 = coef[12] * work[6];
+    const double t50 = coef[13] * work[5] + coef[11] * work[6], t51 = coef[21] * t12;
+    const double t52 = coef[15] * work[33], t53 = coef[16] * work[9];
+    const double t54 = coef[9] + work[7] * (t52 + work[6] * (coef[17] * work[6] + t53));
+    const double t55 = py * (px * t15), t56 = coef[26] * work[9], t57 = coef[28] * work[6] + t56;
+    work[22] = coef[9] + work[19] * (t52 + work[5] * (coef[17] * work[5] + t53));
+    work[23] = py * t14;
+    const double t58 = coef[28] * work[5] + t56, t59 = work[5] * work[6];
+    const double t60 = t55 * t57 + x * (work[22] + y_ * (work[23] * t58 + y_ * (coef[35] * t59 + work[9]
+        * (coef[16] * work[6] + (coef[16] * work[5] + coef[34] * work[9])))));
+    const double t61 = work[9] * (work[7] * t54 + x * t60);
+    const double t62 = coef[30] + coef[12] * work[1] + px * (coef[14] * work[2] + x
+        * (t48 + px * (coef[24] * t12 + x * (coef[33] * work[5] + t49)))) + work[9] * (work[7] * t50 + x
+        * (t51 + x * (coef[32] * work[5] + coef[31] * work[6])) + t61);
+    const double t63 = t12 * (t38 + t39) + x * (work[6] * (t40 + t41) + px
+        * (t42 + px * (work[27] + (t43 + t44))) + work[9] * (t46 + t47 + work[9] * t62));
+    const double p_x = work[32] * (coef[0] * x + work[33] * (coef[18] * t12 + x * (t36 + t37) + work[9]
+        * (coef[29] * x + work[9] * t63)));
     work[34] = coef[4] * work[6];
     work[35] = coef[1] * work[5];
-    const double t81 = work[9] * (coef[20] + work[19] * (work[9] * t33));
+    const double t64 = work[9] * (coef[20] + work[19] * (work[9] * t24));
     work[25] = coef[7] * work[6];
     work[28] = coef[3] * work[5];
     work[30] = coef[5] * work[6] + coef[2] * work[5];
-    const double t85 = coef[24] * work[3];
+    const double t65 = coef[24] * work[3];
     work[20] = coef[14] * work[6] + coef[12] * work[5];
     work[21] = coef[13] * work[6] + coef[11] * work[5];
-    const double t88 = coef[30] + coef[33] * work[1] + px * (coef[12] * work[2] + x * (t85 + px * (t32 + x * work[20]))) + work[9] * (work[7] * (coef[32] * work[6] + coef[31] * work[5]) + x * (t64 + x * work[21]) + t76);
-    const double t89 = work[23] * (t47 + t81) + y_ * (work[6] * (t49 + work[25]) + px * (t51 + px * (work[27] + (t53 + work[28]))) + work[9] * (t57 + work[30] + work[9] * t88));
-    const double p_y = work[32] * (coef[0] * y_ + work[33] * (coef[18] * work[23] + y_ * (work[34] + work[35]) + work[9] * (coef[29] * y_ + work[9] * t89)));
-    const double t90 = work[9] * (t5 * t5);
-    const double t91 = coef[41] * work[5];
-    const double t92 = coef[103] * work[6];
-    const double t93 = coef[19] * work[19];
-    const double t94 = coef[106] * work[6];
-    const double t95 = coef[105] * work[9];
-    const double t96 = coef[21] * t22;
-    work[4] = coef[65] * t21;
-    const double t98 = work[9] * (t25 * t70 + x * (coef[26] * t28 + px * (work[7] * (coef[65] * work[6] + t69) + x * (work[4] + x * t73))));
-    const double t99 = t15 * (t94 + t95) + x * (t61 + px * (coef[107] * t21 + x * (t29 + coef[109] * work[5])) + work[9] * (t96 + coef[108] * t23 + t98));
-    const double t100 = t22 * (t91 + t16 + t48) + x * (t51 + px * (t92 + (coef[104] * work[5] + t93)) + work[9] * (coef[102] * px + work[9] * t99));
-    const double t101 = t90 * (coef[18] * t22 + coef[101] * t23 + work[33] * t100);
-    const double t102 = 0.5 * t101;
-    const double t103 = coef[18] * (py * x) + coef[18] * t20;
-    const double t104 = coef[114] * work[9];
-    const double t105 = coef[19] * t37;
-    const double t106 = coef[19] * work[7];
-    const double t107 = coef[23] * work[5];
-    const double t108 = t107 + t26;
-    const double t109 = t39 * t108 + y_ * (t85 + px * (coef[113] * t21 + x * (coef[112] * work[5] + t94)) + work[9] * (coef[111] * t23 + t96 + t98));
-    const double t110 = t20 * (t92 + t40 + work[9] * (coef[110] + work[7] * (work[9] * (t29 + t104)))) + x * (t105 + py * (t16 + (t91 + t106)) + work[9] * (coef[20] * py + work[9] * t109));
-    const double t111 = t90 * (t103 + work[33] * t110);
-    const double t112 = work[9] * (t31 + x * (coef[112] * t21 + x * t108));
-    const double t113 = work[9] * (coef[42] + t112);
-    const double t114 = t11 + (t14 + coef[115] * work[5]) + work[9] * (coef[38] + work[9] * (work[7] * t18 + x * (coef[116] * t21 + x * (coef[116] * work[5] + t16 + t113))));
-    const double t115 = coef[36] + work[32] * (coef[37] + work[33] * t114);
-    const double t116 = px * py;
-    const double t117 = t116 * (coef[117] + coef[43] * (work[7] * work[33])) + x * (coef[43] * (t23 * (py * work[33])) + y_ * (coef[18] + work[33] * (t91 + t42 + work[9] * (coef[20] + t112))));
-    const double t118 = t90 * t117;
-    const double t119 = (-0.5) * t118;
-    const double t120 = t106 + coef[103] * work[5];
-    const double t121 = coef[24] * work[5];
-    const double t122 = coef[21] * t23;
-    const double t123 = t39 * (t107 + t104) + y_ * (coef[112] * work[3] + px * (coef[106] * t21 + x * (coef[113] * work[6] + t121)) + work[9] * (t122 + coef[111] * t22 + t98));
-    const double t124 = t20 * (t43 + work[9] * (coef[20] + work[7] * (work[9] * t30))) + x * (t105 + py * (t16 + t120) + work[9] * (coef[110] * py + work[9] * t123));
-    const double t125 = t90 * (t103 + work[33] * t124);
-    const double t126 = t39 * (coef[106] * work[5] + t95) + y_ * (coef[109] * work[3] + px * (t32 + x * (coef[107] * work[6] + t107)) + work[9] * (t122 + coef[108] * t22 + t98));
-    const double t127 = coef[101] * t22 + coef[18] * t23 + work[33] * (t23 * (t43 + t81) + y_ * (t105 + py * (coef[104] * work[6] + t120) + work[9] * (coef[102] * py + work[9] * t126)));
-    const double t128 = t90 * t127;
-    const double t129 = 0.5 * t128;
-    const double t130 = coef[115] * work[6] + t38 + work[9] * (coef[38] + work[9] * (work[19] * t41 + y_ * (coef[116] * work[23] + y_ * (coef[116] * work[6] + t40 + t113))));
-    const double t131 = coef[36] + work[32] * (coef[37] + work[33] * t130);
-    work[29] = t53 + t49;
+    const double t66 = coef[30] + coef[33] * work[1] + px * (coef[12] * work[2] + x
+        * (t65 + px * (t23 + x * work[20]))) + work[9] * (work[7] * (coef[32] * work[6] + coef[31] * work[5])
+        + x * (t51 + x * work[21]) + t61);
+    const double t67 = work[23] * (t38 + t64) + y_ * (work[6] * (t40 + work[25]) + px
+        * (t42 + px * (work[27] + (t43 + work[28]))) + work[9] * (t46 + work[30] + work[9] * t66));
+    const double p_y = work[32] * (coef[0] * y_ + work[33] * (coef[18] * work[23] + y_ * (work[34] + work[35])
+        + work[9] * (coef[29] * y_ + work[9] * t67)));
+    const double t68 = work[9] * (t2 * t2), t69 = coef[41] * work[5], t70 = coef[103] * work[6];
+    const double t71 = coef[19] * work[19], t72 = coef[106] * work[6], t73 = coef[105] * work[9];
+    const double t74 = coef[21] * t13;
+    work[4] = coef[65] * t12;
+    const double t75 = work[9] * (t16 * t57 + x * (coef[26] * t19 + px * (work[7] * (coef[65] * work[6] + t56)
+        + x * (work[4] + x * t58))));
+    const double t76 = t7 * (t72 + t73) + x * (t48 + px * (coef[107] * t12 + x * (t20 + coef[109] * work[5]))
+        + work[9] * (t74 + coef[108] * t14 + t75));
+    const double t77 = t13 * (t69 + t8 + t39) + x * (t42 + px * (t70 + (coef[104] * work[5] + t71)) + work[9]
+        * (coef[102] * px + work[9] * t76));
+    const double t78 = t68 * (coef[18] * t13 + coef[101] * t14 + work[33] * t77), t79 = 0.5 * t78;
+    const double t80 = coef[18] * (py * x) + coef[18] * t11, t81 = coef[114] * work[9];
+    const double t82 = coef[19] * t28, t83 = coef[19] * work[7], t84 = coef[23] * work[5];
+    const double t85 = t84 + t17;
+    const double t86 = t30 * t85 + y_ * (t65 + px * (coef[113] * t12 + x * (coef[112] * work[5] + t72))
+        + work[9] * (coef[111] * t14 + t74 + t75));
+    const double t87 = t11 * (t70 + t31 + work[9] * (coef[110] + work[7] * (work[9] * (t20 + t81)))) + x
+        * (t82 + py * (t8 + (t69 + t83)) + work[9] * (coef[20] * py + work[9] * t86));
+    const double t88 = t68 * (t80 + work[33] * t87);
+    const double t89 = work[9] * (t22 + x * (coef[112] * t12 + x * t85));
+    const double t90 = work[9] * (coef[42] + t89);
+    const double t91 = t4 + (t6 + coef[115] * work[5]) + work[9] * (coef[38] + work[9] * (work[7] * t10 + x
+        * (coef[116] * t12 + x * (coef[116] * work[5] + t8 + t90))));
+    const double t92 = coef[36] + work[32] * (coef[37] + work[33] * t91), t93 = px * py;
+    const double t94 = t93 * (coef[117] + coef[43] * (work[7] * work[33])) + x
+        * (coef[43] * (t14 * (py * work[33])) + y_ * (coef[18] + work[33] * (t69 + t33 + work[9]
+        * (coef[20] + t89))));
+    const double t95 = t68 * t94, t96 = (-0.5) * t95, t97 = t83 + coef[103] * work[5];
+    const double t98 = coef[24] * work[5], t99 = coef[21] * t14;
+    const double t100 = t30 * (t84 + t81) + y_ * (coef[112] * work[3] + px * (coef[106] * t12 + x
+        * (coef[113] * work[6] + t98)) + work[9] * (t99 + coef[111] * t13 + t75));
+    const double t101 = t11 * (t34 + work[9] * (coef[20] + work[7] * (work[9] * t21))) + x
+        * (t82 + py * (t8 + t97) + work[9] * (coef[110] * py + work[9] * t100));
+    const double t102 = t68 * (t80 + work[33] * t101);
+    const double t103 = t30 * (coef[106] * work[5] + t73) + y_ * (coef[109] * work[3] + px
+        * (t23 + x * (coef[107] * work[6] + t84)) + work[9] * (t99 + coef[108] * t13 + t75));
+    const double t104 = coef[101] * t13 + coef[18] * t14 + work[33] * (t14 * (t34 + t64) + y_
+        * (t82 + py * (coef[104] * work[6] + t97) + work[9] * (coef[102] * py + work[9] * t103)));
+    const double t105 = t68 * t104, t106 = 0.5 * t105;
+    const double t107 = coef[115] * work[6] + t29 + work[9] * (coef[38] + work[9] * (work[19] * t32 + y_
+        * (coef[116] * work[23] + y_ * (coef[116] * work[6] + t31 + t90))));
+    const double t108 = coef[36] + work[32] * (coef[37] + work[33] * t107);
+    work[29] = t43 + t40;
     work[24] = coef[68] * work[9];
     work[14] = coef[53] * work[7];
     work[15] = coef[61] * work[26];
     work[16] = coef[49] * work[6];
     work[17] = coef[53] * work[19];
     work[18] = coef[51] * work[19] + coef[51] * work[7];
-    const double t139 = coef[73] + coef[35] * work[1] + px * (coef[56] * work[2] + x * (coef[65] * work[3] + px * (coef[67] * t21 + x * (coef[35] * work[6] + coef[77] * work[5]))));
-    work[8] = coef[63] * t21;
-    const double t141 = coef[57] * work[33];
-    const double t142 = coef[58] * work[9];
-    work[10] = work[7] * (t141 + work[6] * (coef[59] * work[6] + t142));
-    const double t144 = coef[69] * work[9];
-    work[11] = t68 * (coef[71] * work[6] + t144);
-    work[12] = work[19] * (t141 + work[5] * (coef[59] * work[5] + t142));
-    work[13] = y_ * (work[23] * (coef[71] * work[5] + t144) + y_ * (coef[79] * t74 + work[9] * (coef[58] * work[6] + (coef[58] * work[5] + coef[78] * work[9]))));
-    const double t148 = work[7] * (coef[55] * work[5] + coef[54] * work[6]) + x * (work[8] + x * (coef[76] * work[5] + coef[75] * work[6])) + work[9] * (work[7] * (coef[52] + work[10]) + x * (work[11] + x * (coef[74] + work[12] + work[13])));
-    const double t149 = work[6] * (coef[46] * work[6] + work[14]) + px * (work[15] + px * (work[16] + (work[17] + coef[50] * work[5]))) + work[9] * (work[18] + (coef[45] * work[6] + coef[48] * work[5]) + work[9] * (t139 + work[9] * t148));
-    const double t150 = coef[30] + work[7] * (work[6] * (coef[14] * work[5] + t62) + work[9] * (t63 + work[9] * t67)) + x * (t21 * (coef[64] * work[6] + coef[66] * work[5] + work[9] * (coef[62] + work[7] * (work[9] * (coef[70] * work[6] + work[24])))) + x * t149);
-    const double t151 = work[5] * (t54 + coef[47] * work[19]) + py * (coef[60] * t37 + py * (t50 + coef[6] * work[5] + work[29])) + work[9] * (t55 + coef[72] * work[19] + t58 + work[9] * t150);
-    const double t152 = work[32] * (coef[0] + work[33] * (t45 + (coef[44] * work[19] + t46) + work[9] * (coef[29] + work[9] * t151)));
-    const double t153 = coef[88] + coef[91] * work[1] + px * (coef[93] * work[2] + x * (coef[95] * work[3] + px * (coef[96] * t21 + x * (coef[99] * work[6] + coef[100] * work[5]))));
-    const double t154 = work[7] * (coef[92] * work[5] + coef[90] * work[6]) + x * (coef[94] * t21 + x * (coef[98] * work[5] + coef[97] * work[6])) + work[9] * (work[7] * (coef[89] + work[10]) + x * (work[11] + x * (coef[89] + work[12] + work[13])));
-    const double t155 = work[6] * (coef[82] * work[6] + work[14]) + px * (work[15] + px * (coef[85] * work[6] + (work[17] + coef[86] * work[5]))) + work[9] * (coef[84] * work[5] + coef[81] * work[6] + work[18] + work[9] * (t153 + work[9] * t154));
-    const double t156 = py * t15 * (coef[24] * work[6] + t107 + work[9] * (coef[21] + work[7] * (work[9] * t70))) + x * (work[23] * (t29 + t121 + work[9] * (coef[21] + work[19] * (work[9] * t73))) + y_ * t155);
-    const double t157 = coef[80] * (t8 * work[6]) + px * (coef[83] * t37 + py * (t47 + (t106 + t93))) + work[9] * (coef[20] * t116 + coef[87] * t8 + work[9] * t156);
-    const double t158 = t90 * (coef[18] * t116 + coef[44] * t8 + work[33] * t157);
-    work[0] = 0.5 * t158;
+    const double t109 = coef[73] + coef[35] * work[1] + px * (coef[56] * work[2] + x * (coef[65] * work[3]
+        + px * (coef[67] * t12 + x * (coef[35] * work[6] + coef[77] * work[5]))));
+    work[8] = coef[63] * t12;
+    const double t110 = coef[57] * work[33], t111 = coef[58] * work[9];
+    work[10] = work[7] * (t110 + work[6] * (coef[59] * work[6] + t111));
+    const double t112 = coef[69] * work[9];
+    work[11] = t55 * (coef[71] * work[6] + t112);
+    work[12] = work[19] * (t110 + work[5] * (coef[59] * work[5] + t111));
+    work[13] = y_ * (work[23] * (coef[71] * work[5] + t112) + y_ * (coef[79] * t59 + work[9]
+        * (coef[58] * work[6] + (coef[58] * work[5] + coef[78] * work[9]))));
+    const double t113 = work[7] * (coef[55] * work[5] + coef[54] * work[6]) + x * (work[8] + x
+        * (coef[76] * work[5] + coef[75] * work[6])) + work[9] * (work[7] * (coef[52] + work[10]) + x
+        * (work[11] + x * (coef[74] + work[12] + work[13])));
+    const double t114 = work[6] * (coef[46] * work[6] + work[14]) + px * (work[15] + px
+        * (work[16] + (work[17] + coef[50] * work[5]))) + work[9] * (work[18] + (coef[45] * work[6] + coef[48]
+        * work[5]) + work[9] * (t109 + work[9] * t113));
+    const double t115 = coef[30] + work[7] * (work[6] * (coef[14] * work[5] + t49) + work[9] * (t50 + work[9]
+        * t54)) + x * (t12 * (coef[64] * work[6] + coef[66] * work[5] + work[9] * (coef[62] + work[7]
+        * (work[9] * (coef[70] * work[6] + work[24])))) + x * t114);
+    const double t116 = work[5] * (t44 + coef[47] * work[19]) + py * (coef[60] * t28 + py * (t41 + coef[6]
+        * work[5] + work[29])) + work[9] * (t45 + coef[72] * work[19] + t47 + work[9] * t115);
+    const double t117 = work[32] * (coef[0] + work[33] * (t36 + (coef[44] * work[19] + t37) + work[9]
+        * (coef[29] + work[9] * t116)));
+    const double t118 = coef[88] + coef[91] * work[1] + px * (coef[93] * work[2] + x * (coef[95] * work[3]
+        + px * (coef[96] * t12 + x * (coef[99] * work[6] + coef[100] * work[5]))));
+    const double t119 = work[7] * (coef[92] * work[5] + coef[90] * work[6]) + x * (coef[94] * t12 + x
+        * (coef[98] * work[5] + coef[97] * work[6])) + work[9] * (work[7] * (coef[89] + work[10]) + x
+        * (work[11] + x * (coef[89] + work[12] + work[13])));
+    const double t120 = work[6] * (coef[82] * work[6] + work[14]) + px * (work[15] + px * (coef[85] * work[6]
+        + (work[17] + coef[86] * work[5]))) + work[9] * (coef[84] * work[5] + coef[81] * work[6] + work[18]
+        + work[9] * (t118 + work[9] * t119));
+    const double t121 = py * t7 * (coef[24] * work[6] + t84 + work[9] * (coef[21] + work[7]
+        * (work[9] * t57))) + x * (work[23] * (t20 + t98 + work[9] * (coef[21] + work[19] * (work[9] * t58)))
+        + y_ * t120);
+    const double t122 = coef[80] * (t3 * work[6]) + px * (coef[83] * t28 + py * (t38 + (t83 + t71))) + work[9]
+        * (coef[20] * t93 + coef[87] * t3 + work[9] * t121);
+    const double t123 = t68 * (coef[18] * t93 + coef[44] * t3 + work[33] * t122);
+    work[0] = 0.5 * t123;
     displacement[0] = (-0.5) * p_px;
     increment[0] = p_px;
     displacement[1] = (-0.5) * p_py;
@@ -398,355 +365,138 @@ kepler_APART static void kepler_linearise_part1(const double coef[118], const do
     increment[2] = -p_x;
     displacement[3] = 0.5 * p_y;
     increment[3] = -p_y;
-    increment_jacobian[0] = t101;
-    increment_jacobian[10] = -t101;
-    jacobian[0] = 1.0 - t102;
-    jacobian[10] = 1.0 + t102;
-    jacobian[1] = (-0.5) * t111;
-    jacobian[14] = 0.5 * t111;
-    increment_jacobian[1] = t111;
-    increment_jacobian[14] = -t111;
-    jacobian[2] = (-0.5) * t115;
-    increment_jacobian[2] = t115;
-    increment_jacobian[3] = t118;
-    increment_jacobian[6] = t118;
-    jacobian[3] = t119;
-    jacobian[6] = t119;
-    jacobian[4] = (-0.5) * t125;
-    jacobian[11] = 0.5 * t125;
-    increment_jacobian[4] = t125;
-    increment_jacobian[11] = -t125;
-    increment_jacobian[5] = t128;
-    increment_jacobian[15] = -t128;
-    jacobian[5] = 1.0 - t129;
-    jacobian[15] = 1.0 + t129;
-    jacobian[7] = (-0.5) * t131;
-    increment_jacobian[7] = t131;
-    jacobian[8] = 0.5 * t152;
-    increment_jacobian[8] = -t152;
-    increment_jacobian[9] = -t158;
-    increment_jacobian[12] = -t158;
+    increment_jacobian[0] = t78;
+    increment_jacobian[10] = -t78;
+    jacobian[0] = 1.0 - t79;
+    jacobian[10] = 1.0 + t79;
+    jacobian[1] = (-0.5) * t88;
+    jacobian[14] = 0.5 * t88;
+    increment_jacobian[1] = t88;
+    increment_jacobian[14] = -t88;
+    jacobian[2] = (-0.5) * t92;
+    increment_jacobian[2] = t92;
+    increment_jacobian[3] = t95;
+    increment_jacobian[6] = t95;
+    jacobian[3] = t96;
+    jacobian[6] = t96;
+    jacobian[4] = (-0.5) * t102;
+    jacobian[11] = 0.5 * t102;
+    increment_jacobian[4] = t102;
+    increment_jacobian[11] = -t102;
+    increment_jacobian[5] = t105;
+    increment_jacobian[15] = -t105;
+    jacobian[5] = 1.0 - t106;
+    jacobian[15] = 1.0 + t106;
+    jacobian[7] = (-0.5) * t108;
+    increment_jacobian[7] = t108;
+    jacobian[8] = 0.5 * t117;
+    increment_jacobian[8] = -t117;
+    increment_jacobian[9] = -t123;
+    increment_jacobian[12] = -t123;
     jacobian[9] = work[0];
 }
 
 /* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
    increment, all with the momenta p = grad S_h(y) (part 2 of 2) */
 kepler_APART static void kepler_linearise_part2(const double coef[118], const double y[4],
-                                                double displacement[restrict 4], double increment[restrict 4],
-                                                double jacobian[restrict 16],
-                                                double increment_jacobian[restrict 16],
-                                                double work[restrict 36])
+    double displacement[restrict 4], double increment[restrict 4], double jacobian[restrict 16],
+    double increment_jacobian[restrict 16], double work[restrict 36])
 {
-    (void)displacement;
-    (void)increment;
-    const double x = y[0];
-    const double y_ = y[1];
-    const double px = y[2];
-    const double t160 = coef[73] + coef[77] * work[1] + px * (coef[35] * work[2] + x * (coef[67] * work[3] + px * (work[4] + x * (coef[35] * work[5] + coef[56] * work[6]))));
-    const double t161 = work[7] * (coef[75] * work[5] + coef[76] * work[6]) + x * (work[8] + x * (coef[55] * work[6] + coef[54] * work[5])) + work[9] * (work[7] * (coef[74] + work[10]) + x * (work[11] + x * (coef[52] + work[12] + work[13])));
-    const double t162 = work[6] * (coef[50] * work[6] + work[14]) + px * (work[15] + px * (work[16] + (work[17] + coef[46] * work[5]))) + work[9] * (coef[45] * work[5] + coef[48] * work[6] + work[18] + work[9] * (t160 + work[9] * t161));
-    const double t163 = coef[30] + work[19] * (work[5] * work[20] + work[9] * (work[21] + work[9] * work[22])) + y_ * (work[23] * (coef[64] * work[5] + coef[66] * work[6] + work[9] * (coef[62] + work[19] * (work[9] * (coef[70] * work[5] + work[24])))) + y_ * t162);
-    const double t164 = work[6] * (coef[47] * work[7] + work[25]) + px * (coef[60] * work[26] + px * (work[27] + work[28] + work[29])) + work[9] * (work[30] + (work[31] + coef[72] * work[7]) + work[9] * t163);
-    const double t165 = work[32] * (coef[0] + work[33] * (work[34] + (work[35] + coef[44] * work[7]) + work[9] * (coef[29] + work[9] * t164)));
+    (void)displacement, (void)increment;
+    const double x = y[0], y_ = y[1], px = y[2];
+    const double t1 = coef[73] + coef[77] * work[1] + px * (coef[35] * work[2] + x * (coef[67] * work[3] + px
+        * (work[4] + x * (coef[35] * work[5] + coef[56] * work[6]))));
+    const double t2 = work[7] * (coef[75] * work[5] + coef[76] * work[6]) + x * (work[8] + x
+        * (coef[55] * work[6] + coef[54] * work[5])) + work[9] * (work[7] * (coef[74] + work[10]) + x
+        * (work[11] + x * (coef[52] + work[12] + work[13])));
+    const double t3 = work[6] * (coef[50] * work[6] + work[14]) + px * (work[15] + px
+        * (work[16] + (work[17] + coef[46] * work[5]))) + work[9] * (coef[45] * work[5] + coef[48] * work[6]
+        + work[18] + work[9] * (t1 + work[9] * t2));
+    const double t4 = coef[30] + work[19] * (work[5] * work[20] + work[9] * (work[21] + work[9] * work[22]))
+        + y_ * (work[23] * (coef[64] * work[5] + coef[66] * work[6] + work[9] * (coef[62] + work[19]
+        * (work[9] * (coef[70] * work[5] + work[24])))) + y_ * t3);
+    const double t5 = work[6] * (coef[47] * work[7] + work[25]) + px * (coef[60] * work[26] + px
+        * (work[27] + work[28] + work[29])) + work[9] * (work[30] + (work[31] + coef[72] * work[7]) + work[9]
+        * t4);
+    const double t6 = work[32] * (coef[0] + work[33] * (work[34] + (work[35] + coef[44] * work[7]) + work[9]
+        * (coef[29] + work[9] * t5)));
     jacobian[12] = work[0];
-    jacobian[13] = 0.5 * t165;
-    increment_jacobian[13] = -t165;
+    jacobian[13] = 0.5 * t6;
+    increment_jacobian[13] = -t6;
 }
 
 /* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
    increment, all with the momenta p = grad S_h(y) */
 static void kepler_linearise(const double coef[118], const double y[4], double displacement[restrict 4],
-                             double increment[restrict 4], double jacobian[restrict 16],
-                             double increment_jacobian[restrict 16])
+    double increment[restrict 4], double jacobian[restrict 16], double increment_jacobian[restrict 16])
 {
     double work[36];
     kepler_linearise_part1(coef, y, displacement, increment, jacobian, increment_jacobian, work);
     kepler_linearise_part2(coef, y, displacement, increment, jacobian, increment_jacobian, work);
 }
 
-/* Solve matrix * solution = side, both overwritten, by elimination with partial pivoting. 0 if singular. */
-static int kepler_solve_pivoting(double matrix[16], double side[4])
-{
-    for (int k = 0; k < 4; ++k) {
-        int best = k;
-        for (int i = k + 1; i < 4; ++i)
-            if (fabs(matrix[i * 4 + k]) > fabs(matrix[best * 4 + k])) best = i;
-        const double pivot = matrix[best * 4 + k];
-        if (!(fabs(pivot) > 0.0)) return 0;
-        for (int j = k; j < 4 && best != k; ++j) {
-            const double swap = matrix[k * 4 + j];
-            matrix[k * 4 + j] = matrix[best * 4 + j];
-            matrix[best * 4 + j] = swap;
-        }
-        const double swap = side[k];
-        side[k] = side[best];
-        side[best] = swap;
-        for (int i = k + 1; i < 4; ++i) {
-            const double factor = matrix[i * 4 + k] / pivot;
-            for (int j = k + 1; j < 4; ++j) matrix[i * 4 + j] -= factor * matrix[k * 4 + j];
-            side[i] -= factor * side[k];
-        }
-    }
-    for (int i = 4 - 1; i >= 0; --i) {
-        for (int j = i + 1; j < 4; ++j) side[i] -= matrix[i * 4 + j] * side[j];
-        side[i] /= matrix[i * 4 + i];
-    }
-    return 1;
-}
-
 /* elimination without pivoting: the solution, and the reciprocals of the pivots */
 static void kepler_eliminate(const double matrix[16], const double side[4], double solution[restrict 4],
-                             double reciprocal[restrict 4])
+    double reciprocal[restrict 4])
 {
-    const double t1 = 1.0 / matrix[0];
-    const double t2 = matrix[12] * t1;
-    const double t3 = matrix[4] * t1;
-    const double t4 = side[1] - side[0] * t3;
-    const double t5 = 1.0 / (matrix[5] - matrix[1] * t3);
-    const double t6 = (matrix[13] - matrix[1] * t2) * t5;
-    const double t7 = matrix[8] * t1;
-    const double t8 = (matrix[9] - matrix[1] * t7) * t5;
-    const double t9 = side[2] - side[0] * t7 - t4 * t8;
+    /* solution */
+    const double t1 = 1.0 / matrix[0], t2 = matrix[12] * t1, t3 = matrix[4] * t1;
+    const double t4 = side[1] - side[0] * t3, t5 = 1.0 / (matrix[5] - matrix[1] * t3);
+    const double t6 = (matrix[13] - matrix[1] * t2) * t5, t7 = matrix[8] * t1;
+    const double t8 = (matrix[9] - matrix[1] * t7) * t5, t9 = side[2] - side[0] * t7 - t4 * t8;
     const double t10 = matrix[6] - matrix[2] * t3;
     const double t11 = 1.0 / (matrix[10] - matrix[2] * t7 - t10 * t8);
     const double t12 = (matrix[14] - matrix[2] * t2 - t10 * t6) * t11;
-    const double t13 = matrix[7] - matrix[3] * t3;
-    const double t14 = matrix[11] - matrix[3] * t7 - t13 * t8;
+    const double t13 = matrix[7] - matrix[3] * t3, t14 = matrix[11] - matrix[3] * t7 - t13 * t8;
     const double t15 = 1.0 / (matrix[15] - matrix[3] * t2 - t13 * t6 - t14 * t12);
     const double t16 = (side[3] - side[0] * t2 - t4 * t6 - t9 * t12) * t15;
-    const double t17 = t11 * (t9 - t14 * t16);
-    const double t18 = t5 * (t4 - (t13 * t16 + t10 * t17));
+    const double t17 = t11 * (t9 - t14 * t16), t18 = t5 * (t4 - (t13 * t16 + t10 * t17));
     solution[0] = t1 * (side[0] - (matrix[3] * t16 + (matrix[2] * t17 + matrix[1] * t18)));
     solution[1] = t18;
     solution[2] = t17;
     solution[3] = t16;
+    /* reciprocal */
     reciprocal[0] = t1;
     reciprocal[1] = t5;
     reciprocal[2] = t11;
     reciprocal[3] = t15;
 }
 
-/* Solve matrix * solution = side, both overwritten. The matrix is I + O(h), so elimination without pivoting
-   does unless a pivot is far from 1. 0 if singular. */
-static int kepler_solve(double matrix[16], double side[4])
+/* the Hamiltonian */
+double kepler_hamiltonian(const kepler_params *params, const double x[4])
 {
-    double solution[4], reciprocal[4], largest = 0.0;
-    kepler_eliminate(matrix, side, solution, reciprocal);
-    for (int i = 0; i < 4; ++i)
-        if (!(fabs(reciprocal[i]) <= largest)) largest = fabs(reciprocal[i]);
-    if (!(largest < 1e3)) return kepler_solve_pivoting(matrix, side);
-    memcpy(side, solution, sizeof solution);
-    return 1;
+    if (params == NULL) params = &kepler_default_params;
+    const double mu = params->mu, x_ = x[0], y = x[1], px = x[2], py = x[3];
+    return 0.5 * (px * px + py * py) - mu / sqrt(x_ * x_ + y * y);
 }
 
-/* Whether a guess is where the next values may be. Recurrences that were fitted to little else than rest, near a saddle,
-   may lead anywhere; and far away the equation of a step has solutions that have nothing to do with the motion. */
-static int kepler_near(const double guess[4], const double last[4])
+/* the Casimirs */
+void kepler_casimirs(const kepler_params *params, const double x[4], double out[])
 {
-    double distance = 0.0, size = 0.0;
-    for (int i = 0; i < 4; ++i) {
-        distance += fabs(guess[i] - last[i]);
-        size += fabs(last[i]);
-    }
-    return distance <= 4.0 * size;
+    (void)params, (void)x, (void)out;
 }
 
-/* The guess for the next value (y), from earlier ones; 0 if there is none. */
-static int kepler_predict(const kepler_memory *memory, double value[4])
+/* pi(x) grad H(x) */
+void kepler_vector_field(const kepler_params *params, const double x[4], double out[4])
 {
-    const int last = memory->count - 1;
-    double odd[4] = { 0.0 }, binomial = -1.0;
-    memset(value, 0, 4 * sizeof value[0]);
-    if (memory->fitting) {
-        for (int k = 0; k < memory->terms; k += 2)
-            for (int i = 0; i < 4; ++i) {
-                value[i] += memory->weight[k][i][0] * memory->past[last - k][i];
-                odd[i] += memory->weight[k + 1][i][0] * memory->past[last - 1 - k][i];
-            }
-        for (int i = 0; i < 4; ++i) value[i] += odd[i];
-    } else {
-        for (int k = 0; k < memory->order && k <= last; ++k) {
-            binomial *= -(double)(memory->order - k) / (k + 1);
-            for (int i = 0; i < 4; ++i) value[i] += binomial * memory->past[last - k][i];
-        }
-    }
-    return last >= 0 && kepler_near(value, memory->past[last]);
+    if (params == NULL) params = &kepler_default_params;
+    const double mu = params->mu, x_ = x[0], y = x[1], px = x[2], py = x[3];
+    const double t1 = 1.0 / sqrt(x_ * x_ + y * y), t2 = mu * (t1 * (t1 * t1));
+    out[0] = px;
+    out[1] = py;
+    out[2] = -(x_ * t2);
+    out[3] = -(y * t2);
 }
 
-/* Choose the guess that would have been best for a value that took several iterations. */
-static void kepler_judge(kepler_memory *memory, const double value[4])
+/* ---- Compensated sums, linear equations ---- */
+/* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to
+   its last bit: were it rounded with the change, corrections of one sign would add up to a drift. 0, and x as
+   before, if the sum is not finite. */
+static int kepler_advance(kepler_solver *s, const double change[kepler_DIM],
+    const double correction[kepler_DIM])
 {
-    double row[8 + 1][4], guess[4], least = HUGE_VAL, fitted = HUGE_VAL;
-    const int rows = memory->count < 8 ? memory->count : 8;
-    memcpy(row[0], value, sizeof row[0]);
-    for (int k = 0; k < rows; ++k) memcpy(row[k + 1], memory->past[memory->count - 1 - k], sizeof row[0]);
-    for (int order = 1; order <= rows; ++order) { /* row[0] becomes the backward difference of this order */
-        double size = 0.0;
-        for (int k = 0; k <= rows - order; ++k)
-            for (int i = 0; i < 4; ++i) row[k][i] -= row[k + 1][i];
-        for (int i = 0; i < 4; ++i) size += fabs(row[0][i]);
-        if (size < least) {
-            least = size;
-            memory->order = order;
-        }
-    }
-    memory->fitting = memory->terms > 0;
-    if (memory->fitting && kepler_predict(memory, guess)) {
-        fitted = 0.0;
-        for (int i = 0; i < 4; ++i) fitted += fabs(value[i] - guess[i]);
-    }
-    memory->fitting = memory->terms > 0 && fitted <= least;
-    if (memory->order == 0) memory->order = 1;
-}
-
-/* Make eight columns orthogonal to one, by the multiples of it that are put into r. Where that one is among the eight, those
-   up to it stay as they are, and inverse becomes one over its squared length. The number of rows is even. */
-static void kepler_project(int rows, double (*one)[8], int column, double *inverse, double (*eight)[8], double r[8])
-{
-    double even[8] = { 0.0 }, odd[8] = { 0.0 };
-    for (int i = 0; i < rows; i += 2) {
-        const double entry = one[i][column], next = one[i + 1][column];
-        for (int l = 0; l < 8; ++l) even[l] += entry * eight[i][l];
-        for (int l = 0; l < 8; ++l) odd[l] += next * eight[i + 1][l];
-    }
-    for (int l = 0; l < 8; ++l) even[l] += odd[l];
-    if (one == eight) {
-        *inverse = even[column] > 0.0 ? 1.0 / even[column] : 0.0;
-        memset(even, 0, ((size_t)column + 1) * sizeof even[0]);
-    }
-    for (int l = 0; l < 8; ++l) r[l] = even[l] *= *inverse;
-    for (int i = 0; i < rows; ++i) {
-        const double entry = one[i][column];
-        for (int l = 0; l < 8; ++l) eight[i][l] -= entry * even[l];
-    }
-}
-
-/* By how much recurrences miss the last of these values. */
-static double kepler_missed(const double *value, double (*weight)[8])
-{
-    enum { AHEAD = 8, WINDOW = 40, CHECKS = 8 };
-    double most = 0.0;
-    for (int i = 0; i < CHECKS; ++i) {
-        double guess[8] = { 0.0 };
-        for (int k = 0; k < WINDOW; ++k)
-            for (int l = 0; l < 8; ++l) guess[l] += weight[k][l] * value[i + WINDOW - 1 - k];
-        for (int l = 0; l < AHEAD; ++l) most = fmax(most, fabs(guess[l] - value[i + WINDOW + l]));
-    }
-    return most;
-}
-
-/* Fit the recurrences value[m + l] = sum of weight[k][..][l] * value[m - 1 - k], l = 0 ... 8 - 1, to the history of
-   a component: ridge least squares by modified Gram-Schmidt, the ridge at the level of rounding. Columns are taken in by
-   eights, until they leave next to nothing of the right-hand sides. How many past values are used; 0 if the recurrences do
-   not foresee the last values, which they were not fitted to. */
-static int kepler_train(kepler_memory *memory, int component)
-{
-    enum { AHEAD = 8, WINDOW = 40, ROWS = 56 };
-    double q[WINDOW / 8][ROWS + WINDOW][8], r[WINDOW / 8][WINDOW][8], inverse[WINDOW]; /* eight columns in each part */
-    double right[ROWS + WINDOW][8], weight[WINDOW][8], value[111], largest = 0.0, left = HUGE_VAL;
-    int terms = 0;
-    memset(q, 0, sizeof q);
-    memset(right, 0, sizeof right);
-    memset(weight, 0, sizeof weight);
-    for (int i = 0; i < 111; ++i) {
-        value[i] = memory->past[memory->count - 111 + i][component];
-        if (fabs(value[i]) > largest) largest = fabs(value[i]);
-    }
-    for (int i = 0; i < ROWS; ++i)
-        for (int l = 0; l < AHEAD; ++l) right[i][l] = value[i + WINDOW + l];
-    while (terms < WINDOW && left > 3e-12 * largest) {
-        const int part = terms / 8, rows = ROWS + terms + 8; /* further rows of the ridge are zero in these columns */
-        for (int i = 0; i < ROWS; ++i)
-            for (int l = 0; l < 8; ++l) q[part][i][l] = value[i + WINDOW - 1 - terms - l];
-        for (int l = 0; l < 8; ++l) q[part][ROWS + terms + l][l] = 1e-15 * largest;
-        for (int k = 0; k < terms; ++k) kepler_project(rows, q[k / 8], k % 8, &inverse[k], q[part], r[part][k]);
-        for (int l = 0; l < 8; ++l, ++terms) {
-            kepler_project(rows, q[part], l, &inverse[terms], q[part], r[part][terms]);
-            kepler_project(rows, q[part], l, &inverse[terms], right, weight[terms]);
-        }
-        double sum[8] = { 0.0 };
-        for (int i = 0; i < ROWS; ++i)
-            for (int l = 0; l < 8; ++l) sum[l] += fabs(right[i][l]);
-        left = 0.0;
-        for (int l = 0; l < 8; ++l) left += sum[l] / ROWS;
-    }
-    for (int k = terms - 1; k >= 0; --k)
-        for (int j = k + 1; j < terms; ++j)
-            for (int l = 0; l < 8; ++l) weight[k][l] -= r[j / 8][k][j % 8] * weight[j][l];
-    for (int k = 0; k < WINDOW; ++k) memcpy(memory->weight[k][component], weight[k], AHEAD * sizeof(double));
-    return kepler_missed(value + ROWS, weight) <= 1e-07 * largest ? terms : 0;
-}
-
-/* Drop what is old, if so many values would not fit into the history. */
-static void kepler_make_room(kepler_memory *memory, int values)
-{
-    if (memory->count + values <= 222) return;
-    memmove(memory->past, memory->past + memory->count - 111, 111 * sizeof memory->past[0]);
-    memory->count = 111;
-}
-
-/* Add a value to the history. */
-static void kepler_record(kepler_memory *memory, const double value[4])
-{
-    kepler_make_room(memory, 1);
-    memcpy(memory->past[memory->count++], value, 4 * sizeof value[0]);
-}
-
-/* Fit the recurrence to the last values; with every time, wait longer before it is done again. */
-static void kepler_fit(kepler_memory *memory)
-{
-    int found = 1;
-    memory->terms = 0;
-    for (int i = 0; i < 4 && found; ++i) {
-        const int terms = kepler_train(memory, i);
-        found = terms > 0;
-        if (terms > memory->terms) memory->terms = terms;
-    }
-    if (!found) memory->terms = 0;
-    memory->fitting = found;
-    ++memory->fits;
-    memory->slow = 0;
-    memory->patience = memory->patience < 10000 ? 2 * memory->patience + 150 : 20000;
-}
-
-/* Take in the solved value: what took one iteration needs no better guess. */
-static void kepler_remember(kepler_memory *memory, const double value[4], int iterations)
-{
-    if (iterations > 1) kepler_judge(memory, value);
-    kepler_record(memory, value);
-    memory->slow = iterations > 1 ? memory->slow + 1 : 0;
-    if (memory->slow > memory->patience && memory->count >= 111) kepler_fit(memory);
-}
-
-/* Whether an increment is that of the motion. Where the step is too large, the equation may have been solved by a point far
-   away, at another energy, that has nothing to do with it. */
-static int kepler_plausible(const kepler_solver *s, int stage, const double increment[4])
-{
-    double moved = 0.0, size = 0.0, field[4], middle[4], end[4];
-    for (int i = 0; i < 4; ++i) {
-        moved += fabs(increment[i]);
-        size += fabs(s->x[i]);
-    }
-    if (moved <= 1.5 * size) return 1;
-    kepler_vector_field(&s->params, s->x, field);
-    for (int i = 0; i < 4; ++i) {
-        size += fabs(kepler_fractions[stage] * s->h * field[i]);
-        middle[i] = s->x[i] + 0.5 * increment[i];
-        end[i] = s->x[i] + increment[i];
-    }
-    if (moved <= 1.5 * size) return 1;
-    const double before = kepler_hamiltonian(&s->params, s->x), after = kepler_hamiltonian(&s->params, end);
-    const double scale = fabs(before) + fabs(kepler_hamiltonian(&s->params, middle)) + fabs(after);
-    return fabs(after - before) <= 0.5 * scale;
-}
-
-/* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to its last
-   bit: were it rounded with the change, corrections of one sign would add up to a drift. 0, and x as before, if the
-   sum is not finite. */
-static int kepler_advance(kepler_solver *s, const double change[4], const double correction[4])
-{
-    double x[4], carry[4];
-    for (int i = 0; i < 4; ++i) {
+    double x[kepler_DIM], carry[kepler_DIM];
+    for (int i = 0; i < kepler_DIM; ++i) {
         const double sum = s->x[i] + change[i], added = sum - s->x[i];
         const double lost = (s->x[i] - (sum - added)) + (change[i] - added);
         const double small = lost + (s->carry[i] + correction[i]);
@@ -759,99 +509,167 @@ static int kepler_advance(kepler_solver *s, const double change[4], const double
     return 1;
 }
 
-/* Size of a correction relative to each component of y, but no finer than 1e-6 of the largest; NaN or infinite if
-   the correction is. */
-static double kepler_size(const double y[4], const double delta[4])
+/* Newton matrices are I + O(h): a pivot whose reciprocal is larger than this is far from 1. */
+#define kepler_LARGEST_RECIPROCAL 1e3
+
+/* Solve matrix * solution = side, both overwritten. The matrix is I + O(h): 0 if a pivot is far from 1. */
+static int kepler_solve(double matrix[kepler_DIM * kepler_DIM], double side[kepler_DIM])
+{
+    double solution[kepler_DIM], reciprocal[kepler_DIM], largest = 0.0;
+    kepler_eliminate(matrix, side, solution, reciprocal);
+    for (int i = 0; i < kepler_DIM; ++i)
+        if (!(fabs(reciprocal[i]) <= largest)) largest = fabs(reciprocal[i]);
+    if (!(largest < kepler_LARGEST_RECIPROCAL)) return 0;
+    memcpy(side, solution, sizeof solution);
+    return 1;
+}
+
+/* ---- Starting guesses ---- */
+/* How far from the last value a guess may be, in sizes of that value. */
+#define kepler_REACH 4.0
+
+/* The guess for the next value from the last ones: the sum of their backward differences. 0 if there is none,
+   or if it is far away, where the equation of a step has solutions that have nothing to do with the motion.
+   */
+static int kepler_predict(const kepler_history *history, double value[kepler_DIM])
+{
+    double distance = 0.0, size = 0.0;
+    for (int i = 0; i < kepler_DIM; ++i) {
+        value[i] = 0.0;
+        for (int k = 0; k < history->order; ++k) value[i] += history->difference[k][i];
+        distance += fabs(value[i] - history->difference[0][i]);
+        size += fabs(history->difference[0][i]);
+    }
+    return history->order > 0 && distance <= kepler_REACH * size;
+}
+
+/* Take in the solved value. The guess of order k missed it by its k-th difference: the next is of the best
+   order. */
+static void kepler_remember(kepler_history *history, const double value[kepler_DIM])
+{
+    double least = HUGE_VAL, next[kepler_DIM];
+    memcpy(next, value, sizeof next);
+    for (int k = 0; k <= history->count && k < kepler_DIFFERENCES; ++k) {
+        double size = 0.0;
+        for (int i = 0; i < kepler_DIM; ++i) {
+            const double last = history->difference[k][i];
+            history->difference[k][i] = next[i];
+            size += fabs(next[i]);
+            next[i] -= last;
+        }
+        if (k > 0 && size < least) {
+            least = size;
+            history->order = k;
+        }
+    }
+    if (history->count == 0) history->order = 1;
+    if (history->count < kepler_DIFFERENCES) ++history->count;
+}
+
+/* How far a step may lead, in sizes of the state and of what the vector field says, if the energy is lost;
+   and the part of the energy that counts as lost. */
+#define kepler_PLAUSIBLE 1.5
+#define kepler_LOST 0.5
+
+/* Whether an increment is that of the motion. Where the step is too large, the equation may have been solved
+   by a point far away, at another energy, that has nothing to do with it. */
+static int kepler_plausible(const kepler_solver *s, const double increment[kepler_DIM])
+{
+    double moved = 0.0, size = 0.0, field[kepler_DIM], middle[kepler_DIM], end[kepler_DIM];
+    for (int i = 0; i < kepler_DIM; ++i) {
+        moved += fabs(increment[i]);
+        size += fabs(s->x[i]);
+    }
+    if (moved <= kepler_PLAUSIBLE * size) return 1;
+    kepler_vector_field(&s->params, s->x, field);
+    for (int i = 0; i < kepler_DIM; ++i) {
+        size += fabs(s->h * field[i]);
+        middle[i] = s->x[i] + 0.5 * increment[i];
+        end[i] = s->x[i] + increment[i];
+    }
+    if (moved <= kepler_PLAUSIBLE * size) return 1;
+    const double before = kepler_hamiltonian(&s->params, s->x), after = kepler_hamiltonian(&s->params, end);
+    const double scale = fabs(before) + fabs(kepler_hamiltonian(&s->params, middle)) + fabs(after);
+    return fabs(after - before) <= kepler_LOST * scale;
+}
+
+/* ---- The implicit step, by Newton's method ---- */
+/* Components of y are measured no finer than by this part of the largest. */
+#define kepler_FLOOR 1e-6
+
+/* Size of a correction relative to each component of y; NaN or infinite if the correction is. */
+static double kepler_size(const double y[kepler_DIM], const double delta[kepler_DIM])
 {
     double norm = 0.0, size = 0.0;
-    for (int i = 0; i < 4; ++i) norm = fabs(y[i]) > norm ? fabs(y[i]) : norm;
-    for (int i = 0; i < 4; ++i) {
-        const double ratio = fabs(delta[i]) / (fabs(y[i]) + 1e-6 * norm + DBL_MIN);
+    for (int i = 0; i < kepler_DIM; ++i) norm = fabs(y[i]) > norm ? fabs(y[i]) : norm;
+    for (int i = 0; i < kepler_DIM; ++i) {
+        const double ratio = fabs(delta[i]) / (fabs(y[i]) + kepler_FLOOR * norm + DBL_MIN);
         if (!isfinite(ratio)) return ratio;
         size = ratio > size ? ratio : size;
     }
     return size;
 }
 
+/* Corrections below the first that shrink by less than the second have reached the level of rounding. */
+#define kepler_NEARLY_SOLVED 1e-8
+#define kepler_SHRINKING 0.25
+
 /* Solve (y - x) + displacement(y) = 0 for y by Newton's method from the extrapolated guess, and advance. The
-   increment is corrected to first order by the last Newton correction, so that correction costs no evaluation:
-   a correction is accepted when the error that remains after it, quadratic in it, is below 1e-20. */
-static kepler_status kepler_attempt(kepler_solver *s, int stage)
+   increment is corrected to first order by the last Newton correction, so that correction costs no
+   evaluation: a correction is accepted when the error that remains after it, quadratic in it, is below
+   kepler_TOLERANCE. */
+static kepler_status kepler_attempt(kepler_solver *s)
 {
-    const double *coef = s->coef[stage];
-    kepler_memory *memory = &s->memory[stage];
-    double y[4], delta[4], displacement[4], increment[4];
-    double jacobian[16], increment_jacobian[16];
-    if (!kepler_predict(memory, y)) memcpy(y, s->x, sizeof y);
-    double previous = HUGE_VAL;
-    for (int iteration = 0; iteration < 20; ++iteration) {
-        kepler_linearise(coef, y, displacement, increment, jacobian, increment_jacobian);
+    double y[kepler_DIM], delta[kepler_DIM], displacement[kepler_DIM], increment[kepler_DIM];
+    double jacobian[kepler_DIM * kepler_DIM], increment_jacobian[kepler_DIM * kepler_DIM], previous =
+        HUGE_VAL;
+    if (!kepler_predict(&s->history, y)) memcpy(y, s->x, sizeof y);
+    for (int iteration = 1; iteration <= kepler_MAX_ITERATIONS; ++iteration) {
+        kepler_linearise(s->coef, y, displacement, increment, jacobian, increment_jacobian);
         ++s->evaluations;
-        for (int i = 0; i < 4; ++i) delta[i] = ((y[i] - s->x[i]) + displacement[i]) - s->carry[i];
+        for (int i = 0; i < kepler_DIM; ++i) delta[i] = ((y[i] - s->x[i]) + displacement[i]) - s->carry[i];
         const int regular = kepler_solve(jacobian, delta);
-        const double size = kepler_size(y, delta);
+        const double size = kepler_size(y, delta), growth = size / (previous * previous);
         if (!isfinite(size)) return kepler_NOT_FINITE;
         if (!regular) return kepler_SINGULAR;
-        for (int i = 0; i < 4; ++i) y[i] -= delta[i];
-        const double growth = size / (previous * previous);
+        for (int i = 0; i < kepler_DIM; ++i) y[i] -= delta[i];
         const double remaining = size * size * (growth > 1.0 ? growth : 1.0);
-        /* The second test: corrections no longer shrink, the solve has reached the level of rounding. */
-        if (remaining <= 1e-20 || (previous < 1e-8 && size > 0.25 * previous)) {
-            double correction[4] = { 0.0 };
-            for (int i = 0; i < 4; ++i)
-                for (int j = 0; j < 4; ++j) correction[i] -= increment_jacobian[i * 4 + j] * delta[j];
-            if (!kepler_plausible(s, stage, increment)) return kepler_NO_CONVERGENCE;
-            if (!kepler_advance(s, increment, correction)) return kepler_NOT_FINITE;
-            kepler_remember(memory, y, iteration + 1);
-            return kepler_OK;
-        }
+        const int stalled = previous < kepler_NEARLY_SOLVED && size > kepler_SHRINKING * previous;
         previous = size;
+        if (!(remaining <= kepler_TOLERANCE || stalled)) continue;
+        double correction[kepler_DIM] = { 0.0 };
+        for (int i = 0; i < kepler_DIM; ++i)
+            for (int j = 0; j < kepler_DIM; ++j)
+                correction[i] -= increment_jacobian[i * kepler_DIM + j] * delta[j];
+        if (!kepler_plausible(s, increment)) return kepler_NO_CONVERGENCE;
+        if (!kepler_advance(s, increment, correction)) return kepler_NOT_FINITE;
+        kepler_remember(&s->history, y);
+        return kepler_OK;
     }
     return kepler_NO_CONVERGENCE;
 }
 
-/* The 1 stages of one step. If one fails, the state is as before the step. */
-static kepler_status kepler_stages(kepler_solver *s)
-{
-    double x[4], carry[4];
-    memcpy(x, s->x, sizeof x);
-    memcpy(carry, s->carry, sizeof carry);
-    for (int stage = 0; stage < 1; ++stage) {
-        kepler_status status = kepler_attempt(s, stage);
-        /* A guess from earlier steps may have misled it: once more without. */
-        if (status != kepler_OK && s->memory[stage].count > 0) {
-            memset(&s->memory[stage], 0, sizeof s->memory[stage]);
-            status = kepler_attempt(s, stage);
-        }
-        if (status != kepler_OK) {
-            memcpy(s->x, x, sizeof x);
-            memcpy(s->carry, carry, sizeof carry);
-            return status;
-        }
-    }
-    return kepler_OK;
-}
-
-/* Whether steps can be made with these parameters: finite, positive where the spec says so, and with finite
-   coefficients for a step so short that it has no part in it. */
+/* ---- The solver ---- */
+/* Whether steps can be made with these parameters: allowed, and with finite coefficients for a step so short
+   that it has no part in it. */
 static int kepler_admissible(const kepler_params *params)
 {
-    double coef[118];
-    if (!(isfinite(params->mu) && params->mu > 0.0)) return 0;
+    double coef[kepler_COEFFICIENTS];
+    if (!kepler_allowed(params)) return 0;
     kepler_prepare(params, 1e-100, coef);
-    for (int k = 0; k < 118; ++k)
+    for (int k = 0; k < kepler_COEFFICIENTS; ++k)
         if (!isfinite(coef[k])) return 0;
     return 1;
 }
 
-/* All of kepler_init but the gauge. The arguments may be parts of *s: they are read before it is written. */
-static kepler_status kepler_start(kepler_solver *s, const kepler_params *params, const double x0[4])
+/* The arguments may be parts of *s: they are read before it is written. */
+kepler_status kepler_init(kepler_solver *s, const kepler_params *params, const double x0[kepler_DIM])
 {
     if (s == NULL || x0 == NULL) return kepler_BAD_ARGUMENT;
     const kepler_params own = params != NULL ? *params : kepler_default_params;
-    double x[4];
+    double x[kepler_DIM];
     memcpy(x, x0, sizeof x);
-    for (int i = 0; i < 4; ++i)
+    for (int i = 0; i < kepler_DIM; ++i)
         if (!isfinite(x[i])) return kepler_BAD_ARGUMENT;
     if (!kepler_admissible(&own)) return kepler_BAD_ARGUMENT;
     memset(s, 0, sizeof *s);
@@ -860,1230 +678,83 @@ static kepler_status kepler_start(kepler_solver *s, const kepler_params *params,
     return kepler_OK;
 }
 
-kepler_status kepler_init(kepler_solver *s, const kepler_params *params, const double x0[4])
-{
-    return kepler_start(s, params, x0);
-}
-
 /* What depends on the step size; nothing where that is as before. */
 static kepler_status kepler_set_step(kepler_solver *s, double h)
 {
     if (s == NULL || !isfinite(h)) return kepler_BAD_ARGUMENT;
-    if (s->ready && memcmp(&h, &s->h, sizeof h) == 0) return kepler_OK;
-    for (int stage = 0; stage < 1; ++stage)
-        kepler_prepare(&s->params, kepler_fractions[stage] * h, s->coef[stage]);
-    memset(s->memory, 0, sizeof s->memory);
-    for (int stage = 0; stage < 1; ++stage) s->memory[stage].patience = 150;
-    s->pause = 16;
-    s->setback = s->foreseeing = 0;
-    s->doubt = s->retry = 0;
-    s->effort = 0.0;
-    s->passes = INT_MAX;
+    if (s->prepared && memcmp(&h, &s->h, sizeof h) == 0) return kepler_OK;
+    kepler_prepare(&s->params, h, s->coef);
+    memset(&s->history, 0, sizeof s->history);
     s->h = h;
-    s->ready = 1;
+    s->t_before_h = s->t;
+    s->steps_before_h = s->steps;
+    s->prepared = 1;
     return kepler_OK;
+}
+
+/* One stage. A guess from earlier steps may have misled it: then once more without. */
+static kepler_status kepler_stage(kepler_solver *s)
+{
+    kepler_status status = kepler_attempt(s);
+    if (status != kepler_OK && s->history.count > 0) {
+        memset(&s->history, 0, sizeof s->history);
+        status = kepler_attempt(s);
+    }
+    return status;
 }
 
 kepler_status kepler_step(kepler_solver *s, double h)
 {
     kepler_status status = kepler_set_step(s, h);
     if (status != kepler_OK) return status;
-    status = kepler_stages(s);
-    if (status == kepler_OK) ++s->steps;
+    status = kepler_stage(s);
+    if (status != kepler_OK) return status;
+    ++s->steps;
+    s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
     return status;
 }
 
-/*
- * Eight at a time: below, the formulas of a step are evaluated for 8 steps of a trajectory, or members of an
- * ensemble, at once. Compilers make vector instructions of the loops over lanes.
- */
-enum { kepler_LANES = 8 };
-
-#if defined(__GNUC__)
-typedef double kepler_lanes[kepler_LANES] __attribute__((aligned(64))); /* a value in each lane */
-#else
-typedef double kepler_lanes[kepler_LANES];
-#endif
-
-#if defined(__clang__)
-#define kepler_EACH_LANE _Pragma("clang loop vectorize(assume_safety)")
-#pragma clang diagnostic push
-#pragma clang diagnostic ignored "-Wpass-failed"
-#elif defined(__GNUC__)
-#define kepler_EACH_LANE _Pragma("GCC ivdep") _Pragma("GCC unroll 1")
-#else
-#define kepler_EACH_LANE
-#endif
-
-/* What all blocks share: coefficients, the same in each lane, and the recurrences by which they are foreseen. */
-typedef struct {
-    int fits[1]; /* the fit that weight is of; -1 for none */
-    kepler_lanes coef[1][118], weight[1][40][4];
-} kepler_table;
-
-/* A stage in all lanes, linearised around y. */
-typedef struct {
-    kepler_lanes y[4], displacement[4], increment[4], residual[4];
-    /* a residual r of alpha(y) = x takes inverse r from y, and gain r from the increment */
-    kepler_lanes inverse[16], slope[16], gain[16];
-} kepler_model;
-
-/* kepler_linearise_lanes_part1 (part 1 of 2) */
-kepler_APART static void kepler_linearise_lanes_part1(kepler_lanes coef[restrict 118],
-                                                      kepler_lanes y[restrict 4],
-                                                      kepler_lanes displacement[restrict 4],
-                                                      kepler_lanes increment[restrict 4],
-                                                      kepler_lanes jacobian[restrict 16],
-                                                      kepler_lanes increment_jacobian[restrict 16],
-                                                      kepler_lanes work[restrict 36])
-{
-    kepler_EACH_LANE
-    for (int lane = 0; lane < kepler_LANES; ++lane) {
-        const double x = y[0][lane];
-        const double y_ = y[1][lane];
-        const double px = y[2][lane];
-        const double py = y[3][lane];
-        work[19][lane] = x * x;
-        work[7][lane] = y_ * y_;
-        const double t3 = work[19][lane] + work[7][lane];
-        work[9][lane] = 1.0 / sqrt(t3);
-        const double t5 = work[9][lane] * work[9][lane];
-        work[32][lane] = work[9][lane] * t5;
-        work[33][lane] = 1.0 / t3;
-        const double t8 = x * y_;
-        work[26][lane] = py * t8;
-        work[6][lane] = py * py;
-        const double t11 = coef[39][lane] * work[6][lane];
-        work[5][lane] = px * px;
-        const double t13 = coef[39][lane] * work[5][lane];
-        const double t14 = coef[18][lane] * work[19][lane];
-        const double t15 = px * work[7][lane];
-        const double t16 = coef[22][lane] * work[6][lane];
-        const double t17 = coef[40][lane] * work[9][lane];
-        const double t18 = t16 + t17;
-        work[3][lane] = y_ * (py * work[6][lane]);
-        const double t20 = px * y_;
-        const double t21 = py * t20;
-        const double t22 = py * y_;
-        const double t23 = px * x;
-        const double t24 = y_ * work[7][lane];
-        const double t25 = py * t24;
-        const double t26 = coef[25][lane] * work[9][lane];
-        const double t27 = coef[27][lane] * work[6][lane] + t26;
-        const double t28 = t8 * (py * work[9][lane]);
-        const double t29 = coef[23][lane] * work[6][lane];
-        const double t30 = t29 + t26;
-        const double t31 = work[7][lane] * t30;
-        const double t32 = coef[23][lane] * t21;
-        const double t33 = coef[27][lane] * work[5][lane] + t26;
-        const double t34 = work[9][lane] * (t25 * t27 + x * (coef[25][lane] * t28 + px * (t31 + x * (t32 + x * t33))));
-        const double t35 = x * (coef[22][lane] * work[3][lane] + px * (coef[41][lane] * t21 + x * (coef[43][lane] * work[5][lane] + t16)) + work[9][lane] * (coef[20][lane] * t22 + coef[42][lane] * t23 + t34));
-        const double t36 = coef[37][lane] * px + work[33][lane] * (coef[18][lane] * work[26][lane] + px * (t11 + (t13 + t14)) + work[9][lane] * (coef[38][lane] * px + work[9][lane] * (t15 * t18 + t35)));
-        const double p_px = coef[36][lane] * px + work[32][lane] * t36;
-        const double t37 = px * t8;
-        const double t38 = t13 + coef[18][lane] * work[7][lane];
-        const double t39 = py * work[19][lane];
-        const double t40 = coef[22][lane] * work[5][lane];
-        const double t41 = t40 + t17;
-        const double t42 = coef[41][lane] * work[6][lane];
-        const double t43 = t42 + t40;
-        const double t44 = t39 * t41 + y_ * (coef[43][lane] * work[3][lane] + px * (coef[22][lane] * t21 + x * t43) + work[9][lane] * (coef[20][lane] * t23 + coef[42][lane] * t22 + t34));
-        const double p_py = coef[36][lane] * py + work[32][lane] * (coef[37][lane] * py + work[33][lane] * (coef[18][lane] * t37 + py * (t11 + t38) + work[9][lane] * (coef[38][lane] * py + work[9][lane] * t44)));
-        const double t45 = coef[1][lane] * work[6][lane];
-        const double t46 = coef[4][lane] * work[5][lane];
-        const double t47 = t40 + t16;
-        const double t48 = work[9][lane] * (coef[20][lane] + work[7][lane] * (work[9][lane] * t27));
-        const double t49 = coef[10][lane] * work[7][lane];
-        const double t50 = coef[3][lane] * work[6][lane];
-        const double t51 = coef[19][lane] * work[26][lane];
-        work[27][lane] = coef[6][lane] * work[6][lane];
-        const double t53 = coef[10][lane] * work[19][lane];
-        const double t54 = coef[7][lane] * work[5][lane];
-        const double t55 = coef[8][lane] * work[7][lane];
-        work[31][lane] = coef[8][lane] * work[19][lane];
-        const double t57 = t55 + work[31][lane];
-        const double t58 = coef[2][lane] * work[6][lane] + coef[5][lane] * work[5][lane];
-        work[1][lane] = work[6][lane] * work[6][lane] * work[7][lane];
-        work[2][lane] = work[6][lane] * t15;
-        const double t61 = coef[23][lane] * work[3][lane];
-        const double t62 = coef[12][lane] * work[6][lane];
-        const double t63 = coef[13][lane] * work[5][lane] + coef[11][lane] * work[6][lane];
-        const double t64 = coef[21][lane] * t21;
-        const double t65 = coef[15][lane] * work[33][lane];
-        const double t66 = coef[16][lane] * work[9][lane];
-        const double t67 = coef[9][lane] + work[7][lane] * (t65 + work[6][lane] * (coef[17][lane] * work[6][lane] + t66));
-        const double t68 = py * (px * t24);
-        const double t69 = coef[26][lane] * work[9][lane];
-        const double t70 = coef[28][lane] * work[6][lane] + t69;
-        work[22][lane] = coef[9][lane] + work[19][lane] * (t65 + work[5][lane] * (coef[17][lane] * work[5][lane] + t66));
-        work[23][lane] = py * t23;
-        const double t73 = coef[28][lane] * work[5][lane] + t69;
-        const double t74 = work[5][lane] * work[6][lane];
-        const double t75 = t68 * t70 + x * (work[22][lane] + y_ * (work[23][lane] * t73 + y_ * (coef[35][lane] * t74 + work[9][lane] * (coef[16][lane] * work[6][lane] + (coef[16][lane] * work[5][lane] + coef[34][lane] * work[9][lane])))));
-        const double t76 = work[9][lane] * (work[7][lane] * t67 + x * t75);
-        const double t77 = coef[30][lane] + coef[12][lane] * work[1][lane] + px * (coef[14][lane] * work[2][lane] + x * (t61 + px * (coef[24][lane] * t21 + x * (coef[33][lane] * work[5][lane] + t62)))) + work[9][lane] * (work[7][lane] * t63 + x * (t64 + x * (coef[32][lane] * work[5][lane] + coef[31][lane] * work[6][lane])) + t76);
-        const double t78 = t21 * (t47 + t48) + x * (work[6][lane] * (t49 + t50) + px * (t51 + px * (work[27][lane] + (t53 + t54))) + work[9][lane] * (t57 + t58 + work[9][lane] * t77));
-        const double p_x = work[32][lane] * (coef[0][lane] * x + work[33][lane] * (coef[18][lane] * t21 + x * (t45 + t46) + work[9][lane] * (coef[29][lane] * x + work[9][lane] * t78)));
-        work[34][lane] = coef[4][lane] * work[6][lane];
-        work[35][lane] = coef[1][lane] * work[5][lane];
-        const double t81 = work[9][lane] * (coef[20][lane] + work[19][lane] * (work[9][lane] * t33));
-        work[25][lane] = coef[7][lane] * work[6][lane];
-        work[28][lane] = coef[3][lane] * work[5][lane];
-        work[30][lane] = coef[5][lane] * work[6][lane] + coef[2][lane] * work[5][lane];
-        const double t85 = coef[24][lane] * work[3][lane];
-        work[20][lane] = coef[14][lane] * work[6][lane] + coef[12][lane] * work[5][lane];
-        work[21][lane] = coef[13][lane] * work[6][lane] + coef[11][lane] * work[5][lane];
-        const double t88 = coef[30][lane] + coef[33][lane] * work[1][lane] + px * (coef[12][lane] * work[2][lane] + x * (t85 + px * (t32 + x * work[20][lane]))) + work[9][lane] * (work[7][lane] * (coef[32][lane] * work[6][lane] + coef[31][lane] * work[5][lane]) + x * (t64 + x * work[21][lane]) + t76);
-        const double t89 = work[23][lane] * (t47 + t81) + y_ * (work[6][lane] * (t49 + work[25][lane]) + px * (t51 + px * (work[27][lane] + (t53 + work[28][lane]))) + work[9][lane] * (t57 + work[30][lane] + work[9][lane] * t88));
-        const double p_y = work[32][lane] * (coef[0][lane] * y_ + work[33][lane] * (coef[18][lane] * work[23][lane] + y_ * (work[34][lane] + work[35][lane]) + work[9][lane] * (coef[29][lane] * y_ + work[9][lane] * t89)));
-        const double t90 = work[9][lane] * (t5 * t5);
-        const double t91 = coef[41][lane] * work[5][lane];
-        const double t92 = coef[103][lane] * work[6][lane];
-        const double t93 = coef[19][lane] * work[19][lane];
-        const double t94 = coef[106][lane] * work[6][lane];
-        const double t95 = coef[105][lane] * work[9][lane];
-        const double t96 = coef[21][lane] * t22;
-        work[4][lane] = coef[65][lane] * t21;
-        const double t98 = work[9][lane] * (t25 * t70 + x * (coef[26][lane] * t28 + px * (work[7][lane] * (coef[65][lane] * work[6][lane] + t69) + x * (work[4][lane] + x * t73))));
-        const double t99 = t15 * (t94 + t95) + x * (t61 + px * (coef[107][lane] * t21 + x * (t29 + coef[109][lane] * work[5][lane])) + work[9][lane] * (t96 + coef[108][lane] * t23 + t98));
-        const double t100 = t22 * (t91 + t16 + t48) + x * (t51 + px * (t92 + (coef[104][lane] * work[5][lane] + t93)) + work[9][lane] * (coef[102][lane] * px + work[9][lane] * t99));
-        const double t101 = t90 * (coef[18][lane] * t22 + coef[101][lane] * t23 + work[33][lane] * t100);
-        const double t102 = 0.5 * t101;
-        const double t103 = coef[18][lane] * (py * x) + coef[18][lane] * t20;
-        const double t104 = coef[114][lane] * work[9][lane];
-        const double t105 = coef[19][lane] * t37;
-        const double t106 = coef[19][lane] * work[7][lane];
-        const double t107 = coef[23][lane] * work[5][lane];
-        const double t108 = t107 + t26;
-        const double t109 = t39 * t108 + y_ * (t85 + px * (coef[113][lane] * t21 + x * (coef[112][lane] * work[5][lane] + t94)) + work[9][lane] * (coef[111][lane] * t23 + t96 + t98));
-        const double t110 = t20 * (t92 + t40 + work[9][lane] * (coef[110][lane] + work[7][lane] * (work[9][lane] * (t29 + t104)))) + x * (t105 + py * (t16 + (t91 + t106)) + work[9][lane] * (coef[20][lane] * py + work[9][lane] * t109));
-        const double t111 = t90 * (t103 + work[33][lane] * t110);
-        const double t112 = work[9][lane] * (t31 + x * (coef[112][lane] * t21 + x * t108));
-        const double t113 = work[9][lane] * (coef[42][lane] + t112);
-        const double t114 = t11 + (t14 + coef[115][lane] * work[5][lane]) + work[9][lane] * (coef[38][lane] + work[9][lane] * (work[7][lane] * t18 + x * (coef[116][lane] * t21 + x * (coef[116][lane] * work[5][lane] + t16 + t113))));
-        const double t115 = coef[36][lane] + work[32][lane] * (coef[37][lane] + work[33][lane] * t114);
-        const double t116 = px * py;
-        const double t117 = t116 * (coef[117][lane] + coef[43][lane] * (work[7][lane] * work[33][lane])) + x * (coef[43][lane] * (t23 * (py * work[33][lane])) + y_ * (coef[18][lane] + work[33][lane] * (t91 + t42 + work[9][lane] * (coef[20][lane] + t112))));
-        const double t118 = t90 * t117;
-        const double t119 = (-0.5) * t118;
-        const double t120 = t106 + coef[103][lane] * work[5][lane];
-        const double t121 = coef[24][lane] * work[5][lane];
-        const double t122 = coef[21][lane] * t23;
-        const double t123 = t39 * (t107 + t104) + y_ * (coef[112][lane] * work[3][lane] + px * (coef[106][lane] * t21 + x * (coef[113][lane] * work[6][lane] + t121)) + work[9][lane] * (t122 + coef[111][lane] * t22 + t98));
-        const double t124 = t20 * (t43 + work[9][lane] * (coef[20][lane] + work[7][lane] * (work[9][lane] * t30))) + x * (t105 + py * (t16 + t120) + work[9][lane] * (coef[110][lane] * py + work[9][lane] * t123));
-        const double t125 = t90 * (t103 + work[33][lane] * t124);
-        const double t126 = t39 * (coef[106][lane] * work[5][lane] + t95) + y_ * (coef[109][lane] * work[3][lane] + px * (t32 + x * (coef[107][lane] * work[6][lane] + t107)) + work[9][lane] * (t122 + coef[108][lane] * t22 + t98));
-        const double t127 = coef[101][lane] * t22 + coef[18][lane] * t23 + work[33][lane] * (t23 * (t43 + t81) + y_ * (t105 + py * (coef[104][lane] * work[6][lane] + t120) + work[9][lane] * (coef[102][lane] * py + work[9][lane] * t126)));
-        const double t128 = t90 * t127;
-        const double t129 = 0.5 * t128;
-        const double t130 = coef[115][lane] * work[6][lane] + t38 + work[9][lane] * (coef[38][lane] + work[9][lane] * (work[19][lane] * t41 + y_ * (coef[116][lane] * work[23][lane] + y_ * (coef[116][lane] * work[6][lane] + t40 + t113))));
-        const double t131 = coef[36][lane] + work[32][lane] * (coef[37][lane] + work[33][lane] * t130);
-        work[29][lane] = t53 + t49;
-        work[24][lane] = coef[68][lane] * work[9][lane];
-        work[14][lane] = coef[53][lane] * work[7][lane];
-        work[15][lane] = coef[61][lane] * work[26][lane];
-        work[16][lane] = coef[49][lane] * work[6][lane];
-        work[17][lane] = coef[53][lane] * work[19][lane];
-        work[18][lane] = coef[51][lane] * work[19][lane] + coef[51][lane] * work[7][lane];
-        const double t139 = coef[73][lane] + coef[35][lane] * work[1][lane] + px * (coef[56][lane] * work[2][lane] + x * (coef[65][lane] * work[3][lane] + px * (coef[67][lane] * t21 + x * (coef[35][lane] * work[6][lane] + coef[77][lane] * work[5][lane]))));
-        work[8][lane] = coef[63][lane] * t21;
-        const double t141 = coef[57][lane] * work[33][lane];
-        const double t142 = coef[58][lane] * work[9][lane];
-        work[10][lane] = work[7][lane] * (t141 + work[6][lane] * (coef[59][lane] * work[6][lane] + t142));
-        const double t144 = coef[69][lane] * work[9][lane];
-        work[11][lane] = t68 * (coef[71][lane] * work[6][lane] + t144);
-        work[12][lane] = work[19][lane] * (t141 + work[5][lane] * (coef[59][lane] * work[5][lane] + t142));
-        work[13][lane] = y_ * (work[23][lane] * (coef[71][lane] * work[5][lane] + t144) + y_ * (coef[79][lane] * t74 + work[9][lane] * (coef[58][lane] * work[6][lane] + (coef[58][lane] * work[5][lane] + coef[78][lane] * work[9][lane]))));
-        const double t148 = work[7][lane] * (coef[55][lane] * work[5][lane] + coef[54][lane] * work[6][lane]) + x * (work[8][lane] + x * (coef[76][lane] * work[5][lane] + coef[75][lane] * work[6][lane])) + work[9][lane] * (work[7][lane] * (coef[52][lane] + work[10][lane]) + x * (work[11][lane] + x * (coef[74][lane] + work[12][lane] + work[13][lane])));
-        const double t149 = work[6][lane] * (coef[46][lane] * work[6][lane] + work[14][lane]) + px * (work[15][lane] + px * (work[16][lane] + (work[17][lane] + coef[50][lane] * work[5][lane]))) + work[9][lane] * (work[18][lane] + (coef[45][lane] * work[6][lane] + coef[48][lane] * work[5][lane]) + work[9][lane] * (t139 + work[9][lane] * t148));
-        const double t150 = coef[30][lane] + work[7][lane] * (work[6][lane] * (coef[14][lane] * work[5][lane] + t62) + work[9][lane] * (t63 + work[9][lane] * t67)) + x * (t21 * (coef[64][lane] * work[6][lane] + coef[66][lane] * work[5][lane] + work[9][lane] * (coef[62][lane] + work[7][lane] * (work[9][lane] * (coef[70][lane] * work[6][lane] + work[24][lane])))) + x * t149);
-        const double t151 = work[5][lane] * (t54 + coef[47][lane] * work[19][lane]) + py * (coef[60][lane] * t37 + py * (t50 + coef[6][lane] * work[5][lane] + work[29][lane])) + work[9][lane] * (t55 + coef[72][lane] * work[19][lane] + t58 + work[9][lane] * t150);
-        const double t152 = work[32][lane] * (coef[0][lane] + work[33][lane] * (t45 + (coef[44][lane] * work[19][lane] + t46) + work[9][lane] * (coef[29][lane] + work[9][lane] * t151)));
-        const double t153 = coef[88][lane] + coef[91][lane] * work[1][lane] + px * (coef[93][lane] * work[2][lane] + x * (coef[95][lane] * work[3][lane] + px * (coef[96][lane] * t21 + x * (coef[99][lane] * work[6][lane] + coef[100][lane] * work[5][lane]))));
-        const double t154 = work[7][lane] * (coef[92][lane] * work[5][lane] + coef[90][lane] * work[6][lane]) + x * (coef[94][lane] * t21 + x * (coef[98][lane] * work[5][lane] + coef[97][lane] * work[6][lane])) + work[9][lane] * (work[7][lane] * (coef[89][lane] + work[10][lane]) + x * (work[11][lane] + x * (coef[89][lane] + work[12][lane] + work[13][lane])));
-        const double t155 = work[6][lane] * (coef[82][lane] * work[6][lane] + work[14][lane]) + px * (work[15][lane] + px * (coef[85][lane] * work[6][lane] + (work[17][lane] + coef[86][lane] * work[5][lane]))) + work[9][lane] * (coef[84][lane] * work[5][lane] + coef[81][lane] * work[6][lane] + work[18][lane] + work[9][lane] * (t153 + work[9][lane] * t154));
-        const double t156 = py * t15 * (coef[24][lane] * work[6][lane] + t107 + work[9][lane] * (coef[21][lane] + work[7][lane] * (work[9][lane] * t70))) + x * (work[23][lane] * (t29 + t121 + work[9][lane] * (coef[21][lane] + work[19][lane] * (work[9][lane] * t73))) + y_ * t155);
-        const double t157 = coef[80][lane] * (t8 * work[6][lane]) + px * (coef[83][lane] * t37 + py * (t47 + (t106 + t93))) + work[9][lane] * (coef[20][lane] * t116 + coef[87][lane] * t8 + work[9][lane] * t156);
-        const double t158 = t90 * (coef[18][lane] * t116 + coef[44][lane] * t8 + work[33][lane] * t157);
-        work[0][lane] = 0.5 * t158;
-        displacement[0][lane] = (-0.5) * p_px;
-        increment[0][lane] = p_px;
-        displacement[1][lane] = (-0.5) * p_py;
-        increment[1][lane] = p_py;
-        displacement[2][lane] = 0.5 * p_x;
-        increment[2][lane] = -p_x;
-        displacement[3][lane] = 0.5 * p_y;
-        increment[3][lane] = -p_y;
-        increment_jacobian[0][lane] = t101;
-        increment_jacobian[10][lane] = -t101;
-        jacobian[0][lane] = 1.0 - t102;
-        jacobian[10][lane] = 1.0 + t102;
-        jacobian[1][lane] = (-0.5) * t111;
-        jacobian[14][lane] = 0.5 * t111;
-        increment_jacobian[1][lane] = t111;
-        increment_jacobian[14][lane] = -t111;
-        jacobian[2][lane] = (-0.5) * t115;
-        increment_jacobian[2][lane] = t115;
-        increment_jacobian[3][lane] = t118;
-        increment_jacobian[6][lane] = t118;
-        jacobian[3][lane] = t119;
-        jacobian[6][lane] = t119;
-        jacobian[4][lane] = (-0.5) * t125;
-        jacobian[11][lane] = 0.5 * t125;
-        increment_jacobian[4][lane] = t125;
-        increment_jacobian[11][lane] = -t125;
-        increment_jacobian[5][lane] = t128;
-        increment_jacobian[15][lane] = -t128;
-        jacobian[5][lane] = 1.0 - t129;
-        jacobian[15][lane] = 1.0 + t129;
-        jacobian[7][lane] = (-0.5) * t131;
-        increment_jacobian[7][lane] = t131;
-        jacobian[8][lane] = 0.5 * t152;
-        increment_jacobian[8][lane] = -t152;
-        increment_jacobian[9][lane] = -t158;
-        increment_jacobian[12][lane] = -t158;
-        jacobian[9][lane] = work[0][lane];
-    }
-}
-
-/* kepler_linearise_lanes_part2 (part 2 of 2) */
-kepler_APART static void kepler_linearise_lanes_part2(kepler_lanes coef[restrict 118],
-                                                      kepler_lanes y[restrict 4],
-                                                      kepler_lanes displacement[restrict 4],
-                                                      kepler_lanes increment[restrict 4],
-                                                      kepler_lanes jacobian[restrict 16],
-                                                      kepler_lanes increment_jacobian[restrict 16],
-                                                      kepler_lanes work[restrict 36])
-{
-    (void)displacement;
-    (void)increment;
-    kepler_EACH_LANE
-    for (int lane = 0; lane < kepler_LANES; ++lane) {
-        const double x = y[0][lane];
-        const double y_ = y[1][lane];
-        const double px = y[2][lane];
-        const double t160 = coef[73][lane] + coef[77][lane] * work[1][lane] + px * (coef[35][lane] * work[2][lane] + x * (coef[67][lane] * work[3][lane] + px * (work[4][lane] + x * (coef[35][lane] * work[5][lane] + coef[56][lane] * work[6][lane]))));
-        const double t161 = work[7][lane] * (coef[75][lane] * work[5][lane] + coef[76][lane] * work[6][lane]) + x * (work[8][lane] + x * (coef[55][lane] * work[6][lane] + coef[54][lane] * work[5][lane])) + work[9][lane] * (work[7][lane] * (coef[74][lane] + work[10][lane]) + x * (work[11][lane] + x * (coef[52][lane] + work[12][lane] + work[13][lane])));
-        const double t162 = work[6][lane] * (coef[50][lane] * work[6][lane] + work[14][lane]) + px * (work[15][lane] + px * (work[16][lane] + (work[17][lane] + coef[46][lane] * work[5][lane]))) + work[9][lane] * (coef[45][lane] * work[5][lane] + coef[48][lane] * work[6][lane] + work[18][lane] + work[9][lane] * (t160 + work[9][lane] * t161));
-        const double t163 = coef[30][lane] + work[19][lane] * (work[5][lane] * work[20][lane] + work[9][lane] * (work[21][lane] + work[9][lane] * work[22][lane])) + y_ * (work[23][lane] * (coef[64][lane] * work[5][lane] + coef[66][lane] * work[6][lane] + work[9][lane] * (coef[62][lane] + work[19][lane] * (work[9][lane] * (coef[70][lane] * work[5][lane] + work[24][lane])))) + y_ * t162);
-        const double t164 = work[6][lane] * (coef[47][lane] * work[7][lane] + work[25][lane]) + px * (coef[60][lane] * work[26][lane] + px * (work[27][lane] + work[28][lane] + work[29][lane])) + work[9][lane] * (work[30][lane] + (work[31][lane] + coef[72][lane] * work[7][lane]) + work[9][lane] * t163);
-        const double t165 = work[32][lane] * (coef[0][lane] + work[33][lane] * (work[34][lane] + (work[35][lane] + coef[44][lane] * work[7][lane]) + work[9][lane] * (coef[29][lane] + work[9][lane] * t164)));
-        jacobian[12][lane] = work[0][lane];
-        jacobian[13][lane] = 0.5 * t165;
-        increment_jacobian[13][lane] = -t165;
-    }
-}
-
-/* kepler_linearise in all lanes. */
-static void kepler_linearise_lanes(kepler_lanes coef[restrict 118], kepler_lanes y[restrict 4],
-                                   kepler_lanes displacement[restrict 4], kepler_lanes increment[restrict 4],
-                                   kepler_lanes jacobian[restrict 16],
-                                   kepler_lanes increment_jacobian[restrict 16])
-{
-    kepler_lanes work[36];
-    kepler_linearise_lanes_part1(coef, y, displacement, increment, jacobian, increment_jacobian, work);
-    kepler_linearise_lanes_part2(coef, y, displacement, increment, jacobian, increment_jacobian, work);
-}
-
-/* kepler_evaluate in all lanes. */
-static void kepler_evaluate_lanes(kepler_lanes coef[restrict 118], kepler_lanes y[restrict 4],
-                                  kepler_lanes displacement[restrict 4], kepler_lanes increment[restrict 4])
-{
-    kepler_EACH_LANE
-    for (int lane = 0; lane < kepler_LANES; ++lane) {
-        const double x = y[0][lane];
-        const double y_ = y[1][lane];
-        const double px = y[2][lane];
-        const double py = y[3][lane];
-        const double t1 = x * x;
-        const double t2 = y_ * y_;
-        const double t3 = t1 + t2;
-        const double t4 = 1.0 / sqrt(t3);
-        const double t5 = t4 * (t4 * t4);
-        const double t6 = 1.0 / t3;
-        const double t7 = x * y_;
-        const double t8 = py * t7;
-        const double t9 = py * py;
-        const double t10 = coef[39][lane] * t9;
-        const double t11 = px * px;
-        const double t12 = coef[39][lane] * t11;
-        const double t13 = px * t2;
-        const double t14 = coef[22][lane] * t9;
-        const double t15 = coef[40][lane] * t4;
-        const double t16 = y_ * (py * t9);
-        const double t17 = py * (px * y_);
-        const double t18 = py * y_;
-        const double t19 = px * x;
-        const double t20 = y_ * t2;
-        const double t21 = coef[25][lane] * t4;
-        const double t22 = coef[27][lane] * t9 + t21;
-        const double t23 = coef[23][lane] * t17;
-        const double t24 = coef[27][lane] * t11 + t21;
-        const double t25 = py * t20 * t22 + x * (coef[25][lane] * (t7 * (py * t4)) + px * (t2 * (coef[23][lane] * t9 + t21) + x * (t23 + x * t24)));
-        const double t26 = t4 * t25;
-        const double t27 = x * (coef[22][lane] * t16 + px * (coef[41][lane] * t17 + x * (coef[43][lane] * t11 + t14)) + t4 * (coef[20][lane] * t18 + coef[42][lane] * t19 + t26));
-        const double t28 = t6 * (coef[18][lane] * t8 + px * (t10 + (t12 + coef[18][lane] * t1)) + t4 * (coef[38][lane] * px + t4 * (t13 * (t14 + t15) + t27)));
-        const double p_px = coef[36][lane] * px + t5 * (coef[37][lane] * px + t28);
-        const double t29 = coef[22][lane] * t11;
-        const double t30 = y_ * (coef[43][lane] * t16 + px * (coef[22][lane] * t17 + x * (coef[41][lane] * t9 + t29)) + t4 * (coef[20][lane] * t19 + coef[42][lane] * t18 + t26));
-        const double t31 = coef[18][lane] * (px * t7) + py * (t10 + (t12 + coef[18][lane] * t2)) + t4 * (coef[38][lane] * py + t4 * (py * t1 * (t29 + t15) + t30));
-        const double p_py = coef[36][lane] * py + t5 * (coef[37][lane] * py + t6 * t31);
-        const double t32 = t29 + t14;
-        const double t33 = coef[10][lane] * t2;
-        const double t34 = coef[19][lane] * t8;
-        const double t35 = coef[6][lane] * t9;
-        const double t36 = coef[10][lane] * t1;
-        const double t37 = coef[8][lane] * t2 + coef[8][lane] * t1;
-        const double t38 = t9 * t9 * t2;
-        const double t39 = t9 * t13;
-        const double t40 = coef[30][lane] + coef[12][lane] * t38 + px * (coef[14][lane] * t39 + x * (coef[23][lane] * t16 + px * (coef[24][lane] * t17 + x * (coef[33][lane] * t11 + coef[12][lane] * t9))));
-        const double t41 = coef[21][lane] * t17;
-        const double t42 = coef[15][lane] * t6;
-        const double t43 = coef[16][lane] * t4;
-        const double t44 = coef[26][lane] * t4;
-        const double t45 = py * t19;
-        const double t46 = y_ * (t45 * (coef[28][lane] * t11 + t44) + y_ * (coef[35][lane] * (t11 * t9) + t4 * (coef[16][lane] * t9 + (coef[16][lane] * t11 + coef[34][lane] * t4))));
-        const double t47 = x * (py * (px * t20) * (coef[28][lane] * t9 + t44) + x * (coef[9][lane] + t1 * (t42 + t11 * (coef[17][lane] * t11 + t43)) + t46));
-        const double t48 = t4 * (t2 * (coef[9][lane] + t2 * (t42 + t9 * (coef[17][lane] * t9 + t43))) + t47);
-        const double t49 = t4 * (t40 + t4 * (t2 * (coef[13][lane] * t11 + coef[11][lane] * t9) + x * (t41 + x * (coef[32][lane] * t11 + coef[31][lane] * t9)) + t48));
-        const double t50 = t9 * (t33 + coef[3][lane] * t9) + px * (t34 + px * (t35 + (t36 + coef[7][lane] * t11))) + t4 * (t37 + (coef[2][lane] * t9 + coef[5][lane] * t11) + t49);
-        const double t51 = coef[18][lane] * t17 + x * (coef[1][lane] * t9 + coef[4][lane] * t11) + t4 * (coef[29][lane] * x + t4 * (t17 * (t32 + t4 * (coef[20][lane] + t2 * (t4 * t22))) + x * t50));
-        const double p_x = t5 * (coef[0][lane] * x + t6 * t51);
-        const double t52 = coef[30][lane] + coef[33][lane] * t38 + px * (coef[12][lane] * t39 + x * (coef[24][lane] * t16 + px * (t23 + x * (coef[14][lane] * t9 + coef[12][lane] * t11))));
-        const double t53 = t4 * (t52 + t4 * (t2 * (coef[32][lane] * t9 + coef[31][lane] * t11) + x * (t41 + x * (coef[13][lane] * t9 + coef[11][lane] * t11)) + t48));
-        const double t54 = t9 * (t33 + coef[7][lane] * t9) + px * (t34 + px * (t35 + (t36 + coef[3][lane] * t11))) + t4 * (t37 + (coef[5][lane] * t9 + coef[2][lane] * t11) + t53);
-        const double t55 = coef[18][lane] * t45 + y_ * (coef[4][lane] * t9 + coef[1][lane] * t11) + t4 * (coef[29][lane] * y_ + t4 * (t45 * (t32 + t4 * (coef[20][lane] + t1 * (t4 * t24))) + y_ * t54));
-        const double p_y = t5 * (coef[0][lane] * y_ + t6 * t55);
-        displacement[0][lane] = (-0.5) * p_px;
-        displacement[1][lane] = (-0.5) * p_py;
-        displacement[2][lane] = 0.5 * p_x;
-        displacement[3][lane] = 0.5 * p_y;
-        increment[0][lane] = p_px;
-        increment[1][lane] = p_py;
-        increment[2][lane] = -p_x;
-        increment[3][lane] = -p_y;
-    }
-}
-
-/* kepler_invert in all lanes. */
-static void kepler_invert_lanes(kepler_lanes matrix[restrict 16], kepler_lanes slope[restrict 16],
-                                kepler_lanes inverse[restrict 16], kepler_lanes gain[restrict 16],
-                                kepler_lanes reciprocal[restrict 4])
-{
-    kepler_EACH_LANE
-    for (int lane = 0; lane < kepler_LANES; ++lane) {
-        const double t1 = 1.0 / matrix[0][lane];
-        const double t2 = matrix[1][lane] * t1;
-        const double t3 = 1.0 / (matrix[5][lane] - matrix[4][lane] * t2);
-        const double t4 = matrix[4][lane] * t1 * t3;
-        const double t5 = matrix[2][lane] * t1;
-        const double t6 = (matrix[6][lane] - matrix[4][lane] * t5) * t3;
-        const double t7 = t5 - t2 * t6;
-        const double t8 = matrix[9][lane] - matrix[8][lane] * t2;
-        const double t9 = 1.0 / (matrix[10][lane] - matrix[8][lane] * t5 - t8 * t6);
-        const double t10 = (t8 * t4 - matrix[8][lane] * t1) * t9;
-        const double t11 = matrix[3][lane] * t1;
-        const double t12 = (matrix[7][lane] - matrix[4][lane] * t11) * t3;
-        const double t13 = (matrix[11][lane] - matrix[8][lane] * t11 - t8 * t12) * t9;
-        const double t14 = t11 - t2 * t12 - t7 * t13;
-        const double t15 = matrix[13][lane] - matrix[12][lane] * t2;
-        const double t16 = matrix[14][lane] - matrix[12][lane] * t5 - t15 * t6;
-        const double t17 = 1.0 / (matrix[15][lane] - matrix[12][lane] * t11 - t15 * t12 - t16 * t13);
-        const double t18 = (t15 * t4 - matrix[12][lane] * t1 - t16 * t10) * t17;
-        const double t19 = t1 + t2 * t4 - t7 * t10 - t14 * t18;
-        const double t20 = t8 * t3 * t9;
-        const double t21 = (t16 * t20 - t15 * t3) * t17;
-        const double t22 = t7 * t20 - t2 * t3 - t14 * t21;
-        const double t23 = t16 * t9 * t17;
-        const double t24 = t14 * t23 - t7 * t9;
-        const double t25 = t14 * t17;
-        const double t26 = t12 - t6 * t13;
-        const double t27 = t4 + t6 * t10 + t26 * t18;
-        const double t28 = t3 + t6 * t20 - t26 * t21;
-        const double t29 = t26 * t23 - t6 * t9;
-        const double t30 = t26 * t17;
-        const double t31 = t10 - t13 * t18;
-        const double t32 = t20 + t13 * t21;
-        const double t33 = t9 + t13 * t23;
-        const double t34 = t13 * t17;
-        inverse[0][lane] = t19;
-        inverse[1][lane] = t22;
-        inverse[2][lane] = t24;
-        inverse[3][lane] = -t25;
-        inverse[4][lane] = -t27;
-        inverse[5][lane] = t28;
-        inverse[6][lane] = t29;
-        inverse[7][lane] = -t30;
-        inverse[8][lane] = t31;
-        inverse[9][lane] = -t32;
-        inverse[10][lane] = t33;
-        inverse[11][lane] = -t34;
-        inverse[12][lane] = t18;
-        inverse[13][lane] = t21;
-        inverse[14][lane] = -t23;
-        inverse[15][lane] = t17;
-        gain[0][lane] = slope[0][lane] * t19 - slope[1][lane] * t27 + (slope[3][lane] * t18 + slope[2][lane] * t31);
-        gain[1][lane] = slope[0][lane] * t22 + slope[1][lane] * t28 + (slope[3][lane] * t21 - slope[2][lane] * t32);
-        gain[2][lane] = slope[2][lane] * t33 - slope[3][lane] * t23 + (slope[0][lane] * t24 + slope[1][lane] * t29);
-        gain[3][lane] = slope[3][lane] * t17 - slope[2][lane] * t34 - (slope[1][lane] * t30 + slope[0][lane] * t25);
-        gain[4][lane] = slope[4][lane] * t19 - slope[5][lane] * t27 + (slope[7][lane] * t18 + slope[6][lane] * t31);
-        gain[5][lane] = slope[7][lane] * t21 - slope[6][lane] * t32 + (slope[5][lane] * t28 + slope[4][lane] * t22);
-        gain[6][lane] = slope[6][lane] * t33 - slope[7][lane] * t23 + (slope[5][lane] * t29 + slope[4][lane] * t24);
-        gain[7][lane] = slope[7][lane] * t17 - slope[6][lane] * t34 - (slope[4][lane] * t25 + slope[5][lane] * t30);
-        gain[8][lane] = slope[11][lane] * t18 + slope[10][lane] * t31 + (slope[8][lane] * t19 - slope[9][lane] * t27);
-        gain[9][lane] = slope[9][lane] * t28 + slope[8][lane] * t22 + (slope[11][lane] * t21 - slope[10][lane] * t32);
-        gain[10][lane] = slope[10][lane] * t33 - slope[11][lane] * t23 + (slope[9][lane] * t29 + slope[8][lane] * t24);
-        gain[11][lane] = slope[11][lane] * t17 - slope[10][lane] * t34 - (slope[9][lane] * t30 + slope[8][lane] * t25);
-        gain[12][lane] = slope[15][lane] * t18 + slope[14][lane] * t31 + (slope[12][lane] * t19 - slope[13][lane] * t27);
-        gain[13][lane] = slope[13][lane] * t28 + slope[12][lane] * t22 + (slope[15][lane] * t21 - slope[14][lane] * t32);
-        gain[14][lane] = slope[14][lane] * t33 - slope[15][lane] * t23 + (slope[13][lane] * t29 + slope[12][lane] * t24);
-        gain[15][lane] = slope[15][lane] * t17 - slope[14][lane] * t34 - (slope[12][lane] * t25 + slope[13][lane] * t30);
-        reciprocal[0][lane] = t1;
-        reciprocal[1][lane] = t3;
-        reciprocal[2][lane] = t9;
-        reciprocal[3][lane] = t17;
-    }
-}
-
-/* Everything about a stage at the points y. The matrices are I + O(h): where a pivot is far from 1, all is infinite. */
-static void kepler_tabulate(kepler_lanes coef[restrict], kepler_model *model)
-{
-    kepler_lanes jacobian[16], reciprocal[4];
-    kepler_linearise_lanes(coef, model->y, model->displacement, model->increment, jacobian, model->slope);
-    kepler_invert_lanes(jacobian, model->slope, model->inverse, model->gain, reciprocal);
-    for (int i = 0; i < 4; ++i) {
-        kepler_EACH_LANE
-        for (int lane = 0; lane < kepler_LANES; ++lane)
-            model->inverse[i][lane] += fabs(reciprocal[i][lane]) < 1e3 ? 0.0 : HUGE_VAL;
-    }
-}
-
-/* kepler_size in all lanes, summed over the components. */
-static void kepler_sizes(kepler_lanes y[restrict 4], kepler_lanes delta[restrict 4],
-    kepler_lanes size)
-{
-    kepler_lanes norm = { 0.0 };
-    memset(size, 0, kepler_LANES * sizeof size[0]);
-    for (int i = 0; i < 4; ++i)
-        for (int lane = 0; lane < kepler_LANES; ++lane)
-            norm[lane] = 1e-6 * fabs(y[i][lane]) > norm[lane] ? 1e-6 * fabs(y[i][lane]) : norm[lane];
-    for (int i = 0; i < 4; ++i) {
-        kepler_EACH_LANE
-        for (int lane = 0; lane < kepler_LANES; ++lane)
-            size[lane] += fabs(delta[i][lane]) / (fabs(y[i][lane]) + norm[lane] + DBL_MIN);
-    }
-}
-
-/* Correct y by the residuals, with the inverse in the table, and measure the corrections. */
-static void kepler_correct(kepler_model *model, kepler_lanes size)
-{
-    kepler_lanes delta[4];
-    memset(delta, 0, sizeof delta);
-    for (int i = 0; i < 4; ++i)
-        for (int j = 0; j < 4; ++j) {
-            kepler_EACH_LANE
-            for (int lane = 0; lane < kepler_LANES; ++lane)
-                delta[i][lane] += model->inverse[i * 4 + j][lane] * model->residual[j][lane];
-        }
-    kepler_sizes(model->y, delta, size);
-    for (int i = 0; i < 4; ++i)
-        for (int lane = 0; lane < kepler_LANES; ++lane) model->y[i][lane] -= delta[i][lane];
-}
-
-/* The largest of the lanes, none of which is negative; infinite if one is not finite. As integers, the bits of such
-   numbers have their order, and those of what is no number are larger. */
-static double kepler_largest(const kepler_lanes size)
-{
-    uint64_t bits[8], most = 0;
-    double largest;
-    memcpy(bits, size, sizeof bits);
-    for (int lane = 0; lane < kepler_LANES; ++lane) most = bits[lane] > most ? bits[lane] : most;
-    memcpy(&largest, &most, sizeof largest);
-    return isfinite(largest) ? largest : HUGE_VAL;
-}
-
-/* kepler_near for the guesses of all lanes, seen from one value. */
-static int kepler_near_lanes(kepler_lanes y[restrict 4], const double last[4])
-{
-    kepler_lanes distance = { 0.0 };
-    double size = 0.0;
-    for (int i = 0; i < 4; ++i) {
-        size += fabs(last[i]);
-        kepler_EACH_LANE
-        for (int lane = 0; lane < kepler_LANES; ++lane) distance[lane] += fabs(y[i][lane] - last[i]);
-    }
-    return kepler_largest(distance) <= 4.0 * size;
-}
-
-/* What is left after a correction of this size: quadratic in it, where the matrices are of the points corrected; where
-   they are of points further off, by bend, also of the order of size times bend. bound is what the last pass left. */
-static double kepler_remaining(double size, double bend, double bound)
-{
-    const double growth = size / bound, left = size * (size + bend);
-    return growth > 1.0 ? growth * left : left;
-}
-
-/* The table of a stage, with its matrices or with those of the last pass. */
-static void kepler_update(kepler_lanes coef[restrict], kepler_model *model, int matrices)
-{
-    if (matrices)
-        kepler_tabulate(coef, model);
-    else
-        kepler_evaluate_lanes(coef, model->y, model->displacement, model->increment);
-}
-
-/* The steps of a block one after the other, each along the linear model of its lane. As X, the state with its carry, gains
-   increment - gain residual, the next residual follows from this one; X itself is added up apart. */
-static void kepler_chain(kepler_model model[1], double x[4], double carry[4])
-{
-    double residual[4], sum[4], small[4];
-    for (int i = 0; i < 4; ++i) {
-        residual[i] = ((model->y[i][0] - x[i]) + model->displacement[i][0]) - carry[i];
-        sum[i] = x[i];
-        small[i] = carry[i];
-    }
-    for (int k = 0; k < 1 * kepler_LANES; ++k) {
-        const int lane = k / 1, after = (k + 1) / 1 % kepler_LANES;
-        kepler_model *at = &model[k % 1], *next = &model[(k + 1) % 1];
-        double even[4] = { 0.0 }, odd[4] = { 0.0 }; /* two sums, so that no long chain of additions is waited for */
-        for (int i = 0; i < 4; ++i) {
-            at->residual[i][lane] = residual[i];
-            for (int j = 0; j < 4; j += 2) even[i] += at->gain[i * 4 + j][lane] * residual[j];
-            for (int j = 1; j < 4; j += 2) odd[i] += at->gain[i * 4 + j][lane] * residual[j];
-        }
-        for (int i = 0; i < 4; ++i) {
-            const double change = at->increment[i][lane], total = sum[i] + change, added = total - sum[i];
-            const double turn = (next->displacement[i][after] - at->displacement[i][lane]) - change;
-            const double moved = (next->y[i][after] - at->y[i][lane]) + turn;
-            residual[i] = ((moved + residual[i]) + odd[i]) + even[i];
-            small[i] += ((sum[i] - (total - added)) + (change - added)) - (even[i] + odd[i]);
-            sum[i] = total;
-        }
-    }
-    for (int i = 0; i < 4; ++i) {
-        x[i] = sum[i] + small[i];
-        carry[i] = small[i] - (x[i] - sum[i]);
-    }
-}
-
-/* Bring the table up to date: coefficients, and weights that were fitted since. */
-static void kepler_refresh(const kepler_solver *s, kepler_table *table)
-{
-    for (int stage = 0; stage < 1; ++stage) {
-        if (table->fits[stage] == s->memory[stage].fits) continue;
-        table->fits[stage] = s->memory[stage].fits;
-        for (int k = 0; k < 118; ++k)
-            for (int lane = 0; lane < kepler_LANES; ++lane) table->coef[stage][k][lane] = s->coef[stage][k];
-        memcpy(table->weight[stage], s->memory[stage].weight, (size_t)s->memory[stage].terms * sizeof table->weight[0][0]);
-    }
-}
-
-/* Guesses for the next kepler_LANES values of a stage, by its recurrences. */
-static void kepler_foresee(const kepler_memory *memory, kepler_lanes weight[restrict][4],
-    kepler_lanes y[restrict 4])
-{
-    const int last = memory->count - 1;
-    for (int i = 0; i < 4; ++i) {
-        kepler_lanes even = { 0.0 }, odd = { 0.0 };
-        for (int k = 0; k < memory->terms; k += 2) {
-            const double past = memory->past[last - k][i], earlier = memory->past[last - 1 - k][i];
-            kepler_EACH_LANE
-            for (int lane = 0; lane < kepler_LANES; ++lane) even[lane] += weight[k][i][lane] * past;
-            kepler_EACH_LANE
-            for (int lane = 0; lane < kepler_LANES; ++lane) odd[lane] += weight[k + 1][i][lane] * earlier;
-        }
-        kepler_EACH_LANE
-        for (int lane = 0; lane < kepler_LANES; ++lane) y[i][lane] = even[lane] + odd[lane];
-    }
-}
-
-/* kepler_record for the values of all lanes, one after the other. */
-static void kepler_record_lanes(kepler_memory *memory, kepler_lanes y[restrict 4])
-{
-    kepler_make_room(memory, kepler_LANES);
-    for (int lane = 0; lane < kepler_LANES; ++lane)
-        for (int i = 0; i < 4; ++i) memory->past[memory->count + lane][i] = y[i][lane];
-    memory->count += kepler_LANES;
-}
-
-/* Guesses where no recurrence is known: where alpha and beta have the means of steps by the classical Runge-Kutta
-   method, to leading order. */
-static void kepler_march(const kepler_solver *s, kepler_table *table, kepler_model model[1])
-{
-    static const double reach[4] = { 0.5, 0.5, 1.0, 0.0 }, weight[4] = { 1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0 };
-    double x[4], point[4], slope[4], mean[4];
-    memcpy(x, s->x, sizeof x);
-    for (int k = 0; k < 1 * kepler_LANES; ++k) {
-        const double h = kepler_fractions[k % 1] * s->h;
-        memcpy(point, x, sizeof x);
-        memset(mean, 0, sizeof mean);
-        for (int part = 0; part < 4; ++part) {
-            kepler_vector_field(&s->params, point, slope);
-            for (int i = 0; i < 4; ++i) {
-                mean[i] += weight[part] * slope[i];
-                point[i] = x[i] + h * reach[part] * slope[i];
-            }
-        }
-        for (int i = 0; i < 4; ++i) {
-            model[k % 1].y[i][k / 1] = x[i] + 0.5 * h * mean[i];
-            x[i] += h * mean[i];
-        }
-    }
-    for (int stage = 0; stage < 1; ++stage) {
-        kepler_model *at = &model[stage];
-        kepler_evaluate_lanes(table->coef[stage], at->y, at->displacement, at->increment);
-        for (int i = 0; i < 4; ++i) {
-            kepler_EACH_LANE
-            for (int lane = 0; lane < kepler_LANES; ++lane)
-                at->y[i][lane] -= at->displacement[i][lane] + 0.5 * at->increment[i][lane];
-        }
-    }
-}
-
-/* kepler_LANES steps at once: guess the points of all, and correct them together until the error that remains is as
-   small as after a single step. How many passes that took; 0, and the solver as before, where it takes more than most. */
-static int kepler_block(kepler_solver *s, kepler_table *table, int most)
-{
-    kepler_model model[1];
-    kepler_lanes sizes;
-    double x[4], carry[4], previous = HUGE_VAL, bend = 0.0, bound = HUGE_VAL;
-    int passes = 0, solved = 0;
-    if (!s->foreseeing) kepler_march(s, table, model);
-    for (int stage = 0; stage < 1; ++stage) {
-        if (s->foreseeing) kepler_foresee(&s->memory[stage], table->weight[stage], model[stage].y);
-        if (!kepler_near_lanes(model[stage].y, s->x)) return 0;
-    }
-    while (!solved) {
-        double size = 0.0;
-        const int matrices = previous > 1e-05;
-        for (int stage = 0; stage < 1; ++stage) kepler_update(table->coef[stage], &model[stage], matrices);
-        memcpy(x, s->x, sizeof x);
-        memcpy(carry, s->carry, sizeof carry);
-        kepler_chain(model, x, carry);
-        for (int stage = 0; stage < 1; ++stage) {
-            kepler_correct(&model[stage], sizes);
-            const double largest = kepler_largest(sizes);
-            size = largest > size ? largest : size;
-        }
-        s->evaluations += 1 * kepler_LANES;
-        bend = matrices ? 0.0 : bend + previous;
-        bound = kepler_remaining(size, bend, bound);
-        /* The second test: after the square of so small a correction there is rounding only. */
-        solved = bound <= 1e-20 || (previous < 1e-8 && size < 1e-10);
-        if ((++passes >= most || !(size < previous)) && !solved) return 0;
-        previous = size;
-    }
-    for (int stage = 0; stage < 1; ++stage)
-        if (!kepler_near_lanes(model[stage].y, s->x)) return 0;
-    for (int i = 0; i < 4; ++i)
-        if (!isfinite(x[i])) return 0;
-    memcpy(s->x, x, sizeof x);
-    memcpy(s->carry, carry, sizeof carry);
-    s->steps += kepler_LANES;
-    for (int stage = 0; stage < 1; ++stage) {
-        kepler_memory *memory = &s->memory[stage];
-        kepler_record_lanes(memory, model[stage].y);
-        memory->slow = passes > 1 ? memory->slow + kepler_LANES : 0;
-        if (memory->slow > memory->patience && s->foreseeing) kepler_fit(memory);
-    }
-    return passes;
-}
-
-/* Recurrences are given up for a while, the longer the more often that happens. */
-static void kepler_give_up(kepler_solver *s)
-{
-    s->foreseeing = s->setback = s->pause = 0;
-    s->doubt = 2 * s->doubt + 600;
-    s->retry = s->steps + s->doubt;
-}
-
-/* How the next block is guessed: by recurrences, fitted as soon as enough steps are to be made, or
-   have been, to repay that. */
-static void kepler_choose_guess(kepler_solver *s, size_t steps)
-{
-    for (int stage = 0; stage < 1; ++stage)
-        if (s->memory[stage].count < 111) {
-            s->foreseeing = 0;
-            return;
-        }
-    if (s->foreseeing || (steps < 600 && s->steps < 150) || s->steps < s->retry) return;
-    s->foreseeing = 1;
-    for (int stage = 0; stage < 1 && s->foreseeing; ++stage) {
-        kepler_fit(&s->memory[stage]);
-        s->foreseeing = s->memory[stage].terms > 0;
-    }
-    s->pause = kepler_LANES;
-    if (!s->foreseeing) kepler_give_up(s);
-}
-
-/* Learn from a block: after one that failed single steps are made, the more the more often that happens. Recurrences
-   that fail repeatedly, or need more passes than steps by Runge-Kutta did, are given up. */
-static void kepler_learn_from(kepler_solver *s, int passes)
-{
-    if (passes > 0) {
-        s->setback /= 2;
-    } else {
-        s->setback = 2 * s->setback + kepler_LANES > 1000 ? 1000 : 2 * s->setback + kepler_LANES;
-        s->pause = s->setback;
-    }
-    if (!s->foreseeing) {
-        s->passes = passes > 0 ? passes : INT_MAX;
-    } else if (passes > s->passes || s->setback > 5 * kepler_LANES) {
-        kepler_give_up(s);
-    }
-}
-
-/* A single step, and the running mean of the evaluations that a stage of one takes. */
-static kepler_status kepler_single(kepler_solver *s)
-{
-    const size_t before = s->evaluations;
-    const kepler_status status = kepler_step(s, s->h);
-    s->effort += 0.125 * ((double)(s->evaluations - before) / 1 - s->effort);
-    return status;
-}
-
-/* Blocks of steps where they cost less than single steps, with at most as many passes over a block as 2 for each
-   evaluation in a single step. The results differ by round-off only. */
 kepler_status kepler_integrate(kepler_solver *s, double h, size_t steps)
 {
-    kepler_table table;
     kepler_status status = kepler_set_step(s, h);
-    for (int stage = 0; stage < 1; ++stage) table.fits[stage] = -1;
-    while (status == kepler_OK && steps > 0) {
-        if (steps >= kepler_LANES && s->pause == 0) kepler_choose_guess(s, steps);
-        if (steps >= kepler_LANES && s->pause == 0) {
-            kepler_refresh(s, &table);
-            const int passes = kepler_block(s, &table, (int)(2 * s->effort + 0.5));
-            kepler_learn_from(s, passes);
-            if (passes > 0) steps -= kepler_LANES;
-        } else {
-            if (s->pause > 0) --s->pause;
-            status = kepler_single(s);
-            if (status == kepler_OK) --steps;
-        }
-    }
+    for (; steps > 0 && status == kepler_OK; --steps) status = kepler_step(s, h);
     return status;
-}
-
-/* Members of an ensemble, each in its lane. */
-typedef struct {
-    kepler_lanes x[4], carry[4], coef[1][118];
-    kepler_lanes past[1][111][4]; /* solved values, in a ring */
-    kepler_lanes weight[1][40][4]; /* of past values, the latest first, for the next */
-    int latest;     /* the row of the latest values */
-    int count;      /* rows in use */
-    int order[1];   /* how many of them the extrapolation uses */
-    int terms[1];   /* how many of them the recurrences use */
-    int fits;       /* how often recurrences have been fitted */
-    int fitting[1]; /* whether they are the better guess */
-    int slow;       /* how many of the last steps took more than one iteration */
-    int patience;   /* how many of those before recurrences are fitted again */
-    int active[8];  /* whether the lane has a member that has not failed */
-    size_t left[8]; /* steps that are still to be made, where one has */
-} kepler_group;
-
-/* The past values of a stage, the latest for k = 0. */
-static kepler_lanes *kepler_group_past(kepler_group *group, int stage, int k)
-{
-    const int row = group->latest + k;
-    return group->past[stage][row < 111 ? row : row - 111];
-}
-
-/* Guess the values of a stage by the recurrences of the members. */
-static void kepler_group_foresee(kepler_group *group, int stage, kepler_lanes y[restrict 4])
-{
-    memset(y, 0, 4 * sizeof y[0]);
-    for (int k = 0; k < group->terms[stage]; ++k) {
-        kepler_lanes *past = kepler_group_past(group, stage, k), *weight = group->weight[stage][k];
-        for (int i = 0; i < 4; ++i) {
-            kepler_EACH_LANE
-            for (int lane = 0; lane < kepler_LANES; ++lane) y[i][lane] += weight[i][lane] * past[i][lane];
-        }
-    }
-}
-
-/* Extrapolate the values of a stage. */
-static void kepler_group_extrapolate(kepler_group *group, int stage, kepler_lanes y[restrict 4])
-{
-    const int order = group->order[stage];
-    double binomial = -1.0;
-    memcpy(y, group->x, 4 * sizeof y[0]);
-    if (order > 0) memset(y, 0, 4 * sizeof y[0]);
-    for (int k = 0; k < order; ++k) {
-        kepler_lanes *past = kepler_group_past(group, stage, k);
-        binomial *= -(double)(order - k) / (k + 1);
-        for (int i = 0; i < 4; ++i) {
-            kepler_EACH_LANE
-            for (int lane = 0; lane < kepler_LANES; ++lane) y[i][lane] += binomial * past[i][lane];
-        }
-    }
-}
-
-/* The sum over members of the absolute values of all components. */
-static double kepler_group_sum(const kepler_group *group, kepler_lanes y[4])
-{
-    double sum = 0.0;
-    for (int i = 0; i < 4; ++i)
-        for (int lane = 0; lane < kepler_LANES; ++lane) sum += group->active[lane] ? fabs(y[i][lane]) : 0.0;
-    return sum;
-}
-
-static void kepler_group_subtract(kepler_lanes y[restrict 4], kepler_lanes other[restrict 4])
-{
-    for (int i = 0; i < 4; ++i) {
-        kepler_EACH_LANE
-        for (int lane = 0; lane < kepler_LANES; ++lane) y[i][lane] -= other[i][lane];
-    }
-}
-
-/* Choose the guess that would have been best for these values. */
-static void kepler_group_judge(kepler_group *group, int stage, kepler_lanes y[4])
-{
-    kepler_lanes row[8 + 1][4];
-    const int rows = group->count < 8 ? group->count : 8;
-    double least = HUGE_VAL;
-    memcpy(row[0], y, sizeof row[0]);
-    for (int k = 0; k < rows; ++k) memcpy(row[k + 1], kepler_group_past(group, stage, k), sizeof row[0]);
-    if (group->order[stage] == 0) group->order[stage] = 1;
-    for (int order = 1; order <= rows; ++order) { /* row[0] becomes the backward difference of this order */
-        for (int k = 0; k <= rows - order; ++k) kepler_group_subtract(row[k], row[k + 1]);
-        const double size = kepler_group_sum(group, row[0]);
-        if (size < least) {
-            least = size;
-            group->order[stage] = order;
-        }
-    }
-    if (group->terms[stage] == 0) return;
-    kepler_group_foresee(group, stage, row[0]);
-    kepler_group_subtract(row[0], y);
-    group->fitting[stage] = kepler_group_sum(group, row[0]) <= least;
-}
-
-/* Fit the recurrences of all members; with every time, wait longer before it is done again, and for long if it did not
-   help. */
-static void kepler_group_fit(kepler_group *group)
-{
-    kepler_memory memory;
-    const int helped = group->fits == 0 || group->fitting[0];
-    memory.count = 111;
-    for (int stage = 0; stage < 1; ++stage) {
-        int found = 1;
-        group->terms[stage] = 0;
-        for (int lane = 0; lane < kepler_LANES; ++lane)
-            for (int i = 0; i < 4 && group->active[lane] && found; ++i) {
-                for (int k = 0; k < 111; ++k)
-                    memory.past[111 - 1 - k][i] = kepler_group_past(group, stage, k)[i][lane];
-                const int terms = kepler_train(&memory, i);
-                found = terms > 0;
-                if (terms > group->terms[stage]) group->terms[stage] = terms;
-                for (int k = 0; k < 40; ++k) group->weight[stage][k][i][lane] = memory.weight[k][i][0];
-            }
-        if (!found) group->terms[stage] = 0;
-        group->fitting[stage] = found;
-    }
-    ++group->fits;
-    group->slow = 0;
-    group->patience = helped && group->patience < 10000 ? 2 * group->patience + 150 : 100 * 150;
-}
-
-/* Replace guesses that are not near the last values, as kepler_near has it, by these; lane by lane. */
-static void kepler_stay_near(kepler_lanes y[restrict 4], kepler_lanes last[restrict 4])
-{
-    kepler_lanes distance = { 0.0 }, size = { 0.0 };
-    for (int i = 0; i < 4; ++i) {
-        kepler_EACH_LANE
-        for (int lane = 0; lane < kepler_LANES; ++lane) {
-            distance[lane] += fabs(y[i][lane] - last[i][lane]);
-            size[lane] += fabs(last[i][lane]);
-        }
-    }
-    for (int i = 0; i < 4; ++i) {
-        kepler_EACH_LANE
-        for (int lane = 0; lane < kepler_LANES; ++lane)
-            y[i][lane] = distance[lane] <= 4.0 * size[lane] ? y[i][lane] : last[i][lane];
-    }
-}
-
-/* Whether lanes are still to be solved after a correction of this size; those where nothing is finite leave the group.
-   bound is what remains in each lane. */
-static int kepler_group_open(kepler_group *group, const kepler_lanes size, const kepler_lanes previous,
-    double bend, kepler_lanes bound)
-{
-    int open = 0;
-    kepler_EACH_LANE
-    for (int lane = 0; lane < kepler_LANES; ++lane)
-        bound[lane] = kepler_remaining(size[lane], bend, bound[lane]);
-    if (kepler_largest(bound) <= 1e-20) return 0;
-    for (int lane = 0; lane < kepler_LANES; ++lane) {
-        const int solved = bound[lane] <= 1e-20 || (previous[lane] < 1e-8 && size[lane] < 1e-10);
-        if (!isfinite(size[lane])) group->active[lane] = 0;
-        open += group->active[lane] && !solved;
-    }
-    return open;
-}
-
-/* The guess for a stage: recurrences, or extrapolation; the state for members where that is not near. */
-static void kepler_group_predict(kepler_group *group, int stage, kepler_lanes y[4])
-{
-    if (group->fitting[stage]) kepler_group_foresee(group, stage, y);
-    else kepler_group_extrapolate(group, stage, y);
-    kepler_stay_near(y, group->x);
-}
-
-/* Newton's method for a stage, until the slowest lane is solved. The number of iterations; where that is the most
-   allowed, lanes that are not solved leave the group. */
-static int kepler_group_solve(kepler_group *group, int stage, kepler_model *model)
-{
-    kepler_lanes size, previous, bound;
-    double largest = HUGE_VAL, bend = 0.0;
-    int iterations = 0, open = 1;
-    for (int lane = 0; lane < kepler_LANES; ++lane) size[lane] = bound[lane] = HUGE_VAL;
-    kepler_group_predict(group, stage, model->y);
-    for (; open > 0 && iterations < 20; ++iterations) {
-        memcpy(previous, size, sizeof size);
-        kepler_update(group->coef[stage], model, largest > 1e-05);
-        bend = largest > 1e-05 ? 0.0 : bend + largest;
-        for (int i = 0; i < 4; ++i) {
-            kepler_EACH_LANE
-            for (int lane = 0; lane < kepler_LANES; ++lane)
-                model->residual[i][lane] =
-                    ((model->y[i][lane] - group->x[i][lane]) + model->displacement[i][lane]) - group->carry[i][lane];
-        }
-        kepler_correct(model, size);
-        open = kepler_group_open(group, size, previous, bend, bound);
-        largest = kepler_largest(size);
-    }
-    for (int lane = 0; lane < kepler_LANES && open > 0; ++lane)
-        group->active[lane] = group->active[lane] && bound[lane] <= 1e-20;
-    return iterations;
-}
-
-/* Add the increments, corrected to first order, in compensated arithmetic as for a single step. */
-static void kepler_group_advance(kepler_lanes x[restrict 4], kepler_lanes carry[restrict 4],
-    kepler_model *model)
-{
-    for (int i = 0; i < 4; ++i)
-        for (int j = 0; j < 4; ++j) {
-            kepler_EACH_LANE
-            for (int lane = 0; lane < kepler_LANES; ++lane)
-                carry[i][lane] -= model->gain[i * 4 + j][lane] * model->residual[j][lane];
-        }
-    for (int i = 0; i < 4; ++i) {
-        kepler_EACH_LANE
-        for (int lane = 0; lane < kepler_LANES; ++lane) {
-            const double change = model->increment[i][lane], sum = x[i][lane] + change, added = sum - x[i][lane];
-            const double small = ((x[i][lane] - (sum - added)) + (change - added)) + carry[i][lane];
-            x[i][lane] = sum + small;
-            carry[i][lane] = small - (x[i][lane] - sum);
-        }
-    }
-}
-
-/* Members that failed, or whose state is not near the one before the step or not finite, keep that one, and leave. How many
-   stay. */
-static int kepler_group_leave(kepler_group *group, kepler_lanes x[4], kepler_lanes carry[4],
-    size_t remaining)
-{
-    kepler_lanes moved = { 0.0 }, size = { 0.0 }, bad;
-    int active = 0;
-    for (int i = 0; i < 4; ++i) {
-        kepler_EACH_LANE
-        for (int lane = 0; lane < kepler_LANES; ++lane) {
-            moved[lane] += fabs(group->x[i][lane] - x[i][lane]);
-            size[lane] += fabs(x[i][lane]);
-        }
-    }
-    for (int lane = 0; lane < kepler_LANES; ++lane) bad[lane] = moved[lane] <= 4.0 * size[lane] ? 0.0 : 1.0;
-    for (int lane = 0; lane < kepler_LANES; ++lane) active += group->active[lane];
-    if (active == kepler_LANES && !(kepler_largest(bad) > 0.0)) return active;
-    active = 0;
-    for (int lane = 0; lane < kepler_LANES; ++lane) {
-        group->active[lane] = group->active[lane] && !(bad[lane] > 0.0);
-        active += group->active[lane];
-        for (int i = 0; i < 4 && !group->active[lane]; ++i) {
-            group->x[i][lane] = x[i][lane];
-            group->carry[i][lane] = carry[i][lane];
-        }
-        if (!group->active[lane] && group->left[lane] == 0) group->left[lane] = remaining;
-    }
-    return active;
-}
-
-/* One step of all members, of as many as remain. How many members are left. */
-static int kepler_group_step(kepler_group *group, size_t remaining)
-{
-    kepler_lanes x[4], carry[4];
-    kepler_model model;
-    const int next = (group->latest > 0 ? group->latest : 111) - 1;
-    int most = 0;
-    memcpy(x, group->x, sizeof x);
-    memcpy(carry, group->carry, sizeof carry);
-    for (int stage = 0; stage < 1; ++stage) {
-        const int iterations = kepler_group_solve(group, stage, &model);
-        kepler_group_advance(group->x, group->carry, &model);
-        if (iterations > most) most = iterations;
-        if ((iterations > 1 && next % 8 == 0) || group->count < 8)
-            kepler_group_judge(group, stage, model.y);
-        memcpy(group->past[stage][next], model.y, sizeof model.y);
-    }
-    group->latest = next;
-    if (group->count < 111) ++group->count;
-    group->slow = most > 1 ? group->slow + 1 : 0;
-    if (group->slow > group->patience && group->count == 111 && remaining >= 800)
-        kepler_group_fit(group);
-    return kepler_group_leave(group, x, carry, remaining);
-}
-
-/* Put a member into a lane: its state, and its coefficients. */
-static kepler_status kepler_group_join(kepler_group *group, int lane, const kepler_params *params,
-    const double x0[4], double h)
-{
-    kepler_solver s;
-    kepler_status status = kepler_init(&s, params, x0);
-    if (status == kepler_OK) status = kepler_set_step(&s, h);
-    if (status != kepler_OK) return status;
-    for (int i = 0; i < 4; ++i) group->x[i][lane] = s.x[i];
-    for (int stage = 0; stage < 1; ++stage)
-        for (int k = 0; k < 118; ++k) group->coef[stage][k][lane] = s.coef[stage][k];
-    group->active[lane] = 1;
-    return status;
-}
-
-/* The steps that a member has still to make after it left the group, by itself. */
-static kepler_status kepler_group_finish(const kepler_group *group, int lane, const kepler_params *params,
-    double x[4], double h)
-{
-    kepler_solver s;
-    kepler_status status = kepler_init(&s, params, x);
-    if (status != kepler_OK) return status;
-    for (int i = 0; i < 4; ++i) s.carry[i] = group->carry[i][lane];
-    status = kepler_integrate(&s, h, group->left[lane]);
-    memcpy(x, s.x, sizeof s.x);
-    return status;
-}
-
-/* The members from first on, as many as there are lanes. The first status that is not OK. */
-static kepler_status kepler_group_run(const kepler_params *params, double *x, size_t members, size_t first,
-    double h, size_t steps, unsigned char *status)
-{
-    kepler_group group;
-    kepler_status worst = kepler_OK, member[8];
-    const int count = members - first < kepler_LANES ? (int)(members - first) : kepler_LANES;
-    double state[4];
-    size_t left = steps;
-    memset(&group, 0, sizeof group);
-    for (int lane = 0; lane < count; ++lane) {
-        for (size_t i = 0; i < 4; ++i) state[i] = x[i * members + first + (size_t)lane];
-        member[lane] = kepler_group_join(&group, lane, params, state, h);
-    }
-    for (int active = count; left > 0 && active > 2; --left) active = kepler_group_step(&group, left);
-    for (int lane = 0; lane < count; ++lane) {
-        if (group.active[lane]) group.left[lane] = left;
-        for (int i = 0; i < 4; ++i) state[i] = group.x[i][lane];
-        if (member[lane] == kepler_OK) {
-            if (group.left[lane] > 0) member[lane] = kepler_group_finish(&group, lane, params, state, h);
-            for (size_t i = 0; i < 4; ++i) x[i * members + first + (size_t)lane] = state[i];
-        }
-        if (status != NULL) status[first + (size_t)lane] = (unsigned char)member[lane];
-        if (worst == kepler_OK) worst = member[lane];
-    }
-    return worst;
-}
-
-kepler_status kepler_ensemble(const kepler_params *params, double *x, size_t members, double h, size_t steps,
-                              unsigned char *status)
-{
-    kepler_status worst = isfinite(h) ? kepler_OK : kepler_BAD_ARGUMENT;
-    const kepler_params own = params != NULL ? *params : kepler_default_params;
-    size_t earliest = members;
-    if (x == NULL && members > 0) return kepler_BAD_ARGUMENT;
-#ifdef _OPENMP
-#pragma omp parallel for schedule(dynamic)
-#endif
-    for (size_t first = 0; first < members; first += kepler_LANES) {
-        const kepler_status group = kepler_group_run(&own, x, members, first, h, steps, status);
-        if (group == kepler_OK) continue;
-#ifdef _OPENMP
-#pragma omp critical
-#endif
-        if (first < earliest) {
-            earliest = first;
-            worst = group;
-        }
-    }
-    return worst;
-}
-
-#if defined(__clang__)
-#pragma clang diagnostic pop
-#endif
-
-/* the Hamiltonian */
-static void kepler_energy(const kepler_params *params, const double x[4], double energy[restrict 1])
-{
-    const double x_ = x[0];
-    const double y = x[1];
-    const double px = x[2];
-    const double py = x[3];
-    energy[0] = 0.5 * (px * px + py * py) - params->mu / sqrt(x_ * x_ + y * y);
-}
-
-/* the Casimirs */
-static void kepler_casimir_values(const kepler_params *params, const double x[4], double out[restrict 1])
-{
-    (void)params;
-    (void)x;
-    (void)out;
-}
-
-/* pi(x) grad H(x) */
-static void kepler_field(const kepler_params *params, const double x[4], double out[restrict 4])
-{
-    const double x_ = x[0];
-    const double y = x[1];
-    const double px = x[2];
-    const double py = x[3];
-    const double t1 = 1.0 / sqrt(x_ * x_ + y * y);
-    const double t2 = params->mu * (t1 * (t1 * t1));
-    out[0] = px;
-    out[1] = py;
-    out[2] = -(x_ * t2);
-    out[3] = -(y * t2);
-}
-
-double kepler_hamiltonian(const kepler_params *params, const double x[4])
-{
-    double energy[1];
-    kepler_energy(params != NULL ? params : &kepler_default_params, x, energy);
-    return energy[0];
-}
-
-void kepler_casimirs(const kepler_params *params, const double x[4], double out[])
-{
-    double value[1]; /* out may overlap x */
-    kepler_casimir_values(params != NULL ? params : &kepler_default_params, x, value);
-    for (int i = 0; i < 0; ++i) out[i] = value[i];
-}
-
-void kepler_vector_field(const kepler_params *params, const double x[4], double out[4])
-{
-    double value[4];
-    kepler_field(params != NULL ? params : &kepler_default_params, x, value);
-    memcpy(out, value, sizeof value);
 }
 
 const char *kepler_status_string(kepler_status status)
 {
-    switch (status) {
-    case kepler_OK: return "ok";
-    case kepler_NO_CONVERGENCE: return "no convergence: the step is too large";
-    case kepler_SINGULAR: return "singular Newton matrix: the step is too large";
-    case kepler_NOT_FINITE: return "not finite: overflow, or outside the domain";
-    case kepler_BAD_ARGUMENT: return "bad argument: a null pointer, or values that are not allowed";
-    }
-    return "unknown status";
+    static const char *const text[] = {
+        "ok",
+        "no convergence: the step is too large",
+        "singular Newton matrix: the step is too large",
+        "not finite: overflow, or outside the domain",
+        "bad argument: a null pointer, or values that are not allowed"
+    };
+    return (unsigned)status <= kepler_BAD_ARGUMENT ? text[status] : "unknown status";
 }
 
 size_t kepler_solver_size(void) { return sizeof(kepler_solver); }
 
 size_t kepler_solver_steps_done(const kepler_solver *s) { return s->steps; }
+
+/* ---- Ensembles ---- */
+kepler_status kepler_ensemble(const kepler_params *params, double *x, size_t members, double h, size_t steps,
+    unsigned char *status)
+{
+    kepler_status worst = isfinite(h) ? kepler_OK : kepler_BAD_ARGUMENT;
+    const kepler_params own = params != NULL ? *params : kepler_default_params;
+    if (x == NULL && members > 0) return kepler_BAD_ARGUMENT;
+    for (size_t m = 0; m < members; ++m) {
+        kepler_solver s;
+        double x0[kepler_DIM];
+        for (size_t i = 0; i < kepler_DIM; ++i) x0[i] = x[i * members + m];
+        kepler_status member = kepler_init(&s, &own, x0);
+        if (member == kepler_OK) {
+            member = kepler_integrate(&s, h, steps);
+            for (size_t i = 0; i < kepler_DIM; ++i) x[i * members + m] = s.x[i];
+        }
+        if (status != NULL) status[m] = (unsigned char)member;
+        if (worst == kepler_OK) worst = member;
+    }
+    return worst;
+}

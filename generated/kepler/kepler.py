@@ -6,17 +6,17 @@
 #   step: implicit, Newton iteration with the analytic matrix
 #   one Newton iteration: 376 additions, 560 multiplications, 2 divisions, 1 functions
 #
-# spec: kepler, sha256 4874dc0d710c60140708e41ebaf66583708ef198476a1827e3178a4de2a45e27
+# spec: kepler, sha256 7d889f3f1aeb8f2269b42200556d64daeb9a92956762d91c1f8a8d00d84f48f2
 # to regenerate: phigen build kepler
 # DO NOT EDIT: change the spec and regenerate; edits are noticed by the checksum below.
 #
 # SPDX-License-Identifier: 0BSD
 # This file belongs to whoever generated it; phigen claims no rights in it.
-# body-sha256: 892a49d6a2c0b0b872acf87f060c2271b3de70e9d4a02939c63cc95ef9673549
+# body-sha256: 252ade887244e5529ce81d1013c783974e7a024e7bea71454f2c4bf191783574
 import numpy as np
 
 VERSION = "0.1.0"
-SPEC_SHA256 = "4874dc0d710c60140708e41ebaf66583708ef198476a1827e3178a4de2a45e27"
+SPEC_SHA256 = "7d889f3f1aeb8f2269b42200556d64daeb9a92956762d91c1f8a8d00d84f48f2"
 DIM = 4
 ORDER = 6
 COORDINATES = ("x", "y", "px", "py",)

@@ -13,7 +13,19 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: ca7a746631769c79b16c9793f3c98e14d73659f5107c08eb6edf91c44fb1ea38
+ *
+ *   1. The model
+ *   2. Compensated sums, linear equations
+ *   3. Starting guesses
+ *   4. Recurrences fitted to the last values
+ *   5. The implicit step, by Newton's method
+ *   6. Several steps or members at once
+ *   7. The solver
+ *   8. Newton's method in lanes
+ *   9. Blocks of steps
+ *   10. Groups of members
+ *   11. Ensembles
+ * body-sha256: d61743a9af2d493660b9746c4d58c1e761e38683a9e62288258a0936cdb5557a
  */
 #include "kowalevski_top.h"
 
@@ -23,10 +35,15 @@
 #include <stdint.h>
 #include <string.h>
 
+/* ---- The model ---- */
 const kowalevski_top_params kowalevski_top_default_params = { 0 };
 
-/* A step of size h is the composition of these fractions of it. */
-static const double kowalevski_top_fractions[1] = { 1.0 };
+enum { kowalevski_top_MAX_ITERATIONS = 20 }; /* of an inner solve */
+enum { kowalevski_top_CHECKS = 8 }; /* values that a recurrence is not fitted to, but has to foresee */
+enum { kowalevski_top_PASSES = 2 }; /* over a block, that cost per step what an evaluation costs */
+
+/* A correction is accepted when the error that it leaves is estimated to be below this. */
+#define kowalevski_top_TOLERANCE 1e-20
 
 /* Functions to be kept apart: very long ones compile in quadratic time. */
 #if defined(__GNUC__)
@@ -38,42 +55,20 @@ static const double kowalevski_top_fractions[1] = { 1.0 };
 /* (1 - w cot w)/s with w = sqrt(s)/2, coth for negative s: the function of the exponential bi-realisation. */
 static double kowalevski_top_phi0(double s)
 {
-    if (fabs(s) < 0.25) {
-        double sum = 8.586062056277845e-15;
-        sum = sum * s + 3.3896802963225827e-13;
-        sum = sum * s + 1.3382536530684679e-11;
-        sum = sum * s + 5.284190138687493e-10;
-        sum = sum * s + 2.08767569878681e-08;
-        sum = sum * s + 8.267195767195768e-07;
-        sum = sum * s + 3.306878306878307e-05;
-        sum = sum * s + 0.001388888888888889;
-        sum = sum * s + 0.08333333333333333;
-        return sum;
-    }
+    if (fabs(s) < 0.25)
+        return (0.08333333333333333 + s * (0.001388888888888889 + s * (3.306878306878307e-05 + s *
+            (8.267195767195768e-07 + s * (2.08767569878681e-08 + s * (5.284190138687493e-10 + s *
+            (1.3382536530684679e-11 + s * (3.3896802963225827e-13 + s * 8.586062056277845e-15))))))));
     if (fabs(s) < 16.0) {
         const double pole = 1.0 / (39.47841760435743 - s);
-        double sum = 1.3621211117593843e-46;
-        sum = sum * s + 2.1509755511832569e-44;
-        sum = sum * s + 3.3966848266497805e-42;
-        sum = sum * s + 5.363831046655698e-40;
-        sum = sum * s + 8.470227328650247e-38;
-        sum = sum * s + 1.3375664093215244e-35;
-        sum = sum * s + 2.1122063323183885e-33;
-        sum = sum * s + 3.3354842988221443e-31;
-        sum = sum * s + 5.267262996834231e-29;
-        sum = sum * s + 8.318003195189264e-27;
-        sum = sum * s + 1.3136241807166534e-24;
-        sum = sum * s + 2.0747401878593604e-22;
-        sum = sum * s + 3.277539174701792e-20;
-        sum = sum * s + 5.180118196169724e-18;
-        sum = sum * s + 8.196052055691008e-16;
-        sum = sum * s + 1.3000482138698975e-13;
-        sum = sum * s + 2.0742872904166045e-11;
-        sum = sum * s + 3.357141926657451e-09;
-        sum = sum * s + 5.637370282876845e-07;
-        sum = sum * s + 0.000105641107053347;
-        sum = sum * s + 0.03267274151216445;
-        return 2.0 * pole + sum;
+        return 2.0 * pole + (0.03267274151216445 + s * (0.000105641107053347 + s * (5.637370282876845e-07
+            + s * (3.357141926657451e-09 + s * (2.0742872904166045e-11 + s * (1.3000482138698975e-13 + s *
+            (8.196052055691008e-16 + s * (5.180118196169724e-18 + s * (3.277539174701792e-20 + s *
+            (2.0747401878593604e-22 + s * (1.3136241807166534e-24 + s * (8.318003195189264e-27 + s *
+            (5.267262996834231e-29 + s * (3.3354842988221443e-31 + s * (2.1122063323183885e-33 + s *
+            (1.3375664093215244e-35 + s * (8.470227328650247e-38 + s * (5.363831046655698e-40 + s *
+            (3.3966848266497805e-42 + s * (2.1509755511832569e-44 + s *
+            1.3621211117593843e-46))))))))))))))))))));
     }
     const double w = 0.5 * sqrt(fabs(s)), c = w / (s > 0.0 ? tan(w) : tanh(w));
     const double phi0 = (1.0 - c) / s;
@@ -83,42 +78,20 @@ static double kowalevski_top_phi0(double s)
 /* The derivative of (1 - w cot w)/s, w = sqrt(s)/2. */
 static double kowalevski_top_phi1(double s)
 {
-    if (fabs(s) < 0.25) {
-        double sum = 1.9573818287022555e-15;
-        sum = sum * s + 6.868849645022276e-14;
-        sum = sum * s + 2.372776207425808e-12;
-        sum = sum * s + 8.029521918410807e-11;
-        sum = sum * s + 2.6420950693437467e-09;
-        sum = sum * s + 8.35070279514724e-08;
-        sum = sum * s + 2.48015873015873e-06;
-        sum = sum * s + 6.613756613756614e-05;
-        sum = sum * s + 0.001388888888888889;
-        return sum;
-    }
+    if (fabs(s) < 0.25)
+        return (0.001388888888888889 + s * (6.613756613756614e-05 + s * (2.48015873015873e-06 + s *
+            (8.35070279514724e-08 + s * (2.6420950693437467e-09 + s * (8.029521918410807e-11 + s *
+            (2.372776207425808e-12 + s * (6.868849645022276e-14 + s * 1.9573818287022555e-15))))))));
     if (fabs(s) < 16.0) {
         const double pole = 1.0 / (39.47841760435743 - s);
-        double sum = 1.8114038279637677e-47;
-        sum = sum * s + 2.7242422235187686e-45;
-        sum = sum * s + 4.0868535472481875e-43;
-        sum = sum * s + 6.114032687969605e-41;
-        sum = sum * s + 9.118512779314688e-39;
-        sum = sum * s + 1.3552363725840395e-36;
-        sum = sum * s + 2.0063496139822866e-34;
-        sum = sum * s + 2.957088865245744e-32;
-        sum = sum * s + 4.336129588468787e-30;
-        sum = sum * s + 6.320715596201077e-28;
-        sum = sum * s + 9.149803514708191e-26;
-        sum = sum * s + 1.3136241807166533e-23;
-        sum = sum * s + 1.8672661690734246e-21;
-        sum = sum * s + 2.6220313397614337e-19;
-        sum = sum * s + 3.626082737318807e-17;
-        sum = sum * s + 4.917631233414605e-15;
-        sum = sum * s + 6.500241069349487e-13;
-        sum = sum * s + 8.297149161666418e-11;
-        sum = sum * s + 1.0071425779972354e-08;
-        sum = sum * s + 1.127474056575369e-06;
-        sum = sum * s + 0.000105641107053347;
-        return 2.0 * pole * pole + sum;
+        return 2.0 * pole * pole + (0.000105641107053347 + s * (1.127474056575369e-06 + s *
+            (1.0071425779972354e-08 + s * (8.297149161666418e-11 + s * (6.500241069349487e-13 + s *
+            (4.917631233414605e-15 + s * (3.626082737318807e-17 + s * (2.6220313397614337e-19 + s *
+            (1.8672661690734246e-21 + s * (1.3136241807166533e-23 + s * (9.149803514708191e-26 + s *
+            (6.320715596201077e-28 + s * (4.336129588468787e-30 + s * (2.957088865245744e-32 + s *
+            (2.0063496139822866e-34 + s * (1.3552363725840395e-36 + s * (9.118512779314688e-39 + s *
+            (6.114032687969605e-41 + s * (4.0868535472481875e-43 + s * (2.7242422235187686e-45 + s *
+            1.8114038279637677e-47))))))))))))))))))));
     }
     const double w = 0.5 * sqrt(fabs(s)), c = w / (s > 0.0 ? tan(w) : tanh(w));
     const double phi0 = (1.0 - c) / s;
@@ -129,42 +102,20 @@ static double kowalevski_top_phi1(double s)
 /* The second derivative of (1 - w cot w)/s, w = sqrt(s)/2. */
 static double kowalevski_top_phi2(double s)
 {
-    if (fabs(s) < 0.25) {
-        double sum = 4.958102545524207e-16;
-        sum = sum * s + 1.5659054629618044e-14;
-        sum = sum * s + 4.808194751515593e-13;
-        sum = sum * s + 1.4236657244554848e-11;
-        sum = sum * s + 4.0147609592054037e-10;
-        sum = sum * s + 1.0568380277374987e-08;
-        sum = sum * s + 2.505210838544172e-07;
-        sum = sum * s + 4.96031746031746e-06;
-        sum = sum * s + 6.613756613756614e-05;
-        return sum;
-    }
+    if (fabs(s) < 0.25)
+        return (6.613756613756614e-05 + s * (4.96031746031746e-06 + s * (2.505210838544172e-07 + s *
+            (1.0568380277374987e-08 + s * (4.0147609592054037e-10 + s * (1.4236657244554848e-11 + s *
+            (4.808194751515593e-13 + s * (1.5659054629618044e-14 + s * 4.958102545524207e-16))))))));
     if (fabs(s) < 16.0) {
         const double pole = 1.0 / (39.47841760435743 - s);
-        double sum = 2.5235866986281763e-48;
-        sum = sum * s + 3.622807655927535e-46;
-        sum = sum * s + 5.17606022468566e-44;
-        sum = sum * s + 7.356336385046738e-42;
-        sum = sum * s + 1.0393855569548329e-39;
-        sum = sum * s + 1.45896204469035e-37;
-        sum = sum * s + 2.032854558876059e-35;
-        sum = sum * s + 2.8088894595752015e-33;
-        sum = sum * s + 3.844215524819467e-31;
-        sum = sum * s + 5.203355506162545e-29;
-        sum = sum * s + 6.952787155821185e-27;
-        sum = sum * s + 9.149803514708191e-25;
-        sum = sum * s + 1.182261762644988e-22;
-        sum = sum * s + 1.4938129352587397e-20;
-        sum = sum * s + 1.8354219378330035e-18;
-        sum = sum * s + 2.1756496423912842e-16;
-        sum = sum * s + 2.4588156167073025e-14;
-        sum = sum * s + 2.600096427739795e-12;
-        sum = sum * s + 2.4891447484999256e-10;
-        sum = sum * s + 2.0142851559944708e-08;
-        sum = sum * s + 1.127474056575369e-06;
-        return 4.0 * pole * pole * pole + sum;
+        return 4.0 * pole * pole * pole + (1.127474056575369e-06 + s * (2.0142851559944708e-08 + s *
+            (2.4891447484999256e-10 + s * (2.600096427739795e-12 + s * (2.4588156167073025e-14 + s *
+            (2.1756496423912842e-16 + s * (1.8354219378330035e-18 + s * (1.4938129352587397e-20 + s *
+            (1.182261762644988e-22 + s * (9.149803514708191e-25 + s * (6.952787155821185e-27 + s *
+            (5.203355506162545e-29 + s * (3.844215524819467e-31 + s * (2.8088894595752015e-33 + s *
+            (2.032854558876059e-35 + s * (1.45896204469035e-37 + s * (1.0393855569548329e-39 + s *
+            (7.356336385046738e-42 + s * (5.17606022468566e-44 + s * (3.622807655927535e-46 + s *
+            2.5235866986281763e-48))))))))))))))))))));
     }
     const double w = 0.5 * sqrt(fabs(s)), c = w / (s > 0.0 ? tan(w) : tanh(w));
     const double phi0 = (1.0 - c) / s;
@@ -177,10 +128,7 @@ static double kowalevski_top_phi2(double s)
 static void kowalevski_top_prepare(const kowalevski_top_params *params, double h, double coef[restrict 172])
 {
     (void)params;
-    const double t1 = h * h;
-    const double t2 = h * t1;
-    const double t3 = h * (t2 * t2);
-    const double t4 = h * (t1 * t1);
+    const double t1 = h * h, t2 = h * t1, t3 = h * (t2 * t2), t4 = h * (t1 * t1);
     coef[0] = (-1.0 / 48.0) * t2;
     coef[1] = (-1.0 / 46080.0) * t3;
     coef[2] = (-1.0 / 138240.0) * t3;
@@ -358,32 +306,22 @@ static void kowalevski_top_prepare(const kowalevski_top_params *params, double h
 /* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
    increment, all with the momenta p = grad S_h(y) (part 1 of 3) */
 kowalevski_top_APART static void kowalevski_top_linearise_part1(const double coef[172], const double y[6],
-                                                                double displacement[restrict 6],
-                                                                double increment[restrict 6],
-                                                                double jacobian[restrict 36],
-                                                                double increment_jacobian[restrict 36],
-                                                                double work[restrict 274])
+    double displacement[restrict 6], double increment[restrict 6], double jacobian[restrict 36],
+    double increment_jacobian[restrict 36], double work[restrict 274])
 {
-    (void)displacement;
-    (void)jacobian;
-    (void)increment_jacobian;
-    const double P1 = y[0];
-    const double P2 = y[1];
-    const double P3 = y[2];
-    const double G1 = y[3];
-    const double G2 = y[4];
-    const double G3 = y[5];
+    (void)displacement, (void)jacobian, (void)increment_jacobian;
+    const double P1 = y[0], P2 = y[1], P3 = y[2], G1 = y[3], G2 = y[4], G3 = y[5];
     work[54] = G2 * P2;
     work[29] = P2 * P2;
     work[126] = coef[77] * work[29];
     work[97] = coef[38] + G1 * coef[47];
     work[127] = coef[10] + G1 * coef[15];
     work[128] = coef[18] * work[29];
-    const double t7 = G1 * (coef[3] + G1 * coef[4]);
+    const double t1 = G1 * (coef[3] + G1 * coef[4]);
     work[57] = G3 * G3;
     work[77] = G2 * G2;
-    const double t10 = coef[0] + coef[2] * work[77];
-    const double t11 = work[29] * (work[127] + work[128]) + (t7 + (coef[1] * work[57] + t10));
+    const double t2 = coef[0] + coef[2] * work[77];
+    const double t3 = work[29] * (work[127] + work[128]) + (t1 + (coef[1] * work[57] + t2));
     work[131] = coef[64] * work[54];
     work[30] = P1 * P1;
     work[132] = coef[10] + G1 * coef[59] + (coef[86] * work[29] + coef[18] * work[30]);
@@ -395,10 +333,12 @@ kowalevski_top_APART static void kowalevski_top_linearise_part1(const double coe
     work[138] = coef[78] + G1 * coef[79];
     work[115] = coef[36] * work[27];
     work[139] = coef[80] * work[29];
-    const double t23 = coef[76] * work[27];
-    const double t24 = G1 * coef[55];
-    work[140] = G1 * (coef[5] + t24) + (coef[53] * work[57] + (coef[24] + coef[54] * work[77]));
-    const double t26 = work[27] * (coef[72] * work[77] + coef[71] * work[57]) + work[135] + G1 * (work[133] + G1 * (coef[73] * work[27] + work[136])) + P2 * (coef[74] * work[137] + P2 * (work[29] * (work[138] + (work[115] + work[139])) + (work[27] * (t23 + (coef[12] + G1 * coef[75])) + work[140])));
+    const double t4 = coef[76] * work[27], t5 = G1 * coef[55];
+    work[140] = G1 * (coef[5] + t5) + (coef[53] * work[57] + (coef[24] + coef[54] * work[77]));
+    const double t6 = work[27] * (coef[72] * work[77] + coef[71] * work[57]) + work[135] + G1
+        * (work[133] + G1 * (coef[73] * work[27] + work[136])) + P2 * (coef[74] * work[137] + P2
+        * (work[29] * (work[138] + (work[115] + work[139])) + (work[27] * (t4 + (coef[12] + G1 * coef[75]))
+        + work[140])));
     work[26] = G3 * P3;
     work[129] = coef[81] + G1 * coef[82] + coef[83] * work[27];
     work[103] = G3 * (P2 * P3);
@@ -410,16 +350,18 @@ kowalevski_top_APART static void kowalevski_top_linearise_part1(const double coe
     work[116] = coef[34] + work[120];
     work[71] = coef[44] * work[27];
     work[141] = coef[37] * work[29];
-    const double t38 = G1 * coef[27];
-    work[142] = G1 * (coef[12] + t38) + (coef[25] * work[57] + (coef[24] + coef[26] * work[77]));
+    const double t7 = G1 * coef[27];
+    work[142] = G1 * (coef[12] + t7) + (coef[25] * work[57] + (coef[24] + coef[26] * work[77]));
     work[143] = coef[39] * work[54];
-    const double t41 = coef[40] * work[26];
+    const double t8 = coef[40] * work[26];
     work[144] = coef[78] + G1 * coef[87] + (work[141] + coef[80] * work[30]);
-    const double t43 = work[29] * (work[116] + (work[71] + work[141])) + (work[27] * (t23 + (coef[12] + G1 * coef[85])) + work[142]) + P1 * (work[143] + t41 + P1 * (work[115] + work[144]));
-    work[11] = G3 * (work[54] * (work[126] + work[97]) + P1 * (t11 + P1 * (work[131] + P1 * work[132]))) + P3 * (t26 + P1 * (work[87] + P1 * t43));
-    work[95] = work[11] * work[11];
+    const double t9 = work[29] * (work[116] + (work[71] + work[141]))
+        + (work[27] * (t4 + (coef[12] + G1 * coef[85])) + work[142]) + P1 * (work[143] + t8 + P1
+        * (work[115] + work[144]));
+    work[11] = G3 * (work[54] * (work[126] + work[97]) + P1 * (t3 + P1 * (work[131] + P1 * work[132]))) + P3
+        * (t6 + P1 * (work[87] + P1 * t9));
     work[40] = coef[8] * work[57];
-    const double t46 = work[40] + coef[9] * work[77];
+    const double t10 = work[40] + coef[9] * work[77];
     work[45] = coef[10] + G1 * coef[11];
     work[42] = coef[2] * work[29];
     work[72] = G1 * G1;
@@ -430,32 +372,33 @@ kowalevski_top_APART static void kowalevski_top_linearise_part1(const double coe
     work[60] = G1 * work[39];
     work[61] = coef[21] + G1 * coef[23];
     work[62] = coef[32] * work[29];
-    const double t57 = work[54] * (t46 + G1 * (work[45] + work[42])) + P1 * (work[56] + work[57] * (work[58] + (work[59] + coef[43] * work[30])) + G2 * (coef[41] * work[60] + G2 * (work[61] + (coef[44] * work[30] + work[62]))));
+    const double t11 = work[54] * (t10 + G1 * (work[45] + work[42])) + P1 * (work[56] + work[57]
+        * (work[58] + (work[59] + coef[43] * work[30])) + G2 * (coef[41] * work[60] + G2
+        * (work[61] + (coef[44] * work[30] + work[62]))));
     work[32] = coef[30] * work[54];
     work[88] = G1 * coef[39];
     work[33] = coef[38] + work[88] + (coef[42] * work[29] + coef[46] * work[30]);
-    work[86] = G3 * (t11 + P1 * (work[32] + P1 * work[33]));
-    const double t62 = coef[5] + G1 * coef[6] + coef[7] * work[27];
+    work[86] = G3 * (t3 + P1 * (work[32] + P1 * work[33]));
+    const double t12 = coef[5] + G1 * coef[6] + coef[7] * work[27];
     work[47] = coef[12] + G1 * coef[13];
     work[48] = coef[17] * work[29];
     work[46] = coef[14] * work[27];
-    const double t66 = work[115] + work[141];
-    const double t67 = coef[29] * work[27];
-    work[55] = work[29] * (work[116] + t66) + (work[27] * (t67 + (coef[28] + G1 * coef[14])) + work[142]);
-    const double t69 = coef[36] * work[54];
+    const double t13 = work[115] + work[141], t14 = coef[29] * work[27];
+    work[55] = work[29] * (work[116] + t13) + (work[27] * (t14 + (coef[28] + G1 * coef[14])) + work[142]);
+    const double t15 = coef[36] * work[54];
     work[85] = coef[45] * work[29];
     work[117] = coef[37] * work[30];
-    const double t72 = work[85] + work[117];
-    const double t73 = work[26] * t62 + P2 * (coef[16] * work[103] + G2 * (work[47] + (work[48] + work[46]))) + P1 * (work[55] + P1 * (t69 + t41 + P1 * (work[115] + (coef[34] + G1 * coef[17] + t72))));
-    work[20] = t57 + P3 * (work[86] + P3 * t73);
-    work[96] = work[20] * work[20];
+    const double t16 = work[85] + work[117];
+    const double t17 = work[26] * t12 + P2 * (coef[16] * work[103] + G2 * (work[47] + (work[48] + work[46])))
+        + P1 * (work[55] + P1 * (t15 + t8 + P1 * (work[115] + (coef[34] + G1 * coef[17] + t16))));
+    work[20] = t11 + P3 * (work[86] + P3 * t17);
     work[98] = coef[48] * work[27];
     work[102] = work[26] * (work[97] + work[98]);
     work[105] = coef[65] * work[30];
     work[43] = G3 * P1;
     work[106] = coef[64] * work[43];
     work[82] = coef[17] * work[30];
-    const double t81 = coef[58] * work[29];
+    const double t18 = coef[58] * work[29];
     work[121] = coef[32] * work[30];
     work[111] = coef[12] + work[121];
     work[112] = coef[49] + coef[31] * work[30];
@@ -471,35 +414,35 @@ kowalevski_top_APART static void kowalevski_top_linearise_part1(const double coe
     work[69] = coef[63] * work[29];
     work[101] = work[68] + (work[118] + work[69]);
     work[124] = G3 * (work[100] + P1 * work[101]);
-    const double t97 = G1 * coef[50];
-    work[113] = work[27] * (t67 + (coef[28] + G1 * coef[56])) + work[140];
+    const double t19 = G1 * coef[50];
+    work[113] = work[27] * (t14 + (coef[28] + G1 * coef[56])) + work[140];
     work[114] = coef[62] * work[26];
-    work[70] = work[114] + t69;
-    const double t101 = work[77] * (t81 + work[111]) + (coef[19] + work[57] * (work[48] + work[112])) + G1 * (G1 * (work[109] + (work[110] + work[104])) + work[119]) + P3 * (work[124] + P3 * (work[29] * (coef[34] + t97 + t66) + work[113] + P1 * (work[70] + P1 * (work[115] + (work[116] + t72)))));
-    work[13] = G2 * (work[102] + P1 * (t46 + G1 * (work[105] + work[45]) + P3 * (work[106] + P3 * (work[47] + (work[82] + work[46]))))) + P2 * t101;
-    work[94] = work[13] * work[13];
-    work[125] = work[96] + work[94];
-    work[6] = work[95] + work[125];
-    work[14] = kowalevski_top_phi0(work[6]);
+    work[70] = work[114] + t15;
+    const double t20 = work[77] * (t18 + work[111]) + (coef[19] + work[57] * (work[48] + work[112])) + G1
+        * (G1 * (work[109] + (work[110] + work[104])) + work[119]) + P3 * (work[124] + P3
+        * (work[29] * (coef[34] + t19 + t13) + work[113] + P1 * (work[70] + P1
+        * (work[115] + (work[116] + t16)))));
+    work[13] = G2 * (work[102] + P1 * (t10 + G1 * (work[105] + work[45]) + P3 * (work[106] + P3
+        * (work[47] + (work[82] + work[46]))))) + P2 * t20;
     work[183] = coef[87] * work[29];
-    work[182] = coef[49] + t97;
-    const double t108 = G1 * coef[90];
-    work[185] = G1 * (coef[38] + t108);
+    work[182] = coef[49] + t19;
+    const double t21 = G1 * coef[90];
+    work[185] = G1 * (coef[38] + t21);
     work[186] = coef[114] + coef[108] * work[77];
     work[28] = coef[118] * work[54];
     work[187] = work[58] + (work[59] + coef[119] * work[30]);
     work[184] = coef[49] + G1 * coef[68] + coef[116] * work[27];
-    const double t114 = coef[16] * work[27];
-    work[130] = t7 + (coef[117] * work[57] + t10);
-    work[31] = work[29] * (work[127] + (t114 + work[128])) + (work[27] * t62 + work[130]);
-    const double t117 = work[26] * work[184] + P2 * (coef[53] * work[103] + G2 * (work[97] + (work[126] + work[98]))) + P1 * (work[31] + P1 * (coef[25] * work[26] + work[131] + P1 * (t114 + work[132])));
-    work[8] = G3 * (work[29] * (work[183] + work[182]) + (work[185] + (coef[115] * work[57] + work[186])) + P1 * (work[28] + P1 * work[187])) + P3 * t117;
-    work[63] = G3 * work[20];
-    work[34] = G1 * work[11];
-    work[24] = work[63] - work[34];
+    const double t22 = coef[16] * work[27];
+    work[130] = t1 + (coef[117] * work[57] + t2);
+    work[31] = work[29] * (work[127] + (t22 + work[128])) + (work[27] * t12 + work[130]);
+    const double t23 = work[26] * work[184] + P2 * (coef[53] * work[103] + G2
+        * (work[97] + (work[126] + work[98]))) + P1 * (work[31] + P1 * (coef[25] * work[26] + work[131] + P1
+        * (t22 + work[132])));
+    work[8] = G3 * (work[29] * (work[183] + work[182]) + (work[185] + (coef[115] * work[57] + work[186])) + P1
+        * (work[28] + P1 * work[187])) + P3 * t23;
     work[173] = work[27] * (coef[111] * work[27] + (coef[67] + G1 * coef[69]));
-    const double t122 = G1 * coef[91];
-    work[174] = G1 * (coef[110] + t122);
+    const double t24 = G1 * coef[91];
+    work[174] = G1 * (coef[110] + t24);
     work[175] = coef[108] * work[57];
     work[44] = coef[113] * work[26];
     work[176] = coef[26] * work[27];
@@ -507,24 +450,41 @@ kowalevski_top_APART static void kowalevski_top_linearise_part1(const double coe
     work[172] = coef[12] + G1 * coef[51] + (coef[112] * work[29] + coef[54] * work[27]);
     work[41] = G2 * coef[90];
     work[145] = work[105] + work[42];
-    const double t131 = P1 * (work[40] + G2 * (work[41] + coef[32] * work[39]) + G1 * (work[45] + work[145]) + P3 * (work[106] + P3 * (work[46] + (work[47] + (work[48] + work[82])))));
-    work[0] = G2 * (work[173] + (work[174] + (work[175] + (coef[107] + coef[109] * work[77]))) + P1 * (work[44] + P1 * (work[61] + (work[176] + work[49])))) + P2 * (work[102] + P2 * (coef[77] * work[103] + G2 * work[172]) + t131);
-    work[51] = G1 * work[13];
-    work[50] = G2 * work[20];
-    work[25] = work[51] - work[50];
+    const double t25 = P1 * (work[40] + G2 * (work[41] + coef[32] * work[39]) + G1 * (work[45] + work[145])
+        + P3 * (work[106] + P3 * (work[46] + (work[47] + (work[48] + work[82])))));
+    work[0] = G2 * (work[173] + (work[174] + (work[175] + (coef[107] + coef[109] * work[77]))) + P1
+        * (work[44] + P1 * (work[61] + (work[176] + work[49])))) + P2 * (work[102] + P2
+        * (coef[77] * work[103] + G2 * work[172]) + t25);
     work[148] = G2 * P1;
     work[78] = coef[10] + G1 * coef[102];
-    work[149] = work[110] + t81;
-    const double t138 = work[148] * (work[105] + work[78]) + P2 * (coef[79] * work[57] + G2 * (G2 * coef[96] + coef[2] * work[39]) + G1 * (coef[12] + G1 * coef[97] + work[149]));
+    work[149] = work[110] + t18;
+    const double t26 = work[148] * (work[105] + work[78]) + P2 * (coef[79] * work[57] + G2 * (G2 * coef[96]
+        + coef[2] * work[39]) + G1 * (coef[12] + G1 * coef[97] + work[149]));
     work[146] = coef[47] * work[54];
     work[79] = coef[3] + G1 * coef[101];
     work[80] = coef[15] * work[29];
     work[147] = work[79] + (work[80] + coef[59] * work[30]);
     work[134] = G3 * (work[146] + P1 * work[147]);
     work[150] = coef[95] * work[27];
-    const double t145 = coef[93] * work[77] + coef[92] * work[57] + G1 * (work[150] + (coef[21] + G1 * coef[94])) + work[29] * (coef[98] + t24 + (coef[99] * work[27] + coef[100] * work[29]));
+    const double t27 = coef[93] * work[77] + coef[92] * work[57] + G1 * (work[150] + (coef[21] + G1
+        * coef[94])) + work[29] * (coef[98] + t5 + (coef[99] * work[27] + coef[100] * work[29]));
     work[81] = coef[13] * work[54] + coef[6] * work[26];
-    work[2] = work[77] * (coef[89] + t122 + coef[104] * work[30]) + (coef[66] + work[57] * (coef[103] * work[30] + (coef[88] + t108))) + P2 * t138 + P3 * (work[134] + P3 * (t145 + P1 * (work[81] + P1 * (coef[105] * work[27] + (coef[28] + t38 + (coef[97] * work[29] + coef[106] * work[30]))))));
+    work[2] = work[77] * (coef[89] + t24 + coef[104] * work[30]) + (coef[66] + work[57]
+        * (coef[103] * work[30] + (coef[88] + t21))) + P2 * t26 + P3 * (work[134] + P3
+        * (t27 + P1 * (work[81] + P1 * (coef[105] * work[27] + (coef[28] + t7 + (coef[97] * work[29]
+        + coef[106] * work[30]))))));
+    work[95] = work[11] * work[11];
+    work[96] = work[20] * work[20];
+    work[94] = work[13] * work[13];
+    work[125] = work[96] + work[94];
+    work[6] = work[95] + work[125];
+    work[14] = kowalevski_top_phi0(work[6]);
+    work[63] = G3 * work[20];
+    work[34] = G1 * work[11];
+    work[24] = work[63] - work[34];
+    work[51] = G1 * work[13];
+    work[50] = G2 * work[20];
+    work[25] = work[51] - work[50];
     work[64] = G3 * work[2];
     work[90] = G1 * work[8];
     work[65] = P3 * work[20];
@@ -578,203 +538,221 @@ kowalevski_top_APART static void kowalevski_top_linearise_part1(const double coe
 /* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
    increment, all with the momenta p = grad S_h(y) (part 2 of 3) */
 kowalevski_top_APART static void kowalevski_top_linearise_part2(const double coef[172], const double y[6],
-                                                                double displacement[restrict 6],
-                                                                double increment[restrict 6],
-                                                                double jacobian[restrict 36],
-                                                                double increment_jacobian[restrict 36],
-                                                                double work[restrict 274])
+    double displacement[restrict 6], double increment[restrict 6], double jacobian[restrict 36],
+    double increment_jacobian[restrict 36], double work[restrict 274])
 {
     (void)increment;
-    const double P1 = y[0];
-    const double P2 = y[1];
-    const double P3 = y[2];
-    const double G1 = y[3];
-    const double G2 = y[4];
-    const double G3 = y[5];
+    const double P1 = y[0], P2 = y[1], P3 = y[2], G1 = y[3], G2 = y[4], G3 = y[5];
     work[233] = work[0] * work[1] - work[2] * work[3] + (work[4] - work[5]);
-    const double t190 = work[6] * work[7] + (work[8] * work[9] - work[0] * work[10] + (work[11] * work[12] - work[13] * work[233]));
+    const double t1 = work[6] * work[7] + (work[8] * work[9] - work[0] * work[10] + (work[11] * work[12]
+        - work[13] * work[233]));
     work[206] = work[11] * work[3];
     work[205] = work[13] * work[17];
     work[247] = work[206] - work[205];
     work[215] = work[11] * work[18];
     work[260] = work[13] * work[19];
     work[218] = work[8] * work[3] - work[0] * work[17] + (work[215] - work[260]);
-    work[220] = work[6] * work[18] + (work[2] * work[10] - work[8] * work[247] + (work[20] * work[233] - work[11] * work[218]));
-    work[255] = work[6] * work[19] + (work[0] * work[247] - work[2] * work[9] + (work[13] * work[218] - work[20] * work[12]));
+    work[220] = work[6] * work[18] + (work[2] * work[10] - work[8] * work[247] + (work[20] * work[233]
+        - work[11] * work[218]));
+    work[255] = work[6] * work[19] + (work[0] * work[247] - work[2] * work[9] + (work[13] * work[218]
+        - work[20] * work[12]));
     work[264] = work[6] * work[1] + (work[11] * work[9] - work[13] * work[10]);
     work[272] = work[6] * work[3] + (work[20] * work[10] - work[11] * work[247]);
     work[273] = work[6] * work[17] + (work[13] * work[247] - work[20] * work[9]);
-    const double t202 = coef[135] * work[26];
-    const double t203 = coef[40] * work[27];
-    work[190] = G3 * (work[28] + P1 * (coef[141] + G1 * coef[142] + (coef[130] * work[29] + coef[143] * work[30]))) + P3 * (work[31] + P1 * (t202 + work[32] + P1 * (t203 + work[33])));
-    const double t205 = work[24] - work[34];
-    work[263] = t205 * work[14];
-    work[265] = t205 * work[6];
-    const double t208 = G2 * work[13];
-    const double t209 = G1 * work[20];
-    work[203] = t208 + t209;
-    const double t211 = work[20] * work[203];
-    const double t212 = work[11] * t205;
-    work[246] = work[35] - work[36] + (t211 - t212);
-    const double t214 = work[13] * t205;
+    const double t2 = coef[135] * work[26], t3 = coef[40] * work[27];
+    work[190] = G3 * (work[28] + P1 * (coef[141] + G1 * coef[142] + (coef[130] * work[29] + coef[143]
+        * work[30]))) + P3 * (work[31] + P1 * (t2 + work[32] + P1 * (t3 + work[33])));
+    const double t4 = work[24] - work[34];
+    work[263] = t4 * work[14];
+    work[265] = t4 * work[6];
+    const double t5 = G2 * work[13], t6 = G1 * work[20];
+    work[203] = t5 + t6;
+    const double t7 = work[20] * work[203], t8 = work[11] * t4;
+    work[246] = work[35] - work[36] + (t7 - t8);
+    const double t9 = work[13] * t4;
     work[204] = work[37] - work[38] - work[38];
-    work[207] = t214 - work[20] * work[204];
+    work[207] = t9 - work[20] * work[204];
     work[249] = 0.5 * G2;
-    work[157] = work[263] - work[15] * (work[265] + (work[9] + (work[11] * work[246] - work[13] * work[207]))) - work[249];
-    const double t219 = coef[131] * work[39];
-    const double t220 = work[40] + G2 * (work[41] + t219);
-    const double t221 = coef[41] * work[30];
-    const double t222 = t221 + work[42];
-    const double t223 = coef[30] * work[43];
-    work[179] = G2 * (work[44] + P1 * (coef[67] + G1 * coef[140] + (coef[138] * work[30] + coef[136] * work[27]))) + P2 * (t220 + G1 * (work[45] + t222) + P3 * (t223 + P3 * (work[46] + (work[47] + (work[48] + work[49])))));
+    work[157] = work[263] - work[15] * (work[265] + (work[9] + (work[11] * work[246] - work[13] * work[207])))
+        - work[249];
+    const double t10 = coef[131] * work[39], t11 = work[40] + G2 * (work[41] + t10);
+    const double t12 = coef[41] * work[30], t13 = t12 + work[42], t14 = coef[30] * work[43];
+    work[179] = G2 * (work[44] + P1 * (coef[67] + G1 * coef[140] + (coef[138] * work[30] + coef[136]
+        * work[27]))) + P2 * (t11 + G1 * (work[45] + t13) + P3
+        * (t14 + P3 * (work[46] + (work[47] + (work[48] + work[49])))));
     work[211] = 0.5 * G3;
-    const double t226 = work[50] - work[51] - work[51];
+    const double t15 = work[50] - work[51] - work[51];
     work[199] = work[23] - work[37];
-    const double t228 = work[20] * work[199];
-    work[248] = t228 - work[11] * t226;
-    const double t230 = G3 * work[11];
-    work[198] = t230 + t209;
-    const double t232 = work[20] * work[198];
-    work[202] = work[1] + (work[13] * t226 - t232);
-    work[155] = work[211] + (t226 * work[14] - work[15] * (work[6] * t226 + (work[52] - work[53] + (work[11] * work[248] - work[13] * work[202]))));
-    const double t235 = coef[122] * work[29];
-    const double t236 = coef[121] * work[26];
-    const double t237 = coef[44] * work[54];
-    const double t238 = t236 + t237;
-    const double t239 = coef[126] * work[27];
-    const double t240 = coef[127] * work[29];
-    const double t241 = G3 * (work[32] + P1 * (coef[89] + G1 * coef[120] + (t235 + coef[128] * work[30]))) + P3 * (work[55] + P1 * (t238 + P1 * (t239 + (coef[125] + G1 * coef[36] + (t240 + coef[129] * work[30])))));
-    work[239] = work[56] + work[57] * (work[58] + (work[59] + coef[123] * work[30])) + G2 * (coef[115] * work[60] + G2 * (work[61] + (coef[124] * work[30] + work[62]))) + P3 * t241;
-    const double t243 = G3 * work[8];
-    const double t244 = G2 * work[0];
-    const double t245 = P3 * work[11];
-    const double t246 = P2 * work[13];
-    const double t247 = t243 + t244 + (t245 + t246);
+    const double t16 = work[20] * work[199];
+    work[248] = t16 - work[11] * t15;
+    const double t17 = G3 * work[11];
+    work[198] = t17 + t6;
+    const double t18 = work[20] * work[198];
+    work[202] = work[1] + (work[13] * t15 - t18);
+    work[155] = work[211] + (t15 * work[14] - work[15] * (work[6] * t15 + (work[52] - work[53]
+        + (work[11] * work[248] - work[13] * work[202]))));
+    const double t19 = coef[122] * work[29], t20 = coef[121] * work[26], t21 = coef[44] * work[54];
+    const double t22 = t20 + t21, t23 = coef[126] * work[27], t24 = coef[127] * work[29];
+    const double t25 = G3 * (work[32] + P1 * (coef[89] + G1 * coef[120] + (t19 + coef[128] * work[30]))) + P3
+        * (work[55] + P1 * (t22 + P1 * (t23 + (coef[125] + G1 * coef[36] + (t24 + coef[129] * work[30])))));
+    work[239] = work[56] + work[57] * (work[58] + (work[59] + coef[123] * work[30])) + G2
+        * (coef[115] * work[60] + G2 * (work[61] + (coef[124] * work[30] + work[62]))) + P3 * t25;
+    const double t26 = G3 * work[8], t27 = G2 * work[0], t28 = P3 * work[11], t29 = P2 * work[13];
+    const double t30 = t26 + t27 + (t28 + t29);
     work[235] = work[20] * work[15];
     work[228] = work[63] + work[24];
-    const double t250 = t230 + t208;
-    const double t251 = work[11] * t250;
-    work[257] = work[17] - work[20] * work[228] - t251;
-    const double t253 = work[13] * t250;
+    const double t31 = t17 + t5, t32 = work[11] * t31;
+    work[257] = work[17] - work[20] * work[228] - t32;
+    const double t33 = work[13] * t31;
     work[208] = work[25] - work[50];
-    const double t255 = work[20] * work[208];
-    work[232] = t253 - (t255 + work[3]);
+    const double t34 = work[20] * work[208];
+    work[232] = t33 - (t34 + work[3]);
     work[229] = work[64] + (work[65] + work[21]);
-    work[258] = work[19] - work[20] * work[229] - work[11] * t247 - (work[8] * t250 + work[2] * work[228]);
+    work[258] = work[19] - work[20] * work[229] - work[11] * t30 - (work[8] * t31 + work[2] * work[228]);
     work[230] = work[22] - work[66] - work[67];
-    work[234] = work[0] * t250 - work[2] * work[208] + (work[13] * t247 - (work[20] * work[230] + work[18]));
-    const double t261 = kowalevski_top_phi2(work[6]);
-    work[231] = work[20] * t261;
-    const double t263 = work[15] * (t247 * work[6] + 2.0 * (work[20] * work[7]) + (work[8] * work[257] - work[0] * work[232] + (work[11] * work[258] - work[13] * work[234]))) + 2.0 * (work[231] * t190);
-    work[159] = t247 * work[14] + 2.0 * (work[235] * work[7]) - t263;
-    const double t265 = coef[1] * work[29];
-    const double t266 = coef[132] + G1 * coef[65];
-    const double t267 = coef[133] * work[29];
-    const double t268 = G2 * (t223 + P3 * (work[47] + (work[49] + work[46]))) + P2 * (G3 * (work[68] + (coef[122] * work[30] + work[69])) + P3 * (work[70] + P1 * (work[71] + (t266 + (t267 + coef[133] * work[30])))));
-    work[238] = work[39] * (coef[130] * work[57] + coef[32] * work[72]) + G2 * (G1 * (work[45] + (t221 + t265)) + (work[40] + G2 * (G2 * coef[9] + t219))) + P3 * t268;
+    work[234] = work[0] * t31 - work[2] * work[208] + (work[13] * t30 - (work[20] * work[230] + work[18]));
+    const double t35 = kowalevski_top_phi2(work[6]);
+    work[231] = work[20] * t35;
+    const double t36 = work[15] * (t30 * work[6] + 2.0 * (work[20] * work[7]) + (work[8] * work[257] - work[0]
+        * work[232] + (work[11] * work[258] - work[13] * work[234]))) + 2.0 * (work[231] * t1);
+    work[159] = t30 * work[14] + 2.0 * (work[235] * work[7]) - t36;
+    const double t37 = coef[1] * work[29], t38 = coef[132] + G1 * coef[65];
+    const double t39 = coef[133] * work[29];
+    const double t40 = G2 * (t14 + P3 * (work[47] + (work[49] + work[46]))) + P2
+        * (G3 * (work[68] + (coef[122] * work[30] + work[69])) + P3 * (work[70] + P1
+        * (work[71] + (t38 + (t39 + coef[133] * work[30])))));
+    work[238] = work[39] * (coef[130] * work[57] + coef[32] * work[72]) + G2 * (G1 * (work[45] + (t12 + t37))
+        + (work[40] + G2 * (G2 * coef[9] + t10))) + P3 * t40;
     work[236] = 0.5 * P3;
     work[227] = work[13] * work[15];
-    const double t272 = work[73] + (work[74] + work[22]);
+    const double t41 = work[73] + (work[74] + work[22]);
     work[268] = work[51] + work[25];
-    work[261] = work[11] * work[268] + t228;
-    work[224] = work[1] - work[13] * work[268] - t232;
+    work[261] = work[11] * work[268] + t16;
+    work[224] = work[1] - work[13] * work[268] - t18;
     work[223] = work[16] - work[75] - work[76];
-    work[262] = work[8] * work[268] + work[2] * work[199] + (work[20] * work[223] + work[11] * t272);
-    const double t278 = G1 * work[2];
-    const double t279 = P1 * work[20];
-    work[222] = t243 + t278 + (t279 + t245);
-    work[225] = work[7] - work[13] * t272 - work[20] * work[222] - (work[2] * work[198] + work[0] * work[268]);
-    work[226] = work[13] * t261;
-    const double t283 = work[15] * (2.0 * work[4] - work[6] * t272 + (work[8] * work[261] - work[0] * work[224] + (work[11] * work[262] - (work[233] + work[13] * work[225])))) + 2.0 * (work[226] * t190);
-    work[161] = work[236] + (2.0 * (work[227] * work[7]) - work[14] * t272 - t283);
-    const double t285 = coef[39] * work[30];
-    const double t286 = G1 * coef[53];
-    const double t287 = coef[12] + t286;
-    const double t288 = coef[35] * work[29];
-    work[158] = P1 * (coef[22] * work[57] + coef[23] * work[77]) + P2 * (coef[32] * work[60] + G2 * (work[78] + t222)) + P3 * (G3 * (work[79] + (work[80] + t285)) + P3 * (work[81] + P1 * (work[46] + (t287 + (t288 + work[82])))));
-    work[266] = t250 * work[14];
-    work[267] = t250 * work[6];
+    work[262] = work[8] * work[268] + work[2] * work[199] + (work[20] * work[223] + work[11] * t41);
+    const double t42 = G1 * work[2], t43 = P1 * work[20];
+    work[222] = t26 + t42 + (t43 + t28);
+    work[225] = work[7] - work[13] * t41 - work[20] * work[222] - (work[2] * work[198] + work[0] * work[268]);
+    work[226] = work[13] * t35;
+    const double t44 = work[15] * (2.0 * work[4] - work[6] * t41 + (work[8] * work[261] - work[0] * work[224]
+        + (work[11] * work[262] - (work[233] + work[13] * work[225])))) + 2.0 * (work[226] * t1);
+    work[161] = work[236] + (2.0 * (work[227] * work[7]) - work[14] * t41 - t44);
+    const double t45 = coef[39] * work[30], t46 = G1 * coef[53], t47 = coef[12] + t46;
+    const double t48 = coef[35] * work[29];
+    work[158] = P1 * (coef[22] * work[57] + coef[23] * work[77]) + P2 * (coef[32] * work[60] + G2
+        * (work[78] + t13)) + P3 * (G3 * (work[79] + (work[80] + t45)) + P3 * (work[81] + P1
+        * (work[46] + (t47 + (t48 + work[82])))));
+    work[266] = t31 * work[14];
+    work[267] = t31 * work[6];
     work[209] = work[34] - work[63] - work[63];
-    work[252] = work[17] + (work[20] * work[209] - t251);
-    work[210] = work[83] - work[84] + (t253 - t255);
+    work[252] = work[17] + (work[20] * work[209] - t32);
+    work[210] = work[83] - work[84] + (t33 - t34);
     work[163] = work[266] - work[15] * (work[267] + (work[11] * work[252] - work[13] * work[210]));
-    const double t296 = coef[138] * work[27];
-    const double t297 = work[85] + t296;
-    const double t298 = coef[137] * work[27];
-    const double t299 = work[29] * (t266 + t297) + (work[27] * (t298 + (coef[49] + G1 * coef[84])) + (G1 * (coef[49] + t286) + (coef[135] * work[57] + (coef[134] + coef[136] * work[77]))));
-    const double t300 = t267 + coef[45] * work[30];
-    work[237] = work[86] + P3 * (work[87] + P1 * (t299 + P1 * (t237 + coef[139] * work[26] + P1 * (t296 + (coef[132] + work[88] + t300)))));
-    const double t302 = work[21] - work[89] - work[90];
+    const double t49 = coef[138] * work[27], t50 = work[85] + t49, t51 = coef[137] * work[27];
+    const double t52 = work[29] * (t38 + t50) + (work[27] * (t51 + (coef[49] + G1 * coef[84]))
+        + (G1 * (coef[49] + t46) + (coef[135] * work[57] + (coef[134] + coef[136] * work[77]))));
+    const double t53 = t39 + coef[45] * work[30];
+    work[237] = work[86] + P3 * (work[87] + P1 * (t52 + P1 * (t21 + coef[139] * work[26] + P1
+        * (t49 + (coef[132] + work[88] + t53)))));
+    const double t54 = work[21] - work[89] - work[90];
     work[221] = work[11] * work[15];
-    work[219] = work[11] * t261;
-    work[253] = t211 - (work[1] + t212);
+    work[219] = work[11] * t35;
+    work[253] = t7 - (work[1] + t8);
     work[212] = work[38] + work[23];
-    work[216] = t214 + work[20] * work[212];
-    work[214] = t278 + t244 + (t279 + t246);
-    work[254] = work[2] * work[203] - work[8] * t205 + (work[20] * work[214] - (work[11] * t302 + work[7]));
+    work[216] = t9 + work[20] * work[212];
+    work[214] = t42 + t27 + (t43 + t29);
+    work[254] = work[2] * work[203] - work[8] * t4 + (work[20] * work[214] - (work[11] * t54 + work[7]));
     work[213] = work[91] + (work[92] + work[16]);
-    work[217] = work[0] * t205 + work[2] * work[212] + (work[20] * work[213] + work[13] * t302);
-    const double t312 = 2.0 * (work[219] * t190) + work[15] * (work[6] * t302 + 2.0 * work[93] + (work[8] * work[253] - work[0] * work[216] + (work[12] + work[11] * work[254] - work[13] * work[217])));
+    work[217] = work[0] * t4 + work[2] * work[212] + (work[20] * work[213] + work[13] * t54);
+    const double t55 = 2.0 * (work[219] * t1) + work[15] * (work[6] * t54 + 2.0 * work[93]
+        + (work[8] * work[253] - work[0] * work[216] + (work[12] + work[11] * work[254] - work[13]
+        * work[217])));
     work[259] = 0.5 * P2;
-    work[165] = work[14] * t302 + 2.0 * (work[221] * work[7]) - t312 - work[259];
+    work[165] = work[14] * t54 + 2.0 * (work[221] * work[7]) - t55 - work[259];
     work[152] = work[94] + work[95];
     work[153] = work[20] * work[13];
     work[166] = work[20] * work[153] + work[13] * work[152];
     work[151] = work[11] * work[20];
     work[167] = work[20] * work[151] + work[11] * work[152];
-    work[269] = work[152] * work[14] + work[15] * (work[13] * work[166] + work[11] * work[167] - work[152] * work[6]);
+    work[269] = work[152] * work[14] + work[15] * (work[13] * work[166] + work[11] * work[167] - work[152]
+        * work[6]);
     work[196] = work[153] * work[14];
     work[197] = work[153] * work[6];
     work[168] = work[11] * work[13];
-    const double t324 = work[20] * work[168];
+    const double t56 = work[20] * work[168];
     work[193] = work[11] * work[153];
-    work[180] = t324 - work[193];
+    work[180] = t56 - work[193];
     work[169] = work[96] + work[95];
     work[181] = work[13] * work[153] + work[20] * work[169];
     work[195] = 0.5 * work[11];
-    work[270] = work[196] - work[15] * (work[197] + (work[11] * work[180] - work[13] * work[181])) - work[195];
+    work[270] = work[196] - work[15] * (work[197] + (work[11] * work[180] - work[13] * work[181]))
+        - work[195];
     work[170] = coef[118] * work[43];
-    const double t332 = coef[64] * work[30];
-    const double t333 = G1 * coef[41];
-    work[189] = G2 * (work[170] + P3 * (work[97] + (t332 + work[98]))) + P2 * (G3 * (coef[153] + t333 + (work[99] + coef[130] * work[30])) + P3 * (work[100] + coef[147] * work[26] + P1 * (coef[62] * work[27] + work[101])));
-    const double t335 = coef[36] * work[29];
-    work[178] = work[102] + P2 * (coef[57] * work[103] + G2 * (coef[49] + G1 * coef[152] + (coef[148] * work[27] + work[104]))) + P1 * (t220 + G1 * (work[45] + (work[105] + t265)) + P3 * (work[106] + P3 * (work[46] + (work[47] + (work[82] + t335)))));
-    const double t337 = G1 * (work[107] + G2 * (work[108] + coef[146] * work[39]) + G1 * (work[109] + (work[99] + work[110]))) + (work[77] * (work[48] + work[111]) + (coef[19] + work[57] * (t335 + work[112])));
-    const double t338 = work[29] * (coef[125] + G1 * coef[145] + (coef[129] * work[29] + t239)) + work[113] + P1 * (work[114] + t237 + P1 * (work[115] + (work[116] + (t240 + work[117]))));
-    work[240] = t337 + P3 * (G3 * (coef[144] * work[54] + P1 * (work[68] + (t235 + work[118]))) + P3 * t338);
-    const double t340 = coef[47] * work[26];
-    const double t341 = coef[13] * work[27];
-    const double t342 = G1 * coef[149];
-    const double t343 = coef[5] + t342;
-    const double t344 = coef[50] * work[29];
-    const double t345 = work[119] + G1 * (coef[49] + work[120] + (coef[151] * work[29] + work[121])) + P3 * (coef[61] * work[43] + P3 * (coef[56] * work[27] + (t343 + (t344 + coef[35] * work[30]))));
-    work[160] = G2 * (t340 + P1 * (work[78] + (work[105] + t341))) + P2 * t345;
-    const double t347 = coef[74] * work[27];
-    const double t348 = work[29] * (coef[132] + t333 + t297) + (work[27] * (t298 + (coef[49] + G1 * coef[150])) + (G1 * (coef[3] + t342) + (coef[147] * work[57] + (coef[134] + coef[148] * work[77]))));
-    work[241] = G2 * (G3 * (t347 + work[97]) + P1 * (work[106] + P3 * (work[122] + (work[123] + t285)))) + P2 * (work[124] + P3 * (t348 + P1 * (t238 + P1 * (t296 + (t266 + t300)))));
+    const double t57 = coef[64] * work[30], t58 = G1 * coef[41];
+    work[189] = G2 * (work[170] + P3 * (work[97] + (t57 + work[98]))) + P2
+        * (G3 * (coef[153] + t58 + (work[99] + coef[130] * work[30])) + P3 * (work[100] + coef[147] * work[26]
+        + P1 * (coef[62] * work[27] + work[101])));
+    const double t59 = coef[36] * work[29];
+    work[178] = work[102] + P2 * (coef[57] * work[103] + G2 * (coef[49] + G1 * coef[152]
+        + (coef[148] * work[27] + work[104]))) + P1 * (t11 + G1 * (work[45] + (work[105] + t37)) + P3
+        * (work[106] + P3 * (work[46] + (work[47] + (work[82] + t59)))));
+    const double t60 = G1 * (work[107] + G2 * (work[108] + coef[146] * work[39]) + G1
+        * (work[109] + (work[99] + work[110]))) + (work[77] * (work[48] + work[111]) + (coef[19] + work[57]
+        * (t59 + work[112])));
+    const double t61 = work[29] * (coef[125] + G1 * coef[145] + (coef[129] * work[29] + t23)) + work[113] + P1
+        * (work[114] + t21 + P1 * (work[115] + (work[116] + (t24 + work[117]))));
+    work[240] = t60 + P3 * (G3 * (coef[144] * work[54] + P1 * (work[68] + (t19 + work[118]))) + P3 * t61);
+    const double t62 = coef[47] * work[26], t63 = coef[13] * work[27], t64 = G1 * coef[149];
+    const double t65 = coef[5] + t64, t66 = coef[50] * work[29];
+    const double t67 = work[119] + G1 * (coef[49] + work[120] + (coef[151] * work[29] + work[121])) + P3
+        * (coef[61] * work[43] + P3 * (coef[56] * work[27] + (t65 + (t66 + coef[35] * work[30]))));
+    work[160] = G2 * (t62 + P1 * (work[78] + (work[105] + t63))) + P2 * t67;
+    const double t68 = coef[74] * work[27];
+    const double t69 = work[29] * (coef[132] + t58 + t50) + (work[27] * (t51 + (coef[49] + G1 * coef[150]))
+        + (G1 * (coef[3] + t64) + (coef[147] * work[57] + (coef[134] + coef[148] * work[77]))));
+    work[241] = G2 * (G3 * (t68 + work[97]) + P1 * (work[106] + P3 * (work[122] + (work[123] + t45)))) + P2
+        * (work[124] + P3 * (t69 + P1 * (t22 + P1 * (t49 + (t38 + t53)))));
     work[245] = 0.5 * work[13];
     work[243] = work[151] * work[14];
     work[244] = work[151] * work[6];
     work[194] = work[13] * work[151];
-    work[191] = work[194] - t324;
+    work[191] = work[194] - t56;
     work[192] = work[11] * work[151] + work[20] * work[125];
-    work[271] = work[245] + (work[243] - work[15] * (work[244] - (work[13] * work[191] + work[11] * work[192])));
-    const double t357 = coef[155] * work[27];
-    work[171] = work[97] + (work[126] + t332);
-    work[177] = G2 * (coef[113] * work[43] + P3 * (coef[164] + G1 * coef[109] + (t357 + coef[136] * work[30]))) + P2 * (G3 * work[171] + P3 * (coef[74] * work[26] + coef[148] * work[54] + P1 * (work[123] + (work[122] + (work[99] + t285)))));
-    work[188] = work[26] * (coef[52] * work[27] + (coef[153] + G1 * coef[165])) + P2 * (coef[147] * work[103] + G2 * (work[97] + (t347 + work[126]))) + P1 * (work[29] * (work[127] + (work[128] + t203)) + (work[27] * work[129] + work[130]) + P1 * (work[131] + t202 + P1 * (t203 + work[132])));
-    const double t361 = G1 * coef[162];
-    const double t362 = work[29] * (t343 + (coef[75] * work[27] + coef[79] * work[29])) + (work[133] + G1 * (coef[67] + t361 + coef[163] * work[27])) + P1 * (work[131] + coef[82] * work[26] + P1 * (coef[85] * work[27] + (t287 + (t288 + coef[87] * work[30]))));
-    work[164] = work[134] + P3 * t362;
-    const double t364 = coef[158] * work[27];
-    const double t365 = work[27] * (coef[154] * work[77] + coef[97] * work[57]) + work[135] + G1 * (work[133] + G1 * (t357 + work[136])) + P2 * (coef[156] * work[137] + P2 * (work[29] * (work[138] + (t239 + work[139])) + (work[27] * (coef[34] + G1 * coef[157] + t364) + work[140])));
-    const double t366 = work[29] * (work[116] + (coef[124] * work[27] + work[141])) + (work[27] * (coef[34] + G1 * coef[161] + t364) + work[142]) + P1 * (t236 + work[143] + P1 * (t239 + work[144]));
-    const double t367 = work[26] * (coef[88] + G1 * coef[159] + coef[92] * work[27]) + P2 * (coef[121] * work[103] + G2 * (work[122] + (work[99] + coef[160] * work[27]))) + P1 * t366;
-    work[242] = t365 + P1 * t367;
-    work[154] = G2 * (coef[110] + G1 * coef[166] + (coef[23] * work[30] + coef[69] * work[27])) + P2 * (coef[51] * work[54] + t340 + P1 * (t341 + (work[78] + work[145])));
-    work[156] = G3 * (coef[38] + G1 * coef[167] + (coef[22] * work[30] + t344)) + P3 * (coef[68] * work[26] + work[146] + P1 * (coef[6] * work[27] + work[147]));
-    work[162] = P2 * (coef[102] * work[148] + P2 * (coef[55] * work[27] + (coef[12] + work[120] + work[149]))) + (coef[90] * work[57] + coef[91] * work[77] + P3 * (coef[101] * work[43] + P3 * (coef[21] + t361 + (work[150] + coef[27] * work[30]))));
-    displacement[0] = work[14] * work[7] - work[15] * t190 - 0.5 * work[16];
+    work[271] = work[245] + (work[243] - work[15] * (work[244] - (work[13] * work[191] + work[11]
+        * work[192])));
+    const double t70 = coef[155] * work[27];
+    work[171] = work[97] + (work[126] + t57);
+    work[177] = G2 * (coef[113] * work[43] + P3 * (coef[164] + G1 * coef[109] + (t70 + coef[136] * work[30])))
+        + P2 * (G3 * work[171] + P3 * (coef[74] * work[26] + coef[148] * work[54] + P1
+        * (work[123] + (work[122] + (work[99] + t45)))));
+    work[188] = work[26] * (coef[52] * work[27] + (coef[153] + G1 * coef[165])) + P2 * (coef[147] * work[103]
+        + G2 * (work[97] + (t68 + work[126]))) + P1 * (work[29] * (work[127] + (work[128] + t3))
+        + (work[27] * work[129] + work[130]) + P1 * (work[131] + t2 + P1 * (t3 + work[132])));
+    const double t71 = G1 * coef[162];
+    const double t72 = work[29] * (t65 + (coef[75] * work[27] + coef[79] * work[29])) + (work[133] + G1
+        * (coef[67] + t71 + coef[163] * work[27])) + P1 * (work[131] + coef[82] * work[26] + P1
+        * (coef[85] * work[27] + (t47 + (t48 + coef[87] * work[30]))));
+    work[164] = work[134] + P3 * t72;
+    const double t73 = coef[158] * work[27];
+    const double t74 = work[27] * (coef[154] * work[77] + coef[97] * work[57]) + work[135] + G1
+        * (work[133] + G1 * (t70 + work[136])) + P2 * (coef[156] * work[137] + P2
+        * (work[29] * (work[138] + (t23 + work[139])) + (work[27] * (coef[34] + G1 * coef[157] + t73)
+        + work[140])));
+    const double t75 = work[29] * (work[116] + (coef[124] * work[27] + work[141]))
+        + (work[27] * (coef[34] + G1 * coef[161] + t73) + work[142]) + P1 * (t20 + work[143] + P1
+        * (t23 + work[144]));
+    const double t76 = work[26] * (coef[88] + G1 * coef[159] + coef[92] * work[27]) + P2
+        * (coef[121] * work[103] + G2 * (work[122] + (work[99] + coef[160] * work[27]))) + P1 * t75;
+    work[242] = t74 + P1 * t76;
+    work[154] = G2 * (coef[110] + G1 * coef[166] + (coef[23] * work[30] + coef[69] * work[27])) + P2
+        * (coef[51] * work[54] + t62 + P1 * (t63 + (work[78] + work[145])));
+    work[156] = G3 * (coef[38] + G1 * coef[167] + (coef[22] * work[30] + t66)) + P3 * (coef[68] * work[26]
+        + work[146] + P1 * (coef[6] * work[27] + work[147]));
+    work[162] = P2 * (coef[102] * work[148] + P2 * (coef[55] * work[27] + (coef[12] + work[120] + work[149])))
+        + (coef[90] * work[57] + coef[91] * work[77] + P3 * (coef[101] * work[43] + P3 * (coef[21] + t71
+        + (work[150] + coef[27] * work[30]))));
+    displacement[0] = work[14] * work[7] - work[15] * t1 - 0.5 * work[16];
     displacement[1] = work[14] * work[18] - work[15] * work[220] - 0.5 * work[21];
     displacement[2] = work[14] * work[19] - work[15] * work[255] - 0.5 * work[22];
     displacement[3] = work[1] * work[14] - work[15] * work[264] - 0.5 * work[23];
@@ -782,11 +760,14 @@ kowalevski_top_APART static void kowalevski_top_linearise_part2(const double coe
     displacement[5] = work[14] * work[17] - work[15] * work[273] - 0.5 * work[25];
     increment_jacobian[30] = G1 * work[238] - G2 * work[239];
     increment_jacobian[24] = G3 * work[239] - G1 * work[237];
-    jacobian[0] = 1.0 + (work[190] * work[157] + work[179] * work[155] + (work[239] * work[159] + work[238] * work[161] + (work[158] * work[163] + work[237] * work[165])) - work[269]);
+    jacobian[0] = 1.0 + (work[190] * work[157] + work[179] * work[155] + (work[239] * work[159] + work[238]
+        * work[161] + (work[158] * work[163] + work[237] * work[165])) - work[269]);
     increment_jacobian[31] = G1 * work[240] - G2 * work[238];
-    jacobian[1] = work[270] + (work[189] * work[157] + work[178] * work[155] + (work[238] * work[159] + work[240] * work[161] + (work[160] * work[163] + work[241] * work[165])));
+    jacobian[1] = work[270] + (work[189] * work[157] + work[178] * work[155] + (work[238] * work[159]
+        + work[240] * work[161] + (work[160] * work[163] + work[241] * work[165])));
     increment_jacobian[19] = G2 * work[241] - G3 * work[240];
-    jacobian[2] = work[271] + (work[177] * work[155] + work[188] * work[157] + (work[237] * work[159] + work[241] * work[161] + (work[164] * work[163] + work[242] * work[165])));
+    jacobian[2] = work[271] + (work[177] * work[155] + work[188] * work[157] + (work[237] * work[159]
+        + work[241] * work[161] + (work[164] * work[163] + work[242] * work[165])));
     increment_jacobian[20] = G2 * work[242] - G3 * work[241];
     increment_jacobian[26] = G3 * work[237] - G1 * work[242];
     increment_jacobian[9] = P3 * work[158] + (G3 * work[162] - P1 * work[164]) - G1 * work[156] - work[8];
@@ -796,225 +777,233 @@ kowalevski_top_APART static void kowalevski_top_linearise_part2(const double coe
 /* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
    increment, all with the momenta p = grad S_h(y) (part 3 of 3) */
 kowalevski_top_APART static void kowalevski_top_linearise_part3(const double coef[172], const double y[6],
-                                                                double displacement[restrict 6],
-                                                                double increment[restrict 6],
-                                                                double jacobian[restrict 36],
-                                                                double increment_jacobian[restrict 36],
-                                                                double work[restrict 274])
+    double displacement[restrict 6], double increment[restrict 6], double jacobian[restrict 36],
+    double increment_jacobian[restrict 36], double work[restrict 274])
 {
-    (void)displacement;
-    (void)increment;
-    const double P1 = y[0];
-    const double P2 = y[1];
-    const double P3 = y[2];
-    const double G1 = y[3];
-    const double G2 = y[4];
-    const double G3 = y[5];
-    const double t372 = work[8] * work[11];
-    const double t373 = work[0] * work[13];
-    const double t374 = t372 + t373;
-    const double t375 = t374 + t374;
-    const double t376 = work[8] * work[20] + work[2] * work[11];
-    const double t377 = work[2] * work[151] + work[8] * work[152] + (work[20] * t376 + work[11] * t375);
-    const double t378 = work[0] * work[20] + work[2] * work[13];
-    const double t379 = work[2] * work[153] + work[0] * work[152] + (work[20] * t378 + work[13] * t375);
-    const double t380 = work[154] * work[155] + work[156] * work[157] + (work[158] * work[159] + work[160] * work[161] + (work[162] * work[163] + work[164] * work[165])) - (t375 * work[14] + work[15] * (work[0] * work[166] + work[8] * work[167] + (work[11] * t377 + work[13] * t379) - t375 * work[6]));
-    const double t381 = t378 * work[14];
-    const double t382 = t378 * work[6];
-    const double t383 = work[2] * work[168];
-    const double t384 = work[8] * work[153];
-    const double t385 = work[8] * work[13] + work[0] * work[11];
-    const double t386 = work[20] * t385;
-    const double t387 = work[11] * t378;
-    const double t388 = t383 - t384 + (t386 - t387);
-    const double t389 = work[2] * work[20];
-    const double t390 = t389 + t372;
-    const double t391 = t390 + t390;
-    const double t392 = work[0] * work[153] + work[2] * work[169] + (work[13] * t378 + work[20] * t391);
-    const double t393 = 0.5 * work[8];
-    const double t394 = G2 * (G3 * coef[169] + coef[113] * (P1 * P3)) + P2 * (work[170] + P3 * (work[98] + work[171]));
-    const double t395 = work[29] * work[172] + (work[173] + (work[174] + (work[175] + (coef[107] + coef[168] * work[77])))) + P1 * (coef[167] * work[54] + work[44] + P1 * (work[176] + (work[61] + (work[49] + work[62]))));
-    const double t396 = t381 - work[15] * (t382 + (work[8] * work[180] - work[0] * work[181] + (work[11] * t388 - work[13] * t392))) - t393 + (t394 * work[157] + t395 * work[155] + (work[179] * work[159] + work[178] * work[161] + (work[154] * work[163] + work[177] * work[165])));
-    const double t397 = 0.5 * work[0];
-    const double t398 = t376 * work[14];
-    const double t399 = t376 * work[6];
-    const double t400 = work[0] * work[151];
-    const double t401 = work[13] * t376;
-    const double t402 = t400 - t383 + (t401 - t386);
-    const double t403 = t389 + t373;
-    const double t404 = t403 + t403;
-    const double t405 = work[8] * work[151] + work[2] * work[125] + (work[11] * t376 + work[20] * t404);
-    const double t406 = work[29] * (work[182] + (coef[53] * work[27] + work[183])) + (work[27] * work[184] + (work[185] + (coef[170] * work[57] + work[186]))) + P1 * (coef[171] * work[26] + work[28] + P1 * (coef[25] * work[27] + work[187]));
-    const double t407 = t397 + (t398 - work[15] * (t399 - (work[0] * work[191] + work[8] * work[192] + (work[13] * t402 + work[11] * t405)))) + (t406 * work[157] + t394 * work[155] + (work[190] * work[159] + work[189] * work[161] + (work[156] * work[163] + work[188] * work[165])));
-    const double t408 = work[193] - work[194];
-    const double t409 = work[195] + (work[196] - work[15] * (work[197] - (work[11] * t408 + work[20] * work[166])));
-    const double t410 = work[198] * work[14];
-    const double t411 = work[198] * work[6];
-    const double t412 = work[11] * work[198];
-    const double t413 = work[13] * work[199];
-    const double t414 = work[200] - work[201] + (t412 - t413);
-    const double t415 = t410 - work[15] * (t411 + (work[20] * work[202] - work[11] * t414));
-    const double t416 = 0.5 * G1;
-    const double t417 = work[13] * work[203];
-    const double t418 = work[3] + (work[11] * work[204] - t417);
-    const double t419 = t416 + (work[204] * work[14] - work[15] * (work[204] * work[6] + (work[205] - work[206] + (work[20] * work[207] - work[11] * t418))));
-    const double t420 = work[208] * work[14];
-    const double t421 = work[208] * work[6];
-    const double t422 = work[11] * work[208];
-    const double t423 = t422 - work[13] * work[209];
-    const double t424 = t420 - work[15] * (t421 + (work[10] + (work[20] * work[210] - work[11] * t423))) - work[211];
-    const double t425 = 0.5 * P1;
-    const double t426 = work[3] - work[11] * work[212] - t417;
-    const double t427 = work[18] - work[11] * work[213] - work[13] * work[214] - (work[0] * work[203] + work[8] * work[212]);
-    const double t428 = work[15] * (2.0 * work[215] - work[6] * work[213] + (work[2] * work[216] - work[8] * t426 + (work[20] * work[217] - (work[218] + work[11] * t427)))) + 2.0 * (work[219] * work[220]);
-    const double t429 = t425 + (2.0 * (work[221] * work[18]) - work[14] * work[213] - t428);
-    const double t430 = t412 - (t413 + work[17]);
-    const double t431 = work[8] * work[198] - work[0] * work[199] + (work[11] * work[222] - (work[13] * work[223] + work[19]));
-    const double t432 = work[15] * (work[222] * work[6] + 2.0 * (work[13] * work[18]) + (work[2] * work[224] - work[8] * t430 + (work[20] * work[225] - work[11] * t431))) + 2.0 * (work[226] * work[220]);
-    const double t433 = work[222] * work[14] + 2.0 * (work[227] * work[18]) - t432;
-    const double t434 = work[13] * work[228] + t422;
-    const double t435 = work[8] * work[208] + work[0] * work[228] + (work[13] * work[229] + work[11] * work[230]);
-    const double t436 = 2.0 * (work[231] * work[220]) + work[15] * (work[6] * work[230] + 2.0 * work[5] + (work[2] * work[232] - work[8] * t434 + (work[233] + work[20] * work[234] - work[11] * t435)));
-    const double t437 = work[14] * work[230] + 2.0 * (work[235] * work[18]) - t436 - work[236];
-    const double t438 = work[13] * work[168] + work[11] * work[169];
-    const double t439 = work[169] * work[14] + work[15] * (work[11] * t438 + work[20] * work[181] - work[169] * work[6]);
-    const double t440 = work[168] * work[14];
-    const double t441 = work[168] * work[6];
-    const double t442 = work[11] * work[168] + work[13] * work[125];
-    const double t443 = 0.5 * work[20];
-    const double t444 = t440 - work[15] * (t441 + (work[20] * work[191] - work[11] * t442)) - t443;
-    const double t445 = t384 - t400 + (t387 - t401);
-    const double t446 = t393 + (t381 - work[15] * (t382 - (work[8] * t408 + work[2] * work[166] + (work[11] * t445 + work[20] * t379)))) + (work[154] * t415 + work[156] * t419 + (work[160] * t433 + work[158] * t437 + (work[162] * t424 + work[164] * t429)));
-    const double t447 = work[0] * work[168] + work[8] * work[169] + (work[13] * t385 + work[11] * t391);
-    const double t448 = t395 * t415 + t394 * t419 + (work[154] * t424 + work[177] * t429 + (work[178] * t433 + work[179] * t437)) - (t391 * work[14] + work[15] * (work[8] * t438 + work[2] * work[181] + (work[20] * t392 + work[11] * t447) - t391 * work[6]));
-    const double t449 = t385 * work[14];
-    const double t450 = t385 * work[6];
-    const double t451 = work[8] * work[168] + work[0] * work[125] + (work[11] * t385 + work[13] * t404);
-    const double t452 = 0.5 * work[2];
-    const double t453 = t449 - work[15] * (t450 + (work[2] * work[191] - work[8] * t442 + (work[20] * t402 - work[11] * t451))) - t452 + (t394 * t415 + t406 * t419 + (work[156] * t424 + work[188] * t429 + (work[189] * t433 + work[190] * t437)));
-    const double t454 = work[243] - work[15] * (work[244] + (work[13] * t408 - work[20] * work[167])) - work[245];
-    const double t455 = work[203] * work[14];
-    const double t456 = work[203] * work[6];
-    const double t457 = t455 - work[15] * (t456 + (work[13] * t418 - work[20] * work[246]));
-    const double t458 = work[199] * work[14];
-    const double t459 = work[6] * work[199];
-    const double t460 = t458 - work[15] * (t459 + (work[247] + (work[13] * t414 - work[20] * work[248]))) - t416;
-    const double t461 = work[249] + (work[209] * work[14] - work[15] * (work[6] * work[209] + (work[250] - work[251] + (work[13] * t423 - work[20] * work[252]))));
-    const double t462 = work[15] * (work[6] * work[214] + 2.0 * (work[11] * work[19]) + (work[0] * t426 - work[2] * work[253] + (work[13] * t427 - work[20] * work[254]))) + 2.0 * (work[219] * work[255]);
-    const double t463 = work[214] * work[14] + 2.0 * (work[221] * work[19]) - t462;
-    const double t464 = work[15] * (2.0 * work[256] - work[6] * work[229] + (work[0] * t434 - work[2] * work[257] + (work[13] * t435 - (work[12] + work[20] * work[258])))) + 2.0 * (work[231] * work[255]);
-    const double t465 = work[259] + (2.0 * (work[235] * work[19]) - work[14] * work[229] - t464);
-    const double t466 = work[15] * (work[6] * work[223] + 2.0 * work[260] + (work[0] * t430 - work[2] * work[261] + (work[218] + work[13] * t431 - work[20] * work[262]))) + 2.0 * (work[226] * work[255]);
-    const double t467 = work[14] * work[223] + 2.0 * (work[227] * work[19]) - t466 - t425;
-    const double t468 = t443 + (t440 - work[15] * (t441 - (work[20] * work[180] + work[13] * t438)));
-    const double t469 = work[125] * work[14] + work[15] * (work[13] * t442 + work[20] * work[192] - work[125] * work[6]);
-    const double t470 = t398 - work[15] * (t399 + (work[0] * t408 - work[2] * work[167] + (work[13] * t445 - work[20] * t377))) - t397 + (work[156] * t457 + work[154] * t460 + (work[162] * t461 + work[164] * t463 + (work[160] * t467 + work[158] * t465)));
-    const double t471 = t452 + (t449 - work[15] * (t450 - (work[2] * work[180] + work[0] * t438 + (work[20] * t388 + work[13] * t447)))) + (t394 * t457 + t395 * t460 + (work[154] * t461 + work[177] * t463 + (work[179] * t465 + work[178] * t467)));
-    const double t472 = t406 * t457 + t394 * t460 + (work[156] * t461 + work[188] * t463 + (work[189] * t467 + work[190] * t465)) - (t404 * work[14] + work[15] * (work[0] * t442 + work[2] * work[192] + (work[13] * t451 + work[20] * t405) - t404 * work[6]));
-    const double t473 = work[263] + 2.0 * (work[1] * work[221]) - (2.0 * (work[219] * work[264]) + work[15] * (work[265] + 2.0 * work[250] + (work[9] + work[11] * work[253] - work[13] * work[216])));
-    const double t474 = t473 - work[249];
-    const double t475 = work[266] + 2.0 * (work[1] * work[235]) - (work[15] * (work[267] + 2.0 * (work[20] * work[1]) + (work[11] * work[257] - work[13] * work[232])) + 2.0 * (work[231] * work[264]));
-    const double t476 = 2.0 * (work[1] * work[227]) - work[268] * work[14] - (2.0 * (work[226] * work[264]) + work[15] * (2.0 * work[53] - work[268] * work[6] + (work[11] * work[261] - (work[10] + work[13] * work[224]))));
-    const double t477 = work[211] + t476;
-    const double t478 = 2.0 * (work[3] * work[221]) - work[212] * work[14] - (work[15] * (2.0 * work[206] - work[212] * work[6] + (work[20] * work[216] - (work[247] + work[11] * t426))) + 2.0 * (work[219] * work[272]));
-    const double t479 = t416 + t478;
-    const double t480 = t410 + 2.0 * (work[3] * work[227]) - (work[15] * (t411 + 2.0 * (work[13] * work[3]) + (work[20] * work[224] - work[11] * t430)) + 2.0 * (work[226] * work[272]));
-    const double t481 = t420 + 2.0 * (work[3] * work[235]) - (2.0 * (work[231] * work[272]) + work[15] * (t421 + 2.0 * work[52] + (work[10] + work[20] * work[232] - work[11] * t434)));
-    const double t482 = t481 - work[211];
-    const double t483 = t455 + 2.0 * (work[17] * work[221]) - (work[15] * (t456 + 2.0 * (work[11] * work[17]) + (work[13] * t426 - work[20] * work[253])) + 2.0 * (work[219] * work[273]));
-    const double t484 = 2.0 * (work[17] * work[235]) - work[228] * work[14] - (2.0 * (work[231] * work[273]) + work[15] * (2.0 * work[251] - work[228] * work[6] + (work[13] * t434 - (work[9] + work[20] * work[257]))));
-    const double t485 = work[249] + t484;
-    const double t486 = t458 + 2.0 * (work[17] * work[227]) - (work[15] * (t459 + 2.0 * work[205] + (work[247] + work[13] * t430 - work[20] * work[261])) + 2.0 * (work[226] * work[273]));
-    const double t487 = t486 - t416;
-    const double t488 = G2 * work[190];
-    const double t489 = G3 * work[179];
-    const double t490 = P2 * work[237];
-    const double t491 = P3 * work[238];
-    const double t492 = G3 * work[178];
-    const double t493 = G2 * work[188];
-    const double t494 = G2 * work[156];
-    const double t495 = G3 * work[154];
-    const double t496 = G3 * work[158];
-    const double t497 = G3 * work[160];
-    const double t498 = P1 * work[241];
-    const double t499 = G1 * work[189];
-    const double t500 = G1 * work[188];
-    const double t501 = G1 * t394;
-    const double t502 = G2 * work[158];
-    const double t503 = G1 * work[178];
-    const double t504 = G1 * work[177];
-    const double t505 = G2 * work[164];
-    const double t506 = G2 * work[237];
-    const double t507 = G3 * work[238];
-    const double t508 = G1 * work[241];
-    jacobian[3] = t380;
-    increment_jacobian[4] = work[8] + (G2 * t394 - G3 * t395 + (P2 * work[177] - P3 * work[178]));
-    increment_jacobian[16] = G1 * t395 + (P1 * work[178] - P2 * work[179] - G2 * work[154]) - work[2];
-    jacobian[4] = t396;
-    increment_jacobian[5] = G2 * t406 - G3 * t394 + (P2 * work[188] - P3 * work[189]) - work[0];
-    increment_jacobian[11] = work[2] + (P3 * work[190] + (G3 * work[156] - P1 * work[188]) - G1 * t406);
-    jacobian[5] = t407;
-    jacobian[6] = t409 + (work[179] * t415 + work[190] * t419 + (work[158] * t424 + work[237] * t429 + (work[238] * t433 + work[239] * t437)));
-    jacobian[7] = 1.0 + (work[178] * t415 + work[189] * t419 + (work[240] * t433 + work[238] * t437 + (work[160] * t424 + work[241] * t429)) - t439);
-    jacobian[8] = t444 + (work[177] * t415 + work[188] * t419 + (work[241] * t433 + work[237] * t437 + (work[164] * t424 + work[242] * t429)));
-    jacobian[9] = t446;
-    jacobian[10] = t448;
-    jacobian[11] = t453;
-    jacobian[12] = t454 + (work[190] * t457 + work[179] * t460 + (work[158] * t461 + work[237] * t463 + (work[239] * t465 + work[238] * t467)));
-    jacobian[13] = t468 + (work[189] * t457 + work[178] * t460 + (work[160] * t461 + work[241] * t463 + (work[238] * t465 + work[240] * t467)));
-    jacobian[14] = 1.0 + (work[188] * t457 + work[177] * t460 + (work[164] * t461 + work[242] * t463 + (work[241] * t467 + work[237] * t465)) - t469);
-    jacobian[15] = t470;
-    jacobian[16] = t471;
-    jacobian[17] = t472;
-    jacobian[18] = work[237] * t474 + (work[239] * t475 + work[238] * t477);
-    jacobian[19] = work[241] * t474 + (work[238] * t475 + work[240] * t477);
-    jacobian[20] = work[242] * t474 + (work[237] * t475 + work[241] * t477);
-    jacobian[21] = 1.0 + (work[164] * t474 + (work[158] * t475 + work[160] * t477) - work[269]);
-    jacobian[22] = work[270] + (work[177] * t474 + (work[179] * t475 + work[178] * t477));
-    jacobian[23] = work[271] + (work[188] * t474 + (work[190] * t475 + work[189] * t477));
-    jacobian[24] = work[237] * t479 + (work[238] * t480 + work[239] * t482);
-    jacobian[25] = work[241] * t479 + (work[240] * t480 + work[238] * t482);
-    jacobian[26] = work[242] * t479 + (work[241] * t480 + work[237] * t482);
-    jacobian[27] = t409 + (work[164] * t479 + (work[160] * t480 + work[158] * t482));
-    jacobian[28] = 1.0 + (work[177] * t479 + (work[178] * t480 + work[179] * t482) - t439);
-    jacobian[29] = t444 + (work[188] * t479 + (work[189] * t480 + work[190] * t482));
-    jacobian[30] = work[237] * t483 + (work[239] * t485 + work[238] * t487);
-    jacobian[31] = work[241] * t483 + (work[240] * t487 + work[238] * t485);
-    jacobian[32] = work[242] * t483 + (work[241] * t487 + work[237] * t485);
-    jacobian[33] = t454 + (work[164] * t483 + (work[158] * t485 + work[160] * t487));
-    jacobian[34] = t468 + (work[177] * t483 + (work[178] * t487 + work[179] * t485));
-    jacobian[35] = 1.0 + (work[188] * t483 + (work[190] * t485 + work[189] * t487) - t469);
-    increment_jacobian[0] = t488 - t489 + (t490 - t491);
-    increment_jacobian[1] = work[11] + (G2 * work[189] - t492 + (P2 * work[241] - P3 * work[240]));
-    increment_jacobian[22] = G2 * work[177] - t492 + work[11];
-    increment_jacobian[2] = t493 - G3 * work[177] + (P2 * work[242] - P3 * work[241]) - work[13];
-    increment_jacobian[23] = t493 - G3 * work[189] - work[13];
-    increment_jacobian[3] = t494 - t495 + (P2 * work[164] - P3 * work[160]);
-    increment_jacobian[6] = P3 * work[239] + (t496 - P1 * work[237]) - G1 * work[190] - work[11];
-    increment_jacobian[27] = t496 - G1 * work[164] - work[11];
-    increment_jacobian[7] = t491 + (t497 - t498) - t499;
-    increment_jacobian[35] = t499 - t488;
-    increment_jacobian[8] = work[20] + (P3 * work[237] + (G3 * work[164] - P1 * work[242]) - t500);
-    increment_jacobian[29] = G3 * work[190] - t500 + work[20];
-    increment_jacobian[10] = P3 * work[179] + (t495 - P1 * work[177]) - t501;
-    increment_jacobian[17] = t501 + (P1 * work[189] - P2 * work[190] - t494);
-    increment_jacobian[12] = work[13] + (G1 * work[179] + (P1 * work[238] - P2 * work[239] - t502));
-    increment_jacobian[33] = G1 * work[160] - t502 + work[13];
-    increment_jacobian[13] = t503 + (P1 * work[240] - P2 * work[238] - G2 * work[160]) - work[20];
-    increment_jacobian[34] = t503 - G2 * work[179] - work[20];
-    increment_jacobian[28] = t489 - t504;
-    increment_jacobian[14] = t504 + (t498 - t490 - t505);
-    increment_jacobian[21] = t505 - t497;
-    increment_jacobian[18] = t506 - t507;
-    increment_jacobian[25] = t507 - t508;
-    increment_jacobian[32] = t508 - t506;
+    (void)displacement, (void)increment;
+    const double P1 = y[0], P2 = y[1], P3 = y[2], G1 = y[3], G2 = y[4], G3 = y[5];
+    const double t1 = work[8] * work[11], t2 = work[0] * work[13], t3 = t1 + t2, t4 = t3 + t3;
+    const double t5 = work[8] * work[20] + work[2] * work[11];
+    const double t6 = work[2] * work[151] + work[8] * work[152] + (work[20] * t5 + work[11] * t4);
+    const double t7 = work[0] * work[20] + work[2] * work[13];
+    const double t8 = work[2] * work[153] + work[0] * work[152] + (work[20] * t7 + work[13] * t4);
+    const double t9 = work[154] * work[155] + work[156] * work[157] + (work[158] * work[159] + work[160]
+        * work[161] + (work[162] * work[163] + work[164] * work[165])) - (t4 * work[14] + work[15]
+        * (work[0] * work[166] + work[8] * work[167] + (work[11] * t6 + work[13] * t8) - t4 * work[6]));
+    const double t10 = t7 * work[14], t11 = t7 * work[6], t12 = work[2] * work[168];
+    const double t13 = work[8] * work[153], t14 = work[8] * work[13] + work[0] * work[11];
+    const double t15 = work[20] * t14, t16 = work[11] * t7, t17 = t12 - t13 + (t15 - t16);
+    const double t18 = work[2] * work[20], t19 = t18 + t1, t20 = t19 + t19;
+    const double t21 = work[0] * work[153] + work[2] * work[169] + (work[13] * t7 + work[20] * t20);
+    const double t22 = 0.5 * work[8];
+    const double t23 = G2 * (G3 * coef[169] + coef[113] * (P1 * P3)) + P2 * (work[170] + P3
+        * (work[98] + work[171]));
+    const double t24 = work[29] * work[172] + (work[173] + (work[174] + (work[175] + (coef[107] + coef[168]
+        * work[77])))) + P1 * (coef[167] * work[54] + work[44] + P1
+        * (work[176] + (work[61] + (work[49] + work[62]))));
+    const double t25 = t10 - work[15] * (t11 + (work[8] * work[180] - work[0] * work[181] + (work[11] * t17
+        - work[13] * t21))) - t22 + (t23 * work[157] + t24 * work[155] + (work[179] * work[159] + work[178]
+        * work[161] + (work[154] * work[163] + work[177] * work[165])));
+    const double t26 = 0.5 * work[0], t27 = t5 * work[14], t28 = t5 * work[6];
+    const double t29 = work[0] * work[151], t30 = work[13] * t5, t31 = t29 - t12 + (t30 - t15);
+    const double t32 = t18 + t2, t33 = t32 + t32;
+    const double t34 = work[8] * work[151] + work[2] * work[125] + (work[11] * t5 + work[20] * t33);
+    const double t35 = work[29] * (work[182] + (coef[53] * work[27] + work[183])) + (work[27] * work[184]
+        + (work[185] + (coef[170] * work[57] + work[186]))) + P1 * (coef[171] * work[26] + work[28] + P1
+        * (coef[25] * work[27] + work[187]));
+    const double t36 = t26 + (t27 - work[15] * (t28 - (work[0] * work[191] + work[8] * work[192]
+        + (work[13] * t31 + work[11] * t34)))) + (t35 * work[157] + t23 * work[155] + (work[190] * work[159]
+        + work[189] * work[161] + (work[156] * work[163] + work[188] * work[165])));
+    const double t37 = work[193] - work[194];
+    const double t38 = work[195] + (work[196] - work[15] * (work[197] - (work[11] * t37 + work[20]
+        * work[166])));
+    const double t39 = work[198] * work[14], t40 = work[198] * work[6], t41 = work[11] * work[198];
+    const double t42 = work[13] * work[199], t43 = work[200] - work[201] + (t41 - t42);
+    const double t44 = t39 - work[15] * (t40 + (work[20] * work[202] - work[11] * t43));
+    const double t45 = 0.5 * G1, t46 = work[13] * work[203];
+    const double t47 = work[3] + (work[11] * work[204] - t46);
+    const double t48 = t45 + (work[204] * work[14] - work[15] * (work[204] * work[6] + (work[205] - work[206]
+        + (work[20] * work[207] - work[11] * t47))));
+    const double t49 = work[208] * work[14], t50 = work[208] * work[6], t51 = work[11] * work[208];
+    const double t52 = t51 - work[13] * work[209];
+    const double t53 = t49 - work[15] * (t50 + (work[10] + (work[20] * work[210] - work[11] * t52)))
+        - work[211];
+    const double t54 = 0.5 * P1, t55 = work[3] - work[11] * work[212] - t46;
+    const double t56 = work[18] - work[11] * work[213] - work[13] * work[214] - (work[0] * work[203] + work[8]
+        * work[212]);
+    const double t57 = work[15] * (2.0 * work[215] - work[6] * work[213] + (work[2] * work[216] - work[8]
+        * t55 + (work[20] * work[217] - (work[218] + work[11] * t56)))) + 2.0 * (work[219] * work[220]);
+    const double t58 = t54 + (2.0 * (work[221] * work[18]) - work[14] * work[213] - t57);
+    const double t59 = t41 - (t42 + work[17]);
+    const double t60 = work[8] * work[198] - work[0] * work[199] + (work[11] * work[222]
+        - (work[13] * work[223] + work[19]));
+    const double t61 = work[15] * (work[222] * work[6] + 2.0 * (work[13] * work[18]) + (work[2] * work[224]
+        - work[8] * t59 + (work[20] * work[225] - work[11] * t60))) + 2.0 * (work[226] * work[220]);
+    const double t62 = work[222] * work[14] + 2.0 * (work[227] * work[18]) - t61;
+    const double t63 = work[13] * work[228] + t51;
+    const double t64 = work[8] * work[208] + work[0] * work[228] + (work[13] * work[229] + work[11]
+        * work[230]);
+    const double t65 = 2.0 * (work[231] * work[220]) + work[15] * (work[6] * work[230] + 2.0 * work[5]
+        + (work[2] * work[232] - work[8] * t63 + (work[233] + work[20] * work[234] - work[11] * t64)));
+    const double t66 = work[14] * work[230] + 2.0 * (work[235] * work[18]) - t65 - work[236];
+    const double t67 = work[13] * work[168] + work[11] * work[169];
+    const double t68 = work[169] * work[14] + work[15] * (work[11] * t67 + work[20] * work[181] - work[169]
+        * work[6]);
+    const double t69 = work[168] * work[14], t70 = work[168] * work[6];
+    const double t71 = work[11] * work[168] + work[13] * work[125], t72 = 0.5 * work[20];
+    const double t73 = t69 - work[15] * (t70 + (work[20] * work[191] - work[11] * t71)) - t72;
+    const double t74 = t13 - t29 + (t16 - t30);
+    const double t75 = t22 + (t10 - work[15] * (t11 - (work[8] * t37 + work[2] * work[166] + (work[11] * t74
+        + work[20] * t8)))) + (work[154] * t44 + work[156] * t48 + (work[160] * t62 + work[158] * t66
+        + (work[162] * t53 + work[164] * t58)));
+    const double t76 = work[0] * work[168] + work[8] * work[169] + (work[13] * t14 + work[11] * t20);
+    const double t77 = t24 * t44 + t23 * t48 + (work[154] * t53 + work[177] * t58 + (work[178] * t62
+        + work[179] * t66)) - (t20 * work[14] + work[15] * (work[8] * t67 + work[2] * work[181]
+        + (work[20] * t21 + work[11] * t76) - t20 * work[6]));
+    const double t78 = t14 * work[14], t79 = t14 * work[6];
+    const double t80 = work[8] * work[168] + work[0] * work[125] + (work[11] * t14 + work[13] * t33);
+    const double t81 = 0.5 * work[2];
+    const double t82 = t78 - work[15] * (t79 + (work[2] * work[191] - work[8] * t71 + (work[20] * t31
+        - work[11] * t80))) - t81 + (t23 * t44 + t35 * t48 + (work[156] * t53 + work[188] * t58
+        + (work[189] * t62 + work[190] * t66)));
+    const double t83 = work[243] - work[15] * (work[244] + (work[13] * t37 - work[20] * work[167]))
+        - work[245];
+    const double t84 = work[203] * work[14], t85 = work[203] * work[6];
+    const double t86 = t84 - work[15] * (t85 + (work[13] * t47 - work[20] * work[246]));
+    const double t87 = work[199] * work[14], t88 = work[6] * work[199];
+    const double t89 = t87 - work[15] * (t88 + (work[247] + (work[13] * t43 - work[20] * work[248]))) - t45;
+    const double t90 = work[249] + (work[209] * work[14] - work[15] * (work[6] * work[209]
+        + (work[250] - work[251] + (work[13] * t52 - work[20] * work[252]))));
+    const double t91 = work[15] * (work[6] * work[214] + 2.0 * (work[11] * work[19]) + (work[0] * t55
+        - work[2] * work[253] + (work[13] * t56 - work[20] * work[254]))) + 2.0 * (work[219] * work[255]);
+    const double t92 = work[214] * work[14] + 2.0 * (work[221] * work[19]) - t91;
+    const double t93 = work[15] * (2.0 * work[256] - work[6] * work[229] + (work[0] * t63 - work[2]
+        * work[257] + (work[13] * t64 - (work[12] + work[20] * work[258])))) + 2.0 * (work[231] * work[255]);
+    const double t94 = work[259] + (2.0 * (work[235] * work[19]) - work[14] * work[229] - t93);
+    const double t95 = work[15] * (work[6] * work[223] + 2.0 * work[260] + (work[0] * t59 - work[2]
+        * work[261] + (work[218] + work[13] * t60 - work[20] * work[262]))) + 2.0 * (work[226] * work[255]);
+    const double t96 = work[14] * work[223] + 2.0 * (work[227] * work[19]) - t95 - t54;
+    const double t97 = t72 + (t69 - work[15] * (t70 - (work[20] * work[180] + work[13] * t67)));
+    const double t98 = work[125] * work[14] + work[15] * (work[13] * t71 + work[20] * work[192] - work[125]
+        * work[6]);
+    const double t99 = t27 - work[15] * (t28 + (work[0] * t37 - work[2] * work[167] + (work[13] * t74
+        - work[20] * t6))) - t26 + (work[156] * t86 + work[154] * t89 + (work[162] * t90 + work[164] * t92
+        + (work[160] * t96 + work[158] * t94)));
+    const double t100 = t81 + (t78 - work[15] * (t79 - (work[2] * work[180] + work[0] * t67 + (work[20] * t17
+        + work[13] * t76)))) + (t23 * t86 + t24 * t89 + (work[154] * t90 + work[177] * t92 + (work[179] * t94
+        + work[178] * t96)));
+    const double t101 = t35 * t86 + t23 * t89 + (work[156] * t90 + work[188] * t92 + (work[189] * t96
+        + work[190] * t94)) - (t33 * work[14] + work[15] * (work[0] * t71 + work[2] * work[192]
+        + (work[13] * t80 + work[20] * t34) - t33 * work[6]));
+    const double t102 = work[263] + 2.0 * (work[1] * work[221]) - (2.0 * (work[219] * work[264]) + work[15]
+        * (work[265] + 2.0 * work[250] + (work[9] + work[11] * work[253] - work[13] * work[216])));
+    const double t103 = t102 - work[249];
+    const double t104 = work[266] + 2.0 * (work[1] * work[235]) - (work[15] * (work[267] + 2.0
+        * (work[20] * work[1]) + (work[11] * work[257] - work[13] * work[232])) + 2.0
+        * (work[231] * work[264]));
+    const double t105 = 2.0 * (work[1] * work[227]) - work[268] * work[14] - (2.0 * (work[226] * work[264])
+        + work[15] * (2.0 * work[53] - work[268] * work[6] + (work[11] * work[261] - (work[10] + work[13]
+        * work[224]))));
+    const double t106 = work[211] + t105;
+    const double t107 = 2.0 * (work[3] * work[221]) - work[212] * work[14] - (work[15] * (2.0 * work[206]
+        - work[212] * work[6] + (work[20] * work[216] - (work[247] + work[11] * t55))) + 2.0
+        * (work[219] * work[272]));
+    const double t108 = t45 + t107;
+    const double t109 = t39 + 2.0 * (work[3] * work[227]) - (work[15] * (t40 + 2.0 * (work[13] * work[3])
+        + (work[20] * work[224] - work[11] * t59)) + 2.0 * (work[226] * work[272]));
+    const double t110 = t49 + 2.0 * (work[3] * work[235]) - (2.0 * (work[231] * work[272]) + work[15]
+        * (t50 + 2.0 * work[52] + (work[10] + work[20] * work[232] - work[11] * t63)));
+    const double t111 = t110 - work[211];
+    const double t112 = t84 + 2.0 * (work[17] * work[221]) - (work[15] * (t85 + 2.0 * (work[11] * work[17])
+        + (work[13] * t55 - work[20] * work[253])) + 2.0 * (work[219] * work[273]));
+    const double t113 = 2.0 * (work[17] * work[235]) - work[228] * work[14] - (2.0 * (work[231] * work[273])
+        + work[15] * (2.0 * work[251] - work[228] * work[6] + (work[13] * t63 - (work[9] + work[20]
+        * work[257]))));
+    const double t114 = work[249] + t113;
+    const double t115 = t87 + 2.0 * (work[17] * work[227]) - (work[15] * (t88 + 2.0 * work[205]
+        + (work[247] + work[13] * t59 - work[20] * work[261])) + 2.0 * (work[226] * work[273]));
+    const double t116 = t115 - t45, t117 = G2 * work[190], t118 = G3 * work[179];
+    const double t119 = P2 * work[237], t120 = P3 * work[238], t121 = G3 * work[178];
+    const double t122 = G2 * work[188], t123 = G2 * work[156], t124 = G3 * work[154];
+    const double t125 = G3 * work[158], t126 = G3 * work[160], t127 = P1 * work[241];
+    const double t128 = G1 * work[189], t129 = G1 * work[188], t130 = G1 * t23;
+    const double t131 = G2 * work[158], t132 = G1 * work[178], t133 = G1 * work[177];
+    const double t134 = G2 * work[164], t135 = G2 * work[237], t136 = G3 * work[238];
+    const double t137 = G1 * work[241];
+    jacobian[3] = t9;
+    increment_jacobian[4] = work[8] + (G2 * t23 - G3 * t24 + (P2 * work[177] - P3 * work[178]));
+    increment_jacobian[16] = G1 * t24 + (P1 * work[178] - P2 * work[179] - G2 * work[154]) - work[2];
+    jacobian[4] = t25;
+    increment_jacobian[5] = G2 * t35 - G3 * t23 + (P2 * work[188] - P3 * work[189]) - work[0];
+    increment_jacobian[11] = work[2] + (P3 * work[190] + (G3 * work[156] - P1 * work[188]) - G1 * t35);
+    jacobian[5] = t36;
+    jacobian[6] = t38 + (work[179] * t44 + work[190] * t48 + (work[158] * t53 + work[237] * t58
+        + (work[238] * t62 + work[239] * t66)));
+    jacobian[7] = 1.0 + (work[178] * t44 + work[189] * t48 + (work[240] * t62 + work[238] * t66
+        + (work[160] * t53 + work[241] * t58)) - t68);
+    jacobian[8] = t73 + (work[177] * t44 + work[188] * t48 + (work[241] * t62 + work[237] * t66
+        + (work[164] * t53 + work[242] * t58)));
+    jacobian[9] = t75;
+    jacobian[10] = t77;
+    jacobian[11] = t82;
+    jacobian[12] = t83 + (work[190] * t86 + work[179] * t89 + (work[158] * t90 + work[237] * t92
+        + (work[239] * t94 + work[238] * t96)));
+    jacobian[13] = t97 + (work[189] * t86 + work[178] * t89 + (work[160] * t90 + work[241] * t92
+        + (work[238] * t94 + work[240] * t96)));
+    jacobian[14] = 1.0 + (work[188] * t86 + work[177] * t89 + (work[164] * t90 + work[242] * t92
+        + (work[241] * t96 + work[237] * t94)) - t98);
+    jacobian[15] = t99;
+    jacobian[16] = t100;
+    jacobian[17] = t101;
+    jacobian[18] = work[237] * t103 + (work[239] * t104 + work[238] * t106);
+    jacobian[19] = work[241] * t103 + (work[238] * t104 + work[240] * t106);
+    jacobian[20] = work[242] * t103 + (work[237] * t104 + work[241] * t106);
+    jacobian[21] = 1.0 + (work[164] * t103 + (work[158] * t104 + work[160] * t106) - work[269]);
+    jacobian[22] = work[270] + (work[177] * t103 + (work[179] * t104 + work[178] * t106));
+    jacobian[23] = work[271] + (work[188] * t103 + (work[190] * t104 + work[189] * t106));
+    jacobian[24] = work[237] * t108 + (work[238] * t109 + work[239] * t111);
+    jacobian[25] = work[241] * t108 + (work[240] * t109 + work[238] * t111);
+    jacobian[26] = work[242] * t108 + (work[241] * t109 + work[237] * t111);
+    jacobian[27] = t38 + (work[164] * t108 + (work[160] * t109 + work[158] * t111));
+    jacobian[28] = 1.0 + (work[177] * t108 + (work[178] * t109 + work[179] * t111) - t68);
+    jacobian[29] = t73 + (work[188] * t108 + (work[189] * t109 + work[190] * t111));
+    jacobian[30] = work[237] * t112 + (work[239] * t114 + work[238] * t116);
+    jacobian[31] = work[241] * t112 + (work[240] * t116 + work[238] * t114);
+    jacobian[32] = work[242] * t112 + (work[241] * t116 + work[237] * t114);
+    jacobian[33] = t83 + (work[164] * t112 + (work[158] * t114 + work[160] * t116));
+    jacobian[34] = t97 + (work[177] * t112 + (work[178] * t116 + work[179] * t114));
+    jacobian[35] = 1.0 + (work[188] * t112 + (work[190] * t114 + work[189] * t116) - t98);
+    increment_jacobian[0] = t117 - t118 + (t119 - t120);
+    increment_jacobian[1] = work[11] + (G2 * work[189] - t121 + (P2 * work[241] - P3 * work[240]));
+    increment_jacobian[22] = G2 * work[177] - t121 + work[11];
+    increment_jacobian[2] = t122 - G3 * work[177] + (P2 * work[242] - P3 * work[241]) - work[13];
+    increment_jacobian[23] = t122 - G3 * work[189] - work[13];
+    increment_jacobian[3] = t123 - t124 + (P2 * work[164] - P3 * work[160]);
+    increment_jacobian[6] = P3 * work[239] + (t125 - P1 * work[237]) - G1 * work[190] - work[11];
+    increment_jacobian[27] = t125 - G1 * work[164] - work[11];
+    increment_jacobian[7] = t120 + (t126 - t127) - t128;
+    increment_jacobian[35] = t128 - t117;
+    increment_jacobian[8] = work[20] + (P3 * work[237] + (G3 * work[164] - P1 * work[242]) - t129);
+    increment_jacobian[29] = G3 * work[190] - t129 + work[20];
+    increment_jacobian[10] = P3 * work[179] + (t124 - P1 * work[177]) - t130;
+    increment_jacobian[17] = t130 + (P1 * work[189] - P2 * work[190] - t123);
+    increment_jacobian[12] = work[13] + (G1 * work[179] + (P1 * work[238] - P2 * work[239] - t131));
+    increment_jacobian[33] = G1 * work[160] - t131 + work[13];
+    increment_jacobian[13] = t132 + (P1 * work[240] - P2 * work[238] - G2 * work[160]) - work[20];
+    increment_jacobian[34] = t132 - G2 * work[179] - work[20];
+    increment_jacobian[28] = t118 - t133;
+    increment_jacobian[14] = t133 + (t127 - t119 - t134);
+    increment_jacobian[21] = t134 - t126;
+    increment_jacobian[18] = t135 - t136;
+    increment_jacobian[25] = t136 - t137;
+    increment_jacobian[32] = t137 - t135;
 }
 
 /* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
    increment, all with the momenta p = grad S_h(y) */
 static void kowalevski_top_linearise(const double coef[172], const double y[6],
-                                     double displacement[restrict 6], double increment[restrict 6],
-                                     double jacobian[restrict 36], double increment_jacobian[restrict 36])
+    double displacement[restrict 6], double increment[restrict 6], double jacobian[restrict 36],
+    double increment_jacobian[restrict 36])
 {
     double work[274];
     kowalevski_top_linearise_part1(coef, y, displacement, increment, jacobian, increment_jacobian, work);
@@ -1022,99 +1011,116 @@ static void kowalevski_top_linearise(const double coef[172], const double y[6],
     kowalevski_top_linearise_part3(coef, y, displacement, increment, jacobian, increment_jacobian, work);
 }
 
-/* Solve matrix * solution = side, both overwritten, by elimination with partial pivoting. 0 if singular. */
-static int kowalevski_top_solve(double matrix[36], double side[6])
+/* the Hamiltonian */
+double kowalevski_top_hamiltonian(const kowalevski_top_params *params, const double x[6])
 {
-    for (int k = 0; k < 6; ++k) {
+    (void)params;
+    const double P1 = x[0], P2 = x[1], P3 = x[2], G1 = x[3];
+    return G1 + 0.5 * (P3 * P3 + (0.5 * (P1 * P1) + 0.5 * (P2 * P2)));
+}
+
+/* the Casimirs */
+void kowalevski_top_casimirs(const kowalevski_top_params *params, const double x[6], double out[])
+{
+    (void)params;
+    const double P1 = x[0], P2 = x[1], P3 = x[2], G1 = x[3], G2 = x[4], G3 = x[5];
+    out[0] = G3 * G3 + (G1 * G1 + G2 * G2);
+    out[1] = G3 * P3 + (G2 * P2 + G1 * P1);
+}
+
+/* pi(x) grad H(x) */
+void kowalevski_top_vector_field(const kowalevski_top_params *params, const double x[6], double out[6])
+{
+    (void)params;
+    const double P1 = x[0], P2 = x[1], P3 = x[2], G1 = x[3], G2 = x[4], G3 = x[5];
+    const double t1 = P2 * P3, t2 = P1 * P3;
+    out[0] = t1 - 0.5 * t1;
+    out[1] = G3 + (0.5 * t2 - t2);
+    out[2] = -G2;
+    out[3] = G2 * P3 - 0.5 * (G3 * P2);
+    out[4] = 0.5 * (G3 * P1) - G1 * P3;
+    out[5] = 0.5 * (G1 * P2) - 0.5 * (G2 * P1);
+}
+
+/* ---- Compensated sums, linear equations ---- */
+/* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to
+   its last bit: were it rounded with the change, corrections of one sign would add up to a drift. 0, and x as
+   before, if the sum is not finite. */
+static int kowalevski_top_advance(kowalevski_top_solver *s, const double change[kowalevski_top_DIM],
+    const double correction[kowalevski_top_DIM])
+{
+    double x[kowalevski_top_DIM], carry[kowalevski_top_DIM];
+    for (int i = 0; i < kowalevski_top_DIM; ++i) {
+        const double sum = s->x[i] + change[i], added = sum - s->x[i];
+        const double lost = (s->x[i] - (sum - added)) + (change[i] - added);
+        const double small = lost + (s->carry[i] + correction[i]);
+        x[i] = sum + small;
+        carry[i] = small - (x[i] - sum);
+        if (!isfinite(x[i])) return 0;
+    }
+    memcpy(s->x, x, sizeof x);
+    memcpy(s->carry, carry, sizeof carry);
+    return 1;
+}
+
+/* Newton matrices are I + O(h): a pivot whose reciprocal is larger than this is far from 1. */
+#define kowalevski_top_LARGEST_RECIPROCAL 1e3
+
+/* Solve matrix * solution = side, both overwritten, by elimination with partial pivoting. 0 if singular. */
+static int kowalevski_top_solve(double matrix[kowalevski_top_DIM * kowalevski_top_DIM],
+    double side[kowalevski_top_DIM])
+{
+    for (int k = 0; k < kowalevski_top_DIM; ++k) {
         int best = k;
-        for (int i = k + 1; i < 6; ++i)
-            if (fabs(matrix[i * 6 + k]) > fabs(matrix[best * 6 + k])) best = i;
-        const double pivot = matrix[best * 6 + k];
+        for (int i = k + 1; i < kowalevski_top_DIM; ++i)
+            if (fabs(matrix[i * kowalevski_top_DIM + k]) > fabs(matrix[best * kowalevski_top_DIM + k]))
+                best = i;
+        const double pivot = matrix[best * kowalevski_top_DIM + k], last = side[k];
         if (!(fabs(pivot) > 0.0)) return 0;
-        for (int j = k; j < 6 && best != k; ++j) {
-            const double swap = matrix[k * 6 + j];
-            matrix[k * 6 + j] = matrix[best * 6 + j];
-            matrix[best * 6 + j] = swap;
+        for (int j = k; j < kowalevski_top_DIM && best != k; ++j) {
+            const double swap = matrix[k * kowalevski_top_DIM + j];
+            matrix[k * kowalevski_top_DIM + j] = matrix[best * kowalevski_top_DIM + j];
+            matrix[best * kowalevski_top_DIM + j] = swap;
         }
-        const double swap = side[k];
         side[k] = side[best];
-        side[best] = swap;
-        for (int i = k + 1; i < 6; ++i) {
-            const double factor = matrix[i * 6 + k] / pivot;
-            for (int j = k + 1; j < 6; ++j) matrix[i * 6 + j] -= factor * matrix[k * 6 + j];
+        side[best] = last;
+        for (int i = k + 1; i < kowalevski_top_DIM; ++i) {
+            const double factor = matrix[i * kowalevski_top_DIM + k] / pivot;
+            for (int j = k + 1; j < kowalevski_top_DIM; ++j)
+                matrix[i * kowalevski_top_DIM + j] -= factor * matrix[k * kowalevski_top_DIM + j];
             side[i] -= factor * side[k];
         }
     }
-    for (int i = 6 - 1; i >= 0; --i) {
-        for (int j = i + 1; j < 6; ++j) side[i] -= matrix[i * 6 + j] * side[j];
-        side[i] /= matrix[i * 6 + i];
+    for (int i = kowalevski_top_DIM - 1; i >= 0; --i) {
+        for (int j = i + 1; j < kowalevski_top_DIM; ++j)
+            side[i] -= matrix[i * kowalevski_top_DIM + j] * side[j];
+        side[i] /= matrix[i * kowalevski_top_DIM + i];
     }
     return 1;
 }
 
-/* Whether a guess is where the next values may be. Recurrences that were fitted to little else than rest, near a saddle,
-   may lead anywhere; and far away the equation of a step has solutions that have nothing to do with the motion. */
-static int kowalevski_top_near(const double guess[6], const double last[6])
-{
-    double distance = 0.0, size = 0.0;
-    for (int i = 0; i < 6; ++i) {
-        distance += fabs(guess[i] - last[i]);
-        size += fabs(last[i]);
-    }
-    return distance <= 4.0 * size;
-}
+/* ---- Starting guesses ---- */
 
-/* The guess for the next value (y), from earlier ones; 0 if there is none. */
-static int kowalevski_top_predict(const kowalevski_top_memory *memory, double value[6])
-{
-    const int last = memory->count - 1;
-    double odd[6] = { 0.0 }, binomial = -1.0;
-    memset(value, 0, 6 * sizeof value[0]);
-    if (memory->fitting) {
-        for (int k = 0; k < memory->terms; k += 2)
-            for (int i = 0; i < 6; ++i) {
-                value[i] += memory->weight[k][i][0] * memory->past[last - k][i];
-                odd[i] += memory->weight[k + 1][i][0] * memory->past[last - 1 - k][i];
-            }
-        for (int i = 0; i < 6; ++i) value[i] += odd[i];
-    } else {
-        for (int k = 0; k < memory->order && k <= last; ++k) {
-            binomial *= -(double)(memory->order - k) / (k + 1);
-            for (int i = 0; i < 6; ++i) value[i] += binomial * memory->past[last - k][i];
-        }
-    }
-    return last >= 0 && kowalevski_top_near(value, memory->past[last]);
-}
+/* ---- Recurrences fitted to the last values ---- */
+/* A recurrence uses no more values than leave so little, in sizes of the largest. */
+#define kowalevski_top_ENOUGH 3e-12
 
-/* Choose the guess that would have been best for a value that took several iterations. */
-static void kowalevski_top_judge(kowalevski_top_memory *memory, const double value[6])
-{
-    double row[8 + 1][6], guess[6], least = HUGE_VAL, fitted = HUGE_VAL;
-    const int rows = memory->count < 8 ? memory->count : 8;
-    memcpy(row[0], value, sizeof row[0]);
-    for (int k = 0; k < rows; ++k) memcpy(row[k + 1], memory->past[memory->count - 1 - k], sizeof row[0]);
-    for (int order = 1; order <= rows; ++order) { /* row[0] becomes the backward difference of this order */
-        double size = 0.0;
-        for (int k = 0; k <= rows - order; ++k)
-            for (int i = 0; i < 6; ++i) row[k][i] -= row[k + 1][i];
-        for (int i = 0; i < 6; ++i) size += fabs(row[0][i]);
-        if (size < least) {
-            least = size;
-            memory->order = order;
-        }
-    }
-    memory->fitting = memory->terms > 0;
-    if (memory->fitting && kowalevski_top_predict(memory, guess)) {
-        fitted = 0.0;
-        for (int i = 0; i < 6; ++i) fitted += fabs(value[i] - guess[i]);
-    }
-    memory->fitting = memory->terms > 0 && fitted <= least;
-    if (memory->order == 0) memory->order = 1;
-}
+/* The ridge of the least squares: the level of rounding. */
+#define kowalevski_top_RIDGE 1e-15
 
-/* Make eight columns orthogonal to one, by the multiples of it that are put into r. Where that one is among the eight, those
-   up to it stay as they are, and inverse becomes one over its squared length. The number of rows is even. */
-static void kowalevski_top_project(int rows, double (*one)[8], int column, double *inverse, double (*eight)[8], double r[8])
+/* How far a recurrence may miss values that it was not fitted to, in sizes of the largest: beyond, the motion
+   is chaotic or the step long, and other guesses are as good. */
+#define kowalevski_top_HOPELESS 1e-7
+
+/* equations of the least squares */
+enum { kowalevski_top_ROWS = kowalevski_top_REMEMBERED - kowalevski_top_WINDOW - kowalevski_top_AHEAD
+    - kowalevski_top_CHECKS + 1 };
+
+/* Make eight columns orthogonal to one, by the multiples of it that are put into r. Where that one is among
+   the eight, those up to it stay as they are, and inverse becomes one over its squared length. The number of
+   rows is even. */
+static void kowalevski_top_project(int rows, double (*one)[8], int column, double *inverse,
+    double (*eight)[8], double r[8])
 {
     double even[8] = { 0.0 }, odd[8] = { 0.0 };
     for (int i = 0; i < rows; i += 2) {
@@ -1137,7 +1143,7 @@ static void kowalevski_top_project(int rows, double (*one)[8], int column, doubl
 /* By how much recurrences miss the last of these values. */
 static double kowalevski_top_missed(const double *value, double (*weight)[8])
 {
-    enum { AHEAD = 8, WINDOW = 40, CHECKS = 8 };
+    enum { AHEAD = kowalevski_top_AHEAD, WINDOW = kowalevski_top_WINDOW, CHECKS = kowalevski_top_CHECKS };
     double most = 0.0;
     for (int i = 0; i < CHECKS; ++i) {
         double guess[8] = { 0.0 };
@@ -1148,31 +1154,36 @@ static double kowalevski_top_missed(const double *value, double (*weight)[8])
     return most;
 }
 
-/* Fit the recurrences value[m + l] = sum of weight[k][..][l] * value[m - 1 - k], l = 0 ... 8 - 1, to the history of
-   a component: ridge least squares by modified Gram-Schmidt, the ridge at the level of rounding. Columns are taken in by
-   eights, until they leave next to nothing of the right-hand sides. How many past values are used; 0 if the recurrences do
-   not foresee the last values, which they were not fitted to. */
-static int kowalevski_top_train(kowalevski_top_memory *memory, int component)
+/* Fit the recurrences value[m + l] = sum of weight[k][..][l] * value[m - 1 - k], l = 0 ...
+   kowalevski_top_AHEAD - 1, to the history of a component: ridge least squares by modified Gram-Schmidt, the
+   ridge at the level of rounding. Columns are taken in by eights, until they leave next to nothing of the
+   right-hand sides. How many past values are used; 0 if the recurrences do not foresee the last values, which
+   they were not fitted to. */
+static int kowalevski_top_train(kowalevski_top_history *history, int component)
 {
-    enum { AHEAD = 8, WINDOW = 40, ROWS = 56 };
-    double q[WINDOW / 8][ROWS + WINDOW][8], r[WINDOW / 8][WINDOW][8], inverse[WINDOW]; /* eight columns in each part */
-    double right[ROWS + WINDOW][8], weight[WINDOW][8], value[111], largest = 0.0, left = HUGE_VAL;
+    enum { AHEAD = kowalevski_top_AHEAD, WINDOW = kowalevski_top_WINDOW, ROWS = kowalevski_top_ROWS };
+    /* eight columns in each part */
+    double q[WINDOW / 8][ROWS + WINDOW][8], r[WINDOW / 8][WINDOW][8], inverse[WINDOW];
+    double right[ROWS + WINDOW][8], weight[WINDOW][8], value[kowalevski_top_REMEMBERED], largest = 0.0, left =
+        HUGE_VAL;
     int terms = 0;
     memset(q, 0, sizeof q);
     memset(right, 0, sizeof right);
     memset(weight, 0, sizeof weight);
-    for (int i = 0; i < 111; ++i) {
-        value[i] = memory->past[memory->count - 111 + i][component];
+    for (int i = 0; i < kowalevski_top_REMEMBERED; ++i) {
+        value[i] = history->past[history->count - kowalevski_top_REMEMBERED + i][component];
         if (fabs(value[i]) > largest) largest = fabs(value[i]);
     }
     for (int i = 0; i < ROWS; ++i)
         for (int l = 0; l < AHEAD; ++l) right[i][l] = value[i + WINDOW + l];
-    while (terms < WINDOW && left > 3e-12 * largest) {
-        const int part = terms / 8, rows = ROWS + terms + 8; /* further rows of the ridge are zero in these columns */
+    while (terms < WINDOW && left > kowalevski_top_ENOUGH * largest) {
+        /* further rows of the ridge are zero in these columns */
+        const int part = terms / 8, rows = ROWS + terms + 8;
         for (int i = 0; i < ROWS; ++i)
             for (int l = 0; l < 8; ++l) q[part][i][l] = value[i + WINDOW - 1 - terms - l];
-        for (int l = 0; l < 8; ++l) q[part][ROWS + terms + l][l] = 1e-15 * largest;
-        for (int k = 0; k < terms; ++k) kowalevski_top_project(rows, q[k / 8], k % 8, &inverse[k], q[part], r[part][k]);
+        for (int l = 0; l < 8; ++l) q[part][ROWS + terms + l][l] = kowalevski_top_RIDGE * largest;
+        for (int k = 0; k < terms; ++k)
+            kowalevski_top_project(rows, q[k / 8], k % 8, &inverse[k], q[part], r[part][k]);
         for (int l = 0; l < 8; ++l, ++terms) {
             kowalevski_top_project(rows, q[part], l, &inverse[terms], q[part], r[part][terms]);
             kowalevski_top_project(rows, q[part], l, &inverse[terms], right, weight[terms]);
@@ -1186,226 +1197,227 @@ static int kowalevski_top_train(kowalevski_top_memory *memory, int component)
     for (int k = terms - 1; k >= 0; --k)
         for (int j = k + 1; j < terms; ++j)
             for (int l = 0; l < 8; ++l) weight[k][l] -= r[j / 8][k][j % 8] * weight[j][l];
-    for (int k = 0; k < WINDOW; ++k) memcpy(memory->weight[k][component], weight[k], AHEAD * sizeof(double));
-    return kowalevski_top_missed(value + ROWS, weight) <= 1e-07 * largest ? terms : 0;
+    for (int k = 0; k < WINDOW; ++k) memcpy(history->weight[k][component], weight[k], AHEAD * sizeof(double));
+    return kowalevski_top_missed(value + ROWS, weight) <= kowalevski_top_HOPELESS * largest ? terms : 0;
+}
+/* How far from the last value a guess may be, in sizes of that value. */
+#define kowalevski_top_REACH 4.0
+
+/* Whether a guess is where the next values may be. Far away the equation of a step has solutions that have
+   nothing to do with the motion. */
+static int kowalevski_top_near(const double guess[kowalevski_top_DIM], const double last[kowalevski_top_DIM])
+{
+    double distance = 0.0, size = 0.0;
+    for (int i = 0; i < kowalevski_top_DIM; ++i) {
+        distance += fabs(guess[i] - last[i]);
+        size += fabs(last[i]);
+    }
+    return distance <= kowalevski_top_REACH * size;
+}
+
+enum {
+    /* values that extrapolation uses at most: more amplify rounding more than they gain */
+    kowalevski_top_HISTORY = 8,
+    kowalevski_top_REPAY = 150,      /* steps that a fit costs, about */
+    kowalevski_top_LONG_WAIT = 20000 /* steps until a recurrence that often needs fitting is fitted again */
+};
+
+/* The guess for the next value (y), from earlier ones; 0 if there is none. */
+static int kowalevski_top_predict(const kowalevski_top_history *history, double value[kowalevski_top_DIM])
+{
+    const int last = history->count - 1;
+    double odd[kowalevski_top_DIM] = { 0.0 }, binomial = -1.0;
+    memset(value, 0, kowalevski_top_DIM * sizeof value[0]);
+    if (history->use_recurrence) {
+        for (int k = 0; k < history->recurrence_terms; k += 2)
+            for (int i = 0; i < kowalevski_top_DIM; ++i) {
+                value[i] += history->weight[k][i][0] * history->past[last - k][i];
+                odd[i] += history->weight[k + 1][i][0] * history->past[last - 1 - k][i];
+            }
+        for (int i = 0; i < kowalevski_top_DIM; ++i) value[i] += odd[i];
+    } else {
+        for (int k = 0; k < history->extrapolation_order && k <= last; ++k) {
+            binomial *= -(double)(history->extrapolation_order - k) / (k + 1);
+            for (int i = 0; i < kowalevski_top_DIM; ++i) value[i] += binomial * history->past[last - k][i];
+        }
+    }
+    return last >= 0 && kowalevski_top_near(value, history->past[last]);
+}
+
+/* Choose the guess that would have been best for a value that took several iterations. */
+static void kowalevski_top_judge(kowalevski_top_history *history, const double value[kowalevski_top_DIM])
+{
+    double row[kowalevski_top_HISTORY + 1][kowalevski_top_DIM], guess[kowalevski_top_DIM], least = HUGE_VAL,
+        fitted = HUGE_VAL;
+    const int rows = history->count < kowalevski_top_HISTORY ? history->count : kowalevski_top_HISTORY;
+    memcpy(row[0], value, sizeof row[0]);
+    for (int k = 0; k < rows; ++k) memcpy(row[k + 1], history->past[history->count - 1 - k], sizeof row[0]);
+    for (int order = 1; order <= rows; ++order) { /* row[0] becomes the backward difference of this order */
+        double size = 0.0;
+        for (int k = 0; k <= rows - order; ++k)
+            for (int i = 0; i < kowalevski_top_DIM; ++i) row[k][i] -= row[k + 1][i];
+        for (int i = 0; i < kowalevski_top_DIM; ++i) size += fabs(row[0][i]);
+        if (size < least) {
+            least = size;
+            history->extrapolation_order = order;
+        }
+    }
+    history->use_recurrence = history->recurrence_terms > 0;
+    if (history->use_recurrence && kowalevski_top_predict(history, guess)) {
+        fitted = 0.0;
+        for (int i = 0; i < kowalevski_top_DIM; ++i) fitted += fabs(value[i] - guess[i]);
+    }
+    history->use_recurrence = history->recurrence_terms > 0 && fitted <= least;
+    if (history->extrapolation_order == 0) history->extrapolation_order = 1;
 }
 
 /* Drop what is old, if so many values would not fit into the history. */
-static void kowalevski_top_make_room(kowalevski_top_memory *memory, int values)
+static void kowalevski_top_make_room(kowalevski_top_history *history, int values)
 {
-    if (memory->count + values <= 222) return;
-    memmove(memory->past, memory->past + memory->count - 111, 111 * sizeof memory->past[0]);
-    memory->count = 111;
+    if (history->count + values <= kowalevski_top_KEPT) return;
+    memmove(history->past, history->past + history->count - kowalevski_top_REMEMBERED,
+        kowalevski_top_REMEMBERED * sizeof history->past[0]);
+    history->count = kowalevski_top_REMEMBERED;
 }
 
 /* Add a value to the history. */
-static void kowalevski_top_record(kowalevski_top_memory *memory, const double value[6])
+static void kowalevski_top_record(kowalevski_top_history *history, const double value[kowalevski_top_DIM])
 {
-    kowalevski_top_make_room(memory, 1);
-    memcpy(memory->past[memory->count++], value, 6 * sizeof value[0]);
+    kowalevski_top_make_room(history, 1);
+    memcpy(history->past[history->count++], value, kowalevski_top_DIM * sizeof value[0]);
 }
 
 /* Fit the recurrence to the last values; with every time, wait longer before it is done again. */
-static void kowalevski_top_fit(kowalevski_top_memory *memory)
+static void kowalevski_top_fit(kowalevski_top_history *history)
 {
     int found = 1;
-    memory->terms = 0;
-    for (int i = 0; i < 6 && found; ++i) {
-        const int terms = kowalevski_top_train(memory, i);
+    history->recurrence_terms = 0;
+    for (int i = 0; i < kowalevski_top_DIM && found; ++i) {
+        const int terms = kowalevski_top_train(history, i);
         found = terms > 0;
-        if (terms > memory->terms) memory->terms = terms;
+        if (terms > history->recurrence_terms) history->recurrence_terms = terms;
     }
-    if (!found) memory->terms = 0;
-    memory->fitting = found;
-    ++memory->fits;
-    memory->slow = 0;
-    memory->patience = memory->patience < 10000 ? 2 * memory->patience + 150 : 20000;
+    if (!found) history->recurrence_terms = 0;
+    history->use_recurrence = found;
+    ++history->fits;
+    history->slow_steps = 0;
+    history->slow_steps_allowed = history->slow_steps_allowed < kowalevski_top_LONG_WAIT / 2
+        ? 2 * history->slow_steps_allowed + kowalevski_top_REPAY : kowalevski_top_LONG_WAIT;
 }
 
 /* Take in the solved value: what took one iteration needs no better guess. */
-static void kowalevski_top_remember(kowalevski_top_memory *memory, const double value[6], int iterations)
+static void kowalevski_top_remember(kowalevski_top_history *history, const double value[kowalevski_top_DIM],
+    int iterations)
 {
-    if (iterations > 1) kowalevski_top_judge(memory, value);
-    kowalevski_top_record(memory, value);
-    memory->slow = iterations > 1 ? memory->slow + 1 : 0;
-    if (memory->slow > memory->patience && memory->count >= 111) kowalevski_top_fit(memory);
+    if (iterations > 1) kowalevski_top_judge(history, value);
+    kowalevski_top_record(history, value);
+    history->slow_steps = iterations > 1 ? history->slow_steps + 1 : 0;
+    if (history->slow_steps > history->slow_steps_allowed && history->count >= kowalevski_top_REMEMBERED)
+        kowalevski_top_fit(history);
 }
 
-/* Whether an increment is that of the motion. Where the step is too large, the equation may have been solved by a point far
-   away, at another energy, that has nothing to do with it. */
-static int kowalevski_top_plausible(const kowalevski_top_solver *s, int stage, const double increment[6])
+/* How far a step may lead, in sizes of the state and of what the vector field says, if the energy is lost;
+   and the part of the energy that counts as lost. */
+#define kowalevski_top_PLAUSIBLE 1.5
+#define kowalevski_top_LOST 0.5
+
+/* Whether an increment is that of the motion. Where the step is too large, the equation may have been solved
+   by a point far away, at another energy, that has nothing to do with it. */
+static int kowalevski_top_plausible(const kowalevski_top_solver *s,
+    const double increment[kowalevski_top_DIM])
 {
-    double moved = 0.0, size = 0.0, field[6], middle[6], end[6];
-    for (int i = 0; i < 6; ++i) {
+    double moved = 0.0, size = 0.0, field[kowalevski_top_DIM], middle[kowalevski_top_DIM],
+        end[kowalevski_top_DIM];
+    for (int i = 0; i < kowalevski_top_DIM; ++i) {
         moved += fabs(increment[i]);
         size += fabs(s->x[i]);
     }
-    if (moved <= 1.5 * size) return 1;
+    if (moved <= kowalevski_top_PLAUSIBLE * size) return 1;
     kowalevski_top_vector_field(&s->params, s->x, field);
-    for (int i = 0; i < 6; ++i) {
-        size += fabs(kowalevski_top_fractions[stage] * s->h * field[i]);
+    for (int i = 0; i < kowalevski_top_DIM; ++i) {
+        size += fabs(s->h * field[i]);
         middle[i] = s->x[i] + 0.5 * increment[i];
         end[i] = s->x[i] + increment[i];
     }
-    if (moved <= 1.5 * size) return 1;
-    const double before = kowalevski_top_hamiltonian(&s->params, s->x), after = kowalevski_top_hamiltonian(&s->params, end);
+    if (moved <= kowalevski_top_PLAUSIBLE * size) return 1;
+    const double before = kowalevski_top_hamiltonian(&s->params, s->x), after =
+        kowalevski_top_hamiltonian(&s->params, end);
     const double scale = fabs(before) + fabs(kowalevski_top_hamiltonian(&s->params, middle)) + fabs(after);
-    return fabs(after - before) <= 0.5 * scale;
+    return fabs(after - before) <= kowalevski_top_LOST * scale;
 }
 
-/* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to its last
-   bit: were it rounded with the change, corrections of one sign would add up to a drift. 0, and x as before, if the
-   sum is not finite. */
-static int kowalevski_top_advance(kowalevski_top_solver *s, const double change[6], const double correction[6])
-{
-    double x[6], carry[6];
-    for (int i = 0; i < 6; ++i) {
-        const double sum = s->x[i] + change[i], added = sum - s->x[i];
-        const double lost = (s->x[i] - (sum - added)) + (change[i] - added);
-        const double small = lost + (s->carry[i] + correction[i]);
-        x[i] = sum + small;
-        carry[i] = small - (x[i] - sum);
-        if (!isfinite(x[i])) return 0;
-    }
-    memcpy(s->x, x, sizeof x);
-    memcpy(s->carry, carry, sizeof carry);
-    return 1;
-}
+/* ---- The implicit step, by Newton's method ---- */
+/* Components of y are measured no finer than by this part of the largest. */
+#define kowalevski_top_FLOOR 1e-6
 
-/* Size of a correction relative to each component of y, but no finer than 1e-6 of the largest; NaN or infinite if
-   the correction is. */
-static double kowalevski_top_size(const double y[6], const double delta[6])
+/* Size of a correction relative to each component of y; NaN or infinite if the correction is. */
+static double kowalevski_top_size(const double y[kowalevski_top_DIM], const double delta[kowalevski_top_DIM])
 {
     double norm = 0.0, size = 0.0;
-    for (int i = 0; i < 6; ++i) norm = fabs(y[i]) > norm ? fabs(y[i]) : norm;
-    for (int i = 0; i < 6; ++i) {
-        const double ratio = fabs(delta[i]) / (fabs(y[i]) + 1e-6 * norm + DBL_MIN);
+    for (int i = 0; i < kowalevski_top_DIM; ++i) norm = fabs(y[i]) > norm ? fabs(y[i]) : norm;
+    for (int i = 0; i < kowalevski_top_DIM; ++i) {
+        const double ratio = fabs(delta[i]) / (fabs(y[i]) + kowalevski_top_FLOOR * norm + DBL_MIN);
         if (!isfinite(ratio)) return ratio;
         size = ratio > size ? ratio : size;
     }
     return size;
 }
 
+/* Corrections below the first that shrink by less than the second have reached the level of rounding. */
+#define kowalevski_top_NEARLY_SOLVED 1e-8
+#define kowalevski_top_SHRINKING 0.25
+
 /* Solve (y - x) + displacement(y) = 0 for y by Newton's method from the extrapolated guess, and advance. The
-   increment is corrected to first order by the last Newton correction, so that correction costs no evaluation:
-   a correction is accepted when the error that remains after it, quadratic in it, is below 1e-20. */
-static kowalevski_top_status kowalevski_top_attempt(kowalevski_top_solver *s, int stage)
+   increment is corrected to first order by the last Newton correction, so that correction costs no
+   evaluation: a correction is accepted when the error that remains after it, quadratic in it, is below
+   kowalevski_top_TOLERANCE. */
+static kowalevski_top_status kowalevski_top_attempt(kowalevski_top_solver *s)
 {
-    const double *coef = s->coef[stage];
-    kowalevski_top_memory *memory = &s->memory[stage];
-    double y[6], delta[6], displacement[6], increment[6];
-    double jacobian[36], increment_jacobian[36];
-    if (!kowalevski_top_predict(memory, y)) memcpy(y, s->x, sizeof y);
-    double previous = HUGE_VAL;
-    for (int iteration = 0; iteration < 20; ++iteration) {
-        kowalevski_top_linearise(coef, y, displacement, increment, jacobian, increment_jacobian);
+    double y[kowalevski_top_DIM], delta[kowalevski_top_DIM], displacement[kowalevski_top_DIM],
+        increment[kowalevski_top_DIM];
+    double jacobian[kowalevski_top_DIM * kowalevski_top_DIM], increment_jacobian[kowalevski_top_DIM
+        * kowalevski_top_DIM], previous = HUGE_VAL;
+    if (!kowalevski_top_predict(&s->history, y)) memcpy(y, s->x, sizeof y);
+    for (int iteration = 1; iteration <= kowalevski_top_MAX_ITERATIONS; ++iteration) {
+        kowalevski_top_linearise(s->coef, y, displacement, increment, jacobian, increment_jacobian);
         ++s->evaluations;
-        for (int i = 0; i < 6; ++i) delta[i] = ((y[i] - s->x[i]) + displacement[i]) - s->carry[i];
+        for (int i = 0; i < kowalevski_top_DIM; ++i) delta[i] = ((y[i] - s->x[i]) + displacement[i])
+            - s->carry[i];
         const int regular = kowalevski_top_solve(jacobian, delta);
-        const double size = kowalevski_top_size(y, delta);
+        const double size = kowalevski_top_size(y, delta), growth = size / (previous * previous);
         if (!isfinite(size)) return kowalevski_top_NOT_FINITE;
         if (!regular) return kowalevski_top_SINGULAR;
-        for (int i = 0; i < 6; ++i) y[i] -= delta[i];
-        const double growth = size / (previous * previous);
+        for (int i = 0; i < kowalevski_top_DIM; ++i) y[i] -= delta[i];
         const double remaining = size * size * (growth > 1.0 ? growth : 1.0);
-        /* The second test: corrections no longer shrink, the solve has reached the level of rounding. */
-        if (remaining <= 1e-20 || (previous < 1e-8 && size > 0.25 * previous)) {
-            double correction[6] = { 0.0 };
-            for (int i = 0; i < 6; ++i)
-                for (int j = 0; j < 6; ++j) correction[i] -= increment_jacobian[i * 6 + j] * delta[j];
-            if (!kowalevski_top_plausible(s, stage, increment)) return kowalevski_top_NO_CONVERGENCE;
-            if (!kowalevski_top_advance(s, increment, correction)) return kowalevski_top_NOT_FINITE;
-            kowalevski_top_remember(memory, y, iteration + 1);
-            return kowalevski_top_OK;
-        }
+        const int stalled = previous < kowalevski_top_NEARLY_SOLVED && size > kowalevski_top_SHRINKING
+            * previous;
         previous = size;
+        if (!(remaining <= kowalevski_top_TOLERANCE || stalled)) continue;
+        double correction[kowalevski_top_DIM] = { 0.0 };
+        for (int i = 0; i < kowalevski_top_DIM; ++i)
+            for (int j = 0; j < kowalevski_top_DIM; ++j)
+                correction[i] -= increment_jacobian[i * kowalevski_top_DIM + j] * delta[j];
+        if (!kowalevski_top_plausible(s, increment)) return kowalevski_top_NO_CONVERGENCE;
+        if (!kowalevski_top_advance(s, increment, correction)) return kowalevski_top_NOT_FINITE;
+        kowalevski_top_remember(&s->history, y, iteration);
+        return kowalevski_top_OK;
     }
     return kowalevski_top_NO_CONVERGENCE;
 }
 
-/* The 1 stages of one step. If one fails, the state is as before the step. */
-static kowalevski_top_status kowalevski_top_stages(kowalevski_top_solver *s)
-{
-    double x[6], carry[6];
-    memcpy(x, s->x, sizeof x);
-    memcpy(carry, s->carry, sizeof carry);
-    for (int stage = 0; stage < 1; ++stage) {
-        kowalevski_top_status status = kowalevski_top_attempt(s, stage);
-        /* A guess from earlier steps may have misled it: once more without. */
-        if (status != kowalevski_top_OK && s->memory[stage].count > 0) {
-            memset(&s->memory[stage], 0, sizeof s->memory[stage]);
-            status = kowalevski_top_attempt(s, stage);
-        }
-        if (status != kowalevski_top_OK) {
-            memcpy(s->x, x, sizeof x);
-            memcpy(s->carry, carry, sizeof carry);
-            return status;
-        }
-    }
-    return kowalevski_top_OK;
-}
-
-/* All of kowalevski_top_init but the gauge. The arguments may be parts of *s: they are read before it is written. */
-static kowalevski_top_status kowalevski_top_start(kowalevski_top_solver *s, const kowalevski_top_params *params, const double x0[6])
-{
-    if (s == NULL || x0 == NULL) return kowalevski_top_BAD_ARGUMENT;
-    const kowalevski_top_params own = params != NULL ? *params : kowalevski_top_default_params;
-    double x[6];
-    memcpy(x, x0, sizeof x);
-    for (int i = 0; i < 6; ++i)
-        if (!isfinite(x[i])) return kowalevski_top_BAD_ARGUMENT;
-    memset(s, 0, sizeof *s);
-    memcpy(s->x, x, sizeof s->x);
-    s->params = own;
-    return kowalevski_top_OK;
-}
-
-kowalevski_top_status kowalevski_top_init(kowalevski_top_solver *s, const kowalevski_top_params *params,
-                                          const double x0[6])
-{
-    return kowalevski_top_start(s, params, x0);
-}
-
-/* What depends on the step size; nothing where that is as before. */
-static kowalevski_top_status kowalevski_top_set_step(kowalevski_top_solver *s, double h)
-{
-    if (s == NULL || !isfinite(h)) return kowalevski_top_BAD_ARGUMENT;
-    if (s->ready && memcmp(&h, &s->h, sizeof h) == 0) return kowalevski_top_OK;
-    for (int stage = 0; stage < 1; ++stage)
-        kowalevski_top_prepare(&s->params, kowalevski_top_fractions[stage] * h, s->coef[stage]);
-    memset(s->memory, 0, sizeof s->memory);
-    for (int stage = 0; stage < 1; ++stage) s->memory[stage].patience = 150;
-    s->pause = 16;
-    s->setback = s->foreseeing = 0;
-    s->doubt = s->retry = 0;
-    s->effort = 0.0;
-    s->passes = INT_MAX;
-    s->h = h;
-    s->ready = 1;
-    return kowalevski_top_OK;
-}
-
-kowalevski_top_status kowalevski_top_step(kowalevski_top_solver *s, double h)
-{
-    kowalevski_top_status status = kowalevski_top_set_step(s, h);
-    if (status != kowalevski_top_OK) return status;
-    status = kowalevski_top_stages(s);
-    if (status == kowalevski_top_OK) ++s->steps;
-    return status;
-}
-
-/*
- * Eight at a time: below, the formulas of a step are evaluated for 8 steps of a trajectory, or members of an
- * ensemble, at once. Compilers make vector instructions of the loops over lanes.
- */
-enum { kowalevski_top_LANES = 8 };
+/* ---- Several steps or members at once ---- */
+/* Below, the formulas of a step are evaluated for several steps of a trajectory, or members of an ensemble,
+   at once. Compilers make vector instructions of the loops over lanes. */
+enum { kowalevski_top_LANES = 8 }; /* what one vector of AVX-512 holds */
 
 #if defined(__GNUC__)
-typedef double kowalevski_top_lanes[kowalevski_top_LANES] __attribute__((aligned(64))); /* a value in each lane */
+/* a value in each lane */
+typedef double kowalevski_top_lanes[kowalevski_top_LANES] __attribute__((aligned(64)));
 #else
 typedef double kowalevski_top_lanes[kowalevski_top_LANES];
 #endif
 
+/* Before a loop over lanes: tells compilers that they are independent. */
 #if defined(__clang__)
 #define kowalevski_top_EACH_LANE _Pragma("clang loop vectorize(assume_safety)")
 #pragma clang diagnostic push
@@ -1416,24 +1428,90 @@ typedef double kowalevski_top_lanes[kowalevski_top_LANES];
 #define kowalevski_top_EACH_LANE
 #endif
 
-/* What all blocks share: coefficients, the same in each lane, and the recurrences by which they are foreseen. */
-typedef struct {
-    int fits[1]; /* the fit that weight is of; -1 for none */
-    kowalevski_top_lanes coef[1][172], weight[1][40][6];
-} kowalevski_top_table;
+/* ---- The solver ---- */
+/* The arguments may be parts of *s: they are read before it is written. */
+kowalevski_top_status kowalevski_top_init(kowalevski_top_solver *s, const kowalevski_top_params *params,
+    const double x0[kowalevski_top_DIM])
+{
+    if (s == NULL || x0 == NULL) return kowalevski_top_BAD_ARGUMENT;
+    const kowalevski_top_params own = params != NULL ? *params : kowalevski_top_default_params;
+    double x[kowalevski_top_DIM];
+    memcpy(x, x0, sizeof x);
+    for (int i = 0; i < kowalevski_top_DIM; ++i)
+        if (!isfinite(x[i])) return kowalevski_top_BAD_ARGUMENT;
+    memset(s, 0, sizeof *s);
+    memcpy(s->x, x, sizeof s->x);
+    s->params = own;
+    return kowalevski_top_OK;
+}
 
-/* A stage in all lanes, linearised around y. */
-typedef struct {
-    kowalevski_top_lanes y[6], displacement[6], increment[6], residual[6];
-    /* a residual r of alpha(y) = x takes inverse r from y, and gain r from the increment */
-    kowalevski_top_lanes inverse[36], slope[36], gain[36];
-} kowalevski_top_model;
+/* What depends on the step size; nothing where that is as before. */
+static kowalevski_top_status kowalevski_top_set_step(kowalevski_top_solver *s, double h)
+{
+    if (s == NULL || !isfinite(h)) return kowalevski_top_BAD_ARGUMENT;
+    if (s->prepared && memcmp(&h, &s->h, sizeof h) == 0) return kowalevski_top_OK;
+    kowalevski_top_prepare(&s->params, h, s->coef);
+    memset(&s->history, 0, sizeof s->history);
+    s->history.slow_steps_allowed = kowalevski_top_REPAY;
+    memset(&s->blocks, 0, sizeof s->blocks);
+    s->blocks.single_steps = 2 * kowalevski_top_LANES;
+    s->blocks.passes_without_recurrences = INT_MAX;
+    s->h = h;
+    s->t_before_h = s->t;
+    s->steps_before_h = s->steps;
+    s->prepared = 1;
+    return kowalevski_top_OK;
+}
+
+/* Some good steps have been made. */
+static void kowalevski_top_count(kowalevski_top_solver *s, size_t steps)
+{
+    s->steps += steps;
+    s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
+}
+
+/* One stage. A guess from earlier steps may have misled it: then once more without. */
+static kowalevski_top_status kowalevski_top_stage(kowalevski_top_solver *s)
+{
+    kowalevski_top_status status = kowalevski_top_attempt(s);
+    if (status != kowalevski_top_OK && s->history.count > 0) {
+        memset(&s->history, 0, sizeof s->history);
+        status = kowalevski_top_attempt(s);
+    }
+    return status;
+}
+
+kowalevski_top_status kowalevski_top_step(kowalevski_top_solver *s, double h)
+{
+    kowalevski_top_status status = kowalevski_top_set_step(s, h);
+    if (status != kowalevski_top_OK) return status;
+    status = kowalevski_top_stage(s);
+    if (status == kowalevski_top_OK) kowalevski_top_count(s, 1);
+    return status;
+}
+
+const char *kowalevski_top_status_string(kowalevski_top_status status)
+{
+    static const char *const text[] = {
+        "ok",
+        "no convergence: the step is too large",
+        "singular Newton matrix: the step is too large",
+        "not finite: overflow, or outside the domain",
+        "bad argument: a null pointer, or values that are not allowed"
+    };
+    return (unsigned)status <= kowalevski_top_BAD_ARGUMENT ? text[status] : "unknown status";
+}
+
+size_t kowalevski_top_solver_size(void) { return sizeof(kowalevski_top_solver); }
+
+size_t kowalevski_top_solver_steps_done(const kowalevski_top_solver *s) { return s->steps; }
 
 /* kowalevski_top_phi0 for the loops over lanes: no branches. No number beyond |s| = 4.0. */
 static inline double kowalevski_top_phi0_lane(double s)
 {
     const double ss = s * s;
-    double sum = 1.455172475614865e-27, other = 5.744790668872202e-26; /* every second term each, as neither then is waited for */
+    /* every second term each, as neither then is waited for */
+    double sum = 1.455172475614865e-27, other = 5.744790668872202e-26;
     sum = sum * ss + 2.267952452337683e-24;
     other = other * ss + 8.953517427037546e-23;
     sum = sum * ss + 3.534707039629467e-21;
@@ -1456,7 +1534,8 @@ static inline double kowalevski_top_phi0_lane(double s)
 static inline double kowalevski_top_phi1_lane(double s)
 {
     const double ss = s * s;
-    double sum = 6.266191399131027e-28, other = 2.328275960983784e-26; /* every second term each, as neither then is waited for */
+    /* every second term each, as neither then is waited for */
+    double sum = 6.266191399131027e-28, other = 2.328275960983784e-26;
     sum = sum * ss + 8.617186003308303e-25;
     other = other * ss + 3.1751334332727565e-23;
     sum = sum * ss + 1.163957265514881e-21;
@@ -1479,7 +1558,8 @@ static inline double kowalevski_top_phi1_lane(double s)
 static inline double kowalevski_top_phi2_lane(double s)
 {
     const double ss = s * s;
-    double sum = 2.8570406826710835e-28, other = 1.0025906238609643e-26; /* every second term each, as neither then is waited for */
+    /* every second term each, as neither then is waited for */
+    double sum = 2.8570406826710835e-28, other = 1.0025906238609643e-26;
     sum = sum * ss + 3.492413941475676e-25;
     other = other * ss + 1.2064060404631625e-23;
     sum = sum * ss + 4.127673463254583e-22;
@@ -1498,73 +1578,78 @@ static inline double kowalevski_top_phi2_lane(double s)
     return sum + (fabs(s) <= 4.0 ? 0.0 : (double)NAN);
 }
 
-/* kowalevski_top_linearise_lanes_part1 (part 1 of 3) */
+/* kowalevski_top_linearise in all lanes (part 1 of 3) */
 kowalevski_top_APART static void kowalevski_top_linearise_lanes_part1(kowalevski_top_lanes coef[restrict 172],
-                                                                      kowalevski_top_lanes y[restrict 6],
-                                                                      kowalevski_top_lanes displacement[restrict 6],
-                                                                      kowalevski_top_lanes increment[restrict 6],
-                                                                      kowalevski_top_lanes jacobian[restrict 36],
-                                                                      kowalevski_top_lanes increment_jacobian[restrict 36],
-                                                                      kowalevski_top_lanes work[restrict 274])
+    kowalevski_top_lanes y[restrict 6], kowalevski_top_lanes displacement[restrict 6],
+    kowalevski_top_lanes increment[restrict 6], kowalevski_top_lanes jacobian[restrict 36],
+    kowalevski_top_lanes increment_jacobian[restrict 36], kowalevski_top_lanes work[restrict 274])
 {
-    (void)displacement;
-    (void)jacobian;
-    (void)increment_jacobian;
+    (void)displacement, (void)jacobian, (void)increment_jacobian;
     kowalevski_top_EACH_LANE
     for (int lane = 0; lane < kowalevski_top_LANES; ++lane) {
-        const double P1 = y[0][lane];
-        const double P2 = y[1][lane];
-        const double P3 = y[2][lane];
-        const double G1 = y[3][lane];
-        const double G2 = y[4][lane];
-        const double G3 = y[5][lane];
+        const double P1 = y[0][lane], P2 = y[1][lane], P3 = y[2][lane], G1 = y[3][lane], G2 = y[4][lane], G3 =
+            y[5][lane];
         work[54][lane] = G2 * P2;
         work[29][lane] = P2 * P2;
         work[126][lane] = coef[77][lane] * work[29][lane];
         work[97][lane] = coef[38][lane] + G1 * coef[47][lane];
         work[127][lane] = coef[10][lane] + G1 * coef[15][lane];
         work[128][lane] = coef[18][lane] * work[29][lane];
-        const double t7 = G1 * (coef[3][lane] + G1 * coef[4][lane]);
+        const double t1 = G1 * (coef[3][lane] + G1 * coef[4][lane]);
         work[57][lane] = G3 * G3;
         work[77][lane] = G2 * G2;
-        const double t10 = coef[0][lane] + coef[2][lane] * work[77][lane];
-        const double t11 = work[29][lane] * (work[127][lane] + work[128][lane]) + (t7 + (coef[1][lane] * work[57][lane] + t10));
+        const double t2 = coef[0][lane] + coef[2][lane] * work[77][lane];
+        const double t3 = work[29][lane] * (work[127][lane] + work[128][lane])
+            + (t1 + (coef[1][lane] * work[57][lane] + t2));
         work[131][lane] = coef[64][lane] * work[54][lane];
         work[30][lane] = P1 * P1;
-        work[132][lane] = coef[10][lane] + G1 * coef[59][lane] + (coef[86][lane] * work[29][lane] + coef[18][lane] * work[30][lane]);
+        work[132][lane] = coef[10][lane] + G1 * coef[59][lane] + (coef[86][lane] * work[29][lane]
+            + coef[18][lane] * work[30][lane]);
         work[27][lane] = P3 * P3;
-        work[135][lane] = coef[49][lane] * work[57][lane] + (coef[66][lane] + coef[67][lane] * work[77][lane]);
+        work[135][lane] = coef[49][lane] * work[57][lane] + (coef[66][lane] + coef[67][lane]
+            * work[77][lane]);
         work[133][lane] = coef[69][lane] * work[77][lane] + coef[68][lane] * work[57][lane];
         work[136][lane] = coef[21][lane] + G1 * coef[70][lane];
         work[137][lane] = G3 * (G2 * P3);
         work[138][lane] = coef[78][lane] + G1 * coef[79][lane];
         work[115][lane] = coef[36][lane] * work[27][lane];
         work[139][lane] = coef[80][lane] * work[29][lane];
-        const double t23 = coef[76][lane] * work[27][lane];
-        const double t24 = G1 * coef[55][lane];
-        work[140][lane] = G1 * (coef[5][lane] + t24) + (coef[53][lane] * work[57][lane] + (coef[24][lane] + coef[54][lane] * work[77][lane]));
-        const double t26 = work[27][lane] * (coef[72][lane] * work[77][lane] + coef[71][lane] * work[57][lane]) + work[135][lane] + G1 * (work[133][lane] + G1 * (coef[73][lane] * work[27][lane] + work[136][lane])) + P2 * (coef[74][lane] * work[137][lane] + P2 * (work[29][lane] * (work[138][lane] + (work[115][lane] + work[139][lane])) + (work[27][lane] * (t23 + (coef[12][lane] + G1 * coef[75][lane])) + work[140][lane])));
+        const double t4 = coef[76][lane] * work[27][lane], t5 = G1 * coef[55][lane];
+        work[140][lane] = G1 * (coef[5][lane] + t5) + (coef[53][lane] * work[57][lane] + (coef[24][lane]
+            + coef[54][lane] * work[77][lane]));
+        const double t6 = work[27][lane] * (coef[72][lane] * work[77][lane] + coef[71][lane] * work[57][lane])
+            + work[135][lane] + G1 * (work[133][lane] + G1 * (coef[73][lane] * work[27][lane]
+            + work[136][lane])) + P2 * (coef[74][lane] * work[137][lane] + P2 * (work[29][lane]
+            * (work[138][lane] + (work[115][lane] + work[139][lane])) + (work[27][lane]
+            * (t4 + (coef[12][lane] + G1 * coef[75][lane])) + work[140][lane])));
         work[26][lane] = G3 * P3;
         work[129][lane] = coef[81][lane] + G1 * coef[82][lane] + coef[83][lane] * work[27][lane];
         work[103][lane] = G3 * (P2 * P3);
         work[122][lane] = coef[49][lane] + G1 * coef[64][lane];
         work[99][lane] = coef[39][lane] * work[29][lane];
         work[123][lane] = coef[84][lane] * work[27][lane];
-        work[87][lane] = work[26][lane] * work[129][lane] + P2 * (coef[40][lane] * work[103][lane] + G2 * (work[122][lane] + (work[99][lane] + work[123][lane])));
+        work[87][lane] = work[26][lane] * work[129][lane] + P2 * (coef[40][lane] * work[103][lane] + G2
+            * (work[122][lane] + (work[99][lane] + work[123][lane])));
         work[120][lane] = G1 * coef[35][lane];
         work[116][lane] = coef[34][lane] + work[120][lane];
         work[71][lane] = coef[44][lane] * work[27][lane];
         work[141][lane] = coef[37][lane] * work[29][lane];
-        const double t38 = G1 * coef[27][lane];
-        work[142][lane] = G1 * (coef[12][lane] + t38) + (coef[25][lane] * work[57][lane] + (coef[24][lane] + coef[26][lane] * work[77][lane]));
+        const double t7 = G1 * coef[27][lane];
+        work[142][lane] = G1 * (coef[12][lane] + t7) + (coef[25][lane] * work[57][lane] + (coef[24][lane]
+            + coef[26][lane] * work[77][lane]));
         work[143][lane] = coef[39][lane] * work[54][lane];
-        const double t41 = coef[40][lane] * work[26][lane];
-        work[144][lane] = coef[78][lane] + G1 * coef[87][lane] + (work[141][lane] + coef[80][lane] * work[30][lane]);
-        const double t43 = work[29][lane] * (work[116][lane] + (work[71][lane] + work[141][lane])) + (work[27][lane] * (t23 + (coef[12][lane] + G1 * coef[85][lane])) + work[142][lane]) + P1 * (work[143][lane] + t41 + P1 * (work[115][lane] + work[144][lane]));
-        work[11][lane] = G3 * (work[54][lane] * (work[126][lane] + work[97][lane]) + P1 * (t11 + P1 * (work[131][lane] + P1 * work[132][lane]))) + P3 * (t26 + P1 * (work[87][lane] + P1 * t43));
+        const double t8 = coef[40][lane] * work[26][lane];
+        work[144][lane] = coef[78][lane] + G1 * coef[87][lane] + (work[141][lane] + coef[80][lane]
+            * work[30][lane]);
+        const double t9 = work[29][lane] * (work[116][lane] + (work[71][lane] + work[141][lane]))
+            + (work[27][lane] * (t4 + (coef[12][lane] + G1 * coef[85][lane])) + work[142][lane]) + P1
+            * (work[143][lane] + t8 + P1 * (work[115][lane] + work[144][lane]));
+        work[11][lane] = G3 * (work[54][lane] * (work[126][lane] + work[97][lane]) + P1
+            * (t3 + P1 * (work[131][lane] + P1 * work[132][lane]))) + P3 * (t6 + P1 * (work[87][lane] + P1
+            * t9));
         work[95][lane] = work[11][lane] * work[11][lane];
         work[40][lane] = coef[8][lane] * work[57][lane];
-        const double t46 = work[40][lane] + coef[9][lane] * work[77][lane];
+        const double t10 = work[40][lane] + coef[9][lane] * work[77][lane];
         work[45][lane] = coef[10][lane] + G1 * coef[11][lane];
         work[42][lane] = coef[2][lane] * work[29][lane];
         work[72][lane] = G1 * G1;
@@ -1575,24 +1660,30 @@ kowalevski_top_APART static void kowalevski_top_linearise_lanes_part1(kowalevski
         work[60][lane] = G1 * work[39][lane];
         work[61][lane] = coef[21][lane] + G1 * coef[23][lane];
         work[62][lane] = coef[32][lane] * work[29][lane];
-        const double t57 = work[54][lane] * (t46 + G1 * (work[45][lane] + work[42][lane])) + P1 * (work[56][lane] + work[57][lane] * (work[58][lane] + (work[59][lane] + coef[43][lane] * work[30][lane])) + G2 * (coef[41][lane] * work[60][lane] + G2 * (work[61][lane] + (coef[44][lane] * work[30][lane] + work[62][lane]))));
+        const double t11 = work[54][lane] * (t10 + G1 * (work[45][lane] + work[42][lane])) + P1
+            * (work[56][lane] + work[57][lane] * (work[58][lane] + (work[59][lane] + coef[43][lane]
+            * work[30][lane])) + G2 * (coef[41][lane] * work[60][lane] + G2 * (work[61][lane]
+            + (coef[44][lane] * work[30][lane] + work[62][lane]))));
         work[32][lane] = coef[30][lane] * work[54][lane];
         work[88][lane] = G1 * coef[39][lane];
-        work[33][lane] = coef[38][lane] + work[88][lane] + (coef[42][lane] * work[29][lane] + coef[46][lane] * work[30][lane]);
-        work[86][lane] = G3 * (t11 + P1 * (work[32][lane] + P1 * work[33][lane]));
-        const double t62 = coef[5][lane] + G1 * coef[6][lane] + coef[7][lane] * work[27][lane];
+        work[33][lane] = coef[38][lane] + work[88][lane] + (coef[42][lane] * work[29][lane] + coef[46][lane]
+            * work[30][lane]);
+        work[86][lane] = G3 * (t3 + P1 * (work[32][lane] + P1 * work[33][lane]));
+        const double t12 = coef[5][lane] + G1 * coef[6][lane] + coef[7][lane] * work[27][lane];
         work[47][lane] = coef[12][lane] + G1 * coef[13][lane];
         work[48][lane] = coef[17][lane] * work[29][lane];
         work[46][lane] = coef[14][lane] * work[27][lane];
-        const double t66 = work[115][lane] + work[141][lane];
-        const double t67 = coef[29][lane] * work[27][lane];
-        work[55][lane] = work[29][lane] * (work[116][lane] + t66) + (work[27][lane] * (t67 + (coef[28][lane] + G1 * coef[14][lane])) + work[142][lane]);
-        const double t69 = coef[36][lane] * work[54][lane];
+        const double t13 = work[115][lane] + work[141][lane], t14 = coef[29][lane] * work[27][lane];
+        work[55][lane] = work[29][lane] * (work[116][lane] + t13) + (work[27][lane]
+            * (t14 + (coef[28][lane] + G1 * coef[14][lane])) + work[142][lane]);
+        const double t15 = coef[36][lane] * work[54][lane];
         work[85][lane] = coef[45][lane] * work[29][lane];
         work[117][lane] = coef[37][lane] * work[30][lane];
-        const double t72 = work[85][lane] + work[117][lane];
-        const double t73 = work[26][lane] * t62 + P2 * (coef[16][lane] * work[103][lane] + G2 * (work[47][lane] + (work[48][lane] + work[46][lane]))) + P1 * (work[55][lane] + P1 * (t69 + t41 + P1 * (work[115][lane] + (coef[34][lane] + G1 * coef[17][lane] + t72))));
-        work[20][lane] = t57 + P3 * (work[86][lane] + P3 * t73);
+        const double t16 = work[85][lane] + work[117][lane];
+        const double t17 = work[26][lane] * t12 + P2 * (coef[16][lane] * work[103][lane] + G2
+            * (work[47][lane] + (work[48][lane] + work[46][lane]))) + P1 * (work[55][lane] + P1
+            * (t15 + t8 + P1 * (work[115][lane] + (coef[34][lane] + G1 * coef[17][lane] + t16))));
+        work[20][lane] = t11 + P3 * (work[86][lane] + P3 * t17);
         work[96][lane] = work[20][lane] * work[20][lane];
         work[98][lane] = coef[48][lane] * work[27][lane];
         work[102][lane] = work[26][lane] * (work[97][lane] + work[98][lane]);
@@ -1600,7 +1691,7 @@ kowalevski_top_APART static void kowalevski_top_linearise_lanes_part1(kowalevski
         work[43][lane] = G3 * P1;
         work[106][lane] = coef[64][lane] * work[43][lane];
         work[82][lane] = coef[17][lane] * work[30][lane];
-        const double t81 = coef[58][lane] * work[29][lane];
+        const double t18 = coef[58][lane] * work[29][lane];
         work[121][lane] = coef[32][lane] * work[30][lane];
         work[111][lane] = coef[12][lane] + work[121][lane];
         work[112][lane] = coef[49][lane] + coef[31][lane] * work[30][lane];
@@ -1616,60 +1707,85 @@ kowalevski_top_APART static void kowalevski_top_linearise_lanes_part1(kowalevski
         work[69][lane] = coef[63][lane] * work[29][lane];
         work[101][lane] = work[68][lane] + (work[118][lane] + work[69][lane]);
         work[124][lane] = G3 * (work[100][lane] + P1 * work[101][lane]);
-        const double t97 = G1 * coef[50][lane];
-        work[113][lane] = work[27][lane] * (t67 + (coef[28][lane] + G1 * coef[56][lane])) + work[140][lane];
+        const double t19 = G1 * coef[50][lane];
+        work[113][lane] = work[27][lane] * (t14 + (coef[28][lane] + G1 * coef[56][lane])) + work[140][lane];
         work[114][lane] = coef[62][lane] * work[26][lane];
-        work[70][lane] = work[114][lane] + t69;
-        const double t101 = work[77][lane] * (t81 + work[111][lane]) + (coef[19][lane] + work[57][lane] * (work[48][lane] + work[112][lane])) + G1 * (G1 * (work[109][lane] + (work[110][lane] + work[104][lane])) + work[119][lane]) + P3 * (work[124][lane] + P3 * (work[29][lane] * (coef[34][lane] + t97 + t66) + work[113][lane] + P1 * (work[70][lane] + P1 * (work[115][lane] + (work[116][lane] + t72)))));
-        work[13][lane] = G2 * (work[102][lane] + P1 * (t46 + G1 * (work[105][lane] + work[45][lane]) + P3 * (work[106][lane] + P3 * (work[47][lane] + (work[82][lane] + work[46][lane]))))) + P2 * t101;
+        work[70][lane] = work[114][lane] + t15;
+        const double t20 = work[77][lane] * (t18 + work[111][lane]) + (coef[19][lane] + work[57][lane]
+            * (work[48][lane] + work[112][lane])) + G1 * (G1 * (work[109][lane] + (work[110][lane]
+            + work[104][lane])) + work[119][lane]) + P3 * (work[124][lane] + P3 * (work[29][lane]
+            * (coef[34][lane] + t19 + t13) + work[113][lane] + P1 * (work[70][lane] + P1 * (work[115][lane]
+            + (work[116][lane] + t16)))));
+        work[13][lane] = G2 * (work[102][lane] + P1 * (t10 + G1 * (work[105][lane] + work[45][lane]) + P3
+            * (work[106][lane] + P3 * (work[47][lane] + (work[82][lane] + work[46][lane]))))) + P2 * t20;
         work[94][lane] = work[13][lane] * work[13][lane];
         work[125][lane] = work[96][lane] + work[94][lane];
         work[6][lane] = work[95][lane] + work[125][lane];
         work[14][lane] = kowalevski_top_phi0_lane(work[6][lane]);
         work[183][lane] = coef[87][lane] * work[29][lane];
-        work[182][lane] = coef[49][lane] + t97;
-        const double t108 = G1 * coef[90][lane];
-        work[185][lane] = G1 * (coef[38][lane] + t108);
+        work[182][lane] = coef[49][lane] + t19;
+        const double t21 = G1 * coef[90][lane];
+        work[185][lane] = G1 * (coef[38][lane] + t21);
         work[186][lane] = coef[114][lane] + coef[108][lane] * work[77][lane];
         work[28][lane] = coef[118][lane] * work[54][lane];
         work[187][lane] = work[58][lane] + (work[59][lane] + coef[119][lane] * work[30][lane]);
         work[184][lane] = coef[49][lane] + G1 * coef[68][lane] + coef[116][lane] * work[27][lane];
-        const double t114 = coef[16][lane] * work[27][lane];
-        work[130][lane] = t7 + (coef[117][lane] * work[57][lane] + t10);
-        work[31][lane] = work[29][lane] * (work[127][lane] + (t114 + work[128][lane])) + (work[27][lane] * t62 + work[130][lane]);
-        const double t117 = work[26][lane] * work[184][lane] + P2 * (coef[53][lane] * work[103][lane] + G2 * (work[97][lane] + (work[126][lane] + work[98][lane]))) + P1 * (work[31][lane] + P1 * (coef[25][lane] * work[26][lane] + work[131][lane] + P1 * (t114 + work[132][lane])));
-        work[8][lane] = G3 * (work[29][lane] * (work[183][lane] + work[182][lane]) + (work[185][lane] + (coef[115][lane] * work[57][lane] + work[186][lane])) + P1 * (work[28][lane] + P1 * work[187][lane])) + P3 * t117;
+        const double t22 = coef[16][lane] * work[27][lane];
+        work[130][lane] = t1 + (coef[117][lane] * work[57][lane] + t2);
+        work[31][lane] = work[29][lane] * (work[127][lane] + (t22 + work[128][lane])) + (work[27][lane] * t12
+            + work[130][lane]);
+        const double t23 = work[26][lane] * work[184][lane] + P2 * (coef[53][lane] * work[103][lane] + G2
+            * (work[97][lane] + (work[126][lane] + work[98][lane]))) + P1 * (work[31][lane] + P1
+            * (coef[25][lane] * work[26][lane] + work[131][lane] + P1 * (t22 + work[132][lane])));
+        work[8][lane] = G3 * (work[29][lane] * (work[183][lane] + work[182][lane]) + (work[185][lane]
+            + (coef[115][lane] * work[57][lane] + work[186][lane])) + P1 * (work[28][lane] + P1
+            * work[187][lane])) + P3 * t23;
         work[63][lane] = G3 * work[20][lane];
         work[34][lane] = G1 * work[11][lane];
         work[24][lane] = work[63][lane] - work[34][lane];
-        work[173][lane] = work[27][lane] * (coef[111][lane] * work[27][lane] + (coef[67][lane] + G1 * coef[69][lane]));
-        const double t122 = G1 * coef[91][lane];
-        work[174][lane] = G1 * (coef[110][lane] + t122);
+        work[173][lane] = work[27][lane] * (coef[111][lane] * work[27][lane] + (coef[67][lane] + G1
+            * coef[69][lane]));
+        const double t24 = G1 * coef[91][lane];
+        work[174][lane] = G1 * (coef[110][lane] + t24);
         work[175][lane] = coef[108][lane] * work[57][lane];
         work[44][lane] = coef[113][lane] * work[26][lane];
         work[176][lane] = coef[26][lane] * work[27][lane];
         work[49][lane] = coef[36][lane] * work[30][lane];
-        work[172][lane] = coef[12][lane] + G1 * coef[51][lane] + (coef[112][lane] * work[29][lane] + coef[54][lane] * work[27][lane]);
+        work[172][lane] = coef[12][lane] + G1 * coef[51][lane] + (coef[112][lane] * work[29][lane]
+            + coef[54][lane] * work[27][lane]);
         work[41][lane] = G2 * coef[90][lane];
         work[145][lane] = work[105][lane] + work[42][lane];
-        const double t131 = P1 * (work[40][lane] + G2 * (work[41][lane] + coef[32][lane] * work[39][lane]) + G1 * (work[45][lane] + work[145][lane]) + P3 * (work[106][lane] + P3 * (work[46][lane] + (work[47][lane] + (work[48][lane] + work[82][lane])))));
-        work[0][lane] = G2 * (work[173][lane] + (work[174][lane] + (work[175][lane] + (coef[107][lane] + coef[109][lane] * work[77][lane]))) + P1 * (work[44][lane] + P1 * (work[61][lane] + (work[176][lane] + work[49][lane])))) + P2 * (work[102][lane] + P2 * (coef[77][lane] * work[103][lane] + G2 * work[172][lane]) + t131);
+        const double t25 = P1 * (work[40][lane] + G2 * (work[41][lane] + coef[32][lane] * work[39][lane]) + G1
+            * (work[45][lane] + work[145][lane]) + P3 * (work[106][lane] + P3 * (work[46][lane]
+            + (work[47][lane] + (work[48][lane] + work[82][lane])))));
+        work[0][lane] = G2 * (work[173][lane] + (work[174][lane] + (work[175][lane] + (coef[107][lane]
+            + coef[109][lane] * work[77][lane]))) + P1 * (work[44][lane] + P1 * (work[61][lane]
+            + (work[176][lane] + work[49][lane])))) + P2 * (work[102][lane] + P2 * (coef[77][lane]
+            * work[103][lane] + G2 * work[172][lane]) + t25);
         work[51][lane] = G1 * work[13][lane];
         work[50][lane] = G2 * work[20][lane];
         work[25][lane] = work[51][lane] - work[50][lane];
         work[148][lane] = G2 * P1;
         work[78][lane] = coef[10][lane] + G1 * coef[102][lane];
-        work[149][lane] = work[110][lane] + t81;
-        const double t138 = work[148][lane] * (work[105][lane] + work[78][lane]) + P2 * (coef[79][lane] * work[57][lane] + G2 * (G2 * coef[96][lane] + coef[2][lane] * work[39][lane]) + G1 * (coef[12][lane] + G1 * coef[97][lane] + work[149][lane]));
+        work[149][lane] = work[110][lane] + t18;
+        const double t26 = work[148][lane] * (work[105][lane] + work[78][lane]) + P2 * (coef[79][lane]
+            * work[57][lane] + G2 * (G2 * coef[96][lane] + coef[2][lane] * work[39][lane]) + G1
+            * (coef[12][lane] + G1 * coef[97][lane] + work[149][lane]));
         work[146][lane] = coef[47][lane] * work[54][lane];
         work[79][lane] = coef[3][lane] + G1 * coef[101][lane];
         work[80][lane] = coef[15][lane] * work[29][lane];
         work[147][lane] = work[79][lane] + (work[80][lane] + coef[59][lane] * work[30][lane]);
         work[134][lane] = G3 * (work[146][lane] + P1 * work[147][lane]);
         work[150][lane] = coef[95][lane] * work[27][lane];
-        const double t145 = coef[93][lane] * work[77][lane] + coef[92][lane] * work[57][lane] + G1 * (work[150][lane] + (coef[21][lane] + G1 * coef[94][lane])) + work[29][lane] * (coef[98][lane] + t24 + (coef[99][lane] * work[27][lane] + coef[100][lane] * work[29][lane]));
+        const double t27 = coef[93][lane] * work[77][lane] + coef[92][lane] * work[57][lane] + G1
+            * (work[150][lane] + (coef[21][lane] + G1 * coef[94][lane])) + work[29][lane] * (coef[98][lane]
+            + t5 + (coef[99][lane] * work[27][lane] + coef[100][lane] * work[29][lane]));
         work[81][lane] = coef[13][lane] * work[54][lane] + coef[6][lane] * work[26][lane];
-        work[2][lane] = work[77][lane] * (coef[89][lane] + t122 + coef[104][lane] * work[30][lane]) + (coef[66][lane] + work[57][lane] * (coef[103][lane] * work[30][lane] + (coef[88][lane] + t108))) + P2 * t138 + P3 * (work[134][lane] + P3 * (t145 + P1 * (work[81][lane] + P1 * (coef[105][lane] * work[27][lane] + (coef[28][lane] + t38 + (coef[97][lane] * work[29][lane] + coef[106][lane] * work[30][lane]))))));
+        work[2][lane] = work[77][lane] * (coef[89][lane] + t24 + coef[104][lane] * work[30][lane])
+            + (coef[66][lane] + work[57][lane] * (coef[103][lane] * work[30][lane] + (coef[88][lane] + t21)))
+            + P2 * t26 + P3 * (work[134][lane] + P3 * (t27 + P1 * (work[81][lane] + P1 * (coef[105][lane]
+            * work[27][lane] + (coef[28][lane] + t7 + (coef[97][lane] * work[29][lane] + coef[106][lane]
+            * work[30][lane]))))));
         work[64][lane] = G3 * work[2][lane];
         work[90][lane] = G1 * work[8][lane];
         work[65][lane] = P3 * work[20][lane];
@@ -1680,7 +1796,8 @@ kowalevski_top_APART static void kowalevski_top_linearise_lanes_part1(kowalevski
         work[74][lane] = P1 * work[13][lane];
         work[66][lane] = P2 * work[20][lane];
         work[22][lane] = work[73][lane] - work[67][lane] + (work[74][lane] - work[66][lane]);
-        work[7][lane] = work[8][lane] * work[24][lane] - work[0][lane] * work[25][lane] + (work[11][lane] * work[21][lane] - work[13][lane] * work[22][lane]);
+        work[7][lane] = work[8][lane] * work[24][lane] - work[0][lane] * work[25][lane] + (work[11][lane]
+            * work[21][lane] - work[13][lane] * work[22][lane]);
         work[15][lane] = kowalevski_top_phi1_lane(work[6][lane]);
         work[38][lane] = G2 * work[11][lane];
         work[37][lane] = G3 * work[13][lane];
@@ -1705,12 +1822,15 @@ kowalevski_top_APART static void kowalevski_top_linearise_lanes_part1(kowalevski
         work[92][lane] = P2 * work[11][lane];
         work[75][lane] = P3 * work[13][lane];
         work[16][lane] = work[91][lane] - work[76][lane] + (work[92][lane] - work[75][lane]);
-        work[19][lane] = work[0][lane] * work[23][lane] - work[2][lane] * work[24][lane] + (work[13][lane] * work[16][lane] - work[20][lane] * work[21][lane]);
+        work[19][lane] = work[0][lane] * work[23][lane] - work[2][lane] * work[24][lane] + (work[13][lane]
+            * work[16][lane] - work[20][lane] * work[21][lane]);
         work[256][lane] = work[20][lane] * work[19][lane];
         work[93][lane] = work[11][lane] * work[7][lane];
-        work[12][lane] = work[2][lane] * work[17][lane] - work[8][lane] * work[1][lane] + (work[256][lane] - work[93][lane]);
+        work[12][lane] = work[2][lane] * work[17][lane] - work[8][lane] * work[1][lane] + (work[256][lane]
+            - work[93][lane]);
         work[4][lane] = work[13][lane] * work[7][lane];
-        work[18][lane] = work[2][lane] * work[25][lane] - work[8][lane] * work[23][lane] + (work[20][lane] * work[22][lane] - work[11][lane] * work[16][lane]);
+        work[18][lane] = work[2][lane] * work[25][lane] - work[8][lane] * work[23][lane] + (work[20][lane]
+            * work[22][lane] - work[11][lane] * work[16][lane]);
         work[5][lane] = work[20][lane] * work[18][lane];
         increment[4][lane] = work[24][lane];
         increment[5][lane] = work[25][lane];
@@ -1721,565 +1841,734 @@ kowalevski_top_APART static void kowalevski_top_linearise_lanes_part1(kowalevski
     }
 }
 
-/* kowalevski_top_linearise_lanes_part2 (part 2 of 3) */
+/* kowalevski_top_linearise in all lanes (part 2 of 3) */
 kowalevski_top_APART static void kowalevski_top_linearise_lanes_part2(kowalevski_top_lanes coef[restrict 172],
-                                                                      kowalevski_top_lanes y[restrict 6],
-                                                                      kowalevski_top_lanes displacement[restrict 6],
-                                                                      kowalevski_top_lanes increment[restrict 6],
-                                                                      kowalevski_top_lanes jacobian[restrict 36],
-                                                                      kowalevski_top_lanes increment_jacobian[restrict 36],
-                                                                      kowalevski_top_lanes work[restrict 274])
+    kowalevski_top_lanes y[restrict 6], kowalevski_top_lanes displacement[restrict 6],
+    kowalevski_top_lanes increment[restrict 6], kowalevski_top_lanes jacobian[restrict 36],
+    kowalevski_top_lanes increment_jacobian[restrict 36], kowalevski_top_lanes work[restrict 274])
 {
     (void)increment;
     kowalevski_top_EACH_LANE
     for (int lane = 0; lane < kowalevski_top_LANES; ++lane) {
-        const double P1 = y[0][lane];
-        const double P2 = y[1][lane];
-        const double P3 = y[2][lane];
-        const double G1 = y[3][lane];
-        const double G2 = y[4][lane];
-        const double G3 = y[5][lane];
-        work[233][lane] = work[0][lane] * work[1][lane] - work[2][lane] * work[3][lane] + (work[4][lane] - work[5][lane]);
-        const double t190 = work[6][lane] * work[7][lane] + (work[8][lane] * work[9][lane] - work[0][lane] * work[10][lane] + (work[11][lane] * work[12][lane] - work[13][lane] * work[233][lane]));
+        const double P1 = y[0][lane], P2 = y[1][lane], P3 = y[2][lane], G1 = y[3][lane], G2 = y[4][lane], G3 =
+            y[5][lane];
+        work[233][lane] = work[0][lane] * work[1][lane] - work[2][lane] * work[3][lane] + (work[4][lane]
+            - work[5][lane]);
+        const double t1 = work[6][lane] * work[7][lane] + (work[8][lane] * work[9][lane] - work[0][lane]
+            * work[10][lane] + (work[11][lane] * work[12][lane] - work[13][lane] * work[233][lane]));
         work[206][lane] = work[11][lane] * work[3][lane];
         work[205][lane] = work[13][lane] * work[17][lane];
         work[247][lane] = work[206][lane] - work[205][lane];
         work[215][lane] = work[11][lane] * work[18][lane];
         work[260][lane] = work[13][lane] * work[19][lane];
-        work[218][lane] = work[8][lane] * work[3][lane] - work[0][lane] * work[17][lane] + (work[215][lane] - work[260][lane]);
-        work[220][lane] = work[6][lane] * work[18][lane] + (work[2][lane] * work[10][lane] - work[8][lane] * work[247][lane] + (work[20][lane] * work[233][lane] - work[11][lane] * work[218][lane]));
-        work[255][lane] = work[6][lane] * work[19][lane] + (work[0][lane] * work[247][lane] - work[2][lane] * work[9][lane] + (work[13][lane] * work[218][lane] - work[20][lane] * work[12][lane]));
-        work[264][lane] = work[6][lane] * work[1][lane] + (work[11][lane] * work[9][lane] - work[13][lane] * work[10][lane]);
-        work[272][lane] = work[6][lane] * work[3][lane] + (work[20][lane] * work[10][lane] - work[11][lane] * work[247][lane]);
-        work[273][lane] = work[6][lane] * work[17][lane] + (work[13][lane] * work[247][lane] - work[20][lane] * work[9][lane]);
-        const double t202 = coef[135][lane] * work[26][lane];
-        const double t203 = coef[40][lane] * work[27][lane];
-        work[190][lane] = G3 * (work[28][lane] + P1 * (coef[141][lane] + G1 * coef[142][lane] + (coef[130][lane] * work[29][lane] + coef[143][lane] * work[30][lane]))) + P3 * (work[31][lane] + P1 * (t202 + work[32][lane] + P1 * (t203 + work[33][lane])));
-        const double t205 = work[24][lane] - work[34][lane];
-        work[263][lane] = t205 * work[14][lane];
-        work[265][lane] = t205 * work[6][lane];
-        const double t208 = G2 * work[13][lane];
-        const double t209 = G1 * work[20][lane];
-        work[203][lane] = t208 + t209;
-        const double t211 = work[20][lane] * work[203][lane];
-        const double t212 = work[11][lane] * t205;
-        work[246][lane] = work[35][lane] - work[36][lane] + (t211 - t212);
-        const double t214 = work[13][lane] * t205;
+        work[218][lane] = work[8][lane] * work[3][lane] - work[0][lane] * work[17][lane] + (work[215][lane]
+            - work[260][lane]);
+        work[220][lane] = work[6][lane] * work[18][lane] + (work[2][lane] * work[10][lane] - work[8][lane]
+            * work[247][lane] + (work[20][lane] * work[233][lane] - work[11][lane] * work[218][lane]));
+        work[255][lane] = work[6][lane] * work[19][lane] + (work[0][lane] * work[247][lane] - work[2][lane]
+            * work[9][lane] + (work[13][lane] * work[218][lane] - work[20][lane] * work[12][lane]));
+        work[264][lane] = work[6][lane] * work[1][lane] + (work[11][lane] * work[9][lane] - work[13][lane]
+            * work[10][lane]);
+        work[272][lane] = work[6][lane] * work[3][lane] + (work[20][lane] * work[10][lane] - work[11][lane]
+            * work[247][lane]);
+        work[273][lane] = work[6][lane] * work[17][lane] + (work[13][lane] * work[247][lane] - work[20][lane]
+            * work[9][lane]);
+        const double t2 = coef[135][lane] * work[26][lane], t3 = coef[40][lane] * work[27][lane];
+        work[190][lane] = G3 * (work[28][lane] + P1 * (coef[141][lane] + G1 * coef[142][lane]
+            + (coef[130][lane] * work[29][lane] + coef[143][lane] * work[30][lane]))) + P3 * (work[31][lane]
+            + P1 * (t2 + work[32][lane] + P1 * (t3 + work[33][lane])));
+        const double t4 = work[24][lane] - work[34][lane];
+        work[263][lane] = t4 * work[14][lane];
+        work[265][lane] = t4 * work[6][lane];
+        const double t5 = G2 * work[13][lane], t6 = G1 * work[20][lane];
+        work[203][lane] = t5 + t6;
+        const double t7 = work[20][lane] * work[203][lane], t8 = work[11][lane] * t4;
+        work[246][lane] = work[35][lane] - work[36][lane] + (t7 - t8);
+        const double t9 = work[13][lane] * t4;
         work[204][lane] = work[37][lane] - work[38][lane] - work[38][lane];
-        work[207][lane] = t214 - work[20][lane] * work[204][lane];
+        work[207][lane] = t9 - work[20][lane] * work[204][lane];
         work[249][lane] = 0.5 * G2;
-        work[157][lane] = work[263][lane] - work[15][lane] * (work[265][lane] + (work[9][lane] + (work[11][lane] * work[246][lane] - work[13][lane] * work[207][lane]))) - work[249][lane];
-        const double t219 = coef[131][lane] * work[39][lane];
-        const double t220 = work[40][lane] + G2 * (work[41][lane] + t219);
-        const double t221 = coef[41][lane] * work[30][lane];
-        const double t222 = t221 + work[42][lane];
-        const double t223 = coef[30][lane] * work[43][lane];
-        work[179][lane] = G2 * (work[44][lane] + P1 * (coef[67][lane] + G1 * coef[140][lane] + (coef[138][lane] * work[30][lane] + coef[136][lane] * work[27][lane]))) + P2 * (t220 + G1 * (work[45][lane] + t222) + P3 * (t223 + P3 * (work[46][lane] + (work[47][lane] + (work[48][lane] + work[49][lane])))));
+        work[157][lane] = work[263][lane] - work[15][lane] * (work[265][lane] + (work[9][lane]
+            + (work[11][lane] * work[246][lane] - work[13][lane] * work[207][lane]))) - work[249][lane];
+        const double t10 = coef[131][lane] * work[39][lane];
+        const double t11 = work[40][lane] + G2 * (work[41][lane] + t10);
+        const double t12 = coef[41][lane] * work[30][lane], t13 = t12 + work[42][lane];
+        const double t14 = coef[30][lane] * work[43][lane];
+        work[179][lane] = G2 * (work[44][lane] + P1 * (coef[67][lane] + G1 * coef[140][lane]
+            + (coef[138][lane] * work[30][lane] + coef[136][lane] * work[27][lane]))) + P2
+            * (t11 + G1 * (work[45][lane] + t13) + P3 * (t14 + P3 * (work[46][lane] + (work[47][lane]
+            + (work[48][lane] + work[49][lane])))));
         work[211][lane] = 0.5 * G3;
-        const double t226 = work[50][lane] - work[51][lane] - work[51][lane];
+        const double t15 = work[50][lane] - work[51][lane] - work[51][lane];
         work[199][lane] = work[23][lane] - work[37][lane];
-        const double t228 = work[20][lane] * work[199][lane];
-        work[248][lane] = t228 - work[11][lane] * t226;
-        const double t230 = G3 * work[11][lane];
-        work[198][lane] = t230 + t209;
-        const double t232 = work[20][lane] * work[198][lane];
-        work[202][lane] = work[1][lane] + (work[13][lane] * t226 - t232);
-        work[155][lane] = work[211][lane] + (t226 * work[14][lane] - work[15][lane] * (work[6][lane] * t226 + (work[52][lane] - work[53][lane] + (work[11][lane] * work[248][lane] - work[13][lane] * work[202][lane]))));
-        const double t235 = coef[122][lane] * work[29][lane];
-        const double t236 = coef[121][lane] * work[26][lane];
-        const double t237 = coef[44][lane] * work[54][lane];
-        const double t238 = t236 + t237;
-        const double t239 = coef[126][lane] * work[27][lane];
-        const double t240 = coef[127][lane] * work[29][lane];
-        const double t241 = G3 * (work[32][lane] + P1 * (coef[89][lane] + G1 * coef[120][lane] + (t235 + coef[128][lane] * work[30][lane]))) + P3 * (work[55][lane] + P1 * (t238 + P1 * (t239 + (coef[125][lane] + G1 * coef[36][lane] + (t240 + coef[129][lane] * work[30][lane])))));
-        work[239][lane] = work[56][lane] + work[57][lane] * (work[58][lane] + (work[59][lane] + coef[123][lane] * work[30][lane])) + G2 * (coef[115][lane] * work[60][lane] + G2 * (work[61][lane] + (coef[124][lane] * work[30][lane] + work[62][lane]))) + P3 * t241;
-        const double t243 = G3 * work[8][lane];
-        const double t244 = G2 * work[0][lane];
-        const double t245 = P3 * work[11][lane];
-        const double t246 = P2 * work[13][lane];
-        const double t247 = t243 + t244 + (t245 + t246);
+        const double t16 = work[20][lane] * work[199][lane];
+        work[248][lane] = t16 - work[11][lane] * t15;
+        const double t17 = G3 * work[11][lane];
+        work[198][lane] = t17 + t6;
+        const double t18 = work[20][lane] * work[198][lane];
+        work[202][lane] = work[1][lane] + (work[13][lane] * t15 - t18);
+        work[155][lane] = work[211][lane] + (t15 * work[14][lane] - work[15][lane] * (work[6][lane] * t15
+            + (work[52][lane] - work[53][lane] + (work[11][lane] * work[248][lane] - work[13][lane]
+            * work[202][lane]))));
+        const double t19 = coef[122][lane] * work[29][lane], t20 = coef[121][lane] * work[26][lane];
+        const double t21 = coef[44][lane] * work[54][lane], t22 = t20 + t21;
+        const double t23 = coef[126][lane] * work[27][lane], t24 = coef[127][lane] * work[29][lane];
+        const double t25 = G3 * (work[32][lane] + P1 * (coef[89][lane] + G1 * coef[120][lane]
+            + (t19 + coef[128][lane] * work[30][lane]))) + P3 * (work[55][lane] + P1
+            * (t22 + P1 * (t23 + (coef[125][lane] + G1 * coef[36][lane] + (t24 + coef[129][lane]
+            * work[30][lane])))));
+        work[239][lane] = work[56][lane] + work[57][lane] * (work[58][lane] + (work[59][lane]
+            + coef[123][lane] * work[30][lane])) + G2 * (coef[115][lane] * work[60][lane] + G2
+            * (work[61][lane] + (coef[124][lane] * work[30][lane] + work[62][lane]))) + P3 * t25;
+        const double t26 = G3 * work[8][lane], t27 = G2 * work[0][lane], t28 = P3 * work[11][lane];
+        const double t29 = P2 * work[13][lane], t30 = t26 + t27 + (t28 + t29);
         work[235][lane] = work[20][lane] * work[15][lane];
         work[228][lane] = work[63][lane] + work[24][lane];
-        const double t250 = t230 + t208;
-        const double t251 = work[11][lane] * t250;
-        work[257][lane] = work[17][lane] - work[20][lane] * work[228][lane] - t251;
-        const double t253 = work[13][lane] * t250;
+        const double t31 = t17 + t5, t32 = work[11][lane] * t31;
+        work[257][lane] = work[17][lane] - work[20][lane] * work[228][lane] - t32;
+        const double t33 = work[13][lane] * t31;
         work[208][lane] = work[25][lane] - work[50][lane];
-        const double t255 = work[20][lane] * work[208][lane];
-        work[232][lane] = t253 - (t255 + work[3][lane]);
+        const double t34 = work[20][lane] * work[208][lane];
+        work[232][lane] = t33 - (t34 + work[3][lane]);
         work[229][lane] = work[64][lane] + (work[65][lane] + work[21][lane]);
-        work[258][lane] = work[19][lane] - work[20][lane] * work[229][lane] - work[11][lane] * t247 - (work[8][lane] * t250 + work[2][lane] * work[228][lane]);
+        work[258][lane] = work[19][lane] - work[20][lane] * work[229][lane] - work[11][lane] * t30
+            - (work[8][lane] * t31 + work[2][lane] * work[228][lane]);
         work[230][lane] = work[22][lane] - work[66][lane] - work[67][lane];
-        work[234][lane] = work[0][lane] * t250 - work[2][lane] * work[208][lane] + (work[13][lane] * t247 - (work[20][lane] * work[230][lane] + work[18][lane]));
-        const double t261 = kowalevski_top_phi2_lane(work[6][lane]);
-        work[231][lane] = work[20][lane] * t261;
-        const double t263 = work[15][lane] * (t247 * work[6][lane] + 2.0 * (work[20][lane] * work[7][lane]) + (work[8][lane] * work[257][lane] - work[0][lane] * work[232][lane] + (work[11][lane] * work[258][lane] - work[13][lane] * work[234][lane]))) + 2.0 * (work[231][lane] * t190);
-        work[159][lane] = t247 * work[14][lane] + 2.0 * (work[235][lane] * work[7][lane]) - t263;
-        const double t265 = coef[1][lane] * work[29][lane];
-        const double t266 = coef[132][lane] + G1 * coef[65][lane];
-        const double t267 = coef[133][lane] * work[29][lane];
-        const double t268 = G2 * (t223 + P3 * (work[47][lane] + (work[49][lane] + work[46][lane]))) + P2 * (G3 * (work[68][lane] + (coef[122][lane] * work[30][lane] + work[69][lane])) + P3 * (work[70][lane] + P1 * (work[71][lane] + (t266 + (t267 + coef[133][lane] * work[30][lane])))));
-        work[238][lane] = work[39][lane] * (coef[130][lane] * work[57][lane] + coef[32][lane] * work[72][lane]) + G2 * (G1 * (work[45][lane] + (t221 + t265)) + (work[40][lane] + G2 * (G2 * coef[9][lane] + t219))) + P3 * t268;
+        work[234][lane] = work[0][lane] * t31 - work[2][lane] * work[208][lane] + (work[13][lane] * t30
+            - (work[20][lane] * work[230][lane] + work[18][lane]));
+        const double t35 = kowalevski_top_phi2_lane(work[6][lane]);
+        work[231][lane] = work[20][lane] * t35;
+        const double t36 = work[15][lane] * (t30 * work[6][lane] + 2.0 * (work[20][lane] * work[7][lane])
+            + (work[8][lane] * work[257][lane] - work[0][lane] * work[232][lane] + (work[11][lane]
+            * work[258][lane] - work[13][lane] * work[234][lane]))) + 2.0 * (work[231][lane] * t1);
+        work[159][lane] = t30 * work[14][lane] + 2.0 * (work[235][lane] * work[7][lane]) - t36;
+        const double t37 = coef[1][lane] * work[29][lane], t38 = coef[132][lane] + G1 * coef[65][lane];
+        const double t39 = coef[133][lane] * work[29][lane];
+        const double t40 = G2 * (t14 + P3 * (work[47][lane] + (work[49][lane] + work[46][lane]))) + P2
+            * (G3 * (work[68][lane] + (coef[122][lane] * work[30][lane] + work[69][lane])) + P3
+            * (work[70][lane] + P1 * (work[71][lane] + (t38 + (t39 + coef[133][lane] * work[30][lane])))));
+        work[238][lane] = work[39][lane] * (coef[130][lane] * work[57][lane] + coef[32][lane]
+            * work[72][lane]) + G2 * (G1 * (work[45][lane] + (t12 + t37)) + (work[40][lane] + G2
+            * (G2 * coef[9][lane] + t10))) + P3 * t40;
         work[236][lane] = 0.5 * P3;
         work[227][lane] = work[13][lane] * work[15][lane];
-        const double t272 = work[73][lane] + (work[74][lane] + work[22][lane]);
+        const double t41 = work[73][lane] + (work[74][lane] + work[22][lane]);
         work[268][lane] = work[51][lane] + work[25][lane];
-        work[261][lane] = work[11][lane] * work[268][lane] + t228;
-        work[224][lane] = work[1][lane] - work[13][lane] * work[268][lane] - t232;
+        work[261][lane] = work[11][lane] * work[268][lane] + t16;
+        work[224][lane] = work[1][lane] - work[13][lane] * work[268][lane] - t18;
         work[223][lane] = work[16][lane] - work[75][lane] - work[76][lane];
-        work[262][lane] = work[8][lane] * work[268][lane] + work[2][lane] * work[199][lane] + (work[20][lane] * work[223][lane] + work[11][lane] * t272);
-        const double t278 = G1 * work[2][lane];
-        const double t279 = P1 * work[20][lane];
-        work[222][lane] = t243 + t278 + (t279 + t245);
-        work[225][lane] = work[7][lane] - work[13][lane] * t272 - work[20][lane] * work[222][lane] - (work[2][lane] * work[198][lane] + work[0][lane] * work[268][lane]);
-        work[226][lane] = work[13][lane] * t261;
-        const double t283 = work[15][lane] * (2.0 * work[4][lane] - work[6][lane] * t272 + (work[8][lane] * work[261][lane] - work[0][lane] * work[224][lane] + (work[11][lane] * work[262][lane] - (work[233][lane] + work[13][lane] * work[225][lane])))) + 2.0 * (work[226][lane] * t190);
-        work[161][lane] = work[236][lane] + (2.0 * (work[227][lane] * work[7][lane]) - work[14][lane] * t272 - t283);
-        const double t285 = coef[39][lane] * work[30][lane];
-        const double t286 = G1 * coef[53][lane];
-        const double t287 = coef[12][lane] + t286;
-        const double t288 = coef[35][lane] * work[29][lane];
-        work[158][lane] = P1 * (coef[22][lane] * work[57][lane] + coef[23][lane] * work[77][lane]) + P2 * (coef[32][lane] * work[60][lane] + G2 * (work[78][lane] + t222)) + P3 * (G3 * (work[79][lane] + (work[80][lane] + t285)) + P3 * (work[81][lane] + P1 * (work[46][lane] + (t287 + (t288 + work[82][lane])))));
-        work[266][lane] = t250 * work[14][lane];
-        work[267][lane] = t250 * work[6][lane];
+        work[262][lane] = work[8][lane] * work[268][lane] + work[2][lane] * work[199][lane] + (work[20][lane]
+            * work[223][lane] + work[11][lane] * t41);
+        const double t42 = G1 * work[2][lane], t43 = P1 * work[20][lane];
+        work[222][lane] = t26 + t42 + (t43 + t28);
+        work[225][lane] = work[7][lane] - work[13][lane] * t41 - work[20][lane] * work[222][lane]
+            - (work[2][lane] * work[198][lane] + work[0][lane] * work[268][lane]);
+        work[226][lane] = work[13][lane] * t35;
+        const double t44 = work[15][lane] * (2.0 * work[4][lane] - work[6][lane] * t41 + (work[8][lane]
+            * work[261][lane] - work[0][lane] * work[224][lane] + (work[11][lane] * work[262][lane]
+            - (work[233][lane] + work[13][lane] * work[225][lane])))) + 2.0 * (work[226][lane] * t1);
+        work[161][lane] = work[236][lane] + (2.0 * (work[227][lane] * work[7][lane]) - work[14][lane] * t41
+            - t44);
+        const double t45 = coef[39][lane] * work[30][lane], t46 = G1 * coef[53][lane];
+        const double t47 = coef[12][lane] + t46, t48 = coef[35][lane] * work[29][lane];
+        work[158][lane] = P1 * (coef[22][lane] * work[57][lane] + coef[23][lane] * work[77][lane]) + P2
+            * (coef[32][lane] * work[60][lane] + G2 * (work[78][lane] + t13)) + P3
+            * (G3 * (work[79][lane] + (work[80][lane] + t45)) + P3 * (work[81][lane] + P1 * (work[46][lane]
+            + (t47 + (t48 + work[82][lane])))));
+        work[266][lane] = t31 * work[14][lane];
+        work[267][lane] = t31 * work[6][lane];
         work[209][lane] = work[34][lane] - work[63][lane] - work[63][lane];
-        work[252][lane] = work[17][lane] + (work[20][lane] * work[209][lane] - t251);
-        work[210][lane] = work[83][lane] - work[84][lane] + (t253 - t255);
-        work[163][lane] = work[266][lane] - work[15][lane] * (work[267][lane] + (work[11][lane] * work[252][lane] - work[13][lane] * work[210][lane]));
-        const double t296 = coef[138][lane] * work[27][lane];
-        const double t297 = work[85][lane] + t296;
-        const double t298 = coef[137][lane] * work[27][lane];
-        const double t299 = work[29][lane] * (t266 + t297) + (work[27][lane] * (t298 + (coef[49][lane] + G1 * coef[84][lane])) + (G1 * (coef[49][lane] + t286) + (coef[135][lane] * work[57][lane] + (coef[134][lane] + coef[136][lane] * work[77][lane]))));
-        const double t300 = t267 + coef[45][lane] * work[30][lane];
-        work[237][lane] = work[86][lane] + P3 * (work[87][lane] + P1 * (t299 + P1 * (t237 + coef[139][lane] * work[26][lane] + P1 * (t296 + (coef[132][lane] + work[88][lane] + t300)))));
-        const double t302 = work[21][lane] - work[89][lane] - work[90][lane];
+        work[252][lane] = work[17][lane] + (work[20][lane] * work[209][lane] - t32);
+        work[210][lane] = work[83][lane] - work[84][lane] + (t33 - t34);
+        work[163][lane] = work[266][lane] - work[15][lane] * (work[267][lane] + (work[11][lane]
+            * work[252][lane] - work[13][lane] * work[210][lane]));
+        const double t49 = coef[138][lane] * work[27][lane], t50 = work[85][lane] + t49;
+        const double t51 = coef[137][lane] * work[27][lane];
+        const double t52 = work[29][lane] * (t38 + t50) + (work[27][lane] * (t51 + (coef[49][lane] + G1
+            * coef[84][lane])) + (G1 * (coef[49][lane] + t46) + (coef[135][lane] * work[57][lane]
+            + (coef[134][lane] + coef[136][lane] * work[77][lane]))));
+        const double t53 = t39 + coef[45][lane] * work[30][lane];
+        work[237][lane] = work[86][lane] + P3 * (work[87][lane] + P1 * (t52 + P1 * (t21 + coef[139][lane]
+            * work[26][lane] + P1 * (t49 + (coef[132][lane] + work[88][lane] + t53)))));
+        const double t54 = work[21][lane] - work[89][lane] - work[90][lane];
         work[221][lane] = work[11][lane] * work[15][lane];
-        work[219][lane] = work[11][lane] * t261;
-        work[253][lane] = t211 - (work[1][lane] + t212);
+        work[219][lane] = work[11][lane] * t35;
+        work[253][lane] = t7 - (work[1][lane] + t8);
         work[212][lane] = work[38][lane] + work[23][lane];
-        work[216][lane] = t214 + work[20][lane] * work[212][lane];
-        work[214][lane] = t278 + t244 + (t279 + t246);
-        work[254][lane] = work[2][lane] * work[203][lane] - work[8][lane] * t205 + (work[20][lane] * work[214][lane] - (work[11][lane] * t302 + work[7][lane]));
+        work[216][lane] = t9 + work[20][lane] * work[212][lane];
+        work[214][lane] = t42 + t27 + (t43 + t29);
+        work[254][lane] = work[2][lane] * work[203][lane] - work[8][lane] * t4 + (work[20][lane]
+            * work[214][lane] - (work[11][lane] * t54 + work[7][lane]));
         work[213][lane] = work[91][lane] + (work[92][lane] + work[16][lane]);
-        work[217][lane] = work[0][lane] * t205 + work[2][lane] * work[212][lane] + (work[20][lane] * work[213][lane] + work[13][lane] * t302);
-        const double t312 = 2.0 * (work[219][lane] * t190) + work[15][lane] * (work[6][lane] * t302 + 2.0 * work[93][lane] + (work[8][lane] * work[253][lane] - work[0][lane] * work[216][lane] + (work[12][lane] + work[11][lane] * work[254][lane] - work[13][lane] * work[217][lane])));
+        work[217][lane] = work[0][lane] * t4 + work[2][lane] * work[212][lane] + (work[20][lane]
+            * work[213][lane] + work[13][lane] * t54);
+        const double t55 = 2.0 * (work[219][lane] * t1) + work[15][lane] * (work[6][lane] * t54 + 2.0
+            * work[93][lane] + (work[8][lane] * work[253][lane] - work[0][lane] * work[216][lane]
+            + (work[12][lane] + work[11][lane] * work[254][lane] - work[13][lane] * work[217][lane])));
         work[259][lane] = 0.5 * P2;
-        work[165][lane] = work[14][lane] * t302 + 2.0 * (work[221][lane] * work[7][lane]) - t312 - work[259][lane];
+        work[165][lane] = work[14][lane] * t54 + 2.0 * (work[221][lane] * work[7][lane]) - t55
+            - work[259][lane];
         work[152][lane] = work[94][lane] + work[95][lane];
         work[153][lane] = work[20][lane] * work[13][lane];
         work[166][lane] = work[20][lane] * work[153][lane] + work[13][lane] * work[152][lane];
         work[151][lane] = work[11][lane] * work[20][lane];
         work[167][lane] = work[20][lane] * work[151][lane] + work[11][lane] * work[152][lane];
-        work[269][lane] = work[152][lane] * work[14][lane] + work[15][lane] * (work[13][lane] * work[166][lane] + work[11][lane] * work[167][lane] - work[152][lane] * work[6][lane]);
+        work[269][lane] = work[152][lane] * work[14][lane] + work[15][lane] * (work[13][lane]
+            * work[166][lane] + work[11][lane] * work[167][lane] - work[152][lane] * work[6][lane]);
         work[196][lane] = work[153][lane] * work[14][lane];
         work[197][lane] = work[153][lane] * work[6][lane];
         work[168][lane] = work[11][lane] * work[13][lane];
-        const double t324 = work[20][lane] * work[168][lane];
+        const double t56 = work[20][lane] * work[168][lane];
         work[193][lane] = work[11][lane] * work[153][lane];
-        work[180][lane] = t324 - work[193][lane];
+        work[180][lane] = t56 - work[193][lane];
         work[169][lane] = work[96][lane] + work[95][lane];
         work[181][lane] = work[13][lane] * work[153][lane] + work[20][lane] * work[169][lane];
         work[195][lane] = 0.5 * work[11][lane];
-        work[270][lane] = work[196][lane] - work[15][lane] * (work[197][lane] + (work[11][lane] * work[180][lane] - work[13][lane] * work[181][lane])) - work[195][lane];
+        work[270][lane] = work[196][lane] - work[15][lane] * (work[197][lane] + (work[11][lane]
+            * work[180][lane] - work[13][lane] * work[181][lane])) - work[195][lane];
         work[170][lane] = coef[118][lane] * work[43][lane];
-        const double t332 = coef[64][lane] * work[30][lane];
-        const double t333 = G1 * coef[41][lane];
-        work[189][lane] = G2 * (work[170][lane] + P3 * (work[97][lane] + (t332 + work[98][lane]))) + P2 * (G3 * (coef[153][lane] + t333 + (work[99][lane] + coef[130][lane] * work[30][lane])) + P3 * (work[100][lane] + coef[147][lane] * work[26][lane] + P1 * (coef[62][lane] * work[27][lane] + work[101][lane])));
-        const double t335 = coef[36][lane] * work[29][lane];
-        work[178][lane] = work[102][lane] + P2 * (coef[57][lane] * work[103][lane] + G2 * (coef[49][lane] + G1 * coef[152][lane] + (coef[148][lane] * work[27][lane] + work[104][lane]))) + P1 * (t220 + G1 * (work[45][lane] + (work[105][lane] + t265)) + P3 * (work[106][lane] + P3 * (work[46][lane] + (work[47][lane] + (work[82][lane] + t335)))));
-        const double t337 = G1 * (work[107][lane] + G2 * (work[108][lane] + coef[146][lane] * work[39][lane]) + G1 * (work[109][lane] + (work[99][lane] + work[110][lane]))) + (work[77][lane] * (work[48][lane] + work[111][lane]) + (coef[19][lane] + work[57][lane] * (t335 + work[112][lane])));
-        const double t338 = work[29][lane] * (coef[125][lane] + G1 * coef[145][lane] + (coef[129][lane] * work[29][lane] + t239)) + work[113][lane] + P1 * (work[114][lane] + t237 + P1 * (work[115][lane] + (work[116][lane] + (t240 + work[117][lane]))));
-        work[240][lane] = t337 + P3 * (G3 * (coef[144][lane] * work[54][lane] + P1 * (work[68][lane] + (t235 + work[118][lane]))) + P3 * t338);
-        const double t340 = coef[47][lane] * work[26][lane];
-        const double t341 = coef[13][lane] * work[27][lane];
-        const double t342 = G1 * coef[149][lane];
-        const double t343 = coef[5][lane] + t342;
-        const double t344 = coef[50][lane] * work[29][lane];
-        const double t345 = work[119][lane] + G1 * (coef[49][lane] + work[120][lane] + (coef[151][lane] * work[29][lane] + work[121][lane])) + P3 * (coef[61][lane] * work[43][lane] + P3 * (coef[56][lane] * work[27][lane] + (t343 + (t344 + coef[35][lane] * work[30][lane]))));
-        work[160][lane] = G2 * (t340 + P1 * (work[78][lane] + (work[105][lane] + t341))) + P2 * t345;
-        const double t347 = coef[74][lane] * work[27][lane];
-        const double t348 = work[29][lane] * (coef[132][lane] + t333 + t297) + (work[27][lane] * (t298 + (coef[49][lane] + G1 * coef[150][lane])) + (G1 * (coef[3][lane] + t342) + (coef[147][lane] * work[57][lane] + (coef[134][lane] + coef[148][lane] * work[77][lane]))));
-        work[241][lane] = G2 * (G3 * (t347 + work[97][lane]) + P1 * (work[106][lane] + P3 * (work[122][lane] + (work[123][lane] + t285)))) + P2 * (work[124][lane] + P3 * (t348 + P1 * (t238 + P1 * (t296 + (t266 + t300)))));
+        const double t57 = coef[64][lane] * work[30][lane], t58 = G1 * coef[41][lane];
+        work[189][lane] = G2 * (work[170][lane] + P3 * (work[97][lane] + (t57 + work[98][lane]))) + P2
+            * (G3 * (coef[153][lane] + t58 + (work[99][lane] + coef[130][lane] * work[30][lane])) + P3
+            * (work[100][lane] + coef[147][lane] * work[26][lane] + P1 * (coef[62][lane] * work[27][lane]
+            + work[101][lane])));
+        const double t59 = coef[36][lane] * work[29][lane];
+        work[178][lane] = work[102][lane] + P2 * (coef[57][lane] * work[103][lane] + G2 * (coef[49][lane] + G1
+            * coef[152][lane] + (coef[148][lane] * work[27][lane] + work[104][lane]))) + P1
+            * (t11 + G1 * (work[45][lane] + (work[105][lane] + t37)) + P3 * (work[106][lane] + P3
+            * (work[46][lane] + (work[47][lane] + (work[82][lane] + t59)))));
+        const double t60 = G1 * (work[107][lane] + G2 * (work[108][lane] + coef[146][lane] * work[39][lane])
+            + G1 * (work[109][lane] + (work[99][lane] + work[110][lane]))) + (work[77][lane] * (work[48][lane]
+            + work[111][lane]) + (coef[19][lane] + work[57][lane] * (t59 + work[112][lane])));
+        const double t61 = work[29][lane] * (coef[125][lane] + G1 * coef[145][lane] + (coef[129][lane]
+            * work[29][lane] + t23)) + work[113][lane] + P1 * (work[114][lane] + t21 + P1 * (work[115][lane]
+            + (work[116][lane] + (t24 + work[117][lane]))));
+        work[240][lane] = t60 + P3 * (G3 * (coef[144][lane] * work[54][lane] + P1 * (work[68][lane]
+            + (t19 + work[118][lane]))) + P3 * t61);
+        const double t62 = coef[47][lane] * work[26][lane], t63 = coef[13][lane] * work[27][lane];
+        const double t64 = G1 * coef[149][lane], t65 = coef[5][lane] + t64;
+        const double t66 = coef[50][lane] * work[29][lane];
+        const double t67 = work[119][lane] + G1 * (coef[49][lane] + work[120][lane] + (coef[151][lane]
+            * work[29][lane] + work[121][lane])) + P3 * (coef[61][lane] * work[43][lane] + P3
+            * (coef[56][lane] * work[27][lane] + (t65 + (t66 + coef[35][lane] * work[30][lane]))));
+        work[160][lane] = G2 * (t62 + P1 * (work[78][lane] + (work[105][lane] + t63))) + P2 * t67;
+        const double t68 = coef[74][lane] * work[27][lane];
+        const double t69 = work[29][lane] * (coef[132][lane] + t58 + t50) + (work[27][lane]
+            * (t51 + (coef[49][lane] + G1 * coef[150][lane])) + (G1 * (coef[3][lane] + t64) + (coef[147][lane]
+            * work[57][lane] + (coef[134][lane] + coef[148][lane] * work[77][lane]))));
+        work[241][lane] = G2 * (G3 * (t68 + work[97][lane]) + P1 * (work[106][lane] + P3 * (work[122][lane]
+            + (work[123][lane] + t45)))) + P2 * (work[124][lane] + P3
+            * (t69 + P1 * (t22 + P1 * (t49 + (t38 + t53)))));
         work[245][lane] = 0.5 * work[13][lane];
         work[243][lane] = work[151][lane] * work[14][lane];
         work[244][lane] = work[151][lane] * work[6][lane];
         work[194][lane] = work[13][lane] * work[151][lane];
-        work[191][lane] = work[194][lane] - t324;
+        work[191][lane] = work[194][lane] - t56;
         work[192][lane] = work[11][lane] * work[151][lane] + work[20][lane] * work[125][lane];
-        work[271][lane] = work[245][lane] + (work[243][lane] - work[15][lane] * (work[244][lane] - (work[13][lane] * work[191][lane] + work[11][lane] * work[192][lane])));
-        const double t357 = coef[155][lane] * work[27][lane];
-        work[171][lane] = work[97][lane] + (work[126][lane] + t332);
-        work[177][lane] = G2 * (coef[113][lane] * work[43][lane] + P3 * (coef[164][lane] + G1 * coef[109][lane] + (t357 + coef[136][lane] * work[30][lane]))) + P2 * (G3 * work[171][lane] + P3 * (coef[74][lane] * work[26][lane] + coef[148][lane] * work[54][lane] + P1 * (work[123][lane] + (work[122][lane] + (work[99][lane] + t285)))));
-        work[188][lane] = work[26][lane] * (coef[52][lane] * work[27][lane] + (coef[153][lane] + G1 * coef[165][lane])) + P2 * (coef[147][lane] * work[103][lane] + G2 * (work[97][lane] + (t347 + work[126][lane]))) + P1 * (work[29][lane] * (work[127][lane] + (work[128][lane] + t203)) + (work[27][lane] * work[129][lane] + work[130][lane]) + P1 * (work[131][lane] + t202 + P1 * (t203 + work[132][lane])));
-        const double t361 = G1 * coef[162][lane];
-        const double t362 = work[29][lane] * (t343 + (coef[75][lane] * work[27][lane] + coef[79][lane] * work[29][lane])) + (work[133][lane] + G1 * (coef[67][lane] + t361 + coef[163][lane] * work[27][lane])) + P1 * (work[131][lane] + coef[82][lane] * work[26][lane] + P1 * (coef[85][lane] * work[27][lane] + (t287 + (t288 + coef[87][lane] * work[30][lane]))));
-        work[164][lane] = work[134][lane] + P3 * t362;
-        const double t364 = coef[158][lane] * work[27][lane];
-        const double t365 = work[27][lane] * (coef[154][lane] * work[77][lane] + coef[97][lane] * work[57][lane]) + work[135][lane] + G1 * (work[133][lane] + G1 * (t357 + work[136][lane])) + P2 * (coef[156][lane] * work[137][lane] + P2 * (work[29][lane] * (work[138][lane] + (t239 + work[139][lane])) + (work[27][lane] * (coef[34][lane] + G1 * coef[157][lane] + t364) + work[140][lane])));
-        const double t366 = work[29][lane] * (work[116][lane] + (coef[124][lane] * work[27][lane] + work[141][lane])) + (work[27][lane] * (coef[34][lane] + G1 * coef[161][lane] + t364) + work[142][lane]) + P1 * (t236 + work[143][lane] + P1 * (t239 + work[144][lane]));
-        const double t367 = work[26][lane] * (coef[88][lane] + G1 * coef[159][lane] + coef[92][lane] * work[27][lane]) + P2 * (coef[121][lane] * work[103][lane] + G2 * (work[122][lane] + (work[99][lane] + coef[160][lane] * work[27][lane]))) + P1 * t366;
-        work[242][lane] = t365 + P1 * t367;
-        work[154][lane] = G2 * (coef[110][lane] + G1 * coef[166][lane] + (coef[23][lane] * work[30][lane] + coef[69][lane] * work[27][lane])) + P2 * (coef[51][lane] * work[54][lane] + t340 + P1 * (t341 + (work[78][lane] + work[145][lane])));
-        work[156][lane] = G3 * (coef[38][lane] + G1 * coef[167][lane] + (coef[22][lane] * work[30][lane] + t344)) + P3 * (coef[68][lane] * work[26][lane] + work[146][lane] + P1 * (coef[6][lane] * work[27][lane] + work[147][lane]));
-        work[162][lane] = P2 * (coef[102][lane] * work[148][lane] + P2 * (coef[55][lane] * work[27][lane] + (coef[12][lane] + work[120][lane] + work[149][lane]))) + (coef[90][lane] * work[57][lane] + coef[91][lane] * work[77][lane] + P3 * (coef[101][lane] * work[43][lane] + P3 * (coef[21][lane] + t361 + (work[150][lane] + coef[27][lane] * work[30][lane]))));
-        displacement[0][lane] = work[14][lane] * work[7][lane] - work[15][lane] * t190 - 0.5 * work[16][lane];
-        displacement[1][lane] = work[14][lane] * work[18][lane] - work[15][lane] * work[220][lane] - 0.5 * work[21][lane];
-        displacement[2][lane] = work[14][lane] * work[19][lane] - work[15][lane] * work[255][lane] - 0.5 * work[22][lane];
-        displacement[3][lane] = work[1][lane] * work[14][lane] - work[15][lane] * work[264][lane] - 0.5 * work[23][lane];
-        displacement[4][lane] = work[14][lane] * work[3][lane] - work[15][lane] * work[272][lane] - 0.5 * work[24][lane];
-        displacement[5][lane] = work[14][lane] * work[17][lane] - work[15][lane] * work[273][lane] - 0.5 * work[25][lane];
+        work[271][lane] = work[245][lane] + (work[243][lane] - work[15][lane] * (work[244][lane]
+            - (work[13][lane] * work[191][lane] + work[11][lane] * work[192][lane])));
+        const double t70 = coef[155][lane] * work[27][lane];
+        work[171][lane] = work[97][lane] + (work[126][lane] + t57);
+        work[177][lane] = G2 * (coef[113][lane] * work[43][lane] + P3 * (coef[164][lane] + G1
+            * coef[109][lane] + (t70 + coef[136][lane] * work[30][lane]))) + P2 * (G3 * work[171][lane] + P3
+            * (coef[74][lane] * work[26][lane] + coef[148][lane] * work[54][lane] + P1 * (work[123][lane]
+            + (work[122][lane] + (work[99][lane] + t45)))));
+        work[188][lane] = work[26][lane] * (coef[52][lane] * work[27][lane] + (coef[153][lane] + G1
+            * coef[165][lane])) + P2 * (coef[147][lane] * work[103][lane] + G2 * (work[97][lane]
+            + (t68 + work[126][lane]))) + P1 * (work[29][lane] * (work[127][lane] + (work[128][lane] + t3))
+            + (work[27][lane] * work[129][lane] + work[130][lane]) + P1 * (work[131][lane] + t2 + P1
+            * (t3 + work[132][lane])));
+        const double t71 = G1 * coef[162][lane];
+        const double t72 = work[29][lane] * (t65 + (coef[75][lane] * work[27][lane] + coef[79][lane]
+            * work[29][lane])) + (work[133][lane] + G1 * (coef[67][lane] + t71 + coef[163][lane]
+            * work[27][lane])) + P1 * (work[131][lane] + coef[82][lane] * work[26][lane] + P1
+            * (coef[85][lane] * work[27][lane] + (t47 + (t48 + coef[87][lane] * work[30][lane]))));
+        work[164][lane] = work[134][lane] + P3 * t72;
+        const double t73 = coef[158][lane] * work[27][lane];
+        const double t74 = work[27][lane] * (coef[154][lane] * work[77][lane] + coef[97][lane]
+            * work[57][lane]) + work[135][lane] + G1 * (work[133][lane] + G1 * (t70 + work[136][lane])) + P2
+            * (coef[156][lane] * work[137][lane] + P2 * (work[29][lane] * (work[138][lane]
+            + (t23 + work[139][lane])) + (work[27][lane] * (coef[34][lane] + G1 * coef[157][lane] + t73)
+            + work[140][lane])));
+        const double t75 = work[29][lane] * (work[116][lane] + (coef[124][lane] * work[27][lane]
+            + work[141][lane])) + (work[27][lane] * (coef[34][lane] + G1 * coef[161][lane] + t73)
+            + work[142][lane]) + P1 * (t20 + work[143][lane] + P1 * (t23 + work[144][lane]));
+        const double t76 = work[26][lane] * (coef[88][lane] + G1 * coef[159][lane] + coef[92][lane]
+            * work[27][lane]) + P2 * (coef[121][lane] * work[103][lane] + G2 * (work[122][lane]
+            + (work[99][lane] + coef[160][lane] * work[27][lane]))) + P1 * t75;
+        work[242][lane] = t74 + P1 * t76;
+        work[154][lane] = G2 * (coef[110][lane] + G1 * coef[166][lane] + (coef[23][lane] * work[30][lane]
+            + coef[69][lane] * work[27][lane])) + P2 * (coef[51][lane] * work[54][lane] + t62 + P1
+            * (t63 + (work[78][lane] + work[145][lane])));
+        work[156][lane] = G3 * (coef[38][lane] + G1 * coef[167][lane] + (coef[22][lane] * work[30][lane]
+            + t66)) + P3 * (coef[68][lane] * work[26][lane] + work[146][lane] + P1 * (coef[6][lane]
+            * work[27][lane] + work[147][lane]));
+        work[162][lane] = P2 * (coef[102][lane] * work[148][lane] + P2 * (coef[55][lane] * work[27][lane]
+            + (coef[12][lane] + work[120][lane] + work[149][lane]))) + (coef[90][lane] * work[57][lane]
+            + coef[91][lane] * work[77][lane] + P3 * (coef[101][lane] * work[43][lane] + P3 * (coef[21][lane]
+            + t71 + (work[150][lane] + coef[27][lane] * work[30][lane]))));
+        displacement[0][lane] = work[14][lane] * work[7][lane] - work[15][lane] * t1 - 0.5 * work[16][lane];
+        displacement[1][lane] = work[14][lane] * work[18][lane] - work[15][lane] * work[220][lane] - 0.5
+            * work[21][lane];
+        displacement[2][lane] = work[14][lane] * work[19][lane] - work[15][lane] * work[255][lane] - 0.5
+            * work[22][lane];
+        displacement[3][lane] = work[1][lane] * work[14][lane] - work[15][lane] * work[264][lane] - 0.5
+            * work[23][lane];
+        displacement[4][lane] = work[14][lane] * work[3][lane] - work[15][lane] * work[272][lane] - 0.5
+            * work[24][lane];
+        displacement[5][lane] = work[14][lane] * work[17][lane] - work[15][lane] * work[273][lane] - 0.5
+            * work[25][lane];
         increment_jacobian[30][lane] = G1 * work[238][lane] - G2 * work[239][lane];
         increment_jacobian[24][lane] = G3 * work[239][lane] - G1 * work[237][lane];
-        jacobian[0][lane] = 1.0 + (work[190][lane] * work[157][lane] + work[179][lane] * work[155][lane] + (work[239][lane] * work[159][lane] + work[238][lane] * work[161][lane] + (work[158][lane] * work[163][lane] + work[237][lane] * work[165][lane])) - work[269][lane]);
+        jacobian[0][lane] = 1.0 + (work[190][lane] * work[157][lane] + work[179][lane] * work[155][lane]
+            + (work[239][lane] * work[159][lane] + work[238][lane] * work[161][lane] + (work[158][lane]
+            * work[163][lane] + work[237][lane] * work[165][lane])) - work[269][lane]);
         increment_jacobian[31][lane] = G1 * work[240][lane] - G2 * work[238][lane];
-        jacobian[1][lane] = work[270][lane] + (work[189][lane] * work[157][lane] + work[178][lane] * work[155][lane] + (work[238][lane] * work[159][lane] + work[240][lane] * work[161][lane] + (work[160][lane] * work[163][lane] + work[241][lane] * work[165][lane])));
+        jacobian[1][lane] = work[270][lane] + (work[189][lane] * work[157][lane] + work[178][lane]
+            * work[155][lane] + (work[238][lane] * work[159][lane] + work[240][lane] * work[161][lane]
+            + (work[160][lane] * work[163][lane] + work[241][lane] * work[165][lane])));
         increment_jacobian[19][lane] = G2 * work[241][lane] - G3 * work[240][lane];
-        jacobian[2][lane] = work[271][lane] + (work[177][lane] * work[155][lane] + work[188][lane] * work[157][lane] + (work[237][lane] * work[159][lane] + work[241][lane] * work[161][lane] + (work[164][lane] * work[163][lane] + work[242][lane] * work[165][lane])));
+        jacobian[2][lane] = work[271][lane] + (work[177][lane] * work[155][lane] + work[188][lane]
+            * work[157][lane] + (work[237][lane] * work[159][lane] + work[241][lane] * work[161][lane]
+            + (work[164][lane] * work[163][lane] + work[242][lane] * work[165][lane])));
         increment_jacobian[20][lane] = G2 * work[242][lane] - G3 * work[241][lane];
         increment_jacobian[26][lane] = G3 * work[237][lane] - G1 * work[242][lane];
-        increment_jacobian[9][lane] = P3 * work[158][lane] + (G3 * work[162][lane] - P1 * work[164][lane]) - G1 * work[156][lane] - work[8][lane];
-        increment_jacobian[15][lane] = work[0][lane] + (G1 * work[154][lane] + (P1 * work[160][lane] - P2 * work[158][lane] - G2 * work[162][lane]));
+        increment_jacobian[9][lane] = P3 * work[158][lane] + (G3 * work[162][lane] - P1 * work[164][lane])
+            - G1 * work[156][lane] - work[8][lane];
+        increment_jacobian[15][lane] = work[0][lane] + (G1 * work[154][lane] + (P1 * work[160][lane] - P2
+            * work[158][lane] - G2 * work[162][lane]));
     }
 }
 
-/* kowalevski_top_linearise_lanes_part3 (part 3 of 3) */
+/* kowalevski_top_linearise in all lanes (part 3 of 3) */
 kowalevski_top_APART static void kowalevski_top_linearise_lanes_part3(kowalevski_top_lanes coef[restrict 172],
-                                                                      kowalevski_top_lanes y[restrict 6],
-                                                                      kowalevski_top_lanes displacement[restrict 6],
-                                                                      kowalevski_top_lanes increment[restrict 6],
-                                                                      kowalevski_top_lanes jacobian[restrict 36],
-                                                                      kowalevski_top_lanes increment_jacobian[restrict 36],
-                                                                      kowalevski_top_lanes work[restrict 274])
+    kowalevski_top_lanes y[restrict 6], kowalevski_top_lanes displacement[restrict 6],
+    kowalevski_top_lanes increment[restrict 6], kowalevski_top_lanes jacobian[restrict 36],
+    kowalevski_top_lanes increment_jacobian[restrict 36], kowalevski_top_lanes work[restrict 274])
 {
-    (void)displacement;
-    (void)increment;
+    (void)displacement, (void)increment;
     kowalevski_top_EACH_LANE
     for (int lane = 0; lane < kowalevski_top_LANES; ++lane) {
-        const double P1 = y[0][lane];
-        const double P2 = y[1][lane];
-        const double P3 = y[2][lane];
-        const double G1 = y[3][lane];
-        const double G2 = y[4][lane];
-        const double G3 = y[5][lane];
-        const double t372 = work[8][lane] * work[11][lane];
-        const double t373 = work[0][lane] * work[13][lane];
-        const double t374 = t372 + t373;
-        const double t375 = t374 + t374;
-        const double t376 = work[8][lane] * work[20][lane] + work[2][lane] * work[11][lane];
-        const double t377 = work[2][lane] * work[151][lane] + work[8][lane] * work[152][lane] + (work[20][lane] * t376 + work[11][lane] * t375);
-        const double t378 = work[0][lane] * work[20][lane] + work[2][lane] * work[13][lane];
-        const double t379 = work[2][lane] * work[153][lane] + work[0][lane] * work[152][lane] + (work[20][lane] * t378 + work[13][lane] * t375);
-        const double t380 = work[154][lane] * work[155][lane] + work[156][lane] * work[157][lane] + (work[158][lane] * work[159][lane] + work[160][lane] * work[161][lane] + (work[162][lane] * work[163][lane] + work[164][lane] * work[165][lane])) - (t375 * work[14][lane] + work[15][lane] * (work[0][lane] * work[166][lane] + work[8][lane] * work[167][lane] + (work[11][lane] * t377 + work[13][lane] * t379) - t375 * work[6][lane]));
-        const double t381 = t378 * work[14][lane];
-        const double t382 = t378 * work[6][lane];
-        const double t383 = work[2][lane] * work[168][lane];
-        const double t384 = work[8][lane] * work[153][lane];
-        const double t385 = work[8][lane] * work[13][lane] + work[0][lane] * work[11][lane];
-        const double t386 = work[20][lane] * t385;
-        const double t387 = work[11][lane] * t378;
-        const double t388 = t383 - t384 + (t386 - t387);
-        const double t389 = work[2][lane] * work[20][lane];
-        const double t390 = t389 + t372;
-        const double t391 = t390 + t390;
-        const double t392 = work[0][lane] * work[153][lane] + work[2][lane] * work[169][lane] + (work[13][lane] * t378 + work[20][lane] * t391);
-        const double t393 = 0.5 * work[8][lane];
-        const double t394 = G2 * (G3 * coef[169][lane] + coef[113][lane] * (P1 * P3)) + P2 * (work[170][lane] + P3 * (work[98][lane] + work[171][lane]));
-        const double t395 = work[29][lane] * work[172][lane] + (work[173][lane] + (work[174][lane] + (work[175][lane] + (coef[107][lane] + coef[168][lane] * work[77][lane])))) + P1 * (coef[167][lane] * work[54][lane] + work[44][lane] + P1 * (work[176][lane] + (work[61][lane] + (work[49][lane] + work[62][lane]))));
-        const double t396 = t381 - work[15][lane] * (t382 + (work[8][lane] * work[180][lane] - work[0][lane] * work[181][lane] + (work[11][lane] * t388 - work[13][lane] * t392))) - t393 + (t394 * work[157][lane] + t395 * work[155][lane] + (work[179][lane] * work[159][lane] + work[178][lane] * work[161][lane] + (work[154][lane] * work[163][lane] + work[177][lane] * work[165][lane])));
-        const double t397 = 0.5 * work[0][lane];
-        const double t398 = t376 * work[14][lane];
-        const double t399 = t376 * work[6][lane];
-        const double t400 = work[0][lane] * work[151][lane];
-        const double t401 = work[13][lane] * t376;
-        const double t402 = t400 - t383 + (t401 - t386);
-        const double t403 = t389 + t373;
-        const double t404 = t403 + t403;
-        const double t405 = work[8][lane] * work[151][lane] + work[2][lane] * work[125][lane] + (work[11][lane] * t376 + work[20][lane] * t404);
-        const double t406 = work[29][lane] * (work[182][lane] + (coef[53][lane] * work[27][lane] + work[183][lane])) + (work[27][lane] * work[184][lane] + (work[185][lane] + (coef[170][lane] * work[57][lane] + work[186][lane]))) + P1 * (coef[171][lane] * work[26][lane] + work[28][lane] + P1 * (coef[25][lane] * work[27][lane] + work[187][lane]));
-        const double t407 = t397 + (t398 - work[15][lane] * (t399 - (work[0][lane] * work[191][lane] + work[8][lane] * work[192][lane] + (work[13][lane] * t402 + work[11][lane] * t405)))) + (t406 * work[157][lane] + t394 * work[155][lane] + (work[190][lane] * work[159][lane] + work[189][lane] * work[161][lane] + (work[156][lane] * work[163][lane] + work[188][lane] * work[165][lane])));
-        const double t408 = work[193][lane] - work[194][lane];
-        const double t409 = work[195][lane] + (work[196][lane] - work[15][lane] * (work[197][lane] - (work[11][lane] * t408 + work[20][lane] * work[166][lane])));
-        const double t410 = work[198][lane] * work[14][lane];
-        const double t411 = work[198][lane] * work[6][lane];
-        const double t412 = work[11][lane] * work[198][lane];
-        const double t413 = work[13][lane] * work[199][lane];
-        const double t414 = work[200][lane] - work[201][lane] + (t412 - t413);
-        const double t415 = t410 - work[15][lane] * (t411 + (work[20][lane] * work[202][lane] - work[11][lane] * t414));
-        const double t416 = 0.5 * G1;
-        const double t417 = work[13][lane] * work[203][lane];
-        const double t418 = work[3][lane] + (work[11][lane] * work[204][lane] - t417);
-        const double t419 = t416 + (work[204][lane] * work[14][lane] - work[15][lane] * (work[204][lane] * work[6][lane] + (work[205][lane] - work[206][lane] + (work[20][lane] * work[207][lane] - work[11][lane] * t418))));
-        const double t420 = work[208][lane] * work[14][lane];
-        const double t421 = work[208][lane] * work[6][lane];
-        const double t422 = work[11][lane] * work[208][lane];
-        const double t423 = t422 - work[13][lane] * work[209][lane];
-        const double t424 = t420 - work[15][lane] * (t421 + (work[10][lane] + (work[20][lane] * work[210][lane] - work[11][lane] * t423))) - work[211][lane];
-        const double t425 = 0.5 * P1;
-        const double t426 = work[3][lane] - work[11][lane] * work[212][lane] - t417;
-        const double t427 = work[18][lane] - work[11][lane] * work[213][lane] - work[13][lane] * work[214][lane] - (work[0][lane] * work[203][lane] + work[8][lane] * work[212][lane]);
-        const double t428 = work[15][lane] * (2.0 * work[215][lane] - work[6][lane] * work[213][lane] + (work[2][lane] * work[216][lane] - work[8][lane] * t426 + (work[20][lane] * work[217][lane] - (work[218][lane] + work[11][lane] * t427)))) + 2.0 * (work[219][lane] * work[220][lane]);
-        const double t429 = t425 + (2.0 * (work[221][lane] * work[18][lane]) - work[14][lane] * work[213][lane] - t428);
-        const double t430 = t412 - (t413 + work[17][lane]);
-        const double t431 = work[8][lane] * work[198][lane] - work[0][lane] * work[199][lane] + (work[11][lane] * work[222][lane] - (work[13][lane] * work[223][lane] + work[19][lane]));
-        const double t432 = work[15][lane] * (work[222][lane] * work[6][lane] + 2.0 * (work[13][lane] * work[18][lane]) + (work[2][lane] * work[224][lane] - work[8][lane] * t430 + (work[20][lane] * work[225][lane] - work[11][lane] * t431))) + 2.0 * (work[226][lane] * work[220][lane]);
-        const double t433 = work[222][lane] * work[14][lane] + 2.0 * (work[227][lane] * work[18][lane]) - t432;
-        const double t434 = work[13][lane] * work[228][lane] + t422;
-        const double t435 = work[8][lane] * work[208][lane] + work[0][lane] * work[228][lane] + (work[13][lane] * work[229][lane] + work[11][lane] * work[230][lane]);
-        const double t436 = 2.0 * (work[231][lane] * work[220][lane]) + work[15][lane] * (work[6][lane] * work[230][lane] + 2.0 * work[5][lane] + (work[2][lane] * work[232][lane] - work[8][lane] * t434 + (work[233][lane] + work[20][lane] * work[234][lane] - work[11][lane] * t435)));
-        const double t437 = work[14][lane] * work[230][lane] + 2.0 * (work[235][lane] * work[18][lane]) - t436 - work[236][lane];
-        const double t438 = work[13][lane] * work[168][lane] + work[11][lane] * work[169][lane];
-        const double t439 = work[169][lane] * work[14][lane] + work[15][lane] * (work[11][lane] * t438 + work[20][lane] * work[181][lane] - work[169][lane] * work[6][lane]);
-        const double t440 = work[168][lane] * work[14][lane];
-        const double t441 = work[168][lane] * work[6][lane];
-        const double t442 = work[11][lane] * work[168][lane] + work[13][lane] * work[125][lane];
-        const double t443 = 0.5 * work[20][lane];
-        const double t444 = t440 - work[15][lane] * (t441 + (work[20][lane] * work[191][lane] - work[11][lane] * t442)) - t443;
-        const double t445 = t384 - t400 + (t387 - t401);
-        const double t446 = t393 + (t381 - work[15][lane] * (t382 - (work[8][lane] * t408 + work[2][lane] * work[166][lane] + (work[11][lane] * t445 + work[20][lane] * t379)))) + (work[154][lane] * t415 + work[156][lane] * t419 + (work[160][lane] * t433 + work[158][lane] * t437 + (work[162][lane] * t424 + work[164][lane] * t429)));
-        const double t447 = work[0][lane] * work[168][lane] + work[8][lane] * work[169][lane] + (work[13][lane] * t385 + work[11][lane] * t391);
-        const double t448 = t395 * t415 + t394 * t419 + (work[154][lane] * t424 + work[177][lane] * t429 + (work[178][lane] * t433 + work[179][lane] * t437)) - (t391 * work[14][lane] + work[15][lane] * (work[8][lane] * t438 + work[2][lane] * work[181][lane] + (work[20][lane] * t392 + work[11][lane] * t447) - t391 * work[6][lane]));
-        const double t449 = t385 * work[14][lane];
-        const double t450 = t385 * work[6][lane];
-        const double t451 = work[8][lane] * work[168][lane] + work[0][lane] * work[125][lane] + (work[11][lane] * t385 + work[13][lane] * t404);
-        const double t452 = 0.5 * work[2][lane];
-        const double t453 = t449 - work[15][lane] * (t450 + (work[2][lane] * work[191][lane] - work[8][lane] * t442 + (work[20][lane] * t402 - work[11][lane] * t451))) - t452 + (t394 * t415 + t406 * t419 + (work[156][lane] * t424 + work[188][lane] * t429 + (work[189][lane] * t433 + work[190][lane] * t437)));
-        const double t454 = work[243][lane] - work[15][lane] * (work[244][lane] + (work[13][lane] * t408 - work[20][lane] * work[167][lane])) - work[245][lane];
-        const double t455 = work[203][lane] * work[14][lane];
-        const double t456 = work[203][lane] * work[6][lane];
-        const double t457 = t455 - work[15][lane] * (t456 + (work[13][lane] * t418 - work[20][lane] * work[246][lane]));
-        const double t458 = work[199][lane] * work[14][lane];
-        const double t459 = work[6][lane] * work[199][lane];
-        const double t460 = t458 - work[15][lane] * (t459 + (work[247][lane] + (work[13][lane] * t414 - work[20][lane] * work[248][lane]))) - t416;
-        const double t461 = work[249][lane] + (work[209][lane] * work[14][lane] - work[15][lane] * (work[6][lane] * work[209][lane] + (work[250][lane] - work[251][lane] + (work[13][lane] * t423 - work[20][lane] * work[252][lane]))));
-        const double t462 = work[15][lane] * (work[6][lane] * work[214][lane] + 2.0 * (work[11][lane] * work[19][lane]) + (work[0][lane] * t426 - work[2][lane] * work[253][lane] + (work[13][lane] * t427 - work[20][lane] * work[254][lane]))) + 2.0 * (work[219][lane] * work[255][lane]);
-        const double t463 = work[214][lane] * work[14][lane] + 2.0 * (work[221][lane] * work[19][lane]) - t462;
-        const double t464 = work[15][lane] * (2.0 * work[256][lane] - work[6][lane] * work[229][lane] + (work[0][lane] * t434 - work[2][lane] * work[257][lane] + (work[13][lane] * t435 - (work[12][lane] + work[20][lane] * work[258][lane])))) + 2.0 * (work[231][lane] * work[255][lane]);
-        const double t465 = work[259][lane] + (2.0 * (work[235][lane] * work[19][lane]) - work[14][lane] * work[229][lane] - t464);
-        const double t466 = work[15][lane] * (work[6][lane] * work[223][lane] + 2.0 * work[260][lane] + (work[0][lane] * t430 - work[2][lane] * work[261][lane] + (work[218][lane] + work[13][lane] * t431 - work[20][lane] * work[262][lane]))) + 2.0 * (work[226][lane] * work[255][lane]);
-        const double t467 = work[14][lane] * work[223][lane] + 2.0 * (work[227][lane] * work[19][lane]) - t466 - t425;
-        const double t468 = t443 + (t440 - work[15][lane] * (t441 - (work[20][lane] * work[180][lane] + work[13][lane] * t438)));
-        const double t469 = work[125][lane] * work[14][lane] + work[15][lane] * (work[13][lane] * t442 + work[20][lane] * work[192][lane] - work[125][lane] * work[6][lane]);
-        const double t470 = t398 - work[15][lane] * (t399 + (work[0][lane] * t408 - work[2][lane] * work[167][lane] + (work[13][lane] * t445 - work[20][lane] * t377))) - t397 + (work[156][lane] * t457 + work[154][lane] * t460 + (work[162][lane] * t461 + work[164][lane] * t463 + (work[160][lane] * t467 + work[158][lane] * t465)));
-        const double t471 = t452 + (t449 - work[15][lane] * (t450 - (work[2][lane] * work[180][lane] + work[0][lane] * t438 + (work[20][lane] * t388 + work[13][lane] * t447)))) + (t394 * t457 + t395 * t460 + (work[154][lane] * t461 + work[177][lane] * t463 + (work[179][lane] * t465 + work[178][lane] * t467)));
-        const double t472 = t406 * t457 + t394 * t460 + (work[156][lane] * t461 + work[188][lane] * t463 + (work[189][lane] * t467 + work[190][lane] * t465)) - (t404 * work[14][lane] + work[15][lane] * (work[0][lane] * t442 + work[2][lane] * work[192][lane] + (work[13][lane] * t451 + work[20][lane] * t405) - t404 * work[6][lane]));
-        const double t473 = work[263][lane] + 2.0 * (work[1][lane] * work[221][lane]) - (2.0 * (work[219][lane] * work[264][lane]) + work[15][lane] * (work[265][lane] + 2.0 * work[250][lane] + (work[9][lane] + work[11][lane] * work[253][lane] - work[13][lane] * work[216][lane])));
-        const double t474 = t473 - work[249][lane];
-        const double t475 = work[266][lane] + 2.0 * (work[1][lane] * work[235][lane]) - (work[15][lane] * (work[267][lane] + 2.0 * (work[20][lane] * work[1][lane]) + (work[11][lane] * work[257][lane] - work[13][lane] * work[232][lane])) + 2.0 * (work[231][lane] * work[264][lane]));
-        const double t476 = 2.0 * (work[1][lane] * work[227][lane]) - work[268][lane] * work[14][lane] - (2.0 * (work[226][lane] * work[264][lane]) + work[15][lane] * (2.0 * work[53][lane] - work[268][lane] * work[6][lane] + (work[11][lane] * work[261][lane] - (work[10][lane] + work[13][lane] * work[224][lane]))));
-        const double t477 = work[211][lane] + t476;
-        const double t478 = 2.0 * (work[3][lane] * work[221][lane]) - work[212][lane] * work[14][lane] - (work[15][lane] * (2.0 * work[206][lane] - work[212][lane] * work[6][lane] + (work[20][lane] * work[216][lane] - (work[247][lane] + work[11][lane] * t426))) + 2.0 * (work[219][lane] * work[272][lane]));
-        const double t479 = t416 + t478;
-        const double t480 = t410 + 2.0 * (work[3][lane] * work[227][lane]) - (work[15][lane] * (t411 + 2.0 * (work[13][lane] * work[3][lane]) + (work[20][lane] * work[224][lane] - work[11][lane] * t430)) + 2.0 * (work[226][lane] * work[272][lane]));
-        const double t481 = t420 + 2.0 * (work[3][lane] * work[235][lane]) - (2.0 * (work[231][lane] * work[272][lane]) + work[15][lane] * (t421 + 2.0 * work[52][lane] + (work[10][lane] + work[20][lane] * work[232][lane] - work[11][lane] * t434)));
-        const double t482 = t481 - work[211][lane];
-        const double t483 = t455 + 2.0 * (work[17][lane] * work[221][lane]) - (work[15][lane] * (t456 + 2.0 * (work[11][lane] * work[17][lane]) + (work[13][lane] * t426 - work[20][lane] * work[253][lane])) + 2.0 * (work[219][lane] * work[273][lane]));
-        const double t484 = 2.0 * (work[17][lane] * work[235][lane]) - work[228][lane] * work[14][lane] - (2.0 * (work[231][lane] * work[273][lane]) + work[15][lane] * (2.0 * work[251][lane] - work[228][lane] * work[6][lane] + (work[13][lane] * t434 - (work[9][lane] + work[20][lane] * work[257][lane]))));
-        const double t485 = work[249][lane] + t484;
-        const double t486 = t458 + 2.0 * (work[17][lane] * work[227][lane]) - (work[15][lane] * (t459 + 2.0 * work[205][lane] + (work[247][lane] + work[13][lane] * t430 - work[20][lane] * work[261][lane])) + 2.0 * (work[226][lane] * work[273][lane]));
-        const double t487 = t486 - t416;
-        const double t488 = G2 * work[190][lane];
-        const double t489 = G3 * work[179][lane];
-        const double t490 = P2 * work[237][lane];
-        const double t491 = P3 * work[238][lane];
-        const double t492 = G3 * work[178][lane];
-        const double t493 = G2 * work[188][lane];
-        const double t494 = G2 * work[156][lane];
-        const double t495 = G3 * work[154][lane];
-        const double t496 = G3 * work[158][lane];
-        const double t497 = G3 * work[160][lane];
-        const double t498 = P1 * work[241][lane];
-        const double t499 = G1 * work[189][lane];
-        const double t500 = G1 * work[188][lane];
-        const double t501 = G1 * t394;
-        const double t502 = G2 * work[158][lane];
-        const double t503 = G1 * work[178][lane];
-        const double t504 = G1 * work[177][lane];
-        const double t505 = G2 * work[164][lane];
-        const double t506 = G2 * work[237][lane];
-        const double t507 = G3 * work[238][lane];
-        const double t508 = G1 * work[241][lane];
-        jacobian[3][lane] = t380;
-        increment_jacobian[4][lane] = work[8][lane] + (G2 * t394 - G3 * t395 + (P2 * work[177][lane] - P3 * work[178][lane]));
-        increment_jacobian[16][lane] = G1 * t395 + (P1 * work[178][lane] - P2 * work[179][lane] - G2 * work[154][lane]) - work[2][lane];
-        jacobian[4][lane] = t396;
-        increment_jacobian[5][lane] = G2 * t406 - G3 * t394 + (P2 * work[188][lane] - P3 * work[189][lane]) - work[0][lane];
-        increment_jacobian[11][lane] = work[2][lane] + (P3 * work[190][lane] + (G3 * work[156][lane] - P1 * work[188][lane]) - G1 * t406);
-        jacobian[5][lane] = t407;
-        jacobian[6][lane] = t409 + (work[179][lane] * t415 + work[190][lane] * t419 + (work[158][lane] * t424 + work[237][lane] * t429 + (work[238][lane] * t433 + work[239][lane] * t437)));
-        jacobian[7][lane] = 1.0 + (work[178][lane] * t415 + work[189][lane] * t419 + (work[240][lane] * t433 + work[238][lane] * t437 + (work[160][lane] * t424 + work[241][lane] * t429)) - t439);
-        jacobian[8][lane] = t444 + (work[177][lane] * t415 + work[188][lane] * t419 + (work[241][lane] * t433 + work[237][lane] * t437 + (work[164][lane] * t424 + work[242][lane] * t429)));
-        jacobian[9][lane] = t446;
-        jacobian[10][lane] = t448;
-        jacobian[11][lane] = t453;
-        jacobian[12][lane] = t454 + (work[190][lane] * t457 + work[179][lane] * t460 + (work[158][lane] * t461 + work[237][lane] * t463 + (work[239][lane] * t465 + work[238][lane] * t467)));
-        jacobian[13][lane] = t468 + (work[189][lane] * t457 + work[178][lane] * t460 + (work[160][lane] * t461 + work[241][lane] * t463 + (work[238][lane] * t465 + work[240][lane] * t467)));
-        jacobian[14][lane] = 1.0 + (work[188][lane] * t457 + work[177][lane] * t460 + (work[164][lane] * t461 + work[242][lane] * t463 + (work[241][lane] * t467 + work[237][lane] * t465)) - t469);
-        jacobian[15][lane] = t470;
-        jacobian[16][lane] = t471;
-        jacobian[17][lane] = t472;
-        jacobian[18][lane] = work[237][lane] * t474 + (work[239][lane] * t475 + work[238][lane] * t477);
-        jacobian[19][lane] = work[241][lane] * t474 + (work[238][lane] * t475 + work[240][lane] * t477);
-        jacobian[20][lane] = work[242][lane] * t474 + (work[237][lane] * t475 + work[241][lane] * t477);
-        jacobian[21][lane] = 1.0 + (work[164][lane] * t474 + (work[158][lane] * t475 + work[160][lane] * t477) - work[269][lane]);
-        jacobian[22][lane] = work[270][lane] + (work[177][lane] * t474 + (work[179][lane] * t475 + work[178][lane] * t477));
-        jacobian[23][lane] = work[271][lane] + (work[188][lane] * t474 + (work[190][lane] * t475 + work[189][lane] * t477));
-        jacobian[24][lane] = work[237][lane] * t479 + (work[238][lane] * t480 + work[239][lane] * t482);
-        jacobian[25][lane] = work[241][lane] * t479 + (work[240][lane] * t480 + work[238][lane] * t482);
-        jacobian[26][lane] = work[242][lane] * t479 + (work[241][lane] * t480 + work[237][lane] * t482);
-        jacobian[27][lane] = t409 + (work[164][lane] * t479 + (work[160][lane] * t480 + work[158][lane] * t482));
-        jacobian[28][lane] = 1.0 + (work[177][lane] * t479 + (work[178][lane] * t480 + work[179][lane] * t482) - t439);
-        jacobian[29][lane] = t444 + (work[188][lane] * t479 + (work[189][lane] * t480 + work[190][lane] * t482));
-        jacobian[30][lane] = work[237][lane] * t483 + (work[239][lane] * t485 + work[238][lane] * t487);
-        jacobian[31][lane] = work[241][lane] * t483 + (work[240][lane] * t487 + work[238][lane] * t485);
-        jacobian[32][lane] = work[242][lane] * t483 + (work[241][lane] * t487 + work[237][lane] * t485);
-        jacobian[33][lane] = t454 + (work[164][lane] * t483 + (work[158][lane] * t485 + work[160][lane] * t487));
-        jacobian[34][lane] = t468 + (work[177][lane] * t483 + (work[178][lane] * t487 + work[179][lane] * t485));
-        jacobian[35][lane] = 1.0 + (work[188][lane] * t483 + (work[190][lane] * t485 + work[189][lane] * t487) - t469);
-        increment_jacobian[0][lane] = t488 - t489 + (t490 - t491);
-        increment_jacobian[1][lane] = work[11][lane] + (G2 * work[189][lane] - t492 + (P2 * work[241][lane] - P3 * work[240][lane]));
-        increment_jacobian[22][lane] = G2 * work[177][lane] - t492 + work[11][lane];
-        increment_jacobian[2][lane] = t493 - G3 * work[177][lane] + (P2 * work[242][lane] - P3 * work[241][lane]) - work[13][lane];
-        increment_jacobian[23][lane] = t493 - G3 * work[189][lane] - work[13][lane];
-        increment_jacobian[3][lane] = t494 - t495 + (P2 * work[164][lane] - P3 * work[160][lane]);
-        increment_jacobian[6][lane] = P3 * work[239][lane] + (t496 - P1 * work[237][lane]) - G1 * work[190][lane] - work[11][lane];
-        increment_jacobian[27][lane] = t496 - G1 * work[164][lane] - work[11][lane];
-        increment_jacobian[7][lane] = t491 + (t497 - t498) - t499;
-        increment_jacobian[35][lane] = t499 - t488;
-        increment_jacobian[8][lane] = work[20][lane] + (P3 * work[237][lane] + (G3 * work[164][lane] - P1 * work[242][lane]) - t500);
-        increment_jacobian[29][lane] = G3 * work[190][lane] - t500 + work[20][lane];
-        increment_jacobian[10][lane] = P3 * work[179][lane] + (t495 - P1 * work[177][lane]) - t501;
-        increment_jacobian[17][lane] = t501 + (P1 * work[189][lane] - P2 * work[190][lane] - t494);
-        increment_jacobian[12][lane] = work[13][lane] + (G1 * work[179][lane] + (P1 * work[238][lane] - P2 * work[239][lane] - t502));
-        increment_jacobian[33][lane] = G1 * work[160][lane] - t502 + work[13][lane];
-        increment_jacobian[13][lane] = t503 + (P1 * work[240][lane] - P2 * work[238][lane] - G2 * work[160][lane]) - work[20][lane];
-        increment_jacobian[34][lane] = t503 - G2 * work[179][lane] - work[20][lane];
-        increment_jacobian[28][lane] = t489 - t504;
-        increment_jacobian[14][lane] = t504 + (t498 - t490 - t505);
-        increment_jacobian[21][lane] = t505 - t497;
-        increment_jacobian[18][lane] = t506 - t507;
-        increment_jacobian[25][lane] = t507 - t508;
-        increment_jacobian[32][lane] = t508 - t506;
+        const double P1 = y[0][lane], P2 = y[1][lane], P3 = y[2][lane], G1 = y[3][lane], G2 = y[4][lane], G3 =
+            y[5][lane];
+        const double t1 = work[8][lane] * work[11][lane], t2 = work[0][lane] * work[13][lane];
+        const double t3 = t1 + t2, t4 = t3 + t3;
+        const double t5 = work[8][lane] * work[20][lane] + work[2][lane] * work[11][lane];
+        const double t6 = work[2][lane] * work[151][lane] + work[8][lane] * work[152][lane] + (work[20][lane]
+            * t5 + work[11][lane] * t4);
+        const double t7 = work[0][lane] * work[20][lane] + work[2][lane] * work[13][lane];
+        const double t8 = work[2][lane] * work[153][lane] + work[0][lane] * work[152][lane] + (work[20][lane]
+            * t7 + work[13][lane] * t4);
+        const double t9 = work[154][lane] * work[155][lane] + work[156][lane] * work[157][lane]
+            + (work[158][lane] * work[159][lane] + work[160][lane] * work[161][lane] + (work[162][lane]
+            * work[163][lane] + work[164][lane] * work[165][lane])) - (t4 * work[14][lane] + work[15][lane]
+            * (work[0][lane] * work[166][lane] + work[8][lane] * work[167][lane] + (work[11][lane] * t6
+            + work[13][lane] * t8) - t4 * work[6][lane]));
+        const double t10 = t7 * work[14][lane], t11 = t7 * work[6][lane];
+        const double t12 = work[2][lane] * work[168][lane], t13 = work[8][lane] * work[153][lane];
+        const double t14 = work[8][lane] * work[13][lane] + work[0][lane] * work[11][lane];
+        const double t15 = work[20][lane] * t14, t16 = work[11][lane] * t7;
+        const double t17 = t12 - t13 + (t15 - t16), t18 = work[2][lane] * work[20][lane], t19 = t18 + t1;
+        const double t20 = t19 + t19;
+        const double t21 = work[0][lane] * work[153][lane] + work[2][lane] * work[169][lane] + (work[13][lane]
+            * t7 + work[20][lane] * t20);
+        const double t22 = 0.5 * work[8][lane];
+        const double t23 = G2 * (G3 * coef[169][lane] + coef[113][lane] * (P1 * P3)) + P2 * (work[170][lane]
+            + P3 * (work[98][lane] + work[171][lane]));
+        const double t24 = work[29][lane] * work[172][lane] + (work[173][lane] + (work[174][lane]
+            + (work[175][lane] + (coef[107][lane] + coef[168][lane] * work[77][lane])))) + P1
+            * (coef[167][lane] * work[54][lane] + work[44][lane] + P1 * (work[176][lane] + (work[61][lane]
+            + (work[49][lane] + work[62][lane]))));
+        const double t25 = t10 - work[15][lane] * (t11 + (work[8][lane] * work[180][lane] - work[0][lane]
+            * work[181][lane] + (work[11][lane] * t17 - work[13][lane] * t21))) - t22 + (t23 * work[157][lane]
+            + t24 * work[155][lane] + (work[179][lane] * work[159][lane] + work[178][lane] * work[161][lane]
+            + (work[154][lane] * work[163][lane] + work[177][lane] * work[165][lane])));
+        const double t26 = 0.5 * work[0][lane], t27 = t5 * work[14][lane], t28 = t5 * work[6][lane];
+        const double t29 = work[0][lane] * work[151][lane], t30 = work[13][lane] * t5;
+        const double t31 = t29 - t12 + (t30 - t15), t32 = t18 + t2, t33 = t32 + t32;
+        const double t34 = work[8][lane] * work[151][lane] + work[2][lane] * work[125][lane] + (work[11][lane]
+            * t5 + work[20][lane] * t33);
+        const double t35 = work[29][lane] * (work[182][lane] + (coef[53][lane] * work[27][lane]
+            + work[183][lane])) + (work[27][lane] * work[184][lane] + (work[185][lane] + (coef[170][lane]
+            * work[57][lane] + work[186][lane]))) + P1 * (coef[171][lane] * work[26][lane] + work[28][lane]
+            + P1 * (coef[25][lane] * work[27][lane] + work[187][lane]));
+        const double t36 = t26 + (t27 - work[15][lane] * (t28 - (work[0][lane] * work[191][lane]
+            + work[8][lane] * work[192][lane] + (work[13][lane] * t31 + work[11][lane] * t34))))
+            + (t35 * work[157][lane] + t23 * work[155][lane] + (work[190][lane] * work[159][lane]
+            + work[189][lane] * work[161][lane] + (work[156][lane] * work[163][lane] + work[188][lane]
+            * work[165][lane])));
+        const double t37 = work[193][lane] - work[194][lane];
+        const double t38 = work[195][lane] + (work[196][lane] - work[15][lane] * (work[197][lane]
+            - (work[11][lane] * t37 + work[20][lane] * work[166][lane])));
+        const double t39 = work[198][lane] * work[14][lane], t40 = work[198][lane] * work[6][lane];
+        const double t41 = work[11][lane] * work[198][lane], t42 = work[13][lane] * work[199][lane];
+        const double t43 = work[200][lane] - work[201][lane] + (t41 - t42);
+        const double t44 = t39 - work[15][lane] * (t40 + (work[20][lane] * work[202][lane] - work[11][lane]
+            * t43));
+        const double t45 = 0.5 * G1, t46 = work[13][lane] * work[203][lane];
+        const double t47 = work[3][lane] + (work[11][lane] * work[204][lane] - t46);
+        const double t48 = t45 + (work[204][lane] * work[14][lane] - work[15][lane] * (work[204][lane]
+            * work[6][lane] + (work[205][lane] - work[206][lane] + (work[20][lane] * work[207][lane]
+            - work[11][lane] * t47))));
+        const double t49 = work[208][lane] * work[14][lane], t50 = work[208][lane] * work[6][lane];
+        const double t51 = work[11][lane] * work[208][lane];
+        const double t52 = t51 - work[13][lane] * work[209][lane];
+        const double t53 = t49 - work[15][lane] * (t50 + (work[10][lane] + (work[20][lane] * work[210][lane]
+            - work[11][lane] * t52))) - work[211][lane];
+        const double t54 = 0.5 * P1, t55 = work[3][lane] - work[11][lane] * work[212][lane] - t46;
+        const double t56 = work[18][lane] - work[11][lane] * work[213][lane] - work[13][lane]
+            * work[214][lane] - (work[0][lane] * work[203][lane] + work[8][lane] * work[212][lane]);
+        const double t57 = work[15][lane] * (2.0 * work[215][lane] - work[6][lane] * work[213][lane]
+            + (work[2][lane] * work[216][lane] - work[8][lane] * t55 + (work[20][lane] * work[217][lane]
+            - (work[218][lane] + work[11][lane] * t56)))) + 2.0 * (work[219][lane] * work[220][lane]);
+        const double t58 = t54 + (2.0 * (work[221][lane] * work[18][lane]) - work[14][lane] * work[213][lane]
+            - t57);
+        const double t59 = t41 - (t42 + work[17][lane]);
+        const double t60 = work[8][lane] * work[198][lane] - work[0][lane] * work[199][lane] + (work[11][lane]
+            * work[222][lane] - (work[13][lane] * work[223][lane] + work[19][lane]));
+        const double t61 = work[15][lane] * (work[222][lane] * work[6][lane] + 2.0 * (work[13][lane]
+            * work[18][lane]) + (work[2][lane] * work[224][lane] - work[8][lane] * t59 + (work[20][lane]
+            * work[225][lane] - work[11][lane] * t60))) + 2.0 * (work[226][lane] * work[220][lane]);
+        const double t62 = work[222][lane] * work[14][lane] + 2.0 * (work[227][lane] * work[18][lane]) - t61;
+        const double t63 = work[13][lane] * work[228][lane] + t51;
+        const double t64 = work[8][lane] * work[208][lane] + work[0][lane] * work[228][lane] + (work[13][lane]
+            * work[229][lane] + work[11][lane] * work[230][lane]);
+        const double t65 = 2.0 * (work[231][lane] * work[220][lane]) + work[15][lane] * (work[6][lane]
+            * work[230][lane] + 2.0 * work[5][lane] + (work[2][lane] * work[232][lane] - work[8][lane] * t63
+            + (work[233][lane] + work[20][lane] * work[234][lane] - work[11][lane] * t64)));
+        const double t66 = work[14][lane] * work[230][lane] + 2.0 * (work[235][lane] * work[18][lane]) - t65
+            - work[236][lane];
+        const double t67 = work[13][lane] * work[168][lane] + work[11][lane] * work[169][lane];
+        const double t68 = work[169][lane] * work[14][lane] + work[15][lane] * (work[11][lane] * t67
+            + work[20][lane] * work[181][lane] - work[169][lane] * work[6][lane]);
+        const double t69 = work[168][lane] * work[14][lane], t70 = work[168][lane] * work[6][lane];
+        const double t71 = work[11][lane] * work[168][lane] + work[13][lane] * work[125][lane];
+        const double t72 = 0.5 * work[20][lane];
+        const double t73 = t69 - work[15][lane] * (t70 + (work[20][lane] * work[191][lane] - work[11][lane]
+            * t71)) - t72;
+        const double t74 = t13 - t29 + (t16 - t30);
+        const double t75 = t22 + (t10 - work[15][lane] * (t11 - (work[8][lane] * t37 + work[2][lane]
+            * work[166][lane] + (work[11][lane] * t74 + work[20][lane] * t8)))) + (work[154][lane] * t44
+            + work[156][lane] * t48 + (work[160][lane] * t62 + work[158][lane] * t66 + (work[162][lane] * t53
+            + work[164][lane] * t58)));
+        const double t76 = work[0][lane] * work[168][lane] + work[8][lane] * work[169][lane] + (work[13][lane]
+            * t14 + work[11][lane] * t20);
+        const double t77 = t24 * t44 + t23 * t48 + (work[154][lane] * t53 + work[177][lane] * t58
+            + (work[178][lane] * t62 + work[179][lane] * t66)) - (t20 * work[14][lane] + work[15][lane]
+            * (work[8][lane] * t67 + work[2][lane] * work[181][lane] + (work[20][lane] * t21 + work[11][lane]
+            * t76) - t20 * work[6][lane]));
+        const double t78 = t14 * work[14][lane], t79 = t14 * work[6][lane];
+        const double t80 = work[8][lane] * work[168][lane] + work[0][lane] * work[125][lane] + (work[11][lane]
+            * t14 + work[13][lane] * t33);
+        const double t81 = 0.5 * work[2][lane];
+        const double t82 = t78 - work[15][lane] * (t79 + (work[2][lane] * work[191][lane] - work[8][lane]
+            * t71 + (work[20][lane] * t31 - work[11][lane] * t80))) - t81 + (t23 * t44 + t35 * t48
+            + (work[156][lane] * t53 + work[188][lane] * t58 + (work[189][lane] * t62 + work[190][lane]
+            * t66)));
+        const double t83 = work[243][lane] - work[15][lane] * (work[244][lane] + (work[13][lane] * t37
+            - work[20][lane] * work[167][lane])) - work[245][lane];
+        const double t84 = work[203][lane] * work[14][lane], t85 = work[203][lane] * work[6][lane];
+        const double t86 = t84 - work[15][lane] * (t85 + (work[13][lane] * t47 - work[20][lane]
+            * work[246][lane]));
+        const double t87 = work[199][lane] * work[14][lane], t88 = work[6][lane] * work[199][lane];
+        const double t89 = t87 - work[15][lane] * (t88 + (work[247][lane] + (work[13][lane] * t43
+            - work[20][lane] * work[248][lane]))) - t45;
+        const double t90 = work[249][lane] + (work[209][lane] * work[14][lane] - work[15][lane]
+            * (work[6][lane] * work[209][lane] + (work[250][lane] - work[251][lane] + (work[13][lane] * t52
+            - work[20][lane] * work[252][lane]))));
+        const double t91 = work[15][lane] * (work[6][lane] * work[214][lane] + 2.0 * (work[11][lane]
+            * work[19][lane]) + (work[0][lane] * t55 - work[2][lane] * work[253][lane] + (work[13][lane] * t56
+            - work[20][lane] * work[254][lane]))) + 2.0 * (work[219][lane] * work[255][lane]);
+        const double t92 = work[214][lane] * work[14][lane] + 2.0 * (work[221][lane] * work[19][lane]) - t91;
+        const double t93 = work[15][lane] * (2.0 * work[256][lane] - work[6][lane] * work[229][lane]
+            + (work[0][lane] * t63 - work[2][lane] * work[257][lane] + (work[13][lane] * t64 - (work[12][lane]
+            + work[20][lane] * work[258][lane])))) + 2.0 * (work[231][lane] * work[255][lane]);
+        const double t94 = work[259][lane] + (2.0 * (work[235][lane] * work[19][lane]) - work[14][lane]
+            * work[229][lane] - t93);
+        const double t95 = work[15][lane] * (work[6][lane] * work[223][lane] + 2.0 * work[260][lane]
+            + (work[0][lane] * t59 - work[2][lane] * work[261][lane] + (work[218][lane] + work[13][lane] * t60
+            - work[20][lane] * work[262][lane]))) + 2.0 * (work[226][lane] * work[255][lane]);
+        const double t96 = work[14][lane] * work[223][lane] + 2.0 * (work[227][lane] * work[19][lane]) - t95
+            - t54;
+        const double t97 = t72 + (t69 - work[15][lane] * (t70 - (work[20][lane] * work[180][lane]
+            + work[13][lane] * t67)));
+        const double t98 = work[125][lane] * work[14][lane] + work[15][lane] * (work[13][lane] * t71
+            + work[20][lane] * work[192][lane] - work[125][lane] * work[6][lane]);
+        const double t99 = t27 - work[15][lane] * (t28 + (work[0][lane] * t37 - work[2][lane]
+            * work[167][lane] + (work[13][lane] * t74 - work[20][lane] * t6))) - t26 + (work[156][lane] * t86
+            + work[154][lane] * t89 + (work[162][lane] * t90 + work[164][lane] * t92 + (work[160][lane] * t96
+            + work[158][lane] * t94)));
+        const double t100 = t81 + (t78 - work[15][lane] * (t79 - (work[2][lane] * work[180][lane]
+            + work[0][lane] * t67 + (work[20][lane] * t17 + work[13][lane] * t76)))) + (t23 * t86 + t24 * t89
+            + (work[154][lane] * t90 + work[177][lane] * t92 + (work[179][lane] * t94 + work[178][lane]
+            * t96)));
+        const double t101 = t35 * t86 + t23 * t89 + (work[156][lane] * t90 + work[188][lane] * t92
+            + (work[189][lane] * t96 + work[190][lane] * t94)) - (t33 * work[14][lane] + work[15][lane]
+            * (work[0][lane] * t71 + work[2][lane] * work[192][lane] + (work[13][lane] * t80 + work[20][lane]
+            * t34) - t33 * work[6][lane]));
+        const double t102 = work[263][lane] + 2.0 * (work[1][lane] * work[221][lane])
+            - (2.0 * (work[219][lane] * work[264][lane]) + work[15][lane] * (work[265][lane] + 2.0
+            * work[250][lane] + (work[9][lane] + work[11][lane] * work[253][lane] - work[13][lane]
+            * work[216][lane])));
+        const double t103 = t102 - work[249][lane];
+        const double t104 = work[266][lane] + 2.0 * (work[1][lane] * work[235][lane]) - (work[15][lane]
+            * (work[267][lane] + 2.0 * (work[20][lane] * work[1][lane]) + (work[11][lane] * work[257][lane]
+            - work[13][lane] * work[232][lane])) + 2.0 * (work[231][lane] * work[264][lane]));
+        const double t105 = 2.0 * (work[1][lane] * work[227][lane]) - work[268][lane] * work[14][lane]
+            - (2.0 * (work[226][lane] * work[264][lane]) + work[15][lane] * (2.0 * work[53][lane]
+            - work[268][lane] * work[6][lane] + (work[11][lane] * work[261][lane] - (work[10][lane]
+            + work[13][lane] * work[224][lane]))));
+        const double t106 = work[211][lane] + t105;
+        const double t107 = 2.0 * (work[3][lane] * work[221][lane]) - work[212][lane] * work[14][lane]
+            - (work[15][lane] * (2.0 * work[206][lane] - work[212][lane] * work[6][lane] + (work[20][lane]
+            * work[216][lane] - (work[247][lane] + work[11][lane] * t55))) + 2.0 * (work[219][lane]
+            * work[272][lane]));
+        const double t108 = t45 + t107;
+        const double t109 = t39 + 2.0 * (work[3][lane] * work[227][lane]) - (work[15][lane]
+            * (t40 + 2.0 * (work[13][lane] * work[3][lane]) + (work[20][lane] * work[224][lane]
+            - work[11][lane] * t59)) + 2.0 * (work[226][lane] * work[272][lane]));
+        const double t110 = t49 + 2.0 * (work[3][lane] * work[235][lane])
+            - (2.0 * (work[231][lane] * work[272][lane]) + work[15][lane] * (t50 + 2.0 * work[52][lane]
+            + (work[10][lane] + work[20][lane] * work[232][lane] - work[11][lane] * t63)));
+        const double t111 = t110 - work[211][lane];
+        const double t112 = t84 + 2.0 * (work[17][lane] * work[221][lane]) - (work[15][lane]
+            * (t85 + 2.0 * (work[11][lane] * work[17][lane]) + (work[13][lane] * t55 - work[20][lane]
+            * work[253][lane])) + 2.0 * (work[219][lane] * work[273][lane]));
+        const double t113 = 2.0 * (work[17][lane] * work[235][lane]) - work[228][lane] * work[14][lane]
+            - (2.0 * (work[231][lane] * work[273][lane]) + work[15][lane] * (2.0 * work[251][lane]
+            - work[228][lane] * work[6][lane] + (work[13][lane] * t63 - (work[9][lane] + work[20][lane]
+            * work[257][lane]))));
+        const double t114 = work[249][lane] + t113;
+        const double t115 = t87 + 2.0 * (work[17][lane] * work[227][lane]) - (work[15][lane]
+            * (t88 + 2.0 * work[205][lane] + (work[247][lane] + work[13][lane] * t59 - work[20][lane]
+            * work[261][lane])) + 2.0 * (work[226][lane] * work[273][lane]));
+        const double t116 = t115 - t45, t117 = G2 * work[190][lane], t118 = G3 * work[179][lane];
+        const double t119 = P2 * work[237][lane], t120 = P3 * work[238][lane];
+        const double t121 = G3 * work[178][lane], t122 = G2 * work[188][lane];
+        const double t123 = G2 * work[156][lane], t124 = G3 * work[154][lane];
+        const double t125 = G3 * work[158][lane], t126 = G3 * work[160][lane];
+        const double t127 = P1 * work[241][lane], t128 = G1 * work[189][lane];
+        const double t129 = G1 * work[188][lane], t130 = G1 * t23, t131 = G2 * work[158][lane];
+        const double t132 = G1 * work[178][lane], t133 = G1 * work[177][lane];
+        const double t134 = G2 * work[164][lane], t135 = G2 * work[237][lane];
+        const double t136 = G3 * work[238][lane], t137 = G1 * work[241][lane];
+        jacobian[3][lane] = t9;
+        increment_jacobian[4][lane] = work[8][lane] + (G2 * t23 - G3 * t24 + (P2 * work[177][lane] - P3
+            * work[178][lane]));
+        increment_jacobian[16][lane] = G1 * t24 + (P1 * work[178][lane] - P2 * work[179][lane] - G2
+            * work[154][lane]) - work[2][lane];
+        jacobian[4][lane] = t25;
+        increment_jacobian[5][lane] = G2 * t35 - G3 * t23 + (P2 * work[188][lane] - P3 * work[189][lane])
+            - work[0][lane];
+        increment_jacobian[11][lane] = work[2][lane] + (P3 * work[190][lane] + (G3 * work[156][lane] - P1
+            * work[188][lane]) - G1 * t35);
+        jacobian[5][lane] = t36;
+        jacobian[6][lane] = t38 + (work[179][lane] * t44 + work[190][lane] * t48 + (work[158][lane] * t53
+            + work[237][lane] * t58 + (work[238][lane] * t62 + work[239][lane] * t66)));
+        jacobian[7][lane] = 1.0 + (work[178][lane] * t44 + work[189][lane] * t48 + (work[240][lane] * t62
+            + work[238][lane] * t66 + (work[160][lane] * t53 + work[241][lane] * t58)) - t68);
+        jacobian[8][lane] = t73 + (work[177][lane] * t44 + work[188][lane] * t48 + (work[241][lane] * t62
+            + work[237][lane] * t66 + (work[164][lane] * t53 + work[242][lane] * t58)));
+        jacobian[9][lane] = t75;
+        jacobian[10][lane] = t77;
+        jacobian[11][lane] = t82;
+        jacobian[12][lane] = t83 + (work[190][lane] * t86 + work[179][lane] * t89 + (work[158][lane] * t90
+            + work[237][lane] * t92 + (work[239][lane] * t94 + work[238][lane] * t96)));
+        jacobian[13][lane] = t97 + (work[189][lane] * t86 + work[178][lane] * t89 + (work[160][lane] * t90
+            + work[241][lane] * t92 + (work[238][lane] * t94 + work[240][lane] * t96)));
+        jacobian[14][lane] = 1.0 + (work[188][lane] * t86 + work[177][lane] * t89 + (work[164][lane] * t90
+            + work[242][lane] * t92 + (work[241][lane] * t96 + work[237][lane] * t94)) - t98);
+        jacobian[15][lane] = t99;
+        jacobian[16][lane] = t100;
+        jacobian[17][lane] = t101;
+        jacobian[18][lane] = work[237][lane] * t103 + (work[239][lane] * t104 + work[238][lane] * t106);
+        jacobian[19][lane] = work[241][lane] * t103 + (work[238][lane] * t104 + work[240][lane] * t106);
+        jacobian[20][lane] = work[242][lane] * t103 + (work[237][lane] * t104 + work[241][lane] * t106);
+        jacobian[21][lane] = 1.0 + (work[164][lane] * t103 + (work[158][lane] * t104 + work[160][lane] * t106)
+            - work[269][lane]);
+        jacobian[22][lane] = work[270][lane] + (work[177][lane] * t103 + (work[179][lane] * t104
+            + work[178][lane] * t106));
+        jacobian[23][lane] = work[271][lane] + (work[188][lane] * t103 + (work[190][lane] * t104
+            + work[189][lane] * t106));
+        jacobian[24][lane] = work[237][lane] * t108 + (work[238][lane] * t109 + work[239][lane] * t111);
+        jacobian[25][lane] = work[241][lane] * t108 + (work[240][lane] * t109 + work[238][lane] * t111);
+        jacobian[26][lane] = work[242][lane] * t108 + (work[241][lane] * t109 + work[237][lane] * t111);
+        jacobian[27][lane] = t38 + (work[164][lane] * t108 + (work[160][lane] * t109 + work[158][lane]
+            * t111));
+        jacobian[28][lane] = 1.0 + (work[177][lane] * t108 + (work[178][lane] * t109 + work[179][lane] * t111)
+            - t68);
+        jacobian[29][lane] = t73 + (work[188][lane] * t108 + (work[189][lane] * t109 + work[190][lane]
+            * t111));
+        jacobian[30][lane] = work[237][lane] * t112 + (work[239][lane] * t114 + work[238][lane] * t116);
+        jacobian[31][lane] = work[241][lane] * t112 + (work[240][lane] * t116 + work[238][lane] * t114);
+        jacobian[32][lane] = work[242][lane] * t112 + (work[241][lane] * t116 + work[237][lane] * t114);
+        jacobian[33][lane] = t83 + (work[164][lane] * t112 + (work[158][lane] * t114 + work[160][lane]
+            * t116));
+        jacobian[34][lane] = t97 + (work[177][lane] * t112 + (work[178][lane] * t116 + work[179][lane]
+            * t114));
+        jacobian[35][lane] = 1.0 + (work[188][lane] * t112 + (work[190][lane] * t114 + work[189][lane] * t116)
+            - t98);
+        increment_jacobian[0][lane] = t117 - t118 + (t119 - t120);
+        increment_jacobian[1][lane] = work[11][lane] + (G2 * work[189][lane] - t121 + (P2 * work[241][lane]
+            - P3 * work[240][lane]));
+        increment_jacobian[22][lane] = G2 * work[177][lane] - t121 + work[11][lane];
+        increment_jacobian[2][lane] = t122 - G3 * work[177][lane] + (P2 * work[242][lane] - P3
+            * work[241][lane]) - work[13][lane];
+        increment_jacobian[23][lane] = t122 - G3 * work[189][lane] - work[13][lane];
+        increment_jacobian[3][lane] = t123 - t124 + (P2 * work[164][lane] - P3 * work[160][lane]);
+        increment_jacobian[6][lane] = P3 * work[239][lane] + (t125 - P1 * work[237][lane]) - G1
+            * work[190][lane] - work[11][lane];
+        increment_jacobian[27][lane] = t125 - G1 * work[164][lane] - work[11][lane];
+        increment_jacobian[7][lane] = t120 + (t126 - t127) - t128;
+        increment_jacobian[35][lane] = t128 - t117;
+        increment_jacobian[8][lane] = work[20][lane] + (P3 * work[237][lane] + (G3 * work[164][lane] - P1
+            * work[242][lane]) - t129);
+        increment_jacobian[29][lane] = G3 * work[190][lane] - t129 + work[20][lane];
+        increment_jacobian[10][lane] = P3 * work[179][lane] + (t124 - P1 * work[177][lane]) - t130;
+        increment_jacobian[17][lane] = t130 + (P1 * work[189][lane] - P2 * work[190][lane] - t123);
+        increment_jacobian[12][lane] = work[13][lane] + (G1 * work[179][lane] + (P1 * work[238][lane] - P2
+            * work[239][lane] - t131));
+        increment_jacobian[33][lane] = G1 * work[160][lane] - t131 + work[13][lane];
+        increment_jacobian[13][lane] = t132 + (P1 * work[240][lane] - P2 * work[238][lane] - G2
+            * work[160][lane]) - work[20][lane];
+        increment_jacobian[34][lane] = t132 - G2 * work[179][lane] - work[20][lane];
+        increment_jacobian[28][lane] = t118 - t133;
+        increment_jacobian[14][lane] = t133 + (t127 - t119 - t134);
+        increment_jacobian[21][lane] = t134 - t126;
+        increment_jacobian[18][lane] = t135 - t136;
+        increment_jacobian[25][lane] = t136 - t137;
+        increment_jacobian[32][lane] = t137 - t135;
     }
 }
 
-/* kowalevski_top_linearise in all lanes. */
+/* kowalevski_top_linearise in all lanes */
 static void kowalevski_top_linearise_lanes(kowalevski_top_lanes coef[restrict 172],
-                                           kowalevski_top_lanes y[restrict 6],
-                                           kowalevski_top_lanes displacement[restrict 6],
-                                           kowalevski_top_lanes increment[restrict 6],
-                                           kowalevski_top_lanes jacobian[restrict 36],
-                                           kowalevski_top_lanes increment_jacobian[restrict 36])
+    kowalevski_top_lanes y[restrict 6], kowalevski_top_lanes displacement[restrict 6],
+    kowalevski_top_lanes increment[restrict 6], kowalevski_top_lanes jacobian[restrict 36],
+    kowalevski_top_lanes increment_jacobian[restrict 36])
 {
     kowalevski_top_lanes work[274];
-    kowalevski_top_linearise_lanes_part1(coef, y, displacement, increment, jacobian, increment_jacobian, work);
-    kowalevski_top_linearise_lanes_part2(coef, y, displacement, increment, jacobian, increment_jacobian, work);
-    kowalevski_top_linearise_lanes_part3(coef, y, displacement, increment, jacobian, increment_jacobian, work);
+    kowalevski_top_linearise_lanes_part1(coef, y, displacement, increment, jacobian, increment_jacobian,
+        work);
+    kowalevski_top_linearise_lanes_part2(coef, y, displacement, increment, jacobian, increment_jacobian,
+        work);
+    kowalevski_top_linearise_lanes_part3(coef, y, displacement, increment, jacobian, increment_jacobian,
+        work);
 }
 
-/* kowalevski_top_evaluate in all lanes. */
+/* kowalevski_top_evaluate in all lanes */
 static void kowalevski_top_evaluate_lanes(kowalevski_top_lanes coef[restrict 172],
-                                          kowalevski_top_lanes y[restrict 6],
-                                          kowalevski_top_lanes displacement[restrict 6],
-                                          kowalevski_top_lanes increment[restrict 6])
+    kowalevski_top_lanes y[restrict 6], kowalevski_top_lanes displacement[restrict 6],
+    kowalevski_top_lanes increment[restrict 6])
 {
     kowalevski_top_EACH_LANE
     for (int lane = 0; lane < kowalevski_top_LANES; ++lane) {
-        const double P1 = y[0][lane];
-        const double P2 = y[1][lane];
-        const double P3 = y[2][lane];
-        const double G1 = y[3][lane];
-        const double G2 = y[4][lane];
-        const double G3 = y[5][lane];
-        const double t1 = G2 * P2;
-        const double t2 = P2 * P2;
-        const double t3 = coef[77][lane] * t2;
+        const double P1 = y[0][lane], P2 = y[1][lane], P3 = y[2][lane], G1 = y[3][lane], G2 = y[4][lane], G3 =
+            y[5][lane];
+        const double t1 = G2 * P2, t2 = P2 * P2, t3 = coef[77][lane] * t2;
         const double t4 = coef[38][lane] + G1 * coef[47][lane];
-        const double t5 = coef[10][lane] + G1 * coef[15][lane];
-        const double t6 = coef[18][lane] * t2;
-        const double t7 = G1 * (coef[3][lane] + G1 * coef[4][lane]);
-        const double t8 = G3 * G3;
-        const double t9 = G2 * G2;
+        const double t5 = coef[10][lane] + G1 * coef[15][lane], t6 = coef[18][lane] * t2;
+        const double t7 = G1 * (coef[3][lane] + G1 * coef[4][lane]), t8 = G3 * G3, t9 = G2 * G2;
         const double t10 = coef[0][lane] + coef[2][lane] * t9;
-        const double t11 = t2 * (t5 + t6) + (t7 + (coef[1][lane] * t8 + t10));
-        const double t12 = coef[64][lane] * t1;
+        const double t11 = t2 * (t5 + t6) + (t7 + (coef[1][lane] * t8 + t10)), t12 = coef[64][lane] * t1;
         const double t13 = P1 * P1;
-        const double t14 = coef[10][lane] + G1 * coef[59][lane] + (coef[86][lane] * t2 + coef[18][lane] * t13);
+        const double t14 = coef[10][lane] + G1 * coef[59][lane] + (coef[86][lane] * t2 + coef[18][lane]
+            * t13);
         const double t15 = P3 * P3;
-        const double t16 = t15 * (coef[72][lane] * t9 + coef[71][lane] * t8) + (coef[49][lane] * t8 + (coef[66][lane] + coef[67][lane] * t9)) + G1 * (coef[69][lane] * t9 + coef[68][lane] * t8 + G1 * (coef[73][lane] * t15 + (coef[21][lane] + G1 * coef[70][lane])));
-        const double t17 = coef[36][lane] * t15;
-        const double t18 = coef[76][lane] * t15;
-        const double t19 = G1 * coef[55][lane];
-        const double t20 = G1 * (coef[5][lane] + t19) + (coef[53][lane] * t8 + (coef[24][lane] + coef[54][lane] * t9));
-        const double t21 = coef[74][lane] * (G3 * (G2 * P3)) + P2 * (t2 * (coef[78][lane] + G1 * coef[79][lane] + (t17 + coef[80][lane] * t2)) + (t15 * (t18 + (coef[12][lane] + G1 * coef[75][lane])) + t20));
-        const double t22 = G3 * P3;
-        const double t23 = G3 * (P2 * P3);
-        const double t24 = t22 * (coef[81][lane] + G1 * coef[82][lane] + coef[83][lane] * t15) + P2 * (coef[40][lane] * t23 + G2 * (coef[49][lane] + G1 * coef[64][lane] + (coef[39][lane] * t2 + coef[84][lane] * t15)));
-        const double t25 = coef[34][lane] + G1 * coef[35][lane];
-        const double t26 = coef[37][lane] * t2;
+        const double t16 = t15 * (coef[72][lane] * t9 + coef[71][lane] * t8) + (coef[49][lane] * t8
+            + (coef[66][lane] + coef[67][lane] * t9)) + G1 * (coef[69][lane] * t9 + coef[68][lane] * t8 + G1
+            * (coef[73][lane] * t15 + (coef[21][lane] + G1 * coef[70][lane])));
+        const double t17 = coef[36][lane] * t15, t18 = coef[76][lane] * t15, t19 = G1 * coef[55][lane];
+        const double t20 = G1 * (coef[5][lane] + t19) + (coef[53][lane] * t8 + (coef[24][lane]
+            + coef[54][lane] * t9));
+        const double t21 = coef[74][lane] * (G3 * (G2 * P3)) + P2 * (t2 * (coef[78][lane] + G1
+            * coef[79][lane] + (t17 + coef[80][lane] * t2))
+            + (t15 * (t18 + (coef[12][lane] + G1 * coef[75][lane])) + t20));
+        const double t22 = G3 * P3, t23 = G3 * (P2 * P3);
+        const double t24 = t22 * (coef[81][lane] + G1 * coef[82][lane] + coef[83][lane] * t15) + P2
+            * (coef[40][lane] * t23 + G2 * (coef[49][lane] + G1 * coef[64][lane] + (coef[39][lane] * t2
+            + coef[84][lane] * t15)));
+        const double t25 = coef[34][lane] + G1 * coef[35][lane], t26 = coef[37][lane] * t2;
         const double t27 = G1 * coef[27][lane];
-        const double t28 = G1 * (coef[12][lane] + t27) + (coef[25][lane] * t8 + (coef[24][lane] + coef[26][lane] * t9));
+        const double t28 = G1 * (coef[12][lane] + t27) + (coef[25][lane] * t8 + (coef[24][lane]
+            + coef[26][lane] * t9));
         const double t29 = coef[40][lane] * t22;
-        const double t30 = t2 * (t25 + (coef[44][lane] * t15 + t26)) + (t15 * (t18 + (coef[12][lane] + G1 * coef[85][lane])) + t28) + P1 * (coef[39][lane] * t1 + t29 + P1 * (t17 + (coef[78][lane] + G1 * coef[87][lane] + (t26 + coef[80][lane] * t13))));
-        const double p_P3 = G3 * (t1 * (t3 + t4) + P1 * (t11 + P1 * (t12 + P1 * t14))) + P3 * (t16 + P2 * t21 + P1 * (t24 + P1 * t30));
-        const double t31 = coef[8][lane] * t8;
-        const double t32 = t31 + coef[9][lane] * t9;
-        const double t33 = coef[10][lane] + G1 * coef[11][lane];
-        const double t34 = coef[2][lane] * t2;
-        const double t35 = coef[20][lane] + G1 * coef[22][lane];
-        const double t36 = coef[31][lane] * t2;
-        const double t37 = P1 * P2;
-        const double t38 = coef[21][lane] + G1 * coef[23][lane];
-        const double t39 = coef[19][lane] + coef[33][lane] * (G1 * G1 * t2) + t8 * (t35 + (t36 + coef[43][lane] * t13)) + G2 * (coef[41][lane] * (G1 * t37) + G2 * (t38 + (coef[44][lane] * t13 + coef[32][lane] * t2)));
+        const double t30 = t2 * (t25 + (coef[44][lane] * t15 + t26))
+            + (t15 * (t18 + (coef[12][lane] + G1 * coef[85][lane])) + t28) + P1 * (coef[39][lane] * t1 + t29
+            + P1 * (t17 + (coef[78][lane] + G1 * coef[87][lane] + (t26 + coef[80][lane] * t13))));
+        const double p_P3 = G3 * (t1 * (t3 + t4) + P1 * (t11 + P1 * (t12 + P1 * t14))) + P3 * (t16 + P2 * t21
+            + P1 * (t24 + P1 * t30));
+        const double t31 = coef[8][lane] * t8, t32 = t31 + coef[9][lane] * t9;
+        const double t33 = coef[10][lane] + G1 * coef[11][lane], t34 = coef[2][lane] * t2;
+        const double t35 = coef[20][lane] + G1 * coef[22][lane], t36 = coef[31][lane] * t2;
+        const double t37 = P1 * P2, t38 = coef[21][lane] + G1 * coef[23][lane];
+        const double t39 = coef[19][lane] + coef[33][lane] * (G1 * G1 * t2) + t8
+            * (t35 + (t36 + coef[43][lane] * t13)) + G2 * (coef[41][lane] * (G1 * t37) + G2
+            * (t38 + (coef[44][lane] * t13 + coef[32][lane] * t2)));
         const double t40 = coef[5][lane] + G1 * coef[6][lane] + coef[7][lane] * t15;
-        const double t41 = coef[12][lane] + G1 * coef[13][lane];
-        const double t42 = coef[17][lane] * t2;
-        const double t43 = coef[14][lane] * t15;
-        const double t44 = t17 + t26;
-        const double t45 = coef[29][lane] * t15;
-        const double t46 = coef[36][lane] * t1;
-        const double t47 = coef[45][lane] * t2 + coef[37][lane] * t13;
-        const double t48 = t2 * (t25 + t44) + (t15 * (t45 + (coef[28][lane] + G1 * coef[14][lane])) + t28) + P1 * (t46 + t29 + P1 * (t17 + (coef[34][lane] + G1 * coef[17][lane] + t47)));
-        const double t49 = G3 * (t11 + P1 * (coef[30][lane] * t1 + P1 * (coef[38][lane] + G1 * coef[39][lane] + (coef[42][lane] * t2 + coef[46][lane] * t13)))) + P3 * (t22 * t40 + P2 * (coef[16][lane] * t23 + G2 * (t41 + (t42 + t43))) + P1 * t48);
+        const double t41 = coef[12][lane] + G1 * coef[13][lane], t42 = coef[17][lane] * t2;
+        const double t43 = coef[14][lane] * t15, t44 = t17 + t26, t45 = coef[29][lane] * t15;
+        const double t46 = coef[36][lane] * t1, t47 = coef[45][lane] * t2 + coef[37][lane] * t13;
+        const double t48 = t2 * (t25 + t44) + (t15 * (t45 + (coef[28][lane] + G1 * coef[14][lane])) + t28)
+            + P1 * (t46 + t29 + P1 * (t17 + (coef[34][lane] + G1 * coef[17][lane] + t47)));
+        const double t49 = G3 * (t11 + P1 * (coef[30][lane] * t1 + P1 * (coef[38][lane] + G1 * coef[39][lane]
+            + (coef[42][lane] * t2 + coef[46][lane] * t13)))) + P3 * (t22 * t40 + P2 * (coef[16][lane] * t23
+            + G2 * (t41 + (t42 + t43))) + P1 * t48);
         const double p_P1 = t1 * (t32 + G1 * (t33 + t34)) + P1 * t39 + P3 * t49;
-        const double t50 = coef[48][lane] * t15;
-        const double t51 = t22 * (t4 + t50);
-        const double t52 = coef[65][lane] * t13;
-        const double t53 = coef[64][lane] * (G3 * P1);
-        const double t54 = coef[17][lane] * t13;
-        const double t55 = coef[58][lane] * t2;
-        const double t56 = coef[33][lane] * t13;
-        const double t57 = t9 * (t55 + (coef[12][lane] + coef[32][lane] * t13)) + (coef[19][lane] + t8 * (t42 + (coef[49][lane] + coef[31][lane] * t13))) + G1 * (G1 * (coef[12][lane] + G1 * coef[52][lane] + (t56 + coef[59][lane] * t2)) + (coef[50][lane] * t8 + G2 * (G2 * coef[51][lane] + coef[1][lane] * t37)));
+        const double t50 = coef[48][lane] * t15, t51 = t22 * (t4 + t50), t52 = coef[65][lane] * t13;
+        const double t53 = coef[64][lane] * (G3 * P1), t54 = coef[17][lane] * t13;
+        const double t55 = coef[58][lane] * t2, t56 = coef[33][lane] * t13;
+        const double t57 = t9 * (t55 + (coef[12][lane] + coef[32][lane] * t13)) + (coef[19][lane] + t8
+            * (t42 + (coef[49][lane] + coef[31][lane] * t13))) + G1 * (G1 * (coef[12][lane] + G1
+            * coef[52][lane] + (t56 + coef[59][lane] * t2)) + (coef[50][lane] * t8 + G2 * (G2 * coef[51][lane]
+            + coef[1][lane] * t37)));
         const double t58 = G1 * coef[50][lane];
-        const double t59 = t2 * (coef[34][lane] + t58 + t44) + (t15 * (t45 + (coef[28][lane] + G1 * coef[56][lane])) + t20) + P1 * (coef[62][lane] * t22 + t46 + P1 * (t17 + (t25 + t47)));
-        const double t60 = P2 * (t57 + P3 * (G3 * (coef[57][lane] * t1 + P1 * (coef[60][lane] + G1 * coef[61][lane] + (coef[63][lane] * t13 + coef[63][lane] * t2))) + P3 * t59));
-        const double p_P2 = G2 * (t51 + P1 * (t32 + G1 * (t52 + t33) + P3 * (t53 + P3 * (t41 + (t54 + t43))))) + t60;
+        const double t59 = t2 * (coef[34][lane] + t58 + t44)
+            + (t15 * (t45 + (coef[28][lane] + G1 * coef[56][lane])) + t20) + P1 * (coef[62][lane] * t22 + t46
+            + P1 * (t17 + (t25 + t47)));
+        const double t60 = P2 * (t57 + P3 * (G3 * (coef[57][lane] * t1 + P1 * (coef[60][lane] + G1
+            * coef[61][lane] + (coef[63][lane] * t13 + coef[63][lane] * t2))) + P3 * t59));
+        const double p_P2 = G2 * (t51 + P1 * (t32 + G1 * (t52 + t33) + P3 * (t53 + P3 * (t41 + (t54 + t43)))))
+            + t60;
         const double t61 = p_P3 * p_P3 + (p_P1 * p_P1 + p_P2 * p_P2);
-        const double t62 = kowalevski_top_phi0_lane(t61);
-        const double t63 = G1 * coef[90][lane];
-        const double t64 = t2 * (coef[87][lane] * t2 + (coef[49][lane] + t58)) + (G1 * (coef[38][lane] + t63) + (coef[115][lane] * t8 + (coef[114][lane] + coef[108][lane] * t9))) + P1 * (coef[118][lane] * t1 + P1 * (t35 + (t36 + coef[119][lane] * t13)));
+        const double t62 = kowalevski_top_phi0_lane(t61), t63 = G1 * coef[90][lane];
+        const double t64 = t2 * (coef[87][lane] * t2 + (coef[49][lane] + t58)) + (G1 * (coef[38][lane] + t63)
+            + (coef[115][lane] * t8 + (coef[114][lane] + coef[108][lane] * t9))) + P1 * (coef[118][lane] * t1
+            + P1 * (t35 + (t36 + coef[119][lane] * t13)));
         const double t65 = coef[16][lane] * t15;
-        const double t66 = t2 * (t5 + (t65 + t6)) + (t15 * t40 + (t7 + (coef[117][lane] * t8 + t10))) + P1 * (coef[25][lane] * t22 + t12 + P1 * (t65 + t14));
-        const double t67 = P3 * (t22 * (coef[49][lane] + G1 * coef[68][lane] + coef[116][lane] * t15) + P2 * (coef[53][lane] * t23 + G2 * (t4 + (t3 + t50))) + P1 * t66);
+        const double t66 = t2 * (t5 + (t65 + t6)) + (t15 * t40 + (t7 + (coef[117][lane] * t8 + t10))) + P1
+            * (coef[25][lane] * t22 + t12 + P1 * (t65 + t14));
+        const double t67 = P3 * (t22 * (coef[49][lane] + G1 * coef[68][lane] + coef[116][lane] * t15) + P2
+            * (coef[53][lane] * t23 + G2 * (t4 + (t3 + t50))) + P1 * t66);
         const double p_G3 = G3 * t64 + t67;
-        const double t68 = G3 * p_P1 - G1 * p_P3;
-        const double t69 = G1 * coef[91][lane];
-        const double t70 = t15 * (coef[111][lane] * t15 + (coef[67][lane] + G1 * coef[69][lane])) + (G1 * (coef[110][lane] + t69) + (coef[108][lane] * t8 + (coef[107][lane] + coef[109][lane] * t9))) + P1 * (coef[113][lane] * t22 + P1 * (t38 + (coef[26][lane] * t15 + coef[36][lane] * t13)));
-        const double t71 = t31 + G2 * (G2 * coef[90][lane] + coef[32][lane] * t37) + G1 * (t33 + (t52 + t34)) + P3 * (t53 + P3 * (t43 + (t41 + (t42 + t54))));
-        const double p_G2 = G2 * t70 + P2 * (t51 + P2 * (coef[77][lane] * t23 + G2 * (coef[12][lane] + G1 * coef[51][lane] + (coef[112][lane] * t2 + coef[54][lane] * t15))) + P1 * t71);
+        const double t68 = G3 * p_P1 - G1 * p_P3, t69 = G1 * coef[91][lane];
+        const double t70 = t15 * (coef[111][lane] * t15 + (coef[67][lane] + G1 * coef[69][lane]))
+            + (G1 * (coef[110][lane] + t69) + (coef[108][lane] * t8 + (coef[107][lane] + coef[109][lane]
+            * t9))) + P1 * (coef[113][lane] * t22 + P1 * (t38 + (coef[26][lane] * t15 + coef[36][lane]
+            * t13)));
+        const double t71 = t31 + G2 * (G2 * coef[90][lane] + coef[32][lane] * t37) + G1 * (t33 + (t52 + t34))
+            + P3 * (t53 + P3 * (t43 + (t41 + (t42 + t54))));
+        const double p_G2 = G2 * t70 + P2 * (t51 + P2 * (coef[77][lane] * t23 + G2 * (coef[12][lane] + G1
+            * coef[51][lane] + (coef[112][lane] * t2 + coef[54][lane] * t15))) + P1 * t71);
         const double t72 = G1 * p_P2 - G2 * p_P1;
-        const double t73 = G2 * P1 * (t52 + (coef[10][lane] + G1 * coef[102][lane])) + P2 * (coef[79][lane] * t8 + G2 * (G2 * coef[96][lane] + coef[2][lane] * t37) + G1 * (coef[12][lane] + G1 * coef[97][lane] + (t56 + t55)));
-        const double t74 = coef[93][lane] * t9 + coef[92][lane] * t8 + G1 * (coef[95][lane] * t15 + (coef[21][lane] + G1 * coef[94][lane])) + t2 * (coef[98][lane] + t19 + (coef[99][lane] * t15 + coef[100][lane] * t2));
-        const double t75 = P3 * (t74 + P1 * (coef[13][lane] * t1 + coef[6][lane] * t22 + P1 * (coef[105][lane] * t15 + (coef[28][lane] + t27 + (coef[97][lane] * t2 + coef[106][lane] * t13)))));
-        const double p_G1 = t9 * (coef[89][lane] + t69 + coef[104][lane] * t13) + (coef[66][lane] + t8 * (coef[103][lane] * t13 + (coef[88][lane] + t63))) + P2 * t73 + P3 * (G3 * (coef[47][lane] * t1 + P1 * (coef[3][lane] + G1 * coef[101][lane] + (coef[15][lane] * t2 + coef[59][lane] * t13))) + t75);
+        const double t73 = G2 * P1 * (t52 + (coef[10][lane] + G1 * coef[102][lane])) + P2 * (coef[79][lane]
+            * t8 + G2 * (G2 * coef[96][lane] + coef[2][lane] * t37) + G1 * (coef[12][lane] + G1
+            * coef[97][lane] + (t56 + t55)));
+        const double t74 = coef[93][lane] * t9 + coef[92][lane] * t8 + G1 * (coef[95][lane] * t15
+            + (coef[21][lane] + G1 * coef[94][lane])) + t2 * (coef[98][lane] + t19 + (coef[99][lane] * t15
+            + coef[100][lane] * t2));
+        const double t75 = P3 * (t74 + P1 * (coef[13][lane] * t1 + coef[6][lane] * t22 + P1 * (coef[105][lane]
+            * t15 + (coef[28][lane] + t27 + (coef[97][lane] * t2 + coef[106][lane] * t13)))));
+        const double p_G1 = t9 * (coef[89][lane] + t69 + coef[104][lane] * t13) + (coef[66][lane] + t8
+            * (coef[103][lane] * t13 + (coef[88][lane] + t63))) + P2 * t73 + P3 * (G3 * (coef[47][lane] * t1
+            + P1 * (coef[3][lane] + G1 * coef[101][lane] + (coef[15][lane] * t2 + coef[59][lane] * t13)))
+            + t75);
         const double t76 = G3 * p_G1 - G1 * p_G3 + (P3 * p_P1 - P1 * p_P3);
         const double t77 = G1 * p_G2 - G2 * p_G1 + (P1 * p_P2 - P2 * p_P1);
         const double t78 = p_G3 * t68 - p_G2 * t72 + (p_P3 * t76 - p_P2 * t77);
-        const double t79 = kowalevski_top_phi1_lane(t61);
-        const double t80 = G2 * p_P3 - G3 * p_P2;
-        const double t81 = p_P2 * t80 - p_P1 * t68;
-        const double t82 = p_P3 * t68 - p_P2 * t72;
-        const double t83 = p_P1 * t81 - p_P3 * t82;
-        const double t84 = p_P1 * t72 - p_P3 * t80;
+        const double t79 = kowalevski_top_phi1_lane(t61), t80 = G2 * p_P3 - G3 * p_P2;
+        const double t81 = p_P2 * t80 - p_P1 * t68, t82 = p_P3 * t68 - p_P2 * t72;
+        const double t83 = p_P1 * t81 - p_P3 * t82, t84 = p_P1 * t72 - p_P3 * t80;
         const double t85 = p_P2 * t82 - p_P1 * t84;
         const double t86 = G2 * p_G3 - G3 * p_G2 + (P2 * p_P3 - P3 * p_P2);
         const double t87 = p_G2 * t80 - p_G1 * t68 + (p_P2 * t86 - p_P1 * t76);
@@ -2288,9 +2577,12 @@ static void kowalevski_top_evaluate_lanes(kowalevski_top_lanes coef[restrict 172
         const double t90 = p_G2 * t82 - p_G1 * t84 + (p_P2 * t78 - p_P1 * t89);
         const double t91 = p_P3 * t84 - p_P2 * t81;
         const double t92 = p_G3 * t84 - p_G2 * t81 + (p_P3 * t89 - p_P2 * t87);
-        displacement[0][lane] = t62 * t78 - t79 * (t61 * t78 + (p_G3 * t83 - p_G2 * t85 + (p_P3 * t88 - p_P2 * t90))) - 0.5 * t86;
-        displacement[1][lane] = t62 * t89 - t79 * (t61 * t89 + (p_G1 * t85 - p_G3 * t91 + (p_P1 * t90 - p_P3 * t92))) - 0.5 * t76;
-        displacement[2][lane] = t62 * t87 - t79 * (t61 * t87 + (p_G2 * t91 - p_G1 * t83 + (p_P2 * t92 - p_P1 * t88))) - 0.5 * t77;
+        displacement[0][lane] = t62 * t78 - t79 * (t61 * t78 + (p_G3 * t83 - p_G2 * t85 + (p_P3 * t88 - p_P2
+            * t90))) - 0.5 * t86;
+        displacement[1][lane] = t62 * t89 - t79 * (t61 * t89 + (p_G1 * t85 - p_G3 * t91 + (p_P1 * t90 - p_P3
+            * t92))) - 0.5 * t76;
+        displacement[2][lane] = t62 * t87 - t79 * (t61 * t87 + (p_G2 * t91 - p_G1 * t83 + (p_P2 * t92 - p_P1
+            * t88))) - 0.5 * t77;
         displacement[3][lane] = t82 * t62 - t79 * (t61 * t82 + (p_P3 * t83 - p_P2 * t85)) - 0.5 * t80;
         displacement[4][lane] = t62 * t84 - t79 * (t61 * t84 + (p_P1 * t85 - p_P3 * t91)) - 0.5 * t68;
         displacement[5][lane] = t62 * t81 - t79 * (t61 * t81 + (p_P2 * t91 - p_P1 * t83)) - 0.5 * t72;
@@ -2303,89 +2595,41 @@ static void kowalevski_top_evaluate_lanes(kowalevski_top_lanes coef[restrict 172
     }
 }
 
-/* Invert the matrices of all lanes in place by elimination without pivoting: they are I + O(h). Infinite where a pivot is
-   far from 1. */
-static void kowalevski_top_invert(kowalevski_top_lanes matrix[restrict 36])
-{
-    for (int k = 0; k < 6; ++k) {
-        kowalevski_top_lanes factor[6];
-        kowalevski_top_EACH_LANE
-        for (int lane = 0; lane < kowalevski_top_LANES; ++lane) {
-            const double reciprocal = 1.0 / matrix[k * 6 + k][lane];
-            matrix[k * 6 + k][lane] = 1.0;
-            for (int j = 0; j < 6; ++j) matrix[k * 6 + j][lane] *= reciprocal;
-            matrix[k * 6 + k][lane] += fabs(reciprocal) < 1e3 ? 0.0 : HUGE_VAL;
-        }
-        for (int i = 0; i < 6; ++i) {
-            kowalevski_top_EACH_LANE
-            for (int lane = 0; lane < kowalevski_top_LANES; ++lane) {
-                factor[i][lane] = matrix[i * 6 + k][lane];
-                if (i != k) matrix[i * 6 + k][lane] = 0.0;
-            }
-        }
-        for (int i = 0; i < 6; ++i)
-            for (int j = 0; j < 6 && i != k; ++j) {
-                kowalevski_top_EACH_LANE
-                for (int lane = 0; lane < kowalevski_top_LANES; ++lane)
-                    matrix[i * 6 + j][lane] -= factor[i][lane] * matrix[k * 6 + j][lane];
-            }
-    }
-}
+/* ---- Newton's method in lanes ---- */
+/* Components of y are measured no finer than by this part of the largest. */
+#define kowalevski_top_FLOOR_OF_LANES 1e-6
 
-/* Everything about a stage at the points y. */
-static void kowalevski_top_tabulate(kowalevski_top_lanes coef[restrict], kowalevski_top_model *model)
-{
-    kowalevski_top_linearise_lanes(coef, model->y, model->displacement, model->increment, model->inverse, model->slope);
-    kowalevski_top_invert(model->inverse);
-    for (int i = 0; i < 6; ++i)
-        for (int j = 0; j < 6; ++j) {
-            kowalevski_top_lanes sum = { 0.0 };
-            for (int k = 0; k < 6; ++k) {
-                kowalevski_top_EACH_LANE
-                for (int lane = 0; lane < kowalevski_top_LANES; ++lane)
-                    sum[lane] += model->slope[i * 6 + k][lane] * model->inverse[k * 6 + j][lane];
-            }
-            memcpy(model->gain[i * 6 + j], sum, sizeof sum);
-        }
-}
+/* A stage in all lanes, linearised around y. */
+typedef struct {
+    kowalevski_top_lanes y[kowalevski_top_DIM], displacement[kowalevski_top_DIM],
+        increment[kowalevski_top_DIM], residual[kowalevski_top_DIM];
+    /* a residual r of alpha(y) = x takes inverse r from y, and gain r from the increment */
+    kowalevski_top_lanes inverse[kowalevski_top_DIM * kowalevski_top_DIM], slope[kowalevski_top_DIM
+        * kowalevski_top_DIM], gain[kowalevski_top_DIM * kowalevski_top_DIM];
+} kowalevski_top_model;
 
 /* kowalevski_top_size in all lanes, summed over the components. */
-static void kowalevski_top_sizes(kowalevski_top_lanes y[restrict 6], kowalevski_top_lanes delta[restrict 6],
-    kowalevski_top_lanes size)
+static void kowalevski_top_sizes(kowalevski_top_lanes y[restrict kowalevski_top_DIM],
+    kowalevski_top_lanes delta[restrict kowalevski_top_DIM], kowalevski_top_lanes size)
 {
     kowalevski_top_lanes norm = { 0.0 };
     memset(size, 0, kowalevski_top_LANES * sizeof size[0]);
-    for (int i = 0; i < 6; ++i)
+    for (int i = 0; i < kowalevski_top_DIM; ++i)
         for (int lane = 0; lane < kowalevski_top_LANES; ++lane)
-            norm[lane] = 1e-6 * fabs(y[i][lane]) > norm[lane] ? 1e-6 * fabs(y[i][lane]) : norm[lane];
-    for (int i = 0; i < 6; ++i) {
+            norm[lane] = kowalevski_top_FLOOR_OF_LANES * fabs(y[i][lane]) > norm[lane]
+                ? kowalevski_top_FLOOR_OF_LANES * fabs(y[i][lane]) : norm[lane];
+    for (int i = 0; i < kowalevski_top_DIM; ++i) {
         kowalevski_top_EACH_LANE
         for (int lane = 0; lane < kowalevski_top_LANES; ++lane)
             size[lane] += fabs(delta[i][lane]) / (fabs(y[i][lane]) + norm[lane] + DBL_MIN);
     }
 }
 
-/* Correct y by the residuals, with the inverse in the table, and measure the corrections. */
-static void kowalevski_top_correct(kowalevski_top_model *model, kowalevski_top_lanes size)
-{
-    kowalevski_top_lanes delta[6];
-    memset(delta, 0, sizeof delta);
-    for (int i = 0; i < 6; ++i)
-        for (int j = 0; j < 6; ++j) {
-            kowalevski_top_EACH_LANE
-            for (int lane = 0; lane < kowalevski_top_LANES; ++lane)
-                delta[i][lane] += model->inverse[i * 6 + j][lane] * model->residual[j][lane];
-        }
-    kowalevski_top_sizes(model->y, delta, size);
-    for (int i = 0; i < 6; ++i)
-        for (int lane = 0; lane < kowalevski_top_LANES; ++lane) model->y[i][lane] -= delta[i][lane];
-}
-
-/* The largest of the lanes, none of which is negative; infinite if one is not finite. As integers, the bits of such
-   numbers have their order, and those of what is no number are larger. */
+/* The largest of the lanes, none of which is negative; infinite if one is not finite. As integers, the bits
+   of such numbers have their order, and those of what is no number are larger. */
 static double kowalevski_top_largest(const kowalevski_top_lanes size)
 {
-    uint64_t bits[8], most = 0;
+    uint64_t bits[kowalevski_top_LANES], most = 0;
     double largest;
     memcpy(bits, size, sizeof bits);
     for (int lane = 0; lane < kowalevski_top_LANES; ++lane) most = bits[lane] > most ? bits[lane] : most;
@@ -2393,29 +2637,86 @@ static double kowalevski_top_largest(const kowalevski_top_lanes size)
     return isfinite(largest) ? largest : HUGE_VAL;
 }
 
-/* kowalevski_top_near for the guesses of all lanes, seen from one value. */
-static int kowalevski_top_near_lanes(kowalevski_top_lanes y[restrict 6], const double last[6])
+/* Correct y by the residuals, with the inverse in the table, and measure the corrections. */
+static void kowalevski_top_correct(kowalevski_top_model *model, kowalevski_top_lanes size)
 {
-    kowalevski_top_lanes distance = { 0.0 };
-    double size = 0.0;
-    for (int i = 0; i < 6; ++i) {
-        size += fabs(last[i]);
-        kowalevski_top_EACH_LANE
-        for (int lane = 0; lane < kowalevski_top_LANES; ++lane) distance[lane] += fabs(y[i][lane] - last[i]);
-    }
-    return kowalevski_top_largest(distance) <= 4.0 * size;
+    kowalevski_top_lanes delta[kowalevski_top_DIM];
+    memset(delta, 0, sizeof delta);
+    for (int i = 0; i < kowalevski_top_DIM; ++i)
+        for (int j = 0; j < kowalevski_top_DIM; ++j) {
+            kowalevski_top_EACH_LANE
+            for (int lane = 0; lane < kowalevski_top_LANES; ++lane)
+                delta[i][lane] += model->inverse[i * kowalevski_top_DIM + j][lane] * model->residual[j][lane];
+        }
+    kowalevski_top_sizes(model->y, delta, size);
+    for (int i = 0; i < kowalevski_top_DIM; ++i)
+        for (int lane = 0; lane < kowalevski_top_LANES; ++lane) model->y[i][lane] -= delta[i][lane];
 }
 
-/* What is left after a correction of this size: quadratic in it, where the matrices are of the points corrected; where
-   they are of points further off, by bend, also of the order of size times bend. bound is what the last pass left. */
+/* What is left after a correction of this size: quadratic in it, where the matrices are of the points
+   corrected; where they are of points further off, by bend, also of the order of size times bend. bound is
+   what the last pass left. */
 static double kowalevski_top_remaining(double size, double bend, double bound)
 {
     const double growth = size / bound, left = size * (size + bend);
     return growth > 1.0 ? growth * left : left;
 }
 
+/* Invert the matrices of all lanes in place by elimination without pivoting: they are I + O(h). Infinite
+   where a pivot is far from 1. */
+static void kowalevski_top_invert(kowalevski_top_lanes matrix[restrict kowalevski_top_DIM
+    * kowalevski_top_DIM])
+{
+    for (int k = 0; k < kowalevski_top_DIM; ++k) {
+        kowalevski_top_lanes factor[kowalevski_top_DIM];
+        kowalevski_top_EACH_LANE
+        for (int lane = 0; lane < kowalevski_top_LANES; ++lane) {
+            const double reciprocal = 1.0 / matrix[k * kowalevski_top_DIM + k][lane];
+            matrix[k * kowalevski_top_DIM + k][lane] = 1.0;
+            for (int j = 0; j < kowalevski_top_DIM; ++j)
+                matrix[k * kowalevski_top_DIM + j][lane] *= reciprocal;
+            matrix[k * kowalevski_top_DIM + k][lane] += fabs(reciprocal) < kowalevski_top_LARGEST_RECIPROCAL
+                ? 0.0 : HUGE_VAL;
+        }
+        for (int i = 0; i < kowalevski_top_DIM; ++i) {
+            kowalevski_top_EACH_LANE
+            for (int lane = 0; lane < kowalevski_top_LANES; ++lane) {
+                factor[i][lane] = matrix[i * kowalevski_top_DIM + k][lane];
+                if (i != k) matrix[i * kowalevski_top_DIM + k][lane] = 0.0;
+            }
+        }
+        for (int i = 0; i < kowalevski_top_DIM; ++i)
+            for (int j = 0; j < kowalevski_top_DIM && i != k; ++j) {
+                kowalevski_top_EACH_LANE
+                for (int lane = 0; lane < kowalevski_top_LANES; ++lane)
+                    matrix[i * kowalevski_top_DIM + j][lane] -= factor[i][lane]
+                        * matrix[k * kowalevski_top_DIM + j][lane];
+            }
+    }
+}
+
+/* Everything about a stage at the points y. */
+static void kowalevski_top_tabulate(kowalevski_top_lanes coef[restrict], kowalevski_top_model *model)
+{
+    kowalevski_top_linearise_lanes(coef, model->y, model->displacement, model->increment, model->inverse,
+        model->slope);
+    kowalevski_top_invert(model->inverse);
+    for (int i = 0; i < kowalevski_top_DIM; ++i)
+        for (int j = 0; j < kowalevski_top_DIM; ++j) {
+            kowalevski_top_lanes sum = { 0.0 };
+            for (int k = 0; k < kowalevski_top_DIM; ++k) {
+                kowalevski_top_EACH_LANE
+                for (int lane = 0; lane < kowalevski_top_LANES; ++lane)
+                    sum[lane] += model->slope[i * kowalevski_top_DIM + k][lane] * model->inverse[k
+                        * kowalevski_top_DIM + j][lane];
+            }
+            memcpy(model->gain[i * kowalevski_top_DIM + j], sum, sizeof sum);
+        }
+}
+
 /* The table of a stage, with its matrices or with those of the last pass. */
-static void kowalevski_top_update(kowalevski_top_lanes coef[restrict], kowalevski_top_model *model, int matrices)
+static void kowalevski_top_update(kowalevski_top_lanes coef[restrict], kowalevski_top_model *model,
+    int matrices)
 {
     if (matrices)
         kowalevski_top_tabulate(coef, model);
@@ -2423,26 +2724,58 @@ static void kowalevski_top_update(kowalevski_top_lanes coef[restrict], kowalevsk
         kowalevski_top_evaluate_lanes(coef, model->y, model->displacement, model->increment);
 }
 
-/* The steps of a block one after the other, each along the linear model of its lane. As X, the state with its carry, gains
-   increment - gain residual, the next residual follows from this one; X itself is added up apart. */
-static void kowalevski_top_chain(kowalevski_top_model model[1], double x[6], double carry[6])
+/* ---- Blocks of steps ---- */
+/* What all blocks share: coefficients, the same in each lane, and the recurrences by which they are foreseen.
+   */
+typedef struct {
+    int fits; /* the fit that weight is of; -1 for none */
+    kowalevski_top_lanes coef[kowalevski_top_COEFFICIENTS], weight[kowalevski_top_WINDOW][kowalevski_top_DIM];
+} kowalevski_top_table;
+
+/* The stages of a step. */
+typedef struct {
+    kowalevski_top_model stage;
+} kowalevski_top_models;
+
+/* kowalevski_top_near for the guesses of all lanes, seen from one value. */
+static int kowalevski_top_near_lanes(kowalevski_top_lanes y[restrict kowalevski_top_DIM],
+    const double last[kowalevski_top_DIM])
 {
-    double residual[6], sum[6], small[6];
-    for (int i = 0; i < 6; ++i) {
-        residual[i] = ((model->y[i][0] - x[i]) + model->displacement[i][0]) - carry[i];
+    kowalevski_top_lanes distance = { 0.0 };
+    double size = 0.0;
+    for (int i = 0; i < kowalevski_top_DIM; ++i) {
+        size += fabs(last[i]);
+        kowalevski_top_EACH_LANE
+        for (int lane = 0; lane < kowalevski_top_LANES; ++lane) distance[lane] += fabs(y[i][lane] - last[i]);
+    }
+    return kowalevski_top_largest(distance) <= kowalevski_top_REACH * size;
+}
+
+/* The steps of a block one after the other, each along the linear model of its lane. As X, the state with its
+   carry, gains increment - gain residual, the next residual follows from this one; X itself is added up
+   apart. */
+static void kowalevski_top_chain(kowalevski_top_models *models, double x[kowalevski_top_DIM],
+    double carry[kowalevski_top_DIM])
+{
+    double residual[kowalevski_top_DIM], sum[kowalevski_top_DIM], small[kowalevski_top_DIM];
+    for (int i = 0; i < kowalevski_top_DIM; ++i) {
+        residual[i] = ((models->stage.y[i][0] - x[i]) + models->stage.displacement[i][0]) - carry[i];
         sum[i] = x[i];
         small[i] = carry[i];
     }
-    for (int k = 0; k < 1 * kowalevski_top_LANES; ++k) {
-        const int lane = k / 1, after = (k + 1) / 1 % kowalevski_top_LANES;
-        kowalevski_top_model *at = &model[k % 1], *next = &model[(k + 1) % 1];
-        double even[6] = { 0.0 }, odd[6] = { 0.0 }; /* two sums, so that no long chain of additions is waited for */
-        for (int i = 0; i < 6; ++i) {
+    for (int lane = 0; lane < kowalevski_top_LANES; ++lane) {
+        const int after = (lane + 1) % kowalevski_top_LANES;
+        kowalevski_top_model *at = &models->stage, *next = &models->stage;
+        /* two sums, so that no long chain of additions is waited for */
+        double even[kowalevski_top_DIM] = { 0.0 }, odd[kowalevski_top_DIM] = { 0.0 };
+        for (int i = 0; i < kowalevski_top_DIM; ++i) {
             at->residual[i][lane] = residual[i];
-            for (int j = 0; j < 6; j += 2) even[i] += at->gain[i * 6 + j][lane] * residual[j];
-            for (int j = 1; j < 6; j += 2) odd[i] += at->gain[i * 6 + j][lane] * residual[j];
+            for (int j = 0; j < kowalevski_top_DIM; j += 2)
+                even[i] += at->gain[i * kowalevski_top_DIM + j][lane] * residual[j];
+            for (int j = 1; j < kowalevski_top_DIM; j += 2)
+                odd[i] += at->gain[i * kowalevski_top_DIM + j][lane] * residual[j];
         }
-        for (int i = 0; i < 6; ++i) {
+        for (int i = 0; i < kowalevski_top_DIM; ++i) {
             const double change = at->increment[i][lane], total = sum[i] + change, added = total - sum[i];
             const double turn = (next->displacement[i][after] - at->displacement[i][lane]) - change;
             const double moved = (next->y[i][after] - at->y[i][lane]) + turn;
@@ -2451,37 +2784,43 @@ static void kowalevski_top_chain(kowalevski_top_model model[1], double x[6], dou
             sum[i] = total;
         }
     }
-    for (int i = 0; i < 6; ++i) {
+    for (int i = 0; i < kowalevski_top_DIM; ++i) {
         x[i] = sum[i] + small[i];
         carry[i] = small[i] - (x[i] - sum[i]);
     }
 }
 
-/* Bring the table up to date: coefficients, and weights that were fitted since. */
+/* Bring the table of a stage up to date: coefficients, and weights that were fitted since. */
+static void kowalevski_top_refresh_stage(const kowalevski_top_solver *s, kowalevski_top_table *table)
+{
+    if (table->fits == s->history.fits) return;
+    table->fits = s->history.fits;
+    for (int k = 0; k < kowalevski_top_COEFFICIENTS; ++k)
+        for (int lane = 0; lane < kowalevski_top_LANES; ++lane) table->coef[k][lane] = s->coef[k];
+    memcpy(table->weight, s->history.weight,
+        (size_t)s->history.recurrence_terms * kowalevski_top_DIM * sizeof(kowalevski_top_lanes));
+}
+
 static void kowalevski_top_refresh(const kowalevski_top_solver *s, kowalevski_top_table *table)
 {
-    for (int stage = 0; stage < 1; ++stage) {
-        if (table->fits[stage] == s->memory[stage].fits) continue;
-        table->fits[stage] = s->memory[stage].fits;
-        for (int k = 0; k < 172; ++k)
-            for (int lane = 0; lane < kowalevski_top_LANES; ++lane) table->coef[stage][k][lane] = s->coef[stage][k];
-        memcpy(table->weight[stage], s->memory[stage].weight, (size_t)s->memory[stage].terms * sizeof table->weight[0][0]);
-    }
+    kowalevski_top_refresh_stage(s, table);
 }
 
 /* Guesses for the next kowalevski_top_LANES values of a stage, by its recurrences. */
-static void kowalevski_top_foresee(const kowalevski_top_memory *memory, kowalevski_top_lanes weight[restrict][6],
-    kowalevski_top_lanes y[restrict 6])
+static void kowalevski_top_foresee(const kowalevski_top_history *history,
+    kowalevski_top_lanes weight[restrict][kowalevski_top_DIM],
+    kowalevski_top_lanes y[restrict kowalevski_top_DIM])
 {
-    const int last = memory->count - 1;
-    for (int i = 0; i < 6; ++i) {
+    const int last = history->count - 1;
+    for (int i = 0; i < kowalevski_top_DIM; ++i) {
         kowalevski_top_lanes even = { 0.0 }, odd = { 0.0 };
-        for (int k = 0; k < memory->terms; k += 2) {
-            const double past = memory->past[last - k][i], earlier = memory->past[last - 1 - k][i];
+        for (int k = 0; k < history->recurrence_terms; k += 2) {
+            const double past = history->past[last - k][i], earlier = history->past[last - 1 - k][i];
             kowalevski_top_EACH_LANE
             for (int lane = 0; lane < kowalevski_top_LANES; ++lane) even[lane] += weight[k][i][lane] * past;
             kowalevski_top_EACH_LANE
-            for (int lane = 0; lane < kowalevski_top_LANES; ++lane) odd[lane] += weight[k + 1][i][lane] * earlier;
+            for (int lane = 0; lane < kowalevski_top_LANES; ++lane)
+                odd[lane] += weight[k + 1][i][lane] * earlier;
         }
         kowalevski_top_EACH_LANE
         for (int lane = 0; lane < kowalevski_top_LANES; ++lane) y[i][lane] = even[lane] + odd[lane];
@@ -2489,137 +2828,177 @@ static void kowalevski_top_foresee(const kowalevski_top_memory *memory, kowalevs
 }
 
 /* kowalevski_top_record for the values of all lanes, one after the other. */
-static void kowalevski_top_record_lanes(kowalevski_top_memory *memory, kowalevski_top_lanes y[restrict 6])
+static void kowalevski_top_record_lanes(kowalevski_top_history *history,
+    kowalevski_top_lanes y[restrict kowalevski_top_DIM])
 {
-    kowalevski_top_make_room(memory, kowalevski_top_LANES);
+    kowalevski_top_make_room(history, kowalevski_top_LANES);
     for (int lane = 0; lane < kowalevski_top_LANES; ++lane)
-        for (int i = 0; i < 6; ++i) memory->past[memory->count + lane][i] = y[i][lane];
-    memory->count += kowalevski_top_LANES;
+        for (int i = 0; i < kowalevski_top_DIM; ++i) history->past[history->count + lane][i] = y[i][lane];
+    history->count += kowalevski_top_LANES;
 }
 
-/* Guesses where no recurrence is known: where alpha and beta have the means of steps by the classical Runge-Kutta
-   method, to leading order. */
-static void kowalevski_top_march(const kowalevski_top_solver *s, kowalevski_top_table *table, kowalevski_top_model model[1])
+/* y becomes the points whose alpha and beta have these means. */
+static void kowalevski_top_from_means(kowalevski_top_lanes coef[restrict], kowalevski_top_model *model)
 {
-    static const double reach[4] = { 0.5, 0.5, 1.0, 0.0 }, weight[4] = { 1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0 };
-    double x[6], point[6], slope[6], mean[6];
+    kowalevski_top_evaluate_lanes(coef, model->y, model->displacement, model->increment);
+    for (int i = 0; i < kowalevski_top_DIM; ++i) {
+        kowalevski_top_EACH_LANE
+        for (int lane = 0; lane < kowalevski_top_LANES; ++lane)
+            model->y[i][lane] -= model->displacement[i][lane] + 0.5 * model->increment[i][lane];
+    }
+}
+
+/* Guesses where no recurrence is known: where alpha and beta have the means of steps by the classical
+   Runge-Kutta method, to leading order. */
+static void kowalevski_top_march(const kowalevski_top_solver *s, kowalevski_top_table *table,
+    kowalevski_top_models *models)
+{
+    static const double reach[4] = { 0.5, 0.5, 1.0, 0.0 }, weight[4] = { 1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0
+        / 6.0 };
+    double x[kowalevski_top_DIM], point[kowalevski_top_DIM], slope[kowalevski_top_DIM],
+        mean[kowalevski_top_DIM];
     memcpy(x, s->x, sizeof x);
-    for (int k = 0; k < 1 * kowalevski_top_LANES; ++k) {
-        const double h = kowalevski_top_fractions[k % 1] * s->h;
+    const double h = s->h;
+    kowalevski_top_model *at = &models->stage;
+    for (int lane = 0; lane < kowalevski_top_LANES; ++lane) {
         memcpy(point, x, sizeof x);
         memset(mean, 0, sizeof mean);
         for (int part = 0; part < 4; ++part) {
             kowalevski_top_vector_field(&s->params, point, slope);
-            for (int i = 0; i < 6; ++i) {
+            for (int i = 0; i < kowalevski_top_DIM; ++i) {
                 mean[i] += weight[part] * slope[i];
                 point[i] = x[i] + h * reach[part] * slope[i];
             }
         }
-        for (int i = 0; i < 6; ++i) {
-            model[k % 1].y[i][k / 1] = x[i] + 0.5 * h * mean[i];
+        for (int i = 0; i < kowalevski_top_DIM; ++i) {
+            at->y[i][lane] = x[i] + 0.5 * h * mean[i];
             x[i] += h * mean[i];
         }
     }
-    for (int stage = 0; stage < 1; ++stage) {
-        kowalevski_top_model *at = &model[stage];
-        kowalevski_top_evaluate_lanes(table->coef[stage], at->y, at->displacement, at->increment);
-        for (int i = 0; i < 6; ++i) {
-            kowalevski_top_EACH_LANE
-            for (int lane = 0; lane < kowalevski_top_LANES; ++lane)
-                at->y[i][lane] -= at->displacement[i][lane] + 0.5 * at->increment[i][lane];
-        }
-    }
+    kowalevski_top_from_means(table->coef, &models->stage);
 }
 
-/* kowalevski_top_LANES steps at once: guess the points of all, and correct them together until the error that remains is as
-   small as after a single step. How many passes that took; 0, and the solver as before, where it takes more than most. */
+/* Guess the points of all stages and steps, by recurrences or else by Runge-Kutta steps. 0 if they are not
+   near the state. */
+static int kowalevski_top_guess(kowalevski_top_solver *s, kowalevski_top_table *table,
+    kowalevski_top_models *models)
+{
+    if (!s->blocks.use_recurrences) kowalevski_top_march(s, table, models);
+    if (s->blocks.use_recurrences) kowalevski_top_foresee(&s->history, table->weight, models->stage.y);
+    if (!kowalevski_top_near_lanes(models->stage.y, s->x)) return 0;
+    return 1;
+}
+
+/* One pass over the points of a stage: correct them by the residuals. The largest correction. */
+static double kowalevski_top_correct_stage(kowalevski_top_model *model)
+{
+    kowalevski_top_lanes sizes;
+    kowalevski_top_correct(model, sizes);
+    return kowalevski_top_largest(sizes);
+}
+
+/* Corrections below the first go on with the matrices of the last pass, as its error is then of third order.
+   After the square of so small a correction as the second, there is rounding only, if the next is below the
+   third. */
+#define kowalevski_top_FROZEN 1e-5
+#define kowalevski_top_SMALL 1e-8
+#define kowalevski_top_ROUNDING 1e-10
+
+/* kowalevski_top_LANES steps at once: guess the points of all, and correct them together until the error that
+   remains is as small as after a single step. How many passes that took; 0, and the solver as before, where
+   it takes more than most. */
 static int kowalevski_top_block(kowalevski_top_solver *s, kowalevski_top_table *table, int most)
 {
-    kowalevski_top_model model[1];
-    kowalevski_top_lanes sizes;
-    double x[6], carry[6], previous = HUGE_VAL, bend = 0.0, bound = HUGE_VAL;
+    kowalevski_top_models models;
+    double x[kowalevski_top_DIM], carry[kowalevski_top_DIM], previous = HUGE_VAL, bend = 0.0, bound =
+        HUGE_VAL;
     int passes = 0, solved = 0;
-    if (!s->foreseeing) kowalevski_top_march(s, table, model);
-    for (int stage = 0; stage < 1; ++stage) {
-        if (s->foreseeing) kowalevski_top_foresee(&s->memory[stage], table->weight[stage], model[stage].y);
-        if (!kowalevski_top_near_lanes(model[stage].y, s->x)) return 0;
-    }
+    if (!kowalevski_top_guess(s, table, &models)) return 0;
     while (!solved) {
         double size = 0.0;
-        const int matrices = previous > 1e-05;
-        for (int stage = 0; stage < 1; ++stage) kowalevski_top_update(table->coef[stage], &model[stage], matrices);
+        const int matrices = previous > kowalevski_top_FROZEN;
+        kowalevski_top_update(table->coef, &models.stage, matrices);
         memcpy(x, s->x, sizeof x);
         memcpy(carry, s->carry, sizeof carry);
-        kowalevski_top_chain(model, x, carry);
-        for (int stage = 0; stage < 1; ++stage) {
-            kowalevski_top_correct(&model[stage], sizes);
-            const double largest = kowalevski_top_largest(sizes);
-            size = largest > size ? largest : size;
-        }
-        s->evaluations += 1 * kowalevski_top_LANES;
+        kowalevski_top_chain(&models, x, carry);
+        const double largest = kowalevski_top_correct_stage(&models.stage);
+        size = largest > size ? largest : size;
+        s->evaluations += kowalevski_top_LANES;
         bend = matrices ? 0.0 : bend + previous;
         bound = kowalevski_top_remaining(size, bend, bound);
-        /* The second test: after the square of so small a correction there is rounding only. */
-        solved = bound <= 1e-20 || (previous < 1e-8 && size < 1e-10);
+        solved = bound <= kowalevski_top_TOLERANCE || (previous < kowalevski_top_SMALL && size
+            < kowalevski_top_ROUNDING);
         if ((++passes >= most || !(size < previous)) && !solved) return 0;
         previous = size;
     }
-    for (int stage = 0; stage < 1; ++stage)
-        if (!kowalevski_top_near_lanes(model[stage].y, s->x)) return 0;
-    for (int i = 0; i < 6; ++i)
+    if (!kowalevski_top_near_lanes(models.stage.y, s->x)) return 0;
+    for (int i = 0; i < kowalevski_top_DIM; ++i)
         if (!isfinite(x[i])) return 0;
     memcpy(s->x, x, sizeof x);
     memcpy(s->carry, carry, sizeof carry);
-    s->steps += kowalevski_top_LANES;
-    for (int stage = 0; stage < 1; ++stage) {
-        kowalevski_top_memory *memory = &s->memory[stage];
-        kowalevski_top_record_lanes(memory, model[stage].y);
-        memory->slow = passes > 1 ? memory->slow + kowalevski_top_LANES : 0;
-        if (memory->slow > memory->patience && s->foreseeing) kowalevski_top_fit(memory);
-    }
+    kowalevski_top_count(s, kowalevski_top_LANES);
+    kowalevski_top_history *history = &s->history;
+    kowalevski_top_record_lanes(history, models.stage.y);
+    history->slow_steps = passes > 1 ? history->slow_steps + kowalevski_top_LANES : 0;
+    if (history->slow_steps > history->slow_steps_allowed && s->blocks.use_recurrences)
+        kowalevski_top_fit(history);
     return passes;
 }
+
+enum {
+    /* steps that fits for whole blocks are saved in */
+    kowalevski_top_REPAY_BLOCKS = 4 * kowalevski_top_REPAY,
+    kowalevski_top_MOST_SINGLE_STEPS = 1000 /* before blocks are tried again */
+};
 
 /* Recurrences are given up for a while, the longer the more often that happens. */
 static void kowalevski_top_give_up(kowalevski_top_solver *s)
 {
-    s->foreseeing = s->setback = s->pause = 0;
-    s->doubt = 2 * s->doubt + 600;
-    s->retry = s->steps + s->doubt;
+    s->blocks.use_recurrences = s->blocks.last_single_steps = s->blocks.single_steps = 0;
+    s->blocks.steps_without_recurrences = 2 * s->blocks.steps_without_recurrences
+        + kowalevski_top_REPAY_BLOCKS;
+    s->blocks.recurrences_from_step = s->steps + s->blocks.steps_without_recurrences;
+}
+
+/* Fit the recurrence of a stage. Whether it foresees. */
+static int kowalevski_top_fitted(kowalevski_top_history *history)
+{
+    kowalevski_top_fit(history);
+    return history->recurrence_terms > 0;
 }
 
 /* How the next block is guessed: by recurrences, fitted as soon as enough steps are to be made, or
    have been, to repay that. */
 static void kowalevski_top_choose_guess(kowalevski_top_solver *s, size_t steps)
 {
-    for (int stage = 0; stage < 1; ++stage)
-        if (s->memory[stage].count < 111) {
-            s->foreseeing = 0;
-            return;
-        }
-    if (s->foreseeing || (steps < 600 && s->steps < 150) || s->steps < s->retry) return;
-    s->foreseeing = 1;
-    for (int stage = 0; stage < 1 && s->foreseeing; ++stage) {
-        kowalevski_top_fit(&s->memory[stage]);
-        s->foreseeing = s->memory[stage].terms > 0;
+    if (s->history.count < kowalevski_top_REMEMBERED) {
+        s->blocks.use_recurrences = 0;
+        return;
     }
-    s->pause = kowalevski_top_LANES;
-    if (!s->foreseeing) kowalevski_top_give_up(s);
+    if (s->blocks.use_recurrences || s->steps < s->blocks.recurrences_from_step) return;
+    if (steps < kowalevski_top_REPAY_BLOCKS && s->steps < kowalevski_top_REPAY) return;
+    s->blocks.use_recurrences = 1;
+    s->blocks.use_recurrences = s->blocks.use_recurrences && kowalevski_top_fitted(&s->history);
+    s->blocks.single_steps = kowalevski_top_LANES;
+    if (!s->blocks.use_recurrences) kowalevski_top_give_up(s);
 }
 
-/* Learn from a block: after one that failed single steps are made, the more the more often that happens. Recurrences
-   that fail repeatedly, or need more passes than steps by Runge-Kutta did, are given up. */
+/* Learn from a block: after one that failed single steps are made, the more the more often that happens.
+   Recurrences that fail repeatedly, or need more passes than steps by Runge-Kutta did, are given up. */
 static void kowalevski_top_learn_from(kowalevski_top_solver *s, int passes)
 {
     if (passes > 0) {
-        s->setback /= 2;
+        s->blocks.last_single_steps /= 2;
     } else {
-        s->setback = 2 * s->setback + kowalevski_top_LANES > 1000 ? 1000 : 2 * s->setback + kowalevski_top_LANES;
-        s->pause = s->setback;
+        const int longer = 2 * s->blocks.last_single_steps + kowalevski_top_LANES;
+        s->blocks.last_single_steps = longer > kowalevski_top_MOST_SINGLE_STEPS
+            ? kowalevski_top_MOST_SINGLE_STEPS : longer;
+        s->blocks.single_steps = s->blocks.last_single_steps;
     }
-    if (!s->foreseeing) {
-        s->passes = passes > 0 ? passes : INT_MAX;
-    } else if (passes > s->passes || s->setback > 5 * kowalevski_top_LANES) {
+    if (!s->blocks.use_recurrences) {
+        s->blocks.passes_without_recurrences = passes > 0 ? passes : INT_MAX;
+    } else if (passes > s->blocks.passes_without_recurrences || s->blocks.last_single_steps > 5
+        * kowalevski_top_LANES) {
         kowalevski_top_give_up(s);
     }
 }
@@ -2629,26 +3008,29 @@ static kowalevski_top_status kowalevski_top_single(kowalevski_top_solver *s)
 {
     const size_t before = s->evaluations;
     const kowalevski_top_status status = kowalevski_top_step(s, s->h);
-    s->effort += 0.125 * ((double)(s->evaluations - before) / 1 - s->effort);
+    const double evaluations = (double)(s->evaluations - before);
+    s->blocks.evaluations_per_stage += 0.125 * (evaluations - s->blocks.evaluations_per_stage);
     return status;
 }
 
-/* Blocks of steps where they cost less than single steps, with at most as many passes over a block as 2 for each
-   evaluation in a single step. The results differ by round-off only. */
+/* Blocks of steps where they cost less than single steps, with at most as many passes over a block as
+   kowalevski_top_PASSES for each evaluation in a single step. The results differ by round-off only. */
 kowalevski_top_status kowalevski_top_integrate(kowalevski_top_solver *s, double h, size_t steps)
 {
     kowalevski_top_table table;
     kowalevski_top_status status = kowalevski_top_set_step(s, h);
-    for (int stage = 0; stage < 1; ++stage) table.fits[stage] = -1;
+    table.fits = -1;
     while (status == kowalevski_top_OK && steps > 0) {
-        if (steps >= kowalevski_top_LANES && s->pause == 0) kowalevski_top_choose_guess(s, steps);
-        if (steps >= kowalevski_top_LANES && s->pause == 0) {
+        if (steps >= kowalevski_top_LANES && s->blocks.single_steps == 0)
+            kowalevski_top_choose_guess(s, steps);
+        if (steps >= kowalevski_top_LANES && s->blocks.single_steps == 0) {
             kowalevski_top_refresh(s, &table);
-            const int passes = kowalevski_top_block(s, &table, (int)(2 * s->effort + 0.5));
+            const int passes = kowalevski_top_block(s, &table, (int)(kowalevski_top_PASSES
+                * s->blocks.evaluations_per_stage + 0.5));
             kowalevski_top_learn_from(s, passes);
             if (passes > 0) steps -= kowalevski_top_LANES;
         } else {
-            if (s->pause > 0) --s->pause;
+            if (s->blocks.single_steps > 0) --s->blocks.single_steps;
             status = kowalevski_top_single(s);
             if (status == kowalevski_top_OK) --steps;
         }
@@ -2656,54 +3038,68 @@ kowalevski_top_status kowalevski_top_integrate(kowalevski_top_solver *s, double 
     return status;
 }
 
+/* ---- Groups of members ---- */
+enum {
+    kowalevski_top_GROUP = kowalevski_top_LANES, /* members, one in each lane */
+    kowalevski_top_FEWEST = 3,                   /* fewer members are quicker one by one */
+    /* steps that fits cost: of eight values at once, only one is foreseen */
+    kowalevski_top_GROUP_REPAY = 200 * kowalevski_top_DIM,
+    /* steps until recurrences that did not help are fitted again */
+    kowalevski_top_HOPELESS_WAIT = 100 * kowalevski_top_REPAY
+};
+
 /* Members of an ensemble, each in its lane. */
 typedef struct {
-    kowalevski_top_lanes x[6], carry[6], coef[1][172];
-    kowalevski_top_lanes past[1][111][6]; /* solved values, in a ring */
-    kowalevski_top_lanes weight[1][40][6]; /* of past values, the latest first, for the next */
-    int latest;     /* the row of the latest values */
-    int count;      /* rows in use */
-    int order[1];   /* how many of them the extrapolation uses */
-    int terms[1];   /* how many of them the recurrences use */
-    int fits;       /* how often recurrences have been fitted */
-    int fitting[1]; /* whether they are the better guess */
-    int slow;       /* how many of the last steps took more than one iteration */
-    int patience;   /* how many of those before recurrences are fitted again */
-    int active[8];  /* whether the lane has a member that has not failed */
-    size_t left[8]; /* steps that are still to be made, where one has */
+    kowalevski_top_lanes x[kowalevski_top_DIM], carry[kowalevski_top_DIM], coef[kowalevski_top_COEFFICIENTS];
+    kowalevski_top_lanes past[kowalevski_top_REMEMBERED][kowalevski_top_DIM]; /* solved values, in a ring */
+    /* of past values, the latest first, for the next */
+    kowalevski_top_lanes weight[kowalevski_top_WINDOW][kowalevski_top_DIM];
+    int latest;                              /* the row of the latest values */
+    int count;                               /* rows in use */
+    int extrapolation_order;                 /* how many of them the extrapolation uses */
+    int recurrence_terms;                    /* how many of them the recurrences use */
+    int use_recurrences;                     /* whether these are the better guess */
+    int fits;                                /* how often recurrences have been fitted */
+    int slow_steps;                          /* how many of the last steps took more than one iteration */
+    int slow_steps_allowed;                  /* how many of those before recurrences are fitted again */
+    int active[kowalevski_top_LANES];        /* whether the lane has a member that has not failed */
+    size_t steps_left[kowalevski_top_LANES]; /* that are still to be made, where one has */
 } kowalevski_top_group;
 
 /* The past values of a stage, the latest for k = 0. */
-static kowalevski_top_lanes *kowalevski_top_group_past(kowalevski_top_group *group, int stage, int k)
+static kowalevski_top_lanes *kowalevski_top_group_past(kowalevski_top_group *group, int k)
 {
     const int row = group->latest + k;
-    return group->past[stage][row < 111 ? row : row - 111];
+    return group->past[row < kowalevski_top_REMEMBERED ? row : row - kowalevski_top_REMEMBERED];
 }
 
 /* Guess the values of a stage by the recurrences of the members. */
-static void kowalevski_top_group_foresee(kowalevski_top_group *group, int stage, kowalevski_top_lanes y[restrict 6])
+static void kowalevski_top_group_foresee(kowalevski_top_group *group,
+    kowalevski_top_lanes y[restrict kowalevski_top_DIM])
 {
-    memset(y, 0, 6 * sizeof y[0]);
-    for (int k = 0; k < group->terms[stage]; ++k) {
-        kowalevski_top_lanes *past = kowalevski_top_group_past(group, stage, k), *weight = group->weight[stage][k];
-        for (int i = 0; i < 6; ++i) {
+    memset(y, 0, kowalevski_top_DIM * sizeof y[0]);
+    for (int k = 0; k < group->recurrence_terms; ++k) {
+        kowalevski_top_lanes *past = kowalevski_top_group_past(group, k), *weight = group->weight[k];
+        for (int i = 0; i < kowalevski_top_DIM; ++i) {
             kowalevski_top_EACH_LANE
-            for (int lane = 0; lane < kowalevski_top_LANES; ++lane) y[i][lane] += weight[i][lane] * past[i][lane];
+            for (int lane = 0; lane < kowalevski_top_LANES; ++lane)
+                y[i][lane] += weight[i][lane] * past[i][lane];
         }
     }
 }
 
 /* Extrapolate the values of a stage. */
-static void kowalevski_top_group_extrapolate(kowalevski_top_group *group, int stage, kowalevski_top_lanes y[restrict 6])
+static void kowalevski_top_group_extrapolate(kowalevski_top_group *group,
+    kowalevski_top_lanes y[restrict kowalevski_top_DIM])
 {
-    const int order = group->order[stage];
+    const int order = group->extrapolation_order;
     double binomial = -1.0;
-    memcpy(y, group->x, 6 * sizeof y[0]);
-    if (order > 0) memset(y, 0, 6 * sizeof y[0]);
+    memcpy(y, group->x, kowalevski_top_DIM * sizeof y[0]);
+    if (order > 0) memset(y, 0, kowalevski_top_DIM * sizeof y[0]);
     for (int k = 0; k < order; ++k) {
-        kowalevski_top_lanes *past = kowalevski_top_group_past(group, stage, k);
+        kowalevski_top_lanes *past = kowalevski_top_group_past(group, k);
         binomial *= -(double)(order - k) / (k + 1);
-        for (int i = 0; i < 6; ++i) {
+        for (int i = 0; i < kowalevski_top_DIM; ++i) {
             kowalevski_top_EACH_LANE
             for (int lane = 0; lane < kowalevski_top_LANES; ++lane) y[i][lane] += binomial * past[i][lane];
         }
@@ -2711,102 +3107,110 @@ static void kowalevski_top_group_extrapolate(kowalevski_top_group *group, int st
 }
 
 /* The sum over members of the absolute values of all components. */
-static double kowalevski_top_group_sum(const kowalevski_top_group *group, kowalevski_top_lanes y[6])
+static double kowalevski_top_group_sum(const kowalevski_top_group *group,
+    kowalevski_top_lanes y[kowalevski_top_DIM])
 {
     double sum = 0.0;
-    for (int i = 0; i < 6; ++i)
-        for (int lane = 0; lane < kowalevski_top_LANES; ++lane) sum += group->active[lane] ? fabs(y[i][lane]) : 0.0;
+    for (int i = 0; i < kowalevski_top_DIM; ++i)
+        for (int lane = 0; lane < kowalevski_top_LANES; ++lane) sum += group->active[lane] ? fabs(y[i][lane])
+            : 0.0;
     return sum;
 }
 
-static void kowalevski_top_group_subtract(kowalevski_top_lanes y[restrict 6], kowalevski_top_lanes other[restrict 6])
+static void kowalevski_top_group_subtract(kowalevski_top_lanes y[restrict kowalevski_top_DIM],
+    kowalevski_top_lanes other[restrict kowalevski_top_DIM])
 {
-    for (int i = 0; i < 6; ++i) {
+    for (int i = 0; i < kowalevski_top_DIM; ++i) {
         kowalevski_top_EACH_LANE
         for (int lane = 0; lane < kowalevski_top_LANES; ++lane) y[i][lane] -= other[i][lane];
     }
 }
 
 /* Choose the guess that would have been best for these values. */
-static void kowalevski_top_group_judge(kowalevski_top_group *group, int stage, kowalevski_top_lanes y[6])
+static void kowalevski_top_group_judge(kowalevski_top_group *group,
+    kowalevski_top_lanes y[kowalevski_top_DIM])
 {
-    kowalevski_top_lanes row[8 + 1][6];
-    const int rows = group->count < 8 ? group->count : 8;
+    kowalevski_top_lanes row[kowalevski_top_HISTORY + 1][kowalevski_top_DIM];
+    const int rows = group->count < kowalevski_top_HISTORY ? group->count : kowalevski_top_HISTORY;
     double least = HUGE_VAL;
     memcpy(row[0], y, sizeof row[0]);
-    for (int k = 0; k < rows; ++k) memcpy(row[k + 1], kowalevski_top_group_past(group, stage, k), sizeof row[0]);
-    if (group->order[stage] == 0) group->order[stage] = 1;
+    for (int k = 0; k < rows; ++k) memcpy(row[k + 1], kowalevski_top_group_past(group, k), sizeof row[0]);
+    if (group->extrapolation_order == 0) group->extrapolation_order = 1;
     for (int order = 1; order <= rows; ++order) { /* row[0] becomes the backward difference of this order */
         for (int k = 0; k <= rows - order; ++k) kowalevski_top_group_subtract(row[k], row[k + 1]);
         const double size = kowalevski_top_group_sum(group, row[0]);
         if (size < least) {
             least = size;
-            group->order[stage] = order;
+            group->extrapolation_order = order;
         }
     }
-    if (group->terms[stage] == 0) return;
-    kowalevski_top_group_foresee(group, stage, row[0]);
+    if (group->recurrence_terms == 0) return;
+    kowalevski_top_group_foresee(group, row[0]);
     kowalevski_top_group_subtract(row[0], y);
-    group->fitting[stage] = kowalevski_top_group_sum(group, row[0]) <= least;
+    group->use_recurrences = kowalevski_top_group_sum(group, row[0]) <= least;
 }
 
-/* Fit the recurrences of all members; with every time, wait longer before it is done again, and for long if it did not
-   help. */
+/* Fit the recurrences of all members; with every time, wait longer before it is done again, and for long if
+   it did not help. */
 static void kowalevski_top_group_fit(kowalevski_top_group *group)
 {
-    kowalevski_top_memory memory;
-    const int helped = group->fits == 0 || group->fitting[0];
-    memory.count = 111;
-    for (int stage = 0; stage < 1; ++stage) {
-        int found = 1;
-        group->terms[stage] = 0;
-        for (int lane = 0; lane < kowalevski_top_LANES; ++lane)
-            for (int i = 0; i < 6 && group->active[lane] && found; ++i) {
-                for (int k = 0; k < 111; ++k)
-                    memory.past[111 - 1 - k][i] = kowalevski_top_group_past(group, stage, k)[i][lane];
-                const int terms = kowalevski_top_train(&memory, i);
-                found = terms > 0;
-                if (terms > group->terms[stage]) group->terms[stage] = terms;
-                for (int k = 0; k < 40; ++k) group->weight[stage][k][i][lane] = memory.weight[k][i][0];
-            }
-        if (!found) group->terms[stage] = 0;
-        group->fitting[stage] = found;
-    }
+    kowalevski_top_history member;
+    const int helped = group->fits == 0 || group->use_recurrences;
+    member.count = kowalevski_top_REMEMBERED;
+    int found = 1;
+    group->recurrence_terms = 0;
+    for (int lane = 0; lane < kowalevski_top_LANES; ++lane)
+        for (int i = 0; i < kowalevski_top_DIM && group->active[lane] && found; ++i) {
+            for (int k = 0; k < kowalevski_top_REMEMBERED; ++k)
+                member.past[kowalevski_top_REMEMBERED - 1 - k][i] = kowalevski_top_group_past(group,
+                    k)[i][lane];
+            const int terms = kowalevski_top_train(&member, i);
+            found = terms > 0;
+            if (terms > group->recurrence_terms) group->recurrence_terms = terms;
+            for (int k = 0; k < kowalevski_top_WINDOW; ++k)
+                group->weight[k][i][lane] = member.weight[k][i][0];
+        }
+    if (!found) group->recurrence_terms = 0;
+    group->use_recurrences = found;
     ++group->fits;
-    group->slow = 0;
-    group->patience = helped && group->patience < 10000 ? 2 * group->patience + 150 : 100 * 150;
+    group->slow_steps = 0;
+    group->slow_steps_allowed = helped && group->slow_steps_allowed < kowalevski_top_LONG_WAIT / 2 ? 2
+        * group->slow_steps_allowed + kowalevski_top_REPAY : kowalevski_top_HOPELESS_WAIT;
 }
 
-/* Replace guesses that are not near the last values, as kowalevski_top_near has it, by these; lane by lane. */
-static void kowalevski_top_stay_near(kowalevski_top_lanes y[restrict 6], kowalevski_top_lanes last[restrict 6])
+/* Replace guesses that are not near the last values, as kowalevski_top_near has it, by these; lane by lane.
+   */
+static void kowalevski_top_stay_near(kowalevski_top_lanes y[restrict kowalevski_top_DIM],
+    kowalevski_top_lanes last[restrict kowalevski_top_DIM])
 {
     kowalevski_top_lanes distance = { 0.0 }, size = { 0.0 };
-    for (int i = 0; i < 6; ++i) {
+    for (int i = 0; i < kowalevski_top_DIM; ++i) {
         kowalevski_top_EACH_LANE
         for (int lane = 0; lane < kowalevski_top_LANES; ++lane) {
             distance[lane] += fabs(y[i][lane] - last[i][lane]);
             size[lane] += fabs(last[i][lane]);
         }
     }
-    for (int i = 0; i < 6; ++i) {
+    for (int i = 0; i < kowalevski_top_DIM; ++i) {
         kowalevski_top_EACH_LANE
         for (int lane = 0; lane < kowalevski_top_LANES; ++lane)
-            y[i][lane] = distance[lane] <= 4.0 * size[lane] ? y[i][lane] : last[i][lane];
+            y[i][lane] = distance[lane] <= kowalevski_top_REACH * size[lane] ? y[i][lane] : last[i][lane];
     }
 }
 
-/* Whether lanes are still to be solved after a correction of this size; those where nothing is finite leave the group.
-   bound is what remains in each lane. */
-static int kowalevski_top_group_open(kowalevski_top_group *group, const kowalevski_top_lanes size, const kowalevski_top_lanes previous,
-    double bend, kowalevski_top_lanes bound)
+/* Whether lanes are still to be solved after a correction of this size; those where nothing is finite leave
+   the group. bound is what remains in each lane. */
+static int kowalevski_top_group_open(kowalevski_top_group *group, const kowalevski_top_lanes size,
+    const kowalevski_top_lanes previous, double bend, kowalevski_top_lanes bound)
 {
     int open = 0;
     kowalevski_top_EACH_LANE
     for (int lane = 0; lane < kowalevski_top_LANES; ++lane)
         bound[lane] = kowalevski_top_remaining(size[lane], bend, bound[lane]);
-    if (kowalevski_top_largest(bound) <= 1e-20) return 0;
+    if (kowalevski_top_largest(bound) <= kowalevski_top_TOLERANCE) return 0;
     for (int lane = 0; lane < kowalevski_top_LANES; ++lane) {
-        const int solved = bound[lane] <= 1e-20 || (previous[lane] < 1e-8 && size[lane] < 1e-10);
+        const int solved = bound[lane] <= kowalevski_top_TOLERANCE || (previous[lane] < kowalevski_top_SMALL
+            && size[lane] < kowalevski_top_ROUNDING);
         if (!isfinite(size[lane])) group->active[lane] = 0;
         open += group->active[lane] && !solved;
     }
@@ -2814,88 +3218,93 @@ static int kowalevski_top_group_open(kowalevski_top_group *group, const kowalevs
 }
 
 /* The guess for a stage: recurrences, or extrapolation; the state for members where that is not near. */
-static void kowalevski_top_group_predict(kowalevski_top_group *group, int stage, kowalevski_top_lanes y[6])
+static void kowalevski_top_group_predict(kowalevski_top_group *group,
+    kowalevski_top_lanes y[kowalevski_top_DIM])
 {
-    if (group->fitting[stage]) kowalevski_top_group_foresee(group, stage, y);
-    else kowalevski_top_group_extrapolate(group, stage, y);
+    if (group->use_recurrences) kowalevski_top_group_foresee(group, y);
+    else kowalevski_top_group_extrapolate(group, y);
     kowalevski_top_stay_near(y, group->x);
 }
 
-/* Newton's method for a stage, until the slowest lane is solved. The number of iterations; where that is the most
-   allowed, lanes that are not solved leave the group. */
-static int kowalevski_top_group_solve(kowalevski_top_group *group, int stage, kowalevski_top_model *model)
+/* Newton's method for a stage, until the slowest lane is solved. The number of iterations; where that is the
+   most allowed, lanes that are not solved leave the group. */
+static int kowalevski_top_group_solve(kowalevski_top_group *group, kowalevski_top_model *model)
 {
     kowalevski_top_lanes size, previous, bound;
     double largest = HUGE_VAL, bend = 0.0;
     int iterations = 0, open = 1;
     for (int lane = 0; lane < kowalevski_top_LANES; ++lane) size[lane] = bound[lane] = HUGE_VAL;
-    kowalevski_top_group_predict(group, stage, model->y);
-    for (; open > 0 && iterations < 20; ++iterations) {
+    kowalevski_top_group_predict(group, model->y);
+    for (; open > 0 && iterations < kowalevski_top_MAX_ITERATIONS; ++iterations) {
         memcpy(previous, size, sizeof size);
-        kowalevski_top_update(group->coef[stage], model, largest > 1e-05);
-        bend = largest > 1e-05 ? 0.0 : bend + largest;
-        for (int i = 0; i < 6; ++i) {
+        kowalevski_top_update(group->coef, model, largest > kowalevski_top_FROZEN);
+        bend = largest > kowalevski_top_FROZEN ? 0.0 : bend + largest;
+        for (int i = 0; i < kowalevski_top_DIM; ++i) {
             kowalevski_top_EACH_LANE
             for (int lane = 0; lane < kowalevski_top_LANES; ++lane)
                 model->residual[i][lane] =
-                    ((model->y[i][lane] - group->x[i][lane]) + model->displacement[i][lane]) - group->carry[i][lane];
+                    ((model->y[i][lane] - group->x[i][lane]) + model->displacement[i][lane])
+                        - group->carry[i][lane];
         }
         kowalevski_top_correct(model, size);
         open = kowalevski_top_group_open(group, size, previous, bend, bound);
         largest = kowalevski_top_largest(size);
     }
     for (int lane = 0; lane < kowalevski_top_LANES && open > 0; ++lane)
-        group->active[lane] = group->active[lane] && bound[lane] <= 1e-20;
+        group->active[lane] = group->active[lane] && bound[lane] <= kowalevski_top_TOLERANCE;
     return iterations;
 }
 
 /* Add the increments, corrected to first order, in compensated arithmetic as for a single step. */
-static void kowalevski_top_group_advance(kowalevski_top_lanes x[restrict 6], kowalevski_top_lanes carry[restrict 6],
-    kowalevski_top_model *model)
+static void kowalevski_top_group_advance(kowalevski_top_lanes x[restrict kowalevski_top_DIM],
+    kowalevski_top_lanes carry[restrict kowalevski_top_DIM], kowalevski_top_model *model)
 {
-    for (int i = 0; i < 6; ++i)
-        for (int j = 0; j < 6; ++j) {
+    for (int i = 0; i < kowalevski_top_DIM; ++i)
+        for (int j = 0; j < kowalevski_top_DIM; ++j) {
             kowalevski_top_EACH_LANE
             for (int lane = 0; lane < kowalevski_top_LANES; ++lane)
-                carry[i][lane] -= model->gain[i * 6 + j][lane] * model->residual[j][lane];
+                carry[i][lane] -= model->gain[i * kowalevski_top_DIM + j][lane] * model->residual[j][lane];
         }
-    for (int i = 0; i < 6; ++i) {
+    for (int i = 0; i < kowalevski_top_DIM; ++i) {
         kowalevski_top_EACH_LANE
         for (int lane = 0; lane < kowalevski_top_LANES; ++lane) {
-            const double change = model->increment[i][lane], sum = x[i][lane] + change, added = sum - x[i][lane];
-            const double small = ((x[i][lane] - (sum - added)) + (change - added)) + carry[i][lane];
+            const double change = model->increment[i][lane], sum = x[i][lane] + change, added = sum
+                - x[i][lane];
+            const double lost = (x[i][lane] - (sum - added)) + (change - added);
+            const double small = lost + carry[i][lane];
             x[i][lane] = sum + small;
             carry[i][lane] = small - (x[i][lane] - sum);
         }
     }
 }
 
-/* Members that failed, or whose state is not near the one before the step or not finite, keep that one, and leave. How many
-   stay. */
-static int kowalevski_top_group_leave(kowalevski_top_group *group, kowalevski_top_lanes x[6], kowalevski_top_lanes carry[6],
-    size_t remaining)
+/* Members that failed, or whose state is not near the one before the step or not finite, keep that one, and
+   leave. How many stay. */
+static int kowalevski_top_group_leave(kowalevski_top_group *group, kowalevski_top_lanes x[kowalevski_top_DIM],
+    kowalevski_top_lanes carry[kowalevski_top_DIM], size_t remaining)
 {
     kowalevski_top_lanes moved = { 0.0 }, size = { 0.0 }, bad;
     int active = 0;
-    for (int i = 0; i < 6; ++i) {
+    for (int i = 0; i < kowalevski_top_DIM; ++i) {
         kowalevski_top_EACH_LANE
         for (int lane = 0; lane < kowalevski_top_LANES; ++lane) {
             moved[lane] += fabs(group->x[i][lane] - x[i][lane]);
             size[lane] += fabs(x[i][lane]);
         }
     }
-    for (int lane = 0; lane < kowalevski_top_LANES; ++lane) bad[lane] = moved[lane] <= 4.0 * size[lane] ? 0.0 : 1.0;
+    for (int lane = 0; lane < kowalevski_top_LANES; ++lane)
+        bad[lane] = moved[lane] <= kowalevski_top_REACH * size[lane] ? 0.0 : 1.0;
     for (int lane = 0; lane < kowalevski_top_LANES; ++lane) active += group->active[lane];
     if (active == kowalevski_top_LANES && !(kowalevski_top_largest(bad) > 0.0)) return active;
     active = 0;
     for (int lane = 0; lane < kowalevski_top_LANES; ++lane) {
         group->active[lane] = group->active[lane] && !(bad[lane] > 0.0);
         active += group->active[lane];
-        for (int i = 0; i < 6 && !group->active[lane]; ++i) {
+        for (int i = 0; i < kowalevski_top_DIM && !group->active[lane]; ++i) {
             group->x[i][lane] = x[i][lane];
             group->carry[i][lane] = carry[i][lane];
         }
-        if (!group->active[lane] && group->left[lane] == 0) group->left[lane] = remaining;
+        if (!group->active[lane] && group->steps_left[lane] == 0) group->steps_left[lane] = remaining;
     }
     return active;
 }
@@ -2903,77 +3312,77 @@ static int kowalevski_top_group_leave(kowalevski_top_group *group, kowalevski_to
 /* One step of all members, of as many as remain. How many members are left. */
 static int kowalevski_top_group_step(kowalevski_top_group *group, size_t remaining)
 {
-    kowalevski_top_lanes x[6], carry[6];
+    kowalevski_top_lanes x[kowalevski_top_DIM], carry[kowalevski_top_DIM];
     kowalevski_top_model model;
-    const int next = (group->latest > 0 ? group->latest : 111) - 1;
+    const int next = (group->latest > 0 ? group->latest : kowalevski_top_REMEMBERED) - 1;
     int most = 0;
     memcpy(x, group->x, sizeof x);
     memcpy(carry, group->carry, sizeof carry);
-    for (int stage = 0; stage < 1; ++stage) {
-        const int iterations = kowalevski_top_group_solve(group, stage, &model);
-        kowalevski_top_group_advance(group->x, group->carry, &model);
-        if (iterations > most) most = iterations;
-        if ((iterations > 1 && next % 8 == 0) || group->count < 8)
-            kowalevski_top_group_judge(group, stage, model.y);
-        memcpy(group->past[stage][next], model.y, sizeof model.y);
-    }
+    const int iterations = kowalevski_top_group_solve(group, &model);
+    kowalevski_top_group_advance(group->x, group->carry, &model);
+    if (iterations > most) most = iterations;
+    if ((iterations > 1 && next % kowalevski_top_HISTORY == 0) || group->count < kowalevski_top_HISTORY)
+        kowalevski_top_group_judge(group, model.y);
+    memcpy(group->past[next], model.y, sizeof model.y);
     group->latest = next;
-    if (group->count < 111) ++group->count;
-    group->slow = most > 1 ? group->slow + 1 : 0;
-    if (group->slow > group->patience && group->count == 111 && remaining >= 1200)
+    if (group->count < kowalevski_top_REMEMBERED) ++group->count;
+    group->slow_steps = most > 1 ? group->slow_steps + 1 : 0;
+    if (group->slow_steps > group->slow_steps_allowed && group->count == kowalevski_top_REMEMBERED
+        && remaining >= kowalevski_top_GROUP_REPAY)
         kowalevski_top_group_fit(group);
     return kowalevski_top_group_leave(group, x, carry, remaining);
 }
 
 /* Put a member into a lane: its state, and its coefficients. */
-static kowalevski_top_status kowalevski_top_group_join(kowalevski_top_group *group, int lane, const kowalevski_top_params *params,
-    const double x0[6], double h)
+static kowalevski_top_status kowalevski_top_group_join(kowalevski_top_group *group, int lane,
+    const kowalevski_top_params *params, const double x0[kowalevski_top_DIM], double h)
 {
     kowalevski_top_solver s;
     kowalevski_top_status status = kowalevski_top_init(&s, params, x0);
     if (status == kowalevski_top_OK) status = kowalevski_top_set_step(&s, h);
     if (status != kowalevski_top_OK) return status;
-    for (int i = 0; i < 6; ++i) group->x[i][lane] = s.x[i];
-    for (int stage = 0; stage < 1; ++stage)
-        for (int k = 0; k < 172; ++k) group->coef[stage][k][lane] = s.coef[stage][k];
+    for (int i = 0; i < kowalevski_top_DIM; ++i) group->x[i][lane] = s.x[i];
+    for (int k = 0; k < kowalevski_top_COEFFICIENTS; ++k) group->coef[k][lane] = s.coef[k];
     group->active[lane] = 1;
     return status;
 }
 
 /* The steps that a member has still to make after it left the group, by itself. */
-static kowalevski_top_status kowalevski_top_group_finish(const kowalevski_top_group *group, int lane, const kowalevski_top_params *params,
-    double x[6], double h)
+static kowalevski_top_status kowalevski_top_group_finish(const kowalevski_top_group *group, int lane,
+    const kowalevski_top_params *params, double x[kowalevski_top_DIM], double h)
 {
     kowalevski_top_solver s;
     kowalevski_top_status status = kowalevski_top_init(&s, params, x);
     if (status != kowalevski_top_OK) return status;
-    for (int i = 0; i < 6; ++i) s.carry[i] = group->carry[i][lane];
-    status = kowalevski_top_integrate(&s, h, group->left[lane]);
+    for (int i = 0; i < kowalevski_top_DIM; ++i) s.carry[i] = group->carry[i][lane];
+    status = kowalevski_top_integrate(&s, h, group->steps_left[lane]);
     memcpy(x, s.x, sizeof s.x);
     return status;
 }
 
 /* The members from first on, as many as there are lanes. The first status that is not OK. */
-static kowalevski_top_status kowalevski_top_group_run(const kowalevski_top_params *params, double *x, size_t members, size_t first,
-    double h, size_t steps, unsigned char *status)
+static kowalevski_top_status kowalevski_top_group_run(const kowalevski_top_params *params, double *x,
+    size_t members, size_t first, double h, size_t steps, unsigned char *status)
 {
     kowalevski_top_group group;
-    kowalevski_top_status worst = kowalevski_top_OK, member[8];
+    kowalevski_top_status worst = kowalevski_top_OK, member[kowalevski_top_LANES];
     const int count = members - first < kowalevski_top_LANES ? (int)(members - first) : kowalevski_top_LANES;
-    double state[6];
+    double state[kowalevski_top_DIM];
     size_t left = steps;
     memset(&group, 0, sizeof group);
     for (int lane = 0; lane < count; ++lane) {
-        for (size_t i = 0; i < 6; ++i) state[i] = x[i * members + first + (size_t)lane];
+        for (size_t i = 0; i < kowalevski_top_DIM; ++i) state[i] = x[i * members + first + (size_t)lane];
         member[lane] = kowalevski_top_group_join(&group, lane, params, state, h);
     }
-    for (int active = count; left > 0 && active > 2; --left) active = kowalevski_top_group_step(&group, left);
+    for (int active = count; left > 0 && active >= kowalevski_top_FEWEST; --left)
+        active = kowalevski_top_group_step(&group, left);
     for (int lane = 0; lane < count; ++lane) {
-        if (group.active[lane]) group.left[lane] = left;
-        for (int i = 0; i < 6; ++i) state[i] = group.x[i][lane];
+        if (group.active[lane]) group.steps_left[lane] = left;
+        for (int i = 0; i < kowalevski_top_DIM; ++i) state[i] = group.x[i][lane];
         if (member[lane] == kowalevski_top_OK) {
-            if (group.left[lane] > 0) member[lane] = kowalevski_top_group_finish(&group, lane, params, state, h);
-            for (size_t i = 0; i < 6; ++i) x[i * members + first + (size_t)lane] = state[i];
+            if (group.steps_left[lane] > 0)
+                member[lane] = kowalevski_top_group_finish(&group, lane, params, state, h);
+            for (size_t i = 0; i < kowalevski_top_DIM; ++i) x[i * members + first + (size_t)lane] = state[i];
         }
         if (status != NULL) status[first + (size_t)lane] = (unsigned char)member[lane];
         if (worst == kowalevski_top_OK) worst = member[lane];
@@ -2981,8 +3390,9 @@ static kowalevski_top_status kowalevski_top_group_run(const kowalevski_top_param
     return worst;
 }
 
+/* ---- Ensembles ---- */
 kowalevski_top_status kowalevski_top_ensemble(const kowalevski_top_params *params, double *x, size_t members,
-                                              double h, size_t steps, unsigned char *status)
+    double h, size_t steps, unsigned char *status)
 {
     kowalevski_top_status worst = isfinite(h) ? kowalevski_top_OK : kowalevski_top_BAD_ARGUMENT;
     const kowalevski_top_params own = params != NULL ? *params : kowalevski_top_default_params;
@@ -2991,8 +3401,9 @@ kowalevski_top_status kowalevski_top_ensemble(const kowalevski_top_params *param
 #ifdef _OPENMP
 #pragma omp parallel for schedule(dynamic)
 #endif
-    for (size_t first = 0; first < members; first += kowalevski_top_LANES) {
-        const kowalevski_top_status group = kowalevski_top_group_run(&own, x, members, first, h, steps, status);
+    for (size_t first = 0; first < members; first += kowalevski_top_GROUP) {
+        const kowalevski_top_status group = kowalevski_top_group_run(&own, x, members, first, h, steps,
+            status);
         if (group == kowalevski_top_OK) continue;
 #ifdef _OPENMP
 #pragma omp critical
@@ -3008,88 +3419,3 @@ kowalevski_top_status kowalevski_top_ensemble(const kowalevski_top_params *param
 #if defined(__clang__)
 #pragma clang diagnostic pop
 #endif
-
-/* the Hamiltonian */
-static void kowalevski_top_energy(const kowalevski_top_params *params, const double x[6],
-                                  double energy[restrict 1])
-{
-    (void)params;
-    const double P1 = x[0];
-    const double P2 = x[1];
-    const double P3 = x[2];
-    const double G1 = x[3];
-    energy[0] = G1 + 0.5 * (P3 * P3 + (0.5 * (P1 * P1) + 0.5 * (P2 * P2)));
-}
-
-/* the Casimirs */
-static void kowalevski_top_casimir_values(const kowalevski_top_params *params, const double x[6],
-                                          double out[restrict 2])
-{
-    (void)params;
-    const double P1 = x[0];
-    const double P2 = x[1];
-    const double P3 = x[2];
-    const double G1 = x[3];
-    const double G2 = x[4];
-    const double G3 = x[5];
-    out[0] = G3 * G3 + (G1 * G1 + G2 * G2);
-    out[1] = G3 * P3 + (G2 * P2 + G1 * P1);
-}
-
-/* pi(x) grad H(x) */
-static void kowalevski_top_field(const kowalevski_top_params *params, const double x[6],
-                                 double out[restrict 6])
-{
-    (void)params;
-    const double P1 = x[0];
-    const double P2 = x[1];
-    const double P3 = x[2];
-    const double G1 = x[3];
-    const double G2 = x[4];
-    const double G3 = x[5];
-    const double t1 = P2 * P3;
-    const double t2 = P1 * P3;
-    out[0] = t1 - 0.5 * t1;
-    out[1] = G3 + (0.5 * t2 - t2);
-    out[2] = -G2;
-    out[3] = G2 * P3 - 0.5 * (G3 * P2);
-    out[4] = 0.5 * (G3 * P1) - G1 * P3;
-    out[5] = 0.5 * (G1 * P2) - 0.5 * (G2 * P1);
-}
-
-double kowalevski_top_hamiltonian(const kowalevski_top_params *params, const double x[6])
-{
-    double energy[1];
-    kowalevski_top_energy(params != NULL ? params : &kowalevski_top_default_params, x, energy);
-    return energy[0];
-}
-
-void kowalevski_top_casimirs(const kowalevski_top_params *params, const double x[6], double out[])
-{
-    double value[2]; /* out may overlap x */
-    kowalevski_top_casimir_values(params != NULL ? params : &kowalevski_top_default_params, x, value);
-    for (int i = 0; i < 2; ++i) out[i] = value[i];
-}
-
-void kowalevski_top_vector_field(const kowalevski_top_params *params, const double x[6], double out[6])
-{
-    double value[6];
-    kowalevski_top_field(params != NULL ? params : &kowalevski_top_default_params, x, value);
-    memcpy(out, value, sizeof value);
-}
-
-const char *kowalevski_top_status_string(kowalevski_top_status status)
-{
-    switch (status) {
-    case kowalevski_top_OK: return "ok";
-    case kowalevski_top_NO_CONVERGENCE: return "no convergence: the step is too large";
-    case kowalevski_top_SINGULAR: return "singular Newton matrix: the step is too large";
-    case kowalevski_top_NOT_FINITE: return "not finite: overflow, or outside the domain";
-    case kowalevski_top_BAD_ARGUMENT: return "bad argument: a null pointer, or values that are not allowed";
-    }
-    return "unknown status";
-}
-
-size_t kowalevski_top_solver_size(void) { return sizeof(kowalevski_top_solver); }
-
-size_t kowalevski_top_solver_steps_done(const kowalevski_top_solver *s) { return s->steps; }

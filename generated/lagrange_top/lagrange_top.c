@@ -7,26 +7,41 @@
  *   step: implicit, Newton iteration with the analytic matrix
  *   one Newton iteration: 603 additions, 713 multiplications, 3 functions
  *
- * spec: lagrange_top, sha256 4c969fa4a402cc869785c21021556d3101cd779e45d647fdbc1c0ecb8e816537
+ * spec: lagrange_top, sha256 dc5faff4a3a290ee3b9329fcccd8fb8e506caefcd665168370fc76ae8622ea1f
  * to regenerate: phigen build lagrange_top
  * DO NOT EDIT: change the spec and regenerate; edits are noticed by the checksum below.
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: a1824192eeed4270214ce5ff49f904809d77c4e564da3ee4a17ac2f2d9881174
+ *
+ *   1. The model
+ *   2. Compensated sums, linear equations
+ *   3. Starting guesses
+ *   4. The implicit step, by Newton's method
+ *   5. The solver
+ *   6. Ensembles
+ * body-sha256: eebb98e4292ddf6a21f9aa3d8ca68cd55caeb72cb50d715eb157c0a23ed4946e
  */
 #include "lagrange_top.h"
 
 #include <float.h>
-#include <limits.h>
 #include <math.h>
-#include <stdint.h>
 #include <string.h>
 
+/* ---- The model ---- */
 const lagrange_top_params lagrange_top_default_params = { 2.0, 1.0, 1.0 };
 
-/* A step of size h is the composition of these fractions of it. */
-static const double lagrange_top_fractions[1] = { 1.0 };
+enum { lagrange_top_MAX_ITERATIONS = 20 }; /* of an inner solve */
+
+/* A correction is accepted when the error that it leaves is estimated to be below this. */
+#define lagrange_top_TOLERANCE 1e-20
+
+/* Whether all parameters are finite, and positive where they have to be. */
+static int lagrange_top_allowed(const lagrange_top_params *params)
+{
+    return isfinite(params->I1) && params->I1 > 0.0 && isfinite(params->I3) && params->I3 > 0.0
+        && isfinite(params->mgl);
+}
 
 /* Functions to be kept apart: very long ones compile in quadratic time. */
 #if defined(__GNUC__)
@@ -38,42 +53,20 @@ static const double lagrange_top_fractions[1] = { 1.0 };
 /* (1 - w cot w)/s with w = sqrt(s)/2, coth for negative s: the function of the exponential bi-realisation. */
 static double lagrange_top_phi0(double s)
 {
-    if (fabs(s) < 0.25) {
-        double sum = 8.586062056277845e-15;
-        sum = sum * s + 3.3896802963225827e-13;
-        sum = sum * s + 1.3382536530684679e-11;
-        sum = sum * s + 5.284190138687493e-10;
-        sum = sum * s + 2.08767569878681e-08;
-        sum = sum * s + 8.267195767195768e-07;
-        sum = sum * s + 3.306878306878307e-05;
-        sum = sum * s + 0.001388888888888889;
-        sum = sum * s + 0.08333333333333333;
-        return sum;
-    }
+    if (fabs(s) < 0.25)
+        return (0.08333333333333333 + s * (0.001388888888888889 + s * (3.306878306878307e-05 + s *
+            (8.267195767195768e-07 + s * (2.08767569878681e-08 + s * (5.284190138687493e-10 + s *
+            (1.3382536530684679e-11 + s * (3.3896802963225827e-13 + s * 8.586062056277845e-15))))))));
     if (fabs(s) < 16.0) {
         const double pole = 1.0 / (39.47841760435743 - s);
-        double sum = 1.3621211117593843e-46;
-        sum = sum * s + 2.1509755511832569e-44;
-        sum = sum * s + 3.3966848266497805e-42;
-        sum = sum * s + 5.363831046655698e-40;
-        sum = sum * s + 8.470227328650247e-38;
-        sum = sum * s + 1.3375664093215244e-35;
-        sum = sum * s + 2.1122063323183885e-33;
-        sum = sum * s + 3.3354842988221443e-31;
-        sum = sum * s + 5.267262996834231e-29;
-        sum = sum * s + 8.318003195189264e-27;
-        sum = sum * s + 1.3136241807166534e-24;
-        sum = sum * s + 2.0747401878593604e-22;
-        sum = sum * s + 3.277539174701792e-20;
-        sum = sum * s + 5.180118196169724e-18;
-        sum = sum * s + 8.196052055691008e-16;
-        sum = sum * s + 1.3000482138698975e-13;
-        sum = sum * s + 2.0742872904166045e-11;
-        sum = sum * s + 3.357141926657451e-09;
-        sum = sum * s + 5.637370282876845e-07;
-        sum = sum * s + 0.000105641107053347;
-        sum = sum * s + 0.03267274151216445;
-        return 2.0 * pole + sum;
+        return 2.0 * pole + (0.03267274151216445 + s * (0.000105641107053347 + s * (5.637370282876845e-07
+            + s * (3.357141926657451e-09 + s * (2.0742872904166045e-11 + s * (1.3000482138698975e-13 + s *
+            (8.196052055691008e-16 + s * (5.180118196169724e-18 + s * (3.277539174701792e-20 + s *
+            (2.0747401878593604e-22 + s * (1.3136241807166534e-24 + s * (8.318003195189264e-27 + s *
+            (5.267262996834231e-29 + s * (3.3354842988221443e-31 + s * (2.1122063323183885e-33 + s *
+            (1.3375664093215244e-35 + s * (8.470227328650247e-38 + s * (5.363831046655698e-40 + s *
+            (3.3966848266497805e-42 + s * (2.1509755511832569e-44 + s *
+            1.3621211117593843e-46))))))))))))))))))));
     }
     const double w = 0.5 * sqrt(fabs(s)), c = w / (s > 0.0 ? tan(w) : tanh(w));
     const double phi0 = (1.0 - c) / s;
@@ -83,42 +76,20 @@ static double lagrange_top_phi0(double s)
 /* The derivative of (1 - w cot w)/s, w = sqrt(s)/2. */
 static double lagrange_top_phi1(double s)
 {
-    if (fabs(s) < 0.25) {
-        double sum = 1.9573818287022555e-15;
-        sum = sum * s + 6.868849645022276e-14;
-        sum = sum * s + 2.372776207425808e-12;
-        sum = sum * s + 8.029521918410807e-11;
-        sum = sum * s + 2.6420950693437467e-09;
-        sum = sum * s + 8.35070279514724e-08;
-        sum = sum * s + 2.48015873015873e-06;
-        sum = sum * s + 6.613756613756614e-05;
-        sum = sum * s + 0.001388888888888889;
-        return sum;
-    }
+    if (fabs(s) < 0.25)
+        return (0.001388888888888889 + s * (6.613756613756614e-05 + s * (2.48015873015873e-06 + s *
+            (8.35070279514724e-08 + s * (2.6420950693437467e-09 + s * (8.029521918410807e-11 + s *
+            (2.372776207425808e-12 + s * (6.868849645022276e-14 + s * 1.9573818287022555e-15))))))));
     if (fabs(s) < 16.0) {
         const double pole = 1.0 / (39.47841760435743 - s);
-        double sum = 1.8114038279637677e-47;
-        sum = sum * s + 2.7242422235187686e-45;
-        sum = sum * s + 4.0868535472481875e-43;
-        sum = sum * s + 6.114032687969605e-41;
-        sum = sum * s + 9.118512779314688e-39;
-        sum = sum * s + 1.3552363725840395e-36;
-        sum = sum * s + 2.0063496139822866e-34;
-        sum = sum * s + 2.957088865245744e-32;
-        sum = sum * s + 4.336129588468787e-30;
-        sum = sum * s + 6.320715596201077e-28;
-        sum = sum * s + 9.149803514708191e-26;
-        sum = sum * s + 1.3136241807166533e-23;
-        sum = sum * s + 1.8672661690734246e-21;
-        sum = sum * s + 2.6220313397614337e-19;
-        sum = sum * s + 3.626082737318807e-17;
-        sum = sum * s + 4.917631233414605e-15;
-        sum = sum * s + 6.500241069349487e-13;
-        sum = sum * s + 8.297149161666418e-11;
-        sum = sum * s + 1.0071425779972354e-08;
-        sum = sum * s + 1.127474056575369e-06;
-        sum = sum * s + 0.000105641107053347;
-        return 2.0 * pole * pole + sum;
+        return 2.0 * pole * pole + (0.000105641107053347 + s * (1.127474056575369e-06 + s *
+            (1.0071425779972354e-08 + s * (8.297149161666418e-11 + s * (6.500241069349487e-13 + s *
+            (4.917631233414605e-15 + s * (3.626082737318807e-17 + s * (2.6220313397614337e-19 + s *
+            (1.8672661690734246e-21 + s * (1.3136241807166533e-23 + s * (9.149803514708191e-26 + s *
+            (6.320715596201077e-28 + s * (4.336129588468787e-30 + s * (2.957088865245744e-32 + s *
+            (2.0063496139822866e-34 + s * (1.3552363725840395e-36 + s * (9.118512779314688e-39 + s *
+            (6.114032687969605e-41 + s * (4.0868535472481875e-43 + s * (2.7242422235187686e-45 + s *
+            1.8114038279637677e-47))))))))))))))))))));
     }
     const double w = 0.5 * sqrt(fabs(s)), c = w / (s > 0.0 ? tan(w) : tanh(w));
     const double phi0 = (1.0 - c) / s;
@@ -129,42 +100,20 @@ static double lagrange_top_phi1(double s)
 /* The second derivative of (1 - w cot w)/s, w = sqrt(s)/2. */
 static double lagrange_top_phi2(double s)
 {
-    if (fabs(s) < 0.25) {
-        double sum = 4.958102545524207e-16;
-        sum = sum * s + 1.5659054629618044e-14;
-        sum = sum * s + 4.808194751515593e-13;
-        sum = sum * s + 1.4236657244554848e-11;
-        sum = sum * s + 4.0147609592054037e-10;
-        sum = sum * s + 1.0568380277374987e-08;
-        sum = sum * s + 2.505210838544172e-07;
-        sum = sum * s + 4.96031746031746e-06;
-        sum = sum * s + 6.613756613756614e-05;
-        return sum;
-    }
+    if (fabs(s) < 0.25)
+        return (6.613756613756614e-05 + s * (4.96031746031746e-06 + s * (2.505210838544172e-07 + s *
+            (1.0568380277374987e-08 + s * (4.0147609592054037e-10 + s * (1.4236657244554848e-11 + s *
+            (4.808194751515593e-13 + s * (1.5659054629618044e-14 + s * 4.958102545524207e-16))))))));
     if (fabs(s) < 16.0) {
         const double pole = 1.0 / (39.47841760435743 - s);
-        double sum = 2.5235866986281763e-48;
-        sum = sum * s + 3.622807655927535e-46;
-        sum = sum * s + 5.17606022468566e-44;
-        sum = sum * s + 7.356336385046738e-42;
-        sum = sum * s + 1.0393855569548329e-39;
-        sum = sum * s + 1.45896204469035e-37;
-        sum = sum * s + 2.032854558876059e-35;
-        sum = sum * s + 2.8088894595752015e-33;
-        sum = sum * s + 3.844215524819467e-31;
-        sum = sum * s + 5.203355506162545e-29;
-        sum = sum * s + 6.952787155821185e-27;
-        sum = sum * s + 9.149803514708191e-25;
-        sum = sum * s + 1.182261762644988e-22;
-        sum = sum * s + 1.4938129352587397e-20;
-        sum = sum * s + 1.8354219378330035e-18;
-        sum = sum * s + 2.1756496423912842e-16;
-        sum = sum * s + 2.4588156167073025e-14;
-        sum = sum * s + 2.600096427739795e-12;
-        sum = sum * s + 2.4891447484999256e-10;
-        sum = sum * s + 2.0142851559944708e-08;
-        sum = sum * s + 1.127474056575369e-06;
-        return 4.0 * pole * pole * pole + sum;
+        return 4.0 * pole * pole * pole + (1.127474056575369e-06 + s * (2.0142851559944708e-08 + s *
+            (2.4891447484999256e-10 + s * (2.600096427739795e-12 + s * (2.4588156167073025e-14 + s *
+            (2.1756496423912842e-16 + s * (1.8354219378330035e-18 + s * (1.4938129352587397e-20 + s *
+            (1.182261762644988e-22 + s * (9.149803514708191e-25 + s * (6.952787155821185e-27 + s *
+            (5.203355506162545e-29 + s * (3.844215524819467e-31 + s * (2.8088894595752015e-33 + s *
+            (2.032854558876059e-35 + s * (1.45896204469035e-37 + s * (1.0393855569548329e-39 + s *
+            (7.356336385046738e-42 + s * (5.17606022468566e-44 + s * (3.622807655927535e-46 + s *
+            2.5235866986281763e-48))))))))))))))))))));
     }
     const double w = 0.5 * sqrt(fabs(s)), c = w / (s > 0.0 ? tan(w) : tanh(w));
     const double phi0 = (1.0 - c) / s;
@@ -176,9 +125,7 @@ static double lagrange_top_phi2(double s)
 /* everything that depends on parameters and step size only */
 static void lagrange_top_prepare(const lagrange_top_params *params, double h, double coef[restrict 8])
 {
-    const double t1 = 1.0 / params->I3;
-    const double t2 = 1.0 / params->I1;
-    const double t3 = 1.0 / 12.0 * t2;
+    const double t1 = 1.0 / params->I3, t2 = 1.0 / params->I1, t3 = 1.0 / 12.0 * t2;
     const double t4 = h * (h * h);
     const double t5 = t4 * t2 * (1.0 / 24.0 * (t2 * t2) + t1 * (1.0 / 24.0 * t1 - t3));
     const double t6 = h * params->mgl;
@@ -195,190 +142,162 @@ static void lagrange_top_prepare(const lagrange_top_params *params, double h, do
 /* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
    increment, all with the momenta p = grad S_h(y) (part 1 of 2) */
 lagrange_top_APART static void lagrange_top_linearise_part1(const double coef[8], const double y[6],
-                                                            double displacement[restrict 6],
-                                                            double increment[restrict 6],
-                                                            double jacobian[restrict 36],
-                                                            double increment_jacobian[restrict 36],
-                                                            double work[restrict 113])
+    double displacement[restrict 6], double increment[restrict 6], double jacobian[restrict 36],
+    double increment_jacobian[restrict 36], double work[restrict 113])
 {
-    const double P1 = y[0];
-    const double P2 = y[1];
-    const double P3 = y[2];
-    const double G1 = y[3];
-    const double G2 = y[4];
-    const double G3 = y[5];
+    const double P1 = y[0], P2 = y[1], P3 = y[2], G1 = y[3], G2 = y[4], G3 = y[5];
     work[1] = coef[2] * (P2 * P2) + (coef[3] + coef[2] * (P1 * P1));
     work[12] = coef[0] * (G1 * P1) + coef[0] * (G2 * P2) + P3 * work[1];
-    const double t2 = work[12] * work[12];
     work[63] = coef[1] + coef[2] * (P3 * P3);
     work[112] = P1 * work[63];
     work[10] = coef[0] * (G1 * P3) + work[112];
-    const double t5 = work[10] * work[10];
     work[111] = P2 * work[63];
     work[3] = coef[0] * (G2 * P3) + work[111];
-    const double t7 = work[3] * work[3];
-    work[27] = t5 + t7;
-    work[22] = t2 + work[27];
+    const double t1 = G2 * coef[4], t2 = P2 * P3;
+    work[11] = t1 + coef[0] * t2;
+    const double t3 = G1 * coef[4], t4 = P1 * P3;
+    work[13] = t3 + coef[0] * t4;
+    const double t5 = work[12] * work[12], t6 = work[10] * work[10], t7 = work[3] * work[3];
+    work[27] = t6 + t7;
+    work[22] = t5 + work[27];
     work[18] = lagrange_top_phi0(work[22]);
-    const double t11 = G3 * work[10];
-    const double t12 = G1 * work[12];
-    const double t13 = t11 - t12;
-    const double t14 = G2 * coef[4];
-    const double t15 = P2 * P3;
-    work[11] = t14 + coef[0] * t15;
-    const double t16 = G1 * work[3];
-    const double t17 = G2 * work[10];
-    const double t18 = t16 - t17;
-    const double t19 = G1 * coef[4];
-    const double t20 = P1 * P3;
-    work[13] = t19 + coef[0] * t20;
-    const double t21 = G3 * work[13];
-    const double t22 = G1 * coef[5];
-    const double t23 = P3 * work[10];
-    const double t24 = P1 * work[12];
-    const double t25 = t21 - t22 + (t23 - t24);
-    const double t26 = G1 * work[11];
-    const double t27 = G2 * work[13];
-    const double t28 = P1 * work[3];
-    const double t29 = P2 * work[10];
-    const double t30 = t26 - t27 + (t28 - t29);
-    const double t31 = coef[5] * t13 - work[11] * t18 + (work[12] * t25 - work[3] * t30);
+    const double t8 = G3 * work[10], t9 = G1 * work[12], t10 = t8 - t9, t11 = G1 * work[3];
+    const double t12 = G2 * work[10], t13 = t11 - t12, t14 = G3 * work[13], t15 = G1 * coef[5];
+    const double t16 = P3 * work[10], t17 = P1 * work[12], t18 = t14 - t15 + (t16 - t17);
+    const double t19 = G1 * work[11], t20 = G2 * work[13], t21 = P1 * work[3], t22 = P2 * work[10];
+    const double t23 = t19 - t20 + (t21 - t22);
+    const double t24 = coef[5] * t10 - work[11] * t13 + (work[12] * t18 - work[3] * t23);
     work[19] = lagrange_top_phi1(work[22]);
-    const double t33 = G2 * work[12];
-    const double t34 = G3 * work[3];
-    const double t35 = t33 - t34;
-    work[67] = work[3] * t35;
-    work[66] = work[10] * t13;
+    const double t25 = G2 * work[12], t26 = G3 * work[3], t27 = t25 - t26;
+    work[67] = work[3] * t27;
+    work[66] = work[10] * t10;
     work[69] = work[67] - work[66];
     work[81] = work[10] * work[69];
-    work[97] = work[12] * t13 - work[3] * t18;
+    work[97] = work[12] * t10 - work[3] * t13;
     work[80] = work[12] * work[97];
     work[101] = work[81] - work[80];
     work[104] = work[3] * work[97];
-    const double t44 = work[10] * t18;
-    const double t45 = work[12] * t35;
-    work[52] = t44 - t45;
+    const double t28 = work[10] * t13, t29 = work[12] * t27;
+    work[52] = t28 - t29;
     work[108] = work[10] * work[52];
     work[49] = work[104] - work[108];
-    const double t49 = G2 * coef[5];
-    const double t50 = G3 * work[11];
-    const double t51 = P2 * work[12];
-    const double t52 = P3 * work[3];
-    const double t53 = t49 - t50 + (t51 - t52);
-    work[72] = work[11] * t35 - work[13] * t13 + (work[3] * t53 - work[10] * t25);
+    const double t30 = G2 * coef[5], t31 = G3 * work[11], t32 = P2 * work[12], t33 = P3 * work[3];
+    const double t34 = t30 - t31 + (t32 - t33);
+    work[72] = work[11] * t27 - work[13] * t10 + (work[3] * t34 - work[10] * t18);
     work[86] = work[10] * work[72];
-    const double t56 = work[12] * t31;
-    work[88] = work[13] * work[69] - coef[5] * work[97] + (work[86] - t56);
-    const double t58 = work[3] * t31;
-    work[46] = work[13] * t18 - coef[5] * t35 + (work[10] * t30 - work[12] * t53);
+    const double t35 = work[12] * t24;
+    work[88] = work[13] * work[69] - coef[5] * work[97] + (work[86] - t35);
+    const double t36 = work[3] * t24;
+    work[46] = work[13] * t13 - coef[5] * t27 + (work[10] * t23 - work[12] * t34);
     work[41] = work[10] * work[46];
-    work[43] = work[11] * work[97] - work[13] * work[52] + (t58 - work[41]);
-    const double t62 = work[22] * t31 + (coef[5] * work[101] - work[11] * work[49] + (work[12] * work[88] - work[3] * work[43]));
+    work[43] = work[11] * work[97] - work[13] * work[52] + (t36 - work[41]);
+    const double t37 = work[22] * t24 + (coef[5] * work[101] - work[11] * work[49] + (work[12] * work[88]
+        - work[3] * work[43]));
     work[106] = work[12] * work[52];
     work[110] = work[3] * work[69];
     work[91] = work[106] - work[110];
     work[57] = work[12] * work[46];
     work[93] = work[3] * work[72];
     work[60] = coef[5] * work[52] - work[11] * work[69] + (work[57] - work[93]);
-    work[40] = work[22] * work[46] + (work[13] * work[49] - coef[5] * work[91] + (work[10] * work[43] - work[12] * work[60]));
-    work[85] = work[22] * work[72] + (work[11] * work[91] - work[13] * work[101] + (work[3] * work[60] - work[10] * work[88]));
+    work[40] = work[22] * work[46] + (work[13] * work[49] - coef[5] * work[91] + (work[10] * work[43]
+        - work[12] * work[60]));
+    work[85] = work[22] * work[72] + (work[11] * work[91] - work[13] * work[101] + (work[3] * work[60]
+        - work[10] * work[88]));
     work[99] = work[22] * work[97] + (work[12] * work[101] - work[3] * work[49]);
     work[107] = work[22] * work[52] + (work[10] * work[49] - work[12] * work[91]);
     work[109] = work[22] * work[69] + (work[3] * work[91] - work[10] * work[101]);
-    const double t74 = G3 * coef[5];
-    const double t75 = G2 * work[11];
-    const double t76 = P2 * work[3];
-    const double t77 = P3 * work[12];
-    const double t78 = t74 + t75 + (t76 + t77);
+    const double t38 = G3 * coef[5], t39 = G2 * work[11], t40 = P2 * work[3], t41 = P3 * work[12];
+    const double t42 = t38 + t39 + (t40 + t41);
     work[45] = work[10] * work[19];
-    work[36] = t11 + t13;
-    const double t81 = G2 * work[3];
-    const double t82 = G3 * work[12];
-    const double t83 = t81 + t82;
-    const double t84 = work[12] * t83;
-    work[87] = work[69] - work[10] * work[36] - t84;
-    const double t86 = work[3] * t83;
-    work[35] = t18 - t17;
-    const double t88 = work[10] * work[35];
-    work[42] = t86 - (t88 + work[52]);
-    work[38] = t21 + (t23 + t25);
-    work[89] = work[72] - work[10] * work[38] - work[12] * t78 - (coef[5] * t83 + work[13] * work[36]);
-    work[37] = t30 - t29 - t27;
-    work[44] = work[11] * t83 - work[13] * work[35] + (work[3] * t78 - (work[10] * work[37] + work[46]));
-    const double t94 = lagrange_top_phi2(work[22]);
-    work[39] = work[10] * t94;
-    const double t96 = work[19] * (work[22] * t78 + 2.0 * (work[10] * t31) + (coef[5] * work[87] - work[11] * work[42] + (work[12] * work[89] - work[3] * work[44]))) + 2.0 * (work[39] * t62);
-    work[8] = t78 * work[18] + 2.0 * (work[45] * t31) - t96;
+    work[36] = t8 + t10;
+    const double t43 = G2 * work[3], t44 = G3 * work[12], t45 = t43 + t44, t46 = work[12] * t45;
+    work[87] = work[69] - work[10] * work[36] - t46;
+    const double t47 = work[3] * t45;
+    work[35] = t13 - t12;
+    const double t48 = work[10] * work[35];
+    work[42] = t47 - (t48 + work[52]);
+    work[38] = t14 + (t16 + t18);
+    work[89] = work[72] - work[10] * work[38] - work[12] * t42 - (coef[5] * t45 + work[13] * work[36]);
+    work[37] = t23 - t22 - t20;
+    work[44] = work[11] * t45 - work[13] * work[35] + (work[3] * t42 - (work[10] * work[37] + work[46]));
+    const double t49 = lagrange_top_phi2(work[22]);
+    work[39] = work[10] * t49;
+    const double t50 = work[19] * (work[22] * t42 + 2.0 * (work[10] * t24) + (coef[5] * work[87] - work[11]
+        * work[42] + (work[12] * work[89] - work[3] * work[44]))) + 2.0 * (work[39] * t37);
+    work[8] = t42 * work[18] + 2.0 * (work[45] * t24) - t50;
     work[17] = P3 * coef[0];
-    work[96] = t83 * work[18];
-    work[98] = work[22] * t83;
-    work[48] = t12 - t11 - t11;
-    work[82] = work[69] + (work[10] * work[48] - t84);
-    work[50] = t86 - t88 + (t45 - t44);
+    work[96] = t45 * work[18];
+    work[98] = work[22] * t45;
+    work[48] = t9 - t8 - t8;
+    work[82] = work[69] + (work[10] * work[48] - t46);
+    work[50] = t47 - t48 + (t29 - t28);
     work[5] = work[96] - work[19] * (work[98] + (work[12] * work[82] - work[3] * work[50]));
-    work[7] = G1 * coef[0] + coef[6] * t20;
-    const double t106 = t25 - t24 - t22;
+    work[7] = G1 * coef[0] + coef[6] * t4;
+    const double t51 = t18 - t17 - t15;
     work[62] = work[12] * work[19];
-    work[61] = work[12] * t94;
-    const double t109 = G1 * work[10];
-    work[54] = t81 + t109;
-    work[100] = t13 - t12;
+    work[61] = work[12] * t49;
+    const double t52 = G1 * work[10];
+    work[54] = t43 + t52;
+    work[100] = t10 - t9;
     work[83] = work[10] * work[54] - (work[12] * work[100] + work[97]);
-    work[53] = t33 + t35;
+    work[53] = t25 + t27;
     work[58] = work[3] * work[100] + work[10] * work[53];
-    const double t115 = G1 * work[13];
-    const double t116 = P1 * work[10];
-    work[56] = t75 + t115 + (t76 + t116);
-    work[84] = work[13] * work[54] - coef[5] * work[100] + (work[10] * work[56] - (work[12] * t106 + t31));
-    work[55] = t49 + (t51 + t53);
-    work[59] = work[11] * work[100] + work[13] * work[53] + (work[10] * work[55] + work[3] * t106);
-    const double t121 = 2.0 * (work[61] * t62) + work[19] * (work[22] * t106 + 2.0 * t56 + (coef[5] * work[83] - work[11] * work[58] + (work[88] + work[12] * work[84] - work[3] * work[59])));
+    const double t53 = G1 * work[13], t54 = P1 * work[10];
+    work[56] = t39 + t53 + (t40 + t54);
+    work[84] = work[13] * work[54] - coef[5] * work[100] + (work[10] * work[56] - (work[12] * t51 + t24));
+    work[55] = t30 + (t32 + t34);
+    work[59] = work[11] * work[100] + work[13] * work[53] + (work[10] * work[55] + work[3] * t51);
+    const double t55 = 2.0 * (work[61] * t37) + work[19] * (work[22] * t51 + 2.0 * t35 + (coef[5] * work[83]
+        - work[11] * work[58] + (work[88] + work[12] * work[84] - work[3] * work[59])));
     work[90] = 0.5 * P2;
-    work[6] = work[18] * t106 + 2.0 * (work[62] * t31) - t121 - work[90];
-    work[15] = t7 + t2;
+    work[6] = work[18] * t51 + 2.0 * (work[62] * t24) - t55 - work[90];
+    work[15] = t7 + t5;
     work[16] = work[10] * work[12];
     work[20] = work[10] * work[16] + work[12] * work[15];
     work[14] = work[3] * work[10];
     work[21] = work[10] * work[14] + work[3] * work[15];
-    work[102] = work[15] * work[18] + work[19] * (work[12] * work[20] + work[3] * work[21] - work[15] * work[22]);
+    work[102] = work[15] * work[18] + work[19] * (work[12] * work[20] + work[3] * work[21] - work[15]
+        * work[22]);
     work[33] = work[14] * work[18];
     work[34] = work[14] * work[22];
     work[23] = work[3] * work[12];
-    const double t133 = work[10] * work[23];
+    const double t56 = work[10] * work[23];
     work[30] = work[14] * work[12];
-    work[25] = t133 - work[30];
-    work[24] = t5 + t2;
+    work[25] = t56 - work[30];
+    work[24] = t6 + t5;
     work[26] = work[3] * work[14] + work[10] * work[24];
     work[32] = 0.5 * work[12];
     work[105] = work[33] - work[19] * (work[34] + (work[12] * work[25] - work[3] * work[26])) - work[32];
     work[51] = 0.5 * G3;
-    const double t141 = t17 - t16 - t16;
-    work[65] = t35 - t34;
-    const double t143 = work[10] * work[65];
-    work[92] = t143 - work[12] * t141;
-    work[64] = t109 + t82;
-    const double t146 = work[10] * work[64];
-    work[68] = work[3] * t141 - t146 + work[97];
-    work[4] = work[51] + (t141 * work[18] - work[19] * (work[22] * t141 + (work[108] - work[104] + (work[12] * work[92] - work[3] * work[68]))));
-    work[2] = G2 * coef[0] + coef[6] * t15;
+    const double t57 = t12 - t11 - t11;
+    work[65] = t27 - t26;
+    const double t58 = work[10] * work[65];
+    work[92] = t58 - work[12] * t57;
+    work[64] = t52 + t44;
+    const double t59 = work[10] * work[64];
+    work[68] = work[3] * t57 - t59 + work[97];
+    work[4] = work[51] + (t57 * work[18] - work[19] * (work[22] * t57 + (work[108] - work[104]
+        + (work[12] * work[92] - work[3] * work[68]))));
+    work[2] = G2 * coef[0] + coef[6] * t2;
     work[47] = 0.5 * P3;
     work[76] = work[3] * work[19];
-    const double t152 = t26 + (t28 + t30);
-    work[75] = work[3] * t94;
-    work[103] = t16 + t18;
-    work[94] = work[12] * work[103] + t143;
-    work[73] = work[97] - work[3] * work[103] - t146;
-    work[71] = t53 - t52 - t50;
-    work[95] = coef[5] * work[103] + work[13] * work[65] + (work[12] * t152 + work[10] * work[71]);
-    work[70] = t74 + t115 + (t116 + t77);
-    work[74] = t31 - work[3] * t152 - work[10] * work[70] - (work[13] * work[64] + work[11] * work[103]);
-    const double t161 = 2.0 * (work[75] * t62) + work[19] * (2.0 * t58 - work[22] * t152 + (coef[5] * work[94] - work[11] * work[73] + (work[12] * work[95] - (work[43] + work[3] * work[74]))));
-    work[9] = work[47] + (2.0 * (work[76] * t31) - work[18] * t152 - t161);
+    const double t60 = t19 + (t21 + t23);
+    work[75] = work[3] * t49;
+    work[103] = t11 + t13;
+    work[94] = work[12] * work[103] + t58;
+    work[73] = work[97] - work[3] * work[103] - t59;
+    work[71] = t34 - t33 - t31;
+    work[95] = coef[5] * work[103] + work[13] * work[65] + (work[12] * t60 + work[10] * work[71]);
+    work[70] = t38 + t53 + (t54 + t41);
+    work[74] = t24 - work[3] * t60 - work[10] * work[70] - (work[13] * work[64] + work[11] * work[103]);
+    const double t61 = 2.0 * (work[75] * t37) + work[19] * (2.0 * t36 - work[22] * t60 + (coef[5] * work[94]
+        - work[11] * work[73] + (work[12] * work[95] - (work[43] + work[3] * work[74]))));
+    work[9] = work[47] + (2.0 * (work[76] * t24) - work[18] * t60 - t61);
     work[79] = 0.5 * work[3];
     work[77] = work[16] * work[18];
     work[78] = work[16] * work[22];
     work[31] = work[3] * work[16];
-    work[28] = work[31] - t133;
+    work[28] = work[31] - t56;
     work[29] = work[10] * work[27] + work[12] * work[16];
     work[0] = work[79] + (work[77] - work[19] * (work[78] - (work[3] * work[28] + work[12] * work[29])));
     increment_jacobian[17] = 0.0;
@@ -387,22 +306,22 @@ lagrange_top_APART static void lagrange_top_linearise_part1(const double coef[8]
     increment_jacobian[31] = G1 * work[63];
     increment_jacobian[29] = work[10];
     increment_jacobian[23] = -work[3];
-    increment[4] = t13;
     increment_jacobian[5] = -work[11];
-    increment[5] = t18;
     increment_jacobian[11] = work[13];
-    increment[1] = t25;
-    increment[2] = t30;
-    increment[3] = t35;
-    increment[0] = t53;
-    displacement[0] = work[18] * t31 - work[19] * t62 - 0.5 * t53;
-    displacement[1] = work[18] * work[46] - work[19] * work[40] - 0.5 * t25;
-    displacement[2] = work[18] * work[72] - work[19] * work[85] - 0.5 * t30;
-    displacement[3] = work[18] * work[97] - work[19] * work[99] - 0.5 * t35;
-    displacement[4] = work[18] * work[52] - work[19] * work[107] - 0.5 * t13;
-    displacement[5] = work[18] * work[69] - work[19] * work[109] - 0.5 * t18;
-    increment_jacobian[15] = work[11] - (t14 + P2 * work[17]);
-    increment_jacobian[16] = t19 + P1 * work[17] - work[13];
+    increment[4] = t10;
+    increment[5] = t13;
+    increment[1] = t18;
+    increment[2] = t23;
+    increment[3] = t27;
+    increment[0] = t34;
+    displacement[0] = work[18] * t24 - work[19] * t37 - 0.5 * t34;
+    displacement[1] = work[18] * work[46] - work[19] * work[40] - 0.5 * t18;
+    displacement[2] = work[18] * work[72] - work[19] * work[85] - 0.5 * t23;
+    displacement[3] = work[18] * work[97] - work[19] * work[99] - 0.5 * t27;
+    displacement[4] = work[18] * work[52] - work[19] * work[107] - 0.5 * t10;
+    displacement[5] = work[18] * work[69] - work[19] * work[109] - 0.5 * t13;
+    increment_jacobian[15] = work[11] - (t1 + P2 * work[17]);
+    increment_jacobian[16] = t3 + P1 * work[17] - work[13];
     increment_jacobian[26] = G3 * work[7] - G1 * work[1];
     jacobian[0] = 1.0 + (work[63] * work[8] + (work[17] * work[5] + work[7] * work[6]) - work[102]);
     increment_jacobian[20] = G2 * work[1] - G3 * work[2];
@@ -412,448 +331,241 @@ lagrange_top_APART static void lagrange_top_linearise_part1(const double coef[8]
 /* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
    increment, all with the momenta p = grad S_h(y) (part 2 of 2) */
 lagrange_top_APART static void lagrange_top_linearise_part2(const double coef[8], const double y[6],
-                                                            double displacement[restrict 6],
-                                                            double increment[restrict 6],
-                                                            double jacobian[restrict 36],
-                                                            double increment_jacobian[restrict 36],
-                                                            double work[restrict 113])
+    double displacement[restrict 6], double increment[restrict 6], double jacobian[restrict 36],
+    double increment_jacobian[restrict 36], double work[restrict 113])
 {
-    (void)displacement;
-    (void)increment;
-    const double P1 = y[0];
-    const double P2 = y[1];
-    const double P3 = y[2];
-    const double G1 = y[3];
-    const double G2 = y[4];
-    const double G3 = y[5];
-    const double t170 = P2 * coef[0];
-    const double t171 = P1 * coef[0];
-    const double t172 = work[11] * work[3];
-    const double t173 = coef[5] * work[12];
-    const double t174 = t172 + t173;
-    const double t175 = t174 + t174;
-    const double t176 = work[11] * work[10] + work[13] * work[3];
-    const double t177 = work[13] * work[14] + work[11] * work[15] + (work[10] * t176 + work[3] * t175);
-    const double t178 = coef[5] * work[10] + work[13] * work[12];
-    const double t179 = work[13] * work[16] + coef[5] * work[15] + (work[10] * t178 + work[12] * t175);
-    const double t180 = work[17] * work[8] + (coef[4] * work[5] + t171 * work[6]) - (t175 * work[18] + work[19] * (coef[5] * work[20] + work[11] * work[21] + (work[3] * t177 + work[12] * t179) - work[22] * t175));
-    const double t181 = t176 * work[18];
-    const double t182 = t176 * work[22];
-    const double t183 = work[13] * work[23];
-    const double t184 = coef[5] * work[14];
-    const double t185 = coef[5] * work[3] + work[11] * work[12];
-    const double t186 = work[10] * t185;
-    const double t187 = work[12] * t176;
-    const double t188 = t183 - t184 + (t186 - t187);
-    const double t189 = work[13] * work[10];
-    const double t190 = t189 + t173;
-    const double t191 = t190 + t190;
-    const double t192 = work[11] * work[14] + work[13] * work[24] + (work[3] * t176 + work[10] * t191);
-    const double t193 = t181 - work[19] * (t182 + (coef[5] * work[25] - work[11] * work[26] + (work[12] * t188 - work[3] * t192))) - coef[7] + (coef[4] * work[4] + (work[17] * work[9] + t170 * work[6]));
-    const double t194 = 0.5 * work[11];
-    const double t195 = t178 * work[18];
-    const double t196 = t178 * work[22];
-    const double t197 = t189 + t172;
-    const double t198 = t197 + t197;
-    const double t199 = work[13] * work[27] + coef[5] * work[16] + (work[10] * t198 + work[12] * t178);
-    const double t200 = work[11] * work[16];
-    const double t201 = work[3] * t178;
-    const double t202 = t200 - t183 + (t201 - t186);
-    const double t203 = work[30] - work[31];
-    const double t204 = work[32] + (work[33] - work[19] * (work[34] - (work[12] * t203 + work[10] * work[21])));
-    const double t205 = work[12] * work[35];
-    const double t206 = t205 + work[3] * work[36];
-    const double t207 = coef[5] * work[35] + work[11] * work[36] + (work[12] * work[37] + work[3] * work[38]);
-    const double t208 = 2.0 * (work[39] * work[40]) + work[19] * (work[22] * work[37] + 2.0 * work[41] + (work[13] * work[42] - coef[5] * t206 + (work[43] + work[10] * work[44] - work[12] * t207)));
-    const double t209 = work[18] * work[37] + 2.0 * (work[45] * work[46]) - t208 - work[47];
-    const double t210 = work[35] * work[18];
-    const double t211 = work[22] * work[35];
-    const double t212 = t205 - work[3] * work[48];
-    const double t213 = t210 - work[19] * (t211 + (work[49] + (work[10] * work[50] - work[12] * t212))) - work[51];
-    const double t214 = 0.5 * P1;
-    const double t215 = work[52] - work[12] * work[53] - work[3] * work[54];
-    const double t216 = work[46] - work[12] * work[55] - work[3] * work[56] - (work[11] * work[54] + coef[5] * work[53]);
-    const double t217 = work[19] * (2.0 * work[57] - work[22] * work[55] + (work[13] * work[58] - coef[5] * t215 + (work[10] * work[59] - (work[60] + work[12] * t216)))) + 2.0 * (work[61] * work[40]);
-    const double t218 = t214 + (2.0 * (work[62] * work[46]) - work[18] * work[55] - t217);
-    const double t219 = work[64] * work[18];
-    const double t220 = work[64] * work[22];
-    const double t221 = work[12] * work[64];
-    const double t222 = work[3] * work[65];
-    const double t223 = work[66] - work[67] + (t221 - t222);
-    const double t224 = t219 - work[19] * (t220 + (work[10] * work[68] - work[12] * t223));
-    const double t225 = t221 - (work[69] + t222);
-    const double t226 = coef[5] * work[64] - work[11] * work[65] + (work[12] * work[70] - (work[3] * work[71] + work[72]));
-    const double t227 = work[19] * (work[22] * work[70] + 2.0 * (work[3] * work[46]) + (work[13] * work[73] - coef[5] * t225 + (work[10] * work[74] - work[12] * t226))) + 2.0 * (work[75] * work[40]);
-    const double t228 = work[70] * work[18] + 2.0 * (work[76] * work[46]) - t227;
-    const double t229 = work[3] * work[23] + work[12] * work[24];
-    const double t230 = work[24] * work[18] + work[19] * (work[10] * work[26] + work[12] * t229 - work[24] * work[22]);
-    const double t231 = work[23] * work[18];
-    const double t232 = work[23] * work[22];
-    const double t233 = work[12] * work[23] + work[3] * work[27];
-    const double t234 = 0.5 * work[10];
-    const double t235 = t231 - work[19] * (t232 + (work[10] * work[28] - work[12] * t233)) - t234;
-    const double t236 = t184 - t200 + (t187 - t201);
-    const double t237 = coef[7] + (t181 - work[19] * (t182 - (coef[5] * t203 + work[13] * work[21] + (work[12] * t236 + work[10] * t177)))) + (work[17] * t209 + (coef[4] * t213 + t171 * t218));
-    const double t238 = work[11] * work[23] + coef[5] * work[24] + (work[3] * t185 + work[12] * t191);
-    const double t239 = coef[4] * t224 + (work[17] * t228 + t170 * t218) - (t191 * work[18] + work[19] * (work[13] * work[26] + coef[5] * t229 + (work[10] * t192 + work[12] * t238) - work[22] * t191));
-    const double t240 = t185 * work[18];
-    const double t241 = work[22] * t185;
-    const double t242 = coef[5] * work[23] + work[11] * work[27] + (work[12] * t185 + work[3] * t198);
-    const double t243 = 0.5 * work[13];
-    const double t244 = work[77] - work[19] * (work[78] + (work[3] * t203 - work[10] * work[20])) - work[79];
-    const double t245 = 0.5 * G2;
-    const double t246 = t245 + (work[48] * work[18] - work[19] * (work[22] * work[48] + (work[80] - work[81] + (work[3] * t212 - work[10] * work[82]))));
-    const double t247 = work[19] * (work[22] * work[56] + 2.0 * (work[12] * work[72]) + (work[11] * t215 - work[13] * work[83] + (work[3] * t216 - work[10] * work[84]))) + 2.0 * (work[61] * work[85]);
-    const double t248 = work[56] * work[18] + 2.0 * (work[62] * work[72]) - t247;
-    const double t249 = work[19] * (2.0 * work[86] - work[22] * work[38] + (work[11] * t206 - work[13] * work[87] + (work[3] * t207 - (work[88] + work[10] * work[89])))) + 2.0 * (work[39] * work[85]);
-    const double t250 = work[90] + (2.0 * (work[45] * work[72]) - work[18] * work[38] - t249);
-    const double t251 = t234 + (t231 - work[19] * (t232 - (work[10] * work[25] + work[3] * t229)));
-    const double t252 = work[65] * work[18];
-    const double t253 = work[22] * work[65];
-    const double t254 = 0.5 * G1;
-    const double t255 = t252 - work[19] * (t253 + (work[91] + (work[3] * t223 - work[10] * work[92]))) - t254;
-    const double t256 = work[19] * (work[22] * work[71] + 2.0 * work[93] + (work[11] * t225 - work[13] * work[94] + (work[60] + work[3] * t226 - work[10] * work[95]))) + 2.0 * (work[75] * work[85]);
-    const double t257 = work[18] * work[71] + 2.0 * (work[76] * work[72]) - t256 - t214;
-    const double t258 = work[27] * work[18] + work[19] * (work[3] * t233 + work[10] * work[29] - work[27] * work[22]);
-    const double t259 = t195 - work[19] * (t196 + (work[11] * t203 - work[13] * work[20] + (work[3] * t236 - work[10] * t179))) - t194 + (coef[4] * t246 + t171 * t248 + work[17] * t250);
-    const double t260 = t243 + (t240 - work[19] * (t241 - (work[13] * work[25] + work[11] * t229 + (work[10] * t188 + work[3] * t238)))) + (coef[4] * t255 + (t170 * t248 + work[17] * t257));
-    const double t261 = work[96] + 2.0 * (work[45] * work[97]) - (work[19] * (work[98] + 2.0 * (work[10] * work[97]) + (work[12] * work[87] - work[3] * work[42])) + 2.0 * (work[39] * work[99]));
-    const double t262 = work[100] * work[18] + 2.0 * (work[62] * work[97]) - (2.0 * (work[61] * work[99]) + work[19] * (work[22] * work[100] + 2.0 * work[80] + (work[101] + work[12] * work[83] - work[3] * work[58])));
-    const double t263 = t262 - t245;
-    const double t264 = 2.0 * (work[76] * work[97]) - work[103] * work[18] - (2.0 * (work[75] * work[99]) + work[19] * (2.0 * work[104] - work[103] * work[22] + (work[12] * work[94] - (work[49] + work[3] * work[73]))));
-    const double t265 = work[51] + t264;
-    const double t266 = 2.0 * (work[62] * work[52]) - work[53] * work[18] - (work[19] * (2.0 * work[106] - work[22] * work[53] + (work[10] * work[58] - (work[91] + work[12] * t215))) + 2.0 * (work[61] * work[107]));
-    const double t267 = t254 + t266;
-    const double t268 = t210 + 2.0 * (work[45] * work[52]) - (2.0 * (work[39] * work[107]) + work[19] * (t211 + 2.0 * work[108] + (work[49] + work[10] * work[42] - work[12] * t206)));
-    const double t269 = t268 - work[51];
-    const double t270 = t219 + 2.0 * (work[76] * work[52]) - (work[19] * (t220 + 2.0 * (work[3] * work[52]) + (work[10] * work[73] - work[12] * t225)) + 2.0 * (work[75] * work[107]));
-    const double t271 = work[54] * work[18] + 2.0 * (work[62] * work[69]) - (work[19] * (work[54] * work[22] + 2.0 * (work[12] * work[69]) + (work[3] * t215 - work[10] * work[83])) + 2.0 * (work[61] * work[109]));
-    const double t272 = 2.0 * (work[45] * work[69]) - work[36] * work[18] - (2.0 * (work[39] * work[109]) + work[19] * (2.0 * work[81] - work[22] * work[36] + (work[3] * t206 - (work[101] + work[10] * work[87]))));
-    const double t273 = t245 + t272;
-    const double t274 = t252 + 2.0 * (work[69] * work[76]) - (work[19] * (t253 + 2.0 * work[110] + (work[91] + work[3] * t225 - work[10] * work[94])) + 2.0 * (work[75] * work[109]));
-    const double t275 = t274 - t254;
-    const double t276 = P2 * work[7];
-    const double t277 = P3 * work[63];
-    const double t278 = G3 * work[17];
-    const double t279 = P3 * work[17];
-    const double t280 = G3 * coef[4];
-    const double t281 = P1 * work[2];
-    const double t282 = G2 * work[17];
-    const double t283 = G1 * work[17];
-    const double t284 = G1 * t170;
-    const double t285 = G2 * t171;
-    const double t286 = G2 * work[7];
-    const double t287 = G3 * work[63];
-    const double t288 = G1 * work[2];
+    (void)displacement, (void)increment;
+    const double P1 = y[0], P2 = y[1], P3 = y[2], G1 = y[3], G2 = y[4], G3 = y[5];
+    const double t1 = P2 * coef[0], t2 = P1 * coef[0], t3 = work[11] * work[3];
+    const double t4 = coef[5] * work[12], t5 = t3 + t4, t6 = t5 + t5;
+    const double t7 = work[11] * work[10] + work[13] * work[3];
+    const double t8 = work[13] * work[14] + work[11] * work[15] + (work[10] * t7 + work[3] * t6);
+    const double t9 = coef[5] * work[10] + work[13] * work[12];
+    const double t10 = work[13] * work[16] + coef[5] * work[15] + (work[10] * t9 + work[12] * t6);
+    const double t11 = work[17] * work[8] + (coef[4] * work[5] + t2 * work[6]) - (t6 * work[18] + work[19]
+        * (coef[5] * work[20] + work[11] * work[21] + (work[3] * t8 + work[12] * t10) - work[22] * t6));
+    const double t12 = t7 * work[18], t13 = t7 * work[22], t14 = work[13] * work[23];
+    const double t15 = coef[5] * work[14], t16 = coef[5] * work[3] + work[11] * work[12];
+    const double t17 = work[10] * t16, t18 = work[12] * t7, t19 = t14 - t15 + (t17 - t18);
+    const double t20 = work[13] * work[10], t21 = t20 + t4, t22 = t21 + t21;
+    const double t23 = work[11] * work[14] + work[13] * work[24] + (work[3] * t7 + work[10] * t22);
+    const double t24 = t12 - work[19] * (t13 + (coef[5] * work[25] - work[11] * work[26] + (work[12] * t19
+        - work[3] * t23))) - coef[7] + (coef[4] * work[4] + (work[17] * work[9] + t1 * work[6]));
+    const double t25 = 0.5 * work[11], t26 = t9 * work[18], t27 = t9 * work[22], t28 = t20 + t3;
+    const double t29 = t28 + t28;
+    const double t30 = work[13] * work[27] + coef[5] * work[16] + (work[10] * t29 + work[12] * t9);
+    const double t31 = work[11] * work[16], t32 = work[3] * t9, t33 = t31 - t14 + (t32 - t17);
+    const double t34 = work[30] - work[31];
+    const double t35 = work[32] + (work[33] - work[19] * (work[34] - (work[12] * t34 + work[10] * work[21])));
+    const double t36 = work[12] * work[35], t37 = t36 + work[3] * work[36];
+    const double t38 = coef[5] * work[35] + work[11] * work[36] + (work[12] * work[37] + work[3] * work[38]);
+    const double t39 = 2.0 * (work[39] * work[40]) + work[19] * (work[22] * work[37] + 2.0 * work[41]
+        + (work[13] * work[42] - coef[5] * t37 + (work[43] + work[10] * work[44] - work[12] * t38)));
+    const double t40 = work[18] * work[37] + 2.0 * (work[45] * work[46]) - t39 - work[47];
+    const double t41 = work[35] * work[18], t42 = work[22] * work[35];
+    const double t43 = t36 - work[3] * work[48];
+    const double t44 = t41 - work[19] * (t42 + (work[49] + (work[10] * work[50] - work[12] * t43)))
+        - work[51];
+    const double t45 = 0.5 * P1, t46 = work[52] - work[12] * work[53] - work[3] * work[54];
+    const double t47 = work[46] - work[12] * work[55] - work[3] * work[56] - (work[11] * work[54] + coef[5]
+        * work[53]);
+    const double t48 = work[19] * (2.0 * work[57] - work[22] * work[55] + (work[13] * work[58] - coef[5] * t46
+        + (work[10] * work[59] - (work[60] + work[12] * t47)))) + 2.0 * (work[61] * work[40]);
+    const double t49 = t45 + (2.0 * (work[62] * work[46]) - work[18] * work[55] - t48);
+    const double t50 = work[64] * work[18], t51 = work[64] * work[22], t52 = work[12] * work[64];
+    const double t53 = work[3] * work[65], t54 = work[66] - work[67] + (t52 - t53);
+    const double t55 = t50 - work[19] * (t51 + (work[10] * work[68] - work[12] * t54));
+    const double t56 = t52 - (work[69] + t53);
+    const double t57 = coef[5] * work[64] - work[11] * work[65] + (work[12] * work[70] - (work[3] * work[71]
+        + work[72]));
+    const double t58 = work[19] * (work[22] * work[70] + 2.0 * (work[3] * work[46]) + (work[13] * work[73]
+        - coef[5] * t56 + (work[10] * work[74] - work[12] * t57))) + 2.0 * (work[75] * work[40]);
+    const double t59 = work[70] * work[18] + 2.0 * (work[76] * work[46]) - t58;
+    const double t60 = work[3] * work[23] + work[12] * work[24];
+    const double t61 = work[24] * work[18] + work[19] * (work[10] * work[26] + work[12] * t60 - work[24]
+        * work[22]);
+    const double t62 = work[23] * work[18], t63 = work[23] * work[22];
+    const double t64 = work[12] * work[23] + work[3] * work[27], t65 = 0.5 * work[10];
+    const double t66 = t62 - work[19] * (t63 + (work[10] * work[28] - work[12] * t64)) - t65;
+    const double t67 = t15 - t31 + (t18 - t32);
+    const double t68 = coef[7] + (t12 - work[19] * (t13 - (coef[5] * t34 + work[13] * work[21]
+        + (work[12] * t67 + work[10] * t8)))) + (work[17] * t40 + (coef[4] * t44 + t2 * t49));
+    const double t69 = work[11] * work[23] + coef[5] * work[24] + (work[3] * t16 + work[12] * t22);
+    const double t70 = coef[4] * t55 + (work[17] * t59 + t1 * t49) - (t22 * work[18] + work[19]
+        * (work[13] * work[26] + coef[5] * t60 + (work[10] * t23 + work[12] * t69) - work[22] * t22));
+    const double t71 = t16 * work[18], t72 = work[22] * t16;
+    const double t73 = coef[5] * work[23] + work[11] * work[27] + (work[12] * t16 + work[3] * t29);
+    const double t74 = 0.5 * work[13];
+    const double t75 = work[77] - work[19] * (work[78] + (work[3] * t34 - work[10] * work[20])) - work[79];
+    const double t76 = 0.5 * G2;
+    const double t77 = t76 + (work[48] * work[18] - work[19] * (work[22] * work[48] + (work[80] - work[81]
+        + (work[3] * t43 - work[10] * work[82]))));
+    const double t78 = work[19] * (work[22] * work[56] + 2.0 * (work[12] * work[72]) + (work[11] * t46
+        - work[13] * work[83] + (work[3] * t47 - work[10] * work[84]))) + 2.0 * (work[61] * work[85]);
+    const double t79 = work[56] * work[18] + 2.0 * (work[62] * work[72]) - t78;
+    const double t80 = work[19] * (2.0 * work[86] - work[22] * work[38] + (work[11] * t37 - work[13]
+        * work[87] + (work[3] * t38 - (work[88] + work[10] * work[89])))) + 2.0 * (work[39] * work[85]);
+    const double t81 = work[90] + (2.0 * (work[45] * work[72]) - work[18] * work[38] - t80);
+    const double t82 = t65 + (t62 - work[19] * (t63 - (work[10] * work[25] + work[3] * t60)));
+    const double t83 = work[65] * work[18], t84 = work[22] * work[65], t85 = 0.5 * G1;
+    const double t86 = t83 - work[19] * (t84 + (work[91] + (work[3] * t54 - work[10] * work[92]))) - t85;
+    const double t87 = work[19] * (work[22] * work[71] + 2.0 * work[93] + (work[11] * t56 - work[13]
+        * work[94] + (work[60] + work[3] * t57 - work[10] * work[95]))) + 2.0 * (work[75] * work[85]);
+    const double t88 = work[18] * work[71] + 2.0 * (work[76] * work[72]) - t87 - t45;
+    const double t89 = work[27] * work[18] + work[19] * (work[3] * t64 + work[10] * work[29] - work[27]
+        * work[22]);
+    const double t90 = t26 - work[19] * (t27 + (work[11] * t34 - work[13] * work[20] + (work[3] * t67
+        - work[10] * t10))) - t25 + (coef[4] * t77 + t2 * t79 + work[17] * t81);
+    const double t91 = t74 + (t71 - work[19] * (t72 - (work[13] * work[25] + work[11] * t60 + (work[10] * t19
+        + work[3] * t69)))) + (coef[4] * t86 + (t1 * t79 + work[17] * t88));
+    const double t92 = work[96] + 2.0 * (work[45] * work[97]) - (work[19] * (work[98] + 2.0
+        * (work[10] * work[97]) + (work[12] * work[87] - work[3] * work[42])) + 2.0 * (work[39] * work[99]));
+    const double t93 = work[100] * work[18] + 2.0 * (work[62] * work[97]) - (2.0 * (work[61] * work[99])
+        + work[19] * (work[22] * work[100] + 2.0 * work[80] + (work[101] + work[12] * work[83] - work[3]
+        * work[58])));
+    const double t94 = t93 - t76;
+    const double t95 = 2.0 * (work[76] * work[97]) - work[103] * work[18] - (2.0 * (work[75] * work[99])
+        + work[19] * (2.0 * work[104] - work[103] * work[22] + (work[12] * work[94] - (work[49] + work[3]
+        * work[73]))));
+    const double t96 = work[51] + t95;
+    const double t97 = 2.0 * (work[62] * work[52]) - work[53] * work[18] - (work[19] * (2.0 * work[106]
+        - work[22] * work[53] + (work[10] * work[58] - (work[91] + work[12] * t46))) + 2.0
+        * (work[61] * work[107]));
+    const double t98 = t85 + t97;
+    const double t99 = t41 + 2.0 * (work[45] * work[52]) - (2.0 * (work[39] * work[107]) + work[19]
+        * (t42 + 2.0 * work[108] + (work[49] + work[10] * work[42] - work[12] * t37)));
+    const double t100 = t99 - work[51];
+    const double t101 = t50 + 2.0 * (work[76] * work[52]) - (work[19] * (t51 + 2.0 * (work[3] * work[52])
+        + (work[10] * work[73] - work[12] * t56)) + 2.0 * (work[75] * work[107]));
+    const double t102 = work[54] * work[18] + 2.0 * (work[62] * work[69]) - (work[19] * (work[54] * work[22]
+        + 2.0 * (work[12] * work[69]) + (work[3] * t46 - work[10] * work[83])) + 2.0
+        * (work[61] * work[109]));
+    const double t103 = 2.0 * (work[45] * work[69]) - work[36] * work[18] - (2.0 * (work[39] * work[109])
+        + work[19] * (2.0 * work[81] - work[22] * work[36] + (work[3] * t37 - (work[101] + work[10]
+        * work[87]))));
+    const double t104 = t76 + t103;
+    const double t105 = t83 + 2.0 * (work[69] * work[76]) - (work[19] * (t84 + 2.0 * work[110]
+        + (work[91] + work[3] * t56 - work[10] * work[94])) + 2.0 * (work[75] * work[109]));
+    const double t106 = t105 - t85, t107 = P2 * work[7], t108 = P3 * work[63], t109 = G3 * work[17];
+    const double t110 = P3 * work[17], t111 = G3 * coef[4], t112 = P1 * work[2];
+    const double t113 = G2 * work[17], t114 = G1 * work[17], t115 = G1 * t1, t116 = G2 * t2;
+    const double t117 = G2 * work[7], t118 = G3 * work[63], t119 = G1 * work[2];
     jacobian[23] = work[0];
-    increment_jacobian[2] = P2 * work[1] - P3 * work[2] - G3 * t170 - work[3];
-    increment_jacobian[10] = -(P1 * t170);
-    jacobian[2] = work[0] + (t170 * work[4] + (t171 * work[5] + work[1] * work[6] + (work[7] * work[8] + work[2] * work[9])));
-    increment_jacobian[3] = P2 * t171;
-    increment_jacobian[8] = work[10] + (P3 * work[7] + (G3 * t171 - P1 * work[1]));
-    jacobian[3] = t180;
-    jacobian[4] = t193;
-    jacobian[5] = t194 + (t195 - work[19] * (t196 - (work[11] * work[28] + coef[5] * work[29] + (work[12] * t199 + work[3] * t202))));
-    jacobian[6] = t204 + (work[63] * t209 + (work[17] * t213 + work[7] * t218));
-    jacobian[7] = 1.0 + (work[17] * t224 + (work[63] * t228 + work[2] * t218) - t230);
-    jacobian[8] = t235 + (t170 * t224 + (work[2] * t228 + work[7] * t209 + (t171 * t213 + work[1] * t218)));
-    jacobian[29] = t235;
-    jacobian[9] = t237;
-    jacobian[10] = t239;
-    jacobian[17] = -(t198 * work[18] + work[19] * (work[13] * work[29] + work[11] * t233 + (work[10] * t199 + work[3] * t242) - t198 * work[22]));
-    jacobian[11] = t240 - work[19] * (t241 + (work[13] * work[28] - coef[5] * t233 + (work[10] * t202 - work[12] * t242))) - t243;
-    jacobian[12] = t244 + (work[17] * t246 + work[7] * t248 + work[63] * t250);
-    jacobian[13] = t251 + (work[17] * t255 + (work[2] * t248 + work[63] * t257));
-    jacobian[14] = 1.0 + (t170 * t255 + (t171 * t246 + work[1] * t248 + (work[7] * t250 + work[2] * t257)) - t258);
-    jacobian[35] = 1.0 - t258;
-    jacobian[15] = t259;
-    jacobian[16] = t260;
-    jacobian[18] = work[63] * t261 + work[7] * t263;
-    jacobian[21] = 1.0 + (work[17] * t261 + t171 * t263 - work[102]);
-    jacobian[19] = work[2] * t263 + work[63] * t265;
-    jacobian[20] = work[1] * t263 + (work[7] * t261 + work[2] * t265);
-    jacobian[22] = work[105] + (work[17] * t265 + t170 * t263);
-    jacobian[24] = work[7] * t267 + work[63] * t269;
-    jacobian[27] = t204 + (work[17] * t269 + t171 * t267);
-    jacobian[25] = work[63] * t270 + work[2] * t267;
-    jacobian[26] = work[1] * t267 + (work[2] * t270 + work[7] * t269);
-    jacobian[28] = 1.0 + (work[17] * t270 + t170 * t267 - t230);
-    jacobian[30] = work[7] * t271 + work[63] * t273;
-    jacobian[33] = t244 + (t171 * t271 + work[17] * t273);
-    jacobian[31] = work[2] * t271 + work[63] * t275;
-    jacobian[32] = work[1] * t271 + (work[2] * t275 + work[7] * t273);
-    jacobian[34] = t251 + (t170 * t271 + work[17] * t275);
-    increment_jacobian[0] = t276;
-    increment_jacobian[1] = work[12] + (P2 * work[2] - t277 - t278);
-    increment_jacobian[6] = t277 + (t278 - P1 * work[7]) - work[12];
-    increment_jacobian[22] = G2 * t170 - t278 + work[12];
-    increment_jacobian[27] = t278 - G1 * t171 - work[12];
-    increment_jacobian[4] = coef[5] + (P2 * t170 - t279 - t280);
-    increment_jacobian[9] = t279 + (t280 - P1 * t171) - coef[5];
-    increment_jacobian[7] = -t281;
-    increment_jacobian[12] = work[3] - (t282 + work[111]);
-    increment_jacobian[33] = work[3] - t282;
-    increment_jacobian[13] = t283 + work[112] - work[10];
-    increment_jacobian[34] = t283 - work[10];
-    increment_jacobian[28] = -t284;
-    increment_jacobian[14] = t284 + (t281 - t276 - t285);
-    increment_jacobian[21] = t285;
-    increment_jacobian[18] = t286;
-    increment_jacobian[19] = G2 * work[2] - t287;
-    increment_jacobian[24] = t287 - G1 * work[7];
-    increment_jacobian[25] = -t288;
-    increment_jacobian[32] = t288 - t286;
+    increment_jacobian[2] = P2 * work[1] - P3 * work[2] - G3 * t1 - work[3];
+    increment_jacobian[10] = -(P1 * t1);
+    jacobian[2] = work[0] + (t1 * work[4] + (t2 * work[5] + work[1] * work[6] + (work[7] * work[8] + work[2]
+        * work[9])));
+    increment_jacobian[3] = P2 * t2;
+    increment_jacobian[8] = work[10] + (P3 * work[7] + (G3 * t2 - P1 * work[1]));
+    jacobian[3] = t11;
+    jacobian[4] = t24;
+    jacobian[5] = t25 + (t26 - work[19] * (t27 - (work[11] * work[28] + coef[5] * work[29] + (work[12] * t30
+        + work[3] * t33))));
+    jacobian[6] = t35 + (work[63] * t40 + (work[17] * t44 + work[7] * t49));
+    jacobian[7] = 1.0 + (work[17] * t55 + (work[63] * t59 + work[2] * t49) - t61);
+    jacobian[8] = t66 + (t1 * t55 + (work[2] * t59 + work[7] * t40 + (t2 * t44 + work[1] * t49)));
+    jacobian[29] = t66;
+    jacobian[9] = t68;
+    jacobian[10] = t70;
+    jacobian[17] = -(t29 * work[18] + work[19] * (work[13] * work[29] + work[11] * t64 + (work[10] * t30
+        + work[3] * t73) - t29 * work[22]));
+    jacobian[11] = t71 - work[19] * (t72 + (work[13] * work[28] - coef[5] * t64 + (work[10] * t33 - work[12]
+        * t73))) - t74;
+    jacobian[12] = t75 + (work[17] * t77 + work[7] * t79 + work[63] * t81);
+    jacobian[13] = t82 + (work[17] * t86 + (work[2] * t79 + work[63] * t88));
+    jacobian[14] = 1.0 + (t1 * t86 + (t2 * t77 + work[1] * t79 + (work[7] * t81 + work[2] * t88)) - t89);
+    jacobian[35] = 1.0 - t89;
+    jacobian[15] = t90;
+    jacobian[16] = t91;
+    jacobian[18] = work[63] * t92 + work[7] * t94;
+    jacobian[21] = 1.0 + (work[17] * t92 + t2 * t94 - work[102]);
+    jacobian[19] = work[2] * t94 + work[63] * t96;
+    jacobian[20] = work[1] * t94 + (work[7] * t92 + work[2] * t96);
+    jacobian[22] = work[105] + (work[17] * t96 + t1 * t94);
+    jacobian[24] = work[7] * t98 + work[63] * t100;
+    jacobian[27] = t35 + (work[17] * t100 + t2 * t98);
+    jacobian[25] = work[63] * t101 + work[2] * t98;
+    jacobian[26] = work[1] * t98 + (work[2] * t101 + work[7] * t100);
+    jacobian[28] = 1.0 + (work[17] * t101 + t1 * t98 - t61);
+    jacobian[30] = work[7] * t102 + work[63] * t104;
+    jacobian[33] = t75 + (t2 * t102 + work[17] * t104);
+    jacobian[31] = work[2] * t102 + work[63] * t106;
+    jacobian[32] = work[1] * t102 + (work[2] * t106 + work[7] * t104);
+    jacobian[34] = t82 + (t1 * t102 + work[17] * t106);
+    increment_jacobian[0] = t107;
+    increment_jacobian[1] = work[12] + (P2 * work[2] - t108 - t109);
+    increment_jacobian[6] = t108 + (t109 - P1 * work[7]) - work[12];
+    increment_jacobian[22] = G2 * t1 - t109 + work[12];
+    increment_jacobian[27] = t109 - G1 * t2 - work[12];
+    increment_jacobian[4] = coef[5] + (P2 * t1 - t110 - t111);
+    increment_jacobian[9] = t110 + (t111 - P1 * t2) - coef[5];
+    increment_jacobian[7] = -t112;
+    increment_jacobian[12] = work[3] - (t113 + work[111]);
+    increment_jacobian[33] = work[3] - t113;
+    increment_jacobian[13] = t114 + work[112] - work[10];
+    increment_jacobian[34] = t114 - work[10];
+    increment_jacobian[28] = -t115;
+    increment_jacobian[14] = t115 + (t112 - t107 - t116);
+    increment_jacobian[21] = t116;
+    increment_jacobian[18] = t117;
+    increment_jacobian[19] = G2 * work[2] - t118;
+    increment_jacobian[24] = t118 - G1 * work[7];
+    increment_jacobian[25] = -t119;
+    increment_jacobian[32] = t119 - t117;
 }
 
 /* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
    increment, all with the momenta p = grad S_h(y) */
 static void lagrange_top_linearise(const double coef[8], const double y[6], double displacement[restrict 6],
-                                   double increment[restrict 6], double jacobian[restrict 36],
-                                   double increment_jacobian[restrict 36])
+    double increment[restrict 6], double jacobian[restrict 36], double increment_jacobian[restrict 36])
 {
     double work[113];
     lagrange_top_linearise_part1(coef, y, displacement, increment, jacobian, increment_jacobian, work);
     lagrange_top_linearise_part2(coef, y, displacement, increment, jacobian, increment_jacobian, work);
 }
 
-/* Solve matrix * solution = side, both overwritten, by elimination with partial pivoting. 0 if singular. */
-static int lagrange_top_solve(double matrix[36], double side[6])
+/* the Hamiltonian */
+double lagrange_top_hamiltonian(const lagrange_top_params *params, const double x[6])
 {
-    for (int k = 0; k < 6; ++k) {
-        int best = k;
-        for (int i = k + 1; i < 6; ++i)
-            if (fabs(matrix[i * 6 + k]) > fabs(matrix[best * 6 + k])) best = i;
-        const double pivot = matrix[best * 6 + k];
-        if (!(fabs(pivot) > 0.0)) return 0;
-        for (int j = k; j < 6 && best != k; ++j) {
-            const double swap = matrix[k * 6 + j];
-            matrix[k * 6 + j] = matrix[best * 6 + j];
-            matrix[best * 6 + j] = swap;
-        }
-        const double swap = side[k];
-        side[k] = side[best];
-        side[best] = swap;
-        for (int i = k + 1; i < 6; ++i) {
-            const double factor = matrix[i * 6 + k] / pivot;
-            for (int j = k + 1; j < 6; ++j) matrix[i * 6 + j] -= factor * matrix[k * 6 + j];
-            side[i] -= factor * side[k];
-        }
-    }
-    for (int i = 6 - 1; i >= 0; --i) {
-        for (int j = i + 1; j < 6; ++j) side[i] -= matrix[i * 6 + j] * side[j];
-        side[i] /= matrix[i * 6 + i];
-    }
-    return 1;
+    if (params == NULL) params = &lagrange_top_default_params;
+    const double I1 = params->I1, I3 = params->I3, mgl = params->mgl, P1 = x[0], P2 = x[1], P3 = x[2], G3 =
+        x[5];
+    return G3 * mgl + 0.5 * (P3 * P3 / I3 + (P1 * P1 + P2 * P2) / I1);
 }
 
-/* Whether a guess is where the next values may be. Recurrences that were fitted to little else than rest, near a saddle,
-   may lead anywhere; and far away the equation of a step has solutions that have nothing to do with the motion. */
-static int lagrange_top_near(const double guess[6], const double last[6])
+/* the Casimirs */
+void lagrange_top_casimirs(const lagrange_top_params *params, const double x[6], double out[])
 {
-    double distance = 0.0, size = 0.0;
-    for (int i = 0; i < 6; ++i) {
-        distance += fabs(guess[i] - last[i]);
-        size += fabs(last[i]);
-    }
-    return distance <= 4.0 * size;
+    (void)params;
+    const double P1 = x[0], P2 = x[1], P3 = x[2], G1 = x[3], G2 = x[4], G3 = x[5];
+    out[0] = G3 * G3 + (G1 * G1 + G2 * G2);
+    out[1] = G3 * P3 + (G2 * P2 + G1 * P1);
 }
 
-/* The guess for the next value (y), from earlier ones; 0 if there is none. */
-static int lagrange_top_predict(const lagrange_top_memory *memory, double value[6])
+/* pi(x) grad H(x) */
+void lagrange_top_vector_field(const lagrange_top_params *params, const double x[6], double out[6])
 {
-    const int last = memory->count - 1;
-    double odd[6] = { 0.0 }, binomial = -1.0;
-    memset(value, 0, 6 * sizeof value[0]);
-    if (memory->fitting) {
-        for (int k = 0; k < memory->terms; k += 2)
-            for (int i = 0; i < 6; ++i) {
-                value[i] += memory->weight[k][i][0] * memory->past[last - k][i];
-                odd[i] += memory->weight[k + 1][i][0] * memory->past[last - 1 - k][i];
-            }
-        for (int i = 0; i < 6; ++i) value[i] += odd[i];
-    } else {
-        for (int k = 0; k < memory->order && k <= last; ++k) {
-            binomial *= -(double)(memory->order - k) / (k + 1);
-            for (int i = 0; i < 6; ++i) value[i] += binomial * memory->past[last - k][i];
-        }
-    }
-    return last >= 0 && lagrange_top_near(value, memory->past[last]);
+    if (params == NULL) params = &lagrange_top_default_params;
+    const double I1 = params->I1, I3 = params->I3, mgl = params->mgl, P1 = x[0], P2 = x[1], P3 = x[2], G1 =
+        x[3], G2 = x[4], G3 = x[5];
+    const double t1 = P3 / I3, t2 = 1.0 / I1, t3 = P2 * t2, t4 = P1 * t2;
+    out[0] = G2 * mgl + (P2 * t1 - P3 * t3);
+    out[1] = P3 * t4 - P1 * t1 - G1 * mgl;
+    out[2] = P1 * t3 - P2 * t4;
+    out[3] = G2 * t1 - G3 * t3;
+    out[4] = G3 * t4 - G1 * t1;
+    out[5] = G1 * t3 - G2 * t4;
 }
 
-/* Choose the guess that would have been best for a value that took several iterations. */
-static void lagrange_top_judge(lagrange_top_memory *memory, const double value[6])
+/* ---- Compensated sums, linear equations ---- */
+/* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to
+   its last bit: were it rounded with the change, corrections of one sign would add up to a drift. 0, and x as
+   before, if the sum is not finite. */
+static int lagrange_top_advance(lagrange_top_solver *s, const double change[lagrange_top_DIM],
+    const double correction[lagrange_top_DIM])
 {
-    double row[8 + 1][6], guess[6], least = HUGE_VAL, fitted = HUGE_VAL;
-    const int rows = memory->count < 8 ? memory->count : 8;
-    memcpy(row[0], value, sizeof row[0]);
-    for (int k = 0; k < rows; ++k) memcpy(row[k + 1], memory->past[memory->count - 1 - k], sizeof row[0]);
-    for (int order = 1; order <= rows; ++order) { /* row[0] becomes the backward difference of this order */
-        double size = 0.0;
-        for (int k = 0; k <= rows - order; ++k)
-            for (int i = 0; i < 6; ++i) row[k][i] -= row[k + 1][i];
-        for (int i = 0; i < 6; ++i) size += fabs(row[0][i]);
-        if (size < least) {
-            least = size;
-            memory->order = order;
-        }
-    }
-    memory->fitting = memory->terms > 0;
-    if (memory->fitting && lagrange_top_predict(memory, guess)) {
-        fitted = 0.0;
-        for (int i = 0; i < 6; ++i) fitted += fabs(value[i] - guess[i]);
-    }
-    memory->fitting = memory->terms > 0 && fitted <= least;
-    if (memory->order == 0) memory->order = 1;
-}
-
-/* Make eight columns orthogonal to one, by the multiples of it that are put into r. Where that one is among the eight, those
-   up to it stay as they are, and inverse becomes one over its squared length. The number of rows is even. */
-static void lagrange_top_project(int rows, double (*one)[8], int column, double *inverse, double (*eight)[8], double r[8])
-{
-    double even[8] = { 0.0 }, odd[8] = { 0.0 };
-    for (int i = 0; i < rows; i += 2) {
-        const double entry = one[i][column], next = one[i + 1][column];
-        for (int l = 0; l < 8; ++l) even[l] += entry * eight[i][l];
-        for (int l = 0; l < 8; ++l) odd[l] += next * eight[i + 1][l];
-    }
-    for (int l = 0; l < 8; ++l) even[l] += odd[l];
-    if (one == eight) {
-        *inverse = even[column] > 0.0 ? 1.0 / even[column] : 0.0;
-        memset(even, 0, ((size_t)column + 1) * sizeof even[0]);
-    }
-    for (int l = 0; l < 8; ++l) r[l] = even[l] *= *inverse;
-    for (int i = 0; i < rows; ++i) {
-        const double entry = one[i][column];
-        for (int l = 0; l < 8; ++l) eight[i][l] -= entry * even[l];
-    }
-}
-
-/* By how much recurrences miss the last of these values. */
-static double lagrange_top_missed(const double *value, double (*weight)[8])
-{
-    enum { AHEAD = 8, WINDOW = 40, CHECKS = 8 };
-    double most = 0.0;
-    for (int i = 0; i < CHECKS; ++i) {
-        double guess[8] = { 0.0 };
-        for (int k = 0; k < WINDOW; ++k)
-            for (int l = 0; l < 8; ++l) guess[l] += weight[k][l] * value[i + WINDOW - 1 - k];
-        for (int l = 0; l < AHEAD; ++l) most = fmax(most, fabs(guess[l] - value[i + WINDOW + l]));
-    }
-    return most;
-}
-
-/* Fit the recurrences value[m + l] = sum of weight[k][..][l] * value[m - 1 - k], l = 0 ... 8 - 1, to the history of
-   a component: ridge least squares by modified Gram-Schmidt, the ridge at the level of rounding. Columns are taken in by
-   eights, until they leave next to nothing of the right-hand sides. How many past values are used; 0 if the recurrences do
-   not foresee the last values, which they were not fitted to. */
-static int lagrange_top_train(lagrange_top_memory *memory, int component)
-{
-    enum { AHEAD = 8, WINDOW = 40, ROWS = 56 };
-    double q[WINDOW / 8][ROWS + WINDOW][8], r[WINDOW / 8][WINDOW][8], inverse[WINDOW]; /* eight columns in each part */
-    double right[ROWS + WINDOW][8], weight[WINDOW][8], value[111], largest = 0.0, left = HUGE_VAL;
-    int terms = 0;
-    memset(q, 0, sizeof q);
-    memset(right, 0, sizeof right);
-    memset(weight, 0, sizeof weight);
-    for (int i = 0; i < 111; ++i) {
-        value[i] = memory->past[memory->count - 111 + i][component];
-        if (fabs(value[i]) > largest) largest = fabs(value[i]);
-    }
-    for (int i = 0; i < ROWS; ++i)
-        for (int l = 0; l < AHEAD; ++l) right[i][l] = value[i + WINDOW + l];
-    while (terms < WINDOW && left > 3e-12 * largest) {
-        const int part = terms / 8, rows = ROWS + terms + 8; /* further rows of the ridge are zero in these columns */
-        for (int i = 0; i < ROWS; ++i)
-            for (int l = 0; l < 8; ++l) q[part][i][l] = value[i + WINDOW - 1 - terms - l];
-        for (int l = 0; l < 8; ++l) q[part][ROWS + terms + l][l] = 1e-15 * largest;
-        for (int k = 0; k < terms; ++k) lagrange_top_project(rows, q[k / 8], k % 8, &inverse[k], q[part], r[part][k]);
-        for (int l = 0; l < 8; ++l, ++terms) {
-            lagrange_top_project(rows, q[part], l, &inverse[terms], q[part], r[part][terms]);
-            lagrange_top_project(rows, q[part], l, &inverse[terms], right, weight[terms]);
-        }
-        double sum[8] = { 0.0 };
-        for (int i = 0; i < ROWS; ++i)
-            for (int l = 0; l < 8; ++l) sum[l] += fabs(right[i][l]);
-        left = 0.0;
-        for (int l = 0; l < 8; ++l) left += sum[l] / ROWS;
-    }
-    for (int k = terms - 1; k >= 0; --k)
-        for (int j = k + 1; j < terms; ++j)
-            for (int l = 0; l < 8; ++l) weight[k][l] -= r[j / 8][k][j % 8] * weight[j][l];
-    for (int k = 0; k < WINDOW; ++k) memcpy(memory->weight[k][component], weight[k], AHEAD * sizeof(double));
-    return lagrange_top_missed(value + ROWS, weight) <= 1e-07 * largest ? terms : 0;
-}
-
-/* Drop what is old, if so many values would not fit into the history. */
-static void lagrange_top_make_room(lagrange_top_memory *memory, int values)
-{
-    if (memory->count + values <= 222) return;
-    memmove(memory->past, memory->past + memory->count - 111, 111 * sizeof memory->past[0]);
-    memory->count = 111;
-}
-
-/* Add a value to the history. */
-static void lagrange_top_record(lagrange_top_memory *memory, const double value[6])
-{
-    lagrange_top_make_room(memory, 1);
-    memcpy(memory->past[memory->count++], value, 6 * sizeof value[0]);
-}
-
-/* Fit the recurrence to the last values; with every time, wait longer before it is done again. */
-static void lagrange_top_fit(lagrange_top_memory *memory)
-{
-    int found = 1;
-    memory->terms = 0;
-    for (int i = 0; i < 6 && found; ++i) {
-        const int terms = lagrange_top_train(memory, i);
-        found = terms > 0;
-        if (terms > memory->terms) memory->terms = terms;
-    }
-    if (!found) memory->terms = 0;
-    memory->fitting = found;
-    ++memory->fits;
-    memory->slow = 0;
-    memory->patience = memory->patience < 10000 ? 2 * memory->patience + 150 : 20000;
-}
-
-/* Take in the solved value: what took one iteration needs no better guess. */
-static void lagrange_top_remember(lagrange_top_memory *memory, const double value[6], int iterations)
-{
-    if (iterations > 1) lagrange_top_judge(memory, value);
-    lagrange_top_record(memory, value);
-    memory->slow = iterations > 1 ? memory->slow + 1 : 0;
-    if (memory->slow > memory->patience && memory->count >= 111) lagrange_top_fit(memory);
-}
-
-/* Whether an increment is that of the motion. Where the step is too large, the equation may have been solved by a point far
-   away, at another energy, that has nothing to do with it. */
-static int lagrange_top_plausible(const lagrange_top_solver *s, int stage, const double increment[6])
-{
-    double moved = 0.0, size = 0.0, field[6], middle[6], end[6];
-    for (int i = 0; i < 6; ++i) {
-        moved += fabs(increment[i]);
-        size += fabs(s->x[i]);
-    }
-    if (moved <= 1.5 * size) return 1;
-    lagrange_top_vector_field(&s->params, s->x, field);
-    for (int i = 0; i < 6; ++i) {
-        size += fabs(lagrange_top_fractions[stage] * s->h * field[i]);
-        middle[i] = s->x[i] + 0.5 * increment[i];
-        end[i] = s->x[i] + increment[i];
-    }
-    if (moved <= 1.5 * size) return 1;
-    const double before = lagrange_top_hamiltonian(&s->params, s->x), after = lagrange_top_hamiltonian(&s->params, end);
-    const double scale = fabs(before) + fabs(lagrange_top_hamiltonian(&s->params, middle)) + fabs(after);
-    return fabs(after - before) <= 0.5 * scale;
-}
-
-/* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to its last
-   bit: were it rounded with the change, corrections of one sign would add up to a drift. 0, and x as before, if the
-   sum is not finite. */
-static int lagrange_top_advance(lagrange_top_solver *s, const double change[6], const double correction[6])
-{
-    double x[6], carry[6];
-    for (int i = 0; i < 6; ++i) {
+    double x[lagrange_top_DIM], carry[lagrange_top_DIM];
+    for (int i = 0; i < lagrange_top_DIM; ++i) {
         const double sum = s->x[i] + change[i], added = sum - s->x[i];
         const double lost = (s->x[i] - (sum - added)) + (change[i] - added);
         const double small = lost + (s->carry[i] + correction[i]);
@@ -866,101 +578,187 @@ static int lagrange_top_advance(lagrange_top_solver *s, const double change[6], 
     return 1;
 }
 
-/* Size of a correction relative to each component of y, but no finer than 1e-6 of the largest; NaN or infinite if
-   the correction is. */
-static double lagrange_top_size(const double y[6], const double delta[6])
+/* Solve matrix * solution = side, both overwritten, by elimination with partial pivoting. 0 if singular. */
+static int lagrange_top_solve(double matrix[lagrange_top_DIM * lagrange_top_DIM],
+    double side[lagrange_top_DIM])
+{
+    for (int k = 0; k < lagrange_top_DIM; ++k) {
+        int best = k;
+        for (int i = k + 1; i < lagrange_top_DIM; ++i)
+            if (fabs(matrix[i * lagrange_top_DIM + k]) > fabs(matrix[best * lagrange_top_DIM + k])) best = i;
+        const double pivot = matrix[best * lagrange_top_DIM + k], last = side[k];
+        if (!(fabs(pivot) > 0.0)) return 0;
+        for (int j = k; j < lagrange_top_DIM && best != k; ++j) {
+            const double swap = matrix[k * lagrange_top_DIM + j];
+            matrix[k * lagrange_top_DIM + j] = matrix[best * lagrange_top_DIM + j];
+            matrix[best * lagrange_top_DIM + j] = swap;
+        }
+        side[k] = side[best];
+        side[best] = last;
+        for (int i = k + 1; i < lagrange_top_DIM; ++i) {
+            const double factor = matrix[i * lagrange_top_DIM + k] / pivot;
+            for (int j = k + 1; j < lagrange_top_DIM; ++j)
+                matrix[i * lagrange_top_DIM + j] -= factor * matrix[k * lagrange_top_DIM + j];
+            side[i] -= factor * side[k];
+        }
+    }
+    for (int i = lagrange_top_DIM - 1; i >= 0; --i) {
+        for (int j = i + 1; j < lagrange_top_DIM; ++j) side[i] -= matrix[i * lagrange_top_DIM + j] * side[j];
+        side[i] /= matrix[i * lagrange_top_DIM + i];
+    }
+    return 1;
+}
+
+/* ---- Starting guesses ---- */
+/* How far from the last value a guess may be, in sizes of that value. */
+#define lagrange_top_REACH 4.0
+
+/* The guess for the next value from the last ones: the sum of their backward differences. 0 if there is none,
+   or if it is far away, where the equation of a step has solutions that have nothing to do with the motion.
+   */
+static int lagrange_top_predict(const lagrange_top_history *history, double value[lagrange_top_DIM])
+{
+    double distance = 0.0, size = 0.0;
+    for (int i = 0; i < lagrange_top_DIM; ++i) {
+        value[i] = 0.0;
+        for (int k = 0; k < history->order; ++k) value[i] += history->difference[k][i];
+        distance += fabs(value[i] - history->difference[0][i]);
+        size += fabs(history->difference[0][i]);
+    }
+    return history->order > 0 && distance <= lagrange_top_REACH * size;
+}
+
+/* Take in the solved value. The guess of order k missed it by its k-th difference: the next is of the best
+   order. */
+static void lagrange_top_remember(lagrange_top_history *history, const double value[lagrange_top_DIM])
+{
+    double least = HUGE_VAL, next[lagrange_top_DIM];
+    memcpy(next, value, sizeof next);
+    for (int k = 0; k <= history->count && k < lagrange_top_DIFFERENCES; ++k) {
+        double size = 0.0;
+        for (int i = 0; i < lagrange_top_DIM; ++i) {
+            const double last = history->difference[k][i];
+            history->difference[k][i] = next[i];
+            size += fabs(next[i]);
+            next[i] -= last;
+        }
+        if (k > 0 && size < least) {
+            least = size;
+            history->order = k;
+        }
+    }
+    if (history->count == 0) history->order = 1;
+    if (history->count < lagrange_top_DIFFERENCES) ++history->count;
+}
+
+/* How far a step may lead, in sizes of the state and of what the vector field says, if the energy is lost;
+   and the part of the energy that counts as lost. */
+#define lagrange_top_PLAUSIBLE 1.5
+#define lagrange_top_LOST 0.5
+
+/* Whether an increment is that of the motion. Where the step is too large, the equation may have been solved
+   by a point far away, at another energy, that has nothing to do with it. */
+static int lagrange_top_plausible(const lagrange_top_solver *s, const double increment[lagrange_top_DIM])
+{
+    double moved = 0.0, size = 0.0, field[lagrange_top_DIM], middle[lagrange_top_DIM], end[lagrange_top_DIM];
+    for (int i = 0; i < lagrange_top_DIM; ++i) {
+        moved += fabs(increment[i]);
+        size += fabs(s->x[i]);
+    }
+    if (moved <= lagrange_top_PLAUSIBLE * size) return 1;
+    lagrange_top_vector_field(&s->params, s->x, field);
+    for (int i = 0; i < lagrange_top_DIM; ++i) {
+        size += fabs(s->h * field[i]);
+        middle[i] = s->x[i] + 0.5 * increment[i];
+        end[i] = s->x[i] + increment[i];
+    }
+    if (moved <= lagrange_top_PLAUSIBLE * size) return 1;
+    const double before = lagrange_top_hamiltonian(&s->params, s->x), after =
+        lagrange_top_hamiltonian(&s->params, end);
+    const double scale = fabs(before) + fabs(lagrange_top_hamiltonian(&s->params, middle)) + fabs(after);
+    return fabs(after - before) <= lagrange_top_LOST * scale;
+}
+
+/* ---- The implicit step, by Newton's method ---- */
+/* Components of y are measured no finer than by this part of the largest. */
+#define lagrange_top_FLOOR 1e-6
+
+/* Size of a correction relative to each component of y; NaN or infinite if the correction is. */
+static double lagrange_top_size(const double y[lagrange_top_DIM], const double delta[lagrange_top_DIM])
 {
     double norm = 0.0, size = 0.0;
-    for (int i = 0; i < 6; ++i) norm = fabs(y[i]) > norm ? fabs(y[i]) : norm;
-    for (int i = 0; i < 6; ++i) {
-        const double ratio = fabs(delta[i]) / (fabs(y[i]) + 1e-6 * norm + DBL_MIN);
+    for (int i = 0; i < lagrange_top_DIM; ++i) norm = fabs(y[i]) > norm ? fabs(y[i]) : norm;
+    for (int i = 0; i < lagrange_top_DIM; ++i) {
+        const double ratio = fabs(delta[i]) / (fabs(y[i]) + lagrange_top_FLOOR * norm + DBL_MIN);
         if (!isfinite(ratio)) return ratio;
         size = ratio > size ? ratio : size;
     }
     return size;
 }
 
+/* Corrections below the first that shrink by less than the second have reached the level of rounding. */
+#define lagrange_top_NEARLY_SOLVED 1e-8
+#define lagrange_top_SHRINKING 0.25
+
 /* Solve (y - x) + displacement(y) = 0 for y by Newton's method from the extrapolated guess, and advance. The
-   increment is corrected to first order by the last Newton correction, so that correction costs no evaluation:
-   a correction is accepted when the error that remains after it, quadratic in it, is below 1e-20. */
-static lagrange_top_status lagrange_top_attempt(lagrange_top_solver *s, int stage)
+   increment is corrected to first order by the last Newton correction, so that correction costs no
+   evaluation: a correction is accepted when the error that remains after it, quadratic in it, is below
+   lagrange_top_TOLERANCE. */
+static lagrange_top_status lagrange_top_attempt(lagrange_top_solver *s)
 {
-    const double *coef = s->coef[stage];
-    lagrange_top_memory *memory = &s->memory[stage];
-    double y[6], delta[6], displacement[6], increment[6];
-    double jacobian[36], increment_jacobian[36];
-    if (!lagrange_top_predict(memory, y)) memcpy(y, s->x, sizeof y);
-    double previous = HUGE_VAL;
-    for (int iteration = 0; iteration < 20; ++iteration) {
-        lagrange_top_linearise(coef, y, displacement, increment, jacobian, increment_jacobian);
+    double y[lagrange_top_DIM], delta[lagrange_top_DIM], displacement[lagrange_top_DIM],
+        increment[lagrange_top_DIM];
+    double jacobian[lagrange_top_DIM * lagrange_top_DIM], increment_jacobian[lagrange_top_DIM
+        * lagrange_top_DIM], previous = HUGE_VAL;
+    if (!lagrange_top_predict(&s->history, y)) memcpy(y, s->x, sizeof y);
+    for (int iteration = 1; iteration <= lagrange_top_MAX_ITERATIONS; ++iteration) {
+        lagrange_top_linearise(s->coef, y, displacement, increment, jacobian, increment_jacobian);
         ++s->evaluations;
-        for (int i = 0; i < 6; ++i) delta[i] = ((y[i] - s->x[i]) + displacement[i]) - s->carry[i];
+        for (int i = 0; i < lagrange_top_DIM; ++i) delta[i] = ((y[i] - s->x[i]) + displacement[i])
+            - s->carry[i];
         const int regular = lagrange_top_solve(jacobian, delta);
-        const double size = lagrange_top_size(y, delta);
+        const double size = lagrange_top_size(y, delta), growth = size / (previous * previous);
         if (!isfinite(size)) return lagrange_top_NOT_FINITE;
         if (!regular) return lagrange_top_SINGULAR;
-        for (int i = 0; i < 6; ++i) y[i] -= delta[i];
-        const double growth = size / (previous * previous);
+        for (int i = 0; i < lagrange_top_DIM; ++i) y[i] -= delta[i];
         const double remaining = size * size * (growth > 1.0 ? growth : 1.0);
-        /* The second test: corrections no longer shrink, the solve has reached the level of rounding. */
-        if (remaining <= 1e-20 || (previous < 1e-8 && size > 0.25 * previous)) {
-            double correction[6] = { 0.0 };
-            for (int i = 0; i < 6; ++i)
-                for (int j = 0; j < 6; ++j) correction[i] -= increment_jacobian[i * 6 + j] * delta[j];
-            if (!lagrange_top_plausible(s, stage, increment)) return lagrange_top_NO_CONVERGENCE;
-            if (!lagrange_top_advance(s, increment, correction)) return lagrange_top_NOT_FINITE;
-            lagrange_top_remember(memory, y, iteration + 1);
-            return lagrange_top_OK;
-        }
+        const int stalled = previous < lagrange_top_NEARLY_SOLVED && size > lagrange_top_SHRINKING * previous;
         previous = size;
+        if (!(remaining <= lagrange_top_TOLERANCE || stalled)) continue;
+        double correction[lagrange_top_DIM] = { 0.0 };
+        for (int i = 0; i < lagrange_top_DIM; ++i)
+            for (int j = 0; j < lagrange_top_DIM; ++j)
+                correction[i] -= increment_jacobian[i * lagrange_top_DIM + j] * delta[j];
+        if (!lagrange_top_plausible(s, increment)) return lagrange_top_NO_CONVERGENCE;
+        if (!lagrange_top_advance(s, increment, correction)) return lagrange_top_NOT_FINITE;
+        lagrange_top_remember(&s->history, y);
+        return lagrange_top_OK;
     }
     return lagrange_top_NO_CONVERGENCE;
 }
 
-/* The 1 stages of one step. If one fails, the state is as before the step. */
-static lagrange_top_status lagrange_top_stages(lagrange_top_solver *s)
-{
-    double x[6], carry[6];
-    memcpy(x, s->x, sizeof x);
-    memcpy(carry, s->carry, sizeof carry);
-    for (int stage = 0; stage < 1; ++stage) {
-        lagrange_top_status status = lagrange_top_attempt(s, stage);
-        /* A guess from earlier steps may have misled it: once more without. */
-        if (status != lagrange_top_OK && s->memory[stage].count > 0) {
-            memset(&s->memory[stage], 0, sizeof s->memory[stage]);
-            status = lagrange_top_attempt(s, stage);
-        }
-        if (status != lagrange_top_OK) {
-            memcpy(s->x, x, sizeof x);
-            memcpy(s->carry, carry, sizeof carry);
-            return status;
-        }
-    }
-    return lagrange_top_OK;
-}
-
-/* Whether steps can be made with these parameters: finite, positive where the spec says so, and with finite
-   coefficients for a step so short that it has no part in it. */
+/* ---- The solver ---- */
+/* Whether steps can be made with these parameters: allowed, and with finite coefficients for a step so short
+   that it has no part in it. */
 static int lagrange_top_admissible(const lagrange_top_params *params)
 {
-    double coef[8];
-    if (!(isfinite(params->I1) && params->I1 > 0.0)) return 0;
-    if (!(isfinite(params->I3) && params->I3 > 0.0)) return 0;
-    if (!(isfinite(params->mgl))) return 0;
+    double coef[lagrange_top_COEFFICIENTS];
+    if (!lagrange_top_allowed(params)) return 0;
     lagrange_top_prepare(params, 1e-100, coef);
-    for (int k = 0; k < 8; ++k)
+    for (int k = 0; k < lagrange_top_COEFFICIENTS; ++k)
         if (!isfinite(coef[k])) return 0;
     return 1;
 }
 
-/* All of lagrange_top_init but the gauge. The arguments may be parts of *s: they are read before it is written. */
-static lagrange_top_status lagrange_top_start(lagrange_top_solver *s, const lagrange_top_params *params, const double x0[6])
+/* The arguments may be parts of *s: they are read before it is written. */
+lagrange_top_status lagrange_top_init(lagrange_top_solver *s, const lagrange_top_params *params,
+    const double x0[lagrange_top_DIM])
 {
     if (s == NULL || x0 == NULL) return lagrange_top_BAD_ARGUMENT;
     const lagrange_top_params own = params != NULL ? *params : lagrange_top_default_params;
-    double x[6];
+    double x[lagrange_top_DIM];
     memcpy(x, x0, sizeof x);
-    for (int i = 0; i < 6; ++i)
+    for (int i = 0; i < lagrange_top_DIM; ++i)
         if (!isfinite(x[i])) return lagrange_top_BAD_ARGUMENT;
     if (!lagrange_top_admissible(&own)) return lagrange_top_BAD_ARGUMENT;
     memset(s, 0, sizeof *s);
@@ -969,1416 +767,83 @@ static lagrange_top_status lagrange_top_start(lagrange_top_solver *s, const lagr
     return lagrange_top_OK;
 }
 
-lagrange_top_status lagrange_top_init(lagrange_top_solver *s, const lagrange_top_params *params,
-                                      const double x0[6])
-{
-    return lagrange_top_start(s, params, x0);
-}
-
 /* What depends on the step size; nothing where that is as before. */
 static lagrange_top_status lagrange_top_set_step(lagrange_top_solver *s, double h)
 {
     if (s == NULL || !isfinite(h)) return lagrange_top_BAD_ARGUMENT;
-    if (s->ready && memcmp(&h, &s->h, sizeof h) == 0) return lagrange_top_OK;
-    for (int stage = 0; stage < 1; ++stage)
-        lagrange_top_prepare(&s->params, lagrange_top_fractions[stage] * h, s->coef[stage]);
-    memset(s->memory, 0, sizeof s->memory);
-    for (int stage = 0; stage < 1; ++stage) s->memory[stage].patience = 150;
-    s->pause = 16;
-    s->setback = s->foreseeing = 0;
-    s->doubt = s->retry = 0;
-    s->effort = 0.0;
-    s->passes = INT_MAX;
+    if (s->prepared && memcmp(&h, &s->h, sizeof h) == 0) return lagrange_top_OK;
+    lagrange_top_prepare(&s->params, h, s->coef);
+    memset(&s->history, 0, sizeof s->history);
     s->h = h;
-    s->ready = 1;
+    s->t_before_h = s->t;
+    s->steps_before_h = s->steps;
+    s->prepared = 1;
     return lagrange_top_OK;
+}
+
+/* One stage. A guess from earlier steps may have misled it: then once more without. */
+static lagrange_top_status lagrange_top_stage(lagrange_top_solver *s)
+{
+    lagrange_top_status status = lagrange_top_attempt(s);
+    if (status != lagrange_top_OK && s->history.count > 0) {
+        memset(&s->history, 0, sizeof s->history);
+        status = lagrange_top_attempt(s);
+    }
+    return status;
 }
 
 lagrange_top_status lagrange_top_step(lagrange_top_solver *s, double h)
 {
     lagrange_top_status status = lagrange_top_set_step(s, h);
     if (status != lagrange_top_OK) return status;
-    status = lagrange_top_stages(s);
-    if (status == lagrange_top_OK) ++s->steps;
+    status = lagrange_top_stage(s);
+    if (status != lagrange_top_OK) return status;
+    ++s->steps;
+    s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
     return status;
 }
 
-/*
- * Eight at a time: below, the formulas of a step are evaluated for 8 steps of a trajectory, or members of an
- * ensemble, at once. Compilers make vector instructions of the loops over lanes.
- */
-enum { lagrange_top_LANES = 8 };
-
-#if defined(__GNUC__)
-typedef double lagrange_top_lanes[lagrange_top_LANES] __attribute__((aligned(64))); /* a value in each lane */
-#else
-typedef double lagrange_top_lanes[lagrange_top_LANES];
-#endif
-
-#if defined(__clang__)
-#define lagrange_top_EACH_LANE _Pragma("clang loop vectorize(assume_safety)")
-#pragma clang diagnostic push
-#pragma clang diagnostic ignored "-Wpass-failed"
-#elif defined(__GNUC__)
-#define lagrange_top_EACH_LANE _Pragma("GCC ivdep") _Pragma("GCC unroll 1")
-#else
-#define lagrange_top_EACH_LANE
-#endif
-
-/* What all blocks share: coefficients, the same in each lane, and the recurrences by which they are foreseen. */
-typedef struct {
-    int fits[1]; /* the fit that weight is of; -1 for none */
-    lagrange_top_lanes coef[1][8], weight[1][40][6];
-} lagrange_top_table;
-
-/* A stage in all lanes, linearised around y. */
-typedef struct {
-    lagrange_top_lanes y[6], displacement[6], increment[6], residual[6];
-    /* a residual r of alpha(y) = x takes inverse r from y, and gain r from the increment */
-    lagrange_top_lanes inverse[36], slope[36], gain[36];
-} lagrange_top_model;
-
-/* lagrange_top_phi0 for the loops over lanes: no branches. No number beyond |s| = 4.0. */
-static inline double lagrange_top_phi0_lane(double s)
-{
-    const double ss = s * s;
-    double sum = 1.455172475614865e-27, other = 5.744790668872202e-26; /* every second term each, as neither then is waited for */
-    sum = sum * ss + 2.267952452337683e-24;
-    other = other * ss + 8.953517427037546e-23;
-    sum = sum * ss + 3.534707039629467e-21;
-    other = other * ss + 1.3954464685812522e-19;
-    sum = sum * ss + 5.5090028283602295e-18;
-    other = other * ss + 2.174868698558062e-16;
-    sum = sum * ss + 8.586062056277845e-15;
-    other = other * ss + 3.3896802963225827e-13;
-    sum = sum * ss + 1.3382536530684679e-11;
-    other = other * ss + 5.284190138687493e-10;
-    sum = sum * ss + 2.08767569878681e-08;
-    other = other * ss + 8.267195767195768e-07;
-    sum = sum * ss + 3.306878306878307e-05;
-    other = other * ss + 0.001388888888888889;
-    sum = (sum * s + other) * s + 0.08333333333333333;
-    return sum + (fabs(s) <= 4.0 ? 0.0 : (double)NAN);
-}
-
-/* lagrange_top_phi1 for the loops over lanes: no branches. No number beyond |s| = 4.0. */
-static inline double lagrange_top_phi1_lane(double s)
-{
-    const double ss = s * s;
-    double sum = 6.266191399131027e-28, other = 2.328275960983784e-26; /* every second term each, as neither then is waited for */
-    sum = sum * ss + 8.617186003308303e-25;
-    other = other * ss + 3.1751334332727565e-23;
-    sum = sum * ss + 1.163957265514881e-21;
-    other = other * ss + 4.241648447555361e-20;
-    sum = sum * ss + 1.5349911154393775e-18;
-    other = other * ss + 5.5090028283602297e-17;
-    sum = sum * ss + 1.9573818287022555e-15;
-    other = other * ss + 6.868849645022276e-14;
-    sum = sum * ss + 2.372776207425808e-12;
-    other = other * ss + 8.029521918410807e-11;
-    sum = sum * ss + 2.6420950693437467e-09;
-    other = other * ss + 8.35070279514724e-08;
-    sum = sum * ss + 2.48015873015873e-06;
-    other = other * ss + 6.613756613756614e-05;
-    sum = (sum * s + other) * s + 0.001388888888888889;
-    return sum + (fabs(s) <= 4.0 ? 0.0 : (double)NAN);
-}
-
-/* lagrange_top_phi2 for the loops over lanes: no branches. No number beyond |s| = 4.0. */
-static inline double lagrange_top_phi2_lane(double s)
-{
-    const double ss = s * s;
-    double sum = 2.8570406826710835e-28, other = 1.0025906238609643e-26; /* every second term each, as neither then is waited for */
-    sum = sum * ss + 3.492413941475676e-25;
-    other = other * ss + 1.2064060404631625e-23;
-    sum = sum * ss + 4.127673463254583e-22;
-    other = other * ss + 1.3967487186178574e-20;
-    sum = sum * ss + 4.665813292310897e-19;
-    other = other * ss + 1.5349911154393774e-17;
-    sum = sum * ss + 4.958102545524207e-16;
-    other = other * ss + 1.5659054629618044e-14;
-    sum = sum * ss + 4.808194751515593e-13;
-    other = other * ss + 1.4236657244554848e-11;
-    sum = sum * ss + 4.0147609592054037e-10;
-    other = other * ss + 1.0568380277374987e-08;
-    sum = sum * ss + 2.505210838544172e-07;
-    other = other * ss + 4.96031746031746e-06;
-    sum = (sum * s + other) * s + 6.613756613756614e-05;
-    return sum + (fabs(s) <= 4.0 ? 0.0 : (double)NAN);
-}
-
-/* lagrange_top_linearise_lanes_part1 (part 1 of 2) */
-lagrange_top_APART static void lagrange_top_linearise_lanes_part1(lagrange_top_lanes coef[restrict 8],
-                                                                  lagrange_top_lanes y[restrict 6],
-                                                                  lagrange_top_lanes displacement[restrict 6],
-                                                                  lagrange_top_lanes increment[restrict 6],
-                                                                  lagrange_top_lanes jacobian[restrict 36],
-                                                                  lagrange_top_lanes increment_jacobian[restrict 36],
-                                                                  lagrange_top_lanes work[restrict 113])
-{
-    lagrange_top_EACH_LANE
-    for (int lane = 0; lane < lagrange_top_LANES; ++lane) {
-        const double P1 = y[0][lane];
-        const double P2 = y[1][lane];
-        const double P3 = y[2][lane];
-        const double G1 = y[3][lane];
-        const double G2 = y[4][lane];
-        const double G3 = y[5][lane];
-        work[1][lane] = coef[2][lane] * (P2 * P2) + (coef[3][lane] + coef[2][lane] * (P1 * P1));
-        work[12][lane] = coef[0][lane] * (G1 * P1) + coef[0][lane] * (G2 * P2) + P3 * work[1][lane];
-        const double t2 = work[12][lane] * work[12][lane];
-        work[63][lane] = coef[1][lane] + coef[2][lane] * (P3 * P3);
-        work[112][lane] = P1 * work[63][lane];
-        work[10][lane] = coef[0][lane] * (G1 * P3) + work[112][lane];
-        const double t5 = work[10][lane] * work[10][lane];
-        work[111][lane] = P2 * work[63][lane];
-        work[3][lane] = coef[0][lane] * (G2 * P3) + work[111][lane];
-        const double t7 = work[3][lane] * work[3][lane];
-        work[27][lane] = t5 + t7;
-        work[22][lane] = t2 + work[27][lane];
-        work[18][lane] = lagrange_top_phi0_lane(work[22][lane]);
-        const double t11 = G3 * work[10][lane];
-        const double t12 = G1 * work[12][lane];
-        const double t13 = t11 - t12;
-        const double t14 = G2 * coef[4][lane];
-        const double t15 = P2 * P3;
-        work[11][lane] = t14 + coef[0][lane] * t15;
-        const double t16 = G1 * work[3][lane];
-        const double t17 = G2 * work[10][lane];
-        const double t18 = t16 - t17;
-        const double t19 = G1 * coef[4][lane];
-        const double t20 = P1 * P3;
-        work[13][lane] = t19 + coef[0][lane] * t20;
-        const double t21 = G3 * work[13][lane];
-        const double t22 = G1 * coef[5][lane];
-        const double t23 = P3 * work[10][lane];
-        const double t24 = P1 * work[12][lane];
-        const double t25 = t21 - t22 + (t23 - t24);
-        const double t26 = G1 * work[11][lane];
-        const double t27 = G2 * work[13][lane];
-        const double t28 = P1 * work[3][lane];
-        const double t29 = P2 * work[10][lane];
-        const double t30 = t26 - t27 + (t28 - t29);
-        const double t31 = coef[5][lane] * t13 - work[11][lane] * t18 + (work[12][lane] * t25 - work[3][lane] * t30);
-        work[19][lane] = lagrange_top_phi1_lane(work[22][lane]);
-        const double t33 = G2 * work[12][lane];
-        const double t34 = G3 * work[3][lane];
-        const double t35 = t33 - t34;
-        work[67][lane] = work[3][lane] * t35;
-        work[66][lane] = work[10][lane] * t13;
-        work[69][lane] = work[67][lane] - work[66][lane];
-        work[81][lane] = work[10][lane] * work[69][lane];
-        work[97][lane] = work[12][lane] * t13 - work[3][lane] * t18;
-        work[80][lane] = work[12][lane] * work[97][lane];
-        work[101][lane] = work[81][lane] - work[80][lane];
-        work[104][lane] = work[3][lane] * work[97][lane];
-        const double t44 = work[10][lane] * t18;
-        const double t45 = work[12][lane] * t35;
-        work[52][lane] = t44 - t45;
-        work[108][lane] = work[10][lane] * work[52][lane];
-        work[49][lane] = work[104][lane] - work[108][lane];
-        const double t49 = G2 * coef[5][lane];
-        const double t50 = G3 * work[11][lane];
-        const double t51 = P2 * work[12][lane];
-        const double t52 = P3 * work[3][lane];
-        const double t53 = t49 - t50 + (t51 - t52);
-        work[72][lane] = work[11][lane] * t35 - work[13][lane] * t13 + (work[3][lane] * t53 - work[10][lane] * t25);
-        work[86][lane] = work[10][lane] * work[72][lane];
-        const double t56 = work[12][lane] * t31;
-        work[88][lane] = work[13][lane] * work[69][lane] - coef[5][lane] * work[97][lane] + (work[86][lane] - t56);
-        const double t58 = work[3][lane] * t31;
-        work[46][lane] = work[13][lane] * t18 - coef[5][lane] * t35 + (work[10][lane] * t30 - work[12][lane] * t53);
-        work[41][lane] = work[10][lane] * work[46][lane];
-        work[43][lane] = work[11][lane] * work[97][lane] - work[13][lane] * work[52][lane] + (t58 - work[41][lane]);
-        const double t62 = work[22][lane] * t31 + (coef[5][lane] * work[101][lane] - work[11][lane] * work[49][lane] + (work[12][lane] * work[88][lane] - work[3][lane] * work[43][lane]));
-        work[106][lane] = work[12][lane] * work[52][lane];
-        work[110][lane] = work[3][lane] * work[69][lane];
-        work[91][lane] = work[106][lane] - work[110][lane];
-        work[57][lane] = work[12][lane] * work[46][lane];
-        work[93][lane] = work[3][lane] * work[72][lane];
-        work[60][lane] = coef[5][lane] * work[52][lane] - work[11][lane] * work[69][lane] + (work[57][lane] - work[93][lane]);
-        work[40][lane] = work[22][lane] * work[46][lane] + (work[13][lane] * work[49][lane] - coef[5][lane] * work[91][lane] + (work[10][lane] * work[43][lane] - work[12][lane] * work[60][lane]));
-        work[85][lane] = work[22][lane] * work[72][lane] + (work[11][lane] * work[91][lane] - work[13][lane] * work[101][lane] + (work[3][lane] * work[60][lane] - work[10][lane] * work[88][lane]));
-        work[99][lane] = work[22][lane] * work[97][lane] + (work[12][lane] * work[101][lane] - work[3][lane] * work[49][lane]);
-        work[107][lane] = work[22][lane] * work[52][lane] + (work[10][lane] * work[49][lane] - work[12][lane] * work[91][lane]);
-        work[109][lane] = work[22][lane] * work[69][lane] + (work[3][lane] * work[91][lane] - work[10][lane] * work[101][lane]);
-        const double t74 = G3 * coef[5][lane];
-        const double t75 = G2 * work[11][lane];
-        const double t76 = P2 * work[3][lane];
-        const double t77 = P3 * work[12][lane];
-        const double t78 = t74 + t75 + (t76 + t77);
-        work[45][lane] = work[10][lane] * work[19][lane];
-        work[36][lane] = t11 + t13;
-        const double t81 = G2 * work[3][lane];
-        const double t82 = G3 * work[12][lane];
-        const double t83 = t81 + t82;
-        const double t84 = work[12][lane] * t83;
-        work[87][lane] = work[69][lane] - work[10][lane] * work[36][lane] - t84;
-        const double t86 = work[3][lane] * t83;
-        work[35][lane] = t18 - t17;
-        const double t88 = work[10][lane] * work[35][lane];
-        work[42][lane] = t86 - (t88 + work[52][lane]);
-        work[38][lane] = t21 + (t23 + t25);
-        work[89][lane] = work[72][lane] - work[10][lane] * work[38][lane] - work[12][lane] * t78 - (coef[5][lane] * t83 + work[13][lane] * work[36][lane]);
-        work[37][lane] = t30 - t29 - t27;
-        work[44][lane] = work[11][lane] * t83 - work[13][lane] * work[35][lane] + (work[3][lane] * t78 - (work[10][lane] * work[37][lane] + work[46][lane]));
-        const double t94 = lagrange_top_phi2_lane(work[22][lane]);
-        work[39][lane] = work[10][lane] * t94;
-        const double t96 = work[19][lane] * (work[22][lane] * t78 + 2.0 * (work[10][lane] * t31) + (coef[5][lane] * work[87][lane] - work[11][lane] * work[42][lane] + (work[12][lane] * work[89][lane] - work[3][lane] * work[44][lane]))) + 2.0 * (work[39][lane] * t62);
-        work[8][lane] = t78 * work[18][lane] + 2.0 * (work[45][lane] * t31) - t96;
-        work[17][lane] = P3 * coef[0][lane];
-        work[96][lane] = t83 * work[18][lane];
-        work[98][lane] = work[22][lane] * t83;
-        work[48][lane] = t12 - t11 - t11;
-        work[82][lane] = work[69][lane] + (work[10][lane] * work[48][lane] - t84);
-        work[50][lane] = t86 - t88 + (t45 - t44);
-        work[5][lane] = work[96][lane] - work[19][lane] * (work[98][lane] + (work[12][lane] * work[82][lane] - work[3][lane] * work[50][lane]));
-        work[7][lane] = G1 * coef[0][lane] + coef[6][lane] * t20;
-        const double t106 = t25 - t24 - t22;
-        work[62][lane] = work[12][lane] * work[19][lane];
-        work[61][lane] = work[12][lane] * t94;
-        const double t109 = G1 * work[10][lane];
-        work[54][lane] = t81 + t109;
-        work[100][lane] = t13 - t12;
-        work[83][lane] = work[10][lane] * work[54][lane] - (work[12][lane] * work[100][lane] + work[97][lane]);
-        work[53][lane] = t33 + t35;
-        work[58][lane] = work[3][lane] * work[100][lane] + work[10][lane] * work[53][lane];
-        const double t115 = G1 * work[13][lane];
-        const double t116 = P1 * work[10][lane];
-        work[56][lane] = t75 + t115 + (t76 + t116);
-        work[84][lane] = work[13][lane] * work[54][lane] - coef[5][lane] * work[100][lane] + (work[10][lane] * work[56][lane] - (work[12][lane] * t106 + t31));
-        work[55][lane] = t49 + (t51 + t53);
-        work[59][lane] = work[11][lane] * work[100][lane] + work[13][lane] * work[53][lane] + (work[10][lane] * work[55][lane] + work[3][lane] * t106);
-        const double t121 = 2.0 * (work[61][lane] * t62) + work[19][lane] * (work[22][lane] * t106 + 2.0 * t56 + (coef[5][lane] * work[83][lane] - work[11][lane] * work[58][lane] + (work[88][lane] + work[12][lane] * work[84][lane] - work[3][lane] * work[59][lane])));
-        work[90][lane] = 0.5 * P2;
-        work[6][lane] = work[18][lane] * t106 + 2.0 * (work[62][lane] * t31) - t121 - work[90][lane];
-        work[15][lane] = t7 + t2;
-        work[16][lane] = work[10][lane] * work[12][lane];
-        work[20][lane] = work[10][lane] * work[16][lane] + work[12][lane] * work[15][lane];
-        work[14][lane] = work[3][lane] * work[10][lane];
-        work[21][lane] = work[10][lane] * work[14][lane] + work[3][lane] * work[15][lane];
-        work[102][lane] = work[15][lane] * work[18][lane] + work[19][lane] * (work[12][lane] * work[20][lane] + work[3][lane] * work[21][lane] - work[15][lane] * work[22][lane]);
-        work[33][lane] = work[14][lane] * work[18][lane];
-        work[34][lane] = work[14][lane] * work[22][lane];
-        work[23][lane] = work[3][lane] * work[12][lane];
-        const double t133 = work[10][lane] * work[23][lane];
-        work[30][lane] = work[14][lane] * work[12][lane];
-        work[25][lane] = t133 - work[30][lane];
-        work[24][lane] = t5 + t2;
-        work[26][lane] = work[3][lane] * work[14][lane] + work[10][lane] * work[24][lane];
-        work[32][lane] = 0.5 * work[12][lane];
-        work[105][lane] = work[33][lane] - work[19][lane] * (work[34][lane] + (work[12][lane] * work[25][lane] - work[3][lane] * work[26][lane])) - work[32][lane];
-        work[51][lane] = 0.5 * G3;
-        const double t141 = t17 - t16 - t16;
-        work[65][lane] = t35 - t34;
-        const double t143 = work[10][lane] * work[65][lane];
-        work[92][lane] = t143 - work[12][lane] * t141;
-        work[64][lane] = t109 + t82;
-        const double t146 = work[10][lane] * work[64][lane];
-        work[68][lane] = work[3][lane] * t141 - t146 + work[97][lane];
-        work[4][lane] = work[51][lane] + (t141 * work[18][lane] - work[19][lane] * (work[22][lane] * t141 + (work[108][lane] - work[104][lane] + (work[12][lane] * work[92][lane] - work[3][lane] * work[68][lane]))));
-        work[2][lane] = G2 * coef[0][lane] + coef[6][lane] * t15;
-        work[47][lane] = 0.5 * P3;
-        work[76][lane] = work[3][lane] * work[19][lane];
-        const double t152 = t26 + (t28 + t30);
-        work[75][lane] = work[3][lane] * t94;
-        work[103][lane] = t16 + t18;
-        work[94][lane] = work[12][lane] * work[103][lane] + t143;
-        work[73][lane] = work[97][lane] - work[3][lane] * work[103][lane] - t146;
-        work[71][lane] = t53 - t52 - t50;
-        work[95][lane] = coef[5][lane] * work[103][lane] + work[13][lane] * work[65][lane] + (work[12][lane] * t152 + work[10][lane] * work[71][lane]);
-        work[70][lane] = t74 + t115 + (t116 + t77);
-        work[74][lane] = t31 - work[3][lane] * t152 - work[10][lane] * work[70][lane] - (work[13][lane] * work[64][lane] + work[11][lane] * work[103][lane]);
-        const double t161 = 2.0 * (work[75][lane] * t62) + work[19][lane] * (2.0 * t58 - work[22][lane] * t152 + (coef[5][lane] * work[94][lane] - work[11][lane] * work[73][lane] + (work[12][lane] * work[95][lane] - (work[43][lane] + work[3][lane] * work[74][lane]))));
-        work[9][lane] = work[47][lane] + (2.0 * (work[76][lane] * t31) - work[18][lane] * t152 - t161);
-        work[79][lane] = 0.5 * work[3][lane];
-        work[77][lane] = work[16][lane] * work[18][lane];
-        work[78][lane] = work[16][lane] * work[22][lane];
-        work[31][lane] = work[3][lane] * work[16][lane];
-        work[28][lane] = work[31][lane] - t133;
-        work[29][lane] = work[10][lane] * work[27][lane] + work[12][lane] * work[16][lane];
-        work[0][lane] = work[79][lane] + (work[77][lane] - work[19][lane] * (work[78][lane] - (work[3][lane] * work[28][lane] + work[12][lane] * work[29][lane])));
-        increment_jacobian[17][lane] = 0.0;
-        increment_jacobian[35][lane] = 0.0;
-        increment_jacobian[30][lane] = -(G2 * work[63][lane]);
-        increment_jacobian[31][lane] = G1 * work[63][lane];
-        increment_jacobian[29][lane] = work[10][lane];
-        increment_jacobian[23][lane] = -work[3][lane];
-        increment[4][lane] = t13;
-        increment_jacobian[5][lane] = -work[11][lane];
-        increment[5][lane] = t18;
-        increment_jacobian[11][lane] = work[13][lane];
-        increment[1][lane] = t25;
-        increment[2][lane] = t30;
-        increment[3][lane] = t35;
-        increment[0][lane] = t53;
-        displacement[0][lane] = work[18][lane] * t31 - work[19][lane] * t62 - 0.5 * t53;
-        displacement[1][lane] = work[18][lane] * work[46][lane] - work[19][lane] * work[40][lane] - 0.5 * t25;
-        displacement[2][lane] = work[18][lane] * work[72][lane] - work[19][lane] * work[85][lane] - 0.5 * t30;
-        displacement[3][lane] = work[18][lane] * work[97][lane] - work[19][lane] * work[99][lane] - 0.5 * t35;
-        displacement[4][lane] = work[18][lane] * work[52][lane] - work[19][lane] * work[107][lane] - 0.5 * t13;
-        displacement[5][lane] = work[18][lane] * work[69][lane] - work[19][lane] * work[109][lane] - 0.5 * t18;
-        increment_jacobian[15][lane] = work[11][lane] - (t14 + P2 * work[17][lane]);
-        increment_jacobian[16][lane] = t19 + P1 * work[17][lane] - work[13][lane];
-        increment_jacobian[26][lane] = G3 * work[7][lane] - G1 * work[1][lane];
-        jacobian[0][lane] = 1.0 + (work[63][lane] * work[8][lane] + (work[17][lane] * work[5][lane] + work[7][lane] * work[6][lane]) - work[102][lane]);
-        increment_jacobian[20][lane] = G2 * work[1][lane] - G3 * work[2][lane];
-        jacobian[1][lane] = work[105][lane] + (work[17][lane] * work[4][lane] + (work[2][lane] * work[6][lane] + work[63][lane] * work[9][lane]));
-    }
-}
-
-/* lagrange_top_linearise_lanes_part2 (part 2 of 2) */
-lagrange_top_APART static void lagrange_top_linearise_lanes_part2(lagrange_top_lanes coef[restrict 8],
-                                                                  lagrange_top_lanes y[restrict 6],
-                                                                  lagrange_top_lanes displacement[restrict 6],
-                                                                  lagrange_top_lanes increment[restrict 6],
-                                                                  lagrange_top_lanes jacobian[restrict 36],
-                                                                  lagrange_top_lanes increment_jacobian[restrict 36],
-                                                                  lagrange_top_lanes work[restrict 113])
-{
-    (void)displacement;
-    (void)increment;
-    lagrange_top_EACH_LANE
-    for (int lane = 0; lane < lagrange_top_LANES; ++lane) {
-        const double P1 = y[0][lane];
-        const double P2 = y[1][lane];
-        const double P3 = y[2][lane];
-        const double G1 = y[3][lane];
-        const double G2 = y[4][lane];
-        const double G3 = y[5][lane];
-        const double t170 = P2 * coef[0][lane];
-        const double t171 = P1 * coef[0][lane];
-        const double t172 = work[11][lane] * work[3][lane];
-        const double t173 = coef[5][lane] * work[12][lane];
-        const double t174 = t172 + t173;
-        const double t175 = t174 + t174;
-        const double t176 = work[11][lane] * work[10][lane] + work[13][lane] * work[3][lane];
-        const double t177 = work[13][lane] * work[14][lane] + work[11][lane] * work[15][lane] + (work[10][lane] * t176 + work[3][lane] * t175);
-        const double t178 = coef[5][lane] * work[10][lane] + work[13][lane] * work[12][lane];
-        const double t179 = work[13][lane] * work[16][lane] + coef[5][lane] * work[15][lane] + (work[10][lane] * t178 + work[12][lane] * t175);
-        const double t180 = work[17][lane] * work[8][lane] + (coef[4][lane] * work[5][lane] + t171 * work[6][lane]) - (t175 * work[18][lane] + work[19][lane] * (coef[5][lane] * work[20][lane] + work[11][lane] * work[21][lane] + (work[3][lane] * t177 + work[12][lane] * t179) - work[22][lane] * t175));
-        const double t181 = t176 * work[18][lane];
-        const double t182 = t176 * work[22][lane];
-        const double t183 = work[13][lane] * work[23][lane];
-        const double t184 = coef[5][lane] * work[14][lane];
-        const double t185 = coef[5][lane] * work[3][lane] + work[11][lane] * work[12][lane];
-        const double t186 = work[10][lane] * t185;
-        const double t187 = work[12][lane] * t176;
-        const double t188 = t183 - t184 + (t186 - t187);
-        const double t189 = work[13][lane] * work[10][lane];
-        const double t190 = t189 + t173;
-        const double t191 = t190 + t190;
-        const double t192 = work[11][lane] * work[14][lane] + work[13][lane] * work[24][lane] + (work[3][lane] * t176 + work[10][lane] * t191);
-        const double t193 = t181 - work[19][lane] * (t182 + (coef[5][lane] * work[25][lane] - work[11][lane] * work[26][lane] + (work[12][lane] * t188 - work[3][lane] * t192))) - coef[7][lane] + (coef[4][lane] * work[4][lane] + (work[17][lane] * work[9][lane] + t170 * work[6][lane]));
-        const double t194 = 0.5 * work[11][lane];
-        const double t195 = t178 * work[18][lane];
-        const double t196 = t178 * work[22][lane];
-        const double t197 = t189 + t172;
-        const double t198 = t197 + t197;
-        const double t199 = work[13][lane] * work[27][lane] + coef[5][lane] * work[16][lane] + (work[10][lane] * t198 + work[12][lane] * t178);
-        const double t200 = work[11][lane] * work[16][lane];
-        const double t201 = work[3][lane] * t178;
-        const double t202 = t200 - t183 + (t201 - t186);
-        const double t203 = work[30][lane] - work[31][lane];
-        const double t204 = work[32][lane] + (work[33][lane] - work[19][lane] * (work[34][lane] - (work[12][lane] * t203 + work[10][lane] * work[21][lane])));
-        const double t205 = work[12][lane] * work[35][lane];
-        const double t206 = t205 + work[3][lane] * work[36][lane];
-        const double t207 = coef[5][lane] * work[35][lane] + work[11][lane] * work[36][lane] + (work[12][lane] * work[37][lane] + work[3][lane] * work[38][lane]);
-        const double t208 = 2.0 * (work[39][lane] * work[40][lane]) + work[19][lane] * (work[22][lane] * work[37][lane] + 2.0 * work[41][lane] + (work[13][lane] * work[42][lane] - coef[5][lane] * t206 + (work[43][lane] + work[10][lane] * work[44][lane] - work[12][lane] * t207)));
-        const double t209 = work[18][lane] * work[37][lane] + 2.0 * (work[45][lane] * work[46][lane]) - t208 - work[47][lane];
-        const double t210 = work[35][lane] * work[18][lane];
-        const double t211 = work[22][lane] * work[35][lane];
-        const double t212 = t205 - work[3][lane] * work[48][lane];
-        const double t213 = t210 - work[19][lane] * (t211 + (work[49][lane] + (work[10][lane] * work[50][lane] - work[12][lane] * t212))) - work[51][lane];
-        const double t214 = 0.5 * P1;
-        const double t215 = work[52][lane] - work[12][lane] * work[53][lane] - work[3][lane] * work[54][lane];
-        const double t216 = work[46][lane] - work[12][lane] * work[55][lane] - work[3][lane] * work[56][lane] - (work[11][lane] * work[54][lane] + coef[5][lane] * work[53][lane]);
-        const double t217 = work[19][lane] * (2.0 * work[57][lane] - work[22][lane] * work[55][lane] + (work[13][lane] * work[58][lane] - coef[5][lane] * t215 + (work[10][lane] * work[59][lane] - (work[60][lane] + work[12][lane] * t216)))) + 2.0 * (work[61][lane] * work[40][lane]);
-        const double t218 = t214 + (2.0 * (work[62][lane] * work[46][lane]) - work[18][lane] * work[55][lane] - t217);
-        const double t219 = work[64][lane] * work[18][lane];
-        const double t220 = work[64][lane] * work[22][lane];
-        const double t221 = work[12][lane] * work[64][lane];
-        const double t222 = work[3][lane] * work[65][lane];
-        const double t223 = work[66][lane] - work[67][lane] + (t221 - t222);
-        const double t224 = t219 - work[19][lane] * (t220 + (work[10][lane] * work[68][lane] - work[12][lane] * t223));
-        const double t225 = t221 - (work[69][lane] + t222);
-        const double t226 = coef[5][lane] * work[64][lane] - work[11][lane] * work[65][lane] + (work[12][lane] * work[70][lane] - (work[3][lane] * work[71][lane] + work[72][lane]));
-        const double t227 = work[19][lane] * (work[22][lane] * work[70][lane] + 2.0 * (work[3][lane] * work[46][lane]) + (work[13][lane] * work[73][lane] - coef[5][lane] * t225 + (work[10][lane] * work[74][lane] - work[12][lane] * t226))) + 2.0 * (work[75][lane] * work[40][lane]);
-        const double t228 = work[70][lane] * work[18][lane] + 2.0 * (work[76][lane] * work[46][lane]) - t227;
-        const double t229 = work[3][lane] * work[23][lane] + work[12][lane] * work[24][lane];
-        const double t230 = work[24][lane] * work[18][lane] + work[19][lane] * (work[10][lane] * work[26][lane] + work[12][lane] * t229 - work[24][lane] * work[22][lane]);
-        const double t231 = work[23][lane] * work[18][lane];
-        const double t232 = work[23][lane] * work[22][lane];
-        const double t233 = work[12][lane] * work[23][lane] + work[3][lane] * work[27][lane];
-        const double t234 = 0.5 * work[10][lane];
-        const double t235 = t231 - work[19][lane] * (t232 + (work[10][lane] * work[28][lane] - work[12][lane] * t233)) - t234;
-        const double t236 = t184 - t200 + (t187 - t201);
-        const double t237 = coef[7][lane] + (t181 - work[19][lane] * (t182 - (coef[5][lane] * t203 + work[13][lane] * work[21][lane] + (work[12][lane] * t236 + work[10][lane] * t177)))) + (work[17][lane] * t209 + (coef[4][lane] * t213 + t171 * t218));
-        const double t238 = work[11][lane] * work[23][lane] + coef[5][lane] * work[24][lane] + (work[3][lane] * t185 + work[12][lane] * t191);
-        const double t239 = coef[4][lane] * t224 + (work[17][lane] * t228 + t170 * t218) - (t191 * work[18][lane] + work[19][lane] * (work[13][lane] * work[26][lane] + coef[5][lane] * t229 + (work[10][lane] * t192 + work[12][lane] * t238) - work[22][lane] * t191));
-        const double t240 = t185 * work[18][lane];
-        const double t241 = work[22][lane] * t185;
-        const double t242 = coef[5][lane] * work[23][lane] + work[11][lane] * work[27][lane] + (work[12][lane] * t185 + work[3][lane] * t198);
-        const double t243 = 0.5 * work[13][lane];
-        const double t244 = work[77][lane] - work[19][lane] * (work[78][lane] + (work[3][lane] * t203 - work[10][lane] * work[20][lane])) - work[79][lane];
-        const double t245 = 0.5 * G2;
-        const double t246 = t245 + (work[48][lane] * work[18][lane] - work[19][lane] * (work[22][lane] * work[48][lane] + (work[80][lane] - work[81][lane] + (work[3][lane] * t212 - work[10][lane] * work[82][lane]))));
-        const double t247 = work[19][lane] * (work[22][lane] * work[56][lane] + 2.0 * (work[12][lane] * work[72][lane]) + (work[11][lane] * t215 - work[13][lane] * work[83][lane] + (work[3][lane] * t216 - work[10][lane] * work[84][lane]))) + 2.0 * (work[61][lane] * work[85][lane]);
-        const double t248 = work[56][lane] * work[18][lane] + 2.0 * (work[62][lane] * work[72][lane]) - t247;
-        const double t249 = work[19][lane] * (2.0 * work[86][lane] - work[22][lane] * work[38][lane] + (work[11][lane] * t206 - work[13][lane] * work[87][lane] + (work[3][lane] * t207 - (work[88][lane] + work[10][lane] * work[89][lane])))) + 2.0 * (work[39][lane] * work[85][lane]);
-        const double t250 = work[90][lane] + (2.0 * (work[45][lane] * work[72][lane]) - work[18][lane] * work[38][lane] - t249);
-        const double t251 = t234 + (t231 - work[19][lane] * (t232 - (work[10][lane] * work[25][lane] + work[3][lane] * t229)));
-        const double t252 = work[65][lane] * work[18][lane];
-        const double t253 = work[22][lane] * work[65][lane];
-        const double t254 = 0.5 * G1;
-        const double t255 = t252 - work[19][lane] * (t253 + (work[91][lane] + (work[3][lane] * t223 - work[10][lane] * work[92][lane]))) - t254;
-        const double t256 = work[19][lane] * (work[22][lane] * work[71][lane] + 2.0 * work[93][lane] + (work[11][lane] * t225 - work[13][lane] * work[94][lane] + (work[60][lane] + work[3][lane] * t226 - work[10][lane] * work[95][lane]))) + 2.0 * (work[75][lane] * work[85][lane]);
-        const double t257 = work[18][lane] * work[71][lane] + 2.0 * (work[76][lane] * work[72][lane]) - t256 - t214;
-        const double t258 = work[27][lane] * work[18][lane] + work[19][lane] * (work[3][lane] * t233 + work[10][lane] * work[29][lane] - work[27][lane] * work[22][lane]);
-        const double t259 = t195 - work[19][lane] * (t196 + (work[11][lane] * t203 - work[13][lane] * work[20][lane] + (work[3][lane] * t236 - work[10][lane] * t179))) - t194 + (coef[4][lane] * t246 + t171 * t248 + work[17][lane] * t250);
-        const double t260 = t243 + (t240 - work[19][lane] * (t241 - (work[13][lane] * work[25][lane] + work[11][lane] * t229 + (work[10][lane] * t188 + work[3][lane] * t238)))) + (coef[4][lane] * t255 + (t170 * t248 + work[17][lane] * t257));
-        const double t261 = work[96][lane] + 2.0 * (work[45][lane] * work[97][lane]) - (work[19][lane] * (work[98][lane] + 2.0 * (work[10][lane] * work[97][lane]) + (work[12][lane] * work[87][lane] - work[3][lane] * work[42][lane])) + 2.0 * (work[39][lane] * work[99][lane]));
-        const double t262 = work[100][lane] * work[18][lane] + 2.0 * (work[62][lane] * work[97][lane]) - (2.0 * (work[61][lane] * work[99][lane]) + work[19][lane] * (work[22][lane] * work[100][lane] + 2.0 * work[80][lane] + (work[101][lane] + work[12][lane] * work[83][lane] - work[3][lane] * work[58][lane])));
-        const double t263 = t262 - t245;
-        const double t264 = 2.0 * (work[76][lane] * work[97][lane]) - work[103][lane] * work[18][lane] - (2.0 * (work[75][lane] * work[99][lane]) + work[19][lane] * (2.0 * work[104][lane] - work[103][lane] * work[22][lane] + (work[12][lane] * work[94][lane] - (work[49][lane] + work[3][lane] * work[73][lane]))));
-        const double t265 = work[51][lane] + t264;
-        const double t266 = 2.0 * (work[62][lane] * work[52][lane]) - work[53][lane] * work[18][lane] - (work[19][lane] * (2.0 * work[106][lane] - work[22][lane] * work[53][lane] + (work[10][lane] * work[58][lane] - (work[91][lane] + work[12][lane] * t215))) + 2.0 * (work[61][lane] * work[107][lane]));
-        const double t267 = t254 + t266;
-        const double t268 = t210 + 2.0 * (work[45][lane] * work[52][lane]) - (2.0 * (work[39][lane] * work[107][lane]) + work[19][lane] * (t211 + 2.0 * work[108][lane] + (work[49][lane] + work[10][lane] * work[42][lane] - work[12][lane] * t206)));
-        const double t269 = t268 - work[51][lane];
-        const double t270 = t219 + 2.0 * (work[76][lane] * work[52][lane]) - (work[19][lane] * (t220 + 2.0 * (work[3][lane] * work[52][lane]) + (work[10][lane] * work[73][lane] - work[12][lane] * t225)) + 2.0 * (work[75][lane] * work[107][lane]));
-        const double t271 = work[54][lane] * work[18][lane] + 2.0 * (work[62][lane] * work[69][lane]) - (work[19][lane] * (work[54][lane] * work[22][lane] + 2.0 * (work[12][lane] * work[69][lane]) + (work[3][lane] * t215 - work[10][lane] * work[83][lane])) + 2.0 * (work[61][lane] * work[109][lane]));
-        const double t272 = 2.0 * (work[45][lane] * work[69][lane]) - work[36][lane] * work[18][lane] - (2.0 * (work[39][lane] * work[109][lane]) + work[19][lane] * (2.0 * work[81][lane] - work[22][lane] * work[36][lane] + (work[3][lane] * t206 - (work[101][lane] + work[10][lane] * work[87][lane]))));
-        const double t273 = t245 + t272;
-        const double t274 = t252 + 2.0 * (work[69][lane] * work[76][lane]) - (work[19][lane] * (t253 + 2.0 * work[110][lane] + (work[91][lane] + work[3][lane] * t225 - work[10][lane] * work[94][lane])) + 2.0 * (work[75][lane] * work[109][lane]));
-        const double t275 = t274 - t254;
-        const double t276 = P2 * work[7][lane];
-        const double t277 = P3 * work[63][lane];
-        const double t278 = G3 * work[17][lane];
-        const double t279 = P3 * work[17][lane];
-        const double t280 = G3 * coef[4][lane];
-        const double t281 = P1 * work[2][lane];
-        const double t282 = G2 * work[17][lane];
-        const double t283 = G1 * work[17][lane];
-        const double t284 = G1 * t170;
-        const double t285 = G2 * t171;
-        const double t286 = G2 * work[7][lane];
-        const double t287 = G3 * work[63][lane];
-        const double t288 = G1 * work[2][lane];
-        jacobian[23][lane] = work[0][lane];
-        increment_jacobian[2][lane] = P2 * work[1][lane] - P3 * work[2][lane] - G3 * t170 - work[3][lane];
-        increment_jacobian[10][lane] = -(P1 * t170);
-        jacobian[2][lane] = work[0][lane] + (t170 * work[4][lane] + (t171 * work[5][lane] + work[1][lane] * work[6][lane] + (work[7][lane] * work[8][lane] + work[2][lane] * work[9][lane])));
-        increment_jacobian[3][lane] = P2 * t171;
-        increment_jacobian[8][lane] = work[10][lane] + (P3 * work[7][lane] + (G3 * t171 - P1 * work[1][lane]));
-        jacobian[3][lane] = t180;
-        jacobian[4][lane] = t193;
-        jacobian[5][lane] = t194 + (t195 - work[19][lane] * (t196 - (work[11][lane] * work[28][lane] + coef[5][lane] * work[29][lane] + (work[12][lane] * t199 + work[3][lane] * t202))));
-        jacobian[6][lane] = t204 + (work[63][lane] * t209 + (work[17][lane] * t213 + work[7][lane] * t218));
-        jacobian[7][lane] = 1.0 + (work[17][lane] * t224 + (work[63][lane] * t228 + work[2][lane] * t218) - t230);
-        jacobian[8][lane] = t235 + (t170 * t224 + (work[2][lane] * t228 + work[7][lane] * t209 + (t171 * t213 + work[1][lane] * t218)));
-        jacobian[29][lane] = t235;
-        jacobian[9][lane] = t237;
-        jacobian[10][lane] = t239;
-        jacobian[17][lane] = -(t198 * work[18][lane] + work[19][lane] * (work[13][lane] * work[29][lane] + work[11][lane] * t233 + (work[10][lane] * t199 + work[3][lane] * t242) - t198 * work[22][lane]));
-        jacobian[11][lane] = t240 - work[19][lane] * (t241 + (work[13][lane] * work[28][lane] - coef[5][lane] * t233 + (work[10][lane] * t202 - work[12][lane] * t242))) - t243;
-        jacobian[12][lane] = t244 + (work[17][lane] * t246 + work[7][lane] * t248 + work[63][lane] * t250);
-        jacobian[13][lane] = t251 + (work[17][lane] * t255 + (work[2][lane] * t248 + work[63][lane] * t257));
-        jacobian[14][lane] = 1.0 + (t170 * t255 + (t171 * t246 + work[1][lane] * t248 + (work[7][lane] * t250 + work[2][lane] * t257)) - t258);
-        jacobian[35][lane] = 1.0 - t258;
-        jacobian[15][lane] = t259;
-        jacobian[16][lane] = t260;
-        jacobian[18][lane] = work[63][lane] * t261 + work[7][lane] * t263;
-        jacobian[21][lane] = 1.0 + (work[17][lane] * t261 + t171 * t263 - work[102][lane]);
-        jacobian[19][lane] = work[2][lane] * t263 + work[63][lane] * t265;
-        jacobian[20][lane] = work[1][lane] * t263 + (work[7][lane] * t261 + work[2][lane] * t265);
-        jacobian[22][lane] = work[105][lane] + (work[17][lane] * t265 + t170 * t263);
-        jacobian[24][lane] = work[7][lane] * t267 + work[63][lane] * t269;
-        jacobian[27][lane] = t204 + (work[17][lane] * t269 + t171 * t267);
-        jacobian[25][lane] = work[63][lane] * t270 + work[2][lane] * t267;
-        jacobian[26][lane] = work[1][lane] * t267 + (work[2][lane] * t270 + work[7][lane] * t269);
-        jacobian[28][lane] = 1.0 + (work[17][lane] * t270 + t170 * t267 - t230);
-        jacobian[30][lane] = work[7][lane] * t271 + work[63][lane] * t273;
-        jacobian[33][lane] = t244 + (t171 * t271 + work[17][lane] * t273);
-        jacobian[31][lane] = work[2][lane] * t271 + work[63][lane] * t275;
-        jacobian[32][lane] = work[1][lane] * t271 + (work[2][lane] * t275 + work[7][lane] * t273);
-        jacobian[34][lane] = t251 + (t170 * t271 + work[17][lane] * t275);
-        increment_jacobian[0][lane] = t276;
-        increment_jacobian[1][lane] = work[12][lane] + (P2 * work[2][lane] - t277 - t278);
-        increment_jacobian[6][lane] = t277 + (t278 - P1 * work[7][lane]) - work[12][lane];
-        increment_jacobian[22][lane] = G2 * t170 - t278 + work[12][lane];
-        increment_jacobian[27][lane] = t278 - G1 * t171 - work[12][lane];
-        increment_jacobian[4][lane] = coef[5][lane] + (P2 * t170 - t279 - t280);
-        increment_jacobian[9][lane] = t279 + (t280 - P1 * t171) - coef[5][lane];
-        increment_jacobian[7][lane] = -t281;
-        increment_jacobian[12][lane] = work[3][lane] - (t282 + work[111][lane]);
-        increment_jacobian[33][lane] = work[3][lane] - t282;
-        increment_jacobian[13][lane] = t283 + work[112][lane] - work[10][lane];
-        increment_jacobian[34][lane] = t283 - work[10][lane];
-        increment_jacobian[28][lane] = -t284;
-        increment_jacobian[14][lane] = t284 + (t281 - t276 - t285);
-        increment_jacobian[21][lane] = t285;
-        increment_jacobian[18][lane] = t286;
-        increment_jacobian[19][lane] = G2 * work[2][lane] - t287;
-        increment_jacobian[24][lane] = t287 - G1 * work[7][lane];
-        increment_jacobian[25][lane] = -t288;
-        increment_jacobian[32][lane] = t288 - t286;
-    }
-}
-
-/* lagrange_top_linearise in all lanes. */
-static void lagrange_top_linearise_lanes(lagrange_top_lanes coef[restrict 8], lagrange_top_lanes y[restrict 6],
-                                         lagrange_top_lanes displacement[restrict 6],
-                                         lagrange_top_lanes increment[restrict 6],
-                                         lagrange_top_lanes jacobian[restrict 36],
-                                         lagrange_top_lanes increment_jacobian[restrict 36])
-{
-    lagrange_top_lanes work[113];
-    lagrange_top_linearise_lanes_part1(coef, y, displacement, increment, jacobian, increment_jacobian, work);
-    lagrange_top_linearise_lanes_part2(coef, y, displacement, increment, jacobian, increment_jacobian, work);
-}
-
-/* lagrange_top_evaluate in all lanes. */
-static void lagrange_top_evaluate_lanes(lagrange_top_lanes coef[restrict 8], lagrange_top_lanes y[restrict 6],
-                                        lagrange_top_lanes displacement[restrict 6],
-                                        lagrange_top_lanes increment[restrict 6])
-{
-    lagrange_top_EACH_LANE
-    for (int lane = 0; lane < lagrange_top_LANES; ++lane) {
-        const double P1 = y[0][lane];
-        const double P2 = y[1][lane];
-        const double P3 = y[2][lane];
-        const double G1 = y[3][lane];
-        const double G2 = y[4][lane];
-        const double G3 = y[5][lane];
-        const double p_P3 = coef[0][lane] * (G1 * P1) + coef[0][lane] * (G2 * P2) + P3 * (coef[2][lane] * (P2 * P2) + (coef[3][lane] + coef[2][lane] * (P1 * P1)));
-        const double t1 = coef[1][lane] + coef[2][lane] * (P3 * P3);
-        const double p_P1 = coef[0][lane] * (G1 * P3) + P1 * t1;
-        const double p_P2 = coef[0][lane] * (G2 * P3) + P2 * t1;
-        const double t2 = p_P3 * p_P3 + (p_P1 * p_P1 + p_P2 * p_P2);
-        const double t3 = lagrange_top_phi0_lane(t2);
-        const double t4 = G3 * p_P1 - G1 * p_P3;
-        const double p_G2 = G2 * coef[4][lane] + coef[0][lane] * (P2 * P3);
-        const double t5 = G1 * p_P2 - G2 * p_P1;
-        const double p_G1 = G1 * coef[4][lane] + coef[0][lane] * (P1 * P3);
-        const double t6 = G3 * p_G1 - G1 * coef[5][lane] + (P3 * p_P1 - P1 * p_P3);
-        const double t7 = G1 * p_G2 - G2 * p_G1 + (P1 * p_P2 - P2 * p_P1);
-        const double t8 = coef[5][lane] * t4 - p_G2 * t5 + (p_P3 * t6 - p_P2 * t7);
-        const double t9 = lagrange_top_phi1_lane(t2);
-        const double t10 = G2 * p_P3 - G3 * p_P2;
-        const double t11 = p_P2 * t10 - p_P1 * t4;
-        const double t12 = p_P3 * t4 - p_P2 * t5;
-        const double t13 = p_P1 * t11 - p_P3 * t12;
-        const double t14 = p_P1 * t5 - p_P3 * t10;
-        const double t15 = p_P2 * t12 - p_P1 * t14;
-        const double t16 = G2 * coef[5][lane] - G3 * p_G2 + (P2 * p_P3 - P3 * p_P2);
-        const double t17 = p_G2 * t10 - p_G1 * t4 + (p_P2 * t16 - p_P1 * t6);
-        const double t18 = p_G1 * t11 - coef[5][lane] * t12 + (p_P1 * t17 - p_P3 * t8);
-        const double t19 = p_G1 * t5 - coef[5][lane] * t10 + (p_P1 * t7 - p_P3 * t16);
-        const double t20 = p_G2 * t12 - p_G1 * t14 + (p_P2 * t8 - p_P1 * t19);
-        const double t21 = p_P3 * t14 - p_P2 * t11;
-        const double t22 = coef[5][lane] * t14 - p_G2 * t11 + (p_P3 * t19 - p_P2 * t17);
-        displacement[0][lane] = t3 * t8 - t9 * (t2 * t8 + (coef[5][lane] * t13 - p_G2 * t15 + (p_P3 * t18 - p_P2 * t20))) - 0.5 * t16;
-        displacement[1][lane] = t3 * t19 - t9 * (t2 * t19 + (p_G1 * t15 - coef[5][lane] * t21 + (p_P1 * t20 - p_P3 * t22))) - 0.5 * t6;
-        displacement[2][lane] = t3 * t17 - t9 * (t2 * t17 + (p_G2 * t21 - p_G1 * t13 + (p_P2 * t22 - p_P1 * t18))) - 0.5 * t7;
-        displacement[3][lane] = t3 * t12 - t9 * (t2 * t12 + (p_P3 * t13 - p_P2 * t15)) - 0.5 * t10;
-        displacement[4][lane] = t3 * t14 - t9 * (t2 * t14 + (p_P1 * t15 - p_P3 * t21)) - 0.5 * t4;
-        displacement[5][lane] = t3 * t11 - t9 * (t2 * t11 + (p_P2 * t21 - p_P1 * t13)) - 0.5 * t5;
-        increment[0][lane] = t16;
-        increment[1][lane] = t6;
-        increment[2][lane] = t7;
-        increment[3][lane] = t10;
-        increment[4][lane] = t4;
-        increment[5][lane] = t5;
-    }
-}
-
-/* Invert the matrices of all lanes in place by elimination without pivoting: they are I + O(h). Infinite where a pivot is
-   far from 1. */
-static void lagrange_top_invert(lagrange_top_lanes matrix[restrict 36])
-{
-    for (int k = 0; k < 6; ++k) {
-        lagrange_top_lanes factor[6];
-        lagrange_top_EACH_LANE
-        for (int lane = 0; lane < lagrange_top_LANES; ++lane) {
-            const double reciprocal = 1.0 / matrix[k * 6 + k][lane];
-            matrix[k * 6 + k][lane] = 1.0;
-            for (int j = 0; j < 6; ++j) matrix[k * 6 + j][lane] *= reciprocal;
-            matrix[k * 6 + k][lane] += fabs(reciprocal) < 1e3 ? 0.0 : HUGE_VAL;
-        }
-        for (int i = 0; i < 6; ++i) {
-            lagrange_top_EACH_LANE
-            for (int lane = 0; lane < lagrange_top_LANES; ++lane) {
-                factor[i][lane] = matrix[i * 6 + k][lane];
-                if (i != k) matrix[i * 6 + k][lane] = 0.0;
-            }
-        }
-        for (int i = 0; i < 6; ++i)
-            for (int j = 0; j < 6 && i != k; ++j) {
-                lagrange_top_EACH_LANE
-                for (int lane = 0; lane < lagrange_top_LANES; ++lane)
-                    matrix[i * 6 + j][lane] -= factor[i][lane] * matrix[k * 6 + j][lane];
-            }
-    }
-}
-
-/* Everything about a stage at the points y. */
-static void lagrange_top_tabulate(lagrange_top_lanes coef[restrict], lagrange_top_model *model)
-{
-    lagrange_top_linearise_lanes(coef, model->y, model->displacement, model->increment, model->inverse, model->slope);
-    lagrange_top_invert(model->inverse);
-    for (int i = 0; i < 6; ++i)
-        for (int j = 0; j < 6; ++j) {
-            lagrange_top_lanes sum = { 0.0 };
-            for (int k = 0; k < 6; ++k) {
-                lagrange_top_EACH_LANE
-                for (int lane = 0; lane < lagrange_top_LANES; ++lane)
-                    sum[lane] += model->slope[i * 6 + k][lane] * model->inverse[k * 6 + j][lane];
-            }
-            memcpy(model->gain[i * 6 + j], sum, sizeof sum);
-        }
-}
-
-/* lagrange_top_size in all lanes, summed over the components. */
-static void lagrange_top_sizes(lagrange_top_lanes y[restrict 6], lagrange_top_lanes delta[restrict 6],
-    lagrange_top_lanes size)
-{
-    lagrange_top_lanes norm = { 0.0 };
-    memset(size, 0, lagrange_top_LANES * sizeof size[0]);
-    for (int i = 0; i < 6; ++i)
-        for (int lane = 0; lane < lagrange_top_LANES; ++lane)
-            norm[lane] = 1e-6 * fabs(y[i][lane]) > norm[lane] ? 1e-6 * fabs(y[i][lane]) : norm[lane];
-    for (int i = 0; i < 6; ++i) {
-        lagrange_top_EACH_LANE
-        for (int lane = 0; lane < lagrange_top_LANES; ++lane)
-            size[lane] += fabs(delta[i][lane]) / (fabs(y[i][lane]) + norm[lane] + DBL_MIN);
-    }
-}
-
-/* Correct y by the residuals, with the inverse in the table, and measure the corrections. */
-static void lagrange_top_correct(lagrange_top_model *model, lagrange_top_lanes size)
-{
-    lagrange_top_lanes delta[6];
-    memset(delta, 0, sizeof delta);
-    for (int i = 0; i < 6; ++i)
-        for (int j = 0; j < 6; ++j) {
-            lagrange_top_EACH_LANE
-            for (int lane = 0; lane < lagrange_top_LANES; ++lane)
-                delta[i][lane] += model->inverse[i * 6 + j][lane] * model->residual[j][lane];
-        }
-    lagrange_top_sizes(model->y, delta, size);
-    for (int i = 0; i < 6; ++i)
-        for (int lane = 0; lane < lagrange_top_LANES; ++lane) model->y[i][lane] -= delta[i][lane];
-}
-
-/* The largest of the lanes, none of which is negative; infinite if one is not finite. As integers, the bits of such
-   numbers have their order, and those of what is no number are larger. */
-static double lagrange_top_largest(const lagrange_top_lanes size)
-{
-    uint64_t bits[8], most = 0;
-    double largest;
-    memcpy(bits, size, sizeof bits);
-    for (int lane = 0; lane < lagrange_top_LANES; ++lane) most = bits[lane] > most ? bits[lane] : most;
-    memcpy(&largest, &most, sizeof largest);
-    return isfinite(largest) ? largest : HUGE_VAL;
-}
-
-/* lagrange_top_near for the guesses of all lanes, seen from one value. */
-static int lagrange_top_near_lanes(lagrange_top_lanes y[restrict 6], const double last[6])
-{
-    lagrange_top_lanes distance = { 0.0 };
-    double size = 0.0;
-    for (int i = 0; i < 6; ++i) {
-        size += fabs(last[i]);
-        lagrange_top_EACH_LANE
-        for (int lane = 0; lane < lagrange_top_LANES; ++lane) distance[lane] += fabs(y[i][lane] - last[i]);
-    }
-    return lagrange_top_largest(distance) <= 4.0 * size;
-}
-
-/* What is left after a correction of this size: quadratic in it, where the matrices are of the points corrected; where
-   they are of points further off, by bend, also of the order of size times bend. bound is what the last pass left. */
-static double lagrange_top_remaining(double size, double bend, double bound)
-{
-    const double growth = size / bound, left = size * (size + bend);
-    return growth > 1.0 ? growth * left : left;
-}
-
-/* The table of a stage, with its matrices or with those of the last pass. */
-static void lagrange_top_update(lagrange_top_lanes coef[restrict], lagrange_top_model *model, int matrices)
-{
-    if (matrices)
-        lagrange_top_tabulate(coef, model);
-    else
-        lagrange_top_evaluate_lanes(coef, model->y, model->displacement, model->increment);
-}
-
-/* The steps of a block one after the other, each along the linear model of its lane. As X, the state with its carry, gains
-   increment - gain residual, the next residual follows from this one; X itself is added up apart. */
-static void lagrange_top_chain(lagrange_top_model model[1], double x[6], double carry[6])
-{
-    double residual[6], sum[6], small[6];
-    for (int i = 0; i < 6; ++i) {
-        residual[i] = ((model->y[i][0] - x[i]) + model->displacement[i][0]) - carry[i];
-        sum[i] = x[i];
-        small[i] = carry[i];
-    }
-    for (int k = 0; k < 1 * lagrange_top_LANES; ++k) {
-        const int lane = k / 1, after = (k + 1) / 1 % lagrange_top_LANES;
-        lagrange_top_model *at = &model[k % 1], *next = &model[(k + 1) % 1];
-        double even[6] = { 0.0 }, odd[6] = { 0.0 }; /* two sums, so that no long chain of additions is waited for */
-        for (int i = 0; i < 6; ++i) {
-            at->residual[i][lane] = residual[i];
-            for (int j = 0; j < 6; j += 2) even[i] += at->gain[i * 6 + j][lane] * residual[j];
-            for (int j = 1; j < 6; j += 2) odd[i] += at->gain[i * 6 + j][lane] * residual[j];
-        }
-        for (int i = 0; i < 6; ++i) {
-            const double change = at->increment[i][lane], total = sum[i] + change, added = total - sum[i];
-            const double turn = (next->displacement[i][after] - at->displacement[i][lane]) - change;
-            const double moved = (next->y[i][after] - at->y[i][lane]) + turn;
-            residual[i] = ((moved + residual[i]) + odd[i]) + even[i];
-            small[i] += ((sum[i] - (total - added)) + (change - added)) - (even[i] + odd[i]);
-            sum[i] = total;
-        }
-    }
-    for (int i = 0; i < 6; ++i) {
-        x[i] = sum[i] + small[i];
-        carry[i] = small[i] - (x[i] - sum[i]);
-    }
-}
-
-/* Bring the table up to date: coefficients, and weights that were fitted since. */
-static void lagrange_top_refresh(const lagrange_top_solver *s, lagrange_top_table *table)
-{
-    for (int stage = 0; stage < 1; ++stage) {
-        if (table->fits[stage] == s->memory[stage].fits) continue;
-        table->fits[stage] = s->memory[stage].fits;
-        for (int k = 0; k < 8; ++k)
-            for (int lane = 0; lane < lagrange_top_LANES; ++lane) table->coef[stage][k][lane] = s->coef[stage][k];
-        memcpy(table->weight[stage], s->memory[stage].weight, (size_t)s->memory[stage].terms * sizeof table->weight[0][0]);
-    }
-}
-
-/* Guesses for the next lagrange_top_LANES values of a stage, by its recurrences. */
-static void lagrange_top_foresee(const lagrange_top_memory *memory, lagrange_top_lanes weight[restrict][6],
-    lagrange_top_lanes y[restrict 6])
-{
-    const int last = memory->count - 1;
-    for (int i = 0; i < 6; ++i) {
-        lagrange_top_lanes even = { 0.0 }, odd = { 0.0 };
-        for (int k = 0; k < memory->terms; k += 2) {
-            const double past = memory->past[last - k][i], earlier = memory->past[last - 1 - k][i];
-            lagrange_top_EACH_LANE
-            for (int lane = 0; lane < lagrange_top_LANES; ++lane) even[lane] += weight[k][i][lane] * past;
-            lagrange_top_EACH_LANE
-            for (int lane = 0; lane < lagrange_top_LANES; ++lane) odd[lane] += weight[k + 1][i][lane] * earlier;
-        }
-        lagrange_top_EACH_LANE
-        for (int lane = 0; lane < lagrange_top_LANES; ++lane) y[i][lane] = even[lane] + odd[lane];
-    }
-}
-
-/* lagrange_top_record for the values of all lanes, one after the other. */
-static void lagrange_top_record_lanes(lagrange_top_memory *memory, lagrange_top_lanes y[restrict 6])
-{
-    lagrange_top_make_room(memory, lagrange_top_LANES);
-    for (int lane = 0; lane < lagrange_top_LANES; ++lane)
-        for (int i = 0; i < 6; ++i) memory->past[memory->count + lane][i] = y[i][lane];
-    memory->count += lagrange_top_LANES;
-}
-
-/* Guesses where no recurrence is known: where alpha and beta have the means of steps by the classical Runge-Kutta
-   method, to leading order. */
-static void lagrange_top_march(const lagrange_top_solver *s, lagrange_top_table *table, lagrange_top_model model[1])
-{
-    static const double reach[4] = { 0.5, 0.5, 1.0, 0.0 }, weight[4] = { 1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0 };
-    double x[6], point[6], slope[6], mean[6];
-    memcpy(x, s->x, sizeof x);
-    for (int k = 0; k < 1 * lagrange_top_LANES; ++k) {
-        const double h = lagrange_top_fractions[k % 1] * s->h;
-        memcpy(point, x, sizeof x);
-        memset(mean, 0, sizeof mean);
-        for (int part = 0; part < 4; ++part) {
-            lagrange_top_vector_field(&s->params, point, slope);
-            for (int i = 0; i < 6; ++i) {
-                mean[i] += weight[part] * slope[i];
-                point[i] = x[i] + h * reach[part] * slope[i];
-            }
-        }
-        for (int i = 0; i < 6; ++i) {
-            model[k % 1].y[i][k / 1] = x[i] + 0.5 * h * mean[i];
-            x[i] += h * mean[i];
-        }
-    }
-    for (int stage = 0; stage < 1; ++stage) {
-        lagrange_top_model *at = &model[stage];
-        lagrange_top_evaluate_lanes(table->coef[stage], at->y, at->displacement, at->increment);
-        for (int i = 0; i < 6; ++i) {
-            lagrange_top_EACH_LANE
-            for (int lane = 0; lane < lagrange_top_LANES; ++lane)
-                at->y[i][lane] -= at->displacement[i][lane] + 0.5 * at->increment[i][lane];
-        }
-    }
-}
-
-/* lagrange_top_LANES steps at once: guess the points of all, and correct them together until the error that remains is as
-   small as after a single step. How many passes that took; 0, and the solver as before, where it takes more than most. */
-static int lagrange_top_block(lagrange_top_solver *s, lagrange_top_table *table, int most)
-{
-    lagrange_top_model model[1];
-    lagrange_top_lanes sizes;
-    double x[6], carry[6], previous = HUGE_VAL, bend = 0.0, bound = HUGE_VAL;
-    int passes = 0, solved = 0;
-    if (!s->foreseeing) lagrange_top_march(s, table, model);
-    for (int stage = 0; stage < 1; ++stage) {
-        if (s->foreseeing) lagrange_top_foresee(&s->memory[stage], table->weight[stage], model[stage].y);
-        if (!lagrange_top_near_lanes(model[stage].y, s->x)) return 0;
-    }
-    while (!solved) {
-        double size = 0.0;
-        const int matrices = previous > 1e-05;
-        for (int stage = 0; stage < 1; ++stage) lagrange_top_update(table->coef[stage], &model[stage], matrices);
-        memcpy(x, s->x, sizeof x);
-        memcpy(carry, s->carry, sizeof carry);
-        lagrange_top_chain(model, x, carry);
-        for (int stage = 0; stage < 1; ++stage) {
-            lagrange_top_correct(&model[stage], sizes);
-            const double largest = lagrange_top_largest(sizes);
-            size = largest > size ? largest : size;
-        }
-        s->evaluations += 1 * lagrange_top_LANES;
-        bend = matrices ? 0.0 : bend + previous;
-        bound = lagrange_top_remaining(size, bend, bound);
-        /* The second test: after the square of so small a correction there is rounding only. */
-        solved = bound <= 1e-20 || (previous < 1e-8 && size < 1e-10);
-        if ((++passes >= most || !(size < previous)) && !solved) return 0;
-        previous = size;
-    }
-    for (int stage = 0; stage < 1; ++stage)
-        if (!lagrange_top_near_lanes(model[stage].y, s->x)) return 0;
-    for (int i = 0; i < 6; ++i)
-        if (!isfinite(x[i])) return 0;
-    memcpy(s->x, x, sizeof x);
-    memcpy(s->carry, carry, sizeof carry);
-    s->steps += lagrange_top_LANES;
-    for (int stage = 0; stage < 1; ++stage) {
-        lagrange_top_memory *memory = &s->memory[stage];
-        lagrange_top_record_lanes(memory, model[stage].y);
-        memory->slow = passes > 1 ? memory->slow + lagrange_top_LANES : 0;
-        if (memory->slow > memory->patience && s->foreseeing) lagrange_top_fit(memory);
-    }
-    return passes;
-}
-
-/* Recurrences are given up for a while, the longer the more often that happens. */
-static void lagrange_top_give_up(lagrange_top_solver *s)
-{
-    s->foreseeing = s->setback = s->pause = 0;
-    s->doubt = 2 * s->doubt + 600;
-    s->retry = s->steps + s->doubt;
-}
-
-/* How the next block is guessed: by recurrences, fitted as soon as enough steps are to be made, or
-   have been, to repay that. */
-static void lagrange_top_choose_guess(lagrange_top_solver *s, size_t steps)
-{
-    for (int stage = 0; stage < 1; ++stage)
-        if (s->memory[stage].count < 111) {
-            s->foreseeing = 0;
-            return;
-        }
-    if (s->foreseeing || (steps < 600 && s->steps < 150) || s->steps < s->retry) return;
-    s->foreseeing = 1;
-    for (int stage = 0; stage < 1 && s->foreseeing; ++stage) {
-        lagrange_top_fit(&s->memory[stage]);
-        s->foreseeing = s->memory[stage].terms > 0;
-    }
-    s->pause = lagrange_top_LANES;
-    if (!s->foreseeing) lagrange_top_give_up(s);
-}
-
-/* Learn from a block: after one that failed single steps are made, the more the more often that happens. Recurrences
-   that fail repeatedly, or need more passes than steps by Runge-Kutta did, are given up. */
-static void lagrange_top_learn_from(lagrange_top_solver *s, int passes)
-{
-    if (passes > 0) {
-        s->setback /= 2;
-    } else {
-        s->setback = 2 * s->setback + lagrange_top_LANES > 1000 ? 1000 : 2 * s->setback + lagrange_top_LANES;
-        s->pause = s->setback;
-    }
-    if (!s->foreseeing) {
-        s->passes = passes > 0 ? passes : INT_MAX;
-    } else if (passes > s->passes || s->setback > 5 * lagrange_top_LANES) {
-        lagrange_top_give_up(s);
-    }
-}
-
-/* A single step, and the running mean of the evaluations that a stage of one takes. */
-static lagrange_top_status lagrange_top_single(lagrange_top_solver *s)
-{
-    const size_t before = s->evaluations;
-    const lagrange_top_status status = lagrange_top_step(s, s->h);
-    s->effort += 0.125 * ((double)(s->evaluations - before) / 1 - s->effort);
-    return status;
-}
-
-/* Blocks of steps where they cost less than single steps, with at most as many passes over a block as 2 for each
-   evaluation in a single step. The results differ by round-off only. */
 lagrange_top_status lagrange_top_integrate(lagrange_top_solver *s, double h, size_t steps)
 {
-    lagrange_top_table table;
     lagrange_top_status status = lagrange_top_set_step(s, h);
-    for (int stage = 0; stage < 1; ++stage) table.fits[stage] = -1;
-    while (status == lagrange_top_OK && steps > 0) {
-        if (steps >= lagrange_top_LANES && s->pause == 0) lagrange_top_choose_guess(s, steps);
-        if (steps >= lagrange_top_LANES && s->pause == 0) {
-            lagrange_top_refresh(s, &table);
-            const int passes = lagrange_top_block(s, &table, (int)(2 * s->effort + 0.5));
-            lagrange_top_learn_from(s, passes);
-            if (passes > 0) steps -= lagrange_top_LANES;
-        } else {
-            if (s->pause > 0) --s->pause;
-            status = lagrange_top_single(s);
-            if (status == lagrange_top_OK) --steps;
-        }
-    }
+    for (; steps > 0 && status == lagrange_top_OK; --steps) status = lagrange_top_step(s, h);
     return status;
-}
-
-/* Members of an ensemble, each in its lane. */
-typedef struct {
-    lagrange_top_lanes x[6], carry[6], coef[1][8];
-    lagrange_top_lanes past[1][111][6]; /* solved values, in a ring */
-    lagrange_top_lanes weight[1][40][6]; /* of past values, the latest first, for the next */
-    int latest;     /* the row of the latest values */
-    int count;      /* rows in use */
-    int order[1];   /* how many of them the extrapolation uses */
-    int terms[1];   /* how many of them the recurrences use */
-    int fits;       /* how often recurrences have been fitted */
-    int fitting[1]; /* whether they are the better guess */
-    int slow;       /* how many of the last steps took more than one iteration */
-    int patience;   /* how many of those before recurrences are fitted again */
-    int active[8];  /* whether the lane has a member that has not failed */
-    size_t left[8]; /* steps that are still to be made, where one has */
-} lagrange_top_group;
-
-/* The past values of a stage, the latest for k = 0. */
-static lagrange_top_lanes *lagrange_top_group_past(lagrange_top_group *group, int stage, int k)
-{
-    const int row = group->latest + k;
-    return group->past[stage][row < 111 ? row : row - 111];
-}
-
-/* Guess the values of a stage by the recurrences of the members. */
-static void lagrange_top_group_foresee(lagrange_top_group *group, int stage, lagrange_top_lanes y[restrict 6])
-{
-    memset(y, 0, 6 * sizeof y[0]);
-    for (int k = 0; k < group->terms[stage]; ++k) {
-        lagrange_top_lanes *past = lagrange_top_group_past(group, stage, k), *weight = group->weight[stage][k];
-        for (int i = 0; i < 6; ++i) {
-            lagrange_top_EACH_LANE
-            for (int lane = 0; lane < lagrange_top_LANES; ++lane) y[i][lane] += weight[i][lane] * past[i][lane];
-        }
-    }
-}
-
-/* Extrapolate the values of a stage. */
-static void lagrange_top_group_extrapolate(lagrange_top_group *group, int stage, lagrange_top_lanes y[restrict 6])
-{
-    const int order = group->order[stage];
-    double binomial = -1.0;
-    memcpy(y, group->x, 6 * sizeof y[0]);
-    if (order > 0) memset(y, 0, 6 * sizeof y[0]);
-    for (int k = 0; k < order; ++k) {
-        lagrange_top_lanes *past = lagrange_top_group_past(group, stage, k);
-        binomial *= -(double)(order - k) / (k + 1);
-        for (int i = 0; i < 6; ++i) {
-            lagrange_top_EACH_LANE
-            for (int lane = 0; lane < lagrange_top_LANES; ++lane) y[i][lane] += binomial * past[i][lane];
-        }
-    }
-}
-
-/* The sum over members of the absolute values of all components. */
-static double lagrange_top_group_sum(const lagrange_top_group *group, lagrange_top_lanes y[6])
-{
-    double sum = 0.0;
-    for (int i = 0; i < 6; ++i)
-        for (int lane = 0; lane < lagrange_top_LANES; ++lane) sum += group->active[lane] ? fabs(y[i][lane]) : 0.0;
-    return sum;
-}
-
-static void lagrange_top_group_subtract(lagrange_top_lanes y[restrict 6], lagrange_top_lanes other[restrict 6])
-{
-    for (int i = 0; i < 6; ++i) {
-        lagrange_top_EACH_LANE
-        for (int lane = 0; lane < lagrange_top_LANES; ++lane) y[i][lane] -= other[i][lane];
-    }
-}
-
-/* Choose the guess that would have been best for these values. */
-static void lagrange_top_group_judge(lagrange_top_group *group, int stage, lagrange_top_lanes y[6])
-{
-    lagrange_top_lanes row[8 + 1][6];
-    const int rows = group->count < 8 ? group->count : 8;
-    double least = HUGE_VAL;
-    memcpy(row[0], y, sizeof row[0]);
-    for (int k = 0; k < rows; ++k) memcpy(row[k + 1], lagrange_top_group_past(group, stage, k), sizeof row[0]);
-    if (group->order[stage] == 0) group->order[stage] = 1;
-    for (int order = 1; order <= rows; ++order) { /* row[0] becomes the backward difference of this order */
-        for (int k = 0; k <= rows - order; ++k) lagrange_top_group_subtract(row[k], row[k + 1]);
-        const double size = lagrange_top_group_sum(group, row[0]);
-        if (size < least) {
-            least = size;
-            group->order[stage] = order;
-        }
-    }
-    if (group->terms[stage] == 0) return;
-    lagrange_top_group_foresee(group, stage, row[0]);
-    lagrange_top_group_subtract(row[0], y);
-    group->fitting[stage] = lagrange_top_group_sum(group, row[0]) <= least;
-}
-
-/* Fit the recurrences of all members; with every time, wait longer before it is done again, and for long if it did not
-   help. */
-static void lagrange_top_group_fit(lagrange_top_group *group)
-{
-    lagrange_top_memory memory;
-    const int helped = group->fits == 0 || group->fitting[0];
-    memory.count = 111;
-    for (int stage = 0; stage < 1; ++stage) {
-        int found = 1;
-        group->terms[stage] = 0;
-        for (int lane = 0; lane < lagrange_top_LANES; ++lane)
-            for (int i = 0; i < 6 && group->active[lane] && found; ++i) {
-                for (int k = 0; k < 111; ++k)
-                    memory.past[111 - 1 - k][i] = lagrange_top_group_past(group, stage, k)[i][lane];
-                const int terms = lagrange_top_train(&memory, i);
-                found = terms > 0;
-                if (terms > group->terms[stage]) group->terms[stage] = terms;
-                for (int k = 0; k < 40; ++k) group->weight[stage][k][i][lane] = memory.weight[k][i][0];
-            }
-        if (!found) group->terms[stage] = 0;
-        group->fitting[stage] = found;
-    }
-    ++group->fits;
-    group->slow = 0;
-    group->patience = helped && group->patience < 10000 ? 2 * group->patience + 150 : 100 * 150;
-}
-
-/* Replace guesses that are not near the last values, as lagrange_top_near has it, by these; lane by lane. */
-static void lagrange_top_stay_near(lagrange_top_lanes y[restrict 6], lagrange_top_lanes last[restrict 6])
-{
-    lagrange_top_lanes distance = { 0.0 }, size = { 0.0 };
-    for (int i = 0; i < 6; ++i) {
-        lagrange_top_EACH_LANE
-        for (int lane = 0; lane < lagrange_top_LANES; ++lane) {
-            distance[lane] += fabs(y[i][lane] - last[i][lane]);
-            size[lane] += fabs(last[i][lane]);
-        }
-    }
-    for (int i = 0; i < 6; ++i) {
-        lagrange_top_EACH_LANE
-        for (int lane = 0; lane < lagrange_top_LANES; ++lane)
-            y[i][lane] = distance[lane] <= 4.0 * size[lane] ? y[i][lane] : last[i][lane];
-    }
-}
-
-/* Whether lanes are still to be solved after a correction of this size; those where nothing is finite leave the group.
-   bound is what remains in each lane. */
-static int lagrange_top_group_open(lagrange_top_group *group, const lagrange_top_lanes size, const lagrange_top_lanes previous,
-    double bend, lagrange_top_lanes bound)
-{
-    int open = 0;
-    lagrange_top_EACH_LANE
-    for (int lane = 0; lane < lagrange_top_LANES; ++lane)
-        bound[lane] = lagrange_top_remaining(size[lane], bend, bound[lane]);
-    if (lagrange_top_largest(bound) <= 1e-20) return 0;
-    for (int lane = 0; lane < lagrange_top_LANES; ++lane) {
-        const int solved = bound[lane] <= 1e-20 || (previous[lane] < 1e-8 && size[lane] < 1e-10);
-        if (!isfinite(size[lane])) group->active[lane] = 0;
-        open += group->active[lane] && !solved;
-    }
-    return open;
-}
-
-/* The guess for a stage: recurrences, or extrapolation; the state for members where that is not near. */
-static void lagrange_top_group_predict(lagrange_top_group *group, int stage, lagrange_top_lanes y[6])
-{
-    if (group->fitting[stage]) lagrange_top_group_foresee(group, stage, y);
-    else lagrange_top_group_extrapolate(group, stage, y);
-    lagrange_top_stay_near(y, group->x);
-}
-
-/* Newton's method for a stage, until the slowest lane is solved. The number of iterations; where that is the most
-   allowed, lanes that are not solved leave the group. */
-static int lagrange_top_group_solve(lagrange_top_group *group, int stage, lagrange_top_model *model)
-{
-    lagrange_top_lanes size, previous, bound;
-    double largest = HUGE_VAL, bend = 0.0;
-    int iterations = 0, open = 1;
-    for (int lane = 0; lane < lagrange_top_LANES; ++lane) size[lane] = bound[lane] = HUGE_VAL;
-    lagrange_top_group_predict(group, stage, model->y);
-    for (; open > 0 && iterations < 20; ++iterations) {
-        memcpy(previous, size, sizeof size);
-        lagrange_top_update(group->coef[stage], model, largest > 1e-05);
-        bend = largest > 1e-05 ? 0.0 : bend + largest;
-        for (int i = 0; i < 6; ++i) {
-            lagrange_top_EACH_LANE
-            for (int lane = 0; lane < lagrange_top_LANES; ++lane)
-                model->residual[i][lane] =
-                    ((model->y[i][lane] - group->x[i][lane]) + model->displacement[i][lane]) - group->carry[i][lane];
-        }
-        lagrange_top_correct(model, size);
-        open = lagrange_top_group_open(group, size, previous, bend, bound);
-        largest = lagrange_top_largest(size);
-    }
-    for (int lane = 0; lane < lagrange_top_LANES && open > 0; ++lane)
-        group->active[lane] = group->active[lane] && bound[lane] <= 1e-20;
-    return iterations;
-}
-
-/* Add the increments, corrected to first order, in compensated arithmetic as for a single step. */
-static void lagrange_top_group_advance(lagrange_top_lanes x[restrict 6], lagrange_top_lanes carry[restrict 6],
-    lagrange_top_model *model)
-{
-    for (int i = 0; i < 6; ++i)
-        for (int j = 0; j < 6; ++j) {
-            lagrange_top_EACH_LANE
-            for (int lane = 0; lane < lagrange_top_LANES; ++lane)
-                carry[i][lane] -= model->gain[i * 6 + j][lane] * model->residual[j][lane];
-        }
-    for (int i = 0; i < 6; ++i) {
-        lagrange_top_EACH_LANE
-        for (int lane = 0; lane < lagrange_top_LANES; ++lane) {
-            const double change = model->increment[i][lane], sum = x[i][lane] + change, added = sum - x[i][lane];
-            const double small = ((x[i][lane] - (sum - added)) + (change - added)) + carry[i][lane];
-            x[i][lane] = sum + small;
-            carry[i][lane] = small - (x[i][lane] - sum);
-        }
-    }
-}
-
-/* Members that failed, or whose state is not near the one before the step or not finite, keep that one, and leave. How many
-   stay. */
-static int lagrange_top_group_leave(lagrange_top_group *group, lagrange_top_lanes x[6], lagrange_top_lanes carry[6],
-    size_t remaining)
-{
-    lagrange_top_lanes moved = { 0.0 }, size = { 0.0 }, bad;
-    int active = 0;
-    for (int i = 0; i < 6; ++i) {
-        lagrange_top_EACH_LANE
-        for (int lane = 0; lane < lagrange_top_LANES; ++lane) {
-            moved[lane] += fabs(group->x[i][lane] - x[i][lane]);
-            size[lane] += fabs(x[i][lane]);
-        }
-    }
-    for (int lane = 0; lane < lagrange_top_LANES; ++lane) bad[lane] = moved[lane] <= 4.0 * size[lane] ? 0.0 : 1.0;
-    for (int lane = 0; lane < lagrange_top_LANES; ++lane) active += group->active[lane];
-    if (active == lagrange_top_LANES && !(lagrange_top_largest(bad) > 0.0)) return active;
-    active = 0;
-    for (int lane = 0; lane < lagrange_top_LANES; ++lane) {
-        group->active[lane] = group->active[lane] && !(bad[lane] > 0.0);
-        active += group->active[lane];
-        for (int i = 0; i < 6 && !group->active[lane]; ++i) {
-            group->x[i][lane] = x[i][lane];
-            group->carry[i][lane] = carry[i][lane];
-        }
-        if (!group->active[lane] && group->left[lane] == 0) group->left[lane] = remaining;
-    }
-    return active;
-}
-
-/* One step of all members, of as many as remain. How many members are left. */
-static int lagrange_top_group_step(lagrange_top_group *group, size_t remaining)
-{
-    lagrange_top_lanes x[6], carry[6];
-    lagrange_top_model model;
-    const int next = (group->latest > 0 ? group->latest : 111) - 1;
-    int most = 0;
-    memcpy(x, group->x, sizeof x);
-    memcpy(carry, group->carry, sizeof carry);
-    for (int stage = 0; stage < 1; ++stage) {
-        const int iterations = lagrange_top_group_solve(group, stage, &model);
-        lagrange_top_group_advance(group->x, group->carry, &model);
-        if (iterations > most) most = iterations;
-        if ((iterations > 1 && next % 8 == 0) || group->count < 8)
-            lagrange_top_group_judge(group, stage, model.y);
-        memcpy(group->past[stage][next], model.y, sizeof model.y);
-    }
-    group->latest = next;
-    if (group->count < 111) ++group->count;
-    group->slow = most > 1 ? group->slow + 1 : 0;
-    if (group->slow > group->patience && group->count == 111 && remaining >= 1200)
-        lagrange_top_group_fit(group);
-    return lagrange_top_group_leave(group, x, carry, remaining);
-}
-
-/* Put a member into a lane: its state, and its coefficients. */
-static lagrange_top_status lagrange_top_group_join(lagrange_top_group *group, int lane, const lagrange_top_params *params,
-    const double x0[6], double h)
-{
-    lagrange_top_solver s;
-    lagrange_top_status status = lagrange_top_init(&s, params, x0);
-    if (status == lagrange_top_OK) status = lagrange_top_set_step(&s, h);
-    if (status != lagrange_top_OK) return status;
-    for (int i = 0; i < 6; ++i) group->x[i][lane] = s.x[i];
-    for (int stage = 0; stage < 1; ++stage)
-        for (int k = 0; k < 8; ++k) group->coef[stage][k][lane] = s.coef[stage][k];
-    group->active[lane] = 1;
-    return status;
-}
-
-/* The steps that a member has still to make after it left the group, by itself. */
-static lagrange_top_status lagrange_top_group_finish(const lagrange_top_group *group, int lane, const lagrange_top_params *params,
-    double x[6], double h)
-{
-    lagrange_top_solver s;
-    lagrange_top_status status = lagrange_top_init(&s, params, x);
-    if (status != lagrange_top_OK) return status;
-    for (int i = 0; i < 6; ++i) s.carry[i] = group->carry[i][lane];
-    status = lagrange_top_integrate(&s, h, group->left[lane]);
-    memcpy(x, s.x, sizeof s.x);
-    return status;
-}
-
-/* The members from first on, as many as there are lanes. The first status that is not OK. */
-static lagrange_top_status lagrange_top_group_run(const lagrange_top_params *params, double *x, size_t members, size_t first,
-    double h, size_t steps, unsigned char *status)
-{
-    lagrange_top_group group;
-    lagrange_top_status worst = lagrange_top_OK, member[8];
-    const int count = members - first < lagrange_top_LANES ? (int)(members - first) : lagrange_top_LANES;
-    double state[6];
-    size_t left = steps;
-    memset(&group, 0, sizeof group);
-    for (int lane = 0; lane < count; ++lane) {
-        for (size_t i = 0; i < 6; ++i) state[i] = x[i * members + first + (size_t)lane];
-        member[lane] = lagrange_top_group_join(&group, lane, params, state, h);
-    }
-    for (int active = count; left > 0 && active > 2; --left) active = lagrange_top_group_step(&group, left);
-    for (int lane = 0; lane < count; ++lane) {
-        if (group.active[lane]) group.left[lane] = left;
-        for (int i = 0; i < 6; ++i) state[i] = group.x[i][lane];
-        if (member[lane] == lagrange_top_OK) {
-            if (group.left[lane] > 0) member[lane] = lagrange_top_group_finish(&group, lane, params, state, h);
-            for (size_t i = 0; i < 6; ++i) x[i * members + first + (size_t)lane] = state[i];
-        }
-        if (status != NULL) status[first + (size_t)lane] = (unsigned char)member[lane];
-        if (worst == lagrange_top_OK) worst = member[lane];
-    }
-    return worst;
-}
-
-lagrange_top_status lagrange_top_ensemble(const lagrange_top_params *params, double *x, size_t members,
-                                          double h, size_t steps, unsigned char *status)
-{
-    lagrange_top_status worst = isfinite(h) ? lagrange_top_OK : lagrange_top_BAD_ARGUMENT;
-    const lagrange_top_params own = params != NULL ? *params : lagrange_top_default_params;
-    size_t earliest = members;
-    if (x == NULL && members > 0) return lagrange_top_BAD_ARGUMENT;
-#ifdef _OPENMP
-#pragma omp parallel for schedule(dynamic)
-#endif
-    for (size_t first = 0; first < members; first += lagrange_top_LANES) {
-        const lagrange_top_status group = lagrange_top_group_run(&own, x, members, first, h, steps, status);
-        if (group == lagrange_top_OK) continue;
-#ifdef _OPENMP
-#pragma omp critical
-#endif
-        if (first < earliest) {
-            earliest = first;
-            worst = group;
-        }
-    }
-    return worst;
-}
-
-#if defined(__clang__)
-#pragma clang diagnostic pop
-#endif
-
-/* the Hamiltonian */
-static void lagrange_top_energy(const lagrange_top_params *params, const double x[6],
-                                double energy[restrict 1])
-{
-    const double P1 = x[0];
-    const double P2 = x[1];
-    const double P3 = x[2];
-    const double G3 = x[5];
-    energy[0] = G3 * params->mgl + 0.5 * (P3 * P3 / params->I3 + (P1 * P1 + P2 * P2) / params->I1);
-}
-
-/* the Casimirs */
-static void lagrange_top_casimir_values(const lagrange_top_params *params, const double x[6],
-                                        double out[restrict 2])
-{
-    (void)params;
-    const double P1 = x[0];
-    const double P2 = x[1];
-    const double P3 = x[2];
-    const double G1 = x[3];
-    const double G2 = x[4];
-    const double G3 = x[5];
-    out[0] = G3 * G3 + (G1 * G1 + G2 * G2);
-    out[1] = G3 * P3 + (G2 * P2 + G1 * P1);
-}
-
-/* pi(x) grad H(x) */
-static void lagrange_top_field(const lagrange_top_params *params, const double x[6], double out[restrict 6])
-{
-    const double P1 = x[0];
-    const double P2 = x[1];
-    const double P3 = x[2];
-    const double G1 = x[3];
-    const double G2 = x[4];
-    const double G3 = x[5];
-    const double t1 = P3 / params->I3;
-    const double t2 = 1.0 / params->I1;
-    const double t3 = P2 * t2;
-    const double t4 = P1 * t2;
-    out[0] = G2 * params->mgl + (P2 * t1 - P3 * t3);
-    out[1] = P3 * t4 - P1 * t1 - G1 * params->mgl;
-    out[2] = P1 * t3 - P2 * t4;
-    out[3] = G2 * t1 - G3 * t3;
-    out[4] = G3 * t4 - G1 * t1;
-    out[5] = G1 * t3 - G2 * t4;
-}
-
-double lagrange_top_hamiltonian(const lagrange_top_params *params, const double x[6])
-{
-    double energy[1];
-    lagrange_top_energy(params != NULL ? params : &lagrange_top_default_params, x, energy);
-    return energy[0];
-}
-
-void lagrange_top_casimirs(const lagrange_top_params *params, const double x[6], double out[])
-{
-    double value[2]; /* out may overlap x */
-    lagrange_top_casimir_values(params != NULL ? params : &lagrange_top_default_params, x, value);
-    for (int i = 0; i < 2; ++i) out[i] = value[i];
-}
-
-void lagrange_top_vector_field(const lagrange_top_params *params, const double x[6], double out[6])
-{
-    double value[6];
-    lagrange_top_field(params != NULL ? params : &lagrange_top_default_params, x, value);
-    memcpy(out, value, sizeof value);
 }
 
 const char *lagrange_top_status_string(lagrange_top_status status)
 {
-    switch (status) {
-    case lagrange_top_OK: return "ok";
-    case lagrange_top_NO_CONVERGENCE: return "no convergence: the step is too large";
-    case lagrange_top_SINGULAR: return "singular Newton matrix: the step is too large";
-    case lagrange_top_NOT_FINITE: return "not finite: overflow, or outside the domain";
-    case lagrange_top_BAD_ARGUMENT: return "bad argument: a null pointer, or values that are not allowed";
-    }
-    return "unknown status";
+    static const char *const text[] = {
+        "ok",
+        "no convergence: the step is too large",
+        "singular Newton matrix: the step is too large",
+        "not finite: overflow, or outside the domain",
+        "bad argument: a null pointer, or values that are not allowed"
+    };
+    return (unsigned)status <= lagrange_top_BAD_ARGUMENT ? text[status] : "unknown status";
 }
 
 size_t lagrange_top_solver_size(void) { return sizeof(lagrange_top_solver); }
 
 size_t lagrange_top_solver_steps_done(const lagrange_top_solver *s) { return s->steps; }
+
+/* ---- Ensembles ---- */
+lagrange_top_status lagrange_top_ensemble(const lagrange_top_params *params, double *x, size_t members,
+    double h, size_t steps, unsigned char *status)
+{
+    lagrange_top_status worst = isfinite(h) ? lagrange_top_OK : lagrange_top_BAD_ARGUMENT;
+    const lagrange_top_params own = params != NULL ? *params : lagrange_top_default_params;
+    if (x == NULL && members > 0) return lagrange_top_BAD_ARGUMENT;
+    for (size_t m = 0; m < members; ++m) {
+        lagrange_top_solver s;
+        double x0[lagrange_top_DIM];
+        for (size_t i = 0; i < lagrange_top_DIM; ++i) x0[i] = x[i * members + m];
+        lagrange_top_status member = lagrange_top_init(&s, &own, x0);
+        if (member == lagrange_top_OK) {
+            member = lagrange_top_integrate(&s, h, steps);
+            for (size_t i = 0; i < lagrange_top_DIM; ++i) x[i * members + m] = s.x[i];
+        }
+        if (status != NULL) status[m] = (unsigned char)member;
+        if (worst == lagrange_top_OK) worst = member;
+    }
+    return worst;
+}

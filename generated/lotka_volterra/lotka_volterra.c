@@ -13,7 +13,19 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 157618a057acc9c3d50c15282d635938335e9647af0feb079061057ba68d77c3
+ *
+ *   1. The model
+ *   2. Compensated sums, linear equations
+ *   3. Starting guesses
+ *   4. Recurrences fitted to the last values
+ *   5. The implicit step, by Newton's method
+ *   6. Several steps or members at once
+ *   7. The solver
+ *   8. Newton's method in lanes
+ *   9. Blocks of steps
+ *   10. Groups of members
+ *   11. Ensembles
+ * body-sha256: 6ac0637e26c7addaa2919338895af6347eb4900fc62acaf9f381697d6a94a1dc
  */
 #include "lotka_volterra.h"
 
@@ -23,10 +35,15 @@
 #include <stdint.h>
 #include <string.h>
 
+/* ---- The model ---- */
 const lotka_volterra_params lotka_volterra_default_params = { 0 };
 
-/* A step of size h is the composition of these fractions of it. */
-static const double lotka_volterra_fractions[1] = { 1.0 };
+enum { lotka_volterra_MAX_ITERATIONS = 20 }; /* of an inner solve */
+enum { lotka_volterra_CHECKS = 8 }; /* values that a recurrence is not fitted to, but has to foresee */
+enum { lotka_volterra_PASSES = 2 }; /* over a block, that cost per step what an evaluation costs */
+
+/* A correction is accepted when the error that it leaves is estimated to be below this. */
+#define lotka_volterra_TOLERANCE 1e-20
 
 /* everything that depends on parameters and step size only */
 static void lotka_volterra_prepare(const lotka_volterra_params *params, double h, double coef[restrict 1])
@@ -38,46 +55,25 @@ static void lotka_volterra_prepare(const lotka_volterra_params *params, double h
 /* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
    increment, all with the momenta p = grad S_h(y) */
 static void lotka_volterra_linearise(const double coef[1], const double y[3], double displacement[restrict 3],
-                                     double increment[restrict 3], double jacobian[restrict 9],
-                                     double increment_jacobian[restrict 9])
+    double increment[restrict 3], double jacobian[restrict 9], double increment_jacobian[restrict 9])
 {
-    const double x1 = y[0];
-    const double x2 = y[1];
-    const double x3 = y[2];
-    const double t1 = coef[0] * x2;
-    const double t2 = coef[0] * x3;
-    const double t3 = expm1((-0.5) * (t1 + t2));
-    const double t4 = coef[0] * x1;
-    const double t5 = expm1(0.5 * (t4 - t2));
-    const double t6 = expm1(0.5 * (t1 + t4));
-    const double t7 = 1.0 + t3;
-    const double t8 = 1.0 / t7;
-    const double t9 = 1.0 + t8;
-    const double t10 = t3 * t9;
-    const double t11 = 1.0 + t5;
-    const double t12 = 1.0 / t11;
-    const double t13 = 1.0 + t12;
-    const double t14 = t5 * t13;
-    const double t15 = 1.0 + t6;
-    const double t16 = 1.0 / t15;
-    const double t17 = 1.0 + t16;
-    const double t18 = t6 * t17;
-    const double t19 = coef[0] * t7;
-    const double t20 = (-0.5) * (x1 * t19);
-    const double t21 = coef[0] * t11;
-    const double t22 = x2 * t21;
-    const double t23 = coef[0] * t15;
-    const double t24 = 0.5 * (x3 * t23);
-    const double t25 = -(x1 * (0.5 * (t3 * (t19 * (t8 * t8))) - 0.5 * (t19 * t9)));
-    const double t26 = 0.5 * (t21 * t13);
-    const double t27 = 0.5 * (t5 * (t21 * (t12 * t12)));
-    const double t28 = -(x3 * (0.5 * (t23 * t17) - 0.5 * (t6 * (t23 * (t16 * t16)))));
+    const double x1 = y[0], x2 = y[1], x3 = y[2];
+    /* displacement */
+    const double t1 = coef[0] * x2, t2 = coef[0] * x3, t3 = expm1((-0.5) * (t1 + t2));
+    const double t4 = coef[0] * x1, t5 = expm1(0.5 * (t4 - t2)), t6 = expm1(0.5 * (t1 + t4));
     displacement[0] = x1 * t3;
     displacement[1] = x2 * t5;
     displacement[2] = x3 * t6;
+    /* increment */
+    const double t7 = 1.0 + t3, t8 = 1.0 / t7, t9 = 1.0 + t8, t10 = t3 * t9, t11 = 1.0 + t5;
+    const double t12 = 1.0 / t11, t13 = 1.0 + t12, t14 = t5 * t13, t15 = 1.0 + t6, t16 = 1.0 / t15;
+    const double t17 = 1.0 + t16, t18 = t6 * t17;
     increment[0] = -(x1 * t10);
     increment[1] = -(x2 * t14);
     increment[2] = -(x3 * t18);
+    /* jacobian */
+    const double t19 = coef[0] * t7, t20 = (-0.5) * (x1 * t19), t21 = coef[0] * t11, t22 = x2 * t21;
+    const double t23 = coef[0] * t15, t24 = 0.5 * (x3 * t23);
     jacobian[0] = t7;
     jacobian[1] = t20;
     jacobian[2] = t20;
@@ -87,6 +83,10 @@ static void lotka_volterra_linearise(const double coef[1], const double y[3], do
     jacobian[6] = t24;
     jacobian[7] = t24;
     jacobian[8] = t15;
+    /* increment jacobian */
+    const double t25 = -(x1 * (0.5 * (t3 * (t19 * (t8 * t8))) - 0.5 * (t19 * t9)));
+    const double t26 = 0.5 * (t21 * t13), t27 = 0.5 * (t5 * (t21 * (t12 * t12)));
+    const double t28 = -(x3 * (0.5 * (t23 * t17) - 0.5 * (t6 * (t23 * (t16 * t16)))));
     increment_jacobian[0] = -t10;
     increment_jacobian[1] = t25;
     increment_jacobian[2] = t25;
@@ -98,134 +98,145 @@ static void lotka_volterra_linearise(const double coef[1], const double y[3], do
     increment_jacobian[8] = -t18;
 }
 
-/* Solve matrix * solution = side, both overwritten, by elimination with partial pivoting. 0 if singular. */
-static int lotka_volterra_solve_pivoting(double matrix[9], double side[3])
-{
-    for (int k = 0; k < 3; ++k) {
-        int best = k;
-        for (int i = k + 1; i < 3; ++i)
-            if (fabs(matrix[i * 3 + k]) > fabs(matrix[best * 3 + k])) best = i;
-        const double pivot = matrix[best * 3 + k];
-        if (!(fabs(pivot) > 0.0)) return 0;
-        for (int j = k; j < 3 && best != k; ++j) {
-            const double swap = matrix[k * 3 + j];
-            matrix[k * 3 + j] = matrix[best * 3 + j];
-            matrix[best * 3 + j] = swap;
-        }
-        const double swap = side[k];
-        side[k] = side[best];
-        side[best] = swap;
-        for (int i = k + 1; i < 3; ++i) {
-            const double factor = matrix[i * 3 + k] / pivot;
-            for (int j = k + 1; j < 3; ++j) matrix[i * 3 + j] -= factor * matrix[k * 3 + j];
-            side[i] -= factor * side[k];
-        }
-    }
-    for (int i = 3 - 1; i >= 0; --i) {
-        for (int j = i + 1; j < 3; ++j) side[i] -= matrix[i * 3 + j] * side[j];
-        side[i] /= matrix[i * 3 + i];
-    }
-    return 1;
-}
-
 /* elimination without pivoting: the solution, and the reciprocals of the pivots */
-static void lotka_volterra_eliminate(const double matrix[9], const double side[3], double solution[restrict 3],
-                                     double reciprocal[restrict 3])
+static void lotka_volterra_eliminate(const double matrix[9], const double side[3],
+    double solution[restrict 3], double reciprocal[restrict 3])
 {
-    const double t1 = 1.0 / matrix[0];
-    const double t2 = matrix[6] * t1;
-    const double t3 = matrix[3] * t1;
-    const double t4 = side[1] - side[0] * t3;
-    const double t5 = 1.0 / (matrix[4] - matrix[1] * t3);
-    const double t6 = (matrix[7] - matrix[1] * t2) * t5;
-    const double t7 = matrix[5] - matrix[2] * t3;
+    /* solution */
+    const double t1 = 1.0 / matrix[0], t2 = matrix[6] * t1, t3 = matrix[3] * t1;
+    const double t4 = side[1] - side[0] * t3, t5 = 1.0 / (matrix[4] - matrix[1] * t3);
+    const double t6 = (matrix[7] - matrix[1] * t2) * t5, t7 = matrix[5] - matrix[2] * t3;
     const double t8 = 1.0 / (matrix[8] - matrix[2] * t2 - t7 * t6);
-    const double t9 = (side[2] - side[0] * t2 - t4 * t6) * t8;
-    const double t10 = t5 * (t4 - t7 * t9);
+    const double t9 = (side[2] - side[0] * t2 - t4 * t6) * t8, t10 = t5 * (t4 - t7 * t9);
     solution[0] = t1 * (side[0] - (matrix[2] * t9 + matrix[1] * t10));
     solution[1] = t10;
     solution[2] = t9;
+    /* reciprocal */
     reciprocal[0] = t1;
     reciprocal[1] = t5;
     reciprocal[2] = t8;
 }
 
+/* the Hamiltonian */
+double lotka_volterra_hamiltonian(const lotka_volterra_params *params, const double x[3])
+{
+    (void)params;
+    const double x1 = x[0], x2 = x[1], x3 = x[2];
+    return x3 + (x1 + x2);
+}
+
+/* the Casimirs */
+void lotka_volterra_casimirs(const lotka_volterra_params *params, const double x[3], double out[])
+{
+    (void)params;
+    const double x1 = x[0], x2 = x[1], x3 = x[2];
+    out[0] = x1 * x3 / x2;
+}
+
+/* pi(x) grad H(x) */
+void lotka_volterra_vector_field(const lotka_volterra_params *params, const double x[3], double out[3])
+{
+    (void)params;
+    const double x1 = x[0], x2 = x[1], x3 = x[2];
+    const double t1 = x1 * x3, t2 = x1 * x2, t3 = x2 * x3;
+    out[0] = t1 + t2;
+    out[1] = t3 - t2;
+    out[2] = -(t1 + t3);
+}
+
+/* ---- Compensated sums, linear equations ---- */
+/* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to
+   its last bit: were it rounded with the change, corrections of one sign would add up to a drift. 0, and x as
+   before, if the sum is not finite. */
+static int lotka_volterra_advance(lotka_volterra_solver *s, const double change[lotka_volterra_DIM],
+    const double correction[lotka_volterra_DIM])
+{
+    double x[lotka_volterra_DIM], carry[lotka_volterra_DIM];
+    for (int i = 0; i < lotka_volterra_DIM; ++i) {
+        const double sum = s->x[i] + change[i], added = sum - s->x[i];
+        const double lost = (s->x[i] - (sum - added)) + (change[i] - added);
+        const double small = lost + (s->carry[i] + correction[i]);
+        x[i] = sum + small;
+        carry[i] = small - (x[i] - sum);
+        if (!isfinite(x[i])) return 0;
+    }
+    memcpy(s->x, x, sizeof x);
+    memcpy(s->carry, carry, sizeof carry);
+    return 1;
+}
+
+/* Newton matrices are I + O(h): a pivot whose reciprocal is larger than this is far from 1. */
+#define lotka_volterra_LARGEST_RECIPROCAL 1e3
+
+/* Solve matrix * solution = side, both overwritten, by elimination with partial pivoting. 0 if singular. */
+static int lotka_volterra_solve_pivoting(double matrix[lotka_volterra_DIM * lotka_volterra_DIM],
+    double side[lotka_volterra_DIM])
+{
+    for (int k = 0; k < lotka_volterra_DIM; ++k) {
+        int best = k;
+        for (int i = k + 1; i < lotka_volterra_DIM; ++i)
+            if (fabs(matrix[i * lotka_volterra_DIM + k]) > fabs(matrix[best * lotka_volterra_DIM + k]))
+                best = i;
+        const double pivot = matrix[best * lotka_volterra_DIM + k], last = side[k];
+        if (!(fabs(pivot) > 0.0)) return 0;
+        for (int j = k; j < lotka_volterra_DIM && best != k; ++j) {
+            const double swap = matrix[k * lotka_volterra_DIM + j];
+            matrix[k * lotka_volterra_DIM + j] = matrix[best * lotka_volterra_DIM + j];
+            matrix[best * lotka_volterra_DIM + j] = swap;
+        }
+        side[k] = side[best];
+        side[best] = last;
+        for (int i = k + 1; i < lotka_volterra_DIM; ++i) {
+            const double factor = matrix[i * lotka_volterra_DIM + k] / pivot;
+            for (int j = k + 1; j < lotka_volterra_DIM; ++j)
+                matrix[i * lotka_volterra_DIM + j] -= factor * matrix[k * lotka_volterra_DIM + j];
+            side[i] -= factor * side[k];
+        }
+    }
+    for (int i = lotka_volterra_DIM - 1; i >= 0; --i) {
+        for (int j = i + 1; j < lotka_volterra_DIM; ++j)
+            side[i] -= matrix[i * lotka_volterra_DIM + j] * side[j];
+        side[i] /= matrix[i * lotka_volterra_DIM + i];
+    }
+    return 1;
+}
+
 /* Solve matrix * solution = side, both overwritten. The matrix is I + O(h), so elimination without pivoting
    does unless a pivot is far from 1. 0 if singular. */
-static int lotka_volterra_solve(double matrix[9], double side[3])
+static int lotka_volterra_solve(double matrix[lotka_volterra_DIM * lotka_volterra_DIM],
+    double side[lotka_volterra_DIM])
 {
-    double solution[3], reciprocal[3], largest = 0.0;
+    double solution[lotka_volterra_DIM], reciprocal[lotka_volterra_DIM], largest = 0.0;
     lotka_volterra_eliminate(matrix, side, solution, reciprocal);
-    for (int i = 0; i < 3; ++i)
+    for (int i = 0; i < lotka_volterra_DIM; ++i)
         if (!(fabs(reciprocal[i]) <= largest)) largest = fabs(reciprocal[i]);
-    if (!(largest < 1e3)) return lotka_volterra_solve_pivoting(matrix, side);
+    if (!(largest < lotka_volterra_LARGEST_RECIPROCAL)) return lotka_volterra_solve_pivoting(matrix, side);
     memcpy(side, solution, sizeof solution);
     return 1;
 }
 
-/* Whether a guess is where the next values may be. Recurrences that were fitted to little else than rest, near a saddle,
-   may lead anywhere; and far away the equation of a step has solutions that have nothing to do with the motion. */
-static int lotka_volterra_near(const double guess[3], const double last[3])
-{
-    double distance = 0.0, size = 0.0;
-    for (int i = 0; i < 3; ++i) {
-        distance += fabs(guess[i] - last[i]);
-        size += fabs(last[i]);
-    }
-    return distance <= 4.0 * size;
-}
+/* ---- Starting guesses ---- */
 
-/* The guess for the next value (y), from earlier ones; 0 if there is none. */
-static int lotka_volterra_predict(const lotka_volterra_memory *memory, double value[3])
-{
-    const int last = memory->count - 1;
-    double odd[3] = { 0.0 }, binomial = -1.0;
-    memset(value, 0, 3 * sizeof value[0]);
-    if (memory->fitting) {
-        for (int k = 0; k < memory->terms; k += 2)
-            for (int i = 0; i < 3; ++i) {
-                value[i] += memory->weight[k][i][0] * memory->past[last - k][i];
-                odd[i] += memory->weight[k + 1][i][0] * memory->past[last - 1 - k][i];
-            }
-        for (int i = 0; i < 3; ++i) value[i] += odd[i];
-    } else {
-        for (int k = 0; k < memory->order && k <= last; ++k) {
-            binomial *= -(double)(memory->order - k) / (k + 1);
-            for (int i = 0; i < 3; ++i) value[i] += binomial * memory->past[last - k][i];
-        }
-    }
-    return last >= 0 && lotka_volterra_near(value, memory->past[last]);
-}
+/* ---- Recurrences fitted to the last values ---- */
+/* A recurrence uses no more values than leave so little, in sizes of the largest. */
+#define lotka_volterra_ENOUGH 3e-12
 
-/* Choose the guess that would have been best for a value that took several iterations. */
-static void lotka_volterra_judge(lotka_volterra_memory *memory, const double value[3])
-{
-    double row[8 + 1][3], guess[3], least = HUGE_VAL, fitted = HUGE_VAL;
-    const int rows = memory->count < 8 ? memory->count : 8;
-    memcpy(row[0], value, sizeof row[0]);
-    for (int k = 0; k < rows; ++k) memcpy(row[k + 1], memory->past[memory->count - 1 - k], sizeof row[0]);
-    for (int order = 1; order <= rows; ++order) { /* row[0] becomes the backward difference of this order */
-        double size = 0.0;
-        for (int k = 0; k <= rows - order; ++k)
-            for (int i = 0; i < 3; ++i) row[k][i] -= row[k + 1][i];
-        for (int i = 0; i < 3; ++i) size += fabs(row[0][i]);
-        if (size < least) {
-            least = size;
-            memory->order = order;
-        }
-    }
-    memory->fitting = memory->terms > 0;
-    if (memory->fitting && lotka_volterra_predict(memory, guess)) {
-        fitted = 0.0;
-        for (int i = 0; i < 3; ++i) fitted += fabs(value[i] - guess[i]);
-    }
-    memory->fitting = memory->terms > 0 && fitted <= least;
-    if (memory->order == 0) memory->order = 1;
-}
+/* The ridge of the least squares: the level of rounding. */
+#define lotka_volterra_RIDGE 1e-15
 
-/* Make eight columns orthogonal to one, by the multiples of it that are put into r. Where that one is among the eight, those
-   up to it stay as they are, and inverse becomes one over its squared length. The number of rows is even. */
-static void lotka_volterra_project(int rows, double (*one)[8], int column, double *inverse, double (*eight)[8], double r[8])
+/* How far a recurrence may miss values that it was not fitted to, in sizes of the largest: beyond, the motion
+   is chaotic or the step long, and other guesses are as good. */
+#define lotka_volterra_HOPELESS 1e-7
+
+/* equations of the least squares */
+enum { lotka_volterra_ROWS = lotka_volterra_REMEMBERED - lotka_volterra_WINDOW - lotka_volterra_AHEAD
+    - lotka_volterra_CHECKS + 1 };
+
+/* Make eight columns orthogonal to one, by the multiples of it that are put into r. Where that one is among
+   the eight, those up to it stay as they are, and inverse becomes one over its squared length. The number of
+   rows is even. */
+static void lotka_volterra_project(int rows, double (*one)[8], int column, double *inverse,
+    double (*eight)[8], double r[8])
 {
     double even[8] = { 0.0 }, odd[8] = { 0.0 };
     for (int i = 0; i < rows; i += 2) {
@@ -248,7 +259,7 @@ static void lotka_volterra_project(int rows, double (*one)[8], int column, doubl
 /* By how much recurrences miss the last of these values. */
 static double lotka_volterra_missed(const double *value, double (*weight)[8])
 {
-    enum { AHEAD = 8, WINDOW = 40, CHECKS = 8 };
+    enum { AHEAD = lotka_volterra_AHEAD, WINDOW = lotka_volterra_WINDOW, CHECKS = lotka_volterra_CHECKS };
     double most = 0.0;
     for (int i = 0; i < CHECKS; ++i) {
         double guess[8] = { 0.0 };
@@ -259,31 +270,36 @@ static double lotka_volterra_missed(const double *value, double (*weight)[8])
     return most;
 }
 
-/* Fit the recurrences value[m + l] = sum of weight[k][..][l] * value[m - 1 - k], l = 0 ... 8 - 1, to the history of
-   a component: ridge least squares by modified Gram-Schmidt, the ridge at the level of rounding. Columns are taken in by
-   eights, until they leave next to nothing of the right-hand sides. How many past values are used; 0 if the recurrences do
-   not foresee the last values, which they were not fitted to. */
-static int lotka_volterra_train(lotka_volterra_memory *memory, int component)
+/* Fit the recurrences value[m + l] = sum of weight[k][..][l] * value[m - 1 - k], l = 0 ...
+   lotka_volterra_AHEAD - 1, to the history of a component: ridge least squares by modified Gram-Schmidt, the
+   ridge at the level of rounding. Columns are taken in by eights, until they leave next to nothing of the
+   right-hand sides. How many past values are used; 0 if the recurrences do not foresee the last values, which
+   they were not fitted to. */
+static int lotka_volterra_train(lotka_volterra_history *history, int component)
 {
-    enum { AHEAD = 8, WINDOW = 40, ROWS = 56 };
-    double q[WINDOW / 8][ROWS + WINDOW][8], r[WINDOW / 8][WINDOW][8], inverse[WINDOW]; /* eight columns in each part */
-    double right[ROWS + WINDOW][8], weight[WINDOW][8], value[111], largest = 0.0, left = HUGE_VAL;
+    enum { AHEAD = lotka_volterra_AHEAD, WINDOW = lotka_volterra_WINDOW, ROWS = lotka_volterra_ROWS };
+    /* eight columns in each part */
+    double q[WINDOW / 8][ROWS + WINDOW][8], r[WINDOW / 8][WINDOW][8], inverse[WINDOW];
+    double right[ROWS + WINDOW][8], weight[WINDOW][8], value[lotka_volterra_REMEMBERED], largest = 0.0, left =
+        HUGE_VAL;
     int terms = 0;
     memset(q, 0, sizeof q);
     memset(right, 0, sizeof right);
     memset(weight, 0, sizeof weight);
-    for (int i = 0; i < 111; ++i) {
-        value[i] = memory->past[memory->count - 111 + i][component];
+    for (int i = 0; i < lotka_volterra_REMEMBERED; ++i) {
+        value[i] = history->past[history->count - lotka_volterra_REMEMBERED + i][component];
         if (fabs(value[i]) > largest) largest = fabs(value[i]);
     }
     for (int i = 0; i < ROWS; ++i)
         for (int l = 0; l < AHEAD; ++l) right[i][l] = value[i + WINDOW + l];
-    while (terms < WINDOW && left > 3e-12 * largest) {
-        const int part = terms / 8, rows = ROWS + terms + 8; /* further rows of the ridge are zero in these columns */
+    while (terms < WINDOW && left > lotka_volterra_ENOUGH * largest) {
+        /* further rows of the ridge are zero in these columns */
+        const int part = terms / 8, rows = ROWS + terms + 8;
         for (int i = 0; i < ROWS; ++i)
             for (int l = 0; l < 8; ++l) q[part][i][l] = value[i + WINDOW - 1 - terms - l];
-        for (int l = 0; l < 8; ++l) q[part][ROWS + terms + l][l] = 1e-15 * largest;
-        for (int k = 0; k < terms; ++k) lotka_volterra_project(rows, q[k / 8], k % 8, &inverse[k], q[part], r[part][k]);
+        for (int l = 0; l < 8; ++l) q[part][ROWS + terms + l][l] = lotka_volterra_RIDGE * largest;
+        for (int k = 0; k < terms; ++k)
+            lotka_volterra_project(rows, q[k / 8], k % 8, &inverse[k], q[part], r[part][k]);
         for (int l = 0; l < 8; ++l, ++terms) {
             lotka_volterra_project(rows, q[part], l, &inverse[terms], q[part], r[part][terms]);
             lotka_volterra_project(rows, q[part], l, &inverse[terms], right, weight[terms]);
@@ -297,98 +313,162 @@ static int lotka_volterra_train(lotka_volterra_memory *memory, int component)
     for (int k = terms - 1; k >= 0; --k)
         for (int j = k + 1; j < terms; ++j)
             for (int l = 0; l < 8; ++l) weight[k][l] -= r[j / 8][k][j % 8] * weight[j][l];
-    for (int k = 0; k < WINDOW; ++k) memcpy(memory->weight[k][component], weight[k], AHEAD * sizeof(double));
-    return lotka_volterra_missed(value + ROWS, weight) <= 1e-07 * largest ? terms : 0;
+    for (int k = 0; k < WINDOW; ++k) memcpy(history->weight[k][component], weight[k], AHEAD * sizeof(double));
+    return lotka_volterra_missed(value + ROWS, weight) <= lotka_volterra_HOPELESS * largest ? terms : 0;
+}
+/* How far from the last value a guess may be, in sizes of that value. */
+#define lotka_volterra_REACH 4.0
+
+/* Whether a guess is where the next values may be. Far away the equation of a step has solutions that have
+   nothing to do with the motion. */
+static int lotka_volterra_near(const double guess[lotka_volterra_DIM], const double last[lotka_volterra_DIM])
+{
+    double distance = 0.0, size = 0.0;
+    for (int i = 0; i < lotka_volterra_DIM; ++i) {
+        distance += fabs(guess[i] - last[i]);
+        size += fabs(last[i]);
+    }
+    return distance <= lotka_volterra_REACH * size;
+}
+
+enum {
+    /* values that extrapolation uses at most: more amplify rounding more than they gain */
+    lotka_volterra_HISTORY = 8,
+    lotka_volterra_REPAY = 150,      /* steps that a fit costs, about */
+    lotka_volterra_LONG_WAIT = 20000 /* steps until a recurrence that often needs fitting is fitted again */
+};
+
+/* The guess for the next value (y), from earlier ones; 0 if there is none. */
+static int lotka_volterra_predict(const lotka_volterra_history *history, double value[lotka_volterra_DIM])
+{
+    const int last = history->count - 1;
+    double odd[lotka_volterra_DIM] = { 0.0 }, binomial = -1.0;
+    memset(value, 0, lotka_volterra_DIM * sizeof value[0]);
+    if (history->use_recurrence) {
+        for (int k = 0; k < history->recurrence_terms; k += 2)
+            for (int i = 0; i < lotka_volterra_DIM; ++i) {
+                value[i] += history->weight[k][i][0] * history->past[last - k][i];
+                odd[i] += history->weight[k + 1][i][0] * history->past[last - 1 - k][i];
+            }
+        for (int i = 0; i < lotka_volterra_DIM; ++i) value[i] += odd[i];
+    } else {
+        for (int k = 0; k < history->extrapolation_order && k <= last; ++k) {
+            binomial *= -(double)(history->extrapolation_order - k) / (k + 1);
+            for (int i = 0; i < lotka_volterra_DIM; ++i) value[i] += binomial * history->past[last - k][i];
+        }
+    }
+    return last >= 0 && lotka_volterra_near(value, history->past[last]);
+}
+
+/* Choose the guess that would have been best for a value that took several iterations. */
+static void lotka_volterra_judge(lotka_volterra_history *history, const double value[lotka_volterra_DIM])
+{
+    double row[lotka_volterra_HISTORY + 1][lotka_volterra_DIM], guess[lotka_volterra_DIM], least = HUGE_VAL,
+        fitted = HUGE_VAL;
+    const int rows = history->count < lotka_volterra_HISTORY ? history->count : lotka_volterra_HISTORY;
+    memcpy(row[0], value, sizeof row[0]);
+    for (int k = 0; k < rows; ++k) memcpy(row[k + 1], history->past[history->count - 1 - k], sizeof row[0]);
+    for (int order = 1; order <= rows; ++order) { /* row[0] becomes the backward difference of this order */
+        double size = 0.0;
+        for (int k = 0; k <= rows - order; ++k)
+            for (int i = 0; i < lotka_volterra_DIM; ++i) row[k][i] -= row[k + 1][i];
+        for (int i = 0; i < lotka_volterra_DIM; ++i) size += fabs(row[0][i]);
+        if (size < least) {
+            least = size;
+            history->extrapolation_order = order;
+        }
+    }
+    history->use_recurrence = history->recurrence_terms > 0;
+    if (history->use_recurrence && lotka_volterra_predict(history, guess)) {
+        fitted = 0.0;
+        for (int i = 0; i < lotka_volterra_DIM; ++i) fitted += fabs(value[i] - guess[i]);
+    }
+    history->use_recurrence = history->recurrence_terms > 0 && fitted <= least;
+    if (history->extrapolation_order == 0) history->extrapolation_order = 1;
 }
 
 /* Drop what is old, if so many values would not fit into the history. */
-static void lotka_volterra_make_room(lotka_volterra_memory *memory, int values)
+static void lotka_volterra_make_room(lotka_volterra_history *history, int values)
 {
-    if (memory->count + values <= 222) return;
-    memmove(memory->past, memory->past + memory->count - 111, 111 * sizeof memory->past[0]);
-    memory->count = 111;
+    if (history->count + values <= lotka_volterra_KEPT) return;
+    memmove(history->past, history->past + history->count - lotka_volterra_REMEMBERED,
+        lotka_volterra_REMEMBERED * sizeof history->past[0]);
+    history->count = lotka_volterra_REMEMBERED;
 }
 
 /* Add a value to the history. */
-static void lotka_volterra_record(lotka_volterra_memory *memory, const double value[3])
+static void lotka_volterra_record(lotka_volterra_history *history, const double value[lotka_volterra_DIM])
 {
-    lotka_volterra_make_room(memory, 1);
-    memcpy(memory->past[memory->count++], value, 3 * sizeof value[0]);
+    lotka_volterra_make_room(history, 1);
+    memcpy(history->past[history->count++], value, lotka_volterra_DIM * sizeof value[0]);
 }
 
 /* Fit the recurrence to the last values; with every time, wait longer before it is done again. */
-static void lotka_volterra_fit(lotka_volterra_memory *memory)
+static void lotka_volterra_fit(lotka_volterra_history *history)
 {
     int found = 1;
-    memory->terms = 0;
-    for (int i = 0; i < 3 && found; ++i) {
-        const int terms = lotka_volterra_train(memory, i);
+    history->recurrence_terms = 0;
+    for (int i = 0; i < lotka_volterra_DIM && found; ++i) {
+        const int terms = lotka_volterra_train(history, i);
         found = terms > 0;
-        if (terms > memory->terms) memory->terms = terms;
+        if (terms > history->recurrence_terms) history->recurrence_terms = terms;
     }
-    if (!found) memory->terms = 0;
-    memory->fitting = found;
-    ++memory->fits;
-    memory->slow = 0;
-    memory->patience = memory->patience < 10000 ? 2 * memory->patience + 150 : 20000;
+    if (!found) history->recurrence_terms = 0;
+    history->use_recurrence = found;
+    ++history->fits;
+    history->slow_steps = 0;
+    history->slow_steps_allowed = history->slow_steps_allowed < lotka_volterra_LONG_WAIT / 2
+        ? 2 * history->slow_steps_allowed + lotka_volterra_REPAY : lotka_volterra_LONG_WAIT;
 }
 
 /* Take in the solved value: what took one iteration needs no better guess. */
-static void lotka_volterra_remember(lotka_volterra_memory *memory, const double value[3], int iterations)
+static void lotka_volterra_remember(lotka_volterra_history *history, const double value[lotka_volterra_DIM],
+    int iterations)
 {
-    if (iterations > 1) lotka_volterra_judge(memory, value);
-    lotka_volterra_record(memory, value);
-    memory->slow = iterations > 1 ? memory->slow + 1 : 0;
-    if (memory->slow > memory->patience && memory->count >= 111) lotka_volterra_fit(memory);
+    if (iterations > 1) lotka_volterra_judge(history, value);
+    lotka_volterra_record(history, value);
+    history->slow_steps = iterations > 1 ? history->slow_steps + 1 : 0;
+    if (history->slow_steps > history->slow_steps_allowed && history->count >= lotka_volterra_REMEMBERED)
+        lotka_volterra_fit(history);
 }
 
-/* Whether an increment is that of the motion. Where the step is too large, the equation may have been solved by a point far
-   away, at another energy, that has nothing to do with it. */
-static int lotka_volterra_plausible(const lotka_volterra_solver *s, int stage, const double increment[3])
+/* How far a step may lead, in sizes of the state and of what the vector field says, if the energy is lost;
+   and the part of the energy that counts as lost. */
+#define lotka_volterra_PLAUSIBLE 1.5
+#define lotka_volterra_LOST 0.5
+
+/* Whether an increment is that of the motion. Where the step is too large, the equation may have been solved
+   by a point far away, at another energy, that has nothing to do with it. */
+static int lotka_volterra_plausible(const lotka_volterra_solver *s,
+    const double increment[lotka_volterra_DIM])
 {
-    double moved = 0.0, size = 0.0, field[3], middle[3], end[3];
-    for (int i = 0; i < 3; ++i) {
+    double moved = 0.0, size = 0.0, field[lotka_volterra_DIM], middle[lotka_volterra_DIM],
+        end[lotka_volterra_DIM];
+    for (int i = 0; i < lotka_volterra_DIM; ++i) {
         moved += fabs(increment[i]);
         size += fabs(s->x[i]);
     }
-    if (moved <= 1.5 * size) return 1;
+    if (moved <= lotka_volterra_PLAUSIBLE * size) return 1;
     lotka_volterra_vector_field(&s->params, s->x, field);
-    for (int i = 0; i < 3; ++i) {
-        size += fabs(lotka_volterra_fractions[stage] * s->h * field[i]);
+    for (int i = 0; i < lotka_volterra_DIM; ++i) {
+        size += fabs(s->h * field[i]);
         middle[i] = s->x[i] + 0.5 * increment[i];
         end[i] = s->x[i] + increment[i];
     }
-    if (moved <= 1.5 * size) return 1;
-    const double before = lotka_volterra_hamiltonian(&s->params, s->x), after = lotka_volterra_hamiltonian(&s->params, end);
+    if (moved <= lotka_volterra_PLAUSIBLE * size) return 1;
+    const double before = lotka_volterra_hamiltonian(&s->params, s->x), after =
+        lotka_volterra_hamiltonian(&s->params, end);
     const double scale = fabs(before) + fabs(lotka_volterra_hamiltonian(&s->params, middle)) + fabs(after);
-    return fabs(after - before) <= 0.5 * scale;
+    return fabs(after - before) <= lotka_volterra_LOST * scale;
 }
 
-/* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to its last
-   bit: were it rounded with the change, corrections of one sign would add up to a drift. 0, and x as before, if the
-   sum is not finite. */
-static int lotka_volterra_advance(lotka_volterra_solver *s, const double change[3], const double correction[3])
-{
-    double x[3], carry[3];
-    for (int i = 0; i < 3; ++i) {
-        const double sum = s->x[i] + change[i], added = sum - s->x[i];
-        const double lost = (s->x[i] - (sum - added)) + (change[i] - added);
-        const double small = lost + (s->carry[i] + correction[i]);
-        x[i] = sum + small;
-        carry[i] = small - (x[i] - sum);
-        if (!isfinite(x[i])) return 0;
-    }
-    memcpy(s->x, x, sizeof x);
-    memcpy(s->carry, carry, sizeof carry);
-    return 1;
-}
-
+/* ---- The implicit step, by Newton's method ---- */
 /* Size of a correction relative to each component of y (coordinates keep their sign, and may be of very
    different size); NaN or infinite if the correction is. */
-static double lotka_volterra_size(const double y[3], const double delta[3])
+static double lotka_volterra_size(const double y[lotka_volterra_DIM], const double delta[lotka_volterra_DIM])
 {
     double size = 0.0;
-    for (int i = 0; i < 3; ++i) {
+    for (int i = 0; i < lotka_volterra_DIM; ++i) {
         const double ratio = fabs(delta[i]) / (fabs(y[i]) + DBL_MIN);
         if (!isfinite(ratio)) return ratio;
         size = ratio > size ? ratio : size;
@@ -396,126 +476,61 @@ static double lotka_volterra_size(const double y[3], const double delta[3])
     return size;
 }
 
+/* Corrections below the first that shrink by less than the second have reached the level of rounding. */
+#define lotka_volterra_NEARLY_SOLVED 1e-8
+#define lotka_volterra_SHRINKING 0.25
+
 /* Solve (y - x) + displacement(y) = 0 for y by Newton's method from the extrapolated guess, and advance. The
-   increment is corrected to first order by the last Newton correction, so that correction costs no evaluation:
-   a correction is accepted when the error that remains after it, quadratic in it, is below 1e-20. */
-static lotka_volterra_status lotka_volterra_attempt(lotka_volterra_solver *s, int stage)
+   increment is corrected to first order by the last Newton correction, so that correction costs no
+   evaluation: a correction is accepted when the error that remains after it, quadratic in it, is below
+   lotka_volterra_TOLERANCE. */
+static lotka_volterra_status lotka_volterra_attempt(lotka_volterra_solver *s)
 {
-    const double *coef = s->coef[stage];
-    lotka_volterra_memory *memory = &s->memory[stage];
-    double y[3], delta[3], displacement[3], increment[3];
-    double jacobian[9], increment_jacobian[9];
-    if (!lotka_volterra_predict(memory, y)) memcpy(y, s->x, sizeof y);
-    double previous = HUGE_VAL;
-    for (int iteration = 0; iteration < 20; ++iteration) {
-        lotka_volterra_linearise(coef, y, displacement, increment, jacobian, increment_jacobian);
+    double y[lotka_volterra_DIM], delta[lotka_volterra_DIM], displacement[lotka_volterra_DIM],
+        increment[lotka_volterra_DIM];
+    double jacobian[lotka_volterra_DIM * lotka_volterra_DIM], increment_jacobian[lotka_volterra_DIM
+        * lotka_volterra_DIM], previous = HUGE_VAL;
+    if (!lotka_volterra_predict(&s->history, y)) memcpy(y, s->x, sizeof y);
+    for (int iteration = 1; iteration <= lotka_volterra_MAX_ITERATIONS; ++iteration) {
+        lotka_volterra_linearise(s->coef, y, displacement, increment, jacobian, increment_jacobian);
         ++s->evaluations;
-        for (int i = 0; i < 3; ++i) delta[i] = ((y[i] - s->x[i]) + displacement[i]) - s->carry[i];
+        for (int i = 0; i < lotka_volterra_DIM; ++i) delta[i] = ((y[i] - s->x[i]) + displacement[i])
+            - s->carry[i];
         const int regular = lotka_volterra_solve(jacobian, delta);
-        const double size = lotka_volterra_size(y, delta);
+        const double size = lotka_volterra_size(y, delta), growth = size / (previous * previous);
         if (!isfinite(size)) return lotka_volterra_NOT_FINITE;
         if (!regular) return lotka_volterra_SINGULAR;
-        for (int i = 0; i < 3; ++i) y[i] -= delta[i];
-        const double growth = size / (previous * previous);
+        for (int i = 0; i < lotka_volterra_DIM; ++i) y[i] -= delta[i];
         const double remaining = size * size * (growth > 1.0 ? growth : 1.0);
-        /* The second test: corrections no longer shrink, the solve has reached the level of rounding. */
-        if (remaining <= 1e-20 || (previous < 1e-8 && size > 0.25 * previous)) {
-            double correction[3] = { 0.0 };
-            for (int i = 0; i < 3; ++i)
-                for (int j = 0; j < 3; ++j) correction[i] -= increment_jacobian[i * 3 + j] * delta[j];
-            if (!lotka_volterra_plausible(s, stage, increment)) return lotka_volterra_NO_CONVERGENCE;
-            if (!lotka_volterra_advance(s, increment, correction)) return lotka_volterra_NOT_FINITE;
-            lotka_volterra_remember(memory, y, iteration + 1);
-            return lotka_volterra_OK;
-        }
+        const int stalled = previous < lotka_volterra_NEARLY_SOLVED && size > lotka_volterra_SHRINKING
+            * previous;
         previous = size;
+        if (!(remaining <= lotka_volterra_TOLERANCE || stalled)) continue;
+        double correction[lotka_volterra_DIM] = { 0.0 };
+        for (int i = 0; i < lotka_volterra_DIM; ++i)
+            for (int j = 0; j < lotka_volterra_DIM; ++j)
+                correction[i] -= increment_jacobian[i * lotka_volterra_DIM + j] * delta[j];
+        if (!lotka_volterra_plausible(s, increment)) return lotka_volterra_NO_CONVERGENCE;
+        if (!lotka_volterra_advance(s, increment, correction)) return lotka_volterra_NOT_FINITE;
+        lotka_volterra_remember(&s->history, y, iteration);
+        return lotka_volterra_OK;
     }
     return lotka_volterra_NO_CONVERGENCE;
 }
 
-/* The 1 stages of one step. If one fails, the state is as before the step. */
-static lotka_volterra_status lotka_volterra_stages(lotka_volterra_solver *s)
-{
-    double x[3], carry[3];
-    memcpy(x, s->x, sizeof x);
-    memcpy(carry, s->carry, sizeof carry);
-    for (int stage = 0; stage < 1; ++stage) {
-        lotka_volterra_status status = lotka_volterra_attempt(s, stage);
-        /* A guess from earlier steps may have misled it: once more without. */
-        if (status != lotka_volterra_OK && s->memory[stage].count > 0) {
-            memset(&s->memory[stage], 0, sizeof s->memory[stage]);
-            status = lotka_volterra_attempt(s, stage);
-        }
-        if (status != lotka_volterra_OK) {
-            memcpy(s->x, x, sizeof x);
-            memcpy(s->carry, carry, sizeof carry);
-            return status;
-        }
-    }
-    return lotka_volterra_OK;
-}
-
-/* All of lotka_volterra_init but the gauge. The arguments may be parts of *s: they are read before it is written. */
-static lotka_volterra_status lotka_volterra_start(lotka_volterra_solver *s, const lotka_volterra_params *params, const double x0[3])
-{
-    if (s == NULL || x0 == NULL) return lotka_volterra_BAD_ARGUMENT;
-    const lotka_volterra_params own = params != NULL ? *params : lotka_volterra_default_params;
-    double x[3];
-    memcpy(x, x0, sizeof x);
-    for (int i = 0; i < 3; ++i)
-        if (!isfinite(x[i])) return lotka_volterra_BAD_ARGUMENT;
-    memset(s, 0, sizeof *s);
-    memcpy(s->x, x, sizeof s->x);
-    s->params = own;
-    return lotka_volterra_OK;
-}
-
-lotka_volterra_status lotka_volterra_init(lotka_volterra_solver *s, const lotka_volterra_params *params,
-                                          const double x0[3])
-{
-    return lotka_volterra_start(s, params, x0);
-}
-
-/* What depends on the step size; nothing where that is as before. */
-static lotka_volterra_status lotka_volterra_set_step(lotka_volterra_solver *s, double h)
-{
-    if (s == NULL || !isfinite(h)) return lotka_volterra_BAD_ARGUMENT;
-    if (s->ready && memcmp(&h, &s->h, sizeof h) == 0) return lotka_volterra_OK;
-    for (int stage = 0; stage < 1; ++stage)
-        lotka_volterra_prepare(&s->params, lotka_volterra_fractions[stage] * h, s->coef[stage]);
-    memset(s->memory, 0, sizeof s->memory);
-    for (int stage = 0; stage < 1; ++stage) s->memory[stage].patience = 150;
-    s->pause = 16;
-    s->setback = s->foreseeing = 0;
-    s->doubt = s->retry = 0;
-    s->effort = 0.0;
-    s->passes = INT_MAX;
-    s->h = h;
-    s->ready = 1;
-    return lotka_volterra_OK;
-}
-
-lotka_volterra_status lotka_volterra_step(lotka_volterra_solver *s, double h)
-{
-    lotka_volterra_status status = lotka_volterra_set_step(s, h);
-    if (status != lotka_volterra_OK) return status;
-    status = lotka_volterra_stages(s);
-    if (status == lotka_volterra_OK) ++s->steps;
-    return status;
-}
-
-/*
- * Eight at a time: below, the formulas of a step are evaluated for 8 steps of a trajectory, or members of an
- * ensemble, at once. Compilers make vector instructions of the loops over lanes.
- */
-enum { lotka_volterra_LANES = 8 };
+/* ---- Several steps or members at once ---- */
+/* Below, the formulas of a step are evaluated for several steps of a trajectory, or members of an ensemble,
+   at once. Compilers make vector instructions of the loops over lanes. */
+enum { lotka_volterra_LANES = 8 }; /* what one vector of AVX-512 holds */
 
 #if defined(__GNUC__)
-typedef double lotka_volterra_lanes[lotka_volterra_LANES] __attribute__((aligned(64))); /* a value in each lane */
+/* a value in each lane */
+typedef double lotka_volterra_lanes[lotka_volterra_LANES] __attribute__((aligned(64)));
 #else
 typedef double lotka_volterra_lanes[lotka_volterra_LANES];
 #endif
 
+/* Before a loop over lanes: tells compilers that they are independent. */
 #if defined(__clang__)
 #define lotka_volterra_EACH_LANE _Pragma("clang loop vectorize(assume_safety)")
 #pragma clang diagnostic push
@@ -525,19 +540,6 @@ typedef double lotka_volterra_lanes[lotka_volterra_LANES];
 #else
 #define lotka_volterra_EACH_LANE
 #endif
-
-/* What all blocks share: coefficients, the same in each lane, and the recurrences by which they are foreseen. */
-typedef struct {
-    int fits[1]; /* the fit that weight is of; -1 for none */
-    lotka_volterra_lanes coef[1][1], weight[1][40][3];
-} lotka_volterra_table;
-
-/* A stage in all lanes, linearised around y. */
-typedef struct {
-    lotka_volterra_lanes y[3], displacement[3], increment[3], residual[3];
-    /* a residual r of alpha(y) = x takes inverse r from y, and gain r from the increment */
-    lotka_volterra_lanes inverse[9], slope[9], gain[9];
-} lotka_volterra_model;
 
 /* exp(u) - 1 for the loops over lanes: u = k log 2 + r, no branches. No number beyond |u| = 700.0. */
 static inline double lotka_volterra_expm1_lane(double u)
@@ -564,46 +566,103 @@ static inline double lotka_volterra_expm1_lane(double u)
     return power * sum + (power - 1.0) + (fabs(u) <= 700.0 ? 0.0 : (double)NAN);
 }
 
-/* lotka_volterra_linearise in all lanes. */
+/* ---- The solver ---- */
+/* The arguments may be parts of *s: they are read before it is written. */
+lotka_volterra_status lotka_volterra_init(lotka_volterra_solver *s, const lotka_volterra_params *params,
+    const double x0[lotka_volterra_DIM])
+{
+    if (s == NULL || x0 == NULL) return lotka_volterra_BAD_ARGUMENT;
+    const lotka_volterra_params own = params != NULL ? *params : lotka_volterra_default_params;
+    double x[lotka_volterra_DIM];
+    memcpy(x, x0, sizeof x);
+    for (int i = 0; i < lotka_volterra_DIM; ++i)
+        if (!isfinite(x[i])) return lotka_volterra_BAD_ARGUMENT;
+    memset(s, 0, sizeof *s);
+    memcpy(s->x, x, sizeof s->x);
+    s->params = own;
+    return lotka_volterra_OK;
+}
+
+/* What depends on the step size; nothing where that is as before. */
+static lotka_volterra_status lotka_volterra_set_step(lotka_volterra_solver *s, double h)
+{
+    if (s == NULL || !isfinite(h)) return lotka_volterra_BAD_ARGUMENT;
+    if (s->prepared && memcmp(&h, &s->h, sizeof h) == 0) return lotka_volterra_OK;
+    lotka_volterra_prepare(&s->params, h, s->coef);
+    memset(&s->history, 0, sizeof s->history);
+    s->history.slow_steps_allowed = lotka_volterra_REPAY;
+    memset(&s->blocks, 0, sizeof s->blocks);
+    s->blocks.single_steps = 2 * lotka_volterra_LANES;
+    s->blocks.passes_without_recurrences = INT_MAX;
+    s->h = h;
+    s->t_before_h = s->t;
+    s->steps_before_h = s->steps;
+    s->prepared = 1;
+    return lotka_volterra_OK;
+}
+
+/* Some good steps have been made. */
+static void lotka_volterra_count(lotka_volterra_solver *s, size_t steps)
+{
+    s->steps += steps;
+    s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
+}
+
+/* One stage. A guess from earlier steps may have misled it: then once more without. */
+static lotka_volterra_status lotka_volterra_stage(lotka_volterra_solver *s)
+{
+    lotka_volterra_status status = lotka_volterra_attempt(s);
+    if (status != lotka_volterra_OK && s->history.count > 0) {
+        memset(&s->history, 0, sizeof s->history);
+        status = lotka_volterra_attempt(s);
+    }
+    return status;
+}
+
+lotka_volterra_status lotka_volterra_step(lotka_volterra_solver *s, double h)
+{
+    lotka_volterra_status status = lotka_volterra_set_step(s, h);
+    if (status != lotka_volterra_OK) return status;
+    status = lotka_volterra_stage(s);
+    if (status == lotka_volterra_OK) lotka_volterra_count(s, 1);
+    return status;
+}
+
+const char *lotka_volterra_status_string(lotka_volterra_status status)
+{
+    static const char *const text[] = {
+        "ok",
+        "no convergence: the step is too large",
+        "singular Newton matrix: the step is too large",
+        "not finite: overflow, or outside the domain",
+        "bad argument: a null pointer, or values that are not allowed"
+    };
+    return (unsigned)status <= lotka_volterra_BAD_ARGUMENT ? text[status] : "unknown status";
+}
+
+size_t lotka_volterra_solver_size(void) { return sizeof(lotka_volterra_solver); }
+
+size_t lotka_volterra_solver_steps_done(const lotka_volterra_solver *s) { return s->steps; }
+
+/* lotka_volterra_linearise in all lanes */
 static void lotka_volterra_linearise_lanes(lotka_volterra_lanes coef[restrict 1],
-                                           lotka_volterra_lanes y[restrict 3],
-                                           lotka_volterra_lanes displacement[restrict 3],
-                                           lotka_volterra_lanes increment[restrict 3],
-                                           lotka_volterra_lanes jacobian[restrict 9],
-                                           lotka_volterra_lanes increment_jacobian[restrict 9])
+    lotka_volterra_lanes y[restrict 3], lotka_volterra_lanes displacement[restrict 3],
+    lotka_volterra_lanes increment[restrict 3], lotka_volterra_lanes jacobian[restrict 9],
+    lotka_volterra_lanes increment_jacobian[restrict 9])
 {
     lotka_volterra_EACH_LANE
     for (int lane = 0; lane < lotka_volterra_LANES; ++lane) {
-        const double x1 = y[0][lane];
-        const double x2 = y[1][lane];
-        const double x3 = y[2][lane];
-        const double t1 = coef[0][lane] * x2;
-        const double t2 = coef[0][lane] * x3;
-        const double t3 = lotka_volterra_expm1_lane((-0.5) * (t1 + t2));
-        const double t4 = coef[0][lane] * x1;
+        const double x1 = y[0][lane], x2 = y[1][lane], x3 = y[2][lane];
+        const double t1 = coef[0][lane] * x2, t2 = coef[0][lane] * x3;
+        const double t3 = lotka_volterra_expm1_lane((-0.5) * (t1 + t2)), t4 = coef[0][lane] * x1;
         const double t5 = lotka_volterra_expm1_lane(0.5 * (t4 - t2));
-        const double t6 = lotka_volterra_expm1_lane(0.5 * (t1 + t4));
-        const double t7 = 1.0 + t3;
-        const double t8 = 1.0 / t7;
-        const double t9 = 1.0 + t8;
-        const double t10 = t3 * t9;
-        const double t11 = 1.0 + t5;
-        const double t12 = 1.0 / t11;
-        const double t13 = 1.0 + t12;
-        const double t14 = t5 * t13;
-        const double t15 = 1.0 + t6;
-        const double t16 = 1.0 / t15;
-        const double t17 = 1.0 + t16;
-        const double t18 = t6 * t17;
-        const double t19 = coef[0][lane] * t7;
-        const double t20 = (-0.5) * (x1 * t19);
-        const double t21 = coef[0][lane] * t11;
-        const double t22 = x2 * t21;
-        const double t23 = coef[0][lane] * t15;
-        const double t24 = 0.5 * (x3 * t23);
+        const double t6 = lotka_volterra_expm1_lane(0.5 * (t1 + t4)), t7 = 1.0 + t3, t8 = 1.0 / t7;
+        const double t9 = 1.0 + t8, t10 = t3 * t9, t11 = 1.0 + t5, t12 = 1.0 / t11, t13 = 1.0 + t12;
+        const double t14 = t5 * t13, t15 = 1.0 + t6, t16 = 1.0 / t15, t17 = 1.0 + t16, t18 = t6 * t17;
+        const double t19 = coef[0][lane] * t7, t20 = (-0.5) * (x1 * t19), t21 = coef[0][lane] * t11;
+        const double t22 = x2 * t21, t23 = coef[0][lane] * t15, t24 = 0.5 * (x3 * t23);
         const double t25 = -(x1 * (0.5 * (t3 * (t19 * (t8 * t8))) - 0.5 * (t19 * t9)));
-        const double t26 = 0.5 * (t21 * t13);
-        const double t27 = 0.5 * (t5 * (t21 * (t12 * t12)));
+        const double t26 = 0.5 * (t21 * t13), t27 = 0.5 * (t5 * (t21 * (t12 * t12)));
         const double t28 = -(x3 * (0.5 * (t23 * t17) - 0.5 * (t6 * (t23 * (t16 * t16)))));
         displacement[0][lane] = x1 * t3;
         displacement[1][lane] = x2 * t5;
@@ -632,21 +691,16 @@ static void lotka_volterra_linearise_lanes(lotka_volterra_lanes coef[restrict 1]
     }
 }
 
-/* lotka_volterra_evaluate in all lanes. */
+/* lotka_volterra_evaluate in all lanes */
 static void lotka_volterra_evaluate_lanes(lotka_volterra_lanes coef[restrict 1],
-                                          lotka_volterra_lanes y[restrict 3],
-                                          lotka_volterra_lanes displacement[restrict 3],
-                                          lotka_volterra_lanes increment[restrict 3])
+    lotka_volterra_lanes y[restrict 3], lotka_volterra_lanes displacement[restrict 3],
+    lotka_volterra_lanes increment[restrict 3])
 {
     lotka_volterra_EACH_LANE
     for (int lane = 0; lane < lotka_volterra_LANES; ++lane) {
-        const double x1 = y[0][lane];
-        const double x2 = y[1][lane];
-        const double x3 = y[2][lane];
-        const double t1 = coef[0][lane] * x2;
-        const double t2 = coef[0][lane] * x3;
-        const double t3 = lotka_volterra_expm1_lane((-0.5) * (t1 + t2));
-        const double t4 = coef[0][lane] * x1;
+        const double x1 = y[0][lane], x2 = y[1][lane], x3 = y[2][lane];
+        const double t1 = coef[0][lane] * x2, t2 = coef[0][lane] * x3;
+        const double t3 = lotka_volterra_expm1_lane((-0.5) * (t1 + t2)), t4 = coef[0][lane] * x1;
         const double t5 = lotka_volterra_expm1_lane(0.5 * (t4 - t2));
         const double t6 = lotka_volterra_expm1_lane(0.5 * (t1 + t4));
         displacement[0][lane] = x1 * t3;
@@ -658,32 +712,21 @@ static void lotka_volterra_evaluate_lanes(lotka_volterra_lanes coef[restrict 1],
     }
 }
 
-/* lotka_volterra_invert in all lanes. */
+/* lotka_volterra_invert in all lanes */
 static void lotka_volterra_invert_lanes(lotka_volterra_lanes matrix[restrict 9],
-                                        lotka_volterra_lanes slope[restrict 9],
-                                        lotka_volterra_lanes inverse[restrict 9],
-                                        lotka_volterra_lanes gain[restrict 9],
-                                        lotka_volterra_lanes reciprocal[restrict 3])
+    lotka_volterra_lanes slope[restrict 9], lotka_volterra_lanes inverse[restrict 9],
+    lotka_volterra_lanes gain[restrict 9], lotka_volterra_lanes reciprocal[restrict 3])
 {
     lotka_volterra_EACH_LANE
     for (int lane = 0; lane < lotka_volterra_LANES; ++lane) {
-        const double t1 = 1.0 / matrix[0][lane];
-        const double t2 = matrix[1][lane] * t1;
-        const double t3 = 1.0 / (matrix[4][lane] - matrix[3][lane] * t2);
-        const double t4 = matrix[3][lane] * t1 * t3;
-        const double t5 = matrix[2][lane] * t1;
-        const double t6 = (matrix[5][lane] - matrix[3][lane] * t5) * t3;
-        const double t7 = t5 - t2 * t6;
-        const double t8 = matrix[7][lane] - matrix[6][lane] * t2;
+        const double t1 = 1.0 / matrix[0][lane], t2 = matrix[1][lane] * t1;
+        const double t3 = 1.0 / (matrix[4][lane] - matrix[3][lane] * t2), t4 = matrix[3][lane] * t1 * t3;
+        const double t5 = matrix[2][lane] * t1, t6 = (matrix[5][lane] - matrix[3][lane] * t5) * t3;
+        const double t7 = t5 - t2 * t6, t8 = matrix[7][lane] - matrix[6][lane] * t2;
         const double t9 = 1.0 / (matrix[8][lane] - matrix[6][lane] * t5 - t8 * t6);
-        const double t10 = (t8 * t4 - matrix[6][lane] * t1) * t9;
-        const double t11 = t1 + t2 * t4 - t7 * t10;
-        const double t12 = t8 * t3 * t9;
-        const double t13 = t7 * t12 - t2 * t3;
-        const double t14 = t7 * t9;
-        const double t15 = t4 + t6 * t10;
-        const double t16 = t3 + t6 * t12;
-        const double t17 = t6 * t9;
+        const double t10 = (t8 * t4 - matrix[6][lane] * t1) * t9, t11 = t1 + t2 * t4 - t7 * t10;
+        const double t12 = t8 * t3 * t9, t13 = t7 * t12 - t2 * t3, t14 = t7 * t9, t15 = t4 + t6 * t10;
+        const double t16 = t3 + t6 * t12, t17 = t6 * t9;
         inverse[0][lane] = t11;
         inverse[1][lane] = t13;
         inverse[2][lane] = -t14;
@@ -708,56 +751,41 @@ static void lotka_volterra_invert_lanes(lotka_volterra_lanes matrix[restrict 9],
     }
 }
 
-/* Everything about a stage at the points y. The matrices are I + O(h): where a pivot is far from 1, all is infinite. */
-static void lotka_volterra_tabulate(lotka_volterra_lanes coef[restrict], lotka_volterra_model *model)
-{
-    lotka_volterra_lanes jacobian[9], reciprocal[3];
-    lotka_volterra_linearise_lanes(coef, model->y, model->displacement, model->increment, jacobian, model->slope);
-    lotka_volterra_invert_lanes(jacobian, model->slope, model->inverse, model->gain, reciprocal);
-    for (int i = 0; i < 3; ++i) {
-        lotka_volterra_EACH_LANE
-        for (int lane = 0; lane < lotka_volterra_LANES; ++lane)
-            model->inverse[i][lane] += fabs(reciprocal[i][lane]) < 1e3 ? 0.0 : HUGE_VAL;
-    }
-}
+/* ---- Newton's method in lanes ---- */
+/* Components of y are measured no finer than by this part of the largest. */
+#define lotka_volterra_FLOOR_OF_LANES 0.0
+
+/* A stage in all lanes, linearised around y. */
+typedef struct {
+    lotka_volterra_lanes y[lotka_volterra_DIM], displacement[lotka_volterra_DIM],
+        increment[lotka_volterra_DIM], residual[lotka_volterra_DIM];
+    /* a residual r of alpha(y) = x takes inverse r from y, and gain r from the increment */
+    lotka_volterra_lanes inverse[lotka_volterra_DIM * lotka_volterra_DIM], slope[lotka_volterra_DIM
+        * lotka_volterra_DIM], gain[lotka_volterra_DIM * lotka_volterra_DIM];
+} lotka_volterra_model;
 
 /* lotka_volterra_size in all lanes, summed over the components. */
-static void lotka_volterra_sizes(lotka_volterra_lanes y[restrict 3], lotka_volterra_lanes delta[restrict 3],
-    lotka_volterra_lanes size)
+static void lotka_volterra_sizes(lotka_volterra_lanes y[restrict lotka_volterra_DIM],
+    lotka_volterra_lanes delta[restrict lotka_volterra_DIM], lotka_volterra_lanes size)
 {
     lotka_volterra_lanes norm = { 0.0 };
     memset(size, 0, lotka_volterra_LANES * sizeof size[0]);
-    for (int i = 0; i < 3; ++i)
+    for (int i = 0; i < lotka_volterra_DIM; ++i)
         for (int lane = 0; lane < lotka_volterra_LANES; ++lane)
-            norm[lane] = 0.0 * fabs(y[i][lane]) > norm[lane] ? 0.0 * fabs(y[i][lane]) : norm[lane];
-    for (int i = 0; i < 3; ++i) {
+            norm[lane] = lotka_volterra_FLOOR_OF_LANES * fabs(y[i][lane]) > norm[lane]
+                ? lotka_volterra_FLOOR_OF_LANES * fabs(y[i][lane]) : norm[lane];
+    for (int i = 0; i < lotka_volterra_DIM; ++i) {
         lotka_volterra_EACH_LANE
         for (int lane = 0; lane < lotka_volterra_LANES; ++lane)
             size[lane] += fabs(delta[i][lane]) / (fabs(y[i][lane]) + norm[lane] + DBL_MIN);
     }
 }
 
-/* Correct y by the residuals, with the inverse in the table, and measure the corrections. */
-static void lotka_volterra_correct(lotka_volterra_model *model, lotka_volterra_lanes size)
-{
-    lotka_volterra_lanes delta[3];
-    memset(delta, 0, sizeof delta);
-    for (int i = 0; i < 3; ++i)
-        for (int j = 0; j < 3; ++j) {
-            lotka_volterra_EACH_LANE
-            for (int lane = 0; lane < lotka_volterra_LANES; ++lane)
-                delta[i][lane] += model->inverse[i * 3 + j][lane] * model->residual[j][lane];
-        }
-    lotka_volterra_sizes(model->y, delta, size);
-    for (int i = 0; i < 3; ++i)
-        for (int lane = 0; lane < lotka_volterra_LANES; ++lane) model->y[i][lane] -= delta[i][lane];
-}
-
-/* The largest of the lanes, none of which is negative; infinite if one is not finite. As integers, the bits of such
-   numbers have their order, and those of what is no number are larger. */
+/* The largest of the lanes, none of which is negative; infinite if one is not finite. As integers, the bits
+   of such numbers have their order, and those of what is no number are larger. */
 static double lotka_volterra_largest(const lotka_volterra_lanes size)
 {
-    uint64_t bits[8], most = 0;
+    uint64_t bits[lotka_volterra_LANES], most = 0;
     double largest;
     memcpy(bits, size, sizeof bits);
     for (int lane = 0; lane < lotka_volterra_LANES; ++lane) most = bits[lane] > most ? bits[lane] : most;
@@ -765,29 +793,50 @@ static double lotka_volterra_largest(const lotka_volterra_lanes size)
     return isfinite(largest) ? largest : HUGE_VAL;
 }
 
-/* lotka_volterra_near for the guesses of all lanes, seen from one value. */
-static int lotka_volterra_near_lanes(lotka_volterra_lanes y[restrict 3], const double last[3])
+/* Correct y by the residuals, with the inverse in the table, and measure the corrections. */
+static void lotka_volterra_correct(lotka_volterra_model *model, lotka_volterra_lanes size)
 {
-    lotka_volterra_lanes distance = { 0.0 };
-    double size = 0.0;
-    for (int i = 0; i < 3; ++i) {
-        size += fabs(last[i]);
-        lotka_volterra_EACH_LANE
-        for (int lane = 0; lane < lotka_volterra_LANES; ++lane) distance[lane] += fabs(y[i][lane] - last[i]);
-    }
-    return lotka_volterra_largest(distance) <= 4.0 * size;
+    lotka_volterra_lanes delta[lotka_volterra_DIM];
+    memset(delta, 0, sizeof delta);
+    for (int i = 0; i < lotka_volterra_DIM; ++i)
+        for (int j = 0; j < lotka_volterra_DIM; ++j) {
+            lotka_volterra_EACH_LANE
+            for (int lane = 0; lane < lotka_volterra_LANES; ++lane)
+                delta[i][lane] += model->inverse[i * lotka_volterra_DIM + j][lane] * model->residual[j][lane];
+        }
+    lotka_volterra_sizes(model->y, delta, size);
+    for (int i = 0; i < lotka_volterra_DIM; ++i)
+        for (int lane = 0; lane < lotka_volterra_LANES; ++lane) model->y[i][lane] -= delta[i][lane];
 }
 
-/* What is left after a correction of this size: quadratic in it, where the matrices are of the points corrected; where
-   they are of points further off, by bend, also of the order of size times bend. bound is what the last pass left. */
+/* What is left after a correction of this size: quadratic in it, where the matrices are of the points
+   corrected; where they are of points further off, by bend, also of the order of size times bend. bound is
+   what the last pass left. */
 static double lotka_volterra_remaining(double size, double bend, double bound)
 {
     const double growth = size / bound, left = size * (size + bend);
     return growth > 1.0 ? growth * left : left;
 }
 
+/* Everything about a stage at the points y. The matrices are I + O(h): where a pivot is far from 1, all is
+   infinite. */
+static void lotka_volterra_tabulate(lotka_volterra_lanes coef[restrict], lotka_volterra_model *model)
+{
+    lotka_volterra_lanes jacobian[lotka_volterra_DIM * lotka_volterra_DIM], reciprocal[lotka_volterra_DIM];
+    lotka_volterra_linearise_lanes(coef, model->y, model->displacement, model->increment, jacobian,
+        model->slope);
+    lotka_volterra_invert_lanes(jacobian, model->slope, model->inverse, model->gain, reciprocal);
+    for (int i = 0; i < lotka_volterra_DIM; ++i) {
+        lotka_volterra_EACH_LANE
+        for (int lane = 0; lane < lotka_volterra_LANES; ++lane)
+            model->inverse[i][lane] += fabs(reciprocal[i][lane]) < lotka_volterra_LARGEST_RECIPROCAL ? 0.0
+                : HUGE_VAL;
+    }
+}
+
 /* The table of a stage, with its matrices or with those of the last pass. */
-static void lotka_volterra_update(lotka_volterra_lanes coef[restrict], lotka_volterra_model *model, int matrices)
+static void lotka_volterra_update(lotka_volterra_lanes coef[restrict], lotka_volterra_model *model,
+    int matrices)
 {
     if (matrices)
         lotka_volterra_tabulate(coef, model);
@@ -795,26 +844,58 @@ static void lotka_volterra_update(lotka_volterra_lanes coef[restrict], lotka_vol
         lotka_volterra_evaluate_lanes(coef, model->y, model->displacement, model->increment);
 }
 
-/* The steps of a block one after the other, each along the linear model of its lane. As X, the state with its carry, gains
-   increment - gain residual, the next residual follows from this one; X itself is added up apart. */
-static void lotka_volterra_chain(lotka_volterra_model model[1], double x[3], double carry[3])
+/* ---- Blocks of steps ---- */
+/* What all blocks share: coefficients, the same in each lane, and the recurrences by which they are foreseen.
+   */
+typedef struct {
+    int fits; /* the fit that weight is of; -1 for none */
+    lotka_volterra_lanes coef[lotka_volterra_COEFFICIENTS], weight[lotka_volterra_WINDOW][lotka_volterra_DIM];
+} lotka_volterra_table;
+
+/* The stages of a step. */
+typedef struct {
+    lotka_volterra_model stage;
+} lotka_volterra_models;
+
+/* lotka_volterra_near for the guesses of all lanes, seen from one value. */
+static int lotka_volterra_near_lanes(lotka_volterra_lanes y[restrict lotka_volterra_DIM],
+    const double last[lotka_volterra_DIM])
 {
-    double residual[3], sum[3], small[3];
-    for (int i = 0; i < 3; ++i) {
-        residual[i] = ((model->y[i][0] - x[i]) + model->displacement[i][0]) - carry[i];
+    lotka_volterra_lanes distance = { 0.0 };
+    double size = 0.0;
+    for (int i = 0; i < lotka_volterra_DIM; ++i) {
+        size += fabs(last[i]);
+        lotka_volterra_EACH_LANE
+        for (int lane = 0; lane < lotka_volterra_LANES; ++lane) distance[lane] += fabs(y[i][lane] - last[i]);
+    }
+    return lotka_volterra_largest(distance) <= lotka_volterra_REACH * size;
+}
+
+/* The steps of a block one after the other, each along the linear model of its lane. As X, the state with its
+   carry, gains increment - gain residual, the next residual follows from this one; X itself is added up
+   apart. */
+static void lotka_volterra_chain(lotka_volterra_models *models, double x[lotka_volterra_DIM],
+    double carry[lotka_volterra_DIM])
+{
+    double residual[lotka_volterra_DIM], sum[lotka_volterra_DIM], small[lotka_volterra_DIM];
+    for (int i = 0; i < lotka_volterra_DIM; ++i) {
+        residual[i] = ((models->stage.y[i][0] - x[i]) + models->stage.displacement[i][0]) - carry[i];
         sum[i] = x[i];
         small[i] = carry[i];
     }
-    for (int k = 0; k < 1 * lotka_volterra_LANES; ++k) {
-        const int lane = k / 1, after = (k + 1) / 1 % lotka_volterra_LANES;
-        lotka_volterra_model *at = &model[k % 1], *next = &model[(k + 1) % 1];
-        double even[3] = { 0.0 }, odd[3] = { 0.0 }; /* two sums, so that no long chain of additions is waited for */
-        for (int i = 0; i < 3; ++i) {
+    for (int lane = 0; lane < lotka_volterra_LANES; ++lane) {
+        const int after = (lane + 1) % lotka_volterra_LANES;
+        lotka_volterra_model *at = &models->stage, *next = &models->stage;
+        /* two sums, so that no long chain of additions is waited for */
+        double even[lotka_volterra_DIM] = { 0.0 }, odd[lotka_volterra_DIM] = { 0.0 };
+        for (int i = 0; i < lotka_volterra_DIM; ++i) {
             at->residual[i][lane] = residual[i];
-            for (int j = 0; j < 3; j += 2) even[i] += at->gain[i * 3 + j][lane] * residual[j];
-            for (int j = 1; j < 3; j += 2) odd[i] += at->gain[i * 3 + j][lane] * residual[j];
+            for (int j = 0; j < lotka_volterra_DIM; j += 2)
+                even[i] += at->gain[i * lotka_volterra_DIM + j][lane] * residual[j];
+            for (int j = 1; j < lotka_volterra_DIM; j += 2)
+                odd[i] += at->gain[i * lotka_volterra_DIM + j][lane] * residual[j];
         }
-        for (int i = 0; i < 3; ++i) {
+        for (int i = 0; i < lotka_volterra_DIM; ++i) {
             const double change = at->increment[i][lane], total = sum[i] + change, added = total - sum[i];
             const double turn = (next->displacement[i][after] - at->displacement[i][lane]) - change;
             const double moved = (next->y[i][after] - at->y[i][lane]) + turn;
@@ -823,37 +904,43 @@ static void lotka_volterra_chain(lotka_volterra_model model[1], double x[3], dou
             sum[i] = total;
         }
     }
-    for (int i = 0; i < 3; ++i) {
+    for (int i = 0; i < lotka_volterra_DIM; ++i) {
         x[i] = sum[i] + small[i];
         carry[i] = small[i] - (x[i] - sum[i]);
     }
 }
 
-/* Bring the table up to date: coefficients, and weights that were fitted since. */
+/* Bring the table of a stage up to date: coefficients, and weights that were fitted since. */
+static void lotka_volterra_refresh_stage(const lotka_volterra_solver *s, lotka_volterra_table *table)
+{
+    if (table->fits == s->history.fits) return;
+    table->fits = s->history.fits;
+    for (int k = 0; k < lotka_volterra_COEFFICIENTS; ++k)
+        for (int lane = 0; lane < lotka_volterra_LANES; ++lane) table->coef[k][lane] = s->coef[k];
+    memcpy(table->weight, s->history.weight,
+        (size_t)s->history.recurrence_terms * lotka_volterra_DIM * sizeof(lotka_volterra_lanes));
+}
+
 static void lotka_volterra_refresh(const lotka_volterra_solver *s, lotka_volterra_table *table)
 {
-    for (int stage = 0; stage < 1; ++stage) {
-        if (table->fits[stage] == s->memory[stage].fits) continue;
-        table->fits[stage] = s->memory[stage].fits;
-        for (int k = 0; k < 1; ++k)
-            for (int lane = 0; lane < lotka_volterra_LANES; ++lane) table->coef[stage][k][lane] = s->coef[stage][k];
-        memcpy(table->weight[stage], s->memory[stage].weight, (size_t)s->memory[stage].terms * sizeof table->weight[0][0]);
-    }
+    lotka_volterra_refresh_stage(s, table);
 }
 
 /* Guesses for the next lotka_volterra_LANES values of a stage, by its recurrences. */
-static void lotka_volterra_foresee(const lotka_volterra_memory *memory, lotka_volterra_lanes weight[restrict][3],
-    lotka_volterra_lanes y[restrict 3])
+static void lotka_volterra_foresee(const lotka_volterra_history *history,
+    lotka_volterra_lanes weight[restrict][lotka_volterra_DIM],
+    lotka_volterra_lanes y[restrict lotka_volterra_DIM])
 {
-    const int last = memory->count - 1;
-    for (int i = 0; i < 3; ++i) {
+    const int last = history->count - 1;
+    for (int i = 0; i < lotka_volterra_DIM; ++i) {
         lotka_volterra_lanes even = { 0.0 }, odd = { 0.0 };
-        for (int k = 0; k < memory->terms; k += 2) {
-            const double past = memory->past[last - k][i], earlier = memory->past[last - 1 - k][i];
+        for (int k = 0; k < history->recurrence_terms; k += 2) {
+            const double past = history->past[last - k][i], earlier = history->past[last - 1 - k][i];
             lotka_volterra_EACH_LANE
             for (int lane = 0; lane < lotka_volterra_LANES; ++lane) even[lane] += weight[k][i][lane] * past;
             lotka_volterra_EACH_LANE
-            for (int lane = 0; lane < lotka_volterra_LANES; ++lane) odd[lane] += weight[k + 1][i][lane] * earlier;
+            for (int lane = 0; lane < lotka_volterra_LANES; ++lane)
+                odd[lane] += weight[k + 1][i][lane] * earlier;
         }
         lotka_volterra_EACH_LANE
         for (int lane = 0; lane < lotka_volterra_LANES; ++lane) y[i][lane] = even[lane] + odd[lane];
@@ -861,137 +948,177 @@ static void lotka_volterra_foresee(const lotka_volterra_memory *memory, lotka_vo
 }
 
 /* lotka_volterra_record for the values of all lanes, one after the other. */
-static void lotka_volterra_record_lanes(lotka_volterra_memory *memory, lotka_volterra_lanes y[restrict 3])
+static void lotka_volterra_record_lanes(lotka_volterra_history *history,
+    lotka_volterra_lanes y[restrict lotka_volterra_DIM])
 {
-    lotka_volterra_make_room(memory, lotka_volterra_LANES);
+    lotka_volterra_make_room(history, lotka_volterra_LANES);
     for (int lane = 0; lane < lotka_volterra_LANES; ++lane)
-        for (int i = 0; i < 3; ++i) memory->past[memory->count + lane][i] = y[i][lane];
-    memory->count += lotka_volterra_LANES;
+        for (int i = 0; i < lotka_volterra_DIM; ++i) history->past[history->count + lane][i] = y[i][lane];
+    history->count += lotka_volterra_LANES;
 }
 
-/* Guesses where no recurrence is known: where alpha and beta have the means of steps by the classical Runge-Kutta
-   method, to leading order. */
-static void lotka_volterra_march(const lotka_volterra_solver *s, lotka_volterra_table *table, lotka_volterra_model model[1])
+/* y becomes the points whose alpha and beta have these means. */
+static void lotka_volterra_from_means(lotka_volterra_lanes coef[restrict], lotka_volterra_model *model)
 {
-    static const double reach[4] = { 0.5, 0.5, 1.0, 0.0 }, weight[4] = { 1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0 };
-    double x[3], point[3], slope[3], mean[3];
+    lotka_volterra_evaluate_lanes(coef, model->y, model->displacement, model->increment);
+    for (int i = 0; i < lotka_volterra_DIM; ++i) {
+        lotka_volterra_EACH_LANE
+        for (int lane = 0; lane < lotka_volterra_LANES; ++lane)
+            model->y[i][lane] -= model->displacement[i][lane] + 0.5 * model->increment[i][lane];
+    }
+}
+
+/* Guesses where no recurrence is known: where alpha and beta have the means of steps by the classical
+   Runge-Kutta method, to leading order. */
+static void lotka_volterra_march(const lotka_volterra_solver *s, lotka_volterra_table *table,
+    lotka_volterra_models *models)
+{
+    static const double reach[4] = { 0.5, 0.5, 1.0, 0.0 }, weight[4] = { 1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0
+        / 6.0 };
+    double x[lotka_volterra_DIM], point[lotka_volterra_DIM], slope[lotka_volterra_DIM],
+        mean[lotka_volterra_DIM];
     memcpy(x, s->x, sizeof x);
-    for (int k = 0; k < 1 * lotka_volterra_LANES; ++k) {
-        const double h = lotka_volterra_fractions[k % 1] * s->h;
+    const double h = s->h;
+    lotka_volterra_model *at = &models->stage;
+    for (int lane = 0; lane < lotka_volterra_LANES; ++lane) {
         memcpy(point, x, sizeof x);
         memset(mean, 0, sizeof mean);
         for (int part = 0; part < 4; ++part) {
             lotka_volterra_vector_field(&s->params, point, slope);
-            for (int i = 0; i < 3; ++i) {
+            for (int i = 0; i < lotka_volterra_DIM; ++i) {
                 mean[i] += weight[part] * slope[i];
                 point[i] = x[i] + h * reach[part] * slope[i];
             }
         }
-        for (int i = 0; i < 3; ++i) {
-            model[k % 1].y[i][k / 1] = x[i] + 0.5 * h * mean[i];
+        for (int i = 0; i < lotka_volterra_DIM; ++i) {
+            at->y[i][lane] = x[i] + 0.5 * h * mean[i];
             x[i] += h * mean[i];
         }
     }
-    for (int stage = 0; stage < 1; ++stage) {
-        lotka_volterra_model *at = &model[stage];
-        lotka_volterra_evaluate_lanes(table->coef[stage], at->y, at->displacement, at->increment);
-        for (int i = 0; i < 3; ++i) {
-            lotka_volterra_EACH_LANE
-            for (int lane = 0; lane < lotka_volterra_LANES; ++lane)
-                at->y[i][lane] -= at->displacement[i][lane] + 0.5 * at->increment[i][lane];
-        }
-    }
+    lotka_volterra_from_means(table->coef, &models->stage);
 }
 
-/* lotka_volterra_LANES steps at once: guess the points of all, and correct them together until the error that remains is as
-   small as after a single step. How many passes that took; 0, and the solver as before, where it takes more than most. */
+/* Guess the points of all stages and steps, by recurrences or else by Runge-Kutta steps. 0 if they are not
+   near the state. */
+static int lotka_volterra_guess(lotka_volterra_solver *s, lotka_volterra_table *table,
+    lotka_volterra_models *models)
+{
+    if (!s->blocks.use_recurrences) lotka_volterra_march(s, table, models);
+    if (s->blocks.use_recurrences) lotka_volterra_foresee(&s->history, table->weight, models->stage.y);
+    if (!lotka_volterra_near_lanes(models->stage.y, s->x)) return 0;
+    return 1;
+}
+
+/* One pass over the points of a stage: correct them by the residuals. The largest correction. */
+static double lotka_volterra_correct_stage(lotka_volterra_model *model)
+{
+    lotka_volterra_lanes sizes;
+    lotka_volterra_correct(model, sizes);
+    return lotka_volterra_largest(sizes);
+}
+
+/* Corrections below the first go on with the matrices of the last pass, as its error is then of third order.
+   After the square of so small a correction as the second, there is rounding only, if the next is below the
+   third. */
+#define lotka_volterra_FROZEN 1e-5
+#define lotka_volterra_SMALL 1e-8
+#define lotka_volterra_ROUNDING 1e-10
+
+/* lotka_volterra_LANES steps at once: guess the points of all, and correct them together until the error that
+   remains is as small as after a single step. How many passes that took; 0, and the solver as before, where
+   it takes more than most. */
 static int lotka_volterra_block(lotka_volterra_solver *s, lotka_volterra_table *table, int most)
 {
-    lotka_volterra_model model[1];
-    lotka_volterra_lanes sizes;
-    double x[3], carry[3], previous = HUGE_VAL, bend = 0.0, bound = HUGE_VAL;
+    lotka_volterra_models models;
+    double x[lotka_volterra_DIM], carry[lotka_volterra_DIM], previous = HUGE_VAL, bend = 0.0, bound =
+        HUGE_VAL;
     int passes = 0, solved = 0;
-    if (!s->foreseeing) lotka_volterra_march(s, table, model);
-    for (int stage = 0; stage < 1; ++stage) {
-        if (s->foreseeing) lotka_volterra_foresee(&s->memory[stage], table->weight[stage], model[stage].y);
-        if (!lotka_volterra_near_lanes(model[stage].y, s->x)) return 0;
-    }
+    if (!lotka_volterra_guess(s, table, &models)) return 0;
     while (!solved) {
         double size = 0.0;
-        const int matrices = previous > 1e-05;
-        for (int stage = 0; stage < 1; ++stage) lotka_volterra_update(table->coef[stage], &model[stage], matrices);
+        const int matrices = previous > lotka_volterra_FROZEN;
+        lotka_volterra_update(table->coef, &models.stage, matrices);
         memcpy(x, s->x, sizeof x);
         memcpy(carry, s->carry, sizeof carry);
-        lotka_volterra_chain(model, x, carry);
-        for (int stage = 0; stage < 1; ++stage) {
-            lotka_volterra_correct(&model[stage], sizes);
-            const double largest = lotka_volterra_largest(sizes);
-            size = largest > size ? largest : size;
-        }
-        s->evaluations += 1 * lotka_volterra_LANES;
+        lotka_volterra_chain(&models, x, carry);
+        const double largest = lotka_volterra_correct_stage(&models.stage);
+        size = largest > size ? largest : size;
+        s->evaluations += lotka_volterra_LANES;
         bend = matrices ? 0.0 : bend + previous;
         bound = lotka_volterra_remaining(size, bend, bound);
-        /* The second test: after the square of so small a correction there is rounding only. */
-        solved = bound <= 1e-20 || (previous < 1e-8 && size < 1e-10);
+        solved = bound <= lotka_volterra_TOLERANCE || (previous < lotka_volterra_SMALL && size
+            < lotka_volterra_ROUNDING);
         if ((++passes >= most || !(size < previous)) && !solved) return 0;
         previous = size;
     }
-    for (int stage = 0; stage < 1; ++stage)
-        if (!lotka_volterra_near_lanes(model[stage].y, s->x)) return 0;
-    for (int i = 0; i < 3; ++i)
+    if (!lotka_volterra_near_lanes(models.stage.y, s->x)) return 0;
+    for (int i = 0; i < lotka_volterra_DIM; ++i)
         if (!isfinite(x[i])) return 0;
     memcpy(s->x, x, sizeof x);
     memcpy(s->carry, carry, sizeof carry);
-    s->steps += lotka_volterra_LANES;
-    for (int stage = 0; stage < 1; ++stage) {
-        lotka_volterra_memory *memory = &s->memory[stage];
-        lotka_volterra_record_lanes(memory, model[stage].y);
-        memory->slow = passes > 1 ? memory->slow + lotka_volterra_LANES : 0;
-        if (memory->slow > memory->patience && s->foreseeing) lotka_volterra_fit(memory);
-    }
+    lotka_volterra_count(s, lotka_volterra_LANES);
+    lotka_volterra_history *history = &s->history;
+    lotka_volterra_record_lanes(history, models.stage.y);
+    history->slow_steps = passes > 1 ? history->slow_steps + lotka_volterra_LANES : 0;
+    if (history->slow_steps > history->slow_steps_allowed && s->blocks.use_recurrences)
+        lotka_volterra_fit(history);
     return passes;
 }
+
+enum {
+    /* steps that fits for whole blocks are saved in */
+    lotka_volterra_REPAY_BLOCKS = 4 * lotka_volterra_REPAY,
+    lotka_volterra_MOST_SINGLE_STEPS = 1000 /* before blocks are tried again */
+};
 
 /* Recurrences are given up for a while, the longer the more often that happens. */
 static void lotka_volterra_give_up(lotka_volterra_solver *s)
 {
-    s->foreseeing = s->setback = s->pause = 0;
-    s->doubt = 2 * s->doubt + 600;
-    s->retry = s->steps + s->doubt;
+    s->blocks.use_recurrences = s->blocks.last_single_steps = s->blocks.single_steps = 0;
+    s->blocks.steps_without_recurrences = 2 * s->blocks.steps_without_recurrences
+        + lotka_volterra_REPAY_BLOCKS;
+    s->blocks.recurrences_from_step = s->steps + s->blocks.steps_without_recurrences;
+}
+
+/* Fit the recurrence of a stage. Whether it foresees. */
+static int lotka_volterra_fitted(lotka_volterra_history *history)
+{
+    lotka_volterra_fit(history);
+    return history->recurrence_terms > 0;
 }
 
 /* How the next block is guessed: by recurrences, fitted as soon as enough steps are to be made, or
    have been, to repay that. */
 static void lotka_volterra_choose_guess(lotka_volterra_solver *s, size_t steps)
 {
-    for (int stage = 0; stage < 1; ++stage)
-        if (s->memory[stage].count < 111) {
-            s->foreseeing = 0;
-            return;
-        }
-    if (s->foreseeing || (steps < 600 && s->steps < 150) || s->steps < s->retry) return;
-    s->foreseeing = 1;
-    for (int stage = 0; stage < 1 && s->foreseeing; ++stage) {
-        lotka_volterra_fit(&s->memory[stage]);
-        s->foreseeing = s->memory[stage].terms > 0;
+    if (s->history.count < lotka_volterra_REMEMBERED) {
+        s->blocks.use_recurrences = 0;
+        return;
     }
-    s->pause = lotka_volterra_LANES;
-    if (!s->foreseeing) lotka_volterra_give_up(s);
+    if (s->blocks.use_recurrences || s->steps < s->blocks.recurrences_from_step) return;
+    if (steps < lotka_volterra_REPAY_BLOCKS && s->steps < lotka_volterra_REPAY) return;
+    s->blocks.use_recurrences = 1;
+    s->blocks.use_recurrences = s->blocks.use_recurrences && lotka_volterra_fitted(&s->history);
+    s->blocks.single_steps = lotka_volterra_LANES;
+    if (!s->blocks.use_recurrences) lotka_volterra_give_up(s);
 }
 
-/* Learn from a block: after one that failed single steps are made, the more the more often that happens. Recurrences
-   that fail repeatedly, or need more passes than steps by Runge-Kutta did, are given up. */
+/* Learn from a block: after one that failed single steps are made, the more the more often that happens.
+   Recurrences that fail repeatedly, or need more passes than steps by Runge-Kutta did, are given up. */
 static void lotka_volterra_learn_from(lotka_volterra_solver *s, int passes)
 {
     if (passes > 0) {
-        s->setback /= 2;
+        s->blocks.last_single_steps /= 2;
     } else {
-        s->setback = 2 * s->setback + lotka_volterra_LANES > 1000 ? 1000 : 2 * s->setback + lotka_volterra_LANES;
-        s->pause = s->setback;
+        const int longer = 2 * s->blocks.last_single_steps + lotka_volterra_LANES;
+        s->blocks.last_single_steps = longer > lotka_volterra_MOST_SINGLE_STEPS
+            ? lotka_volterra_MOST_SINGLE_STEPS : longer;
+        s->blocks.single_steps = s->blocks.last_single_steps;
     }
-    if (!s->foreseeing) {
-        s->passes = passes > 0 ? passes : INT_MAX;
-    } else if (passes > s->passes || s->setback > 5 * lotka_volterra_LANES) {
+    if (!s->blocks.use_recurrences) {
+        s->blocks.passes_without_recurrences = passes > 0 ? passes : INT_MAX;
+    } else if (passes > s->blocks.passes_without_recurrences || s->blocks.last_single_steps > 5
+        * lotka_volterra_LANES) {
         lotka_volterra_give_up(s);
     }
 }
@@ -1001,26 +1128,29 @@ static lotka_volterra_status lotka_volterra_single(lotka_volterra_solver *s)
 {
     const size_t before = s->evaluations;
     const lotka_volterra_status status = lotka_volterra_step(s, s->h);
-    s->effort += 0.125 * ((double)(s->evaluations - before) / 1 - s->effort);
+    const double evaluations = (double)(s->evaluations - before);
+    s->blocks.evaluations_per_stage += 0.125 * (evaluations - s->blocks.evaluations_per_stage);
     return status;
 }
 
-/* Blocks of steps where they cost less than single steps, with at most as many passes over a block as 2 for each
-   evaluation in a single step. The results differ by round-off only. */
+/* Blocks of steps where they cost less than single steps, with at most as many passes over a block as
+   lotka_volterra_PASSES for each evaluation in a single step. The results differ by round-off only. */
 lotka_volterra_status lotka_volterra_integrate(lotka_volterra_solver *s, double h, size_t steps)
 {
     lotka_volterra_table table;
     lotka_volterra_status status = lotka_volterra_set_step(s, h);
-    for (int stage = 0; stage < 1; ++stage) table.fits[stage] = -1;
+    table.fits = -1;
     while (status == lotka_volterra_OK && steps > 0) {
-        if (steps >= lotka_volterra_LANES && s->pause == 0) lotka_volterra_choose_guess(s, steps);
-        if (steps >= lotka_volterra_LANES && s->pause == 0) {
+        if (steps >= lotka_volterra_LANES && s->blocks.single_steps == 0)
+            lotka_volterra_choose_guess(s, steps);
+        if (steps >= lotka_volterra_LANES && s->blocks.single_steps == 0) {
             lotka_volterra_refresh(s, &table);
-            const int passes = lotka_volterra_block(s, &table, (int)(2 * s->effort + 0.5));
+            const int passes = lotka_volterra_block(s, &table, (int)(lotka_volterra_PASSES
+                * s->blocks.evaluations_per_stage + 0.5));
             lotka_volterra_learn_from(s, passes);
             if (passes > 0) steps -= lotka_volterra_LANES;
         } else {
-            if (s->pause > 0) --s->pause;
+            if (s->blocks.single_steps > 0) --s->blocks.single_steps;
             status = lotka_volterra_single(s);
             if (status == lotka_volterra_OK) --steps;
         }
@@ -1028,54 +1158,68 @@ lotka_volterra_status lotka_volterra_integrate(lotka_volterra_solver *s, double 
     return status;
 }
 
+/* ---- Groups of members ---- */
+enum {
+    lotka_volterra_GROUP = lotka_volterra_LANES, /* members, one in each lane */
+    lotka_volterra_FEWEST = 3,                   /* fewer members are quicker one by one */
+    /* steps that fits cost: of eight values at once, only one is foreseen */
+    lotka_volterra_GROUP_REPAY = 200 * lotka_volterra_DIM,
+    /* steps until recurrences that did not help are fitted again */
+    lotka_volterra_HOPELESS_WAIT = 100 * lotka_volterra_REPAY
+};
+
 /* Members of an ensemble, each in its lane. */
 typedef struct {
-    lotka_volterra_lanes x[3], carry[3], coef[1][1];
-    lotka_volterra_lanes past[1][111][3]; /* solved values, in a ring */
-    lotka_volterra_lanes weight[1][40][3]; /* of past values, the latest first, for the next */
-    int latest;     /* the row of the latest values */
-    int count;      /* rows in use */
-    int order[1];   /* how many of them the extrapolation uses */
-    int terms[1];   /* how many of them the recurrences use */
-    int fits;       /* how often recurrences have been fitted */
-    int fitting[1]; /* whether they are the better guess */
-    int slow;       /* how many of the last steps took more than one iteration */
-    int patience;   /* how many of those before recurrences are fitted again */
-    int active[8];  /* whether the lane has a member that has not failed */
-    size_t left[8]; /* steps that are still to be made, where one has */
+    lotka_volterra_lanes x[lotka_volterra_DIM], carry[lotka_volterra_DIM], coef[lotka_volterra_COEFFICIENTS];
+    lotka_volterra_lanes past[lotka_volterra_REMEMBERED][lotka_volterra_DIM]; /* solved values, in a ring */
+    /* of past values, the latest first, for the next */
+    lotka_volterra_lanes weight[lotka_volterra_WINDOW][lotka_volterra_DIM];
+    int latest;                              /* the row of the latest values */
+    int count;                               /* rows in use */
+    int extrapolation_order;                 /* how many of them the extrapolation uses */
+    int recurrence_terms;                    /* how many of them the recurrences use */
+    int use_recurrences;                     /* whether these are the better guess */
+    int fits;                                /* how often recurrences have been fitted */
+    int slow_steps;                          /* how many of the last steps took more than one iteration */
+    int slow_steps_allowed;                  /* how many of those before recurrences are fitted again */
+    int active[lotka_volterra_LANES];        /* whether the lane has a member that has not failed */
+    size_t steps_left[lotka_volterra_LANES]; /* that are still to be made, where one has */
 } lotka_volterra_group;
 
 /* The past values of a stage, the latest for k = 0. */
-static lotka_volterra_lanes *lotka_volterra_group_past(lotka_volterra_group *group, int stage, int k)
+static lotka_volterra_lanes *lotka_volterra_group_past(lotka_volterra_group *group, int k)
 {
     const int row = group->latest + k;
-    return group->past[stage][row < 111 ? row : row - 111];
+    return group->past[row < lotka_volterra_REMEMBERED ? row : row - lotka_volterra_REMEMBERED];
 }
 
 /* Guess the values of a stage by the recurrences of the members. */
-static void lotka_volterra_group_foresee(lotka_volterra_group *group, int stage, lotka_volterra_lanes y[restrict 3])
+static void lotka_volterra_group_foresee(lotka_volterra_group *group,
+    lotka_volterra_lanes y[restrict lotka_volterra_DIM])
 {
-    memset(y, 0, 3 * sizeof y[0]);
-    for (int k = 0; k < group->terms[stage]; ++k) {
-        lotka_volterra_lanes *past = lotka_volterra_group_past(group, stage, k), *weight = group->weight[stage][k];
-        for (int i = 0; i < 3; ++i) {
+    memset(y, 0, lotka_volterra_DIM * sizeof y[0]);
+    for (int k = 0; k < group->recurrence_terms; ++k) {
+        lotka_volterra_lanes *past = lotka_volterra_group_past(group, k), *weight = group->weight[k];
+        for (int i = 0; i < lotka_volterra_DIM; ++i) {
             lotka_volterra_EACH_LANE
-            for (int lane = 0; lane < lotka_volterra_LANES; ++lane) y[i][lane] += weight[i][lane] * past[i][lane];
+            for (int lane = 0; lane < lotka_volterra_LANES; ++lane)
+                y[i][lane] += weight[i][lane] * past[i][lane];
         }
     }
 }
 
 /* Extrapolate the values of a stage. */
-static void lotka_volterra_group_extrapolate(lotka_volterra_group *group, int stage, lotka_volterra_lanes y[restrict 3])
+static void lotka_volterra_group_extrapolate(lotka_volterra_group *group,
+    lotka_volterra_lanes y[restrict lotka_volterra_DIM])
 {
-    const int order = group->order[stage];
+    const int order = group->extrapolation_order;
     double binomial = -1.0;
-    memcpy(y, group->x, 3 * sizeof y[0]);
-    if (order > 0) memset(y, 0, 3 * sizeof y[0]);
+    memcpy(y, group->x, lotka_volterra_DIM * sizeof y[0]);
+    if (order > 0) memset(y, 0, lotka_volterra_DIM * sizeof y[0]);
     for (int k = 0; k < order; ++k) {
-        lotka_volterra_lanes *past = lotka_volterra_group_past(group, stage, k);
+        lotka_volterra_lanes *past = lotka_volterra_group_past(group, k);
         binomial *= -(double)(order - k) / (k + 1);
-        for (int i = 0; i < 3; ++i) {
+        for (int i = 0; i < lotka_volterra_DIM; ++i) {
             lotka_volterra_EACH_LANE
             for (int lane = 0; lane < lotka_volterra_LANES; ++lane) y[i][lane] += binomial * past[i][lane];
         }
@@ -1083,102 +1227,110 @@ static void lotka_volterra_group_extrapolate(lotka_volterra_group *group, int st
 }
 
 /* The sum over members of the absolute values of all components. */
-static double lotka_volterra_group_sum(const lotka_volterra_group *group, lotka_volterra_lanes y[3])
+static double lotka_volterra_group_sum(const lotka_volterra_group *group,
+    lotka_volterra_lanes y[lotka_volterra_DIM])
 {
     double sum = 0.0;
-    for (int i = 0; i < 3; ++i)
-        for (int lane = 0; lane < lotka_volterra_LANES; ++lane) sum += group->active[lane] ? fabs(y[i][lane]) : 0.0;
+    for (int i = 0; i < lotka_volterra_DIM; ++i)
+        for (int lane = 0; lane < lotka_volterra_LANES; ++lane) sum += group->active[lane] ? fabs(y[i][lane])
+            : 0.0;
     return sum;
 }
 
-static void lotka_volterra_group_subtract(lotka_volterra_lanes y[restrict 3], lotka_volterra_lanes other[restrict 3])
+static void lotka_volterra_group_subtract(lotka_volterra_lanes y[restrict lotka_volterra_DIM],
+    lotka_volterra_lanes other[restrict lotka_volterra_DIM])
 {
-    for (int i = 0; i < 3; ++i) {
+    for (int i = 0; i < lotka_volterra_DIM; ++i) {
         lotka_volterra_EACH_LANE
         for (int lane = 0; lane < lotka_volterra_LANES; ++lane) y[i][lane] -= other[i][lane];
     }
 }
 
 /* Choose the guess that would have been best for these values. */
-static void lotka_volterra_group_judge(lotka_volterra_group *group, int stage, lotka_volterra_lanes y[3])
+static void lotka_volterra_group_judge(lotka_volterra_group *group,
+    lotka_volterra_lanes y[lotka_volterra_DIM])
 {
-    lotka_volterra_lanes row[8 + 1][3];
-    const int rows = group->count < 8 ? group->count : 8;
+    lotka_volterra_lanes row[lotka_volterra_HISTORY + 1][lotka_volterra_DIM];
+    const int rows = group->count < lotka_volterra_HISTORY ? group->count : lotka_volterra_HISTORY;
     double least = HUGE_VAL;
     memcpy(row[0], y, sizeof row[0]);
-    for (int k = 0; k < rows; ++k) memcpy(row[k + 1], lotka_volterra_group_past(group, stage, k), sizeof row[0]);
-    if (group->order[stage] == 0) group->order[stage] = 1;
+    for (int k = 0; k < rows; ++k) memcpy(row[k + 1], lotka_volterra_group_past(group, k), sizeof row[0]);
+    if (group->extrapolation_order == 0) group->extrapolation_order = 1;
     for (int order = 1; order <= rows; ++order) { /* row[0] becomes the backward difference of this order */
         for (int k = 0; k <= rows - order; ++k) lotka_volterra_group_subtract(row[k], row[k + 1]);
         const double size = lotka_volterra_group_sum(group, row[0]);
         if (size < least) {
             least = size;
-            group->order[stage] = order;
+            group->extrapolation_order = order;
         }
     }
-    if (group->terms[stage] == 0) return;
-    lotka_volterra_group_foresee(group, stage, row[0]);
+    if (group->recurrence_terms == 0) return;
+    lotka_volterra_group_foresee(group, row[0]);
     lotka_volterra_group_subtract(row[0], y);
-    group->fitting[stage] = lotka_volterra_group_sum(group, row[0]) <= least;
+    group->use_recurrences = lotka_volterra_group_sum(group, row[0]) <= least;
 }
 
-/* Fit the recurrences of all members; with every time, wait longer before it is done again, and for long if it did not
-   help. */
+/* Fit the recurrences of all members; with every time, wait longer before it is done again, and for long if
+   it did not help. */
 static void lotka_volterra_group_fit(lotka_volterra_group *group)
 {
-    lotka_volterra_memory memory;
-    const int helped = group->fits == 0 || group->fitting[0];
-    memory.count = 111;
-    for (int stage = 0; stage < 1; ++stage) {
-        int found = 1;
-        group->terms[stage] = 0;
-        for (int lane = 0; lane < lotka_volterra_LANES; ++lane)
-            for (int i = 0; i < 3 && group->active[lane] && found; ++i) {
-                for (int k = 0; k < 111; ++k)
-                    memory.past[111 - 1 - k][i] = lotka_volterra_group_past(group, stage, k)[i][lane];
-                const int terms = lotka_volterra_train(&memory, i);
-                found = terms > 0;
-                if (terms > group->terms[stage]) group->terms[stage] = terms;
-                for (int k = 0; k < 40; ++k) group->weight[stage][k][i][lane] = memory.weight[k][i][0];
-            }
-        if (!found) group->terms[stage] = 0;
-        group->fitting[stage] = found;
-    }
+    lotka_volterra_history member;
+    const int helped = group->fits == 0 || group->use_recurrences;
+    member.count = lotka_volterra_REMEMBERED;
+    int found = 1;
+    group->recurrence_terms = 0;
+    for (int lane = 0; lane < lotka_volterra_LANES; ++lane)
+        for (int i = 0; i < lotka_volterra_DIM && group->active[lane] && found; ++i) {
+            for (int k = 0; k < lotka_volterra_REMEMBERED; ++k)
+                member.past[lotka_volterra_REMEMBERED - 1 - k][i] = lotka_volterra_group_past(group,
+                    k)[i][lane];
+            const int terms = lotka_volterra_train(&member, i);
+            found = terms > 0;
+            if (terms > group->recurrence_terms) group->recurrence_terms = terms;
+            for (int k = 0; k < lotka_volterra_WINDOW; ++k)
+                group->weight[k][i][lane] = member.weight[k][i][0];
+        }
+    if (!found) group->recurrence_terms = 0;
+    group->use_recurrences = found;
     ++group->fits;
-    group->slow = 0;
-    group->patience = helped && group->patience < 10000 ? 2 * group->patience + 150 : 100 * 150;
+    group->slow_steps = 0;
+    group->slow_steps_allowed = helped && group->slow_steps_allowed < lotka_volterra_LONG_WAIT / 2 ? 2
+        * group->slow_steps_allowed + lotka_volterra_REPAY : lotka_volterra_HOPELESS_WAIT;
 }
 
-/* Replace guesses that are not near the last values, as lotka_volterra_near has it, by these; lane by lane. */
-static void lotka_volterra_stay_near(lotka_volterra_lanes y[restrict 3], lotka_volterra_lanes last[restrict 3])
+/* Replace guesses that are not near the last values, as lotka_volterra_near has it, by these; lane by lane.
+   */
+static void lotka_volterra_stay_near(lotka_volterra_lanes y[restrict lotka_volterra_DIM],
+    lotka_volterra_lanes last[restrict lotka_volterra_DIM])
 {
     lotka_volterra_lanes distance = { 0.0 }, size = { 0.0 };
-    for (int i = 0; i < 3; ++i) {
+    for (int i = 0; i < lotka_volterra_DIM; ++i) {
         lotka_volterra_EACH_LANE
         for (int lane = 0; lane < lotka_volterra_LANES; ++lane) {
             distance[lane] += fabs(y[i][lane] - last[i][lane]);
             size[lane] += fabs(last[i][lane]);
         }
     }
-    for (int i = 0; i < 3; ++i) {
+    for (int i = 0; i < lotka_volterra_DIM; ++i) {
         lotka_volterra_EACH_LANE
         for (int lane = 0; lane < lotka_volterra_LANES; ++lane)
-            y[i][lane] = distance[lane] <= 4.0 * size[lane] ? y[i][lane] : last[i][lane];
+            y[i][lane] = distance[lane] <= lotka_volterra_REACH * size[lane] ? y[i][lane] : last[i][lane];
     }
 }
 
-/* Whether lanes are still to be solved after a correction of this size; those where nothing is finite leave the group.
-   bound is what remains in each lane. */
-static int lotka_volterra_group_open(lotka_volterra_group *group, const lotka_volterra_lanes size, const lotka_volterra_lanes previous,
-    double bend, lotka_volterra_lanes bound)
+/* Whether lanes are still to be solved after a correction of this size; those where nothing is finite leave
+   the group. bound is what remains in each lane. */
+static int lotka_volterra_group_open(lotka_volterra_group *group, const lotka_volterra_lanes size,
+    const lotka_volterra_lanes previous, double bend, lotka_volterra_lanes bound)
 {
     int open = 0;
     lotka_volterra_EACH_LANE
     for (int lane = 0; lane < lotka_volterra_LANES; ++lane)
         bound[lane] = lotka_volterra_remaining(size[lane], bend, bound[lane]);
-    if (lotka_volterra_largest(bound) <= 1e-20) return 0;
+    if (lotka_volterra_largest(bound) <= lotka_volterra_TOLERANCE) return 0;
     for (int lane = 0; lane < lotka_volterra_LANES; ++lane) {
-        const int solved = bound[lane] <= 1e-20 || (previous[lane] < 1e-8 && size[lane] < 1e-10);
+        const int solved = bound[lane] <= lotka_volterra_TOLERANCE || (previous[lane] < lotka_volterra_SMALL
+            && size[lane] < lotka_volterra_ROUNDING);
         if (!isfinite(size[lane])) group->active[lane] = 0;
         open += group->active[lane] && !solved;
     }
@@ -1186,88 +1338,93 @@ static int lotka_volterra_group_open(lotka_volterra_group *group, const lotka_vo
 }
 
 /* The guess for a stage: recurrences, or extrapolation; the state for members where that is not near. */
-static void lotka_volterra_group_predict(lotka_volterra_group *group, int stage, lotka_volterra_lanes y[3])
+static void lotka_volterra_group_predict(lotka_volterra_group *group,
+    lotka_volterra_lanes y[lotka_volterra_DIM])
 {
-    if (group->fitting[stage]) lotka_volterra_group_foresee(group, stage, y);
-    else lotka_volterra_group_extrapolate(group, stage, y);
+    if (group->use_recurrences) lotka_volterra_group_foresee(group, y);
+    else lotka_volterra_group_extrapolate(group, y);
     lotka_volterra_stay_near(y, group->x);
 }
 
-/* Newton's method for a stage, until the slowest lane is solved. The number of iterations; where that is the most
-   allowed, lanes that are not solved leave the group. */
-static int lotka_volterra_group_solve(lotka_volterra_group *group, int stage, lotka_volterra_model *model)
+/* Newton's method for a stage, until the slowest lane is solved. The number of iterations; where that is the
+   most allowed, lanes that are not solved leave the group. */
+static int lotka_volterra_group_solve(lotka_volterra_group *group, lotka_volterra_model *model)
 {
     lotka_volterra_lanes size, previous, bound;
     double largest = HUGE_VAL, bend = 0.0;
     int iterations = 0, open = 1;
     for (int lane = 0; lane < lotka_volterra_LANES; ++lane) size[lane] = bound[lane] = HUGE_VAL;
-    lotka_volterra_group_predict(group, stage, model->y);
-    for (; open > 0 && iterations < 20; ++iterations) {
+    lotka_volterra_group_predict(group, model->y);
+    for (; open > 0 && iterations < lotka_volterra_MAX_ITERATIONS; ++iterations) {
         memcpy(previous, size, sizeof size);
-        lotka_volterra_update(group->coef[stage], model, largest > 1e-05);
-        bend = largest > 1e-05 ? 0.0 : bend + largest;
-        for (int i = 0; i < 3; ++i) {
+        lotka_volterra_update(group->coef, model, largest > lotka_volterra_FROZEN);
+        bend = largest > lotka_volterra_FROZEN ? 0.0 : bend + largest;
+        for (int i = 0; i < lotka_volterra_DIM; ++i) {
             lotka_volterra_EACH_LANE
             for (int lane = 0; lane < lotka_volterra_LANES; ++lane)
                 model->residual[i][lane] =
-                    ((model->y[i][lane] - group->x[i][lane]) + model->displacement[i][lane]) - group->carry[i][lane];
+                    ((model->y[i][lane] - group->x[i][lane]) + model->displacement[i][lane])
+                        - group->carry[i][lane];
         }
         lotka_volterra_correct(model, size);
         open = lotka_volterra_group_open(group, size, previous, bend, bound);
         largest = lotka_volterra_largest(size);
     }
     for (int lane = 0; lane < lotka_volterra_LANES && open > 0; ++lane)
-        group->active[lane] = group->active[lane] && bound[lane] <= 1e-20;
+        group->active[lane] = group->active[lane] && bound[lane] <= lotka_volterra_TOLERANCE;
     return iterations;
 }
 
 /* Add the increments, corrected to first order, in compensated arithmetic as for a single step. */
-static void lotka_volterra_group_advance(lotka_volterra_lanes x[restrict 3], lotka_volterra_lanes carry[restrict 3],
-    lotka_volterra_model *model)
+static void lotka_volterra_group_advance(lotka_volterra_lanes x[restrict lotka_volterra_DIM],
+    lotka_volterra_lanes carry[restrict lotka_volterra_DIM], lotka_volterra_model *model)
 {
-    for (int i = 0; i < 3; ++i)
-        for (int j = 0; j < 3; ++j) {
+    for (int i = 0; i < lotka_volterra_DIM; ++i)
+        for (int j = 0; j < lotka_volterra_DIM; ++j) {
             lotka_volterra_EACH_LANE
             for (int lane = 0; lane < lotka_volterra_LANES; ++lane)
-                carry[i][lane] -= model->gain[i * 3 + j][lane] * model->residual[j][lane];
+                carry[i][lane] -= model->gain[i * lotka_volterra_DIM + j][lane] * model->residual[j][lane];
         }
-    for (int i = 0; i < 3; ++i) {
+    for (int i = 0; i < lotka_volterra_DIM; ++i) {
         lotka_volterra_EACH_LANE
         for (int lane = 0; lane < lotka_volterra_LANES; ++lane) {
-            const double change = model->increment[i][lane], sum = x[i][lane] + change, added = sum - x[i][lane];
-            const double small = ((x[i][lane] - (sum - added)) + (change - added)) + carry[i][lane];
+            const double change = model->increment[i][lane], sum = x[i][lane] + change, added = sum
+                - x[i][lane];
+            const double lost = (x[i][lane] - (sum - added)) + (change - added);
+            const double small = lost + carry[i][lane];
             x[i][lane] = sum + small;
             carry[i][lane] = small - (x[i][lane] - sum);
         }
     }
 }
 
-/* Members that failed, or whose state is not near the one before the step or not finite, keep that one, and leave. How many
-   stay. */
-static int lotka_volterra_group_leave(lotka_volterra_group *group, lotka_volterra_lanes x[3], lotka_volterra_lanes carry[3],
-    size_t remaining)
+/* Members that failed, or whose state is not near the one before the step or not finite, keep that one, and
+   leave. How many stay. */
+static int lotka_volterra_group_leave(lotka_volterra_group *group, lotka_volterra_lanes x[lotka_volterra_DIM],
+    lotka_volterra_lanes carry[lotka_volterra_DIM], size_t remaining)
 {
     lotka_volterra_lanes moved = { 0.0 }, size = { 0.0 }, bad;
     int active = 0;
-    for (int i = 0; i < 3; ++i) {
+    for (int i = 0; i < lotka_volterra_DIM; ++i) {
         lotka_volterra_EACH_LANE
         for (int lane = 0; lane < lotka_volterra_LANES; ++lane) {
             moved[lane] += fabs(group->x[i][lane] - x[i][lane]);
             size[lane] += fabs(x[i][lane]);
         }
     }
-    for (int lane = 0; lane < lotka_volterra_LANES; ++lane) bad[lane] = moved[lane] <= 4.0 * size[lane] ? 0.0 : 1.0;
+    for (int lane = 0; lane < lotka_volterra_LANES; ++lane)
+        bad[lane] = moved[lane] <= lotka_volterra_REACH * size[lane] ? 0.0 : 1.0;
     for (int lane = 0; lane < lotka_volterra_LANES; ++lane) active += group->active[lane];
     if (active == lotka_volterra_LANES && !(lotka_volterra_largest(bad) > 0.0)) return active;
     active = 0;
     for (int lane = 0; lane < lotka_volterra_LANES; ++lane) {
         group->active[lane] = group->active[lane] && !(bad[lane] > 0.0);
         active += group->active[lane];
-        for (int i = 0; i < 3 && !group->active[lane]; ++i) {
+        for (int i = 0; i < lotka_volterra_DIM && !group->active[lane]; ++i) {
             group->x[i][lane] = x[i][lane];
             group->carry[i][lane] = carry[i][lane];
         }
-        if (!group->active[lane] && group->left[lane] == 0) group->left[lane] = remaining;
+        if (!group->active[lane] && group->steps_left[lane] == 0) group->steps_left[lane] = remaining;
     }
     return active;
 }
@@ -1275,77 +1432,77 @@ static int lotka_volterra_group_leave(lotka_volterra_group *group, lotka_volterr
 /* One step of all members, of as many as remain. How many members are left. */
 static int lotka_volterra_group_step(lotka_volterra_group *group, size_t remaining)
 {
-    lotka_volterra_lanes x[3], carry[3];
+    lotka_volterra_lanes x[lotka_volterra_DIM], carry[lotka_volterra_DIM];
     lotka_volterra_model model;
-    const int next = (group->latest > 0 ? group->latest : 111) - 1;
+    const int next = (group->latest > 0 ? group->latest : lotka_volterra_REMEMBERED) - 1;
     int most = 0;
     memcpy(x, group->x, sizeof x);
     memcpy(carry, group->carry, sizeof carry);
-    for (int stage = 0; stage < 1; ++stage) {
-        const int iterations = lotka_volterra_group_solve(group, stage, &model);
-        lotka_volterra_group_advance(group->x, group->carry, &model);
-        if (iterations > most) most = iterations;
-        if ((iterations > 1 && next % 8 == 0) || group->count < 8)
-            lotka_volterra_group_judge(group, stage, model.y);
-        memcpy(group->past[stage][next], model.y, sizeof model.y);
-    }
+    const int iterations = lotka_volterra_group_solve(group, &model);
+    lotka_volterra_group_advance(group->x, group->carry, &model);
+    if (iterations > most) most = iterations;
+    if ((iterations > 1 && next % lotka_volterra_HISTORY == 0) || group->count < lotka_volterra_HISTORY)
+        lotka_volterra_group_judge(group, model.y);
+    memcpy(group->past[next], model.y, sizeof model.y);
     group->latest = next;
-    if (group->count < 111) ++group->count;
-    group->slow = most > 1 ? group->slow + 1 : 0;
-    if (group->slow > group->patience && group->count == 111 && remaining >= 600)
+    if (group->count < lotka_volterra_REMEMBERED) ++group->count;
+    group->slow_steps = most > 1 ? group->slow_steps + 1 : 0;
+    if (group->slow_steps > group->slow_steps_allowed && group->count == lotka_volterra_REMEMBERED
+        && remaining >= lotka_volterra_GROUP_REPAY)
         lotka_volterra_group_fit(group);
     return lotka_volterra_group_leave(group, x, carry, remaining);
 }
 
 /* Put a member into a lane: its state, and its coefficients. */
-static lotka_volterra_status lotka_volterra_group_join(lotka_volterra_group *group, int lane, const lotka_volterra_params *params,
-    const double x0[3], double h)
+static lotka_volterra_status lotka_volterra_group_join(lotka_volterra_group *group, int lane,
+    const lotka_volterra_params *params, const double x0[lotka_volterra_DIM], double h)
 {
     lotka_volterra_solver s;
     lotka_volterra_status status = lotka_volterra_init(&s, params, x0);
     if (status == lotka_volterra_OK) status = lotka_volterra_set_step(&s, h);
     if (status != lotka_volterra_OK) return status;
-    for (int i = 0; i < 3; ++i) group->x[i][lane] = s.x[i];
-    for (int stage = 0; stage < 1; ++stage)
-        for (int k = 0; k < 1; ++k) group->coef[stage][k][lane] = s.coef[stage][k];
+    for (int i = 0; i < lotka_volterra_DIM; ++i) group->x[i][lane] = s.x[i];
+    for (int k = 0; k < lotka_volterra_COEFFICIENTS; ++k) group->coef[k][lane] = s.coef[k];
     group->active[lane] = 1;
     return status;
 }
 
 /* The steps that a member has still to make after it left the group, by itself. */
-static lotka_volterra_status lotka_volterra_group_finish(const lotka_volterra_group *group, int lane, const lotka_volterra_params *params,
-    double x[3], double h)
+static lotka_volterra_status lotka_volterra_group_finish(const lotka_volterra_group *group, int lane,
+    const lotka_volterra_params *params, double x[lotka_volterra_DIM], double h)
 {
     lotka_volterra_solver s;
     lotka_volterra_status status = lotka_volterra_init(&s, params, x);
     if (status != lotka_volterra_OK) return status;
-    for (int i = 0; i < 3; ++i) s.carry[i] = group->carry[i][lane];
-    status = lotka_volterra_integrate(&s, h, group->left[lane]);
+    for (int i = 0; i < lotka_volterra_DIM; ++i) s.carry[i] = group->carry[i][lane];
+    status = lotka_volterra_integrate(&s, h, group->steps_left[lane]);
     memcpy(x, s.x, sizeof s.x);
     return status;
 }
 
 /* The members from first on, as many as there are lanes. The first status that is not OK. */
-static lotka_volterra_status lotka_volterra_group_run(const lotka_volterra_params *params, double *x, size_t members, size_t first,
-    double h, size_t steps, unsigned char *status)
+static lotka_volterra_status lotka_volterra_group_run(const lotka_volterra_params *params, double *x,
+    size_t members, size_t first, double h, size_t steps, unsigned char *status)
 {
     lotka_volterra_group group;
-    lotka_volterra_status worst = lotka_volterra_OK, member[8];
+    lotka_volterra_status worst = lotka_volterra_OK, member[lotka_volterra_LANES];
     const int count = members - first < lotka_volterra_LANES ? (int)(members - first) : lotka_volterra_LANES;
-    double state[3];
+    double state[lotka_volterra_DIM];
     size_t left = steps;
     memset(&group, 0, sizeof group);
     for (int lane = 0; lane < count; ++lane) {
-        for (size_t i = 0; i < 3; ++i) state[i] = x[i * members + first + (size_t)lane];
+        for (size_t i = 0; i < lotka_volterra_DIM; ++i) state[i] = x[i * members + first + (size_t)lane];
         member[lane] = lotka_volterra_group_join(&group, lane, params, state, h);
     }
-    for (int active = count; left > 0 && active > 2; --left) active = lotka_volterra_group_step(&group, left);
+    for (int active = count; left > 0 && active >= lotka_volterra_FEWEST; --left)
+        active = lotka_volterra_group_step(&group, left);
     for (int lane = 0; lane < count; ++lane) {
-        if (group.active[lane]) group.left[lane] = left;
-        for (int i = 0; i < 3; ++i) state[i] = group.x[i][lane];
+        if (group.active[lane]) group.steps_left[lane] = left;
+        for (int i = 0; i < lotka_volterra_DIM; ++i) state[i] = group.x[i][lane];
         if (member[lane] == lotka_volterra_OK) {
-            if (group.left[lane] > 0) member[lane] = lotka_volterra_group_finish(&group, lane, params, state, h);
-            for (size_t i = 0; i < 3; ++i) x[i * members + first + (size_t)lane] = state[i];
+            if (group.steps_left[lane] > 0)
+                member[lane] = lotka_volterra_group_finish(&group, lane, params, state, h);
+            for (size_t i = 0; i < lotka_volterra_DIM; ++i) x[i * members + first + (size_t)lane] = state[i];
         }
         if (status != NULL) status[first + (size_t)lane] = (unsigned char)member[lane];
         if (worst == lotka_volterra_OK) worst = member[lane];
@@ -1353,8 +1510,9 @@ static lotka_volterra_status lotka_volterra_group_run(const lotka_volterra_param
     return worst;
 }
 
+/* ---- Ensembles ---- */
 lotka_volterra_status lotka_volterra_ensemble(const lotka_volterra_params *params, double *x, size_t members,
-                                              double h, size_t steps, unsigned char *status)
+    double h, size_t steps, unsigned char *status)
 {
     lotka_volterra_status worst = isfinite(h) ? lotka_volterra_OK : lotka_volterra_BAD_ARGUMENT;
     const lotka_volterra_params own = params != NULL ? *params : lotka_volterra_default_params;
@@ -1363,8 +1521,9 @@ lotka_volterra_status lotka_volterra_ensemble(const lotka_volterra_params *param
 #ifdef _OPENMP
 #pragma omp parallel for schedule(dynamic)
 #endif
-    for (size_t first = 0; first < members; first += lotka_volterra_LANES) {
-        const lotka_volterra_status group = lotka_volterra_group_run(&own, x, members, first, h, steps, status);
+    for (size_t first = 0; first < members; first += lotka_volterra_GROUP) {
+        const lotka_volterra_status group = lotka_volterra_group_run(&own, x, members, first, h, steps,
+            status);
         if (group == lotka_volterra_OK) continue;
 #ifdef _OPENMP
 #pragma omp critical
@@ -1380,78 +1539,3 @@ lotka_volterra_status lotka_volterra_ensemble(const lotka_volterra_params *param
 #if defined(__clang__)
 #pragma clang diagnostic pop
 #endif
-
-/* the Hamiltonian */
-static void lotka_volterra_energy(const lotka_volterra_params *params, const double x[3],
-                                  double energy[restrict 1])
-{
-    (void)params;
-    const double x1 = x[0];
-    const double x2 = x[1];
-    const double x3 = x[2];
-    energy[0] = x3 + (x1 + x2);
-}
-
-/* the Casimirs */
-static void lotka_volterra_casimir_values(const lotka_volterra_params *params, const double x[3],
-                                          double out[restrict 1])
-{
-    (void)params;
-    const double x1 = x[0];
-    const double x2 = x[1];
-    const double x3 = x[2];
-    out[0] = x1 * x3 / x2;
-}
-
-/* pi(x) grad H(x) */
-static void lotka_volterra_field(const lotka_volterra_params *params, const double x[3],
-                                 double out[restrict 3])
-{
-    (void)params;
-    const double x1 = x[0];
-    const double x2 = x[1];
-    const double x3 = x[2];
-    const double t1 = x1 * x3;
-    const double t2 = x1 * x2;
-    const double t3 = x2 * x3;
-    out[0] = t1 + t2;
-    out[1] = t3 - t2;
-    out[2] = -(t1 + t3);
-}
-
-double lotka_volterra_hamiltonian(const lotka_volterra_params *params, const double x[3])
-{
-    double energy[1];
-    lotka_volterra_energy(params != NULL ? params : &lotka_volterra_default_params, x, energy);
-    return energy[0];
-}
-
-void lotka_volterra_casimirs(const lotka_volterra_params *params, const double x[3], double out[])
-{
-    double value[1]; /* out may overlap x */
-    lotka_volterra_casimir_values(params != NULL ? params : &lotka_volterra_default_params, x, value);
-    for (int i = 0; i < 1; ++i) out[i] = value[i];
-}
-
-void lotka_volterra_vector_field(const lotka_volterra_params *params, const double x[3], double out[3])
-{
-    double value[3];
-    lotka_volterra_field(params != NULL ? params : &lotka_volterra_default_params, x, value);
-    memcpy(out, value, sizeof value);
-}
-
-const char *lotka_volterra_status_string(lotka_volterra_status status)
-{
-    switch (status) {
-    case lotka_volterra_OK: return "ok";
-    case lotka_volterra_NO_CONVERGENCE: return "no convergence: the step is too large";
-    case lotka_volterra_SINGULAR: return "singular Newton matrix: the step is too large";
-    case lotka_volterra_NOT_FINITE: return "not finite: overflow, or outside the domain";
-    case lotka_volterra_BAD_ARGUMENT: return "bad argument: a null pointer, or values that are not allowed";
-    }
-    return "unknown status";
-}
-
-size_t lotka_volterra_solver_size(void) { return sizeof(lotka_volterra_solver); }
-
-size_t lotka_volterra_solver_steps_done(const lotka_volterra_solver *s) { return s->steps; }

@@ -6,17 +6,17 @@
 #   step: implicit, Newton iteration with the analytic matrix
 #   one Newton iteration: 19 additions, 42 multiplications
 #
-# spec: maxwell_bloch, sha256 6998467bccf92cc00d1bbe2abe38d3e97c02a9e39e68f54463c214043fe191c9
+# spec: maxwell_bloch, sha256 624a938a8bb2adf6721f7be0bad529b807bbe017cc3b22a2d1819ff654f45cf0
 # to regenerate: phigen build maxwell_bloch
 # DO NOT EDIT: change the spec and regenerate; edits are noticed by the checksum below.
 #
 # SPDX-License-Identifier: 0BSD
 # This file belongs to whoever generated it; phigen claims no rights in it.
-# body-sha256: f12810d007e2fd1416d71b15b9fc42d0baeba70ffae1bb99e4b549c7970da58c
+# body-sha256: ea7326c651938d1b388d48e280c42667876c647ae6ae67b43527f71f11719c12
 import numpy as np
 
 VERSION = "0.1.0"
-SPEC_SHA256 = "6998467bccf92cc00d1bbe2abe38d3e97c02a9e39e68f54463c214043fe191c9"
+SPEC_SHA256 = "624a938a8bb2adf6721f7be0bad529b807bbe017cc3b22a2d1819ff654f45cf0"
 DIM = 3
 ORDER = 4
 COORDINATES = ("x", "y", "z",)

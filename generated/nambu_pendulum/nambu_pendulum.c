@@ -13,7 +13,20 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 3262649e6f2a0eeca699a4c11716a051d184b707cbe2eeeef2f85fa1ff98e7a0
+ *
+ *   1. The model
+ *   2. Compensated sums, linear equations
+ *   3. Starting guesses
+ *   4. Recurrences fitted to the last values
+ *   5. The implicit step, along paths dm/dt = pi(m) p
+ *   6. Several steps or members at once
+ *   7. The solver
+ *   8. Newton's method in lanes
+ *   9. Paths in lanes
+ *   10. Blocks of steps
+ *   11. Groups of members
+ *   12. Ensembles
+ * body-sha256: 22148abe844d5b524b69e8d449975c2d59f0dbc2239e70116ae4d49180ec973c
  */
 #include "nambu_pendulum.h"
 
@@ -23,10 +36,25 @@
 #include <stdint.h>
 #include <string.h>
 
+/* ---- The model ---- */
 const nambu_pendulum_params nambu_pendulum_default_params = { 0 };
 
-/* A step of size h is the composition of these fractions of it. */
-static const double nambu_pendulum_fractions[1] = { 1.0 };
+enum { nambu_pendulum_MAX_ITERATIONS = 20 }; /* of an inner solve */
+/* most of the expansion of a path; one that needs more is cut into pieces */
+enum { nambu_pendulum_TERMS = 30 };
+enum { nambu_pendulum_SERIES = 11 };      /* of a path, those of the coordinates first */
+enum { nambu_pendulum_FIXED = 1 };        /* values that are constant along a path */
+enum { nambu_pendulum_CHECKS = 8 };       /* values that a recurrence is not fitted to, but has to foresee */
+enum { nambu_pendulum_PASSES = 1 };       /* over a block, that cost per step what an evaluation costs */
+enum { nambu_pendulum_SLOPE_TERMS = 12 }; /* most of the expansion of the derivatives of a path */
+enum { nambu_pendulum_SLOPE_SERIES = 5 }; /* further series that these need */
+enum { nambu_pendulum_SLOPE_FIXED = 1 };  /* further values that are constant along a path */
+
+/* A correction is accepted when the error that it leaves is estimated to be below this. */
+#define nambu_pendulum_TOLERANCE 1e-20
+
+/* The series of dm_i/dt along a path, for each i. */
+static const int nambu_pendulum_path_slopes[nambu_pendulum_DIM] = { 10, 6, 7 };
 
 /* everything that depends on parameters and step size only */
 static void nambu_pendulum_prepare(const nambu_pendulum_params *params, double h, double coef[restrict 3])
@@ -39,15 +67,15 @@ static void nambu_pendulum_prepare(const nambu_pendulum_params *params, double h
 
 /* p = grad S_h(y), and the Jacobian 1 - Hess S_h(y) pi(y) / 2 of the equation for p, up to O(h^2) */
 static void nambu_pendulum_generate(const double coef[3], const double y[3], double slope[restrict 3],
-                                    double jacobian[restrict 9])
+    double jacobian[restrict 9])
 {
-    const double theta = y[0];
-    const double p = y[1];
-    const double t1 = sin(theta);
-    const double t2 = cos(theta);
+    const double theta = y[0], p = y[1];
+    /* slope */
+    const double t1 = sin(theta), t2 = cos(theta);
     slope[0] = coef[0] * (t1 * t2);
     slope[1] = coef[1] * p;
     slope[2] = coef[1];
+    /* jacobian */
     jacobian[0] = 1.0;
     jacobian[1] = (-0.5) * (coef[0] * (t2 * t2 - t1 * t1));
     jacobian[2] = 0.0;
@@ -59,134 +87,145 @@ static void nambu_pendulum_generate(const double coef[3], const double y[3], dou
     jacobian[8] = 1.0;
 }
 
-/* Solve matrix * solution = side, both overwritten, by elimination with partial pivoting. 0 if singular. */
-static int nambu_pendulum_solve_pivoting(double matrix[9], double side[3])
-{
-    for (int k = 0; k < 3; ++k) {
-        int best = k;
-        for (int i = k + 1; i < 3; ++i)
-            if (fabs(matrix[i * 3 + k]) > fabs(matrix[best * 3 + k])) best = i;
-        const double pivot = matrix[best * 3 + k];
-        if (!(fabs(pivot) > 0.0)) return 0;
-        for (int j = k; j < 3 && best != k; ++j) {
-            const double swap = matrix[k * 3 + j];
-            matrix[k * 3 + j] = matrix[best * 3 + j];
-            matrix[best * 3 + j] = swap;
-        }
-        const double swap = side[k];
-        side[k] = side[best];
-        side[best] = swap;
-        for (int i = k + 1; i < 3; ++i) {
-            const double factor = matrix[i * 3 + k] / pivot;
-            for (int j = k + 1; j < 3; ++j) matrix[i * 3 + j] -= factor * matrix[k * 3 + j];
-            side[i] -= factor * side[k];
-        }
-    }
-    for (int i = 3 - 1; i >= 0; --i) {
-        for (int j = i + 1; j < 3; ++j) side[i] -= matrix[i * 3 + j] * side[j];
-        side[i] /= matrix[i * 3 + i];
-    }
-    return 1;
-}
-
 /* elimination without pivoting: the solution, and the reciprocals of the pivots */
-static void nambu_pendulum_eliminate(const double matrix[9], const double side[3], double solution[restrict 3],
-                                     double reciprocal[restrict 3])
+static void nambu_pendulum_eliminate(const double matrix[9], const double side[3],
+    double solution[restrict 3], double reciprocal[restrict 3])
 {
-    const double t1 = 1.0 / matrix[0];
-    const double t2 = matrix[6] * t1;
-    const double t3 = matrix[3] * t1;
-    const double t4 = side[1] - side[0] * t3;
-    const double t5 = 1.0 / (matrix[4] - matrix[1] * t3);
-    const double t6 = (matrix[7] - matrix[1] * t2) * t5;
-    const double t7 = matrix[5] - matrix[2] * t3;
+    /* solution */
+    const double t1 = 1.0 / matrix[0], t2 = matrix[6] * t1, t3 = matrix[3] * t1;
+    const double t4 = side[1] - side[0] * t3, t5 = 1.0 / (matrix[4] - matrix[1] * t3);
+    const double t6 = (matrix[7] - matrix[1] * t2) * t5, t7 = matrix[5] - matrix[2] * t3;
     const double t8 = 1.0 / (matrix[8] - matrix[2] * t2 - t7 * t6);
-    const double t9 = (side[2] - side[0] * t2 - t4 * t6) * t8;
-    const double t10 = t5 * (t4 - t7 * t9);
+    const double t9 = (side[2] - side[0] * t2 - t4 * t6) * t8, t10 = t5 * (t4 - t7 * t9);
     solution[0] = t1 * (side[0] - (matrix[2] * t9 + matrix[1] * t10));
     solution[1] = t10;
     solution[2] = t9;
+    /* reciprocal */
     reciprocal[0] = t1;
     reciprocal[1] = t5;
     reciprocal[2] = t8;
 }
 
+/* the Hamiltonian */
+double nambu_pendulum_hamiltonian(const nambu_pendulum_params *params, const double x[3])
+{
+    (void)params;
+    const double p = x[1], V = x[2];
+    return V + 0.5 * (p * p);
+}
+
+/* the Casimirs */
+void nambu_pendulum_casimirs(const nambu_pendulum_params *params, const double x[3], double out[])
+{
+    (void)params;
+    const double theta = x[0], V = x[2];
+    out[0] = V + cos(theta);
+}
+
+/* pi(x) grad H(x) */
+void nambu_pendulum_vector_field(const nambu_pendulum_params *params, const double x[3], double out[3])
+{
+    (void)params;
+    const double theta = x[0], p = x[1];
+    const double t1 = sin(theta);
+    out[0] = p;
+    out[1] = -t1;
+    out[2] = p * t1;
+}
+
+/* ---- Compensated sums, linear equations ---- */
+/* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to
+   its last bit: were it rounded with the change, corrections of one sign would add up to a drift. 0, and x as
+   before, if the sum is not finite. */
+static int nambu_pendulum_advance(nambu_pendulum_solver *s, const double change[nambu_pendulum_DIM],
+    const double correction[nambu_pendulum_DIM])
+{
+    double x[nambu_pendulum_DIM], carry[nambu_pendulum_DIM];
+    for (int i = 0; i < nambu_pendulum_DIM; ++i) {
+        const double sum = s->x[i] + change[i], added = sum - s->x[i];
+        const double lost = (s->x[i] - (sum - added)) + (change[i] - added);
+        const double small = lost + (s->carry[i] + correction[i]);
+        x[i] = sum + small;
+        carry[i] = small - (x[i] - sum);
+        if (!isfinite(x[i])) return 0;
+    }
+    memcpy(s->x, x, sizeof x);
+    memcpy(s->carry, carry, sizeof carry);
+    return 1;
+}
+
+/* Newton matrices are I + O(h): a pivot whose reciprocal is larger than this is far from 1. */
+#define nambu_pendulum_LARGEST_RECIPROCAL 1e3
+
+/* Solve matrix * solution = side, both overwritten, by elimination with partial pivoting. 0 if singular. */
+static int nambu_pendulum_solve_pivoting(double matrix[nambu_pendulum_DIM * nambu_pendulum_DIM],
+    double side[nambu_pendulum_DIM])
+{
+    for (int k = 0; k < nambu_pendulum_DIM; ++k) {
+        int best = k;
+        for (int i = k + 1; i < nambu_pendulum_DIM; ++i)
+            if (fabs(matrix[i * nambu_pendulum_DIM + k]) > fabs(matrix[best * nambu_pendulum_DIM + k]))
+                best = i;
+        const double pivot = matrix[best * nambu_pendulum_DIM + k], last = side[k];
+        if (!(fabs(pivot) > 0.0)) return 0;
+        for (int j = k; j < nambu_pendulum_DIM && best != k; ++j) {
+            const double swap = matrix[k * nambu_pendulum_DIM + j];
+            matrix[k * nambu_pendulum_DIM + j] = matrix[best * nambu_pendulum_DIM + j];
+            matrix[best * nambu_pendulum_DIM + j] = swap;
+        }
+        side[k] = side[best];
+        side[best] = last;
+        for (int i = k + 1; i < nambu_pendulum_DIM; ++i) {
+            const double factor = matrix[i * nambu_pendulum_DIM + k] / pivot;
+            for (int j = k + 1; j < nambu_pendulum_DIM; ++j)
+                matrix[i * nambu_pendulum_DIM + j] -= factor * matrix[k * nambu_pendulum_DIM + j];
+            side[i] -= factor * side[k];
+        }
+    }
+    for (int i = nambu_pendulum_DIM - 1; i >= 0; --i) {
+        for (int j = i + 1; j < nambu_pendulum_DIM; ++j)
+            side[i] -= matrix[i * nambu_pendulum_DIM + j] * side[j];
+        side[i] /= matrix[i * nambu_pendulum_DIM + i];
+    }
+    return 1;
+}
+
 /* Solve matrix * solution = side, both overwritten. The matrix is I + O(h), so elimination without pivoting
    does unless a pivot is far from 1. 0 if singular. */
-static int nambu_pendulum_solve(double matrix[9], double side[3])
+static int nambu_pendulum_solve(double matrix[nambu_pendulum_DIM * nambu_pendulum_DIM],
+    double side[nambu_pendulum_DIM])
 {
-    double solution[3], reciprocal[3], largest = 0.0;
+    double solution[nambu_pendulum_DIM], reciprocal[nambu_pendulum_DIM], largest = 0.0;
     nambu_pendulum_eliminate(matrix, side, solution, reciprocal);
-    for (int i = 0; i < 3; ++i)
+    for (int i = 0; i < nambu_pendulum_DIM; ++i)
         if (!(fabs(reciprocal[i]) <= largest)) largest = fabs(reciprocal[i]);
-    if (!(largest < 1e3)) return nambu_pendulum_solve_pivoting(matrix, side);
+    if (!(largest < nambu_pendulum_LARGEST_RECIPROCAL)) return nambu_pendulum_solve_pivoting(matrix, side);
     memcpy(side, solution, sizeof solution);
     return 1;
 }
 
-/* Whether a guess is where the next values may be. Recurrences that were fitted to little else than rest, near a saddle,
-   may lead anywhere; and far away the equation of a step has solutions that have nothing to do with the motion. */
-static int nambu_pendulum_near(const double guess[3], const double last[3])
-{
-    double distance = 0.0, size = 0.0;
-    for (int i = 0; i < 3; ++i) {
-        distance += fabs(guess[i] - last[i]);
-        size += fabs(last[i]);
-    }
-    return distance <= 4.0 * size;
-}
+/* ---- Starting guesses ---- */
 
-/* The guess for the next value (y), from earlier ones; 0 if there is none. */
-static int nambu_pendulum_predict(const nambu_pendulum_memory *memory, double value[3])
-{
-    const int last = memory->count - 1;
-    double odd[3] = { 0.0 }, binomial = -1.0;
-    memset(value, 0, 3 * sizeof value[0]);
-    if (memory->fitting) {
-        for (int k = 0; k < memory->terms; k += 2)
-            for (int i = 0; i < 3; ++i) {
-                value[i] += memory->weight[k][i][0] * memory->past[last - k][i];
-                odd[i] += memory->weight[k + 1][i][0] * memory->past[last - 1 - k][i];
-            }
-        for (int i = 0; i < 3; ++i) value[i] += odd[i];
-    } else {
-        for (int k = 0; k < memory->order && k <= last; ++k) {
-            binomial *= -(double)(memory->order - k) / (k + 1);
-            for (int i = 0; i < 3; ++i) value[i] += binomial * memory->past[last - k][i];
-        }
-    }
-    return last >= 0 && nambu_pendulum_near(value, memory->past[last]);
-}
+/* ---- Recurrences fitted to the last values ---- */
+/* A recurrence uses no more values than leave so little, in sizes of the largest. */
+#define nambu_pendulum_ENOUGH 3e-12
 
-/* Choose the guess that would have been best for a value that took several iterations. */
-static void nambu_pendulum_judge(nambu_pendulum_memory *memory, const double value[3])
-{
-    double row[8 + 1][3], guess[3], least = HUGE_VAL, fitted = HUGE_VAL;
-    const int rows = memory->count < 8 ? memory->count : 8;
-    memcpy(row[0], value, sizeof row[0]);
-    for (int k = 0; k < rows; ++k) memcpy(row[k + 1], memory->past[memory->count - 1 - k], sizeof row[0]);
-    for (int order = 1; order <= rows; ++order) { /* row[0] becomes the backward difference of this order */
-        double size = 0.0;
-        for (int k = 0; k <= rows - order; ++k)
-            for (int i = 0; i < 3; ++i) row[k][i] -= row[k + 1][i];
-        for (int i = 0; i < 3; ++i) size += fabs(row[0][i]);
-        if (size < least) {
-            least = size;
-            memory->order = order;
-        }
-    }
-    memory->fitting = memory->terms > 0;
-    if (memory->fitting && nambu_pendulum_predict(memory, guess)) {
-        fitted = 0.0;
-        for (int i = 0; i < 3; ++i) fitted += fabs(value[i] - guess[i]);
-    }
-    memory->fitting = memory->terms > 0 && fitted <= least;
-    if (memory->order == 0) memory->order = 1;
-}
+/* The ridge of the least squares: the level of rounding. */
+#define nambu_pendulum_RIDGE 1e-15
 
-/* Make eight columns orthogonal to one, by the multiples of it that are put into r. Where that one is among the eight, those
-   up to it stay as they are, and inverse becomes one over its squared length. The number of rows is even. */
-static void nambu_pendulum_project(int rows, double (*one)[8], int column, double *inverse, double (*eight)[8], double r[8])
+/* How far a recurrence may miss values that it was not fitted to, in sizes of the largest: beyond, the motion
+   is chaotic or the step long, and other guesses are as good. */
+#define nambu_pendulum_HOPELESS 1e-7
+
+/* equations of the least squares */
+enum { nambu_pendulum_ROWS = nambu_pendulum_REMEMBERED - nambu_pendulum_WINDOW - nambu_pendulum_AHEAD
+    - nambu_pendulum_CHECKS + 1 };
+
+/* Make eight columns orthogonal to one, by the multiples of it that are put into r. Where that one is among
+   the eight, those up to it stay as they are, and inverse becomes one over its squared length. The number of
+   rows is even. */
+static void nambu_pendulum_project(int rows, double (*one)[8], int column, double *inverse,
+    double (*eight)[8], double r[8])
 {
     double even[8] = { 0.0 }, odd[8] = { 0.0 };
     for (int i = 0; i < rows; i += 2) {
@@ -209,7 +248,7 @@ static void nambu_pendulum_project(int rows, double (*one)[8], int column, doubl
 /* By how much recurrences miss the last of these values. */
 static double nambu_pendulum_missed(const double *value, double (*weight)[8])
 {
-    enum { AHEAD = 8, WINDOW = 40, CHECKS = 8 };
+    enum { AHEAD = nambu_pendulum_AHEAD, WINDOW = nambu_pendulum_WINDOW, CHECKS = nambu_pendulum_CHECKS };
     double most = 0.0;
     for (int i = 0; i < CHECKS; ++i) {
         double guess[8] = { 0.0 };
@@ -220,31 +259,36 @@ static double nambu_pendulum_missed(const double *value, double (*weight)[8])
     return most;
 }
 
-/* Fit the recurrences value[m + l] = sum of weight[k][..][l] * value[m - 1 - k], l = 0 ... 8 - 1, to the history of
-   a component: ridge least squares by modified Gram-Schmidt, the ridge at the level of rounding. Columns are taken in by
-   eights, until they leave next to nothing of the right-hand sides. How many past values are used; 0 if the recurrences do
-   not foresee the last values, which they were not fitted to. */
-static int nambu_pendulum_train(nambu_pendulum_memory *memory, int component)
+/* Fit the recurrences value[m + l] = sum of weight[k][..][l] * value[m - 1 - k], l = 0 ...
+   nambu_pendulum_AHEAD - 1, to the history of a component: ridge least squares by modified Gram-Schmidt, the
+   ridge at the level of rounding. Columns are taken in by eights, until they leave next to nothing of the
+   right-hand sides. How many past values are used; 0 if the recurrences do not foresee the last values, which
+   they were not fitted to. */
+static int nambu_pendulum_train(nambu_pendulum_history *history, int component)
 {
-    enum { AHEAD = 8, WINDOW = 40, ROWS = 56 };
-    double q[WINDOW / 8][ROWS + WINDOW][8], r[WINDOW / 8][WINDOW][8], inverse[WINDOW]; /* eight columns in each part */
-    double right[ROWS + WINDOW][8], weight[WINDOW][8], value[111], largest = 0.0, left = HUGE_VAL;
+    enum { AHEAD = nambu_pendulum_AHEAD, WINDOW = nambu_pendulum_WINDOW, ROWS = nambu_pendulum_ROWS };
+    /* eight columns in each part */
+    double q[WINDOW / 8][ROWS + WINDOW][8], r[WINDOW / 8][WINDOW][8], inverse[WINDOW];
+    double right[ROWS + WINDOW][8], weight[WINDOW][8], value[nambu_pendulum_REMEMBERED], largest = 0.0, left =
+        HUGE_VAL;
     int terms = 0;
     memset(q, 0, sizeof q);
     memset(right, 0, sizeof right);
     memset(weight, 0, sizeof weight);
-    for (int i = 0; i < 111; ++i) {
-        value[i] = memory->past[memory->count - 111 + i][component];
+    for (int i = 0; i < nambu_pendulum_REMEMBERED; ++i) {
+        value[i] = history->past[history->count - nambu_pendulum_REMEMBERED + i][component];
         if (fabs(value[i]) > largest) largest = fabs(value[i]);
     }
     for (int i = 0; i < ROWS; ++i)
         for (int l = 0; l < AHEAD; ++l) right[i][l] = value[i + WINDOW + l];
-    while (terms < WINDOW && left > 3e-12 * largest) {
-        const int part = terms / 8, rows = ROWS + terms + 8; /* further rows of the ridge are zero in these columns */
+    while (terms < WINDOW && left > nambu_pendulum_ENOUGH * largest) {
+        /* further rows of the ridge are zero in these columns */
+        const int part = terms / 8, rows = ROWS + terms + 8;
         for (int i = 0; i < ROWS; ++i)
             for (int l = 0; l < 8; ++l) q[part][i][l] = value[i + WINDOW - 1 - terms - l];
-        for (int l = 0; l < 8; ++l) q[part][ROWS + terms + l][l] = 1e-15 * largest;
-        for (int k = 0; k < terms; ++k) nambu_pendulum_project(rows, q[k / 8], k % 8, &inverse[k], q[part], r[part][k]);
+        for (int l = 0; l < 8; ++l) q[part][ROWS + terms + l][l] = nambu_pendulum_RIDGE * largest;
+        for (int k = 0; k < terms; ++k)
+            nambu_pendulum_project(rows, q[k / 8], k % 8, &inverse[k], q[part], r[part][k]);
         for (int l = 0; l < 8; ++l, ++terms) {
             nambu_pendulum_project(rows, q[part], l, &inverse[terms], q[part], r[part][terms]);
             nambu_pendulum_project(rows, q[part], l, &inverse[terms], right, weight[terms]);
@@ -258,90 +302,153 @@ static int nambu_pendulum_train(nambu_pendulum_memory *memory, int component)
     for (int k = terms - 1; k >= 0; --k)
         for (int j = k + 1; j < terms; ++j)
             for (int l = 0; l < 8; ++l) weight[k][l] -= r[j / 8][k][j % 8] * weight[j][l];
-    for (int k = 0; k < WINDOW; ++k) memcpy(memory->weight[k][component], weight[k], AHEAD * sizeof(double));
-    return nambu_pendulum_missed(value + ROWS, weight) <= 1e-07 * largest ? terms : 0;
+    for (int k = 0; k < WINDOW; ++k) memcpy(history->weight[k][component], weight[k], AHEAD * sizeof(double));
+    return nambu_pendulum_missed(value + ROWS, weight) <= nambu_pendulum_HOPELESS * largest ? terms : 0;
+}
+/* How far from the last value a guess may be, in sizes of that value. */
+#define nambu_pendulum_REACH 4.0
+
+/* Whether a guess is where the next values may be. Far away the equation of a step has solutions that have
+   nothing to do with the motion. */
+static int nambu_pendulum_near(const double guess[nambu_pendulum_DIM], const double last[nambu_pendulum_DIM])
+{
+    double distance = 0.0, size = 0.0;
+    for (int i = 0; i < nambu_pendulum_DIM; ++i) {
+        distance += fabs(guess[i] - last[i]);
+        size += fabs(last[i]);
+    }
+    return distance <= nambu_pendulum_REACH * size;
+}
+
+enum {
+    /* values that extrapolation uses at most: more amplify rounding more than they gain */
+    nambu_pendulum_HISTORY = 8,
+    nambu_pendulum_REPAY = 150,      /* steps that a fit costs, about */
+    nambu_pendulum_LONG_WAIT = 20000 /* steps until a recurrence that often needs fitting is fitted again */
+};
+
+/* The guess for the next value (y), from earlier ones; 0 if there is none. */
+static int nambu_pendulum_predict(const nambu_pendulum_history *history, double value[nambu_pendulum_DIM])
+{
+    const int last = history->count - 1;
+    double odd[nambu_pendulum_DIM] = { 0.0 }, binomial = -1.0;
+    memset(value, 0, nambu_pendulum_DIM * sizeof value[0]);
+    if (history->use_recurrence) {
+        for (int k = 0; k < history->recurrence_terms; k += 2)
+            for (int i = 0; i < nambu_pendulum_DIM; ++i) {
+                value[i] += history->weight[k][i][0] * history->past[last - k][i];
+                odd[i] += history->weight[k + 1][i][0] * history->past[last - 1 - k][i];
+            }
+        for (int i = 0; i < nambu_pendulum_DIM; ++i) value[i] += odd[i];
+    } else {
+        for (int k = 0; k < history->extrapolation_order && k <= last; ++k) {
+            binomial *= -(double)(history->extrapolation_order - k) / (k + 1);
+            for (int i = 0; i < nambu_pendulum_DIM; ++i) value[i] += binomial * history->past[last - k][i];
+        }
+    }
+    return last >= 0 && nambu_pendulum_near(value, history->past[last]);
+}
+
+/* Choose the guess that would have been best for a value that took several iterations. */
+static void nambu_pendulum_judge(nambu_pendulum_history *history, const double value[nambu_pendulum_DIM])
+{
+    double row[nambu_pendulum_HISTORY + 1][nambu_pendulum_DIM], guess[nambu_pendulum_DIM], least = HUGE_VAL,
+        fitted = HUGE_VAL;
+    const int rows = history->count < nambu_pendulum_HISTORY ? history->count : nambu_pendulum_HISTORY;
+    memcpy(row[0], value, sizeof row[0]);
+    for (int k = 0; k < rows; ++k) memcpy(row[k + 1], history->past[history->count - 1 - k], sizeof row[0]);
+    for (int order = 1; order <= rows; ++order) { /* row[0] becomes the backward difference of this order */
+        double size = 0.0;
+        for (int k = 0; k <= rows - order; ++k)
+            for (int i = 0; i < nambu_pendulum_DIM; ++i) row[k][i] -= row[k + 1][i];
+        for (int i = 0; i < nambu_pendulum_DIM; ++i) size += fabs(row[0][i]);
+        if (size < least) {
+            least = size;
+            history->extrapolation_order = order;
+        }
+    }
+    history->use_recurrence = history->recurrence_terms > 0;
+    if (history->use_recurrence && nambu_pendulum_predict(history, guess)) {
+        fitted = 0.0;
+        for (int i = 0; i < nambu_pendulum_DIM; ++i) fitted += fabs(value[i] - guess[i]);
+    }
+    history->use_recurrence = history->recurrence_terms > 0 && fitted <= least;
+    if (history->extrapolation_order == 0) history->extrapolation_order = 1;
 }
 
 /* Drop what is old, if so many values would not fit into the history. */
-static void nambu_pendulum_make_room(nambu_pendulum_memory *memory, int values)
+static void nambu_pendulum_make_room(nambu_pendulum_history *history, int values)
 {
-    if (memory->count + values <= 222) return;
-    memmove(memory->past, memory->past + memory->count - 111, 111 * sizeof memory->past[0]);
-    memory->count = 111;
+    if (history->count + values <= nambu_pendulum_KEPT) return;
+    memmove(history->past, history->past + history->count - nambu_pendulum_REMEMBERED,
+        nambu_pendulum_REMEMBERED * sizeof history->past[0]);
+    history->count = nambu_pendulum_REMEMBERED;
 }
 
 /* Add a value to the history. */
-static void nambu_pendulum_record(nambu_pendulum_memory *memory, const double value[3])
+static void nambu_pendulum_record(nambu_pendulum_history *history, const double value[nambu_pendulum_DIM])
 {
-    nambu_pendulum_make_room(memory, 1);
-    memcpy(memory->past[memory->count++], value, 3 * sizeof value[0]);
+    nambu_pendulum_make_room(history, 1);
+    memcpy(history->past[history->count++], value, nambu_pendulum_DIM * sizeof value[0]);
 }
 
 /* Fit the recurrence to the last values; with every time, wait longer before it is done again. */
-static void nambu_pendulum_fit(nambu_pendulum_memory *memory)
+static void nambu_pendulum_fit(nambu_pendulum_history *history)
 {
     int found = 1;
-    memory->terms = 0;
-    for (int i = 0; i < 3 && found; ++i) {
-        const int terms = nambu_pendulum_train(memory, i);
+    history->recurrence_terms = 0;
+    for (int i = 0; i < nambu_pendulum_DIM && found; ++i) {
+        const int terms = nambu_pendulum_train(history, i);
         found = terms > 0;
-        if (terms > memory->terms) memory->terms = terms;
+        if (terms > history->recurrence_terms) history->recurrence_terms = terms;
     }
-    if (!found) memory->terms = 0;
-    memory->fitting = found;
-    ++memory->fits;
-    memory->slow = 0;
-    memory->patience = memory->patience < 10000 ? 2 * memory->patience + 150 : 20000;
+    if (!found) history->recurrence_terms = 0;
+    history->use_recurrence = found;
+    ++history->fits;
+    history->slow_steps = 0;
+    history->slow_steps_allowed = history->slow_steps_allowed < nambu_pendulum_LONG_WAIT / 2
+        ? 2 * history->slow_steps_allowed + nambu_pendulum_REPAY : nambu_pendulum_LONG_WAIT;
 }
 
 /* Take in the solved value: what took one iteration needs no better guess. */
-static void nambu_pendulum_remember(nambu_pendulum_memory *memory, const double value[3], int iterations)
+static void nambu_pendulum_remember(nambu_pendulum_history *history, const double value[nambu_pendulum_DIM],
+    int iterations)
 {
-    if (iterations > 1) nambu_pendulum_judge(memory, value);
-    nambu_pendulum_record(memory, value);
-    memory->slow = iterations > 1 ? memory->slow + 1 : 0;
-    if (memory->slow > memory->patience && memory->count >= 111) nambu_pendulum_fit(memory);
+    if (iterations > 1) nambu_pendulum_judge(history, value);
+    nambu_pendulum_record(history, value);
+    history->slow_steps = iterations > 1 ? history->slow_steps + 1 : 0;
+    if (history->slow_steps > history->slow_steps_allowed && history->count >= nambu_pendulum_REMEMBERED)
+        nambu_pendulum_fit(history);
 }
 
-/* Whether an increment is that of the motion. Where the step is too large, the equation may have been solved by a point far
-   away, at another energy, that has nothing to do with it. */
-static int nambu_pendulum_plausible(const nambu_pendulum_solver *s, int stage, const double increment[3])
+/* How far a step may lead, in sizes of the state and of what the vector field says, if the energy is lost;
+   and the part of the energy that counts as lost. */
+#define nambu_pendulum_PLAUSIBLE 1.5
+#define nambu_pendulum_LOST 0.5
+
+/* Whether an increment is that of the motion. Where the step is too large, the equation may have been solved
+   by a point far away, at another energy, that has nothing to do with it. */
+static int nambu_pendulum_plausible(const nambu_pendulum_solver *s,
+    const double increment[nambu_pendulum_DIM])
 {
-    double moved = 0.0, size = 0.0, field[3], middle[3], end[3];
-    for (int i = 0; i < 3; ++i) {
+    double moved = 0.0, size = 0.0, field[nambu_pendulum_DIM], middle[nambu_pendulum_DIM],
+        end[nambu_pendulum_DIM];
+    for (int i = 0; i < nambu_pendulum_DIM; ++i) {
         moved += fabs(increment[i]);
         size += fabs(s->x[i]);
     }
-    if (moved <= 1.5 * size) return 1;
+    if (moved <= nambu_pendulum_PLAUSIBLE * size) return 1;
     nambu_pendulum_vector_field(&s->params, s->x, field);
-    for (int i = 0; i < 3; ++i) {
-        size += fabs(nambu_pendulum_fractions[stage] * s->h * field[i]);
+    for (int i = 0; i < nambu_pendulum_DIM; ++i) {
+        size += fabs(s->h * field[i]);
         middle[i] = s->x[i] + 0.5 * increment[i];
         end[i] = s->x[i] + increment[i];
     }
-    if (moved <= 1.5 * size) return 1;
-    const double before = nambu_pendulum_hamiltonian(&s->params, s->x), after = nambu_pendulum_hamiltonian(&s->params, end);
+    if (moved <= nambu_pendulum_PLAUSIBLE * size) return 1;
+    const double before = nambu_pendulum_hamiltonian(&s->params, s->x), after =
+        nambu_pendulum_hamiltonian(&s->params, end);
     const double scale = fabs(before) + fabs(nambu_pendulum_hamiltonian(&s->params, middle)) + fabs(after);
-    return fabs(after - before) <= 0.5 * scale;
-}
-
-/* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to its last
-   bit: were it rounded with the change, corrections of one sign would add up to a drift. 0, and x as before, if the
-   sum is not finite. */
-static int nambu_pendulum_advance(nambu_pendulum_solver *s, const double change[3], const double correction[3])
-{
-    double x[3], carry[3];
-    for (int i = 0; i < 3; ++i) {
-        const double sum = s->x[i] + change[i], added = sum - s->x[i];
-        const double lost = (s->x[i] - (sum - added)) + (change[i] - added);
-        const double small = lost + (s->carry[i] + correction[i]);
-        x[i] = sum + small;
-        carry[i] = small - (x[i] - sum);
-        if (!isfinite(x[i])) return 0;
-    }
-    memcpy(s->x, x, sizeof x);
-    memcpy(s->carry, carry, sizeof carry);
-    return 1;
+    return fabs(after - before) <= nambu_pendulum_LOST * scale;
 }
 
 /* Coefficient k >= 1 of the Taylor series of f(a), where d is that of f'(a): f(a)' = f'(a) a'. */
@@ -352,13 +459,50 @@ static double nambu_pendulum_taylor_chain(const double *a, const double *d, int 
     return sum / k;
 }
 
-/* Whether dm/dt = pi(m) p holds at a point m, where the expansion has the given slope: one with gaps between its terms,
-   like t + t^9, or across the kink of an absolute value, only looks as if it had converged. */
-static int nambu_pendulum_holds(const double *coef, const double p[3], const double m[3], const double slope[3])
+/* The first coefficients of the series of a path, those of the coordinates given. */
+static void nambu_pendulum_path_begin(const double *coef, const double p[3],
+    double s[11][nambu_pendulum_TERMS + 1], double f[1])
 {
     (void)coef;
-    double e[11], field[3], scale = 0.0;
-    memcpy(e, m, 3 * sizeof *e);
+    (void)f;
+    s[3][0] = sin(s[0][0]);
+    s[4][0] = p[2] * s[3][0];
+    s[5][0] = p[0] + s[4][0];
+    s[6][0] = -s[5][0];
+    s[7][0] = p[1] * s[3][0];
+    s[8][0] = cos(s[0][0]);
+    s[9][0] = -s[3][0];
+    s[10][0] = p[1];
+}
+
+/* Coefficient k of the series, and with it coefficient k + 1 of the coordinates. */
+static void nambu_pendulum_path_order(const double *coef, const double p[3],
+    double s[11][nambu_pendulum_TERMS + 1], const double f[1], int k)
+{
+    (void)coef;
+    (void)f;
+    if (k > 0) {
+        s[3][k] = nambu_pendulum_taylor_chain(s[0], s[8], k);
+        s[4][k] = p[2] * s[3][k];
+        s[5][k] = s[4][k];
+        s[6][k] = -s[5][k];
+        s[7][k] = p[1] * s[3][k];
+        s[8][k] = nambu_pendulum_taylor_chain(s[0], s[9], k);
+        s[9][k] = -s[3][k];
+        s[10][k] = 0.0;
+    }
+    s[0][k + 1] = s[10][k] / (k + 1);
+    s[1][k + 1] = s[6][k] / (k + 1);
+    s[2][k + 1] = s[7][k] / (k + 1);
+}
+
+/* The slope of the path at a point m. */
+static void nambu_pendulum_path_field(const double *coef, const double p[3], const double m[3],
+    double field[3])
+{
+    double e[11];
+    (void)coef;
+    memcpy(e, m, 3 * sizeof e[0]);
     e[3] = sin(e[0]);
     e[4] = p[2] * e[3];
     e[5] = p[0] + e[4];
@@ -370,50 +514,48 @@ static int nambu_pendulum_holds(const double *coef, const double p[3], const dou
     field[0] = e[10];
     field[1] = e[6];
     field[2] = e[7];
-    for (int i = 0; i < 3; ++i) scale += fabs(m[i]) + fabs(slope[i]);
-    for (int i = 0; i < 3; ++i)
+}
+
+/* ---- The implicit step, along paths dm/dt = pi(m) p ---- */
+enum {
+    nambu_pendulum_LONGEST_PATH = 128, /* pieces of a path, a power of 2 */
+    /* of all paths that are tried in a solve: steps that need more are wrong by as much as the state */
+    nambu_pendulum_MOST_PIECES = 512
+};
+
+/* Whether dm/dt = pi(m) p holds at a point m, where the expansion has the given slope: one with gaps between
+   its terms, like t + t^9, or across the kink of an absolute value, only looks as if it had converged. */
+static int nambu_pendulum_holds(const double *coef, const double p[nambu_pendulum_DIM],
+    const double m[nambu_pendulum_DIM], const double slope[nambu_pendulum_DIM])
+{
+    double field[nambu_pendulum_DIM], scale = 0.0;
+    nambu_pendulum_path_field(coef, p, m, field);
+    for (int i = 0; i < nambu_pendulum_DIM; ++i) scale += fabs(m[i]) + fabs(slope[i]);
+    for (int i = 0; i < nambu_pendulum_DIM; ++i)
         if (!(fabs(field[i] - slope[i]) <= 2e-15 * scale)) return 0;
     return 1;
 }
 
-/* The path dm/dt = pi(m) p, 0 <= t <= 1, from start, by its Taylor series: change is m(1) - start, mean the mean of
-   m - start. The number of terms follows from their size; 0 if 30 do not suffice. */
-static int nambu_pendulum_piece(const double *coef, const double p[3], const double start[3], double change[3],
-    double mean[3])
+/* A path for 0 <= t <= 1, from start, by its Taylor series: change is m(1) - start, mean the mean of m -
+   start. The number of terms follows from their size; 0 if nambu_pendulum_TERMS do not suffice. */
+static int nambu_pendulum_piece(const double *coef, const double p[nambu_pendulum_DIM],
+    const double start[nambu_pendulum_DIM], double change[nambu_pendulum_DIM],
+    double mean[nambu_pendulum_DIM])
 {
-    (void)coef;
-    double s[11][30 + 1], end[3], slope[3], norm = 0.0;
+    double series[nambu_pendulum_SERIES][nambu_pendulum_TERMS + 1], fixed[nambu_pendulum_FIXED],
+        end[nambu_pendulum_DIM], slope[nambu_pendulum_DIM], norm = 0.0;
     int small = 0;
-    for (int i = 0; i < 3; ++i) {
-        s[i][0] = start[i];
+    for (int i = 0; i < nambu_pendulum_DIM; ++i) {
+        series[i][0] = start[i];
         change[i] = mean[i] = slope[i] = 0.0;
         norm += fabs(start[i]);
     }
-    s[3][0] = sin(s[0][0]);
-    s[4][0] = p[2] * s[3][0];
-    s[5][0] = p[0] + s[4][0];
-    s[6][0] = -s[5][0];
-    s[7][0] = p[1] * s[3][0];
-    s[8][0] = cos(s[0][0]);
-    s[9][0] = -s[3][0];
-    s[10][0] = p[1];
-    for (int k = 0; k < 30; ++k) {
-        if (k > 0) {
-            s[3][k] = nambu_pendulum_taylor_chain(s[0], s[8], k);
-            s[4][k] = p[2] * s[3][k];
-            s[5][k] = s[4][k];
-            s[6][k] = -s[5][k];
-            s[7][k] = p[1] * s[3][k];
-            s[8][k] = nambu_pendulum_taylor_chain(s[0], s[9], k);
-            s[9][k] = -s[3][k];
-            s[10][k] = 0.0;
-        }
-        s[0][k + 1] = s[10][k] / (k + 1);
-        s[1][k + 1] = s[6][k] / (k + 1);
-        s[2][k + 1] = s[7][k] / (k + 1);
+    nambu_pendulum_path_begin(coef, p, series, fixed);
+    for (int k = 0; k < nambu_pendulum_TERMS; ++k) {
+        nambu_pendulum_path_order(coef, p, series, fixed, k);
         int negligible = 1;
-        for (int i = 0; i < 3; ++i) {
-            const double term = s[i][k + 1];
+        for (int i = 0; i < nambu_pendulum_DIM; ++i) {
+            const double term = series[i][k + 1];
             change[i] += term;
             mean[i] += term / (k + 2);
             slope[i] += (k + 1) * term;
@@ -426,23 +568,26 @@ static int nambu_pendulum_piece(const double *coef, const double p[3], const dou
     return 0;
 }
 
-/* The whole path from x, in 1, 2, 4, ... pieces until each expansion converges. Whatever p is, the end of the path
-   lies on the symplectic leaf of x. 0 if the path is too long or leaves the domain. *made counts all pieces. */
-static int nambu_pendulum_path(const double *coef, const double x[3], const double p[3], double change[3],
-    double mean[3], int *made)
+/* The whole path from x, in 1, 2, 4, ... pieces until each expansion converges. Whatever p is, the end of the
+   path lies on the symplectic leaf of x. 0 if the path is too long or leaves the domain. *made counts all
+   pieces. */
+static int nambu_pendulum_path(const double *coef, const double x[nambu_pendulum_DIM],
+    const double p[nambu_pendulum_DIM], double change[nambu_pendulum_DIM], double mean[nambu_pendulum_DIM],
+    int *made)
 {
-    for (int pieces = 1; pieces <= 128; pieces *= 2) {
-        double q[3], point[3], shift[3], local[3];
+    for (int pieces = 1; pieces <= nambu_pendulum_LONGEST_PATH; pieces *= 2) {
+        double q[nambu_pendulum_DIM], point[nambu_pendulum_DIM], shift[nambu_pendulum_DIM],
+            local[nambu_pendulum_DIM];
         int good = 1;
-        for (int i = 0; i < 3; ++i) {
+        for (int i = 0; i < nambu_pendulum_DIM; ++i) {
             q[i] = p[i] / pieces;
             change[i] = mean[i] = 0.0;
         }
         for (int piece = 0; piece < pieces && good; ++piece) {
-            for (int i = 0; i < 3; ++i) point[i] = x[i] + change[i];
+            for (int i = 0; i < nambu_pendulum_DIM; ++i) point[i] = x[i] + change[i];
             good = nambu_pendulum_piece(coef, q, point, shift, local);
             ++*made;
-            for (int i = 0; i < 3; ++i) {
+            for (int i = 0; i < nambu_pendulum_DIM; ++i) {
                 mean[i] += (change[i] + local[i]) / pieces;
                 change[i] += shift[i];
             }
@@ -454,47 +599,53 @@ static int nambu_pendulum_path(const double *coef, const double x[3], const doub
 
 /* The residual p - grad S_h(mean of the path) of the equation for p, with that mean y, the path's change of
    x and an approximate Jacobian of the residual. 0 if the path cannot be followed. */
-static int nambu_pendulum_residual(nambu_pendulum_solver *s, const double *coef, const double p[3], double y[3],
-    double residual[3], double change[3], double jacobian[9],
-    int *made)
+static int nambu_pendulum_residual(nambu_pendulum_solver *s, const double *coef,
+    const double p[nambu_pendulum_DIM], double y[nambu_pendulum_DIM], double residual[nambu_pendulum_DIM],
+    double change[nambu_pendulum_DIM], double jacobian[nambu_pendulum_DIM * nambu_pendulum_DIM], int *made)
 {
-    double mean[3];
+    double mean[nambu_pendulum_DIM];
     if (!nambu_pendulum_path(coef, s->x, p, change, mean, made)) return 0;
-    for (int i = 0; i < 3; ++i) y[i] = s->x[i] + mean[i];
+    for (int i = 0; i < nambu_pendulum_DIM; ++i) y[i] = s->x[i] + mean[i];
     nambu_pendulum_generate(coef, y, residual, jacobian);
-    for (int i = 0; i < 3; ++i) residual[i] = p[i] - residual[i];
+    for (int i = 0; i < nambu_pendulum_DIM; ++i) residual[i] = p[i] - residual[i];
     ++s->evaluations;
     return 1;
 }
 
 /* The Jacobian by differences, for steps so large that the approximate one does not contract. */
-static int nambu_pendulum_differences(nambu_pendulum_solver *s, const double *coef, const double p[3],
-    const double residual[3], double jacobian[9], int *made)
+static int nambu_pendulum_differences(nambu_pendulum_solver *s, const double *coef,
+    const double p[nambu_pendulum_DIM], const double residual[nambu_pendulum_DIM],
+    double jacobian[nambu_pendulum_DIM * nambu_pendulum_DIM], int *made)
 {
-    double q[3], y[3], moved[3], change[3], unused[9], norm = DBL_MIN;
-    for (int i = 0; i < 3; ++i) norm = fabs(p[i]) > norm ? fabs(p[i]) : norm;
-    for (int j = 0; j < 3; ++j) {
+    double q[nambu_pendulum_DIM], y[nambu_pendulum_DIM], moved[nambu_pendulum_DIM],
+        change[nambu_pendulum_DIM], unused[nambu_pendulum_DIM * nambu_pendulum_DIM], norm = DBL_MIN;
+    for (int i = 0; i < nambu_pendulum_DIM; ++i) norm = fabs(p[i]) > norm ? fabs(p[i]) : norm;
+    for (int j = 0; j < nambu_pendulum_DIM; ++j) {
         memcpy(q, p, sizeof q);
         q[j] += 1e-7 * norm;
         if (!nambu_pendulum_residual(s, coef, q, y, moved, change, unused, made)) return 0;
-        for (int i = 0; i < 3; ++i) jacobian[i * 3 + j] = (moved[i] - residual[i]) / (q[j] - p[j]);
+        for (int i = 0; i < nambu_pendulum_DIM; ++i)
+            jacobian[i * nambu_pendulum_DIM + j] = (moved[i] - residual[i]) / (q[j] - p[j]);
     }
     return 1;
 }
 
-/* Solve p = grad S_h(mean of the path from x under p) and move to the end of that path. Where that takes more than
-   512 pieces of paths, the step is so large that a solution would mean nothing. */
-static nambu_pendulum_status nambu_pendulum_attempt(nambu_pendulum_solver *s, int stage)
+/* Solve p = grad S_h(mean of the path from x under p) and move to the end of that path. Where that takes more
+   than nambu_pendulum_MOST_PIECES pieces of paths, the step is so large that a solution would mean nothing.
+   */
+static nambu_pendulum_status nambu_pendulum_attempt(nambu_pendulum_solver *s)
 {
-    const double *coef = s->coef[stage], none[3] = { 0.0 };
-    nambu_pendulum_memory *memory = &s->memory[stage];
-    double p[3], y[3], residual[3], change[3], jacobian[9], previous = HUGE_VAL;
-    if (!nambu_pendulum_predict(memory, y)) memcpy(y, s->x, sizeof y);
+    const double *coef = s->coef, none[nambu_pendulum_DIM] = { 0.0 };
+    double p[nambu_pendulum_DIM], y[nambu_pendulum_DIM], residual[nambu_pendulum_DIM],
+        change[nambu_pendulum_DIM], jacobian[nambu_pendulum_DIM * nambu_pendulum_DIM], previous = HUGE_VAL;
+    if (!nambu_pendulum_predict(&s->history, y)) memcpy(y, s->x, sizeof y);
     nambu_pendulum_generate(coef, y, p, jacobian);
-    for (int iteration = 0, made = 0; iteration < 20 && made <= 512; ++iteration) {
-        if (!nambu_pendulum_residual(s, coef, p, y, residual, change, jacobian, &made)) return nambu_pendulum_NO_CONVERGENCE;
+    for (int iteration = 0, made = 0; iteration < nambu_pendulum_MAX_ITERATIONS && made <=
+        nambu_pendulum_MOST_PIECES; ++iteration) {
+        if (!nambu_pendulum_residual(s, coef, p, y, residual, change, jacobian, &made))
+            return nambu_pendulum_NO_CONVERGENCE;
         double size = 0.0, norm = DBL_MIN;
-        for (int i = 0; i < 3; ++i) {
+        for (int i = 0; i < nambu_pendulum_DIM; ++i) {
             if (!isfinite(residual[i])) return nambu_pendulum_NOT_FINITE;
             size = fabs(residual[i]) > size ? fabs(residual[i]) : size;
             norm = fabs(p[i]) > norm ? fabs(p[i]) : norm;
@@ -502,103 +653,34 @@ static nambu_pendulum_status nambu_pendulum_attempt(nambu_pendulum_solver *s, in
         size /= norm;
         /* The second test: residuals no longer shrink, the solve has reached the level of rounding. */
         if (size <= 4e-16 || (previous < 1e-12 && size > 0.25 * previous)) {
-            if (!nambu_pendulum_plausible(s, stage, change)) return nambu_pendulum_NO_CONVERGENCE;
+            if (!nambu_pendulum_plausible(s, change)) return nambu_pendulum_NO_CONVERGENCE;
             if (!nambu_pendulum_advance(s, change, none)) return nambu_pendulum_NOT_FINITE;
-            nambu_pendulum_remember(memory, y, iteration);
+            nambu_pendulum_remember(&s->history, y, iteration);
             return nambu_pendulum_OK;
         }
         const int slow = iteration >= 3 && size > 0.05 * previous;
-        if (slow && !nambu_pendulum_differences(s, coef, p, residual, jacobian, &made)) return nambu_pendulum_NO_CONVERGENCE;
+        if (slow && !nambu_pendulum_differences(s, coef, p, residual, jacobian, &made))
+            return nambu_pendulum_NO_CONVERGENCE;
         if (!nambu_pendulum_solve(jacobian, residual)) return nambu_pendulum_SINGULAR;
-        for (int i = 0; i < 3; ++i) p[i] -= residual[i];
+        for (int i = 0; i < nambu_pendulum_DIM; ++i) p[i] -= residual[i];
         previous = size;
     }
     return nambu_pendulum_NO_CONVERGENCE;
 }
 
-/* The 1 stages of one step. If one fails, the state is as before the step. */
-static nambu_pendulum_status nambu_pendulum_stages(nambu_pendulum_solver *s)
-{
-    double x[3], carry[3];
-    memcpy(x, s->x, sizeof x);
-    memcpy(carry, s->carry, sizeof carry);
-    for (int stage = 0; stage < 1; ++stage) {
-        nambu_pendulum_status status = nambu_pendulum_attempt(s, stage);
-        /* A guess from earlier steps may have misled it: once more without. */
-        if (status != nambu_pendulum_OK && s->memory[stage].count > 0) {
-            memset(&s->memory[stage], 0, sizeof s->memory[stage]);
-            status = nambu_pendulum_attempt(s, stage);
-        }
-        if (status != nambu_pendulum_OK) {
-            memcpy(s->x, x, sizeof x);
-            memcpy(s->carry, carry, sizeof carry);
-            return status;
-        }
-    }
-    return nambu_pendulum_OK;
-}
-
-/* All of nambu_pendulum_init but the gauge. The arguments may be parts of *s: they are read before it is written. */
-static nambu_pendulum_status nambu_pendulum_start(nambu_pendulum_solver *s, const nambu_pendulum_params *params, const double x0[3])
-{
-    if (s == NULL || x0 == NULL) return nambu_pendulum_BAD_ARGUMENT;
-    const nambu_pendulum_params own = params != NULL ? *params : nambu_pendulum_default_params;
-    double x[3];
-    memcpy(x, x0, sizeof x);
-    for (int i = 0; i < 3; ++i)
-        if (!isfinite(x[i])) return nambu_pendulum_BAD_ARGUMENT;
-    memset(s, 0, sizeof *s);
-    memcpy(s->x, x, sizeof s->x);
-    s->params = own;
-    return nambu_pendulum_OK;
-}
-
-nambu_pendulum_status nambu_pendulum_init(nambu_pendulum_solver *s, const nambu_pendulum_params *params,
-                                          const double x0[3])
-{
-    return nambu_pendulum_start(s, params, x0);
-}
-
-/* What depends on the step size; nothing where that is as before. */
-static nambu_pendulum_status nambu_pendulum_set_step(nambu_pendulum_solver *s, double h)
-{
-    if (s == NULL || !isfinite(h)) return nambu_pendulum_BAD_ARGUMENT;
-    if (s->ready && memcmp(&h, &s->h, sizeof h) == 0) return nambu_pendulum_OK;
-    for (int stage = 0; stage < 1; ++stage)
-        nambu_pendulum_prepare(&s->params, nambu_pendulum_fractions[stage] * h, s->coef[stage]);
-    memset(s->memory, 0, sizeof s->memory);
-    for (int stage = 0; stage < 1; ++stage) s->memory[stage].patience = 150;
-    s->pause = 16;
-    s->setback = s->foreseeing = 0;
-    s->doubt = s->retry = 0;
-    s->effort = 0.0;
-    s->passes = INT_MAX;
-    s->h = h;
-    s->ready = 1;
-    return nambu_pendulum_OK;
-}
-
-nambu_pendulum_status nambu_pendulum_step(nambu_pendulum_solver *s, double h)
-{
-    nambu_pendulum_status status = nambu_pendulum_set_step(s, h);
-    if (status != nambu_pendulum_OK) return status;
-    status = nambu_pendulum_stages(s);
-    if (status == nambu_pendulum_OK) ++s->steps;
-    return status;
-}
-
-/*
- * Eight at a time: below, the formulas of a step are evaluated for 8 steps of a trajectory, or members of an
- * ensemble, at once. Compilers make vector instructions of the loops over lanes.
- */
-enum { nambu_pendulum_LANES = 8 };
+/* ---- Several steps or members at once ---- */
+/* Below, the formulas of a step are evaluated for several steps of a trajectory, or members of an ensemble,
+   at once. Compilers make vector instructions of the loops over lanes. */
+enum { nambu_pendulum_LANES = 8 }; /* what one vector of AVX-512 holds */
 
 #if defined(__GNUC__)
-typedef double nambu_pendulum_lanes[nambu_pendulum_LANES] __attribute__((aligned(64))); /* a value in each lane */
+/* a value in each lane */
+typedef double nambu_pendulum_lanes[nambu_pendulum_LANES] __attribute__((aligned(64)));
 #else
 typedef double nambu_pendulum_lanes[nambu_pendulum_LANES];
 #endif
 
+/* Before a loop over lanes: tells compilers that they are independent. */
 #if defined(__clang__)
 #define nambu_pendulum_EACH_LANE _Pragma("clang loop vectorize(assume_safety)")
 #pragma clang diagnostic push
@@ -609,27 +691,14 @@ typedef double nambu_pendulum_lanes[nambu_pendulum_LANES];
 #define nambu_pendulum_EACH_LANE
 #endif
 
-/* What all blocks share: coefficients, the same in each lane, and the recurrences by which they are foreseen. */
-typedef struct {
-    int fits[1]; /* the fit that weight is of; -1 for none */
-    nambu_pendulum_lanes coef[1][3], weight[1][40][3];
-} nambu_pendulum_table;
-
-/* A stage in all lanes, linearised around y. */
-typedef struct {
-    nambu_pendulum_lanes y[3], displacement[3], increment[3], residual[3];
-    /* a residual r of alpha(y) = x takes inverse r from y, and gain r from the increment */
-    nambu_pendulum_lanes inverse[9], slope[9], gain[9];
-    nambu_pendulum_lanes middle[3]; /* of the path, less y */
-    nambu_pendulum_lanes alpha_y[9], increment_y[9]; /* of alpha and beta - alpha, with p held fixed */
-} nambu_pendulum_model;
-
-/* sin u for the loops over lanes: u = k pi + r with |r| <= pi/2, no branches. No number beyond |u| = 1000000.0. */
+/* sin u for the loops over lanes: u = k pi + r with |r| <= pi/2, no branches. No number beyond |u| =
+   1000000.0. */
 static inline double nambu_pendulum_sin_lane(double u)
 {
     const double shifted = (u * 0.3183098861837907 + 0.0) + 6755399441055744.0;
     const double k = (shifted - 6755399441055744.0) - 0.0;
-    const double r = ((u - k * 3.141592651605606) - k * 1.9841871479187034e-09) - k * 1.1442377452219664e-17, q = r * r, qq = q * q;
+    const double r = ((u - k * 3.141592651605606) - k * 1.9841871479187034e-09) - k * 1.1442377452219664e-17,
+        q = r * r, qq = q * q;
     uint64_t parity, bits; /* the last bit of shifted is the parity of k + 0.0 */
     double value, sum = -3.868170170630684e-23, other = 1.9572941063391263e-20;
     sum = sum * qq + -8.22063524662433e-18;
@@ -649,12 +718,14 @@ static inline double nambu_pendulum_sin_lane(double u)
     return value + (fabs(u) <= 1000000.0 ? 0.0 : (double)NAN);
 }
 
-/* cos u for the loops over lanes: u = k pi + r with |r| <= pi/2, no branches. No number beyond |u| = 1000000.0. */
+/* cos u for the loops over lanes: u = k pi + r with |r| <= pi/2, no branches. No number beyond |u| =
+   1000000.0. */
 static inline double nambu_pendulum_cos_lane(double u)
 {
     const double shifted = (u * 0.3183098861837907 + 0.5) + 6755399441055744.0;
     const double k = (shifted - 6755399441055744.0) - 0.5;
-    const double r = ((u - k * 3.141592651605606) - k * 1.9841871479187034e-09) - k * 1.1442377452219664e-17, q = r * r, qq = q * q;
+    const double r = ((u - k * 3.141592651605606) - k * 1.9841871479187034e-09) - k * 1.1442377452219664e-17,
+        q = r * r, qq = q * q;
     uint64_t parity, bits; /* the last bit of shifted is the parity of k + 0.5 */
     double value, sum = -3.868170170630684e-23, other = 1.9572941063391263e-20;
     sum = sum * qq + -8.22063524662433e-18;
@@ -674,18 +745,93 @@ static inline double nambu_pendulum_cos_lane(double u)
     return value + (fabs(u) <= 1000000.0 ? 0.0 : (double)NAN);
 }
 
-/* nambu_pendulum_curvature in all lanes. */
+/* ---- The solver ---- */
+/* The arguments may be parts of *s: they are read before it is written. */
+nambu_pendulum_status nambu_pendulum_init(nambu_pendulum_solver *s, const nambu_pendulum_params *params,
+    const double x0[nambu_pendulum_DIM])
+{
+    if (s == NULL || x0 == NULL) return nambu_pendulum_BAD_ARGUMENT;
+    const nambu_pendulum_params own = params != NULL ? *params : nambu_pendulum_default_params;
+    double x[nambu_pendulum_DIM];
+    memcpy(x, x0, sizeof x);
+    for (int i = 0; i < nambu_pendulum_DIM; ++i)
+        if (!isfinite(x[i])) return nambu_pendulum_BAD_ARGUMENT;
+    memset(s, 0, sizeof *s);
+    memcpy(s->x, x, sizeof s->x);
+    s->params = own;
+    return nambu_pendulum_OK;
+}
+
+/* What depends on the step size; nothing where that is as before. */
+static nambu_pendulum_status nambu_pendulum_set_step(nambu_pendulum_solver *s, double h)
+{
+    if (s == NULL || !isfinite(h)) return nambu_pendulum_BAD_ARGUMENT;
+    if (s->prepared && memcmp(&h, &s->h, sizeof h) == 0) return nambu_pendulum_OK;
+    nambu_pendulum_prepare(&s->params, h, s->coef);
+    memset(&s->history, 0, sizeof s->history);
+    s->history.slow_steps_allowed = nambu_pendulum_REPAY;
+    memset(&s->blocks, 0, sizeof s->blocks);
+    s->blocks.single_steps = 2 * nambu_pendulum_LANES;
+    s->blocks.passes_without_recurrences = INT_MAX;
+    s->h = h;
+    s->t_before_h = s->t;
+    s->steps_before_h = s->steps;
+    s->prepared = 1;
+    return nambu_pendulum_OK;
+}
+
+/* Some good steps have been made. */
+static void nambu_pendulum_count(nambu_pendulum_solver *s, size_t steps)
+{
+    s->steps += steps;
+    s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
+}
+
+/* One stage. A guess from earlier steps may have misled it: then once more without. */
+static nambu_pendulum_status nambu_pendulum_stage(nambu_pendulum_solver *s)
+{
+    nambu_pendulum_status status = nambu_pendulum_attempt(s);
+    if (status != nambu_pendulum_OK && s->history.count > 0) {
+        memset(&s->history, 0, sizeof s->history);
+        status = nambu_pendulum_attempt(s);
+    }
+    return status;
+}
+
+nambu_pendulum_status nambu_pendulum_step(nambu_pendulum_solver *s, double h)
+{
+    nambu_pendulum_status status = nambu_pendulum_set_step(s, h);
+    if (status != nambu_pendulum_OK) return status;
+    status = nambu_pendulum_stage(s);
+    if (status == nambu_pendulum_OK) nambu_pendulum_count(s, 1);
+    return status;
+}
+
+const char *nambu_pendulum_status_string(nambu_pendulum_status status)
+{
+    static const char *const text[] = {
+        "ok",
+        "no convergence: the step is too large",
+        "singular Newton matrix: the step is too large",
+        "not finite: overflow, or outside the domain",
+        "bad argument: a null pointer, or values that are not allowed"
+    };
+    return (unsigned)status <= nambu_pendulum_BAD_ARGUMENT ? text[status] : "unknown status";
+}
+
+size_t nambu_pendulum_solver_size(void) { return sizeof(nambu_pendulum_solver); }
+
+size_t nambu_pendulum_solver_steps_done(const nambu_pendulum_solver *s) { return s->steps; }
+
+/* nambu_pendulum_curvature in all lanes */
 static void nambu_pendulum_curvature_lanes(nambu_pendulum_lanes coef[restrict 3],
-                                           nambu_pendulum_lanes y[restrict 3],
-                                           nambu_pendulum_lanes slope[restrict 3],
-                                           nambu_pendulum_lanes slope_jacobian[restrict 9])
+    nambu_pendulum_lanes y[restrict 3], nambu_pendulum_lanes slope[restrict 3],
+    nambu_pendulum_lanes slope_jacobian[restrict 9])
 {
     nambu_pendulum_EACH_LANE
     for (int lane = 0; lane < nambu_pendulum_LANES; ++lane) {
-        const double theta = y[0][lane];
-        const double p = y[1][lane];
-        const double t1 = nambu_pendulum_sin_lane(theta);
-        const double t2 = nambu_pendulum_cos_lane(theta);
+        const double theta = y[0][lane], p = y[1][lane];
+        const double t1 = nambu_pendulum_sin_lane(theta), t2 = nambu_pendulum_cos_lane(theta);
         slope[0][lane] = coef[0][lane] * (t1 * t2);
         slope[1][lane] = coef[1][lane] * p;
         slope[2][lane] = coef[1][lane];
@@ -701,37 +847,29 @@ static void nambu_pendulum_curvature_lanes(nambu_pendulum_lanes coef[restrict 3]
     }
 }
 
-/* nambu_pendulum_momentum in all lanes. */
+/* nambu_pendulum_momentum in all lanes */
 static void nambu_pendulum_momentum_lanes(nambu_pendulum_lanes coef[restrict 3],
-                                          nambu_pendulum_lanes y[restrict 3],
-                                          nambu_pendulum_lanes slope[restrict 3])
+    nambu_pendulum_lanes y[restrict 3], nambu_pendulum_lanes slope[restrict 3])
 {
     nambu_pendulum_EACH_LANE
     for (int lane = 0; lane < nambu_pendulum_LANES; ++lane) {
-        const double theta = y[0][lane];
-        const double p = y[1][lane];
+        const double theta = y[0][lane], p = y[1][lane];
         slope[0][lane] = coef[0][lane] * (nambu_pendulum_sin_lane(theta) * nambu_pendulum_cos_lane(theta));
         slope[1][lane] = coef[1][lane] * p;
         slope[2][lane] = coef[1][lane];
     }
 }
 
-/* nambu_pendulum_values in all lanes. */
+/* nambu_pendulum_values in all lanes */
 static void nambu_pendulum_values_lanes(nambu_pendulum_lanes coef[restrict 3],
-                                        nambu_pendulum_lanes p[restrict 3], nambu_pendulum_lanes m[restrict 3],
-                                        nambu_pendulum_lanes value[restrict 11],
-                                        nambu_pendulum_lanes fixed[restrict 1])
+    nambu_pendulum_lanes p[restrict 3], nambu_pendulum_lanes m[restrict 3],
+    nambu_pendulum_lanes value[restrict 11], nambu_pendulum_lanes fixed[restrict 1])
 {
-    (void)coef;
-    (void)fixed;
+    (void)coef, (void)fixed;
     nambu_pendulum_EACH_LANE
     for (int lane = 0; lane < nambu_pendulum_LANES; ++lane) {
-        const double theta = m[0][lane];
-        const double p_ = m[1][lane];
-        const double V = m[2][lane];
-        const double t1 = nambu_pendulum_sin_lane(theta);
-        const double t2 = p[2][lane] * t1;
-        const double t3 = p[0][lane] + t2;
+        const double theta = m[0][lane], p_ = m[1][lane], V = m[2][lane];
+        const double t1 = nambu_pendulum_sin_lane(theta), t2 = p[2][lane] * t1, t3 = p[0][lane] + t2;
         value[0][lane] = theta;
         value[1][lane] = p_;
         value[2][lane] = V;
@@ -746,17 +884,13 @@ static void nambu_pendulum_values_lanes(nambu_pendulum_lanes coef[restrict 3],
     }
 }
 
-/* nambu_pendulum_slope_values in all lanes. */
+/* nambu_pendulum_slope_values in all lanes */
 static void nambu_pendulum_slope_values_lanes(nambu_pendulum_lanes coef[restrict 3],
-                                              nambu_pendulum_lanes p[restrict 3],
-                                              nambu_pendulum_lanes value[restrict 11],
-                                              nambu_pendulum_lanes fixed[restrict 1],
-                                              nambu_pendulum_lanes slope[restrict 5],
-                                              nambu_pendulum_lanes slope_fixed[restrict 1])
+    nambu_pendulum_lanes p[restrict 3], nambu_pendulum_lanes value[restrict 11],
+    nambu_pendulum_lanes fixed[restrict 1], nambu_pendulum_lanes slope[restrict 5],
+    nambu_pendulum_lanes slope_fixed[restrict 1])
 {
-    (void)coef;
-    (void)fixed;
-    (void)slope_fixed;
+    (void)coef, (void)fixed, (void)slope_fixed;
     nambu_pendulum_EACH_LANE
     for (int lane = 0; lane < nambu_pendulum_LANES; ++lane) {
         const double t1 = p[2][lane] * value[8][lane];
@@ -768,81 +902,83 @@ static void nambu_pendulum_slope_values_lanes(nambu_pendulum_lanes coef[restrict
     }
 }
 
-/* nambu_pendulum_along_mean in all lanes. */
+/* nambu_pendulum_along_mean in all lanes */
 static void nambu_pendulum_along_mean_lanes(nambu_pendulum_lanes even[restrict 18],
-                                            nambu_pendulum_lanes odd[restrict 18],
-                                            nambu_pendulum_lanes mean[restrict 18],
-                                            nambu_pendulum_lanes hessian[restrict 9],
-                                            nambu_pendulum_lanes alpha_y[restrict 9],
-                                            nambu_pendulum_lanes increment_y[restrict 9],
-                                            nambu_pendulum_lanes jacobian[restrict 9],
-                                            nambu_pendulum_lanes increment_jacobian[restrict 9],
-                                            nambu_pendulum_lanes reciprocal[restrict 3])
+    nambu_pendulum_lanes odd[restrict 18], nambu_pendulum_lanes mean[restrict 18],
+    nambu_pendulum_lanes hessian[restrict 9], nambu_pendulum_lanes alpha_y[restrict 9],
+    nambu_pendulum_lanes increment_y[restrict 9], nambu_pendulum_lanes jacobian[restrict 9],
+    nambu_pendulum_lanes increment_jacobian[restrict 9], nambu_pendulum_lanes reciprocal[restrict 3])
 {
     nambu_pendulum_EACH_LANE
     for (int lane = 0; lane < nambu_pendulum_LANES; ++lane) {
-        const double t1 = even[2][lane] - odd[2][lane];
-        const double t2 = 1.0 / mean[0][lane];
-        const double t3 = mean[1][lane] * t2;
-        const double t4 = mean[13][lane] - mean[12][lane] * t3;
-        const double t5 = 1.0 / (mean[7][lane] - mean[6][lane] * t3);
-        const double t6 = mean[6][lane] * t2 * t5;
-        const double t7 = mean[2][lane] * t2;
-        const double t8 = (mean[8][lane] - mean[6][lane] * t7) * t5;
+        const double t1 = even[2][lane] - odd[2][lane], t2 = 1.0 / mean[0][lane];
+        const double t3 = mean[1][lane] * t2, t4 = mean[13][lane] - mean[12][lane] * t3;
+        const double t5 = 1.0 / (mean[7][lane] - mean[6][lane] * t3), t6 = mean[6][lane] * t2 * t5;
+        const double t7 = mean[2][lane] * t2, t8 = (mean[8][lane] - mean[6][lane] * t7) * t5;
         const double t9 = 1.0 / (mean[14][lane] - mean[12][lane] * t7 - t4 * t8);
-        const double t10 = (t4 * t6 - mean[12][lane] * t2) * t9;
-        const double t11 = even[0][lane] - odd[0][lane];
-        const double t12 = t7 - t3 * t8;
-        const double t13 = t2 + t3 * t6 - t12 * t10;
-        const double t14 = even[1][lane] - odd[1][lane];
-        const double t15 = t6 + t8 * t10;
-        const double t16 = t4 * t5 * t9;
-        const double t17 = t5 + t8 * t16;
-        const double t18 = t12 * t16 - t3 * t5;
-        const double t19 = t12 * t9;
-        const double t20 = t8 * t9;
-        const double t21 = even[8][lane] - odd[8][lane];
-        const double t22 = even[6][lane] - odd[6][lane];
-        const double t23 = even[7][lane] - odd[7][lane];
-        const double t24 = even[14][lane] - odd[14][lane];
-        const double t25 = even[12][lane] - odd[12][lane];
-        const double t26 = even[13][lane] - odd[13][lane];
-        const double t27 = even[5][lane] - odd[5][lane];
-        const double t28 = even[4][lane] - odd[4][lane];
+        const double t10 = (t4 * t6 - mean[12][lane] * t2) * t9, t11 = even[0][lane] - odd[0][lane];
+        const double t12 = t7 - t3 * t8, t13 = t2 + t3 * t6 - t12 * t10;
+        const double t14 = even[1][lane] - odd[1][lane], t15 = t6 + t8 * t10, t16 = t4 * t5 * t9;
+        const double t17 = t5 + t8 * t16, t18 = t12 * t16 - t3 * t5, t19 = t12 * t9, t20 = t8 * t9;
+        const double t21 = even[8][lane] - odd[8][lane], t22 = even[6][lane] - odd[6][lane];
+        const double t23 = even[7][lane] - odd[7][lane], t24 = even[14][lane] - odd[14][lane];
+        const double t25 = even[12][lane] - odd[12][lane], t26 = even[13][lane] - odd[13][lane];
+        const double t27 = even[5][lane] - odd[5][lane], t28 = even[4][lane] - odd[4][lane];
         const double t29 = even[3][lane] - odd[3][lane];
-        const double t30 = hessian[6][lane] * mean[11][lane] + (hessian[0][lane] * mean[9][lane] + hessian[3][lane] * mean[10][lane]);
-        const double t31 = 1.0 - (hessian[6][lane] * mean[5][lane] + (hessian[3][lane] * mean[4][lane] + hessian[0][lane] * mean[3][lane]));
-        const double t32 = hessian[6][lane] * mean[17][lane] + (hessian[3][lane] * mean[16][lane] + hessian[0][lane] * mean[15][lane]);
-        const double t33 = t30 * t16 + t31 * t10 - t32 * t9;
-        const double t34 = t32 * t20 - (t31 * t15 + t30 * t17);
+        const double t30 = hessian[6][lane] * mean[11][lane] + (hessian[0][lane] * mean[9][lane]
+            + hessian[3][lane] * mean[10][lane]);
+        const double t31 = 1.0 - (hessian[6][lane] * mean[5][lane] + (hessian[3][lane] * mean[4][lane]
+            + hessian[0][lane] * mean[3][lane]));
+        const double t32 = hessian[6][lane] * mean[17][lane] + (hessian[3][lane] * mean[16][lane]
+            + hessian[0][lane] * mean[15][lane]);
+        const double t33 = t30 * t16 + t31 * t10 - t32 * t9, t34 = t32 * t20 - (t31 * t15 + t30 * t17);
         const double t35 = t32 * t19 + (t31 * t13 - t30 * t18);
-        const double t36 = hessian[7][lane] * mean[17][lane] + (hessian[1][lane] * mean[15][lane] + hessian[4][lane] * mean[16][lane]);
-        const double t37 = 1.0 - (hessian[7][lane] * mean[11][lane] + (hessian[4][lane] * mean[10][lane] + hessian[1][lane] * mean[9][lane]));
-        const double t38 = hessian[7][lane] * mean[5][lane] + (hessian[4][lane] * mean[4][lane] + hessian[1][lane] * mean[3][lane]);
+        const double t36 = hessian[7][lane] * mean[17][lane] + (hessian[1][lane] * mean[15][lane]
+            + hessian[4][lane] * mean[16][lane]);
+        const double t37 = 1.0 - (hessian[7][lane] * mean[11][lane] + (hessian[4][lane] * mean[10][lane]
+            + hessian[1][lane] * mean[9][lane]));
+        const double t38 = hessian[7][lane] * mean[5][lane] + (hessian[4][lane] * mean[4][lane]
+            + hessian[1][lane] * mean[3][lane]);
         const double t39 = t36 * t19 + (t37 * t18 - t38 * t13);
-        const double t40 = t36 * t20 + (t37 * t17 + t38 * t15);
-        const double t41 = t36 * t9 + (t37 * t16 + t38 * t10);
-        const double t42 = 1.0 - (hessian[8][lane] * mean[17][lane] + (hessian[2][lane] * mean[15][lane] + hessian[5][lane] * mean[16][lane]));
-        const double t43 = hessian[8][lane] * mean[11][lane] + (hessian[5][lane] * mean[10][lane] + hessian[2][lane] * mean[9][lane]);
-        const double t44 = hessian[8][lane] * mean[5][lane] + (hessian[5][lane] * mean[4][lane] + hessian[2][lane] * mean[3][lane]);
-        const double t45 = t42 * t9 + (t43 * t16 - t44 * t10);
-        const double t46 = t44 * t15 - t43 * t17 - t42 * t20;
-        const double t47 = t42 * t19 + (t43 * t18 + t44 * t13);
-        const double t48 = even[11][lane] - odd[11][lane];
-        const double t49 = even[9][lane] - odd[9][lane];
-        const double t50 = even[10][lane] - odd[10][lane];
-        const double t51 = even[17][lane] - odd[17][lane];
-        const double t52 = even[16][lane] - odd[16][lane];
+        const double t40 = t36 * t20 + (t37 * t17 + t38 * t15), t41 = t36 * t9 + (t37 * t16 + t38 * t10);
+        const double t42 = 1.0 - (hessian[8][lane] * mean[17][lane] + (hessian[2][lane] * mean[15][lane]
+            + hessian[5][lane] * mean[16][lane]));
+        const double t43 = hessian[8][lane] * mean[11][lane] + (hessian[5][lane] * mean[10][lane]
+            + hessian[2][lane] * mean[9][lane]);
+        const double t44 = hessian[8][lane] * mean[5][lane] + (hessian[5][lane] * mean[4][lane]
+            + hessian[2][lane] * mean[3][lane]);
+        const double t45 = t42 * t9 + (t43 * t16 - t44 * t10), t46 = t44 * t15 - t43 * t17 - t42 * t20;
+        const double t47 = t42 * t19 + (t43 * t18 + t44 * t13), t48 = even[11][lane] - odd[11][lane];
+        const double t49 = even[9][lane] - odd[9][lane], t50 = even[10][lane] - odd[10][lane];
+        const double t51 = even[17][lane] - odd[17][lane], t52 = even[16][lane] - odd[16][lane];
         const double t53 = even[15][lane] - odd[15][lane];
-        const double t54 = 2.0 * (hessian[6][lane] * odd[5][lane]) + (2.0 * (hessian[3][lane] * odd[4][lane]) + 2.0 * (hessian[0][lane] * odd[3][lane])) + (2.0 * (odd[2][lane] * t33) + (2.0 * (odd[1][lane] * t34) + 2.0 * (odd[0][lane] * t35)));
-        const double t55 = 2.0 * (hessian[7][lane] * odd[5][lane]) + (2.0 * (hessian[1][lane] * odd[3][lane]) + 2.0 * (hessian[4][lane] * odd[4][lane])) + (2.0 * (odd[0][lane] * t39) + 2.0 * (odd[1][lane] * t40) - 2.0 * (odd[2][lane] * t41));
-        const double t56 = 2.0 * (hessian[8][lane] * odd[5][lane]) + (2.0 * (hessian[2][lane] * odd[3][lane]) + 2.0 * (hessian[5][lane] * odd[4][lane])) + (2.0 * (odd[2][lane] * t45) + (2.0 * (odd[1][lane] * t46) - 2.0 * (odd[0][lane] * t47)));
-        const double t57 = 2.0 * (hessian[6][lane] * odd[11][lane]) + (2.0 * (hessian[0][lane] * odd[9][lane]) + 2.0 * (hessian[3][lane] * odd[10][lane])) + (2.0 * (odd[8][lane] * t33) + (2.0 * (odd[6][lane] * t35) + 2.0 * (odd[7][lane] * t34)));
-        const double t58 = 2.0 * (hessian[7][lane] * odd[11][lane]) + (2.0 * (hessian[4][lane] * odd[10][lane]) + 2.0 * (hessian[1][lane] * odd[9][lane])) + (2.0 * (odd[6][lane] * t39) + 2.0 * (odd[7][lane] * t40) - 2.0 * (odd[8][lane] * t41));
-        const double t59 = 2.0 * (hessian[8][lane] * odd[11][lane]) + (2.0 * (hessian[2][lane] * odd[9][lane]) + 2.0 * (hessian[5][lane] * odd[10][lane])) + (2.0 * (odd[8][lane] * t45) + (2.0 * (odd[7][lane] * t46) - 2.0 * (odd[6][lane] * t47)));
-        const double t60 = 2.0 * (hessian[6][lane] * odd[17][lane]) + (2.0 * (hessian[0][lane] * odd[15][lane]) + 2.0 * (hessian[3][lane] * odd[16][lane])) + (2.0 * (odd[14][lane] * t33) + (2.0 * (odd[13][lane] * t34) + 2.0 * (odd[12][lane] * t35)));
-        const double t61 = 2.0 * (hessian[7][lane] * odd[17][lane]) + (2.0 * (hessian[4][lane] * odd[16][lane]) + 2.0 * (hessian[1][lane] * odd[15][lane])) + (2.0 * (odd[12][lane] * t39) + 2.0 * (odd[13][lane] * t40) - 2.0 * (odd[14][lane] * t41));
-        const double t62 = 2.0 * (hessian[8][lane] * odd[17][lane]) + (2.0 * (hessian[2][lane] * odd[15][lane]) + 2.0 * (hessian[5][lane] * odd[16][lane])) + (2.0 * (odd[14][lane] * t45) + (2.0 * (odd[13][lane] * t46) - 2.0 * (odd[12][lane] * t47)));
+        const double t54 = 2.0 * (hessian[6][lane] * odd[5][lane]) + (2.0 * (hessian[3][lane] * odd[4][lane])
+            + 2.0 * (hessian[0][lane] * odd[3][lane])) + (2.0 * (odd[2][lane] * t33)
+            + (2.0 * (odd[1][lane] * t34) + 2.0 * (odd[0][lane] * t35)));
+        const double t55 = 2.0 * (hessian[7][lane] * odd[5][lane]) + (2.0 * (hessian[1][lane] * odd[3][lane])
+            + 2.0 * (hessian[4][lane] * odd[4][lane])) + (2.0 * (odd[0][lane] * t39) + 2.0 * (odd[1][lane]
+            * t40) - 2.0 * (odd[2][lane] * t41));
+        const double t56 = 2.0 * (hessian[8][lane] * odd[5][lane]) + (2.0 * (hessian[2][lane] * odd[3][lane])
+            + 2.0 * (hessian[5][lane] * odd[4][lane])) + (2.0 * (odd[2][lane] * t45)
+            + (2.0 * (odd[1][lane] * t46) - 2.0 * (odd[0][lane] * t47)));
+        const double t57 = 2.0 * (hessian[6][lane] * odd[11][lane]) + (2.0 * (hessian[0][lane] * odd[9][lane])
+            + 2.0 * (hessian[3][lane] * odd[10][lane])) + (2.0 * (odd[8][lane] * t33)
+            + (2.0 * (odd[6][lane] * t35) + 2.0 * (odd[7][lane] * t34)));
+        const double t58 = 2.0 * (hessian[7][lane] * odd[11][lane])
+            + (2.0 * (hessian[4][lane] * odd[10][lane]) + 2.0 * (hessian[1][lane] * odd[9][lane]))
+            + (2.0 * (odd[6][lane] * t39) + 2.0 * (odd[7][lane] * t40) - 2.0 * (odd[8][lane] * t41));
+        const double t59 = 2.0 * (hessian[8][lane] * odd[11][lane]) + (2.0 * (hessian[2][lane] * odd[9][lane])
+            + 2.0 * (hessian[5][lane] * odd[10][lane])) + (2.0 * (odd[8][lane] * t45)
+            + (2.0 * (odd[7][lane] * t46) - 2.0 * (odd[6][lane] * t47)));
+        const double t60 = 2.0 * (hessian[6][lane] * odd[17][lane])
+            + (2.0 * (hessian[0][lane] * odd[15][lane]) + 2.0 * (hessian[3][lane] * odd[16][lane]))
+            + (2.0 * (odd[14][lane] * t33) + (2.0 * (odd[13][lane] * t34) + 2.0 * (odd[12][lane] * t35)));
+        const double t61 = 2.0 * (hessian[7][lane] * odd[17][lane])
+            + (2.0 * (hessian[4][lane] * odd[16][lane]) + 2.0 * (hessian[1][lane] * odd[15][lane]))
+            + (2.0 * (odd[12][lane] * t39) + 2.0 * (odd[13][lane] * t40) - 2.0 * (odd[14][lane] * t41));
+        const double t62 = 2.0 * (hessian[8][lane] * odd[17][lane])
+            + (2.0 * (hessian[2][lane] * odd[15][lane]) + 2.0 * (hessian[5][lane] * odd[16][lane]))
+            + (2.0 * (odd[14][lane] * t45) + (2.0 * (odd[13][lane] * t46) - 2.0 * (odd[12][lane] * t47)));
         alpha_y[0][lane] = t1 * t10 + (t11 * t13 - t14 * t15);
         alpha_y[1][lane] = t14 * t17 + t11 * t18 - t1 * t16;
         alpha_y[2][lane] = t1 * t9 - (t11 * t19 + t14 * t20);
@@ -852,24 +988,42 @@ static void nambu_pendulum_along_mean_lanes(nambu_pendulum_lanes even[restrict 1
         alpha_y[6][lane] = t24 * t10 + (t25 * t13 - t26 * t15);
         alpha_y[7][lane] = t26 * t17 + t25 * t18 - t24 * t16;
         alpha_y[8][lane] = t24 * t9 - (t25 * t19 + t26 * t20);
-        increment_y[0][lane] = 2.0 * (odd[2][lane] * t10) + (2.0 * (odd[0][lane] * t13) - 2.0 * (odd[1][lane] * t15));
-        increment_y[1][lane] = 2.0 * (odd[0][lane] * t18) + 2.0 * (odd[1][lane] * t17) - 2.0 * (odd[2][lane] * t16);
-        increment_y[2][lane] = 2.0 * (odd[2][lane] * t9) + ((-2.0) * (odd[0][lane] * t19) - 2.0 * (odd[1][lane] * t20));
-        increment_y[3][lane] = 2.0 * (odd[8][lane] * t10) + (2.0 * (odd[6][lane] * t13) - 2.0 * (odd[7][lane] * t15));
-        increment_y[4][lane] = 2.0 * (odd[6][lane] * t18) + 2.0 * (odd[7][lane] * t17) - 2.0 * (odd[8][lane] * t16);
-        increment_y[5][lane] = 2.0 * (odd[8][lane] * t9) + ((-2.0) * (odd[6][lane] * t19) - 2.0 * (odd[7][lane] * t20));
-        increment_y[6][lane] = 2.0 * (odd[14][lane] * t10) + (2.0 * (odd[12][lane] * t13) - 2.0 * (odd[13][lane] * t15));
-        increment_y[7][lane] = 2.0 * (odd[12][lane] * t18) + 2.0 * (odd[13][lane] * t17) - 2.0 * (odd[14][lane] * t16);
-        increment_y[8][lane] = 2.0 * (odd[14][lane] * t9) + ((-2.0) * (odd[12][lane] * t19) - 2.0 * (odd[13][lane] * t20));
-        jacobian[0][lane] = hessian[6][lane] * t27 + (hessian[3][lane] * t28 + hessian[0][lane] * t29) + (t1 * t33 + (t14 * t34 + t11 * t35));
-        jacobian[1][lane] = hessian[7][lane] * t27 + (hessian[1][lane] * t29 + hessian[4][lane] * t28) + (t11 * t39 + t14 * t40 - t1 * t41);
-        jacobian[2][lane] = hessian[8][lane] * t27 + (hessian[5][lane] * t28 + hessian[2][lane] * t29) + (t1 * t45 + (t14 * t46 - t11 * t47));
-        jacobian[3][lane] = hessian[6][lane] * t48 + (hessian[0][lane] * t49 + hessian[3][lane] * t50) + (t21 * t33 + (t22 * t35 + t23 * t34));
-        jacobian[4][lane] = hessian[7][lane] * t48 + (hessian[4][lane] * t50 + hessian[1][lane] * t49) + (t23 * t40 + t22 * t39 - t21 * t41);
-        jacobian[5][lane] = hessian[8][lane] * t48 + (hessian[5][lane] * t50 + hessian[2][lane] * t49) + (t21 * t45 + (t23 * t46 - t22 * t47));
-        jacobian[6][lane] = hessian[6][lane] * t51 + (hessian[3][lane] * t52 + hessian[0][lane] * t53) + (t24 * t33 + (t25 * t35 + t26 * t34));
-        jacobian[7][lane] = hessian[7][lane] * t51 + (hessian[1][lane] * t53 + hessian[4][lane] * t52) + (t25 * t39 + t26 * t40 - t24 * t41);
-        jacobian[8][lane] = hessian[8][lane] * t51 + (hessian[2][lane] * t53 + hessian[5][lane] * t52) + (t24 * t45 + (t26 * t46 - t25 * t47));
+        increment_y[0][lane] = 2.0 * (odd[2][lane] * t10) + (2.0 * (odd[0][lane] * t13) - 2.0 * (odd[1][lane]
+            * t15));
+        increment_y[1][lane] = 2.0 * (odd[0][lane] * t18) + 2.0 * (odd[1][lane] * t17) - 2.0 * (odd[2][lane]
+            * t16);
+        increment_y[2][lane] = 2.0 * (odd[2][lane] * t9) + ((-2.0) * (odd[0][lane] * t19) - 2.0
+            * (odd[1][lane] * t20));
+        increment_y[3][lane] = 2.0 * (odd[8][lane] * t10) + (2.0 * (odd[6][lane] * t13) - 2.0 * (odd[7][lane]
+            * t15));
+        increment_y[4][lane] = 2.0 * (odd[6][lane] * t18) + 2.0 * (odd[7][lane] * t17) - 2.0 * (odd[8][lane]
+            * t16);
+        increment_y[5][lane] = 2.0 * (odd[8][lane] * t9) + ((-2.0) * (odd[6][lane] * t19) - 2.0
+            * (odd[7][lane] * t20));
+        increment_y[6][lane] = 2.0 * (odd[14][lane] * t10) + (2.0 * (odd[12][lane] * t13) - 2.0
+            * (odd[13][lane] * t15));
+        increment_y[7][lane] = 2.0 * (odd[12][lane] * t18) + 2.0 * (odd[13][lane] * t17) - 2.0
+            * (odd[14][lane] * t16);
+        increment_y[8][lane] = 2.0 * (odd[14][lane] * t9) + ((-2.0) * (odd[12][lane] * t19) - 2.0
+            * (odd[13][lane] * t20));
+        jacobian[0][lane] = hessian[6][lane] * t27 + (hessian[3][lane] * t28 + hessian[0][lane] * t29)
+            + (t1 * t33 + (t14 * t34 + t11 * t35));
+        jacobian[1][lane] = hessian[7][lane] * t27 + (hessian[1][lane] * t29 + hessian[4][lane] * t28)
+            + (t11 * t39 + t14 * t40 - t1 * t41);
+        jacobian[2][lane] = hessian[8][lane] * t27 + (hessian[5][lane] * t28 + hessian[2][lane] * t29)
+            + (t1 * t45 + (t14 * t46 - t11 * t47));
+        jacobian[3][lane] = hessian[6][lane] * t48 + (hessian[0][lane] * t49 + hessian[3][lane] * t50)
+            + (t21 * t33 + (t22 * t35 + t23 * t34));
+        jacobian[4][lane] = hessian[7][lane] * t48 + (hessian[4][lane] * t50 + hessian[1][lane] * t49)
+            + (t23 * t40 + t22 * t39 - t21 * t41);
+        jacobian[5][lane] = hessian[8][lane] * t48 + (hessian[5][lane] * t50 + hessian[2][lane] * t49)
+            + (t21 * t45 + (t23 * t46 - t22 * t47));
+        jacobian[6][lane] = hessian[6][lane] * t51 + (hessian[3][lane] * t52 + hessian[0][lane] * t53)
+            + (t24 * t33 + (t25 * t35 + t26 * t34));
+        jacobian[7][lane] = hessian[7][lane] * t51 + (hessian[1][lane] * t53 + hessian[4][lane] * t52)
+            + (t25 * t39 + t26 * t40 - t24 * t41);
+        jacobian[8][lane] = hessian[8][lane] * t51 + (hessian[2][lane] * t53 + hessian[5][lane] * t52)
+            + (t24 * t45 + (t26 * t46 - t25 * t47));
         increment_jacobian[0][lane] = t54;
         increment_jacobian[1][lane] = t55;
         increment_jacobian[2][lane] = t56;
@@ -885,32 +1039,21 @@ static void nambu_pendulum_along_mean_lanes(nambu_pendulum_lanes even[restrict 1
     }
 }
 
-/* nambu_pendulum_invert in all lanes. */
+/* nambu_pendulum_invert in all lanes */
 static void nambu_pendulum_invert_lanes(nambu_pendulum_lanes matrix[restrict 9],
-                                        nambu_pendulum_lanes slope[restrict 9],
-                                        nambu_pendulum_lanes inverse[restrict 9],
-                                        nambu_pendulum_lanes gain[restrict 9],
-                                        nambu_pendulum_lanes reciprocal[restrict 3])
+    nambu_pendulum_lanes slope[restrict 9], nambu_pendulum_lanes inverse[restrict 9],
+    nambu_pendulum_lanes gain[restrict 9], nambu_pendulum_lanes reciprocal[restrict 3])
 {
     nambu_pendulum_EACH_LANE
     for (int lane = 0; lane < nambu_pendulum_LANES; ++lane) {
-        const double t1 = 1.0 / matrix[0][lane];
-        const double t2 = matrix[1][lane] * t1;
-        const double t3 = 1.0 / (matrix[4][lane] - matrix[3][lane] * t2);
-        const double t4 = matrix[3][lane] * t1 * t3;
-        const double t5 = matrix[2][lane] * t1;
-        const double t6 = (matrix[5][lane] - matrix[3][lane] * t5) * t3;
-        const double t7 = t5 - t2 * t6;
-        const double t8 = matrix[7][lane] - matrix[6][lane] * t2;
+        const double t1 = 1.0 / matrix[0][lane], t2 = matrix[1][lane] * t1;
+        const double t3 = 1.0 / (matrix[4][lane] - matrix[3][lane] * t2), t4 = matrix[3][lane] * t1 * t3;
+        const double t5 = matrix[2][lane] * t1, t6 = (matrix[5][lane] - matrix[3][lane] * t5) * t3;
+        const double t7 = t5 - t2 * t6, t8 = matrix[7][lane] - matrix[6][lane] * t2;
         const double t9 = 1.0 / (matrix[8][lane] - matrix[6][lane] * t5 - t8 * t6);
-        const double t10 = (t8 * t4 - matrix[6][lane] * t1) * t9;
-        const double t11 = t1 + t2 * t4 - t7 * t10;
-        const double t12 = t8 * t3 * t9;
-        const double t13 = t7 * t12 - t2 * t3;
-        const double t14 = t7 * t9;
-        const double t15 = t4 + t6 * t10;
-        const double t16 = t3 + t6 * t12;
-        const double t17 = t6 * t9;
+        const double t10 = (t8 * t4 - matrix[6][lane] * t1) * t9, t11 = t1 + t2 * t4 - t7 * t10;
+        const double t12 = t8 * t3 * t9, t13 = t7 * t12 - t2 * t3, t14 = t7 * t9, t15 = t4 + t6 * t10;
+        const double t16 = t3 + t6 * t12, t17 = t6 * t9;
         inverse[0][lane] = t11;
         inverse[1][lane] = t13;
         inverse[2][lane] = -t14;
@@ -935,43 +1078,45 @@ static void nambu_pendulum_invert_lanes(nambu_pendulum_lanes matrix[restrict 9],
     }
 }
 
+/* ---- Newton's method in lanes ---- */
+/* Components of y are measured no finer than by this part of the largest. */
+#define nambu_pendulum_FLOOR_OF_LANES 1e-6
+
+/* A stage in all lanes, linearised around y. */
+typedef struct {
+    nambu_pendulum_lanes y[nambu_pendulum_DIM], displacement[nambu_pendulum_DIM],
+        increment[nambu_pendulum_DIM], residual[nambu_pendulum_DIM];
+    /* a residual r of alpha(y) = x takes inverse r from y, and gain r from the increment */
+    nambu_pendulum_lanes inverse[nambu_pendulum_DIM * nambu_pendulum_DIM], slope[nambu_pendulum_DIM
+        * nambu_pendulum_DIM], gain[nambu_pendulum_DIM * nambu_pendulum_DIM];
+    nambu_pendulum_lanes middle[nambu_pendulum_DIM]; /* of the path, less y */
+    /* of alpha and beta - alpha, with p held fixed */
+    nambu_pendulum_lanes alpha_y[nambu_pendulum_DIM * nambu_pendulum_DIM], increment_y[nambu_pendulum_DIM
+        * nambu_pendulum_DIM];
+} nambu_pendulum_model;
+
 /* nambu_pendulum_size in all lanes, summed over the components. */
-static void nambu_pendulum_sizes(nambu_pendulum_lanes y[restrict 3], nambu_pendulum_lanes delta[restrict 3],
-    nambu_pendulum_lanes size)
+static void nambu_pendulum_sizes(nambu_pendulum_lanes y[restrict nambu_pendulum_DIM],
+    nambu_pendulum_lanes delta[restrict nambu_pendulum_DIM], nambu_pendulum_lanes size)
 {
     nambu_pendulum_lanes norm = { 0.0 };
     memset(size, 0, nambu_pendulum_LANES * sizeof size[0]);
-    for (int i = 0; i < 3; ++i)
+    for (int i = 0; i < nambu_pendulum_DIM; ++i)
         for (int lane = 0; lane < nambu_pendulum_LANES; ++lane)
-            norm[lane] = 1e-6 * fabs(y[i][lane]) > norm[lane] ? 1e-6 * fabs(y[i][lane]) : norm[lane];
-    for (int i = 0; i < 3; ++i) {
+            norm[lane] = nambu_pendulum_FLOOR_OF_LANES * fabs(y[i][lane]) > norm[lane]
+                ? nambu_pendulum_FLOOR_OF_LANES * fabs(y[i][lane]) : norm[lane];
+    for (int i = 0; i < nambu_pendulum_DIM; ++i) {
         nambu_pendulum_EACH_LANE
         for (int lane = 0; lane < nambu_pendulum_LANES; ++lane)
             size[lane] += fabs(delta[i][lane]) / (fabs(y[i][lane]) + norm[lane] + DBL_MIN);
     }
 }
 
-/* Correct y by the residuals, with the inverse in the table, and measure the corrections. */
-static void nambu_pendulum_correct(nambu_pendulum_model *model, nambu_pendulum_lanes size)
-{
-    nambu_pendulum_lanes delta[3];
-    memset(delta, 0, sizeof delta);
-    for (int i = 0; i < 3; ++i)
-        for (int j = 0; j < 3; ++j) {
-            nambu_pendulum_EACH_LANE
-            for (int lane = 0; lane < nambu_pendulum_LANES; ++lane)
-                delta[i][lane] += model->inverse[i * 3 + j][lane] * model->residual[j][lane];
-        }
-    nambu_pendulum_sizes(model->y, delta, size);
-    for (int i = 0; i < 3; ++i)
-        for (int lane = 0; lane < nambu_pendulum_LANES; ++lane) model->y[i][lane] -= delta[i][lane];
-}
-
-/* The largest of the lanes, none of which is negative; infinite if one is not finite. As integers, the bits of such
-   numbers have their order, and those of what is no number are larger. */
+/* The largest of the lanes, none of which is negative; infinite if one is not finite. As integers, the bits
+   of such numbers have their order, and those of what is no number are larger. */
 static double nambu_pendulum_largest(const nambu_pendulum_lanes size)
 {
-    uint64_t bits[8], most = 0;
+    uint64_t bits[nambu_pendulum_LANES], most = 0;
     double largest;
     memcpy(bits, size, sizeof bits);
     for (int lane = 0; lane < nambu_pendulum_LANES; ++lane) most = bits[lane] > most ? bits[lane] : most;
@@ -979,38 +1124,53 @@ static double nambu_pendulum_largest(const nambu_pendulum_lanes size)
     return isfinite(largest) ? largest : HUGE_VAL;
 }
 
-/* nambu_pendulum_near for the guesses of all lanes, seen from one value. */
-static int nambu_pendulum_near_lanes(nambu_pendulum_lanes y[restrict 3], const double last[3])
+/* Correct y by the residuals, with the inverse in the table, and measure the corrections. */
+static void nambu_pendulum_correct(nambu_pendulum_model *model, nambu_pendulum_lanes size)
 {
-    nambu_pendulum_lanes distance = { 0.0 };
-    double size = 0.0;
-    for (int i = 0; i < 3; ++i) {
-        size += fabs(last[i]);
-        nambu_pendulum_EACH_LANE
-        for (int lane = 0; lane < nambu_pendulum_LANES; ++lane) distance[lane] += fabs(y[i][lane] - last[i]);
-    }
-    return nambu_pendulum_largest(distance) <= 4.0 * size;
+    nambu_pendulum_lanes delta[nambu_pendulum_DIM];
+    memset(delta, 0, sizeof delta);
+    for (int i = 0; i < nambu_pendulum_DIM; ++i)
+        for (int j = 0; j < nambu_pendulum_DIM; ++j) {
+            nambu_pendulum_EACH_LANE
+            for (int lane = 0; lane < nambu_pendulum_LANES; ++lane)
+                delta[i][lane] += model->inverse[i * nambu_pendulum_DIM + j][lane] * model->residual[j][lane];
+        }
+    nambu_pendulum_sizes(model->y, delta, size);
+    for (int i = 0; i < nambu_pendulum_DIM; ++i)
+        for (int lane = 0; lane < nambu_pendulum_LANES; ++lane) model->y[i][lane] -= delta[i][lane];
 }
 
-/* What is left after a correction of this size: quadratic in it, where the matrices are of the points corrected; where
-   they are of points further off, by bend, also of the order of size times bend. bound is what the last pass left. */
+/* What is left after a correction of this size: quadratic in it, where the matrices are of the points
+   corrected; where they are of points further off, by bend, also of the order of size times bend. bound is
+   what the last pass left. */
 static double nambu_pendulum_remaining(double size, double bend, double bound)
 {
     const double growth = size / bound, left = size * (size + bend);
     return growth > 1.0 ? growth * left : left;
 }
 
-/* The paths of all lanes as Taylor series about their middle, with half of p: they take the time from -1 to 1, and need
-   fewer terms than from their start. s[i][k] is coefficient k of series i, the coordinates first; slope goes on with the
-   entries of d(pi p)/dm and of pi, from which v follows, the derivatives along middle and p, row by row. */
+/* ---- Paths in lanes ---- */
+enum { nambu_pendulum_TERMS_OF_LANES = 16 }; /* most of the expansion of a path from its middle */
+
+/* Accuracy of the derivatives of paths. */
+#define nambu_pendulum_SLOPE_ACCURACY 1e-7
+
+/* The paths of all lanes as Taylor series about their middle, with half of p: they take the time from -1 to
+   1, and need fewer terms than from their start. s[i][k] is coefficient k of series i, the coordinates first;
+   slope goes on with the entries of d(pi p)/dm and of pi, from which v follows, the derivatives along middle
+   and p, row by row. */
 typedef struct {
-    nambu_pendulum_lanes p[3], fixed[1], slope_fixed[1], value[11];
-    nambu_pendulum_lanes s[11][16 + 1], slope[5][12 + 1];
-    nambu_pendulum_lanes v[12 + 1][18];
-    nambu_pendulum_lanes even[3], odd[3], mean[3]; /* sums of terms, those of even order also as means over time */
-    nambu_pendulum_lanes v_even[18], v_odd[18], v_mean[18];
-    nambu_pendulum_lanes unit[3]; /* what terms are multiplied by to be measured */
-    int terms; /* orders that are known */
+    nambu_pendulum_lanes p[nambu_pendulum_DIM], fixed[nambu_pendulum_FIXED],
+        slope_fixed[nambu_pendulum_SLOPE_FIXED], value[nambu_pendulum_SERIES];
+    nambu_pendulum_lanes s[nambu_pendulum_SERIES][nambu_pendulum_TERMS_OF_LANES + 1],
+        slope[nambu_pendulum_SLOPE_SERIES][nambu_pendulum_SLOPE_TERMS + 1];
+    nambu_pendulum_lanes v[nambu_pendulum_SLOPE_TERMS + 1][2 * nambu_pendulum_DIM * nambu_pendulum_DIM];
+    /* sums of terms, those of even order also as means over time */
+    nambu_pendulum_lanes even[nambu_pendulum_DIM], odd[nambu_pendulum_DIM], mean[nambu_pendulum_DIM];
+    nambu_pendulum_lanes v_even[2 * nambu_pendulum_DIM * nambu_pendulum_DIM], v_odd[2 * nambu_pendulum_DIM
+        * nambu_pendulum_DIM], v_mean[2 * nambu_pendulum_DIM * nambu_pendulum_DIM];
+    nambu_pendulum_lanes unit[nambu_pendulum_DIM]; /* what terms are multiplied by to be measured */
+    int terms;                                     /* orders that are known */
 } nambu_pendulum_expansion;
 
 /* The largest of the lanes; what is not finite does not count: that lane has failed. */
@@ -1018,12 +1178,13 @@ static double nambu_pendulum_largest_finite(const nambu_pendulum_lanes size)
 {
     nambu_pendulum_lanes finite;
     nambu_pendulum_EACH_LANE
-    for (int lane = 0; lane < nambu_pendulum_LANES; ++lane) finite[lane] = size[lane] <= DBL_MAX ? size[lane] : 0.0;
+    for (int lane = 0; lane < nambu_pendulum_LANES; ++lane)
+        finite[lane] = size[lane] <= DBL_MAX ? size[lane] : 0.0;
     return nambu_pendulum_largest(finite);
 }
 
-/* Coefficient k >= 1 of the series that follow from those of the coordinates: sums over the orders between 0 and k,
-   then what else there is. */
+/* Coefficient k >= 1 of the series that follow from those of the coordinates: sums over the orders between 0
+   and k, then what else there is. */
 static void nambu_pendulum_follow(nambu_pendulum_lanes coef[restrict], nambu_pendulum_expansion *e, int k)
 {
     const double share = 1.0 / k;
@@ -1050,9 +1211,9 @@ static void nambu_pendulum_follow(nambu_pendulum_lanes coef[restrict], nambu_pen
     }
 }
 
-/* Coefficient k >= 1 of the further series: sums over the orders between 0 and k,
-   then what else there is. */
-static void nambu_pendulum_follow_slopes(nambu_pendulum_lanes coef[restrict], nambu_pendulum_expansion *e, int k)
+/* Coefficient k >= 1 of the further series: sums over the orders between 0 and k, then what else there is. */
+static void nambu_pendulum_follow_slopes(nambu_pendulum_lanes coef[restrict], nambu_pendulum_expansion *e,
+    int k)
 {
     (void)coef;
     nambu_pendulum_lanes sum[1];
@@ -1066,188 +1227,6 @@ static void nambu_pendulum_follow_slopes(nambu_pendulum_lanes coef[restrict], na
         e->slope[2][k][lane] = e->s[10][0][lane] * e->s[8][k][lane];
         e->slope[3][k][lane] = 0.0;
         e->slope[4][k][lane] = 0.0;
-    }
-}
-
-/* Order k of the series, and with it order k + 1 of the coordinates. */
-static void nambu_pendulum_next_order(nambu_pendulum_lanes coef[restrict], nambu_pendulum_expansion *e, int k)
-{
-    static const int field[3] = { 10, 6, 7 };
-    if (k > 0) nambu_pendulum_follow(coef, e, k);
-    for (int i = 0; i < 3; ++i) {
-        const double share = 1.0 / (k + 1);
-        nambu_pendulum_EACH_LANE
-        for (int lane = 0; lane < nambu_pendulum_LANES; ++lane) e->s[i][k + 1][lane] = share * e->s[field[i]][k][lane];
-    }
-}
-
-/* Begin to expand the paths with the middles m. */
-static void nambu_pendulum_begin(nambu_pendulum_lanes coef[restrict], nambu_pendulum_expansion *e, nambu_pendulum_lanes m[restrict 3])
-{
-    nambu_pendulum_lanes norm = { 0.0 };
-    nambu_pendulum_values_lanes(coef, e->p, m, e->value, e->fixed);
-    for (int i = 0; i < 11; ++i) memcpy(e->s[i][0], e->value[i], sizeof e->value[i]);
-    memset(e->even, 0, sizeof e->even);
-    memset(e->odd, 0, sizeof e->odd);
-    memset(e->mean, 0, sizeof e->mean);
-    nambu_pendulum_next_order(coef, e, 0);
-    e->terms = 0;
-    for (int i = 0; i < 3; ++i) {
-        nambu_pendulum_EACH_LANE
-        for (int lane = 0; lane < nambu_pendulum_LANES; ++lane) {
-            e->unit[i][lane] = fabs(m[i][lane]) + fabs(e->s[i][1][lane]) + DBL_MIN;
-            norm[lane] += e->unit[i][lane];
-        }
-    }
-    for (int i = 0; i < 3; ++i) {
-        nambu_pendulum_EACH_LANE
-        for (int lane = 0; lane < nambu_pendulum_LANES; ++lane) e->unit[i][lane] = 1.0 / (e->unit[i][lane] + 1e-5 * norm[lane]);
-    }
-}
-
-/* Add the terms of the odd order k and of the next; their size. */
-static double nambu_pendulum_add_terms(nambu_pendulum_expansion *e, int k)
-{
-    nambu_pendulum_lanes size = { 0.0 };
-    const double share = 1.0 / (k + 2);
-    for (int i = 0; i < 3; ++i) {
-        nambu_pendulum_EACH_LANE
-        for (int lane = 0; lane < nambu_pendulum_LANES; ++lane) {
-            const double odd = e->s[i][k][lane], even = e->s[i][k + 1][lane];
-            e->odd[i][lane] += odd;
-            e->even[i][lane] += even;
-            e->mean[i][lane] += share * even;
-            size[lane] += (fabs(odd) + fabs(even)) * e->unit[i][lane];
-        }
-    }
-    return nambu_pendulum_largest_finite(size);
-}
-
-/* Go on by two orders at a time, until these are below accuracy in all lanes that are finite, or 16 are known: whether
-   they suffice is checked at the ends. */
-static void nambu_pendulum_extend(nambu_pendulum_lanes coef[restrict], nambu_pendulum_expansion *e, double accuracy)
-{
-    double size = HUGE_VAL;
-    for (; e->terms < 16 && size > accuracy; e->terms += 2) {
-        if (e->terms > 0) nambu_pendulum_next_order(coef, e, e->terms);
-        nambu_pendulum_next_order(coef, e, e->terms + 1);
-        size = nambu_pendulum_add_terms(e, e->terms + 1);
-    }
-}
-
-/* nambu_pendulum_holds in all lanes, at one end of the paths, where the expansions have the given slope: infinite where the
-   equation does not hold. */
-static void nambu_pendulum_check_end(nambu_pendulum_lanes coef[restrict], nambu_pendulum_expansion *e, nambu_pendulum_lanes m[restrict 3],
-    nambu_pendulum_lanes slope[restrict 3], nambu_pendulum_lanes wrong)
-{
-    static const int field[3] = { 10, 6, 7 };
-    nambu_pendulum_lanes value[11], fixed[1], scale = { 0.0 };
-    nambu_pendulum_values_lanes(coef, e->p, m, value, fixed);
-    for (int i = 0; i < 3; ++i) {
-        nambu_pendulum_EACH_LANE
-        for (int lane = 0; lane < nambu_pendulum_LANES; ++lane) scale[lane] += fabs(m[i][lane]) + fabs(slope[i][lane]);
-    }
-    for (int i = 0; i < 3; ++i) {
-        nambu_pendulum_EACH_LANE
-        for (int lane = 0; lane < nambu_pendulum_LANES; ++lane) {
-            const double off = fabs(value[field[i]][lane] - slope[i][lane]);
-            wrong[lane] += off <= 2e-15 * scale[lane] ? 0.0 : HUGE_VAL;
-        }
-    }
-}
-
-/* The same at both ends. */
-static void nambu_pendulum_check_ends(nambu_pendulum_lanes coef[restrict], nambu_pendulum_expansion *e, nambu_pendulum_lanes wrong)
-{
-    nambu_pendulum_lanes start[3], end[3], start_slope[3], end_slope[3];
-    for (int i = 0; i < 3; ++i) {
-        nambu_pendulum_lanes even = { 0.0 }, odd = { 0.0 };
-        for (int k = 1; k < e->terms; k += 2) {
-            nambu_pendulum_EACH_LANE
-            for (int lane = 0; lane < nambu_pendulum_LANES; ++lane) {
-                odd[lane] += k * e->s[i][k][lane];
-                even[lane] += (k + 1) * e->s[i][k + 1][lane];
-            }
-        }
-        nambu_pendulum_EACH_LANE
-        for (int lane = 0; lane < nambu_pendulum_LANES; ++lane) {
-            start[i][lane] = e->s[i][0][lane] + (e->even[i][lane] - e->odd[i][lane]);
-            end[i][lane] = e->s[i][0][lane] + (e->even[i][lane] + e->odd[i][lane]);
-            start_slope[i][lane] = odd[lane] - even[lane];
-            end_slope[i][lane] = odd[lane] + even[lane];
-        }
-    }
-    nambu_pendulum_check_end(coef, e, start, start_slope, wrong);
-    nambu_pendulum_check_end(coef, e, end, end_slope, wrong);
-}
-
-/* Begin to expand the paths with mean y, from their middles as far as these are known. */
-static void nambu_pendulum_begin_at(nambu_pendulum_lanes coef[restrict], const nambu_pendulum_model *model, nambu_pendulum_expansion *e)
-{
-    nambu_pendulum_lanes m[3];
-    for (int i = 0; i < 3; ++i) {
-        nambu_pendulum_EACH_LANE
-        for (int lane = 0; lane < nambu_pendulum_LANES; ++lane) m[i][lane] = model->y[i][lane] + model->middle[i][lane];
-    }
-    nambu_pendulum_begin(coef, e, m);
-}
-
-/* Find the middles by iteration, which gains some digits each time, with expansions as short as that allows; the last
-   can be gone on with. Infinite where that does not converge. */
-static void nambu_pendulum_settle(nambu_pendulum_lanes coef[restrict], nambu_pendulum_model *model, nambu_pendulum_expansion *e)
-{
-    nambu_pendulum_lanes size, norm;
-    double left = 1.0;
-    memset(model->middle, 0, sizeof model->middle);
-    for (int round = 0; left > 1e-9 && round < 12; ++round) {
-        for (int i = 0; i < 3 && round > 0; ++i) {
-            nambu_pendulum_EACH_LANE
-            for (int lane = 0; lane < nambu_pendulum_LANES; ++lane) model->middle[i][lane] = -e->mean[i][lane];
-        }
-        nambu_pendulum_begin_at(coef, model, e);
-        nambu_pendulum_extend(coef, e, 1e-4 * left);
-        memset(size, 0, sizeof size);
-        memset(norm, 0, sizeof norm);
-        for (int i = 0; i < 3; ++i) {
-            nambu_pendulum_EACH_LANE
-            for (int lane = 0; lane < nambu_pendulum_LANES; ++lane) {
-                size[lane] += fabs(model->middle[i][lane] + e->mean[i][lane]);
-                norm[lane] += fabs(model->y[i][lane]);
-            }
-        }
-        nambu_pendulum_EACH_LANE
-        for (int lane = 0; lane < nambu_pendulum_LANES; ++lane) size[lane] /= norm[lane] + DBL_MIN;
-        left = nambu_pendulum_largest_finite(size);
-        if (left > 1.0) left = 1.0;
-    }
-    for (int lane = 0; lane < nambu_pendulum_LANES && left > 1e-9; ++lane)
-        if (size[lane] > 1e-9) model->middle[0][lane] = HUGE_VAL;
-}
-
-/* Half of p: paths take the time from -1 to 1. */
-static void nambu_pendulum_halve(nambu_pendulum_lanes p[restrict 3])
-{
-    for (int i = 0; i < 3; ++i) {
-        nambu_pendulum_EACH_LANE
-        for (int lane = 0; lane < nambu_pendulum_LANES; ++lane) p[i][lane] *= 0.5;
-    }
-}
-
-/* alpha - y and beta - alpha to leading order, from one short expansion. */
-static void nambu_pendulum_evaluate_lanes(nambu_pendulum_lanes coef[restrict], nambu_pendulum_lanes y[restrict 3],
-    nambu_pendulum_lanes displacement[restrict 3], nambu_pendulum_lanes increment[restrict 3])
-{
-    nambu_pendulum_expansion e;
-    nambu_pendulum_momentum_lanes(coef, y, e.p);
-    nambu_pendulum_halve(e.p);
-    nambu_pendulum_begin(coef, &e, y);
-    nambu_pendulum_extend(coef, &e, 1e-6);
-    for (int i = 0; i < 3; ++i) {
-        nambu_pendulum_EACH_LANE
-        for (int lane = 0; lane < nambu_pendulum_LANES; ++lane) {
-            displacement[i][lane] = (e.even[i][lane] - e.odd[i][lane]) - e.mean[i][lane];
-            increment[i][lane] = 2.0 * e.odd[i][lane];
-        }
     }
 }
 
@@ -1275,12 +1254,11 @@ static void nambu_pendulum_vary_by(nambu_pendulum_expansion *e, int j, int k)
     }
 }
 
-/* Order k + 1 of the derivatives; order 0 is 1 along the middle, and 0 along p. */
-static void nambu_pendulum_vary_order(nambu_pendulum_expansion *e, int k)
+/* What order k of it contributes by itself. */
+static void nambu_pendulum_vary_source(nambu_pendulum_expansion *e, int k)
 {
     nambu_pendulum_lanes *to = e->v[k + 1];
     const double share = 1.0 / (k + 1);
-    memset(to, 0, 18 * sizeof to[0]);
     nambu_pendulum_EACH_LANE
     for (int lane = 0; lane < nambu_pendulum_LANES; ++lane) {
         to[6][lane] += share * e->slope[1][k][lane];
@@ -1290,17 +1268,218 @@ static void nambu_pendulum_vary_order(nambu_pendulum_expansion *e, int k)
         to[11][lane] += 0.5 * share * e->s[9][k][lane];
         to[16][lane] += 0.5 * share * e->s[3][k][lane];
     }
+}
+
+/* Order k of the series, and with it order k + 1 of the coordinates. */
+static void nambu_pendulum_next_order(nambu_pendulum_lanes coef[restrict], nambu_pendulum_expansion *e, int k)
+{
+    if (k > 0) nambu_pendulum_follow(coef, e, k);
+    for (int i = 0; i < nambu_pendulum_DIM; ++i) {
+        const double share = 1.0 / (k + 1);
+        nambu_pendulum_EACH_LANE
+        for (int lane = 0; lane < nambu_pendulum_LANES; ++lane)
+            e->s[i][k + 1][lane] = share * e->s[nambu_pendulum_path_slopes[i]][k][lane];
+    }
+}
+
+/* Begin to expand the paths with the middles m. */
+static void nambu_pendulum_begin(nambu_pendulum_lanes coef[restrict], nambu_pendulum_expansion *e,
+    nambu_pendulum_lanes m[restrict nambu_pendulum_DIM])
+{
+    nambu_pendulum_lanes norm = { 0.0 };
+    nambu_pendulum_values_lanes(coef, e->p, m, e->value, e->fixed);
+    for (int i = 0; i < nambu_pendulum_SERIES; ++i) memcpy(e->s[i][0], e->value[i], sizeof e->value[i]);
+    memset(e->even, 0, sizeof e->even);
+    memset(e->odd, 0, sizeof e->odd);
+    memset(e->mean, 0, sizeof e->mean);
+    nambu_pendulum_next_order(coef, e, 0);
+    e->terms = 0;
+    for (int i = 0; i < nambu_pendulum_DIM; ++i) {
+        nambu_pendulum_EACH_LANE
+        for (int lane = 0; lane < nambu_pendulum_LANES; ++lane) {
+            e->unit[i][lane] = fabs(m[i][lane]) + fabs(e->s[i][1][lane]) + DBL_MIN;
+            norm[lane] += e->unit[i][lane];
+        }
+    }
+    for (int i = 0; i < nambu_pendulum_DIM; ++i) {
+        nambu_pendulum_EACH_LANE
+        for (int lane = 0; lane < nambu_pendulum_LANES; ++lane)
+            e->unit[i][lane] = 1.0 / (e->unit[i][lane] + 1e-5 * norm[lane]);
+    }
+}
+
+/* Add the terms of the odd order k and of the next; their size. */
+static double nambu_pendulum_add_terms(nambu_pendulum_expansion *e, int k)
+{
+    nambu_pendulum_lanes size = { 0.0 };
+    const double share = 1.0 / (k + 2);
+    for (int i = 0; i < nambu_pendulum_DIM; ++i) {
+        nambu_pendulum_EACH_LANE
+        for (int lane = 0; lane < nambu_pendulum_LANES; ++lane) {
+            const double odd = e->s[i][k][lane], even = e->s[i][k + 1][lane];
+            e->odd[i][lane] += odd;
+            e->even[i][lane] += even;
+            e->mean[i][lane] += share * even;
+            size[lane] += (fabs(odd) + fabs(even)) * e->unit[i][lane];
+        }
+    }
+    return nambu_pendulum_largest_finite(size);
+}
+
+/* Go on by two orders at a time, until these are below accuracy in all lanes that are finite, or
+   nambu_pendulum_TERMS_OF_LANES are known: whether they suffice is checked at the ends. */
+static void nambu_pendulum_extend(nambu_pendulum_lanes coef[restrict], nambu_pendulum_expansion *e,
+    double accuracy)
+{
+    double size = HUGE_VAL;
+    for (; e->terms < nambu_pendulum_TERMS_OF_LANES && size > accuracy; e->terms += 2) {
+        if (e->terms > 0) nambu_pendulum_next_order(coef, e, e->terms);
+        nambu_pendulum_next_order(coef, e, e->terms + 1);
+        size = nambu_pendulum_add_terms(e, e->terms + 1);
+    }
+}
+
+/* nambu_pendulum_holds in all lanes, at one end of the paths, where the expansions have the given slope:
+   infinite where the equation does not hold. */
+static void nambu_pendulum_check_end(nambu_pendulum_lanes coef[restrict], nambu_pendulum_expansion *e,
+    nambu_pendulum_lanes m[restrict nambu_pendulum_DIM],
+    nambu_pendulum_lanes slope[restrict nambu_pendulum_DIM], nambu_pendulum_lanes wrong)
+{
+    nambu_pendulum_lanes value[nambu_pendulum_SERIES], fixed[nambu_pendulum_FIXED], scale = { 0.0 };
+    nambu_pendulum_values_lanes(coef, e->p, m, value, fixed);
+    for (int i = 0; i < nambu_pendulum_DIM; ++i) {
+        nambu_pendulum_EACH_LANE
+        for (int lane = 0; lane < nambu_pendulum_LANES; ++lane) scale[lane] += fabs(m[i][lane])
+            + fabs(slope[i][lane]);
+    }
+    for (int i = 0; i < nambu_pendulum_DIM; ++i) {
+        nambu_pendulum_EACH_LANE
+        for (int lane = 0; lane < nambu_pendulum_LANES; ++lane) {
+            const double off = fabs(value[nambu_pendulum_path_slopes[i]][lane] - slope[i][lane]);
+            wrong[lane] += off <= 2e-15 * scale[lane] ? 0.0 : HUGE_VAL;
+        }
+    }
+}
+
+/* The same at both ends. */
+static void nambu_pendulum_check_ends(nambu_pendulum_lanes coef[restrict], nambu_pendulum_expansion *e,
+    nambu_pendulum_lanes wrong)
+{
+    nambu_pendulum_lanes start[nambu_pendulum_DIM], end[nambu_pendulum_DIM], start_slope[nambu_pendulum_DIM],
+        end_slope[nambu_pendulum_DIM];
+    for (int i = 0; i < nambu_pendulum_DIM; ++i) {
+        nambu_pendulum_lanes even = { 0.0 }, odd = { 0.0 };
+        for (int k = 1; k < e->terms; k += 2) {
+            nambu_pendulum_EACH_LANE
+            for (int lane = 0; lane < nambu_pendulum_LANES; ++lane) {
+                odd[lane] += k * e->s[i][k][lane];
+                even[lane] += (k + 1) * e->s[i][k + 1][lane];
+            }
+        }
+        nambu_pendulum_EACH_LANE
+        for (int lane = 0; lane < nambu_pendulum_LANES; ++lane) {
+            start[i][lane] = e->s[i][0][lane] + (e->even[i][lane] - e->odd[i][lane]);
+            end[i][lane] = e->s[i][0][lane] + (e->even[i][lane] + e->odd[i][lane]);
+            start_slope[i][lane] = odd[lane] - even[lane];
+            end_slope[i][lane] = odd[lane] + even[lane];
+        }
+    }
+    nambu_pendulum_check_end(coef, e, start, start_slope, wrong);
+    nambu_pendulum_check_end(coef, e, end, end_slope, wrong);
+}
+
+/* Begin to expand the paths with mean y, from their middles as far as these are known. */
+static void nambu_pendulum_begin_at(nambu_pendulum_lanes coef[restrict], const nambu_pendulum_model *model,
+    nambu_pendulum_expansion *e)
+{
+    nambu_pendulum_lanes m[nambu_pendulum_DIM];
+    for (int i = 0; i < nambu_pendulum_DIM; ++i) {
+        nambu_pendulum_EACH_LANE
+        for (int lane = 0; lane < nambu_pendulum_LANES; ++lane)
+            m[i][lane] = model->y[i][lane] + model->middle[i][lane];
+    }
+    nambu_pendulum_begin(coef, e, m);
+}
+
+/* Find the middles by iteration, which gains some digits each time, with expansions as short as that allows;
+   the last can be gone on with. Infinite where that does not converge. */
+static void nambu_pendulum_settle(nambu_pendulum_lanes coef[restrict], nambu_pendulum_model *model,
+    nambu_pendulum_expansion *e)
+{
+    nambu_pendulum_lanes size, norm;
+    double left = 1.0;
+    memset(model->middle, 0, sizeof model->middle);
+    for (int round = 0; left > 1e-9 && round < 12; ++round) {
+        for (int i = 0; i < nambu_pendulum_DIM && round > 0; ++i) {
+            nambu_pendulum_EACH_LANE
+            for (int lane = 0; lane < nambu_pendulum_LANES; ++lane)
+                model->middle[i][lane] = -e->mean[i][lane];
+        }
+        nambu_pendulum_begin_at(coef, model, e);
+        nambu_pendulum_extend(coef, e, 1e-4 * left);
+        memset(size, 0, sizeof size);
+        memset(norm, 0, sizeof norm);
+        for (int i = 0; i < nambu_pendulum_DIM; ++i) {
+            nambu_pendulum_EACH_LANE
+            for (int lane = 0; lane < nambu_pendulum_LANES; ++lane) {
+                size[lane] += fabs(model->middle[i][lane] + e->mean[i][lane]);
+                norm[lane] += fabs(model->y[i][lane]);
+            }
+        }
+        nambu_pendulum_EACH_LANE
+        for (int lane = 0; lane < nambu_pendulum_LANES; ++lane) size[lane] /= norm[lane] + DBL_MIN;
+        left = nambu_pendulum_largest_finite(size);
+        if (left > 1.0) left = 1.0;
+    }
+    for (int lane = 0; lane < nambu_pendulum_LANES && left > 1e-9; ++lane)
+        if (size[lane] > 1e-9) model->middle[0][lane] = HUGE_VAL;
+}
+
+/* Half of p: paths take the time from -1 to 1. */
+static void nambu_pendulum_halve(nambu_pendulum_lanes p[restrict nambu_pendulum_DIM])
+{
+    for (int i = 0; i < nambu_pendulum_DIM; ++i) {
+        nambu_pendulum_EACH_LANE
+        for (int lane = 0; lane < nambu_pendulum_LANES; ++lane) p[i][lane] *= 0.5;
+    }
+}
+
+/* alpha - y and beta - alpha to leading order, from one short expansion. */
+static void nambu_pendulum_evaluate_lanes(nambu_pendulum_lanes coef[restrict],
+    nambu_pendulum_lanes y[restrict nambu_pendulum_DIM],
+    nambu_pendulum_lanes displacement[restrict nambu_pendulum_DIM],
+    nambu_pendulum_lanes increment[restrict nambu_pendulum_DIM])
+{
+    nambu_pendulum_expansion e;
+    nambu_pendulum_momentum_lanes(coef, y, e.p);
+    nambu_pendulum_halve(e.p);
+    nambu_pendulum_begin(coef, &e, y);
+    nambu_pendulum_extend(coef, &e, 1e-6);
+    for (int i = 0; i < nambu_pendulum_DIM; ++i) {
+        nambu_pendulum_EACH_LANE
+        for (int lane = 0; lane < nambu_pendulum_LANES; ++lane) {
+            displacement[i][lane] = (e.even[i][lane] - e.odd[i][lane]) - e.mean[i][lane];
+            increment[i][lane] = 2.0 * e.odd[i][lane];
+        }
+    }
+}
+
+/* Order k + 1 of the derivatives; order 0 is 1 along the middle, and 0 along p. */
+static void nambu_pendulum_vary_order(nambu_pendulum_expansion *e, int k)
+{
+    memset(e->v[k + 1], 0, 2 * nambu_pendulum_DIM * nambu_pendulum_DIM * sizeof e->v[0][0]);
+    nambu_pendulum_vary_source(e, k);
     for (int j = 0; j < k; ++j) nambu_pendulum_vary_by(e, j, k);
 }
 
-/* Add the terms of the odd order k of the derivatives and of the next, and measure them: those along the middle beside 1,
-   those along p beside their first. */
+/* Add the terms of the odd order k of the derivatives and of the next, and measure them: those along the
+   middle beside 1, those along p beside their first. */
 static void nambu_pendulum_add_slopes(nambu_pendulum_expansion *e, int k, nambu_pendulum_lanes size)
 {
     nambu_pendulum_lanes parts[2] = { { 0.0 } }, first = { 0.0 };
     const double share = 1.0 / (k + 2);
-    for (int i = 0; i < 18; ++i) {
-        const int part = i % 6 / 3;
+    for (int i = 0; i < 2 * nambu_pendulum_DIM * nambu_pendulum_DIM; ++i) {
+        const int part = i % (2 * nambu_pendulum_DIM) / nambu_pendulum_DIM;
         nambu_pendulum_EACH_LANE
         for (int lane = 0; lane < nambu_pendulum_LANES; ++lane) {
             const double odd = e->v[k][i][lane], even = e->v[k + 1][i][lane];
@@ -1316,23 +1495,24 @@ static void nambu_pendulum_add_slopes(nambu_pendulum_expansion *e, int k, nambu_
         size[lane] = parts[0][lane] + parts[1][lane] / (first[lane] + DBL_MIN);
 }
 
-/* The derivatives of the paths along their middles and p, to seven digits: what that leaves of a correction is below
-   rounding when it is accepted. Infinite where 12 terms do not suffice. */
+/* The derivatives of the paths along their middles and p, to seven digits: what that leaves of a correction
+   is below rounding when it is accepted. Infinite where nambu_pendulum_SLOPE_TERMS terms do not suffice. */
 static void nambu_pendulum_vary(nambu_pendulum_lanes coef[restrict], nambu_pendulum_expansion *e)
 {
-    nambu_pendulum_lanes slope[5], size;
+    nambu_pendulum_lanes slope[nambu_pendulum_SLOPE_SERIES], size;
     double largest = 1.0, next = 1.0; /* the last two orders, and what is to be expected of the next */
     nambu_pendulum_slope_values_lanes(coef, e->p, e->value, e->fixed, slope, e->slope_fixed);
-    for (int i = 0; i < 5; ++i) memcpy(e->slope[i][0], slope[i], sizeof slope[i]);
+    for (int i = 0; i < nambu_pendulum_SLOPE_SERIES; ++i) memcpy(e->slope[i][0], slope[i], sizeof slope[i]);
     memset(e->v_even, 0, sizeof e->v_even);
     memset(e->v_odd, 0, sizeof e->v_odd);
     memset(e->v_mean, 0, sizeof e->v_mean);
-    for (int i = 0; i < 3; ++i) {
+    for (int i = 0; i < nambu_pendulum_DIM; ++i) {
         nambu_pendulum_EACH_LANE
         for (int lane = 0; lane < nambu_pendulum_LANES; ++lane)
-            e->v_even[i * 6 + i][lane] = e->v_mean[i * 6 + i][lane] = 1.0;
+            e->v_even[i * 2 * nambu_pendulum_DIM + i][lane] = e->v_mean[i * 2 * nambu_pendulum_DIM
+                + i][lane] = 1.0;
     }
-    for (int k = 0; k < 12 && next > 1e-07; ++k) {
+    for (int k = 0; k < nambu_pendulum_SLOPE_TERMS && next > nambu_pendulum_SLOPE_ACCURACY; ++k) {
         if (k >= e->terms) nambu_pendulum_next_order(coef, e, k);
         if (k > 0) nambu_pendulum_follow_slopes(coef, e, k);
         nambu_pendulum_vary_order(e, k);
@@ -1342,54 +1522,62 @@ static void nambu_pendulum_vary(nambu_pendulum_lanes coef[restrict], nambu_pendu
         largest = nambu_pendulum_largest_finite(size);
         next = largest * (largest / previous);
     }
-    for (int lane = 0; lane < nambu_pendulum_LANES && next > 1e-07; ++lane)
-        if (size[lane] > 1e-07) e->v_mean[0][lane] = HUGE_VAL;
+    for (int lane = 0; lane < nambu_pendulum_LANES && next > nambu_pendulum_SLOPE_ACCURACY; ++lane)
+        if (size[lane] > nambu_pendulum_SLOPE_ACCURACY) e->v_mean[0][lane] = HUGE_VAL;
 }
 
 /* alpha - y and beta - alpha from an expansion whose mean misses y by little, to first order in that. */
-static void nambu_pendulum_read_ends(nambu_pendulum_model *model, nambu_pendulum_expansion *e, const nambu_pendulum_lanes wrong)
+static void nambu_pendulum_read_ends(nambu_pendulum_model *model, nambu_pendulum_expansion *e,
+    const nambu_pendulum_lanes wrong)
 {
-    nambu_pendulum_lanes miss[3];
-    for (int i = 0; i < 3; ++i) {
+    nambu_pendulum_lanes miss[nambu_pendulum_DIM];
+    for (int i = 0; i < nambu_pendulum_DIM; ++i) {
         nambu_pendulum_EACH_LANE
         for (int lane = 0; lane < nambu_pendulum_LANES; ++lane) {
             miss[i][lane] = model->middle[i][lane] + e->mean[i][lane];
-            model->displacement[i][lane] = ((model->middle[i][lane] + e->even[i][lane]) - e->odd[i][lane]) + wrong[lane];
+            model->displacement[i][lane] = ((model->middle[i][lane] + e->even[i][lane]) - e->odd[i][lane])
+                + wrong[lane];
             model->increment[i][lane] = 2.0 * e->odd[i][lane];
             model->middle[i][lane] = -e->mean[i][lane];
         }
     }
-    for (int i = 0; i < 3; ++i)
-        for (int j = 0; j < 3; ++j) {
+    for (int i = 0; i < nambu_pendulum_DIM; ++i)
+        for (int j = 0; j < nambu_pendulum_DIM; ++j) {
             nambu_pendulum_EACH_LANE
             for (int lane = 0; lane < nambu_pendulum_LANES; ++lane) {
-                model->displacement[i][lane] -= model->alpha_y[i * 3 + j][lane] * miss[j][lane];
-                model->increment[i][lane] -= model->increment_y[i * 3 + j][lane] * miss[j][lane];
+                model->displacement[i][lane] -= model->alpha_y[i * nambu_pendulum_DIM + j][lane]
+                    * miss[j][lane];
+                model->increment[i][lane] -= model->increment_y[i * nambu_pendulum_DIM + j][lane]
+                    * miss[j][lane];
             }
         }
 }
 
 /* The matrices of a stage, from the derivatives of the paths and the Hessian of S_h. */
-static void nambu_pendulum_linearise_paths(nambu_pendulum_lanes coef[restrict], nambu_pendulum_model *model, nambu_pendulum_expansion *e,
-    nambu_pendulum_lanes hessian[restrict 9])
+static void nambu_pendulum_linearise_paths(nambu_pendulum_lanes coef[restrict], nambu_pendulum_model *model,
+    nambu_pendulum_expansion *e, nambu_pendulum_lanes hessian[restrict nambu_pendulum_DIM
+    * nambu_pendulum_DIM])
 {
-    nambu_pendulum_lanes jacobian[9], reciprocal[2 * 3];
+    nambu_pendulum_lanes jacobian[nambu_pendulum_DIM * nambu_pendulum_DIM],
+        reciprocal[2 * nambu_pendulum_DIM];
     nambu_pendulum_vary(coef, e);
-    nambu_pendulum_along_mean_lanes(e->v_even, e->v_odd, e->v_mean, hessian, model->alpha_y, model->increment_y, jacobian,
-        model->slope, reciprocal);
-    nambu_pendulum_invert_lanes(jacobian, model->slope, model->inverse, model->gain, reciprocal + 3);
-    for (int i = 0; i < 2 * 3; ++i) {
+    nambu_pendulum_along_mean_lanes(e->v_even, e->v_odd, e->v_mean, hessian, model->alpha_y,
+        model->increment_y, jacobian, model->slope, reciprocal);
+    nambu_pendulum_invert_lanes(jacobian, model->slope, model->inverse, model->gain, reciprocal
+        + nambu_pendulum_DIM);
+    for (int i = 0; i < 2 * nambu_pendulum_DIM; ++i) {
         nambu_pendulum_EACH_LANE
         for (int lane = 0; lane < nambu_pendulum_LANES; ++lane)
-            model->inverse[i % 3][lane] += fabs(reciprocal[i][lane]) < 1e3 ? 0.0 : HUGE_VAL;
+            model->inverse[i % nambu_pendulum_DIM][lane] += fabs(reciprocal[i][lane]) < 1e3 ? 0.0 : HUGE_VAL;
     }
 }
 
 /* The table of a stage, with its matrices or with those of the last pass. */
-static void nambu_pendulum_update(nambu_pendulum_lanes coef[restrict], nambu_pendulum_model *model, int matrices)
+static void nambu_pendulum_update(nambu_pendulum_lanes coef[restrict], nambu_pendulum_model *model,
+    int matrices)
 {
     nambu_pendulum_expansion e;
-    nambu_pendulum_lanes hessian[9], wrong = { 0.0 };
+    nambu_pendulum_lanes hessian[nambu_pendulum_DIM * nambu_pendulum_DIM], wrong = { 0.0 };
     if (matrices) nambu_pendulum_curvature_lanes(coef, model->y, e.p, hessian);
     else nambu_pendulum_momentum_lanes(coef, model->y, e.p);
     nambu_pendulum_halve(e.p);
@@ -1401,26 +1589,58 @@ static void nambu_pendulum_update(nambu_pendulum_lanes coef[restrict], nambu_pen
     nambu_pendulum_read_ends(model, &e, wrong);
 }
 
-/* The steps of a block one after the other, each along the linear model of its lane. As X, the state with its carry, gains
-   increment - gain residual, the next residual follows from this one; X itself is added up apart. */
-static void nambu_pendulum_chain(nambu_pendulum_model model[1], double x[3], double carry[3])
+/* ---- Blocks of steps ---- */
+/* What all blocks share: coefficients, the same in each lane, and the recurrences by which they are foreseen.
+   */
+typedef struct {
+    int fits; /* the fit that weight is of; -1 for none */
+    nambu_pendulum_lanes coef[nambu_pendulum_COEFFICIENTS], weight[nambu_pendulum_WINDOW][nambu_pendulum_DIM];
+} nambu_pendulum_table;
+
+/* The stages of a step. */
+typedef struct {
+    nambu_pendulum_model stage;
+} nambu_pendulum_models;
+
+/* nambu_pendulum_near for the guesses of all lanes, seen from one value. */
+static int nambu_pendulum_near_lanes(nambu_pendulum_lanes y[restrict nambu_pendulum_DIM],
+    const double last[nambu_pendulum_DIM])
 {
-    double residual[3], sum[3], small[3];
-    for (int i = 0; i < 3; ++i) {
-        residual[i] = ((model->y[i][0] - x[i]) + model->displacement[i][0]) - carry[i];
+    nambu_pendulum_lanes distance = { 0.0 };
+    double size = 0.0;
+    for (int i = 0; i < nambu_pendulum_DIM; ++i) {
+        size += fabs(last[i]);
+        nambu_pendulum_EACH_LANE
+        for (int lane = 0; lane < nambu_pendulum_LANES; ++lane) distance[lane] += fabs(y[i][lane] - last[i]);
+    }
+    return nambu_pendulum_largest(distance) <= nambu_pendulum_REACH * size;
+}
+
+/* The steps of a block one after the other, each along the linear model of its lane. As X, the state with its
+   carry, gains increment - gain residual, the next residual follows from this one; X itself is added up
+   apart. */
+static void nambu_pendulum_chain(nambu_pendulum_models *models, double x[nambu_pendulum_DIM],
+    double carry[nambu_pendulum_DIM])
+{
+    double residual[nambu_pendulum_DIM], sum[nambu_pendulum_DIM], small[nambu_pendulum_DIM];
+    for (int i = 0; i < nambu_pendulum_DIM; ++i) {
+        residual[i] = ((models->stage.y[i][0] - x[i]) + models->stage.displacement[i][0]) - carry[i];
         sum[i] = x[i];
         small[i] = carry[i];
     }
-    for (int k = 0; k < 1 * nambu_pendulum_LANES; ++k) {
-        const int lane = k / 1, after = (k + 1) / 1 % nambu_pendulum_LANES;
-        nambu_pendulum_model *at = &model[k % 1], *next = &model[(k + 1) % 1];
-        double even[3] = { 0.0 }, odd[3] = { 0.0 }; /* two sums, so that no long chain of additions is waited for */
-        for (int i = 0; i < 3; ++i) {
+    for (int lane = 0; lane < nambu_pendulum_LANES; ++lane) {
+        const int after = (lane + 1) % nambu_pendulum_LANES;
+        nambu_pendulum_model *at = &models->stage, *next = &models->stage;
+        /* two sums, so that no long chain of additions is waited for */
+        double even[nambu_pendulum_DIM] = { 0.0 }, odd[nambu_pendulum_DIM] = { 0.0 };
+        for (int i = 0; i < nambu_pendulum_DIM; ++i) {
             at->residual[i][lane] = residual[i];
-            for (int j = 0; j < 3; j += 2) even[i] += at->gain[i * 3 + j][lane] * residual[j];
-            for (int j = 1; j < 3; j += 2) odd[i] += at->gain[i * 3 + j][lane] * residual[j];
+            for (int j = 0; j < nambu_pendulum_DIM; j += 2)
+                even[i] += at->gain[i * nambu_pendulum_DIM + j][lane] * residual[j];
+            for (int j = 1; j < nambu_pendulum_DIM; j += 2)
+                odd[i] += at->gain[i * nambu_pendulum_DIM + j][lane] * residual[j];
         }
-        for (int i = 0; i < 3; ++i) {
+        for (int i = 0; i < nambu_pendulum_DIM; ++i) {
             const double change = at->increment[i][lane], total = sum[i] + change, added = total - sum[i];
             const double turn = (next->displacement[i][after] - at->displacement[i][lane]) - change;
             const double moved = (next->y[i][after] - at->y[i][lane]) + turn;
@@ -1429,37 +1649,43 @@ static void nambu_pendulum_chain(nambu_pendulum_model model[1], double x[3], dou
             sum[i] = total;
         }
     }
-    for (int i = 0; i < 3; ++i) {
+    for (int i = 0; i < nambu_pendulum_DIM; ++i) {
         x[i] = sum[i] + small[i];
         carry[i] = small[i] - (x[i] - sum[i]);
     }
 }
 
-/* Bring the table up to date: coefficients, and weights that were fitted since. */
+/* Bring the table of a stage up to date: coefficients, and weights that were fitted since. */
+static void nambu_pendulum_refresh_stage(const nambu_pendulum_solver *s, nambu_pendulum_table *table)
+{
+    if (table->fits == s->history.fits) return;
+    table->fits = s->history.fits;
+    for (int k = 0; k < nambu_pendulum_COEFFICIENTS; ++k)
+        for (int lane = 0; lane < nambu_pendulum_LANES; ++lane) table->coef[k][lane] = s->coef[k];
+    memcpy(table->weight, s->history.weight,
+        (size_t)s->history.recurrence_terms * nambu_pendulum_DIM * sizeof(nambu_pendulum_lanes));
+}
+
 static void nambu_pendulum_refresh(const nambu_pendulum_solver *s, nambu_pendulum_table *table)
 {
-    for (int stage = 0; stage < 1; ++stage) {
-        if (table->fits[stage] == s->memory[stage].fits) continue;
-        table->fits[stage] = s->memory[stage].fits;
-        for (int k = 0; k < 3; ++k)
-            for (int lane = 0; lane < nambu_pendulum_LANES; ++lane) table->coef[stage][k][lane] = s->coef[stage][k];
-        memcpy(table->weight[stage], s->memory[stage].weight, (size_t)s->memory[stage].terms * sizeof table->weight[0][0]);
-    }
+    nambu_pendulum_refresh_stage(s, table);
 }
 
 /* Guesses for the next nambu_pendulum_LANES values of a stage, by its recurrences. */
-static void nambu_pendulum_foresee(const nambu_pendulum_memory *memory, nambu_pendulum_lanes weight[restrict][3],
-    nambu_pendulum_lanes y[restrict 3])
+static void nambu_pendulum_foresee(const nambu_pendulum_history *history,
+    nambu_pendulum_lanes weight[restrict][nambu_pendulum_DIM],
+    nambu_pendulum_lanes y[restrict nambu_pendulum_DIM])
 {
-    const int last = memory->count - 1;
-    for (int i = 0; i < 3; ++i) {
+    const int last = history->count - 1;
+    for (int i = 0; i < nambu_pendulum_DIM; ++i) {
         nambu_pendulum_lanes even = { 0.0 }, odd = { 0.0 };
-        for (int k = 0; k < memory->terms; k += 2) {
-            const double past = memory->past[last - k][i], earlier = memory->past[last - 1 - k][i];
+        for (int k = 0; k < history->recurrence_terms; k += 2) {
+            const double past = history->past[last - k][i], earlier = history->past[last - 1 - k][i];
             nambu_pendulum_EACH_LANE
             for (int lane = 0; lane < nambu_pendulum_LANES; ++lane) even[lane] += weight[k][i][lane] * past;
             nambu_pendulum_EACH_LANE
-            for (int lane = 0; lane < nambu_pendulum_LANES; ++lane) odd[lane] += weight[k + 1][i][lane] * earlier;
+            for (int lane = 0; lane < nambu_pendulum_LANES; ++lane)
+                odd[lane] += weight[k + 1][i][lane] * earlier;
         }
         nambu_pendulum_EACH_LANE
         for (int lane = 0; lane < nambu_pendulum_LANES; ++lane) y[i][lane] = even[lane] + odd[lane];
@@ -1467,137 +1693,177 @@ static void nambu_pendulum_foresee(const nambu_pendulum_memory *memory, nambu_pe
 }
 
 /* nambu_pendulum_record for the values of all lanes, one after the other. */
-static void nambu_pendulum_record_lanes(nambu_pendulum_memory *memory, nambu_pendulum_lanes y[restrict 3])
+static void nambu_pendulum_record_lanes(nambu_pendulum_history *history,
+    nambu_pendulum_lanes y[restrict nambu_pendulum_DIM])
 {
-    nambu_pendulum_make_room(memory, nambu_pendulum_LANES);
+    nambu_pendulum_make_room(history, nambu_pendulum_LANES);
     for (int lane = 0; lane < nambu_pendulum_LANES; ++lane)
-        for (int i = 0; i < 3; ++i) memory->past[memory->count + lane][i] = y[i][lane];
-    memory->count += nambu_pendulum_LANES;
+        for (int i = 0; i < nambu_pendulum_DIM; ++i) history->past[history->count + lane][i] = y[i][lane];
+    history->count += nambu_pendulum_LANES;
 }
 
-/* Guesses where no recurrence is known: where alpha and beta have the means of steps by the classical Runge-Kutta
-   method, to leading order. */
-static void nambu_pendulum_march(const nambu_pendulum_solver *s, nambu_pendulum_table *table, nambu_pendulum_model model[1])
+/* y becomes the points whose alpha and beta have these means. */
+static void nambu_pendulum_from_means(nambu_pendulum_lanes coef[restrict], nambu_pendulum_model *model)
 {
-    static const double reach[4] = { 0.5, 0.5, 1.0, 0.0 }, weight[4] = { 1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0 };
-    double x[3], point[3], slope[3], mean[3];
+    nambu_pendulum_evaluate_lanes(coef, model->y, model->displacement, model->increment);
+    for (int i = 0; i < nambu_pendulum_DIM; ++i) {
+        nambu_pendulum_EACH_LANE
+        for (int lane = 0; lane < nambu_pendulum_LANES; ++lane)
+            model->y[i][lane] -= model->displacement[i][lane] + 0.5 * model->increment[i][lane];
+    }
+}
+
+/* Guesses where no recurrence is known: where alpha and beta have the means of steps by the classical
+   Runge-Kutta method, to leading order. */
+static void nambu_pendulum_march(const nambu_pendulum_solver *s, nambu_pendulum_table *table,
+    nambu_pendulum_models *models)
+{
+    static const double reach[4] = { 0.5, 0.5, 1.0, 0.0 }, weight[4] = { 1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0
+        / 6.0 };
+    double x[nambu_pendulum_DIM], point[nambu_pendulum_DIM], slope[nambu_pendulum_DIM],
+        mean[nambu_pendulum_DIM];
     memcpy(x, s->x, sizeof x);
-    for (int k = 0; k < 1 * nambu_pendulum_LANES; ++k) {
-        const double h = nambu_pendulum_fractions[k % 1] * s->h;
+    const double h = s->h;
+    nambu_pendulum_model *at = &models->stage;
+    for (int lane = 0; lane < nambu_pendulum_LANES; ++lane) {
         memcpy(point, x, sizeof x);
         memset(mean, 0, sizeof mean);
         for (int part = 0; part < 4; ++part) {
             nambu_pendulum_vector_field(&s->params, point, slope);
-            for (int i = 0; i < 3; ++i) {
+            for (int i = 0; i < nambu_pendulum_DIM; ++i) {
                 mean[i] += weight[part] * slope[i];
                 point[i] = x[i] + h * reach[part] * slope[i];
             }
         }
-        for (int i = 0; i < 3; ++i) {
-            model[k % 1].y[i][k / 1] = x[i] + 0.5 * h * mean[i];
+        for (int i = 0; i < nambu_pendulum_DIM; ++i) {
+            at->y[i][lane] = x[i] + 0.5 * h * mean[i];
             x[i] += h * mean[i];
         }
     }
-    for (int stage = 0; stage < 1; ++stage) {
-        nambu_pendulum_model *at = &model[stage];
-        nambu_pendulum_evaluate_lanes(table->coef[stage], at->y, at->displacement, at->increment);
-        for (int i = 0; i < 3; ++i) {
-            nambu_pendulum_EACH_LANE
-            for (int lane = 0; lane < nambu_pendulum_LANES; ++lane)
-                at->y[i][lane] -= at->displacement[i][lane] + 0.5 * at->increment[i][lane];
-        }
-    }
+    nambu_pendulum_from_means(table->coef, &models->stage);
 }
 
-/* nambu_pendulum_LANES steps at once: guess the points of all, and correct them together until the error that remains is as
-   small as after a single step. How many passes that took; 0, and the solver as before, where it takes more than most. */
+/* Guess the points of all stages and steps, by recurrences or else by Runge-Kutta steps. 0 if they are not
+   near the state. */
+static int nambu_pendulum_guess(nambu_pendulum_solver *s, nambu_pendulum_table *table,
+    nambu_pendulum_models *models)
+{
+    if (!s->blocks.use_recurrences) nambu_pendulum_march(s, table, models);
+    if (s->blocks.use_recurrences) nambu_pendulum_foresee(&s->history, table->weight, models->stage.y);
+    if (!nambu_pendulum_near_lanes(models->stage.y, s->x)) return 0;
+    return 1;
+}
+
+/* One pass over the points of a stage: correct them by the residuals. The largest correction. */
+static double nambu_pendulum_correct_stage(nambu_pendulum_model *model)
+{
+    nambu_pendulum_lanes sizes;
+    nambu_pendulum_correct(model, sizes);
+    return nambu_pendulum_largest(sizes);
+}
+
+/* Corrections below the first go on with the matrices of the last pass, as its error is then of third order.
+   After the square of so small a correction as the second, there is rounding only, if the next is below the
+   third. */
+#define nambu_pendulum_FROZEN 1e-5
+#define nambu_pendulum_SMALL 1e-8
+#define nambu_pendulum_ROUNDING 1e-10
+
+/* nambu_pendulum_LANES steps at once: guess the points of all, and correct them together until the error that
+   remains is as small as after a single step. How many passes that took; 0, and the solver as before, where
+   it takes more than most. */
 static int nambu_pendulum_block(nambu_pendulum_solver *s, nambu_pendulum_table *table, int most)
 {
-    nambu_pendulum_model model[1];
-    nambu_pendulum_lanes sizes;
-    double x[3], carry[3], previous = HUGE_VAL, bend = 0.0, bound = HUGE_VAL;
+    nambu_pendulum_models models;
+    double x[nambu_pendulum_DIM], carry[nambu_pendulum_DIM], previous = HUGE_VAL, bend = 0.0, bound =
+        HUGE_VAL;
     int passes = 0, solved = 0;
-    if (!s->foreseeing) nambu_pendulum_march(s, table, model);
-    for (int stage = 0; stage < 1; ++stage) {
-        if (s->foreseeing) nambu_pendulum_foresee(&s->memory[stage], table->weight[stage], model[stage].y);
-        if (!nambu_pendulum_near_lanes(model[stage].y, s->x)) return 0;
-    }
+    if (!nambu_pendulum_guess(s, table, &models)) return 0;
     while (!solved) {
         double size = 0.0;
-        const int matrices = previous > 1e-05;
-        for (int stage = 0; stage < 1; ++stage) nambu_pendulum_update(table->coef[stage], &model[stage], matrices);
+        const int matrices = previous > nambu_pendulum_FROZEN;
+        nambu_pendulum_update(table->coef, &models.stage, matrices);
         memcpy(x, s->x, sizeof x);
         memcpy(carry, s->carry, sizeof carry);
-        nambu_pendulum_chain(model, x, carry);
-        for (int stage = 0; stage < 1; ++stage) {
-            nambu_pendulum_correct(&model[stage], sizes);
-            const double largest = nambu_pendulum_largest(sizes);
-            size = largest > size ? largest : size;
-        }
-        s->evaluations += 1 * nambu_pendulum_LANES;
+        nambu_pendulum_chain(&models, x, carry);
+        const double largest = nambu_pendulum_correct_stage(&models.stage);
+        size = largest > size ? largest : size;
+        s->evaluations += nambu_pendulum_LANES;
         bend = matrices ? 0.0 : bend + previous;
         bound = nambu_pendulum_remaining(size, bend, bound);
-        /* The second test: after the square of so small a correction there is rounding only. */
-        solved = bound <= 1e-20 || (previous < 1e-8 && size < 1e-10);
+        solved = bound <= nambu_pendulum_TOLERANCE || (previous < nambu_pendulum_SMALL && size
+            < nambu_pendulum_ROUNDING);
         if ((++passes >= most || !(size < previous)) && !solved) return 0;
         previous = size;
     }
-    for (int stage = 0; stage < 1; ++stage)
-        if (!nambu_pendulum_near_lanes(model[stage].y, s->x)) return 0;
-    for (int i = 0; i < 3; ++i)
+    if (!nambu_pendulum_near_lanes(models.stage.y, s->x)) return 0;
+    for (int i = 0; i < nambu_pendulum_DIM; ++i)
         if (!isfinite(x[i])) return 0;
     memcpy(s->x, x, sizeof x);
     memcpy(s->carry, carry, sizeof carry);
-    s->steps += nambu_pendulum_LANES;
-    for (int stage = 0; stage < 1; ++stage) {
-        nambu_pendulum_memory *memory = &s->memory[stage];
-        nambu_pendulum_record_lanes(memory, model[stage].y);
-        memory->slow = passes > 1 ? memory->slow + nambu_pendulum_LANES : 0;
-        if (memory->slow > memory->patience && s->foreseeing) nambu_pendulum_fit(memory);
-    }
+    nambu_pendulum_count(s, nambu_pendulum_LANES);
+    nambu_pendulum_history *history = &s->history;
+    nambu_pendulum_record_lanes(history, models.stage.y);
+    history->slow_steps = passes > 1 ? history->slow_steps + nambu_pendulum_LANES : 0;
+    if (history->slow_steps > history->slow_steps_allowed && s->blocks.use_recurrences)
+        nambu_pendulum_fit(history);
     return passes;
 }
+
+enum {
+    /* steps that fits for whole blocks are saved in */
+    nambu_pendulum_REPAY_BLOCKS = 4 * nambu_pendulum_REPAY,
+    nambu_pendulum_MOST_SINGLE_STEPS = 1000 /* before blocks are tried again */
+};
 
 /* Recurrences are given up for a while, the longer the more often that happens. */
 static void nambu_pendulum_give_up(nambu_pendulum_solver *s)
 {
-    s->foreseeing = s->setback = s->pause = 0;
-    s->doubt = 2 * s->doubt + 600;
-    s->retry = s->steps + s->doubt;
+    s->blocks.use_recurrences = s->blocks.last_single_steps = s->blocks.single_steps = 0;
+    s->blocks.steps_without_recurrences = 2 * s->blocks.steps_without_recurrences
+        + nambu_pendulum_REPAY_BLOCKS;
+    s->blocks.recurrences_from_step = s->steps + s->blocks.steps_without_recurrences;
+}
+
+/* Fit the recurrence of a stage. Whether it foresees. */
+static int nambu_pendulum_fitted(nambu_pendulum_history *history)
+{
+    nambu_pendulum_fit(history);
+    return history->recurrence_terms > 0;
 }
 
 /* How the next block is guessed: by recurrences, fitted as soon as enough steps are to be made, or
    have been, to repay that. */
 static void nambu_pendulum_choose_guess(nambu_pendulum_solver *s, size_t steps)
 {
-    for (int stage = 0; stage < 1; ++stage)
-        if (s->memory[stage].count < 111) {
-            s->foreseeing = 0;
-            return;
-        }
-    if (s->foreseeing || (steps < 600 && s->steps < 150) || s->steps < s->retry) return;
-    s->foreseeing = 1;
-    for (int stage = 0; stage < 1 && s->foreseeing; ++stage) {
-        nambu_pendulum_fit(&s->memory[stage]);
-        s->foreseeing = s->memory[stage].terms > 0;
+    if (s->history.count < nambu_pendulum_REMEMBERED) {
+        s->blocks.use_recurrences = 0;
+        return;
     }
-    s->pause = nambu_pendulum_LANES;
-    if (!s->foreseeing) nambu_pendulum_give_up(s);
+    if (s->blocks.use_recurrences || s->steps < s->blocks.recurrences_from_step) return;
+    if (steps < nambu_pendulum_REPAY_BLOCKS && s->steps < nambu_pendulum_REPAY) return;
+    s->blocks.use_recurrences = 1;
+    s->blocks.use_recurrences = s->blocks.use_recurrences && nambu_pendulum_fitted(&s->history);
+    s->blocks.single_steps = nambu_pendulum_LANES;
+    if (!s->blocks.use_recurrences) nambu_pendulum_give_up(s);
 }
 
-/* Learn from a block: after one that failed single steps are made, the more the more often that happens. Recurrences
-   that fail repeatedly, or need more passes than steps by Runge-Kutta did, are given up. */
+/* Learn from a block: after one that failed single steps are made, the more the more often that happens.
+   Recurrences that fail repeatedly, or need more passes than steps by Runge-Kutta did, are given up. */
 static void nambu_pendulum_learn_from(nambu_pendulum_solver *s, int passes)
 {
     if (passes > 0) {
-        s->setback /= 2;
+        s->blocks.last_single_steps /= 2;
     } else {
-        s->setback = 2 * s->setback + nambu_pendulum_LANES > 1000 ? 1000 : 2 * s->setback + nambu_pendulum_LANES;
-        s->pause = s->setback;
+        const int longer = 2 * s->blocks.last_single_steps + nambu_pendulum_LANES;
+        s->blocks.last_single_steps = longer > nambu_pendulum_MOST_SINGLE_STEPS
+            ? nambu_pendulum_MOST_SINGLE_STEPS : longer;
+        s->blocks.single_steps = s->blocks.last_single_steps;
     }
-    if (!s->foreseeing) {
-        s->passes = passes > 0 ? passes : INT_MAX;
-    } else if (passes > s->passes || s->setback > 5 * nambu_pendulum_LANES) {
+    if (!s->blocks.use_recurrences) {
+        s->blocks.passes_without_recurrences = passes > 0 ? passes : INT_MAX;
+    } else if (passes > s->blocks.passes_without_recurrences || s->blocks.last_single_steps > 5
+        * nambu_pendulum_LANES) {
         nambu_pendulum_give_up(s);
     }
 }
@@ -1607,26 +1873,29 @@ static nambu_pendulum_status nambu_pendulum_single(nambu_pendulum_solver *s)
 {
     const size_t before = s->evaluations;
     const nambu_pendulum_status status = nambu_pendulum_step(s, s->h);
-    s->effort += 0.125 * ((double)(s->evaluations - before) / 1 - s->effort);
+    const double evaluations = (double)(s->evaluations - before);
+    s->blocks.evaluations_per_stage += 0.125 * (evaluations - s->blocks.evaluations_per_stage);
     return status;
 }
 
-/* Blocks of steps where they cost less than single steps, with at most as many passes over a block as 1 for each
-   evaluation in a single step. The results differ by round-off only. */
+/* Blocks of steps where they cost less than single steps, with at most as many passes over a block as
+   nambu_pendulum_PASSES for each evaluation in a single step. The results differ by round-off only. */
 nambu_pendulum_status nambu_pendulum_integrate(nambu_pendulum_solver *s, double h, size_t steps)
 {
     nambu_pendulum_table table;
     nambu_pendulum_status status = nambu_pendulum_set_step(s, h);
-    for (int stage = 0; stage < 1; ++stage) table.fits[stage] = -1;
+    table.fits = -1;
     while (status == nambu_pendulum_OK && steps > 0) {
-        if (steps >= nambu_pendulum_LANES && s->pause == 0) nambu_pendulum_choose_guess(s, steps);
-        if (steps >= nambu_pendulum_LANES && s->pause == 0) {
+        if (steps >= nambu_pendulum_LANES && s->blocks.single_steps == 0)
+            nambu_pendulum_choose_guess(s, steps);
+        if (steps >= nambu_pendulum_LANES && s->blocks.single_steps == 0) {
             nambu_pendulum_refresh(s, &table);
-            const int passes = nambu_pendulum_block(s, &table, (int)(1 * s->effort + 0.5));
+            const int passes = nambu_pendulum_block(s, &table, (int)(nambu_pendulum_PASSES
+                * s->blocks.evaluations_per_stage + 0.5));
             nambu_pendulum_learn_from(s, passes);
             if (passes > 0) steps -= nambu_pendulum_LANES;
         } else {
-            if (s->pause > 0) --s->pause;
+            if (s->blocks.single_steps > 0) --s->blocks.single_steps;
             status = nambu_pendulum_single(s);
             if (status == nambu_pendulum_OK) --steps;
         }
@@ -1634,54 +1903,68 @@ nambu_pendulum_status nambu_pendulum_integrate(nambu_pendulum_solver *s, double 
     return status;
 }
 
+/* ---- Groups of members ---- */
+enum {
+    nambu_pendulum_GROUP = nambu_pendulum_LANES, /* members, one in each lane */
+    nambu_pendulum_FEWEST = 3,                   /* fewer members are quicker one by one */
+    /* steps that fits cost: of eight values at once, only one is foreseen */
+    nambu_pendulum_GROUP_REPAY = 200 * nambu_pendulum_DIM,
+    /* steps until recurrences that did not help are fitted again */
+    nambu_pendulum_HOPELESS_WAIT = 100 * nambu_pendulum_REPAY
+};
+
 /* Members of an ensemble, each in its lane. */
 typedef struct {
-    nambu_pendulum_lanes x[3], carry[3], coef[1][3];
-    nambu_pendulum_lanes past[1][111][3]; /* solved values, in a ring */
-    nambu_pendulum_lanes weight[1][40][3]; /* of past values, the latest first, for the next */
-    int latest;     /* the row of the latest values */
-    int count;      /* rows in use */
-    int order[1];   /* how many of them the extrapolation uses */
-    int terms[1];   /* how many of them the recurrences use */
-    int fits;       /* how often recurrences have been fitted */
-    int fitting[1]; /* whether they are the better guess */
-    int slow;       /* how many of the last steps took more than one iteration */
-    int patience;   /* how many of those before recurrences are fitted again */
-    int active[8];  /* whether the lane has a member that has not failed */
-    size_t left[8]; /* steps that are still to be made, where one has */
+    nambu_pendulum_lanes x[nambu_pendulum_DIM], carry[nambu_pendulum_DIM], coef[nambu_pendulum_COEFFICIENTS];
+    nambu_pendulum_lanes past[nambu_pendulum_REMEMBERED][nambu_pendulum_DIM]; /* solved values, in a ring */
+    /* of past values, the latest first, for the next */
+    nambu_pendulum_lanes weight[nambu_pendulum_WINDOW][nambu_pendulum_DIM];
+    int latest;                              /* the row of the latest values */
+    int count;                               /* rows in use */
+    int extrapolation_order;                 /* how many of them the extrapolation uses */
+    int recurrence_terms;                    /* how many of them the recurrences use */
+    int use_recurrences;                     /* whether these are the better guess */
+    int fits;                                /* how often recurrences have been fitted */
+    int slow_steps;                          /* how many of the last steps took more than one iteration */
+    int slow_steps_allowed;                  /* how many of those before recurrences are fitted again */
+    int active[nambu_pendulum_LANES];        /* whether the lane has a member that has not failed */
+    size_t steps_left[nambu_pendulum_LANES]; /* that are still to be made, where one has */
 } nambu_pendulum_group;
 
 /* The past values of a stage, the latest for k = 0. */
-static nambu_pendulum_lanes *nambu_pendulum_group_past(nambu_pendulum_group *group, int stage, int k)
+static nambu_pendulum_lanes *nambu_pendulum_group_past(nambu_pendulum_group *group, int k)
 {
     const int row = group->latest + k;
-    return group->past[stage][row < 111 ? row : row - 111];
+    return group->past[row < nambu_pendulum_REMEMBERED ? row : row - nambu_pendulum_REMEMBERED];
 }
 
 /* Guess the values of a stage by the recurrences of the members. */
-static void nambu_pendulum_group_foresee(nambu_pendulum_group *group, int stage, nambu_pendulum_lanes y[restrict 3])
+static void nambu_pendulum_group_foresee(nambu_pendulum_group *group,
+    nambu_pendulum_lanes y[restrict nambu_pendulum_DIM])
 {
-    memset(y, 0, 3 * sizeof y[0]);
-    for (int k = 0; k < group->terms[stage]; ++k) {
-        nambu_pendulum_lanes *past = nambu_pendulum_group_past(group, stage, k), *weight = group->weight[stage][k];
-        for (int i = 0; i < 3; ++i) {
+    memset(y, 0, nambu_pendulum_DIM * sizeof y[0]);
+    for (int k = 0; k < group->recurrence_terms; ++k) {
+        nambu_pendulum_lanes *past = nambu_pendulum_group_past(group, k), *weight = group->weight[k];
+        for (int i = 0; i < nambu_pendulum_DIM; ++i) {
             nambu_pendulum_EACH_LANE
-            for (int lane = 0; lane < nambu_pendulum_LANES; ++lane) y[i][lane] += weight[i][lane] * past[i][lane];
+            for (int lane = 0; lane < nambu_pendulum_LANES; ++lane)
+                y[i][lane] += weight[i][lane] * past[i][lane];
         }
     }
 }
 
 /* Extrapolate the values of a stage. */
-static void nambu_pendulum_group_extrapolate(nambu_pendulum_group *group, int stage, nambu_pendulum_lanes y[restrict 3])
+static void nambu_pendulum_group_extrapolate(nambu_pendulum_group *group,
+    nambu_pendulum_lanes y[restrict nambu_pendulum_DIM])
 {
-    const int order = group->order[stage];
+    const int order = group->extrapolation_order;
     double binomial = -1.0;
-    memcpy(y, group->x, 3 * sizeof y[0]);
-    if (order > 0) memset(y, 0, 3 * sizeof y[0]);
+    memcpy(y, group->x, nambu_pendulum_DIM * sizeof y[0]);
+    if (order > 0) memset(y, 0, nambu_pendulum_DIM * sizeof y[0]);
     for (int k = 0; k < order; ++k) {
-        nambu_pendulum_lanes *past = nambu_pendulum_group_past(group, stage, k);
+        nambu_pendulum_lanes *past = nambu_pendulum_group_past(group, k);
         binomial *= -(double)(order - k) / (k + 1);
-        for (int i = 0; i < 3; ++i) {
+        for (int i = 0; i < nambu_pendulum_DIM; ++i) {
             nambu_pendulum_EACH_LANE
             for (int lane = 0; lane < nambu_pendulum_LANES; ++lane) y[i][lane] += binomial * past[i][lane];
         }
@@ -1689,102 +1972,110 @@ static void nambu_pendulum_group_extrapolate(nambu_pendulum_group *group, int st
 }
 
 /* The sum over members of the absolute values of all components. */
-static double nambu_pendulum_group_sum(const nambu_pendulum_group *group, nambu_pendulum_lanes y[3])
+static double nambu_pendulum_group_sum(const nambu_pendulum_group *group,
+    nambu_pendulum_lanes y[nambu_pendulum_DIM])
 {
     double sum = 0.0;
-    for (int i = 0; i < 3; ++i)
-        for (int lane = 0; lane < nambu_pendulum_LANES; ++lane) sum += group->active[lane] ? fabs(y[i][lane]) : 0.0;
+    for (int i = 0; i < nambu_pendulum_DIM; ++i)
+        for (int lane = 0; lane < nambu_pendulum_LANES; ++lane) sum += group->active[lane] ? fabs(y[i][lane])
+            : 0.0;
     return sum;
 }
 
-static void nambu_pendulum_group_subtract(nambu_pendulum_lanes y[restrict 3], nambu_pendulum_lanes other[restrict 3])
+static void nambu_pendulum_group_subtract(nambu_pendulum_lanes y[restrict nambu_pendulum_DIM],
+    nambu_pendulum_lanes other[restrict nambu_pendulum_DIM])
 {
-    for (int i = 0; i < 3; ++i) {
+    for (int i = 0; i < nambu_pendulum_DIM; ++i) {
         nambu_pendulum_EACH_LANE
         for (int lane = 0; lane < nambu_pendulum_LANES; ++lane) y[i][lane] -= other[i][lane];
     }
 }
 
 /* Choose the guess that would have been best for these values. */
-static void nambu_pendulum_group_judge(nambu_pendulum_group *group, int stage, nambu_pendulum_lanes y[3])
+static void nambu_pendulum_group_judge(nambu_pendulum_group *group,
+    nambu_pendulum_lanes y[nambu_pendulum_DIM])
 {
-    nambu_pendulum_lanes row[8 + 1][3];
-    const int rows = group->count < 8 ? group->count : 8;
+    nambu_pendulum_lanes row[nambu_pendulum_HISTORY + 1][nambu_pendulum_DIM];
+    const int rows = group->count < nambu_pendulum_HISTORY ? group->count : nambu_pendulum_HISTORY;
     double least = HUGE_VAL;
     memcpy(row[0], y, sizeof row[0]);
-    for (int k = 0; k < rows; ++k) memcpy(row[k + 1], nambu_pendulum_group_past(group, stage, k), sizeof row[0]);
-    if (group->order[stage] == 0) group->order[stage] = 1;
+    for (int k = 0; k < rows; ++k) memcpy(row[k + 1], nambu_pendulum_group_past(group, k), sizeof row[0]);
+    if (group->extrapolation_order == 0) group->extrapolation_order = 1;
     for (int order = 1; order <= rows; ++order) { /* row[0] becomes the backward difference of this order */
         for (int k = 0; k <= rows - order; ++k) nambu_pendulum_group_subtract(row[k], row[k + 1]);
         const double size = nambu_pendulum_group_sum(group, row[0]);
         if (size < least) {
             least = size;
-            group->order[stage] = order;
+            group->extrapolation_order = order;
         }
     }
-    if (group->terms[stage] == 0) return;
-    nambu_pendulum_group_foresee(group, stage, row[0]);
+    if (group->recurrence_terms == 0) return;
+    nambu_pendulum_group_foresee(group, row[0]);
     nambu_pendulum_group_subtract(row[0], y);
-    group->fitting[stage] = nambu_pendulum_group_sum(group, row[0]) <= least;
+    group->use_recurrences = nambu_pendulum_group_sum(group, row[0]) <= least;
 }
 
-/* Fit the recurrences of all members; with every time, wait longer before it is done again, and for long if it did not
-   help. */
+/* Fit the recurrences of all members; with every time, wait longer before it is done again, and for long if
+   it did not help. */
 static void nambu_pendulum_group_fit(nambu_pendulum_group *group)
 {
-    nambu_pendulum_memory memory;
-    const int helped = group->fits == 0 || group->fitting[0];
-    memory.count = 111;
-    for (int stage = 0; stage < 1; ++stage) {
-        int found = 1;
-        group->terms[stage] = 0;
-        for (int lane = 0; lane < nambu_pendulum_LANES; ++lane)
-            for (int i = 0; i < 3 && group->active[lane] && found; ++i) {
-                for (int k = 0; k < 111; ++k)
-                    memory.past[111 - 1 - k][i] = nambu_pendulum_group_past(group, stage, k)[i][lane];
-                const int terms = nambu_pendulum_train(&memory, i);
-                found = terms > 0;
-                if (terms > group->terms[stage]) group->terms[stage] = terms;
-                for (int k = 0; k < 40; ++k) group->weight[stage][k][i][lane] = memory.weight[k][i][0];
-            }
-        if (!found) group->terms[stage] = 0;
-        group->fitting[stage] = found;
-    }
+    nambu_pendulum_history member;
+    const int helped = group->fits == 0 || group->use_recurrences;
+    member.count = nambu_pendulum_REMEMBERED;
+    int found = 1;
+    group->recurrence_terms = 0;
+    for (int lane = 0; lane < nambu_pendulum_LANES; ++lane)
+        for (int i = 0; i < nambu_pendulum_DIM && group->active[lane] && found; ++i) {
+            for (int k = 0; k < nambu_pendulum_REMEMBERED; ++k)
+                member.past[nambu_pendulum_REMEMBERED - 1 - k][i] = nambu_pendulum_group_past(group,
+                    k)[i][lane];
+            const int terms = nambu_pendulum_train(&member, i);
+            found = terms > 0;
+            if (terms > group->recurrence_terms) group->recurrence_terms = terms;
+            for (int k = 0; k < nambu_pendulum_WINDOW; ++k)
+                group->weight[k][i][lane] = member.weight[k][i][0];
+        }
+    if (!found) group->recurrence_terms = 0;
+    group->use_recurrences = found;
     ++group->fits;
-    group->slow = 0;
-    group->patience = helped && group->patience < 10000 ? 2 * group->patience + 150 : 100 * 150;
+    group->slow_steps = 0;
+    group->slow_steps_allowed = helped && group->slow_steps_allowed < nambu_pendulum_LONG_WAIT / 2 ? 2
+        * group->slow_steps_allowed + nambu_pendulum_REPAY : nambu_pendulum_HOPELESS_WAIT;
 }
 
-/* Replace guesses that are not near the last values, as nambu_pendulum_near has it, by these; lane by lane. */
-static void nambu_pendulum_stay_near(nambu_pendulum_lanes y[restrict 3], nambu_pendulum_lanes last[restrict 3])
+/* Replace guesses that are not near the last values, as nambu_pendulum_near has it, by these; lane by lane.
+   */
+static void nambu_pendulum_stay_near(nambu_pendulum_lanes y[restrict nambu_pendulum_DIM],
+    nambu_pendulum_lanes last[restrict nambu_pendulum_DIM])
 {
     nambu_pendulum_lanes distance = { 0.0 }, size = { 0.0 };
-    for (int i = 0; i < 3; ++i) {
+    for (int i = 0; i < nambu_pendulum_DIM; ++i) {
         nambu_pendulum_EACH_LANE
         for (int lane = 0; lane < nambu_pendulum_LANES; ++lane) {
             distance[lane] += fabs(y[i][lane] - last[i][lane]);
             size[lane] += fabs(last[i][lane]);
         }
     }
-    for (int i = 0; i < 3; ++i) {
+    for (int i = 0; i < nambu_pendulum_DIM; ++i) {
         nambu_pendulum_EACH_LANE
         for (int lane = 0; lane < nambu_pendulum_LANES; ++lane)
-            y[i][lane] = distance[lane] <= 4.0 * size[lane] ? y[i][lane] : last[i][lane];
+            y[i][lane] = distance[lane] <= nambu_pendulum_REACH * size[lane] ? y[i][lane] : last[i][lane];
     }
 }
 
-/* Whether lanes are still to be solved after a correction of this size; those where nothing is finite leave the group.
-   bound is what remains in each lane. */
-static int nambu_pendulum_group_open(nambu_pendulum_group *group, const nambu_pendulum_lanes size, const nambu_pendulum_lanes previous,
-    double bend, nambu_pendulum_lanes bound)
+/* Whether lanes are still to be solved after a correction of this size; those where nothing is finite leave
+   the group. bound is what remains in each lane. */
+static int nambu_pendulum_group_open(nambu_pendulum_group *group, const nambu_pendulum_lanes size,
+    const nambu_pendulum_lanes previous, double bend, nambu_pendulum_lanes bound)
 {
     int open = 0;
     nambu_pendulum_EACH_LANE
     for (int lane = 0; lane < nambu_pendulum_LANES; ++lane)
         bound[lane] = nambu_pendulum_remaining(size[lane], bend, bound[lane]);
-    if (nambu_pendulum_largest(bound) <= 1e-20) return 0;
+    if (nambu_pendulum_largest(bound) <= nambu_pendulum_TOLERANCE) return 0;
     for (int lane = 0; lane < nambu_pendulum_LANES; ++lane) {
-        const int solved = bound[lane] <= 1e-20 || (previous[lane] < 1e-8 && size[lane] < 1e-10);
+        const int solved = bound[lane] <= nambu_pendulum_TOLERANCE || (previous[lane] < nambu_pendulum_SMALL
+            && size[lane] < nambu_pendulum_ROUNDING);
         if (!isfinite(size[lane])) group->active[lane] = 0;
         open += group->active[lane] && !solved;
     }
@@ -1792,88 +2083,93 @@ static int nambu_pendulum_group_open(nambu_pendulum_group *group, const nambu_pe
 }
 
 /* The guess for a stage: recurrences, or extrapolation; the state for members where that is not near. */
-static void nambu_pendulum_group_predict(nambu_pendulum_group *group, int stage, nambu_pendulum_lanes y[3])
+static void nambu_pendulum_group_predict(nambu_pendulum_group *group,
+    nambu_pendulum_lanes y[nambu_pendulum_DIM])
 {
-    if (group->fitting[stage]) nambu_pendulum_group_foresee(group, stage, y);
-    else nambu_pendulum_group_extrapolate(group, stage, y);
+    if (group->use_recurrences) nambu_pendulum_group_foresee(group, y);
+    else nambu_pendulum_group_extrapolate(group, y);
     nambu_pendulum_stay_near(y, group->x);
 }
 
-/* Newton's method for a stage, until the slowest lane is solved. The number of iterations; where that is the most
-   allowed, lanes that are not solved leave the group. */
-static int nambu_pendulum_group_solve(nambu_pendulum_group *group, int stage, nambu_pendulum_model *model)
+/* Newton's method for a stage, until the slowest lane is solved. The number of iterations; where that is the
+   most allowed, lanes that are not solved leave the group. */
+static int nambu_pendulum_group_solve(nambu_pendulum_group *group, nambu_pendulum_model *model)
 {
     nambu_pendulum_lanes size, previous, bound;
     double largest = HUGE_VAL, bend = 0.0;
     int iterations = 0, open = 1;
     for (int lane = 0; lane < nambu_pendulum_LANES; ++lane) size[lane] = bound[lane] = HUGE_VAL;
-    nambu_pendulum_group_predict(group, stage, model->y);
-    for (; open > 0 && iterations < 20; ++iterations) {
+    nambu_pendulum_group_predict(group, model->y);
+    for (; open > 0 && iterations < nambu_pendulum_MAX_ITERATIONS; ++iterations) {
         memcpy(previous, size, sizeof size);
-        nambu_pendulum_update(group->coef[stage], model, largest > 1e-05);
-        bend = largest > 1e-05 ? 0.0 : bend + largest;
-        for (int i = 0; i < 3; ++i) {
+        nambu_pendulum_update(group->coef, model, largest > nambu_pendulum_FROZEN);
+        bend = largest > nambu_pendulum_FROZEN ? 0.0 : bend + largest;
+        for (int i = 0; i < nambu_pendulum_DIM; ++i) {
             nambu_pendulum_EACH_LANE
             for (int lane = 0; lane < nambu_pendulum_LANES; ++lane)
                 model->residual[i][lane] =
-                    ((model->y[i][lane] - group->x[i][lane]) + model->displacement[i][lane]) - group->carry[i][lane];
+                    ((model->y[i][lane] - group->x[i][lane]) + model->displacement[i][lane])
+                        - group->carry[i][lane];
         }
         nambu_pendulum_correct(model, size);
         open = nambu_pendulum_group_open(group, size, previous, bend, bound);
         largest = nambu_pendulum_largest(size);
     }
     for (int lane = 0; lane < nambu_pendulum_LANES && open > 0; ++lane)
-        group->active[lane] = group->active[lane] && bound[lane] <= 1e-20;
+        group->active[lane] = group->active[lane] && bound[lane] <= nambu_pendulum_TOLERANCE;
     return iterations;
 }
 
 /* Add the increments, corrected to first order, in compensated arithmetic as for a single step. */
-static void nambu_pendulum_group_advance(nambu_pendulum_lanes x[restrict 3], nambu_pendulum_lanes carry[restrict 3],
-    nambu_pendulum_model *model)
+static void nambu_pendulum_group_advance(nambu_pendulum_lanes x[restrict nambu_pendulum_DIM],
+    nambu_pendulum_lanes carry[restrict nambu_pendulum_DIM], nambu_pendulum_model *model)
 {
-    for (int i = 0; i < 3; ++i)
-        for (int j = 0; j < 3; ++j) {
+    for (int i = 0; i < nambu_pendulum_DIM; ++i)
+        for (int j = 0; j < nambu_pendulum_DIM; ++j) {
             nambu_pendulum_EACH_LANE
             for (int lane = 0; lane < nambu_pendulum_LANES; ++lane)
-                carry[i][lane] -= model->gain[i * 3 + j][lane] * model->residual[j][lane];
+                carry[i][lane] -= model->gain[i * nambu_pendulum_DIM + j][lane] * model->residual[j][lane];
         }
-    for (int i = 0; i < 3; ++i) {
+    for (int i = 0; i < nambu_pendulum_DIM; ++i) {
         nambu_pendulum_EACH_LANE
         for (int lane = 0; lane < nambu_pendulum_LANES; ++lane) {
-            const double change = model->increment[i][lane], sum = x[i][lane] + change, added = sum - x[i][lane];
-            const double small = ((x[i][lane] - (sum - added)) + (change - added)) + carry[i][lane];
+            const double change = model->increment[i][lane], sum = x[i][lane] + change, added = sum
+                - x[i][lane];
+            const double lost = (x[i][lane] - (sum - added)) + (change - added);
+            const double small = lost + carry[i][lane];
             x[i][lane] = sum + small;
             carry[i][lane] = small - (x[i][lane] - sum);
         }
     }
 }
 
-/* Members that failed, or whose state is not near the one before the step or not finite, keep that one, and leave. How many
-   stay. */
-static int nambu_pendulum_group_leave(nambu_pendulum_group *group, nambu_pendulum_lanes x[3], nambu_pendulum_lanes carry[3],
-    size_t remaining)
+/* Members that failed, or whose state is not near the one before the step or not finite, keep that one, and
+   leave. How many stay. */
+static int nambu_pendulum_group_leave(nambu_pendulum_group *group, nambu_pendulum_lanes x[nambu_pendulum_DIM],
+    nambu_pendulum_lanes carry[nambu_pendulum_DIM], size_t remaining)
 {
     nambu_pendulum_lanes moved = { 0.0 }, size = { 0.0 }, bad;
     int active = 0;
-    for (int i = 0; i < 3; ++i) {
+    for (int i = 0; i < nambu_pendulum_DIM; ++i) {
         nambu_pendulum_EACH_LANE
         for (int lane = 0; lane < nambu_pendulum_LANES; ++lane) {
             moved[lane] += fabs(group->x[i][lane] - x[i][lane]);
             size[lane] += fabs(x[i][lane]);
         }
     }
-    for (int lane = 0; lane < nambu_pendulum_LANES; ++lane) bad[lane] = moved[lane] <= 4.0 * size[lane] ? 0.0 : 1.0;
+    for (int lane = 0; lane < nambu_pendulum_LANES; ++lane)
+        bad[lane] = moved[lane] <= nambu_pendulum_REACH * size[lane] ? 0.0 : 1.0;
     for (int lane = 0; lane < nambu_pendulum_LANES; ++lane) active += group->active[lane];
     if (active == nambu_pendulum_LANES && !(nambu_pendulum_largest(bad) > 0.0)) return active;
     active = 0;
     for (int lane = 0; lane < nambu_pendulum_LANES; ++lane) {
         group->active[lane] = group->active[lane] && !(bad[lane] > 0.0);
         active += group->active[lane];
-        for (int i = 0; i < 3 && !group->active[lane]; ++i) {
+        for (int i = 0; i < nambu_pendulum_DIM && !group->active[lane]; ++i) {
             group->x[i][lane] = x[i][lane];
             group->carry[i][lane] = carry[i][lane];
         }
-        if (!group->active[lane] && group->left[lane] == 0) group->left[lane] = remaining;
+        if (!group->active[lane] && group->steps_left[lane] == 0) group->steps_left[lane] = remaining;
     }
     return active;
 }
@@ -1881,77 +2177,77 @@ static int nambu_pendulum_group_leave(nambu_pendulum_group *group, nambu_pendulu
 /* One step of all members, of as many as remain. How many members are left. */
 static int nambu_pendulum_group_step(nambu_pendulum_group *group, size_t remaining)
 {
-    nambu_pendulum_lanes x[3], carry[3];
+    nambu_pendulum_lanes x[nambu_pendulum_DIM], carry[nambu_pendulum_DIM];
     nambu_pendulum_model model;
-    const int next = (group->latest > 0 ? group->latest : 111) - 1;
+    const int next = (group->latest > 0 ? group->latest : nambu_pendulum_REMEMBERED) - 1;
     int most = 0;
     memcpy(x, group->x, sizeof x);
     memcpy(carry, group->carry, sizeof carry);
-    for (int stage = 0; stage < 1; ++stage) {
-        const int iterations = nambu_pendulum_group_solve(group, stage, &model);
-        nambu_pendulum_group_advance(group->x, group->carry, &model);
-        if (iterations > most) most = iterations;
-        if ((iterations > 1 && next % 8 == 0) || group->count < 8)
-            nambu_pendulum_group_judge(group, stage, model.y);
-        memcpy(group->past[stage][next], model.y, sizeof model.y);
-    }
+    const int iterations = nambu_pendulum_group_solve(group, &model);
+    nambu_pendulum_group_advance(group->x, group->carry, &model);
+    if (iterations > most) most = iterations;
+    if ((iterations > 1 && next % nambu_pendulum_HISTORY == 0) || group->count < nambu_pendulum_HISTORY)
+        nambu_pendulum_group_judge(group, model.y);
+    memcpy(group->past[next], model.y, sizeof model.y);
     group->latest = next;
-    if (group->count < 111) ++group->count;
-    group->slow = most > 1 ? group->slow + 1 : 0;
-    if (group->slow > group->patience && group->count == 111 && remaining >= 600)
+    if (group->count < nambu_pendulum_REMEMBERED) ++group->count;
+    group->slow_steps = most > 1 ? group->slow_steps + 1 : 0;
+    if (group->slow_steps > group->slow_steps_allowed && group->count == nambu_pendulum_REMEMBERED
+        && remaining >= nambu_pendulum_GROUP_REPAY)
         nambu_pendulum_group_fit(group);
     return nambu_pendulum_group_leave(group, x, carry, remaining);
 }
 
 /* Put a member into a lane: its state, and its coefficients. */
-static nambu_pendulum_status nambu_pendulum_group_join(nambu_pendulum_group *group, int lane, const nambu_pendulum_params *params,
-    const double x0[3], double h)
+static nambu_pendulum_status nambu_pendulum_group_join(nambu_pendulum_group *group, int lane,
+    const nambu_pendulum_params *params, const double x0[nambu_pendulum_DIM], double h)
 {
     nambu_pendulum_solver s;
     nambu_pendulum_status status = nambu_pendulum_init(&s, params, x0);
     if (status == nambu_pendulum_OK) status = nambu_pendulum_set_step(&s, h);
     if (status != nambu_pendulum_OK) return status;
-    for (int i = 0; i < 3; ++i) group->x[i][lane] = s.x[i];
-    for (int stage = 0; stage < 1; ++stage)
-        for (int k = 0; k < 3; ++k) group->coef[stage][k][lane] = s.coef[stage][k];
+    for (int i = 0; i < nambu_pendulum_DIM; ++i) group->x[i][lane] = s.x[i];
+    for (int k = 0; k < nambu_pendulum_COEFFICIENTS; ++k) group->coef[k][lane] = s.coef[k];
     group->active[lane] = 1;
     return status;
 }
 
 /* The steps that a member has still to make after it left the group, by itself. */
-static nambu_pendulum_status nambu_pendulum_group_finish(const nambu_pendulum_group *group, int lane, const nambu_pendulum_params *params,
-    double x[3], double h)
+static nambu_pendulum_status nambu_pendulum_group_finish(const nambu_pendulum_group *group, int lane,
+    const nambu_pendulum_params *params, double x[nambu_pendulum_DIM], double h)
 {
     nambu_pendulum_solver s;
     nambu_pendulum_status status = nambu_pendulum_init(&s, params, x);
     if (status != nambu_pendulum_OK) return status;
-    for (int i = 0; i < 3; ++i) s.carry[i] = group->carry[i][lane];
-    status = nambu_pendulum_integrate(&s, h, group->left[lane]);
+    for (int i = 0; i < nambu_pendulum_DIM; ++i) s.carry[i] = group->carry[i][lane];
+    status = nambu_pendulum_integrate(&s, h, group->steps_left[lane]);
     memcpy(x, s.x, sizeof s.x);
     return status;
 }
 
 /* The members from first on, as many as there are lanes. The first status that is not OK. */
-static nambu_pendulum_status nambu_pendulum_group_run(const nambu_pendulum_params *params, double *x, size_t members, size_t first,
-    double h, size_t steps, unsigned char *status)
+static nambu_pendulum_status nambu_pendulum_group_run(const nambu_pendulum_params *params, double *x,
+    size_t members, size_t first, double h, size_t steps, unsigned char *status)
 {
     nambu_pendulum_group group;
-    nambu_pendulum_status worst = nambu_pendulum_OK, member[8];
+    nambu_pendulum_status worst = nambu_pendulum_OK, member[nambu_pendulum_LANES];
     const int count = members - first < nambu_pendulum_LANES ? (int)(members - first) : nambu_pendulum_LANES;
-    double state[3];
+    double state[nambu_pendulum_DIM];
     size_t left = steps;
     memset(&group, 0, sizeof group);
     for (int lane = 0; lane < count; ++lane) {
-        for (size_t i = 0; i < 3; ++i) state[i] = x[i * members + first + (size_t)lane];
+        for (size_t i = 0; i < nambu_pendulum_DIM; ++i) state[i] = x[i * members + first + (size_t)lane];
         member[lane] = nambu_pendulum_group_join(&group, lane, params, state, h);
     }
-    for (int active = count; left > 0 && active > 2; --left) active = nambu_pendulum_group_step(&group, left);
+    for (int active = count; left > 0 && active >= nambu_pendulum_FEWEST; --left)
+        active = nambu_pendulum_group_step(&group, left);
     for (int lane = 0; lane < count; ++lane) {
-        if (group.active[lane]) group.left[lane] = left;
-        for (int i = 0; i < 3; ++i) state[i] = group.x[i][lane];
+        if (group.active[lane]) group.steps_left[lane] = left;
+        for (int i = 0; i < nambu_pendulum_DIM; ++i) state[i] = group.x[i][lane];
         if (member[lane] == nambu_pendulum_OK) {
-            if (group.left[lane] > 0) member[lane] = nambu_pendulum_group_finish(&group, lane, params, state, h);
-            for (size_t i = 0; i < 3; ++i) x[i * members + first + (size_t)lane] = state[i];
+            if (group.steps_left[lane] > 0)
+                member[lane] = nambu_pendulum_group_finish(&group, lane, params, state, h);
+            for (size_t i = 0; i < nambu_pendulum_DIM; ++i) x[i * members + first + (size_t)lane] = state[i];
         }
         if (status != NULL) status[first + (size_t)lane] = (unsigned char)member[lane];
         if (worst == nambu_pendulum_OK) worst = member[lane];
@@ -1959,8 +2255,9 @@ static nambu_pendulum_status nambu_pendulum_group_run(const nambu_pendulum_param
     return worst;
 }
 
+/* ---- Ensembles ---- */
 nambu_pendulum_status nambu_pendulum_ensemble(const nambu_pendulum_params *params, double *x, size_t members,
-                                              double h, size_t steps, unsigned char *status)
+    double h, size_t steps, unsigned char *status)
 {
     nambu_pendulum_status worst = isfinite(h) ? nambu_pendulum_OK : nambu_pendulum_BAD_ARGUMENT;
     const nambu_pendulum_params own = params != NULL ? *params : nambu_pendulum_default_params;
@@ -1969,8 +2266,9 @@ nambu_pendulum_status nambu_pendulum_ensemble(const nambu_pendulum_params *param
 #ifdef _OPENMP
 #pragma omp parallel for schedule(dynamic)
 #endif
-    for (size_t first = 0; first < members; first += nambu_pendulum_LANES) {
-        const nambu_pendulum_status group = nambu_pendulum_group_run(&own, x, members, first, h, steps, status);
+    for (size_t first = 0; first < members; first += nambu_pendulum_GROUP) {
+        const nambu_pendulum_status group = nambu_pendulum_group_run(&own, x, members, first, h, steps,
+            status);
         if (group == nambu_pendulum_OK) continue;
 #ifdef _OPENMP
 #pragma omp critical
@@ -1986,73 +2284,3 @@ nambu_pendulum_status nambu_pendulum_ensemble(const nambu_pendulum_params *param
 #if defined(__clang__)
 #pragma clang diagnostic pop
 #endif
-
-/* the Hamiltonian */
-static void nambu_pendulum_energy(const nambu_pendulum_params *params, const double x[3],
-                                  double energy[restrict 1])
-{
-    (void)params;
-    const double p = x[1];
-    const double V = x[2];
-    energy[0] = V + 0.5 * (p * p);
-}
-
-/* the Casimirs */
-static void nambu_pendulum_casimir_values(const nambu_pendulum_params *params, const double x[3],
-                                          double out[restrict 1])
-{
-    (void)params;
-    const double theta = x[0];
-    const double V = x[2];
-    out[0] = V + cos(theta);
-}
-
-/* pi(x) grad H(x) */
-static void nambu_pendulum_field(const nambu_pendulum_params *params, const double x[3],
-                                 double out[restrict 3])
-{
-    (void)params;
-    const double theta = x[0];
-    const double p = x[1];
-    const double t1 = sin(theta);
-    out[0] = p;
-    out[1] = -t1;
-    out[2] = p * t1;
-}
-
-double nambu_pendulum_hamiltonian(const nambu_pendulum_params *params, const double x[3])
-{
-    double energy[1];
-    nambu_pendulum_energy(params != NULL ? params : &nambu_pendulum_default_params, x, energy);
-    return energy[0];
-}
-
-void nambu_pendulum_casimirs(const nambu_pendulum_params *params, const double x[3], double out[])
-{
-    double value[1]; /* out may overlap x */
-    nambu_pendulum_casimir_values(params != NULL ? params : &nambu_pendulum_default_params, x, value);
-    for (int i = 0; i < 1; ++i) out[i] = value[i];
-}
-
-void nambu_pendulum_vector_field(const nambu_pendulum_params *params, const double x[3], double out[3])
-{
-    double value[3];
-    nambu_pendulum_field(params != NULL ? params : &nambu_pendulum_default_params, x, value);
-    memcpy(out, value, sizeof value);
-}
-
-const char *nambu_pendulum_status_string(nambu_pendulum_status status)
-{
-    switch (status) {
-    case nambu_pendulum_OK: return "ok";
-    case nambu_pendulum_NO_CONVERGENCE: return "no convergence: the step is too large";
-    case nambu_pendulum_SINGULAR: return "singular Newton matrix: the step is too large";
-    case nambu_pendulum_NOT_FINITE: return "not finite: overflow, or outside the domain";
-    case nambu_pendulum_BAD_ARGUMENT: return "bad argument: a null pointer, or values that are not allowed";
-    }
-    return "unknown status";
-}
-
-size_t nambu_pendulum_solver_size(void) { return sizeof(nambu_pendulum_solver); }
-
-size_t nambu_pendulum_solver_steps_done(const nambu_pendulum_solver *s) { return s->steps; }

@@ -6,17 +6,17 @@
 #   step: implicit, Newton iteration with the analytic matrix
 #   one Newton iteration: 21 additions, 29 multiplications, 2 functions
 #
-# spec: pendulum, sha256 c0378c57bf491100d6d09245ab1ff75a89adc0280b656f54517cabb646660482
+# spec: pendulum, sha256 ed81622cda36680120729d820e279a981f65dfdd206a130f06fa0ab7a405c963
 # to regenerate: phigen build pendulum
 # DO NOT EDIT: change the spec and regenerate; edits are noticed by the checksum below.
 #
 # SPDX-License-Identifier: 0BSD
 # This file belongs to whoever generated it; phigen claims no rights in it.
-# body-sha256: e5b1078f7313a4ae4baeb53e9f04d8be74bf51bd924ef6b8628aba650aa3b03f
+# body-sha256: 9641c43ef7ce74703cf19076bb86dd598bf825f5b645c32062d300a90b336d70
 import numpy as np
 
 VERSION = "0.1.0"
-SPEC_SHA256 = "c0378c57bf491100d6d09245ab1ff75a89adc0280b656f54517cabb646660482"
+SPEC_SHA256 = "ed81622cda36680120729d820e279a981f65dfdd206a130f06fa0ab7a405c963"
 DIM = 2
 ORDER = 6
 COORDINATES = ("q", "p",)

@@ -7,33 +7,33 @@
  *   step: explicit
  *   one step: 1 additions, 2 multiplications, 1 functions
  *
- * spec: pendulum_euler, sha256 980cd9a109f0a4d5c32137db8a3109a848b0e374d893a3c5600b123f3d9d0d03
+ * spec: pendulum_euler, sha256 8b9224d26c52b34d4e4bd936c41718dc0761cfe4b9e06bb0315047751d325409
  * to regenerate: phigen build pendulum_euler
  * DO NOT EDIT: change the spec and regenerate; edits are noticed by the checksum below.
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: b17d4896d661fd3c0a13b66599a61d5b8034e097062a24f11447bb721484451b
+ *
+ *   1. The model
+ *   2. Compensated sums, linear equations
+ *   3. The explicit step
+ *   4. The solver
+ *   5. Ensembles
+ * body-sha256: 77998303edb421c4961d144d197577d985a27404a4bf306f488e1c882da4130c
  */
 #include "pendulum_euler.h"
 
-#include <float.h>
-#include <limits.h>
 #include <math.h>
-#include <stdint.h>
 #include <string.h>
 
+/* ---- The model ---- */
 const pendulum_euler_params pendulum_euler_default_params = { 1.0 };
 
-/* A step of size h is the composition of these fractions of it. */
-static const double pendulum_euler_fractions[1] = { 1.0 };
-
-/* Functions to be kept apart: very long ones compile in quadratic time. */
-#if defined(__GNUC__)
-#define pendulum_euler_APART __attribute__((noinline))
-#else
-#define pendulum_euler_APART
-#endif
+/* Whether all parameters are finite, and positive where they have to be. */
+static int pendulum_euler_allowed(const pendulum_euler_params *params)
+{
+    return isfinite(params->g) && params->g > 0.0;
+}
 
 /* everything that depends on parameters and step size only */
 static void pendulum_euler_prepare(const pendulum_euler_params *params, double h, double coef[restrict 2])
@@ -42,13 +42,47 @@ static void pendulum_euler_prepare(const pendulum_euler_params *params, double h
     coef[1] = h;
 }
 
-/* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to its last
-   bit: were it rounded with the change, corrections of one sign would add up to a drift. 0, and x as before, if the
-   sum is not finite. */
-static int pendulum_euler_advance(pendulum_euler_solver *s, const double change[2], const double correction[2])
+/* the increment of one step from the state */
+static void pendulum_euler_explicit(const double coef[2], const double state[2], double increment[restrict 2])
 {
-    double x[2], carry[2];
-    for (int i = 0; i < 2; ++i) {
+    const double q = state[0], p = state[1];
+    const double t1 = coef[0] * sin(q);
+    increment[0] = coef[1] * (p - t1);
+    increment[1] = -t1;
+}
+
+/* the Hamiltonian */
+double pendulum_euler_hamiltonian(const pendulum_euler_params *params, const double x[2])
+{
+    if (params == NULL) params = &pendulum_euler_default_params;
+    const double g = params->g, q = x[0], p = x[1];
+    return 0.5 * (p * p) - g * cos(q);
+}
+
+/* the Casimirs */
+void pendulum_euler_casimirs(const pendulum_euler_params *params, const double x[2], double out[])
+{
+    (void)params, (void)x, (void)out;
+}
+
+/* pi(x) grad H(x) */
+void pendulum_euler_vector_field(const pendulum_euler_params *params, const double x[2], double out[2])
+{
+    if (params == NULL) params = &pendulum_euler_default_params;
+    const double g = params->g, q = x[0], p = x[1];
+    out[0] = p;
+    out[1] = -(g * sin(q));
+}
+
+/* ---- Compensated sums, linear equations ---- */
+/* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to
+   its last bit: were it rounded with the change, corrections of one sign would add up to a drift. 0, and x as
+   before, if the sum is not finite. */
+static int pendulum_euler_advance(pendulum_euler_solver *s, const double change[pendulum_euler_DIM],
+    const double correction[pendulum_euler_DIM])
+{
+    double x[pendulum_euler_DIM], carry[pendulum_euler_DIM];
+    for (int i = 0; i < pendulum_euler_DIM; ++i) {
         const double sum = s->x[i] + change[i], added = sum - s->x[i];
         const double lost = (s->x[i] - (sum - added)) + (change[i] - added);
         const double small = lost + (s->carry[i] + correction[i]);
@@ -61,63 +95,39 @@ static int pendulum_euler_advance(pendulum_euler_solver *s, const double change[
     return 1;
 }
 
-/* the increment of one step from the state */
-static void pendulum_euler_explicit(const double coef[2], const double state[2], double increment[restrict 2])
-{
-    const double q = state[0];
-    const double p = state[1];
-    const double t1 = coef[0] * sin(q);
-    increment[0] = coef[1] * (p - t1);
-    increment[1] = -t1;
-}
-
+/* ---- The explicit step ---- */
 /* One explicit stage: x + increment(x). */
-static pendulum_euler_status pendulum_euler_attempt(pendulum_euler_solver *s, int stage)
+static pendulum_euler_status pendulum_euler_stage(pendulum_euler_solver *s)
 {
-    const double none[2] = { 0.0 };
-    double increment[2];
-    pendulum_euler_explicit(s->coef[stage], s->x, increment);
+    const double none[pendulum_euler_DIM] = { 0.0 };
+    double increment[pendulum_euler_DIM];
+    pendulum_euler_explicit(s->coef, s->x, increment);
     ++s->evaluations;
     return pendulum_euler_advance(s, increment, none) ? pendulum_euler_OK : pendulum_euler_NOT_FINITE;
 }
 
-/* The 1 stages of one step. If one fails, the state is as before the step. */
-static pendulum_euler_status pendulum_euler_stages(pendulum_euler_solver *s)
-{
-    double x[2], carry[2];
-    memcpy(x, s->x, sizeof x);
-    memcpy(carry, s->carry, sizeof carry);
-    for (int stage = 0; stage < 1; ++stage) {
-        pendulum_euler_status status = pendulum_euler_attempt(s, stage);
-        if (status != pendulum_euler_OK) {
-            memcpy(s->x, x, sizeof x);
-            memcpy(s->carry, carry, sizeof carry);
-            return status;
-        }
-    }
-    return pendulum_euler_OK;
-}
-
-/* Whether steps can be made with these parameters: finite, positive where the spec says so, and with finite
-   coefficients for a step so short that it has no part in it. */
+/* ---- The solver ---- */
+/* Whether steps can be made with these parameters: allowed, and with finite coefficients for a step so short
+   that it has no part in it. */
 static int pendulum_euler_admissible(const pendulum_euler_params *params)
 {
-    double coef[2];
-    if (!(isfinite(params->g) && params->g > 0.0)) return 0;
+    double coef[pendulum_euler_COEFFICIENTS];
+    if (!pendulum_euler_allowed(params)) return 0;
     pendulum_euler_prepare(params, 1e-100, coef);
-    for (int k = 0; k < 2; ++k)
+    for (int k = 0; k < pendulum_euler_COEFFICIENTS; ++k)
         if (!isfinite(coef[k])) return 0;
     return 1;
 }
 
-/* All of pendulum_euler_init but the gauge. The arguments may be parts of *s: they are read before it is written. */
-static pendulum_euler_status pendulum_euler_start(pendulum_euler_solver *s, const pendulum_euler_params *params, const double x0[2])
+/* The arguments may be parts of *s: they are read before it is written. */
+pendulum_euler_status pendulum_euler_init(pendulum_euler_solver *s, const pendulum_euler_params *params,
+    const double x0[pendulum_euler_DIM])
 {
     if (s == NULL || x0 == NULL) return pendulum_euler_BAD_ARGUMENT;
     const pendulum_euler_params own = params != NULL ? *params : pendulum_euler_default_params;
-    double x[2];
+    double x[pendulum_euler_DIM];
     memcpy(x, x0, sizeof x);
-    for (int i = 0; i < 2; ++i)
+    for (int i = 0; i < pendulum_euler_DIM; ++i)
         if (!isfinite(x[i])) return pendulum_euler_BAD_ARGUMENT;
     if (!pendulum_euler_admissible(&own)) return pendulum_euler_BAD_ARGUMENT;
     memset(s, 0, sizeof *s);
@@ -126,21 +136,16 @@ static pendulum_euler_status pendulum_euler_start(pendulum_euler_solver *s, cons
     return pendulum_euler_OK;
 }
 
-pendulum_euler_status pendulum_euler_init(pendulum_euler_solver *s, const pendulum_euler_params *params,
-                                          const double x0[2])
-{
-    return pendulum_euler_start(s, params, x0);
-}
-
 /* What depends on the step size; nothing where that is as before. */
 static pendulum_euler_status pendulum_euler_set_step(pendulum_euler_solver *s, double h)
 {
     if (s == NULL || !isfinite(h)) return pendulum_euler_BAD_ARGUMENT;
-    if (s->ready && memcmp(&h, &s->h, sizeof h) == 0) return pendulum_euler_OK;
-    for (int stage = 0; stage < 1; ++stage)
-        pendulum_euler_prepare(&s->params, pendulum_euler_fractions[stage] * h, s->coef[stage]);
+    if (s->prepared && memcmp(&h, &s->h, sizeof h) == 0) return pendulum_euler_OK;
+    pendulum_euler_prepare(&s->params, h, s->coef);
     s->h = h;
-    s->ready = 1;
+    s->t_before_h = s->t;
+    s->steps_before_h = s->steps;
+    s->prepared = 1;
     return pendulum_euler_OK;
 }
 
@@ -148,303 +153,54 @@ pendulum_euler_status pendulum_euler_step(pendulum_euler_solver *s, double h)
 {
     pendulum_euler_status status = pendulum_euler_set_step(s, h);
     if (status != pendulum_euler_OK) return status;
-    status = pendulum_euler_stages(s);
-    if (status == pendulum_euler_OK) ++s->steps;
+    status = pendulum_euler_stage(s);
+    if (status != pendulum_euler_OK) return status;
+    ++s->steps;
+    s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
     return status;
 }
 
 pendulum_euler_status pendulum_euler_integrate(pendulum_euler_solver *s, double h, size_t steps)
 {
     pendulum_euler_status status = pendulum_euler_set_step(s, h);
-    for (size_t k = 0; k < steps && status == pendulum_euler_OK; ++k) status = pendulum_euler_step(s, h);
+    for (; steps > 0 && status == pendulum_euler_OK; --steps) status = pendulum_euler_step(s, h);
     return status;
-}
-
-/*
- * Eight at a time: below, the formulas of a step are evaluated for 8 steps of a trajectory, or members of an
- * ensemble, at once. Compilers make vector instructions of the loops over lanes.
- */
-enum { pendulum_euler_LANES = 8 };
-
-#if defined(__GNUC__)
-typedef double pendulum_euler_lanes[pendulum_euler_LANES] __attribute__((aligned(64))); /* a value in each lane */
-#else
-typedef double pendulum_euler_lanes[pendulum_euler_LANES];
-#endif
-
-#if defined(__clang__)
-#define pendulum_euler_EACH_LANE _Pragma("clang loop vectorize(assume_safety) unroll(disable)")
-#pragma clang diagnostic push
-#pragma clang diagnostic ignored "-Wpass-failed"
-#elif defined(__GNUC__)
-#define pendulum_euler_EACH_LANE _Pragma("GCC ivdep") _Pragma("GCC unroll 1")
-#else
-#define pendulum_euler_EACH_LANE
-#endif
-
-/* sin u for the loops over lanes: u = k pi + r with |r| <= pi/2, no branches. No number beyond |u| = 1000000.0. */
-static inline double pendulum_euler_sin_lane(double u)
-{
-    const double shifted = (u * 0.3183098861837907 + 0.0) + 6755399441055744.0;
-    const double k = (shifted - 6755399441055744.0) - 0.0;
-    const double r = ((u - k * 3.141592651605606) - k * 1.9841871479187034e-09) - k * 1.1442377452219664e-17, q = r * r, qq = q * q;
-    uint64_t parity, bits; /* the last bit of shifted is the parity of k + 0.0 */
-    double value, sum = -3.868170170630684e-23, other = 1.9572941063391263e-20;
-    sum = sum * qq + -8.22063524662433e-18;
-    other = other * qq + 2.8114572543455206e-15;
-    sum = sum * qq + -7.647163731819816e-13;
-    other = other * qq + 1.6059043836821613e-10;
-    sum = sum * qq + -2.505210838544172e-08;
-    other = other * qq + 2.7557319223985893e-06;
-    sum = sum * qq + -0.0001984126984126984;
-    other = other * qq + 0.008333333333333333;
-    sum = (sum * q + other) * q + -0.16666666666666666;
-    value = r + r * q * sum;
-    memcpy(&parity, &shifted, sizeof parity);
-    memcpy(&bits, &value, sizeof bits);
-    bits ^= parity << 63;
-    memcpy(&value, &bits, sizeof bits);
-    return value + (fabs(u) <= 1000000.0 ? 0.0 : (double)NAN);
-}
-
-/* Members of an ensemble, one in each lane. */
-typedef struct {
-    pendulum_euler_lanes x[2], carry[2];
-} pendulum_euler_pack;
-
-enum {
-    pendulum_euler_PACKS = 4, /* in a group: while one waits for a result, the others are worked at */
-    pendulum_euler_GROUP = pendulum_euler_PACKS * pendulum_euler_LANES,
-    pendulum_euler_STRETCH = 32 /* steps before the members are looked at: what is not finite stays so */
-};
-
-/* pendulum_euler_explicit in all lanes. */
-static void pendulum_euler_explicit_lanes(const double coef[2], pendulum_euler_lanes state[restrict 2],
-                                          pendulum_euler_lanes increment[restrict 2])
-{
-    pendulum_euler_EACH_LANE
-    for (int lane = 0; lane < pendulum_euler_LANES; ++lane) {
-        const double q = state[0][lane];
-        const double p = state[1][lane];
-        const double t1 = coef[0] * pendulum_euler_sin_lane(q);
-        increment[0][lane] = coef[1] * (p - t1);
-        increment[1][lane] = -t1;
-    }
-}
-
-/* pendulum_euler_attempt for the members of a pack; the sums are those of pendulum_euler_advance. */
-static inline void pendulum_euler_attempt_lanes(const double *coef, pendulum_euler_pack *pack)
-{
-    pendulum_euler_lanes increment[2];
-    pendulum_euler_explicit_lanes(coef, pack->x, increment);
-    for (int i = 0; i < 2; ++i) {
-        double *x = pack->x[i], *carry = pack->carry[i];
-        pendulum_euler_EACH_LANE
-        for (int lane = 0; lane < pendulum_euler_LANES; ++lane) {
-            const double change = increment[i][lane], sum = x[lane] + change, added = sum - x[lane];
-            const double small = ((x[lane] - (sum - added)) + (change - added)) + carry[lane];
-            x[lane] = sum + small;
-            carry[lane] = small - (x[lane] - sum);
-        }
-    }
-}
-
-/* Steps of some packs: as in pendulum_euler_stages, each stage for all of them. */
-static void pendulum_euler_steps_lanes(const pendulum_euler_solver *s, pendulum_euler_pack *pack, int packs, int steps)
-{
-    for (int step = 0; step < steps; ++step)
-        for (int stage = 0; stage < 1; ++stage)
-            for (int k = 0; k < packs; ++k) pendulum_euler_attempt_lanes(s->coef[stage], &pack[k]);
-}
-
-/* Members of an ensemble, in packs. */
-typedef struct {
-    pendulum_euler_solver s; /* parameters and coefficients, the same for all */
-    pendulum_euler_pack pack[pendulum_euler_PACKS];
-    int packs; /* in use */
-    int active[pendulum_euler_GROUP];  /* whether there is such a member, and it has not left */
-    size_t left[pendulum_euler_GROUP]; /* steps that it has still to make */
-} pendulum_euler_group;
-
-/* How many active members have values that are not finite, and which. */
-static int pendulum_euler_group_lost(const pendulum_euler_group *group, int lost[pendulum_euler_GROUP])
-{
-    int count = 0;
-    for (int m = 0; m < pendulum_euler_GROUP; ++m) {
-        int finite = 1;
-        for (int i = 0; i < 2; ++i)
-            finite = finite && isfinite(group->pack[m / pendulum_euler_LANES].x[i][m % pendulum_euler_LANES]);
-        lost[m] = group->active[m] && !finite;
-        count += lost[m];
-    }
-    return count;
-}
-
-static void pendulum_euler_pack_copy(pendulum_euler_pack *to, const pendulum_euler_pack *from, int lane)
-{
-    for (int i = 0; i < 2; ++i) {
-        to->x[i][lane] = from->x[i][lane];
-        to->carry[i][lane] = from->carry[i][lane];
-    }
-}
-
-/* Some steps of all members. One whose values are not finite then leaves, with its state before them. How many remain. */
-static int pendulum_euler_group_steps(pendulum_euler_group *group, int steps)
-{
-    pendulum_euler_pack before[pendulum_euler_PACKS];
-    int lost[pendulum_euler_GROUP], active = 0;
-    memcpy(before, group->pack, sizeof before);
-    pendulum_euler_steps_lanes(&group->s, group->pack, group->packs, steps);
-    pendulum_euler_group_lost(group, lost);
-    for (int m = 0; m < pendulum_euler_GROUP; ++m) {
-        const int pack = m / pendulum_euler_LANES;
-        group->active[m] = group->active[m] && !lost[m];
-        if (group->active[m]) group->left[m] -= (size_t)steps;
-        else pendulum_euler_pack_copy(&group->pack[pack], &before[pack], m % pendulum_euler_LANES);
-        active += group->active[m];
-    }
-    return active;
-}
-
-/* The end of a member: if it left the group, by its remaining steps, one by one. */
-static pendulum_euler_status pendulum_euler_group_end(const pendulum_euler_group *group, int m, double h, double x[2])
-{
-    const pendulum_euler_pack *pack = &group->pack[m / pendulum_euler_LANES];
-    pendulum_euler_solver s = group->s;
-    for (int i = 0; i < 2; ++i) {
-        s.x[i] = pack->x[i][m % pendulum_euler_LANES];
-        s.carry[i] = pack->carry[i][m % pendulum_euler_LANES];
-    }
-    const pendulum_euler_status status = pendulum_euler_integrate(&s, h, group->left[m]);
-    memcpy(x, s.x, sizeof s.x);
-    return status;
-}
-
-/* The members from first on, as many as a group holds. The first status that is not OK. */
-pendulum_euler_APART static pendulum_euler_status pendulum_euler_group_run(
-    const pendulum_euler_params *params, double *x, size_t members, size_t first, double h, size_t steps,
-    unsigned char *status)
-{
-    pendulum_euler_group group;
-    pendulum_euler_status worst = pendulum_euler_OK, member[pendulum_euler_GROUP];
-    const int count = members - first < pendulum_euler_GROUP ? (int)(members - first) : pendulum_euler_GROUP;
-    double state[2];
-    memset(&group, 0, sizeof group);
-    group.packs = (count + pendulum_euler_LANES - 1) / pendulum_euler_LANES;
-    for (int m = 0; m < count; ++m) {
-        for (size_t i = 0; i < 2; ++i) state[i] = x[i * members + first + (size_t)m];
-        for (int i = 0; i < 2; ++i) group.pack[m / pendulum_euler_LANES].x[i][m % pendulum_euler_LANES] = state[i];
-        member[m] = pendulum_euler_init(&group.s, params, state);
-        group.active[m] = member[m] == pendulum_euler_OK;
-        group.left[m] = steps;
-    }
-    int active = pendulum_euler_set_step(&group.s, h) == pendulum_euler_OK;
-    if (count == 1) active = 0; /* one alone is quicker without lanes */
-    for (size_t left = steps; left > 0 && active > 0;) {
-        const int stretch = left < pendulum_euler_STRETCH ? (int)left : pendulum_euler_STRETCH;
-        active = pendulum_euler_group_steps(&group, stretch);
-        left -= (size_t)stretch;
-    }
-    for (int m = 0; m < count; ++m) {
-        if (member[m] == pendulum_euler_OK) {
-            member[m] = pendulum_euler_group_end(&group, m, h, state);
-            for (size_t i = 0; i < 2; ++i) x[i * members + first + (size_t)m] = state[i];
-        }
-        if (status != NULL) status[first + (size_t)m] = (unsigned char)member[m];
-        if (worst == pendulum_euler_OK) worst = member[m];
-    }
-    return worst;
-}
-
-pendulum_euler_status pendulum_euler_ensemble(const pendulum_euler_params *params, double *x, size_t members,
-                                              double h, size_t steps, unsigned char *status)
-{
-    pendulum_euler_status worst = isfinite(h) ? pendulum_euler_OK : pendulum_euler_BAD_ARGUMENT;
-    const pendulum_euler_params own = params != NULL ? *params : pendulum_euler_default_params;
-    size_t earliest = members;
-    if (x == NULL && members > 0) return pendulum_euler_BAD_ARGUMENT;
-#ifdef _OPENMP
-#pragma omp parallel for schedule(dynamic)
-#endif
-    for (size_t first = 0; first < members; first += pendulum_euler_GROUP) {
-        const pendulum_euler_status group = pendulum_euler_group_run(&own, x, members, first, h, steps, status);
-        if (group == pendulum_euler_OK) continue;
-#ifdef _OPENMP
-#pragma omp critical
-#endif
-        if (first < earliest) {
-            earliest = first;
-            worst = group;
-        }
-    }
-    return worst;
-}
-
-#if defined(__clang__)
-#pragma clang diagnostic pop
-#endif
-
-/* the Hamiltonian */
-static void pendulum_euler_energy(const pendulum_euler_params *params, const double x[2],
-                                  double energy[restrict 1])
-{
-    const double q = x[0];
-    const double p = x[1];
-    energy[0] = 0.5 * (p * p) - params->g * cos(q);
-}
-
-/* the Casimirs */
-static void pendulum_euler_casimir_values(const pendulum_euler_params *params, const double x[2],
-                                          double out[restrict 1])
-{
-    (void)params;
-    (void)x;
-    (void)out;
-}
-
-/* pi(x) grad H(x) */
-static void pendulum_euler_field(const pendulum_euler_params *params, const double x[2],
-                                 double out[restrict 2])
-{
-    const double q = x[0];
-    const double p = x[1];
-    out[0] = p;
-    out[1] = -(params->g * sin(q));
-}
-
-double pendulum_euler_hamiltonian(const pendulum_euler_params *params, const double x[2])
-{
-    double energy[1];
-    pendulum_euler_energy(params != NULL ? params : &pendulum_euler_default_params, x, energy);
-    return energy[0];
-}
-
-void pendulum_euler_casimirs(const pendulum_euler_params *params, const double x[2], double out[])
-{
-    double value[1]; /* out may overlap x */
-    pendulum_euler_casimir_values(params != NULL ? params : &pendulum_euler_default_params, x, value);
-    for (int i = 0; i < 0; ++i) out[i] = value[i];
-}
-
-void pendulum_euler_vector_field(const pendulum_euler_params *params, const double x[2], double out[2])
-{
-    double value[2];
-    pendulum_euler_field(params != NULL ? params : &pendulum_euler_default_params, x, value);
-    memcpy(out, value, sizeof value);
 }
 
 const char *pendulum_euler_status_string(pendulum_euler_status status)
 {
-    switch (status) {
-    case pendulum_euler_OK: return "ok";
-    case pendulum_euler_NO_CONVERGENCE: return "no convergence: the step is too large";
-    case pendulum_euler_SINGULAR: return "singular Newton matrix: the step is too large";
-    case pendulum_euler_NOT_FINITE: return "not finite: overflow, or outside the domain";
-    case pendulum_euler_BAD_ARGUMENT: return "bad argument: a null pointer, or values that are not allowed";
-    }
-    return "unknown status";
+    static const char *const text[] = {
+        "ok",
+        "no convergence: the step is too large",
+        "singular Newton matrix: the step is too large",
+        "not finite: overflow, or outside the domain",
+        "bad argument: a null pointer, or values that are not allowed"
+    };
+    return (unsigned)status <= pendulum_euler_BAD_ARGUMENT ? text[status] : "unknown status";
 }
 
 size_t pendulum_euler_solver_size(void) { return sizeof(pendulum_euler_solver); }
 
 size_t pendulum_euler_solver_steps_done(const pendulum_euler_solver *s) { return s->steps; }
+
+/* ---- Ensembles ---- */
+pendulum_euler_status pendulum_euler_ensemble(const pendulum_euler_params *params, double *x, size_t members,
+    double h, size_t steps, unsigned char *status)
+{
+    pendulum_euler_status worst = isfinite(h) ? pendulum_euler_OK : pendulum_euler_BAD_ARGUMENT;
+    const pendulum_euler_params own = params != NULL ? *params : pendulum_euler_default_params;
+    if (x == NULL && members > 0) return pendulum_euler_BAD_ARGUMENT;
+    for (size_t m = 0; m < members; ++m) {
+        pendulum_euler_solver s;
+        double x0[pendulum_euler_DIM];
+        for (size_t i = 0; i < pendulum_euler_DIM; ++i) x0[i] = x[i * members + m];
+        pendulum_euler_status member = pendulum_euler_init(&s, &own, x0);
+        if (member == pendulum_euler_OK) {
+            member = pendulum_euler_integrate(&s, h, steps);
+            for (size_t i = 0; i < pendulum_euler_DIM; ++i) x[i * members + m] = s.x[i];
+        }
+        if (status != NULL) status[m] = (unsigned char)member;
+        if (worst == pendulum_euler_OK) worst = member;
+    }
+    return worst;
+}

@@ -6,17 +6,17 @@
 #   step: explicit
 #   one step: 1 additions, 2 multiplications, 1 functions
 #
-# spec: pendulum_euler, sha256 980cd9a109f0a4d5c32137db8a3109a848b0e374d893a3c5600b123f3d9d0d03
+# spec: pendulum_euler, sha256 8b9224d26c52b34d4e4bd936c41718dc0761cfe4b9e06bb0315047751d325409
 # to regenerate: phigen build pendulum_euler
 # DO NOT EDIT: change the spec and regenerate; edits are noticed by the checksum below.
 #
 # SPDX-License-Identifier: 0BSD
 # This file belongs to whoever generated it; phigen claims no rights in it.
-# body-sha256: 14807eeced03b7a78173c7ee28d3bc943c8ff8b1b8f060a720e106b204d4779e
+# body-sha256: 11d179c68b90ee4433b5ecbed96f921961fb15582a3c9da1ba75195bc563ff38
 import numpy as np
 
 VERSION = "0.1.0"
-SPEC_SHA256 = "980cd9a109f0a4d5c32137db8a3109a848b0e374d893a3c5600b123f3d9d0d03"
+SPEC_SHA256 = "8b9224d26c52b34d4e4bd936c41718dc0761cfe4b9e06bb0315047751d325409"
 DIM = 2
 ORDER = 1
 COORDINATES = ("q", "p",)

@@ -7,30 +7,38 @@
  *   step: implicit, Newton iteration with the analytic matrix
  *   one Newton iteration: 191 additions, 291 multiplications, 4 functions
  *
- * spec: poisson_not_hamiltonian, sha256 3e9bff5b9c04c9b131661df50cd92ec15be998797c3620a96085fb54ee678034
+ * spec: poisson_not_hamiltonian, sha256 91f506e06f622dbaf4083fe4274a994509dabe6e59da3a17c4a06cd9bcaa9603
  * to regenerate: phigen build poisson_not_hamiltonian
  * DO NOT EDIT: change the spec and regenerate; edits are noticed by the checksum below.
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 85e4ee3402345b59751c9312142cfde73df46a90a3eda68239b6a36b266cc186
+ *
+ *   1. The model
+ *   2. Compensated sums, linear equations
+ *   3. Starting guesses
+ *   4. The implicit step, by Newton's method
+ *   5. The solver
+ *   6. Ensembles
+ * body-sha256: 5a495e2a8433a143bb7ad337c6d2f490603918f6bb1767cbc9b03429b61f2b8c
  */
 #include "poisson_not_hamiltonian.h"
 
 #include <float.h>
-#include <limits.h>
 #include <math.h>
-#include <stdint.h>
 #include <string.h>
 
+/* ---- The model ---- */
 const poisson_not_hamiltonian_params poisson_not_hamiltonian_default_params = { 0 };
 
-/* A step of size h is the composition of these fractions of it. */
-static const double poisson_not_hamiltonian_fractions[1] = { 1.0 };
+enum { poisson_not_hamiltonian_MAX_ITERATIONS = 20 }; /* of an inner solve */
+
+/* A correction is accepted when the error that it leaves is estimated to be below this. */
+#define poisson_not_hamiltonian_TOLERANCE 1e-20
 
 /* everything that depends on parameters and step size only */
 static void poisson_not_hamiltonian_prepare(const poisson_not_hamiltonian_params *params, double h,
-                                            double coef[restrict 2])
+    double coef[restrict 2])
 {
     (void)params;
     coef[0] = 0.5 * h;
@@ -40,141 +48,62 @@ static void poisson_not_hamiltonian_prepare(const poisson_not_hamiltonian_params
 /* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
    increment, all with the momenta p = grad S_h(y) */
 static void poisson_not_hamiltonian_linearise(const double coef[2], const double y[3],
-                                              double displacement[restrict 3], double increment[restrict 3],
-                                              double jacobian[restrict 9],
-                                              double increment_jacobian[restrict 9])
+    double displacement[restrict 3], double increment[restrict 3], double jacobian[restrict 9],
+    double increment_jacobian[restrict 9])
 {
-    const double x = y[0];
-    const double y_ = y[1];
-    const double z = y[2];
-    const double t1 = y_ - z;
+    const double x = y[0], y_ = y[1], z = y[2];
+    /* momenta */
     const double p_z = coef[1] * y_ + coef[0] * z;
     const double p_y = coef[1] * z + coef[0] * y_;
     const double p_x = coef[0] * x;
-    const double t2 = p_z + (p_y + 2.0 * p_x);
-    const double t3 = t1 * t2;
-    const double t4 = p_y - p_z;
-    const double t5 = x * t4;
-    const double t6 = exp(0.25 * (t3 - t5));
-    const double t7 = 0.25 * (t1 * t4 + x * t2);
-    const double t8 = cos(t7);
-    const double t9 = x * t8;
-    const double t10 = sin(t7);
-    const double t11 = t1 * t10;
-    const double t12 = t9 - t11;
-    const double t13 = t6 * t12;
-    const double t14 = 0.5 * (y_ + z - x);
-    const double t15 = x + t1;
-    const double t16 = t15 * t8;
-    const double t17 = x - t1;
-    const double t18 = t17 * t10;
-    const double t19 = t16 + t18;
-    const double t20 = t14 + 0.5 * (t6 * t19);
-    const double t21 = t17 * t8;
-    const double t22 = t15 * t10;
-    const double t23 = t21 - t22;
-    const double t24 = t14 + 0.5 * (t6 * t23);
-    const double t25 = exp(0.25 * (t5 - t3));
-    const double t26 = t9 + t11;
-    const double t27 = t16 - t18;
-    const double t28 = t21 + t22;
-    const double t29 = t1 * t6;
-    const double t30 = x * t10;
-    const double t31 = x * t30;
-    const double t32 = 0.5 * (t1 * t9);
-    const double t33 = 0.5 * (t29 * t12) + t6 * ((-0.5) * t31 - t32);
-    const double t34 = p_z - p_y;
-    const double t35 = t34 * t6;
-    const double t36 = t2 * t10;
-    const double t37 = t8 - 0.25 * (x * t36);
-    const double t38 = t2 * t8;
-    const double t39 = 0.25 * (t1 * t38);
-    const double t40 = 0.25 * (t35 * t12) + t6 * (t37 - t39);
-    const double t41 = t2 * t6;
-    const double t42 = 0.25 * (t41 * t12);
-    const double t43 = t4 * t10;
-    const double t44 = x * t43;
-    const double t45 = t4 * t8;
-    const double t46 = t10 + 0.25 * (t1 * t45);
-    const double t47 = t42 + t6 * ((-0.25) * t44 - t46);
-    const double t48 = (t1 - x) * t6;
-    const double t49 = x * t22;
-    const double t50 = 0.25 * (t1 * t16);
-    const double t51 = 0.25 * (t48 * t12) + t6 * ((-0.25) * t49 - t50);
-    const double t52 = t15 * t6;
-    const double t53 = z - y_;
-    const double t54 = x + t53;
-    const double t55 = t54 * t10;
-    const double t56 = x * t55;
-    const double t57 = t54 * t8;
-    const double t58 = 0.25 * (t1 * t57);
-    const double t59 = 0.25 * (t52 * t12) + t6 * ((-0.25) * t56 - t58);
-    const double t60 = t34 * t8;
-    const double t61 = 0.25 * (t1 * t60);
-    const double t62 = t34 * t10;
-    const double t63 = 0.25 * (x * t62);
-    const double t64 = t6 * (t10 - t61 - t63);
-    const double t65 = 0.5 * (t17 * t9);
-    const double t66 = t15 * t30;
-    const double t67 = 0.5 * (t29 * t19) + t6 * (t65 - 0.5 * t66);
-    const double t68 = t8 - 0.25 * (t15 * t36);
-    const double t69 = t10 + 0.25 * (t17 * t38);
-    const double t70 = -0.5 + 0.5 * (0.25 * (t35 * t19) + t6 * (t68 + t69));
-    const double t71 = 0.25 * (t17 * t16);
-    const double t72 = t15 * t22;
-    const double t73 = 0.25 * (t48 * t19) + t6 * (t71 - 0.25 * t72);
-    const double t74 = 0.25 * (t17 * t57);
-    const double t75 = t15 * t55;
-    const double t76 = 0.25 * (t52 * t19) + t6 * (t74 - 0.25 * t75);
-    const double t77 = 0.25 * (t41 * t19);
-    const double t78 = t8 - 0.25 * (t15 * t43);
-    const double t79 = 0.25 * (t17 * t45);
-    const double t80 = 0.5 + 0.5 * (t77 + t6 * (t78 + (t79 - t10)));
-    const double t81 = (-0.25) * (t15 * t62) - t8;
-    const double t82 = t10 + 0.25 * (t17 * t60);
-    const double t83 = 0.5 + 0.5 * (t6 * (t81 + t82) - t77);
-    const double t84 = t17 * t30;
-    const double t85 = 0.5 * (t15 * t9);
-    const double t86 = 0.5 * (t29 * t23) + t6 * ((-0.5) * t84 - t85);
-    const double t87 = t8 - 0.25 * (t17 * t36);
-    const double t88 = t10 + 0.25 * (t15 * t38);
-    const double t89 = -0.5 + 0.5 * (0.25 * (t35 * t23) + t6 * (t87 - t88));
-    const double t90 = 0.25 * (t41 * t23);
-    const double t91 = (-0.25) * (t17 * t43) - t8;
-    const double t92 = t10 + 0.25 * (t15 * t45);
-    const double t93 = 0.5 + 0.5 * (t90 + t6 * (t91 - t92));
-    const double t94 = t17 * t22;
-    const double t95 = 0.25 * (t15 * t16);
-    const double t96 = 0.25 * (t48 * t23) + t6 * ((-0.25) * t94 - t95);
-    const double t97 = t17 * t55;
-    const double t98 = 0.25 * (t15 * t57);
-    const double t99 = 0.25 * (t52 * t23) + t6 * ((-0.25) * t97 - t98);
-    const double t100 = t8 - 0.25 * (t17 * t62);
-    const double t101 = 0.25 * (t15 * t60);
-    const double t102 = 0.5 + 0.5 * (t6 * (t100 + (t10 - t101)) - t90);
-    const double t103 = t1 * t25;
-    const double t104 = t4 * t25;
-    const double t105 = coef[0] * (t25 * (t32 - 0.5 * t31) - 0.5 * (t103 * t26) - t33) + (0.25 * (t104 * t26) + t25 * (t39 + t37) - t40);
-    const double t106 = t2 * t25;
-    const double t107 = 0.25 * (t106 * t26);
-    const double t108 = (t53 - x) * t25;
-    const double t109 = 0.25 * (t108 * t26) + t25 * (t58 - 0.25 * t56) - t59;
-    const double t110 = t54 * t25;
-    const double t111 = 0.25 * (t110 * t26) + t25 * (t50 - 0.25 * t49) - t51;
-    const double t112 = coef[0] * (0.5 * (t25 * ((-0.5) * t66 - t65) - 0.5 * (t103 * t27)) - 0.5 * t67) + (-0.5 + 0.5 * (0.25 * (t104 * t27) + t25 * (t68 - t69)) - t70);
-    const double t113 = 0.5 * (0.25 * (t108 * t27) + t25 * ((-0.25) * t75 - t74)) - 0.5 * t76;
-    const double t114 = 0.5 * (0.25 * (t110 * t27) + t25 * ((-0.25) * t72 - t71)) - 0.5 * t73;
-    const double t115 = 0.25 * (t106 * t27);
-    const double t116 = coef[0] * (0.5 * (t25 * (t85 - 0.5 * t84) - 0.5 * (t103 * t28)) - 0.5 * t86) + (-0.5 + 0.5 * (0.25 * (t104 * t28) + t25 * (t87 + t88)) - t89);
-    const double t117 = 0.5 * (0.25 * (t110 * t28) + t25 * (t95 - 0.25 * t94)) - 0.5 * t96;
-    const double t118 = 0.5 * (0.25 * (t108 * t28) + t25 * (t98 - 0.25 * t97)) - 0.5 * t99;
-    const double t119 = 0.25 * (t106 * t28);
+    /* displacement */
+    const double t1 = y_ - z, t2 = p_z + (p_y + 2.0 * p_x), t3 = t1 * t2, t4 = p_y - p_z;
+    const double t5 = x * t4, t6 = exp(0.25 * (t3 - t5)), t7 = 0.25 * (t1 * t4 + x * t2);
+    const double t8 = cos(t7), t9 = x * t8, t10 = sin(t7), t11 = t1 * t10, t12 = t9 - t11;
+    const double t13 = t6 * t12, t14 = 0.5 * (y_ + z - x), t15 = x + t1, t16 = t15 * t8;
+    const double t17 = x - t1, t18 = t17 * t10, t19 = t16 + t18, t20 = t14 + 0.5 * (t6 * t19);
+    const double t21 = t17 * t8, t22 = t15 * t10, t23 = t21 - t22, t24 = t14 + 0.5 * (t6 * t23);
     displacement[0] = t13 - x;
     displacement[1] = t20 - y_;
     displacement[2] = t24 - z;
+    /* increment */
+    const double t25 = exp(0.25 * (t5 - t3)), t26 = t9 + t11, t27 = t16 - t18, t28 = t21 + t22;
     increment[0] = t25 * t26 - t13;
     increment[1] = t14 + 0.5 * (t25 * t27) - t20;
     increment[2] = t14 + 0.5 * (t25 * t28) - t24;
+    /* jacobian */
+    const double t29 = t1 * t6, t30 = x * t10, t31 = x * t30, t32 = 0.5 * (t1 * t9);
+    const double t33 = 0.5 * (t29 * t12) + t6 * ((-0.5) * t31 - t32), t34 = p_z - p_y;
+    const double t35 = t34 * t6, t36 = t2 * t10, t37 = t8 - 0.25 * (x * t36), t38 = t2 * t8;
+    const double t39 = 0.25 * (t1 * t38), t40 = 0.25 * (t35 * t12) + t6 * (t37 - t39), t41 = t2 * t6;
+    const double t42 = 0.25 * (t41 * t12), t43 = t4 * t10, t44 = x * t43, t45 = t4 * t8;
+    const double t46 = t10 + 0.25 * (t1 * t45), t47 = t42 + t6 * ((-0.25) * t44 - t46);
+    const double t48 = (t1 - x) * t6, t49 = x * t22, t50 = 0.25 * (t1 * t16);
+    const double t51 = 0.25 * (t48 * t12) + t6 * ((-0.25) * t49 - t50), t52 = t15 * t6, t53 = z - y_;
+    const double t54 = x + t53, t55 = t54 * t10, t56 = x * t55, t57 = t54 * t8;
+    const double t58 = 0.25 * (t1 * t57), t59 = 0.25 * (t52 * t12) + t6 * ((-0.25) * t56 - t58);
+    const double t60 = t34 * t8, t61 = 0.25 * (t1 * t60), t62 = t34 * t10, t63 = 0.25 * (x * t62);
+    const double t64 = t6 * (t10 - t61 - t63), t65 = 0.5 * (t17 * t9), t66 = t15 * t30;
+    const double t67 = 0.5 * (t29 * t19) + t6 * (t65 - 0.5 * t66), t68 = t8 - 0.25 * (t15 * t36);
+    const double t69 = t10 + 0.25 * (t17 * t38);
+    const double t70 = -0.5 + 0.5 * (0.25 * (t35 * t19) + t6 * (t68 + t69));
+    const double t71 = 0.25 * (t17 * t16), t72 = t15 * t22;
+    const double t73 = 0.25 * (t48 * t19) + t6 * (t71 - 0.25 * t72), t74 = 0.25 * (t17 * t57);
+    const double t75 = t15 * t55, t76 = 0.25 * (t52 * t19) + t6 * (t74 - 0.25 * t75);
+    const double t77 = 0.25 * (t41 * t19), t78 = t8 - 0.25 * (t15 * t43), t79 = 0.25 * (t17 * t45);
+    const double t80 = 0.5 + 0.5 * (t77 + t6 * (t78 + (t79 - t10)));
+    const double t81 = (-0.25) * (t15 * t62) - t8, t82 = t10 + 0.25 * (t17 * t60);
+    const double t83 = 0.5 + 0.5 * (t6 * (t81 + t82) - t77), t84 = t17 * t30, t85 = 0.5 * (t15 * t9);
+    const double t86 = 0.5 * (t29 * t23) + t6 * ((-0.5) * t84 - t85), t87 = t8 - 0.25 * (t17 * t36);
+    const double t88 = t10 + 0.25 * (t15 * t38);
+    const double t89 = -0.5 + 0.5 * (0.25 * (t35 * t23) + t6 * (t87 - t88));
+    const double t90 = 0.25 * (t41 * t23), t91 = (-0.25) * (t17 * t43) - t8;
+    const double t92 = t10 + 0.25 * (t15 * t45), t93 = 0.5 + 0.5 * (t90 + t6 * (t91 - t92));
+    const double t94 = t17 * t22, t95 = 0.25 * (t15 * t16);
+    const double t96 = 0.25 * (t48 * t23) + t6 * ((-0.25) * t94 - t95), t97 = t17 * t55;
+    const double t98 = 0.25 * (t15 * t57), t99 = 0.25 * (t52 * t23) + t6 * ((-0.25) * t97 - t98);
+    const double t100 = t8 - 0.25 * (t17 * t62), t101 = 0.25 * (t15 * t60);
+    const double t102 = 0.5 + 0.5 * (t6 * (t100 + (t10 - t101)) - t90);
     jacobian[0] = 1.0 + (coef[0] * t33 + (-1.0 + t40));
     jacobian[1] = t47 + (coef[0] * t51 + coef[1] * t59);
     jacobian[2] = t64 - t42 + (coef[1] * t51 + coef[0] * t59);
@@ -184,290 +113,94 @@ static void poisson_not_hamiltonian_linearise(const double coef[2], const double
     jacobian[6] = 0.5 * (coef[0] * t86) + t89;
     jacobian[7] = t93 + (0.5 * (coef[0] * t96) + 0.5 * (coef[1] * t99));
     jacobian[8] = 1.0 + (0.5 * (coef[0] * t99) + 0.5 * (coef[1] * t96) + (-1.0 + t102));
+    /* increment jacobian */
+    const double t103 = t1 * t25, t104 = t4 * t25;
+    const double t105 = coef[0] * (t25 * (t32 - 0.5 * t31) - 0.5 * (t103 * t26) - t33) + (0.25 * (t104 * t26)
+        + t25 * (t39 + t37) - t40);
+    const double t106 = t2 * t25, t107 = 0.25 * (t106 * t26), t108 = (t53 - x) * t25;
+    const double t109 = 0.25 * (t108 * t26) + t25 * (t58 - 0.25 * t56) - t59, t110 = t54 * t25;
+    const double t111 = 0.25 * (t110 * t26) + t25 * (t50 - 0.25 * t49) - t51;
+    const double t112 = coef[0] * (0.5 * (t25 * ((-0.5) * t66 - t65) - 0.5 * (t103 * t27)) - 0.5 * t67)
+        + (-0.5 + 0.5 * (0.25 * (t104 * t27) + t25 * (t68 - t69)) - t70);
+    const double t113 = 0.5 * (0.25 * (t108 * t27) + t25 * ((-0.25) * t75 - t74)) - 0.5 * t76;
+    const double t114 = 0.5 * (0.25 * (t110 * t27) + t25 * ((-0.25) * t72 - t71)) - 0.5 * t73;
+    const double t115 = 0.25 * (t106 * t27);
+    const double t116 = coef[0] * (0.5 * (t25 * (t85 - 0.5 * t84) - 0.5 * (t103 * t28)) - 0.5 * t86)
+        + (-0.5 + 0.5 * (0.25 * (t104 * t28) + t25 * (t87 + t88)) - t89);
+    const double t117 = 0.5 * (0.25 * (t110 * t28) + t25 * (t95 - 0.25 * t94)) - 0.5 * t96;
+    const double t118 = 0.5 * (0.25 * (t108 * t28) + t25 * (t98 - 0.25 * t97)) - 0.5 * t99;
+    const double t119 = 0.25 * (t106 * t28);
     increment_jacobian[0] = t105;
     increment_jacobian[1] = t25 * (t46 - 0.25 * t44) - t107 - t47 + (coef[1] * t109 + coef[0] * t111);
     increment_jacobian[2] = t107 + t25 * (t61 - t10 - t63) + (t42 - t64) + (coef[0] * t109 + coef[1] * t111);
     increment_jacobian[3] = t112;
-    increment_jacobian[4] = coef[1] * t113 + coef[0] * t114 + (0.5 + 0.5 * (t25 * (t78 + (t10 - t79)) - t115) - t80);
+    increment_jacobian[4] = coef[1] * t113 + coef[0] * t114 + (0.5 + 0.5 * (t25 * (t78 + (t10 - t79)) - t115)
+        - t80);
     increment_jacobian[5] = coef[1] * t114 + coef[0] * t113 + (0.5 + 0.5 * (t115 + t25 * (t81 - t82)) - t83);
     increment_jacobian[6] = t116;
     increment_jacobian[7] = coef[0] * t117 + coef[1] * t118 + (0.5 + 0.5 * (t25 * (t92 + t91) - t119) - t93);
-    increment_jacobian[8] = 0.5 + 0.5 * (t119 + t25 * (t101 - t10 + t100)) - t102 + (coef[1] * t117 + coef[0] * t118);
-}
-
-/* Solve matrix * solution = side, both overwritten, by elimination with partial pivoting. 0 if singular. */
-static int poisson_not_hamiltonian_solve_pivoting(double matrix[9], double side[3])
-{
-    for (int k = 0; k < 3; ++k) {
-        int best = k;
-        for (int i = k + 1; i < 3; ++i)
-            if (fabs(matrix[i * 3 + k]) > fabs(matrix[best * 3 + k])) best = i;
-        const double pivot = matrix[best * 3 + k];
-        if (!(fabs(pivot) > 0.0)) return 0;
-        for (int j = k; j < 3 && best != k; ++j) {
-            const double swap = matrix[k * 3 + j];
-            matrix[k * 3 + j] = matrix[best * 3 + j];
-            matrix[best * 3 + j] = swap;
-        }
-        const double swap = side[k];
-        side[k] = side[best];
-        side[best] = swap;
-        for (int i = k + 1; i < 3; ++i) {
-            const double factor = matrix[i * 3 + k] / pivot;
-            for (int j = k + 1; j < 3; ++j) matrix[i * 3 + j] -= factor * matrix[k * 3 + j];
-            side[i] -= factor * side[k];
-        }
-    }
-    for (int i = 3 - 1; i >= 0; --i) {
-        for (int j = i + 1; j < 3; ++j) side[i] -= matrix[i * 3 + j] * side[j];
-        side[i] /= matrix[i * 3 + i];
-    }
-    return 1;
+    increment_jacobian[8] = 0.5 + 0.5 * (t119 + t25 * (t101 - t10 + t100)) - t102 + (coef[1] * t117 + coef[0]
+        * t118);
 }
 
 /* elimination without pivoting: the solution, and the reciprocals of the pivots */
 static void poisson_not_hamiltonian_eliminate(const double matrix[9], const double side[3],
-                                              double solution[restrict 3], double reciprocal[restrict 3])
+    double solution[restrict 3], double reciprocal[restrict 3])
 {
-    const double t1 = 1.0 / matrix[0];
-    const double t2 = matrix[6] * t1;
-    const double t3 = matrix[3] * t1;
-    const double t4 = side[1] - side[0] * t3;
-    const double t5 = 1.0 / (matrix[4] - matrix[1] * t3);
-    const double t6 = (matrix[7] - matrix[1] * t2) * t5;
-    const double t7 = matrix[5] - matrix[2] * t3;
+    /* solution */
+    const double t1 = 1.0 / matrix[0], t2 = matrix[6] * t1, t3 = matrix[3] * t1;
+    const double t4 = side[1] - side[0] * t3, t5 = 1.0 / (matrix[4] - matrix[1] * t3);
+    const double t6 = (matrix[7] - matrix[1] * t2) * t5, t7 = matrix[5] - matrix[2] * t3;
     const double t8 = 1.0 / (matrix[8] - matrix[2] * t2 - t7 * t6);
-    const double t9 = (side[2] - side[0] * t2 - t4 * t6) * t8;
-    const double t10 = t5 * (t4 - t7 * t9);
+    const double t9 = (side[2] - side[0] * t2 - t4 * t6) * t8, t10 = t5 * (t4 - t7 * t9);
     solution[0] = t1 * (side[0] - (matrix[2] * t9 + matrix[1] * t10));
     solution[1] = t10;
     solution[2] = t9;
+    /* reciprocal */
     reciprocal[0] = t1;
     reciprocal[1] = t5;
     reciprocal[2] = t8;
 }
 
-/* Solve matrix * solution = side, both overwritten. The matrix is I + O(h), so elimination without pivoting
-   does unless a pivot is far from 1. 0 if singular. */
-static int poisson_not_hamiltonian_solve(double matrix[9], double side[3])
+/* the Hamiltonian */
+double poisson_not_hamiltonian_hamiltonian(const poisson_not_hamiltonian_params *params, const double x[3])
 {
-    double solution[3], reciprocal[3], largest = 0.0;
-    poisson_not_hamiltonian_eliminate(matrix, side, solution, reciprocal);
-    for (int i = 0; i < 3; ++i)
-        if (!(fabs(reciprocal[i]) <= largest)) largest = fabs(reciprocal[i]);
-    if (!(largest < 1e3)) return poisson_not_hamiltonian_solve_pivoting(matrix, side);
-    memcpy(side, solution, sizeof solution);
-    return 1;
+    (void)params;
+    const double x_ = x[0], y = x[1], z = x[2];
+    const double t1 = y - z;
+    return 0.25 * (x_ * x_ + t1 * t1);
 }
 
-/* Whether a guess is where the next values may be. Recurrences that were fitted to little else than rest, near a saddle,
-   may lead anywhere; and far away the equation of a step has solutions that have nothing to do with the motion. */
-static int poisson_not_hamiltonian_near(const double guess[3], const double last[3])
+/* the Casimirs */
+void poisson_not_hamiltonian_casimirs(const poisson_not_hamiltonian_params *params, const double x[3],
+    double out[])
 {
-    double distance = 0.0, size = 0.0;
-    for (int i = 0; i < 3; ++i) {
-        distance += fabs(guess[i] - last[i]);
-        size += fabs(last[i]);
-    }
-    return distance <= 4.0 * size;
+    (void)params;
+    const double x_ = x[0], y = x[1], z = x[2];
+    out[0] = y + z - x_;
 }
 
-/* The guess for the next value (y), from earlier ones; 0 if there is none. */
-static int poisson_not_hamiltonian_predict(const poisson_not_hamiltonian_memory *memory, double value[3])
+/* pi(x) grad H(x) */
+void poisson_not_hamiltonian_vector_field(const poisson_not_hamiltonian_params *params, const double x[3],
+    double out[3])
 {
-    const int last = memory->count - 1;
-    double odd[3] = { 0.0 }, binomial = -1.0;
-    memset(value, 0, 3 * sizeof value[0]);
-    if (memory->fitting) {
-        for (int k = 0; k < memory->terms; k += 2)
-            for (int i = 0; i < 3; ++i) {
-                value[i] += memory->weight[k][i][0] * memory->past[last - k][i];
-                odd[i] += memory->weight[k + 1][i][0] * memory->past[last - 1 - k][i];
-            }
-        for (int i = 0; i < 3; ++i) value[i] += odd[i];
-    } else {
-        for (int k = 0; k < memory->order && k <= last; ++k) {
-            binomial *= -(double)(memory->order - k) / (k + 1);
-            for (int i = 0; i < 3; ++i) value[i] += binomial * memory->past[last - k][i];
-        }
-    }
-    return last >= 0 && poisson_not_hamiltonian_near(value, memory->past[last]);
+    (void)params;
+    const double x_ = x[0], y = x[1], z = x[2];
+    const double t1 = y - z, t2 = x_ * x_ + t1 * t1, t3 = 0.25 * (t1 * t2), t4 = 0.25 * (x_ * t2);
+    out[0] = t3 + t3;
+    out[1] = t3 - t4;
+    out[2] = t3 + t4;
 }
 
-/* Choose the guess that would have been best for a value that took several iterations. */
-static void poisson_not_hamiltonian_judge(poisson_not_hamiltonian_memory *memory, const double value[3])
+/* ---- Compensated sums, linear equations ---- */
+/* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to
+   its last bit: were it rounded with the change, corrections of one sign would add up to a drift. 0, and x as
+   before, if the sum is not finite. */
+static int poisson_not_hamiltonian_advance(poisson_not_hamiltonian_solver *s,
+    const double change[poisson_not_hamiltonian_DIM], const double correction[poisson_not_hamiltonian_DIM])
 {
-    double row[8 + 1][3], guess[3], least = HUGE_VAL, fitted = HUGE_VAL;
-    const int rows = memory->count < 8 ? memory->count : 8;
-    memcpy(row[0], value, sizeof row[0]);
-    for (int k = 0; k < rows; ++k) memcpy(row[k + 1], memory->past[memory->count - 1 - k], sizeof row[0]);
-    for (int order = 1; order <= rows; ++order) { /* row[0] becomes the backward difference of this order */
-        double size = 0.0;
-        for (int k = 0; k <= rows - order; ++k)
-            for (int i = 0; i < 3; ++i) row[k][i] -= row[k + 1][i];
-        for (int i = 0; i < 3; ++i) size += fabs(row[0][i]);
-        if (size < least) {
-            least = size;
-            memory->order = order;
-        }
-    }
-    memory->fitting = memory->terms > 0;
-    if (memory->fitting && poisson_not_hamiltonian_predict(memory, guess)) {
-        fitted = 0.0;
-        for (int i = 0; i < 3; ++i) fitted += fabs(value[i] - guess[i]);
-    }
-    memory->fitting = memory->terms > 0 && fitted <= least;
-    if (memory->order == 0) memory->order = 1;
-}
-
-/* Make eight columns orthogonal to one, by the multiples of it that are put into r. Where that one is among the eight, those
-   up to it stay as they are, and inverse becomes one over its squared length. The number of rows is even. */
-static void poisson_not_hamiltonian_project(int rows, double (*one)[8], int column, double *inverse, double (*eight)[8], double r[8])
-{
-    double even[8] = { 0.0 }, odd[8] = { 0.0 };
-    for (int i = 0; i < rows; i += 2) {
-        const double entry = one[i][column], next = one[i + 1][column];
-        for (int l = 0; l < 8; ++l) even[l] += entry * eight[i][l];
-        for (int l = 0; l < 8; ++l) odd[l] += next * eight[i + 1][l];
-    }
-    for (int l = 0; l < 8; ++l) even[l] += odd[l];
-    if (one == eight) {
-        *inverse = even[column] > 0.0 ? 1.0 / even[column] : 0.0;
-        memset(even, 0, ((size_t)column + 1) * sizeof even[0]);
-    }
-    for (int l = 0; l < 8; ++l) r[l] = even[l] *= *inverse;
-    for (int i = 0; i < rows; ++i) {
-        const double entry = one[i][column];
-        for (int l = 0; l < 8; ++l) eight[i][l] -= entry * even[l];
-    }
-}
-
-/* By how much recurrences miss the last of these values. */
-static double poisson_not_hamiltonian_missed(const double *value, double (*weight)[8])
-{
-    enum { AHEAD = 8, WINDOW = 40, CHECKS = 8 };
-    double most = 0.0;
-    for (int i = 0; i < CHECKS; ++i) {
-        double guess[8] = { 0.0 };
-        for (int k = 0; k < WINDOW; ++k)
-            for (int l = 0; l < 8; ++l) guess[l] += weight[k][l] * value[i + WINDOW - 1 - k];
-        for (int l = 0; l < AHEAD; ++l) most = fmax(most, fabs(guess[l] - value[i + WINDOW + l]));
-    }
-    return most;
-}
-
-/* Fit the recurrences value[m + l] = sum of weight[k][..][l] * value[m - 1 - k], l = 0 ... 8 - 1, to the history of
-   a component: ridge least squares by modified Gram-Schmidt, the ridge at the level of rounding. Columns are taken in by
-   eights, until they leave next to nothing of the right-hand sides. How many past values are used; 0 if the recurrences do
-   not foresee the last values, which they were not fitted to. */
-static int poisson_not_hamiltonian_train(poisson_not_hamiltonian_memory *memory, int component)
-{
-    enum { AHEAD = 8, WINDOW = 40, ROWS = 56 };
-    double q[WINDOW / 8][ROWS + WINDOW][8], r[WINDOW / 8][WINDOW][8], inverse[WINDOW]; /* eight columns in each part */
-    double right[ROWS + WINDOW][8], weight[WINDOW][8], value[111], largest = 0.0, left = HUGE_VAL;
-    int terms = 0;
-    memset(q, 0, sizeof q);
-    memset(right, 0, sizeof right);
-    memset(weight, 0, sizeof weight);
-    for (int i = 0; i < 111; ++i) {
-        value[i] = memory->past[memory->count - 111 + i][component];
-        if (fabs(value[i]) > largest) largest = fabs(value[i]);
-    }
-    for (int i = 0; i < ROWS; ++i)
-        for (int l = 0; l < AHEAD; ++l) right[i][l] = value[i + WINDOW + l];
-    while (terms < WINDOW && left > 3e-12 * largest) {
-        const int part = terms / 8, rows = ROWS + terms + 8; /* further rows of the ridge are zero in these columns */
-        for (int i = 0; i < ROWS; ++i)
-            for (int l = 0; l < 8; ++l) q[part][i][l] = value[i + WINDOW - 1 - terms - l];
-        for (int l = 0; l < 8; ++l) q[part][ROWS + terms + l][l] = 1e-15 * largest;
-        for (int k = 0; k < terms; ++k) poisson_not_hamiltonian_project(rows, q[k / 8], k % 8, &inverse[k], q[part], r[part][k]);
-        for (int l = 0; l < 8; ++l, ++terms) {
-            poisson_not_hamiltonian_project(rows, q[part], l, &inverse[terms], q[part], r[part][terms]);
-            poisson_not_hamiltonian_project(rows, q[part], l, &inverse[terms], right, weight[terms]);
-        }
-        double sum[8] = { 0.0 };
-        for (int i = 0; i < ROWS; ++i)
-            for (int l = 0; l < 8; ++l) sum[l] += fabs(right[i][l]);
-        left = 0.0;
-        for (int l = 0; l < 8; ++l) left += sum[l] / ROWS;
-    }
-    for (int k = terms - 1; k >= 0; --k)
-        for (int j = k + 1; j < terms; ++j)
-            for (int l = 0; l < 8; ++l) weight[k][l] -= r[j / 8][k][j % 8] * weight[j][l];
-    for (int k = 0; k < WINDOW; ++k) memcpy(memory->weight[k][component], weight[k], AHEAD * sizeof(double));
-    return poisson_not_hamiltonian_missed(value + ROWS, weight) <= 1e-07 * largest ? terms : 0;
-}
-
-/* Drop what is old, if so many values would not fit into the history. */
-static void poisson_not_hamiltonian_make_room(poisson_not_hamiltonian_memory *memory, int values)
-{
-    if (memory->count + values <= 222) return;
-    memmove(memory->past, memory->past + memory->count - 111, 111 * sizeof memory->past[0]);
-    memory->count = 111;
-}
-
-/* Add a value to the history. */
-static void poisson_not_hamiltonian_record(poisson_not_hamiltonian_memory *memory, const double value[3])
-{
-    poisson_not_hamiltonian_make_room(memory, 1);
-    memcpy(memory->past[memory->count++], value, 3 * sizeof value[0]);
-}
-
-/* Fit the recurrence to the last values; with every time, wait longer before it is done again. */
-static void poisson_not_hamiltonian_fit(poisson_not_hamiltonian_memory *memory)
-{
-    int found = 1;
-    memory->terms = 0;
-    for (int i = 0; i < 3 && found; ++i) {
-        const int terms = poisson_not_hamiltonian_train(memory, i);
-        found = terms > 0;
-        if (terms > memory->terms) memory->terms = terms;
-    }
-    if (!found) memory->terms = 0;
-    memory->fitting = found;
-    ++memory->fits;
-    memory->slow = 0;
-    memory->patience = memory->patience < 10000 ? 2 * memory->patience + 150 : 20000;
-}
-
-/* Take in the solved value: what took one iteration needs no better guess. */
-static void poisson_not_hamiltonian_remember(poisson_not_hamiltonian_memory *memory, const double value[3], int iterations)
-{
-    if (iterations > 1) poisson_not_hamiltonian_judge(memory, value);
-    poisson_not_hamiltonian_record(memory, value);
-    memory->slow = iterations > 1 ? memory->slow + 1 : 0;
-    if (memory->slow > memory->patience && memory->count >= 111) poisson_not_hamiltonian_fit(memory);
-}
-
-/* Whether an increment is that of the motion. Where the step is too large, the equation may have been solved by a point far
-   away, at another energy, that has nothing to do with it. */
-static int poisson_not_hamiltonian_plausible(const poisson_not_hamiltonian_solver *s, int stage, const double increment[3])
-{
-    double moved = 0.0, size = 0.0, field[3], middle[3], end[3];
-    for (int i = 0; i < 3; ++i) {
-        moved += fabs(increment[i]);
-        size += fabs(s->x[i]);
-    }
-    if (moved <= 1.5 * size) return 1;
-    poisson_not_hamiltonian_vector_field(&s->params, s->x, field);
-    for (int i = 0; i < 3; ++i) {
-        size += fabs(poisson_not_hamiltonian_fractions[stage] * s->h * field[i]);
-        middle[i] = s->x[i] + 0.5 * increment[i];
-        end[i] = s->x[i] + increment[i];
-    }
-    if (moved <= 1.5 * size) return 1;
-    const double before = poisson_not_hamiltonian_hamiltonian(&s->params, s->x), after = poisson_not_hamiltonian_hamiltonian(&s->params, end);
-    const double scale = fabs(before) + fabs(poisson_not_hamiltonian_hamiltonian(&s->params, middle)) + fabs(after);
-    return fabs(after - before) <= 0.5 * scale;
-}
-
-/* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to its last
-   bit: were it rounded with the change, corrections of one sign would add up to a drift. 0, and x as before, if the
-   sum is not finite. */
-static int poisson_not_hamiltonian_advance(poisson_not_hamiltonian_solver *s, const double change[3], const double correction[3])
-{
-    double x[3], carry[3];
-    for (int i = 0; i < 3; ++i) {
+    double x[poisson_not_hamiltonian_DIM], carry[poisson_not_hamiltonian_DIM];
+    for (int i = 0; i < poisson_not_hamiltonian_DIM; ++i) {
         const double sum = s->x[i] + change[i], added = sum - s->x[i];
         const double lost = (s->x[i] - (sum - added)) + (change[i] - added);
         const double small = lost + (s->carry[i] + correction[i]);
@@ -480,87 +213,169 @@ static int poisson_not_hamiltonian_advance(poisson_not_hamiltonian_solver *s, co
     return 1;
 }
 
-/* Size of a correction relative to each component of y, but no finer than 1e-6 of the largest; NaN or infinite if
-   the correction is. */
-static double poisson_not_hamiltonian_size(const double y[3], const double delta[3])
+/* Newton matrices are I + O(h): a pivot whose reciprocal is larger than this is far from 1. */
+#define poisson_not_hamiltonian_LARGEST_RECIPROCAL 1e3
+
+/* Solve matrix * solution = side, both overwritten. The matrix is I + O(h): 0 if a pivot is far from 1. */
+static int poisson_not_hamiltonian_solve(double matrix[poisson_not_hamiltonian_DIM
+    * poisson_not_hamiltonian_DIM], double side[poisson_not_hamiltonian_DIM])
+{
+    double solution[poisson_not_hamiltonian_DIM], reciprocal[poisson_not_hamiltonian_DIM], largest = 0.0;
+    poisson_not_hamiltonian_eliminate(matrix, side, solution, reciprocal);
+    for (int i = 0; i < poisson_not_hamiltonian_DIM; ++i)
+        if (!(fabs(reciprocal[i]) <= largest)) largest = fabs(reciprocal[i]);
+    if (!(largest < poisson_not_hamiltonian_LARGEST_RECIPROCAL)) return 0;
+    memcpy(side, solution, sizeof solution);
+    return 1;
+}
+
+/* ---- Starting guesses ---- */
+/* How far from the last value a guess may be, in sizes of that value. */
+#define poisson_not_hamiltonian_REACH 4.0
+
+/* The guess for the next value from the last ones: the sum of their backward differences. 0 if there is none,
+   or if it is far away, where the equation of a step has solutions that have nothing to do with the motion.
+   */
+static int poisson_not_hamiltonian_predict(const poisson_not_hamiltonian_history *history,
+    double value[poisson_not_hamiltonian_DIM])
+{
+    double distance = 0.0, size = 0.0;
+    for (int i = 0; i < poisson_not_hamiltonian_DIM; ++i) {
+        value[i] = 0.0;
+        for (int k = 0; k < history->order; ++k) value[i] += history->difference[k][i];
+        distance += fabs(value[i] - history->difference[0][i]);
+        size += fabs(history->difference[0][i]);
+    }
+    return history->order > 0 && distance <= poisson_not_hamiltonian_REACH * size;
+}
+
+/* Take in the solved value. The guess of order k missed it by its k-th difference: the next is of the best
+   order. */
+static void poisson_not_hamiltonian_remember(poisson_not_hamiltonian_history *history,
+    const double value[poisson_not_hamiltonian_DIM])
+{
+    double least = HUGE_VAL, next[poisson_not_hamiltonian_DIM];
+    memcpy(next, value, sizeof next);
+    for (int k = 0; k <= history->count && k < poisson_not_hamiltonian_DIFFERENCES; ++k) {
+        double size = 0.0;
+        for (int i = 0; i < poisson_not_hamiltonian_DIM; ++i) {
+            const double last = history->difference[k][i];
+            history->difference[k][i] = next[i];
+            size += fabs(next[i]);
+            next[i] -= last;
+        }
+        if (k > 0 && size < least) {
+            least = size;
+            history->order = k;
+        }
+    }
+    if (history->count == 0) history->order = 1;
+    if (history->count < poisson_not_hamiltonian_DIFFERENCES) ++history->count;
+}
+
+/* How far a step may lead, in sizes of the state and of what the vector field says, if the energy is lost;
+   and the part of the energy that counts as lost. */
+#define poisson_not_hamiltonian_PLAUSIBLE 1.5
+#define poisson_not_hamiltonian_LOST 0.5
+
+/* Whether an increment is that of the motion. Where the step is too large, the equation may have been solved
+   by a point far away, at another energy, that has nothing to do with it. */
+static int poisson_not_hamiltonian_plausible(const poisson_not_hamiltonian_solver *s,
+    const double increment[poisson_not_hamiltonian_DIM])
+{
+    double moved = 0.0, size = 0.0, field[poisson_not_hamiltonian_DIM], middle[poisson_not_hamiltonian_DIM],
+        end[poisson_not_hamiltonian_DIM];
+    for (int i = 0; i < poisson_not_hamiltonian_DIM; ++i) {
+        moved += fabs(increment[i]);
+        size += fabs(s->x[i]);
+    }
+    if (moved <= poisson_not_hamiltonian_PLAUSIBLE * size) return 1;
+    poisson_not_hamiltonian_vector_field(&s->params, s->x, field);
+    for (int i = 0; i < poisson_not_hamiltonian_DIM; ++i) {
+        size += fabs(s->h * field[i]);
+        middle[i] = s->x[i] + 0.5 * increment[i];
+        end[i] = s->x[i] + increment[i];
+    }
+    if (moved <= poisson_not_hamiltonian_PLAUSIBLE * size) return 1;
+    const double before = poisson_not_hamiltonian_hamiltonian(&s->params, s->x), after =
+        poisson_not_hamiltonian_hamiltonian(&s->params, end);
+    const double scale = fabs(before) + fabs(poisson_not_hamiltonian_hamiltonian(&s->params, middle))
+        + fabs(after);
+    return fabs(after - before) <= poisson_not_hamiltonian_LOST * scale;
+}
+
+/* ---- The implicit step, by Newton's method ---- */
+/* Components of y are measured no finer than by this part of the largest. */
+#define poisson_not_hamiltonian_FLOOR 1e-6
+
+/* Size of a correction relative to each component of y; NaN or infinite if the correction is. */
+static double poisson_not_hamiltonian_size(const double y[poisson_not_hamiltonian_DIM],
+    const double delta[poisson_not_hamiltonian_DIM])
 {
     double norm = 0.0, size = 0.0;
-    for (int i = 0; i < 3; ++i) norm = fabs(y[i]) > norm ? fabs(y[i]) : norm;
-    for (int i = 0; i < 3; ++i) {
-        const double ratio = fabs(delta[i]) / (fabs(y[i]) + 1e-6 * norm + DBL_MIN);
+    for (int i = 0; i < poisson_not_hamiltonian_DIM; ++i) norm = fabs(y[i]) > norm ? fabs(y[i]) : norm;
+    for (int i = 0; i < poisson_not_hamiltonian_DIM; ++i) {
+        const double ratio = fabs(delta[i]) / (fabs(y[i]) + poisson_not_hamiltonian_FLOOR * norm + DBL_MIN);
         if (!isfinite(ratio)) return ratio;
         size = ratio > size ? ratio : size;
     }
     return size;
 }
 
+/* Corrections below the first that shrink by less than the second have reached the level of rounding. */
+#define poisson_not_hamiltonian_NEARLY_SOLVED 1e-8
+#define poisson_not_hamiltonian_SHRINKING 0.25
+
 /* Solve (y - x) + displacement(y) = 0 for y by Newton's method from the extrapolated guess, and advance. The
-   increment is corrected to first order by the last Newton correction, so that correction costs no evaluation:
-   a correction is accepted when the error that remains after it, quadratic in it, is below 1e-20. */
-static poisson_not_hamiltonian_status poisson_not_hamiltonian_attempt(poisson_not_hamiltonian_solver *s, int stage)
+   increment is corrected to first order by the last Newton correction, so that correction costs no
+   evaluation: a correction is accepted when the error that remains after it, quadratic in it, is below
+   poisson_not_hamiltonian_TOLERANCE. */
+static poisson_not_hamiltonian_status poisson_not_hamiltonian_attempt(poisson_not_hamiltonian_solver *s)
 {
-    const double *coef = s->coef[stage];
-    poisson_not_hamiltonian_memory *memory = &s->memory[stage];
-    double y[3], delta[3], displacement[3], increment[3];
-    double jacobian[9], increment_jacobian[9];
-    if (!poisson_not_hamiltonian_predict(memory, y)) memcpy(y, s->x, sizeof y);
-    double previous = HUGE_VAL;
-    for (int iteration = 0; iteration < 20; ++iteration) {
-        poisson_not_hamiltonian_linearise(coef, y, displacement, increment, jacobian, increment_jacobian);
+    double y[poisson_not_hamiltonian_DIM], delta[poisson_not_hamiltonian_DIM],
+        displacement[poisson_not_hamiltonian_DIM], increment[poisson_not_hamiltonian_DIM];
+    double jacobian[poisson_not_hamiltonian_DIM * poisson_not_hamiltonian_DIM],
+        increment_jacobian[poisson_not_hamiltonian_DIM * poisson_not_hamiltonian_DIM], previous = HUGE_VAL;
+    if (!poisson_not_hamiltonian_predict(&s->history, y)) memcpy(y, s->x, sizeof y);
+    for (int iteration = 1; iteration <= poisson_not_hamiltonian_MAX_ITERATIONS; ++iteration) {
+        poisson_not_hamiltonian_linearise(s->coef, y, displacement, increment, jacobian, increment_jacobian);
         ++s->evaluations;
-        for (int i = 0; i < 3; ++i) delta[i] = ((y[i] - s->x[i]) + displacement[i]) - s->carry[i];
+        for (int i = 0; i < poisson_not_hamiltonian_DIM; ++i) delta[i] = ((y[i] - s->x[i]) + displacement[i])
+            - s->carry[i];
         const int regular = poisson_not_hamiltonian_solve(jacobian, delta);
-        const double size = poisson_not_hamiltonian_size(y, delta);
+        const double size = poisson_not_hamiltonian_size(y, delta), growth = size / (previous * previous);
         if (!isfinite(size)) return poisson_not_hamiltonian_NOT_FINITE;
         if (!regular) return poisson_not_hamiltonian_SINGULAR;
-        for (int i = 0; i < 3; ++i) y[i] -= delta[i];
-        const double growth = size / (previous * previous);
+        for (int i = 0; i < poisson_not_hamiltonian_DIM; ++i) y[i] -= delta[i];
         const double remaining = size * size * (growth > 1.0 ? growth : 1.0);
-        /* The second test: corrections no longer shrink, the solve has reached the level of rounding. */
-        if (remaining <= 1e-20 || (previous < 1e-8 && size > 0.25 * previous)) {
-            double correction[3] = { 0.0 };
-            for (int i = 0; i < 3; ++i)
-                for (int j = 0; j < 3; ++j) correction[i] -= increment_jacobian[i * 3 + j] * delta[j];
-            if (!poisson_not_hamiltonian_plausible(s, stage, increment)) return poisson_not_hamiltonian_NO_CONVERGENCE;
-            if (!poisson_not_hamiltonian_advance(s, increment, correction)) return poisson_not_hamiltonian_NOT_FINITE;
-            poisson_not_hamiltonian_remember(memory, y, iteration + 1);
-            return poisson_not_hamiltonian_OK;
-        }
+        const int stalled = previous < poisson_not_hamiltonian_NEARLY_SOLVED && size
+            > poisson_not_hamiltonian_SHRINKING * previous;
         previous = size;
+        if (!(remaining <= poisson_not_hamiltonian_TOLERANCE || stalled)) continue;
+        double correction[poisson_not_hamiltonian_DIM] = { 0.0 };
+        for (int i = 0; i < poisson_not_hamiltonian_DIM; ++i)
+            for (int j = 0; j < poisson_not_hamiltonian_DIM; ++j)
+                correction[i] -= increment_jacobian[i * poisson_not_hamiltonian_DIM + j] * delta[j];
+        if (!poisson_not_hamiltonian_plausible(s, increment)) return poisson_not_hamiltonian_NO_CONVERGENCE;
+        if (!poisson_not_hamiltonian_advance(s, increment, correction))
+            return poisson_not_hamiltonian_NOT_FINITE;
+        poisson_not_hamiltonian_remember(&s->history, y);
+        return poisson_not_hamiltonian_OK;
     }
     return poisson_not_hamiltonian_NO_CONVERGENCE;
 }
 
-/* The 1 stages of one step. If one fails, the state is as before the step. */
-static poisson_not_hamiltonian_status poisson_not_hamiltonian_stages(poisson_not_hamiltonian_solver *s)
-{
-    double x[3], carry[3];
-    memcpy(x, s->x, sizeof x);
-    memcpy(carry, s->carry, sizeof carry);
-    for (int stage = 0; stage < 1; ++stage) {
-        poisson_not_hamiltonian_status status = poisson_not_hamiltonian_attempt(s, stage);
-        /* A guess from earlier steps may have misled it: once more without. */
-        if (status != poisson_not_hamiltonian_OK && s->memory[stage].count > 0) {
-            memset(&s->memory[stage], 0, sizeof s->memory[stage]);
-            status = poisson_not_hamiltonian_attempt(s, stage);
-        }
-        if (status != poisson_not_hamiltonian_OK) {
-            memcpy(s->x, x, sizeof x);
-            memcpy(s->carry, carry, sizeof carry);
-            return status;
-        }
-    }
-    return poisson_not_hamiltonian_OK;
-}
-
-/* All of poisson_not_hamiltonian_init but the gauge. The arguments may be parts of *s: they are read before it is written. */
-static poisson_not_hamiltonian_status poisson_not_hamiltonian_start(poisson_not_hamiltonian_solver *s, const poisson_not_hamiltonian_params *params, const double x0[3])
+/* ---- The solver ---- */
+/* The arguments may be parts of *s: they are read before it is written. */
+poisson_not_hamiltonian_status poisson_not_hamiltonian_init(poisson_not_hamiltonian_solver *s,
+    const poisson_not_hamiltonian_params *params, const double x0[poisson_not_hamiltonian_DIM])
 {
     if (s == NULL || x0 == NULL) return poisson_not_hamiltonian_BAD_ARGUMENT;
-    const poisson_not_hamiltonian_params own = params != NULL ? *params : poisson_not_hamiltonian_default_params;
-    double x[3];
+    const poisson_not_hamiltonian_params own = params != NULL ? *params
+        : poisson_not_hamiltonian_default_params;
+    double x[poisson_not_hamiltonian_DIM];
     memcpy(x, x0, sizeof x);
-    for (int i = 0; i < 3; ++i)
+    for (int i = 0; i < poisson_not_hamiltonian_DIM; ++i)
         if (!isfinite(x[i])) return poisson_not_hamiltonian_BAD_ARGUMENT;
     memset(s, 0, sizeof *s);
     memcpy(s->x, x, sizeof s->x);
@@ -568,1157 +383,88 @@ static poisson_not_hamiltonian_status poisson_not_hamiltonian_start(poisson_not_
     return poisson_not_hamiltonian_OK;
 }
 
-poisson_not_hamiltonian_status poisson_not_hamiltonian_init(poisson_not_hamiltonian_solver *s,
-                                                            const poisson_not_hamiltonian_params *params,
-                                                            const double x0[3])
-{
-    return poisson_not_hamiltonian_start(s, params, x0);
-}
-
 /* What depends on the step size; nothing where that is as before. */
-static poisson_not_hamiltonian_status poisson_not_hamiltonian_set_step(poisson_not_hamiltonian_solver *s, double h)
+static poisson_not_hamiltonian_status poisson_not_hamiltonian_set_step(poisson_not_hamiltonian_solver *s,
+    double h)
 {
     if (s == NULL || !isfinite(h)) return poisson_not_hamiltonian_BAD_ARGUMENT;
-    if (s->ready && memcmp(&h, &s->h, sizeof h) == 0) return poisson_not_hamiltonian_OK;
-    for (int stage = 0; stage < 1; ++stage)
-        poisson_not_hamiltonian_prepare(&s->params, poisson_not_hamiltonian_fractions[stage] * h, s->coef[stage]);
-    memset(s->memory, 0, sizeof s->memory);
-    for (int stage = 0; stage < 1; ++stage) s->memory[stage].patience = 150;
-    s->pause = 16;
-    s->setback = s->foreseeing = 0;
-    s->doubt = s->retry = 0;
-    s->effort = 0.0;
-    s->passes = INT_MAX;
+    if (s->prepared && memcmp(&h, &s->h, sizeof h) == 0) return poisson_not_hamiltonian_OK;
+    poisson_not_hamiltonian_prepare(&s->params, h, s->coef);
+    memset(&s->history, 0, sizeof s->history);
     s->h = h;
-    s->ready = 1;
+    s->t_before_h = s->t;
+    s->steps_before_h = s->steps;
+    s->prepared = 1;
     return poisson_not_hamiltonian_OK;
+}
+
+/* One stage. A guess from earlier steps may have misled it: then once more without. */
+static poisson_not_hamiltonian_status poisson_not_hamiltonian_stage(poisson_not_hamiltonian_solver *s)
+{
+    poisson_not_hamiltonian_status status = poisson_not_hamiltonian_attempt(s);
+    if (status != poisson_not_hamiltonian_OK && s->history.count > 0) {
+        memset(&s->history, 0, sizeof s->history);
+        status = poisson_not_hamiltonian_attempt(s);
+    }
+    return status;
 }
 
 poisson_not_hamiltonian_status poisson_not_hamiltonian_step(poisson_not_hamiltonian_solver *s, double h)
 {
     poisson_not_hamiltonian_status status = poisson_not_hamiltonian_set_step(s, h);
     if (status != poisson_not_hamiltonian_OK) return status;
-    status = poisson_not_hamiltonian_stages(s);
-    if (status == poisson_not_hamiltonian_OK) ++s->steps;
+    status = poisson_not_hamiltonian_stage(s);
+    if (status != poisson_not_hamiltonian_OK) return status;
+    ++s->steps;
+    s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
     return status;
 }
 
-/*
- * Eight at a time: below, the formulas of a step are evaluated for 8 steps of a trajectory, or members of an
- * ensemble, at once. Compilers make vector instructions of the loops over lanes.
- */
-enum { poisson_not_hamiltonian_LANES = 8 };
-
-#if defined(__GNUC__)
-typedef double poisson_not_hamiltonian_lanes[poisson_not_hamiltonian_LANES] __attribute__((aligned(64))); /* a value in each lane */
-#else
-typedef double poisson_not_hamiltonian_lanes[poisson_not_hamiltonian_LANES];
-#endif
-
-#if defined(__clang__)
-#define poisson_not_hamiltonian_EACH_LANE _Pragma("clang loop vectorize(assume_safety)")
-#pragma clang diagnostic push
-#pragma clang diagnostic ignored "-Wpass-failed"
-#elif defined(__GNUC__)
-#define poisson_not_hamiltonian_EACH_LANE _Pragma("GCC ivdep") _Pragma("GCC unroll 1")
-#else
-#define poisson_not_hamiltonian_EACH_LANE
-#endif
-
-/* What all blocks share: coefficients, the same in each lane, and the recurrences by which they are foreseen. */
-typedef struct {
-    int fits[1]; /* the fit that weight is of; -1 for none */
-    poisson_not_hamiltonian_lanes coef[1][2], weight[1][40][3];
-} poisson_not_hamiltonian_table;
-
-/* A stage in all lanes, linearised around y. */
-typedef struct {
-    poisson_not_hamiltonian_lanes y[3], displacement[3], increment[3], residual[3];
-    /* a residual r of alpha(y) = x takes inverse r from y, and gain r from the increment */
-    poisson_not_hamiltonian_lanes inverse[9], slope[9], gain[9];
-} poisson_not_hamiltonian_model;
-
-/* exp(u) for the loops over lanes: u = k log 2 + r, no branches. No number beyond |u| = 700.0. */
-static inline double poisson_not_hamiltonian_exp_lane(double u)
+poisson_not_hamiltonian_status poisson_not_hamiltonian_integrate(poisson_not_hamiltonian_solver *s, double h,
+    size_t steps)
 {
-    const double shifted = u * 1.4426950408889634 + 6755399441055744.0, k = shifted - 6755399441055744.0;
-    const double r = (u - k * 0.6931471803691238) - k * 1.9082149292705877e-10, rr = r * r;
-    uint64_t bits; /* the last bits of shifted are k */
-    double power, sum = 1.1470745597729725e-11, other = 1.6059043836821613e-10;
-    memcpy(&bits, &shifted, sizeof bits);
-    bits = (bits + 1023) << 52;
-    memcpy(&power, &bits, sizeof power);
-    sum = sum * rr + 2.08767569878681e-09;
-    other = other * rr + 2.505210838544172e-08;
-    sum = sum * rr + 2.755731922398589e-07;
-    other = other * rr + 2.7557319223985893e-06;
-    sum = sum * rr + 2.48015873015873e-05;
-    other = other * rr + 0.0001984126984126984;
-    sum = sum * rr + 0.001388888888888889;
-    other = other * rr + 0.008333333333333333;
-    sum = sum * rr + 0.041666666666666664;
-    other = other * rr + 0.16666666666666666;
-    sum = (sum * r + other) * r + 0.5;
-    sum = sum * rr + r;
-    return power * sum + power + (fabs(u) <= 700.0 ? 0.0 : (double)NAN);
-}
-
-/* sin u for the loops over lanes: u = k pi + r with |r| <= pi/2, no branches. No number beyond |u| = 1000000.0. */
-static inline double poisson_not_hamiltonian_sin_lane(double u)
-{
-    const double shifted = (u * 0.3183098861837907 + 0.0) + 6755399441055744.0;
-    const double k = (shifted - 6755399441055744.0) - 0.0;
-    const double r = ((u - k * 3.141592651605606) - k * 1.9841871479187034e-09) - k * 1.1442377452219664e-17, q = r * r, qq = q * q;
-    uint64_t parity, bits; /* the last bit of shifted is the parity of k + 0.0 */
-    double value, sum = -3.868170170630684e-23, other = 1.9572941063391263e-20;
-    sum = sum * qq + -8.22063524662433e-18;
-    other = other * qq + 2.8114572543455206e-15;
-    sum = sum * qq + -7.647163731819816e-13;
-    other = other * qq + 1.6059043836821613e-10;
-    sum = sum * qq + -2.505210838544172e-08;
-    other = other * qq + 2.7557319223985893e-06;
-    sum = sum * qq + -0.0001984126984126984;
-    other = other * qq + 0.008333333333333333;
-    sum = (sum * q + other) * q + -0.16666666666666666;
-    value = r + r * q * sum;
-    memcpy(&parity, &shifted, sizeof parity);
-    memcpy(&bits, &value, sizeof bits);
-    bits ^= parity << 63;
-    memcpy(&value, &bits, sizeof bits);
-    return value + (fabs(u) <= 1000000.0 ? 0.0 : (double)NAN);
-}
-
-/* cos u for the loops over lanes: u = k pi + r with |r| <= pi/2, no branches. No number beyond |u| = 1000000.0. */
-static inline double poisson_not_hamiltonian_cos_lane(double u)
-{
-    const double shifted = (u * 0.3183098861837907 + 0.5) + 6755399441055744.0;
-    const double k = (shifted - 6755399441055744.0) - 0.5;
-    const double r = ((u - k * 3.141592651605606) - k * 1.9841871479187034e-09) - k * 1.1442377452219664e-17, q = r * r, qq = q * q;
-    uint64_t parity, bits; /* the last bit of shifted is the parity of k + 0.5 */
-    double value, sum = -3.868170170630684e-23, other = 1.9572941063391263e-20;
-    sum = sum * qq + -8.22063524662433e-18;
-    other = other * qq + 2.8114572543455206e-15;
-    sum = sum * qq + -7.647163731819816e-13;
-    other = other * qq + 1.6059043836821613e-10;
-    sum = sum * qq + -2.505210838544172e-08;
-    other = other * qq + 2.7557319223985893e-06;
-    sum = sum * qq + -0.0001984126984126984;
-    other = other * qq + 0.008333333333333333;
-    sum = (sum * q + other) * q + -0.16666666666666666;
-    value = r + r * q * sum;
-    memcpy(&parity, &shifted, sizeof parity);
-    memcpy(&bits, &value, sizeof bits);
-    bits ^= parity << 63;
-    memcpy(&value, &bits, sizeof bits);
-    return value + (fabs(u) <= 1000000.0 ? 0.0 : (double)NAN);
-}
-
-/* poisson_not_hamiltonian_linearise in all lanes. */
-static void poisson_not_hamiltonian_linearise_lanes(poisson_not_hamiltonian_lanes coef[restrict 2],
-                                                    poisson_not_hamiltonian_lanes y[restrict 3],
-                                                    poisson_not_hamiltonian_lanes displacement[restrict 3],
-                                                    poisson_not_hamiltonian_lanes increment[restrict 3],
-                                                    poisson_not_hamiltonian_lanes jacobian[restrict 9],
-                                                    poisson_not_hamiltonian_lanes increment_jacobian[restrict 9])
-{
-    poisson_not_hamiltonian_EACH_LANE
-    for (int lane = 0; lane < poisson_not_hamiltonian_LANES; ++lane) {
-        const double x = y[0][lane];
-        const double y_ = y[1][lane];
-        const double z = y[2][lane];
-        const double t1 = y_ - z;
-        const double p_z = coef[1][lane] * y_ + coef[0][lane] * z;
-        const double p_y = coef[1][lane] * z + coef[0][lane] * y_;
-        const double p_x = coef[0][lane] * x;
-        const double t2 = p_z + (p_y + 2.0 * p_x);
-        const double t3 = t1 * t2;
-        const double t4 = p_y - p_z;
-        const double t5 = x * t4;
-        const double t6 = poisson_not_hamiltonian_exp_lane(0.25 * (t3 - t5));
-        const double t7 = 0.25 * (t1 * t4 + x * t2);
-        const double t8 = poisson_not_hamiltonian_cos_lane(t7);
-        const double t9 = x * t8;
-        const double t10 = poisson_not_hamiltonian_sin_lane(t7);
-        const double t11 = t1 * t10;
-        const double t12 = t9 - t11;
-        const double t13 = t6 * t12;
-        const double t14 = 0.5 * (y_ + z - x);
-        const double t15 = x + t1;
-        const double t16 = t15 * t8;
-        const double t17 = x - t1;
-        const double t18 = t17 * t10;
-        const double t19 = t16 + t18;
-        const double t20 = t14 + 0.5 * (t6 * t19);
-        const double t21 = t17 * t8;
-        const double t22 = t15 * t10;
-        const double t23 = t21 - t22;
-        const double t24 = t14 + 0.5 * (t6 * t23);
-        const double t25 = poisson_not_hamiltonian_exp_lane(0.25 * (t5 - t3));
-        const double t26 = t9 + t11;
-        const double t27 = t16 - t18;
-        const double t28 = t21 + t22;
-        const double t29 = t1 * t6;
-        const double t30 = x * t10;
-        const double t31 = x * t30;
-        const double t32 = 0.5 * (t1 * t9);
-        const double t33 = 0.5 * (t29 * t12) + t6 * ((-0.5) * t31 - t32);
-        const double t34 = p_z - p_y;
-        const double t35 = t34 * t6;
-        const double t36 = t2 * t10;
-        const double t37 = t8 - 0.25 * (x * t36);
-        const double t38 = t2 * t8;
-        const double t39 = 0.25 * (t1 * t38);
-        const double t40 = 0.25 * (t35 * t12) + t6 * (t37 - t39);
-        const double t41 = t2 * t6;
-        const double t42 = 0.25 * (t41 * t12);
-        const double t43 = t4 * t10;
-        const double t44 = x * t43;
-        const double t45 = t4 * t8;
-        const double t46 = t10 + 0.25 * (t1 * t45);
-        const double t47 = t42 + t6 * ((-0.25) * t44 - t46);
-        const double t48 = (t1 - x) * t6;
-        const double t49 = x * t22;
-        const double t50 = 0.25 * (t1 * t16);
-        const double t51 = 0.25 * (t48 * t12) + t6 * ((-0.25) * t49 - t50);
-        const double t52 = t15 * t6;
-        const double t53 = z - y_;
-        const double t54 = x + t53;
-        const double t55 = t54 * t10;
-        const double t56 = x * t55;
-        const double t57 = t54 * t8;
-        const double t58 = 0.25 * (t1 * t57);
-        const double t59 = 0.25 * (t52 * t12) + t6 * ((-0.25) * t56 - t58);
-        const double t60 = t34 * t8;
-        const double t61 = 0.25 * (t1 * t60);
-        const double t62 = t34 * t10;
-        const double t63 = 0.25 * (x * t62);
-        const double t64 = t6 * (t10 - t61 - t63);
-        const double t65 = 0.5 * (t17 * t9);
-        const double t66 = t15 * t30;
-        const double t67 = 0.5 * (t29 * t19) + t6 * (t65 - 0.5 * t66);
-        const double t68 = t8 - 0.25 * (t15 * t36);
-        const double t69 = t10 + 0.25 * (t17 * t38);
-        const double t70 = -0.5 + 0.5 * (0.25 * (t35 * t19) + t6 * (t68 + t69));
-        const double t71 = 0.25 * (t17 * t16);
-        const double t72 = t15 * t22;
-        const double t73 = 0.25 * (t48 * t19) + t6 * (t71 - 0.25 * t72);
-        const double t74 = 0.25 * (t17 * t57);
-        const double t75 = t15 * t55;
-        const double t76 = 0.25 * (t52 * t19) + t6 * (t74 - 0.25 * t75);
-        const double t77 = 0.25 * (t41 * t19);
-        const double t78 = t8 - 0.25 * (t15 * t43);
-        const double t79 = 0.25 * (t17 * t45);
-        const double t80 = 0.5 + 0.5 * (t77 + t6 * (t78 + (t79 - t10)));
-        const double t81 = (-0.25) * (t15 * t62) - t8;
-        const double t82 = t10 + 0.25 * (t17 * t60);
-        const double t83 = 0.5 + 0.5 * (t6 * (t81 + t82) - t77);
-        const double t84 = t17 * t30;
-        const double t85 = 0.5 * (t15 * t9);
-        const double t86 = 0.5 * (t29 * t23) + t6 * ((-0.5) * t84 - t85);
-        const double t87 = t8 - 0.25 * (t17 * t36);
-        const double t88 = t10 + 0.25 * (t15 * t38);
-        const double t89 = -0.5 + 0.5 * (0.25 * (t35 * t23) + t6 * (t87 - t88));
-        const double t90 = 0.25 * (t41 * t23);
-        const double t91 = (-0.25) * (t17 * t43) - t8;
-        const double t92 = t10 + 0.25 * (t15 * t45);
-        const double t93 = 0.5 + 0.5 * (t90 + t6 * (t91 - t92));
-        const double t94 = t17 * t22;
-        const double t95 = 0.25 * (t15 * t16);
-        const double t96 = 0.25 * (t48 * t23) + t6 * ((-0.25) * t94 - t95);
-        const double t97 = t17 * t55;
-        const double t98 = 0.25 * (t15 * t57);
-        const double t99 = 0.25 * (t52 * t23) + t6 * ((-0.25) * t97 - t98);
-        const double t100 = t8 - 0.25 * (t17 * t62);
-        const double t101 = 0.25 * (t15 * t60);
-        const double t102 = 0.5 + 0.5 * (t6 * (t100 + (t10 - t101)) - t90);
-        const double t103 = t1 * t25;
-        const double t104 = t4 * t25;
-        const double t105 = coef[0][lane] * (t25 * (t32 - 0.5 * t31) - 0.5 * (t103 * t26) - t33) + (0.25 * (t104 * t26) + t25 * (t39 + t37) - t40);
-        const double t106 = t2 * t25;
-        const double t107 = 0.25 * (t106 * t26);
-        const double t108 = (t53 - x) * t25;
-        const double t109 = 0.25 * (t108 * t26) + t25 * (t58 - 0.25 * t56) - t59;
-        const double t110 = t54 * t25;
-        const double t111 = 0.25 * (t110 * t26) + t25 * (t50 - 0.25 * t49) - t51;
-        const double t112 = coef[0][lane] * (0.5 * (t25 * ((-0.5) * t66 - t65) - 0.5 * (t103 * t27)) - 0.5 * t67) + (-0.5 + 0.5 * (0.25 * (t104 * t27) + t25 * (t68 - t69)) - t70);
-        const double t113 = 0.5 * (0.25 * (t108 * t27) + t25 * ((-0.25) * t75 - t74)) - 0.5 * t76;
-        const double t114 = 0.5 * (0.25 * (t110 * t27) + t25 * ((-0.25) * t72 - t71)) - 0.5 * t73;
-        const double t115 = 0.25 * (t106 * t27);
-        const double t116 = coef[0][lane] * (0.5 * (t25 * (t85 - 0.5 * t84) - 0.5 * (t103 * t28)) - 0.5 * t86) + (-0.5 + 0.5 * (0.25 * (t104 * t28) + t25 * (t87 + t88)) - t89);
-        const double t117 = 0.5 * (0.25 * (t110 * t28) + t25 * (t95 - 0.25 * t94)) - 0.5 * t96;
-        const double t118 = 0.5 * (0.25 * (t108 * t28) + t25 * (t98 - 0.25 * t97)) - 0.5 * t99;
-        const double t119 = 0.25 * (t106 * t28);
-        displacement[0][lane] = t13 - x;
-        displacement[1][lane] = t20 - y_;
-        displacement[2][lane] = t24 - z;
-        increment[0][lane] = t25 * t26 - t13;
-        increment[1][lane] = t14 + 0.5 * (t25 * t27) - t20;
-        increment[2][lane] = t14 + 0.5 * (t25 * t28) - t24;
-        jacobian[0][lane] = 1.0 + (coef[0][lane] * t33 + (-1.0 + t40));
-        jacobian[1][lane] = t47 + (coef[0][lane] * t51 + coef[1][lane] * t59);
-        jacobian[2][lane] = t64 - t42 + (coef[1][lane] * t51 + coef[0][lane] * t59);
-        jacobian[3][lane] = 0.5 * (coef[0][lane] * t67) + t70;
-        jacobian[4][lane] = 1.0 + (0.5 * (coef[0][lane] * t73) + 0.5 * (coef[1][lane] * t76) + (-1.0 + t80));
-        jacobian[5][lane] = 0.5 * (coef[0][lane] * t76) + 0.5 * (coef[1][lane] * t73) + t83;
-        jacobian[6][lane] = 0.5 * (coef[0][lane] * t86) + t89;
-        jacobian[7][lane] = t93 + (0.5 * (coef[0][lane] * t96) + 0.5 * (coef[1][lane] * t99));
-        jacobian[8][lane] = 1.0 + (0.5 * (coef[0][lane] * t99) + 0.5 * (coef[1][lane] * t96) + (-1.0 + t102));
-        increment_jacobian[0][lane] = t105;
-        increment_jacobian[1][lane] = t25 * (t46 - 0.25 * t44) - t107 - t47 + (coef[1][lane] * t109 + coef[0][lane] * t111);
-        increment_jacobian[2][lane] = t107 + t25 * (t61 - t10 - t63) + (t42 - t64) + (coef[0][lane] * t109 + coef[1][lane] * t111);
-        increment_jacobian[3][lane] = t112;
-        increment_jacobian[4][lane] = coef[1][lane] * t113 + coef[0][lane] * t114 + (0.5 + 0.5 * (t25 * (t78 + (t10 - t79)) - t115) - t80);
-        increment_jacobian[5][lane] = coef[1][lane] * t114 + coef[0][lane] * t113 + (0.5 + 0.5 * (t115 + t25 * (t81 - t82)) - t83);
-        increment_jacobian[6][lane] = t116;
-        increment_jacobian[7][lane] = coef[0][lane] * t117 + coef[1][lane] * t118 + (0.5 + 0.5 * (t25 * (t92 + t91) - t119) - t93);
-        increment_jacobian[8][lane] = 0.5 + 0.5 * (t119 + t25 * (t101 - t10 + t100)) - t102 + (coef[1][lane] * t117 + coef[0][lane] * t118);
-    }
-}
-
-/* poisson_not_hamiltonian_evaluate in all lanes. */
-static void poisson_not_hamiltonian_evaluate_lanes(poisson_not_hamiltonian_lanes coef[restrict 2],
-                                                   poisson_not_hamiltonian_lanes y[restrict 3],
-                                                   poisson_not_hamiltonian_lanes displacement[restrict 3],
-                                                   poisson_not_hamiltonian_lanes increment[restrict 3])
-{
-    poisson_not_hamiltonian_EACH_LANE
-    for (int lane = 0; lane < poisson_not_hamiltonian_LANES; ++lane) {
-        const double x = y[0][lane];
-        const double y_ = y[1][lane];
-        const double z = y[2][lane];
-        const double t1 = y_ - z;
-        const double p_z = coef[1][lane] * y_ + coef[0][lane] * z;
-        const double p_y = coef[1][lane] * z + coef[0][lane] * y_;
-        const double p_x = coef[0][lane] * x;
-        const double t2 = p_z + (p_y + 2.0 * p_x);
-        const double t3 = t1 * t2;
-        const double t4 = p_y - p_z;
-        const double t5 = x * t4;
-        const double t6 = poisson_not_hamiltonian_exp_lane(0.25 * (t3 - t5));
-        const double t7 = 0.25 * (t1 * t4 + x * t2);
-        const double t8 = poisson_not_hamiltonian_cos_lane(t7);
-        const double t9 = x * t8;
-        const double t10 = poisson_not_hamiltonian_sin_lane(t7);
-        const double t11 = t1 * t10;
-        const double t12 = t6 * (t9 - t11);
-        const double t13 = 0.5 * (y_ + z - x);
-        const double t14 = x + t1;
-        const double t15 = t14 * t8;
-        const double t16 = x - t1;
-        const double t17 = t16 * t10;
-        const double t18 = t13 + 0.5 * (t6 * (t15 + t17));
-        const double t19 = t16 * t8;
-        const double t20 = t14 * t10;
-        const double t21 = t13 + 0.5 * (t6 * (t19 - t20));
-        const double t22 = poisson_not_hamiltonian_exp_lane(0.25 * (t5 - t3));
-        displacement[0][lane] = t12 - x;
-        displacement[1][lane] = t18 - y_;
-        displacement[2][lane] = t21 - z;
-        increment[0][lane] = t22 * (t9 + t11) - t12;
-        increment[1][lane] = t13 + 0.5 * (t22 * (t15 - t17)) - t18;
-        increment[2][lane] = t13 + 0.5 * (t22 * (t19 + t20)) - t21;
-    }
-}
-
-/* poisson_not_hamiltonian_invert in all lanes. */
-static void poisson_not_hamiltonian_invert_lanes(poisson_not_hamiltonian_lanes matrix[restrict 9],
-                                                 poisson_not_hamiltonian_lanes slope[restrict 9],
-                                                 poisson_not_hamiltonian_lanes inverse[restrict 9],
-                                                 poisson_not_hamiltonian_lanes gain[restrict 9],
-                                                 poisson_not_hamiltonian_lanes reciprocal[restrict 3])
-{
-    poisson_not_hamiltonian_EACH_LANE
-    for (int lane = 0; lane < poisson_not_hamiltonian_LANES; ++lane) {
-        const double t1 = 1.0 / matrix[0][lane];
-        const double t2 = matrix[1][lane] * t1;
-        const double t3 = 1.0 / (matrix[4][lane] - matrix[3][lane] * t2);
-        const double t4 = matrix[3][lane] * t1 * t3;
-        const double t5 = matrix[2][lane] * t1;
-        const double t6 = (matrix[5][lane] - matrix[3][lane] * t5) * t3;
-        const double t7 = t5 - t2 * t6;
-        const double t8 = matrix[7][lane] - matrix[6][lane] * t2;
-        const double t9 = 1.0 / (matrix[8][lane] - matrix[6][lane] * t5 - t8 * t6);
-        const double t10 = (t8 * t4 - matrix[6][lane] * t1) * t9;
-        const double t11 = t1 + t2 * t4 - t7 * t10;
-        const double t12 = t8 * t3 * t9;
-        const double t13 = t7 * t12 - t2 * t3;
-        const double t14 = t7 * t9;
-        const double t15 = t4 + t6 * t10;
-        const double t16 = t3 + t6 * t12;
-        const double t17 = t6 * t9;
-        inverse[0][lane] = t11;
-        inverse[1][lane] = t13;
-        inverse[2][lane] = -t14;
-        inverse[3][lane] = -t15;
-        inverse[4][lane] = t16;
-        inverse[5][lane] = -t17;
-        inverse[6][lane] = t10;
-        inverse[7][lane] = -t12;
-        inverse[8][lane] = t9;
-        gain[0][lane] = slope[2][lane] * t10 + (slope[0][lane] * t11 - slope[1][lane] * t15);
-        gain[1][lane] = slope[0][lane] * t13 + slope[1][lane] * t16 - slope[2][lane] * t12;
-        gain[2][lane] = slope[2][lane] * t9 - (slope[0][lane] * t14 + slope[1][lane] * t17);
-        gain[3][lane] = slope[5][lane] * t10 + (slope[3][lane] * t11 - slope[4][lane] * t15);
-        gain[4][lane] = slope[3][lane] * t13 + slope[4][lane] * t16 - slope[5][lane] * t12;
-        gain[5][lane] = slope[5][lane] * t9 - (slope[4][lane] * t17 + slope[3][lane] * t14);
-        gain[6][lane] = slope[8][lane] * t10 + (slope[6][lane] * t11 - slope[7][lane] * t15);
-        gain[7][lane] = slope[6][lane] * t13 + slope[7][lane] * t16 - slope[8][lane] * t12;
-        gain[8][lane] = slope[8][lane] * t9 - (slope[6][lane] * t14 + slope[7][lane] * t17);
-        reciprocal[0][lane] = t1;
-        reciprocal[1][lane] = t3;
-        reciprocal[2][lane] = t9;
-    }
-}
-
-/* Everything about a stage at the points y. The matrices are I + O(h): where a pivot is far from 1, all is infinite. */
-static void poisson_not_hamiltonian_tabulate(poisson_not_hamiltonian_lanes coef[restrict], poisson_not_hamiltonian_model *model)
-{
-    poisson_not_hamiltonian_lanes jacobian[9], reciprocal[3];
-    poisson_not_hamiltonian_linearise_lanes(coef, model->y, model->displacement, model->increment, jacobian, model->slope);
-    poisson_not_hamiltonian_invert_lanes(jacobian, model->slope, model->inverse, model->gain, reciprocal);
-    for (int i = 0; i < 3; ++i) {
-        poisson_not_hamiltonian_EACH_LANE
-        for (int lane = 0; lane < poisson_not_hamiltonian_LANES; ++lane)
-            model->inverse[i][lane] += fabs(reciprocal[i][lane]) < 1e3 ? 0.0 : HUGE_VAL;
-    }
-}
-
-/* poisson_not_hamiltonian_size in all lanes, summed over the components. */
-static void poisson_not_hamiltonian_sizes(poisson_not_hamiltonian_lanes y[restrict 3], poisson_not_hamiltonian_lanes delta[restrict 3],
-    poisson_not_hamiltonian_lanes size)
-{
-    poisson_not_hamiltonian_lanes norm = { 0.0 };
-    memset(size, 0, poisson_not_hamiltonian_LANES * sizeof size[0]);
-    for (int i = 0; i < 3; ++i)
-        for (int lane = 0; lane < poisson_not_hamiltonian_LANES; ++lane)
-            norm[lane] = 1e-6 * fabs(y[i][lane]) > norm[lane] ? 1e-6 * fabs(y[i][lane]) : norm[lane];
-    for (int i = 0; i < 3; ++i) {
-        poisson_not_hamiltonian_EACH_LANE
-        for (int lane = 0; lane < poisson_not_hamiltonian_LANES; ++lane)
-            size[lane] += fabs(delta[i][lane]) / (fabs(y[i][lane]) + norm[lane] + DBL_MIN);
-    }
-}
-
-/* Correct y by the residuals, with the inverse in the table, and measure the corrections. */
-static void poisson_not_hamiltonian_correct(poisson_not_hamiltonian_model *model, poisson_not_hamiltonian_lanes size)
-{
-    poisson_not_hamiltonian_lanes delta[3];
-    memset(delta, 0, sizeof delta);
-    for (int i = 0; i < 3; ++i)
-        for (int j = 0; j < 3; ++j) {
-            poisson_not_hamiltonian_EACH_LANE
-            for (int lane = 0; lane < poisson_not_hamiltonian_LANES; ++lane)
-                delta[i][lane] += model->inverse[i * 3 + j][lane] * model->residual[j][lane];
-        }
-    poisson_not_hamiltonian_sizes(model->y, delta, size);
-    for (int i = 0; i < 3; ++i)
-        for (int lane = 0; lane < poisson_not_hamiltonian_LANES; ++lane) model->y[i][lane] -= delta[i][lane];
-}
-
-/* The largest of the lanes, none of which is negative; infinite if one is not finite. As integers, the bits of such
-   numbers have their order, and those of what is no number are larger. */
-static double poisson_not_hamiltonian_largest(const poisson_not_hamiltonian_lanes size)
-{
-    uint64_t bits[8], most = 0;
-    double largest;
-    memcpy(bits, size, sizeof bits);
-    for (int lane = 0; lane < poisson_not_hamiltonian_LANES; ++lane) most = bits[lane] > most ? bits[lane] : most;
-    memcpy(&largest, &most, sizeof largest);
-    return isfinite(largest) ? largest : HUGE_VAL;
-}
-
-/* poisson_not_hamiltonian_near for the guesses of all lanes, seen from one value. */
-static int poisson_not_hamiltonian_near_lanes(poisson_not_hamiltonian_lanes y[restrict 3], const double last[3])
-{
-    poisson_not_hamiltonian_lanes distance = { 0.0 };
-    double size = 0.0;
-    for (int i = 0; i < 3; ++i) {
-        size += fabs(last[i]);
-        poisson_not_hamiltonian_EACH_LANE
-        for (int lane = 0; lane < poisson_not_hamiltonian_LANES; ++lane) distance[lane] += fabs(y[i][lane] - last[i]);
-    }
-    return poisson_not_hamiltonian_largest(distance) <= 4.0 * size;
-}
-
-/* What is left after a correction of this size: quadratic in it, where the matrices are of the points corrected; where
-   they are of points further off, by bend, also of the order of size times bend. bound is what the last pass left. */
-static double poisson_not_hamiltonian_remaining(double size, double bend, double bound)
-{
-    const double growth = size / bound, left = size * (size + bend);
-    return growth > 1.0 ? growth * left : left;
-}
-
-/* The table of a stage, with its matrices or with those of the last pass. */
-static void poisson_not_hamiltonian_update(poisson_not_hamiltonian_lanes coef[restrict], poisson_not_hamiltonian_model *model, int matrices)
-{
-    if (matrices)
-        poisson_not_hamiltonian_tabulate(coef, model);
-    else
-        poisson_not_hamiltonian_evaluate_lanes(coef, model->y, model->displacement, model->increment);
-}
-
-/* The steps of a block one after the other, each along the linear model of its lane. As X, the state with its carry, gains
-   increment - gain residual, the next residual follows from this one; X itself is added up apart. */
-static void poisson_not_hamiltonian_chain(poisson_not_hamiltonian_model model[1], double x[3], double carry[3])
-{
-    double residual[3], sum[3], small[3];
-    for (int i = 0; i < 3; ++i) {
-        residual[i] = ((model->y[i][0] - x[i]) + model->displacement[i][0]) - carry[i];
-        sum[i] = x[i];
-        small[i] = carry[i];
-    }
-    for (int k = 0; k < 1 * poisson_not_hamiltonian_LANES; ++k) {
-        const int lane = k / 1, after = (k + 1) / 1 % poisson_not_hamiltonian_LANES;
-        poisson_not_hamiltonian_model *at = &model[k % 1], *next = &model[(k + 1) % 1];
-        double even[3] = { 0.0 }, odd[3] = { 0.0 }; /* two sums, so that no long chain of additions is waited for */
-        for (int i = 0; i < 3; ++i) {
-            at->residual[i][lane] = residual[i];
-            for (int j = 0; j < 3; j += 2) even[i] += at->gain[i * 3 + j][lane] * residual[j];
-            for (int j = 1; j < 3; j += 2) odd[i] += at->gain[i * 3 + j][lane] * residual[j];
-        }
-        for (int i = 0; i < 3; ++i) {
-            const double change = at->increment[i][lane], total = sum[i] + change, added = total - sum[i];
-            const double turn = (next->displacement[i][after] - at->displacement[i][lane]) - change;
-            const double moved = (next->y[i][after] - at->y[i][lane]) + turn;
-            residual[i] = ((moved + residual[i]) + odd[i]) + even[i];
-            small[i] += ((sum[i] - (total - added)) + (change - added)) - (even[i] + odd[i]);
-            sum[i] = total;
-        }
-    }
-    for (int i = 0; i < 3; ++i) {
-        x[i] = sum[i] + small[i];
-        carry[i] = small[i] - (x[i] - sum[i]);
-    }
-}
-
-/* Bring the table up to date: coefficients, and weights that were fitted since. */
-static void poisson_not_hamiltonian_refresh(const poisson_not_hamiltonian_solver *s, poisson_not_hamiltonian_table *table)
-{
-    for (int stage = 0; stage < 1; ++stage) {
-        if (table->fits[stage] == s->memory[stage].fits) continue;
-        table->fits[stage] = s->memory[stage].fits;
-        for (int k = 0; k < 2; ++k)
-            for (int lane = 0; lane < poisson_not_hamiltonian_LANES; ++lane) table->coef[stage][k][lane] = s->coef[stage][k];
-        memcpy(table->weight[stage], s->memory[stage].weight, (size_t)s->memory[stage].terms * sizeof table->weight[0][0]);
-    }
-}
-
-/* Guesses for the next poisson_not_hamiltonian_LANES values of a stage, by its recurrences. */
-static void poisson_not_hamiltonian_foresee(const poisson_not_hamiltonian_memory *memory, poisson_not_hamiltonian_lanes weight[restrict][3],
-    poisson_not_hamiltonian_lanes y[restrict 3])
-{
-    const int last = memory->count - 1;
-    for (int i = 0; i < 3; ++i) {
-        poisson_not_hamiltonian_lanes even = { 0.0 }, odd = { 0.0 };
-        for (int k = 0; k < memory->terms; k += 2) {
-            const double past = memory->past[last - k][i], earlier = memory->past[last - 1 - k][i];
-            poisson_not_hamiltonian_EACH_LANE
-            for (int lane = 0; lane < poisson_not_hamiltonian_LANES; ++lane) even[lane] += weight[k][i][lane] * past;
-            poisson_not_hamiltonian_EACH_LANE
-            for (int lane = 0; lane < poisson_not_hamiltonian_LANES; ++lane) odd[lane] += weight[k + 1][i][lane] * earlier;
-        }
-        poisson_not_hamiltonian_EACH_LANE
-        for (int lane = 0; lane < poisson_not_hamiltonian_LANES; ++lane) y[i][lane] = even[lane] + odd[lane];
-    }
-}
-
-/* poisson_not_hamiltonian_record for the values of all lanes, one after the other. */
-static void poisson_not_hamiltonian_record_lanes(poisson_not_hamiltonian_memory *memory, poisson_not_hamiltonian_lanes y[restrict 3])
-{
-    poisson_not_hamiltonian_make_room(memory, poisson_not_hamiltonian_LANES);
-    for (int lane = 0; lane < poisson_not_hamiltonian_LANES; ++lane)
-        for (int i = 0; i < 3; ++i) memory->past[memory->count + lane][i] = y[i][lane];
-    memory->count += poisson_not_hamiltonian_LANES;
-}
-
-/* Guesses where no recurrence is known: where alpha and beta have the means of steps by the classical Runge-Kutta
-   method, to leading order. */
-static void poisson_not_hamiltonian_march(const poisson_not_hamiltonian_solver *s, poisson_not_hamiltonian_table *table, poisson_not_hamiltonian_model model[1])
-{
-    static const double reach[4] = { 0.5, 0.5, 1.0, 0.0 }, weight[4] = { 1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0 };
-    double x[3], point[3], slope[3], mean[3];
-    memcpy(x, s->x, sizeof x);
-    for (int k = 0; k < 1 * poisson_not_hamiltonian_LANES; ++k) {
-        const double h = poisson_not_hamiltonian_fractions[k % 1] * s->h;
-        memcpy(point, x, sizeof x);
-        memset(mean, 0, sizeof mean);
-        for (int part = 0; part < 4; ++part) {
-            poisson_not_hamiltonian_vector_field(&s->params, point, slope);
-            for (int i = 0; i < 3; ++i) {
-                mean[i] += weight[part] * slope[i];
-                point[i] = x[i] + h * reach[part] * slope[i];
-            }
-        }
-        for (int i = 0; i < 3; ++i) {
-            model[k % 1].y[i][k / 1] = x[i] + 0.5 * h * mean[i];
-            x[i] += h * mean[i];
-        }
-    }
-    for (int stage = 0; stage < 1; ++stage) {
-        poisson_not_hamiltonian_model *at = &model[stage];
-        poisson_not_hamiltonian_evaluate_lanes(table->coef[stage], at->y, at->displacement, at->increment);
-        for (int i = 0; i < 3; ++i) {
-            poisson_not_hamiltonian_EACH_LANE
-            for (int lane = 0; lane < poisson_not_hamiltonian_LANES; ++lane)
-                at->y[i][lane] -= at->displacement[i][lane] + 0.5 * at->increment[i][lane];
-        }
-    }
-}
-
-/* poisson_not_hamiltonian_LANES steps at once: guess the points of all, and correct them together until the error that remains is as
-   small as after a single step. How many passes that took; 0, and the solver as before, where it takes more than most. */
-static int poisson_not_hamiltonian_block(poisson_not_hamiltonian_solver *s, poisson_not_hamiltonian_table *table, int most)
-{
-    poisson_not_hamiltonian_model model[1];
-    poisson_not_hamiltonian_lanes sizes;
-    double x[3], carry[3], previous = HUGE_VAL, bend = 0.0, bound = HUGE_VAL;
-    int passes = 0, solved = 0;
-    if (!s->foreseeing) poisson_not_hamiltonian_march(s, table, model);
-    for (int stage = 0; stage < 1; ++stage) {
-        if (s->foreseeing) poisson_not_hamiltonian_foresee(&s->memory[stage], table->weight[stage], model[stage].y);
-        if (!poisson_not_hamiltonian_near_lanes(model[stage].y, s->x)) return 0;
-    }
-    while (!solved) {
-        double size = 0.0;
-        const int matrices = previous > 1e-05;
-        for (int stage = 0; stage < 1; ++stage) poisson_not_hamiltonian_update(table->coef[stage], &model[stage], matrices);
-        memcpy(x, s->x, sizeof x);
-        memcpy(carry, s->carry, sizeof carry);
-        poisson_not_hamiltonian_chain(model, x, carry);
-        for (int stage = 0; stage < 1; ++stage) {
-            poisson_not_hamiltonian_correct(&model[stage], sizes);
-            const double largest = poisson_not_hamiltonian_largest(sizes);
-            size = largest > size ? largest : size;
-        }
-        s->evaluations += 1 * poisson_not_hamiltonian_LANES;
-        bend = matrices ? 0.0 : bend + previous;
-        bound = poisson_not_hamiltonian_remaining(size, bend, bound);
-        /* The second test: after the square of so small a correction there is rounding only. */
-        solved = bound <= 1e-20 || (previous < 1e-8 && size < 1e-10);
-        if ((++passes >= most || !(size < previous)) && !solved) return 0;
-        previous = size;
-    }
-    for (int stage = 0; stage < 1; ++stage)
-        if (!poisson_not_hamiltonian_near_lanes(model[stage].y, s->x)) return 0;
-    for (int i = 0; i < 3; ++i)
-        if (!isfinite(x[i])) return 0;
-    memcpy(s->x, x, sizeof x);
-    memcpy(s->carry, carry, sizeof carry);
-    s->steps += poisson_not_hamiltonian_LANES;
-    for (int stage = 0; stage < 1; ++stage) {
-        poisson_not_hamiltonian_memory *memory = &s->memory[stage];
-        poisson_not_hamiltonian_record_lanes(memory, model[stage].y);
-        memory->slow = passes > 1 ? memory->slow + poisson_not_hamiltonian_LANES : 0;
-        if (memory->slow > memory->patience && s->foreseeing) poisson_not_hamiltonian_fit(memory);
-    }
-    return passes;
-}
-
-/* Recurrences are given up for a while, the longer the more often that happens. */
-static void poisson_not_hamiltonian_give_up(poisson_not_hamiltonian_solver *s)
-{
-    s->foreseeing = s->setback = s->pause = 0;
-    s->doubt = 2 * s->doubt + 600;
-    s->retry = s->steps + s->doubt;
-}
-
-/* How the next block is guessed: by recurrences, fitted as soon as enough steps are to be made, or
-   have been, to repay that. */
-static void poisson_not_hamiltonian_choose_guess(poisson_not_hamiltonian_solver *s, size_t steps)
-{
-    for (int stage = 0; stage < 1; ++stage)
-        if (s->memory[stage].count < 111) {
-            s->foreseeing = 0;
-            return;
-        }
-    if (s->foreseeing || (steps < 600 && s->steps < 150) || s->steps < s->retry) return;
-    s->foreseeing = 1;
-    for (int stage = 0; stage < 1 && s->foreseeing; ++stage) {
-        poisson_not_hamiltonian_fit(&s->memory[stage]);
-        s->foreseeing = s->memory[stage].terms > 0;
-    }
-    s->pause = poisson_not_hamiltonian_LANES;
-    if (!s->foreseeing) poisson_not_hamiltonian_give_up(s);
-}
-
-/* Learn from a block: after one that failed single steps are made, the more the more often that happens. Recurrences
-   that fail repeatedly, or need more passes than steps by Runge-Kutta did, are given up. */
-static void poisson_not_hamiltonian_learn_from(poisson_not_hamiltonian_solver *s, int passes)
-{
-    if (passes > 0) {
-        s->setback /= 2;
-    } else {
-        s->setback = 2 * s->setback + poisson_not_hamiltonian_LANES > 1000 ? 1000 : 2 * s->setback + poisson_not_hamiltonian_LANES;
-        s->pause = s->setback;
-    }
-    if (!s->foreseeing) {
-        s->passes = passes > 0 ? passes : INT_MAX;
-    } else if (passes > s->passes || s->setback > 5 * poisson_not_hamiltonian_LANES) {
-        poisson_not_hamiltonian_give_up(s);
-    }
-}
-
-/* A single step, and the running mean of the evaluations that a stage of one takes. */
-static poisson_not_hamiltonian_status poisson_not_hamiltonian_single(poisson_not_hamiltonian_solver *s)
-{
-    const size_t before = s->evaluations;
-    const poisson_not_hamiltonian_status status = poisson_not_hamiltonian_step(s, s->h);
-    s->effort += 0.125 * ((double)(s->evaluations - before) / 1 - s->effort);
-    return status;
-}
-
-/* Blocks of steps where they cost less than single steps, with at most as many passes over a block as 2 for each
-   evaluation in a single step. The results differ by round-off only. */
-poisson_not_hamiltonian_status poisson_not_hamiltonian_integrate(poisson_not_hamiltonian_solver *s, double h, size_t steps)
-{
-    poisson_not_hamiltonian_table table;
     poisson_not_hamiltonian_status status = poisson_not_hamiltonian_set_step(s, h);
-    for (int stage = 0; stage < 1; ++stage) table.fits[stage] = -1;
-    while (status == poisson_not_hamiltonian_OK && steps > 0) {
-        if (steps >= poisson_not_hamiltonian_LANES && s->pause == 0) poisson_not_hamiltonian_choose_guess(s, steps);
-        if (steps >= poisson_not_hamiltonian_LANES && s->pause == 0) {
-            poisson_not_hamiltonian_refresh(s, &table);
-            const int passes = poisson_not_hamiltonian_block(s, &table, (int)(2 * s->effort + 0.5));
-            poisson_not_hamiltonian_learn_from(s, passes);
-            if (passes > 0) steps -= poisson_not_hamiltonian_LANES;
-        } else {
-            if (s->pause > 0) --s->pause;
-            status = poisson_not_hamiltonian_single(s);
-            if (status == poisson_not_hamiltonian_OK) --steps;
-        }
-    }
+    for (; steps > 0 && status == poisson_not_hamiltonian_OK; --steps)
+        status = poisson_not_hamiltonian_step(s, h);
     return status;
-}
-
-/* Members of an ensemble, each in its lane. */
-typedef struct {
-    poisson_not_hamiltonian_lanes x[3], carry[3], coef[1][2];
-    poisson_not_hamiltonian_lanes past[1][111][3]; /* solved values, in a ring */
-    poisson_not_hamiltonian_lanes weight[1][40][3]; /* of past values, the latest first, for the next */
-    int latest;     /* the row of the latest values */
-    int count;      /* rows in use */
-    int order[1];   /* how many of them the extrapolation uses */
-    int terms[1];   /* how many of them the recurrences use */
-    int fits;       /* how often recurrences have been fitted */
-    int fitting[1]; /* whether they are the better guess */
-    int slow;       /* how many of the last steps took more than one iteration */
-    int patience;   /* how many of those before recurrences are fitted again */
-    int active[8];  /* whether the lane has a member that has not failed */
-    size_t left[8]; /* steps that are still to be made, where one has */
-} poisson_not_hamiltonian_group;
-
-/* The past values of a stage, the latest for k = 0. */
-static poisson_not_hamiltonian_lanes *poisson_not_hamiltonian_group_past(poisson_not_hamiltonian_group *group, int stage, int k)
-{
-    const int row = group->latest + k;
-    return group->past[stage][row < 111 ? row : row - 111];
-}
-
-/* Guess the values of a stage by the recurrences of the members. */
-static void poisson_not_hamiltonian_group_foresee(poisson_not_hamiltonian_group *group, int stage, poisson_not_hamiltonian_lanes y[restrict 3])
-{
-    memset(y, 0, 3 * sizeof y[0]);
-    for (int k = 0; k < group->terms[stage]; ++k) {
-        poisson_not_hamiltonian_lanes *past = poisson_not_hamiltonian_group_past(group, stage, k), *weight = group->weight[stage][k];
-        for (int i = 0; i < 3; ++i) {
-            poisson_not_hamiltonian_EACH_LANE
-            for (int lane = 0; lane < poisson_not_hamiltonian_LANES; ++lane) y[i][lane] += weight[i][lane] * past[i][lane];
-        }
-    }
-}
-
-/* Extrapolate the values of a stage. */
-static void poisson_not_hamiltonian_group_extrapolate(poisson_not_hamiltonian_group *group, int stage, poisson_not_hamiltonian_lanes y[restrict 3])
-{
-    const int order = group->order[stage];
-    double binomial = -1.0;
-    memcpy(y, group->x, 3 * sizeof y[0]);
-    if (order > 0) memset(y, 0, 3 * sizeof y[0]);
-    for (int k = 0; k < order; ++k) {
-        poisson_not_hamiltonian_lanes *past = poisson_not_hamiltonian_group_past(group, stage, k);
-        binomial *= -(double)(order - k) / (k + 1);
-        for (int i = 0; i < 3; ++i) {
-            poisson_not_hamiltonian_EACH_LANE
-            for (int lane = 0; lane < poisson_not_hamiltonian_LANES; ++lane) y[i][lane] += binomial * past[i][lane];
-        }
-    }
-}
-
-/* The sum over members of the absolute values of all components. */
-static double poisson_not_hamiltonian_group_sum(const poisson_not_hamiltonian_group *group, poisson_not_hamiltonian_lanes y[3])
-{
-    double sum = 0.0;
-    for (int i = 0; i < 3; ++i)
-        for (int lane = 0; lane < poisson_not_hamiltonian_LANES; ++lane) sum += group->active[lane] ? fabs(y[i][lane]) : 0.0;
-    return sum;
-}
-
-static void poisson_not_hamiltonian_group_subtract(poisson_not_hamiltonian_lanes y[restrict 3], poisson_not_hamiltonian_lanes other[restrict 3])
-{
-    for (int i = 0; i < 3; ++i) {
-        poisson_not_hamiltonian_EACH_LANE
-        for (int lane = 0; lane < poisson_not_hamiltonian_LANES; ++lane) y[i][lane] -= other[i][lane];
-    }
-}
-
-/* Choose the guess that would have been best for these values. */
-static void poisson_not_hamiltonian_group_judge(poisson_not_hamiltonian_group *group, int stage, poisson_not_hamiltonian_lanes y[3])
-{
-    poisson_not_hamiltonian_lanes row[8 + 1][3];
-    const int rows = group->count < 8 ? group->count : 8;
-    double least = HUGE_VAL;
-    memcpy(row[0], y, sizeof row[0]);
-    for (int k = 0; k < rows; ++k) memcpy(row[k + 1], poisson_not_hamiltonian_group_past(group, stage, k), sizeof row[0]);
-    if (group->order[stage] == 0) group->order[stage] = 1;
-    for (int order = 1; order <= rows; ++order) { /* row[0] becomes the backward difference of this order */
-        for (int k = 0; k <= rows - order; ++k) poisson_not_hamiltonian_group_subtract(row[k], row[k + 1]);
-        const double size = poisson_not_hamiltonian_group_sum(group, row[0]);
-        if (size < least) {
-            least = size;
-            group->order[stage] = order;
-        }
-    }
-    if (group->terms[stage] == 0) return;
-    poisson_not_hamiltonian_group_foresee(group, stage, row[0]);
-    poisson_not_hamiltonian_group_subtract(row[0], y);
-    group->fitting[stage] = poisson_not_hamiltonian_group_sum(group, row[0]) <= least;
-}
-
-/* Fit the recurrences of all members; with every time, wait longer before it is done again, and for long if it did not
-   help. */
-static void poisson_not_hamiltonian_group_fit(poisson_not_hamiltonian_group *group)
-{
-    poisson_not_hamiltonian_memory memory;
-    const int helped = group->fits == 0 || group->fitting[0];
-    memory.count = 111;
-    for (int stage = 0; stage < 1; ++stage) {
-        int found = 1;
-        group->terms[stage] = 0;
-        for (int lane = 0; lane < poisson_not_hamiltonian_LANES; ++lane)
-            for (int i = 0; i < 3 && group->active[lane] && found; ++i) {
-                for (int k = 0; k < 111; ++k)
-                    memory.past[111 - 1 - k][i] = poisson_not_hamiltonian_group_past(group, stage, k)[i][lane];
-                const int terms = poisson_not_hamiltonian_train(&memory, i);
-                found = terms > 0;
-                if (terms > group->terms[stage]) group->terms[stage] = terms;
-                for (int k = 0; k < 40; ++k) group->weight[stage][k][i][lane] = memory.weight[k][i][0];
-            }
-        if (!found) group->terms[stage] = 0;
-        group->fitting[stage] = found;
-    }
-    ++group->fits;
-    group->slow = 0;
-    group->patience = helped && group->patience < 10000 ? 2 * group->patience + 150 : 100 * 150;
-}
-
-/* Replace guesses that are not near the last values, as poisson_not_hamiltonian_near has it, by these; lane by lane. */
-static void poisson_not_hamiltonian_stay_near(poisson_not_hamiltonian_lanes y[restrict 3], poisson_not_hamiltonian_lanes last[restrict 3])
-{
-    poisson_not_hamiltonian_lanes distance = { 0.0 }, size = { 0.0 };
-    for (int i = 0; i < 3; ++i) {
-        poisson_not_hamiltonian_EACH_LANE
-        for (int lane = 0; lane < poisson_not_hamiltonian_LANES; ++lane) {
-            distance[lane] += fabs(y[i][lane] - last[i][lane]);
-            size[lane] += fabs(last[i][lane]);
-        }
-    }
-    for (int i = 0; i < 3; ++i) {
-        poisson_not_hamiltonian_EACH_LANE
-        for (int lane = 0; lane < poisson_not_hamiltonian_LANES; ++lane)
-            y[i][lane] = distance[lane] <= 4.0 * size[lane] ? y[i][lane] : last[i][lane];
-    }
-}
-
-/* Whether lanes are still to be solved after a correction of this size; those where nothing is finite leave the group.
-   bound is what remains in each lane. */
-static int poisson_not_hamiltonian_group_open(poisson_not_hamiltonian_group *group, const poisson_not_hamiltonian_lanes size, const poisson_not_hamiltonian_lanes previous,
-    double bend, poisson_not_hamiltonian_lanes bound)
-{
-    int open = 0;
-    poisson_not_hamiltonian_EACH_LANE
-    for (int lane = 0; lane < poisson_not_hamiltonian_LANES; ++lane)
-        bound[lane] = poisson_not_hamiltonian_remaining(size[lane], bend, bound[lane]);
-    if (poisson_not_hamiltonian_largest(bound) <= 1e-20) return 0;
-    for (int lane = 0; lane < poisson_not_hamiltonian_LANES; ++lane) {
-        const int solved = bound[lane] <= 1e-20 || (previous[lane] < 1e-8 && size[lane] < 1e-10);
-        if (!isfinite(size[lane])) group->active[lane] = 0;
-        open += group->active[lane] && !solved;
-    }
-    return open;
-}
-
-/* The guess for a stage: recurrences, or extrapolation; the state for members where that is not near. */
-static void poisson_not_hamiltonian_group_predict(poisson_not_hamiltonian_group *group, int stage, poisson_not_hamiltonian_lanes y[3])
-{
-    if (group->fitting[stage]) poisson_not_hamiltonian_group_foresee(group, stage, y);
-    else poisson_not_hamiltonian_group_extrapolate(group, stage, y);
-    poisson_not_hamiltonian_stay_near(y, group->x);
-}
-
-/* Newton's method for a stage, until the slowest lane is solved. The number of iterations; where that is the most
-   allowed, lanes that are not solved leave the group. */
-static int poisson_not_hamiltonian_group_solve(poisson_not_hamiltonian_group *group, int stage, poisson_not_hamiltonian_model *model)
-{
-    poisson_not_hamiltonian_lanes size, previous, bound;
-    double largest = HUGE_VAL, bend = 0.0;
-    int iterations = 0, open = 1;
-    for (int lane = 0; lane < poisson_not_hamiltonian_LANES; ++lane) size[lane] = bound[lane] = HUGE_VAL;
-    poisson_not_hamiltonian_group_predict(group, stage, model->y);
-    for (; open > 0 && iterations < 20; ++iterations) {
-        memcpy(previous, size, sizeof size);
-        poisson_not_hamiltonian_update(group->coef[stage], model, largest > 1e-05);
-        bend = largest > 1e-05 ? 0.0 : bend + largest;
-        for (int i = 0; i < 3; ++i) {
-            poisson_not_hamiltonian_EACH_LANE
-            for (int lane = 0; lane < poisson_not_hamiltonian_LANES; ++lane)
-                model->residual[i][lane] =
-                    ((model->y[i][lane] - group->x[i][lane]) + model->displacement[i][lane]) - group->carry[i][lane];
-        }
-        poisson_not_hamiltonian_correct(model, size);
-        open = poisson_not_hamiltonian_group_open(group, size, previous, bend, bound);
-        largest = poisson_not_hamiltonian_largest(size);
-    }
-    for (int lane = 0; lane < poisson_not_hamiltonian_LANES && open > 0; ++lane)
-        group->active[lane] = group->active[lane] && bound[lane] <= 1e-20;
-    return iterations;
-}
-
-/* Add the increments, corrected to first order, in compensated arithmetic as for a single step. */
-static void poisson_not_hamiltonian_group_advance(poisson_not_hamiltonian_lanes x[restrict 3], poisson_not_hamiltonian_lanes carry[restrict 3],
-    poisson_not_hamiltonian_model *model)
-{
-    for (int i = 0; i < 3; ++i)
-        for (int j = 0; j < 3; ++j) {
-            poisson_not_hamiltonian_EACH_LANE
-            for (int lane = 0; lane < poisson_not_hamiltonian_LANES; ++lane)
-                carry[i][lane] -= model->gain[i * 3 + j][lane] * model->residual[j][lane];
-        }
-    for (int i = 0; i < 3; ++i) {
-        poisson_not_hamiltonian_EACH_LANE
-        for (int lane = 0; lane < poisson_not_hamiltonian_LANES; ++lane) {
-            const double change = model->increment[i][lane], sum = x[i][lane] + change, added = sum - x[i][lane];
-            const double small = ((x[i][lane] - (sum - added)) + (change - added)) + carry[i][lane];
-            x[i][lane] = sum + small;
-            carry[i][lane] = small - (x[i][lane] - sum);
-        }
-    }
-}
-
-/* Members that failed, or whose state is not near the one before the step or not finite, keep that one, and leave. How many
-   stay. */
-static int poisson_not_hamiltonian_group_leave(poisson_not_hamiltonian_group *group, poisson_not_hamiltonian_lanes x[3], poisson_not_hamiltonian_lanes carry[3],
-    size_t remaining)
-{
-    poisson_not_hamiltonian_lanes moved = { 0.0 }, size = { 0.0 }, bad;
-    int active = 0;
-    for (int i = 0; i < 3; ++i) {
-        poisson_not_hamiltonian_EACH_LANE
-        for (int lane = 0; lane < poisson_not_hamiltonian_LANES; ++lane) {
-            moved[lane] += fabs(group->x[i][lane] - x[i][lane]);
-            size[lane] += fabs(x[i][lane]);
-        }
-    }
-    for (int lane = 0; lane < poisson_not_hamiltonian_LANES; ++lane) bad[lane] = moved[lane] <= 4.0 * size[lane] ? 0.0 : 1.0;
-    for (int lane = 0; lane < poisson_not_hamiltonian_LANES; ++lane) active += group->active[lane];
-    if (active == poisson_not_hamiltonian_LANES && !(poisson_not_hamiltonian_largest(bad) > 0.0)) return active;
-    active = 0;
-    for (int lane = 0; lane < poisson_not_hamiltonian_LANES; ++lane) {
-        group->active[lane] = group->active[lane] && !(bad[lane] > 0.0);
-        active += group->active[lane];
-        for (int i = 0; i < 3 && !group->active[lane]; ++i) {
-            group->x[i][lane] = x[i][lane];
-            group->carry[i][lane] = carry[i][lane];
-        }
-        if (!group->active[lane] && group->left[lane] == 0) group->left[lane] = remaining;
-    }
-    return active;
-}
-
-/* One step of all members, of as many as remain. How many members are left. */
-static int poisson_not_hamiltonian_group_step(poisson_not_hamiltonian_group *group, size_t remaining)
-{
-    poisson_not_hamiltonian_lanes x[3], carry[3];
-    poisson_not_hamiltonian_model model;
-    const int next = (group->latest > 0 ? group->latest : 111) - 1;
-    int most = 0;
-    memcpy(x, group->x, sizeof x);
-    memcpy(carry, group->carry, sizeof carry);
-    for (int stage = 0; stage < 1; ++stage) {
-        const int iterations = poisson_not_hamiltonian_group_solve(group, stage, &model);
-        poisson_not_hamiltonian_group_advance(group->x, group->carry, &model);
-        if (iterations > most) most = iterations;
-        if ((iterations > 1 && next % 8 == 0) || group->count < 8)
-            poisson_not_hamiltonian_group_judge(group, stage, model.y);
-        memcpy(group->past[stage][next], model.y, sizeof model.y);
-    }
-    group->latest = next;
-    if (group->count < 111) ++group->count;
-    group->slow = most > 1 ? group->slow + 1 : 0;
-    if (group->slow > group->patience && group->count == 111 && remaining >= 600)
-        poisson_not_hamiltonian_group_fit(group);
-    return poisson_not_hamiltonian_group_leave(group, x, carry, remaining);
-}
-
-/* Put a member into a lane: its state, and its coefficients. */
-static poisson_not_hamiltonian_status poisson_not_hamiltonian_group_join(poisson_not_hamiltonian_group *group, int lane, const poisson_not_hamiltonian_params *params,
-    const double x0[3], double h)
-{
-    poisson_not_hamiltonian_solver s;
-    poisson_not_hamiltonian_status status = poisson_not_hamiltonian_init(&s, params, x0);
-    if (status == poisson_not_hamiltonian_OK) status = poisson_not_hamiltonian_set_step(&s, h);
-    if (status != poisson_not_hamiltonian_OK) return status;
-    for (int i = 0; i < 3; ++i) group->x[i][lane] = s.x[i];
-    for (int stage = 0; stage < 1; ++stage)
-        for (int k = 0; k < 2; ++k) group->coef[stage][k][lane] = s.coef[stage][k];
-    group->active[lane] = 1;
-    return status;
-}
-
-/* The steps that a member has still to make after it left the group, by itself. */
-static poisson_not_hamiltonian_status poisson_not_hamiltonian_group_finish(const poisson_not_hamiltonian_group *group, int lane, const poisson_not_hamiltonian_params *params,
-    double x[3], double h)
-{
-    poisson_not_hamiltonian_solver s;
-    poisson_not_hamiltonian_status status = poisson_not_hamiltonian_init(&s, params, x);
-    if (status != poisson_not_hamiltonian_OK) return status;
-    for (int i = 0; i < 3; ++i) s.carry[i] = group->carry[i][lane];
-    status = poisson_not_hamiltonian_integrate(&s, h, group->left[lane]);
-    memcpy(x, s.x, sizeof s.x);
-    return status;
-}
-
-/* The members from first on, as many as there are lanes. The first status that is not OK. */
-static poisson_not_hamiltonian_status poisson_not_hamiltonian_group_run(const poisson_not_hamiltonian_params *params, double *x, size_t members, size_t first,
-    double h, size_t steps, unsigned char *status)
-{
-    poisson_not_hamiltonian_group group;
-    poisson_not_hamiltonian_status worst = poisson_not_hamiltonian_OK, member[8];
-    const int count = members - first < poisson_not_hamiltonian_LANES ? (int)(members - first) : poisson_not_hamiltonian_LANES;
-    double state[3];
-    size_t left = steps;
-    memset(&group, 0, sizeof group);
-    for (int lane = 0; lane < count; ++lane) {
-        for (size_t i = 0; i < 3; ++i) state[i] = x[i * members + first + (size_t)lane];
-        member[lane] = poisson_not_hamiltonian_group_join(&group, lane, params, state, h);
-    }
-    for (int active = count; left > 0 && active > 2; --left) active = poisson_not_hamiltonian_group_step(&group, left);
-    for (int lane = 0; lane < count; ++lane) {
-        if (group.active[lane]) group.left[lane] = left;
-        for (int i = 0; i < 3; ++i) state[i] = group.x[i][lane];
-        if (member[lane] == poisson_not_hamiltonian_OK) {
-            if (group.left[lane] > 0) member[lane] = poisson_not_hamiltonian_group_finish(&group, lane, params, state, h);
-            for (size_t i = 0; i < 3; ++i) x[i * members + first + (size_t)lane] = state[i];
-        }
-        if (status != NULL) status[first + (size_t)lane] = (unsigned char)member[lane];
-        if (worst == poisson_not_hamiltonian_OK) worst = member[lane];
-    }
-    return worst;
-}
-
-poisson_not_hamiltonian_status poisson_not_hamiltonian_ensemble(const poisson_not_hamiltonian_params *params,
-                                                                double *x, size_t members, double h,
-                                                                size_t steps, unsigned char *status)
-{
-    poisson_not_hamiltonian_status worst = isfinite(h) ? poisson_not_hamiltonian_OK : poisson_not_hamiltonian_BAD_ARGUMENT;
-    const poisson_not_hamiltonian_params own = params != NULL ? *params : poisson_not_hamiltonian_default_params;
-    size_t earliest = members;
-    if (x == NULL && members > 0) return poisson_not_hamiltonian_BAD_ARGUMENT;
-#ifdef _OPENMP
-#pragma omp parallel for schedule(dynamic)
-#endif
-    for (size_t first = 0; first < members; first += poisson_not_hamiltonian_LANES) {
-        const poisson_not_hamiltonian_status group = poisson_not_hamiltonian_group_run(&own, x, members, first, h, steps, status);
-        if (group == poisson_not_hamiltonian_OK) continue;
-#ifdef _OPENMP
-#pragma omp critical
-#endif
-        if (first < earliest) {
-            earliest = first;
-            worst = group;
-        }
-    }
-    return worst;
-}
-
-#if defined(__clang__)
-#pragma clang diagnostic pop
-#endif
-
-/* the Hamiltonian */
-static void poisson_not_hamiltonian_energy(const poisson_not_hamiltonian_params *params, const double x[3],
-                                           double energy[restrict 1])
-{
-    (void)params;
-    const double x_ = x[0];
-    const double y = x[1];
-    const double z = x[2];
-    const double t1 = y - z;
-    energy[0] = 0.25 * (x_ * x_ + t1 * t1);
-}
-
-/* the Casimirs */
-static void poisson_not_hamiltonian_casimir_values(const poisson_not_hamiltonian_params *params,
-                                                   const double x[3], double out[restrict 1])
-{
-    (void)params;
-    const double x_ = x[0];
-    const double y = x[1];
-    const double z = x[2];
-    out[0] = y + z - x_;
-}
-
-/* pi(x) grad H(x) */
-static void poisson_not_hamiltonian_field(const poisson_not_hamiltonian_params *params, const double x[3],
-                                          double out[restrict 3])
-{
-    (void)params;
-    const double x_ = x[0];
-    const double y = x[1];
-    const double z = x[2];
-    const double t1 = y - z;
-    const double t2 = x_ * x_ + t1 * t1;
-    const double t3 = 0.25 * (t1 * t2);
-    const double t4 = 0.25 * (x_ * t2);
-    out[0] = t3 + t3;
-    out[1] = t3 - t4;
-    out[2] = t3 + t4;
-}
-
-double poisson_not_hamiltonian_hamiltonian(const poisson_not_hamiltonian_params *params, const double x[3])
-{
-    double energy[1];
-    poisson_not_hamiltonian_energy(params != NULL ? params : &poisson_not_hamiltonian_default_params, x, energy);
-    return energy[0];
-}
-
-void poisson_not_hamiltonian_casimirs(const poisson_not_hamiltonian_params *params, const double x[3],
-                                      double out[])
-{
-    double value[1]; /* out may overlap x */
-    poisson_not_hamiltonian_casimir_values(params != NULL ? params : &poisson_not_hamiltonian_default_params, x, value);
-    for (int i = 0; i < 1; ++i) out[i] = value[i];
-}
-
-void poisson_not_hamiltonian_vector_field(const poisson_not_hamiltonian_params *params, const double x[3],
-                                          double out[3])
-{
-    double value[3];
-    poisson_not_hamiltonian_field(params != NULL ? params : &poisson_not_hamiltonian_default_params, x, value);
-    memcpy(out, value, sizeof value);
 }
 
 const char *poisson_not_hamiltonian_status_string(poisson_not_hamiltonian_status status)
 {
-    switch (status) {
-    case poisson_not_hamiltonian_OK: return "ok";
-    case poisson_not_hamiltonian_NO_CONVERGENCE: return "no convergence: the step is too large";
-    case poisson_not_hamiltonian_SINGULAR: return "singular Newton matrix: the step is too large";
-    case poisson_not_hamiltonian_NOT_FINITE: return "not finite: overflow, or outside the domain";
-    case poisson_not_hamiltonian_BAD_ARGUMENT: return "bad argument: a null pointer, or values that are not allowed";
-    }
-    return "unknown status";
+    static const char *const text[] = {
+        "ok",
+        "no convergence: the step is too large",
+        "singular Newton matrix: the step is too large",
+        "not finite: overflow, or outside the domain",
+        "bad argument: a null pointer, or values that are not allowed"
+    };
+    return (unsigned)status <= poisson_not_hamiltonian_BAD_ARGUMENT ? text[status] : "unknown status";
 }
 
 size_t poisson_not_hamiltonian_solver_size(void) { return sizeof(poisson_not_hamiltonian_solver); }
 
 size_t poisson_not_hamiltonian_solver_steps_done(const poisson_not_hamiltonian_solver *s) { return s->steps; }
+
+/* ---- Ensembles ---- */
+poisson_not_hamiltonian_status poisson_not_hamiltonian_ensemble(const poisson_not_hamiltonian_params *params,
+    double *x, size_t members, double h, size_t steps, unsigned char *status)
+{
+    poisson_not_hamiltonian_status worst = isfinite(h) ? poisson_not_hamiltonian_OK
+        : poisson_not_hamiltonian_BAD_ARGUMENT;
+    const poisson_not_hamiltonian_params own = params != NULL ? *params
+        : poisson_not_hamiltonian_default_params;
+    if (x == NULL && members > 0) return poisson_not_hamiltonian_BAD_ARGUMENT;
+    for (size_t m = 0; m < members; ++m) {
+        poisson_not_hamiltonian_solver s;
+        double x0[poisson_not_hamiltonian_DIM];
+        for (size_t i = 0; i < poisson_not_hamiltonian_DIM; ++i) x0[i] = x[i * members + m];
+        poisson_not_hamiltonian_status member = poisson_not_hamiltonian_init(&s, &own, x0);
+        if (member == poisson_not_hamiltonian_OK) {
+            member = poisson_not_hamiltonian_integrate(&s, h, steps);
+            for (size_t i = 0; i < poisson_not_hamiltonian_DIM; ++i) x[i * members + m] = s.x[i];
+        }
+        if (status != NULL) status[m] = (unsigned char)member;
+        if (worst == poisson_not_hamiltonian_OK) worst = member;
+    }
+    return worst;
+}

@@ -6,17 +6,17 @@
 #   step: implicit, Newton iteration with the analytic matrix
 #   one Newton iteration: 191 additions, 291 multiplications, 4 functions
 #
-# spec: poisson_not_hamiltonian, sha256 3e9bff5b9c04c9b131661df50cd92ec15be998797c3620a96085fb54ee678034
+# spec: poisson_not_hamiltonian, sha256 91f506e06f622dbaf4083fe4274a994509dabe6e59da3a17c4a06cd9bcaa9603
 # to regenerate: phigen build poisson_not_hamiltonian
 # DO NOT EDIT: change the spec and regenerate; edits are noticed by the checksum below.
 #
 # SPDX-License-Identifier: 0BSD
 # This file belongs to whoever generated it; phigen claims no rights in it.
-# body-sha256: 451fe58f17ee8bdd2deababf2ec665bbc789e538fd0afd7ade59af7b1de66e77
+# body-sha256: 484a6ffeec3f360c34a80ca50cb8977f25272e4462b02013d85ddef0f59032c7
 import numpy as np
 
 VERSION = "0.1.0"
-SPEC_SHA256 = "3e9bff5b9c04c9b131661df50cd92ec15be998797c3620a96085fb54ee678034"
+SPEC_SHA256 = "91f506e06f622dbaf4083fe4274a994509dabe6e59da3a17c4a06cd9bcaa9603"
 DIM = 3
 ORDER = 4
 COORDINATES = ("x", "y", "z",)

@@ -7,36 +7,49 @@
  *   step: implicit, Newton iteration with the analytic matrix
  *   one Newton iteration: 29 additions, 72 multiplications, 4 divisions, 2 functions
  *
- * spec: predator_prey, sha256 756f4a9cb0ed0e328b63a51b2d6b8dddeb1b3f43ed6e5f1477d35affb9e83153
+ * spec: predator_prey, sha256 e9ed620ed8f3d5aad12a62fc9348c8e9ca6a49af75e51b9b9dab791a7ff33715
  * to regenerate: phigen build predator_prey
  * DO NOT EDIT: change the spec and regenerate; edits are noticed by the checksum below.
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 7fca46db915f1110d27b2283f3a757603c5af43bda3547e31e388a40fc3dc5cf
+ *
+ *   1. The model
+ *   2. Compensated sums, linear equations
+ *   3. Starting guesses
+ *   4. The implicit step, by Newton's method
+ *   5. The solver
+ *   6. Ensembles
+ * body-sha256: c763856ac00d8d1e2353f7b317b6e24fd1030685330c296253aab757e260cdc0
  */
 #include "predator_prey.h"
 
 #include <float.h>
-#include <limits.h>
 #include <math.h>
-#include <stdint.h>
 #include <string.h>
 
+/* ---- The model ---- */
 const predator_prey_params predator_prey_default_params = { 1.0, 0.1, 0.05, 0.5 };
 
-/* A step of size h is the composition of these fractions of it. */
-static const double predator_prey_fractions[1] = { 1.0 };
+enum { predator_prey_MAX_ITERATIONS = 20 }; /* of an inner solve */
+
+/* A correction is accepted when the error that it leaves is estimated to be below this. */
+#define predator_prey_TOLERANCE 1e-20
+
+/* Whether all parameters are finite, and positive where they have to be. */
+static int predator_prey_allowed(const predator_prey_params *params)
+{
+    return isfinite(params->growth) && params->growth > 0.0 && isfinite(params->attack) && params->attack
+        > 0.0 && isfinite(params->gain) && params->gain > 0.0 && isfinite(params->death) && params->death
+        > 0.0;
+}
 
 /* everything that depends on parameters and step size only */
 static void predator_prey_prepare(const predator_prey_params *params, double h, double coef[restrict 11])
 {
-    const double t1 = params->death * h;
-    const double t2 = h * h;
-    const double t3 = h * t2;
+    const double t1 = params->death * h, t2 = h * h, t3 = h * t2;
     const double t4 = t3 * (params->gain * (params->attack * params->attack));
-    const double t5 = t3 * (params->attack * (params->gain * params->gain));
-    const double t6 = params->growth * h;
+    const double t5 = t3 * (params->attack * (params->gain * params->gain)), t6 = params->growth * h;
     coef[0] = t1;
     coef[1] = params->gain * h * (-1.0 - 1.0 / 24.0 * (t2 * (params->growth * params->growth)));
     coef[2] = params->attack * params->gain * t3 * (1.0 / 12.0 * params->death + 1.0 / 12.0 * params->growth);
@@ -53,319 +66,90 @@ static void predator_prey_prepare(const predator_prey_params *params, double h, 
 /* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
    increment, all with the momenta p = grad S_h(y) */
 static void predator_prey_linearise(const double coef[11], const double y[2], double displacement[restrict 2],
-                                    double increment[restrict 2], double jacobian[restrict 4],
-                                    double increment_jacobian[restrict 4])
+    double increment[restrict 2], double jacobian[restrict 4], double increment_jacobian[restrict 4])
 {
-    const double prey = y[0];
-    const double predator = y[1];
-    const double t1 = 1.0 / predator;
-    const double t2 = coef[7] * predator;
+    const double prey = y[0], predator = y[1];
+    /* momenta */
+    const double t1 = 1.0 / predator, t2 = coef[7] * predator;
     const double p_predator = coef[6] + coef[5] * t1 + prey * (t2 + (coef[2] + coef[8] * prey));
-    const double t3 = expm1((-0.5) * (predator * p_predator));
-    const double t4 = 1.0 / prey;
-    const double t5 = coef[2] + coef[4] * prey;
-    const double p_prey = coef[1] + coef[0] * t4 + predator * (coef[3] * predator + t5);
-    const double t6 = expm1(0.5 * (prey * p_prey));
-    const double t7 = 1.0 + t3;
-    const double t8 = 1.0 / t7;
-    const double t9 = 1.0 + t8;
-    const double t10 = t3 * t9;
-    const double t11 = 1.0 + t6;
-    const double t12 = 1.0 / t11;
-    const double t13 = 1.0 + t12;
-    const double t14 = t6 * t13;
-    const double t15 = t2 + t5;
-    const double t16 = predator * t7;
-    const double t17 = prey * t16;
-    const double t18 = p_predator * t7;
-    const double t19 = coef[7] * prey + coef[10] * (t1 * t1);
-    const double t20 = p_prey * t11;
-    const double t21 = coef[4] * predator + coef[9] * (t4 * t4);
-    const double t22 = prey * t11;
-    const double t23 = predator * t22;
-    const double t24 = t8 * t8;
-    const double t25 = prey * (0.5 * (t3 * (t16 * t24)) - 0.5 * (t16 * t9));
-    const double t26 = t12 * t12;
-    const double t27 = predator * (0.5 * (t22 * t13) - 0.5 * (t6 * (t22 * t26)));
-    displacement[0] = prey * t3;
+    const double t3 = 1.0 / prey, t4 = coef[2] + coef[4] * prey;
+    const double p_prey = coef[1] + coef[0] * t3 + predator * (coef[3] * predator + t4);
+    /* displacement */
+    const double t5 = expm1((-0.5) * (predator * p_predator)), t6 = expm1(0.5 * (prey * p_prey));
+    displacement[0] = prey * t5;
     displacement[1] = predator * t6;
+    /* increment */
+    const double t7 = 1.0 + t5, t8 = 1.0 / t7, t9 = 1.0 + t8, t10 = t5 * t9, t11 = 1.0 + t6;
+    const double t12 = 1.0 / t11, t13 = 1.0 + t12, t14 = t6 * t13;
     increment[0] = -(prey * t10);
     increment[1] = -(predator * t14);
-    jacobian[0] = 1.0 + (t3 - 0.5 * (t15 * t17));
+    /* jacobian */
+    const double t15 = t2 + t4, t16 = predator * t7, t17 = prey * t16, t18 = p_predator * t7;
+    const double t19 = coef[7] * prey + coef[10] * (t1 * t1), t20 = p_prey * t11;
+    const double t21 = coef[4] * predator + coef[9] * (t3 * t3), t22 = prey * t11;
+    const double t23 = predator * t22;
+    jacobian[0] = 1.0 + (t5 - 0.5 * (t15 * t17));
     jacobian[1] = (-0.5) * (prey * t18) - 0.5 * (t19 * t17);
     jacobian[2] = 0.5 * (predator * t20) + 0.5 * (t21 * t23);
     jacobian[3] = 1.0 + (t6 + 0.5 * (t15 * t23));
+    /* increment jacobian */
+    const double t24 = t8 * t8, t25 = prey * (0.5 * (t5 * (t16 * t24)) - 0.5 * (t16 * t9));
+    const double t26 = t12 * t12, t27 = predator * (0.5 * (t22 * t13) - 0.5 * (t6 * (t22 * t26)));
     increment_jacobian[0] = -(t10 + t15 * t25);
-    increment_jacobian[1] = -(prey * (0.5 * (t3 * (t24 * t18)) - 0.5 * (t18 * t9)) + t19 * t25);
+    increment_jacobian[1] = -(prey * (0.5 * (t5 * (t24 * t18)) - 0.5 * (t18 * t9)) + t19 * t25);
     increment_jacobian[2] = -(predator * (0.5 * (t20 * t13) - 0.5 * (t6 * (t20 * t26))) + t21 * t27);
     increment_jacobian[3] = -(t14 + t15 * t27);
 }
 
-/* Solve matrix * solution = side, both overwritten, by elimination with partial pivoting. 0 if singular. */
-static int predator_prey_solve_pivoting(double matrix[4], double side[2])
-{
-    for (int k = 0; k < 2; ++k) {
-        int best = k;
-        for (int i = k + 1; i < 2; ++i)
-            if (fabs(matrix[i * 2 + k]) > fabs(matrix[best * 2 + k])) best = i;
-        const double pivot = matrix[best * 2 + k];
-        if (!(fabs(pivot) > 0.0)) return 0;
-        for (int j = k; j < 2 && best != k; ++j) {
-            const double swap = matrix[k * 2 + j];
-            matrix[k * 2 + j] = matrix[best * 2 + j];
-            matrix[best * 2 + j] = swap;
-        }
-        const double swap = side[k];
-        side[k] = side[best];
-        side[best] = swap;
-        for (int i = k + 1; i < 2; ++i) {
-            const double factor = matrix[i * 2 + k] / pivot;
-            for (int j = k + 1; j < 2; ++j) matrix[i * 2 + j] -= factor * matrix[k * 2 + j];
-            side[i] -= factor * side[k];
-        }
-    }
-    for (int i = 2 - 1; i >= 0; --i) {
-        for (int j = i + 1; j < 2; ++j) side[i] -= matrix[i * 2 + j] * side[j];
-        side[i] /= matrix[i * 2 + i];
-    }
-    return 1;
-}
-
 /* elimination without pivoting: the solution, and the reciprocals of the pivots */
 static void predator_prey_eliminate(const double matrix[4], const double side[2], double solution[restrict 2],
-                                    double reciprocal[restrict 2])
+    double reciprocal[restrict 2])
 {
-    const double t1 = 1.0 / matrix[0];
-    const double t2 = matrix[2] * t1;
-    const double t3 = 1.0 / (matrix[3] - matrix[1] * t2);
+    /* solution */
+    const double t1 = 1.0 / matrix[0], t2 = matrix[2] * t1, t3 = 1.0 / (matrix[3] - matrix[1] * t2);
     const double t4 = (side[1] - side[0] * t2) * t3;
     solution[0] = t1 * (side[0] - matrix[1] * t4);
     solution[1] = t4;
+    /* reciprocal */
     reciprocal[0] = t1;
     reciprocal[1] = t3;
 }
 
-/* Solve matrix * solution = side, both overwritten. The matrix is I + O(h), so elimination without pivoting
-   does unless a pivot is far from 1. 0 if singular. */
-static int predator_prey_solve(double matrix[4], double side[2])
+/* the Hamiltonian */
+double predator_prey_hamiltonian(const predator_prey_params *params, const double x[2])
 {
-    double solution[2], reciprocal[2], largest = 0.0;
-    predator_prey_eliminate(matrix, side, solution, reciprocal);
-    for (int i = 0; i < 2; ++i)
-        if (!(fabs(reciprocal[i]) <= largest)) largest = fabs(reciprocal[i]);
-    if (!(largest < 1e3)) return predator_prey_solve_pivoting(matrix, side);
-    memcpy(side, solution, sizeof solution);
-    return 1;
+    if (params == NULL) params = &predator_prey_default_params;
+    const double growth = params->growth, attack = params->attack, gain = params->gain, death = params->death,
+        prey = x[0], predator = x[1];
+    return death * log(prey) + (growth * log(predator) - attack * predator) - gain * prey;
 }
 
-/* Whether a guess is where the next values may be. Recurrences that were fitted to little else than rest, near a saddle,
-   may lead anywhere; and far away the equation of a step has solutions that have nothing to do with the motion. */
-static int predator_prey_near(const double guess[2], const double last[2])
+/* the Casimirs */
+void predator_prey_casimirs(const predator_prey_params *params, const double x[2], double out[])
 {
-    double distance = 0.0, size = 0.0;
-    for (int i = 0; i < 2; ++i) {
-        distance += fabs(guess[i] - last[i]);
-        size += fabs(last[i]);
-    }
-    return distance <= 4.0 * size;
+    (void)params, (void)x, (void)out;
 }
 
-/* The guess for the next value (y), from earlier ones; 0 if there is none. */
-static int predator_prey_predict(const predator_prey_memory *memory, double value[2])
+/* pi(x) grad H(x) */
+void predator_prey_vector_field(const predator_prey_params *params, const double x[2], double out[2])
 {
-    const int last = memory->count - 1;
-    double odd[2] = { 0.0 }, binomial = -1.0;
-    memset(value, 0, 2 * sizeof value[0]);
-    if (memory->fitting) {
-        for (int k = 0; k < memory->terms; k += 2)
-            for (int i = 0; i < 2; ++i) {
-                value[i] += memory->weight[k][i][0] * memory->past[last - k][i];
-                odd[i] += memory->weight[k + 1][i][0] * memory->past[last - 1 - k][i];
-            }
-        for (int i = 0; i < 2; ++i) value[i] += odd[i];
-    } else {
-        for (int k = 0; k < memory->order && k <= last; ++k) {
-            binomial *= -(double)(memory->order - k) / (k + 1);
-            for (int i = 0; i < 2; ++i) value[i] += binomial * memory->past[last - k][i];
-        }
-    }
-    return last >= 0 && predator_prey_near(value, memory->past[last]);
+    if (params == NULL) params = &predator_prey_default_params;
+    const double growth = params->growth, attack = params->attack, gain = params->gain, death = params->death,
+        prey = x[0], predator = x[1];
+    const double t1 = predator * prey;
+    out[0] = t1 * (growth / predator - attack);
+    out[1] = -(t1 * (death / prey - gain));
 }
 
-/* Choose the guess that would have been best for a value that took several iterations. */
-static void predator_prey_judge(predator_prey_memory *memory, const double value[2])
+/* ---- Compensated sums, linear equations ---- */
+/* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to
+   its last bit: were it rounded with the change, corrections of one sign would add up to a drift. 0, and x as
+   before, if the sum is not finite. */
+static int predator_prey_advance(predator_prey_solver *s, const double change[predator_prey_DIM],
+    const double correction[predator_prey_DIM])
 {
-    double row[8 + 1][2], guess[2], least = HUGE_VAL, fitted = HUGE_VAL;
-    const int rows = memory->count < 8 ? memory->count : 8;
-    memcpy(row[0], value, sizeof row[0]);
-    for (int k = 0; k < rows; ++k) memcpy(row[k + 1], memory->past[memory->count - 1 - k], sizeof row[0]);
-    for (int order = 1; order <= rows; ++order) { /* row[0] becomes the backward difference of this order */
-        double size = 0.0;
-        for (int k = 0; k <= rows - order; ++k)
-            for (int i = 0; i < 2; ++i) row[k][i] -= row[k + 1][i];
-        for (int i = 0; i < 2; ++i) size += fabs(row[0][i]);
-        if (size < least) {
-            least = size;
-            memory->order = order;
-        }
-    }
-    memory->fitting = memory->terms > 0;
-    if (memory->fitting && predator_prey_predict(memory, guess)) {
-        fitted = 0.0;
-        for (int i = 0; i < 2; ++i) fitted += fabs(value[i] - guess[i]);
-    }
-    memory->fitting = memory->terms > 0 && fitted <= least;
-    if (memory->order == 0) memory->order = 1;
-}
-
-/* Make eight columns orthogonal to one, by the multiples of it that are put into r. Where that one is among the eight, those
-   up to it stay as they are, and inverse becomes one over its squared length. The number of rows is even. */
-static void predator_prey_project(int rows, double (*one)[8], int column, double *inverse, double (*eight)[8], double r[8])
-{
-    double even[8] = { 0.0 }, odd[8] = { 0.0 };
-    for (int i = 0; i < rows; i += 2) {
-        const double entry = one[i][column], next = one[i + 1][column];
-        for (int l = 0; l < 8; ++l) even[l] += entry * eight[i][l];
-        for (int l = 0; l < 8; ++l) odd[l] += next * eight[i + 1][l];
-    }
-    for (int l = 0; l < 8; ++l) even[l] += odd[l];
-    if (one == eight) {
-        *inverse = even[column] > 0.0 ? 1.0 / even[column] : 0.0;
-        memset(even, 0, ((size_t)column + 1) * sizeof even[0]);
-    }
-    for (int l = 0; l < 8; ++l) r[l] = even[l] *= *inverse;
-    for (int i = 0; i < rows; ++i) {
-        const double entry = one[i][column];
-        for (int l = 0; l < 8; ++l) eight[i][l] -= entry * even[l];
-    }
-}
-
-/* By how much recurrences miss the last of these values. */
-static double predator_prey_missed(const double *value, double (*weight)[8])
-{
-    enum { AHEAD = 8, WINDOW = 40, CHECKS = 8 };
-    double most = 0.0;
-    for (int i = 0; i < CHECKS; ++i) {
-        double guess[8] = { 0.0 };
-        for (int k = 0; k < WINDOW; ++k)
-            for (int l = 0; l < 8; ++l) guess[l] += weight[k][l] * value[i + WINDOW - 1 - k];
-        for (int l = 0; l < AHEAD; ++l) most = fmax(most, fabs(guess[l] - value[i + WINDOW + l]));
-    }
-    return most;
-}
-
-/* Fit the recurrences value[m + l] = sum of weight[k][..][l] * value[m - 1 - k], l = 0 ... 8 - 1, to the history of
-   a component: ridge least squares by modified Gram-Schmidt, the ridge at the level of rounding. Columns are taken in by
-   eights, until they leave next to nothing of the right-hand sides. How many past values are used; 0 if the recurrences do
-   not foresee the last values, which they were not fitted to. */
-static int predator_prey_train(predator_prey_memory *memory, int component)
-{
-    enum { AHEAD = 8, WINDOW = 40, ROWS = 56 };
-    double q[WINDOW / 8][ROWS + WINDOW][8], r[WINDOW / 8][WINDOW][8], inverse[WINDOW]; /* eight columns in each part */
-    double right[ROWS + WINDOW][8], weight[WINDOW][8], value[111], largest = 0.0, left = HUGE_VAL;
-    int terms = 0;
-    memset(q, 0, sizeof q);
-    memset(right, 0, sizeof right);
-    memset(weight, 0, sizeof weight);
-    for (int i = 0; i < 111; ++i) {
-        value[i] = memory->past[memory->count - 111 + i][component];
-        if (fabs(value[i]) > largest) largest = fabs(value[i]);
-    }
-    for (int i = 0; i < ROWS; ++i)
-        for (int l = 0; l < AHEAD; ++l) right[i][l] = value[i + WINDOW + l];
-    while (terms < WINDOW && left > 3e-12 * largest) {
-        const int part = terms / 8, rows = ROWS + terms + 8; /* further rows of the ridge are zero in these columns */
-        for (int i = 0; i < ROWS; ++i)
-            for (int l = 0; l < 8; ++l) q[part][i][l] = value[i + WINDOW - 1 - terms - l];
-        for (int l = 0; l < 8; ++l) q[part][ROWS + terms + l][l] = 1e-15 * largest;
-        for (int k = 0; k < terms; ++k) predator_prey_project(rows, q[k / 8], k % 8, &inverse[k], q[part], r[part][k]);
-        for (int l = 0; l < 8; ++l, ++terms) {
-            predator_prey_project(rows, q[part], l, &inverse[terms], q[part], r[part][terms]);
-            predator_prey_project(rows, q[part], l, &inverse[terms], right, weight[terms]);
-        }
-        double sum[8] = { 0.0 };
-        for (int i = 0; i < ROWS; ++i)
-            for (int l = 0; l < 8; ++l) sum[l] += fabs(right[i][l]);
-        left = 0.0;
-        for (int l = 0; l < 8; ++l) left += sum[l] / ROWS;
-    }
-    for (int k = terms - 1; k >= 0; --k)
-        for (int j = k + 1; j < terms; ++j)
-            for (int l = 0; l < 8; ++l) weight[k][l] -= r[j / 8][k][j % 8] * weight[j][l];
-    for (int k = 0; k < WINDOW; ++k) memcpy(memory->weight[k][component], weight[k], AHEAD * sizeof(double));
-    return predator_prey_missed(value + ROWS, weight) <= 1e-07 * largest ? terms : 0;
-}
-
-/* Drop what is old, if so many values would not fit into the history. */
-static void predator_prey_make_room(predator_prey_memory *memory, int values)
-{
-    if (memory->count + values <= 222) return;
-    memmove(memory->past, memory->past + memory->count - 111, 111 * sizeof memory->past[0]);
-    memory->count = 111;
-}
-
-/* Add a value to the history. */
-static void predator_prey_record(predator_prey_memory *memory, const double value[2])
-{
-    predator_prey_make_room(memory, 1);
-    memcpy(memory->past[memory->count++], value, 2 * sizeof value[0]);
-}
-
-/* Fit the recurrence to the last values; with every time, wait longer before it is done again. */
-static void predator_prey_fit(predator_prey_memory *memory)
-{
-    int found = 1;
-    memory->terms = 0;
-    for (int i = 0; i < 2 && found; ++i) {
-        const int terms = predator_prey_train(memory, i);
-        found = terms > 0;
-        if (terms > memory->terms) memory->terms = terms;
-    }
-    if (!found) memory->terms = 0;
-    memory->fitting = found;
-    ++memory->fits;
-    memory->slow = 0;
-    memory->patience = memory->patience < 10000 ? 2 * memory->patience + 150 : 20000;
-}
-
-/* Take in the solved value: what took one iteration needs no better guess. */
-static void predator_prey_remember(predator_prey_memory *memory, const double value[2], int iterations)
-{
-    if (iterations > 1) predator_prey_judge(memory, value);
-    predator_prey_record(memory, value);
-    memory->slow = iterations > 1 ? memory->slow + 1 : 0;
-    if (memory->slow > memory->patience && memory->count >= 111) predator_prey_fit(memory);
-}
-
-/* Whether an increment is that of the motion. Where the step is too large, the equation may have been solved by a point far
-   away, at another energy, that has nothing to do with it. */
-static int predator_prey_plausible(const predator_prey_solver *s, int stage, const double increment[2])
-{
-    double moved = 0.0, size = 0.0, field[2], middle[2], end[2];
-    for (int i = 0; i < 2; ++i) {
-        moved += fabs(increment[i]);
-        size += fabs(s->x[i]);
-    }
-    if (moved <= 1.5 * size) return 1;
-    predator_prey_vector_field(&s->params, s->x, field);
-    for (int i = 0; i < 2; ++i) {
-        size += fabs(predator_prey_fractions[stage] * s->h * field[i]);
-        middle[i] = s->x[i] + 0.5 * increment[i];
-        end[i] = s->x[i] + increment[i];
-    }
-    if (moved <= 1.5 * size) return 1;
-    const double before = predator_prey_hamiltonian(&s->params, s->x), after = predator_prey_hamiltonian(&s->params, end);
-    const double scale = fabs(before) + fabs(predator_prey_hamiltonian(&s->params, middle)) + fabs(after);
-    return fabs(after - before) <= 0.5 * scale;
-}
-
-/* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to its last
-   bit: were it rounded with the change, corrections of one sign would add up to a drift. 0, and x as before, if the
-   sum is not finite. */
-static int predator_prey_advance(predator_prey_solver *s, const double change[2], const double correction[2])
-{
-    double x[2], carry[2];
-    for (int i = 0; i < 2; ++i) {
+    double x[predator_prey_DIM], carry[predator_prey_DIM];
+    for (int i = 0; i < predator_prey_DIM; ++i) {
         const double sum = s->x[i] + change[i], added = sum - s->x[i];
         const double lost = (s->x[i] - (sum - added)) + (change[i] - added);
         const double small = lost + (s->carry[i] + correction[i]);
@@ -378,12 +162,100 @@ static int predator_prey_advance(predator_prey_solver *s, const double change[2]
     return 1;
 }
 
+/* Newton matrices are I + O(h): a pivot whose reciprocal is larger than this is far from 1. */
+#define predator_prey_LARGEST_RECIPROCAL 1e3
+
+/* Solve matrix * solution = side, both overwritten. The matrix is I + O(h): 0 if a pivot is far from 1. */
+static int predator_prey_solve(double matrix[predator_prey_DIM * predator_prey_DIM],
+    double side[predator_prey_DIM])
+{
+    double solution[predator_prey_DIM], reciprocal[predator_prey_DIM], largest = 0.0;
+    predator_prey_eliminate(matrix, side, solution, reciprocal);
+    for (int i = 0; i < predator_prey_DIM; ++i)
+        if (!(fabs(reciprocal[i]) <= largest)) largest = fabs(reciprocal[i]);
+    if (!(largest < predator_prey_LARGEST_RECIPROCAL)) return 0;
+    memcpy(side, solution, sizeof solution);
+    return 1;
+}
+
+/* ---- Starting guesses ---- */
+/* How far from the last value a guess may be, in sizes of that value. */
+#define predator_prey_REACH 4.0
+
+/* The guess for the next value from the last ones: the sum of their backward differences. 0 if there is none,
+   or if it is far away, where the equation of a step has solutions that have nothing to do with the motion.
+   */
+static int predator_prey_predict(const predator_prey_history *history, double value[predator_prey_DIM])
+{
+    double distance = 0.0, size = 0.0;
+    for (int i = 0; i < predator_prey_DIM; ++i) {
+        value[i] = 0.0;
+        for (int k = 0; k < history->order; ++k) value[i] += history->difference[k][i];
+        distance += fabs(value[i] - history->difference[0][i]);
+        size += fabs(history->difference[0][i]);
+    }
+    return history->order > 0 && distance <= predator_prey_REACH * size;
+}
+
+/* Take in the solved value. The guess of order k missed it by its k-th difference: the next is of the best
+   order. */
+static void predator_prey_remember(predator_prey_history *history, const double value[predator_prey_DIM])
+{
+    double least = HUGE_VAL, next[predator_prey_DIM];
+    memcpy(next, value, sizeof next);
+    for (int k = 0; k <= history->count && k < predator_prey_DIFFERENCES; ++k) {
+        double size = 0.0;
+        for (int i = 0; i < predator_prey_DIM; ++i) {
+            const double last = history->difference[k][i];
+            history->difference[k][i] = next[i];
+            size += fabs(next[i]);
+            next[i] -= last;
+        }
+        if (k > 0 && size < least) {
+            least = size;
+            history->order = k;
+        }
+    }
+    if (history->count == 0) history->order = 1;
+    if (history->count < predator_prey_DIFFERENCES) ++history->count;
+}
+
+/* How far a step may lead, in sizes of the state and of what the vector field says, if the energy is lost;
+   and the part of the energy that counts as lost. */
+#define predator_prey_PLAUSIBLE 1.5
+#define predator_prey_LOST 0.5
+
+/* Whether an increment is that of the motion. Where the step is too large, the equation may have been solved
+   by a point far away, at another energy, that has nothing to do with it. */
+static int predator_prey_plausible(const predator_prey_solver *s, const double increment[predator_prey_DIM])
+{
+    double moved = 0.0, size = 0.0, field[predator_prey_DIM], middle[predator_prey_DIM],
+        end[predator_prey_DIM];
+    for (int i = 0; i < predator_prey_DIM; ++i) {
+        moved += fabs(increment[i]);
+        size += fabs(s->x[i]);
+    }
+    if (moved <= predator_prey_PLAUSIBLE * size) return 1;
+    predator_prey_vector_field(&s->params, s->x, field);
+    for (int i = 0; i < predator_prey_DIM; ++i) {
+        size += fabs(s->h * field[i]);
+        middle[i] = s->x[i] + 0.5 * increment[i];
+        end[i] = s->x[i] + increment[i];
+    }
+    if (moved <= predator_prey_PLAUSIBLE * size) return 1;
+    const double before = predator_prey_hamiltonian(&s->params, s->x), after =
+        predator_prey_hamiltonian(&s->params, end);
+    const double scale = fabs(before) + fabs(predator_prey_hamiltonian(&s->params, middle)) + fabs(after);
+    return fabs(after - before) <= predator_prey_LOST * scale;
+}
+
+/* ---- The implicit step, by Newton's method ---- */
 /* Size of a correction relative to each component of y (coordinates keep their sign, and may be of very
    different size); NaN or infinite if the correction is. */
-static double predator_prey_size(const double y[2], const double delta[2])
+static double predator_prey_size(const double y[predator_prey_DIM], const double delta[predator_prey_DIM])
 {
     double size = 0.0;
-    for (int i = 0; i < 2; ++i) {
+    for (int i = 0; i < predator_prey_DIM; ++i) {
         const double ratio = fabs(delta[i]) / (fabs(y[i]) + DBL_MIN);
         if (!isfinite(ratio)) return ratio;
         size = ratio > size ? ratio : size;
@@ -391,88 +263,70 @@ static double predator_prey_size(const double y[2], const double delta[2])
     return size;
 }
 
+/* Corrections below the first that shrink by less than the second have reached the level of rounding. */
+#define predator_prey_NEARLY_SOLVED 1e-8
+#define predator_prey_SHRINKING 0.25
+
 /* Solve (y - x) + displacement(y) = 0 for y by Newton's method from the extrapolated guess, and advance. The
-   increment is corrected to first order by the last Newton correction, so that correction costs no evaluation:
-   a correction is accepted when the error that remains after it, quadratic in it, is below 1e-20. */
-static predator_prey_status predator_prey_attempt(predator_prey_solver *s, int stage)
+   increment is corrected to first order by the last Newton correction, so that correction costs no
+   evaluation: a correction is accepted when the error that remains after it, quadratic in it, is below
+   predator_prey_TOLERANCE. */
+static predator_prey_status predator_prey_attempt(predator_prey_solver *s)
 {
-    const double *coef = s->coef[stage];
-    predator_prey_memory *memory = &s->memory[stage];
-    double y[2], delta[2], displacement[2], increment[2];
-    double jacobian[4], increment_jacobian[4];
-    if (!predator_prey_predict(memory, y)) memcpy(y, s->x, sizeof y);
-    double previous = HUGE_VAL;
-    for (int iteration = 0; iteration < 20; ++iteration) {
-        predator_prey_linearise(coef, y, displacement, increment, jacobian, increment_jacobian);
+    double y[predator_prey_DIM], delta[predator_prey_DIM], displacement[predator_prey_DIM],
+        increment[predator_prey_DIM];
+    double jacobian[predator_prey_DIM * predator_prey_DIM], increment_jacobian[predator_prey_DIM
+        * predator_prey_DIM], previous = HUGE_VAL;
+    if (!predator_prey_predict(&s->history, y)) memcpy(y, s->x, sizeof y);
+    for (int iteration = 1; iteration <= predator_prey_MAX_ITERATIONS; ++iteration) {
+        predator_prey_linearise(s->coef, y, displacement, increment, jacobian, increment_jacobian);
         ++s->evaluations;
-        for (int i = 0; i < 2; ++i) delta[i] = ((y[i] - s->x[i]) + displacement[i]) - s->carry[i];
+        for (int i = 0; i < predator_prey_DIM; ++i) delta[i] = ((y[i] - s->x[i]) + displacement[i])
+            - s->carry[i];
         const int regular = predator_prey_solve(jacobian, delta);
-        const double size = predator_prey_size(y, delta);
+        const double size = predator_prey_size(y, delta), growth = size / (previous * previous);
         if (!isfinite(size)) return predator_prey_NOT_FINITE;
         if (!regular) return predator_prey_SINGULAR;
-        for (int i = 0; i < 2; ++i) y[i] -= delta[i];
-        const double growth = size / (previous * previous);
+        for (int i = 0; i < predator_prey_DIM; ++i) y[i] -= delta[i];
         const double remaining = size * size * (growth > 1.0 ? growth : 1.0);
-        /* The second test: corrections no longer shrink, the solve has reached the level of rounding. */
-        if (remaining <= 1e-20 || (previous < 1e-8 && size > 0.25 * previous)) {
-            double correction[2] = { 0.0 };
-            for (int i = 0; i < 2; ++i)
-                for (int j = 0; j < 2; ++j) correction[i] -= increment_jacobian[i * 2 + j] * delta[j];
-            if (!predator_prey_plausible(s, stage, increment)) return predator_prey_NO_CONVERGENCE;
-            if (!predator_prey_advance(s, increment, correction)) return predator_prey_NOT_FINITE;
-            predator_prey_remember(memory, y, iteration + 1);
-            return predator_prey_OK;
-        }
+        const int stalled = previous < predator_prey_NEARLY_SOLVED && size > predator_prey_SHRINKING
+            * previous;
         previous = size;
+        if (!(remaining <= predator_prey_TOLERANCE || stalled)) continue;
+        double correction[predator_prey_DIM] = { 0.0 };
+        for (int i = 0; i < predator_prey_DIM; ++i)
+            for (int j = 0; j < predator_prey_DIM; ++j)
+                correction[i] -= increment_jacobian[i * predator_prey_DIM + j] * delta[j];
+        if (!predator_prey_plausible(s, increment)) return predator_prey_NO_CONVERGENCE;
+        if (!predator_prey_advance(s, increment, correction)) return predator_prey_NOT_FINITE;
+        predator_prey_remember(&s->history, y);
+        return predator_prey_OK;
     }
     return predator_prey_NO_CONVERGENCE;
 }
 
-/* The 1 stages of one step. If one fails, the state is as before the step. */
-static predator_prey_status predator_prey_stages(predator_prey_solver *s)
-{
-    double x[2], carry[2];
-    memcpy(x, s->x, sizeof x);
-    memcpy(carry, s->carry, sizeof carry);
-    for (int stage = 0; stage < 1; ++stage) {
-        predator_prey_status status = predator_prey_attempt(s, stage);
-        /* A guess from earlier steps may have misled it: once more without. */
-        if (status != predator_prey_OK && s->memory[stage].count > 0) {
-            memset(&s->memory[stage], 0, sizeof s->memory[stage]);
-            status = predator_prey_attempt(s, stage);
-        }
-        if (status != predator_prey_OK) {
-            memcpy(s->x, x, sizeof x);
-            memcpy(s->carry, carry, sizeof carry);
-            return status;
-        }
-    }
-    return predator_prey_OK;
-}
-
-/* Whether steps can be made with these parameters: finite, positive where the spec says so, and with finite
-   coefficients for a step so short that it has no part in it. */
+/* ---- The solver ---- */
+/* Whether steps can be made with these parameters: allowed, and with finite coefficients for a step so short
+   that it has no part in it. */
 static int predator_prey_admissible(const predator_prey_params *params)
 {
-    double coef[11];
-    if (!(isfinite(params->growth) && params->growth > 0.0)) return 0;
-    if (!(isfinite(params->attack) && params->attack > 0.0)) return 0;
-    if (!(isfinite(params->gain) && params->gain > 0.0)) return 0;
-    if (!(isfinite(params->death) && params->death > 0.0)) return 0;
+    double coef[predator_prey_COEFFICIENTS];
+    if (!predator_prey_allowed(params)) return 0;
     predator_prey_prepare(params, 1e-100, coef);
-    for (int k = 0; k < 11; ++k)
+    for (int k = 0; k < predator_prey_COEFFICIENTS; ++k)
         if (!isfinite(coef[k])) return 0;
     return 1;
 }
 
-/* All of predator_prey_init but the gauge. The arguments may be parts of *s: they are read before it is written. */
-static predator_prey_status predator_prey_start(predator_prey_solver *s, const predator_prey_params *params, const double x0[2])
+/* The arguments may be parts of *s: they are read before it is written. */
+predator_prey_status predator_prey_init(predator_prey_solver *s, const predator_prey_params *params,
+    const double x0[predator_prey_DIM])
 {
     if (s == NULL || x0 == NULL) return predator_prey_BAD_ARGUMENT;
     const predator_prey_params own = params != NULL ? *params : predator_prey_default_params;
-    double x[2];
+    double x[predator_prey_DIM];
     memcpy(x, x0, sizeof x);
-    for (int i = 0; i < 2; ++i)
+    for (int i = 0; i < predator_prey_DIM; ++i)
         if (!isfinite(x[i])) return predator_prey_BAD_ARGUMENT;
     if (!predator_prey_admissible(&own)) return predator_prey_BAD_ARGUMENT;
     memset(s, 0, sizeof *s);
@@ -481,939 +335,83 @@ static predator_prey_status predator_prey_start(predator_prey_solver *s, const p
     return predator_prey_OK;
 }
 
-predator_prey_status predator_prey_init(predator_prey_solver *s, const predator_prey_params *params,
-                                        const double x0[2])
-{
-    return predator_prey_start(s, params, x0);
-}
-
 /* What depends on the step size; nothing where that is as before. */
 static predator_prey_status predator_prey_set_step(predator_prey_solver *s, double h)
 {
     if (s == NULL || !isfinite(h)) return predator_prey_BAD_ARGUMENT;
-    if (s->ready && memcmp(&h, &s->h, sizeof h) == 0) return predator_prey_OK;
-    for (int stage = 0; stage < 1; ++stage)
-        predator_prey_prepare(&s->params, predator_prey_fractions[stage] * h, s->coef[stage]);
-    memset(s->memory, 0, sizeof s->memory);
-    for (int stage = 0; stage < 1; ++stage) s->memory[stage].patience = 150;
-    s->pause = 16;
-    s->setback = s->foreseeing = 0;
-    s->doubt = s->retry = 0;
-    s->effort = 0.0;
-    s->passes = INT_MAX;
+    if (s->prepared && memcmp(&h, &s->h, sizeof h) == 0) return predator_prey_OK;
+    predator_prey_prepare(&s->params, h, s->coef);
+    memset(&s->history, 0, sizeof s->history);
     s->h = h;
-    s->ready = 1;
+    s->t_before_h = s->t;
+    s->steps_before_h = s->steps;
+    s->prepared = 1;
     return predator_prey_OK;
+}
+
+/* One stage. A guess from earlier steps may have misled it: then once more without. */
+static predator_prey_status predator_prey_stage(predator_prey_solver *s)
+{
+    predator_prey_status status = predator_prey_attempt(s);
+    if (status != predator_prey_OK && s->history.count > 0) {
+        memset(&s->history, 0, sizeof s->history);
+        status = predator_prey_attempt(s);
+    }
+    return status;
 }
 
 predator_prey_status predator_prey_step(predator_prey_solver *s, double h)
 {
     predator_prey_status status = predator_prey_set_step(s, h);
     if (status != predator_prey_OK) return status;
-    status = predator_prey_stages(s);
-    if (status == predator_prey_OK) ++s->steps;
+    status = predator_prey_stage(s);
+    if (status != predator_prey_OK) return status;
+    ++s->steps;
+    s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
     return status;
 }
 
-/*
- * Eight at a time: below, the formulas of a step are evaluated for 8 steps of a trajectory, or members of an
- * ensemble, at once. Compilers make vector instructions of the loops over lanes.
- */
-enum { predator_prey_LANES = 8 };
-
-#if defined(__GNUC__)
-typedef double predator_prey_lanes[predator_prey_LANES] __attribute__((aligned(64))); /* a value in each lane */
-#else
-typedef double predator_prey_lanes[predator_prey_LANES];
-#endif
-
-#if defined(__clang__)
-#define predator_prey_EACH_LANE _Pragma("clang loop vectorize(assume_safety)")
-#pragma clang diagnostic push
-#pragma clang diagnostic ignored "-Wpass-failed"
-#elif defined(__GNUC__)
-#define predator_prey_EACH_LANE _Pragma("GCC ivdep") _Pragma("GCC unroll 1")
-#else
-#define predator_prey_EACH_LANE
-#endif
-
-/* What all blocks share: coefficients, the same in each lane, and the recurrences by which they are foreseen. */
-typedef struct {
-    int fits[1]; /* the fit that weight is of; -1 for none */
-    predator_prey_lanes coef[1][11], weight[1][40][2];
-} predator_prey_table;
-
-/* A stage in all lanes, linearised around y. */
-typedef struct {
-    predator_prey_lanes y[2], displacement[2], increment[2], residual[2];
-    /* a residual r of alpha(y) = x takes inverse r from y, and gain r from the increment */
-    predator_prey_lanes inverse[4], slope[4], gain[4];
-} predator_prey_model;
-
-/* exp(u) - 1 for the loops over lanes: u = k log 2 + r, no branches. No number beyond |u| = 700.0. */
-static inline double predator_prey_expm1_lane(double u)
-{
-    const double shifted = u * 1.4426950408889634 + 6755399441055744.0, k = shifted - 6755399441055744.0;
-    const double r = (u - k * 0.6931471803691238) - k * 1.9082149292705877e-10, rr = r * r;
-    uint64_t bits; /* the last bits of shifted are k */
-    double power, sum = 1.1470745597729725e-11, other = 1.6059043836821613e-10;
-    memcpy(&bits, &shifted, sizeof bits);
-    bits = (bits + 1023) << 52;
-    memcpy(&power, &bits, sizeof power);
-    sum = sum * rr + 2.08767569878681e-09;
-    other = other * rr + 2.505210838544172e-08;
-    sum = sum * rr + 2.755731922398589e-07;
-    other = other * rr + 2.7557319223985893e-06;
-    sum = sum * rr + 2.48015873015873e-05;
-    other = other * rr + 0.0001984126984126984;
-    sum = sum * rr + 0.001388888888888889;
-    other = other * rr + 0.008333333333333333;
-    sum = sum * rr + 0.041666666666666664;
-    other = other * rr + 0.16666666666666666;
-    sum = (sum * r + other) * r + 0.5;
-    sum = sum * rr + r;
-    return power * sum + (power - 1.0) + (fabs(u) <= 700.0 ? 0.0 : (double)NAN);
-}
-
-/* predator_prey_linearise in all lanes. */
-static void predator_prey_linearise_lanes(predator_prey_lanes coef[restrict 11],
-                                          predator_prey_lanes y[restrict 2],
-                                          predator_prey_lanes displacement[restrict 2],
-                                          predator_prey_lanes increment[restrict 2],
-                                          predator_prey_lanes jacobian[restrict 4],
-                                          predator_prey_lanes increment_jacobian[restrict 4])
-{
-    predator_prey_EACH_LANE
-    for (int lane = 0; lane < predator_prey_LANES; ++lane) {
-        const double prey = y[0][lane];
-        const double predator = y[1][lane];
-        const double t1 = 1.0 / predator;
-        const double t2 = coef[7][lane] * predator;
-        const double p_predator = coef[6][lane] + coef[5][lane] * t1 + prey * (t2 + (coef[2][lane] + coef[8][lane] * prey));
-        const double t3 = predator_prey_expm1_lane((-0.5) * (predator * p_predator));
-        const double t4 = 1.0 / prey;
-        const double t5 = coef[2][lane] + coef[4][lane] * prey;
-        const double p_prey = coef[1][lane] + coef[0][lane] * t4 + predator * (coef[3][lane] * predator + t5);
-        const double t6 = predator_prey_expm1_lane(0.5 * (prey * p_prey));
-        const double t7 = 1.0 + t3;
-        const double t8 = 1.0 / t7;
-        const double t9 = 1.0 + t8;
-        const double t10 = t3 * t9;
-        const double t11 = 1.0 + t6;
-        const double t12 = 1.0 / t11;
-        const double t13 = 1.0 + t12;
-        const double t14 = t6 * t13;
-        const double t15 = t2 + t5;
-        const double t16 = predator * t7;
-        const double t17 = prey * t16;
-        const double t18 = p_predator * t7;
-        const double t19 = coef[7][lane] * prey + coef[10][lane] * (t1 * t1);
-        const double t20 = p_prey * t11;
-        const double t21 = coef[4][lane] * predator + coef[9][lane] * (t4 * t4);
-        const double t22 = prey * t11;
-        const double t23 = predator * t22;
-        const double t24 = t8 * t8;
-        const double t25 = prey * (0.5 * (t3 * (t16 * t24)) - 0.5 * (t16 * t9));
-        const double t26 = t12 * t12;
-        const double t27 = predator * (0.5 * (t22 * t13) - 0.5 * (t6 * (t22 * t26)));
-        displacement[0][lane] = prey * t3;
-        displacement[1][lane] = predator * t6;
-        increment[0][lane] = -(prey * t10);
-        increment[1][lane] = -(predator * t14);
-        jacobian[0][lane] = 1.0 + (t3 - 0.5 * (t15 * t17));
-        jacobian[1][lane] = (-0.5) * (prey * t18) - 0.5 * (t19 * t17);
-        jacobian[2][lane] = 0.5 * (predator * t20) + 0.5 * (t21 * t23);
-        jacobian[3][lane] = 1.0 + (t6 + 0.5 * (t15 * t23));
-        increment_jacobian[0][lane] = -(t10 + t15 * t25);
-        increment_jacobian[1][lane] = -(prey * (0.5 * (t3 * (t24 * t18)) - 0.5 * (t18 * t9)) + t19 * t25);
-        increment_jacobian[2][lane] = -(predator * (0.5 * (t20 * t13) - 0.5 * (t6 * (t20 * t26))) + t21 * t27);
-        increment_jacobian[3][lane] = -(t14 + t15 * t27);
-    }
-}
-
-/* predator_prey_evaluate in all lanes. */
-static void predator_prey_evaluate_lanes(predator_prey_lanes coef[restrict 11],
-                                         predator_prey_lanes y[restrict 2],
-                                         predator_prey_lanes displacement[restrict 2],
-                                         predator_prey_lanes increment[restrict 2])
-{
-    predator_prey_EACH_LANE
-    for (int lane = 0; lane < predator_prey_LANES; ++lane) {
-        const double prey = y[0][lane];
-        const double predator = y[1][lane];
-        const double p_predator = coef[6][lane] + coef[5][lane] / predator + prey * (coef[7][lane] * predator + (coef[2][lane] + coef[8][lane] * prey));
-        const double t1 = predator_prey_expm1_lane((-0.5) * (predator * p_predator));
-        const double p_prey = coef[1][lane] + coef[0][lane] / prey + predator * (coef[3][lane] * predator + (coef[2][lane] + coef[4][lane] * prey));
-        const double t2 = predator_prey_expm1_lane(0.5 * (prey * p_prey));
-        displacement[0][lane] = prey * t1;
-        displacement[1][lane] = predator * t2;
-        increment[0][lane] = -(prey * (t1 * (1.0 + 1.0 / (1.0 + t1))));
-        increment[1][lane] = -(predator * (t2 * (1.0 + 1.0 / (1.0 + t2))));
-    }
-}
-
-/* predator_prey_invert in all lanes. */
-static void predator_prey_invert_lanes(predator_prey_lanes matrix[restrict 4],
-                                       predator_prey_lanes slope[restrict 4],
-                                       predator_prey_lanes inverse[restrict 4],
-                                       predator_prey_lanes gain[restrict 4],
-                                       predator_prey_lanes reciprocal[restrict 2])
-{
-    predator_prey_EACH_LANE
-    for (int lane = 0; lane < predator_prey_LANES; ++lane) {
-        const double t1 = 1.0 / matrix[0][lane];
-        const double t2 = matrix[1][lane] * t1;
-        const double t3 = 1.0 / (matrix[3][lane] - matrix[2][lane] * t2);
-        const double t4 = matrix[2][lane] * t1 * t3;
-        const double t5 = t1 + t2 * t4;
-        const double t6 = t2 * t3;
-        inverse[0][lane] = t5;
-        inverse[1][lane] = -t6;
-        inverse[2][lane] = -t4;
-        inverse[3][lane] = t3;
-        gain[0][lane] = slope[0][lane] * t5 - slope[1][lane] * t4;
-        gain[1][lane] = slope[1][lane] * t3 - slope[0][lane] * t6;
-        gain[2][lane] = slope[2][lane] * t5 - slope[3][lane] * t4;
-        gain[3][lane] = slope[3][lane] * t3 - slope[2][lane] * t6;
-        reciprocal[0][lane] = t1;
-        reciprocal[1][lane] = t3;
-    }
-}
-
-/* Everything about a stage at the points y. The matrices are I + O(h): where a pivot is far from 1, all is infinite. */
-static void predator_prey_tabulate(predator_prey_lanes coef[restrict], predator_prey_model *model)
-{
-    predator_prey_lanes jacobian[4], reciprocal[2];
-    predator_prey_linearise_lanes(coef, model->y, model->displacement, model->increment, jacobian, model->slope);
-    predator_prey_invert_lanes(jacobian, model->slope, model->inverse, model->gain, reciprocal);
-    for (int i = 0; i < 2; ++i) {
-        predator_prey_EACH_LANE
-        for (int lane = 0; lane < predator_prey_LANES; ++lane)
-            model->inverse[i][lane] += fabs(reciprocal[i][lane]) < 1e3 ? 0.0 : HUGE_VAL;
-    }
-}
-
-/* predator_prey_size in all lanes, summed over the components. */
-static void predator_prey_sizes(predator_prey_lanes y[restrict 2], predator_prey_lanes delta[restrict 2],
-    predator_prey_lanes size)
-{
-    predator_prey_lanes norm = { 0.0 };
-    memset(size, 0, predator_prey_LANES * sizeof size[0]);
-    for (int i = 0; i < 2; ++i)
-        for (int lane = 0; lane < predator_prey_LANES; ++lane)
-            norm[lane] = 0.0 * fabs(y[i][lane]) > norm[lane] ? 0.0 * fabs(y[i][lane]) : norm[lane];
-    for (int i = 0; i < 2; ++i) {
-        predator_prey_EACH_LANE
-        for (int lane = 0; lane < predator_prey_LANES; ++lane)
-            size[lane] += fabs(delta[i][lane]) / (fabs(y[i][lane]) + norm[lane] + DBL_MIN);
-    }
-}
-
-/* Correct y by the residuals, with the inverse in the table, and measure the corrections. */
-static void predator_prey_correct(predator_prey_model *model, predator_prey_lanes size)
-{
-    predator_prey_lanes delta[2];
-    memset(delta, 0, sizeof delta);
-    for (int i = 0; i < 2; ++i)
-        for (int j = 0; j < 2; ++j) {
-            predator_prey_EACH_LANE
-            for (int lane = 0; lane < predator_prey_LANES; ++lane)
-                delta[i][lane] += model->inverse[i * 2 + j][lane] * model->residual[j][lane];
-        }
-    predator_prey_sizes(model->y, delta, size);
-    for (int i = 0; i < 2; ++i)
-        for (int lane = 0; lane < predator_prey_LANES; ++lane) model->y[i][lane] -= delta[i][lane];
-}
-
-/* The largest of the lanes, none of which is negative; infinite if one is not finite. As integers, the bits of such
-   numbers have their order, and those of what is no number are larger. */
-static double predator_prey_largest(const predator_prey_lanes size)
-{
-    uint64_t bits[8], most = 0;
-    double largest;
-    memcpy(bits, size, sizeof bits);
-    for (int lane = 0; lane < predator_prey_LANES; ++lane) most = bits[lane] > most ? bits[lane] : most;
-    memcpy(&largest, &most, sizeof largest);
-    return isfinite(largest) ? largest : HUGE_VAL;
-}
-
-/* predator_prey_near for the guesses of all lanes, seen from one value. */
-static int predator_prey_near_lanes(predator_prey_lanes y[restrict 2], const double last[2])
-{
-    predator_prey_lanes distance = { 0.0 };
-    double size = 0.0;
-    for (int i = 0; i < 2; ++i) {
-        size += fabs(last[i]);
-        predator_prey_EACH_LANE
-        for (int lane = 0; lane < predator_prey_LANES; ++lane) distance[lane] += fabs(y[i][lane] - last[i]);
-    }
-    return predator_prey_largest(distance) <= 4.0 * size;
-}
-
-/* What is left after a correction of this size: quadratic in it, where the matrices are of the points corrected; where
-   they are of points further off, by bend, also of the order of size times bend. bound is what the last pass left. */
-static double predator_prey_remaining(double size, double bend, double bound)
-{
-    const double growth = size / bound, left = size * (size + bend);
-    return growth > 1.0 ? growth * left : left;
-}
-
-/* The table of a stage, with its matrices or with those of the last pass. */
-static void predator_prey_update(predator_prey_lanes coef[restrict], predator_prey_model *model, int matrices)
-{
-    if (matrices)
-        predator_prey_tabulate(coef, model);
-    else
-        predator_prey_evaluate_lanes(coef, model->y, model->displacement, model->increment);
-}
-
-/* The steps of a block one after the other, each along the linear model of its lane. As X, the state with its carry, gains
-   increment - gain residual, the next residual follows from this one; X itself is added up apart. */
-static void predator_prey_chain(predator_prey_model model[1], double x[2], double carry[2])
-{
-    double residual[2], sum[2], small[2];
-    for (int i = 0; i < 2; ++i) {
-        residual[i] = ((model->y[i][0] - x[i]) + model->displacement[i][0]) - carry[i];
-        sum[i] = x[i];
-        small[i] = carry[i];
-    }
-    for (int k = 0; k < 1 * predator_prey_LANES; ++k) {
-        const int lane = k / 1, after = (k + 1) / 1 % predator_prey_LANES;
-        predator_prey_model *at = &model[k % 1], *next = &model[(k + 1) % 1];
-        double even[2] = { 0.0 }, odd[2] = { 0.0 }; /* two sums, so that no long chain of additions is waited for */
-        for (int i = 0; i < 2; ++i) {
-            at->residual[i][lane] = residual[i];
-            for (int j = 0; j < 2; j += 2) even[i] += at->gain[i * 2 + j][lane] * residual[j];
-            for (int j = 1; j < 2; j += 2) odd[i] += at->gain[i * 2 + j][lane] * residual[j];
-        }
-        for (int i = 0; i < 2; ++i) {
-            const double change = at->increment[i][lane], total = sum[i] + change, added = total - sum[i];
-            const double turn = (next->displacement[i][after] - at->displacement[i][lane]) - change;
-            const double moved = (next->y[i][after] - at->y[i][lane]) + turn;
-            residual[i] = ((moved + residual[i]) + odd[i]) + even[i];
-            small[i] += ((sum[i] - (total - added)) + (change - added)) - (even[i] + odd[i]);
-            sum[i] = total;
-        }
-    }
-    for (int i = 0; i < 2; ++i) {
-        x[i] = sum[i] + small[i];
-        carry[i] = small[i] - (x[i] - sum[i]);
-    }
-}
-
-/* Bring the table up to date: coefficients, and weights that were fitted since. */
-static void predator_prey_refresh(const predator_prey_solver *s, predator_prey_table *table)
-{
-    for (int stage = 0; stage < 1; ++stage) {
-        if (table->fits[stage] == s->memory[stage].fits) continue;
-        table->fits[stage] = s->memory[stage].fits;
-        for (int k = 0; k < 11; ++k)
-            for (int lane = 0; lane < predator_prey_LANES; ++lane) table->coef[stage][k][lane] = s->coef[stage][k];
-        memcpy(table->weight[stage], s->memory[stage].weight, (size_t)s->memory[stage].terms * sizeof table->weight[0][0]);
-    }
-}
-
-/* Guesses for the next predator_prey_LANES values of a stage, by its recurrences. */
-static void predator_prey_foresee(const predator_prey_memory *memory, predator_prey_lanes weight[restrict][2],
-    predator_prey_lanes y[restrict 2])
-{
-    const int last = memory->count - 1;
-    for (int i = 0; i < 2; ++i) {
-        predator_prey_lanes even = { 0.0 }, odd = { 0.0 };
-        for (int k = 0; k < memory->terms; k += 2) {
-            const double past = memory->past[last - k][i], earlier = memory->past[last - 1 - k][i];
-            predator_prey_EACH_LANE
-            for (int lane = 0; lane < predator_prey_LANES; ++lane) even[lane] += weight[k][i][lane] * past;
-            predator_prey_EACH_LANE
-            for (int lane = 0; lane < predator_prey_LANES; ++lane) odd[lane] += weight[k + 1][i][lane] * earlier;
-        }
-        predator_prey_EACH_LANE
-        for (int lane = 0; lane < predator_prey_LANES; ++lane) y[i][lane] = even[lane] + odd[lane];
-    }
-}
-
-/* predator_prey_record for the values of all lanes, one after the other. */
-static void predator_prey_record_lanes(predator_prey_memory *memory, predator_prey_lanes y[restrict 2])
-{
-    predator_prey_make_room(memory, predator_prey_LANES);
-    for (int lane = 0; lane < predator_prey_LANES; ++lane)
-        for (int i = 0; i < 2; ++i) memory->past[memory->count + lane][i] = y[i][lane];
-    memory->count += predator_prey_LANES;
-}
-
-/* Guesses where no recurrence is known: where alpha and beta have the means of steps by the classical Runge-Kutta
-   method, to leading order. */
-static void predator_prey_march(const predator_prey_solver *s, predator_prey_table *table, predator_prey_model model[1])
-{
-    static const double reach[4] = { 0.5, 0.5, 1.0, 0.0 }, weight[4] = { 1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0 };
-    double x[2], point[2], slope[2], mean[2];
-    memcpy(x, s->x, sizeof x);
-    for (int k = 0; k < 1 * predator_prey_LANES; ++k) {
-        const double h = predator_prey_fractions[k % 1] * s->h;
-        memcpy(point, x, sizeof x);
-        memset(mean, 0, sizeof mean);
-        for (int part = 0; part < 4; ++part) {
-            predator_prey_vector_field(&s->params, point, slope);
-            for (int i = 0; i < 2; ++i) {
-                mean[i] += weight[part] * slope[i];
-                point[i] = x[i] + h * reach[part] * slope[i];
-            }
-        }
-        for (int i = 0; i < 2; ++i) {
-            model[k % 1].y[i][k / 1] = x[i] + 0.5 * h * mean[i];
-            x[i] += h * mean[i];
-        }
-    }
-    for (int stage = 0; stage < 1; ++stage) {
-        predator_prey_model *at = &model[stage];
-        predator_prey_evaluate_lanes(table->coef[stage], at->y, at->displacement, at->increment);
-        for (int i = 0; i < 2; ++i) {
-            predator_prey_EACH_LANE
-            for (int lane = 0; lane < predator_prey_LANES; ++lane)
-                at->y[i][lane] -= at->displacement[i][lane] + 0.5 * at->increment[i][lane];
-        }
-    }
-}
-
-/* predator_prey_LANES steps at once: guess the points of all, and correct them together until the error that remains is as
-   small as after a single step. How many passes that took; 0, and the solver as before, where it takes more than most. */
-static int predator_prey_block(predator_prey_solver *s, predator_prey_table *table, int most)
-{
-    predator_prey_model model[1];
-    predator_prey_lanes sizes;
-    double x[2], carry[2], previous = HUGE_VAL, bend = 0.0, bound = HUGE_VAL;
-    int passes = 0, solved = 0;
-    if (!s->foreseeing) predator_prey_march(s, table, model);
-    for (int stage = 0; stage < 1; ++stage) {
-        if (s->foreseeing) predator_prey_foresee(&s->memory[stage], table->weight[stage], model[stage].y);
-        if (!predator_prey_near_lanes(model[stage].y, s->x)) return 0;
-    }
-    while (!solved) {
-        double size = 0.0;
-        const int matrices = previous > 1e-05;
-        for (int stage = 0; stage < 1; ++stage) predator_prey_update(table->coef[stage], &model[stage], matrices);
-        memcpy(x, s->x, sizeof x);
-        memcpy(carry, s->carry, sizeof carry);
-        predator_prey_chain(model, x, carry);
-        for (int stage = 0; stage < 1; ++stage) {
-            predator_prey_correct(&model[stage], sizes);
-            const double largest = predator_prey_largest(sizes);
-            size = largest > size ? largest : size;
-        }
-        s->evaluations += 1 * predator_prey_LANES;
-        bend = matrices ? 0.0 : bend + previous;
-        bound = predator_prey_remaining(size, bend, bound);
-        /* The second test: after the square of so small a correction there is rounding only. */
-        solved = bound <= 1e-20 || (previous < 1e-8 && size < 1e-10);
-        if ((++passes >= most || !(size < previous)) && !solved) return 0;
-        previous = size;
-    }
-    for (int stage = 0; stage < 1; ++stage)
-        if (!predator_prey_near_lanes(model[stage].y, s->x)) return 0;
-    for (int i = 0; i < 2; ++i)
-        if (!isfinite(x[i])) return 0;
-    memcpy(s->x, x, sizeof x);
-    memcpy(s->carry, carry, sizeof carry);
-    s->steps += predator_prey_LANES;
-    for (int stage = 0; stage < 1; ++stage) {
-        predator_prey_memory *memory = &s->memory[stage];
-        predator_prey_record_lanes(memory, model[stage].y);
-        memory->slow = passes > 1 ? memory->slow + predator_prey_LANES : 0;
-        if (memory->slow > memory->patience && s->foreseeing) predator_prey_fit(memory);
-    }
-    return passes;
-}
-
-/* Recurrences are given up for a while, the longer the more often that happens. */
-static void predator_prey_give_up(predator_prey_solver *s)
-{
-    s->foreseeing = s->setback = s->pause = 0;
-    s->doubt = 2 * s->doubt + 600;
-    s->retry = s->steps + s->doubt;
-}
-
-/* How the next block is guessed: by recurrences, fitted as soon as enough steps are to be made, or
-   have been, to repay that. */
-static void predator_prey_choose_guess(predator_prey_solver *s, size_t steps)
-{
-    for (int stage = 0; stage < 1; ++stage)
-        if (s->memory[stage].count < 111) {
-            s->foreseeing = 0;
-            return;
-        }
-    if (s->foreseeing || (steps < 600 && s->steps < 150) || s->steps < s->retry) return;
-    s->foreseeing = 1;
-    for (int stage = 0; stage < 1 && s->foreseeing; ++stage) {
-        predator_prey_fit(&s->memory[stage]);
-        s->foreseeing = s->memory[stage].terms > 0;
-    }
-    s->pause = predator_prey_LANES;
-    if (!s->foreseeing) predator_prey_give_up(s);
-}
-
-/* Learn from a block: after one that failed single steps are made, the more the more often that happens. Recurrences
-   that fail repeatedly, or need more passes than steps by Runge-Kutta did, are given up. */
-static void predator_prey_learn_from(predator_prey_solver *s, int passes)
-{
-    if (passes > 0) {
-        s->setback /= 2;
-    } else {
-        s->setback = 2 * s->setback + predator_prey_LANES > 1000 ? 1000 : 2 * s->setback + predator_prey_LANES;
-        s->pause = s->setback;
-    }
-    if (!s->foreseeing) {
-        s->passes = passes > 0 ? passes : INT_MAX;
-    } else if (passes > s->passes || s->setback > 5 * predator_prey_LANES) {
-        predator_prey_give_up(s);
-    }
-}
-
-/* A single step, and the running mean of the evaluations that a stage of one takes. */
-static predator_prey_status predator_prey_single(predator_prey_solver *s)
-{
-    const size_t before = s->evaluations;
-    const predator_prey_status status = predator_prey_step(s, s->h);
-    s->effort += 0.125 * ((double)(s->evaluations - before) / 1 - s->effort);
-    return status;
-}
-
-/* Blocks of steps where they cost less than single steps, with at most as many passes over a block as 2 for each
-   evaluation in a single step. The results differ by round-off only. */
 predator_prey_status predator_prey_integrate(predator_prey_solver *s, double h, size_t steps)
 {
-    predator_prey_table table;
     predator_prey_status status = predator_prey_set_step(s, h);
-    for (int stage = 0; stage < 1; ++stage) table.fits[stage] = -1;
-    while (status == predator_prey_OK && steps > 0) {
-        if (steps >= predator_prey_LANES && s->pause == 0) predator_prey_choose_guess(s, steps);
-        if (steps >= predator_prey_LANES && s->pause == 0) {
-            predator_prey_refresh(s, &table);
-            const int passes = predator_prey_block(s, &table, (int)(2 * s->effort + 0.5));
-            predator_prey_learn_from(s, passes);
-            if (passes > 0) steps -= predator_prey_LANES;
-        } else {
-            if (s->pause > 0) --s->pause;
-            status = predator_prey_single(s);
-            if (status == predator_prey_OK) --steps;
-        }
-    }
+    for (; steps > 0 && status == predator_prey_OK; --steps) status = predator_prey_step(s, h);
     return status;
-}
-
-/* Members of an ensemble, each in its lane. */
-typedef struct {
-    predator_prey_lanes x[2], carry[2], coef[1][11];
-    predator_prey_lanes past[1][111][2]; /* solved values, in a ring */
-    predator_prey_lanes weight[1][40][2]; /* of past values, the latest first, for the next */
-    int latest;     /* the row of the latest values */
-    int count;      /* rows in use */
-    int order[1];   /* how many of them the extrapolation uses */
-    int terms[1];   /* how many of them the recurrences use */
-    int fits;       /* how often recurrences have been fitted */
-    int fitting[1]; /* whether they are the better guess */
-    int slow;       /* how many of the last steps took more than one iteration */
-    int patience;   /* how many of those before recurrences are fitted again */
-    int active[8];  /* whether the lane has a member that has not failed */
-    size_t left[8]; /* steps that are still to be made, where one has */
-} predator_prey_group;
-
-/* The past values of a stage, the latest for k = 0. */
-static predator_prey_lanes *predator_prey_group_past(predator_prey_group *group, int stage, int k)
-{
-    const int row = group->latest + k;
-    return group->past[stage][row < 111 ? row : row - 111];
-}
-
-/* Guess the values of a stage by the recurrences of the members. */
-static void predator_prey_group_foresee(predator_prey_group *group, int stage, predator_prey_lanes y[restrict 2])
-{
-    memset(y, 0, 2 * sizeof y[0]);
-    for (int k = 0; k < group->terms[stage]; ++k) {
-        predator_prey_lanes *past = predator_prey_group_past(group, stage, k), *weight = group->weight[stage][k];
-        for (int i = 0; i < 2; ++i) {
-            predator_prey_EACH_LANE
-            for (int lane = 0; lane < predator_prey_LANES; ++lane) y[i][lane] += weight[i][lane] * past[i][lane];
-        }
-    }
-}
-
-/* Extrapolate the values of a stage. */
-static void predator_prey_group_extrapolate(predator_prey_group *group, int stage, predator_prey_lanes y[restrict 2])
-{
-    const int order = group->order[stage];
-    double binomial = -1.0;
-    memcpy(y, group->x, 2 * sizeof y[0]);
-    if (order > 0) memset(y, 0, 2 * sizeof y[0]);
-    for (int k = 0; k < order; ++k) {
-        predator_prey_lanes *past = predator_prey_group_past(group, stage, k);
-        binomial *= -(double)(order - k) / (k + 1);
-        for (int i = 0; i < 2; ++i) {
-            predator_prey_EACH_LANE
-            for (int lane = 0; lane < predator_prey_LANES; ++lane) y[i][lane] += binomial * past[i][lane];
-        }
-    }
-}
-
-/* The sum over members of the absolute values of all components. */
-static double predator_prey_group_sum(const predator_prey_group *group, predator_prey_lanes y[2])
-{
-    double sum = 0.0;
-    for (int i = 0; i < 2; ++i)
-        for (int lane = 0; lane < predator_prey_LANES; ++lane) sum += group->active[lane] ? fabs(y[i][lane]) : 0.0;
-    return sum;
-}
-
-static void predator_prey_group_subtract(predator_prey_lanes y[restrict 2], predator_prey_lanes other[restrict 2])
-{
-    for (int i = 0; i < 2; ++i) {
-        predator_prey_EACH_LANE
-        for (int lane = 0; lane < predator_prey_LANES; ++lane) y[i][lane] -= other[i][lane];
-    }
-}
-
-/* Choose the guess that would have been best for these values. */
-static void predator_prey_group_judge(predator_prey_group *group, int stage, predator_prey_lanes y[2])
-{
-    predator_prey_lanes row[8 + 1][2];
-    const int rows = group->count < 8 ? group->count : 8;
-    double least = HUGE_VAL;
-    memcpy(row[0], y, sizeof row[0]);
-    for (int k = 0; k < rows; ++k) memcpy(row[k + 1], predator_prey_group_past(group, stage, k), sizeof row[0]);
-    if (group->order[stage] == 0) group->order[stage] = 1;
-    for (int order = 1; order <= rows; ++order) { /* row[0] becomes the backward difference of this order */
-        for (int k = 0; k <= rows - order; ++k) predator_prey_group_subtract(row[k], row[k + 1]);
-        const double size = predator_prey_group_sum(group, row[0]);
-        if (size < least) {
-            least = size;
-            group->order[stage] = order;
-        }
-    }
-    if (group->terms[stage] == 0) return;
-    predator_prey_group_foresee(group, stage, row[0]);
-    predator_prey_group_subtract(row[0], y);
-    group->fitting[stage] = predator_prey_group_sum(group, row[0]) <= least;
-}
-
-/* Fit the recurrences of all members; with every time, wait longer before it is done again, and for long if it did not
-   help. */
-static void predator_prey_group_fit(predator_prey_group *group)
-{
-    predator_prey_memory memory;
-    const int helped = group->fits == 0 || group->fitting[0];
-    memory.count = 111;
-    for (int stage = 0; stage < 1; ++stage) {
-        int found = 1;
-        group->terms[stage] = 0;
-        for (int lane = 0; lane < predator_prey_LANES; ++lane)
-            for (int i = 0; i < 2 && group->active[lane] && found; ++i) {
-                for (int k = 0; k < 111; ++k)
-                    memory.past[111 - 1 - k][i] = predator_prey_group_past(group, stage, k)[i][lane];
-                const int terms = predator_prey_train(&memory, i);
-                found = terms > 0;
-                if (terms > group->terms[stage]) group->terms[stage] = terms;
-                for (int k = 0; k < 40; ++k) group->weight[stage][k][i][lane] = memory.weight[k][i][0];
-            }
-        if (!found) group->terms[stage] = 0;
-        group->fitting[stage] = found;
-    }
-    ++group->fits;
-    group->slow = 0;
-    group->patience = helped && group->patience < 10000 ? 2 * group->patience + 150 : 100 * 150;
-}
-
-/* Replace guesses that are not near the last values, as predator_prey_near has it, by these; lane by lane. */
-static void predator_prey_stay_near(predator_prey_lanes y[restrict 2], predator_prey_lanes last[restrict 2])
-{
-    predator_prey_lanes distance = { 0.0 }, size = { 0.0 };
-    for (int i = 0; i < 2; ++i) {
-        predator_prey_EACH_LANE
-        for (int lane = 0; lane < predator_prey_LANES; ++lane) {
-            distance[lane] += fabs(y[i][lane] - last[i][lane]);
-            size[lane] += fabs(last[i][lane]);
-        }
-    }
-    for (int i = 0; i < 2; ++i) {
-        predator_prey_EACH_LANE
-        for (int lane = 0; lane < predator_prey_LANES; ++lane)
-            y[i][lane] = distance[lane] <= 4.0 * size[lane] ? y[i][lane] : last[i][lane];
-    }
-}
-
-/* Whether lanes are still to be solved after a correction of this size; those where nothing is finite leave the group.
-   bound is what remains in each lane. */
-static int predator_prey_group_open(predator_prey_group *group, const predator_prey_lanes size, const predator_prey_lanes previous,
-    double bend, predator_prey_lanes bound)
-{
-    int open = 0;
-    predator_prey_EACH_LANE
-    for (int lane = 0; lane < predator_prey_LANES; ++lane)
-        bound[lane] = predator_prey_remaining(size[lane], bend, bound[lane]);
-    if (predator_prey_largest(bound) <= 1e-20) return 0;
-    for (int lane = 0; lane < predator_prey_LANES; ++lane) {
-        const int solved = bound[lane] <= 1e-20 || (previous[lane] < 1e-8 && size[lane] < 1e-10);
-        if (!isfinite(size[lane])) group->active[lane] = 0;
-        open += group->active[lane] && !solved;
-    }
-    return open;
-}
-
-/* The guess for a stage: recurrences, or extrapolation; the state for members where that is not near. */
-static void predator_prey_group_predict(predator_prey_group *group, int stage, predator_prey_lanes y[2])
-{
-    if (group->fitting[stage]) predator_prey_group_foresee(group, stage, y);
-    else predator_prey_group_extrapolate(group, stage, y);
-    predator_prey_stay_near(y, group->x);
-}
-
-/* Newton's method for a stage, until the slowest lane is solved. The number of iterations; where that is the most
-   allowed, lanes that are not solved leave the group. */
-static int predator_prey_group_solve(predator_prey_group *group, int stage, predator_prey_model *model)
-{
-    predator_prey_lanes size, previous, bound;
-    double largest = HUGE_VAL, bend = 0.0;
-    int iterations = 0, open = 1;
-    for (int lane = 0; lane < predator_prey_LANES; ++lane) size[lane] = bound[lane] = HUGE_VAL;
-    predator_prey_group_predict(group, stage, model->y);
-    for (; open > 0 && iterations < 20; ++iterations) {
-        memcpy(previous, size, sizeof size);
-        predator_prey_update(group->coef[stage], model, largest > 1e-05);
-        bend = largest > 1e-05 ? 0.0 : bend + largest;
-        for (int i = 0; i < 2; ++i) {
-            predator_prey_EACH_LANE
-            for (int lane = 0; lane < predator_prey_LANES; ++lane)
-                model->residual[i][lane] =
-                    ((model->y[i][lane] - group->x[i][lane]) + model->displacement[i][lane]) - group->carry[i][lane];
-        }
-        predator_prey_correct(model, size);
-        open = predator_prey_group_open(group, size, previous, bend, bound);
-        largest = predator_prey_largest(size);
-    }
-    for (int lane = 0; lane < predator_prey_LANES && open > 0; ++lane)
-        group->active[lane] = group->active[lane] && bound[lane] <= 1e-20;
-    return iterations;
-}
-
-/* Add the increments, corrected to first order, in compensated arithmetic as for a single step. */
-static void predator_prey_group_advance(predator_prey_lanes x[restrict 2], predator_prey_lanes carry[restrict 2],
-    predator_prey_model *model)
-{
-    for (int i = 0; i < 2; ++i)
-        for (int j = 0; j < 2; ++j) {
-            predator_prey_EACH_LANE
-            for (int lane = 0; lane < predator_prey_LANES; ++lane)
-                carry[i][lane] -= model->gain[i * 2 + j][lane] * model->residual[j][lane];
-        }
-    for (int i = 0; i < 2; ++i) {
-        predator_prey_EACH_LANE
-        for (int lane = 0; lane < predator_prey_LANES; ++lane) {
-            const double change = model->increment[i][lane], sum = x[i][lane] + change, added = sum - x[i][lane];
-            const double small = ((x[i][lane] - (sum - added)) + (change - added)) + carry[i][lane];
-            x[i][lane] = sum + small;
-            carry[i][lane] = small - (x[i][lane] - sum);
-        }
-    }
-}
-
-/* Members that failed, or whose state is not near the one before the step or not finite, keep that one, and leave. How many
-   stay. */
-static int predator_prey_group_leave(predator_prey_group *group, predator_prey_lanes x[2], predator_prey_lanes carry[2],
-    size_t remaining)
-{
-    predator_prey_lanes moved = { 0.0 }, size = { 0.0 }, bad;
-    int active = 0;
-    for (int i = 0; i < 2; ++i) {
-        predator_prey_EACH_LANE
-        for (int lane = 0; lane < predator_prey_LANES; ++lane) {
-            moved[lane] += fabs(group->x[i][lane] - x[i][lane]);
-            size[lane] += fabs(x[i][lane]);
-        }
-    }
-    for (int lane = 0; lane < predator_prey_LANES; ++lane) bad[lane] = moved[lane] <= 4.0 * size[lane] ? 0.0 : 1.0;
-    for (int lane = 0; lane < predator_prey_LANES; ++lane) active += group->active[lane];
-    if (active == predator_prey_LANES && !(predator_prey_largest(bad) > 0.0)) return active;
-    active = 0;
-    for (int lane = 0; lane < predator_prey_LANES; ++lane) {
-        group->active[lane] = group->active[lane] && !(bad[lane] > 0.0);
-        active += group->active[lane];
-        for (int i = 0; i < 2 && !group->active[lane]; ++i) {
-            group->x[i][lane] = x[i][lane];
-            group->carry[i][lane] = carry[i][lane];
-        }
-        if (!group->active[lane] && group->left[lane] == 0) group->left[lane] = remaining;
-    }
-    return active;
-}
-
-/* One step of all members, of as many as remain. How many members are left. */
-static int predator_prey_group_step(predator_prey_group *group, size_t remaining)
-{
-    predator_prey_lanes x[2], carry[2];
-    predator_prey_model model;
-    const int next = (group->latest > 0 ? group->latest : 111) - 1;
-    int most = 0;
-    memcpy(x, group->x, sizeof x);
-    memcpy(carry, group->carry, sizeof carry);
-    for (int stage = 0; stage < 1; ++stage) {
-        const int iterations = predator_prey_group_solve(group, stage, &model);
-        predator_prey_group_advance(group->x, group->carry, &model);
-        if (iterations > most) most = iterations;
-        if ((iterations > 1 && next % 8 == 0) || group->count < 8)
-            predator_prey_group_judge(group, stage, model.y);
-        memcpy(group->past[stage][next], model.y, sizeof model.y);
-    }
-    group->latest = next;
-    if (group->count < 111) ++group->count;
-    group->slow = most > 1 ? group->slow + 1 : 0;
-    if (group->slow > group->patience && group->count == 111 && remaining >= 400)
-        predator_prey_group_fit(group);
-    return predator_prey_group_leave(group, x, carry, remaining);
-}
-
-/* Put a member into a lane: its state, and its coefficients. */
-static predator_prey_status predator_prey_group_join(predator_prey_group *group, int lane, const predator_prey_params *params,
-    const double x0[2], double h)
-{
-    predator_prey_solver s;
-    predator_prey_status status = predator_prey_init(&s, params, x0);
-    if (status == predator_prey_OK) status = predator_prey_set_step(&s, h);
-    if (status != predator_prey_OK) return status;
-    for (int i = 0; i < 2; ++i) group->x[i][lane] = s.x[i];
-    for (int stage = 0; stage < 1; ++stage)
-        for (int k = 0; k < 11; ++k) group->coef[stage][k][lane] = s.coef[stage][k];
-    group->active[lane] = 1;
-    return status;
-}
-
-/* The steps that a member has still to make after it left the group, by itself. */
-static predator_prey_status predator_prey_group_finish(const predator_prey_group *group, int lane, const predator_prey_params *params,
-    double x[2], double h)
-{
-    predator_prey_solver s;
-    predator_prey_status status = predator_prey_init(&s, params, x);
-    if (status != predator_prey_OK) return status;
-    for (int i = 0; i < 2; ++i) s.carry[i] = group->carry[i][lane];
-    status = predator_prey_integrate(&s, h, group->left[lane]);
-    memcpy(x, s.x, sizeof s.x);
-    return status;
-}
-
-/* The members from first on, as many as there are lanes. The first status that is not OK. */
-static predator_prey_status predator_prey_group_run(const predator_prey_params *params, double *x, size_t members, size_t first,
-    double h, size_t steps, unsigned char *status)
-{
-    predator_prey_group group;
-    predator_prey_status worst = predator_prey_OK, member[8];
-    const int count = members - first < predator_prey_LANES ? (int)(members - first) : predator_prey_LANES;
-    double state[2];
-    size_t left = steps;
-    memset(&group, 0, sizeof group);
-    for (int lane = 0; lane < count; ++lane) {
-        for (size_t i = 0; i < 2; ++i) state[i] = x[i * members + first + (size_t)lane];
-        member[lane] = predator_prey_group_join(&group, lane, params, state, h);
-    }
-    for (int active = count; left > 0 && active > 2; --left) active = predator_prey_group_step(&group, left);
-    for (int lane = 0; lane < count; ++lane) {
-        if (group.active[lane]) group.left[lane] = left;
-        for (int i = 0; i < 2; ++i) state[i] = group.x[i][lane];
-        if (member[lane] == predator_prey_OK) {
-            if (group.left[lane] > 0) member[lane] = predator_prey_group_finish(&group, lane, params, state, h);
-            for (size_t i = 0; i < 2; ++i) x[i * members + first + (size_t)lane] = state[i];
-        }
-        if (status != NULL) status[first + (size_t)lane] = (unsigned char)member[lane];
-        if (worst == predator_prey_OK) worst = member[lane];
-    }
-    return worst;
-}
-
-predator_prey_status predator_prey_ensemble(const predator_prey_params *params, double *x, size_t members,
-                                            double h, size_t steps, unsigned char *status)
-{
-    predator_prey_status worst = isfinite(h) ? predator_prey_OK : predator_prey_BAD_ARGUMENT;
-    const predator_prey_params own = params != NULL ? *params : predator_prey_default_params;
-    size_t earliest = members;
-    if (x == NULL && members > 0) return predator_prey_BAD_ARGUMENT;
-#ifdef _OPENMP
-#pragma omp parallel for schedule(dynamic)
-#endif
-    for (size_t first = 0; first < members; first += predator_prey_LANES) {
-        const predator_prey_status group = predator_prey_group_run(&own, x, members, first, h, steps, status);
-        if (group == predator_prey_OK) continue;
-#ifdef _OPENMP
-#pragma omp critical
-#endif
-        if (first < earliest) {
-            earliest = first;
-            worst = group;
-        }
-    }
-    return worst;
-}
-
-#if defined(__clang__)
-#pragma clang diagnostic pop
-#endif
-
-/* the Hamiltonian */
-static void predator_prey_energy(const predator_prey_params *params, const double x[2],
-                                 double energy[restrict 1])
-{
-    const double prey = x[0];
-    const double predator = x[1];
-    energy[0] = params->death * log(prey) + (params->growth * log(predator) - params->attack * predator) - params->gain * prey;
-}
-
-/* the Casimirs */
-static void predator_prey_casimir_values(const predator_prey_params *params, const double x[2],
-                                         double out[restrict 1])
-{
-    (void)params;
-    (void)x;
-    (void)out;
-}
-
-/* pi(x) grad H(x) */
-static void predator_prey_field(const predator_prey_params *params, const double x[2], double out[restrict 2])
-{
-    const double prey = x[0];
-    const double predator = x[1];
-    const double t1 = predator * prey;
-    out[0] = t1 * (params->growth / predator - params->attack);
-    out[1] = -(t1 * (params->death / prey - params->gain));
-}
-
-double predator_prey_hamiltonian(const predator_prey_params *params, const double x[2])
-{
-    double energy[1];
-    predator_prey_energy(params != NULL ? params : &predator_prey_default_params, x, energy);
-    return energy[0];
-}
-
-void predator_prey_casimirs(const predator_prey_params *params, const double x[2], double out[])
-{
-    double value[1]; /* out may overlap x */
-    predator_prey_casimir_values(params != NULL ? params : &predator_prey_default_params, x, value);
-    for (int i = 0; i < 0; ++i) out[i] = value[i];
-}
-
-void predator_prey_vector_field(const predator_prey_params *params, const double x[2], double out[2])
-{
-    double value[2];
-    predator_prey_field(params != NULL ? params : &predator_prey_default_params, x, value);
-    memcpy(out, value, sizeof value);
 }
 
 const char *predator_prey_status_string(predator_prey_status status)
 {
-    switch (status) {
-    case predator_prey_OK: return "ok";
-    case predator_prey_NO_CONVERGENCE: return "no convergence: the step is too large";
-    case predator_prey_SINGULAR: return "singular Newton matrix: the step is too large";
-    case predator_prey_NOT_FINITE: return "not finite: overflow, or outside the domain";
-    case predator_prey_BAD_ARGUMENT: return "bad argument: a null pointer, or values that are not allowed";
-    }
-    return "unknown status";
+    static const char *const text[] = {
+        "ok",
+        "no convergence: the step is too large",
+        "singular Newton matrix: the step is too large",
+        "not finite: overflow, or outside the domain",
+        "bad argument: a null pointer, or values that are not allowed"
+    };
+    return (unsigned)status <= predator_prey_BAD_ARGUMENT ? text[status] : "unknown status";
 }
 
 size_t predator_prey_solver_size(void) { return sizeof(predator_prey_solver); }
 
 size_t predator_prey_solver_steps_done(const predator_prey_solver *s) { return s->steps; }
+
+/* ---- Ensembles ---- */
+predator_prey_status predator_prey_ensemble(const predator_prey_params *params, double *x, size_t members,
+    double h, size_t steps, unsigned char *status)
+{
+    predator_prey_status worst = isfinite(h) ? predator_prey_OK : predator_prey_BAD_ARGUMENT;
+    const predator_prey_params own = params != NULL ? *params : predator_prey_default_params;
+    if (x == NULL && members > 0) return predator_prey_BAD_ARGUMENT;
+    for (size_t m = 0; m < members; ++m) {
+        predator_prey_solver s;
+        double x0[predator_prey_DIM];
+        for (size_t i = 0; i < predator_prey_DIM; ++i) x0[i] = x[i * members + m];
+        predator_prey_status member = predator_prey_init(&s, &own, x0);
+        if (member == predator_prey_OK) {
+            member = predator_prey_integrate(&s, h, steps);
+            for (size_t i = 0; i < predator_prey_DIM; ++i) x[i * members + m] = s.x[i];
+        }
+        if (status != NULL) status[m] = (unsigned char)member;
+        if (worst == predator_prey_OK) worst = member;
+    }
+    return worst;
+}

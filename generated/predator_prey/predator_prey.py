@@ -6,17 +6,17 @@
 #   step: implicit, Newton iteration with the analytic matrix
 #   one Newton iteration: 29 additions, 72 multiplications, 4 divisions, 2 functions
 #
-# spec: predator_prey, sha256 756f4a9cb0ed0e328b63a51b2d6b8dddeb1b3f43ed6e5f1477d35affb9e83153
+# spec: predator_prey, sha256 e9ed620ed8f3d5aad12a62fc9348c8e9ca6a49af75e51b9b9dab791a7ff33715
 # to regenerate: phigen build predator_prey
 # DO NOT EDIT: change the spec and regenerate; edits are noticed by the checksum below.
 #
 # SPDX-License-Identifier: 0BSD
 # This file belongs to whoever generated it; phigen claims no rights in it.
-# body-sha256: fd8ebb40fa8883b3853e2249990b17486d2a2a25f1b900dbe8d426ff12ae8924
+# body-sha256: 1feda929d0a846436e2a18eafd32ebdc15db80e3cacc3e89845c73ce77cca133
 import numpy as np
 
 VERSION = "0.1.0"
-SPEC_SHA256 = "756f4a9cb0ed0e328b63a51b2d6b8dddeb1b3f43ed6e5f1477d35affb9e83153"
+SPEC_SHA256 = "e9ed620ed8f3d5aad12a62fc9348c8e9ca6a49af75e51b9b9dab791a7ff33715"
 DIM = 2
 ORDER = 4
 COORDINATES = ("prey", "predator",)

@@ -14,7 +14,20 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: df62ab5b74b691e71fcc0abf6fbb652be8d1a672a3769f9a325da4fb62cedc9a
+ *
+ *   1. The model
+ *   2. Compensated sums, linear equations
+ *   3. Starting guesses
+ *   4. Recurrences fitted to the last values
+ *   5. The implicit step, by Newton's method
+ *   6. The choice of the gauge: multiples of Casimirs taken from H
+ *   7. Several steps or members at once
+ *   8. The solver
+ *   9. Newton's method in lanes
+ *   10. Blocks of steps
+ *   11. Groups of members
+ *   12. Ensembles
+ * body-sha256: 1b082407b7e8d2379c955c56d94468a63c5de3a7fb15479df04868ad3533e601
  */
 #include "rigid_body.h"
 
@@ -24,50 +37,40 @@
 #include <stdint.h>
 #include <string.h>
 
+/* ---- The model ---- */
 const rigid_body_params rigid_body_default_params = { 2.0, 1.0, 0.6666666666666666 };
 
-/* A step of size h is the composition of these fractions of it. */
-static const double rigid_body_fractions[1] = { 1.0 };
+enum { rigid_body_MAX_ITERATIONS = 20 }; /* of an inner solve */
+enum { rigid_body_CHECKS = 8 };          /* values that a recurrence is not fitted to, but has to foresee */
+enum { rigid_body_PASSES = 2 };          /* over a block, that cost per step what an evaluation costs */
+
+/* A correction is accepted when the error that it leaves is estimated to be below this. */
+#define rigid_body_TOLERANCE 1e-20
+
+/* Whether all parameters are finite, and positive where they have to be. */
+static int rigid_body_allowed(const rigid_body_params *params)
+{
+    return isfinite(params->I1) && params->I1 > 0.0 && isfinite(params->I2) && params->I2 > 0.0
+        && isfinite(params->I3) && params->I3 > 0.0;
+}
 
 /* (1 - w cot w)/s with w = sqrt(s)/2, coth for negative s: the function of the exponential bi-realisation. */
 static double rigid_body_phi0(double s)
 {
-    if (fabs(s) < 0.25) {
-        double sum = 8.586062056277845e-15;
-        sum = sum * s + 3.3896802963225827e-13;
-        sum = sum * s + 1.3382536530684679e-11;
-        sum = sum * s + 5.284190138687493e-10;
-        sum = sum * s + 2.08767569878681e-08;
-        sum = sum * s + 8.267195767195768e-07;
-        sum = sum * s + 3.306878306878307e-05;
-        sum = sum * s + 0.001388888888888889;
-        sum = sum * s + 0.08333333333333333;
-        return sum;
-    }
+    if (fabs(s) < 0.25)
+        return (0.08333333333333333 + s * (0.001388888888888889 + s * (3.306878306878307e-05 + s *
+            (8.267195767195768e-07 + s * (2.08767569878681e-08 + s * (5.284190138687493e-10 + s *
+            (1.3382536530684679e-11 + s * (3.3896802963225827e-13 + s * 8.586062056277845e-15))))))));
     if (fabs(s) < 16.0) {
         const double pole = 1.0 / (39.47841760435743 - s);
-        double sum = 1.3621211117593843e-46;
-        sum = sum * s + 2.1509755511832569e-44;
-        sum = sum * s + 3.3966848266497805e-42;
-        sum = sum * s + 5.363831046655698e-40;
-        sum = sum * s + 8.470227328650247e-38;
-        sum = sum * s + 1.3375664093215244e-35;
-        sum = sum * s + 2.1122063323183885e-33;
-        sum = sum * s + 3.3354842988221443e-31;
-        sum = sum * s + 5.267262996834231e-29;
-        sum = sum * s + 8.318003195189264e-27;
-        sum = sum * s + 1.3136241807166534e-24;
-        sum = sum * s + 2.0747401878593604e-22;
-        sum = sum * s + 3.277539174701792e-20;
-        sum = sum * s + 5.180118196169724e-18;
-        sum = sum * s + 8.196052055691008e-16;
-        sum = sum * s + 1.3000482138698975e-13;
-        sum = sum * s + 2.0742872904166045e-11;
-        sum = sum * s + 3.357141926657451e-09;
-        sum = sum * s + 5.637370282876845e-07;
-        sum = sum * s + 0.000105641107053347;
-        sum = sum * s + 0.03267274151216445;
-        return 2.0 * pole + sum;
+        return 2.0 * pole + (0.03267274151216445 + s * (0.000105641107053347 + s * (5.637370282876845e-07
+            + s * (3.357141926657451e-09 + s * (2.0742872904166045e-11 + s * (1.3000482138698975e-13 + s *
+            (8.196052055691008e-16 + s * (5.180118196169724e-18 + s * (3.277539174701792e-20 + s *
+            (2.0747401878593604e-22 + s * (1.3136241807166534e-24 + s * (8.318003195189264e-27 + s *
+            (5.267262996834231e-29 + s * (3.3354842988221443e-31 + s * (2.1122063323183885e-33 + s *
+            (1.3375664093215244e-35 + s * (8.470227328650247e-38 + s * (5.363831046655698e-40 + s *
+            (3.3966848266497805e-42 + s * (2.1509755511832569e-44 + s *
+            1.3621211117593843e-46))))))))))))))))))));
     }
     const double w = 0.5 * sqrt(fabs(s)), c = w / (s > 0.0 ? tan(w) : tanh(w));
     const double phi0 = (1.0 - c) / s;
@@ -77,42 +80,20 @@ static double rigid_body_phi0(double s)
 /* The derivative of (1 - w cot w)/s, w = sqrt(s)/2. */
 static double rigid_body_phi1(double s)
 {
-    if (fabs(s) < 0.25) {
-        double sum = 1.9573818287022555e-15;
-        sum = sum * s + 6.868849645022276e-14;
-        sum = sum * s + 2.372776207425808e-12;
-        sum = sum * s + 8.029521918410807e-11;
-        sum = sum * s + 2.6420950693437467e-09;
-        sum = sum * s + 8.35070279514724e-08;
-        sum = sum * s + 2.48015873015873e-06;
-        sum = sum * s + 6.613756613756614e-05;
-        sum = sum * s + 0.001388888888888889;
-        return sum;
-    }
+    if (fabs(s) < 0.25)
+        return (0.001388888888888889 + s * (6.613756613756614e-05 + s * (2.48015873015873e-06 + s *
+            (8.35070279514724e-08 + s * (2.6420950693437467e-09 + s * (8.029521918410807e-11 + s *
+            (2.372776207425808e-12 + s * (6.868849645022276e-14 + s * 1.9573818287022555e-15))))))));
     if (fabs(s) < 16.0) {
         const double pole = 1.0 / (39.47841760435743 - s);
-        double sum = 1.8114038279637677e-47;
-        sum = sum * s + 2.7242422235187686e-45;
-        sum = sum * s + 4.0868535472481875e-43;
-        sum = sum * s + 6.114032687969605e-41;
-        sum = sum * s + 9.118512779314688e-39;
-        sum = sum * s + 1.3552363725840395e-36;
-        sum = sum * s + 2.0063496139822866e-34;
-        sum = sum * s + 2.957088865245744e-32;
-        sum = sum * s + 4.336129588468787e-30;
-        sum = sum * s + 6.320715596201077e-28;
-        sum = sum * s + 9.149803514708191e-26;
-        sum = sum * s + 1.3136241807166533e-23;
-        sum = sum * s + 1.8672661690734246e-21;
-        sum = sum * s + 2.6220313397614337e-19;
-        sum = sum * s + 3.626082737318807e-17;
-        sum = sum * s + 4.917631233414605e-15;
-        sum = sum * s + 6.500241069349487e-13;
-        sum = sum * s + 8.297149161666418e-11;
-        sum = sum * s + 1.0071425779972354e-08;
-        sum = sum * s + 1.127474056575369e-06;
-        sum = sum * s + 0.000105641107053347;
-        return 2.0 * pole * pole + sum;
+        return 2.0 * pole * pole + (0.000105641107053347 + s * (1.127474056575369e-06 + s *
+            (1.0071425779972354e-08 + s * (8.297149161666418e-11 + s * (6.500241069349487e-13 + s *
+            (4.917631233414605e-15 + s * (3.626082737318807e-17 + s * (2.6220313397614337e-19 + s *
+            (1.8672661690734246e-21 + s * (1.3136241807166533e-23 + s * (9.149803514708191e-26 + s *
+            (6.320715596201077e-28 + s * (4.336129588468787e-30 + s * (2.957088865245744e-32 + s *
+            (2.0063496139822866e-34 + s * (1.3552363725840395e-36 + s * (9.118512779314688e-39 + s *
+            (6.114032687969605e-41 + s * (4.0868535472481875e-43 + s * (2.7242422235187686e-45 + s *
+            1.8114038279637677e-47))))))))))))))))))));
     }
     const double w = 0.5 * sqrt(fabs(s)), c = w / (s > 0.0 ? tan(w) : tanh(w));
     const double phi0 = (1.0 - c) / s;
@@ -122,105 +103,73 @@ static double rigid_body_phi1(double s)
 
 /* everything that depends on parameters and step size only */
 static void rigid_body_prepare(const rigid_body_params *params, const double gauge[1], double h,
-                               double coef[restrict 35])
+    double coef[restrict 35])
 {
-    const double t1 = 1.0 / params->I1;
-    const double t2 = h * h;
-    const double t3 = h * t2;
-    const double t4 = t1 * t1;
-    const double t5 = 1.0 / params->I2;
-    const double t6 = 1.0 / 24.0 * t5;
-    const double t7 = 1.0 / 12.0 * gauge[0];
-    const double t8 = 1.0 / params->I3;
-    const double t9 = 1.0 / 24.0 * t8;
-    const double t10 = 1.0 / 12.0 * t1;
-    const double t11 = 1.0 / 6.0 * t1;
+    const double t1 = 1.0 / params->I1, t2 = h * h, t3 = h * t2, t4 = t1 * t1, t5 = 1.0 / params->I2;
+    const double t6 = 1.0 / 24.0 * t5, t7 = 1.0 / 12.0 * gauge[0], t8 = 1.0 / params->I3;
+    const double t9 = 1.0 / 24.0 * t8, t10 = 1.0 / 12.0 * t1, t11 = 1.0 / 6.0 * t1;
     const double t12 = 1.0 / 12.0 * t8;
     const double t13 = t3 * (t4 * (t6 - t7) + t8 * (t5 * (t9 - t10) + gauge[0] * (t11 - t12)));
-    const double t14 = h * (t2 * t2);
-    const double t15 = t5 * t5;
-    const double t16 = 1.0 / 72.0 * t1;
-    const double t17 = 1.0 / 180.0 * gauge[0];
-    const double t18 = gauge[0] * (t16 - t17);
-    const double t19 = 1.0 / 72.0 * (t1 * t5);
-    const double t20 = gauge[0] * gauge[0];
-    const double t21 = gauge[0] * t20;
-    const double t22 = 1.0 / 90.0 * t21;
-    const double t23 = 1.0 / 24.0 * gauge[0];
-    const double t24 = 1.0 / 80.0 * t5;
-    const double t25 = 1.0 / 720.0 * t1;
-    const double t26 = 1.0 / 30.0 * t20;
-    const double t27 = 1.0 / 720.0 * t8;
-    const double t28 = 1.0 / 240.0 * t5;
-    const double t29 = 1.0 / 72.0 * t5;
-    const double t30 = (-1.0 / 180.0) * gauge[0];
-    const double t31 = 1.0 / 240.0 * t8;
-    const double t32 = t30 - t31;
-    const double t33 = 1.0 / 180.0 * t21;
-    const double t34 = 1.0 / 40.0 * gauge[0];
-    const double t35 = t34 + 1.0 / 120.0 * t8;
-    const double t36 = 1.0 / 240.0 * t1;
-    const double t37 = 1.0 / 1440.0 * t8;
-    const double t38 = 1.0 / 1440.0 * t4;
-    const double t39 = t8 * (t5 * (t27 - t28) + gauge[0] * (t29 + t32)) - t33 + t1 * (gauge[0] * (t35 + ((-1.0 / 24.0) * t5 - t36)) + (t8 * (t37 - t28 - t25) + (t38 + t5 * (t36 + t24))));
-    const double t40 = t4 * (1.0 / 240.0 * (t15 * t1) + gauge[0] * (t18 - t19)) + t8 * (t1 * (t22 + t1 * (t5 * (t23 - t24 - t25) - t26)) + t8 * t39);
-    const double t41 = t14 * t40;
-    const double t42 = 1.0 / 12.0 * t5;
+    const double t14 = h * (t2 * t2), t15 = t5 * t5, t16 = 1.0 / 72.0 * t1;
+    const double t17 = 1.0 / 180.0 * gauge[0], t18 = gauge[0] * (t16 - t17);
+    const double t19 = 1.0 / 72.0 * (t1 * t5), t20 = gauge[0] * gauge[0], t21 = gauge[0] * t20;
+    const double t22 = 1.0 / 90.0 * t21, t23 = 1.0 / 24.0 * gauge[0], t24 = 1.0 / 80.0 * t5;
+    const double t25 = 1.0 / 720.0 * t1, t26 = 1.0 / 30.0 * t20, t27 = 1.0 / 720.0 * t8;
+    const double t28 = 1.0 / 240.0 * t5, t29 = 1.0 / 72.0 * t5, t30 = (-1.0 / 180.0) * gauge[0];
+    const double t31 = 1.0 / 240.0 * t8, t32 = t30 - t31, t33 = 1.0 / 180.0 * t21;
+    const double t34 = 1.0 / 40.0 * gauge[0], t35 = t34 + 1.0 / 120.0 * t8, t36 = 1.0 / 240.0 * t1;
+    const double t37 = 1.0 / 1440.0 * t8, t38 = 1.0 / 1440.0 * t4;
+    const double t39 = t8 * (t5 * (t27 - t28) + gauge[0] * (t29 + t32)) - t33 + t1
+        * (gauge[0] * (t35 + ((-1.0 / 24.0) * t5 - t36)) + (t8 * (t37 - t28 - t25)
+        + (t38 + t5 * (t36 + t24))));
+    const double t40 = t4 * (1.0 / 240.0 * (t15 * t1) + gauge[0] * (t18 - t19)) + t8
+        * (t1 * (t22 + t1 * (t5 * (t23 - t24 - t25) - t26)) + t8 * t39);
+    const double t41 = t14 * t40, t42 = 1.0 / 12.0 * t5;
     const double t43 = t3 * (t4 * (t9 - t7) + t5 * (t8 * (t6 - t10) + gauge[0] * (t11 - t42)));
-    const double t44 = 1.0 / 90.0 * gauge[0];
-    const double t45 = 17.0 / 360.0 * t1;
-    const double t46 = 1.0 / 72.0 * t4;
-    const double t47 = 1.0 / 30.0 * t5;
-    const double t48 = 1.0 / 30.0 * t1;
-    const double t49 = gauge[0] * t4 * (1.0 / 36.0 * t1 - t44) + t5 * (gauge[0] * t5 * (1.0 / 36.0 * t5 - t44) + t1 * (t5 * (t45 - t29) - t46 + gauge[0] * (t44 - t47 - t48)));
-    const double t50 = t44 - 1.0 / 30.0 * t8;
-    const double t51 = 1.0 / 72.0 * t8;
-    const double t52 = 7.0 / 360.0 * t1;
-    const double t53 = gauge[0] * (7.0 / 60.0 * t1 - t47 + t50) + (t8 * (17.0 / 360.0 * t5 - t51 - t52) + (t5 * ((-1.0 / 72.0) * t5 - t52) - 7.0 / 360.0 * t4));
-    const double t54 = t8 * (t5 * t53 + (gauge[0] * t8 * (1.0 / 36.0 * t8 - t44) + t1 * (t8 * (t45 - t51) - t46 + gauge[0] * (t50 - t48))));
-    const double t55 = 1.0 / 360.0 * t1;
-    const double t56 = t4 * t8;
-    const double t57 = (-1.0 / 360.0) * t8;
-    const double t58 = t8 * t5;
-    const double t59 = 1.0 / 80.0 * t4;
-    const double t60 = 1.0 / 144.0 * t1;
-    const double t61 = 1.0 / 80.0 * t8;
-    const double t62 = t56 * (t57 - t55) + t5 * (t58 * (t57 - 1.0 / 360.0 * t5) + t1 * (t59 + t5 * (t24 - t60) + t8 * (t61 - 1.0 / 144.0 * t5 - t60)));
+    const double t44 = 1.0 / 90.0 * gauge[0], t45 = 17.0 / 360.0 * t1, t46 = 1.0 / 72.0 * t4;
+    const double t47 = 1.0 / 30.0 * t5, t48 = 1.0 / 30.0 * t1;
+    const double t49 = gauge[0] * t4 * (1.0 / 36.0 * t1 - t44) + t5 * (gauge[0] * t5 * (1.0 / 36.0 * t5 - t44)
+        + t1 * (t5 * (t45 - t29) - t46 + gauge[0] * (t44 - t47 - t48)));
+    const double t50 = t44 - 1.0 / 30.0 * t8, t51 = 1.0 / 72.0 * t8, t52 = 7.0 / 360.0 * t1;
+    const double t53 = gauge[0] * (7.0 / 60.0 * t1 - t47 + t50) + (t8 * (17.0 / 360.0 * t5 - t51 - t52)
+        + (t5 * ((-1.0 / 72.0) * t5 - t52) - 7.0 / 360.0 * t4));
+    const double t54 = t8 * (t5 * t53 + (gauge[0] * t8 * (1.0 / 36.0 * t8 - t44) + t1 * (t8 * (t45 - t51)
+        - t46 + gauge[0] * (t50 - t48))));
+    const double t55 = 1.0 / 360.0 * t1, t56 = t4 * t8, t57 = (-1.0 / 360.0) * t8, t58 = t8 * t5;
+    const double t59 = 1.0 / 80.0 * t4, t60 = 1.0 / 144.0 * t1, t61 = 1.0 / 80.0 * t8;
+    const double t62 = t56 * (t57 - t55) + t5 * (t58 * (t57 - 1.0 / 360.0 * t5) + t1 * (t59 + t5 * (t24 - t60)
+        + t8 * (t61 - 1.0 / 144.0 * t5 - t60)));
     const double t63 = t14 * (gauge[0] * (t49 + t54) + (t15 * t4 * ((-1.0 / 360.0) * t5 - t55) + t8 * t62));
-    const double t64 = t8 * t8;
-    const double t65 = 1.0 / 72.0 * (t1 * t8);
-    const double t66 = t23 - t61;
-    const double t67 = 1.0 / 720.0 * t5;
-    const double t68 = t51 - t17;
-    const double t69 = 1.0 / 120.0 * t5;
-    const double t70 = t34 - t9;
-    const double t71 = 1.0 / 1440.0 * t5;
-    const double t72 = t38 + t5 * (t71 - t25);
-    const double t73 = t5 * (t8 * (t67 - t31) + gauge[0] * (t68 - t28)) - t33 + t1 * (gauge[0] * (t69 - t36 + t70) + (t8 * (t36 + (t61 - t28)) + t72));
-    const double t74 = t4 * (1.0 / 240.0 * (t1 * t64) + gauge[0] * (t18 - t65)) + t5 * (t1 * (t22 + t1 * (t8 * (t66 - t25) - t26)) + t5 * t73);
-    const double t75 = t14 * t74;
-    const double t76 = gauge[0] * t68;
-    const double t77 = 1.0 / 72.0 * t58;
-    const double t78 = t23 - t27;
-    const double t79 = t29 - t17;
-    const double t80 = 1.0 / 120.0 * t1;
-    const double t81 = t34 - t31;
-    const double t82 = t1 * (t5 * (t25 - t28) + gauge[0] * (t79 - t36)) - t33 + t8 * (gauge[0] * (t80 - t6 + t81) + (t38 + t5 * (t24 - t36) + t8 * (t28 + t37 - t25)));
-    const double t83 = t64 * (1.0 / 240.0 * (t15 * t8) + gauge[0] * (t76 - t77)) + t1 * (t8 * (t22 + t8 * (t5 * (t78 - t24) - t26)) + t1 * t82);
-    const double t84 = t14 * t83;
-    const double t85 = gauge[0] * t79;
-    const double t86 = t5 * (gauge[0] * (t70 + (t80 - t28)) + (t8 * (t28 + t61 - t36) + t72)) + (t1 * (t8 * (t25 - t31) + gauge[0] * (t68 - t36)) - t33);
-    const double t87 = t15 * (1.0 / 240.0 * (t5 * t64) + gauge[0] * (t85 - t77)) + t1 * (t5 * (t22 + t5 * (t8 * (t66 - t67) - t26)) + t1 * t86);
-    const double t88 = t14 * t87;
-    const double t89 = 1.0 / 24.0 * t1;
+    const double t64 = t8 * t8, t65 = 1.0 / 72.0 * (t1 * t8), t66 = t23 - t61;
+    const double t67 = 1.0 / 720.0 * t5, t68 = t51 - t17, t69 = 1.0 / 120.0 * t5, t70 = t34 - t9;
+    const double t71 = 1.0 / 1440.0 * t5, t72 = t38 + t5 * (t71 - t25);
+    const double t73 = t5 * (t8 * (t67 - t31) + gauge[0] * (t68 - t28)) - t33 + t1
+        * (gauge[0] * (t69 - t36 + t70) + (t8 * (t36 + (t61 - t28)) + t72));
+    const double t74 = t4 * (1.0 / 240.0 * (t1 * t64) + gauge[0] * (t18 - t65)) + t5
+        * (t1 * (t22 + t1 * (t8 * (t66 - t25) - t26)) + t5 * t73);
+    const double t75 = t14 * t74, t76 = gauge[0] * t68, t77 = 1.0 / 72.0 * t58, t78 = t23 - t27;
+    const double t79 = t29 - t17, t80 = 1.0 / 120.0 * t1, t81 = t34 - t31;
+    const double t82 = t1 * (t5 * (t25 - t28) + gauge[0] * (t79 - t36)) - t33 + t8
+        * (gauge[0] * (t80 - t6 + t81) + (t38 + t5 * (t24 - t36) + t8 * (t28 + t37 - t25)));
+    const double t83 = t64 * (1.0 / 240.0 * (t15 * t8) + gauge[0] * (t76 - t77)) + t1
+        * (t8 * (t22 + t8 * (t5 * (t78 - t24) - t26)) + t1 * t82);
+    const double t84 = t14 * t83, t85 = gauge[0] * t79;
+    const double t86 = t5 * (gauge[0] * (t70 + (t80 - t28)) + (t8 * (t28 + t61 - t36) + t72))
+        + (t1 * (t8 * (t25 - t31) + gauge[0] * (t68 - t36)) - t33);
+    const double t87 = t15 * (1.0 / 240.0 * (t5 * t64) + gauge[0] * (t85 - t77)) + t1
+        * (t5 * (t22 + t5 * (t8 * (t66 - t67) - t26)) + t1 * t86);
+    const double t88 = t14 * t87, t89 = 1.0 / 24.0 * t1;
     const double t90 = t3 * (t15 * (t89 - t7) + t8 * (t1 * (t9 - t42) + gauge[0] * (1.0 / 6.0 * t5 - t12)));
-    const double t91 = 1.0 / 80.0 * t1;
-    const double t92 = t37 - t67;
-    const double t93 = t8 * (t1 * (t27 - t36) + gauge[0] * (t16 + t32)) - t33 + t5 * (gauge[0] * (t35 + ((-1.0 / 240.0) * t5 - t89)) + (t8 * (t92 - t36) + (t59 + t5 * (t36 + t71))));
-    const double t94 = t15 * (1.0 / 240.0 * (t4 * t5) + gauge[0] * (t85 - t19)) + t8 * (t5 * (t22 + t5 * (t1 * (t23 - t67 - t91) - t26)) + t8 * t93);
+    const double t91 = 1.0 / 80.0 * t1, t92 = t37 - t67;
+    const double t93 = t8 * (t1 * (t27 - t36) + gauge[0] * (t16 + t32)) - t33 + t5
+        * (gauge[0] * (t35 + ((-1.0 / 240.0) * t5 - t89)) + (t8 * (t92 - t36) + (t59 + t5 * (t36 + t71))));
+    const double t94 = t15 * (1.0 / 240.0 * (t4 * t5) + gauge[0] * (t85 - t19)) + t8
+        * (t5 * (t22 + t5 * (t1 * (t23 - t67 - t91) - t26)) + t8 * t93);
     const double t95 = t14 * t94;
-    const double t96 = t5 * (t1 * (t67 - t36) + gauge[0] * (t16 + (t30 - t28))) - t33 + t8 * (gauge[0] * (t69 - t89 + t81) + (t8 * (t36 + t92) + (t59 + t5 * (t71 - t36))));
-    const double t97 = t64 * (1.0 / 240.0 * t56 + gauge[0] * (t76 - t65)) + t5 * (t8 * (t22 + t8 * (t1 * (t78 - t91) - t26)) + t5 * t96);
+    const double t96 = t5 * (t1 * (t67 - t36) + gauge[0] * (t16 + (t30 - t28))) - t33 + t8
+        * (gauge[0] * (t69 - t89 + t81) + (t8 * (t36 + t92) + (t59 + t5 * (t71 - t36))));
+    const double t97 = t64 * (1.0 / 240.0 * t56 + gauge[0] * (t76 - t65)) + t5
+        * (t8 * (t22 + t8 * (t1 * (t78 - t91) - t26)) + t5 * t96);
     const double t98 = t14 * t97;
     coef[0] = 2.0 * (h * (0.5 * t1 - gauge[0]));
     coef[1] = 2.0 * t13;
@@ -262,84 +211,54 @@ static void rigid_body_prepare(const rigid_body_params *params, const double gau
 /* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
    increment, all with the momenta p = grad S_h(y) */
 static void rigid_body_linearise(const double coef[35], const double y[3], double displacement[restrict 3],
-                                 double increment[restrict 3], double jacobian[restrict 9],
-                                 double increment_jacobian[restrict 9])
+    double increment[restrict 3], double jacobian[restrict 9], double increment_jacobian[restrict 9])
 {
-    const double x1 = y[0];
-    const double x2 = y[1];
-    const double x3 = y[2];
-    const double t1 = x1 * x1;
-    const double t2 = x2 * x2;
-    const double t3 = coef[4] * t2;
-    const double t4 = x3 * x3;
-    const double t5 = coef[1] + coef[18] * t1;
-    const double t6 = coef[9] + coef[16] * t2;
+    const double x1 = y[0], x2 = y[1], x3 = y[2];
+    /* momenta */
+    const double t1 = x1 * x1, t2 = x2 * x2, t3 = coef[4] * t2, t4 = x3 * x3;
+    const double t5 = coef[1] + coef[18] * t1, t6 = coef[9] + coef[16] * t2;
     const double p_x3 = x3 * (t1 * (t3 + coef[17] * t4 + t5) + (coef[14] + t2 * (coef[15] * t4 + t6)));
-    const double t7 = coef[4] * t4;
-    const double t8 = coef[5] * t2 + t7;
-    const double t9 = coef[2] * t4;
-    const double p_x1 = x1 * (t2 * (coef[3] + coef[7] * t1 + t8) + (coef[0] + t4 * (t9 + (coef[1] + coef[6] * t1))));
-    const double t10 = x3 * p_x1;
-    const double t11 = x1 * p_x3;
-    const double t12 = t10 - t11;
-    const double t13 = coef[3] + coef[13] * t1;
-    const double t14 = coef[10] * t4;
-    const double p_x2 = x2 * (t1 * (coef[12] * t2 + t7 + t13) + (coef[8] + t4 * (t14 + (coef[9] + coef[11] * t2))));
-    const double t15 = x1 * p_x2;
-    const double t16 = x2 * p_x1;
-    const double t17 = t15 - t16;
-    const double t18 = p_x3 * t12 - p_x2 * t17;
-    const double t19 = p_x3 * p_x3;
-    const double t20 = p_x1 * p_x1;
-    const double t21 = p_x2 * p_x2;
-    const double t22 = t20 + t21;
-    const double t23 = t19 + t22;
-    const double t24 = rigid_body_phi0(t23);
-    const double t25 = x2 * p_x3;
-    const double t26 = x3 * p_x2;
-    const double t27 = t25 - t26;
-    const double t28 = p_x1 * t17 - p_x3 * t27;
-    const double t29 = p_x2 * t27 - p_x1 * t12;
+    const double t7 = coef[4] * t4, t8 = coef[5] * t2 + t7, t9 = coef[2] * t4;
+    const double p_x1 = x1 * (t2 * (coef[3] + coef[7] * t1 + t8) + (coef[0] + t4
+        * (t9 + (coef[1] + coef[6] * t1))));
+    const double t10 = coef[3] + coef[13] * t1, t11 = coef[10] * t4;
+    const double p_x2 = x2 * (t1 * (coef[12] * t2 + t7 + t10) + (coef[8] + t4 * (t11 + (coef[9] + coef[11]
+        * t2))));
+    /* displacement */
+    const double t12 = x3 * p_x1, t13 = x1 * p_x3, t14 = t12 - t13, t15 = x1 * p_x2, t16 = x2 * p_x1;
+    const double t17 = t15 - t16, t18 = p_x3 * t14 - p_x2 * t17, t19 = p_x3 * p_x3;
+    const double t20 = p_x1 * p_x1, t21 = p_x2 * p_x2, t22 = t20 + t21, t23 = t19 + t22;
+    const double t24 = rigid_body_phi0(t23), t25 = x2 * p_x3, t26 = x3 * p_x2, t27 = t25 - t26;
+    const double t28 = p_x1 * t17 - p_x3 * t27, t29 = p_x2 * t27 - p_x1 * t14;
+    displacement[0] = t18 * t24 - 0.5 * t27;
+    displacement[1] = t28 * t24 - 0.5 * t14;
+    displacement[2] = t24 * t29 - 0.5 * t17;
+    /* increment */
+    increment[0] = t27;
+    increment[1] = t14;
+    increment[2] = t17;
+    /* jacobian */
     const double t30 = x1 * x3 * (coef[25] + coef[27] * t1 + (coef[26] * t4 + coef[22] * t2));
-    const double t31 = rigid_body_phi1(t23);
-    const double t32 = p_x3 * t31;
-    const double t33 = 0.5 * x2;
-    const double t34 = (t12 - t11) * t24 + 2.0 * (t18 * t32) - t33;
-    const double t35 = t2 * (coef[3] + coef[20] * t1 + t8) + (coef[0] + t4 * (t9 + (coef[1] + coef[19] * t1)));
-    const double t36 = x2 * p_x2;
-    const double t37 = x3 * p_x3;
-    const double t38 = p_x1 * t31;
+    const double t31 = rigid_body_phi1(t23), t32 = p_x3 * t31, t33 = 0.5 * x2;
+    const double t34 = (t14 - t13) * t24 + 2.0 * (t18 * t32) - t33;
+    const double t35 = t2 * (coef[3] + coef[20] * t1 + t8) + (coef[0] + t4 * (t9 + (coef[1] + coef[19]
+        * t1)));
+    const double t36 = x2 * p_x2, t37 = x3 * p_x3, t38 = p_x1 * t31;
     const double t39 = (t36 + t37) * t24 + 2.0 * (t18 * t38);
     const double t40 = x1 * x2 * (coef[21] + coef[24] * t1 + (coef[22] * t4 + coef[23] * t2));
-    const double t41 = 0.5 * x3;
-    const double t42 = p_x2 * t31;
-    const double t43 = t41 + (2.0 * (t18 * t42) - (t15 + t17) * t24);
-    const double t44 = p_x1 * p_x2 * t24;
+    const double t41 = 0.5 * x3, t42 = p_x2 * t31;
+    const double t43 = t41 + (2.0 * (t18 * t42) - (t15 + t17) * t24), t44 = p_x1 * p_x2 * t24;
     const double t45 = 0.5 * p_x3;
     const double t46 = x2 * x3 * (coef[31] * t4 + coef[32] * t2 + (coef[30] + coef[22] * t1));
-    const double t47 = t1 * (t13 + (t7 + coef[29] * t2)) + (coef[8] + t4 * (t14 + (coef[9] + coef[28] * t2)));
-    const double t48 = 0.5 * p_x2;
-    const double t49 = p_x1 * p_x3 * t24;
+    const double t47 = t1 * (t10 + (t7 + coef[29] * t2)) + (coef[8] + t4 * (t11 + (coef[9] + coef[28] * t2)));
+    const double t48 = 0.5 * p_x2, t49 = p_x1 * p_x3 * t24;
     const double t50 = t1 * (t3 + coef[34] * t4 + t5) + (coef[14] + t2 * (coef[33] * t4 + t6));
-    const double t51 = 0.5 * x1;
-    const double t52 = t51 + (2.0 * (t28 * t32) - (t25 + t27) * t24);
-    const double t53 = x1 * p_x1;
-    const double t54 = (t53 + t37) * t24 + 2.0 * (t28 * t42);
-    const double t55 = (t17 - t16) * t24 + 2.0 * (t28 * t38) - t41;
-    const double t56 = p_x2 * p_x3 * t24;
-    const double t57 = 0.5 * p_x1;
-    const double t58 = (t36 + t53) * t24 + 2.0 * (t29 * t32);
+    const double t51 = 0.5 * x1, t52 = t51 + (2.0 * (t28 * t32) - (t25 + t27) * t24);
+    const double t53 = x1 * p_x1, t54 = (t53 + t37) * t24 + 2.0 * (t28 * t42);
+    const double t55 = (t17 - t16) * t24 + 2.0 * (t28 * t38) - t41, t56 = p_x2 * p_x3 * t24;
+    const double t57 = 0.5 * p_x1, t58 = (t36 + t53) * t24 + 2.0 * (t29 * t32);
     const double t59 = (t27 - t26) * t24 + 2.0 * (t29 * t42) - t51;
-    const double t60 = t33 + (2.0 * (t29 * t38) - (t10 + t12) * t24);
-    const double t61 = x2 * t30;
-    const double t62 = x3 * t40;
-    const double t63 = x1 * t46;
-    displacement[0] = t18 * t24 - 0.5 * t27;
-    displacement[1] = t28 * t24 - 0.5 * t12;
-    displacement[2] = t24 * t29 - 0.5 * t17;
-    increment[0] = t27;
-    increment[1] = t12;
-    increment[2] = t17;
+    const double t60 = t33 + (2.0 * (t29 * t38) - (t12 + t14) * t24);
     jacobian[0] = 1.0 + (t30 * t34 + (t35 * t39 + t40 * t43) - (t19 + t21) * t24);
     jacobian[1] = t44 - t45 + (t46 * t34 + (t40 * t39 + t47 * t43));
     jacobian[2] = t48 + t49 + (t50 * t34 + (t30 * t39 + t46 * t43));
@@ -349,6 +268,8 @@ static void rigid_body_linearise(const double coef[35], const double y[3], doubl
     jacobian[6] = t49 - t48 + (t30 * t58 + (t40 * t59 + t35 * t60));
     jacobian[7] = t57 + t56 + (t46 * t58 + (t40 * t60 + t47 * t59));
     jacobian[8] = 1.0 + (t50 * t58 + (t30 * t60 + t46 * t59) - t22 * t24);
+    /* increment jacobian */
+    const double t61 = x2 * t30, t62 = x3 * t40, t63 = x1 * t46;
     increment_jacobian[0] = t61 - t62;
     increment_jacobian[1] = p_x3 + (x2 * t46 - x3 * t47);
     increment_jacobian[2] = x2 * t50 - x3 * t46 - p_x2;
@@ -360,134 +281,178 @@ static void rigid_body_linearise(const double coef[35], const double y[3], doubl
     increment_jacobian[8] = t63 - t61;
 }
 
-/* Solve matrix * solution = side, both overwritten, by elimination with partial pivoting. 0 if singular. */
-static int rigid_body_solve_pivoting(double matrix[9], double side[3])
-{
-    for (int k = 0; k < 3; ++k) {
-        int best = k;
-        for (int i = k + 1; i < 3; ++i)
-            if (fabs(matrix[i * 3 + k]) > fabs(matrix[best * 3 + k])) best = i;
-        const double pivot = matrix[best * 3 + k];
-        if (!(fabs(pivot) > 0.0)) return 0;
-        for (int j = k; j < 3 && best != k; ++j) {
-            const double swap = matrix[k * 3 + j];
-            matrix[k * 3 + j] = matrix[best * 3 + j];
-            matrix[best * 3 + j] = swap;
-        }
-        const double swap = side[k];
-        side[k] = side[best];
-        side[best] = swap;
-        for (int i = k + 1; i < 3; ++i) {
-            const double factor = matrix[i * 3 + k] / pivot;
-            for (int j = k + 1; j < 3; ++j) matrix[i * 3 + j] -= factor * matrix[k * 3 + j];
-            side[i] -= factor * side[k];
-        }
-    }
-    for (int i = 3 - 1; i >= 0; --i) {
-        for (int j = i + 1; j < 3; ++j) side[i] -= matrix[i * 3 + j] * side[j];
-        side[i] /= matrix[i * 3 + i];
-    }
-    return 1;
-}
-
 /* elimination without pivoting: the solution, and the reciprocals of the pivots */
 static void rigid_body_eliminate(const double matrix[9], const double side[3], double solution[restrict 3],
-                                 double reciprocal[restrict 3])
+    double reciprocal[restrict 3])
 {
-    const double t1 = 1.0 / matrix[0];
-    const double t2 = matrix[6] * t1;
-    const double t3 = matrix[3] * t1;
-    const double t4 = side[1] - side[0] * t3;
-    const double t5 = 1.0 / (matrix[4] - matrix[1] * t3);
-    const double t6 = (matrix[7] - matrix[1] * t2) * t5;
-    const double t7 = matrix[5] - matrix[2] * t3;
+    /* solution */
+    const double t1 = 1.0 / matrix[0], t2 = matrix[6] * t1, t3 = matrix[3] * t1;
+    const double t4 = side[1] - side[0] * t3, t5 = 1.0 / (matrix[4] - matrix[1] * t3);
+    const double t6 = (matrix[7] - matrix[1] * t2) * t5, t7 = matrix[5] - matrix[2] * t3;
     const double t8 = 1.0 / (matrix[8] - matrix[2] * t2 - t7 * t6);
-    const double t9 = (side[2] - side[0] * t2 - t4 * t6) * t8;
-    const double t10 = t5 * (t4 - t7 * t9);
+    const double t9 = (side[2] - side[0] * t2 - t4 * t6) * t8, t10 = t5 * (t4 - t7 * t9);
     solution[0] = t1 * (side[0] - (matrix[2] * t9 + matrix[1] * t10));
     solution[1] = t10;
     solution[2] = t9;
+    /* reciprocal */
     reciprocal[0] = t1;
     reciprocal[1] = t5;
     reciprocal[2] = t8;
 }
 
+/* the leading error vector pi grad S_3, as a function of the gauge */
+static void rigid_body_guide(const rigid_body_params *params, const double gauge[1], const double x[3],
+    double error[restrict 3])
+{
+    const double x1 = x[0], x2 = x[1], x3 = x[2];
+    const double t1 = 1.0 / params->I2, t2 = 1.0 / params->I1, t3 = t2 * t2, t4 = x1 * x1;
+    const double t5 = 1.0 / 12.0 * (t3 * t4), t6 = x2 * x2, t7 = 1.0 / 12.0 * t2;
+    const double t8 = 1.0 / 6.0 * gauge[0], t9 = t7 - t8, t10 = 1.0 / 6.0 * (t3 * (gauge[0] * t4));
+    const double t11 = 1.0 / params->I3, t12 = 1.0 / 3.0 * t1, t13 = 1.0 / 6.0 * t11;
+    const double t14 = 1.0 / 12.0 * t11, t15 = 1.0 / 6.0 * t1, t16 = 1.0 / 6.0 * t2;
+    const double t17 = 1.0 / 3.0 * t2;
+    const double t18 = t1 * (t5 + t6 * (t1 * t9)) - t10 + t11 * (t6 * (gauge[0] * (t12 - t13) + t2
+        * (t14 - t15)) + t4 * (t1 * (t14 - t16) + gauge[0] * (t17 - t13)));
+    const double t19 = x3 * t18, t20 = x3 * x3, t21 = 1.0 / 12.0 * t1, t22 = 1.0 / 3.0 * t11;
+    const double t23 = t11 * (t5 + t20 * (t11 * t9)) - t10 + t1 * (t4 * (gauge[0] * (t17 - t15) + t11
+        * (t21 - t16)) + t20 * (t2 * (t21 - t13) + gauge[0] * (t22 - t15)));
+    const double t24 = x2 * t23, t25 = t1 * t1;
+    const double t26 = t2 * (t6 * (gauge[0] * (t12 - t16) + t11 * (t7 - t15)) + t20 * (gauge[0] * (t22 - t16)
+        + t1 * (t7 - t13))) + (t11 * (1.0 / 12.0 * (t6 * t25) + t20 * (t11 * (t21 - t8))) - 1.0 / 6.0
+        * (t25 * (gauge[0] * t6)));
+    const double t27 = x1 * t26;
+    error[0] = x2 * t19 - x3 * t24;
+    error[1] = x3 * t27 - x1 * t19;
+    error[2] = x1 * t24 - x2 * t27;
+}
+
+/* grad H . grad H, then grad H . grad C and grad C . grad C for each Casimir of the gauge */
+static void rigid_body_products(const rigid_body_params *params, const double x[3], double out[restrict 3])
+{
+    const double x1 = x[0], x2 = x[1], x3 = x[2];
+    const double t1 = x3 / params->I3, t2 = x2 / params->I2, t3 = x1 / params->I1;
+    out[0] = t1 * t1 + (t2 * t2 + t3 * t3);
+    out[1] = 2.0 * (x3 * t1) + (2.0 * (x2 * t2) + 2.0 * (x1 * t3));
+    out[2] = 4.0 * (x3 * x3) + (4.0 * (x2 * x2) + 4.0 * (x1 * x1));
+}
+
+/* the Hamiltonian */
+double rigid_body_hamiltonian(const rigid_body_params *params, const double x[3])
+{
+    if (params == NULL) params = &rigid_body_default_params;
+    const double I1 = params->I1, I2 = params->I2, I3 = params->I3, x1 = x[0], x2 = x[1], x3 = x[2];
+    return 0.5 * (x3 * x3 / I3 + (x2 * x2 / I2 + x1 * x1 / I1));
+}
+
+/* the Casimirs */
+void rigid_body_casimirs(const rigid_body_params *params, const double x[3], double out[])
+{
+    (void)params;
+    const double x1 = x[0], x2 = x[1], x3 = x[2];
+    out[0] = x3 * x3 + (x2 * x2 + x1 * x1);
+}
+
+/* pi(x) grad H(x) */
+void rigid_body_vector_field(const rigid_body_params *params, const double x[3], double out[3])
+{
+    if (params == NULL) params = &rigid_body_default_params;
+    const double I1 = params->I1, I2 = params->I2, I3 = params->I3, x1 = x[0], x2 = x[1], x3 = x[2];
+    const double t1 = x3 / I3, t2 = x2 / I2, t3 = x1 / I1;
+    out[0] = x2 * t1 - x3 * t2;
+    out[1] = x3 * t3 - x1 * t1;
+    out[2] = x1 * t2 - x2 * t3;
+}
+
+/* ---- Compensated sums, linear equations ---- */
+/* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to
+   its last bit: were it rounded with the change, corrections of one sign would add up to a drift. 0, and x as
+   before, if the sum is not finite. */
+static int rigid_body_advance(rigid_body_solver *s, const double change[rigid_body_DIM],
+    const double correction[rigid_body_DIM])
+{
+    double x[rigid_body_DIM], carry[rigid_body_DIM];
+    for (int i = 0; i < rigid_body_DIM; ++i) {
+        const double sum = s->x[i] + change[i], added = sum - s->x[i];
+        const double lost = (s->x[i] - (sum - added)) + (change[i] - added);
+        const double small = lost + (s->carry[i] + correction[i]);
+        x[i] = sum + small;
+        carry[i] = small - (x[i] - sum);
+        if (!isfinite(x[i])) return 0;
+    }
+    memcpy(s->x, x, sizeof x);
+    memcpy(s->carry, carry, sizeof carry);
+    return 1;
+}
+
+/* Newton matrices are I + O(h): a pivot whose reciprocal is larger than this is far from 1. */
+#define rigid_body_LARGEST_RECIPROCAL 1e3
+
+/* Solve matrix * solution = side, both overwritten, by elimination with partial pivoting. 0 if singular. */
+static int rigid_body_solve_pivoting(double matrix[rigid_body_DIM * rigid_body_DIM],
+    double side[rigid_body_DIM])
+{
+    for (int k = 0; k < rigid_body_DIM; ++k) {
+        int best = k;
+        for (int i = k + 1; i < rigid_body_DIM; ++i)
+            if (fabs(matrix[i * rigid_body_DIM + k]) > fabs(matrix[best * rigid_body_DIM + k])) best = i;
+        const double pivot = matrix[best * rigid_body_DIM + k], last = side[k];
+        if (!(fabs(pivot) > 0.0)) return 0;
+        for (int j = k; j < rigid_body_DIM && best != k; ++j) {
+            const double swap = matrix[k * rigid_body_DIM + j];
+            matrix[k * rigid_body_DIM + j] = matrix[best * rigid_body_DIM + j];
+            matrix[best * rigid_body_DIM + j] = swap;
+        }
+        side[k] = side[best];
+        side[best] = last;
+        for (int i = k + 1; i < rigid_body_DIM; ++i) {
+            const double factor = matrix[i * rigid_body_DIM + k] / pivot;
+            for (int j = k + 1; j < rigid_body_DIM; ++j)
+                matrix[i * rigid_body_DIM + j] -= factor * matrix[k * rigid_body_DIM + j];
+            side[i] -= factor * side[k];
+        }
+    }
+    for (int i = rigid_body_DIM - 1; i >= 0; --i) {
+        for (int j = i + 1; j < rigid_body_DIM; ++j) side[i] -= matrix[i * rigid_body_DIM + j] * side[j];
+        side[i] /= matrix[i * rigid_body_DIM + i];
+    }
+    return 1;
+}
+
 /* Solve matrix * solution = side, both overwritten. The matrix is I + O(h), so elimination without pivoting
    does unless a pivot is far from 1. 0 if singular. */
-static int rigid_body_solve(double matrix[9], double side[3])
+static int rigid_body_solve(double matrix[rigid_body_DIM * rigid_body_DIM], double side[rigid_body_DIM])
 {
-    double solution[3], reciprocal[3], largest = 0.0;
+    double solution[rigid_body_DIM], reciprocal[rigid_body_DIM], largest = 0.0;
     rigid_body_eliminate(matrix, side, solution, reciprocal);
-    for (int i = 0; i < 3; ++i)
+    for (int i = 0; i < rigid_body_DIM; ++i)
         if (!(fabs(reciprocal[i]) <= largest)) largest = fabs(reciprocal[i]);
-    if (!(largest < 1e3)) return rigid_body_solve_pivoting(matrix, side);
+    if (!(largest < rigid_body_LARGEST_RECIPROCAL)) return rigid_body_solve_pivoting(matrix, side);
     memcpy(side, solution, sizeof solution);
     return 1;
 }
 
-/* Whether a guess is where the next values may be. Recurrences that were fitted to little else than rest, near a saddle,
-   may lead anywhere; and far away the equation of a step has solutions that have nothing to do with the motion. */
-static int rigid_body_near(const double guess[3], const double last[3])
-{
-    double distance = 0.0, size = 0.0;
-    for (int i = 0; i < 3; ++i) {
-        distance += fabs(guess[i] - last[i]);
-        size += fabs(last[i]);
-    }
-    return distance <= 4.0 * size;
-}
+/* ---- Starting guesses ---- */
 
-/* The guess for the next value (y), from earlier ones; 0 if there is none. */
-static int rigid_body_predict(const rigid_body_memory *memory, double value[3])
-{
-    const int last = memory->count - 1;
-    double odd[3] = { 0.0 }, binomial = -1.0;
-    memset(value, 0, 3 * sizeof value[0]);
-    if (memory->fitting) {
-        for (int k = 0; k < memory->terms; k += 2)
-            for (int i = 0; i < 3; ++i) {
-                value[i] += memory->weight[k][i][0] * memory->past[last - k][i];
-                odd[i] += memory->weight[k + 1][i][0] * memory->past[last - 1 - k][i];
-            }
-        for (int i = 0; i < 3; ++i) value[i] += odd[i];
-    } else {
-        for (int k = 0; k < memory->order && k <= last; ++k) {
-            binomial *= -(double)(memory->order - k) / (k + 1);
-            for (int i = 0; i < 3; ++i) value[i] += binomial * memory->past[last - k][i];
-        }
-    }
-    return last >= 0 && rigid_body_near(value, memory->past[last]);
-}
+/* ---- Recurrences fitted to the last values ---- */
+/* A recurrence uses no more values than leave so little, in sizes of the largest. */
+#define rigid_body_ENOUGH 3e-12
 
-/* Choose the guess that would have been best for a value that took several iterations. */
-static void rigid_body_judge(rigid_body_memory *memory, const double value[3])
-{
-    double row[8 + 1][3], guess[3], least = HUGE_VAL, fitted = HUGE_VAL;
-    const int rows = memory->count < 8 ? memory->count : 8;
-    memcpy(row[0], value, sizeof row[0]);
-    for (int k = 0; k < rows; ++k) memcpy(row[k + 1], memory->past[memory->count - 1 - k], sizeof row[0]);
-    for (int order = 1; order <= rows; ++order) { /* row[0] becomes the backward difference of this order */
-        double size = 0.0;
-        for (int k = 0; k <= rows - order; ++k)
-            for (int i = 0; i < 3; ++i) row[k][i] -= row[k + 1][i];
-        for (int i = 0; i < 3; ++i) size += fabs(row[0][i]);
-        if (size < least) {
-            least = size;
-            memory->order = order;
-        }
-    }
-    memory->fitting = memory->terms > 0;
-    if (memory->fitting && rigid_body_predict(memory, guess)) {
-        fitted = 0.0;
-        for (int i = 0; i < 3; ++i) fitted += fabs(value[i] - guess[i]);
-    }
-    memory->fitting = memory->terms > 0 && fitted <= least;
-    if (memory->order == 0) memory->order = 1;
-}
+/* The ridge of the least squares: the level of rounding. */
+#define rigid_body_RIDGE 1e-15
 
-/* Make eight columns orthogonal to one, by the multiples of it that are put into r. Where that one is among the eight, those
-   up to it stay as they are, and inverse becomes one over its squared length. The number of rows is even. */
-static void rigid_body_project(int rows, double (*one)[8], int column, double *inverse, double (*eight)[8], double r[8])
+/* How far a recurrence may miss values that it was not fitted to, in sizes of the largest: beyond, the motion
+   is chaotic or the step long, and other guesses are as good. */
+#define rigid_body_HOPELESS 1e-7
+
+/* equations of the least squares */
+enum { rigid_body_ROWS = rigid_body_REMEMBERED - rigid_body_WINDOW - rigid_body_AHEAD - rigid_body_CHECKS
+    + 1 };
+
+/* Make eight columns orthogonal to one, by the multiples of it that are put into r. Where that one is among
+   the eight, those up to it stay as they are, and inverse becomes one over its squared length. The number of
+   rows is even. */
+static void rigid_body_project(int rows, double (*one)[8], int column, double *inverse, double (*eight)[8],
+    double r[8])
 {
     double even[8] = { 0.0 }, odd[8] = { 0.0 };
     for (int i = 0; i < rows; i += 2) {
@@ -510,7 +475,7 @@ static void rigid_body_project(int rows, double (*one)[8], int column, double *i
 /* By how much recurrences miss the last of these values. */
 static double rigid_body_missed(const double *value, double (*weight)[8])
 {
-    enum { AHEAD = 8, WINDOW = 40, CHECKS = 8 };
+    enum { AHEAD = rigid_body_AHEAD, WINDOW = rigid_body_WINDOW, CHECKS = rigid_body_CHECKS };
     double most = 0.0;
     for (int i = 0; i < CHECKS; ++i) {
         double guess[8] = { 0.0 };
@@ -521,31 +486,36 @@ static double rigid_body_missed(const double *value, double (*weight)[8])
     return most;
 }
 
-/* Fit the recurrences value[m + l] = sum of weight[k][..][l] * value[m - 1 - k], l = 0 ... 8 - 1, to the history of
-   a component: ridge least squares by modified Gram-Schmidt, the ridge at the level of rounding. Columns are taken in by
-   eights, until they leave next to nothing of the right-hand sides. How many past values are used; 0 if the recurrences do
-   not foresee the last values, which they were not fitted to. */
-static int rigid_body_train(rigid_body_memory *memory, int component)
+/* Fit the recurrences value[m + l] = sum of weight[k][..][l] * value[m - 1 - k], l = 0 ... rigid_body_AHEAD -
+   1, to the history of a component: ridge least squares by modified Gram-Schmidt, the ridge at the level of
+   rounding. Columns are taken in by eights, until they leave next to nothing of the right-hand sides. How
+   many past values are used; 0 if the recurrences do not foresee the last values, which they were not fitted
+   to. */
+static int rigid_body_train(rigid_body_history *history, int component)
 {
-    enum { AHEAD = 8, WINDOW = 40, ROWS = 56 };
-    double q[WINDOW / 8][ROWS + WINDOW][8], r[WINDOW / 8][WINDOW][8], inverse[WINDOW]; /* eight columns in each part */
-    double right[ROWS + WINDOW][8], weight[WINDOW][8], value[111], largest = 0.0, left = HUGE_VAL;
+    enum { AHEAD = rigid_body_AHEAD, WINDOW = rigid_body_WINDOW, ROWS = rigid_body_ROWS };
+    /* eight columns in each part */
+    double q[WINDOW / 8][ROWS + WINDOW][8], r[WINDOW / 8][WINDOW][8], inverse[WINDOW];
+    double right[ROWS + WINDOW][8], weight[WINDOW][8], value[rigid_body_REMEMBERED], largest = 0.0, left =
+        HUGE_VAL;
     int terms = 0;
     memset(q, 0, sizeof q);
     memset(right, 0, sizeof right);
     memset(weight, 0, sizeof weight);
-    for (int i = 0; i < 111; ++i) {
-        value[i] = memory->past[memory->count - 111 + i][component];
+    for (int i = 0; i < rigid_body_REMEMBERED; ++i) {
+        value[i] = history->past[history->count - rigid_body_REMEMBERED + i][component];
         if (fabs(value[i]) > largest) largest = fabs(value[i]);
     }
     for (int i = 0; i < ROWS; ++i)
         for (int l = 0; l < AHEAD; ++l) right[i][l] = value[i + WINDOW + l];
-    while (terms < WINDOW && left > 3e-12 * largest) {
-        const int part = terms / 8, rows = ROWS + terms + 8; /* further rows of the ridge are zero in these columns */
+    while (terms < WINDOW && left > rigid_body_ENOUGH * largest) {
+        /* further rows of the ridge are zero in these columns */
+        const int part = terms / 8, rows = ROWS + terms + 8;
         for (int i = 0; i < ROWS; ++i)
             for (int l = 0; l < 8; ++l) q[part][i][l] = value[i + WINDOW - 1 - terms - l];
-        for (int l = 0; l < 8; ++l) q[part][ROWS + terms + l][l] = 1e-15 * largest;
-        for (int k = 0; k < terms; ++k) rigid_body_project(rows, q[k / 8], k % 8, &inverse[k], q[part], r[part][k]);
+        for (int l = 0; l < 8; ++l) q[part][ROWS + terms + l][l] = rigid_body_RIDGE * largest;
+        for (int k = 0; k < terms; ++k)
+            rigid_body_project(rows, q[k / 8], k % 8, &inverse[k], q[part], r[part][k]);
         for (int l = 0; l < 8; ++l, ++terms) {
             rigid_body_project(rows, q[part], l, &inverse[terms], q[part], r[part][terms]);
             rigid_body_project(rows, q[part], l, &inverse[terms], right, weight[terms]);
@@ -559,410 +529,322 @@ static int rigid_body_train(rigid_body_memory *memory, int component)
     for (int k = terms - 1; k >= 0; --k)
         for (int j = k + 1; j < terms; ++j)
             for (int l = 0; l < 8; ++l) weight[k][l] -= r[j / 8][k][j % 8] * weight[j][l];
-    for (int k = 0; k < WINDOW; ++k) memcpy(memory->weight[k][component], weight[k], AHEAD * sizeof(double));
-    return rigid_body_missed(value + ROWS, weight) <= 1e-07 * largest ? terms : 0;
+    for (int k = 0; k < WINDOW; ++k) memcpy(history->weight[k][component], weight[k], AHEAD * sizeof(double));
+    return rigid_body_missed(value + ROWS, weight) <= rigid_body_HOPELESS * largest ? terms : 0;
+}
+/* How far from the last value a guess may be, in sizes of that value. */
+#define rigid_body_REACH 4.0
+
+/* Whether a guess is where the next values may be. Far away the equation of a step has solutions that have
+   nothing to do with the motion. */
+static int rigid_body_near(const double guess[rigid_body_DIM], const double last[rigid_body_DIM])
+{
+    double distance = 0.0, size = 0.0;
+    for (int i = 0; i < rigid_body_DIM; ++i) {
+        distance += fabs(guess[i] - last[i]);
+        size += fabs(last[i]);
+    }
+    return distance <= rigid_body_REACH * size;
+}
+
+enum {
+    /* values that extrapolation uses at most: more amplify rounding more than they gain */
+    rigid_body_HISTORY = 8,
+    rigid_body_REPAY = 150,      /* steps that a fit costs, about */
+    rigid_body_LONG_WAIT = 20000 /* steps until a recurrence that often needs fitting is fitted again */
+};
+
+/* The guess for the next value (y), from earlier ones; 0 if there is none. */
+static int rigid_body_predict(const rigid_body_history *history, double value[rigid_body_DIM])
+{
+    const int last = history->count - 1;
+    double odd[rigid_body_DIM] = { 0.0 }, binomial = -1.0;
+    memset(value, 0, rigid_body_DIM * sizeof value[0]);
+    if (history->use_recurrence) {
+        for (int k = 0; k < history->recurrence_terms; k += 2)
+            for (int i = 0; i < rigid_body_DIM; ++i) {
+                value[i] += history->weight[k][i][0] * history->past[last - k][i];
+                odd[i] += history->weight[k + 1][i][0] * history->past[last - 1 - k][i];
+            }
+        for (int i = 0; i < rigid_body_DIM; ++i) value[i] += odd[i];
+    } else {
+        for (int k = 0; k < history->extrapolation_order && k <= last; ++k) {
+            binomial *= -(double)(history->extrapolation_order - k) / (k + 1);
+            for (int i = 0; i < rigid_body_DIM; ++i) value[i] += binomial * history->past[last - k][i];
+        }
+    }
+    return last >= 0 && rigid_body_near(value, history->past[last]);
+}
+
+/* Choose the guess that would have been best for a value that took several iterations. */
+static void rigid_body_judge(rigid_body_history *history, const double value[rigid_body_DIM])
+{
+    double row[rigid_body_HISTORY + 1][rigid_body_DIM], guess[rigid_body_DIM], least = HUGE_VAL, fitted =
+        HUGE_VAL;
+    const int rows = history->count < rigid_body_HISTORY ? history->count : rigid_body_HISTORY;
+    memcpy(row[0], value, sizeof row[0]);
+    for (int k = 0; k < rows; ++k) memcpy(row[k + 1], history->past[history->count - 1 - k], sizeof row[0]);
+    for (int order = 1; order <= rows; ++order) { /* row[0] becomes the backward difference of this order */
+        double size = 0.0;
+        for (int k = 0; k <= rows - order; ++k)
+            for (int i = 0; i < rigid_body_DIM; ++i) row[k][i] -= row[k + 1][i];
+        for (int i = 0; i < rigid_body_DIM; ++i) size += fabs(row[0][i]);
+        if (size < least) {
+            least = size;
+            history->extrapolation_order = order;
+        }
+    }
+    history->use_recurrence = history->recurrence_terms > 0;
+    if (history->use_recurrence && rigid_body_predict(history, guess)) {
+        fitted = 0.0;
+        for (int i = 0; i < rigid_body_DIM; ++i) fitted += fabs(value[i] - guess[i]);
+    }
+    history->use_recurrence = history->recurrence_terms > 0 && fitted <= least;
+    if (history->extrapolation_order == 0) history->extrapolation_order = 1;
 }
 
 /* Drop what is old, if so many values would not fit into the history. */
-static void rigid_body_make_room(rigid_body_memory *memory, int values)
+static void rigid_body_make_room(rigid_body_history *history, int values)
 {
-    if (memory->count + values <= 222) return;
-    memmove(memory->past, memory->past + memory->count - 111, 111 * sizeof memory->past[0]);
-    memory->count = 111;
+    if (history->count + values <= rigid_body_KEPT) return;
+    memmove(history->past, history->past + history->count - rigid_body_REMEMBERED, rigid_body_REMEMBERED
+        * sizeof history->past[0]);
+    history->count = rigid_body_REMEMBERED;
 }
 
 /* Add a value to the history. */
-static void rigid_body_record(rigid_body_memory *memory, const double value[3])
+static void rigid_body_record(rigid_body_history *history, const double value[rigid_body_DIM])
 {
-    rigid_body_make_room(memory, 1);
-    memcpy(memory->past[memory->count++], value, 3 * sizeof value[0]);
+    rigid_body_make_room(history, 1);
+    memcpy(history->past[history->count++], value, rigid_body_DIM * sizeof value[0]);
 }
 
 /* Fit the recurrence to the last values; with every time, wait longer before it is done again. */
-static void rigid_body_fit(rigid_body_memory *memory)
+static void rigid_body_fit(rigid_body_history *history)
 {
     int found = 1;
-    memory->terms = 0;
-    for (int i = 0; i < 3 && found; ++i) {
-        const int terms = rigid_body_train(memory, i);
+    history->recurrence_terms = 0;
+    for (int i = 0; i < rigid_body_DIM && found; ++i) {
+        const int terms = rigid_body_train(history, i);
         found = terms > 0;
-        if (terms > memory->terms) memory->terms = terms;
+        if (terms > history->recurrence_terms) history->recurrence_terms = terms;
     }
-    if (!found) memory->terms = 0;
-    memory->fitting = found;
-    ++memory->fits;
-    memory->slow = 0;
-    memory->patience = memory->patience < 10000 ? 2 * memory->patience + 150 : 20000;
+    if (!found) history->recurrence_terms = 0;
+    history->use_recurrence = found;
+    ++history->fits;
+    history->slow_steps = 0;
+    history->slow_steps_allowed = history->slow_steps_allowed < rigid_body_LONG_WAIT / 2
+        ? 2 * history->slow_steps_allowed + rigid_body_REPAY : rigid_body_LONG_WAIT;
 }
 
 /* Take in the solved value: what took one iteration needs no better guess. */
-static void rigid_body_remember(rigid_body_memory *memory, const double value[3], int iterations)
+static void rigid_body_remember(rigid_body_history *history, const double value[rigid_body_DIM],
+    int iterations)
 {
-    if (iterations > 1) rigid_body_judge(memory, value);
-    rigid_body_record(memory, value);
-    memory->slow = iterations > 1 ? memory->slow + 1 : 0;
-    if (memory->slow > memory->patience && memory->count >= 111) rigid_body_fit(memory);
+    if (iterations > 1) rigid_body_judge(history, value);
+    rigid_body_record(history, value);
+    history->slow_steps = iterations > 1 ? history->slow_steps + 1 : 0;
+    if (history->slow_steps > history->slow_steps_allowed && history->count >= rigid_body_REMEMBERED)
+        rigid_body_fit(history);
 }
 
-/* Whether an increment is that of the motion. Where the step is too large, the equation may have been solved by a point far
-   away, at another energy, that has nothing to do with it. */
-static int rigid_body_plausible(const rigid_body_solver *s, int stage, const double increment[3])
+/* How far a step may lead, in sizes of the state and of what the vector field says, if the energy is lost;
+   and the part of the energy that counts as lost. */
+#define rigid_body_PLAUSIBLE 1.5
+#define rigid_body_LOST 0.5
+
+/* Whether an increment is that of the motion. Where the step is too large, the equation may have been solved
+   by a point far away, at another energy, that has nothing to do with it. */
+static int rigid_body_plausible(const rigid_body_solver *s, const double increment[rigid_body_DIM])
 {
-    double moved = 0.0, size = 0.0, field[3], middle[3], end[3];
-    for (int i = 0; i < 3; ++i) {
+    double moved = 0.0, size = 0.0, field[rigid_body_DIM], middle[rigid_body_DIM], end[rigid_body_DIM];
+    for (int i = 0; i < rigid_body_DIM; ++i) {
         moved += fabs(increment[i]);
         size += fabs(s->x[i]);
     }
-    if (moved <= 1.5 * size) return 1;
+    if (moved <= rigid_body_PLAUSIBLE * size) return 1;
     rigid_body_vector_field(&s->params, s->x, field);
-    for (int i = 0; i < 3; ++i) {
-        size += fabs(rigid_body_fractions[stage] * s->h * field[i]);
+    for (int i = 0; i < rigid_body_DIM; ++i) {
+        size += fabs(s->h * field[i]);
         middle[i] = s->x[i] + 0.5 * increment[i];
         end[i] = s->x[i] + increment[i];
     }
-    if (moved <= 1.5 * size) return 1;
-    const double before = rigid_body_hamiltonian(&s->params, s->x), after = rigid_body_hamiltonian(&s->params, end);
+    if (moved <= rigid_body_PLAUSIBLE * size) return 1;
+    const double before = rigid_body_hamiltonian(&s->params, s->x), after = rigid_body_hamiltonian(&s->params,
+        end);
     const double scale = fabs(before) + fabs(rigid_body_hamiltonian(&s->params, middle)) + fabs(after);
-    return fabs(after - before) <= 0.5 * scale;
+    return fabs(after - before) <= rigid_body_LOST * scale;
 }
 
-/* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to its last
-   bit: were it rounded with the change, corrections of one sign would add up to a drift. 0, and x as before, if the
-   sum is not finite. */
-static int rigid_body_advance(rigid_body_solver *s, const double change[3], const double correction[3])
-{
-    double x[3], carry[3];
-    for (int i = 0; i < 3; ++i) {
-        const double sum = s->x[i] + change[i], added = sum - s->x[i];
-        const double lost = (s->x[i] - (sum - added)) + (change[i] - added);
-        const double small = lost + (s->carry[i] + correction[i]);
-        x[i] = sum + small;
-        carry[i] = small - (x[i] - sum);
-        if (!isfinite(x[i])) return 0;
-    }
-    memcpy(s->x, x, sizeof x);
-    memcpy(s->carry, carry, sizeof carry);
-    return 1;
-}
+/* ---- The implicit step, by Newton's method ---- */
+/* Components of y are measured no finer than by this part of the largest. */
+#define rigid_body_FLOOR 1e-6
 
-/* Size of a correction relative to each component of y, but no finer than 1e-6 of the largest; NaN or infinite if
-   the correction is. */
-static double rigid_body_size(const double y[3], const double delta[3])
+/* Size of a correction relative to each component of y; NaN or infinite if the correction is. */
+static double rigid_body_size(const double y[rigid_body_DIM], const double delta[rigid_body_DIM])
 {
     double norm = 0.0, size = 0.0;
-    for (int i = 0; i < 3; ++i) norm = fabs(y[i]) > norm ? fabs(y[i]) : norm;
-    for (int i = 0; i < 3; ++i) {
-        const double ratio = fabs(delta[i]) / (fabs(y[i]) + 1e-6 * norm + DBL_MIN);
+    for (int i = 0; i < rigid_body_DIM; ++i) norm = fabs(y[i]) > norm ? fabs(y[i]) : norm;
+    for (int i = 0; i < rigid_body_DIM; ++i) {
+        const double ratio = fabs(delta[i]) / (fabs(y[i]) + rigid_body_FLOOR * norm + DBL_MIN);
         if (!isfinite(ratio)) return ratio;
         size = ratio > size ? ratio : size;
     }
     return size;
 }
 
+/* Corrections below the first that shrink by less than the second have reached the level of rounding. */
+#define rigid_body_NEARLY_SOLVED 1e-8
+#define rigid_body_SHRINKING 0.25
+
 /* Solve (y - x) + displacement(y) = 0 for y by Newton's method from the extrapolated guess, and advance. The
-   increment is corrected to first order by the last Newton correction, so that correction costs no evaluation:
-   a correction is accepted when the error that remains after it, quadratic in it, is below 1e-20. */
-static rigid_body_status rigid_body_attempt(rigid_body_solver *s, int stage)
+   increment is corrected to first order by the last Newton correction, so that correction costs no
+   evaluation: a correction is accepted when the error that remains after it, quadratic in it, is below
+   rigid_body_TOLERANCE. */
+static rigid_body_status rigid_body_attempt(rigid_body_solver *s)
 {
-    const double *coef = s->coef[stage];
-    rigid_body_memory *memory = &s->memory[stage];
-    double y[3], delta[3], displacement[3], increment[3];
-    double jacobian[9], increment_jacobian[9];
-    if (!rigid_body_predict(memory, y)) memcpy(y, s->x, sizeof y);
-    double previous = HUGE_VAL;
-    for (int iteration = 0; iteration < 20; ++iteration) {
-        rigid_body_linearise(coef, y, displacement, increment, jacobian, increment_jacobian);
+    double y[rigid_body_DIM], delta[rigid_body_DIM], displacement[rigid_body_DIM], increment[rigid_body_DIM];
+    double jacobian[rigid_body_DIM * rigid_body_DIM], increment_jacobian[rigid_body_DIM * rigid_body_DIM],
+        previous = HUGE_VAL;
+    if (!rigid_body_predict(&s->history, y)) memcpy(y, s->x, sizeof y);
+    for (int iteration = 1; iteration <= rigid_body_MAX_ITERATIONS; ++iteration) {
+        rigid_body_linearise(s->coef, y, displacement, increment, jacobian, increment_jacobian);
         ++s->evaluations;
-        for (int i = 0; i < 3; ++i) delta[i] = ((y[i] - s->x[i]) + displacement[i]) - s->carry[i];
+        for (int i = 0; i < rigid_body_DIM; ++i) delta[i] = ((y[i] - s->x[i]) + displacement[i])
+            - s->carry[i];
         const int regular = rigid_body_solve(jacobian, delta);
-        const double size = rigid_body_size(y, delta);
+        const double size = rigid_body_size(y, delta), growth = size / (previous * previous);
         if (!isfinite(size)) return rigid_body_NOT_FINITE;
         if (!regular) return rigid_body_SINGULAR;
-        for (int i = 0; i < 3; ++i) y[i] -= delta[i];
-        const double growth = size / (previous * previous);
+        for (int i = 0; i < rigid_body_DIM; ++i) y[i] -= delta[i];
         const double remaining = size * size * (growth > 1.0 ? growth : 1.0);
-        /* The second test: corrections no longer shrink, the solve has reached the level of rounding. */
-        if (remaining <= 1e-20 || (previous < 1e-8 && size > 0.25 * previous)) {
-            double correction[3] = { 0.0 };
-            for (int i = 0; i < 3; ++i)
-                for (int j = 0; j < 3; ++j) correction[i] -= increment_jacobian[i * 3 + j] * delta[j];
-            if (!rigid_body_plausible(s, stage, increment)) return rigid_body_NO_CONVERGENCE;
-            if (!rigid_body_advance(s, increment, correction)) return rigid_body_NOT_FINITE;
-            rigid_body_remember(memory, y, iteration + 1);
-            return rigid_body_OK;
-        }
+        const int stalled = previous < rigid_body_NEARLY_SOLVED && size > rigid_body_SHRINKING * previous;
         previous = size;
+        if (!(remaining <= rigid_body_TOLERANCE || stalled)) continue;
+        double correction[rigid_body_DIM] = { 0.0 };
+        for (int i = 0; i < rigid_body_DIM; ++i)
+            for (int j = 0; j < rigid_body_DIM; ++j)
+                correction[i] -= increment_jacobian[i * rigid_body_DIM + j] * delta[j];
+        if (!rigid_body_plausible(s, increment)) return rigid_body_NO_CONVERGENCE;
+        if (!rigid_body_advance(s, increment, correction)) return rigid_body_NOT_FINITE;
+        rigid_body_remember(&s->history, y, iteration);
+        return rigid_body_OK;
     }
     return rigid_body_NO_CONVERGENCE;
 }
 
-/* The 1 stages of one step. If one fails, the state is as before the step. */
-static rigid_body_status rigid_body_stages(rigid_body_solver *s)
+/* ---- The choice of the gauge: multiples of Casimirs taken from H ---- */
+enum {
+    rigid_body_SAMPLES = 32, /* states along a short piece of the trajectory */
+    /* S_3 is cubic in H, so the square of the error is of degree six in each multiple */
+    rigid_body_DEGREE = 6,
+    rigid_body_SWEEPS = 4 /* most rounds over the multiples */
+};
+
+/* A short piece of the trajectory from x, by a Runge-Kutta method with steps of a fixed change. */
+static void rigid_body_sample(const rigid_body_params *params, const double x[rigid_body_DIM],
+    double samples[][rigid_body_DIM])
 {
-    double x[3], carry[3];
-    memcpy(x, s->x, sizeof x);
-    memcpy(carry, s->carry, sizeof carry);
-    for (int stage = 0; stage < 1; ++stage) {
-        rigid_body_status status = rigid_body_attempt(s, stage);
-        /* A guess from earlier steps may have misled it: once more without. */
-        if (status != rigid_body_OK && s->memory[stage].count > 0) {
-            memset(&s->memory[stage], 0, sizeof s->memory[stage]);
-            status = rigid_body_attempt(s, stage);
-        }
-        if (status != rigid_body_OK) {
-            memcpy(s->x, x, sizeof x);
-            memcpy(s->carry, carry, sizeof carry);
-            return status;
-        }
+    double slope[rigid_body_DIM], middle[rigid_body_DIM], size = 0.0, speed = DBL_MIN;
+    rigid_body_vector_field(params, x, slope);
+    for (int i = 0; i < rigid_body_DIM; ++i) {
+        samples[0][i] = x[i];
+        size += fabs(x[i]);
+        speed += fabs(slope[i]);
     }
-    return rigid_body_OK;
+    const double h = 0.25 * size / speed;
+    for (int k = 1; k < rigid_body_SAMPLES; ++k) {
+        const double *y = samples[k - 1];
+        rigid_body_vector_field(params, y, slope);
+        for (int i = 0; i < rigid_body_DIM; ++i) middle[i] = y[i] + 0.5 * h * slope[i];
+        rigid_body_vector_field(params, middle, slope);
+        for (int i = 0; i < rigid_body_DIM; ++i) samples[k][i] = y[i] + h * slope[i];
+    }
 }
 
-/* Whether steps can be made with these parameters: finite, positive where the spec says so, and with finite
-   coefficients for a step so short that it has no part in it. */
-static int rigid_body_admissible(const rigid_body_params *params)
+/* Sum of |pi grad S_3|^2, the leading error of the method, over the samples. */
+static double rigid_body_gauge_error(const rigid_body_params *params, const double gauge[rigid_body_GAUGES],
+    double samples[][rigid_body_DIM])
 {
-    double coef[35];
-    const double gauge[1] = { 0.0 };
-    if (!(isfinite(params->I1) && params->I1 > 0.0)) return 0;
-    if (!(isfinite(params->I2) && params->I2 > 0.0)) return 0;
-    if (!(isfinite(params->I3) && params->I3 > 0.0)) return 0;
-    rigid_body_prepare(params, gauge, 1e-100, coef);
-    for (int k = 0; k < 35; ++k)
-        if (!isfinite(coef[k])) return 0;
-    return 1;
-}
-
-/* All of rigid_body_init but the gauge. The arguments may be parts of *s: they are read before it is written. */
-static rigid_body_status rigid_body_start(rigid_body_solver *s, const rigid_body_params *params, const double x0[3])
-{
-    if (s == NULL || x0 == NULL) return rigid_body_BAD_ARGUMENT;
-    const rigid_body_params own = params != NULL ? *params : rigid_body_default_params;
-    double x[3];
-    memcpy(x, x0, sizeof x);
-    for (int i = 0; i < 3; ++i)
-        if (!isfinite(x[i])) return rigid_body_BAD_ARGUMENT;
-    if (!rigid_body_admissible(&own)) return rigid_body_BAD_ARGUMENT;
-    memset(s, 0, sizeof *s);
-    memcpy(s->x, x, sizeof s->x);
-    s->params = own;
-    return rigid_body_OK;
-}
-
-/* the leading error vector pi grad S_3, as a function of the gauge */
-static void rigid_body_guide(const rigid_body_params *params, const double gauge[1], const double x[3],
-                             double error[restrict 3])
-{
-    const double x1 = x[0];
-    const double x2 = x[1];
-    const double x3 = x[2];
-    const double t1 = 1.0 / params->I2;
-    const double t2 = 1.0 / params->I1;
-    const double t3 = t2 * t2;
-    const double t4 = x1 * x1;
-    const double t5 = 1.0 / 12.0 * (t3 * t4);
-    const double t6 = x2 * x2;
-    const double t7 = 1.0 / 12.0 * t2;
-    const double t8 = 1.0 / 6.0 * gauge[0];
-    const double t9 = t7 - t8;
-    const double t10 = 1.0 / 6.0 * (t3 * (gauge[0] * t4));
-    const double t11 = 1.0 / params->I3;
-    const double t12 = 1.0 / 3.0 * t1;
-    const double t13 = 1.0 / 6.0 * t11;
-    const double t14 = 1.0 / 12.0 * t11;
-    const double t15 = 1.0 / 6.0 * t1;
-    const double t16 = 1.0 / 6.0 * t2;
-    const double t17 = 1.0 / 3.0 * t2;
-    const double t18 = t1 * (t5 + t6 * (t1 * t9)) - t10 + t11 * (t6 * (gauge[0] * (t12 - t13) + t2 * (t14 - t15)) + t4 * (t1 * (t14 - t16) + gauge[0] * (t17 - t13)));
-    const double t19 = x3 * t18;
-    const double t20 = x3 * x3;
-    const double t21 = 1.0 / 12.0 * t1;
-    const double t22 = 1.0 / 3.0 * t11;
-    const double t23 = t11 * (t5 + t20 * (t11 * t9)) - t10 + t1 * (t4 * (gauge[0] * (t17 - t15) + t11 * (t21 - t16)) + t20 * (t2 * (t21 - t13) + gauge[0] * (t22 - t15)));
-    const double t24 = x2 * t23;
-    const double t25 = t1 * t1;
-    const double t26 = t2 * (t6 * (gauge[0] * (t12 - t16) + t11 * (t7 - t15)) + t20 * (gauge[0] * (t22 - t16) + t1 * (t7 - t13))) + (t11 * (1.0 / 12.0 * (t6 * t25) + t20 * (t11 * (t21 - t8))) - 1.0 / 6.0 * (t25 * (gauge[0] * t6)));
-    const double t27 = x1 * t26;
-    error[0] = x2 * t19 - x3 * t24;
-    error[1] = x3 * t27 - x1 * t19;
-    error[2] = x1 * t24 - x2 * t27;
-}
-
-/* grad H . grad H, then grad H . grad C and grad C . grad C for each Casimir of the gauge */
-static void rigid_body_products(const rigid_body_params *params, const double x[3], double out[restrict 3])
-{
-    const double x1 = x[0];
-    const double x2 = x[1];
-    const double x3 = x[2];
-    const double t1 = x3 / params->I3;
-    const double t2 = x2 / params->I2;
-    const double t3 = x1 / params->I1;
-    out[0] = t1 * t1 + (t2 * t2 + t3 * t3);
-    out[1] = 2.0 * (x3 * t1) + (2.0 * (x2 * t2) + 2.0 * (x1 * t3));
-    out[2] = 4.0 * (x3 * x3) + (4.0 * (x2 * x2) + 4.0 * (x1 * x1));
-}
-
-enum { rigid_body_SAMPLES = 32 };
-
-/* Sum of |pi grad S_3|^2, the leading error of the method, over sampled states. */
-static double rigid_body_gauge_error(const rigid_body_params *params, const double gauge[1],
-                                     double samples[][3])
-{
-    double error[3], sum = 0.0;
+    double error[rigid_body_DIM], sum = 0.0;
     for (int k = 0; k < rigid_body_SAMPLES; ++k) {
         rigid_body_guide(params, gauge, samples[k], error);
-        for (int i = 0; i < 3; ++i) sum += error[i] * error[i];
+        for (int i = 0; i < rigid_body_DIM; ++i) sum += error[i] * error[i];
     }
     return sum;
 }
 
-/* A short piece of the trajectory from x, by a Runge-Kutta method with steps of a fixed change. */
-static void rigid_body_sample(const rigid_body_params *params, const double x[3], double samples[][3])
+/* The error polynomial at centre + t width, by Newton's formula from forward differences. */
+static double rigid_body_on_line(const double difference[rigid_body_DEGREE + 1], double t)
 {
-    double y[3], z[3], k1[3], k2[3], size = 0.0, speed = DBL_MIN;
-    memcpy(y, x, sizeof y);
-    rigid_body_vector_field(params, y, k1);
-    for (int i = 0; i < 3; ++i) {
-        size += fabs(y[i]);
-        speed += fabs(k1[i]);
-    }
-    const double h = 0.25 * size / speed;
-    for (int k = 0; k < rigid_body_SAMPLES; ++k) {
-        memcpy(samples[k], y, sizeof y);
-        rigid_body_vector_field(params, y, k1);
-        for (int i = 0; i < 3; ++i) z[i] = y[i] + 0.5 * h * k1[i];
-        rigid_body_vector_field(params, z, k2);
-        for (int i = 0; i < 3; ++i) y[i] += h * k2[i];
-    }
+    double error = difference[rigid_body_DEGREE];
+    for (int k = rigid_body_DEGREE - 1; k >= 0; --k) error = difference[k] + (t + 3.0 - k) / (k + 1) * error;
+    return error;
 }
 
-/* The error where one multiple varies, of centre + (j - 3) width for j = 0 ... 6, as forward differences: S_3 is cubic in H,
-   so these are those of a polynomial of degree six. Their size, before. */
-static double rigid_body_gauge_line(const rigid_body_params *params, const double gauge[1], int c, double width,
-    double samples[][3], double difference[7])
+/* How many widths multiple c is to be moved for the least error: the best on grids, each finer than the one
+   before. */
+static double rigid_body_least_on_line(const rigid_body_params *params, const double gauge[rigid_body_GAUGES],
+    int c, double width, double samples[][rigid_body_DIM])
 {
-    double moved[1], size = 0.0;
+    double moved[rigid_body_GAUGES], difference[rigid_body_DEGREE + 1], size = 0.0, best = 0.0, mesh = 0.125;
     memcpy(moved, gauge, sizeof moved);
-    for (int j = 0; j < 7; ++j) {
+    for (int j = 0; j <= rigid_body_DEGREE; ++j) {
         moved[c] = gauge[c] + (j - 3) * width;
         difference[j] = rigid_body_gauge_error(params, moved, samples);
         size += difference[j];
     }
-    for (int order = 1; order < 7; ++order)
-        for (int j = 6; j >= order; --j) difference[j] -= difference[j - 1];
-    return size;
-}
-
-/* Its value at centre + t width, by Newton's formula. */
-static double rigid_body_on_line(const double difference[7], double t)
-{
-    double error = difference[6];
-    for (int k = 5; k >= 0; --k) error = difference[k] + (t + 3.0 - k) / (k + 1) * error;
-    return error;
-}
-
-/* Where it is least: the best t on grids, each finer than the one before. */
-static double rigid_body_least_on_line(const double difference[7], double size)
-{
-    const double mesh[3] = { 0.125, 1.0 / 64.0, 1.0 / 512.0 };
-    double best = 0.0, least = rigid_body_on_line(difference, best);
-    for (int level = 0; level < 3; ++level) {
+    for (int order = 1; order <= rigid_body_DEGREE; ++order)
+        for (int j = rigid_body_DEGREE; j >= order; --j) difference[j] -= difference[j - 1];
+    double least = rigid_body_on_line(difference, best);
+    for (int level = 0; level < 3; ++level, mesh *= 0.125) {
         const int reach = level == 0 ? 24 : 8;
         const double centre = best;
         for (int j = -reach; j <= reach; ++j) {
-            const double t = centre + j * mesh[level], error = rigid_body_on_line(difference, t);
-            if (error < least - 1e-12 * size) { /* close calls are not decided by rounding */
-                least = error;
-                best = t;
-            }
+            const double t = centre + j * mesh, error = rigid_body_on_line(difference, t);
+            if (!(error < least - 1e-12 * size)) continue; /* close calls are not decided by rounding */
+            least = error;
+            best = t;
         }
     }
     return best;
 }
 
-/* The lambda that minimise the leading error along a short piece of the trajectory, one after the other, from the
-   least-squares solution of grad H = sum of lambda grad C. Zero where that gives nothing finite. */
-static void rigid_body_choose_gauge(const rigid_body_params *params, const double x[3], double gauge[1])
+/* The multiples that minimise the leading error along a short piece of the trajectory, one after the other,
+   from the least-squares solution of grad H = sum of multiples of grad C. Zero where that gives nothing
+   finite. */
+static void rigid_body_choose_gauge(const rigid_body_params *params, const double x[rigid_body_DIM],
+    double gauge[rigid_body_GAUGES])
 {
-    double samples[rigid_body_SAMPLES][3], out[3], sums[3] = { 0.0 }, width[1];
+    double samples[rigid_body_SAMPLES][rigid_body_DIM], out[1 + 2 * rigid_body_GAUGES],
+        sums[1 + 2 * rigid_body_GAUGES] = { 0.0 };
+    double width[rigid_body_GAUGES];
     rigid_body_sample(params, x, samples);
     for (int k = 0; k < rigid_body_SAMPLES; ++k) {
         rigid_body_products(params, samples[k], out);
-        for (int i = 0; i < 3; ++i) sums[i] += out[i];
+        for (int i = 0; i < 1 + 2 * rigid_body_GAUGES; ++i) sums[i] += out[i];
     }
-    for (int c = 0; c < 1; ++c) {
+    for (int c = 0; c < rigid_body_GAUGES; ++c) {
         const double norm = sums[2 + 2 * c] > 0.0 ? sums[2 + 2 * c] : HUGE_VAL;
         gauge[c] = sums[1 + 2 * c] / norm;
         width[c] = sqrt(sums[0] / norm);
     }
-    for (int sweep = 0, moved = 1; sweep < 4 && moved; ++sweep) {
+    for (int sweep = 0, moved = 1; sweep < rigid_body_SWEEPS && moved; ++sweep) {
         moved = 0;
-        for (int c = 0; c < 1; ++c) {
-            double difference[7];
-            const double size = rigid_body_gauge_line(params, gauge, c, width[c], samples, difference);
-            const double best = rigid_body_least_on_line(difference, size);
+        for (int c = 0; c < rigid_body_GAUGES; ++c) {
+            const double best = rigid_body_least_on_line(params, gauge, c, width[c], samples);
             gauge[c] += best * width[c];
             moved = moved || best != 0.0;
         }
     }
     if (!isfinite(rigid_body_gauge_error(params, gauge, samples)))
-        for (int c = 0; c < 1; ++c) gauge[c] = 0.0;
+        memset(gauge, 0, rigid_body_GAUGES * sizeof gauge[0]);
 }
 
-/* Start at x0 with a gauge of one's own, e.g. that of another trajectory: see rigid_body_solver. */
-rigid_body_status rigid_body_init_gauge(rigid_body_solver *s, const rigid_body_params *params,
-                                        const double x0[3], const double gauge[1])
-{
-    double own[1];
-    if (gauge == NULL) return rigid_body_init(s, params, x0);
-    memcpy(own, gauge, sizeof own);
-    for (int c = 0; c < 1; ++c)
-        if (!isfinite(own[c])) return rigid_body_BAD_ARGUMENT;
-    const rigid_body_status status = rigid_body_start(s, params, x0);
-    if (status == rigid_body_OK) memcpy(s->gauge, own, sizeof s->gauge);
-    return status;
-}
-
-rigid_body_status rigid_body_init(rigid_body_solver *s, const rigid_body_params *params, const double x0[3])
-{
-    const rigid_body_status status = rigid_body_start(s, params, x0);
-    if (status == rigid_body_OK) rigid_body_choose_gauge(&s->params, s->x, s->gauge);
-    return status;
-}
-
-/* What depends on the step size; nothing where that is as before. */
-static rigid_body_status rigid_body_set_step(rigid_body_solver *s, double h)
-{
-    if (s == NULL || !isfinite(h)) return rigid_body_BAD_ARGUMENT;
-    if (s->ready && memcmp(&h, &s->h, sizeof h) == 0) return rigid_body_OK;
-    for (int stage = 0; stage < 1; ++stage)
-        rigid_body_prepare(&s->params, s->gauge, rigid_body_fractions[stage] * h, s->coef[stage]);
-    memset(s->memory, 0, sizeof s->memory);
-    for (int stage = 0; stage < 1; ++stage) s->memory[stage].patience = 150;
-    s->pause = 16;
-    s->setback = s->foreseeing = 0;
-    s->doubt = s->retry = 0;
-    s->effort = 0.0;
-    s->passes = INT_MAX;
-    s->h = h;
-    s->ready = 1;
-    return rigid_body_OK;
-}
-
-rigid_body_status rigid_body_step(rigid_body_solver *s, double h)
-{
-    rigid_body_status status = rigid_body_set_step(s, h);
-    if (status != rigid_body_OK) return status;
-    status = rigid_body_stages(s);
-    if (status == rigid_body_OK) ++s->steps;
-    return status;
-}
-
-/*
- * Eight at a time: below, the formulas of a step are evaluated for 8 steps of a trajectory, or members of an
- * ensemble, at once. Compilers make vector instructions of the loops over lanes.
- */
-enum { rigid_body_LANES = 8 };
+/* ---- Several steps or members at once ---- */
+/* Below, the formulas of a step are evaluated for several steps of a trajectory, or members of an ensemble,
+   at once. Compilers make vector instructions of the loops over lanes. */
+enum { rigid_body_LANES = 8 }; /* what one vector of AVX-512 holds */
 
 #if defined(__GNUC__)
 typedef double rigid_body_lanes[rigid_body_LANES] __attribute__((aligned(64))); /* a value in each lane */
@@ -970,6 +852,7 @@ typedef double rigid_body_lanes[rigid_body_LANES] __attribute__((aligned(64))); 
 typedef double rigid_body_lanes[rigid_body_LANES];
 #endif
 
+/* Before a loop over lanes: tells compilers that they are independent. */
 #if defined(__clang__)
 #define rigid_body_EACH_LANE _Pragma("clang loop vectorize(assume_safety)")
 #pragma clang diagnostic push
@@ -980,24 +863,116 @@ typedef double rigid_body_lanes[rigid_body_LANES];
 #define rigid_body_EACH_LANE
 #endif
 
-/* What all blocks share: coefficients, the same in each lane, and the recurrences by which they are foreseen. */
-typedef struct {
-    int fits[1]; /* the fit that weight is of; -1 for none */
-    rigid_body_lanes coef[1][35], weight[1][40][3];
-} rigid_body_table;
+/* ---- The solver ---- */
+/* Whether steps can be made with these parameters: allowed, and with finite coefficients for a step so short
+   that it has no part in it. */
+static int rigid_body_admissible(const rigid_body_params *params)
+{
+    double coef[rigid_body_COEFFICIENTS];
+    if (!rigid_body_allowed(params)) return 0;
+    rigid_body_prepare(params, (const double[rigid_body_GAUGES]){ 0.0 }, 1e-100, coef);
+    for (int k = 0; k < rigid_body_COEFFICIENTS; ++k)
+        if (!isfinite(coef[k])) return 0;
+    return 1;
+}
 
-/* A stage in all lanes, linearised around y. */
-typedef struct {
-    rigid_body_lanes y[3], displacement[3], increment[3], residual[3];
-    /* a residual r of alpha(y) = x takes inverse r from y, and gain r from the increment */
-    rigid_body_lanes inverse[9], slope[9], gain[9];
-} rigid_body_model;
+/* The arguments may be parts of *s: they are read before it is written. */
+rigid_body_status rigid_body_init_gauge(rigid_body_solver *s, const rigid_body_params *params,
+    const double x0[rigid_body_DIM], const double gauge[rigid_body_GAUGES])
+{
+    if (s == NULL || x0 == NULL) return rigid_body_BAD_ARGUMENT;
+    const rigid_body_params own = params != NULL ? *params : rigid_body_default_params;
+    double x[rigid_body_DIM];
+    memcpy(x, x0, sizeof x);
+    for (int i = 0; i < rigid_body_DIM; ++i)
+        if (!isfinite(x[i])) return rigid_body_BAD_ARGUMENT;
+    double multiples[rigid_body_GAUGES] = { 0.0 };
+    const int given = gauge != NULL;
+    if (given) memcpy(multiples, gauge, sizeof multiples);
+    for (int c = 0; c < rigid_body_GAUGES; ++c)
+        if (!isfinite(multiples[c])) return rigid_body_BAD_ARGUMENT;
+    if (!rigid_body_admissible(&own)) return rigid_body_BAD_ARGUMENT;
+    memset(s, 0, sizeof *s);
+    memcpy(s->x, x, sizeof s->x);
+    s->params = own;
+    if (!given) rigid_body_choose_gauge(&own, x, multiples);
+    memcpy(s->gauge, multiples, sizeof s->gauge);
+    return rigid_body_OK;
+}
+
+rigid_body_status rigid_body_init(rigid_body_solver *s, const rigid_body_params *params,
+    const double x0[rigid_body_DIM])
+{
+    return rigid_body_init_gauge(s, params, x0, NULL);
+}
+
+/* What depends on the step size; nothing where that is as before. */
+static rigid_body_status rigid_body_set_step(rigid_body_solver *s, double h)
+{
+    if (s == NULL || !isfinite(h)) return rigid_body_BAD_ARGUMENT;
+    if (s->prepared && memcmp(&h, &s->h, sizeof h) == 0) return rigid_body_OK;
+    rigid_body_prepare(&s->params, s->gauge, h, s->coef);
+    memset(&s->history, 0, sizeof s->history);
+    s->history.slow_steps_allowed = rigid_body_REPAY;
+    memset(&s->blocks, 0, sizeof s->blocks);
+    s->blocks.single_steps = 2 * rigid_body_LANES;
+    s->blocks.passes_without_recurrences = INT_MAX;
+    s->h = h;
+    s->t_before_h = s->t;
+    s->steps_before_h = s->steps;
+    s->prepared = 1;
+    return rigid_body_OK;
+}
+
+/* Some good steps have been made. */
+static void rigid_body_count(rigid_body_solver *s, size_t steps)
+{
+    s->steps += steps;
+    s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
+}
+
+/* One stage. A guess from earlier steps may have misled it: then once more without. */
+static rigid_body_status rigid_body_stage(rigid_body_solver *s)
+{
+    rigid_body_status status = rigid_body_attempt(s);
+    if (status != rigid_body_OK && s->history.count > 0) {
+        memset(&s->history, 0, sizeof s->history);
+        status = rigid_body_attempt(s);
+    }
+    return status;
+}
+
+rigid_body_status rigid_body_step(rigid_body_solver *s, double h)
+{
+    rigid_body_status status = rigid_body_set_step(s, h);
+    if (status != rigid_body_OK) return status;
+    status = rigid_body_stage(s);
+    if (status == rigid_body_OK) rigid_body_count(s, 1);
+    return status;
+}
+
+const char *rigid_body_status_string(rigid_body_status status)
+{
+    static const char *const text[] = {
+        "ok",
+        "no convergence: the step is too large",
+        "singular Newton matrix: the step is too large",
+        "not finite: overflow, or outside the domain",
+        "bad argument: a null pointer, or values that are not allowed"
+    };
+    return (unsigned)status <= rigid_body_BAD_ARGUMENT ? text[status] : "unknown status";
+}
+
+size_t rigid_body_solver_size(void) { return sizeof(rigid_body_solver); }
+
+size_t rigid_body_solver_steps_done(const rigid_body_solver *s) { return s->steps; }
 
 /* rigid_body_phi0 for the loops over lanes: no branches. No number beyond |s| = 4.0. */
 static inline double rigid_body_phi0_lane(double s)
 {
     const double ss = s * s;
-    double sum = 1.455172475614865e-27, other = 5.744790668872202e-26; /* every second term each, as neither then is waited for */
+    /* every second term each, as neither then is waited for */
+    double sum = 1.455172475614865e-27, other = 5.744790668872202e-26;
     sum = sum * ss + 2.267952452337683e-24;
     other = other * ss + 8.953517427037546e-23;
     sum = sum * ss + 3.534707039629467e-21;
@@ -1020,7 +995,8 @@ static inline double rigid_body_phi0_lane(double s)
 static inline double rigid_body_phi1_lane(double s)
 {
     const double ss = s * s;
-    double sum = 6.266191399131027e-28, other = 2.328275960983784e-26; /* every second term each, as neither then is waited for */
+    /* every second term each, as neither then is waited for */
+    double sum = 6.266191399131027e-28, other = 2.328275960983784e-26;
     sum = sum * ss + 8.617186003308303e-25;
     other = other * ss + 3.1751334332727565e-23;
     sum = sum * ss + 1.163957265514881e-21;
@@ -1039,83 +1015,55 @@ static inline double rigid_body_phi1_lane(double s)
     return sum + (fabs(s) <= 4.0 ? 0.0 : (double)NAN);
 }
 
-/* rigid_body_linearise in all lanes. */
+/* rigid_body_linearise in all lanes */
 static void rigid_body_linearise_lanes(rigid_body_lanes coef[restrict 35], rigid_body_lanes y[restrict 3],
-                                       rigid_body_lanes displacement[restrict 3],
-                                       rigid_body_lanes increment[restrict 3],
-                                       rigid_body_lanes jacobian[restrict 9],
-                                       rigid_body_lanes increment_jacobian[restrict 9])
+    rigid_body_lanes displacement[restrict 3], rigid_body_lanes increment[restrict 3],
+    rigid_body_lanes jacobian[restrict 9], rigid_body_lanes increment_jacobian[restrict 9])
 {
     rigid_body_EACH_LANE
     for (int lane = 0; lane < rigid_body_LANES; ++lane) {
-        const double x1 = y[0][lane];
-        const double x2 = y[1][lane];
-        const double x3 = y[2][lane];
-        const double t1 = x1 * x1;
-        const double t2 = x2 * x2;
-        const double t3 = coef[4][lane] * t2;
-        const double t4 = x3 * x3;
-        const double t5 = coef[1][lane] + coef[18][lane] * t1;
-        const double t6 = coef[9][lane] + coef[16][lane] * t2;
-        const double p_x3 = x3 * (t1 * (t3 + coef[17][lane] * t4 + t5) + (coef[14][lane] + t2 * (coef[15][lane] * t4 + t6)));
-        const double t7 = coef[4][lane] * t4;
-        const double t8 = coef[5][lane] * t2 + t7;
-        const double t9 = coef[2][lane] * t4;
-        const double p_x1 = x1 * (t2 * (coef[3][lane] + coef[7][lane] * t1 + t8) + (coef[0][lane] + t4 * (t9 + (coef[1][lane] + coef[6][lane] * t1))));
-        const double t10 = x3 * p_x1;
-        const double t11 = x1 * p_x3;
-        const double t12 = t10 - t11;
-        const double t13 = coef[3][lane] + coef[13][lane] * t1;
-        const double t14 = coef[10][lane] * t4;
-        const double p_x2 = x2 * (t1 * (coef[12][lane] * t2 + t7 + t13) + (coef[8][lane] + t4 * (t14 + (coef[9][lane] + coef[11][lane] * t2))));
-        const double t15 = x1 * p_x2;
-        const double t16 = x2 * p_x1;
-        const double t17 = t15 - t16;
-        const double t18 = p_x3 * t12 - p_x2 * t17;
-        const double t19 = p_x3 * p_x3;
-        const double t20 = p_x1 * p_x1;
-        const double t21 = p_x2 * p_x2;
-        const double t22 = t20 + t21;
-        const double t23 = t19 + t22;
-        const double t24 = rigid_body_phi0_lane(t23);
-        const double t25 = x2 * p_x3;
-        const double t26 = x3 * p_x2;
-        const double t27 = t25 - t26;
-        const double t28 = p_x1 * t17 - p_x3 * t27;
-        const double t29 = p_x2 * t27 - p_x1 * t12;
-        const double t30 = x1 * x3 * (coef[25][lane] + coef[27][lane] * t1 + (coef[26][lane] * t4 + coef[22][lane] * t2));
-        const double t31 = rigid_body_phi1_lane(t23);
-        const double t32 = p_x3 * t31;
-        const double t33 = 0.5 * x2;
+        const double x1 = y[0][lane], x2 = y[1][lane], x3 = y[2][lane];
+        const double t1 = x1 * x1, t2 = x2 * x2, t3 = coef[4][lane] * t2, t4 = x3 * x3;
+        const double t5 = coef[1][lane] + coef[18][lane] * t1, t6 = coef[9][lane] + coef[16][lane] * t2;
+        const double p_x3 = x3 * (t1 * (t3 + coef[17][lane] * t4 + t5) + (coef[14][lane] + t2
+            * (coef[15][lane] * t4 + t6)));
+        const double t7 = coef[4][lane] * t4, t8 = coef[5][lane] * t2 + t7, t9 = coef[2][lane] * t4;
+        const double p_x1 = x1 * (t2 * (coef[3][lane] + coef[7][lane] * t1 + t8) + (coef[0][lane] + t4
+            * (t9 + (coef[1][lane] + coef[6][lane] * t1))));
+        const double t10 = x3 * p_x1, t11 = x1 * p_x3, t12 = t10 - t11;
+        const double t13 = coef[3][lane] + coef[13][lane] * t1, t14 = coef[10][lane] * t4;
+        const double p_x2 = x2 * (t1 * (coef[12][lane] * t2 + t7 + t13) + (coef[8][lane] + t4
+            * (t14 + (coef[9][lane] + coef[11][lane] * t2))));
+        const double t15 = x1 * p_x2, t16 = x2 * p_x1, t17 = t15 - t16, t18 = p_x3 * t12 - p_x2 * t17;
+        const double t19 = p_x3 * p_x3, t20 = p_x1 * p_x1, t21 = p_x2 * p_x2, t22 = t20 + t21;
+        const double t23 = t19 + t22, t24 = rigid_body_phi0_lane(t23), t25 = x2 * p_x3, t26 = x3 * p_x2;
+        const double t27 = t25 - t26, t28 = p_x1 * t17 - p_x3 * t27, t29 = p_x2 * t27 - p_x1 * t12;
+        const double t30 = x1 * x3 * (coef[25][lane] + coef[27][lane] * t1 + (coef[26][lane] * t4
+            + coef[22][lane] * t2));
+        const double t31 = rigid_body_phi1_lane(t23), t32 = p_x3 * t31, t33 = 0.5 * x2;
         const double t34 = (t12 - t11) * t24 + 2.0 * (t18 * t32) - t33;
-        const double t35 = t2 * (coef[3][lane] + coef[20][lane] * t1 + t8) + (coef[0][lane] + t4 * (t9 + (coef[1][lane] + coef[19][lane] * t1)));
-        const double t36 = x2 * p_x2;
-        const double t37 = x3 * p_x3;
-        const double t38 = p_x1 * t31;
+        const double t35 = t2 * (coef[3][lane] + coef[20][lane] * t1 + t8) + (coef[0][lane] + t4
+            * (t9 + (coef[1][lane] + coef[19][lane] * t1)));
+        const double t36 = x2 * p_x2, t37 = x3 * p_x3, t38 = p_x1 * t31;
         const double t39 = (t36 + t37) * t24 + 2.0 * (t18 * t38);
-        const double t40 = x1 * x2 * (coef[21][lane] + coef[24][lane] * t1 + (coef[22][lane] * t4 + coef[23][lane] * t2));
-        const double t41 = 0.5 * x3;
-        const double t42 = p_x2 * t31;
-        const double t43 = t41 + (2.0 * (t18 * t42) - (t15 + t17) * t24);
-        const double t44 = p_x1 * p_x2 * t24;
+        const double t40 = x1 * x2 * (coef[21][lane] + coef[24][lane] * t1 + (coef[22][lane] * t4
+            + coef[23][lane] * t2));
+        const double t41 = 0.5 * x3, t42 = p_x2 * t31;
+        const double t43 = t41 + (2.0 * (t18 * t42) - (t15 + t17) * t24), t44 = p_x1 * p_x2 * t24;
         const double t45 = 0.5 * p_x3;
-        const double t46 = x2 * x3 * (coef[31][lane] * t4 + coef[32][lane] * t2 + (coef[30][lane] + coef[22][lane] * t1));
-        const double t47 = t1 * (t13 + (t7 + coef[29][lane] * t2)) + (coef[8][lane] + t4 * (t14 + (coef[9][lane] + coef[28][lane] * t2)));
-        const double t48 = 0.5 * p_x2;
-        const double t49 = p_x1 * p_x3 * t24;
-        const double t50 = t1 * (t3 + coef[34][lane] * t4 + t5) + (coef[14][lane] + t2 * (coef[33][lane] * t4 + t6));
-        const double t51 = 0.5 * x1;
-        const double t52 = t51 + (2.0 * (t28 * t32) - (t25 + t27) * t24);
-        const double t53 = x1 * p_x1;
-        const double t54 = (t53 + t37) * t24 + 2.0 * (t28 * t42);
-        const double t55 = (t17 - t16) * t24 + 2.0 * (t28 * t38) - t41;
-        const double t56 = p_x2 * p_x3 * t24;
-        const double t57 = 0.5 * p_x1;
-        const double t58 = (t36 + t53) * t24 + 2.0 * (t29 * t32);
+        const double t46 = x2 * x3 * (coef[31][lane] * t4 + coef[32][lane] * t2 + (coef[30][lane]
+            + coef[22][lane] * t1));
+        const double t47 = t1 * (t13 + (t7 + coef[29][lane] * t2)) + (coef[8][lane] + t4
+            * (t14 + (coef[9][lane] + coef[28][lane] * t2)));
+        const double t48 = 0.5 * p_x2, t49 = p_x1 * p_x3 * t24;
+        const double t50 = t1 * (t3 + coef[34][lane] * t4 + t5) + (coef[14][lane] + t2 * (coef[33][lane] * t4
+            + t6));
+        const double t51 = 0.5 * x1, t52 = t51 + (2.0 * (t28 * t32) - (t25 + t27) * t24);
+        const double t53 = x1 * p_x1, t54 = (t53 + t37) * t24 + 2.0 * (t28 * t42);
+        const double t55 = (t17 - t16) * t24 + 2.0 * (t28 * t38) - t41, t56 = p_x2 * p_x3 * t24;
+        const double t57 = 0.5 * p_x1, t58 = (t36 + t53) * t24 + 2.0 * (t29 * t32);
         const double t59 = (t27 - t26) * t24 + 2.0 * (t29 * t42) - t51;
-        const double t60 = t33 + (2.0 * (t29 * t38) - (t10 + t12) * t24);
-        const double t61 = x2 * t30;
-        const double t62 = x3 * t40;
+        const double t60 = t33 + (2.0 * (t29 * t38) - (t10 + t12) * t24), t61 = x2 * t30, t62 = x3 * t40;
         const double t63 = x1 * t46;
         displacement[0][lane] = t18 * t24 - 0.5 * t27;
         displacement[1][lane] = t28 * t24 - 0.5 * t12;
@@ -1144,24 +1092,23 @@ static void rigid_body_linearise_lanes(rigid_body_lanes coef[restrict 35], rigid
     }
 }
 
-/* rigid_body_evaluate in all lanes. */
+/* rigid_body_evaluate in all lanes */
 static void rigid_body_evaluate_lanes(rigid_body_lanes coef[restrict 35], rigid_body_lanes y[restrict 3],
-                                      rigid_body_lanes displacement[restrict 3],
-                                      rigid_body_lanes increment[restrict 3])
+    rigid_body_lanes displacement[restrict 3], rigid_body_lanes increment[restrict 3])
 {
     rigid_body_EACH_LANE
     for (int lane = 0; lane < rigid_body_LANES; ++lane) {
-        const double x1 = y[0][lane];
-        const double x2 = y[1][lane];
-        const double x3 = y[2][lane];
-        const double t1 = x1 * x1;
-        const double t2 = x2 * x2;
-        const double t3 = x3 * x3;
-        const double p_x3 = x3 * (t1 * (coef[4][lane] * t2 + coef[17][lane] * t3 + (coef[1][lane] + coef[18][lane] * t1)) + (coef[14][lane] + t2 * (coef[15][lane] * t3 + (coef[9][lane] + coef[16][lane] * t2))));
+        const double x1 = y[0][lane], x2 = y[1][lane], x3 = y[2][lane];
+        const double t1 = x1 * x1, t2 = x2 * x2, t3 = x3 * x3;
+        const double p_x3 = x3 * (t1 * (coef[4][lane] * t2 + coef[17][lane] * t3 + (coef[1][lane]
+            + coef[18][lane] * t1)) + (coef[14][lane] + t2 * (coef[15][lane] * t3 + (coef[9][lane]
+            + coef[16][lane] * t2))));
         const double t4 = coef[4][lane] * t3;
-        const double p_x1 = x1 * (t2 * (coef[3][lane] + coef[7][lane] * t1 + (coef[5][lane] * t2 + t4)) + (coef[0][lane] + t3 * (coef[2][lane] * t3 + (coef[1][lane] + coef[6][lane] * t1))));
+        const double p_x1 = x1 * (t2 * (coef[3][lane] + coef[7][lane] * t1 + (coef[5][lane] * t2 + t4))
+            + (coef[0][lane] + t3 * (coef[2][lane] * t3 + (coef[1][lane] + coef[6][lane] * t1))));
         const double t5 = x3 * p_x1 - x1 * p_x3;
-        const double p_x2 = x2 * (t1 * (coef[12][lane] * t2 + t4 + (coef[3][lane] + coef[13][lane] * t1)) + (coef[8][lane] + t3 * (coef[10][lane] * t3 + (coef[9][lane] + coef[11][lane] * t2))));
+        const double p_x2 = x2 * (t1 * (coef[12][lane] * t2 + t4 + (coef[3][lane] + coef[13][lane] * t1))
+            + (coef[8][lane] + t3 * (coef[10][lane] * t3 + (coef[9][lane] + coef[11][lane] * t2))));
         const double t6 = x1 * p_x2 - x2 * p_x1;
         const double t7 = rigid_body_phi0_lane(p_x3 * p_x3 + (p_x1 * p_x1 + p_x2 * p_x2));
         const double t8 = x2 * p_x3 - x3 * p_x2;
@@ -1174,30 +1121,21 @@ static void rigid_body_evaluate_lanes(rigid_body_lanes coef[restrict 35], rigid_
     }
 }
 
-/* rigid_body_invert in all lanes. */
+/* rigid_body_invert in all lanes */
 static void rigid_body_invert_lanes(rigid_body_lanes matrix[restrict 9], rigid_body_lanes slope[restrict 9],
-                                    rigid_body_lanes inverse[restrict 9], rigid_body_lanes gain[restrict 9],
-                                    rigid_body_lanes reciprocal[restrict 3])
+    rigid_body_lanes inverse[restrict 9], rigid_body_lanes gain[restrict 9],
+    rigid_body_lanes reciprocal[restrict 3])
 {
     rigid_body_EACH_LANE
     for (int lane = 0; lane < rigid_body_LANES; ++lane) {
-        const double t1 = 1.0 / matrix[0][lane];
-        const double t2 = matrix[1][lane] * t1;
-        const double t3 = 1.0 / (matrix[4][lane] - matrix[3][lane] * t2);
-        const double t4 = matrix[3][lane] * t1 * t3;
-        const double t5 = matrix[2][lane] * t1;
-        const double t6 = (matrix[5][lane] - matrix[3][lane] * t5) * t3;
-        const double t7 = t5 - t2 * t6;
-        const double t8 = matrix[7][lane] - matrix[6][lane] * t2;
+        const double t1 = 1.0 / matrix[0][lane], t2 = matrix[1][lane] * t1;
+        const double t3 = 1.0 / (matrix[4][lane] - matrix[3][lane] * t2), t4 = matrix[3][lane] * t1 * t3;
+        const double t5 = matrix[2][lane] * t1, t6 = (matrix[5][lane] - matrix[3][lane] * t5) * t3;
+        const double t7 = t5 - t2 * t6, t8 = matrix[7][lane] - matrix[6][lane] * t2;
         const double t9 = 1.0 / (matrix[8][lane] - matrix[6][lane] * t5 - t8 * t6);
-        const double t10 = (t8 * t4 - matrix[6][lane] * t1) * t9;
-        const double t11 = t1 + t2 * t4 - t7 * t10;
-        const double t12 = t8 * t3 * t9;
-        const double t13 = t7 * t12 - t2 * t3;
-        const double t14 = t7 * t9;
-        const double t15 = t4 + t6 * t10;
-        const double t16 = t3 + t6 * t12;
-        const double t17 = t6 * t9;
+        const double t10 = (t8 * t4 - matrix[6][lane] * t1) * t9, t11 = t1 + t2 * t4 - t7 * t10;
+        const double t12 = t8 * t3 * t9, t13 = t7 * t12 - t2 * t3, t14 = t7 * t9, t15 = t4 + t6 * t10;
+        const double t16 = t3 + t6 * t12, t17 = t6 * t9;
         inverse[0][lane] = t11;
         inverse[1][lane] = t13;
         inverse[2][lane] = -t14;
@@ -1222,56 +1160,41 @@ static void rigid_body_invert_lanes(rigid_body_lanes matrix[restrict 9], rigid_b
     }
 }
 
-/* Everything about a stage at the points y. The matrices are I + O(h): where a pivot is far from 1, all is infinite. */
-static void rigid_body_tabulate(rigid_body_lanes coef[restrict], rigid_body_model *model)
-{
-    rigid_body_lanes jacobian[9], reciprocal[3];
-    rigid_body_linearise_lanes(coef, model->y, model->displacement, model->increment, jacobian, model->slope);
-    rigid_body_invert_lanes(jacobian, model->slope, model->inverse, model->gain, reciprocal);
-    for (int i = 0; i < 3; ++i) {
-        rigid_body_EACH_LANE
-        for (int lane = 0; lane < rigid_body_LANES; ++lane)
-            model->inverse[i][lane] += fabs(reciprocal[i][lane]) < 1e3 ? 0.0 : HUGE_VAL;
-    }
-}
+/* ---- Newton's method in lanes ---- */
+/* Components of y are measured no finer than by this part of the largest. */
+#define rigid_body_FLOOR_OF_LANES 1e-6
+
+/* A stage in all lanes, linearised around y. */
+typedef struct {
+    rigid_body_lanes y[rigid_body_DIM], displacement[rigid_body_DIM], increment[rigid_body_DIM],
+        residual[rigid_body_DIM];
+    /* a residual r of alpha(y) = x takes inverse r from y, and gain r from the increment */
+    rigid_body_lanes inverse[rigid_body_DIM * rigid_body_DIM], slope[rigid_body_DIM * rigid_body_DIM],
+        gain[rigid_body_DIM * rigid_body_DIM];
+} rigid_body_model;
 
 /* rigid_body_size in all lanes, summed over the components. */
-static void rigid_body_sizes(rigid_body_lanes y[restrict 3], rigid_body_lanes delta[restrict 3],
-    rigid_body_lanes size)
+static void rigid_body_sizes(rigid_body_lanes y[restrict rigid_body_DIM],
+    rigid_body_lanes delta[restrict rigid_body_DIM], rigid_body_lanes size)
 {
     rigid_body_lanes norm = { 0.0 };
     memset(size, 0, rigid_body_LANES * sizeof size[0]);
-    for (int i = 0; i < 3; ++i)
+    for (int i = 0; i < rigid_body_DIM; ++i)
         for (int lane = 0; lane < rigid_body_LANES; ++lane)
-            norm[lane] = 1e-6 * fabs(y[i][lane]) > norm[lane] ? 1e-6 * fabs(y[i][lane]) : norm[lane];
-    for (int i = 0; i < 3; ++i) {
+            norm[lane] = rigid_body_FLOOR_OF_LANES * fabs(y[i][lane]) > norm[lane] ? rigid_body_FLOOR_OF_LANES
+                * fabs(y[i][lane]) : norm[lane];
+    for (int i = 0; i < rigid_body_DIM; ++i) {
         rigid_body_EACH_LANE
         for (int lane = 0; lane < rigid_body_LANES; ++lane)
             size[lane] += fabs(delta[i][lane]) / (fabs(y[i][lane]) + norm[lane] + DBL_MIN);
     }
 }
 
-/* Correct y by the residuals, with the inverse in the table, and measure the corrections. */
-static void rigid_body_correct(rigid_body_model *model, rigid_body_lanes size)
-{
-    rigid_body_lanes delta[3];
-    memset(delta, 0, sizeof delta);
-    for (int i = 0; i < 3; ++i)
-        for (int j = 0; j < 3; ++j) {
-            rigid_body_EACH_LANE
-            for (int lane = 0; lane < rigid_body_LANES; ++lane)
-                delta[i][lane] += model->inverse[i * 3 + j][lane] * model->residual[j][lane];
-        }
-    rigid_body_sizes(model->y, delta, size);
-    for (int i = 0; i < 3; ++i)
-        for (int lane = 0; lane < rigid_body_LANES; ++lane) model->y[i][lane] -= delta[i][lane];
-}
-
-/* The largest of the lanes, none of which is negative; infinite if one is not finite. As integers, the bits of such
-   numbers have their order, and those of what is no number are larger. */
+/* The largest of the lanes, none of which is negative; infinite if one is not finite. As integers, the bits
+   of such numbers have their order, and those of what is no number are larger. */
 static double rigid_body_largest(const rigid_body_lanes size)
 {
-    uint64_t bits[8], most = 0;
+    uint64_t bits[rigid_body_LANES], most = 0;
     double largest;
     memcpy(bits, size, sizeof bits);
     for (int lane = 0; lane < rigid_body_LANES; ++lane) most = bits[lane] > most ? bits[lane] : most;
@@ -1279,25 +1202,44 @@ static double rigid_body_largest(const rigid_body_lanes size)
     return isfinite(largest) ? largest : HUGE_VAL;
 }
 
-/* rigid_body_near for the guesses of all lanes, seen from one value. */
-static int rigid_body_near_lanes(rigid_body_lanes y[restrict 3], const double last[3])
+/* Correct y by the residuals, with the inverse in the table, and measure the corrections. */
+static void rigid_body_correct(rigid_body_model *model, rigid_body_lanes size)
 {
-    rigid_body_lanes distance = { 0.0 };
-    double size = 0.0;
-    for (int i = 0; i < 3; ++i) {
-        size += fabs(last[i]);
-        rigid_body_EACH_LANE
-        for (int lane = 0; lane < rigid_body_LANES; ++lane) distance[lane] += fabs(y[i][lane] - last[i]);
-    }
-    return rigid_body_largest(distance) <= 4.0 * size;
+    rigid_body_lanes delta[rigid_body_DIM];
+    memset(delta, 0, sizeof delta);
+    for (int i = 0; i < rigid_body_DIM; ++i)
+        for (int j = 0; j < rigid_body_DIM; ++j) {
+            rigid_body_EACH_LANE
+            for (int lane = 0; lane < rigid_body_LANES; ++lane)
+                delta[i][lane] += model->inverse[i * rigid_body_DIM + j][lane] * model->residual[j][lane];
+        }
+    rigid_body_sizes(model->y, delta, size);
+    for (int i = 0; i < rigid_body_DIM; ++i)
+        for (int lane = 0; lane < rigid_body_LANES; ++lane) model->y[i][lane] -= delta[i][lane];
 }
 
-/* What is left after a correction of this size: quadratic in it, where the matrices are of the points corrected; where
-   they are of points further off, by bend, also of the order of size times bend. bound is what the last pass left. */
+/* What is left after a correction of this size: quadratic in it, where the matrices are of the points
+   corrected; where they are of points further off, by bend, also of the order of size times bend. bound is
+   what the last pass left. */
 static double rigid_body_remaining(double size, double bend, double bound)
 {
     const double growth = size / bound, left = size * (size + bend);
     return growth > 1.0 ? growth * left : left;
+}
+
+/* Everything about a stage at the points y. The matrices are I + O(h): where a pivot is far from 1, all is
+   infinite. */
+static void rigid_body_tabulate(rigid_body_lanes coef[restrict], rigid_body_model *model)
+{
+    rigid_body_lanes jacobian[rigid_body_DIM * rigid_body_DIM], reciprocal[rigid_body_DIM];
+    rigid_body_linearise_lanes(coef, model->y, model->displacement, model->increment, jacobian, model->slope);
+    rigid_body_invert_lanes(jacobian, model->slope, model->inverse, model->gain, reciprocal);
+    for (int i = 0; i < rigid_body_DIM; ++i) {
+        rigid_body_EACH_LANE
+        for (int lane = 0; lane < rigid_body_LANES; ++lane)
+            model->inverse[i][lane] += fabs(reciprocal[i][lane]) < rigid_body_LARGEST_RECIPROCAL ? 0.0
+                : HUGE_VAL;
+    }
 }
 
 /* The table of a stage, with its matrices or with those of the last pass. */
@@ -1309,26 +1251,58 @@ static void rigid_body_update(rigid_body_lanes coef[restrict], rigid_body_model 
         rigid_body_evaluate_lanes(coef, model->y, model->displacement, model->increment);
 }
 
-/* The steps of a block one after the other, each along the linear model of its lane. As X, the state with its carry, gains
-   increment - gain residual, the next residual follows from this one; X itself is added up apart. */
-static void rigid_body_chain(rigid_body_model model[1], double x[3], double carry[3])
+/* ---- Blocks of steps ---- */
+/* What all blocks share: coefficients, the same in each lane, and the recurrences by which they are foreseen.
+   */
+typedef struct {
+    int fits; /* the fit that weight is of; -1 for none */
+    rigid_body_lanes coef[rigid_body_COEFFICIENTS], weight[rigid_body_WINDOW][rigid_body_DIM];
+} rigid_body_table;
+
+/* The stages of a step. */
+typedef struct {
+    rigid_body_model stage;
+} rigid_body_models;
+
+/* rigid_body_near for the guesses of all lanes, seen from one value. */
+static int rigid_body_near_lanes(rigid_body_lanes y[restrict rigid_body_DIM],
+    const double last[rigid_body_DIM])
 {
-    double residual[3], sum[3], small[3];
-    for (int i = 0; i < 3; ++i) {
-        residual[i] = ((model->y[i][0] - x[i]) + model->displacement[i][0]) - carry[i];
+    rigid_body_lanes distance = { 0.0 };
+    double size = 0.0;
+    for (int i = 0; i < rigid_body_DIM; ++i) {
+        size += fabs(last[i]);
+        rigid_body_EACH_LANE
+        for (int lane = 0; lane < rigid_body_LANES; ++lane) distance[lane] += fabs(y[i][lane] - last[i]);
+    }
+    return rigid_body_largest(distance) <= rigid_body_REACH * size;
+}
+
+/* The steps of a block one after the other, each along the linear model of its lane. As X, the state with its
+   carry, gains increment - gain residual, the next residual follows from this one; X itself is added up
+   apart. */
+static void rigid_body_chain(rigid_body_models *models, double x[rigid_body_DIM],
+    double carry[rigid_body_DIM])
+{
+    double residual[rigid_body_DIM], sum[rigid_body_DIM], small[rigid_body_DIM];
+    for (int i = 0; i < rigid_body_DIM; ++i) {
+        residual[i] = ((models->stage.y[i][0] - x[i]) + models->stage.displacement[i][0]) - carry[i];
         sum[i] = x[i];
         small[i] = carry[i];
     }
-    for (int k = 0; k < 1 * rigid_body_LANES; ++k) {
-        const int lane = k / 1, after = (k + 1) / 1 % rigid_body_LANES;
-        rigid_body_model *at = &model[k % 1], *next = &model[(k + 1) % 1];
-        double even[3] = { 0.0 }, odd[3] = { 0.0 }; /* two sums, so that no long chain of additions is waited for */
-        for (int i = 0; i < 3; ++i) {
+    for (int lane = 0; lane < rigid_body_LANES; ++lane) {
+        const int after = (lane + 1) % rigid_body_LANES;
+        rigid_body_model *at = &models->stage, *next = &models->stage;
+        /* two sums, so that no long chain of additions is waited for */
+        double even[rigid_body_DIM] = { 0.0 }, odd[rigid_body_DIM] = { 0.0 };
+        for (int i = 0; i < rigid_body_DIM; ++i) {
             at->residual[i][lane] = residual[i];
-            for (int j = 0; j < 3; j += 2) even[i] += at->gain[i * 3 + j][lane] * residual[j];
-            for (int j = 1; j < 3; j += 2) odd[i] += at->gain[i * 3 + j][lane] * residual[j];
+            for (int j = 0; j < rigid_body_DIM; j += 2)
+                even[i] += at->gain[i * rigid_body_DIM + j][lane] * residual[j];
+            for (int j = 1; j < rigid_body_DIM; j += 2)
+                odd[i] += at->gain[i * rigid_body_DIM + j][lane] * residual[j];
         }
-        for (int i = 0; i < 3; ++i) {
+        for (int i = 0; i < rigid_body_DIM; ++i) {
             const double change = at->increment[i][lane], total = sum[i] + change, added = total - sum[i];
             const double turn = (next->displacement[i][after] - at->displacement[i][lane]) - change;
             const double moved = (next->y[i][after] - at->y[i][lane]) + turn;
@@ -1337,33 +1311,37 @@ static void rigid_body_chain(rigid_body_model model[1], double x[3], double carr
             sum[i] = total;
         }
     }
-    for (int i = 0; i < 3; ++i) {
+    for (int i = 0; i < rigid_body_DIM; ++i) {
         x[i] = sum[i] + small[i];
         carry[i] = small[i] - (x[i] - sum[i]);
     }
 }
 
-/* Bring the table up to date: coefficients, and weights that were fitted since. */
+/* Bring the table of a stage up to date: coefficients, and weights that were fitted since. */
+static void rigid_body_refresh_stage(const rigid_body_solver *s, rigid_body_table *table)
+{
+    if (table->fits == s->history.fits) return;
+    table->fits = s->history.fits;
+    for (int k = 0; k < rigid_body_COEFFICIENTS; ++k)
+        for (int lane = 0; lane < rigid_body_LANES; ++lane) table->coef[k][lane] = s->coef[k];
+    memcpy(table->weight, s->history.weight,
+        (size_t)s->history.recurrence_terms * rigid_body_DIM * sizeof(rigid_body_lanes));
+}
+
 static void rigid_body_refresh(const rigid_body_solver *s, rigid_body_table *table)
 {
-    for (int stage = 0; stage < 1; ++stage) {
-        if (table->fits[stage] == s->memory[stage].fits) continue;
-        table->fits[stage] = s->memory[stage].fits;
-        for (int k = 0; k < 35; ++k)
-            for (int lane = 0; lane < rigid_body_LANES; ++lane) table->coef[stage][k][lane] = s->coef[stage][k];
-        memcpy(table->weight[stage], s->memory[stage].weight, (size_t)s->memory[stage].terms * sizeof table->weight[0][0]);
-    }
+    rigid_body_refresh_stage(s, table);
 }
 
 /* Guesses for the next rigid_body_LANES values of a stage, by its recurrences. */
-static void rigid_body_foresee(const rigid_body_memory *memory, rigid_body_lanes weight[restrict][3],
-    rigid_body_lanes y[restrict 3])
+static void rigid_body_foresee(const rigid_body_history *history,
+    rigid_body_lanes weight[restrict][rigid_body_DIM], rigid_body_lanes y[restrict rigid_body_DIM])
 {
-    const int last = memory->count - 1;
-    for (int i = 0; i < 3; ++i) {
+    const int last = history->count - 1;
+    for (int i = 0; i < rigid_body_DIM; ++i) {
         rigid_body_lanes even = { 0.0 }, odd = { 0.0 };
-        for (int k = 0; k < memory->terms; k += 2) {
-            const double past = memory->past[last - k][i], earlier = memory->past[last - 1 - k][i];
+        for (int k = 0; k < history->recurrence_terms; k += 2) {
+            const double past = history->past[last - k][i], earlier = history->past[last - 1 - k][i];
             rigid_body_EACH_LANE
             for (int lane = 0; lane < rigid_body_LANES; ++lane) even[lane] += weight[k][i][lane] * past;
             rigid_body_EACH_LANE
@@ -1375,137 +1353,169 @@ static void rigid_body_foresee(const rigid_body_memory *memory, rigid_body_lanes
 }
 
 /* rigid_body_record for the values of all lanes, one after the other. */
-static void rigid_body_record_lanes(rigid_body_memory *memory, rigid_body_lanes y[restrict 3])
+static void rigid_body_record_lanes(rigid_body_history *history, rigid_body_lanes y[restrict rigid_body_DIM])
 {
-    rigid_body_make_room(memory, rigid_body_LANES);
+    rigid_body_make_room(history, rigid_body_LANES);
     for (int lane = 0; lane < rigid_body_LANES; ++lane)
-        for (int i = 0; i < 3; ++i) memory->past[memory->count + lane][i] = y[i][lane];
-    memory->count += rigid_body_LANES;
+        for (int i = 0; i < rigid_body_DIM; ++i) history->past[history->count + lane][i] = y[i][lane];
+    history->count += rigid_body_LANES;
 }
 
-/* Guesses where no recurrence is known: where alpha and beta have the means of steps by the classical Runge-Kutta
-   method, to leading order. */
-static void rigid_body_march(const rigid_body_solver *s, rigid_body_table *table, rigid_body_model model[1])
+/* y becomes the points whose alpha and beta have these means. */
+static void rigid_body_from_means(rigid_body_lanes coef[restrict], rigid_body_model *model)
 {
-    static const double reach[4] = { 0.5, 0.5, 1.0, 0.0 }, weight[4] = { 1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0 };
-    double x[3], point[3], slope[3], mean[3];
+    rigid_body_evaluate_lanes(coef, model->y, model->displacement, model->increment);
+    for (int i = 0; i < rigid_body_DIM; ++i) {
+        rigid_body_EACH_LANE
+        for (int lane = 0; lane < rigid_body_LANES; ++lane)
+            model->y[i][lane] -= model->displacement[i][lane] + 0.5 * model->increment[i][lane];
+    }
+}
+
+/* Guesses where no recurrence is known: where alpha and beta have the means of steps by the classical
+   Runge-Kutta method, to leading order. */
+static void rigid_body_march(const rigid_body_solver *s, rigid_body_table *table, rigid_body_models *models)
+{
+    static const double reach[4] = { 0.5, 0.5, 1.0, 0.0 }, weight[4] = { 1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0
+        / 6.0 };
+    double x[rigid_body_DIM], point[rigid_body_DIM], slope[rigid_body_DIM], mean[rigid_body_DIM];
     memcpy(x, s->x, sizeof x);
-    for (int k = 0; k < 1 * rigid_body_LANES; ++k) {
-        const double h = rigid_body_fractions[k % 1] * s->h;
+    const double h = s->h;
+    rigid_body_model *at = &models->stage;
+    for (int lane = 0; lane < rigid_body_LANES; ++lane) {
         memcpy(point, x, sizeof x);
         memset(mean, 0, sizeof mean);
         for (int part = 0; part < 4; ++part) {
             rigid_body_vector_field(&s->params, point, slope);
-            for (int i = 0; i < 3; ++i) {
+            for (int i = 0; i < rigid_body_DIM; ++i) {
                 mean[i] += weight[part] * slope[i];
                 point[i] = x[i] + h * reach[part] * slope[i];
             }
         }
-        for (int i = 0; i < 3; ++i) {
-            model[k % 1].y[i][k / 1] = x[i] + 0.5 * h * mean[i];
+        for (int i = 0; i < rigid_body_DIM; ++i) {
+            at->y[i][lane] = x[i] + 0.5 * h * mean[i];
             x[i] += h * mean[i];
         }
     }
-    for (int stage = 0; stage < 1; ++stage) {
-        rigid_body_model *at = &model[stage];
-        rigid_body_evaluate_lanes(table->coef[stage], at->y, at->displacement, at->increment);
-        for (int i = 0; i < 3; ++i) {
-            rigid_body_EACH_LANE
-            for (int lane = 0; lane < rigid_body_LANES; ++lane)
-                at->y[i][lane] -= at->displacement[i][lane] + 0.5 * at->increment[i][lane];
-        }
-    }
+    rigid_body_from_means(table->coef, &models->stage);
 }
 
-/* rigid_body_LANES steps at once: guess the points of all, and correct them together until the error that remains is as
-   small as after a single step. How many passes that took; 0, and the solver as before, where it takes more than most. */
+/* Guess the points of all stages and steps, by recurrences or else by Runge-Kutta steps. 0 if they are not
+   near the state. */
+static int rigid_body_guess(rigid_body_solver *s, rigid_body_table *table, rigid_body_models *models)
+{
+    if (!s->blocks.use_recurrences) rigid_body_march(s, table, models);
+    if (s->blocks.use_recurrences) rigid_body_foresee(&s->history, table->weight, models->stage.y);
+    if (!rigid_body_near_lanes(models->stage.y, s->x)) return 0;
+    return 1;
+}
+
+/* One pass over the points of a stage: correct them by the residuals. The largest correction. */
+static double rigid_body_correct_stage(rigid_body_model *model)
+{
+    rigid_body_lanes sizes;
+    rigid_body_correct(model, sizes);
+    return rigid_body_largest(sizes);
+}
+
+/* Corrections below the first go on with the matrices of the last pass, as its error is then of third order.
+   After the square of so small a correction as the second, there is rounding only, if the next is below the
+   third. */
+#define rigid_body_FROZEN 1e-5
+#define rigid_body_SMALL 1e-8
+#define rigid_body_ROUNDING 1e-10
+
+/* rigid_body_LANES steps at once: guess the points of all, and correct them together until the error that
+   remains is as small as after a single step. How many passes that took; 0, and the solver as before, where
+   it takes more than most. */
 static int rigid_body_block(rigid_body_solver *s, rigid_body_table *table, int most)
 {
-    rigid_body_model model[1];
-    rigid_body_lanes sizes;
-    double x[3], carry[3], previous = HUGE_VAL, bend = 0.0, bound = HUGE_VAL;
+    rigid_body_models models;
+    double x[rigid_body_DIM], carry[rigid_body_DIM], previous = HUGE_VAL, bend = 0.0, bound = HUGE_VAL;
     int passes = 0, solved = 0;
-    if (!s->foreseeing) rigid_body_march(s, table, model);
-    for (int stage = 0; stage < 1; ++stage) {
-        if (s->foreseeing) rigid_body_foresee(&s->memory[stage], table->weight[stage], model[stage].y);
-        if (!rigid_body_near_lanes(model[stage].y, s->x)) return 0;
-    }
+    if (!rigid_body_guess(s, table, &models)) return 0;
     while (!solved) {
         double size = 0.0;
-        const int matrices = previous > 1e-05;
-        for (int stage = 0; stage < 1; ++stage) rigid_body_update(table->coef[stage], &model[stage], matrices);
+        const int matrices = previous > rigid_body_FROZEN;
+        rigid_body_update(table->coef, &models.stage, matrices);
         memcpy(x, s->x, sizeof x);
         memcpy(carry, s->carry, sizeof carry);
-        rigid_body_chain(model, x, carry);
-        for (int stage = 0; stage < 1; ++stage) {
-            rigid_body_correct(&model[stage], sizes);
-            const double largest = rigid_body_largest(sizes);
-            size = largest > size ? largest : size;
-        }
-        s->evaluations += 1 * rigid_body_LANES;
+        rigid_body_chain(&models, x, carry);
+        const double largest = rigid_body_correct_stage(&models.stage);
+        size = largest > size ? largest : size;
+        s->evaluations += rigid_body_LANES;
         bend = matrices ? 0.0 : bend + previous;
         bound = rigid_body_remaining(size, bend, bound);
-        /* The second test: after the square of so small a correction there is rounding only. */
-        solved = bound <= 1e-20 || (previous < 1e-8 && size < 1e-10);
+        solved = bound <= rigid_body_TOLERANCE || (previous < rigid_body_SMALL && size < rigid_body_ROUNDING);
         if ((++passes >= most || !(size < previous)) && !solved) return 0;
         previous = size;
     }
-    for (int stage = 0; stage < 1; ++stage)
-        if (!rigid_body_near_lanes(model[stage].y, s->x)) return 0;
-    for (int i = 0; i < 3; ++i)
+    if (!rigid_body_near_lanes(models.stage.y, s->x)) return 0;
+    for (int i = 0; i < rigid_body_DIM; ++i)
         if (!isfinite(x[i])) return 0;
     memcpy(s->x, x, sizeof x);
     memcpy(s->carry, carry, sizeof carry);
-    s->steps += rigid_body_LANES;
-    for (int stage = 0; stage < 1; ++stage) {
-        rigid_body_memory *memory = &s->memory[stage];
-        rigid_body_record_lanes(memory, model[stage].y);
-        memory->slow = passes > 1 ? memory->slow + rigid_body_LANES : 0;
-        if (memory->slow > memory->patience && s->foreseeing) rigid_body_fit(memory);
-    }
+    rigid_body_count(s, rigid_body_LANES);
+    rigid_body_history *history = &s->history;
+    rigid_body_record_lanes(history, models.stage.y);
+    history->slow_steps = passes > 1 ? history->slow_steps + rigid_body_LANES : 0;
+    if (history->slow_steps > history->slow_steps_allowed && s->blocks.use_recurrences)
+        rigid_body_fit(history);
     return passes;
 }
+
+enum {
+    rigid_body_REPAY_BLOCKS = 4 * rigid_body_REPAY, /* steps that fits for whole blocks are saved in */
+    rigid_body_MOST_SINGLE_STEPS = 1000             /* before blocks are tried again */
+};
 
 /* Recurrences are given up for a while, the longer the more often that happens. */
 static void rigid_body_give_up(rigid_body_solver *s)
 {
-    s->foreseeing = s->setback = s->pause = 0;
-    s->doubt = 2 * s->doubt + 600;
-    s->retry = s->steps + s->doubt;
+    s->blocks.use_recurrences = s->blocks.last_single_steps = s->blocks.single_steps = 0;
+    s->blocks.steps_without_recurrences = 2 * s->blocks.steps_without_recurrences + rigid_body_REPAY_BLOCKS;
+    s->blocks.recurrences_from_step = s->steps + s->blocks.steps_without_recurrences;
+}
+
+/* Fit the recurrence of a stage. Whether it foresees. */
+static int rigid_body_fitted(rigid_body_history *history)
+{
+    rigid_body_fit(history);
+    return history->recurrence_terms > 0;
 }
 
 /* How the next block is guessed: by recurrences, fitted as soon as enough steps are to be made, or
    have been, to repay that. */
 static void rigid_body_choose_guess(rigid_body_solver *s, size_t steps)
 {
-    for (int stage = 0; stage < 1; ++stage)
-        if (s->memory[stage].count < 111) {
-            s->foreseeing = 0;
-            return;
-        }
-    if (s->foreseeing || (steps < 600 && s->steps < 150) || s->steps < s->retry) return;
-    s->foreseeing = 1;
-    for (int stage = 0; stage < 1 && s->foreseeing; ++stage) {
-        rigid_body_fit(&s->memory[stage]);
-        s->foreseeing = s->memory[stage].terms > 0;
+    if (s->history.count < rigid_body_REMEMBERED) {
+        s->blocks.use_recurrences = 0;
+        return;
     }
-    s->pause = rigid_body_LANES;
-    if (!s->foreseeing) rigid_body_give_up(s);
+    if (s->blocks.use_recurrences || s->steps < s->blocks.recurrences_from_step) return;
+    if (steps < rigid_body_REPAY_BLOCKS && s->steps < rigid_body_REPAY) return;
+    s->blocks.use_recurrences = 1;
+    s->blocks.use_recurrences = s->blocks.use_recurrences && rigid_body_fitted(&s->history);
+    s->blocks.single_steps = rigid_body_LANES;
+    if (!s->blocks.use_recurrences) rigid_body_give_up(s);
 }
 
-/* Learn from a block: after one that failed single steps are made, the more the more often that happens. Recurrences
-   that fail repeatedly, or need more passes than steps by Runge-Kutta did, are given up. */
+/* Learn from a block: after one that failed single steps are made, the more the more often that happens.
+   Recurrences that fail repeatedly, or need more passes than steps by Runge-Kutta did, are given up. */
 static void rigid_body_learn_from(rigid_body_solver *s, int passes)
 {
     if (passes > 0) {
-        s->setback /= 2;
+        s->blocks.last_single_steps /= 2;
     } else {
-        s->setback = 2 * s->setback + rigid_body_LANES > 1000 ? 1000 : 2 * s->setback + rigid_body_LANES;
-        s->pause = s->setback;
+        const int longer = 2 * s->blocks.last_single_steps + rigid_body_LANES;
+        s->blocks.last_single_steps = longer > rigid_body_MOST_SINGLE_STEPS ? rigid_body_MOST_SINGLE_STEPS
+            : longer;
+        s->blocks.single_steps = s->blocks.last_single_steps;
     }
-    if (!s->foreseeing) {
-        s->passes = passes > 0 ? passes : INT_MAX;
-    } else if (passes > s->passes || s->setback > 5 * rigid_body_LANES) {
+    if (!s->blocks.use_recurrences) {
+        s->blocks.passes_without_recurrences = passes > 0 ? passes : INT_MAX;
+    } else if (passes > s->blocks.passes_without_recurrences || s->blocks.last_single_steps > 5
+        * rigid_body_LANES) {
         rigid_body_give_up(s);
     }
 }
@@ -1515,26 +1525,28 @@ static rigid_body_status rigid_body_single(rigid_body_solver *s)
 {
     const size_t before = s->evaluations;
     const rigid_body_status status = rigid_body_step(s, s->h);
-    s->effort += 0.125 * ((double)(s->evaluations - before) / 1 - s->effort);
+    const double evaluations = (double)(s->evaluations - before);
+    s->blocks.evaluations_per_stage += 0.125 * (evaluations - s->blocks.evaluations_per_stage);
     return status;
 }
 
-/* Blocks of steps where they cost less than single steps, with at most as many passes over a block as 2 for each
-   evaluation in a single step. The results differ by round-off only. */
+/* Blocks of steps where they cost less than single steps, with at most as many passes over a block as
+   rigid_body_PASSES for each evaluation in a single step. The results differ by round-off only. */
 rigid_body_status rigid_body_integrate(rigid_body_solver *s, double h, size_t steps)
 {
     rigid_body_table table;
     rigid_body_status status = rigid_body_set_step(s, h);
-    for (int stage = 0; stage < 1; ++stage) table.fits[stage] = -1;
+    table.fits = -1;
     while (status == rigid_body_OK && steps > 0) {
-        if (steps >= rigid_body_LANES && s->pause == 0) rigid_body_choose_guess(s, steps);
-        if (steps >= rigid_body_LANES && s->pause == 0) {
+        if (steps >= rigid_body_LANES && s->blocks.single_steps == 0) rigid_body_choose_guess(s, steps);
+        if (steps >= rigid_body_LANES && s->blocks.single_steps == 0) {
             rigid_body_refresh(s, &table);
-            const int passes = rigid_body_block(s, &table, (int)(2 * s->effort + 0.5));
+            const int passes = rigid_body_block(s, &table, (int)(rigid_body_PASSES
+                * s->blocks.evaluations_per_stage + 0.5));
             rigid_body_learn_from(s, passes);
             if (passes > 0) steps -= rigid_body_LANES;
         } else {
-            if (s->pause > 0) --s->pause;
+            if (s->blocks.single_steps > 0) --s->blocks.single_steps;
             status = rigid_body_single(s);
             if (status == rigid_body_OK) --steps;
         }
@@ -1542,38 +1554,49 @@ rigid_body_status rigid_body_integrate(rigid_body_solver *s, double h, size_t st
     return status;
 }
 
+/* ---- Groups of members ---- */
+enum {
+    rigid_body_GROUP = rigid_body_LANES, /* members, one in each lane */
+    rigid_body_FEWEST = 3,               /* fewer members are quicker one by one */
+    /* steps that fits cost: of eight values at once, only one is foreseen */
+    rigid_body_GROUP_REPAY = 200 * rigid_body_DIM,
+    /* steps until recurrences that did not help are fitted again */
+    rigid_body_HOPELESS_WAIT = 100 * rigid_body_REPAY
+};
+
 /* Members of an ensemble, each in its lane. */
 typedef struct {
-    rigid_body_lanes x[3], carry[3], coef[1][35];
-    rigid_body_lanes past[1][111][3]; /* solved values, in a ring */
-    rigid_body_lanes weight[1][40][3]; /* of past values, the latest first, for the next */
-    int latest;     /* the row of the latest values */
-    int count;      /* rows in use */
-    int order[1];   /* how many of them the extrapolation uses */
-    int terms[1];   /* how many of them the recurrences use */
-    int fits;       /* how often recurrences have been fitted */
-    int fitting[1]; /* whether they are the better guess */
-    int slow;       /* how many of the last steps took more than one iteration */
-    int patience;   /* how many of those before recurrences are fitted again */
-    int active[8];  /* whether the lane has a member that has not failed */
-    size_t left[8]; /* steps that are still to be made, where one has */
-    double gauge[8][1]; /* of each member */
+    rigid_body_lanes x[rigid_body_DIM], carry[rigid_body_DIM], coef[rigid_body_COEFFICIENTS];
+    rigid_body_lanes past[rigid_body_REMEMBERED][rigid_body_DIM]; /* solved values, in a ring */
+    /* of past values, the latest first, for the next */
+    rigid_body_lanes weight[rigid_body_WINDOW][rigid_body_DIM];
+    int latest; /* the row of the latest values */
+    int count; /* rows in use */
+    int extrapolation_order; /* how many of them the extrapolation uses */
+    int recurrence_terms; /* how many of them the recurrences use */
+    int use_recurrences; /* whether these are the better guess */
+    int fits; /* how often recurrences have been fitted */
+    int slow_steps; /* how many of the last steps took more than one iteration */
+    int slow_steps_allowed; /* how many of those before recurrences are fitted again */
+    int active[rigid_body_LANES]; /* whether the lane has a member that has not failed */
+    size_t steps_left[rigid_body_LANES]; /* that are still to be made, where one has */
+    double gauge[rigid_body_LANES][rigid_body_GAUGES]; /* of each member */
 } rigid_body_group;
 
 /* The past values of a stage, the latest for k = 0. */
-static rigid_body_lanes *rigid_body_group_past(rigid_body_group *group, int stage, int k)
+static rigid_body_lanes *rigid_body_group_past(rigid_body_group *group, int k)
 {
     const int row = group->latest + k;
-    return group->past[stage][row < 111 ? row : row - 111];
+    return group->past[row < rigid_body_REMEMBERED ? row : row - rigid_body_REMEMBERED];
 }
 
 /* Guess the values of a stage by the recurrences of the members. */
-static void rigid_body_group_foresee(rigid_body_group *group, int stage, rigid_body_lanes y[restrict 3])
+static void rigid_body_group_foresee(rigid_body_group *group, rigid_body_lanes y[restrict rigid_body_DIM])
 {
-    memset(y, 0, 3 * sizeof y[0]);
-    for (int k = 0; k < group->terms[stage]; ++k) {
-        rigid_body_lanes *past = rigid_body_group_past(group, stage, k), *weight = group->weight[stage][k];
-        for (int i = 0; i < 3; ++i) {
+    memset(y, 0, rigid_body_DIM * sizeof y[0]);
+    for (int k = 0; k < group->recurrence_terms; ++k) {
+        rigid_body_lanes *past = rigid_body_group_past(group, k), *weight = group->weight[k];
+        for (int i = 0; i < rigid_body_DIM; ++i) {
             rigid_body_EACH_LANE
             for (int lane = 0; lane < rigid_body_LANES; ++lane) y[i][lane] += weight[i][lane] * past[i][lane];
         }
@@ -1581,16 +1604,16 @@ static void rigid_body_group_foresee(rigid_body_group *group, int stage, rigid_b
 }
 
 /* Extrapolate the values of a stage. */
-static void rigid_body_group_extrapolate(rigid_body_group *group, int stage, rigid_body_lanes y[restrict 3])
+static void rigid_body_group_extrapolate(rigid_body_group *group, rigid_body_lanes y[restrict rigid_body_DIM])
 {
-    const int order = group->order[stage];
+    const int order = group->extrapolation_order;
     double binomial = -1.0;
-    memcpy(y, group->x, 3 * sizeof y[0]);
-    if (order > 0) memset(y, 0, 3 * sizeof y[0]);
+    memcpy(y, group->x, rigid_body_DIM * sizeof y[0]);
+    if (order > 0) memset(y, 0, rigid_body_DIM * sizeof y[0]);
     for (int k = 0; k < order; ++k) {
-        rigid_body_lanes *past = rigid_body_group_past(group, stage, k);
+        rigid_body_lanes *past = rigid_body_group_past(group, k);
         binomial *= -(double)(order - k) / (k + 1);
-        for (int i = 0; i < 3; ++i) {
+        for (int i = 0; i < rigid_body_DIM; ++i) {
             rigid_body_EACH_LANE
             for (int lane = 0; lane < rigid_body_LANES; ++lane) y[i][lane] += binomial * past[i][lane];
         }
@@ -1598,102 +1621,105 @@ static void rigid_body_group_extrapolate(rigid_body_group *group, int stage, rig
 }
 
 /* The sum over members of the absolute values of all components. */
-static double rigid_body_group_sum(const rigid_body_group *group, rigid_body_lanes y[3])
+static double rigid_body_group_sum(const rigid_body_group *group, rigid_body_lanes y[rigid_body_DIM])
 {
     double sum = 0.0;
-    for (int i = 0; i < 3; ++i)
-        for (int lane = 0; lane < rigid_body_LANES; ++lane) sum += group->active[lane] ? fabs(y[i][lane]) : 0.0;
+    for (int i = 0; i < rigid_body_DIM; ++i)
+        for (int lane = 0; lane < rigid_body_LANES; ++lane) sum += group->active[lane] ? fabs(y[i][lane])
+            : 0.0;
     return sum;
 }
 
-static void rigid_body_group_subtract(rigid_body_lanes y[restrict 3], rigid_body_lanes other[restrict 3])
+static void rigid_body_group_subtract(rigid_body_lanes y[restrict rigid_body_DIM],
+    rigid_body_lanes other[restrict rigid_body_DIM])
 {
-    for (int i = 0; i < 3; ++i) {
+    for (int i = 0; i < rigid_body_DIM; ++i) {
         rigid_body_EACH_LANE
         for (int lane = 0; lane < rigid_body_LANES; ++lane) y[i][lane] -= other[i][lane];
     }
 }
 
 /* Choose the guess that would have been best for these values. */
-static void rigid_body_group_judge(rigid_body_group *group, int stage, rigid_body_lanes y[3])
+static void rigid_body_group_judge(rigid_body_group *group, rigid_body_lanes y[rigid_body_DIM])
 {
-    rigid_body_lanes row[8 + 1][3];
-    const int rows = group->count < 8 ? group->count : 8;
+    rigid_body_lanes row[rigid_body_HISTORY + 1][rigid_body_DIM];
+    const int rows = group->count < rigid_body_HISTORY ? group->count : rigid_body_HISTORY;
     double least = HUGE_VAL;
     memcpy(row[0], y, sizeof row[0]);
-    for (int k = 0; k < rows; ++k) memcpy(row[k + 1], rigid_body_group_past(group, stage, k), sizeof row[0]);
-    if (group->order[stage] == 0) group->order[stage] = 1;
+    for (int k = 0; k < rows; ++k) memcpy(row[k + 1], rigid_body_group_past(group, k), sizeof row[0]);
+    if (group->extrapolation_order == 0) group->extrapolation_order = 1;
     for (int order = 1; order <= rows; ++order) { /* row[0] becomes the backward difference of this order */
         for (int k = 0; k <= rows - order; ++k) rigid_body_group_subtract(row[k], row[k + 1]);
         const double size = rigid_body_group_sum(group, row[0]);
         if (size < least) {
             least = size;
-            group->order[stage] = order;
+            group->extrapolation_order = order;
         }
     }
-    if (group->terms[stage] == 0) return;
-    rigid_body_group_foresee(group, stage, row[0]);
+    if (group->recurrence_terms == 0) return;
+    rigid_body_group_foresee(group, row[0]);
     rigid_body_group_subtract(row[0], y);
-    group->fitting[stage] = rigid_body_group_sum(group, row[0]) <= least;
+    group->use_recurrences = rigid_body_group_sum(group, row[0]) <= least;
 }
 
-/* Fit the recurrences of all members; with every time, wait longer before it is done again, and for long if it did not
-   help. */
+/* Fit the recurrences of all members; with every time, wait longer before it is done again, and for long if
+   it did not help. */
 static void rigid_body_group_fit(rigid_body_group *group)
 {
-    rigid_body_memory memory;
-    const int helped = group->fits == 0 || group->fitting[0];
-    memory.count = 111;
-    for (int stage = 0; stage < 1; ++stage) {
-        int found = 1;
-        group->terms[stage] = 0;
-        for (int lane = 0; lane < rigid_body_LANES; ++lane)
-            for (int i = 0; i < 3 && group->active[lane] && found; ++i) {
-                for (int k = 0; k < 111; ++k)
-                    memory.past[111 - 1 - k][i] = rigid_body_group_past(group, stage, k)[i][lane];
-                const int terms = rigid_body_train(&memory, i);
-                found = terms > 0;
-                if (terms > group->terms[stage]) group->terms[stage] = terms;
-                for (int k = 0; k < 40; ++k) group->weight[stage][k][i][lane] = memory.weight[k][i][0];
-            }
-        if (!found) group->terms[stage] = 0;
-        group->fitting[stage] = found;
-    }
+    rigid_body_history member;
+    const int helped = group->fits == 0 || group->use_recurrences;
+    member.count = rigid_body_REMEMBERED;
+    int found = 1;
+    group->recurrence_terms = 0;
+    for (int lane = 0; lane < rigid_body_LANES; ++lane)
+        for (int i = 0; i < rigid_body_DIM && group->active[lane] && found; ++i) {
+            for (int k = 0; k < rigid_body_REMEMBERED; ++k)
+                member.past[rigid_body_REMEMBERED - 1 - k][i] = rigid_body_group_past(group, k)[i][lane];
+            const int terms = rigid_body_train(&member, i);
+            found = terms > 0;
+            if (terms > group->recurrence_terms) group->recurrence_terms = terms;
+            for (int k = 0; k < rigid_body_WINDOW; ++k) group->weight[k][i][lane] = member.weight[k][i][0];
+        }
+    if (!found) group->recurrence_terms = 0;
+    group->use_recurrences = found;
     ++group->fits;
-    group->slow = 0;
-    group->patience = helped && group->patience < 10000 ? 2 * group->patience + 150 : 100 * 150;
+    group->slow_steps = 0;
+    group->slow_steps_allowed = helped && group->slow_steps_allowed < rigid_body_LONG_WAIT / 2 ? 2
+        * group->slow_steps_allowed + rigid_body_REPAY : rigid_body_HOPELESS_WAIT;
 }
 
 /* Replace guesses that are not near the last values, as rigid_body_near has it, by these; lane by lane. */
-static void rigid_body_stay_near(rigid_body_lanes y[restrict 3], rigid_body_lanes last[restrict 3])
+static void rigid_body_stay_near(rigid_body_lanes y[restrict rigid_body_DIM],
+    rigid_body_lanes last[restrict rigid_body_DIM])
 {
     rigid_body_lanes distance = { 0.0 }, size = { 0.0 };
-    for (int i = 0; i < 3; ++i) {
+    for (int i = 0; i < rigid_body_DIM; ++i) {
         rigid_body_EACH_LANE
         for (int lane = 0; lane < rigid_body_LANES; ++lane) {
             distance[lane] += fabs(y[i][lane] - last[i][lane]);
             size[lane] += fabs(last[i][lane]);
         }
     }
-    for (int i = 0; i < 3; ++i) {
+    for (int i = 0; i < rigid_body_DIM; ++i) {
         rigid_body_EACH_LANE
         for (int lane = 0; lane < rigid_body_LANES; ++lane)
-            y[i][lane] = distance[lane] <= 4.0 * size[lane] ? y[i][lane] : last[i][lane];
+            y[i][lane] = distance[lane] <= rigid_body_REACH * size[lane] ? y[i][lane] : last[i][lane];
     }
 }
 
-/* Whether lanes are still to be solved after a correction of this size; those where nothing is finite leave the group.
-   bound is what remains in each lane. */
-static int rigid_body_group_open(rigid_body_group *group, const rigid_body_lanes size, const rigid_body_lanes previous,
-    double bend, rigid_body_lanes bound)
+/* Whether lanes are still to be solved after a correction of this size; those where nothing is finite leave
+   the group. bound is what remains in each lane. */
+static int rigid_body_group_open(rigid_body_group *group, const rigid_body_lanes size,
+    const rigid_body_lanes previous, double bend, rigid_body_lanes bound)
 {
     int open = 0;
     rigid_body_EACH_LANE
     for (int lane = 0; lane < rigid_body_LANES; ++lane)
         bound[lane] = rigid_body_remaining(size[lane], bend, bound[lane]);
-    if (rigid_body_largest(bound) <= 1e-20) return 0;
+    if (rigid_body_largest(bound) <= rigid_body_TOLERANCE) return 0;
     for (int lane = 0; lane < rigid_body_LANES; ++lane) {
-        const int solved = bound[lane] <= 1e-20 || (previous[lane] < 1e-8 && size[lane] < 1e-10);
+        const int solved = bound[lane] <= rigid_body_TOLERANCE || (previous[lane] < rigid_body_SMALL
+            && size[lane] < rigid_body_ROUNDING);
         if (!isfinite(size[lane])) group->active[lane] = 0;
         open += group->active[lane] && !solved;
     }
@@ -1701,88 +1727,92 @@ static int rigid_body_group_open(rigid_body_group *group, const rigid_body_lanes
 }
 
 /* The guess for a stage: recurrences, or extrapolation; the state for members where that is not near. */
-static void rigid_body_group_predict(rigid_body_group *group, int stage, rigid_body_lanes y[3])
+static void rigid_body_group_predict(rigid_body_group *group, rigid_body_lanes y[rigid_body_DIM])
 {
-    if (group->fitting[stage]) rigid_body_group_foresee(group, stage, y);
-    else rigid_body_group_extrapolate(group, stage, y);
+    if (group->use_recurrences) rigid_body_group_foresee(group, y);
+    else rigid_body_group_extrapolate(group, y);
     rigid_body_stay_near(y, group->x);
 }
 
-/* Newton's method for a stage, until the slowest lane is solved. The number of iterations; where that is the most
-   allowed, lanes that are not solved leave the group. */
-static int rigid_body_group_solve(rigid_body_group *group, int stage, rigid_body_model *model)
+/* Newton's method for a stage, until the slowest lane is solved. The number of iterations; where that is the
+   most allowed, lanes that are not solved leave the group. */
+static int rigid_body_group_solve(rigid_body_group *group, rigid_body_model *model)
 {
     rigid_body_lanes size, previous, bound;
     double largest = HUGE_VAL, bend = 0.0;
     int iterations = 0, open = 1;
     for (int lane = 0; lane < rigid_body_LANES; ++lane) size[lane] = bound[lane] = HUGE_VAL;
-    rigid_body_group_predict(group, stage, model->y);
-    for (; open > 0 && iterations < 20; ++iterations) {
+    rigid_body_group_predict(group, model->y);
+    for (; open > 0 && iterations < rigid_body_MAX_ITERATIONS; ++iterations) {
         memcpy(previous, size, sizeof size);
-        rigid_body_update(group->coef[stage], model, largest > 1e-05);
-        bend = largest > 1e-05 ? 0.0 : bend + largest;
-        for (int i = 0; i < 3; ++i) {
+        rigid_body_update(group->coef, model, largest > rigid_body_FROZEN);
+        bend = largest > rigid_body_FROZEN ? 0.0 : bend + largest;
+        for (int i = 0; i < rigid_body_DIM; ++i) {
             rigid_body_EACH_LANE
             for (int lane = 0; lane < rigid_body_LANES; ++lane)
                 model->residual[i][lane] =
-                    ((model->y[i][lane] - group->x[i][lane]) + model->displacement[i][lane]) - group->carry[i][lane];
+                    ((model->y[i][lane] - group->x[i][lane]) + model->displacement[i][lane])
+                        - group->carry[i][lane];
         }
         rigid_body_correct(model, size);
         open = rigid_body_group_open(group, size, previous, bend, bound);
         largest = rigid_body_largest(size);
     }
     for (int lane = 0; lane < rigid_body_LANES && open > 0; ++lane)
-        group->active[lane] = group->active[lane] && bound[lane] <= 1e-20;
+        group->active[lane] = group->active[lane] && bound[lane] <= rigid_body_TOLERANCE;
     return iterations;
 }
 
 /* Add the increments, corrected to first order, in compensated arithmetic as for a single step. */
-static void rigid_body_group_advance(rigid_body_lanes x[restrict 3], rigid_body_lanes carry[restrict 3],
-    rigid_body_model *model)
+static void rigid_body_group_advance(rigid_body_lanes x[restrict rigid_body_DIM],
+    rigid_body_lanes carry[restrict rigid_body_DIM], rigid_body_model *model)
 {
-    for (int i = 0; i < 3; ++i)
-        for (int j = 0; j < 3; ++j) {
+    for (int i = 0; i < rigid_body_DIM; ++i)
+        for (int j = 0; j < rigid_body_DIM; ++j) {
             rigid_body_EACH_LANE
             for (int lane = 0; lane < rigid_body_LANES; ++lane)
-                carry[i][lane] -= model->gain[i * 3 + j][lane] * model->residual[j][lane];
+                carry[i][lane] -= model->gain[i * rigid_body_DIM + j][lane] * model->residual[j][lane];
         }
-    for (int i = 0; i < 3; ++i) {
+    for (int i = 0; i < rigid_body_DIM; ++i) {
         rigid_body_EACH_LANE
         for (int lane = 0; lane < rigid_body_LANES; ++lane) {
-            const double change = model->increment[i][lane], sum = x[i][lane] + change, added = sum - x[i][lane];
-            const double small = ((x[i][lane] - (sum - added)) + (change - added)) + carry[i][lane];
+            const double change = model->increment[i][lane], sum = x[i][lane] + change, added = sum
+                - x[i][lane];
+            const double lost = (x[i][lane] - (sum - added)) + (change - added);
+            const double small = lost + carry[i][lane];
             x[i][lane] = sum + small;
             carry[i][lane] = small - (x[i][lane] - sum);
         }
     }
 }
 
-/* Members that failed, or whose state is not near the one before the step or not finite, keep that one, and leave. How many
-   stay. */
-static int rigid_body_group_leave(rigid_body_group *group, rigid_body_lanes x[3], rigid_body_lanes carry[3],
-    size_t remaining)
+/* Members that failed, or whose state is not near the one before the step or not finite, keep that one, and
+   leave. How many stay. */
+static int rigid_body_group_leave(rigid_body_group *group, rigid_body_lanes x[rigid_body_DIM],
+    rigid_body_lanes carry[rigid_body_DIM], size_t remaining)
 {
     rigid_body_lanes moved = { 0.0 }, size = { 0.0 }, bad;
     int active = 0;
-    for (int i = 0; i < 3; ++i) {
+    for (int i = 0; i < rigid_body_DIM; ++i) {
         rigid_body_EACH_LANE
         for (int lane = 0; lane < rigid_body_LANES; ++lane) {
             moved[lane] += fabs(group->x[i][lane] - x[i][lane]);
             size[lane] += fabs(x[i][lane]);
         }
     }
-    for (int lane = 0; lane < rigid_body_LANES; ++lane) bad[lane] = moved[lane] <= 4.0 * size[lane] ? 0.0 : 1.0;
+    for (int lane = 0; lane < rigid_body_LANES; ++lane)
+        bad[lane] = moved[lane] <= rigid_body_REACH * size[lane] ? 0.0 : 1.0;
     for (int lane = 0; lane < rigid_body_LANES; ++lane) active += group->active[lane];
     if (active == rigid_body_LANES && !(rigid_body_largest(bad) > 0.0)) return active;
     active = 0;
     for (int lane = 0; lane < rigid_body_LANES; ++lane) {
         group->active[lane] = group->active[lane] && !(bad[lane] > 0.0);
         active += group->active[lane];
-        for (int i = 0; i < 3 && !group->active[lane]; ++i) {
+        for (int i = 0; i < rigid_body_DIM && !group->active[lane]; ++i) {
             group->x[i][lane] = x[i][lane];
             group->carry[i][lane] = carry[i][lane];
         }
-        if (!group->active[lane] && group->left[lane] == 0) group->left[lane] = remaining;
+        if (!group->active[lane] && group->steps_left[lane] == 0) group->steps_left[lane] = remaining;
     }
     return active;
 }
@@ -1790,78 +1820,78 @@ static int rigid_body_group_leave(rigid_body_group *group, rigid_body_lanes x[3]
 /* One step of all members, of as many as remain. How many members are left. */
 static int rigid_body_group_step(rigid_body_group *group, size_t remaining)
 {
-    rigid_body_lanes x[3], carry[3];
+    rigid_body_lanes x[rigid_body_DIM], carry[rigid_body_DIM];
     rigid_body_model model;
-    const int next = (group->latest > 0 ? group->latest : 111) - 1;
+    const int next = (group->latest > 0 ? group->latest : rigid_body_REMEMBERED) - 1;
     int most = 0;
     memcpy(x, group->x, sizeof x);
     memcpy(carry, group->carry, sizeof carry);
-    for (int stage = 0; stage < 1; ++stage) {
-        const int iterations = rigid_body_group_solve(group, stage, &model);
-        rigid_body_group_advance(group->x, group->carry, &model);
-        if (iterations > most) most = iterations;
-        if ((iterations > 1 && next % 8 == 0) || group->count < 8)
-            rigid_body_group_judge(group, stage, model.y);
-        memcpy(group->past[stage][next], model.y, sizeof model.y);
-    }
+    const int iterations = rigid_body_group_solve(group, &model);
+    rigid_body_group_advance(group->x, group->carry, &model);
+    if (iterations > most) most = iterations;
+    if ((iterations > 1 && next % rigid_body_HISTORY == 0) || group->count < rigid_body_HISTORY)
+        rigid_body_group_judge(group, model.y);
+    memcpy(group->past[next], model.y, sizeof model.y);
     group->latest = next;
-    if (group->count < 111) ++group->count;
-    group->slow = most > 1 ? group->slow + 1 : 0;
-    if (group->slow > group->patience && group->count == 111 && remaining >= 600)
+    if (group->count < rigid_body_REMEMBERED) ++group->count;
+    group->slow_steps = most > 1 ? group->slow_steps + 1 : 0;
+    if (group->slow_steps > group->slow_steps_allowed && group->count == rigid_body_REMEMBERED && remaining >=
+        rigid_body_GROUP_REPAY)
         rigid_body_group_fit(group);
     return rigid_body_group_leave(group, x, carry, remaining);
 }
 
 /* Put a member into a lane: its state, and its coefficients. */
-static rigid_body_status rigid_body_group_join(rigid_body_group *group, int lane, const rigid_body_params *params,
-    const double x0[3], double h)
+static rigid_body_status rigid_body_group_join(rigid_body_group *group, int lane,
+    const rigid_body_params *params, const double x0[rigid_body_DIM], double h)
 {
     rigid_body_solver s;
     rigid_body_status status = rigid_body_init(&s, params, x0);
     if (status == rigid_body_OK) status = rigid_body_set_step(&s, h);
     if (status != rigid_body_OK) return status;
-    for (int i = 0; i < 3; ++i) group->x[i][lane] = s.x[i];
-    for (int stage = 0; stage < 1; ++stage)
-        for (int k = 0; k < 35; ++k) group->coef[stage][k][lane] = s.coef[stage][k];
+    for (int i = 0; i < rigid_body_DIM; ++i) group->x[i][lane] = s.x[i];
+    for (int k = 0; k < rigid_body_COEFFICIENTS; ++k) group->coef[k][lane] = s.coef[k];
     memcpy(group->gauge[lane], s.gauge, sizeof s.gauge);
     group->active[lane] = 1;
     return status;
 }
 
 /* The steps that a member has still to make after it left the group, by itself. */
-static rigid_body_status rigid_body_group_finish(const rigid_body_group *group, int lane, const rigid_body_params *params,
-    double x[3], double h)
+static rigid_body_status rigid_body_group_finish(const rigid_body_group *group, int lane,
+    const rigid_body_params *params, double x[rigid_body_DIM], double h)
 {
     rigid_body_solver s;
     rigid_body_status status = rigid_body_init_gauge(&s, params, x, group->gauge[lane]);
     if (status != rigid_body_OK) return status;
-    for (int i = 0; i < 3; ++i) s.carry[i] = group->carry[i][lane];
-    status = rigid_body_integrate(&s, h, group->left[lane]);
+    for (int i = 0; i < rigid_body_DIM; ++i) s.carry[i] = group->carry[i][lane];
+    status = rigid_body_integrate(&s, h, group->steps_left[lane]);
     memcpy(x, s.x, sizeof s.x);
     return status;
 }
 
 /* The members from first on, as many as there are lanes. The first status that is not OK. */
-static rigid_body_status rigid_body_group_run(const rigid_body_params *params, double *x, size_t members, size_t first,
-    double h, size_t steps, unsigned char *status)
+static rigid_body_status rigid_body_group_run(const rigid_body_params *params, double *x, size_t members,
+    size_t first, double h, size_t steps, unsigned char *status)
 {
     rigid_body_group group;
-    rigid_body_status worst = rigid_body_OK, member[8];
+    rigid_body_status worst = rigid_body_OK, member[rigid_body_LANES];
     const int count = members - first < rigid_body_LANES ? (int)(members - first) : rigid_body_LANES;
-    double state[3];
+    double state[rigid_body_DIM];
     size_t left = steps;
     memset(&group, 0, sizeof group);
     for (int lane = 0; lane < count; ++lane) {
-        for (size_t i = 0; i < 3; ++i) state[i] = x[i * members + first + (size_t)lane];
+        for (size_t i = 0; i < rigid_body_DIM; ++i) state[i] = x[i * members + first + (size_t)lane];
         member[lane] = rigid_body_group_join(&group, lane, params, state, h);
     }
-    for (int active = count; left > 0 && active > 2; --left) active = rigid_body_group_step(&group, left);
+    for (int active = count; left > 0 && active >= rigid_body_FEWEST; --left)
+        active = rigid_body_group_step(&group, left);
     for (int lane = 0; lane < count; ++lane) {
-        if (group.active[lane]) group.left[lane] = left;
-        for (int i = 0; i < 3; ++i) state[i] = group.x[i][lane];
+        if (group.active[lane]) group.steps_left[lane] = left;
+        for (int i = 0; i < rigid_body_DIM; ++i) state[i] = group.x[i][lane];
         if (member[lane] == rigid_body_OK) {
-            if (group.left[lane] > 0) member[lane] = rigid_body_group_finish(&group, lane, params, state, h);
-            for (size_t i = 0; i < 3; ++i) x[i * members + first + (size_t)lane] = state[i];
+            if (group.steps_left[lane] > 0)
+                member[lane] = rigid_body_group_finish(&group, lane, params, state, h);
+            for (size_t i = 0; i < rigid_body_DIM; ++i) x[i * members + first + (size_t)lane] = state[i];
         }
         if (status != NULL) status[first + (size_t)lane] = (unsigned char)member[lane];
         if (worst == rigid_body_OK) worst = member[lane];
@@ -1869,8 +1899,9 @@ static rigid_body_status rigid_body_group_run(const rigid_body_params *params, d
     return worst;
 }
 
+/* ---- Ensembles ---- */
 rigid_body_status rigid_body_ensemble(const rigid_body_params *params, double *x, size_t members, double h,
-                                      size_t steps, unsigned char *status)
+    size_t steps, unsigned char *status)
 {
     rigid_body_status worst = isfinite(h) ? rigid_body_OK : rigid_body_BAD_ARGUMENT;
     const rigid_body_params own = params != NULL ? *params : rigid_body_default_params;
@@ -1879,7 +1910,7 @@ rigid_body_status rigid_body_ensemble(const rigid_body_params *params, double *x
 #ifdef _OPENMP
 #pragma omp parallel for schedule(dynamic)
 #endif
-    for (size_t first = 0; first < members; first += rigid_body_LANES) {
+    for (size_t first = 0; first < members; first += rigid_body_GROUP) {
         const rigid_body_status group = rigid_body_group_run(&own, x, members, first, h, steps, status);
         if (group == rigid_body_OK) continue;
 #ifdef _OPENMP
@@ -1896,74 +1927,3 @@ rigid_body_status rigid_body_ensemble(const rigid_body_params *params, double *x
 #if defined(__clang__)
 #pragma clang diagnostic pop
 #endif
-
-/* the Hamiltonian */
-static void rigid_body_energy(const rigid_body_params *params, const double x[3], double energy[restrict 1])
-{
-    const double x1 = x[0];
-    const double x2 = x[1];
-    const double x3 = x[2];
-    energy[0] = 0.5 * (x3 * x3 / params->I3 + (x2 * x2 / params->I2 + x1 * x1 / params->I1));
-}
-
-/* the Casimirs */
-static void rigid_body_casimir_values(const rigid_body_params *params, const double x[3],
-                                      double out[restrict 1])
-{
-    (void)params;
-    const double x1 = x[0];
-    const double x2 = x[1];
-    const double x3 = x[2];
-    out[0] = x3 * x3 + (x2 * x2 + x1 * x1);
-}
-
-/* pi(x) grad H(x) */
-static void rigid_body_field(const rigid_body_params *params, const double x[3], double out[restrict 3])
-{
-    const double x1 = x[0];
-    const double x2 = x[1];
-    const double x3 = x[2];
-    const double t1 = x3 / params->I3;
-    const double t2 = x2 / params->I2;
-    const double t3 = x1 / params->I1;
-    out[0] = x2 * t1 - x3 * t2;
-    out[1] = x3 * t3 - x1 * t1;
-    out[2] = x1 * t2 - x2 * t3;
-}
-
-double rigid_body_hamiltonian(const rigid_body_params *params, const double x[3])
-{
-    double energy[1];
-    rigid_body_energy(params != NULL ? params : &rigid_body_default_params, x, energy);
-    return energy[0];
-}
-
-void rigid_body_casimirs(const rigid_body_params *params, const double x[3], double out[])
-{
-    double value[1]; /* out may overlap x */
-    rigid_body_casimir_values(params != NULL ? params : &rigid_body_default_params, x, value);
-    for (int i = 0; i < 1; ++i) out[i] = value[i];
-}
-
-void rigid_body_vector_field(const rigid_body_params *params, const double x[3], double out[3])
-{
-    double value[3];
-    rigid_body_field(params != NULL ? params : &rigid_body_default_params, x, value);
-    memcpy(out, value, sizeof value);
-}
-
-const char *rigid_body_status_string(rigid_body_status status)
-{
-    switch (status) {
-    case rigid_body_OK: return "ok";
-    case rigid_body_NO_CONVERGENCE: return "no convergence: the step is too large";
-    case rigid_body_SINGULAR: return "singular Newton matrix: the step is too large";
-    case rigid_body_NOT_FINITE: return "not finite: overflow, or outside the domain";
-    case rigid_body_BAD_ARGUMENT: return "bad argument: a null pointer, or values that are not allowed";
-    }
-    return "unknown status";
-}
-
-size_t rigid_body_solver_size(void) { return sizeof(rigid_body_solver); }
-
-size_t rigid_body_solver_steps_done(const rigid_body_solver *s) { return s->steps; }

@@ -8,66 +8,60 @@
  *   step: implicit, Newton iteration with the analytic matrix
  *   one Newton iteration: 98 additions, 176 multiplications, 2 functions
  *
- * spec: rigid_body_dual, sha256 0e11b9097280029b8ba1ccfb15ded1fd61460b8002163aceea086ead92ecf619
+ * spec: rigid_body_dual, sha256 e8342777c4b6b547dcc62fa6d2e3aaf07e52570aa2174b60c461d6c56ed43f1b
  * to regenerate: phigen build rigid_body_dual
  * DO NOT EDIT: change the spec and regenerate; edits are noticed by the checksum below.
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 4ef340116760e9e398f76ebc0565eae1590eb5b706905269b058169ced8acfe9
+ *
+ *   1. The model
+ *   2. Compensated sums, linear equations
+ *   3. Starting guesses
+ *   4. The implicit step, by Newton's method
+ *   5. The choice of the gauge: multiples of Casimirs taken from H
+ *   6. The solver
+ *   7. Ensembles
+ * body-sha256: ead10cd5a5cf48af97429a0e0942d9ade63eba3120541ec1e9f938b71af42a77
  */
 #include "rigid_body_dual.h"
 
 #include <float.h>
-#include <limits.h>
 #include <math.h>
-#include <stdint.h>
 #include <string.h>
 
+/* ---- The model ---- */
 const rigid_body_dual_params rigid_body_dual_default_params = { 2.0, 1.0, 0.6666666666666666 };
 
-/* A step of size h is the composition of these fractions of it. */
-static const double rigid_body_dual_fractions[1] = { 1.0 };
+enum { rigid_body_dual_MAX_ITERATIONS = 20 }; /* of an inner solve */
+
+/* A correction is accepted when the error that it leaves is estimated to be below this. */
+#define rigid_body_dual_TOLERANCE 1e-20
+
+/* Whether all parameters are finite, and positive where they have to be. */
+static int rigid_body_dual_allowed(const rigid_body_dual_params *params)
+{
+    return isfinite(params->I1) && params->I1 > 0.0 && isfinite(params->I2) && params->I2 > 0.0
+        && isfinite(params->I3) && params->I3 > 0.0;
+}
 
 /* (1 - w cot w)/s with w = sqrt(s)/2, coth for negative s: the function of the exponential bi-realisation. */
 static double rigid_body_dual_phi0(double s)
 {
-    if (fabs(s) < 0.25) {
-        double sum = 8.586062056277845e-15;
-        sum = sum * s + 3.3896802963225827e-13;
-        sum = sum * s + 1.3382536530684679e-11;
-        sum = sum * s + 5.284190138687493e-10;
-        sum = sum * s + 2.08767569878681e-08;
-        sum = sum * s + 8.267195767195768e-07;
-        sum = sum * s + 3.306878306878307e-05;
-        sum = sum * s + 0.001388888888888889;
-        sum = sum * s + 0.08333333333333333;
-        return sum;
-    }
+    if (fabs(s) < 0.25)
+        return (0.08333333333333333 + s * (0.001388888888888889 + s * (3.306878306878307e-05 + s *
+            (8.267195767195768e-07 + s * (2.08767569878681e-08 + s * (5.284190138687493e-10 + s *
+            (1.3382536530684679e-11 + s * (3.3896802963225827e-13 + s * 8.586062056277845e-15))))))));
     if (fabs(s) < 16.0) {
         const double pole = 1.0 / (39.47841760435743 - s);
-        double sum = 1.3621211117593843e-46;
-        sum = sum * s + 2.1509755511832569e-44;
-        sum = sum * s + 3.3966848266497805e-42;
-        sum = sum * s + 5.363831046655698e-40;
-        sum = sum * s + 8.470227328650247e-38;
-        sum = sum * s + 1.3375664093215244e-35;
-        sum = sum * s + 2.1122063323183885e-33;
-        sum = sum * s + 3.3354842988221443e-31;
-        sum = sum * s + 5.267262996834231e-29;
-        sum = sum * s + 8.318003195189264e-27;
-        sum = sum * s + 1.3136241807166534e-24;
-        sum = sum * s + 2.0747401878593604e-22;
-        sum = sum * s + 3.277539174701792e-20;
-        sum = sum * s + 5.180118196169724e-18;
-        sum = sum * s + 8.196052055691008e-16;
-        sum = sum * s + 1.3000482138698975e-13;
-        sum = sum * s + 2.0742872904166045e-11;
-        sum = sum * s + 3.357141926657451e-09;
-        sum = sum * s + 5.637370282876845e-07;
-        sum = sum * s + 0.000105641107053347;
-        sum = sum * s + 0.03267274151216445;
-        return 2.0 * pole + sum;
+        return 2.0 * pole + (0.03267274151216445 + s * (0.000105641107053347 + s * (5.637370282876845e-07
+            + s * (3.357141926657451e-09 + s * (2.0742872904166045e-11 + s * (1.3000482138698975e-13 + s *
+            (8.196052055691008e-16 + s * (5.180118196169724e-18 + s * (3.277539174701792e-20 + s *
+            (2.0747401878593604e-22 + s * (1.3136241807166534e-24 + s * (8.318003195189264e-27 + s *
+            (5.267262996834231e-29 + s * (3.3354842988221443e-31 + s * (2.1122063323183885e-33 + s *
+            (1.3375664093215244e-35 + s * (8.470227328650247e-38 + s * (5.363831046655698e-40 + s *
+            (3.3966848266497805e-42 + s * (2.1509755511832569e-44 + s *
+            1.3621211117593843e-46))))))))))))))))))));
     }
     const double w = 0.5 * sqrt(fabs(s)), c = w / (s > 0.0 ? tan(w) : tanh(w));
     const double phi0 = (1.0 - c) / s;
@@ -77,42 +71,20 @@ static double rigid_body_dual_phi0(double s)
 /* The derivative of (1 - w cot w)/s, w = sqrt(s)/2. */
 static double rigid_body_dual_phi1(double s)
 {
-    if (fabs(s) < 0.25) {
-        double sum = 1.9573818287022555e-15;
-        sum = sum * s + 6.868849645022276e-14;
-        sum = sum * s + 2.372776207425808e-12;
-        sum = sum * s + 8.029521918410807e-11;
-        sum = sum * s + 2.6420950693437467e-09;
-        sum = sum * s + 8.35070279514724e-08;
-        sum = sum * s + 2.48015873015873e-06;
-        sum = sum * s + 6.613756613756614e-05;
-        sum = sum * s + 0.001388888888888889;
-        return sum;
-    }
+    if (fabs(s) < 0.25)
+        return (0.001388888888888889 + s * (6.613756613756614e-05 + s * (2.48015873015873e-06 + s *
+            (8.35070279514724e-08 + s * (2.6420950693437467e-09 + s * (8.029521918410807e-11 + s *
+            (2.372776207425808e-12 + s * (6.868849645022276e-14 + s * 1.9573818287022555e-15))))))));
     if (fabs(s) < 16.0) {
         const double pole = 1.0 / (39.47841760435743 - s);
-        double sum = 1.8114038279637677e-47;
-        sum = sum * s + 2.7242422235187686e-45;
-        sum = sum * s + 4.0868535472481875e-43;
-        sum = sum * s + 6.114032687969605e-41;
-        sum = sum * s + 9.118512779314688e-39;
-        sum = sum * s + 1.3552363725840395e-36;
-        sum = sum * s + 2.0063496139822866e-34;
-        sum = sum * s + 2.957088865245744e-32;
-        sum = sum * s + 4.336129588468787e-30;
-        sum = sum * s + 6.320715596201077e-28;
-        sum = sum * s + 9.149803514708191e-26;
-        sum = sum * s + 1.3136241807166533e-23;
-        sum = sum * s + 1.8672661690734246e-21;
-        sum = sum * s + 2.6220313397614337e-19;
-        sum = sum * s + 3.626082737318807e-17;
-        sum = sum * s + 4.917631233414605e-15;
-        sum = sum * s + 6.500241069349487e-13;
-        sum = sum * s + 8.297149161666418e-11;
-        sum = sum * s + 1.0071425779972354e-08;
-        sum = sum * s + 1.127474056575369e-06;
-        sum = sum * s + 0.000105641107053347;
-        return 2.0 * pole * pole + sum;
+        return 2.0 * pole * pole + (0.000105641107053347 + s * (1.127474056575369e-06 + s *
+            (1.0071425779972354e-08 + s * (8.297149161666418e-11 + s * (6.500241069349487e-13 + s *
+            (4.917631233414605e-15 + s * (3.626082737318807e-17 + s * (2.6220313397614337e-19 + s *
+            (1.8672661690734246e-21 + s * (1.3136241807166533e-23 + s * (9.149803514708191e-26 + s *
+            (6.320715596201077e-28 + s * (4.336129588468787e-30 + s * (2.957088865245744e-32 + s *
+            (2.0063496139822866e-34 + s * (1.3552363725840395e-36 + s * (9.118512779314688e-39 + s *
+            (6.114032687969605e-41 + s * (4.0868535472481875e-43 + s * (2.7242422235187686e-45 + s *
+            1.8114038279637677e-47))))))))))))))))))));
     }
     const double w = 0.5 * sqrt(fabs(s)), c = w / (s > 0.0 ? tan(w) : tanh(w));
     const double phi0 = (1.0 - c) / s;
@@ -122,21 +94,13 @@ static double rigid_body_dual_phi1(double s)
 
 /* everything that depends on parameters and step size only */
 static void rigid_body_dual_prepare(const rigid_body_dual_params *params, const double gauge[1], double h,
-                                    double coef[restrict 12])
+    double coef[restrict 12])
 {
-    const double t1 = 1.0 / params->I1;
-    const double t2 = gauge[0] * t1;
-    const double t3 = h * (h * h);
-    const double t4 = 1.0 / params->I3;
-    const double t5 = t4 * t4;
-    const double t6 = 1.0 / params->I2;
-    const double t7 = gauge[0] * t6;
-    const double t8 = 1.0 / 12.0 * t4;
-    const double t9 = 1.0 / 24.0 * t1;
-    const double t10 = t8 - t9;
+    const double t1 = 1.0 / params->I1, t2 = gauge[0] * t1, t3 = h * (h * h), t4 = 1.0 / params->I3;
+    const double t5 = t4 * t4, t6 = 1.0 / params->I2, t7 = gauge[0] * t6, t8 = 1.0 / 12.0 * t4;
+    const double t9 = 1.0 / 24.0 * t1, t10 = t8 - t9;
     const double t11 = t3 * (t5 * (-1.0 / 24.0 - 1.0 / 24.0 * t7) + t1 * (t10 + gauge[0] * (t6 * t10)));
-    const double t12 = gauge[0] * t4;
-    const double t13 = 1.0 / 12.0 * t6 - t9;
+    const double t12 = gauge[0] * t4, t13 = 1.0 / 12.0 * t6 - t9;
     const double t14 = t3 * (t6 * t6 * (-1.0 / 24.0 - 1.0 / 24.0 * t12) + t1 * (t13 + gauge[0] * (t4 * t13)));
     const double t15 = t8 - 1.0 / 24.0 * t6;
     const double t16 = t3 * (t5 * (-1.0 / 24.0 - 1.0 / 24.0 * t2) + t6 * (t15 + gauge[0] * (t1 * t15)));
@@ -157,368 +121,162 @@ static void rigid_body_dual_prepare(const rigid_body_dual_params *params, const 
 /* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
    increment, all with the momenta p = grad S_h(y) */
 static void rigid_body_dual_linearise(const double coef[12], const double y[3],
-                                      double displacement[restrict 3], double increment[restrict 3],
-                                      double jacobian[restrict 9], double increment_jacobian[restrict 9])
+    double displacement[restrict 3], double increment[restrict 3], double jacobian[restrict 9],
+    double increment_jacobian[restrict 9])
 {
-    const double x1 = y[0];
-    const double x2 = y[1];
-    const double x3 = y[2];
-    const double t1 = x2 * x2;
-    const double t2 = x1 * x1;
-    const double t3 = coef[4] * t1 + (coef[5] + coef[1] * t2);
+    const double x1 = y[0], x2 = y[1], x3 = y[2];
+    /* momenta */
+    const double t1 = x2 * x2, t2 = x1 * x1, t3 = coef[4] * t1 + (coef[5] + coef[1] * t2);
     const double p_x3 = x3 * t3;
-    const double t4 = coef[9] * p_x3;
-    const double t5 = x3 * x3;
-    const double t6 = coef[1] * t5 + (coef[0] + coef[2] * t1);
-    const double p_x1 = x1 * t6;
-    const double t7 = coef[10] * p_x1;
-    const double t8 = coef[11] * p_x3;
-    const double t9 = x3 * t7 - x1 * t8;
-    const double t10 = coef[4] * t5 + (coef[3] + coef[2] * t2);
-    const double p_x2 = x2 * t10;
-    const double t11 = coef[10] * p_x2;
-    const double t12 = coef[11] * p_x2;
-    const double t13 = coef[9] * p_x1;
-    const double t14 = x1 * t12 - x2 * t13;
-    const double t15 = t4 * t9 - t11 * t14;
-    const double t16 = coef[11] * (coef[10] * (p_x2 * p_x2)) + coef[9] * (coef[10] * (p_x1 * p_x1) + coef[11] * (p_x3 * p_x3));
-    const double t17 = rigid_body_dual_phi0(t16);
-    const double t18 = coef[9] * x2;
-    const double t19 = coef[10] * x3;
-    const double t20 = t18 * p_x3 - t19 * p_x2;
-    const double t21 = x2 * t4 - x3 * t11;
-    const double t22 = t7 * t14 - t8 * t21;
-    const double t23 = coef[11] * x1;
-    const double t24 = t19 * p_x1 - t23 * p_x3;
-    const double t25 = t12 * t21 - t13 * t9;
+    const double t4 = x3 * x3, t5 = coef[1] * t4 + (coef[0] + coef[2] * t1);
+    const double p_x1 = x1 * t5;
+    const double t6 = coef[4] * t4 + (coef[3] + coef[2] * t2);
+    const double p_x2 = x2 * t6;
+    /* displacement */
+    const double t7 = coef[9] * p_x3, t8 = coef[10] * p_x1, t9 = coef[11] * p_x3;
+    const double t10 = x3 * t8 - x1 * t9, t11 = coef[10] * p_x2, t12 = coef[11] * p_x2;
+    const double t13 = coef[9] * p_x1, t14 = x1 * t12 - x2 * t13, t15 = t7 * t10 - t11 * t14;
+    const double t16 = coef[11] * (coef[10] * (p_x2 * p_x2)) + coef[9] * (coef[10] * (p_x1 * p_x1) + coef[11]
+        * (p_x3 * p_x3));
+    const double t17 = rigid_body_dual_phi0(t16), t18 = coef[9] * x2, t19 = coef[10] * x3;
+    const double t20 = t18 * p_x3 - t19 * p_x2, t21 = x2 * t7 - x3 * t11, t22 = t8 * t14 - t9 * t21;
+    const double t23 = coef[11] * x1, t24 = t19 * p_x1 - t23 * p_x3, t25 = t12 * t21 - t13 * t10;
     const double t26 = t23 * p_x2 - t18 * p_x1;
-    const double t27 = coef[7] * (x1 * x3);
-    const double t28 = coef[9] * t9;
-    const double t29 = rigid_body_dual_phi1(t16);
-    const double t30 = coef[9] * t8 * t29;
-    const double t31 = 0.5 * t18;
-    const double t32 = (t28 - t23 * t4) * t17 + 2.0 * (t15 * t30) - t31;
-    const double t33 = coef[9] * t7 * t29;
-    const double t34 = (t18 * t11 + t19 * t4) * t17 + 2.0 * (t15 * t33);
-    const double t35 = coef[6] * (x1 * x2);
-    const double t36 = 0.5 * t19;
-    const double t37 = coef[11] * t11 * t29;
-    const double t38 = coef[10] * t14;
-    const double t39 = t36 + (2.0 * (t15 * t37) - (t23 * t11 + t38) * t17);
-    const double t40 = t11 * t12;
-    const double t41 = t8 * t4;
-    const double t42 = coef[8] * (x2 * x3);
-    const double t43 = 0.5 * t23;
-    const double t44 = coef[11] * t21;
-    const double t45 = t43 + (2.0 * (t22 * t30) - (t18 * t8 + t44) * t17);
-    const double t46 = (t19 * t8 + t23 * t7) * t17 + 2.0 * (t22 * t37);
-    const double t47 = (t38 - t18 * t7) * t17 + 2.0 * (t22 * t33) - t36;
-    const double t48 = t13 * t7;
-    const double t49 = (t18 * t12 + t23 * t13) * t17 + 2.0 * (t25 * t30);
-    const double t50 = (t44 - t19 * t12) * t17 + 2.0 * (t25 * t37) - t43;
-    const double t51 = t31 + (2.0 * (t25 * t33) - (t19 * t13 + t28) * t17);
-    const double t52 = t18 * t27;
-    const double t53 = t19 * t35;
-    const double t54 = t23 * t42;
     displacement[0] = t15 * t17 - 0.5 * t20;
     displacement[1] = t22 * t17 - 0.5 * t24;
     displacement[2] = t25 * t17 - 0.5 * t26;
+    /* increment */
     increment[0] = t20;
     increment[1] = t24;
     increment[2] = t26;
-    jacobian[0] = 1.0 + (t27 * t32 + (t6 * t34 + t35 * t39) - (t40 + t41) * t17);
-    jacobian[1] = t11 * t13 * t17 - 0.5 * t4 + (t42 * t32 + (t35 * t34 + t10 * t39));
-    jacobian[2] = 0.5 * t11 + t7 * t4 * t17 + (t3 * t32 + (t27 * t34 + t42 * t39));
-    jacobian[3] = 0.5 * t8 + t12 * t7 * t17 + (t27 * t45 + (t35 * t46 + t6 * t47));
-    jacobian[4] = 1.0 + (t42 * t45 + (t10 * t46 + t35 * t47) - (t41 + t48) * t17);
-    jacobian[5] = t11 * t8 * t17 - 0.5 * t7 + (t3 * t45 + (t42 * t46 + t27 * t47));
-    jacobian[6] = t8 * t13 * t17 - 0.5 * t12 + (t27 * t49 + (t35 * t50 + t6 * t51));
-    jacobian[7] = 0.5 * t13 + t12 * t4 * t17 + (t42 * t49 + (t10 * t50 + t35 * t51));
+    /* jacobian */
+    const double t27 = coef[7] * (x1 * x3), t28 = coef[9] * t10, t29 = rigid_body_dual_phi1(t16);
+    const double t30 = coef[9] * t9 * t29, t31 = 0.5 * t18;
+    const double t32 = (t28 - t23 * t7) * t17 + 2.0 * (t15 * t30) - t31, t33 = coef[9] * t8 * t29;
+    const double t34 = (t18 * t11 + t19 * t7) * t17 + 2.0 * (t15 * t33), t35 = coef[6] * (x1 * x2);
+    const double t36 = 0.5 * t19, t37 = coef[11] * t11 * t29, t38 = coef[10] * t14;
+    const double t39 = t36 + (2.0 * (t15 * t37) - (t23 * t11 + t38) * t17), t40 = t11 * t12;
+    const double t41 = t9 * t7, t42 = coef[8] * (x2 * x3), t43 = 0.5 * t23, t44 = coef[11] * t21;
+    const double t45 = t43 + (2.0 * (t22 * t30) - (t18 * t9 + t44) * t17);
+    const double t46 = (t19 * t9 + t23 * t8) * t17 + 2.0 * (t22 * t37);
+    const double t47 = (t38 - t18 * t8) * t17 + 2.0 * (t22 * t33) - t36, t48 = t13 * t8;
+    const double t49 = (t18 * t12 + t23 * t13) * t17 + 2.0 * (t25 * t30);
+    const double t50 = (t44 - t19 * t12) * t17 + 2.0 * (t25 * t37) - t43;
+    const double t51 = t31 + (2.0 * (t25 * t33) - (t19 * t13 + t28) * t17);
+    jacobian[0] = 1.0 + (t27 * t32 + (t5 * t34 + t35 * t39) - (t40 + t41) * t17);
+    jacobian[1] = t11 * t13 * t17 - 0.5 * t7 + (t42 * t32 + (t35 * t34 + t6 * t39));
+    jacobian[2] = 0.5 * t11 + t8 * t7 * t17 + (t3 * t32 + (t27 * t34 + t42 * t39));
+    jacobian[3] = 0.5 * t9 + t12 * t8 * t17 + (t27 * t45 + (t35 * t46 + t5 * t47));
+    jacobian[4] = 1.0 + (t42 * t45 + (t6 * t46 + t35 * t47) - (t41 + t48) * t17);
+    jacobian[5] = t11 * t9 * t17 - 0.5 * t8 + (t3 * t45 + (t42 * t46 + t27 * t47));
+    jacobian[6] = t9 * t13 * t17 - 0.5 * t12 + (t27 * t49 + (t35 * t50 + t5 * t51));
+    jacobian[7] = 0.5 * t13 + t12 * t7 * t17 + (t42 * t49 + (t6 * t50 + t35 * t51));
     jacobian[8] = 1.0 + (t3 * t49 + (t42 * t50 + t27 * t51) - (t40 + t48) * t17);
+    /* increment jacobian */
+    const double t52 = t18 * t27, t53 = t19 * t35, t54 = t23 * t42;
     increment_jacobian[0] = t52 - t53;
-    increment_jacobian[1] = t4 + (t18 * t42 - t19 * t10);
+    increment_jacobian[1] = t7 + (t18 * t42 - t19 * t6);
     increment_jacobian[2] = t18 * t3 - t19 * t42 - t11;
-    increment_jacobian[3] = t19 * t6 - t23 * t27 - t8;
+    increment_jacobian[3] = t19 * t5 - t23 * t27 - t9;
     increment_jacobian[4] = t53 - t54;
-    increment_jacobian[5] = t19 * t27 - t23 * t3 + t7;
-    increment_jacobian[6] = t23 * t35 - t18 * t6 + t12;
-    increment_jacobian[7] = t23 * t10 - t18 * t35 - t13;
+    increment_jacobian[5] = t19 * t27 - t23 * t3 + t8;
+    increment_jacobian[6] = t23 * t35 - t18 * t5 + t12;
+    increment_jacobian[7] = t23 * t6 - t18 * t35 - t13;
     increment_jacobian[8] = t54 - t52;
-}
-
-/* Solve matrix * solution = side, both overwritten, by elimination with partial pivoting. 0 if singular. */
-static int rigid_body_dual_solve_pivoting(double matrix[9], double side[3])
-{
-    for (int k = 0; k < 3; ++k) {
-        int best = k;
-        for (int i = k + 1; i < 3; ++i)
-            if (fabs(matrix[i * 3 + k]) > fabs(matrix[best * 3 + k])) best = i;
-        const double pivot = matrix[best * 3 + k];
-        if (!(fabs(pivot) > 0.0)) return 0;
-        for (int j = k; j < 3 && best != k; ++j) {
-            const double swap = matrix[k * 3 + j];
-            matrix[k * 3 + j] = matrix[best * 3 + j];
-            matrix[best * 3 + j] = swap;
-        }
-        const double swap = side[k];
-        side[k] = side[best];
-        side[best] = swap;
-        for (int i = k + 1; i < 3; ++i) {
-            const double factor = matrix[i * 3 + k] / pivot;
-            for (int j = k + 1; j < 3; ++j) matrix[i * 3 + j] -= factor * matrix[k * 3 + j];
-            side[i] -= factor * side[k];
-        }
-    }
-    for (int i = 3 - 1; i >= 0; --i) {
-        for (int j = i + 1; j < 3; ++j) side[i] -= matrix[i * 3 + j] * side[j];
-        side[i] /= matrix[i * 3 + i];
-    }
-    return 1;
 }
 
 /* elimination without pivoting: the solution, and the reciprocals of the pivots */
 static void rigid_body_dual_eliminate(const double matrix[9], const double side[3],
-                                      double solution[restrict 3], double reciprocal[restrict 3])
+    double solution[restrict 3], double reciprocal[restrict 3])
 {
-    const double t1 = 1.0 / matrix[0];
-    const double t2 = matrix[6] * t1;
-    const double t3 = matrix[3] * t1;
-    const double t4 = side[1] - side[0] * t3;
-    const double t5 = 1.0 / (matrix[4] - matrix[1] * t3);
-    const double t6 = (matrix[7] - matrix[1] * t2) * t5;
-    const double t7 = matrix[5] - matrix[2] * t3;
+    /* solution */
+    const double t1 = 1.0 / matrix[0], t2 = matrix[6] * t1, t3 = matrix[3] * t1;
+    const double t4 = side[1] - side[0] * t3, t5 = 1.0 / (matrix[4] - matrix[1] * t3);
+    const double t6 = (matrix[7] - matrix[1] * t2) * t5, t7 = matrix[5] - matrix[2] * t3;
     const double t8 = 1.0 / (matrix[8] - matrix[2] * t2 - t7 * t6);
-    const double t9 = (side[2] - side[0] * t2 - t4 * t6) * t8;
-    const double t10 = t5 * (t4 - t7 * t9);
+    const double t9 = (side[2] - side[0] * t2 - t4 * t6) * t8, t10 = t5 * (t4 - t7 * t9);
     solution[0] = t1 * (side[0] - (matrix[2] * t9 + matrix[1] * t10));
     solution[1] = t10;
     solution[2] = t9;
+    /* reciprocal */
     reciprocal[0] = t1;
     reciprocal[1] = t5;
     reciprocal[2] = t8;
 }
 
-/* Solve matrix * solution = side, both overwritten. The matrix is I + O(h), so elimination without pivoting
-   does unless a pivot is far from 1. 0 if singular. */
-static int rigid_body_dual_solve(double matrix[9], double side[3])
+/* the leading error vector pi grad S_3, as a function of the gauge */
+static void rigid_body_dual_guide(const rigid_body_dual_params *params, const double gauge[1],
+    const double x[3], double error[restrict 3])
 {
-    double solution[3], reciprocal[3], largest = 0.0;
-    rigid_body_dual_eliminate(matrix, side, solution, reciprocal);
-    for (int i = 0; i < 3; ++i)
-        if (!(fabs(reciprocal[i]) <= largest)) largest = fabs(reciprocal[i]);
-    if (!(largest < 1e3)) return rigid_body_dual_solve_pivoting(matrix, side);
-    memcpy(side, solution, sizeof solution);
-    return 1;
+    const double x1 = x[0], x2 = x[1], x3 = x[2];
+    const double t1 = 1.0 / params->I2, t2 = x2 * t1, t3 = 1.0 / params->I3, t4 = x2 * x2;
+    const double t5 = 1.0 / 6.0 * t1, t6 = 1.0 / 12.0 * t3, t7 = t5 - t6, t8 = 1.0 / params->I1;
+    const double t9 = x1 * x1, t10 = 1.0 / 6.0 * t8, t11 = t10 - t6, t12 = t1 * t1;
+    const double t13 = t3 * (t4 * (t7 + gauge[0] * (t8 * t7)) + t9 * (t11 + gauge[0] * (t1 * t11)))
+        + (t8 * (t9 * (t8 * (-1.0 / 12.0 - 1.0 / 12.0 * (gauge[0] * t1))) - 1.0 / 12.0
+        * (t12 * (gauge[0] * t4))) - 1.0 / 12.0 * (t4 * t12));
+    const double t14 = x3 * t13, t15 = x3 * t3, t16 = -1.0 / 12.0 - 1.0 / 12.0 * (gauge[0] * t3);
+    const double t17 = t3 * t3, t18 = x3 * x3, t19 = 1.0 / 12.0 * (t17 * (gauge[0] * t18));
+    const double t20 = 1.0 / 12.0 * (t18 * t17), t21 = 1.0 / 6.0 * t3, t22 = 1.0 / 12.0 * t1;
+    const double t23 = t21 - t22, t24 = t10 - t22;
+    const double t25 = t8 * (t9 * (t8 * t16) - t19) - t20 + t1 * (t18 * (t23 + gauge[0] * (t8 * t23)) + t9
+        * (t24 + gauge[0] * (t3 * t24)));
+    const double t26 = x2 * t25, t27 = 1.0 / 12.0 * t8, t28 = t5 - t27, t29 = t21 - t27;
+    const double t30 = t1 * (t4 * (t1 * t16) - t19) - t20 + t8 * (t4 * (t28 + gauge[0] * (t3 * t28)) + t18
+        * (t29 + gauge[0] * (t1 * t29)));
+    const double t31 = x1 * t30, t32 = x1 * t8;
+    error[0] = t2 * t14 - t15 * t26;
+    error[1] = t15 * t31 - t32 * t14;
+    error[2] = t32 * t26 - t2 * t31;
 }
 
-/* Whether a guess is where the next values may be. Recurrences that were fitted to little else than rest, near a saddle,
-   may lead anywhere; and far away the equation of a step has solutions that have nothing to do with the motion. */
-static int rigid_body_dual_near(const double guess[3], const double last[3])
+/* grad H . grad H, then grad H . grad C and grad C . grad C for each Casimir of the gauge */
+static void rigid_body_dual_products(const rigid_body_dual_params *params, const double x[3],
+    double out[restrict 3])
 {
-    double distance = 0.0, size = 0.0;
-    for (int i = 0; i < 3; ++i) {
-        distance += fabs(guess[i] - last[i]);
-        size += fabs(last[i]);
-    }
-    return distance <= 4.0 * size;
+    const double x1 = x[0], x2 = x[1], x3 = x[2];
+    const double t1 = x3 / params->I3, t2 = x2 / params->I2, t3 = x1 / params->I1;
+    out[0] = x3 * x3 + (x2 * x2 + x1 * x1);
+    out[1] = -(x3 * t1 + (x2 * t2 + x1 * t3));
+    out[2] = t1 * t1 + (t2 * t2 + t3 * t3);
 }
 
-/* The guess for the next value (y), from earlier ones; 0 if there is none. */
-static int rigid_body_dual_predict(const rigid_body_dual_memory *memory, double value[3])
+/* the Hamiltonian */
+double rigid_body_dual_hamiltonian(const rigid_body_dual_params *params, const double x[3])
 {
-    const int last = memory->count - 1;
-    double odd[3] = { 0.0 }, binomial = -1.0;
-    memset(value, 0, 3 * sizeof value[0]);
-    if (memory->fitting) {
-        for (int k = 0; k < memory->terms; k += 2)
-            for (int i = 0; i < 3; ++i) {
-                value[i] += memory->weight[k][i][0] * memory->past[last - k][i];
-                odd[i] += memory->weight[k + 1][i][0] * memory->past[last - 1 - k][i];
-            }
-        for (int i = 0; i < 3; ++i) value[i] += odd[i];
-    } else {
-        for (int k = 0; k < memory->order && k <= last; ++k) {
-            binomial *= -(double)(memory->order - k) / (k + 1);
-            for (int i = 0; i < 3; ++i) value[i] += binomial * memory->past[last - k][i];
-        }
-    }
-    return last >= 0 && rigid_body_dual_near(value, memory->past[last]);
+    (void)params;
+    const double x1 = x[0], x2 = x[1], x3 = x[2];
+    return (-0.5) * (x3 * x3 + (x2 * x2 + x1 * x1));
 }
 
-/* Choose the guess that would have been best for a value that took several iterations. */
-static void rigid_body_dual_judge(rigid_body_dual_memory *memory, const double value[3])
+/* the Casimirs */
+void rigid_body_dual_casimirs(const rigid_body_dual_params *params, const double x[3], double out[])
 {
-    double row[8 + 1][3], guess[3], least = HUGE_VAL, fitted = HUGE_VAL;
-    const int rows = memory->count < 8 ? memory->count : 8;
-    memcpy(row[0], value, sizeof row[0]);
-    for (int k = 0; k < rows; ++k) memcpy(row[k + 1], memory->past[memory->count - 1 - k], sizeof row[0]);
-    for (int order = 1; order <= rows; ++order) { /* row[0] becomes the backward difference of this order */
-        double size = 0.0;
-        for (int k = 0; k <= rows - order; ++k)
-            for (int i = 0; i < 3; ++i) row[k][i] -= row[k + 1][i];
-        for (int i = 0; i < 3; ++i) size += fabs(row[0][i]);
-        if (size < least) {
-            least = size;
-            memory->order = order;
-        }
-    }
-    memory->fitting = memory->terms > 0;
-    if (memory->fitting && rigid_body_dual_predict(memory, guess)) {
-        fitted = 0.0;
-        for (int i = 0; i < 3; ++i) fitted += fabs(value[i] - guess[i]);
-    }
-    memory->fitting = memory->terms > 0 && fitted <= least;
-    if (memory->order == 0) memory->order = 1;
+    if (params == NULL) params = &rigid_body_dual_default_params;
+    const double I1 = params->I1, I2 = params->I2, I3 = params->I3, x1 = x[0], x2 = x[1], x3 = x[2];
+    out[0] = 0.5 * (x3 * x3 / I3 + (x2 * x2 / I2 + x1 * x1 / I1));
 }
 
-/* Make eight columns orthogonal to one, by the multiples of it that are put into r. Where that one is among the eight, those
-   up to it stay as they are, and inverse becomes one over its squared length. The number of rows is even. */
-static void rigid_body_dual_project(int rows, double (*one)[8], int column, double *inverse, double (*eight)[8], double r[8])
+/* pi(x) grad H(x) */
+void rigid_body_dual_vector_field(const rigid_body_dual_params *params, const double x[3], double out[3])
 {
-    double even[8] = { 0.0 }, odd[8] = { 0.0 };
-    for (int i = 0; i < rows; i += 2) {
-        const double entry = one[i][column], next = one[i + 1][column];
-        for (int l = 0; l < 8; ++l) even[l] += entry * eight[i][l];
-        for (int l = 0; l < 8; ++l) odd[l] += next * eight[i + 1][l];
-    }
-    for (int l = 0; l < 8; ++l) even[l] += odd[l];
-    if (one == eight) {
-        *inverse = even[column] > 0.0 ? 1.0 / even[column] : 0.0;
-        memset(even, 0, ((size_t)column + 1) * sizeof even[0]);
-    }
-    for (int l = 0; l < 8; ++l) r[l] = even[l] *= *inverse;
-    for (int i = 0; i < rows; ++i) {
-        const double entry = one[i][column];
-        for (int l = 0; l < 8; ++l) eight[i][l] -= entry * even[l];
-    }
+    if (params == NULL) params = &rigid_body_dual_default_params;
+    const double I1 = params->I1, I2 = params->I2, I3 = params->I3, x1 = x[0], x2 = x[1], x3 = x[2];
+    const double t1 = x3 / I3, t2 = x2 / I2, t3 = x1 / I1;
+    out[0] = x2 * t1 - x3 * t2;
+    out[1] = x3 * t3 - x1 * t1;
+    out[2] = x1 * t2 - x2 * t3;
 }
 
-/* By how much recurrences miss the last of these values. */
-static double rigid_body_dual_missed(const double *value, double (*weight)[8])
+/* ---- Compensated sums, linear equations ---- */
+/* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to
+   its last bit: were it rounded with the change, corrections of one sign would add up to a drift. 0, and x as
+   before, if the sum is not finite. */
+static int rigid_body_dual_advance(rigid_body_dual_solver *s, const double change[rigid_body_dual_DIM],
+    const double correction[rigid_body_dual_DIM])
 {
-    enum { AHEAD = 8, WINDOW = 40, CHECKS = 8 };
-    double most = 0.0;
-    for (int i = 0; i < CHECKS; ++i) {
-        double guess[8] = { 0.0 };
-        for (int k = 0; k < WINDOW; ++k)
-            for (int l = 0; l < 8; ++l) guess[l] += weight[k][l] * value[i + WINDOW - 1 - k];
-        for (int l = 0; l < AHEAD; ++l) most = fmax(most, fabs(guess[l] - value[i + WINDOW + l]));
-    }
-    return most;
-}
-
-/* Fit the recurrences value[m + l] = sum of weight[k][..][l] * value[m - 1 - k], l = 0 ... 8 - 1, to the history of
-   a component: ridge least squares by modified Gram-Schmidt, the ridge at the level of rounding. Columns are taken in by
-   eights, until they leave next to nothing of the right-hand sides. How many past values are used; 0 if the recurrences do
-   not foresee the last values, which they were not fitted to. */
-static int rigid_body_dual_train(rigid_body_dual_memory *memory, int component)
-{
-    enum { AHEAD = 8, WINDOW = 40, ROWS = 56 };
-    double q[WINDOW / 8][ROWS + WINDOW][8], r[WINDOW / 8][WINDOW][8], inverse[WINDOW]; /* eight columns in each part */
-    double right[ROWS + WINDOW][8], weight[WINDOW][8], value[111], largest = 0.0, left = HUGE_VAL;
-    int terms = 0;
-    memset(q, 0, sizeof q);
-    memset(right, 0, sizeof right);
-    memset(weight, 0, sizeof weight);
-    for (int i = 0; i < 111; ++i) {
-        value[i] = memory->past[memory->count - 111 + i][component];
-        if (fabs(value[i]) > largest) largest = fabs(value[i]);
-    }
-    for (int i = 0; i < ROWS; ++i)
-        for (int l = 0; l < AHEAD; ++l) right[i][l] = value[i + WINDOW + l];
-    while (terms < WINDOW && left > 3e-12 * largest) {
-        const int part = terms / 8, rows = ROWS + terms + 8; /* further rows of the ridge are zero in these columns */
-        for (int i = 0; i < ROWS; ++i)
-            for (int l = 0; l < 8; ++l) q[part][i][l] = value[i + WINDOW - 1 - terms - l];
-        for (int l = 0; l < 8; ++l) q[part][ROWS + terms + l][l] = 1e-15 * largest;
-        for (int k = 0; k < terms; ++k) rigid_body_dual_project(rows, q[k / 8], k % 8, &inverse[k], q[part], r[part][k]);
-        for (int l = 0; l < 8; ++l, ++terms) {
-            rigid_body_dual_project(rows, q[part], l, &inverse[terms], q[part], r[part][terms]);
-            rigid_body_dual_project(rows, q[part], l, &inverse[terms], right, weight[terms]);
-        }
-        double sum[8] = { 0.0 };
-        for (int i = 0; i < ROWS; ++i)
-            for (int l = 0; l < 8; ++l) sum[l] += fabs(right[i][l]);
-        left = 0.0;
-        for (int l = 0; l < 8; ++l) left += sum[l] / ROWS;
-    }
-    for (int k = terms - 1; k >= 0; --k)
-        for (int j = k + 1; j < terms; ++j)
-            for (int l = 0; l < 8; ++l) weight[k][l] -= r[j / 8][k][j % 8] * weight[j][l];
-    for (int k = 0; k < WINDOW; ++k) memcpy(memory->weight[k][component], weight[k], AHEAD * sizeof(double));
-    return rigid_body_dual_missed(value + ROWS, weight) <= 1e-07 * largest ? terms : 0;
-}
-
-/* Drop what is old, if so many values would not fit into the history. */
-static void rigid_body_dual_make_room(rigid_body_dual_memory *memory, int values)
-{
-    if (memory->count + values <= 222) return;
-    memmove(memory->past, memory->past + memory->count - 111, 111 * sizeof memory->past[0]);
-    memory->count = 111;
-}
-
-/* Add a value to the history. */
-static void rigid_body_dual_record(rigid_body_dual_memory *memory, const double value[3])
-{
-    rigid_body_dual_make_room(memory, 1);
-    memcpy(memory->past[memory->count++], value, 3 * sizeof value[0]);
-}
-
-/* Fit the recurrence to the last values; with every time, wait longer before it is done again. */
-static void rigid_body_dual_fit(rigid_body_dual_memory *memory)
-{
-    int found = 1;
-    memory->terms = 0;
-    for (int i = 0; i < 3 && found; ++i) {
-        const int terms = rigid_body_dual_train(memory, i);
-        found = terms > 0;
-        if (terms > memory->terms) memory->terms = terms;
-    }
-    if (!found) memory->terms = 0;
-    memory->fitting = found;
-    ++memory->fits;
-    memory->slow = 0;
-    memory->patience = memory->patience < 10000 ? 2 * memory->patience + 150 : 20000;
-}
-
-/* Take in the solved value: what took one iteration needs no better guess. */
-static void rigid_body_dual_remember(rigid_body_dual_memory *memory, const double value[3], int iterations)
-{
-    if (iterations > 1) rigid_body_dual_judge(memory, value);
-    rigid_body_dual_record(memory, value);
-    memory->slow = iterations > 1 ? memory->slow + 1 : 0;
-    if (memory->slow > memory->patience && memory->count >= 111) rigid_body_dual_fit(memory);
-}
-
-/* Whether an increment is that of the motion. Where the step is too large, the equation may have been solved by a point far
-   away, at another energy, that has nothing to do with it. */
-static int rigid_body_dual_plausible(const rigid_body_dual_solver *s, int stage, const double increment[3])
-{
-    double moved = 0.0, size = 0.0, field[3], middle[3], end[3];
-    for (int i = 0; i < 3; ++i) {
-        moved += fabs(increment[i]);
-        size += fabs(s->x[i]);
-    }
-    if (moved <= 1.5 * size) return 1;
-    rigid_body_dual_vector_field(&s->params, s->x, field);
-    for (int i = 0; i < 3; ++i) {
-        size += fabs(rigid_body_dual_fractions[stage] * s->h * field[i]);
-        middle[i] = s->x[i] + 0.5 * increment[i];
-        end[i] = s->x[i] + increment[i];
-    }
-    if (moved <= 1.5 * size) return 1;
-    const double before = rigid_body_dual_hamiltonian(&s->params, s->x), after = rigid_body_dual_hamiltonian(&s->params, end);
-    const double scale = fabs(before) + fabs(rigid_body_dual_hamiltonian(&s->params, middle)) + fabs(after);
-    return fabs(after - before) <= 0.5 * scale;
-}
-
-/* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to its last
-   bit: were it rounded with the change, corrections of one sign would add up to a drift. 0, and x as before, if the
-   sum is not finite. */
-static int rigid_body_dual_advance(rigid_body_dual_solver *s, const double change[3], const double correction[3])
-{
-    double x[3], carry[3];
-    for (int i = 0; i < 3; ++i) {
+    double x[rigid_body_dual_DIM], carry[rigid_body_dual_DIM];
+    for (int i = 0; i < rigid_body_dual_DIM; ++i) {
         const double sum = s->x[i] + change[i], added = sum - s->x[i];
         const double lost = (s->x[i] - (sum - added)) + (change[i] - added);
         const double small = lost + (s->carry[i] + correction[i]);
@@ -531,1341 +289,368 @@ static int rigid_body_dual_advance(rigid_body_dual_solver *s, const double chang
     return 1;
 }
 
-/* Size of a correction relative to each component of y, but no finer than 1e-6 of the largest; NaN or infinite if
-   the correction is. */
-static double rigid_body_dual_size(const double y[3], const double delta[3])
+/* Newton matrices are I + O(h): a pivot whose reciprocal is larger than this is far from 1. */
+#define rigid_body_dual_LARGEST_RECIPROCAL 1e3
+
+/* Solve matrix * solution = side, both overwritten. The matrix is I + O(h): 0 if a pivot is far from 1. */
+static int rigid_body_dual_solve(double matrix[rigid_body_dual_DIM * rigid_body_dual_DIM],
+    double side[rigid_body_dual_DIM])
+{
+    double solution[rigid_body_dual_DIM], reciprocal[rigid_body_dual_DIM], largest = 0.0;
+    rigid_body_dual_eliminate(matrix, side, solution, reciprocal);
+    for (int i = 0; i < rigid_body_dual_DIM; ++i)
+        if (!(fabs(reciprocal[i]) <= largest)) largest = fabs(reciprocal[i]);
+    if (!(largest < rigid_body_dual_LARGEST_RECIPROCAL)) return 0;
+    memcpy(side, solution, sizeof solution);
+    return 1;
+}
+
+/* ---- Starting guesses ---- */
+/* How far from the last value a guess may be, in sizes of that value. */
+#define rigid_body_dual_REACH 4.0
+
+/* The guess for the next value from the last ones: the sum of their backward differences. 0 if there is none,
+   or if it is far away, where the equation of a step has solutions that have nothing to do with the motion.
+   */
+static int rigid_body_dual_predict(const rigid_body_dual_history *history, double value[rigid_body_dual_DIM])
+{
+    double distance = 0.0, size = 0.0;
+    for (int i = 0; i < rigid_body_dual_DIM; ++i) {
+        value[i] = 0.0;
+        for (int k = 0; k < history->order; ++k) value[i] += history->difference[k][i];
+        distance += fabs(value[i] - history->difference[0][i]);
+        size += fabs(history->difference[0][i]);
+    }
+    return history->order > 0 && distance <= rigid_body_dual_REACH * size;
+}
+
+/* Take in the solved value. The guess of order k missed it by its k-th difference: the next is of the best
+   order. */
+static void rigid_body_dual_remember(rigid_body_dual_history *history,
+    const double value[rigid_body_dual_DIM])
+{
+    double least = HUGE_VAL, next[rigid_body_dual_DIM];
+    memcpy(next, value, sizeof next);
+    for (int k = 0; k <= history->count && k < rigid_body_dual_DIFFERENCES; ++k) {
+        double size = 0.0;
+        for (int i = 0; i < rigid_body_dual_DIM; ++i) {
+            const double last = history->difference[k][i];
+            history->difference[k][i] = next[i];
+            size += fabs(next[i]);
+            next[i] -= last;
+        }
+        if (k > 0 && size < least) {
+            least = size;
+            history->order = k;
+        }
+    }
+    if (history->count == 0) history->order = 1;
+    if (history->count < rigid_body_dual_DIFFERENCES) ++history->count;
+}
+
+/* How far a step may lead, in sizes of the state and of what the vector field says, if the energy is lost;
+   and the part of the energy that counts as lost. */
+#define rigid_body_dual_PLAUSIBLE 1.5
+#define rigid_body_dual_LOST 0.5
+
+/* Whether an increment is that of the motion. Where the step is too large, the equation may have been solved
+   by a point far away, at another energy, that has nothing to do with it. */
+static int rigid_body_dual_plausible(const rigid_body_dual_solver *s,
+    const double increment[rigid_body_dual_DIM])
+{
+    double moved = 0.0, size = 0.0, field[rigid_body_dual_DIM], middle[rigid_body_dual_DIM],
+        end[rigid_body_dual_DIM];
+    for (int i = 0; i < rigid_body_dual_DIM; ++i) {
+        moved += fabs(increment[i]);
+        size += fabs(s->x[i]);
+    }
+    if (moved <= rigid_body_dual_PLAUSIBLE * size) return 1;
+    rigid_body_dual_vector_field(&s->params, s->x, field);
+    for (int i = 0; i < rigid_body_dual_DIM; ++i) {
+        size += fabs(s->h * field[i]);
+        middle[i] = s->x[i] + 0.5 * increment[i];
+        end[i] = s->x[i] + increment[i];
+    }
+    if (moved <= rigid_body_dual_PLAUSIBLE * size) return 1;
+    const double before = rigid_body_dual_hamiltonian(&s->params, s->x), after =
+        rigid_body_dual_hamiltonian(&s->params, end);
+    const double scale = fabs(before) + fabs(rigid_body_dual_hamiltonian(&s->params, middle)) + fabs(after);
+    return fabs(after - before) <= rigid_body_dual_LOST * scale;
+}
+
+/* ---- The implicit step, by Newton's method ---- */
+/* Components of y are measured no finer than by this part of the largest. */
+#define rigid_body_dual_FLOOR 1e-6
+
+/* Size of a correction relative to each component of y; NaN or infinite if the correction is. */
+static double rigid_body_dual_size(const double y[rigid_body_dual_DIM],
+    const double delta[rigid_body_dual_DIM])
 {
     double norm = 0.0, size = 0.0;
-    for (int i = 0; i < 3; ++i) norm = fabs(y[i]) > norm ? fabs(y[i]) : norm;
-    for (int i = 0; i < 3; ++i) {
-        const double ratio = fabs(delta[i]) / (fabs(y[i]) + 1e-6 * norm + DBL_MIN);
+    for (int i = 0; i < rigid_body_dual_DIM; ++i) norm = fabs(y[i]) > norm ? fabs(y[i]) : norm;
+    for (int i = 0; i < rigid_body_dual_DIM; ++i) {
+        const double ratio = fabs(delta[i]) / (fabs(y[i]) + rigid_body_dual_FLOOR * norm + DBL_MIN);
         if (!isfinite(ratio)) return ratio;
         size = ratio > size ? ratio : size;
     }
     return size;
 }
 
+/* Corrections below the first that shrink by less than the second have reached the level of rounding. */
+#define rigid_body_dual_NEARLY_SOLVED 1e-8
+#define rigid_body_dual_SHRINKING 0.25
+
 /* Solve (y - x) + displacement(y) = 0 for y by Newton's method from the extrapolated guess, and advance. The
-   increment is corrected to first order by the last Newton correction, so that correction costs no evaluation:
-   a correction is accepted when the error that remains after it, quadratic in it, is below 1e-20. */
-static rigid_body_dual_status rigid_body_dual_attempt(rigid_body_dual_solver *s, int stage)
+   increment is corrected to first order by the last Newton correction, so that correction costs no
+   evaluation: a correction is accepted when the error that remains after it, quadratic in it, is below
+   rigid_body_dual_TOLERANCE. */
+static rigid_body_dual_status rigid_body_dual_attempt(rigid_body_dual_solver *s)
 {
-    const double *coef = s->coef[stage];
-    rigid_body_dual_memory *memory = &s->memory[stage];
-    double y[3], delta[3], displacement[3], increment[3];
-    double jacobian[9], increment_jacobian[9];
-    if (!rigid_body_dual_predict(memory, y)) memcpy(y, s->x, sizeof y);
-    double previous = HUGE_VAL;
-    for (int iteration = 0; iteration < 20; ++iteration) {
-        rigid_body_dual_linearise(coef, y, displacement, increment, jacobian, increment_jacobian);
+    double y[rigid_body_dual_DIM], delta[rigid_body_dual_DIM], displacement[rigid_body_dual_DIM],
+        increment[rigid_body_dual_DIM];
+    double jacobian[rigid_body_dual_DIM * rigid_body_dual_DIM], increment_jacobian[rigid_body_dual_DIM
+        * rigid_body_dual_DIM], previous = HUGE_VAL;
+    if (!rigid_body_dual_predict(&s->history, y)) memcpy(y, s->x, sizeof y);
+    for (int iteration = 1; iteration <= rigid_body_dual_MAX_ITERATIONS; ++iteration) {
+        rigid_body_dual_linearise(s->coef, y, displacement, increment, jacobian, increment_jacobian);
         ++s->evaluations;
-        for (int i = 0; i < 3; ++i) delta[i] = ((y[i] - s->x[i]) + displacement[i]) - s->carry[i];
+        for (int i = 0; i < rigid_body_dual_DIM; ++i) delta[i] = ((y[i] - s->x[i]) + displacement[i])
+            - s->carry[i];
         const int regular = rigid_body_dual_solve(jacobian, delta);
-        const double size = rigid_body_dual_size(y, delta);
+        const double size = rigid_body_dual_size(y, delta), growth = size / (previous * previous);
         if (!isfinite(size)) return rigid_body_dual_NOT_FINITE;
         if (!regular) return rigid_body_dual_SINGULAR;
-        for (int i = 0; i < 3; ++i) y[i] -= delta[i];
-        const double growth = size / (previous * previous);
+        for (int i = 0; i < rigid_body_dual_DIM; ++i) y[i] -= delta[i];
         const double remaining = size * size * (growth > 1.0 ? growth : 1.0);
-        /* The second test: corrections no longer shrink, the solve has reached the level of rounding. */
-        if (remaining <= 1e-20 || (previous < 1e-8 && size > 0.25 * previous)) {
-            double correction[3] = { 0.0 };
-            for (int i = 0; i < 3; ++i)
-                for (int j = 0; j < 3; ++j) correction[i] -= increment_jacobian[i * 3 + j] * delta[j];
-            if (!rigid_body_dual_plausible(s, stage, increment)) return rigid_body_dual_NO_CONVERGENCE;
-            if (!rigid_body_dual_advance(s, increment, correction)) return rigid_body_dual_NOT_FINITE;
-            rigid_body_dual_remember(memory, y, iteration + 1);
-            return rigid_body_dual_OK;
-        }
+        const int stalled = previous < rigid_body_dual_NEARLY_SOLVED && size > rigid_body_dual_SHRINKING
+            * previous;
         previous = size;
+        if (!(remaining <= rigid_body_dual_TOLERANCE || stalled)) continue;
+        double correction[rigid_body_dual_DIM] = { 0.0 };
+        for (int i = 0; i < rigid_body_dual_DIM; ++i)
+            for (int j = 0; j < rigid_body_dual_DIM; ++j)
+                correction[i] -= increment_jacobian[i * rigid_body_dual_DIM + j] * delta[j];
+        if (!rigid_body_dual_plausible(s, increment)) return rigid_body_dual_NO_CONVERGENCE;
+        if (!rigid_body_dual_advance(s, increment, correction)) return rigid_body_dual_NOT_FINITE;
+        rigid_body_dual_remember(&s->history, y);
+        return rigid_body_dual_OK;
     }
     return rigid_body_dual_NO_CONVERGENCE;
 }
 
-/* The 1 stages of one step. If one fails, the state is as before the step. */
-static rigid_body_dual_status rigid_body_dual_stages(rigid_body_dual_solver *s)
+/* ---- The choice of the gauge: multiples of Casimirs taken from H ---- */
+enum {
+    rigid_body_dual_SAMPLES = 32, /* states along a short piece of the trajectory */
+    rigid_body_dual_SWEEPS = 4    /* most rounds over the multiples */
+};
+
+/* A short piece of the trajectory from x, by a Runge-Kutta method with steps of a fixed change. */
+static void rigid_body_dual_sample(const rigid_body_dual_params *params, const double x[rigid_body_dual_DIM],
+    double samples[][rigid_body_dual_DIM])
 {
-    double x[3], carry[3];
-    memcpy(x, s->x, sizeof x);
-    memcpy(carry, s->carry, sizeof carry);
-    for (int stage = 0; stage < 1; ++stage) {
-        rigid_body_dual_status status = rigid_body_dual_attempt(s, stage);
-        /* A guess from earlier steps may have misled it: once more without. */
-        if (status != rigid_body_dual_OK && s->memory[stage].count > 0) {
-            memset(&s->memory[stage], 0, sizeof s->memory[stage]);
-            status = rigid_body_dual_attempt(s, stage);
-        }
-        if (status != rigid_body_dual_OK) {
-            memcpy(s->x, x, sizeof x);
-            memcpy(s->carry, carry, sizeof carry);
-            return status;
-        }
+    double slope[rigid_body_dual_DIM], middle[rigid_body_dual_DIM], size = 0.0, speed = DBL_MIN;
+    rigid_body_dual_vector_field(params, x, slope);
+    for (int i = 0; i < rigid_body_dual_DIM; ++i) {
+        samples[0][i] = x[i];
+        size += fabs(x[i]);
+        speed += fabs(slope[i]);
     }
-    return rigid_body_dual_OK;
+    const double h = 0.25 * size / speed;
+    for (int k = 1; k < rigid_body_dual_SAMPLES; ++k) {
+        const double *y = samples[k - 1];
+        rigid_body_dual_vector_field(params, y, slope);
+        for (int i = 0; i < rigid_body_dual_DIM; ++i) middle[i] = y[i] + 0.5 * h * slope[i];
+        rigid_body_dual_vector_field(params, middle, slope);
+        for (int i = 0; i < rigid_body_dual_DIM; ++i) samples[k][i] = y[i] + h * slope[i];
+    }
 }
 
-/* Whether steps can be made with these parameters: finite, positive where the spec says so, and with finite
-   coefficients for a step so short that it has no part in it. */
-static int rigid_body_dual_admissible(const rigid_body_dual_params *params)
+/* Sum of |pi grad S_3|^2, the leading error of the method, over the samples. */
+static double rigid_body_dual_gauge_error(const rigid_body_dual_params *params,
+    const double gauge[rigid_body_dual_GAUGES], double samples[][rigid_body_dual_DIM])
 {
-    double coef[12];
-    const double gauge[1] = { 0.0 };
-    if (!(isfinite(params->I1) && params->I1 > 0.0)) return 0;
-    if (!(isfinite(params->I2) && params->I2 > 0.0)) return 0;
-    if (!(isfinite(params->I3) && params->I3 > 0.0)) return 0;
-    rigid_body_dual_prepare(params, gauge, 1e-100, coef);
-    for (int k = 0; k < 12; ++k)
-        if (!isfinite(coef[k])) return 0;
-    return 1;
-}
-
-/* All of rigid_body_dual_init but the gauge. The arguments may be parts of *s: they are read before it is written. */
-static rigid_body_dual_status rigid_body_dual_start(rigid_body_dual_solver *s, const rigid_body_dual_params *params, const double x0[3])
-{
-    if (s == NULL || x0 == NULL) return rigid_body_dual_BAD_ARGUMENT;
-    const rigid_body_dual_params own = params != NULL ? *params : rigid_body_dual_default_params;
-    double x[3];
-    memcpy(x, x0, sizeof x);
-    for (int i = 0; i < 3; ++i)
-        if (!isfinite(x[i])) return rigid_body_dual_BAD_ARGUMENT;
-    if (!rigid_body_dual_admissible(&own)) return rigid_body_dual_BAD_ARGUMENT;
-    memset(s, 0, sizeof *s);
-    memcpy(s->x, x, sizeof s->x);
-    s->params = own;
-    return rigid_body_dual_OK;
-}
-
-/* the leading error vector pi grad S_3, as a function of the gauge */
-static void rigid_body_dual_guide(const rigid_body_dual_params *params, const double gauge[1],
-                                  const double x[3], double error[restrict 3])
-{
-    const double x1 = x[0];
-    const double x2 = x[1];
-    const double x3 = x[2];
-    const double t1 = 1.0 / params->I2;
-    const double t2 = x2 * t1;
-    const double t3 = 1.0 / params->I3;
-    const double t4 = x2 * x2;
-    const double t5 = 1.0 / 6.0 * t1;
-    const double t6 = 1.0 / 12.0 * t3;
-    const double t7 = t5 - t6;
-    const double t8 = 1.0 / params->I1;
-    const double t9 = x1 * x1;
-    const double t10 = 1.0 / 6.0 * t8;
-    const double t11 = t10 - t6;
-    const double t12 = t1 * t1;
-    const double t13 = t3 * (t4 * (t7 + gauge[0] * (t8 * t7)) + t9 * (t11 + gauge[0] * (t1 * t11))) + (t8 * (t9 * (t8 * (-1.0 / 12.0 - 1.0 / 12.0 * (gauge[0] * t1))) - 1.0 / 12.0 * (t12 * (gauge[0] * t4))) - 1.0 / 12.0 * (t4 * t12));
-    const double t14 = x3 * t13;
-    const double t15 = x3 * t3;
-    const double t16 = -1.0 / 12.0 - 1.0 / 12.0 * (gauge[0] * t3);
-    const double t17 = t3 * t3;
-    const double t18 = x3 * x3;
-    const double t19 = 1.0 / 12.0 * (t17 * (gauge[0] * t18));
-    const double t20 = 1.0 / 12.0 * (t18 * t17);
-    const double t21 = 1.0 / 6.0 * t3;
-    const double t22 = 1.0 / 12.0 * t1;
-    const double t23 = t21 - t22;
-    const double t24 = t10 - t22;
-    const double t25 = t8 * (t9 * (t8 * t16) - t19) - t20 + t1 * (t18 * (t23 + gauge[0] * (t8 * t23)) + t9 * (t24 + gauge[0] * (t3 * t24)));
-    const double t26 = x2 * t25;
-    const double t27 = 1.0 / 12.0 * t8;
-    const double t28 = t5 - t27;
-    const double t29 = t21 - t27;
-    const double t30 = t1 * (t4 * (t1 * t16) - t19) - t20 + t8 * (t4 * (t28 + gauge[0] * (t3 * t28)) + t18 * (t29 + gauge[0] * (t1 * t29)));
-    const double t31 = x1 * t30;
-    const double t32 = x1 * t8;
-    error[0] = t2 * t14 - t15 * t26;
-    error[1] = t15 * t31 - t32 * t14;
-    error[2] = t32 * t26 - t2 * t31;
-}
-
-/* grad H . grad H, then grad H . grad C and grad C . grad C for each Casimir of the gauge */
-static void rigid_body_dual_products(const rigid_body_dual_params *params, const double x[3],
-                                     double out[restrict 3])
-{
-    const double x1 = x[0];
-    const double x2 = x[1];
-    const double x3 = x[2];
-    const double t1 = x3 / params->I3;
-    const double t2 = x2 / params->I2;
-    const double t3 = x1 / params->I1;
-    out[0] = x3 * x3 + (x2 * x2 + x1 * x1);
-    out[1] = -(x3 * t1 + (x2 * t2 + x1 * t3));
-    out[2] = t1 * t1 + (t2 * t2 + t3 * t3);
-}
-
-enum { rigid_body_dual_SAMPLES = 32 };
-
-/* Sum of |pi grad S_3|^2, the leading error of the method, over sampled states. */
-static double rigid_body_dual_gauge_error(const rigid_body_dual_params *params, const double gauge[1],
-                                     double samples[][3])
-{
-    double error[3], sum = 0.0;
+    double error[rigid_body_dual_DIM], sum = 0.0;
     for (int k = 0; k < rigid_body_dual_SAMPLES; ++k) {
         rigid_body_dual_guide(params, gauge, samples[k], error);
-        for (int i = 0; i < 3; ++i) sum += error[i] * error[i];
+        for (int i = 0; i < rigid_body_dual_DIM; ++i) sum += error[i] * error[i];
     }
     return sum;
 }
 
-/* A short piece of the trajectory from x, by a Runge-Kutta method with steps of a fixed change. */
-static void rigid_body_dual_sample(const rigid_body_dual_params *params, const double x[3], double samples[][3])
+/* How many widths multiple c is to be moved for the least error: the best on grids, each finer than the one
+   before. */
+static double rigid_body_dual_least_on_line(const rigid_body_dual_params *params,
+    const double gauge[rigid_body_dual_GAUGES], int c, double width, double samples[][rigid_body_dual_DIM])
 {
-    double y[3], z[3], k1[3], k2[3], size = 0.0, speed = DBL_MIN;
-    memcpy(y, x, sizeof y);
-    rigid_body_dual_vector_field(params, y, k1);
-    for (int i = 0; i < 3; ++i) {
-        size += fabs(y[i]);
-        speed += fabs(k1[i]);
-    }
-    const double h = 0.25 * size / speed;
-    for (int k = 0; k < rigid_body_dual_SAMPLES; ++k) {
-        memcpy(samples[k], y, sizeof y);
-        rigid_body_dual_vector_field(params, y, k1);
-        for (int i = 0; i < 3; ++i) z[i] = y[i] + 0.5 * h * k1[i];
-        rigid_body_dual_vector_field(params, z, k2);
-        for (int i = 0; i < 3; ++i) y[i] += h * k2[i];
-    }
-}
-
-/* The error where one multiple varies, of centre + (j - 3) width for j = 0 ... 6, as forward differences: S_3 is cubic in H,
-   so these are those of a polynomial of degree six. Their size, before. */
-static double rigid_body_dual_gauge_line(const rigid_body_dual_params *params, const double gauge[1], int c, double width,
-    double samples[][3], double difference[7])
-{
-    double moved[1], size = 0.0;
+    double moved[rigid_body_dual_GAUGES], best = 0.0, mesh = 0.125, least =
+        rigid_body_dual_gauge_error(params, gauge, samples);
     memcpy(moved, gauge, sizeof moved);
-    for (int j = 0; j < 7; ++j) {
-        moved[c] = gauge[c] + (j - 3) * width;
-        difference[j] = rigid_body_dual_gauge_error(params, moved, samples);
-        size += difference[j];
-    }
-    for (int order = 1; order < 7; ++order)
-        for (int j = 6; j >= order; --j) difference[j] -= difference[j - 1];
-    return size;
-}
-
-/* Its value at centre + t width, by Newton's formula. */
-static double rigid_body_dual_on_line(const double difference[7], double t)
-{
-    double error = difference[6];
-    for (int k = 5; k >= 0; --k) error = difference[k] + (t + 3.0 - k) / (k + 1) * error;
-    return error;
-}
-
-/* Where it is least: the best t on grids, each finer than the one before. */
-static double rigid_body_dual_least_on_line(const double difference[7], double size)
-{
-    const double mesh[3] = { 0.125, 1.0 / 64.0, 1.0 / 512.0 };
-    double best = 0.0, least = rigid_body_dual_on_line(difference, best);
-    for (int level = 0; level < 3; ++level) {
+    for (int level = 0; level < 3; ++level, mesh *= 0.125) {
         const int reach = level == 0 ? 24 : 8;
         const double centre = best;
         for (int j = -reach; j <= reach; ++j) {
-            const double t = centre + j * mesh[level], error = rigid_body_dual_on_line(difference, t);
-            if (error < least - 1e-12 * size) { /* close calls are not decided by rounding */
-                least = error;
-                best = t;
-            }
+            moved[c] = gauge[c] + (centre + j * mesh) * width;
+            const double error = rigid_body_dual_gauge_error(params, moved, samples);
+            if (!(error < least - 1e-12 * least)) continue; /* close calls are not decided by rounding */
+            least = error;
+            best = centre + j * mesh;
         }
     }
     return best;
 }
 
-/* The lambda that minimise the leading error along a short piece of the trajectory, one after the other, from the
-   least-squares solution of grad H = sum of lambda grad C. Zero where that gives nothing finite. */
-static void rigid_body_dual_choose_gauge(const rigid_body_dual_params *params, const double x[3], double gauge[1])
+/* The multiples that minimise the leading error along a short piece of the trajectory, one after the other,
+   from the least-squares solution of grad H = sum of multiples of grad C. Zero where that gives nothing
+   finite. */
+static void rigid_body_dual_choose_gauge(const rigid_body_dual_params *params,
+    const double x[rigid_body_dual_DIM], double gauge[rigid_body_dual_GAUGES])
 {
-    double samples[rigid_body_dual_SAMPLES][3], out[3], sums[3] = { 0.0 }, width[1];
+    double samples[rigid_body_dual_SAMPLES][rigid_body_dual_DIM], out[1 + 2 * rigid_body_dual_GAUGES],
+        sums[1 + 2 * rigid_body_dual_GAUGES] = { 0.0 };
+    double width[rigid_body_dual_GAUGES];
     rigid_body_dual_sample(params, x, samples);
     for (int k = 0; k < rigid_body_dual_SAMPLES; ++k) {
         rigid_body_dual_products(params, samples[k], out);
-        for (int i = 0; i < 3; ++i) sums[i] += out[i];
+        for (int i = 0; i < 1 + 2 * rigid_body_dual_GAUGES; ++i) sums[i] += out[i];
     }
-    for (int c = 0; c < 1; ++c) {
+    for (int c = 0; c < rigid_body_dual_GAUGES; ++c) {
         const double norm = sums[2 + 2 * c] > 0.0 ? sums[2 + 2 * c] : HUGE_VAL;
         gauge[c] = sums[1 + 2 * c] / norm;
         width[c] = sqrt(sums[0] / norm);
     }
-    for (int sweep = 0, moved = 1; sweep < 4 && moved; ++sweep) {
+    for (int sweep = 0, moved = 1; sweep < rigid_body_dual_SWEEPS && moved; ++sweep) {
         moved = 0;
-        for (int c = 0; c < 1; ++c) {
-            double difference[7];
-            const double size = rigid_body_dual_gauge_line(params, gauge, c, width[c], samples, difference);
-            const double best = rigid_body_dual_least_on_line(difference, size);
+        for (int c = 0; c < rigid_body_dual_GAUGES; ++c) {
+            const double best = rigid_body_dual_least_on_line(params, gauge, c, width[c], samples);
             gauge[c] += best * width[c];
             moved = moved || best != 0.0;
         }
     }
     if (!isfinite(rigid_body_dual_gauge_error(params, gauge, samples)))
-        for (int c = 0; c < 1; ++c) gauge[c] = 0.0;
+        memset(gauge, 0, rigid_body_dual_GAUGES * sizeof gauge[0]);
 }
 
-/* Start at x0 with a gauge of one's own, e.g. that of another trajectory: see rigid_body_dual_solver. */
-rigid_body_dual_status rigid_body_dual_init_gauge(rigid_body_dual_solver *s,
-                                                  const rigid_body_dual_params *params, const double x0[3],
-                                                  const double gauge[1])
+/* ---- The solver ---- */
+/* Whether steps can be made with these parameters: allowed, and with finite coefficients for a step so short
+   that it has no part in it. */
+static int rigid_body_dual_admissible(const rigid_body_dual_params *params)
 {
-    double own[1];
-    if (gauge == NULL) return rigid_body_dual_init(s, params, x0);
-    memcpy(own, gauge, sizeof own);
-    for (int c = 0; c < 1; ++c)
-        if (!isfinite(own[c])) return rigid_body_dual_BAD_ARGUMENT;
-    const rigid_body_dual_status status = rigid_body_dual_start(s, params, x0);
-    if (status == rigid_body_dual_OK) memcpy(s->gauge, own, sizeof s->gauge);
-    return status;
+    double coef[rigid_body_dual_COEFFICIENTS];
+    if (!rigid_body_dual_allowed(params)) return 0;
+    rigid_body_dual_prepare(params, (const double[rigid_body_dual_GAUGES]){ 0.0 }, 1e-100, coef);
+    for (int k = 0; k < rigid_body_dual_COEFFICIENTS; ++k)
+        if (!isfinite(coef[k])) return 0;
+    return 1;
+}
+
+/* The arguments may be parts of *s: they are read before it is written. */
+rigid_body_dual_status rigid_body_dual_init_gauge(rigid_body_dual_solver *s,
+    const rigid_body_dual_params *params, const double x0[rigid_body_dual_DIM],
+    const double gauge[rigid_body_dual_GAUGES])
+{
+    if (s == NULL || x0 == NULL) return rigid_body_dual_BAD_ARGUMENT;
+    const rigid_body_dual_params own = params != NULL ? *params : rigid_body_dual_default_params;
+    double x[rigid_body_dual_DIM];
+    memcpy(x, x0, sizeof x);
+    for (int i = 0; i < rigid_body_dual_DIM; ++i)
+        if (!isfinite(x[i])) return rigid_body_dual_BAD_ARGUMENT;
+    double multiples[rigid_body_dual_GAUGES] = { 0.0 };
+    const int given = gauge != NULL;
+    if (given) memcpy(multiples, gauge, sizeof multiples);
+    for (int c = 0; c < rigid_body_dual_GAUGES; ++c)
+        if (!isfinite(multiples[c])) return rigid_body_dual_BAD_ARGUMENT;
+    if (!rigid_body_dual_admissible(&own)) return rigid_body_dual_BAD_ARGUMENT;
+    memset(s, 0, sizeof *s);
+    memcpy(s->x, x, sizeof s->x);
+    s->params = own;
+    if (!given) rigid_body_dual_choose_gauge(&own, x, multiples);
+    memcpy(s->gauge, multiples, sizeof s->gauge);
+    return rigid_body_dual_OK;
 }
 
 rigid_body_dual_status rigid_body_dual_init(rigid_body_dual_solver *s, const rigid_body_dual_params *params,
-                                            const double x0[3])
+    const double x0[rigid_body_dual_DIM])
 {
-    const rigid_body_dual_status status = rigid_body_dual_start(s, params, x0);
-    if (status == rigid_body_dual_OK) rigid_body_dual_choose_gauge(&s->params, s->x, s->gauge);
-    return status;
+    return rigid_body_dual_init_gauge(s, params, x0, NULL);
 }
 
 /* What depends on the step size; nothing where that is as before. */
 static rigid_body_dual_status rigid_body_dual_set_step(rigid_body_dual_solver *s, double h)
 {
     if (s == NULL || !isfinite(h)) return rigid_body_dual_BAD_ARGUMENT;
-    if (s->ready && memcmp(&h, &s->h, sizeof h) == 0) return rigid_body_dual_OK;
-    for (int stage = 0; stage < 1; ++stage)
-        rigid_body_dual_prepare(&s->params, s->gauge, rigid_body_dual_fractions[stage] * h, s->coef[stage]);
-    memset(s->memory, 0, sizeof s->memory);
-    for (int stage = 0; stage < 1; ++stage) s->memory[stage].patience = 150;
-    s->pause = 16;
-    s->setback = s->foreseeing = 0;
-    s->doubt = s->retry = 0;
-    s->effort = 0.0;
-    s->passes = INT_MAX;
+    if (s->prepared && memcmp(&h, &s->h, sizeof h) == 0) return rigid_body_dual_OK;
+    rigid_body_dual_prepare(&s->params, s->gauge, h, s->coef);
+    memset(&s->history, 0, sizeof s->history);
     s->h = h;
-    s->ready = 1;
+    s->t_before_h = s->t;
+    s->steps_before_h = s->steps;
+    s->prepared = 1;
     return rigid_body_dual_OK;
+}
+
+/* One stage. A guess from earlier steps may have misled it: then once more without. */
+static rigid_body_dual_status rigid_body_dual_stage(rigid_body_dual_solver *s)
+{
+    rigid_body_dual_status status = rigid_body_dual_attempt(s);
+    if (status != rigid_body_dual_OK && s->history.count > 0) {
+        memset(&s->history, 0, sizeof s->history);
+        status = rigid_body_dual_attempt(s);
+    }
+    return status;
 }
 
 rigid_body_dual_status rigid_body_dual_step(rigid_body_dual_solver *s, double h)
 {
     rigid_body_dual_status status = rigid_body_dual_set_step(s, h);
     if (status != rigid_body_dual_OK) return status;
-    status = rigid_body_dual_stages(s);
-    if (status == rigid_body_dual_OK) ++s->steps;
+    status = rigid_body_dual_stage(s);
+    if (status != rigid_body_dual_OK) return status;
+    ++s->steps;
+    s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
     return status;
 }
 
-/*
- * Eight at a time: below, the formulas of a step are evaluated for 8 steps of a trajectory, or members of an
- * ensemble, at once. Compilers make vector instructions of the loops over lanes.
- */
-enum { rigid_body_dual_LANES = 8 };
-
-#if defined(__GNUC__)
-typedef double rigid_body_dual_lanes[rigid_body_dual_LANES] __attribute__((aligned(64))); /* a value in each lane */
-#else
-typedef double rigid_body_dual_lanes[rigid_body_dual_LANES];
-#endif
-
-#if defined(__clang__)
-#define rigid_body_dual_EACH_LANE _Pragma("clang loop vectorize(assume_safety)")
-#pragma clang diagnostic push
-#pragma clang diagnostic ignored "-Wpass-failed"
-#elif defined(__GNUC__)
-#define rigid_body_dual_EACH_LANE _Pragma("GCC ivdep") _Pragma("GCC unroll 1")
-#else
-#define rigid_body_dual_EACH_LANE
-#endif
-
-/* What all blocks share: coefficients, the same in each lane, and the recurrences by which they are foreseen. */
-typedef struct {
-    int fits[1]; /* the fit that weight is of; -1 for none */
-    rigid_body_dual_lanes coef[1][12], weight[1][40][3];
-} rigid_body_dual_table;
-
-/* A stage in all lanes, linearised around y. */
-typedef struct {
-    rigid_body_dual_lanes y[3], displacement[3], increment[3], residual[3];
-    /* a residual r of alpha(y) = x takes inverse r from y, and gain r from the increment */
-    rigid_body_dual_lanes inverse[9], slope[9], gain[9];
-} rigid_body_dual_model;
-
-/* rigid_body_dual_phi0 for the loops over lanes: no branches. No number beyond |s| = 4.0. */
-static inline double rigid_body_dual_phi0_lane(double s)
-{
-    const double ss = s * s;
-    double sum = 1.455172475614865e-27, other = 5.744790668872202e-26; /* every second term each, as neither then is waited for */
-    sum = sum * ss + 2.267952452337683e-24;
-    other = other * ss + 8.953517427037546e-23;
-    sum = sum * ss + 3.534707039629467e-21;
-    other = other * ss + 1.3954464685812522e-19;
-    sum = sum * ss + 5.5090028283602295e-18;
-    other = other * ss + 2.174868698558062e-16;
-    sum = sum * ss + 8.586062056277845e-15;
-    other = other * ss + 3.3896802963225827e-13;
-    sum = sum * ss + 1.3382536530684679e-11;
-    other = other * ss + 5.284190138687493e-10;
-    sum = sum * ss + 2.08767569878681e-08;
-    other = other * ss + 8.267195767195768e-07;
-    sum = sum * ss + 3.306878306878307e-05;
-    other = other * ss + 0.001388888888888889;
-    sum = (sum * s + other) * s + 0.08333333333333333;
-    return sum + (fabs(s) <= 4.0 ? 0.0 : (double)NAN);
-}
-
-/* rigid_body_dual_phi1 for the loops over lanes: no branches. No number beyond |s| = 4.0. */
-static inline double rigid_body_dual_phi1_lane(double s)
-{
-    const double ss = s * s;
-    double sum = 6.266191399131027e-28, other = 2.328275960983784e-26; /* every second term each, as neither then is waited for */
-    sum = sum * ss + 8.617186003308303e-25;
-    other = other * ss + 3.1751334332727565e-23;
-    sum = sum * ss + 1.163957265514881e-21;
-    other = other * ss + 4.241648447555361e-20;
-    sum = sum * ss + 1.5349911154393775e-18;
-    other = other * ss + 5.5090028283602297e-17;
-    sum = sum * ss + 1.9573818287022555e-15;
-    other = other * ss + 6.868849645022276e-14;
-    sum = sum * ss + 2.372776207425808e-12;
-    other = other * ss + 8.029521918410807e-11;
-    sum = sum * ss + 2.6420950693437467e-09;
-    other = other * ss + 8.35070279514724e-08;
-    sum = sum * ss + 2.48015873015873e-06;
-    other = other * ss + 6.613756613756614e-05;
-    sum = (sum * s + other) * s + 0.001388888888888889;
-    return sum + (fabs(s) <= 4.0 ? 0.0 : (double)NAN);
-}
-
-/* rigid_body_dual_linearise in all lanes. */
-static void rigid_body_dual_linearise_lanes(rigid_body_dual_lanes coef[restrict 12],
-                                            rigid_body_dual_lanes y[restrict 3],
-                                            rigid_body_dual_lanes displacement[restrict 3],
-                                            rigid_body_dual_lanes increment[restrict 3],
-                                            rigid_body_dual_lanes jacobian[restrict 9],
-                                            rigid_body_dual_lanes increment_jacobian[restrict 9])
-{
-    rigid_body_dual_EACH_LANE
-    for (int lane = 0; lane < rigid_body_dual_LANES; ++lane) {
-        const double x1 = y[0][lane];
-        const double x2 = y[1][lane];
-        const double x3 = y[2][lane];
-        const double t1 = x2 * x2;
-        const double t2 = x1 * x1;
-        const double t3 = coef[4][lane] * t1 + (coef[5][lane] + coef[1][lane] * t2);
-        const double p_x3 = x3 * t3;
-        const double t4 = coef[9][lane] * p_x3;
-        const double t5 = x3 * x3;
-        const double t6 = coef[1][lane] * t5 + (coef[0][lane] + coef[2][lane] * t1);
-        const double p_x1 = x1 * t6;
-        const double t7 = coef[10][lane] * p_x1;
-        const double t8 = coef[11][lane] * p_x3;
-        const double t9 = x3 * t7 - x1 * t8;
-        const double t10 = coef[4][lane] * t5 + (coef[3][lane] + coef[2][lane] * t2);
-        const double p_x2 = x2 * t10;
-        const double t11 = coef[10][lane] * p_x2;
-        const double t12 = coef[11][lane] * p_x2;
-        const double t13 = coef[9][lane] * p_x1;
-        const double t14 = x1 * t12 - x2 * t13;
-        const double t15 = t4 * t9 - t11 * t14;
-        const double t16 = coef[11][lane] * (coef[10][lane] * (p_x2 * p_x2)) + coef[9][lane] * (coef[10][lane] * (p_x1 * p_x1) + coef[11][lane] * (p_x3 * p_x3));
-        const double t17 = rigid_body_dual_phi0_lane(t16);
-        const double t18 = coef[9][lane] * x2;
-        const double t19 = coef[10][lane] * x3;
-        const double t20 = t18 * p_x3 - t19 * p_x2;
-        const double t21 = x2 * t4 - x3 * t11;
-        const double t22 = t7 * t14 - t8 * t21;
-        const double t23 = coef[11][lane] * x1;
-        const double t24 = t19 * p_x1 - t23 * p_x3;
-        const double t25 = t12 * t21 - t13 * t9;
-        const double t26 = t23 * p_x2 - t18 * p_x1;
-        const double t27 = coef[7][lane] * (x1 * x3);
-        const double t28 = coef[9][lane] * t9;
-        const double t29 = rigid_body_dual_phi1_lane(t16);
-        const double t30 = coef[9][lane] * t8 * t29;
-        const double t31 = 0.5 * t18;
-        const double t32 = (t28 - t23 * t4) * t17 + 2.0 * (t15 * t30) - t31;
-        const double t33 = coef[9][lane] * t7 * t29;
-        const double t34 = (t18 * t11 + t19 * t4) * t17 + 2.0 * (t15 * t33);
-        const double t35 = coef[6][lane] * (x1 * x2);
-        const double t36 = 0.5 * t19;
-        const double t37 = coef[11][lane] * t11 * t29;
-        const double t38 = coef[10][lane] * t14;
-        const double t39 = t36 + (2.0 * (t15 * t37) - (t23 * t11 + t38) * t17);
-        const double t40 = t11 * t12;
-        const double t41 = t8 * t4;
-        const double t42 = coef[8][lane] * (x2 * x3);
-        const double t43 = 0.5 * t23;
-        const double t44 = coef[11][lane] * t21;
-        const double t45 = t43 + (2.0 * (t22 * t30) - (t18 * t8 + t44) * t17);
-        const double t46 = (t19 * t8 + t23 * t7) * t17 + 2.0 * (t22 * t37);
-        const double t47 = (t38 - t18 * t7) * t17 + 2.0 * (t22 * t33) - t36;
-        const double t48 = t13 * t7;
-        const double t49 = (t18 * t12 + t23 * t13) * t17 + 2.0 * (t25 * t30);
-        const double t50 = (t44 - t19 * t12) * t17 + 2.0 * (t25 * t37) - t43;
-        const double t51 = t31 + (2.0 * (t25 * t33) - (t19 * t13 + t28) * t17);
-        const double t52 = t18 * t27;
-        const double t53 = t19 * t35;
-        const double t54 = t23 * t42;
-        displacement[0][lane] = t15 * t17 - 0.5 * t20;
-        displacement[1][lane] = t22 * t17 - 0.5 * t24;
-        displacement[2][lane] = t25 * t17 - 0.5 * t26;
-        increment[0][lane] = t20;
-        increment[1][lane] = t24;
-        increment[2][lane] = t26;
-        jacobian[0][lane] = 1.0 + (t27 * t32 + (t6 * t34 + t35 * t39) - (t40 + t41) * t17);
-        jacobian[1][lane] = t11 * t13 * t17 - 0.5 * t4 + (t42 * t32 + (t35 * t34 + t10 * t39));
-        jacobian[2][lane] = 0.5 * t11 + t7 * t4 * t17 + (t3 * t32 + (t27 * t34 + t42 * t39));
-        jacobian[3][lane] = 0.5 * t8 + t12 * t7 * t17 + (t27 * t45 + (t35 * t46 + t6 * t47));
-        jacobian[4][lane] = 1.0 + (t42 * t45 + (t10 * t46 + t35 * t47) - (t41 + t48) * t17);
-        jacobian[5][lane] = t11 * t8 * t17 - 0.5 * t7 + (t3 * t45 + (t42 * t46 + t27 * t47));
-        jacobian[6][lane] = t8 * t13 * t17 - 0.5 * t12 + (t27 * t49 + (t35 * t50 + t6 * t51));
-        jacobian[7][lane] = 0.5 * t13 + t12 * t4 * t17 + (t42 * t49 + (t10 * t50 + t35 * t51));
-        jacobian[8][lane] = 1.0 + (t3 * t49 + (t42 * t50 + t27 * t51) - (t40 + t48) * t17);
-        increment_jacobian[0][lane] = t52 - t53;
-        increment_jacobian[1][lane] = t4 + (t18 * t42 - t19 * t10);
-        increment_jacobian[2][lane] = t18 * t3 - t19 * t42 - t11;
-        increment_jacobian[3][lane] = t19 * t6 - t23 * t27 - t8;
-        increment_jacobian[4][lane] = t53 - t54;
-        increment_jacobian[5][lane] = t19 * t27 - t23 * t3 + t7;
-        increment_jacobian[6][lane] = t23 * t35 - t18 * t6 + t12;
-        increment_jacobian[7][lane] = t23 * t10 - t18 * t35 - t13;
-        increment_jacobian[8][lane] = t54 - t52;
-    }
-}
-
-/* rigid_body_dual_evaluate in all lanes. */
-static void rigid_body_dual_evaluate_lanes(rigid_body_dual_lanes coef[restrict 12],
-                                           rigid_body_dual_lanes y[restrict 3],
-                                           rigid_body_dual_lanes displacement[restrict 3],
-                                           rigid_body_dual_lanes increment[restrict 3])
-{
-    rigid_body_dual_EACH_LANE
-    for (int lane = 0; lane < rigid_body_dual_LANES; ++lane) {
-        const double x1 = y[0][lane];
-        const double x2 = y[1][lane];
-        const double x3 = y[2][lane];
-        const double t1 = x2 * x2;
-        const double t2 = x1 * x1;
-        const double p_x3 = x3 * (coef[4][lane] * t1 + (coef[5][lane] + coef[1][lane] * t2));
-        const double t3 = coef[9][lane] * p_x3;
-        const double t4 = x3 * x3;
-        const double p_x1 = x1 * (coef[1][lane] * t4 + (coef[0][lane] + coef[2][lane] * t1));
-        const double t5 = coef[10][lane] * p_x1;
-        const double t6 = coef[11][lane] * p_x3;
-        const double t7 = x3 * t5 - x1 * t6;
-        const double p_x2 = x2 * (coef[4][lane] * t4 + (coef[3][lane] + coef[2][lane] * t2));
-        const double t8 = coef[10][lane] * p_x2;
-        const double t9 = coef[11][lane] * p_x2;
-        const double t10 = coef[9][lane] * p_x1;
-        const double t11 = x1 * t9 - x2 * t10;
-        const double t12 = rigid_body_dual_phi0_lane(coef[11][lane] * (coef[10][lane] * (p_x2 * p_x2)) + coef[9][lane] * (coef[10][lane] * (p_x1 * p_x1) + coef[11][lane] * (p_x3 * p_x3)));
-        const double t13 = coef[9][lane] * x2;
-        const double t14 = coef[10][lane] * x3;
-        const double t15 = t13 * p_x3 - t14 * p_x2;
-        const double t16 = x2 * t3 - x3 * t8;
-        const double t17 = coef[11][lane] * x1;
-        const double t18 = t14 * p_x1 - t17 * p_x3;
-        const double t19 = t17 * p_x2 - t13 * p_x1;
-        displacement[0][lane] = (t3 * t7 - t8 * t11) * t12 - 0.5 * t15;
-        displacement[1][lane] = (t5 * t11 - t6 * t16) * t12 - 0.5 * t18;
-        displacement[2][lane] = (t9 * t16 - t10 * t7) * t12 - 0.5 * t19;
-        increment[0][lane] = t15;
-        increment[1][lane] = t18;
-        increment[2][lane] = t19;
-    }
-}
-
-/* rigid_body_dual_invert in all lanes. */
-static void rigid_body_dual_invert_lanes(rigid_body_dual_lanes matrix[restrict 9],
-                                         rigid_body_dual_lanes slope[restrict 9],
-                                         rigid_body_dual_lanes inverse[restrict 9],
-                                         rigid_body_dual_lanes gain[restrict 9],
-                                         rigid_body_dual_lanes reciprocal[restrict 3])
-{
-    rigid_body_dual_EACH_LANE
-    for (int lane = 0; lane < rigid_body_dual_LANES; ++lane) {
-        const double t1 = 1.0 / matrix[0][lane];
-        const double t2 = matrix[1][lane] * t1;
-        const double t3 = 1.0 / (matrix[4][lane] - matrix[3][lane] * t2);
-        const double t4 = matrix[3][lane] * t1 * t3;
-        const double t5 = matrix[2][lane] * t1;
-        const double t6 = (matrix[5][lane] - matrix[3][lane] * t5) * t3;
-        const double t7 = t5 - t2 * t6;
-        const double t8 = matrix[7][lane] - matrix[6][lane] * t2;
-        const double t9 = 1.0 / (matrix[8][lane] - matrix[6][lane] * t5 - t8 * t6);
-        const double t10 = (t8 * t4 - matrix[6][lane] * t1) * t9;
-        const double t11 = t1 + t2 * t4 - t7 * t10;
-        const double t12 = t8 * t3 * t9;
-        const double t13 = t7 * t12 - t2 * t3;
-        const double t14 = t7 * t9;
-        const double t15 = t4 + t6 * t10;
-        const double t16 = t3 + t6 * t12;
-        const double t17 = t6 * t9;
-        inverse[0][lane] = t11;
-        inverse[1][lane] = t13;
-        inverse[2][lane] = -t14;
-        inverse[3][lane] = -t15;
-        inverse[4][lane] = t16;
-        inverse[5][lane] = -t17;
-        inverse[6][lane] = t10;
-        inverse[7][lane] = -t12;
-        inverse[8][lane] = t9;
-        gain[0][lane] = slope[2][lane] * t10 + (slope[0][lane] * t11 - slope[1][lane] * t15);
-        gain[1][lane] = slope[0][lane] * t13 + slope[1][lane] * t16 - slope[2][lane] * t12;
-        gain[2][lane] = slope[2][lane] * t9 - (slope[0][lane] * t14 + slope[1][lane] * t17);
-        gain[3][lane] = slope[5][lane] * t10 + (slope[3][lane] * t11 - slope[4][lane] * t15);
-        gain[4][lane] = slope[3][lane] * t13 + slope[4][lane] * t16 - slope[5][lane] * t12;
-        gain[5][lane] = slope[5][lane] * t9 - (slope[4][lane] * t17 + slope[3][lane] * t14);
-        gain[6][lane] = slope[8][lane] * t10 + (slope[6][lane] * t11 - slope[7][lane] * t15);
-        gain[7][lane] = slope[6][lane] * t13 + slope[7][lane] * t16 - slope[8][lane] * t12;
-        gain[8][lane] = slope[8][lane] * t9 - (slope[6][lane] * t14 + slope[7][lane] * t17);
-        reciprocal[0][lane] = t1;
-        reciprocal[1][lane] = t3;
-        reciprocal[2][lane] = t9;
-    }
-}
-
-/* Everything about a stage at the points y. The matrices are I + O(h): where a pivot is far from 1, all is infinite. */
-static void rigid_body_dual_tabulate(rigid_body_dual_lanes coef[restrict], rigid_body_dual_model *model)
-{
-    rigid_body_dual_lanes jacobian[9], reciprocal[3];
-    rigid_body_dual_linearise_lanes(coef, model->y, model->displacement, model->increment, jacobian, model->slope);
-    rigid_body_dual_invert_lanes(jacobian, model->slope, model->inverse, model->gain, reciprocal);
-    for (int i = 0; i < 3; ++i) {
-        rigid_body_dual_EACH_LANE
-        for (int lane = 0; lane < rigid_body_dual_LANES; ++lane)
-            model->inverse[i][lane] += fabs(reciprocal[i][lane]) < 1e3 ? 0.0 : HUGE_VAL;
-    }
-}
-
-/* rigid_body_dual_size in all lanes, summed over the components. */
-static void rigid_body_dual_sizes(rigid_body_dual_lanes y[restrict 3], rigid_body_dual_lanes delta[restrict 3],
-    rigid_body_dual_lanes size)
-{
-    rigid_body_dual_lanes norm = { 0.0 };
-    memset(size, 0, rigid_body_dual_LANES * sizeof size[0]);
-    for (int i = 0; i < 3; ++i)
-        for (int lane = 0; lane < rigid_body_dual_LANES; ++lane)
-            norm[lane] = 1e-6 * fabs(y[i][lane]) > norm[lane] ? 1e-6 * fabs(y[i][lane]) : norm[lane];
-    for (int i = 0; i < 3; ++i) {
-        rigid_body_dual_EACH_LANE
-        for (int lane = 0; lane < rigid_body_dual_LANES; ++lane)
-            size[lane] += fabs(delta[i][lane]) / (fabs(y[i][lane]) + norm[lane] + DBL_MIN);
-    }
-}
-
-/* Correct y by the residuals, with the inverse in the table, and measure the corrections. */
-static void rigid_body_dual_correct(rigid_body_dual_model *model, rigid_body_dual_lanes size)
-{
-    rigid_body_dual_lanes delta[3];
-    memset(delta, 0, sizeof delta);
-    for (int i = 0; i < 3; ++i)
-        for (int j = 0; j < 3; ++j) {
-            rigid_body_dual_EACH_LANE
-            for (int lane = 0; lane < rigid_body_dual_LANES; ++lane)
-                delta[i][lane] += model->inverse[i * 3 + j][lane] * model->residual[j][lane];
-        }
-    rigid_body_dual_sizes(model->y, delta, size);
-    for (int i = 0; i < 3; ++i)
-        for (int lane = 0; lane < rigid_body_dual_LANES; ++lane) model->y[i][lane] -= delta[i][lane];
-}
-
-/* The largest of the lanes, none of which is negative; infinite if one is not finite. As integers, the bits of such
-   numbers have their order, and those of what is no number are larger. */
-static double rigid_body_dual_largest(const rigid_body_dual_lanes size)
-{
-    uint64_t bits[8], most = 0;
-    double largest;
-    memcpy(bits, size, sizeof bits);
-    for (int lane = 0; lane < rigid_body_dual_LANES; ++lane) most = bits[lane] > most ? bits[lane] : most;
-    memcpy(&largest, &most, sizeof largest);
-    return isfinite(largest) ? largest : HUGE_VAL;
-}
-
-/* rigid_body_dual_near for the guesses of all lanes, seen from one value. */
-static int rigid_body_dual_near_lanes(rigid_body_dual_lanes y[restrict 3], const double last[3])
-{
-    rigid_body_dual_lanes distance = { 0.0 };
-    double size = 0.0;
-    for (int i = 0; i < 3; ++i) {
-        size += fabs(last[i]);
-        rigid_body_dual_EACH_LANE
-        for (int lane = 0; lane < rigid_body_dual_LANES; ++lane) distance[lane] += fabs(y[i][lane] - last[i]);
-    }
-    return rigid_body_dual_largest(distance) <= 4.0 * size;
-}
-
-/* What is left after a correction of this size: quadratic in it, where the matrices are of the points corrected; where
-   they are of points further off, by bend, also of the order of size times bend. bound is what the last pass left. */
-static double rigid_body_dual_remaining(double size, double bend, double bound)
-{
-    const double growth = size / bound, left = size * (size + bend);
-    return growth > 1.0 ? growth * left : left;
-}
-
-/* The table of a stage, with its matrices or with those of the last pass. */
-static void rigid_body_dual_update(rigid_body_dual_lanes coef[restrict], rigid_body_dual_model *model, int matrices)
-{
-    if (matrices)
-        rigid_body_dual_tabulate(coef, model);
-    else
-        rigid_body_dual_evaluate_lanes(coef, model->y, model->displacement, model->increment);
-}
-
-/* The steps of a block one after the other, each along the linear model of its lane. As X, the state with its carry, gains
-   increment - gain residual, the next residual follows from this one; X itself is added up apart. */
-static void rigid_body_dual_chain(rigid_body_dual_model model[1], double x[3], double carry[3])
-{
-    double residual[3], sum[3], small[3];
-    for (int i = 0; i < 3; ++i) {
-        residual[i] = ((model->y[i][0] - x[i]) + model->displacement[i][0]) - carry[i];
-        sum[i] = x[i];
-        small[i] = carry[i];
-    }
-    for (int k = 0; k < 1 * rigid_body_dual_LANES; ++k) {
-        const int lane = k / 1, after = (k + 1) / 1 % rigid_body_dual_LANES;
-        rigid_body_dual_model *at = &model[k % 1], *next = &model[(k + 1) % 1];
-        double even[3] = { 0.0 }, odd[3] = { 0.0 }; /* two sums, so that no long chain of additions is waited for */
-        for (int i = 0; i < 3; ++i) {
-            at->residual[i][lane] = residual[i];
-            for (int j = 0; j < 3; j += 2) even[i] += at->gain[i * 3 + j][lane] * residual[j];
-            for (int j = 1; j < 3; j += 2) odd[i] += at->gain[i * 3 + j][lane] * residual[j];
-        }
-        for (int i = 0; i < 3; ++i) {
-            const double change = at->increment[i][lane], total = sum[i] + change, added = total - sum[i];
-            const double turn = (next->displacement[i][after] - at->displacement[i][lane]) - change;
-            const double moved = (next->y[i][after] - at->y[i][lane]) + turn;
-            residual[i] = ((moved + residual[i]) + odd[i]) + even[i];
-            small[i] += ((sum[i] - (total - added)) + (change - added)) - (even[i] + odd[i]);
-            sum[i] = total;
-        }
-    }
-    for (int i = 0; i < 3; ++i) {
-        x[i] = sum[i] + small[i];
-        carry[i] = small[i] - (x[i] - sum[i]);
-    }
-}
-
-/* Bring the table up to date: coefficients, and weights that were fitted since. */
-static void rigid_body_dual_refresh(const rigid_body_dual_solver *s, rigid_body_dual_table *table)
-{
-    for (int stage = 0; stage < 1; ++stage) {
-        if (table->fits[stage] == s->memory[stage].fits) continue;
-        table->fits[stage] = s->memory[stage].fits;
-        for (int k = 0; k < 12; ++k)
-            for (int lane = 0; lane < rigid_body_dual_LANES; ++lane) table->coef[stage][k][lane] = s->coef[stage][k];
-        memcpy(table->weight[stage], s->memory[stage].weight, (size_t)s->memory[stage].terms * sizeof table->weight[0][0]);
-    }
-}
-
-/* Guesses for the next rigid_body_dual_LANES values of a stage, by its recurrences. */
-static void rigid_body_dual_foresee(const rigid_body_dual_memory *memory, rigid_body_dual_lanes weight[restrict][3],
-    rigid_body_dual_lanes y[restrict 3])
-{
-    const int last = memory->count - 1;
-    for (int i = 0; i < 3; ++i) {
-        rigid_body_dual_lanes even = { 0.0 }, odd = { 0.0 };
-        for (int k = 0; k < memory->terms; k += 2) {
-            const double past = memory->past[last - k][i], earlier = memory->past[last - 1 - k][i];
-            rigid_body_dual_EACH_LANE
-            for (int lane = 0; lane < rigid_body_dual_LANES; ++lane) even[lane] += weight[k][i][lane] * past;
-            rigid_body_dual_EACH_LANE
-            for (int lane = 0; lane < rigid_body_dual_LANES; ++lane) odd[lane] += weight[k + 1][i][lane] * earlier;
-        }
-        rigid_body_dual_EACH_LANE
-        for (int lane = 0; lane < rigid_body_dual_LANES; ++lane) y[i][lane] = even[lane] + odd[lane];
-    }
-}
-
-/* rigid_body_dual_record for the values of all lanes, one after the other. */
-static void rigid_body_dual_record_lanes(rigid_body_dual_memory *memory, rigid_body_dual_lanes y[restrict 3])
-{
-    rigid_body_dual_make_room(memory, rigid_body_dual_LANES);
-    for (int lane = 0; lane < rigid_body_dual_LANES; ++lane)
-        for (int i = 0; i < 3; ++i) memory->past[memory->count + lane][i] = y[i][lane];
-    memory->count += rigid_body_dual_LANES;
-}
-
-/* Guesses where no recurrence is known: where alpha and beta have the means of steps by the classical Runge-Kutta
-   method, to leading order. */
-static void rigid_body_dual_march(const rigid_body_dual_solver *s, rigid_body_dual_table *table, rigid_body_dual_model model[1])
-{
-    static const double reach[4] = { 0.5, 0.5, 1.0, 0.0 }, weight[4] = { 1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0 };
-    double x[3], point[3], slope[3], mean[3];
-    memcpy(x, s->x, sizeof x);
-    for (int k = 0; k < 1 * rigid_body_dual_LANES; ++k) {
-        const double h = rigid_body_dual_fractions[k % 1] * s->h;
-        memcpy(point, x, sizeof x);
-        memset(mean, 0, sizeof mean);
-        for (int part = 0; part < 4; ++part) {
-            rigid_body_dual_vector_field(&s->params, point, slope);
-            for (int i = 0; i < 3; ++i) {
-                mean[i] += weight[part] * slope[i];
-                point[i] = x[i] + h * reach[part] * slope[i];
-            }
-        }
-        for (int i = 0; i < 3; ++i) {
-            model[k % 1].y[i][k / 1] = x[i] + 0.5 * h * mean[i];
-            x[i] += h * mean[i];
-        }
-    }
-    for (int stage = 0; stage < 1; ++stage) {
-        rigid_body_dual_model *at = &model[stage];
-        rigid_body_dual_evaluate_lanes(table->coef[stage], at->y, at->displacement, at->increment);
-        for (int i = 0; i < 3; ++i) {
-            rigid_body_dual_EACH_LANE
-            for (int lane = 0; lane < rigid_body_dual_LANES; ++lane)
-                at->y[i][lane] -= at->displacement[i][lane] + 0.5 * at->increment[i][lane];
-        }
-    }
-}
-
-/* rigid_body_dual_LANES steps at once: guess the points of all, and correct them together until the error that remains is as
-   small as after a single step. How many passes that took; 0, and the solver as before, where it takes more than most. */
-static int rigid_body_dual_block(rigid_body_dual_solver *s, rigid_body_dual_table *table, int most)
-{
-    rigid_body_dual_model model[1];
-    rigid_body_dual_lanes sizes;
-    double x[3], carry[3], previous = HUGE_VAL, bend = 0.0, bound = HUGE_VAL;
-    int passes = 0, solved = 0;
-    if (!s->foreseeing) rigid_body_dual_march(s, table, model);
-    for (int stage = 0; stage < 1; ++stage) {
-        if (s->foreseeing) rigid_body_dual_foresee(&s->memory[stage], table->weight[stage], model[stage].y);
-        if (!rigid_body_dual_near_lanes(model[stage].y, s->x)) return 0;
-    }
-    while (!solved) {
-        double size = 0.0;
-        const int matrices = previous > 1e-05;
-        for (int stage = 0; stage < 1; ++stage) rigid_body_dual_update(table->coef[stage], &model[stage], matrices);
-        memcpy(x, s->x, sizeof x);
-        memcpy(carry, s->carry, sizeof carry);
-        rigid_body_dual_chain(model, x, carry);
-        for (int stage = 0; stage < 1; ++stage) {
-            rigid_body_dual_correct(&model[stage], sizes);
-            const double largest = rigid_body_dual_largest(sizes);
-            size = largest > size ? largest : size;
-        }
-        s->evaluations += 1 * rigid_body_dual_LANES;
-        bend = matrices ? 0.0 : bend + previous;
-        bound = rigid_body_dual_remaining(size, bend, bound);
-        /* The second test: after the square of so small a correction there is rounding only. */
-        solved = bound <= 1e-20 || (previous < 1e-8 && size < 1e-10);
-        if ((++passes >= most || !(size < previous)) && !solved) return 0;
-        previous = size;
-    }
-    for (int stage = 0; stage < 1; ++stage)
-        if (!rigid_body_dual_near_lanes(model[stage].y, s->x)) return 0;
-    for (int i = 0; i < 3; ++i)
-        if (!isfinite(x[i])) return 0;
-    memcpy(s->x, x, sizeof x);
-    memcpy(s->carry, carry, sizeof carry);
-    s->steps += rigid_body_dual_LANES;
-    for (int stage = 0; stage < 1; ++stage) {
-        rigid_body_dual_memory *memory = &s->memory[stage];
-        rigid_body_dual_record_lanes(memory, model[stage].y);
-        memory->slow = passes > 1 ? memory->slow + rigid_body_dual_LANES : 0;
-        if (memory->slow > memory->patience && s->foreseeing) rigid_body_dual_fit(memory);
-    }
-    return passes;
-}
-
-/* Recurrences are given up for a while, the longer the more often that happens. */
-static void rigid_body_dual_give_up(rigid_body_dual_solver *s)
-{
-    s->foreseeing = s->setback = s->pause = 0;
-    s->doubt = 2 * s->doubt + 600;
-    s->retry = s->steps + s->doubt;
-}
-
-/* How the next block is guessed: by recurrences, fitted as soon as enough steps are to be made, or
-   have been, to repay that. */
-static void rigid_body_dual_choose_guess(rigid_body_dual_solver *s, size_t steps)
-{
-    for (int stage = 0; stage < 1; ++stage)
-        if (s->memory[stage].count < 111) {
-            s->foreseeing = 0;
-            return;
-        }
-    if (s->foreseeing || (steps < 600 && s->steps < 150) || s->steps < s->retry) return;
-    s->foreseeing = 1;
-    for (int stage = 0; stage < 1 && s->foreseeing; ++stage) {
-        rigid_body_dual_fit(&s->memory[stage]);
-        s->foreseeing = s->memory[stage].terms > 0;
-    }
-    s->pause = rigid_body_dual_LANES;
-    if (!s->foreseeing) rigid_body_dual_give_up(s);
-}
-
-/* Learn from a block: after one that failed single steps are made, the more the more often that happens. Recurrences
-   that fail repeatedly, or need more passes than steps by Runge-Kutta did, are given up. */
-static void rigid_body_dual_learn_from(rigid_body_dual_solver *s, int passes)
-{
-    if (passes > 0) {
-        s->setback /= 2;
-    } else {
-        s->setback = 2 * s->setback + rigid_body_dual_LANES > 1000 ? 1000 : 2 * s->setback + rigid_body_dual_LANES;
-        s->pause = s->setback;
-    }
-    if (!s->foreseeing) {
-        s->passes = passes > 0 ? passes : INT_MAX;
-    } else if (passes > s->passes || s->setback > 5 * rigid_body_dual_LANES) {
-        rigid_body_dual_give_up(s);
-    }
-}
-
-/* A single step, and the running mean of the evaluations that a stage of one takes. */
-static rigid_body_dual_status rigid_body_dual_single(rigid_body_dual_solver *s)
-{
-    const size_t before = s->evaluations;
-    const rigid_body_dual_status status = rigid_body_dual_step(s, s->h);
-    s->effort += 0.125 * ((double)(s->evaluations - before) / 1 - s->effort);
-    return status;
-}
-
-/* Blocks of steps where they cost less than single steps, with at most as many passes over a block as 2 for each
-   evaluation in a single step. The results differ by round-off only. */
 rigid_body_dual_status rigid_body_dual_integrate(rigid_body_dual_solver *s, double h, size_t steps)
 {
-    rigid_body_dual_table table;
     rigid_body_dual_status status = rigid_body_dual_set_step(s, h);
-    for (int stage = 0; stage < 1; ++stage) table.fits[stage] = -1;
-    while (status == rigid_body_dual_OK && steps > 0) {
-        if (steps >= rigid_body_dual_LANES && s->pause == 0) rigid_body_dual_choose_guess(s, steps);
-        if (steps >= rigid_body_dual_LANES && s->pause == 0) {
-            rigid_body_dual_refresh(s, &table);
-            const int passes = rigid_body_dual_block(s, &table, (int)(2 * s->effort + 0.5));
-            rigid_body_dual_learn_from(s, passes);
-            if (passes > 0) steps -= rigid_body_dual_LANES;
-        } else {
-            if (s->pause > 0) --s->pause;
-            status = rigid_body_dual_single(s);
-            if (status == rigid_body_dual_OK) --steps;
-        }
-    }
+    for (; steps > 0 && status == rigid_body_dual_OK; --steps) status = rigid_body_dual_step(s, h);
     return status;
-}
-
-/* Members of an ensemble, each in its lane. */
-typedef struct {
-    rigid_body_dual_lanes x[3], carry[3], coef[1][12];
-    rigid_body_dual_lanes past[1][111][3]; /* solved values, in a ring */
-    rigid_body_dual_lanes weight[1][40][3]; /* of past values, the latest first, for the next */
-    int latest;     /* the row of the latest values */
-    int count;      /* rows in use */
-    int order[1];   /* how many of them the extrapolation uses */
-    int terms[1];   /* how many of them the recurrences use */
-    int fits;       /* how often recurrences have been fitted */
-    int fitting[1]; /* whether they are the better guess */
-    int slow;       /* how many of the last steps took more than one iteration */
-    int patience;   /* how many of those before recurrences are fitted again */
-    int active[8];  /* whether the lane has a member that has not failed */
-    size_t left[8]; /* steps that are still to be made, where one has */
-    double gauge[8][1]; /* of each member */
-} rigid_body_dual_group;
-
-/* The past values of a stage, the latest for k = 0. */
-static rigid_body_dual_lanes *rigid_body_dual_group_past(rigid_body_dual_group *group, int stage, int k)
-{
-    const int row = group->latest + k;
-    return group->past[stage][row < 111 ? row : row - 111];
-}
-
-/* Guess the values of a stage by the recurrences of the members. */
-static void rigid_body_dual_group_foresee(rigid_body_dual_group *group, int stage, rigid_body_dual_lanes y[restrict 3])
-{
-    memset(y, 0, 3 * sizeof y[0]);
-    for (int k = 0; k < group->terms[stage]; ++k) {
-        rigid_body_dual_lanes *past = rigid_body_dual_group_past(group, stage, k), *weight = group->weight[stage][k];
-        for (int i = 0; i < 3; ++i) {
-            rigid_body_dual_EACH_LANE
-            for (int lane = 0; lane < rigid_body_dual_LANES; ++lane) y[i][lane] += weight[i][lane] * past[i][lane];
-        }
-    }
-}
-
-/* Extrapolate the values of a stage. */
-static void rigid_body_dual_group_extrapolate(rigid_body_dual_group *group, int stage, rigid_body_dual_lanes y[restrict 3])
-{
-    const int order = group->order[stage];
-    double binomial = -1.0;
-    memcpy(y, group->x, 3 * sizeof y[0]);
-    if (order > 0) memset(y, 0, 3 * sizeof y[0]);
-    for (int k = 0; k < order; ++k) {
-        rigid_body_dual_lanes *past = rigid_body_dual_group_past(group, stage, k);
-        binomial *= -(double)(order - k) / (k + 1);
-        for (int i = 0; i < 3; ++i) {
-            rigid_body_dual_EACH_LANE
-            for (int lane = 0; lane < rigid_body_dual_LANES; ++lane) y[i][lane] += binomial * past[i][lane];
-        }
-    }
-}
-
-/* The sum over members of the absolute values of all components. */
-static double rigid_body_dual_group_sum(const rigid_body_dual_group *group, rigid_body_dual_lanes y[3])
-{
-    double sum = 0.0;
-    for (int i = 0; i < 3; ++i)
-        for (int lane = 0; lane < rigid_body_dual_LANES; ++lane) sum += group->active[lane] ? fabs(y[i][lane]) : 0.0;
-    return sum;
-}
-
-static void rigid_body_dual_group_subtract(rigid_body_dual_lanes y[restrict 3], rigid_body_dual_lanes other[restrict 3])
-{
-    for (int i = 0; i < 3; ++i) {
-        rigid_body_dual_EACH_LANE
-        for (int lane = 0; lane < rigid_body_dual_LANES; ++lane) y[i][lane] -= other[i][lane];
-    }
-}
-
-/* Choose the guess that would have been best for these values. */
-static void rigid_body_dual_group_judge(rigid_body_dual_group *group, int stage, rigid_body_dual_lanes y[3])
-{
-    rigid_body_dual_lanes row[8 + 1][3];
-    const int rows = group->count < 8 ? group->count : 8;
-    double least = HUGE_VAL;
-    memcpy(row[0], y, sizeof row[0]);
-    for (int k = 0; k < rows; ++k) memcpy(row[k + 1], rigid_body_dual_group_past(group, stage, k), sizeof row[0]);
-    if (group->order[stage] == 0) group->order[stage] = 1;
-    for (int order = 1; order <= rows; ++order) { /* row[0] becomes the backward difference of this order */
-        for (int k = 0; k <= rows - order; ++k) rigid_body_dual_group_subtract(row[k], row[k + 1]);
-        const double size = rigid_body_dual_group_sum(group, row[0]);
-        if (size < least) {
-            least = size;
-            group->order[stage] = order;
-        }
-    }
-    if (group->terms[stage] == 0) return;
-    rigid_body_dual_group_foresee(group, stage, row[0]);
-    rigid_body_dual_group_subtract(row[0], y);
-    group->fitting[stage] = rigid_body_dual_group_sum(group, row[0]) <= least;
-}
-
-/* Fit the recurrences of all members; with every time, wait longer before it is done again, and for long if it did not
-   help. */
-static void rigid_body_dual_group_fit(rigid_body_dual_group *group)
-{
-    rigid_body_dual_memory memory;
-    const int helped = group->fits == 0 || group->fitting[0];
-    memory.count = 111;
-    for (int stage = 0; stage < 1; ++stage) {
-        int found = 1;
-        group->terms[stage] = 0;
-        for (int lane = 0; lane < rigid_body_dual_LANES; ++lane)
-            for (int i = 0; i < 3 && group->active[lane] && found; ++i) {
-                for (int k = 0; k < 111; ++k)
-                    memory.past[111 - 1 - k][i] = rigid_body_dual_group_past(group, stage, k)[i][lane];
-                const int terms = rigid_body_dual_train(&memory, i);
-                found = terms > 0;
-                if (terms > group->terms[stage]) group->terms[stage] = terms;
-                for (int k = 0; k < 40; ++k) group->weight[stage][k][i][lane] = memory.weight[k][i][0];
-            }
-        if (!found) group->terms[stage] = 0;
-        group->fitting[stage] = found;
-    }
-    ++group->fits;
-    group->slow = 0;
-    group->patience = helped && group->patience < 10000 ? 2 * group->patience + 150 : 100 * 150;
-}
-
-/* Replace guesses that are not near the last values, as rigid_body_dual_near has it, by these; lane by lane. */
-static void rigid_body_dual_stay_near(rigid_body_dual_lanes y[restrict 3], rigid_body_dual_lanes last[restrict 3])
-{
-    rigid_body_dual_lanes distance = { 0.0 }, size = { 0.0 };
-    for (int i = 0; i < 3; ++i) {
-        rigid_body_dual_EACH_LANE
-        for (int lane = 0; lane < rigid_body_dual_LANES; ++lane) {
-            distance[lane] += fabs(y[i][lane] - last[i][lane]);
-            size[lane] += fabs(last[i][lane]);
-        }
-    }
-    for (int i = 0; i < 3; ++i) {
-        rigid_body_dual_EACH_LANE
-        for (int lane = 0; lane < rigid_body_dual_LANES; ++lane)
-            y[i][lane] = distance[lane] <= 4.0 * size[lane] ? y[i][lane] : last[i][lane];
-    }
-}
-
-/* Whether lanes are still to be solved after a correction of this size; those where nothing is finite leave the group.
-   bound is what remains in each lane. */
-static int rigid_body_dual_group_open(rigid_body_dual_group *group, const rigid_body_dual_lanes size, const rigid_body_dual_lanes previous,
-    double bend, rigid_body_dual_lanes bound)
-{
-    int open = 0;
-    rigid_body_dual_EACH_LANE
-    for (int lane = 0; lane < rigid_body_dual_LANES; ++lane)
-        bound[lane] = rigid_body_dual_remaining(size[lane], bend, bound[lane]);
-    if (rigid_body_dual_largest(bound) <= 1e-20) return 0;
-    for (int lane = 0; lane < rigid_body_dual_LANES; ++lane) {
-        const int solved = bound[lane] <= 1e-20 || (previous[lane] < 1e-8 && size[lane] < 1e-10);
-        if (!isfinite(size[lane])) group->active[lane] = 0;
-        open += group->active[lane] && !solved;
-    }
-    return open;
-}
-
-/* The guess for a stage: recurrences, or extrapolation; the state for members where that is not near. */
-static void rigid_body_dual_group_predict(rigid_body_dual_group *group, int stage, rigid_body_dual_lanes y[3])
-{
-    if (group->fitting[stage]) rigid_body_dual_group_foresee(group, stage, y);
-    else rigid_body_dual_group_extrapolate(group, stage, y);
-    rigid_body_dual_stay_near(y, group->x);
-}
-
-/* Newton's method for a stage, until the slowest lane is solved. The number of iterations; where that is the most
-   allowed, lanes that are not solved leave the group. */
-static int rigid_body_dual_group_solve(rigid_body_dual_group *group, int stage, rigid_body_dual_model *model)
-{
-    rigid_body_dual_lanes size, previous, bound;
-    double largest = HUGE_VAL, bend = 0.0;
-    int iterations = 0, open = 1;
-    for (int lane = 0; lane < rigid_body_dual_LANES; ++lane) size[lane] = bound[lane] = HUGE_VAL;
-    rigid_body_dual_group_predict(group, stage, model->y);
-    for (; open > 0 && iterations < 20; ++iterations) {
-        memcpy(previous, size, sizeof size);
-        rigid_body_dual_update(group->coef[stage], model, largest > 1e-05);
-        bend = largest > 1e-05 ? 0.0 : bend + largest;
-        for (int i = 0; i < 3; ++i) {
-            rigid_body_dual_EACH_LANE
-            for (int lane = 0; lane < rigid_body_dual_LANES; ++lane)
-                model->residual[i][lane] =
-                    ((model->y[i][lane] - group->x[i][lane]) + model->displacement[i][lane]) - group->carry[i][lane];
-        }
-        rigid_body_dual_correct(model, size);
-        open = rigid_body_dual_group_open(group, size, previous, bend, bound);
-        largest = rigid_body_dual_largest(size);
-    }
-    for (int lane = 0; lane < rigid_body_dual_LANES && open > 0; ++lane)
-        group->active[lane] = group->active[lane] && bound[lane] <= 1e-20;
-    return iterations;
-}
-
-/* Add the increments, corrected to first order, in compensated arithmetic as for a single step. */
-static void rigid_body_dual_group_advance(rigid_body_dual_lanes x[restrict 3], rigid_body_dual_lanes carry[restrict 3],
-    rigid_body_dual_model *model)
-{
-    for (int i = 0; i < 3; ++i)
-        for (int j = 0; j < 3; ++j) {
-            rigid_body_dual_EACH_LANE
-            for (int lane = 0; lane < rigid_body_dual_LANES; ++lane)
-                carry[i][lane] -= model->gain[i * 3 + j][lane] * model->residual[j][lane];
-        }
-    for (int i = 0; i < 3; ++i) {
-        rigid_body_dual_EACH_LANE
-        for (int lane = 0; lane < rigid_body_dual_LANES; ++lane) {
-            const double change = model->increment[i][lane], sum = x[i][lane] + change, added = sum - x[i][lane];
-            const double small = ((x[i][lane] - (sum - added)) + (change - added)) + carry[i][lane];
-            x[i][lane] = sum + small;
-            carry[i][lane] = small - (x[i][lane] - sum);
-        }
-    }
-}
-
-/* Members that failed, or whose state is not near the one before the step or not finite, keep that one, and leave. How many
-   stay. */
-static int rigid_body_dual_group_leave(rigid_body_dual_group *group, rigid_body_dual_lanes x[3], rigid_body_dual_lanes carry[3],
-    size_t remaining)
-{
-    rigid_body_dual_lanes moved = { 0.0 }, size = { 0.0 }, bad;
-    int active = 0;
-    for (int i = 0; i < 3; ++i) {
-        rigid_body_dual_EACH_LANE
-        for (int lane = 0; lane < rigid_body_dual_LANES; ++lane) {
-            moved[lane] += fabs(group->x[i][lane] - x[i][lane]);
-            size[lane] += fabs(x[i][lane]);
-        }
-    }
-    for (int lane = 0; lane < rigid_body_dual_LANES; ++lane) bad[lane] = moved[lane] <= 4.0 * size[lane] ? 0.0 : 1.0;
-    for (int lane = 0; lane < rigid_body_dual_LANES; ++lane) active += group->active[lane];
-    if (active == rigid_body_dual_LANES && !(rigid_body_dual_largest(bad) > 0.0)) return active;
-    active = 0;
-    for (int lane = 0; lane < rigid_body_dual_LANES; ++lane) {
-        group->active[lane] = group->active[lane] && !(bad[lane] > 0.0);
-        active += group->active[lane];
-        for (int i = 0; i < 3 && !group->active[lane]; ++i) {
-            group->x[i][lane] = x[i][lane];
-            group->carry[i][lane] = carry[i][lane];
-        }
-        if (!group->active[lane] && group->left[lane] == 0) group->left[lane] = remaining;
-    }
-    return active;
-}
-
-/* One step of all members, of as many as remain. How many members are left. */
-static int rigid_body_dual_group_step(rigid_body_dual_group *group, size_t remaining)
-{
-    rigid_body_dual_lanes x[3], carry[3];
-    rigid_body_dual_model model;
-    const int next = (group->latest > 0 ? group->latest : 111) - 1;
-    int most = 0;
-    memcpy(x, group->x, sizeof x);
-    memcpy(carry, group->carry, sizeof carry);
-    for (int stage = 0; stage < 1; ++stage) {
-        const int iterations = rigid_body_dual_group_solve(group, stage, &model);
-        rigid_body_dual_group_advance(group->x, group->carry, &model);
-        if (iterations > most) most = iterations;
-        if ((iterations > 1 && next % 8 == 0) || group->count < 8)
-            rigid_body_dual_group_judge(group, stage, model.y);
-        memcpy(group->past[stage][next], model.y, sizeof model.y);
-    }
-    group->latest = next;
-    if (group->count < 111) ++group->count;
-    group->slow = most > 1 ? group->slow + 1 : 0;
-    if (group->slow > group->patience && group->count == 111 && remaining >= 600)
-        rigid_body_dual_group_fit(group);
-    return rigid_body_dual_group_leave(group, x, carry, remaining);
-}
-
-/* Put a member into a lane: its state, and its coefficients. */
-static rigid_body_dual_status rigid_body_dual_group_join(rigid_body_dual_group *group, int lane, const rigid_body_dual_params *params,
-    const double x0[3], double h)
-{
-    rigid_body_dual_solver s;
-    rigid_body_dual_status status = rigid_body_dual_init(&s, params, x0);
-    if (status == rigid_body_dual_OK) status = rigid_body_dual_set_step(&s, h);
-    if (status != rigid_body_dual_OK) return status;
-    for (int i = 0; i < 3; ++i) group->x[i][lane] = s.x[i];
-    for (int stage = 0; stage < 1; ++stage)
-        for (int k = 0; k < 12; ++k) group->coef[stage][k][lane] = s.coef[stage][k];
-    memcpy(group->gauge[lane], s.gauge, sizeof s.gauge);
-    group->active[lane] = 1;
-    return status;
-}
-
-/* The steps that a member has still to make after it left the group, by itself. */
-static rigid_body_dual_status rigid_body_dual_group_finish(const rigid_body_dual_group *group, int lane, const rigid_body_dual_params *params,
-    double x[3], double h)
-{
-    rigid_body_dual_solver s;
-    rigid_body_dual_status status = rigid_body_dual_init_gauge(&s, params, x, group->gauge[lane]);
-    if (status != rigid_body_dual_OK) return status;
-    for (int i = 0; i < 3; ++i) s.carry[i] = group->carry[i][lane];
-    status = rigid_body_dual_integrate(&s, h, group->left[lane]);
-    memcpy(x, s.x, sizeof s.x);
-    return status;
-}
-
-/* The members from first on, as many as there are lanes. The first status that is not OK. */
-static rigid_body_dual_status rigid_body_dual_group_run(const rigid_body_dual_params *params, double *x, size_t members, size_t first,
-    double h, size_t steps, unsigned char *status)
-{
-    rigid_body_dual_group group;
-    rigid_body_dual_status worst = rigid_body_dual_OK, member[8];
-    const int count = members - first < rigid_body_dual_LANES ? (int)(members - first) : rigid_body_dual_LANES;
-    double state[3];
-    size_t left = steps;
-    memset(&group, 0, sizeof group);
-    for (int lane = 0; lane < count; ++lane) {
-        for (size_t i = 0; i < 3; ++i) state[i] = x[i * members + first + (size_t)lane];
-        member[lane] = rigid_body_dual_group_join(&group, lane, params, state, h);
-    }
-    for (int active = count; left > 0 && active > 2; --left) active = rigid_body_dual_group_step(&group, left);
-    for (int lane = 0; lane < count; ++lane) {
-        if (group.active[lane]) group.left[lane] = left;
-        for (int i = 0; i < 3; ++i) state[i] = group.x[i][lane];
-        if (member[lane] == rigid_body_dual_OK) {
-            if (group.left[lane] > 0) member[lane] = rigid_body_dual_group_finish(&group, lane, params, state, h);
-            for (size_t i = 0; i < 3; ++i) x[i * members + first + (size_t)lane] = state[i];
-        }
-        if (status != NULL) status[first + (size_t)lane] = (unsigned char)member[lane];
-        if (worst == rigid_body_dual_OK) worst = member[lane];
-    }
-    return worst;
-}
-
-rigid_body_dual_status rigid_body_dual_ensemble(const rigid_body_dual_params *params, double *x,
-                                                size_t members, double h, size_t steps, unsigned char *status)
-{
-    rigid_body_dual_status worst = isfinite(h) ? rigid_body_dual_OK : rigid_body_dual_BAD_ARGUMENT;
-    const rigid_body_dual_params own = params != NULL ? *params : rigid_body_dual_default_params;
-    size_t earliest = members;
-    if (x == NULL && members > 0) return rigid_body_dual_BAD_ARGUMENT;
-#ifdef _OPENMP
-#pragma omp parallel for schedule(dynamic)
-#endif
-    for (size_t first = 0; first < members; first += rigid_body_dual_LANES) {
-        const rigid_body_dual_status group = rigid_body_dual_group_run(&own, x, members, first, h, steps, status);
-        if (group == rigid_body_dual_OK) continue;
-#ifdef _OPENMP
-#pragma omp critical
-#endif
-        if (first < earliest) {
-            earliest = first;
-            worst = group;
-        }
-    }
-    return worst;
-}
-
-#if defined(__clang__)
-#pragma clang diagnostic pop
-#endif
-
-/* the Hamiltonian */
-static void rigid_body_dual_energy(const rigid_body_dual_params *params, const double x[3],
-                                   double energy[restrict 1])
-{
-    (void)params;
-    const double x1 = x[0];
-    const double x2 = x[1];
-    const double x3 = x[2];
-    energy[0] = (-0.5) * (x3 * x3 + (x2 * x2 + x1 * x1));
-}
-
-/* the Casimirs */
-static void rigid_body_dual_casimir_values(const rigid_body_dual_params *params, const double x[3],
-                                           double out[restrict 1])
-{
-    const double x1 = x[0];
-    const double x2 = x[1];
-    const double x3 = x[2];
-    out[0] = 0.5 * (x3 * x3 / params->I3 + (x2 * x2 / params->I2 + x1 * x1 / params->I1));
-}
-
-/* pi(x) grad H(x) */
-static void rigid_body_dual_field(const rigid_body_dual_params *params, const double x[3],
-                                  double out[restrict 3])
-{
-    const double x1 = x[0];
-    const double x2 = x[1];
-    const double x3 = x[2];
-    const double t1 = x3 / params->I3;
-    const double t2 = x2 / params->I2;
-    const double t3 = x1 / params->I1;
-    out[0] = x2 * t1 - x3 * t2;
-    out[1] = x3 * t3 - x1 * t1;
-    out[2] = x1 * t2 - x2 * t3;
-}
-
-double rigid_body_dual_hamiltonian(const rigid_body_dual_params *params, const double x[3])
-{
-    double energy[1];
-    rigid_body_dual_energy(params != NULL ? params : &rigid_body_dual_default_params, x, energy);
-    return energy[0];
-}
-
-void rigid_body_dual_casimirs(const rigid_body_dual_params *params, const double x[3], double out[])
-{
-    double value[1]; /* out may overlap x */
-    rigid_body_dual_casimir_values(params != NULL ? params : &rigid_body_dual_default_params, x, value);
-    for (int i = 0; i < 1; ++i) out[i] = value[i];
-}
-
-void rigid_body_dual_vector_field(const rigid_body_dual_params *params, const double x[3], double out[3])
-{
-    double value[3];
-    rigid_body_dual_field(params != NULL ? params : &rigid_body_dual_default_params, x, value);
-    memcpy(out, value, sizeof value);
 }
 
 const char *rigid_body_dual_status_string(rigid_body_dual_status status)
 {
-    switch (status) {
-    case rigid_body_dual_OK: return "ok";
-    case rigid_body_dual_NO_CONVERGENCE: return "no convergence: the step is too large";
-    case rigid_body_dual_SINGULAR: return "singular Newton matrix: the step is too large";
-    case rigid_body_dual_NOT_FINITE: return "not finite: overflow, or outside the domain";
-    case rigid_body_dual_BAD_ARGUMENT: return "bad argument: a null pointer, or values that are not allowed";
-    }
-    return "unknown status";
+    static const char *const text[] = {
+        "ok",
+        "no convergence: the step is too large",
+        "singular Newton matrix: the step is too large",
+        "not finite: overflow, or outside the domain",
+        "bad argument: a null pointer, or values that are not allowed"
+    };
+    return (unsigned)status <= rigid_body_dual_BAD_ARGUMENT ? text[status] : "unknown status";
 }
 
 size_t rigid_body_dual_solver_size(void) { return sizeof(rigid_body_dual_solver); }
 
 size_t rigid_body_dual_solver_steps_done(const rigid_body_dual_solver *s) { return s->steps; }
+
+/* ---- Ensembles ---- */
+rigid_body_dual_status rigid_body_dual_ensemble(const rigid_body_dual_params *params, double *x,
+    size_t members, double h, size_t steps, unsigned char *status)
+{
+    rigid_body_dual_status worst = isfinite(h) ? rigid_body_dual_OK : rigid_body_dual_BAD_ARGUMENT;
+    const rigid_body_dual_params own = params != NULL ? *params : rigid_body_dual_default_params;
+    if (x == NULL && members > 0) return rigid_body_dual_BAD_ARGUMENT;
+    for (size_t m = 0; m < members; ++m) {
+        rigid_body_dual_solver s;
+        double x0[rigid_body_dual_DIM];
+        for (size_t i = 0; i < rigid_body_dual_DIM; ++i) x0[i] = x[i * members + m];
+        rigid_body_dual_status member = rigid_body_dual_init(&s, &own, x0);
+        if (member == rigid_body_dual_OK) {
+            member = rigid_body_dual_integrate(&s, h, steps);
+            for (size_t i = 0; i < rigid_body_dual_DIM; ++i) x[i * members + m] = s.x[i];
+        }
+        if (status != NULL) status[m] = (unsigned char)member;
+        if (worst == rigid_body_dual_OK) worst = member;
+    }
+    return worst;
+}

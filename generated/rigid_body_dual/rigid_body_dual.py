@@ -7,17 +7,17 @@
 #   step: implicit, Newton iteration with the analytic matrix
 #   one Newton iteration: 98 additions, 176 multiplications, 2 functions
 #
-# spec: rigid_body_dual, sha256 0e11b9097280029b8ba1ccfb15ded1fd61460b8002163aceea086ead92ecf619
+# spec: rigid_body_dual, sha256 e8342777c4b6b547dcc62fa6d2e3aaf07e52570aa2174b60c461d6c56ed43f1b
 # to regenerate: phigen build rigid_body_dual
 # DO NOT EDIT: change the spec and regenerate; edits are noticed by the checksum below.
 #
 # SPDX-License-Identifier: 0BSD
 # This file belongs to whoever generated it; phigen claims no rights in it.
-# body-sha256: 83ce2e4ecd857f069689e5a9cdc2f99ef7c7e7520cdf6bbf11392572cb60ca0e
+# body-sha256: fc9babc6e87842f69f460bd8b41506f0a6efeac03dae94a398c1a7baf1820423
 import numpy as np
 
 VERSION = "0.1.0"
-SPEC_SHA256 = "0e11b9097280029b8ba1ccfb15ded1fd61460b8002163aceea086ead92ecf619"
+SPEC_SHA256 = "e8342777c4b6b547dcc62fa6d2e3aaf07e52570aa2174b60c461d6c56ed43f1b"
 DIM = 3
 ORDER = 4
 COORDINATES = ("x1", "x2", "x3",)

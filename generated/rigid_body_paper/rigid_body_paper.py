@@ -6,17 +6,17 @@
 #   step: implicit, Newton iteration with the analytic matrix
 #   one Newton iteration: 61 additions, 87 multiplications, 2 functions
 #
-# spec: rigid_body_paper, sha256 252e63a465020d4f81a0a44276c75edbb523615ce0cb4a3efc6ebf0241578d2e
+# spec: rigid_body_paper, sha256 fdf2d9a528753bef04cdf4e448b386ab40d533eb21d1b8fc60aed87613d78d3e
 # to regenerate: phigen build rigid_body_paper
 # DO NOT EDIT: change the spec and regenerate; edits are noticed by the checksum below.
 #
 # SPDX-License-Identifier: 0BSD
 # This file belongs to whoever generated it; phigen claims no rights in it.
-# body-sha256: 14160c0772214b628500ce3cfdb46906a4f0bdd218d9cc0bedc0dc42e98b8319
+# body-sha256: 267a078690d82e358c5a84d3defc7bbaad7439dbc4bbf6d670350907610460c7
 import numpy as np
 
 VERSION = "0.1.0"
-SPEC_SHA256 = "252e63a465020d4f81a0a44276c75edbb523615ce0cb4a3efc6ebf0241578d2e"
+SPEC_SHA256 = "fdf2d9a528753bef04cdf4e448b386ab40d533eb21d1b8fc60aed87613d78d3e"
 DIM = 3
 ORDER = 2
 COORDINATES = ("x1", "x2", "x3",)

@@ -7,26 +7,41 @@
  *   step: implicit in p, each path followed by its Taylor series to round-off
  *   one evaluation of the equation for p: 2 additions, 11 multiplications, 1 divisions
  *
- * spec: sir_epidemic, sha256 115b753136b45d645443f1dd70079639f2bd0e5420635c11a5444e91e153af93
+ * spec: sir_epidemic, sha256 a13678a806dd22744a0465a1afcd9f1cd7c0aa55e2f372bdedeb916b1232077b
  * to regenerate: phigen build sir_epidemic
  * DO NOT EDIT: change the spec and regenerate; edits are noticed by the checksum below.
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 74c69074937a822fdfdff88d0428ebe59f5da643273386282733a360881e1ec5
+ *
+ *   1. The model
+ *   2. Compensated sums, linear equations
+ *   3. Starting guesses
+ *   4. The implicit step, along paths dm/dt = pi(m) p
+ *   5. The solver
+ *   6. Ensembles
+ * body-sha256: fb57a3379cb13d9ebaf837119cae315aaf7117ecf6fa60eefb017bb4432c76d8
  */
 #include "sir_epidemic.h"
 
 #include <float.h>
-#include <limits.h>
 #include <math.h>
-#include <stdint.h>
 #include <string.h>
 
+/* ---- The model ---- */
 const sir_epidemic_params sir_epidemic_default_params = { 0.5, 0.2 };
 
-/* A step of size h is the composition of these fractions of it. */
-static const double sir_epidemic_fractions[1] = { 1.0 };
+enum { sir_epidemic_MAX_ITERATIONS = 20 }; /* of an inner solve */
+/* most of the expansion of a path; one that needs more is cut into pieces */
+enum { sir_epidemic_TERMS = 30 };
+enum { sir_epidemic_SERIES = 10 }; /* of a path, those of the coordinates first */
+enum { sir_epidemic_FIXED = 1 };   /* values that are constant along a path */
+
+/* Whether all parameters are finite, and positive where they have to be. */
+static int sir_epidemic_allowed(const sir_epidemic_params *params)
+{
+    return isfinite(params->beta) && params->beta > 0.0 && isfinite(params->gamma) && params->gamma > 0.0;
+}
 
 /* everything that depends on parameters and step size only */
 static void sir_epidemic_prepare(const sir_epidemic_params *params, double h, double coef[restrict 4])
@@ -40,17 +55,16 @@ static void sir_epidemic_prepare(const sir_epidemic_params *params, double h, do
 
 /* p = grad S_h(y), and the Jacobian 1 - Hess S_h(y) pi(y) / 2 of the equation for p, up to O(h^2) */
 static void sir_epidemic_generate(const double coef[4], const double y[3], double slope[restrict 3],
-                                  double jacobian[restrict 9])
+    double jacobian[restrict 9])
 {
-    const double S = y[0];
-    const double I_ = y[1];
+    const double S = y[0], I_ = y[1];
+    /* slope */
     const double t1 = 1.0 / S;
-    const double t2 = I_ * S;
-    const double t3 = t2 * (coef[3] * (t1 * t1));
-    const double t4 = coef[2] * t2;
     slope[0] = coef[1] + coef[0] * t1;
     slope[1] = coef[1] + I_ * coef[2];
     slope[2] = 0.0;
+    /* jacobian */
+    const double t2 = I_ * S, t3 = t2 * (coef[3] * (t1 * t1)), t4 = coef[2] * t2;
     jacobian[0] = 1.0;
     jacobian[1] = (-0.5) * t3;
     jacobian[2] = 0.5 * t3;
@@ -62,279 +76,61 @@ static void sir_epidemic_generate(const double coef[4], const double y[3], doubl
     jacobian[8] = 1.0;
 }
 
-/* Solve matrix * solution = side, both overwritten, by elimination with partial pivoting. 0 if singular. */
-static int sir_epidemic_solve_pivoting(double matrix[9], double side[3])
-{
-    for (int k = 0; k < 3; ++k) {
-        int best = k;
-        for (int i = k + 1; i < 3; ++i)
-            if (fabs(matrix[i * 3 + k]) > fabs(matrix[best * 3 + k])) best = i;
-        const double pivot = matrix[best * 3 + k];
-        if (!(fabs(pivot) > 0.0)) return 0;
-        for (int j = k; j < 3 && best != k; ++j) {
-            const double swap = matrix[k * 3 + j];
-            matrix[k * 3 + j] = matrix[best * 3 + j];
-            matrix[best * 3 + j] = swap;
-        }
-        const double swap = side[k];
-        side[k] = side[best];
-        side[best] = swap;
-        for (int i = k + 1; i < 3; ++i) {
-            const double factor = matrix[i * 3 + k] / pivot;
-            for (int j = k + 1; j < 3; ++j) matrix[i * 3 + j] -= factor * matrix[k * 3 + j];
-            side[i] -= factor * side[k];
-        }
-    }
-    for (int i = 3 - 1; i >= 0; --i) {
-        for (int j = i + 1; j < 3; ++j) side[i] -= matrix[i * 3 + j] * side[j];
-        side[i] /= matrix[i * 3 + i];
-    }
-    return 1;
-}
-
 /* elimination without pivoting: the solution, and the reciprocals of the pivots */
 static void sir_epidemic_eliminate(const double matrix[9], const double side[3], double solution[restrict 3],
-                                   double reciprocal[restrict 3])
+    double reciprocal[restrict 3])
 {
-    const double t1 = 1.0 / matrix[0];
-    const double t2 = matrix[6] * t1;
-    const double t3 = matrix[3] * t1;
-    const double t4 = side[1] - side[0] * t3;
-    const double t5 = 1.0 / (matrix[4] - matrix[1] * t3);
-    const double t6 = (matrix[7] - matrix[1] * t2) * t5;
-    const double t7 = matrix[5] - matrix[2] * t3;
+    /* solution */
+    const double t1 = 1.0 / matrix[0], t2 = matrix[6] * t1, t3 = matrix[3] * t1;
+    const double t4 = side[1] - side[0] * t3, t5 = 1.0 / (matrix[4] - matrix[1] * t3);
+    const double t6 = (matrix[7] - matrix[1] * t2) * t5, t7 = matrix[5] - matrix[2] * t3;
     const double t8 = 1.0 / (matrix[8] - matrix[2] * t2 - t7 * t6);
-    const double t9 = (side[2] - side[0] * t2 - t4 * t6) * t8;
-    const double t10 = t5 * (t4 - t7 * t9);
+    const double t9 = (side[2] - side[0] * t2 - t4 * t6) * t8, t10 = t5 * (t4 - t7 * t9);
     solution[0] = t1 * (side[0] - (matrix[2] * t9 + matrix[1] * t10));
     solution[1] = t10;
     solution[2] = t9;
+    /* reciprocal */
     reciprocal[0] = t1;
     reciprocal[1] = t5;
     reciprocal[2] = t8;
 }
 
-/* Solve matrix * solution = side, both overwritten. The matrix is I + O(h), so elimination without pivoting
-   does unless a pivot is far from 1. 0 if singular. */
-static int sir_epidemic_solve(double matrix[9], double side[3])
+/* the Hamiltonian */
+double sir_epidemic_hamiltonian(const sir_epidemic_params *params, const double x[3])
 {
-    double solution[3], reciprocal[3], largest = 0.0;
-    sir_epidemic_eliminate(matrix, side, solution, reciprocal);
-    for (int i = 0; i < 3; ++i)
-        if (!(fabs(reciprocal[i]) <= largest)) largest = fabs(reciprocal[i]);
-    if (!(largest < 1e3)) return sir_epidemic_solve_pivoting(matrix, side);
-    memcpy(side, solution, sizeof solution);
-    return 1;
+    if (params == NULL) params = &sir_epidemic_default_params;
+    const double beta = params->beta, gamma = params->gamma, S = x[0], I_ = x[1];
+    return gamma * log(S) - beta * (I_ + S);
 }
 
-/* Whether a guess is where the next values may be. Recurrences that were fitted to little else than rest, near a saddle,
-   may lead anywhere; and far away the equation of a step has solutions that have nothing to do with the motion. */
-static int sir_epidemic_near(const double guess[3], const double last[3])
+/* the Casimirs */
+void sir_epidemic_casimirs(const sir_epidemic_params *params, const double x[3], double out[])
 {
-    double distance = 0.0, size = 0.0;
-    for (int i = 0; i < 3; ++i) {
-        distance += fabs(guess[i] - last[i]);
-        size += fabs(last[i]);
-    }
-    return distance <= 4.0 * size;
+    (void)params;
+    const double S = x[0], I_ = x[1], R = x[2];
+    out[0] = R + (I_ + S);
 }
 
-/* The guess for the next value (y), from earlier ones; 0 if there is none. */
-static int sir_epidemic_predict(const sir_epidemic_memory *memory, double value[3])
+/* pi(x) grad H(x) */
+void sir_epidemic_vector_field(const sir_epidemic_params *params, const double x[3], double out[3])
 {
-    const int last = memory->count - 1;
-    double odd[3] = { 0.0 }, binomial = -1.0;
-    memset(value, 0, 3 * sizeof value[0]);
-    if (memory->fitting) {
-        for (int k = 0; k < memory->terms; k += 2)
-            for (int i = 0; i < 3; ++i) {
-                value[i] += memory->weight[k][i][0] * memory->past[last - k][i];
-                odd[i] += memory->weight[k + 1][i][0] * memory->past[last - 1 - k][i];
-            }
-        for (int i = 0; i < 3; ++i) value[i] += odd[i];
-    } else {
-        for (int k = 0; k < memory->order && k <= last; ++k) {
-            binomial *= -(double)(memory->order - k) / (k + 1);
-            for (int i = 0; i < 3; ++i) value[i] += binomial * memory->past[last - k][i];
-        }
-    }
-    return last >= 0 && sir_epidemic_near(value, memory->past[last]);
+    if (params == NULL) params = &sir_epidemic_default_params;
+    const double beta = params->beta, gamma = params->gamma, S = x[0], I_ = x[1];
+    const double t1 = I_ * S, t2 = beta * t1, t3 = t1 * (gamma / S - beta);
+    out[0] = -t2;
+    out[1] = -t3;
+    out[2] = t2 + t3;
 }
 
-/* Choose the guess that would have been best for a value that took several iterations. */
-static void sir_epidemic_judge(sir_epidemic_memory *memory, const double value[3])
+/* ---- Compensated sums, linear equations ---- */
+/* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to
+   its last bit: were it rounded with the change, corrections of one sign would add up to a drift. 0, and x as
+   before, if the sum is not finite. */
+static int sir_epidemic_advance(sir_epidemic_solver *s, const double change[sir_epidemic_DIM],
+    const double correction[sir_epidemic_DIM])
 {
-    double row[8 + 1][3], guess[3], least = HUGE_VAL, fitted = HUGE_VAL;
-    const int rows = memory->count < 8 ? memory->count : 8;
-    memcpy(row[0], value, sizeof row[0]);
-    for (int k = 0; k < rows; ++k) memcpy(row[k + 1], memory->past[memory->count - 1 - k], sizeof row[0]);
-    for (int order = 1; order <= rows; ++order) { /* row[0] becomes the backward difference of this order */
-        double size = 0.0;
-        for (int k = 0; k <= rows - order; ++k)
-            for (int i = 0; i < 3; ++i) row[k][i] -= row[k + 1][i];
-        for (int i = 0; i < 3; ++i) size += fabs(row[0][i]);
-        if (size < least) {
-            least = size;
-            memory->order = order;
-        }
-    }
-    memory->fitting = memory->terms > 0;
-    if (memory->fitting && sir_epidemic_predict(memory, guess)) {
-        fitted = 0.0;
-        for (int i = 0; i < 3; ++i) fitted += fabs(value[i] - guess[i]);
-    }
-    memory->fitting = memory->terms > 0 && fitted <= least;
-    if (memory->order == 0) memory->order = 1;
-}
-
-/* Make eight columns orthogonal to one, by the multiples of it that are put into r. Where that one is among the eight, those
-   up to it stay as they are, and inverse becomes one over its squared length. The number of rows is even. */
-static void sir_epidemic_project(int rows, double (*one)[8], int column, double *inverse, double (*eight)[8], double r[8])
-{
-    double even[8] = { 0.0 }, odd[8] = { 0.0 };
-    for (int i = 0; i < rows; i += 2) {
-        const double entry = one[i][column], next = one[i + 1][column];
-        for (int l = 0; l < 8; ++l) even[l] += entry * eight[i][l];
-        for (int l = 0; l < 8; ++l) odd[l] += next * eight[i + 1][l];
-    }
-    for (int l = 0; l < 8; ++l) even[l] += odd[l];
-    if (one == eight) {
-        *inverse = even[column] > 0.0 ? 1.0 / even[column] : 0.0;
-        memset(even, 0, ((size_t)column + 1) * sizeof even[0]);
-    }
-    for (int l = 0; l < 8; ++l) r[l] = even[l] *= *inverse;
-    for (int i = 0; i < rows; ++i) {
-        const double entry = one[i][column];
-        for (int l = 0; l < 8; ++l) eight[i][l] -= entry * even[l];
-    }
-}
-
-/* By how much recurrences miss the last of these values. */
-static double sir_epidemic_missed(const double *value, double (*weight)[8])
-{
-    enum { AHEAD = 8, WINDOW = 40, CHECKS = 8 };
-    double most = 0.0;
-    for (int i = 0; i < CHECKS; ++i) {
-        double guess[8] = { 0.0 };
-        for (int k = 0; k < WINDOW; ++k)
-            for (int l = 0; l < 8; ++l) guess[l] += weight[k][l] * value[i + WINDOW - 1 - k];
-        for (int l = 0; l < AHEAD; ++l) most = fmax(most, fabs(guess[l] - value[i + WINDOW + l]));
-    }
-    return most;
-}
-
-/* Fit the recurrences value[m + l] = sum of weight[k][..][l] * value[m - 1 - k], l = 0 ... 8 - 1, to the history of
-   a component: ridge least squares by modified Gram-Schmidt, the ridge at the level of rounding. Columns are taken in by
-   eights, until they leave next to nothing of the right-hand sides. How many past values are used; 0 if the recurrences do
-   not foresee the last values, which they were not fitted to. */
-static int sir_epidemic_train(sir_epidemic_memory *memory, int component)
-{
-    enum { AHEAD = 8, WINDOW = 40, ROWS = 56 };
-    double q[WINDOW / 8][ROWS + WINDOW][8], r[WINDOW / 8][WINDOW][8], inverse[WINDOW]; /* eight columns in each part */
-    double right[ROWS + WINDOW][8], weight[WINDOW][8], value[111], largest = 0.0, left = HUGE_VAL;
-    int terms = 0;
-    memset(q, 0, sizeof q);
-    memset(right, 0, sizeof right);
-    memset(weight, 0, sizeof weight);
-    for (int i = 0; i < 111; ++i) {
-        value[i] = memory->past[memory->count - 111 + i][component];
-        if (fabs(value[i]) > largest) largest = fabs(value[i]);
-    }
-    for (int i = 0; i < ROWS; ++i)
-        for (int l = 0; l < AHEAD; ++l) right[i][l] = value[i + WINDOW + l];
-    while (terms < WINDOW && left > 3e-12 * largest) {
-        const int part = terms / 8, rows = ROWS + terms + 8; /* further rows of the ridge are zero in these columns */
-        for (int i = 0; i < ROWS; ++i)
-            for (int l = 0; l < 8; ++l) q[part][i][l] = value[i + WINDOW - 1 - terms - l];
-        for (int l = 0; l < 8; ++l) q[part][ROWS + terms + l][l] = 1e-15 * largest;
-        for (int k = 0; k < terms; ++k) sir_epidemic_project(rows, q[k / 8], k % 8, &inverse[k], q[part], r[part][k]);
-        for (int l = 0; l < 8; ++l, ++terms) {
-            sir_epidemic_project(rows, q[part], l, &inverse[terms], q[part], r[part][terms]);
-            sir_epidemic_project(rows, q[part], l, &inverse[terms], right, weight[terms]);
-        }
-        double sum[8] = { 0.0 };
-        for (int i = 0; i < ROWS; ++i)
-            for (int l = 0; l < 8; ++l) sum[l] += fabs(right[i][l]);
-        left = 0.0;
-        for (int l = 0; l < 8; ++l) left += sum[l] / ROWS;
-    }
-    for (int k = terms - 1; k >= 0; --k)
-        for (int j = k + 1; j < terms; ++j)
-            for (int l = 0; l < 8; ++l) weight[k][l] -= r[j / 8][k][j % 8] * weight[j][l];
-    for (int k = 0; k < WINDOW; ++k) memcpy(memory->weight[k][component], weight[k], AHEAD * sizeof(double));
-    return sir_epidemic_missed(value + ROWS, weight) <= 1e-07 * largest ? terms : 0;
-}
-
-/* Drop what is old, if so many values would not fit into the history. */
-static void sir_epidemic_make_room(sir_epidemic_memory *memory, int values)
-{
-    if (memory->count + values <= 222) return;
-    memmove(memory->past, memory->past + memory->count - 111, 111 * sizeof memory->past[0]);
-    memory->count = 111;
-}
-
-/* Add a value to the history. */
-static void sir_epidemic_record(sir_epidemic_memory *memory, const double value[3])
-{
-    sir_epidemic_make_room(memory, 1);
-    memcpy(memory->past[memory->count++], value, 3 * sizeof value[0]);
-}
-
-/* Fit the recurrence to the last values; with every time, wait longer before it is done again. */
-static void sir_epidemic_fit(sir_epidemic_memory *memory)
-{
-    int found = 1;
-    memory->terms = 0;
-    for (int i = 0; i < 3 && found; ++i) {
-        const int terms = sir_epidemic_train(memory, i);
-        found = terms > 0;
-        if (terms > memory->terms) memory->terms = terms;
-    }
-    if (!found) memory->terms = 0;
-    memory->fitting = found;
-    ++memory->fits;
-    memory->slow = 0;
-    memory->patience = memory->patience < 10000 ? 2 * memory->patience + 150 : 20000;
-}
-
-/* Take in the solved value: what took one iteration needs no better guess. */
-static void sir_epidemic_remember(sir_epidemic_memory *memory, const double value[3], int iterations)
-{
-    if (iterations > 1) sir_epidemic_judge(memory, value);
-    sir_epidemic_record(memory, value);
-    memory->slow = iterations > 1 ? memory->slow + 1 : 0;
-    if (memory->slow > memory->patience && memory->count >= 111) sir_epidemic_fit(memory);
-}
-
-/* Whether an increment is that of the motion. Where the step is too large, the equation may have been solved by a point far
-   away, at another energy, that has nothing to do with it. */
-static int sir_epidemic_plausible(const sir_epidemic_solver *s, int stage, const double increment[3])
-{
-    double moved = 0.0, size = 0.0, field[3], middle[3], end[3];
-    for (int i = 0; i < 3; ++i) {
-        moved += fabs(increment[i]);
-        size += fabs(s->x[i]);
-    }
-    if (moved <= 1.5 * size) return 1;
-    sir_epidemic_vector_field(&s->params, s->x, field);
-    for (int i = 0; i < 3; ++i) {
-        size += fabs(sir_epidemic_fractions[stage] * s->h * field[i]);
-        middle[i] = s->x[i] + 0.5 * increment[i];
-        end[i] = s->x[i] + increment[i];
-    }
-    if (moved <= 1.5 * size) return 1;
-    const double before = sir_epidemic_hamiltonian(&s->params, s->x), after = sir_epidemic_hamiltonian(&s->params, end);
-    const double scale = fabs(before) + fabs(sir_epidemic_hamiltonian(&s->params, middle)) + fabs(after);
-    return fabs(after - before) <= 0.5 * scale;
-}
-
-/* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to its last
-   bit: were it rounded with the change, corrections of one sign would add up to a drift. 0, and x as before, if the
-   sum is not finite. */
-static int sir_epidemic_advance(sir_epidemic_solver *s, const double change[3], const double correction[3])
-{
-    double x[3], carry[3];
-    for (int i = 0; i < 3; ++i) {
+    double x[sir_epidemic_DIM], carry[sir_epidemic_DIM];
+    for (int i = 0; i < sir_epidemic_DIM; ++i) {
         const double sum = s->x[i] + change[i], added = sum - s->x[i];
         const double lost = (s->x[i] - (sum - added)) + (change[i] - added);
         const double small = lost + (s->carry[i] + correction[i]);
@@ -347,6 +143,92 @@ static int sir_epidemic_advance(sir_epidemic_solver *s, const double change[3], 
     return 1;
 }
 
+/* Newton matrices are I + O(h): a pivot whose reciprocal is larger than this is far from 1. */
+#define sir_epidemic_LARGEST_RECIPROCAL 1e3
+
+/* Solve matrix * solution = side, both overwritten. The matrix is I + O(h): 0 if a pivot is far from 1. */
+static int sir_epidemic_solve(double matrix[sir_epidemic_DIM * sir_epidemic_DIM],
+    double side[sir_epidemic_DIM])
+{
+    double solution[sir_epidemic_DIM], reciprocal[sir_epidemic_DIM], largest = 0.0;
+    sir_epidemic_eliminate(matrix, side, solution, reciprocal);
+    for (int i = 0; i < sir_epidemic_DIM; ++i)
+        if (!(fabs(reciprocal[i]) <= largest)) largest = fabs(reciprocal[i]);
+    if (!(largest < sir_epidemic_LARGEST_RECIPROCAL)) return 0;
+    memcpy(side, solution, sizeof solution);
+    return 1;
+}
+
+/* ---- Starting guesses ---- */
+/* How far from the last value a guess may be, in sizes of that value. */
+#define sir_epidemic_REACH 4.0
+
+/* The guess for the next value from the last ones: the sum of their backward differences. 0 if there is none,
+   or if it is far away, where the equation of a step has solutions that have nothing to do with the motion.
+   */
+static int sir_epidemic_predict(const sir_epidemic_history *history, double value[sir_epidemic_DIM])
+{
+    double distance = 0.0, size = 0.0;
+    for (int i = 0; i < sir_epidemic_DIM; ++i) {
+        value[i] = 0.0;
+        for (int k = 0; k < history->order; ++k) value[i] += history->difference[k][i];
+        distance += fabs(value[i] - history->difference[0][i]);
+        size += fabs(history->difference[0][i]);
+    }
+    return history->order > 0 && distance <= sir_epidemic_REACH * size;
+}
+
+/* Take in the solved value. The guess of order k missed it by its k-th difference: the next is of the best
+   order. */
+static void sir_epidemic_remember(sir_epidemic_history *history, const double value[sir_epidemic_DIM])
+{
+    double least = HUGE_VAL, next[sir_epidemic_DIM];
+    memcpy(next, value, sizeof next);
+    for (int k = 0; k <= history->count && k < sir_epidemic_DIFFERENCES; ++k) {
+        double size = 0.0;
+        for (int i = 0; i < sir_epidemic_DIM; ++i) {
+            const double last = history->difference[k][i];
+            history->difference[k][i] = next[i];
+            size += fabs(next[i]);
+            next[i] -= last;
+        }
+        if (k > 0 && size < least) {
+            least = size;
+            history->order = k;
+        }
+    }
+    if (history->count == 0) history->order = 1;
+    if (history->count < sir_epidemic_DIFFERENCES) ++history->count;
+}
+
+/* How far a step may lead, in sizes of the state and of what the vector field says, if the energy is lost;
+   and the part of the energy that counts as lost. */
+#define sir_epidemic_PLAUSIBLE 1.5
+#define sir_epidemic_LOST 0.5
+
+/* Whether an increment is that of the motion. Where the step is too large, the equation may have been solved
+   by a point far away, at another energy, that has nothing to do with it. */
+static int sir_epidemic_plausible(const sir_epidemic_solver *s, const double increment[sir_epidemic_DIM])
+{
+    double moved = 0.0, size = 0.0, field[sir_epidemic_DIM], middle[sir_epidemic_DIM], end[sir_epidemic_DIM];
+    for (int i = 0; i < sir_epidemic_DIM; ++i) {
+        moved += fabs(increment[i]);
+        size += fabs(s->x[i]);
+    }
+    if (moved <= sir_epidemic_PLAUSIBLE * size) return 1;
+    sir_epidemic_vector_field(&s->params, s->x, field);
+    for (int i = 0; i < sir_epidemic_DIM; ++i) {
+        size += fabs(s->h * field[i]);
+        middle[i] = s->x[i] + 0.5 * increment[i];
+        end[i] = s->x[i] + increment[i];
+    }
+    if (moved <= sir_epidemic_PLAUSIBLE * size) return 1;
+    const double before = sir_epidemic_hamiltonian(&s->params, s->x), after =
+        sir_epidemic_hamiltonian(&s->params, end);
+    const double scale = fabs(before) + fabs(sir_epidemic_hamiltonian(&s->params, middle)) + fabs(after);
+    return fabs(after - before) <= sir_epidemic_LOST * scale;
+}
+
 /* Coefficient k of the product of two Taylor series. */
 static double sir_epidemic_taylor_product(const double *a, const double *b, int k)
 {
@@ -355,13 +237,48 @@ static double sir_epidemic_taylor_product(const double *a, const double *b, int 
     return sum;
 }
 
-/* Whether dm/dt = pi(m) p holds at a point m, where the expansion has the given slope: one with gaps between its terms,
-   like t + t^9, or across the kink of an absolute value, only looks as if it had converged. */
-static int sir_epidemic_holds(const double *coef, const double p[3], const double m[3], const double slope[3])
+/* The first coefficients of the series of a path, those of the coordinates given. */
+static void sir_epidemic_path_begin(const double *coef, const double p[3],
+    double s[10][sir_epidemic_TERMS + 1], double f[1])
 {
     (void)coef;
-    double e[10], field[3], scale = 0.0;
-    memcpy(e, m, 3 * sizeof *e);
+    (void)f;
+    s[3][0] = s[1][0] * s[0][0];
+    s[4][0] = p[1] * s[3][0];
+    s[5][0] = p[2] * s[3][0];
+    s[6][0] = s[4][0] - s[5][0];
+    s[7][0] = p[0] * s[3][0];
+    s[8][0] = s[5][0] - s[7][0];
+    s[9][0] = s[7][0] - s[4][0];
+}
+
+/* Coefficient k of the series, and with it coefficient k + 1 of the coordinates. */
+static void sir_epidemic_path_order(const double *coef, const double p[3],
+    double s[10][sir_epidemic_TERMS + 1], const double f[1], int k)
+{
+    (void)coef;
+    (void)f;
+    if (k > 0) {
+        s[3][k] = sir_epidemic_taylor_product(s[1], s[0], k);
+        s[4][k] = p[1] * s[3][k];
+        s[5][k] = p[2] * s[3][k];
+        s[6][k] = s[4][k] - s[5][k];
+        s[7][k] = p[0] * s[3][k];
+        s[8][k] = s[5][k] - s[7][k];
+        s[9][k] = s[7][k] - s[4][k];
+    }
+    s[0][k + 1] = s[6][k] / (k + 1);
+    s[1][k + 1] = s[8][k] / (k + 1);
+    s[2][k + 1] = s[9][k] / (k + 1);
+}
+
+/* The slope of the path at a point m. */
+static void sir_epidemic_path_field(const double *coef, const double p[3], const double m[3],
+    double field[3])
+{
+    double e[10];
+    (void)coef;
+    memcpy(e, m, 3 * sizeof e[0]);
     e[3] = e[1] * e[0];
     e[4] = p[1] * e[3];
     e[5] = p[2] * e[3];
@@ -372,48 +289,47 @@ static int sir_epidemic_holds(const double *coef, const double p[3], const doubl
     field[0] = e[6];
     field[1] = e[8];
     field[2] = e[9];
-    for (int i = 0; i < 3; ++i) scale += fabs(m[i]) + fabs(slope[i]);
-    for (int i = 0; i < 3; ++i)
+}
+
+/* ---- The implicit step, along paths dm/dt = pi(m) p ---- */
+enum {
+    sir_epidemic_LONGEST_PATH = 128, /* pieces of a path, a power of 2 */
+    /* of all paths that are tried in a solve: steps that need more are wrong by as much as the state */
+    sir_epidemic_MOST_PIECES = 512
+};
+
+/* Whether dm/dt = pi(m) p holds at a point m, where the expansion has the given slope: one with gaps between
+   its terms, like t + t^9, or across the kink of an absolute value, only looks as if it had converged. */
+static int sir_epidemic_holds(const double *coef, const double p[sir_epidemic_DIM],
+    const double m[sir_epidemic_DIM], const double slope[sir_epidemic_DIM])
+{
+    double field[sir_epidemic_DIM], scale = 0.0;
+    sir_epidemic_path_field(coef, p, m, field);
+    for (int i = 0; i < sir_epidemic_DIM; ++i) scale += fabs(m[i]) + fabs(slope[i]);
+    for (int i = 0; i < sir_epidemic_DIM; ++i)
         if (!(fabs(field[i] - slope[i]) <= 2e-15 * scale)) return 0;
     return 1;
 }
 
-/* The path dm/dt = pi(m) p, 0 <= t <= 1, from start, by its Taylor series: change is m(1) - start, mean the mean of
-   m - start. The number of terms follows from their size; 0 if 30 do not suffice. */
-static int sir_epidemic_piece(const double *coef, const double p[3], const double start[3], double change[3],
-    double mean[3])
+/* A path for 0 <= t <= 1, from start, by its Taylor series: change is m(1) - start, mean the mean of m -
+   start. The number of terms follows from their size; 0 if sir_epidemic_TERMS do not suffice. */
+static int sir_epidemic_piece(const double *coef, const double p[sir_epidemic_DIM],
+    const double start[sir_epidemic_DIM], double change[sir_epidemic_DIM], double mean[sir_epidemic_DIM])
 {
-    (void)coef;
-    double s[10][30 + 1], end[3], slope[3], norm = 0.0;
+    double series[sir_epidemic_SERIES][sir_epidemic_TERMS + 1], fixed[sir_epidemic_FIXED],
+        end[sir_epidemic_DIM], slope[sir_epidemic_DIM], norm = 0.0;
     int small = 0;
-    for (int i = 0; i < 3; ++i) {
-        s[i][0] = start[i];
+    for (int i = 0; i < sir_epidemic_DIM; ++i) {
+        series[i][0] = start[i];
         change[i] = mean[i] = slope[i] = 0.0;
         norm += fabs(start[i]);
     }
-    s[3][0] = s[1][0] * s[0][0];
-    s[4][0] = p[1] * s[3][0];
-    s[5][0] = p[2] * s[3][0];
-    s[6][0] = s[4][0] - s[5][0];
-    s[7][0] = p[0] * s[3][0];
-    s[8][0] = s[5][0] - s[7][0];
-    s[9][0] = s[7][0] - s[4][0];
-    for (int k = 0; k < 30; ++k) {
-        if (k > 0) {
-            s[3][k] = sir_epidemic_taylor_product(s[1], s[0], k);
-            s[4][k] = p[1] * s[3][k];
-            s[5][k] = p[2] * s[3][k];
-            s[6][k] = s[4][k] - s[5][k];
-            s[7][k] = p[0] * s[3][k];
-            s[8][k] = s[5][k] - s[7][k];
-            s[9][k] = s[7][k] - s[4][k];
-        }
-        s[0][k + 1] = s[6][k] / (k + 1);
-        s[1][k + 1] = s[8][k] / (k + 1);
-        s[2][k + 1] = s[9][k] / (k + 1);
+    sir_epidemic_path_begin(coef, p, series, fixed);
+    for (int k = 0; k < sir_epidemic_TERMS; ++k) {
+        sir_epidemic_path_order(coef, p, series, fixed, k);
         int negligible = 1;
-        for (int i = 0; i < 3; ++i) {
-            const double term = s[i][k + 1];
+        for (int i = 0; i < sir_epidemic_DIM; ++i) {
+            const double term = series[i][k + 1];
             change[i] += term;
             mean[i] += term / (k + 2);
             slope[i] += (k + 1) * term;
@@ -426,23 +342,25 @@ static int sir_epidemic_piece(const double *coef, const double p[3], const doubl
     return 0;
 }
 
-/* The whole path from x, in 1, 2, 4, ... pieces until each expansion converges. Whatever p is, the end of the path
-   lies on the symplectic leaf of x. 0 if the path is too long or leaves the domain. *made counts all pieces. */
-static int sir_epidemic_path(const double *coef, const double x[3], const double p[3], double change[3],
-    double mean[3], int *made)
+/* The whole path from x, in 1, 2, 4, ... pieces until each expansion converges. Whatever p is, the end of the
+   path lies on the symplectic leaf of x. 0 if the path is too long or leaves the domain. *made counts all
+   pieces. */
+static int sir_epidemic_path(const double *coef, const double x[sir_epidemic_DIM],
+    const double p[sir_epidemic_DIM], double change[sir_epidemic_DIM], double mean[sir_epidemic_DIM],
+    int *made)
 {
-    for (int pieces = 1; pieces <= 128; pieces *= 2) {
-        double q[3], point[3], shift[3], local[3];
+    for (int pieces = 1; pieces <= sir_epidemic_LONGEST_PATH; pieces *= 2) {
+        double q[sir_epidemic_DIM], point[sir_epidemic_DIM], shift[sir_epidemic_DIM], local[sir_epidemic_DIM];
         int good = 1;
-        for (int i = 0; i < 3; ++i) {
+        for (int i = 0; i < sir_epidemic_DIM; ++i) {
             q[i] = p[i] / pieces;
             change[i] = mean[i] = 0.0;
         }
         for (int piece = 0; piece < pieces && good; ++piece) {
-            for (int i = 0; i < 3; ++i) point[i] = x[i] + change[i];
+            for (int i = 0; i < sir_epidemic_DIM; ++i) point[i] = x[i] + change[i];
             good = sir_epidemic_piece(coef, q, point, shift, local);
             ++*made;
-            for (int i = 0; i < 3; ++i) {
+            for (int i = 0; i < sir_epidemic_DIM; ++i) {
                 mean[i] += (change[i] + local[i]) / pieces;
                 change[i] += shift[i];
             }
@@ -454,47 +372,52 @@ static int sir_epidemic_path(const double *coef, const double x[3], const double
 
 /* The residual p - grad S_h(mean of the path) of the equation for p, with that mean y, the path's change of
    x and an approximate Jacobian of the residual. 0 if the path cannot be followed. */
-static int sir_epidemic_residual(sir_epidemic_solver *s, const double *coef, const double p[3], double y[3],
-    double residual[3], double change[3], double jacobian[9],
-    int *made)
+static int sir_epidemic_residual(sir_epidemic_solver *s, const double *coef, const double p[sir_epidemic_DIM],
+    double y[sir_epidemic_DIM], double residual[sir_epidemic_DIM], double change[sir_epidemic_DIM],
+    double jacobian[sir_epidemic_DIM * sir_epidemic_DIM], int *made)
 {
-    double mean[3];
+    double mean[sir_epidemic_DIM];
     if (!sir_epidemic_path(coef, s->x, p, change, mean, made)) return 0;
-    for (int i = 0; i < 3; ++i) y[i] = s->x[i] + mean[i];
+    for (int i = 0; i < sir_epidemic_DIM; ++i) y[i] = s->x[i] + mean[i];
     sir_epidemic_generate(coef, y, residual, jacobian);
-    for (int i = 0; i < 3; ++i) residual[i] = p[i] - residual[i];
+    for (int i = 0; i < sir_epidemic_DIM; ++i) residual[i] = p[i] - residual[i];
     ++s->evaluations;
     return 1;
 }
 
 /* The Jacobian by differences, for steps so large that the approximate one does not contract. */
-static int sir_epidemic_differences(sir_epidemic_solver *s, const double *coef, const double p[3],
-    const double residual[3], double jacobian[9], int *made)
+static int sir_epidemic_differences(sir_epidemic_solver *s, const double *coef,
+    const double p[sir_epidemic_DIM], const double residual[sir_epidemic_DIM],
+    double jacobian[sir_epidemic_DIM * sir_epidemic_DIM], int *made)
 {
-    double q[3], y[3], moved[3], change[3], unused[9], norm = DBL_MIN;
-    for (int i = 0; i < 3; ++i) norm = fabs(p[i]) > norm ? fabs(p[i]) : norm;
-    for (int j = 0; j < 3; ++j) {
+    double q[sir_epidemic_DIM], y[sir_epidemic_DIM], moved[sir_epidemic_DIM], change[sir_epidemic_DIM],
+        unused[sir_epidemic_DIM * sir_epidemic_DIM], norm = DBL_MIN;
+    for (int i = 0; i < sir_epidemic_DIM; ++i) norm = fabs(p[i]) > norm ? fabs(p[i]) : norm;
+    for (int j = 0; j < sir_epidemic_DIM; ++j) {
         memcpy(q, p, sizeof q);
         q[j] += 1e-7 * norm;
         if (!sir_epidemic_residual(s, coef, q, y, moved, change, unused, made)) return 0;
-        for (int i = 0; i < 3; ++i) jacobian[i * 3 + j] = (moved[i] - residual[i]) / (q[j] - p[j]);
+        for (int i = 0; i < sir_epidemic_DIM; ++i)
+            jacobian[i * sir_epidemic_DIM + j] = (moved[i] - residual[i]) / (q[j] - p[j]);
     }
     return 1;
 }
 
-/* Solve p = grad S_h(mean of the path from x under p) and move to the end of that path. Where that takes more than
-   512 pieces of paths, the step is so large that a solution would mean nothing. */
-static sir_epidemic_status sir_epidemic_attempt(sir_epidemic_solver *s, int stage)
+/* Solve p = grad S_h(mean of the path from x under p) and move to the end of that path. Where that takes more
+   than sir_epidemic_MOST_PIECES pieces of paths, the step is so large that a solution would mean nothing. */
+static sir_epidemic_status sir_epidemic_attempt(sir_epidemic_solver *s)
 {
-    const double *coef = s->coef[stage], none[3] = { 0.0 };
-    sir_epidemic_memory *memory = &s->memory[stage];
-    double p[3], y[3], residual[3], change[3], jacobian[9], previous = HUGE_VAL;
-    if (!sir_epidemic_predict(memory, y)) memcpy(y, s->x, sizeof y);
+    const double *coef = s->coef, none[sir_epidemic_DIM] = { 0.0 };
+    double p[sir_epidemic_DIM], y[sir_epidemic_DIM], residual[sir_epidemic_DIM], change[sir_epidemic_DIM],
+        jacobian[sir_epidemic_DIM * sir_epidemic_DIM], previous = HUGE_VAL;
+    if (!sir_epidemic_predict(&s->history, y)) memcpy(y, s->x, sizeof y);
     sir_epidemic_generate(coef, y, p, jacobian);
-    for (int iteration = 0, made = 0; iteration < 20 && made <= 512; ++iteration) {
-        if (!sir_epidemic_residual(s, coef, p, y, residual, change, jacobian, &made)) return sir_epidemic_NO_CONVERGENCE;
+    for (int iteration = 0, made = 0; iteration < sir_epidemic_MAX_ITERATIONS && made <=
+        sir_epidemic_MOST_PIECES; ++iteration) {
+        if (!sir_epidemic_residual(s, coef, p, y, residual, change, jacobian, &made))
+            return sir_epidemic_NO_CONVERGENCE;
         double size = 0.0, norm = DBL_MIN;
-        for (int i = 0; i < 3; ++i) {
+        for (int i = 0; i < sir_epidemic_DIM; ++i) {
             if (!isfinite(residual[i])) return sir_epidemic_NOT_FINITE;
             size = fabs(residual[i]) > size ? fabs(residual[i]) : size;
             norm = fabs(p[i]) > norm ? fabs(p[i]) : norm;
@@ -502,63 +425,43 @@ static sir_epidemic_status sir_epidemic_attempt(sir_epidemic_solver *s, int stag
         size /= norm;
         /* The second test: residuals no longer shrink, the solve has reached the level of rounding. */
         if (size <= 4e-16 || (previous < 1e-12 && size > 0.25 * previous)) {
-            if (!sir_epidemic_plausible(s, stage, change)) return sir_epidemic_NO_CONVERGENCE;
+            if (!sir_epidemic_plausible(s, change)) return sir_epidemic_NO_CONVERGENCE;
             if (!sir_epidemic_advance(s, change, none)) return sir_epidemic_NOT_FINITE;
-            sir_epidemic_remember(memory, y, iteration);
+            sir_epidemic_remember(&s->history, y);
             return sir_epidemic_OK;
         }
         const int slow = iteration >= 3 && size > 0.05 * previous;
-        if (slow && !sir_epidemic_differences(s, coef, p, residual, jacobian, &made)) return sir_epidemic_NO_CONVERGENCE;
+        if (slow && !sir_epidemic_differences(s, coef, p, residual, jacobian, &made))
+            return sir_epidemic_NO_CONVERGENCE;
         if (!sir_epidemic_solve(jacobian, residual)) return sir_epidemic_SINGULAR;
-        for (int i = 0; i < 3; ++i) p[i] -= residual[i];
+        for (int i = 0; i < sir_epidemic_DIM; ++i) p[i] -= residual[i];
         previous = size;
     }
     return sir_epidemic_NO_CONVERGENCE;
 }
 
-/* The 1 stages of one step. If one fails, the state is as before the step. */
-static sir_epidemic_status sir_epidemic_stages(sir_epidemic_solver *s)
-{
-    double x[3], carry[3];
-    memcpy(x, s->x, sizeof x);
-    memcpy(carry, s->carry, sizeof carry);
-    for (int stage = 0; stage < 1; ++stage) {
-        sir_epidemic_status status = sir_epidemic_attempt(s, stage);
-        /* A guess from earlier steps may have misled it: once more without. */
-        if (status != sir_epidemic_OK && s->memory[stage].count > 0) {
-            memset(&s->memory[stage], 0, sizeof s->memory[stage]);
-            status = sir_epidemic_attempt(s, stage);
-        }
-        if (status != sir_epidemic_OK) {
-            memcpy(s->x, x, sizeof x);
-            memcpy(s->carry, carry, sizeof carry);
-            return status;
-        }
-    }
-    return sir_epidemic_OK;
-}
-
-/* Whether steps can be made with these parameters: finite, positive where the spec says so, and with finite
-   coefficients for a step so short that it has no part in it. */
+/* ---- The solver ---- */
+/* Whether steps can be made with these parameters: allowed, and with finite coefficients for a step so short
+   that it has no part in it. */
 static int sir_epidemic_admissible(const sir_epidemic_params *params)
 {
-    double coef[4];
-    if (!(isfinite(params->beta) && params->beta > 0.0)) return 0;
-    if (!(isfinite(params->gamma) && params->gamma > 0.0)) return 0;
+    double coef[sir_epidemic_COEFFICIENTS];
+    if (!sir_epidemic_allowed(params)) return 0;
     sir_epidemic_prepare(params, 1e-100, coef);
-    for (int k = 0; k < 4; ++k)
+    for (int k = 0; k < sir_epidemic_COEFFICIENTS; ++k)
         if (!isfinite(coef[k])) return 0;
     return 1;
 }
 
-/* All of sir_epidemic_init but the gauge. The arguments may be parts of *s: they are read before it is written. */
-static sir_epidemic_status sir_epidemic_start(sir_epidemic_solver *s, const sir_epidemic_params *params, const double x0[3])
+/* The arguments may be parts of *s: they are read before it is written. */
+sir_epidemic_status sir_epidemic_init(sir_epidemic_solver *s, const sir_epidemic_params *params,
+    const double x0[sir_epidemic_DIM])
 {
     if (s == NULL || x0 == NULL) return sir_epidemic_BAD_ARGUMENT;
     const sir_epidemic_params own = params != NULL ? *params : sir_epidemic_default_params;
-    double x[3];
+    double x[sir_epidemic_DIM];
     memcpy(x, x0, sizeof x);
-    for (int i = 0; i < 3; ++i)
+    for (int i = 0; i < sir_epidemic_DIM; ++i)
         if (!isfinite(x[i])) return sir_epidemic_BAD_ARGUMENT;
     if (!sir_epidemic_admissible(&own)) return sir_epidemic_BAD_ARGUMENT;
     memset(s, 0, sizeof *s);
@@ -567,1486 +470,83 @@ static sir_epidemic_status sir_epidemic_start(sir_epidemic_solver *s, const sir_
     return sir_epidemic_OK;
 }
 
-sir_epidemic_status sir_epidemic_init(sir_epidemic_solver *s, const sir_epidemic_params *params,
-                                      const double x0[3])
-{
-    return sir_epidemic_start(s, params, x0);
-}
-
 /* What depends on the step size; nothing where that is as before. */
 static sir_epidemic_status sir_epidemic_set_step(sir_epidemic_solver *s, double h)
 {
     if (s == NULL || !isfinite(h)) return sir_epidemic_BAD_ARGUMENT;
-    if (s->ready && memcmp(&h, &s->h, sizeof h) == 0) return sir_epidemic_OK;
-    for (int stage = 0; stage < 1; ++stage)
-        sir_epidemic_prepare(&s->params, sir_epidemic_fractions[stage] * h, s->coef[stage]);
-    memset(s->memory, 0, sizeof s->memory);
-    for (int stage = 0; stage < 1; ++stage) s->memory[stage].patience = 150;
-    s->pause = 16;
-    s->setback = s->foreseeing = 0;
-    s->doubt = s->retry = 0;
-    s->effort = 0.0;
-    s->passes = INT_MAX;
+    if (s->prepared && memcmp(&h, &s->h, sizeof h) == 0) return sir_epidemic_OK;
+    sir_epidemic_prepare(&s->params, h, s->coef);
+    memset(&s->history, 0, sizeof s->history);
     s->h = h;
-    s->ready = 1;
+    s->t_before_h = s->t;
+    s->steps_before_h = s->steps;
+    s->prepared = 1;
     return sir_epidemic_OK;
+}
+
+/* One stage. A guess from earlier steps may have misled it: then once more without. */
+static sir_epidemic_status sir_epidemic_stage(sir_epidemic_solver *s)
+{
+    sir_epidemic_status status = sir_epidemic_attempt(s);
+    if (status != sir_epidemic_OK && s->history.count > 0) {
+        memset(&s->history, 0, sizeof s->history);
+        status = sir_epidemic_attempt(s);
+    }
+    return status;
 }
 
 sir_epidemic_status sir_epidemic_step(sir_epidemic_solver *s, double h)
 {
     sir_epidemic_status status = sir_epidemic_set_step(s, h);
     if (status != sir_epidemic_OK) return status;
-    status = sir_epidemic_stages(s);
-    if (status == sir_epidemic_OK) ++s->steps;
+    status = sir_epidemic_stage(s);
+    if (status != sir_epidemic_OK) return status;
+    ++s->steps;
+    s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
     return status;
 }
 
-/*
- * Eight at a time: below, the formulas of a step are evaluated for 8 steps of a trajectory, or members of an
- * ensemble, at once. Compilers make vector instructions of the loops over lanes.
- */
-enum { sir_epidemic_LANES = 8 };
-
-#if defined(__GNUC__)
-typedef double sir_epidemic_lanes[sir_epidemic_LANES] __attribute__((aligned(64))); /* a value in each lane */
-#else
-typedef double sir_epidemic_lanes[sir_epidemic_LANES];
-#endif
-
-#if defined(__clang__)
-#define sir_epidemic_EACH_LANE _Pragma("clang loop vectorize(assume_safety)")
-#pragma clang diagnostic push
-#pragma clang diagnostic ignored "-Wpass-failed"
-#elif defined(__GNUC__)
-#define sir_epidemic_EACH_LANE _Pragma("GCC ivdep") _Pragma("GCC unroll 1")
-#else
-#define sir_epidemic_EACH_LANE
-#endif
-
-/* What all blocks share: coefficients, the same in each lane, and the recurrences by which they are foreseen. */
-typedef struct {
-    int fits[1]; /* the fit that weight is of; -1 for none */
-    sir_epidemic_lanes coef[1][4], weight[1][40][3];
-} sir_epidemic_table;
-
-/* A stage in all lanes, linearised around y. */
-typedef struct {
-    sir_epidemic_lanes y[3], displacement[3], increment[3], residual[3];
-    /* a residual r of alpha(y) = x takes inverse r from y, and gain r from the increment */
-    sir_epidemic_lanes inverse[9], slope[9], gain[9];
-    sir_epidemic_lanes middle[3]; /* of the path, less y */
-    sir_epidemic_lanes alpha_y[9], increment_y[9]; /* of alpha and beta - alpha, with p held fixed */
-} sir_epidemic_model;
-
-/* sir_epidemic_curvature in all lanes. */
-static void sir_epidemic_curvature_lanes(sir_epidemic_lanes coef[restrict 4], sir_epidemic_lanes y[restrict 3],
-                                         sir_epidemic_lanes slope[restrict 3],
-                                         sir_epidemic_lanes slope_jacobian[restrict 9])
-{
-    sir_epidemic_EACH_LANE
-    for (int lane = 0; lane < sir_epidemic_LANES; ++lane) {
-        const double S = y[0][lane];
-        const double I_ = y[1][lane];
-        const double t1 = 1.0 / S;
-        slope[0][lane] = coef[1][lane] + coef[0][lane] * t1;
-        slope[1][lane] = coef[1][lane] + I_ * coef[2][lane];
-        slope[2][lane] = 0.0;
-        slope_jacobian[0][lane] = coef[3][lane] * (t1 * t1);
-        slope_jacobian[1][lane] = 0.0;
-        slope_jacobian[2][lane] = 0.0;
-        slope_jacobian[3][lane] = 0.0;
-        slope_jacobian[4][lane] = coef[2][lane];
-        slope_jacobian[5][lane] = 0.0;
-        slope_jacobian[6][lane] = 0.0;
-        slope_jacobian[7][lane] = 0.0;
-        slope_jacobian[8][lane] = 0.0;
-    }
-}
-
-/* sir_epidemic_momentum in all lanes. */
-static void sir_epidemic_momentum_lanes(sir_epidemic_lanes coef[restrict 4], sir_epidemic_lanes y[restrict 3],
-                                        sir_epidemic_lanes slope[restrict 3])
-{
-    sir_epidemic_EACH_LANE
-    for (int lane = 0; lane < sir_epidemic_LANES; ++lane) {
-        const double S = y[0][lane];
-        const double I_ = y[1][lane];
-        slope[0][lane] = coef[1][lane] + coef[0][lane] / S;
-        slope[1][lane] = coef[1][lane] + I_ * coef[2][lane];
-        slope[2][lane] = 0.0;
-    }
-}
-
-/* sir_epidemic_values in all lanes. */
-static void sir_epidemic_values_lanes(sir_epidemic_lanes coef[restrict 4], sir_epidemic_lanes p[restrict 3],
-                                      sir_epidemic_lanes m[restrict 3], sir_epidemic_lanes value[restrict 10],
-                                      sir_epidemic_lanes fixed[restrict 1])
-{
-    (void)coef;
-    (void)fixed;
-    sir_epidemic_EACH_LANE
-    for (int lane = 0; lane < sir_epidemic_LANES; ++lane) {
-        const double S = m[0][lane];
-        const double I_ = m[1][lane];
-        const double R = m[2][lane];
-        const double t1 = I_ * S;
-        const double t2 = p[1][lane] * t1;
-        const double t3 = p[2][lane] * t1;
-        const double t4 = p[0][lane] * t1;
-        value[0][lane] = S;
-        value[1][lane] = I_;
-        value[2][lane] = R;
-        value[3][lane] = t1;
-        value[4][lane] = t2;
-        value[5][lane] = t3;
-        value[6][lane] = t2 - t3;
-        value[7][lane] = t4;
-        value[8][lane] = t3 - t4;
-        value[9][lane] = t4 - t2;
-    }
-}
-
-/* sir_epidemic_slope_values in all lanes. */
-static void sir_epidemic_slope_values_lanes(sir_epidemic_lanes coef[restrict 4],
-                                            sir_epidemic_lanes p[restrict 3],
-                                            sir_epidemic_lanes value[restrict 10],
-                                            sir_epidemic_lanes fixed[restrict 1],
-                                            sir_epidemic_lanes slope[restrict 13],
-                                            sir_epidemic_lanes slope_fixed[restrict 1])
-{
-    (void)coef;
-    (void)fixed;
-    (void)slope_fixed;
-    sir_epidemic_EACH_LANE
-    for (int lane = 0; lane < sir_epidemic_LANES; ++lane) {
-        const double t1 = p[1][lane] * value[1][lane];
-        const double t2 = p[2][lane] * value[1][lane];
-        const double t3 = p[1][lane] * value[0][lane];
-        const double t4 = p[2][lane] * value[0][lane];
-        const double t5 = p[0][lane] * value[1][lane];
-        const double t6 = p[0][lane] * value[0][lane];
-        slope[0][lane] = t1;
-        slope[1][lane] = t2;
-        slope[2][lane] = t1 - t2;
-        slope[3][lane] = t3;
-        slope[4][lane] = t4;
-        slope[5][lane] = t3 - t4;
-        slope[6][lane] = t5;
-        slope[7][lane] = t2 - t5;
-        slope[8][lane] = t6;
-        slope[9][lane] = t4 - t6;
-        slope[10][lane] = t5 - t1;
-        slope[11][lane] = t6 - t3;
-        slope[12][lane] = -value[3][lane];
-    }
-}
-
-/* sir_epidemic_along_mean in all lanes. */
-static void sir_epidemic_along_mean_lanes(sir_epidemic_lanes even[restrict 18],
-                                          sir_epidemic_lanes odd[restrict 18],
-                                          sir_epidemic_lanes mean[restrict 18],
-                                          sir_epidemic_lanes hessian[restrict 9],
-                                          sir_epidemic_lanes alpha_y[restrict 9],
-                                          sir_epidemic_lanes increment_y[restrict 9],
-                                          sir_epidemic_lanes jacobian[restrict 9],
-                                          sir_epidemic_lanes increment_jacobian[restrict 9],
-                                          sir_epidemic_lanes reciprocal[restrict 3])
-{
-    sir_epidemic_EACH_LANE
-    for (int lane = 0; lane < sir_epidemic_LANES; ++lane) {
-        const double t1 = even[2][lane] - odd[2][lane];
-        const double t2 = 1.0 / mean[0][lane];
-        const double t3 = mean[1][lane] * t2;
-        const double t4 = mean[13][lane] - mean[12][lane] * t3;
-        const double t5 = 1.0 / (mean[7][lane] - mean[6][lane] * t3);
-        const double t6 = mean[6][lane] * t2 * t5;
-        const double t7 = mean[2][lane] * t2;
-        const double t8 = (mean[8][lane] - mean[6][lane] * t7) * t5;
-        const double t9 = 1.0 / (mean[14][lane] - mean[12][lane] * t7 - t4 * t8);
-        const double t10 = (t4 * t6 - mean[12][lane] * t2) * t9;
-        const double t11 = even[0][lane] - odd[0][lane];
-        const double t12 = t7 - t3 * t8;
-        const double t13 = t2 + t3 * t6 - t12 * t10;
-        const double t14 = even[1][lane] - odd[1][lane];
-        const double t15 = t6 + t8 * t10;
-        const double t16 = t4 * t5 * t9;
-        const double t17 = t5 + t8 * t16;
-        const double t18 = t12 * t16 - t3 * t5;
-        const double t19 = t12 * t9;
-        const double t20 = t8 * t9;
-        const double t21 = even[8][lane] - odd[8][lane];
-        const double t22 = even[6][lane] - odd[6][lane];
-        const double t23 = even[7][lane] - odd[7][lane];
-        const double t24 = even[14][lane] - odd[14][lane];
-        const double t25 = even[12][lane] - odd[12][lane];
-        const double t26 = even[13][lane] - odd[13][lane];
-        const double t27 = even[5][lane] - odd[5][lane];
-        const double t28 = even[4][lane] - odd[4][lane];
-        const double t29 = even[3][lane] - odd[3][lane];
-        const double t30 = hessian[6][lane] * mean[11][lane] + (hessian[0][lane] * mean[9][lane] + hessian[3][lane] * mean[10][lane]);
-        const double t31 = 1.0 - (hessian[6][lane] * mean[5][lane] + (hessian[3][lane] * mean[4][lane] + hessian[0][lane] * mean[3][lane]));
-        const double t32 = hessian[6][lane] * mean[17][lane] + (hessian[3][lane] * mean[16][lane] + hessian[0][lane] * mean[15][lane]);
-        const double t33 = t30 * t16 + t31 * t10 - t32 * t9;
-        const double t34 = t32 * t20 - (t31 * t15 + t30 * t17);
-        const double t35 = t32 * t19 + (t31 * t13 - t30 * t18);
-        const double t36 = hessian[7][lane] * mean[17][lane] + (hessian[1][lane] * mean[15][lane] + hessian[4][lane] * mean[16][lane]);
-        const double t37 = 1.0 - (hessian[7][lane] * mean[11][lane] + (hessian[4][lane] * mean[10][lane] + hessian[1][lane] * mean[9][lane]));
-        const double t38 = hessian[7][lane] * mean[5][lane] + (hessian[4][lane] * mean[4][lane] + hessian[1][lane] * mean[3][lane]);
-        const double t39 = t36 * t19 + (t37 * t18 - t38 * t13);
-        const double t40 = t36 * t20 + (t37 * t17 + t38 * t15);
-        const double t41 = t36 * t9 + (t37 * t16 + t38 * t10);
-        const double t42 = 1.0 - (hessian[8][lane] * mean[17][lane] + (hessian[2][lane] * mean[15][lane] + hessian[5][lane] * mean[16][lane]));
-        const double t43 = hessian[8][lane] * mean[11][lane] + (hessian[5][lane] * mean[10][lane] + hessian[2][lane] * mean[9][lane]);
-        const double t44 = hessian[8][lane] * mean[5][lane] + (hessian[5][lane] * mean[4][lane] + hessian[2][lane] * mean[3][lane]);
-        const double t45 = t42 * t9 + (t43 * t16 - t44 * t10);
-        const double t46 = t44 * t15 - t43 * t17 - t42 * t20;
-        const double t47 = t42 * t19 + (t43 * t18 + t44 * t13);
-        const double t48 = even[11][lane] - odd[11][lane];
-        const double t49 = even[9][lane] - odd[9][lane];
-        const double t50 = even[10][lane] - odd[10][lane];
-        const double t51 = even[17][lane] - odd[17][lane];
-        const double t52 = even[16][lane] - odd[16][lane];
-        const double t53 = even[15][lane] - odd[15][lane];
-        const double t54 = 2.0 * (hessian[6][lane] * odd[5][lane]) + (2.0 * (hessian[3][lane] * odd[4][lane]) + 2.0 * (hessian[0][lane] * odd[3][lane])) + (2.0 * (odd[2][lane] * t33) + (2.0 * (odd[1][lane] * t34) + 2.0 * (odd[0][lane] * t35)));
-        const double t55 = 2.0 * (hessian[7][lane] * odd[5][lane]) + (2.0 * (hessian[1][lane] * odd[3][lane]) + 2.0 * (hessian[4][lane] * odd[4][lane])) + (2.0 * (odd[0][lane] * t39) + 2.0 * (odd[1][lane] * t40) - 2.0 * (odd[2][lane] * t41));
-        const double t56 = 2.0 * (hessian[8][lane] * odd[5][lane]) + (2.0 * (hessian[2][lane] * odd[3][lane]) + 2.0 * (hessian[5][lane] * odd[4][lane])) + (2.0 * (odd[2][lane] * t45) + (2.0 * (odd[1][lane] * t46) - 2.0 * (odd[0][lane] * t47)));
-        const double t57 = 2.0 * (hessian[6][lane] * odd[11][lane]) + (2.0 * (hessian[0][lane] * odd[9][lane]) + 2.0 * (hessian[3][lane] * odd[10][lane])) + (2.0 * (odd[8][lane] * t33) + (2.0 * (odd[6][lane] * t35) + 2.0 * (odd[7][lane] * t34)));
-        const double t58 = 2.0 * (hessian[7][lane] * odd[11][lane]) + (2.0 * (hessian[4][lane] * odd[10][lane]) + 2.0 * (hessian[1][lane] * odd[9][lane])) + (2.0 * (odd[6][lane] * t39) + 2.0 * (odd[7][lane] * t40) - 2.0 * (odd[8][lane] * t41));
-        const double t59 = 2.0 * (hessian[8][lane] * odd[11][lane]) + (2.0 * (hessian[2][lane] * odd[9][lane]) + 2.0 * (hessian[5][lane] * odd[10][lane])) + (2.0 * (odd[8][lane] * t45) + (2.0 * (odd[7][lane] * t46) - 2.0 * (odd[6][lane] * t47)));
-        const double t60 = 2.0 * (hessian[6][lane] * odd[17][lane]) + (2.0 * (hessian[0][lane] * odd[15][lane]) + 2.0 * (hessian[3][lane] * odd[16][lane])) + (2.0 * (odd[14][lane] * t33) + (2.0 * (odd[13][lane] * t34) + 2.0 * (odd[12][lane] * t35)));
-        const double t61 = 2.0 * (hessian[7][lane] * odd[17][lane]) + (2.0 * (hessian[4][lane] * odd[16][lane]) + 2.0 * (hessian[1][lane] * odd[15][lane])) + (2.0 * (odd[12][lane] * t39) + 2.0 * (odd[13][lane] * t40) - 2.0 * (odd[14][lane] * t41));
-        const double t62 = 2.0 * (hessian[8][lane] * odd[17][lane]) + (2.0 * (hessian[2][lane] * odd[15][lane]) + 2.0 * (hessian[5][lane] * odd[16][lane])) + (2.0 * (odd[14][lane] * t45) + (2.0 * (odd[13][lane] * t46) - 2.0 * (odd[12][lane] * t47)));
-        alpha_y[0][lane] = t1 * t10 + (t11 * t13 - t14 * t15);
-        alpha_y[1][lane] = t14 * t17 + t11 * t18 - t1 * t16;
-        alpha_y[2][lane] = t1 * t9 - (t11 * t19 + t14 * t20);
-        alpha_y[3][lane] = t21 * t10 + (t22 * t13 - t23 * t15);
-        alpha_y[4][lane] = t23 * t17 + t22 * t18 - t21 * t16;
-        alpha_y[5][lane] = t21 * t9 - (t22 * t19 + t23 * t20);
-        alpha_y[6][lane] = t24 * t10 + (t25 * t13 - t26 * t15);
-        alpha_y[7][lane] = t26 * t17 + t25 * t18 - t24 * t16;
-        alpha_y[8][lane] = t24 * t9 - (t25 * t19 + t26 * t20);
-        increment_y[0][lane] = 2.0 * (odd[2][lane] * t10) + (2.0 * (odd[0][lane] * t13) - 2.0 * (odd[1][lane] * t15));
-        increment_y[1][lane] = 2.0 * (odd[0][lane] * t18) + 2.0 * (odd[1][lane] * t17) - 2.0 * (odd[2][lane] * t16);
-        increment_y[2][lane] = 2.0 * (odd[2][lane] * t9) + ((-2.0) * (odd[0][lane] * t19) - 2.0 * (odd[1][lane] * t20));
-        increment_y[3][lane] = 2.0 * (odd[8][lane] * t10) + (2.0 * (odd[6][lane] * t13) - 2.0 * (odd[7][lane] * t15));
-        increment_y[4][lane] = 2.0 * (odd[6][lane] * t18) + 2.0 * (odd[7][lane] * t17) - 2.0 * (odd[8][lane] * t16);
-        increment_y[5][lane] = 2.0 * (odd[8][lane] * t9) + ((-2.0) * (odd[6][lane] * t19) - 2.0 * (odd[7][lane] * t20));
-        increment_y[6][lane] = 2.0 * (odd[14][lane] * t10) + (2.0 * (odd[12][lane] * t13) - 2.0 * (odd[13][lane] * t15));
-        increment_y[7][lane] = 2.0 * (odd[12][lane] * t18) + 2.0 * (odd[13][lane] * t17) - 2.0 * (odd[14][lane] * t16);
-        increment_y[8][lane] = 2.0 * (odd[14][lane] * t9) + ((-2.0) * (odd[12][lane] * t19) - 2.0 * (odd[13][lane] * t20));
-        jacobian[0][lane] = hessian[6][lane] * t27 + (hessian[3][lane] * t28 + hessian[0][lane] * t29) + (t1 * t33 + (t14 * t34 + t11 * t35));
-        jacobian[1][lane] = hessian[7][lane] * t27 + (hessian[1][lane] * t29 + hessian[4][lane] * t28) + (t11 * t39 + t14 * t40 - t1 * t41);
-        jacobian[2][lane] = hessian[8][lane] * t27 + (hessian[5][lane] * t28 + hessian[2][lane] * t29) + (t1 * t45 + (t14 * t46 - t11 * t47));
-        jacobian[3][lane] = hessian[6][lane] * t48 + (hessian[0][lane] * t49 + hessian[3][lane] * t50) + (t21 * t33 + (t22 * t35 + t23 * t34));
-        jacobian[4][lane] = hessian[7][lane] * t48 + (hessian[4][lane] * t50 + hessian[1][lane] * t49) + (t23 * t40 + t22 * t39 - t21 * t41);
-        jacobian[5][lane] = hessian[8][lane] * t48 + (hessian[5][lane] * t50 + hessian[2][lane] * t49) + (t21 * t45 + (t23 * t46 - t22 * t47));
-        jacobian[6][lane] = hessian[6][lane] * t51 + (hessian[3][lane] * t52 + hessian[0][lane] * t53) + (t24 * t33 + (t25 * t35 + t26 * t34));
-        jacobian[7][lane] = hessian[7][lane] * t51 + (hessian[1][lane] * t53 + hessian[4][lane] * t52) + (t25 * t39 + t26 * t40 - t24 * t41);
-        jacobian[8][lane] = hessian[8][lane] * t51 + (hessian[2][lane] * t53 + hessian[5][lane] * t52) + (t24 * t45 + (t26 * t46 - t25 * t47));
-        increment_jacobian[0][lane] = t54;
-        increment_jacobian[1][lane] = t55;
-        increment_jacobian[2][lane] = t56;
-        increment_jacobian[3][lane] = t57;
-        increment_jacobian[4][lane] = t58;
-        increment_jacobian[5][lane] = t59;
-        increment_jacobian[6][lane] = t60;
-        increment_jacobian[7][lane] = t61;
-        increment_jacobian[8][lane] = t62;
-        reciprocal[0][lane] = t2;
-        reciprocal[1][lane] = t5;
-        reciprocal[2][lane] = t9;
-    }
-}
-
-/* sir_epidemic_invert in all lanes. */
-static void sir_epidemic_invert_lanes(sir_epidemic_lanes matrix[restrict 9],
-                                      sir_epidemic_lanes slope[restrict 9],
-                                      sir_epidemic_lanes inverse[restrict 9],
-                                      sir_epidemic_lanes gain[restrict 9],
-                                      sir_epidemic_lanes reciprocal[restrict 3])
-{
-    sir_epidemic_EACH_LANE
-    for (int lane = 0; lane < sir_epidemic_LANES; ++lane) {
-        const double t1 = 1.0 / matrix[0][lane];
-        const double t2 = matrix[1][lane] * t1;
-        const double t3 = 1.0 / (matrix[4][lane] - matrix[3][lane] * t2);
-        const double t4 = matrix[3][lane] * t1 * t3;
-        const double t5 = matrix[2][lane] * t1;
-        const double t6 = (matrix[5][lane] - matrix[3][lane] * t5) * t3;
-        const double t7 = t5 - t2 * t6;
-        const double t8 = matrix[7][lane] - matrix[6][lane] * t2;
-        const double t9 = 1.0 / (matrix[8][lane] - matrix[6][lane] * t5 - t8 * t6);
-        const double t10 = (t8 * t4 - matrix[6][lane] * t1) * t9;
-        const double t11 = t1 + t2 * t4 - t7 * t10;
-        const double t12 = t8 * t3 * t9;
-        const double t13 = t7 * t12 - t2 * t3;
-        const double t14 = t7 * t9;
-        const double t15 = t4 + t6 * t10;
-        const double t16 = t3 + t6 * t12;
-        const double t17 = t6 * t9;
-        inverse[0][lane] = t11;
-        inverse[1][lane] = t13;
-        inverse[2][lane] = -t14;
-        inverse[3][lane] = -t15;
-        inverse[4][lane] = t16;
-        inverse[5][lane] = -t17;
-        inverse[6][lane] = t10;
-        inverse[7][lane] = -t12;
-        inverse[8][lane] = t9;
-        gain[0][lane] = slope[2][lane] * t10 + (slope[0][lane] * t11 - slope[1][lane] * t15);
-        gain[1][lane] = slope[0][lane] * t13 + slope[1][lane] * t16 - slope[2][lane] * t12;
-        gain[2][lane] = slope[2][lane] * t9 - (slope[0][lane] * t14 + slope[1][lane] * t17);
-        gain[3][lane] = slope[5][lane] * t10 + (slope[3][lane] * t11 - slope[4][lane] * t15);
-        gain[4][lane] = slope[3][lane] * t13 + slope[4][lane] * t16 - slope[5][lane] * t12;
-        gain[5][lane] = slope[5][lane] * t9 - (slope[4][lane] * t17 + slope[3][lane] * t14);
-        gain[6][lane] = slope[8][lane] * t10 + (slope[6][lane] * t11 - slope[7][lane] * t15);
-        gain[7][lane] = slope[6][lane] * t13 + slope[7][lane] * t16 - slope[8][lane] * t12;
-        gain[8][lane] = slope[8][lane] * t9 - (slope[6][lane] * t14 + slope[7][lane] * t17);
-        reciprocal[0][lane] = t1;
-        reciprocal[1][lane] = t3;
-        reciprocal[2][lane] = t9;
-    }
-}
-
-/* sir_epidemic_size in all lanes, summed over the components. */
-static void sir_epidemic_sizes(sir_epidemic_lanes y[restrict 3], sir_epidemic_lanes delta[restrict 3],
-    sir_epidemic_lanes size)
-{
-    sir_epidemic_lanes norm = { 0.0 };
-    memset(size, 0, sir_epidemic_LANES * sizeof size[0]);
-    for (int i = 0; i < 3; ++i)
-        for (int lane = 0; lane < sir_epidemic_LANES; ++lane)
-            norm[lane] = 1e-6 * fabs(y[i][lane]) > norm[lane] ? 1e-6 * fabs(y[i][lane]) : norm[lane];
-    for (int i = 0; i < 3; ++i) {
-        sir_epidemic_EACH_LANE
-        for (int lane = 0; lane < sir_epidemic_LANES; ++lane)
-            size[lane] += fabs(delta[i][lane]) / (fabs(y[i][lane]) + norm[lane] + DBL_MIN);
-    }
-}
-
-/* Correct y by the residuals, with the inverse in the table, and measure the corrections. */
-static void sir_epidemic_correct(sir_epidemic_model *model, sir_epidemic_lanes size)
-{
-    sir_epidemic_lanes delta[3];
-    memset(delta, 0, sizeof delta);
-    for (int i = 0; i < 3; ++i)
-        for (int j = 0; j < 3; ++j) {
-            sir_epidemic_EACH_LANE
-            for (int lane = 0; lane < sir_epidemic_LANES; ++lane)
-                delta[i][lane] += model->inverse[i * 3 + j][lane] * model->residual[j][lane];
-        }
-    sir_epidemic_sizes(model->y, delta, size);
-    for (int i = 0; i < 3; ++i)
-        for (int lane = 0; lane < sir_epidemic_LANES; ++lane) model->y[i][lane] -= delta[i][lane];
-}
-
-/* The largest of the lanes, none of which is negative; infinite if one is not finite. As integers, the bits of such
-   numbers have their order, and those of what is no number are larger. */
-static double sir_epidemic_largest(const sir_epidemic_lanes size)
-{
-    uint64_t bits[8], most = 0;
-    double largest;
-    memcpy(bits, size, sizeof bits);
-    for (int lane = 0; lane < sir_epidemic_LANES; ++lane) most = bits[lane] > most ? bits[lane] : most;
-    memcpy(&largest, &most, sizeof largest);
-    return isfinite(largest) ? largest : HUGE_VAL;
-}
-
-/* sir_epidemic_near for the guesses of all lanes, seen from one value. */
-static int sir_epidemic_near_lanes(sir_epidemic_lanes y[restrict 3], const double last[3])
-{
-    sir_epidemic_lanes distance = { 0.0 };
-    double size = 0.0;
-    for (int i = 0; i < 3; ++i) {
-        size += fabs(last[i]);
-        sir_epidemic_EACH_LANE
-        for (int lane = 0; lane < sir_epidemic_LANES; ++lane) distance[lane] += fabs(y[i][lane] - last[i]);
-    }
-    return sir_epidemic_largest(distance) <= 4.0 * size;
-}
-
-/* What is left after a correction of this size: quadratic in it, where the matrices are of the points corrected; where
-   they are of points further off, by bend, also of the order of size times bend. bound is what the last pass left. */
-static double sir_epidemic_remaining(double size, double bend, double bound)
-{
-    const double growth = size / bound, left = size * (size + bend);
-    return growth > 1.0 ? growth * left : left;
-}
-
-/* The paths of all lanes as Taylor series about their middle, with half of p: they take the time from -1 to 1, and need
-   fewer terms than from their start. s[i][k] is coefficient k of series i, the coordinates first; slope goes on with the
-   entries of d(pi p)/dm and of pi, from which v follows, the derivatives along middle and p, row by row. */
-typedef struct {
-    sir_epidemic_lanes p[3], fixed[1], slope_fixed[1], value[10];
-    sir_epidemic_lanes s[10][16 + 1], slope[13][12 + 1];
-    sir_epidemic_lanes v[12 + 1][18];
-    sir_epidemic_lanes even[3], odd[3], mean[3]; /* sums of terms, those of even order also as means over time */
-    sir_epidemic_lanes v_even[18], v_odd[18], v_mean[18];
-    sir_epidemic_lanes unit[3]; /* what terms are multiplied by to be measured */
-    int terms; /* orders that are known */
-} sir_epidemic_expansion;
-
-/* The largest of the lanes; what is not finite does not count: that lane has failed. */
-static double sir_epidemic_largest_finite(const sir_epidemic_lanes size)
-{
-    sir_epidemic_lanes finite;
-    sir_epidemic_EACH_LANE
-    for (int lane = 0; lane < sir_epidemic_LANES; ++lane) finite[lane] = size[lane] <= DBL_MAX ? size[lane] : 0.0;
-    return sir_epidemic_largest(finite);
-}
-
-/* Coefficient k >= 1 of the series that follow from those of the coordinates: sums over the orders between 0 and k,
-   then what else there is. */
-static void sir_epidemic_follow(sir_epidemic_lanes coef[restrict], sir_epidemic_expansion *e, int k)
-{
-    (void)coef;
-    sir_epidemic_lanes sum[1];
-    memset(sum, 0, sizeof sum);
-    for (int j = 1; j < k; ++j) {
-        sir_epidemic_EACH_LANE
-        for (int lane = 0; lane < sir_epidemic_LANES; ++lane) {
-            sum[0][lane] += e->s[1][j][lane] * e->s[0][k - j][lane];
-        }
-    }
-    sir_epidemic_EACH_LANE
-    for (int lane = 0; lane < sir_epidemic_LANES; ++lane) {
-        e->s[3][k][lane] = sum[0][lane] + e->s[1][0][lane] * e->s[0][k][lane] + e->s[1][k][lane] * e->s[0][0][lane];
-        e->s[4][k][lane] = e->p[1][lane] * e->s[3][k][lane];
-        e->s[5][k][lane] = e->p[2][lane] * e->s[3][k][lane];
-        e->s[6][k][lane] = e->s[4][k][lane] - e->s[5][k][lane];
-        e->s[7][k][lane] = e->p[0][lane] * e->s[3][k][lane];
-        e->s[8][k][lane] = e->s[5][k][lane] - e->s[7][k][lane];
-        e->s[9][k][lane] = e->s[7][k][lane] - e->s[4][k][lane];
-    }
-}
-
-/* Coefficient k >= 1 of the further series: sums over the orders between 0 and k,
-   then what else there is. */
-static void sir_epidemic_follow_slopes(sir_epidemic_lanes coef[restrict], sir_epidemic_expansion *e, int k)
-{
-    (void)coef;
-    sir_epidemic_lanes sum[1];
-    memset(sum, 0, sizeof sum);
-    for (int j = 1; j < k; ++j) {
-    }
-    sir_epidemic_EACH_LANE
-    for (int lane = 0; lane < sir_epidemic_LANES; ++lane) {
-        e->slope[0][k][lane] = e->p[1][lane] * e->s[1][k][lane];
-        e->slope[1][k][lane] = e->p[2][lane] * e->s[1][k][lane];
-        e->slope[2][k][lane] = e->slope[0][k][lane] - e->slope[1][k][lane];
-        e->slope[3][k][lane] = e->p[1][lane] * e->s[0][k][lane];
-        e->slope[4][k][lane] = e->p[2][lane] * e->s[0][k][lane];
-        e->slope[5][k][lane] = e->slope[3][k][lane] - e->slope[4][k][lane];
-        e->slope[6][k][lane] = e->p[0][lane] * e->s[1][k][lane];
-        e->slope[7][k][lane] = e->slope[1][k][lane] - e->slope[6][k][lane];
-        e->slope[8][k][lane] = e->p[0][lane] * e->s[0][k][lane];
-        e->slope[9][k][lane] = e->slope[4][k][lane] - e->slope[8][k][lane];
-        e->slope[10][k][lane] = e->slope[6][k][lane] - e->slope[0][k][lane];
-        e->slope[11][k][lane] = e->slope[8][k][lane] - e->slope[3][k][lane];
-        e->slope[12][k][lane] = -e->s[3][k][lane];
-    }
-}
-
-/* Order k of the series, and with it order k + 1 of the coordinates. */
-static void sir_epidemic_next_order(sir_epidemic_lanes coef[restrict], sir_epidemic_expansion *e, int k)
-{
-    static const int field[3] = { 6, 8, 9 };
-    if (k > 0) sir_epidemic_follow(coef, e, k);
-    for (int i = 0; i < 3; ++i) {
-        const double share = 1.0 / (k + 1);
-        sir_epidemic_EACH_LANE
-        for (int lane = 0; lane < sir_epidemic_LANES; ++lane) e->s[i][k + 1][lane] = share * e->s[field[i]][k][lane];
-    }
-}
-
-/* Begin to expand the paths with the middles m. */
-static void sir_epidemic_begin(sir_epidemic_lanes coef[restrict], sir_epidemic_expansion *e, sir_epidemic_lanes m[restrict 3])
-{
-    sir_epidemic_lanes norm = { 0.0 };
-    sir_epidemic_values_lanes(coef, e->p, m, e->value, e->fixed);
-    for (int i = 0; i < 10; ++i) memcpy(e->s[i][0], e->value[i], sizeof e->value[i]);
-    memset(e->even, 0, sizeof e->even);
-    memset(e->odd, 0, sizeof e->odd);
-    memset(e->mean, 0, sizeof e->mean);
-    sir_epidemic_next_order(coef, e, 0);
-    e->terms = 0;
-    for (int i = 0; i < 3; ++i) {
-        sir_epidemic_EACH_LANE
-        for (int lane = 0; lane < sir_epidemic_LANES; ++lane) {
-            e->unit[i][lane] = fabs(m[i][lane]) + fabs(e->s[i][1][lane]) + DBL_MIN;
-            norm[lane] += e->unit[i][lane];
-        }
-    }
-    for (int i = 0; i < 3; ++i) {
-        sir_epidemic_EACH_LANE
-        for (int lane = 0; lane < sir_epidemic_LANES; ++lane) e->unit[i][lane] = 1.0 / (e->unit[i][lane] + 1e-5 * norm[lane]);
-    }
-}
-
-/* Add the terms of the odd order k and of the next; their size. */
-static double sir_epidemic_add_terms(sir_epidemic_expansion *e, int k)
-{
-    sir_epidemic_lanes size = { 0.0 };
-    const double share = 1.0 / (k + 2);
-    for (int i = 0; i < 3; ++i) {
-        sir_epidemic_EACH_LANE
-        for (int lane = 0; lane < sir_epidemic_LANES; ++lane) {
-            const double odd = e->s[i][k][lane], even = e->s[i][k + 1][lane];
-            e->odd[i][lane] += odd;
-            e->even[i][lane] += even;
-            e->mean[i][lane] += share * even;
-            size[lane] += (fabs(odd) + fabs(even)) * e->unit[i][lane];
-        }
-    }
-    return sir_epidemic_largest_finite(size);
-}
-
-/* Go on by two orders at a time, until these are below accuracy in all lanes that are finite, or 16 are known: whether
-   they suffice is checked at the ends. */
-static void sir_epidemic_extend(sir_epidemic_lanes coef[restrict], sir_epidemic_expansion *e, double accuracy)
-{
-    double size = HUGE_VAL;
-    for (; e->terms < 16 && size > accuracy; e->terms += 2) {
-        if (e->terms > 0) sir_epidemic_next_order(coef, e, e->terms);
-        sir_epidemic_next_order(coef, e, e->terms + 1);
-        size = sir_epidemic_add_terms(e, e->terms + 1);
-    }
-}
-
-/* sir_epidemic_holds in all lanes, at one end of the paths, where the expansions have the given slope: infinite where the
-   equation does not hold. */
-static void sir_epidemic_check_end(sir_epidemic_lanes coef[restrict], sir_epidemic_expansion *e, sir_epidemic_lanes m[restrict 3],
-    sir_epidemic_lanes slope[restrict 3], sir_epidemic_lanes wrong)
-{
-    static const int field[3] = { 6, 8, 9 };
-    sir_epidemic_lanes value[10], fixed[1], scale = { 0.0 };
-    sir_epidemic_values_lanes(coef, e->p, m, value, fixed);
-    for (int i = 0; i < 3; ++i) {
-        sir_epidemic_EACH_LANE
-        for (int lane = 0; lane < sir_epidemic_LANES; ++lane) scale[lane] += fabs(m[i][lane]) + fabs(slope[i][lane]);
-    }
-    for (int i = 0; i < 3; ++i) {
-        sir_epidemic_EACH_LANE
-        for (int lane = 0; lane < sir_epidemic_LANES; ++lane) {
-            const double off = fabs(value[field[i]][lane] - slope[i][lane]);
-            wrong[lane] += off <= 2e-15 * scale[lane] ? 0.0 : HUGE_VAL;
-        }
-    }
-}
-
-/* The same at both ends. */
-static void sir_epidemic_check_ends(sir_epidemic_lanes coef[restrict], sir_epidemic_expansion *e, sir_epidemic_lanes wrong)
-{
-    sir_epidemic_lanes start[3], end[3], start_slope[3], end_slope[3];
-    for (int i = 0; i < 3; ++i) {
-        sir_epidemic_lanes even = { 0.0 }, odd = { 0.0 };
-        for (int k = 1; k < e->terms; k += 2) {
-            sir_epidemic_EACH_LANE
-            for (int lane = 0; lane < sir_epidemic_LANES; ++lane) {
-                odd[lane] += k * e->s[i][k][lane];
-                even[lane] += (k + 1) * e->s[i][k + 1][lane];
-            }
-        }
-        sir_epidemic_EACH_LANE
-        for (int lane = 0; lane < sir_epidemic_LANES; ++lane) {
-            start[i][lane] = e->s[i][0][lane] + (e->even[i][lane] - e->odd[i][lane]);
-            end[i][lane] = e->s[i][0][lane] + (e->even[i][lane] + e->odd[i][lane]);
-            start_slope[i][lane] = odd[lane] - even[lane];
-            end_slope[i][lane] = odd[lane] + even[lane];
-        }
-    }
-    sir_epidemic_check_end(coef, e, start, start_slope, wrong);
-    sir_epidemic_check_end(coef, e, end, end_slope, wrong);
-}
-
-/* Begin to expand the paths with mean y, from their middles as far as these are known. */
-static void sir_epidemic_begin_at(sir_epidemic_lanes coef[restrict], const sir_epidemic_model *model, sir_epidemic_expansion *e)
-{
-    sir_epidemic_lanes m[3];
-    for (int i = 0; i < 3; ++i) {
-        sir_epidemic_EACH_LANE
-        for (int lane = 0; lane < sir_epidemic_LANES; ++lane) m[i][lane] = model->y[i][lane] + model->middle[i][lane];
-    }
-    sir_epidemic_begin(coef, e, m);
-}
-
-/* Find the middles by iteration, which gains some digits each time, with expansions as short as that allows; the last
-   can be gone on with. Infinite where that does not converge. */
-static void sir_epidemic_settle(sir_epidemic_lanes coef[restrict], sir_epidemic_model *model, sir_epidemic_expansion *e)
-{
-    sir_epidemic_lanes size, norm;
-    double left = 1.0;
-    memset(model->middle, 0, sizeof model->middle);
-    for (int round = 0; left > 1e-9 && round < 12; ++round) {
-        for (int i = 0; i < 3 && round > 0; ++i) {
-            sir_epidemic_EACH_LANE
-            for (int lane = 0; lane < sir_epidemic_LANES; ++lane) model->middle[i][lane] = -e->mean[i][lane];
-        }
-        sir_epidemic_begin_at(coef, model, e);
-        sir_epidemic_extend(coef, e, 1e-4 * left);
-        memset(size, 0, sizeof size);
-        memset(norm, 0, sizeof norm);
-        for (int i = 0; i < 3; ++i) {
-            sir_epidemic_EACH_LANE
-            for (int lane = 0; lane < sir_epidemic_LANES; ++lane) {
-                size[lane] += fabs(model->middle[i][lane] + e->mean[i][lane]);
-                norm[lane] += fabs(model->y[i][lane]);
-            }
-        }
-        sir_epidemic_EACH_LANE
-        for (int lane = 0; lane < sir_epidemic_LANES; ++lane) size[lane] /= norm[lane] + DBL_MIN;
-        left = sir_epidemic_largest_finite(size);
-        if (left > 1.0) left = 1.0;
-    }
-    for (int lane = 0; lane < sir_epidemic_LANES && left > 1e-9; ++lane)
-        if (size[lane] > 1e-9) model->middle[0][lane] = HUGE_VAL;
-}
-
-/* Half of p: paths take the time from -1 to 1. */
-static void sir_epidemic_halve(sir_epidemic_lanes p[restrict 3])
-{
-    for (int i = 0; i < 3; ++i) {
-        sir_epidemic_EACH_LANE
-        for (int lane = 0; lane < sir_epidemic_LANES; ++lane) p[i][lane] *= 0.5;
-    }
-}
-
-/* alpha - y and beta - alpha to leading order, from one short expansion. */
-static void sir_epidemic_evaluate_lanes(sir_epidemic_lanes coef[restrict], sir_epidemic_lanes y[restrict 3],
-    sir_epidemic_lanes displacement[restrict 3], sir_epidemic_lanes increment[restrict 3])
-{
-    sir_epidemic_expansion e;
-    sir_epidemic_momentum_lanes(coef, y, e.p);
-    sir_epidemic_halve(e.p);
-    sir_epidemic_begin(coef, &e, y);
-    sir_epidemic_extend(coef, &e, 1e-6);
-    for (int i = 0; i < 3; ++i) {
-        sir_epidemic_EACH_LANE
-        for (int lane = 0; lane < sir_epidemic_LANES; ++lane) {
-            displacement[i][lane] = (e.even[i][lane] - e.odd[i][lane]) - e.mean[i][lane];
-            increment[i][lane] = 2.0 * e.odd[i][lane];
-        }
-    }
-}
-
-/* What order j of d(pi p)/dm contributes to order k + 1 of the derivatives. */
-static void sir_epidemic_vary_by(sir_epidemic_expansion *e, int j, int k)
-{
-    sir_epidemic_lanes *from = e->v[k - j], *to = e->v[k + 1];
-    const double share = 1.0 / (k + 1);
-    sir_epidemic_EACH_LANE
-    for (int lane = 0; lane < sir_epidemic_LANES; ++lane) {
-        const double a00 = share * e->slope[2][j][lane];
-        const double a01 = share * e->slope[5][j][lane];
-        const double a10 = share * e->slope[7][j][lane];
-        const double a11 = share * e->slope[9][j][lane];
-        const double a20 = share * e->slope[10][j][lane];
-        const double a21 = share * e->slope[11][j][lane];
-        to[0][lane] += a00 * from[0][lane] + a01 * from[6][lane];
-        to[1][lane] += a00 * from[1][lane] + a01 * from[7][lane];
-        to[2][lane] += a00 * from[2][lane] + a01 * from[8][lane];
-        to[3][lane] += a00 * from[3][lane] + a01 * from[9][lane];
-        to[4][lane] += a00 * from[4][lane] + a01 * from[10][lane];
-        to[5][lane] += a00 * from[5][lane] + a01 * from[11][lane];
-        to[6][lane] += a10 * from[0][lane] + a11 * from[6][lane];
-        to[7][lane] += a10 * from[1][lane] + a11 * from[7][lane];
-        to[8][lane] += a10 * from[2][lane] + a11 * from[8][lane];
-        to[9][lane] += a10 * from[3][lane] + a11 * from[9][lane];
-        to[10][lane] += a10 * from[4][lane] + a11 * from[10][lane];
-        to[11][lane] += a10 * from[5][lane] + a11 * from[11][lane];
-        to[12][lane] += a20 * from[0][lane] + a21 * from[6][lane];
-        to[13][lane] += a20 * from[1][lane] + a21 * from[7][lane];
-        to[14][lane] += a20 * from[2][lane] + a21 * from[8][lane];
-        to[15][lane] += a20 * from[3][lane] + a21 * from[9][lane];
-        to[16][lane] += a20 * from[4][lane] + a21 * from[10][lane];
-        to[17][lane] += a20 * from[5][lane] + a21 * from[11][lane];
-    }
-}
-
-/* Order k + 1 of the derivatives; order 0 is 1 along the middle, and 0 along p. */
-static void sir_epidemic_vary_order(sir_epidemic_expansion *e, int k)
-{
-    sir_epidemic_lanes *to = e->v[k + 1];
-    const double share = 1.0 / (k + 1);
-    memset(to, 0, 18 * sizeof to[0]);
-    sir_epidemic_EACH_LANE
-    for (int lane = 0; lane < sir_epidemic_LANES; ++lane) {
-        to[0][lane] += share * e->slope[2][k][lane];
-        to[1][lane] += share * e->slope[5][k][lane];
-        to[6][lane] += share * e->slope[7][k][lane];
-        to[7][lane] += share * e->slope[9][k][lane];
-        to[12][lane] += share * e->slope[10][k][lane];
-        to[13][lane] += share * e->slope[11][k][lane];
-        to[4][lane] += 0.5 * share * e->s[3][k][lane];
-        to[5][lane] += 0.5 * share * e->slope[12][k][lane];
-        to[9][lane] += 0.5 * share * e->slope[12][k][lane];
-        to[11][lane] += 0.5 * share * e->s[3][k][lane];
-        to[15][lane] += 0.5 * share * e->s[3][k][lane];
-        to[16][lane] += 0.5 * share * e->slope[12][k][lane];
-    }
-    for (int j = 0; j < k; ++j) sir_epidemic_vary_by(e, j, k);
-}
-
-/* Add the terms of the odd order k of the derivatives and of the next, and measure them: those along the middle beside 1,
-   those along p beside their first. */
-static void sir_epidemic_add_slopes(sir_epidemic_expansion *e, int k, sir_epidemic_lanes size)
-{
-    sir_epidemic_lanes parts[2] = { { 0.0 } }, first = { 0.0 };
-    const double share = 1.0 / (k + 2);
-    for (int i = 0; i < 18; ++i) {
-        const int part = i % 6 / 3;
-        sir_epidemic_EACH_LANE
-        for (int lane = 0; lane < sir_epidemic_LANES; ++lane) {
-            const double odd = e->v[k][i][lane], even = e->v[k + 1][i][lane];
-            e->v_odd[i][lane] += odd;
-            e->v_even[i][lane] += even;
-            e->v_mean[i][lane] += share * even;
-            parts[part][lane] += fabs(odd) + fabs(even);
-            first[lane] += fabs(e->v[1][i][lane]);
-        }
-    }
-    sir_epidemic_EACH_LANE
-    for (int lane = 0; lane < sir_epidemic_LANES; ++lane)
-        size[lane] = parts[0][lane] + parts[1][lane] / (first[lane] + DBL_MIN);
-}
-
-/* The derivatives of the paths along their middles and p, to seven digits: what that leaves of a correction is below
-   rounding when it is accepted. Infinite where 12 terms do not suffice. */
-static void sir_epidemic_vary(sir_epidemic_lanes coef[restrict], sir_epidemic_expansion *e)
-{
-    sir_epidemic_lanes slope[13], size;
-    double largest = 1.0, next = 1.0; /* the last two orders, and what is to be expected of the next */
-    sir_epidemic_slope_values_lanes(coef, e->p, e->value, e->fixed, slope, e->slope_fixed);
-    for (int i = 0; i < 13; ++i) memcpy(e->slope[i][0], slope[i], sizeof slope[i]);
-    memset(e->v_even, 0, sizeof e->v_even);
-    memset(e->v_odd, 0, sizeof e->v_odd);
-    memset(e->v_mean, 0, sizeof e->v_mean);
-    for (int i = 0; i < 3; ++i) {
-        sir_epidemic_EACH_LANE
-        for (int lane = 0; lane < sir_epidemic_LANES; ++lane)
-            e->v_even[i * 6 + i][lane] = e->v_mean[i * 6 + i][lane] = 1.0;
-    }
-    for (int k = 0; k < 12 && next > 1e-07; ++k) {
-        if (k >= e->terms) sir_epidemic_next_order(coef, e, k);
-        if (k > 0) sir_epidemic_follow_slopes(coef, e, k);
-        sir_epidemic_vary_order(e, k);
-        if (k % 2 == 0) continue;
-        sir_epidemic_add_slopes(e, k, size);
-        const double previous = largest;
-        largest = sir_epidemic_largest_finite(size);
-        next = largest * (largest / previous);
-    }
-    for (int lane = 0; lane < sir_epidemic_LANES && next > 1e-07; ++lane)
-        if (size[lane] > 1e-07) e->v_mean[0][lane] = HUGE_VAL;
-}
-
-/* alpha - y and beta - alpha from an expansion whose mean misses y by little, to first order in that. */
-static void sir_epidemic_read_ends(sir_epidemic_model *model, sir_epidemic_expansion *e, const sir_epidemic_lanes wrong)
-{
-    sir_epidemic_lanes miss[3];
-    for (int i = 0; i < 3; ++i) {
-        sir_epidemic_EACH_LANE
-        for (int lane = 0; lane < sir_epidemic_LANES; ++lane) {
-            miss[i][lane] = model->middle[i][lane] + e->mean[i][lane];
-            model->displacement[i][lane] = ((model->middle[i][lane] + e->even[i][lane]) - e->odd[i][lane]) + wrong[lane];
-            model->increment[i][lane] = 2.0 * e->odd[i][lane];
-            model->middle[i][lane] = -e->mean[i][lane];
-        }
-    }
-    for (int i = 0; i < 3; ++i)
-        for (int j = 0; j < 3; ++j) {
-            sir_epidemic_EACH_LANE
-            for (int lane = 0; lane < sir_epidemic_LANES; ++lane) {
-                model->displacement[i][lane] -= model->alpha_y[i * 3 + j][lane] * miss[j][lane];
-                model->increment[i][lane] -= model->increment_y[i * 3 + j][lane] * miss[j][lane];
-            }
-        }
-}
-
-/* The matrices of a stage, from the derivatives of the paths and the Hessian of S_h. */
-static void sir_epidemic_linearise_paths(sir_epidemic_lanes coef[restrict], sir_epidemic_model *model, sir_epidemic_expansion *e,
-    sir_epidemic_lanes hessian[restrict 9])
-{
-    sir_epidemic_lanes jacobian[9], reciprocal[2 * 3];
-    sir_epidemic_vary(coef, e);
-    sir_epidemic_along_mean_lanes(e->v_even, e->v_odd, e->v_mean, hessian, model->alpha_y, model->increment_y, jacobian,
-        model->slope, reciprocal);
-    sir_epidemic_invert_lanes(jacobian, model->slope, model->inverse, model->gain, reciprocal + 3);
-    for (int i = 0; i < 2 * 3; ++i) {
-        sir_epidemic_EACH_LANE
-        for (int lane = 0; lane < sir_epidemic_LANES; ++lane)
-            model->inverse[i % 3][lane] += fabs(reciprocal[i][lane]) < 1e3 ? 0.0 : HUGE_VAL;
-    }
-}
-
-/* The table of a stage, with its matrices or with those of the last pass. */
-static void sir_epidemic_update(sir_epidemic_lanes coef[restrict], sir_epidemic_model *model, int matrices)
-{
-    sir_epidemic_expansion e;
-    sir_epidemic_lanes hessian[9], wrong = { 0.0 };
-    if (matrices) sir_epidemic_curvature_lanes(coef, model->y, e.p, hessian);
-    else sir_epidemic_momentum_lanes(coef, model->y, e.p);
-    sir_epidemic_halve(e.p);
-    if (matrices) sir_epidemic_settle(coef, model, &e);
-    else sir_epidemic_begin_at(coef, model, &e);
-    sir_epidemic_extend(coef, &e, 1e-17);
-    sir_epidemic_check_ends(coef, &e, wrong);
-    if (matrices) sir_epidemic_linearise_paths(coef, model, &e, hessian);
-    sir_epidemic_read_ends(model, &e, wrong);
-}
-
-/* The steps of a block one after the other, each along the linear model of its lane. As X, the state with its carry, gains
-   increment - gain residual, the next residual follows from this one; X itself is added up apart. */
-static void sir_epidemic_chain(sir_epidemic_model model[1], double x[3], double carry[3])
-{
-    double residual[3], sum[3], small[3];
-    for (int i = 0; i < 3; ++i) {
-        residual[i] = ((model->y[i][0] - x[i]) + model->displacement[i][0]) - carry[i];
-        sum[i] = x[i];
-        small[i] = carry[i];
-    }
-    for (int k = 0; k < 1 * sir_epidemic_LANES; ++k) {
-        const int lane = k / 1, after = (k + 1) / 1 % sir_epidemic_LANES;
-        sir_epidemic_model *at = &model[k % 1], *next = &model[(k + 1) % 1];
-        double even[3] = { 0.0 }, odd[3] = { 0.0 }; /* two sums, so that no long chain of additions is waited for */
-        for (int i = 0; i < 3; ++i) {
-            at->residual[i][lane] = residual[i];
-            for (int j = 0; j < 3; j += 2) even[i] += at->gain[i * 3 + j][lane] * residual[j];
-            for (int j = 1; j < 3; j += 2) odd[i] += at->gain[i * 3 + j][lane] * residual[j];
-        }
-        for (int i = 0; i < 3; ++i) {
-            const double change = at->increment[i][lane], total = sum[i] + change, added = total - sum[i];
-            const double turn = (next->displacement[i][after] - at->displacement[i][lane]) - change;
-            const double moved = (next->y[i][after] - at->y[i][lane]) + turn;
-            residual[i] = ((moved + residual[i]) + odd[i]) + even[i];
-            small[i] += ((sum[i] - (total - added)) + (change - added)) - (even[i] + odd[i]);
-            sum[i] = total;
-        }
-    }
-    for (int i = 0; i < 3; ++i) {
-        x[i] = sum[i] + small[i];
-        carry[i] = small[i] - (x[i] - sum[i]);
-    }
-}
-
-/* Bring the table up to date: coefficients, and weights that were fitted since. */
-static void sir_epidemic_refresh(const sir_epidemic_solver *s, sir_epidemic_table *table)
-{
-    for (int stage = 0; stage < 1; ++stage) {
-        if (table->fits[stage] == s->memory[stage].fits) continue;
-        table->fits[stage] = s->memory[stage].fits;
-        for (int k = 0; k < 4; ++k)
-            for (int lane = 0; lane < sir_epidemic_LANES; ++lane) table->coef[stage][k][lane] = s->coef[stage][k];
-        memcpy(table->weight[stage], s->memory[stage].weight, (size_t)s->memory[stage].terms * sizeof table->weight[0][0]);
-    }
-}
-
-/* Guesses for the next sir_epidemic_LANES values of a stage, by its recurrences. */
-static void sir_epidemic_foresee(const sir_epidemic_memory *memory, sir_epidemic_lanes weight[restrict][3],
-    sir_epidemic_lanes y[restrict 3])
-{
-    const int last = memory->count - 1;
-    for (int i = 0; i < 3; ++i) {
-        sir_epidemic_lanes even = { 0.0 }, odd = { 0.0 };
-        for (int k = 0; k < memory->terms; k += 2) {
-            const double past = memory->past[last - k][i], earlier = memory->past[last - 1 - k][i];
-            sir_epidemic_EACH_LANE
-            for (int lane = 0; lane < sir_epidemic_LANES; ++lane) even[lane] += weight[k][i][lane] * past;
-            sir_epidemic_EACH_LANE
-            for (int lane = 0; lane < sir_epidemic_LANES; ++lane) odd[lane] += weight[k + 1][i][lane] * earlier;
-        }
-        sir_epidemic_EACH_LANE
-        for (int lane = 0; lane < sir_epidemic_LANES; ++lane) y[i][lane] = even[lane] + odd[lane];
-    }
-}
-
-/* sir_epidemic_record for the values of all lanes, one after the other. */
-static void sir_epidemic_record_lanes(sir_epidemic_memory *memory, sir_epidemic_lanes y[restrict 3])
-{
-    sir_epidemic_make_room(memory, sir_epidemic_LANES);
-    for (int lane = 0; lane < sir_epidemic_LANES; ++lane)
-        for (int i = 0; i < 3; ++i) memory->past[memory->count + lane][i] = y[i][lane];
-    memory->count += sir_epidemic_LANES;
-}
-
-/* Guesses where no recurrence is known: where alpha and beta have the means of steps by the classical Runge-Kutta
-   method, to leading order. */
-static void sir_epidemic_march(const sir_epidemic_solver *s, sir_epidemic_table *table, sir_epidemic_model model[1])
-{
-    static const double reach[4] = { 0.5, 0.5, 1.0, 0.0 }, weight[4] = { 1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0 };
-    double x[3], point[3], slope[3], mean[3];
-    memcpy(x, s->x, sizeof x);
-    for (int k = 0; k < 1 * sir_epidemic_LANES; ++k) {
-        const double h = sir_epidemic_fractions[k % 1] * s->h;
-        memcpy(point, x, sizeof x);
-        memset(mean, 0, sizeof mean);
-        for (int part = 0; part < 4; ++part) {
-            sir_epidemic_vector_field(&s->params, point, slope);
-            for (int i = 0; i < 3; ++i) {
-                mean[i] += weight[part] * slope[i];
-                point[i] = x[i] + h * reach[part] * slope[i];
-            }
-        }
-        for (int i = 0; i < 3; ++i) {
-            model[k % 1].y[i][k / 1] = x[i] + 0.5 * h * mean[i];
-            x[i] += h * mean[i];
-        }
-    }
-    for (int stage = 0; stage < 1; ++stage) {
-        sir_epidemic_model *at = &model[stage];
-        sir_epidemic_evaluate_lanes(table->coef[stage], at->y, at->displacement, at->increment);
-        for (int i = 0; i < 3; ++i) {
-            sir_epidemic_EACH_LANE
-            for (int lane = 0; lane < sir_epidemic_LANES; ++lane)
-                at->y[i][lane] -= at->displacement[i][lane] + 0.5 * at->increment[i][lane];
-        }
-    }
-}
-
-/* sir_epidemic_LANES steps at once: guess the points of all, and correct them together until the error that remains is as
-   small as after a single step. How many passes that took; 0, and the solver as before, where it takes more than most. */
-static int sir_epidemic_block(sir_epidemic_solver *s, sir_epidemic_table *table, int most)
-{
-    sir_epidemic_model model[1];
-    sir_epidemic_lanes sizes;
-    double x[3], carry[3], previous = HUGE_VAL, bend = 0.0, bound = HUGE_VAL;
-    int passes = 0, solved = 0;
-    if (!s->foreseeing) sir_epidemic_march(s, table, model);
-    for (int stage = 0; stage < 1; ++stage) {
-        if (s->foreseeing) sir_epidemic_foresee(&s->memory[stage], table->weight[stage], model[stage].y);
-        if (!sir_epidemic_near_lanes(model[stage].y, s->x)) return 0;
-    }
-    while (!solved) {
-        double size = 0.0;
-        const int matrices = previous > 1e-05;
-        for (int stage = 0; stage < 1; ++stage) sir_epidemic_update(table->coef[stage], &model[stage], matrices);
-        memcpy(x, s->x, sizeof x);
-        memcpy(carry, s->carry, sizeof carry);
-        sir_epidemic_chain(model, x, carry);
-        for (int stage = 0; stage < 1; ++stage) {
-            sir_epidemic_correct(&model[stage], sizes);
-            const double largest = sir_epidemic_largest(sizes);
-            size = largest > size ? largest : size;
-        }
-        s->evaluations += 1 * sir_epidemic_LANES;
-        bend = matrices ? 0.0 : bend + previous;
-        bound = sir_epidemic_remaining(size, bend, bound);
-        /* The second test: after the square of so small a correction there is rounding only. */
-        solved = bound <= 1e-20 || (previous < 1e-8 && size < 1e-10);
-        if ((++passes >= most || !(size < previous)) && !solved) return 0;
-        previous = size;
-    }
-    for (int stage = 0; stage < 1; ++stage)
-        if (!sir_epidemic_near_lanes(model[stage].y, s->x)) return 0;
-    for (int i = 0; i < 3; ++i)
-        if (!isfinite(x[i])) return 0;
-    memcpy(s->x, x, sizeof x);
-    memcpy(s->carry, carry, sizeof carry);
-    s->steps += sir_epidemic_LANES;
-    for (int stage = 0; stage < 1; ++stage) {
-        sir_epidemic_memory *memory = &s->memory[stage];
-        sir_epidemic_record_lanes(memory, model[stage].y);
-        memory->slow = passes > 1 ? memory->slow + sir_epidemic_LANES : 0;
-        if (memory->slow > memory->patience && s->foreseeing) sir_epidemic_fit(memory);
-    }
-    return passes;
-}
-
-/* Recurrences are given up for a while, the longer the more often that happens. */
-static void sir_epidemic_give_up(sir_epidemic_solver *s)
-{
-    s->foreseeing = s->setback = s->pause = 0;
-    s->doubt = 2 * s->doubt + 600;
-    s->retry = s->steps + s->doubt;
-}
-
-/* How the next block is guessed: by recurrences, fitted as soon as enough steps are to be made, or
-   have been, to repay that. */
-static void sir_epidemic_choose_guess(sir_epidemic_solver *s, size_t steps)
-{
-    for (int stage = 0; stage < 1; ++stage)
-        if (s->memory[stage].count < 111) {
-            s->foreseeing = 0;
-            return;
-        }
-    if (s->foreseeing || (steps < 600 && s->steps < 150) || s->steps < s->retry) return;
-    s->foreseeing = 1;
-    for (int stage = 0; stage < 1 && s->foreseeing; ++stage) {
-        sir_epidemic_fit(&s->memory[stage]);
-        s->foreseeing = s->memory[stage].terms > 0;
-    }
-    s->pause = sir_epidemic_LANES;
-    if (!s->foreseeing) sir_epidemic_give_up(s);
-}
-
-/* Learn from a block: after one that failed single steps are made, the more the more often that happens. Recurrences
-   that fail repeatedly, or need more passes than steps by Runge-Kutta did, are given up. */
-static void sir_epidemic_learn_from(sir_epidemic_solver *s, int passes)
-{
-    if (passes > 0) {
-        s->setback /= 2;
-    } else {
-        s->setback = 2 * s->setback + sir_epidemic_LANES > 1000 ? 1000 : 2 * s->setback + sir_epidemic_LANES;
-        s->pause = s->setback;
-    }
-    if (!s->foreseeing) {
-        s->passes = passes > 0 ? passes : INT_MAX;
-    } else if (passes > s->passes || s->setback > 5 * sir_epidemic_LANES) {
-        sir_epidemic_give_up(s);
-    }
-}
-
-/* A single step, and the running mean of the evaluations that a stage of one takes. */
-static sir_epidemic_status sir_epidemic_single(sir_epidemic_solver *s)
-{
-    const size_t before = s->evaluations;
-    const sir_epidemic_status status = sir_epidemic_step(s, s->h);
-    s->effort += 0.125 * ((double)(s->evaluations - before) / 1 - s->effort);
-    return status;
-}
-
-/* Blocks of steps where they cost less than single steps, with at most as many passes over a block as 1 for each
-   evaluation in a single step. The results differ by round-off only. */
 sir_epidemic_status sir_epidemic_integrate(sir_epidemic_solver *s, double h, size_t steps)
 {
-    sir_epidemic_table table;
     sir_epidemic_status status = sir_epidemic_set_step(s, h);
-    for (int stage = 0; stage < 1; ++stage) table.fits[stage] = -1;
-    while (status == sir_epidemic_OK && steps > 0) {
-        if (steps >= sir_epidemic_LANES && s->pause == 0) sir_epidemic_choose_guess(s, steps);
-        if (steps >= sir_epidemic_LANES && s->pause == 0) {
-            sir_epidemic_refresh(s, &table);
-            const int passes = sir_epidemic_block(s, &table, (int)(1 * s->effort + 0.5));
-            sir_epidemic_learn_from(s, passes);
-            if (passes > 0) steps -= sir_epidemic_LANES;
-        } else {
-            if (s->pause > 0) --s->pause;
-            status = sir_epidemic_single(s);
-            if (status == sir_epidemic_OK) --steps;
-        }
-    }
+    for (; steps > 0 && status == sir_epidemic_OK; --steps) status = sir_epidemic_step(s, h);
     return status;
-}
-
-/* Members of an ensemble, each in its lane. */
-typedef struct {
-    sir_epidemic_lanes x[3], carry[3], coef[1][4];
-    sir_epidemic_lanes past[1][111][3]; /* solved values, in a ring */
-    sir_epidemic_lanes weight[1][40][3]; /* of past values, the latest first, for the next */
-    int latest;     /* the row of the latest values */
-    int count;      /* rows in use */
-    int order[1];   /* how many of them the extrapolation uses */
-    int terms[1];   /* how many of them the recurrences use */
-    int fits;       /* how often recurrences have been fitted */
-    int fitting[1]; /* whether they are the better guess */
-    int slow;       /* how many of the last steps took more than one iteration */
-    int patience;   /* how many of those before recurrences are fitted again */
-    int active[8];  /* whether the lane has a member that has not failed */
-    size_t left[8]; /* steps that are still to be made, where one has */
-} sir_epidemic_group;
-
-/* The past values of a stage, the latest for k = 0. */
-static sir_epidemic_lanes *sir_epidemic_group_past(sir_epidemic_group *group, int stage, int k)
-{
-    const int row = group->latest + k;
-    return group->past[stage][row < 111 ? row : row - 111];
-}
-
-/* Guess the values of a stage by the recurrences of the members. */
-static void sir_epidemic_group_foresee(sir_epidemic_group *group, int stage, sir_epidemic_lanes y[restrict 3])
-{
-    memset(y, 0, 3 * sizeof y[0]);
-    for (int k = 0; k < group->terms[stage]; ++k) {
-        sir_epidemic_lanes *past = sir_epidemic_group_past(group, stage, k), *weight = group->weight[stage][k];
-        for (int i = 0; i < 3; ++i) {
-            sir_epidemic_EACH_LANE
-            for (int lane = 0; lane < sir_epidemic_LANES; ++lane) y[i][lane] += weight[i][lane] * past[i][lane];
-        }
-    }
-}
-
-/* Extrapolate the values of a stage. */
-static void sir_epidemic_group_extrapolate(sir_epidemic_group *group, int stage, sir_epidemic_lanes y[restrict 3])
-{
-    const int order = group->order[stage];
-    double binomial = -1.0;
-    memcpy(y, group->x, 3 * sizeof y[0]);
-    if (order > 0) memset(y, 0, 3 * sizeof y[0]);
-    for (int k = 0; k < order; ++k) {
-        sir_epidemic_lanes *past = sir_epidemic_group_past(group, stage, k);
-        binomial *= -(double)(order - k) / (k + 1);
-        for (int i = 0; i < 3; ++i) {
-            sir_epidemic_EACH_LANE
-            for (int lane = 0; lane < sir_epidemic_LANES; ++lane) y[i][lane] += binomial * past[i][lane];
-        }
-    }
-}
-
-/* The sum over members of the absolute values of all components. */
-static double sir_epidemic_group_sum(const sir_epidemic_group *group, sir_epidemic_lanes y[3])
-{
-    double sum = 0.0;
-    for (int i = 0; i < 3; ++i)
-        for (int lane = 0; lane < sir_epidemic_LANES; ++lane) sum += group->active[lane] ? fabs(y[i][lane]) : 0.0;
-    return sum;
-}
-
-static void sir_epidemic_group_subtract(sir_epidemic_lanes y[restrict 3], sir_epidemic_lanes other[restrict 3])
-{
-    for (int i = 0; i < 3; ++i) {
-        sir_epidemic_EACH_LANE
-        for (int lane = 0; lane < sir_epidemic_LANES; ++lane) y[i][lane] -= other[i][lane];
-    }
-}
-
-/* Choose the guess that would have been best for these values. */
-static void sir_epidemic_group_judge(sir_epidemic_group *group, int stage, sir_epidemic_lanes y[3])
-{
-    sir_epidemic_lanes row[8 + 1][3];
-    const int rows = group->count < 8 ? group->count : 8;
-    double least = HUGE_VAL;
-    memcpy(row[0], y, sizeof row[0]);
-    for (int k = 0; k < rows; ++k) memcpy(row[k + 1], sir_epidemic_group_past(group, stage, k), sizeof row[0]);
-    if (group->order[stage] == 0) group->order[stage] = 1;
-    for (int order = 1; order <= rows; ++order) { /* row[0] becomes the backward difference of this order */
-        for (int k = 0; k <= rows - order; ++k) sir_epidemic_group_subtract(row[k], row[k + 1]);
-        const double size = sir_epidemic_group_sum(group, row[0]);
-        if (size < least) {
-            least = size;
-            group->order[stage] = order;
-        }
-    }
-    if (group->terms[stage] == 0) return;
-    sir_epidemic_group_foresee(group, stage, row[0]);
-    sir_epidemic_group_subtract(row[0], y);
-    group->fitting[stage] = sir_epidemic_group_sum(group, row[0]) <= least;
-}
-
-/* Fit the recurrences of all members; with every time, wait longer before it is done again, and for long if it did not
-   help. */
-static void sir_epidemic_group_fit(sir_epidemic_group *group)
-{
-    sir_epidemic_memory memory;
-    const int helped = group->fits == 0 || group->fitting[0];
-    memory.count = 111;
-    for (int stage = 0; stage < 1; ++stage) {
-        int found = 1;
-        group->terms[stage] = 0;
-        for (int lane = 0; lane < sir_epidemic_LANES; ++lane)
-            for (int i = 0; i < 3 && group->active[lane] && found; ++i) {
-                for (int k = 0; k < 111; ++k)
-                    memory.past[111 - 1 - k][i] = sir_epidemic_group_past(group, stage, k)[i][lane];
-                const int terms = sir_epidemic_train(&memory, i);
-                found = terms > 0;
-                if (terms > group->terms[stage]) group->terms[stage] = terms;
-                for (int k = 0; k < 40; ++k) group->weight[stage][k][i][lane] = memory.weight[k][i][0];
-            }
-        if (!found) group->terms[stage] = 0;
-        group->fitting[stage] = found;
-    }
-    ++group->fits;
-    group->slow = 0;
-    group->patience = helped && group->patience < 10000 ? 2 * group->patience + 150 : 100 * 150;
-}
-
-/* Replace guesses that are not near the last values, as sir_epidemic_near has it, by these; lane by lane. */
-static void sir_epidemic_stay_near(sir_epidemic_lanes y[restrict 3], sir_epidemic_lanes last[restrict 3])
-{
-    sir_epidemic_lanes distance = { 0.0 }, size = { 0.0 };
-    for (int i = 0; i < 3; ++i) {
-        sir_epidemic_EACH_LANE
-        for (int lane = 0; lane < sir_epidemic_LANES; ++lane) {
-            distance[lane] += fabs(y[i][lane] - last[i][lane]);
-            size[lane] += fabs(last[i][lane]);
-        }
-    }
-    for (int i = 0; i < 3; ++i) {
-        sir_epidemic_EACH_LANE
-        for (int lane = 0; lane < sir_epidemic_LANES; ++lane)
-            y[i][lane] = distance[lane] <= 4.0 * size[lane] ? y[i][lane] : last[i][lane];
-    }
-}
-
-/* Whether lanes are still to be solved after a correction of this size; those where nothing is finite leave the group.
-   bound is what remains in each lane. */
-static int sir_epidemic_group_open(sir_epidemic_group *group, const sir_epidemic_lanes size, const sir_epidemic_lanes previous,
-    double bend, sir_epidemic_lanes bound)
-{
-    int open = 0;
-    sir_epidemic_EACH_LANE
-    for (int lane = 0; lane < sir_epidemic_LANES; ++lane)
-        bound[lane] = sir_epidemic_remaining(size[lane], bend, bound[lane]);
-    if (sir_epidemic_largest(bound) <= 1e-20) return 0;
-    for (int lane = 0; lane < sir_epidemic_LANES; ++lane) {
-        const int solved = bound[lane] <= 1e-20 || (previous[lane] < 1e-8 && size[lane] < 1e-10);
-        if (!isfinite(size[lane])) group->active[lane] = 0;
-        open += group->active[lane] && !solved;
-    }
-    return open;
-}
-
-/* The guess for a stage: recurrences, or extrapolation; the state for members where that is not near. */
-static void sir_epidemic_group_predict(sir_epidemic_group *group, int stage, sir_epidemic_lanes y[3])
-{
-    if (group->fitting[stage]) sir_epidemic_group_foresee(group, stage, y);
-    else sir_epidemic_group_extrapolate(group, stage, y);
-    sir_epidemic_stay_near(y, group->x);
-}
-
-/* Newton's method for a stage, until the slowest lane is solved. The number of iterations; where that is the most
-   allowed, lanes that are not solved leave the group. */
-static int sir_epidemic_group_solve(sir_epidemic_group *group, int stage, sir_epidemic_model *model)
-{
-    sir_epidemic_lanes size, previous, bound;
-    double largest = HUGE_VAL, bend = 0.0;
-    int iterations = 0, open = 1;
-    for (int lane = 0; lane < sir_epidemic_LANES; ++lane) size[lane] = bound[lane] = HUGE_VAL;
-    sir_epidemic_group_predict(group, stage, model->y);
-    for (; open > 0 && iterations < 20; ++iterations) {
-        memcpy(previous, size, sizeof size);
-        sir_epidemic_update(group->coef[stage], model, largest > 1e-05);
-        bend = largest > 1e-05 ? 0.0 : bend + largest;
-        for (int i = 0; i < 3; ++i) {
-            sir_epidemic_EACH_LANE
-            for (int lane = 0; lane < sir_epidemic_LANES; ++lane)
-                model->residual[i][lane] =
-                    ((model->y[i][lane] - group->x[i][lane]) + model->displacement[i][lane]) - group->carry[i][lane];
-        }
-        sir_epidemic_correct(model, size);
-        open = sir_epidemic_group_open(group, size, previous, bend, bound);
-        largest = sir_epidemic_largest(size);
-    }
-    for (int lane = 0; lane < sir_epidemic_LANES && open > 0; ++lane)
-        group->active[lane] = group->active[lane] && bound[lane] <= 1e-20;
-    return iterations;
-}
-
-/* Add the increments, corrected to first order, in compensated arithmetic as for a single step. */
-static void sir_epidemic_group_advance(sir_epidemic_lanes x[restrict 3], sir_epidemic_lanes carry[restrict 3],
-    sir_epidemic_model *model)
-{
-    for (int i = 0; i < 3; ++i)
-        for (int j = 0; j < 3; ++j) {
-            sir_epidemic_EACH_LANE
-            for (int lane = 0; lane < sir_epidemic_LANES; ++lane)
-                carry[i][lane] -= model->gain[i * 3 + j][lane] * model->residual[j][lane];
-        }
-    for (int i = 0; i < 3; ++i) {
-        sir_epidemic_EACH_LANE
-        for (int lane = 0; lane < sir_epidemic_LANES; ++lane) {
-            const double change = model->increment[i][lane], sum = x[i][lane] + change, added = sum - x[i][lane];
-            const double small = ((x[i][lane] - (sum - added)) + (change - added)) + carry[i][lane];
-            x[i][lane] = sum + small;
-            carry[i][lane] = small - (x[i][lane] - sum);
-        }
-    }
-}
-
-/* Members that failed, or whose state is not near the one before the step or not finite, keep that one, and leave. How many
-   stay. */
-static int sir_epidemic_group_leave(sir_epidemic_group *group, sir_epidemic_lanes x[3], sir_epidemic_lanes carry[3],
-    size_t remaining)
-{
-    sir_epidemic_lanes moved = { 0.0 }, size = { 0.0 }, bad;
-    int active = 0;
-    for (int i = 0; i < 3; ++i) {
-        sir_epidemic_EACH_LANE
-        for (int lane = 0; lane < sir_epidemic_LANES; ++lane) {
-            moved[lane] += fabs(group->x[i][lane] - x[i][lane]);
-            size[lane] += fabs(x[i][lane]);
-        }
-    }
-    for (int lane = 0; lane < sir_epidemic_LANES; ++lane) bad[lane] = moved[lane] <= 4.0 * size[lane] ? 0.0 : 1.0;
-    for (int lane = 0; lane < sir_epidemic_LANES; ++lane) active += group->active[lane];
-    if (active == sir_epidemic_LANES && !(sir_epidemic_largest(bad) > 0.0)) return active;
-    active = 0;
-    for (int lane = 0; lane < sir_epidemic_LANES; ++lane) {
-        group->active[lane] = group->active[lane] && !(bad[lane] > 0.0);
-        active += group->active[lane];
-        for (int i = 0; i < 3 && !group->active[lane]; ++i) {
-            group->x[i][lane] = x[i][lane];
-            group->carry[i][lane] = carry[i][lane];
-        }
-        if (!group->active[lane] && group->left[lane] == 0) group->left[lane] = remaining;
-    }
-    return active;
-}
-
-/* One step of all members, of as many as remain. How many members are left. */
-static int sir_epidemic_group_step(sir_epidemic_group *group, size_t remaining)
-{
-    sir_epidemic_lanes x[3], carry[3];
-    sir_epidemic_model model;
-    const int next = (group->latest > 0 ? group->latest : 111) - 1;
-    int most = 0;
-    memcpy(x, group->x, sizeof x);
-    memcpy(carry, group->carry, sizeof carry);
-    for (int stage = 0; stage < 1; ++stage) {
-        const int iterations = sir_epidemic_group_solve(group, stage, &model);
-        sir_epidemic_group_advance(group->x, group->carry, &model);
-        if (iterations > most) most = iterations;
-        if ((iterations > 1 && next % 8 == 0) || group->count < 8)
-            sir_epidemic_group_judge(group, stage, model.y);
-        memcpy(group->past[stage][next], model.y, sizeof model.y);
-    }
-    group->latest = next;
-    if (group->count < 111) ++group->count;
-    group->slow = most > 1 ? group->slow + 1 : 0;
-    if (group->slow > group->patience && group->count == 111 && remaining >= 600)
-        sir_epidemic_group_fit(group);
-    return sir_epidemic_group_leave(group, x, carry, remaining);
-}
-
-/* Put a member into a lane: its state, and its coefficients. */
-static sir_epidemic_status sir_epidemic_group_join(sir_epidemic_group *group, int lane, const sir_epidemic_params *params,
-    const double x0[3], double h)
-{
-    sir_epidemic_solver s;
-    sir_epidemic_status status = sir_epidemic_init(&s, params, x0);
-    if (status == sir_epidemic_OK) status = sir_epidemic_set_step(&s, h);
-    if (status != sir_epidemic_OK) return status;
-    for (int i = 0; i < 3; ++i) group->x[i][lane] = s.x[i];
-    for (int stage = 0; stage < 1; ++stage)
-        for (int k = 0; k < 4; ++k) group->coef[stage][k][lane] = s.coef[stage][k];
-    group->active[lane] = 1;
-    return status;
-}
-
-/* The steps that a member has still to make after it left the group, by itself. */
-static sir_epidemic_status sir_epidemic_group_finish(const sir_epidemic_group *group, int lane, const sir_epidemic_params *params,
-    double x[3], double h)
-{
-    sir_epidemic_solver s;
-    sir_epidemic_status status = sir_epidemic_init(&s, params, x);
-    if (status != sir_epidemic_OK) return status;
-    for (int i = 0; i < 3; ++i) s.carry[i] = group->carry[i][lane];
-    status = sir_epidemic_integrate(&s, h, group->left[lane]);
-    memcpy(x, s.x, sizeof s.x);
-    return status;
-}
-
-/* The members from first on, as many as there are lanes. The first status that is not OK. */
-static sir_epidemic_status sir_epidemic_group_run(const sir_epidemic_params *params, double *x, size_t members, size_t first,
-    double h, size_t steps, unsigned char *status)
-{
-    sir_epidemic_group group;
-    sir_epidemic_status worst = sir_epidemic_OK, member[8];
-    const int count = members - first < sir_epidemic_LANES ? (int)(members - first) : sir_epidemic_LANES;
-    double state[3];
-    size_t left = steps;
-    memset(&group, 0, sizeof group);
-    for (int lane = 0; lane < count; ++lane) {
-        for (size_t i = 0; i < 3; ++i) state[i] = x[i * members + first + (size_t)lane];
-        member[lane] = sir_epidemic_group_join(&group, lane, params, state, h);
-    }
-    for (int active = count; left > 0 && active > 2; --left) active = sir_epidemic_group_step(&group, left);
-    for (int lane = 0; lane < count; ++lane) {
-        if (group.active[lane]) group.left[lane] = left;
-        for (int i = 0; i < 3; ++i) state[i] = group.x[i][lane];
-        if (member[lane] == sir_epidemic_OK) {
-            if (group.left[lane] > 0) member[lane] = sir_epidemic_group_finish(&group, lane, params, state, h);
-            for (size_t i = 0; i < 3; ++i) x[i * members + first + (size_t)lane] = state[i];
-        }
-        if (status != NULL) status[first + (size_t)lane] = (unsigned char)member[lane];
-        if (worst == sir_epidemic_OK) worst = member[lane];
-    }
-    return worst;
-}
-
-sir_epidemic_status sir_epidemic_ensemble(const sir_epidemic_params *params, double *x, size_t members,
-                                          double h, size_t steps, unsigned char *status)
-{
-    sir_epidemic_status worst = isfinite(h) ? sir_epidemic_OK : sir_epidemic_BAD_ARGUMENT;
-    const sir_epidemic_params own = params != NULL ? *params : sir_epidemic_default_params;
-    size_t earliest = members;
-    if (x == NULL && members > 0) return sir_epidemic_BAD_ARGUMENT;
-#ifdef _OPENMP
-#pragma omp parallel for schedule(dynamic)
-#endif
-    for (size_t first = 0; first < members; first += sir_epidemic_LANES) {
-        const sir_epidemic_status group = sir_epidemic_group_run(&own, x, members, first, h, steps, status);
-        if (group == sir_epidemic_OK) continue;
-#ifdef _OPENMP
-#pragma omp critical
-#endif
-        if (first < earliest) {
-            earliest = first;
-            worst = group;
-        }
-    }
-    return worst;
-}
-
-#if defined(__clang__)
-#pragma clang diagnostic pop
-#endif
-
-/* the Hamiltonian */
-static void sir_epidemic_energy(const sir_epidemic_params *params, const double x[3],
-                                double energy[restrict 1])
-{
-    const double S = x[0];
-    const double I_ = x[1];
-    energy[0] = params->gamma * log(S) - params->beta * (I_ + S);
-}
-
-/* the Casimirs */
-static void sir_epidemic_casimir_values(const sir_epidemic_params *params, const double x[3],
-                                        double out[restrict 1])
-{
-    (void)params;
-    const double S = x[0];
-    const double I_ = x[1];
-    const double R = x[2];
-    out[0] = R + (I_ + S);
-}
-
-/* pi(x) grad H(x) */
-static void sir_epidemic_field(const sir_epidemic_params *params, const double x[3], double out[restrict 3])
-{
-    const double S = x[0];
-    const double I_ = x[1];
-    const double t1 = I_ * S;
-    const double t2 = params->beta * t1;
-    const double t3 = t1 * (params->gamma / S - params->beta);
-    out[0] = -t2;
-    out[1] = -t3;
-    out[2] = t2 + t3;
-}
-
-double sir_epidemic_hamiltonian(const sir_epidemic_params *params, const double x[3])
-{
-    double energy[1];
-    sir_epidemic_energy(params != NULL ? params : &sir_epidemic_default_params, x, energy);
-    return energy[0];
-}
-
-void sir_epidemic_casimirs(const sir_epidemic_params *params, const double x[3], double out[])
-{
-    double value[1]; /* out may overlap x */
-    sir_epidemic_casimir_values(params != NULL ? params : &sir_epidemic_default_params, x, value);
-    for (int i = 0; i < 1; ++i) out[i] = value[i];
-}
-
-void sir_epidemic_vector_field(const sir_epidemic_params *params, const double x[3], double out[3])
-{
-    double value[3];
-    sir_epidemic_field(params != NULL ? params : &sir_epidemic_default_params, x, value);
-    memcpy(out, value, sizeof value);
 }
 
 const char *sir_epidemic_status_string(sir_epidemic_status status)
 {
-    switch (status) {
-    case sir_epidemic_OK: return "ok";
-    case sir_epidemic_NO_CONVERGENCE: return "no convergence: the step is too large";
-    case sir_epidemic_SINGULAR: return "singular Newton matrix: the step is too large";
-    case sir_epidemic_NOT_FINITE: return "not finite: overflow, or outside the domain";
-    case sir_epidemic_BAD_ARGUMENT: return "bad argument: a null pointer, or values that are not allowed";
-    }
-    return "unknown status";
+    static const char *const text[] = {
+        "ok",
+        "no convergence: the step is too large",
+        "singular Newton matrix: the step is too large",
+        "not finite: overflow, or outside the domain",
+        "bad argument: a null pointer, or values that are not allowed"
+    };
+    return (unsigned)status <= sir_epidemic_BAD_ARGUMENT ? text[status] : "unknown status";
 }
 
 size_t sir_epidemic_solver_size(void) { return sizeof(sir_epidemic_solver); }
 
 size_t sir_epidemic_solver_steps_done(const sir_epidemic_solver *s) { return s->steps; }
+
+/* ---- Ensembles ---- */
+sir_epidemic_status sir_epidemic_ensemble(const sir_epidemic_params *params, double *x, size_t members,
+    double h, size_t steps, unsigned char *status)
+{
+    sir_epidemic_status worst = isfinite(h) ? sir_epidemic_OK : sir_epidemic_BAD_ARGUMENT;
+    const sir_epidemic_params own = params != NULL ? *params : sir_epidemic_default_params;
+    if (x == NULL && members > 0) return sir_epidemic_BAD_ARGUMENT;
+    for (size_t m = 0; m < members; ++m) {
+        sir_epidemic_solver s;
+        double x0[sir_epidemic_DIM];
+        for (size_t i = 0; i < sir_epidemic_DIM; ++i) x0[i] = x[i * members + m];
+        sir_epidemic_status member = sir_epidemic_init(&s, &own, x0);
+        if (member == sir_epidemic_OK) {
+            member = sir_epidemic_integrate(&s, h, steps);
+            for (size_t i = 0; i < sir_epidemic_DIM; ++i) x[i * members + m] = s.x[i];
+        }
+        if (status != NULL) status[m] = (unsigned char)member;
+        if (worst == sir_epidemic_OK) worst = member;
+    }
+    return worst;
+}

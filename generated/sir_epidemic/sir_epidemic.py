@@ -6,17 +6,17 @@
 #   step: implicit in p, each path followed by its Taylor series to round-off
 #   one evaluation of the equation for p: 2 additions, 11 multiplications, 1 divisions
 #
-# spec: sir_epidemic, sha256 115b753136b45d645443f1dd70079639f2bd0e5420635c11a5444e91e153af93
+# spec: sir_epidemic, sha256 a13678a806dd22744a0465a1afcd9f1cd7c0aa55e2f372bdedeb916b1232077b
 # to regenerate: phigen build sir_epidemic
 # DO NOT EDIT: change the spec and regenerate; edits are noticed by the checksum below.
 #
 # SPDX-License-Identifier: 0BSD
 # This file belongs to whoever generated it; phigen claims no rights in it.
-# body-sha256: ab28f62d8287c559c8830de6a87d3d2da077c78a906b2ddd6569862fc1c23de6
+# body-sha256: 7c07cd92b24ddc1d00830492a8c39b48d45c736b0f0c14985afd62b0b5917f5c
 import numpy as np
 
 VERSION = "0.1.0"
-SPEC_SHA256 = "115b753136b45d645443f1dd70079639f2bd0e5420635c11a5444e91e153af93"
+SPEC_SHA256 = "a13678a806dd22744a0465a1afcd9f1cd7c0aa55e2f372bdedeb916b1232077b"
 DIM = 3
 ORDER = 4
 COORDINATES = ("S", "I", "R",)

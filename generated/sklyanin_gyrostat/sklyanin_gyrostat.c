@@ -8,43 +8,49 @@
  *   step: implicit in p, each path followed by its Taylor series to round-off
  *   one evaluation of the equation for p: 84 additions, 156 multiplications
  *
- * spec: sklyanin_gyrostat, sha256 94d457c9aa3e46aec56580365573c4c556c8a0c29c26c22b6d908e85ad6c708e
+ * spec: sklyanin_gyrostat, sha256 e651a28cdc56907d5b5af694cc55378ac05a29592265e45944f163a14d4ec86f
  * to regenerate: phigen build sklyanin_gyrostat
  * DO NOT EDIT: change the spec and regenerate; edits are noticed by the checksum below.
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: f3ab4e3e9861c355b675f7db0314cf0c43c340c56d522e319fcd834b573bb228
+ *
+ *   1. The model
+ *   2. Compensated sums, linear equations
+ *   3. Starting guesses
+ *   4. The implicit step, along paths dm/dt = pi(m) p
+ *   5. The choice of the gauge: multiples of Casimirs taken from H
+ *   6. The solver
+ *   7. Ensembles
+ * body-sha256: 2247981319e50a8548016719718eb6d214ad1fa58f33b939ec3ff0a89e52e562
  */
 #include "sklyanin_gyrostat.h"
 
 #include <float.h>
-#include <limits.h>
 #include <math.h>
-#include <stdint.h>
 #include <string.h>
 
+/* ---- The model ---- */
 const sklyanin_gyrostat_params sklyanin_gyrostat_default_params = { 0 };
 
-/* A step of size h is the composition of these fractions of it. */
-static const double sklyanin_gyrostat_fractions[1] = { 1.0 };
+enum { sklyanin_gyrostat_MAX_ITERATIONS = 20 }; /* of an inner solve */
+/* most of the expansion of a path; one that needs more is cut into pieces */
+enum { sklyanin_gyrostat_TERMS = 30 };
+enum { sklyanin_gyrostat_SERIES = 40 }; /* of a path, those of the coordinates first */
+enum { sklyanin_gyrostat_FIXED = 1 };   /* values that are constant along a path */
 
 /* everything that depends on parameters and step size only */
 static void sklyanin_gyrostat_prepare(const sklyanin_gyrostat_params *params, const double gauge[1], double h,
-                                      double coef[restrict 31])
+    double coef[restrict 31])
 {
     (void)params;
-    const double t1 = h * (h * h);
-    const double t2 = t1 * (3.0 / 400.0 - 1.0 / 60.0 * gauge[0]);
+    const double t1 = h * (h * h), t2 = t1 * (3.0 / 400.0 - 1.0 / 60.0 * gauge[0]);
     const double t3 = t1 * (1.0 / 90.0 - 1.0 / 45.0 * gauge[0]);
     const double t4 = t1 * (1.0 / 1800.0 - 1.0 / 300.0 * gauge[0]);
     const double t5 = t1 * (1.0 / 216.0 - 1.0 / 108.0 * gauge[0]);
-    const double t6 = t1 * (1.0 / 90.0 - 2.0 / 45.0 * gauge[0]);
-    const double t7 = 1.0 / 75.0 * gauge[0];
-    const double t8 = t1 * (-1.0 / 450.0 + t7);
-    const double t9 = t1 * (1.0 / 180.0 - 1.0 / 30.0 * gauge[0]);
-    const double t10 = t1 * (1.0 / 450.0 - t7);
-    const double t11 = t1 * (1.0 / 27.0 - 4.0 / 27.0 * gauge[0]);
+    const double t6 = t1 * (1.0 / 90.0 - 2.0 / 45.0 * gauge[0]), t7 = 1.0 / 75.0 * gauge[0];
+    const double t8 = t1 * (-1.0 / 450.0 + t7), t9 = t1 * (1.0 / 180.0 - 1.0 / 30.0 * gauge[0]);
+    const double t10 = t1 * (1.0 / 450.0 - t7), t11 = t1 * (1.0 / 27.0 - 4.0 / 27.0 * gauge[0]);
     const double t12 = t1 * (-1.0 / 90.0 + 1.0 / 15.0 * gauge[0]);
     const double t13 = t1 * (1.0 / 72.0 - 1.0 / 12.0 * gauge[0]);
     coef[0] = 2.0 * t2;
@@ -82,54 +88,34 @@ static void sklyanin_gyrostat_prepare(const sklyanin_gyrostat_params *params, co
 
 /* p = grad S_h(y), and the Jacobian 1 - Hess S_h(y) pi(y) / 2 of the equation for p, up to O(h^2) */
 static void sklyanin_gyrostat_generate(const double coef[31], const double y[4], double slope[restrict 4],
-                                       double jacobian[restrict 16])
+    double jacobian[restrict 16])
 {
-    const double S0 = y[0];
-    const double S1 = y[1];
-    const double S2 = y[2];
-    const double S3 = y[3];
-    const double t1 = S3 * S3;
-    const double t2 = S2 * coef[6];
-    const double t3 = coef[4] * t1 + S2 * (coef[5] + t2);
-    const double t4 = S2 * coef[10];
-    const double t5 = S2 * (coef[9] + t4) + (coef[7] + coef[8] * t1);
-    const double t6 = S1 * t5;
-    const double t7 = coef[1] * t1;
-    const double t8 = coef[2] + coef[3] * t1;
-    const double t9 = S2 * t8;
-    const double t10 = S1 * (t3 + t6) + (coef[0] * t1 + S2 * (t7 + t9));
-    const double t11 = S0 * S0;
+    const double S0 = y[0], S1 = y[1], S2 = y[2], S3 = y[3];
+    /* slope */
+    const double t1 = S3 * S3, t2 = S2 * coef[6], t3 = coef[4] * t1 + S2 * (coef[5] + t2);
+    const double t4 = S2 * coef[10], t5 = S2 * (coef[9] + t4) + (coef[7] + coef[8] * t1);
+    const double t6 = S1 * t5, t7 = coef[1] * t1, t8 = coef[2] + coef[3] * t1, t9 = S2 * t8;
+    const double t10 = S1 * (t3 + t6) + (coef[0] * t1 + S2 * (t7 + t9)), t11 = S0 * S0;
     const double t12 = coef[14] + t2;
-    const double t13 = coef[20] + t11 * (S1 * (coef[4] + S1 * coef[8]) + (coef[0] + S2 * (coef[1] + S2 * coef[3])));
-    const double t14 = S2 * S3;
-    const double t15 = S2 * coef[24];
-    const double t16 = S0 * (t3 + S1 * (coef[21] + coef[22] * t1 + S2 * (coef[23] + t15)));
-    const double t17 = 2.0 * (t14 * t16);
-    const double t18 = S1 * S2;
-    const double t19 = S0 * S3;
-    const double t20 = S1 * coef[22];
-    const double t21 = S2 * coef[26];
-    const double t22 = t19 * (S1 * (coef[30] + t20) + (coef[28] + S2 * (coef[29] + t21)));
-    const double t23 = t18 * t22;
-    const double t24 = S1 * S3;
-    const double t25 = S1 * (coef[9] + t15);
-    const double t26 = S0 * (t7 + S2 * (coef[25] + coef[26] * t1) + S1 * (coef[5] + S2 * coef[27] + t25));
-    const double t27 = 3.0 * (t24 * t26);
-    const double t28 = S0 * S2;
-    const double t29 = S0 * S1;
-    const double t30 = coef[12] + t11 * t5;
-    const double t31 = S3 * t11;
-    const double t32 = (coef[4] + t20) * t31;
-    const double t33 = t11 * (t12 + t25);
-    const double t34 = t28 * t32;
-    const double t35 = 2.0 * (t19 * t33);
-    const double t36 = t31 * (coef[1] + t21);
-    const double t37 = coef[17] + t11 * (t8 + S1 * (coef[6] + S1 * coef[10]));
-    const double t38 = 2.0 * (t29 * t36);
+    const double t13 = coef[20] + t11 * (S1 * (coef[4] + S1 * coef[8]) + (coef[0] + S2 * (coef[1] + S2
+        * coef[3])));
     slope[0] = S0 * t10;
     slope[1] = coef[11] + S1 * coef[12] + t11 * (coef[13] * t1 + S2 * (coef[14] + S2 * coef[15]) + t6);
     slope[2] = coef[16] + S2 * coef[17] + t11 * (S1 * (t12 + S1 * (coef[19] + t4)) + (coef[18] * t1 + t9));
     slope[3] = S3 * t13;
+    /* jacobian */
+    const double t14 = S2 * S3, t15 = S2 * coef[24];
+    const double t16 = S0 * (t3 + S1 * (coef[21] + coef[22] * t1 + S2 * (coef[23] + t15)));
+    const double t17 = 2.0 * (t14 * t16), t18 = S1 * S2, t19 = S0 * S3, t20 = S1 * coef[22];
+    const double t21 = S2 * coef[26];
+    const double t22 = t19 * (S1 * (coef[30] + t20) + (coef[28] + S2 * (coef[29] + t21)));
+    const double t23 = t18 * t22, t24 = S1 * S3, t25 = S1 * (coef[9] + t15);
+    const double t26 = S0 * (t7 + S2 * (coef[25] + coef[26] * t1) + S1 * (coef[5] + S2 * coef[27] + t25));
+    const double t27 = 3.0 * (t24 * t26), t28 = S0 * S2, t29 = S0 * S1, t30 = coef[12] + t11 * t5;
+    const double t31 = S3 * t11, t32 = (coef[4] + t20) * t31, t33 = t11 * (t12 + t25);
+    const double t34 = t28 * t32, t35 = 2.0 * (t19 * t33), t36 = t31 * (coef[1] + t21);
+    const double t37 = coef[17] + t11 * (t8 + S1 * (coef[6] + S1 * coef[10]));
+    const double t38 = 2.0 * (t29 * t36);
     jacobian[0] = 1.0 - 0.5 * (t17 + (t23 - t27));
     jacobian[1] = (-0.5) * (2.0 * (t28 * t22) - 2.0 * (t19 * t26) - 2.0 * (t14 * t10));
     jacobian[2] = (-0.5) * (2.0 * (t19 * t16) + 3.0 * (t24 * t10) - 2.0 * (t29 * t22));
@@ -148,289 +134,117 @@ static void sklyanin_gyrostat_generate(const double coef[31], const double y[4],
     jacobian[15] = 1.0 - 0.5 * (t38 + ((-2.0) * t34 - t23));
 }
 
-/* Solve matrix * solution = side, both overwritten, by elimination with partial pivoting. 0 if singular. */
-static int sklyanin_gyrostat_solve_pivoting(double matrix[16], double side[4])
-{
-    for (int k = 0; k < 4; ++k) {
-        int best = k;
-        for (int i = k + 1; i < 4; ++i)
-            if (fabs(matrix[i * 4 + k]) > fabs(matrix[best * 4 + k])) best = i;
-        const double pivot = matrix[best * 4 + k];
-        if (!(fabs(pivot) > 0.0)) return 0;
-        for (int j = k; j < 4 && best != k; ++j) {
-            const double swap = matrix[k * 4 + j];
-            matrix[k * 4 + j] = matrix[best * 4 + j];
-            matrix[best * 4 + j] = swap;
-        }
-        const double swap = side[k];
-        side[k] = side[best];
-        side[best] = swap;
-        for (int i = k + 1; i < 4; ++i) {
-            const double factor = matrix[i * 4 + k] / pivot;
-            for (int j = k + 1; j < 4; ++j) matrix[i * 4 + j] -= factor * matrix[k * 4 + j];
-            side[i] -= factor * side[k];
-        }
-    }
-    for (int i = 4 - 1; i >= 0; --i) {
-        for (int j = i + 1; j < 4; ++j) side[i] -= matrix[i * 4 + j] * side[j];
-        side[i] /= matrix[i * 4 + i];
-    }
-    return 1;
-}
-
 /* elimination without pivoting: the solution, and the reciprocals of the pivots */
 static void sklyanin_gyrostat_eliminate(const double matrix[16], const double side[4],
-                                        double solution[restrict 4], double reciprocal[restrict 4])
+    double solution[restrict 4], double reciprocal[restrict 4])
 {
-    const double t1 = 1.0 / matrix[0];
-    const double t2 = matrix[12] * t1;
-    const double t3 = matrix[4] * t1;
-    const double t4 = side[1] - side[0] * t3;
-    const double t5 = 1.0 / (matrix[5] - matrix[1] * t3);
-    const double t6 = (matrix[13] - matrix[1] * t2) * t5;
-    const double t7 = matrix[8] * t1;
-    const double t8 = (matrix[9] - matrix[1] * t7) * t5;
-    const double t9 = side[2] - side[0] * t7 - t4 * t8;
+    /* solution */
+    const double t1 = 1.0 / matrix[0], t2 = matrix[12] * t1, t3 = matrix[4] * t1;
+    const double t4 = side[1] - side[0] * t3, t5 = 1.0 / (matrix[5] - matrix[1] * t3);
+    const double t6 = (matrix[13] - matrix[1] * t2) * t5, t7 = matrix[8] * t1;
+    const double t8 = (matrix[9] - matrix[1] * t7) * t5, t9 = side[2] - side[0] * t7 - t4 * t8;
     const double t10 = matrix[6] - matrix[2] * t3;
     const double t11 = 1.0 / (matrix[10] - matrix[2] * t7 - t10 * t8);
     const double t12 = (matrix[14] - matrix[2] * t2 - t10 * t6) * t11;
-    const double t13 = matrix[7] - matrix[3] * t3;
-    const double t14 = matrix[11] - matrix[3] * t7 - t13 * t8;
+    const double t13 = matrix[7] - matrix[3] * t3, t14 = matrix[11] - matrix[3] * t7 - t13 * t8;
     const double t15 = 1.0 / (matrix[15] - matrix[3] * t2 - t13 * t6 - t14 * t12);
     const double t16 = (side[3] - side[0] * t2 - t4 * t6 - t9 * t12) * t15;
-    const double t17 = t11 * (t9 - t14 * t16);
-    const double t18 = t5 * (t4 - (t13 * t16 + t10 * t17));
+    const double t17 = t11 * (t9 - t14 * t16), t18 = t5 * (t4 - (t13 * t16 + t10 * t17));
     solution[0] = t1 * (side[0] - (matrix[3] * t16 + (matrix[2] * t17 + matrix[1] * t18)));
     solution[1] = t18;
     solution[2] = t17;
     solution[3] = t16;
+    /* reciprocal */
     reciprocal[0] = t1;
     reciprocal[1] = t5;
     reciprocal[2] = t11;
     reciprocal[3] = t15;
 }
 
-/* Solve matrix * solution = side, both overwritten. The matrix is I + O(h), so elimination without pivoting
-   does unless a pivot is far from 1. 0 if singular. */
-static int sklyanin_gyrostat_solve(double matrix[16], double side[4])
+/* the leading error vector pi grad S_3, as a function of the gauge */
+static void sklyanin_gyrostat_guide(const sklyanin_gyrostat_params *params, const double gauge[1],
+    const double x[4], double error[restrict 4])
 {
-    double solution[4], reciprocal[4], largest = 0.0;
-    sklyanin_gyrostat_eliminate(matrix, side, solution, reciprocal);
-    for (int i = 0; i < 4; ++i)
-        if (!(fabs(reciprocal[i]) <= largest)) largest = fabs(reciprocal[i]);
-    if (!(largest < 1e3)) return sklyanin_gyrostat_solve_pivoting(matrix, side);
-    memcpy(side, solution, sizeof solution);
-    return 1;
+    (void)params;
+    const double S0 = x[0], S1 = x[1], S2 = x[2], S3 = x[3];
+    const double t1 = S1 * S3, t2 = S0 * S0, t3 = S3 * S3;
+    const double t4 = S2 * (1.0 / 900.0 - 1.0 / 150.0 * gauge[0] + t3 * (1.0 / 108.0 - 1.0 / 54.0
+        * gauge[0]));
+    const double t5 = -1.0 / 450.0 + 1.0 / 75.0 * gauge[0], t6 = 1.0 / 15.0 * gauge[0];
+    const double t7 = S2 * (1.0 / 90.0 - t6), t8 = S2 * (1.0 / 36.0 - 1.0 / 6.0 * gauge[0]);
+    const double t9 = t2 * (t3 * (1.0 / 90.0 - 1.0 / 45.0 * gauge[0]) + t4 + S1 * (t5 + t7 + S1 * (-1.0 / 90.0
+        + t6 + t8)));
+    const double t10 = S2 * S3, t11 = 2.0 / 45.0 * gauge[0], t12 = 1.0 / 30.0 * gauge[0];
+    const double t13 = 2.0 / 75.0 * gauge[0];
+    const double t14 = S1 * (1.0 / 225.0 - t13 + t3 * (2.0 / 27.0 - 8.0 / 27.0 * gauge[0]) + S2 * (-1.0 / 45.0
+        + 2.0 / 15.0 * gauge[0] + t8));
+    const double t15 = t2 * (t3 * (1.0 / 90.0 - t11) + S2 * (t5 + S2 * (1.0 / 180.0 - t12)) + t14);
+    const double t16 = S1 * S2;
+    const double t17 = S1 * (1.0 / 45.0 + 2.0 / 27.0 * S1) + (3.0 / 200.0 + S2 * (1.0 / 45.0 + 1.0 / 108.0
+        * S2)) + gauge[0] * (S1 * (-4.0 / 45.0 - 8.0 / 27.0 * S1) + (-1.0 / 30.0 + S2 * (-2.0 / 45.0 - 1.0
+        / 54.0 * S2)));
+    const double t18 = S3 * t2 * t17, t19 = S0 * S3;
+    const double t20 = t3 * (3.0 / 200.0 - t12) + S2 * (t3 * (1.0 / 45.0 - t11) + t4) + S1
+        * (t3 * (1.0 / 45.0 - 4.0 / 45.0 * gauge[0]) + S2 * (-1.0 / 225.0 + t13 + t7) + t14);
+    const double t21 = S0 * t20, t22 = S0 * S2, t23 = S0 * S1;
+    error[0] = 3.0 * (t1 * t9) - 2.0 * (t10 * t15) - t16 * t18;
+    error[1] = 2.0 * (t19 * t9) + 2.0 * (t10 * t21) - 2.0 * (t22 * t18);
+    error[2] = 2.0 * (t23 * t18) + ((-3.0) * (t1 * t21) - 2.0 * (t19 * t15));
+    error[3] = 2.0 * (t22 * t15) + t16 * t21 - 2.0 * (t23 * t9);
 }
 
-/* Whether a guess is where the next values may be. Recurrences that were fitted to little else than rest, near a saddle,
-   may lead anywhere; and far away the equation of a step has solutions that have nothing to do with the motion. */
-static int sklyanin_gyrostat_near(const double guess[4], const double last[4])
+/* grad H . grad H, then grad H . grad C and grad C . grad C for each Casimir of the gauge */
+static void sklyanin_gyrostat_products(const sklyanin_gyrostat_params *params, const double x[4],
+    double out[restrict 3])
 {
-    double distance = 0.0, size = 0.0;
-    for (int i = 0; i < 4; ++i) {
-        distance += fabs(guess[i] - last[i]);
-        size += fabs(last[i]);
-    }
-    return distance <= 4.0 * size;
+    (void)params;
+    const double S1 = x[1], S2 = x[2], S3 = x[3];
+    const double t1 = 1.0 / 10.0 + S1, t2 = S3 * S3, t3 = 1.0 / 5.0 + 0.5 * S2;
+    out[0] = t1 * t1 + (1.0 / 9.0 * t2 + t3 * t3);
+    out[1] = 2.0 * (S1 * t1) + (2.0 / 3.0 * t2 + 2.0 * (S2 * t3));
+    out[2] = 4.0 * (S1 * S1) + (4.0 * (S2 * S2) + 4.0 * t2);
 }
 
-/* The guess for the next value (y), from earlier ones; 0 if there is none. */
-static int sklyanin_gyrostat_predict(const sklyanin_gyrostat_memory *memory, double value[4])
+/* the Hamiltonian */
+double sklyanin_gyrostat_hamiltonian(const sklyanin_gyrostat_params *params, const double x[4])
 {
-    const int last = memory->count - 1;
-    double odd[4] = { 0.0 }, binomial = -1.0;
-    memset(value, 0, 4 * sizeof value[0]);
-    if (memory->fitting) {
-        for (int k = 0; k < memory->terms; k += 2)
-            for (int i = 0; i < 4; ++i) {
-                value[i] += memory->weight[k][i][0] * memory->past[last - k][i];
-                odd[i] += memory->weight[k + 1][i][0] * memory->past[last - 1 - k][i];
-            }
-        for (int i = 0; i < 4; ++i) value[i] += odd[i];
-    } else {
-        for (int k = 0; k < memory->order && k <= last; ++k) {
-            binomial *= -(double)(memory->order - k) / (k + 1);
-            for (int i = 0; i < 4; ++i) value[i] += binomial * memory->past[last - k][i];
-        }
-    }
-    return last >= 0 && sklyanin_gyrostat_near(value, memory->past[last]);
+    (void)params;
+    const double S1 = x[1], S2 = x[2], S3 = x[3];
+    return 1.0 / 5.0 * S2 + (1.0 / 10.0 * S1 + 0.5 * (1.0 / 3.0 * (S3 * S3) + (S1 * S1 + 0.5 * (S2 * S2))));
 }
 
-/* Choose the guess that would have been best for a value that took several iterations. */
-static void sklyanin_gyrostat_judge(sklyanin_gyrostat_memory *memory, const double value[4])
+/* the Casimirs */
+void sklyanin_gyrostat_casimirs(const sklyanin_gyrostat_params *params, const double x[4], double out[])
 {
-    double row[8 + 1][4], guess[4], least = HUGE_VAL, fitted = HUGE_VAL;
-    const int rows = memory->count < 8 ? memory->count : 8;
-    memcpy(row[0], value, sizeof row[0]);
-    for (int k = 0; k < rows; ++k) memcpy(row[k + 1], memory->past[memory->count - 1 - k], sizeof row[0]);
-    for (int order = 1; order <= rows; ++order) { /* row[0] becomes the backward difference of this order */
-        double size = 0.0;
-        for (int k = 0; k <= rows - order; ++k)
-            for (int i = 0; i < 4; ++i) row[k][i] -= row[k + 1][i];
-        for (int i = 0; i < 4; ++i) size += fabs(row[0][i]);
-        if (size < least) {
-            least = size;
-            memory->order = order;
-        }
-    }
-    memory->fitting = memory->terms > 0;
-    if (memory->fitting && sklyanin_gyrostat_predict(memory, guess)) {
-        fitted = 0.0;
-        for (int i = 0; i < 4; ++i) fitted += fabs(value[i] - guess[i]);
-    }
-    memory->fitting = memory->terms > 0 && fitted <= least;
-    if (memory->order == 0) memory->order = 1;
+    (void)params;
+    const double S0 = x[0], S1 = x[1], S2 = x[2], S3 = x[3];
+    const double t1 = S3 * S3, t2 = S2 * S2, t3 = S1 * S1;
+    out[0] = t1 + (t2 + t3);
+    out[1] = 2.5 * t1 + (t3 + S0 * S0 + 1.5 * t2);
 }
 
-/* Make eight columns orthogonal to one, by the multiples of it that are put into r. Where that one is among the eight, those
-   up to it stay as they are, and inverse becomes one over its squared length. The number of rows is even. */
-static void sklyanin_gyrostat_project(int rows, double (*one)[8], int column, double *inverse, double (*eight)[8], double r[8])
+/* pi(x) grad H(x) */
+void sklyanin_gyrostat_vector_field(const sklyanin_gyrostat_params *params, const double x[4], double out[4])
 {
-    double even[8] = { 0.0 }, odd[8] = { 0.0 };
-    for (int i = 0; i < rows; i += 2) {
-        const double entry = one[i][column], next = one[i + 1][column];
-        for (int l = 0; l < 8; ++l) even[l] += entry * eight[i][l];
-        for (int l = 0; l < 8; ++l) odd[l] += next * eight[i + 1][l];
-    }
-    for (int l = 0; l < 8; ++l) even[l] += odd[l];
-    if (one == eight) {
-        *inverse = even[column] > 0.0 ? 1.0 / even[column] : 0.0;
-        memset(even, 0, ((size_t)column + 1) * sizeof even[0]);
-    }
-    for (int l = 0; l < 8; ++l) r[l] = even[l] *= *inverse;
-    for (int i = 0; i < rows; ++i) {
-        const double entry = one[i][column];
-        for (int l = 0; l < 8; ++l) eight[i][l] -= entry * even[l];
-    }
+    (void)params;
+    const double S0 = x[0], S1 = x[1], S2 = x[2], S3 = x[3];
+    const double t1 = 1.0 / 5.0 + 0.5 * S2, t2 = 1.0 / 10.0 + S1, t3 = S0 * S3, t4 = S0 * S2;
+    const double t5 = S0 * S1;
+    out[0] = 3.0 * (S1 * S3 * t1) - 2.0 * (S2 * S3 * t2) - 1.0 / 3.0 * (S3 * (S1 * S2));
+    out[1] = 2.0 * (t3 * t1) - 2.0 / 3.0 * (S3 * t4);
+    out[2] = 2.0 / 3.0 * (S3 * t5) - 2.0 * (t2 * t3);
+    out[3] = 2.0 * (t4 * t2) - 2.0 * (t5 * t1);
 }
 
-/* By how much recurrences miss the last of these values. */
-static double sklyanin_gyrostat_missed(const double *value, double (*weight)[8])
+/* ---- Compensated sums, linear equations ---- */
+/* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to
+   its last bit: were it rounded with the change, corrections of one sign would add up to a drift. 0, and x as
+   before, if the sum is not finite. */
+static int sklyanin_gyrostat_advance(sklyanin_gyrostat_solver *s, const double change[sklyanin_gyrostat_DIM],
+    const double correction[sklyanin_gyrostat_DIM])
 {
-    enum { AHEAD = 8, WINDOW = 40, CHECKS = 8 };
-    double most = 0.0;
-    for (int i = 0; i < CHECKS; ++i) {
-        double guess[8] = { 0.0 };
-        for (int k = 0; k < WINDOW; ++k)
-            for (int l = 0; l < 8; ++l) guess[l] += weight[k][l] * value[i + WINDOW - 1 - k];
-        for (int l = 0; l < AHEAD; ++l) most = fmax(most, fabs(guess[l] - value[i + WINDOW + l]));
-    }
-    return most;
-}
-
-/* Fit the recurrences value[m + l] = sum of weight[k][..][l] * value[m - 1 - k], l = 0 ... 8 - 1, to the history of
-   a component: ridge least squares by modified Gram-Schmidt, the ridge at the level of rounding. Columns are taken in by
-   eights, until they leave next to nothing of the right-hand sides. How many past values are used; 0 if the recurrences do
-   not foresee the last values, which they were not fitted to. */
-static int sklyanin_gyrostat_train(sklyanin_gyrostat_memory *memory, int component)
-{
-    enum { AHEAD = 8, WINDOW = 40, ROWS = 56 };
-    double q[WINDOW / 8][ROWS + WINDOW][8], r[WINDOW / 8][WINDOW][8], inverse[WINDOW]; /* eight columns in each part */
-    double right[ROWS + WINDOW][8], weight[WINDOW][8], value[111], largest = 0.0, left = HUGE_VAL;
-    int terms = 0;
-    memset(q, 0, sizeof q);
-    memset(right, 0, sizeof right);
-    memset(weight, 0, sizeof weight);
-    for (int i = 0; i < 111; ++i) {
-        value[i] = memory->past[memory->count - 111 + i][component];
-        if (fabs(value[i]) > largest) largest = fabs(value[i]);
-    }
-    for (int i = 0; i < ROWS; ++i)
-        for (int l = 0; l < AHEAD; ++l) right[i][l] = value[i + WINDOW + l];
-    while (terms < WINDOW && left > 3e-12 * largest) {
-        const int part = terms / 8, rows = ROWS + terms + 8; /* further rows of the ridge are zero in these columns */
-        for (int i = 0; i < ROWS; ++i)
-            for (int l = 0; l < 8; ++l) q[part][i][l] = value[i + WINDOW - 1 - terms - l];
-        for (int l = 0; l < 8; ++l) q[part][ROWS + terms + l][l] = 1e-15 * largest;
-        for (int k = 0; k < terms; ++k) sklyanin_gyrostat_project(rows, q[k / 8], k % 8, &inverse[k], q[part], r[part][k]);
-        for (int l = 0; l < 8; ++l, ++terms) {
-            sklyanin_gyrostat_project(rows, q[part], l, &inverse[terms], q[part], r[part][terms]);
-            sklyanin_gyrostat_project(rows, q[part], l, &inverse[terms], right, weight[terms]);
-        }
-        double sum[8] = { 0.0 };
-        for (int i = 0; i < ROWS; ++i)
-            for (int l = 0; l < 8; ++l) sum[l] += fabs(right[i][l]);
-        left = 0.0;
-        for (int l = 0; l < 8; ++l) left += sum[l] / ROWS;
-    }
-    for (int k = terms - 1; k >= 0; --k)
-        for (int j = k + 1; j < terms; ++j)
-            for (int l = 0; l < 8; ++l) weight[k][l] -= r[j / 8][k][j % 8] * weight[j][l];
-    for (int k = 0; k < WINDOW; ++k) memcpy(memory->weight[k][component], weight[k], AHEAD * sizeof(double));
-    return sklyanin_gyrostat_missed(value + ROWS, weight) <= 1e-07 * largest ? terms : 0;
-}
-
-/* Drop what is old, if so many values would not fit into the history. */
-static void sklyanin_gyrostat_make_room(sklyanin_gyrostat_memory *memory, int values)
-{
-    if (memory->count + values <= 222) return;
-    memmove(memory->past, memory->past + memory->count - 111, 111 * sizeof memory->past[0]);
-    memory->count = 111;
-}
-
-/* Add a value to the history. */
-static void sklyanin_gyrostat_record(sklyanin_gyrostat_memory *memory, const double value[4])
-{
-    sklyanin_gyrostat_make_room(memory, 1);
-    memcpy(memory->past[memory->count++], value, 4 * sizeof value[0]);
-}
-
-/* Fit the recurrence to the last values; with every time, wait longer before it is done again. */
-static void sklyanin_gyrostat_fit(sklyanin_gyrostat_memory *memory)
-{
-    int found = 1;
-    memory->terms = 0;
-    for (int i = 0; i < 4 && found; ++i) {
-        const int terms = sklyanin_gyrostat_train(memory, i);
-        found = terms > 0;
-        if (terms > memory->terms) memory->terms = terms;
-    }
-    if (!found) memory->terms = 0;
-    memory->fitting = found;
-    ++memory->fits;
-    memory->slow = 0;
-    memory->patience = memory->patience < 10000 ? 2 * memory->patience + 150 : 20000;
-}
-
-/* Take in the solved value: what took one iteration needs no better guess. */
-static void sklyanin_gyrostat_remember(sklyanin_gyrostat_memory *memory, const double value[4], int iterations)
-{
-    if (iterations > 1) sklyanin_gyrostat_judge(memory, value);
-    sklyanin_gyrostat_record(memory, value);
-    memory->slow = iterations > 1 ? memory->slow + 1 : 0;
-    if (memory->slow > memory->patience && memory->count >= 111) sklyanin_gyrostat_fit(memory);
-}
-
-/* Whether an increment is that of the motion. Where the step is too large, the equation may have been solved by a point far
-   away, at another energy, that has nothing to do with it. */
-static int sklyanin_gyrostat_plausible(const sklyanin_gyrostat_solver *s, int stage, const double increment[4])
-{
-    double moved = 0.0, size = 0.0, field[4], middle[4], end[4];
-    for (int i = 0; i < 4; ++i) {
-        moved += fabs(increment[i]);
-        size += fabs(s->x[i]);
-    }
-    if (moved <= 1.5 * size) return 1;
-    sklyanin_gyrostat_vector_field(&s->params, s->x, field);
-    for (int i = 0; i < 4; ++i) {
-        size += fabs(sklyanin_gyrostat_fractions[stage] * s->h * field[i]);
-        middle[i] = s->x[i] + 0.5 * increment[i];
-        end[i] = s->x[i] + increment[i];
-    }
-    if (moved <= 1.5 * size) return 1;
-    const double before = sklyanin_gyrostat_hamiltonian(&s->params, s->x), after = sklyanin_gyrostat_hamiltonian(&s->params, end);
-    const double scale = fabs(before) + fabs(sklyanin_gyrostat_hamiltonian(&s->params, middle)) + fabs(after);
-    return fabs(after - before) <= 0.5 * scale;
-}
-
-/* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to its last
-   bit: were it rounded with the change, corrections of one sign would add up to a drift. 0, and x as before, if the
-   sum is not finite. */
-static int sklyanin_gyrostat_advance(sklyanin_gyrostat_solver *s, const double change[4], const double correction[4])
-{
-    double x[4], carry[4];
-    for (int i = 0; i < 4; ++i) {
+    double x[sklyanin_gyrostat_DIM], carry[sklyanin_gyrostat_DIM];
+    for (int i = 0; i < sklyanin_gyrostat_DIM; ++i) {
         const double sum = s->x[i] + change[i], added = sum - s->x[i];
         const double lost = (s->x[i] - (sum - added)) + (change[i] - added);
         const double small = lost + (s->carry[i] + correction[i]);
@@ -443,6 +257,96 @@ static int sklyanin_gyrostat_advance(sklyanin_gyrostat_solver *s, const double c
     return 1;
 }
 
+/* Newton matrices are I + O(h): a pivot whose reciprocal is larger than this is far from 1. */
+#define sklyanin_gyrostat_LARGEST_RECIPROCAL 1e3
+
+/* Solve matrix * solution = side, both overwritten. The matrix is I + O(h): 0 if a pivot is far from 1. */
+static int sklyanin_gyrostat_solve(double matrix[sklyanin_gyrostat_DIM * sklyanin_gyrostat_DIM],
+    double side[sklyanin_gyrostat_DIM])
+{
+    double solution[sklyanin_gyrostat_DIM], reciprocal[sklyanin_gyrostat_DIM], largest = 0.0;
+    sklyanin_gyrostat_eliminate(matrix, side, solution, reciprocal);
+    for (int i = 0; i < sklyanin_gyrostat_DIM; ++i)
+        if (!(fabs(reciprocal[i]) <= largest)) largest = fabs(reciprocal[i]);
+    if (!(largest < sklyanin_gyrostat_LARGEST_RECIPROCAL)) return 0;
+    memcpy(side, solution, sizeof solution);
+    return 1;
+}
+
+/* ---- Starting guesses ---- */
+/* How far from the last value a guess may be, in sizes of that value. */
+#define sklyanin_gyrostat_REACH 4.0
+
+/* The guess for the next value from the last ones: the sum of their backward differences. 0 if there is none,
+   or if it is far away, where the equation of a step has solutions that have nothing to do with the motion.
+   */
+static int sklyanin_gyrostat_predict(const sklyanin_gyrostat_history *history,
+    double value[sklyanin_gyrostat_DIM])
+{
+    double distance = 0.0, size = 0.0;
+    for (int i = 0; i < sklyanin_gyrostat_DIM; ++i) {
+        value[i] = 0.0;
+        for (int k = 0; k < history->order; ++k) value[i] += history->difference[k][i];
+        distance += fabs(value[i] - history->difference[0][i]);
+        size += fabs(history->difference[0][i]);
+    }
+    return history->order > 0 && distance <= sklyanin_gyrostat_REACH * size;
+}
+
+/* Take in the solved value. The guess of order k missed it by its k-th difference: the next is of the best
+   order. */
+static void sklyanin_gyrostat_remember(sklyanin_gyrostat_history *history,
+    const double value[sklyanin_gyrostat_DIM])
+{
+    double least = HUGE_VAL, next[sklyanin_gyrostat_DIM];
+    memcpy(next, value, sizeof next);
+    for (int k = 0; k <= history->count && k < sklyanin_gyrostat_DIFFERENCES; ++k) {
+        double size = 0.0;
+        for (int i = 0; i < sklyanin_gyrostat_DIM; ++i) {
+            const double last = history->difference[k][i];
+            history->difference[k][i] = next[i];
+            size += fabs(next[i]);
+            next[i] -= last;
+        }
+        if (k > 0 && size < least) {
+            least = size;
+            history->order = k;
+        }
+    }
+    if (history->count == 0) history->order = 1;
+    if (history->count < sklyanin_gyrostat_DIFFERENCES) ++history->count;
+}
+
+/* How far a step may lead, in sizes of the state and of what the vector field says, if the energy is lost;
+   and the part of the energy that counts as lost. */
+#define sklyanin_gyrostat_PLAUSIBLE 1.5
+#define sklyanin_gyrostat_LOST 0.5
+
+/* Whether an increment is that of the motion. Where the step is too large, the equation may have been solved
+   by a point far away, at another energy, that has nothing to do with it. */
+static int sklyanin_gyrostat_plausible(const sklyanin_gyrostat_solver *s,
+    const double increment[sklyanin_gyrostat_DIM])
+{
+    double moved = 0.0, size = 0.0, field[sklyanin_gyrostat_DIM], middle[sklyanin_gyrostat_DIM],
+        end[sklyanin_gyrostat_DIM];
+    for (int i = 0; i < sklyanin_gyrostat_DIM; ++i) {
+        moved += fabs(increment[i]);
+        size += fabs(s->x[i]);
+    }
+    if (moved <= sklyanin_gyrostat_PLAUSIBLE * size) return 1;
+    sklyanin_gyrostat_vector_field(&s->params, s->x, field);
+    for (int i = 0; i < sklyanin_gyrostat_DIM; ++i) {
+        size += fabs(s->h * field[i]);
+        middle[i] = s->x[i] + 0.5 * increment[i];
+        end[i] = s->x[i] + increment[i];
+    }
+    if (moved <= sklyanin_gyrostat_PLAUSIBLE * size) return 1;
+    const double before = sklyanin_gyrostat_hamiltonian(&s->params, s->x), after =
+        sklyanin_gyrostat_hamiltonian(&s->params, end);
+    const double scale = fabs(before) + fabs(sklyanin_gyrostat_hamiltonian(&s->params, middle)) + fabs(after);
+    return fabs(after - before) <= sklyanin_gyrostat_LOST * scale;
+}
+
 /* Coefficient k of the product of two Taylor series. */
 static double sklyanin_gyrostat_taylor_product(const double *a, const double *b, int k)
 {
@@ -451,13 +355,107 @@ static double sklyanin_gyrostat_taylor_product(const double *a, const double *b,
     return sum;
 }
 
-/* Whether dm/dt = pi(m) p holds at a point m, where the expansion has the given slope: one with gaps between its terms,
-   like t + t^9, or across the kink of an absolute value, only looks as if it had converged. */
-static int sklyanin_gyrostat_holds(const double *coef, const double p[4], const double m[4], const double slope[4])
+/* The first coefficients of the series of a path, those of the coordinates given. */
+static void sklyanin_gyrostat_path_begin(const double *coef, const double p[4],
+    double s[40][sklyanin_gyrostat_TERMS + 1], double f[1])
 {
     (void)coef;
-    double e[40], field[4], scale = 0.0;
-    memcpy(e, m, 4 * sizeof *e);
+    (void)f;
+    s[4][0] = s[1][0] * s[3][0];
+    s[5][0] = p[2] * s[4][0];
+    s[6][0] = 3.0 * s[5][0];
+    s[7][0] = s[2][0] * s[3][0];
+    s[8][0] = p[1] * s[7][0];
+    s[9][0] = 2.0 * s[8][0];
+    s[10][0] = s[6][0] - s[9][0];
+    s[11][0] = s[1][0] * s[2][0];
+    s[12][0] = p[3] * s[11][0];
+    s[13][0] = s[10][0] - s[12][0];
+    s[14][0] = p[0] * s[7][0];
+    s[15][0] = 2.0 * s[14][0];
+    s[16][0] = s[0][0] * s[3][0];
+    s[17][0] = p[2] * s[16][0];
+    s[18][0] = 2.0 * s[17][0];
+    s[19][0] = s[15][0] + s[18][0];
+    s[20][0] = s[0][0] * s[2][0];
+    s[21][0] = p[3] * s[20][0];
+    s[22][0] = 2.0 * s[21][0];
+    s[23][0] = s[19][0] - s[22][0];
+    s[24][0] = s[0][0] * s[1][0];
+    s[25][0] = p[3] * s[24][0];
+    s[26][0] = 2.0 * s[25][0];
+    s[27][0] = p[0] * s[4][0];
+    s[28][0] = (-3.0) * s[27][0];
+    s[29][0] = p[1] * s[16][0];
+    s[30][0] = 2.0 * s[29][0];
+    s[31][0] = s[28][0] - s[30][0];
+    s[32][0] = s[26][0] + s[31][0];
+    s[33][0] = p[0] * s[11][0];
+    s[34][0] = p[1] * s[20][0];
+    s[35][0] = 2.0 * s[34][0];
+    s[36][0] = s[33][0] + s[35][0];
+    s[37][0] = p[2] * s[24][0];
+    s[38][0] = 2.0 * s[37][0];
+    s[39][0] = s[36][0] - s[38][0];
+}
+
+/* Coefficient k of the series, and with it coefficient k + 1 of the coordinates. */
+static void sklyanin_gyrostat_path_order(const double *coef, const double p[4],
+    double s[40][sklyanin_gyrostat_TERMS + 1], const double f[1], int k)
+{
+    (void)coef;
+    (void)f;
+    if (k > 0) {
+        s[4][k] = sklyanin_gyrostat_taylor_product(s[1], s[3], k);
+        s[5][k] = p[2] * s[4][k];
+        s[6][k] = 3.0 * s[5][k];
+        s[7][k] = sklyanin_gyrostat_taylor_product(s[2], s[3], k);
+        s[8][k] = p[1] * s[7][k];
+        s[9][k] = 2.0 * s[8][k];
+        s[10][k] = s[6][k] - s[9][k];
+        s[11][k] = sklyanin_gyrostat_taylor_product(s[1], s[2], k);
+        s[12][k] = p[3] * s[11][k];
+        s[13][k] = s[10][k] - s[12][k];
+        s[14][k] = p[0] * s[7][k];
+        s[15][k] = 2.0 * s[14][k];
+        s[16][k] = sklyanin_gyrostat_taylor_product(s[0], s[3], k);
+        s[17][k] = p[2] * s[16][k];
+        s[18][k] = 2.0 * s[17][k];
+        s[19][k] = s[15][k] + s[18][k];
+        s[20][k] = sklyanin_gyrostat_taylor_product(s[0], s[2], k);
+        s[21][k] = p[3] * s[20][k];
+        s[22][k] = 2.0 * s[21][k];
+        s[23][k] = s[19][k] - s[22][k];
+        s[24][k] = sklyanin_gyrostat_taylor_product(s[0], s[1], k);
+        s[25][k] = p[3] * s[24][k];
+        s[26][k] = 2.0 * s[25][k];
+        s[27][k] = p[0] * s[4][k];
+        s[28][k] = -3.0 * s[27][k];
+        s[29][k] = p[1] * s[16][k];
+        s[30][k] = 2.0 * s[29][k];
+        s[31][k] = s[28][k] - s[30][k];
+        s[32][k] = s[26][k] + s[31][k];
+        s[33][k] = p[0] * s[11][k];
+        s[34][k] = p[1] * s[20][k];
+        s[35][k] = 2.0 * s[34][k];
+        s[36][k] = s[33][k] + s[35][k];
+        s[37][k] = p[2] * s[24][k];
+        s[38][k] = 2.0 * s[37][k];
+        s[39][k] = s[36][k] - s[38][k];
+    }
+    s[0][k + 1] = s[13][k] / (k + 1);
+    s[1][k + 1] = s[23][k] / (k + 1);
+    s[2][k + 1] = s[32][k] / (k + 1);
+    s[3][k + 1] = s[39][k] / (k + 1);
+}
+
+/* The slope of the path at a point m. */
+static void sklyanin_gyrostat_path_field(const double *coef, const double p[4], const double m[4],
+    double field[4])
+{
+    double e[40];
+    (void)coef;
+    memcpy(e, m, 4 * sizeof e[0]);
     e[4] = e[1] * e[3];
     e[5] = p[2] * e[4];
     e[6] = 3.0 * e[5];
@@ -498,107 +496,48 @@ static int sklyanin_gyrostat_holds(const double *coef, const double p[4], const 
     field[1] = e[23];
     field[2] = e[32];
     field[3] = e[39];
-    for (int i = 0; i < 4; ++i) scale += fabs(m[i]) + fabs(slope[i]);
-    for (int i = 0; i < 4; ++i)
+}
+
+/* ---- The implicit step, along paths dm/dt = pi(m) p ---- */
+enum {
+    sklyanin_gyrostat_LONGEST_PATH = 128, /* pieces of a path, a power of 2 */
+    /* of all paths that are tried in a solve: steps that need more are wrong by as much as the state */
+    sklyanin_gyrostat_MOST_PIECES = 512
+};
+
+/* Whether dm/dt = pi(m) p holds at a point m, where the expansion has the given slope: one with gaps between
+   its terms, like t + t^9, or across the kink of an absolute value, only looks as if it had converged. */
+static int sklyanin_gyrostat_holds(const double *coef, const double p[sklyanin_gyrostat_DIM],
+    const double m[sklyanin_gyrostat_DIM], const double slope[sklyanin_gyrostat_DIM])
+{
+    double field[sklyanin_gyrostat_DIM], scale = 0.0;
+    sklyanin_gyrostat_path_field(coef, p, m, field);
+    for (int i = 0; i < sklyanin_gyrostat_DIM; ++i) scale += fabs(m[i]) + fabs(slope[i]);
+    for (int i = 0; i < sklyanin_gyrostat_DIM; ++i)
         if (!(fabs(field[i] - slope[i]) <= 2e-15 * scale)) return 0;
     return 1;
 }
 
-/* The path dm/dt = pi(m) p, 0 <= t <= 1, from start, by its Taylor series: change is m(1) - start, mean the mean of
-   m - start. The number of terms follows from their size; 0 if 30 do not suffice. */
-static int sklyanin_gyrostat_piece(const double *coef, const double p[4], const double start[4], double change[4],
-    double mean[4])
+/* A path for 0 <= t <= 1, from start, by its Taylor series: change is m(1) - start, mean the mean of m -
+   start. The number of terms follows from their size; 0 if sklyanin_gyrostat_TERMS do not suffice. */
+static int sklyanin_gyrostat_piece(const double *coef, const double p[sklyanin_gyrostat_DIM],
+    const double start[sklyanin_gyrostat_DIM], double change[sklyanin_gyrostat_DIM],
+    double mean[sklyanin_gyrostat_DIM])
 {
-    (void)coef;
-    double s[40][30 + 1], end[4], slope[4], norm = 0.0;
+    double series[sklyanin_gyrostat_SERIES][sklyanin_gyrostat_TERMS + 1], fixed[sklyanin_gyrostat_FIXED],
+        end[sklyanin_gyrostat_DIM], slope[sklyanin_gyrostat_DIM], norm = 0.0;
     int small = 0;
-    for (int i = 0; i < 4; ++i) {
-        s[i][0] = start[i];
+    for (int i = 0; i < sklyanin_gyrostat_DIM; ++i) {
+        series[i][0] = start[i];
         change[i] = mean[i] = slope[i] = 0.0;
         norm += fabs(start[i]);
     }
-    s[4][0] = s[1][0] * s[3][0];
-    s[5][0] = p[2] * s[4][0];
-    s[6][0] = 3.0 * s[5][0];
-    s[7][0] = s[2][0] * s[3][0];
-    s[8][0] = p[1] * s[7][0];
-    s[9][0] = 2.0 * s[8][0];
-    s[10][0] = s[6][0] - s[9][0];
-    s[11][0] = s[1][0] * s[2][0];
-    s[12][0] = p[3] * s[11][0];
-    s[13][0] = s[10][0] - s[12][0];
-    s[14][0] = p[0] * s[7][0];
-    s[15][0] = 2.0 * s[14][0];
-    s[16][0] = s[0][0] * s[3][0];
-    s[17][0] = p[2] * s[16][0];
-    s[18][0] = 2.0 * s[17][0];
-    s[19][0] = s[15][0] + s[18][0];
-    s[20][0] = s[0][0] * s[2][0];
-    s[21][0] = p[3] * s[20][0];
-    s[22][0] = 2.0 * s[21][0];
-    s[23][0] = s[19][0] - s[22][0];
-    s[24][0] = s[0][0] * s[1][0];
-    s[25][0] = p[3] * s[24][0];
-    s[26][0] = 2.0 * s[25][0];
-    s[27][0] = p[0] * s[4][0];
-    s[28][0] = (-3.0) * s[27][0];
-    s[29][0] = p[1] * s[16][0];
-    s[30][0] = 2.0 * s[29][0];
-    s[31][0] = s[28][0] - s[30][0];
-    s[32][0] = s[26][0] + s[31][0];
-    s[33][0] = p[0] * s[11][0];
-    s[34][0] = p[1] * s[20][0];
-    s[35][0] = 2.0 * s[34][0];
-    s[36][0] = s[33][0] + s[35][0];
-    s[37][0] = p[2] * s[24][0];
-    s[38][0] = 2.0 * s[37][0];
-    s[39][0] = s[36][0] - s[38][0];
-    for (int k = 0; k < 30; ++k) {
-        if (k > 0) {
-            s[4][k] = sklyanin_gyrostat_taylor_product(s[1], s[3], k);
-            s[5][k] = p[2] * s[4][k];
-            s[6][k] = 3.0 * s[5][k];
-            s[7][k] = sklyanin_gyrostat_taylor_product(s[2], s[3], k);
-            s[8][k] = p[1] * s[7][k];
-            s[9][k] = 2.0 * s[8][k];
-            s[10][k] = s[6][k] - s[9][k];
-            s[11][k] = sklyanin_gyrostat_taylor_product(s[1], s[2], k);
-            s[12][k] = p[3] * s[11][k];
-            s[13][k] = s[10][k] - s[12][k];
-            s[14][k] = p[0] * s[7][k];
-            s[15][k] = 2.0 * s[14][k];
-            s[16][k] = sklyanin_gyrostat_taylor_product(s[0], s[3], k);
-            s[17][k] = p[2] * s[16][k];
-            s[18][k] = 2.0 * s[17][k];
-            s[19][k] = s[15][k] + s[18][k];
-            s[20][k] = sklyanin_gyrostat_taylor_product(s[0], s[2], k);
-            s[21][k] = p[3] * s[20][k];
-            s[22][k] = 2.0 * s[21][k];
-            s[23][k] = s[19][k] - s[22][k];
-            s[24][k] = sklyanin_gyrostat_taylor_product(s[0], s[1], k);
-            s[25][k] = p[3] * s[24][k];
-            s[26][k] = 2.0 * s[25][k];
-            s[27][k] = p[0] * s[4][k];
-            s[28][k] = -3.0 * s[27][k];
-            s[29][k] = p[1] * s[16][k];
-            s[30][k] = 2.0 * s[29][k];
-            s[31][k] = s[28][k] - s[30][k];
-            s[32][k] = s[26][k] + s[31][k];
-            s[33][k] = p[0] * s[11][k];
-            s[34][k] = p[1] * s[20][k];
-            s[35][k] = 2.0 * s[34][k];
-            s[36][k] = s[33][k] + s[35][k];
-            s[37][k] = p[2] * s[24][k];
-            s[38][k] = 2.0 * s[37][k];
-            s[39][k] = s[36][k] - s[38][k];
-        }
-        s[0][k + 1] = s[13][k] / (k + 1);
-        s[1][k + 1] = s[23][k] / (k + 1);
-        s[2][k + 1] = s[32][k] / (k + 1);
-        s[3][k + 1] = s[39][k] / (k + 1);
+    sklyanin_gyrostat_path_begin(coef, p, series, fixed);
+    for (int k = 0; k < sklyanin_gyrostat_TERMS; ++k) {
+        sklyanin_gyrostat_path_order(coef, p, series, fixed, k);
         int negligible = 1;
-        for (int i = 0; i < 4; ++i) {
-            const double term = s[i][k + 1];
+        for (int i = 0; i < sklyanin_gyrostat_DIM; ++i) {
+            const double term = series[i][k + 1];
             change[i] += term;
             mean[i] += term / (k + 2);
             slope[i] += (k + 1) * term;
@@ -611,23 +550,26 @@ static int sklyanin_gyrostat_piece(const double *coef, const double p[4], const 
     return 0;
 }
 
-/* The whole path from x, in 1, 2, 4, ... pieces until each expansion converges. Whatever p is, the end of the path
-   lies on the symplectic leaf of x. 0 if the path is too long or leaves the domain. *made counts all pieces. */
-static int sklyanin_gyrostat_path(const double *coef, const double x[4], const double p[4], double change[4],
-    double mean[4], int *made)
+/* The whole path from x, in 1, 2, 4, ... pieces until each expansion converges. Whatever p is, the end of the
+   path lies on the symplectic leaf of x. 0 if the path is too long or leaves the domain. *made counts all
+   pieces. */
+static int sklyanin_gyrostat_path(const double *coef, const double x[sklyanin_gyrostat_DIM],
+    const double p[sklyanin_gyrostat_DIM], double change[sklyanin_gyrostat_DIM],
+    double mean[sklyanin_gyrostat_DIM], int *made)
 {
-    for (int pieces = 1; pieces <= 128; pieces *= 2) {
-        double q[4], point[4], shift[4], local[4];
+    for (int pieces = 1; pieces <= sklyanin_gyrostat_LONGEST_PATH; pieces *= 2) {
+        double q[sklyanin_gyrostat_DIM], point[sklyanin_gyrostat_DIM], shift[sklyanin_gyrostat_DIM],
+            local[sklyanin_gyrostat_DIM];
         int good = 1;
-        for (int i = 0; i < 4; ++i) {
+        for (int i = 0; i < sklyanin_gyrostat_DIM; ++i) {
             q[i] = p[i] / pieces;
             change[i] = mean[i] = 0.0;
         }
         for (int piece = 0; piece < pieces && good; ++piece) {
-            for (int i = 0; i < 4; ++i) point[i] = x[i] + change[i];
+            for (int i = 0; i < sklyanin_gyrostat_DIM; ++i) point[i] = x[i] + change[i];
             good = sklyanin_gyrostat_piece(coef, q, point, shift, local);
             ++*made;
-            for (int i = 0; i < 4; ++i) {
+            for (int i = 0; i < sklyanin_gyrostat_DIM; ++i) {
                 mean[i] += (change[i] + local[i]) / pieces;
                 change[i] += shift[i];
             }
@@ -639,47 +581,55 @@ static int sklyanin_gyrostat_path(const double *coef, const double x[4], const d
 
 /* The residual p - grad S_h(mean of the path) of the equation for p, with that mean y, the path's change of
    x and an approximate Jacobian of the residual. 0 if the path cannot be followed. */
-static int sklyanin_gyrostat_residual(sklyanin_gyrostat_solver *s, const double *coef, const double p[4], double y[4],
-    double residual[4], double change[4], double jacobian[16],
-    int *made)
+static int sklyanin_gyrostat_residual(sklyanin_gyrostat_solver *s, const double *coef,
+    const double p[sklyanin_gyrostat_DIM], double y[sklyanin_gyrostat_DIM],
+    double residual[sklyanin_gyrostat_DIM], double change[sklyanin_gyrostat_DIM],
+    double jacobian[sklyanin_gyrostat_DIM * sklyanin_gyrostat_DIM], int *made)
 {
-    double mean[4];
+    double mean[sklyanin_gyrostat_DIM];
     if (!sklyanin_gyrostat_path(coef, s->x, p, change, mean, made)) return 0;
-    for (int i = 0; i < 4; ++i) y[i] = s->x[i] + mean[i];
+    for (int i = 0; i < sklyanin_gyrostat_DIM; ++i) y[i] = s->x[i] + mean[i];
     sklyanin_gyrostat_generate(coef, y, residual, jacobian);
-    for (int i = 0; i < 4; ++i) residual[i] = p[i] - residual[i];
+    for (int i = 0; i < sklyanin_gyrostat_DIM; ++i) residual[i] = p[i] - residual[i];
     ++s->evaluations;
     return 1;
 }
 
 /* The Jacobian by differences, for steps so large that the approximate one does not contract. */
-static int sklyanin_gyrostat_differences(sklyanin_gyrostat_solver *s, const double *coef, const double p[4],
-    const double residual[4], double jacobian[16], int *made)
+static int sklyanin_gyrostat_differences(sklyanin_gyrostat_solver *s, const double *coef,
+    const double p[sklyanin_gyrostat_DIM], const double residual[sklyanin_gyrostat_DIM],
+    double jacobian[sklyanin_gyrostat_DIM * sklyanin_gyrostat_DIM], int *made)
 {
-    double q[4], y[4], moved[4], change[4], unused[16], norm = DBL_MIN;
-    for (int i = 0; i < 4; ++i) norm = fabs(p[i]) > norm ? fabs(p[i]) : norm;
-    for (int j = 0; j < 4; ++j) {
+    double q[sklyanin_gyrostat_DIM], y[sklyanin_gyrostat_DIM], moved[sklyanin_gyrostat_DIM],
+        change[sklyanin_gyrostat_DIM], unused[sklyanin_gyrostat_DIM * sklyanin_gyrostat_DIM], norm = DBL_MIN;
+    for (int i = 0; i < sklyanin_gyrostat_DIM; ++i) norm = fabs(p[i]) > norm ? fabs(p[i]) : norm;
+    for (int j = 0; j < sklyanin_gyrostat_DIM; ++j) {
         memcpy(q, p, sizeof q);
         q[j] += 1e-7 * norm;
         if (!sklyanin_gyrostat_residual(s, coef, q, y, moved, change, unused, made)) return 0;
-        for (int i = 0; i < 4; ++i) jacobian[i * 4 + j] = (moved[i] - residual[i]) / (q[j] - p[j]);
+        for (int i = 0; i < sklyanin_gyrostat_DIM; ++i)
+            jacobian[i * sklyanin_gyrostat_DIM + j] = (moved[i] - residual[i]) / (q[j] - p[j]);
     }
     return 1;
 }
 
-/* Solve p = grad S_h(mean of the path from x under p) and move to the end of that path. Where that takes more than
-   512 pieces of paths, the step is so large that a solution would mean nothing. */
-static sklyanin_gyrostat_status sklyanin_gyrostat_attempt(sklyanin_gyrostat_solver *s, int stage)
+/* Solve p = grad S_h(mean of the path from x under p) and move to the end of that path. Where that takes more
+   than sklyanin_gyrostat_MOST_PIECES pieces of paths, the step is so large that a solution would mean
+   nothing. */
+static sklyanin_gyrostat_status sklyanin_gyrostat_attempt(sklyanin_gyrostat_solver *s)
 {
-    const double *coef = s->coef[stage], none[4] = { 0.0 };
-    sklyanin_gyrostat_memory *memory = &s->memory[stage];
-    double p[4], y[4], residual[4], change[4], jacobian[16], previous = HUGE_VAL;
-    if (!sklyanin_gyrostat_predict(memory, y)) memcpy(y, s->x, sizeof y);
+    const double *coef = s->coef, none[sklyanin_gyrostat_DIM] = { 0.0 };
+    double p[sklyanin_gyrostat_DIM], y[sklyanin_gyrostat_DIM], residual[sklyanin_gyrostat_DIM],
+        change[sklyanin_gyrostat_DIM], jacobian[sklyanin_gyrostat_DIM * sklyanin_gyrostat_DIM], previous =
+        HUGE_VAL;
+    if (!sklyanin_gyrostat_predict(&s->history, y)) memcpy(y, s->x, sizeof y);
     sklyanin_gyrostat_generate(coef, y, p, jacobian);
-    for (int iteration = 0, made = 0; iteration < 20 && made <= 512; ++iteration) {
-        if (!sklyanin_gyrostat_residual(s, coef, p, y, residual, change, jacobian, &made)) return sklyanin_gyrostat_NO_CONVERGENCE;
+    for (int iteration = 0, made = 0; iteration < sklyanin_gyrostat_MAX_ITERATIONS && made <=
+        sklyanin_gyrostat_MOST_PIECES; ++iteration) {
+        if (!sklyanin_gyrostat_residual(s, coef, p, y, residual, change, jacobian, &made))
+            return sklyanin_gyrostat_NO_CONVERGENCE;
         double size = 0.0, norm = DBL_MIN;
-        for (int i = 0; i < 4; ++i) {
+        for (int i = 0; i < sklyanin_gyrostat_DIM; ++i) {
             if (!isfinite(residual[i])) return sklyanin_gyrostat_NOT_FINITE;
             size = fabs(residual[i]) > size ? fabs(residual[i]) : size;
             norm = fabs(p[i]) > norm ? fabs(p[i]) : norm;
@@ -687,2130 +637,222 @@ static sklyanin_gyrostat_status sklyanin_gyrostat_attempt(sklyanin_gyrostat_solv
         size /= norm;
         /* The second test: residuals no longer shrink, the solve has reached the level of rounding. */
         if (size <= 4e-16 || (previous < 1e-12 && size > 0.25 * previous)) {
-            if (!sklyanin_gyrostat_plausible(s, stage, change)) return sklyanin_gyrostat_NO_CONVERGENCE;
+            if (!sklyanin_gyrostat_plausible(s, change)) return sklyanin_gyrostat_NO_CONVERGENCE;
             if (!sklyanin_gyrostat_advance(s, change, none)) return sklyanin_gyrostat_NOT_FINITE;
-            sklyanin_gyrostat_remember(memory, y, iteration);
+            sklyanin_gyrostat_remember(&s->history, y);
             return sklyanin_gyrostat_OK;
         }
         const int slow = iteration >= 3 && size > 0.05 * previous;
-        if (slow && !sklyanin_gyrostat_differences(s, coef, p, residual, jacobian, &made)) return sklyanin_gyrostat_NO_CONVERGENCE;
+        if (slow && !sklyanin_gyrostat_differences(s, coef, p, residual, jacobian, &made))
+            return sklyanin_gyrostat_NO_CONVERGENCE;
         if (!sklyanin_gyrostat_solve(jacobian, residual)) return sklyanin_gyrostat_SINGULAR;
-        for (int i = 0; i < 4; ++i) p[i] -= residual[i];
+        for (int i = 0; i < sklyanin_gyrostat_DIM; ++i) p[i] -= residual[i];
         previous = size;
     }
     return sklyanin_gyrostat_NO_CONVERGENCE;
 }
 
-/* The 1 stages of one step. If one fails, the state is as before the step. */
-static sklyanin_gyrostat_status sklyanin_gyrostat_stages(sklyanin_gyrostat_solver *s)
+/* ---- The choice of the gauge: multiples of Casimirs taken from H ---- */
+enum {
+    sklyanin_gyrostat_SAMPLES = 32, /* states along a short piece of the trajectory */
+    sklyanin_gyrostat_SWEEPS = 4    /* most rounds over the multiples */
+};
+
+/* A short piece of the trajectory from x, by a Runge-Kutta method with steps of a fixed change. */
+static void sklyanin_gyrostat_sample(const sklyanin_gyrostat_params *params,
+    const double x[sklyanin_gyrostat_DIM], double samples[][sklyanin_gyrostat_DIM])
 {
-    double x[4], carry[4];
-    memcpy(x, s->x, sizeof x);
-    memcpy(carry, s->carry, sizeof carry);
-    for (int stage = 0; stage < 1; ++stage) {
-        sklyanin_gyrostat_status status = sklyanin_gyrostat_attempt(s, stage);
-        /* A guess from earlier steps may have misled it: once more without. */
-        if (status != sklyanin_gyrostat_OK && s->memory[stage].count > 0) {
-            memset(&s->memory[stage], 0, sizeof s->memory[stage]);
-            status = sklyanin_gyrostat_attempt(s, stage);
-        }
-        if (status != sklyanin_gyrostat_OK) {
-            memcpy(s->x, x, sizeof x);
-            memcpy(s->carry, carry, sizeof carry);
-            return status;
-        }
+    double slope[sklyanin_gyrostat_DIM], middle[sklyanin_gyrostat_DIM], size = 0.0, speed = DBL_MIN;
+    sklyanin_gyrostat_vector_field(params, x, slope);
+    for (int i = 0; i < sklyanin_gyrostat_DIM; ++i) {
+        samples[0][i] = x[i];
+        size += fabs(x[i]);
+        speed += fabs(slope[i]);
     }
-    return sklyanin_gyrostat_OK;
+    const double h = 0.25 * size / speed;
+    for (int k = 1; k < sklyanin_gyrostat_SAMPLES; ++k) {
+        const double *y = samples[k - 1];
+        sklyanin_gyrostat_vector_field(params, y, slope);
+        for (int i = 0; i < sklyanin_gyrostat_DIM; ++i) middle[i] = y[i] + 0.5 * h * slope[i];
+        sklyanin_gyrostat_vector_field(params, middle, slope);
+        for (int i = 0; i < sklyanin_gyrostat_DIM; ++i) samples[k][i] = y[i] + h * slope[i];
+    }
 }
 
-/* All of sklyanin_gyrostat_init but the gauge. The arguments may be parts of *s: they are read before it is written. */
-static sklyanin_gyrostat_status sklyanin_gyrostat_start(sklyanin_gyrostat_solver *s, const sklyanin_gyrostat_params *params, const double x0[4])
+/* Sum of |pi grad S_3|^2, the leading error of the method, over the samples. */
+static double sklyanin_gyrostat_gauge_error(const sklyanin_gyrostat_params *params,
+    const double gauge[sklyanin_gyrostat_GAUGES], double samples[][sklyanin_gyrostat_DIM])
 {
-    if (s == NULL || x0 == NULL) return sklyanin_gyrostat_BAD_ARGUMENT;
-    const sklyanin_gyrostat_params own = params != NULL ? *params : sklyanin_gyrostat_default_params;
-    double x[4];
-    memcpy(x, x0, sizeof x);
-    for (int i = 0; i < 4; ++i)
-        if (!isfinite(x[i])) return sklyanin_gyrostat_BAD_ARGUMENT;
-    memset(s, 0, sizeof *s);
-    memcpy(s->x, x, sizeof s->x);
-    s->params = own;
-    return sklyanin_gyrostat_OK;
-}
-
-/* the leading error vector pi grad S_3, as a function of the gauge */
-static void sklyanin_gyrostat_guide(const sklyanin_gyrostat_params *params, const double gauge[1],
-                                    const double x[4], double error[restrict 4])
-{
-    (void)params;
-    const double S0 = x[0];
-    const double S1 = x[1];
-    const double S2 = x[2];
-    const double S3 = x[3];
-    const double t1 = S1 * S3;
-    const double t2 = S0 * S0;
-    const double t3 = S3 * S3;
-    const double t4 = S2 * (1.0 / 900.0 - 1.0 / 150.0 * gauge[0] + t3 * (1.0 / 108.0 - 1.0 / 54.0 * gauge[0]));
-    const double t5 = -1.0 / 450.0 + 1.0 / 75.0 * gauge[0];
-    const double t6 = 1.0 / 15.0 * gauge[0];
-    const double t7 = S2 * (1.0 / 90.0 - t6);
-    const double t8 = S2 * (1.0 / 36.0 - 1.0 / 6.0 * gauge[0]);
-    const double t9 = t2 * (t3 * (1.0 / 90.0 - 1.0 / 45.0 * gauge[0]) + t4 + S1 * (t5 + t7 + S1 * (-1.0 / 90.0 + t6 + t8)));
-    const double t10 = S2 * S3;
-    const double t11 = 2.0 / 45.0 * gauge[0];
-    const double t12 = 1.0 / 30.0 * gauge[0];
-    const double t13 = 2.0 / 75.0 * gauge[0];
-    const double t14 = S1 * (1.0 / 225.0 - t13 + t3 * (2.0 / 27.0 - 8.0 / 27.0 * gauge[0]) + S2 * (-1.0 / 45.0 + 2.0 / 15.0 * gauge[0] + t8));
-    const double t15 = t2 * (t3 * (1.0 / 90.0 - t11) + S2 * (t5 + S2 * (1.0 / 180.0 - t12)) + t14);
-    const double t16 = S1 * S2;
-    const double t17 = S1 * (1.0 / 45.0 + 2.0 / 27.0 * S1) + (3.0 / 200.0 + S2 * (1.0 / 45.0 + 1.0 / 108.0 * S2)) + gauge[0] * (S1 * (-4.0 / 45.0 - 8.0 / 27.0 * S1) + (-1.0 / 30.0 + S2 * (-2.0 / 45.0 - 1.0 / 54.0 * S2)));
-    const double t18 = S3 * t2 * t17;
-    const double t19 = S0 * S3;
-    const double t20 = t3 * (3.0 / 200.0 - t12) + S2 * (t3 * (1.0 / 45.0 - t11) + t4) + S1 * (t3 * (1.0 / 45.0 - 4.0 / 45.0 * gauge[0]) + S2 * (-1.0 / 225.0 + t13 + t7) + t14);
-    const double t21 = S0 * t20;
-    const double t22 = S0 * S2;
-    const double t23 = S0 * S1;
-    error[0] = 3.0 * (t1 * t9) - 2.0 * (t10 * t15) - t16 * t18;
-    error[1] = 2.0 * (t19 * t9) + 2.0 * (t10 * t21) - 2.0 * (t22 * t18);
-    error[2] = 2.0 * (t23 * t18) + ((-3.0) * (t1 * t21) - 2.0 * (t19 * t15));
-    error[3] = 2.0 * (t22 * t15) + t16 * t21 - 2.0 * (t23 * t9);
-}
-
-/* grad H . grad H, then grad H . grad C and grad C . grad C for each Casimir of the gauge */
-static void sklyanin_gyrostat_products(const sklyanin_gyrostat_params *params, const double x[4],
-                                       double out[restrict 3])
-{
-    (void)params;
-    const double S1 = x[1];
-    const double S2 = x[2];
-    const double S3 = x[3];
-    const double t1 = 1.0 / 10.0 + S1;
-    const double t2 = S3 * S3;
-    const double t3 = 1.0 / 5.0 + 0.5 * S2;
-    out[0] = t1 * t1 + (1.0 / 9.0 * t2 + t3 * t3);
-    out[1] = 2.0 * (S1 * t1) + (2.0 / 3.0 * t2 + 2.0 * (S2 * t3));
-    out[2] = 4.0 * (S1 * S1) + (4.0 * (S2 * S2) + 4.0 * t2);
-}
-
-enum { sklyanin_gyrostat_SAMPLES = 32 };
-
-/* Sum of |pi grad S_3|^2, the leading error of the method, over sampled states. */
-static double sklyanin_gyrostat_gauge_error(const sklyanin_gyrostat_params *params, const double gauge[1],
-                                     double samples[][4])
-{
-    double error[4], sum = 0.0;
+    double error[sklyanin_gyrostat_DIM], sum = 0.0;
     for (int k = 0; k < sklyanin_gyrostat_SAMPLES; ++k) {
         sklyanin_gyrostat_guide(params, gauge, samples[k], error);
-        for (int i = 0; i < 4; ++i) sum += error[i] * error[i];
+        for (int i = 0; i < sklyanin_gyrostat_DIM; ++i) sum += error[i] * error[i];
     }
     return sum;
 }
 
-/* A short piece of the trajectory from x, by a Runge-Kutta method with steps of a fixed change. */
-static void sklyanin_gyrostat_sample(const sklyanin_gyrostat_params *params, const double x[4], double samples[][4])
+/* How many widths multiple c is to be moved for the least error: the best on grids, each finer than the one
+   before. */
+static double sklyanin_gyrostat_least_on_line(const sklyanin_gyrostat_params *params,
+    const double gauge[sklyanin_gyrostat_GAUGES], int c, double width,
+    double samples[][sklyanin_gyrostat_DIM])
 {
-    double y[4], z[4], k1[4], k2[4], size = 0.0, speed = DBL_MIN;
-    memcpy(y, x, sizeof y);
-    sklyanin_gyrostat_vector_field(params, y, k1);
-    for (int i = 0; i < 4; ++i) {
-        size += fabs(y[i]);
-        speed += fabs(k1[i]);
-    }
-    const double h = 0.25 * size / speed;
-    for (int k = 0; k < sklyanin_gyrostat_SAMPLES; ++k) {
-        memcpy(samples[k], y, sizeof y);
-        sklyanin_gyrostat_vector_field(params, y, k1);
-        for (int i = 0; i < 4; ++i) z[i] = y[i] + 0.5 * h * k1[i];
-        sklyanin_gyrostat_vector_field(params, z, k2);
-        for (int i = 0; i < 4; ++i) y[i] += h * k2[i];
-    }
-}
-
-/* The error where one multiple varies, of centre + (j - 3) width for j = 0 ... 6, as forward differences: S_3 is cubic in H,
-   so these are those of a polynomial of degree six. Their size, before. */
-static double sklyanin_gyrostat_gauge_line(const sklyanin_gyrostat_params *params, const double gauge[1], int c, double width,
-    double samples[][4], double difference[7])
-{
-    double moved[1], size = 0.0;
+    double moved[sklyanin_gyrostat_GAUGES], best = 0.0, mesh = 0.125, least =
+        sklyanin_gyrostat_gauge_error(params, gauge, samples);
     memcpy(moved, gauge, sizeof moved);
-    for (int j = 0; j < 7; ++j) {
-        moved[c] = gauge[c] + (j - 3) * width;
-        difference[j] = sklyanin_gyrostat_gauge_error(params, moved, samples);
-        size += difference[j];
-    }
-    for (int order = 1; order < 7; ++order)
-        for (int j = 6; j >= order; --j) difference[j] -= difference[j - 1];
-    return size;
-}
-
-/* Its value at centre + t width, by Newton's formula. */
-static double sklyanin_gyrostat_on_line(const double difference[7], double t)
-{
-    double error = difference[6];
-    for (int k = 5; k >= 0; --k) error = difference[k] + (t + 3.0 - k) / (k + 1) * error;
-    return error;
-}
-
-/* Where it is least: the best t on grids, each finer than the one before. */
-static double sklyanin_gyrostat_least_on_line(const double difference[7], double size)
-{
-    const double mesh[3] = { 0.125, 1.0 / 64.0, 1.0 / 512.0 };
-    double best = 0.0, least = sklyanin_gyrostat_on_line(difference, best);
-    for (int level = 0; level < 3; ++level) {
+    for (int level = 0; level < 3; ++level, mesh *= 0.125) {
         const int reach = level == 0 ? 24 : 8;
         const double centre = best;
         for (int j = -reach; j <= reach; ++j) {
-            const double t = centre + j * mesh[level], error = sklyanin_gyrostat_on_line(difference, t);
-            if (error < least - 1e-12 * size) { /* close calls are not decided by rounding */
-                least = error;
-                best = t;
-            }
+            moved[c] = gauge[c] + (centre + j * mesh) * width;
+            const double error = sklyanin_gyrostat_gauge_error(params, moved, samples);
+            if (!(error < least - 1e-12 * least)) continue; /* close calls are not decided by rounding */
+            least = error;
+            best = centre + j * mesh;
         }
     }
     return best;
 }
 
-/* The lambda that minimise the leading error along a short piece of the trajectory, one after the other, from the
-   least-squares solution of grad H = sum of lambda grad C. Zero where that gives nothing finite. */
-static void sklyanin_gyrostat_choose_gauge(const sklyanin_gyrostat_params *params, const double x[4], double gauge[1])
+/* The multiples that minimise the leading error along a short piece of the trajectory, one after the other,
+   from the least-squares solution of grad H = sum of multiples of grad C. Zero where that gives nothing
+   finite. */
+static void sklyanin_gyrostat_choose_gauge(const sklyanin_gyrostat_params *params,
+    const double x[sklyanin_gyrostat_DIM], double gauge[sklyanin_gyrostat_GAUGES])
 {
-    double samples[sklyanin_gyrostat_SAMPLES][4], out[3], sums[3] = { 0.0 }, width[1];
+    double samples[sklyanin_gyrostat_SAMPLES][sklyanin_gyrostat_DIM], out[1 + 2 * sklyanin_gyrostat_GAUGES],
+        sums[1 + 2 * sklyanin_gyrostat_GAUGES] = { 0.0 };
+    double width[sklyanin_gyrostat_GAUGES];
     sklyanin_gyrostat_sample(params, x, samples);
     for (int k = 0; k < sklyanin_gyrostat_SAMPLES; ++k) {
         sklyanin_gyrostat_products(params, samples[k], out);
-        for (int i = 0; i < 3; ++i) sums[i] += out[i];
+        for (int i = 0; i < 1 + 2 * sklyanin_gyrostat_GAUGES; ++i) sums[i] += out[i];
     }
-    for (int c = 0; c < 1; ++c) {
+    for (int c = 0; c < sklyanin_gyrostat_GAUGES; ++c) {
         const double norm = sums[2 + 2 * c] > 0.0 ? sums[2 + 2 * c] : HUGE_VAL;
         gauge[c] = sums[1 + 2 * c] / norm;
         width[c] = sqrt(sums[0] / norm);
     }
-    for (int sweep = 0, moved = 1; sweep < 4 && moved; ++sweep) {
+    for (int sweep = 0, moved = 1; sweep < sklyanin_gyrostat_SWEEPS && moved; ++sweep) {
         moved = 0;
-        for (int c = 0; c < 1; ++c) {
-            double difference[7];
-            const double size = sklyanin_gyrostat_gauge_line(params, gauge, c, width[c], samples, difference);
-            const double best = sklyanin_gyrostat_least_on_line(difference, size);
+        for (int c = 0; c < sklyanin_gyrostat_GAUGES; ++c) {
+            const double best = sklyanin_gyrostat_least_on_line(params, gauge, c, width[c], samples);
             gauge[c] += best * width[c];
             moved = moved || best != 0.0;
         }
     }
     if (!isfinite(sklyanin_gyrostat_gauge_error(params, gauge, samples)))
-        for (int c = 0; c < 1; ++c) gauge[c] = 0.0;
+        memset(gauge, 0, sklyanin_gyrostat_GAUGES * sizeof gauge[0]);
 }
 
-/* Start at x0 with a gauge of one's own, e.g. that of another trajectory: see sklyanin_gyrostat_solver. */
+/* ---- The solver ---- */
+/* The arguments may be parts of *s: they are read before it is written. */
 sklyanin_gyrostat_status sklyanin_gyrostat_init_gauge(sklyanin_gyrostat_solver *s,
-                                                      const sklyanin_gyrostat_params *params,
-                                                      const double x0[4], const double gauge[1])
+    const sklyanin_gyrostat_params *params, const double x0[sklyanin_gyrostat_DIM],
+    const double gauge[sklyanin_gyrostat_GAUGES])
 {
-    double own[1];
-    if (gauge == NULL) return sklyanin_gyrostat_init(s, params, x0);
-    memcpy(own, gauge, sizeof own);
-    for (int c = 0; c < 1; ++c)
-        if (!isfinite(own[c])) return sklyanin_gyrostat_BAD_ARGUMENT;
-    const sklyanin_gyrostat_status status = sklyanin_gyrostat_start(s, params, x0);
-    if (status == sklyanin_gyrostat_OK) memcpy(s->gauge, own, sizeof s->gauge);
-    return status;
+    if (s == NULL || x0 == NULL) return sklyanin_gyrostat_BAD_ARGUMENT;
+    const sklyanin_gyrostat_params own = params != NULL ? *params : sklyanin_gyrostat_default_params;
+    double x[sklyanin_gyrostat_DIM];
+    memcpy(x, x0, sizeof x);
+    for (int i = 0; i < sklyanin_gyrostat_DIM; ++i)
+        if (!isfinite(x[i])) return sklyanin_gyrostat_BAD_ARGUMENT;
+    double multiples[sklyanin_gyrostat_GAUGES] = { 0.0 };
+    const int given = gauge != NULL;
+    if (given) memcpy(multiples, gauge, sizeof multiples);
+    for (int c = 0; c < sklyanin_gyrostat_GAUGES; ++c)
+        if (!isfinite(multiples[c])) return sklyanin_gyrostat_BAD_ARGUMENT;
+    memset(s, 0, sizeof *s);
+    memcpy(s->x, x, sizeof s->x);
+    s->params = own;
+    if (!given) sklyanin_gyrostat_choose_gauge(&own, x, multiples);
+    memcpy(s->gauge, multiples, sizeof s->gauge);
+    return sklyanin_gyrostat_OK;
 }
 
 sklyanin_gyrostat_status sklyanin_gyrostat_init(sklyanin_gyrostat_solver *s,
-                                                const sklyanin_gyrostat_params *params, const double x0[4])
+    const sklyanin_gyrostat_params *params, const double x0[sklyanin_gyrostat_DIM])
 {
-    const sklyanin_gyrostat_status status = sklyanin_gyrostat_start(s, params, x0);
-    if (status == sklyanin_gyrostat_OK) sklyanin_gyrostat_choose_gauge(&s->params, s->x, s->gauge);
-    return status;
+    return sklyanin_gyrostat_init_gauge(s, params, x0, NULL);
 }
 
 /* What depends on the step size; nothing where that is as before. */
 static sklyanin_gyrostat_status sklyanin_gyrostat_set_step(sklyanin_gyrostat_solver *s, double h)
 {
     if (s == NULL || !isfinite(h)) return sklyanin_gyrostat_BAD_ARGUMENT;
-    if (s->ready && memcmp(&h, &s->h, sizeof h) == 0) return sklyanin_gyrostat_OK;
-    for (int stage = 0; stage < 1; ++stage)
-        sklyanin_gyrostat_prepare(&s->params, s->gauge, sklyanin_gyrostat_fractions[stage] * h, s->coef[stage]);
-    memset(s->memory, 0, sizeof s->memory);
-    for (int stage = 0; stage < 1; ++stage) s->memory[stage].patience = 150;
-    s->pause = 16;
-    s->setback = s->foreseeing = 0;
-    s->doubt = s->retry = 0;
-    s->effort = 0.0;
-    s->passes = INT_MAX;
+    if (s->prepared && memcmp(&h, &s->h, sizeof h) == 0) return sklyanin_gyrostat_OK;
+    sklyanin_gyrostat_prepare(&s->params, s->gauge, h, s->coef);
+    memset(&s->history, 0, sizeof s->history);
     s->h = h;
-    s->ready = 1;
+    s->t_before_h = s->t;
+    s->steps_before_h = s->steps;
+    s->prepared = 1;
     return sklyanin_gyrostat_OK;
+}
+
+/* One stage. A guess from earlier steps may have misled it: then once more without. */
+static sklyanin_gyrostat_status sklyanin_gyrostat_stage(sklyanin_gyrostat_solver *s)
+{
+    sklyanin_gyrostat_status status = sklyanin_gyrostat_attempt(s);
+    if (status != sklyanin_gyrostat_OK && s->history.count > 0) {
+        memset(&s->history, 0, sizeof s->history);
+        status = sklyanin_gyrostat_attempt(s);
+    }
+    return status;
 }
 
 sklyanin_gyrostat_status sklyanin_gyrostat_step(sklyanin_gyrostat_solver *s, double h)
 {
     sklyanin_gyrostat_status status = sklyanin_gyrostat_set_step(s, h);
     if (status != sklyanin_gyrostat_OK) return status;
-    status = sklyanin_gyrostat_stages(s);
-    if (status == sklyanin_gyrostat_OK) ++s->steps;
+    status = sklyanin_gyrostat_stage(s);
+    if (status != sklyanin_gyrostat_OK) return status;
+    ++s->steps;
+    s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
     return status;
 }
 
-/*
- * Eight at a time: below, the formulas of a step are evaluated for 8 steps of a trajectory, or members of an
- * ensemble, at once. Compilers make vector instructions of the loops over lanes.
- */
-enum { sklyanin_gyrostat_LANES = 8 };
-
-#if defined(__GNUC__)
-typedef double sklyanin_gyrostat_lanes[sklyanin_gyrostat_LANES] __attribute__((aligned(64))); /* a value in each lane */
-#else
-typedef double sklyanin_gyrostat_lanes[sklyanin_gyrostat_LANES];
-#endif
-
-#if defined(__clang__)
-#define sklyanin_gyrostat_EACH_LANE _Pragma("clang loop vectorize(assume_safety)")
-#pragma clang diagnostic push
-#pragma clang diagnostic ignored "-Wpass-failed"
-#elif defined(__GNUC__)
-#define sklyanin_gyrostat_EACH_LANE _Pragma("GCC ivdep") _Pragma("GCC unroll 1")
-#else
-#define sklyanin_gyrostat_EACH_LANE
-#endif
-
-/* What all blocks share: coefficients, the same in each lane, and the recurrences by which they are foreseen. */
-typedef struct {
-    int fits[1]; /* the fit that weight is of; -1 for none */
-    sklyanin_gyrostat_lanes coef[1][31], weight[1][40][4];
-} sklyanin_gyrostat_table;
-
-/* A stage in all lanes, linearised around y. */
-typedef struct {
-    sklyanin_gyrostat_lanes y[4], displacement[4], increment[4], residual[4];
-    /* a residual r of alpha(y) = x takes inverse r from y, and gain r from the increment */
-    sklyanin_gyrostat_lanes inverse[16], slope[16], gain[16];
-    sklyanin_gyrostat_lanes middle[4]; /* of the path, less y */
-    sklyanin_gyrostat_lanes alpha_y[16], increment_y[16]; /* of alpha and beta - alpha, with p held fixed */
-} sklyanin_gyrostat_model;
-
-/* sklyanin_gyrostat_curvature in all lanes. */
-static void sklyanin_gyrostat_curvature_lanes(sklyanin_gyrostat_lanes coef[restrict 31],
-                                              sklyanin_gyrostat_lanes y[restrict 4],
-                                              sklyanin_gyrostat_lanes slope[restrict 4],
-                                              sklyanin_gyrostat_lanes slope_jacobian[restrict 16])
-{
-    sklyanin_gyrostat_EACH_LANE
-    for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane) {
-        const double S0 = y[0][lane];
-        const double S1 = y[1][lane];
-        const double S2 = y[2][lane];
-        const double S3 = y[3][lane];
-        const double t1 = S3 * S3;
-        const double t2 = S2 * coef[6][lane];
-        const double t3 = coef[4][lane] * t1 + S2 * (coef[5][lane] + t2);
-        const double t4 = S2 * coef[10][lane];
-        const double t5 = S2 * (coef[9][lane] + t4) + (coef[7][lane] + coef[8][lane] * t1);
-        const double t6 = S1 * t5;
-        const double t7 = coef[1][lane] * t1;
-        const double t8 = coef[2][lane] + coef[3][lane] * t1;
-        const double t9 = S2 * t8;
-        const double t10 = S1 * (t3 + t6) + (coef[0][lane] * t1 + S2 * (t7 + t9));
-        const double t11 = S0 * S0;
-        const double t12 = coef[14][lane] + t2;
-        const double t13 = coef[20][lane] + t11 * (S1 * (coef[4][lane] + S1 * coef[8][lane]) + (coef[0][lane] + S2 * (coef[1][lane] + S2 * coef[3][lane])));
-        const double t14 = S2 * coef[24][lane];
-        const double t15 = S0 * (t3 + S1 * (coef[21][lane] + coef[22][lane] * t1 + S2 * (coef[23][lane] + t14)));
-        const double t16 = S1 * (coef[9][lane] + t14);
-        const double t17 = S0 * (t7 + S2 * (coef[25][lane] + coef[26][lane] * t1) + S1 * (coef[5][lane] + S2 * coef[27][lane] + t16));
-        const double t18 = S1 * coef[22][lane];
-        const double t19 = S2 * coef[26][lane];
-        const double t20 = S0 * S3 * (S1 * (coef[30][lane] + t18) + (coef[28][lane] + S2 * (coef[29][lane] + t19)));
-        const double t21 = t11 * (t12 + t16);
-        const double t22 = S3 * t11;
-        const double t23 = (coef[4][lane] + t18) * t22;
-        const double t24 = t22 * (coef[1][lane] + t19);
-        slope[0][lane] = S0 * t10;
-        slope[1][lane] = coef[11][lane] + S1 * coef[12][lane] + t11 * (coef[13][lane] * t1 + S2 * (coef[14][lane] + S2 * coef[15][lane]) + t6);
-        slope[2][lane] = coef[16][lane] + S2 * coef[17][lane] + t11 * (S1 * (t12 + S1 * (coef[19][lane] + t4)) + (coef[18][lane] * t1 + t9));
-        slope[3][lane] = S3 * t13;
-        slope_jacobian[0][lane] = t10;
-        slope_jacobian[1][lane] = t15;
-        slope_jacobian[2][lane] = t17;
-        slope_jacobian[3][lane] = t20;
-        slope_jacobian[4][lane] = t15;
-        slope_jacobian[5][lane] = coef[12][lane] + t11 * t5;
-        slope_jacobian[6][lane] = t21;
-        slope_jacobian[7][lane] = t23;
-        slope_jacobian[8][lane] = t17;
-        slope_jacobian[9][lane] = t21;
-        slope_jacobian[10][lane] = coef[17][lane] + t11 * (t8 + S1 * (coef[6][lane] + S1 * coef[10][lane]));
-        slope_jacobian[11][lane] = t24;
-        slope_jacobian[12][lane] = t20;
-        slope_jacobian[13][lane] = t23;
-        slope_jacobian[14][lane] = t24;
-        slope_jacobian[15][lane] = t13;
-    }
-}
-
-/* sklyanin_gyrostat_momentum in all lanes. */
-static void sklyanin_gyrostat_momentum_lanes(sklyanin_gyrostat_lanes coef[restrict 31],
-                                             sklyanin_gyrostat_lanes y[restrict 4],
-                                             sklyanin_gyrostat_lanes slope[restrict 4])
-{
-    sklyanin_gyrostat_EACH_LANE
-    for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane) {
-        const double S0 = y[0][lane];
-        const double S1 = y[1][lane];
-        const double S2 = y[2][lane];
-        const double S3 = y[3][lane];
-        const double t1 = S3 * S3;
-        const double t2 = S2 * coef[6][lane];
-        const double t3 = S2 * coef[10][lane];
-        const double t4 = S1 * (S2 * (coef[9][lane] + t3) + (coef[7][lane] + coef[8][lane] * t1));
-        const double t5 = S2 * (coef[2][lane] + coef[3][lane] * t1);
-        const double t6 = S0 * S0;
-        slope[0][lane] = S0 * (S1 * (coef[4][lane] * t1 + S2 * (coef[5][lane] + t2) + t4) + (coef[0][lane] * t1 + S2 * (coef[1][lane] * t1 + t5)));
-        slope[1][lane] = coef[11][lane] + S1 * coef[12][lane] + t6 * (coef[13][lane] * t1 + S2 * (coef[14][lane] + S2 * coef[15][lane]) + t4);
-        slope[2][lane] = coef[16][lane] + S2 * coef[17][lane] + t6 * (S1 * (coef[14][lane] + t2 + S1 * (coef[19][lane] + t3)) + (coef[18][lane] * t1 + t5));
-        slope[3][lane] = S3 * (coef[20][lane] + t6 * (S1 * (coef[4][lane] + S1 * coef[8][lane]) + (coef[0][lane] + S2 * (coef[1][lane] + S2 * coef[3][lane]))));
-    }
-}
-
-/* sklyanin_gyrostat_values in all lanes. */
-static void sklyanin_gyrostat_values_lanes(sklyanin_gyrostat_lanes coef[restrict 31],
-                                           sklyanin_gyrostat_lanes p[restrict 4],
-                                           sklyanin_gyrostat_lanes m[restrict 4],
-                                           sklyanin_gyrostat_lanes value[restrict 40],
-                                           sklyanin_gyrostat_lanes fixed[restrict 1])
-{
-    (void)coef;
-    (void)fixed;
-    sklyanin_gyrostat_EACH_LANE
-    for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane) {
-        const double S0 = m[0][lane];
-        const double S1 = m[1][lane];
-        const double S2 = m[2][lane];
-        const double S3 = m[3][lane];
-        const double t1 = S1 * S3;
-        const double t2 = p[2][lane] * t1;
-        const double t3 = 3.0 * t2;
-        const double t4 = S2 * S3;
-        const double t5 = p[1][lane] * t4;
-        const double t6 = 2.0 * t5;
-        const double t7 = t3 - t6;
-        const double t8 = S1 * S2;
-        const double t9 = p[3][lane] * t8;
-        const double t10 = p[0][lane] * t4;
-        const double t11 = 2.0 * t10;
-        const double t12 = S0 * S3;
-        const double t13 = p[2][lane] * t12;
-        const double t14 = 2.0 * t13;
-        const double t15 = t11 + t14;
-        const double t16 = S0 * S2;
-        const double t17 = p[3][lane] * t16;
-        const double t18 = 2.0 * t17;
-        const double t19 = S0 * S1;
-        const double t20 = p[3][lane] * t19;
-        const double t21 = 2.0 * t20;
-        const double t22 = p[0][lane] * t1;
-        const double t23 = (-3.0) * t22;
-        const double t24 = p[1][lane] * t12;
-        const double t25 = 2.0 * t24;
-        const double t26 = t23 - t25;
-        const double t27 = p[0][lane] * t8;
-        const double t28 = p[1][lane] * t16;
-        const double t29 = 2.0 * t28;
-        const double t30 = t27 + t29;
-        const double t31 = p[2][lane] * t19;
-        const double t32 = 2.0 * t31;
-        value[0][lane] = S0;
-        value[1][lane] = S1;
-        value[2][lane] = S2;
-        value[3][lane] = S3;
-        value[4][lane] = t1;
-        value[5][lane] = t2;
-        value[6][lane] = t3;
-        value[7][lane] = t4;
-        value[8][lane] = t5;
-        value[9][lane] = t6;
-        value[10][lane] = t7;
-        value[11][lane] = t8;
-        value[12][lane] = t9;
-        value[13][lane] = t7 - t9;
-        value[14][lane] = t10;
-        value[15][lane] = t11;
-        value[16][lane] = t12;
-        value[17][lane] = t13;
-        value[18][lane] = t14;
-        value[19][lane] = t15;
-        value[20][lane] = t16;
-        value[21][lane] = t17;
-        value[22][lane] = t18;
-        value[23][lane] = t15 - t18;
-        value[24][lane] = t19;
-        value[25][lane] = t20;
-        value[26][lane] = t21;
-        value[27][lane] = t22;
-        value[28][lane] = t23;
-        value[29][lane] = t24;
-        value[30][lane] = t25;
-        value[31][lane] = t26;
-        value[32][lane] = t21 + t26;
-        value[33][lane] = t27;
-        value[34][lane] = t28;
-        value[35][lane] = t29;
-        value[36][lane] = t30;
-        value[37][lane] = t31;
-        value[38][lane] = t32;
-        value[39][lane] = t30 - t32;
-    }
-}
-
-/* sklyanin_gyrostat_slope_values in all lanes. */
-static void sklyanin_gyrostat_slope_values_lanes(sklyanin_gyrostat_lanes coef[restrict 31],
-                                                 sklyanin_gyrostat_lanes p[restrict 4],
-                                                 sklyanin_gyrostat_lanes value[restrict 40],
-                                                 sklyanin_gyrostat_lanes fixed[restrict 1],
-                                                 sklyanin_gyrostat_lanes slope[restrict 51],
-                                                 sklyanin_gyrostat_lanes slope_fixed[restrict 1])
-{
-    (void)coef;
-    (void)fixed;
-    (void)slope_fixed;
-    sklyanin_gyrostat_EACH_LANE
-    for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane) {
-        const double t1 = p[2][lane] * value[3][lane];
-        const double t2 = 3.0 * t1;
-        const double t3 = p[3][lane] * value[2][lane];
-        const double t4 = p[1][lane] * value[3][lane];
-        const double t5 = (-2.0) * t4;
-        const double t6 = p[3][lane] * value[1][lane];
-        const double t7 = p[2][lane] * value[1][lane];
-        const double t8 = 3.0 * t7;
-        const double t9 = p[1][lane] * value[2][lane];
-        const double t10 = 2.0 * t9;
-        const double t11 = 2.0 * t1;
-        const double t12 = 2.0 * t3;
-        const double t13 = p[0][lane] * value[3][lane];
-        const double t14 = 2.0 * t13;
-        const double t15 = p[3][lane] * value[0][lane];
-        const double t16 = 2.0 * t15;
-        const double t17 = p[2][lane] * value[0][lane];
-        const double t18 = 2.0 * t17;
-        const double t19 = p[0][lane] * value[2][lane];
-        const double t20 = 2.0 * t19;
-        const double t21 = 2.0 * t6;
-        const double t22 = 2.0 * t4;
-        const double t23 = 3.0 * t13;
-        const double t24 = p[0][lane] * value[1][lane];
-        const double t25 = (-3.0) * t24;
-        const double t26 = p[1][lane] * value[0][lane];
-        const double t27 = 2.0 * t26;
-        const double t28 = 2.0 * t7;
-        slope[0][lane] = t1;
-        slope[1][lane] = t2;
-        slope[2][lane] = t3;
-        slope[3][lane] = t2 - t3;
-        slope[4][lane] = t4;
-        slope[5][lane] = t5;
-        slope[6][lane] = t6;
-        slope[7][lane] = t5 - t6;
-        slope[8][lane] = t7;
-        slope[9][lane] = t8;
-        slope[10][lane] = t9;
-        slope[11][lane] = t10;
-        slope[12][lane] = t8 - t10;
-        slope[13][lane] = t11;
-        slope[14][lane] = t12;
-        slope[15][lane] = t11 - t12;
-        slope[16][lane] = t13;
-        slope[17][lane] = t14;
-        slope[18][lane] = t15;
-        slope[19][lane] = t16;
-        slope[20][lane] = t14 - t16;
-        slope[21][lane] = t17;
-        slope[22][lane] = t18;
-        slope[23][lane] = t19;
-        slope[24][lane] = t20;
-        slope[25][lane] = t18 + t20;
-        slope[26][lane] = t21;
-        slope[27][lane] = t22;
-        slope[28][lane] = t21 - t22;
-        slope[29][lane] = t23;
-        slope[30][lane] = t16 - t23;
-        slope[31][lane] = t24;
-        slope[32][lane] = t25;
-        slope[33][lane] = t26;
-        slope[34][lane] = t27;
-        slope[35][lane] = t25 - t27;
-        slope[36][lane] = t28;
-        slope[37][lane] = t10 - t28;
-        slope[38][lane] = t19 - t18;
-        slope[39][lane] = t24 + t27;
-        slope[40][lane] = (-2.0) * value[7][lane];
-        slope[41][lane] = 3.0 * value[4][lane];
-        slope[42][lane] = -value[11][lane];
-        slope[43][lane] = 2.0 * value[7][lane];
-        slope[44][lane] = 2.0 * value[16][lane];
-        slope[45][lane] = (-2.0) * value[20][lane];
-        slope[46][lane] = (-3.0) * value[4][lane];
-        slope[47][lane] = (-2.0) * value[16][lane];
-        slope[48][lane] = 2.0 * value[24][lane];
-        slope[49][lane] = 2.0 * value[20][lane];
-        slope[50][lane] = (-2.0) * value[24][lane];
-    }
-}
-
-/* sklyanin_gyrostat_along_mean in all lanes. */
-static void sklyanin_gyrostat_along_mean_lanes(sklyanin_gyrostat_lanes even[restrict 32],
-                                               sklyanin_gyrostat_lanes odd[restrict 32],
-                                               sklyanin_gyrostat_lanes mean[restrict 32],
-                                               sklyanin_gyrostat_lanes hessian[restrict 16],
-                                               sklyanin_gyrostat_lanes alpha_y[restrict 16],
-                                               sklyanin_gyrostat_lanes increment_y[restrict 16],
-                                               sklyanin_gyrostat_lanes jacobian[restrict 16],
-                                               sklyanin_gyrostat_lanes increment_jacobian[restrict 16],
-                                               sklyanin_gyrostat_lanes reciprocal[restrict 4])
-{
-    sklyanin_gyrostat_EACH_LANE
-    for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane) {
-        const double t1 = even[0][lane] - odd[0][lane];
-        const double t2 = 1.0 / mean[0][lane];
-        const double t3 = mean[1][lane] * t2;
-        const double t4 = 1.0 / (mean[9][lane] - mean[8][lane] * t3);
-        const double t5 = mean[8][lane] * t2 * t4;
-        const double t6 = mean[2][lane] * t2;
-        const double t7 = (mean[10][lane] - mean[8][lane] * t6) * t4;
-        const double t8 = t6 - t3 * t7;
-        const double t9 = mean[17][lane] - mean[16][lane] * t3;
-        const double t10 = 1.0 / (mean[18][lane] - mean[16][lane] * t6 - t9 * t7);
-        const double t11 = (t9 * t5 - mean[16][lane] * t2) * t10;
-        const double t12 = mean[3][lane] * t2;
-        const double t13 = (mean[11][lane] - mean[8][lane] * t12) * t4;
-        const double t14 = (mean[19][lane] - mean[16][lane] * t12 - t9 * t13) * t10;
-        const double t15 = t12 - t3 * t13 - t8 * t14;
-        const double t16 = mean[25][lane] - mean[24][lane] * t3;
-        const double t17 = mean[26][lane] - mean[24][lane] * t6 - t16 * t7;
-        const double t18 = 1.0 / (mean[27][lane] - mean[24][lane] * t12 - t16 * t13 - t17 * t14);
-        const double t19 = (t16 * t5 - mean[24][lane] * t2 - t17 * t11) * t18;
-        const double t20 = t2 + t3 * t5 - t8 * t11 - t15 * t19;
-        const double t21 = even[1][lane] - odd[1][lane];
-        const double t22 = t13 - t7 * t14;
-        const double t23 = t5 + t7 * t11 + t22 * t19;
-        const double t24 = even[3][lane] - odd[3][lane];
-        const double t25 = even[2][lane] - odd[2][lane];
-        const double t26 = t11 - t14 * t19;
-        const double t27 = t9 * t4 * t10;
-        const double t28 = (t17 * t27 - t16 * t4) * t18;
-        const double t29 = t8 * t27 - t3 * t4 - t15 * t28;
-        const double t30 = t4 + t7 * t27 - t22 * t28;
-        const double t31 = t27 + t14 * t28;
-        const double t32 = t17 * t10 * t18;
-        const double t33 = t15 * t32 - t8 * t10;
-        const double t34 = t22 * t32 - t7 * t10;
-        const double t35 = t10 + t14 * t32;
-        const double t36 = t14 * t18;
-        const double t37 = t22 * t18;
-        const double t38 = t15 * t18;
-        const double t39 = even[11][lane] - odd[11][lane];
-        const double t40 = even[10][lane] - odd[10][lane];
-        const double t41 = even[8][lane] - odd[8][lane];
-        const double t42 = even[9][lane] - odd[9][lane];
-        const double t43 = even[19][lane] - odd[19][lane];
-        const double t44 = even[18][lane] - odd[18][lane];
-        const double t45 = even[16][lane] - odd[16][lane];
-        const double t46 = even[17][lane] - odd[17][lane];
-        const double t47 = even[24][lane] - odd[24][lane];
-        const double t48 = even[25][lane] - odd[25][lane];
-        const double t49 = even[27][lane] - odd[27][lane];
-        const double t50 = even[26][lane] - odd[26][lane];
-        const double t51 = even[6][lane] - odd[6][lane];
-        const double t52 = even[7][lane] - odd[7][lane];
-        const double t53 = even[4][lane] - odd[4][lane];
-        const double t54 = even[5][lane] - odd[5][lane];
-        const double t55 = hessian[12][lane] * mean[31][lane] + hessian[8][lane] * mean[30][lane] + (hessian[4][lane] * mean[29][lane] + hessian[0][lane] * mean[28][lane]);
-        const double t56 = hessian[12][lane] * mean[23][lane] + hessian[8][lane] * mean[22][lane] + (hessian[4][lane] * mean[21][lane] + hessian[0][lane] * mean[20][lane]);
-        const double t57 = hessian[8][lane] * mean[14][lane] + hessian[12][lane] * mean[15][lane] + (hessian[4][lane] * mean[13][lane] + hessian[0][lane] * mean[12][lane]);
-        const double t58 = 1.0 - (hessian[0][lane] * mean[4][lane] + hessian[4][lane] * mean[5][lane] + (hessian[8][lane] * mean[6][lane] + hessian[12][lane] * mean[7][lane]));
-        const double t59 = t55 * t37 - t56 * t34 - (t57 * t30 + t58 * t23);
-        const double t60 = t58 * t20 - t57 * t29 + (t55 * t38 - t56 * t33);
-        const double t61 = t56 * t32 - t55 * t18 + (t58 * t19 - t57 * t28);
-        const double t62 = t57 * t31 + t58 * t26 + (t55 * t36 - t56 * t35);
-        const double t63 = hessian[8][lane] * t51 + hessian[12][lane] * t52 + (hessian[0][lane] * t53 + hessian[4][lane] * t54) + (t21 * t59 + t1 * t60 + (t24 * t61 + t25 * t62));
-        const double t64 = hessian[5][lane] * mean[21][lane] + hessian[1][lane] * mean[20][lane] + (hessian[9][lane] * mean[22][lane] + hessian[13][lane] * mean[23][lane]);
-        const double t65 = hessian[5][lane] * mean[29][lane] + hessian[1][lane] * mean[28][lane] + (hessian[13][lane] * mean[31][lane] + hessian[9][lane] * mean[30][lane]);
-        const double t66 = 1.0 - (hessian[1][lane] * mean[12][lane] + hessian[5][lane] * mean[13][lane] + (hessian[13][lane] * mean[15][lane] + hessian[9][lane] * mean[14][lane]));
-        const double t67 = hessian[13][lane] * mean[7][lane] + hessian[9][lane] * mean[6][lane] + (hessian[1][lane] * mean[4][lane] + hessian[5][lane] * mean[5][lane]);
-        const double t68 = t64 * t32 - t65 * t18 + (t66 * t28 - t67 * t19);
-        const double t69 = t65 * t36 - t64 * t35 - (t66 * t31 + t67 * t26);
-        const double t70 = t66 * t29 - t67 * t20 + (t65 * t38 - t64 * t33);
-        const double t71 = t65 * t37 - t64 * t34 + (t67 * t23 + t66 * t30);
-        const double t72 = hessian[13][lane] * t52 + hessian[9][lane] * t51 + (hessian[5][lane] * t54 + hessian[1][lane] * t53) + (t24 * t68 + t25 * t69 + (t1 * t70 + t21 * t71));
-        const double t73 = hessian[2][lane] * mean[28][lane] + hessian[6][lane] * mean[29][lane] + (hessian[14][lane] * mean[31][lane] + hessian[10][lane] * mean[30][lane]);
-        const double t74 = 1.0 - (hessian[2][lane] * mean[20][lane] + hessian[6][lane] * mean[21][lane] + (hessian[10][lane] * mean[22][lane] + hessian[14][lane] * mean[23][lane]));
-        const double t75 = hessian[2][lane] * mean[4][lane] + hessian[6][lane] * mean[5][lane] + (hessian[14][lane] * mean[7][lane] + hessian[10][lane] * mean[6][lane]);
-        const double t76 = hessian[6][lane] * mean[13][lane] + hessian[2][lane] * mean[12][lane] + (hessian[14][lane] * mean[15][lane] + hessian[10][lane] * mean[14][lane]);
-        const double t77 = t73 * t37 + t74 * t34 + (t75 * t23 - t76 * t30);
-        const double t78 = t73 * t38 + t74 * t33 - (t76 * t29 + t75 * t20);
-        const double t79 = t73 * t36 + t74 * t35 + (t76 * t31 - t75 * t26);
-        const double t80 = t76 * t28 + t75 * t19 + (t73 * t18 + t74 * t32);
-        const double t81 = hessian[10][lane] * t51 + hessian[14][lane] * t52 + (hessian[2][lane] * t53 + hessian[6][lane] * t54) + (t21 * t77 + t1 * t78 + (t25 * t79 - t24 * t80));
-        const double t82 = 1.0 - (hessian[11][lane] * mean[30][lane] + hessian[15][lane] * mean[31][lane] + (hessian[3][lane] * mean[28][lane] + hessian[7][lane] * mean[29][lane]));
-        const double t83 = hessian[11][lane] * mean[22][lane] + hessian[15][lane] * mean[23][lane] + (hessian[7][lane] * mean[21][lane] + hessian[3][lane] * mean[20][lane]);
-        const double t84 = hessian[11][lane] * mean[6][lane] + hessian[15][lane] * mean[7][lane] + (hessian[3][lane] * mean[4][lane] + hessian[7][lane] * mean[5][lane]);
-        const double t85 = hessian[11][lane] * mean[14][lane] + hessian[15][lane] * mean[15][lane] + (hessian[3][lane] * mean[12][lane] + hessian[7][lane] * mean[13][lane]);
-        const double t86 = t82 * t18 + t83 * t32 - (t84 * t19 + t85 * t28);
-        const double t87 = t85 * t31 - t84 * t26 - (t82 * t36 + t83 * t35);
-        const double t88 = t84 * t23 - t85 * t30 - (t82 * t37 + t83 * t34);
-        const double t89 = t82 * t38 + t83 * t33 + (t84 * t20 + t85 * t29);
-        const double t90 = hessian[3][lane] * t53 + hessian[7][lane] * t54 + (hessian[11][lane] * t51 + hessian[15][lane] * t52) + (t24 * t86 + t25 * t87 + (t21 * t88 - t1 * t89));
-        const double t91 = even[13][lane] - odd[13][lane];
-        const double t92 = even[12][lane] - odd[12][lane];
-        const double t93 = even[15][lane] - odd[15][lane];
-        const double t94 = even[14][lane] - odd[14][lane];
-        const double t95 = hessian[4][lane] * t91 + hessian[0][lane] * t92 + (hessian[12][lane] * t93 + hessian[8][lane] * t94) + (t39 * t61 + t40 * t62 + (t41 * t60 + t42 * t59));
-        const double t96 = hessian[9][lane] * t94 + hessian[13][lane] * t93 + (hessian[1][lane] * t92 + hessian[5][lane] * t91) + (t39 * t68 + t40 * t69 + (t41 * t70 + t42 * t71));
-        const double t97 = hessian[10][lane] * t94 + hessian[14][lane] * t93 + (hessian[6][lane] * t91 + hessian[2][lane] * t92) + (t40 * t79 - t39 * t80 + (t42 * t77 + t41 * t78));
-        const double t98 = hessian[15][lane] * t93 + hessian[11][lane] * t94 + (hessian[7][lane] * t91 + hessian[3][lane] * t92) + (t39 * t86 + t40 * t87 + (t42 * t88 - t41 * t89));
-        const double t99 = even[21][lane] - odd[21][lane];
-        const double t100 = even[20][lane] - odd[20][lane];
-        const double t101 = even[22][lane] - odd[22][lane];
-        const double t102 = even[23][lane] - odd[23][lane];
-        const double t103 = hessian[4][lane] * t99 + hessian[0][lane] * t100 + (hessian[8][lane] * t101 + hessian[12][lane] * t102) + (t43 * t61 + t44 * t62 + (t45 * t60 + t46 * t59));
-        const double t104 = hessian[9][lane] * t101 + hessian[13][lane] * t102 + (hessian[5][lane] * t99 + hessian[1][lane] * t100) + (t43 * t68 + t44 * t69 + (t46 * t71 + t45 * t70));
-        const double t105 = hessian[10][lane] * t101 + hessian[14][lane] * t102 + (hessian[6][lane] * t99 + hessian[2][lane] * t100) + (t44 * t79 - t43 * t80 + (t45 * t78 + t46 * t77));
-        const double t106 = hessian[3][lane] * t100 + hessian[7][lane] * t99 + (hessian[11][lane] * t101 + hessian[15][lane] * t102) + (t43 * t86 + t44 * t87 + (t46 * t88 - t45 * t89));
-        const double t107 = even[29][lane] - odd[29][lane];
-        const double t108 = even[28][lane] - odd[28][lane];
-        const double t109 = even[30][lane] - odd[30][lane];
-        const double t110 = even[31][lane] - odd[31][lane];
-        const double t111 = hessian[4][lane] * t107 + hessian[0][lane] * t108 + (hessian[8][lane] * t109 + hessian[12][lane] * t110) + (t49 * t61 + t50 * t62 + (t47 * t60 + t48 * t59));
-        const double t112 = hessian[9][lane] * t109 + hessian[13][lane] * t110 + (hessian[5][lane] * t107 + hessian[1][lane] * t108) + (t47 * t70 + t48 * t71 + (t49 * t68 + t50 * t69));
-        const double t113 = hessian[10][lane] * t109 + hessian[14][lane] * t110 + (hessian[6][lane] * t107 + hessian[2][lane] * t108) + (t50 * t79 - t49 * t80 + (t47 * t78 + t48 * t77));
-        const double t114 = hessian[3][lane] * t108 + hessian[7][lane] * t107 + (hessian[15][lane] * t110 + hessian[11][lane] * t109) + (t48 * t88 - t47 * t89 + (t49 * t86 + t50 * t87));
-        const double t115 = 2.0 * (hessian[0][lane] * odd[4][lane]) + 2.0 * (hessian[4][lane] * odd[5][lane]) + (2.0 * (hessian[8][lane] * odd[6][lane]) + 2.0 * (hessian[12][lane] * odd[7][lane])) + (2.0 * (odd[0][lane] * t60) + 2.0 * (odd[1][lane] * t59) + (2.0 * (odd[3][lane] * t61) + 2.0 * (odd[2][lane] * t62)));
-        const double t116 = 2.0 * (hessian[9][lane] * odd[6][lane]) + 2.0 * (hessian[13][lane] * odd[7][lane]) + (2.0 * (hessian[1][lane] * odd[4][lane]) + 2.0 * (hessian[5][lane] * odd[5][lane])) + (2.0 * (odd[0][lane] * t70) + 2.0 * (odd[1][lane] * t71) + (2.0 * (odd[3][lane] * t68) + 2.0 * (odd[2][lane] * t69)));
-        const double t117 = 2.0 * (hessian[2][lane] * odd[4][lane]) + 2.0 * (hessian[6][lane] * odd[5][lane]) + (2.0 * (hessian[14][lane] * odd[7][lane]) + 2.0 * (hessian[10][lane] * odd[6][lane])) + (2.0 * (odd[2][lane] * t79) - 2.0 * (odd[3][lane] * t80) + (2.0 * (odd[1][lane] * t77) + 2.0 * (odd[0][lane] * t78)));
-        const double t118 = 2.0 * (hessian[3][lane] * odd[4][lane]) + 2.0 * (hessian[7][lane] * odd[5][lane]) + (2.0 * (hessian[15][lane] * odd[7][lane]) + 2.0 * (hessian[11][lane] * odd[6][lane])) + (2.0 * (odd[1][lane] * t88) - 2.0 * (odd[0][lane] * t89) + (2.0 * (odd[3][lane] * t86) + 2.0 * (odd[2][lane] * t87)));
-        const double t119 = 2.0 * (hessian[0][lane] * odd[12][lane]) + 2.0 * (hessian[4][lane] * odd[13][lane]) + (2.0 * (hessian[8][lane] * odd[14][lane]) + 2.0 * (hessian[12][lane] * odd[15][lane])) + (2.0 * (odd[11][lane] * t61) + 2.0 * (odd[10][lane] * t62) + (2.0 * (odd[9][lane] * t59) + 2.0 * (odd[8][lane] * t60)));
-        const double t120 = 2.0 * (hessian[9][lane] * odd[14][lane]) + 2.0 * (hessian[13][lane] * odd[15][lane]) + (2.0 * (hessian[5][lane] * odd[13][lane]) + 2.0 * (hessian[1][lane] * odd[12][lane])) + (2.0 * (odd[11][lane] * t68) + 2.0 * (odd[10][lane] * t69) + (2.0 * (odd[8][lane] * t70) + 2.0 * (odd[9][lane] * t71)));
-        const double t121 = 2.0 * (hessian[2][lane] * odd[12][lane]) + 2.0 * (hessian[6][lane] * odd[13][lane]) + (2.0 * (hessian[14][lane] * odd[15][lane]) + 2.0 * (hessian[10][lane] * odd[14][lane])) + (2.0 * (odd[10][lane] * t79) - 2.0 * (odd[11][lane] * t80) + (2.0 * (odd[8][lane] * t78) + 2.0 * (odd[9][lane] * t77)));
-        const double t122 = 2.0 * (hessian[7][lane] * odd[13][lane]) + 2.0 * (hessian[3][lane] * odd[12][lane]) + (2.0 * (hessian[11][lane] * odd[14][lane]) + 2.0 * (hessian[15][lane] * odd[15][lane])) + (2.0 * (odd[9][lane] * t88) - 2.0 * (odd[8][lane] * t89) + (2.0 * (odd[11][lane] * t86) + 2.0 * (odd[10][lane] * t87)));
-        const double t123 = 2.0 * (hessian[12][lane] * odd[23][lane]) + 2.0 * (hessian[8][lane] * odd[22][lane]) + (2.0 * (hessian[4][lane] * odd[21][lane]) + 2.0 * (hessian[0][lane] * odd[20][lane])) + (2.0 * (odd[19][lane] * t61) + 2.0 * (odd[18][lane] * t62) + (2.0 * (odd[16][lane] * t60) + 2.0 * (odd[17][lane] * t59)));
-        const double t124 = 2.0 * (hessian[1][lane] * odd[20][lane]) + 2.0 * (hessian[5][lane] * odd[21][lane]) + (2.0 * (hessian[13][lane] * odd[23][lane]) + 2.0 * (hessian[9][lane] * odd[22][lane])) + (2.0 * (odd[19][lane] * t68) + 2.0 * (odd[18][lane] * t69) + (2.0 * (odd[16][lane] * t70) + 2.0 * (odd[17][lane] * t71)));
-        const double t125 = 2.0 * (hessian[6][lane] * odd[21][lane]) + 2.0 * (hessian[2][lane] * odd[20][lane]) + (2.0 * (hessian[10][lane] * odd[22][lane]) + 2.0 * (hessian[14][lane] * odd[23][lane])) + (2.0 * (odd[18][lane] * t79) - 2.0 * (odd[19][lane] * t80) + (2.0 * (odd[17][lane] * t77) + 2.0 * (odd[16][lane] * t78)));
-        const double t126 = 2.0 * (hessian[15][lane] * odd[23][lane]) + 2.0 * (hessian[11][lane] * odd[22][lane]) + (2.0 * (hessian[3][lane] * odd[20][lane]) + 2.0 * (hessian[7][lane] * odd[21][lane])) + (2.0 * (odd[19][lane] * t86) + 2.0 * (odd[18][lane] * t87) + (2.0 * (odd[17][lane] * t88) - 2.0 * (odd[16][lane] * t89)));
-        const double t127 = 2.0 * (hessian[0][lane] * odd[28][lane]) + 2.0 * (hessian[4][lane] * odd[29][lane]) + (2.0 * (hessian[12][lane] * odd[31][lane]) + 2.0 * (hessian[8][lane] * odd[30][lane])) + (2.0 * (odd[27][lane] * t61) + 2.0 * (odd[26][lane] * t62) + (2.0 * (odd[25][lane] * t59) + 2.0 * (odd[24][lane] * t60)));
-        const double t128 = 2.0 * (hessian[9][lane] * odd[30][lane]) + 2.0 * (hessian[13][lane] * odd[31][lane]) + (2.0 * (hessian[1][lane] * odd[28][lane]) + 2.0 * (hessian[5][lane] * odd[29][lane])) + (2.0 * (odd[27][lane] * t68) + 2.0 * (odd[26][lane] * t69) + (2.0 * (odd[24][lane] * t70) + 2.0 * (odd[25][lane] * t71)));
-        const double t129 = 2.0 * (hessian[10][lane] * odd[30][lane]) + 2.0 * (hessian[14][lane] * odd[31][lane]) + (2.0 * (hessian[2][lane] * odd[28][lane]) + 2.0 * (hessian[6][lane] * odd[29][lane])) + (2.0 * (odd[25][lane] * t77) + 2.0 * (odd[24][lane] * t78) + (2.0 * (odd[26][lane] * t79) - 2.0 * (odd[27][lane] * t80)));
-        const double t130 = 2.0 * (hessian[7][lane] * odd[29][lane]) + 2.0 * (hessian[3][lane] * odd[28][lane]) + (2.0 * (hessian[11][lane] * odd[30][lane]) + 2.0 * (hessian[15][lane] * odd[31][lane])) + (2.0 * (odd[25][lane] * t88) - 2.0 * (odd[24][lane] * t89) + (2.0 * (odd[27][lane] * t86) + 2.0 * (odd[26][lane] * t87)));
-        alpha_y[0][lane] = t1 * t20 - t21 * t23 + (t24 * t19 + t25 * t26);
-        alpha_y[1][lane] = t1 * t29 + t21 * t30 + (t24 * t28 - t25 * t31);
-        alpha_y[2][lane] = t1 * t33 + t21 * t34 + (t25 * t35 - t24 * t32);
-        alpha_y[3][lane] = t24 * t18 - t25 * t36 - (t21 * t37 + t1 * t38);
-        alpha_y[4][lane] = t39 * t19 + t40 * t26 + (t41 * t20 - t42 * t23);
-        alpha_y[5][lane] = t41 * t29 + t42 * t30 + (t39 * t28 - t40 * t31);
-        alpha_y[6][lane] = t42 * t34 + t41 * t33 + (t40 * t35 - t39 * t32);
-        alpha_y[7][lane] = t39 * t18 - t40 * t36 - (t41 * t38 + t42 * t37);
-        alpha_y[8][lane] = t43 * t19 + t44 * t26 + (t45 * t20 - t46 * t23);
-        alpha_y[9][lane] = t45 * t29 + t46 * t30 + (t43 * t28 - t44 * t31);
-        alpha_y[10][lane] = t45 * t33 + t46 * t34 + (t44 * t35 - t43 * t32);
-        alpha_y[11][lane] = t43 * t18 - t44 * t36 - (t46 * t37 + t45 * t38);
-        alpha_y[12][lane] = t47 * t20 - t48 * t23 + (t49 * t19 + t50 * t26);
-        alpha_y[13][lane] = t49 * t28 - t50 * t31 + (t48 * t30 + t47 * t29);
-        alpha_y[14][lane] = t50 * t35 - t49 * t32 + (t48 * t34 + t47 * t33);
-        alpha_y[15][lane] = t49 * t18 - t50 * t36 - (t48 * t37 + t47 * t38);
-        increment_y[0][lane] = 2.0 * (odd[0][lane] * t20) - 2.0 * (odd[1][lane] * t23) + (2.0 * (odd[3][lane] * t19) + 2.0 * (odd[2][lane] * t26));
-        increment_y[1][lane] = 2.0 * (odd[1][lane] * t30) + 2.0 * (odd[0][lane] * t29) + (2.0 * (odd[3][lane] * t28) - 2.0 * (odd[2][lane] * t31));
-        increment_y[2][lane] = 2.0 * (odd[1][lane] * t34) + 2.0 * (odd[0][lane] * t33) + (2.0 * (odd[2][lane] * t35) - 2.0 * (odd[3][lane] * t32));
-        increment_y[3][lane] = (-2.0) * (odd[0][lane] * t38) - 2.0 * (odd[1][lane] * t37) + (2.0 * (odd[3][lane] * t18) - 2.0 * (odd[2][lane] * t36));
-        increment_y[4][lane] = 2.0 * (odd[11][lane] * t19) + 2.0 * (odd[10][lane] * t26) + (2.0 * (odd[8][lane] * t20) - 2.0 * (odd[9][lane] * t23));
-        increment_y[5][lane] = 2.0 * (odd[9][lane] * t30) + 2.0 * (odd[8][lane] * t29) + (2.0 * (odd[11][lane] * t28) - 2.0 * (odd[10][lane] * t31));
-        increment_y[6][lane] = 2.0 * (odd[10][lane] * t35) - 2.0 * (odd[11][lane] * t32) + (2.0 * (odd[8][lane] * t33) + 2.0 * (odd[9][lane] * t34));
-        increment_y[7][lane] = (-2.0) * (odd[8][lane] * t38) - 2.0 * (odd[9][lane] * t37) + (2.0 * (odd[11][lane] * t18) - 2.0 * (odd[10][lane] * t36));
-        increment_y[8][lane] = 2.0 * (odd[19][lane] * t19) + 2.0 * (odd[18][lane] * t26) + (2.0 * (odd[16][lane] * t20) - 2.0 * (odd[17][lane] * t23));
-        increment_y[9][lane] = 2.0 * (odd[16][lane] * t29) + 2.0 * (odd[17][lane] * t30) + (2.0 * (odd[19][lane] * t28) - 2.0 * (odd[18][lane] * t31));
-        increment_y[10][lane] = 2.0 * (odd[18][lane] * t35) - 2.0 * (odd[19][lane] * t32) + (2.0 * (odd[16][lane] * t33) + 2.0 * (odd[17][lane] * t34));
-        increment_y[11][lane] = (-2.0) * (odd[16][lane] * t38) - 2.0 * (odd[17][lane] * t37) + (2.0 * (odd[19][lane] * t18) - 2.0 * (odd[18][lane] * t36));
-        increment_y[12][lane] = 2.0 * (odd[24][lane] * t20) - 2.0 * (odd[25][lane] * t23) + (2.0 * (odd[27][lane] * t19) + 2.0 * (odd[26][lane] * t26));
-        increment_y[13][lane] = 2.0 * (odd[24][lane] * t29) + 2.0 * (odd[25][lane] * t30) + (2.0 * (odd[27][lane] * t28) - 2.0 * (odd[26][lane] * t31));
-        increment_y[14][lane] = 2.0 * (odd[26][lane] * t35) - 2.0 * (odd[27][lane] * t32) + (2.0 * (odd[24][lane] * t33) + 2.0 * (odd[25][lane] * t34));
-        increment_y[15][lane] = (-2.0) * (odd[24][lane] * t38) - 2.0 * (odd[25][lane] * t37) + (2.0 * (odd[27][lane] * t18) - 2.0 * (odd[26][lane] * t36));
-        jacobian[0][lane] = t63;
-        jacobian[1][lane] = t72;
-        jacobian[2][lane] = t81;
-        jacobian[3][lane] = t90;
-        jacobian[4][lane] = t95;
-        jacobian[5][lane] = t96;
-        jacobian[6][lane] = t97;
-        jacobian[7][lane] = t98;
-        jacobian[8][lane] = t103;
-        jacobian[9][lane] = t104;
-        jacobian[10][lane] = t105;
-        jacobian[11][lane] = t106;
-        jacobian[12][lane] = t111;
-        jacobian[13][lane] = t112;
-        jacobian[14][lane] = t113;
-        jacobian[15][lane] = t114;
-        increment_jacobian[0][lane] = t115;
-        increment_jacobian[1][lane] = t116;
-        increment_jacobian[2][lane] = t117;
-        increment_jacobian[3][lane] = t118;
-        increment_jacobian[4][lane] = t119;
-        increment_jacobian[5][lane] = t120;
-        increment_jacobian[6][lane] = t121;
-        increment_jacobian[7][lane] = t122;
-        increment_jacobian[8][lane] = t123;
-        increment_jacobian[9][lane] = t124;
-        increment_jacobian[10][lane] = t125;
-        increment_jacobian[11][lane] = t126;
-        increment_jacobian[12][lane] = t127;
-        increment_jacobian[13][lane] = t128;
-        increment_jacobian[14][lane] = t129;
-        increment_jacobian[15][lane] = t130;
-        reciprocal[0][lane] = t2;
-        reciprocal[1][lane] = t4;
-        reciprocal[2][lane] = t10;
-        reciprocal[3][lane] = t18;
-    }
-}
-
-/* sklyanin_gyrostat_invert in all lanes. */
-static void sklyanin_gyrostat_invert_lanes(sklyanin_gyrostat_lanes matrix[restrict 16],
-                                           sklyanin_gyrostat_lanes slope[restrict 16],
-                                           sklyanin_gyrostat_lanes inverse[restrict 16],
-                                           sklyanin_gyrostat_lanes gain[restrict 16],
-                                           sklyanin_gyrostat_lanes reciprocal[restrict 4])
-{
-    sklyanin_gyrostat_EACH_LANE
-    for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane) {
-        const double t1 = 1.0 / matrix[0][lane];
-        const double t2 = matrix[1][lane] * t1;
-        const double t3 = 1.0 / (matrix[5][lane] - matrix[4][lane] * t2);
-        const double t4 = matrix[4][lane] * t1 * t3;
-        const double t5 = matrix[2][lane] * t1;
-        const double t6 = (matrix[6][lane] - matrix[4][lane] * t5) * t3;
-        const double t7 = t5 - t2 * t6;
-        const double t8 = matrix[9][lane] - matrix[8][lane] * t2;
-        const double t9 = 1.0 / (matrix[10][lane] - matrix[8][lane] * t5 - t8 * t6);
-        const double t10 = (t8 * t4 - matrix[8][lane] * t1) * t9;
-        const double t11 = matrix[3][lane] * t1;
-        const double t12 = (matrix[7][lane] - matrix[4][lane] * t11) * t3;
-        const double t13 = (matrix[11][lane] - matrix[8][lane] * t11 - t8 * t12) * t9;
-        const double t14 = t11 - t2 * t12 - t7 * t13;
-        const double t15 = matrix[13][lane] - matrix[12][lane] * t2;
-        const double t16 = matrix[14][lane] - matrix[12][lane] * t5 - t15 * t6;
-        const double t17 = 1.0 / (matrix[15][lane] - matrix[12][lane] * t11 - t15 * t12 - t16 * t13);
-        const double t18 = (t15 * t4 - matrix[12][lane] * t1 - t16 * t10) * t17;
-        const double t19 = t1 + t2 * t4 - t7 * t10 - t14 * t18;
-        const double t20 = t8 * t3 * t9;
-        const double t21 = (t16 * t20 - t15 * t3) * t17;
-        const double t22 = t7 * t20 - t2 * t3 - t14 * t21;
-        const double t23 = t16 * t9 * t17;
-        const double t24 = t14 * t23 - t7 * t9;
-        const double t25 = t14 * t17;
-        const double t26 = t12 - t6 * t13;
-        const double t27 = t4 + t6 * t10 + t26 * t18;
-        const double t28 = t3 + t6 * t20 - t26 * t21;
-        const double t29 = t26 * t23 - t6 * t9;
-        const double t30 = t26 * t17;
-        const double t31 = t10 - t13 * t18;
-        const double t32 = t20 + t13 * t21;
-        const double t33 = t9 + t13 * t23;
-        const double t34 = t13 * t17;
-        inverse[0][lane] = t19;
-        inverse[1][lane] = t22;
-        inverse[2][lane] = t24;
-        inverse[3][lane] = -t25;
-        inverse[4][lane] = -t27;
-        inverse[5][lane] = t28;
-        inverse[6][lane] = t29;
-        inverse[7][lane] = -t30;
-        inverse[8][lane] = t31;
-        inverse[9][lane] = -t32;
-        inverse[10][lane] = t33;
-        inverse[11][lane] = -t34;
-        inverse[12][lane] = t18;
-        inverse[13][lane] = t21;
-        inverse[14][lane] = -t23;
-        inverse[15][lane] = t17;
-        gain[0][lane] = slope[0][lane] * t19 - slope[1][lane] * t27 + (slope[3][lane] * t18 + slope[2][lane] * t31);
-        gain[1][lane] = slope[0][lane] * t22 + slope[1][lane] * t28 + (slope[3][lane] * t21 - slope[2][lane] * t32);
-        gain[2][lane] = slope[2][lane] * t33 - slope[3][lane] * t23 + (slope[0][lane] * t24 + slope[1][lane] * t29);
-        gain[3][lane] = slope[3][lane] * t17 - slope[2][lane] * t34 - (slope[1][lane] * t30 + slope[0][lane] * t25);
-        gain[4][lane] = slope[4][lane] * t19 - slope[5][lane] * t27 + (slope[7][lane] * t18 + slope[6][lane] * t31);
-        gain[5][lane] = slope[7][lane] * t21 - slope[6][lane] * t32 + (slope[5][lane] * t28 + slope[4][lane] * t22);
-        gain[6][lane] = slope[6][lane] * t33 - slope[7][lane] * t23 + (slope[5][lane] * t29 + slope[4][lane] * t24);
-        gain[7][lane] = slope[7][lane] * t17 - slope[6][lane] * t34 - (slope[4][lane] * t25 + slope[5][lane] * t30);
-        gain[8][lane] = slope[11][lane] * t18 + slope[10][lane] * t31 + (slope[8][lane] * t19 - slope[9][lane] * t27);
-        gain[9][lane] = slope[9][lane] * t28 + slope[8][lane] * t22 + (slope[11][lane] * t21 - slope[10][lane] * t32);
-        gain[10][lane] = slope[10][lane] * t33 - slope[11][lane] * t23 + (slope[9][lane] * t29 + slope[8][lane] * t24);
-        gain[11][lane] = slope[11][lane] * t17 - slope[10][lane] * t34 - (slope[9][lane] * t30 + slope[8][lane] * t25);
-        gain[12][lane] = slope[15][lane] * t18 + slope[14][lane] * t31 + (slope[12][lane] * t19 - slope[13][lane] * t27);
-        gain[13][lane] = slope[13][lane] * t28 + slope[12][lane] * t22 + (slope[15][lane] * t21 - slope[14][lane] * t32);
-        gain[14][lane] = slope[14][lane] * t33 - slope[15][lane] * t23 + (slope[13][lane] * t29 + slope[12][lane] * t24);
-        gain[15][lane] = slope[15][lane] * t17 - slope[14][lane] * t34 - (slope[12][lane] * t25 + slope[13][lane] * t30);
-        reciprocal[0][lane] = t1;
-        reciprocal[1][lane] = t3;
-        reciprocal[2][lane] = t9;
-        reciprocal[3][lane] = t17;
-    }
-}
-
-/* sklyanin_gyrostat_size in all lanes, summed over the components. */
-static void sklyanin_gyrostat_sizes(sklyanin_gyrostat_lanes y[restrict 4], sklyanin_gyrostat_lanes delta[restrict 4],
-    sklyanin_gyrostat_lanes size)
-{
-    sklyanin_gyrostat_lanes norm = { 0.0 };
-    memset(size, 0, sklyanin_gyrostat_LANES * sizeof size[0]);
-    for (int i = 0; i < 4; ++i)
-        for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane)
-            norm[lane] = 1e-6 * fabs(y[i][lane]) > norm[lane] ? 1e-6 * fabs(y[i][lane]) : norm[lane];
-    for (int i = 0; i < 4; ++i) {
-        sklyanin_gyrostat_EACH_LANE
-        for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane)
-            size[lane] += fabs(delta[i][lane]) / (fabs(y[i][lane]) + norm[lane] + DBL_MIN);
-    }
-}
-
-/* Correct y by the residuals, with the inverse in the table, and measure the corrections. */
-static void sklyanin_gyrostat_correct(sklyanin_gyrostat_model *model, sklyanin_gyrostat_lanes size)
-{
-    sklyanin_gyrostat_lanes delta[4];
-    memset(delta, 0, sizeof delta);
-    for (int i = 0; i < 4; ++i)
-        for (int j = 0; j < 4; ++j) {
-            sklyanin_gyrostat_EACH_LANE
-            for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane)
-                delta[i][lane] += model->inverse[i * 4 + j][lane] * model->residual[j][lane];
-        }
-    sklyanin_gyrostat_sizes(model->y, delta, size);
-    for (int i = 0; i < 4; ++i)
-        for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane) model->y[i][lane] -= delta[i][lane];
-}
-
-/* The largest of the lanes, none of which is negative; infinite if one is not finite. As integers, the bits of such
-   numbers have their order, and those of what is no number are larger. */
-static double sklyanin_gyrostat_largest(const sklyanin_gyrostat_lanes size)
-{
-    uint64_t bits[8], most = 0;
-    double largest;
-    memcpy(bits, size, sizeof bits);
-    for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane) most = bits[lane] > most ? bits[lane] : most;
-    memcpy(&largest, &most, sizeof largest);
-    return isfinite(largest) ? largest : HUGE_VAL;
-}
-
-/* sklyanin_gyrostat_near for the guesses of all lanes, seen from one value. */
-static int sklyanin_gyrostat_near_lanes(sklyanin_gyrostat_lanes y[restrict 4], const double last[4])
-{
-    sklyanin_gyrostat_lanes distance = { 0.0 };
-    double size = 0.0;
-    for (int i = 0; i < 4; ++i) {
-        size += fabs(last[i]);
-        sklyanin_gyrostat_EACH_LANE
-        for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane) distance[lane] += fabs(y[i][lane] - last[i]);
-    }
-    return sklyanin_gyrostat_largest(distance) <= 4.0 * size;
-}
-
-/* What is left after a correction of this size: quadratic in it, where the matrices are of the points corrected; where
-   they are of points further off, by bend, also of the order of size times bend. bound is what the last pass left. */
-static double sklyanin_gyrostat_remaining(double size, double bend, double bound)
-{
-    const double growth = size / bound, left = size * (size + bend);
-    return growth > 1.0 ? growth * left : left;
-}
-
-/* The paths of all lanes as Taylor series about their middle, with half of p: they take the time from -1 to 1, and need
-   fewer terms than from their start. s[i][k] is coefficient k of series i, the coordinates first; slope goes on with the
-   entries of d(pi p)/dm and of pi, from which v follows, the derivatives along middle and p, row by row. */
-typedef struct {
-    sklyanin_gyrostat_lanes p[4], fixed[1], slope_fixed[1], value[40];
-    sklyanin_gyrostat_lanes s[40][16 + 1], slope[51][12 + 1];
-    sklyanin_gyrostat_lanes v[12 + 1][32];
-    sklyanin_gyrostat_lanes even[4], odd[4], mean[4]; /* sums of terms, those of even order also as means over time */
-    sklyanin_gyrostat_lanes v_even[32], v_odd[32], v_mean[32];
-    sklyanin_gyrostat_lanes unit[4]; /* what terms are multiplied by to be measured */
-    int terms; /* orders that are known */
-} sklyanin_gyrostat_expansion;
-
-/* The largest of the lanes; what is not finite does not count: that lane has failed. */
-static double sklyanin_gyrostat_largest_finite(const sklyanin_gyrostat_lanes size)
-{
-    sklyanin_gyrostat_lanes finite;
-    sklyanin_gyrostat_EACH_LANE
-    for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane) finite[lane] = size[lane] <= DBL_MAX ? size[lane] : 0.0;
-    return sklyanin_gyrostat_largest(finite);
-}
-
-/* Coefficient k >= 1 of the series that follow from those of the coordinates: sums over the orders between 0 and k,
-   then what else there is. */
-static void sklyanin_gyrostat_follow(sklyanin_gyrostat_lanes coef[restrict], sklyanin_gyrostat_expansion *e, int k)
-{
-    (void)coef;
-    sklyanin_gyrostat_lanes sum[6];
-    memset(sum, 0, sizeof sum);
-    for (int j = 1; j < k; ++j) {
-        sklyanin_gyrostat_EACH_LANE
-        for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane) {
-            sum[0][lane] += e->s[1][j][lane] * e->s[3][k - j][lane];
-            sum[1][lane] += e->s[2][j][lane] * e->s[3][k - j][lane];
-            sum[2][lane] += e->s[1][j][lane] * e->s[2][k - j][lane];
-            sum[3][lane] += e->s[0][j][lane] * e->s[3][k - j][lane];
-            sum[4][lane] += e->s[0][j][lane] * e->s[2][k - j][lane];
-            sum[5][lane] += e->s[0][j][lane] * e->s[1][k - j][lane];
-        }
-    }
-    sklyanin_gyrostat_EACH_LANE
-    for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane) {
-        e->s[4][k][lane] = sum[0][lane] + e->s[1][0][lane] * e->s[3][k][lane] + e->s[1][k][lane] * e->s[3][0][lane];
-        e->s[5][k][lane] = e->p[2][lane] * e->s[4][k][lane];
-        e->s[6][k][lane] = 3.0 * e->s[5][k][lane];
-        e->s[7][k][lane] = sum[1][lane] + e->s[2][0][lane] * e->s[3][k][lane] + e->s[2][k][lane] * e->s[3][0][lane];
-        e->s[8][k][lane] = e->p[1][lane] * e->s[7][k][lane];
-        e->s[9][k][lane] = 2.0 * e->s[8][k][lane];
-        e->s[10][k][lane] = e->s[6][k][lane] - e->s[9][k][lane];
-        e->s[11][k][lane] = sum[2][lane] + e->s[1][0][lane] * e->s[2][k][lane] + e->s[1][k][lane] * e->s[2][0][lane];
-        e->s[12][k][lane] = e->p[3][lane] * e->s[11][k][lane];
-        e->s[13][k][lane] = e->s[10][k][lane] - e->s[12][k][lane];
-        e->s[14][k][lane] = e->p[0][lane] * e->s[7][k][lane];
-        e->s[15][k][lane] = 2.0 * e->s[14][k][lane];
-        e->s[16][k][lane] = sum[3][lane] + e->s[0][0][lane] * e->s[3][k][lane] + e->s[0][k][lane] * e->s[3][0][lane];
-        e->s[17][k][lane] = e->p[2][lane] * e->s[16][k][lane];
-        e->s[18][k][lane] = 2.0 * e->s[17][k][lane];
-        e->s[19][k][lane] = e->s[15][k][lane] + e->s[18][k][lane];
-        e->s[20][k][lane] = sum[4][lane] + e->s[0][0][lane] * e->s[2][k][lane] + e->s[0][k][lane] * e->s[2][0][lane];
-        e->s[21][k][lane] = e->p[3][lane] * e->s[20][k][lane];
-        e->s[22][k][lane] = 2.0 * e->s[21][k][lane];
-        e->s[23][k][lane] = e->s[19][k][lane] - e->s[22][k][lane];
-        e->s[24][k][lane] = sum[5][lane] + e->s[0][0][lane] * e->s[1][k][lane] + e->s[0][k][lane] * e->s[1][0][lane];
-        e->s[25][k][lane] = e->p[3][lane] * e->s[24][k][lane];
-        e->s[26][k][lane] = 2.0 * e->s[25][k][lane];
-        e->s[27][k][lane] = e->p[0][lane] * e->s[4][k][lane];
-        e->s[28][k][lane] = -3.0 * e->s[27][k][lane];
-        e->s[29][k][lane] = e->p[1][lane] * e->s[16][k][lane];
-        e->s[30][k][lane] = 2.0 * e->s[29][k][lane];
-        e->s[31][k][lane] = e->s[28][k][lane] - e->s[30][k][lane];
-        e->s[32][k][lane] = e->s[26][k][lane] + e->s[31][k][lane];
-        e->s[33][k][lane] = e->p[0][lane] * e->s[11][k][lane];
-        e->s[34][k][lane] = e->p[1][lane] * e->s[20][k][lane];
-        e->s[35][k][lane] = 2.0 * e->s[34][k][lane];
-        e->s[36][k][lane] = e->s[33][k][lane] + e->s[35][k][lane];
-        e->s[37][k][lane] = e->p[2][lane] * e->s[24][k][lane];
-        e->s[38][k][lane] = 2.0 * e->s[37][k][lane];
-        e->s[39][k][lane] = e->s[36][k][lane] - e->s[38][k][lane];
-    }
-}
-
-/* Coefficient k >= 1 of the further series: sums over the orders between 0 and k,
-   then what else there is. */
-static void sklyanin_gyrostat_follow_slopes(sklyanin_gyrostat_lanes coef[restrict], sklyanin_gyrostat_expansion *e, int k)
-{
-    (void)coef;
-    sklyanin_gyrostat_lanes sum[1];
-    memset(sum, 0, sizeof sum);
-    for (int j = 1; j < k; ++j) {
-    }
-    sklyanin_gyrostat_EACH_LANE
-    for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane) {
-        e->slope[0][k][lane] = e->p[2][lane] * e->s[3][k][lane];
-        e->slope[1][k][lane] = 3.0 * e->slope[0][k][lane];
-        e->slope[2][k][lane] = e->p[3][lane] * e->s[2][k][lane];
-        e->slope[3][k][lane] = e->slope[1][k][lane] - e->slope[2][k][lane];
-        e->slope[4][k][lane] = e->p[1][lane] * e->s[3][k][lane];
-        e->slope[5][k][lane] = -2.0 * e->slope[4][k][lane];
-        e->slope[6][k][lane] = e->p[3][lane] * e->s[1][k][lane];
-        e->slope[7][k][lane] = e->slope[5][k][lane] - e->slope[6][k][lane];
-        e->slope[8][k][lane] = e->p[2][lane] * e->s[1][k][lane];
-        e->slope[9][k][lane] = 3.0 * e->slope[8][k][lane];
-        e->slope[10][k][lane] = e->p[1][lane] * e->s[2][k][lane];
-        e->slope[11][k][lane] = 2.0 * e->slope[10][k][lane];
-        e->slope[12][k][lane] = e->slope[9][k][lane] - e->slope[11][k][lane];
-        e->slope[13][k][lane] = 2.0 * e->slope[0][k][lane];
-        e->slope[14][k][lane] = 2.0 * e->slope[2][k][lane];
-        e->slope[15][k][lane] = e->slope[13][k][lane] - e->slope[14][k][lane];
-        e->slope[16][k][lane] = e->p[0][lane] * e->s[3][k][lane];
-        e->slope[17][k][lane] = 2.0 * e->slope[16][k][lane];
-        e->slope[18][k][lane] = e->p[3][lane] * e->s[0][k][lane];
-        e->slope[19][k][lane] = 2.0 * e->slope[18][k][lane];
-        e->slope[20][k][lane] = e->slope[17][k][lane] - e->slope[19][k][lane];
-        e->slope[21][k][lane] = e->p[2][lane] * e->s[0][k][lane];
-        e->slope[22][k][lane] = 2.0 * e->slope[21][k][lane];
-        e->slope[23][k][lane] = e->p[0][lane] * e->s[2][k][lane];
-        e->slope[24][k][lane] = 2.0 * e->slope[23][k][lane];
-        e->slope[25][k][lane] = e->slope[22][k][lane] + e->slope[24][k][lane];
-        e->slope[26][k][lane] = 2.0 * e->slope[6][k][lane];
-        e->slope[27][k][lane] = 2.0 * e->slope[4][k][lane];
-        e->slope[28][k][lane] = e->slope[26][k][lane] - e->slope[27][k][lane];
-        e->slope[29][k][lane] = 3.0 * e->slope[16][k][lane];
-        e->slope[30][k][lane] = e->slope[19][k][lane] - e->slope[29][k][lane];
-        e->slope[31][k][lane] = e->p[0][lane] * e->s[1][k][lane];
-        e->slope[32][k][lane] = -3.0 * e->slope[31][k][lane];
-        e->slope[33][k][lane] = e->p[1][lane] * e->s[0][k][lane];
-        e->slope[34][k][lane] = 2.0 * e->slope[33][k][lane];
-        e->slope[35][k][lane] = e->slope[32][k][lane] - e->slope[34][k][lane];
-        e->slope[36][k][lane] = 2.0 * e->slope[8][k][lane];
-        e->slope[37][k][lane] = e->slope[11][k][lane] - e->slope[36][k][lane];
-        e->slope[38][k][lane] = e->slope[23][k][lane] - e->slope[22][k][lane];
-        e->slope[39][k][lane] = e->slope[31][k][lane] + e->slope[34][k][lane];
-        e->slope[40][k][lane] = -2.0 * e->s[7][k][lane];
-        e->slope[41][k][lane] = 3.0 * e->s[4][k][lane];
-        e->slope[42][k][lane] = -e->s[11][k][lane];
-        e->slope[43][k][lane] = 2.0 * e->s[7][k][lane];
-        e->slope[44][k][lane] = 2.0 * e->s[16][k][lane];
-        e->slope[45][k][lane] = -2.0 * e->s[20][k][lane];
-        e->slope[46][k][lane] = -3.0 * e->s[4][k][lane];
-        e->slope[47][k][lane] = -2.0 * e->s[16][k][lane];
-        e->slope[48][k][lane] = 2.0 * e->s[24][k][lane];
-        e->slope[49][k][lane] = 2.0 * e->s[20][k][lane];
-        e->slope[50][k][lane] = -2.0 * e->s[24][k][lane];
-    }
-}
-
-/* Order k of the series, and with it order k + 1 of the coordinates. */
-static void sklyanin_gyrostat_next_order(sklyanin_gyrostat_lanes coef[restrict], sklyanin_gyrostat_expansion *e, int k)
-{
-    static const int field[4] = { 13, 23, 32, 39 };
-    if (k > 0) sklyanin_gyrostat_follow(coef, e, k);
-    for (int i = 0; i < 4; ++i) {
-        const double share = 1.0 / (k + 1);
-        sklyanin_gyrostat_EACH_LANE
-        for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane) e->s[i][k + 1][lane] = share * e->s[field[i]][k][lane];
-    }
-}
-
-/* Begin to expand the paths with the middles m. */
-static void sklyanin_gyrostat_begin(sklyanin_gyrostat_lanes coef[restrict], sklyanin_gyrostat_expansion *e, sklyanin_gyrostat_lanes m[restrict 4])
-{
-    sklyanin_gyrostat_lanes norm = { 0.0 };
-    sklyanin_gyrostat_values_lanes(coef, e->p, m, e->value, e->fixed);
-    for (int i = 0; i < 40; ++i) memcpy(e->s[i][0], e->value[i], sizeof e->value[i]);
-    memset(e->even, 0, sizeof e->even);
-    memset(e->odd, 0, sizeof e->odd);
-    memset(e->mean, 0, sizeof e->mean);
-    sklyanin_gyrostat_next_order(coef, e, 0);
-    e->terms = 0;
-    for (int i = 0; i < 4; ++i) {
-        sklyanin_gyrostat_EACH_LANE
-        for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane) {
-            e->unit[i][lane] = fabs(m[i][lane]) + fabs(e->s[i][1][lane]) + DBL_MIN;
-            norm[lane] += e->unit[i][lane];
-        }
-    }
-    for (int i = 0; i < 4; ++i) {
-        sklyanin_gyrostat_EACH_LANE
-        for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane) e->unit[i][lane] = 1.0 / (e->unit[i][lane] + 1e-5 * norm[lane]);
-    }
-}
-
-/* Add the terms of the odd order k and of the next; their size. */
-static double sklyanin_gyrostat_add_terms(sklyanin_gyrostat_expansion *e, int k)
-{
-    sklyanin_gyrostat_lanes size = { 0.0 };
-    const double share = 1.0 / (k + 2);
-    for (int i = 0; i < 4; ++i) {
-        sklyanin_gyrostat_EACH_LANE
-        for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane) {
-            const double odd = e->s[i][k][lane], even = e->s[i][k + 1][lane];
-            e->odd[i][lane] += odd;
-            e->even[i][lane] += even;
-            e->mean[i][lane] += share * even;
-            size[lane] += (fabs(odd) + fabs(even)) * e->unit[i][lane];
-        }
-    }
-    return sklyanin_gyrostat_largest_finite(size);
-}
-
-/* Go on by two orders at a time, until these are below accuracy in all lanes that are finite, or 16 are known: whether
-   they suffice is checked at the ends. */
-static void sklyanin_gyrostat_extend(sklyanin_gyrostat_lanes coef[restrict], sklyanin_gyrostat_expansion *e, double accuracy)
-{
-    double size = HUGE_VAL;
-    for (; e->terms < 16 && size > accuracy; e->terms += 2) {
-        if (e->terms > 0) sklyanin_gyrostat_next_order(coef, e, e->terms);
-        sklyanin_gyrostat_next_order(coef, e, e->terms + 1);
-        size = sklyanin_gyrostat_add_terms(e, e->terms + 1);
-    }
-}
-
-/* sklyanin_gyrostat_holds in all lanes, at one end of the paths, where the expansions have the given slope: infinite where the
-   equation does not hold. */
-static void sklyanin_gyrostat_check_end(sklyanin_gyrostat_lanes coef[restrict], sklyanin_gyrostat_expansion *e, sklyanin_gyrostat_lanes m[restrict 4],
-    sklyanin_gyrostat_lanes slope[restrict 4], sklyanin_gyrostat_lanes wrong)
-{
-    static const int field[4] = { 13, 23, 32, 39 };
-    sklyanin_gyrostat_lanes value[40], fixed[1], scale = { 0.0 };
-    sklyanin_gyrostat_values_lanes(coef, e->p, m, value, fixed);
-    for (int i = 0; i < 4; ++i) {
-        sklyanin_gyrostat_EACH_LANE
-        for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane) scale[lane] += fabs(m[i][lane]) + fabs(slope[i][lane]);
-    }
-    for (int i = 0; i < 4; ++i) {
-        sklyanin_gyrostat_EACH_LANE
-        for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane) {
-            const double off = fabs(value[field[i]][lane] - slope[i][lane]);
-            wrong[lane] += off <= 2e-15 * scale[lane] ? 0.0 : HUGE_VAL;
-        }
-    }
-}
-
-/* The same at both ends. */
-static void sklyanin_gyrostat_check_ends(sklyanin_gyrostat_lanes coef[restrict], sklyanin_gyrostat_expansion *e, sklyanin_gyrostat_lanes wrong)
-{
-    sklyanin_gyrostat_lanes start[4], end[4], start_slope[4], end_slope[4];
-    for (int i = 0; i < 4; ++i) {
-        sklyanin_gyrostat_lanes even = { 0.0 }, odd = { 0.0 };
-        for (int k = 1; k < e->terms; k += 2) {
-            sklyanin_gyrostat_EACH_LANE
-            for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane) {
-                odd[lane] += k * e->s[i][k][lane];
-                even[lane] += (k + 1) * e->s[i][k + 1][lane];
-            }
-        }
-        sklyanin_gyrostat_EACH_LANE
-        for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane) {
-            start[i][lane] = e->s[i][0][lane] + (e->even[i][lane] - e->odd[i][lane]);
-            end[i][lane] = e->s[i][0][lane] + (e->even[i][lane] + e->odd[i][lane]);
-            start_slope[i][lane] = odd[lane] - even[lane];
-            end_slope[i][lane] = odd[lane] + even[lane];
-        }
-    }
-    sklyanin_gyrostat_check_end(coef, e, start, start_slope, wrong);
-    sklyanin_gyrostat_check_end(coef, e, end, end_slope, wrong);
-}
-
-/* Begin to expand the paths with mean y, from their middles as far as these are known. */
-static void sklyanin_gyrostat_begin_at(sklyanin_gyrostat_lanes coef[restrict], const sklyanin_gyrostat_model *model, sklyanin_gyrostat_expansion *e)
-{
-    sklyanin_gyrostat_lanes m[4];
-    for (int i = 0; i < 4; ++i) {
-        sklyanin_gyrostat_EACH_LANE
-        for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane) m[i][lane] = model->y[i][lane] + model->middle[i][lane];
-    }
-    sklyanin_gyrostat_begin(coef, e, m);
-}
-
-/* Find the middles by iteration, which gains some digits each time, with expansions as short as that allows; the last
-   can be gone on with. Infinite where that does not converge. */
-static void sklyanin_gyrostat_settle(sklyanin_gyrostat_lanes coef[restrict], sklyanin_gyrostat_model *model, sklyanin_gyrostat_expansion *e)
-{
-    sklyanin_gyrostat_lanes size, norm;
-    double left = 1.0;
-    memset(model->middle, 0, sizeof model->middle);
-    for (int round = 0; left > 1e-9 && round < 12; ++round) {
-        for (int i = 0; i < 4 && round > 0; ++i) {
-            sklyanin_gyrostat_EACH_LANE
-            for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane) model->middle[i][lane] = -e->mean[i][lane];
-        }
-        sklyanin_gyrostat_begin_at(coef, model, e);
-        sklyanin_gyrostat_extend(coef, e, 1e-4 * left);
-        memset(size, 0, sizeof size);
-        memset(norm, 0, sizeof norm);
-        for (int i = 0; i < 4; ++i) {
-            sklyanin_gyrostat_EACH_LANE
-            for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane) {
-                size[lane] += fabs(model->middle[i][lane] + e->mean[i][lane]);
-                norm[lane] += fabs(model->y[i][lane]);
-            }
-        }
-        sklyanin_gyrostat_EACH_LANE
-        for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane) size[lane] /= norm[lane] + DBL_MIN;
-        left = sklyanin_gyrostat_largest_finite(size);
-        if (left > 1.0) left = 1.0;
-    }
-    for (int lane = 0; lane < sklyanin_gyrostat_LANES && left > 1e-9; ++lane)
-        if (size[lane] > 1e-9) model->middle[0][lane] = HUGE_VAL;
-}
-
-/* Half of p: paths take the time from -1 to 1. */
-static void sklyanin_gyrostat_halve(sklyanin_gyrostat_lanes p[restrict 4])
-{
-    for (int i = 0; i < 4; ++i) {
-        sklyanin_gyrostat_EACH_LANE
-        for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane) p[i][lane] *= 0.5;
-    }
-}
-
-/* alpha - y and beta - alpha to leading order, from one short expansion. */
-static void sklyanin_gyrostat_evaluate_lanes(sklyanin_gyrostat_lanes coef[restrict], sklyanin_gyrostat_lanes y[restrict 4],
-    sklyanin_gyrostat_lanes displacement[restrict 4], sklyanin_gyrostat_lanes increment[restrict 4])
-{
-    sklyanin_gyrostat_expansion e;
-    sklyanin_gyrostat_momentum_lanes(coef, y, e.p);
-    sklyanin_gyrostat_halve(e.p);
-    sklyanin_gyrostat_begin(coef, &e, y);
-    sklyanin_gyrostat_extend(coef, &e, 1e-6);
-    for (int i = 0; i < 4; ++i) {
-        sklyanin_gyrostat_EACH_LANE
-        for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane) {
-            displacement[i][lane] = (e.even[i][lane] - e.odd[i][lane]) - e.mean[i][lane];
-            increment[i][lane] = 2.0 * e.odd[i][lane];
-        }
-    }
-}
-
-/* What order j of d(pi p)/dm contributes to order k + 1 of the derivatives. */
-static void sklyanin_gyrostat_vary_by(sklyanin_gyrostat_expansion *e, int j, int k)
-{
-    sklyanin_gyrostat_lanes *from = e->v[k - j], *to = e->v[k + 1];
-    const double share = 1.0 / (k + 1);
-    sklyanin_gyrostat_EACH_LANE
-    for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane) {
-        const double a01 = share * e->slope[3][j][lane];
-        const double a02 = share * e->slope[7][j][lane];
-        const double a03 = share * e->slope[12][j][lane];
-        const double a10 = share * e->slope[15][j][lane];
-        const double a12 = share * e->slope[20][j][lane];
-        const double a13 = share * e->slope[25][j][lane];
-        const double a20 = share * e->slope[28][j][lane];
-        const double a21 = share * e->slope[30][j][lane];
-        const double a23 = share * e->slope[35][j][lane];
-        const double a30 = share * e->slope[37][j][lane];
-        const double a31 = share * e->slope[38][j][lane];
-        const double a32 = share * e->slope[39][j][lane];
-        to[0][lane] += a01 * from[8][lane] + a02 * from[16][lane] + a03 * from[24][lane];
-        to[1][lane] += a01 * from[9][lane] + a02 * from[17][lane] + a03 * from[25][lane];
-        to[2][lane] += a01 * from[10][lane] + a02 * from[18][lane] + a03 * from[26][lane];
-        to[3][lane] += a01 * from[11][lane] + a02 * from[19][lane] + a03 * from[27][lane];
-        to[4][lane] += a01 * from[12][lane] + a02 * from[20][lane] + a03 * from[28][lane];
-        to[5][lane] += a01 * from[13][lane] + a02 * from[21][lane] + a03 * from[29][lane];
-        to[6][lane] += a01 * from[14][lane] + a02 * from[22][lane] + a03 * from[30][lane];
-        to[7][lane] += a01 * from[15][lane] + a02 * from[23][lane] + a03 * from[31][lane];
-        to[8][lane] += a10 * from[0][lane] + a12 * from[16][lane] + a13 * from[24][lane];
-        to[9][lane] += a10 * from[1][lane] + a12 * from[17][lane] + a13 * from[25][lane];
-        to[10][lane] += a10 * from[2][lane] + a12 * from[18][lane] + a13 * from[26][lane];
-        to[11][lane] += a10 * from[3][lane] + a12 * from[19][lane] + a13 * from[27][lane];
-        to[12][lane] += a10 * from[4][lane] + a12 * from[20][lane] + a13 * from[28][lane];
-        to[13][lane] += a10 * from[5][lane] + a12 * from[21][lane] + a13 * from[29][lane];
-        to[14][lane] += a10 * from[6][lane] + a12 * from[22][lane] + a13 * from[30][lane];
-        to[15][lane] += a10 * from[7][lane] + a12 * from[23][lane] + a13 * from[31][lane];
-        to[16][lane] += a20 * from[0][lane] + a21 * from[8][lane] + a23 * from[24][lane];
-        to[17][lane] += a20 * from[1][lane] + a21 * from[9][lane] + a23 * from[25][lane];
-        to[18][lane] += a20 * from[2][lane] + a21 * from[10][lane] + a23 * from[26][lane];
-        to[19][lane] += a20 * from[3][lane] + a21 * from[11][lane] + a23 * from[27][lane];
-        to[20][lane] += a20 * from[4][lane] + a21 * from[12][lane] + a23 * from[28][lane];
-        to[21][lane] += a20 * from[5][lane] + a21 * from[13][lane] + a23 * from[29][lane];
-        to[22][lane] += a20 * from[6][lane] + a21 * from[14][lane] + a23 * from[30][lane];
-        to[23][lane] += a20 * from[7][lane] + a21 * from[15][lane] + a23 * from[31][lane];
-        to[24][lane] += a30 * from[0][lane] + a31 * from[8][lane] + a32 * from[16][lane];
-        to[25][lane] += a30 * from[1][lane] + a31 * from[9][lane] + a32 * from[17][lane];
-        to[26][lane] += a30 * from[2][lane] + a31 * from[10][lane] + a32 * from[18][lane];
-        to[27][lane] += a30 * from[3][lane] + a31 * from[11][lane] + a32 * from[19][lane];
-        to[28][lane] += a30 * from[4][lane] + a31 * from[12][lane] + a32 * from[20][lane];
-        to[29][lane] += a30 * from[5][lane] + a31 * from[13][lane] + a32 * from[21][lane];
-        to[30][lane] += a30 * from[6][lane] + a31 * from[14][lane] + a32 * from[22][lane];
-        to[31][lane] += a30 * from[7][lane] + a31 * from[15][lane] + a32 * from[23][lane];
-    }
-}
-
-/* Order k + 1 of the derivatives; order 0 is 1 along the middle, and 0 along p. */
-static void sklyanin_gyrostat_vary_order(sklyanin_gyrostat_expansion *e, int k)
-{
-    sklyanin_gyrostat_lanes *to = e->v[k + 1];
-    const double share = 1.0 / (k + 1);
-    memset(to, 0, 32 * sizeof to[0]);
-    sklyanin_gyrostat_EACH_LANE
-    for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane) {
-        to[1][lane] += share * e->slope[3][k][lane];
-        to[2][lane] += share * e->slope[7][k][lane];
-        to[3][lane] += share * e->slope[12][k][lane];
-        to[8][lane] += share * e->slope[15][k][lane];
-        to[10][lane] += share * e->slope[20][k][lane];
-        to[11][lane] += share * e->slope[25][k][lane];
-        to[16][lane] += share * e->slope[28][k][lane];
-        to[17][lane] += share * e->slope[30][k][lane];
-        to[19][lane] += share * e->slope[35][k][lane];
-        to[24][lane] += share * e->slope[37][k][lane];
-        to[25][lane] += share * e->slope[38][k][lane];
-        to[26][lane] += share * e->slope[39][k][lane];
-        to[5][lane] += 0.5 * share * e->slope[40][k][lane];
-        to[6][lane] += 0.5 * share * e->slope[41][k][lane];
-        to[7][lane] += 0.5 * share * e->slope[42][k][lane];
-        to[12][lane] += 0.5 * share * e->slope[43][k][lane];
-        to[14][lane] += 0.5 * share * e->slope[44][k][lane];
-        to[15][lane] += 0.5 * share * e->slope[45][k][lane];
-        to[20][lane] += 0.5 * share * e->slope[46][k][lane];
-        to[21][lane] += 0.5 * share * e->slope[47][k][lane];
-        to[23][lane] += 0.5 * share * e->slope[48][k][lane];
-        to[28][lane] += 0.5 * share * e->s[11][k][lane];
-        to[29][lane] += 0.5 * share * e->slope[49][k][lane];
-        to[30][lane] += 0.5 * share * e->slope[50][k][lane];
-    }
-    for (int j = 0; j < k; ++j) sklyanin_gyrostat_vary_by(e, j, k);
-}
-
-/* Add the terms of the odd order k of the derivatives and of the next, and measure them: those along the middle beside 1,
-   those along p beside their first. */
-static void sklyanin_gyrostat_add_slopes(sklyanin_gyrostat_expansion *e, int k, sklyanin_gyrostat_lanes size)
-{
-    sklyanin_gyrostat_lanes parts[2] = { { 0.0 } }, first = { 0.0 };
-    const double share = 1.0 / (k + 2);
-    for (int i = 0; i < 32; ++i) {
-        const int part = i % 8 / 4;
-        sklyanin_gyrostat_EACH_LANE
-        for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane) {
-            const double odd = e->v[k][i][lane], even = e->v[k + 1][i][lane];
-            e->v_odd[i][lane] += odd;
-            e->v_even[i][lane] += even;
-            e->v_mean[i][lane] += share * even;
-            parts[part][lane] += fabs(odd) + fabs(even);
-            first[lane] += fabs(e->v[1][i][lane]);
-        }
-    }
-    sklyanin_gyrostat_EACH_LANE
-    for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane)
-        size[lane] = parts[0][lane] + parts[1][lane] / (first[lane] + DBL_MIN);
-}
-
-/* The derivatives of the paths along their middles and p, to seven digits: what that leaves of a correction is below
-   rounding when it is accepted. Infinite where 12 terms do not suffice. */
-static void sklyanin_gyrostat_vary(sklyanin_gyrostat_lanes coef[restrict], sklyanin_gyrostat_expansion *e)
-{
-    sklyanin_gyrostat_lanes slope[51], size;
-    double largest = 1.0, next = 1.0; /* the last two orders, and what is to be expected of the next */
-    sklyanin_gyrostat_slope_values_lanes(coef, e->p, e->value, e->fixed, slope, e->slope_fixed);
-    for (int i = 0; i < 51; ++i) memcpy(e->slope[i][0], slope[i], sizeof slope[i]);
-    memset(e->v_even, 0, sizeof e->v_even);
-    memset(e->v_odd, 0, sizeof e->v_odd);
-    memset(e->v_mean, 0, sizeof e->v_mean);
-    for (int i = 0; i < 4; ++i) {
-        sklyanin_gyrostat_EACH_LANE
-        for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane)
-            e->v_even[i * 8 + i][lane] = e->v_mean[i * 8 + i][lane] = 1.0;
-    }
-    for (int k = 0; k < 12 && next > 1e-07; ++k) {
-        if (k >= e->terms) sklyanin_gyrostat_next_order(coef, e, k);
-        if (k > 0) sklyanin_gyrostat_follow_slopes(coef, e, k);
-        sklyanin_gyrostat_vary_order(e, k);
-        if (k % 2 == 0) continue;
-        sklyanin_gyrostat_add_slopes(e, k, size);
-        const double previous = largest;
-        largest = sklyanin_gyrostat_largest_finite(size);
-        next = largest * (largest / previous);
-    }
-    for (int lane = 0; lane < sklyanin_gyrostat_LANES && next > 1e-07; ++lane)
-        if (size[lane] > 1e-07) e->v_mean[0][lane] = HUGE_VAL;
-}
-
-/* alpha - y and beta - alpha from an expansion whose mean misses y by little, to first order in that. */
-static void sklyanin_gyrostat_read_ends(sklyanin_gyrostat_model *model, sklyanin_gyrostat_expansion *e, const sklyanin_gyrostat_lanes wrong)
-{
-    sklyanin_gyrostat_lanes miss[4];
-    for (int i = 0; i < 4; ++i) {
-        sklyanin_gyrostat_EACH_LANE
-        for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane) {
-            miss[i][lane] = model->middle[i][lane] + e->mean[i][lane];
-            model->displacement[i][lane] = ((model->middle[i][lane] + e->even[i][lane]) - e->odd[i][lane]) + wrong[lane];
-            model->increment[i][lane] = 2.0 * e->odd[i][lane];
-            model->middle[i][lane] = -e->mean[i][lane];
-        }
-    }
-    for (int i = 0; i < 4; ++i)
-        for (int j = 0; j < 4; ++j) {
-            sklyanin_gyrostat_EACH_LANE
-            for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane) {
-                model->displacement[i][lane] -= model->alpha_y[i * 4 + j][lane] * miss[j][lane];
-                model->increment[i][lane] -= model->increment_y[i * 4 + j][lane] * miss[j][lane];
-            }
-        }
-}
-
-/* The matrices of a stage, from the derivatives of the paths and the Hessian of S_h. */
-static void sklyanin_gyrostat_linearise_paths(sklyanin_gyrostat_lanes coef[restrict], sklyanin_gyrostat_model *model, sklyanin_gyrostat_expansion *e,
-    sklyanin_gyrostat_lanes hessian[restrict 16])
-{
-    sklyanin_gyrostat_lanes jacobian[16], reciprocal[2 * 4];
-    sklyanin_gyrostat_vary(coef, e);
-    sklyanin_gyrostat_along_mean_lanes(e->v_even, e->v_odd, e->v_mean, hessian, model->alpha_y, model->increment_y, jacobian,
-        model->slope, reciprocal);
-    sklyanin_gyrostat_invert_lanes(jacobian, model->slope, model->inverse, model->gain, reciprocal + 4);
-    for (int i = 0; i < 2 * 4; ++i) {
-        sklyanin_gyrostat_EACH_LANE
-        for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane)
-            model->inverse[i % 4][lane] += fabs(reciprocal[i][lane]) < 1e3 ? 0.0 : HUGE_VAL;
-    }
-}
-
-/* The table of a stage, with its matrices or with those of the last pass. */
-static void sklyanin_gyrostat_update(sklyanin_gyrostat_lanes coef[restrict], sklyanin_gyrostat_model *model, int matrices)
-{
-    sklyanin_gyrostat_expansion e;
-    sklyanin_gyrostat_lanes hessian[16], wrong = { 0.0 };
-    if (matrices) sklyanin_gyrostat_curvature_lanes(coef, model->y, e.p, hessian);
-    else sklyanin_gyrostat_momentum_lanes(coef, model->y, e.p);
-    sklyanin_gyrostat_halve(e.p);
-    if (matrices) sklyanin_gyrostat_settle(coef, model, &e);
-    else sklyanin_gyrostat_begin_at(coef, model, &e);
-    sklyanin_gyrostat_extend(coef, &e, 1e-17);
-    sklyanin_gyrostat_check_ends(coef, &e, wrong);
-    if (matrices) sklyanin_gyrostat_linearise_paths(coef, model, &e, hessian);
-    sklyanin_gyrostat_read_ends(model, &e, wrong);
-}
-
-/* The steps of a block one after the other, each along the linear model of its lane. As X, the state with its carry, gains
-   increment - gain residual, the next residual follows from this one; X itself is added up apart. */
-static void sklyanin_gyrostat_chain(sklyanin_gyrostat_model model[1], double x[4], double carry[4])
-{
-    double residual[4], sum[4], small[4];
-    for (int i = 0; i < 4; ++i) {
-        residual[i] = ((model->y[i][0] - x[i]) + model->displacement[i][0]) - carry[i];
-        sum[i] = x[i];
-        small[i] = carry[i];
-    }
-    for (int k = 0; k < 1 * sklyanin_gyrostat_LANES; ++k) {
-        const int lane = k / 1, after = (k + 1) / 1 % sklyanin_gyrostat_LANES;
-        sklyanin_gyrostat_model *at = &model[k % 1], *next = &model[(k + 1) % 1];
-        double even[4] = { 0.0 }, odd[4] = { 0.0 }; /* two sums, so that no long chain of additions is waited for */
-        for (int i = 0; i < 4; ++i) {
-            at->residual[i][lane] = residual[i];
-            for (int j = 0; j < 4; j += 2) even[i] += at->gain[i * 4 + j][lane] * residual[j];
-            for (int j = 1; j < 4; j += 2) odd[i] += at->gain[i * 4 + j][lane] * residual[j];
-        }
-        for (int i = 0; i < 4; ++i) {
-            const double change = at->increment[i][lane], total = sum[i] + change, added = total - sum[i];
-            const double turn = (next->displacement[i][after] - at->displacement[i][lane]) - change;
-            const double moved = (next->y[i][after] - at->y[i][lane]) + turn;
-            residual[i] = ((moved + residual[i]) + odd[i]) + even[i];
-            small[i] += ((sum[i] - (total - added)) + (change - added)) - (even[i] + odd[i]);
-            sum[i] = total;
-        }
-    }
-    for (int i = 0; i < 4; ++i) {
-        x[i] = sum[i] + small[i];
-        carry[i] = small[i] - (x[i] - sum[i]);
-    }
-}
-
-/* Bring the table up to date: coefficients, and weights that were fitted since. */
-static void sklyanin_gyrostat_refresh(const sklyanin_gyrostat_solver *s, sklyanin_gyrostat_table *table)
-{
-    for (int stage = 0; stage < 1; ++stage) {
-        if (table->fits[stage] == s->memory[stage].fits) continue;
-        table->fits[stage] = s->memory[stage].fits;
-        for (int k = 0; k < 31; ++k)
-            for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane) table->coef[stage][k][lane] = s->coef[stage][k];
-        memcpy(table->weight[stage], s->memory[stage].weight, (size_t)s->memory[stage].terms * sizeof table->weight[0][0]);
-    }
-}
-
-/* Guesses for the next sklyanin_gyrostat_LANES values of a stage, by its recurrences. */
-static void sklyanin_gyrostat_foresee(const sklyanin_gyrostat_memory *memory, sklyanin_gyrostat_lanes weight[restrict][4],
-    sklyanin_gyrostat_lanes y[restrict 4])
-{
-    const int last = memory->count - 1;
-    for (int i = 0; i < 4; ++i) {
-        sklyanin_gyrostat_lanes even = { 0.0 }, odd = { 0.0 };
-        for (int k = 0; k < memory->terms; k += 2) {
-            const double past = memory->past[last - k][i], earlier = memory->past[last - 1 - k][i];
-            sklyanin_gyrostat_EACH_LANE
-            for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane) even[lane] += weight[k][i][lane] * past;
-            sklyanin_gyrostat_EACH_LANE
-            for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane) odd[lane] += weight[k + 1][i][lane] * earlier;
-        }
-        sklyanin_gyrostat_EACH_LANE
-        for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane) y[i][lane] = even[lane] + odd[lane];
-    }
-}
-
-/* sklyanin_gyrostat_record for the values of all lanes, one after the other. */
-static void sklyanin_gyrostat_record_lanes(sklyanin_gyrostat_memory *memory, sklyanin_gyrostat_lanes y[restrict 4])
-{
-    sklyanin_gyrostat_make_room(memory, sklyanin_gyrostat_LANES);
-    for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane)
-        for (int i = 0; i < 4; ++i) memory->past[memory->count + lane][i] = y[i][lane];
-    memory->count += sklyanin_gyrostat_LANES;
-}
-
-/* Guesses where no recurrence is known: where alpha and beta have the means of steps by the classical Runge-Kutta
-   method, to leading order. */
-static void sklyanin_gyrostat_march(const sklyanin_gyrostat_solver *s, sklyanin_gyrostat_table *table, sklyanin_gyrostat_model model[1])
-{
-    static const double reach[4] = { 0.5, 0.5, 1.0, 0.0 }, weight[4] = { 1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0 };
-    double x[4], point[4], slope[4], mean[4];
-    memcpy(x, s->x, sizeof x);
-    for (int k = 0; k < 1 * sklyanin_gyrostat_LANES; ++k) {
-        const double h = sklyanin_gyrostat_fractions[k % 1] * s->h;
-        memcpy(point, x, sizeof x);
-        memset(mean, 0, sizeof mean);
-        for (int part = 0; part < 4; ++part) {
-            sklyanin_gyrostat_vector_field(&s->params, point, slope);
-            for (int i = 0; i < 4; ++i) {
-                mean[i] += weight[part] * slope[i];
-                point[i] = x[i] + h * reach[part] * slope[i];
-            }
-        }
-        for (int i = 0; i < 4; ++i) {
-            model[k % 1].y[i][k / 1] = x[i] + 0.5 * h * mean[i];
-            x[i] += h * mean[i];
-        }
-    }
-    for (int stage = 0; stage < 1; ++stage) {
-        sklyanin_gyrostat_model *at = &model[stage];
-        sklyanin_gyrostat_evaluate_lanes(table->coef[stage], at->y, at->displacement, at->increment);
-        for (int i = 0; i < 4; ++i) {
-            sklyanin_gyrostat_EACH_LANE
-            for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane)
-                at->y[i][lane] -= at->displacement[i][lane] + 0.5 * at->increment[i][lane];
-        }
-    }
-}
-
-/* sklyanin_gyrostat_LANES steps at once: guess the points of all, and correct them together until the error that remains is as
-   small as after a single step. How many passes that took; 0, and the solver as before, where it takes more than most. */
-static int sklyanin_gyrostat_block(sklyanin_gyrostat_solver *s, sklyanin_gyrostat_table *table, int most)
-{
-    sklyanin_gyrostat_model model[1];
-    sklyanin_gyrostat_lanes sizes;
-    double x[4], carry[4], previous = HUGE_VAL, bend = 0.0, bound = HUGE_VAL;
-    int passes = 0, solved = 0;
-    if (!s->foreseeing) sklyanin_gyrostat_march(s, table, model);
-    for (int stage = 0; stage < 1; ++stage) {
-        if (s->foreseeing) sklyanin_gyrostat_foresee(&s->memory[stage], table->weight[stage], model[stage].y);
-        if (!sklyanin_gyrostat_near_lanes(model[stage].y, s->x)) return 0;
-    }
-    while (!solved) {
-        double size = 0.0;
-        const int matrices = previous > 1e-05;
-        for (int stage = 0; stage < 1; ++stage) sklyanin_gyrostat_update(table->coef[stage], &model[stage], matrices);
-        memcpy(x, s->x, sizeof x);
-        memcpy(carry, s->carry, sizeof carry);
-        sklyanin_gyrostat_chain(model, x, carry);
-        for (int stage = 0; stage < 1; ++stage) {
-            sklyanin_gyrostat_correct(&model[stage], sizes);
-            const double largest = sklyanin_gyrostat_largest(sizes);
-            size = largest > size ? largest : size;
-        }
-        s->evaluations += 1 * sklyanin_gyrostat_LANES;
-        bend = matrices ? 0.0 : bend + previous;
-        bound = sklyanin_gyrostat_remaining(size, bend, bound);
-        /* The second test: after the square of so small a correction there is rounding only. */
-        solved = bound <= 1e-20 || (previous < 1e-8 && size < 1e-10);
-        if ((++passes >= most || !(size < previous)) && !solved) return 0;
-        previous = size;
-    }
-    for (int stage = 0; stage < 1; ++stage)
-        if (!sklyanin_gyrostat_near_lanes(model[stage].y, s->x)) return 0;
-    for (int i = 0; i < 4; ++i)
-        if (!isfinite(x[i])) return 0;
-    memcpy(s->x, x, sizeof x);
-    memcpy(s->carry, carry, sizeof carry);
-    s->steps += sklyanin_gyrostat_LANES;
-    for (int stage = 0; stage < 1; ++stage) {
-        sklyanin_gyrostat_memory *memory = &s->memory[stage];
-        sklyanin_gyrostat_record_lanes(memory, model[stage].y);
-        memory->slow = passes > 1 ? memory->slow + sklyanin_gyrostat_LANES : 0;
-        if (memory->slow > memory->patience && s->foreseeing) sklyanin_gyrostat_fit(memory);
-    }
-    return passes;
-}
-
-/* Recurrences are given up for a while, the longer the more often that happens. */
-static void sklyanin_gyrostat_give_up(sklyanin_gyrostat_solver *s)
-{
-    s->foreseeing = s->setback = s->pause = 0;
-    s->doubt = 2 * s->doubt + 600;
-    s->retry = s->steps + s->doubt;
-}
-
-/* How the next block is guessed: by recurrences, fitted as soon as enough steps are to be made, or
-   have been, to repay that. */
-static void sklyanin_gyrostat_choose_guess(sklyanin_gyrostat_solver *s, size_t steps)
-{
-    for (int stage = 0; stage < 1; ++stage)
-        if (s->memory[stage].count < 111) {
-            s->foreseeing = 0;
-            return;
-        }
-    if (s->foreseeing || (steps < 600 && s->steps < 150) || s->steps < s->retry) return;
-    s->foreseeing = 1;
-    for (int stage = 0; stage < 1 && s->foreseeing; ++stage) {
-        sklyanin_gyrostat_fit(&s->memory[stage]);
-        s->foreseeing = s->memory[stage].terms > 0;
-    }
-    s->pause = sklyanin_gyrostat_LANES;
-    if (!s->foreseeing) sklyanin_gyrostat_give_up(s);
-}
-
-/* Learn from a block: after one that failed single steps are made, the more the more often that happens. Recurrences
-   that fail repeatedly, or need more passes than steps by Runge-Kutta did, are given up. */
-static void sklyanin_gyrostat_learn_from(sklyanin_gyrostat_solver *s, int passes)
-{
-    if (passes > 0) {
-        s->setback /= 2;
-    } else {
-        s->setback = 2 * s->setback + sklyanin_gyrostat_LANES > 1000 ? 1000 : 2 * s->setback + sklyanin_gyrostat_LANES;
-        s->pause = s->setback;
-    }
-    if (!s->foreseeing) {
-        s->passes = passes > 0 ? passes : INT_MAX;
-    } else if (passes > s->passes || s->setback > 5 * sklyanin_gyrostat_LANES) {
-        sklyanin_gyrostat_give_up(s);
-    }
-}
-
-/* A single step, and the running mean of the evaluations that a stage of one takes. */
-static sklyanin_gyrostat_status sklyanin_gyrostat_single(sklyanin_gyrostat_solver *s)
-{
-    const size_t before = s->evaluations;
-    const sklyanin_gyrostat_status status = sklyanin_gyrostat_step(s, s->h);
-    s->effort += 0.125 * ((double)(s->evaluations - before) / 1 - s->effort);
-    return status;
-}
-
-/* Blocks of steps where they cost less than single steps, with at most as many passes over a block as 1 for each
-   evaluation in a single step. The results differ by round-off only. */
 sklyanin_gyrostat_status sklyanin_gyrostat_integrate(sklyanin_gyrostat_solver *s, double h, size_t steps)
 {
-    sklyanin_gyrostat_table table;
     sklyanin_gyrostat_status status = sklyanin_gyrostat_set_step(s, h);
-    for (int stage = 0; stage < 1; ++stage) table.fits[stage] = -1;
-    while (status == sklyanin_gyrostat_OK && steps > 0) {
-        if (steps >= sklyanin_gyrostat_LANES && s->pause == 0) sklyanin_gyrostat_choose_guess(s, steps);
-        if (steps >= sklyanin_gyrostat_LANES && s->pause == 0) {
-            sklyanin_gyrostat_refresh(s, &table);
-            const int passes = sklyanin_gyrostat_block(s, &table, (int)(1 * s->effort + 0.5));
-            sklyanin_gyrostat_learn_from(s, passes);
-            if (passes > 0) steps -= sklyanin_gyrostat_LANES;
-        } else {
-            if (s->pause > 0) --s->pause;
-            status = sklyanin_gyrostat_single(s);
-            if (status == sklyanin_gyrostat_OK) --steps;
-        }
-    }
+    for (; steps > 0 && status == sklyanin_gyrostat_OK; --steps) status = sklyanin_gyrostat_step(s, h);
     return status;
-}
-
-/* Members of an ensemble, each in its lane. */
-typedef struct {
-    sklyanin_gyrostat_lanes x[4], carry[4], coef[1][31];
-    sklyanin_gyrostat_lanes past[1][111][4]; /* solved values, in a ring */
-    sklyanin_gyrostat_lanes weight[1][40][4]; /* of past values, the latest first, for the next */
-    int latest;     /* the row of the latest values */
-    int count;      /* rows in use */
-    int order[1];   /* how many of them the extrapolation uses */
-    int terms[1];   /* how many of them the recurrences use */
-    int fits;       /* how often recurrences have been fitted */
-    int fitting[1]; /* whether they are the better guess */
-    int slow;       /* how many of the last steps took more than one iteration */
-    int patience;   /* how many of those before recurrences are fitted again */
-    int active[8];  /* whether the lane has a member that has not failed */
-    size_t left[8]; /* steps that are still to be made, where one has */
-    double gauge[8][1]; /* of each member */
-} sklyanin_gyrostat_group;
-
-/* The past values of a stage, the latest for k = 0. */
-static sklyanin_gyrostat_lanes *sklyanin_gyrostat_group_past(sklyanin_gyrostat_group *group, int stage, int k)
-{
-    const int row = group->latest + k;
-    return group->past[stage][row < 111 ? row : row - 111];
-}
-
-/* Guess the values of a stage by the recurrences of the members. */
-static void sklyanin_gyrostat_group_foresee(sklyanin_gyrostat_group *group, int stage, sklyanin_gyrostat_lanes y[restrict 4])
-{
-    memset(y, 0, 4 * sizeof y[0]);
-    for (int k = 0; k < group->terms[stage]; ++k) {
-        sklyanin_gyrostat_lanes *past = sklyanin_gyrostat_group_past(group, stage, k), *weight = group->weight[stage][k];
-        for (int i = 0; i < 4; ++i) {
-            sklyanin_gyrostat_EACH_LANE
-            for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane) y[i][lane] += weight[i][lane] * past[i][lane];
-        }
-    }
-}
-
-/* Extrapolate the values of a stage. */
-static void sklyanin_gyrostat_group_extrapolate(sklyanin_gyrostat_group *group, int stage, sklyanin_gyrostat_lanes y[restrict 4])
-{
-    const int order = group->order[stage];
-    double binomial = -1.0;
-    memcpy(y, group->x, 4 * sizeof y[0]);
-    if (order > 0) memset(y, 0, 4 * sizeof y[0]);
-    for (int k = 0; k < order; ++k) {
-        sklyanin_gyrostat_lanes *past = sklyanin_gyrostat_group_past(group, stage, k);
-        binomial *= -(double)(order - k) / (k + 1);
-        for (int i = 0; i < 4; ++i) {
-            sklyanin_gyrostat_EACH_LANE
-            for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane) y[i][lane] += binomial * past[i][lane];
-        }
-    }
-}
-
-/* The sum over members of the absolute values of all components. */
-static double sklyanin_gyrostat_group_sum(const sklyanin_gyrostat_group *group, sklyanin_gyrostat_lanes y[4])
-{
-    double sum = 0.0;
-    for (int i = 0; i < 4; ++i)
-        for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane) sum += group->active[lane] ? fabs(y[i][lane]) : 0.0;
-    return sum;
-}
-
-static void sklyanin_gyrostat_group_subtract(sklyanin_gyrostat_lanes y[restrict 4], sklyanin_gyrostat_lanes other[restrict 4])
-{
-    for (int i = 0; i < 4; ++i) {
-        sklyanin_gyrostat_EACH_LANE
-        for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane) y[i][lane] -= other[i][lane];
-    }
-}
-
-/* Choose the guess that would have been best for these values. */
-static void sklyanin_gyrostat_group_judge(sklyanin_gyrostat_group *group, int stage, sklyanin_gyrostat_lanes y[4])
-{
-    sklyanin_gyrostat_lanes row[8 + 1][4];
-    const int rows = group->count < 8 ? group->count : 8;
-    double least = HUGE_VAL;
-    memcpy(row[0], y, sizeof row[0]);
-    for (int k = 0; k < rows; ++k) memcpy(row[k + 1], sklyanin_gyrostat_group_past(group, stage, k), sizeof row[0]);
-    if (group->order[stage] == 0) group->order[stage] = 1;
-    for (int order = 1; order <= rows; ++order) { /* row[0] becomes the backward difference of this order */
-        for (int k = 0; k <= rows - order; ++k) sklyanin_gyrostat_group_subtract(row[k], row[k + 1]);
-        const double size = sklyanin_gyrostat_group_sum(group, row[0]);
-        if (size < least) {
-            least = size;
-            group->order[stage] = order;
-        }
-    }
-    if (group->terms[stage] == 0) return;
-    sklyanin_gyrostat_group_foresee(group, stage, row[0]);
-    sklyanin_gyrostat_group_subtract(row[0], y);
-    group->fitting[stage] = sklyanin_gyrostat_group_sum(group, row[0]) <= least;
-}
-
-/* Fit the recurrences of all members; with every time, wait longer before it is done again, and for long if it did not
-   help. */
-static void sklyanin_gyrostat_group_fit(sklyanin_gyrostat_group *group)
-{
-    sklyanin_gyrostat_memory memory;
-    const int helped = group->fits == 0 || group->fitting[0];
-    memory.count = 111;
-    for (int stage = 0; stage < 1; ++stage) {
-        int found = 1;
-        group->terms[stage] = 0;
-        for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane)
-            for (int i = 0; i < 4 && group->active[lane] && found; ++i) {
-                for (int k = 0; k < 111; ++k)
-                    memory.past[111 - 1 - k][i] = sklyanin_gyrostat_group_past(group, stage, k)[i][lane];
-                const int terms = sklyanin_gyrostat_train(&memory, i);
-                found = terms > 0;
-                if (terms > group->terms[stage]) group->terms[stage] = terms;
-                for (int k = 0; k < 40; ++k) group->weight[stage][k][i][lane] = memory.weight[k][i][0];
-            }
-        if (!found) group->terms[stage] = 0;
-        group->fitting[stage] = found;
-    }
-    ++group->fits;
-    group->slow = 0;
-    group->patience = helped && group->patience < 10000 ? 2 * group->patience + 150 : 100 * 150;
-}
-
-/* Replace guesses that are not near the last values, as sklyanin_gyrostat_near has it, by these; lane by lane. */
-static void sklyanin_gyrostat_stay_near(sklyanin_gyrostat_lanes y[restrict 4], sklyanin_gyrostat_lanes last[restrict 4])
-{
-    sklyanin_gyrostat_lanes distance = { 0.0 }, size = { 0.0 };
-    for (int i = 0; i < 4; ++i) {
-        sklyanin_gyrostat_EACH_LANE
-        for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane) {
-            distance[lane] += fabs(y[i][lane] - last[i][lane]);
-            size[lane] += fabs(last[i][lane]);
-        }
-    }
-    for (int i = 0; i < 4; ++i) {
-        sklyanin_gyrostat_EACH_LANE
-        for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane)
-            y[i][lane] = distance[lane] <= 4.0 * size[lane] ? y[i][lane] : last[i][lane];
-    }
-}
-
-/* Whether lanes are still to be solved after a correction of this size; those where nothing is finite leave the group.
-   bound is what remains in each lane. */
-static int sklyanin_gyrostat_group_open(sklyanin_gyrostat_group *group, const sklyanin_gyrostat_lanes size, const sklyanin_gyrostat_lanes previous,
-    double bend, sklyanin_gyrostat_lanes bound)
-{
-    int open = 0;
-    sklyanin_gyrostat_EACH_LANE
-    for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane)
-        bound[lane] = sklyanin_gyrostat_remaining(size[lane], bend, bound[lane]);
-    if (sklyanin_gyrostat_largest(bound) <= 1e-20) return 0;
-    for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane) {
-        const int solved = bound[lane] <= 1e-20 || (previous[lane] < 1e-8 && size[lane] < 1e-10);
-        if (!isfinite(size[lane])) group->active[lane] = 0;
-        open += group->active[lane] && !solved;
-    }
-    return open;
-}
-
-/* The guess for a stage: recurrences, or extrapolation; the state for members where that is not near. */
-static void sklyanin_gyrostat_group_predict(sklyanin_gyrostat_group *group, int stage, sklyanin_gyrostat_lanes y[4])
-{
-    if (group->fitting[stage]) sklyanin_gyrostat_group_foresee(group, stage, y);
-    else sklyanin_gyrostat_group_extrapolate(group, stage, y);
-    sklyanin_gyrostat_stay_near(y, group->x);
-}
-
-/* Newton's method for a stage, until the slowest lane is solved. The number of iterations; where that is the most
-   allowed, lanes that are not solved leave the group. */
-static int sklyanin_gyrostat_group_solve(sklyanin_gyrostat_group *group, int stage, sklyanin_gyrostat_model *model)
-{
-    sklyanin_gyrostat_lanes size, previous, bound;
-    double largest = HUGE_VAL, bend = 0.0;
-    int iterations = 0, open = 1;
-    for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane) size[lane] = bound[lane] = HUGE_VAL;
-    sklyanin_gyrostat_group_predict(group, stage, model->y);
-    for (; open > 0 && iterations < 20; ++iterations) {
-        memcpy(previous, size, sizeof size);
-        sklyanin_gyrostat_update(group->coef[stage], model, largest > 1e-05);
-        bend = largest > 1e-05 ? 0.0 : bend + largest;
-        for (int i = 0; i < 4; ++i) {
-            sklyanin_gyrostat_EACH_LANE
-            for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane)
-                model->residual[i][lane] =
-                    ((model->y[i][lane] - group->x[i][lane]) + model->displacement[i][lane]) - group->carry[i][lane];
-        }
-        sklyanin_gyrostat_correct(model, size);
-        open = sklyanin_gyrostat_group_open(group, size, previous, bend, bound);
-        largest = sklyanin_gyrostat_largest(size);
-    }
-    for (int lane = 0; lane < sklyanin_gyrostat_LANES && open > 0; ++lane)
-        group->active[lane] = group->active[lane] && bound[lane] <= 1e-20;
-    return iterations;
-}
-
-/* Add the increments, corrected to first order, in compensated arithmetic as for a single step. */
-static void sklyanin_gyrostat_group_advance(sklyanin_gyrostat_lanes x[restrict 4], sklyanin_gyrostat_lanes carry[restrict 4],
-    sklyanin_gyrostat_model *model)
-{
-    for (int i = 0; i < 4; ++i)
-        for (int j = 0; j < 4; ++j) {
-            sklyanin_gyrostat_EACH_LANE
-            for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane)
-                carry[i][lane] -= model->gain[i * 4 + j][lane] * model->residual[j][lane];
-        }
-    for (int i = 0; i < 4; ++i) {
-        sklyanin_gyrostat_EACH_LANE
-        for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane) {
-            const double change = model->increment[i][lane], sum = x[i][lane] + change, added = sum - x[i][lane];
-            const double small = ((x[i][lane] - (sum - added)) + (change - added)) + carry[i][lane];
-            x[i][lane] = sum + small;
-            carry[i][lane] = small - (x[i][lane] - sum);
-        }
-    }
-}
-
-/* Members that failed, or whose state is not near the one before the step or not finite, keep that one, and leave. How many
-   stay. */
-static int sklyanin_gyrostat_group_leave(sklyanin_gyrostat_group *group, sklyanin_gyrostat_lanes x[4], sklyanin_gyrostat_lanes carry[4],
-    size_t remaining)
-{
-    sklyanin_gyrostat_lanes moved = { 0.0 }, size = { 0.0 }, bad;
-    int active = 0;
-    for (int i = 0; i < 4; ++i) {
-        sklyanin_gyrostat_EACH_LANE
-        for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane) {
-            moved[lane] += fabs(group->x[i][lane] - x[i][lane]);
-            size[lane] += fabs(x[i][lane]);
-        }
-    }
-    for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane) bad[lane] = moved[lane] <= 4.0 * size[lane] ? 0.0 : 1.0;
-    for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane) active += group->active[lane];
-    if (active == sklyanin_gyrostat_LANES && !(sklyanin_gyrostat_largest(bad) > 0.0)) return active;
-    active = 0;
-    for (int lane = 0; lane < sklyanin_gyrostat_LANES; ++lane) {
-        group->active[lane] = group->active[lane] && !(bad[lane] > 0.0);
-        active += group->active[lane];
-        for (int i = 0; i < 4 && !group->active[lane]; ++i) {
-            group->x[i][lane] = x[i][lane];
-            group->carry[i][lane] = carry[i][lane];
-        }
-        if (!group->active[lane] && group->left[lane] == 0) group->left[lane] = remaining;
-    }
-    return active;
-}
-
-/* One step of all members, of as many as remain. How many members are left. */
-static int sklyanin_gyrostat_group_step(sklyanin_gyrostat_group *group, size_t remaining)
-{
-    sklyanin_gyrostat_lanes x[4], carry[4];
-    sklyanin_gyrostat_model model;
-    const int next = (group->latest > 0 ? group->latest : 111) - 1;
-    int most = 0;
-    memcpy(x, group->x, sizeof x);
-    memcpy(carry, group->carry, sizeof carry);
-    for (int stage = 0; stage < 1; ++stage) {
-        const int iterations = sklyanin_gyrostat_group_solve(group, stage, &model);
-        sklyanin_gyrostat_group_advance(group->x, group->carry, &model);
-        if (iterations > most) most = iterations;
-        if ((iterations > 1 && next % 8 == 0) || group->count < 8)
-            sklyanin_gyrostat_group_judge(group, stage, model.y);
-        memcpy(group->past[stage][next], model.y, sizeof model.y);
-    }
-    group->latest = next;
-    if (group->count < 111) ++group->count;
-    group->slow = most > 1 ? group->slow + 1 : 0;
-    if (group->slow > group->patience && group->count == 111 && remaining >= 800)
-        sklyanin_gyrostat_group_fit(group);
-    return sklyanin_gyrostat_group_leave(group, x, carry, remaining);
-}
-
-/* Put a member into a lane: its state, and its coefficients. */
-static sklyanin_gyrostat_status sklyanin_gyrostat_group_join(sklyanin_gyrostat_group *group, int lane, const sklyanin_gyrostat_params *params,
-    const double x0[4], double h)
-{
-    sklyanin_gyrostat_solver s;
-    sklyanin_gyrostat_status status = sklyanin_gyrostat_init(&s, params, x0);
-    if (status == sklyanin_gyrostat_OK) status = sklyanin_gyrostat_set_step(&s, h);
-    if (status != sklyanin_gyrostat_OK) return status;
-    for (int i = 0; i < 4; ++i) group->x[i][lane] = s.x[i];
-    for (int stage = 0; stage < 1; ++stage)
-        for (int k = 0; k < 31; ++k) group->coef[stage][k][lane] = s.coef[stage][k];
-    memcpy(group->gauge[lane], s.gauge, sizeof s.gauge);
-    group->active[lane] = 1;
-    return status;
-}
-
-/* The steps that a member has still to make after it left the group, by itself. */
-static sklyanin_gyrostat_status sklyanin_gyrostat_group_finish(const sklyanin_gyrostat_group *group, int lane, const sklyanin_gyrostat_params *params,
-    double x[4], double h)
-{
-    sklyanin_gyrostat_solver s;
-    sklyanin_gyrostat_status status = sklyanin_gyrostat_init_gauge(&s, params, x, group->gauge[lane]);
-    if (status != sklyanin_gyrostat_OK) return status;
-    for (int i = 0; i < 4; ++i) s.carry[i] = group->carry[i][lane];
-    status = sklyanin_gyrostat_integrate(&s, h, group->left[lane]);
-    memcpy(x, s.x, sizeof s.x);
-    return status;
-}
-
-/* The members from first on, as many as there are lanes. The first status that is not OK. */
-static sklyanin_gyrostat_status sklyanin_gyrostat_group_run(const sklyanin_gyrostat_params *params, double *x, size_t members, size_t first,
-    double h, size_t steps, unsigned char *status)
-{
-    sklyanin_gyrostat_group group;
-    sklyanin_gyrostat_status worst = sklyanin_gyrostat_OK, member[8];
-    const int count = members - first < sklyanin_gyrostat_LANES ? (int)(members - first) : sklyanin_gyrostat_LANES;
-    double state[4];
-    size_t left = steps;
-    memset(&group, 0, sizeof group);
-    for (int lane = 0; lane < count; ++lane) {
-        for (size_t i = 0; i < 4; ++i) state[i] = x[i * members + first + (size_t)lane];
-        member[lane] = sklyanin_gyrostat_group_join(&group, lane, params, state, h);
-    }
-    for (int active = count; left > 0 && active > 2; --left) active = sklyanin_gyrostat_group_step(&group, left);
-    for (int lane = 0; lane < count; ++lane) {
-        if (group.active[lane]) group.left[lane] = left;
-        for (int i = 0; i < 4; ++i) state[i] = group.x[i][lane];
-        if (member[lane] == sklyanin_gyrostat_OK) {
-            if (group.left[lane] > 0) member[lane] = sklyanin_gyrostat_group_finish(&group, lane, params, state, h);
-            for (size_t i = 0; i < 4; ++i) x[i * members + first + (size_t)lane] = state[i];
-        }
-        if (status != NULL) status[first + (size_t)lane] = (unsigned char)member[lane];
-        if (worst == sklyanin_gyrostat_OK) worst = member[lane];
-    }
-    return worst;
-}
-
-sklyanin_gyrostat_status sklyanin_gyrostat_ensemble(const sklyanin_gyrostat_params *params, double *x,
-                                                    size_t members, double h, size_t steps,
-                                                    unsigned char *status)
-{
-    sklyanin_gyrostat_status worst = isfinite(h) ? sklyanin_gyrostat_OK : sklyanin_gyrostat_BAD_ARGUMENT;
-    const sklyanin_gyrostat_params own = params != NULL ? *params : sklyanin_gyrostat_default_params;
-    size_t earliest = members;
-    if (x == NULL && members > 0) return sklyanin_gyrostat_BAD_ARGUMENT;
-#ifdef _OPENMP
-#pragma omp parallel for schedule(dynamic)
-#endif
-    for (size_t first = 0; first < members; first += sklyanin_gyrostat_LANES) {
-        const sklyanin_gyrostat_status group = sklyanin_gyrostat_group_run(&own, x, members, first, h, steps, status);
-        if (group == sklyanin_gyrostat_OK) continue;
-#ifdef _OPENMP
-#pragma omp critical
-#endif
-        if (first < earliest) {
-            earliest = first;
-            worst = group;
-        }
-    }
-    return worst;
-}
-
-#if defined(__clang__)
-#pragma clang diagnostic pop
-#endif
-
-/* the Hamiltonian */
-static void sklyanin_gyrostat_energy(const sklyanin_gyrostat_params *params, const double x[4],
-                                     double energy[restrict 1])
-{
-    (void)params;
-    const double S1 = x[1];
-    const double S2 = x[2];
-    const double S3 = x[3];
-    energy[0] = 1.0 / 5.0 * S2 + (1.0 / 10.0 * S1 + 0.5 * (1.0 / 3.0 * (S3 * S3) + (S1 * S1 + 0.5 * (S2 * S2))));
-}
-
-/* the Casimirs */
-static void sklyanin_gyrostat_casimir_values(const sklyanin_gyrostat_params *params, const double x[4],
-                                             double out[restrict 2])
-{
-    (void)params;
-    const double S0 = x[0];
-    const double S1 = x[1];
-    const double S2 = x[2];
-    const double S3 = x[3];
-    const double t1 = S3 * S3;
-    const double t2 = S2 * S2;
-    const double t3 = S1 * S1;
-    out[0] = t1 + (t2 + t3);
-    out[1] = 2.5 * t1 + (t3 + S0 * S0 + 1.5 * t2);
-}
-
-/* pi(x) grad H(x) */
-static void sklyanin_gyrostat_field(const sklyanin_gyrostat_params *params, const double x[4],
-                                    double out[restrict 4])
-{
-    (void)params;
-    const double S0 = x[0];
-    const double S1 = x[1];
-    const double S2 = x[2];
-    const double S3 = x[3];
-    const double t1 = 1.0 / 5.0 + 0.5 * S2;
-    const double t2 = 1.0 / 10.0 + S1;
-    const double t3 = S0 * S3;
-    const double t4 = S0 * S2;
-    const double t5 = S0 * S1;
-    out[0] = 3.0 * (S1 * S3 * t1) - 2.0 * (S2 * S3 * t2) - 1.0 / 3.0 * (S3 * (S1 * S2));
-    out[1] = 2.0 * (t3 * t1) - 2.0 / 3.0 * (S3 * t4);
-    out[2] = 2.0 / 3.0 * (S3 * t5) - 2.0 * (t2 * t3);
-    out[3] = 2.0 * (t4 * t2) - 2.0 * (t5 * t1);
-}
-
-double sklyanin_gyrostat_hamiltonian(const sklyanin_gyrostat_params *params, const double x[4])
-{
-    double energy[1];
-    sklyanin_gyrostat_energy(params != NULL ? params : &sklyanin_gyrostat_default_params, x, energy);
-    return energy[0];
-}
-
-void sklyanin_gyrostat_casimirs(const sklyanin_gyrostat_params *params, const double x[4], double out[])
-{
-    double value[2]; /* out may overlap x */
-    sklyanin_gyrostat_casimir_values(params != NULL ? params : &sklyanin_gyrostat_default_params, x, value);
-    for (int i = 0; i < 2; ++i) out[i] = value[i];
-}
-
-void sklyanin_gyrostat_vector_field(const sklyanin_gyrostat_params *params, const double x[4], double out[4])
-{
-    double value[4];
-    sklyanin_gyrostat_field(params != NULL ? params : &sklyanin_gyrostat_default_params, x, value);
-    memcpy(out, value, sizeof value);
 }
 
 const char *sklyanin_gyrostat_status_string(sklyanin_gyrostat_status status)
 {
-    switch (status) {
-    case sklyanin_gyrostat_OK: return "ok";
-    case sklyanin_gyrostat_NO_CONVERGENCE: return "no convergence: the step is too large";
-    case sklyanin_gyrostat_SINGULAR: return "singular Newton matrix: the step is too large";
-    case sklyanin_gyrostat_NOT_FINITE: return "not finite: overflow, or outside the domain";
-    case sklyanin_gyrostat_BAD_ARGUMENT: return "bad argument: a null pointer, or values that are not allowed";
-    }
-    return "unknown status";
+    static const char *const text[] = {
+        "ok",
+        "no convergence: the step is too large",
+        "singular Newton matrix: the step is too large",
+        "not finite: overflow, or outside the domain",
+        "bad argument: a null pointer, or values that are not allowed"
+    };
+    return (unsigned)status <= sklyanin_gyrostat_BAD_ARGUMENT ? text[status] : "unknown status";
 }
 
 size_t sklyanin_gyrostat_solver_size(void) { return sizeof(sklyanin_gyrostat_solver); }
 
 size_t sklyanin_gyrostat_solver_steps_done(const sklyanin_gyrostat_solver *s) { return s->steps; }
+
+/* ---- Ensembles ---- */
+sklyanin_gyrostat_status sklyanin_gyrostat_ensemble(const sklyanin_gyrostat_params *params, double *x,
+    size_t members, double h, size_t steps, unsigned char *status)
+{
+    sklyanin_gyrostat_status worst = isfinite(h) ? sklyanin_gyrostat_OK : sklyanin_gyrostat_BAD_ARGUMENT;
+    const sklyanin_gyrostat_params own = params != NULL ? *params : sklyanin_gyrostat_default_params;
+    if (x == NULL && members > 0) return sklyanin_gyrostat_BAD_ARGUMENT;
+    for (size_t m = 0; m < members; ++m) {
+        sklyanin_gyrostat_solver s;
+        double x0[sklyanin_gyrostat_DIM];
+        for (size_t i = 0; i < sklyanin_gyrostat_DIM; ++i) x0[i] = x[i * members + m];
+        sklyanin_gyrostat_status member = sklyanin_gyrostat_init(&s, &own, x0);
+        if (member == sklyanin_gyrostat_OK) {
+            member = sklyanin_gyrostat_integrate(&s, h, steps);
+            for (size_t i = 0; i < sklyanin_gyrostat_DIM; ++i) x[i * members + m] = s.x[i];
+        }
+        if (status != NULL) status[m] = (unsigned char)member;
+        if (worst == sklyanin_gyrostat_OK) worst = member;
+    }
+    return worst;
+}

@@ -7,17 +7,17 @@
 #   step: implicit in p, each path followed by its Taylor series to round-off
 #   one evaluation of the equation for p: 84 additions, 156 multiplications
 #
-# spec: sklyanin_gyrostat, sha256 94d457c9aa3e46aec56580365573c4c556c8a0c29c26c22b6d908e85ad6c708e
+# spec: sklyanin_gyrostat, sha256 e651a28cdc56907d5b5af694cc55378ac05a29592265e45944f163a14d4ec86f
 # to regenerate: phigen build sklyanin_gyrostat
 # DO NOT EDIT: change the spec and regenerate; edits are noticed by the checksum below.
 #
 # SPDX-License-Identifier: 0BSD
 # This file belongs to whoever generated it; phigen claims no rights in it.
-# body-sha256: a5426cf5fd98fb079a471e065ee7350b481ca09902eed58fb24d60bce5e4d7cd
+# body-sha256: 938c98d736a707a4c7dca890f68174ce8718c4b0a729d14915f28a0b63437cf6
 import numpy as np
 
 VERSION = "0.1.0"
-SPEC_SHA256 = "94d457c9aa3e46aec56580365573c4c556c8a0c29c26c22b6d908e85ad6c708e"
+SPEC_SHA256 = "e651a28cdc56907d5b5af694cc55378ac05a29592265e45944f163a14d4ec86f"
 DIM = 4
 ORDER = 4
 COORDINATES = ("S0", "S1", "S2", "S3",)

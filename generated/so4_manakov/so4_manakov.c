@@ -8,26 +8,35 @@
  *   step: implicit, Newton iteration with the analytic matrix
  *   one Newton iteration: 824 additions, 738 multiplications, 4 functions
  *
- * spec: so4_manakov, sha256 e5ef0b8ca1ea64cf1312e35d5c5ef2f6e1fc0f132fbd63bc25720a35fa45a507
+ * spec: so4_manakov, sha256 c60c8cfe639c4453a54f9110f2a3b99c614520fc0699d00cf0c68db1b9948be4
  * to regenerate: phigen build so4_manakov
  * DO NOT EDIT: change the spec and regenerate; edits are noticed by the checksum below.
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 1932f14c045df3cff68fb3013e0933a035aea1dda7d107f12f4e03a00095a4bd
+ *
+ *   1. The model
+ *   2. Compensated sums, linear equations
+ *   3. Starting guesses
+ *   4. The implicit step, by Newton's method
+ *   5. The choice of the gauge: multiples of Casimirs taken from H
+ *   6. The solver
+ *   7. Ensembles
+ * body-sha256: de6d3a7f323df7e7a605d005cd70f9a4af75cf1073e5b8dcd51a1df51807c63d
  */
 #include "so4_manakov.h"
 
 #include <float.h>
-#include <limits.h>
 #include <math.h>
-#include <stdint.h>
 #include <string.h>
 
+/* ---- The model ---- */
 const so4_manakov_params so4_manakov_default_params = { 0 };
 
-/* A step of size h is the composition of these fractions of it. */
-static const double so4_manakov_fractions[1] = { 1.0 };
+enum { so4_manakov_MAX_ITERATIONS = 20 }; /* of an inner solve */
+
+/* A correction is accepted when the error that it leaves is estimated to be below this. */
+#define so4_manakov_TOLERANCE 1e-20
 
 /* Functions to be kept apart: very long ones compile in quadratic time. */
 #if defined(__GNUC__)
@@ -39,42 +48,20 @@ static const double so4_manakov_fractions[1] = { 1.0 };
 /* (1 - w cot w)/s with w = sqrt(s)/2, coth for negative s: the function of the exponential bi-realisation. */
 static double so4_manakov_phi0(double s)
 {
-    if (fabs(s) < 0.25) {
-        double sum = 8.586062056277845e-15;
-        sum = sum * s + 3.3896802963225827e-13;
-        sum = sum * s + 1.3382536530684679e-11;
-        sum = sum * s + 5.284190138687493e-10;
-        sum = sum * s + 2.08767569878681e-08;
-        sum = sum * s + 8.267195767195768e-07;
-        sum = sum * s + 3.306878306878307e-05;
-        sum = sum * s + 0.001388888888888889;
-        sum = sum * s + 0.08333333333333333;
-        return sum;
-    }
+    if (fabs(s) < 0.25)
+        return (0.08333333333333333 + s * (0.001388888888888889 + s * (3.306878306878307e-05 + s *
+            (8.267195767195768e-07 + s * (2.08767569878681e-08 + s * (5.284190138687493e-10 + s *
+            (1.3382536530684679e-11 + s * (3.3896802963225827e-13 + s * 8.586062056277845e-15))))))));
     if (fabs(s) < 16.0) {
         const double pole = 1.0 / (39.47841760435743 - s);
-        double sum = 1.3621211117593843e-46;
-        sum = sum * s + 2.1509755511832569e-44;
-        sum = sum * s + 3.3966848266497805e-42;
-        sum = sum * s + 5.363831046655698e-40;
-        sum = sum * s + 8.470227328650247e-38;
-        sum = sum * s + 1.3375664093215244e-35;
-        sum = sum * s + 2.1122063323183885e-33;
-        sum = sum * s + 3.3354842988221443e-31;
-        sum = sum * s + 5.267262996834231e-29;
-        sum = sum * s + 8.318003195189264e-27;
-        sum = sum * s + 1.3136241807166534e-24;
-        sum = sum * s + 2.0747401878593604e-22;
-        sum = sum * s + 3.277539174701792e-20;
-        sum = sum * s + 5.180118196169724e-18;
-        sum = sum * s + 8.196052055691008e-16;
-        sum = sum * s + 1.3000482138698975e-13;
-        sum = sum * s + 2.0742872904166045e-11;
-        sum = sum * s + 3.357141926657451e-09;
-        sum = sum * s + 5.637370282876845e-07;
-        sum = sum * s + 0.000105641107053347;
-        sum = sum * s + 0.03267274151216445;
-        return 2.0 * pole + sum;
+        return 2.0 * pole + (0.03267274151216445 + s * (0.000105641107053347 + s * (5.637370282876845e-07
+            + s * (3.357141926657451e-09 + s * (2.0742872904166045e-11 + s * (1.3000482138698975e-13 + s *
+            (8.196052055691008e-16 + s * (5.180118196169724e-18 + s * (3.277539174701792e-20 + s *
+            (2.0747401878593604e-22 + s * (1.3136241807166534e-24 + s * (8.318003195189264e-27 + s *
+            (5.267262996834231e-29 + s * (3.3354842988221443e-31 + s * (2.1122063323183885e-33 + s *
+            (1.3375664093215244e-35 + s * (8.470227328650247e-38 + s * (5.363831046655698e-40 + s *
+            (3.3966848266497805e-42 + s * (2.1509755511832569e-44 + s *
+            1.3621211117593843e-46))))))))))))))))))));
     }
     const double w = 0.5 * sqrt(fabs(s)), c = w / (s > 0.0 ? tan(w) : tanh(w));
     const double phi0 = (1.0 - c) / s;
@@ -84,42 +71,20 @@ static double so4_manakov_phi0(double s)
 /* The derivative of (1 - w cot w)/s, w = sqrt(s)/2. */
 static double so4_manakov_phi1(double s)
 {
-    if (fabs(s) < 0.25) {
-        double sum = 1.9573818287022555e-15;
-        sum = sum * s + 6.868849645022276e-14;
-        sum = sum * s + 2.372776207425808e-12;
-        sum = sum * s + 8.029521918410807e-11;
-        sum = sum * s + 2.6420950693437467e-09;
-        sum = sum * s + 8.35070279514724e-08;
-        sum = sum * s + 2.48015873015873e-06;
-        sum = sum * s + 6.613756613756614e-05;
-        sum = sum * s + 0.001388888888888889;
-        return sum;
-    }
+    if (fabs(s) < 0.25)
+        return (0.001388888888888889 + s * (6.613756613756614e-05 + s * (2.48015873015873e-06 + s *
+            (8.35070279514724e-08 + s * (2.6420950693437467e-09 + s * (8.029521918410807e-11 + s *
+            (2.372776207425808e-12 + s * (6.868849645022276e-14 + s * 1.9573818287022555e-15))))))));
     if (fabs(s) < 16.0) {
         const double pole = 1.0 / (39.47841760435743 - s);
-        double sum = 1.8114038279637677e-47;
-        sum = sum * s + 2.7242422235187686e-45;
-        sum = sum * s + 4.0868535472481875e-43;
-        sum = sum * s + 6.114032687969605e-41;
-        sum = sum * s + 9.118512779314688e-39;
-        sum = sum * s + 1.3552363725840395e-36;
-        sum = sum * s + 2.0063496139822866e-34;
-        sum = sum * s + 2.957088865245744e-32;
-        sum = sum * s + 4.336129588468787e-30;
-        sum = sum * s + 6.320715596201077e-28;
-        sum = sum * s + 9.149803514708191e-26;
-        sum = sum * s + 1.3136241807166533e-23;
-        sum = sum * s + 1.8672661690734246e-21;
-        sum = sum * s + 2.6220313397614337e-19;
-        sum = sum * s + 3.626082737318807e-17;
-        sum = sum * s + 4.917631233414605e-15;
-        sum = sum * s + 6.500241069349487e-13;
-        sum = sum * s + 8.297149161666418e-11;
-        sum = sum * s + 1.0071425779972354e-08;
-        sum = sum * s + 1.127474056575369e-06;
-        sum = sum * s + 0.000105641107053347;
-        return 2.0 * pole * pole + sum;
+        return 2.0 * pole * pole + (0.000105641107053347 + s * (1.127474056575369e-06 + s *
+            (1.0071425779972354e-08 + s * (8.297149161666418e-11 + s * (6.500241069349487e-13 + s *
+            (4.917631233414605e-15 + s * (3.626082737318807e-17 + s * (2.6220313397614337e-19 + s *
+            (1.8672661690734246e-21 + s * (1.3136241807166533e-23 + s * (9.149803514708191e-26 + s *
+            (6.320715596201077e-28 + s * (4.336129588468787e-30 + s * (2.957088865245744e-32 + s *
+            (2.0063496139822866e-34 + s * (1.3552363725840395e-36 + s * (9.118512779314688e-39 + s *
+            (6.114032687969605e-41 + s * (4.0868535472481875e-43 + s * (2.7242422235187686e-45 + s *
+            1.8114038279637677e-47))))))))))))))))))));
     }
     const double w = 0.5 * sqrt(fabs(s)), c = w / (s > 0.0 ? tan(w) : tanh(w));
     const double phi0 = (1.0 - c) / s;
@@ -129,25 +94,17 @@ static double so4_manakov_phi1(double s)
 
 /* everything that depends on parameters and step size only */
 static void so4_manakov_prepare(const so4_manakov_params *params, const double gauge[1], double h,
-                                double coef[restrict 32])
+    double coef[restrict 32])
 {
     (void)params;
-    const double t1 = h * (h * h);
-    const double t2 = t1 * (1.0 / 4320.0 - 1.0 / 432.0 * gauge[0]);
-    const double t3 = 1.0 / 675.0 * gauge[0];
-    const double t4 = t1 * (1.0 / 5400.0 - t3);
-    const double t5 = t1 * (1.0 / 8100.0 - t3);
-    const double t6 = t1 * (1.0 / 17280.0 - 1.0 / 1728.0 * gauge[0]);
-    const double t7 = t1 * (3.0 / 31360.0 - 3.0 / 3136.0 * gauge[0]);
-    const double t8 = 1.0 / 4800.0 * gauge[0];
-    const double t9 = t1 * (1.0 / 28800.0 - t8);
-    const double t10 = t1 * (1.0 / 67200.0 - t8);
-    const double t11 = 1.0 / 3675.0 * gauge[0];
-    const double t12 = t1 * (1.0 / 29400.0 - t11);
-    const double t13 = 1.0 / 10800.0 * gauge[0];
-    const double t14 = t1 * (1.0 / 64800.0 - t13);
-    const double t15 = t1 * (1.0 / 44100.0 - t11);
-    const double t16 = t1 * (1.0 / 151200.0 - t13);
+    const double t1 = h * (h * h), t2 = t1 * (1.0 / 4320.0 - 1.0 / 432.0 * gauge[0]);
+    const double t3 = 1.0 / 675.0 * gauge[0], t4 = t1 * (1.0 / 5400.0 - t3);
+    const double t5 = t1 * (1.0 / 8100.0 - t3), t6 = t1 * (1.0 / 17280.0 - 1.0 / 1728.0 * gauge[0]);
+    const double t7 = t1 * (3.0 / 31360.0 - 3.0 / 3136.0 * gauge[0]), t8 = 1.0 / 4800.0 * gauge[0];
+    const double t9 = t1 * (1.0 / 28800.0 - t8), t10 = t1 * (1.0 / 67200.0 - t8);
+    const double t11 = 1.0 / 3675.0 * gauge[0], t12 = t1 * (1.0 / 29400.0 - t11);
+    const double t13 = 1.0 / 10800.0 * gauge[0], t14 = t1 * (1.0 / 64800.0 - t13);
+    const double t15 = t1 * (1.0 / 44100.0 - t11), t16 = t1 * (1.0 / 151200.0 - t13);
     const double t17 = t1 * (1.0 / 211680.0 - 1.0 / 21168.0 * gauge[0]);
     coef[0] = t1 * (-1.0 / 3780.0 + 4.0 / 1575.0 * gauge[0]);
     coef[1] = t1 * (1.0 / 3024.0 - 5.0 / 1512.0 * gauge[0]);
@@ -186,53 +143,36 @@ static void so4_manakov_prepare(const so4_manakov_params *params, const double g
 /* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
    increment, all with the momenta p = grad S_h(y) (part 1 of 3) */
 so4_manakov_APART static void so4_manakov_linearise_part1(const double coef[32], const double y[6],
-                                                          double displacement[restrict 6],
-                                                          double increment[restrict 6],
-                                                          double jacobian[restrict 36],
-                                                          double increment_jacobian[restrict 36],
-                                                          double work[restrict 130])
+    double displacement[restrict 6], double increment[restrict 6], double jacobian[restrict 36],
+    double increment_jacobian[restrict 36], double work[restrict 130])
 {
-    (void)jacobian;
-    (void)increment_jacobian;
-    const double x12 = y[0];
-    const double x13 = y[1];
-    const double x14 = y[2];
-    const double x23 = y[3];
-    const double x24 = y[4];
-    const double x34 = y[5];
-    const double t1 = x14 * x23;
-    const double t2 = x13 * x24;
+    (void)jacobian, (void)increment_jacobian;
+    const double x12 = y[0], x13 = y[1], x14 = y[2], x23 = y[3], x24 = y[4], x34 = y[5];
+    const double t1 = x14 * x23, t2 = x13 * x24;
     work[7] = coef[0] * t1 + coef[1] * t2;
-    const double t4 = x24 * x24;
-    const double t5 = x23 * x23;
-    const double t6 = x14 * x14;
-    const double t7 = x13 * x13;
-    work[11] = coef[3] * t4 + (coef[4] * t5 + coef[5] * t6 + (coef[2] + coef[6] * t7));
+    const double t3 = x24 * x24, t4 = x23 * x23, t5 = x14 * x14, t6 = x13 * x13;
+    work[11] = coef[3] * t3 + (coef[4] * t4 + coef[5] * t5 + (coef[2] + coef[6] * t6));
     work[119] = x34 * work[7] + x12 * work[11];
-    work[46] = coef[18] * t4 + (coef[19] + coef[9] * t7 + (coef[13] * t6 + coef[15] * t5));
+    work[46] = coef[18] * t3 + (coef[19] + coef[9] * t6 + (coef[13] * t5 + coef[15] * t4));
     work[118] = x12 * work[7] + x34 * work[46];
-    const double t10 = 2.0 * work[118];
-    const double t11 = work[119] + t10;
-    const double t12 = x12 * x34;
-    work[27] = coef[7] * t1 + coef[1] * t12;
-    const double t14 = x34 * x34;
-    const double t15 = x12 * x12;
-    work[28] = coef[9] * t14 + (coef[8] + coef[6] * t15 + (coef[10] * t5 + coef[11] * t6));
+    const double t7 = x12 * x34;
+    work[27] = coef[7] * t1 + coef[1] * t7;
+    const double t8 = x34 * x34, t9 = x12 * x12;
+    work[28] = coef[9] * t8 + (coef[8] + coef[6] * t9 + (coef[10] * t4 + coef[11] * t5));
     work[110] = x24 * work[27] + x13 * work[28];
-    work[43] = coef[18] * t14 + (coef[16] * t5 + coef[14] * t6 + (coef[17] + coef[3] * t15));
+    work[43] = coef[18] * t8 + (coef[16] * t4 + coef[14] * t5 + (coef[17] + coef[3] * t9));
     work[109] = x13 * work[27] + x24 * work[43];
-    const double t18 = 2.0 * work[109];
-    const double t19 = work[110] - t18;
-    work[35] = coef[7] * t2 + coef[0] * t12;
-    work[39] = coef[15] * t14 + (coef[16] * t4 + coef[10] * t7 + (coef[12] + coef[4] * t15));
+    work[35] = coef[7] * t2 + coef[0] * t7;
+    work[39] = coef[15] * t8 + (coef[16] * t3 + coef[10] * t6 + (coef[12] + coef[4] * t9));
     work[108] = x14 * work[35] + x23 * work[39];
-    const double t22 = work[118] * work[118] + (work[109] * work[109] + work[108] * work[108]);
-    work[34] = coef[13] * t14 + (coef[14] * t4 + coef[11] * t7 + (coef[12] + coef[5] * t15));
+    work[34] = coef[13] * t8 + (coef[14] * t3 + coef[11] * t6 + (coef[12] + coef[5] * t9));
     work[111] = x23 * work[35] + x14 * work[34];
-    const double t24 = 2.0 * work[108];
-    const double t25 = work[111] + t24;
-    const double t26 = work[119] * t11 + (work[110] * t19 + (t22 + work[111] * t25));
-    work[23] = so4_manakov_phi0(t26);
+    const double t10 = 2.0 * work[118], t11 = work[119] + t10, t12 = 2.0 * work[109];
+    const double t13 = work[110] - t12;
+    const double t14 = work[118] * work[118] + (work[109] * work[109] + work[108] * work[108]);
+    const double t15 = 2.0 * work[108], t16 = work[111] + t15;
+    const double t17 = work[119] * t11 + (work[110] * t13 + (t14 + work[111] * t16));
+    work[23] = so4_manakov_phi0(t17);
     work[33] = 0.5 * work[109];
     work[38] = 0.5 * work[110];
     work[22] = work[33] - work[38];
@@ -240,461 +180,400 @@ so4_manakov_APART static void so4_manakov_linearise_part1(const double coef[32],
     work[86] = 0.5 * work[119];
     work[85] = 0.5 * work[118];
     work[21] = work[86] + work[85];
-    const double t35 = x34 * work[47] + x24 * work[21] + (x12 * work[47] - x13 * work[21]);
-    const double t36 = work[22] * t35;
+    const double t18 = x34 * work[47] + x24 * work[21] + (x12 * work[47] - x13 * work[21]);
+    const double t19 = work[22] * t18;
     work[26] = 0.5 * work[108];
     work[42] = 0.5 * work[111];
     work[30] = work[26] + work[42];
-    const double t40 = x23 * work[21];
-    const double t41 = x34 * work[30];
-    const double t42 = x14 * work[21];
-    const double t43 = x12 * work[30];
-    const double t44 = t40 - t41 + (t42 - t43);
-    const double t45 = t43 - t42 + (t41 - t40);
-    const double t46 = t36 + work[30] * t44 + (t36 - work[30] * t45);
-    const double t47 = work[23] * t46;
-    const double t48 = work[119] - t10;
-    const double t49 = work[110] + t18;
-    const double t50 = work[111] - t24;
-    const double t51 = work[119] * t48 + (work[110] * t49 + (t22 + work[111] * t50));
-    work[1] = so4_manakov_phi0(t51);
+    const double t20 = x23 * work[21], t21 = x34 * work[30], t22 = x14 * work[21];
+    const double t23 = x12 * work[30], t24 = t20 - t21 + (t22 - t23), t25 = t23 - t22 + (t21 - t20);
+    const double t26 = t19 + work[30] * t24 + (t19 - work[30] * t25), t27 = work[23] * t26;
+    const double t28 = work[119] - t10, t29 = work[110] + t12, t30 = work[111] - t15;
+    const double t31 = work[119] * t28 + (work[110] * t29 + (t14 + work[111] * t30));
+    work[1] = so4_manakov_phi0(t31);
     work[18] = work[38] + work[33];
-    const double t54 = x34 * work[18];
+    const double t32 = x34 * work[18];
     work[19] = work[86] - work[85];
-    const double t56 = x12 * work[18];
-    const double t57 = t54 + x24 * work[19] + (x13 * work[19] - t56);
-    const double t58 = work[18] * t57;
+    const double t33 = x12 * work[18], t34 = t32 + x24 * work[19] + (x13 * work[19] - t33);
+    const double t35 = work[18] * t34;
     work[29] = work[26] - work[42];
     work[20] = work[85] - work[86];
     work[52] = work[42] - work[26];
-    const double t62 = x14 * work[20] + x12 * work[52] + (x34 * work[29] + x23 * work[19]);
-    const double t63 = work[29] * t62;
-    const double t64 = t56 + x13 * work[20] + (x24 * work[20] - t54);
-    const double t65 = work[18] * t64;
-    work[4] = t58 + t63 + (t63 - t65);
-    const double t67 = x13 * work[108] + x14 * work[109] - (x23 * work[110] + x24 * work[111]);
-    const double t68 = x23 * work[18];
-    const double t69 = x14 * work[18];
-    work[71] = t68 + x24 * work[52] + (x13 * work[52] - t69);
-    work[70] = x24 * work[29] - t68 + (x13 * work[29] + t69);
-    work[55] = work[29] * work[71] + work[19] * t64 + (work[52] * work[70] + work[20] * t57);
-    const double t73 = work[1] * work[55];
-    const double t74 = work[21] * t35;
+    const double t36 = x14 * work[20] + x12 * work[52] + (x34 * work[29] + x23 * work[19]);
+    const double t37 = work[29] * t36, t38 = t33 + x13 * work[20] + (x24 * work[20] - t32);
+    const double t39 = work[18] * t38;
+    work[4] = t35 + t37 + (t37 - t39);
+    const double t40 = x13 * work[108] + x14 * work[109] - (x23 * work[110] + x24 * work[111]);
+    const double t41 = x23 * work[18], t42 = x14 * work[18];
+    work[71] = t41 + x24 * work[52] + (x13 * work[52] - t42);
+    work[70] = x24 * work[29] - t41 + (x13 * work[29] + t42);
+    work[55] = work[29] * work[71] + work[19] * t38 + (work[52] * work[70] + work[20] * t34);
+    const double t43 = work[1] * work[55], t44 = work[21] * t18;
     work[69] = x14 * work[22] + x13 * work[30] + (x23 * work[22] - x24 * work[30]);
-    const double t76 = work[30] * work[69];
-    const double t77 = t74 - t76;
-    work[58] = t77 + t77;
-    const double t79 = x23 * work[119] - x34 * work[111] + (x14 * work[118] - x12 * work[108]);
-    const double t80 = work[19] * t62;
-    const double t81 = work[18] * work[70];
-    const double t82 = work[18] * work[71];
-    work[90] = t80 - t81 + (t80 + t82);
-    const double t84 = work[47] * work[69];
-    work[89] = t84 + work[21] * t45 + (t84 - work[21] * t44);
-    const double t86 = work[23] * work[89];
-    const double t87 = x34 * work[110] + x24 * work[119] - (x13 * work[118] + x12 * work[109]);
-    const double t88 = work[20] * t62;
-    work[98] = t88 - t82 + (t81 + t88);
-    const double t90 = x12 * work[110] - x13 * work[119] + (x24 * work[118] - x34 * work[109]);
-    const double t91 = t76 - t74;
-    work[99] = t91 + t91;
-    const double t93 = x12 * work[111] - x14 * work[119] + (x34 * work[108] - x23 * work[118]);
-    const double t94 = work[52] * t62;
-    work[101] = t94 - t58 + (t65 + t94);
-    const double t96 = x13 * work[111] - x14 * work[110] + (x23 * work[109] - x24 * work[108]);
+    const double t45 = work[30] * work[69], t46 = t44 - t45;
+    work[58] = t46 + t46;
+    const double t47 = x23 * work[119] - x34 * work[111] + (x14 * work[118] - x12 * work[108]);
+    const double t48 = work[19] * t36, t49 = work[18] * work[70], t50 = work[18] * work[71];
+    work[90] = t48 - t49 + (t48 + t50);
+    const double t51 = work[47] * work[69];
+    work[89] = t51 + work[21] * t25 + (t51 - work[21] * t24);
+    const double t52 = work[23] * work[89];
+    const double t53 = x34 * work[110] + x24 * work[119] - (x13 * work[118] + x12 * work[109]);
+    const double t54 = work[20] * t36;
+    work[98] = t54 - t50 + (t49 + t54);
+    const double t55 = x12 * work[110] - x13 * work[119] + (x24 * work[118] - x34 * work[109]);
+    const double t56 = t45 - t44;
+    work[99] = t56 + t56;
+    const double t57 = x12 * work[111] - x14 * work[119] + (x34 * work[108] - x23 * work[118]);
+    const double t58 = work[52] * t36;
+    work[101] = t58 - t35 + (t39 + t58);
+    const double t59 = x13 * work[111] - x14 * work[110] + (x23 * work[109] - x24 * work[108]);
     work[97] = work[22] * work[47];
     work[84] = work[30] * work[30];
-    const double t99 = work[97] - work[84];
-    work[45] = (t99 + t99) * work[23];
+    const double t60 = work[97] - work[84];
+    work[45] = (t60 + t60) * work[23];
     work[83] = work[52] * work[29];
     work[44] = work[18] * work[18];
-    const double t103 = work[83] - work[44];
-    work[6] = work[45] + (t103 + t103) * work[1];
+    const double t61 = work[83] - work[44];
+    work[6] = work[45] + (t61 + t61) * work[1];
     work[67] = 0.5 * x14;
     work[78] = 0.5 * x23;
     work[51] = work[67] - work[78];
-    const double t108 = work[51] * work[29];
+    const double t62 = work[51] * work[29];
     work[68] = 0.5 * x13;
     work[0] = 0.5 * x24;
     work[64] = work[68] + work[0];
     work[95] = work[64] * work[18];
     work[62] = (-0.5) * x13 - work[0];
     work[96] = work[62] * work[18];
-    const double t115 = 2.0 * work[119];
-    const double t116 = so4_manakov_phi1(t51);
-    work[61] = (t10 - t115) * t116;
+    const double t63 = 2.0 * work[119], t64 = so4_manakov_phi1(t31);
+    work[61] = (t10 - t63) * t64;
     work[59] = work[0] - work[68];
-    const double t119 = work[59] * work[22];
+    const double t65 = work[59] * work[22];
     work[91] = (-0.5) * x23 - work[67];
     work[88] = work[78] + work[67];
     work[49] = work[88] * work[30];
-    const double t123 = (t119 - work[91] * work[30] + (t119 + work[49])) * work[23];
-    const double t124 = so4_manakov_phi1(t26);
-    work[66] = (t115 + t10) * t124;
-    work[100] = t123 + t46 * work[66];
-    work[8] = (t108 - work[95] + (work[96] + t108)) * work[1] + work[61] * work[4] + work[100];
+    const double t66 = (t65 - work[91] * work[30] + (t65 + work[49])) * work[23];
+    const double t67 = so4_manakov_phi1(t17);
+    work[66] = (t63 + t10) * t67;
+    work[100] = t66 + t26 * work[66];
+    work[8] = (t62 - work[95] + (work[96] + t62)) * work[1] + work[61] * work[4] + work[100];
     work[25] = x12 * x24;
     work[24] = x13 * x34;
     work[9] = coef[23] * work[25] + coef[1] * work[24];
     work[75] = 0.5 * x34;
     work[48] = (-0.5) * x12 - work[75];
-    work[60] = 0.5 * t35;
-    const double t134 = work[48] * work[22] + work[60];
-    const double t135 = 2.0 * work[110];
-    work[57] = (t18 - t135) * t124;
-    work[104] = work[23] * (t134 + t134) + t46 * work[57];
+    work[60] = 0.5 * t18;
+    const double t68 = work[48] * work[22] + work[60], t69 = 2.0 * work[110];
+    work[57] = (t12 - t69) * t67;
+    work[104] = work[23] * (t68 + t68) + t26 * work[57];
     work[73] = 0.5 * x12;
     work[50] = work[75] - work[73];
-    work[63] = 0.5 * t57;
+    work[63] = 0.5 * t34;
     work[103] = work[50] * work[18] + work[63];
     work[53] = work[73] - work[75];
-    work[65] = 0.5 * t64;
+    work[65] = 0.5 * t38;
     work[102] = work[53] * work[18] + work[65];
-    const double t145 = work[1] * (work[103] - work[102]);
-    work[56] = (t135 + t18) * t116;
-    work[10] = work[104] + (t145 + work[4] * work[56]) - work[67];
+    const double t70 = work[1] * (work[103] - work[102]);
+    work[56] = (t69 + t12) * t64;
+    work[10] = work[104] + (t70 + work[4] * work[56]) - work[67];
     work[87] = work[78] - work[67];
     work[54] = work[87] * work[29];
-    work[81] = (work[119] + t48) * t116;
-    work[82] = (work[119] + t11) * t124;
-    work[105] = t123 + t46 * work[82];
+    work[81] = (work[119] + t28) * t64;
+    work[82] = (work[119] + t11) * t67;
+    work[105] = t66 + t26 * work[82];
     work[12] = (work[54] - work[96] + (work[54] + work[95])) * work[1] + work[4] * work[81] + work[105];
     work[40] = x12 * x13;
     work[41] = x24 * x34;
     work[13] = coef[20] * work[40] + coef[1] * work[41];
-    work[79] = (work[110] + t49) * t116;
+    work[79] = (work[110] + t29) * t64;
     work[77] = work[75] + work[73];
-    const double t159 = work[77] * work[22] - work[60];
-    work[80] = (work[110] + t19) * t124;
-    work[106] = work[23] * (t159 + t159) + t46 * work[80];
-    work[14] = work[78] + (work[4] * work[79] + t145 + work[106]);
+    const double t71 = work[77] * work[22] - work[60];
+    work[80] = (work[110] + t13) * t67;
+    work[106] = work[23] * (t71 + t71) + t26 * work[80];
+    work[14] = work[78] + (work[4] * work[79] + t70 + work[106]);
     work[31] = x12 * x23;
     work[32] = x14 * x34;
     work[15] = coef[22] * work[31] + coef[0] * work[32];
-    work[93] = 0.5 * t44;
-    work[92] = 0.5 * t45;
-    const double t168 = work[23] * (work[48] * work[30] + work[93] - (work[77] * work[30] + work[92]));
-    const double t169 = 2.0 * work[111];
-    work[74] = (t169 + t24) * t124;
-    work[107] = t168 + t46 * work[74];
-    work[94] = 0.5 * t62;
-    const double t173 = work[50] * work[29] + work[94];
-    work[72] = (t24 - t169) * t116;
-    work[16] = work[107] + (work[1] * (t173 + t173) + work[4] * work[72]) - work[68];
+    work[93] = 0.5 * t24;
+    work[92] = 0.5 * t25;
+    const double t72 = work[23] * (work[48] * work[30] + work[93] - (work[77] * work[30] + work[92]));
+    const double t73 = 2.0 * work[111];
+    work[74] = (t73 + t15) * t67;
+    work[107] = t72 + t26 * work[74];
+    work[94] = 0.5 * t36;
+    const double t74 = work[50] * work[29] + work[94];
+    work[72] = (t15 - t73) * t64;
+    work[16] = work[107] + (work[1] * (t74 + t74) + work[4] * work[72]) - work[68];
     work[37] = x23 * x34;
     work[36] = x12 * x14;
     work[17] = coef[0] * work[37] + coef[21] * work[36];
     work[2] = work[53] * work[29] - work[94];
-    work[3] = (work[111] + t50) * t116;
-    work[76] = (work[111] + t25) * t124;
-    work[5] = t168 + t46 * work[76];
-    displacement[0] = t47 + work[1] * work[4] - 0.5 * t67;
-    increment[0] = t67;
-    displacement[1] = t73 + work[23] * work[58] - 0.5 * t79;
-    increment[1] = t79;
-    displacement[2] = work[1] * work[90] + t86 - 0.5 * t87;
-    increment[2] = t87;
-    displacement[3] = work[1] * work[98] + t86 - 0.5 * t90;
-    increment[3] = t90;
-    displacement[4] = work[23] * work[99] + t73 - 0.5 * t93;
-    increment[4] = t93;
-    displacement[5] = t47 + work[1] * work[101] - 0.5 * t96;
-    increment[5] = t96;
+    work[3] = (work[111] + t30) * t64;
+    work[76] = (work[111] + t16) * t67;
+    work[5] = t72 + t26 * work[76];
+    displacement[0] = t27 + work[1] * work[4] - 0.5 * t40;
+    increment[0] = t40;
+    displacement[1] = t43 + work[23] * work[58] - 0.5 * t47;
+    increment[1] = t47;
+    displacement[2] = work[1] * work[90] + t52 - 0.5 * t53;
+    increment[2] = t53;
+    displacement[3] = work[1] * work[98] + t52 - 0.5 * t55;
+    increment[3] = t55;
+    displacement[4] = work[23] * work[99] + t43 - 0.5 * t57;
+    increment[4] = t57;
+    displacement[5] = t27 + work[1] * work[101] - 0.5 * t59;
+    increment[5] = t59;
 }
 
 /* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
    increment, all with the momenta p = grad S_h(y) (part 2 of 3) */
 so4_manakov_APART static void so4_manakov_linearise_part2(const double coef[32], const double y[6],
-                                                          double displacement[restrict 6],
-                                                          double increment[restrict 6],
-                                                          double jacobian[restrict 36],
-                                                          double increment_jacobian[restrict 36],
-                                                          double work[restrict 130])
+    double displacement[restrict 6], double increment[restrict 6], double jacobian[restrict 36],
+    double increment_jacobian[restrict 36], double work[restrict 130])
 {
-    (void)displacement;
-    (void)increment;
-    const double x13 = y[1];
-    const double x14 = y[2];
-    const double x23 = y[3];
-    const double x24 = y[4];
-    const double t183 = work[0] + (work[1] * (work[2] + work[2]) + work[3] * work[4] + work[5]);
-    const double t184 = work[18] * work[19];
-    const double t185 = work[18] * work[20];
-    const double t186 = (t184 - t185) * work[1];
-    const double t187 = work[21] * work[22];
-    const double t188 = (t187 + t187) * work[23];
+    (void)displacement, (void)increment;
+    const double x13 = y[1], x14 = y[2], x23 = y[3], x24 = y[4];
+    const double t1 = work[0] + (work[1] * (work[2] + work[2]) + work[3] * work[4] + work[5]);
+    const double t2 = work[18] * work[19], t3 = work[18] * work[20], t4 = (t2 - t3) * work[1];
+    const double t5 = work[21] * work[22], t6 = (t5 + t5) * work[23];
     work[114] = coef[26] * work[24] + coef[1] * work[25];
-    const double t190 = x13 * x14;
-    const double t191 = x23 * x24;
-    work[115] = coef[24] * t190 + coef[7] * t191;
-    const double t193 = x13 * x23;
-    const double t194 = x14 * x24;
-    work[116] = coef[25] * t193 + coef[7] * t194;
-    const double t196 = work[20] * work[29];
-    const double t197 = work[30] * work[21];
-    const double t198 = (t197 + t197) * work[23];
-    const double t199 = (t196 + t196) * work[1] + t198;
+    const double t7 = x13 * x14, t8 = x23 * x24;
+    work[115] = coef[24] * t7 + coef[7] * t8;
+    const double t9 = x13 * x23, t10 = x14 * x24;
+    work[116] = coef[25] * t9 + coef[7] * t10;
+    const double t11 = work[20] * work[29], t12 = work[30] * work[21], t13 = (t12 + t12) * work[23];
+    const double t14 = (t11 + t11) * work[1] + t13;
     work[113] = coef[0] * work[31] + coef[28] * work[32];
-    work[121] = coef[7] * t193 + coef[27] * t194;
-    const double t202 = work[19] * work[29];
-    const double t203 = t198 + (t202 + t202) * work[1];
+    work[121] = coef[7] * t9 + coef[27] * t10;
+    const double t15 = work[19] * work[29], t16 = t13 + (t15 + t15) * work[1];
     work[112] = coef[0] * work[36] + coef[30] * work[37];
-    work[120] = coef[7] * t190 + coef[29] * t191;
+    work[120] = coef[7] * t7 + coef[29] * t8;
     work[123] = coef[1] * work[40] + coef[31] * work[41];
-    const double t207 = work[44] + work[29] * work[29];
-    const double t208 = work[45] + (t207 + t207) * work[1] + (work[46] * work[8] + work[123] * work[10] + (work[113] * t183 + work[112] * work[16] + (work[7] * work[12] + work[114] * work[14])));
-    const double t209 = work[21] * work[47];
-    const double t210 = (t209 + t209) * work[23];
-    const double t211 = work[48] * work[21];
-    const double t212 = t211 - work[49];
-    const double t213 = work[50] * work[20];
-    const double t214 = work[51] * work[52];
-    const double t215 = work[53] * work[19];
-    const double t216 = (t213 + t214 + (work[54] + t215)) * work[1];
-    const double t217 = t216 + work[55] * work[56];
-    const double t218 = (t212 + t212) * work[23] + work[57] * work[58] + t217;
-    const double t219 = work[59] * work[21] + work[60];
-    const double t220 = work[23] * (t219 + t219);
-    const double t221 = work[61] * work[55] + work[1] * (work[62] * work[20] + work[63] + (work[64] * work[19] - work[65]));
-    const double t222 = t220 + work[66] * work[58] + t221 - work[67];
-    const double t223 = work[68] - work[0];
-    const double t224 = 0.5 * work[69];
-    const double t225 = t223 * work[30] + t224;
-    const double t226 = work[23] * (t225 + t225);
-    const double t227 = 0.5 * work[70];
-    const double t228 = 0.5 * work[71];
-    const double t229 = work[72] * work[55] + work[1] * (work[64] * work[52] - t227 + (work[62] * work[29] + t228));
-    const double t230 = work[73] + (work[74] * work[58] - t226 + t229);
-    const double t231 = (-0.5) * x24 - work[68];
-    const double t232 = work[3] * work[55] + work[1] * (t231 * work[52] + t227 + (work[64] * work[29] - t228));
-    const double t233 = work[75] + (t232 + (work[58] * work[76] - t226));
-    const double t234 = work[77] * work[21];
-    const double t235 = (-0.5) * x14 - work[78];
-    const double t236 = t235 * work[30];
-    const double t237 = t234 - t236;
-    const double t238 = t216 + work[79] * work[55];
-    const double t239 = (t237 + t237) * work[23] + work[80] * work[58] + t238;
-    const double t240 = work[55] * work[81] + work[1] * (work[64] * work[20] - work[63] + (work[62] * work[19] + work[65]));
-    const double t241 = t220 + work[82] * work[58] + t240 - work[78];
-    const double t242 = work[20] * work[19];
-    const double t243 = t242 + work[83];
-    const double t244 = (t243 + t243) * work[1];
-    const double t245 = work[21] * work[21];
-    const double t246 = work[84] + t245;
-    const double t247 = (t246 + t246) * work[23];
-    const double t248 = t244 - t247;
-    const double t249 = work[18] * work[52];
-    const double t250 = work[18] * work[29];
-    const double t251 = (t249 - t250) * work[1];
-    const double t252 = work[30] * work[22];
-    const double t253 = (t252 + t252) * work[23];
-    const double t254 = (t250 - t249) * work[1];
-    const double t255 = t244 + t247;
-    const double t256 = (t185 - t184) * work[1];
-    const double t257 = work[52] * work[19];
-    const double t258 = t198 + (t257 + t257) * work[1];
-    const double t259 = work[87] * work[18] + t228;
-    const double t260 = work[51] * work[18] + t227;
-    const double t261 = work[1] * (t259 - t260);
-    const double t262 = work[88] * work[47] - t224;
-    const double t263 = work[89] * work[57] + work[23] * (t262 + t262);
-    const double t264 = work[73] + (work[90] * work[56] + t261 + t263);
-    const double t265 = work[23] * (work[91] * work[21] + work[92] - (work[88] * work[21] + work[93]));
-    const double t266 = work[89] * work[66] + t265;
-    const double t267 = work[51] * work[19] - work[94];
-    const double t268 = work[68] + (t266 + (work[61] * work[90] + work[1] * (t267 + t267)));
-    const double t269 = t231 * work[18];
-    const double t270 = t223 * work[47];
-    const double t271 = (t270 - t211 + (t270 + t234)) * work[23];
-    const double t272 = t271 + work[89] * work[76];
-    const double t273 = (t215 + work[95] + (t215 - t269)) * work[1] + work[3] * work[90] + t272;
-    const double t274 = t271 + work[89] * work[74];
-    const double t275 = work[50] * work[19];
-    const double t276 = t274 + ((t275 - work[95] + (work[96] + t275)) * work[1] + work[72] * work[90]);
-    const double t277 = t235 * work[47] + t224;
-    const double t278 = work[23] * (t277 + t277) + work[89] * work[80];
-    const double t279 = work[79] * work[90] + t261 + t278 - work[75];
-    const double t280 = work[87] * work[19] + work[94];
-    const double t281 = t265 + work[89] * work[82];
-    const double t282 = work[90] * work[81] + work[1] * (t280 + t280) + t281 - work[0];
-    const double t283 = work[30] * work[47];
-    const double t284 = (t283 + t283) * work[23];
-    const double t285 = t242 - work[44];
-    const double t286 = work[97] - t245;
-    const double t287 = (t286 + t286) * work[23];
-    const double t288 = (t285 + t285) * work[1] + t287;
-    const double t289 = work[19] * work[19] + work[44];
-    const double t290 = (t289 + t289) * work[1] + t287 + (work[120] * t264 + work[112] * t268 + (work[35] * t273 + work[39] * t276 + (work[15] * t282 + work[116] * t279)));
-    const double t291 = work[20] * work[52];
-    const double t292 = t198 + (t291 + t291) * work[1];
-    const double t293 = work[1] * (t260 - t259);
-    const double t294 = work[75] + (t263 + (work[98] * work[56] + t293));
-    const double t295 = work[51] * work[20] + work[94];
-    const double t296 = work[1] * (t295 + t295) + work[98] * work[61] + t266 - work[0];
-    const double t297 = work[53] * work[20];
-    const double t298 = t272 + ((t297 - work[95] + (t297 + t269)) * work[1] + work[98] * work[3]);
-    const double t299 = (t213 - work[96] + (t213 + work[95])) * work[1] + work[98] * work[72] + t274;
-    const double t300 = work[87] * work[20] - work[94];
-    const double t301 = work[68] + (t281 + (work[98] * work[81] + work[1] * (t300 + t300)));
-    const double t302 = work[98] * work[79] + t293 + t278 - work[73];
-    const double t303 = work[20] * work[20] + work[44];
-    const double t304 = (t303 + t303) * work[1] + t287 + (work[113] * t296 + work[121] * t294 + (work[34] * t298 + work[35] * t299 + (work[17] * t301 + work[115] * t302)));
-    const double t305 = work[49] - t211;
-    const double t306 = t217 + ((t305 + t305) * work[23] + work[99] * work[57]);
-    const double t307 = work[78] + (work[99] * work[66] - t220 + t221);
-    const double t308 = t236 - t234;
-    const double t309 = t238 + ((t308 + t308) * work[23] + work[99] * work[80]);
-    const double t310 = work[67] + (work[99] * work[82] - t220 + t240);
-    const double t311 = work[99] * work[74] + t226 + t229 - work[75];
-    const double t312 = t226 + work[99] * work[76] + t232 - work[73];
-    const double t313 = work[52] * work[52] + work[44];
-    const double t314 = work[100] + ((t214 + work[95] + (t214 - work[96])) * work[1] + work[101] * work[61]);
-    const double t315 = work[1] * (work[102] - work[103]);
-    const double t316 = t315 + work[101] * work[56] + work[104] - work[78];
-    const double t317 = work[87] * work[52];
-    const double t318 = (t317 - work[95] + (t317 + work[96])) * work[1] + work[101] * work[81] + work[105];
-    const double t319 = work[67] + (work[106] + (work[101] * work[79] + t315));
-    const double t320 = work[50] * work[52] - work[94];
-    const double t321 = work[0] + (work[107] + (work[101] * work[72] + work[1] * (t320 + t320)));
-    const double t322 = work[53] * work[52] + work[94];
-    const double t323 = work[101] * work[3] + work[1] * (t322 + t322) + work[5] - work[68];
-    const double t324 = (t313 + t313) * work[1] + work[45] + (work[7] * t314 + work[9] * t316 + (work[11] * t318 + work[13] * t319 + (work[15] * t321 + work[17] * t323)));
+    const double t17 = work[44] + work[29] * work[29];
+    const double t18 = work[45] + (t17 + t17) * work[1] + (work[46] * work[8] + work[123] * work[10]
+        + (work[113] * t1 + work[112] * work[16] + (work[7] * work[12] + work[114] * work[14])));
+    const double t19 = work[21] * work[47], t20 = (t19 + t19) * work[23], t21 = work[48] * work[21];
+    const double t22 = t21 - work[49], t23 = work[50] * work[20], t24 = work[51] * work[52];
+    const double t25 = work[53] * work[19], t26 = (t23 + t24 + (work[54] + t25)) * work[1];
+    const double t27 = t26 + work[55] * work[56];
+    const double t28 = (t22 + t22) * work[23] + work[57] * work[58] + t27;
+    const double t29 = work[59] * work[21] + work[60], t30 = work[23] * (t29 + t29);
+    const double t31 = work[61] * work[55] + work[1] * (work[62] * work[20] + work[63] + (work[64] * work[19]
+        - work[65]));
+    const double t32 = t30 + work[66] * work[58] + t31 - work[67], t33 = work[68] - work[0];
+    const double t34 = 0.5 * work[69], t35 = t33 * work[30] + t34, t36 = work[23] * (t35 + t35);
+    const double t37 = 0.5 * work[70], t38 = 0.5 * work[71];
+    const double t39 = work[72] * work[55] + work[1] * (work[64] * work[52] - t37 + (work[62] * work[29]
+        + t38));
+    const double t40 = work[73] + (work[74] * work[58] - t36 + t39), t41 = (-0.5) * x24 - work[68];
+    const double t42 = work[3] * work[55] + work[1] * (t41 * work[52] + t37 + (work[64] * work[29] - t38));
+    const double t43 = work[75] + (t42 + (work[58] * work[76] - t36)), t44 = work[77] * work[21];
+    const double t45 = (-0.5) * x14 - work[78], t46 = t45 * work[30], t47 = t44 - t46;
+    const double t48 = t26 + work[79] * work[55];
+    const double t49 = (t47 + t47) * work[23] + work[80] * work[58] + t48;
+    const double t50 = work[55] * work[81] + work[1] * (work[64] * work[20] - work[63] + (work[62] * work[19]
+        + work[65]));
+    const double t51 = t30 + work[82] * work[58] + t50 - work[78], t52 = work[20] * work[19];
+    const double t53 = t52 + work[83], t54 = (t53 + t53) * work[1], t55 = work[21] * work[21];
+    const double t56 = work[84] + t55, t57 = (t56 + t56) * work[23], t58 = t54 - t57;
+    const double t59 = work[18] * work[52], t60 = work[18] * work[29], t61 = (t59 - t60) * work[1];
+    const double t62 = work[30] * work[22], t63 = (t62 + t62) * work[23];
+    const double t64 = (t60 - t59) * work[1], t65 = t54 + t57, t66 = (t3 - t2) * work[1];
+    const double t67 = work[52] * work[19], t68 = t13 + (t67 + t67) * work[1];
+    const double t69 = work[87] * work[18] + t38, t70 = work[51] * work[18] + t37;
+    const double t71 = work[1] * (t69 - t70), t72 = work[88] * work[47] - t34;
+    const double t73 = work[89] * work[57] + work[23] * (t72 + t72);
+    const double t74 = work[73] + (work[90] * work[56] + t71 + t73);
+    const double t75 = work[23] * (work[91] * work[21] + work[92] - (work[88] * work[21] + work[93]));
+    const double t76 = work[89] * work[66] + t75, t77 = work[51] * work[19] - work[94];
+    const double t78 = work[68] + (t76 + (work[61] * work[90] + work[1] * (t77 + t77)));
+    const double t79 = t41 * work[18], t80 = t33 * work[47];
+    const double t81 = (t80 - t21 + (t80 + t44)) * work[23], t82 = t81 + work[89] * work[76];
+    const double t83 = (t25 + work[95] + (t25 - t79)) * work[1] + work[3] * work[90] + t82;
+    const double t84 = t81 + work[89] * work[74], t85 = work[50] * work[19];
+    const double t86 = t84 + ((t85 - work[95] + (work[96] + t85)) * work[1] + work[72] * work[90]);
+    const double t87 = t45 * work[47] + t34, t88 = work[23] * (t87 + t87) + work[89] * work[80];
+    const double t89 = work[79] * work[90] + t71 + t88 - work[75];
+    const double t90 = work[87] * work[19] + work[94], t91 = t75 + work[89] * work[82];
+    const double t92 = work[90] * work[81] + work[1] * (t90 + t90) + t91 - work[0];
+    const double t93 = work[30] * work[47], t94 = (t93 + t93) * work[23], t95 = t52 - work[44];
+    const double t96 = work[97] - t55, t97 = (t96 + t96) * work[23];
+    const double t98 = (t95 + t95) * work[1] + t97, t99 = work[19] * work[19] + work[44];
+    const double t100 = (t99 + t99) * work[1] + t97 + (work[120] * t74 + work[112] * t78 + (work[35] * t83
+        + work[39] * t86 + (work[15] * t92 + work[116] * t89)));
+    const double t101 = work[20] * work[52], t102 = t13 + (t101 + t101) * work[1];
+    const double t103 = work[1] * (t70 - t69);
+    const double t104 = work[75] + (t73 + (work[98] * work[56] + t103));
+    const double t105 = work[51] * work[20] + work[94];
+    const double t106 = work[1] * (t105 + t105) + work[98] * work[61] + t76 - work[0];
+    const double t107 = work[53] * work[20];
+    const double t108 = t82 + ((t107 - work[95] + (t107 + t79)) * work[1] + work[98] * work[3]);
+    const double t109 = (t23 - work[96] + (t23 + work[95])) * work[1] + work[98] * work[72] + t84;
+    const double t110 = work[87] * work[20] - work[94];
+    const double t111 = work[68] + (t91 + (work[98] * work[81] + work[1] * (t110 + t110)));
+    const double t112 = work[98] * work[79] + t103 + t88 - work[73];
+    const double t113 = work[20] * work[20] + work[44];
+    const double t114 = (t113 + t113) * work[1] + t97 + (work[113] * t106 + work[121] * t104
+        + (work[34] * t108 + work[35] * t109 + (work[17] * t111 + work[115] * t112)));
+    const double t115 = work[49] - t21;
+    const double t116 = t27 + ((t115 + t115) * work[23] + work[99] * work[57]);
+    const double t117 = work[78] + (work[99] * work[66] - t30 + t31), t118 = t46 - t44;
+    const double t119 = t48 + ((t118 + t118) * work[23] + work[99] * work[80]);
+    const double t120 = work[67] + (work[99] * work[82] - t30 + t50);
+    const double t121 = work[99] * work[74] + t36 + t39 - work[75];
+    const double t122 = t36 + work[99] * work[76] + t42 - work[73];
+    const double t123 = work[52] * work[52] + work[44];
+    const double t124 = work[100] + ((t24 + work[95] + (t24 - work[96])) * work[1] + work[101] * work[61]);
+    const double t125 = work[1] * (work[102] - work[103]);
+    const double t126 = t125 + work[101] * work[56] + work[104] - work[78];
+    const double t127 = work[87] * work[52];
+    const double t128 = (t127 - work[95] + (t127 + work[96])) * work[1] + work[101] * work[81] + work[105];
+    const double t129 = work[67] + (work[106] + (work[101] * work[79] + t125));
+    const double t130 = work[50] * work[52] - work[94];
+    const double t131 = work[0] + (work[107] + (work[101] * work[72] + work[1] * (t130 + t130)));
+    const double t132 = work[53] * work[52] + work[94];
+    const double t133 = work[101] * work[3] + work[1] * (t132 + t132) + work[5] - work[68];
+    const double t134 = (t123 + t123) * work[1] + work[45] + (work[7] * t124 + work[9] * t126
+        + (work[11] * t128 + work[13] * t129 + (work[15] * t131 + work[17] * t133)));
     work[129] = x14 * work[9];
     work[127] = x13 * work[15];
     work[124] = x24 * work[17];
     work[117] = x23 * work[13];
-    const double t329 = x14 * work[27];
-    const double t330 = x13 * work[35];
-    const double t331 = x24 * work[35];
-    const double t332 = x23 * work[27];
+    const double t135 = x14 * work[27], t136 = x13 * work[35], t137 = x24 * work[35];
+    const double t138 = x23 * work[27];
     work[122] = x14 * work[123];
     work[125] = x13 * work[112];
     work[126] = x24 * work[113];
     work[128] = x23 * work[114];
-    jacobian[0] = 1.0 + (work[6] + (work[7] * work[8] + work[9] * work[10] + (work[11] * work[12] + work[13] * work[14] + (work[15] * work[16] + work[17] * t183))));
-    jacobian[1] = t186 - t188 - work[26] + (work[114] * work[8] + work[27] * work[10] + (work[115] * t183 + work[116] * work[16] + (work[13] * work[12] + work[28] * work[14])));
-    jacobian[2] = t199 - work[33] + (work[113] * work[8] + work[121] * work[10] + (work[34] * t183 + work[35] * work[16] + (work[17] * work[12] + work[115] * work[14])));
-    jacobian[3] = work[38] + t203 + (work[112] * work[8] + work[120] * work[10] + (work[39] * work[16] + work[35] * t183 + (work[15] * work[12] + work[116] * work[14])));
-    jacobian[4] = work[42] + (t186 + t188) + (work[123] * work[8] + work[43] * work[10] + (work[9] * work[12] + work[27] * work[14] + (work[120] * work[16] + work[121] * t183)));
-    jacobian[5] = t208;
-    jacobian[6] = work[26] + (t186 + t210) + (work[9] * t218 + work[7] * t222 + (work[15] * t230 + work[17] * t233 + (work[13] * t239 + work[11] * t241)));
-    jacobian[7] = 1.0 + (t248 + (work[27] * t218 + work[114] * t222 + (work[28] * t239 + work[13] * t241 + (work[115] * t233 + work[116] * t230))));
-    jacobian[8] = t251 - t253 - work[85] + (work[121] * t218 + work[113] * t222 + (work[34] * t233 + work[35] * t230 + (work[115] * t239 + work[17] * t241)));
-    jacobian[9] = t254 - t253 - work[86] + (work[120] * t218 + work[112] * t222 + (work[116] * t239 + work[15] * t241 + (work[39] * t230 + work[35] * t233)));
-    jacobian[10] = t255 + (work[43] * t218 + work[123] * t222 + (work[120] * t230 + work[121] * t233 + (work[27] * t239 + work[9] * t241)));
-    jacobian[11] = work[42] + (t210 + t256) + (work[123] * t218 + work[46] * t222 + (work[114] * t239 + work[7] * t241 + (work[113] * t233 + work[112] * t230)));
-    jacobian[12] = work[33] + t258 + (work[9] * t264 + work[7] * t268 + (work[17] * t273 + work[15] * t276 + (work[13] * t279 + work[11] * t282)));
-    jacobian[17] = t203 - work[38] + (work[123] * t264 + work[46] * t268 + (work[112] * t276 + work[113] * t273 + (work[114] * t279 + work[7] * t282)));
-    jacobian[13] = work[85] + (t284 + t251) + (work[114] * t268 + work[27] * t264 + (work[115] * t273 + work[116] * t276 + (work[13] * t282 + work[28] * t279)));
-    jacobian[16] = t251 - t284 - work[86] + (work[43] * t264 + work[123] * t268 + (work[121] * t273 + work[120] * t276 + (work[27] * t279 + work[9] * t282)));
-    jacobian[14] = 1.0 + (t288 + (work[113] * t268 + work[121] * t264 + (work[34] * t273 + work[35] * t276 + (work[115] * t279 + work[17] * t282))));
-    jacobian[15] = t290;
-    jacobian[18] = t292 - work[38] + (work[9] * t294 + work[7] * t296 + (work[17] * t298 + work[15] * t299 + (work[11] * t301 + work[13] * t302)));
-    jacobian[19] = work[86] + (t284 + t254) + (work[114] * t296 + work[27] * t294 + (work[116] * t299 + work[115] * t298 + (work[13] * t301 + work[28] * t302)));
-    jacobian[21] = 1.0 + (t288 + (work[112] * t296 + work[120] * t294 + (work[39] * t299 + work[35] * t298 + (work[15] * t301 + work[116] * t302))));
-    jacobian[22] = t254 - t284 - work[85] + (work[43] * t294 + work[123] * t296 + (work[121] * t298 + work[120] * t299 + (work[9] * t301 + work[27] * t302)));
-    jacobian[23] = work[33] + t199 + (work[46] * t296 + work[123] * t294 + (work[113] * t298 + work[112] * t299 + (work[7] * t301 + work[114] * t302)));
-    jacobian[20] = t304;
-    jacobian[24] = t186 - t210 - work[42] + (work[9] * t306 + work[7] * t307 + (work[13] * t309 + work[11] * t310 + (work[15] * t311 + work[17] * t312)));
-    jacobian[25] = t255 + (work[27] * t306 + work[114] * t307 + (work[28] * t309 + work[13] * t310 + (work[116] * t311 + work[115] * t312)));
-    jacobian[26] = work[86] + (t253 + t251) + (work[121] * t306 + work[113] * t307 + (work[115] * t309 + work[17] * t310 + (work[34] * t312 + work[35] * t311)));
-    jacobian[27] = work[85] + (t253 + t254) + (work[120] * t306 + work[112] * t307 + (work[35] * t312 + work[39] * t311 + (work[116] * t309 + work[15] * t310)));
-    jacobian[28] = 1.0 + (t248 + (work[43] * t306 + work[123] * t307 + (work[121] * t312 + work[120] * t311 + (work[27] * t309 + work[9] * t310))));
-    jacobian[29] = t256 - t210 - work[26] + (work[123] * t306 + work[46] * t307 + (work[114] * t309 + work[7] * t310 + (work[112] * t311 + work[113] * t312)));
-    jacobian[31] = t256 - t188 - work[42] + (work[114] * t314 + work[27] * t316 + (work[116] * t321 + work[115] * t323 + (work[13] * t318 + work[28] * t319)));
-    jacobian[32] = work[38] + t292 + (work[113] * t314 + work[121] * t316 + (work[17] * t318 + work[115] * t319 + (work[35] * t321 + work[34] * t323)));
-    jacobian[33] = t258 - work[33] + (work[112] * t314 + work[120] * t316 + (work[15] * t318 + work[116] * t319 + (work[35] * t323 + work[39] * t321)));
-    jacobian[34] = work[26] + (t188 + t256) + (work[123] * t314 + work[43] * t316 + (work[121] * t323 + work[120] * t321 + (work[9] * t318 + work[27] * t319)));
-    jacobian[35] = 1.0 + (work[6] + (work[46] * t314 + work[123] * t316 + (work[7] * t318 + work[114] * t319 + (work[113] * t323 + work[112] * t321))));
-    jacobian[30] = t324;
+    jacobian[0] = 1.0 + (work[6] + (work[7] * work[8] + work[9] * work[10] + (work[11] * work[12] + work[13]
+        * work[14] + (work[15] * work[16] + work[17] * t1))));
+    jacobian[1] = t4 - t6 - work[26] + (work[114] * work[8] + work[27] * work[10] + (work[115] * t1
+        + work[116] * work[16] + (work[13] * work[12] + work[28] * work[14])));
+    jacobian[2] = t14 - work[33] + (work[113] * work[8] + work[121] * work[10] + (work[34] * t1 + work[35]
+        * work[16] + (work[17] * work[12] + work[115] * work[14])));
+    jacobian[3] = work[38] + t16 + (work[112] * work[8] + work[120] * work[10] + (work[39] * work[16]
+        + work[35] * t1 + (work[15] * work[12] + work[116] * work[14])));
+    jacobian[4] = work[42] + (t4 + t6) + (work[123] * work[8] + work[43] * work[10] + (work[9] * work[12]
+        + work[27] * work[14] + (work[120] * work[16] + work[121] * t1)));
+    jacobian[5] = t18;
+    jacobian[6] = work[26] + (t4 + t20) + (work[9] * t28 + work[7] * t32 + (work[15] * t40 + work[17] * t43
+        + (work[13] * t49 + work[11] * t51)));
+    jacobian[7] = 1.0 + (t58 + (work[27] * t28 + work[114] * t32 + (work[28] * t49 + work[13] * t51
+        + (work[115] * t43 + work[116] * t40))));
+    jacobian[8] = t61 - t63 - work[85] + (work[121] * t28 + work[113] * t32 + (work[34] * t43 + work[35] * t40
+        + (work[115] * t49 + work[17] * t51)));
+    jacobian[9] = t64 - t63 - work[86] + (work[120] * t28 + work[112] * t32 + (work[116] * t49 + work[15]
+        * t51 + (work[39] * t40 + work[35] * t43)));
+    jacobian[10] = t65 + (work[43] * t28 + work[123] * t32 + (work[120] * t40 + work[121] * t43
+        + (work[27] * t49 + work[9] * t51)));
+    jacobian[11] = work[42] + (t20 + t66) + (work[123] * t28 + work[46] * t32 + (work[114] * t49 + work[7]
+        * t51 + (work[113] * t43 + work[112] * t40)));
+    jacobian[12] = work[33] + t68 + (work[9] * t74 + work[7] * t78 + (work[17] * t83 + work[15] * t86
+        + (work[13] * t89 + work[11] * t92)));
+    jacobian[17] = t16 - work[38] + (work[123] * t74 + work[46] * t78 + (work[112] * t86 + work[113] * t83
+        + (work[114] * t89 + work[7] * t92)));
+    jacobian[13] = work[85] + (t94 + t61) + (work[114] * t78 + work[27] * t74 + (work[115] * t83 + work[116]
+        * t86 + (work[13] * t92 + work[28] * t89)));
+    jacobian[16] = t61 - t94 - work[86] + (work[43] * t74 + work[123] * t78 + (work[121] * t83 + work[120]
+        * t86 + (work[27] * t89 + work[9] * t92)));
+    jacobian[14] = 1.0 + (t98 + (work[113] * t78 + work[121] * t74 + (work[34] * t83 + work[35] * t86
+        + (work[115] * t89 + work[17] * t92))));
+    jacobian[15] = t100;
+    jacobian[18] = t102 - work[38] + (work[9] * t104 + work[7] * t106 + (work[17] * t108 + work[15] * t109
+        + (work[11] * t111 + work[13] * t112)));
+    jacobian[19] = work[86] + (t94 + t64) + (work[114] * t106 + work[27] * t104 + (work[116] * t109
+        + work[115] * t108 + (work[13] * t111 + work[28] * t112)));
+    jacobian[21] = 1.0 + (t98 + (work[112] * t106 + work[120] * t104 + (work[39] * t109 + work[35] * t108
+        + (work[15] * t111 + work[116] * t112))));
+    jacobian[22] = t64 - t94 - work[85] + (work[43] * t104 + work[123] * t106 + (work[121] * t108 + work[120]
+        * t109 + (work[9] * t111 + work[27] * t112)));
+    jacobian[23] = work[33] + t14 + (work[46] * t106 + work[123] * t104 + (work[113] * t108 + work[112] * t109
+        + (work[7] * t111 + work[114] * t112)));
+    jacobian[20] = t114;
+    jacobian[24] = t4 - t20 - work[42] + (work[9] * t116 + work[7] * t117 + (work[13] * t119 + work[11] * t120
+        + (work[15] * t121 + work[17] * t122)));
+    jacobian[25] = t65 + (work[27] * t116 + work[114] * t117 + (work[28] * t119 + work[13] * t120
+        + (work[116] * t121 + work[115] * t122)));
+    jacobian[26] = work[86] + (t63 + t61) + (work[121] * t116 + work[113] * t117 + (work[115] * t119
+        + work[17] * t120 + (work[34] * t122 + work[35] * t121)));
+    jacobian[27] = work[85] + (t63 + t64) + (work[120] * t116 + work[112] * t117 + (work[35] * t122 + work[39]
+        * t121 + (work[116] * t119 + work[15] * t120)));
+    jacobian[28] = 1.0 + (t58 + (work[43] * t116 + work[123] * t117 + (work[121] * t122 + work[120] * t121
+        + (work[27] * t119 + work[9] * t120))));
+    jacobian[29] = t66 - t20 - work[26] + (work[123] * t116 + work[46] * t117 + (work[114] * t119 + work[7]
+        * t120 + (work[112] * t121 + work[113] * t122)));
+    jacobian[31] = t66 - t6 - work[42] + (work[114] * t124 + work[27] * t126 + (work[116] * t131 + work[115]
+        * t133 + (work[13] * t128 + work[28] * t129)));
+    jacobian[32] = work[38] + t102 + (work[113] * t124 + work[121] * t126 + (work[17] * t128 + work[115]
+        * t129 + (work[35] * t131 + work[34] * t133)));
+    jacobian[33] = t68 - work[33] + (work[112] * t124 + work[120] * t126 + (work[15] * t128 + work[116] * t129
+        + (work[35] * t133 + work[39] * t131)));
+    jacobian[34] = work[26] + (t6 + t66) + (work[123] * t124 + work[43] * t126 + (work[121] * t133 + work[120]
+        * t131 + (work[9] * t128 + work[27] * t129)));
+    jacobian[35] = 1.0 + (work[6] + (work[46] * t124 + work[123] * t126 + (work[7] * t128 + work[114] * t129
+        + (work[113] * t133 + work[112] * t131))));
+    jacobian[30] = t134;
     increment_jacobian[0] = work[129] + (work[127] - work[124] - work[117]);
-    increment_jacobian[1] = work[108] + (t329 + (x13 * work[116] - x24 * work[115] - x23 * work[28]));
-    increment_jacobian[34] = x23 * work[43] + (x13 * work[121] - x24 * work[120] - t329) - work[108];
-    increment_jacobian[2] = work[109] + (x14 * work[121] + (t330 - x24 * work[34] - x23 * work[115]));
-    increment_jacobian[33] = work[109] + (x23 * work[120] + (t330 - x24 * work[39] - x14 * work[116]));
-    increment_jacobian[3] = x14 * work[120] + (x13 * work[39] - t331 - x23 * work[116]) - work[110];
-    increment_jacobian[32] = x23 * work[121] + (x13 * work[34] - t331 - x14 * work[115]) - work[110];
-    increment_jacobian[4] = x14 * work[43] + (x13 * work[120] - x24 * work[121] - t332) - work[111];
-    increment_jacobian[31] = work[111] + (t332 + (x13 * work[115] - x24 * work[116] - x14 * work[28]));
+    increment_jacobian[1] = work[108] + (t135 + (x13 * work[116] - x24 * work[115] - x23 * work[28]));
+    increment_jacobian[34] = x23 * work[43] + (x13 * work[121] - x24 * work[120] - t135) - work[108];
+    increment_jacobian[2] = work[109] + (x14 * work[121] + (t136 - x24 * work[34] - x23 * work[115]));
+    increment_jacobian[33] = work[109] + (x23 * work[120] + (t136 - x24 * work[39] - x14 * work[116]));
+    increment_jacobian[3] = x14 * work[120] + (x13 * work[39] - t137 - x23 * work[116]) - work[110];
+    increment_jacobian[32] = x23 * work[121] + (x13 * work[34] - t137 - x14 * work[115]) - work[110];
+    increment_jacobian[4] = x14 * work[43] + (x13 * work[120] - x24 * work[121] - t138) - work[111];
+    increment_jacobian[31] = work[111] + (t138 + (x13 * work[115] - x24 * work[116] - x14 * work[28]));
     increment_jacobian[5] = work[122] + (work[125] - work[126] - work[128]);
 }
 
 /* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
    increment, all with the momenta p = grad S_h(y) (part 3 of 3) */
 so4_manakov_APART static void so4_manakov_linearise_part3(const double coef[32], const double y[6],
-                                                          double displacement[restrict 6],
-                                                          double increment[restrict 6],
-                                                          double jacobian[restrict 36],
-                                                          double increment_jacobian[restrict 36],
-                                                          double work[restrict 130])
+    double displacement[restrict 6], double increment[restrict 6], double jacobian[restrict 36],
+    double increment_jacobian[restrict 36], double work[restrict 130])
 {
-    (void)coef;
-    (void)displacement;
-    (void)increment;
-    (void)jacobian;
-    const double x12 = y[0];
-    const double x13 = y[1];
-    const double x14 = y[2];
-    const double x23 = y[3];
-    const double x24 = y[4];
-    const double x34 = y[5];
-    const double t337 = x14 * work[7];
-    const double t338 = x14 * work[114];
-    const double t339 = x34 * work[115];
-    const double t340 = x12 * work[116];
-    const double t341 = x12 * work[35];
-    const double t342 = x34 * work[35];
-    const double t343 = x23 * work[9];
-    const double t344 = x12 * work[120];
-    const double t345 = x34 * work[121];
-    const double t346 = x23 * work[7];
-    const double t347 = x13 * work[7];
-    const double t348 = x12 * work[27];
-    const double t349 = x12 * work[121];
-    const double t350 = x13 * work[113];
-    const double t351 = x34 * work[116];
-    const double t352 = x24 * work[15];
-    const double t353 = x34 * work[27];
-    const double t354 = x24 * work[7];
-    const double t355 = x12 * work[115];
-    const double t356 = x13 * work[17];
-    const double t357 = x24 * work[112];
-    const double t358 = x34 * work[120];
-    const double t359 = x14 * work[13];
-    const double t360 = x23 * work[123];
-    increment_jacobian[6] = t337 + (x23 * work[11] - (x12 * work[15] + x34 * work[17])) - work[108];
-    increment_jacobian[29] = x34 * work[112] + x12 * work[113] - t337 - x23 * work[46] + work[108];
-    increment_jacobian[7] = t338 + (work[117] - (t339 + t340));
-    increment_jacobian[8] = work[118] + (x14 * work[113] + (x23 * work[17] - (t341 + x34 * work[34])));
-    increment_jacobian[27] = t341 + x34 * work[39] - x14 * work[15] - x23 * work[112] - work[118];
-    increment_jacobian[9] = work[119] + (x14 * work[112] + (x23 * work[15] - (t342 + x12 * work[39])));
-    increment_jacobian[26] = t342 + x12 * work[34] - x14 * work[17] - x23 * work[113] - work[119];
-    increment_jacobian[10] = work[122] + (t343 - (t344 + t345));
-    increment_jacobian[11] = t346 - (x34 * work[113] + x12 * work[112]) + x14 * work[46] - work[111];
-    increment_jacobian[24] = work[111] + (x34 * work[15] + x12 * work[17] - x14 * work[11] - t346);
-    increment_jacobian[12] = x34 * work[13] + x24 * work[11] - (t347 + x12 * work[9]) - work[109];
-    increment_jacobian[23] = x12 * work[114] - t347 + (x24 * work[46] - x34 * work[123]) - work[109];
-    increment_jacobian[13] = x24 * work[13] + x34 * work[28] - (x13 * work[114] + t348) - work[118];
-    increment_jacobian[22] = work[118] + (t348 - x13 * work[9] + (x24 * work[123] - x34 * work[43]));
-    increment_jacobian[14] = t339 + work[124] - (t349 + t350);
-    increment_jacobian[15] = t351 + t352 - (t344 + work[125]);
-    increment_jacobian[16] = work[119] + (t353 + x24 * work[9] - (x13 * work[123] + x12 * work[43]));
-    increment_jacobian[19] = x24 * work[114] - t353 + (x12 * work[28] - x13 * work[13]) - work[119];
-    increment_jacobian[17] = work[110] + (x34 * work[114] + t354 - (x12 * work[123] + x13 * work[46]));
-    increment_jacobian[18] = work[110] + (t354 - x34 * work[9] + (x12 * work[13] - x13 * work[11]));
-    increment_jacobian[20] = t355 - t356 + (work[126] - t345);
-    increment_jacobian[21] = t357 - t358 + (t340 - work[127]);
-    increment_jacobian[25] = t351 + t355 - t359 - work[128];
-    increment_jacobian[30] = t343 + (t356 - t352 - t359);
-    increment_jacobian[28] = t358 + t349 - work[129] - t360;
-    increment_jacobian[35] = t360 + (t350 - t357 - t338);
+    (void)coef, (void)displacement, (void)increment, (void)jacobian;
+    const double x12 = y[0], x13 = y[1], x14 = y[2], x23 = y[3], x24 = y[4], x34 = y[5];
+    const double t1 = x14 * work[7], t2 = x14 * work[114], t3 = x34 * work[115];
+    const double t4 = x12 * work[116], t5 = x12 * work[35], t6 = x34 * work[35], t7 = x23 * work[9];
+    const double t8 = x12 * work[120], t9 = x34 * work[121], t10 = x23 * work[7];
+    const double t11 = x13 * work[7], t12 = x12 * work[27], t13 = x12 * work[121];
+    const double t14 = x13 * work[113], t15 = x34 * work[116], t16 = x24 * work[15];
+    const double t17 = x34 * work[27], t18 = x24 * work[7], t19 = x12 * work[115];
+    const double t20 = x13 * work[17], t21 = x24 * work[112], t22 = x34 * work[120];
+    const double t23 = x14 * work[13], t24 = x23 * work[123];
+    increment_jacobian[6] = t1 + (x23 * work[11] - (x12 * work[15] + x34 * work[17])) - work[108];
+    increment_jacobian[29] = x34 * work[112] + x12 * work[113] - t1 - x23 * work[46] + work[108];
+    increment_jacobian[7] = t2 + (work[117] - (t3 + t4));
+    increment_jacobian[8] = work[118] + (x14 * work[113] + (x23 * work[17] - (t5 + x34 * work[34])));
+    increment_jacobian[27] = t5 + x34 * work[39] - x14 * work[15] - x23 * work[112] - work[118];
+    increment_jacobian[9] = work[119] + (x14 * work[112] + (x23 * work[15] - (t6 + x12 * work[39])));
+    increment_jacobian[26] = t6 + x12 * work[34] - x14 * work[17] - x23 * work[113] - work[119];
+    increment_jacobian[10] = work[122] + (t7 - (t8 + t9));
+    increment_jacobian[11] = t10 - (x34 * work[113] + x12 * work[112]) + x14 * work[46] - work[111];
+    increment_jacobian[24] = work[111] + (x34 * work[15] + x12 * work[17] - x14 * work[11] - t10);
+    increment_jacobian[12] = x34 * work[13] + x24 * work[11] - (t11 + x12 * work[9]) - work[109];
+    increment_jacobian[23] = x12 * work[114] - t11 + (x24 * work[46] - x34 * work[123]) - work[109];
+    increment_jacobian[13] = x24 * work[13] + x34 * work[28] - (x13 * work[114] + t12) - work[118];
+    increment_jacobian[22] = work[118] + (t12 - x13 * work[9] + (x24 * work[123] - x34 * work[43]));
+    increment_jacobian[14] = t3 + work[124] - (t13 + t14);
+    increment_jacobian[15] = t15 + t16 - (t8 + work[125]);
+    increment_jacobian[16] = work[119] + (t17 + x24 * work[9] - (x13 * work[123] + x12 * work[43]));
+    increment_jacobian[19] = x24 * work[114] - t17 + (x12 * work[28] - x13 * work[13]) - work[119];
+    increment_jacobian[17] = work[110] + (x34 * work[114] + t18 - (x12 * work[123] + x13 * work[46]));
+    increment_jacobian[18] = work[110] + (t18 - x34 * work[9] + (x12 * work[13] - x13 * work[11]));
+    increment_jacobian[20] = t19 - t20 + (work[126] - t9);
+    increment_jacobian[21] = t21 - t22 + (t4 - work[127]);
+    increment_jacobian[25] = t15 + t19 - t23 - work[128];
+    increment_jacobian[30] = t7 + (t20 - t16 - t23);
+    increment_jacobian[28] = t22 + t13 - work[129] - t24;
+    increment_jacobian[35] = t24 + (t14 - t21 - t2);
 }
 
 /* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
    increment, all with the momenta p = grad S_h(y) */
 static void so4_manakov_linearise(const double coef[32], const double y[6], double displacement[restrict 6],
-                                  double increment[restrict 6], double jacobian[restrict 36],
-                                  double increment_jacobian[restrict 36])
+    double increment[restrict 6], double jacobian[restrict 36], double increment_jacobian[restrict 36])
 {
     double work[130];
     so4_manakov_linearise_part1(coef, y, displacement, increment, jacobian, increment_jacobian, work);
@@ -702,378 +581,38 @@ static void so4_manakov_linearise(const double coef[32], const double y[6], doub
     so4_manakov_linearise_part3(coef, y, displacement, increment, jacobian, increment_jacobian, work);
 }
 
-/* Solve matrix * solution = side, both overwritten, by elimination with partial pivoting. 0 if singular. */
-static int so4_manakov_solve(double matrix[36], double side[6])
-{
-    for (int k = 0; k < 6; ++k) {
-        int best = k;
-        for (int i = k + 1; i < 6; ++i)
-            if (fabs(matrix[i * 6 + k]) > fabs(matrix[best * 6 + k])) best = i;
-        const double pivot = matrix[best * 6 + k];
-        if (!(fabs(pivot) > 0.0)) return 0;
-        for (int j = k; j < 6 && best != k; ++j) {
-            const double swap = matrix[k * 6 + j];
-            matrix[k * 6 + j] = matrix[best * 6 + j];
-            matrix[best * 6 + j] = swap;
-        }
-        const double swap = side[k];
-        side[k] = side[best];
-        side[best] = swap;
-        for (int i = k + 1; i < 6; ++i) {
-            const double factor = matrix[i * 6 + k] / pivot;
-            for (int j = k + 1; j < 6; ++j) matrix[i * 6 + j] -= factor * matrix[k * 6 + j];
-            side[i] -= factor * side[k];
-        }
-    }
-    for (int i = 6 - 1; i >= 0; --i) {
-        for (int j = i + 1; j < 6; ++j) side[i] -= matrix[i * 6 + j] * side[j];
-        side[i] /= matrix[i * 6 + i];
-    }
-    return 1;
-}
-
-/* Whether a guess is where the next values may be. Recurrences that were fitted to little else than rest, near a saddle,
-   may lead anywhere; and far away the equation of a step has solutions that have nothing to do with the motion. */
-static int so4_manakov_near(const double guess[6], const double last[6])
-{
-    double distance = 0.0, size = 0.0;
-    for (int i = 0; i < 6; ++i) {
-        distance += fabs(guess[i] - last[i]);
-        size += fabs(last[i]);
-    }
-    return distance <= 4.0 * size;
-}
-
-/* The guess for the next value (y), from earlier ones; 0 if there is none. */
-static int so4_manakov_predict(const so4_manakov_memory *memory, double value[6])
-{
-    const int last = memory->count - 1;
-    double odd[6] = { 0.0 }, binomial = -1.0;
-    memset(value, 0, 6 * sizeof value[0]);
-    if (memory->fitting) {
-        for (int k = 0; k < memory->terms; k += 2)
-            for (int i = 0; i < 6; ++i) {
-                value[i] += memory->weight[k][i][0] * memory->past[last - k][i];
-                odd[i] += memory->weight[k + 1][i][0] * memory->past[last - 1 - k][i];
-            }
-        for (int i = 0; i < 6; ++i) value[i] += odd[i];
-    } else {
-        for (int k = 0; k < memory->order && k <= last; ++k) {
-            binomial *= -(double)(memory->order - k) / (k + 1);
-            for (int i = 0; i < 6; ++i) value[i] += binomial * memory->past[last - k][i];
-        }
-    }
-    return last >= 0 && so4_manakov_near(value, memory->past[last]);
-}
-
-/* Choose the guess that would have been best for a value that took several iterations. */
-static void so4_manakov_judge(so4_manakov_memory *memory, const double value[6])
-{
-    double row[8 + 1][6], guess[6], least = HUGE_VAL, fitted = HUGE_VAL;
-    const int rows = memory->count < 8 ? memory->count : 8;
-    memcpy(row[0], value, sizeof row[0]);
-    for (int k = 0; k < rows; ++k) memcpy(row[k + 1], memory->past[memory->count - 1 - k], sizeof row[0]);
-    for (int order = 1; order <= rows; ++order) { /* row[0] becomes the backward difference of this order */
-        double size = 0.0;
-        for (int k = 0; k <= rows - order; ++k)
-            for (int i = 0; i < 6; ++i) row[k][i] -= row[k + 1][i];
-        for (int i = 0; i < 6; ++i) size += fabs(row[0][i]);
-        if (size < least) {
-            least = size;
-            memory->order = order;
-        }
-    }
-    memory->fitting = memory->terms > 0;
-    if (memory->fitting && so4_manakov_predict(memory, guess)) {
-        fitted = 0.0;
-        for (int i = 0; i < 6; ++i) fitted += fabs(value[i] - guess[i]);
-    }
-    memory->fitting = memory->terms > 0 && fitted <= least;
-    if (memory->order == 0) memory->order = 1;
-}
-
-/* Make eight columns orthogonal to one, by the multiples of it that are put into r. Where that one is among the eight, those
-   up to it stay as they are, and inverse becomes one over its squared length. The number of rows is even. */
-static void so4_manakov_project(int rows, double (*one)[8], int column, double *inverse, double (*eight)[8], double r[8])
-{
-    double even[8] = { 0.0 }, odd[8] = { 0.0 };
-    for (int i = 0; i < rows; i += 2) {
-        const double entry = one[i][column], next = one[i + 1][column];
-        for (int l = 0; l < 8; ++l) even[l] += entry * eight[i][l];
-        for (int l = 0; l < 8; ++l) odd[l] += next * eight[i + 1][l];
-    }
-    for (int l = 0; l < 8; ++l) even[l] += odd[l];
-    if (one == eight) {
-        *inverse = even[column] > 0.0 ? 1.0 / even[column] : 0.0;
-        memset(even, 0, ((size_t)column + 1) * sizeof even[0]);
-    }
-    for (int l = 0; l < 8; ++l) r[l] = even[l] *= *inverse;
-    for (int i = 0; i < rows; ++i) {
-        const double entry = one[i][column];
-        for (int l = 0; l < 8; ++l) eight[i][l] -= entry * even[l];
-    }
-}
-
-/* By how much recurrences miss the last of these values. */
-static double so4_manakov_missed(const double *value, double (*weight)[8])
-{
-    enum { AHEAD = 8, WINDOW = 40, CHECKS = 8 };
-    double most = 0.0;
-    for (int i = 0; i < CHECKS; ++i) {
-        double guess[8] = { 0.0 };
-        for (int k = 0; k < WINDOW; ++k)
-            for (int l = 0; l < 8; ++l) guess[l] += weight[k][l] * value[i + WINDOW - 1 - k];
-        for (int l = 0; l < AHEAD; ++l) most = fmax(most, fabs(guess[l] - value[i + WINDOW + l]));
-    }
-    return most;
-}
-
-/* Fit the recurrences value[m + l] = sum of weight[k][..][l] * value[m - 1 - k], l = 0 ... 8 - 1, to the history of
-   a component: ridge least squares by modified Gram-Schmidt, the ridge at the level of rounding. Columns are taken in by
-   eights, until they leave next to nothing of the right-hand sides. How many past values are used; 0 if the recurrences do
-   not foresee the last values, which they were not fitted to. */
-static int so4_manakov_train(so4_manakov_memory *memory, int component)
-{
-    enum { AHEAD = 8, WINDOW = 40, ROWS = 56 };
-    double q[WINDOW / 8][ROWS + WINDOW][8], r[WINDOW / 8][WINDOW][8], inverse[WINDOW]; /* eight columns in each part */
-    double right[ROWS + WINDOW][8], weight[WINDOW][8], value[111], largest = 0.0, left = HUGE_VAL;
-    int terms = 0;
-    memset(q, 0, sizeof q);
-    memset(right, 0, sizeof right);
-    memset(weight, 0, sizeof weight);
-    for (int i = 0; i < 111; ++i) {
-        value[i] = memory->past[memory->count - 111 + i][component];
-        if (fabs(value[i]) > largest) largest = fabs(value[i]);
-    }
-    for (int i = 0; i < ROWS; ++i)
-        for (int l = 0; l < AHEAD; ++l) right[i][l] = value[i + WINDOW + l];
-    while (terms < WINDOW && left > 3e-12 * largest) {
-        const int part = terms / 8, rows = ROWS + terms + 8; /* further rows of the ridge are zero in these columns */
-        for (int i = 0; i < ROWS; ++i)
-            for (int l = 0; l < 8; ++l) q[part][i][l] = value[i + WINDOW - 1 - terms - l];
-        for (int l = 0; l < 8; ++l) q[part][ROWS + terms + l][l] = 1e-15 * largest;
-        for (int k = 0; k < terms; ++k) so4_manakov_project(rows, q[k / 8], k % 8, &inverse[k], q[part], r[part][k]);
-        for (int l = 0; l < 8; ++l, ++terms) {
-            so4_manakov_project(rows, q[part], l, &inverse[terms], q[part], r[part][terms]);
-            so4_manakov_project(rows, q[part], l, &inverse[terms], right, weight[terms]);
-        }
-        double sum[8] = { 0.0 };
-        for (int i = 0; i < ROWS; ++i)
-            for (int l = 0; l < 8; ++l) sum[l] += fabs(right[i][l]);
-        left = 0.0;
-        for (int l = 0; l < 8; ++l) left += sum[l] / ROWS;
-    }
-    for (int k = terms - 1; k >= 0; --k)
-        for (int j = k + 1; j < terms; ++j)
-            for (int l = 0; l < 8; ++l) weight[k][l] -= r[j / 8][k][j % 8] * weight[j][l];
-    for (int k = 0; k < WINDOW; ++k) memcpy(memory->weight[k][component], weight[k], AHEAD * sizeof(double));
-    return so4_manakov_missed(value + ROWS, weight) <= 1e-07 * largest ? terms : 0;
-}
-
-/* Drop what is old, if so many values would not fit into the history. */
-static void so4_manakov_make_room(so4_manakov_memory *memory, int values)
-{
-    if (memory->count + values <= 222) return;
-    memmove(memory->past, memory->past + memory->count - 111, 111 * sizeof memory->past[0]);
-    memory->count = 111;
-}
-
-/* Add a value to the history. */
-static void so4_manakov_record(so4_manakov_memory *memory, const double value[6])
-{
-    so4_manakov_make_room(memory, 1);
-    memcpy(memory->past[memory->count++], value, 6 * sizeof value[0]);
-}
-
-/* Fit the recurrence to the last values; with every time, wait longer before it is done again. */
-static void so4_manakov_fit(so4_manakov_memory *memory)
-{
-    int found = 1;
-    memory->terms = 0;
-    for (int i = 0; i < 6 && found; ++i) {
-        const int terms = so4_manakov_train(memory, i);
-        found = terms > 0;
-        if (terms > memory->terms) memory->terms = terms;
-    }
-    if (!found) memory->terms = 0;
-    memory->fitting = found;
-    ++memory->fits;
-    memory->slow = 0;
-    memory->patience = memory->patience < 10000 ? 2 * memory->patience + 150 : 20000;
-}
-
-/* Take in the solved value: what took one iteration needs no better guess. */
-static void so4_manakov_remember(so4_manakov_memory *memory, const double value[6], int iterations)
-{
-    if (iterations > 1) so4_manakov_judge(memory, value);
-    so4_manakov_record(memory, value);
-    memory->slow = iterations > 1 ? memory->slow + 1 : 0;
-    if (memory->slow > memory->patience && memory->count >= 111) so4_manakov_fit(memory);
-}
-
-/* Whether an increment is that of the motion. Where the step is too large, the equation may have been solved by a point far
-   away, at another energy, that has nothing to do with it. */
-static int so4_manakov_plausible(const so4_manakov_solver *s, int stage, const double increment[6])
-{
-    double moved = 0.0, size = 0.0, field[6], middle[6], end[6];
-    for (int i = 0; i < 6; ++i) {
-        moved += fabs(increment[i]);
-        size += fabs(s->x[i]);
-    }
-    if (moved <= 1.5 * size) return 1;
-    so4_manakov_vector_field(&s->params, s->x, field);
-    for (int i = 0; i < 6; ++i) {
-        size += fabs(so4_manakov_fractions[stage] * s->h * field[i]);
-        middle[i] = s->x[i] + 0.5 * increment[i];
-        end[i] = s->x[i] + increment[i];
-    }
-    if (moved <= 1.5 * size) return 1;
-    const double before = so4_manakov_hamiltonian(&s->params, s->x), after = so4_manakov_hamiltonian(&s->params, end);
-    const double scale = fabs(before) + fabs(so4_manakov_hamiltonian(&s->params, middle)) + fabs(after);
-    return fabs(after - before) <= 0.5 * scale;
-}
-
-/* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to its last
-   bit: were it rounded with the change, corrections of one sign would add up to a drift. 0, and x as before, if the
-   sum is not finite. */
-static int so4_manakov_advance(so4_manakov_solver *s, const double change[6], const double correction[6])
-{
-    double x[6], carry[6];
-    for (int i = 0; i < 6; ++i) {
-        const double sum = s->x[i] + change[i], added = sum - s->x[i];
-        const double lost = (s->x[i] - (sum - added)) + (change[i] - added);
-        const double small = lost + (s->carry[i] + correction[i]);
-        x[i] = sum + small;
-        carry[i] = small - (x[i] - sum);
-        if (!isfinite(x[i])) return 0;
-    }
-    memcpy(s->x, x, sizeof x);
-    memcpy(s->carry, carry, sizeof carry);
-    return 1;
-}
-
-/* Size of a correction relative to each component of y, but no finer than 1e-6 of the largest; NaN or infinite if
-   the correction is. */
-static double so4_manakov_size(const double y[6], const double delta[6])
-{
-    double norm = 0.0, size = 0.0;
-    for (int i = 0; i < 6; ++i) norm = fabs(y[i]) > norm ? fabs(y[i]) : norm;
-    for (int i = 0; i < 6; ++i) {
-        const double ratio = fabs(delta[i]) / (fabs(y[i]) + 1e-6 * norm + DBL_MIN);
-        if (!isfinite(ratio)) return ratio;
-        size = ratio > size ? ratio : size;
-    }
-    return size;
-}
-
-/* Solve (y - x) + displacement(y) = 0 for y by Newton's method from the extrapolated guess, and advance. The
-   increment is corrected to first order by the last Newton correction, so that correction costs no evaluation:
-   a correction is accepted when the error that remains after it, quadratic in it, is below 1e-20. */
-static so4_manakov_status so4_manakov_attempt(so4_manakov_solver *s, int stage)
-{
-    const double *coef = s->coef[stage];
-    so4_manakov_memory *memory = &s->memory[stage];
-    double y[6], delta[6], displacement[6], increment[6];
-    double jacobian[36], increment_jacobian[36];
-    if (!so4_manakov_predict(memory, y)) memcpy(y, s->x, sizeof y);
-    double previous = HUGE_VAL;
-    for (int iteration = 0; iteration < 20; ++iteration) {
-        so4_manakov_linearise(coef, y, displacement, increment, jacobian, increment_jacobian);
-        ++s->evaluations;
-        for (int i = 0; i < 6; ++i) delta[i] = ((y[i] - s->x[i]) + displacement[i]) - s->carry[i];
-        const int regular = so4_manakov_solve(jacobian, delta);
-        const double size = so4_manakov_size(y, delta);
-        if (!isfinite(size)) return so4_manakov_NOT_FINITE;
-        if (!regular) return so4_manakov_SINGULAR;
-        for (int i = 0; i < 6; ++i) y[i] -= delta[i];
-        const double growth = size / (previous * previous);
-        const double remaining = size * size * (growth > 1.0 ? growth : 1.0);
-        /* The second test: corrections no longer shrink, the solve has reached the level of rounding. */
-        if (remaining <= 1e-20 || (previous < 1e-8 && size > 0.25 * previous)) {
-            double correction[6] = { 0.0 };
-            for (int i = 0; i < 6; ++i)
-                for (int j = 0; j < 6; ++j) correction[i] -= increment_jacobian[i * 6 + j] * delta[j];
-            if (!so4_manakov_plausible(s, stage, increment)) return so4_manakov_NO_CONVERGENCE;
-            if (!so4_manakov_advance(s, increment, correction)) return so4_manakov_NOT_FINITE;
-            so4_manakov_remember(memory, y, iteration + 1);
-            return so4_manakov_OK;
-        }
-        previous = size;
-    }
-    return so4_manakov_NO_CONVERGENCE;
-}
-
-/* The 1 stages of one step. If one fails, the state is as before the step. */
-static so4_manakov_status so4_manakov_stages(so4_manakov_solver *s)
-{
-    double x[6], carry[6];
-    memcpy(x, s->x, sizeof x);
-    memcpy(carry, s->carry, sizeof carry);
-    for (int stage = 0; stage < 1; ++stage) {
-        so4_manakov_status status = so4_manakov_attempt(s, stage);
-        /* A guess from earlier steps may have misled it: once more without. */
-        if (status != so4_manakov_OK && s->memory[stage].count > 0) {
-            memset(&s->memory[stage], 0, sizeof s->memory[stage]);
-            status = so4_manakov_attempt(s, stage);
-        }
-        if (status != so4_manakov_OK) {
-            memcpy(s->x, x, sizeof x);
-            memcpy(s->carry, carry, sizeof carry);
-            return status;
-        }
-    }
-    return so4_manakov_OK;
-}
-
-/* All of so4_manakov_init but the gauge. The arguments may be parts of *s: they are read before it is written. */
-static so4_manakov_status so4_manakov_start(so4_manakov_solver *s, const so4_manakov_params *params, const double x0[6])
-{
-    if (s == NULL || x0 == NULL) return so4_manakov_BAD_ARGUMENT;
-    const so4_manakov_params own = params != NULL ? *params : so4_manakov_default_params;
-    double x[6];
-    memcpy(x, x0, sizeof x);
-    for (int i = 0; i < 6; ++i)
-        if (!isfinite(x[i])) return so4_manakov_BAD_ARGUMENT;
-    memset(s, 0, sizeof *s);
-    memcpy(s->x, x, sizeof s->x);
-    s->params = own;
-    return so4_manakov_OK;
-}
-
 /* the leading error vector pi grad S_3, as a function of the gauge */
 static void so4_manakov_guide(const so4_manakov_params *params, const double gauge[1], const double x[6],
-                              double error[restrict 6])
+    double error[restrict 6])
 {
     (void)params;
-    const double x12 = x[0];
-    const double x13 = x[1];
-    const double x14 = x[2];
-    const double x23 = x[3];
-    const double x24 = x[4];
-    const double x34 = x[5];
+    const double x12 = x[0], x13 = x[1], x14 = x[2], x23 = x[3], x24 = x[4], x34 = x[5];
     const double t1 = 1.0 / 15120.0 - 1.0 / 1800.0 * gauge[0];
     const double t2 = -1.0 / 3780.0 + 4.0 / 1575.0 * gauge[0];
-    const double t3 = x13 * x24 * t1 + x12 * (x34 * t2);
-    const double t4 = x34 * x34;
-    const double t5 = x24 * x24;
-    const double t6 = x12 * x12;
-    const double t7 = x13 * x13;
-    const double t8 = gauge[0] * ((-2.0 / 675.0) * t6 - 1.0 / 2400.0 * t7 + ((-1.0 / 5400.0) * t5 - 2.0 / 3675.0 * t4));
-    const double t9 = x14 * t3 + x23 * (1.0 / 22050.0 * t4 + 1.0 / 75600.0 * t5 + (1.0 / 2700.0 * t6 + 1.0 / 14400.0 * t7) + t8);
-    const double t10 = x14 * x23;
-    const double t11 = 1.0 / 3024.0 - 5.0 / 1512.0 * gauge[0];
-    const double t12 = t10 * t1 + x12 * (x34 * t11);
-    const double t13 = x14 * x14;
-    const double t14 = x23 * x23;
-    const double t15 = 1.0 / 32400.0 * t13 + 1.0 / 2160.0 * t6 + (1.0 / 105840.0 * t4 + 1.0 / 75600.0 * t14) + gauge[0] * ((-1.0 / 216.0) * t6 - 1.0 / 5400.0 * t13 + ((-1.0 / 5400.0) * t14 - 1.0 / 10584.0 * t4));
+    const double t3 = x13 * x24 * t1 + x12 * (x34 * t2), t4 = x34 * x34, t5 = x24 * x24;
+    const double t6 = x12 * x12, t7 = x13 * x13;
+    const double t8 = gauge[0] * ((-2.0 / 675.0) * t6 - 1.0 / 2400.0 * t7 + ((-1.0 / 5400.0) * t5 - 2.0
+        / 3675.0 * t4));
+    const double t9 = x14 * t3 + x23 * (1.0 / 22050.0 * t4 + 1.0 / 75600.0 * t5 + (1.0 / 2700.0 * t6 + 1.0
+        / 14400.0 * t7) + t8);
+    const double t10 = x14 * x23, t11 = 1.0 / 3024.0 - 5.0 / 1512.0 * gauge[0];
+    const double t12 = t10 * t1 + x12 * (x34 * t11), t13 = x14 * x14, t14 = x23 * x23;
+    const double t15 = 1.0 / 32400.0 * t13 + 1.0 / 2160.0 * t6 + (1.0 / 105840.0 * t4 + 1.0 / 75600.0 * t14)
+        + gauge[0] * ((-1.0 / 216.0) * t6 - 1.0 / 5400.0 * t13 + ((-1.0 / 5400.0) * t14 - 1.0 / 10584.0
+        * t4));
     const double t16 = x13 * t12 + x24 * t15;
-    const double t17 = 3.0 / 15680.0 * t4 + 1.0 / 14400.0 * t14 + (1.0 / 33600.0 * t13 + 1.0 / 8640.0 * t6) + gauge[0] * ((-1.0 / 864.0) * t6 - 1.0 / 2400.0 * t13 + ((-1.0 / 2400.0) * t14 - 3.0 / 1568.0 * t4));
+    const double t17 = 3.0 / 15680.0 * t4 + 1.0 / 14400.0 * t14 + (1.0 / 33600.0 * t13 + 1.0 / 8640.0 * t6)
+        + gauge[0] * ((-1.0 / 864.0) * t6 - 1.0 / 2400.0 * t13 + ((-1.0 / 2400.0) * t14 - 3.0 / 1568.0 * t4));
     const double t18 = x24 * t12 + x13 * t17;
-    const double t19 = x23 * t3 + x14 * (1.0 / 4050.0 * t6 + 1.0 / 33600.0 * t7 + (1.0 / 32400.0 * t5 + 1.0 / 14700.0 * t4) + t8);
+    const double t19 = x23 * t3 + x14 * (1.0 / 4050.0 * t6 + 1.0 / 33600.0 * t7 + (1.0 / 32400.0 * t5 + 1.0
+        / 14700.0 * t4) + t8);
     const double t20 = t10 * t2 + x13 * (x24 * t11);
-    const double t21 = 1.0 / 2700.0 * t14 + 1.0 / 2160.0 * t5 + (1.0 / 4050.0 * t13 + 1.0 / 8640.0 * t7) + gauge[0] * ((-2.0 / 675.0) * t14 - 1.0 / 216.0 * t5 + ((-1.0 / 864.0) * t7 - 2.0 / 675.0 * t13));
+    const double t21 = 1.0 / 2700.0 * t14 + 1.0 / 2160.0 * t5 + (1.0 / 4050.0 * t13 + 1.0 / 8640.0 * t7)
+        + gauge[0] * ((-2.0 / 675.0) * t14 - 1.0 / 216.0 * t5 + ((-1.0 / 864.0) * t7 - 2.0 / 675.0 * t13));
     const double t22 = x34 * t20 + x12 * t21;
-    const double t23 = 3.0 / 15680.0 * t7 + 1.0 / 14700.0 * t13 + (1.0 / 105840.0 * t5 + 1.0 / 22050.0 * t14) + gauge[0] * ((-3.0 / 1568.0) * t7 - 2.0 / 3675.0 * t13 + ((-2.0 / 3675.0) * t14 - 1.0 / 10584.0 * t5));
+    const double t23 = 3.0 / 15680.0 * t7 + 1.0 / 14700.0 * t13 + (1.0 / 105840.0 * t5 + 1.0 / 22050.0 * t14)
+        + gauge[0] * ((-3.0 / 1568.0) * t7 - 2.0 / 3675.0 * t13 + ((-2.0 / 3675.0) * t14 - 1.0 / 10584.0
+        * t5));
     const double t24 = x12 * t20 + x34 * t23;
     error[0] = x13 * t9 + x14 * t16 - (x23 * t18 + x24 * t19);
     error[1] = x23 * t22 - x34 * t19 + (x14 * t24 - x12 * t9);
@@ -1087,1656 +626,43 @@ static void so4_manakov_guide(const so4_manakov_params *params, const double gau
 static void so4_manakov_products(const so4_manakov_params *params, const double x[6], double out[restrict 3])
 {
     (void)params;
-    const double x12 = x[0];
-    const double x13 = x[1];
-    const double x14 = x[2];
-    const double x23 = x[3];
-    const double x24 = x[4];
-    const double x34 = x[5];
-    const double t1 = x24 * x24;
-    const double t2 = x34 * x34;
-    const double t3 = x23 * x23;
-    const double t4 = x14 * x14;
-    const double t5 = x12 * x12;
+    const double x12 = x[0], x13 = x[1], x14 = x[2], x23 = x[3], x24 = x[4], x34 = x[5];
+    const double t1 = x24 * x24, t2 = x34 * x34, t3 = x23 * x23, t4 = x14 * x14, t5 = x12 * x12;
     const double t6 = x13 * x13;
-    out[0] = 1.0 / 36.0 * t1 + 1.0 / 49.0 * t2 + (1.0 / 25.0 * t3 + 1.0 / 25.0 * t4 + (1.0 / 9.0 * t5 + 0.0625 * t6));
-    out[1] = 1.0 / 3.0 * t1 + 2.0 / 7.0 * t2 + (2.0 / 3.0 * t5 + 0.5 * t6 + (2.0 / 5.0 * t3 + 2.0 / 5.0 * t4));
+    out[0] = 1.0 / 36.0 * t1 + 1.0 / 49.0 * t2 + (1.0 / 25.0 * t3 + 1.0 / 25.0 * t4 + (1.0 / 9.0 * t5 + 0.0625
+        * t6));
+    out[1] = 1.0 / 3.0 * t1 + 2.0 / 7.0 * t2 + (2.0 / 3.0 * t5 + 0.5 * t6 + (2.0 / 5.0 * t3 + 2.0 / 5.0
+        * t4));
     out[2] = 4.0 * t1 + 4.0 * t2 + (4.0 * t5 + 4.0 * t6 + (4.0 * t3 + 4.0 * t4));
 }
 
-enum { so4_manakov_SAMPLES = 32 };
-
-/* Sum of |pi grad S_3|^2, the leading error of the method, over sampled states. */
-static double so4_manakov_gauge_error(const so4_manakov_params *params, const double gauge[1],
-                                     double samples[][6])
-{
-    double error[6], sum = 0.0;
-    for (int k = 0; k < so4_manakov_SAMPLES; ++k) {
-        so4_manakov_guide(params, gauge, samples[k], error);
-        for (int i = 0; i < 6; ++i) sum += error[i] * error[i];
-    }
-    return sum;
-}
-
-/* A short piece of the trajectory from x, by a Runge-Kutta method with steps of a fixed change. */
-static void so4_manakov_sample(const so4_manakov_params *params, const double x[6], double samples[][6])
-{
-    double y[6], z[6], k1[6], k2[6], size = 0.0, speed = DBL_MIN;
-    memcpy(y, x, sizeof y);
-    so4_manakov_vector_field(params, y, k1);
-    for (int i = 0; i < 6; ++i) {
-        size += fabs(y[i]);
-        speed += fabs(k1[i]);
-    }
-    const double h = 0.25 * size / speed;
-    for (int k = 0; k < so4_manakov_SAMPLES; ++k) {
-        memcpy(samples[k], y, sizeof y);
-        so4_manakov_vector_field(params, y, k1);
-        for (int i = 0; i < 6; ++i) z[i] = y[i] + 0.5 * h * k1[i];
-        so4_manakov_vector_field(params, z, k2);
-        for (int i = 0; i < 6; ++i) y[i] += h * k2[i];
-    }
-}
-
-/* The error where one multiple varies, of centre + (j - 3) width for j = 0 ... 6, as forward differences: S_3 is cubic in H,
-   so these are those of a polynomial of degree six. Their size, before. */
-static double so4_manakov_gauge_line(const so4_manakov_params *params, const double gauge[1], int c, double width,
-    double samples[][6], double difference[7])
-{
-    double moved[1], size = 0.0;
-    memcpy(moved, gauge, sizeof moved);
-    for (int j = 0; j < 7; ++j) {
-        moved[c] = gauge[c] + (j - 3) * width;
-        difference[j] = so4_manakov_gauge_error(params, moved, samples);
-        size += difference[j];
-    }
-    for (int order = 1; order < 7; ++order)
-        for (int j = 6; j >= order; --j) difference[j] -= difference[j - 1];
-    return size;
-}
-
-/* Its value at centre + t width, by Newton's formula. */
-static double so4_manakov_on_line(const double difference[7], double t)
-{
-    double error = difference[6];
-    for (int k = 5; k >= 0; --k) error = difference[k] + (t + 3.0 - k) / (k + 1) * error;
-    return error;
-}
-
-/* Where it is least: the best t on grids, each finer than the one before. */
-static double so4_manakov_least_on_line(const double difference[7], double size)
-{
-    const double mesh[3] = { 0.125, 1.0 / 64.0, 1.0 / 512.0 };
-    double best = 0.0, least = so4_manakov_on_line(difference, best);
-    for (int level = 0; level < 3; ++level) {
-        const int reach = level == 0 ? 24 : 8;
-        const double centre = best;
-        for (int j = -reach; j <= reach; ++j) {
-            const double t = centre + j * mesh[level], error = so4_manakov_on_line(difference, t);
-            if (error < least - 1e-12 * size) { /* close calls are not decided by rounding */
-                least = error;
-                best = t;
-            }
-        }
-    }
-    return best;
-}
-
-/* The lambda that minimise the leading error along a short piece of the trajectory, one after the other, from the
-   least-squares solution of grad H = sum of lambda grad C. Zero where that gives nothing finite. */
-static void so4_manakov_choose_gauge(const so4_manakov_params *params, const double x[6], double gauge[1])
-{
-    double samples[so4_manakov_SAMPLES][6], out[3], sums[3] = { 0.0 }, width[1];
-    so4_manakov_sample(params, x, samples);
-    for (int k = 0; k < so4_manakov_SAMPLES; ++k) {
-        so4_manakov_products(params, samples[k], out);
-        for (int i = 0; i < 3; ++i) sums[i] += out[i];
-    }
-    for (int c = 0; c < 1; ++c) {
-        const double norm = sums[2 + 2 * c] > 0.0 ? sums[2 + 2 * c] : HUGE_VAL;
-        gauge[c] = sums[1 + 2 * c] / norm;
-        width[c] = sqrt(sums[0] / norm);
-    }
-    for (int sweep = 0, moved = 1; sweep < 4 && moved; ++sweep) {
-        moved = 0;
-        for (int c = 0; c < 1; ++c) {
-            double difference[7];
-            const double size = so4_manakov_gauge_line(params, gauge, c, width[c], samples, difference);
-            const double best = so4_manakov_least_on_line(difference, size);
-            gauge[c] += best * width[c];
-            moved = moved || best != 0.0;
-        }
-    }
-    if (!isfinite(so4_manakov_gauge_error(params, gauge, samples)))
-        for (int c = 0; c < 1; ++c) gauge[c] = 0.0;
-}
-
-/* Start at x0 with a gauge of one's own, e.g. that of another trajectory: see so4_manakov_solver. */
-so4_manakov_status so4_manakov_init_gauge(so4_manakov_solver *s, const so4_manakov_params *params,
-                                          const double x0[6], const double gauge[1])
-{
-    double own[1];
-    if (gauge == NULL) return so4_manakov_init(s, params, x0);
-    memcpy(own, gauge, sizeof own);
-    for (int c = 0; c < 1; ++c)
-        if (!isfinite(own[c])) return so4_manakov_BAD_ARGUMENT;
-    const so4_manakov_status status = so4_manakov_start(s, params, x0);
-    if (status == so4_manakov_OK) memcpy(s->gauge, own, sizeof s->gauge);
-    return status;
-}
-
-so4_manakov_status so4_manakov_init(so4_manakov_solver *s, const so4_manakov_params *params,
-                                    const double x0[6])
-{
-    const so4_manakov_status status = so4_manakov_start(s, params, x0);
-    if (status == so4_manakov_OK) so4_manakov_choose_gauge(&s->params, s->x, s->gauge);
-    return status;
-}
-
-/* What depends on the step size; nothing where that is as before. */
-static so4_manakov_status so4_manakov_set_step(so4_manakov_solver *s, double h)
-{
-    if (s == NULL || !isfinite(h)) return so4_manakov_BAD_ARGUMENT;
-    if (s->ready && memcmp(&h, &s->h, sizeof h) == 0) return so4_manakov_OK;
-    for (int stage = 0; stage < 1; ++stage)
-        so4_manakov_prepare(&s->params, s->gauge, so4_manakov_fractions[stage] * h, s->coef[stage]);
-    memset(s->memory, 0, sizeof s->memory);
-    for (int stage = 0; stage < 1; ++stage) s->memory[stage].patience = 150;
-    s->pause = 16;
-    s->setback = s->foreseeing = 0;
-    s->doubt = s->retry = 0;
-    s->effort = 0.0;
-    s->passes = INT_MAX;
-    s->h = h;
-    s->ready = 1;
-    return so4_manakov_OK;
-}
-
-so4_manakov_status so4_manakov_step(so4_manakov_solver *s, double h)
-{
-    so4_manakov_status status = so4_manakov_set_step(s, h);
-    if (status != so4_manakov_OK) return status;
-    status = so4_manakov_stages(s);
-    if (status == so4_manakov_OK) ++s->steps;
-    return status;
-}
-
-/*
- * Eight at a time: below, the formulas of a step are evaluated for 8 steps of a trajectory, or members of an
- * ensemble, at once. Compilers make vector instructions of the loops over lanes.
- */
-enum { so4_manakov_LANES = 8 };
-
-#if defined(__GNUC__)
-typedef double so4_manakov_lanes[so4_manakov_LANES] __attribute__((aligned(64))); /* a value in each lane */
-#else
-typedef double so4_manakov_lanes[so4_manakov_LANES];
-#endif
-
-#if defined(__clang__)
-#define so4_manakov_EACH_LANE _Pragma("clang loop vectorize(assume_safety)")
-#pragma clang diagnostic push
-#pragma clang diagnostic ignored "-Wpass-failed"
-#elif defined(__GNUC__)
-#define so4_manakov_EACH_LANE _Pragma("GCC ivdep") _Pragma("GCC unroll 1")
-#else
-#define so4_manakov_EACH_LANE
-#endif
-
-/* What all blocks share: coefficients, the same in each lane, and the recurrences by which they are foreseen. */
-typedef struct {
-    int fits[1]; /* the fit that weight is of; -1 for none */
-    so4_manakov_lanes coef[1][32], weight[1][40][6];
-} so4_manakov_table;
-
-/* A stage in all lanes, linearised around y. */
-typedef struct {
-    so4_manakov_lanes y[6], displacement[6], increment[6], residual[6];
-    /* a residual r of alpha(y) = x takes inverse r from y, and gain r from the increment */
-    so4_manakov_lanes inverse[36], slope[36], gain[36];
-} so4_manakov_model;
-
-/* so4_manakov_phi0 for the loops over lanes: no branches. No number beyond |s| = 4.0. */
-static inline double so4_manakov_phi0_lane(double s)
-{
-    const double ss = s * s;
-    double sum = 1.455172475614865e-27, other = 5.744790668872202e-26; /* every second term each, as neither then is waited for */
-    sum = sum * ss + 2.267952452337683e-24;
-    other = other * ss + 8.953517427037546e-23;
-    sum = sum * ss + 3.534707039629467e-21;
-    other = other * ss + 1.3954464685812522e-19;
-    sum = sum * ss + 5.5090028283602295e-18;
-    other = other * ss + 2.174868698558062e-16;
-    sum = sum * ss + 8.586062056277845e-15;
-    other = other * ss + 3.3896802963225827e-13;
-    sum = sum * ss + 1.3382536530684679e-11;
-    other = other * ss + 5.284190138687493e-10;
-    sum = sum * ss + 2.08767569878681e-08;
-    other = other * ss + 8.267195767195768e-07;
-    sum = sum * ss + 3.306878306878307e-05;
-    other = other * ss + 0.001388888888888889;
-    sum = (sum * s + other) * s + 0.08333333333333333;
-    return sum + (fabs(s) <= 4.0 ? 0.0 : (double)NAN);
-}
-
-/* so4_manakov_phi1 for the loops over lanes: no branches. No number beyond |s| = 4.0. */
-static inline double so4_manakov_phi1_lane(double s)
-{
-    const double ss = s * s;
-    double sum = 6.266191399131027e-28, other = 2.328275960983784e-26; /* every second term each, as neither then is waited for */
-    sum = sum * ss + 8.617186003308303e-25;
-    other = other * ss + 3.1751334332727565e-23;
-    sum = sum * ss + 1.163957265514881e-21;
-    other = other * ss + 4.241648447555361e-20;
-    sum = sum * ss + 1.5349911154393775e-18;
-    other = other * ss + 5.5090028283602297e-17;
-    sum = sum * ss + 1.9573818287022555e-15;
-    other = other * ss + 6.868849645022276e-14;
-    sum = sum * ss + 2.372776207425808e-12;
-    other = other * ss + 8.029521918410807e-11;
-    sum = sum * ss + 2.6420950693437467e-09;
-    other = other * ss + 8.35070279514724e-08;
-    sum = sum * ss + 2.48015873015873e-06;
-    other = other * ss + 6.613756613756614e-05;
-    sum = (sum * s + other) * s + 0.001388888888888889;
-    return sum + (fabs(s) <= 4.0 ? 0.0 : (double)NAN);
-}
-
-/* so4_manakov_linearise_lanes_part1 (part 1 of 3) */
-so4_manakov_APART static void so4_manakov_linearise_lanes_part1(so4_manakov_lanes coef[restrict 32],
-                                                                so4_manakov_lanes y[restrict 6],
-                                                                so4_manakov_lanes displacement[restrict 6],
-                                                                so4_manakov_lanes increment[restrict 6],
-                                                                so4_manakov_lanes jacobian[restrict 36],
-                                                                so4_manakov_lanes increment_jacobian[restrict 36],
-                                                                so4_manakov_lanes work[restrict 130])
-{
-    (void)jacobian;
-    (void)increment_jacobian;
-    so4_manakov_EACH_LANE
-    for (int lane = 0; lane < so4_manakov_LANES; ++lane) {
-        const double x12 = y[0][lane];
-        const double x13 = y[1][lane];
-        const double x14 = y[2][lane];
-        const double x23 = y[3][lane];
-        const double x24 = y[4][lane];
-        const double x34 = y[5][lane];
-        const double t1 = x14 * x23;
-        const double t2 = x13 * x24;
-        work[7][lane] = coef[0][lane] * t1 + coef[1][lane] * t2;
-        const double t4 = x24 * x24;
-        const double t5 = x23 * x23;
-        const double t6 = x14 * x14;
-        const double t7 = x13 * x13;
-        work[11][lane] = coef[3][lane] * t4 + (coef[4][lane] * t5 + coef[5][lane] * t6 + (coef[2][lane] + coef[6][lane] * t7));
-        work[119][lane] = x34 * work[7][lane] + x12 * work[11][lane];
-        work[46][lane] = coef[18][lane] * t4 + (coef[19][lane] + coef[9][lane] * t7 + (coef[13][lane] * t6 + coef[15][lane] * t5));
-        work[118][lane] = x12 * work[7][lane] + x34 * work[46][lane];
-        const double t10 = 2.0 * work[118][lane];
-        const double t11 = work[119][lane] + t10;
-        const double t12 = x12 * x34;
-        work[27][lane] = coef[7][lane] * t1 + coef[1][lane] * t12;
-        const double t14 = x34 * x34;
-        const double t15 = x12 * x12;
-        work[28][lane] = coef[9][lane] * t14 + (coef[8][lane] + coef[6][lane] * t15 + (coef[10][lane] * t5 + coef[11][lane] * t6));
-        work[110][lane] = x24 * work[27][lane] + x13 * work[28][lane];
-        work[43][lane] = coef[18][lane] * t14 + (coef[16][lane] * t5 + coef[14][lane] * t6 + (coef[17][lane] + coef[3][lane] * t15));
-        work[109][lane] = x13 * work[27][lane] + x24 * work[43][lane];
-        const double t18 = 2.0 * work[109][lane];
-        const double t19 = work[110][lane] - t18;
-        work[35][lane] = coef[7][lane] * t2 + coef[0][lane] * t12;
-        work[39][lane] = coef[15][lane] * t14 + (coef[16][lane] * t4 + coef[10][lane] * t7 + (coef[12][lane] + coef[4][lane] * t15));
-        work[108][lane] = x14 * work[35][lane] + x23 * work[39][lane];
-        const double t22 = work[118][lane] * work[118][lane] + (work[109][lane] * work[109][lane] + work[108][lane] * work[108][lane]);
-        work[34][lane] = coef[13][lane] * t14 + (coef[14][lane] * t4 + coef[11][lane] * t7 + (coef[12][lane] + coef[5][lane] * t15));
-        work[111][lane] = x23 * work[35][lane] + x14 * work[34][lane];
-        const double t24 = 2.0 * work[108][lane];
-        const double t25 = work[111][lane] + t24;
-        const double t26 = work[119][lane] * t11 + (work[110][lane] * t19 + (t22 + work[111][lane] * t25));
-        work[23][lane] = so4_manakov_phi0_lane(t26);
-        work[33][lane] = 0.5 * work[109][lane];
-        work[38][lane] = 0.5 * work[110][lane];
-        work[22][lane] = work[33][lane] - work[38][lane];
-        work[47][lane] = work[38][lane] - work[33][lane];
-        work[86][lane] = 0.5 * work[119][lane];
-        work[85][lane] = 0.5 * work[118][lane];
-        work[21][lane] = work[86][lane] + work[85][lane];
-        const double t35 = x34 * work[47][lane] + x24 * work[21][lane] + (x12 * work[47][lane] - x13 * work[21][lane]);
-        const double t36 = work[22][lane] * t35;
-        work[26][lane] = 0.5 * work[108][lane];
-        work[42][lane] = 0.5 * work[111][lane];
-        work[30][lane] = work[26][lane] + work[42][lane];
-        const double t40 = x23 * work[21][lane];
-        const double t41 = x34 * work[30][lane];
-        const double t42 = x14 * work[21][lane];
-        const double t43 = x12 * work[30][lane];
-        const double t44 = t40 - t41 + (t42 - t43);
-        const double t45 = t43 - t42 + (t41 - t40);
-        const double t46 = t36 + work[30][lane] * t44 + (t36 - work[30][lane] * t45);
-        const double t47 = work[23][lane] * t46;
-        const double t48 = work[119][lane] - t10;
-        const double t49 = work[110][lane] + t18;
-        const double t50 = work[111][lane] - t24;
-        const double t51 = work[119][lane] * t48 + (work[110][lane] * t49 + (t22 + work[111][lane] * t50));
-        work[1][lane] = so4_manakov_phi0_lane(t51);
-        work[18][lane] = work[38][lane] + work[33][lane];
-        const double t54 = x34 * work[18][lane];
-        work[19][lane] = work[86][lane] - work[85][lane];
-        const double t56 = x12 * work[18][lane];
-        const double t57 = t54 + x24 * work[19][lane] + (x13 * work[19][lane] - t56);
-        const double t58 = work[18][lane] * t57;
-        work[29][lane] = work[26][lane] - work[42][lane];
-        work[20][lane] = work[85][lane] - work[86][lane];
-        work[52][lane] = work[42][lane] - work[26][lane];
-        const double t62 = x14 * work[20][lane] + x12 * work[52][lane] + (x34 * work[29][lane] + x23 * work[19][lane]);
-        const double t63 = work[29][lane] * t62;
-        const double t64 = t56 + x13 * work[20][lane] + (x24 * work[20][lane] - t54);
-        const double t65 = work[18][lane] * t64;
-        work[4][lane] = t58 + t63 + (t63 - t65);
-        const double t67 = x13 * work[108][lane] + x14 * work[109][lane] - (x23 * work[110][lane] + x24 * work[111][lane]);
-        const double t68 = x23 * work[18][lane];
-        const double t69 = x14 * work[18][lane];
-        work[71][lane] = t68 + x24 * work[52][lane] + (x13 * work[52][lane] - t69);
-        work[70][lane] = x24 * work[29][lane] - t68 + (x13 * work[29][lane] + t69);
-        work[55][lane] = work[29][lane] * work[71][lane] + work[19][lane] * t64 + (work[52][lane] * work[70][lane] + work[20][lane] * t57);
-        const double t73 = work[1][lane] * work[55][lane];
-        const double t74 = work[21][lane] * t35;
-        work[69][lane] = x14 * work[22][lane] + x13 * work[30][lane] + (x23 * work[22][lane] - x24 * work[30][lane]);
-        const double t76 = work[30][lane] * work[69][lane];
-        const double t77 = t74 - t76;
-        work[58][lane] = t77 + t77;
-        const double t79 = x23 * work[119][lane] - x34 * work[111][lane] + (x14 * work[118][lane] - x12 * work[108][lane]);
-        const double t80 = work[19][lane] * t62;
-        const double t81 = work[18][lane] * work[70][lane];
-        const double t82 = work[18][lane] * work[71][lane];
-        work[90][lane] = t80 - t81 + (t80 + t82);
-        const double t84 = work[47][lane] * work[69][lane];
-        work[89][lane] = t84 + work[21][lane] * t45 + (t84 - work[21][lane] * t44);
-        const double t86 = work[23][lane] * work[89][lane];
-        const double t87 = x34 * work[110][lane] + x24 * work[119][lane] - (x13 * work[118][lane] + x12 * work[109][lane]);
-        const double t88 = work[20][lane] * t62;
-        work[98][lane] = t88 - t82 + (t81 + t88);
-        const double t90 = x12 * work[110][lane] - x13 * work[119][lane] + (x24 * work[118][lane] - x34 * work[109][lane]);
-        const double t91 = t76 - t74;
-        work[99][lane] = t91 + t91;
-        const double t93 = x12 * work[111][lane] - x14 * work[119][lane] + (x34 * work[108][lane] - x23 * work[118][lane]);
-        const double t94 = work[52][lane] * t62;
-        work[101][lane] = t94 - t58 + (t65 + t94);
-        const double t96 = x13 * work[111][lane] - x14 * work[110][lane] + (x23 * work[109][lane] - x24 * work[108][lane]);
-        work[97][lane] = work[22][lane] * work[47][lane];
-        work[84][lane] = work[30][lane] * work[30][lane];
-        const double t99 = work[97][lane] - work[84][lane];
-        work[45][lane] = (t99 + t99) * work[23][lane];
-        work[83][lane] = work[52][lane] * work[29][lane];
-        work[44][lane] = work[18][lane] * work[18][lane];
-        const double t103 = work[83][lane] - work[44][lane];
-        work[6][lane] = work[45][lane] + (t103 + t103) * work[1][lane];
-        work[67][lane] = 0.5 * x14;
-        work[78][lane] = 0.5 * x23;
-        work[51][lane] = work[67][lane] - work[78][lane];
-        const double t108 = work[51][lane] * work[29][lane];
-        work[68][lane] = 0.5 * x13;
-        work[0][lane] = 0.5 * x24;
-        work[64][lane] = work[68][lane] + work[0][lane];
-        work[95][lane] = work[64][lane] * work[18][lane];
-        work[62][lane] = (-0.5) * x13 - work[0][lane];
-        work[96][lane] = work[62][lane] * work[18][lane];
-        const double t115 = 2.0 * work[119][lane];
-        const double t116 = so4_manakov_phi1_lane(t51);
-        work[61][lane] = (t10 - t115) * t116;
-        work[59][lane] = work[0][lane] - work[68][lane];
-        const double t119 = work[59][lane] * work[22][lane];
-        work[91][lane] = (-0.5) * x23 - work[67][lane];
-        work[88][lane] = work[78][lane] + work[67][lane];
-        work[49][lane] = work[88][lane] * work[30][lane];
-        const double t123 = (t119 - work[91][lane] * work[30][lane] + (t119 + work[49][lane])) * work[23][lane];
-        const double t124 = so4_manakov_phi1_lane(t26);
-        work[66][lane] = (t115 + t10) * t124;
-        work[100][lane] = t123 + t46 * work[66][lane];
-        work[8][lane] = (t108 - work[95][lane] + (work[96][lane] + t108)) * work[1][lane] + work[61][lane] * work[4][lane] + work[100][lane];
-        work[25][lane] = x12 * x24;
-        work[24][lane] = x13 * x34;
-        work[9][lane] = coef[23][lane] * work[25][lane] + coef[1][lane] * work[24][lane];
-        work[75][lane] = 0.5 * x34;
-        work[48][lane] = (-0.5) * x12 - work[75][lane];
-        work[60][lane] = 0.5 * t35;
-        const double t134 = work[48][lane] * work[22][lane] + work[60][lane];
-        const double t135 = 2.0 * work[110][lane];
-        work[57][lane] = (t18 - t135) * t124;
-        work[104][lane] = work[23][lane] * (t134 + t134) + t46 * work[57][lane];
-        work[73][lane] = 0.5 * x12;
-        work[50][lane] = work[75][lane] - work[73][lane];
-        work[63][lane] = 0.5 * t57;
-        work[103][lane] = work[50][lane] * work[18][lane] + work[63][lane];
-        work[53][lane] = work[73][lane] - work[75][lane];
-        work[65][lane] = 0.5 * t64;
-        work[102][lane] = work[53][lane] * work[18][lane] + work[65][lane];
-        const double t145 = work[1][lane] * (work[103][lane] - work[102][lane]);
-        work[56][lane] = (t135 + t18) * t116;
-        work[10][lane] = work[104][lane] + (t145 + work[4][lane] * work[56][lane]) - work[67][lane];
-        work[87][lane] = work[78][lane] - work[67][lane];
-        work[54][lane] = work[87][lane] * work[29][lane];
-        work[81][lane] = (work[119][lane] + t48) * t116;
-        work[82][lane] = (work[119][lane] + t11) * t124;
-        work[105][lane] = t123 + t46 * work[82][lane];
-        work[12][lane] = (work[54][lane] - work[96][lane] + (work[54][lane] + work[95][lane])) * work[1][lane] + work[4][lane] * work[81][lane] + work[105][lane];
-        work[40][lane] = x12 * x13;
-        work[41][lane] = x24 * x34;
-        work[13][lane] = coef[20][lane] * work[40][lane] + coef[1][lane] * work[41][lane];
-        work[79][lane] = (work[110][lane] + t49) * t116;
-        work[77][lane] = work[75][lane] + work[73][lane];
-        const double t159 = work[77][lane] * work[22][lane] - work[60][lane];
-        work[80][lane] = (work[110][lane] + t19) * t124;
-        work[106][lane] = work[23][lane] * (t159 + t159) + t46 * work[80][lane];
-        work[14][lane] = work[78][lane] + (work[4][lane] * work[79][lane] + t145 + work[106][lane]);
-        work[31][lane] = x12 * x23;
-        work[32][lane] = x14 * x34;
-        work[15][lane] = coef[22][lane] * work[31][lane] + coef[0][lane] * work[32][lane];
-        work[93][lane] = 0.5 * t44;
-        work[92][lane] = 0.5 * t45;
-        const double t168 = work[23][lane] * (work[48][lane] * work[30][lane] + work[93][lane] - (work[77][lane] * work[30][lane] + work[92][lane]));
-        const double t169 = 2.0 * work[111][lane];
-        work[74][lane] = (t169 + t24) * t124;
-        work[107][lane] = t168 + t46 * work[74][lane];
-        work[94][lane] = 0.5 * t62;
-        const double t173 = work[50][lane] * work[29][lane] + work[94][lane];
-        work[72][lane] = (t24 - t169) * t116;
-        work[16][lane] = work[107][lane] + (work[1][lane] * (t173 + t173) + work[4][lane] * work[72][lane]) - work[68][lane];
-        work[37][lane] = x23 * x34;
-        work[36][lane] = x12 * x14;
-        work[17][lane] = coef[0][lane] * work[37][lane] + coef[21][lane] * work[36][lane];
-        work[2][lane] = work[53][lane] * work[29][lane] - work[94][lane];
-        work[3][lane] = (work[111][lane] + t50) * t116;
-        work[76][lane] = (work[111][lane] + t25) * t124;
-        work[5][lane] = t168 + t46 * work[76][lane];
-        displacement[0][lane] = t47 + work[1][lane] * work[4][lane] - 0.5 * t67;
-        increment[0][lane] = t67;
-        displacement[1][lane] = t73 + work[23][lane] * work[58][lane] - 0.5 * t79;
-        increment[1][lane] = t79;
-        displacement[2][lane] = work[1][lane] * work[90][lane] + t86 - 0.5 * t87;
-        increment[2][lane] = t87;
-        displacement[3][lane] = work[1][lane] * work[98][lane] + t86 - 0.5 * t90;
-        increment[3][lane] = t90;
-        displacement[4][lane] = work[23][lane] * work[99][lane] + t73 - 0.5 * t93;
-        increment[4][lane] = t93;
-        displacement[5][lane] = t47 + work[1][lane] * work[101][lane] - 0.5 * t96;
-        increment[5][lane] = t96;
-    }
-}
-
-/* so4_manakov_linearise_lanes_part2 (part 2 of 3) */
-so4_manakov_APART static void so4_manakov_linearise_lanes_part2(so4_manakov_lanes coef[restrict 32],
-                                                                so4_manakov_lanes y[restrict 6],
-                                                                so4_manakov_lanes displacement[restrict 6],
-                                                                so4_manakov_lanes increment[restrict 6],
-                                                                so4_manakov_lanes jacobian[restrict 36],
-                                                                so4_manakov_lanes increment_jacobian[restrict 36],
-                                                                so4_manakov_lanes work[restrict 130])
-{
-    (void)displacement;
-    (void)increment;
-    so4_manakov_EACH_LANE
-    for (int lane = 0; lane < so4_manakov_LANES; ++lane) {
-        const double x13 = y[1][lane];
-        const double x14 = y[2][lane];
-        const double x23 = y[3][lane];
-        const double x24 = y[4][lane];
-        const double t183 = work[0][lane] + (work[1][lane] * (work[2][lane] + work[2][lane]) + work[3][lane] * work[4][lane] + work[5][lane]);
-        const double t184 = work[18][lane] * work[19][lane];
-        const double t185 = work[18][lane] * work[20][lane];
-        const double t186 = (t184 - t185) * work[1][lane];
-        const double t187 = work[21][lane] * work[22][lane];
-        const double t188 = (t187 + t187) * work[23][lane];
-        work[114][lane] = coef[26][lane] * work[24][lane] + coef[1][lane] * work[25][lane];
-        const double t190 = x13 * x14;
-        const double t191 = x23 * x24;
-        work[115][lane] = coef[24][lane] * t190 + coef[7][lane] * t191;
-        const double t193 = x13 * x23;
-        const double t194 = x14 * x24;
-        work[116][lane] = coef[25][lane] * t193 + coef[7][lane] * t194;
-        const double t196 = work[20][lane] * work[29][lane];
-        const double t197 = work[30][lane] * work[21][lane];
-        const double t198 = (t197 + t197) * work[23][lane];
-        const double t199 = (t196 + t196) * work[1][lane] + t198;
-        work[113][lane] = coef[0][lane] * work[31][lane] + coef[28][lane] * work[32][lane];
-        work[121][lane] = coef[7][lane] * t193 + coef[27][lane] * t194;
-        const double t202 = work[19][lane] * work[29][lane];
-        const double t203 = t198 + (t202 + t202) * work[1][lane];
-        work[112][lane] = coef[0][lane] * work[36][lane] + coef[30][lane] * work[37][lane];
-        work[120][lane] = coef[7][lane] * t190 + coef[29][lane] * t191;
-        work[123][lane] = coef[1][lane] * work[40][lane] + coef[31][lane] * work[41][lane];
-        const double t207 = work[44][lane] + work[29][lane] * work[29][lane];
-        const double t208 = work[45][lane] + (t207 + t207) * work[1][lane] + (work[46][lane] * work[8][lane] + work[123][lane] * work[10][lane] + (work[113][lane] * t183 + work[112][lane] * work[16][lane] + (work[7][lane] * work[12][lane] + work[114][lane] * work[14][lane])));
-        const double t209 = work[21][lane] * work[47][lane];
-        const double t210 = (t209 + t209) * work[23][lane];
-        const double t211 = work[48][lane] * work[21][lane];
-        const double t212 = t211 - work[49][lane];
-        const double t213 = work[50][lane] * work[20][lane];
-        const double t214 = work[51][lane] * work[52][lane];
-        const double t215 = work[53][lane] * work[19][lane];
-        const double t216 = (t213 + t214 + (work[54][lane] + t215)) * work[1][lane];
-        const double t217 = t216 + work[55][lane] * work[56][lane];
-        const double t218 = (t212 + t212) * work[23][lane] + work[57][lane] * work[58][lane] + t217;
-        const double t219 = work[59][lane] * work[21][lane] + work[60][lane];
-        const double t220 = work[23][lane] * (t219 + t219);
-        const double t221 = work[61][lane] * work[55][lane] + work[1][lane] * (work[62][lane] * work[20][lane] + work[63][lane] + (work[64][lane] * work[19][lane] - work[65][lane]));
-        const double t222 = t220 + work[66][lane] * work[58][lane] + t221 - work[67][lane];
-        const double t223 = work[68][lane] - work[0][lane];
-        const double t224 = 0.5 * work[69][lane];
-        const double t225 = t223 * work[30][lane] + t224;
-        const double t226 = work[23][lane] * (t225 + t225);
-        const double t227 = 0.5 * work[70][lane];
-        const double t228 = 0.5 * work[71][lane];
-        const double t229 = work[72][lane] * work[55][lane] + work[1][lane] * (work[64][lane] * work[52][lane] - t227 + (work[62][lane] * work[29][lane] + t228));
-        const double t230 = work[73][lane] + (work[74][lane] * work[58][lane] - t226 + t229);
-        const double t231 = (-0.5) * x24 - work[68][lane];
-        const double t232 = work[3][lane] * work[55][lane] + work[1][lane] * (t231 * work[52][lane] + t227 + (work[64][lane] * work[29][lane] - t228));
-        const double t233 = work[75][lane] + (t232 + (work[58][lane] * work[76][lane] - t226));
-        const double t234 = work[77][lane] * work[21][lane];
-        const double t235 = (-0.5) * x14 - work[78][lane];
-        const double t236 = t235 * work[30][lane];
-        const double t237 = t234 - t236;
-        const double t238 = t216 + work[79][lane] * work[55][lane];
-        const double t239 = (t237 + t237) * work[23][lane] + work[80][lane] * work[58][lane] + t238;
-        const double t240 = work[55][lane] * work[81][lane] + work[1][lane] * (work[64][lane] * work[20][lane] - work[63][lane] + (work[62][lane] * work[19][lane] + work[65][lane]));
-        const double t241 = t220 + work[82][lane] * work[58][lane] + t240 - work[78][lane];
-        const double t242 = work[20][lane] * work[19][lane];
-        const double t243 = t242 + work[83][lane];
-        const double t244 = (t243 + t243) * work[1][lane];
-        const double t245 = work[21][lane] * work[21][lane];
-        const double t246 = work[84][lane] + t245;
-        const double t247 = (t246 + t246) * work[23][lane];
-        const double t248 = t244 - t247;
-        const double t249 = work[18][lane] * work[52][lane];
-        const double t250 = work[18][lane] * work[29][lane];
-        const double t251 = (t249 - t250) * work[1][lane];
-        const double t252 = work[30][lane] * work[22][lane];
-        const double t253 = (t252 + t252) * work[23][lane];
-        const double t254 = (t250 - t249) * work[1][lane];
-        const double t255 = t244 + t247;
-        const double t256 = (t185 - t184) * work[1][lane];
-        const double t257 = work[52][lane] * work[19][lane];
-        const double t258 = t198 + (t257 + t257) * work[1][lane];
-        const double t259 = work[87][lane] * work[18][lane] + t228;
-        const double t260 = work[51][lane] * work[18][lane] + t227;
-        const double t261 = work[1][lane] * (t259 - t260);
-        const double t262 = work[88][lane] * work[47][lane] - t224;
-        const double t263 = work[89][lane] * work[57][lane] + work[23][lane] * (t262 + t262);
-        const double t264 = work[73][lane] + (work[90][lane] * work[56][lane] + t261 + t263);
-        const double t265 = work[23][lane] * (work[91][lane] * work[21][lane] + work[92][lane] - (work[88][lane] * work[21][lane] + work[93][lane]));
-        const double t266 = work[89][lane] * work[66][lane] + t265;
-        const double t267 = work[51][lane] * work[19][lane] - work[94][lane];
-        const double t268 = work[68][lane] + (t266 + (work[61][lane] * work[90][lane] + work[1][lane] * (t267 + t267)));
-        const double t269 = t231 * work[18][lane];
-        const double t270 = t223 * work[47][lane];
-        const double t271 = (t270 - t211 + (t270 + t234)) * work[23][lane];
-        const double t272 = t271 + work[89][lane] * work[76][lane];
-        const double t273 = (t215 + work[95][lane] + (t215 - t269)) * work[1][lane] + work[3][lane] * work[90][lane] + t272;
-        const double t274 = t271 + work[89][lane] * work[74][lane];
-        const double t275 = work[50][lane] * work[19][lane];
-        const double t276 = t274 + ((t275 - work[95][lane] + (work[96][lane] + t275)) * work[1][lane] + work[72][lane] * work[90][lane]);
-        const double t277 = t235 * work[47][lane] + t224;
-        const double t278 = work[23][lane] * (t277 + t277) + work[89][lane] * work[80][lane];
-        const double t279 = work[79][lane] * work[90][lane] + t261 + t278 - work[75][lane];
-        const double t280 = work[87][lane] * work[19][lane] + work[94][lane];
-        const double t281 = t265 + work[89][lane] * work[82][lane];
-        const double t282 = work[90][lane] * work[81][lane] + work[1][lane] * (t280 + t280) + t281 - work[0][lane];
-        const double t283 = work[30][lane] * work[47][lane];
-        const double t284 = (t283 + t283) * work[23][lane];
-        const double t285 = t242 - work[44][lane];
-        const double t286 = work[97][lane] - t245;
-        const double t287 = (t286 + t286) * work[23][lane];
-        const double t288 = (t285 + t285) * work[1][lane] + t287;
-        const double t289 = work[19][lane] * work[19][lane] + work[44][lane];
-        const double t290 = (t289 + t289) * work[1][lane] + t287 + (work[120][lane] * t264 + work[112][lane] * t268 + (work[35][lane] * t273 + work[39][lane] * t276 + (work[15][lane] * t282 + work[116][lane] * t279)));
-        const double t291 = work[20][lane] * work[52][lane];
-        const double t292 = t198 + (t291 + t291) * work[1][lane];
-        const double t293 = work[1][lane] * (t260 - t259);
-        const double t294 = work[75][lane] + (t263 + (work[98][lane] * work[56][lane] + t293));
-        const double t295 = work[51][lane] * work[20][lane] + work[94][lane];
-        const double t296 = work[1][lane] * (t295 + t295) + work[98][lane] * work[61][lane] + t266 - work[0][lane];
-        const double t297 = work[53][lane] * work[20][lane];
-        const double t298 = t272 + ((t297 - work[95][lane] + (t297 + t269)) * work[1][lane] + work[98][lane] * work[3][lane]);
-        const double t299 = (t213 - work[96][lane] + (t213 + work[95][lane])) * work[1][lane] + work[98][lane] * work[72][lane] + t274;
-        const double t300 = work[87][lane] * work[20][lane] - work[94][lane];
-        const double t301 = work[68][lane] + (t281 + (work[98][lane] * work[81][lane] + work[1][lane] * (t300 + t300)));
-        const double t302 = work[98][lane] * work[79][lane] + t293 + t278 - work[73][lane];
-        const double t303 = work[20][lane] * work[20][lane] + work[44][lane];
-        const double t304 = (t303 + t303) * work[1][lane] + t287 + (work[113][lane] * t296 + work[121][lane] * t294 + (work[34][lane] * t298 + work[35][lane] * t299 + (work[17][lane] * t301 + work[115][lane] * t302)));
-        const double t305 = work[49][lane] - t211;
-        const double t306 = t217 + ((t305 + t305) * work[23][lane] + work[99][lane] * work[57][lane]);
-        const double t307 = work[78][lane] + (work[99][lane] * work[66][lane] - t220 + t221);
-        const double t308 = t236 - t234;
-        const double t309 = t238 + ((t308 + t308) * work[23][lane] + work[99][lane] * work[80][lane]);
-        const double t310 = work[67][lane] + (work[99][lane] * work[82][lane] - t220 + t240);
-        const double t311 = work[99][lane] * work[74][lane] + t226 + t229 - work[75][lane];
-        const double t312 = t226 + work[99][lane] * work[76][lane] + t232 - work[73][lane];
-        const double t313 = work[52][lane] * work[52][lane] + work[44][lane];
-        const double t314 = work[100][lane] + ((t214 + work[95][lane] + (t214 - work[96][lane])) * work[1][lane] + work[101][lane] * work[61][lane]);
-        const double t315 = work[1][lane] * (work[102][lane] - work[103][lane]);
-        const double t316 = t315 + work[101][lane] * work[56][lane] + work[104][lane] - work[78][lane];
-        const double t317 = work[87][lane] * work[52][lane];
-        const double t318 = (t317 - work[95][lane] + (t317 + work[96][lane])) * work[1][lane] + work[101][lane] * work[81][lane] + work[105][lane];
-        const double t319 = work[67][lane] + (work[106][lane] + (work[101][lane] * work[79][lane] + t315));
-        const double t320 = work[50][lane] * work[52][lane] - work[94][lane];
-        const double t321 = work[0][lane] + (work[107][lane] + (work[101][lane] * work[72][lane] + work[1][lane] * (t320 + t320)));
-        const double t322 = work[53][lane] * work[52][lane] + work[94][lane];
-        const double t323 = work[101][lane] * work[3][lane] + work[1][lane] * (t322 + t322) + work[5][lane] - work[68][lane];
-        const double t324 = (t313 + t313) * work[1][lane] + work[45][lane] + (work[7][lane] * t314 + work[9][lane] * t316 + (work[11][lane] * t318 + work[13][lane] * t319 + (work[15][lane] * t321 + work[17][lane] * t323)));
-        work[129][lane] = x14 * work[9][lane];
-        work[127][lane] = x13 * work[15][lane];
-        work[124][lane] = x24 * work[17][lane];
-        work[117][lane] = x23 * work[13][lane];
-        const double t329 = x14 * work[27][lane];
-        const double t330 = x13 * work[35][lane];
-        const double t331 = x24 * work[35][lane];
-        const double t332 = x23 * work[27][lane];
-        work[122][lane] = x14 * work[123][lane];
-        work[125][lane] = x13 * work[112][lane];
-        work[126][lane] = x24 * work[113][lane];
-        work[128][lane] = x23 * work[114][lane];
-        jacobian[0][lane] = 1.0 + (work[6][lane] + (work[7][lane] * work[8][lane] + work[9][lane] * work[10][lane] + (work[11][lane] * work[12][lane] + work[13][lane] * work[14][lane] + (work[15][lane] * work[16][lane] + work[17][lane] * t183))));
-        jacobian[1][lane] = t186 - t188 - work[26][lane] + (work[114][lane] * work[8][lane] + work[27][lane] * work[10][lane] + (work[115][lane] * t183 + work[116][lane] * work[16][lane] + (work[13][lane] * work[12][lane] + work[28][lane] * work[14][lane])));
-        jacobian[2][lane] = t199 - work[33][lane] + (work[113][lane] * work[8][lane] + work[121][lane] * work[10][lane] + (work[34][lane] * t183 + work[35][lane] * work[16][lane] + (work[17][lane] * work[12][lane] + work[115][lane] * work[14][lane])));
-        jacobian[3][lane] = work[38][lane] + t203 + (work[112][lane] * work[8][lane] + work[120][lane] * work[10][lane] + (work[39][lane] * work[16][lane] + work[35][lane] * t183 + (work[15][lane] * work[12][lane] + work[116][lane] * work[14][lane])));
-        jacobian[4][lane] = work[42][lane] + (t186 + t188) + (work[123][lane] * work[8][lane] + work[43][lane] * work[10][lane] + (work[9][lane] * work[12][lane] + work[27][lane] * work[14][lane] + (work[120][lane] * work[16][lane] + work[121][lane] * t183)));
-        jacobian[5][lane] = t208;
-        jacobian[6][lane] = work[26][lane] + (t186 + t210) + (work[9][lane] * t218 + work[7][lane] * t222 + (work[15][lane] * t230 + work[17][lane] * t233 + (work[13][lane] * t239 + work[11][lane] * t241)));
-        jacobian[7][lane] = 1.0 + (t248 + (work[27][lane] * t218 + work[114][lane] * t222 + (work[28][lane] * t239 + work[13][lane] * t241 + (work[115][lane] * t233 + work[116][lane] * t230))));
-        jacobian[8][lane] = t251 - t253 - work[85][lane] + (work[121][lane] * t218 + work[113][lane] * t222 + (work[34][lane] * t233 + work[35][lane] * t230 + (work[115][lane] * t239 + work[17][lane] * t241)));
-        jacobian[9][lane] = t254 - t253 - work[86][lane] + (work[120][lane] * t218 + work[112][lane] * t222 + (work[116][lane] * t239 + work[15][lane] * t241 + (work[39][lane] * t230 + work[35][lane] * t233)));
-        jacobian[10][lane] = t255 + (work[43][lane] * t218 + work[123][lane] * t222 + (work[120][lane] * t230 + work[121][lane] * t233 + (work[27][lane] * t239 + work[9][lane] * t241)));
-        jacobian[11][lane] = work[42][lane] + (t210 + t256) + (work[123][lane] * t218 + work[46][lane] * t222 + (work[114][lane] * t239 + work[7][lane] * t241 + (work[113][lane] * t233 + work[112][lane] * t230)));
-        jacobian[12][lane] = work[33][lane] + t258 + (work[9][lane] * t264 + work[7][lane] * t268 + (work[17][lane] * t273 + work[15][lane] * t276 + (work[13][lane] * t279 + work[11][lane] * t282)));
-        jacobian[17][lane] = t203 - work[38][lane] + (work[123][lane] * t264 + work[46][lane] * t268 + (work[112][lane] * t276 + work[113][lane] * t273 + (work[114][lane] * t279 + work[7][lane] * t282)));
-        jacobian[13][lane] = work[85][lane] + (t284 + t251) + (work[114][lane] * t268 + work[27][lane] * t264 + (work[115][lane] * t273 + work[116][lane] * t276 + (work[13][lane] * t282 + work[28][lane] * t279)));
-        jacobian[16][lane] = t251 - t284 - work[86][lane] + (work[43][lane] * t264 + work[123][lane] * t268 + (work[121][lane] * t273 + work[120][lane] * t276 + (work[27][lane] * t279 + work[9][lane] * t282)));
-        jacobian[14][lane] = 1.0 + (t288 + (work[113][lane] * t268 + work[121][lane] * t264 + (work[34][lane] * t273 + work[35][lane] * t276 + (work[115][lane] * t279 + work[17][lane] * t282))));
-        jacobian[15][lane] = t290;
-        jacobian[18][lane] = t292 - work[38][lane] + (work[9][lane] * t294 + work[7][lane] * t296 + (work[17][lane] * t298 + work[15][lane] * t299 + (work[11][lane] * t301 + work[13][lane] * t302)));
-        jacobian[19][lane] = work[86][lane] + (t284 + t254) + (work[114][lane] * t296 + work[27][lane] * t294 + (work[116][lane] * t299 + work[115][lane] * t298 + (work[13][lane] * t301 + work[28][lane] * t302)));
-        jacobian[21][lane] = 1.0 + (t288 + (work[112][lane] * t296 + work[120][lane] * t294 + (work[39][lane] * t299 + work[35][lane] * t298 + (work[15][lane] * t301 + work[116][lane] * t302))));
-        jacobian[22][lane] = t254 - t284 - work[85][lane] + (work[43][lane] * t294 + work[123][lane] * t296 + (work[121][lane] * t298 + work[120][lane] * t299 + (work[9][lane] * t301 + work[27][lane] * t302)));
-        jacobian[23][lane] = work[33][lane] + t199 + (work[46][lane] * t296 + work[123][lane] * t294 + (work[113][lane] * t298 + work[112][lane] * t299 + (work[7][lane] * t301 + work[114][lane] * t302)));
-        jacobian[20][lane] = t304;
-        jacobian[24][lane] = t186 - t210 - work[42][lane] + (work[9][lane] * t306 + work[7][lane] * t307 + (work[13][lane] * t309 + work[11][lane] * t310 + (work[15][lane] * t311 + work[17][lane] * t312)));
-        jacobian[25][lane] = t255 + (work[27][lane] * t306 + work[114][lane] * t307 + (work[28][lane] * t309 + work[13][lane] * t310 + (work[116][lane] * t311 + work[115][lane] * t312)));
-        jacobian[26][lane] = work[86][lane] + (t253 + t251) + (work[121][lane] * t306 + work[113][lane] * t307 + (work[115][lane] * t309 + work[17][lane] * t310 + (work[34][lane] * t312 + work[35][lane] * t311)));
-        jacobian[27][lane] = work[85][lane] + (t253 + t254) + (work[120][lane] * t306 + work[112][lane] * t307 + (work[35][lane] * t312 + work[39][lane] * t311 + (work[116][lane] * t309 + work[15][lane] * t310)));
-        jacobian[28][lane] = 1.0 + (t248 + (work[43][lane] * t306 + work[123][lane] * t307 + (work[121][lane] * t312 + work[120][lane] * t311 + (work[27][lane] * t309 + work[9][lane] * t310))));
-        jacobian[29][lane] = t256 - t210 - work[26][lane] + (work[123][lane] * t306 + work[46][lane] * t307 + (work[114][lane] * t309 + work[7][lane] * t310 + (work[112][lane] * t311 + work[113][lane] * t312)));
-        jacobian[31][lane] = t256 - t188 - work[42][lane] + (work[114][lane] * t314 + work[27][lane] * t316 + (work[116][lane] * t321 + work[115][lane] * t323 + (work[13][lane] * t318 + work[28][lane] * t319)));
-        jacobian[32][lane] = work[38][lane] + t292 + (work[113][lane] * t314 + work[121][lane] * t316 + (work[17][lane] * t318 + work[115][lane] * t319 + (work[35][lane] * t321 + work[34][lane] * t323)));
-        jacobian[33][lane] = t258 - work[33][lane] + (work[112][lane] * t314 + work[120][lane] * t316 + (work[15][lane] * t318 + work[116][lane] * t319 + (work[35][lane] * t323 + work[39][lane] * t321)));
-        jacobian[34][lane] = work[26][lane] + (t188 + t256) + (work[123][lane] * t314 + work[43][lane] * t316 + (work[121][lane] * t323 + work[120][lane] * t321 + (work[9][lane] * t318 + work[27][lane] * t319)));
-        jacobian[35][lane] = 1.0 + (work[6][lane] + (work[46][lane] * t314 + work[123][lane] * t316 + (work[7][lane] * t318 + work[114][lane] * t319 + (work[113][lane] * t323 + work[112][lane] * t321))));
-        jacobian[30][lane] = t324;
-        increment_jacobian[0][lane] = work[129][lane] + (work[127][lane] - work[124][lane] - work[117][lane]);
-        increment_jacobian[1][lane] = work[108][lane] + (t329 + (x13 * work[116][lane] - x24 * work[115][lane] - x23 * work[28][lane]));
-        increment_jacobian[34][lane] = x23 * work[43][lane] + (x13 * work[121][lane] - x24 * work[120][lane] - t329) - work[108][lane];
-        increment_jacobian[2][lane] = work[109][lane] + (x14 * work[121][lane] + (t330 - x24 * work[34][lane] - x23 * work[115][lane]));
-        increment_jacobian[33][lane] = work[109][lane] + (x23 * work[120][lane] + (t330 - x24 * work[39][lane] - x14 * work[116][lane]));
-        increment_jacobian[3][lane] = x14 * work[120][lane] + (x13 * work[39][lane] - t331 - x23 * work[116][lane]) - work[110][lane];
-        increment_jacobian[32][lane] = x23 * work[121][lane] + (x13 * work[34][lane] - t331 - x14 * work[115][lane]) - work[110][lane];
-        increment_jacobian[4][lane] = x14 * work[43][lane] + (x13 * work[120][lane] - x24 * work[121][lane] - t332) - work[111][lane];
-        increment_jacobian[31][lane] = work[111][lane] + (t332 + (x13 * work[115][lane] - x24 * work[116][lane] - x14 * work[28][lane]));
-        increment_jacobian[5][lane] = work[122][lane] + (work[125][lane] - work[126][lane] - work[128][lane]);
-    }
-}
-
-/* so4_manakov_linearise_lanes_part3 (part 3 of 3) */
-so4_manakov_APART static void so4_manakov_linearise_lanes_part3(so4_manakov_lanes coef[restrict 32],
-                                                                so4_manakov_lanes y[restrict 6],
-                                                                so4_manakov_lanes displacement[restrict 6],
-                                                                so4_manakov_lanes increment[restrict 6],
-                                                                so4_manakov_lanes jacobian[restrict 36],
-                                                                so4_manakov_lanes increment_jacobian[restrict 36],
-                                                                so4_manakov_lanes work[restrict 130])
-{
-    (void)coef;
-    (void)displacement;
-    (void)increment;
-    (void)jacobian;
-    so4_manakov_EACH_LANE
-    for (int lane = 0; lane < so4_manakov_LANES; ++lane) {
-        const double x12 = y[0][lane];
-        const double x13 = y[1][lane];
-        const double x14 = y[2][lane];
-        const double x23 = y[3][lane];
-        const double x24 = y[4][lane];
-        const double x34 = y[5][lane];
-        const double t337 = x14 * work[7][lane];
-        const double t338 = x14 * work[114][lane];
-        const double t339 = x34 * work[115][lane];
-        const double t340 = x12 * work[116][lane];
-        const double t341 = x12 * work[35][lane];
-        const double t342 = x34 * work[35][lane];
-        const double t343 = x23 * work[9][lane];
-        const double t344 = x12 * work[120][lane];
-        const double t345 = x34 * work[121][lane];
-        const double t346 = x23 * work[7][lane];
-        const double t347 = x13 * work[7][lane];
-        const double t348 = x12 * work[27][lane];
-        const double t349 = x12 * work[121][lane];
-        const double t350 = x13 * work[113][lane];
-        const double t351 = x34 * work[116][lane];
-        const double t352 = x24 * work[15][lane];
-        const double t353 = x34 * work[27][lane];
-        const double t354 = x24 * work[7][lane];
-        const double t355 = x12 * work[115][lane];
-        const double t356 = x13 * work[17][lane];
-        const double t357 = x24 * work[112][lane];
-        const double t358 = x34 * work[120][lane];
-        const double t359 = x14 * work[13][lane];
-        const double t360 = x23 * work[123][lane];
-        increment_jacobian[6][lane] = t337 + (x23 * work[11][lane] - (x12 * work[15][lane] + x34 * work[17][lane])) - work[108][lane];
-        increment_jacobian[29][lane] = x34 * work[112][lane] + x12 * work[113][lane] - t337 - x23 * work[46][lane] + work[108][lane];
-        increment_jacobian[7][lane] = t338 + (work[117][lane] - (t339 + t340));
-        increment_jacobian[8][lane] = work[118][lane] + (x14 * work[113][lane] + (x23 * work[17][lane] - (t341 + x34 * work[34][lane])));
-        increment_jacobian[27][lane] = t341 + x34 * work[39][lane] - x14 * work[15][lane] - x23 * work[112][lane] - work[118][lane];
-        increment_jacobian[9][lane] = work[119][lane] + (x14 * work[112][lane] + (x23 * work[15][lane] - (t342 + x12 * work[39][lane])));
-        increment_jacobian[26][lane] = t342 + x12 * work[34][lane] - x14 * work[17][lane] - x23 * work[113][lane] - work[119][lane];
-        increment_jacobian[10][lane] = work[122][lane] + (t343 - (t344 + t345));
-        increment_jacobian[11][lane] = t346 - (x34 * work[113][lane] + x12 * work[112][lane]) + x14 * work[46][lane] - work[111][lane];
-        increment_jacobian[24][lane] = work[111][lane] + (x34 * work[15][lane] + x12 * work[17][lane] - x14 * work[11][lane] - t346);
-        increment_jacobian[12][lane] = x34 * work[13][lane] + x24 * work[11][lane] - (t347 + x12 * work[9][lane]) - work[109][lane];
-        increment_jacobian[23][lane] = x12 * work[114][lane] - t347 + (x24 * work[46][lane] - x34 * work[123][lane]) - work[109][lane];
-        increment_jacobian[13][lane] = x24 * work[13][lane] + x34 * work[28][lane] - (x13 * work[114][lane] + t348) - work[118][lane];
-        increment_jacobian[22][lane] = work[118][lane] + (t348 - x13 * work[9][lane] + (x24 * work[123][lane] - x34 * work[43][lane]));
-        increment_jacobian[14][lane] = t339 + work[124][lane] - (t349 + t350);
-        increment_jacobian[15][lane] = t351 + t352 - (t344 + work[125][lane]);
-        increment_jacobian[16][lane] = work[119][lane] + (t353 + x24 * work[9][lane] - (x13 * work[123][lane] + x12 * work[43][lane]));
-        increment_jacobian[19][lane] = x24 * work[114][lane] - t353 + (x12 * work[28][lane] - x13 * work[13][lane]) - work[119][lane];
-        increment_jacobian[17][lane] = work[110][lane] + (x34 * work[114][lane] + t354 - (x12 * work[123][lane] + x13 * work[46][lane]));
-        increment_jacobian[18][lane] = work[110][lane] + (t354 - x34 * work[9][lane] + (x12 * work[13][lane] - x13 * work[11][lane]));
-        increment_jacobian[20][lane] = t355 - t356 + (work[126][lane] - t345);
-        increment_jacobian[21][lane] = t357 - t358 + (t340 - work[127][lane]);
-        increment_jacobian[25][lane] = t351 + t355 - t359 - work[128][lane];
-        increment_jacobian[30][lane] = t343 + (t356 - t352 - t359);
-        increment_jacobian[28][lane] = t358 + t349 - work[129][lane] - t360;
-        increment_jacobian[35][lane] = t360 + (t350 - t357 - t338);
-    }
-}
-
-/* so4_manakov_linearise in all lanes. */
-static void so4_manakov_linearise_lanes(so4_manakov_lanes coef[restrict 32], so4_manakov_lanes y[restrict 6],
-                                        so4_manakov_lanes displacement[restrict 6],
-                                        so4_manakov_lanes increment[restrict 6],
-                                        so4_manakov_lanes jacobian[restrict 36],
-                                        so4_manakov_lanes increment_jacobian[restrict 36])
-{
-    so4_manakov_lanes work[130];
-    so4_manakov_linearise_lanes_part1(coef, y, displacement, increment, jacobian, increment_jacobian, work);
-    so4_manakov_linearise_lanes_part2(coef, y, displacement, increment, jacobian, increment_jacobian, work);
-    so4_manakov_linearise_lanes_part3(coef, y, displacement, increment, jacobian, increment_jacobian, work);
-}
-
-/* so4_manakov_evaluate in all lanes. */
-static void so4_manakov_evaluate_lanes(so4_manakov_lanes coef[restrict 32], so4_manakov_lanes y[restrict 6],
-                                       so4_manakov_lanes displacement[restrict 6],
-                                       so4_manakov_lanes increment[restrict 6])
-{
-    so4_manakov_EACH_LANE
-    for (int lane = 0; lane < so4_manakov_LANES; ++lane) {
-        const double x12 = y[0][lane];
-        const double x13 = y[1][lane];
-        const double x14 = y[2][lane];
-        const double x23 = y[3][lane];
-        const double x24 = y[4][lane];
-        const double x34 = y[5][lane];
-        const double t1 = x14 * x23;
-        const double t2 = x13 * x24;
-        const double t3 = coef[0][lane] * t1 + coef[1][lane] * t2;
-        const double t4 = x24 * x24;
-        const double t5 = x23 * x23;
-        const double t6 = x14 * x14;
-        const double t7 = x13 * x13;
-        const double p_x12 = x34 * t3 + x12 * (coef[3][lane] * t4 + (coef[4][lane] * t5 + coef[5][lane] * t6 + (coef[2][lane] + coef[6][lane] * t7)));
-        const double p_x34 = x12 * t3 + x34 * (coef[18][lane] * t4 + (coef[19][lane] + coef[9][lane] * t7 + (coef[13][lane] * t6 + coef[15][lane] * t5)));
-        const double t8 = 2.0 * p_x34;
-        const double t9 = x12 * x34;
-        const double t10 = coef[7][lane] * t1 + coef[1][lane] * t9;
-        const double t11 = x34 * x34;
-        const double t12 = x12 * x12;
-        const double p_x13 = x24 * t10 + x13 * (coef[9][lane] * t11 + (coef[8][lane] + coef[6][lane] * t12 + (coef[10][lane] * t5 + coef[11][lane] * t6)));
-        const double p_x24 = x13 * t10 + x24 * (coef[18][lane] * t11 + (coef[16][lane] * t5 + coef[14][lane] * t6 + (coef[17][lane] + coef[3][lane] * t12)));
-        const double t13 = 2.0 * p_x24;
-        const double t14 = coef[7][lane] * t2 + coef[0][lane] * t9;
-        const double p_x23 = x14 * t14 + x23 * (coef[15][lane] * t11 + (coef[16][lane] * t4 + coef[10][lane] * t7 + (coef[12][lane] + coef[4][lane] * t12)));
-        const double t15 = p_x34 * p_x34 + (p_x24 * p_x24 + p_x23 * p_x23);
-        const double p_x14 = x23 * t14 + x14 * (coef[13][lane] * t11 + (coef[14][lane] * t4 + coef[11][lane] * t7 + (coef[12][lane] + coef[5][lane] * t12)));
-        const double t16 = 2.0 * p_x23;
-        const double t17 = so4_manakov_phi0_lane(p_x12 * (p_x12 + t8) + (p_x13 * (p_x13 - t13) + (t15 + p_x14 * (p_x14 + t16))));
-        const double t18 = 0.5 * p_x24;
-        const double t19 = 0.5 * p_x13;
-        const double t20 = t18 - t19;
-        const double t21 = t19 - t18;
-        const double t22 = 0.5 * p_x12;
-        const double t23 = 0.5 * p_x34;
-        const double t24 = t22 + t23;
-        const double t25 = x34 * t21 + x24 * t24 + (x12 * t21 - x13 * t24);
-        const double t26 = t20 * t25;
-        const double t27 = 0.5 * p_x23;
-        const double t28 = 0.5 * p_x14;
-        const double t29 = t27 + t28;
-        const double t30 = x23 * t24;
-        const double t31 = x34 * t29;
-        const double t32 = x14 * t24;
-        const double t33 = x12 * t29;
-        const double t34 = t30 - t31 + (t32 - t33);
-        const double t35 = t33 - t32 + (t31 - t30);
-        const double t36 = t17 * (t26 + t29 * t34 + (t26 - t29 * t35));
-        const double t37 = so4_manakov_phi0_lane(p_x12 * (p_x12 - t8) + (p_x13 * (p_x13 + t13) + (t15 + p_x14 * (p_x14 - t16))));
-        const double t38 = t19 + t18;
-        const double t39 = x34 * t38;
-        const double t40 = t22 - t23;
-        const double t41 = x12 * t38;
-        const double t42 = t39 + x24 * t40 + (x13 * t40 - t41);
-        const double t43 = t38 * t42;
-        const double t44 = t27 - t28;
-        const double t45 = t23 - t22;
-        const double t46 = t28 - t27;
-        const double t47 = x14 * t45 + x12 * t46 + (x34 * t44 + x23 * t40);
-        const double t48 = t44 * t47;
-        const double t49 = t41 + x13 * t45 + (x24 * t45 - t39);
-        const double t50 = t38 * t49;
-        const double t51 = x13 * p_x23 + x14 * p_x24 - (x23 * p_x13 + x24 * p_x14);
-        const double t52 = x23 * t38;
-        const double t53 = x14 * t38;
-        const double t54 = t52 + x24 * t46 + (x13 * t46 - t53);
-        const double t55 = x24 * t44 - t52 + (x13 * t44 + t53);
-        const double t56 = t37 * (t44 * t54 + t40 * t49 + (t46 * t55 + t45 * t42));
-        const double t57 = t24 * t25;
-        const double t58 = x14 * t20 + x13 * t29 + (x23 * t20 - x24 * t29);
-        const double t59 = t29 * t58;
-        const double t60 = t57 - t59;
-        const double t61 = x23 * p_x12 - x34 * p_x14 + (x14 * p_x34 - x12 * p_x23);
-        const double t62 = t40 * t47;
-        const double t63 = t38 * t55;
-        const double t64 = t38 * t54;
-        const double t65 = t21 * t58;
-        const double t66 = t17 * (t65 + t24 * t35 + (t65 - t24 * t34));
-        const double t67 = x34 * p_x13 + x24 * p_x12 - (x13 * p_x34 + x12 * p_x24);
-        const double t68 = t45 * t47;
-        const double t69 = x12 * p_x13 - x13 * p_x12 + (x24 * p_x34 - x34 * p_x24);
-        const double t70 = t59 - t57;
-        const double t71 = x12 * p_x14 - x14 * p_x12 + (x34 * p_x23 - x23 * p_x34);
-        const double t72 = t46 * t47;
-        const double t73 = x13 * p_x14 - x14 * p_x13 + (x23 * p_x24 - x24 * p_x23);
-        displacement[0][lane] = t36 + t37 * (t43 + t48 + (t48 - t50)) - 0.5 * t51;
-        displacement[1][lane] = t56 + t17 * (t60 + t60) - 0.5 * t61;
-        displacement[2][lane] = t37 * (t62 - t63 + (t62 + t64)) + t66 - 0.5 * t67;
-        displacement[3][lane] = t37 * (t68 - t64 + (t63 + t68)) + t66 - 0.5 * t69;
-        displacement[4][lane] = t17 * (t70 + t70) + t56 - 0.5 * t71;
-        displacement[5][lane] = t36 + t37 * (t72 - t43 + (t50 + t72)) - 0.5 * t73;
-        increment[0][lane] = t51;
-        increment[1][lane] = t61;
-        increment[2][lane] = t67;
-        increment[3][lane] = t69;
-        increment[4][lane] = t71;
-        increment[5][lane] = t73;
-    }
-}
-
-/* Invert the matrices of all lanes in place by elimination without pivoting: they are I + O(h). Infinite where a pivot is
-   far from 1. */
-static void so4_manakov_invert(so4_manakov_lanes matrix[restrict 36])
-{
-    for (int k = 0; k < 6; ++k) {
-        so4_manakov_lanes factor[6];
-        so4_manakov_EACH_LANE
-        for (int lane = 0; lane < so4_manakov_LANES; ++lane) {
-            const double reciprocal = 1.0 / matrix[k * 6 + k][lane];
-            matrix[k * 6 + k][lane] = 1.0;
-            for (int j = 0; j < 6; ++j) matrix[k * 6 + j][lane] *= reciprocal;
-            matrix[k * 6 + k][lane] += fabs(reciprocal) < 1e3 ? 0.0 : HUGE_VAL;
-        }
-        for (int i = 0; i < 6; ++i) {
-            so4_manakov_EACH_LANE
-            for (int lane = 0; lane < so4_manakov_LANES; ++lane) {
-                factor[i][lane] = matrix[i * 6 + k][lane];
-                if (i != k) matrix[i * 6 + k][lane] = 0.0;
-            }
-        }
-        for (int i = 0; i < 6; ++i)
-            for (int j = 0; j < 6 && i != k; ++j) {
-                so4_manakov_EACH_LANE
-                for (int lane = 0; lane < so4_manakov_LANES; ++lane)
-                    matrix[i * 6 + j][lane] -= factor[i][lane] * matrix[k * 6 + j][lane];
-            }
-    }
-}
-
-/* Everything about a stage at the points y. */
-static void so4_manakov_tabulate(so4_manakov_lanes coef[restrict], so4_manakov_model *model)
-{
-    so4_manakov_linearise_lanes(coef, model->y, model->displacement, model->increment, model->inverse, model->slope);
-    so4_manakov_invert(model->inverse);
-    for (int i = 0; i < 6; ++i)
-        for (int j = 0; j < 6; ++j) {
-            so4_manakov_lanes sum = { 0.0 };
-            for (int k = 0; k < 6; ++k) {
-                so4_manakov_EACH_LANE
-                for (int lane = 0; lane < so4_manakov_LANES; ++lane)
-                    sum[lane] += model->slope[i * 6 + k][lane] * model->inverse[k * 6 + j][lane];
-            }
-            memcpy(model->gain[i * 6 + j], sum, sizeof sum);
-        }
-}
-
-/* so4_manakov_size in all lanes, summed over the components. */
-static void so4_manakov_sizes(so4_manakov_lanes y[restrict 6], so4_manakov_lanes delta[restrict 6],
-    so4_manakov_lanes size)
-{
-    so4_manakov_lanes norm = { 0.0 };
-    memset(size, 0, so4_manakov_LANES * sizeof size[0]);
-    for (int i = 0; i < 6; ++i)
-        for (int lane = 0; lane < so4_manakov_LANES; ++lane)
-            norm[lane] = 1e-6 * fabs(y[i][lane]) > norm[lane] ? 1e-6 * fabs(y[i][lane]) : norm[lane];
-    for (int i = 0; i < 6; ++i) {
-        so4_manakov_EACH_LANE
-        for (int lane = 0; lane < so4_manakov_LANES; ++lane)
-            size[lane] += fabs(delta[i][lane]) / (fabs(y[i][lane]) + norm[lane] + DBL_MIN);
-    }
-}
-
-/* Correct y by the residuals, with the inverse in the table, and measure the corrections. */
-static void so4_manakov_correct(so4_manakov_model *model, so4_manakov_lanes size)
-{
-    so4_manakov_lanes delta[6];
-    memset(delta, 0, sizeof delta);
-    for (int i = 0; i < 6; ++i)
-        for (int j = 0; j < 6; ++j) {
-            so4_manakov_EACH_LANE
-            for (int lane = 0; lane < so4_manakov_LANES; ++lane)
-                delta[i][lane] += model->inverse[i * 6 + j][lane] * model->residual[j][lane];
-        }
-    so4_manakov_sizes(model->y, delta, size);
-    for (int i = 0; i < 6; ++i)
-        for (int lane = 0; lane < so4_manakov_LANES; ++lane) model->y[i][lane] -= delta[i][lane];
-}
-
-/* The largest of the lanes, none of which is negative; infinite if one is not finite. As integers, the bits of such
-   numbers have their order, and those of what is no number are larger. */
-static double so4_manakov_largest(const so4_manakov_lanes size)
-{
-    uint64_t bits[8], most = 0;
-    double largest;
-    memcpy(bits, size, sizeof bits);
-    for (int lane = 0; lane < so4_manakov_LANES; ++lane) most = bits[lane] > most ? bits[lane] : most;
-    memcpy(&largest, &most, sizeof largest);
-    return isfinite(largest) ? largest : HUGE_VAL;
-}
-
-/* so4_manakov_near for the guesses of all lanes, seen from one value. */
-static int so4_manakov_near_lanes(so4_manakov_lanes y[restrict 6], const double last[6])
-{
-    so4_manakov_lanes distance = { 0.0 };
-    double size = 0.0;
-    for (int i = 0; i < 6; ++i) {
-        size += fabs(last[i]);
-        so4_manakov_EACH_LANE
-        for (int lane = 0; lane < so4_manakov_LANES; ++lane) distance[lane] += fabs(y[i][lane] - last[i]);
-    }
-    return so4_manakov_largest(distance) <= 4.0 * size;
-}
-
-/* What is left after a correction of this size: quadratic in it, where the matrices are of the points corrected; where
-   they are of points further off, by bend, also of the order of size times bend. bound is what the last pass left. */
-static double so4_manakov_remaining(double size, double bend, double bound)
-{
-    const double growth = size / bound, left = size * (size + bend);
-    return growth > 1.0 ? growth * left : left;
-}
-
-/* The table of a stage, with its matrices or with those of the last pass. */
-static void so4_manakov_update(so4_manakov_lanes coef[restrict], so4_manakov_model *model, int matrices)
-{
-    if (matrices)
-        so4_manakov_tabulate(coef, model);
-    else
-        so4_manakov_evaluate_lanes(coef, model->y, model->displacement, model->increment);
-}
-
-/* The steps of a block one after the other, each along the linear model of its lane. As X, the state with its carry, gains
-   increment - gain residual, the next residual follows from this one; X itself is added up apart. */
-static void so4_manakov_chain(so4_manakov_model model[1], double x[6], double carry[6])
-{
-    double residual[6], sum[6], small[6];
-    for (int i = 0; i < 6; ++i) {
-        residual[i] = ((model->y[i][0] - x[i]) + model->displacement[i][0]) - carry[i];
-        sum[i] = x[i];
-        small[i] = carry[i];
-    }
-    for (int k = 0; k < 1 * so4_manakov_LANES; ++k) {
-        const int lane = k / 1, after = (k + 1) / 1 % so4_manakov_LANES;
-        so4_manakov_model *at = &model[k % 1], *next = &model[(k + 1) % 1];
-        double even[6] = { 0.0 }, odd[6] = { 0.0 }; /* two sums, so that no long chain of additions is waited for */
-        for (int i = 0; i < 6; ++i) {
-            at->residual[i][lane] = residual[i];
-            for (int j = 0; j < 6; j += 2) even[i] += at->gain[i * 6 + j][lane] * residual[j];
-            for (int j = 1; j < 6; j += 2) odd[i] += at->gain[i * 6 + j][lane] * residual[j];
-        }
-        for (int i = 0; i < 6; ++i) {
-            const double change = at->increment[i][lane], total = sum[i] + change, added = total - sum[i];
-            const double turn = (next->displacement[i][after] - at->displacement[i][lane]) - change;
-            const double moved = (next->y[i][after] - at->y[i][lane]) + turn;
-            residual[i] = ((moved + residual[i]) + odd[i]) + even[i];
-            small[i] += ((sum[i] - (total - added)) + (change - added)) - (even[i] + odd[i]);
-            sum[i] = total;
-        }
-    }
-    for (int i = 0; i < 6; ++i) {
-        x[i] = sum[i] + small[i];
-        carry[i] = small[i] - (x[i] - sum[i]);
-    }
-}
-
-/* Bring the table up to date: coefficients, and weights that were fitted since. */
-static void so4_manakov_refresh(const so4_manakov_solver *s, so4_manakov_table *table)
-{
-    for (int stage = 0; stage < 1; ++stage) {
-        if (table->fits[stage] == s->memory[stage].fits) continue;
-        table->fits[stage] = s->memory[stage].fits;
-        for (int k = 0; k < 32; ++k)
-            for (int lane = 0; lane < so4_manakov_LANES; ++lane) table->coef[stage][k][lane] = s->coef[stage][k];
-        memcpy(table->weight[stage], s->memory[stage].weight, (size_t)s->memory[stage].terms * sizeof table->weight[0][0]);
-    }
-}
-
-/* Guesses for the next so4_manakov_LANES values of a stage, by its recurrences. */
-static void so4_manakov_foresee(const so4_manakov_memory *memory, so4_manakov_lanes weight[restrict][6],
-    so4_manakov_lanes y[restrict 6])
-{
-    const int last = memory->count - 1;
-    for (int i = 0; i < 6; ++i) {
-        so4_manakov_lanes even = { 0.0 }, odd = { 0.0 };
-        for (int k = 0; k < memory->terms; k += 2) {
-            const double past = memory->past[last - k][i], earlier = memory->past[last - 1 - k][i];
-            so4_manakov_EACH_LANE
-            for (int lane = 0; lane < so4_manakov_LANES; ++lane) even[lane] += weight[k][i][lane] * past;
-            so4_manakov_EACH_LANE
-            for (int lane = 0; lane < so4_manakov_LANES; ++lane) odd[lane] += weight[k + 1][i][lane] * earlier;
-        }
-        so4_manakov_EACH_LANE
-        for (int lane = 0; lane < so4_manakov_LANES; ++lane) y[i][lane] = even[lane] + odd[lane];
-    }
-}
-
-/* so4_manakov_record for the values of all lanes, one after the other. */
-static void so4_manakov_record_lanes(so4_manakov_memory *memory, so4_manakov_lanes y[restrict 6])
-{
-    so4_manakov_make_room(memory, so4_manakov_LANES);
-    for (int lane = 0; lane < so4_manakov_LANES; ++lane)
-        for (int i = 0; i < 6; ++i) memory->past[memory->count + lane][i] = y[i][lane];
-    memory->count += so4_manakov_LANES;
-}
-
-/* Guesses where no recurrence is known: where alpha and beta have the means of steps by the classical Runge-Kutta
-   method, to leading order. */
-static void so4_manakov_march(const so4_manakov_solver *s, so4_manakov_table *table, so4_manakov_model model[1])
-{
-    static const double reach[4] = { 0.5, 0.5, 1.0, 0.0 }, weight[4] = { 1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0 };
-    double x[6], point[6], slope[6], mean[6];
-    memcpy(x, s->x, sizeof x);
-    for (int k = 0; k < 1 * so4_manakov_LANES; ++k) {
-        const double h = so4_manakov_fractions[k % 1] * s->h;
-        memcpy(point, x, sizeof x);
-        memset(mean, 0, sizeof mean);
-        for (int part = 0; part < 4; ++part) {
-            so4_manakov_vector_field(&s->params, point, slope);
-            for (int i = 0; i < 6; ++i) {
-                mean[i] += weight[part] * slope[i];
-                point[i] = x[i] + h * reach[part] * slope[i];
-            }
-        }
-        for (int i = 0; i < 6; ++i) {
-            model[k % 1].y[i][k / 1] = x[i] + 0.5 * h * mean[i];
-            x[i] += h * mean[i];
-        }
-    }
-    for (int stage = 0; stage < 1; ++stage) {
-        so4_manakov_model *at = &model[stage];
-        so4_manakov_evaluate_lanes(table->coef[stage], at->y, at->displacement, at->increment);
-        for (int i = 0; i < 6; ++i) {
-            so4_manakov_EACH_LANE
-            for (int lane = 0; lane < so4_manakov_LANES; ++lane)
-                at->y[i][lane] -= at->displacement[i][lane] + 0.5 * at->increment[i][lane];
-        }
-    }
-}
-
-/* so4_manakov_LANES steps at once: guess the points of all, and correct them together until the error that remains is as
-   small as after a single step. How many passes that took; 0, and the solver as before, where it takes more than most. */
-static int so4_manakov_block(so4_manakov_solver *s, so4_manakov_table *table, int most)
-{
-    so4_manakov_model model[1];
-    so4_manakov_lanes sizes;
-    double x[6], carry[6], previous = HUGE_VAL, bend = 0.0, bound = HUGE_VAL;
-    int passes = 0, solved = 0;
-    if (!s->foreseeing) so4_manakov_march(s, table, model);
-    for (int stage = 0; stage < 1; ++stage) {
-        if (s->foreseeing) so4_manakov_foresee(&s->memory[stage], table->weight[stage], model[stage].y);
-        if (!so4_manakov_near_lanes(model[stage].y, s->x)) return 0;
-    }
-    while (!solved) {
-        double size = 0.0;
-        const int matrices = previous > 1e-05;
-        for (int stage = 0; stage < 1; ++stage) so4_manakov_update(table->coef[stage], &model[stage], matrices);
-        memcpy(x, s->x, sizeof x);
-        memcpy(carry, s->carry, sizeof carry);
-        so4_manakov_chain(model, x, carry);
-        for (int stage = 0; stage < 1; ++stage) {
-            so4_manakov_correct(&model[stage], sizes);
-            const double largest = so4_manakov_largest(sizes);
-            size = largest > size ? largest : size;
-        }
-        s->evaluations += 1 * so4_manakov_LANES;
-        bend = matrices ? 0.0 : bend + previous;
-        bound = so4_manakov_remaining(size, bend, bound);
-        /* The second test: after the square of so small a correction there is rounding only. */
-        solved = bound <= 1e-20 || (previous < 1e-8 && size < 1e-10);
-        if ((++passes >= most || !(size < previous)) && !solved) return 0;
-        previous = size;
-    }
-    for (int stage = 0; stage < 1; ++stage)
-        if (!so4_manakov_near_lanes(model[stage].y, s->x)) return 0;
-    for (int i = 0; i < 6; ++i)
-        if (!isfinite(x[i])) return 0;
-    memcpy(s->x, x, sizeof x);
-    memcpy(s->carry, carry, sizeof carry);
-    s->steps += so4_manakov_LANES;
-    for (int stage = 0; stage < 1; ++stage) {
-        so4_manakov_memory *memory = &s->memory[stage];
-        so4_manakov_record_lanes(memory, model[stage].y);
-        memory->slow = passes > 1 ? memory->slow + so4_manakov_LANES : 0;
-        if (memory->slow > memory->patience && s->foreseeing) so4_manakov_fit(memory);
-    }
-    return passes;
-}
-
-/* Recurrences are given up for a while, the longer the more often that happens. */
-static void so4_manakov_give_up(so4_manakov_solver *s)
-{
-    s->foreseeing = s->setback = s->pause = 0;
-    s->doubt = 2 * s->doubt + 600;
-    s->retry = s->steps + s->doubt;
-}
-
-/* How the next block is guessed: by recurrences, fitted as soon as enough steps are to be made, or
-   have been, to repay that. */
-static void so4_manakov_choose_guess(so4_manakov_solver *s, size_t steps)
-{
-    for (int stage = 0; stage < 1; ++stage)
-        if (s->memory[stage].count < 111) {
-            s->foreseeing = 0;
-            return;
-        }
-    if (s->foreseeing || (steps < 600 && s->steps < 150) || s->steps < s->retry) return;
-    s->foreseeing = 1;
-    for (int stage = 0; stage < 1 && s->foreseeing; ++stage) {
-        so4_manakov_fit(&s->memory[stage]);
-        s->foreseeing = s->memory[stage].terms > 0;
-    }
-    s->pause = so4_manakov_LANES;
-    if (!s->foreseeing) so4_manakov_give_up(s);
-}
-
-/* Learn from a block: after one that failed single steps are made, the more the more often that happens. Recurrences
-   that fail repeatedly, or need more passes than steps by Runge-Kutta did, are given up. */
-static void so4_manakov_learn_from(so4_manakov_solver *s, int passes)
-{
-    if (passes > 0) {
-        s->setback /= 2;
-    } else {
-        s->setback = 2 * s->setback + so4_manakov_LANES > 1000 ? 1000 : 2 * s->setback + so4_manakov_LANES;
-        s->pause = s->setback;
-    }
-    if (!s->foreseeing) {
-        s->passes = passes > 0 ? passes : INT_MAX;
-    } else if (passes > s->passes || s->setback > 5 * so4_manakov_LANES) {
-        so4_manakov_give_up(s);
-    }
-}
-
-/* A single step, and the running mean of the evaluations that a stage of one takes. */
-static so4_manakov_status so4_manakov_single(so4_manakov_solver *s)
-{
-    const size_t before = s->evaluations;
-    const so4_manakov_status status = so4_manakov_step(s, s->h);
-    s->effort += 0.125 * ((double)(s->evaluations - before) / 1 - s->effort);
-    return status;
-}
-
-/* Blocks of steps where they cost less than single steps, with at most as many passes over a block as 2 for each
-   evaluation in a single step. The results differ by round-off only. */
-so4_manakov_status so4_manakov_integrate(so4_manakov_solver *s, double h, size_t steps)
-{
-    so4_manakov_table table;
-    so4_manakov_status status = so4_manakov_set_step(s, h);
-    for (int stage = 0; stage < 1; ++stage) table.fits[stage] = -1;
-    while (status == so4_manakov_OK && steps > 0) {
-        if (steps >= so4_manakov_LANES && s->pause == 0) so4_manakov_choose_guess(s, steps);
-        if (steps >= so4_manakov_LANES && s->pause == 0) {
-            so4_manakov_refresh(s, &table);
-            const int passes = so4_manakov_block(s, &table, (int)(2 * s->effort + 0.5));
-            so4_manakov_learn_from(s, passes);
-            if (passes > 0) steps -= so4_manakov_LANES;
-        } else {
-            if (s->pause > 0) --s->pause;
-            status = so4_manakov_single(s);
-            if (status == so4_manakov_OK) --steps;
-        }
-    }
-    return status;
-}
-
-/* Members of an ensemble, each in its lane. */
-typedef struct {
-    so4_manakov_lanes x[6], carry[6], coef[1][32];
-    so4_manakov_lanes past[1][111][6]; /* solved values, in a ring */
-    so4_manakov_lanes weight[1][40][6]; /* of past values, the latest first, for the next */
-    int latest;     /* the row of the latest values */
-    int count;      /* rows in use */
-    int order[1];   /* how many of them the extrapolation uses */
-    int terms[1];   /* how many of them the recurrences use */
-    int fits;       /* how often recurrences have been fitted */
-    int fitting[1]; /* whether they are the better guess */
-    int slow;       /* how many of the last steps took more than one iteration */
-    int patience;   /* how many of those before recurrences are fitted again */
-    int active[8];  /* whether the lane has a member that has not failed */
-    size_t left[8]; /* steps that are still to be made, where one has */
-    double gauge[8][1]; /* of each member */
-} so4_manakov_group;
-
-/* The past values of a stage, the latest for k = 0. */
-static so4_manakov_lanes *so4_manakov_group_past(so4_manakov_group *group, int stage, int k)
-{
-    const int row = group->latest + k;
-    return group->past[stage][row < 111 ? row : row - 111];
-}
-
-/* Guess the values of a stage by the recurrences of the members. */
-static void so4_manakov_group_foresee(so4_manakov_group *group, int stage, so4_manakov_lanes y[restrict 6])
-{
-    memset(y, 0, 6 * sizeof y[0]);
-    for (int k = 0; k < group->terms[stage]; ++k) {
-        so4_manakov_lanes *past = so4_manakov_group_past(group, stage, k), *weight = group->weight[stage][k];
-        for (int i = 0; i < 6; ++i) {
-            so4_manakov_EACH_LANE
-            for (int lane = 0; lane < so4_manakov_LANES; ++lane) y[i][lane] += weight[i][lane] * past[i][lane];
-        }
-    }
-}
-
-/* Extrapolate the values of a stage. */
-static void so4_manakov_group_extrapolate(so4_manakov_group *group, int stage, so4_manakov_lanes y[restrict 6])
-{
-    const int order = group->order[stage];
-    double binomial = -1.0;
-    memcpy(y, group->x, 6 * sizeof y[0]);
-    if (order > 0) memset(y, 0, 6 * sizeof y[0]);
-    for (int k = 0; k < order; ++k) {
-        so4_manakov_lanes *past = so4_manakov_group_past(group, stage, k);
-        binomial *= -(double)(order - k) / (k + 1);
-        for (int i = 0; i < 6; ++i) {
-            so4_manakov_EACH_LANE
-            for (int lane = 0; lane < so4_manakov_LANES; ++lane) y[i][lane] += binomial * past[i][lane];
-        }
-    }
-}
-
-/* The sum over members of the absolute values of all components. */
-static double so4_manakov_group_sum(const so4_manakov_group *group, so4_manakov_lanes y[6])
-{
-    double sum = 0.0;
-    for (int i = 0; i < 6; ++i)
-        for (int lane = 0; lane < so4_manakov_LANES; ++lane) sum += group->active[lane] ? fabs(y[i][lane]) : 0.0;
-    return sum;
-}
-
-static void so4_manakov_group_subtract(so4_manakov_lanes y[restrict 6], so4_manakov_lanes other[restrict 6])
-{
-    for (int i = 0; i < 6; ++i) {
-        so4_manakov_EACH_LANE
-        for (int lane = 0; lane < so4_manakov_LANES; ++lane) y[i][lane] -= other[i][lane];
-    }
-}
-
-/* Choose the guess that would have been best for these values. */
-static void so4_manakov_group_judge(so4_manakov_group *group, int stage, so4_manakov_lanes y[6])
-{
-    so4_manakov_lanes row[8 + 1][6];
-    const int rows = group->count < 8 ? group->count : 8;
-    double least = HUGE_VAL;
-    memcpy(row[0], y, sizeof row[0]);
-    for (int k = 0; k < rows; ++k) memcpy(row[k + 1], so4_manakov_group_past(group, stage, k), sizeof row[0]);
-    if (group->order[stage] == 0) group->order[stage] = 1;
-    for (int order = 1; order <= rows; ++order) { /* row[0] becomes the backward difference of this order */
-        for (int k = 0; k <= rows - order; ++k) so4_manakov_group_subtract(row[k], row[k + 1]);
-        const double size = so4_manakov_group_sum(group, row[0]);
-        if (size < least) {
-            least = size;
-            group->order[stage] = order;
-        }
-    }
-    if (group->terms[stage] == 0) return;
-    so4_manakov_group_foresee(group, stage, row[0]);
-    so4_manakov_group_subtract(row[0], y);
-    group->fitting[stage] = so4_manakov_group_sum(group, row[0]) <= least;
-}
-
-/* Fit the recurrences of all members; with every time, wait longer before it is done again, and for long if it did not
-   help. */
-static void so4_manakov_group_fit(so4_manakov_group *group)
-{
-    so4_manakov_memory memory;
-    const int helped = group->fits == 0 || group->fitting[0];
-    memory.count = 111;
-    for (int stage = 0; stage < 1; ++stage) {
-        int found = 1;
-        group->terms[stage] = 0;
-        for (int lane = 0; lane < so4_manakov_LANES; ++lane)
-            for (int i = 0; i < 6 && group->active[lane] && found; ++i) {
-                for (int k = 0; k < 111; ++k)
-                    memory.past[111 - 1 - k][i] = so4_manakov_group_past(group, stage, k)[i][lane];
-                const int terms = so4_manakov_train(&memory, i);
-                found = terms > 0;
-                if (terms > group->terms[stage]) group->terms[stage] = terms;
-                for (int k = 0; k < 40; ++k) group->weight[stage][k][i][lane] = memory.weight[k][i][0];
-            }
-        if (!found) group->terms[stage] = 0;
-        group->fitting[stage] = found;
-    }
-    ++group->fits;
-    group->slow = 0;
-    group->patience = helped && group->patience < 10000 ? 2 * group->patience + 150 : 100 * 150;
-}
-
-/* Replace guesses that are not near the last values, as so4_manakov_near has it, by these; lane by lane. */
-static void so4_manakov_stay_near(so4_manakov_lanes y[restrict 6], so4_manakov_lanes last[restrict 6])
-{
-    so4_manakov_lanes distance = { 0.0 }, size = { 0.0 };
-    for (int i = 0; i < 6; ++i) {
-        so4_manakov_EACH_LANE
-        for (int lane = 0; lane < so4_manakov_LANES; ++lane) {
-            distance[lane] += fabs(y[i][lane] - last[i][lane]);
-            size[lane] += fabs(last[i][lane]);
-        }
-    }
-    for (int i = 0; i < 6; ++i) {
-        so4_manakov_EACH_LANE
-        for (int lane = 0; lane < so4_manakov_LANES; ++lane)
-            y[i][lane] = distance[lane] <= 4.0 * size[lane] ? y[i][lane] : last[i][lane];
-    }
-}
-
-/* Whether lanes are still to be solved after a correction of this size; those where nothing is finite leave the group.
-   bound is what remains in each lane. */
-static int so4_manakov_group_open(so4_manakov_group *group, const so4_manakov_lanes size, const so4_manakov_lanes previous,
-    double bend, so4_manakov_lanes bound)
-{
-    int open = 0;
-    so4_manakov_EACH_LANE
-    for (int lane = 0; lane < so4_manakov_LANES; ++lane)
-        bound[lane] = so4_manakov_remaining(size[lane], bend, bound[lane]);
-    if (so4_manakov_largest(bound) <= 1e-20) return 0;
-    for (int lane = 0; lane < so4_manakov_LANES; ++lane) {
-        const int solved = bound[lane] <= 1e-20 || (previous[lane] < 1e-8 && size[lane] < 1e-10);
-        if (!isfinite(size[lane])) group->active[lane] = 0;
-        open += group->active[lane] && !solved;
-    }
-    return open;
-}
-
-/* The guess for a stage: recurrences, or extrapolation; the state for members where that is not near. */
-static void so4_manakov_group_predict(so4_manakov_group *group, int stage, so4_manakov_lanes y[6])
-{
-    if (group->fitting[stage]) so4_manakov_group_foresee(group, stage, y);
-    else so4_manakov_group_extrapolate(group, stage, y);
-    so4_manakov_stay_near(y, group->x);
-}
-
-/* Newton's method for a stage, until the slowest lane is solved. The number of iterations; where that is the most
-   allowed, lanes that are not solved leave the group. */
-static int so4_manakov_group_solve(so4_manakov_group *group, int stage, so4_manakov_model *model)
-{
-    so4_manakov_lanes size, previous, bound;
-    double largest = HUGE_VAL, bend = 0.0;
-    int iterations = 0, open = 1;
-    for (int lane = 0; lane < so4_manakov_LANES; ++lane) size[lane] = bound[lane] = HUGE_VAL;
-    so4_manakov_group_predict(group, stage, model->y);
-    for (; open > 0 && iterations < 20; ++iterations) {
-        memcpy(previous, size, sizeof size);
-        so4_manakov_update(group->coef[stage], model, largest > 1e-05);
-        bend = largest > 1e-05 ? 0.0 : bend + largest;
-        for (int i = 0; i < 6; ++i) {
-            so4_manakov_EACH_LANE
-            for (int lane = 0; lane < so4_manakov_LANES; ++lane)
-                model->residual[i][lane] =
-                    ((model->y[i][lane] - group->x[i][lane]) + model->displacement[i][lane]) - group->carry[i][lane];
-        }
-        so4_manakov_correct(model, size);
-        open = so4_manakov_group_open(group, size, previous, bend, bound);
-        largest = so4_manakov_largest(size);
-    }
-    for (int lane = 0; lane < so4_manakov_LANES && open > 0; ++lane)
-        group->active[lane] = group->active[lane] && bound[lane] <= 1e-20;
-    return iterations;
-}
-
-/* Add the increments, corrected to first order, in compensated arithmetic as for a single step. */
-static void so4_manakov_group_advance(so4_manakov_lanes x[restrict 6], so4_manakov_lanes carry[restrict 6],
-    so4_manakov_model *model)
-{
-    for (int i = 0; i < 6; ++i)
-        for (int j = 0; j < 6; ++j) {
-            so4_manakov_EACH_LANE
-            for (int lane = 0; lane < so4_manakov_LANES; ++lane)
-                carry[i][lane] -= model->gain[i * 6 + j][lane] * model->residual[j][lane];
-        }
-    for (int i = 0; i < 6; ++i) {
-        so4_manakov_EACH_LANE
-        for (int lane = 0; lane < so4_manakov_LANES; ++lane) {
-            const double change = model->increment[i][lane], sum = x[i][lane] + change, added = sum - x[i][lane];
-            const double small = ((x[i][lane] - (sum - added)) + (change - added)) + carry[i][lane];
-            x[i][lane] = sum + small;
-            carry[i][lane] = small - (x[i][lane] - sum);
-        }
-    }
-}
-
-/* Members that failed, or whose state is not near the one before the step or not finite, keep that one, and leave. How many
-   stay. */
-static int so4_manakov_group_leave(so4_manakov_group *group, so4_manakov_lanes x[6], so4_manakov_lanes carry[6],
-    size_t remaining)
-{
-    so4_manakov_lanes moved = { 0.0 }, size = { 0.0 }, bad;
-    int active = 0;
-    for (int i = 0; i < 6; ++i) {
-        so4_manakov_EACH_LANE
-        for (int lane = 0; lane < so4_manakov_LANES; ++lane) {
-            moved[lane] += fabs(group->x[i][lane] - x[i][lane]);
-            size[lane] += fabs(x[i][lane]);
-        }
-    }
-    for (int lane = 0; lane < so4_manakov_LANES; ++lane) bad[lane] = moved[lane] <= 4.0 * size[lane] ? 0.0 : 1.0;
-    for (int lane = 0; lane < so4_manakov_LANES; ++lane) active += group->active[lane];
-    if (active == so4_manakov_LANES && !(so4_manakov_largest(bad) > 0.0)) return active;
-    active = 0;
-    for (int lane = 0; lane < so4_manakov_LANES; ++lane) {
-        group->active[lane] = group->active[lane] && !(bad[lane] > 0.0);
-        active += group->active[lane];
-        for (int i = 0; i < 6 && !group->active[lane]; ++i) {
-            group->x[i][lane] = x[i][lane];
-            group->carry[i][lane] = carry[i][lane];
-        }
-        if (!group->active[lane] && group->left[lane] == 0) group->left[lane] = remaining;
-    }
-    return active;
-}
-
-/* One step of all members, of as many as remain. How many members are left. */
-static int so4_manakov_group_step(so4_manakov_group *group, size_t remaining)
-{
-    so4_manakov_lanes x[6], carry[6];
-    so4_manakov_model model;
-    const int next = (group->latest > 0 ? group->latest : 111) - 1;
-    int most = 0;
-    memcpy(x, group->x, sizeof x);
-    memcpy(carry, group->carry, sizeof carry);
-    for (int stage = 0; stage < 1; ++stage) {
-        const int iterations = so4_manakov_group_solve(group, stage, &model);
-        so4_manakov_group_advance(group->x, group->carry, &model);
-        if (iterations > most) most = iterations;
-        if ((iterations > 1 && next % 8 == 0) || group->count < 8)
-            so4_manakov_group_judge(group, stage, model.y);
-        memcpy(group->past[stage][next], model.y, sizeof model.y);
-    }
-    group->latest = next;
-    if (group->count < 111) ++group->count;
-    group->slow = most > 1 ? group->slow + 1 : 0;
-    if (group->slow > group->patience && group->count == 111 && remaining >= 1200)
-        so4_manakov_group_fit(group);
-    return so4_manakov_group_leave(group, x, carry, remaining);
-}
-
-/* Put a member into a lane: its state, and its coefficients. */
-static so4_manakov_status so4_manakov_group_join(so4_manakov_group *group, int lane, const so4_manakov_params *params,
-    const double x0[6], double h)
-{
-    so4_manakov_solver s;
-    so4_manakov_status status = so4_manakov_init(&s, params, x0);
-    if (status == so4_manakov_OK) status = so4_manakov_set_step(&s, h);
-    if (status != so4_manakov_OK) return status;
-    for (int i = 0; i < 6; ++i) group->x[i][lane] = s.x[i];
-    for (int stage = 0; stage < 1; ++stage)
-        for (int k = 0; k < 32; ++k) group->coef[stage][k][lane] = s.coef[stage][k];
-    memcpy(group->gauge[lane], s.gauge, sizeof s.gauge);
-    group->active[lane] = 1;
-    return status;
-}
-
-/* The steps that a member has still to make after it left the group, by itself. */
-static so4_manakov_status so4_manakov_group_finish(const so4_manakov_group *group, int lane, const so4_manakov_params *params,
-    double x[6], double h)
-{
-    so4_manakov_solver s;
-    so4_manakov_status status = so4_manakov_init_gauge(&s, params, x, group->gauge[lane]);
-    if (status != so4_manakov_OK) return status;
-    for (int i = 0; i < 6; ++i) s.carry[i] = group->carry[i][lane];
-    status = so4_manakov_integrate(&s, h, group->left[lane]);
-    memcpy(x, s.x, sizeof s.x);
-    return status;
-}
-
-/* The members from first on, as many as there are lanes. The first status that is not OK. */
-static so4_manakov_status so4_manakov_group_run(const so4_manakov_params *params, double *x, size_t members, size_t first,
-    double h, size_t steps, unsigned char *status)
-{
-    so4_manakov_group group;
-    so4_manakov_status worst = so4_manakov_OK, member[8];
-    const int count = members - first < so4_manakov_LANES ? (int)(members - first) : so4_manakov_LANES;
-    double state[6];
-    size_t left = steps;
-    memset(&group, 0, sizeof group);
-    for (int lane = 0; lane < count; ++lane) {
-        for (size_t i = 0; i < 6; ++i) state[i] = x[i * members + first + (size_t)lane];
-        member[lane] = so4_manakov_group_join(&group, lane, params, state, h);
-    }
-    for (int active = count; left > 0 && active > 2; --left) active = so4_manakov_group_step(&group, left);
-    for (int lane = 0; lane < count; ++lane) {
-        if (group.active[lane]) group.left[lane] = left;
-        for (int i = 0; i < 6; ++i) state[i] = group.x[i][lane];
-        if (member[lane] == so4_manakov_OK) {
-            if (group.left[lane] > 0) member[lane] = so4_manakov_group_finish(&group, lane, params, state, h);
-            for (size_t i = 0; i < 6; ++i) x[i * members + first + (size_t)lane] = state[i];
-        }
-        if (status != NULL) status[first + (size_t)lane] = (unsigned char)member[lane];
-        if (worst == so4_manakov_OK) worst = member[lane];
-    }
-    return worst;
-}
-
-so4_manakov_status so4_manakov_ensemble(const so4_manakov_params *params, double *x, size_t members, double h,
-                                        size_t steps, unsigned char *status)
-{
-    so4_manakov_status worst = isfinite(h) ? so4_manakov_OK : so4_manakov_BAD_ARGUMENT;
-    const so4_manakov_params own = params != NULL ? *params : so4_manakov_default_params;
-    size_t earliest = members;
-    if (x == NULL && members > 0) return so4_manakov_BAD_ARGUMENT;
-#ifdef _OPENMP
-#pragma omp parallel for schedule(dynamic)
-#endif
-    for (size_t first = 0; first < members; first += so4_manakov_LANES) {
-        const so4_manakov_status group = so4_manakov_group_run(&own, x, members, first, h, steps, status);
-        if (group == so4_manakov_OK) continue;
-#ifdef _OPENMP
-#pragma omp critical
-#endif
-        if (first < earliest) {
-            earliest = first;
-            worst = group;
-        }
-    }
-    return worst;
-}
-
-#if defined(__clang__)
-#pragma clang diagnostic pop
-#endif
-
 /* the Hamiltonian */
-static void so4_manakov_energy(const so4_manakov_params *params, const double x[6], double energy[restrict 1])
+double so4_manakov_hamiltonian(const so4_manakov_params *params, const double x[6])
 {
     (void)params;
-    const double x12 = x[0];
-    const double x13 = x[1];
-    const double x14 = x[2];
-    const double x23 = x[3];
-    const double x24 = x[4];
-    const double x34 = x[5];
-    const double t1 = 1.0 / 7.0 * (x34 * x34) + (1.0 / 6.0 * (x24 * x24) + (1.0 / 5.0 * (x23 * x23) + (1.0 / 5.0 * (x14 * x14) + (0.25 * (x13 * x13) + 1.0 / 3.0 * (x12 * x12)))));
-    energy[0] = 0.5 * t1;
+    const double x12 = x[0], x13 = x[1], x14 = x[2], x23 = x[3], x24 = x[4], x34 = x[5];
+    const double t1 = 1.0 / 7.0 * (x34 * x34) + (1.0 / 6.0 * (x24 * x24) + (1.0 / 5.0 * (x23 * x23)
+        + (1.0 / 5.0 * (x14 * x14) + (0.25 * (x13 * x13) + 1.0 / 3.0 * (x12 * x12)))));
+    return 0.5 * t1;
 }
 
 /* the Casimirs */
-static void so4_manakov_casimir_values(const so4_manakov_params *params, const double x[6],
-                                       double out[restrict 2])
+void so4_manakov_casimirs(const so4_manakov_params *params, const double x[6], double out[])
 {
     (void)params;
-    const double x12 = x[0];
-    const double x13 = x[1];
-    const double x14 = x[2];
-    const double x23 = x[3];
-    const double x24 = x[4];
-    const double x34 = x[5];
+    const double x12 = x[0], x13 = x[1], x14 = x[2], x23 = x[3], x24 = x[4], x34 = x[5];
     out[0] = x34 * x34 + (x24 * x24 + (x23 * x23 + (x14 * x14 + (x12 * x12 + x13 * x13))));
     out[1] = x14 * x23 + (x12 * x34 - x13 * x24);
 }
 
 /* pi(x) grad H(x) */
-static void so4_manakov_field(const so4_manakov_params *params, const double x[6], double out[restrict 6])
+void so4_manakov_vector_field(const so4_manakov_params *params, const double x[6], double out[6])
 {
     (void)params;
-    const double x12 = x[0];
-    const double x13 = x[1];
-    const double x14 = x[2];
-    const double x23 = x[3];
-    const double x24 = x[4];
-    const double x34 = x[5];
-    const double t1 = x13 * x23;
-    const double t2 = x14 * x24;
-    const double t3 = x12 * x23;
-    const double t4 = x14 * x34;
-    const double t5 = x12 * x24;
-    const double t6 = x13 * x34;
-    const double t7 = x24 * x34;
-    const double t8 = x12 * x13;
-    const double t9 = x12 * x14;
-    const double t10 = x23 * x34;
-    const double t11 = x13 * x14;
-    const double t12 = x23 * x24;
+    const double x12 = x[0], x13 = x[1], x14 = x[2], x23 = x[3], x24 = x[4], x34 = x[5];
+    const double t1 = x13 * x23, t2 = x14 * x24, t3 = x12 * x23, t4 = x14 * x34, t5 = x12 * x24;
+    const double t6 = x13 * x34, t7 = x24 * x34, t8 = x12 * x13, t9 = x12 * x14, t10 = x23 * x34;
+    const double t11 = x13 * x14, t12 = x23 * x24;
     out[0] = (-0.25) * t1 - 1.0 / 5.0 * t2 + (1.0 / 6.0 * t2 + 1.0 / 5.0 * t1);
     out[1] = 1.0 / 3.0 * t3 - 1.0 / 5.0 * t4 + (1.0 / 7.0 * t4 - 1.0 / 5.0 * t3);
     out[2] = (-1.0 / 6.0) * t5 - 1.0 / 7.0 * t6 + (1.0 / 3.0 * t5 + 0.25 * t6);
@@ -2745,39 +671,384 @@ static void so4_manakov_field(const so4_manakov_params *params, const double x[6
     out[5] = 1.0 / 5.0 * t11 - 0.25 * t11 + (1.0 / 6.0 * t12 - 1.0 / 5.0 * t12);
 }
 
-double so4_manakov_hamiltonian(const so4_manakov_params *params, const double x[6])
+/* ---- Compensated sums, linear equations ---- */
+/* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to
+   its last bit: were it rounded with the change, corrections of one sign would add up to a drift. 0, and x as
+   before, if the sum is not finite. */
+static int so4_manakov_advance(so4_manakov_solver *s, const double change[so4_manakov_DIM],
+    const double correction[so4_manakov_DIM])
 {
-    double energy[1];
-    so4_manakov_energy(params != NULL ? params : &so4_manakov_default_params, x, energy);
-    return energy[0];
+    double x[so4_manakov_DIM], carry[so4_manakov_DIM];
+    for (int i = 0; i < so4_manakov_DIM; ++i) {
+        const double sum = s->x[i] + change[i], added = sum - s->x[i];
+        const double lost = (s->x[i] - (sum - added)) + (change[i] - added);
+        const double small = lost + (s->carry[i] + correction[i]);
+        x[i] = sum + small;
+        carry[i] = small - (x[i] - sum);
+        if (!isfinite(x[i])) return 0;
+    }
+    memcpy(s->x, x, sizeof x);
+    memcpy(s->carry, carry, sizeof carry);
+    return 1;
 }
 
-void so4_manakov_casimirs(const so4_manakov_params *params, const double x[6], double out[])
+/* Solve matrix * solution = side, both overwritten, by elimination with partial pivoting. 0 if singular. */
+static int so4_manakov_solve(double matrix[so4_manakov_DIM * so4_manakov_DIM], double side[so4_manakov_DIM])
 {
-    double value[2]; /* out may overlap x */
-    so4_manakov_casimir_values(params != NULL ? params : &so4_manakov_default_params, x, value);
-    for (int i = 0; i < 2; ++i) out[i] = value[i];
+    for (int k = 0; k < so4_manakov_DIM; ++k) {
+        int best = k;
+        for (int i = k + 1; i < so4_manakov_DIM; ++i)
+            if (fabs(matrix[i * so4_manakov_DIM + k]) > fabs(matrix[best * so4_manakov_DIM + k])) best = i;
+        const double pivot = matrix[best * so4_manakov_DIM + k], last = side[k];
+        if (!(fabs(pivot) > 0.0)) return 0;
+        for (int j = k; j < so4_manakov_DIM && best != k; ++j) {
+            const double swap = matrix[k * so4_manakov_DIM + j];
+            matrix[k * so4_manakov_DIM + j] = matrix[best * so4_manakov_DIM + j];
+            matrix[best * so4_manakov_DIM + j] = swap;
+        }
+        side[k] = side[best];
+        side[best] = last;
+        for (int i = k + 1; i < so4_manakov_DIM; ++i) {
+            const double factor = matrix[i * so4_manakov_DIM + k] / pivot;
+            for (int j = k + 1; j < so4_manakov_DIM; ++j)
+                matrix[i * so4_manakov_DIM + j] -= factor * matrix[k * so4_manakov_DIM + j];
+            side[i] -= factor * side[k];
+        }
+    }
+    for (int i = so4_manakov_DIM - 1; i >= 0; --i) {
+        for (int j = i + 1; j < so4_manakov_DIM; ++j) side[i] -= matrix[i * so4_manakov_DIM + j] * side[j];
+        side[i] /= matrix[i * so4_manakov_DIM + i];
+    }
+    return 1;
 }
 
-void so4_manakov_vector_field(const so4_manakov_params *params, const double x[6], double out[6])
+/* ---- Starting guesses ---- */
+/* How far from the last value a guess may be, in sizes of that value. */
+#define so4_manakov_REACH 4.0
+
+/* The guess for the next value from the last ones: the sum of their backward differences. 0 if there is none,
+   or if it is far away, where the equation of a step has solutions that have nothing to do with the motion.
+   */
+static int so4_manakov_predict(const so4_manakov_history *history, double value[so4_manakov_DIM])
 {
-    double value[6];
-    so4_manakov_field(params != NULL ? params : &so4_manakov_default_params, x, value);
-    memcpy(out, value, sizeof value);
+    double distance = 0.0, size = 0.0;
+    for (int i = 0; i < so4_manakov_DIM; ++i) {
+        value[i] = 0.0;
+        for (int k = 0; k < history->order; ++k) value[i] += history->difference[k][i];
+        distance += fabs(value[i] - history->difference[0][i]);
+        size += fabs(history->difference[0][i]);
+    }
+    return history->order > 0 && distance <= so4_manakov_REACH * size;
+}
+
+/* Take in the solved value. The guess of order k missed it by its k-th difference: the next is of the best
+   order. */
+static void so4_manakov_remember(so4_manakov_history *history, const double value[so4_manakov_DIM])
+{
+    double least = HUGE_VAL, next[so4_manakov_DIM];
+    memcpy(next, value, sizeof next);
+    for (int k = 0; k <= history->count && k < so4_manakov_DIFFERENCES; ++k) {
+        double size = 0.0;
+        for (int i = 0; i < so4_manakov_DIM; ++i) {
+            const double last = history->difference[k][i];
+            history->difference[k][i] = next[i];
+            size += fabs(next[i]);
+            next[i] -= last;
+        }
+        if (k > 0 && size < least) {
+            least = size;
+            history->order = k;
+        }
+    }
+    if (history->count == 0) history->order = 1;
+    if (history->count < so4_manakov_DIFFERENCES) ++history->count;
+}
+
+/* How far a step may lead, in sizes of the state and of what the vector field says, if the energy is lost;
+   and the part of the energy that counts as lost. */
+#define so4_manakov_PLAUSIBLE 1.5
+#define so4_manakov_LOST 0.5
+
+/* Whether an increment is that of the motion. Where the step is too large, the equation may have been solved
+   by a point far away, at another energy, that has nothing to do with it. */
+static int so4_manakov_plausible(const so4_manakov_solver *s, const double increment[so4_manakov_DIM])
+{
+    double moved = 0.0, size = 0.0, field[so4_manakov_DIM], middle[so4_manakov_DIM], end[so4_manakov_DIM];
+    for (int i = 0; i < so4_manakov_DIM; ++i) {
+        moved += fabs(increment[i]);
+        size += fabs(s->x[i]);
+    }
+    if (moved <= so4_manakov_PLAUSIBLE * size) return 1;
+    so4_manakov_vector_field(&s->params, s->x, field);
+    for (int i = 0; i < so4_manakov_DIM; ++i) {
+        size += fabs(s->h * field[i]);
+        middle[i] = s->x[i] + 0.5 * increment[i];
+        end[i] = s->x[i] + increment[i];
+    }
+    if (moved <= so4_manakov_PLAUSIBLE * size) return 1;
+    const double before = so4_manakov_hamiltonian(&s->params, s->x), after =
+        so4_manakov_hamiltonian(&s->params, end);
+    const double scale = fabs(before) + fabs(so4_manakov_hamiltonian(&s->params, middle)) + fabs(after);
+    return fabs(after - before) <= so4_manakov_LOST * scale;
+}
+
+/* ---- The implicit step, by Newton's method ---- */
+/* Components of y are measured no finer than by this part of the largest. */
+#define so4_manakov_FLOOR 1e-6
+
+/* Size of a correction relative to each component of y; NaN or infinite if the correction is. */
+static double so4_manakov_size(const double y[so4_manakov_DIM], const double delta[so4_manakov_DIM])
+{
+    double norm = 0.0, size = 0.0;
+    for (int i = 0; i < so4_manakov_DIM; ++i) norm = fabs(y[i]) > norm ? fabs(y[i]) : norm;
+    for (int i = 0; i < so4_manakov_DIM; ++i) {
+        const double ratio = fabs(delta[i]) / (fabs(y[i]) + so4_manakov_FLOOR * norm + DBL_MIN);
+        if (!isfinite(ratio)) return ratio;
+        size = ratio > size ? ratio : size;
+    }
+    return size;
+}
+
+/* Corrections below the first that shrink by less than the second have reached the level of rounding. */
+#define so4_manakov_NEARLY_SOLVED 1e-8
+#define so4_manakov_SHRINKING 0.25
+
+/* Solve (y - x) + displacement(y) = 0 for y by Newton's method from the extrapolated guess, and advance. The
+   increment is corrected to first order by the last Newton correction, so that correction costs no
+   evaluation: a correction is accepted when the error that remains after it, quadratic in it, is below
+   so4_manakov_TOLERANCE. */
+static so4_manakov_status so4_manakov_attempt(so4_manakov_solver *s)
+{
+    double y[so4_manakov_DIM], delta[so4_manakov_DIM], displacement[so4_manakov_DIM],
+        increment[so4_manakov_DIM];
+    double jacobian[so4_manakov_DIM * so4_manakov_DIM], increment_jacobian[so4_manakov_DIM * so4_manakov_DIM],
+        previous = HUGE_VAL;
+    if (!so4_manakov_predict(&s->history, y)) memcpy(y, s->x, sizeof y);
+    for (int iteration = 1; iteration <= so4_manakov_MAX_ITERATIONS; ++iteration) {
+        so4_manakov_linearise(s->coef, y, displacement, increment, jacobian, increment_jacobian);
+        ++s->evaluations;
+        for (int i = 0; i < so4_manakov_DIM; ++i) delta[i] = ((y[i] - s->x[i]) + displacement[i])
+            - s->carry[i];
+        const int regular = so4_manakov_solve(jacobian, delta);
+        const double size = so4_manakov_size(y, delta), growth = size / (previous * previous);
+        if (!isfinite(size)) return so4_manakov_NOT_FINITE;
+        if (!regular) return so4_manakov_SINGULAR;
+        for (int i = 0; i < so4_manakov_DIM; ++i) y[i] -= delta[i];
+        const double remaining = size * size * (growth > 1.0 ? growth : 1.0);
+        const int stalled = previous < so4_manakov_NEARLY_SOLVED && size > so4_manakov_SHRINKING * previous;
+        previous = size;
+        if (!(remaining <= so4_manakov_TOLERANCE || stalled)) continue;
+        double correction[so4_manakov_DIM] = { 0.0 };
+        for (int i = 0; i < so4_manakov_DIM; ++i)
+            for (int j = 0; j < so4_manakov_DIM; ++j)
+                correction[i] -= increment_jacobian[i * so4_manakov_DIM + j] * delta[j];
+        if (!so4_manakov_plausible(s, increment)) return so4_manakov_NO_CONVERGENCE;
+        if (!so4_manakov_advance(s, increment, correction)) return so4_manakov_NOT_FINITE;
+        so4_manakov_remember(&s->history, y);
+        return so4_manakov_OK;
+    }
+    return so4_manakov_NO_CONVERGENCE;
+}
+
+/* ---- The choice of the gauge: multiples of Casimirs taken from H ---- */
+enum {
+    so4_manakov_SAMPLES = 32, /* states along a short piece of the trajectory */
+    so4_manakov_SWEEPS = 4    /* most rounds over the multiples */
+};
+
+/* A short piece of the trajectory from x, by a Runge-Kutta method with steps of a fixed change. */
+static void so4_manakov_sample(const so4_manakov_params *params, const double x[so4_manakov_DIM],
+    double samples[][so4_manakov_DIM])
+{
+    double slope[so4_manakov_DIM], middle[so4_manakov_DIM], size = 0.0, speed = DBL_MIN;
+    so4_manakov_vector_field(params, x, slope);
+    for (int i = 0; i < so4_manakov_DIM; ++i) {
+        samples[0][i] = x[i];
+        size += fabs(x[i]);
+        speed += fabs(slope[i]);
+    }
+    const double h = 0.25 * size / speed;
+    for (int k = 1; k < so4_manakov_SAMPLES; ++k) {
+        const double *y = samples[k - 1];
+        so4_manakov_vector_field(params, y, slope);
+        for (int i = 0; i < so4_manakov_DIM; ++i) middle[i] = y[i] + 0.5 * h * slope[i];
+        so4_manakov_vector_field(params, middle, slope);
+        for (int i = 0; i < so4_manakov_DIM; ++i) samples[k][i] = y[i] + h * slope[i];
+    }
+}
+
+/* Sum of |pi grad S_3|^2, the leading error of the method, over the samples. */
+static double so4_manakov_gauge_error(const so4_manakov_params *params,
+    const double gauge[so4_manakov_GAUGES], double samples[][so4_manakov_DIM])
+{
+    double error[so4_manakov_DIM], sum = 0.0;
+    for (int k = 0; k < so4_manakov_SAMPLES; ++k) {
+        so4_manakov_guide(params, gauge, samples[k], error);
+        for (int i = 0; i < so4_manakov_DIM; ++i) sum += error[i] * error[i];
+    }
+    return sum;
+}
+
+/* How many widths multiple c is to be moved for the least error: the best on grids, each finer than the one
+   before. */
+static double so4_manakov_least_on_line(const so4_manakov_params *params,
+    const double gauge[so4_manakov_GAUGES], int c, double width, double samples[][so4_manakov_DIM])
+{
+    double moved[so4_manakov_GAUGES], best = 0.0, mesh = 0.125, least = so4_manakov_gauge_error(params, gauge,
+        samples);
+    memcpy(moved, gauge, sizeof moved);
+    for (int level = 0; level < 3; ++level, mesh *= 0.125) {
+        const int reach = level == 0 ? 24 : 8;
+        const double centre = best;
+        for (int j = -reach; j <= reach; ++j) {
+            moved[c] = gauge[c] + (centre + j * mesh) * width;
+            const double error = so4_manakov_gauge_error(params, moved, samples);
+            if (!(error < least - 1e-12 * least)) continue; /* close calls are not decided by rounding */
+            least = error;
+            best = centre + j * mesh;
+        }
+    }
+    return best;
+}
+
+/* The multiples that minimise the leading error along a short piece of the trajectory, one after the other,
+   from the least-squares solution of grad H = sum of multiples of grad C. Zero where that gives nothing
+   finite. */
+static void so4_manakov_choose_gauge(const so4_manakov_params *params, const double x[so4_manakov_DIM],
+    double gauge[so4_manakov_GAUGES])
+{
+    double samples[so4_manakov_SAMPLES][so4_manakov_DIM], out[1 + 2 * so4_manakov_GAUGES],
+        sums[1 + 2 * so4_manakov_GAUGES] = { 0.0 };
+    double width[so4_manakov_GAUGES];
+    so4_manakov_sample(params, x, samples);
+    for (int k = 0; k < so4_manakov_SAMPLES; ++k) {
+        so4_manakov_products(params, samples[k], out);
+        for (int i = 0; i < 1 + 2 * so4_manakov_GAUGES; ++i) sums[i] += out[i];
+    }
+    for (int c = 0; c < so4_manakov_GAUGES; ++c) {
+        const double norm = sums[2 + 2 * c] > 0.0 ? sums[2 + 2 * c] : HUGE_VAL;
+        gauge[c] = sums[1 + 2 * c] / norm;
+        width[c] = sqrt(sums[0] / norm);
+    }
+    for (int sweep = 0, moved = 1; sweep < so4_manakov_SWEEPS && moved; ++sweep) {
+        moved = 0;
+        for (int c = 0; c < so4_manakov_GAUGES; ++c) {
+            const double best = so4_manakov_least_on_line(params, gauge, c, width[c], samples);
+            gauge[c] += best * width[c];
+            moved = moved || best != 0.0;
+        }
+    }
+    if (!isfinite(so4_manakov_gauge_error(params, gauge, samples)))
+        memset(gauge, 0, so4_manakov_GAUGES * sizeof gauge[0]);
+}
+
+/* ---- The solver ---- */
+/* The arguments may be parts of *s: they are read before it is written. */
+so4_manakov_status so4_manakov_init_gauge(so4_manakov_solver *s, const so4_manakov_params *params,
+    const double x0[so4_manakov_DIM], const double gauge[so4_manakov_GAUGES])
+{
+    if (s == NULL || x0 == NULL) return so4_manakov_BAD_ARGUMENT;
+    const so4_manakov_params own = params != NULL ? *params : so4_manakov_default_params;
+    double x[so4_manakov_DIM];
+    memcpy(x, x0, sizeof x);
+    for (int i = 0; i < so4_manakov_DIM; ++i)
+        if (!isfinite(x[i])) return so4_manakov_BAD_ARGUMENT;
+    double multiples[so4_manakov_GAUGES] = { 0.0 };
+    const int given = gauge != NULL;
+    if (given) memcpy(multiples, gauge, sizeof multiples);
+    for (int c = 0; c < so4_manakov_GAUGES; ++c)
+        if (!isfinite(multiples[c])) return so4_manakov_BAD_ARGUMENT;
+    memset(s, 0, sizeof *s);
+    memcpy(s->x, x, sizeof s->x);
+    s->params = own;
+    if (!given) so4_manakov_choose_gauge(&own, x, multiples);
+    memcpy(s->gauge, multiples, sizeof s->gauge);
+    return so4_manakov_OK;
+}
+
+so4_manakov_status so4_manakov_init(so4_manakov_solver *s, const so4_manakov_params *params,
+    const double x0[so4_manakov_DIM])
+{
+    return so4_manakov_init_gauge(s, params, x0, NULL);
+}
+
+/* What depends on the step size; nothing where that is as before. */
+static so4_manakov_status so4_manakov_set_step(so4_manakov_solver *s, double h)
+{
+    if (s == NULL || !isfinite(h)) return so4_manakov_BAD_ARGUMENT;
+    if (s->prepared && memcmp(&h, &s->h, sizeof h) == 0) return so4_manakov_OK;
+    so4_manakov_prepare(&s->params, s->gauge, h, s->coef);
+    memset(&s->history, 0, sizeof s->history);
+    s->h = h;
+    s->t_before_h = s->t;
+    s->steps_before_h = s->steps;
+    s->prepared = 1;
+    return so4_manakov_OK;
+}
+
+/* One stage. A guess from earlier steps may have misled it: then once more without. */
+static so4_manakov_status so4_manakov_stage(so4_manakov_solver *s)
+{
+    so4_manakov_status status = so4_manakov_attempt(s);
+    if (status != so4_manakov_OK && s->history.count > 0) {
+        memset(&s->history, 0, sizeof s->history);
+        status = so4_manakov_attempt(s);
+    }
+    return status;
+}
+
+so4_manakov_status so4_manakov_step(so4_manakov_solver *s, double h)
+{
+    so4_manakov_status status = so4_manakov_set_step(s, h);
+    if (status != so4_manakov_OK) return status;
+    status = so4_manakov_stage(s);
+    if (status != so4_manakov_OK) return status;
+    ++s->steps;
+    s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
+    return status;
+}
+
+so4_manakov_status so4_manakov_integrate(so4_manakov_solver *s, double h, size_t steps)
+{
+    so4_manakov_status status = so4_manakov_set_step(s, h);
+    for (; steps > 0 && status == so4_manakov_OK; --steps) status = so4_manakov_step(s, h);
+    return status;
 }
 
 const char *so4_manakov_status_string(so4_manakov_status status)
 {
-    switch (status) {
-    case so4_manakov_OK: return "ok";
-    case so4_manakov_NO_CONVERGENCE: return "no convergence: the step is too large";
-    case so4_manakov_SINGULAR: return "singular Newton matrix: the step is too large";
-    case so4_manakov_NOT_FINITE: return "not finite: overflow, or outside the domain";
-    case so4_manakov_BAD_ARGUMENT: return "bad argument: a null pointer, or values that are not allowed";
-    }
-    return "unknown status";
+    static const char *const text[] = {
+        "ok",
+        "no convergence: the step is too large",
+        "singular Newton matrix: the step is too large",
+        "not finite: overflow, or outside the domain",
+        "bad argument: a null pointer, or values that are not allowed"
+    };
+    return (unsigned)status <= so4_manakov_BAD_ARGUMENT ? text[status] : "unknown status";
 }
 
 size_t so4_manakov_solver_size(void) { return sizeof(so4_manakov_solver); }
 
 size_t so4_manakov_solver_steps_done(const so4_manakov_solver *s) { return s->steps; }
+
+/* ---- Ensembles ---- */
+so4_manakov_status so4_manakov_ensemble(const so4_manakov_params *params, double *x, size_t members, double h,
+    size_t steps, unsigned char *status)
+{
+    so4_manakov_status worst = isfinite(h) ? so4_manakov_OK : so4_manakov_BAD_ARGUMENT;
+    const so4_manakov_params own = params != NULL ? *params : so4_manakov_default_params;
+    if (x == NULL && members > 0) return so4_manakov_BAD_ARGUMENT;
+    for (size_t m = 0; m < members; ++m) {
+        so4_manakov_solver s;
+        double x0[so4_manakov_DIM];
+        for (size_t i = 0; i < so4_manakov_DIM; ++i) x0[i] = x[i * members + m];
+        so4_manakov_status member = so4_manakov_init(&s, &own, x0);
+        if (member == so4_manakov_OK) {
+            member = so4_manakov_integrate(&s, h, steps);
+            for (size_t i = 0; i < so4_manakov_DIM; ++i) x[i * members + m] = s.x[i];
+        }
+        if (status != NULL) status[m] = (unsigned char)member;
+        if (worst == so4_manakov_OK) worst = member;
+    }
+    return worst;
+}

@@ -7,17 +7,17 @@
 #   step: implicit, Newton iteration with the analytic matrix
 #   one Newton iteration: 824 additions, 738 multiplications, 4 functions
 #
-# spec: so4_manakov, sha256 e5ef0b8ca1ea64cf1312e35d5c5ef2f6e1fc0f132fbd63bc25720a35fa45a507
+# spec: so4_manakov, sha256 c60c8cfe639c4453a54f9110f2a3b99c614520fc0699d00cf0c68db1b9948be4
 # to regenerate: phigen build so4_manakov
 # DO NOT EDIT: change the spec and regenerate; edits are noticed by the checksum below.
 #
 # SPDX-License-Identifier: 0BSD
 # This file belongs to whoever generated it; phigen claims no rights in it.
-# body-sha256: fd8e875a91d1027f71aee02ae7dc41bf1018357801781aa1eac925c252fa85f8
+# body-sha256: 58cd599b614e7138817d6b2b63564d2d3f620589a44be25b7044d6fbb67635f8
 import numpy as np
 
 VERSION = "0.1.0"
-SPEC_SHA256 = "e5ef0b8ca1ea64cf1312e35d5c5ef2f6e1fc0f132fbd63bc25720a35fa45a507"
+SPEC_SHA256 = "c60c8cfe639c4453a54f9110f2a3b99c614520fc0699d00cf0c68db1b9948be4"
 DIM = 6
 ORDER = 4
 COORDINATES = ("x12", "x13", "x14", "x23", "x24", "x34",)

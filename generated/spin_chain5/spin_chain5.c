@@ -8,26 +8,41 @@
  *   step: implicit, Newton iteration with the analytic matrix
  *   one Newton iteration: 1700 additions, 2144 multiplications, 10 functions
  *
- * spec: spin_chain5, sha256 da0327c7c317a1988908e0a444023e4dbaa180a3aa04a316a6e41501ce41812b
+ * spec: spin_chain5, sha256 822f770e232b566fca45eb393c188aab67b907df200761f36001661c9c3fe5e9
  * to regenerate: phigen build spin_chain5
  * DO NOT EDIT: change the spec and regenerate; edits are noticed by the checksum below.
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 400b64eeb1e2e27b368012ae1faee42bbf76a64aacdcbfc4e24b95818c37c74c
+ *
+ *   1. The model
+ *   2. Compensated sums, linear equations
+ *   3. Starting guesses
+ *   4. The implicit step, by Newton's method
+ *   5. The choice of the gauge: multiples of Casimirs taken from H
+ *   6. The solver
+ *   7. Ensembles
+ * body-sha256: e96d0bdc8cae5fb5ff10f6322fa0ad6367ecdf40e1258ea9bc9e866e71a3dfe2
  */
 #include "spin_chain5.h"
 
 #include <float.h>
-#include <limits.h>
 #include <math.h>
-#include <stdint.h>
 #include <string.h>
 
+/* ---- The model ---- */
 const spin_chain5_params spin_chain5_default_params = { 1.0 };
 
-/* A step of size h is the composition of these fractions of it. */
-static const double spin_chain5_fractions[1] = { 1.0 };
+enum { spin_chain5_MAX_ITERATIONS = 20 }; /* of an inner solve */
+
+/* A correction is accepted when the error that it leaves is estimated to be below this. */
+#define spin_chain5_TOLERANCE 1e-20
+
+/* Whether all parameters are finite, and positive where they have to be. */
+static int spin_chain5_allowed(const spin_chain5_params *params)
+{
+    return isfinite(params->J);
+}
 
 /* Functions to be kept apart: very long ones compile in quadratic time. */
 #if defined(__GNUC__)
@@ -39,42 +54,20 @@ static const double spin_chain5_fractions[1] = { 1.0 };
 /* (1 - w cot w)/s with w = sqrt(s)/2, coth for negative s: the function of the exponential bi-realisation. */
 static double spin_chain5_phi0(double s)
 {
-    if (fabs(s) < 0.25) {
-        double sum = 8.586062056277845e-15;
-        sum = sum * s + 3.3896802963225827e-13;
-        sum = sum * s + 1.3382536530684679e-11;
-        sum = sum * s + 5.284190138687493e-10;
-        sum = sum * s + 2.08767569878681e-08;
-        sum = sum * s + 8.267195767195768e-07;
-        sum = sum * s + 3.306878306878307e-05;
-        sum = sum * s + 0.001388888888888889;
-        sum = sum * s + 0.08333333333333333;
-        return sum;
-    }
+    if (fabs(s) < 0.25)
+        return (0.08333333333333333 + s * (0.001388888888888889 + s * (3.306878306878307e-05 + s *
+            (8.267195767195768e-07 + s * (2.08767569878681e-08 + s * (5.284190138687493e-10 + s *
+            (1.3382536530684679e-11 + s * (3.3896802963225827e-13 + s * 8.586062056277845e-15))))))));
     if (fabs(s) < 16.0) {
         const double pole = 1.0 / (39.47841760435743 - s);
-        double sum = 1.3621211117593843e-46;
-        sum = sum * s + 2.1509755511832569e-44;
-        sum = sum * s + 3.3966848266497805e-42;
-        sum = sum * s + 5.363831046655698e-40;
-        sum = sum * s + 8.470227328650247e-38;
-        sum = sum * s + 1.3375664093215244e-35;
-        sum = sum * s + 2.1122063323183885e-33;
-        sum = sum * s + 3.3354842988221443e-31;
-        sum = sum * s + 5.267262996834231e-29;
-        sum = sum * s + 8.318003195189264e-27;
-        sum = sum * s + 1.3136241807166534e-24;
-        sum = sum * s + 2.0747401878593604e-22;
-        sum = sum * s + 3.277539174701792e-20;
-        sum = sum * s + 5.180118196169724e-18;
-        sum = sum * s + 8.196052055691008e-16;
-        sum = sum * s + 1.3000482138698975e-13;
-        sum = sum * s + 2.0742872904166045e-11;
-        sum = sum * s + 3.357141926657451e-09;
-        sum = sum * s + 5.637370282876845e-07;
-        sum = sum * s + 0.000105641107053347;
-        sum = sum * s + 0.03267274151216445;
-        return 2.0 * pole + sum;
+        return 2.0 * pole + (0.03267274151216445 + s * (0.000105641107053347 + s * (5.637370282876845e-07
+            + s * (3.357141926657451e-09 + s * (2.0742872904166045e-11 + s * (1.3000482138698975e-13 + s *
+            (8.196052055691008e-16 + s * (5.180118196169724e-18 + s * (3.277539174701792e-20 + s *
+            (2.0747401878593604e-22 + s * (1.3136241807166534e-24 + s * (8.318003195189264e-27 + s *
+            (5.267262996834231e-29 + s * (3.3354842988221443e-31 + s * (2.1122063323183885e-33 + s *
+            (1.3375664093215244e-35 + s * (8.470227328650247e-38 + s * (5.363831046655698e-40 + s *
+            (3.3966848266497805e-42 + s * (2.1509755511832569e-44 + s *
+            1.3621211117593843e-46))))))))))))))))))));
     }
     const double w = 0.5 * sqrt(fabs(s)), c = w / (s > 0.0 ? tan(w) : tanh(w));
     const double phi0 = (1.0 - c) / s;
@@ -84,42 +77,20 @@ static double spin_chain5_phi0(double s)
 /* The derivative of (1 - w cot w)/s, w = sqrt(s)/2. */
 static double spin_chain5_phi1(double s)
 {
-    if (fabs(s) < 0.25) {
-        double sum = 1.9573818287022555e-15;
-        sum = sum * s + 6.868849645022276e-14;
-        sum = sum * s + 2.372776207425808e-12;
-        sum = sum * s + 8.029521918410807e-11;
-        sum = sum * s + 2.6420950693437467e-09;
-        sum = sum * s + 8.35070279514724e-08;
-        sum = sum * s + 2.48015873015873e-06;
-        sum = sum * s + 6.613756613756614e-05;
-        sum = sum * s + 0.001388888888888889;
-        return sum;
-    }
+    if (fabs(s) < 0.25)
+        return (0.001388888888888889 + s * (6.613756613756614e-05 + s * (2.48015873015873e-06 + s *
+            (8.35070279514724e-08 + s * (2.6420950693437467e-09 + s * (8.029521918410807e-11 + s *
+            (2.372776207425808e-12 + s * (6.868849645022276e-14 + s * 1.9573818287022555e-15))))))));
     if (fabs(s) < 16.0) {
         const double pole = 1.0 / (39.47841760435743 - s);
-        double sum = 1.8114038279637677e-47;
-        sum = sum * s + 2.7242422235187686e-45;
-        sum = sum * s + 4.0868535472481875e-43;
-        sum = sum * s + 6.114032687969605e-41;
-        sum = sum * s + 9.118512779314688e-39;
-        sum = sum * s + 1.3552363725840395e-36;
-        sum = sum * s + 2.0063496139822866e-34;
-        sum = sum * s + 2.957088865245744e-32;
-        sum = sum * s + 4.336129588468787e-30;
-        sum = sum * s + 6.320715596201077e-28;
-        sum = sum * s + 9.149803514708191e-26;
-        sum = sum * s + 1.3136241807166533e-23;
-        sum = sum * s + 1.8672661690734246e-21;
-        sum = sum * s + 2.6220313397614337e-19;
-        sum = sum * s + 3.626082737318807e-17;
-        sum = sum * s + 4.917631233414605e-15;
-        sum = sum * s + 6.500241069349487e-13;
-        sum = sum * s + 8.297149161666418e-11;
-        sum = sum * s + 1.0071425779972354e-08;
-        sum = sum * s + 1.127474056575369e-06;
-        sum = sum * s + 0.000105641107053347;
-        return 2.0 * pole * pole + sum;
+        return 2.0 * pole * pole + (0.000105641107053347 + s * (1.127474056575369e-06 + s *
+            (1.0071425779972354e-08 + s * (8.297149161666418e-11 + s * (6.500241069349487e-13 + s *
+            (4.917631233414605e-15 + s * (3.626082737318807e-17 + s * (2.6220313397614337e-19 + s *
+            (1.8672661690734246e-21 + s * (1.3136241807166533e-23 + s * (9.149803514708191e-26 + s *
+            (6.320715596201077e-28 + s * (4.336129588468787e-30 + s * (2.957088865245744e-32 + s *
+            (2.0063496139822866e-34 + s * (1.3552363725840395e-36 + s * (9.118512779314688e-39 + s *
+            (6.114032687969605e-41 + s * (4.0868535472481875e-43 + s * (2.7242422235187686e-45 + s *
+            1.8114038279637677e-47))))))))))))))))))));
     }
     const double w = 0.5 * sqrt(fabs(s)), c = w / (s > 0.0 ? tan(w) : tanh(w));
     const double phi0 = (1.0 - c) / s;
@@ -129,33 +100,17 @@ static double spin_chain5_phi1(double s)
 
 /* everything that depends on parameters and step size only */
 static void spin_chain5_prepare(const spin_chain5_params *params, const double gauge[5], double h,
-                                double coef[restrict 33])
+    double coef[restrict 33])
 {
-    const double t1 = 1.0 / 6.0 * gauge[4];
-    const double t2 = 1.0 / 6.0 * params->J;
-    const double t3 = h * (h * h);
-    const double t4 = params->J * params->J;
-    const double t5 = t3 * t4;
-    const double t6 = t5 * (t2 - t1);
-    const double t7 = t3 * (params->J * t4);
-    const double t8 = 1.0 / 6.0 * gauge[1];
-    const double t9 = (t2 - t8) * t5;
-    const double t10 = t8 - t2;
-    const double t11 = 1.0 / 6.0 * gauge[0];
-    const double t12 = t11 - t2;
-    const double t13 = 1.0 / 12.0 * params->J;
-    const double t14 = t13 - 1.0 / 12.0 * gauge[0];
-    const double t15 = 1.0 / 12.0 * gauge[4];
-    const double t16 = (t2 - t11) * t5;
-    const double t17 = 1.0 / 12.0 * gauge[1];
-    const double t18 = 1.0 / 6.0 * gauge[2];
-    const double t19 = (t2 - t18) * t5;
-    const double t20 = t18 - t2;
-    const double t21 = 1.0 / 12.0 * gauge[2];
-    const double t22 = 1.0 / 6.0 * gauge[3];
-    const double t23 = (t2 - t22) * t5;
-    const double t24 = t22 - t2;
-    const double t25 = 1.0 / 12.0 * gauge[3];
+    const double t1 = 1.0 / 6.0 * gauge[4], t2 = 1.0 / 6.0 * params->J, t3 = h * (h * h);
+    const double t4 = params->J * params->J, t5 = t3 * t4, t6 = t5 * (t2 - t1);
+    const double t7 = t3 * (params->J * t4), t8 = 1.0 / 6.0 * gauge[1], t9 = (t2 - t8) * t5;
+    const double t10 = t8 - t2, t11 = 1.0 / 6.0 * gauge[0], t12 = t11 - t2;
+    const double t13 = 1.0 / 12.0 * params->J, t14 = t13 - 1.0 / 12.0 * gauge[0];
+    const double t15 = 1.0 / 12.0 * gauge[4], t16 = (t2 - t11) * t5, t17 = 1.0 / 12.0 * gauge[1];
+    const double t18 = 1.0 / 6.0 * gauge[2], t19 = (t2 - t18) * t5, t20 = t18 - t2;
+    const double t21 = 1.0 / 12.0 * gauge[2], t22 = 1.0 / 6.0 * gauge[3], t23 = (t2 - t22) * t5;
+    const double t24 = t22 - t2, t25 = 1.0 / 12.0 * gauge[3];
     coef[0] = -(params->J * h);
     coef[1] = (t1 - t2) * t5;
     coef[2] = t6;
@@ -194,1483 +149,1304 @@ static void spin_chain5_prepare(const spin_chain5_params *params, const double g
 /* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
    increment, all with the momenta p = grad S_h(y) (part 1 of 7) */
 spin_chain5_APART static void spin_chain5_linearise_part1(const double coef[33], const double y[15],
-                                                          double displacement[restrict 15],
-                                                          double increment[restrict 15],
-                                                          double jacobian[restrict 225],
-                                                          double increment_jacobian[restrict 225],
-                                                          double work[restrict 517])
+    double displacement[restrict 15], double increment[restrict 15], double jacobian[restrict 225],
+    double increment_jacobian[restrict 225], double work[restrict 505])
 {
-    (void)jacobian;
-    (void)increment_jacobian;
-    const double x1 = y[0];
-    const double y1 = y[1];
-    const double z1 = y[2];
-    const double x2 = y[3];
-    const double y2 = y[4];
-    const double z2 = y[5];
-    const double x3 = y[6];
-    const double y3 = y[7];
-    const double z3 = y[8];
-    const double x4 = y[9];
-    const double y4 = y[10];
-    const double z4 = y[11];
-    const double x5 = y[12];
-    const double y5 = y[13];
-    const double z5 = y[14];
-    work[20] = coef[3] * x5;
-    work[50] = coef[3] * x4;
-    work[14] = work[20] + (coef[5] * x2 + work[50]);
-    const double t4 = coef[9] * z2 + coef[8] * z5;
-    const double t5 = x1 * t4;
-    const double t6 = coef[13] * x2;
-    work[116] = coef[12] * x5 + t6;
-    work[37] = x5 * z4;
-    work[36] = x4 * z5;
-    const double t10 = coef[3] * work[37] + coef[4] * work[36];
-    const double t11 = coef[6] * z2;
-    work[128] = coef[4] * z4;
-    work[126] = t11 + work[128];
-    const double t14 = t10 + x3 * work[126];
-    work[117] = z3 * work[14] + (t5 + (z1 * work[116] + t14));
-    work[27] = coef[3] * y5;
-    work[52] = coef[3] * y4;
-    work[9] = work[27] + (coef[5] * y2 + work[52]);
-    const double t19 = y1 * t4;
-    const double t20 = coef[13] * y2;
-    work[106] = t20 + coef[12] * y5;
-    work[38] = y5 * z4;
-    work[39] = y4 * z5;
-    const double t24 = coef[3] * work[38] + coef[4] * work[39];
-    const double t25 = y3 * work[126] + t24;
-    work[121] = z3 * work[9] + (t19 + (z1 * work[106] + t25));
-    const double t27 = coef[8] * z2 + coef[7] * z5;
-    work[65] = x1 * t27;
-    work[61] = coef[3] * z4;
-    work[8] = coef[4] * z2;
-    work[127] = work[61] + work[8];
-    work[66] = x3 * work[127];
-    work[35] = coef[1] * z5;
-    work[119] = coef[4] * z3;
-    work[137] = work[35] + work[119];
-    work[67] = x4 * work[137];
-    work[62] = coef[11] * z1;
-    const double t38 = coef[2] * z4 + work[62];
-    work[147] = x5 * t38;
-    work[148] = work[65] + (work[66] + (work[67] + work[147]));
-    work[40] = coef[0] * z5;
-    work[13] = coef[0] * z2;
-    work[80] = y1 * t27;
-    work[81] = y3 * work[127];
-    work[160] = y5 * t38;
-    work[82] = y4 * work[137];
-    work[161] = work[80] + (work[81] + (work[160] + work[82]));
-    work[101] = x2 * work[117] + (y2 * work[121] + (x5 * work[148] + (work[40] + (coef[10] * z1 + work[13]) + y5 * work[161])));
-    work[113] = work[101] * work[101];
-    work[115] = coef[8] * y5 + coef[9] * y2;
-    const double t50 = x1 * work[115];
-    work[43] = x5 * y4;
-    work[44] = x4 * y5;
-    const double t53 = coef[3] * work[43] + coef[4] * work[44];
-    work[129] = coef[4] * y4;
-    const double t55 = coef[6] * y2;
-    work[131] = work[129] + t55;
-    const double t57 = t53 + x3 * work[131];
-    work[120] = y3 * work[14] + (t50 + (y1 * work[116] + t57));
-    work[7] = coef[3] * z5;
-    work[23] = work[7] + (coef[5] * z2 + work[61]);
-    const double t61 = coef[13] * z2;
-    work[107] = coef[12] * z5 + t61;
-    work[12] = coef[4] * work[38] + coef[3] * work[39];
-    const double t64 = z1 * work[115] + (work[12] + z3 * work[131]);
-    work[125] = y3 * work[23] + (y1 * work[107] + t64);
-    work[114] = coef[7] * y5 + coef[8] * y2;
-    work[76] = x1 * work[114];
-    work[28] = coef[4] * y2;
-    work[130] = work[52] + work[28];
-    work[77] = x3 * work[130];
-    work[118] = coef[4] * y3;
-    work[47] = coef[1] * y5;
-    work[142] = work[118] + work[47];
-    work[79] = x4 * work[142];
-    work[53] = coef[11] * y1;
-    const double t76 = work[53] + coef[2] * y4;
-    work[154] = x5 * t76;
-    work[155] = work[76] + (work[77] + (work[79] + work[154]));
-    work[48] = coef[0] * y5;
-    work[34] = coef[0] * y2;
-    work[58] = z1 * work[114];
-    work[59] = z3 * work[130];
-    work[60] = z4 * work[142];
-    work[167] = z5 * t76;
-    work[168] = work[58] + (work[59] + (work[60] + work[167]));
-    work[108] = x2 * work[120] + (z2 * work[125] + (x5 * work[155] + (work[48] + (work[34] + coef[10] * y1) + z5 * work[168])));
-    work[112] = work[108] * work[108];
+    (void)displacement, (void)increment, (void)jacobian, (void)increment_jacobian;
+    const double x1 = y[0], y1 = y[1], z1 = y[2], x2 = y[3], y2 = y[4], z2 = y[5], x3 = y[6], y3 = y[7], z3 =
+        y[8], x4 = y[9], y4 = y[10], z4 = y[11], x5 = y[12], y5 = y[13], z5 = y[14];
+    work[24] = coef[3] * x5;
+    work[52] = coef[3] * x4;
+    work[16] = work[24] + (coef[5] * x2 + work[52]);
+    const double t1 = coef[9] * z2 + coef[8] * z5, t2 = x1 * t1, t3 = coef[13] * x2;
+    work[113] = coef[12] * x5 + t3;
+    work[30] = x5 * z4;
+    work[29] = x4 * z5;
+    const double t4 = coef[3] * work[30] + coef[4] * work[29], t5 = coef[6] * z2;
+    work[125] = coef[4] * z4;
+    work[123] = t5 + work[125];
+    const double t6 = t4 + x3 * work[123];
+    work[114] = z3 * work[16] + (t2 + (z1 * work[113] + t6));
+    work[14] = coef[3] * y5;
+    work[54] = coef[3] * y4;
+    work[5] = work[14] + (coef[5] * y2 + work[54]);
+    const double t7 = y1 * t1, t8 = coef[13] * y2;
+    work[105] = t8 + coef[12] * y5;
+    work[31] = y5 * z4;
+    work[32] = y4 * z5;
+    const double t9 = coef[3] * work[31] + coef[4] * work[32], t10 = y3 * work[123] + t9;
+    work[118] = z3 * work[5] + (t7 + (z1 * work[105] + t10));
+    const double t11 = coef[8] * z2 + coef[7] * z5;
+    work[66] = x1 * t11;
+    work[64] = coef[3] * z4;
+    work[27] = coef[4] * z2;
+    work[124] = work[64] + work[27];
+    work[67] = x3 * work[124];
+    work[26] = coef[1] * z5;
+    work[116] = coef[4] * z3;
+    work[134] = work[26] + work[116];
+    work[68] = x4 * work[134];
+    work[65] = coef[11] * z1;
+    const double t12 = coef[2] * z4 + work[65];
+    work[144] = x5 * t12;
+    work[145] = work[66] + (work[67] + (work[68] + work[144]));
+    work[33] = coef[0] * z5;
+    const double t13 = coef[0] * z2;
+    work[73] = y1 * t11;
+    work[74] = y3 * work[124];
+    work[157] = y5 * t12;
+    work[75] = y4 * work[134];
+    work[158] = work[73] + (work[74] + (work[157] + work[75]));
+    work[80] = x2 * work[114] + (y2 * work[118] + (x5 * work[145] + (work[33] + (coef[10] * z1 + t13) + y5
+        * work[158])));
+    work[112] = coef[8] * y5 + coef[9] * y2;
+    const double t14 = x1 * work[112];
+    work[38] = x5 * y4;
+    work[39] = x4 * y5;
+    const double t15 = coef[3] * work[38] + coef[4] * work[39];
+    work[126] = coef[4] * y4;
+    const double t16 = coef[6] * y2;
+    work[128] = work[126] + t16;
+    const double t17 = t15 + x3 * work[128];
+    work[117] = y3 * work[16] + (t14 + (y1 * work[113] + t17));
+    work[35] = coef[3] * z5;
+    work[9] = work[35] + (coef[5] * z2 + work[64]);
+    const double t18 = coef[13] * z2;
+    work[106] = coef[12] * z5 + t18;
+    const double t19 = coef[4] * work[31] + coef[3] * work[32];
+    const double t20 = z1 * work[112] + (t19 + z3 * work[128]);
+    work[122] = y3 * work[9] + (y1 * work[106] + t20);
+    work[111] = coef[7] * y5 + coef[8] * y2;
+    work[70] = x1 * work[111];
+    work[15] = coef[4] * y2;
+    work[127] = work[54] + work[15];
+    work[71] = x3 * work[127];
+    work[115] = coef[4] * y3;
+    work[46] = coef[1] * y5;
+    work[139] = work[115] + work[46];
+    work[72] = x4 * work[139];
+    work[55] = coef[11] * y1;
+    const double t21 = work[55] + coef[2] * y4;
+    work[151] = x5 * t21;
+    work[152] = work[70] + (work[71] + (work[72] + work[151]));
+    work[50] = coef[0] * y5;
+    work[23] = coef[0] * y2;
+    work[61] = z1 * work[111];
+    work[62] = z3 * work[127];
+    work[63] = z4 * work[139];
+    work[164] = z5 * t21;
+    work[165] = work[61] + (work[62] + (work[63] + work[164]));
+    work[81] = x2 * work[117] + (z2 * work[122] + (x5 * work[152] + (work[50] + (work[23] + coef[10] * y1)
+        + z5 * work[165])));
     work[99] = coef[9] * x2 + coef[8] * x5;
-    work[134] = coef[4] * x4;
-    const double t89 = coef[6] * x2;
-    work[132] = work[134] + t89;
-    work[31] = coef[4] * work[43] + coef[3] * work[44];
-    const double t92 = y1 * work[99] + (y3 * work[132] + work[31]);
-    work[122] = x3 * work[9] + (x1 * work[106] + t92);
-    work[17] = coef[3] * work[36] + coef[4] * work[37];
-    const double t95 = z1 * work[99] + (work[17] + z3 * work[132]);
-    work[124] = x3 * work[23] + (x1 * work[107] + t95);
+    work[131] = coef[4] * x4;
+    const double t22 = coef[6] * x2;
+    work[129] = work[131] + t22;
+    work[19] = coef[4] * work[38] + coef[3] * work[39];
+    const double t23 = y1 * work[99] + (y3 * work[129] + work[19]);
+    work[119] = x3 * work[5] + (x1 * work[105] + t23);
+    const double t24 = coef[3] * work[29] + coef[4] * work[30];
+    const double t25 = z1 * work[99] + (t24 + z3 * work[129]);
+    work[121] = x3 * work[9] + (x1 * work[106] + t25);
     work[98] = coef[8] * x2 + coef[7] * x5;
-    work[92] = y1 * work[98];
-    work[19] = coef[4] * x2;
-    work[133] = work[19] + work[50];
-    work[93] = y3 * work[133];
-    work[123] = coef[4] * x3;
-    work[42] = coef[1] * x5;
-    work[145] = work[123] + work[42];
-    work[94] = y4 * work[145];
-    work[51] = coef[11] * x1;
-    const double t107 = work[51] + coef[2] * x4;
-    work[162] = y5 * t107;
-    work[163] = work[92] + (work[93] + (work[94] + work[162]));
-    work[45] = coef[0] * x5;
-    work[26] = coef[0] * x2;
-    work[55] = z1 * work[98];
-    work[56] = z3 * work[133];
-    work[165] = z5 * t107;
-    work[57] = z4 * work[145];
-    work[166] = work[55] + (work[56] + (work[165] + work[57]));
-    work[109] = y2 * work[122] + (z2 * work[124] + (y5 * work[163] + (work[45] + (coef[10] * x1 + work[26]) + z5 * work[166])));
-    work[185] = work[109] * work[109];
-    work[221] = work[112] + work[185];
-    work[100] = work[113] + work[221];
-    work[104] = spin_chain5_phi0(work[100]);
-    work[217] = z1 * work[109];
-    work[103] = x1 * work[101];
-    work[102] = work[217] - work[103];
-    work[110] = x1 * work[108];
-    work[175] = y1 * work[109];
-    work[111] = work[110] - work[175];
-    work[105] = work[101] * work[102] - work[108] * work[111];
-    work[171] = y1 * work[101];
-    work[218] = z1 * work[108];
-    work[172] = work[171] - work[218];
-    work[169] = work[109] * work[111] - work[101] * work[172];
-    work[215] = work[108] * work[172] - work[109] * work[102];
-    work[239] = work[7] + (work[61] + coef[19] * z2);
-    const double t134 = coef[20] * z5 + t61;
-    work[143] = coef[4] * x5;
-    const double t136 = work[143] + t89;
-    work[24] = z1 * t136;
-    work[18] = coef[18] * z2;
-    const double t139 = coef[14] * z4 + work[18];
-    work[240] = x3 * t139;
-    work[245] = coef[16] * x2 + coef[15] * x4;
-    work[25] = z3 * work[245] + t10;
-    work[241] = work[24] + (work[240] + work[25]);
-    work[41] = coef[0] * z3;
-    work[54] = coef[0] * z1;
-    work[141] = coef[4] * y5;
-    const double t147 = work[141] + t55;
-    work[32] = z1 * t147;
-    work[246] = y3 * t139;
-    work[234] = coef[15] * y4 + coef[16] * y2;
-    work[33] = z3 * work[234] + t24;
-    work[247] = work[32] + (work[246] + work[33]);
-    work[2] = x1 * (x3 * work[239] + (x1 * t134 + t95)) + (y1 * (y3 * work[239] + (y1 * t134 + t64)) + (x3 * work[241] + (work[41] + (coef[17] * z2 + work[54]) + y3 * work[247])));
-    work[242] = work[20] + (coef[19] * x2 + work[50]);
-    const double t154 = coef[20] * x5 + t6;
-    work[29] = x1 * t147;
-    work[30] = x3 * work[234];
-    work[5] = coef[18] * x2;
-    const double t158 = work[5] + coef[14] * x4;
-    work[243] = y3 * t158;
-    work[244] = work[29] + (work[30] + (work[243] + work[31]));
-    work[46] = coef[0] * x3;
-    work[72] = coef[0] * x1;
-    work[136] = coef[4] * z5;
-    const double t164 = t11 + work[136];
-    work[15] = x1 * t164;
-    work[235] = coef[15] * z4 + coef[16] * z2;
-    work[16] = x3 * work[235];
-    work[248] = z3 * t158;
-    work[249] = work[15] + (work[16] + (work[17] + work[248]));
-    work[0] = y1 * (y3 * work[242] + (t50 + (y1 * t154 + t57))) + (z1 * (z3 * work[242] + (t5 + (z1 * t154 + t14))) + (y3 * work[244] + (work[46] + (work[72] + coef[17] * x2) + z3 * work[249])));
-    work[320] = z2 * work[0];
-    work[226] = x2 * work[2];
-    work[3] = work[320] - work[226];
-    work[236] = work[27] + (coef[19] * y2 + work[52]);
-    const double t174 = coef[20] * y5 + t20;
-    work[21] = y1 * t136;
-    work[6] = coef[18] * y2;
-    const double t177 = work[6] + coef[14] * y4;
-    work[237] = x3 * t177;
-    work[22] = y3 * work[245] + t53;
-    work[238] = work[21] + (work[237] + work[22]);
-    work[49] = coef[0] * y3;
-    work[87] = coef[0] * y1;
-    work[10] = y1 * t164;
-    work[11] = y3 * work[235];
-    work[250] = z3 * t177;
-    work[251] = work[10] + (work[11] + (work[250] + work[12]));
-    work[4] = x1 * (x3 * work[236] + (x1 * t174 + t92)) + (z1 * (z3 * work[236] + (t19 + (z1 * t174 + t25))) + (x3 * work[238] + (work[49] + (work[87] + coef[17] * y2) + z3 * work[251])));
-    work[1] = x2 * work[4];
-    increment[1] = work[102];
-    increment[2] = work[111];
-    displacement[0] = work[104] * work[105] - 0.5 * work[172];
-    increment[0] = work[172];
-    displacement[1] = work[104] * work[169] - 0.5 * work[102];
-    displacement[2] = work[104] * work[215] - 0.5 * work[111];
-    increment[4] = work[3];
+    work[77] = y1 * work[98];
+    work[28] = coef[4] * x2;
+    work[130] = work[28] + work[52];
+    work[78] = y3 * work[130];
+    work[120] = coef[4] * x3;
+    work[37] = coef[1] * x5;
+    work[142] = work[120] + work[37];
+    work[79] = y4 * work[142];
+    work[53] = coef[11] * x1;
+    const double t26 = work[53] + coef[2] * x4;
+    work[159] = y5 * t26;
+    work[160] = work[77] + (work[78] + (work[79] + work[159]));
+    work[44] = coef[0] * x5;
+    work[13] = coef[0] * x2;
+    work[58] = z1 * work[98];
+    work[59] = z3 * work[130];
+    work[162] = z5 * t26;
+    work[60] = z4 * work[142];
+    work[163] = work[58] + (work[59] + (work[162] + work[60]));
+    work[82] = y2 * work[119] + (z2 * work[121] + (y5 * work[160] + (work[44] + (coef[10] * x1 + work[13])
+        + z5 * work[163])));
+    work[238] = work[35] + (work[64] + coef[19] * z2);
+    const double t27 = coef[20] * z5 + t18;
+    work[140] = coef[4] * x5;
+    const double t28 = work[140] + t22;
+    work[10] = z1 * t28;
+    const double t29 = coef[18] * z2, t30 = coef[14] * z4 + t29;
+    work[239] = x3 * t30;
+    work[244] = coef[16] * x2 + coef[15] * x4;
+    work[12] = z3 * work[244] + t4;
+    work[240] = work[10] + (work[239] + work[12]);
+    work[34] = coef[0] * z3;
+    work[56] = coef[0] * z1;
+    work[138] = coef[4] * y5;
+    const double t31 = work[138] + t16;
+    work[21] = z1 * t31;
+    work[245] = y3 * t30;
+    work[233] = coef[15] * y4 + coef[16] * y2;
+    work[22] = z3 * work[233] + t9;
+    work[246] = work[21] + (work[245] + work[22]);
+    work[84] = x1 * (x3 * work[238] + (x1 * t27 + t25)) + (y1 * (y3 * work[238] + (y1 * t27 + t20))
+        + (x3 * work[240] + (work[34] + (coef[17] * z2 + work[56]) + y3 * work[246])));
+    work[241] = work[24] + (coef[19] * x2 + work[52]);
+    const double t32 = coef[20] * x5 + t3;
+    work[17] = x1 * t31;
+    work[18] = x3 * work[233];
+    const double t33 = coef[18] * x2, t34 = t33 + coef[14] * x4;
+    work[242] = y3 * t34;
+    work[243] = work[17] + (work[18] + (work[242] + work[19]));
+    work[45] = coef[0] * x3;
+    work[69] = coef[0] * x1;
+    work[133] = coef[4] * z5;
+    const double t35 = t5 + work[133], t36 = x1 * t35;
+    work[234] = coef[15] * z4 + coef[16] * z2;
+    const double t37 = x3 * work[234];
+    work[247] = z3 * t34;
+    work[248] = t36 + (t37 + (t24 + work[247]));
+    work[83] = y1 * (y3 * work[241] + (t14 + (y1 * t32 + t17)))
+        + (z1 * (z3 * work[241] + (t2 + (z1 * t32 + t6))) + (y3 * work[243] + (work[45] + (work[69] + coef[17]
+        * x2) + z3 * work[248])));
+    work[235] = work[14] + (coef[19] * y2 + work[54]);
+    const double t38 = coef[20] * y5 + t8;
+    work[6] = y1 * t28;
+    const double t39 = coef[18] * y2, t40 = t39 + coef[14] * y4;
+    work[236] = x3 * t40;
+    work[8] = y3 * work[244] + t15;
+    work[237] = work[6] + (work[236] + work[8]);
+    work[51] = coef[0] * y3;
+    work[76] = coef[0] * y1;
+    const double t41 = y1 * t35, t42 = y3 * work[234];
+    work[249] = z3 * t40;
+    work[250] = t41 + (t42 + (work[249] + t19));
+    work[85] = x1 * (x3 * work[235] + (x1 * t38 + t23)) + (z1 * (z3 * work[235] + (t7 + (z1 * t38 + t10)))
+        + (x3 * work[237] + (work[51] + (work[76] + coef[17] * y2) + z3 * work[250])));
+    work[20] = t33 + coef[26] * x4;
+    work[7] = t39 + coef[26] * y4;
+    const double t43 = work[35] + work[27];
+    work[41] = x1 * t43;
+    const double t44 = coef[23] * z4 + coef[15] * z2;
+    work[42] = x3 * t44;
+    work[36] = coef[25] * z3;
+    const double t45 = work[36] + coef[21] * z5;
+    work[338] = x4 * t45;
+    work[40] = coef[22] * z4;
+    work[264] = coef[4] * z1;
+    work[355] = work[40] + work[264];
+    work[43] = x5 * work[355];
+    work[339] = work[41] + (work[42] + (work[338] + work[43]));
+    work[57] = coef[0] * z4;
+    work[47] = y1 * t43;
+    work[48] = y3 * t44;
+    work[49] = y5 * work[355];
+    work[345] = y4 * t45;
+    work[346] = work[47] + (work[48] + (work[49] + work[345]));
+    const double t46 = y2 * (z1 * work[5] + (t41 + (t42 + (t19 + z3 * work[7])))) + (x4 * work[339]
+        + (work[57] + (coef[24] * z3 + t13) + y4 * work[346]));
+    work[86] = x2 * (z1 * work[16] + (t36 + (t37 + (t24 + z3 * work[20])))) + t46;
+    work[11] = t29 + coef[26] * z4;
+    work[3] = work[28] + work[24];
+    work[1] = y1 * work[3];
+    work[4] = coef[23] * x4 + coef[15] * x2;
+    work[2] = y3 * work[4];
+    work[25] = coef[25] * x3;
+    work[0] = work[25] + coef[21] * x5;
 }
 
 /* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
    increment, all with the momenta p = grad S_h(y) (part 2 of 7) */
 spin_chain5_APART static void spin_chain5_linearise_part2(const double coef[33], const double y[15],
-                                                          double displacement[restrict 15],
-                                                          double increment[restrict 15],
-                                                          double jacobian[restrict 225],
-                                                          double increment_jacobian[restrict 225],
-                                                          double work[restrict 517])
+    double displacement[restrict 15], double increment[restrict 15], double jacobian[restrict 225],
+    double increment_jacobian[restrict 225], double work[restrict 505])
 {
-    (void)jacobian;
-    (void)increment_jacobian;
-    const double x1 = y[0];
-    const double y1 = y[1];
-    const double z1 = y[2];
-    const double x2 = y[3];
-    const double y2 = y[4];
-    const double z2 = y[5];
-    const double x3 = y[6];
-    const double y3 = y[7];
-    const double z3 = y[8];
-    const double x4 = y[9];
-    const double y4 = y[10];
-    const double z4 = y[11];
-    const double x5 = y[12];
-    const double y5 = y[13];
-    const double z5 = y[14];
-    work[282] = y2 * work[0];
-    work[225] = work[1] - work[282];
-    work[224] = work[2] * work[3] - work[4] * work[225];
-    work[230] = work[2] * work[2];
-    work[298] = work[0] * work[0];
-    work[231] = work[4] * work[4];
-    work[325] = work[298] + work[231];
-    work[222] = work[230] + work[325];
-    work[223] = spin_chain5_phi0(work[222]);
-    work[289] = y2 * work[2];
-    work[322] = z2 * work[4];
-    work[290] = work[289] - work[322];
-    work[283] = work[0] * work[225] - work[2] * work[290];
-    work[319] = work[4] * work[290] - work[0] * work[3];
-    work[342] = work[5] + coef[26] * x4;
-    work[337] = work[6] + coef[26] * y4;
-    const double t204 = work[7] + work[8];
-    const double t205 = x1 * t204;
-    const double t206 = coef[23] * z4 + coef[15] * z2;
-    const double t207 = x3 * t206;
-    const double t208 = coef[25] * z3;
-    const double t209 = t208 + coef[21] * z5;
-    work[344] = x4 * t209;
-    const double t211 = coef[22] * z4;
-    work[265] = coef[4] * z1;
-    work[361] = t211 + work[265];
-    const double t214 = x5 * work[361];
-    work[345] = t205 + (t207 + (work[344] + t214));
-    const double t216 = coef[0] * z4;
-    const double t217 = y1 * t204;
-    const double t218 = y3 * t206;
-    const double t219 = y5 * work[361];
-    work[351] = y4 * t209;
-    work[352] = t217 + (t218 + (t219 + work[351]));
-    const double t222 = y2 * (z1 * work[9] + (work[10] + (work[11] + (work[12] + z3 * work[337])))) + (x4 * work[345] + (t216 + (coef[24] * z3 + work[13]) + y4 * work[352]));
-    work[327] = x2 * (z1 * work[14] + (work[15] + (work[16] + (work[17] + z3 * work[342])))) + t222;
-    work[338] = work[18] + coef[26] * z4;
-    const double t224 = work[19] + work[20];
-    const double t225 = y1 * t224;
-    work[336] = coef[23] * x4 + coef[15] * x2;
-    const double t227 = y3 * work[336];
-    const double t228 = coef[25] * x3;
-    const double t229 = t228 + coef[21] * x5;
-    work[354] = y4 * t229;
-    const double t231 = coef[22] * x4;
-    work[273] = coef[4] * x1;
-    work[365] = t231 + work[273];
-    const double t234 = y5 * work[365];
-    work[355] = t225 + (t227 + (work[354] + t234));
-    work[71] = coef[0] * x4;
-    const double t237 = z1 * t224;
-    const double t238 = z3 * work[336];
-    work[357] = z4 * t229;
-    const double t240 = z5 * work[365];
-    work[358] = t237 + (t238 + (work[357] + t240));
-    work[333] = y2 * (x1 * work[9] + (work[21] + (x3 * work[337] + work[22]))) + (z2 * (x1 * work[23] + (work[24] + (x3 * work[338] + work[25]))) + (y4 * work[355] + (work[71] + (work[26] + coef[24] * x3) + z4 * work[358])));
-    work[410] = z3 * work[333];
-    work[329] = x3 * work[327];
-    work[328] = work[410] - work[329];
-    const double t245 = work[27] + work[28];
-    const double t246 = x1 * t245;
-    work[341] = coef[15] * y2 + coef[23] * y4;
-    const double t248 = x3 * work[341];
-    const double t249 = coef[22] * y4;
-    work[263] = coef[4] * y1;
-    work[364] = t249 + work[263];
-    const double t252 = x5 * work[364];
-    const double t253 = coef[25] * y3;
-    const double t254 = coef[21] * y5 + t253;
-    work[349] = x4 * t254;
-    work[350] = t246 + (t248 + (t252 + work[349]));
-    work[88] = coef[0] * y4;
-    const double t258 = z1 * t245;
-    const double t259 = z3 * work[341];
-    work[359] = z4 * t254;
-    const double t261 = z5 * work[364];
-    work[360] = t258 + (t259 + (work[359] + t261));
-    work[332] = x2 * (y1 * work[14] + (work[29] + (work[30] + (work[31] + y3 * work[342])))) + (z2 * (y1 * work[23] + (work[32] + (y3 * work[338] + work[33]))) + (x4 * work[350] + (work[88] + (coef[24] * y3 + work[34]) + z4 * work[360])));
-    work[334] = x3 * work[332];
-    work[370] = y3 * work[333];
-    work[335] = work[334] - work[370];
-    work[331] = work[327] * work[328] - work[332] * work[335];
-    work[339] = work[327] * work[327];
-    work[381] = work[333] * work[333];
-    work[340] = work[332] * work[332];
-    work[413] = work[381] + work[340];
-    work[326] = work[339] + work[413];
-    work[330] = spin_chain5_phi0(work[326]);
-    work[368] = y3 * work[327];
-    work[405] = z3 * work[332];
-    work[369] = work[368] - work[405];
-    work[367] = work[333] * work[335] - work[327] * work[369];
-    work[403] = work[332] * work[369] - work[333] * work[328];
-    work[260] = coef[14] * x3;
-    work[353] = coef[3] * x1;
-    const double t280 = work[20] + (work[260] + work[353]);
-    work[430] = coef[30] * x5 + t228;
-    work[255] = coef[14] * y3;
-    work[348] = coef[3] * y1;
-    const double t284 = work[27] + (work[255] + work[348]);
-    work[424] = coef[30] * y5 + t253;
-    const double t286 = work[35] + work[8];
-    work[73] = x1 * t286;
-    work[146] = coef[2] * x5;
-    work[434] = coef[3] * x2;
-    const double t290 = work[146] + work[434];
-    const double t291 = work[19] + t231;
-    work[74] = coef[27] * work[36] + coef[29] * work[37] + z3 * t291;
-    work[431] = work[73] + (z1 * t290 + work[74]);
-    work[89] = y1 * t286;
-    work[139] = coef[2] * y5;
-    work[432] = coef[3] * y2;
-    const double t297 = work[139] + work[432];
-    const double t298 = t249 + work[28];
-    work[90] = coef[29] * work[38] + coef[27] * work[39] + z3 * t298;
-    work[436] = work[89] + (z1 * t297 + work[90]);
-    const double t301 = y3 * (z2 * t284 + (t258 + (t259 + (t261 + z4 * work[424])))) + (x5 * work[431] + (work[40] + (work[41] + coef[28] * z4) + y5 * work[436]));
-    work[415] = x3 * (z2 * t280 + (t237 + (t238 + (t240 + z4 * work[430])))) + t301;
-    work[427] = work[415] * work[415];
-    work[343] = coef[3] * z1;
-    work[254] = coef[14] * z3;
-    const double t305 = work[7] + (work[343] + work[254]);
-    work[425] = t208 + coef[30] * z5;
-    const double t307 = work[19] + work[42];
-    work[83] = y1 * t307;
-    work[84] = x3 * t298;
-    work[85] = coef[27] * work[43] + coef[29] * work[44];
-    work[435] = x1 * t297 + (work[83] + (work[84] + work[85]));
-    work[140] = coef[2] * z5;
-    work[63] = coef[3] * z2;
-    const double t314 = work[140] + work[63];
-    const double t315 = z1 * t307;
-    const double t316 = coef[27] * work[37] + coef[29] * work[36];
-    const double t317 = t211 + work[8];
-    const double t318 = x3 * t317;
-    work[437] = x1 * t314 + (t315 + (t316 + t318));
-    const double t320 = z3 * (x2 * t305 + (t205 + (t207 + (x4 * work[425] + t214)))) + (y5 * work[435] + (work[45] + (coef[28] * x4 + work[46]) + z5 * work[437]));
-    work[417] = y3 * (x2 * t284 + (t246 + (t248 + (t252 + x4 * work[424])))) + t320;
-    work[443] = work[417] * work[417];
-    const double t322 = work[28] + work[47];
-    work[68] = x1 * t322;
-    work[70] = coef[27] * work[44] + coef[29] * work[43] + y3 * t291;
-    work[433] = work[68] + (y1 * t290 + work[70]);
-    const double t326 = z1 * t322;
-    const double t327 = coef[29] * work[39] + coef[27] * work[38];
-    const double t328 = y3 * t317;
-    work[438] = y1 * t314 + (t326 + (t327 + t328));
-    const double t330 = z3 * (y2 * t305 + (t217 + (t218 + (y4 * work[425] + t219)))) + (x5 * work[433] + (work[48] + (work[49] + coef[28] * y4) + z5 * work[438]));
-    work[414] = x3 * (y2 * t280 + (t225 + (t227 + (y4 * work[430] + t234)))) + t330;
-    work[428] = work[414] * work[414];
-    work[447] = work[443] + work[428];
-    work[416] = work[427] + work[447];
-    work[418] = spin_chain5_phi0(work[416]);
-    work[445] = z4 * work[417];
-    work[421] = x4 * work[415];
-    work[420] = work[445] - work[421];
-    work[422] = x4 * work[414];
-    work[439] = y4 * work[417];
-    work[423] = work[422] - work[439];
-    work[419] = work[415] * work[420] - work[414] * work[423];
-    work[441] = y4 * work[415];
-    work[446] = z4 * work[414];
-    work[442] = work[441] - work[446];
-    work[440] = work[417] * work[423] - work[415] * work[442];
-    work[444] = work[414] * work[442] - work[417] * work[420];
-    work[276] = coef[20] * x1;
-    work[144] = coef[3] * x3;
-    work[91] = work[50] + (work[276] + work[144]);
-    work[95] = work[51] + coef[32] * x4;
-    work[138] = coef[3] * y3;
-    work[261] = coef[20] * y1;
-    work[75] = work[52] + (work[138] + work[261]);
-    work[78] = coef[32] * y4 + work[53];
-    work[366] = coef[21] * x4;
-    work[86] = work[366] + work[434];
-    work[363] = coef[21] * y4;
-    work[69] = work[363] + work[432];
-    const double t359 = x4 * (t315 + (t318 + (t316 + z3 * work[86]))) + (coef[31] * z5 + (work[54] + t216) + y4 * (t326 + (t328 + (z3 * work[69] + t327))));
-    work[97] = x1 * (z2 * work[91] + (work[55] + (work[56] + (z5 * work[95] + work[57])))) + (y1 * (z2 * work[75] + (work[58] + (work[59] + (z5 * work[78] + work[60])))) + t359);
-    work[96] = work[97] * work[97];
-    work[135] = coef[3] * z3;
-    work[262] = coef[20] * z1;
-    work[64] = work[61] + (work[135] + work[262]);
-    increment[5] = work[225];
-    displacement[3] = work[224] * work[223] - 0.5 * work[290];
-    increment[3] = work[290];
-    displacement[4] = work[283] * work[223] - 0.5 * work[3];
-    displacement[5] = work[319] * work[223] - 0.5 * work[225];
-    increment[7] = work[328];
-    increment[8] = work[335];
-    displacement[6] = work[331] * work[330] - 0.5 * work[369];
-    increment[6] = work[369];
-    displacement[7] = work[367] * work[330] - 0.5 * work[328];
-    displacement[8] = work[403] * work[330] - 0.5 * work[335];
-    increment[10] = work[420];
-    increment[11] = work[423];
-    displacement[9] = work[418] * work[419] - 0.5 * work[442];
-    increment[9] = work[442];
-    displacement[10] = work[440] * work[418] - 0.5 * work[420];
-    displacement[11] = work[418] * work[444] - 0.5 * work[423];
+    (void)jacobian, (void)increment_jacobian;
+    const double x1 = y[0], y1 = y[1], z1 = y[2], x2 = y[3], y2 = y[4], z2 = y[5], x3 = y[6], y3 = y[7], z3 =
+        y[8], x4 = y[9], y4 = y[10], z4 = y[11], x5 = y[12], y5 = y[13], z5 = y[14];
+    work[348] = y4 * work[0];
+    const double t1 = coef[22] * x4;
+    work[272] = coef[4] * x1;
+    work[359] = t1 + work[272];
+    const double t2 = y5 * work[359];
+    work[349] = work[1] + (work[2] + (work[348] + t2));
+    const double t3 = coef[0] * x4, t4 = z1 * work[3], t5 = z3 * work[4];
+    work[351] = z4 * work[0];
+    const double t6 = z5 * work[359];
+    work[352] = t4 + (t5 + (work[351] + t6));
+    work[331] = y2 * (x1 * work[5] + (work[6] + (x3 * work[7] + work[8])))
+        + (z2 * (x1 * work[9] + (work[10] + (x3 * work[11] + work[12]))) + (y4 * work[349]
+        + (t3 + (work[13] + coef[24] * x3) + z4 * work[352])));
+    const double t7 = work[14] + work[15], t8 = x1 * t7;
+    work[336] = coef[15] * y2 + coef[23] * y4;
+    const double t9 = x3 * work[336], t10 = coef[22] * y4;
+    work[262] = coef[4] * y1;
+    work[358] = t10 + work[262];
+    const double t11 = x5 * work[358], t12 = coef[25] * y3, t13 = coef[21] * y5 + t12;
+    work[343] = x4 * t13;
+    work[344] = t8 + (t9 + (t11 + work[343]));
+    const double t14 = coef[0] * y4, t15 = z1 * t7, t16 = z3 * work[336];
+    work[353] = z4 * t13;
+    const double t17 = z5 * work[358];
+    work[354] = t15 + (t16 + (work[353] + t17));
+    work[330] = x2 * (y1 * work[16] + (work[17] + (work[18] + (work[19] + y3 * work[20]))))
+        + (z2 * (y1 * work[9] + (work[21] + (y3 * work[11] + work[22]))) + (x4 * work[344]
+        + (t14 + (coef[24] * y3 + work[23]) + z4 * work[354])));
+    work[259] = coef[14] * x3;
+    work[347] = coef[3] * x1;
+    const double t18 = work[24] + (work[259] + work[347]);
+    work[417] = coef[30] * x5 + work[25];
+    work[254] = coef[14] * y3;
+    work[342] = coef[3] * y1;
+    const double t19 = work[14] + (work[254] + work[342]);
+    work[411] = coef[30] * y5 + t12;
+    const double t20 = work[26] + work[27], t21 = x1 * t20;
+    work[143] = coef[2] * x5;
+    work[422] = coef[3] * x2;
+    const double t22 = work[143] + work[422], t23 = work[28] + t1;
+    const double t24 = coef[27] * work[29] + coef[29] * work[30] + z3 * t23;
+    work[419] = t21 + (z1 * t22 + t24);
+    const double t25 = y1 * t20;
+    work[136] = coef[2] * y5;
+    work[420] = coef[3] * y2;
+    const double t26 = work[136] + work[420], t27 = t10 + work[15];
+    const double t28 = coef[29] * work[31] + coef[27] * work[32] + z3 * t27;
+    work[424] = t25 + (z1 * t26 + t28);
+    const double t29 = y3 * (z2 * t19 + (t15 + (t16 + (t17 + z4 * work[411])))) + (x5 * work[419]
+        + (work[33] + (work[34] + coef[28] * z4) + y5 * work[424]));
+    work[92] = x3 * (z2 * t18 + (t4 + (t5 + (t6 + z4 * work[417])))) + t29;
+    work[337] = coef[3] * z1;
+    work[253] = coef[14] * z3;
+    const double t30 = work[35] + (work[337] + work[253]);
+    work[412] = work[36] + coef[30] * z5;
+    const double t31 = work[28] + work[37], t32 = y1 * t31, t33 = x3 * t27;
+    const double t34 = coef[27] * work[38] + coef[29] * work[39];
+    work[423] = x1 * t26 + (t32 + (t33 + t34));
+    work[137] = coef[2] * z5;
+    work[418] = coef[3] * z2;
+    const double t35 = work[137] + work[418], t36 = z1 * t31;
+    const double t37 = coef[27] * work[30] + coef[29] * work[29], t38 = work[40] + work[27];
+    const double t39 = x3 * t38;
+    work[425] = x1 * t35 + (t36 + (t37 + t39));
+    const double t40 = z3 * (x2 * t30 + (work[41] + (work[42] + (x4 * work[412] + work[43]))))
+        + (y5 * work[423] + (work[44] + (coef[28] * x4 + work[45]) + z5 * work[425]));
+    work[90] = y3 * (x2 * t19 + (t8 + (t9 + (t11 + x4 * work[411])))) + t40;
+    const double t41 = work[15] + work[46], t42 = x1 * t41;
+    const double t43 = coef[27] * work[39] + coef[29] * work[38] + y3 * t23;
+    work[421] = t42 + (y1 * t22 + t43);
+    const double t44 = z1 * t41, t45 = coef[29] * work[32] + coef[27] * work[31], t46 = y3 * t38;
+    work[426] = y1 * t35 + (t44 + (t45 + t46));
+    const double t47 = z3 * (y2 * t30 + (work[47] + (work[48] + (y4 * work[412] + work[49]))))
+        + (x5 * work[421] + (work[50] + (work[51] + coef[28] * y4) + z5 * work[426]));
+    work[94] = x3 * (y2 * t18 + (work[1] + (work[2] + (y4 * work[417] + t2)))) + t47;
+    work[275] = coef[20] * x1;
+    work[141] = coef[3] * x3;
+    const double t48 = work[52] + (work[275] + work[141]);
+    work[462] = work[53] + coef[32] * x4;
+    work[135] = coef[3] * y3;
+    work[260] = coef[20] * y1;
+    const double t49 = work[54] + (work[135] + work[260]);
+    work[457] = coef[32] * y4 + work[55];
+    work[360] = coef[21] * x4;
+    const double t50 = work[360] + work[422];
+    work[357] = coef[21] * y4;
+    const double t51 = work[357] + work[420];
+    const double t52 = x4 * (t36 + (t39 + (t37 + z3 * t50))) + (coef[31] * z5 + (work[56] + work[57]) + y4
+        * (t44 + (t46 + (z3 * t51 + t45))));
+    work[95] = x1 * (z2 * t48 + (work[58] + (work[59] + (z5 * work[462] + work[60]))))
+        + (y1 * (z2 * t49 + (work[61] + (work[62] + (z5 * work[457] + work[63])))) + t52);
+    work[132] = coef[3] * z3;
+    work[261] = coef[20] * z1;
+    const double t53 = work[64] + (work[132] + work[261]);
+    work[458] = work[65] + coef[32] * z4;
+    work[356] = coef[21] * z4;
+    const double t54 = work[356] + work[418];
+    const double t55 = z1 * (x2 * t53 + (work[66] + (work[67] + (work[68] + x5 * work[458]))))
+        + (y4 * (t42 + (x3 * t51 + t43)) + (coef[31] * x5 + (t3 + work[69]) + z4 * (t21 + (x3 * t54 + t24))));
+    work[96] = y1 * (x2 * t49 + (work[70] + (work[71] + (x5 * work[457] + work[72])))) + t55;
+    const double t56 = z1 * (y2 * t53 + (work[73] + (work[74] + (y5 * work[458] + work[75]))))
+        + (x4 * (t32 + (t33 + (t34 + y3 * t50))) + (coef[31] * y5 + (work[76] + t14) + z4
+        * (t25 + (y3 * t54 + t28))));
+    work[97] = x1 * (y2 * t48 + (work[77] + (work[78] + (work[79] + y5 * work[462])))) + t56;
+    work[110] = work[80] * work[80];
+    work[109] = work[81] * work[81];
+    work[182] = work[82] * work[82];
+    work[218] = work[109] + work[182];
+    work[100] = work[110] + work[218];
+    work[103] = spin_chain5_phi0(work[100]);
+    work[214] = z1 * work[82];
+    work[102] = x1 * work[80];
+    work[101] = work[214] - work[102];
+    work[107] = x1 * work[81];
+    work[172] = y1 * work[82];
+    work[108] = work[107] - work[172];
+    work[104] = work[80] * work[101] - work[81] * work[108];
+    work[168] = y1 * work[80];
+    work[215] = z1 * work[81];
+    work[169] = work[168] - work[215];
+    work[166] = work[82] * work[108] - work[80] * work[169];
+    work[212] = work[81] * work[169] - work[82] * work[101];
+    work[319] = z2 * work[83];
+    work[225] = x2 * work[84];
+    work[224] = work[319] - work[225];
+    work[222] = x2 * work[85];
+    work[281] = y2 * work[83];
+    work[223] = work[222] - work[281];
+    work[221] = work[84] * work[224] - work[85] * work[223];
+    work[229] = work[84] * work[84];
+    work[297] = work[83] * work[83];
+    work[230] = work[85] * work[85];
+    work[324] = work[297] + work[230];
+    work[219] = work[229] + work[324];
+    work[220] = spin_chain5_phi0(work[219]);
+    work[288] = y2 * work[84];
+    work[321] = z2 * work[85];
+    work[289] = work[288] - work[321];
+    work[282] = work[83] * work[223] - work[84] * work[289];
+    work[318] = work[85] * work[289] - work[83] * work[224];
+    work[404] = z3 * work[331];
+    work[327] = x3 * work[86];
+    work[326] = work[404] - work[327];
+    work[332] = x3 * work[330];
+    work[364] = y3 * work[331];
+    work[333] = work[332] - work[364];
+    work[329] = work[86] * work[326] - work[330] * work[333];
+    work[334] = work[86] * work[86];
+    work[375] = work[331] * work[331];
+    work[335] = work[330] * work[330];
+    work[407] = work[375] + work[335];
+    work[325] = work[334] + work[407];
+    work[328] = spin_chain5_phi0(work[325]);
+    work[362] = y3 * work[86];
+    work[399] = z3 * work[330];
+    work[363] = work[362] - work[399];
+    work[361] = work[331] * work[333] - work[86] * work[363];
+    work[397] = work[330] * work[363] - work[331] * work[326];
+    work[414] = work[92] * work[92];
+    work[430] = work[90] * work[90];
+    work[415] = work[94] * work[94];
+    work[434] = work[430] + work[415];
+    work[408] = work[414] + work[434];
+    work[87] = spin_chain5_phi0(work[408]);
+    work[432] = z4 * work[90];
+    work[409] = x4 * work[92];
+    work[93] = work[432] - work[409];
+    work[410] = x4 * work[94];
+    work[427] = y4 * work[90];
+    work[91] = work[410] - work[427];
+    work[88] = work[92] * work[93] - work[94] * work[91];
+    work[429] = y4 * work[92];
+    work[433] = z4 * work[94];
+    work[89] = work[429] - work[433];
+    increment[1] = work[101];
+    increment[2] = work[108];
+    displacement[0] = work[103] * work[104] - 0.5 * work[169];
+    increment[0] = work[169];
+    displacement[1] = work[103] * work[166] - 0.5 * work[101];
+    displacement[2] = work[103] * work[212] - 0.5 * work[108];
+    increment[4] = work[224];
+    increment[5] = work[223];
+    displacement[3] = work[221] * work[220] - 0.5 * work[289];
+    increment[3] = work[289];
+    displacement[4] = work[282] * work[220] - 0.5 * work[224];
+    displacement[5] = work[318] * work[220] - 0.5 * work[223];
+    increment[7] = work[326];
+    increment[8] = work[333];
+    displacement[6] = work[329] * work[328] - 0.5 * work[363];
+    increment[6] = work[363];
+    displacement[7] = work[361] * work[328] - 0.5 * work[326];
+    displacement[8] = work[397] * work[328] - 0.5 * work[333];
+    increment[10] = work[93];
+    increment[11] = work[91];
 }
 
 /* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
    increment, all with the momenta p = grad S_h(y) (part 3 of 7) */
 spin_chain5_APART static void spin_chain5_linearise_part3(const double coef[33], const double y[15],
-                                                          double displacement[restrict 15],
-                                                          double increment[restrict 15],
-                                                          double jacobian[restrict 225],
-                                                          double increment_jacobian[restrict 225],
-                                                          double work[restrict 517])
+    double displacement[restrict 15], double increment[restrict 15], double jacobian[restrict 225],
+    double increment_jacobian[restrict 225], double work[restrict 505])
 {
-    const double x1 = y[0];
-    const double y1 = y[1];
-    const double z1 = y[2];
-    const double x2 = y[3];
-    const double y2 = y[4];
-    const double z2 = y[5];
-    const double x3 = y[6];
-    const double y3 = y[7];
-    const double z3 = y[8];
-    const double x4 = y[9];
-    const double y4 = y[10];
-    const double z4 = y[11];
-    const double x5 = y[12];
-    const double y5 = y[13];
-    const double z5 = y[14];
-    work[472] = work[62] + coef[32] * z4;
-    work[362] = coef[21] * z4;
-    const double t366 = work[362] + work[63];
-    const double t367 = z1 * (x2 * work[64] + (work[65] + (work[66] + (work[67] + x5 * work[472])))) + (y4 * (work[68] + (x3 * work[69] + work[70])) + (coef[31] * x5 + (work[71] + work[72]) + z4 * (work[73] + (x3 * t366 + work[74]))));
-    work[454] = y1 * (x2 * work[75] + (work[76] + (work[77] + (x5 * work[78] + work[79])))) + t367;
-    work[507] = work[454] * work[454];
-    const double t369 = z1 * (y2 * work[64] + (work[80] + (work[81] + (y5 * work[472] + work[82])))) + (x4 * (work[83] + (work[84] + (work[85] + y3 * work[86]))) + (coef[31] * y5 + (work[87] + work[88]) + z4 * (work[89] + (y3 * t366 + work[90]))));
-    work[453] = x1 * (y2 * work[91] + (work[92] + (work[93] + (work[94] + y5 * work[95])))) + t369;
-    work[473] = work[453] * work[453];
-    work[513] = work[507] + work[473];
-    work[448] = work[96] + work[513];
-    work[451] = spin_chain5_phi0(work[448]);
-    work[511] = z5 * work[454];
-    work[450] = x5 * work[97];
-    work[449] = work[511] - work[450];
-    work[455] = x5 * work[453];
-    work[494] = y5 * work[454];
-    work[456] = work[455] - work[494];
-    work[452] = work[97] * work[449] - work[453] * work[456];
-    work[490] = y5 * work[97];
-    work[512] = z5 * work[453];
-    work[491] = work[490] - work[512];
-    work[488] = work[454] * work[456] - work[97] * work[491];
-    work[509] = work[453] * work[491] - work[454] * work[449];
-    work[180] = z5 * work[98] + z2 * work[99];
-    const double t387 = spin_chain5_phi1(work[100]);
-    work[170] = work[101] * t387;
-    work[216] = 0.5 * y1;
-    work[156] = (work[102] - work[103]) * work[104] + 2.0 * (work[105] * work[170]) - work[216];
-    const double t391 = y2 * work[106];
-    const double t392 = z2 * work[107];
-    const double t393 = y5 * (coef[11] * y5);
-    const double t394 = coef[10] + z5 * (coef[11] * z5);
-    work[182] = t391 + (t392 + (t393 + t394));
-    work[214] = y1 * work[108];
-    work[173] = z1 * work[101];
-    work[176] = work[109] * t387;
-    work[157] = (work[214] + work[173]) * work[104] + 2.0 * (work[105] * work[176]);
-    work[181] = y5 * work[98] + y2 * work[99];
-    work[177] = 0.5 * z1;
-    work[174] = work[108] * t387;
-    work[158] = work[177] + (2.0 * (work[105] * work[174]) - (work[110] + work[111]) * work[104]);
-    work[179] = work[108] * work[109] * work[104];
-    work[178] = 0.5 * work[101];
-    work[183] = z5 * work[114] + z2 * work[115];
-    const double t407 = x2 * work[116];
-    const double t408 = x5 * (coef[11] * x5);
-    work[184] = t407 + (t392 + (t408 + t394));
-    work[220] = 0.5 * work[108];
-    work[219] = work[101] * work[109] * work[104];
-    work[213] = t407 + (t391 + (t408 + (coef[10] + t393)));
-    work[228] = coef[13] * z1;
-    const double t414 = work[228] + coef[5] * z3;
-    work[186] = x2 * t414 + work[117];
-    work[233] = coef[9] * y1 + coef[6] * y3;
-    const double t417 = y2 * work[233];
-    const double t418 = z2 * (coef[6] * z3 + coef[9] * z1);
-    const double t419 = coef[8] * y1;
-    const double t420 = y5 * (work[118] + t419);
-    const double t421 = coef[8] * z1;
-    const double t422 = coef[0] + z5 * (work[119] + t421);
-    work[188] = t417 + (t418 + (t420 + t422));
-    work[227] = coef[13] * y1;
-    const double t425 = work[227] + coef[5] * y3;
-    work[187] = x2 * t425 + work[120];
-    work[189] = y2 * t414 + work[121];
-    work[232] = coef[13] * x1;
-    const double t429 = work[232] + coef[5] * x3;
-    work[191] = y2 * t429 + work[122];
-    work[229] = coef[9] * x1 + coef[6] * x3;
-    const double t432 = x2 * work[229];
-    work[164] = coef[8] * x1;
-    const double t434 = x5 * (work[123] + work[164]);
-    work[190] = t432 + (t418 + (t434 + t422));
-    work[192] = t432 + (t417 + (t434 + (coef[0] + t420)));
-    work[194] = z2 * t429 + work[124];
-    work[193] = z2 * t425 + work[125];
-    work[195] = x2 * work[126] + x5 * work[127];
-    const double t440 = y2 * work[9];
-    const double t441 = z5 * work[128];
-    const double t442 = y5 * work[129];
-    const double t443 = z2 * work[23];
-    work[197] = t440 + (t441 + t442 + t443);
-    work[196] = x5 * work[130] + x2 * work[131];
-    work[198] = y5 * work[127] + y2 * work[126];
-    work[200] = y2 * work[132] + y5 * work[133];
-    const double t448 = x2 * work[14];
-    const double t449 = x5 * work[134];
-    work[199] = t448 + (t441 + t449 + t443);
-    work[201] = t448 + (t449 + t442 + t440);
-    work[203] = z2 * work[132] + z5 * work[133];
-    work[202] = z2 * work[131] + z5 * work[130];
-    work[253] = work[135] + work[136];
-    work[204] = x5 * work[137] + x2 * work[253];
-    work[256] = work[118] + work[27];
-    const double t457 = y2 * work[256];
-    work[257] = work[119] + work[7];
-    const double t459 = z2 * work[257];
-    const double t460 = y5 * (work[138] + work[139]);
-    const double t461 = z5 * (work[135] + work[140]);
-    work[206] = t457 + (t459 + (t460 + t461));
-    work[252] = work[138] + work[141];
-    work[205] = x2 * work[252] + x5 * work[142];
-    work[207] = y5 * work[137] + y2 * work[253];
-    work[259] = work[143] + work[144];
-    work[209] = y5 * work[145] + y2 * work[259];
-    work[258] = work[20] + work[123];
-    const double t469 = x2 * work[258];
-    const double t470 = x5 * (work[146] + work[144]);
-    work[208] = t469 + (t459 + (t470 + t461));
-    work[210] = t469 + (t457 + (t460 + t470));
-    work[212] = z2 * work[259] + z5 * work[145];
-    work[211] = z2 * work[252] + z5 * work[142];
-    work[159] = work[135] + (coef[12] * z1 + work[61]);
-    work[153] = x2 * work[159] + (work[147] + work[148]);
-    work[264] = work[129] + t419;
-    work[149] = y2 * work[264];
-    work[266] = work[128] + t421;
-    work[150] = z2 * work[266];
-    work[474] = coef[7] * y1 + coef[1] * y4;
-    work[151] = y5 * work[474];
-    work[152] = coef[0] + z5 * (coef[7] * z1 + coef[1] * z4);
-    increment[13] = work[449];
-    increment[14] = work[456];
-    displacement[12] = work[451] * work[452] - 0.5 * work[491];
-    increment[12] = work[491];
-    displacement[13] = work[488] * work[451] - 0.5 * work[449];
-    displacement[14] = work[451] * work[509] - 0.5 * work[456];
-    increment_jacobian[15] = z1 * work[182] - x1 * work[180] - work[101];
-    increment_jacobian[30] = x1 * work[181] - y1 * work[182] + work[108];
-    jacobian[0] = 1.0 + (work[180] * work[156] + (work[182] * work[157] + work[181] * work[158]) - (work[112] + work[113]) * work[104]);
-    jacobian[1] = work[179] - work[178] + (work[183] * work[156] + (work[181] * work[157] + work[184] * work[158]));
-    increment_jacobian[1] = y1 * work[183] - z1 * work[184] + work[101];
-    increment_jacobian[31] = x1 * work[184] - y1 * work[181] - work[109];
-    jacobian[2] = work[220] + work[219] + (work[213] * work[156] + (work[180] * work[157] + work[183] * work[158]));
-    increment_jacobian[2] = y1 * work[213] - z1 * work[183] - work[108];
-    increment_jacobian[17] = z1 * work[180] - x1 * work[213] + work[109];
-    increment_jacobian[18] = z1 * work[188] - x1 * work[186];
-    jacobian[3] = work[186] * work[156] + (work[188] * work[157] + work[187] * work[158]);
-    increment_jacobian[3] = y1 * work[186] - z1 * work[187];
-    increment_jacobian[33] = x1 * work[187] - y1 * work[188];
-    increment_jacobian[77] = x2 * work[189] - y2 * work[186];
-    increment_jacobian[19] = z1 * work[191] - x1 * work[189];
-    increment_jacobian[75] = x2 * work[191] - y2 * work[188];
-    jacobian[4] = work[189] * work[156] + (work[191] * work[157] + work[190] * work[158]);
-    increment_jacobian[4] = y1 * work[189] - z1 * work[190];
-    increment_jacobian[34] = x1 * work[190] - y1 * work[191];
-    increment_jacobian[76] = x2 * work[190] - y2 * work[187];
-    increment_jacobian[47] = y2 * work[192] - z2 * work[189];
-    increment_jacobian[62] = z2 * work[186] - x2 * work[192];
-    increment_jacobian[20] = z1 * work[194] - x1 * work[192];
-    increment_jacobian[45] = y2 * work[194] - z2 * work[191];
-    increment_jacobian[60] = z2 * work[188] - x2 * work[194];
-    jacobian[5] = work[192] * work[156] + (work[194] * work[157] + work[193] * work[158]);
-    increment_jacobian[5] = y1 * work[192] - z1 * work[193];
-    increment_jacobian[35] = x1 * work[193] - y1 * work[194];
-    increment_jacobian[46] = y2 * work[193] - z2 * work[190];
-    increment_jacobian[61] = z2 * work[187] - x2 * work[193];
-    increment_jacobian[21] = z1 * work[197] - x1 * work[195];
-    jacobian[6] = work[195] * work[156] + (work[197] * work[157] + work[196] * work[158]);
-    increment_jacobian[6] = y1 * work[195] - z1 * work[196];
-    increment_jacobian[36] = x1 * work[196] - y1 * work[197];
-    increment_jacobian[122] = x3 * work[198] - y3 * work[195];
-    increment_jacobian[22] = z1 * work[200] - x1 * work[198];
-    increment_jacobian[120] = x3 * work[200] - y3 * work[197];
-    jacobian[7] = work[198] * work[156] + (work[200] * work[157] + work[199] * work[158]);
-    increment_jacobian[7] = y1 * work[198] - z1 * work[199];
-    increment_jacobian[37] = x1 * work[199] - y1 * work[200];
-    increment_jacobian[121] = x3 * work[199] - y3 * work[196];
-    increment_jacobian[92] = y3 * work[201] - z3 * work[198];
-    increment_jacobian[107] = z3 * work[195] - x3 * work[201];
-    increment_jacobian[23] = z1 * work[203] - x1 * work[201];
-    increment_jacobian[90] = y3 * work[203] - z3 * work[200];
-    increment_jacobian[105] = z3 * work[197] - x3 * work[203];
-    jacobian[8] = work[201] * work[156] + (work[203] * work[157] + work[202] * work[158]);
-    increment_jacobian[8] = y1 * work[201] - z1 * work[202];
-    increment_jacobian[38] = x1 * work[202] - y1 * work[203];
-    increment_jacobian[91] = y3 * work[202] - z3 * work[199];
-    increment_jacobian[106] = z3 * work[196] - x3 * work[202];
-    increment_jacobian[24] = z1 * work[206] - x1 * work[204];
-    jacobian[9] = work[204] * work[156] + (work[206] * work[157] + work[205] * work[158]);
-    increment_jacobian[9] = y1 * work[204] - z1 * work[205];
-    increment_jacobian[39] = x1 * work[205] - y1 * work[206];
-    increment_jacobian[167] = x4 * work[207] - y4 * work[204];
-    increment_jacobian[25] = z1 * work[209] - x1 * work[207];
-    increment_jacobian[165] = x4 * work[209] - y4 * work[206];
-    jacobian[10] = work[207] * work[156] + (work[209] * work[157] + work[208] * work[158]);
-    increment_jacobian[10] = y1 * work[207] - z1 * work[208];
-    increment_jacobian[40] = x1 * work[208] - y1 * work[209];
-    increment_jacobian[166] = x4 * work[208] - y4 * work[205];
-    increment_jacobian[137] = y4 * work[210] - z4 * work[207];
-    increment_jacobian[152] = z4 * work[204] - x4 * work[210];
-    increment_jacobian[26] = z1 * work[212] - x1 * work[210];
-    increment_jacobian[135] = y4 * work[212] - z4 * work[209];
-    increment_jacobian[150] = z4 * work[206] - x4 * work[212];
-    jacobian[11] = work[210] * work[156] + (work[212] * work[157] + work[211] * work[158]);
-    increment_jacobian[11] = y1 * work[210] - z1 * work[211];
-    increment_jacobian[41] = x1 * work[211] - y1 * work[212];
-    increment_jacobian[136] = y4 * work[211] - z4 * work[208];
-    increment_jacobian[151] = z4 * work[205] - x4 * work[211];
+    const double x1 = y[0], y1 = y[1], z1 = y[2], x2 = y[3], y2 = y[4], z2 = y[5], x3 = y[6], y3 = y[7], z3 =
+        y[8], x4 = y[9], y4 = y[10], z4 = y[11], x5 = y[12], y5 = y[13], z5 = y[14];
+    work[428] = work[90] * work[91] - work[92] * work[89];
+    work[431] = work[94] * work[89] - work[90] * work[93];
+    work[459] = work[95] * work[95];
+    work[495] = work[96] * work[96];
+    work[460] = work[97] * work[97];
+    work[501] = work[495] + work[460];
+    work[435] = work[459] + work[501];
+    work[438] = spin_chain5_phi0(work[435]);
+    work[499] = z5 * work[96];
+    work[437] = x5 * work[95];
+    work[436] = work[499] - work[437];
+    work[440] = x5 * work[97];
+    work[482] = y5 * work[96];
+    work[441] = work[440] - work[482];
+    work[439] = work[95] * work[436] - work[97] * work[441];
+    work[478] = y5 * work[95];
+    work[500] = z5 * work[97];
+    work[479] = work[478] - work[500];
+    work[476] = work[96] * work[441] - work[95] * work[479];
+    work[497] = work[97] * work[479] - work[96] * work[436];
+    work[177] = z5 * work[98] + z2 * work[99];
+    const double t1 = spin_chain5_phi1(work[100]);
+    work[167] = work[80] * t1;
+    work[213] = 0.5 * y1;
+    work[153] = (work[101] - work[102]) * work[103] + 2.0 * (work[104] * work[167]) - work[213];
+    const double t2 = y2 * work[105], t3 = z2 * work[106], t4 = y5 * (coef[11] * y5);
+    const double t5 = coef[10] + z5 * (coef[11] * z5);
+    work[179] = t2 + (t3 + (t4 + t5));
+    work[211] = y1 * work[81];
+    work[170] = z1 * work[80];
+    work[173] = work[82] * t1;
+    work[154] = (work[211] + work[170]) * work[103] + 2.0 * (work[104] * work[173]);
+    work[178] = y5 * work[98] + y2 * work[99];
+    work[174] = 0.5 * z1;
+    work[171] = work[81] * t1;
+    work[155] = work[174] + (2.0 * (work[104] * work[171]) - (work[107] + work[108]) * work[103]);
+    work[176] = work[81] * work[82] * work[103];
+    work[175] = 0.5 * work[80];
+    work[180] = z5 * work[111] + z2 * work[112];
+    const double t6 = x2 * work[113], t7 = x5 * (coef[11] * x5);
+    work[181] = t6 + (t3 + (t7 + t5));
+    work[217] = 0.5 * work[81];
+    work[216] = work[80] * work[82] * work[103];
+    work[210] = t6 + (t2 + (t7 + (coef[10] + t4)));
+    work[227] = coef[13] * z1;
+    const double t8 = work[227] + coef[5] * z3;
+    work[183] = x2 * t8 + work[114];
+    work[232] = coef[9] * y1 + coef[6] * y3;
+    const double t9 = y2 * work[232], t10 = z2 * (coef[6] * z3 + coef[9] * z1), t11 = coef[8] * y1;
+    const double t12 = y5 * (work[115] + t11), t13 = coef[8] * z1;
+    const double t14 = coef[0] + z5 * (work[116] + t13);
+    work[185] = t9 + (t10 + (t12 + t14));
+    work[226] = coef[13] * y1;
+    const double t15 = work[226] + coef[5] * y3;
+    work[184] = x2 * t15 + work[117];
+    work[186] = y2 * t8 + work[118];
+    work[231] = coef[13] * x1;
+    const double t16 = work[231] + coef[5] * x3;
+    work[188] = y2 * t16 + work[119];
+    work[228] = coef[9] * x1 + coef[6] * x3;
+    const double t17 = x2 * work[228];
+    work[161] = coef[8] * x1;
+    const double t18 = x5 * (work[120] + work[161]);
+    work[187] = t17 + (t10 + (t18 + t14));
+    work[189] = t17 + (t9 + (t18 + (coef[0] + t12)));
+    work[191] = z2 * t16 + work[121];
+    work[190] = z2 * t15 + work[122];
+    work[192] = x2 * work[123] + x5 * work[124];
+    const double t19 = y2 * work[5], t20 = z5 * work[125], t21 = y5 * work[126], t22 = z2 * work[9];
+    work[194] = t19 + (t20 + t21 + t22);
+    work[193] = x5 * work[127] + x2 * work[128];
+    work[195] = y5 * work[124] + y2 * work[123];
+    work[197] = y2 * work[129] + y5 * work[130];
+    const double t23 = x2 * work[16], t24 = x5 * work[131];
+    work[196] = t23 + (t20 + t24 + t22);
+    work[198] = t23 + (t24 + t21 + t19);
+    work[200] = z2 * work[129] + z5 * work[130];
+    work[199] = z2 * work[128] + z5 * work[127];
+    work[252] = work[132] + work[133];
+    work[201] = x5 * work[134] + x2 * work[252];
+    work[255] = work[115] + work[14];
+    const double t25 = y2 * work[255];
+    work[256] = work[116] + work[35];
+    const double t26 = z2 * work[256], t27 = y5 * (work[135] + work[136]);
+    const double t28 = z5 * (work[132] + work[137]);
+    work[203] = t25 + (t26 + (t27 + t28));
+    work[251] = work[135] + work[138];
+    work[202] = x2 * work[251] + x5 * work[139];
+    work[204] = y5 * work[134] + y2 * work[252];
+    work[258] = work[140] + work[141];
+    work[206] = y5 * work[142] + y2 * work[258];
+    work[257] = work[24] + work[120];
+    const double t29 = x2 * work[257], t30 = x5 * (work[143] + work[141]);
+    work[205] = t29 + (t26 + (t30 + t28));
+    work[207] = t29 + (t25 + (t27 + t30));
+    work[209] = z2 * work[258] + z5 * work[142];
+    work[208] = z2 * work[251] + z5 * work[139];
+    work[156] = work[132] + (coef[12] * z1 + work[64]);
+    work[150] = x2 * work[156] + (work[144] + work[145]);
+    work[263] = work[126] + t11;
+    work[146] = y2 * work[263];
+    work[265] = work[125] + t13;
+    work[147] = z2 * work[265];
+    work[461] = coef[7] * y1 + coef[1] * y4;
+    work[148] = y5 * work[461];
+    work[149] = coef[0] + z5 * (coef[7] * z1 + coef[1] * z4);
+    displacement[9] = work[87] * work[88] - 0.5 * work[89];
+    increment[9] = work[89];
+    displacement[10] = work[428] * work[87] - 0.5 * work[93];
+    displacement[11] = work[87] * work[431] - 0.5 * work[91];
+    increment[13] = work[436];
+    increment[14] = work[441];
+    displacement[12] = work[438] * work[439] - 0.5 * work[479];
+    increment[12] = work[479];
+    displacement[13] = work[476] * work[438] - 0.5 * work[436];
+    displacement[14] = work[438] * work[497] - 0.5 * work[441];
+    increment_jacobian[15] = z1 * work[179] - x1 * work[177] - work[80];
+    increment_jacobian[30] = x1 * work[178] - y1 * work[179] + work[81];
+    jacobian[0] = 1.0 + (work[177] * work[153] + (work[179] * work[154] + work[178] * work[155])
+        - (work[109] + work[110]) * work[103]);
+    jacobian[1] = work[176] - work[175] + (work[180] * work[153] + (work[178] * work[154] + work[181]
+        * work[155]));
+    increment_jacobian[1] = y1 * work[180] - z1 * work[181] + work[80];
+    increment_jacobian[31] = x1 * work[181] - y1 * work[178] - work[82];
+    jacobian[2] = work[217] + work[216] + (work[210] * work[153] + (work[177] * work[154] + work[180]
+        * work[155]));
+    increment_jacobian[2] = y1 * work[210] - z1 * work[180] - work[81];
+    increment_jacobian[17] = z1 * work[177] - x1 * work[210] + work[82];
+    increment_jacobian[18] = z1 * work[185] - x1 * work[183];
+    jacobian[3] = work[183] * work[153] + (work[185] * work[154] + work[184] * work[155]);
+    increment_jacobian[3] = y1 * work[183] - z1 * work[184];
+    increment_jacobian[33] = x1 * work[184] - y1 * work[185];
+    increment_jacobian[77] = x2 * work[186] - y2 * work[183];
+    increment_jacobian[19] = z1 * work[188] - x1 * work[186];
+    increment_jacobian[75] = x2 * work[188] - y2 * work[185];
+    jacobian[4] = work[186] * work[153] + (work[188] * work[154] + work[187] * work[155]);
+    increment_jacobian[4] = y1 * work[186] - z1 * work[187];
+    increment_jacobian[34] = x1 * work[187] - y1 * work[188];
+    increment_jacobian[76] = x2 * work[187] - y2 * work[184];
+    increment_jacobian[47] = y2 * work[189] - z2 * work[186];
+    increment_jacobian[62] = z2 * work[183] - x2 * work[189];
+    increment_jacobian[20] = z1 * work[191] - x1 * work[189];
+    increment_jacobian[45] = y2 * work[191] - z2 * work[188];
+    increment_jacobian[60] = z2 * work[185] - x2 * work[191];
+    jacobian[5] = work[189] * work[153] + (work[191] * work[154] + work[190] * work[155]);
+    increment_jacobian[5] = y1 * work[189] - z1 * work[190];
+    increment_jacobian[35] = x1 * work[190] - y1 * work[191];
+    increment_jacobian[46] = y2 * work[190] - z2 * work[187];
+    increment_jacobian[61] = z2 * work[184] - x2 * work[190];
+    increment_jacobian[21] = z1 * work[194] - x1 * work[192];
+    jacobian[6] = work[192] * work[153] + (work[194] * work[154] + work[193] * work[155]);
+    increment_jacobian[6] = y1 * work[192] - z1 * work[193];
+    increment_jacobian[36] = x1 * work[193] - y1 * work[194];
+    increment_jacobian[122] = x3 * work[195] - y3 * work[192];
+    increment_jacobian[22] = z1 * work[197] - x1 * work[195];
+    increment_jacobian[120] = x3 * work[197] - y3 * work[194];
+    jacobian[7] = work[195] * work[153] + (work[197] * work[154] + work[196] * work[155]);
+    increment_jacobian[7] = y1 * work[195] - z1 * work[196];
+    increment_jacobian[37] = x1 * work[196] - y1 * work[197];
+    increment_jacobian[121] = x3 * work[196] - y3 * work[193];
+    increment_jacobian[92] = y3 * work[198] - z3 * work[195];
+    increment_jacobian[107] = z3 * work[192] - x3 * work[198];
+    increment_jacobian[23] = z1 * work[200] - x1 * work[198];
+    increment_jacobian[90] = y3 * work[200] - z3 * work[197];
+    increment_jacobian[105] = z3 * work[194] - x3 * work[200];
+    jacobian[8] = work[198] * work[153] + (work[200] * work[154] + work[199] * work[155]);
+    increment_jacobian[8] = y1 * work[198] - z1 * work[199];
+    increment_jacobian[38] = x1 * work[199] - y1 * work[200];
+    increment_jacobian[91] = y3 * work[199] - z3 * work[196];
+    increment_jacobian[106] = z3 * work[193] - x3 * work[199];
+    increment_jacobian[24] = z1 * work[203] - x1 * work[201];
+    jacobian[9] = work[201] * work[153] + (work[203] * work[154] + work[202] * work[155]);
+    increment_jacobian[9] = y1 * work[201] - z1 * work[202];
+    increment_jacobian[39] = x1 * work[202] - y1 * work[203];
+    increment_jacobian[167] = x4 * work[204] - y4 * work[201];
+    increment_jacobian[25] = z1 * work[206] - x1 * work[204];
+    increment_jacobian[165] = x4 * work[206] - y4 * work[203];
+    jacobian[10] = work[204] * work[153] + (work[206] * work[154] + work[205] * work[155]);
+    increment_jacobian[10] = y1 * work[204] - z1 * work[205];
+    increment_jacobian[40] = x1 * work[205] - y1 * work[206];
+    increment_jacobian[166] = x4 * work[205] - y4 * work[202];
+    increment_jacobian[137] = y4 * work[207] - z4 * work[204];
+    increment_jacobian[152] = z4 * work[201] - x4 * work[207];
+    increment_jacobian[26] = z1 * work[209] - x1 * work[207];
+    increment_jacobian[135] = y4 * work[209] - z4 * work[206];
+    increment_jacobian[150] = z4 * work[203] - x4 * work[209];
+    jacobian[11] = work[207] * work[153] + (work[209] * work[154] + work[208] * work[155]);
+    increment_jacobian[11] = y1 * work[207] - z1 * work[208];
+    increment_jacobian[41] = x1 * work[208] - y1 * work[209];
+    increment_jacobian[136] = y4 * work[208] - z4 * work[205];
+    increment_jacobian[151] = z4 * work[202] - x4 * work[208];
 }
 
 /* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
    increment, all with the momenta p = grad S_h(y) (part 4 of 7) */
 spin_chain5_APART static void spin_chain5_linearise_part4(const double coef[33], const double y[15],
-                                                          double displacement[restrict 15],
-                                                          double increment[restrict 15],
-                                                          double jacobian[restrict 225],
-                                                          double increment_jacobian[restrict 225],
-                                                          double work[restrict 517])
+    double displacement[restrict 15], double increment[restrict 15], double jacobian[restrict 225],
+    double increment_jacobian[restrict 225], double work[restrict 505])
 {
-    (void)displacement;
-    (void)increment;
-    const double x1 = y[0];
-    const double y1 = y[1];
-    const double z1 = y[2];
-    const double x2 = y[3];
-    const double y2 = y[4];
-    const double z2 = y[5];
-    const double x3 = y[6];
-    const double y3 = y[7];
-    const double z3 = y[8];
-    const double x4 = y[9];
-    const double y4 = y[10];
-    const double z4 = y[11];
-    const double x5 = y[12];
-    const double y5 = y[13];
-    const double z5 = y[14];
-    work[458] = work[149] + (work[150] + (work[151] + work[152]));
-    const double t485 = work[138] + (coef[12] * y1 + work[52]);
-    work[461] = x2 * t485 + (work[154] + work[155]);
-    work[464] = y2 * work[159] + (work[160] + work[161]);
-    const double t488 = work[144] + (coef[12] * x1 + work[50]);
-    work[459] = y2 * t488 + (work[162] + work[163]);
-    work[274] = work[134] + work[164];
-    const double t491 = x2 * work[274];
-    work[471] = coef[7] * x1 + coef[1] * x4;
-    const double t493 = x5 * work[471];
-    work[462] = t491 + (work[150] + (t493 + work[152]));
-    work[463] = t491 + (work[149] + (t493 + (coef[0] + work[151])));
-    work[457] = z2 * t488 + (work[165] + work[166]);
-    work[460] = z2 * t485 + (work[167] + work[168]);
-    const double t498 = 0.5 * x1;
-    const double t499 = t498 + (2.0 * (work[169] * work[170]) - (work[171] + work[172]) * work[104]);
-    const double t500 = x1 * work[109];
-    const double t501 = (t500 + work[173]) * work[104] + 2.0 * (work[169] * work[174]);
-    const double t502 = (work[111] - work[175]) * work[104] + 2.0 * (work[169] * work[176]) - work[177];
-    const double t503 = work[108] * work[101] * work[104];
-    const double t504 = 0.5 * work[109];
-    const double t505 = (t500 + work[214]) * work[104] + 2.0 * (work[215] * work[170]);
-    const double t506 = work[216] + (2.0 * (work[215] * work[176]) - (work[217] + work[102]) * work[104]);
-    const double t507 = (work[172] - work[218]) * work[104] + 2.0 * (work[215] * work[174]) - t498;
-    work[321] = y2 * work[4];
-    work[286] = z2 * work[2];
-    const double t510 = spin_chain5_phi1(work[222]);
-    work[284] = work[0] * t510;
-    work[268] = (work[321] + work[286]) * work[223] + 2.0 * (work[224] * work[284]);
-    work[285] = 0.5 * z2;
-    work[287] = work[4] * t510;
-    work[270] = work[285] + (2.0 * (work[224] * work[287]) - (work[1] + work[225]) * work[223]);
-    work[288] = work[2] * t510;
-    work[318] = 0.5 * y2;
-    work[272] = (work[3] - work[226]) * work[223] + 2.0 * (work[224] * work[288]) - work[318];
-    const double t519 = y1 * (work[227] + coef[19] * y3);
-    const double t520 = z1 * (work[228] + coef[19] * z3);
-    const double t521 = y3 * (coef[18] * y3);
-    const double t522 = coef[17] + z3 * (coef[18] * z3);
-    work[293] = t519 + (t520 + (t521 + t522));
-    const double t524 = coef[16] * x3 + coef[6] * x1;
-    work[295] = z1 * work[229] + z3 * t524;
-    work[294] = y1 * work[229] + y3 * t524;
-    work[292] = work[0] * work[4] * work[223];
-    work[291] = 0.5 * work[2];
-    const double t529 = x1 * (work[232] + coef[19] * x3);
-    const double t530 = x3 * (coef[18] * x3);
-    work[296] = t529 + (t520 + (t530 + t522));
-    work[297] = z1 * work[233] + z3 * (coef[6] * y1 + coef[16] * y3);
-    work[324] = 0.5 * work[4];
-    work[323] = work[0] * work[2] * work[223];
-    work[317] = t529 + (t519 + (t530 + (coef[17] + t521)));
-    const double t536 = y1 * work[131];
-    const double t537 = z1 * work[126];
-    const double t538 = y3 * work[234];
-    const double t539 = coef[0] + z3 * work[235];
-    work[299] = t536 + (t537 + (t538 + t539));
-    work[300] = x1 * work[236] + (work[237] + work[238]);
-    work[301] = x1 * work[239] + (work[240] + work[241]);
-    work[302] = y1 * work[242] + (work[243] + work[244]);
-    const double t544 = x1 * work[132];
-    const double t545 = x3 * work[245];
-    work[303] = t544 + (t537 + (t545 + t539));
-    work[304] = y1 * work[239] + (work[246] + work[247]);
-    work[305] = z1 * work[242] + (work[248] + work[249]);
-    work[306] = z1 * work[236] + (work[250] + work[251]);
-    work[307] = t544 + (t536 + (t545 + (coef[0] + t538)));
-    const double t551 = y1 * work[252];
-    const double t552 = z1 * work[253];
-    const double t553 = z3 * (work[7] + work[254]);
-    const double t554 = y3 * (work[255] + work[27]);
-    work[308] = t551 + (t552 + (t553 + t554));
-    work[346] = coef[15] * y3 + work[141];
-    work[309] = x1 * work[256] + x3 * work[346];
-    work[347] = coef[15] * z3 + work[136];
-    work[310] = x1 * work[257] + x3 * work[347];
-    work[356] = work[143] + coef[15] * x3;
-    work[311] = y1 * work[258] + y3 * work[356];
-    const double t562 = x1 * work[259];
-    const double t563 = x3 * (work[260] + work[20]);
-    work[312] = t562 + (t552 + (t563 + t553));
-    work[313] = y1 * work[257] + y3 * work[347];
-    work[314] = z3 * work[356] + z1 * work[258];
-    work[316] = t562 + (t551 + (t563 + t554));
-    work[315] = z3 * work[346] + z1 * work[256];
-    work[281] = y1 * (work[138] + (work[52] + work[261]));
-    work[280] = y3 * work[129];
-    work[277] = z3 * work[128];
-    work[278] = z1 * (work[135] + (work[262] + work[61]));
-    work[267] = work[281] + (work[280] + work[277] + work[278]);
-    work[279] = work[263] + work[52];
-    work[269] = x3 * work[279] + x1 * work[264];
-    work[275] = work[61] + work[265];
-    work[271] = x3 * work[275] + x1 * work[266];
-    increment_jacobian[27] = z1 * work[458] - x1 * work[153];
-    jacobian[12] = work[153] * work[156] + (work[458] * work[157] + work[461] * work[158]);
-    increment_jacobian[12] = y1 * work[153] - z1 * work[461];
-    increment_jacobian[42] = x1 * work[461] - y1 * work[458];
-    increment_jacobian[212] = x5 * work[464] - y5 * work[153];
-    increment_jacobian[28] = z1 * work[459] - x1 * work[464];
-    increment_jacobian[210] = x5 * work[459] - y5 * work[458];
-    jacobian[13] = work[464] * work[156] + (work[459] * work[157] + work[462] * work[158]);
-    increment_jacobian[13] = y1 * work[464] - z1 * work[462];
-    increment_jacobian[43] = x1 * work[462] - y1 * work[459];
-    increment_jacobian[211] = x5 * work[462] - y5 * work[461];
-    increment_jacobian[182] = y5 * work[463] - z5 * work[464];
-    increment_jacobian[197] = z5 * work[153] - x5 * work[463];
-    increment_jacobian[29] = z1 * work[457] - x1 * work[463];
-    increment_jacobian[180] = y5 * work[457] - z5 * work[459];
-    increment_jacobian[195] = z5 * work[458] - x5 * work[457];
-    jacobian[14] = work[463] * work[156] + (work[457] * work[157] + work[460] * work[158]);
-    increment_jacobian[14] = y1 * work[463] - z1 * work[460];
-    increment_jacobian[44] = x1 * work[460] - y1 * work[457];
-    increment_jacobian[181] = y5 * work[460] - z5 * work[462];
-    increment_jacobian[196] = z5 * work[461] - x5 * work[460];
-    jacobian[15] = work[178] + work[179] + (work[180] * t499 + (work[181] * t501 + work[182] * t502));
-    jacobian[16] = 1.0 + (work[183] * t499 + (work[184] * t501 + work[181] * t502) - (work[185] + work[113]) * work[104]);
-    jacobian[18] = work[186] * t499 + (work[187] * t501 + work[188] * t502);
-    jacobian[19] = work[189] * t499 + (work[190] * t501 + work[191] * t502);
-    jacobian[20] = work[192] * t499 + (work[193] * t501 + work[194] * t502);
-    jacobian[21] = work[195] * t499 + (work[196] * t501 + work[197] * t502);
-    jacobian[22] = work[198] * t499 + (work[199] * t501 + work[200] * t502);
-    jacobian[23] = work[201] * t499 + (work[202] * t501 + work[203] * t502);
-    jacobian[24] = work[204] * t499 + (work[205] * t501 + work[206] * t502);
-    jacobian[25] = work[207] * t499 + (work[208] * t501 + work[209] * t502);
-    jacobian[26] = work[210] * t499 + (work[211] * t501 + work[212] * t502);
-    jacobian[27] = work[153] * t499 + (work[461] * t501 + work[458] * t502);
-    jacobian[28] = work[464] * t499 + (work[462] * t501 + work[459] * t502);
-    jacobian[29] = work[463] * t499 + (work[460] * t501 + work[457] * t502);
-    jacobian[17] = t503 - t504 + (work[213] * t499 + (work[183] * t501 + work[180] * t502));
-    jacobian[30] = work[219] - work[220] + (work[180] * t505 + (work[182] * t506 + work[181] * t507));
-    jacobian[31] = t504 + t503 + (work[183] * t505 + (work[184] * t507 + work[181] * t506));
-    jacobian[32] = 1.0 + (work[213] * t505 + (work[180] * t506 + work[183] * t507) - work[221] * work[104]);
-    jacobian[33] = work[186] * t505 + (work[188] * t506 + work[187] * t507);
-    jacobian[34] = work[189] * t505 + (work[191] * t506 + work[190] * t507);
-    jacobian[35] = work[192] * t505 + (work[193] * t507 + work[194] * t506);
-    jacobian[36] = work[195] * t505 + (work[196] * t507 + work[197] * t506);
-    jacobian[37] = work[198] * t505 + (work[199] * t507 + work[200] * t506);
-    jacobian[38] = work[201] * t505 + (work[202] * t507 + work[203] * t506);
-    jacobian[39] = work[204] * t505 + (work[206] * t506 + work[205] * t507);
-    jacobian[40] = work[207] * t505 + (work[209] * t506 + work[208] * t507);
-    jacobian[41] = work[210] * t505 + (work[211] * t507 + work[212] * t506);
-    jacobian[42] = work[153] * t505 + (work[461] * t507 + work[458] * t506);
-    jacobian[43] = work[464] * t505 + (work[459] * t506 + work[462] * t507);
-    jacobian[44] = work[463] * t505 + (work[457] * t506 + work[460] * t507);
-    jacobian[45] = work[188] * work[268] + (work[191] * work[270] + work[194] * work[272]);
-    jacobian[46] = work[187] * work[268] + (work[193] * work[272] + work[190] * work[270]);
-    jacobian[47] = work[186] * work[268] + (work[189] * work[270] + work[192] * work[272]);
-    increment_jacobian[63] = z2 * work[293] - x2 * work[295] - work[2];
-    jacobian[48] = 1.0 + (work[293] * work[268] + (work[295] * work[272] + work[294] * work[270]) - (work[230] + work[231]) * work[223]);
-    increment_jacobian[78] = x2 * work[294] - y2 * work[293] + work[4];
-    increment_jacobian[79] = x2 * work[296] - y2 * work[294] - work[0];
-    jacobian[49] = work[292] - work[291] + (work[294] * work[268] + (work[296] * work[270] + work[297] * work[272]));
-    increment_jacobian[49] = y2 * work[297] - z2 * work[296] + work[2];
-    jacobian[50] = work[324] + work[323] + (work[295] * work[268] + (work[317] * work[272] + work[297] * work[270]));
-    increment_jacobian[50] = y2 * work[317] - z2 * work[297] - work[4];
-    increment_jacobian[65] = z2 * work[295] - x2 * work[317] + work[0];
-    increment_jacobian[81] = x2 * work[300] - y2 * work[299];
-    jacobian[51] = work[299] * work[268] + (work[300] * work[270] + work[301] * work[272]);
-    increment_jacobian[51] = y2 * work[301] - z2 * work[300];
-    increment_jacobian[66] = z2 * work[299] - x2 * work[301];
-    increment_jacobian[123] = x3 * work[302] - y3 * work[299];
-    increment_jacobian[82] = x2 * work[303] - y2 * work[302];
-    increment_jacobian[124] = x3 * work[303] - y3 * work[300];
-    jacobian[52] = work[302] * work[268] + (work[303] * work[270] + work[304] * work[272]);
-    increment_jacobian[52] = y2 * work[304] - z2 * work[303];
-    increment_jacobian[67] = z2 * work[302] - x2 * work[304];
-    increment_jacobian[125] = x3 * work[304] - y3 * work[301];
-    increment_jacobian[93] = y3 * work[305] - z3 * work[302];
-    increment_jacobian[108] = z3 * work[299] - x3 * work[305];
-    increment_jacobian[83] = x2 * work[306] - y2 * work[305];
-    increment_jacobian[94] = y3 * work[306] - z3 * work[303];
-    increment_jacobian[109] = z3 * work[300] - x3 * work[306];
-    jacobian[53] = work[305] * work[268] + (work[306] * work[270] + work[307] * work[272]);
-    increment_jacobian[53] = y2 * work[307] - z2 * work[306];
-    increment_jacobian[68] = z2 * work[305] - x2 * work[307];
-    increment_jacobian[95] = y3 * work[307] - z3 * work[304];
-    increment_jacobian[110] = z3 * work[301] - x3 * work[307];
-    increment_jacobian[84] = x2 * work[309] - y2 * work[308];
-    jacobian[54] = work[308] * work[268] + (work[309] * work[270] + work[310] * work[272]);
-    increment_jacobian[54] = y2 * work[310] - z2 * work[309];
-    increment_jacobian[69] = z2 * work[308] - x2 * work[310];
-    increment_jacobian[168] = x4 * work[311] - y4 * work[308];
-    increment_jacobian[85] = x2 * work[312] - y2 * work[311];
-    increment_jacobian[169] = x4 * work[312] - y4 * work[309];
-    jacobian[55] = work[311] * work[268] + (work[312] * work[270] + work[313] * work[272]);
-    increment_jacobian[55] = y2 * work[313] - z2 * work[312];
-    increment_jacobian[70] = z2 * work[311] - x2 * work[313];
-    increment_jacobian[170] = x4 * work[313] - y4 * work[310];
-    increment_jacobian[138] = y4 * work[314] - z4 * work[311];
-    increment_jacobian[153] = z4 * work[308] - x4 * work[314];
-    increment_jacobian[71] = z2 * work[314] - x2 * work[316];
-    increment_jacobian[140] = y4 * work[316] - z4 * work[313];
-    increment_jacobian[155] = z4 * work[310] - x4 * work[316];
-    jacobian[56] = work[314] * work[268] + (work[316] * work[272] + work[315] * work[270]);
-    increment_jacobian[56] = y2 * work[316] - z2 * work[315];
-    increment_jacobian[86] = x2 * work[315] - y2 * work[314];
-    increment_jacobian[139] = y4 * work[315] - z4 * work[312];
-    increment_jacobian[154] = z4 * work[309] - x4 * work[315];
-    increment_jacobian[87] = x2 * work[269] - y2 * work[267];
+    (void)displacement, (void)increment;
+    const double x1 = y[0], y1 = y[1], z1 = y[2], x2 = y[3], y2 = y[4], z2 = y[5], x3 = y[6], y3 = y[7], z3 =
+        y[8], x4 = y[9], y4 = y[10], z4 = y[11], x5 = y[12], y5 = y[13], z5 = y[14];
+    work[443] = work[146] + (work[147] + (work[148] + work[149]));
+    const double t1 = work[135] + (coef[12] * y1 + work[54]);
+    work[446] = x2 * t1 + (work[151] + work[152]);
+    work[449] = y2 * work[156] + (work[157] + work[158]);
+    const double t2 = work[141] + (coef[12] * x1 + work[52]);
+    work[444] = y2 * t2 + (work[159] + work[160]);
+    work[273] = work[131] + work[161];
+    const double t3 = x2 * work[273];
+    work[456] = coef[7] * x1 + coef[1] * x4;
+    const double t4 = x5 * work[456];
+    work[447] = t3 + (work[147] + (t4 + work[149]));
+    work[448] = t3 + (work[146] + (t4 + (coef[0] + work[148])));
+    work[442] = z2 * t2 + (work[162] + work[163]);
+    work[445] = z2 * t1 + (work[164] + work[165]);
+    const double t5 = 0.5 * x1;
+    const double t6 = t5 + (2.0 * (work[166] * work[167]) - (work[168] + work[169]) * work[103]);
+    const double t7 = x1 * work[82];
+    const double t8 = (t7 + work[170]) * work[103] + 2.0 * (work[166] * work[171]);
+    const double t9 = (work[108] - work[172]) * work[103] + 2.0 * (work[166] * work[173]) - work[174];
+    const double t10 = work[81] * work[80] * work[103], t11 = 0.5 * work[82];
+    const double t12 = (t7 + work[211]) * work[103] + 2.0 * (work[212] * work[167]);
+    const double t13 = work[213] + (2.0 * (work[212] * work[173]) - (work[214] + work[101]) * work[103]);
+    const double t14 = (work[169] - work[215]) * work[103] + 2.0 * (work[212] * work[171]) - t5;
+    work[320] = y2 * work[85];
+    work[285] = z2 * work[84];
+    const double t15 = spin_chain5_phi1(work[219]);
+    work[283] = work[83] * t15;
+    work[267] = (work[320] + work[285]) * work[220] + 2.0 * (work[221] * work[283]);
+    work[284] = 0.5 * z2;
+    work[286] = work[85] * t15;
+    work[269] = work[284] + (2.0 * (work[221] * work[286]) - (work[222] + work[223]) * work[220]);
+    work[287] = work[84] * t15;
+    work[317] = 0.5 * y2;
+    work[271] = (work[224] - work[225]) * work[220] + 2.0 * (work[221] * work[287]) - work[317];
+    const double t16 = y1 * (work[226] + coef[19] * y3), t17 = z1 * (work[227] + coef[19] * z3);
+    const double t18 = y3 * (coef[18] * y3), t19 = coef[17] + z3 * (coef[18] * z3);
+    work[292] = t16 + (t17 + (t18 + t19));
+    const double t20 = coef[16] * x3 + coef[6] * x1;
+    work[294] = z1 * work[228] + z3 * t20;
+    work[293] = y1 * work[228] + y3 * t20;
+    work[291] = work[83] * work[85] * work[220];
+    work[290] = 0.5 * work[84];
+    const double t21 = x1 * (work[231] + coef[19] * x3), t22 = x3 * (coef[18] * x3);
+    work[295] = t21 + (t17 + (t22 + t19));
+    work[296] = z1 * work[232] + z3 * (coef[6] * y1 + coef[16] * y3);
+    work[323] = 0.5 * work[85];
+    work[322] = work[83] * work[84] * work[220];
+    work[316] = t21 + (t16 + (t22 + (coef[17] + t18)));
+    const double t23 = y1 * work[128], t24 = z1 * work[123], t25 = y3 * work[233];
+    const double t26 = coef[0] + z3 * work[234];
+    work[298] = t23 + (t24 + (t25 + t26));
+    work[299] = x1 * work[235] + (work[236] + work[237]);
+    work[300] = x1 * work[238] + (work[239] + work[240]);
+    work[301] = y1 * work[241] + (work[242] + work[243]);
+    const double t27 = x1 * work[129], t28 = x3 * work[244];
+    work[302] = t27 + (t24 + (t28 + t26));
+    work[303] = y1 * work[238] + (work[245] + work[246]);
+    work[304] = z1 * work[241] + (work[247] + work[248]);
+    work[305] = z1 * work[235] + (work[249] + work[250]);
+    work[306] = t27 + (t23 + (t28 + (coef[0] + t25)));
+    const double t29 = y1 * work[251], t30 = z1 * work[252], t31 = z3 * (work[35] + work[253]);
+    const double t32 = y3 * (work[254] + work[14]);
+    work[307] = t29 + (t30 + (t31 + t32));
+    work[340] = coef[15] * y3 + work[138];
+    work[308] = x1 * work[255] + x3 * work[340];
+    work[341] = coef[15] * z3 + work[133];
+    work[309] = x1 * work[256] + x3 * work[341];
+    work[350] = work[140] + coef[15] * x3;
+    work[310] = y1 * work[257] + y3 * work[350];
+    const double t33 = x1 * work[258], t34 = x3 * (work[259] + work[24]);
+    work[311] = t33 + (t30 + (t34 + t31));
+    work[312] = y1 * work[256] + y3 * work[341];
+    work[313] = z3 * work[350] + z1 * work[257];
+    work[315] = t33 + (t29 + (t34 + t32));
+    work[314] = z3 * work[340] + z1 * work[255];
+    work[280] = y1 * (work[135] + (work[54] + work[260]));
+    work[279] = y3 * work[126];
+    work[276] = z3 * work[125];
+    work[277] = z1 * (work[132] + (work[261] + work[64]));
+    work[266] = work[280] + (work[279] + work[276] + work[277]);
+    work[278] = work[262] + work[54];
+    work[268] = x3 * work[278] + x1 * work[263];
+    work[274] = work[64] + work[264];
+    work[270] = x3 * work[274] + x1 * work[265];
+    increment_jacobian[27] = z1 * work[443] - x1 * work[150];
+    jacobian[12] = work[150] * work[153] + (work[443] * work[154] + work[446] * work[155]);
+    increment_jacobian[12] = y1 * work[150] - z1 * work[446];
+    increment_jacobian[42] = x1 * work[446] - y1 * work[443];
+    increment_jacobian[212] = x5 * work[449] - y5 * work[150];
+    increment_jacobian[28] = z1 * work[444] - x1 * work[449];
+    increment_jacobian[210] = x5 * work[444] - y5 * work[443];
+    jacobian[13] = work[449] * work[153] + (work[444] * work[154] + work[447] * work[155]);
+    increment_jacobian[13] = y1 * work[449] - z1 * work[447];
+    increment_jacobian[43] = x1 * work[447] - y1 * work[444];
+    increment_jacobian[211] = x5 * work[447] - y5 * work[446];
+    increment_jacobian[182] = y5 * work[448] - z5 * work[449];
+    increment_jacobian[197] = z5 * work[150] - x5 * work[448];
+    increment_jacobian[29] = z1 * work[442] - x1 * work[448];
+    increment_jacobian[180] = y5 * work[442] - z5 * work[444];
+    increment_jacobian[195] = z5 * work[443] - x5 * work[442];
+    jacobian[14] = work[448] * work[153] + (work[442] * work[154] + work[445] * work[155]);
+    increment_jacobian[14] = y1 * work[448] - z1 * work[445];
+    increment_jacobian[44] = x1 * work[445] - y1 * work[442];
+    increment_jacobian[181] = y5 * work[445] - z5 * work[447];
+    increment_jacobian[196] = z5 * work[446] - x5 * work[445];
+    jacobian[15] = work[175] + work[176] + (work[177] * t6 + (work[178] * t8 + work[179] * t9));
+    jacobian[16] = 1.0 + (work[180] * t6 + (work[181] * t8 + work[178] * t9) - (work[182] + work[110])
+        * work[103]);
+    jacobian[18] = work[183] * t6 + (work[184] * t8 + work[185] * t9);
+    jacobian[19] = work[186] * t6 + (work[187] * t8 + work[188] * t9);
+    jacobian[20] = work[189] * t6 + (work[190] * t8 + work[191] * t9);
+    jacobian[21] = work[192] * t6 + (work[193] * t8 + work[194] * t9);
+    jacobian[22] = work[195] * t6 + (work[196] * t8 + work[197] * t9);
+    jacobian[23] = work[198] * t6 + (work[199] * t8 + work[200] * t9);
+    jacobian[24] = work[201] * t6 + (work[202] * t8 + work[203] * t9);
+    jacobian[25] = work[204] * t6 + (work[205] * t8 + work[206] * t9);
+    jacobian[26] = work[207] * t6 + (work[208] * t8 + work[209] * t9);
+    jacobian[27] = work[150] * t6 + (work[446] * t8 + work[443] * t9);
+    jacobian[28] = work[449] * t6 + (work[447] * t8 + work[444] * t9);
+    jacobian[29] = work[448] * t6 + (work[445] * t8 + work[442] * t9);
+    jacobian[17] = t10 - t11 + (work[210] * t6 + (work[180] * t8 + work[177] * t9));
+    jacobian[30] = work[216] - work[217] + (work[177] * t12 + (work[179] * t13 + work[178] * t14));
+    jacobian[31] = t11 + t10 + (work[180] * t12 + (work[181] * t14 + work[178] * t13));
+    jacobian[32] = 1.0 + (work[210] * t12 + (work[177] * t13 + work[180] * t14) - work[218] * work[103]);
+    jacobian[33] = work[183] * t12 + (work[185] * t13 + work[184] * t14);
+    jacobian[34] = work[186] * t12 + (work[188] * t13 + work[187] * t14);
+    jacobian[35] = work[189] * t12 + (work[190] * t14 + work[191] * t13);
+    jacobian[36] = work[192] * t12 + (work[193] * t14 + work[194] * t13);
+    jacobian[37] = work[195] * t12 + (work[196] * t14 + work[197] * t13);
+    jacobian[38] = work[198] * t12 + (work[199] * t14 + work[200] * t13);
+    jacobian[39] = work[201] * t12 + (work[203] * t13 + work[202] * t14);
+    jacobian[40] = work[204] * t12 + (work[206] * t13 + work[205] * t14);
+    jacobian[41] = work[207] * t12 + (work[208] * t14 + work[209] * t13);
+    jacobian[42] = work[150] * t12 + (work[446] * t14 + work[443] * t13);
+    jacobian[43] = work[449] * t12 + (work[444] * t13 + work[447] * t14);
+    jacobian[44] = work[448] * t12 + (work[442] * t13 + work[445] * t14);
+    jacobian[45] = work[185] * work[267] + (work[188] * work[269] + work[191] * work[271]);
+    jacobian[46] = work[184] * work[267] + (work[190] * work[271] + work[187] * work[269]);
+    jacobian[47] = work[183] * work[267] + (work[186] * work[269] + work[189] * work[271]);
+    increment_jacobian[63] = z2 * work[292] - x2 * work[294] - work[84];
+    jacobian[48] = 1.0 + (work[292] * work[267] + (work[294] * work[271] + work[293] * work[269])
+        - (work[229] + work[230]) * work[220]);
+    increment_jacobian[78] = x2 * work[293] - y2 * work[292] + work[85];
+    increment_jacobian[79] = x2 * work[295] - y2 * work[293] - work[83];
+    jacobian[49] = work[291] - work[290] + (work[293] * work[267] + (work[295] * work[269] + work[296]
+        * work[271]));
+    increment_jacobian[49] = y2 * work[296] - z2 * work[295] + work[84];
+    jacobian[50] = work[323] + work[322] + (work[294] * work[267] + (work[316] * work[271] + work[296]
+        * work[269]));
+    increment_jacobian[50] = y2 * work[316] - z2 * work[296] - work[85];
+    increment_jacobian[65] = z2 * work[294] - x2 * work[316] + work[83];
+    increment_jacobian[81] = x2 * work[299] - y2 * work[298];
+    jacobian[51] = work[298] * work[267] + (work[299] * work[269] + work[300] * work[271]);
+    increment_jacobian[51] = y2 * work[300] - z2 * work[299];
+    increment_jacobian[66] = z2 * work[298] - x2 * work[300];
+    increment_jacobian[123] = x3 * work[301] - y3 * work[298];
+    increment_jacobian[82] = x2 * work[302] - y2 * work[301];
+    increment_jacobian[124] = x3 * work[302] - y3 * work[299];
+    jacobian[52] = work[301] * work[267] + (work[302] * work[269] + work[303] * work[271]);
+    increment_jacobian[52] = y2 * work[303] - z2 * work[302];
+    increment_jacobian[67] = z2 * work[301] - x2 * work[303];
+    increment_jacobian[125] = x3 * work[303] - y3 * work[300];
+    increment_jacobian[93] = y3 * work[304] - z3 * work[301];
+    increment_jacobian[108] = z3 * work[298] - x3 * work[304];
+    increment_jacobian[83] = x2 * work[305] - y2 * work[304];
+    increment_jacobian[94] = y3 * work[305] - z3 * work[302];
+    increment_jacobian[109] = z3 * work[299] - x3 * work[305];
+    jacobian[53] = work[304] * work[267] + (work[305] * work[269] + work[306] * work[271]);
+    increment_jacobian[53] = y2 * work[306] - z2 * work[305];
+    increment_jacobian[68] = z2 * work[304] - x2 * work[306];
+    increment_jacobian[95] = y3 * work[306] - z3 * work[303];
+    increment_jacobian[110] = z3 * work[300] - x3 * work[306];
+    increment_jacobian[84] = x2 * work[308] - y2 * work[307];
+    jacobian[54] = work[307] * work[267] + (work[308] * work[269] + work[309] * work[271]);
+    increment_jacobian[54] = y2 * work[309] - z2 * work[308];
+    increment_jacobian[69] = z2 * work[307] - x2 * work[309];
+    increment_jacobian[168] = x4 * work[310] - y4 * work[307];
+    increment_jacobian[85] = x2 * work[311] - y2 * work[310];
+    increment_jacobian[169] = x4 * work[311] - y4 * work[308];
+    jacobian[55] = work[310] * work[267] + (work[311] * work[269] + work[312] * work[271]);
+    increment_jacobian[55] = y2 * work[312] - z2 * work[311];
+    increment_jacobian[70] = z2 * work[310] - x2 * work[312];
+    increment_jacobian[170] = x4 * work[312] - y4 * work[309];
+    increment_jacobian[138] = y4 * work[313] - z4 * work[310];
+    increment_jacobian[153] = z4 * work[307] - x4 * work[313];
+    increment_jacobian[71] = z2 * work[313] - x2 * work[315];
+    increment_jacobian[140] = y4 * work[315] - z4 * work[312];
+    increment_jacobian[155] = z4 * work[309] - x4 * work[315];
+    jacobian[56] = work[313] * work[267] + (work[315] * work[271] + work[314] * work[269]);
+    increment_jacobian[56] = y2 * work[315] - z2 * work[314];
+    increment_jacobian[86] = x2 * work[314] - y2 * work[313];
+    increment_jacobian[139] = y4 * work[314] - z4 * work[311];
+    increment_jacobian[154] = z4 * work[308] - x4 * work[314];
+    increment_jacobian[87] = x2 * work[268] - y2 * work[266];
 }
 
 /* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
    increment, all with the momenta p = grad S_h(y) (part 5 of 7) */
 spin_chain5_APART static void spin_chain5_linearise_part5(const double coef[33], const double y[15],
-                                                          double displacement[restrict 15],
-                                                          double increment[restrict 15],
-                                                          double jacobian[restrict 225],
-                                                          double increment_jacobian[restrict 225],
-                                                          double work[restrict 517])
+    double displacement[restrict 15], double increment[restrict 15], double jacobian[restrict 225],
+    double increment_jacobian[restrict 225], double work[restrict 505])
 {
-    (void)displacement;
-    (void)increment;
-    const double x1 = y[0];
-    const double y1 = y[1];
-    const double z1 = y[2];
-    const double x2 = y[3];
-    const double y2 = y[4];
-    const double z2 = y[5];
-    const double x3 = y[6];
-    const double y3 = y[7];
-    const double z3 = y[8];
-    const double x4 = y[9];
-    const double y4 = y[10];
-    const double z4 = y[11];
-    const double x5 = y[12];
-    const double y5 = y[13];
-    const double z5 = y[14];
-    const double t578 = work[50] + work[273];
-    work[466] = y3 * t578 + y1 * work[274];
-    work[470] = y1 * work[266] + y3 * work[275];
-    const double t581 = x1 * (work[144] + (work[50] + work[276]));
-    const double t582 = x3 * work[134];
-    work[468] = t581 + (t582 + work[277] + work[278]);
-    work[465] = z3 * t578 + z1 * work[274];
-    work[467] = z1 * work[264] + z3 * work[279];
-    work[469] = t581 + (work[280] + t582 + work[281]);
-    const double t587 = (work[225] - work[282]) * work[223] + 2.0 * (work[283] * work[284]) - work[285];
-    const double t588 = x2 * work[0];
-    const double t589 = (t588 + work[286]) * work[223] + 2.0 * (work[283] * work[287]);
-    const double t590 = 0.5 * x2;
-    const double t591 = t590 + (2.0 * (work[283] * work[288]) - (work[289] + work[290]) * work[223]);
-    const double t592 = work[4] * work[2] * work[223];
-    const double t593 = 0.5 * work[0];
-    const double t594 = work[318] + (2.0 * (work[319] * work[284]) - (work[320] + work[3]) * work[223]);
-    const double t595 = (work[321] + t588) * work[223] + 2.0 * (work[319] * work[288]);
-    const double t596 = (work[290] - work[322]) * work[223] + 2.0 * (work[319] * work[287]) - t590;
-    const double t597 = spin_chain5_phi1(work[326]);
-    work[404] = work[327] * t597;
-    work[408] = 0.5 * y3;
-    const double t600 = (work[328] - work[329]) * work[330] + 2.0 * (work[331] * work[404]) - work[408];
-    const double t601 = z3 * work[327];
-    work[401] = y3 * work[332];
-    work[409] = work[333] * t597;
-    const double t604 = (t601 + work[401]) * work[330] + 2.0 * (work[331] * work[409]);
-    const double t605 = 0.5 * z3;
-    work[406] = work[332] * t597;
-    const double t607 = t605 + (2.0 * (work[331] * work[406]) - (work[334] + work[335]) * work[330]);
-    work[376] = z4 * work[336] + z2 * work[245];
-    const double t609 = y2 * work[337];
-    const double t610 = z2 * work[338];
-    const double t611 = y4 * (coef[25] * y4);
-    const double t612 = coef[24] + z4 * (coef[25] * z4);
-    work[378] = t609 + (t610 + (t611 + t612));
-    work[377] = y2 * work[245] + y4 * work[336];
-    work[375] = work[332] * work[333] * work[330];
-    work[374] = 0.5 * work[327];
-    work[379] = z4 * work[341] + z2 * work[234];
-    const double t618 = x2 * work[342];
-    const double t619 = x4 * (coef[25] * x4);
-    work[380] = t618 + (t610 + (t619 + t612));
-    work[412] = 0.5 * work[332];
-    work[411] = work[327] * work[333] * work[330];
-    work[400] = t618 + (t609 + (t619 + (coef[24] + t611)));
-    const double t624 = work[343] + (coef[26] * z3 + work[7]);
-    work[382] = x2 * t624 + (work[344] + work[345]);
-    const double t626 = y2 * work[346];
-    const double t627 = z2 * work[347];
-    work[429] = coef[22] * y5 + coef[23] * y3;
-    const double t629 = y4 * work[429];
-    const double t630 = coef[0] + z4 * (coef[22] * z5 + coef[23] * z3);
-    work[384] = t626 + (t627 + (t629 + t630));
-    const double t632 = work[348] + (coef[26] * y3 + work[27]);
-    work[383] = x2 * t632 + (work[349] + work[350]);
-    work[385] = y2 * t624 + (work[351] + work[352]);
-    const double t635 = work[353] + (work[20] + coef[26] * x3);
-    work[387] = y2 * t635 + (work[354] + work[355]);
-    const double t637 = x2 * work[356];
-    work[426] = coef[23] * x3 + coef[22] * x5;
-    const double t639 = x4 * work[426];
-    work[386] = t637 + (t627 + (t639 + t630));
-    work[388] = t637 + (t626 + (t639 + (coef[0] + t629)));
-    work[390] = z2 * t635 + (work[357] + work[358]);
-    work[389] = z2 * t632 + (work[359] + work[360]);
-    const double t644 = work[343] + work[128];
-    work[391] = x4 * work[361] + x2 * t644;
-    const double t646 = y2 * work[279];
-    const double t647 = z2 * work[275];
-    const double t648 = z4 * (work[343] + work[362]);
-    const double t649 = y4 * (work[348] + work[363]);
-    work[393] = t646 + (t647 + (t648 + t649));
-    const double t651 = work[129] + work[348];
-    work[392] = x4 * work[364] + x2 * t651;
-    work[394] = y4 * work[361] + y2 * t644;
-    const double t654 = work[134] + work[353];
-    work[396] = y4 * work[365] + y2 * t654;
-    const double t656 = x2 * t578;
-    const double t657 = x4 * (work[366] + work[353]);
-    work[395] = t656 + (t647 + (t648 + t657));
-    work[397] = t656 + (t646 + (t657 + t649));
-    work[399] = z2 * t654 + z4 * work[365];
-    work[398] = z2 * t651 + z4 * work[364];
-    work[407] = 0.5 * x3;
-    work[371] = work[407] + (2.0 * (work[367] * work[404]) - (work[368] + work[369]) * work[330]);
-    work[402] = x3 * work[333];
-    work[372] = (t601 + work[402]) * work[330] + 2.0 * (work[367] * work[406]);
-    work[373] = (work[335] - work[370]) * work[330] + 2.0 * (work[367] * work[409]) - t605;
-    jacobian[57] = work[267] * work[268] + (work[269] * work[270] + work[271] * work[272]);
-    increment_jacobian[57] = y2 * work[271] - z2 * work[269];
-    increment_jacobian[72] = z2 * work[267] - x2 * work[271];
-    increment_jacobian[213] = x5 * work[466] - y5 * work[267];
-    increment_jacobian[73] = z2 * work[466] - x2 * work[470];
-    increment_jacobian[215] = x5 * work[470] - y5 * work[271];
-    jacobian[58] = work[466] * work[268] + (work[470] * work[272] + work[468] * work[270]);
-    increment_jacobian[58] = y2 * work[470] - z2 * work[468];
-    increment_jacobian[88] = x2 * work[468] - y2 * work[466];
-    increment_jacobian[214] = x5 * work[468] - y5 * work[269];
-    increment_jacobian[183] = y5 * work[465] - z5 * work[466];
-    increment_jacobian[198] = z5 * work[267] - x5 * work[465];
-    increment_jacobian[89] = x2 * work[467] - y2 * work[465];
-    increment_jacobian[184] = y5 * work[467] - z5 * work[468];
-    increment_jacobian[199] = z5 * work[269] - x5 * work[467];
-    jacobian[59] = work[465] * work[268] + (work[467] * work[270] + work[469] * work[272]);
-    increment_jacobian[59] = y2 * work[469] - z2 * work[467];
-    increment_jacobian[74] = z2 * work[465] - x2 * work[469];
-    increment_jacobian[185] = y5 * work[469] - z5 * work[470];
-    increment_jacobian[200] = z5 * work[271] - x5 * work[469];
-    jacobian[60] = work[188] * t587 + (work[191] * t589 + work[194] * t591);
-    jacobian[61] = work[187] * t587 + (work[190] * t589 + work[193] * t591);
-    jacobian[62] = work[186] * t587 + (work[189] * t589 + work[192] * t591);
-    jacobian[63] = work[291] + work[292] + (work[293] * t587 + (work[294] * t589 + work[295] * t591));
-    jacobian[64] = 1.0 + (work[294] * t587 + (work[296] * t589 + work[297] * t591) - (work[298] + work[230]) * work[223]);
-    jacobian[66] = work[299] * t587 + (work[300] * t589 + work[301] * t591);
-    jacobian[67] = work[302] * t587 + (work[303] * t589 + work[304] * t591);
-    jacobian[68] = work[305] * t587 + (work[306] * t589 + work[307] * t591);
-    jacobian[69] = work[308] * t587 + (work[309] * t589 + work[310] * t591);
-    jacobian[70] = work[311] * t587 + (work[312] * t589 + work[313] * t591);
-    jacobian[71] = work[314] * t587 + (work[315] * t589 + work[316] * t591);
-    jacobian[72] = work[267] * t587 + (work[269] * t589 + work[271] * t591);
-    jacobian[73] = work[466] * t587 + (work[468] * t589 + work[470] * t591);
-    jacobian[74] = work[465] * t587 + (work[467] * t589 + work[469] * t591);
-    jacobian[65] = t592 - t593 + (work[295] * t587 + (work[297] * t589 + work[317] * t591));
-    jacobian[75] = work[188] * t594 + (work[194] * t595 + work[191] * t596);
-    jacobian[76] = work[187] * t594 + (work[193] * t595 + work[190] * t596);
-    jacobian[77] = work[186] * t594 + (work[192] * t595 + work[189] * t596);
-    jacobian[78] = work[323] - work[324] + (work[293] * t594 + (work[295] * t595 + work[294] * t596));
-    jacobian[79] = t593 + t592 + (work[294] * t594 + (work[297] * t595 + work[296] * t596));
-    jacobian[80] = 1.0 + (work[295] * t594 + (work[317] * t595 + work[297] * t596) - work[325] * work[223]);
-    jacobian[81] = work[299] * t594 + (work[301] * t595 + work[300] * t596);
-    jacobian[82] = work[302] * t594 + (work[304] * t595 + work[303] * t596);
-    jacobian[83] = work[305] * t594 + (work[307] * t595 + work[306] * t596);
-    jacobian[84] = work[308] * t594 + (work[310] * t595 + work[309] * t596);
-    jacobian[85] = work[311] * t594 + (work[313] * t595 + work[312] * t596);
-    jacobian[86] = work[314] * t594 + (work[316] * t595 + work[315] * t596);
-    jacobian[87] = work[267] * t594 + (work[271] * t595 + work[269] * t596);
-    jacobian[88] = work[466] * t594 + (work[470] * t595 + work[468] * t596);
-    jacobian[89] = work[465] * t594 + (work[469] * t595 + work[467] * t596);
-    jacobian[90] = work[203] * t600 + (work[197] * t604 + work[200] * t607);
-    jacobian[91] = work[202] * t600 + (work[196] * t604 + work[199] * t607);
-    jacobian[92] = work[201] * t600 + (work[195] * t604 + work[198] * t607);
-    jacobian[93] = work[305] * t600 + (work[299] * t604 + work[302] * t607);
-    jacobian[94] = work[306] * t600 + (work[300] * t604 + work[303] * t607);
-    jacobian[95] = work[307] * t600 + (work[301] * t604 + work[304] * t607);
-    increment_jacobian[111] = z3 * work[378] - x3 * work[376] - work[327];
-    jacobian[96] = 1.0 + (work[376] * t600 + (work[378] * t604 + work[377] * t607) - (work[339] + work[340]) * work[330]);
-    increment_jacobian[126] = x3 * work[377] - y3 * work[378] + work[332];
-    jacobian[97] = work[375] - work[374] + (work[379] * t600 + (work[377] * t604 + work[380] * t607));
-    increment_jacobian[97] = y3 * work[379] - z3 * work[380] + work[327];
-    increment_jacobian[127] = x3 * work[380] - y3 * work[377] - work[333];
-    jacobian[98] = work[412] + work[411] + (work[400] * t600 + (work[376] * t604 + work[379] * t607));
-    increment_jacobian[98] = y3 * work[400] - z3 * work[379] - work[332];
-    increment_jacobian[113] = z3 * work[376] - x3 * work[400] + work[333];
-    increment_jacobian[114] = z3 * work[384] - x3 * work[382];
-    jacobian[99] = work[382] * t600 + (work[384] * t604 + work[383] * t607);
-    increment_jacobian[99] = y3 * work[382] - z3 * work[383];
-    increment_jacobian[129] = x3 * work[383] - y3 * work[384];
-    increment_jacobian[173] = x4 * work[385] - y4 * work[382];
-    increment_jacobian[115] = z3 * work[387] - x3 * work[385];
-    increment_jacobian[171] = x4 * work[387] - y4 * work[384];
-    jacobian[100] = work[385] * t600 + (work[387] * t604 + work[386] * t607);
-    increment_jacobian[100] = y3 * work[385] - z3 * work[386];
-    increment_jacobian[130] = x3 * work[386] - y3 * work[387];
-    increment_jacobian[172] = x4 * work[386] - y4 * work[383];
-    increment_jacobian[143] = y4 * work[388] - z4 * work[385];
-    increment_jacobian[158] = z4 * work[382] - x4 * work[388];
-    increment_jacobian[116] = z3 * work[390] - x3 * work[388];
-    increment_jacobian[141] = y4 * work[390] - z4 * work[387];
-    increment_jacobian[156] = z4 * work[384] - x4 * work[390];
-    jacobian[101] = work[388] * t600 + (work[390] * t604 + work[389] * t607);
-    increment_jacobian[101] = y3 * work[388] - z3 * work[389];
-    increment_jacobian[131] = x3 * work[389] - y3 * work[390];
-    increment_jacobian[142] = y4 * work[389] - z4 * work[386];
-    increment_jacobian[157] = z4 * work[383] - x4 * work[389];
-    increment_jacobian[117] = z3 * work[393] - x3 * work[391];
-    jacobian[102] = work[391] * t600 + (work[393] * t604 + work[392] * t607);
-    increment_jacobian[102] = y3 * work[391] - z3 * work[392];
-    increment_jacobian[132] = x3 * work[392] - y3 * work[393];
-    increment_jacobian[218] = x5 * work[394] - y5 * work[391];
-    increment_jacobian[118] = z3 * work[396] - x3 * work[394];
-    increment_jacobian[216] = x5 * work[396] - y5 * work[393];
-    jacobian[103] = work[394] * t600 + (work[396] * t604 + work[395] * t607);
-    increment_jacobian[103] = y3 * work[394] - z3 * work[395];
-    increment_jacobian[133] = x3 * work[395] - y3 * work[396];
-    increment_jacobian[217] = x5 * work[395] - y5 * work[392];
-    increment_jacobian[188] = y5 * work[397] - z5 * work[394];
-    increment_jacobian[203] = z5 * work[391] - x5 * work[397];
-    increment_jacobian[119] = z3 * work[399] - x3 * work[397];
-    increment_jacobian[186] = y5 * work[399] - z5 * work[396];
-    increment_jacobian[201] = z5 * work[393] - x5 * work[399];
-    jacobian[104] = work[397] * t600 + (work[399] * t604 + work[398] * t607);
-    increment_jacobian[104] = y3 * work[397] - z3 * work[398];
-    increment_jacobian[134] = x3 * work[398] - y3 * work[399];
-    increment_jacobian[187] = y5 * work[398] - z5 * work[395];
-    increment_jacobian[202] = z5 * work[392] - x5 * work[398];
-    jacobian[105] = work[203] * work[371] + (work[200] * work[372] + work[197] * work[373]);
-    jacobian[106] = work[202] * work[371] + (work[199] * work[372] + work[196] * work[373]);
-    jacobian[107] = work[201] * work[371] + (work[198] * work[372] + work[195] * work[373]);
-    jacobian[108] = work[305] * work[371] + (work[302] * work[372] + work[299] * work[373]);
+    (void)displacement, (void)increment;
+    const double x1 = y[0], y1 = y[1], z1 = y[2], x2 = y[3], y2 = y[4], z2 = y[5], x3 = y[6], y3 = y[7], z3 =
+        y[8], x4 = y[9], y4 = y[10], z4 = y[11], x5 = y[12], y5 = y[13], z5 = y[14];
+    const double t1 = work[52] + work[272];
+    work[451] = y3 * t1 + y1 * work[273];
+    work[455] = y1 * work[265] + y3 * work[274];
+    const double t2 = x1 * (work[141] + (work[52] + work[275])), t3 = x3 * work[131];
+    work[453] = t2 + (t3 + work[276] + work[277]);
+    work[450] = z3 * t1 + z1 * work[273];
+    work[452] = z1 * work[263] + z3 * work[278];
+    work[454] = t2 + (work[279] + t3 + work[280]);
+    const double t4 = (work[223] - work[281]) * work[220] + 2.0 * (work[282] * work[283]) - work[284];
+    const double t5 = x2 * work[83];
+    const double t6 = (t5 + work[285]) * work[220] + 2.0 * (work[282] * work[286]), t7 = 0.5 * x2;
+    const double t8 = t7 + (2.0 * (work[282] * work[287]) - (work[288] + work[289]) * work[220]);
+    const double t9 = work[85] * work[84] * work[220], t10 = 0.5 * work[83];
+    const double t11 = work[317] + (2.0 * (work[318] * work[283]) - (work[319] + work[224]) * work[220]);
+    const double t12 = (work[320] + t5) * work[220] + 2.0 * (work[318] * work[287]);
+    const double t13 = (work[289] - work[321]) * work[220] + 2.0 * (work[318] * work[286]) - t7;
+    const double t14 = spin_chain5_phi1(work[325]);
+    work[398] = work[86] * t14;
+    work[402] = 0.5 * y3;
+    const double t15 = (work[326] - work[327]) * work[328] + 2.0 * (work[329] * work[398]) - work[402];
+    const double t16 = z3 * work[86];
+    work[395] = y3 * work[330];
+    work[403] = work[331] * t14;
+    const double t17 = (t16 + work[395]) * work[328] + 2.0 * (work[329] * work[403]), t18 = 0.5 * z3;
+    work[400] = work[330] * t14;
+    const double t19 = t18 + (2.0 * (work[329] * work[400]) - (work[332] + work[333]) * work[328]);
+    work[370] = z4 * work[4] + z2 * work[244];
+    const double t20 = y2 * work[7], t21 = z2 * work[11], t22 = y4 * (coef[25] * y4);
+    const double t23 = coef[24] + z4 * (coef[25] * z4);
+    work[372] = t20 + (t21 + (t22 + t23));
+    work[371] = y2 * work[244] + y4 * work[4];
+    work[369] = work[330] * work[331] * work[328];
+    work[368] = 0.5 * work[86];
+    work[373] = z4 * work[336] + z2 * work[233];
+    const double t24 = x2 * work[20], t25 = x4 * (coef[25] * x4);
+    work[374] = t24 + (t21 + (t25 + t23));
+    work[406] = 0.5 * work[330];
+    work[405] = work[86] * work[331] * work[328];
+    work[394] = t24 + (t20 + (t25 + (coef[24] + t22)));
+    const double t26 = work[337] + (coef[26] * z3 + work[35]);
+    work[376] = x2 * t26 + (work[338] + work[339]);
+    const double t27 = y2 * work[340], t28 = z2 * work[341];
+    work[416] = coef[22] * y5 + coef[23] * y3;
+    const double t29 = y4 * work[416], t30 = coef[0] + z4 * (coef[22] * z5 + coef[23] * z3);
+    work[378] = t27 + (t28 + (t29 + t30));
+    const double t31 = work[342] + (coef[26] * y3 + work[14]);
+    work[377] = x2 * t31 + (work[343] + work[344]);
+    work[379] = y2 * t26 + (work[345] + work[346]);
+    const double t32 = work[347] + (work[24] + coef[26] * x3);
+    work[381] = y2 * t32 + (work[348] + work[349]);
+    const double t33 = x2 * work[350];
+    work[413] = coef[23] * x3 + coef[22] * x5;
+    const double t34 = x4 * work[413];
+    work[380] = t33 + (t28 + (t34 + t30));
+    work[382] = t33 + (t27 + (t34 + (coef[0] + t29)));
+    work[384] = z2 * t32 + (work[351] + work[352]);
+    work[383] = z2 * t31 + (work[353] + work[354]);
+    const double t35 = work[337] + work[125];
+    work[385] = x4 * work[355] + x2 * t35;
+    const double t36 = y2 * work[278], t37 = z2 * work[274], t38 = z4 * (work[337] + work[356]);
+    const double t39 = y4 * (work[342] + work[357]);
+    work[387] = t36 + (t37 + (t38 + t39));
+    const double t40 = work[126] + work[342];
+    work[386] = x4 * work[358] + x2 * t40;
+    work[388] = y4 * work[355] + y2 * t35;
+    const double t41 = work[131] + work[347];
+    work[390] = y4 * work[359] + y2 * t41;
+    const double t42 = x2 * t1, t43 = x4 * (work[360] + work[347]);
+    work[389] = t42 + (t37 + (t38 + t43));
+    work[391] = t42 + (t36 + (t43 + t39));
+    work[393] = z2 * t41 + z4 * work[359];
+    work[392] = z2 * t40 + z4 * work[358];
+    work[401] = 0.5 * x3;
+    work[365] = work[401] + (2.0 * (work[361] * work[398]) - (work[362] + work[363]) * work[328]);
+    work[396] = x3 * work[331];
+    work[366] = (t16 + work[396]) * work[328] + 2.0 * (work[361] * work[400]);
+    work[367] = (work[333] - work[364]) * work[328] + 2.0 * (work[361] * work[403]) - t18;
+    jacobian[57] = work[266] * work[267] + (work[268] * work[269] + work[270] * work[271]);
+    increment_jacobian[57] = y2 * work[270] - z2 * work[268];
+    increment_jacobian[72] = z2 * work[266] - x2 * work[270];
+    increment_jacobian[213] = x5 * work[451] - y5 * work[266];
+    increment_jacobian[73] = z2 * work[451] - x2 * work[455];
+    increment_jacobian[215] = x5 * work[455] - y5 * work[270];
+    jacobian[58] = work[451] * work[267] + (work[455] * work[271] + work[453] * work[269]);
+    increment_jacobian[58] = y2 * work[455] - z2 * work[453];
+    increment_jacobian[88] = x2 * work[453] - y2 * work[451];
+    increment_jacobian[214] = x5 * work[453] - y5 * work[268];
+    increment_jacobian[183] = y5 * work[450] - z5 * work[451];
+    increment_jacobian[198] = z5 * work[266] - x5 * work[450];
+    increment_jacobian[89] = x2 * work[452] - y2 * work[450];
+    increment_jacobian[184] = y5 * work[452] - z5 * work[453];
+    increment_jacobian[199] = z5 * work[268] - x5 * work[452];
+    jacobian[59] = work[450] * work[267] + (work[452] * work[269] + work[454] * work[271]);
+    increment_jacobian[59] = y2 * work[454] - z2 * work[452];
+    increment_jacobian[74] = z2 * work[450] - x2 * work[454];
+    increment_jacobian[185] = y5 * work[454] - z5 * work[455];
+    increment_jacobian[200] = z5 * work[270] - x5 * work[454];
+    jacobian[60] = work[185] * t4 + (work[188] * t6 + work[191] * t8);
+    jacobian[61] = work[184] * t4 + (work[187] * t6 + work[190] * t8);
+    jacobian[62] = work[183] * t4 + (work[186] * t6 + work[189] * t8);
+    jacobian[63] = work[290] + work[291] + (work[292] * t4 + (work[293] * t6 + work[294] * t8));
+    jacobian[64] = 1.0 + (work[293] * t4 + (work[295] * t6 + work[296] * t8) - (work[297] + work[229])
+        * work[220]);
+    jacobian[66] = work[298] * t4 + (work[299] * t6 + work[300] * t8);
+    jacobian[67] = work[301] * t4 + (work[302] * t6 + work[303] * t8);
+    jacobian[68] = work[304] * t4 + (work[305] * t6 + work[306] * t8);
+    jacobian[69] = work[307] * t4 + (work[308] * t6 + work[309] * t8);
+    jacobian[70] = work[310] * t4 + (work[311] * t6 + work[312] * t8);
+    jacobian[71] = work[313] * t4 + (work[314] * t6 + work[315] * t8);
+    jacobian[72] = work[266] * t4 + (work[268] * t6 + work[270] * t8);
+    jacobian[73] = work[451] * t4 + (work[453] * t6 + work[455] * t8);
+    jacobian[74] = work[450] * t4 + (work[452] * t6 + work[454] * t8);
+    jacobian[65] = t9 - t10 + (work[294] * t4 + (work[296] * t6 + work[316] * t8));
+    jacobian[75] = work[185] * t11 + (work[191] * t12 + work[188] * t13);
+    jacobian[76] = work[184] * t11 + (work[190] * t12 + work[187] * t13);
+    jacobian[77] = work[183] * t11 + (work[189] * t12 + work[186] * t13);
+    jacobian[78] = work[322] - work[323] + (work[292] * t11 + (work[294] * t12 + work[293] * t13));
+    jacobian[79] = t10 + t9 + (work[293] * t11 + (work[296] * t12 + work[295] * t13));
+    jacobian[80] = 1.0 + (work[294] * t11 + (work[316] * t12 + work[296] * t13) - work[324] * work[220]);
+    jacobian[81] = work[298] * t11 + (work[300] * t12 + work[299] * t13);
+    jacobian[82] = work[301] * t11 + (work[303] * t12 + work[302] * t13);
+    jacobian[83] = work[304] * t11 + (work[306] * t12 + work[305] * t13);
+    jacobian[84] = work[307] * t11 + (work[309] * t12 + work[308] * t13);
+    jacobian[85] = work[310] * t11 + (work[312] * t12 + work[311] * t13);
+    jacobian[86] = work[313] * t11 + (work[315] * t12 + work[314] * t13);
+    jacobian[87] = work[266] * t11 + (work[270] * t12 + work[268] * t13);
+    jacobian[88] = work[451] * t11 + (work[455] * t12 + work[453] * t13);
+    jacobian[89] = work[450] * t11 + (work[454] * t12 + work[452] * t13);
+    jacobian[90] = work[200] * t15 + (work[194] * t17 + work[197] * t19);
+    jacobian[91] = work[199] * t15 + (work[193] * t17 + work[196] * t19);
+    jacobian[92] = work[198] * t15 + (work[192] * t17 + work[195] * t19);
+    jacobian[93] = work[304] * t15 + (work[298] * t17 + work[301] * t19);
+    jacobian[94] = work[305] * t15 + (work[299] * t17 + work[302] * t19);
+    jacobian[95] = work[306] * t15 + (work[300] * t17 + work[303] * t19);
+    increment_jacobian[111] = z3 * work[372] - x3 * work[370] - work[86];
+    jacobian[96] = 1.0 + (work[370] * t15 + (work[372] * t17 + work[371] * t19) - (work[334] + work[335])
+        * work[328]);
+    increment_jacobian[126] = x3 * work[371] - y3 * work[372] + work[330];
+    jacobian[97] = work[369] - work[368] + (work[373] * t15 + (work[371] * t17 + work[374] * t19));
+    increment_jacobian[97] = y3 * work[373] - z3 * work[374] + work[86];
+    increment_jacobian[127] = x3 * work[374] - y3 * work[371] - work[331];
+    jacobian[98] = work[406] + work[405] + (work[394] * t15 + (work[370] * t17 + work[373] * t19));
+    increment_jacobian[98] = y3 * work[394] - z3 * work[373] - work[330];
+    increment_jacobian[113] = z3 * work[370] - x3 * work[394] + work[331];
+    increment_jacobian[114] = z3 * work[378] - x3 * work[376];
+    jacobian[99] = work[376] * t15 + (work[378] * t17 + work[377] * t19);
+    increment_jacobian[99] = y3 * work[376] - z3 * work[377];
+    increment_jacobian[129] = x3 * work[377] - y3 * work[378];
+    increment_jacobian[173] = x4 * work[379] - y4 * work[376];
+    increment_jacobian[115] = z3 * work[381] - x3 * work[379];
+    increment_jacobian[171] = x4 * work[381] - y4 * work[378];
+    jacobian[100] = work[379] * t15 + (work[381] * t17 + work[380] * t19);
+    increment_jacobian[100] = y3 * work[379] - z3 * work[380];
+    increment_jacobian[130] = x3 * work[380] - y3 * work[381];
+    increment_jacobian[172] = x4 * work[380] - y4 * work[377];
+    increment_jacobian[143] = y4 * work[382] - z4 * work[379];
+    increment_jacobian[158] = z4 * work[376] - x4 * work[382];
+    increment_jacobian[116] = z3 * work[384] - x3 * work[382];
+    increment_jacobian[141] = y4 * work[384] - z4 * work[381];
+    increment_jacobian[156] = z4 * work[378] - x4 * work[384];
+    jacobian[101] = work[382] * t15 + (work[384] * t17 + work[383] * t19);
+    increment_jacobian[101] = y3 * work[382] - z3 * work[383];
+    increment_jacobian[131] = x3 * work[383] - y3 * work[384];
+    increment_jacobian[142] = y4 * work[383] - z4 * work[380];
+    increment_jacobian[157] = z4 * work[377] - x4 * work[383];
+    increment_jacobian[117] = z3 * work[387] - x3 * work[385];
+    jacobian[102] = work[385] * t15 + (work[387] * t17 + work[386] * t19);
+    increment_jacobian[102] = y3 * work[385] - z3 * work[386];
+    increment_jacobian[132] = x3 * work[386] - y3 * work[387];
+    increment_jacobian[218] = x5 * work[388] - y5 * work[385];
+    increment_jacobian[118] = z3 * work[390] - x3 * work[388];
+    increment_jacobian[216] = x5 * work[390] - y5 * work[387];
+    jacobian[103] = work[388] * t15 + (work[390] * t17 + work[389] * t19);
+    increment_jacobian[103] = y3 * work[388] - z3 * work[389];
+    increment_jacobian[133] = x3 * work[389] - y3 * work[390];
+    increment_jacobian[217] = x5 * work[389] - y5 * work[386];
+    increment_jacobian[188] = y5 * work[391] - z5 * work[388];
+    increment_jacobian[203] = z5 * work[385] - x5 * work[391];
+    increment_jacobian[119] = z3 * work[393] - x3 * work[391];
+    increment_jacobian[186] = y5 * work[393] - z5 * work[390];
+    increment_jacobian[201] = z5 * work[387] - x5 * work[393];
+    jacobian[104] = work[391] * t15 + (work[393] * t17 + work[392] * t19);
+    increment_jacobian[104] = y3 * work[391] - z3 * work[392];
+    increment_jacobian[134] = x3 * work[392] - y3 * work[393];
+    increment_jacobian[187] = y5 * work[392] - z5 * work[389];
+    increment_jacobian[202] = z5 * work[386] - x5 * work[392];
+    jacobian[105] = work[200] * work[365] + (work[197] * work[366] + work[194] * work[367]);
+    jacobian[106] = work[199] * work[365] + (work[196] * work[366] + work[193] * work[367]);
+    jacobian[107] = work[198] * work[365] + (work[195] * work[366] + work[192] * work[367]);
+    jacobian[108] = work[304] * work[365] + (work[301] * work[366] + work[298] * work[367]);
 }
 
 /* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
    increment, all with the momenta p = grad S_h(y) (part 6 of 7) */
 spin_chain5_APART static void spin_chain5_linearise_part6(const double coef[33], const double y[15],
-                                                          double displacement[restrict 15],
-                                                          double increment[restrict 15],
-                                                          double jacobian[restrict 225],
-                                                          double increment_jacobian[restrict 225],
-                                                          double work[restrict 517])
+    double displacement[restrict 15], double increment[restrict 15], double jacobian[restrict 225],
+    double increment_jacobian[restrict 225], double work[restrict 505])
 {
-    (void)displacement;
-    (void)increment;
-    const double x1 = y[0];
-    const double y1 = y[1];
-    const double z1 = y[2];
-    const double x3 = y[6];
-    const double y3 = y[7];
-    const double z3 = y[8];
-    const double x4 = y[9];
-    const double y4 = y[10];
-    const double z4 = y[11];
-    const double x5 = y[12];
-    const double y5 = y[13];
-    const double z5 = y[14];
-    const double t667 = work[327] * work[332] * work[330];
-    const double t668 = 0.5 * work[333];
-    const double t669 = (work[401] + work[402]) * work[330] + 2.0 * (work[403] * work[404]);
-    const double t670 = (work[369] - work[405]) * work[330] + 2.0 * (work[403] * work[406]) - work[407];
-    const double t671 = work[408] + (2.0 * (work[403] * work[409]) - (work[410] + work[328]) * work[330]);
-    const double t672 = y4 * work[414];
-    const double t673 = z4 * work[415];
-    const double t674 = spin_chain5_phi1(work[416]);
-    const double t675 = work[417] * t674;
-    const double t676 = (t672 + t673) * work[418] + 2.0 * (work[419] * t675);
-    const double t677 = work[415] * t674;
-    const double t678 = 0.5 * y4;
-    const double t679 = (work[420] - work[421]) * work[418] + 2.0 * (work[419] * t677) - t678;
-    const double t680 = 0.5 * z4;
-    const double t681 = work[414] * t674;
-    const double t682 = t680 + (2.0 * (work[419] * t681) - (work[422] + work[423]) * work[418]);
-    const double t683 = y3 * work[424];
-    const double t684 = z3 * work[425];
-    const double t685 = y5 * (coef[29] * y5);
-    const double t686 = coef[28] + z5 * (coef[29] * z5);
-    const double t687 = t683 + (t684 + (t685 + t686));
-    const double t688 = coef[27] * x5 + coef[22] * x3;
-    work[514] = z3 * work[426] + z5 * t688;
-    work[515] = y5 * t688 + y3 * work[426];
-    const double t691 = work[414] * work[417] * work[418];
-    const double t692 = 0.5 * work[415];
-    work[516] = z3 * work[429] + z5 * (coef[22] * y3 + coef[27] * y5);
-    const double t694 = x3 * work[430];
-    const double t695 = x5 * (coef[29] * x5);
-    const double t696 = t694 + (t684 + (t695 + t686));
-    const double t697 = 0.5 * work[414];
-    const double t698 = work[415] * work[417] * work[418];
-    const double t699 = t694 + (t683 + (t695 + (coef[28] + t685)));
-    const double t700 = y3 * work[364];
-    const double t701 = z3 * work[361];
-    const double t702 = coef[1] * y1 + coef[27] * y4;
-    const double t703 = y5 * t702;
-    const double t704 = coef[0] + z5 * (coef[1] * z1 + coef[27] * z4);
-    work[499] = t700 + (t701 + (t703 + t704));
-    const double t706 = work[63] + (work[343] + coef[30] * z4);
-    const double t707 = coef[29] * z4;
-    const double t708 = coef[2] * z1 + t707;
-    work[505] = x3 * t706 + (x5 * t708 + work[431]);
-    const double t710 = work[432] + (coef[30] * y4 + work[348]);
-    const double t711 = coef[29] * y4;
-    const double t712 = t711 + coef[2] * y1;
-    work[502] = x3 * t710 + (x5 * t712 + work[433]);
-    const double t714 = work[434] + (work[353] + coef[30] * x4);
-    work[475] = coef[29] * x4;
-    const double t716 = coef[2] * x1 + work[475];
-    work[498] = y3 * t714 + (y5 * t716 + work[435]);
-    const double t718 = x3 * work[365];
-    const double t719 = coef[27] * x4 + coef[1] * x1;
-    const double t720 = x5 * t719;
-    work[501] = t718 + (t701 + (t720 + t704));
-    work[504] = y3 * t706 + (y5 * t708 + work[436]);
-    work[497] = z3 * t714 + (z5 * t716 + work[437]);
-    work[500] = z3 * t710 + (z5 * t712 + work[438]);
-    work[503] = t718 + (t700 + (t720 + (coef[0] + t703)));
-    const double t726 = (work[423] - work[439]) * work[418] + 2.0 * (work[440] * t675) - t680;
-    const double t727 = x4 * work[417];
-    const double t728 = (t727 + t673) * work[418] + 2.0 * (work[440] * t681);
-    const double t729 = 0.5 * x4;
-    const double t730 = t729 + (2.0 * (work[440] * t677) - (work[441] + work[442]) * work[418]);
-    const double t731 = work[414] * work[415] * work[418];
-    const double t732 = 0.5 * work[417];
-    const double t733 = t678 + (2.0 * (work[444] * t675) - (work[445] + work[420]) * work[418]);
-    const double t734 = (t727 + t672) * work[418] + 2.0 * (work[444] * t677);
-    const double t735 = (work[442] - work[446]) * work[418] + 2.0 * (work[444] * t681) - t729;
-    const double t736 = spin_chain5_phi1(work[448]);
-    work[489] = work[97] * t736;
-    work[510] = 0.5 * y5;
-    work[481] = (work[449] - work[450]) * work[451] + 2.0 * (work[452] * work[489]) - work[510];
-    work[508] = y5 * work[453];
-    work[492] = z5 * work[97];
-    work[495] = work[454] * t736;
-    work[483] = (work[508] + work[492]) * work[451] + 2.0 * (work[452] * work[495]);
-    work[496] = 0.5 * z5;
-    work[493] = work[453] * t736;
-    work[484] = work[496] + (2.0 * (work[452] * work[493]) - (work[455] + work[456]) * work[451]);
-    work[487] = z1 * work[471] + z4 * t719;
-    work[485] = y1 * work[78];
-    work[476] = z1 * work[472];
-    work[486] = y4 * t711;
-    work[477] = coef[31] + z4 * t707;
-    work[506] = work[485] + (work[476] + (work[486] + work[477]));
-    work[482] = y4 * t719 + y1 * work[471];
-    work[478] = work[454] * work[453] * work[451];
-    work[479] = 0.5 * work[97];
-    work[480] = z1 * work[474] + z4 * t702;
-    jacobian[109] = work[306] * work[371] + (work[303] * work[372] + work[300] * work[373]);
-    jacobian[110] = work[307] * work[371] + (work[304] * work[372] + work[301] * work[373]);
-    jacobian[111] = work[374] + work[375] + (work[376] * work[371] + (work[377] * work[372] + work[378] * work[373]));
-    jacobian[112] = 1.0 + (work[379] * work[371] + (work[380] * work[372] + work[377] * work[373]) - (work[381] + work[339]) * work[330]);
-    jacobian[114] = work[382] * work[371] + (work[383] * work[372] + work[384] * work[373]);
-    jacobian[115] = work[385] * work[371] + (work[386] * work[372] + work[387] * work[373]);
-    jacobian[116] = work[388] * work[371] + (work[389] * work[372] + work[390] * work[373]);
-    jacobian[117] = work[391] * work[371] + (work[392] * work[372] + work[393] * work[373]);
-    jacobian[118] = work[394] * work[371] + (work[395] * work[372] + work[396] * work[373]);
-    jacobian[119] = work[397] * work[371] + (work[398] * work[372] + work[399] * work[373]);
-    jacobian[113] = t667 - t668 + (work[400] * work[371] + (work[379] * work[372] + work[376] * work[373]));
-    jacobian[120] = work[203] * t669 + (work[200] * t670 + work[197] * t671);
-    jacobian[121] = work[202] * t669 + (work[199] * t670 + work[196] * t671);
-    jacobian[122] = work[201] * t669 + (work[198] * t670 + work[195] * t671);
-    jacobian[123] = work[305] * t669 + (work[299] * t671 + work[302] * t670);
-    jacobian[124] = work[306] * t669 + (work[303] * t670 + work[300] * t671);
-    jacobian[125] = work[307] * t669 + (work[301] * t671 + work[304] * t670);
-    jacobian[126] = work[411] - work[412] + (work[376] * t669 + (work[378] * t671 + work[377] * t670));
-    jacobian[127] = t668 + t667 + (work[379] * t669 + (work[377] * t671 + work[380] * t670));
-    jacobian[128] = 1.0 + (work[400] * t669 + (work[376] * t671 + work[379] * t670) - work[413] * work[330]);
-    jacobian[129] = work[382] * t669 + (work[384] * t671 + work[383] * t670);
-    jacobian[130] = work[385] * t669 + (work[387] * t671 + work[386] * t670);
-    jacobian[131] = work[388] * t669 + (work[389] * t670 + work[390] * t671);
-    jacobian[132] = work[391] * t669 + (work[392] * t670 + work[393] * t671);
-    jacobian[133] = work[394] * t669 + (work[395] * t670 + work[396] * t671);
-    jacobian[134] = work[397] * t669 + (work[398] * t670 + work[399] * t671);
-    jacobian[135] = work[206] * t676 + (work[212] * t679 + work[209] * t682);
-    jacobian[136] = work[205] * t676 + (work[211] * t679 + work[208] * t682);
-    jacobian[137] = work[204] * t676 + (work[210] * t679 + work[207] * t682);
-    jacobian[138] = work[308] * t676 + (work[311] * t682 + work[314] * t679);
-    jacobian[139] = work[309] * t676 + (work[315] * t679 + work[312] * t682);
-    jacobian[140] = work[310] * t676 + (work[313] * t682 + work[316] * t679);
-    jacobian[141] = work[384] * t676 + (work[387] * t682 + work[390] * t679);
-    jacobian[142] = work[383] * t676 + (work[389] * t679 + work[386] * t682);
-    jacobian[143] = work[382] * t676 + (work[385] * t682 + work[388] * t679);
-    increment_jacobian[159] = z4 * t687 - x4 * work[514] - work[415];
-    jacobian[144] = 1.0 + (t687 * t676 + (work[514] * t679 + work[515] * t682) - (work[427] + work[428]) * work[418]);
-    increment_jacobian[174] = x4 * work[515] - y4 * t687 + work[414];
-    jacobian[145] = t691 - t692 + (work[515] * t676 + (work[516] * t679 + t696 * t682));
-    increment_jacobian[145] = y4 * work[516] - z4 * t696 + work[415];
-    increment_jacobian[175] = x4 * t696 - y4 * work[515] - work[417];
-    jacobian[146] = t697 + t698 + (work[514] * t676 + (t699 * t679 + work[516] * t682));
-    increment_jacobian[146] = y4 * t699 - z4 * work[516] - work[414];
-    increment_jacobian[161] = z4 * work[514] - x4 * t699 + work[417];
-    increment_jacobian[162] = z4 * work[499] - x4 * work[505];
-    jacobian[147] = work[499] * t676 + (work[505] * t679 + work[502] * t682);
-    increment_jacobian[147] = y4 * work[505] - z4 * work[502];
-    increment_jacobian[177] = x4 * work[502] - y4 * work[499];
-    increment_jacobian[219] = x5 * work[498] - y5 * work[499];
-    increment_jacobian[178] = x4 * work[501] - y4 * work[498];
-    increment_jacobian[220] = x5 * work[501] - y5 * work[502];
-    jacobian[148] = work[498] * t676 + (work[501] * t682 + work[504] * t679);
-    increment_jacobian[148] = y4 * work[504] - z4 * work[501];
-    increment_jacobian[163] = z4 * work[498] - x4 * work[504];
-    increment_jacobian[221] = x5 * work[504] - y5 * work[505];
-    increment_jacobian[189] = y5 * work[497] - z5 * work[498];
-    increment_jacobian[204] = z5 * work[499] - x5 * work[497];
-    increment_jacobian[179] = x4 * work[500] - y4 * work[497];
-    increment_jacobian[190] = y5 * work[500] - z5 * work[501];
-    increment_jacobian[205] = z5 * work[502] - x5 * work[500];
-    jacobian[149] = work[497] * t676 + (work[500] * t682 + work[503] * t679);
-    increment_jacobian[149] = y4 * work[503] - z4 * work[500];
-    increment_jacobian[164] = z4 * work[497] - x4 * work[503];
-    increment_jacobian[191] = y5 * work[503] - z5 * work[504];
-    increment_jacobian[206] = z5 * work[505] - x5 * work[503];
-    jacobian[150] = work[206] * t726 + (work[209] * t728 + work[212] * t730);
-    jacobian[151] = work[205] * t726 + (work[208] * t728 + work[211] * t730);
-    jacobian[152] = work[204] * t726 + (work[207] * t728 + work[210] * t730);
-    jacobian[153] = work[308] * t726 + (work[311] * t728 + work[314] * t730);
-    jacobian[154] = work[309] * t726 + (work[312] * t728 + work[315] * t730);
-    jacobian[155] = work[310] * t726 + (work[313] * t728 + work[316] * t730);
-    jacobian[156] = work[384] * t726 + (work[387] * t728 + work[390] * t730);
-    jacobian[157] = work[383] * t726 + (work[386] * t728 + work[389] * t730);
-    jacobian[158] = work[382] * t726 + (work[385] * t728 + work[388] * t730);
-    jacobian[159] = t692 + t691 + (t687 * t726 + (work[515] * t728 + work[514] * t730));
-    jacobian[160] = 1.0 + (work[515] * t726 + (t696 * t728 + work[516] * t730) - (work[427] + work[443]) * work[418]);
-    jacobian[162] = work[499] * t726 + (work[502] * t728 + work[505] * t730);
-    jacobian[163] = work[498] * t726 + (work[501] * t728 + work[504] * t730);
-    jacobian[164] = work[497] * t726 + (work[500] * t728 + work[503] * t730);
-    jacobian[161] = t731 - t732 + (work[514] * t726 + (work[516] * t728 + t699 * t730));
-    jacobian[165] = work[206] * t733 + (work[212] * t734 + work[209] * t735);
-    jacobian[166] = work[205] * t733 + (work[211] * t734 + work[208] * t735);
-    jacobian[167] = work[204] * t733 + (work[210] * t734 + work[207] * t735);
-    jacobian[168] = work[308] * t733 + (work[314] * t734 + work[311] * t735);
-    jacobian[169] = work[309] * t733 + (work[315] * t734 + work[312] * t735);
-    jacobian[170] = work[310] * t733 + (work[316] * t734 + work[313] * t735);
-    jacobian[171] = work[384] * t733 + (work[390] * t734 + work[387] * t735);
-    jacobian[172] = work[383] * t733 + (work[389] * t734 + work[386] * t735);
-    jacobian[173] = work[382] * t733 + (work[388] * t734 + work[385] * t735);
-    jacobian[174] = t698 - t697 + (t687 * t733 + (work[514] * t734 + work[515] * t735));
-    jacobian[175] = t732 + t731 + (work[515] * t733 + (work[516] * t734 + t696 * t735));
-    jacobian[176] = 1.0 + (work[514] * t733 + (t699 * t734 + work[516] * t735) - work[447] * work[418]);
-    jacobian[177] = work[499] * t733 + (work[505] * t734 + work[502] * t735);
-    jacobian[178] = work[498] * t733 + (work[504] * t734 + work[501] * t735);
-    jacobian[179] = work[497] * t733 + (work[503] * t734 + work[500] * t735);
-    jacobian[180] = work[457] * work[481] + (work[458] * work[483] + work[459] * work[484]);
-    jacobian[181] = work[460] * work[481] + (work[461] * work[483] + work[462] * work[484]);
-    jacobian[182] = work[463] * work[481] + (work[153] * work[483] + work[464] * work[484]);
-    jacobian[183] = work[465] * work[481] + (work[267] * work[483] + work[466] * work[484]);
-    jacobian[184] = work[467] * work[481] + (work[269] * work[483] + work[468] * work[484]);
-    jacobian[185] = work[469] * work[481] + (work[271] * work[483] + work[470] * work[484]);
-    jacobian[186] = work[399] * work[481] + (work[393] * work[483] + work[396] * work[484]);
-    jacobian[187] = work[398] * work[481] + (work[392] * work[483] + work[395] * work[484]);
-    jacobian[188] = work[397] * work[481] + (work[391] * work[483] + work[394] * work[484]);
-    jacobian[189] = work[497] * work[481] + (work[499] * work[483] + work[498] * work[484]);
-    jacobian[190] = work[500] * work[481] + (work[502] * work[483] + work[501] * work[484]);
-    jacobian[191] = work[503] * work[481] + (work[505] * work[483] + work[504] * work[484]);
-    increment_jacobian[207] = z5 * work[506] - x5 * work[487] - work[97];
-    jacobian[192] = 1.0 + (work[487] * work[481] + (work[506] * work[483] + work[482] * work[484]) - (work[96] + work[473]) * work[451]);
-    increment_jacobian[222] = x5 * work[482] - y5 * work[506] + work[453];
+    (void)displacement, (void)increment;
+    const double x1 = y[0], y1 = y[1], z1 = y[2], x3 = y[6], y3 = y[7], z3 = y[8], x4 = y[9], y4 = y[10], z4 =
+        y[11], x5 = y[12], y5 = y[13], z5 = y[14];
+    const double t1 = work[86] * work[330] * work[328], t2 = 0.5 * work[331];
+    const double t3 = (work[395] + work[396]) * work[328] + 2.0 * (work[397] * work[398]);
+    const double t4 = (work[363] - work[399]) * work[328] + 2.0 * (work[397] * work[400]) - work[401];
+    const double t5 = work[402] + (2.0 * (work[397] * work[403]) - (work[404] + work[326]) * work[328]);
+    const double t6 = y4 * work[94], t7 = z4 * work[92], t8 = spin_chain5_phi1(work[408]);
+    const double t9 = work[90] * t8, t10 = (t6 + t7) * work[87] + 2.0 * (work[88] * t9);
+    const double t11 = work[92] * t8, t12 = 0.5 * y4;
+    const double t13 = (work[93] - work[409]) * work[87] + 2.0 * (work[88] * t11) - t12;
+    const double t14 = 0.5 * z4, t15 = work[94] * t8;
+    const double t16 = t14 + (2.0 * (work[88] * t15) - (work[410] + work[91]) * work[87]);
+    const double t17 = y3 * work[411], t18 = z3 * work[412], t19 = y5 * (coef[29] * y5);
+    const double t20 = coef[28] + z5 * (coef[29] * z5), t21 = t17 + (t18 + (t19 + t20));
+    const double t22 = coef[27] * x5 + coef[22] * x3;
+    work[502] = z3 * work[413] + z5 * t22;
+    work[503] = y5 * t22 + y3 * work[413];
+    const double t23 = work[94] * work[90] * work[87], t24 = 0.5 * work[92];
+    work[504] = z3 * work[416] + z5 * (coef[22] * y3 + coef[27] * y5);
+    const double t25 = x3 * work[417], t26 = x5 * (coef[29] * x5), t27 = t25 + (t18 + (t26 + t20));
+    const double t28 = 0.5 * work[94], t29 = work[92] * work[90] * work[87];
+    const double t30 = t25 + (t17 + (t26 + (coef[28] + t19))), t31 = y3 * work[358];
+    const double t32 = z3 * work[355], t33 = coef[1] * y1 + coef[27] * y4, t34 = y5 * t33;
+    const double t35 = coef[0] + z5 * (coef[1] * z1 + coef[27] * z4);
+    work[487] = t31 + (t32 + (t34 + t35));
+    const double t36 = work[418] + (work[337] + coef[30] * z4), t37 = coef[29] * z4;
+    const double t38 = coef[2] * z1 + t37;
+    work[493] = x3 * t36 + (x5 * t38 + work[419]);
+    const double t39 = work[420] + (coef[30] * y4 + work[342]), t40 = coef[29] * y4;
+    const double t41 = t40 + coef[2] * y1;
+    work[490] = x3 * t39 + (x5 * t41 + work[421]);
+    const double t42 = work[422] + (work[347] + coef[30] * x4);
+    work[463] = coef[29] * x4;
+    const double t43 = coef[2] * x1 + work[463];
+    work[486] = y3 * t42 + (y5 * t43 + work[423]);
+    const double t44 = x3 * work[359], t45 = coef[27] * x4 + coef[1] * x1, t46 = x5 * t45;
+    work[489] = t44 + (t32 + (t46 + t35));
+    work[492] = y3 * t36 + (y5 * t38 + work[424]);
+    work[485] = z3 * t42 + (z5 * t43 + work[425]);
+    work[488] = z3 * t39 + (z5 * t41 + work[426]);
+    work[491] = t44 + (t31 + (t46 + (coef[0] + t34)));
+    const double t47 = (work[91] - work[427]) * work[87] + 2.0 * (work[428] * t9) - t14;
+    const double t48 = x4 * work[90], t49 = (t48 + t7) * work[87] + 2.0 * (work[428] * t15);
+    const double t50 = 0.5 * x4;
+    const double t51 = t50 + (2.0 * (work[428] * t11) - (work[429] + work[89]) * work[87]);
+    const double t52 = work[94] * work[92] * work[87], t53 = 0.5 * work[90];
+    const double t54 = t12 + (2.0 * (work[431] * t9) - (work[432] + work[93]) * work[87]);
+    const double t55 = (t48 + t6) * work[87] + 2.0 * (work[431] * t11);
+    const double t56 = (work[89] - work[433]) * work[87] + 2.0 * (work[431] * t15) - t50;
+    const double t57 = spin_chain5_phi1(work[435]);
+    work[477] = work[95] * t57;
+    work[498] = 0.5 * y5;
+    work[469] = (work[436] - work[437]) * work[438] + 2.0 * (work[439] * work[477]) - work[498];
+    work[496] = y5 * work[97];
+    work[480] = z5 * work[95];
+    work[483] = work[96] * t57;
+    work[471] = (work[496] + work[480]) * work[438] + 2.0 * (work[439] * work[483]);
+    work[484] = 0.5 * z5;
+    work[481] = work[97] * t57;
+    work[472] = work[484] + (2.0 * (work[439] * work[481]) - (work[440] + work[441]) * work[438]);
+    work[475] = z1 * work[456] + z4 * t45;
+    work[473] = y1 * work[457];
+    work[464] = z1 * work[458];
+    work[474] = y4 * t40;
+    work[465] = coef[31] + z4 * t37;
+    work[494] = work[473] + (work[464] + (work[474] + work[465]));
+    work[470] = y4 * t45 + y1 * work[456];
+    work[466] = work[96] * work[97] * work[438];
+    work[467] = 0.5 * work[95];
+    work[468] = z1 * work[461] + z4 * t33;
+    jacobian[109] = work[305] * work[365] + (work[302] * work[366] + work[299] * work[367]);
+    jacobian[110] = work[306] * work[365] + (work[303] * work[366] + work[300] * work[367]);
+    jacobian[111] = work[368] + work[369] + (work[370] * work[365] + (work[371] * work[366] + work[372]
+        * work[367]));
+    jacobian[112] = 1.0 + (work[373] * work[365] + (work[374] * work[366] + work[371] * work[367])
+        - (work[375] + work[334]) * work[328]);
+    jacobian[114] = work[376] * work[365] + (work[377] * work[366] + work[378] * work[367]);
+    jacobian[115] = work[379] * work[365] + (work[380] * work[366] + work[381] * work[367]);
+    jacobian[116] = work[382] * work[365] + (work[383] * work[366] + work[384] * work[367]);
+    jacobian[117] = work[385] * work[365] + (work[386] * work[366] + work[387] * work[367]);
+    jacobian[118] = work[388] * work[365] + (work[389] * work[366] + work[390] * work[367]);
+    jacobian[119] = work[391] * work[365] + (work[392] * work[366] + work[393] * work[367]);
+    jacobian[113] = t1 - t2 + (work[394] * work[365] + (work[373] * work[366] + work[370] * work[367]));
+    jacobian[120] = work[200] * t3 + (work[197] * t4 + work[194] * t5);
+    jacobian[121] = work[199] * t3 + (work[196] * t4 + work[193] * t5);
+    jacobian[122] = work[198] * t3 + (work[195] * t4 + work[192] * t5);
+    jacobian[123] = work[304] * t3 + (work[298] * t5 + work[301] * t4);
+    jacobian[124] = work[305] * t3 + (work[302] * t4 + work[299] * t5);
+    jacobian[125] = work[306] * t3 + (work[300] * t5 + work[303] * t4);
+    jacobian[126] = work[405] - work[406] + (work[370] * t3 + (work[372] * t5 + work[371] * t4));
+    jacobian[127] = t2 + t1 + (work[373] * t3 + (work[371] * t5 + work[374] * t4));
+    jacobian[128] = 1.0 + (work[394] * t3 + (work[370] * t5 + work[373] * t4) - work[407] * work[328]);
+    jacobian[129] = work[376] * t3 + (work[378] * t5 + work[377] * t4);
+    jacobian[130] = work[379] * t3 + (work[381] * t5 + work[380] * t4);
+    jacobian[131] = work[382] * t3 + (work[383] * t4 + work[384] * t5);
+    jacobian[132] = work[385] * t3 + (work[386] * t4 + work[387] * t5);
+    jacobian[133] = work[388] * t3 + (work[389] * t4 + work[390] * t5);
+    jacobian[134] = work[391] * t3 + (work[392] * t4 + work[393] * t5);
+    jacobian[135] = work[203] * t10 + (work[209] * t13 + work[206] * t16);
+    jacobian[136] = work[202] * t10 + (work[208] * t13 + work[205] * t16);
+    jacobian[137] = work[201] * t10 + (work[207] * t13 + work[204] * t16);
+    jacobian[138] = work[307] * t10 + (work[310] * t16 + work[313] * t13);
+    jacobian[139] = work[308] * t10 + (work[314] * t13 + work[311] * t16);
+    jacobian[140] = work[309] * t10 + (work[312] * t16 + work[315] * t13);
+    jacobian[141] = work[378] * t10 + (work[381] * t16 + work[384] * t13);
+    jacobian[142] = work[377] * t10 + (work[383] * t13 + work[380] * t16);
+    jacobian[143] = work[376] * t10 + (work[379] * t16 + work[382] * t13);
+    increment_jacobian[159] = z4 * t21 - x4 * work[502] - work[92];
+    jacobian[144] = 1.0 + (t21 * t10 + (work[502] * t13 + work[503] * t16) - (work[414] + work[415])
+        * work[87]);
+    increment_jacobian[174] = x4 * work[503] - y4 * t21 + work[94];
+    jacobian[145] = t23 - t24 + (work[503] * t10 + (work[504] * t13 + t27 * t16));
+    increment_jacobian[145] = y4 * work[504] - z4 * t27 + work[92];
+    increment_jacobian[175] = x4 * t27 - y4 * work[503] - work[90];
+    jacobian[146] = t28 + t29 + (work[502] * t10 + (t30 * t13 + work[504] * t16));
+    increment_jacobian[146] = y4 * t30 - z4 * work[504] - work[94];
+    increment_jacobian[161] = z4 * work[502] - x4 * t30 + work[90];
+    increment_jacobian[162] = z4 * work[487] - x4 * work[493];
+    jacobian[147] = work[487] * t10 + (work[493] * t13 + work[490] * t16);
+    increment_jacobian[147] = y4 * work[493] - z4 * work[490];
+    increment_jacobian[177] = x4 * work[490] - y4 * work[487];
+    increment_jacobian[219] = x5 * work[486] - y5 * work[487];
+    increment_jacobian[178] = x4 * work[489] - y4 * work[486];
+    increment_jacobian[220] = x5 * work[489] - y5 * work[490];
+    jacobian[148] = work[486] * t10 + (work[489] * t16 + work[492] * t13);
+    increment_jacobian[148] = y4 * work[492] - z4 * work[489];
+    increment_jacobian[163] = z4 * work[486] - x4 * work[492];
+    increment_jacobian[221] = x5 * work[492] - y5 * work[493];
+    increment_jacobian[189] = y5 * work[485] - z5 * work[486];
+    increment_jacobian[204] = z5 * work[487] - x5 * work[485];
+    increment_jacobian[179] = x4 * work[488] - y4 * work[485];
+    increment_jacobian[190] = y5 * work[488] - z5 * work[489];
+    increment_jacobian[205] = z5 * work[490] - x5 * work[488];
+    jacobian[149] = work[485] * t10 + (work[488] * t16 + work[491] * t13);
+    increment_jacobian[149] = y4 * work[491] - z4 * work[488];
+    increment_jacobian[164] = z4 * work[485] - x4 * work[491];
+    increment_jacobian[191] = y5 * work[491] - z5 * work[492];
+    increment_jacobian[206] = z5 * work[493] - x5 * work[491];
+    jacobian[150] = work[203] * t47 + (work[206] * t49 + work[209] * t51);
+    jacobian[151] = work[202] * t47 + (work[205] * t49 + work[208] * t51);
+    jacobian[152] = work[201] * t47 + (work[204] * t49 + work[207] * t51);
+    jacobian[153] = work[307] * t47 + (work[310] * t49 + work[313] * t51);
+    jacobian[154] = work[308] * t47 + (work[311] * t49 + work[314] * t51);
+    jacobian[155] = work[309] * t47 + (work[312] * t49 + work[315] * t51);
+    jacobian[156] = work[378] * t47 + (work[381] * t49 + work[384] * t51);
+    jacobian[157] = work[377] * t47 + (work[380] * t49 + work[383] * t51);
+    jacobian[158] = work[376] * t47 + (work[379] * t49 + work[382] * t51);
+    jacobian[159] = t24 + t23 + (t21 * t47 + (work[503] * t49 + work[502] * t51));
+    jacobian[160] = 1.0 + (work[503] * t47 + (t27 * t49 + work[504] * t51) - (work[414] + work[430])
+        * work[87]);
+    jacobian[162] = work[487] * t47 + (work[490] * t49 + work[493] * t51);
+    jacobian[163] = work[486] * t47 + (work[489] * t49 + work[492] * t51);
+    jacobian[164] = work[485] * t47 + (work[488] * t49 + work[491] * t51);
+    jacobian[161] = t52 - t53 + (work[502] * t47 + (work[504] * t49 + t30 * t51));
+    jacobian[165] = work[203] * t54 + (work[209] * t55 + work[206] * t56);
+    jacobian[166] = work[202] * t54 + (work[208] * t55 + work[205] * t56);
+    jacobian[167] = work[201] * t54 + (work[207] * t55 + work[204] * t56);
+    jacobian[168] = work[307] * t54 + (work[313] * t55 + work[310] * t56);
+    jacobian[169] = work[308] * t54 + (work[314] * t55 + work[311] * t56);
+    jacobian[170] = work[309] * t54 + (work[315] * t55 + work[312] * t56);
+    jacobian[171] = work[378] * t54 + (work[384] * t55 + work[381] * t56);
+    jacobian[172] = work[377] * t54 + (work[383] * t55 + work[380] * t56);
+    jacobian[173] = work[376] * t54 + (work[382] * t55 + work[379] * t56);
+    jacobian[174] = t29 - t28 + (t21 * t54 + (work[502] * t55 + work[503] * t56));
+    jacobian[175] = t53 + t52 + (work[503] * t54 + (work[504] * t55 + t27 * t56));
+    jacobian[176] = 1.0 + (work[502] * t54 + (t30 * t55 + work[504] * t56) - work[434] * work[87]);
+    jacobian[177] = work[487] * t54 + (work[493] * t55 + work[490] * t56);
+    jacobian[178] = work[486] * t54 + (work[492] * t55 + work[489] * t56);
+    jacobian[179] = work[485] * t54 + (work[491] * t55 + work[488] * t56);
+    jacobian[180] = work[442] * work[469] + (work[443] * work[471] + work[444] * work[472]);
+    jacobian[181] = work[445] * work[469] + (work[446] * work[471] + work[447] * work[472]);
+    jacobian[182] = work[448] * work[469] + (work[150] * work[471] + work[449] * work[472]);
+    jacobian[183] = work[450] * work[469] + (work[266] * work[471] + work[451] * work[472]);
+    jacobian[184] = work[452] * work[469] + (work[268] * work[471] + work[453] * work[472]);
+    jacobian[185] = work[454] * work[469] + (work[270] * work[471] + work[455] * work[472]);
+    jacobian[186] = work[393] * work[469] + (work[387] * work[471] + work[390] * work[472]);
+    jacobian[187] = work[392] * work[469] + (work[386] * work[471] + work[389] * work[472]);
+    jacobian[188] = work[391] * work[469] + (work[385] * work[471] + work[388] * work[472]);
+    jacobian[189] = work[485] * work[469] + (work[487] * work[471] + work[486] * work[472]);
+    jacobian[190] = work[488] * work[469] + (work[490] * work[471] + work[489] * work[472]);
+    jacobian[191] = work[491] * work[469] + (work[493] * work[471] + work[492] * work[472]);
+    increment_jacobian[207] = z5 * work[494] - x5 * work[475] - work[95];
+    jacobian[192] = 1.0 + (work[475] * work[469] + (work[494] * work[471] + work[470] * work[472])
+        - (work[459] + work[460]) * work[438]);
+    increment_jacobian[222] = x5 * work[470] - y5 * work[494] + work[97];
 }
 
 /* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
    increment, all with the momenta p = grad S_h(y) (part 7 of 7) */
 spin_chain5_APART static void spin_chain5_linearise_part7(const double coef[33], const double y[15],
-                                                          double displacement[restrict 15],
-                                                          double increment[restrict 15],
-                                                          double jacobian[restrict 225],
-                                                          double increment_jacobian[restrict 225],
-                                                          double work[restrict 517])
+    double displacement[restrict 15], double increment[restrict 15], double jacobian[restrict 225],
+    double increment_jacobian[restrict 225], double work[restrict 505])
 {
-    (void)displacement;
-    (void)increment;
-    const double x1 = y[0];
-    const double y1 = y[1];
-    const double z1 = y[2];
-    const double x2 = y[3];
-    const double y2 = y[4];
-    const double z2 = y[5];
-    const double x3 = y[6];
-    const double y3 = y[7];
-    const double z3 = y[8];
-    const double x4 = y[9];
-    const double y4 = y[10];
-    const double z4 = y[11];
-    const double x5 = y[12];
-    const double y5 = y[13];
-    const double z5 = y[14];
-    const double t757 = x1 * work[95];
-    const double t758 = x4 * work[475];
-    const double t759 = t757 + (work[476] + (t758 + work[477]));
-    const double t760 = 0.5 * work[453];
-    const double t761 = work[97] * work[454] * work[451];
-    const double t762 = t757 + (work[485] + (t758 + (coef[31] + work[486])));
-    const double t763 = 0.5 * x5;
-    const double t764 = t763 + (2.0 * (work[488] * work[489]) - (work[490] + work[491]) * work[451]);
-    const double t765 = x5 * work[454];
-    const double t766 = (t765 + work[492]) * work[451] + 2.0 * (work[488] * work[493]);
-    const double t767 = (work[456] - work[494]) * work[451] + 2.0 * (work[488] * work[495]) - work[496];
-    const double t768 = work[97] * work[453] * work[451];
-    const double t769 = 0.5 * work[454];
-    const double t770 = (t765 + work[508]) * work[451] + 2.0 * (work[509] * work[489]);
-    const double t771 = work[510] + (2.0 * (work[509] * work[495]) - (work[511] + work[449]) * work[451]);
-    const double t772 = (work[491] - work[512]) * work[451] + 2.0 * (work[509] * work[493]) - t763;
-    const double t773 = y1 * work[180];
-    const double t774 = z1 * work[181];
-    const double t775 = x1 * work[183];
-    const double t776 = y2 * work[295];
-    const double t777 = z2 * work[294];
-    const double t778 = x2 * work[297];
-    const double t779 = y3 * work[376];
-    const double t780 = z3 * work[377];
-    const double t781 = x3 * work[379];
-    const double t782 = y4 * work[514];
-    const double t783 = z4 * work[515];
-    const double t784 = x4 * work[516];
-    const double t785 = y5 * work[487];
-    const double t786 = z5 * work[482];
-    const double t787 = x5 * work[480];
-    jacobian[193] = work[478] - work[479] + (work[480] * work[481] + (work[482] * work[483] + t759 * work[484]));
-    increment_jacobian[193] = y5 * work[480] - z5 * t759 + work[97];
-    increment_jacobian[223] = x5 * t759 - y5 * work[482] - work[454];
-    jacobian[194] = t760 + t761 + (t762 * work[481] + (work[487] * work[483] + work[480] * work[484]));
-    increment_jacobian[194] = y5 * t762 - z5 * work[480] - work[453];
-    increment_jacobian[209] = z5 * work[487] - x5 * t762 + work[454];
-    jacobian[195] = work[457] * t764 + (work[459] * t766 + work[458] * t767);
-    jacobian[196] = work[460] * t764 + (work[462] * t766 + work[461] * t767);
-    jacobian[197] = work[463] * t764 + (work[464] * t766 + work[153] * t767);
-    jacobian[198] = work[465] * t764 + (work[466] * t766 + work[267] * t767);
-    jacobian[199] = work[467] * t764 + (work[468] * t766 + work[269] * t767);
-    jacobian[200] = work[469] * t764 + (work[470] * t766 + work[271] * t767);
-    jacobian[201] = work[399] * t764 + (work[396] * t766 + work[393] * t767);
-    jacobian[202] = work[398] * t764 + (work[395] * t766 + work[392] * t767);
-    jacobian[203] = work[397] * t764 + (work[394] * t766 + work[391] * t767);
-    jacobian[204] = work[497] * t764 + (work[498] * t766 + work[499] * t767);
-    jacobian[205] = work[500] * t764 + (work[501] * t766 + work[502] * t767);
-    jacobian[206] = work[503] * t764 + (work[504] * t766 + work[505] * t767);
-    jacobian[207] = work[479] + work[478] + (work[487] * t764 + (work[482] * t766 + work[506] * t767));
-    jacobian[208] = 1.0 + (work[480] * t764 + (t759 * t766 + work[482] * t767) - (work[507] + work[96]) * work[451]);
-    jacobian[209] = t768 - t769 + (t762 * t764 + (work[480] * t766 + work[487] * t767));
-    jacobian[210] = work[457] * t770 + (work[458] * t771 + work[459] * t772);
-    jacobian[211] = work[460] * t770 + (work[462] * t772 + work[461] * t771);
-    jacobian[212] = work[463] * t770 + (work[464] * t772 + work[153] * t771);
-    jacobian[213] = work[465] * t770 + (work[267] * t771 + work[466] * t772);
-    jacobian[214] = work[467] * t770 + (work[468] * t772 + work[269] * t771);
-    jacobian[215] = work[469] * t770 + (work[470] * t772 + work[271] * t771);
-    jacobian[216] = work[399] * t770 + (work[396] * t772 + work[393] * t771);
-    jacobian[217] = work[398] * t770 + (work[395] * t772 + work[392] * t771);
-    jacobian[218] = work[397] * t770 + (work[394] * t772 + work[391] * t771);
-    jacobian[219] = work[497] * t770 + (work[499] * t771 + work[498] * t772);
-    jacobian[220] = work[500] * t770 + (work[501] * t772 + work[502] * t771);
-    jacobian[221] = work[503] * t770 + (work[504] * t772 + work[505] * t771);
-    jacobian[222] = t761 - t760 + (work[487] * t770 + (work[482] * t772 + work[506] * t771));
-    jacobian[223] = t769 + t768 + (work[480] * t770 + (work[482] * t771 + t759 * t772));
-    jacobian[224] = 1.0 + (t762 * t770 + (work[487] * t771 + work[480] * t772) - work[513] * work[451]);
-    increment_jacobian[0] = t773 - t774;
-    increment_jacobian[16] = t774 - t775;
-    increment_jacobian[32] = t775 - t773;
-    increment_jacobian[48] = t776 - t777;
-    increment_jacobian[64] = t777 - t778;
-    increment_jacobian[80] = t778 - t776;
-    increment_jacobian[96] = t779 - t780;
-    increment_jacobian[112] = t780 - t781;
-    increment_jacobian[128] = t781 - t779;
-    increment_jacobian[144] = t782 - t783;
-    increment_jacobian[160] = t783 - t784;
-    increment_jacobian[176] = t784 - t782;
-    increment_jacobian[192] = t785 - t786;
-    increment_jacobian[208] = t786 - t787;
-    increment_jacobian[224] = t787 - t785;
+    (void)displacement, (void)increment;
+    const double x1 = y[0], y1 = y[1], z1 = y[2], x2 = y[3], y2 = y[4], z2 = y[5], x3 = y[6], y3 = y[7], z3 =
+        y[8], x4 = y[9], y4 = y[10], z4 = y[11], x5 = y[12], y5 = y[13], z5 = y[14];
+    const double t1 = x1 * work[462], t2 = x4 * work[463], t3 = t1 + (work[464] + (t2 + work[465]));
+    const double t4 = 0.5 * work[97], t5 = work[95] * work[96] * work[438];
+    const double t6 = t1 + (work[473] + (t2 + (coef[31] + work[474]))), t7 = 0.5 * x5;
+    const double t8 = t7 + (2.0 * (work[476] * work[477]) - (work[478] + work[479]) * work[438]);
+    const double t9 = x5 * work[96];
+    const double t10 = (t9 + work[480]) * work[438] + 2.0 * (work[476] * work[481]);
+    const double t11 = (work[441] - work[482]) * work[438] + 2.0 * (work[476] * work[483]) - work[484];
+    const double t12 = work[95] * work[97] * work[438], t13 = 0.5 * work[96];
+    const double t14 = (t9 + work[496]) * work[438] + 2.0 * (work[497] * work[477]);
+    const double t15 = work[498] + (2.0 * (work[497] * work[483]) - (work[499] + work[436]) * work[438]);
+    const double t16 = (work[479] - work[500]) * work[438] + 2.0 * (work[497] * work[481]) - t7;
+    const double t17 = y1 * work[177], t18 = z1 * work[178], t19 = x1 * work[180];
+    const double t20 = y2 * work[294], t21 = z2 * work[293], t22 = x2 * work[296];
+    const double t23 = y3 * work[370], t24 = z3 * work[371], t25 = x3 * work[373];
+    const double t26 = y4 * work[502], t27 = z4 * work[503], t28 = x4 * work[504];
+    const double t29 = y5 * work[475], t30 = z5 * work[470], t31 = x5 * work[468];
+    jacobian[193] = work[466] - work[467] + (work[468] * work[469] + (work[470] * work[471] + t3
+        * work[472]));
+    increment_jacobian[193] = y5 * work[468] - z5 * t3 + work[95];
+    increment_jacobian[223] = x5 * t3 - y5 * work[470] - work[96];
+    jacobian[194] = t4 + t5 + (t6 * work[469] + (work[475] * work[471] + work[468] * work[472]));
+    increment_jacobian[194] = y5 * t6 - z5 * work[468] - work[97];
+    increment_jacobian[209] = z5 * work[475] - x5 * t6 + work[96];
+    jacobian[195] = work[442] * t8 + (work[444] * t10 + work[443] * t11);
+    jacobian[196] = work[445] * t8 + (work[447] * t10 + work[446] * t11);
+    jacobian[197] = work[448] * t8 + (work[449] * t10 + work[150] * t11);
+    jacobian[198] = work[450] * t8 + (work[451] * t10 + work[266] * t11);
+    jacobian[199] = work[452] * t8 + (work[453] * t10 + work[268] * t11);
+    jacobian[200] = work[454] * t8 + (work[455] * t10 + work[270] * t11);
+    jacobian[201] = work[393] * t8 + (work[390] * t10 + work[387] * t11);
+    jacobian[202] = work[392] * t8 + (work[389] * t10 + work[386] * t11);
+    jacobian[203] = work[391] * t8 + (work[388] * t10 + work[385] * t11);
+    jacobian[204] = work[485] * t8 + (work[486] * t10 + work[487] * t11);
+    jacobian[205] = work[488] * t8 + (work[489] * t10 + work[490] * t11);
+    jacobian[206] = work[491] * t8 + (work[492] * t10 + work[493] * t11);
+    jacobian[207] = work[467] + work[466] + (work[475] * t8 + (work[470] * t10 + work[494] * t11));
+    jacobian[208] = 1.0 + (work[468] * t8 + (t3 * t10 + work[470] * t11) - (work[495] + work[459])
+        * work[438]);
+    jacobian[209] = t12 - t13 + (t6 * t8 + (work[468] * t10 + work[475] * t11));
+    jacobian[210] = work[442] * t14 + (work[443] * t15 + work[444] * t16);
+    jacobian[211] = work[445] * t14 + (work[447] * t16 + work[446] * t15);
+    jacobian[212] = work[448] * t14 + (work[449] * t16 + work[150] * t15);
+    jacobian[213] = work[450] * t14 + (work[266] * t15 + work[451] * t16);
+    jacobian[214] = work[452] * t14 + (work[453] * t16 + work[268] * t15);
+    jacobian[215] = work[454] * t14 + (work[455] * t16 + work[270] * t15);
+    jacobian[216] = work[393] * t14 + (work[390] * t16 + work[387] * t15);
+    jacobian[217] = work[392] * t14 + (work[389] * t16 + work[386] * t15);
+    jacobian[218] = work[391] * t14 + (work[388] * t16 + work[385] * t15);
+    jacobian[219] = work[485] * t14 + (work[487] * t15 + work[486] * t16);
+    jacobian[220] = work[488] * t14 + (work[489] * t16 + work[490] * t15);
+    jacobian[221] = work[491] * t14 + (work[492] * t16 + work[493] * t15);
+    jacobian[222] = t5 - t4 + (work[475] * t14 + (work[470] * t16 + work[494] * t15));
+    jacobian[223] = t13 + t12 + (work[468] * t14 + (work[470] * t15 + t3 * t16));
+    jacobian[224] = 1.0 + (t6 * t14 + (work[475] * t15 + work[468] * t16) - work[501] * work[438]);
+    increment_jacobian[0] = t17 - t18;
+    increment_jacobian[16] = t18 - t19;
+    increment_jacobian[32] = t19 - t17;
+    increment_jacobian[48] = t20 - t21;
+    increment_jacobian[64] = t21 - t22;
+    increment_jacobian[80] = t22 - t20;
+    increment_jacobian[96] = t23 - t24;
+    increment_jacobian[112] = t24 - t25;
+    increment_jacobian[128] = t25 - t23;
+    increment_jacobian[144] = t26 - t27;
+    increment_jacobian[160] = t27 - t28;
+    increment_jacobian[176] = t28 - t26;
+    increment_jacobian[192] = t29 - t30;
+    increment_jacobian[208] = t30 - t31;
+    increment_jacobian[224] = t31 - t29;
 }
 
 /* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
    increment, all with the momenta p = grad S_h(y) */
 static void spin_chain5_linearise(const double coef[33], const double y[15], double displacement[restrict 15],
-                                  double increment[restrict 15], double jacobian[restrict 225],
-                                  double increment_jacobian[restrict 225])
+    double increment[restrict 15], double jacobian[restrict 225], double increment_jacobian[restrict 225])
 {
-    double work[517];
+    double work[505];
     spin_chain5_linearise_part1(coef, y, displacement, increment, jacobian, increment_jacobian, work);
     spin_chain5_linearise_part2(coef, y, displacement, increment, jacobian, increment_jacobian, work);
     spin_chain5_linearise_part3(coef, y, displacement, increment, jacobian, increment_jacobian, work);
@@ -1680,767 +1456,322 @@ static void spin_chain5_linearise(const double coef[33], const double y[15], dou
     spin_chain5_linearise_part7(coef, y, displacement, increment, jacobian, increment_jacobian, work);
 }
 
-/* Solve matrix * solution = side, both overwritten, by elimination with partial pivoting. 0 if singular. */
-static int spin_chain5_solve(double matrix[225], double side[15])
-{
-    for (int k = 0; k < 15; ++k) {
-        int best = k;
-        for (int i = k + 1; i < 15; ++i)
-            if (fabs(matrix[i * 15 + k]) > fabs(matrix[best * 15 + k])) best = i;
-        const double pivot = matrix[best * 15 + k];
-        if (!(fabs(pivot) > 0.0)) return 0;
-        for (int j = k; j < 15 && best != k; ++j) {
-            const double swap = matrix[k * 15 + j];
-            matrix[k * 15 + j] = matrix[best * 15 + j];
-            matrix[best * 15 + j] = swap;
-        }
-        const double swap = side[k];
-        side[k] = side[best];
-        side[best] = swap;
-        for (int i = k + 1; i < 15; ++i) {
-            const double factor = matrix[i * 15 + k] / pivot;
-            for (int j = k + 1; j < 15; ++j) matrix[i * 15 + j] -= factor * matrix[k * 15 + j];
-            side[i] -= factor * side[k];
-        }
-    }
-    for (int i = 15 - 1; i >= 0; --i) {
-        for (int j = i + 1; j < 15; ++j) side[i] -= matrix[i * 15 + j] * side[j];
-        side[i] /= matrix[i * 15 + i];
-    }
-    return 1;
-}
-
-/* Whether a guess is where the next values may be. Recurrences that were fitted to little else than rest, near a saddle,
-   may lead anywhere; and far away the equation of a step has solutions that have nothing to do with the motion. */
-static int spin_chain5_near(const double guess[15], const double last[15])
-{
-    double distance = 0.0, size = 0.0;
-    for (int i = 0; i < 15; ++i) {
-        distance += fabs(guess[i] - last[i]);
-        size += fabs(last[i]);
-    }
-    return distance <= 4.0 * size;
-}
-
-/* The guess for the next value (y), from earlier ones; 0 if there is none. */
-static int spin_chain5_predict(const spin_chain5_memory *memory, double value[15])
-{
-    const int last = memory->count - 1;
-    double odd[15] = { 0.0 }, binomial = -1.0;
-    memset(value, 0, 15 * sizeof value[0]);
-    if (memory->fitting) {
-        for (int k = 0; k < memory->terms; k += 2)
-            for (int i = 0; i < 15; ++i) {
-                value[i] += memory->weight[k][i][0] * memory->past[last - k][i];
-                odd[i] += memory->weight[k + 1][i][0] * memory->past[last - 1 - k][i];
-            }
-        for (int i = 0; i < 15; ++i) value[i] += odd[i];
-    } else {
-        for (int k = 0; k < memory->order && k <= last; ++k) {
-            binomial *= -(double)(memory->order - k) / (k + 1);
-            for (int i = 0; i < 15; ++i) value[i] += binomial * memory->past[last - k][i];
-        }
-    }
-    return last >= 0 && spin_chain5_near(value, memory->past[last]);
-}
-
-/* Choose the guess that would have been best for a value that took several iterations. */
-static void spin_chain5_judge(spin_chain5_memory *memory, const double value[15])
-{
-    double row[8 + 1][15], guess[15], least = HUGE_VAL, fitted = HUGE_VAL;
-    const int rows = memory->count < 8 ? memory->count : 8;
-    memcpy(row[0], value, sizeof row[0]);
-    for (int k = 0; k < rows; ++k) memcpy(row[k + 1], memory->past[memory->count - 1 - k], sizeof row[0]);
-    for (int order = 1; order <= rows; ++order) { /* row[0] becomes the backward difference of this order */
-        double size = 0.0;
-        for (int k = 0; k <= rows - order; ++k)
-            for (int i = 0; i < 15; ++i) row[k][i] -= row[k + 1][i];
-        for (int i = 0; i < 15; ++i) size += fabs(row[0][i]);
-        if (size < least) {
-            least = size;
-            memory->order = order;
-        }
-    }
-    memory->fitting = memory->terms > 0;
-    if (memory->fitting && spin_chain5_predict(memory, guess)) {
-        fitted = 0.0;
-        for (int i = 0; i < 15; ++i) fitted += fabs(value[i] - guess[i]);
-    }
-    memory->fitting = memory->terms > 0 && fitted <= least;
-    if (memory->order == 0) memory->order = 1;
-}
-
-/* Make eight columns orthogonal to one, by the multiples of it that are put into r. Where that one is among the eight, those
-   up to it stay as they are, and inverse becomes one over its squared length. The number of rows is even. */
-static void spin_chain5_project(int rows, double (*one)[8], int column, double *inverse, double (*eight)[8], double r[8])
-{
-    double even[8] = { 0.0 }, odd[8] = { 0.0 };
-    for (int i = 0; i < rows; i += 2) {
-        const double entry = one[i][column], next = one[i + 1][column];
-        for (int l = 0; l < 8; ++l) even[l] += entry * eight[i][l];
-        for (int l = 0; l < 8; ++l) odd[l] += next * eight[i + 1][l];
-    }
-    for (int l = 0; l < 8; ++l) even[l] += odd[l];
-    if (one == eight) {
-        *inverse = even[column] > 0.0 ? 1.0 / even[column] : 0.0;
-        memset(even, 0, ((size_t)column + 1) * sizeof even[0]);
-    }
-    for (int l = 0; l < 8; ++l) r[l] = even[l] *= *inverse;
-    for (int i = 0; i < rows; ++i) {
-        const double entry = one[i][column];
-        for (int l = 0; l < 8; ++l) eight[i][l] -= entry * even[l];
-    }
-}
-
-/* By how much recurrences miss the last of these values. */
-static double spin_chain5_missed(const double *value, double (*weight)[8])
-{
-    enum { AHEAD = 8, WINDOW = 40, CHECKS = 8 };
-    double most = 0.0;
-    for (int i = 0; i < CHECKS; ++i) {
-        double guess[8] = { 0.0 };
-        for (int k = 0; k < WINDOW; ++k)
-            for (int l = 0; l < 8; ++l) guess[l] += weight[k][l] * value[i + WINDOW - 1 - k];
-        for (int l = 0; l < AHEAD; ++l) most = fmax(most, fabs(guess[l] - value[i + WINDOW + l]));
-    }
-    return most;
-}
-
-/* Fit the recurrences value[m + l] = sum of weight[k][..][l] * value[m - 1 - k], l = 0 ... 8 - 1, to the history of
-   a component: ridge least squares by modified Gram-Schmidt, the ridge at the level of rounding. Columns are taken in by
-   eights, until they leave next to nothing of the right-hand sides. How many past values are used; 0 if the recurrences do
-   not foresee the last values, which they were not fitted to. */
-static int spin_chain5_train(spin_chain5_memory *memory, int component)
-{
-    enum { AHEAD = 8, WINDOW = 40, ROWS = 56 };
-    double q[WINDOW / 8][ROWS + WINDOW][8], r[WINDOW / 8][WINDOW][8], inverse[WINDOW]; /* eight columns in each part */
-    double right[ROWS + WINDOW][8], weight[WINDOW][8], value[111], largest = 0.0, left = HUGE_VAL;
-    int terms = 0;
-    memset(q, 0, sizeof q);
-    memset(right, 0, sizeof right);
-    memset(weight, 0, sizeof weight);
-    for (int i = 0; i < 111; ++i) {
-        value[i] = memory->past[memory->count - 111 + i][component];
-        if (fabs(value[i]) > largest) largest = fabs(value[i]);
-    }
-    for (int i = 0; i < ROWS; ++i)
-        for (int l = 0; l < AHEAD; ++l) right[i][l] = value[i + WINDOW + l];
-    while (terms < WINDOW && left > 3e-12 * largest) {
-        const int part = terms / 8, rows = ROWS + terms + 8; /* further rows of the ridge are zero in these columns */
-        for (int i = 0; i < ROWS; ++i)
-            for (int l = 0; l < 8; ++l) q[part][i][l] = value[i + WINDOW - 1 - terms - l];
-        for (int l = 0; l < 8; ++l) q[part][ROWS + terms + l][l] = 1e-15 * largest;
-        for (int k = 0; k < terms; ++k) spin_chain5_project(rows, q[k / 8], k % 8, &inverse[k], q[part], r[part][k]);
-        for (int l = 0; l < 8; ++l, ++terms) {
-            spin_chain5_project(rows, q[part], l, &inverse[terms], q[part], r[part][terms]);
-            spin_chain5_project(rows, q[part], l, &inverse[terms], right, weight[terms]);
-        }
-        double sum[8] = { 0.0 };
-        for (int i = 0; i < ROWS; ++i)
-            for (int l = 0; l < 8; ++l) sum[l] += fabs(right[i][l]);
-        left = 0.0;
-        for (int l = 0; l < 8; ++l) left += sum[l] / ROWS;
-    }
-    for (int k = terms - 1; k >= 0; --k)
-        for (int j = k + 1; j < terms; ++j)
-            for (int l = 0; l < 8; ++l) weight[k][l] -= r[j / 8][k][j % 8] * weight[j][l];
-    for (int k = 0; k < WINDOW; ++k) memcpy(memory->weight[k][component], weight[k], AHEAD * sizeof(double));
-    return spin_chain5_missed(value + ROWS, weight) <= 1e-07 * largest ? terms : 0;
-}
-
-/* Drop what is old, if so many values would not fit into the history. */
-static void spin_chain5_make_room(spin_chain5_memory *memory, int values)
-{
-    if (memory->count + values <= 222) return;
-    memmove(memory->past, memory->past + memory->count - 111, 111 * sizeof memory->past[0]);
-    memory->count = 111;
-}
-
-/* Add a value to the history. */
-static void spin_chain5_record(spin_chain5_memory *memory, const double value[15])
-{
-    spin_chain5_make_room(memory, 1);
-    memcpy(memory->past[memory->count++], value, 15 * sizeof value[0]);
-}
-
-/* Fit the recurrence to the last values; with every time, wait longer before it is done again. */
-static void spin_chain5_fit(spin_chain5_memory *memory)
-{
-    int found = 1;
-    memory->terms = 0;
-    for (int i = 0; i < 15 && found; ++i) {
-        const int terms = spin_chain5_train(memory, i);
-        found = terms > 0;
-        if (terms > memory->terms) memory->terms = terms;
-    }
-    if (!found) memory->terms = 0;
-    memory->fitting = found;
-    ++memory->fits;
-    memory->slow = 0;
-    memory->patience = memory->patience < 10000 ? 2 * memory->patience + 150 : 20000;
-}
-
-/* Take in the solved value: what took one iteration needs no better guess. */
-static void spin_chain5_remember(spin_chain5_memory *memory, const double value[15], int iterations)
-{
-    if (iterations > 1) spin_chain5_judge(memory, value);
-    spin_chain5_record(memory, value);
-    memory->slow = iterations > 1 ? memory->slow + 1 : 0;
-    if (memory->slow > memory->patience && memory->count >= 111) spin_chain5_fit(memory);
-}
-
-/* Whether an increment is that of the motion. Where the step is too large, the equation may have been solved by a point far
-   away, at another energy, that has nothing to do with it. */
-static int spin_chain5_plausible(const spin_chain5_solver *s, int stage, const double increment[15])
-{
-    double moved = 0.0, size = 0.0, field[15], middle[15], end[15];
-    for (int i = 0; i < 15; ++i) {
-        moved += fabs(increment[i]);
-        size += fabs(s->x[i]);
-    }
-    if (moved <= 1.5 * size) return 1;
-    spin_chain5_vector_field(&s->params, s->x, field);
-    for (int i = 0; i < 15; ++i) {
-        size += fabs(spin_chain5_fractions[stage] * s->h * field[i]);
-        middle[i] = s->x[i] + 0.5 * increment[i];
-        end[i] = s->x[i] + increment[i];
-    }
-    if (moved <= 1.5 * size) return 1;
-    const double before = spin_chain5_hamiltonian(&s->params, s->x), after = spin_chain5_hamiltonian(&s->params, end);
-    const double scale = fabs(before) + fabs(spin_chain5_hamiltonian(&s->params, middle)) + fabs(after);
-    return fabs(after - before) <= 0.5 * scale;
-}
-
-/* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to its last
-   bit: were it rounded with the change, corrections of one sign would add up to a drift. 0, and x as before, if the
-   sum is not finite. */
-static int spin_chain5_advance(spin_chain5_solver *s, const double change[15], const double correction[15])
-{
-    double x[15], carry[15];
-    for (int i = 0; i < 15; ++i) {
-        const double sum = s->x[i] + change[i], added = sum - s->x[i];
-        const double lost = (s->x[i] - (sum - added)) + (change[i] - added);
-        const double small = lost + (s->carry[i] + correction[i]);
-        x[i] = sum + small;
-        carry[i] = small - (x[i] - sum);
-        if (!isfinite(x[i])) return 0;
-    }
-    memcpy(s->x, x, sizeof x);
-    memcpy(s->carry, carry, sizeof carry);
-    return 1;
-}
-
-/* Size of a correction relative to each component of y, but no finer than 1e-6 of the largest; NaN or infinite if
-   the correction is. */
-static double spin_chain5_size(const double y[15], const double delta[15])
-{
-    double norm = 0.0, size = 0.0;
-    for (int i = 0; i < 15; ++i) norm = fabs(y[i]) > norm ? fabs(y[i]) : norm;
-    for (int i = 0; i < 15; ++i) {
-        const double ratio = fabs(delta[i]) / (fabs(y[i]) + 1e-6 * norm + DBL_MIN);
-        if (!isfinite(ratio)) return ratio;
-        size = ratio > size ? ratio : size;
-    }
-    return size;
-}
-
-/* Solve (y - x) + displacement(y) = 0 for y by Newton's method from the extrapolated guess, and advance. The
-   increment is corrected to first order by the last Newton correction, so that correction costs no evaluation:
-   a correction is accepted when the error that remains after it, quadratic in it, is below 1e-20. */
-static spin_chain5_status spin_chain5_attempt(spin_chain5_solver *s, int stage)
-{
-    const double *coef = s->coef[stage];
-    spin_chain5_memory *memory = &s->memory[stage];
-    double y[15], delta[15], displacement[15], increment[15];
-    double jacobian[225], increment_jacobian[225];
-    if (!spin_chain5_predict(memory, y)) memcpy(y, s->x, sizeof y);
-    double previous = HUGE_VAL;
-    for (int iteration = 0; iteration < 20; ++iteration) {
-        spin_chain5_linearise(coef, y, displacement, increment, jacobian, increment_jacobian);
-        ++s->evaluations;
-        for (int i = 0; i < 15; ++i) delta[i] = ((y[i] - s->x[i]) + displacement[i]) - s->carry[i];
-        const int regular = spin_chain5_solve(jacobian, delta);
-        const double size = spin_chain5_size(y, delta);
-        if (!isfinite(size)) return spin_chain5_NOT_FINITE;
-        if (!regular) return spin_chain5_SINGULAR;
-        for (int i = 0; i < 15; ++i) y[i] -= delta[i];
-        const double growth = size / (previous * previous);
-        const double remaining = size * size * (growth > 1.0 ? growth : 1.0);
-        /* The second test: corrections no longer shrink, the solve has reached the level of rounding. */
-        if (remaining <= 1e-20 || (previous < 1e-8 && size > 0.25 * previous)) {
-            double correction[15] = { 0.0 };
-            for (int i = 0; i < 15; ++i)
-                for (int j = 0; j < 15; ++j) correction[i] -= increment_jacobian[i * 15 + j] * delta[j];
-            if (!spin_chain5_plausible(s, stage, increment)) return spin_chain5_NO_CONVERGENCE;
-            if (!spin_chain5_advance(s, increment, correction)) return spin_chain5_NOT_FINITE;
-            spin_chain5_remember(memory, y, iteration + 1);
-            return spin_chain5_OK;
-        }
-        previous = size;
-    }
-    return spin_chain5_NO_CONVERGENCE;
-}
-
-/* The 1 stages of one step. If one fails, the state is as before the step. */
-static spin_chain5_status spin_chain5_stages(spin_chain5_solver *s)
-{
-    double x[15], carry[15];
-    memcpy(x, s->x, sizeof x);
-    memcpy(carry, s->carry, sizeof carry);
-    for (int stage = 0; stage < 1; ++stage) {
-        spin_chain5_status status = spin_chain5_attempt(s, stage);
-        /* A guess from earlier steps may have misled it: once more without. */
-        if (status != spin_chain5_OK && s->memory[stage].count > 0) {
-            memset(&s->memory[stage], 0, sizeof s->memory[stage]);
-            status = spin_chain5_attempt(s, stage);
-        }
-        if (status != spin_chain5_OK) {
-            memcpy(s->x, x, sizeof x);
-            memcpy(s->carry, carry, sizeof carry);
-            return status;
-        }
-    }
-    return spin_chain5_OK;
-}
-
-/* Whether steps can be made with these parameters: finite, positive where the spec says so, and with finite
-   coefficients for a step so short that it has no part in it. */
-static int spin_chain5_admissible(const spin_chain5_params *params)
-{
-    double coef[33];
-    const double gauge[5] = { 0.0 };
-    if (!(isfinite(params->J))) return 0;
-    spin_chain5_prepare(params, gauge, 1e-100, coef);
-    for (int k = 0; k < 33; ++k)
-        if (!isfinite(coef[k])) return 0;
-    return 1;
-}
-
-/* All of spin_chain5_init but the gauge. The arguments may be parts of *s: they are read before it is written. */
-static spin_chain5_status spin_chain5_start(spin_chain5_solver *s, const spin_chain5_params *params, const double x0[15])
-{
-    if (s == NULL || x0 == NULL) return spin_chain5_BAD_ARGUMENT;
-    const spin_chain5_params own = params != NULL ? *params : spin_chain5_default_params;
-    double x[15];
-    memcpy(x, x0, sizeof x);
-    for (int i = 0; i < 15; ++i)
-        if (!isfinite(x[i])) return spin_chain5_BAD_ARGUMENT;
-    if (!spin_chain5_admissible(&own)) return spin_chain5_BAD_ARGUMENT;
-    memset(s, 0, sizeof *s);
-    memcpy(s->x, x, sizeof s->x);
-    s->params = own;
-    return spin_chain5_OK;
-}
-
 /* the leading error vector pi grad S_3, as a function of the gauge (part 1 of 2) */
 spin_chain5_APART static void spin_chain5_guide_part1(const spin_chain5_params *params, const double gauge[5],
-                                                      const double x[15], double error[restrict 15],
-                                                      double work[restrict 114])
+    const double x[15], double error[restrict 15], double work[restrict 114])
 {
-    const double x1 = x[0];
-    const double y1 = x[1];
-    const double z1 = x[2];
-    const double x2 = x[3];
-    const double y2 = x[4];
-    const double z2 = x[5];
-    const double x3 = x[6];
-    const double y3 = x[7];
-    const double z3 = x[8];
-    const double x4 = x[9];
-    const double y4 = x[10];
-    const double z4 = x[11];
-    const double x5 = x[12];
-    const double y5 = x[13];
-    const double z5 = x[14];
+    const double x1 = x[0], y1 = x[1], z1 = x[2], x2 = x[3], y2 = x[4], z2 = x[5], x3 = x[6], y3 = x[7], z3 =
+        x[8], x4 = x[9], y4 = x[10], z4 = x[11], x5 = x[12], y5 = x[13], z5 = x[14];
     work[25] = params->J * params->J;
     work[33] = (-1.0 / 6.0) * x2;
     work[67] = 1.0 / 3.0 * x5;
-    const double t4 = x2 * (work[33] - work[67]);
-    const double t5 = (-1.0 / 6.0) * (x5 * x5);
-    const double t6 = y5 * y5;
-    work[75] = t5 - 1.0 / 6.0 * t6;
+    const double t1 = x2 * (work[33] - work[67]), t2 = (-1.0 / 6.0) * (x5 * x5), t3 = y5 * y5;
+    work[75] = t2 - 1.0 / 6.0 * t3;
     work[34] = (-1.0 / 6.0) * y2;
     work[68] = 1.0 / 3.0 * y5;
-    const double t10 = y2 * (work[34] - work[68]);
+    const double t4 = y2 * (work[34] - work[68]);
     work[30] = 1.0 / 6.0 * z5;
     work[49] = 1.0 / 6.0 * z2;
     work[5] = work[30] + work[49];
-    const double t14 = x2 * work[5] + x5 * work[5];
-    const double t15 = y2 * work[5] + y5 * work[5];
+    const double t5 = x2 * work[5] + x5 * work[5], t6 = y2 * work[5] + y5 * work[5];
     work[90] = 1.0 / 6.0 * y1;
     work[29] = 1.0 / 6.0 * y3;
-    const double t18 = work[90] + work[29];
+    const double t7 = work[90] + work[29];
     work[99] = (-1.0 / 6.0) * z1;
     work[40] = 1.0 / 6.0 * z3;
-    const double t21 = work[99] - work[40];
+    const double t8 = work[99] - work[40];
     work[88] = 1.0 / 6.0 * x1;
     work[31] = 1.0 / 6.0 * x3;
-    const double t24 = work[88] + work[31];
-    work[46] = gauge[1] * (y2 * (z2 * t18 + y2 * t21) + x2 * (x2 * t21 + z2 * t24));
+    const double t9 = work[88] + work[31];
+    work[46] = gauge[1] * (y2 * (z2 * t7 + y2 * t8) + x2 * (x2 * t8 + z2 * t9));
     work[52] = 1.0 / 6.0 * y4;
-    const double t27 = work[90] + work[52];
-    const double t28 = z5 * t27;
+    const double t10 = work[90] + work[52], t11 = z5 * t10;
     work[39] = 1.0 / 6.0 * z4;
-    const double t30 = work[99] - work[39];
+    const double t12 = work[99] - work[39];
     work[59] = 1.0 / 6.0 * x4;
     work[86] = work[88] + work[59];
-    const double t33 = z5 * work[86];
-    work[74] = gauge[4] * (y5 * (t28 + y5 * t30) + x5 * (t33 + x5 * t30));
+    const double t13 = z5 * work[86];
+    work[74] = gauge[4] * (y5 * (t11 + y5 * t12) + x5 * (t13 + x5 * t12));
     work[6] = 1.0 / 12.0 * x5;
     work[7] = 1.0 / 12.0 * x4;
     work[36] = 1.0 / 6.0 * x2;
     work[47] = work[6] + (work[7] + work[36]);
     work[48] = (-1.0 / 6.0) * z2;
-    const double t40 = work[48] - work[30];
-    work[10] = x1 * t40;
-    const double t42 = work[36] + work[67];
+    const double t14 = work[48] - work[30];
+    work[10] = x1 * t14;
+    const double t15 = work[36] + work[67];
     work[100] = 1.0 / 12.0 * z4;
-    const double t44 = work[48] - work[100];
+    const double t16 = work[48] - work[100];
     work[69] = x5 * z4;
-    const double t46 = 1.0 / 12.0 * work[69];
+    const double t17 = 1.0 / 12.0 * work[69];
     work[70] = x4 * z5;
-    const double t48 = 1.0 / 12.0 * work[70];
-    const double t49 = t46 - t48;
-    work[12] = x3 * t44 + t49;
+    const double t18 = 1.0 / 12.0 * work[70], t19 = t17 - t18;
+    work[12] = x3 * t16 + t19;
     work[50] = 1.0 / 12.0 * y5;
     work[89] = 1.0 / 12.0 * y4;
     work[41] = 1.0 / 6.0 * y2;
     work[43] = work[50] + (work[89] + work[41]);
-    work[102] = y1 * t40;
-    const double t56 = work[41] + work[68];
+    work[102] = y1 * t14;
+    const double t20 = work[41] + work[68];
     work[71] = y5 * z4;
-    const double t58 = 1.0 / 12.0 * work[71];
+    const double t21 = 1.0 / 12.0 * work[71];
     work[72] = y4 * z5;
-    const double t60 = 1.0 / 12.0 * work[72];
-    const double t61 = t58 - t60;
-    const double t62 = y3 * t44 + t61;
+    const double t22 = 1.0 / 12.0 * work[72], t23 = t21 - t22, t24 = y3 * t16 + t23;
     work[38] = 1.0 / 12.0 * z2;
-    const double t64 = work[100] - work[38];
-    work[109] = x3 * t64;
-    const double t66 = (-1.0 / 12.0) * z3 - work[30];
-    work[110] = x4 * t66;
+    const double t25 = work[100] - work[38];
+    work[109] = x3 * t25;
+    const double t26 = (-1.0 / 12.0) * z3 - work[30];
+    work[110] = x4 * t26;
     work[101] = 1.0 / 6.0 * z1;
-    const double t69 = work[39] + work[101];
-    work[103] = y3 * t64;
-    work[104] = y4 * t66;
-    const double t72 = y5 * t69;
-    const double t73 = y2 * (z3 * work[43] + (work[102] + (z1 * t56 + t62))) + (x5 * (work[10] + (work[109] + (work[110] + x5 * t69))) + y5 * (work[102] + (work[103] + (work[104] + t72))));
-    const double t74 = gauge[0] * (z1 * (t4 + (work[75] + t10)) + (x1 * t14 + y1 * t15)) + (work[46] + work[74]) + params->J * (x2 * (z3 * work[47] + (work[10] + (z1 * t42 + work[12]))) + t73);
-    const double t75 = work[25] * t74;
+    const double t27 = work[39] + work[101];
+    work[103] = y3 * t25;
+    work[104] = y4 * t26;
+    const double t28 = y5 * t27;
+    const double t29 = y2 * (z3 * work[43] + (work[102] + (z1 * t20 + t24)))
+        + (x5 * (work[10] + (work[109] + (work[110] + x5 * t27))) + y5
+        * (work[102] + (work[103] + (work[104] + t28))));
+    const double t30 = gauge[0] * (z1 * (t1 + (work[75] + t4)) + (x1 * t5 + y1 * t6)) + (work[46] + work[74])
+        + params->J * (x2 * (z3 * work[47] + (work[10] + (z1 * t15 + work[12]))) + t29);
+    const double t31 = work[25] * t30;
     work[28] = 1.0 / 6.0 * y5;
     work[4] = work[28] + work[41];
-    const double t78 = x5 * work[4] + x2 * work[4];
+    const double t32 = x5 * work[4] + x2 * work[4];
     work[76] = 1.0 / 3.0 * z5;
-    const double t80 = z2 * (work[48] - work[76]);
-    const double t81 = 1.0 / 6.0 * (z5 * z5);
-    work[81] = t5 - t81;
+    const double t33 = z2 * (work[48] - work[76]), t34 = 1.0 / 6.0 * (z5 * z5);
+    work[81] = t2 - t34;
     work[85] = (-1.0 / 6.0) * y1;
-    const double t84 = work[85] - work[29];
-    const double t85 = work[40] + work[101];
-    work[57] = gauge[1] * (x2 * (x2 * t84 + y2 * t24) + z2 * (z2 * t84 + y2 * t85));
-    const double t87 = y5 * work[86];
-    const double t88 = work[85] - work[52];
-    work[80] = gauge[4] * (x5 * (t87 + x5 * t88) + z5 * (z5 * t88 + t72));
-    const double t90 = work[34] - work[28];
-    work[22] = x1 * t90;
+    const double t35 = work[85] - work[29], t36 = work[40] + work[101];
+    work[57] = gauge[1] * (x2 * (x2 * t35 + y2 * t9) + z2 * (z2 * t35 + y2 * t36));
+    const double t37 = y5 * work[86], t38 = work[85] - work[52];
+    work[80] = gauge[4] * (x5 * (t37 + x5 * t38) + z5 * (z5 * t38 + t28));
+    const double t39 = work[34] - work[28];
+    work[22] = x1 * t39;
     work[77] = x5 * y4;
-    const double t93 = 1.0 / 12.0 * work[77];
+    const double t40 = 1.0 / 12.0 * work[77];
     work[78] = x4 * y5;
-    const double t95 = 1.0 / 12.0 * work[78];
-    const double t96 = t93 - t95;
-    const double t97 = work[34] - work[89];
-    work[24] = t96 + x3 * t97;
+    const double t41 = 1.0 / 12.0 * work[78], t42 = t40 - t41, t43 = work[34] - work[89];
+    work[24] = t42 + x3 * t43;
     work[37] = 1.0 / 12.0 * z5;
     work[53] = work[37] + (work[100] + work[49]);
-    const double t101 = work[49] + work[76];
-    work[91] = z1 * t90;
-    work[45] = t60 - t58;
-    const double t104 = work[91] + (z3 * t97 + work[45]);
+    const double t44 = work[49] + work[76];
+    work[91] = z1 * t39;
+    work[45] = t22 - t21;
+    const double t45 = work[91] + (z3 * t43 + work[45]);
     work[51] = 1.0 / 12.0 * y2;
-    const double t106 = work[89] - work[51];
-    work[92] = z3 * t106;
-    const double t108 = (-1.0 / 12.0) * y3 - work[28];
-    work[93] = z4 * t108;
-    work[112] = x3 * t106;
-    work[113] = x4 * t108;
-    const double t112 = z2 * (y3 * work[53] + (y1 * t101 + t104)) + (z5 * (work[91] + (work[92] + (t28 + work[93]))) + x5 * (work[22] + (work[112] + (x5 * t27 + work[113]))));
-    const double t113 = gauge[0] * (z1 * t15 + x1 * t78 + y1 * (t4 + (t80 + work[81]))) + (work[57] + work[80]) + params->J * (x2 * (y3 * work[47] + (work[22] + (y1 * t42 + work[24]))) + t112);
-    const double t114 = work[25] * t113;
-    const double t115 = (-1.0 / 6.0) * (y2 * y2) - 1.0 / 6.0 * (z2 * z2);
-    const double t116 = y2 * t18;
-    const double t117 = z2 * t85;
-    work[19] = t116 + t117;
-    work[64] = gauge[1] * (x1 * t115 + x3 * t115 + x2 * work[19]);
-    work[98] = z5 * t69;
-    work[87] = y5 * t27;
+    const double t46 = work[89] - work[51];
+    work[92] = z3 * t46;
+    const double t47 = (-1.0 / 12.0) * y3 - work[28];
+    work[93] = z4 * t47;
+    work[112] = x3 * t46;
+    work[113] = x4 * t47;
+    const double t48 = z2 * (y3 * work[53] + (y1 * t44 + t45))
+        + (z5 * (work[91] + (work[92] + (t11 + work[93]))) + x5
+        * (work[22] + (work[112] + (x5 * t10 + work[113]))));
+    const double t49 = gauge[0] * (z1 * t6 + x1 * t32 + y1 * (t1 + (t33 + work[81]))) + (work[57] + work[80])
+        + params->J * (x2 * (y3 * work[47] + (work[22] + (y1 * t15 + work[24]))) + t48);
+    const double t50 = work[25] * t49, t51 = (-1.0 / 6.0) * (y2 * y2) - 1.0 / 6.0 * (z2 * z2);
+    const double t52 = y2 * t7, t53 = z2 * t36;
+    work[19] = t52 + t53;
+    work[64] = gauge[1] * (x1 * t51 + x3 * t51 + x2 * work[19]);
+    work[98] = z5 * t27;
+    work[87] = y5 * t10;
     work[111] = work[98] + work[87];
-    work[83] = (-1.0 / 6.0) * t6 - t81;
+    work[83] = (-1.0 / 6.0) * t3 - t34;
     work[82] = gauge[4] * (x5 * work[111] + (x4 * work[83] + x1 * work[83]));
     work[32] = 1.0 / 6.0 * x5;
     work[3] = work[33] - work[32];
     work[106] = y1 * work[3];
-    const double t128 = work[33] - work[7];
-    work[14] = t95 - t93;
-    const double t130 = work[106] + (y3 * t128 + work[14]);
+    const double t54 = work[33] - work[7];
+    work[14] = t41 - t40;
+    const double t55 = work[106] + (y3 * t54 + work[14]);
     work[95] = z1 * work[3];
-    work[18] = t48 - t46;
-    const double t133 = work[95] + (work[18] + z3 * t128);
+    work[18] = t18 - t17;
+    const double t56 = work[95] + (work[18] + z3 * t54);
     work[58] = 1.0 / 12.0 * x2;
-    const double t135 = work[7] - work[58];
-    work[96] = z3 * t135;
-    const double t137 = (-1.0 / 12.0) * x3 - work[32];
-    work[97] = z4 * t137;
-    work[107] = y3 * t135;
-    work[108] = y4 * t137;
-    const double t141 = z2 * (x3 * work[53] + (x1 * t101 + t133)) + (z5 * (work[95] + (work[96] + (t33 + work[97]))) + y5 * (work[106] + (work[107] + (work[108] + t87))));
-    const double t142 = work[64] + work[82] + gauge[0] * (z1 * t14 + y1 * t78 + x1 * (t10 + (t80 + work[83]))) + params->J * (y2 * (x3 * work[43] + (x1 * t56 + t130)) + t141);
-    const double t143 = work[25] * t142;
+    const double t57 = work[7] - work[58];
+    work[96] = z3 * t57;
+    const double t58 = (-1.0 / 12.0) * x3 - work[32];
+    work[97] = z4 * t58;
+    work[107] = y3 * t57;
+    work[108] = y4 * t58;
+    const double t59 = z2 * (x3 * work[53] + (x1 * t44 + t56))
+        + (z5 * (work[95] + (work[96] + (t13 + work[97]))) + y5
+        * (work[106] + (work[107] + (work[108] + t37))));
+    const double t60 = work[64] + work[82] + gauge[0] * (z1 * t5 + y1 * t32 + x1 * (t4 + (t33 + work[83])))
+        + params->J * (y2 * (x3 * work[43] + (x1 * t20 + t55)) + t59);
+    const double t61 = work[25] * t60;
     work[0] = work[41] + work[52];
-    const double t145 = z3 * work[0];
-    const double t146 = work[48] - work[39];
-    work[42] = y3 * t146;
-    work[16] = x3 * t146;
+    const double t62 = z3 * work[0], t63 = work[48] - work[39];
+    work[42] = y3 * t63;
+    work[16] = x3 * t63;
     work[35] = work[59] + work[36];
     work[17] = z3 * work[35];
-    work[73] = gauge[2] * (y3 * (t145 + work[42]) + x3 * (work[16] + work[17]));
-    const double t152 = work[32] + work[36];
-    work[11] = z1 * t152;
-    const double t154 = z1 * work[4];
-    work[94] = gauge[0] * (x1 * (work[11] + work[10]) + y1 * (work[102] + t154));
-    const double t156 = x2 * t24;
-    const double t157 = t116 + t156;
+    work[73] = gauge[2] * (y3 * (t62 + work[42]) + x3 * (work[16] + work[17]));
+    const double t64 = work[32] + work[36];
+    work[11] = z1 * t64;
+    const double t65 = z1 * work[4];
+    work[94] = gauge[0] * (x1 * (work[11] + work[10]) + y1 * (work[102] + t65));
+    const double t66 = x2 * t9, t67 = t52 + t66;
     work[84] = (-1.0 / 6.0) * x1;
-    const double t159 = x1 * (work[84] - 1.0 / 3.0 * x3);
-    const double t160 = (-1.0 / 6.0) * (x3 * x3);
-    const double t161 = y3 * y3;
+    const double t68 = x1 * (work[84] - 1.0 / 3.0 * x3), t69 = (-1.0 / 6.0) * (x3 * x3);
+    const double t70 = y3 * y3;
     work[20] = y1 * (work[85] - 1.0 / 3.0 * y3);
-    const double t163 = work[37] + (work[100] + 1.0 / 3.0 * z2);
+    const double t71 = work[37] + (work[100] + 1.0 / 3.0 * z2);
     work[8] = work[34] - work[50];
     work[54] = z1 * work[8];
     work[1] = work[39] + work[49];
-    const double t167 = y3 * work[1];
-    const double t168 = work[34] - work[52];
-    work[56] = z3 * t168;
-    work[55] = work[56] + t61;
-    const double t171 = work[33] - work[6];
-    work[60] = z1 * t171;
-    const double t173 = work[33] - work[59];
-    work[63] = z3 * t173;
-    work[61] = t49 + work[63];
-    const double t176 = y1 * work[5];
-    const double t177 = x1 * (x3 * t163 + (x1 * work[5] + t133)) + (y3 * (work[54] + (t167 + work[55])) + x3 * (work[60] + (x3 * work[1] + work[61])) + y1 * (y3 * t163 + (t176 + t104)));
-    work[26] = work[25] * (work[73] + work[94] + gauge[1] * (z1 * t157 + z3 * t157 + z2 * (t159 + (t160 - 1.0 / 6.0 * t161 + work[20]))) + params->J * t177);
-    work[23] = y1 * t152;
-    work[105] = gauge[0] * (x1 * (work[23] + work[22]) + z1 * (work[91] + t176));
+    const double t72 = y3 * work[1], t73 = work[34] - work[52];
+    work[56] = z3 * t73;
+    work[55] = work[56] + t23;
+    const double t74 = work[33] - work[6];
+    work[60] = z1 * t74;
+    const double t75 = work[33] - work[59];
+    work[63] = z3 * t75;
+    work[61] = t19 + work[63];
+    const double t76 = y1 * work[5];
+    const double t77 = x1 * (x3 * t71 + (x1 * work[5] + t56)) + (y3 * (work[54] + (t72 + work[55])) + x3
+        * (work[60] + (x3 * work[1] + work[61])) + y1 * (y3 * t71 + (t76 + t45)));
+    work[26] = work[25] * (work[73] + work[94] + gauge[1] * (z1 * t67 + z3 * t67 + z2
+        * (t68 + (t69 - 1.0 / 6.0 * t70 + work[20]))) + params->J * t77);
+    work[23] = y1 * t64;
+    work[105] = gauge[0] * (x1 * (work[23] + work[22]) + z1 * (work[91] + t76));
     work[15] = y3 * work[35];
-    work[13] = x3 * t168;
-    work[79] = gauge[2] * (x3 * (work[15] + work[13]) + z3 * (work[56] + t167));
+    work[13] = x3 * t73;
+    work[79] = gauge[2] * (x3 * (work[15] + work[13]) + z3 * (work[56] + t72));
     work[21] = z1 * (work[99] - 1.0 / 3.0 * z3);
-    const double t185 = 1.0 / 6.0 * (z3 * z3);
-    const double t186 = t117 + t156;
-    const double t187 = work[50] + (work[89] + 1.0 / 3.0 * y2);
-    work[65] = y1 * t171;
-    work[62] = y3 * t173;
-    work[66] = t96 + work[62];
+    const double t78 = 1.0 / 6.0 * (z3 * z3), t79 = t53 + t66;
+    const double t80 = work[50] + (work[89] + 1.0 / 3.0 * y2);
+    work[65] = y1 * t74;
+    work[62] = y3 * t75;
+    work[66] = t42 + work[62];
     work[9] = work[48] - work[37];
     work[44] = y1 * work[9];
-    const double t193 = x3 * (work[65] + (x3 * work[0] + work[66])) + z3 * (work[44] + (work[42] + (t145 + work[45]))) + z1 * (z3 * t187 + (work[102] + (t154 + t62)));
-    const double t194 = work[105] + work[79] + gauge[1] * (y2 * (t159 + (work[21] + (t160 - t185))) + (y1 * t186 + y3 * t186)) + params->J * (x1 * (x3 * t187 + (x1 * work[4] + t130)) + t193);
-    work[27] = work[25] * t194;
-    work[2] = (-1.0 / 6.0) * t161 - t185;
-    error[0] = y1 * t75 - z1 * t114;
-    error[1] = z1 * t143 - x1 * t75;
-    error[2] = x1 * t114 - y1 * t143;
+    const double t81 = x3 * (work[65] + (x3 * work[0] + work[66])) + z3
+        * (work[44] + (work[42] + (t62 + work[45]))) + z1 * (z3 * t80 + (work[102] + (t65 + t24)));
+    const double t82 = work[105] + work[79] + gauge[1] * (y2 * (t68 + (work[21] + (t69 - t78)))
+        + (y1 * t79 + y3 * t79)) + params->J * (x1 * (x3 * t80 + (x1 * work[4] + t55)) + t81);
+    work[27] = work[25] * t82;
+    work[2] = (-1.0 / 6.0) * t70 - t78;
+    error[0] = y1 * t31 - z1 * t50;
+    error[1] = z1 * t61 - x1 * t31;
+    error[2] = x1 * t50 - y1 * t61;
     error[3] = y2 * work[26] - z2 * work[27];
 }
 
 /* the leading error vector pi grad S_3, as a function of the gauge (part 2 of 2) */
 spin_chain5_APART static void spin_chain5_guide_part2(const spin_chain5_params *params, const double gauge[5],
-                                                      const double x[15], double error[restrict 15],
-                                                      double work[restrict 114])
+    const double x[15], double error[restrict 15], double work[restrict 114])
 {
-    const double x1 = x[0];
-    const double y1 = x[1];
-    const double z1 = x[2];
-    const double x2 = x[3];
-    const double y2 = x[4];
-    const double z2 = x[5];
-    const double x3 = x[6];
-    const double y3 = x[7];
-    const double z3 = x[8];
-    const double x4 = x[9];
-    const double y4 = x[10];
-    const double z4 = x[11];
-    const double x5 = x[12];
-    const double y5 = x[13];
-    const double z5 = x[14];
-    const double t197 = y3 * work[0];
-    const double t198 = z3 * work[1];
-    const double t199 = t197 + t198;
-    const double t200 = gauge[2] * (x4 * work[2] + x2 * work[2] + x3 * t199);
-    const double t201 = gauge[0] * (y1 * y1 * work[3] + z1 * z1 * work[3] + x1 * (y1 * work[4] + z1 * work[5]));
-    const double t202 = work[6] + (1.0 / 3.0 * x2 + work[7]);
-    const double t203 = x1 * work[8];
-    const double t204 = x1 * work[9];
-    const double t205 = z1 * (z3 * t202 + (work[10] + (work[11] + work[12]))) + (y3 * (t203 + (work[13] + (work[14] + work[15]))) + z3 * (t204 + (work[16] + (work[17] + work[18]))));
-    const double t206 = gauge[1] * (x3 * work[19] + x1 * work[19] + x2 * (work[20] + (work[2] + work[21]))) + (t200 + t201) + params->J * (y1 * (y3 * t202 + (work[22] + (work[23] + work[24]))) + t205);
-    const double t207 = work[25] * t206;
-    const double t208 = work[28] + work[29];
-    const double t209 = z4 * t208;
-    const double t210 = (-1.0 / 6.0) * z3;
-    const double t211 = t210 - work[30];
-    const double t212 = work[31] + work[32];
-    const double t213 = z4 * t212;
-    const double t214 = gauge[3] * (y4 * (t209 + y4 * t211) + x4 * (x4 * t211 + t213));
-    const double t215 = 1.0 / 3.0 * x4;
-    const double t216 = x2 * (work[33] - t215);
-    const double t217 = (-1.0 / 6.0) * (x4 * x4);
-    const double t218 = y4 * y4;
-    const double t219 = t217 - 1.0 / 6.0 * t218;
-    const double t220 = 1.0 / 3.0 * y4;
-    const double t221 = y2 * (work[34] - t220);
-    const double t222 = x3 * work[35];
-    const double t223 = t222 + t197;
-    const double t224 = t215 + work[36];
-    const double t225 = work[37] - work[38];
-    const double t226 = y1 * t225;
-    const double t227 = (-1.0 / 12.0) * z1 - work[39];
-    const double t228 = y5 * t227;
-    const double t229 = work[30] + work[40];
-    const double t230 = y4 * t229;
-    const double t231 = x1 * t225;
-    const double t232 = x5 * t227;
-    const double t233 = work[41] + t220;
-    const double t234 = y4 * (t226 + (work[42] + (t228 + t230))) + x4 * (t231 + (work[16] + (x4 * t229 + t232))) + y2 * (z1 * work[43] + (work[44] + (work[42] + (work[45] + z3 * t233))));
-    const double t235 = work[46] + t214 + gauge[2] * (z3 * (t216 + (t219 + t221)) + (z2 * t223 + z4 * t223)) + params->J * (x2 * (z1 * work[47] + (t204 + (work[16] + (work[18] + z3 * t224)))) + t234);
-    const double t236 = work[25] * t235;
-    const double t237 = (-1.0 / 6.0) * y3;
-    const double t238 = t237 - work[28];
-    const double t239 = y4 * t212;
-    const double t240 = gauge[3] * (z4 * (z4 * t238 + t230) + x4 * (t239 + x4 * t238));
-    const double t241 = 1.0 / 6.0 * (z4 * z4);
-    const double t242 = t217 - t241;
-    const double t243 = 1.0 / 3.0 * z4;
-    const double t244 = z2 * (work[48] - t243);
-    const double t245 = t222 + t198;
-    const double t246 = work[49] + t243;
-    const double t247 = work[50] - work[51];
-    const double t248 = z1 * t247;
-    const double t249 = (-1.0 / 12.0) * y1 - work[52];
-    const double t250 = z5 * t249;
-    const double t251 = x1 * t247;
-    const double t252 = x5 * t249;
-    const double t253 = z2 * (y1 * work[53] + (work[54] + (y3 * t246 + work[55]))) + (z4 * (t248 + (work[56] + (t209 + t250))) + x4 * (t251 + (work[13] + (t252 + x4 * t208))));
-    const double t254 = work[57] + t240 + gauge[2] * (y3 * (t216 + (t242 + t244)) + (y2 * t245 + y4 * t245)) + params->J * (x2 * (y1 * work[47] + (t203 + (work[13] + (work[14] + y3 * t224)))) + t253);
-    const double t255 = work[25] * t254;
-    const double t256 = (-1.0 / 6.0) * t218 - t241;
-    const double t257 = y4 * t208;
-    const double t258 = z4 * t229;
-    const double t259 = t257 + t258;
-    const double t260 = gauge[3] * (x3 * t256 + x5 * t256 + x4 * t259);
-    const double t261 = work[6] - work[58];
-    const double t262 = y1 * t261;
-    const double t263 = (-1.0 / 12.0) * x1 - work[59];
-    const double t264 = y5 * t263;
-    const double t265 = z1 * t261;
-    const double t266 = z5 * t263;
-    const double t267 = z2 * (x1 * work[53] + (work[60] + (x3 * t246 + work[61]))) + (y4 * (t262 + (work[62] + (t264 + t239))) + z4 * (t265 + (work[63] + (t213 + t266))));
-    const double t268 = work[64] + t260 + gauge[2] * (x3 * (t221 + (t256 + t244)) + (x2 * t199 + x4 * t199)) + params->J * (y2 * (x1 * work[43] + (work[65] + (x3 * t233 + work[66]))) + t267);
-    const double t269 = work[25] * t268;
-    const double t270 = x3 * ((-1.0 / 6.0) * x3 - work[67]);
-    const double t271 = y3 * (t237 - work[68]);
-    const double t272 = x4 * t212;
-    const double t273 = t257 + t272;
-    const double t274 = work[6] + (1.0 / 12.0 * x1 + work[31]);
-    const double t275 = work[31] + work[67];
-    const double t276 = (-1.0 / 12.0) * z2;
-    const double t277 = t276 - work[30];
-    const double t278 = x1 * t277;
-    const double t279 = work[58] + work[32];
-    const double t280 = 1.0 / 6.0 * work[69];
-    const double t281 = 1.0 / 6.0 * work[70];
-    const double t282 = (-1.0 / 12.0) * x2;
-    const double t283 = t282 - work[59];
-    const double t284 = t280 - t281 + z3 * t283;
-    const double t285 = y1 * t277;
-    const double t286 = work[51] + work[28];
-    const double t287 = 1.0 / 6.0 * work[71];
-    const double t288 = 1.0 / 6.0 * work[72];
-    const double t289 = (-1.0 / 12.0) * y2;
-    const double t290 = t289 - work[52];
-    const double t291 = t287 - t288 + z3 * t290;
-    const double t292 = work[50] + (1.0 / 12.0 * y1 + work[29]);
-    const double t293 = work[29] + work[68];
-    const double t294 = x5 * (t278 + (z1 * t279 + t284)) + y5 * (t285 + (z1 * t286 + t291)) + y3 * (z2 * t292 + (t248 + (work[56] + (z4 * t293 + t250))));
-    const double t295 = work[73] + work[74] + gauge[3] * (z4 * (t270 + (work[75] + t271)) + (z3 * t273 + z5 * t273)) + params->J * (x3 * (z2 * t274 + (t265 + (work[63] + (z4 * t275 + t266)))) + t294);
-    const double t296 = work[25] * t295;
-    const double t297 = t272 + t258;
-    const double t298 = z3 * (t210 - work[76]);
-    const double t299 = work[37] + (1.0 / 12.0 * z1 + work[40]);
-    const double t300 = work[40] + work[76];
-    const double t301 = work[30] + work[38];
-    const double t302 = t289 - work[28];
-    const double t303 = z1 * t302;
-    const double t304 = t288 - t287;
-    const double t305 = t276 - work[39];
-    const double t306 = y3 * t305;
-    const double t307 = x1 * t302;
-    const double t308 = 1.0 / 6.0 * work[77];
-    const double t309 = 1.0 / 6.0 * work[78];
-    const double t310 = t308 - t309 + y3 * t283;
-    const double t311 = z3 * (y2 * t299 + (t226 + (work[42] + (y4 * t300 + t228)))) + (z5 * (y1 * t301 + (t303 + (t304 + t306))) + x5 * (t307 + (y1 * t279 + t310)));
-    const double t312 = work[79] + work[80] + gauge[3] * (y3 * t297 + y5 * t297 + y4 * (t270 + (t298 + work[81]))) + params->J * (x3 * (y2 * t274 + (t262 + (work[62] + (t264 + y4 * t275)))) + t311);
-    const double t313 = work[25] * t312;
-    const double t314 = t282 - work[32];
-    const double t315 = z1 * t314;
-    const double t316 = x3 * t305;
-    const double t317 = t281 - t280;
-    const double t318 = y1 * t314;
-    const double t319 = x3 * t290;
-    const double t320 = t309 - t308;
-    const double t321 = z5 * (x1 * t301 + (t315 + (t316 + t317))) + y5 * (x1 * t286 + (t318 + (t319 + t320))) + z3 * (x2 * t299 + (t231 + (work[16] + (x4 * t300 + t232))));
-    const double t322 = work[82] + t200 + gauge[3] * (x5 * t259 + x3 * t259 + x4 * (t271 + (work[83] + t298))) + params->J * (y3 * (x2 * t292 + (t251 + (work[13] + (t252 + x4 * t293)))) + t321);
-    const double t323 = work[25] * t322;
-    const double t324 = x1 * (work[84] - t215);
-    const double t325 = y1 * (work[85] - t220);
-    const double t326 = x5 * work[86];
-    const double t327 = t326 + work[87];
-    const double t328 = work[7] + (work[88] + 1.0 / 12.0 * x3);
-    const double t329 = work[88] + t215;
-    const double t330 = work[51] + work[52];
-    const double t331 = work[59] + work[58];
-    const double t332 = work[89] + (1.0 / 12.0 * y3 + work[90]);
-    const double t333 = work[90] + t220;
-    const double t334 = y4 * (t303 + (t306 + (z3 * t330 + t304))) + x4 * (t315 + (t316 + (z3 * t331 + t317))) + y1 * (z2 * t332 + (work[91] + (work[92] + (work[93] + z5 * t333))));
-    const double t335 = gauge[4] * (z5 * (t324 + (t325 + t219)) + (z4 * t327 + z1 * t327)) + (work[94] + t214) + params->J * (x1 * (z2 * t328 + (work[95] + (work[96] + (z5 * t329 + work[97])))) + t334);
-    const double t336 = work[25] * t335;
-    const double t337 = t326 + work[98];
-    const double t338 = z1 * (work[99] - t243);
-    const double t339 = work[100] + (1.0 / 12.0 * z3 + work[101]);
-    const double t340 = t243 + work[101];
-    const double t341 = work[39] + work[38];
-    const double t342 = z1 * (y2 * t339 + (work[102] + (work[103] + (work[104] + y5 * t340)))) + (x4 * (t318 + (t319 + (y3 * t331 + t320))) + z4 * (t285 + (y3 * t341 + t291)));
-    const double t343 = gauge[4] * (y4 * t337 + y1 * t337 + y5 * (t324 + (t242 + t338))) + (work[105] + t240) + params->J * (x1 * (y2 * t328 + (work[106] + (work[107] + (y5 * t329 + work[108])))) + t342);
-    const double t344 = work[25] * t343;
-    const double t345 = z4 * (t278 + (x3 * t341 + t284)) + y4 * (t307 + (x3 * t330 + t310)) + z1 * (x2 * t339 + (work[10] + (work[109] + (work[110] + x5 * t340))));
-    const double t346 = gauge[4] * (x4 * work[111] + x1 * work[111] + x5 * (t325 + (t256 + t338))) + (t260 + t201) + params->J * (y1 * (x2 * t332 + (work[22] + (work[112] + (x5 * t333 + work[113])))) + t345);
-    const double t347 = work[25] * t346;
-    error[4] = z2 * t207 - x2 * work[26];
-    error[5] = x2 * work[27] - y2 * t207;
-    error[6] = y3 * t236 - z3 * t255;
-    error[7] = z3 * t269 - x3 * t236;
-    error[8] = x3 * t255 - y3 * t269;
-    error[9] = y4 * t296 - z4 * t313;
-    error[10] = z4 * t323 - x4 * t296;
-    error[11] = x4 * t313 - y4 * t323;
-    error[12] = y5 * t336 - z5 * t344;
-    error[13] = z5 * t347 - x5 * t336;
-    error[14] = x5 * t344 - y5 * t347;
+    const double x1 = x[0], y1 = x[1], z1 = x[2], x2 = x[3], y2 = x[4], z2 = x[5], x3 = x[6], y3 = x[7], z3 =
+        x[8], x4 = x[9], y4 = x[10], z4 = x[11], x5 = x[12], y5 = x[13], z5 = x[14];
+    const double t1 = y3 * work[0], t2 = z3 * work[1], t3 = t1 + t2;
+    const double t4 = gauge[2] * (x4 * work[2] + x2 * work[2] + x3 * t3);
+    const double t5 = gauge[0] * (y1 * y1 * work[3] + z1 * z1 * work[3] + x1 * (y1 * work[4] + z1 * work[5]));
+    const double t6 = work[6] + (1.0 / 3.0 * x2 + work[7]), t7 = x1 * work[8], t8 = x1 * work[9];
+    const double t9 = z1 * (z3 * t6 + (work[10] + (work[11] + work[12])))
+        + (y3 * (t7 + (work[13] + (work[14] + work[15]))) + z3 * (t8 + (work[16] + (work[17] + work[18]))));
+    const double t10 = gauge[1] * (x3 * work[19] + x1 * work[19] + x2 * (work[20] + (work[2] + work[21])))
+        + (t4 + t5) + params->J * (y1 * (y3 * t6 + (work[22] + (work[23] + work[24]))) + t9);
+    const double t11 = work[25] * t10, t12 = work[28] + work[29], t13 = z4 * t12;
+    const double t14 = (-1.0 / 6.0) * z3, t15 = t14 - work[30], t16 = work[31] + work[32];
+    const double t17 = z4 * t16, t18 = gauge[3] * (y4 * (t13 + y4 * t15) + x4 * (x4 * t15 + t17));
+    const double t19 = 1.0 / 3.0 * x4, t20 = x2 * (work[33] - t19), t21 = (-1.0 / 6.0) * (x4 * x4);
+    const double t22 = y4 * y4, t23 = t21 - 1.0 / 6.0 * t22, t24 = 1.0 / 3.0 * y4;
+    const double t25 = y2 * (work[34] - t24), t26 = x3 * work[35], t27 = t26 + t1;
+    const double t28 = t19 + work[36], t29 = work[37] - work[38], t30 = y1 * t29;
+    const double t31 = (-1.0 / 12.0) * z1 - work[39], t32 = y5 * t31, t33 = work[30] + work[40];
+    const double t34 = y4 * t33, t35 = x1 * t29, t36 = x5 * t31, t37 = work[41] + t24;
+    const double t38 = y4 * (t30 + (work[42] + (t32 + t34))) + x4 * (t35 + (work[16] + (x4 * t33 + t36))) + y2
+        * (z1 * work[43] + (work[44] + (work[42] + (work[45] + z3 * t37))));
+    const double t39 = work[46] + t18 + gauge[2] * (z3 * (t20 + (t23 + t25)) + (z2 * t27 + z4 * t27))
+        + params->J * (x2 * (z1 * work[47] + (t8 + (work[16] + (work[18] + z3 * t28)))) + t38);
+    const double t40 = work[25] * t39, t41 = (-1.0 / 6.0) * y3, t42 = t41 - work[28], t43 = y4 * t16;
+    const double t44 = gauge[3] * (z4 * (z4 * t42 + t34) + x4 * (t43 + x4 * t42));
+    const double t45 = 1.0 / 6.0 * (z4 * z4), t46 = t21 - t45, t47 = 1.0 / 3.0 * z4;
+    const double t48 = z2 * (work[48] - t47), t49 = t26 + t2, t50 = work[49] + t47;
+    const double t51 = work[50] - work[51], t52 = z1 * t51, t53 = (-1.0 / 12.0) * y1 - work[52];
+    const double t54 = z5 * t53, t55 = x1 * t51, t56 = x5 * t53;
+    const double t57 = z2 * (y1 * work[53] + (work[54] + (y3 * t50 + work[55])))
+        + (z4 * (t52 + (work[56] + (t13 + t54))) + x4 * (t55 + (work[13] + (t56 + x4 * t12))));
+    const double t58 = work[57] + t44 + gauge[2] * (y3 * (t20 + (t46 + t48)) + (y2 * t49 + y4 * t49))
+        + params->J * (x2 * (y1 * work[47] + (t7 + (work[13] + (work[14] + y3 * t28)))) + t57);
+    const double t59 = work[25] * t58, t60 = (-1.0 / 6.0) * t22 - t45, t61 = y4 * t12;
+    const double t62 = z4 * t33, t63 = t61 + t62, t64 = gauge[3] * (x3 * t60 + x5 * t60 + x4 * t63);
+    const double t65 = work[6] - work[58], t66 = y1 * t65, t67 = (-1.0 / 12.0) * x1 - work[59];
+    const double t68 = y5 * t67, t69 = z1 * t65, t70 = z5 * t67;
+    const double t71 = z2 * (x1 * work[53] + (work[60] + (x3 * t50 + work[61])))
+        + (y4 * (t66 + (work[62] + (t68 + t43))) + z4 * (t69 + (work[63] + (t17 + t70))));
+    const double t72 = work[64] + t64 + gauge[2] * (x3 * (t25 + (t60 + t48)) + (x2 * t3 + x4 * t3))
+        + params->J * (y2 * (x1 * work[43] + (work[65] + (x3 * t37 + work[66]))) + t71);
+    const double t73 = work[25] * t72, t74 = x3 * ((-1.0 / 6.0) * x3 - work[67]);
+    const double t75 = y3 * (t41 - work[68]), t76 = x4 * t16, t77 = t61 + t76;
+    const double t78 = work[6] + (1.0 / 12.0 * x1 + work[31]), t79 = work[31] + work[67];
+    const double t80 = (-1.0 / 12.0) * z2, t81 = t80 - work[30], t82 = x1 * t81;
+    const double t83 = work[58] + work[32], t84 = 1.0 / 6.0 * work[69], t85 = 1.0 / 6.0 * work[70];
+    const double t86 = (-1.0 / 12.0) * x2, t87 = t86 - work[59], t88 = t84 - t85 + z3 * t87;
+    const double t89 = y1 * t81, t90 = work[51] + work[28], t91 = 1.0 / 6.0 * work[71];
+    const double t92 = 1.0 / 6.0 * work[72], t93 = (-1.0 / 12.0) * y2, t94 = t93 - work[52];
+    const double t95 = t91 - t92 + z3 * t94, t96 = work[50] + (1.0 / 12.0 * y1 + work[29]);
+    const double t97 = work[29] + work[68];
+    const double t98 = x5 * (t82 + (z1 * t83 + t88)) + y5 * (t89 + (z1 * t90 + t95)) + y3
+        * (z2 * t96 + (t52 + (work[56] + (z4 * t97 + t54))));
+    const double t99 = work[73] + work[74] + gauge[3] * (z4 * (t74 + (work[75] + t75)) + (z3 * t77 + z5
+        * t77)) + params->J * (x3 * (z2 * t78 + (t69 + (work[63] + (z4 * t79 + t70)))) + t98);
+    const double t100 = work[25] * t99, t101 = t76 + t62, t102 = z3 * (t14 - work[76]);
+    const double t103 = work[37] + (1.0 / 12.0 * z1 + work[40]), t104 = work[40] + work[76];
+    const double t105 = work[30] + work[38], t106 = t93 - work[28], t107 = z1 * t106;
+    const double t108 = t92 - t91, t109 = t80 - work[39], t110 = y3 * t109, t111 = x1 * t106;
+    const double t112 = 1.0 / 6.0 * work[77], t113 = 1.0 / 6.0 * work[78];
+    const double t114 = t112 - t113 + y3 * t87;
+    const double t115 = z3 * (y2 * t103 + (t30 + (work[42] + (y4 * t104 + t32))))
+        + (z5 * (y1 * t105 + (t107 + (t108 + t110))) + x5 * (t111 + (y1 * t83 + t114)));
+    const double t116 = work[79] + work[80] + gauge[3] * (y3 * t101 + y5 * t101 + y4
+        * (t74 + (t102 + work[81]))) + params->J * (x3 * (y2 * t78 + (t66 + (work[62] + (t68 + y4 * t79))))
+        + t115);
+    const double t117 = work[25] * t116, t118 = t86 - work[32], t119 = z1 * t118, t120 = x3 * t109;
+    const double t121 = t85 - t84, t122 = y1 * t118, t123 = x3 * t94, t124 = t113 - t112;
+    const double t125 = z5 * (x1 * t105 + (t119 + (t120 + t121))) + y5 * (x1 * t90 + (t122 + (t123 + t124)))
+        + z3 * (x2 * t103 + (t35 + (work[16] + (x4 * t104 + t36))));
+    const double t126 = work[82] + t4 + gauge[3] * (x5 * t63 + x3 * t63 + x4 * (t75 + (work[83] + t102)))
+        + params->J * (y3 * (x2 * t96 + (t55 + (work[13] + (t56 + x4 * t97)))) + t125);
+    const double t127 = work[25] * t126, t128 = x1 * (work[84] - t19), t129 = y1 * (work[85] - t24);
+    const double t130 = x5 * work[86], t131 = t130 + work[87];
+    const double t132 = work[7] + (work[88] + 1.0 / 12.0 * x3), t133 = work[88] + t19;
+    const double t134 = work[51] + work[52], t135 = work[59] + work[58];
+    const double t136 = work[89] + (1.0 / 12.0 * y3 + work[90]), t137 = work[90] + t24;
+    const double t138 = y4 * (t107 + (t110 + (z3 * t134 + t108))) + x4 * (t119 + (t120 + (z3 * t135 + t121)))
+        + y1 * (z2 * t136 + (work[91] + (work[92] + (work[93] + z5 * t137))));
+    const double t139 = gauge[4] * (z5 * (t128 + (t129 + t23)) + (z4 * t131 + z1 * t131)) + (work[94] + t18)
+        + params->J * (x1 * (z2 * t132 + (work[95] + (work[96] + (z5 * t133 + work[97])))) + t138);
+    const double t140 = work[25] * t139, t141 = t130 + work[98], t142 = z1 * (work[99] - t47);
+    const double t143 = work[100] + (1.0 / 12.0 * z3 + work[101]), t144 = t47 + work[101];
+    const double t145 = work[39] + work[38];
+    const double t146 = z1 * (y2 * t143 + (work[102] + (work[103] + (work[104] + y5 * t144))))
+        + (x4 * (t122 + (t123 + (y3 * t135 + t124))) + z4 * (t89 + (y3 * t145 + t95)));
+    const double t147 = gauge[4] * (y4 * t141 + y1 * t141 + y5 * (t128 + (t46 + t142))) + (work[105] + t44)
+        + params->J * (x1 * (y2 * t132 + (work[106] + (work[107] + (y5 * t133 + work[108])))) + t146);
+    const double t148 = work[25] * t147;
+    const double t149 = z4 * (t82 + (x3 * t145 + t88)) + y4 * (t111 + (x3 * t134 + t114)) + z1
+        * (x2 * t143 + (work[10] + (work[109] + (work[110] + x5 * t144))));
+    const double t150 = gauge[4] * (x4 * work[111] + x1 * work[111] + x5 * (t129 + (t60 + t142))) + (t64 + t5)
+        + params->J * (y1 * (x2 * t136 + (work[22] + (work[112] + (x5 * t137 + work[113])))) + t149);
+    const double t151 = work[25] * t150;
+    error[4] = z2 * t11 - x2 * work[26];
+    error[5] = x2 * work[27] - y2 * t11;
+    error[6] = y3 * t40 - z3 * t59;
+    error[7] = z3 * t73 - x3 * t40;
+    error[8] = x3 * t59 - y3 * t73;
+    error[9] = y4 * t100 - z4 * t117;
+    error[10] = z4 * t127 - x4 * t100;
+    error[11] = x4 * t117 - y4 * t127;
+    error[12] = y5 * t140 - z5 * t148;
+    error[13] = z5 * t151 - x5 * t140;
+    error[14] = x5 * t148 - y5 * t151;
 }
 
 /* the leading error vector pi grad S_3, as a function of the gauge */
 static void spin_chain5_guide(const spin_chain5_params *params, const double gauge[5], const double x[15],
-                              double error[restrict 15])
+    double error[restrict 15])
 {
     double work[114];
     spin_chain5_guide_part1(params, gauge, x, error, work);
@@ -2448,54 +1779,21 @@ static void spin_chain5_guide(const spin_chain5_params *params, const double gau
 }
 
 /* grad H . grad H, then grad H . grad C and grad C . grad C for each Casimir of the gauge */
-static void spin_chain5_products(const spin_chain5_params *params, const double x[15], double out[restrict 11])
+static void spin_chain5_products(const spin_chain5_params *params, const double x[15],
+    double out[restrict 11])
 {
-    const double x1 = x[0];
-    const double y1 = x[1];
-    const double z1 = x[2];
-    const double x2 = x[3];
-    const double y2 = x[4];
-    const double z2 = x[5];
-    const double x3 = x[6];
-    const double y3 = x[7];
-    const double z3 = x[8];
-    const double x4 = x[9];
-    const double y4 = x[10];
-    const double z4 = x[11];
-    const double x5 = x[12];
-    const double y5 = x[13];
-    const double z5 = x[14];
-    const double t1 = params->J * z4;
-    const double t2 = params->J * z1;
-    const double t3 = t1 + t2;
-    const double t4 = params->J * y1;
-    const double t5 = params->J * y4;
-    const double t6 = t4 + t5;
-    const double t7 = params->J * x4;
-    const double t8 = params->J * x1;
-    const double t9 = t7 + t8;
-    const double t10 = params->J * x5;
-    const double t11 = params->J * x3;
-    const double t12 = t10 + t11;
-    const double t13 = params->J * z2;
-    const double t14 = t1 + t13;
-    const double t15 = params->J * y5;
-    const double t16 = params->J * y3;
-    const double t17 = t15 + t16;
-    const double t18 = params->J * z5;
-    const double t19 = params->J * z3;
-    const double t20 = t18 + t19;
-    const double t21 = params->J * y2;
-    const double t22 = t21 + t5;
-    const double t23 = params->J * x2;
-    const double t24 = t7 + t23;
-    const double t25 = t2 + t19;
-    const double t26 = t4 + t16;
-    const double t27 = t10 + t23;
-    const double t28 = t15 + t21;
-    const double t29 = t11 + t8;
+    const double x1 = x[0], y1 = x[1], z1 = x[2], x2 = x[3], y2 = x[4], z2 = x[5], x3 = x[6], y3 = x[7], z3 =
+        x[8], x4 = x[9], y4 = x[10], z4 = x[11], x5 = x[12], y5 = x[13], z5 = x[14];
+    const double t1 = params->J * z4, t2 = params->J * z1, t3 = t1 + t2, t4 = params->J * y1;
+    const double t5 = params->J * y4, t6 = t4 + t5, t7 = params->J * x4, t8 = params->J * x1;
+    const double t9 = t7 + t8, t10 = params->J * x5, t11 = params->J * x3, t12 = t10 + t11;
+    const double t13 = params->J * z2, t14 = t1 + t13, t15 = params->J * y5, t16 = params->J * y3;
+    const double t17 = t15 + t16, t18 = params->J * z5, t19 = params->J * z3, t20 = t18 + t19;
+    const double t21 = params->J * y2, t22 = t21 + t5, t23 = params->J * x2, t24 = t7 + t23;
+    const double t25 = t2 + t19, t26 = t4 + t16, t27 = t10 + t23, t28 = t15 + t21, t29 = t11 + t8;
     const double t30 = t18 + t13;
-    const double t31 = t22 * t22 + t24 * t24 + (t25 * t25 + t26 * t26) + (t27 * t27 + t28 * t28 + (t29 * t29 + t30 * t30));
+    const double t31 = t22 * t22 + t24 * t24 + (t25 * t25 + t26 * t26) + (t27 * t27 + t28 * t28
+        + (t29 * t29 + t30 * t30));
     out[0] = t3 * t3 + (t6 * t6 + t9 * t9) + (t12 * t12 + t14 * t14 + (t17 * t17 + t20 * t20)) + t31;
     out[1] = (-2.0) * (x1 * t27) - 2.0 * (y1 * t28) - 2.0 * (z1 * t30);
     out[2] = 4.0 * (z1 * z1) + (4.0 * (y1 * y1) + 4.0 * (x1 * x1));
@@ -2509,2860 +1807,25 @@ static void spin_chain5_products(const spin_chain5_params *params, const double 
     out[10] = 4.0 * (z5 * z5) + (4.0 * (y5 * y5) + 4.0 * (x5 * x5));
 }
 
-enum { spin_chain5_SAMPLES = 32 };
-
-/* Sum of |pi grad S_3|^2, the leading error of the method, over sampled states. */
-static double spin_chain5_gauge_error(const spin_chain5_params *params, const double gauge[5],
-                                     double samples[][15])
-{
-    double error[15], sum = 0.0;
-    for (int k = 0; k < spin_chain5_SAMPLES; ++k) {
-        spin_chain5_guide(params, gauge, samples[k], error);
-        for (int i = 0; i < 15; ++i) sum += error[i] * error[i];
-    }
-    return sum;
-}
-
-/* A short piece of the trajectory from x, by a Runge-Kutta method with steps of a fixed change. */
-static void spin_chain5_sample(const spin_chain5_params *params, const double x[15], double samples[][15])
-{
-    double y[15], z[15], k1[15], k2[15], size = 0.0, speed = DBL_MIN;
-    memcpy(y, x, sizeof y);
-    spin_chain5_vector_field(params, y, k1);
-    for (int i = 0; i < 15; ++i) {
-        size += fabs(y[i]);
-        speed += fabs(k1[i]);
-    }
-    const double h = 0.25 * size / speed;
-    for (int k = 0; k < spin_chain5_SAMPLES; ++k) {
-        memcpy(samples[k], y, sizeof y);
-        spin_chain5_vector_field(params, y, k1);
-        for (int i = 0; i < 15; ++i) z[i] = y[i] + 0.5 * h * k1[i];
-        spin_chain5_vector_field(params, z, k2);
-        for (int i = 0; i < 15; ++i) y[i] += h * k2[i];
-    }
-}
-
-/* The error where one multiple varies, of centre + (j - 3) width for j = 0 ... 6, as forward differences: S_3 is cubic in H,
-   so these are those of a polynomial of degree six. Their size, before. */
-static double spin_chain5_gauge_line(const spin_chain5_params *params, const double gauge[5], int c, double width,
-    double samples[][15], double difference[7])
-{
-    double moved[5], size = 0.0;
-    memcpy(moved, gauge, sizeof moved);
-    for (int j = 0; j < 7; ++j) {
-        moved[c] = gauge[c] + (j - 3) * width;
-        difference[j] = spin_chain5_gauge_error(params, moved, samples);
-        size += difference[j];
-    }
-    for (int order = 1; order < 7; ++order)
-        for (int j = 6; j >= order; --j) difference[j] -= difference[j - 1];
-    return size;
-}
-
-/* Its value at centre + t width, by Newton's formula. */
-static double spin_chain5_on_line(const double difference[7], double t)
-{
-    double error = difference[6];
-    for (int k = 5; k >= 0; --k) error = difference[k] + (t + 3.0 - k) / (k + 1) * error;
-    return error;
-}
-
-/* Where it is least: the best t on grids, each finer than the one before. */
-static double spin_chain5_least_on_line(const double difference[7], double size)
-{
-    const double mesh[3] = { 0.125, 1.0 / 64.0, 1.0 / 512.0 };
-    double best = 0.0, least = spin_chain5_on_line(difference, best);
-    for (int level = 0; level < 3; ++level) {
-        const int reach = level == 0 ? 24 : 8;
-        const double centre = best;
-        for (int j = -reach; j <= reach; ++j) {
-            const double t = centre + j * mesh[level], error = spin_chain5_on_line(difference, t);
-            if (error < least - 1e-12 * size) { /* close calls are not decided by rounding */
-                least = error;
-                best = t;
-            }
-        }
-    }
-    return best;
-}
-
-/* The lambda that minimise the leading error along a short piece of the trajectory, one after the other, from the
-   least-squares solution of grad H = sum of lambda grad C. Zero where that gives nothing finite. */
-static void spin_chain5_choose_gauge(const spin_chain5_params *params, const double x[15], double gauge[5])
-{
-    double samples[spin_chain5_SAMPLES][15], out[11], sums[11] = { 0.0 }, width[5];
-    spin_chain5_sample(params, x, samples);
-    for (int k = 0; k < spin_chain5_SAMPLES; ++k) {
-        spin_chain5_products(params, samples[k], out);
-        for (int i = 0; i < 11; ++i) sums[i] += out[i];
-    }
-    for (int c = 0; c < 5; ++c) {
-        const double norm = sums[2 + 2 * c] > 0.0 ? sums[2 + 2 * c] : HUGE_VAL;
-        gauge[c] = sums[1 + 2 * c] / norm;
-        width[c] = sqrt(sums[0] / norm);
-    }
-    for (int sweep = 0, moved = 1; sweep < 4 && moved; ++sweep) {
-        moved = 0;
-        for (int c = 0; c < 5; ++c) {
-            double difference[7];
-            const double size = spin_chain5_gauge_line(params, gauge, c, width[c], samples, difference);
-            const double best = spin_chain5_least_on_line(difference, size);
-            gauge[c] += best * width[c];
-            moved = moved || best != 0.0;
-        }
-    }
-    if (!isfinite(spin_chain5_gauge_error(params, gauge, samples)))
-        for (int c = 0; c < 5; ++c) gauge[c] = 0.0;
-}
-
-/* Start at x0 with a gauge of one's own, e.g. that of another trajectory: see spin_chain5_solver. */
-spin_chain5_status spin_chain5_init_gauge(spin_chain5_solver *s, const spin_chain5_params *params,
-                                          const double x0[15], const double gauge[5])
-{
-    double own[5];
-    if (gauge == NULL) return spin_chain5_init(s, params, x0);
-    memcpy(own, gauge, sizeof own);
-    for (int c = 0; c < 5; ++c)
-        if (!isfinite(own[c])) return spin_chain5_BAD_ARGUMENT;
-    const spin_chain5_status status = spin_chain5_start(s, params, x0);
-    if (status == spin_chain5_OK) memcpy(s->gauge, own, sizeof s->gauge);
-    return status;
-}
-
-spin_chain5_status spin_chain5_init(spin_chain5_solver *s, const spin_chain5_params *params,
-                                    const double x0[15])
-{
-    const spin_chain5_status status = spin_chain5_start(s, params, x0);
-    if (status == spin_chain5_OK) spin_chain5_choose_gauge(&s->params, s->x, s->gauge);
-    return status;
-}
-
-/* What depends on the step size; nothing where that is as before. */
-static spin_chain5_status spin_chain5_set_step(spin_chain5_solver *s, double h)
-{
-    if (s == NULL || !isfinite(h)) return spin_chain5_BAD_ARGUMENT;
-    if (s->ready && memcmp(&h, &s->h, sizeof h) == 0) return spin_chain5_OK;
-    for (int stage = 0; stage < 1; ++stage)
-        spin_chain5_prepare(&s->params, s->gauge, spin_chain5_fractions[stage] * h, s->coef[stage]);
-    memset(s->memory, 0, sizeof s->memory);
-    for (int stage = 0; stage < 1; ++stage) s->memory[stage].patience = 150;
-    s->pause = 16;
-    s->setback = s->foreseeing = 0;
-    s->doubt = s->retry = 0;
-    s->effort = 0.0;
-    s->passes = INT_MAX;
-    s->h = h;
-    s->ready = 1;
-    return spin_chain5_OK;
-}
-
-spin_chain5_status spin_chain5_step(spin_chain5_solver *s, double h)
-{
-    spin_chain5_status status = spin_chain5_set_step(s, h);
-    if (status != spin_chain5_OK) return status;
-    status = spin_chain5_stages(s);
-    if (status == spin_chain5_OK) ++s->steps;
-    return status;
-}
-
-/*
- * Eight at a time: below, the formulas of a step are evaluated for 8 steps of a trajectory, or members of an
- * ensemble, at once. Compilers make vector instructions of the loops over lanes.
- */
-enum { spin_chain5_LANES = 8 };
-
-#if defined(__GNUC__)
-typedef double spin_chain5_lanes[spin_chain5_LANES] __attribute__((aligned(64))); /* a value in each lane */
-#else
-typedef double spin_chain5_lanes[spin_chain5_LANES];
-#endif
-
-#if defined(__clang__)
-#define spin_chain5_EACH_LANE _Pragma("clang loop vectorize(assume_safety)")
-#pragma clang diagnostic push
-#pragma clang diagnostic ignored "-Wpass-failed"
-#elif defined(__GNUC__)
-#define spin_chain5_EACH_LANE _Pragma("GCC ivdep") _Pragma("GCC unroll 1")
-#else
-#define spin_chain5_EACH_LANE
-#endif
-
-/* What all blocks share: coefficients, the same in each lane, and the recurrences by which they are foreseen. */
-typedef struct {
-    int fits[1]; /* the fit that weight is of; -1 for none */
-    spin_chain5_lanes coef[1][33], weight[1][40][15];
-} spin_chain5_table;
-
-/* A stage in all lanes, linearised around y. */
-typedef struct {
-    spin_chain5_lanes y[15], displacement[15], increment[15], residual[15];
-    /* a residual r of alpha(y) = x takes inverse r from y, and gain r from the increment */
-    spin_chain5_lanes inverse[225], slope[225], gain[225];
-} spin_chain5_model;
-
-/* spin_chain5_phi0 for the loops over lanes: no branches. No number beyond |s| = 4.0. */
-static inline double spin_chain5_phi0_lane(double s)
-{
-    const double ss = s * s;
-    double sum = 1.455172475614865e-27, other = 5.744790668872202e-26; /* every second term each, as neither then is waited for */
-    sum = sum * ss + 2.267952452337683e-24;
-    other = other * ss + 8.953517427037546e-23;
-    sum = sum * ss + 3.534707039629467e-21;
-    other = other * ss + 1.3954464685812522e-19;
-    sum = sum * ss + 5.5090028283602295e-18;
-    other = other * ss + 2.174868698558062e-16;
-    sum = sum * ss + 8.586062056277845e-15;
-    other = other * ss + 3.3896802963225827e-13;
-    sum = sum * ss + 1.3382536530684679e-11;
-    other = other * ss + 5.284190138687493e-10;
-    sum = sum * ss + 2.08767569878681e-08;
-    other = other * ss + 8.267195767195768e-07;
-    sum = sum * ss + 3.306878306878307e-05;
-    other = other * ss + 0.001388888888888889;
-    sum = (sum * s + other) * s + 0.08333333333333333;
-    return sum + (fabs(s) <= 4.0 ? 0.0 : (double)NAN);
-}
-
-/* spin_chain5_phi1 for the loops over lanes: no branches. No number beyond |s| = 4.0. */
-static inline double spin_chain5_phi1_lane(double s)
-{
-    const double ss = s * s;
-    double sum = 6.266191399131027e-28, other = 2.328275960983784e-26; /* every second term each, as neither then is waited for */
-    sum = sum * ss + 8.617186003308303e-25;
-    other = other * ss + 3.1751334332727565e-23;
-    sum = sum * ss + 1.163957265514881e-21;
-    other = other * ss + 4.241648447555361e-20;
-    sum = sum * ss + 1.5349911154393775e-18;
-    other = other * ss + 5.5090028283602297e-17;
-    sum = sum * ss + 1.9573818287022555e-15;
-    other = other * ss + 6.868849645022276e-14;
-    sum = sum * ss + 2.372776207425808e-12;
-    other = other * ss + 8.029521918410807e-11;
-    sum = sum * ss + 2.6420950693437467e-09;
-    other = other * ss + 8.35070279514724e-08;
-    sum = sum * ss + 2.48015873015873e-06;
-    other = other * ss + 6.613756613756614e-05;
-    sum = (sum * s + other) * s + 0.001388888888888889;
-    return sum + (fabs(s) <= 4.0 ? 0.0 : (double)NAN);
-}
-
-/* spin_chain5_linearise_lanes_part1 (part 1 of 7) */
-spin_chain5_APART static void spin_chain5_linearise_lanes_part1(spin_chain5_lanes coef[restrict 33],
-                                                                spin_chain5_lanes y[restrict 15],
-                                                                spin_chain5_lanes displacement[restrict 15],
-                                                                spin_chain5_lanes increment[restrict 15],
-                                                                spin_chain5_lanes jacobian[restrict 225],
-                                                                spin_chain5_lanes increment_jacobian[restrict 225],
-                                                                spin_chain5_lanes work[restrict 517])
-{
-    (void)jacobian;
-    (void)increment_jacobian;
-    spin_chain5_EACH_LANE
-    for (int lane = 0; lane < spin_chain5_LANES; ++lane) {
-        const double x1 = y[0][lane];
-        const double y1 = y[1][lane];
-        const double z1 = y[2][lane];
-        const double x2 = y[3][lane];
-        const double y2 = y[4][lane];
-        const double z2 = y[5][lane];
-        const double x3 = y[6][lane];
-        const double y3 = y[7][lane];
-        const double z3 = y[8][lane];
-        const double x4 = y[9][lane];
-        const double y4 = y[10][lane];
-        const double z4 = y[11][lane];
-        const double x5 = y[12][lane];
-        const double y5 = y[13][lane];
-        const double z5 = y[14][lane];
-        work[20][lane] = coef[3][lane] * x5;
-        work[50][lane] = coef[3][lane] * x4;
-        work[14][lane] = work[20][lane] + (coef[5][lane] * x2 + work[50][lane]);
-        const double t4 = coef[9][lane] * z2 + coef[8][lane] * z5;
-        const double t5 = x1 * t4;
-        const double t6 = coef[13][lane] * x2;
-        work[116][lane] = coef[12][lane] * x5 + t6;
-        work[37][lane] = x5 * z4;
-        work[36][lane] = x4 * z5;
-        const double t10 = coef[3][lane] * work[37][lane] + coef[4][lane] * work[36][lane];
-        const double t11 = coef[6][lane] * z2;
-        work[128][lane] = coef[4][lane] * z4;
-        work[126][lane] = t11 + work[128][lane];
-        const double t14 = t10 + x3 * work[126][lane];
-        work[117][lane] = z3 * work[14][lane] + (t5 + (z1 * work[116][lane] + t14));
-        work[27][lane] = coef[3][lane] * y5;
-        work[52][lane] = coef[3][lane] * y4;
-        work[9][lane] = work[27][lane] + (coef[5][lane] * y2 + work[52][lane]);
-        const double t19 = y1 * t4;
-        const double t20 = coef[13][lane] * y2;
-        work[106][lane] = t20 + coef[12][lane] * y5;
-        work[38][lane] = y5 * z4;
-        work[39][lane] = y4 * z5;
-        const double t24 = coef[3][lane] * work[38][lane] + coef[4][lane] * work[39][lane];
-        const double t25 = y3 * work[126][lane] + t24;
-        work[121][lane] = z3 * work[9][lane] + (t19 + (z1 * work[106][lane] + t25));
-        const double t27 = coef[8][lane] * z2 + coef[7][lane] * z5;
-        work[65][lane] = x1 * t27;
-        work[61][lane] = coef[3][lane] * z4;
-        work[8][lane] = coef[4][lane] * z2;
-        work[127][lane] = work[61][lane] + work[8][lane];
-        work[66][lane] = x3 * work[127][lane];
-        work[35][lane] = coef[1][lane] * z5;
-        work[119][lane] = coef[4][lane] * z3;
-        work[137][lane] = work[35][lane] + work[119][lane];
-        work[67][lane] = x4 * work[137][lane];
-        work[62][lane] = coef[11][lane] * z1;
-        const double t38 = coef[2][lane] * z4 + work[62][lane];
-        work[147][lane] = x5 * t38;
-        work[148][lane] = work[65][lane] + (work[66][lane] + (work[67][lane] + work[147][lane]));
-        work[40][lane] = coef[0][lane] * z5;
-        work[13][lane] = coef[0][lane] * z2;
-        work[80][lane] = y1 * t27;
-        work[81][lane] = y3 * work[127][lane];
-        work[160][lane] = y5 * t38;
-        work[82][lane] = y4 * work[137][lane];
-        work[161][lane] = work[80][lane] + (work[81][lane] + (work[160][lane] + work[82][lane]));
-        work[101][lane] = x2 * work[117][lane] + (y2 * work[121][lane] + (x5 * work[148][lane] + (work[40][lane] + (coef[10][lane] * z1 + work[13][lane]) + y5 * work[161][lane])));
-        work[113][lane] = work[101][lane] * work[101][lane];
-        work[115][lane] = coef[8][lane] * y5 + coef[9][lane] * y2;
-        const double t50 = x1 * work[115][lane];
-        work[43][lane] = x5 * y4;
-        work[44][lane] = x4 * y5;
-        const double t53 = coef[3][lane] * work[43][lane] + coef[4][lane] * work[44][lane];
-        work[129][lane] = coef[4][lane] * y4;
-        const double t55 = coef[6][lane] * y2;
-        work[131][lane] = work[129][lane] + t55;
-        const double t57 = t53 + x3 * work[131][lane];
-        work[120][lane] = y3 * work[14][lane] + (t50 + (y1 * work[116][lane] + t57));
-        work[7][lane] = coef[3][lane] * z5;
-        work[23][lane] = work[7][lane] + (coef[5][lane] * z2 + work[61][lane]);
-        const double t61 = coef[13][lane] * z2;
-        work[107][lane] = coef[12][lane] * z5 + t61;
-        work[12][lane] = coef[4][lane] * work[38][lane] + coef[3][lane] * work[39][lane];
-        const double t64 = z1 * work[115][lane] + (work[12][lane] + z3 * work[131][lane]);
-        work[125][lane] = y3 * work[23][lane] + (y1 * work[107][lane] + t64);
-        work[114][lane] = coef[7][lane] * y5 + coef[8][lane] * y2;
-        work[76][lane] = x1 * work[114][lane];
-        work[28][lane] = coef[4][lane] * y2;
-        work[130][lane] = work[52][lane] + work[28][lane];
-        work[77][lane] = x3 * work[130][lane];
-        work[118][lane] = coef[4][lane] * y3;
-        work[47][lane] = coef[1][lane] * y5;
-        work[142][lane] = work[118][lane] + work[47][lane];
-        work[79][lane] = x4 * work[142][lane];
-        work[53][lane] = coef[11][lane] * y1;
-        const double t76 = work[53][lane] + coef[2][lane] * y4;
-        work[154][lane] = x5 * t76;
-        work[155][lane] = work[76][lane] + (work[77][lane] + (work[79][lane] + work[154][lane]));
-        work[48][lane] = coef[0][lane] * y5;
-        work[34][lane] = coef[0][lane] * y2;
-        work[58][lane] = z1 * work[114][lane];
-        work[59][lane] = z3 * work[130][lane];
-        work[60][lane] = z4 * work[142][lane];
-        work[167][lane] = z5 * t76;
-        work[168][lane] = work[58][lane] + (work[59][lane] + (work[60][lane] + work[167][lane]));
-        work[108][lane] = x2 * work[120][lane] + (z2 * work[125][lane] + (x5 * work[155][lane] + (work[48][lane] + (work[34][lane] + coef[10][lane] * y1) + z5 * work[168][lane])));
-        work[112][lane] = work[108][lane] * work[108][lane];
-        work[99][lane] = coef[9][lane] * x2 + coef[8][lane] * x5;
-        work[134][lane] = coef[4][lane] * x4;
-        const double t89 = coef[6][lane] * x2;
-        work[132][lane] = work[134][lane] + t89;
-        work[31][lane] = coef[4][lane] * work[43][lane] + coef[3][lane] * work[44][lane];
-        const double t92 = y1 * work[99][lane] + (y3 * work[132][lane] + work[31][lane]);
-        work[122][lane] = x3 * work[9][lane] + (x1 * work[106][lane] + t92);
-        work[17][lane] = coef[3][lane] * work[36][lane] + coef[4][lane] * work[37][lane];
-        const double t95 = z1 * work[99][lane] + (work[17][lane] + z3 * work[132][lane]);
-        work[124][lane] = x3 * work[23][lane] + (x1 * work[107][lane] + t95);
-        work[98][lane] = coef[8][lane] * x2 + coef[7][lane] * x5;
-        work[92][lane] = y1 * work[98][lane];
-        work[19][lane] = coef[4][lane] * x2;
-        work[133][lane] = work[19][lane] + work[50][lane];
-        work[93][lane] = y3 * work[133][lane];
-        work[123][lane] = coef[4][lane] * x3;
-        work[42][lane] = coef[1][lane] * x5;
-        work[145][lane] = work[123][lane] + work[42][lane];
-        work[94][lane] = y4 * work[145][lane];
-        work[51][lane] = coef[11][lane] * x1;
-        const double t107 = work[51][lane] + coef[2][lane] * x4;
-        work[162][lane] = y5 * t107;
-        work[163][lane] = work[92][lane] + (work[93][lane] + (work[94][lane] + work[162][lane]));
-        work[45][lane] = coef[0][lane] * x5;
-        work[26][lane] = coef[0][lane] * x2;
-        work[55][lane] = z1 * work[98][lane];
-        work[56][lane] = z3 * work[133][lane];
-        work[165][lane] = z5 * t107;
-        work[57][lane] = z4 * work[145][lane];
-        work[166][lane] = work[55][lane] + (work[56][lane] + (work[165][lane] + work[57][lane]));
-        work[109][lane] = y2 * work[122][lane] + (z2 * work[124][lane] + (y5 * work[163][lane] + (work[45][lane] + (coef[10][lane] * x1 + work[26][lane]) + z5 * work[166][lane])));
-        work[185][lane] = work[109][lane] * work[109][lane];
-        work[221][lane] = work[112][lane] + work[185][lane];
-        work[100][lane] = work[113][lane] + work[221][lane];
-        work[104][lane] = spin_chain5_phi0_lane(work[100][lane]);
-        work[217][lane] = z1 * work[109][lane];
-        work[103][lane] = x1 * work[101][lane];
-        work[102][lane] = work[217][lane] - work[103][lane];
-        work[110][lane] = x1 * work[108][lane];
-        work[175][lane] = y1 * work[109][lane];
-        work[111][lane] = work[110][lane] - work[175][lane];
-        work[105][lane] = work[101][lane] * work[102][lane] - work[108][lane] * work[111][lane];
-        work[171][lane] = y1 * work[101][lane];
-        work[218][lane] = z1 * work[108][lane];
-        work[172][lane] = work[171][lane] - work[218][lane];
-        work[169][lane] = work[109][lane] * work[111][lane] - work[101][lane] * work[172][lane];
-        work[215][lane] = work[108][lane] * work[172][lane] - work[109][lane] * work[102][lane];
-        work[239][lane] = work[7][lane] + (work[61][lane] + coef[19][lane] * z2);
-        const double t134 = coef[20][lane] * z5 + t61;
-        work[143][lane] = coef[4][lane] * x5;
-        const double t136 = work[143][lane] + t89;
-        work[24][lane] = z1 * t136;
-        work[18][lane] = coef[18][lane] * z2;
-        const double t139 = coef[14][lane] * z4 + work[18][lane];
-        work[240][lane] = x3 * t139;
-        work[245][lane] = coef[16][lane] * x2 + coef[15][lane] * x4;
-        work[25][lane] = z3 * work[245][lane] + t10;
-        work[241][lane] = work[24][lane] + (work[240][lane] + work[25][lane]);
-        work[41][lane] = coef[0][lane] * z3;
-        work[54][lane] = coef[0][lane] * z1;
-        work[141][lane] = coef[4][lane] * y5;
-        const double t147 = work[141][lane] + t55;
-        work[32][lane] = z1 * t147;
-        work[246][lane] = y3 * t139;
-        work[234][lane] = coef[15][lane] * y4 + coef[16][lane] * y2;
-        work[33][lane] = z3 * work[234][lane] + t24;
-        work[247][lane] = work[32][lane] + (work[246][lane] + work[33][lane]);
-        work[2][lane] = x1 * (x3 * work[239][lane] + (x1 * t134 + t95)) + (y1 * (y3 * work[239][lane] + (y1 * t134 + t64)) + (x3 * work[241][lane] + (work[41][lane] + (coef[17][lane] * z2 + work[54][lane]) + y3 * work[247][lane])));
-        work[242][lane] = work[20][lane] + (coef[19][lane] * x2 + work[50][lane]);
-        const double t154 = coef[20][lane] * x5 + t6;
-        work[29][lane] = x1 * t147;
-        work[30][lane] = x3 * work[234][lane];
-        work[5][lane] = coef[18][lane] * x2;
-        const double t158 = work[5][lane] + coef[14][lane] * x4;
-        work[243][lane] = y3 * t158;
-        work[244][lane] = work[29][lane] + (work[30][lane] + (work[243][lane] + work[31][lane]));
-        work[46][lane] = coef[0][lane] * x3;
-        work[72][lane] = coef[0][lane] * x1;
-        work[136][lane] = coef[4][lane] * z5;
-        const double t164 = t11 + work[136][lane];
-        work[15][lane] = x1 * t164;
-        work[235][lane] = coef[15][lane] * z4 + coef[16][lane] * z2;
-        work[16][lane] = x3 * work[235][lane];
-        work[248][lane] = z3 * t158;
-        work[249][lane] = work[15][lane] + (work[16][lane] + (work[17][lane] + work[248][lane]));
-        work[0][lane] = y1 * (y3 * work[242][lane] + (t50 + (y1 * t154 + t57))) + (z1 * (z3 * work[242][lane] + (t5 + (z1 * t154 + t14))) + (y3 * work[244][lane] + (work[46][lane] + (work[72][lane] + coef[17][lane] * x2) + z3 * work[249][lane])));
-        work[320][lane] = z2 * work[0][lane];
-        work[226][lane] = x2 * work[2][lane];
-        work[3][lane] = work[320][lane] - work[226][lane];
-        work[236][lane] = work[27][lane] + (coef[19][lane] * y2 + work[52][lane]);
-        const double t174 = coef[20][lane] * y5 + t20;
-        work[21][lane] = y1 * t136;
-        work[6][lane] = coef[18][lane] * y2;
-        const double t177 = work[6][lane] + coef[14][lane] * y4;
-        work[237][lane] = x3 * t177;
-        work[22][lane] = y3 * work[245][lane] + t53;
-        work[238][lane] = work[21][lane] + (work[237][lane] + work[22][lane]);
-        work[49][lane] = coef[0][lane] * y3;
-        work[87][lane] = coef[0][lane] * y1;
-        work[10][lane] = y1 * t164;
-        work[11][lane] = y3 * work[235][lane];
-        work[250][lane] = z3 * t177;
-        work[251][lane] = work[10][lane] + (work[11][lane] + (work[250][lane] + work[12][lane]));
-        work[4][lane] = x1 * (x3 * work[236][lane] + (x1 * t174 + t92)) + (z1 * (z3 * work[236][lane] + (t19 + (z1 * t174 + t25))) + (x3 * work[238][lane] + (work[49][lane] + (work[87][lane] + coef[17][lane] * y2) + z3 * work[251][lane])));
-        work[1][lane] = x2 * work[4][lane];
-        increment[1][lane] = work[102][lane];
-        increment[2][lane] = work[111][lane];
-        displacement[0][lane] = work[104][lane] * work[105][lane] - 0.5 * work[172][lane];
-        increment[0][lane] = work[172][lane];
-        displacement[1][lane] = work[104][lane] * work[169][lane] - 0.5 * work[102][lane];
-        displacement[2][lane] = work[104][lane] * work[215][lane] - 0.5 * work[111][lane];
-        increment[4][lane] = work[3][lane];
-    }
-}
-
-/* spin_chain5_linearise_lanes_part2 (part 2 of 7) */
-spin_chain5_APART static void spin_chain5_linearise_lanes_part2(spin_chain5_lanes coef[restrict 33],
-                                                                spin_chain5_lanes y[restrict 15],
-                                                                spin_chain5_lanes displacement[restrict 15],
-                                                                spin_chain5_lanes increment[restrict 15],
-                                                                spin_chain5_lanes jacobian[restrict 225],
-                                                                spin_chain5_lanes increment_jacobian[restrict 225],
-                                                                spin_chain5_lanes work[restrict 517])
-{
-    (void)jacobian;
-    (void)increment_jacobian;
-    spin_chain5_EACH_LANE
-    for (int lane = 0; lane < spin_chain5_LANES; ++lane) {
-        const double x1 = y[0][lane];
-        const double y1 = y[1][lane];
-        const double z1 = y[2][lane];
-        const double x2 = y[3][lane];
-        const double y2 = y[4][lane];
-        const double z2 = y[5][lane];
-        const double x3 = y[6][lane];
-        const double y3 = y[7][lane];
-        const double z3 = y[8][lane];
-        const double x4 = y[9][lane];
-        const double y4 = y[10][lane];
-        const double z4 = y[11][lane];
-        const double x5 = y[12][lane];
-        const double y5 = y[13][lane];
-        const double z5 = y[14][lane];
-        work[282][lane] = y2 * work[0][lane];
-        work[225][lane] = work[1][lane] - work[282][lane];
-        work[224][lane] = work[2][lane] * work[3][lane] - work[4][lane] * work[225][lane];
-        work[230][lane] = work[2][lane] * work[2][lane];
-        work[298][lane] = work[0][lane] * work[0][lane];
-        work[231][lane] = work[4][lane] * work[4][lane];
-        work[325][lane] = work[298][lane] + work[231][lane];
-        work[222][lane] = work[230][lane] + work[325][lane];
-        work[223][lane] = spin_chain5_phi0_lane(work[222][lane]);
-        work[289][lane] = y2 * work[2][lane];
-        work[322][lane] = z2 * work[4][lane];
-        work[290][lane] = work[289][lane] - work[322][lane];
-        work[283][lane] = work[0][lane] * work[225][lane] - work[2][lane] * work[290][lane];
-        work[319][lane] = work[4][lane] * work[290][lane] - work[0][lane] * work[3][lane];
-        work[342][lane] = work[5][lane] + coef[26][lane] * x4;
-        work[337][lane] = work[6][lane] + coef[26][lane] * y4;
-        const double t204 = work[7][lane] + work[8][lane];
-        const double t205 = x1 * t204;
-        const double t206 = coef[23][lane] * z4 + coef[15][lane] * z2;
-        const double t207 = x3 * t206;
-        const double t208 = coef[25][lane] * z3;
-        const double t209 = t208 + coef[21][lane] * z5;
-        work[344][lane] = x4 * t209;
-        const double t211 = coef[22][lane] * z4;
-        work[265][lane] = coef[4][lane] * z1;
-        work[361][lane] = t211 + work[265][lane];
-        const double t214 = x5 * work[361][lane];
-        work[345][lane] = t205 + (t207 + (work[344][lane] + t214));
-        const double t216 = coef[0][lane] * z4;
-        const double t217 = y1 * t204;
-        const double t218 = y3 * t206;
-        const double t219 = y5 * work[361][lane];
-        work[351][lane] = y4 * t209;
-        work[352][lane] = t217 + (t218 + (t219 + work[351][lane]));
-        const double t222 = y2 * (z1 * work[9][lane] + (work[10][lane] + (work[11][lane] + (work[12][lane] + z3 * work[337][lane])))) + (x4 * work[345][lane] + (t216 + (coef[24][lane] * z3 + work[13][lane]) + y4 * work[352][lane]));
-        work[327][lane] = x2 * (z1 * work[14][lane] + (work[15][lane] + (work[16][lane] + (work[17][lane] + z3 * work[342][lane])))) + t222;
-        work[338][lane] = work[18][lane] + coef[26][lane] * z4;
-        const double t224 = work[19][lane] + work[20][lane];
-        const double t225 = y1 * t224;
-        work[336][lane] = coef[23][lane] * x4 + coef[15][lane] * x2;
-        const double t227 = y3 * work[336][lane];
-        const double t228 = coef[25][lane] * x3;
-        const double t229 = t228 + coef[21][lane] * x5;
-        work[354][lane] = y4 * t229;
-        const double t231 = coef[22][lane] * x4;
-        work[273][lane] = coef[4][lane] * x1;
-        work[365][lane] = t231 + work[273][lane];
-        const double t234 = y5 * work[365][lane];
-        work[355][lane] = t225 + (t227 + (work[354][lane] + t234));
-        work[71][lane] = coef[0][lane] * x4;
-        const double t237 = z1 * t224;
-        const double t238 = z3 * work[336][lane];
-        work[357][lane] = z4 * t229;
-        const double t240 = z5 * work[365][lane];
-        work[358][lane] = t237 + (t238 + (work[357][lane] + t240));
-        work[333][lane] = y2 * (x1 * work[9][lane] + (work[21][lane] + (x3 * work[337][lane] + work[22][lane]))) + (z2 * (x1 * work[23][lane] + (work[24][lane] + (x3 * work[338][lane] + work[25][lane]))) + (y4 * work[355][lane] + (work[71][lane] + (work[26][lane] + coef[24][lane] * x3) + z4 * work[358][lane])));
-        work[410][lane] = z3 * work[333][lane];
-        work[329][lane] = x3 * work[327][lane];
-        work[328][lane] = work[410][lane] - work[329][lane];
-        const double t245 = work[27][lane] + work[28][lane];
-        const double t246 = x1 * t245;
-        work[341][lane] = coef[15][lane] * y2 + coef[23][lane] * y4;
-        const double t248 = x3 * work[341][lane];
-        const double t249 = coef[22][lane] * y4;
-        work[263][lane] = coef[4][lane] * y1;
-        work[364][lane] = t249 + work[263][lane];
-        const double t252 = x5 * work[364][lane];
-        const double t253 = coef[25][lane] * y3;
-        const double t254 = coef[21][lane] * y5 + t253;
-        work[349][lane] = x4 * t254;
-        work[350][lane] = t246 + (t248 + (t252 + work[349][lane]));
-        work[88][lane] = coef[0][lane] * y4;
-        const double t258 = z1 * t245;
-        const double t259 = z3 * work[341][lane];
-        work[359][lane] = z4 * t254;
-        const double t261 = z5 * work[364][lane];
-        work[360][lane] = t258 + (t259 + (work[359][lane] + t261));
-        work[332][lane] = x2 * (y1 * work[14][lane] + (work[29][lane] + (work[30][lane] + (work[31][lane] + y3 * work[342][lane])))) + (z2 * (y1 * work[23][lane] + (work[32][lane] + (y3 * work[338][lane] + work[33][lane]))) + (x4 * work[350][lane] + (work[88][lane] + (coef[24][lane] * y3 + work[34][lane]) + z4 * work[360][lane])));
-        work[334][lane] = x3 * work[332][lane];
-        work[370][lane] = y3 * work[333][lane];
-        work[335][lane] = work[334][lane] - work[370][lane];
-        work[331][lane] = work[327][lane] * work[328][lane] - work[332][lane] * work[335][lane];
-        work[339][lane] = work[327][lane] * work[327][lane];
-        work[381][lane] = work[333][lane] * work[333][lane];
-        work[340][lane] = work[332][lane] * work[332][lane];
-        work[413][lane] = work[381][lane] + work[340][lane];
-        work[326][lane] = work[339][lane] + work[413][lane];
-        work[330][lane] = spin_chain5_phi0_lane(work[326][lane]);
-        work[368][lane] = y3 * work[327][lane];
-        work[405][lane] = z3 * work[332][lane];
-        work[369][lane] = work[368][lane] - work[405][lane];
-        work[367][lane] = work[333][lane] * work[335][lane] - work[327][lane] * work[369][lane];
-        work[403][lane] = work[332][lane] * work[369][lane] - work[333][lane] * work[328][lane];
-        work[260][lane] = coef[14][lane] * x3;
-        work[353][lane] = coef[3][lane] * x1;
-        const double t280 = work[20][lane] + (work[260][lane] + work[353][lane]);
-        work[430][lane] = coef[30][lane] * x5 + t228;
-        work[255][lane] = coef[14][lane] * y3;
-        work[348][lane] = coef[3][lane] * y1;
-        const double t284 = work[27][lane] + (work[255][lane] + work[348][lane]);
-        work[424][lane] = coef[30][lane] * y5 + t253;
-        const double t286 = work[35][lane] + work[8][lane];
-        work[73][lane] = x1 * t286;
-        work[146][lane] = coef[2][lane] * x5;
-        work[434][lane] = coef[3][lane] * x2;
-        const double t290 = work[146][lane] + work[434][lane];
-        const double t291 = work[19][lane] + t231;
-        work[74][lane] = coef[27][lane] * work[36][lane] + coef[29][lane] * work[37][lane] + z3 * t291;
-        work[431][lane] = work[73][lane] + (z1 * t290 + work[74][lane]);
-        work[89][lane] = y1 * t286;
-        work[139][lane] = coef[2][lane] * y5;
-        work[432][lane] = coef[3][lane] * y2;
-        const double t297 = work[139][lane] + work[432][lane];
-        const double t298 = t249 + work[28][lane];
-        work[90][lane] = coef[29][lane] * work[38][lane] + coef[27][lane] * work[39][lane] + z3 * t298;
-        work[436][lane] = work[89][lane] + (z1 * t297 + work[90][lane]);
-        const double t301 = y3 * (z2 * t284 + (t258 + (t259 + (t261 + z4 * work[424][lane])))) + (x5 * work[431][lane] + (work[40][lane] + (work[41][lane] + coef[28][lane] * z4) + y5 * work[436][lane]));
-        work[415][lane] = x3 * (z2 * t280 + (t237 + (t238 + (t240 + z4 * work[430][lane])))) + t301;
-        work[427][lane] = work[415][lane] * work[415][lane];
-        work[343][lane] = coef[3][lane] * z1;
-        work[254][lane] = coef[14][lane] * z3;
-        const double t305 = work[7][lane] + (work[343][lane] + work[254][lane]);
-        work[425][lane] = t208 + coef[30][lane] * z5;
-        const double t307 = work[19][lane] + work[42][lane];
-        work[83][lane] = y1 * t307;
-        work[84][lane] = x3 * t298;
-        work[85][lane] = coef[27][lane] * work[43][lane] + coef[29][lane] * work[44][lane];
-        work[435][lane] = x1 * t297 + (work[83][lane] + (work[84][lane] + work[85][lane]));
-        work[140][lane] = coef[2][lane] * z5;
-        work[63][lane] = coef[3][lane] * z2;
-        const double t314 = work[140][lane] + work[63][lane];
-        const double t315 = z1 * t307;
-        const double t316 = coef[27][lane] * work[37][lane] + coef[29][lane] * work[36][lane];
-        const double t317 = t211 + work[8][lane];
-        const double t318 = x3 * t317;
-        work[437][lane] = x1 * t314 + (t315 + (t316 + t318));
-        const double t320 = z3 * (x2 * t305 + (t205 + (t207 + (x4 * work[425][lane] + t214)))) + (y5 * work[435][lane] + (work[45][lane] + (coef[28][lane] * x4 + work[46][lane]) + z5 * work[437][lane]));
-        work[417][lane] = y3 * (x2 * t284 + (t246 + (t248 + (t252 + x4 * work[424][lane])))) + t320;
-        work[443][lane] = work[417][lane] * work[417][lane];
-        const double t322 = work[28][lane] + work[47][lane];
-        work[68][lane] = x1 * t322;
-        work[70][lane] = coef[27][lane] * work[44][lane] + coef[29][lane] * work[43][lane] + y3 * t291;
-        work[433][lane] = work[68][lane] + (y1 * t290 + work[70][lane]);
-        const double t326 = z1 * t322;
-        const double t327 = coef[29][lane] * work[39][lane] + coef[27][lane] * work[38][lane];
-        const double t328 = y3 * t317;
-        work[438][lane] = y1 * t314 + (t326 + (t327 + t328));
-        const double t330 = z3 * (y2 * t305 + (t217 + (t218 + (y4 * work[425][lane] + t219)))) + (x5 * work[433][lane] + (work[48][lane] + (work[49][lane] + coef[28][lane] * y4) + z5 * work[438][lane]));
-        work[414][lane] = x3 * (y2 * t280 + (t225 + (t227 + (y4 * work[430][lane] + t234)))) + t330;
-        work[428][lane] = work[414][lane] * work[414][lane];
-        work[447][lane] = work[443][lane] + work[428][lane];
-        work[416][lane] = work[427][lane] + work[447][lane];
-        work[418][lane] = spin_chain5_phi0_lane(work[416][lane]);
-        work[445][lane] = z4 * work[417][lane];
-        work[421][lane] = x4 * work[415][lane];
-        work[420][lane] = work[445][lane] - work[421][lane];
-        work[422][lane] = x4 * work[414][lane];
-        work[439][lane] = y4 * work[417][lane];
-        work[423][lane] = work[422][lane] - work[439][lane];
-        work[419][lane] = work[415][lane] * work[420][lane] - work[414][lane] * work[423][lane];
-        work[441][lane] = y4 * work[415][lane];
-        work[446][lane] = z4 * work[414][lane];
-        work[442][lane] = work[441][lane] - work[446][lane];
-        work[440][lane] = work[417][lane] * work[423][lane] - work[415][lane] * work[442][lane];
-        work[444][lane] = work[414][lane] * work[442][lane] - work[417][lane] * work[420][lane];
-        work[276][lane] = coef[20][lane] * x1;
-        work[144][lane] = coef[3][lane] * x3;
-        work[91][lane] = work[50][lane] + (work[276][lane] + work[144][lane]);
-        work[95][lane] = work[51][lane] + coef[32][lane] * x4;
-        work[138][lane] = coef[3][lane] * y3;
-        work[261][lane] = coef[20][lane] * y1;
-        work[75][lane] = work[52][lane] + (work[138][lane] + work[261][lane]);
-        work[78][lane] = coef[32][lane] * y4 + work[53][lane];
-        work[366][lane] = coef[21][lane] * x4;
-        work[86][lane] = work[366][lane] + work[434][lane];
-        work[363][lane] = coef[21][lane] * y4;
-        work[69][lane] = work[363][lane] + work[432][lane];
-        const double t359 = x4 * (t315 + (t318 + (t316 + z3 * work[86][lane]))) + (coef[31][lane] * z5 + (work[54][lane] + t216) + y4 * (t326 + (t328 + (z3 * work[69][lane] + t327))));
-        work[97][lane] = x1 * (z2 * work[91][lane] + (work[55][lane] + (work[56][lane] + (z5 * work[95][lane] + work[57][lane])))) + (y1 * (z2 * work[75][lane] + (work[58][lane] + (work[59][lane] + (z5 * work[78][lane] + work[60][lane])))) + t359);
-        work[96][lane] = work[97][lane] * work[97][lane];
-        work[135][lane] = coef[3][lane] * z3;
-        work[262][lane] = coef[20][lane] * z1;
-        work[64][lane] = work[61][lane] + (work[135][lane] + work[262][lane]);
-        increment[5][lane] = work[225][lane];
-        displacement[3][lane] = work[224][lane] * work[223][lane] - 0.5 * work[290][lane];
-        increment[3][lane] = work[290][lane];
-        displacement[4][lane] = work[283][lane] * work[223][lane] - 0.5 * work[3][lane];
-        displacement[5][lane] = work[319][lane] * work[223][lane] - 0.5 * work[225][lane];
-        increment[7][lane] = work[328][lane];
-        increment[8][lane] = work[335][lane];
-        displacement[6][lane] = work[331][lane] * work[330][lane] - 0.5 * work[369][lane];
-        increment[6][lane] = work[369][lane];
-        displacement[7][lane] = work[367][lane] * work[330][lane] - 0.5 * work[328][lane];
-        displacement[8][lane] = work[403][lane] * work[330][lane] - 0.5 * work[335][lane];
-        increment[10][lane] = work[420][lane];
-        increment[11][lane] = work[423][lane];
-        displacement[9][lane] = work[418][lane] * work[419][lane] - 0.5 * work[442][lane];
-        increment[9][lane] = work[442][lane];
-        displacement[10][lane] = work[440][lane] * work[418][lane] - 0.5 * work[420][lane];
-        displacement[11][lane] = work[418][lane] * work[444][lane] - 0.5 * work[423][lane];
-    }
-}
-
-/* spin_chain5_linearise_lanes_part3 (part 3 of 7) */
-spin_chain5_APART static void spin_chain5_linearise_lanes_part3(spin_chain5_lanes coef[restrict 33],
-                                                                spin_chain5_lanes y[restrict 15],
-                                                                spin_chain5_lanes displacement[restrict 15],
-                                                                spin_chain5_lanes increment[restrict 15],
-                                                                spin_chain5_lanes jacobian[restrict 225],
-                                                                spin_chain5_lanes increment_jacobian[restrict 225],
-                                                                spin_chain5_lanes work[restrict 517])
-{
-    spin_chain5_EACH_LANE
-    for (int lane = 0; lane < spin_chain5_LANES; ++lane) {
-        const double x1 = y[0][lane];
-        const double y1 = y[1][lane];
-        const double z1 = y[2][lane];
-        const double x2 = y[3][lane];
-        const double y2 = y[4][lane];
-        const double z2 = y[5][lane];
-        const double x3 = y[6][lane];
-        const double y3 = y[7][lane];
-        const double z3 = y[8][lane];
-        const double x4 = y[9][lane];
-        const double y4 = y[10][lane];
-        const double z4 = y[11][lane];
-        const double x5 = y[12][lane];
-        const double y5 = y[13][lane];
-        const double z5 = y[14][lane];
-        work[472][lane] = work[62][lane] + coef[32][lane] * z4;
-        work[362][lane] = coef[21][lane] * z4;
-        const double t366 = work[362][lane] + work[63][lane];
-        const double t367 = z1 * (x2 * work[64][lane] + (work[65][lane] + (work[66][lane] + (work[67][lane] + x5 * work[472][lane])))) + (y4 * (work[68][lane] + (x3 * work[69][lane] + work[70][lane])) + (coef[31][lane] * x5 + (work[71][lane] + work[72][lane]) + z4 * (work[73][lane] + (x3 * t366 + work[74][lane]))));
-        work[454][lane] = y1 * (x2 * work[75][lane] + (work[76][lane] + (work[77][lane] + (x5 * work[78][lane] + work[79][lane])))) + t367;
-        work[507][lane] = work[454][lane] * work[454][lane];
-        const double t369 = z1 * (y2 * work[64][lane] + (work[80][lane] + (work[81][lane] + (y5 * work[472][lane] + work[82][lane])))) + (x4 * (work[83][lane] + (work[84][lane] + (work[85][lane] + y3 * work[86][lane]))) + (coef[31][lane] * y5 + (work[87][lane] + work[88][lane]) + z4 * (work[89][lane] + (y3 * t366 + work[90][lane]))));
-        work[453][lane] = x1 * (y2 * work[91][lane] + (work[92][lane] + (work[93][lane] + (work[94][lane] + y5 * work[95][lane])))) + t369;
-        work[473][lane] = work[453][lane] * work[453][lane];
-        work[513][lane] = work[507][lane] + work[473][lane];
-        work[448][lane] = work[96][lane] + work[513][lane];
-        work[451][lane] = spin_chain5_phi0_lane(work[448][lane]);
-        work[511][lane] = z5 * work[454][lane];
-        work[450][lane] = x5 * work[97][lane];
-        work[449][lane] = work[511][lane] - work[450][lane];
-        work[455][lane] = x5 * work[453][lane];
-        work[494][lane] = y5 * work[454][lane];
-        work[456][lane] = work[455][lane] - work[494][lane];
-        work[452][lane] = work[97][lane] * work[449][lane] - work[453][lane] * work[456][lane];
-        work[490][lane] = y5 * work[97][lane];
-        work[512][lane] = z5 * work[453][lane];
-        work[491][lane] = work[490][lane] - work[512][lane];
-        work[488][lane] = work[454][lane] * work[456][lane] - work[97][lane] * work[491][lane];
-        work[509][lane] = work[453][lane] * work[491][lane] - work[454][lane] * work[449][lane];
-        work[180][lane] = z5 * work[98][lane] + z2 * work[99][lane];
-        const double t387 = spin_chain5_phi1_lane(work[100][lane]);
-        work[170][lane] = work[101][lane] * t387;
-        work[216][lane] = 0.5 * y1;
-        work[156][lane] = (work[102][lane] - work[103][lane]) * work[104][lane] + 2.0 * (work[105][lane] * work[170][lane]) - work[216][lane];
-        const double t391 = y2 * work[106][lane];
-        const double t392 = z2 * work[107][lane];
-        const double t393 = y5 * (coef[11][lane] * y5);
-        const double t394 = coef[10][lane] + z5 * (coef[11][lane] * z5);
-        work[182][lane] = t391 + (t392 + (t393 + t394));
-        work[214][lane] = y1 * work[108][lane];
-        work[173][lane] = z1 * work[101][lane];
-        work[176][lane] = work[109][lane] * t387;
-        work[157][lane] = (work[214][lane] + work[173][lane]) * work[104][lane] + 2.0 * (work[105][lane] * work[176][lane]);
-        work[181][lane] = y5 * work[98][lane] + y2 * work[99][lane];
-        work[177][lane] = 0.5 * z1;
-        work[174][lane] = work[108][lane] * t387;
-        work[158][lane] = work[177][lane] + (2.0 * (work[105][lane] * work[174][lane]) - (work[110][lane] + work[111][lane]) * work[104][lane]);
-        work[179][lane] = work[108][lane] * work[109][lane] * work[104][lane];
-        work[178][lane] = 0.5 * work[101][lane];
-        work[183][lane] = z5 * work[114][lane] + z2 * work[115][lane];
-        const double t407 = x2 * work[116][lane];
-        const double t408 = x5 * (coef[11][lane] * x5);
-        work[184][lane] = t407 + (t392 + (t408 + t394));
-        work[220][lane] = 0.5 * work[108][lane];
-        work[219][lane] = work[101][lane] * work[109][lane] * work[104][lane];
-        work[213][lane] = t407 + (t391 + (t408 + (coef[10][lane] + t393)));
-        work[228][lane] = coef[13][lane] * z1;
-        const double t414 = work[228][lane] + coef[5][lane] * z3;
-        work[186][lane] = x2 * t414 + work[117][lane];
-        work[233][lane] = coef[9][lane] * y1 + coef[6][lane] * y3;
-        const double t417 = y2 * work[233][lane];
-        const double t418 = z2 * (coef[6][lane] * z3 + coef[9][lane] * z1);
-        const double t419 = coef[8][lane] * y1;
-        const double t420 = y5 * (work[118][lane] + t419);
-        const double t421 = coef[8][lane] * z1;
-        const double t422 = coef[0][lane] + z5 * (work[119][lane] + t421);
-        work[188][lane] = t417 + (t418 + (t420 + t422));
-        work[227][lane] = coef[13][lane] * y1;
-        const double t425 = work[227][lane] + coef[5][lane] * y3;
-        work[187][lane] = x2 * t425 + work[120][lane];
-        work[189][lane] = y2 * t414 + work[121][lane];
-        work[232][lane] = coef[13][lane] * x1;
-        const double t429 = work[232][lane] + coef[5][lane] * x3;
-        work[191][lane] = y2 * t429 + work[122][lane];
-        work[229][lane] = coef[9][lane] * x1 + coef[6][lane] * x3;
-        const double t432 = x2 * work[229][lane];
-        work[164][lane] = coef[8][lane] * x1;
-        const double t434 = x5 * (work[123][lane] + work[164][lane]);
-        work[190][lane] = t432 + (t418 + (t434 + t422));
-        work[192][lane] = t432 + (t417 + (t434 + (coef[0][lane] + t420)));
-        work[194][lane] = z2 * t429 + work[124][lane];
-        work[193][lane] = z2 * t425 + work[125][lane];
-        work[195][lane] = x2 * work[126][lane] + x5 * work[127][lane];
-        const double t440 = y2 * work[9][lane];
-        const double t441 = z5 * work[128][lane];
-        const double t442 = y5 * work[129][lane];
-        const double t443 = z2 * work[23][lane];
-        work[197][lane] = t440 + (t441 + t442 + t443);
-        work[196][lane] = x5 * work[130][lane] + x2 * work[131][lane];
-        work[198][lane] = y5 * work[127][lane] + y2 * work[126][lane];
-        work[200][lane] = y2 * work[132][lane] + y5 * work[133][lane];
-        const double t448 = x2 * work[14][lane];
-        const double t449 = x5 * work[134][lane];
-        work[199][lane] = t448 + (t441 + t449 + t443);
-        work[201][lane] = t448 + (t449 + t442 + t440);
-        work[203][lane] = z2 * work[132][lane] + z5 * work[133][lane];
-        work[202][lane] = z2 * work[131][lane] + z5 * work[130][lane];
-        work[253][lane] = work[135][lane] + work[136][lane];
-        work[204][lane] = x5 * work[137][lane] + x2 * work[253][lane];
-        work[256][lane] = work[118][lane] + work[27][lane];
-        const double t457 = y2 * work[256][lane];
-        work[257][lane] = work[119][lane] + work[7][lane];
-        const double t459 = z2 * work[257][lane];
-        const double t460 = y5 * (work[138][lane] + work[139][lane]);
-        const double t461 = z5 * (work[135][lane] + work[140][lane]);
-        work[206][lane] = t457 + (t459 + (t460 + t461));
-        work[252][lane] = work[138][lane] + work[141][lane];
-        work[205][lane] = x2 * work[252][lane] + x5 * work[142][lane];
-        work[207][lane] = y5 * work[137][lane] + y2 * work[253][lane];
-        work[259][lane] = work[143][lane] + work[144][lane];
-        work[209][lane] = y5 * work[145][lane] + y2 * work[259][lane];
-        work[258][lane] = work[20][lane] + work[123][lane];
-        const double t469 = x2 * work[258][lane];
-        const double t470 = x5 * (work[146][lane] + work[144][lane]);
-        work[208][lane] = t469 + (t459 + (t470 + t461));
-        work[210][lane] = t469 + (t457 + (t460 + t470));
-        work[212][lane] = z2 * work[259][lane] + z5 * work[145][lane];
-        work[211][lane] = z2 * work[252][lane] + z5 * work[142][lane];
-        work[159][lane] = work[135][lane] + (coef[12][lane] * z1 + work[61][lane]);
-        work[153][lane] = x2 * work[159][lane] + (work[147][lane] + work[148][lane]);
-        work[264][lane] = work[129][lane] + t419;
-        work[149][lane] = y2 * work[264][lane];
-        work[266][lane] = work[128][lane] + t421;
-        work[150][lane] = z2 * work[266][lane];
-        work[474][lane] = coef[7][lane] * y1 + coef[1][lane] * y4;
-        work[151][lane] = y5 * work[474][lane];
-        work[152][lane] = coef[0][lane] + z5 * (coef[7][lane] * z1 + coef[1][lane] * z4);
-        increment[13][lane] = work[449][lane];
-        increment[14][lane] = work[456][lane];
-        displacement[12][lane] = work[451][lane] * work[452][lane] - 0.5 * work[491][lane];
-        increment[12][lane] = work[491][lane];
-        displacement[13][lane] = work[488][lane] * work[451][lane] - 0.5 * work[449][lane];
-        displacement[14][lane] = work[451][lane] * work[509][lane] - 0.5 * work[456][lane];
-        increment_jacobian[15][lane] = z1 * work[182][lane] - x1 * work[180][lane] - work[101][lane];
-        increment_jacobian[30][lane] = x1 * work[181][lane] - y1 * work[182][lane] + work[108][lane];
-        jacobian[0][lane] = 1.0 + (work[180][lane] * work[156][lane] + (work[182][lane] * work[157][lane] + work[181][lane] * work[158][lane]) - (work[112][lane] + work[113][lane]) * work[104][lane]);
-        jacobian[1][lane] = work[179][lane] - work[178][lane] + (work[183][lane] * work[156][lane] + (work[181][lane] * work[157][lane] + work[184][lane] * work[158][lane]));
-        increment_jacobian[1][lane] = y1 * work[183][lane] - z1 * work[184][lane] + work[101][lane];
-        increment_jacobian[31][lane] = x1 * work[184][lane] - y1 * work[181][lane] - work[109][lane];
-        jacobian[2][lane] = work[220][lane] + work[219][lane] + (work[213][lane] * work[156][lane] + (work[180][lane] * work[157][lane] + work[183][lane] * work[158][lane]));
-        increment_jacobian[2][lane] = y1 * work[213][lane] - z1 * work[183][lane] - work[108][lane];
-        increment_jacobian[17][lane] = z1 * work[180][lane] - x1 * work[213][lane] + work[109][lane];
-        increment_jacobian[18][lane] = z1 * work[188][lane] - x1 * work[186][lane];
-        jacobian[3][lane] = work[186][lane] * work[156][lane] + (work[188][lane] * work[157][lane] + work[187][lane] * work[158][lane]);
-        increment_jacobian[3][lane] = y1 * work[186][lane] - z1 * work[187][lane];
-        increment_jacobian[33][lane] = x1 * work[187][lane] - y1 * work[188][lane];
-        increment_jacobian[77][lane] = x2 * work[189][lane] - y2 * work[186][lane];
-        increment_jacobian[19][lane] = z1 * work[191][lane] - x1 * work[189][lane];
-        increment_jacobian[75][lane] = x2 * work[191][lane] - y2 * work[188][lane];
-        jacobian[4][lane] = work[189][lane] * work[156][lane] + (work[191][lane] * work[157][lane] + work[190][lane] * work[158][lane]);
-        increment_jacobian[4][lane] = y1 * work[189][lane] - z1 * work[190][lane];
-        increment_jacobian[34][lane] = x1 * work[190][lane] - y1 * work[191][lane];
-        increment_jacobian[76][lane] = x2 * work[190][lane] - y2 * work[187][lane];
-        increment_jacobian[47][lane] = y2 * work[192][lane] - z2 * work[189][lane];
-        increment_jacobian[62][lane] = z2 * work[186][lane] - x2 * work[192][lane];
-        increment_jacobian[20][lane] = z1 * work[194][lane] - x1 * work[192][lane];
-        increment_jacobian[45][lane] = y2 * work[194][lane] - z2 * work[191][lane];
-        increment_jacobian[60][lane] = z2 * work[188][lane] - x2 * work[194][lane];
-        jacobian[5][lane] = work[192][lane] * work[156][lane] + (work[194][lane] * work[157][lane] + work[193][lane] * work[158][lane]);
-        increment_jacobian[5][lane] = y1 * work[192][lane] - z1 * work[193][lane];
-        increment_jacobian[35][lane] = x1 * work[193][lane] - y1 * work[194][lane];
-        increment_jacobian[46][lane] = y2 * work[193][lane] - z2 * work[190][lane];
-        increment_jacobian[61][lane] = z2 * work[187][lane] - x2 * work[193][lane];
-        increment_jacobian[21][lane] = z1 * work[197][lane] - x1 * work[195][lane];
-        jacobian[6][lane] = work[195][lane] * work[156][lane] + (work[197][lane] * work[157][lane] + work[196][lane] * work[158][lane]);
-        increment_jacobian[6][lane] = y1 * work[195][lane] - z1 * work[196][lane];
-        increment_jacobian[36][lane] = x1 * work[196][lane] - y1 * work[197][lane];
-        increment_jacobian[122][lane] = x3 * work[198][lane] - y3 * work[195][lane];
-        increment_jacobian[22][lane] = z1 * work[200][lane] - x1 * work[198][lane];
-        increment_jacobian[120][lane] = x3 * work[200][lane] - y3 * work[197][lane];
-        jacobian[7][lane] = work[198][lane] * work[156][lane] + (work[200][lane] * work[157][lane] + work[199][lane] * work[158][lane]);
-        increment_jacobian[7][lane] = y1 * work[198][lane] - z1 * work[199][lane];
-        increment_jacobian[37][lane] = x1 * work[199][lane] - y1 * work[200][lane];
-        increment_jacobian[121][lane] = x3 * work[199][lane] - y3 * work[196][lane];
-        increment_jacobian[92][lane] = y3 * work[201][lane] - z3 * work[198][lane];
-        increment_jacobian[107][lane] = z3 * work[195][lane] - x3 * work[201][lane];
-        increment_jacobian[23][lane] = z1 * work[203][lane] - x1 * work[201][lane];
-        increment_jacobian[90][lane] = y3 * work[203][lane] - z3 * work[200][lane];
-        increment_jacobian[105][lane] = z3 * work[197][lane] - x3 * work[203][lane];
-        jacobian[8][lane] = work[201][lane] * work[156][lane] + (work[203][lane] * work[157][lane] + work[202][lane] * work[158][lane]);
-        increment_jacobian[8][lane] = y1 * work[201][lane] - z1 * work[202][lane];
-        increment_jacobian[38][lane] = x1 * work[202][lane] - y1 * work[203][lane];
-        increment_jacobian[91][lane] = y3 * work[202][lane] - z3 * work[199][lane];
-        increment_jacobian[106][lane] = z3 * work[196][lane] - x3 * work[202][lane];
-        increment_jacobian[24][lane] = z1 * work[206][lane] - x1 * work[204][lane];
-        jacobian[9][lane] = work[204][lane] * work[156][lane] + (work[206][lane] * work[157][lane] + work[205][lane] * work[158][lane]);
-        increment_jacobian[9][lane] = y1 * work[204][lane] - z1 * work[205][lane];
-        increment_jacobian[39][lane] = x1 * work[205][lane] - y1 * work[206][lane];
-        increment_jacobian[167][lane] = x4 * work[207][lane] - y4 * work[204][lane];
-        increment_jacobian[25][lane] = z1 * work[209][lane] - x1 * work[207][lane];
-        increment_jacobian[165][lane] = x4 * work[209][lane] - y4 * work[206][lane];
-        jacobian[10][lane] = work[207][lane] * work[156][lane] + (work[209][lane] * work[157][lane] + work[208][lane] * work[158][lane]);
-        increment_jacobian[10][lane] = y1 * work[207][lane] - z1 * work[208][lane];
-        increment_jacobian[40][lane] = x1 * work[208][lane] - y1 * work[209][lane];
-        increment_jacobian[166][lane] = x4 * work[208][lane] - y4 * work[205][lane];
-        increment_jacobian[137][lane] = y4 * work[210][lane] - z4 * work[207][lane];
-        increment_jacobian[152][lane] = z4 * work[204][lane] - x4 * work[210][lane];
-        increment_jacobian[26][lane] = z1 * work[212][lane] - x1 * work[210][lane];
-        increment_jacobian[135][lane] = y4 * work[212][lane] - z4 * work[209][lane];
-        increment_jacobian[150][lane] = z4 * work[206][lane] - x4 * work[212][lane];
-        jacobian[11][lane] = work[210][lane] * work[156][lane] + (work[212][lane] * work[157][lane] + work[211][lane] * work[158][lane]);
-        increment_jacobian[11][lane] = y1 * work[210][lane] - z1 * work[211][lane];
-        increment_jacobian[41][lane] = x1 * work[211][lane] - y1 * work[212][lane];
-        increment_jacobian[136][lane] = y4 * work[211][lane] - z4 * work[208][lane];
-        increment_jacobian[151][lane] = z4 * work[205][lane] - x4 * work[211][lane];
-    }
-}
-
-/* spin_chain5_linearise_lanes_part4 (part 4 of 7) */
-spin_chain5_APART static void spin_chain5_linearise_lanes_part4(spin_chain5_lanes coef[restrict 33],
-                                                                spin_chain5_lanes y[restrict 15],
-                                                                spin_chain5_lanes displacement[restrict 15],
-                                                                spin_chain5_lanes increment[restrict 15],
-                                                                spin_chain5_lanes jacobian[restrict 225],
-                                                                spin_chain5_lanes increment_jacobian[restrict 225],
-                                                                spin_chain5_lanes work[restrict 517])
-{
-    (void)displacement;
-    (void)increment;
-    spin_chain5_EACH_LANE
-    for (int lane = 0; lane < spin_chain5_LANES; ++lane) {
-        const double x1 = y[0][lane];
-        const double y1 = y[1][lane];
-        const double z1 = y[2][lane];
-        const double x2 = y[3][lane];
-        const double y2 = y[4][lane];
-        const double z2 = y[5][lane];
-        const double x3 = y[6][lane];
-        const double y3 = y[7][lane];
-        const double z3 = y[8][lane];
-        const double x4 = y[9][lane];
-        const double y4 = y[10][lane];
-        const double z4 = y[11][lane];
-        const double x5 = y[12][lane];
-        const double y5 = y[13][lane];
-        const double z5 = y[14][lane];
-        work[458][lane] = work[149][lane] + (work[150][lane] + (work[151][lane] + work[152][lane]));
-        const double t485 = work[138][lane] + (coef[12][lane] * y1 + work[52][lane]);
-        work[461][lane] = x2 * t485 + (work[154][lane] + work[155][lane]);
-        work[464][lane] = y2 * work[159][lane] + (work[160][lane] + work[161][lane]);
-        const double t488 = work[144][lane] + (coef[12][lane] * x1 + work[50][lane]);
-        work[459][lane] = y2 * t488 + (work[162][lane] + work[163][lane]);
-        work[274][lane] = work[134][lane] + work[164][lane];
-        const double t491 = x2 * work[274][lane];
-        work[471][lane] = coef[7][lane] * x1 + coef[1][lane] * x4;
-        const double t493 = x5 * work[471][lane];
-        work[462][lane] = t491 + (work[150][lane] + (t493 + work[152][lane]));
-        work[463][lane] = t491 + (work[149][lane] + (t493 + (coef[0][lane] + work[151][lane])));
-        work[457][lane] = z2 * t488 + (work[165][lane] + work[166][lane]);
-        work[460][lane] = z2 * t485 + (work[167][lane] + work[168][lane]);
-        const double t498 = 0.5 * x1;
-        const double t499 = t498 + (2.0 * (work[169][lane] * work[170][lane]) - (work[171][lane] + work[172][lane]) * work[104][lane]);
-        const double t500 = x1 * work[109][lane];
-        const double t501 = (t500 + work[173][lane]) * work[104][lane] + 2.0 * (work[169][lane] * work[174][lane]);
-        const double t502 = (work[111][lane] - work[175][lane]) * work[104][lane] + 2.0 * (work[169][lane] * work[176][lane]) - work[177][lane];
-        const double t503 = work[108][lane] * work[101][lane] * work[104][lane];
-        const double t504 = 0.5 * work[109][lane];
-        const double t505 = (t500 + work[214][lane]) * work[104][lane] + 2.0 * (work[215][lane] * work[170][lane]);
-        const double t506 = work[216][lane] + (2.0 * (work[215][lane] * work[176][lane]) - (work[217][lane] + work[102][lane]) * work[104][lane]);
-        const double t507 = (work[172][lane] - work[218][lane]) * work[104][lane] + 2.0 * (work[215][lane] * work[174][lane]) - t498;
-        work[321][lane] = y2 * work[4][lane];
-        work[286][lane] = z2 * work[2][lane];
-        const double t510 = spin_chain5_phi1_lane(work[222][lane]);
-        work[284][lane] = work[0][lane] * t510;
-        work[268][lane] = (work[321][lane] + work[286][lane]) * work[223][lane] + 2.0 * (work[224][lane] * work[284][lane]);
-        work[285][lane] = 0.5 * z2;
-        work[287][lane] = work[4][lane] * t510;
-        work[270][lane] = work[285][lane] + (2.0 * (work[224][lane] * work[287][lane]) - (work[1][lane] + work[225][lane]) * work[223][lane]);
-        work[288][lane] = work[2][lane] * t510;
-        work[318][lane] = 0.5 * y2;
-        work[272][lane] = (work[3][lane] - work[226][lane]) * work[223][lane] + 2.0 * (work[224][lane] * work[288][lane]) - work[318][lane];
-        const double t519 = y1 * (work[227][lane] + coef[19][lane] * y3);
-        const double t520 = z1 * (work[228][lane] + coef[19][lane] * z3);
-        const double t521 = y3 * (coef[18][lane] * y3);
-        const double t522 = coef[17][lane] + z3 * (coef[18][lane] * z3);
-        work[293][lane] = t519 + (t520 + (t521 + t522));
-        const double t524 = coef[16][lane] * x3 + coef[6][lane] * x1;
-        work[295][lane] = z1 * work[229][lane] + z3 * t524;
-        work[294][lane] = y1 * work[229][lane] + y3 * t524;
-        work[292][lane] = work[0][lane] * work[4][lane] * work[223][lane];
-        work[291][lane] = 0.5 * work[2][lane];
-        const double t529 = x1 * (work[232][lane] + coef[19][lane] * x3);
-        const double t530 = x3 * (coef[18][lane] * x3);
-        work[296][lane] = t529 + (t520 + (t530 + t522));
-        work[297][lane] = z1 * work[233][lane] + z3 * (coef[6][lane] * y1 + coef[16][lane] * y3);
-        work[324][lane] = 0.5 * work[4][lane];
-        work[323][lane] = work[0][lane] * work[2][lane] * work[223][lane];
-        work[317][lane] = t529 + (t519 + (t530 + (coef[17][lane] + t521)));
-        const double t536 = y1 * work[131][lane];
-        const double t537 = z1 * work[126][lane];
-        const double t538 = y3 * work[234][lane];
-        const double t539 = coef[0][lane] + z3 * work[235][lane];
-        work[299][lane] = t536 + (t537 + (t538 + t539));
-        work[300][lane] = x1 * work[236][lane] + (work[237][lane] + work[238][lane]);
-        work[301][lane] = x1 * work[239][lane] + (work[240][lane] + work[241][lane]);
-        work[302][lane] = y1 * work[242][lane] + (work[243][lane] + work[244][lane]);
-        const double t544 = x1 * work[132][lane];
-        const double t545 = x3 * work[245][lane];
-        work[303][lane] = t544 + (t537 + (t545 + t539));
-        work[304][lane] = y1 * work[239][lane] + (work[246][lane] + work[247][lane]);
-        work[305][lane] = z1 * work[242][lane] + (work[248][lane] + work[249][lane]);
-        work[306][lane] = z1 * work[236][lane] + (work[250][lane] + work[251][lane]);
-        work[307][lane] = t544 + (t536 + (t545 + (coef[0][lane] + t538)));
-        const double t551 = y1 * work[252][lane];
-        const double t552 = z1 * work[253][lane];
-        const double t553 = z3 * (work[7][lane] + work[254][lane]);
-        const double t554 = y3 * (work[255][lane] + work[27][lane]);
-        work[308][lane] = t551 + (t552 + (t553 + t554));
-        work[346][lane] = coef[15][lane] * y3 + work[141][lane];
-        work[309][lane] = x1 * work[256][lane] + x3 * work[346][lane];
-        work[347][lane] = coef[15][lane] * z3 + work[136][lane];
-        work[310][lane] = x1 * work[257][lane] + x3 * work[347][lane];
-        work[356][lane] = work[143][lane] + coef[15][lane] * x3;
-        work[311][lane] = y1 * work[258][lane] + y3 * work[356][lane];
-        const double t562 = x1 * work[259][lane];
-        const double t563 = x3 * (work[260][lane] + work[20][lane]);
-        work[312][lane] = t562 + (t552 + (t563 + t553));
-        work[313][lane] = y1 * work[257][lane] + y3 * work[347][lane];
-        work[314][lane] = z3 * work[356][lane] + z1 * work[258][lane];
-        work[316][lane] = t562 + (t551 + (t563 + t554));
-        work[315][lane] = z3 * work[346][lane] + z1 * work[256][lane];
-        work[281][lane] = y1 * (work[138][lane] + (work[52][lane] + work[261][lane]));
-        work[280][lane] = y3 * work[129][lane];
-        work[277][lane] = z3 * work[128][lane];
-        work[278][lane] = z1 * (work[135][lane] + (work[262][lane] + work[61][lane]));
-        work[267][lane] = work[281][lane] + (work[280][lane] + work[277][lane] + work[278][lane]);
-        work[279][lane] = work[263][lane] + work[52][lane];
-        work[269][lane] = x3 * work[279][lane] + x1 * work[264][lane];
-        work[275][lane] = work[61][lane] + work[265][lane];
-        work[271][lane] = x3 * work[275][lane] + x1 * work[266][lane];
-        increment_jacobian[27][lane] = z1 * work[458][lane] - x1 * work[153][lane];
-        jacobian[12][lane] = work[153][lane] * work[156][lane] + (work[458][lane] * work[157][lane] + work[461][lane] * work[158][lane]);
-        increment_jacobian[12][lane] = y1 * work[153][lane] - z1 * work[461][lane];
-        increment_jacobian[42][lane] = x1 * work[461][lane] - y1 * work[458][lane];
-        increment_jacobian[212][lane] = x5 * work[464][lane] - y5 * work[153][lane];
-        increment_jacobian[28][lane] = z1 * work[459][lane] - x1 * work[464][lane];
-        increment_jacobian[210][lane] = x5 * work[459][lane] - y5 * work[458][lane];
-        jacobian[13][lane] = work[464][lane] * work[156][lane] + (work[459][lane] * work[157][lane] + work[462][lane] * work[158][lane]);
-        increment_jacobian[13][lane] = y1 * work[464][lane] - z1 * work[462][lane];
-        increment_jacobian[43][lane] = x1 * work[462][lane] - y1 * work[459][lane];
-        increment_jacobian[211][lane] = x5 * work[462][lane] - y5 * work[461][lane];
-        increment_jacobian[182][lane] = y5 * work[463][lane] - z5 * work[464][lane];
-        increment_jacobian[197][lane] = z5 * work[153][lane] - x5 * work[463][lane];
-        increment_jacobian[29][lane] = z1 * work[457][lane] - x1 * work[463][lane];
-        increment_jacobian[180][lane] = y5 * work[457][lane] - z5 * work[459][lane];
-        increment_jacobian[195][lane] = z5 * work[458][lane] - x5 * work[457][lane];
-        jacobian[14][lane] = work[463][lane] * work[156][lane] + (work[457][lane] * work[157][lane] + work[460][lane] * work[158][lane]);
-        increment_jacobian[14][lane] = y1 * work[463][lane] - z1 * work[460][lane];
-        increment_jacobian[44][lane] = x1 * work[460][lane] - y1 * work[457][lane];
-        increment_jacobian[181][lane] = y5 * work[460][lane] - z5 * work[462][lane];
-        increment_jacobian[196][lane] = z5 * work[461][lane] - x5 * work[460][lane];
-        jacobian[15][lane] = work[178][lane] + work[179][lane] + (work[180][lane] * t499 + (work[181][lane] * t501 + work[182][lane] * t502));
-        jacobian[16][lane] = 1.0 + (work[183][lane] * t499 + (work[184][lane] * t501 + work[181][lane] * t502) - (work[185][lane] + work[113][lane]) * work[104][lane]);
-        jacobian[18][lane] = work[186][lane] * t499 + (work[187][lane] * t501 + work[188][lane] * t502);
-        jacobian[19][lane] = work[189][lane] * t499 + (work[190][lane] * t501 + work[191][lane] * t502);
-        jacobian[20][lane] = work[192][lane] * t499 + (work[193][lane] * t501 + work[194][lane] * t502);
-        jacobian[21][lane] = work[195][lane] * t499 + (work[196][lane] * t501 + work[197][lane] * t502);
-        jacobian[22][lane] = work[198][lane] * t499 + (work[199][lane] * t501 + work[200][lane] * t502);
-        jacobian[23][lane] = work[201][lane] * t499 + (work[202][lane] * t501 + work[203][lane] * t502);
-        jacobian[24][lane] = work[204][lane] * t499 + (work[205][lane] * t501 + work[206][lane] * t502);
-        jacobian[25][lane] = work[207][lane] * t499 + (work[208][lane] * t501 + work[209][lane] * t502);
-        jacobian[26][lane] = work[210][lane] * t499 + (work[211][lane] * t501 + work[212][lane] * t502);
-        jacobian[27][lane] = work[153][lane] * t499 + (work[461][lane] * t501 + work[458][lane] * t502);
-        jacobian[28][lane] = work[464][lane] * t499 + (work[462][lane] * t501 + work[459][lane] * t502);
-        jacobian[29][lane] = work[463][lane] * t499 + (work[460][lane] * t501 + work[457][lane] * t502);
-        jacobian[17][lane] = t503 - t504 + (work[213][lane] * t499 + (work[183][lane] * t501 + work[180][lane] * t502));
-        jacobian[30][lane] = work[219][lane] - work[220][lane] + (work[180][lane] * t505 + (work[182][lane] * t506 + work[181][lane] * t507));
-        jacobian[31][lane] = t504 + t503 + (work[183][lane] * t505 + (work[184][lane] * t507 + work[181][lane] * t506));
-        jacobian[32][lane] = 1.0 + (work[213][lane] * t505 + (work[180][lane] * t506 + work[183][lane] * t507) - work[221][lane] * work[104][lane]);
-        jacobian[33][lane] = work[186][lane] * t505 + (work[188][lane] * t506 + work[187][lane] * t507);
-        jacobian[34][lane] = work[189][lane] * t505 + (work[191][lane] * t506 + work[190][lane] * t507);
-        jacobian[35][lane] = work[192][lane] * t505 + (work[193][lane] * t507 + work[194][lane] * t506);
-        jacobian[36][lane] = work[195][lane] * t505 + (work[196][lane] * t507 + work[197][lane] * t506);
-        jacobian[37][lane] = work[198][lane] * t505 + (work[199][lane] * t507 + work[200][lane] * t506);
-        jacobian[38][lane] = work[201][lane] * t505 + (work[202][lane] * t507 + work[203][lane] * t506);
-        jacobian[39][lane] = work[204][lane] * t505 + (work[206][lane] * t506 + work[205][lane] * t507);
-        jacobian[40][lane] = work[207][lane] * t505 + (work[209][lane] * t506 + work[208][lane] * t507);
-        jacobian[41][lane] = work[210][lane] * t505 + (work[211][lane] * t507 + work[212][lane] * t506);
-        jacobian[42][lane] = work[153][lane] * t505 + (work[461][lane] * t507 + work[458][lane] * t506);
-        jacobian[43][lane] = work[464][lane] * t505 + (work[459][lane] * t506 + work[462][lane] * t507);
-        jacobian[44][lane] = work[463][lane] * t505 + (work[457][lane] * t506 + work[460][lane] * t507);
-        jacobian[45][lane] = work[188][lane] * work[268][lane] + (work[191][lane] * work[270][lane] + work[194][lane] * work[272][lane]);
-        jacobian[46][lane] = work[187][lane] * work[268][lane] + (work[193][lane] * work[272][lane] + work[190][lane] * work[270][lane]);
-        jacobian[47][lane] = work[186][lane] * work[268][lane] + (work[189][lane] * work[270][lane] + work[192][lane] * work[272][lane]);
-        increment_jacobian[63][lane] = z2 * work[293][lane] - x2 * work[295][lane] - work[2][lane];
-        jacobian[48][lane] = 1.0 + (work[293][lane] * work[268][lane] + (work[295][lane] * work[272][lane] + work[294][lane] * work[270][lane]) - (work[230][lane] + work[231][lane]) * work[223][lane]);
-        increment_jacobian[78][lane] = x2 * work[294][lane] - y2 * work[293][lane] + work[4][lane];
-        increment_jacobian[79][lane] = x2 * work[296][lane] - y2 * work[294][lane] - work[0][lane];
-        jacobian[49][lane] = work[292][lane] - work[291][lane] + (work[294][lane] * work[268][lane] + (work[296][lane] * work[270][lane] + work[297][lane] * work[272][lane]));
-        increment_jacobian[49][lane] = y2 * work[297][lane] - z2 * work[296][lane] + work[2][lane];
-        jacobian[50][lane] = work[324][lane] + work[323][lane] + (work[295][lane] * work[268][lane] + (work[317][lane] * work[272][lane] + work[297][lane] * work[270][lane]));
-        increment_jacobian[50][lane] = y2 * work[317][lane] - z2 * work[297][lane] - work[4][lane];
-        increment_jacobian[65][lane] = z2 * work[295][lane] - x2 * work[317][lane] + work[0][lane];
-        increment_jacobian[81][lane] = x2 * work[300][lane] - y2 * work[299][lane];
-        jacobian[51][lane] = work[299][lane] * work[268][lane] + (work[300][lane] * work[270][lane] + work[301][lane] * work[272][lane]);
-        increment_jacobian[51][lane] = y2 * work[301][lane] - z2 * work[300][lane];
-        increment_jacobian[66][lane] = z2 * work[299][lane] - x2 * work[301][lane];
-        increment_jacobian[123][lane] = x3 * work[302][lane] - y3 * work[299][lane];
-        increment_jacobian[82][lane] = x2 * work[303][lane] - y2 * work[302][lane];
-        increment_jacobian[124][lane] = x3 * work[303][lane] - y3 * work[300][lane];
-        jacobian[52][lane] = work[302][lane] * work[268][lane] + (work[303][lane] * work[270][lane] + work[304][lane] * work[272][lane]);
-        increment_jacobian[52][lane] = y2 * work[304][lane] - z2 * work[303][lane];
-        increment_jacobian[67][lane] = z2 * work[302][lane] - x2 * work[304][lane];
-        increment_jacobian[125][lane] = x3 * work[304][lane] - y3 * work[301][lane];
-        increment_jacobian[93][lane] = y3 * work[305][lane] - z3 * work[302][lane];
-        increment_jacobian[108][lane] = z3 * work[299][lane] - x3 * work[305][lane];
-        increment_jacobian[83][lane] = x2 * work[306][lane] - y2 * work[305][lane];
-        increment_jacobian[94][lane] = y3 * work[306][lane] - z3 * work[303][lane];
-        increment_jacobian[109][lane] = z3 * work[300][lane] - x3 * work[306][lane];
-        jacobian[53][lane] = work[305][lane] * work[268][lane] + (work[306][lane] * work[270][lane] + work[307][lane] * work[272][lane]);
-        increment_jacobian[53][lane] = y2 * work[307][lane] - z2 * work[306][lane];
-        increment_jacobian[68][lane] = z2 * work[305][lane] - x2 * work[307][lane];
-        increment_jacobian[95][lane] = y3 * work[307][lane] - z3 * work[304][lane];
-        increment_jacobian[110][lane] = z3 * work[301][lane] - x3 * work[307][lane];
-        increment_jacobian[84][lane] = x2 * work[309][lane] - y2 * work[308][lane];
-        jacobian[54][lane] = work[308][lane] * work[268][lane] + (work[309][lane] * work[270][lane] + work[310][lane] * work[272][lane]);
-        increment_jacobian[54][lane] = y2 * work[310][lane] - z2 * work[309][lane];
-        increment_jacobian[69][lane] = z2 * work[308][lane] - x2 * work[310][lane];
-        increment_jacobian[168][lane] = x4 * work[311][lane] - y4 * work[308][lane];
-        increment_jacobian[85][lane] = x2 * work[312][lane] - y2 * work[311][lane];
-        increment_jacobian[169][lane] = x4 * work[312][lane] - y4 * work[309][lane];
-        jacobian[55][lane] = work[311][lane] * work[268][lane] + (work[312][lane] * work[270][lane] + work[313][lane] * work[272][lane]);
-        increment_jacobian[55][lane] = y2 * work[313][lane] - z2 * work[312][lane];
-        increment_jacobian[70][lane] = z2 * work[311][lane] - x2 * work[313][lane];
-        increment_jacobian[170][lane] = x4 * work[313][lane] - y4 * work[310][lane];
-        increment_jacobian[138][lane] = y4 * work[314][lane] - z4 * work[311][lane];
-        increment_jacobian[153][lane] = z4 * work[308][lane] - x4 * work[314][lane];
-        increment_jacobian[71][lane] = z2 * work[314][lane] - x2 * work[316][lane];
-        increment_jacobian[140][lane] = y4 * work[316][lane] - z4 * work[313][lane];
-        increment_jacobian[155][lane] = z4 * work[310][lane] - x4 * work[316][lane];
-        jacobian[56][lane] = work[314][lane] * work[268][lane] + (work[316][lane] * work[272][lane] + work[315][lane] * work[270][lane]);
-        increment_jacobian[56][lane] = y2 * work[316][lane] - z2 * work[315][lane];
-        increment_jacobian[86][lane] = x2 * work[315][lane] - y2 * work[314][lane];
-        increment_jacobian[139][lane] = y4 * work[315][lane] - z4 * work[312][lane];
-        increment_jacobian[154][lane] = z4 * work[309][lane] - x4 * work[315][lane];
-        increment_jacobian[87][lane] = x2 * work[269][lane] - y2 * work[267][lane];
-    }
-}
-
-/* spin_chain5_linearise_lanes_part5 (part 5 of 7) */
-spin_chain5_APART static void spin_chain5_linearise_lanes_part5(spin_chain5_lanes coef[restrict 33],
-                                                                spin_chain5_lanes y[restrict 15],
-                                                                spin_chain5_lanes displacement[restrict 15],
-                                                                spin_chain5_lanes increment[restrict 15],
-                                                                spin_chain5_lanes jacobian[restrict 225],
-                                                                spin_chain5_lanes increment_jacobian[restrict 225],
-                                                                spin_chain5_lanes work[restrict 517])
-{
-    (void)displacement;
-    (void)increment;
-    spin_chain5_EACH_LANE
-    for (int lane = 0; lane < spin_chain5_LANES; ++lane) {
-        const double x1 = y[0][lane];
-        const double y1 = y[1][lane];
-        const double z1 = y[2][lane];
-        const double x2 = y[3][lane];
-        const double y2 = y[4][lane];
-        const double z2 = y[5][lane];
-        const double x3 = y[6][lane];
-        const double y3 = y[7][lane];
-        const double z3 = y[8][lane];
-        const double x4 = y[9][lane];
-        const double y4 = y[10][lane];
-        const double z4 = y[11][lane];
-        const double x5 = y[12][lane];
-        const double y5 = y[13][lane];
-        const double z5 = y[14][lane];
-        const double t578 = work[50][lane] + work[273][lane];
-        work[466][lane] = y3 * t578 + y1 * work[274][lane];
-        work[470][lane] = y1 * work[266][lane] + y3 * work[275][lane];
-        const double t581 = x1 * (work[144][lane] + (work[50][lane] + work[276][lane]));
-        const double t582 = x3 * work[134][lane];
-        work[468][lane] = t581 + (t582 + work[277][lane] + work[278][lane]);
-        work[465][lane] = z3 * t578 + z1 * work[274][lane];
-        work[467][lane] = z1 * work[264][lane] + z3 * work[279][lane];
-        work[469][lane] = t581 + (work[280][lane] + t582 + work[281][lane]);
-        const double t587 = (work[225][lane] - work[282][lane]) * work[223][lane] + 2.0 * (work[283][lane] * work[284][lane]) - work[285][lane];
-        const double t588 = x2 * work[0][lane];
-        const double t589 = (t588 + work[286][lane]) * work[223][lane] + 2.0 * (work[283][lane] * work[287][lane]);
-        const double t590 = 0.5 * x2;
-        const double t591 = t590 + (2.0 * (work[283][lane] * work[288][lane]) - (work[289][lane] + work[290][lane]) * work[223][lane]);
-        const double t592 = work[4][lane] * work[2][lane] * work[223][lane];
-        const double t593 = 0.5 * work[0][lane];
-        const double t594 = work[318][lane] + (2.0 * (work[319][lane] * work[284][lane]) - (work[320][lane] + work[3][lane]) * work[223][lane]);
-        const double t595 = (work[321][lane] + t588) * work[223][lane] + 2.0 * (work[319][lane] * work[288][lane]);
-        const double t596 = (work[290][lane] - work[322][lane]) * work[223][lane] + 2.0 * (work[319][lane] * work[287][lane]) - t590;
-        const double t597 = spin_chain5_phi1_lane(work[326][lane]);
-        work[404][lane] = work[327][lane] * t597;
-        work[408][lane] = 0.5 * y3;
-        const double t600 = (work[328][lane] - work[329][lane]) * work[330][lane] + 2.0 * (work[331][lane] * work[404][lane]) - work[408][lane];
-        const double t601 = z3 * work[327][lane];
-        work[401][lane] = y3 * work[332][lane];
-        work[409][lane] = work[333][lane] * t597;
-        const double t604 = (t601 + work[401][lane]) * work[330][lane] + 2.0 * (work[331][lane] * work[409][lane]);
-        const double t605 = 0.5 * z3;
-        work[406][lane] = work[332][lane] * t597;
-        const double t607 = t605 + (2.0 * (work[331][lane] * work[406][lane]) - (work[334][lane] + work[335][lane]) * work[330][lane]);
-        work[376][lane] = z4 * work[336][lane] + z2 * work[245][lane];
-        const double t609 = y2 * work[337][lane];
-        const double t610 = z2 * work[338][lane];
-        const double t611 = y4 * (coef[25][lane] * y4);
-        const double t612 = coef[24][lane] + z4 * (coef[25][lane] * z4);
-        work[378][lane] = t609 + (t610 + (t611 + t612));
-        work[377][lane] = y2 * work[245][lane] + y4 * work[336][lane];
-        work[375][lane] = work[332][lane] * work[333][lane] * work[330][lane];
-        work[374][lane] = 0.5 * work[327][lane];
-        work[379][lane] = z4 * work[341][lane] + z2 * work[234][lane];
-        const double t618 = x2 * work[342][lane];
-        const double t619 = x4 * (coef[25][lane] * x4);
-        work[380][lane] = t618 + (t610 + (t619 + t612));
-        work[412][lane] = 0.5 * work[332][lane];
-        work[411][lane] = work[327][lane] * work[333][lane] * work[330][lane];
-        work[400][lane] = t618 + (t609 + (t619 + (coef[24][lane] + t611)));
-        const double t624 = work[343][lane] + (coef[26][lane] * z3 + work[7][lane]);
-        work[382][lane] = x2 * t624 + (work[344][lane] + work[345][lane]);
-        const double t626 = y2 * work[346][lane];
-        const double t627 = z2 * work[347][lane];
-        work[429][lane] = coef[22][lane] * y5 + coef[23][lane] * y3;
-        const double t629 = y4 * work[429][lane];
-        const double t630 = coef[0][lane] + z4 * (coef[22][lane] * z5 + coef[23][lane] * z3);
-        work[384][lane] = t626 + (t627 + (t629 + t630));
-        const double t632 = work[348][lane] + (coef[26][lane] * y3 + work[27][lane]);
-        work[383][lane] = x2 * t632 + (work[349][lane] + work[350][lane]);
-        work[385][lane] = y2 * t624 + (work[351][lane] + work[352][lane]);
-        const double t635 = work[353][lane] + (work[20][lane] + coef[26][lane] * x3);
-        work[387][lane] = y2 * t635 + (work[354][lane] + work[355][lane]);
-        const double t637 = x2 * work[356][lane];
-        work[426][lane] = coef[23][lane] * x3 + coef[22][lane] * x5;
-        const double t639 = x4 * work[426][lane];
-        work[386][lane] = t637 + (t627 + (t639 + t630));
-        work[388][lane] = t637 + (t626 + (t639 + (coef[0][lane] + t629)));
-        work[390][lane] = z2 * t635 + (work[357][lane] + work[358][lane]);
-        work[389][lane] = z2 * t632 + (work[359][lane] + work[360][lane]);
-        const double t644 = work[343][lane] + work[128][lane];
-        work[391][lane] = x4 * work[361][lane] + x2 * t644;
-        const double t646 = y2 * work[279][lane];
-        const double t647 = z2 * work[275][lane];
-        const double t648 = z4 * (work[343][lane] + work[362][lane]);
-        const double t649 = y4 * (work[348][lane] + work[363][lane]);
-        work[393][lane] = t646 + (t647 + (t648 + t649));
-        const double t651 = work[129][lane] + work[348][lane];
-        work[392][lane] = x4 * work[364][lane] + x2 * t651;
-        work[394][lane] = y4 * work[361][lane] + y2 * t644;
-        const double t654 = work[134][lane] + work[353][lane];
-        work[396][lane] = y4 * work[365][lane] + y2 * t654;
-        const double t656 = x2 * t578;
-        const double t657 = x4 * (work[366][lane] + work[353][lane]);
-        work[395][lane] = t656 + (t647 + (t648 + t657));
-        work[397][lane] = t656 + (t646 + (t657 + t649));
-        work[399][lane] = z2 * t654 + z4 * work[365][lane];
-        work[398][lane] = z2 * t651 + z4 * work[364][lane];
-        work[407][lane] = 0.5 * x3;
-        work[371][lane] = work[407][lane] + (2.0 * (work[367][lane] * work[404][lane]) - (work[368][lane] + work[369][lane]) * work[330][lane]);
-        work[402][lane] = x3 * work[333][lane];
-        work[372][lane] = (t601 + work[402][lane]) * work[330][lane] + 2.0 * (work[367][lane] * work[406][lane]);
-        work[373][lane] = (work[335][lane] - work[370][lane]) * work[330][lane] + 2.0 * (work[367][lane] * work[409][lane]) - t605;
-        jacobian[57][lane] = work[267][lane] * work[268][lane] + (work[269][lane] * work[270][lane] + work[271][lane] * work[272][lane]);
-        increment_jacobian[57][lane] = y2 * work[271][lane] - z2 * work[269][lane];
-        increment_jacobian[72][lane] = z2 * work[267][lane] - x2 * work[271][lane];
-        increment_jacobian[213][lane] = x5 * work[466][lane] - y5 * work[267][lane];
-        increment_jacobian[73][lane] = z2 * work[466][lane] - x2 * work[470][lane];
-        increment_jacobian[215][lane] = x5 * work[470][lane] - y5 * work[271][lane];
-        jacobian[58][lane] = work[466][lane] * work[268][lane] + (work[470][lane] * work[272][lane] + work[468][lane] * work[270][lane]);
-        increment_jacobian[58][lane] = y2 * work[470][lane] - z2 * work[468][lane];
-        increment_jacobian[88][lane] = x2 * work[468][lane] - y2 * work[466][lane];
-        increment_jacobian[214][lane] = x5 * work[468][lane] - y5 * work[269][lane];
-        increment_jacobian[183][lane] = y5 * work[465][lane] - z5 * work[466][lane];
-        increment_jacobian[198][lane] = z5 * work[267][lane] - x5 * work[465][lane];
-        increment_jacobian[89][lane] = x2 * work[467][lane] - y2 * work[465][lane];
-        increment_jacobian[184][lane] = y5 * work[467][lane] - z5 * work[468][lane];
-        increment_jacobian[199][lane] = z5 * work[269][lane] - x5 * work[467][lane];
-        jacobian[59][lane] = work[465][lane] * work[268][lane] + (work[467][lane] * work[270][lane] + work[469][lane] * work[272][lane]);
-        increment_jacobian[59][lane] = y2 * work[469][lane] - z2 * work[467][lane];
-        increment_jacobian[74][lane] = z2 * work[465][lane] - x2 * work[469][lane];
-        increment_jacobian[185][lane] = y5 * work[469][lane] - z5 * work[470][lane];
-        increment_jacobian[200][lane] = z5 * work[271][lane] - x5 * work[469][lane];
-        jacobian[60][lane] = work[188][lane] * t587 + (work[191][lane] * t589 + work[194][lane] * t591);
-        jacobian[61][lane] = work[187][lane] * t587 + (work[190][lane] * t589 + work[193][lane] * t591);
-        jacobian[62][lane] = work[186][lane] * t587 + (work[189][lane] * t589 + work[192][lane] * t591);
-        jacobian[63][lane] = work[291][lane] + work[292][lane] + (work[293][lane] * t587 + (work[294][lane] * t589 + work[295][lane] * t591));
-        jacobian[64][lane] = 1.0 + (work[294][lane] * t587 + (work[296][lane] * t589 + work[297][lane] * t591) - (work[298][lane] + work[230][lane]) * work[223][lane]);
-        jacobian[66][lane] = work[299][lane] * t587 + (work[300][lane] * t589 + work[301][lane] * t591);
-        jacobian[67][lane] = work[302][lane] * t587 + (work[303][lane] * t589 + work[304][lane] * t591);
-        jacobian[68][lane] = work[305][lane] * t587 + (work[306][lane] * t589 + work[307][lane] * t591);
-        jacobian[69][lane] = work[308][lane] * t587 + (work[309][lane] * t589 + work[310][lane] * t591);
-        jacobian[70][lane] = work[311][lane] * t587 + (work[312][lane] * t589 + work[313][lane] * t591);
-        jacobian[71][lane] = work[314][lane] * t587 + (work[315][lane] * t589 + work[316][lane] * t591);
-        jacobian[72][lane] = work[267][lane] * t587 + (work[269][lane] * t589 + work[271][lane] * t591);
-        jacobian[73][lane] = work[466][lane] * t587 + (work[468][lane] * t589 + work[470][lane] * t591);
-        jacobian[74][lane] = work[465][lane] * t587 + (work[467][lane] * t589 + work[469][lane] * t591);
-        jacobian[65][lane] = t592 - t593 + (work[295][lane] * t587 + (work[297][lane] * t589 + work[317][lane] * t591));
-        jacobian[75][lane] = work[188][lane] * t594 + (work[194][lane] * t595 + work[191][lane] * t596);
-        jacobian[76][lane] = work[187][lane] * t594 + (work[193][lane] * t595 + work[190][lane] * t596);
-        jacobian[77][lane] = work[186][lane] * t594 + (work[192][lane] * t595 + work[189][lane] * t596);
-        jacobian[78][lane] = work[323][lane] - work[324][lane] + (work[293][lane] * t594 + (work[295][lane] * t595 + work[294][lane] * t596));
-        jacobian[79][lane] = t593 + t592 + (work[294][lane] * t594 + (work[297][lane] * t595 + work[296][lane] * t596));
-        jacobian[80][lane] = 1.0 + (work[295][lane] * t594 + (work[317][lane] * t595 + work[297][lane] * t596) - work[325][lane] * work[223][lane]);
-        jacobian[81][lane] = work[299][lane] * t594 + (work[301][lane] * t595 + work[300][lane] * t596);
-        jacobian[82][lane] = work[302][lane] * t594 + (work[304][lane] * t595 + work[303][lane] * t596);
-        jacobian[83][lane] = work[305][lane] * t594 + (work[307][lane] * t595 + work[306][lane] * t596);
-        jacobian[84][lane] = work[308][lane] * t594 + (work[310][lane] * t595 + work[309][lane] * t596);
-        jacobian[85][lane] = work[311][lane] * t594 + (work[313][lane] * t595 + work[312][lane] * t596);
-        jacobian[86][lane] = work[314][lane] * t594 + (work[316][lane] * t595 + work[315][lane] * t596);
-        jacobian[87][lane] = work[267][lane] * t594 + (work[271][lane] * t595 + work[269][lane] * t596);
-        jacobian[88][lane] = work[466][lane] * t594 + (work[470][lane] * t595 + work[468][lane] * t596);
-        jacobian[89][lane] = work[465][lane] * t594 + (work[469][lane] * t595 + work[467][lane] * t596);
-        jacobian[90][lane] = work[203][lane] * t600 + (work[197][lane] * t604 + work[200][lane] * t607);
-        jacobian[91][lane] = work[202][lane] * t600 + (work[196][lane] * t604 + work[199][lane] * t607);
-        jacobian[92][lane] = work[201][lane] * t600 + (work[195][lane] * t604 + work[198][lane] * t607);
-        jacobian[93][lane] = work[305][lane] * t600 + (work[299][lane] * t604 + work[302][lane] * t607);
-        jacobian[94][lane] = work[306][lane] * t600 + (work[300][lane] * t604 + work[303][lane] * t607);
-        jacobian[95][lane] = work[307][lane] * t600 + (work[301][lane] * t604 + work[304][lane] * t607);
-        increment_jacobian[111][lane] = z3 * work[378][lane] - x3 * work[376][lane] - work[327][lane];
-        jacobian[96][lane] = 1.0 + (work[376][lane] * t600 + (work[378][lane] * t604 + work[377][lane] * t607) - (work[339][lane] + work[340][lane]) * work[330][lane]);
-        increment_jacobian[126][lane] = x3 * work[377][lane] - y3 * work[378][lane] + work[332][lane];
-        jacobian[97][lane] = work[375][lane] - work[374][lane] + (work[379][lane] * t600 + (work[377][lane] * t604 + work[380][lane] * t607));
-        increment_jacobian[97][lane] = y3 * work[379][lane] - z3 * work[380][lane] + work[327][lane];
-        increment_jacobian[127][lane] = x3 * work[380][lane] - y3 * work[377][lane] - work[333][lane];
-        jacobian[98][lane] = work[412][lane] + work[411][lane] + (work[400][lane] * t600 + (work[376][lane] * t604 + work[379][lane] * t607));
-        increment_jacobian[98][lane] = y3 * work[400][lane] - z3 * work[379][lane] - work[332][lane];
-        increment_jacobian[113][lane] = z3 * work[376][lane] - x3 * work[400][lane] + work[333][lane];
-        increment_jacobian[114][lane] = z3 * work[384][lane] - x3 * work[382][lane];
-        jacobian[99][lane] = work[382][lane] * t600 + (work[384][lane] * t604 + work[383][lane] * t607);
-        increment_jacobian[99][lane] = y3 * work[382][lane] - z3 * work[383][lane];
-        increment_jacobian[129][lane] = x3 * work[383][lane] - y3 * work[384][lane];
-        increment_jacobian[173][lane] = x4 * work[385][lane] - y4 * work[382][lane];
-        increment_jacobian[115][lane] = z3 * work[387][lane] - x3 * work[385][lane];
-        increment_jacobian[171][lane] = x4 * work[387][lane] - y4 * work[384][lane];
-        jacobian[100][lane] = work[385][lane] * t600 + (work[387][lane] * t604 + work[386][lane] * t607);
-        increment_jacobian[100][lane] = y3 * work[385][lane] - z3 * work[386][lane];
-        increment_jacobian[130][lane] = x3 * work[386][lane] - y3 * work[387][lane];
-        increment_jacobian[172][lane] = x4 * work[386][lane] - y4 * work[383][lane];
-        increment_jacobian[143][lane] = y4 * work[388][lane] - z4 * work[385][lane];
-        increment_jacobian[158][lane] = z4 * work[382][lane] - x4 * work[388][lane];
-        increment_jacobian[116][lane] = z3 * work[390][lane] - x3 * work[388][lane];
-        increment_jacobian[141][lane] = y4 * work[390][lane] - z4 * work[387][lane];
-        increment_jacobian[156][lane] = z4 * work[384][lane] - x4 * work[390][lane];
-        jacobian[101][lane] = work[388][lane] * t600 + (work[390][lane] * t604 + work[389][lane] * t607);
-        increment_jacobian[101][lane] = y3 * work[388][lane] - z3 * work[389][lane];
-        increment_jacobian[131][lane] = x3 * work[389][lane] - y3 * work[390][lane];
-        increment_jacobian[142][lane] = y4 * work[389][lane] - z4 * work[386][lane];
-        increment_jacobian[157][lane] = z4 * work[383][lane] - x4 * work[389][lane];
-        increment_jacobian[117][lane] = z3 * work[393][lane] - x3 * work[391][lane];
-        jacobian[102][lane] = work[391][lane] * t600 + (work[393][lane] * t604 + work[392][lane] * t607);
-        increment_jacobian[102][lane] = y3 * work[391][lane] - z3 * work[392][lane];
-        increment_jacobian[132][lane] = x3 * work[392][lane] - y3 * work[393][lane];
-        increment_jacobian[218][lane] = x5 * work[394][lane] - y5 * work[391][lane];
-        increment_jacobian[118][lane] = z3 * work[396][lane] - x3 * work[394][lane];
-        increment_jacobian[216][lane] = x5 * work[396][lane] - y5 * work[393][lane];
-        jacobian[103][lane] = work[394][lane] * t600 + (work[396][lane] * t604 + work[395][lane] * t607);
-        increment_jacobian[103][lane] = y3 * work[394][lane] - z3 * work[395][lane];
-        increment_jacobian[133][lane] = x3 * work[395][lane] - y3 * work[396][lane];
-        increment_jacobian[217][lane] = x5 * work[395][lane] - y5 * work[392][lane];
-        increment_jacobian[188][lane] = y5 * work[397][lane] - z5 * work[394][lane];
-        increment_jacobian[203][lane] = z5 * work[391][lane] - x5 * work[397][lane];
-        increment_jacobian[119][lane] = z3 * work[399][lane] - x3 * work[397][lane];
-        increment_jacobian[186][lane] = y5 * work[399][lane] - z5 * work[396][lane];
-        increment_jacobian[201][lane] = z5 * work[393][lane] - x5 * work[399][lane];
-        jacobian[104][lane] = work[397][lane] * t600 + (work[399][lane] * t604 + work[398][lane] * t607);
-        increment_jacobian[104][lane] = y3 * work[397][lane] - z3 * work[398][lane];
-        increment_jacobian[134][lane] = x3 * work[398][lane] - y3 * work[399][lane];
-        increment_jacobian[187][lane] = y5 * work[398][lane] - z5 * work[395][lane];
-        increment_jacobian[202][lane] = z5 * work[392][lane] - x5 * work[398][lane];
-        jacobian[105][lane] = work[203][lane] * work[371][lane] + (work[200][lane] * work[372][lane] + work[197][lane] * work[373][lane]);
-        jacobian[106][lane] = work[202][lane] * work[371][lane] + (work[199][lane] * work[372][lane] + work[196][lane] * work[373][lane]);
-        jacobian[107][lane] = work[201][lane] * work[371][lane] + (work[198][lane] * work[372][lane] + work[195][lane] * work[373][lane]);
-        jacobian[108][lane] = work[305][lane] * work[371][lane] + (work[302][lane] * work[372][lane] + work[299][lane] * work[373][lane]);
-    }
-}
-
-/* spin_chain5_linearise_lanes_part6 (part 6 of 7) */
-spin_chain5_APART static void spin_chain5_linearise_lanes_part6(spin_chain5_lanes coef[restrict 33],
-                                                                spin_chain5_lanes y[restrict 15],
-                                                                spin_chain5_lanes displacement[restrict 15],
-                                                                spin_chain5_lanes increment[restrict 15],
-                                                                spin_chain5_lanes jacobian[restrict 225],
-                                                                spin_chain5_lanes increment_jacobian[restrict 225],
-                                                                spin_chain5_lanes work[restrict 517])
-{
-    (void)displacement;
-    (void)increment;
-    spin_chain5_EACH_LANE
-    for (int lane = 0; lane < spin_chain5_LANES; ++lane) {
-        const double x1 = y[0][lane];
-        const double y1 = y[1][lane];
-        const double z1 = y[2][lane];
-        const double x3 = y[6][lane];
-        const double y3 = y[7][lane];
-        const double z3 = y[8][lane];
-        const double x4 = y[9][lane];
-        const double y4 = y[10][lane];
-        const double z4 = y[11][lane];
-        const double x5 = y[12][lane];
-        const double y5 = y[13][lane];
-        const double z5 = y[14][lane];
-        const double t667 = work[327][lane] * work[332][lane] * work[330][lane];
-        const double t668 = 0.5 * work[333][lane];
-        const double t669 = (work[401][lane] + work[402][lane]) * work[330][lane] + 2.0 * (work[403][lane] * work[404][lane]);
-        const double t670 = (work[369][lane] - work[405][lane]) * work[330][lane] + 2.0 * (work[403][lane] * work[406][lane]) - work[407][lane];
-        const double t671 = work[408][lane] + (2.0 * (work[403][lane] * work[409][lane]) - (work[410][lane] + work[328][lane]) * work[330][lane]);
-        const double t672 = y4 * work[414][lane];
-        const double t673 = z4 * work[415][lane];
-        const double t674 = spin_chain5_phi1_lane(work[416][lane]);
-        const double t675 = work[417][lane] * t674;
-        const double t676 = (t672 + t673) * work[418][lane] + 2.0 * (work[419][lane] * t675);
-        const double t677 = work[415][lane] * t674;
-        const double t678 = 0.5 * y4;
-        const double t679 = (work[420][lane] - work[421][lane]) * work[418][lane] + 2.0 * (work[419][lane] * t677) - t678;
-        const double t680 = 0.5 * z4;
-        const double t681 = work[414][lane] * t674;
-        const double t682 = t680 + (2.0 * (work[419][lane] * t681) - (work[422][lane] + work[423][lane]) * work[418][lane]);
-        const double t683 = y3 * work[424][lane];
-        const double t684 = z3 * work[425][lane];
-        const double t685 = y5 * (coef[29][lane] * y5);
-        const double t686 = coef[28][lane] + z5 * (coef[29][lane] * z5);
-        const double t687 = t683 + (t684 + (t685 + t686));
-        const double t688 = coef[27][lane] * x5 + coef[22][lane] * x3;
-        work[514][lane] = z3 * work[426][lane] + z5 * t688;
-        work[515][lane] = y5 * t688 + y3 * work[426][lane];
-        const double t691 = work[414][lane] * work[417][lane] * work[418][lane];
-        const double t692 = 0.5 * work[415][lane];
-        work[516][lane] = z3 * work[429][lane] + z5 * (coef[22][lane] * y3 + coef[27][lane] * y5);
-        const double t694 = x3 * work[430][lane];
-        const double t695 = x5 * (coef[29][lane] * x5);
-        const double t696 = t694 + (t684 + (t695 + t686));
-        const double t697 = 0.5 * work[414][lane];
-        const double t698 = work[415][lane] * work[417][lane] * work[418][lane];
-        const double t699 = t694 + (t683 + (t695 + (coef[28][lane] + t685)));
-        const double t700 = y3 * work[364][lane];
-        const double t701 = z3 * work[361][lane];
-        const double t702 = coef[1][lane] * y1 + coef[27][lane] * y4;
-        const double t703 = y5 * t702;
-        const double t704 = coef[0][lane] + z5 * (coef[1][lane] * z1 + coef[27][lane] * z4);
-        work[499][lane] = t700 + (t701 + (t703 + t704));
-        const double t706 = work[63][lane] + (work[343][lane] + coef[30][lane] * z4);
-        const double t707 = coef[29][lane] * z4;
-        const double t708 = coef[2][lane] * z1 + t707;
-        work[505][lane] = x3 * t706 + (x5 * t708 + work[431][lane]);
-        const double t710 = work[432][lane] + (coef[30][lane] * y4 + work[348][lane]);
-        const double t711 = coef[29][lane] * y4;
-        const double t712 = t711 + coef[2][lane] * y1;
-        work[502][lane] = x3 * t710 + (x5 * t712 + work[433][lane]);
-        const double t714 = work[434][lane] + (work[353][lane] + coef[30][lane] * x4);
-        work[475][lane] = coef[29][lane] * x4;
-        const double t716 = coef[2][lane] * x1 + work[475][lane];
-        work[498][lane] = y3 * t714 + (y5 * t716 + work[435][lane]);
-        const double t718 = x3 * work[365][lane];
-        const double t719 = coef[27][lane] * x4 + coef[1][lane] * x1;
-        const double t720 = x5 * t719;
-        work[501][lane] = t718 + (t701 + (t720 + t704));
-        work[504][lane] = y3 * t706 + (y5 * t708 + work[436][lane]);
-        work[497][lane] = z3 * t714 + (z5 * t716 + work[437][lane]);
-        work[500][lane] = z3 * t710 + (z5 * t712 + work[438][lane]);
-        work[503][lane] = t718 + (t700 + (t720 + (coef[0][lane] + t703)));
-        const double t726 = (work[423][lane] - work[439][lane]) * work[418][lane] + 2.0 * (work[440][lane] * t675) - t680;
-        const double t727 = x4 * work[417][lane];
-        const double t728 = (t727 + t673) * work[418][lane] + 2.0 * (work[440][lane] * t681);
-        const double t729 = 0.5 * x4;
-        const double t730 = t729 + (2.0 * (work[440][lane] * t677) - (work[441][lane] + work[442][lane]) * work[418][lane]);
-        const double t731 = work[414][lane] * work[415][lane] * work[418][lane];
-        const double t732 = 0.5 * work[417][lane];
-        const double t733 = t678 + (2.0 * (work[444][lane] * t675) - (work[445][lane] + work[420][lane]) * work[418][lane]);
-        const double t734 = (t727 + t672) * work[418][lane] + 2.0 * (work[444][lane] * t677);
-        const double t735 = (work[442][lane] - work[446][lane]) * work[418][lane] + 2.0 * (work[444][lane] * t681) - t729;
-        const double t736 = spin_chain5_phi1_lane(work[448][lane]);
-        work[489][lane] = work[97][lane] * t736;
-        work[510][lane] = 0.5 * y5;
-        work[481][lane] = (work[449][lane] - work[450][lane]) * work[451][lane] + 2.0 * (work[452][lane] * work[489][lane]) - work[510][lane];
-        work[508][lane] = y5 * work[453][lane];
-        work[492][lane] = z5 * work[97][lane];
-        work[495][lane] = work[454][lane] * t736;
-        work[483][lane] = (work[508][lane] + work[492][lane]) * work[451][lane] + 2.0 * (work[452][lane] * work[495][lane]);
-        work[496][lane] = 0.5 * z5;
-        work[493][lane] = work[453][lane] * t736;
-        work[484][lane] = work[496][lane] + (2.0 * (work[452][lane] * work[493][lane]) - (work[455][lane] + work[456][lane]) * work[451][lane]);
-        work[487][lane] = z1 * work[471][lane] + z4 * t719;
-        work[485][lane] = y1 * work[78][lane];
-        work[476][lane] = z1 * work[472][lane];
-        work[486][lane] = y4 * t711;
-        work[477][lane] = coef[31][lane] + z4 * t707;
-        work[506][lane] = work[485][lane] + (work[476][lane] + (work[486][lane] + work[477][lane]));
-        work[482][lane] = y4 * t719 + y1 * work[471][lane];
-        work[478][lane] = work[454][lane] * work[453][lane] * work[451][lane];
-        work[479][lane] = 0.5 * work[97][lane];
-        work[480][lane] = z1 * work[474][lane] + z4 * t702;
-        jacobian[109][lane] = work[306][lane] * work[371][lane] + (work[303][lane] * work[372][lane] + work[300][lane] * work[373][lane]);
-        jacobian[110][lane] = work[307][lane] * work[371][lane] + (work[304][lane] * work[372][lane] + work[301][lane] * work[373][lane]);
-        jacobian[111][lane] = work[374][lane] + work[375][lane] + (work[376][lane] * work[371][lane] + (work[377][lane] * work[372][lane] + work[378][lane] * work[373][lane]));
-        jacobian[112][lane] = 1.0 + (work[379][lane] * work[371][lane] + (work[380][lane] * work[372][lane] + work[377][lane] * work[373][lane]) - (work[381][lane] + work[339][lane]) * work[330][lane]);
-        jacobian[114][lane] = work[382][lane] * work[371][lane] + (work[383][lane] * work[372][lane] + work[384][lane] * work[373][lane]);
-        jacobian[115][lane] = work[385][lane] * work[371][lane] + (work[386][lane] * work[372][lane] + work[387][lane] * work[373][lane]);
-        jacobian[116][lane] = work[388][lane] * work[371][lane] + (work[389][lane] * work[372][lane] + work[390][lane] * work[373][lane]);
-        jacobian[117][lane] = work[391][lane] * work[371][lane] + (work[392][lane] * work[372][lane] + work[393][lane] * work[373][lane]);
-        jacobian[118][lane] = work[394][lane] * work[371][lane] + (work[395][lane] * work[372][lane] + work[396][lane] * work[373][lane]);
-        jacobian[119][lane] = work[397][lane] * work[371][lane] + (work[398][lane] * work[372][lane] + work[399][lane] * work[373][lane]);
-        jacobian[113][lane] = t667 - t668 + (work[400][lane] * work[371][lane] + (work[379][lane] * work[372][lane] + work[376][lane] * work[373][lane]));
-        jacobian[120][lane] = work[203][lane] * t669 + (work[200][lane] * t670 + work[197][lane] * t671);
-        jacobian[121][lane] = work[202][lane] * t669 + (work[199][lane] * t670 + work[196][lane] * t671);
-        jacobian[122][lane] = work[201][lane] * t669 + (work[198][lane] * t670 + work[195][lane] * t671);
-        jacobian[123][lane] = work[305][lane] * t669 + (work[299][lane] * t671 + work[302][lane] * t670);
-        jacobian[124][lane] = work[306][lane] * t669 + (work[303][lane] * t670 + work[300][lane] * t671);
-        jacobian[125][lane] = work[307][lane] * t669 + (work[301][lane] * t671 + work[304][lane] * t670);
-        jacobian[126][lane] = work[411][lane] - work[412][lane] + (work[376][lane] * t669 + (work[378][lane] * t671 + work[377][lane] * t670));
-        jacobian[127][lane] = t668 + t667 + (work[379][lane] * t669 + (work[377][lane] * t671 + work[380][lane] * t670));
-        jacobian[128][lane] = 1.0 + (work[400][lane] * t669 + (work[376][lane] * t671 + work[379][lane] * t670) - work[413][lane] * work[330][lane]);
-        jacobian[129][lane] = work[382][lane] * t669 + (work[384][lane] * t671 + work[383][lane] * t670);
-        jacobian[130][lane] = work[385][lane] * t669 + (work[387][lane] * t671 + work[386][lane] * t670);
-        jacobian[131][lane] = work[388][lane] * t669 + (work[389][lane] * t670 + work[390][lane] * t671);
-        jacobian[132][lane] = work[391][lane] * t669 + (work[392][lane] * t670 + work[393][lane] * t671);
-        jacobian[133][lane] = work[394][lane] * t669 + (work[395][lane] * t670 + work[396][lane] * t671);
-        jacobian[134][lane] = work[397][lane] * t669 + (work[398][lane] * t670 + work[399][lane] * t671);
-        jacobian[135][lane] = work[206][lane] * t676 + (work[212][lane] * t679 + work[209][lane] * t682);
-        jacobian[136][lane] = work[205][lane] * t676 + (work[211][lane] * t679 + work[208][lane] * t682);
-        jacobian[137][lane] = work[204][lane] * t676 + (work[210][lane] * t679 + work[207][lane] * t682);
-        jacobian[138][lane] = work[308][lane] * t676 + (work[311][lane] * t682 + work[314][lane] * t679);
-        jacobian[139][lane] = work[309][lane] * t676 + (work[315][lane] * t679 + work[312][lane] * t682);
-        jacobian[140][lane] = work[310][lane] * t676 + (work[313][lane] * t682 + work[316][lane] * t679);
-        jacobian[141][lane] = work[384][lane] * t676 + (work[387][lane] * t682 + work[390][lane] * t679);
-        jacobian[142][lane] = work[383][lane] * t676 + (work[389][lane] * t679 + work[386][lane] * t682);
-        jacobian[143][lane] = work[382][lane] * t676 + (work[385][lane] * t682 + work[388][lane] * t679);
-        increment_jacobian[159][lane] = z4 * t687 - x4 * work[514][lane] - work[415][lane];
-        jacobian[144][lane] = 1.0 + (t687 * t676 + (work[514][lane] * t679 + work[515][lane] * t682) - (work[427][lane] + work[428][lane]) * work[418][lane]);
-        increment_jacobian[174][lane] = x4 * work[515][lane] - y4 * t687 + work[414][lane];
-        jacobian[145][lane] = t691 - t692 + (work[515][lane] * t676 + (work[516][lane] * t679 + t696 * t682));
-        increment_jacobian[145][lane] = y4 * work[516][lane] - z4 * t696 + work[415][lane];
-        increment_jacobian[175][lane] = x4 * t696 - y4 * work[515][lane] - work[417][lane];
-        jacobian[146][lane] = t697 + t698 + (work[514][lane] * t676 + (t699 * t679 + work[516][lane] * t682));
-        increment_jacobian[146][lane] = y4 * t699 - z4 * work[516][lane] - work[414][lane];
-        increment_jacobian[161][lane] = z4 * work[514][lane] - x4 * t699 + work[417][lane];
-        increment_jacobian[162][lane] = z4 * work[499][lane] - x4 * work[505][lane];
-        jacobian[147][lane] = work[499][lane] * t676 + (work[505][lane] * t679 + work[502][lane] * t682);
-        increment_jacobian[147][lane] = y4 * work[505][lane] - z4 * work[502][lane];
-        increment_jacobian[177][lane] = x4 * work[502][lane] - y4 * work[499][lane];
-        increment_jacobian[219][lane] = x5 * work[498][lane] - y5 * work[499][lane];
-        increment_jacobian[178][lane] = x4 * work[501][lane] - y4 * work[498][lane];
-        increment_jacobian[220][lane] = x5 * work[501][lane] - y5 * work[502][lane];
-        jacobian[148][lane] = work[498][lane] * t676 + (work[501][lane] * t682 + work[504][lane] * t679);
-        increment_jacobian[148][lane] = y4 * work[504][lane] - z4 * work[501][lane];
-        increment_jacobian[163][lane] = z4 * work[498][lane] - x4 * work[504][lane];
-        increment_jacobian[221][lane] = x5 * work[504][lane] - y5 * work[505][lane];
-        increment_jacobian[189][lane] = y5 * work[497][lane] - z5 * work[498][lane];
-        increment_jacobian[204][lane] = z5 * work[499][lane] - x5 * work[497][lane];
-        increment_jacobian[179][lane] = x4 * work[500][lane] - y4 * work[497][lane];
-        increment_jacobian[190][lane] = y5 * work[500][lane] - z5 * work[501][lane];
-        increment_jacobian[205][lane] = z5 * work[502][lane] - x5 * work[500][lane];
-        jacobian[149][lane] = work[497][lane] * t676 + (work[500][lane] * t682 + work[503][lane] * t679);
-        increment_jacobian[149][lane] = y4 * work[503][lane] - z4 * work[500][lane];
-        increment_jacobian[164][lane] = z4 * work[497][lane] - x4 * work[503][lane];
-        increment_jacobian[191][lane] = y5 * work[503][lane] - z5 * work[504][lane];
-        increment_jacobian[206][lane] = z5 * work[505][lane] - x5 * work[503][lane];
-        jacobian[150][lane] = work[206][lane] * t726 + (work[209][lane] * t728 + work[212][lane] * t730);
-        jacobian[151][lane] = work[205][lane] * t726 + (work[208][lane] * t728 + work[211][lane] * t730);
-        jacobian[152][lane] = work[204][lane] * t726 + (work[207][lane] * t728 + work[210][lane] * t730);
-        jacobian[153][lane] = work[308][lane] * t726 + (work[311][lane] * t728 + work[314][lane] * t730);
-        jacobian[154][lane] = work[309][lane] * t726 + (work[312][lane] * t728 + work[315][lane] * t730);
-        jacobian[155][lane] = work[310][lane] * t726 + (work[313][lane] * t728 + work[316][lane] * t730);
-        jacobian[156][lane] = work[384][lane] * t726 + (work[387][lane] * t728 + work[390][lane] * t730);
-        jacobian[157][lane] = work[383][lane] * t726 + (work[386][lane] * t728 + work[389][lane] * t730);
-        jacobian[158][lane] = work[382][lane] * t726 + (work[385][lane] * t728 + work[388][lane] * t730);
-        jacobian[159][lane] = t692 + t691 + (t687 * t726 + (work[515][lane] * t728 + work[514][lane] * t730));
-        jacobian[160][lane] = 1.0 + (work[515][lane] * t726 + (t696 * t728 + work[516][lane] * t730) - (work[427][lane] + work[443][lane]) * work[418][lane]);
-        jacobian[162][lane] = work[499][lane] * t726 + (work[502][lane] * t728 + work[505][lane] * t730);
-        jacobian[163][lane] = work[498][lane] * t726 + (work[501][lane] * t728 + work[504][lane] * t730);
-        jacobian[164][lane] = work[497][lane] * t726 + (work[500][lane] * t728 + work[503][lane] * t730);
-        jacobian[161][lane] = t731 - t732 + (work[514][lane] * t726 + (work[516][lane] * t728 + t699 * t730));
-        jacobian[165][lane] = work[206][lane] * t733 + (work[212][lane] * t734 + work[209][lane] * t735);
-        jacobian[166][lane] = work[205][lane] * t733 + (work[211][lane] * t734 + work[208][lane] * t735);
-        jacobian[167][lane] = work[204][lane] * t733 + (work[210][lane] * t734 + work[207][lane] * t735);
-        jacobian[168][lane] = work[308][lane] * t733 + (work[314][lane] * t734 + work[311][lane] * t735);
-        jacobian[169][lane] = work[309][lane] * t733 + (work[315][lane] * t734 + work[312][lane] * t735);
-        jacobian[170][lane] = work[310][lane] * t733 + (work[316][lane] * t734 + work[313][lane] * t735);
-        jacobian[171][lane] = work[384][lane] * t733 + (work[390][lane] * t734 + work[387][lane] * t735);
-        jacobian[172][lane] = work[383][lane] * t733 + (work[389][lane] * t734 + work[386][lane] * t735);
-        jacobian[173][lane] = work[382][lane] * t733 + (work[388][lane] * t734 + work[385][lane] * t735);
-        jacobian[174][lane] = t698 - t697 + (t687 * t733 + (work[514][lane] * t734 + work[515][lane] * t735));
-        jacobian[175][lane] = t732 + t731 + (work[515][lane] * t733 + (work[516][lane] * t734 + t696 * t735));
-        jacobian[176][lane] = 1.0 + (work[514][lane] * t733 + (t699 * t734 + work[516][lane] * t735) - work[447][lane] * work[418][lane]);
-        jacobian[177][lane] = work[499][lane] * t733 + (work[505][lane] * t734 + work[502][lane] * t735);
-        jacobian[178][lane] = work[498][lane] * t733 + (work[504][lane] * t734 + work[501][lane] * t735);
-        jacobian[179][lane] = work[497][lane] * t733 + (work[503][lane] * t734 + work[500][lane] * t735);
-        jacobian[180][lane] = work[457][lane] * work[481][lane] + (work[458][lane] * work[483][lane] + work[459][lane] * work[484][lane]);
-        jacobian[181][lane] = work[460][lane] * work[481][lane] + (work[461][lane] * work[483][lane] + work[462][lane] * work[484][lane]);
-        jacobian[182][lane] = work[463][lane] * work[481][lane] + (work[153][lane] * work[483][lane] + work[464][lane] * work[484][lane]);
-        jacobian[183][lane] = work[465][lane] * work[481][lane] + (work[267][lane] * work[483][lane] + work[466][lane] * work[484][lane]);
-        jacobian[184][lane] = work[467][lane] * work[481][lane] + (work[269][lane] * work[483][lane] + work[468][lane] * work[484][lane]);
-        jacobian[185][lane] = work[469][lane] * work[481][lane] + (work[271][lane] * work[483][lane] + work[470][lane] * work[484][lane]);
-        jacobian[186][lane] = work[399][lane] * work[481][lane] + (work[393][lane] * work[483][lane] + work[396][lane] * work[484][lane]);
-        jacobian[187][lane] = work[398][lane] * work[481][lane] + (work[392][lane] * work[483][lane] + work[395][lane] * work[484][lane]);
-        jacobian[188][lane] = work[397][lane] * work[481][lane] + (work[391][lane] * work[483][lane] + work[394][lane] * work[484][lane]);
-        jacobian[189][lane] = work[497][lane] * work[481][lane] + (work[499][lane] * work[483][lane] + work[498][lane] * work[484][lane]);
-        jacobian[190][lane] = work[500][lane] * work[481][lane] + (work[502][lane] * work[483][lane] + work[501][lane] * work[484][lane]);
-        jacobian[191][lane] = work[503][lane] * work[481][lane] + (work[505][lane] * work[483][lane] + work[504][lane] * work[484][lane]);
-        increment_jacobian[207][lane] = z5 * work[506][lane] - x5 * work[487][lane] - work[97][lane];
-        jacobian[192][lane] = 1.0 + (work[487][lane] * work[481][lane] + (work[506][lane] * work[483][lane] + work[482][lane] * work[484][lane]) - (work[96][lane] + work[473][lane]) * work[451][lane]);
-        increment_jacobian[222][lane] = x5 * work[482][lane] - y5 * work[506][lane] + work[453][lane];
-    }
-}
-
-/* spin_chain5_linearise_lanes_part7 (part 7 of 7) */
-spin_chain5_APART static void spin_chain5_linearise_lanes_part7(spin_chain5_lanes coef[restrict 33],
-                                                                spin_chain5_lanes y[restrict 15],
-                                                                spin_chain5_lanes displacement[restrict 15],
-                                                                spin_chain5_lanes increment[restrict 15],
-                                                                spin_chain5_lanes jacobian[restrict 225],
-                                                                spin_chain5_lanes increment_jacobian[restrict 225],
-                                                                spin_chain5_lanes work[restrict 517])
-{
-    (void)displacement;
-    (void)increment;
-    spin_chain5_EACH_LANE
-    for (int lane = 0; lane < spin_chain5_LANES; ++lane) {
-        const double x1 = y[0][lane];
-        const double y1 = y[1][lane];
-        const double z1 = y[2][lane];
-        const double x2 = y[3][lane];
-        const double y2 = y[4][lane];
-        const double z2 = y[5][lane];
-        const double x3 = y[6][lane];
-        const double y3 = y[7][lane];
-        const double z3 = y[8][lane];
-        const double x4 = y[9][lane];
-        const double y4 = y[10][lane];
-        const double z4 = y[11][lane];
-        const double x5 = y[12][lane];
-        const double y5 = y[13][lane];
-        const double z5 = y[14][lane];
-        const double t757 = x1 * work[95][lane];
-        const double t758 = x4 * work[475][lane];
-        const double t759 = t757 + (work[476][lane] + (t758 + work[477][lane]));
-        const double t760 = 0.5 * work[453][lane];
-        const double t761 = work[97][lane] * work[454][lane] * work[451][lane];
-        const double t762 = t757 + (work[485][lane] + (t758 + (coef[31][lane] + work[486][lane])));
-        const double t763 = 0.5 * x5;
-        const double t764 = t763 + (2.0 * (work[488][lane] * work[489][lane]) - (work[490][lane] + work[491][lane]) * work[451][lane]);
-        const double t765 = x5 * work[454][lane];
-        const double t766 = (t765 + work[492][lane]) * work[451][lane] + 2.0 * (work[488][lane] * work[493][lane]);
-        const double t767 = (work[456][lane] - work[494][lane]) * work[451][lane] + 2.0 * (work[488][lane] * work[495][lane]) - work[496][lane];
-        const double t768 = work[97][lane] * work[453][lane] * work[451][lane];
-        const double t769 = 0.5 * work[454][lane];
-        const double t770 = (t765 + work[508][lane]) * work[451][lane] + 2.0 * (work[509][lane] * work[489][lane]);
-        const double t771 = work[510][lane] + (2.0 * (work[509][lane] * work[495][lane]) - (work[511][lane] + work[449][lane]) * work[451][lane]);
-        const double t772 = (work[491][lane] - work[512][lane]) * work[451][lane] + 2.0 * (work[509][lane] * work[493][lane]) - t763;
-        const double t773 = y1 * work[180][lane];
-        const double t774 = z1 * work[181][lane];
-        const double t775 = x1 * work[183][lane];
-        const double t776 = y2 * work[295][lane];
-        const double t777 = z2 * work[294][lane];
-        const double t778 = x2 * work[297][lane];
-        const double t779 = y3 * work[376][lane];
-        const double t780 = z3 * work[377][lane];
-        const double t781 = x3 * work[379][lane];
-        const double t782 = y4 * work[514][lane];
-        const double t783 = z4 * work[515][lane];
-        const double t784 = x4 * work[516][lane];
-        const double t785 = y5 * work[487][lane];
-        const double t786 = z5 * work[482][lane];
-        const double t787 = x5 * work[480][lane];
-        jacobian[193][lane] = work[478][lane] - work[479][lane] + (work[480][lane] * work[481][lane] + (work[482][lane] * work[483][lane] + t759 * work[484][lane]));
-        increment_jacobian[193][lane] = y5 * work[480][lane] - z5 * t759 + work[97][lane];
-        increment_jacobian[223][lane] = x5 * t759 - y5 * work[482][lane] - work[454][lane];
-        jacobian[194][lane] = t760 + t761 + (t762 * work[481][lane] + (work[487][lane] * work[483][lane] + work[480][lane] * work[484][lane]));
-        increment_jacobian[194][lane] = y5 * t762 - z5 * work[480][lane] - work[453][lane];
-        increment_jacobian[209][lane] = z5 * work[487][lane] - x5 * t762 + work[454][lane];
-        jacobian[195][lane] = work[457][lane] * t764 + (work[459][lane] * t766 + work[458][lane] * t767);
-        jacobian[196][lane] = work[460][lane] * t764 + (work[462][lane] * t766 + work[461][lane] * t767);
-        jacobian[197][lane] = work[463][lane] * t764 + (work[464][lane] * t766 + work[153][lane] * t767);
-        jacobian[198][lane] = work[465][lane] * t764 + (work[466][lane] * t766 + work[267][lane] * t767);
-        jacobian[199][lane] = work[467][lane] * t764 + (work[468][lane] * t766 + work[269][lane] * t767);
-        jacobian[200][lane] = work[469][lane] * t764 + (work[470][lane] * t766 + work[271][lane] * t767);
-        jacobian[201][lane] = work[399][lane] * t764 + (work[396][lane] * t766 + work[393][lane] * t767);
-        jacobian[202][lane] = work[398][lane] * t764 + (work[395][lane] * t766 + work[392][lane] * t767);
-        jacobian[203][lane] = work[397][lane] * t764 + (work[394][lane] * t766 + work[391][lane] * t767);
-        jacobian[204][lane] = work[497][lane] * t764 + (work[498][lane] * t766 + work[499][lane] * t767);
-        jacobian[205][lane] = work[500][lane] * t764 + (work[501][lane] * t766 + work[502][lane] * t767);
-        jacobian[206][lane] = work[503][lane] * t764 + (work[504][lane] * t766 + work[505][lane] * t767);
-        jacobian[207][lane] = work[479][lane] + work[478][lane] + (work[487][lane] * t764 + (work[482][lane] * t766 + work[506][lane] * t767));
-        jacobian[208][lane] = 1.0 + (work[480][lane] * t764 + (t759 * t766 + work[482][lane] * t767) - (work[507][lane] + work[96][lane]) * work[451][lane]);
-        jacobian[209][lane] = t768 - t769 + (t762 * t764 + (work[480][lane] * t766 + work[487][lane] * t767));
-        jacobian[210][lane] = work[457][lane] * t770 + (work[458][lane] * t771 + work[459][lane] * t772);
-        jacobian[211][lane] = work[460][lane] * t770 + (work[462][lane] * t772 + work[461][lane] * t771);
-        jacobian[212][lane] = work[463][lane] * t770 + (work[464][lane] * t772 + work[153][lane] * t771);
-        jacobian[213][lane] = work[465][lane] * t770 + (work[267][lane] * t771 + work[466][lane] * t772);
-        jacobian[214][lane] = work[467][lane] * t770 + (work[468][lane] * t772 + work[269][lane] * t771);
-        jacobian[215][lane] = work[469][lane] * t770 + (work[470][lane] * t772 + work[271][lane] * t771);
-        jacobian[216][lane] = work[399][lane] * t770 + (work[396][lane] * t772 + work[393][lane] * t771);
-        jacobian[217][lane] = work[398][lane] * t770 + (work[395][lane] * t772 + work[392][lane] * t771);
-        jacobian[218][lane] = work[397][lane] * t770 + (work[394][lane] * t772 + work[391][lane] * t771);
-        jacobian[219][lane] = work[497][lane] * t770 + (work[499][lane] * t771 + work[498][lane] * t772);
-        jacobian[220][lane] = work[500][lane] * t770 + (work[501][lane] * t772 + work[502][lane] * t771);
-        jacobian[221][lane] = work[503][lane] * t770 + (work[504][lane] * t772 + work[505][lane] * t771);
-        jacobian[222][lane] = t761 - t760 + (work[487][lane] * t770 + (work[482][lane] * t772 + work[506][lane] * t771));
-        jacobian[223][lane] = t769 + t768 + (work[480][lane] * t770 + (work[482][lane] * t771 + t759 * t772));
-        jacobian[224][lane] = 1.0 + (t762 * t770 + (work[487][lane] * t771 + work[480][lane] * t772) - work[513][lane] * work[451][lane]);
-        increment_jacobian[0][lane] = t773 - t774;
-        increment_jacobian[16][lane] = t774 - t775;
-        increment_jacobian[32][lane] = t775 - t773;
-        increment_jacobian[48][lane] = t776 - t777;
-        increment_jacobian[64][lane] = t777 - t778;
-        increment_jacobian[80][lane] = t778 - t776;
-        increment_jacobian[96][lane] = t779 - t780;
-        increment_jacobian[112][lane] = t780 - t781;
-        increment_jacobian[128][lane] = t781 - t779;
-        increment_jacobian[144][lane] = t782 - t783;
-        increment_jacobian[160][lane] = t783 - t784;
-        increment_jacobian[176][lane] = t784 - t782;
-        increment_jacobian[192][lane] = t785 - t786;
-        increment_jacobian[208][lane] = t786 - t787;
-        increment_jacobian[224][lane] = t787 - t785;
-    }
-}
-
-/* spin_chain5_linearise in all lanes. */
-static void spin_chain5_linearise_lanes(spin_chain5_lanes coef[restrict 33], spin_chain5_lanes y[restrict 15],
-                                        spin_chain5_lanes displacement[restrict 15],
-                                        spin_chain5_lanes increment[restrict 15],
-                                        spin_chain5_lanes jacobian[restrict 225],
-                                        spin_chain5_lanes increment_jacobian[restrict 225])
-{
-    spin_chain5_lanes work[517];
-    spin_chain5_linearise_lanes_part1(coef, y, displacement, increment, jacobian, increment_jacobian, work);
-    spin_chain5_linearise_lanes_part2(coef, y, displacement, increment, jacobian, increment_jacobian, work);
-    spin_chain5_linearise_lanes_part3(coef, y, displacement, increment, jacobian, increment_jacobian, work);
-    spin_chain5_linearise_lanes_part4(coef, y, displacement, increment, jacobian, increment_jacobian, work);
-    spin_chain5_linearise_lanes_part5(coef, y, displacement, increment, jacobian, increment_jacobian, work);
-    spin_chain5_linearise_lanes_part6(coef, y, displacement, increment, jacobian, increment_jacobian, work);
-    spin_chain5_linearise_lanes_part7(coef, y, displacement, increment, jacobian, increment_jacobian, work);
-}
-
-/* spin_chain5_evaluate_lanes_part1 (part 1 of 2) */
-spin_chain5_APART static void spin_chain5_evaluate_lanes_part1(spin_chain5_lanes coef[restrict 33],
-                                                               spin_chain5_lanes y[restrict 15],
-                                                               spin_chain5_lanes displacement[restrict 15],
-                                                               spin_chain5_lanes increment[restrict 15],
-                                                               spin_chain5_lanes work[restrict 86])
-{
-    spin_chain5_EACH_LANE
-    for (int lane = 0; lane < spin_chain5_LANES; ++lane) {
-        const double x1 = y[0][lane];
-        const double y1 = y[1][lane];
-        const double z1 = y[2][lane];
-        const double x2 = y[3][lane];
-        const double y2 = y[4][lane];
-        const double z2 = y[5][lane];
-        const double x3 = y[6][lane];
-        const double y3 = y[7][lane];
-        const double z3 = y[8][lane];
-        const double x4 = y[9][lane];
-        const double y4 = y[10][lane];
-        const double z4 = y[11][lane];
-        const double x5 = y[12][lane];
-        const double y5 = y[13][lane];
-        const double z5 = y[14][lane];
-        work[19][lane] = coef[3][lane] * x5;
-        work[57][lane] = coef[3][lane] * x4;
-        work[7][lane] = work[19][lane] + (coef[5][lane] * x2 + work[57][lane]);
-        const double t4 = coef[9][lane] * z2 + coef[8][lane] * z5;
-        const double t5 = x1 * t4;
-        const double t6 = coef[13][lane] * x2;
-        const double t7 = coef[12][lane] * x5 + t6;
-        work[27][lane] = x5 * z4;
-        work[26][lane] = x4 * z5;
-        const double t10 = coef[3][lane] * work[27][lane] + coef[4][lane] * work[26][lane];
-        const double t11 = coef[6][lane] * z2;
-        const double t12 = t11 + coef[4][lane] * z4;
-        const double t13 = t10 + x3 * t12;
-        work[21][lane] = coef[3][lane] * y5;
-        work[59][lane] = coef[3][lane] * y4;
-        const double t16 = work[21][lane] + (coef[5][lane] * y2 + work[59][lane]);
-        const double t17 = y1 * t4;
-        const double t18 = coef[13][lane] * y2;
-        const double t19 = t18 + coef[12][lane] * y5;
-        work[30][lane] = y5 * z4;
-        work[31][lane] = y4 * z5;
-        const double t22 = coef[3][lane] * work[30][lane] + coef[4][lane] * work[31][lane];
-        const double t23 = y3 * t12 + t22;
-        const double t24 = coef[8][lane] * z2 + coef[7][lane] * z5;
-        work[71][lane] = x1 * t24;
-        work[69][lane] = coef[3][lane] * z4;
-        work[23][lane] = coef[4][lane] * z2;
-        const double t28 = work[69][lane] + work[23][lane];
-        work[72][lane] = x3 * t28;
-        work[22][lane] = coef[1][lane] * z5;
-        const double t31 = work[22][lane] + coef[4][lane] * z3;
-        work[73][lane] = x4 * t31;
-        work[70][lane] = coef[11][lane] * z1;
-        const double t34 = coef[2][lane] * z4 + work[70][lane];
-        work[32][lane] = coef[0][lane] * z5;
-        const double t36 = coef[0][lane] * z2;
-        work[79][lane] = y1 * t24;
-        work[80][lane] = y3 * t28;
-        work[81][lane] = y4 * t31;
-        const double t40 = x5 * (work[71][lane] + (work[72][lane] + (work[73][lane] + x5 * t34))) + (work[32][lane] + (coef[10][lane] * z1 + t36) + y5 * (work[79][lane] + (work[80][lane] + (y5 * t34 + work[81][lane]))));
-        const double p_z1 = x2 * (z3 * work[7][lane] + (t5 + (z1 * t7 + t13))) + (y2 * (z3 * t16 + (t17 + (z1 * t19 + t23))) + t40);
-        const double t41 = coef[8][lane] * y5 + coef[9][lane] * y2;
-        const double t42 = x1 * t41;
-        work[40][lane] = x5 * y4;
-        work[41][lane] = x4 * y5;
-        const double t45 = coef[3][lane] * work[40][lane] + coef[4][lane] * work[41][lane];
-        const double t46 = coef[6][lane] * y2;
-        const double t47 = coef[4][lane] * y4 + t46;
-        const double t48 = t45 + x3 * t47;
-        work[37][lane] = coef[3][lane] * z5;
-        work[12][lane] = work[37][lane] + (coef[5][lane] * z2 + work[69][lane]);
-        const double t51 = coef[13][lane] * z2;
-        const double t52 = coef[12][lane] * z5 + t51;
-        const double t53 = coef[4][lane] * work[30][lane] + coef[3][lane] * work[31][lane];
-        const double t54 = z1 * t41 + (t53 + z3 * t47);
-        const double t55 = coef[7][lane] * y5 + coef[8][lane] * y2;
-        work[76][lane] = x1 * t55;
-        work[29][lane] = coef[4][lane] * y2;
-        const double t58 = work[59][lane] + work[29][lane];
-        work[77][lane] = x3 * t58;
-        work[48][lane] = coef[1][lane] * y5;
-        const double t61 = coef[4][lane] * y3 + work[48][lane];
-        work[78][lane] = x4 * t61;
-        work[60][lane] = coef[11][lane] * y1;
-        const double t64 = work[60][lane] + coef[2][lane] * y4;
-        work[52][lane] = coef[0][lane] * y5;
-        work[6][lane] = coef[0][lane] * y2;
-        work[66][lane] = z1 * t55;
-        work[67][lane] = z3 * t58;
-        work[68][lane] = z4 * t61;
-        const double t70 = x5 * (work[76][lane] + (work[77][lane] + (work[78][lane] + x5 * t64))) + (work[52][lane] + (work[6][lane] + coef[10][lane] * y1) + z5 * (work[66][lane] + (work[67][lane] + (work[68][lane] + z5 * t64))));
-        const double p_y1 = x2 * (y3 * work[7][lane] + (t42 + (y1 * t7 + t48))) + (z2 * (y3 * work[12][lane] + (y1 * t52 + t54)) + t70);
-        const double t71 = coef[9][lane] * x2 + coef[8][lane] * x5;
-        const double t72 = coef[6][lane] * x2;
-        const double t73 = coef[4][lane] * x4 + t72;
-        work[10][lane] = coef[4][lane] * work[40][lane] + coef[3][lane] * work[41][lane];
-        const double t75 = y1 * t71 + (y3 * t73 + work[10][lane]);
-        const double t76 = coef[3][lane] * work[26][lane] + coef[4][lane] * work[27][lane];
-        const double t77 = z1 * t71 + (t76 + z3 * t73);
-        const double t78 = coef[8][lane] * x2 + coef[7][lane] * x5;
-        work[83][lane] = y1 * t78;
-        work[24][lane] = coef[4][lane] * x2;
-        const double t81 = work[24][lane] + work[57][lane];
-        work[84][lane] = y3 * t81;
-        work[39][lane] = coef[1][lane] * x5;
-        const double t84 = coef[4][lane] * x3 + work[39][lane];
-        work[85][lane] = y4 * t84;
-        work[58][lane] = coef[11][lane] * x1;
-        const double t87 = work[58][lane] + coef[2][lane] * x4;
-        work[43][lane] = coef[0][lane] * x5;
-        const double t89 = coef[0][lane] * x2;
-        work[63][lane] = z1 * t78;
-        work[64][lane] = z3 * t81;
-        work[65][lane] = z4 * t84;
-        const double t93 = y5 * (work[83][lane] + (work[84][lane] + (work[85][lane] + y5 * t87))) + (work[43][lane] + (coef[10][lane] * x1 + t89) + z5 * (work[63][lane] + (work[64][lane] + (z5 * t87 + work[65][lane]))));
-        const double p_x1 = y2 * (x3 * t16 + (x1 * t19 + t75)) + (z2 * (x3 * work[12][lane] + (x1 * t52 + t77)) + t93);
-        const double t94 = spin_chain5_phi0_lane(p_z1 * p_z1 + (p_y1 * p_y1 + p_x1 * p_x1));
-        const double t95 = z1 * p_x1 - x1 * p_z1;
-        const double t96 = x1 * p_y1 - y1 * p_x1;
-        const double t97 = y1 * p_z1 - z1 * p_y1;
-        const double t98 = work[37][lane] + (work[69][lane] + coef[19][lane] * z2);
-        const double t99 = coef[20][lane] * z5 + t51;
-        const double t100 = coef[4][lane] * x5 + t72;
-        const double t101 = z1 * t100;
-        const double t102 = coef[18][lane] * z2;
-        const double t103 = coef[14][lane] * z4 + t102;
-        const double t104 = coef[16][lane] * x2 + coef[15][lane] * x4;
-        const double t105 = z3 * t104 + t10;
-        work[33][lane] = coef[0][lane] * z3;
-        work[61][lane] = coef[0][lane] * z1;
-        const double t108 = coef[4][lane] * y5 + t46;
-        work[13][lane] = z1 * t108;
-        const double t110 = coef[15][lane] * y4 + coef[16][lane] * y2;
-        work[15][lane] = z3 * t110 + t22;
-        const double t112 = y1 * (y3 * t98 + (y1 * t99 + t54)) + (x3 * (t101 + (x3 * t103 + t105)) + (work[33][lane] + (coef[17][lane] * z2 + work[61][lane]) + y3 * (work[13][lane] + (y3 * t103 + work[15][lane]))));
-        const double p_z2 = x1 * (x3 * t98 + (x1 * t99 + t77)) + t112;
-        const double t113 = work[19][lane] + (coef[19][lane] * x2 + work[57][lane]);
-        const double t114 = coef[20][lane] * x5 + t6;
-        work[8][lane] = x1 * t108;
-        work[9][lane] = x3 * t110;
-        const double t117 = coef[18][lane] * x2;
-        const double t118 = t117 + coef[14][lane] * x4;
-        work[44][lane] = coef[0][lane] * x3;
-        work[75][lane] = coef[0][lane] * x1;
-        const double t121 = t11 + coef[4][lane] * z5;
-        const double t122 = x1 * t121;
-        const double t123 = coef[15][lane] * z4 + coef[16][lane] * z2;
-        const double t124 = x3 * t123;
-        const double t125 = y3 * (work[8][lane] + (work[9][lane] + (y3 * t118 + work[10][lane]))) + (work[44][lane] + (work[75][lane] + coef[17][lane] * x2) + z3 * (t122 + (t124 + (t76 + z3 * t118))));
-        const double p_x2 = y1 * (y3 * t113 + (t42 + (y1 * t114 + t48))) + (z1 * (z3 * t113 + (t5 + (z1 * t114 + t13))) + t125);
-        const double t126 = z2 * p_x2 - x2 * p_z2;
-        const double t127 = work[21][lane] + (coef[19][lane] * y2 + work[59][lane]);
-        const double t128 = coef[20][lane] * y5 + t18;
-        const double t129 = y1 * t100;
-        const double t130 = coef[18][lane] * y2;
-        const double t131 = t130 + coef[14][lane] * y4;
-        const double t132 = y3 * t104 + t45;
-        work[53][lane] = coef[0][lane] * y3;
-        work[82][lane] = coef[0][lane] * y1;
-        const double t135 = y1 * t121;
-        const double t136 = y3 * t123;
-        const double t137 = z1 * (z3 * t127 + (t17 + (z1 * t128 + t23))) + (x3 * (t129 + (x3 * t131 + t132)) + (work[53][lane] + (work[82][lane] + coef[17][lane] * y2) + z3 * (t135 + (t136 + (z3 * t131 + t53)))));
-        const double p_y2 = x1 * (x3 * t127 + (x1 * t128 + t75)) + t137;
-        const double t138 = x2 * p_y2 - y2 * p_x2;
-        const double t139 = spin_chain5_phi0_lane(p_z2 * p_z2 + (p_x2 * p_x2 + p_y2 * p_y2));
-        const double t140 = y2 * p_z2 - z2 * p_y2;
-        work[11][lane] = t117 + coef[26][lane] * x4;
-        const double t142 = t130 + coef[26][lane] * y4;
-        const double t143 = work[37][lane] + work[23][lane];
-        work[45][lane] = x1 * t143;
-        const double t145 = coef[23][lane] * z4 + coef[15][lane] * z2;
-        work[46][lane] = x3 * t145;
-        work[38][lane] = coef[25][lane] * z3;
-        const double t148 = work[38][lane] + coef[21][lane] * z5;
-        work[42][lane] = coef[22][lane] * z4;
-        const double t150 = work[42][lane] + coef[4][lane] * z1;
-        work[47][lane] = x5 * t150;
-        work[62][lane] = coef[0][lane] * z4;
-        work[49][lane] = y1 * t143;
-        work[50][lane] = y3 * t145;
-        work[51][lane] = y5 * t150;
-        const double t156 = x4 * (work[45][lane] + (work[46][lane] + (x4 * t148 + work[47][lane]))) + (work[62][lane] + (coef[24][lane] * z3 + t36) + y4 * (work[49][lane] + (work[50][lane] + (work[51][lane] + y4 * t148))));
-        work[17][lane] = x2 * (z1 * work[7][lane] + (t122 + (t124 + (t76 + z3 * work[11][lane])))) + (y2 * (z1 * t16 + (t135 + (t136 + (t53 + z3 * t142)))) + t156);
-        work[14][lane] = t102 + coef[26][lane] * z4;
-        const double t158 = work[24][lane] + work[19][lane];
-        work[54][lane] = y1 * t158;
-        const double t160 = coef[23][lane] * x4 + coef[15][lane] * x2;
-        work[55][lane] = y3 * t160;
-        work[20][lane] = coef[25][lane] * x3;
-        const double t163 = work[20][lane] + coef[21][lane] * x5;
-        work[25][lane] = coef[22][lane] * x4;
-        const double t165 = work[25][lane] + coef[4][lane] * x1;
-        work[56][lane] = y5 * t165;
-        work[74][lane] = coef[0][lane] * x4;
-        work[34][lane] = z1 * t158;
-        work[35][lane] = z3 * t160;
-        work[36][lane] = z5 * t165;
-        const double t171 = y4 * (work[54][lane] + (work[55][lane] + (y4 * t163 + work[56][lane]))) + (work[74][lane] + (t89 + coef[24][lane] * x3) + z4 * (work[34][lane] + (work[35][lane] + (z4 * t163 + work[36][lane]))));
-        work[16][lane] = y2 * (x1 * t16 + (t129 + (x3 * t142 + t132))) + (z2 * (x1 * work[12][lane] + (t101 + (x3 * work[14][lane] + t105))) + t171);
-        work[18][lane] = z3 * work[16][lane] - x3 * work[17][lane];
-        work[0][lane] = work[21][lane] + work[29][lane];
-        work[3][lane] = x1 * work[0][lane];
-        work[1][lane] = coef[15][lane] * y2 + coef[23][lane] * y4;
-        work[4][lane] = x3 * work[1][lane];
-        work[28][lane] = coef[22][lane] * y4;
-        work[2][lane] = work[28][lane] + coef[4][lane] * y1;
-        work[5][lane] = x5 * work[2][lane];
-        increment[1][lane] = t95;
-        increment[2][lane] = t96;
-        displacement[0][lane] = t94 * (p_z1 * t95 - p_y1 * t96) - 0.5 * t97;
-        displacement[1][lane] = t94 * (p_x1 * t96 - p_z1 * t97) - 0.5 * t95;
-        displacement[2][lane] = t94 * (p_y1 * t97 - p_x1 * t95) - 0.5 * t96;
-        increment[0][lane] = t97;
-        increment[4][lane] = t126;
-        increment[5][lane] = t138;
-        displacement[3][lane] = (p_z2 * t126 - p_y2 * t138) * t139 - 0.5 * t140;
-        displacement[4][lane] = (p_x2 * t138 - p_z2 * t140) * t139 - 0.5 * t126;
-        displacement[5][lane] = (p_y2 * t140 - p_x2 * t126) * t139 - 0.5 * t138;
-        increment[3][lane] = t140;
-        increment[7][lane] = work[18][lane];
-    }
-}
-
-/* spin_chain5_evaluate_lanes_part2 (part 2 of 2) */
-spin_chain5_APART static void spin_chain5_evaluate_lanes_part2(spin_chain5_lanes coef[restrict 33],
-                                                               spin_chain5_lanes y[restrict 15],
-                                                               spin_chain5_lanes displacement[restrict 15],
-                                                               spin_chain5_lanes increment[restrict 15],
-                                                               spin_chain5_lanes work[restrict 86])
-{
-    spin_chain5_EACH_LANE
-    for (int lane = 0; lane < spin_chain5_LANES; ++lane) {
-        const double x1 = y[0][lane];
-        const double y1 = y[1][lane];
-        const double z1 = y[2][lane];
-        const double x2 = y[3][lane];
-        const double y2 = y[4][lane];
-        const double z2 = y[5][lane];
-        const double x3 = y[6][lane];
-        const double y3 = y[7][lane];
-        const double z3 = y[8][lane];
-        const double x4 = y[9][lane];
-        const double y4 = y[10][lane];
-        const double z4 = y[11][lane];
-        const double x5 = y[12][lane];
-        const double y5 = y[13][lane];
-        const double z5 = y[14][lane];
-        const double t180 = coef[25][lane] * y3;
-        const double t181 = coef[21][lane] * y5 + t180;
-        const double t182 = coef[0][lane] * y4;
-        const double t183 = z1 * work[0][lane];
-        const double t184 = z3 * work[1][lane];
-        const double t185 = z5 * work[2][lane];
-        const double t186 = x4 * (work[3][lane] + (work[4][lane] + (work[5][lane] + x4 * t181))) + (t182 + (coef[24][lane] * y3 + work[6][lane]) + z4 * (t183 + (t184 + (z4 * t181 + t185))));
-        const double p_y3 = x2 * (y1 * work[7][lane] + (work[8][lane] + (work[9][lane] + (work[10][lane] + y3 * work[11][lane])))) + (z2 * (y1 * work[12][lane] + (work[13][lane] + (y3 * work[14][lane] + work[15][lane]))) + t186);
-        const double t187 = x3 * p_y3 - y3 * work[16][lane];
-        const double t188 = spin_chain5_phi0_lane(work[17][lane] * work[17][lane] + (work[16][lane] * work[16][lane] + p_y3 * p_y3));
-        const double t189 = y3 * work[17][lane] - z3 * p_y3;
-        const double t190 = work[19][lane] + (coef[14][lane] * x3 + coef[3][lane] * x1);
-        const double t191 = coef[30][lane] * x5 + work[20][lane];
-        const double t192 = work[21][lane] + (coef[14][lane] * y3 + coef[3][lane] * y1);
-        const double t193 = coef[30][lane] * y5 + t180;
-        const double t194 = work[22][lane] + work[23][lane];
-        const double t195 = x1 * t194;
-        const double t196 = coef[3][lane] * x2;
-        const double t197 = coef[2][lane] * x5 + t196;
-        const double t198 = work[24][lane] + work[25][lane];
-        const double t199 = coef[27][lane] * work[26][lane] + coef[29][lane] * work[27][lane] + z3 * t198;
-        const double t200 = y1 * t194;
-        const double t201 = coef[3][lane] * y2;
-        const double t202 = coef[2][lane] * y5 + t201;
-        const double t203 = work[28][lane] + work[29][lane];
-        const double t204 = coef[29][lane] * work[30][lane] + coef[27][lane] * work[31][lane] + z3 * t203;
-        const double t205 = y3 * (z2 * t192 + (t183 + (t184 + (t185 + z4 * t193)))) + (x5 * (t195 + (z1 * t197 + t199)) + (work[32][lane] + (work[33][lane] + coef[28][lane] * z4) + y5 * (t200 + (z1 * t202 + t204))));
-        const double p_z4 = x3 * (z2 * t190 + (work[34][lane] + (work[35][lane] + (work[36][lane] + z4 * t191)))) + t205;
-        const double t206 = work[37][lane] + (coef[3][lane] * z1 + coef[14][lane] * z3);
-        const double t207 = work[38][lane] + coef[30][lane] * z5;
-        const double t208 = work[24][lane] + work[39][lane];
-        const double t209 = y1 * t208;
-        const double t210 = x3 * t203;
-        const double t211 = coef[27][lane] * work[40][lane] + coef[29][lane] * work[41][lane];
-        const double t212 = coef[3][lane] * z2;
-        const double t213 = coef[2][lane] * z5 + t212;
-        const double t214 = z1 * t208;
-        const double t215 = coef[27][lane] * work[27][lane] + coef[29][lane] * work[26][lane];
-        const double t216 = work[42][lane] + work[23][lane];
-        const double t217 = x3 * t216;
-        const double t218 = y5 * (x1 * t202 + (t209 + (t210 + t211))) + (work[43][lane] + (coef[28][lane] * x4 + work[44][lane]) + z5 * (x1 * t213 + (t214 + (t215 + t217))));
-        const double p_x4 = y3 * (x2 * t192 + (work[3][lane] + (work[4][lane] + (work[5][lane] + x4 * t193)))) + (z3 * (x2 * t206 + (work[45][lane] + (work[46][lane] + (x4 * t207 + work[47][lane])))) + t218);
-        const double t219 = work[29][lane] + work[48][lane];
-        const double t220 = x1 * t219;
-        const double t221 = coef[27][lane] * work[41][lane] + coef[29][lane] * work[40][lane] + y3 * t198;
-        const double t222 = z1 * t219;
-        const double t223 = coef[29][lane] * work[31][lane] + coef[27][lane] * work[30][lane];
-        const double t224 = y3 * t216;
-        const double t225 = z3 * (y2 * t206 + (work[49][lane] + (work[50][lane] + (y4 * t207 + work[51][lane])))) + (x5 * (t220 + (y1 * t197 + t221)) + (work[52][lane] + (work[53][lane] + coef[28][lane] * y4) + z5 * (y1 * t213 + (t222 + (t223 + t224)))));
-        const double p_y4 = x3 * (y2 * t190 + (work[54][lane] + (work[55][lane] + (y4 * t191 + work[56][lane])))) + t225;
-        const double t226 = spin_chain5_phi0_lane(p_z4 * p_z4 + (p_x4 * p_x4 + p_y4 * p_y4));
-        const double t227 = z4 * p_x4 - x4 * p_z4;
-        const double t228 = x4 * p_y4 - y4 * p_x4;
-        const double t229 = y4 * p_z4 - z4 * p_y4;
-        const double t230 = work[57][lane] + (coef[20][lane] * x1 + coef[3][lane] * x3);
-        const double t231 = work[58][lane] + coef[32][lane] * x4;
-        const double t232 = work[59][lane] + (coef[3][lane] * y3 + coef[20][lane] * y1);
-        const double t233 = coef[32][lane] * y4 + work[60][lane];
-        const double t234 = coef[21][lane] * x4 + t196;
-        const double t235 = coef[21][lane] * y4 + t201;
-        const double t236 = x4 * (t214 + (t217 + (t215 + z3 * t234))) + (coef[31][lane] * z5 + (work[61][lane] + work[62][lane]) + y4 * (t222 + (t224 + (z3 * t235 + t223))));
-        const double p_z5 = x1 * (z2 * t230 + (work[63][lane] + (work[64][lane] + (z5 * t231 + work[65][lane])))) + (y1 * (z2 * t232 + (work[66][lane] + (work[67][lane] + (z5 * t233 + work[68][lane])))) + t236);
-        const double t237 = work[69][lane] + (coef[3][lane] * z3 + coef[20][lane] * z1);
-        const double t238 = work[70][lane] + coef[32][lane] * z4;
-        const double t239 = coef[21][lane] * z4 + t212;
-        const double t240 = z1 * (x2 * t237 + (work[71][lane] + (work[72][lane] + (work[73][lane] + x5 * t238)))) + (y4 * (t220 + (x3 * t235 + t221)) + (coef[31][lane] * x5 + (work[74][lane] + work[75][lane]) + z4 * (t195 + (x3 * t239 + t199))));
-        const double p_x5 = y1 * (x2 * t232 + (work[76][lane] + (work[77][lane] + (x5 * t233 + work[78][lane])))) + t240;
-        const double t241 = z1 * (y2 * t237 + (work[79][lane] + (work[80][lane] + (y5 * t238 + work[81][lane])))) + (x4 * (t209 + (t210 + (t211 + y3 * t234))) + (coef[31][lane] * y5 + (work[82][lane] + t182) + z4 * (t200 + (y3 * t239 + t204))));
-        const double p_y5 = x1 * (y2 * t230 + (work[83][lane] + (work[84][lane] + (work[85][lane] + y5 * t231)))) + t241;
-        const double t242 = spin_chain5_phi0_lane(p_z5 * p_z5 + (p_x5 * p_x5 + p_y5 * p_y5));
-        const double t243 = z5 * p_x5 - x5 * p_z5;
-        const double t244 = x5 * p_y5 - y5 * p_x5;
-        const double t245 = y5 * p_z5 - z5 * p_y5;
-        increment[8][lane] = t187;
-        displacement[6][lane] = (work[17][lane] * work[18][lane] - p_y3 * t187) * t188 - 0.5 * t189;
-        displacement[7][lane] = (work[16][lane] * t187 - work[17][lane] * t189) * t188 - 0.5 * work[18][lane];
-        displacement[8][lane] = (p_y3 * t189 - work[16][lane] * work[18][lane]) * t188 - 0.5 * t187;
-        increment[6][lane] = t189;
-        increment[10][lane] = t227;
-        increment[11][lane] = t228;
-        displacement[9][lane] = t226 * (p_z4 * t227 - p_y4 * t228) - 0.5 * t229;
-        displacement[10][lane] = (p_x4 * t228 - p_z4 * t229) * t226 - 0.5 * t227;
-        displacement[11][lane] = t226 * (p_y4 * t229 - p_x4 * t227) - 0.5 * t228;
-        increment[9][lane] = t229;
-        increment[13][lane] = t243;
-        increment[14][lane] = t244;
-        displacement[12][lane] = t242 * (p_z5 * t243 - p_y5 * t244) - 0.5 * t245;
-        displacement[13][lane] = (p_x5 * t244 - p_z5 * t245) * t242 - 0.5 * t243;
-        displacement[14][lane] = t242 * (p_y5 * t245 - p_x5 * t243) - 0.5 * t244;
-        increment[12][lane] = t245;
-    }
-}
-
-/* spin_chain5_evaluate in all lanes. */
-static void spin_chain5_evaluate_lanes(spin_chain5_lanes coef[restrict 33], spin_chain5_lanes y[restrict 15],
-                                       spin_chain5_lanes displacement[restrict 15],
-                                       spin_chain5_lanes increment[restrict 15])
-{
-    spin_chain5_lanes work[86];
-    spin_chain5_evaluate_lanes_part1(coef, y, displacement, increment, work);
-    spin_chain5_evaluate_lanes_part2(coef, y, displacement, increment, work);
-}
-
-/* Invert the matrices of all lanes in place by elimination without pivoting: they are I + O(h). Infinite where a pivot is
-   far from 1. */
-static void spin_chain5_invert(spin_chain5_lanes matrix[restrict 225])
-{
-    for (int k = 0; k < 15; ++k) {
-        spin_chain5_lanes factor[15];
-        spin_chain5_EACH_LANE
-        for (int lane = 0; lane < spin_chain5_LANES; ++lane) {
-            const double reciprocal = 1.0 / matrix[k * 15 + k][lane];
-            matrix[k * 15 + k][lane] = 1.0;
-            for (int j = 0; j < 15; ++j) matrix[k * 15 + j][lane] *= reciprocal;
-            matrix[k * 15 + k][lane] += fabs(reciprocal) < 1e3 ? 0.0 : HUGE_VAL;
-        }
-        for (int i = 0; i < 15; ++i) {
-            spin_chain5_EACH_LANE
-            for (int lane = 0; lane < spin_chain5_LANES; ++lane) {
-                factor[i][lane] = matrix[i * 15 + k][lane];
-                if (i != k) matrix[i * 15 + k][lane] = 0.0;
-            }
-        }
-        for (int i = 0; i < 15; ++i)
-            for (int j = 0; j < 15 && i != k; ++j) {
-                spin_chain5_EACH_LANE
-                for (int lane = 0; lane < spin_chain5_LANES; ++lane)
-                    matrix[i * 15 + j][lane] -= factor[i][lane] * matrix[k * 15 + j][lane];
-            }
-    }
-}
-
-/* Everything about a stage at the points y. */
-static void spin_chain5_tabulate(spin_chain5_lanes coef[restrict], spin_chain5_model *model)
-{
-    spin_chain5_linearise_lanes(coef, model->y, model->displacement, model->increment, model->inverse, model->slope);
-    spin_chain5_invert(model->inverse);
-    for (int i = 0; i < 15; ++i)
-        for (int j = 0; j < 15; ++j) {
-            spin_chain5_lanes sum = { 0.0 };
-            for (int k = 0; k < 15; ++k) {
-                spin_chain5_EACH_LANE
-                for (int lane = 0; lane < spin_chain5_LANES; ++lane)
-                    sum[lane] += model->slope[i * 15 + k][lane] * model->inverse[k * 15 + j][lane];
-            }
-            memcpy(model->gain[i * 15 + j], sum, sizeof sum);
-        }
-}
-
-/* spin_chain5_size in all lanes, summed over the components. */
-static void spin_chain5_sizes(spin_chain5_lanes y[restrict 15], spin_chain5_lanes delta[restrict 15],
-    spin_chain5_lanes size)
-{
-    spin_chain5_lanes norm = { 0.0 };
-    memset(size, 0, spin_chain5_LANES * sizeof size[0]);
-    for (int i = 0; i < 15; ++i)
-        for (int lane = 0; lane < spin_chain5_LANES; ++lane)
-            norm[lane] = 1e-6 * fabs(y[i][lane]) > norm[lane] ? 1e-6 * fabs(y[i][lane]) : norm[lane];
-    for (int i = 0; i < 15; ++i) {
-        spin_chain5_EACH_LANE
-        for (int lane = 0; lane < spin_chain5_LANES; ++lane)
-            size[lane] += fabs(delta[i][lane]) / (fabs(y[i][lane]) + norm[lane] + DBL_MIN);
-    }
-}
-
-/* Correct y by the residuals, with the inverse in the table, and measure the corrections. */
-static void spin_chain5_correct(spin_chain5_model *model, spin_chain5_lanes size)
-{
-    spin_chain5_lanes delta[15];
-    memset(delta, 0, sizeof delta);
-    for (int i = 0; i < 15; ++i)
-        for (int j = 0; j < 15; ++j) {
-            spin_chain5_EACH_LANE
-            for (int lane = 0; lane < spin_chain5_LANES; ++lane)
-                delta[i][lane] += model->inverse[i * 15 + j][lane] * model->residual[j][lane];
-        }
-    spin_chain5_sizes(model->y, delta, size);
-    for (int i = 0; i < 15; ++i)
-        for (int lane = 0; lane < spin_chain5_LANES; ++lane) model->y[i][lane] -= delta[i][lane];
-}
-
-/* The largest of the lanes, none of which is negative; infinite if one is not finite. As integers, the bits of such
-   numbers have their order, and those of what is no number are larger. */
-static double spin_chain5_largest(const spin_chain5_lanes size)
-{
-    uint64_t bits[8], most = 0;
-    double largest;
-    memcpy(bits, size, sizeof bits);
-    for (int lane = 0; lane < spin_chain5_LANES; ++lane) most = bits[lane] > most ? bits[lane] : most;
-    memcpy(&largest, &most, sizeof largest);
-    return isfinite(largest) ? largest : HUGE_VAL;
-}
-
-/* spin_chain5_near for the guesses of all lanes, seen from one value. */
-static int spin_chain5_near_lanes(spin_chain5_lanes y[restrict 15], const double last[15])
-{
-    spin_chain5_lanes distance = { 0.0 };
-    double size = 0.0;
-    for (int i = 0; i < 15; ++i) {
-        size += fabs(last[i]);
-        spin_chain5_EACH_LANE
-        for (int lane = 0; lane < spin_chain5_LANES; ++lane) distance[lane] += fabs(y[i][lane] - last[i]);
-    }
-    return spin_chain5_largest(distance) <= 4.0 * size;
-}
-
-/* What is left after a correction of this size: quadratic in it, where the matrices are of the points corrected; where
-   they are of points further off, by bend, also of the order of size times bend. bound is what the last pass left. */
-static double spin_chain5_remaining(double size, double bend, double bound)
-{
-    const double growth = size / bound, left = size * (size + bend);
-    return growth > 1.0 ? growth * left : left;
-}
-
-/* The table of a stage, with its matrices or with those of the last pass. */
-static void spin_chain5_update(spin_chain5_lanes coef[restrict], spin_chain5_model *model, int matrices)
-{
-    if (matrices)
-        spin_chain5_tabulate(coef, model);
-    else
-        spin_chain5_evaluate_lanes(coef, model->y, model->displacement, model->increment);
-}
-
-/* The steps of a block one after the other, each along the linear model of its lane. As X, the state with its carry, gains
-   increment - gain residual, the next residual follows from this one; X itself is added up apart. */
-static void spin_chain5_chain(spin_chain5_model model[1], double x[15], double carry[15])
-{
-    double residual[15], sum[15], small[15];
-    for (int i = 0; i < 15; ++i) {
-        residual[i] = ((model->y[i][0] - x[i]) + model->displacement[i][0]) - carry[i];
-        sum[i] = x[i];
-        small[i] = carry[i];
-    }
-    for (int k = 0; k < 1 * spin_chain5_LANES; ++k) {
-        const int lane = k / 1, after = (k + 1) / 1 % spin_chain5_LANES;
-        spin_chain5_model *at = &model[k % 1], *next = &model[(k + 1) % 1];
-        double even[15] = { 0.0 }, odd[15] = { 0.0 }; /* two sums, so that no long chain of additions is waited for */
-        for (int i = 0; i < 15; ++i) {
-            at->residual[i][lane] = residual[i];
-            for (int j = 0; j < 15; j += 2) even[i] += at->gain[i * 15 + j][lane] * residual[j];
-            for (int j = 1; j < 15; j += 2) odd[i] += at->gain[i * 15 + j][lane] * residual[j];
-        }
-        for (int i = 0; i < 15; ++i) {
-            const double change = at->increment[i][lane], total = sum[i] + change, added = total - sum[i];
-            const double turn = (next->displacement[i][after] - at->displacement[i][lane]) - change;
-            const double moved = (next->y[i][after] - at->y[i][lane]) + turn;
-            residual[i] = ((moved + residual[i]) + odd[i]) + even[i];
-            small[i] += ((sum[i] - (total - added)) + (change - added)) - (even[i] + odd[i]);
-            sum[i] = total;
-        }
-    }
-    for (int i = 0; i < 15; ++i) {
-        x[i] = sum[i] + small[i];
-        carry[i] = small[i] - (x[i] - sum[i]);
-    }
-}
-
-/* Bring the table up to date: coefficients, and weights that were fitted since. */
-static void spin_chain5_refresh(const spin_chain5_solver *s, spin_chain5_table *table)
-{
-    for (int stage = 0; stage < 1; ++stage) {
-        if (table->fits[stage] == s->memory[stage].fits) continue;
-        table->fits[stage] = s->memory[stage].fits;
-        for (int k = 0; k < 33; ++k)
-            for (int lane = 0; lane < spin_chain5_LANES; ++lane) table->coef[stage][k][lane] = s->coef[stage][k];
-        memcpy(table->weight[stage], s->memory[stage].weight, (size_t)s->memory[stage].terms * sizeof table->weight[0][0]);
-    }
-}
-
-/* Guesses for the next spin_chain5_LANES values of a stage, by its recurrences. */
-static void spin_chain5_foresee(const spin_chain5_memory *memory, spin_chain5_lanes weight[restrict][15],
-    spin_chain5_lanes y[restrict 15])
-{
-    const int last = memory->count - 1;
-    for (int i = 0; i < 15; ++i) {
-        spin_chain5_lanes even = { 0.0 }, odd = { 0.0 };
-        for (int k = 0; k < memory->terms; k += 2) {
-            const double past = memory->past[last - k][i], earlier = memory->past[last - 1 - k][i];
-            spin_chain5_EACH_LANE
-            for (int lane = 0; lane < spin_chain5_LANES; ++lane) even[lane] += weight[k][i][lane] * past;
-            spin_chain5_EACH_LANE
-            for (int lane = 0; lane < spin_chain5_LANES; ++lane) odd[lane] += weight[k + 1][i][lane] * earlier;
-        }
-        spin_chain5_EACH_LANE
-        for (int lane = 0; lane < spin_chain5_LANES; ++lane) y[i][lane] = even[lane] + odd[lane];
-    }
-}
-
-/* spin_chain5_record for the values of all lanes, one after the other. */
-static void spin_chain5_record_lanes(spin_chain5_memory *memory, spin_chain5_lanes y[restrict 15])
-{
-    spin_chain5_make_room(memory, spin_chain5_LANES);
-    for (int lane = 0; lane < spin_chain5_LANES; ++lane)
-        for (int i = 0; i < 15; ++i) memory->past[memory->count + lane][i] = y[i][lane];
-    memory->count += spin_chain5_LANES;
-}
-
-/* Guesses where no recurrence is known: where alpha and beta have the means of steps by the classical Runge-Kutta
-   method, to leading order. */
-static void spin_chain5_march(const spin_chain5_solver *s, spin_chain5_table *table, spin_chain5_model model[1])
-{
-    static const double reach[4] = { 0.5, 0.5, 1.0, 0.0 }, weight[4] = { 1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0 };
-    double x[15], point[15], slope[15], mean[15];
-    memcpy(x, s->x, sizeof x);
-    for (int k = 0; k < 1 * spin_chain5_LANES; ++k) {
-        const double h = spin_chain5_fractions[k % 1] * s->h;
-        memcpy(point, x, sizeof x);
-        memset(mean, 0, sizeof mean);
-        for (int part = 0; part < 4; ++part) {
-            spin_chain5_vector_field(&s->params, point, slope);
-            for (int i = 0; i < 15; ++i) {
-                mean[i] += weight[part] * slope[i];
-                point[i] = x[i] + h * reach[part] * slope[i];
-            }
-        }
-        for (int i = 0; i < 15; ++i) {
-            model[k % 1].y[i][k / 1] = x[i] + 0.5 * h * mean[i];
-            x[i] += h * mean[i];
-        }
-    }
-    for (int stage = 0; stage < 1; ++stage) {
-        spin_chain5_model *at = &model[stage];
-        spin_chain5_evaluate_lanes(table->coef[stage], at->y, at->displacement, at->increment);
-        for (int i = 0; i < 15; ++i) {
-            spin_chain5_EACH_LANE
-            for (int lane = 0; lane < spin_chain5_LANES; ++lane)
-                at->y[i][lane] -= at->displacement[i][lane] + 0.5 * at->increment[i][lane];
-        }
-    }
-}
-
-/* spin_chain5_LANES steps at once: guess the points of all, and correct them together until the error that remains is as
-   small as after a single step. How many passes that took; 0, and the solver as before, where it takes more than most. */
-static int spin_chain5_block(spin_chain5_solver *s, spin_chain5_table *table, int most)
-{
-    spin_chain5_model model[1];
-    spin_chain5_lanes sizes;
-    double x[15], carry[15], previous = HUGE_VAL, bend = 0.0, bound = HUGE_VAL;
-    int passes = 0, solved = 0;
-    if (!s->foreseeing) spin_chain5_march(s, table, model);
-    for (int stage = 0; stage < 1; ++stage) {
-        if (s->foreseeing) spin_chain5_foresee(&s->memory[stage], table->weight[stage], model[stage].y);
-        if (!spin_chain5_near_lanes(model[stage].y, s->x)) return 0;
-    }
-    while (!solved) {
-        double size = 0.0;
-        const int matrices = previous > 1e-05;
-        for (int stage = 0; stage < 1; ++stage) spin_chain5_update(table->coef[stage], &model[stage], matrices);
-        memcpy(x, s->x, sizeof x);
-        memcpy(carry, s->carry, sizeof carry);
-        spin_chain5_chain(model, x, carry);
-        for (int stage = 0; stage < 1; ++stage) {
-            spin_chain5_correct(&model[stage], sizes);
-            const double largest = spin_chain5_largest(sizes);
-            size = largest > size ? largest : size;
-        }
-        s->evaluations += 1 * spin_chain5_LANES;
-        bend = matrices ? 0.0 : bend + previous;
-        bound = spin_chain5_remaining(size, bend, bound);
-        /* The second test: after the square of so small a correction there is rounding only. */
-        solved = bound <= 1e-20 || (previous < 1e-8 && size < 1e-10);
-        if ((++passes >= most || !(size < previous)) && !solved) return 0;
-        previous = size;
-    }
-    for (int stage = 0; stage < 1; ++stage)
-        if (!spin_chain5_near_lanes(model[stage].y, s->x)) return 0;
-    for (int i = 0; i < 15; ++i)
-        if (!isfinite(x[i])) return 0;
-    memcpy(s->x, x, sizeof x);
-    memcpy(s->carry, carry, sizeof carry);
-    s->steps += spin_chain5_LANES;
-    for (int stage = 0; stage < 1; ++stage) {
-        spin_chain5_memory *memory = &s->memory[stage];
-        spin_chain5_record_lanes(memory, model[stage].y);
-        memory->slow = passes > 1 ? memory->slow + spin_chain5_LANES : 0;
-        if (memory->slow > memory->patience && s->foreseeing) spin_chain5_fit(memory);
-    }
-    return passes;
-}
-
-/* Recurrences are given up for a while, the longer the more often that happens. */
-static void spin_chain5_give_up(spin_chain5_solver *s)
-{
-    s->foreseeing = s->setback = s->pause = 0;
-    s->doubt = 2 * s->doubt + 600;
-    s->retry = s->steps + s->doubt;
-}
-
-/* How the next block is guessed: by recurrences, fitted as soon as enough steps are to be made, or
-   have been, to repay that. */
-static void spin_chain5_choose_guess(spin_chain5_solver *s, size_t steps)
-{
-    for (int stage = 0; stage < 1; ++stage)
-        if (s->memory[stage].count < 111) {
-            s->foreseeing = 0;
-            return;
-        }
-    if (s->foreseeing || (steps < 600 && s->steps < 150) || s->steps < s->retry) return;
-    s->foreseeing = 1;
-    for (int stage = 0; stage < 1 && s->foreseeing; ++stage) {
-        spin_chain5_fit(&s->memory[stage]);
-        s->foreseeing = s->memory[stage].terms > 0;
-    }
-    s->pause = spin_chain5_LANES;
-    if (!s->foreseeing) spin_chain5_give_up(s);
-}
-
-/* Learn from a block: after one that failed single steps are made, the more the more often that happens. Recurrences
-   that fail repeatedly, or need more passes than steps by Runge-Kutta did, are given up. */
-static void spin_chain5_learn_from(spin_chain5_solver *s, int passes)
-{
-    if (passes > 0) {
-        s->setback /= 2;
-    } else {
-        s->setback = 2 * s->setback + spin_chain5_LANES > 1000 ? 1000 : 2 * s->setback + spin_chain5_LANES;
-        s->pause = s->setback;
-    }
-    if (!s->foreseeing) {
-        s->passes = passes > 0 ? passes : INT_MAX;
-    } else if (passes > s->passes || s->setback > 5 * spin_chain5_LANES) {
-        spin_chain5_give_up(s);
-    }
-}
-
-/* A single step, and the running mean of the evaluations that a stage of one takes. */
-static spin_chain5_status spin_chain5_single(spin_chain5_solver *s)
-{
-    const size_t before = s->evaluations;
-    const spin_chain5_status status = spin_chain5_step(s, s->h);
-    s->effort += 0.125 * ((double)(s->evaluations - before) / 1 - s->effort);
-    return status;
-}
-
-/* Blocks of steps where they cost less than single steps, with at most as many passes over a block as 2 for each
-   evaluation in a single step. The results differ by round-off only. */
-spin_chain5_status spin_chain5_integrate(spin_chain5_solver *s, double h, size_t steps)
-{
-    spin_chain5_table table;
-    spin_chain5_status status = spin_chain5_set_step(s, h);
-    for (int stage = 0; stage < 1; ++stage) table.fits[stage] = -1;
-    while (status == spin_chain5_OK && steps > 0) {
-        if (steps >= spin_chain5_LANES && s->pause == 0) spin_chain5_choose_guess(s, steps);
-        if (steps >= spin_chain5_LANES && s->pause == 0) {
-            spin_chain5_refresh(s, &table);
-            const int passes = spin_chain5_block(s, &table, (int)(2 * s->effort + 0.5));
-            spin_chain5_learn_from(s, passes);
-            if (passes > 0) steps -= spin_chain5_LANES;
-        } else {
-            if (s->pause > 0) --s->pause;
-            status = spin_chain5_single(s);
-            if (status == spin_chain5_OK) --steps;
-        }
-    }
-    return status;
-}
-
-/* Members of an ensemble, each in its lane. */
-typedef struct {
-    spin_chain5_lanes x[15], carry[15], coef[1][33];
-    spin_chain5_lanes past[1][111][15]; /* solved values, in a ring */
-    spin_chain5_lanes weight[1][40][15]; /* of past values, the latest first, for the next */
-    int latest;     /* the row of the latest values */
-    int count;      /* rows in use */
-    int order[1];   /* how many of them the extrapolation uses */
-    int terms[1];   /* how many of them the recurrences use */
-    int fits;       /* how often recurrences have been fitted */
-    int fitting[1]; /* whether they are the better guess */
-    int slow;       /* how many of the last steps took more than one iteration */
-    int patience;   /* how many of those before recurrences are fitted again */
-    int active[8];  /* whether the lane has a member that has not failed */
-    size_t left[8]; /* steps that are still to be made, where one has */
-    double gauge[8][5]; /* of each member */
-} spin_chain5_group;
-
-/* The past values of a stage, the latest for k = 0. */
-static spin_chain5_lanes *spin_chain5_group_past(spin_chain5_group *group, int stage, int k)
-{
-    const int row = group->latest + k;
-    return group->past[stage][row < 111 ? row : row - 111];
-}
-
-/* Guess the values of a stage by the recurrences of the members. */
-static void spin_chain5_group_foresee(spin_chain5_group *group, int stage, spin_chain5_lanes y[restrict 15])
-{
-    memset(y, 0, 15 * sizeof y[0]);
-    for (int k = 0; k < group->terms[stage]; ++k) {
-        spin_chain5_lanes *past = spin_chain5_group_past(group, stage, k), *weight = group->weight[stage][k];
-        for (int i = 0; i < 15; ++i) {
-            spin_chain5_EACH_LANE
-            for (int lane = 0; lane < spin_chain5_LANES; ++lane) y[i][lane] += weight[i][lane] * past[i][lane];
-        }
-    }
-}
-
-/* Extrapolate the values of a stage. */
-static void spin_chain5_group_extrapolate(spin_chain5_group *group, int stage, spin_chain5_lanes y[restrict 15])
-{
-    const int order = group->order[stage];
-    double binomial = -1.0;
-    memcpy(y, group->x, 15 * sizeof y[0]);
-    if (order > 0) memset(y, 0, 15 * sizeof y[0]);
-    for (int k = 0; k < order; ++k) {
-        spin_chain5_lanes *past = spin_chain5_group_past(group, stage, k);
-        binomial *= -(double)(order - k) / (k + 1);
-        for (int i = 0; i < 15; ++i) {
-            spin_chain5_EACH_LANE
-            for (int lane = 0; lane < spin_chain5_LANES; ++lane) y[i][lane] += binomial * past[i][lane];
-        }
-    }
-}
-
-/* The sum over members of the absolute values of all components. */
-static double spin_chain5_group_sum(const spin_chain5_group *group, spin_chain5_lanes y[15])
-{
-    double sum = 0.0;
-    for (int i = 0; i < 15; ++i)
-        for (int lane = 0; lane < spin_chain5_LANES; ++lane) sum += group->active[lane] ? fabs(y[i][lane]) : 0.0;
-    return sum;
-}
-
-static void spin_chain5_group_subtract(spin_chain5_lanes y[restrict 15], spin_chain5_lanes other[restrict 15])
-{
-    for (int i = 0; i < 15; ++i) {
-        spin_chain5_EACH_LANE
-        for (int lane = 0; lane < spin_chain5_LANES; ++lane) y[i][lane] -= other[i][lane];
-    }
-}
-
-/* Choose the guess that would have been best for these values. */
-static void spin_chain5_group_judge(spin_chain5_group *group, int stage, spin_chain5_lanes y[15])
-{
-    spin_chain5_lanes row[8 + 1][15];
-    const int rows = group->count < 8 ? group->count : 8;
-    double least = HUGE_VAL;
-    memcpy(row[0], y, sizeof row[0]);
-    for (int k = 0; k < rows; ++k) memcpy(row[k + 1], spin_chain5_group_past(group, stage, k), sizeof row[0]);
-    if (group->order[stage] == 0) group->order[stage] = 1;
-    for (int order = 1; order <= rows; ++order) { /* row[0] becomes the backward difference of this order */
-        for (int k = 0; k <= rows - order; ++k) spin_chain5_group_subtract(row[k], row[k + 1]);
-        const double size = spin_chain5_group_sum(group, row[0]);
-        if (size < least) {
-            least = size;
-            group->order[stage] = order;
-        }
-    }
-    if (group->terms[stage] == 0) return;
-    spin_chain5_group_foresee(group, stage, row[0]);
-    spin_chain5_group_subtract(row[0], y);
-    group->fitting[stage] = spin_chain5_group_sum(group, row[0]) <= least;
-}
-
-/* Fit the recurrences of all members; with every time, wait longer before it is done again, and for long if it did not
-   help. */
-static void spin_chain5_group_fit(spin_chain5_group *group)
-{
-    spin_chain5_memory memory;
-    const int helped = group->fits == 0 || group->fitting[0];
-    memory.count = 111;
-    for (int stage = 0; stage < 1; ++stage) {
-        int found = 1;
-        group->terms[stage] = 0;
-        for (int lane = 0; lane < spin_chain5_LANES; ++lane)
-            for (int i = 0; i < 15 && group->active[lane] && found; ++i) {
-                for (int k = 0; k < 111; ++k)
-                    memory.past[111 - 1 - k][i] = spin_chain5_group_past(group, stage, k)[i][lane];
-                const int terms = spin_chain5_train(&memory, i);
-                found = terms > 0;
-                if (terms > group->terms[stage]) group->terms[stage] = terms;
-                for (int k = 0; k < 40; ++k) group->weight[stage][k][i][lane] = memory.weight[k][i][0];
-            }
-        if (!found) group->terms[stage] = 0;
-        group->fitting[stage] = found;
-    }
-    ++group->fits;
-    group->slow = 0;
-    group->patience = helped && group->patience < 10000 ? 2 * group->patience + 150 : 100 * 150;
-}
-
-/* Replace guesses that are not near the last values, as spin_chain5_near has it, by these; lane by lane. */
-static void spin_chain5_stay_near(spin_chain5_lanes y[restrict 15], spin_chain5_lanes last[restrict 15])
-{
-    spin_chain5_lanes distance = { 0.0 }, size = { 0.0 };
-    for (int i = 0; i < 15; ++i) {
-        spin_chain5_EACH_LANE
-        for (int lane = 0; lane < spin_chain5_LANES; ++lane) {
-            distance[lane] += fabs(y[i][lane] - last[i][lane]);
-            size[lane] += fabs(last[i][lane]);
-        }
-    }
-    for (int i = 0; i < 15; ++i) {
-        spin_chain5_EACH_LANE
-        for (int lane = 0; lane < spin_chain5_LANES; ++lane)
-            y[i][lane] = distance[lane] <= 4.0 * size[lane] ? y[i][lane] : last[i][lane];
-    }
-}
-
-/* Whether lanes are still to be solved after a correction of this size; those where nothing is finite leave the group.
-   bound is what remains in each lane. */
-static int spin_chain5_group_open(spin_chain5_group *group, const spin_chain5_lanes size, const spin_chain5_lanes previous,
-    double bend, spin_chain5_lanes bound)
-{
-    int open = 0;
-    spin_chain5_EACH_LANE
-    for (int lane = 0; lane < spin_chain5_LANES; ++lane)
-        bound[lane] = spin_chain5_remaining(size[lane], bend, bound[lane]);
-    if (spin_chain5_largest(bound) <= 1e-20) return 0;
-    for (int lane = 0; lane < spin_chain5_LANES; ++lane) {
-        const int solved = bound[lane] <= 1e-20 || (previous[lane] < 1e-8 && size[lane] < 1e-10);
-        if (!isfinite(size[lane])) group->active[lane] = 0;
-        open += group->active[lane] && !solved;
-    }
-    return open;
-}
-
-/* The guess for a stage: recurrences, or extrapolation; the state for members where that is not near. */
-static void spin_chain5_group_predict(spin_chain5_group *group, int stage, spin_chain5_lanes y[15])
-{
-    if (group->fitting[stage]) spin_chain5_group_foresee(group, stage, y);
-    else spin_chain5_group_extrapolate(group, stage, y);
-    spin_chain5_stay_near(y, group->x);
-}
-
-/* Newton's method for a stage, until the slowest lane is solved. The number of iterations; where that is the most
-   allowed, lanes that are not solved leave the group. */
-static int spin_chain5_group_solve(spin_chain5_group *group, int stage, spin_chain5_model *model)
-{
-    spin_chain5_lanes size, previous, bound;
-    double largest = HUGE_VAL, bend = 0.0;
-    int iterations = 0, open = 1;
-    for (int lane = 0; lane < spin_chain5_LANES; ++lane) size[lane] = bound[lane] = HUGE_VAL;
-    spin_chain5_group_predict(group, stage, model->y);
-    for (; open > 0 && iterations < 20; ++iterations) {
-        memcpy(previous, size, sizeof size);
-        spin_chain5_update(group->coef[stage], model, largest > 1e-05);
-        bend = largest > 1e-05 ? 0.0 : bend + largest;
-        for (int i = 0; i < 15; ++i) {
-            spin_chain5_EACH_LANE
-            for (int lane = 0; lane < spin_chain5_LANES; ++lane)
-                model->residual[i][lane] =
-                    ((model->y[i][lane] - group->x[i][lane]) + model->displacement[i][lane]) - group->carry[i][lane];
-        }
-        spin_chain5_correct(model, size);
-        open = spin_chain5_group_open(group, size, previous, bend, bound);
-        largest = spin_chain5_largest(size);
-    }
-    for (int lane = 0; lane < spin_chain5_LANES && open > 0; ++lane)
-        group->active[lane] = group->active[lane] && bound[lane] <= 1e-20;
-    return iterations;
-}
-
-/* Add the increments, corrected to first order, in compensated arithmetic as for a single step. */
-static void spin_chain5_group_advance(spin_chain5_lanes x[restrict 15], spin_chain5_lanes carry[restrict 15],
-    spin_chain5_model *model)
-{
-    for (int i = 0; i < 15; ++i)
-        for (int j = 0; j < 15; ++j) {
-            spin_chain5_EACH_LANE
-            for (int lane = 0; lane < spin_chain5_LANES; ++lane)
-                carry[i][lane] -= model->gain[i * 15 + j][lane] * model->residual[j][lane];
-        }
-    for (int i = 0; i < 15; ++i) {
-        spin_chain5_EACH_LANE
-        for (int lane = 0; lane < spin_chain5_LANES; ++lane) {
-            const double change = model->increment[i][lane], sum = x[i][lane] + change, added = sum - x[i][lane];
-            const double small = ((x[i][lane] - (sum - added)) + (change - added)) + carry[i][lane];
-            x[i][lane] = sum + small;
-            carry[i][lane] = small - (x[i][lane] - sum);
-        }
-    }
-}
-
-/* Members that failed, or whose state is not near the one before the step or not finite, keep that one, and leave. How many
-   stay. */
-static int spin_chain5_group_leave(spin_chain5_group *group, spin_chain5_lanes x[15], spin_chain5_lanes carry[15],
-    size_t remaining)
-{
-    spin_chain5_lanes moved = { 0.0 }, size = { 0.0 }, bad;
-    int active = 0;
-    for (int i = 0; i < 15; ++i) {
-        spin_chain5_EACH_LANE
-        for (int lane = 0; lane < spin_chain5_LANES; ++lane) {
-            moved[lane] += fabs(group->x[i][lane] - x[i][lane]);
-            size[lane] += fabs(x[i][lane]);
-        }
-    }
-    for (int lane = 0; lane < spin_chain5_LANES; ++lane) bad[lane] = moved[lane] <= 4.0 * size[lane] ? 0.0 : 1.0;
-    for (int lane = 0; lane < spin_chain5_LANES; ++lane) active += group->active[lane];
-    if (active == spin_chain5_LANES && !(spin_chain5_largest(bad) > 0.0)) return active;
-    active = 0;
-    for (int lane = 0; lane < spin_chain5_LANES; ++lane) {
-        group->active[lane] = group->active[lane] && !(bad[lane] > 0.0);
-        active += group->active[lane];
-        for (int i = 0; i < 15 && !group->active[lane]; ++i) {
-            group->x[i][lane] = x[i][lane];
-            group->carry[i][lane] = carry[i][lane];
-        }
-        if (!group->active[lane] && group->left[lane] == 0) group->left[lane] = remaining;
-    }
-    return active;
-}
-
-/* One step of all members, of as many as remain. How many members are left. */
-static int spin_chain5_group_step(spin_chain5_group *group, size_t remaining)
-{
-    spin_chain5_lanes x[15], carry[15];
-    spin_chain5_model model;
-    const int next = (group->latest > 0 ? group->latest : 111) - 1;
-    int most = 0;
-    memcpy(x, group->x, sizeof x);
-    memcpy(carry, group->carry, sizeof carry);
-    for (int stage = 0; stage < 1; ++stage) {
-        const int iterations = spin_chain5_group_solve(group, stage, &model);
-        spin_chain5_group_advance(group->x, group->carry, &model);
-        if (iterations > most) most = iterations;
-        if ((iterations > 1 && next % 8 == 0) || group->count < 8)
-            spin_chain5_group_judge(group, stage, model.y);
-        memcpy(group->past[stage][next], model.y, sizeof model.y);
-    }
-    group->latest = next;
-    if (group->count < 111) ++group->count;
-    group->slow = most > 1 ? group->slow + 1 : 0;
-    if (group->slow > group->patience && group->count == 111 && remaining >= 3000)
-        spin_chain5_group_fit(group);
-    return spin_chain5_group_leave(group, x, carry, remaining);
-}
-
-/* Put a member into a lane: its state, and its coefficients. */
-static spin_chain5_status spin_chain5_group_join(spin_chain5_group *group, int lane, const spin_chain5_params *params,
-    const double x0[15], double h)
-{
-    spin_chain5_solver s;
-    spin_chain5_status status = spin_chain5_init(&s, params, x0);
-    if (status == spin_chain5_OK) status = spin_chain5_set_step(&s, h);
-    if (status != spin_chain5_OK) return status;
-    for (int i = 0; i < 15; ++i) group->x[i][lane] = s.x[i];
-    for (int stage = 0; stage < 1; ++stage)
-        for (int k = 0; k < 33; ++k) group->coef[stage][k][lane] = s.coef[stage][k];
-    memcpy(group->gauge[lane], s.gauge, sizeof s.gauge);
-    group->active[lane] = 1;
-    return status;
-}
-
-/* The steps that a member has still to make after it left the group, by itself. */
-static spin_chain5_status spin_chain5_group_finish(const spin_chain5_group *group, int lane, const spin_chain5_params *params,
-    double x[15], double h)
-{
-    spin_chain5_solver s;
-    spin_chain5_status status = spin_chain5_init_gauge(&s, params, x, group->gauge[lane]);
-    if (status != spin_chain5_OK) return status;
-    for (int i = 0; i < 15; ++i) s.carry[i] = group->carry[i][lane];
-    status = spin_chain5_integrate(&s, h, group->left[lane]);
-    memcpy(x, s.x, sizeof s.x);
-    return status;
-}
-
-/* The members from first on, as many as there are lanes. The first status that is not OK. */
-static spin_chain5_status spin_chain5_group_run(const spin_chain5_params *params, double *x, size_t members, size_t first,
-    double h, size_t steps, unsigned char *status)
-{
-    spin_chain5_group group;
-    spin_chain5_status worst = spin_chain5_OK, member[8];
-    const int count = members - first < spin_chain5_LANES ? (int)(members - first) : spin_chain5_LANES;
-    double state[15];
-    size_t left = steps;
-    memset(&group, 0, sizeof group);
-    for (int lane = 0; lane < count; ++lane) {
-        for (size_t i = 0; i < 15; ++i) state[i] = x[i * members + first + (size_t)lane];
-        member[lane] = spin_chain5_group_join(&group, lane, params, state, h);
-    }
-    for (int active = count; left > 0 && active > 2; --left) active = spin_chain5_group_step(&group, left);
-    for (int lane = 0; lane < count; ++lane) {
-        if (group.active[lane]) group.left[lane] = left;
-        for (int i = 0; i < 15; ++i) state[i] = group.x[i][lane];
-        if (member[lane] == spin_chain5_OK) {
-            if (group.left[lane] > 0) member[lane] = spin_chain5_group_finish(&group, lane, params, state, h);
-            for (size_t i = 0; i < 15; ++i) x[i * members + first + (size_t)lane] = state[i];
-        }
-        if (status != NULL) status[first + (size_t)lane] = (unsigned char)member[lane];
-        if (worst == spin_chain5_OK) worst = member[lane];
-    }
-    return worst;
-}
-
-spin_chain5_status spin_chain5_ensemble(const spin_chain5_params *params, double *x, size_t members, double h,
-                                        size_t steps, unsigned char *status)
-{
-    spin_chain5_status worst = isfinite(h) ? spin_chain5_OK : spin_chain5_BAD_ARGUMENT;
-    const spin_chain5_params own = params != NULL ? *params : spin_chain5_default_params;
-    size_t earliest = members;
-    if (x == NULL && members > 0) return spin_chain5_BAD_ARGUMENT;
-#ifdef _OPENMP
-#pragma omp parallel for schedule(dynamic)
-#endif
-    for (size_t first = 0; first < members; first += spin_chain5_LANES) {
-        const spin_chain5_status group = spin_chain5_group_run(&own, x, members, first, h, steps, status);
-        if (group == spin_chain5_OK) continue;
-#ifdef _OPENMP
-#pragma omp critical
-#endif
-        if (first < earliest) {
-            earliest = first;
-            worst = group;
-        }
-    }
-    return worst;
-}
-
-#if defined(__clang__)
-#pragma clang diagnostic pop
-#endif
-
 /* the Hamiltonian */
-static void spin_chain5_energy(const spin_chain5_params *params, const double x[15], double energy[restrict 1])
+double spin_chain5_hamiltonian(const spin_chain5_params *params, const double x[15])
 {
-    const double x1 = x[0];
-    const double y1 = x[1];
-    const double z1 = x[2];
-    const double x2 = x[3];
-    const double y2 = x[4];
-    const double z2 = x[5];
-    const double x3 = x[6];
-    const double y3 = x[7];
-    const double z3 = x[8];
-    const double x4 = x[9];
-    const double y4 = x[10];
-    const double z4 = x[11];
-    const double x5 = x[12];
-    const double y5 = x[13];
-    const double z5 = x[14];
-    const double t1 = y3 * y4 + (x3 * x4 + (z2 * z3 + (y2 * y3 + (x2 * x3 + (z1 * z2 + (x1 * x2 + y1 * y2))))));
-    const double t2 = params->J * (z1 * z5 + (y1 * y5 + (x1 * x5 + (z4 * z5 + (y4 * y5 + (x4 * x5 + (z3 * z4 + t1)))))));
-    energy[0] = -t2;
+    if (params == NULL) params = &spin_chain5_default_params;
+    const double J = params->J, x1 = x[0], y1 = x[1], z1 = x[2], x2 = x[3], y2 = x[4], z2 = x[5], x3 = x[6],
+        y3 = x[7], z3 = x[8], x4 = x[9], y4 = x[10], z4 = x[11], x5 = x[12], y5 = x[13], z5 = x[14];
+    const double t1 = y3 * y4
+        + (x3 * x4 + (z2 * z3 + (y2 * y3 + (x2 * x3 + (z1 * z2 + (x1 * x2 + y1 * y2))))));
+    const double t2 = J
+        * (z1 * z5 + (y1 * y5 + (x1 * x5 + (z4 * z5 + (y4 * y5 + (x4 * x5 + (z3 * z4 + t1)))))));
+    return -t2;
 }
 
 /* the Casimirs */
-static void spin_chain5_casimir_values(const spin_chain5_params *params, const double x[15],
-                                       double out[restrict 5])
+void spin_chain5_casimirs(const spin_chain5_params *params, const double x[15], double out[])
 {
     (void)params;
-    const double x1 = x[0];
-    const double y1 = x[1];
-    const double z1 = x[2];
-    const double x2 = x[3];
-    const double y2 = x[4];
-    const double z2 = x[5];
-    const double x3 = x[6];
-    const double y3 = x[7];
-    const double z3 = x[8];
-    const double x4 = x[9];
-    const double y4 = x[10];
-    const double z4 = x[11];
-    const double x5 = x[12];
-    const double y5 = x[13];
-    const double z5 = x[14];
+    const double x1 = x[0], y1 = x[1], z1 = x[2], x2 = x[3], y2 = x[4], z2 = x[5], x3 = x[6], y3 = x[7], z3 =
+        x[8], x4 = x[9], y4 = x[10], z4 = x[11], x5 = x[12], y5 = x[13], z5 = x[14];
     out[0] = z1 * z1 + (y1 * y1 + x1 * x1);
     out[1] = z2 * z2 + (x2 * x2 + y2 * y2);
     out[2] = z3 * z3 + (x3 * x3 + y3 * y3);
@@ -5371,53 +1834,17 @@ static void spin_chain5_casimir_values(const spin_chain5_params *params, const d
 }
 
 /* pi(x) grad H(x) */
-static void spin_chain5_field(const spin_chain5_params *params, const double x[15], double out[restrict 15])
+void spin_chain5_vector_field(const spin_chain5_params *params, const double x[15], double out[15])
 {
-    const double x1 = x[0];
-    const double y1 = x[1];
-    const double z1 = x[2];
-    const double x2 = x[3];
-    const double y2 = x[4];
-    const double z2 = x[5];
-    const double x3 = x[6];
-    const double y3 = x[7];
-    const double z3 = x[8];
-    const double x4 = x[9];
-    const double y4 = x[10];
-    const double z4 = x[11];
-    const double x5 = x[12];
-    const double y5 = x[13];
-    const double z5 = x[14];
-    const double t1 = params->J * y5;
-    const double t2 = params->J * y2;
-    const double t3 = t1 + t2;
-    const double t4 = params->J * z5;
-    const double t5 = params->J * z2;
-    const double t6 = t4 + t5;
-    const double t7 = params->J * x5;
-    const double t8 = params->J * x2;
-    const double t9 = t7 + t8;
-    const double t10 = params->J * y1;
-    const double t11 = params->J * y3;
-    const double t12 = t10 + t11;
-    const double t13 = params->J * z1;
-    const double t14 = params->J * z3;
-    const double t15 = t13 + t14;
-    const double t16 = params->J * x3;
-    const double t17 = params->J * x1;
-    const double t18 = t16 + t17;
-    const double t19 = params->J * y4;
-    const double t20 = t2 + t19;
-    const double t21 = params->J * z4;
-    const double t22 = t21 + t5;
-    const double t23 = params->J * x4;
-    const double t24 = t23 + t8;
-    const double t25 = t1 + t11;
-    const double t26 = t4 + t14;
-    const double t27 = t7 + t16;
-    const double t28 = t10 + t19;
-    const double t29 = t21 + t13;
-    const double t30 = t23 + t17;
+    if (params == NULL) params = &spin_chain5_default_params;
+    const double J = params->J, x1 = x[0], y1 = x[1], z1 = x[2], x2 = x[3], y2 = x[4], z2 = x[5], x3 = x[6],
+        y3 = x[7], z3 = x[8], x4 = x[9], y4 = x[10], z4 = x[11], x5 = x[12], y5 = x[13], z5 = x[14];
+    const double t1 = J * y5, t2 = J * y2, t3 = t1 + t2, t4 = J * z5, t5 = J * z2, t6 = t4 + t5;
+    const double t7 = J * x5, t8 = J * x2, t9 = t7 + t8, t10 = J * y1, t11 = J * y3, t12 = t10 + t11;
+    const double t13 = J * z1, t14 = J * z3, t15 = t13 + t14, t16 = J * x3, t17 = J * x1;
+    const double t18 = t16 + t17, t19 = J * y4, t20 = t2 + t19, t21 = J * z4, t22 = t21 + t5;
+    const double t23 = J * x4, t24 = t23 + t8, t25 = t1 + t11, t26 = t4 + t14, t27 = t7 + t16;
+    const double t28 = t10 + t19, t29 = t21 + t13, t30 = t23 + t17;
     out[0] = z1 * t3 - y1 * t6;
     out[1] = x1 * t6 - z1 * t9;
     out[2] = y1 * t9 - x1 * t3;
@@ -5435,39 +1862,397 @@ static void spin_chain5_field(const spin_chain5_params *params, const double x[1
     out[14] = y5 * t30 - x5 * t28;
 }
 
-double spin_chain5_hamiltonian(const spin_chain5_params *params, const double x[15])
+/* ---- Compensated sums, linear equations ---- */
+/* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to
+   its last bit: were it rounded with the change, corrections of one sign would add up to a drift. 0, and x as
+   before, if the sum is not finite. */
+static int spin_chain5_advance(spin_chain5_solver *s, const double change[spin_chain5_DIM],
+    const double correction[spin_chain5_DIM])
 {
-    double energy[1];
-    spin_chain5_energy(params != NULL ? params : &spin_chain5_default_params, x, energy);
-    return energy[0];
+    double x[spin_chain5_DIM], carry[spin_chain5_DIM];
+    for (int i = 0; i < spin_chain5_DIM; ++i) {
+        const double sum = s->x[i] + change[i], added = sum - s->x[i];
+        const double lost = (s->x[i] - (sum - added)) + (change[i] - added);
+        const double small = lost + (s->carry[i] + correction[i]);
+        x[i] = sum + small;
+        carry[i] = small - (x[i] - sum);
+        if (!isfinite(x[i])) return 0;
+    }
+    memcpy(s->x, x, sizeof x);
+    memcpy(s->carry, carry, sizeof carry);
+    return 1;
 }
 
-void spin_chain5_casimirs(const spin_chain5_params *params, const double x[15], double out[])
+/* Solve matrix * solution = side, both overwritten, by elimination with partial pivoting. 0 if singular. */
+static int spin_chain5_solve(double matrix[spin_chain5_DIM * spin_chain5_DIM], double side[spin_chain5_DIM])
 {
-    double value[5]; /* out may overlap x */
-    spin_chain5_casimir_values(params != NULL ? params : &spin_chain5_default_params, x, value);
-    for (int i = 0; i < 5; ++i) out[i] = value[i];
+    for (int k = 0; k < spin_chain5_DIM; ++k) {
+        int best = k;
+        for (int i = k + 1; i < spin_chain5_DIM; ++i)
+            if (fabs(matrix[i * spin_chain5_DIM + k]) > fabs(matrix[best * spin_chain5_DIM + k])) best = i;
+        const double pivot = matrix[best * spin_chain5_DIM + k], last = side[k];
+        if (!(fabs(pivot) > 0.0)) return 0;
+        for (int j = k; j < spin_chain5_DIM && best != k; ++j) {
+            const double swap = matrix[k * spin_chain5_DIM + j];
+            matrix[k * spin_chain5_DIM + j] = matrix[best * spin_chain5_DIM + j];
+            matrix[best * spin_chain5_DIM + j] = swap;
+        }
+        side[k] = side[best];
+        side[best] = last;
+        for (int i = k + 1; i < spin_chain5_DIM; ++i) {
+            const double factor = matrix[i * spin_chain5_DIM + k] / pivot;
+            for (int j = k + 1; j < spin_chain5_DIM; ++j)
+                matrix[i * spin_chain5_DIM + j] -= factor * matrix[k * spin_chain5_DIM + j];
+            side[i] -= factor * side[k];
+        }
+    }
+    for (int i = spin_chain5_DIM - 1; i >= 0; --i) {
+        for (int j = i + 1; j < spin_chain5_DIM; ++j) side[i] -= matrix[i * spin_chain5_DIM + j] * side[j];
+        side[i] /= matrix[i * spin_chain5_DIM + i];
+    }
+    return 1;
 }
 
-void spin_chain5_vector_field(const spin_chain5_params *params, const double x[15], double out[15])
+/* ---- Starting guesses ---- */
+/* How far from the last value a guess may be, in sizes of that value. */
+#define spin_chain5_REACH 4.0
+
+/* The guess for the next value from the last ones: the sum of their backward differences. 0 if there is none,
+   or if it is far away, where the equation of a step has solutions that have nothing to do with the motion.
+   */
+static int spin_chain5_predict(const spin_chain5_history *history, double value[spin_chain5_DIM])
 {
-    double value[15];
-    spin_chain5_field(params != NULL ? params : &spin_chain5_default_params, x, value);
-    memcpy(out, value, sizeof value);
+    double distance = 0.0, size = 0.0;
+    for (int i = 0; i < spin_chain5_DIM; ++i) {
+        value[i] = 0.0;
+        for (int k = 0; k < history->order; ++k) value[i] += history->difference[k][i];
+        distance += fabs(value[i] - history->difference[0][i]);
+        size += fabs(history->difference[0][i]);
+    }
+    return history->order > 0 && distance <= spin_chain5_REACH * size;
+}
+
+/* Take in the solved value. The guess of order k missed it by its k-th difference: the next is of the best
+   order. */
+static void spin_chain5_remember(spin_chain5_history *history, const double value[spin_chain5_DIM])
+{
+    double least = HUGE_VAL, next[spin_chain5_DIM];
+    memcpy(next, value, sizeof next);
+    for (int k = 0; k <= history->count && k < spin_chain5_DIFFERENCES; ++k) {
+        double size = 0.0;
+        for (int i = 0; i < spin_chain5_DIM; ++i) {
+            const double last = history->difference[k][i];
+            history->difference[k][i] = next[i];
+            size += fabs(next[i]);
+            next[i] -= last;
+        }
+        if (k > 0 && size < least) {
+            least = size;
+            history->order = k;
+        }
+    }
+    if (history->count == 0) history->order = 1;
+    if (history->count < spin_chain5_DIFFERENCES) ++history->count;
+}
+
+/* How far a step may lead, in sizes of the state and of what the vector field says, if the energy is lost;
+   and the part of the energy that counts as lost. */
+#define spin_chain5_PLAUSIBLE 1.5
+#define spin_chain5_LOST 0.5
+
+/* Whether an increment is that of the motion. Where the step is too large, the equation may have been solved
+   by a point far away, at another energy, that has nothing to do with it. */
+static int spin_chain5_plausible(const spin_chain5_solver *s, const double increment[spin_chain5_DIM])
+{
+    double moved = 0.0, size = 0.0, field[spin_chain5_DIM], middle[spin_chain5_DIM], end[spin_chain5_DIM];
+    for (int i = 0; i < spin_chain5_DIM; ++i) {
+        moved += fabs(increment[i]);
+        size += fabs(s->x[i]);
+    }
+    if (moved <= spin_chain5_PLAUSIBLE * size) return 1;
+    spin_chain5_vector_field(&s->params, s->x, field);
+    for (int i = 0; i < spin_chain5_DIM; ++i) {
+        size += fabs(s->h * field[i]);
+        middle[i] = s->x[i] + 0.5 * increment[i];
+        end[i] = s->x[i] + increment[i];
+    }
+    if (moved <= spin_chain5_PLAUSIBLE * size) return 1;
+    const double before = spin_chain5_hamiltonian(&s->params, s->x), after =
+        spin_chain5_hamiltonian(&s->params, end);
+    const double scale = fabs(before) + fabs(spin_chain5_hamiltonian(&s->params, middle)) + fabs(after);
+    return fabs(after - before) <= spin_chain5_LOST * scale;
+}
+
+/* ---- The implicit step, by Newton's method ---- */
+/* Components of y are measured no finer than by this part of the largest. */
+#define spin_chain5_FLOOR 1e-6
+
+/* Size of a correction relative to each component of y; NaN or infinite if the correction is. */
+static double spin_chain5_size(const double y[spin_chain5_DIM], const double delta[spin_chain5_DIM])
+{
+    double norm = 0.0, size = 0.0;
+    for (int i = 0; i < spin_chain5_DIM; ++i) norm = fabs(y[i]) > norm ? fabs(y[i]) : norm;
+    for (int i = 0; i < spin_chain5_DIM; ++i) {
+        const double ratio = fabs(delta[i]) / (fabs(y[i]) + spin_chain5_FLOOR * norm + DBL_MIN);
+        if (!isfinite(ratio)) return ratio;
+        size = ratio > size ? ratio : size;
+    }
+    return size;
+}
+
+/* Corrections below the first that shrink by less than the second have reached the level of rounding. */
+#define spin_chain5_NEARLY_SOLVED 1e-8
+#define spin_chain5_SHRINKING 0.25
+
+/* Solve (y - x) + displacement(y) = 0 for y by Newton's method from the extrapolated guess, and advance. The
+   increment is corrected to first order by the last Newton correction, so that correction costs no
+   evaluation: a correction is accepted when the error that remains after it, quadratic in it, is below
+   spin_chain5_TOLERANCE. */
+static spin_chain5_status spin_chain5_attempt(spin_chain5_solver *s)
+{
+    double y[spin_chain5_DIM], delta[spin_chain5_DIM], displacement[spin_chain5_DIM],
+        increment[spin_chain5_DIM];
+    double jacobian[spin_chain5_DIM * spin_chain5_DIM], increment_jacobian[spin_chain5_DIM * spin_chain5_DIM],
+        previous = HUGE_VAL;
+    if (!spin_chain5_predict(&s->history, y)) memcpy(y, s->x, sizeof y);
+    for (int iteration = 1; iteration <= spin_chain5_MAX_ITERATIONS; ++iteration) {
+        spin_chain5_linearise(s->coef, y, displacement, increment, jacobian, increment_jacobian);
+        ++s->evaluations;
+        for (int i = 0; i < spin_chain5_DIM; ++i) delta[i] = ((y[i] - s->x[i]) + displacement[i])
+            - s->carry[i];
+        const int regular = spin_chain5_solve(jacobian, delta);
+        const double size = spin_chain5_size(y, delta), growth = size / (previous * previous);
+        if (!isfinite(size)) return spin_chain5_NOT_FINITE;
+        if (!regular) return spin_chain5_SINGULAR;
+        for (int i = 0; i < spin_chain5_DIM; ++i) y[i] -= delta[i];
+        const double remaining = size * size * (growth > 1.0 ? growth : 1.0);
+        const int stalled = previous < spin_chain5_NEARLY_SOLVED && size > spin_chain5_SHRINKING * previous;
+        previous = size;
+        if (!(remaining <= spin_chain5_TOLERANCE || stalled)) continue;
+        double correction[spin_chain5_DIM] = { 0.0 };
+        for (int i = 0; i < spin_chain5_DIM; ++i)
+            for (int j = 0; j < spin_chain5_DIM; ++j)
+                correction[i] -= increment_jacobian[i * spin_chain5_DIM + j] * delta[j];
+        if (!spin_chain5_plausible(s, increment)) return spin_chain5_NO_CONVERGENCE;
+        if (!spin_chain5_advance(s, increment, correction)) return spin_chain5_NOT_FINITE;
+        spin_chain5_remember(&s->history, y);
+        return spin_chain5_OK;
+    }
+    return spin_chain5_NO_CONVERGENCE;
+}
+
+/* ---- The choice of the gauge: multiples of Casimirs taken from H ---- */
+enum {
+    spin_chain5_SAMPLES = 32, /* states along a short piece of the trajectory */
+    spin_chain5_SWEEPS = 4    /* most rounds over the multiples */
+};
+
+/* A short piece of the trajectory from x, by a Runge-Kutta method with steps of a fixed change. */
+static void spin_chain5_sample(const spin_chain5_params *params, const double x[spin_chain5_DIM],
+    double samples[][spin_chain5_DIM])
+{
+    double slope[spin_chain5_DIM], middle[spin_chain5_DIM], size = 0.0, speed = DBL_MIN;
+    spin_chain5_vector_field(params, x, slope);
+    for (int i = 0; i < spin_chain5_DIM; ++i) {
+        samples[0][i] = x[i];
+        size += fabs(x[i]);
+        speed += fabs(slope[i]);
+    }
+    const double h = 0.25 * size / speed;
+    for (int k = 1; k < spin_chain5_SAMPLES; ++k) {
+        const double *y = samples[k - 1];
+        spin_chain5_vector_field(params, y, slope);
+        for (int i = 0; i < spin_chain5_DIM; ++i) middle[i] = y[i] + 0.5 * h * slope[i];
+        spin_chain5_vector_field(params, middle, slope);
+        for (int i = 0; i < spin_chain5_DIM; ++i) samples[k][i] = y[i] + h * slope[i];
+    }
+}
+
+/* Sum of |pi grad S_3|^2, the leading error of the method, over the samples. */
+static double spin_chain5_gauge_error(const spin_chain5_params *params,
+    const double gauge[spin_chain5_GAUGES], double samples[][spin_chain5_DIM])
+{
+    double error[spin_chain5_DIM], sum = 0.0;
+    for (int k = 0; k < spin_chain5_SAMPLES; ++k) {
+        spin_chain5_guide(params, gauge, samples[k], error);
+        for (int i = 0; i < spin_chain5_DIM; ++i) sum += error[i] * error[i];
+    }
+    return sum;
+}
+
+/* How many widths multiple c is to be moved for the least error: the best on grids, each finer than the one
+   before. */
+static double spin_chain5_least_on_line(const spin_chain5_params *params,
+    const double gauge[spin_chain5_GAUGES], int c, double width, double samples[][spin_chain5_DIM])
+{
+    double moved[spin_chain5_GAUGES], best = 0.0, mesh = 0.125, least = spin_chain5_gauge_error(params, gauge,
+        samples);
+    memcpy(moved, gauge, sizeof moved);
+    for (int level = 0; level < 3; ++level, mesh *= 0.125) {
+        const int reach = level == 0 ? 24 : 8;
+        const double centre = best;
+        for (int j = -reach; j <= reach; ++j) {
+            moved[c] = gauge[c] + (centre + j * mesh) * width;
+            const double error = spin_chain5_gauge_error(params, moved, samples);
+            if (!(error < least - 1e-12 * least)) continue; /* close calls are not decided by rounding */
+            least = error;
+            best = centre + j * mesh;
+        }
+    }
+    return best;
+}
+
+/* The multiples that minimise the leading error along a short piece of the trajectory, one after the other,
+   from the least-squares solution of grad H = sum of multiples of grad C. Zero where that gives nothing
+   finite. */
+static void spin_chain5_choose_gauge(const spin_chain5_params *params, const double x[spin_chain5_DIM],
+    double gauge[spin_chain5_GAUGES])
+{
+    double samples[spin_chain5_SAMPLES][spin_chain5_DIM], out[1 + 2 * spin_chain5_GAUGES],
+        sums[1 + 2 * spin_chain5_GAUGES] = { 0.0 };
+    double width[spin_chain5_GAUGES];
+    spin_chain5_sample(params, x, samples);
+    for (int k = 0; k < spin_chain5_SAMPLES; ++k) {
+        spin_chain5_products(params, samples[k], out);
+        for (int i = 0; i < 1 + 2 * spin_chain5_GAUGES; ++i) sums[i] += out[i];
+    }
+    for (int c = 0; c < spin_chain5_GAUGES; ++c) {
+        const double norm = sums[2 + 2 * c] > 0.0 ? sums[2 + 2 * c] : HUGE_VAL;
+        gauge[c] = sums[1 + 2 * c] / norm;
+        width[c] = sqrt(sums[0] / norm);
+    }
+    for (int sweep = 0, moved = 1; sweep < spin_chain5_SWEEPS && moved; ++sweep) {
+        moved = 0;
+        for (int c = 0; c < spin_chain5_GAUGES; ++c) {
+            const double best = spin_chain5_least_on_line(params, gauge, c, width[c], samples);
+            gauge[c] += best * width[c];
+            moved = moved || best != 0.0;
+        }
+    }
+    if (!isfinite(spin_chain5_gauge_error(params, gauge, samples)))
+        memset(gauge, 0, spin_chain5_GAUGES * sizeof gauge[0]);
+}
+
+/* ---- The solver ---- */
+/* Whether steps can be made with these parameters: allowed, and with finite coefficients for a step so short
+   that it has no part in it. */
+static int spin_chain5_admissible(const spin_chain5_params *params)
+{
+    double coef[spin_chain5_COEFFICIENTS];
+    if (!spin_chain5_allowed(params)) return 0;
+    spin_chain5_prepare(params, (const double[spin_chain5_GAUGES]){ 0.0 }, 1e-100, coef);
+    for (int k = 0; k < spin_chain5_COEFFICIENTS; ++k)
+        if (!isfinite(coef[k])) return 0;
+    return 1;
+}
+
+/* The arguments may be parts of *s: they are read before it is written. */
+spin_chain5_status spin_chain5_init_gauge(spin_chain5_solver *s, const spin_chain5_params *params,
+    const double x0[spin_chain5_DIM], const double gauge[spin_chain5_GAUGES])
+{
+    if (s == NULL || x0 == NULL) return spin_chain5_BAD_ARGUMENT;
+    const spin_chain5_params own = params != NULL ? *params : spin_chain5_default_params;
+    double x[spin_chain5_DIM];
+    memcpy(x, x0, sizeof x);
+    for (int i = 0; i < spin_chain5_DIM; ++i)
+        if (!isfinite(x[i])) return spin_chain5_BAD_ARGUMENT;
+    double multiples[spin_chain5_GAUGES] = { 0.0 };
+    const int given = gauge != NULL;
+    if (given) memcpy(multiples, gauge, sizeof multiples);
+    for (int c = 0; c < spin_chain5_GAUGES; ++c)
+        if (!isfinite(multiples[c])) return spin_chain5_BAD_ARGUMENT;
+    if (!spin_chain5_admissible(&own)) return spin_chain5_BAD_ARGUMENT;
+    memset(s, 0, sizeof *s);
+    memcpy(s->x, x, sizeof s->x);
+    s->params = own;
+    if (!given) spin_chain5_choose_gauge(&own, x, multiples);
+    memcpy(s->gauge, multiples, sizeof s->gauge);
+    return spin_chain5_OK;
+}
+
+spin_chain5_status spin_chain5_init(spin_chain5_solver *s, const spin_chain5_params *params,
+    const double x0[spin_chain5_DIM])
+{
+    return spin_chain5_init_gauge(s, params, x0, NULL);
+}
+
+/* What depends on the step size; nothing where that is as before. */
+static spin_chain5_status spin_chain5_set_step(spin_chain5_solver *s, double h)
+{
+    if (s == NULL || !isfinite(h)) return spin_chain5_BAD_ARGUMENT;
+    if (s->prepared && memcmp(&h, &s->h, sizeof h) == 0) return spin_chain5_OK;
+    spin_chain5_prepare(&s->params, s->gauge, h, s->coef);
+    memset(&s->history, 0, sizeof s->history);
+    s->h = h;
+    s->t_before_h = s->t;
+    s->steps_before_h = s->steps;
+    s->prepared = 1;
+    return spin_chain5_OK;
+}
+
+/* One stage. A guess from earlier steps may have misled it: then once more without. */
+static spin_chain5_status spin_chain5_stage(spin_chain5_solver *s)
+{
+    spin_chain5_status status = spin_chain5_attempt(s);
+    if (status != spin_chain5_OK && s->history.count > 0) {
+        memset(&s->history, 0, sizeof s->history);
+        status = spin_chain5_attempt(s);
+    }
+    return status;
+}
+
+spin_chain5_status spin_chain5_step(spin_chain5_solver *s, double h)
+{
+    spin_chain5_status status = spin_chain5_set_step(s, h);
+    if (status != spin_chain5_OK) return status;
+    status = spin_chain5_stage(s);
+    if (status != spin_chain5_OK) return status;
+    ++s->steps;
+    s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
+    return status;
+}
+
+spin_chain5_status spin_chain5_integrate(spin_chain5_solver *s, double h, size_t steps)
+{
+    spin_chain5_status status = spin_chain5_set_step(s, h);
+    for (; steps > 0 && status == spin_chain5_OK; --steps) status = spin_chain5_step(s, h);
+    return status;
 }
 
 const char *spin_chain5_status_string(spin_chain5_status status)
 {
-    switch (status) {
-    case spin_chain5_OK: return "ok";
-    case spin_chain5_NO_CONVERGENCE: return "no convergence: the step is too large";
-    case spin_chain5_SINGULAR: return "singular Newton matrix: the step is too large";
-    case spin_chain5_NOT_FINITE: return "not finite: overflow, or outside the domain";
-    case spin_chain5_BAD_ARGUMENT: return "bad argument: a null pointer, or values that are not allowed";
-    }
-    return "unknown status";
+    static const char *const text[] = {
+        "ok",
+        "no convergence: the step is too large",
+        "singular Newton matrix: the step is too large",
+        "not finite: overflow, or outside the domain",
+        "bad argument: a null pointer, or values that are not allowed"
+    };
+    return (unsigned)status <= spin_chain5_BAD_ARGUMENT ? text[status] : "unknown status";
 }
 
 size_t spin_chain5_solver_size(void) { return sizeof(spin_chain5_solver); }
 
 size_t spin_chain5_solver_steps_done(const spin_chain5_solver *s) { return s->steps; }
+
+/* ---- Ensembles ---- */
+spin_chain5_status spin_chain5_ensemble(const spin_chain5_params *params, double *x, size_t members, double h,
+    size_t steps, unsigned char *status)
+{
+    spin_chain5_status worst = isfinite(h) ? spin_chain5_OK : spin_chain5_BAD_ARGUMENT;
+    const spin_chain5_params own = params != NULL ? *params : spin_chain5_default_params;
+    if (x == NULL && members > 0) return spin_chain5_BAD_ARGUMENT;
+    for (size_t m = 0; m < members; ++m) {
+        spin_chain5_solver s;
+        double x0[spin_chain5_DIM];
+        for (size_t i = 0; i < spin_chain5_DIM; ++i) x0[i] = x[i * members + m];
+        spin_chain5_status member = spin_chain5_init(&s, &own, x0);
+        if (member == spin_chain5_OK) {
+            member = spin_chain5_integrate(&s, h, steps);
+            for (size_t i = 0; i < spin_chain5_DIM; ++i) x[i * members + m] = s.x[i];
+        }
+        if (status != NULL) status[m] = (unsigned char)member;
+        if (worst == spin_chain5_OK) worst = member;
+    }
+    return worst;
+}

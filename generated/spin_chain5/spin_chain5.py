@@ -7,17 +7,17 @@
 #   step: implicit, Newton iteration with the analytic matrix
 #   one Newton iteration: 1700 additions, 2144 multiplications, 10 functions
 #
-# spec: spin_chain5, sha256 da0327c7c317a1988908e0a444023e4dbaa180a3aa04a316a6e41501ce41812b
+# spec: spin_chain5, sha256 822f770e232b566fca45eb393c188aab67b907df200761f36001661c9c3fe5e9
 # to regenerate: phigen build spin_chain5
 # DO NOT EDIT: change the spec and regenerate; edits are noticed by the checksum below.
 #
 # SPDX-License-Identifier: 0BSD
 # This file belongs to whoever generated it; phigen claims no rights in it.
-# body-sha256: aa33d5fad55809fb4ca31d540d2dcee6d46c461fad36864fcde7654078d47a87
+# body-sha256: 14c7ce3d39362c053c56b1f9e0020694066df18dcc2400b50fc8cf3e06d06fd5
 import numpy as np
 
 VERSION = "0.1.0"
-SPEC_SHA256 = "da0327c7c317a1988908e0a444023e4dbaa180a3aa04a316a6e41501ce41812b"
+SPEC_SHA256 = "822f770e232b566fca45eb393c188aab67b907df200761f36001661c9c3fe5e9"
 DIM = 15
 ORDER = 4
 COORDINATES = ("x1", "y1", "z1", "x2", "y2", "z2", "x3", "y3", "z3", "x4", "y4", "z4", "x5", "y5", "z5",)

@@ -7,66 +7,52 @@
  *   step: implicit, Newton iteration with the analytic matrix
  *   one Newton iteration: 143 additions, 189 multiplications, 4 functions
  *
- * spec: toda3, sha256 c7dc1027841ad0ebd0aac03361a0c390f021c59279da1553a4dcfe3243181c41
+ * spec: toda3, sha256 813743f0c214e25a500552f5cc291b9b59649d4122a822c50e413b8a48c6bba9
  * to regenerate: phigen build toda3
  * DO NOT EDIT: change the spec and regenerate; edits are noticed by the checksum below.
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 8f37c2dfbf18168dc460379d94cdbfcb01ce1d7ee8de7e82996f219b4759e652
+ *
+ *   1. The model
+ *   2. Compensated sums, linear equations
+ *   3. Starting guesses
+ *   4. The implicit step, by Newton's method
+ *   5. The solver
+ *   6. Ensembles
+ * body-sha256: 08aabdf224771c4eea02d8dc6ef565f9ea98904870ca06d1fd7b65f1913b3ef5
  */
 #include "toda3.h"
 
 #include <float.h>
-#include <limits.h>
 #include <math.h>
-#include <stdint.h>
 #include <string.h>
 
+/* ---- The model ---- */
 const toda3_params toda3_default_params = { 0 };
 
-/* A step of size h is the composition of these fractions of it. */
-static const double toda3_fractions[1] = { 1.0 };
+enum { toda3_MAX_ITERATIONS = 20 }; /* of an inner solve */
+
+/* A correction is accepted when the error that it leaves is estimated to be below this. */
+#define toda3_TOLERANCE 1e-20
 
 /* (1 - w cot w)/s with w = sqrt(s)/2, coth for negative s: the function of the exponential bi-realisation. */
 static double toda3_phi0(double s)
 {
-    if (fabs(s) < 0.25) {
-        double sum = 8.586062056277845e-15;
-        sum = sum * s + 3.3896802963225827e-13;
-        sum = sum * s + 1.3382536530684679e-11;
-        sum = sum * s + 5.284190138687493e-10;
-        sum = sum * s + 2.08767569878681e-08;
-        sum = sum * s + 8.267195767195768e-07;
-        sum = sum * s + 3.306878306878307e-05;
-        sum = sum * s + 0.001388888888888889;
-        sum = sum * s + 0.08333333333333333;
-        return sum;
-    }
+    if (fabs(s) < 0.25)
+        return (0.08333333333333333 + s * (0.001388888888888889 + s * (3.306878306878307e-05 + s *
+            (8.267195767195768e-07 + s * (2.08767569878681e-08 + s * (5.284190138687493e-10 + s *
+            (1.3382536530684679e-11 + s * (3.3896802963225827e-13 + s * 8.586062056277845e-15))))))));
     if (fabs(s) < 16.0) {
         const double pole = 1.0 / (39.47841760435743 - s);
-        double sum = 1.3621211117593843e-46;
-        sum = sum * s + 2.1509755511832569e-44;
-        sum = sum * s + 3.3966848266497805e-42;
-        sum = sum * s + 5.363831046655698e-40;
-        sum = sum * s + 8.470227328650247e-38;
-        sum = sum * s + 1.3375664093215244e-35;
-        sum = sum * s + 2.1122063323183885e-33;
-        sum = sum * s + 3.3354842988221443e-31;
-        sum = sum * s + 5.267262996834231e-29;
-        sum = sum * s + 8.318003195189264e-27;
-        sum = sum * s + 1.3136241807166534e-24;
-        sum = sum * s + 2.0747401878593604e-22;
-        sum = sum * s + 3.277539174701792e-20;
-        sum = sum * s + 5.180118196169724e-18;
-        sum = sum * s + 8.196052055691008e-16;
-        sum = sum * s + 1.3000482138698975e-13;
-        sum = sum * s + 2.0742872904166045e-11;
-        sum = sum * s + 3.357141926657451e-09;
-        sum = sum * s + 5.637370282876845e-07;
-        sum = sum * s + 0.000105641107053347;
-        sum = sum * s + 0.03267274151216445;
-        return 2.0 * pole + sum;
+        return 2.0 * pole + (0.03267274151216445 + s * (0.000105641107053347 + s * (5.637370282876845e-07
+            + s * (3.357141926657451e-09 + s * (2.0742872904166045e-11 + s * (1.3000482138698975e-13 + s *
+            (8.196052055691008e-16 + s * (5.180118196169724e-18 + s * (3.277539174701792e-20 + s *
+            (2.0747401878593604e-22 + s * (1.3136241807166534e-24 + s * (8.318003195189264e-27 + s *
+            (5.267262996834231e-29 + s * (3.3354842988221443e-31 + s * (2.1122063323183885e-33 + s *
+            (1.3375664093215244e-35 + s * (8.470227328650247e-38 + s * (5.363831046655698e-40 + s *
+            (3.3966848266497805e-42 + s * (2.1509755511832569e-44 + s *
+            1.3621211117593843e-46))))))))))))))))))));
     }
     const double w = 0.5 * sqrt(fabs(s)), c = w / (s > 0.0 ? tan(w) : tanh(w));
     const double phi0 = (1.0 - c) / s;
@@ -76,42 +62,20 @@ static double toda3_phi0(double s)
 /* The derivative of (1 - w cot w)/s, w = sqrt(s)/2. */
 static double toda3_phi1(double s)
 {
-    if (fabs(s) < 0.25) {
-        double sum = 1.9573818287022555e-15;
-        sum = sum * s + 6.868849645022276e-14;
-        sum = sum * s + 2.372776207425808e-12;
-        sum = sum * s + 8.029521918410807e-11;
-        sum = sum * s + 2.6420950693437467e-09;
-        sum = sum * s + 8.35070279514724e-08;
-        sum = sum * s + 2.48015873015873e-06;
-        sum = sum * s + 6.613756613756614e-05;
-        sum = sum * s + 0.001388888888888889;
-        return sum;
-    }
+    if (fabs(s) < 0.25)
+        return (0.001388888888888889 + s * (6.613756613756614e-05 + s * (2.48015873015873e-06 + s *
+            (8.35070279514724e-08 + s * (2.6420950693437467e-09 + s * (8.029521918410807e-11 + s *
+            (2.372776207425808e-12 + s * (6.868849645022276e-14 + s * 1.9573818287022555e-15))))))));
     if (fabs(s) < 16.0) {
         const double pole = 1.0 / (39.47841760435743 - s);
-        double sum = 1.8114038279637677e-47;
-        sum = sum * s + 2.7242422235187686e-45;
-        sum = sum * s + 4.0868535472481875e-43;
-        sum = sum * s + 6.114032687969605e-41;
-        sum = sum * s + 9.118512779314688e-39;
-        sum = sum * s + 1.3552363725840395e-36;
-        sum = sum * s + 2.0063496139822866e-34;
-        sum = sum * s + 2.957088865245744e-32;
-        sum = sum * s + 4.336129588468787e-30;
-        sum = sum * s + 6.320715596201077e-28;
-        sum = sum * s + 9.149803514708191e-26;
-        sum = sum * s + 1.3136241807166533e-23;
-        sum = sum * s + 1.8672661690734246e-21;
-        sum = sum * s + 2.6220313397614337e-19;
-        sum = sum * s + 3.626082737318807e-17;
-        sum = sum * s + 4.917631233414605e-15;
-        sum = sum * s + 6.500241069349487e-13;
-        sum = sum * s + 8.297149161666418e-11;
-        sum = sum * s + 1.0071425779972354e-08;
-        sum = sum * s + 1.127474056575369e-06;
-        sum = sum * s + 0.000105641107053347;
-        return 2.0 * pole * pole + sum;
+        return 2.0 * pole * pole + (0.000105641107053347 + s * (1.127474056575369e-06 + s *
+            (1.0071425779972354e-08 + s * (8.297149161666418e-11 + s * (6.500241069349487e-13 + s *
+            (4.917631233414605e-15 + s * (3.626082737318807e-17 + s * (2.6220313397614337e-19 + s *
+            (1.8672661690734246e-21 + s * (1.3136241807166533e-23 + s * (9.149803514708191e-26 + s *
+            (6.320715596201077e-28 + s * (4.336129588468787e-30 + s * (2.957088865245744e-32 + s *
+            (2.0063496139822866e-34 + s * (1.3552363725840395e-36 + s * (9.118512779314688e-39 + s *
+            (6.114032687969605e-41 + s * (4.0868535472481875e-43 + s * (2.7242422235187686e-45 + s *
+            1.8114038279637677e-47))))))))))))))))))));
     }
     const double w = 0.5 * sqrt(fabs(s)), c = w / (s > 0.0 ? tan(w) : tanh(w));
     const double phi0 = (1.0 - c) / s;
@@ -139,134 +103,63 @@ static void toda3_prepare(const toda3_params *params, double h, double coef[rest
 /* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
    increment, all with the momenta p = grad S_h(y) */
 static void toda3_linearise(const double coef[10], const double y[5], double displacement[restrict 5],
-                            double increment[restrict 5], double jacobian[restrict 25],
-                            double increment_jacobian[restrict 25])
+    double increment[restrict 5], double jacobian[restrict 25], double increment_jacobian[restrict 25])
 {
-    const double a1 = y[0];
-    const double a2 = y[1];
-    const double b1 = y[2];
-    const double b2 = y[3];
-    const double b3 = y[4];
-    const double t1 = a2 * a2;
-    const double t2 = b2 * coef[6];
+    const double a1 = y[0], a2 = y[1], b1 = y[2], b2 = y[3], b3 = y[4];
+    /* momenta */
+    const double t1 = a2 * a2, t2 = b2 * coef[6];
     const double p_b3 = b3 * coef[5] + t1 * (t2 + b3 * coef[1]);
-    const double t3 = a1 * a1;
-    const double t4 = coef[1] * t1;
-    const double t5 = coef[5] + coef[1] * t3;
-    const double t6 = t4 + t5;
+    const double t3 = a1 * a1, t4 = coef[1] * t1, t5 = coef[5] + coef[1] * t3, t6 = t4 + t5;
     const double p_b2 = coef[6] * (b1 * t3) + coef[6] * (b3 * t1) + b2 * t6;
-    const double t7 = p_b3 - p_b2;
-    const double t8 = t7 + (p_b2 - p_b3);
-    const double t9 = t8 * (a1 * t8);
-    const double t10 = 2.0 * p_b3;
-    const double t11 = t10 - p_b2;
-    const double t12 = p_b2 * t11 - p_b3 * p_b3;
-    const double t13 = toda3_phi0(t12);
-    const double t14 = b1 * coef[1];
-    const double p_b1 = b1 * coef[5] + t3 * (t2 + t14);
-    const double t15 = p_b2 - p_b1;
-    const double t16 = a1 * t15;
-    const double t17 = t15 * t16;
-    const double t18 = 2.0 * p_b2;
-    const double t19 = t18 - p_b1;
-    const double t20 = p_b1 * t19 - p_b2 * p_b2;
-    const double t21 = toda3_phi0(t20);
-    const double t22 = a1 * p_b2 - a1 * p_b1;
-    const double t23 = a2 * t7;
-    const double t24 = t7 * t23;
-    const double t25 = a2 * p_b3 - a2 * p_b2;
-    const double t26 = b2 * coef[2];
-    const double t27 = b1 * (t14 + t26);
-    const double t28 = coef[3] * t1 + coef[1] * (b2 * b2);
-    const double p_a1 = a1 * (t27 + (coef[0] + coef[4] * t3 + t28));
-    const double t29 = p_a1 * t16;
-    const double t30 = t29 * t21;
-    const double t31 = a1 * p_a1;
-    const double t32 = b3 * coef[2];
-    const double t33 = b2 * (b2 * coef[1] + t32);
-    const double t34 = coef[0] + coef[3] * t3;
-    const double t35 = coef[1] * (b3 * b3);
-    const double p_a2 = a2 * (t33 + (t34 + (coef[4] * t1 + t35)));
-    const double t36 = p_a2 * t23;
-    const double t37 = t36 * t13;
-    const double t38 = a2 * p_a2;
-    const double t39 = t38 - t31;
-    const double t40 = a1 * (t26 + b1 * coef[9]);
-    const double t41 = 0.5 * a1;
-    const double t42 = toda3_phi1(t20);
-    const double t43 = (t19 - p_b1) * t42;
-    const double t44 = (t16 + t16) * t21;
-    const double t45 = t41 + (t17 * t43 - t44);
-    const double t46 = b2 * coef[9];
-    const double t47 = a1 * (t46 + b1 * coef[2]);
-    const double t48 = toda3_phi1(t12);
-    const double t49 = (t11 - p_b2) * t48;
-    const double t50 = (2.0 * p_b1 - t18) * t42;
-    const double t51 = t9 * t49 + (t44 + t17 * t50) - t41;
-    const double t52 = a2 * (t26 + b3 * coef[9]);
-    const double t53 = (t18 - t10) * t48;
-    const double t54 = t9 * t53;
-    const double t55 = a2 * (t46 + t32);
-    const double t56 = coef[6] * t3;
-    const double t57 = coef[6] * t1;
-    const double t58 = coef[5] + t4;
-    const double t59 = 0.5 * a2;
-    const double t60 = (t23 + t23) * t13;
-    const double t61 = t59 + (t24 * t49 - t60);
-    const double t62 = t60 + t24 * t53 - t59;
-    const double t63 = p_a1 * t15 * t21;
-    const double t64 = 0.5 * p_a1;
-    const double t65 = t27 + (coef[0] + coef[7] * t3 + t28);
-    const double t66 = t16 * t21;
-    const double t67 = t66 - t41;
-    const double t68 = t31 * t21;
-    const double t69 = t68 + t29 * t50;
-    const double t70 = t29 * t43;
-    const double t71 = t70 - t68;
-    const double t72 = coef[8] * (a1 * a2);
-    const double t73 = t23 * t13;
-    const double t74 = t73 - t59;
-    const double t75 = t41 - t66;
-    const double t76 = t68 - t70;
-    const double t77 = t36 * t49;
-    const double t78 = t38 * t13;
-    const double t79 = t77 - t78 - t69;
-    const double t80 = p_a2 * t7 * t13;
-    const double t81 = 0.5 * p_a2;
-    const double t82 = t78 + t36 * t53;
-    const double t83 = t52 * t82;
-    const double t84 = t33 + (coef[7] * t1 + t35 + t34);
-    const double t85 = t57 * t82;
-    const double t86 = t58 * t82;
-    const double t87 = t59 - t73;
-    const double t88 = t78 - t77;
-    const double t89 = a1 * t47;
-    const double t90 = a1 * t40;
-    const double t91 = a1 * t56;
-    const double t92 = a2 * t52;
-    const double t93 = a2 * t55;
-    const double t94 = a2 * t57;
-    const double t95 = a1 * t65;
-    const double t96 = a1 * t72;
-    const double t97 = a2 * t72;
-    const double t98 = a2 * t84;
-    displacement[0] = t9 * t13 + t17 * t21 - 0.5 * t22;
-    displacement[1] = t24 * t13 - 0.5 * t25;
-    displacement[2] = t30 - 0.5 * t31;
-    displacement[3] = t37 - t30 - 0.5 * t39;
+    const double t7 = b1 * coef[1];
+    const double p_b1 = b1 * coef[5] + t3 * (t2 + t7);
+    const double t8 = b2 * coef[2], t9 = b1 * (t7 + t8), t10 = coef[3] * t1 + coef[1] * (b2 * b2);
+    const double p_a1 = a1 * (t9 + (coef[0] + coef[4] * t3 + t10));
+    const double t11 = b3 * coef[2], t12 = b2 * (b2 * coef[1] + t11), t13 = coef[0] + coef[3] * t3;
+    const double t14 = coef[1] * (b3 * b3);
+    const double p_a2 = a2 * (t12 + (t13 + (coef[4] * t1 + t14)));
+    /* displacement */
+    const double t15 = p_b3 - p_b2, t16 = t15 + (p_b2 - p_b3), t17 = t16 * (a1 * t16);
+    const double t18 = 2.0 * p_b3, t19 = t18 - p_b2, t20 = p_b2 * t19 - p_b3 * p_b3;
+    const double t21 = toda3_phi0(t20), t22 = p_b2 - p_b1, t23 = a1 * t22, t24 = t22 * t23;
+    const double t25 = 2.0 * p_b2, t26 = t25 - p_b1, t27 = p_b1 * t26 - p_b2 * p_b2;
+    const double t28 = toda3_phi0(t27), t29 = a1 * p_b2 - a1 * p_b1, t30 = a2 * t15, t31 = t15 * t30;
+    const double t32 = a2 * p_b3 - a2 * p_b2, t33 = p_a1 * t23, t34 = t33 * t28, t35 = a1 * p_a1;
+    const double t36 = p_a2 * t30, t37 = t36 * t21, t38 = a2 * p_a2, t39 = t38 - t35;
+    displacement[0] = t17 * t21 + t24 * t28 - 0.5 * t29;
+    displacement[1] = t31 * t21 - 0.5 * t32;
+    displacement[2] = t34 - 0.5 * t35;
+    displacement[3] = t37 - t34 - 0.5 * t39;
     displacement[4] = 0.5 * t38 - t37;
-    increment[0] = t22;
-    increment[1] = t25;
-    increment[2] = t31;
+    /* increment */
+    increment[0] = t29;
+    increment[1] = t32;
+    increment[2] = t35;
     increment[3] = t39;
     increment[4] = -t38;
-    jacobian[0] = 1.0 + (t8 * t8 * t13 + t15 * t15 * t21 - 0.5 * t15 + (t40 * t45 + t47 * t51));
+    /* jacobian */
+    const double t40 = a1 * (t8 + b1 * coef[9]), t41 = 0.5 * a1, t42 = toda3_phi1(t27);
+    const double t43 = (t26 - p_b1) * t42, t44 = (t23 + t23) * t28, t45 = t41 + (t24 * t43 - t44);
+    const double t46 = b2 * coef[9], t47 = a1 * (t46 + b1 * coef[2]), t48 = toda3_phi1(t20);
+    const double t49 = (t19 - p_b2) * t48, t50 = (2.0 * p_b1 - t25) * t42;
+    const double t51 = t17 * t49 + (t44 + t24 * t50) - t41, t52 = a2 * (t8 + b3 * coef[9]);
+    const double t53 = (t25 - t18) * t48, t54 = t17 * t53, t55 = a2 * (t46 + t11);
+    const double t56 = coef[6] * t3, t57 = coef[6] * t1, t58 = coef[5] + t4, t59 = 0.5 * a2;
+    const double t60 = (t30 + t30) * t21, t61 = t59 + (t31 * t49 - t60), t62 = t60 + t31 * t53 - t59;
+    const double t63 = p_a1 * t22 * t28, t64 = 0.5 * p_a1, t65 = t9 + (coef[0] + coef[7] * t3 + t10);
+    const double t66 = t23 * t28, t67 = t66 - t41, t68 = t35 * t28, t69 = t68 + t33 * t50;
+    const double t70 = t33 * t43, t71 = t70 - t68, t72 = coef[8] * (a1 * a2), t73 = t30 * t21;
+    const double t74 = t73 - t59, t75 = t41 - t66, t76 = t68 - t70, t77 = t36 * t49, t78 = t38 * t21;
+    const double t79 = t77 - t78 - t69, t80 = p_a2 * t15 * t21, t81 = 0.5 * p_a2;
+    const double t82 = t78 + t36 * t53, t83 = t52 * t82, t84 = t12 + (coef[7] * t1 + t14 + t13);
+    const double t85 = t57 * t82, t86 = t58 * t82, t87 = t59 - t73, t88 = t78 - t77;
+    jacobian[0] = 1.0 + (t16 * t16 * t21 + t22 * t22 * t28 - 0.5 * t22 + (t40 * t45 + t47 * t51));
     jacobian[1] = t52 * t54 + t55 * t51;
     jacobian[2] = t5 * t45 + t56 * t51;
     jacobian[3] = t57 * t54 + (t56 * t45 + t6 * t51);
     jacobian[4] = t58 * t54 + t57 * t51;
     jacobian[5] = t47 * t61;
-    jacobian[6] = 1.0 + (t7 * t7 * t13 - 0.5 * t7 + (t55 * t61 + t52 * t62));
+    jacobian[6] = 1.0 + (t15 * t15 * t21 - 0.5 * t15 + (t55 * t61 + t52 * t62));
     jacobian[7] = t56 * t61;
     jacobian[8] = t6 * t61 + t57 * t62;
     jacobian[9] = t57 * t61 + t58 * t62;
@@ -285,13 +178,16 @@ static void toda3_linearise(const double coef[10], const double y[5], double dis
     jacobian[22] = t56 * t88;
     jacobian[23] = t55 * t87 + t6 * t88 - t85;
     jacobian[24] = 1.0 + (t52 * t87 + t57 * t88 - t86);
-    increment_jacobian[0] = t89 - t90 + t15;
+    /* increment jacobian */
+    const double t89 = a1 * t47, t90 = a1 * t40, t91 = a1 * t56, t92 = a2 * t52, t93 = a2 * t55;
+    const double t94 = a2 * t57, t95 = a1 * t65, t96 = a1 * t72, t97 = a2 * t72, t98 = a2 * t84;
+    increment_jacobian[0] = t89 - t90 + t22;
     increment_jacobian[1] = a1 * t55;
     increment_jacobian[2] = t91 - a1 * t5;
     increment_jacobian[3] = a1 * t6 - t91;
     increment_jacobian[4] = a1 * t57;
     increment_jacobian[5] = -(a2 * t47);
-    increment_jacobian[6] = t92 - t93 + t7;
+    increment_jacobian[6] = t92 - t93 + t15;
     increment_jacobian[7] = -(a2 * t56);
     increment_jacobian[8] = t94 - a2 * t6;
     increment_jacobian[9] = a2 * t58 - t94;
@@ -312,244 +208,43 @@ static void toda3_linearise(const double coef[10], const double y[5], double dis
     increment_jacobian[24] = -t92;
 }
 
-/* Solve matrix * solution = side, both overwritten, by elimination with partial pivoting. 0 if singular. */
-static int toda3_solve(double matrix[25], double side[5])
+/* the Hamiltonian */
+double toda3_hamiltonian(const toda3_params *params, const double x[5])
 {
-    for (int k = 0; k < 5; ++k) {
-        int best = k;
-        for (int i = k + 1; i < 5; ++i)
-            if (fabs(matrix[i * 5 + k]) > fabs(matrix[best * 5 + k])) best = i;
-        const double pivot = matrix[best * 5 + k];
-        if (!(fabs(pivot) > 0.0)) return 0;
-        for (int j = k; j < 5 && best != k; ++j) {
-            const double swap = matrix[k * 5 + j];
-            matrix[k * 5 + j] = matrix[best * 5 + j];
-            matrix[best * 5 + j] = swap;
-        }
-        const double swap = side[k];
-        side[k] = side[best];
-        side[best] = swap;
-        for (int i = k + 1; i < 5; ++i) {
-            const double factor = matrix[i * 5 + k] / pivot;
-            for (int j = k + 1; j < 5; ++j) matrix[i * 5 + j] -= factor * matrix[k * 5 + j];
-            side[i] -= factor * side[k];
-        }
-    }
-    for (int i = 5 - 1; i >= 0; --i) {
-        for (int j = i + 1; j < 5; ++j) side[i] -= matrix[i * 5 + j] * side[j];
-        side[i] /= matrix[i * 5 + i];
-    }
-    return 1;
+    (void)params;
+    const double a1 = x[0], a2 = x[1], b1 = x[2], b2 = x[3], b3 = x[4];
+    return a2 * a2 + (a1 * a1 + 0.5 * (b3 * b3 + (b1 * b1 + b2 * b2)));
 }
 
-/* Whether a guess is where the next values may be. Recurrences that were fitted to little else than rest, near a saddle,
-   may lead anywhere; and far away the equation of a step has solutions that have nothing to do with the motion. */
-static int toda3_near(const double guess[5], const double last[5])
+/* the Casimirs */
+void toda3_casimirs(const toda3_params *params, const double x[5], double out[])
 {
-    double distance = 0.0, size = 0.0;
-    for (int i = 0; i < 5; ++i) {
-        distance += fabs(guess[i] - last[i]);
-        size += fabs(last[i]);
-    }
-    return distance <= 4.0 * size;
+    (void)params;
+    const double b1 = x[2], b2 = x[3], b3 = x[4];
+    out[0] = b3 + (b1 + b2);
 }
 
-/* The guess for the next value (y), from earlier ones; 0 if there is none. */
-static int toda3_predict(const toda3_memory *memory, double value[5])
+/* pi(x) grad H(x) */
+void toda3_vector_field(const toda3_params *params, const double x[5], double out[5])
 {
-    const int last = memory->count - 1;
-    double odd[5] = { 0.0 }, binomial = -1.0;
-    memset(value, 0, 5 * sizeof value[0]);
-    if (memory->fitting) {
-        for (int k = 0; k < memory->terms; k += 2)
-            for (int i = 0; i < 5; ++i) {
-                value[i] += memory->weight[k][i][0] * memory->past[last - k][i];
-                odd[i] += memory->weight[k + 1][i][0] * memory->past[last - 1 - k][i];
-            }
-        for (int i = 0; i < 5; ++i) value[i] += odd[i];
-    } else {
-        for (int k = 0; k < memory->order && k <= last; ++k) {
-            binomial *= -(double)(memory->order - k) / (k + 1);
-            for (int i = 0; i < 5; ++i) value[i] += binomial * memory->past[last - k][i];
-        }
-    }
-    return last >= 0 && toda3_near(value, memory->past[last]);
+    (void)params;
+    const double a1 = x[0], a2 = x[1], b1 = x[2], b2 = x[3], b3 = x[4];
+    const double t1 = 2.0 * (a1 * a1), t2 = a2 * a2;
+    out[0] = a1 * b2 - a1 * b1;
+    out[1] = a2 * b3 - a2 * b2;
+    out[2] = t1;
+    out[3] = 2.0 * t2 - t1;
+    out[4] = (-2.0) * t2;
 }
 
-/* Choose the guess that would have been best for a value that took several iterations. */
-static void toda3_judge(toda3_memory *memory, const double value[5])
+/* ---- Compensated sums, linear equations ---- */
+/* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to
+   its last bit: were it rounded with the change, corrections of one sign would add up to a drift. 0, and x as
+   before, if the sum is not finite. */
+static int toda3_advance(toda3_solver *s, const double change[toda3_DIM], const double correction[toda3_DIM])
 {
-    double row[8 + 1][5], guess[5], least = HUGE_VAL, fitted = HUGE_VAL;
-    const int rows = memory->count < 8 ? memory->count : 8;
-    memcpy(row[0], value, sizeof row[0]);
-    for (int k = 0; k < rows; ++k) memcpy(row[k + 1], memory->past[memory->count - 1 - k], sizeof row[0]);
-    for (int order = 1; order <= rows; ++order) { /* row[0] becomes the backward difference of this order */
-        double size = 0.0;
-        for (int k = 0; k <= rows - order; ++k)
-            for (int i = 0; i < 5; ++i) row[k][i] -= row[k + 1][i];
-        for (int i = 0; i < 5; ++i) size += fabs(row[0][i]);
-        if (size < least) {
-            least = size;
-            memory->order = order;
-        }
-    }
-    memory->fitting = memory->terms > 0;
-    if (memory->fitting && toda3_predict(memory, guess)) {
-        fitted = 0.0;
-        for (int i = 0; i < 5; ++i) fitted += fabs(value[i] - guess[i]);
-    }
-    memory->fitting = memory->terms > 0 && fitted <= least;
-    if (memory->order == 0) memory->order = 1;
-}
-
-/* Make eight columns orthogonal to one, by the multiples of it that are put into r. Where that one is among the eight, those
-   up to it stay as they are, and inverse becomes one over its squared length. The number of rows is even. */
-static void toda3_project(int rows, double (*one)[8], int column, double *inverse, double (*eight)[8], double r[8])
-{
-    double even[8] = { 0.0 }, odd[8] = { 0.0 };
-    for (int i = 0; i < rows; i += 2) {
-        const double entry = one[i][column], next = one[i + 1][column];
-        for (int l = 0; l < 8; ++l) even[l] += entry * eight[i][l];
-        for (int l = 0; l < 8; ++l) odd[l] += next * eight[i + 1][l];
-    }
-    for (int l = 0; l < 8; ++l) even[l] += odd[l];
-    if (one == eight) {
-        *inverse = even[column] > 0.0 ? 1.0 / even[column] : 0.0;
-        memset(even, 0, ((size_t)column + 1) * sizeof even[0]);
-    }
-    for (int l = 0; l < 8; ++l) r[l] = even[l] *= *inverse;
-    for (int i = 0; i < rows; ++i) {
-        const double entry = one[i][column];
-        for (int l = 0; l < 8; ++l) eight[i][l] -= entry * even[l];
-    }
-}
-
-/* By how much recurrences miss the last of these values. */
-static double toda3_missed(const double *value, double (*weight)[8])
-{
-    enum { AHEAD = 8, WINDOW = 40, CHECKS = 8 };
-    double most = 0.0;
-    for (int i = 0; i < CHECKS; ++i) {
-        double guess[8] = { 0.0 };
-        for (int k = 0; k < WINDOW; ++k)
-            for (int l = 0; l < 8; ++l) guess[l] += weight[k][l] * value[i + WINDOW - 1 - k];
-        for (int l = 0; l < AHEAD; ++l) most = fmax(most, fabs(guess[l] - value[i + WINDOW + l]));
-    }
-    return most;
-}
-
-/* Fit the recurrences value[m + l] = sum of weight[k][..][l] * value[m - 1 - k], l = 0 ... 8 - 1, to the history of
-   a component: ridge least squares by modified Gram-Schmidt, the ridge at the level of rounding. Columns are taken in by
-   eights, until they leave next to nothing of the right-hand sides. How many past values are used; 0 if the recurrences do
-   not foresee the last values, which they were not fitted to. */
-static int toda3_train(toda3_memory *memory, int component)
-{
-    enum { AHEAD = 8, WINDOW = 40, ROWS = 56 };
-    double q[WINDOW / 8][ROWS + WINDOW][8], r[WINDOW / 8][WINDOW][8], inverse[WINDOW]; /* eight columns in each part */
-    double right[ROWS + WINDOW][8], weight[WINDOW][8], value[111], largest = 0.0, left = HUGE_VAL;
-    int terms = 0;
-    memset(q, 0, sizeof q);
-    memset(right, 0, sizeof right);
-    memset(weight, 0, sizeof weight);
-    for (int i = 0; i < 111; ++i) {
-        value[i] = memory->past[memory->count - 111 + i][component];
-        if (fabs(value[i]) > largest) largest = fabs(value[i]);
-    }
-    for (int i = 0; i < ROWS; ++i)
-        for (int l = 0; l < AHEAD; ++l) right[i][l] = value[i + WINDOW + l];
-    while (terms < WINDOW && left > 3e-12 * largest) {
-        const int part = terms / 8, rows = ROWS + terms + 8; /* further rows of the ridge are zero in these columns */
-        for (int i = 0; i < ROWS; ++i)
-            for (int l = 0; l < 8; ++l) q[part][i][l] = value[i + WINDOW - 1 - terms - l];
-        for (int l = 0; l < 8; ++l) q[part][ROWS + terms + l][l] = 1e-15 * largest;
-        for (int k = 0; k < terms; ++k) toda3_project(rows, q[k / 8], k % 8, &inverse[k], q[part], r[part][k]);
-        for (int l = 0; l < 8; ++l, ++terms) {
-            toda3_project(rows, q[part], l, &inverse[terms], q[part], r[part][terms]);
-            toda3_project(rows, q[part], l, &inverse[terms], right, weight[terms]);
-        }
-        double sum[8] = { 0.0 };
-        for (int i = 0; i < ROWS; ++i)
-            for (int l = 0; l < 8; ++l) sum[l] += fabs(right[i][l]);
-        left = 0.0;
-        for (int l = 0; l < 8; ++l) left += sum[l] / ROWS;
-    }
-    for (int k = terms - 1; k >= 0; --k)
-        for (int j = k + 1; j < terms; ++j)
-            for (int l = 0; l < 8; ++l) weight[k][l] -= r[j / 8][k][j % 8] * weight[j][l];
-    for (int k = 0; k < WINDOW; ++k) memcpy(memory->weight[k][component], weight[k], AHEAD * sizeof(double));
-    return toda3_missed(value + ROWS, weight) <= 1e-07 * largest ? terms : 0;
-}
-
-/* Drop what is old, if so many values would not fit into the history. */
-static void toda3_make_room(toda3_memory *memory, int values)
-{
-    if (memory->count + values <= 222) return;
-    memmove(memory->past, memory->past + memory->count - 111, 111 * sizeof memory->past[0]);
-    memory->count = 111;
-}
-
-/* Add a value to the history. */
-static void toda3_record(toda3_memory *memory, const double value[5])
-{
-    toda3_make_room(memory, 1);
-    memcpy(memory->past[memory->count++], value, 5 * sizeof value[0]);
-}
-
-/* Fit the recurrence to the last values; with every time, wait longer before it is done again. */
-static void toda3_fit(toda3_memory *memory)
-{
-    int found = 1;
-    memory->terms = 0;
-    for (int i = 0; i < 5 && found; ++i) {
-        const int terms = toda3_train(memory, i);
-        found = terms > 0;
-        if (terms > memory->terms) memory->terms = terms;
-    }
-    if (!found) memory->terms = 0;
-    memory->fitting = found;
-    ++memory->fits;
-    memory->slow = 0;
-    memory->patience = memory->patience < 10000 ? 2 * memory->patience + 150 : 20000;
-}
-
-/* Take in the solved value: what took one iteration needs no better guess. */
-static void toda3_remember(toda3_memory *memory, const double value[5], int iterations)
-{
-    if (iterations > 1) toda3_judge(memory, value);
-    toda3_record(memory, value);
-    memory->slow = iterations > 1 ? memory->slow + 1 : 0;
-    if (memory->slow > memory->patience && memory->count >= 111) toda3_fit(memory);
-}
-
-/* Whether an increment is that of the motion. Where the step is too large, the equation may have been solved by a point far
-   away, at another energy, that has nothing to do with it. */
-static int toda3_plausible(const toda3_solver *s, int stage, const double increment[5])
-{
-    double moved = 0.0, size = 0.0, field[5], middle[5], end[5];
-    for (int i = 0; i < 5; ++i) {
-        moved += fabs(increment[i]);
-        size += fabs(s->x[i]);
-    }
-    if (moved <= 1.5 * size) return 1;
-    toda3_vector_field(&s->params, s->x, field);
-    for (int i = 0; i < 5; ++i) {
-        size += fabs(toda3_fractions[stage] * s->h * field[i]);
-        middle[i] = s->x[i] + 0.5 * increment[i];
-        end[i] = s->x[i] + increment[i];
-    }
-    if (moved <= 1.5 * size) return 1;
-    const double before = toda3_hamiltonian(&s->params, s->x), after = toda3_hamiltonian(&s->params, end);
-    const double scale = fabs(before) + fabs(toda3_hamiltonian(&s->params, middle)) + fabs(after);
-    return fabs(after - before) <= 0.5 * scale;
-}
-
-/* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to its last
-   bit: were it rounded with the change, corrections of one sign would add up to a drift. 0, and x as before, if the
-   sum is not finite. */
-static int toda3_advance(toda3_solver *s, const double change[5], const double correction[5])
-{
-    double x[5], carry[5];
-    for (int i = 0; i < 5; ++i) {
+    double x[toda3_DIM], carry[toda3_DIM];
+    for (int i = 0; i < toda3_DIM; ++i) {
         const double sum = s->x[i] + change[i], added = sum - s->x[i];
         const double lost = (s->x[i] - (sum - added)) + (change[i] - added);
         const double small = lost + (s->carry[i] + correction[i]);
@@ -562,87 +257,169 @@ static int toda3_advance(toda3_solver *s, const double change[5], const double c
     return 1;
 }
 
-/* Size of a correction relative to each component of y, but no finer than 1e-6 of the largest; NaN or infinite if
-   the correction is. */
-static double toda3_size(const double y[5], const double delta[5])
+/* Solve matrix * solution = side, both overwritten, by elimination with partial pivoting. 0 if singular. */
+static int toda3_solve(double matrix[toda3_DIM * toda3_DIM], double side[toda3_DIM])
+{
+    for (int k = 0; k < toda3_DIM; ++k) {
+        int best = k;
+        for (int i = k + 1; i < toda3_DIM; ++i)
+            if (fabs(matrix[i * toda3_DIM + k]) > fabs(matrix[best * toda3_DIM + k])) best = i;
+        const double pivot = matrix[best * toda3_DIM + k], last = side[k];
+        if (!(fabs(pivot) > 0.0)) return 0;
+        for (int j = k; j < toda3_DIM && best != k; ++j) {
+            const double swap = matrix[k * toda3_DIM + j];
+            matrix[k * toda3_DIM + j] = matrix[best * toda3_DIM + j];
+            matrix[best * toda3_DIM + j] = swap;
+        }
+        side[k] = side[best];
+        side[best] = last;
+        for (int i = k + 1; i < toda3_DIM; ++i) {
+            const double factor = matrix[i * toda3_DIM + k] / pivot;
+            for (int j = k + 1; j < toda3_DIM; ++j)
+                matrix[i * toda3_DIM + j] -= factor * matrix[k * toda3_DIM + j];
+            side[i] -= factor * side[k];
+        }
+    }
+    for (int i = toda3_DIM - 1; i >= 0; --i) {
+        for (int j = i + 1; j < toda3_DIM; ++j) side[i] -= matrix[i * toda3_DIM + j] * side[j];
+        side[i] /= matrix[i * toda3_DIM + i];
+    }
+    return 1;
+}
+
+/* ---- Starting guesses ---- */
+/* How far from the last value a guess may be, in sizes of that value. */
+#define toda3_REACH 4.0
+
+/* The guess for the next value from the last ones: the sum of their backward differences. 0 if there is none,
+   or if it is far away, where the equation of a step has solutions that have nothing to do with the motion.
+   */
+static int toda3_predict(const toda3_history *history, double value[toda3_DIM])
+{
+    double distance = 0.0, size = 0.0;
+    for (int i = 0; i < toda3_DIM; ++i) {
+        value[i] = 0.0;
+        for (int k = 0; k < history->order; ++k) value[i] += history->difference[k][i];
+        distance += fabs(value[i] - history->difference[0][i]);
+        size += fabs(history->difference[0][i]);
+    }
+    return history->order > 0 && distance <= toda3_REACH * size;
+}
+
+/* Take in the solved value. The guess of order k missed it by its k-th difference: the next is of the best
+   order. */
+static void toda3_remember(toda3_history *history, const double value[toda3_DIM])
+{
+    double least = HUGE_VAL, next[toda3_DIM];
+    memcpy(next, value, sizeof next);
+    for (int k = 0; k <= history->count && k < toda3_DIFFERENCES; ++k) {
+        double size = 0.0;
+        for (int i = 0; i < toda3_DIM; ++i) {
+            const double last = history->difference[k][i];
+            history->difference[k][i] = next[i];
+            size += fabs(next[i]);
+            next[i] -= last;
+        }
+        if (k > 0 && size < least) {
+            least = size;
+            history->order = k;
+        }
+    }
+    if (history->count == 0) history->order = 1;
+    if (history->count < toda3_DIFFERENCES) ++history->count;
+}
+
+/* How far a step may lead, in sizes of the state and of what the vector field says, if the energy is lost;
+   and the part of the energy that counts as lost. */
+#define toda3_PLAUSIBLE 1.5
+#define toda3_LOST 0.5
+
+/* Whether an increment is that of the motion. Where the step is too large, the equation may have been solved
+   by a point far away, at another energy, that has nothing to do with it. */
+static int toda3_plausible(const toda3_solver *s, const double increment[toda3_DIM])
+{
+    double moved = 0.0, size = 0.0, field[toda3_DIM], middle[toda3_DIM], end[toda3_DIM];
+    for (int i = 0; i < toda3_DIM; ++i) {
+        moved += fabs(increment[i]);
+        size += fabs(s->x[i]);
+    }
+    if (moved <= toda3_PLAUSIBLE * size) return 1;
+    toda3_vector_field(&s->params, s->x, field);
+    for (int i = 0; i < toda3_DIM; ++i) {
+        size += fabs(s->h * field[i]);
+        middle[i] = s->x[i] + 0.5 * increment[i];
+        end[i] = s->x[i] + increment[i];
+    }
+    if (moved <= toda3_PLAUSIBLE * size) return 1;
+    const double before = toda3_hamiltonian(&s->params, s->x), after = toda3_hamiltonian(&s->params, end);
+    const double scale = fabs(before) + fabs(toda3_hamiltonian(&s->params, middle)) + fabs(after);
+    return fabs(after - before) <= toda3_LOST * scale;
+}
+
+/* ---- The implicit step, by Newton's method ---- */
+/* Components of y are measured no finer than by this part of the largest. */
+#define toda3_FLOOR 1e-6
+
+/* Size of a correction relative to each component of y; NaN or infinite if the correction is. */
+static double toda3_size(const double y[toda3_DIM], const double delta[toda3_DIM])
 {
     double norm = 0.0, size = 0.0;
-    for (int i = 0; i < 5; ++i) norm = fabs(y[i]) > norm ? fabs(y[i]) : norm;
-    for (int i = 0; i < 5; ++i) {
-        const double ratio = fabs(delta[i]) / (fabs(y[i]) + 1e-6 * norm + DBL_MIN);
+    for (int i = 0; i < toda3_DIM; ++i) norm = fabs(y[i]) > norm ? fabs(y[i]) : norm;
+    for (int i = 0; i < toda3_DIM; ++i) {
+        const double ratio = fabs(delta[i]) / (fabs(y[i]) + toda3_FLOOR * norm + DBL_MIN);
         if (!isfinite(ratio)) return ratio;
         size = ratio > size ? ratio : size;
     }
     return size;
 }
 
+/* Corrections below the first that shrink by less than the second have reached the level of rounding. */
+#define toda3_NEARLY_SOLVED 1e-8
+#define toda3_SHRINKING 0.25
+
 /* Solve (y - x) + displacement(y) = 0 for y by Newton's method from the extrapolated guess, and advance. The
-   increment is corrected to first order by the last Newton correction, so that correction costs no evaluation:
-   a correction is accepted when the error that remains after it, quadratic in it, is below 1e-20. */
-static toda3_status toda3_attempt(toda3_solver *s, int stage)
+   increment is corrected to first order by the last Newton correction, so that correction costs no
+   evaluation: a correction is accepted when the error that remains after it, quadratic in it, is below
+   toda3_TOLERANCE. */
+static toda3_status toda3_attempt(toda3_solver *s)
 {
-    const double *coef = s->coef[stage];
-    toda3_memory *memory = &s->memory[stage];
-    double y[5], delta[5], displacement[5], increment[5];
-    double jacobian[25], increment_jacobian[25];
-    if (!toda3_predict(memory, y)) memcpy(y, s->x, sizeof y);
-    double previous = HUGE_VAL;
-    for (int iteration = 0; iteration < 20; ++iteration) {
-        toda3_linearise(coef, y, displacement, increment, jacobian, increment_jacobian);
+    double y[toda3_DIM], delta[toda3_DIM], displacement[toda3_DIM], increment[toda3_DIM];
+    double jacobian[toda3_DIM * toda3_DIM], increment_jacobian[toda3_DIM * toda3_DIM], previous = HUGE_VAL;
+    if (!toda3_predict(&s->history, y)) memcpy(y, s->x, sizeof y);
+    for (int iteration = 1; iteration <= toda3_MAX_ITERATIONS; ++iteration) {
+        toda3_linearise(s->coef, y, displacement, increment, jacobian, increment_jacobian);
         ++s->evaluations;
-        for (int i = 0; i < 5; ++i) delta[i] = ((y[i] - s->x[i]) + displacement[i]) - s->carry[i];
+        for (int i = 0; i < toda3_DIM; ++i) delta[i] = ((y[i] - s->x[i]) + displacement[i]) - s->carry[i];
         const int regular = toda3_solve(jacobian, delta);
-        const double size = toda3_size(y, delta);
+        const double size = toda3_size(y, delta), growth = size / (previous * previous);
         if (!isfinite(size)) return toda3_NOT_FINITE;
         if (!regular) return toda3_SINGULAR;
-        for (int i = 0; i < 5; ++i) y[i] -= delta[i];
-        const double growth = size / (previous * previous);
+        for (int i = 0; i < toda3_DIM; ++i) y[i] -= delta[i];
         const double remaining = size * size * (growth > 1.0 ? growth : 1.0);
-        /* The second test: corrections no longer shrink, the solve has reached the level of rounding. */
-        if (remaining <= 1e-20 || (previous < 1e-8 && size > 0.25 * previous)) {
-            double correction[5] = { 0.0 };
-            for (int i = 0; i < 5; ++i)
-                for (int j = 0; j < 5; ++j) correction[i] -= increment_jacobian[i * 5 + j] * delta[j];
-            if (!toda3_plausible(s, stage, increment)) return toda3_NO_CONVERGENCE;
-            if (!toda3_advance(s, increment, correction)) return toda3_NOT_FINITE;
-            toda3_remember(memory, y, iteration + 1);
-            return toda3_OK;
-        }
+        const int stalled = previous < toda3_NEARLY_SOLVED && size > toda3_SHRINKING * previous;
         previous = size;
+        if (!(remaining <= toda3_TOLERANCE || stalled)) continue;
+        double correction[toda3_DIM] = { 0.0 };
+        for (int i = 0; i < toda3_DIM; ++i)
+            for (int j = 0; j < toda3_DIM; ++j)
+                correction[i] -= increment_jacobian[i * toda3_DIM + j] * delta[j];
+        if (!toda3_plausible(s, increment)) return toda3_NO_CONVERGENCE;
+        if (!toda3_advance(s, increment, correction)) return toda3_NOT_FINITE;
+        toda3_remember(&s->history, y);
+        return toda3_OK;
     }
     return toda3_NO_CONVERGENCE;
 }
 
-/* The 1 stages of one step. If one fails, the state is as before the step. */
-static toda3_status toda3_stages(toda3_solver *s)
-{
-    double x[5], carry[5];
-    memcpy(x, s->x, sizeof x);
-    memcpy(carry, s->carry, sizeof carry);
-    for (int stage = 0; stage < 1; ++stage) {
-        toda3_status status = toda3_attempt(s, stage);
-        /* A guess from earlier steps may have misled it: once more without. */
-        if (status != toda3_OK && s->memory[stage].count > 0) {
-            memset(&s->memory[stage], 0, sizeof s->memory[stage]);
-            status = toda3_attempt(s, stage);
-        }
-        if (status != toda3_OK) {
-            memcpy(s->x, x, sizeof x);
-            memcpy(s->carry, carry, sizeof carry);
-            return status;
-        }
-    }
-    return toda3_OK;
-}
-
-/* All of toda3_init but the gauge. The arguments may be parts of *s: they are read before it is written. */
-static toda3_status toda3_start(toda3_solver *s, const toda3_params *params, const double x0[5])
+/* ---- The solver ---- */
+/* The arguments may be parts of *s: they are read before it is written. */
+toda3_status toda3_init(toda3_solver *s, const toda3_params *params, const double x0[toda3_DIM])
 {
     if (s == NULL || x0 == NULL) return toda3_BAD_ARGUMENT;
     const toda3_params own = params != NULL ? *params : toda3_default_params;
-    double x[5];
+    double x[toda3_DIM];
     memcpy(x, x0, sizeof x);
-    for (int i = 0; i < 5; ++i)
+    for (int i = 0; i < toda3_DIM; ++i)
         if (!isfinite(x[i])) return toda3_BAD_ARGUMENT;
     memset(s, 0, sizeof *s);
     memcpy(s->x, x, sizeof s->x);
@@ -650,1125 +427,83 @@ static toda3_status toda3_start(toda3_solver *s, const toda3_params *params, con
     return toda3_OK;
 }
 
-toda3_status toda3_init(toda3_solver *s, const toda3_params *params, const double x0[5])
-{
-    return toda3_start(s, params, x0);
-}
-
 /* What depends on the step size; nothing where that is as before. */
 static toda3_status toda3_set_step(toda3_solver *s, double h)
 {
     if (s == NULL || !isfinite(h)) return toda3_BAD_ARGUMENT;
-    if (s->ready && memcmp(&h, &s->h, sizeof h) == 0) return toda3_OK;
-    for (int stage = 0; stage < 1; ++stage)
-        toda3_prepare(&s->params, toda3_fractions[stage] * h, s->coef[stage]);
-    memset(s->memory, 0, sizeof s->memory);
-    for (int stage = 0; stage < 1; ++stage) s->memory[stage].patience = 150;
-    s->pause = 16;
-    s->setback = s->foreseeing = 0;
-    s->doubt = s->retry = 0;
-    s->effort = 0.0;
-    s->passes = INT_MAX;
+    if (s->prepared && memcmp(&h, &s->h, sizeof h) == 0) return toda3_OK;
+    toda3_prepare(&s->params, h, s->coef);
+    memset(&s->history, 0, sizeof s->history);
     s->h = h;
-    s->ready = 1;
+    s->t_before_h = s->t;
+    s->steps_before_h = s->steps;
+    s->prepared = 1;
     return toda3_OK;
+}
+
+/* One stage. A guess from earlier steps may have misled it: then once more without. */
+static toda3_status toda3_stage(toda3_solver *s)
+{
+    toda3_status status = toda3_attempt(s);
+    if (status != toda3_OK && s->history.count > 0) {
+        memset(&s->history, 0, sizeof s->history);
+        status = toda3_attempt(s);
+    }
+    return status;
 }
 
 toda3_status toda3_step(toda3_solver *s, double h)
 {
     toda3_status status = toda3_set_step(s, h);
     if (status != toda3_OK) return status;
-    status = toda3_stages(s);
-    if (status == toda3_OK) ++s->steps;
+    status = toda3_stage(s);
+    if (status != toda3_OK) return status;
+    ++s->steps;
+    s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
     return status;
 }
 
-/*
- * Eight at a time: below, the formulas of a step are evaluated for 8 steps of a trajectory, or members of an
- * ensemble, at once. Compilers make vector instructions of the loops over lanes.
- */
-enum { toda3_LANES = 8 };
-
-#if defined(__GNUC__)
-typedef double toda3_lanes[toda3_LANES] __attribute__((aligned(64))); /* a value in each lane */
-#else
-typedef double toda3_lanes[toda3_LANES];
-#endif
-
-#if defined(__clang__)
-#define toda3_EACH_LANE _Pragma("clang loop vectorize(assume_safety)")
-#pragma clang diagnostic push
-#pragma clang diagnostic ignored "-Wpass-failed"
-#elif defined(__GNUC__)
-#define toda3_EACH_LANE _Pragma("GCC ivdep") _Pragma("GCC unroll 1")
-#else
-#define toda3_EACH_LANE
-#endif
-
-/* What all blocks share: coefficients, the same in each lane, and the recurrences by which they are foreseen. */
-typedef struct {
-    int fits[1]; /* the fit that weight is of; -1 for none */
-    toda3_lanes coef[1][10], weight[1][40][5];
-} toda3_table;
-
-/* A stage in all lanes, linearised around y. */
-typedef struct {
-    toda3_lanes y[5], displacement[5], increment[5], residual[5];
-    /* a residual r of alpha(y) = x takes inverse r from y, and gain r from the increment */
-    toda3_lanes inverse[25], slope[25], gain[25];
-} toda3_model;
-
-/* toda3_phi0 for the loops over lanes: no branches. No number beyond |s| = 4.0. */
-static inline double toda3_phi0_lane(double s)
-{
-    const double ss = s * s;
-    double sum = 1.455172475614865e-27, other = 5.744790668872202e-26; /* every second term each, as neither then is waited for */
-    sum = sum * ss + 2.267952452337683e-24;
-    other = other * ss + 8.953517427037546e-23;
-    sum = sum * ss + 3.534707039629467e-21;
-    other = other * ss + 1.3954464685812522e-19;
-    sum = sum * ss + 5.5090028283602295e-18;
-    other = other * ss + 2.174868698558062e-16;
-    sum = sum * ss + 8.586062056277845e-15;
-    other = other * ss + 3.3896802963225827e-13;
-    sum = sum * ss + 1.3382536530684679e-11;
-    other = other * ss + 5.284190138687493e-10;
-    sum = sum * ss + 2.08767569878681e-08;
-    other = other * ss + 8.267195767195768e-07;
-    sum = sum * ss + 3.306878306878307e-05;
-    other = other * ss + 0.001388888888888889;
-    sum = (sum * s + other) * s + 0.08333333333333333;
-    return sum + (fabs(s) <= 4.0 ? 0.0 : (double)NAN);
-}
-
-/* toda3_phi1 for the loops over lanes: no branches. No number beyond |s| = 4.0. */
-static inline double toda3_phi1_lane(double s)
-{
-    const double ss = s * s;
-    double sum = 6.266191399131027e-28, other = 2.328275960983784e-26; /* every second term each, as neither then is waited for */
-    sum = sum * ss + 8.617186003308303e-25;
-    other = other * ss + 3.1751334332727565e-23;
-    sum = sum * ss + 1.163957265514881e-21;
-    other = other * ss + 4.241648447555361e-20;
-    sum = sum * ss + 1.5349911154393775e-18;
-    other = other * ss + 5.5090028283602297e-17;
-    sum = sum * ss + 1.9573818287022555e-15;
-    other = other * ss + 6.868849645022276e-14;
-    sum = sum * ss + 2.372776207425808e-12;
-    other = other * ss + 8.029521918410807e-11;
-    sum = sum * ss + 2.6420950693437467e-09;
-    other = other * ss + 8.35070279514724e-08;
-    sum = sum * ss + 2.48015873015873e-06;
-    other = other * ss + 6.613756613756614e-05;
-    sum = (sum * s + other) * s + 0.001388888888888889;
-    return sum + (fabs(s) <= 4.0 ? 0.0 : (double)NAN);
-}
-
-/* toda3_linearise in all lanes. */
-static void toda3_linearise_lanes(toda3_lanes coef[restrict 10], toda3_lanes y[restrict 5],
-                                  toda3_lanes displacement[restrict 5], toda3_lanes increment[restrict 5],
-                                  toda3_lanes jacobian[restrict 25],
-                                  toda3_lanes increment_jacobian[restrict 25])
-{
-    toda3_EACH_LANE
-    for (int lane = 0; lane < toda3_LANES; ++lane) {
-        const double a1 = y[0][lane];
-        const double a2 = y[1][lane];
-        const double b1 = y[2][lane];
-        const double b2 = y[3][lane];
-        const double b3 = y[4][lane];
-        const double t1 = a2 * a2;
-        const double t2 = b2 * coef[6][lane];
-        const double p_b3 = b3 * coef[5][lane] + t1 * (t2 + b3 * coef[1][lane]);
-        const double t3 = a1 * a1;
-        const double t4 = coef[1][lane] * t1;
-        const double t5 = coef[5][lane] + coef[1][lane] * t3;
-        const double t6 = t4 + t5;
-        const double p_b2 = coef[6][lane] * (b1 * t3) + coef[6][lane] * (b3 * t1) + b2 * t6;
-        const double t7 = p_b3 - p_b2;
-        const double t8 = t7 + (p_b2 - p_b3);
-        const double t9 = t8 * (a1 * t8);
-        const double t10 = 2.0 * p_b3;
-        const double t11 = t10 - p_b2;
-        const double t12 = p_b2 * t11 - p_b3 * p_b3;
-        const double t13 = toda3_phi0_lane(t12);
-        const double t14 = b1 * coef[1][lane];
-        const double p_b1 = b1 * coef[5][lane] + t3 * (t2 + t14);
-        const double t15 = p_b2 - p_b1;
-        const double t16 = a1 * t15;
-        const double t17 = t15 * t16;
-        const double t18 = 2.0 * p_b2;
-        const double t19 = t18 - p_b1;
-        const double t20 = p_b1 * t19 - p_b2 * p_b2;
-        const double t21 = toda3_phi0_lane(t20);
-        const double t22 = a1 * p_b2 - a1 * p_b1;
-        const double t23 = a2 * t7;
-        const double t24 = t7 * t23;
-        const double t25 = a2 * p_b3 - a2 * p_b2;
-        const double t26 = b2 * coef[2][lane];
-        const double t27 = b1 * (t14 + t26);
-        const double t28 = coef[3][lane] * t1 + coef[1][lane] * (b2 * b2);
-        const double p_a1 = a1 * (t27 + (coef[0][lane] + coef[4][lane] * t3 + t28));
-        const double t29 = p_a1 * t16;
-        const double t30 = t29 * t21;
-        const double t31 = a1 * p_a1;
-        const double t32 = b3 * coef[2][lane];
-        const double t33 = b2 * (b2 * coef[1][lane] + t32);
-        const double t34 = coef[0][lane] + coef[3][lane] * t3;
-        const double t35 = coef[1][lane] * (b3 * b3);
-        const double p_a2 = a2 * (t33 + (t34 + (coef[4][lane] * t1 + t35)));
-        const double t36 = p_a2 * t23;
-        const double t37 = t36 * t13;
-        const double t38 = a2 * p_a2;
-        const double t39 = t38 - t31;
-        const double t40 = a1 * (t26 + b1 * coef[9][lane]);
-        const double t41 = 0.5 * a1;
-        const double t42 = toda3_phi1_lane(t20);
-        const double t43 = (t19 - p_b1) * t42;
-        const double t44 = (t16 + t16) * t21;
-        const double t45 = t41 + (t17 * t43 - t44);
-        const double t46 = b2 * coef[9][lane];
-        const double t47 = a1 * (t46 + b1 * coef[2][lane]);
-        const double t48 = toda3_phi1_lane(t12);
-        const double t49 = (t11 - p_b2) * t48;
-        const double t50 = (2.0 * p_b1 - t18) * t42;
-        const double t51 = t9 * t49 + (t44 + t17 * t50) - t41;
-        const double t52 = a2 * (t26 + b3 * coef[9][lane]);
-        const double t53 = (t18 - t10) * t48;
-        const double t54 = t9 * t53;
-        const double t55 = a2 * (t46 + t32);
-        const double t56 = coef[6][lane] * t3;
-        const double t57 = coef[6][lane] * t1;
-        const double t58 = coef[5][lane] + t4;
-        const double t59 = 0.5 * a2;
-        const double t60 = (t23 + t23) * t13;
-        const double t61 = t59 + (t24 * t49 - t60);
-        const double t62 = t60 + t24 * t53 - t59;
-        const double t63 = p_a1 * t15 * t21;
-        const double t64 = 0.5 * p_a1;
-        const double t65 = t27 + (coef[0][lane] + coef[7][lane] * t3 + t28);
-        const double t66 = t16 * t21;
-        const double t67 = t66 - t41;
-        const double t68 = t31 * t21;
-        const double t69 = t68 + t29 * t50;
-        const double t70 = t29 * t43;
-        const double t71 = t70 - t68;
-        const double t72 = coef[8][lane] * (a1 * a2);
-        const double t73 = t23 * t13;
-        const double t74 = t73 - t59;
-        const double t75 = t41 - t66;
-        const double t76 = t68 - t70;
-        const double t77 = t36 * t49;
-        const double t78 = t38 * t13;
-        const double t79 = t77 - t78 - t69;
-        const double t80 = p_a2 * t7 * t13;
-        const double t81 = 0.5 * p_a2;
-        const double t82 = t78 + t36 * t53;
-        const double t83 = t52 * t82;
-        const double t84 = t33 + (coef[7][lane] * t1 + t35 + t34);
-        const double t85 = t57 * t82;
-        const double t86 = t58 * t82;
-        const double t87 = t59 - t73;
-        const double t88 = t78 - t77;
-        const double t89 = a1 * t47;
-        const double t90 = a1 * t40;
-        const double t91 = a1 * t56;
-        const double t92 = a2 * t52;
-        const double t93 = a2 * t55;
-        const double t94 = a2 * t57;
-        const double t95 = a1 * t65;
-        const double t96 = a1 * t72;
-        const double t97 = a2 * t72;
-        const double t98 = a2 * t84;
-        displacement[0][lane] = t9 * t13 + t17 * t21 - 0.5 * t22;
-        displacement[1][lane] = t24 * t13 - 0.5 * t25;
-        displacement[2][lane] = t30 - 0.5 * t31;
-        displacement[3][lane] = t37 - t30 - 0.5 * t39;
-        displacement[4][lane] = 0.5 * t38 - t37;
-        increment[0][lane] = t22;
-        increment[1][lane] = t25;
-        increment[2][lane] = t31;
-        increment[3][lane] = t39;
-        increment[4][lane] = -t38;
-        jacobian[0][lane] = 1.0 + (t8 * t8 * t13 + t15 * t15 * t21 - 0.5 * t15 + (t40 * t45 + t47 * t51));
-        jacobian[1][lane] = t52 * t54 + t55 * t51;
-        jacobian[2][lane] = t5 * t45 + t56 * t51;
-        jacobian[3][lane] = t57 * t54 + (t56 * t45 + t6 * t51);
-        jacobian[4][lane] = t58 * t54 + t57 * t51;
-        jacobian[5][lane] = t47 * t61;
-        jacobian[6][lane] = 1.0 + (t7 * t7 * t13 - 0.5 * t7 + (t55 * t61 + t52 * t62));
-        jacobian[7][lane] = t56 * t61;
-        jacobian[8][lane] = t6 * t61 + t57 * t62;
-        jacobian[9][lane] = t57 * t61 + t58 * t62;
-        jacobian[10][lane] = t63 - t64 + (t65 * t67 + (t47 * t69 + t40 * t71));
-        jacobian[11][lane] = t72 * t67 + t55 * t69;
-        jacobian[12][lane] = 1.0 + (t40 * t67 + (t5 * t71 + t56 * t69));
-        jacobian[13][lane] = t47 * t67 + (t6 * t69 + t56 * t71);
-        jacobian[14][lane] = t57 * t69;
-        jacobian[15][lane] = t64 - t63 + (t72 * t74 + t65 * t75 + (t40 * t76 + t47 * t79));
-        jacobian[16][lane] = t80 - t81 + (t83 + (t84 * t74 + t72 * t75 + t55 * t79));
-        jacobian[17][lane] = t40 * t75 + (t5 * t76 + t56 * t79);
-        jacobian[18][lane] = 1.0 + (t85 + (t55 * t74 + t47 * t75 + (t56 * t76 + t6 * t79)));
-        jacobian[19][lane] = t86 + (t52 * t74 + t57 * t79);
-        jacobian[20][lane] = t72 * t87 + t47 * t88;
-        jacobian[21][lane] = t81 - t80 + (t84 * t87 + t55 * t88 - t83);
-        jacobian[22][lane] = t56 * t88;
-        jacobian[23][lane] = t55 * t87 + t6 * t88 - t85;
-        jacobian[24][lane] = 1.0 + (t52 * t87 + t57 * t88 - t86);
-        increment_jacobian[0][lane] = t89 - t90 + t15;
-        increment_jacobian[1][lane] = a1 * t55;
-        increment_jacobian[2][lane] = t91 - a1 * t5;
-        increment_jacobian[3][lane] = a1 * t6 - t91;
-        increment_jacobian[4][lane] = a1 * t57;
-        increment_jacobian[5][lane] = -(a2 * t47);
-        increment_jacobian[6][lane] = t92 - t93 + t7;
-        increment_jacobian[7][lane] = -(a2 * t56);
-        increment_jacobian[8][lane] = t94 - a2 * t6;
-        increment_jacobian[9][lane] = a2 * t58 - t94;
-        increment_jacobian[10][lane] = t95 + p_a1;
-        increment_jacobian[11][lane] = t96;
-        increment_jacobian[12][lane] = t90;
-        increment_jacobian[13][lane] = t89;
-        increment_jacobian[14][lane] = 0.0;
-        increment_jacobian[15][lane] = t97 - t95 - p_a1;
-        increment_jacobian[16][lane] = p_a2 + (t98 - t96);
-        increment_jacobian[17][lane] = -t90;
-        increment_jacobian[18][lane] = t93 - t89;
-        increment_jacobian[19][lane] = t92;
-        increment_jacobian[20][lane] = -t97;
-        increment_jacobian[21][lane] = -(t98 + p_a2);
-        increment_jacobian[22][lane] = 0.0;
-        increment_jacobian[23][lane] = -t93;
-        increment_jacobian[24][lane] = -t92;
-    }
-}
-
-/* toda3_evaluate in all lanes. */
-static void toda3_evaluate_lanes(toda3_lanes coef[restrict 10], toda3_lanes y[restrict 5],
-                                 toda3_lanes displacement[restrict 5], toda3_lanes increment[restrict 5])
-{
-    toda3_EACH_LANE
-    for (int lane = 0; lane < toda3_LANES; ++lane) {
-        const double a1 = y[0][lane];
-        const double a2 = y[1][lane];
-        const double b1 = y[2][lane];
-        const double b2 = y[3][lane];
-        const double b3 = y[4][lane];
-        const double t1 = a2 * a2;
-        const double t2 = b2 * coef[6][lane];
-        const double p_b3 = b3 * coef[5][lane] + t1 * (t2 + b3 * coef[1][lane]);
-        const double t3 = a1 * a1;
-        const double p_b2 = coef[6][lane] * (b1 * t3) + coef[6][lane] * (b3 * t1) + b2 * (coef[1][lane] * t1 + (coef[5][lane] + coef[1][lane] * t3));
-        const double t4 = p_b3 - p_b2;
-        const double t5 = t4 + (p_b2 - p_b3);
-        const double t6 = toda3_phi0_lane(p_b2 * (2.0 * p_b3 - p_b2) - p_b3 * p_b3);
-        const double t7 = b1 * coef[1][lane];
-        const double p_b1 = b1 * coef[5][lane] + t3 * (t2 + t7);
-        const double t8 = p_b2 - p_b1;
-        const double t9 = a1 * t8;
-        const double t10 = toda3_phi0_lane(p_b1 * (2.0 * p_b2 - p_b1) - p_b2 * p_b2);
-        const double t11 = a1 * p_b2 - a1 * p_b1;
-        const double t12 = a2 * t4;
-        const double t13 = a2 * p_b3 - a2 * p_b2;
-        const double p_a1 = a1 * (b1 * (t7 + b2 * coef[2][lane]) + (coef[0][lane] + coef[4][lane] * t3 + (coef[3][lane] * t1 + coef[1][lane] * (b2 * b2))));
-        const double t14 = p_a1 * t9 * t10;
-        const double t15 = a1 * p_a1;
-        const double p_a2 = a2 * (b2 * (b2 * coef[1][lane] + b3 * coef[2][lane]) + (coef[0][lane] + coef[3][lane] * t3 + (coef[4][lane] * t1 + coef[1][lane] * (b3 * b3))));
-        const double t16 = p_a2 * t12 * t6;
-        const double t17 = a2 * p_a2;
-        const double t18 = t17 - t15;
-        displacement[0][lane] = t5 * (a1 * t5) * t6 + t8 * t9 * t10 - 0.5 * t11;
-        displacement[1][lane] = t4 * t12 * t6 - 0.5 * t13;
-        displacement[2][lane] = t14 - 0.5 * t15;
-        displacement[3][lane] = t16 - t14 - 0.5 * t18;
-        displacement[4][lane] = 0.5 * t17 - t16;
-        increment[0][lane] = t11;
-        increment[1][lane] = t13;
-        increment[2][lane] = t15;
-        increment[3][lane] = t18;
-        increment[4][lane] = -t17;
-    }
-}
-
-/* Invert the matrices of all lanes in place by elimination without pivoting: they are I + O(h). Infinite where a pivot is
-   far from 1. */
-static void toda3_invert(toda3_lanes matrix[restrict 25])
-{
-    for (int k = 0; k < 5; ++k) {
-        toda3_lanes factor[5];
-        toda3_EACH_LANE
-        for (int lane = 0; lane < toda3_LANES; ++lane) {
-            const double reciprocal = 1.0 / matrix[k * 5 + k][lane];
-            matrix[k * 5 + k][lane] = 1.0;
-            for (int j = 0; j < 5; ++j) matrix[k * 5 + j][lane] *= reciprocal;
-            matrix[k * 5 + k][lane] += fabs(reciprocal) < 1e3 ? 0.0 : HUGE_VAL;
-        }
-        for (int i = 0; i < 5; ++i) {
-            toda3_EACH_LANE
-            for (int lane = 0; lane < toda3_LANES; ++lane) {
-                factor[i][lane] = matrix[i * 5 + k][lane];
-                if (i != k) matrix[i * 5 + k][lane] = 0.0;
-            }
-        }
-        for (int i = 0; i < 5; ++i)
-            for (int j = 0; j < 5 && i != k; ++j) {
-                toda3_EACH_LANE
-                for (int lane = 0; lane < toda3_LANES; ++lane)
-                    matrix[i * 5 + j][lane] -= factor[i][lane] * matrix[k * 5 + j][lane];
-            }
-    }
-}
-
-/* Everything about a stage at the points y. */
-static void toda3_tabulate(toda3_lanes coef[restrict], toda3_model *model)
-{
-    toda3_linearise_lanes(coef, model->y, model->displacement, model->increment, model->inverse, model->slope);
-    toda3_invert(model->inverse);
-    for (int i = 0; i < 5; ++i)
-        for (int j = 0; j < 5; ++j) {
-            toda3_lanes sum = { 0.0 };
-            for (int k = 0; k < 5; ++k) {
-                toda3_EACH_LANE
-                for (int lane = 0; lane < toda3_LANES; ++lane)
-                    sum[lane] += model->slope[i * 5 + k][lane] * model->inverse[k * 5 + j][lane];
-            }
-            memcpy(model->gain[i * 5 + j], sum, sizeof sum);
-        }
-}
-
-/* toda3_size in all lanes, summed over the components. */
-static void toda3_sizes(toda3_lanes y[restrict 5], toda3_lanes delta[restrict 5],
-    toda3_lanes size)
-{
-    toda3_lanes norm = { 0.0 };
-    memset(size, 0, toda3_LANES * sizeof size[0]);
-    for (int i = 0; i < 5; ++i)
-        for (int lane = 0; lane < toda3_LANES; ++lane)
-            norm[lane] = 1e-6 * fabs(y[i][lane]) > norm[lane] ? 1e-6 * fabs(y[i][lane]) : norm[lane];
-    for (int i = 0; i < 5; ++i) {
-        toda3_EACH_LANE
-        for (int lane = 0; lane < toda3_LANES; ++lane)
-            size[lane] += fabs(delta[i][lane]) / (fabs(y[i][lane]) + norm[lane] + DBL_MIN);
-    }
-}
-
-/* Correct y by the residuals, with the inverse in the table, and measure the corrections. */
-static void toda3_correct(toda3_model *model, toda3_lanes size)
-{
-    toda3_lanes delta[5];
-    memset(delta, 0, sizeof delta);
-    for (int i = 0; i < 5; ++i)
-        for (int j = 0; j < 5; ++j) {
-            toda3_EACH_LANE
-            for (int lane = 0; lane < toda3_LANES; ++lane)
-                delta[i][lane] += model->inverse[i * 5 + j][lane] * model->residual[j][lane];
-        }
-    toda3_sizes(model->y, delta, size);
-    for (int i = 0; i < 5; ++i)
-        for (int lane = 0; lane < toda3_LANES; ++lane) model->y[i][lane] -= delta[i][lane];
-}
-
-/* The largest of the lanes, none of which is negative; infinite if one is not finite. As integers, the bits of such
-   numbers have their order, and those of what is no number are larger. */
-static double toda3_largest(const toda3_lanes size)
-{
-    uint64_t bits[8], most = 0;
-    double largest;
-    memcpy(bits, size, sizeof bits);
-    for (int lane = 0; lane < toda3_LANES; ++lane) most = bits[lane] > most ? bits[lane] : most;
-    memcpy(&largest, &most, sizeof largest);
-    return isfinite(largest) ? largest : HUGE_VAL;
-}
-
-/* toda3_near for the guesses of all lanes, seen from one value. */
-static int toda3_near_lanes(toda3_lanes y[restrict 5], const double last[5])
-{
-    toda3_lanes distance = { 0.0 };
-    double size = 0.0;
-    for (int i = 0; i < 5; ++i) {
-        size += fabs(last[i]);
-        toda3_EACH_LANE
-        for (int lane = 0; lane < toda3_LANES; ++lane) distance[lane] += fabs(y[i][lane] - last[i]);
-    }
-    return toda3_largest(distance) <= 4.0 * size;
-}
-
-/* What is left after a correction of this size: quadratic in it, where the matrices are of the points corrected; where
-   they are of points further off, by bend, also of the order of size times bend. bound is what the last pass left. */
-static double toda3_remaining(double size, double bend, double bound)
-{
-    const double growth = size / bound, left = size * (size + bend);
-    return growth > 1.0 ? growth * left : left;
-}
-
-/* The table of a stage, with its matrices or with those of the last pass. */
-static void toda3_update(toda3_lanes coef[restrict], toda3_model *model, int matrices)
-{
-    if (matrices)
-        toda3_tabulate(coef, model);
-    else
-        toda3_evaluate_lanes(coef, model->y, model->displacement, model->increment);
-}
-
-/* The steps of a block one after the other, each along the linear model of its lane. As X, the state with its carry, gains
-   increment - gain residual, the next residual follows from this one; X itself is added up apart. */
-static void toda3_chain(toda3_model model[1], double x[5], double carry[5])
-{
-    double residual[5], sum[5], small[5];
-    for (int i = 0; i < 5; ++i) {
-        residual[i] = ((model->y[i][0] - x[i]) + model->displacement[i][0]) - carry[i];
-        sum[i] = x[i];
-        small[i] = carry[i];
-    }
-    for (int k = 0; k < 1 * toda3_LANES; ++k) {
-        const int lane = k / 1, after = (k + 1) / 1 % toda3_LANES;
-        toda3_model *at = &model[k % 1], *next = &model[(k + 1) % 1];
-        double even[5] = { 0.0 }, odd[5] = { 0.0 }; /* two sums, so that no long chain of additions is waited for */
-        for (int i = 0; i < 5; ++i) {
-            at->residual[i][lane] = residual[i];
-            for (int j = 0; j < 5; j += 2) even[i] += at->gain[i * 5 + j][lane] * residual[j];
-            for (int j = 1; j < 5; j += 2) odd[i] += at->gain[i * 5 + j][lane] * residual[j];
-        }
-        for (int i = 0; i < 5; ++i) {
-            const double change = at->increment[i][lane], total = sum[i] + change, added = total - sum[i];
-            const double turn = (next->displacement[i][after] - at->displacement[i][lane]) - change;
-            const double moved = (next->y[i][after] - at->y[i][lane]) + turn;
-            residual[i] = ((moved + residual[i]) + odd[i]) + even[i];
-            small[i] += ((sum[i] - (total - added)) + (change - added)) - (even[i] + odd[i]);
-            sum[i] = total;
-        }
-    }
-    for (int i = 0; i < 5; ++i) {
-        x[i] = sum[i] + small[i];
-        carry[i] = small[i] - (x[i] - sum[i]);
-    }
-}
-
-/* Bring the table up to date: coefficients, and weights that were fitted since. */
-static void toda3_refresh(const toda3_solver *s, toda3_table *table)
-{
-    for (int stage = 0; stage < 1; ++stage) {
-        if (table->fits[stage] == s->memory[stage].fits) continue;
-        table->fits[stage] = s->memory[stage].fits;
-        for (int k = 0; k < 10; ++k)
-            for (int lane = 0; lane < toda3_LANES; ++lane) table->coef[stage][k][lane] = s->coef[stage][k];
-        memcpy(table->weight[stage], s->memory[stage].weight, (size_t)s->memory[stage].terms * sizeof table->weight[0][0]);
-    }
-}
-
-/* Guesses for the next toda3_LANES values of a stage, by its recurrences. */
-static void toda3_foresee(const toda3_memory *memory, toda3_lanes weight[restrict][5],
-    toda3_lanes y[restrict 5])
-{
-    const int last = memory->count - 1;
-    for (int i = 0; i < 5; ++i) {
-        toda3_lanes even = { 0.0 }, odd = { 0.0 };
-        for (int k = 0; k < memory->terms; k += 2) {
-            const double past = memory->past[last - k][i], earlier = memory->past[last - 1 - k][i];
-            toda3_EACH_LANE
-            for (int lane = 0; lane < toda3_LANES; ++lane) even[lane] += weight[k][i][lane] * past;
-            toda3_EACH_LANE
-            for (int lane = 0; lane < toda3_LANES; ++lane) odd[lane] += weight[k + 1][i][lane] * earlier;
-        }
-        toda3_EACH_LANE
-        for (int lane = 0; lane < toda3_LANES; ++lane) y[i][lane] = even[lane] + odd[lane];
-    }
-}
-
-/* toda3_record for the values of all lanes, one after the other. */
-static void toda3_record_lanes(toda3_memory *memory, toda3_lanes y[restrict 5])
-{
-    toda3_make_room(memory, toda3_LANES);
-    for (int lane = 0; lane < toda3_LANES; ++lane)
-        for (int i = 0; i < 5; ++i) memory->past[memory->count + lane][i] = y[i][lane];
-    memory->count += toda3_LANES;
-}
-
-/* Guesses where no recurrence is known: where alpha and beta have the means of steps by the classical Runge-Kutta
-   method, to leading order. */
-static void toda3_march(const toda3_solver *s, toda3_table *table, toda3_model model[1])
-{
-    static const double reach[4] = { 0.5, 0.5, 1.0, 0.0 }, weight[4] = { 1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0 };
-    double x[5], point[5], slope[5], mean[5];
-    memcpy(x, s->x, sizeof x);
-    for (int k = 0; k < 1 * toda3_LANES; ++k) {
-        const double h = toda3_fractions[k % 1] * s->h;
-        memcpy(point, x, sizeof x);
-        memset(mean, 0, sizeof mean);
-        for (int part = 0; part < 4; ++part) {
-            toda3_vector_field(&s->params, point, slope);
-            for (int i = 0; i < 5; ++i) {
-                mean[i] += weight[part] * slope[i];
-                point[i] = x[i] + h * reach[part] * slope[i];
-            }
-        }
-        for (int i = 0; i < 5; ++i) {
-            model[k % 1].y[i][k / 1] = x[i] + 0.5 * h * mean[i];
-            x[i] += h * mean[i];
-        }
-    }
-    for (int stage = 0; stage < 1; ++stage) {
-        toda3_model *at = &model[stage];
-        toda3_evaluate_lanes(table->coef[stage], at->y, at->displacement, at->increment);
-        for (int i = 0; i < 5; ++i) {
-            toda3_EACH_LANE
-            for (int lane = 0; lane < toda3_LANES; ++lane)
-                at->y[i][lane] -= at->displacement[i][lane] + 0.5 * at->increment[i][lane];
-        }
-    }
-}
-
-/* toda3_LANES steps at once: guess the points of all, and correct them together until the error that remains is as
-   small as after a single step. How many passes that took; 0, and the solver as before, where it takes more than most. */
-static int toda3_block(toda3_solver *s, toda3_table *table, int most)
-{
-    toda3_model model[1];
-    toda3_lanes sizes;
-    double x[5], carry[5], previous = HUGE_VAL, bend = 0.0, bound = HUGE_VAL;
-    int passes = 0, solved = 0;
-    if (!s->foreseeing) toda3_march(s, table, model);
-    for (int stage = 0; stage < 1; ++stage) {
-        if (s->foreseeing) toda3_foresee(&s->memory[stage], table->weight[stage], model[stage].y);
-        if (!toda3_near_lanes(model[stage].y, s->x)) return 0;
-    }
-    while (!solved) {
-        double size = 0.0;
-        const int matrices = previous > 1e-05;
-        for (int stage = 0; stage < 1; ++stage) toda3_update(table->coef[stage], &model[stage], matrices);
-        memcpy(x, s->x, sizeof x);
-        memcpy(carry, s->carry, sizeof carry);
-        toda3_chain(model, x, carry);
-        for (int stage = 0; stage < 1; ++stage) {
-            toda3_correct(&model[stage], sizes);
-            const double largest = toda3_largest(sizes);
-            size = largest > size ? largest : size;
-        }
-        s->evaluations += 1 * toda3_LANES;
-        bend = matrices ? 0.0 : bend + previous;
-        bound = toda3_remaining(size, bend, bound);
-        /* The second test: after the square of so small a correction there is rounding only. */
-        solved = bound <= 1e-20 || (previous < 1e-8 && size < 1e-10);
-        if ((++passes >= most || !(size < previous)) && !solved) return 0;
-        previous = size;
-    }
-    for (int stage = 0; stage < 1; ++stage)
-        if (!toda3_near_lanes(model[stage].y, s->x)) return 0;
-    for (int i = 0; i < 5; ++i)
-        if (!isfinite(x[i])) return 0;
-    memcpy(s->x, x, sizeof x);
-    memcpy(s->carry, carry, sizeof carry);
-    s->steps += toda3_LANES;
-    for (int stage = 0; stage < 1; ++stage) {
-        toda3_memory *memory = &s->memory[stage];
-        toda3_record_lanes(memory, model[stage].y);
-        memory->slow = passes > 1 ? memory->slow + toda3_LANES : 0;
-        if (memory->slow > memory->patience && s->foreseeing) toda3_fit(memory);
-    }
-    return passes;
-}
-
-/* Recurrences are given up for a while, the longer the more often that happens. */
-static void toda3_give_up(toda3_solver *s)
-{
-    s->foreseeing = s->setback = s->pause = 0;
-    s->doubt = 2 * s->doubt + 600;
-    s->retry = s->steps + s->doubt;
-}
-
-/* How the next block is guessed: by recurrences, fitted as soon as enough steps are to be made, or
-   have been, to repay that. */
-static void toda3_choose_guess(toda3_solver *s, size_t steps)
-{
-    for (int stage = 0; stage < 1; ++stage)
-        if (s->memory[stage].count < 111) {
-            s->foreseeing = 0;
-            return;
-        }
-    if (s->foreseeing || (steps < 600 && s->steps < 150) || s->steps < s->retry) return;
-    s->foreseeing = 1;
-    for (int stage = 0; stage < 1 && s->foreseeing; ++stage) {
-        toda3_fit(&s->memory[stage]);
-        s->foreseeing = s->memory[stage].terms > 0;
-    }
-    s->pause = toda3_LANES;
-    if (!s->foreseeing) toda3_give_up(s);
-}
-
-/* Learn from a block: after one that failed single steps are made, the more the more often that happens. Recurrences
-   that fail repeatedly, or need more passes than steps by Runge-Kutta did, are given up. */
-static void toda3_learn_from(toda3_solver *s, int passes)
-{
-    if (passes > 0) {
-        s->setback /= 2;
-    } else {
-        s->setback = 2 * s->setback + toda3_LANES > 1000 ? 1000 : 2 * s->setback + toda3_LANES;
-        s->pause = s->setback;
-    }
-    if (!s->foreseeing) {
-        s->passes = passes > 0 ? passes : INT_MAX;
-    } else if (passes > s->passes || s->setback > 5 * toda3_LANES) {
-        toda3_give_up(s);
-    }
-}
-
-/* A single step, and the running mean of the evaluations that a stage of one takes. */
-static toda3_status toda3_single(toda3_solver *s)
-{
-    const size_t before = s->evaluations;
-    const toda3_status status = toda3_step(s, s->h);
-    s->effort += 0.125 * ((double)(s->evaluations - before) / 1 - s->effort);
-    return status;
-}
-
-/* Blocks of steps where they cost less than single steps, with at most as many passes over a block as 2 for each
-   evaluation in a single step. The results differ by round-off only. */
 toda3_status toda3_integrate(toda3_solver *s, double h, size_t steps)
 {
-    toda3_table table;
     toda3_status status = toda3_set_step(s, h);
-    for (int stage = 0; stage < 1; ++stage) table.fits[stage] = -1;
-    while (status == toda3_OK && steps > 0) {
-        if (steps >= toda3_LANES && s->pause == 0) toda3_choose_guess(s, steps);
-        if (steps >= toda3_LANES && s->pause == 0) {
-            toda3_refresh(s, &table);
-            const int passes = toda3_block(s, &table, (int)(2 * s->effort + 0.5));
-            toda3_learn_from(s, passes);
-            if (passes > 0) steps -= toda3_LANES;
-        } else {
-            if (s->pause > 0) --s->pause;
-            status = toda3_single(s);
-            if (status == toda3_OK) --steps;
-        }
-    }
+    for (; steps > 0 && status == toda3_OK; --steps) status = toda3_step(s, h);
     return status;
-}
-
-/* Members of an ensemble, each in its lane. */
-typedef struct {
-    toda3_lanes x[5], carry[5], coef[1][10];
-    toda3_lanes past[1][111][5]; /* solved values, in a ring */
-    toda3_lanes weight[1][40][5]; /* of past values, the latest first, for the next */
-    int latest;     /* the row of the latest values */
-    int count;      /* rows in use */
-    int order[1];   /* how many of them the extrapolation uses */
-    int terms[1];   /* how many of them the recurrences use */
-    int fits;       /* how often recurrences have been fitted */
-    int fitting[1]; /* whether they are the better guess */
-    int slow;       /* how many of the last steps took more than one iteration */
-    int patience;   /* how many of those before recurrences are fitted again */
-    int active[8];  /* whether the lane has a member that has not failed */
-    size_t left[8]; /* steps that are still to be made, where one has */
-} toda3_group;
-
-/* The past values of a stage, the latest for k = 0. */
-static toda3_lanes *toda3_group_past(toda3_group *group, int stage, int k)
-{
-    const int row = group->latest + k;
-    return group->past[stage][row < 111 ? row : row - 111];
-}
-
-/* Guess the values of a stage by the recurrences of the members. */
-static void toda3_group_foresee(toda3_group *group, int stage, toda3_lanes y[restrict 5])
-{
-    memset(y, 0, 5 * sizeof y[0]);
-    for (int k = 0; k < group->terms[stage]; ++k) {
-        toda3_lanes *past = toda3_group_past(group, stage, k), *weight = group->weight[stage][k];
-        for (int i = 0; i < 5; ++i) {
-            toda3_EACH_LANE
-            for (int lane = 0; lane < toda3_LANES; ++lane) y[i][lane] += weight[i][lane] * past[i][lane];
-        }
-    }
-}
-
-/* Extrapolate the values of a stage. */
-static void toda3_group_extrapolate(toda3_group *group, int stage, toda3_lanes y[restrict 5])
-{
-    const int order = group->order[stage];
-    double binomial = -1.0;
-    memcpy(y, group->x, 5 * sizeof y[0]);
-    if (order > 0) memset(y, 0, 5 * sizeof y[0]);
-    for (int k = 0; k < order; ++k) {
-        toda3_lanes *past = toda3_group_past(group, stage, k);
-        binomial *= -(double)(order - k) / (k + 1);
-        for (int i = 0; i < 5; ++i) {
-            toda3_EACH_LANE
-            for (int lane = 0; lane < toda3_LANES; ++lane) y[i][lane] += binomial * past[i][lane];
-        }
-    }
-}
-
-/* The sum over members of the absolute values of all components. */
-static double toda3_group_sum(const toda3_group *group, toda3_lanes y[5])
-{
-    double sum = 0.0;
-    for (int i = 0; i < 5; ++i)
-        for (int lane = 0; lane < toda3_LANES; ++lane) sum += group->active[lane] ? fabs(y[i][lane]) : 0.0;
-    return sum;
-}
-
-static void toda3_group_subtract(toda3_lanes y[restrict 5], toda3_lanes other[restrict 5])
-{
-    for (int i = 0; i < 5; ++i) {
-        toda3_EACH_LANE
-        for (int lane = 0; lane < toda3_LANES; ++lane) y[i][lane] -= other[i][lane];
-    }
-}
-
-/* Choose the guess that would have been best for these values. */
-static void toda3_group_judge(toda3_group *group, int stage, toda3_lanes y[5])
-{
-    toda3_lanes row[8 + 1][5];
-    const int rows = group->count < 8 ? group->count : 8;
-    double least = HUGE_VAL;
-    memcpy(row[0], y, sizeof row[0]);
-    for (int k = 0; k < rows; ++k) memcpy(row[k + 1], toda3_group_past(group, stage, k), sizeof row[0]);
-    if (group->order[stage] == 0) group->order[stage] = 1;
-    for (int order = 1; order <= rows; ++order) { /* row[0] becomes the backward difference of this order */
-        for (int k = 0; k <= rows - order; ++k) toda3_group_subtract(row[k], row[k + 1]);
-        const double size = toda3_group_sum(group, row[0]);
-        if (size < least) {
-            least = size;
-            group->order[stage] = order;
-        }
-    }
-    if (group->terms[stage] == 0) return;
-    toda3_group_foresee(group, stage, row[0]);
-    toda3_group_subtract(row[0], y);
-    group->fitting[stage] = toda3_group_sum(group, row[0]) <= least;
-}
-
-/* Fit the recurrences of all members; with every time, wait longer before it is done again, and for long if it did not
-   help. */
-static void toda3_group_fit(toda3_group *group)
-{
-    toda3_memory memory;
-    const int helped = group->fits == 0 || group->fitting[0];
-    memory.count = 111;
-    for (int stage = 0; stage < 1; ++stage) {
-        int found = 1;
-        group->terms[stage] = 0;
-        for (int lane = 0; lane < toda3_LANES; ++lane)
-            for (int i = 0; i < 5 && group->active[lane] && found; ++i) {
-                for (int k = 0; k < 111; ++k)
-                    memory.past[111 - 1 - k][i] = toda3_group_past(group, stage, k)[i][lane];
-                const int terms = toda3_train(&memory, i);
-                found = terms > 0;
-                if (terms > group->terms[stage]) group->terms[stage] = terms;
-                for (int k = 0; k < 40; ++k) group->weight[stage][k][i][lane] = memory.weight[k][i][0];
-            }
-        if (!found) group->terms[stage] = 0;
-        group->fitting[stage] = found;
-    }
-    ++group->fits;
-    group->slow = 0;
-    group->patience = helped && group->patience < 10000 ? 2 * group->patience + 150 : 100 * 150;
-}
-
-/* Replace guesses that are not near the last values, as toda3_near has it, by these; lane by lane. */
-static void toda3_stay_near(toda3_lanes y[restrict 5], toda3_lanes last[restrict 5])
-{
-    toda3_lanes distance = { 0.0 }, size = { 0.0 };
-    for (int i = 0; i < 5; ++i) {
-        toda3_EACH_LANE
-        for (int lane = 0; lane < toda3_LANES; ++lane) {
-            distance[lane] += fabs(y[i][lane] - last[i][lane]);
-            size[lane] += fabs(last[i][lane]);
-        }
-    }
-    for (int i = 0; i < 5; ++i) {
-        toda3_EACH_LANE
-        for (int lane = 0; lane < toda3_LANES; ++lane)
-            y[i][lane] = distance[lane] <= 4.0 * size[lane] ? y[i][lane] : last[i][lane];
-    }
-}
-
-/* Whether lanes are still to be solved after a correction of this size; those where nothing is finite leave the group.
-   bound is what remains in each lane. */
-static int toda3_group_open(toda3_group *group, const toda3_lanes size, const toda3_lanes previous,
-    double bend, toda3_lanes bound)
-{
-    int open = 0;
-    toda3_EACH_LANE
-    for (int lane = 0; lane < toda3_LANES; ++lane)
-        bound[lane] = toda3_remaining(size[lane], bend, bound[lane]);
-    if (toda3_largest(bound) <= 1e-20) return 0;
-    for (int lane = 0; lane < toda3_LANES; ++lane) {
-        const int solved = bound[lane] <= 1e-20 || (previous[lane] < 1e-8 && size[lane] < 1e-10);
-        if (!isfinite(size[lane])) group->active[lane] = 0;
-        open += group->active[lane] && !solved;
-    }
-    return open;
-}
-
-/* The guess for a stage: recurrences, or extrapolation; the state for members where that is not near. */
-static void toda3_group_predict(toda3_group *group, int stage, toda3_lanes y[5])
-{
-    if (group->fitting[stage]) toda3_group_foresee(group, stage, y);
-    else toda3_group_extrapolate(group, stage, y);
-    toda3_stay_near(y, group->x);
-}
-
-/* Newton's method for a stage, until the slowest lane is solved. The number of iterations; where that is the most
-   allowed, lanes that are not solved leave the group. */
-static int toda3_group_solve(toda3_group *group, int stage, toda3_model *model)
-{
-    toda3_lanes size, previous, bound;
-    double largest = HUGE_VAL, bend = 0.0;
-    int iterations = 0, open = 1;
-    for (int lane = 0; lane < toda3_LANES; ++lane) size[lane] = bound[lane] = HUGE_VAL;
-    toda3_group_predict(group, stage, model->y);
-    for (; open > 0 && iterations < 20; ++iterations) {
-        memcpy(previous, size, sizeof size);
-        toda3_update(group->coef[stage], model, largest > 1e-05);
-        bend = largest > 1e-05 ? 0.0 : bend + largest;
-        for (int i = 0; i < 5; ++i) {
-            toda3_EACH_LANE
-            for (int lane = 0; lane < toda3_LANES; ++lane)
-                model->residual[i][lane] =
-                    ((model->y[i][lane] - group->x[i][lane]) + model->displacement[i][lane]) - group->carry[i][lane];
-        }
-        toda3_correct(model, size);
-        open = toda3_group_open(group, size, previous, bend, bound);
-        largest = toda3_largest(size);
-    }
-    for (int lane = 0; lane < toda3_LANES && open > 0; ++lane)
-        group->active[lane] = group->active[lane] && bound[lane] <= 1e-20;
-    return iterations;
-}
-
-/* Add the increments, corrected to first order, in compensated arithmetic as for a single step. */
-static void toda3_group_advance(toda3_lanes x[restrict 5], toda3_lanes carry[restrict 5],
-    toda3_model *model)
-{
-    for (int i = 0; i < 5; ++i)
-        for (int j = 0; j < 5; ++j) {
-            toda3_EACH_LANE
-            for (int lane = 0; lane < toda3_LANES; ++lane)
-                carry[i][lane] -= model->gain[i * 5 + j][lane] * model->residual[j][lane];
-        }
-    for (int i = 0; i < 5; ++i) {
-        toda3_EACH_LANE
-        for (int lane = 0; lane < toda3_LANES; ++lane) {
-            const double change = model->increment[i][lane], sum = x[i][lane] + change, added = sum - x[i][lane];
-            const double small = ((x[i][lane] - (sum - added)) + (change - added)) + carry[i][lane];
-            x[i][lane] = sum + small;
-            carry[i][lane] = small - (x[i][lane] - sum);
-        }
-    }
-}
-
-/* Members that failed, or whose state is not near the one before the step or not finite, keep that one, and leave. How many
-   stay. */
-static int toda3_group_leave(toda3_group *group, toda3_lanes x[5], toda3_lanes carry[5],
-    size_t remaining)
-{
-    toda3_lanes moved = { 0.0 }, size = { 0.0 }, bad;
-    int active = 0;
-    for (int i = 0; i < 5; ++i) {
-        toda3_EACH_LANE
-        for (int lane = 0; lane < toda3_LANES; ++lane) {
-            moved[lane] += fabs(group->x[i][lane] - x[i][lane]);
-            size[lane] += fabs(x[i][lane]);
-        }
-    }
-    for (int lane = 0; lane < toda3_LANES; ++lane) bad[lane] = moved[lane] <= 4.0 * size[lane] ? 0.0 : 1.0;
-    for (int lane = 0; lane < toda3_LANES; ++lane) active += group->active[lane];
-    if (active == toda3_LANES && !(toda3_largest(bad) > 0.0)) return active;
-    active = 0;
-    for (int lane = 0; lane < toda3_LANES; ++lane) {
-        group->active[lane] = group->active[lane] && !(bad[lane] > 0.0);
-        active += group->active[lane];
-        for (int i = 0; i < 5 && !group->active[lane]; ++i) {
-            group->x[i][lane] = x[i][lane];
-            group->carry[i][lane] = carry[i][lane];
-        }
-        if (!group->active[lane] && group->left[lane] == 0) group->left[lane] = remaining;
-    }
-    return active;
-}
-
-/* One step of all members, of as many as remain. How many members are left. */
-static int toda3_group_step(toda3_group *group, size_t remaining)
-{
-    toda3_lanes x[5], carry[5];
-    toda3_model model;
-    const int next = (group->latest > 0 ? group->latest : 111) - 1;
-    int most = 0;
-    memcpy(x, group->x, sizeof x);
-    memcpy(carry, group->carry, sizeof carry);
-    for (int stage = 0; stage < 1; ++stage) {
-        const int iterations = toda3_group_solve(group, stage, &model);
-        toda3_group_advance(group->x, group->carry, &model);
-        if (iterations > most) most = iterations;
-        if ((iterations > 1 && next % 8 == 0) || group->count < 8)
-            toda3_group_judge(group, stage, model.y);
-        memcpy(group->past[stage][next], model.y, sizeof model.y);
-    }
-    group->latest = next;
-    if (group->count < 111) ++group->count;
-    group->slow = most > 1 ? group->slow + 1 : 0;
-    if (group->slow > group->patience && group->count == 111 && remaining >= 1000)
-        toda3_group_fit(group);
-    return toda3_group_leave(group, x, carry, remaining);
-}
-
-/* Put a member into a lane: its state, and its coefficients. */
-static toda3_status toda3_group_join(toda3_group *group, int lane, const toda3_params *params,
-    const double x0[5], double h)
-{
-    toda3_solver s;
-    toda3_status status = toda3_init(&s, params, x0);
-    if (status == toda3_OK) status = toda3_set_step(&s, h);
-    if (status != toda3_OK) return status;
-    for (int i = 0; i < 5; ++i) group->x[i][lane] = s.x[i];
-    for (int stage = 0; stage < 1; ++stage)
-        for (int k = 0; k < 10; ++k) group->coef[stage][k][lane] = s.coef[stage][k];
-    group->active[lane] = 1;
-    return status;
-}
-
-/* The steps that a member has still to make after it left the group, by itself. */
-static toda3_status toda3_group_finish(const toda3_group *group, int lane, const toda3_params *params,
-    double x[5], double h)
-{
-    toda3_solver s;
-    toda3_status status = toda3_init(&s, params, x);
-    if (status != toda3_OK) return status;
-    for (int i = 0; i < 5; ++i) s.carry[i] = group->carry[i][lane];
-    status = toda3_integrate(&s, h, group->left[lane]);
-    memcpy(x, s.x, sizeof s.x);
-    return status;
-}
-
-/* The members from first on, as many as there are lanes. The first status that is not OK. */
-static toda3_status toda3_group_run(const toda3_params *params, double *x, size_t members, size_t first,
-    double h, size_t steps, unsigned char *status)
-{
-    toda3_group group;
-    toda3_status worst = toda3_OK, member[8];
-    const int count = members - first < toda3_LANES ? (int)(members - first) : toda3_LANES;
-    double state[5];
-    size_t left = steps;
-    memset(&group, 0, sizeof group);
-    for (int lane = 0; lane < count; ++lane) {
-        for (size_t i = 0; i < 5; ++i) state[i] = x[i * members + first + (size_t)lane];
-        member[lane] = toda3_group_join(&group, lane, params, state, h);
-    }
-    for (int active = count; left > 0 && active > 2; --left) active = toda3_group_step(&group, left);
-    for (int lane = 0; lane < count; ++lane) {
-        if (group.active[lane]) group.left[lane] = left;
-        for (int i = 0; i < 5; ++i) state[i] = group.x[i][lane];
-        if (member[lane] == toda3_OK) {
-            if (group.left[lane] > 0) member[lane] = toda3_group_finish(&group, lane, params, state, h);
-            for (size_t i = 0; i < 5; ++i) x[i * members + first + (size_t)lane] = state[i];
-        }
-        if (status != NULL) status[first + (size_t)lane] = (unsigned char)member[lane];
-        if (worst == toda3_OK) worst = member[lane];
-    }
-    return worst;
-}
-
-toda3_status toda3_ensemble(const toda3_params *params, double *x, size_t members, double h, size_t steps,
-                            unsigned char *status)
-{
-    toda3_status worst = isfinite(h) ? toda3_OK : toda3_BAD_ARGUMENT;
-    const toda3_params own = params != NULL ? *params : toda3_default_params;
-    size_t earliest = members;
-    if (x == NULL && members > 0) return toda3_BAD_ARGUMENT;
-#ifdef _OPENMP
-#pragma omp parallel for schedule(dynamic)
-#endif
-    for (size_t first = 0; first < members; first += toda3_LANES) {
-        const toda3_status group = toda3_group_run(&own, x, members, first, h, steps, status);
-        if (group == toda3_OK) continue;
-#ifdef _OPENMP
-#pragma omp critical
-#endif
-        if (first < earliest) {
-            earliest = first;
-            worst = group;
-        }
-    }
-    return worst;
-}
-
-#if defined(__clang__)
-#pragma clang diagnostic pop
-#endif
-
-/* the Hamiltonian */
-static void toda3_energy(const toda3_params *params, const double x[5], double energy[restrict 1])
-{
-    (void)params;
-    const double a1 = x[0];
-    const double a2 = x[1];
-    const double b1 = x[2];
-    const double b2 = x[3];
-    const double b3 = x[4];
-    energy[0] = a2 * a2 + (a1 * a1 + 0.5 * (b3 * b3 + (b1 * b1 + b2 * b2)));
-}
-
-/* the Casimirs */
-static void toda3_casimir_values(const toda3_params *params, const double x[5], double out[restrict 1])
-{
-    (void)params;
-    const double b1 = x[2];
-    const double b2 = x[3];
-    const double b3 = x[4];
-    out[0] = b3 + (b1 + b2);
-}
-
-/* pi(x) grad H(x) */
-static void toda3_field(const toda3_params *params, const double x[5], double out[restrict 5])
-{
-    (void)params;
-    const double a1 = x[0];
-    const double a2 = x[1];
-    const double b1 = x[2];
-    const double b2 = x[3];
-    const double b3 = x[4];
-    const double t1 = 2.0 * (a1 * a1);
-    const double t2 = a2 * a2;
-    out[0] = a1 * b2 - a1 * b1;
-    out[1] = a2 * b3 - a2 * b2;
-    out[2] = t1;
-    out[3] = 2.0 * t2 - t1;
-    out[4] = (-2.0) * t2;
-}
-
-double toda3_hamiltonian(const toda3_params *params, const double x[5])
-{
-    double energy[1];
-    toda3_energy(params != NULL ? params : &toda3_default_params, x, energy);
-    return energy[0];
-}
-
-void toda3_casimirs(const toda3_params *params, const double x[5], double out[])
-{
-    double value[1]; /* out may overlap x */
-    toda3_casimir_values(params != NULL ? params : &toda3_default_params, x, value);
-    for (int i = 0; i < 1; ++i) out[i] = value[i];
-}
-
-void toda3_vector_field(const toda3_params *params, const double x[5], double out[5])
-{
-    double value[5];
-    toda3_field(params != NULL ? params : &toda3_default_params, x, value);
-    memcpy(out, value, sizeof value);
 }
 
 const char *toda3_status_string(toda3_status status)
 {
-    switch (status) {
-    case toda3_OK: return "ok";
-    case toda3_NO_CONVERGENCE: return "no convergence: the step is too large";
-    case toda3_SINGULAR: return "singular Newton matrix: the step is too large";
-    case toda3_NOT_FINITE: return "not finite: overflow, or outside the domain";
-    case toda3_BAD_ARGUMENT: return "bad argument: a null pointer, or values that are not allowed";
-    }
-    return "unknown status";
+    static const char *const text[] = {
+        "ok",
+        "no convergence: the step is too large",
+        "singular Newton matrix: the step is too large",
+        "not finite: overflow, or outside the domain",
+        "bad argument: a null pointer, or values that are not allowed"
+    };
+    return (unsigned)status <= toda3_BAD_ARGUMENT ? text[status] : "unknown status";
 }
 
 size_t toda3_solver_size(void) { return sizeof(toda3_solver); }
 
 size_t toda3_solver_steps_done(const toda3_solver *s) { return s->steps; }
+
+/* ---- Ensembles ---- */
+toda3_status toda3_ensemble(const toda3_params *params, double *x, size_t members, double h, size_t steps,
+    unsigned char *status)
+{
+    toda3_status worst = isfinite(h) ? toda3_OK : toda3_BAD_ARGUMENT;
+    const toda3_params own = params != NULL ? *params : toda3_default_params;
+    if (x == NULL && members > 0) return toda3_BAD_ARGUMENT;
+    for (size_t m = 0; m < members; ++m) {
+        toda3_solver s;
+        double x0[toda3_DIM];
+        for (size_t i = 0; i < toda3_DIM; ++i) x0[i] = x[i * members + m];
+        toda3_status member = toda3_init(&s, &own, x0);
+        if (member == toda3_OK) {
+            member = toda3_integrate(&s, h, steps);
+            for (size_t i = 0; i < toda3_DIM; ++i) x[i * members + m] = s.x[i];
+        }
+        if (status != NULL) status[m] = (unsigned char)member;
+        if (worst == toda3_OK) worst = member;
+    }
+    return worst;
+}

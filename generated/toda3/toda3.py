@@ -6,17 +6,17 @@
 #   step: implicit, Newton iteration with the analytic matrix
 #   one Newton iteration: 143 additions, 189 multiplications, 4 functions
 #
-# spec: toda3, sha256 c7dc1027841ad0ebd0aac03361a0c390f021c59279da1553a4dcfe3243181c41
+# spec: toda3, sha256 813743f0c214e25a500552f5cc291b9b59649d4122a822c50e413b8a48c6bba9
 # to regenerate: phigen build toda3
 # DO NOT EDIT: change the spec and regenerate; edits are noticed by the checksum below.
 #
 # SPDX-License-Identifier: 0BSD
 # This file belongs to whoever generated it; phigen claims no rights in it.
-# body-sha256: dfe3d25afa4f0ea7e83559a8c9fac7d81fe7b5d53f2f26e380f8ce686a277006
+# body-sha256: 5febe554ea9884719c66585fa8bacbfb0ae0c46ea9ee08d06cf277be983bf58d
 import numpy as np
 
 VERSION = "0.1.0"
-SPEC_SHA256 = "c7dc1027841ad0ebd0aac03361a0c390f021c59279da1553a4dcfe3243181c41"
+SPEC_SHA256 = "813743f0c214e25a500552f5cc291b9b59649d4122a822c50e413b8a48c6bba9"
 DIM = 5
 ORDER = 4
 COORDINATES = ("a1", "a2", "b1", "b2", "b3",)

@@ -12,20 +12,31 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 3a19bd3d3b7367fc03e51ca1b11f08a2ddd630854e25284e07416c10ab54551d
+ *
+ *   1. The model
+ *   2. Compensated sums, linear equations
+ *   3. Starting guesses
+ *   4. Recurrences fitted to the last values
+ *   5. The implicit step, along paths dm/dt = pi(m) p
+ *   6. The solver
+ *   7. Ensembles
+ * body-sha256: a56fe595515ad029df676245aa31118f1d37f1a139a16a11a4a792404667346c
  */
 #include "toda3_quadratic.h"
 
 #include <float.h>
-#include <limits.h>
 #include <math.h>
-#include <stdint.h>
 #include <string.h>
 
+/* ---- The model ---- */
 const toda3_quadratic_params toda3_quadratic_default_params = { 0 };
 
-/* A step of size h is the composition of these fractions of it. */
-static const double toda3_quadratic_fractions[1] = { 1.0 };
+enum { toda3_quadratic_MAX_ITERATIONS = 20 }; /* of an inner solve */
+/* most of the expansion of a path; one that needs more is cut into pieces */
+enum { toda3_quadratic_TERMS = 30 };
+enum { toda3_quadratic_SERIES = 41 }; /* of a path, those of the coordinates first */
+enum { toda3_quadratic_FIXED = 1 };   /* values that are constant along a path */
+enum { toda3_quadratic_CHECKS = 8 };  /* values that a recurrence is not fitted to, but has to foresee */
 
 /* everything that depends on parameters and step size only */
 static void toda3_quadratic_prepare(const toda3_quadratic_params *params, double h, double coef[restrict 1])
@@ -36,14 +47,16 @@ static void toda3_quadratic_prepare(const toda3_quadratic_params *params, double
 
 /* p = grad S_h(y), and the Jacobian 1 - Hess S_h(y) pi(y) / 2 of the equation for p, up to O(h^2) */
 static void toda3_quadratic_generate(const double coef[1], const double y[5], double slope[restrict 5],
-                                     double jacobian[restrict 25])
+    double jacobian[restrict 25])
 {
     (void)y;
+    /* slope */
     slope[0] = 0.0;
     slope[1] = 0.0;
     slope[2] = coef[0];
     slope[3] = coef[0];
     slope[4] = coef[0];
+    /* jacobian */
     jacobian[0] = 1.0;
     jacobian[1] = 0.0;
     jacobian[2] = 0.0;
@@ -71,99 +84,111 @@ static void toda3_quadratic_generate(const double coef[1], const double y[5], do
     jacobian[24] = 1.0;
 }
 
-/* Solve matrix * solution = side, both overwritten, by elimination with partial pivoting. 0 if singular. */
-static int toda3_quadratic_solve(double matrix[25], double side[5])
+/* the Hamiltonian */
+double toda3_quadratic_hamiltonian(const toda3_quadratic_params *params, const double x[5])
 {
-    for (int k = 0; k < 5; ++k) {
+    (void)params;
+    const double b1 = x[2], b2 = x[3], b3 = x[4];
+    return b3 + (b1 + b2);
+}
+
+/* the Casimirs */
+void toda3_quadratic_casimirs(const toda3_quadratic_params *params, const double x[5], double out[])
+{
+    (void)params;
+    const double a1 = x[0], a2 = x[1], b1 = x[2], b2 = x[3], b3 = x[4];
+    out[0] = b3 * (b1 * b2) - b3 * (a1 * a1) - b1 * (a2 * a2);
+}
+
+/* pi(x) grad H(x) */
+void toda3_quadratic_vector_field(const toda3_quadratic_params *params, const double x[5], double out[5])
+{
+    (void)params;
+    const double a1 = x[0], a2 = x[1], b1 = x[2], b2 = x[3], b3 = x[4];
+    const double t1 = 2.0 * (a1 * a1), t2 = a2 * a2;
+    out[0] = a1 * b2 - a1 * b1;
+    out[1] = a2 * b3 - a2 * b2;
+    out[2] = t1;
+    out[3] = 2.0 * t2 - t1;
+    out[4] = (-2.0) * t2;
+}
+
+/* ---- Compensated sums, linear equations ---- */
+/* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to
+   its last bit: were it rounded with the change, corrections of one sign would add up to a drift. 0, and x as
+   before, if the sum is not finite. */
+static int toda3_quadratic_advance(toda3_quadratic_solver *s, const double change[toda3_quadratic_DIM],
+    const double correction[toda3_quadratic_DIM])
+{
+    double x[toda3_quadratic_DIM], carry[toda3_quadratic_DIM];
+    for (int i = 0; i < toda3_quadratic_DIM; ++i) {
+        const double sum = s->x[i] + change[i], added = sum - s->x[i];
+        const double lost = (s->x[i] - (sum - added)) + (change[i] - added);
+        const double small = lost + (s->carry[i] + correction[i]);
+        x[i] = sum + small;
+        carry[i] = small - (x[i] - sum);
+        if (!isfinite(x[i])) return 0;
+    }
+    memcpy(s->x, x, sizeof x);
+    memcpy(s->carry, carry, sizeof carry);
+    return 1;
+}
+
+/* Solve matrix * solution = side, both overwritten, by elimination with partial pivoting. 0 if singular. */
+static int toda3_quadratic_solve(double matrix[toda3_quadratic_DIM * toda3_quadratic_DIM],
+    double side[toda3_quadratic_DIM])
+{
+    for (int k = 0; k < toda3_quadratic_DIM; ++k) {
         int best = k;
-        for (int i = k + 1; i < 5; ++i)
-            if (fabs(matrix[i * 5 + k]) > fabs(matrix[best * 5 + k])) best = i;
-        const double pivot = matrix[best * 5 + k];
+        for (int i = k + 1; i < toda3_quadratic_DIM; ++i)
+            if (fabs(matrix[i * toda3_quadratic_DIM + k]) > fabs(matrix[best * toda3_quadratic_DIM + k]))
+                best = i;
+        const double pivot = matrix[best * toda3_quadratic_DIM + k], last = side[k];
         if (!(fabs(pivot) > 0.0)) return 0;
-        for (int j = k; j < 5 && best != k; ++j) {
-            const double swap = matrix[k * 5 + j];
-            matrix[k * 5 + j] = matrix[best * 5 + j];
-            matrix[best * 5 + j] = swap;
+        for (int j = k; j < toda3_quadratic_DIM && best != k; ++j) {
+            const double swap = matrix[k * toda3_quadratic_DIM + j];
+            matrix[k * toda3_quadratic_DIM + j] = matrix[best * toda3_quadratic_DIM + j];
+            matrix[best * toda3_quadratic_DIM + j] = swap;
         }
-        const double swap = side[k];
         side[k] = side[best];
-        side[best] = swap;
-        for (int i = k + 1; i < 5; ++i) {
-            const double factor = matrix[i * 5 + k] / pivot;
-            for (int j = k + 1; j < 5; ++j) matrix[i * 5 + j] -= factor * matrix[k * 5 + j];
+        side[best] = last;
+        for (int i = k + 1; i < toda3_quadratic_DIM; ++i) {
+            const double factor = matrix[i * toda3_quadratic_DIM + k] / pivot;
+            for (int j = k + 1; j < toda3_quadratic_DIM; ++j)
+                matrix[i * toda3_quadratic_DIM + j] -= factor * matrix[k * toda3_quadratic_DIM + j];
             side[i] -= factor * side[k];
         }
     }
-    for (int i = 5 - 1; i >= 0; --i) {
-        for (int j = i + 1; j < 5; ++j) side[i] -= matrix[i * 5 + j] * side[j];
-        side[i] /= matrix[i * 5 + i];
+    for (int i = toda3_quadratic_DIM - 1; i >= 0; --i) {
+        for (int j = i + 1; j < toda3_quadratic_DIM; ++j)
+            side[i] -= matrix[i * toda3_quadratic_DIM + j] * side[j];
+        side[i] /= matrix[i * toda3_quadratic_DIM + i];
     }
     return 1;
 }
 
-/* Whether a guess is where the next values may be. Recurrences that were fitted to little else than rest, near a saddle,
-   may lead anywhere; and far away the equation of a step has solutions that have nothing to do with the motion. */
-static int toda3_quadratic_near(const double guess[5], const double last[5])
-{
-    double distance = 0.0, size = 0.0;
-    for (int i = 0; i < 5; ++i) {
-        distance += fabs(guess[i] - last[i]);
-        size += fabs(last[i]);
-    }
-    return distance <= 4.0 * size;
-}
+/* ---- Starting guesses ---- */
 
-/* The guess for the next value (y), from earlier ones; 0 if there is none. */
-static int toda3_quadratic_predict(const toda3_quadratic_memory *memory, double value[5])
-{
-    const int last = memory->count - 1;
-    double odd[5] = { 0.0 }, binomial = -1.0;
-    memset(value, 0, 5 * sizeof value[0]);
-    if (memory->fitting) {
-        for (int k = 0; k < memory->terms; k += 2)
-            for (int i = 0; i < 5; ++i) {
-                value[i] += memory->weight[k][i][0] * memory->past[last - k][i];
-                odd[i] += memory->weight[k + 1][i][0] * memory->past[last - 1 - k][i];
-            }
-        for (int i = 0; i < 5; ++i) value[i] += odd[i];
-    } else {
-        for (int k = 0; k < memory->order && k <= last; ++k) {
-            binomial *= -(double)(memory->order - k) / (k + 1);
-            for (int i = 0; i < 5; ++i) value[i] += binomial * memory->past[last - k][i];
-        }
-    }
-    return last >= 0 && toda3_quadratic_near(value, memory->past[last]);
-}
+/* ---- Recurrences fitted to the last values ---- */
+/* A recurrence uses no more values than leave so little, in sizes of the largest. */
+#define toda3_quadratic_ENOUGH 3e-12
 
-/* Choose the guess that would have been best for a value that took several iterations. */
-static void toda3_quadratic_judge(toda3_quadratic_memory *memory, const double value[5])
-{
-    double row[8 + 1][5], guess[5], least = HUGE_VAL, fitted = HUGE_VAL;
-    const int rows = memory->count < 8 ? memory->count : 8;
-    memcpy(row[0], value, sizeof row[0]);
-    for (int k = 0; k < rows; ++k) memcpy(row[k + 1], memory->past[memory->count - 1 - k], sizeof row[0]);
-    for (int order = 1; order <= rows; ++order) { /* row[0] becomes the backward difference of this order */
-        double size = 0.0;
-        for (int k = 0; k <= rows - order; ++k)
-            for (int i = 0; i < 5; ++i) row[k][i] -= row[k + 1][i];
-        for (int i = 0; i < 5; ++i) size += fabs(row[0][i]);
-        if (size < least) {
-            least = size;
-            memory->order = order;
-        }
-    }
-    memory->fitting = memory->terms > 0;
-    if (memory->fitting && toda3_quadratic_predict(memory, guess)) {
-        fitted = 0.0;
-        for (int i = 0; i < 5; ++i) fitted += fabs(value[i] - guess[i]);
-    }
-    memory->fitting = memory->terms > 0 && fitted <= least;
-    if (memory->order == 0) memory->order = 1;
-}
+/* The ridge of the least squares: the level of rounding. */
+#define toda3_quadratic_RIDGE 1e-15
 
-/* Make eight columns orthogonal to one, by the multiples of it that are put into r. Where that one is among the eight, those
-   up to it stay as they are, and inverse becomes one over its squared length. The number of rows is even. */
-static void toda3_quadratic_project(int rows, double (*one)[8], int column, double *inverse, double (*eight)[8], double r[8])
+/* How far a recurrence may miss values that it was not fitted to, in sizes of the largest: beyond, the motion
+   is chaotic or the step long, and other guesses are as good. */
+#define toda3_quadratic_HOPELESS 1e-7
+
+/* equations of the least squares */
+enum { toda3_quadratic_ROWS = toda3_quadratic_REMEMBERED - toda3_quadratic_WINDOW - toda3_quadratic_AHEAD
+    - toda3_quadratic_CHECKS + 1 };
+
+/* Make eight columns orthogonal to one, by the multiples of it that are put into r. Where that one is among
+   the eight, those up to it stay as they are, and inverse becomes one over its squared length. The number of
+   rows is even. */
+static void toda3_quadratic_project(int rows, double (*one)[8], int column, double *inverse,
+    double (*eight)[8], double r[8])
 {
     double even[8] = { 0.0 }, odd[8] = { 0.0 };
     for (int i = 0; i < rows; i += 2) {
@@ -186,7 +211,7 @@ static void toda3_quadratic_project(int rows, double (*one)[8], int column, doub
 /* By how much recurrences miss the last of these values. */
 static double toda3_quadratic_missed(const double *value, double (*weight)[8])
 {
-    enum { AHEAD = 1, WINDOW = 40, CHECKS = 8 };
+    enum { AHEAD = toda3_quadratic_AHEAD, WINDOW = toda3_quadratic_WINDOW, CHECKS = toda3_quadratic_CHECKS };
     double most = 0.0;
     for (int i = 0; i < CHECKS; ++i) {
         double guess[8] = { 0.0 };
@@ -197,31 +222,36 @@ static double toda3_quadratic_missed(const double *value, double (*weight)[8])
     return most;
 }
 
-/* Fit the recurrences value[m + l] = sum of weight[k][..][l] * value[m - 1 - k], l = 0 ... 1 - 1, to the history of
-   a component: ridge least squares by modified Gram-Schmidt, the ridge at the level of rounding. Columns are taken in by
-   eights, until they leave next to nothing of the right-hand sides. How many past values are used; 0 if the recurrences do
-   not foresee the last values, which they were not fitted to. */
-static int toda3_quadratic_train(toda3_quadratic_memory *memory, int component)
+/* Fit the recurrences value[m + l] = sum of weight[k][..][l] * value[m - 1 - k], l = 0 ...
+   toda3_quadratic_AHEAD - 1, to the history of a component: ridge least squares by modified Gram-Schmidt, the
+   ridge at the level of rounding. Columns are taken in by eights, until they leave next to nothing of the
+   right-hand sides. How many past values are used; 0 if the recurrences do not foresee the last values, which
+   they were not fitted to. */
+static int toda3_quadratic_train(toda3_quadratic_history *history, int component)
 {
-    enum { AHEAD = 1, WINDOW = 40, ROWS = 64 };
-    double q[WINDOW / 8][ROWS + WINDOW][8], r[WINDOW / 8][WINDOW][8], inverse[WINDOW]; /* eight columns in each part */
-    double right[ROWS + WINDOW][8], weight[WINDOW][8], value[112], largest = 0.0, left = HUGE_VAL;
+    enum { AHEAD = toda3_quadratic_AHEAD, WINDOW = toda3_quadratic_WINDOW, ROWS = toda3_quadratic_ROWS };
+    /* eight columns in each part */
+    double q[WINDOW / 8][ROWS + WINDOW][8], r[WINDOW / 8][WINDOW][8], inverse[WINDOW];
+    double right[ROWS + WINDOW][8], weight[WINDOW][8], value[toda3_quadratic_REMEMBERED], largest = 0.0,
+        left = HUGE_VAL;
     int terms = 0;
     memset(q, 0, sizeof q);
     memset(right, 0, sizeof right);
     memset(weight, 0, sizeof weight);
-    for (int i = 0; i < 112; ++i) {
-        value[i] = memory->past[memory->count - 112 + i][component];
+    for (int i = 0; i < toda3_quadratic_REMEMBERED; ++i) {
+        value[i] = history->past[history->count - toda3_quadratic_REMEMBERED + i][component];
         if (fabs(value[i]) > largest) largest = fabs(value[i]);
     }
     for (int i = 0; i < ROWS; ++i)
         for (int l = 0; l < AHEAD; ++l) right[i][l] = value[i + WINDOW + l];
-    while (terms < WINDOW && left > 3e-12 * largest) {
-        const int part = terms / 8, rows = ROWS + terms + 8; /* further rows of the ridge are zero in these columns */
+    while (terms < WINDOW && left > toda3_quadratic_ENOUGH * largest) {
+        /* further rows of the ridge are zero in these columns */
+        const int part = terms / 8, rows = ROWS + terms + 8;
         for (int i = 0; i < ROWS; ++i)
             for (int l = 0; l < 8; ++l) q[part][i][l] = value[i + WINDOW - 1 - terms - l];
-        for (int l = 0; l < 8; ++l) q[part][ROWS + terms + l][l] = 1e-15 * largest;
-        for (int k = 0; k < terms; ++k) toda3_quadratic_project(rows, q[k / 8], k % 8, &inverse[k], q[part], r[part][k]);
+        for (int l = 0; l < 8; ++l) q[part][ROWS + terms + l][l] = toda3_quadratic_RIDGE * largest;
+        for (int k = 0; k < terms; ++k)
+            toda3_quadratic_project(rows, q[k / 8], k % 8, &inverse[k], q[part], r[part][k]);
         for (int l = 0; l < 8; ++l, ++terms) {
             toda3_quadratic_project(rows, q[part], l, &inverse[terms], q[part], r[part][terms]);
             toda3_quadratic_project(rows, q[part], l, &inverse[terms], right, weight[terms]);
@@ -235,90 +265,154 @@ static int toda3_quadratic_train(toda3_quadratic_memory *memory, int component)
     for (int k = terms - 1; k >= 0; --k)
         for (int j = k + 1; j < terms; ++j)
             for (int l = 0; l < 8; ++l) weight[k][l] -= r[j / 8][k][j % 8] * weight[j][l];
-    for (int k = 0; k < WINDOW; ++k) memcpy(memory->weight[k][component], weight[k], AHEAD * sizeof(double));
-    return toda3_quadratic_missed(value + ROWS, weight) <= 1e-07 * largest ? terms : 0;
+    for (int k = 0; k < WINDOW; ++k) memcpy(history->weight[k][component], weight[k], AHEAD * sizeof(double));
+    return toda3_quadratic_missed(value + ROWS, weight) <= toda3_quadratic_HOPELESS * largest ? terms : 0;
+}
+/* How far from the last value a guess may be, in sizes of that value. */
+#define toda3_quadratic_REACH 4.0
+
+/* Whether a guess is where the next values may be. Far away the equation of a step has solutions that have
+   nothing to do with the motion. */
+static int toda3_quadratic_near(const double guess[toda3_quadratic_DIM],
+    const double last[toda3_quadratic_DIM])
+{
+    double distance = 0.0, size = 0.0;
+    for (int i = 0; i < toda3_quadratic_DIM; ++i) {
+        distance += fabs(guess[i] - last[i]);
+        size += fabs(last[i]);
+    }
+    return distance <= toda3_quadratic_REACH * size;
+}
+
+enum {
+    /* values that extrapolation uses at most: more amplify rounding more than they gain */
+    toda3_quadratic_HISTORY = 8,
+    toda3_quadratic_REPAY = 150,      /* steps that a fit costs, about */
+    toda3_quadratic_LONG_WAIT = 20000 /* steps until a recurrence that often needs fitting is fitted again */
+};
+
+/* The guess for the next value (y), from earlier ones; 0 if there is none. */
+static int toda3_quadratic_predict(const toda3_quadratic_history *history, double value[toda3_quadratic_DIM])
+{
+    const int last = history->count - 1;
+    double odd[toda3_quadratic_DIM] = { 0.0 }, binomial = -1.0;
+    memset(value, 0, toda3_quadratic_DIM * sizeof value[0]);
+    if (history->use_recurrence) {
+        for (int k = 0; k < history->recurrence_terms; k += 2)
+            for (int i = 0; i < toda3_quadratic_DIM; ++i) {
+                value[i] += history->weight[k][i][0] * history->past[last - k][i];
+                odd[i] += history->weight[k + 1][i][0] * history->past[last - 1 - k][i];
+            }
+        for (int i = 0; i < toda3_quadratic_DIM; ++i) value[i] += odd[i];
+    } else {
+        for (int k = 0; k < history->extrapolation_order && k <= last; ++k) {
+            binomial *= -(double)(history->extrapolation_order - k) / (k + 1);
+            for (int i = 0; i < toda3_quadratic_DIM; ++i) value[i] += binomial * history->past[last - k][i];
+        }
+    }
+    return last >= 0 && toda3_quadratic_near(value, history->past[last]);
+}
+
+/* Choose the guess that would have been best for a value that took several iterations. */
+static void toda3_quadratic_judge(toda3_quadratic_history *history, const double value[toda3_quadratic_DIM])
+{
+    double row[toda3_quadratic_HISTORY + 1][toda3_quadratic_DIM], guess[toda3_quadratic_DIM], least =
+        HUGE_VAL, fitted = HUGE_VAL;
+    const int rows = history->count < toda3_quadratic_HISTORY ? history->count : toda3_quadratic_HISTORY;
+    memcpy(row[0], value, sizeof row[0]);
+    for (int k = 0; k < rows; ++k) memcpy(row[k + 1], history->past[history->count - 1 - k], sizeof row[0]);
+    for (int order = 1; order <= rows; ++order) { /* row[0] becomes the backward difference of this order */
+        double size = 0.0;
+        for (int k = 0; k <= rows - order; ++k)
+            for (int i = 0; i < toda3_quadratic_DIM; ++i) row[k][i] -= row[k + 1][i];
+        for (int i = 0; i < toda3_quadratic_DIM; ++i) size += fabs(row[0][i]);
+        if (size < least) {
+            least = size;
+            history->extrapolation_order = order;
+        }
+    }
+    history->use_recurrence = history->recurrence_terms > 0;
+    if (history->use_recurrence && toda3_quadratic_predict(history, guess)) {
+        fitted = 0.0;
+        for (int i = 0; i < toda3_quadratic_DIM; ++i) fitted += fabs(value[i] - guess[i]);
+    }
+    history->use_recurrence = history->recurrence_terms > 0 && fitted <= least;
+    if (history->extrapolation_order == 0) history->extrapolation_order = 1;
 }
 
 /* Drop what is old, if so many values would not fit into the history. */
-static void toda3_quadratic_make_room(toda3_quadratic_memory *memory, int values)
+static void toda3_quadratic_make_room(toda3_quadratic_history *history, int values)
 {
-    if (memory->count + values <= 224) return;
-    memmove(memory->past, memory->past + memory->count - 112, 112 * sizeof memory->past[0]);
-    memory->count = 112;
+    if (history->count + values <= toda3_quadratic_KEPT) return;
+    memmove(history->past, history->past + history->count - toda3_quadratic_REMEMBERED,
+        toda3_quadratic_REMEMBERED * sizeof history->past[0]);
+    history->count = toda3_quadratic_REMEMBERED;
 }
 
 /* Add a value to the history. */
-static void toda3_quadratic_record(toda3_quadratic_memory *memory, const double value[5])
+static void toda3_quadratic_record(toda3_quadratic_history *history, const double value[toda3_quadratic_DIM])
 {
-    toda3_quadratic_make_room(memory, 1);
-    memcpy(memory->past[memory->count++], value, 5 * sizeof value[0]);
+    toda3_quadratic_make_room(history, 1);
+    memcpy(history->past[history->count++], value, toda3_quadratic_DIM * sizeof value[0]);
 }
 
 /* Fit the recurrence to the last values; with every time, wait longer before it is done again. */
-static void toda3_quadratic_fit(toda3_quadratic_memory *memory)
+static void toda3_quadratic_fit(toda3_quadratic_history *history)
 {
     int found = 1;
-    memory->terms = 0;
-    for (int i = 0; i < 5 && found; ++i) {
-        const int terms = toda3_quadratic_train(memory, i);
+    history->recurrence_terms = 0;
+    for (int i = 0; i < toda3_quadratic_DIM && found; ++i) {
+        const int terms = toda3_quadratic_train(history, i);
         found = terms > 0;
-        if (terms > memory->terms) memory->terms = terms;
+        if (terms > history->recurrence_terms) history->recurrence_terms = terms;
     }
-    if (!found) memory->terms = 0;
-    memory->fitting = found;
-    ++memory->fits;
-    memory->slow = 0;
-    memory->patience = memory->patience < 10000 ? 2 * memory->patience + 150 : 20000;
+    if (!found) history->recurrence_terms = 0;
+    history->use_recurrence = found;
+    ++history->fits;
+    history->slow_steps = 0;
+    history->slow_steps_allowed = history->slow_steps_allowed < toda3_quadratic_LONG_WAIT / 2
+        ? 2 * history->slow_steps_allowed + toda3_quadratic_REPAY : toda3_quadratic_LONG_WAIT;
 }
 
 /* Take in the solved value: what took one iteration needs no better guess. */
-static void toda3_quadratic_remember(toda3_quadratic_memory *memory, const double value[5], int iterations)
+static void toda3_quadratic_remember(toda3_quadratic_history *history,
+    const double value[toda3_quadratic_DIM], int iterations)
 {
-    if (iterations > 1) toda3_quadratic_judge(memory, value);
-    toda3_quadratic_record(memory, value);
-    memory->slow = iterations > 1 ? memory->slow + 1 : 0;
-    if (memory->slow > memory->patience && memory->count >= 112) toda3_quadratic_fit(memory);
+    if (iterations > 1) toda3_quadratic_judge(history, value);
+    toda3_quadratic_record(history, value);
+    history->slow_steps = iterations > 1 ? history->slow_steps + 1 : 0;
+    if (history->slow_steps > history->slow_steps_allowed && history->count >= toda3_quadratic_REMEMBERED)
+        toda3_quadratic_fit(history);
 }
 
-/* Whether an increment is that of the motion. Where the step is too large, the equation may have been solved by a point far
-   away, at another energy, that has nothing to do with it. */
-static int toda3_quadratic_plausible(const toda3_quadratic_solver *s, int stage, const double increment[5])
+/* How far a step may lead, in sizes of the state and of what the vector field says, if the energy is lost;
+   and the part of the energy that counts as lost. */
+#define toda3_quadratic_PLAUSIBLE 1.5
+#define toda3_quadratic_LOST 0.5
+
+/* Whether an increment is that of the motion. Where the step is too large, the equation may have been solved
+   by a point far away, at another energy, that has nothing to do with it. */
+static int toda3_quadratic_plausible(const toda3_quadratic_solver *s,
+    const double increment[toda3_quadratic_DIM])
 {
-    double moved = 0.0, size = 0.0, field[5], middle[5], end[5];
-    for (int i = 0; i < 5; ++i) {
+    double moved = 0.0, size = 0.0, field[toda3_quadratic_DIM], middle[toda3_quadratic_DIM],
+        end[toda3_quadratic_DIM];
+    for (int i = 0; i < toda3_quadratic_DIM; ++i) {
         moved += fabs(increment[i]);
         size += fabs(s->x[i]);
     }
-    if (moved <= 1.5 * size) return 1;
+    if (moved <= toda3_quadratic_PLAUSIBLE * size) return 1;
     toda3_quadratic_vector_field(&s->params, s->x, field);
-    for (int i = 0; i < 5; ++i) {
-        size += fabs(toda3_quadratic_fractions[stage] * s->h * field[i]);
+    for (int i = 0; i < toda3_quadratic_DIM; ++i) {
+        size += fabs(s->h * field[i]);
         middle[i] = s->x[i] + 0.5 * increment[i];
         end[i] = s->x[i] + increment[i];
     }
-    if (moved <= 1.5 * size) return 1;
-    const double before = toda3_quadratic_hamiltonian(&s->params, s->x), after = toda3_quadratic_hamiltonian(&s->params, end);
+    if (moved <= toda3_quadratic_PLAUSIBLE * size) return 1;
+    const double before = toda3_quadratic_hamiltonian(&s->params, s->x), after =
+        toda3_quadratic_hamiltonian(&s->params, end);
     const double scale = fabs(before) + fabs(toda3_quadratic_hamiltonian(&s->params, middle)) + fabs(after);
-    return fabs(after - before) <= 0.5 * scale;
-}
-
-/* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to its last
-   bit: were it rounded with the change, corrections of one sign would add up to a drift. 0, and x as before, if the
-   sum is not finite. */
-static int toda3_quadratic_advance(toda3_quadratic_solver *s, const double change[5], const double correction[5])
-{
-    double x[5], carry[5];
-    for (int i = 0; i < 5; ++i) {
-        const double sum = s->x[i] + change[i], added = sum - s->x[i];
-        const double lost = (s->x[i] - (sum - added)) + (change[i] - added);
-        const double small = lost + (s->carry[i] + correction[i]);
-        x[i] = sum + small;
-        carry[i] = small - (x[i] - sum);
-        if (!isfinite(x[i])) return 0;
-    }
-    memcpy(s->x, x, sizeof x);
-    memcpy(s->carry, carry, sizeof carry);
-    return 1;
+    return fabs(after - before) <= toda3_quadratic_LOST * scale;
 }
 
 /* Coefficient k of the product of two Taylor series. */
@@ -329,13 +423,108 @@ static double toda3_quadratic_taylor_product(const double *a, const double *b, i
     return sum;
 }
 
-/* Whether dm/dt = pi(m) p holds at a point m, where the expansion has the given slope: one with gaps between its terms,
-   like t + t^9, or across the kink of an absolute value, only looks as if it had converged. */
-static int toda3_quadratic_holds(const double *coef, const double p[5], const double m[5], const double slope[5])
+/* The first coefficients of the series of a path, those of the coordinates given. */
+static void toda3_quadratic_path_begin(const double *coef, const double p[5],
+    double s[41][toda3_quadratic_TERMS + 1], double f[1])
 {
     (void)coef;
-    double e[41], field[5], scale = 0.0;
-    memcpy(e, m, 5 * sizeof *e);
+    (void)f;
+    s[5][0] = s[0][0] * s[3][0];
+    s[6][0] = p[3] * s[5][0];
+    s[7][0] = s[0][0] * s[1][0];
+    s[8][0] = p[1] * s[7][0];
+    s[9][0] = 0.5 * s[8][0];
+    s[10][0] = s[0][0] * s[2][0];
+    s[11][0] = p[2] * s[10][0];
+    s[12][0] = s[9][0] - s[11][0];
+    s[13][0] = s[6][0] + s[12][0];
+    s[14][0] = s[1][0] * s[4][0];
+    s[15][0] = p[4] * s[14][0];
+    s[16][0] = p[0] * s[7][0];
+    s[17][0] = (-0.5) * s[16][0];
+    s[18][0] = s[1][0] * s[3][0];
+    s[19][0] = p[3] * s[18][0];
+    s[20][0] = s[17][0] - s[19][0];
+    s[21][0] = s[15][0] + s[20][0];
+    s[22][0] = p[0] * s[10][0];
+    s[23][0] = s[0][0] * s[0][0];
+    s[24][0] = p[3] * s[23][0];
+    s[25][0] = 2.0 * s[24][0];
+    s[26][0] = s[22][0] + s[25][0];
+    s[27][0] = p[1] * s[18][0];
+    s[28][0] = p[0] * s[5][0];
+    s[29][0] = s[27][0] - s[28][0];
+    s[30][0] = s[1][0] * s[1][0];
+    s[31][0] = p[4] * s[30][0];
+    s[32][0] = 2.0 * s[31][0];
+    s[33][0] = p[2] * s[23][0];
+    s[34][0] = 2.0 * s[33][0];
+    s[35][0] = s[32][0] - s[34][0];
+    s[36][0] = s[29][0] + s[35][0];
+    s[37][0] = p[3] * s[30][0];
+    s[38][0] = (-2.0) * s[37][0];
+    s[39][0] = p[1] * s[14][0];
+    s[40][0] = s[38][0] - s[39][0];
+}
+
+/* Coefficient k of the series, and with it coefficient k + 1 of the coordinates. */
+static void toda3_quadratic_path_order(const double *coef, const double p[5],
+    double s[41][toda3_quadratic_TERMS + 1], const double f[1], int k)
+{
+    (void)coef;
+    (void)f;
+    if (k > 0) {
+        s[5][k] = toda3_quadratic_taylor_product(s[0], s[3], k);
+        s[6][k] = p[3] * s[5][k];
+        s[7][k] = toda3_quadratic_taylor_product(s[0], s[1], k);
+        s[8][k] = p[1] * s[7][k];
+        s[9][k] = 0.5 * s[8][k];
+        s[10][k] = toda3_quadratic_taylor_product(s[0], s[2], k);
+        s[11][k] = p[2] * s[10][k];
+        s[12][k] = s[9][k] - s[11][k];
+        s[13][k] = s[6][k] + s[12][k];
+        s[14][k] = toda3_quadratic_taylor_product(s[1], s[4], k);
+        s[15][k] = p[4] * s[14][k];
+        s[16][k] = p[0] * s[7][k];
+        s[17][k] = -0.5 * s[16][k];
+        s[18][k] = toda3_quadratic_taylor_product(s[1], s[3], k);
+        s[19][k] = p[3] * s[18][k];
+        s[20][k] = s[17][k] - s[19][k];
+        s[21][k] = s[15][k] + s[20][k];
+        s[22][k] = p[0] * s[10][k];
+        s[23][k] = toda3_quadratic_taylor_product(s[0], s[0], k);
+        s[24][k] = p[3] * s[23][k];
+        s[25][k] = 2.0 * s[24][k];
+        s[26][k] = s[22][k] + s[25][k];
+        s[27][k] = p[1] * s[18][k];
+        s[28][k] = p[0] * s[5][k];
+        s[29][k] = s[27][k] - s[28][k];
+        s[30][k] = toda3_quadratic_taylor_product(s[1], s[1], k);
+        s[31][k] = p[4] * s[30][k];
+        s[32][k] = 2.0 * s[31][k];
+        s[33][k] = p[2] * s[23][k];
+        s[34][k] = 2.0 * s[33][k];
+        s[35][k] = s[32][k] - s[34][k];
+        s[36][k] = s[29][k] + s[35][k];
+        s[37][k] = p[3] * s[30][k];
+        s[38][k] = -2.0 * s[37][k];
+        s[39][k] = p[1] * s[14][k];
+        s[40][k] = s[38][k] - s[39][k];
+    }
+    s[0][k + 1] = s[13][k] / (k + 1);
+    s[1][k + 1] = s[21][k] / (k + 1);
+    s[2][k + 1] = s[26][k] / (k + 1);
+    s[3][k + 1] = s[36][k] / (k + 1);
+    s[4][k + 1] = s[40][k] / (k + 1);
+}
+
+/* The slope of the path at a point m. */
+static void toda3_quadratic_path_field(const double *coef, const double p[5], const double m[5],
+    double field[5])
+{
+    double e[41];
+    (void)coef;
+    memcpy(e, m, 5 * sizeof e[0]);
     e[5] = e[0] * e[3];
     e[6] = p[3] * e[5];
     e[7] = e[0] * e[1];
@@ -377,108 +566,48 @@ static int toda3_quadratic_holds(const double *coef, const double p[5], const do
     field[2] = e[26];
     field[3] = e[36];
     field[4] = e[40];
-    for (int i = 0; i < 5; ++i) scale += fabs(m[i]) + fabs(slope[i]);
-    for (int i = 0; i < 5; ++i)
+}
+
+/* ---- The implicit step, along paths dm/dt = pi(m) p ---- */
+enum {
+    toda3_quadratic_LONGEST_PATH = 128, /* pieces of a path, a power of 2 */
+    /* of all paths that are tried in a solve: steps that need more are wrong by as much as the state */
+    toda3_quadratic_MOST_PIECES = 512
+};
+
+/* Whether dm/dt = pi(m) p holds at a point m, where the expansion has the given slope: one with gaps between
+   its terms, like t + t^9, or across the kink of an absolute value, only looks as if it had converged. */
+static int toda3_quadratic_holds(const double *coef, const double p[toda3_quadratic_DIM],
+    const double m[toda3_quadratic_DIM], const double slope[toda3_quadratic_DIM])
+{
+    double field[toda3_quadratic_DIM], scale = 0.0;
+    toda3_quadratic_path_field(coef, p, m, field);
+    for (int i = 0; i < toda3_quadratic_DIM; ++i) scale += fabs(m[i]) + fabs(slope[i]);
+    for (int i = 0; i < toda3_quadratic_DIM; ++i)
         if (!(fabs(field[i] - slope[i]) <= 2e-15 * scale)) return 0;
     return 1;
 }
 
-/* The path dm/dt = pi(m) p, 0 <= t <= 1, from start, by its Taylor series: change is m(1) - start, mean the mean of
-   m - start. The number of terms follows from their size; 0 if 30 do not suffice. */
-static int toda3_quadratic_piece(const double *coef, const double p[5], const double start[5], double change[5],
-    double mean[5])
+/* A path for 0 <= t <= 1, from start, by its Taylor series: change is m(1) - start, mean the mean of m -
+   start. The number of terms follows from their size; 0 if toda3_quadratic_TERMS do not suffice. */
+static int toda3_quadratic_piece(const double *coef, const double p[toda3_quadratic_DIM],
+    const double start[toda3_quadratic_DIM], double change[toda3_quadratic_DIM],
+    double mean[toda3_quadratic_DIM])
 {
-    (void)coef;
-    double s[41][30 + 1], end[5], slope[5], norm = 0.0;
+    double series[toda3_quadratic_SERIES][toda3_quadratic_TERMS + 1], fixed[toda3_quadratic_FIXED],
+        end[toda3_quadratic_DIM], slope[toda3_quadratic_DIM], norm = 0.0;
     int small = 0;
-    for (int i = 0; i < 5; ++i) {
-        s[i][0] = start[i];
+    for (int i = 0; i < toda3_quadratic_DIM; ++i) {
+        series[i][0] = start[i];
         change[i] = mean[i] = slope[i] = 0.0;
         norm += fabs(start[i]);
     }
-    s[5][0] = s[0][0] * s[3][0];
-    s[6][0] = p[3] * s[5][0];
-    s[7][0] = s[0][0] * s[1][0];
-    s[8][0] = p[1] * s[7][0];
-    s[9][0] = 0.5 * s[8][0];
-    s[10][0] = s[0][0] * s[2][0];
-    s[11][0] = p[2] * s[10][0];
-    s[12][0] = s[9][0] - s[11][0];
-    s[13][0] = s[6][0] + s[12][0];
-    s[14][0] = s[1][0] * s[4][0];
-    s[15][0] = p[4] * s[14][0];
-    s[16][0] = p[0] * s[7][0];
-    s[17][0] = (-0.5) * s[16][0];
-    s[18][0] = s[1][0] * s[3][0];
-    s[19][0] = p[3] * s[18][0];
-    s[20][0] = s[17][0] - s[19][0];
-    s[21][0] = s[15][0] + s[20][0];
-    s[22][0] = p[0] * s[10][0];
-    s[23][0] = s[0][0] * s[0][0];
-    s[24][0] = p[3] * s[23][0];
-    s[25][0] = 2.0 * s[24][0];
-    s[26][0] = s[22][0] + s[25][0];
-    s[27][0] = p[1] * s[18][0];
-    s[28][0] = p[0] * s[5][0];
-    s[29][0] = s[27][0] - s[28][0];
-    s[30][0] = s[1][0] * s[1][0];
-    s[31][0] = p[4] * s[30][0];
-    s[32][0] = 2.0 * s[31][0];
-    s[33][0] = p[2] * s[23][0];
-    s[34][0] = 2.0 * s[33][0];
-    s[35][0] = s[32][0] - s[34][0];
-    s[36][0] = s[29][0] + s[35][0];
-    s[37][0] = p[3] * s[30][0];
-    s[38][0] = (-2.0) * s[37][0];
-    s[39][0] = p[1] * s[14][0];
-    s[40][0] = s[38][0] - s[39][0];
-    for (int k = 0; k < 30; ++k) {
-        if (k > 0) {
-            s[5][k] = toda3_quadratic_taylor_product(s[0], s[3], k);
-            s[6][k] = p[3] * s[5][k];
-            s[7][k] = toda3_quadratic_taylor_product(s[0], s[1], k);
-            s[8][k] = p[1] * s[7][k];
-            s[9][k] = 0.5 * s[8][k];
-            s[10][k] = toda3_quadratic_taylor_product(s[0], s[2], k);
-            s[11][k] = p[2] * s[10][k];
-            s[12][k] = s[9][k] - s[11][k];
-            s[13][k] = s[6][k] + s[12][k];
-            s[14][k] = toda3_quadratic_taylor_product(s[1], s[4], k);
-            s[15][k] = p[4] * s[14][k];
-            s[16][k] = p[0] * s[7][k];
-            s[17][k] = -0.5 * s[16][k];
-            s[18][k] = toda3_quadratic_taylor_product(s[1], s[3], k);
-            s[19][k] = p[3] * s[18][k];
-            s[20][k] = s[17][k] - s[19][k];
-            s[21][k] = s[15][k] + s[20][k];
-            s[22][k] = p[0] * s[10][k];
-            s[23][k] = toda3_quadratic_taylor_product(s[0], s[0], k);
-            s[24][k] = p[3] * s[23][k];
-            s[25][k] = 2.0 * s[24][k];
-            s[26][k] = s[22][k] + s[25][k];
-            s[27][k] = p[1] * s[18][k];
-            s[28][k] = p[0] * s[5][k];
-            s[29][k] = s[27][k] - s[28][k];
-            s[30][k] = toda3_quadratic_taylor_product(s[1], s[1], k);
-            s[31][k] = p[4] * s[30][k];
-            s[32][k] = 2.0 * s[31][k];
-            s[33][k] = p[2] * s[23][k];
-            s[34][k] = 2.0 * s[33][k];
-            s[35][k] = s[32][k] - s[34][k];
-            s[36][k] = s[29][k] + s[35][k];
-            s[37][k] = p[3] * s[30][k];
-            s[38][k] = -2.0 * s[37][k];
-            s[39][k] = p[1] * s[14][k];
-            s[40][k] = s[38][k] - s[39][k];
-        }
-        s[0][k + 1] = s[13][k] / (k + 1);
-        s[1][k + 1] = s[21][k] / (k + 1);
-        s[2][k + 1] = s[26][k] / (k + 1);
-        s[3][k + 1] = s[36][k] / (k + 1);
-        s[4][k + 1] = s[40][k] / (k + 1);
+    toda3_quadratic_path_begin(coef, p, series, fixed);
+    for (int k = 0; k < toda3_quadratic_TERMS; ++k) {
+        toda3_quadratic_path_order(coef, p, series, fixed, k);
         int negligible = 1;
-        for (int i = 0; i < 5; ++i) {
-            const double term = s[i][k + 1];
+        for (int i = 0; i < toda3_quadratic_DIM; ++i) {
+            const double term = series[i][k + 1];
             change[i] += term;
             mean[i] += term / (k + 2);
             slope[i] += (k + 1) * term;
@@ -491,23 +620,26 @@ static int toda3_quadratic_piece(const double *coef, const double p[5], const do
     return 0;
 }
 
-/* The whole path from x, in 1, 2, 4, ... pieces until each expansion converges. Whatever p is, the end of the path
-   lies on the symplectic leaf of x. 0 if the path is too long or leaves the domain. *made counts all pieces. */
-static int toda3_quadratic_path(const double *coef, const double x[5], const double p[5], double change[5],
-    double mean[5], int *made)
+/* The whole path from x, in 1, 2, 4, ... pieces until each expansion converges. Whatever p is, the end of the
+   path lies on the symplectic leaf of x. 0 if the path is too long or leaves the domain. *made counts all
+   pieces. */
+static int toda3_quadratic_path(const double *coef, const double x[toda3_quadratic_DIM],
+    const double p[toda3_quadratic_DIM], double change[toda3_quadratic_DIM], double mean[toda3_quadratic_DIM],
+    int *made)
 {
-    for (int pieces = 1; pieces <= 128; pieces *= 2) {
-        double q[5], point[5], shift[5], local[5];
+    for (int pieces = 1; pieces <= toda3_quadratic_LONGEST_PATH; pieces *= 2) {
+        double q[toda3_quadratic_DIM], point[toda3_quadratic_DIM], shift[toda3_quadratic_DIM],
+            local[toda3_quadratic_DIM];
         int good = 1;
-        for (int i = 0; i < 5; ++i) {
+        for (int i = 0; i < toda3_quadratic_DIM; ++i) {
             q[i] = p[i] / pieces;
             change[i] = mean[i] = 0.0;
         }
         for (int piece = 0; piece < pieces && good; ++piece) {
-            for (int i = 0; i < 5; ++i) point[i] = x[i] + change[i];
+            for (int i = 0; i < toda3_quadratic_DIM; ++i) point[i] = x[i] + change[i];
             good = toda3_quadratic_piece(coef, q, point, shift, local);
             ++*made;
-            for (int i = 0; i < 5; ++i) {
+            for (int i = 0; i < toda3_quadratic_DIM; ++i) {
                 mean[i] += (change[i] + local[i]) / pieces;
                 change[i] += shift[i];
             }
@@ -519,47 +651,53 @@ static int toda3_quadratic_path(const double *coef, const double x[5], const dou
 
 /* The residual p - grad S_h(mean of the path) of the equation for p, with that mean y, the path's change of
    x and an approximate Jacobian of the residual. 0 if the path cannot be followed. */
-static int toda3_quadratic_residual(toda3_quadratic_solver *s, const double *coef, const double p[5], double y[5],
-    double residual[5], double change[5], double jacobian[25],
-    int *made)
+static int toda3_quadratic_residual(toda3_quadratic_solver *s, const double *coef,
+    const double p[toda3_quadratic_DIM], double y[toda3_quadratic_DIM], double residual[toda3_quadratic_DIM],
+    double change[toda3_quadratic_DIM], double jacobian[toda3_quadratic_DIM * toda3_quadratic_DIM], int *made)
 {
-    double mean[5];
+    double mean[toda3_quadratic_DIM];
     if (!toda3_quadratic_path(coef, s->x, p, change, mean, made)) return 0;
-    for (int i = 0; i < 5; ++i) y[i] = s->x[i] + mean[i];
+    for (int i = 0; i < toda3_quadratic_DIM; ++i) y[i] = s->x[i] + mean[i];
     toda3_quadratic_generate(coef, y, residual, jacobian);
-    for (int i = 0; i < 5; ++i) residual[i] = p[i] - residual[i];
+    for (int i = 0; i < toda3_quadratic_DIM; ++i) residual[i] = p[i] - residual[i];
     ++s->evaluations;
     return 1;
 }
 
 /* The Jacobian by differences, for steps so large that the approximate one does not contract. */
-static int toda3_quadratic_differences(toda3_quadratic_solver *s, const double *coef, const double p[5],
-    const double residual[5], double jacobian[25], int *made)
+static int toda3_quadratic_differences(toda3_quadratic_solver *s, const double *coef,
+    const double p[toda3_quadratic_DIM], const double residual[toda3_quadratic_DIM],
+    double jacobian[toda3_quadratic_DIM * toda3_quadratic_DIM], int *made)
 {
-    double q[5], y[5], moved[5], change[5], unused[25], norm = DBL_MIN;
-    for (int i = 0; i < 5; ++i) norm = fabs(p[i]) > norm ? fabs(p[i]) : norm;
-    for (int j = 0; j < 5; ++j) {
+    double q[toda3_quadratic_DIM], y[toda3_quadratic_DIM], moved[toda3_quadratic_DIM],
+        change[toda3_quadratic_DIM], unused[toda3_quadratic_DIM * toda3_quadratic_DIM], norm = DBL_MIN;
+    for (int i = 0; i < toda3_quadratic_DIM; ++i) norm = fabs(p[i]) > norm ? fabs(p[i]) : norm;
+    for (int j = 0; j < toda3_quadratic_DIM; ++j) {
         memcpy(q, p, sizeof q);
         q[j] += 1e-7 * norm;
         if (!toda3_quadratic_residual(s, coef, q, y, moved, change, unused, made)) return 0;
-        for (int i = 0; i < 5; ++i) jacobian[i * 5 + j] = (moved[i] - residual[i]) / (q[j] - p[j]);
+        for (int i = 0; i < toda3_quadratic_DIM; ++i)
+            jacobian[i * toda3_quadratic_DIM + j] = (moved[i] - residual[i]) / (q[j] - p[j]);
     }
     return 1;
 }
 
-/* Solve p = grad S_h(mean of the path from x under p) and move to the end of that path. Where that takes more than
-   512 pieces of paths, the step is so large that a solution would mean nothing. */
-static toda3_quadratic_status toda3_quadratic_attempt(toda3_quadratic_solver *s, int stage)
+/* Solve p = grad S_h(mean of the path from x under p) and move to the end of that path. Where that takes more
+   than toda3_quadratic_MOST_PIECES pieces of paths, the step is so large that a solution would mean nothing.
+   */
+static toda3_quadratic_status toda3_quadratic_attempt(toda3_quadratic_solver *s)
 {
-    const double *coef = s->coef[stage], none[5] = { 0.0 };
-    toda3_quadratic_memory *memory = &s->memory[stage];
-    double p[5], y[5], residual[5], change[5], jacobian[25], previous = HUGE_VAL;
-    if (!toda3_quadratic_predict(memory, y)) memcpy(y, s->x, sizeof y);
+    const double *coef = s->coef, none[toda3_quadratic_DIM] = { 0.0 };
+    double p[toda3_quadratic_DIM], y[toda3_quadratic_DIM], residual[toda3_quadratic_DIM],
+        change[toda3_quadratic_DIM], jacobian[toda3_quadratic_DIM * toda3_quadratic_DIM], previous = HUGE_VAL;
+    if (!toda3_quadratic_predict(&s->history, y)) memcpy(y, s->x, sizeof y);
     toda3_quadratic_generate(coef, y, p, jacobian);
-    for (int iteration = 0, made = 0; iteration < 20 && made <= 512; ++iteration) {
-        if (!toda3_quadratic_residual(s, coef, p, y, residual, change, jacobian, &made)) return toda3_quadratic_NO_CONVERGENCE;
+    for (int iteration = 0, made = 0; iteration < toda3_quadratic_MAX_ITERATIONS && made <=
+        toda3_quadratic_MOST_PIECES; ++iteration) {
+        if (!toda3_quadratic_residual(s, coef, p, y, residual, change, jacobian, &made))
+            return toda3_quadratic_NO_CONVERGENCE;
         double size = 0.0, norm = DBL_MIN;
-        for (int i = 0; i < 5; ++i) {
+        for (int i = 0; i < toda3_quadratic_DIM; ++i) {
             if (!isfinite(residual[i])) return toda3_quadratic_NOT_FINITE;
             size = fabs(residual[i]) > size ? fabs(residual[i]) : size;
             norm = fabs(p[i]) > norm ? fabs(p[i]) : norm;
@@ -567,50 +705,31 @@ static toda3_quadratic_status toda3_quadratic_attempt(toda3_quadratic_solver *s,
         size /= norm;
         /* The second test: residuals no longer shrink, the solve has reached the level of rounding. */
         if (size <= 4e-16 || (previous < 1e-12 && size > 0.25 * previous)) {
-            if (!toda3_quadratic_plausible(s, stage, change)) return toda3_quadratic_NO_CONVERGENCE;
+            if (!toda3_quadratic_plausible(s, change)) return toda3_quadratic_NO_CONVERGENCE;
             if (!toda3_quadratic_advance(s, change, none)) return toda3_quadratic_NOT_FINITE;
-            toda3_quadratic_remember(memory, y, iteration);
+            toda3_quadratic_remember(&s->history, y, iteration);
             return toda3_quadratic_OK;
         }
         const int slow = iteration >= 3 && size > 0.05 * previous;
-        if (slow && !toda3_quadratic_differences(s, coef, p, residual, jacobian, &made)) return toda3_quadratic_NO_CONVERGENCE;
+        if (slow && !toda3_quadratic_differences(s, coef, p, residual, jacobian, &made))
+            return toda3_quadratic_NO_CONVERGENCE;
         if (!toda3_quadratic_solve(jacobian, residual)) return toda3_quadratic_SINGULAR;
-        for (int i = 0; i < 5; ++i) p[i] -= residual[i];
+        for (int i = 0; i < toda3_quadratic_DIM; ++i) p[i] -= residual[i];
         previous = size;
     }
     return toda3_quadratic_NO_CONVERGENCE;
 }
 
-/* The 1 stages of one step. If one fails, the state is as before the step. */
-static toda3_quadratic_status toda3_quadratic_stages(toda3_quadratic_solver *s)
-{
-    double x[5], carry[5];
-    memcpy(x, s->x, sizeof x);
-    memcpy(carry, s->carry, sizeof carry);
-    for (int stage = 0; stage < 1; ++stage) {
-        toda3_quadratic_status status = toda3_quadratic_attempt(s, stage);
-        /* A guess from earlier steps may have misled it: once more without. */
-        if (status != toda3_quadratic_OK && s->memory[stage].count > 0) {
-            memset(&s->memory[stage], 0, sizeof s->memory[stage]);
-            status = toda3_quadratic_attempt(s, stage);
-        }
-        if (status != toda3_quadratic_OK) {
-            memcpy(s->x, x, sizeof x);
-            memcpy(s->carry, carry, sizeof carry);
-            return status;
-        }
-    }
-    return toda3_quadratic_OK;
-}
-
-/* All of toda3_quadratic_init but the gauge. The arguments may be parts of *s: they are read before it is written. */
-static toda3_quadratic_status toda3_quadratic_start(toda3_quadratic_solver *s, const toda3_quadratic_params *params, const double x0[5])
+/* ---- The solver ---- */
+/* The arguments may be parts of *s: they are read before it is written. */
+toda3_quadratic_status toda3_quadratic_init(toda3_quadratic_solver *s, const toda3_quadratic_params *params,
+    const double x0[toda3_quadratic_DIM])
 {
     if (s == NULL || x0 == NULL) return toda3_quadratic_BAD_ARGUMENT;
     const toda3_quadratic_params own = params != NULL ? *params : toda3_quadratic_default_params;
-    double x[5];
+    double x[toda3_quadratic_DIM];
     memcpy(x, x0, sizeof x);
-    for (int i = 0; i < 5; ++i)
+    for (int i = 0; i < toda3_quadratic_DIM; ++i)
         if (!isfinite(x[i])) return toda3_quadratic_BAD_ARGUMENT;
     memset(s, 0, sizeof *s);
     memcpy(s->x, x, sizeof s->x);
@@ -618,139 +737,84 @@ static toda3_quadratic_status toda3_quadratic_start(toda3_quadratic_solver *s, c
     return toda3_quadratic_OK;
 }
 
-toda3_quadratic_status toda3_quadratic_init(toda3_quadratic_solver *s, const toda3_quadratic_params *params,
-                                            const double x0[5])
-{
-    return toda3_quadratic_start(s, params, x0);
-}
-
 /* What depends on the step size; nothing where that is as before. */
 static toda3_quadratic_status toda3_quadratic_set_step(toda3_quadratic_solver *s, double h)
 {
     if (s == NULL || !isfinite(h)) return toda3_quadratic_BAD_ARGUMENT;
-    if (s->ready && memcmp(&h, &s->h, sizeof h) == 0) return toda3_quadratic_OK;
-    for (int stage = 0; stage < 1; ++stage)
-        toda3_quadratic_prepare(&s->params, toda3_quadratic_fractions[stage] * h, s->coef[stage]);
-    memset(s->memory, 0, sizeof s->memory);
-    for (int stage = 0; stage < 1; ++stage) s->memory[stage].patience = 150;
+    if (s->prepared && memcmp(&h, &s->h, sizeof h) == 0) return toda3_quadratic_OK;
+    toda3_quadratic_prepare(&s->params, h, s->coef);
+    memset(&s->history, 0, sizeof s->history);
+    s->history.slow_steps_allowed = toda3_quadratic_REPAY;
     s->h = h;
-    s->ready = 1;
+    s->t_before_h = s->t;
+    s->steps_before_h = s->steps;
+    s->prepared = 1;
     return toda3_quadratic_OK;
+}
+
+/* One stage. A guess from earlier steps may have misled it: then once more without. */
+static toda3_quadratic_status toda3_quadratic_stage(toda3_quadratic_solver *s)
+{
+    toda3_quadratic_status status = toda3_quadratic_attempt(s);
+    if (status != toda3_quadratic_OK && s->history.count > 0) {
+        memset(&s->history, 0, sizeof s->history);
+        status = toda3_quadratic_attempt(s);
+    }
+    return status;
 }
 
 toda3_quadratic_status toda3_quadratic_step(toda3_quadratic_solver *s, double h)
 {
     toda3_quadratic_status status = toda3_quadratic_set_step(s, h);
     if (status != toda3_quadratic_OK) return status;
-    status = toda3_quadratic_stages(s);
-    if (status == toda3_quadratic_OK) ++s->steps;
+    status = toda3_quadratic_stage(s);
+    if (status != toda3_quadratic_OK) return status;
+    ++s->steps;
+    s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
     return status;
 }
 
 toda3_quadratic_status toda3_quadratic_integrate(toda3_quadratic_solver *s, double h, size_t steps)
 {
     toda3_quadratic_status status = toda3_quadratic_set_step(s, h);
-    for (size_t k = 0; k < steps && status == toda3_quadratic_OK; ++k) status = toda3_quadratic_step(s, h);
+    for (; steps > 0 && status == toda3_quadratic_OK; --steps) status = toda3_quadratic_step(s, h);
     return status;
 }
 
+const char *toda3_quadratic_status_string(toda3_quadratic_status status)
+{
+    static const char *const text[] = {
+        "ok",
+        "no convergence: the step is too large",
+        "singular Newton matrix: the step is too large",
+        "not finite: overflow, or outside the domain",
+        "bad argument: a null pointer, or values that are not allowed"
+    };
+    return (unsigned)status <= toda3_quadratic_BAD_ARGUMENT ? text[status] : "unknown status";
+}
+
+size_t toda3_quadratic_solver_size(void) { return sizeof(toda3_quadratic_solver); }
+
+size_t toda3_quadratic_solver_steps_done(const toda3_quadratic_solver *s) { return s->steps; }
+
+/* ---- Ensembles ---- */
 toda3_quadratic_status toda3_quadratic_ensemble(const toda3_quadratic_params *params, double *x,
-                                                size_t members, double h, size_t steps, unsigned char *status)
+    size_t members, double h, size_t steps, unsigned char *status)
 {
     toda3_quadratic_status worst = isfinite(h) ? toda3_quadratic_OK : toda3_quadratic_BAD_ARGUMENT;
     const toda3_quadratic_params own = params != NULL ? *params : toda3_quadratic_default_params;
     if (x == NULL && members > 0) return toda3_quadratic_BAD_ARGUMENT;
     for (size_t m = 0; m < members; ++m) {
         toda3_quadratic_solver s;
-        double x0[5];
-        for (size_t i = 0; i < 5; ++i) x0[i] = x[i * members + m];
+        double x0[toda3_quadratic_DIM];
+        for (size_t i = 0; i < toda3_quadratic_DIM; ++i) x0[i] = x[i * members + m];
         toda3_quadratic_status member = toda3_quadratic_init(&s, &own, x0);
         if (member == toda3_quadratic_OK) {
             member = toda3_quadratic_integrate(&s, h, steps);
-            for (size_t i = 0; i < 5; ++i) x[i * members + m] = s.x[i];
+            for (size_t i = 0; i < toda3_quadratic_DIM; ++i) x[i * members + m] = s.x[i];
         }
         if (status != NULL) status[m] = (unsigned char)member;
         if (worst == toda3_quadratic_OK) worst = member;
     }
     return worst;
 }
-
-/* the Hamiltonian */
-static void toda3_quadratic_energy(const toda3_quadratic_params *params, const double x[5],
-                                   double energy[restrict 1])
-{
-    (void)params;
-    const double b1 = x[2];
-    const double b2 = x[3];
-    const double b3 = x[4];
-    energy[0] = b3 + (b1 + b2);
-}
-
-/* the Casimirs */
-static void toda3_quadratic_casimir_values(const toda3_quadratic_params *params, const double x[5],
-                                           double out[restrict 1])
-{
-    (void)params;
-    const double a1 = x[0];
-    const double a2 = x[1];
-    const double b1 = x[2];
-    const double b2 = x[3];
-    const double b3 = x[4];
-    out[0] = b3 * (b1 * b2) - b3 * (a1 * a1) - b1 * (a2 * a2);
-}
-
-/* pi(x) grad H(x) */
-static void toda3_quadratic_field(const toda3_quadratic_params *params, const double x[5],
-                                  double out[restrict 5])
-{
-    (void)params;
-    const double a1 = x[0];
-    const double a2 = x[1];
-    const double b1 = x[2];
-    const double b2 = x[3];
-    const double b3 = x[4];
-    const double t1 = 2.0 * (a1 * a1);
-    const double t2 = a2 * a2;
-    out[0] = a1 * b2 - a1 * b1;
-    out[1] = a2 * b3 - a2 * b2;
-    out[2] = t1;
-    out[3] = 2.0 * t2 - t1;
-    out[4] = (-2.0) * t2;
-}
-
-double toda3_quadratic_hamiltonian(const toda3_quadratic_params *params, const double x[5])
-{
-    double energy[1];
-    toda3_quadratic_energy(params != NULL ? params : &toda3_quadratic_default_params, x, energy);
-    return energy[0];
-}
-
-void toda3_quadratic_casimirs(const toda3_quadratic_params *params, const double x[5], double out[])
-{
-    double value[1]; /* out may overlap x */
-    toda3_quadratic_casimir_values(params != NULL ? params : &toda3_quadratic_default_params, x, value);
-    for (int i = 0; i < 1; ++i) out[i] = value[i];
-}
-
-void toda3_quadratic_vector_field(const toda3_quadratic_params *params, const double x[5], double out[5])
-{
-    double value[5];
-    toda3_quadratic_field(params != NULL ? params : &toda3_quadratic_default_params, x, value);
-    memcpy(out, value, sizeof value);
-}
-
-const char *toda3_quadratic_status_string(toda3_quadratic_status status)
-{
-    switch (status) {
-    case toda3_quadratic_OK: return "ok";
-    case toda3_quadratic_NO_CONVERGENCE: return "no convergence: the step is too large";
-    case toda3_quadratic_SINGULAR: return "singular Newton matrix: the step is too large";
-    case toda3_quadratic_NOT_FINITE: return "not finite: overflow, or outside the domain";
-    case toda3_quadratic_BAD_ARGUMENT: return "bad argument: a null pointer, or values that are not allowed";
-    }
-    return "unknown status";
-}
-
-size_t toda3_quadratic_solver_size(void) { return sizeof(toda3_quadratic_solver); }
-
-size_t toda3_quadratic_solver_steps_done(const toda3_quadratic_solver *s) { return s->steps; }

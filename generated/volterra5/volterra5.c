@@ -7,26 +7,34 @@
  *   step: implicit, Newton iteration with the analytic matrix
  *   one Newton iteration: 168 additions, 375 multiplications, 5 divisions, 5 functions
  *
- * spec: volterra5, sha256 cfd60e7b7b6deffb6e5297d17c105b63a43ab52b9aeaa9bde72b05fd871e6d03
+ * spec: volterra5, sha256 dd128093b5704f6c0aeea964a546614f9b636714a89d9b639a6d0eec7b0d3270
  * to regenerate: phigen build volterra5
  * DO NOT EDIT: change the spec and regenerate; edits are noticed by the checksum below.
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 51d11632aa187c64d516b60ca2e350f82ee3af178f76ca7018fcc08402bf05b7
+ *
+ *   1. The model
+ *   2. Compensated sums, linear equations
+ *   3. Starting guesses
+ *   4. The implicit step, by Newton's method
+ *   5. The solver
+ *   6. Ensembles
+ * body-sha256: f1f5e99eb00fd2aa5f97367e1277f1731f60258d215596fb2f14431a99ec13cc
  */
 #include "volterra5.h"
 
 #include <float.h>
-#include <limits.h>
 #include <math.h>
-#include <stdint.h>
 #include <string.h>
 
+/* ---- The model ---- */
 const volterra5_params volterra5_default_params = { 0 };
 
-/* A step of size h is the composition of these fractions of it. */
-static const double volterra5_fractions[1] = { 1.0 };
+enum { volterra5_MAX_ITERATIONS = 20 }; /* of an inner solve */
+
+/* A correction is accepted when the error that it leaves is estimated to be below this. */
+#define volterra5_TOLERANCE 1e-20
 
 /* everything that depends on parameters and step size only */
 static void volterra5_prepare(const volterra5_params *params, double h, double coef[restrict 4])
@@ -42,425 +50,160 @@ static void volterra5_prepare(const volterra5_params *params, double h, double c
 /* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
    increment, all with the momenta p = grad S_h(y) */
 static void volterra5_linearise(const double coef[4], const double y[5], double displacement[restrict 5],
-                                double increment[restrict 5], double jacobian[restrict 25],
-                                double increment_jacobian[restrict 25])
+    double increment[restrict 5], double jacobian[restrict 25], double increment_jacobian[restrict 25])
 {
-    const double v1 = y[0];
-    const double v2 = y[1];
-    const double v3 = y[2];
-    const double v4 = y[3];
-    const double v5 = y[4];
-    const double t1 = coef[2] * v4;
-    const double t2 = coef[3] * v5;
-    const double t3 = coef[1] * v1;
-    const double t4 = coef[2] * v2;
-    const double t5 = coef[1] * v4;
-    const double t6 = coef[2] * v3;
+    const double v1 = y[0], v2 = y[1], v3 = y[2], v4 = y[3], v5 = y[4];
+    /* momenta */
+    const double t1 = coef[2] * v4, t2 = coef[3] * v5, t3 = coef[1] * v1, t4 = coef[2] * v2;
+    const double t5 = coef[1] * v4, t6 = coef[2] * v3;
     const double p_v5 = v1 * (t1 + t2 + (t3 + t4)) + (coef[0] + v4 * (t2 + (t5 + t6)));
-    const double t7 = v5 * p_v5;
-    const double t8 = coef[2] * v5;
-    const double t9 = t8 + t6;
-    const double t10 = coef[3] * v2;
-    const double t11 = coef[1] * v3;
-    const double t12 = t1 + (t10 + t11);
-    const double p_v2 = v1 * (t9 + (t10 + t3)) + (coef[0] + v3 * t12);
-    const double t13 = v2 * p_v2;
-    const double t14 = expm1(0.5 * (t7 - t13));
-    const double t15 = coef[3] * v1;
-    const double t16 = coef[1] * v2;
-    const double t17 = t9 + (t15 + t16);
-    const double t18 = coef[1] * v5;
-    const double t19 = t18 + (t15 + t1);
-    const double p_v1 = v2 * t17 + (coef[0] + v5 * t19);
-    const double t20 = v1 * p_v1;
-    const double t21 = coef[3] * v3;
-    const double t22 = coef[2] * v1;
-    const double t23 = t8 + (t5 + t21);
-    const double p_v3 = v2 * (t21 + t1 + (t16 + t22)) + (coef[0] + v4 * t23);
-    const double t24 = v3 * p_v3;
-    const double t25 = expm1(0.5 * (t20 - t24));
-    const double t26 = coef[3] * v4;
-    const double t27 = t18 + (t26 + t22);
-    const double p_v4 = v3 * (t8 + t26 + (t11 + t4)) + (coef[0] + v5 * t27);
-    const double t28 = v4 * p_v4;
-    const double t29 = expm1(0.5 * (t13 - t28));
-    const double t30 = expm1(0.5 * (t24 - t7));
-    const double t31 = expm1(0.5 * (t28 - t20));
-    const double t32 = 1.0 + t14;
-    const double t33 = 1.0 / t32;
-    const double t34 = 1.0 + t33;
-    const double t35 = t14 * t34;
-    const double t36 = 1.0 + t25;
-    const double t37 = 1.0 / t36;
-    const double t38 = 1.0 + t37;
-    const double t39 = t25 * t38;
-    const double t40 = 1.0 + t29;
-    const double t41 = 1.0 / t40;
-    const double t42 = 1.0 + t41;
-    const double t43 = t29 * t42;
-    const double t44 = 1.0 + t30;
-    const double t45 = 1.0 / t44;
-    const double t46 = 1.0 + t45;
-    const double t47 = t30 * t46;
-    const double t48 = 1.0 + t31;
-    const double t49 = 1.0 / t48;
-    const double t50 = 1.0 + t49;
-    const double t51 = t31 * t50;
-    const double t52 = t4 + (t18 + t19);
-    const double t53 = v5 * t32;
-    const double t54 = v1 * t53;
-    const double t55 = t16 + t17;
-    const double t56 = v2 * t32;
-    const double t57 = v1 * t56;
-    const double t58 = t15 + t21;
-    const double t59 = p_v2 * t32;
-    const double t60 = t22 + (t11 + t12);
-    const double t61 = t6 + (t18 + t27);
-    const double t62 = p_v5 * t32;
-    const double t63 = t15 + t26;
-    const double t64 = p_v1 * t36;
-    const double t65 = t10 + t2;
-    const double t66 = v1 * t36;
-    const double t67 = v2 * t66;
-    const double t68 = v3 * t36;
-    const double t69 = v2 * t68;
-    const double t70 = t10 + t26;
-    const double t71 = p_v3 * t36;
-    const double t72 = t4 + (t5 + t23);
-    const double t73 = v2 * t40;
-    const double t74 = v3 * t73;
-    const double t75 = v4 * t40;
-    const double t76 = v3 * t75;
-    const double t77 = p_v2 * t40;
-    const double t78 = t21 + t2;
-    const double t79 = p_v4 * t40;
-    const double t80 = v3 * t44;
-    const double t81 = v4 * t80;
-    const double t82 = v5 * t44;
-    const double t83 = v4 * t82;
-    const double t84 = p_v3 * t44;
-    const double t85 = p_v5 * t44;
-    const double t86 = v4 * t48;
-    const double t87 = v5 * t86;
-    const double t88 = v1 * t48;
-    const double t89 = v5 * t88;
-    const double t90 = p_v1 * t48;
-    const double t91 = p_v4 * t48;
-    const double t92 = t33 * t33;
-    const double t93 = v1 * (0.5 * (t53 * t34) - 0.5 * (t14 * (t92 * t53)));
-    const double t94 = v1 * (0.5 * (t14 * (t92 * t56)) - 0.5 * (t56 * t34));
-    const double t95 = t37 * t37;
-    const double t96 = v2 * (0.5 * (t66 * t38) - 0.5 * (t25 * (t95 * t66)));
-    const double t97 = v2 * (0.5 * (t25 * (t95 * t68)) - 0.5 * (t68 * t38));
-    const double t98 = t41 * t41;
-    const double t99 = v3 * (0.5 * (t73 * t42) - 0.5 * (t29 * (t98 * t73)));
-    const double t100 = v3 * (0.5 * (t29 * (t98 * t75)) - 0.5 * (t75 * t42));
-    const double t101 = t45 * t45;
-    const double t102 = v4 * (0.5 * (t30 * (t82 * t101)) - 0.5 * (t82 * t46));
-    const double t103 = v4 * (0.5 * (t80 * t46) - 0.5 * (t30 * (t80 * t101)));
-    const double t104 = t49 * t49;
-    const double t105 = v5 * (0.5 * (t31 * (t104 * t88)) - 0.5 * (t88 * t50));
-    const double t106 = v5 * (0.5 * (t86 * t50) - 0.5 * (t31 * (t104 * t86)));
-    displacement[0] = v1 * t14;
-    displacement[1] = v2 * t25;
+    const double t7 = coef[2] * v5, t8 = t7 + t6, t9 = coef[3] * v2, t10 = coef[1] * v3;
+    const double t11 = t1 + (t9 + t10);
+    const double p_v2 = v1 * (t8 + (t9 + t3)) + (coef[0] + v3 * t11);
+    const double t12 = coef[3] * v1, t13 = coef[1] * v2, t14 = t8 + (t12 + t13), t15 = coef[1] * v5;
+    const double t16 = t15 + (t12 + t1);
+    const double p_v1 = v2 * t14 + (coef[0] + v5 * t16);
+    const double t17 = coef[3] * v3, t18 = coef[2] * v1, t19 = t7 + (t5 + t17);
+    const double p_v3 = v2 * (t17 + t1 + (t13 + t18)) + (coef[0] + v4 * t19);
+    const double t20 = coef[3] * v4, t21 = t15 + (t20 + t18);
+    const double p_v4 = v3 * (t7 + t20 + (t10 + t4)) + (coef[0] + v5 * t21);
+    /* displacement */
+    const double t22 = v5 * p_v5, t23 = v2 * p_v2, t24 = expm1(0.5 * (t22 - t23)), t25 = v1 * p_v1;
+    const double t26 = v3 * p_v3, t27 = expm1(0.5 * (t25 - t26)), t28 = v4 * p_v4;
+    const double t29 = expm1(0.5 * (t23 - t28)), t30 = expm1(0.5 * (t26 - t22));
+    const double t31 = expm1(0.5 * (t28 - t25));
+    displacement[0] = v1 * t24;
+    displacement[1] = v2 * t27;
     displacement[2] = v3 * t29;
     displacement[3] = v4 * t30;
     displacement[4] = v5 * t31;
+    /* increment */
+    const double t32 = 1.0 + t24, t33 = 1.0 / t32, t34 = 1.0 + t33, t35 = t24 * t34, t36 = 1.0 + t27;
+    const double t37 = 1.0 / t36, t38 = 1.0 + t37, t39 = t27 * t38, t40 = 1.0 + t29, t41 = 1.0 / t40;
+    const double t42 = 1.0 + t41, t43 = t29 * t42, t44 = 1.0 + t30, t45 = 1.0 / t44, t46 = 1.0 + t45;
+    const double t47 = t30 * t46, t48 = 1.0 + t31, t49 = 1.0 / t48, t50 = 1.0 + t49, t51 = t31 * t50;
     increment[0] = -(v1 * t35);
     increment[1] = -(v2 * t39);
     increment[2] = -(v3 * t43);
     increment[3] = -(v4 * t47);
     increment[4] = -(v5 * t51);
-    jacobian[0] = 1.0 + (t14 + (0.5 * (t52 * t54) - 0.5 * (t55 * t57)));
-    jacobian[1] = 0.5 * (t22 * t54) - 0.5 * (t58 * t57) - 0.5 * (v1 * t59);
+    /* jacobian */
+    const double t52 = t4 + (t15 + t16), t53 = v5 * t32, t54 = v1 * t53, t55 = t13 + t14;
+    const double t56 = v2 * t32, t57 = v1 * t56, t58 = t12 + t17, t59 = p_v2 * t32;
+    const double t60 = t18 + (t10 + t11), t61 = t6 + (t15 + t21), t62 = p_v5 * t32, t63 = t12 + t20;
+    const double t64 = p_v1 * t36, t65 = t9 + t2, t66 = v1 * t36, t67 = v2 * t66, t68 = v3 * t36;
+    const double t69 = v2 * t68, t70 = t9 + t20, t71 = p_v3 * t36, t72 = t4 + (t5 + t19);
+    const double t73 = v2 * t40, t74 = v3 * t73, t75 = v4 * t40, t76 = v3 * t75, t77 = p_v2 * t40;
+    const double t78 = t17 + t2, t79 = p_v4 * t40, t80 = v3 * t44, t81 = v4 * t80, t82 = v5 * t44;
+    const double t83 = v4 * t82, t84 = p_v3 * t44, t85 = p_v5 * t44, t86 = v4 * t48, t87 = v5 * t86;
+    const double t88 = v1 * t48, t89 = v5 * t88, t90 = p_v1 * t48, t91 = p_v4 * t48;
+    jacobian[0] = 1.0 + (t24 + (0.5 * (t52 * t54) - 0.5 * (t55 * t57)));
+    jacobian[1] = 0.5 * (t18 * t54) - 0.5 * (t58 * t57) - 0.5 * (v1 * t59);
     jacobian[2] = 0.5 * (t1 * t54) - 0.5 * (t60 * t57);
     jacobian[3] = 0.5 * (t61 * t54) - 0.5 * (t6 * t57);
-    jacobian[4] = 0.5 * (v1 * t62) + (0.5 * (t63 * t54) - 0.5 * (t22 * t57));
+    jacobian[4] = 0.5 * (v1 * t62) + (0.5 * (t63 * t54) - 0.5 * (t18 * t57));
     jacobian[5] = 0.5 * (v2 * t64) + (0.5 * (t65 * t67) - 0.5 * (t4 * t69));
-    jacobian[6] = 1.0 + (t25 + (0.5 * (t55 * t67) - 0.5 * (t60 * t69)));
+    jacobian[6] = 1.0 + (t27 + (0.5 * (t55 * t67) - 0.5 * (t60 * t69)));
     jacobian[7] = 0.5 * (t4 * t67) - 0.5 * (t70 * t69) - 0.5 * (v2 * t71);
-    jacobian[8] = 0.5 * (t8 * t67) - 0.5 * (t72 * t69);
+    jacobian[8] = 0.5 * (t7 * t67) - 0.5 * (t72 * t69);
     jacobian[9] = 0.5 * (t52 * t67) - 0.5 * (t1 * t69);
-    jacobian[10] = 0.5 * (t55 * t74) - 0.5 * (t8 * t76);
+    jacobian[10] = 0.5 * (t55 * t74) - 0.5 * (t7 * t76);
     jacobian[11] = 0.5 * (v3 * t77) + (0.5 * (t58 * t74) - 0.5 * (t6 * t76));
     jacobian[12] = 1.0 + (t29 + (0.5 * (t60 * t74) - 0.5 * (t72 * t76)));
     jacobian[13] = 0.5 * (t6 * t74) - 0.5 * (t78 * t76) - 0.5 * (v3 * t79);
-    jacobian[14] = 0.5 * (t22 * t74) - 0.5 * (t61 * t76);
+    jacobian[14] = 0.5 * (t18 * t74) - 0.5 * (t61 * t76);
     jacobian[15] = 0.5 * (t4 * t81) - 0.5 * (t52 * t83);
-    jacobian[16] = 0.5 * (t60 * t81) - 0.5 * (t22 * t83);
+    jacobian[16] = 0.5 * (t60 * t81) - 0.5 * (t18 * t83);
     jacobian[17] = 0.5 * (v4 * t84) + (0.5 * (t70 * t81) - 0.5 * (t1 * t83));
     jacobian[18] = 1.0 + (t30 + (0.5 * (t72 * t81) - 0.5 * (t61 * t83)));
     jacobian[19] = 0.5 * (t1 * t81) - 0.5 * (t63 * t83) - 0.5 * (v4 * t85);
-    jacobian[20] = 0.5 * (t8 * t87) - 0.5 * (t65 * t89) - 0.5 * (v5 * t90);
+    jacobian[20] = 0.5 * (t7 * t87) - 0.5 * (t65 * t89) - 0.5 * (v5 * t90);
     jacobian[21] = 0.5 * (t6 * t87) - 0.5 * (t55 * t89);
     jacobian[22] = 0.5 * (t72 * t87) - 0.5 * (t4 * t89);
-    jacobian[23] = 0.5 * (v5 * t91) + (0.5 * (t78 * t87) - 0.5 * (t8 * t89));
+    jacobian[23] = 0.5 * (v5 * t91) + (0.5 * (t78 * t87) - 0.5 * (t7 * t89));
     jacobian[24] = 1.0 + (t31 + (0.5 * (t61 * t87) - 0.5 * (t52 * t89)));
+    /* increment jacobian */
+    const double t92 = t33 * t33, t93 = v1 * (0.5 * (t53 * t34) - 0.5 * (t24 * (t92 * t53)));
+    const double t94 = v1 * (0.5 * (t24 * (t92 * t56)) - 0.5 * (t56 * t34)), t95 = t37 * t37;
+    const double t96 = v2 * (0.5 * (t66 * t38) - 0.5 * (t27 * (t95 * t66)));
+    const double t97 = v2 * (0.5 * (t27 * (t95 * t68)) - 0.5 * (t68 * t38)), t98 = t41 * t41;
+    const double t99 = v3 * (0.5 * (t73 * t42) - 0.5 * (t29 * (t98 * t73)));
+    const double t100 = v3 * (0.5 * (t29 * (t98 * t75)) - 0.5 * (t75 * t42)), t101 = t45 * t45;
+    const double t102 = v4 * (0.5 * (t30 * (t82 * t101)) - 0.5 * (t82 * t46));
+    const double t103 = v4 * (0.5 * (t80 * t46) - 0.5 * (t30 * (t80 * t101))), t104 = t49 * t49;
+    const double t105 = v5 * (0.5 * (t31 * (t104 * t88)) - 0.5 * (t88 * t50));
+    const double t106 = v5 * (0.5 * (t86 * t50) - 0.5 * (t31 * (t104 * t86)));
     increment_jacobian[0] = -(t35 + (t52 * t93 + t55 * t94));
-    increment_jacobian[1] = -(v1 * (0.5 * (t14 * (t92 * t59)) - 0.5 * (t59 * t34)) + (t58 * t94 + t22 * t93));
+    increment_jacobian[1] = -(v1 * (0.5 * (t24 * (t92 * t59)) - 0.5 * (t59 * t34)) + (t58 * t94 + t18 * t93));
     increment_jacobian[2] = -(t1 * t93 + t60 * t94);
     increment_jacobian[3] = -(t61 * t93 + t6 * t94);
-    increment_jacobian[4] = -(v1 * (0.5 * (t62 * t34) - 0.5 * (t14 * (t92 * t62))) + (t63 * t93 + t22 * t94));
-    increment_jacobian[5] = -(v2 * (0.5 * (t64 * t38) - 0.5 * (t25 * (t95 * t64))) + (t65 * t96 + t4 * t97));
+    increment_jacobian[4] = -(v1 * (0.5 * (t62 * t34) - 0.5 * (t24 * (t92 * t62))) + (t63 * t93 + t18 * t94));
+    increment_jacobian[5] = -(v2 * (0.5 * (t64 * t38) - 0.5 * (t27 * (t95 * t64))) + (t65 * t96 + t4 * t97));
     increment_jacobian[6] = -(t39 + (t60 * t97 + t55 * t96));
-    increment_jacobian[7] = -(v2 * (0.5 * (t25 * (t95 * t71)) - 0.5 * (t71 * t38)) + (t4 * t96 + t70 * t97));
-    increment_jacobian[8] = -(t72 * t97 + t8 * t96);
+    increment_jacobian[7] = -(v2 * (0.5 * (t27 * (t95 * t71)) - 0.5 * (t71 * t38)) + (t4 * t96 + t70 * t97));
+    increment_jacobian[8] = -(t72 * t97 + t7 * t96);
     increment_jacobian[9] = -(t52 * t96 + t1 * t97);
-    increment_jacobian[10] = -(t55 * t99 + t8 * t100);
-    increment_jacobian[11] = -(v3 * (0.5 * (t77 * t42) - 0.5 * (t29 * (t77 * t98))) + (t6 * t100 + t58 * t99));
+    increment_jacobian[10] = -(t55 * t99 + t7 * t100);
+    increment_jacobian[11] = -(v3 * (0.5 * (t77 * t42) - 0.5 * (t29 * (t77 * t98))) + (t6 * t100 + t58
+        * t99));
     increment_jacobian[12] = -(t43 + (t60 * t99 + t72 * t100));
-    increment_jacobian[13] = -(v3 * (0.5 * (t29 * (t98 * t79)) - 0.5 * (t79 * t42)) + (t78 * t100 + t6 * t99));
-    increment_jacobian[14] = -(t61 * t100 + t22 * t99);
+    increment_jacobian[13] = -(v3 * (0.5 * (t29 * (t98 * t79)) - 0.5 * (t79 * t42)) + (t78 * t100 + t6
+        * t99));
+    increment_jacobian[14] = -(t61 * t100 + t18 * t99);
     increment_jacobian[15] = -(t52 * t102 + t4 * t103);
-    increment_jacobian[16] = -(t60 * t103 + t22 * t102);
-    increment_jacobian[17] = -(v4 * (0.5 * (t84 * t46) - 0.5 * (t30 * (t84 * t101))) + (t70 * t103 + t1 * t102));
+    increment_jacobian[16] = -(t60 * t103 + t18 * t102);
+    increment_jacobian[17] = -(v4 * (0.5 * (t84 * t46) - 0.5 * (t30 * (t84 * t101))) + (t70 * t103 + t1
+        * t102));
     increment_jacobian[18] = -(t47 + (t61 * t102 + t72 * t103));
-    increment_jacobian[19] = -(v4 * (0.5 * (t30 * (t85 * t101)) - 0.5 * (t85 * t46)) + (t1 * t103 + t63 * t102));
-    increment_jacobian[20] = -(v5 * (0.5 * (t31 * (t104 * t90)) - 0.5 * (t90 * t50)) + (t65 * t105 + t8 * t106));
+    increment_jacobian[19] = -(v4 * (0.5 * (t30 * (t85 * t101)) - 0.5 * (t85 * t46)) + (t1 * t103 + t63
+        * t102));
+    increment_jacobian[20] = -(v5 * (0.5 * (t31 * (t104 * t90)) - 0.5 * (t90 * t50)) + (t65 * t105 + t7
+        * t106));
     increment_jacobian[21] = -(t55 * t105 + t6 * t106);
     increment_jacobian[22] = -(t72 * t106 + t4 * t105);
-    increment_jacobian[23] = -(v5 * (0.5 * (t91 * t50) - 0.5 * (t31 * (t104 * t91))) + (t78 * t106 + t8 * t105));
+    increment_jacobian[23] = -(v5 * (0.5 * (t91 * t50) - 0.5 * (t31 * (t104 * t91))) + (t78 * t106 + t7
+        * t105));
     increment_jacobian[24] = -(t51 + (t52 * t105 + t61 * t106));
 }
 
-/* Solve matrix * solution = side, both overwritten, by elimination with partial pivoting. 0 if singular. */
-static int volterra5_solve(double matrix[25], double side[5])
+/* the Hamiltonian */
+double volterra5_hamiltonian(const volterra5_params *params, const double x[5])
 {
-    for (int k = 0; k < 5; ++k) {
-        int best = k;
-        for (int i = k + 1; i < 5; ++i)
-            if (fabs(matrix[i * 5 + k]) > fabs(matrix[best * 5 + k])) best = i;
-        const double pivot = matrix[best * 5 + k];
-        if (!(fabs(pivot) > 0.0)) return 0;
-        for (int j = k; j < 5 && best != k; ++j) {
-            const double swap = matrix[k * 5 + j];
-            matrix[k * 5 + j] = matrix[best * 5 + j];
-            matrix[best * 5 + j] = swap;
-        }
-        const double swap = side[k];
-        side[k] = side[best];
-        side[best] = swap;
-        for (int i = k + 1; i < 5; ++i) {
-            const double factor = matrix[i * 5 + k] / pivot;
-            for (int j = k + 1; j < 5; ++j) matrix[i * 5 + j] -= factor * matrix[k * 5 + j];
-            side[i] -= factor * side[k];
-        }
-    }
-    for (int i = 5 - 1; i >= 0; --i) {
-        for (int j = i + 1; j < 5; ++j) side[i] -= matrix[i * 5 + j] * side[j];
-        side[i] /= matrix[i * 5 + i];
-    }
-    return 1;
+    (void)params;
+    const double v1 = x[0], v2 = x[1], v3 = x[2], v4 = x[3], v5 = x[4];
+    return v5 + (v4 + (v3 + (v1 + v2)));
 }
 
-/* Whether a guess is where the next values may be. Recurrences that were fitted to little else than rest, near a saddle,
-   may lead anywhere; and far away the equation of a step has solutions that have nothing to do with the motion. */
-static int volterra5_near(const double guess[5], const double last[5])
+/* the Casimirs */
+void volterra5_casimirs(const volterra5_params *params, const double x[5], double out[])
 {
-    double distance = 0.0, size = 0.0;
-    for (int i = 0; i < 5; ++i) {
-        distance += fabs(guess[i] - last[i]);
-        size += fabs(last[i]);
-    }
-    return distance <= 4.0 * size;
+    (void)params;
+    const double v1 = x[0], v2 = x[1], v3 = x[2], v4 = x[3], v5 = x[4];
+    out[0] = v5 * (v4 * (v3 * (v1 * v2)));
 }
 
-/* The guess for the next value (y), from earlier ones; 0 if there is none. */
-static int volterra5_predict(const volterra5_memory *memory, double value[5])
+/* pi(x) grad H(x) */
+void volterra5_vector_field(const volterra5_params *params, const double x[5], double out[5])
 {
-    const int last = memory->count - 1;
-    double odd[5] = { 0.0 }, binomial = -1.0;
-    memset(value, 0, 5 * sizeof value[0]);
-    if (memory->fitting) {
-        for (int k = 0; k < memory->terms; k += 2)
-            for (int i = 0; i < 5; ++i) {
-                value[i] += memory->weight[k][i][0] * memory->past[last - k][i];
-                odd[i] += memory->weight[k + 1][i][0] * memory->past[last - 1 - k][i];
-            }
-        for (int i = 0; i < 5; ++i) value[i] += odd[i];
-    } else {
-        for (int k = 0; k < memory->order && k <= last; ++k) {
-            binomial *= -(double)(memory->order - k) / (k + 1);
-            for (int i = 0; i < 5; ++i) value[i] += binomial * memory->past[last - k][i];
-        }
-    }
-    return last >= 0 && volterra5_near(value, memory->past[last]);
+    (void)params;
+    const double v1 = x[0], v2 = x[1], v3 = x[2], v4 = x[3], v5 = x[4];
+    const double t1 = v1 * v2, t2 = v1 * v5, t3 = v2 * v3, t4 = v3 * v4, t5 = v4 * v5;
+    out[0] = t1 - t2;
+    out[1] = t3 - t1;
+    out[2] = t4 - t3;
+    out[3] = t5 - t4;
+    out[4] = t2 - t5;
 }
 
-/* Choose the guess that would have been best for a value that took several iterations. */
-static void volterra5_judge(volterra5_memory *memory, const double value[5])
+/* ---- Compensated sums, linear equations ---- */
+/* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to
+   its last bit: were it rounded with the change, corrections of one sign would add up to a drift. 0, and x as
+   before, if the sum is not finite. */
+static int volterra5_advance(volterra5_solver *s, const double change[volterra5_DIM],
+    const double correction[volterra5_DIM])
 {
-    double row[8 + 1][5], guess[5], least = HUGE_VAL, fitted = HUGE_VAL;
-    const int rows = memory->count < 8 ? memory->count : 8;
-    memcpy(row[0], value, sizeof row[0]);
-    for (int k = 0; k < rows; ++k) memcpy(row[k + 1], memory->past[memory->count - 1 - k], sizeof row[0]);
-    for (int order = 1; order <= rows; ++order) { /* row[0] becomes the backward difference of this order */
-        double size = 0.0;
-        for (int k = 0; k <= rows - order; ++k)
-            for (int i = 0; i < 5; ++i) row[k][i] -= row[k + 1][i];
-        for (int i = 0; i < 5; ++i) size += fabs(row[0][i]);
-        if (size < least) {
-            least = size;
-            memory->order = order;
-        }
-    }
-    memory->fitting = memory->terms > 0;
-    if (memory->fitting && volterra5_predict(memory, guess)) {
-        fitted = 0.0;
-        for (int i = 0; i < 5; ++i) fitted += fabs(value[i] - guess[i]);
-    }
-    memory->fitting = memory->terms > 0 && fitted <= least;
-    if (memory->order == 0) memory->order = 1;
-}
-
-/* Make eight columns orthogonal to one, by the multiples of it that are put into r. Where that one is among the eight, those
-   up to it stay as they are, and inverse becomes one over its squared length. The number of rows is even. */
-static void volterra5_project(int rows, double (*one)[8], int column, double *inverse, double (*eight)[8], double r[8])
-{
-    double even[8] = { 0.0 }, odd[8] = { 0.0 };
-    for (int i = 0; i < rows; i += 2) {
-        const double entry = one[i][column], next = one[i + 1][column];
-        for (int l = 0; l < 8; ++l) even[l] += entry * eight[i][l];
-        for (int l = 0; l < 8; ++l) odd[l] += next * eight[i + 1][l];
-    }
-    for (int l = 0; l < 8; ++l) even[l] += odd[l];
-    if (one == eight) {
-        *inverse = even[column] > 0.0 ? 1.0 / even[column] : 0.0;
-        memset(even, 0, ((size_t)column + 1) * sizeof even[0]);
-    }
-    for (int l = 0; l < 8; ++l) r[l] = even[l] *= *inverse;
-    for (int i = 0; i < rows; ++i) {
-        const double entry = one[i][column];
-        for (int l = 0; l < 8; ++l) eight[i][l] -= entry * even[l];
-    }
-}
-
-/* By how much recurrences miss the last of these values. */
-static double volterra5_missed(const double *value, double (*weight)[8])
-{
-    enum { AHEAD = 8, WINDOW = 40, CHECKS = 8 };
-    double most = 0.0;
-    for (int i = 0; i < CHECKS; ++i) {
-        double guess[8] = { 0.0 };
-        for (int k = 0; k < WINDOW; ++k)
-            for (int l = 0; l < 8; ++l) guess[l] += weight[k][l] * value[i + WINDOW - 1 - k];
-        for (int l = 0; l < AHEAD; ++l) most = fmax(most, fabs(guess[l] - value[i + WINDOW + l]));
-    }
-    return most;
-}
-
-/* Fit the recurrences value[m + l] = sum of weight[k][..][l] * value[m - 1 - k], l = 0 ... 8 - 1, to the history of
-   a component: ridge least squares by modified Gram-Schmidt, the ridge at the level of rounding. Columns are taken in by
-   eights, until they leave next to nothing of the right-hand sides. How many past values are used; 0 if the recurrences do
-   not foresee the last values, which they were not fitted to. */
-static int volterra5_train(volterra5_memory *memory, int component)
-{
-    enum { AHEAD = 8, WINDOW = 40, ROWS = 56 };
-    double q[WINDOW / 8][ROWS + WINDOW][8], r[WINDOW / 8][WINDOW][8], inverse[WINDOW]; /* eight columns in each part */
-    double right[ROWS + WINDOW][8], weight[WINDOW][8], value[111], largest = 0.0, left = HUGE_VAL;
-    int terms = 0;
-    memset(q, 0, sizeof q);
-    memset(right, 0, sizeof right);
-    memset(weight, 0, sizeof weight);
-    for (int i = 0; i < 111; ++i) {
-        value[i] = memory->past[memory->count - 111 + i][component];
-        if (fabs(value[i]) > largest) largest = fabs(value[i]);
-    }
-    for (int i = 0; i < ROWS; ++i)
-        for (int l = 0; l < AHEAD; ++l) right[i][l] = value[i + WINDOW + l];
-    while (terms < WINDOW && left > 3e-12 * largest) {
-        const int part = terms / 8, rows = ROWS + terms + 8; /* further rows of the ridge are zero in these columns */
-        for (int i = 0; i < ROWS; ++i)
-            for (int l = 0; l < 8; ++l) q[part][i][l] = value[i + WINDOW - 1 - terms - l];
-        for (int l = 0; l < 8; ++l) q[part][ROWS + terms + l][l] = 1e-15 * largest;
-        for (int k = 0; k < terms; ++k) volterra5_project(rows, q[k / 8], k % 8, &inverse[k], q[part], r[part][k]);
-        for (int l = 0; l < 8; ++l, ++terms) {
-            volterra5_project(rows, q[part], l, &inverse[terms], q[part], r[part][terms]);
-            volterra5_project(rows, q[part], l, &inverse[terms], right, weight[terms]);
-        }
-        double sum[8] = { 0.0 };
-        for (int i = 0; i < ROWS; ++i)
-            for (int l = 0; l < 8; ++l) sum[l] += fabs(right[i][l]);
-        left = 0.0;
-        for (int l = 0; l < 8; ++l) left += sum[l] / ROWS;
-    }
-    for (int k = terms - 1; k >= 0; --k)
-        for (int j = k + 1; j < terms; ++j)
-            for (int l = 0; l < 8; ++l) weight[k][l] -= r[j / 8][k][j % 8] * weight[j][l];
-    for (int k = 0; k < WINDOW; ++k) memcpy(memory->weight[k][component], weight[k], AHEAD * sizeof(double));
-    return volterra5_missed(value + ROWS, weight) <= 1e-07 * largest ? terms : 0;
-}
-
-/* Drop what is old, if so many values would not fit into the history. */
-static void volterra5_make_room(volterra5_memory *memory, int values)
-{
-    if (memory->count + values <= 222) return;
-    memmove(memory->past, memory->past + memory->count - 111, 111 * sizeof memory->past[0]);
-    memory->count = 111;
-}
-
-/* Add a value to the history. */
-static void volterra5_record(volterra5_memory *memory, const double value[5])
-{
-    volterra5_make_room(memory, 1);
-    memcpy(memory->past[memory->count++], value, 5 * sizeof value[0]);
-}
-
-/* Fit the recurrence to the last values; with every time, wait longer before it is done again. */
-static void volterra5_fit(volterra5_memory *memory)
-{
-    int found = 1;
-    memory->terms = 0;
-    for (int i = 0; i < 5 && found; ++i) {
-        const int terms = volterra5_train(memory, i);
-        found = terms > 0;
-        if (terms > memory->terms) memory->terms = terms;
-    }
-    if (!found) memory->terms = 0;
-    memory->fitting = found;
-    ++memory->fits;
-    memory->slow = 0;
-    memory->patience = memory->patience < 10000 ? 2 * memory->patience + 150 : 20000;
-}
-
-/* Take in the solved value: what took one iteration needs no better guess. */
-static void volterra5_remember(volterra5_memory *memory, const double value[5], int iterations)
-{
-    if (iterations > 1) volterra5_judge(memory, value);
-    volterra5_record(memory, value);
-    memory->slow = iterations > 1 ? memory->slow + 1 : 0;
-    if (memory->slow > memory->patience && memory->count >= 111) volterra5_fit(memory);
-}
-
-/* Whether an increment is that of the motion. Where the step is too large, the equation may have been solved by a point far
-   away, at another energy, that has nothing to do with it. */
-static int volterra5_plausible(const volterra5_solver *s, int stage, const double increment[5])
-{
-    double moved = 0.0, size = 0.0, field[5], middle[5], end[5];
-    for (int i = 0; i < 5; ++i) {
-        moved += fabs(increment[i]);
-        size += fabs(s->x[i]);
-    }
-    if (moved <= 1.5 * size) return 1;
-    volterra5_vector_field(&s->params, s->x, field);
-    for (int i = 0; i < 5; ++i) {
-        size += fabs(volterra5_fractions[stage] * s->h * field[i]);
-        middle[i] = s->x[i] + 0.5 * increment[i];
-        end[i] = s->x[i] + increment[i];
-    }
-    if (moved <= 1.5 * size) return 1;
-    const double before = volterra5_hamiltonian(&s->params, s->x), after = volterra5_hamiltonian(&s->params, end);
-    const double scale = fabs(before) + fabs(volterra5_hamiltonian(&s->params, middle)) + fabs(after);
-    return fabs(after - before) <= 0.5 * scale;
-}
-
-/* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to its last
-   bit: were it rounded with the change, corrections of one sign would add up to a drift. 0, and x as before, if the
-   sum is not finite. */
-static int volterra5_advance(volterra5_solver *s, const double change[5], const double correction[5])
-{
-    double x[5], carry[5];
-    for (int i = 0; i < 5; ++i) {
+    double x[volterra5_DIM], carry[volterra5_DIM];
+    for (int i = 0; i < volterra5_DIM; ++i) {
         const double sum = s->x[i] + change[i], added = sum - s->x[i];
         const double lost = (s->x[i] - (sum - added)) + (change[i] - added);
         const double small = lost + (s->carry[i] + correction[i]);
@@ -473,12 +216,113 @@ static int volterra5_advance(volterra5_solver *s, const double change[5], const 
     return 1;
 }
 
+/* Solve matrix * solution = side, both overwritten, by elimination with partial pivoting. 0 if singular. */
+static int volterra5_solve(double matrix[volterra5_DIM * volterra5_DIM], double side[volterra5_DIM])
+{
+    for (int k = 0; k < volterra5_DIM; ++k) {
+        int best = k;
+        for (int i = k + 1; i < volterra5_DIM; ++i)
+            if (fabs(matrix[i * volterra5_DIM + k]) > fabs(matrix[best * volterra5_DIM + k])) best = i;
+        const double pivot = matrix[best * volterra5_DIM + k], last = side[k];
+        if (!(fabs(pivot) > 0.0)) return 0;
+        for (int j = k; j < volterra5_DIM && best != k; ++j) {
+            const double swap = matrix[k * volterra5_DIM + j];
+            matrix[k * volterra5_DIM + j] = matrix[best * volterra5_DIM + j];
+            matrix[best * volterra5_DIM + j] = swap;
+        }
+        side[k] = side[best];
+        side[best] = last;
+        for (int i = k + 1; i < volterra5_DIM; ++i) {
+            const double factor = matrix[i * volterra5_DIM + k] / pivot;
+            for (int j = k + 1; j < volterra5_DIM; ++j)
+                matrix[i * volterra5_DIM + j] -= factor * matrix[k * volterra5_DIM + j];
+            side[i] -= factor * side[k];
+        }
+    }
+    for (int i = volterra5_DIM - 1; i >= 0; --i) {
+        for (int j = i + 1; j < volterra5_DIM; ++j) side[i] -= matrix[i * volterra5_DIM + j] * side[j];
+        side[i] /= matrix[i * volterra5_DIM + i];
+    }
+    return 1;
+}
+
+/* ---- Starting guesses ---- */
+/* How far from the last value a guess may be, in sizes of that value. */
+#define volterra5_REACH 4.0
+
+/* The guess for the next value from the last ones: the sum of their backward differences. 0 if there is none,
+   or if it is far away, where the equation of a step has solutions that have nothing to do with the motion.
+   */
+static int volterra5_predict(const volterra5_history *history, double value[volterra5_DIM])
+{
+    double distance = 0.0, size = 0.0;
+    for (int i = 0; i < volterra5_DIM; ++i) {
+        value[i] = 0.0;
+        for (int k = 0; k < history->order; ++k) value[i] += history->difference[k][i];
+        distance += fabs(value[i] - history->difference[0][i]);
+        size += fabs(history->difference[0][i]);
+    }
+    return history->order > 0 && distance <= volterra5_REACH * size;
+}
+
+/* Take in the solved value. The guess of order k missed it by its k-th difference: the next is of the best
+   order. */
+static void volterra5_remember(volterra5_history *history, const double value[volterra5_DIM])
+{
+    double least = HUGE_VAL, next[volterra5_DIM];
+    memcpy(next, value, sizeof next);
+    for (int k = 0; k <= history->count && k < volterra5_DIFFERENCES; ++k) {
+        double size = 0.0;
+        for (int i = 0; i < volterra5_DIM; ++i) {
+            const double last = history->difference[k][i];
+            history->difference[k][i] = next[i];
+            size += fabs(next[i]);
+            next[i] -= last;
+        }
+        if (k > 0 && size < least) {
+            least = size;
+            history->order = k;
+        }
+    }
+    if (history->count == 0) history->order = 1;
+    if (history->count < volterra5_DIFFERENCES) ++history->count;
+}
+
+/* How far a step may lead, in sizes of the state and of what the vector field says, if the energy is lost;
+   and the part of the energy that counts as lost. */
+#define volterra5_PLAUSIBLE 1.5
+#define volterra5_LOST 0.5
+
+/* Whether an increment is that of the motion. Where the step is too large, the equation may have been solved
+   by a point far away, at another energy, that has nothing to do with it. */
+static int volterra5_plausible(const volterra5_solver *s, const double increment[volterra5_DIM])
+{
+    double moved = 0.0, size = 0.0, field[volterra5_DIM], middle[volterra5_DIM], end[volterra5_DIM];
+    for (int i = 0; i < volterra5_DIM; ++i) {
+        moved += fabs(increment[i]);
+        size += fabs(s->x[i]);
+    }
+    if (moved <= volterra5_PLAUSIBLE * size) return 1;
+    volterra5_vector_field(&s->params, s->x, field);
+    for (int i = 0; i < volterra5_DIM; ++i) {
+        size += fabs(s->h * field[i]);
+        middle[i] = s->x[i] + 0.5 * increment[i];
+        end[i] = s->x[i] + increment[i];
+    }
+    if (moved <= volterra5_PLAUSIBLE * size) return 1;
+    const double before = volterra5_hamiltonian(&s->params, s->x), after = volterra5_hamiltonian(&s->params,
+        end);
+    const double scale = fabs(before) + fabs(volterra5_hamiltonian(&s->params, middle)) + fabs(after);
+    return fabs(after - before) <= volterra5_LOST * scale;
+}
+
+/* ---- The implicit step, by Newton's method ---- */
 /* Size of a correction relative to each component of y (coordinates keep their sign, and may be of very
    different size); NaN or infinite if the correction is. */
-static double volterra5_size(const double y[5], const double delta[5])
+static double volterra5_size(const double y[volterra5_DIM], const double delta[volterra5_DIM])
 {
     double size = 0.0;
-    for (int i = 0; i < 5; ++i) {
+    for (int i = 0; i < volterra5_DIM; ++i) {
         const double ratio = fabs(delta[i]) / (fabs(y[i]) + DBL_MIN);
         if (!isfinite(ratio)) return ratio;
         size = ratio > size ? ratio : size;
@@ -486,73 +330,55 @@ static double volterra5_size(const double y[5], const double delta[5])
     return size;
 }
 
+/* Corrections below the first that shrink by less than the second have reached the level of rounding. */
+#define volterra5_NEARLY_SOLVED 1e-8
+#define volterra5_SHRINKING 0.25
+
 /* Solve (y - x) + displacement(y) = 0 for y by Newton's method from the extrapolated guess, and advance. The
-   increment is corrected to first order by the last Newton correction, so that correction costs no evaluation:
-   a correction is accepted when the error that remains after it, quadratic in it, is below 1e-20. */
-static volterra5_status volterra5_attempt(volterra5_solver *s, int stage)
+   increment is corrected to first order by the last Newton correction, so that correction costs no
+   evaluation: a correction is accepted when the error that remains after it, quadratic in it, is below
+   volterra5_TOLERANCE. */
+static volterra5_status volterra5_attempt(volterra5_solver *s)
 {
-    const double *coef = s->coef[stage];
-    volterra5_memory *memory = &s->memory[stage];
-    double y[5], delta[5], displacement[5], increment[5];
-    double jacobian[25], increment_jacobian[25];
-    if (!volterra5_predict(memory, y)) memcpy(y, s->x, sizeof y);
-    double previous = HUGE_VAL;
-    for (int iteration = 0; iteration < 20; ++iteration) {
-        volterra5_linearise(coef, y, displacement, increment, jacobian, increment_jacobian);
+    double y[volterra5_DIM], delta[volterra5_DIM], displacement[volterra5_DIM], increment[volterra5_DIM];
+    double jacobian[volterra5_DIM * volterra5_DIM], increment_jacobian[volterra5_DIM * volterra5_DIM],
+        previous = HUGE_VAL;
+    if (!volterra5_predict(&s->history, y)) memcpy(y, s->x, sizeof y);
+    for (int iteration = 1; iteration <= volterra5_MAX_ITERATIONS; ++iteration) {
+        volterra5_linearise(s->coef, y, displacement, increment, jacobian, increment_jacobian);
         ++s->evaluations;
-        for (int i = 0; i < 5; ++i) delta[i] = ((y[i] - s->x[i]) + displacement[i]) - s->carry[i];
+        for (int i = 0; i < volterra5_DIM; ++i) delta[i] = ((y[i] - s->x[i]) + displacement[i]) - s->carry[i];
         const int regular = volterra5_solve(jacobian, delta);
-        const double size = volterra5_size(y, delta);
+        const double size = volterra5_size(y, delta), growth = size / (previous * previous);
         if (!isfinite(size)) return volterra5_NOT_FINITE;
         if (!regular) return volterra5_SINGULAR;
-        for (int i = 0; i < 5; ++i) y[i] -= delta[i];
-        const double growth = size / (previous * previous);
+        for (int i = 0; i < volterra5_DIM; ++i) y[i] -= delta[i];
         const double remaining = size * size * (growth > 1.0 ? growth : 1.0);
-        /* The second test: corrections no longer shrink, the solve has reached the level of rounding. */
-        if (remaining <= 1e-20 || (previous < 1e-8 && size > 0.25 * previous)) {
-            double correction[5] = { 0.0 };
-            for (int i = 0; i < 5; ++i)
-                for (int j = 0; j < 5; ++j) correction[i] -= increment_jacobian[i * 5 + j] * delta[j];
-            if (!volterra5_plausible(s, stage, increment)) return volterra5_NO_CONVERGENCE;
-            if (!volterra5_advance(s, increment, correction)) return volterra5_NOT_FINITE;
-            volterra5_remember(memory, y, iteration + 1);
-            return volterra5_OK;
-        }
+        const int stalled = previous < volterra5_NEARLY_SOLVED && size > volterra5_SHRINKING * previous;
         previous = size;
+        if (!(remaining <= volterra5_TOLERANCE || stalled)) continue;
+        double correction[volterra5_DIM] = { 0.0 };
+        for (int i = 0; i < volterra5_DIM; ++i)
+            for (int j = 0; j < volterra5_DIM; ++j)
+                correction[i] -= increment_jacobian[i * volterra5_DIM + j] * delta[j];
+        if (!volterra5_plausible(s, increment)) return volterra5_NO_CONVERGENCE;
+        if (!volterra5_advance(s, increment, correction)) return volterra5_NOT_FINITE;
+        volterra5_remember(&s->history, y);
+        return volterra5_OK;
     }
     return volterra5_NO_CONVERGENCE;
 }
 
-/* The 1 stages of one step. If one fails, the state is as before the step. */
-static volterra5_status volterra5_stages(volterra5_solver *s)
-{
-    double x[5], carry[5];
-    memcpy(x, s->x, sizeof x);
-    memcpy(carry, s->carry, sizeof carry);
-    for (int stage = 0; stage < 1; ++stage) {
-        volterra5_status status = volterra5_attempt(s, stage);
-        /* A guess from earlier steps may have misled it: once more without. */
-        if (status != volterra5_OK && s->memory[stage].count > 0) {
-            memset(&s->memory[stage], 0, sizeof s->memory[stage]);
-            status = volterra5_attempt(s, stage);
-        }
-        if (status != volterra5_OK) {
-            memcpy(s->x, x, sizeof x);
-            memcpy(s->carry, carry, sizeof carry);
-            return status;
-        }
-    }
-    return volterra5_OK;
-}
-
-/* All of volterra5_init but the gauge. The arguments may be parts of *s: they are read before it is written. */
-static volterra5_status volterra5_start(volterra5_solver *s, const volterra5_params *params, const double x0[5])
+/* ---- The solver ---- */
+/* The arguments may be parts of *s: they are read before it is written. */
+volterra5_status volterra5_init(volterra5_solver *s, const volterra5_params *params,
+    const double x0[volterra5_DIM])
 {
     if (s == NULL || x0 == NULL) return volterra5_BAD_ARGUMENT;
     const volterra5_params own = params != NULL ? *params : volterra5_default_params;
-    double x[5];
+    double x[volterra5_DIM];
     memcpy(x, x0, sizeof x);
-    for (int i = 0; i < 5; ++i)
+    for (int i = 0; i < volterra5_DIM; ++i)
         if (!isfinite(x[i])) return volterra5_BAD_ARGUMENT;
     memset(s, 0, sizeof *s);
     memcpy(s->x, x, sizeof s->x);
@@ -560,1127 +386,83 @@ static volterra5_status volterra5_start(volterra5_solver *s, const volterra5_par
     return volterra5_OK;
 }
 
-volterra5_status volterra5_init(volterra5_solver *s, const volterra5_params *params, const double x0[5])
-{
-    return volterra5_start(s, params, x0);
-}
-
 /* What depends on the step size; nothing where that is as before. */
 static volterra5_status volterra5_set_step(volterra5_solver *s, double h)
 {
     if (s == NULL || !isfinite(h)) return volterra5_BAD_ARGUMENT;
-    if (s->ready && memcmp(&h, &s->h, sizeof h) == 0) return volterra5_OK;
-    for (int stage = 0; stage < 1; ++stage)
-        volterra5_prepare(&s->params, volterra5_fractions[stage] * h, s->coef[stage]);
-    memset(s->memory, 0, sizeof s->memory);
-    for (int stage = 0; stage < 1; ++stage) s->memory[stage].patience = 150;
-    s->pause = 16;
-    s->setback = s->foreseeing = 0;
-    s->doubt = s->retry = 0;
-    s->effort = 0.0;
-    s->passes = INT_MAX;
+    if (s->prepared && memcmp(&h, &s->h, sizeof h) == 0) return volterra5_OK;
+    volterra5_prepare(&s->params, h, s->coef);
+    memset(&s->history, 0, sizeof s->history);
     s->h = h;
-    s->ready = 1;
+    s->t_before_h = s->t;
+    s->steps_before_h = s->steps;
+    s->prepared = 1;
     return volterra5_OK;
+}
+
+/* One stage. A guess from earlier steps may have misled it: then once more without. */
+static volterra5_status volterra5_stage(volterra5_solver *s)
+{
+    volterra5_status status = volterra5_attempt(s);
+    if (status != volterra5_OK && s->history.count > 0) {
+        memset(&s->history, 0, sizeof s->history);
+        status = volterra5_attempt(s);
+    }
+    return status;
 }
 
 volterra5_status volterra5_step(volterra5_solver *s, double h)
 {
     volterra5_status status = volterra5_set_step(s, h);
     if (status != volterra5_OK) return status;
-    status = volterra5_stages(s);
-    if (status == volterra5_OK) ++s->steps;
+    status = volterra5_stage(s);
+    if (status != volterra5_OK) return status;
+    ++s->steps;
+    s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
     return status;
 }
 
-/*
- * Eight at a time: below, the formulas of a step are evaluated for 8 steps of a trajectory, or members of an
- * ensemble, at once. Compilers make vector instructions of the loops over lanes.
- */
-enum { volterra5_LANES = 8 };
-
-#if defined(__GNUC__)
-typedef double volterra5_lanes[volterra5_LANES] __attribute__((aligned(64))); /* a value in each lane */
-#else
-typedef double volterra5_lanes[volterra5_LANES];
-#endif
-
-#if defined(__clang__)
-#define volterra5_EACH_LANE _Pragma("clang loop vectorize(assume_safety)")
-#pragma clang diagnostic push
-#pragma clang diagnostic ignored "-Wpass-failed"
-#elif defined(__GNUC__)
-#define volterra5_EACH_LANE _Pragma("GCC ivdep") _Pragma("GCC unroll 1")
-#else
-#define volterra5_EACH_LANE
-#endif
-
-/* What all blocks share: coefficients, the same in each lane, and the recurrences by which they are foreseen. */
-typedef struct {
-    int fits[1]; /* the fit that weight is of; -1 for none */
-    volterra5_lanes coef[1][4], weight[1][40][5];
-} volterra5_table;
-
-/* A stage in all lanes, linearised around y. */
-typedef struct {
-    volterra5_lanes y[5], displacement[5], increment[5], residual[5];
-    /* a residual r of alpha(y) = x takes inverse r from y, and gain r from the increment */
-    volterra5_lanes inverse[25], slope[25], gain[25];
-} volterra5_model;
-
-/* exp(u) - 1 for the loops over lanes: u = k log 2 + r, no branches. No number beyond |u| = 700.0. */
-static inline double volterra5_expm1_lane(double u)
-{
-    const double shifted = u * 1.4426950408889634 + 6755399441055744.0, k = shifted - 6755399441055744.0;
-    const double r = (u - k * 0.6931471803691238) - k * 1.9082149292705877e-10, rr = r * r;
-    uint64_t bits; /* the last bits of shifted are k */
-    double power, sum = 1.1470745597729725e-11, other = 1.6059043836821613e-10;
-    memcpy(&bits, &shifted, sizeof bits);
-    bits = (bits + 1023) << 52;
-    memcpy(&power, &bits, sizeof power);
-    sum = sum * rr + 2.08767569878681e-09;
-    other = other * rr + 2.505210838544172e-08;
-    sum = sum * rr + 2.755731922398589e-07;
-    other = other * rr + 2.7557319223985893e-06;
-    sum = sum * rr + 2.48015873015873e-05;
-    other = other * rr + 0.0001984126984126984;
-    sum = sum * rr + 0.001388888888888889;
-    other = other * rr + 0.008333333333333333;
-    sum = sum * rr + 0.041666666666666664;
-    other = other * rr + 0.16666666666666666;
-    sum = (sum * r + other) * r + 0.5;
-    sum = sum * rr + r;
-    return power * sum + (power - 1.0) + (fabs(u) <= 700.0 ? 0.0 : (double)NAN);
-}
-
-/* volterra5_linearise in all lanes. */
-static void volterra5_linearise_lanes(volterra5_lanes coef[restrict 4], volterra5_lanes y[restrict 5],
-                                      volterra5_lanes displacement[restrict 5],
-                                      volterra5_lanes increment[restrict 5],
-                                      volterra5_lanes jacobian[restrict 25],
-                                      volterra5_lanes increment_jacobian[restrict 25])
-{
-    volterra5_EACH_LANE
-    for (int lane = 0; lane < volterra5_LANES; ++lane) {
-        const double v1 = y[0][lane];
-        const double v2 = y[1][lane];
-        const double v3 = y[2][lane];
-        const double v4 = y[3][lane];
-        const double v5 = y[4][lane];
-        const double t1 = coef[2][lane] * v4;
-        const double t2 = coef[3][lane] * v5;
-        const double t3 = coef[1][lane] * v1;
-        const double t4 = coef[2][lane] * v2;
-        const double t5 = coef[1][lane] * v4;
-        const double t6 = coef[2][lane] * v3;
-        const double p_v5 = v1 * (t1 + t2 + (t3 + t4)) + (coef[0][lane] + v4 * (t2 + (t5 + t6)));
-        const double t7 = v5 * p_v5;
-        const double t8 = coef[2][lane] * v5;
-        const double t9 = t8 + t6;
-        const double t10 = coef[3][lane] * v2;
-        const double t11 = coef[1][lane] * v3;
-        const double t12 = t1 + (t10 + t11);
-        const double p_v2 = v1 * (t9 + (t10 + t3)) + (coef[0][lane] + v3 * t12);
-        const double t13 = v2 * p_v2;
-        const double t14 = volterra5_expm1_lane(0.5 * (t7 - t13));
-        const double t15 = coef[3][lane] * v1;
-        const double t16 = coef[1][lane] * v2;
-        const double t17 = t9 + (t15 + t16);
-        const double t18 = coef[1][lane] * v5;
-        const double t19 = t18 + (t15 + t1);
-        const double p_v1 = v2 * t17 + (coef[0][lane] + v5 * t19);
-        const double t20 = v1 * p_v1;
-        const double t21 = coef[3][lane] * v3;
-        const double t22 = coef[2][lane] * v1;
-        const double t23 = t8 + (t5 + t21);
-        const double p_v3 = v2 * (t21 + t1 + (t16 + t22)) + (coef[0][lane] + v4 * t23);
-        const double t24 = v3 * p_v3;
-        const double t25 = volterra5_expm1_lane(0.5 * (t20 - t24));
-        const double t26 = coef[3][lane] * v4;
-        const double t27 = t18 + (t26 + t22);
-        const double p_v4 = v3 * (t8 + t26 + (t11 + t4)) + (coef[0][lane] + v5 * t27);
-        const double t28 = v4 * p_v4;
-        const double t29 = volterra5_expm1_lane(0.5 * (t13 - t28));
-        const double t30 = volterra5_expm1_lane(0.5 * (t24 - t7));
-        const double t31 = volterra5_expm1_lane(0.5 * (t28 - t20));
-        const double t32 = 1.0 + t14;
-        const double t33 = 1.0 / t32;
-        const double t34 = 1.0 + t33;
-        const double t35 = t14 * t34;
-        const double t36 = 1.0 + t25;
-        const double t37 = 1.0 / t36;
-        const double t38 = 1.0 + t37;
-        const double t39 = t25 * t38;
-        const double t40 = 1.0 + t29;
-        const double t41 = 1.0 / t40;
-        const double t42 = 1.0 + t41;
-        const double t43 = t29 * t42;
-        const double t44 = 1.0 + t30;
-        const double t45 = 1.0 / t44;
-        const double t46 = 1.0 + t45;
-        const double t47 = t30 * t46;
-        const double t48 = 1.0 + t31;
-        const double t49 = 1.0 / t48;
-        const double t50 = 1.0 + t49;
-        const double t51 = t31 * t50;
-        const double t52 = t4 + (t18 + t19);
-        const double t53 = v5 * t32;
-        const double t54 = v1 * t53;
-        const double t55 = t16 + t17;
-        const double t56 = v2 * t32;
-        const double t57 = v1 * t56;
-        const double t58 = t15 + t21;
-        const double t59 = p_v2 * t32;
-        const double t60 = t22 + (t11 + t12);
-        const double t61 = t6 + (t18 + t27);
-        const double t62 = p_v5 * t32;
-        const double t63 = t15 + t26;
-        const double t64 = p_v1 * t36;
-        const double t65 = t10 + t2;
-        const double t66 = v1 * t36;
-        const double t67 = v2 * t66;
-        const double t68 = v3 * t36;
-        const double t69 = v2 * t68;
-        const double t70 = t10 + t26;
-        const double t71 = p_v3 * t36;
-        const double t72 = t4 + (t5 + t23);
-        const double t73 = v2 * t40;
-        const double t74 = v3 * t73;
-        const double t75 = v4 * t40;
-        const double t76 = v3 * t75;
-        const double t77 = p_v2 * t40;
-        const double t78 = t21 + t2;
-        const double t79 = p_v4 * t40;
-        const double t80 = v3 * t44;
-        const double t81 = v4 * t80;
-        const double t82 = v5 * t44;
-        const double t83 = v4 * t82;
-        const double t84 = p_v3 * t44;
-        const double t85 = p_v5 * t44;
-        const double t86 = v4 * t48;
-        const double t87 = v5 * t86;
-        const double t88 = v1 * t48;
-        const double t89 = v5 * t88;
-        const double t90 = p_v1 * t48;
-        const double t91 = p_v4 * t48;
-        const double t92 = t33 * t33;
-        const double t93 = v1 * (0.5 * (t53 * t34) - 0.5 * (t14 * (t92 * t53)));
-        const double t94 = v1 * (0.5 * (t14 * (t92 * t56)) - 0.5 * (t56 * t34));
-        const double t95 = t37 * t37;
-        const double t96 = v2 * (0.5 * (t66 * t38) - 0.5 * (t25 * (t95 * t66)));
-        const double t97 = v2 * (0.5 * (t25 * (t95 * t68)) - 0.5 * (t68 * t38));
-        const double t98 = t41 * t41;
-        const double t99 = v3 * (0.5 * (t73 * t42) - 0.5 * (t29 * (t98 * t73)));
-        const double t100 = v3 * (0.5 * (t29 * (t98 * t75)) - 0.5 * (t75 * t42));
-        const double t101 = t45 * t45;
-        const double t102 = v4 * (0.5 * (t30 * (t82 * t101)) - 0.5 * (t82 * t46));
-        const double t103 = v4 * (0.5 * (t80 * t46) - 0.5 * (t30 * (t80 * t101)));
-        const double t104 = t49 * t49;
-        const double t105 = v5 * (0.5 * (t31 * (t104 * t88)) - 0.5 * (t88 * t50));
-        const double t106 = v5 * (0.5 * (t86 * t50) - 0.5 * (t31 * (t104 * t86)));
-        displacement[0][lane] = v1 * t14;
-        displacement[1][lane] = v2 * t25;
-        displacement[2][lane] = v3 * t29;
-        displacement[3][lane] = v4 * t30;
-        displacement[4][lane] = v5 * t31;
-        increment[0][lane] = -(v1 * t35);
-        increment[1][lane] = -(v2 * t39);
-        increment[2][lane] = -(v3 * t43);
-        increment[3][lane] = -(v4 * t47);
-        increment[4][lane] = -(v5 * t51);
-        jacobian[0][lane] = 1.0 + (t14 + (0.5 * (t52 * t54) - 0.5 * (t55 * t57)));
-        jacobian[1][lane] = 0.5 * (t22 * t54) - 0.5 * (t58 * t57) - 0.5 * (v1 * t59);
-        jacobian[2][lane] = 0.5 * (t1 * t54) - 0.5 * (t60 * t57);
-        jacobian[3][lane] = 0.5 * (t61 * t54) - 0.5 * (t6 * t57);
-        jacobian[4][lane] = 0.5 * (v1 * t62) + (0.5 * (t63 * t54) - 0.5 * (t22 * t57));
-        jacobian[5][lane] = 0.5 * (v2 * t64) + (0.5 * (t65 * t67) - 0.5 * (t4 * t69));
-        jacobian[6][lane] = 1.0 + (t25 + (0.5 * (t55 * t67) - 0.5 * (t60 * t69)));
-        jacobian[7][lane] = 0.5 * (t4 * t67) - 0.5 * (t70 * t69) - 0.5 * (v2 * t71);
-        jacobian[8][lane] = 0.5 * (t8 * t67) - 0.5 * (t72 * t69);
-        jacobian[9][lane] = 0.5 * (t52 * t67) - 0.5 * (t1 * t69);
-        jacobian[10][lane] = 0.5 * (t55 * t74) - 0.5 * (t8 * t76);
-        jacobian[11][lane] = 0.5 * (v3 * t77) + (0.5 * (t58 * t74) - 0.5 * (t6 * t76));
-        jacobian[12][lane] = 1.0 + (t29 + (0.5 * (t60 * t74) - 0.5 * (t72 * t76)));
-        jacobian[13][lane] = 0.5 * (t6 * t74) - 0.5 * (t78 * t76) - 0.5 * (v3 * t79);
-        jacobian[14][lane] = 0.5 * (t22 * t74) - 0.5 * (t61 * t76);
-        jacobian[15][lane] = 0.5 * (t4 * t81) - 0.5 * (t52 * t83);
-        jacobian[16][lane] = 0.5 * (t60 * t81) - 0.5 * (t22 * t83);
-        jacobian[17][lane] = 0.5 * (v4 * t84) + (0.5 * (t70 * t81) - 0.5 * (t1 * t83));
-        jacobian[18][lane] = 1.0 + (t30 + (0.5 * (t72 * t81) - 0.5 * (t61 * t83)));
-        jacobian[19][lane] = 0.5 * (t1 * t81) - 0.5 * (t63 * t83) - 0.5 * (v4 * t85);
-        jacobian[20][lane] = 0.5 * (t8 * t87) - 0.5 * (t65 * t89) - 0.5 * (v5 * t90);
-        jacobian[21][lane] = 0.5 * (t6 * t87) - 0.5 * (t55 * t89);
-        jacobian[22][lane] = 0.5 * (t72 * t87) - 0.5 * (t4 * t89);
-        jacobian[23][lane] = 0.5 * (v5 * t91) + (0.5 * (t78 * t87) - 0.5 * (t8 * t89));
-        jacobian[24][lane] = 1.0 + (t31 + (0.5 * (t61 * t87) - 0.5 * (t52 * t89)));
-        increment_jacobian[0][lane] = -(t35 + (t52 * t93 + t55 * t94));
-        increment_jacobian[1][lane] = -(v1 * (0.5 * (t14 * (t92 * t59)) - 0.5 * (t59 * t34)) + (t58 * t94 + t22 * t93));
-        increment_jacobian[2][lane] = -(t1 * t93 + t60 * t94);
-        increment_jacobian[3][lane] = -(t61 * t93 + t6 * t94);
-        increment_jacobian[4][lane] = -(v1 * (0.5 * (t62 * t34) - 0.5 * (t14 * (t92 * t62))) + (t63 * t93 + t22 * t94));
-        increment_jacobian[5][lane] = -(v2 * (0.5 * (t64 * t38) - 0.5 * (t25 * (t95 * t64))) + (t65 * t96 + t4 * t97));
-        increment_jacobian[6][lane] = -(t39 + (t60 * t97 + t55 * t96));
-        increment_jacobian[7][lane] = -(v2 * (0.5 * (t25 * (t95 * t71)) - 0.5 * (t71 * t38)) + (t4 * t96 + t70 * t97));
-        increment_jacobian[8][lane] = -(t72 * t97 + t8 * t96);
-        increment_jacobian[9][lane] = -(t52 * t96 + t1 * t97);
-        increment_jacobian[10][lane] = -(t55 * t99 + t8 * t100);
-        increment_jacobian[11][lane] = -(v3 * (0.5 * (t77 * t42) - 0.5 * (t29 * (t77 * t98))) + (t6 * t100 + t58 * t99));
-        increment_jacobian[12][lane] = -(t43 + (t60 * t99 + t72 * t100));
-        increment_jacobian[13][lane] = -(v3 * (0.5 * (t29 * (t98 * t79)) - 0.5 * (t79 * t42)) + (t78 * t100 + t6 * t99));
-        increment_jacobian[14][lane] = -(t61 * t100 + t22 * t99);
-        increment_jacobian[15][lane] = -(t52 * t102 + t4 * t103);
-        increment_jacobian[16][lane] = -(t60 * t103 + t22 * t102);
-        increment_jacobian[17][lane] = -(v4 * (0.5 * (t84 * t46) - 0.5 * (t30 * (t84 * t101))) + (t70 * t103 + t1 * t102));
-        increment_jacobian[18][lane] = -(t47 + (t61 * t102 + t72 * t103));
-        increment_jacobian[19][lane] = -(v4 * (0.5 * (t30 * (t85 * t101)) - 0.5 * (t85 * t46)) + (t1 * t103 + t63 * t102));
-        increment_jacobian[20][lane] = -(v5 * (0.5 * (t31 * (t104 * t90)) - 0.5 * (t90 * t50)) + (t65 * t105 + t8 * t106));
-        increment_jacobian[21][lane] = -(t55 * t105 + t6 * t106);
-        increment_jacobian[22][lane] = -(t72 * t106 + t4 * t105);
-        increment_jacobian[23][lane] = -(v5 * (0.5 * (t91 * t50) - 0.5 * (t31 * (t104 * t91))) + (t78 * t106 + t8 * t105));
-        increment_jacobian[24][lane] = -(t51 + (t52 * t105 + t61 * t106));
-    }
-}
-
-/* volterra5_evaluate in all lanes. */
-static void volterra5_evaluate_lanes(volterra5_lanes coef[restrict 4], volterra5_lanes y[restrict 5],
-                                     volterra5_lanes displacement[restrict 5],
-                                     volterra5_lanes increment[restrict 5])
-{
-    volterra5_EACH_LANE
-    for (int lane = 0; lane < volterra5_LANES; ++lane) {
-        const double v1 = y[0][lane];
-        const double v2 = y[1][lane];
-        const double v3 = y[2][lane];
-        const double v4 = y[3][lane];
-        const double v5 = y[4][lane];
-        const double t1 = coef[2][lane] * v4;
-        const double t2 = coef[3][lane] * v5;
-        const double t3 = coef[1][lane] * v1;
-        const double t4 = coef[2][lane] * v2;
-        const double t5 = coef[1][lane] * v4;
-        const double t6 = coef[2][lane] * v3;
-        const double p_v5 = v1 * (t1 + t2 + (t3 + t4)) + (coef[0][lane] + v4 * (t2 + (t5 + t6)));
-        const double t7 = v5 * p_v5;
-        const double t8 = coef[2][lane] * v5;
-        const double t9 = t8 + t6;
-        const double t10 = coef[3][lane] * v2;
-        const double t11 = coef[1][lane] * v3;
-        const double p_v2 = v1 * (t9 + (t10 + t3)) + (coef[0][lane] + v3 * (t1 + (t10 + t11)));
-        const double t12 = v2 * p_v2;
-        const double t13 = volterra5_expm1_lane(0.5 * (t7 - t12));
-        const double t14 = coef[3][lane] * v1;
-        const double t15 = coef[1][lane] * v2;
-        const double t16 = coef[1][lane] * v5;
-        const double p_v1 = v2 * (t9 + (t14 + t15)) + (coef[0][lane] + v5 * (t16 + (t14 + t1)));
-        const double t17 = v1 * p_v1;
-        const double t18 = coef[3][lane] * v3;
-        const double t19 = coef[2][lane] * v1;
-        const double p_v3 = v2 * (t18 + t1 + (t15 + t19)) + (coef[0][lane] + v4 * (t8 + (t5 + t18)));
-        const double t20 = v3 * p_v3;
-        const double t21 = volterra5_expm1_lane(0.5 * (t17 - t20));
-        const double t22 = coef[3][lane] * v4;
-        const double p_v4 = v3 * (t8 + t22 + (t11 + t4)) + (coef[0][lane] + v5 * (t16 + (t22 + t19)));
-        const double t23 = v4 * p_v4;
-        const double t24 = volterra5_expm1_lane(0.5 * (t12 - t23));
-        const double t25 = volterra5_expm1_lane(0.5 * (t20 - t7));
-        const double t26 = volterra5_expm1_lane(0.5 * (t23 - t17));
-        displacement[0][lane] = v1 * t13;
-        displacement[1][lane] = v2 * t21;
-        displacement[2][lane] = v3 * t24;
-        displacement[3][lane] = v4 * t25;
-        displacement[4][lane] = v5 * t26;
-        increment[0][lane] = -(v1 * (t13 * (1.0 + 1.0 / (1.0 + t13))));
-        increment[1][lane] = -(v2 * (t21 * (1.0 + 1.0 / (1.0 + t21))));
-        increment[2][lane] = -(v3 * (t24 * (1.0 + 1.0 / (1.0 + t24))));
-        increment[3][lane] = -(v4 * (t25 * (1.0 + 1.0 / (1.0 + t25))));
-        increment[4][lane] = -(v5 * (t26 * (1.0 + 1.0 / (1.0 + t26))));
-    }
-}
-
-/* Invert the matrices of all lanes in place by elimination without pivoting: they are I + O(h). Infinite where a pivot is
-   far from 1. */
-static void volterra5_invert(volterra5_lanes matrix[restrict 25])
-{
-    for (int k = 0; k < 5; ++k) {
-        volterra5_lanes factor[5];
-        volterra5_EACH_LANE
-        for (int lane = 0; lane < volterra5_LANES; ++lane) {
-            const double reciprocal = 1.0 / matrix[k * 5 + k][lane];
-            matrix[k * 5 + k][lane] = 1.0;
-            for (int j = 0; j < 5; ++j) matrix[k * 5 + j][lane] *= reciprocal;
-            matrix[k * 5 + k][lane] += fabs(reciprocal) < 1e3 ? 0.0 : HUGE_VAL;
-        }
-        for (int i = 0; i < 5; ++i) {
-            volterra5_EACH_LANE
-            for (int lane = 0; lane < volterra5_LANES; ++lane) {
-                factor[i][lane] = matrix[i * 5 + k][lane];
-                if (i != k) matrix[i * 5 + k][lane] = 0.0;
-            }
-        }
-        for (int i = 0; i < 5; ++i)
-            for (int j = 0; j < 5 && i != k; ++j) {
-                volterra5_EACH_LANE
-                for (int lane = 0; lane < volterra5_LANES; ++lane)
-                    matrix[i * 5 + j][lane] -= factor[i][lane] * matrix[k * 5 + j][lane];
-            }
-    }
-}
-
-/* Everything about a stage at the points y. */
-static void volterra5_tabulate(volterra5_lanes coef[restrict], volterra5_model *model)
-{
-    volterra5_linearise_lanes(coef, model->y, model->displacement, model->increment, model->inverse, model->slope);
-    volterra5_invert(model->inverse);
-    for (int i = 0; i < 5; ++i)
-        for (int j = 0; j < 5; ++j) {
-            volterra5_lanes sum = { 0.0 };
-            for (int k = 0; k < 5; ++k) {
-                volterra5_EACH_LANE
-                for (int lane = 0; lane < volterra5_LANES; ++lane)
-                    sum[lane] += model->slope[i * 5 + k][lane] * model->inverse[k * 5 + j][lane];
-            }
-            memcpy(model->gain[i * 5 + j], sum, sizeof sum);
-        }
-}
-
-/* volterra5_size in all lanes, summed over the components. */
-static void volterra5_sizes(volterra5_lanes y[restrict 5], volterra5_lanes delta[restrict 5],
-    volterra5_lanes size)
-{
-    volterra5_lanes norm = { 0.0 };
-    memset(size, 0, volterra5_LANES * sizeof size[0]);
-    for (int i = 0; i < 5; ++i)
-        for (int lane = 0; lane < volterra5_LANES; ++lane)
-            norm[lane] = 0.0 * fabs(y[i][lane]) > norm[lane] ? 0.0 * fabs(y[i][lane]) : norm[lane];
-    for (int i = 0; i < 5; ++i) {
-        volterra5_EACH_LANE
-        for (int lane = 0; lane < volterra5_LANES; ++lane)
-            size[lane] += fabs(delta[i][lane]) / (fabs(y[i][lane]) + norm[lane] + DBL_MIN);
-    }
-}
-
-/* Correct y by the residuals, with the inverse in the table, and measure the corrections. */
-static void volterra5_correct(volterra5_model *model, volterra5_lanes size)
-{
-    volterra5_lanes delta[5];
-    memset(delta, 0, sizeof delta);
-    for (int i = 0; i < 5; ++i)
-        for (int j = 0; j < 5; ++j) {
-            volterra5_EACH_LANE
-            for (int lane = 0; lane < volterra5_LANES; ++lane)
-                delta[i][lane] += model->inverse[i * 5 + j][lane] * model->residual[j][lane];
-        }
-    volterra5_sizes(model->y, delta, size);
-    for (int i = 0; i < 5; ++i)
-        for (int lane = 0; lane < volterra5_LANES; ++lane) model->y[i][lane] -= delta[i][lane];
-}
-
-/* The largest of the lanes, none of which is negative; infinite if one is not finite. As integers, the bits of such
-   numbers have their order, and those of what is no number are larger. */
-static double volterra5_largest(const volterra5_lanes size)
-{
-    uint64_t bits[8], most = 0;
-    double largest;
-    memcpy(bits, size, sizeof bits);
-    for (int lane = 0; lane < volterra5_LANES; ++lane) most = bits[lane] > most ? bits[lane] : most;
-    memcpy(&largest, &most, sizeof largest);
-    return isfinite(largest) ? largest : HUGE_VAL;
-}
-
-/* volterra5_near for the guesses of all lanes, seen from one value. */
-static int volterra5_near_lanes(volterra5_lanes y[restrict 5], const double last[5])
-{
-    volterra5_lanes distance = { 0.0 };
-    double size = 0.0;
-    for (int i = 0; i < 5; ++i) {
-        size += fabs(last[i]);
-        volterra5_EACH_LANE
-        for (int lane = 0; lane < volterra5_LANES; ++lane) distance[lane] += fabs(y[i][lane] - last[i]);
-    }
-    return volterra5_largest(distance) <= 4.0 * size;
-}
-
-/* What is left after a correction of this size: quadratic in it, where the matrices are of the points corrected; where
-   they are of points further off, by bend, also of the order of size times bend. bound is what the last pass left. */
-static double volterra5_remaining(double size, double bend, double bound)
-{
-    const double growth = size / bound, left = size * (size + bend);
-    return growth > 1.0 ? growth * left : left;
-}
-
-/* The table of a stage, with its matrices or with those of the last pass. */
-static void volterra5_update(volterra5_lanes coef[restrict], volterra5_model *model, int matrices)
-{
-    if (matrices)
-        volterra5_tabulate(coef, model);
-    else
-        volterra5_evaluate_lanes(coef, model->y, model->displacement, model->increment);
-}
-
-/* The steps of a block one after the other, each along the linear model of its lane. As X, the state with its carry, gains
-   increment - gain residual, the next residual follows from this one; X itself is added up apart. */
-static void volterra5_chain(volterra5_model model[1], double x[5], double carry[5])
-{
-    double residual[5], sum[5], small[5];
-    for (int i = 0; i < 5; ++i) {
-        residual[i] = ((model->y[i][0] - x[i]) + model->displacement[i][0]) - carry[i];
-        sum[i] = x[i];
-        small[i] = carry[i];
-    }
-    for (int k = 0; k < 1 * volterra5_LANES; ++k) {
-        const int lane = k / 1, after = (k + 1) / 1 % volterra5_LANES;
-        volterra5_model *at = &model[k % 1], *next = &model[(k + 1) % 1];
-        double even[5] = { 0.0 }, odd[5] = { 0.0 }; /* two sums, so that no long chain of additions is waited for */
-        for (int i = 0; i < 5; ++i) {
-            at->residual[i][lane] = residual[i];
-            for (int j = 0; j < 5; j += 2) even[i] += at->gain[i * 5 + j][lane] * residual[j];
-            for (int j = 1; j < 5; j += 2) odd[i] += at->gain[i * 5 + j][lane] * residual[j];
-        }
-        for (int i = 0; i < 5; ++i) {
-            const double change = at->increment[i][lane], total = sum[i] + change, added = total - sum[i];
-            const double turn = (next->displacement[i][after] - at->displacement[i][lane]) - change;
-            const double moved = (next->y[i][after] - at->y[i][lane]) + turn;
-            residual[i] = ((moved + residual[i]) + odd[i]) + even[i];
-            small[i] += ((sum[i] - (total - added)) + (change - added)) - (even[i] + odd[i]);
-            sum[i] = total;
-        }
-    }
-    for (int i = 0; i < 5; ++i) {
-        x[i] = sum[i] + small[i];
-        carry[i] = small[i] - (x[i] - sum[i]);
-    }
-}
-
-/* Bring the table up to date: coefficients, and weights that were fitted since. */
-static void volterra5_refresh(const volterra5_solver *s, volterra5_table *table)
-{
-    for (int stage = 0; stage < 1; ++stage) {
-        if (table->fits[stage] == s->memory[stage].fits) continue;
-        table->fits[stage] = s->memory[stage].fits;
-        for (int k = 0; k < 4; ++k)
-            for (int lane = 0; lane < volterra5_LANES; ++lane) table->coef[stage][k][lane] = s->coef[stage][k];
-        memcpy(table->weight[stage], s->memory[stage].weight, (size_t)s->memory[stage].terms * sizeof table->weight[0][0]);
-    }
-}
-
-/* Guesses for the next volterra5_LANES values of a stage, by its recurrences. */
-static void volterra5_foresee(const volterra5_memory *memory, volterra5_lanes weight[restrict][5],
-    volterra5_lanes y[restrict 5])
-{
-    const int last = memory->count - 1;
-    for (int i = 0; i < 5; ++i) {
-        volterra5_lanes even = { 0.0 }, odd = { 0.0 };
-        for (int k = 0; k < memory->terms; k += 2) {
-            const double past = memory->past[last - k][i], earlier = memory->past[last - 1 - k][i];
-            volterra5_EACH_LANE
-            for (int lane = 0; lane < volterra5_LANES; ++lane) even[lane] += weight[k][i][lane] * past;
-            volterra5_EACH_LANE
-            for (int lane = 0; lane < volterra5_LANES; ++lane) odd[lane] += weight[k + 1][i][lane] * earlier;
-        }
-        volterra5_EACH_LANE
-        for (int lane = 0; lane < volterra5_LANES; ++lane) y[i][lane] = even[lane] + odd[lane];
-    }
-}
-
-/* volterra5_record for the values of all lanes, one after the other. */
-static void volterra5_record_lanes(volterra5_memory *memory, volterra5_lanes y[restrict 5])
-{
-    volterra5_make_room(memory, volterra5_LANES);
-    for (int lane = 0; lane < volterra5_LANES; ++lane)
-        for (int i = 0; i < 5; ++i) memory->past[memory->count + lane][i] = y[i][lane];
-    memory->count += volterra5_LANES;
-}
-
-/* Guesses where no recurrence is known: where alpha and beta have the means of steps by the classical Runge-Kutta
-   method, to leading order. */
-static void volterra5_march(const volterra5_solver *s, volterra5_table *table, volterra5_model model[1])
-{
-    static const double reach[4] = { 0.5, 0.5, 1.0, 0.0 }, weight[4] = { 1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0 };
-    double x[5], point[5], slope[5], mean[5];
-    memcpy(x, s->x, sizeof x);
-    for (int k = 0; k < 1 * volterra5_LANES; ++k) {
-        const double h = volterra5_fractions[k % 1] * s->h;
-        memcpy(point, x, sizeof x);
-        memset(mean, 0, sizeof mean);
-        for (int part = 0; part < 4; ++part) {
-            volterra5_vector_field(&s->params, point, slope);
-            for (int i = 0; i < 5; ++i) {
-                mean[i] += weight[part] * slope[i];
-                point[i] = x[i] + h * reach[part] * slope[i];
-            }
-        }
-        for (int i = 0; i < 5; ++i) {
-            model[k % 1].y[i][k / 1] = x[i] + 0.5 * h * mean[i];
-            x[i] += h * mean[i];
-        }
-    }
-    for (int stage = 0; stage < 1; ++stage) {
-        volterra5_model *at = &model[stage];
-        volterra5_evaluate_lanes(table->coef[stage], at->y, at->displacement, at->increment);
-        for (int i = 0; i < 5; ++i) {
-            volterra5_EACH_LANE
-            for (int lane = 0; lane < volterra5_LANES; ++lane)
-                at->y[i][lane] -= at->displacement[i][lane] + 0.5 * at->increment[i][lane];
-        }
-    }
-}
-
-/* volterra5_LANES steps at once: guess the points of all, and correct them together until the error that remains is as
-   small as after a single step. How many passes that took; 0, and the solver as before, where it takes more than most. */
-static int volterra5_block(volterra5_solver *s, volterra5_table *table, int most)
-{
-    volterra5_model model[1];
-    volterra5_lanes sizes;
-    double x[5], carry[5], previous = HUGE_VAL, bend = 0.0, bound = HUGE_VAL;
-    int passes = 0, solved = 0;
-    if (!s->foreseeing) volterra5_march(s, table, model);
-    for (int stage = 0; stage < 1; ++stage) {
-        if (s->foreseeing) volterra5_foresee(&s->memory[stage], table->weight[stage], model[stage].y);
-        if (!volterra5_near_lanes(model[stage].y, s->x)) return 0;
-    }
-    while (!solved) {
-        double size = 0.0;
-        const int matrices = previous > 1e-05;
-        for (int stage = 0; stage < 1; ++stage) volterra5_update(table->coef[stage], &model[stage], matrices);
-        memcpy(x, s->x, sizeof x);
-        memcpy(carry, s->carry, sizeof carry);
-        volterra5_chain(model, x, carry);
-        for (int stage = 0; stage < 1; ++stage) {
-            volterra5_correct(&model[stage], sizes);
-            const double largest = volterra5_largest(sizes);
-            size = largest > size ? largest : size;
-        }
-        s->evaluations += 1 * volterra5_LANES;
-        bend = matrices ? 0.0 : bend + previous;
-        bound = volterra5_remaining(size, bend, bound);
-        /* The second test: after the square of so small a correction there is rounding only. */
-        solved = bound <= 1e-20 || (previous < 1e-8 && size < 1e-10);
-        if ((++passes >= most || !(size < previous)) && !solved) return 0;
-        previous = size;
-    }
-    for (int stage = 0; stage < 1; ++stage)
-        if (!volterra5_near_lanes(model[stage].y, s->x)) return 0;
-    for (int i = 0; i < 5; ++i)
-        if (!isfinite(x[i])) return 0;
-    memcpy(s->x, x, sizeof x);
-    memcpy(s->carry, carry, sizeof carry);
-    s->steps += volterra5_LANES;
-    for (int stage = 0; stage < 1; ++stage) {
-        volterra5_memory *memory = &s->memory[stage];
-        volterra5_record_lanes(memory, model[stage].y);
-        memory->slow = passes > 1 ? memory->slow + volterra5_LANES : 0;
-        if (memory->slow > memory->patience && s->foreseeing) volterra5_fit(memory);
-    }
-    return passes;
-}
-
-/* Recurrences are given up for a while, the longer the more often that happens. */
-static void volterra5_give_up(volterra5_solver *s)
-{
-    s->foreseeing = s->setback = s->pause = 0;
-    s->doubt = 2 * s->doubt + 600;
-    s->retry = s->steps + s->doubt;
-}
-
-/* How the next block is guessed: by recurrences, fitted as soon as enough steps are to be made, or
-   have been, to repay that. */
-static void volterra5_choose_guess(volterra5_solver *s, size_t steps)
-{
-    for (int stage = 0; stage < 1; ++stage)
-        if (s->memory[stage].count < 111) {
-            s->foreseeing = 0;
-            return;
-        }
-    if (s->foreseeing || (steps < 600 && s->steps < 150) || s->steps < s->retry) return;
-    s->foreseeing = 1;
-    for (int stage = 0; stage < 1 && s->foreseeing; ++stage) {
-        volterra5_fit(&s->memory[stage]);
-        s->foreseeing = s->memory[stage].terms > 0;
-    }
-    s->pause = volterra5_LANES;
-    if (!s->foreseeing) volterra5_give_up(s);
-}
-
-/* Learn from a block: after one that failed single steps are made, the more the more often that happens. Recurrences
-   that fail repeatedly, or need more passes than steps by Runge-Kutta did, are given up. */
-static void volterra5_learn_from(volterra5_solver *s, int passes)
-{
-    if (passes > 0) {
-        s->setback /= 2;
-    } else {
-        s->setback = 2 * s->setback + volterra5_LANES > 1000 ? 1000 : 2 * s->setback + volterra5_LANES;
-        s->pause = s->setback;
-    }
-    if (!s->foreseeing) {
-        s->passes = passes > 0 ? passes : INT_MAX;
-    } else if (passes > s->passes || s->setback > 5 * volterra5_LANES) {
-        volterra5_give_up(s);
-    }
-}
-
-/* A single step, and the running mean of the evaluations that a stage of one takes. */
-static volterra5_status volterra5_single(volterra5_solver *s)
-{
-    const size_t before = s->evaluations;
-    const volterra5_status status = volterra5_step(s, s->h);
-    s->effort += 0.125 * ((double)(s->evaluations - before) / 1 - s->effort);
-    return status;
-}
-
-/* Blocks of steps where they cost less than single steps, with at most as many passes over a block as 2 for each
-   evaluation in a single step. The results differ by round-off only. */
 volterra5_status volterra5_integrate(volterra5_solver *s, double h, size_t steps)
 {
-    volterra5_table table;
     volterra5_status status = volterra5_set_step(s, h);
-    for (int stage = 0; stage < 1; ++stage) table.fits[stage] = -1;
-    while (status == volterra5_OK && steps > 0) {
-        if (steps >= volterra5_LANES && s->pause == 0) volterra5_choose_guess(s, steps);
-        if (steps >= volterra5_LANES && s->pause == 0) {
-            volterra5_refresh(s, &table);
-            const int passes = volterra5_block(s, &table, (int)(2 * s->effort + 0.5));
-            volterra5_learn_from(s, passes);
-            if (passes > 0) steps -= volterra5_LANES;
-        } else {
-            if (s->pause > 0) --s->pause;
-            status = volterra5_single(s);
-            if (status == volterra5_OK) --steps;
-        }
-    }
+    for (; steps > 0 && status == volterra5_OK; --steps) status = volterra5_step(s, h);
     return status;
-}
-
-/* Members of an ensemble, each in its lane. */
-typedef struct {
-    volterra5_lanes x[5], carry[5], coef[1][4];
-    volterra5_lanes past[1][111][5]; /* solved values, in a ring */
-    volterra5_lanes weight[1][40][5]; /* of past values, the latest first, for the next */
-    int latest;     /* the row of the latest values */
-    int count;      /* rows in use */
-    int order[1];   /* how many of them the extrapolation uses */
-    int terms[1];   /* how many of them the recurrences use */
-    int fits;       /* how often recurrences have been fitted */
-    int fitting[1]; /* whether they are the better guess */
-    int slow;       /* how many of the last steps took more than one iteration */
-    int patience;   /* how many of those before recurrences are fitted again */
-    int active[8];  /* whether the lane has a member that has not failed */
-    size_t left[8]; /* steps that are still to be made, where one has */
-} volterra5_group;
-
-/* The past values of a stage, the latest for k = 0. */
-static volterra5_lanes *volterra5_group_past(volterra5_group *group, int stage, int k)
-{
-    const int row = group->latest + k;
-    return group->past[stage][row < 111 ? row : row - 111];
-}
-
-/* Guess the values of a stage by the recurrences of the members. */
-static void volterra5_group_foresee(volterra5_group *group, int stage, volterra5_lanes y[restrict 5])
-{
-    memset(y, 0, 5 * sizeof y[0]);
-    for (int k = 0; k < group->terms[stage]; ++k) {
-        volterra5_lanes *past = volterra5_group_past(group, stage, k), *weight = group->weight[stage][k];
-        for (int i = 0; i < 5; ++i) {
-            volterra5_EACH_LANE
-            for (int lane = 0; lane < volterra5_LANES; ++lane) y[i][lane] += weight[i][lane] * past[i][lane];
-        }
-    }
-}
-
-/* Extrapolate the values of a stage. */
-static void volterra5_group_extrapolate(volterra5_group *group, int stage, volterra5_lanes y[restrict 5])
-{
-    const int order = group->order[stage];
-    double binomial = -1.0;
-    memcpy(y, group->x, 5 * sizeof y[0]);
-    if (order > 0) memset(y, 0, 5 * sizeof y[0]);
-    for (int k = 0; k < order; ++k) {
-        volterra5_lanes *past = volterra5_group_past(group, stage, k);
-        binomial *= -(double)(order - k) / (k + 1);
-        for (int i = 0; i < 5; ++i) {
-            volterra5_EACH_LANE
-            for (int lane = 0; lane < volterra5_LANES; ++lane) y[i][lane] += binomial * past[i][lane];
-        }
-    }
-}
-
-/* The sum over members of the absolute values of all components. */
-static double volterra5_group_sum(const volterra5_group *group, volterra5_lanes y[5])
-{
-    double sum = 0.0;
-    for (int i = 0; i < 5; ++i)
-        for (int lane = 0; lane < volterra5_LANES; ++lane) sum += group->active[lane] ? fabs(y[i][lane]) : 0.0;
-    return sum;
-}
-
-static void volterra5_group_subtract(volterra5_lanes y[restrict 5], volterra5_lanes other[restrict 5])
-{
-    for (int i = 0; i < 5; ++i) {
-        volterra5_EACH_LANE
-        for (int lane = 0; lane < volterra5_LANES; ++lane) y[i][lane] -= other[i][lane];
-    }
-}
-
-/* Choose the guess that would have been best for these values. */
-static void volterra5_group_judge(volterra5_group *group, int stage, volterra5_lanes y[5])
-{
-    volterra5_lanes row[8 + 1][5];
-    const int rows = group->count < 8 ? group->count : 8;
-    double least = HUGE_VAL;
-    memcpy(row[0], y, sizeof row[0]);
-    for (int k = 0; k < rows; ++k) memcpy(row[k + 1], volterra5_group_past(group, stage, k), sizeof row[0]);
-    if (group->order[stage] == 0) group->order[stage] = 1;
-    for (int order = 1; order <= rows; ++order) { /* row[0] becomes the backward difference of this order */
-        for (int k = 0; k <= rows - order; ++k) volterra5_group_subtract(row[k], row[k + 1]);
-        const double size = volterra5_group_sum(group, row[0]);
-        if (size < least) {
-            least = size;
-            group->order[stage] = order;
-        }
-    }
-    if (group->terms[stage] == 0) return;
-    volterra5_group_foresee(group, stage, row[0]);
-    volterra5_group_subtract(row[0], y);
-    group->fitting[stage] = volterra5_group_sum(group, row[0]) <= least;
-}
-
-/* Fit the recurrences of all members; with every time, wait longer before it is done again, and for long if it did not
-   help. */
-static void volterra5_group_fit(volterra5_group *group)
-{
-    volterra5_memory memory;
-    const int helped = group->fits == 0 || group->fitting[0];
-    memory.count = 111;
-    for (int stage = 0; stage < 1; ++stage) {
-        int found = 1;
-        group->terms[stage] = 0;
-        for (int lane = 0; lane < volterra5_LANES; ++lane)
-            for (int i = 0; i < 5 && group->active[lane] && found; ++i) {
-                for (int k = 0; k < 111; ++k)
-                    memory.past[111 - 1 - k][i] = volterra5_group_past(group, stage, k)[i][lane];
-                const int terms = volterra5_train(&memory, i);
-                found = terms > 0;
-                if (terms > group->terms[stage]) group->terms[stage] = terms;
-                for (int k = 0; k < 40; ++k) group->weight[stage][k][i][lane] = memory.weight[k][i][0];
-            }
-        if (!found) group->terms[stage] = 0;
-        group->fitting[stage] = found;
-    }
-    ++group->fits;
-    group->slow = 0;
-    group->patience = helped && group->patience < 10000 ? 2 * group->patience + 150 : 100 * 150;
-}
-
-/* Replace guesses that are not near the last values, as volterra5_near has it, by these; lane by lane. */
-static void volterra5_stay_near(volterra5_lanes y[restrict 5], volterra5_lanes last[restrict 5])
-{
-    volterra5_lanes distance = { 0.0 }, size = { 0.0 };
-    for (int i = 0; i < 5; ++i) {
-        volterra5_EACH_LANE
-        for (int lane = 0; lane < volterra5_LANES; ++lane) {
-            distance[lane] += fabs(y[i][lane] - last[i][lane]);
-            size[lane] += fabs(last[i][lane]);
-        }
-    }
-    for (int i = 0; i < 5; ++i) {
-        volterra5_EACH_LANE
-        for (int lane = 0; lane < volterra5_LANES; ++lane)
-            y[i][lane] = distance[lane] <= 4.0 * size[lane] ? y[i][lane] : last[i][lane];
-    }
-}
-
-/* Whether lanes are still to be solved after a correction of this size; those where nothing is finite leave the group.
-   bound is what remains in each lane. */
-static int volterra5_group_open(volterra5_group *group, const volterra5_lanes size, const volterra5_lanes previous,
-    double bend, volterra5_lanes bound)
-{
-    int open = 0;
-    volterra5_EACH_LANE
-    for (int lane = 0; lane < volterra5_LANES; ++lane)
-        bound[lane] = volterra5_remaining(size[lane], bend, bound[lane]);
-    if (volterra5_largest(bound) <= 1e-20) return 0;
-    for (int lane = 0; lane < volterra5_LANES; ++lane) {
-        const int solved = bound[lane] <= 1e-20 || (previous[lane] < 1e-8 && size[lane] < 1e-10);
-        if (!isfinite(size[lane])) group->active[lane] = 0;
-        open += group->active[lane] && !solved;
-    }
-    return open;
-}
-
-/* The guess for a stage: recurrences, or extrapolation; the state for members where that is not near. */
-static void volterra5_group_predict(volterra5_group *group, int stage, volterra5_lanes y[5])
-{
-    if (group->fitting[stage]) volterra5_group_foresee(group, stage, y);
-    else volterra5_group_extrapolate(group, stage, y);
-    volterra5_stay_near(y, group->x);
-}
-
-/* Newton's method for a stage, until the slowest lane is solved. The number of iterations; where that is the most
-   allowed, lanes that are not solved leave the group. */
-static int volterra5_group_solve(volterra5_group *group, int stage, volterra5_model *model)
-{
-    volterra5_lanes size, previous, bound;
-    double largest = HUGE_VAL, bend = 0.0;
-    int iterations = 0, open = 1;
-    for (int lane = 0; lane < volterra5_LANES; ++lane) size[lane] = bound[lane] = HUGE_VAL;
-    volterra5_group_predict(group, stage, model->y);
-    for (; open > 0 && iterations < 20; ++iterations) {
-        memcpy(previous, size, sizeof size);
-        volterra5_update(group->coef[stage], model, largest > 1e-05);
-        bend = largest > 1e-05 ? 0.0 : bend + largest;
-        for (int i = 0; i < 5; ++i) {
-            volterra5_EACH_LANE
-            for (int lane = 0; lane < volterra5_LANES; ++lane)
-                model->residual[i][lane] =
-                    ((model->y[i][lane] - group->x[i][lane]) + model->displacement[i][lane]) - group->carry[i][lane];
-        }
-        volterra5_correct(model, size);
-        open = volterra5_group_open(group, size, previous, bend, bound);
-        largest = volterra5_largest(size);
-    }
-    for (int lane = 0; lane < volterra5_LANES && open > 0; ++lane)
-        group->active[lane] = group->active[lane] && bound[lane] <= 1e-20;
-    return iterations;
-}
-
-/* Add the increments, corrected to first order, in compensated arithmetic as for a single step. */
-static void volterra5_group_advance(volterra5_lanes x[restrict 5], volterra5_lanes carry[restrict 5],
-    volterra5_model *model)
-{
-    for (int i = 0; i < 5; ++i)
-        for (int j = 0; j < 5; ++j) {
-            volterra5_EACH_LANE
-            for (int lane = 0; lane < volterra5_LANES; ++lane)
-                carry[i][lane] -= model->gain[i * 5 + j][lane] * model->residual[j][lane];
-        }
-    for (int i = 0; i < 5; ++i) {
-        volterra5_EACH_LANE
-        for (int lane = 0; lane < volterra5_LANES; ++lane) {
-            const double change = model->increment[i][lane], sum = x[i][lane] + change, added = sum - x[i][lane];
-            const double small = ((x[i][lane] - (sum - added)) + (change - added)) + carry[i][lane];
-            x[i][lane] = sum + small;
-            carry[i][lane] = small - (x[i][lane] - sum);
-        }
-    }
-}
-
-/* Members that failed, or whose state is not near the one before the step or not finite, keep that one, and leave. How many
-   stay. */
-static int volterra5_group_leave(volterra5_group *group, volterra5_lanes x[5], volterra5_lanes carry[5],
-    size_t remaining)
-{
-    volterra5_lanes moved = { 0.0 }, size = { 0.0 }, bad;
-    int active = 0;
-    for (int i = 0; i < 5; ++i) {
-        volterra5_EACH_LANE
-        for (int lane = 0; lane < volterra5_LANES; ++lane) {
-            moved[lane] += fabs(group->x[i][lane] - x[i][lane]);
-            size[lane] += fabs(x[i][lane]);
-        }
-    }
-    for (int lane = 0; lane < volterra5_LANES; ++lane) bad[lane] = moved[lane] <= 4.0 * size[lane] ? 0.0 : 1.0;
-    for (int lane = 0; lane < volterra5_LANES; ++lane) active += group->active[lane];
-    if (active == volterra5_LANES && !(volterra5_largest(bad) > 0.0)) return active;
-    active = 0;
-    for (int lane = 0; lane < volterra5_LANES; ++lane) {
-        group->active[lane] = group->active[lane] && !(bad[lane] > 0.0);
-        active += group->active[lane];
-        for (int i = 0; i < 5 && !group->active[lane]; ++i) {
-            group->x[i][lane] = x[i][lane];
-            group->carry[i][lane] = carry[i][lane];
-        }
-        if (!group->active[lane] && group->left[lane] == 0) group->left[lane] = remaining;
-    }
-    return active;
-}
-
-/* One step of all members, of as many as remain. How many members are left. */
-static int volterra5_group_step(volterra5_group *group, size_t remaining)
-{
-    volterra5_lanes x[5], carry[5];
-    volterra5_model model;
-    const int next = (group->latest > 0 ? group->latest : 111) - 1;
-    int most = 0;
-    memcpy(x, group->x, sizeof x);
-    memcpy(carry, group->carry, sizeof carry);
-    for (int stage = 0; stage < 1; ++stage) {
-        const int iterations = volterra5_group_solve(group, stage, &model);
-        volterra5_group_advance(group->x, group->carry, &model);
-        if (iterations > most) most = iterations;
-        if ((iterations > 1 && next % 8 == 0) || group->count < 8)
-            volterra5_group_judge(group, stage, model.y);
-        memcpy(group->past[stage][next], model.y, sizeof model.y);
-    }
-    group->latest = next;
-    if (group->count < 111) ++group->count;
-    group->slow = most > 1 ? group->slow + 1 : 0;
-    if (group->slow > group->patience && group->count == 111 && remaining >= 1000)
-        volterra5_group_fit(group);
-    return volterra5_group_leave(group, x, carry, remaining);
-}
-
-/* Put a member into a lane: its state, and its coefficients. */
-static volterra5_status volterra5_group_join(volterra5_group *group, int lane, const volterra5_params *params,
-    const double x0[5], double h)
-{
-    volterra5_solver s;
-    volterra5_status status = volterra5_init(&s, params, x0);
-    if (status == volterra5_OK) status = volterra5_set_step(&s, h);
-    if (status != volterra5_OK) return status;
-    for (int i = 0; i < 5; ++i) group->x[i][lane] = s.x[i];
-    for (int stage = 0; stage < 1; ++stage)
-        for (int k = 0; k < 4; ++k) group->coef[stage][k][lane] = s.coef[stage][k];
-    group->active[lane] = 1;
-    return status;
-}
-
-/* The steps that a member has still to make after it left the group, by itself. */
-static volterra5_status volterra5_group_finish(const volterra5_group *group, int lane, const volterra5_params *params,
-    double x[5], double h)
-{
-    volterra5_solver s;
-    volterra5_status status = volterra5_init(&s, params, x);
-    if (status != volterra5_OK) return status;
-    for (int i = 0; i < 5; ++i) s.carry[i] = group->carry[i][lane];
-    status = volterra5_integrate(&s, h, group->left[lane]);
-    memcpy(x, s.x, sizeof s.x);
-    return status;
-}
-
-/* The members from first on, as many as there are lanes. The first status that is not OK. */
-static volterra5_status volterra5_group_run(const volterra5_params *params, double *x, size_t members, size_t first,
-    double h, size_t steps, unsigned char *status)
-{
-    volterra5_group group;
-    volterra5_status worst = volterra5_OK, member[8];
-    const int count = members - first < volterra5_LANES ? (int)(members - first) : volterra5_LANES;
-    double state[5];
-    size_t left = steps;
-    memset(&group, 0, sizeof group);
-    for (int lane = 0; lane < count; ++lane) {
-        for (size_t i = 0; i < 5; ++i) state[i] = x[i * members + first + (size_t)lane];
-        member[lane] = volterra5_group_join(&group, lane, params, state, h);
-    }
-    for (int active = count; left > 0 && active > 2; --left) active = volterra5_group_step(&group, left);
-    for (int lane = 0; lane < count; ++lane) {
-        if (group.active[lane]) group.left[lane] = left;
-        for (int i = 0; i < 5; ++i) state[i] = group.x[i][lane];
-        if (member[lane] == volterra5_OK) {
-            if (group.left[lane] > 0) member[lane] = volterra5_group_finish(&group, lane, params, state, h);
-            for (size_t i = 0; i < 5; ++i) x[i * members + first + (size_t)lane] = state[i];
-        }
-        if (status != NULL) status[first + (size_t)lane] = (unsigned char)member[lane];
-        if (worst == volterra5_OK) worst = member[lane];
-    }
-    return worst;
-}
-
-volterra5_status volterra5_ensemble(const volterra5_params *params, double *x, size_t members, double h,
-                                    size_t steps, unsigned char *status)
-{
-    volterra5_status worst = isfinite(h) ? volterra5_OK : volterra5_BAD_ARGUMENT;
-    const volterra5_params own = params != NULL ? *params : volterra5_default_params;
-    size_t earliest = members;
-    if (x == NULL && members > 0) return volterra5_BAD_ARGUMENT;
-#ifdef _OPENMP
-#pragma omp parallel for schedule(dynamic)
-#endif
-    for (size_t first = 0; first < members; first += volterra5_LANES) {
-        const volterra5_status group = volterra5_group_run(&own, x, members, first, h, steps, status);
-        if (group == volterra5_OK) continue;
-#ifdef _OPENMP
-#pragma omp critical
-#endif
-        if (first < earliest) {
-            earliest = first;
-            worst = group;
-        }
-    }
-    return worst;
-}
-
-#if defined(__clang__)
-#pragma clang diagnostic pop
-#endif
-
-/* the Hamiltonian */
-static void volterra5_energy(const volterra5_params *params, const double x[5], double energy[restrict 1])
-{
-    (void)params;
-    const double v1 = x[0];
-    const double v2 = x[1];
-    const double v3 = x[2];
-    const double v4 = x[3];
-    const double v5 = x[4];
-    energy[0] = v5 + (v4 + (v3 + (v1 + v2)));
-}
-
-/* the Casimirs */
-static void volterra5_casimir_values(const volterra5_params *params, const double x[5], double out[restrict 1])
-{
-    (void)params;
-    const double v1 = x[0];
-    const double v2 = x[1];
-    const double v3 = x[2];
-    const double v4 = x[3];
-    const double v5 = x[4];
-    out[0] = v5 * (v4 * (v3 * (v1 * v2)));
-}
-
-/* pi(x) grad H(x) */
-static void volterra5_field(const volterra5_params *params, const double x[5], double out[restrict 5])
-{
-    (void)params;
-    const double v1 = x[0];
-    const double v2 = x[1];
-    const double v3 = x[2];
-    const double v4 = x[3];
-    const double v5 = x[4];
-    const double t1 = v1 * v2;
-    const double t2 = v1 * v5;
-    const double t3 = v2 * v3;
-    const double t4 = v3 * v4;
-    const double t5 = v4 * v5;
-    out[0] = t1 - t2;
-    out[1] = t3 - t1;
-    out[2] = t4 - t3;
-    out[3] = t5 - t4;
-    out[4] = t2 - t5;
-}
-
-double volterra5_hamiltonian(const volterra5_params *params, const double x[5])
-{
-    double energy[1];
-    volterra5_energy(params != NULL ? params : &volterra5_default_params, x, energy);
-    return energy[0];
-}
-
-void volterra5_casimirs(const volterra5_params *params, const double x[5], double out[])
-{
-    double value[1]; /* out may overlap x */
-    volterra5_casimir_values(params != NULL ? params : &volterra5_default_params, x, value);
-    for (int i = 0; i < 1; ++i) out[i] = value[i];
-}
-
-void volterra5_vector_field(const volterra5_params *params, const double x[5], double out[5])
-{
-    double value[5];
-    volterra5_field(params != NULL ? params : &volterra5_default_params, x, value);
-    memcpy(out, value, sizeof value);
 }
 
 const char *volterra5_status_string(volterra5_status status)
 {
-    switch (status) {
-    case volterra5_OK: return "ok";
-    case volterra5_NO_CONVERGENCE: return "no convergence: the step is too large";
-    case volterra5_SINGULAR: return "singular Newton matrix: the step is too large";
-    case volterra5_NOT_FINITE: return "not finite: overflow, or outside the domain";
-    case volterra5_BAD_ARGUMENT: return "bad argument: a null pointer, or values that are not allowed";
-    }
-    return "unknown status";
+    static const char *const text[] = {
+        "ok",
+        "no convergence: the step is too large",
+        "singular Newton matrix: the step is too large",
+        "not finite: overflow, or outside the domain",
+        "bad argument: a null pointer, or values that are not allowed"
+    };
+    return (unsigned)status <= volterra5_BAD_ARGUMENT ? text[status] : "unknown status";
 }
 
 size_t volterra5_solver_size(void) { return sizeof(volterra5_solver); }
 
 size_t volterra5_solver_steps_done(const volterra5_solver *s) { return s->steps; }
+
+/* ---- Ensembles ---- */
+volterra5_status volterra5_ensemble(const volterra5_params *params, double *x, size_t members, double h,
+    size_t steps, unsigned char *status)
+{
+    volterra5_status worst = isfinite(h) ? volterra5_OK : volterra5_BAD_ARGUMENT;
+    const volterra5_params own = params != NULL ? *params : volterra5_default_params;
+    if (x == NULL && members > 0) return volterra5_BAD_ARGUMENT;
+    for (size_t m = 0; m < members; ++m) {
+        volterra5_solver s;
+        double x0[volterra5_DIM];
+        for (size_t i = 0; i < volterra5_DIM; ++i) x0[i] = x[i * members + m];
+        volterra5_status member = volterra5_init(&s, &own, x0);
+        if (member == volterra5_OK) {
+            member = volterra5_integrate(&s, h, steps);
+            for (size_t i = 0; i < volterra5_DIM; ++i) x[i * members + m] = s.x[i];
+        }
+        if (status != NULL) status[m] = (unsigned char)member;
+        if (worst == volterra5_OK) worst = member;
+    }
+    return worst;
+}

@@ -6,17 +6,17 @@
 #   step: implicit, Newton iteration with the analytic matrix
 #   one Newton iteration: 168 additions, 375 multiplications, 5 divisions, 5 functions
 #
-# spec: volterra5, sha256 cfd60e7b7b6deffb6e5297d17c105b63a43ab52b9aeaa9bde72b05fd871e6d03
+# spec: volterra5, sha256 dd128093b5704f6c0aeea964a546614f9b636714a89d9b639a6d0eec7b0d3270
 # to regenerate: phigen build volterra5
 # DO NOT EDIT: change the spec and regenerate; edits are noticed by the checksum below.
 #
 # SPDX-License-Identifier: 0BSD
 # This file belongs to whoever generated it; phigen claims no rights in it.
-# body-sha256: 5e2bc1ac322ad20fd4b94b53b1e03a6f2a37662b177efb4c0d27f4253cabb0b6
+# body-sha256: ed8dce621f9633eff2256bf993fad545b9e5779842f59d8722239c24d56e0f2d
 import numpy as np
 
 VERSION = "0.1.0"
-SPEC_SHA256 = "cfd60e7b7b6deffb6e5297d17c105b63a43ab52b9aeaa9bde72b05fd871e6d03"
+SPEC_SHA256 = "dd128093b5704f6c0aeea964a546614f9b636714a89d9b639a6d0eec7b0d3270"
 DIM = 5
 ORDER = 4
 COORDINATES = ("v1", "v2", "v3", "v4", "v5",)

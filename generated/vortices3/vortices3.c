@@ -7,26 +7,34 @@
  *   step: implicit, Newton iteration with the analytic matrix
  *   one Newton iteration: 701 additions, 1358 multiplications, 3 divisions
  *
- * spec: vortices3, sha256 9f4ece29d2cb2bfd4d374437bcb1bba6d3a05731db8beb500f407873d6a3394c
+ * spec: vortices3, sha256 037a04eba07f271265722e4dcbf9a974884f1b57a9cde7f8c30f2ddfde0882bc
  * to regenerate: phigen build vortices3
  * DO NOT EDIT: change the spec and regenerate; edits are noticed by the checksum below.
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: dce9366ce9bbdec26eafc261abd5a701a91a036baeddff0628329945d98988ec
+ *
+ *   1. The model
+ *   2. Compensated sums, linear equations
+ *   3. Starting guesses
+ *   4. The implicit step, by Newton's method
+ *   5. The solver
+ *   6. Ensembles
+ * body-sha256: 6c09e594546fa02f4aeca02b82f44d494f6c15b539cc240b0689353e185eddec
  */
 #include "vortices3.h"
 
 #include <float.h>
-#include <limits.h>
 #include <math.h>
-#include <stdint.h>
 #include <string.h>
 
+/* ---- The model ---- */
 const vortices3_params vortices3_default_params = { 0 };
 
-/* A step of size h is the composition of these fractions of it. */
-static const double vortices3_fractions[1] = { 1.0 };
+enum { vortices3_MAX_ITERATIONS = 20 }; /* of an inner solve */
+
+/* A correction is accepted when the error that it leaves is estimated to be below this. */
+#define vortices3_TOLERANCE 1e-20
 
 /* Functions to be kept apart: very long ones compile in quadratic time. */
 #if defined(__GNUC__)
@@ -48,202 +56,197 @@ static void vortices3_prepare(const vortices3_params *params, double h, double c
 /* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
    increment, all with the momenta p = grad S_h(y) (part 1 of 4) */
 vortices3_APART static void vortices3_linearise_part1(const double coef[3], const double y[6],
-                                                      double displacement[restrict 6],
-                                                      double increment[restrict 6],
-                                                      double jacobian[restrict 36],
-                                                      double increment_jacobian[restrict 36],
-                                                      double work[restrict 218])
+    double displacement[restrict 6], double increment[restrict 6], double jacobian[restrict 36],
+    double increment_jacobian[restrict 36], double work[restrict 218])
 {
-    const double x1 = y[0];
-    const double y1 = y[1];
-    const double x2 = y[2];
-    const double y2 = y[3];
-    const double x3 = y[4];
-    const double y3 = y[5];
+    const double x1 = y[0], y1 = y[1], x2 = y[2], y2 = y[3], x3 = y[4], y3 = y[5];
     work[6] = x1 - x3;
     work[4] = y1 - y3;
     work[23] = 1.0 / (work[6] * work[6] + work[4] * work[4]);
     work[9] = coef[0] * work[23];
-    const double t5 = 0.25 * (work[6] * work[9]);
+    const double t1 = 0.25 * (work[6] * work[9]);
     work[3] = x1 - x2;
     work[0] = y1 - y2;
     work[12] = 1.0 / (work[0] * work[0] + work[3] * work[3]);
     work[8] = coef[0] * work[12];
-    const double t10 = work[3] * work[8];
-    const double t11 = 0.5 * (t5 - t10);
+    const double t2 = work[3] * work[8], t3 = 0.5 * (t1 - t2);
     work[18] = x2 - x3;
     work[17] = y2 - y3;
     work[19] = 1.0 / (work[17] * work[17] + work[18] * work[18]);
     work[48] = coef[0] * work[19];
-    const double t16 = 0.5 * (work[18] * work[48]);
-    const double t17 = 0.25 * (t10 + t16);
-    work[10] = t11 - t17;
-    const double t19 = work[0] * work[8];
-    const double t20 = 0.5 * (work[17] * work[48]);
-    const double t21 = t19 + t20;
-    const double t22 = work[4] * work[9];
-    const double t23 = 0.25 * t22 - t19;
-    work[7] = 0.25 * t21 - 0.5 * t23;
+    const double t4 = 0.5 * (work[18] * work[48]), t5 = 0.25 * (t2 + t4);
+    work[10] = t3 - t5;
+    const double t6 = work[0] * work[8], t7 = 0.5 * (work[17] * work[48]), t8 = t6 + t7;
+    const double t9 = work[4] * work[9], t10 = 0.25 * t9 - t6;
+    work[7] = 0.25 * t8 - 0.5 * t10;
     work[13] = 2.0 * (work[0] * work[10]) + 2.0 * (work[3] * work[7]);
     work[14] = work[12] * work[13];
     work[11] = coef[1] * work[13];
     work[15] = work[12] * work[11];
     work[34] = 1.0 / 12.0 * (coef[1] * (work[12] * work[14])) + 1.0 / 12.0 * (work[12] * work[15]);
-    const double t30 = 2.0 * (work[3] * work[34]);
+    const double t11 = 2.0 * (work[3] * work[34]);
     work[16] = coef[1] * work[12];
-    const double t32 = 1.0 / 3.0 * (work[16] * work[7]);
+    const double t12 = 1.0 / 3.0 * (work[16] * work[7]);
     work[20] = coef[1] * work[19];
-    const double t34 = (-0.25) * t22 - t20;
-    work[45] = (-0.25) * t21 - t34;
-    const double t36 = t5 + t16;
-    work[44] = t17 - t36;
+    const double t13 = (-0.25) * t9 - t7;
+    work[45] = (-0.25) * t8 - t13;
+    const double t14 = t1 + t4;
+    work[44] = t5 - t14;
     work[43] = 2.0 * (work[17] * work[44]) + 2.0 * (work[18] * work[45]);
     work[42] = work[19] * work[43];
     work[41] = coef[1] * work[43];
     work[40] = work[19] * work[41];
     work[47] = (-1.0 / 24.0) * (coef[1] * (work[19] * work[42])) - 1.0 / 24.0 * (work[19] * work[40]);
-    const double t43 = 1.0 / 6.0 * (work[20] * work[45]) + 2.0 * (work[18] * work[47]);
-    const double t44 = 0.25 * (t30 - t32) - 0.25 * t43;
+    const double t15 = 1.0 / 6.0 * (work[20] * work[45]) + 2.0 * (work[18] * work[47]);
+    const double t16 = 0.25 * (t11 - t12) - 0.25 * t15;
     work[28] = coef[1] * work[23];
-    work[27] = (-0.5) * t23 - t34;
-    work[22] = t11 - t36;
+    work[27] = (-0.5) * t10 - t13;
+    work[22] = t3 - t14;
     work[26] = 2.0 * (work[4] * work[22]) + 2.0 * (work[6] * work[27]);
     work[25] = work[23] * work[26];
     work[21] = coef[1] * work[26];
     work[24] = work[23] * work[21];
     work[39] = (-1.0 / 48.0) * (coef[1] * (work[23] * work[25])) - 1.0 / 48.0 * (work[23] * work[24]);
-    const double t53 = 1.0 / 12.0 * (work[28] * work[27]) + 2.0 * (work[6] * work[39]);
-    const double t54 = 0.5 * t53;
-    const double t55 = 0.5 * (t32 - t30);
-    work[2] = t44 + (t54 - t55);
+    const double t17 = 1.0 / 12.0 * (work[28] * work[27]) + 2.0 * (work[6] * work[39]);
+    const double t18 = 0.5 * t17, t19 = 0.5 * (t12 - t11);
+    work[2] = t16 + (t18 - t19);
     work[1] = work[12] * work[12];
-    const double t58 = 1.0 / 3.0 * (work[16] * work[10]);
-    const double t59 = 2.0 * (work[0] * work[34]);
-    const double t60 = 1.0 / 6.0 * (work[20] * work[44]) + 2.0 * (work[17] * work[47]);
-    work[112] = 0.25 * (t58 - t59 + t60);
-    const double t62 = 1.0 / 12.0 * (work[28] * work[22]) + 2.0 * (work[4] * work[39]);
-    work[111] = 0.5 * (t59 - t58 + t62);
+    const double t20 = 1.0 / 3.0 * (work[16] * work[10]), t21 = 2.0 * (work[0] * work[34]);
+    const double t22 = 1.0 / 6.0 * (work[20] * work[44]) + 2.0 * (work[17] * work[47]);
+    work[112] = 0.25 * (t20 - t21 + t22);
+    const double t23 = 1.0 / 12.0 * (work[28] * work[22]) + 2.0 * (work[4] * work[39]);
+    work[111] = 0.5 * (t21 - t20 + t23);
     work[49] = work[112] - work[111];
-    work[30] = 1.0 / 12.0 * (work[14] * work[11]) + 1.0 / 12.0 * (work[13] * work[15]) + (coef[0] * (work[3] * work[49] + work[0] * work[2]) - 1.0 / 6.0 * (coef[1] * (work[10] * work[10] + work[7] * work[7])));
-    const double t66 = (-0.5) * (coef[2] * work[12]) - work[1] * work[30];
-    const double t67 = 2.0 * (work[10] * work[34]) + work[8] * work[2] + 2.0 * (work[0] * t66);
-    const double t68 = t53 + t43;
-    work[36] = 0.25 * t68 + 0.25 * (t55 - t54);
+    work[30] = 1.0 / 12.0 * (work[14] * work[11]) + 1.0 / 12.0 * (work[13] * work[15])
+        + (coef[0] * (work[3] * work[49] + work[0] * work[2]) - 1.0 / 6.0 * (coef[1] * (work[10] * work[10]
+        + work[7] * work[7])));
+    const double t24 = (-0.5) * (coef[2] * work[12]) - work[1] * work[30];
+    const double t25 = 2.0 * (work[10] * work[34]) + work[8] * work[2] + 2.0 * (work[0] * t24);
+    const double t26 = t17 + t15;
+    work[36] = 0.25 * t26 + 0.25 * (t19 - t18);
     work[5] = work[23] * work[23];
-    const double t71 = t62 + t60;
-    work[50] = work[111] - t71;
-    work[38] = (-1.0 / 48.0) * (work[25] * work[21]) - 1.0 / 48.0 * (work[26] * work[24]) + (1.0 / 24.0 * (coef[1] * (work[27] * work[27] + work[22] * work[22])) + coef[0] * (work[4] * work[36] + 0.25 * (work[6] * work[50])));
+    const double t27 = t23 + t22;
+    work[50] = work[111] - t27;
+    work[38] = (-1.0 / 48.0) * (work[25] * work[21]) - 1.0 / 48.0 * (work[26] * work[24]) + (1.0 / 24.0
+        * (coef[1] * (work[27] * work[27] + work[22] * work[22])) + coef[0] * (work[4] * work[36] + 0.25
+        * (work[6] * work[50])));
     work[35] = 0.125 * (coef[2] * work[23]) - work[5] * work[38];
-    const double t75 = 2.0 * (work[22] * work[39]) + work[9] * work[36] + 2.0 * (work[4] * work[35]);
-    const double p_y1 = t67 + t75;
-    const double t76 = 2.0 * (work[7] * work[34]) + work[8] * work[49] + 2.0 * (work[3] * t66);
-    const double t77 = 2.0 * (work[27] * work[39]) + 0.25 * (work[9] * work[50]) + 2.0 * (work[6] * work[35]);
-    const double p_x1 = t76 + t77;
-    work[75] = t68 + t44;
+    const double t28 = 2.0 * (work[22] * work[39]) + work[9] * work[36] + 2.0 * (work[4] * work[35]);
+    const double p_y1 = t25 + t28;
+    const double t29 = 2.0 * (work[7] * work[34]) + work[8] * work[49] + 2.0 * (work[3] * t24);
+    const double t30 = 2.0 * (work[27] * work[39]) + 0.25 * (work[9] * work[50]) + 2.0 * (work[6] * work[35]);
+    const double p_x1 = t29 + t30;
+    work[75] = t26 + t16;
     work[46] = work[19] * work[19];
-    work[86] = work[112] - t71;
-    work[85] = (-1.0 / 24.0) * (work[42] * work[41]) - 1.0 / 24.0 * (work[43] * work[40]) + (1.0 / 12.0 * (coef[1] * (work[45] * work[45] + work[44] * work[44])) + coef[0] * (0.5 * (work[17] * work[75]) + 0.5 * (work[18] * work[86])));
+    work[86] = work[112] - t27;
+    work[85] = (-1.0 / 24.0) * (work[42] * work[41]) - 1.0 / 24.0 * (work[43] * work[40]) + (1.0 / 12.0
+        * (coef[1] * (work[45] * work[45] + work[44] * work[44])) + coef[0] * (0.5 * (work[17] * work[75])
+        + 0.5 * (work[18] * work[86])));
     work[130] = 0.25 * (coef[2] * work[19]) - work[46] * work[85];
-    const double t83 = 2.0 * (work[44] * work[47]) + 0.5 * (work[48] * work[75]) + 2.0 * (work[17] * work[130]);
-    const double p_y2 = t83 - t67;
-    const double t84 = 2.0 * (work[45] * work[47]) + 0.5 * (work[48] * work[86]) + 2.0 * (work[18] * work[130]);
-    const double p_x2 = t84 - t76;
-    const double t85 = t75 + t83;
-    const double p_y3 = -t85;
-    const double t86 = t84 + t77;
-    const double t87 = 0.25 * work[9];
-    const double t88 = work[6] * work[5];
-    work[56] = coef[0] * t88;
-    const double t90 = 0.5 * (work[6] * work[56]);
-    work[147] = t87 - t90;
-    const double t92 = work[3] * work[1];
-    work[51] = coef[0] * t92;
-    const double t94 = 2.0 * (work[3] * work[51]);
-    work[74] = t94 - work[8];
-    const double t96 = 0.5 * (work[147] + work[74]);
-    work[78] = work[8] - t94;
-    const double t98 = 0.25 * work[78];
-    const double t99 = t96 - t98;
+    const double t31 = 2.0 * (work[44] * work[47]) + 0.5 * (work[48] * work[75]) + 2.0
+        * (work[17] * work[130]);
+    const double p_y2 = t31 - t25;
+    const double t32 = 2.0 * (work[45] * work[47]) + 0.5 * (work[48] * work[86]) + 2.0
+        * (work[18] * work[130]);
+    const double p_x2 = t32 - t29;
+    const double t33 = t28 + t31;
+    const double p_y3 = -t33;
+    const double t34 = t32 + t30, t35 = 0.25 * work[9], t36 = work[6] * work[5];
+    work[56] = coef[0] * t36;
+    const double t37 = 0.5 * (work[6] * work[56]);
+    work[147] = t35 - t37;
+    const double t38 = work[3] * work[1];
+    work[51] = coef[0] * t38;
+    const double t39 = 2.0 * (work[3] * work[51]);
+    work[74] = t39 - work[8];
+    const double t40 = 0.5 * (work[147] + work[74]);
+    work[78] = work[8] - t39;
+    const double t41 = 0.25 * work[78], t42 = t40 - t41;
     work[118] = 2.0 * (work[51] * work[2]);
     work[79] = 2.0 * work[7];
     work[77] = work[0] * work[51];
     work[76] = 2.0 * work[77];
     work[155] = work[4] * work[56];
     work[149] = 0.5 * work[155];
-    const double t106 = 0.5 * (work[76] - work[149]);
-    work[53] = (-0.5) * work[77] - t106;
-    const double t108 = work[79] + (2.0 * (work[3] * work[53]) + 2.0 * (work[0] * t99));
-    const double t109 = coef[1] * t108;
-    work[80] = 1.0 / 6.0 * (t92 * work[11]);
-    const double t111 = 1.0 / 12.0 * (work[12] * t109) - work[80];
-    work[81] = 1.0 / 6.0 * (t92 * work[13]);
-    const double t113 = 1.0 / 12.0 * (work[12] * t108) - work[81];
-    work[83] = 1.0 / 6.0 * (t92 * work[14]);
-    work[82] = 1.0 / 6.0 * (t92 * work[15]);
-    work[52] = work[12] * t111 + (coef[1] * (work[12] * t113 - work[83]) - work[82]);
+    const double t43 = 0.5 * (work[76] - work[149]);
+    work[53] = (-0.5) * work[77] - t43;
+    const double t44 = work[79] + (2.0 * (work[3] * work[53]) + 2.0 * (work[0] * t42));
+    const double t45 = coef[1] * t44;
+    work[80] = 1.0 / 6.0 * (t38 * work[11]);
+    const double t46 = 1.0 / 12.0 * (work[12] * t45) - work[80];
+    work[81] = 1.0 / 6.0 * (t38 * work[13]);
+    const double t47 = 1.0 / 12.0 * (work[12] * t44) - work[81];
+    work[83] = 1.0 / 6.0 * (t38 * work[14]);
+    work[82] = 1.0 / 6.0 * (t38 * work[15]);
+    work[52] = work[12] * t46 + (coef[1] * (work[12] * t47 - work[83]) - work[82]);
     work[32] = 2.0 * work[39];
-    const double t118 = coef[1] * t88;
-    work[162] = 1.0 / 6.0 * (t118 * work[27]);
+    const double t48 = coef[1] * t36;
+    work[162] = 1.0 / 6.0 * (t48 * work[27]);
     work[57] = 0.5 * (work[149] - work[76]) - work[149];
-    work[158] = t88 * work[21];
-    work[156] = t90 - t87;
-    const double t123 = work[156] + t96;
+    work[158] = t36 * work[21];
+    work[156] = t37 - t35;
+    const double t49 = work[156] + t40;
     work[157] = 2.0 * work[27];
-    const double t125 = 2.0 * (work[4] * t123) + (work[157] + 2.0 * (work[6] * work[57]));
-    const double t126 = coef[1] * t125;
-    const double t127 = 1.0 / 24.0 * work[158] - 1.0 / 48.0 * (work[23] * t126);
-    work[161] = 1.0 / 24.0 * (t88 * work[24]);
-    work[160] = 1.0 / 24.0 * (t88 * work[25]);
-    work[159] = t88 * work[26];
-    const double t131 = 1.0 / 24.0 * work[159] - 1.0 / 48.0 * (work[23] * t125);
-    work[58] = work[23] * t127 + (work[161] + coef[1] * (work[160] + work[23] * t131));
-    const double t133 = work[32] - work[162] + (1.0 / 12.0 * (work[28] * work[57]) + 2.0 * (work[6] * work[58]));
-    const double t134 = coef[1] * t92;
-    work[84] = t134 * work[7];
-    const double t136 = 0.5 * work[77];
-    const double t137 = t136 + t106;
+    const double t50 = 2.0 * (work[4] * t49) + (work[157] + 2.0 * (work[6] * work[57]));
+    const double t51 = coef[1] * t50, t52 = 1.0 / 24.0 * work[158] - 1.0 / 48.0 * (work[23] * t51);
+    work[161] = 1.0 / 24.0 * (t36 * work[24]);
+    work[160] = 1.0 / 24.0 * (t36 * work[25]);
+    work[159] = t36 * work[26];
+    const double t53 = 1.0 / 24.0 * work[159] - 1.0 / 48.0 * (work[23] * t50);
+    work[58] = work[23] * t52 + (work[161] + coef[1] * (work[160] + work[23] * t53));
+    const double t54 = work[32] - work[162] + (1.0 / 12.0 * (work[28] * work[57]) + 2.0
+        * (work[6] * work[58]));
+    const double t55 = coef[1] * t38;
+    work[84] = t55 * work[7];
+    const double t56 = 0.5 * work[77], t57 = t56 + t43;
     work[31] = 2.0 * work[34];
-    const double t139 = 2.0 / 3.0 * work[84] + 1.0 / 3.0 * (work[16] * t137) + (work[31] + 2.0 * (work[3] * work[52]));
-    const double t140 = 0.5 * t139;
-    work[69] = t136 - work[149];
-    work[70] = work[156] + t98;
+    const double t58 = 2.0 / 3.0 * work[84] + 1.0 / 3.0 * (work[16] * t57) + (work[31] + 2.0
+        * (work[3] * work[52]));
+    const double t59 = 0.5 * t58;
+    work[69] = t56 - work[149];
+    work[70] = work[156] + t41;
     work[65] = 2.0 * (work[18] * work[69]) + 2.0 * (work[17] * work[70]);
     work[66] = work[19] * work[65];
     work[67] = coef[1] * work[65];
     work[68] = work[19] * work[67];
     work[71] = (-1.0 / 24.0) * (coef[1] * (work[19] * work[66])) - 1.0 / 24.0 * (work[19] * work[68]);
-    const double t148 = 1.0 / 6.0 * (work[20] * work[69]) + 2.0 * (work[18] * work[71]);
-    work[64] = 0.25 * t139 - 0.25 * t148;
-    const double t150 = 0.5 * t133 + t140 + work[64];
+    const double t60 = 1.0 / 6.0 * (work[20] * work[69]) + 2.0 * (work[18] * work[71]);
+    work[64] = 0.25 * t58 - 0.25 * t60;
+    const double t61 = 0.5 * t54 + t59 + work[64];
     work[29] = work[12] * work[1];
     work[113] = work[29] * (work[3] * work[30]);
-    const double t153 = t98 - t96;
-    const double t154 = 1.0 / 6.0 * (work[20] * work[70]) + 2.0 * (work[17] * work[71]);
-    work[93] = 2.0 / 3.0 * (t134 * work[10]);
-    const double t156 = work[93] + 1.0 / 3.0 * (work[16] * t153) + 2.0 * (work[0] * work[52]);
-    work[61] = 0.25 * (t154 - t156);
-    work[164] = 1.0 / 6.0 * (t118 * work[22]);
-    const double t159 = 1.0 / 12.0 * (work[28] * t123) + (2.0 * (work[4] * work[58]) - work[164]);
-    const double t160 = 0.5 * (t156 + t159);
-    work[54] = work[61] - t160;
-    const double t162 = coef[2] * (x2 - x1) + coef[1] * (1.0 / 3.0 * (work[7] * t137) + 1.0 / 3.0 * (work[10] * t153)) + (1.0 / 12.0 * (work[15] * t108) + work[11] * t113) + (1.0 / 12.0 * (work[14] * t109) + work[13] * t111 + coef[0] * (work[0] * t150 + (work[49] + work[3] * work[54])));
-    work[55] = 4.0 * work[113] - work[1] * t162;
-    work[72] = 2.0 * (t99 * work[34]) - work[118] + (2.0 * (work[10] * work[52]) + work[8] * t150) + 2.0 * (work[0] * work[55]);
+    const double t62 = t41 - t40;
+    const double t63 = 1.0 / 6.0 * (work[20] * work[70]) + 2.0 * (work[17] * work[71]);
+    work[93] = 2.0 / 3.0 * (t55 * work[10]);
+    const double t64 = work[93] + 1.0 / 3.0 * (work[16] * t62) + 2.0 * (work[0] * work[52]);
+    work[61] = 0.25 * (t63 - t64);
+    work[164] = 1.0 / 6.0 * (t48 * work[22]);
+    const double t65 = 1.0 / 12.0 * (work[28] * t49) + (2.0 * (work[4] * work[58]) - work[164]);
+    const double t66 = 0.5 * (t64 + t65);
+    work[54] = work[61] - t66;
+    const double t67 = coef[2] * (x2 - x1) + coef[1] * (1.0 / 3.0 * (work[7] * t57) + 1.0 / 3.0
+        * (work[10] * t62)) + (1.0 / 12.0 * (work[15] * t44) + work[11] * t47) + (1.0 / 12.0
+        * (work[14] * t45) + work[13] * t46 + coef[0] * (work[0] * t61 + (work[49] + work[3] * work[54])));
+    work[55] = 4.0 * work[113] - work[1] * t67;
+    work[72] = 2.0 * (t42 * work[34]) - work[118] + (2.0 * (work[10] * work[52]) + work[8] * t61) + 2.0
+        * (work[0] * work[55]);
     work[168] = 2.0 * (work[56] * work[36]);
-    work[63] = t148 + t133;
-    const double t167 = 0.25 * work[63] + 0.25 * ((-0.5) * t133 - t140);
+    work[63] = t60 + t54;
+    const double t68 = 0.25 * work[63] + 0.25 * ((-0.5) * t54 - t59);
     work[37] = work[23] * work[5];
     work[166] = work[37] * (work[6] * work[38]);
     work[167] = coef[2] * work[6];
     work[165] = 0.25 * work[50];
-    work[62] = t154 + t159;
-    work[59] = t160 - work[62];
-    const double t174 = coef[1] * (1.0 / 12.0 * (work[27] * work[57]) + 1.0 / 12.0 * (work[22] * t123)) + work[26] * t127 + coef[0] * (work[4] * t167 + (work[165] + 0.25 * (work[6] * work[59])));
-    work[60] = 4.0 * work[166] - work[5] * (0.25 * work[167] - 1.0 / 48.0 * (t125 * work[24]) + (work[21] * t131 - 1.0 / 48.0 * (work[25] * t126)) + t174);
-    work[73] = 2.0 * (t123 * work[39]) - work[168] + (2.0 * (work[22] * work[58]) + work[9] * t167) + 2.0 * (work[4] * work[60]);
-    const double t177 = work[72] + work[73];
-    const double t178 = 0.5 * t177;
-    work[33] = 2.0 * t66;
+    work[62] = t63 + t65;
+    work[59] = t66 - work[62];
+    const double t69 = coef[1] * (1.0 / 12.0 * (work[27] * work[57]) + 1.0 / 12.0 * (work[22] * t49))
+        + work[26] * t52 + coef[0] * (work[4] * t68 + (work[165] + 0.25 * (work[6] * work[59])));
+    work[60] = 4.0 * work[166] - work[5] * (0.25 * work[167] - 1.0 / 48.0 * (t50 * work[24]) + (work[21] * t53
+        - 1.0 / 48.0 * (work[25] * t51)) + t69);
+    work[73] = 2.0 * (t49 * work[39]) - work[168] + (2.0 * (work[22] * work[58]) + work[9] * t68) + 2.0
+        * (work[4] * work[60]);
+    const double t70 = work[72] + work[73], t71 = 0.5 * t70;
+    work[33] = 2.0 * t24;
     displacement[0] = (-0.5) * p_y1;
     increment[0] = p_y1;
     displacement[1] = 0.5 * p_x1;
@@ -252,161 +255,150 @@ vortices3_APART static void vortices3_linearise_part1(const double coef[3], cons
     increment[2] = 0.5 * p_y2;
     displacement[3] = 0.25 * p_x2;
     increment[3] = (-0.5) * p_x2;
-    increment[4] = 2.0 * t85;
+    increment[4] = 2.0 * t33;
     displacement[4] = p_y3;
-    displacement[5] = t86;
-    increment[5] = (-2.0) * t86;
-    increment_jacobian[0] = t177;
-    increment_jacobian[7] = -t177;
-    jacobian[0] = 1.0 - t178;
-    jacobian[7] = 1.0 + t178;
+    displacement[5] = t34;
+    increment[5] = (-2.0) * t34;
+    increment_jacobian[0] = t70;
+    increment_jacobian[7] = -t70;
+    jacobian[0] = 1.0 - t71;
+    jacobian[7] = 1.0 + t71;
 }
 
 /* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
    increment, all with the momenta p = grad S_h(y) (part 2 of 4) */
 vortices3_APART static void vortices3_linearise_part2(const double coef[3], const double y[6],
-                                                      double displacement[restrict 6],
-                                                      double increment[restrict 6],
-                                                      double jacobian[restrict 36],
-                                                      double increment_jacobian[restrict 36],
-                                                      double work[restrict 218])
+    double displacement[restrict 6], double increment[restrict 6], double jacobian[restrict 36],
+    double increment_jacobian[restrict 36], double work[restrict 218])
 {
-    (void)displacement;
-    (void)increment;
-    const double y1 = y[1];
-    const double y2 = y[3];
-    const double t180 = work[0] * work[1];
-    const double t181 = coef[0] * t180;
-    work[134] = 2.0 * (t181 * work[2]);
-    work[122] = work[3] * t181;
-    const double t184 = 0.5 * work[122];
+    (void)displacement, (void)increment;
+    const double y1 = y[1], y2 = y[3];
+    const double t1 = work[0] * work[1], t2 = coef[0] * t1;
+    work[134] = 2.0 * (t2 * work[2]);
+    work[122] = work[3] * t2;
+    const double t3 = 0.5 * work[122];
     work[119] = 2.0 * work[122];
-    const double t186 = work[4] * work[5];
-    const double t187 = coef[0] * t186;
-    work[169] = work[6] * t187;
-    const double t189 = 0.5 * work[169];
-    const double t190 = work[119] - t189;
-    const double t191 = 0.5 * t190;
-    const double t192 = t184 + t191;
-    const double t193 = coef[1] * t180;
-    work[129] = 2.0 / 3.0 * (t193 * work[7]);
-    const double t195 = 2.0 * (work[0] * t181);
-    work[121] = t195 - work[8];
-    work[170] = 2.0 * (work[4] * t187);
-    const double t198 = 0.25 * (work[9] - work[170]);
-    const double t199 = 0.5 * (work[121] + t198);
-    work[123] = work[8] - t195;
-    const double t201 = 0.25 * work[123];
-    const double t202 = t199 - t201;
+    const double t4 = work[4] * work[5], t5 = coef[0] * t4;
+    work[169] = work[6] * t5;
+    const double t6 = 0.5 * work[169], t7 = work[119] - t6, t8 = 0.5 * t7, t9 = t3 + t8;
+    const double t10 = coef[1] * t1;
+    work[129] = 2.0 / 3.0 * (t10 * work[7]);
+    const double t11 = 2.0 * (work[0] * t2);
+    work[121] = t11 - work[8];
+    work[170] = 2.0 * (work[4] * t5);
+    const double t12 = 0.25 * (work[9] - work[170]), t13 = 0.5 * (work[121] + t12);
+    work[123] = work[8] - t11;
+    const double t14 = 0.25 * work[123], t15 = t13 - t14;
     work[124] = 2.0 * work[10];
-    const double t204 = t201 - t199;
-    const double t205 = work[124] + (2.0 * (work[0] * t192) + 2.0 * (work[3] * t204));
-    const double t206 = coef[1] * t205;
-    work[125] = 1.0 / 6.0 * (t180 * work[11]);
-    const double t208 = 1.0 / 12.0 * (work[12] * t206) - work[125];
-    work[126] = 1.0 / 6.0 * (t180 * work[13]);
-    const double t210 = 1.0 / 12.0 * (work[12] * t205) - work[126];
-    work[128] = 1.0 / 6.0 * (t180 * work[14]);
-    work[127] = 1.0 / 6.0 * (t180 * work[15]);
-    const double t213 = work[12] * t208 + (coef[1] * (work[12] * t210 - work[128]) - work[127]);
-    const double t214 = work[129] + 1.0 / 3.0 * (work[16] * t202) + 2.0 * (work[3] * t213);
-    const double t215 = 0.25 * work[121] + t198;
-    const double t216 = t189 - t184;
-    const double t217 = 2.0 * (work[17] * t216) + 2.0 * (work[18] * t215);
-    const double t218 = work[19] * t217;
-    const double t219 = coef[1] * t217;
-    const double t220 = work[19] * t219;
-    const double t221 = (-1.0 / 24.0) * (coef[1] * (work[19] * t218)) - 1.0 / 24.0 * (work[19] * t220);
-    const double t222 = 1.0 / 6.0 * (work[20] * t215) + 2.0 * (work[18] * t221);
-    const double t223 = 0.25 * t214 - 0.25 * t222;
-    const double t224 = t198 + 0.5 * (work[123] - t198);
-    work[172] = t186 * work[21];
+    const double t16 = t14 - t13, t17 = work[124] + (2.0 * (work[0] * t9) + 2.0 * (work[3] * t16));
+    const double t18 = coef[1] * t17;
+    work[125] = 1.0 / 6.0 * (t1 * work[11]);
+    const double t19 = 1.0 / 12.0 * (work[12] * t18) - work[125];
+    work[126] = 1.0 / 6.0 * (t1 * work[13]);
+    const double t20 = 1.0 / 12.0 * (work[12] * t17) - work[126];
+    work[128] = 1.0 / 6.0 * (t1 * work[14]);
+    work[127] = 1.0 / 6.0 * (t1 * work[15]);
+    const double t21 = work[12] * t19 + (coef[1] * (work[12] * t20 - work[128]) - work[127]);
+    const double t22 = work[129] + 1.0 / 3.0 * (work[16] * t15) + 2.0 * (work[3] * t21);
+    const double t23 = 0.25 * work[121] + t12, t24 = t6 - t3;
+    const double t25 = 2.0 * (work[17] * t24) + 2.0 * (work[18] * t23), t26 = work[19] * t25;
+    const double t27 = coef[1] * t25, t28 = work[19] * t27;
+    const double t29 = (-1.0 / 24.0) * (coef[1] * (work[19] * t26)) - 1.0 / 24.0 * (work[19] * t28);
+    const double t30 = 1.0 / 6.0 * (work[20] * t23) + 2.0 * (work[18] * t29);
+    const double t31 = 0.25 * t22 - 0.25 * t30, t32 = t12 + 0.5 * (work[123] - t12);
+    work[172] = t4 * work[21];
     work[171] = 2.0 * work[22];
-    const double t227 = t189 + t191;
-    const double t228 = work[171] + 2.0 * (work[4] * t227) + 2.0 * (work[6] * t224);
-    const double t229 = coef[1] * t228;
-    const double t230 = 1.0 / 24.0 * work[172] - 1.0 / 48.0 * (work[23] * t229);
-    work[175] = 1.0 / 24.0 * (t186 * work[24]);
-    work[174] = 1.0 / 24.0 * (t186 * work[25]);
-    work[173] = 1.0 / 24.0 * (t186 * work[26]);
-    const double t234 = work[173] - 1.0 / 48.0 * (work[23] * t228);
-    const double t235 = work[23] * t230 + (work[175] + coef[1] * (work[174] + work[23] * t234));
-    const double t236 = coef[1] * t186;
-    work[176] = 1.0 / 6.0 * (t236 * work[27]);
-    const double t238 = 1.0 / 12.0 * (work[28] * t224) + (2.0 * (work[6] * t235) - work[176]);
-    const double t239 = 0.5 * t214;
-    const double t240 = t223 + (0.5 * t238 + t239);
+    const double t33 = t6 + t8, t34 = work[171] + 2.0 * (work[4] * t33) + 2.0 * (work[6] * t32);
+    const double t35 = coef[1] * t34, t36 = 1.0 / 24.0 * work[172] - 1.0 / 48.0 * (work[23] * t35);
+    work[175] = 1.0 / 24.0 * (t4 * work[24]);
+    work[174] = 1.0 / 24.0 * (t4 * work[25]);
+    work[173] = 1.0 / 24.0 * (t4 * work[26]);
+    const double t37 = work[173] - 1.0 / 48.0 * (work[23] * t34);
+    const double t38 = work[23] * t36 + (work[175] + coef[1] * (work[174] + work[23] * t37));
+    const double t39 = coef[1] * t4;
+    work[176] = 1.0 / 6.0 * (t39 * work[27]);
+    const double t40 = 1.0 / 12.0 * (work[28] * t32) + (2.0 * (work[6] * t38) - work[176]);
+    const double t41 = 0.5 * t22, t42 = t31 + (0.5 * t40 + t41);
     work[135] = work[29] * (work[0] * work[30]);
-    const double t242 = (-0.5) * t190 - t184;
-    const double t243 = 1.0 / 6.0 * (work[20] * t216) + 2.0 * (work[17] * t221);
-    work[133] = t193 * work[10];
-    const double t245 = 2.0 / 3.0 * work[133] + 1.0 / 3.0 * (work[16] * t242) + (work[31] + 2.0 * (work[0] * t213));
-    const double t246 = 0.25 * (t243 - t245);
-    work[177] = 1.0 / 6.0 * (t236 * work[22]);
-    const double t248 = work[32] - work[177] + (1.0 / 12.0 * (work[28] * t227) + 2.0 * (work[4] * t235));
-    const double t249 = 0.5 * (t248 + t245);
-    const double t250 = t246 - t249;
-    const double t251 = coef[2] * (y2 - y1) + coef[1] * (1.0 / 3.0 * (work[10] * t242) + 1.0 / 3.0 * (work[7] * t202)) + (1.0 / 12.0 * (work[15] * t205) + work[11] * t210) + (1.0 / 12.0 * (work[14] * t206) + work[13] * t208 + coef[0] * (work[2] + work[0] * t240 + work[3] * t250));
-    const double t252 = 4.0 * work[135] - work[1] * t251;
-    const double t253 = work[33] - work[134] + (2.0 * (t192 * work[34]) + work[8] * t240) + (2.0 * (work[10] * t213) + 2.0 * (work[0] * t252));
+    const double t43 = (-0.5) * t7 - t3, t44 = 1.0 / 6.0 * (work[20] * t24) + 2.0 * (work[17] * t29);
+    work[133] = t10 * work[10];
+    const double t45 = 2.0 / 3.0 * work[133] + 1.0 / 3.0 * (work[16] * t43) + (work[31] + 2.0
+        * (work[0] * t21));
+    const double t46 = 0.25 * (t44 - t45);
+    work[177] = 1.0 / 6.0 * (t39 * work[22]);
+    const double t47 = work[32] - work[177] + (1.0 / 12.0 * (work[28] * t33) + 2.0 * (work[4] * t38));
+    const double t48 = 0.5 * (t47 + t45), t49 = t46 - t48;
+    const double t50 = coef[2] * (y2 - y1) + coef[1] * (1.0 / 3.0 * (work[10] * t43) + 1.0 / 3.0
+        * (work[7] * t15)) + (1.0 / 12.0 * (work[15] * t17) + work[11] * t20) + (1.0 / 12.0 * (work[14] * t18)
+        + work[13] * t19 + coef[0] * (work[2] + work[0] * t42 + work[3] * t49));
+    const double t51 = 4.0 * work[135] - work[1] * t50;
+    const double t52 = work[33] - work[134] + (2.0 * (t9 * work[34]) + work[8] * t42)
+        + (2.0 * (work[10] * t21) + 2.0 * (work[0] * t51));
     work[202] = 2.0 * work[35];
-    work[201] = 2.0 * (t187 * work[36]);
-    const double t256 = t222 + t238;
-    const double t257 = 0.25 * t256 + 0.25 * ((-0.5) * t238 - t239);
+    work[201] = 2.0 * (t5 * work[36]);
+    const double t53 = t30 + t40, t54 = 0.25 * t53 + 0.25 * ((-0.5) * t40 - t41);
     work[204] = work[37] * (work[4] * work[38]);
     work[196] = 0.25 * (coef[2] * work[4]);
-    const double t260 = t243 + t248;
-    const double t261 = t249 - t260;
-    const double t262 = coef[1] * (1.0 / 12.0 * (work[22] * t227) + 1.0 / 12.0 * (work[27] * t224)) + work[26] * t230 + coef[0] * (0.25 * (work[6] * t261) + (work[36] + work[4] * t257));
-    const double t263 = 4.0 * work[204] - work[5] * (work[196] - 1.0 / 48.0 * (work[24] * t228) + (work[21] * t234 - 1.0 / 48.0 * (work[25] * t229)) + t262);
-    const double t264 = 2.0 * (t227 * work[39]) + 2.0 * (work[22] * t235) + (work[202] - work[201]) + (work[9] * t257 + 2.0 * (work[4] * t263));
-    const double t265 = t253 + t264;
-    const double t266 = t246 - t260;
-    const double t267 = t256 + t223;
-    const double t268 = (-1.0 / 24.0) * (t217 * work[40]) - 1.0 / 24.0 * (work[41] * t218) + ((-1.0 / 24.0) * (work[42] * t219) - 1.0 / 24.0 * (work[43] * t220)) + (coef[1] * (1.0 / 6.0 * (t216 * work[44]) + 1.0 / 6.0 * (work[45] * t215)) + coef[0] * (0.5 * (work[17] * t267) + 0.5 * (work[18] * t266)));
-    const double t269 = work[46] * t268;
-    const double t270 = 2.0 * (t215 * work[47]) + 2.0 * (work[45] * t221) + (0.5 * (work[48] * t266) - 2.0 * (work[18] * t269));
-    const double t271 = t270 - (2.0 * (t204 * work[34]) - 2.0 * (t181 * work[49]) + (2.0 * (work[7] * t213) + work[8] * t250) + 2.0 * (work[3] * t252));
-    const double t272 = (-0.5) * t271;
-    const double t273 = 2.0 * (t216 * work[47]) + 2.0 * (work[44] * t221) + (0.5 * (work[48] * t267) - 2.0 * (work[17] * t269));
-    const double t274 = t273 - t253;
-    const double t275 = 2.0 * (t224 * work[39]) - 0.5 * (t187 * work[50]) + (2.0 * (work[27] * t235) + 0.25 * (work[9] * t261)) + 2.0 * (work[6] * t263) + t270;
-    const double t276 = t273 + t264;
+    const double t55 = t44 + t47, t56 = t48 - t55;
+    const double t57 = coef[1] * (1.0 / 12.0 * (work[22] * t33) + 1.0 / 12.0 * (work[27] * t32)) + work[26]
+        * t36 + coef[0] * (0.25 * (work[6] * t56) + (work[36] + work[4] * t54));
+    const double t58 = 4.0 * work[204] - work[5] * (work[196] - 1.0 / 48.0 * (work[24] * t34)
+        + (work[21] * t37 - 1.0 / 48.0 * (work[25] * t35)) + t57);
+    const double t59 = 2.0 * (t33 * work[39]) + 2.0 * (work[22] * t38) + (work[202] - work[201])
+        + (work[9] * t54 + 2.0 * (work[4] * t58));
+    const double t60 = t52 + t59, t61 = t46 - t55, t62 = t53 + t31;
+    const double t63 = (-1.0 / 24.0) * (t25 * work[40]) - 1.0 / 24.0 * (work[41] * t26) + ((-1.0 / 24.0)
+        * (work[42] * t27) - 1.0 / 24.0 * (work[43] * t28)) + (coef[1] * (1.0 / 6.0 * (t24 * work[44]) + 1.0
+        / 6.0 * (work[45] * t23)) + coef[0] * (0.5 * (work[17] * t62) + 0.5 * (work[18] * t61)));
+    const double t64 = work[46] * t63;
+    const double t65 = 2.0 * (t23 * work[47]) + 2.0 * (work[45] * t29) + (0.5 * (work[48] * t61) - 2.0
+        * (work[18] * t64));
+    const double t66 = t65 - (2.0 * (t16 * work[34]) - 2.0 * (t2 * work[49]) + (2.0 * (work[7] * t21)
+        + work[8] * t49) + 2.0 * (work[3] * t51));
+    const double t67 = (-0.5) * t66;
+    const double t68 = 2.0 * (t24 * work[47]) + 2.0 * (work[44] * t29) + (0.5 * (work[48] * t62) - 2.0
+        * (work[17] * t64));
+    const double t69 = t68 - t52;
+    const double t70 = 2.0 * (t32 * work[39]) - 0.5 * (t5 * work[50]) + (2.0 * (work[27] * t38) + 0.25
+        * (work[9] * t56)) + 2.0 * (work[6] * t58) + t65;
+    const double t71 = t68 + t59;
     work[138] = 2.0 * (work[51] * work[49]);
-    const double t278 = 2.0 * (work[7] * work[52]) - work[138] + (2.0 * (work[53] * work[34]) + work[33]) + (work[8] * work[54] + 2.0 * (work[3] * work[55]));
+    const double t72 = 2.0 * (work[7] * work[52]) - work[138] + (2.0 * (work[53] * work[34]) + work[33])
+        + (work[8] * work[54] + 2.0 * (work[3] * work[55]));
     work[210] = 0.5 * (work[56] * work[50]);
-    const double t280 = 2.0 * (work[57] * work[39]) + 2.0 * (work[27] * work[58]) + (work[202] - work[210]) + (0.25 * (work[9] * work[59]) + 2.0 * (work[6] * work[60]));
-    const double t281 = t278 + t280;
-    const double t282 = work[61] - work[62];
-    const double t283 = work[63] + work[64];
-    const double t284 = (-1.0 / 24.0) * (work[65] * work[40]) - 1.0 / 24.0 * (work[41] * work[66]) + ((-1.0 / 24.0) * (work[42] * work[67]) - 1.0 / 24.0 * (work[43] * work[68])) + (coef[1] * (1.0 / 6.0 * (work[69] * work[45]) + 1.0 / 6.0 * (work[44] * work[70])) + coef[0] * (0.5 * (work[18] * t282) + 0.5 * (work[17] * t283)));
-    const double t285 = work[46] * t284;
-    const double t286 = 2.0 * (work[69] * work[47]) + 2.0 * (work[45] * work[71]) + (0.5 * (work[48] * t282) - 2.0 * (work[18] * t285));
-    const double t287 = t286 - t278;
-    const double t288 = 2.0 * (work[70] * work[47]) + 2.0 * (work[44] * work[71]) + (0.5 * (work[48] * t283) - 2.0 * (work[17] * t285));
-    const double t289 = t288 - work[72];
-    const double t290 = 0.5 * t289;
-    const double t291 = t286 + t280;
-    const double t292 = work[73] + t288;
-    const double t293 = work[18] * work[46];
-    work[136] = coef[0] * t293;
-    const double t295 = work[18] * work[136];
+    const double t73 = 2.0 * (work[57] * work[39]) + 2.0 * (work[27] * work[58]) + (work[202] - work[210])
+        + (0.25 * (work[9] * work[59]) + 2.0 * (work[6] * work[60]));
+    const double t74 = t72 + t73, t75 = work[61] - work[62], t76 = work[63] + work[64];
+    const double t77 = (-1.0 / 24.0) * (work[65] * work[40]) - 1.0 / 24.0 * (work[41] * work[66])
+        + ((-1.0 / 24.0) * (work[42] * work[67]) - 1.0 / 24.0 * (work[43] * work[68]))
+        + (coef[1] * (1.0 / 6.0 * (work[69] * work[45]) + 1.0 / 6.0 * (work[44] * work[70])) + coef[0]
+        * (0.5 * (work[18] * t75) + 0.5 * (work[17] * t76)));
+    const double t78 = work[46] * t77;
+    const double t79 = 2.0 * (work[69] * work[47]) + 2.0 * (work[45] * work[71]) + (0.5 * (work[48] * t75)
+        - 2.0 * (work[18] * t78));
+    const double t80 = t79 - t72;
+    const double t81 = 2.0 * (work[70] * work[47]) + 2.0 * (work[44] * work[71]) + (0.5 * (work[48] * t76)
+        - 2.0 * (work[17] * t78));
+    const double t82 = t81 - work[72], t83 = 0.5 * t82, t84 = t79 + t73, t85 = work[73] + t81;
+    const double t86 = work[18] * work[46];
+    work[136] = coef[0] * t86;
+    const double t87 = work[18] * work[136];
     work[120] = 0.5 * work[48];
-    work[145] = t295 - work[120];
-    work[146] = work[120] - t295;
+    work[145] = t87 - work[120];
+    work[146] = work[120] - t87;
     work[90] = 0.25 * (work[146] + work[74]);
     work[88] = work[145] + work[90];
     work[105] = work[136] * work[75];
-    work[151] = t293 * work[41];
+    work[151] = t86 * work[41];
     work[150] = 2.0 * work[45];
     work[148] = work[17] * work[136];
     work[97] = 0.25 * (work[148] - work[76]) - work[148];
     work[99] = work[150] + (2.0 * (work[18] * work[97]) + 2.0 * (work[17] * work[88]));
     work[101] = coef[1] * work[99];
     work[100] = 1.0 / 12.0 * work[151] - 1.0 / 24.0 * (work[19] * work[101]);
-    work[154] = 1.0 / 12.0 * (t293 * work[40]);
-    work[153] = 1.0 / 12.0 * (t293 * work[42]);
-    work[152] = 1.0 / 12.0 * (t293 * work[43]);
+    work[154] = 1.0 / 12.0 * (t86 * work[40]);
+    work[153] = 1.0 / 12.0 * (t86 * work[42]);
+    work[152] = 1.0 / 12.0 * (t86 * work[43]);
     work[98] = work[152] - 1.0 / 24.0 * (work[19] * work[99]);
     work[89] = work[19] * work[100] + (work[154] + coef[1] * (work[153] + work[19] * work[98]));
     work[144] = work[77] - work[148];
@@ -418,310 +410,309 @@ vortices3_APART static void vortices3_linearise_part2(const double coef[3], cons
     work[143] = work[23] * work[142];
     work[95] = (-1.0 / 48.0) * (coef[1] * (work[23] * work[141])) - 1.0 / 48.0 * (work[23] * work[143]);
     work[107] = 1.0 / 12.0 * (work[28] * work[144]) + 2.0 * (work[6] * work[95]);
-    work[87] = coef[1] * t293;
+    work[87] = coef[1] * t86;
     work[163] = 1.0 / 3.0 * (work[87] * work[45]);
     work[132] = 2.0 * work[47];
-    const double t326 = 1.0 / 6.0 * (work[20] * work[97]) - work[163] + (work[132] + 2.0 * (work[18] * work[89]));
-    work[139] = work[107] + t326;
-    const double t328 = work[76] - work[148];
-    work[109] = (-0.25) * t328 - work[77];
+    const double t88 = 1.0 / 6.0 * (work[20] * work[97]) - work[163] + (work[132] + 2.0
+        * (work[18] * work[89]));
+    work[139] = work[107] + t88;
+    const double t89 = work[76] - work[148];
+    work[109] = (-0.25) * t89 - work[77];
     work[117] = work[91] - work[90];
-    work[137] = work[77] + 0.25 * t328;
+    work[137] = work[77] + 0.25 * t89;
     work[114] = 2.0 * (work[0] * work[117]) + (2.0 * (work[3] * work[137]) - work[79]);
     work[115] = coef[1] * work[114];
     work[110] = work[80] + 1.0 / 12.0 * (work[12] * work[115]);
     work[116] = work[81] + 1.0 / 12.0 * (work[12] * work[114]);
     work[92] = work[12] * work[110] + (work[82] + coef[1] * (work[83] + work[12] * work[116]));
-    work[106] = (-2.0 / 3.0) * work[84] - work[31] + (1.0 / 3.0 * (work[16] * work[109]) + 2.0 * (work[3] * work[92]));
-    work[108] = 0.25 * work[106] - 0.25 * t326;
+    work[106] = (-2.0 / 3.0) * work[84] - work[31] + (1.0 / 3.0 * (work[16] * work[109]) + 2.0
+        * (work[3] * work[92]));
+    work[108] = 0.25 * work[106] - 0.25 * t88;
     work[102] = work[139] + work[108];
     work[131] = work[19] * work[46];
     work[104] = work[131] * (work[18] * work[85]);
     work[96] = 0.5 * (coef[2] * work[18]);
     work[103] = 0.5 * work[86];
-    jacobian[1] = (-0.5) * t265;
-    increment_jacobian[1] = t265;
-    jacobian[19] = 0.25 * t271;
-    increment_jacobian[2] = t271;
-    jacobian[2] = t272;
-    increment_jacobian[19] = t272;
-    jacobian[3] = (-0.5) * t274;
-    jacobian[13] = (-0.25) * t274;
-    increment_jacobian[3] = t274;
-    increment_jacobian[13] = 0.5 * t274;
-    jacobian[4] = 0.5 * t275;
-    jacobian[31] = t275;
-    increment_jacobian[4] = -t275;
-    increment_jacobian[31] = (-2.0) * t275;
-    jacobian[5] = 0.5 * t276;
-    jacobian[25] = -t276;
-    increment_jacobian[5] = -t276;
-    increment_jacobian[25] = 2.0 * t276;
-    jacobian[6] = 0.5 * t281;
-    increment_jacobian[6] = -t281;
-    increment_jacobian[8] = t278 - t286;
-    jacobian[8] = 0.5 * t287;
-    jacobian[18] = 0.25 * t287;
-    increment_jacobian[18] = (-0.5) * t287;
-    increment_jacobian[9] = work[72] - t288;
-    jacobian[12] = (-0.25) * t289;
-    jacobian[9] = t290;
-    increment_jacobian[12] = t290;
-    jacobian[10] = (-0.5) * t291;
-    jacobian[30] = t291;
-    increment_jacobian[10] = t291;
-    increment_jacobian[30] = (-2.0) * t291;
-    jacobian[11] = (-0.5) * t292;
-    jacobian[24] = -t292;
-    increment_jacobian[11] = t292;
-    increment_jacobian[24] = 2.0 * t292;
+    jacobian[1] = (-0.5) * t60;
+    increment_jacobian[1] = t60;
+    jacobian[19] = 0.25 * t66;
+    increment_jacobian[2] = t66;
+    jacobian[2] = t67;
+    increment_jacobian[19] = t67;
+    jacobian[3] = (-0.5) * t69;
+    jacobian[13] = (-0.25) * t69;
+    increment_jacobian[3] = t69;
+    increment_jacobian[13] = 0.5 * t69;
+    jacobian[4] = 0.5 * t70;
+    jacobian[31] = t70;
+    increment_jacobian[4] = -t70;
+    increment_jacobian[31] = (-2.0) * t70;
+    jacobian[5] = 0.5 * t71;
+    jacobian[25] = -t71;
+    increment_jacobian[5] = -t71;
+    increment_jacobian[25] = 2.0 * t71;
+    jacobian[6] = 0.5 * t74;
+    increment_jacobian[6] = -t74;
+    increment_jacobian[8] = t72 - t79;
+    jacobian[8] = 0.5 * t80;
+    jacobian[18] = 0.25 * t80;
+    increment_jacobian[18] = (-0.5) * t80;
+    increment_jacobian[9] = work[72] - t81;
+    jacobian[12] = (-0.25) * t82;
+    jacobian[9] = t83;
+    increment_jacobian[12] = t83;
+    jacobian[10] = (-0.5) * t84;
+    jacobian[30] = t84;
+    increment_jacobian[10] = t84;
+    increment_jacobian[30] = (-2.0) * t84;
+    jacobian[11] = (-0.5) * t85;
+    jacobian[24] = -t85;
+    increment_jacobian[11] = t85;
+    increment_jacobian[24] = 2.0 * t85;
 }
 
 /* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
    increment, all with the momenta p = grad S_h(y) (part 3 of 4) */
 vortices3_APART static void vortices3_linearise_part3(const double coef[3], const double y[6],
-                                                      double displacement[restrict 6],
-                                                      double increment[restrict 6],
-                                                      double jacobian[restrict 36],
-                                                      double increment_jacobian[restrict 36],
-                                                      double work[restrict 218])
+    double displacement[restrict 6], double increment[restrict 6], double jacobian[restrict 36],
+    double increment_jacobian[restrict 36], double work[restrict 218])
 {
-    (void)y;
-    (void)displacement;
-    (void)increment;
-    const double t344 = 1.0 / 3.0 * (work[87] * work[44]);
-    const double t345 = 1.0 / 6.0 * (work[20] * work[88]) - t344 + 2.0 * (work[17] * work[89]);
-    const double t346 = work[90] - work[91];
-    const double t347 = 1.0 / 3.0 * (work[16] * t346) + (2.0 * (work[0] * work[92]) - work[93]);
-    const double t348 = 0.25 * (t345 - t347);
-    const double t349 = 1.0 / 12.0 * (work[28] * work[94]) + 2.0 * (work[4] * work[95]);
-    const double t350 = t349 + t345;
-    const double t351 = t348 - t350;
-    const double t352 = work[96] + coef[1] * (1.0 / 6.0 * (work[45] * work[97]) + 1.0 / 6.0 * (work[44] * work[88])) + (work[41] * work[98] - 1.0 / 24.0 * (work[40] * work[99])) + (work[43] * work[100] - 1.0 / 24.0 * (work[42] * work[101]) + coef[0] * (0.5 * (work[17] * work[102]) + (work[103] + 0.5 * (work[18] * t351))));
-    const double t353 = 4.0 * work[104] - work[46] * t352;
-    const double t354 = 2.0 * (work[88] * work[47]) - work[105] + (2.0 * (work[44] * work[89]) + 0.5 * (work[48] * work[102])) + 2.0 * (work[17] * t353);
-    const double t355 = 0.5 * work[106];
-    const double t356 = 0.5 * work[107] + t355 + work[108];
-    const double t357 = 0.5 * (t349 + t347);
-    const double t358 = t348 - t357;
-    const double t359 = coef[1] * (1.0 / 3.0 * (work[7] * work[109]) + 1.0 / 3.0 * (work[10] * t346)) + work[13] * work[110] + coef[0] * (work[0] * t356 + (work[111] - work[112] + work[3] * t358));
-    const double t360 = (-4.0) * work[113] - work[1] * (coef[2] * work[3] + 1.0 / 12.0 * (work[114] * work[15]) + (1.0 / 12.0 * (work[14] * work[115]) + work[11] * work[116]) + t359);
-    const double t361 = t354 - (2.0 * (work[117] * work[34]) + work[118] + (2.0 * (work[10] * work[92]) + work[8] * t356) + 2.0 * (work[0] * t360));
-    const double t362 = 0.25 * t361;
-    const double t363 = work[17] * work[46];
-    const double t364 = coef[0] * t363;
-    const double t365 = work[18] * t364;
-    const double t366 = work[119] - t365;
-    const double t367 = 0.25 * t366;
-    const double t368 = t365 + t367;
-    const double t369 = work[17] * t364;
-    const double t370 = work[120] - t369;
-    const double t371 = t370 + 0.5 * work[121];
-    const double t372 = t365 - work[122];
-    const double t373 = 2.0 * (work[4] * t372) + 2.0 * (work[6] * t371);
-    const double t374 = work[23] * t373;
-    const double t375 = coef[1] * t373;
-    const double t376 = work[23] * t375;
-    const double t377 = (-1.0 / 48.0) * (coef[1] * (work[23] * t374)) - 1.0 / 48.0 * (work[23] * t376);
-    const double t378 = 1.0 / 12.0 * (work[28] * t371) + 2.0 * (work[6] * t377);
-    const double t379 = 0.25 * (t370 + work[121]);
-    const double t380 = t370 - t379;
-    const double t381 = coef[1] * t363;
-    const double t382 = 1.0 / 3.0 * (t381 * work[45]);
-    const double t383 = t363 * work[41];
-    const double t384 = 2.0 * work[44];
-    const double t385 = t384 + (2.0 * (work[17] * t368) + 2.0 * (work[18] * t380));
-    const double t386 = coef[1] * t385;
-    const double t387 = 1.0 / 12.0 * t383 - 1.0 / 24.0 * (work[19] * t386);
-    const double t388 = 1.0 / 12.0 * (t363 * work[40]);
-    const double t389 = 1.0 / 12.0 * (t363 * work[42]);
-    const double t390 = t363 * work[43];
-    const double t391 = 1.0 / 12.0 * t390 - 1.0 / 24.0 * (work[19] * t385);
-    const double t392 = work[19] * t387 + (t388 + coef[1] * (t389 + work[19] * t391));
-    const double t393 = 1.0 / 6.0 * (work[20] * t380) - t382 + 2.0 * (work[18] * t392);
-    const double t394 = t378 + t393;
-    const double t395 = 0.5 * work[123];
-    const double t396 = t395 - t379;
-    const double t397 = (-0.25) * t366 - work[122];
-    const double t398 = 2.0 * (work[0] * t397) - work[124] + 2.0 * (work[3] * (t379 - t395));
-    const double t399 = coef[1] * t398;
-    const double t400 = work[125] + 1.0 / 12.0 * (work[12] * t399);
-    const double t401 = work[126] + 1.0 / 12.0 * (work[12] * t398);
-    const double t402 = work[12] * t400 + (work[127] + coef[1] * (work[128] + work[12] * t401));
-    const double t403 = 1.0 / 3.0 * (work[16] * t396) - work[129] + 2.0 * (work[3] * t402);
-    const double t404 = 0.25 * t403 - 0.25 * t393;
-    const double t405 = t394 + t404;
+    (void)y, (void)displacement, (void)increment;
+    const double t1 = 1.0 / 3.0 * (work[87] * work[44]);
+    const double t2 = 1.0 / 6.0 * (work[20] * work[88]) - t1 + 2.0 * (work[17] * work[89]);
+    const double t3 = work[90] - work[91];
+    const double t4 = 1.0 / 3.0 * (work[16] * t3) + (2.0 * (work[0] * work[92]) - work[93]);
+    const double t5 = 0.25 * (t2 - t4);
+    const double t6 = 1.0 / 12.0 * (work[28] * work[94]) + 2.0 * (work[4] * work[95]), t7 = t6 + t2;
+    const double t8 = t5 - t7;
+    const double t9 = work[96] + coef[1] * (1.0 / 6.0 * (work[45] * work[97]) + 1.0 / 6.0
+        * (work[44] * work[88])) + (work[41] * work[98] - 1.0 / 24.0 * (work[40] * work[99]))
+        + (work[43] * work[100] - 1.0 / 24.0 * (work[42] * work[101]) + coef[0]
+        * (0.5 * (work[17] * work[102]) + (work[103] + 0.5 * (work[18] * t8))));
+    const double t10 = 4.0 * work[104] - work[46] * t9;
+    const double t11 = 2.0 * (work[88] * work[47]) - work[105] + (2.0 * (work[44] * work[89]) + 0.5
+        * (work[48] * work[102])) + 2.0 * (work[17] * t10);
+    const double t12 = 0.5 * work[106], t13 = 0.5 * work[107] + t12 + work[108];
+    const double t14 = 0.5 * (t6 + t4), t15 = t5 - t14;
+    const double t16 = coef[1] * (1.0 / 3.0 * (work[7] * work[109]) + 1.0 / 3.0 * (work[10] * t3)) + work[13]
+        * work[110] + coef[0] * (work[0] * t13 + (work[111] - work[112] + work[3] * t15));
+    const double t17 = (-4.0) * work[113] - work[1] * (coef[2] * work[3] + 1.0 / 12.0 * (work[114] * work[15])
+        + (1.0 / 12.0 * (work[14] * work[115]) + work[11] * work[116]) + t16);
+    const double t18 = t11 - (2.0 * (work[117] * work[34]) + work[118] + (2.0 * (work[10] * work[92])
+        + work[8] * t13) + 2.0 * (work[0] * t17));
+    const double t19 = 0.25 * t18, t20 = work[17] * work[46], t21 = coef[0] * t20;
+    const double t22 = work[18] * t21, t23 = work[119] - t22, t24 = 0.25 * t23, t25 = t22 + t24;
+    const double t26 = work[17] * t21, t27 = work[120] - t26, t28 = t27 + 0.5 * work[121];
+    const double t29 = t22 - work[122], t30 = 2.0 * (work[4] * t29) + 2.0 * (work[6] * t28);
+    const double t31 = work[23] * t30, t32 = coef[1] * t30, t33 = work[23] * t32;
+    const double t34 = (-1.0 / 48.0) * (coef[1] * (work[23] * t31)) - 1.0 / 48.0 * (work[23] * t33);
+    const double t35 = 1.0 / 12.0 * (work[28] * t28) + 2.0 * (work[6] * t34);
+    const double t36 = 0.25 * (t27 + work[121]), t37 = t27 - t36, t38 = coef[1] * t20;
+    const double t39 = 1.0 / 3.0 * (t38 * work[45]), t40 = t20 * work[41], t41 = 2.0 * work[44];
+    const double t42 = t41 + (2.0 * (work[17] * t25) + 2.0 * (work[18] * t37)), t43 = coef[1] * t42;
+    const double t44 = 1.0 / 12.0 * t40 - 1.0 / 24.0 * (work[19] * t43);
+    const double t45 = 1.0 / 12.0 * (t20 * work[40]), t46 = 1.0 / 12.0 * (t20 * work[42]);
+    const double t47 = t20 * work[43], t48 = 1.0 / 12.0 * t47 - 1.0 / 24.0 * (work[19] * t42);
+    const double t49 = work[19] * t44 + (t45 + coef[1] * (t46 + work[19] * t48));
+    const double t50 = 1.0 / 6.0 * (work[20] * t37) - t39 + 2.0 * (work[18] * t49), t51 = t35 + t50;
+    const double t52 = 0.5 * work[123], t53 = t52 - t36, t54 = (-0.25) * t23 - work[122];
+    const double t55 = 2.0 * (work[0] * t54) - work[124] + 2.0 * (work[3] * (t36 - t52));
+    const double t56 = coef[1] * t55, t57 = work[125] + 1.0 / 12.0 * (work[12] * t56);
+    const double t58 = work[126] + 1.0 / 12.0 * (work[12] * t55);
+    const double t59 = work[12] * t57 + (work[127] + coef[1] * (work[128] + work[12] * t58));
+    const double t60 = 1.0 / 3.0 * (work[16] * t53) - work[129] + 2.0 * (work[3] * t59);
+    const double t61 = 0.25 * t60 - 0.25 * t50, t62 = t51 + t61;
     work[207] = 2.0 * work[130];
-    work[206] = t364 * work[75];
+    work[206] = t21 * work[75];
     work[186] = work[131] * (work[17] * work[85]);
     work[187] = coef[2] * work[17];
     work[185] = 0.5 * work[75];
-    const double t411 = 1.0 / 3.0 * (t381 * work[44]);
-    const double t412 = 1.0 / 6.0 * (work[20] * t368) - t411 + (work[132] + 2.0 * (work[17] * t392));
-    const double t413 = work[122] + t367;
-    const double t414 = (-2.0 / 3.0) * work[133] - work[31] + (1.0 / 3.0 * (work[16] * t413) + 2.0 * (work[0] * t402));
-    const double t415 = 0.25 * (t412 - t414);
-    const double t416 = 1.0 / 12.0 * (work[28] * t372) + 2.0 * (work[4] * t377);
-    const double t417 = t416 + t412;
-    const double t418 = t415 - t417;
-    const double t419 = 0.5 * work[187] + coef[1] * (1.0 / 6.0 * (work[44] * t368) + 1.0 / 6.0 * (work[45] * t380)) + (work[41] * t391 - 1.0 / 24.0 * (work[40] * t385)) + (work[43] * t387 - 1.0 / 24.0 * (work[42] * t386) + coef[0] * (work[185] + 0.5 * (work[17] * t405) + 0.5 * (work[18] * t418)));
-    const double t420 = 4.0 * work[186] - work[46] * t419;
-    const double t421 = 2.0 * (t368 * work[47]) + 0.5 * (work[48] * t405) + (work[207] - work[206]) + (2.0 * (work[44] * t392) + 2.0 * (work[17] * t420));
-    const double t422 = 0.5 * t378;
-    const double t423 = t422 + 0.5 * t403 + t404;
-    const double t424 = 0.5 * (t416 + t414);
-    const double t425 = coef[2] * work[0] + coef[1] * (1.0 / 3.0 * (work[10] * t413) + 1.0 / 3.0 * (work[7] * t396)) + (1.0 / 12.0 * (work[15] * t398) + work[11] * t401) + (1.0 / 12.0 * (work[14] * t399) + work[13] * t400 + coef[0] * (work[3] * (t415 - t424) + (work[0] * t423 - work[2])));
-    const double t426 = 2.0 * (t397 * work[34]) + 2.0 * (work[10] * t402) + (work[134] - work[33]) + (work[8] * t423 + 2.0 * (work[0] * ((-4.0) * work[135] - work[1] * t425)));
-    const double t427 = t421 - t426;
-    const double t428 = t424 - t417;
-    const double t429 = 0.25 * t394 + 0.25 * ((-0.5) * t403 - t422);
-    const double t430 = (-1.0 / 48.0) * (t373 * work[24]) - 1.0 / 48.0 * (work[21] * t374) + ((-1.0 / 48.0) * (work[25] * t375) - 1.0 / 48.0 * (work[26] * t376)) + (coef[1] * (1.0 / 12.0 * (t372 * work[22]) + 1.0 / 12.0 * (work[27] * t371)) + coef[0] * (work[4] * t429 + 0.25 * (work[6] * t428)));
-    const double t431 = work[5] * t430;
-    const double t432 = 2.0 * (t371 * work[39]) + 2.0 * (work[27] * t377) + (0.25 * (work[9] * t428) - 2.0 * (work[6] * t431)) + (2.0 * (t380 * work[47]) - t364 * work[86] + (2.0 * (work[45] * t392) + 0.5 * (work[48] * t418)) + 2.0 * (work[18] * t420));
-    const double t433 = 2.0 * (t372 * work[39]) + 2.0 * (work[22] * t377) + (work[9] * t429 - 2.0 * (work[4] * t431)) + t421;
+    const double t63 = 1.0 / 3.0 * (t38 * work[44]);
+    const double t64 = 1.0 / 6.0 * (work[20] * t25) - t63 + (work[132] + 2.0 * (work[17] * t49));
+    const double t65 = work[122] + t24;
+    const double t66 = (-2.0 / 3.0) * work[133] - work[31] + (1.0 / 3.0 * (work[16] * t65) + 2.0
+        * (work[0] * t59));
+    const double t67 = 0.25 * (t64 - t66);
+    const double t68 = 1.0 / 12.0 * (work[28] * t29) + 2.0 * (work[4] * t34), t69 = t68 + t64;
+    const double t70 = t67 - t69;
+    const double t71 = 0.5 * work[187] + coef[1] * (1.0 / 6.0 * (work[44] * t25) + 1.0 / 6.0
+        * (work[45] * t37)) + (work[41] * t48 - 1.0 / 24.0 * (work[40] * t42)) + (work[43] * t44 - 1.0 / 24.0
+        * (work[42] * t43) + coef[0] * (work[185] + 0.5 * (work[17] * t62) + 0.5 * (work[18] * t70)));
+    const double t72 = 4.0 * work[186] - work[46] * t71;
+    const double t73 = 2.0 * (t25 * work[47]) + 0.5 * (work[48] * t62) + (work[207] - work[206])
+        + (2.0 * (work[44] * t49) + 2.0 * (work[17] * t72));
+    const double t74 = 0.5 * t35, t75 = t74 + 0.5 * t60 + t61, t76 = 0.5 * (t68 + t66);
+    const double t77 = coef[2] * work[0] + coef[1] * (1.0 / 3.0 * (work[10] * t65) + 1.0 / 3.0
+        * (work[7] * t53)) + (1.0 / 12.0 * (work[15] * t55) + work[11] * t58) + (1.0 / 12.0 * (work[14] * t56)
+        + work[13] * t57 + coef[0] * (work[3] * (t67 - t76) + (work[0] * t75 - work[2])));
+    const double t78 = 2.0 * (t54 * work[34]) + 2.0 * (work[10] * t59) + (work[134] - work[33])
+        + (work[8] * t75 + 2.0 * (work[0] * ((-4.0) * work[135] - work[1] * t77)));
+    const double t79 = t73 - t78, t80 = t76 - t69, t81 = 0.25 * t51 + 0.25 * ((-0.5) * t60 - t74);
+    const double t82 = (-1.0 / 48.0) * (t30 * work[24]) - 1.0 / 48.0 * (work[21] * t31) + ((-1.0 / 48.0)
+        * (work[25] * t32) - 1.0 / 48.0 * (work[26] * t33)) + (coef[1] * (1.0 / 12.0 * (t29 * work[22]) + 1.0
+        / 12.0 * (work[27] * t28)) + coef[0] * (work[4] * t81 + 0.25 * (work[6] * t80)));
+    const double t83 = work[5] * t82;
+    const double t84 = 2.0 * (t28 * work[39]) + 2.0 * (work[27] * t34) + (0.25 * (work[9] * t80) - 2.0
+        * (work[6] * t83)) + (2.0 * (t37 * work[47]) - t21 * work[86] + (2.0 * (work[45] * t49) + 0.5
+        * (work[48] * t70)) + 2.0 * (work[18] * t72));
+    const double t85 = 2.0 * (t29 * work[39]) + 2.0 * (work[22] * t34) + (work[9] * t81 - 2.0
+        * (work[4] * t83)) + t73;
     work[213] = work[136] * work[86];
-    const double t435 = 2.0 * (work[45] * work[89]) - work[213] + (2.0 * (work[97] * work[47]) + work[207]) + (0.5 * (work[48] * t351) + 2.0 * (work[18] * t353));
-    const double t436 = t435 - (2.0 * (work[137] * work[34]) + 2.0 * (work[7] * work[92]) + (work[138] - work[33]) + (work[8] * t358 + 2.0 * (work[3] * t360)));
-    const double t437 = t357 - t350;
-    const double t438 = 0.25 * work[139] + 0.25 * ((-0.5) * work[107] - t355);
-    const double t439 = (-1.0 / 48.0) * (work[140] * work[24]) - 1.0 / 48.0 * (work[21] * work[141]) + ((-1.0 / 48.0) * (work[25] * work[142]) - 1.0 / 48.0 * (work[26] * work[143])) + (coef[1] * (1.0 / 12.0 * (work[144] * work[27]) + 1.0 / 12.0 * (work[22] * work[94])) + coef[0] * (0.25 * (work[6] * t437) + work[4] * t438));
-    const double t440 = work[5] * t439;
-    const double t441 = 2.0 * (work[144] * work[39]) + 2.0 * (work[27] * work[95]) + (0.25 * (work[9] * t437) - 2.0 * (work[6] * t440)) + t435;
-    const double t442 = 2.0 * (work[94] * work[39]) + 2.0 * (work[22] * work[95]) + (work[9] * t438 - 2.0 * (work[4] * t440)) + t354;
-    const double t443 = 0.25 * work[145];
-    const double t444 = work[146] + work[147];
-    const double t445 = t443 + t444;
-    const double t446 = work[148] + work[149];
-    const double t447 = 0.25 * work[148];
-    work[215] = t446 - t447;
-    const double t449 = 2.0 * (work[18] * work[215]) + 2.0 * (work[17] * t445);
-    const double t450 = coef[1] * (t449 - work[150]);
-    const double t451 = (-1.0 / 12.0) * work[151] - 1.0 / 24.0 * (work[19] * t450);
-    const double t452 = work[150] - t449;
-    const double t453 = 1.0 / 24.0 * (work[19] * t452) - work[152];
-    work[214] = work[19] * t451 + (coef[1] * (work[19] * t453 - work[153]) - work[154]);
-    const double t455 = 0.25 * work[155];
-    work[208] = t446 - t455;
-    const double t457 = 0.5 * work[156];
-    const double t458 = t444 + t457;
-    const double t459 = 2.0 * (work[6] * work[208]) - work[157] + 2.0 * (work[4] * t458);
-    const double t460 = coef[1] * t459;
-    const double t461 = (-1.0 / 24.0) * work[158] - 1.0 / 48.0 * (work[23] * t460);
-    const double t462 = (-1.0 / 24.0) * work[159] - 1.0 / 48.0 * (work[23] * t459);
-    work[209] = work[23] * t461 + (coef[1] * (work[23] * t462 - work[160]) - work[161]);
-    const double t464 = work[162] - work[32] + (1.0 / 12.0 * (work[28] * work[208]) + 2.0 * (work[6] * work[209]));
-    const double t465 = 1.0 / 6.0 * (work[20] * work[215]) + work[163] + (2.0 * (work[18] * work[214]) - work[132]);
-    const double t466 = t464 + t465;
-    const double t467 = 2.0 * (work[3] * (t447 - t455)) + 2.0 * (work[0] * (t457 - t443));
-    const double t468 = 1.0 / 12.0 * (work[12] * (work[12] * (coef[1] * t467))) + 1.0 / 12.0 * (coef[1] * (work[12] * (work[12] * t467)));
-    const double t469 = 1.0 / 3.0 * (work[16] * (t455 - t447)) + 2.0 * (work[3] * t468);
-    const double t470 = t466 + (0.25 * t469 - 0.25 * t465);
-    const double t471 = t344 + 1.0 / 6.0 * (work[20] * t445) + 2.0 * (work[17] * work[214]);
-    const double t472 = 1.0 / 3.0 * (work[16] * (t443 - t457)) + 2.0 * (work[0] * t468);
-    const double t473 = 1.0 / 12.0 * (work[28] * t458) + (work[164] + 2.0 * (work[4] * work[209]));
-    const double t474 = t471 + t473;
-    work[216] = 0.25 * (t471 - t472) - t474;
-    const double t476 = coef[1] * (1.0 / 6.0 * (work[45] * work[215]) + 1.0 / 6.0 * (work[44] * t445)) - work[96] + (1.0 / 24.0 * (work[40] * t452) + work[41] * t453) + (work[43] * t451 - 1.0 / 24.0 * (work[42] * t450) + coef[0] * (0.5 * (work[18] * work[216]) - work[103] + 0.5 * (work[17] * t470)));
-    work[217] = (-4.0) * work[104] - work[46] * t476;
-    const double t478 = 0.25 * t466 + 0.25 * ((-0.5) * t464 - 0.5 * t469);
-    work[211] = 0.5 * (t472 + t473) - t474;
-    const double t480 = coef[1] * (1.0 / 12.0 * (work[208] * work[27]) + 1.0 / 12.0 * (work[22] * t458)) + work[26] * t461 + coef[0] * (work[4] * t478 + (0.25 * (work[6] * work[211]) - work[165]));
-    work[212] = (-4.0) * work[166] - work[5] * ((-0.25) * work[167] - 1.0 / 48.0 * (t459 * work[24]) + (work[21] * t462 - 1.0 / 48.0 * (work[25] * t460)) + t480);
-    const double t482 = 2.0 * (t445 * work[47]) + work[105] + (2.0 * (work[44] * work[214]) + 0.5 * (work[48] * t470)) + 2.0 * (work[17] * work[217]) + (2.0 * (t458 * work[39]) + work[168] + (2.0 * (work[22] * work[209]) + work[9] * t478) + 2.0 * (work[4] * work[212]));
-    const double t483 = 0.25 * t365;
-    const double t484 = (-0.5) * work[169] - t365;
-    work[180] = t483 + t484;
-    const double t486 = t369 - work[120];
-    const double t487 = work[170] - work[9];
-    const double t488 = t486 + 0.25 * t487;
-    work[181] = 0.25 * t370 + t488;
-    work[188] = 2.0 * (work[17] * work[180]) - t384 + 2.0 * (work[18] * work[181]);
+    const double t86 = 2.0 * (work[45] * work[89]) - work[213] + (2.0 * (work[97] * work[47]) + work[207])
+        + (0.5 * (work[48] * t8) + 2.0 * (work[18] * t10));
+    const double t87 = t86 - (2.0 * (work[137] * work[34]) + 2.0 * (work[7] * work[92])
+        + (work[138] - work[33]) + (work[8] * t15 + 2.0 * (work[3] * t17)));
+    const double t88 = t14 - t7, t89 = 0.25 * work[139] + 0.25 * ((-0.5) * work[107] - t12);
+    const double t90 = (-1.0 / 48.0) * (work[140] * work[24]) - 1.0 / 48.0 * (work[21] * work[141])
+        + ((-1.0 / 48.0) * (work[25] * work[142]) - 1.0 / 48.0 * (work[26] * work[143]))
+        + (coef[1] * (1.0 / 12.0 * (work[144] * work[27]) + 1.0 / 12.0 * (work[22] * work[94])) + coef[0]
+        * (0.25 * (work[6] * t88) + work[4] * t89));
+    const double t91 = work[5] * t90;
+    const double t92 = 2.0 * (work[144] * work[39]) + 2.0 * (work[27] * work[95]) + (0.25 * (work[9] * t88)
+        - 2.0 * (work[6] * t91)) + t86;
+    const double t93 = 2.0 * (work[94] * work[39]) + 2.0 * (work[22] * work[95]) + (work[9] * t89 - 2.0
+        * (work[4] * t91)) + t11;
+    const double t94 = 0.25 * work[145], t95 = work[146] + work[147], t96 = t94 + t95;
+    const double t97 = work[148] + work[149], t98 = 0.25 * work[148];
+    work[215] = t97 - t98;
+    const double t99 = 2.0 * (work[18] * work[215]) + 2.0 * (work[17] * t96);
+    const double t100 = coef[1] * (t99 - work[150]);
+    const double t101 = (-1.0 / 12.0) * work[151] - 1.0 / 24.0 * (work[19] * t100);
+    const double t102 = work[150] - t99, t103 = 1.0 / 24.0 * (work[19] * t102) - work[152];
+    work[214] = work[19] * t101 + (coef[1] * (work[19] * t103 - work[153]) - work[154]);
+    const double t104 = 0.25 * work[155];
+    work[208] = t97 - t104;
+    const double t105 = 0.5 * work[156], t106 = t95 + t105;
+    const double t107 = 2.0 * (work[6] * work[208]) - work[157] + 2.0 * (work[4] * t106);
+    const double t108 = coef[1] * t107;
+    const double t109 = (-1.0 / 24.0) * work[158] - 1.0 / 48.0 * (work[23] * t108);
+    const double t110 = (-1.0 / 24.0) * work[159] - 1.0 / 48.0 * (work[23] * t107);
+    work[209] = work[23] * t109 + (coef[1] * (work[23] * t110 - work[160]) - work[161]);
+    const double t111 = work[162] - work[32] + (1.0 / 12.0 * (work[28] * work[208]) + 2.0
+        * (work[6] * work[209]));
+    const double t112 = 1.0 / 6.0 * (work[20] * work[215]) + work[163] + (2.0 * (work[18] * work[214])
+        - work[132]);
+    const double t113 = t111 + t112;
+    const double t114 = 2.0 * (work[3] * (t98 - t104)) + 2.0 * (work[0] * (t105 - t94));
+    const double t115 = 1.0 / 12.0 * (work[12] * (work[12] * (coef[1] * t114))) + 1.0 / 12.0
+        * (coef[1] * (work[12] * (work[12] * t114)));
+    const double t116 = 1.0 / 3.0 * (work[16] * (t104 - t98)) + 2.0 * (work[3] * t115);
+    const double t117 = t113 + (0.25 * t116 - 0.25 * t112);
+    const double t118 = t1 + 1.0 / 6.0 * (work[20] * t96) + 2.0 * (work[17] * work[214]);
+    const double t119 = 1.0 / 3.0 * (work[16] * (t94 - t105)) + 2.0 * (work[0] * t115);
+    const double t120 = 1.0 / 12.0 * (work[28] * t106) + (work[164] + 2.0 * (work[4] * work[209]));
+    const double t121 = t118 + t120;
+    work[216] = 0.25 * (t118 - t119) - t121;
+    const double t122 = coef[1] * (1.0 / 6.0 * (work[45] * work[215]) + 1.0 / 6.0 * (work[44] * t96))
+        - work[96] + (1.0 / 24.0 * (work[40] * t102) + work[41] * t103) + (work[43] * t101 - 1.0 / 24.0
+        * (work[42] * t100) + coef[0] * (0.5 * (work[18] * work[216]) - work[103] + 0.5 * (work[17] * t117)));
+    work[217] = (-4.0) * work[104] - work[46] * t122;
+    const double t123 = 0.25 * t113 + 0.25 * ((-0.5) * t111 - 0.5 * t116);
+    work[211] = 0.5 * (t119 + t120) - t121;
+    const double t124 = coef[1] * (1.0 / 12.0 * (work[208] * work[27]) + 1.0 / 12.0 * (work[22] * t106))
+        + work[26] * t109 + coef[0] * (work[4] * t123 + (0.25 * (work[6] * work[211]) - work[165]));
+    work[212] = (-4.0) * work[166] - work[5] * ((-0.25) * work[167] - 1.0 / 48.0 * (t107 * work[24])
+        + (work[21] * t110 - 1.0 / 48.0 * (work[25] * t108)) + t124);
+    const double t125 = 2.0 * (t96 * work[47]) + work[105] + (2.0 * (work[44] * work[214]) + 0.5
+        * (work[48] * t117)) + 2.0 * (work[17] * work[217]) + (2.0 * (t106 * work[39]) + work[168]
+        + (2.0 * (work[22] * work[209]) + work[9] * t123) + 2.0 * (work[4] * work[212]));
+    const double t126 = 0.25 * t22, t127 = (-0.5) * work[169] - t22;
+    work[180] = t126 + t127;
+    const double t128 = t26 - work[120], t129 = work[170] - work[9], t130 = t128 + 0.25 * t129;
+    work[181] = 0.25 * t27 + t130;
+    work[188] = 2.0 * (work[17] * work[180]) - t41 + 2.0 * (work[18] * work[181]);
     work[190] = coef[1] * work[188];
-    work[182] = (-1.0 / 12.0) * t383 - 1.0 / 24.0 * (work[19] * work[190]);
-    work[189] = (-1.0 / 12.0) * t390 - 1.0 / 24.0 * (work[19] * work[188]);
-    work[205] = work[19] * work[182] + (coef[1] * (work[19] * work[189] - t389) - t388);
-    const double t495 = 1.0 / 6.0 * (work[20] * work[181]) + (t382 + 2.0 * (work[18] * work[205]));
-    const double t496 = 0.125 * t487;
-    work[195] = t488 - t496;
-    const double t498 = 0.25 * work[169];
-    work[194] = t498 + t484;
-    const double t500 = 2.0 * (work[4] * work[194]) + 2.0 * (work[6] * work[195]);
-    work[200] = coef[1] * (t500 - work[171]);
+    work[182] = (-1.0 / 12.0) * t40 - 1.0 / 24.0 * (work[19] * work[190]);
+    work[189] = (-1.0 / 12.0) * t47 - 1.0 / 24.0 * (work[19] * work[188]);
+    work[205] = work[19] * work[182] + (coef[1] * (work[19] * work[189] - t46) - t45);
+    const double t131 = 1.0 / 6.0 * (work[20] * work[181]) + (t39 + 2.0 * (work[18] * work[205]));
+    const double t132 = 0.125 * t129;
+    work[195] = t130 - t132;
+    const double t133 = 0.25 * work[169];
+    work[194] = t133 + t127;
+    const double t134 = 2.0 * (work[4] * work[194]) + 2.0 * (work[6] * work[195]);
+    work[200] = coef[1] * (t134 - work[171]);
     work[199] = (-1.0 / 24.0) * work[172] - 1.0 / 48.0 * (work[23] * work[200]);
-    work[197] = work[171] - t500;
+    work[197] = work[171] - t134;
     work[198] = 1.0 / 48.0 * (work[23] * work[197]) - work[173];
     work[203] = work[23] * work[199] + (coef[1] * (work[23] * work[198] - work[174]) - work[175]);
     work[193] = work[176] + 1.0 / 12.0 * (work[28] * work[195]) + 2.0 * (work[6] * work[203]);
-    work[191] = t495 + work[193];
-    const double t508 = 0.25 * t486;
-    const double t509 = 2.0 * (work[0] * (t498 - t483)) + 2.0 * (work[3] * (t508 - t496));
-    const double t510 = 1.0 / 12.0 * (coef[1] * (work[12] * (work[12] * t509))) + 1.0 / 12.0 * (work[12] * (work[12] * (coef[1] * t509)));
-    work[192] = 1.0 / 3.0 * (work[16] * (t496 - t508)) + 2.0 * (work[3] * t510);
-    work[184] = work[191] + (0.25 * work[192] - 0.25 * t495);
-    work[178] = t411 - work[132] + (1.0 / 6.0 * (work[20] * work[180]) + 2.0 * (work[17] * work[205]));
-    work[183] = 1.0 / 3.0 * (work[16] * (t483 - t498)) + 2.0 * (work[0] * t510);
+    work[191] = t131 + work[193];
+    const double t135 = 0.25 * t128;
+    const double t136 = 2.0 * (work[0] * (t133 - t126)) + 2.0 * (work[3] * (t135 - t132));
+    const double t137 = 1.0 / 12.0 * (coef[1] * (work[12] * (work[12] * t136))) + 1.0 / 12.0
+        * (work[12] * (work[12] * (coef[1] * t136)));
+    work[192] = 1.0 / 3.0 * (work[16] * (t132 - t135)) + 2.0 * (work[3] * t137);
+    work[184] = work[191] + (0.25 * work[192] - 0.25 * t131);
+    work[178] = t63 - work[132] + (1.0 / 6.0 * (work[20] * work[180]) + 2.0 * (work[17] * work[205]));
+    work[183] = 1.0 / 3.0 * (work[16] * (t126 - t133)) + 2.0 * (work[0] * t137);
     work[179] = work[177] + 1.0 / 12.0 * (work[28] * work[194]) + (2.0 * (work[4] * work[203]) - work[32]);
-    increment_jacobian[14] = 0.5 * t361;
-    increment_jacobian[21] = (-0.5) * t361;
-    jacobian[14] = 1.0 - t362;
-    jacobian[21] = 1.0 + t362;
-    jacobian[15] = (-0.25) * t427;
-    increment_jacobian[15] = 0.5 * t427;
-    jacobian[16] = 0.25 * t432;
-    jacobian[33] = t432;
-    increment_jacobian[16] = (-0.5) * t432;
-    increment_jacobian[33] = (-2.0) * t432;
-    jacobian[17] = 0.25 * t433;
-    jacobian[27] = -t433;
-    increment_jacobian[17] = (-0.5) * t433;
-    increment_jacobian[27] = 2.0 * t433;
-    jacobian[20] = 0.25 * t436;
-    increment_jacobian[20] = (-0.5) * t436;
-    jacobian[22] = (-0.25) * t441;
-    jacobian[32] = t441;
-    increment_jacobian[22] = 0.5 * t441;
-    increment_jacobian[32] = (-2.0) * t441;
-    jacobian[23] = (-0.25) * t442;
-    jacobian[26] = -t442;
-    increment_jacobian[23] = 0.5 * t442;
-    increment_jacobian[26] = 2.0 * t442;
-    jacobian[28] = 1.0 - t482;
-    jacobian[35] = 1.0 + t482;
-    increment_jacobian[28] = 2.0 * t482;
-    increment_jacobian[35] = (-2.0) * t482;
+    increment_jacobian[14] = 0.5 * t18;
+    increment_jacobian[21] = (-0.5) * t18;
+    jacobian[14] = 1.0 - t19;
+    jacobian[21] = 1.0 + t19;
+    jacobian[15] = (-0.25) * t79;
+    increment_jacobian[15] = 0.5 * t79;
+    jacobian[16] = 0.25 * t84;
+    jacobian[33] = t84;
+    increment_jacobian[16] = (-0.5) * t84;
+    increment_jacobian[33] = (-2.0) * t84;
+    jacobian[17] = 0.25 * t85;
+    jacobian[27] = -t85;
+    increment_jacobian[17] = (-0.5) * t85;
+    increment_jacobian[27] = 2.0 * t85;
+    jacobian[20] = 0.25 * t87;
+    increment_jacobian[20] = (-0.5) * t87;
+    jacobian[22] = (-0.25) * t92;
+    jacobian[32] = t92;
+    increment_jacobian[22] = 0.5 * t92;
+    increment_jacobian[32] = (-2.0) * t92;
+    jacobian[23] = (-0.25) * t93;
+    jacobian[26] = -t93;
+    increment_jacobian[23] = 0.5 * t93;
+    increment_jacobian[26] = 2.0 * t93;
+    jacobian[28] = 1.0 - t125;
+    jacobian[35] = 1.0 + t125;
+    increment_jacobian[28] = 2.0 * t125;
+    increment_jacobian[35] = (-2.0) * t125;
 }
 
 /* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
    increment, all with the momenta p = grad S_h(y) (part 4 of 4) */
 vortices3_APART static void vortices3_linearise_part4(const double coef[3], const double y[6],
-                                                      double displacement[restrict 6],
-                                                      double increment[restrict 6],
-                                                      double jacobian[restrict 36],
-                                                      double increment_jacobian[restrict 36],
-                                                      double work[restrict 218])
+    double displacement[restrict 6], double increment[restrict 6], double jacobian[restrict 36],
+    double increment_jacobian[restrict 36], double work[restrict 218])
 {
-    (void)y;
-    (void)displacement;
-    (void)increment;
-    const double t516 = work[178] + work[179];
-    const double t517 = coef[1] * (1.0 / 6.0 * (work[180] * work[44]) + 1.0 / 6.0 * (work[45] * work[181])) + work[43] * work[182] + coef[0] * (0.5 * (work[18] * (0.25 * (work[178] - work[183]) - t516)) + (0.5 * (work[17] * work[184]) - work[185]));
-    const double t518 = 2.0 * (work[17] * ((-4.0) * work[186] - work[46] * ((-0.5) * work[187] - 1.0 / 24.0 * (work[188] * work[40]) + (work[41] * work[189] - 1.0 / 24.0 * (work[42] * work[190])) + t517)));
-    const double t519 = 0.25 * work[191] + 0.25 * ((-0.5) * work[192] - 0.5 * work[193]);
-    const double t520 = coef[1] * (1.0 / 12.0 * (work[194] * work[22]) + 1.0 / 12.0 * (work[27] * work[195])) - work[196] + (1.0 / 48.0 * (work[24] * work[197]) + work[21] * work[198]) + (work[26] * work[199] - 1.0 / 48.0 * (work[25] * work[200]) + coef[0] * (work[4] * t519 - work[36] + 0.25 * (work[6] * (0.5 * (work[183] + work[179]) - t516))));
-    const double t521 = 2.0 * (work[194] * work[39]) + work[9] * t519 + (work[201] - work[202]) + (2.0 * (work[22] * work[203]) + 2.0 * (work[4] * ((-4.0) * work[204] - work[5] * t520)));
-    const double t522 = 2.0 * (work[180] * work[47]) + 2.0 * (work[44] * work[205]) + (work[206] - work[207]) + (0.5 * (work[48] * work[184]) + t518) + t521;
-    const double t523 = 2.0 * (work[208] * work[39]) + 2.0 * (work[27] * work[209]) + (work[210] - work[202]) + (0.25 * (work[9] * work[211]) + 2.0 * (work[6] * work[212])) + (work[213] + 2.0 * (work[45] * work[214]) + (2.0 * (work[215] * work[47]) - work[207]) + (0.5 * (work[48] * work[216]) + 2.0 * (work[18] * work[217])));
-    jacobian[29] = -t522;
-    increment_jacobian[29] = 2.0 * t522;
-    jacobian[34] = t523;
-    increment_jacobian[34] = (-2.0) * t523;
+    (void)y, (void)displacement, (void)increment;
+    const double t1 = work[178] + work[179];
+    const double t2 = coef[1] * (1.0 / 6.0 * (work[180] * work[44]) + 1.0 / 6.0 * (work[45] * work[181]))
+        + work[43] * work[182] + coef[0] * (0.5 * (work[18] * (0.25 * (work[178] - work[183]) - t1))
+        + (0.5 * (work[17] * work[184]) - work[185]));
+    const double t3 = 2.0 * (work[17] * ((-4.0) * work[186] - work[46] * ((-0.5) * work[187] - 1.0 / 24.0
+        * (work[188] * work[40]) + (work[41] * work[189] - 1.0 / 24.0 * (work[42] * work[190])) + t2)));
+    const double t4 = 0.25 * work[191] + 0.25 * ((-0.5) * work[192] - 0.5 * work[193]);
+    const double t5 = coef[1] * (1.0 / 12.0 * (work[194] * work[22]) + 1.0 / 12.0 * (work[27] * work[195]))
+        - work[196] + (1.0 / 48.0 * (work[24] * work[197]) + work[21] * work[198]) + (work[26] * work[199]
+        - 1.0 / 48.0 * (work[25] * work[200]) + coef[0] * (work[4] * t4 - work[36] + 0.25
+        * (work[6] * (0.5 * (work[183] + work[179]) - t1))));
+    const double t6 = 2.0 * (work[194] * work[39]) + work[9] * t4 + (work[201] - work[202])
+        + (2.0 * (work[22] * work[203]) + 2.0 * (work[4] * ((-4.0) * work[204] - work[5] * t5)));
+    const double t7 = 2.0 * (work[180] * work[47]) + 2.0 * (work[44] * work[205]) + (work[206] - work[207])
+        + (0.5 * (work[48] * work[184]) + t3) + t6;
+    const double t8 = 2.0 * (work[208] * work[39]) + 2.0 * (work[27] * work[209]) + (work[210] - work[202])
+        + (0.25 * (work[9] * work[211]) + 2.0 * (work[6] * work[212])) + (work[213] + 2.0
+        * (work[45] * work[214]) + (2.0 * (work[215] * work[47]) - work[207]) + (0.5 * (work[48] * work[216])
+        + 2.0 * (work[18] * work[217])));
+    jacobian[29] = -t7;
+    increment_jacobian[29] = 2.0 * t7;
+    jacobian[34] = t8;
+    increment_jacobian[34] = (-2.0) * t8;
 }
 
 /* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
    increment, all with the momenta p = grad S_h(y) */
 static void vortices3_linearise(const double coef[3], const double y[6], double displacement[restrict 6],
-                                double increment[restrict 6], double jacobian[restrict 36],
-                                double increment_jacobian[restrict 36])
+    double increment[restrict 6], double jacobian[restrict 36], double increment_jacobian[restrict 36])
 {
     double work[218];
     vortices3_linearise_part1(coef, y, displacement, increment, jacobian, increment_jacobian, work);
@@ -730,244 +721,49 @@ static void vortices3_linearise(const double coef[3], const double y[6], double 
     vortices3_linearise_part4(coef, y, displacement, increment, jacobian, increment_jacobian, work);
 }
 
-/* Solve matrix * solution = side, both overwritten, by elimination with partial pivoting. 0 if singular. */
-static int vortices3_solve(double matrix[36], double side[6])
+/* the Hamiltonian */
+double vortices3_hamiltonian(const vortices3_params *params, const double x[6])
 {
-    for (int k = 0; k < 6; ++k) {
-        int best = k;
-        for (int i = k + 1; i < 6; ++i)
-            if (fabs(matrix[i * 6 + k]) > fabs(matrix[best * 6 + k])) best = i;
-        const double pivot = matrix[best * 6 + k];
-        if (!(fabs(pivot) > 0.0)) return 0;
-        for (int j = k; j < 6 && best != k; ++j) {
-            const double swap = matrix[k * 6 + j];
-            matrix[k * 6 + j] = matrix[best * 6 + j];
-            matrix[best * 6 + j] = swap;
-        }
-        const double swap = side[k];
-        side[k] = side[best];
-        side[best] = swap;
-        for (int i = k + 1; i < 6; ++i) {
-            const double factor = matrix[i * 6 + k] / pivot;
-            for (int j = k + 1; j < 6; ++j) matrix[i * 6 + j] -= factor * matrix[k * 6 + j];
-            side[i] -= factor * side[k];
-        }
-    }
-    for (int i = 6 - 1; i >= 0; --i) {
-        for (int j = i + 1; j < 6; ++j) side[i] -= matrix[i * 6 + j] * side[j];
-        side[i] /= matrix[i * 6 + i];
-    }
-    return 1;
+    (void)params;
+    const double x1 = x[0], y1 = x[1], x2 = x[2], y2 = x[3], x3 = x[4], y3 = x[5];
+    const double t1 = y2 - y3, t2 = x2 - x3, t3 = y1 - y2, t4 = x1 - x2, t5 = x1 - x3, t6 = y1 - y3;
+    const double t7 = log(t1 * t1 + t2 * t2) - (2.0 * log(t3 * t3 + t4 * t4) - 0.5 * log(t5 * t5 + t6 * t6));
+    return 0.25 * (t7 / 3.141592653589793);
 }
 
-/* Whether a guess is where the next values may be. Recurrences that were fitted to little else than rest, near a saddle,
-   may lead anywhere; and far away the equation of a step has solutions that have nothing to do with the motion. */
-static int vortices3_near(const double guess[6], const double last[6])
+/* the Casimirs */
+void vortices3_casimirs(const vortices3_params *params, const double x[6], double out[])
 {
-    double distance = 0.0, size = 0.0;
-    for (int i = 0; i < 6; ++i) {
-        distance += fabs(guess[i] - last[i]);
-        size += fabs(last[i]);
-    }
-    return distance <= 4.0 * size;
+    (void)params, (void)x, (void)out;
 }
 
-/* The guess for the next value (y), from earlier ones; 0 if there is none. */
-static int vortices3_predict(const vortices3_memory *memory, double value[6])
+/* pi(x) grad H(x) */
+void vortices3_vector_field(const vortices3_params *params, const double x[6], double out[6])
 {
-    const int last = memory->count - 1;
-    double odd[6] = { 0.0 }, binomial = -1.0;
-    memset(value, 0, 6 * sizeof value[0]);
-    if (memory->fitting) {
-        for (int k = 0; k < memory->terms; k += 2)
-            for (int i = 0; i < 6; ++i) {
-                value[i] += memory->weight[k][i][0] * memory->past[last - k][i];
-                odd[i] += memory->weight[k + 1][i][0] * memory->past[last - 1 - k][i];
-            }
-        for (int i = 0; i < 6; ++i) value[i] += odd[i];
-    } else {
-        for (int k = 0; k < memory->order && k <= last; ++k) {
-            binomial *= -(double)(memory->order - k) / (k + 1);
-            for (int i = 0; i < 6; ++i) value[i] += binomial * memory->past[last - k][i];
-        }
-    }
-    return last >= 0 && vortices3_near(value, memory->past[last]);
+    (void)params;
+    const double x1 = x[0], y1 = x[1], x2 = x[2], y2 = x[3], x3 = x[4], y3 = x[5];
+    const double t1 = y1 - y3, t2 = 1.0 / 3.141592653589793, t3 = x1 - x3;
+    const double t4 = t2 / (t3 * t3 + t1 * t1), t5 = t1 * t4, t6 = y1 - y2, t7 = x1 - x2;
+    const double t8 = t2 / (t6 * t6 + t7 * t7), t9 = t6 * t8, t10 = t7 * t8, t11 = t3 * t4;
+    const double t12 = y2 - y3, t13 = x2 - x3, t14 = t2 / (t12 * t12 + t13 * t13);
+    const double t15 = 0.5 * (t12 * t14), t16 = 0.5 * (t13 * t14);
+    out[0] = 0.25 * t5 - t9;
+    out[1] = t10 - 0.25 * t11;
+    out[2] = 0.5 * (t9 + t15);
+    out[3] = (-0.5) * (t10 + t16);
+    out[4] = (-2.0) * ((-0.25) * t5 - t15);
+    out[5] = 2.0 * ((-0.25) * t11 - t16);
 }
 
-/* Choose the guess that would have been best for a value that took several iterations. */
-static void vortices3_judge(vortices3_memory *memory, const double value[6])
+/* ---- Compensated sums, linear equations ---- */
+/* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to
+   its last bit: were it rounded with the change, corrections of one sign would add up to a drift. 0, and x as
+   before, if the sum is not finite. */
+static int vortices3_advance(vortices3_solver *s, const double change[vortices3_DIM],
+    const double correction[vortices3_DIM])
 {
-    double row[8 + 1][6], guess[6], least = HUGE_VAL, fitted = HUGE_VAL;
-    const int rows = memory->count < 8 ? memory->count : 8;
-    memcpy(row[0], value, sizeof row[0]);
-    for (int k = 0; k < rows; ++k) memcpy(row[k + 1], memory->past[memory->count - 1 - k], sizeof row[0]);
-    for (int order = 1; order <= rows; ++order) { /* row[0] becomes the backward difference of this order */
-        double size = 0.0;
-        for (int k = 0; k <= rows - order; ++k)
-            for (int i = 0; i < 6; ++i) row[k][i] -= row[k + 1][i];
-        for (int i = 0; i < 6; ++i) size += fabs(row[0][i]);
-        if (size < least) {
-            least = size;
-            memory->order = order;
-        }
-    }
-    memory->fitting = memory->terms > 0;
-    if (memory->fitting && vortices3_predict(memory, guess)) {
-        fitted = 0.0;
-        for (int i = 0; i < 6; ++i) fitted += fabs(value[i] - guess[i]);
-    }
-    memory->fitting = memory->terms > 0 && fitted <= least;
-    if (memory->order == 0) memory->order = 1;
-}
-
-/* Make eight columns orthogonal to one, by the multiples of it that are put into r. Where that one is among the eight, those
-   up to it stay as they are, and inverse becomes one over its squared length. The number of rows is even. */
-static void vortices3_project(int rows, double (*one)[8], int column, double *inverse, double (*eight)[8], double r[8])
-{
-    double even[8] = { 0.0 }, odd[8] = { 0.0 };
-    for (int i = 0; i < rows; i += 2) {
-        const double entry = one[i][column], next = one[i + 1][column];
-        for (int l = 0; l < 8; ++l) even[l] += entry * eight[i][l];
-        for (int l = 0; l < 8; ++l) odd[l] += next * eight[i + 1][l];
-    }
-    for (int l = 0; l < 8; ++l) even[l] += odd[l];
-    if (one == eight) {
-        *inverse = even[column] > 0.0 ? 1.0 / even[column] : 0.0;
-        memset(even, 0, ((size_t)column + 1) * sizeof even[0]);
-    }
-    for (int l = 0; l < 8; ++l) r[l] = even[l] *= *inverse;
-    for (int i = 0; i < rows; ++i) {
-        const double entry = one[i][column];
-        for (int l = 0; l < 8; ++l) eight[i][l] -= entry * even[l];
-    }
-}
-
-/* By how much recurrences miss the last of these values. */
-static double vortices3_missed(const double *value, double (*weight)[8])
-{
-    enum { AHEAD = 8, WINDOW = 40, CHECKS = 8 };
-    double most = 0.0;
-    for (int i = 0; i < CHECKS; ++i) {
-        double guess[8] = { 0.0 };
-        for (int k = 0; k < WINDOW; ++k)
-            for (int l = 0; l < 8; ++l) guess[l] += weight[k][l] * value[i + WINDOW - 1 - k];
-        for (int l = 0; l < AHEAD; ++l) most = fmax(most, fabs(guess[l] - value[i + WINDOW + l]));
-    }
-    return most;
-}
-
-/* Fit the recurrences value[m + l] = sum of weight[k][..][l] * value[m - 1 - k], l = 0 ... 8 - 1, to the history of
-   a component: ridge least squares by modified Gram-Schmidt, the ridge at the level of rounding. Columns are taken in by
-   eights, until they leave next to nothing of the right-hand sides. How many past values are used; 0 if the recurrences do
-   not foresee the last values, which they were not fitted to. */
-static int vortices3_train(vortices3_memory *memory, int component)
-{
-    enum { AHEAD = 8, WINDOW = 40, ROWS = 56 };
-    double q[WINDOW / 8][ROWS + WINDOW][8], r[WINDOW / 8][WINDOW][8], inverse[WINDOW]; /* eight columns in each part */
-    double right[ROWS + WINDOW][8], weight[WINDOW][8], value[111], largest = 0.0, left = HUGE_VAL;
-    int terms = 0;
-    memset(q, 0, sizeof q);
-    memset(right, 0, sizeof right);
-    memset(weight, 0, sizeof weight);
-    for (int i = 0; i < 111; ++i) {
-        value[i] = memory->past[memory->count - 111 + i][component];
-        if (fabs(value[i]) > largest) largest = fabs(value[i]);
-    }
-    for (int i = 0; i < ROWS; ++i)
-        for (int l = 0; l < AHEAD; ++l) right[i][l] = value[i + WINDOW + l];
-    while (terms < WINDOW && left > 3e-12 * largest) {
-        const int part = terms / 8, rows = ROWS + terms + 8; /* further rows of the ridge are zero in these columns */
-        for (int i = 0; i < ROWS; ++i)
-            for (int l = 0; l < 8; ++l) q[part][i][l] = value[i + WINDOW - 1 - terms - l];
-        for (int l = 0; l < 8; ++l) q[part][ROWS + terms + l][l] = 1e-15 * largest;
-        for (int k = 0; k < terms; ++k) vortices3_project(rows, q[k / 8], k % 8, &inverse[k], q[part], r[part][k]);
-        for (int l = 0; l < 8; ++l, ++terms) {
-            vortices3_project(rows, q[part], l, &inverse[terms], q[part], r[part][terms]);
-            vortices3_project(rows, q[part], l, &inverse[terms], right, weight[terms]);
-        }
-        double sum[8] = { 0.0 };
-        for (int i = 0; i < ROWS; ++i)
-            for (int l = 0; l < 8; ++l) sum[l] += fabs(right[i][l]);
-        left = 0.0;
-        for (int l = 0; l < 8; ++l) left += sum[l] / ROWS;
-    }
-    for (int k = terms - 1; k >= 0; --k)
-        for (int j = k + 1; j < terms; ++j)
-            for (int l = 0; l < 8; ++l) weight[k][l] -= r[j / 8][k][j % 8] * weight[j][l];
-    for (int k = 0; k < WINDOW; ++k) memcpy(memory->weight[k][component], weight[k], AHEAD * sizeof(double));
-    return vortices3_missed(value + ROWS, weight) <= 1e-07 * largest ? terms : 0;
-}
-
-/* Drop what is old, if so many values would not fit into the history. */
-static void vortices3_make_room(vortices3_memory *memory, int values)
-{
-    if (memory->count + values <= 222) return;
-    memmove(memory->past, memory->past + memory->count - 111, 111 * sizeof memory->past[0]);
-    memory->count = 111;
-}
-
-/* Add a value to the history. */
-static void vortices3_record(vortices3_memory *memory, const double value[6])
-{
-    vortices3_make_room(memory, 1);
-    memcpy(memory->past[memory->count++], value, 6 * sizeof value[0]);
-}
-
-/* Fit the recurrence to the last values; with every time, wait longer before it is done again. */
-static void vortices3_fit(vortices3_memory *memory)
-{
-    int found = 1;
-    memory->terms = 0;
-    for (int i = 0; i < 6 && found; ++i) {
-        const int terms = vortices3_train(memory, i);
-        found = terms > 0;
-        if (terms > memory->terms) memory->terms = terms;
-    }
-    if (!found) memory->terms = 0;
-    memory->fitting = found;
-    ++memory->fits;
-    memory->slow = 0;
-    memory->patience = memory->patience < 10000 ? 2 * memory->patience + 150 : 20000;
-}
-
-/* Take in the solved value: what took one iteration needs no better guess. */
-static void vortices3_remember(vortices3_memory *memory, const double value[6], int iterations)
-{
-    if (iterations > 1) vortices3_judge(memory, value);
-    vortices3_record(memory, value);
-    memory->slow = iterations > 1 ? memory->slow + 1 : 0;
-    if (memory->slow > memory->patience && memory->count >= 111) vortices3_fit(memory);
-}
-
-/* Whether an increment is that of the motion. Where the step is too large, the equation may have been solved by a point far
-   away, at another energy, that has nothing to do with it. */
-static int vortices3_plausible(const vortices3_solver *s, int stage, const double increment[6])
-{
-    double moved = 0.0, size = 0.0, field[6], middle[6], end[6];
-    for (int i = 0; i < 6; ++i) {
-        moved += fabs(increment[i]);
-        size += fabs(s->x[i]);
-    }
-    if (moved <= 1.5 * size) return 1;
-    vortices3_vector_field(&s->params, s->x, field);
-    for (int i = 0; i < 6; ++i) {
-        size += fabs(vortices3_fractions[stage] * s->h * field[i]);
-        middle[i] = s->x[i] + 0.5 * increment[i];
-        end[i] = s->x[i] + increment[i];
-    }
-    if (moved <= 1.5 * size) return 1;
-    const double before = vortices3_hamiltonian(&s->params, s->x), after = vortices3_hamiltonian(&s->params, end);
-    const double scale = fabs(before) + fabs(vortices3_hamiltonian(&s->params, middle)) + fabs(after);
-    return fabs(after - before) <= 0.5 * scale;
-}
-
-/* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to its last
-   bit: were it rounded with the change, corrections of one sign would add up to a drift. 0, and x as before, if the
-   sum is not finite. */
-static int vortices3_advance(vortices3_solver *s, const double change[6], const double correction[6])
-{
-    double x[6], carry[6];
-    for (int i = 0; i < 6; ++i) {
+    double x[vortices3_DIM], carry[vortices3_DIM];
+    for (int i = 0; i < vortices3_DIM; ++i) {
         const double sum = s->x[i] + change[i], added = sum - s->x[i];
         const double lost = (s->x[i] - (sum - added)) + (change[i] - added);
         const double small = lost + (s->carry[i] + correction[i]);
@@ -980,87 +776,172 @@ static int vortices3_advance(vortices3_solver *s, const double change[6], const 
     return 1;
 }
 
-/* Size of a correction relative to each component of y, but no finer than 1e-6 of the largest; NaN or infinite if
-   the correction is. */
-static double vortices3_size(const double y[6], const double delta[6])
+/* Solve matrix * solution = side, both overwritten, by elimination with partial pivoting. 0 if singular. */
+static int vortices3_solve(double matrix[vortices3_DIM * vortices3_DIM], double side[vortices3_DIM])
+{
+    for (int k = 0; k < vortices3_DIM; ++k) {
+        int best = k;
+        for (int i = k + 1; i < vortices3_DIM; ++i)
+            if (fabs(matrix[i * vortices3_DIM + k]) > fabs(matrix[best * vortices3_DIM + k])) best = i;
+        const double pivot = matrix[best * vortices3_DIM + k], last = side[k];
+        if (!(fabs(pivot) > 0.0)) return 0;
+        for (int j = k; j < vortices3_DIM && best != k; ++j) {
+            const double swap = matrix[k * vortices3_DIM + j];
+            matrix[k * vortices3_DIM + j] = matrix[best * vortices3_DIM + j];
+            matrix[best * vortices3_DIM + j] = swap;
+        }
+        side[k] = side[best];
+        side[best] = last;
+        for (int i = k + 1; i < vortices3_DIM; ++i) {
+            const double factor = matrix[i * vortices3_DIM + k] / pivot;
+            for (int j = k + 1; j < vortices3_DIM; ++j)
+                matrix[i * vortices3_DIM + j] -= factor * matrix[k * vortices3_DIM + j];
+            side[i] -= factor * side[k];
+        }
+    }
+    for (int i = vortices3_DIM - 1; i >= 0; --i) {
+        for (int j = i + 1; j < vortices3_DIM; ++j) side[i] -= matrix[i * vortices3_DIM + j] * side[j];
+        side[i] /= matrix[i * vortices3_DIM + i];
+    }
+    return 1;
+}
+
+/* ---- Starting guesses ---- */
+/* How far from the last value a guess may be, in sizes of that value. */
+#define vortices3_REACH 4.0
+
+/* The guess for the next value from the last ones: the sum of their backward differences. 0 if there is none,
+   or if it is far away, where the equation of a step has solutions that have nothing to do with the motion.
+   */
+static int vortices3_predict(const vortices3_history *history, double value[vortices3_DIM])
+{
+    double distance = 0.0, size = 0.0;
+    for (int i = 0; i < vortices3_DIM; ++i) {
+        value[i] = 0.0;
+        for (int k = 0; k < history->order; ++k) value[i] += history->difference[k][i];
+        distance += fabs(value[i] - history->difference[0][i]);
+        size += fabs(history->difference[0][i]);
+    }
+    return history->order > 0 && distance <= vortices3_REACH * size;
+}
+
+/* Take in the solved value. The guess of order k missed it by its k-th difference: the next is of the best
+   order. */
+static void vortices3_remember(vortices3_history *history, const double value[vortices3_DIM])
+{
+    double least = HUGE_VAL, next[vortices3_DIM];
+    memcpy(next, value, sizeof next);
+    for (int k = 0; k <= history->count && k < vortices3_DIFFERENCES; ++k) {
+        double size = 0.0;
+        for (int i = 0; i < vortices3_DIM; ++i) {
+            const double last = history->difference[k][i];
+            history->difference[k][i] = next[i];
+            size += fabs(next[i]);
+            next[i] -= last;
+        }
+        if (k > 0 && size < least) {
+            least = size;
+            history->order = k;
+        }
+    }
+    if (history->count == 0) history->order = 1;
+    if (history->count < vortices3_DIFFERENCES) ++history->count;
+}
+
+/* How far a step may lead, in sizes of the state and of what the vector field says, if the energy is lost;
+   and the part of the energy that counts as lost. */
+#define vortices3_PLAUSIBLE 1.5
+#define vortices3_LOST 0.5
+
+/* Whether an increment is that of the motion. Where the step is too large, the equation may have been solved
+   by a point far away, at another energy, that has nothing to do with it. */
+static int vortices3_plausible(const vortices3_solver *s, const double increment[vortices3_DIM])
+{
+    double moved = 0.0, size = 0.0, field[vortices3_DIM], middle[vortices3_DIM], end[vortices3_DIM];
+    for (int i = 0; i < vortices3_DIM; ++i) {
+        moved += fabs(increment[i]);
+        size += fabs(s->x[i]);
+    }
+    if (moved <= vortices3_PLAUSIBLE * size) return 1;
+    vortices3_vector_field(&s->params, s->x, field);
+    for (int i = 0; i < vortices3_DIM; ++i) {
+        size += fabs(s->h * field[i]);
+        middle[i] = s->x[i] + 0.5 * increment[i];
+        end[i] = s->x[i] + increment[i];
+    }
+    if (moved <= vortices3_PLAUSIBLE * size) return 1;
+    const double before = vortices3_hamiltonian(&s->params, s->x), after = vortices3_hamiltonian(&s->params,
+        end);
+    const double scale = fabs(before) + fabs(vortices3_hamiltonian(&s->params, middle)) + fabs(after);
+    return fabs(after - before) <= vortices3_LOST * scale;
+}
+
+/* ---- The implicit step, by Newton's method ---- */
+/* Components of y are measured no finer than by this part of the largest. */
+#define vortices3_FLOOR 1e-6
+
+/* Size of a correction relative to each component of y; NaN or infinite if the correction is. */
+static double vortices3_size(const double y[vortices3_DIM], const double delta[vortices3_DIM])
 {
     double norm = 0.0, size = 0.0;
-    for (int i = 0; i < 6; ++i) norm = fabs(y[i]) > norm ? fabs(y[i]) : norm;
-    for (int i = 0; i < 6; ++i) {
-        const double ratio = fabs(delta[i]) / (fabs(y[i]) + 1e-6 * norm + DBL_MIN);
+    for (int i = 0; i < vortices3_DIM; ++i) norm = fabs(y[i]) > norm ? fabs(y[i]) : norm;
+    for (int i = 0; i < vortices3_DIM; ++i) {
+        const double ratio = fabs(delta[i]) / (fabs(y[i]) + vortices3_FLOOR * norm + DBL_MIN);
         if (!isfinite(ratio)) return ratio;
         size = ratio > size ? ratio : size;
     }
     return size;
 }
 
+/* Corrections below the first that shrink by less than the second have reached the level of rounding. */
+#define vortices3_NEARLY_SOLVED 1e-8
+#define vortices3_SHRINKING 0.25
+
 /* Solve (y - x) + displacement(y) = 0 for y by Newton's method from the extrapolated guess, and advance. The
-   increment is corrected to first order by the last Newton correction, so that correction costs no evaluation:
-   a correction is accepted when the error that remains after it, quadratic in it, is below 1e-20. */
-static vortices3_status vortices3_attempt(vortices3_solver *s, int stage)
+   increment is corrected to first order by the last Newton correction, so that correction costs no
+   evaluation: a correction is accepted when the error that remains after it, quadratic in it, is below
+   vortices3_TOLERANCE. */
+static vortices3_status vortices3_attempt(vortices3_solver *s)
 {
-    const double *coef = s->coef[stage];
-    vortices3_memory *memory = &s->memory[stage];
-    double y[6], delta[6], displacement[6], increment[6];
-    double jacobian[36], increment_jacobian[36];
-    if (!vortices3_predict(memory, y)) memcpy(y, s->x, sizeof y);
-    double previous = HUGE_VAL;
-    for (int iteration = 0; iteration < 20; ++iteration) {
-        vortices3_linearise(coef, y, displacement, increment, jacobian, increment_jacobian);
+    double y[vortices3_DIM], delta[vortices3_DIM], displacement[vortices3_DIM], increment[vortices3_DIM];
+    double jacobian[vortices3_DIM * vortices3_DIM], increment_jacobian[vortices3_DIM * vortices3_DIM],
+        previous = HUGE_VAL;
+    if (!vortices3_predict(&s->history, y)) memcpy(y, s->x, sizeof y);
+    for (int iteration = 1; iteration <= vortices3_MAX_ITERATIONS; ++iteration) {
+        vortices3_linearise(s->coef, y, displacement, increment, jacobian, increment_jacobian);
         ++s->evaluations;
-        for (int i = 0; i < 6; ++i) delta[i] = ((y[i] - s->x[i]) + displacement[i]) - s->carry[i];
+        for (int i = 0; i < vortices3_DIM; ++i) delta[i] = ((y[i] - s->x[i]) + displacement[i]) - s->carry[i];
         const int regular = vortices3_solve(jacobian, delta);
-        const double size = vortices3_size(y, delta);
+        const double size = vortices3_size(y, delta), growth = size / (previous * previous);
         if (!isfinite(size)) return vortices3_NOT_FINITE;
         if (!regular) return vortices3_SINGULAR;
-        for (int i = 0; i < 6; ++i) y[i] -= delta[i];
-        const double growth = size / (previous * previous);
+        for (int i = 0; i < vortices3_DIM; ++i) y[i] -= delta[i];
         const double remaining = size * size * (growth > 1.0 ? growth : 1.0);
-        /* The second test: corrections no longer shrink, the solve has reached the level of rounding. */
-        if (remaining <= 1e-20 || (previous < 1e-8 && size > 0.25 * previous)) {
-            double correction[6] = { 0.0 };
-            for (int i = 0; i < 6; ++i)
-                for (int j = 0; j < 6; ++j) correction[i] -= increment_jacobian[i * 6 + j] * delta[j];
-            if (!vortices3_plausible(s, stage, increment)) return vortices3_NO_CONVERGENCE;
-            if (!vortices3_advance(s, increment, correction)) return vortices3_NOT_FINITE;
-            vortices3_remember(memory, y, iteration + 1);
-            return vortices3_OK;
-        }
+        const int stalled = previous < vortices3_NEARLY_SOLVED && size > vortices3_SHRINKING * previous;
         previous = size;
+        if (!(remaining <= vortices3_TOLERANCE || stalled)) continue;
+        double correction[vortices3_DIM] = { 0.0 };
+        for (int i = 0; i < vortices3_DIM; ++i)
+            for (int j = 0; j < vortices3_DIM; ++j)
+                correction[i] -= increment_jacobian[i * vortices3_DIM + j] * delta[j];
+        if (!vortices3_plausible(s, increment)) return vortices3_NO_CONVERGENCE;
+        if (!vortices3_advance(s, increment, correction)) return vortices3_NOT_FINITE;
+        vortices3_remember(&s->history, y);
+        return vortices3_OK;
     }
     return vortices3_NO_CONVERGENCE;
 }
 
-/* The 1 stages of one step. If one fails, the state is as before the step. */
-static vortices3_status vortices3_stages(vortices3_solver *s)
-{
-    double x[6], carry[6];
-    memcpy(x, s->x, sizeof x);
-    memcpy(carry, s->carry, sizeof carry);
-    for (int stage = 0; stage < 1; ++stage) {
-        vortices3_status status = vortices3_attempt(s, stage);
-        /* A guess from earlier steps may have misled it: once more without. */
-        if (status != vortices3_OK && s->memory[stage].count > 0) {
-            memset(&s->memory[stage], 0, sizeof s->memory[stage]);
-            status = vortices3_attempt(s, stage);
-        }
-        if (status != vortices3_OK) {
-            memcpy(s->x, x, sizeof x);
-            memcpy(s->carry, carry, sizeof carry);
-            return status;
-        }
-    }
-    return vortices3_OK;
-}
-
-/* All of vortices3_init but the gauge. The arguments may be parts of *s: they are read before it is written. */
-static vortices3_status vortices3_start(vortices3_solver *s, const vortices3_params *params, const double x0[6])
+/* ---- The solver ---- */
+/* The arguments may be parts of *s: they are read before it is written. */
+vortices3_status vortices3_init(vortices3_solver *s, const vortices3_params *params,
+    const double x0[vortices3_DIM])
 {
     if (s == NULL || x0 == NULL) return vortices3_BAD_ARGUMENT;
     const vortices3_params own = params != NULL ? *params : vortices3_default_params;
-    double x[6];
+    double x[vortices3_DIM];
     memcpy(x, x0, sizeof x);
-    for (int i = 0; i < 6; ++i)
+    for (int i = 0; i < vortices3_DIM; ++i)
         if (!isfinite(x[i])) return vortices3_BAD_ARGUMENT;
     memset(s, 0, sizeof *s);
     memcpy(s->x, x, sizeof s->x);
@@ -1068,1689 +949,83 @@ static vortices3_status vortices3_start(vortices3_solver *s, const vortices3_par
     return vortices3_OK;
 }
 
-vortices3_status vortices3_init(vortices3_solver *s, const vortices3_params *params, const double x0[6])
-{
-    return vortices3_start(s, params, x0);
-}
-
 /* What depends on the step size; nothing where that is as before. */
 static vortices3_status vortices3_set_step(vortices3_solver *s, double h)
 {
     if (s == NULL || !isfinite(h)) return vortices3_BAD_ARGUMENT;
-    if (s->ready && memcmp(&h, &s->h, sizeof h) == 0) return vortices3_OK;
-    for (int stage = 0; stage < 1; ++stage)
-        vortices3_prepare(&s->params, vortices3_fractions[stage] * h, s->coef[stage]);
-    memset(s->memory, 0, sizeof s->memory);
-    for (int stage = 0; stage < 1; ++stage) s->memory[stage].patience = 150;
-    s->pause = 16;
-    s->setback = s->foreseeing = 0;
-    s->doubt = s->retry = 0;
-    s->effort = 0.0;
-    s->passes = INT_MAX;
+    if (s->prepared && memcmp(&h, &s->h, sizeof h) == 0) return vortices3_OK;
+    vortices3_prepare(&s->params, h, s->coef);
+    memset(&s->history, 0, sizeof s->history);
     s->h = h;
-    s->ready = 1;
+    s->t_before_h = s->t;
+    s->steps_before_h = s->steps;
+    s->prepared = 1;
     return vortices3_OK;
+}
+
+/* One stage. A guess from earlier steps may have misled it: then once more without. */
+static vortices3_status vortices3_stage(vortices3_solver *s)
+{
+    vortices3_status status = vortices3_attempt(s);
+    if (status != vortices3_OK && s->history.count > 0) {
+        memset(&s->history, 0, sizeof s->history);
+        status = vortices3_attempt(s);
+    }
+    return status;
 }
 
 vortices3_status vortices3_step(vortices3_solver *s, double h)
 {
     vortices3_status status = vortices3_set_step(s, h);
     if (status != vortices3_OK) return status;
-    status = vortices3_stages(s);
-    if (status == vortices3_OK) ++s->steps;
+    status = vortices3_stage(s);
+    if (status != vortices3_OK) return status;
+    ++s->steps;
+    s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
     return status;
 }
 
-/*
- * Eight at a time: below, the formulas of a step are evaluated for 8 steps of a trajectory, or members of an
- * ensemble, at once. Compilers make vector instructions of the loops over lanes.
- */
-enum { vortices3_LANES = 8 };
-
-#if defined(__GNUC__)
-typedef double vortices3_lanes[vortices3_LANES] __attribute__((aligned(64))); /* a value in each lane */
-#else
-typedef double vortices3_lanes[vortices3_LANES];
-#endif
-
-#if defined(__clang__)
-#define vortices3_EACH_LANE _Pragma("clang loop vectorize(assume_safety)")
-#pragma clang diagnostic push
-#pragma clang diagnostic ignored "-Wpass-failed"
-#elif defined(__GNUC__)
-#define vortices3_EACH_LANE _Pragma("GCC ivdep") _Pragma("GCC unroll 1")
-#else
-#define vortices3_EACH_LANE
-#endif
-
-/* What all blocks share: coefficients, the same in each lane, and the recurrences by which they are foreseen. */
-typedef struct {
-    int fits[1]; /* the fit that weight is of; -1 for none */
-    vortices3_lanes coef[1][3], weight[1][40][6];
-} vortices3_table;
-
-/* A stage in all lanes, linearised around y. */
-typedef struct {
-    vortices3_lanes y[6], displacement[6], increment[6], residual[6];
-    /* a residual r of alpha(y) = x takes inverse r from y, and gain r from the increment */
-    vortices3_lanes inverse[36], slope[36], gain[36];
-} vortices3_model;
-
-/* vortices3_linearise_lanes_part1 (part 1 of 4) */
-vortices3_APART static void vortices3_linearise_lanes_part1(vortices3_lanes coef[restrict 3],
-                                                            vortices3_lanes y[restrict 6],
-                                                            vortices3_lanes displacement[restrict 6],
-                                                            vortices3_lanes increment[restrict 6],
-                                                            vortices3_lanes jacobian[restrict 36],
-                                                            vortices3_lanes increment_jacobian[restrict 36],
-                                                            vortices3_lanes work[restrict 218])
-{
-    vortices3_EACH_LANE
-    for (int lane = 0; lane < vortices3_LANES; ++lane) {
-        const double x1 = y[0][lane];
-        const double y1 = y[1][lane];
-        const double x2 = y[2][lane];
-        const double y2 = y[3][lane];
-        const double x3 = y[4][lane];
-        const double y3 = y[5][lane];
-        work[6][lane] = x1 - x3;
-        work[4][lane] = y1 - y3;
-        work[23][lane] = 1.0 / (work[6][lane] * work[6][lane] + work[4][lane] * work[4][lane]);
-        work[9][lane] = coef[0][lane] * work[23][lane];
-        const double t5 = 0.25 * (work[6][lane] * work[9][lane]);
-        work[3][lane] = x1 - x2;
-        work[0][lane] = y1 - y2;
-        work[12][lane] = 1.0 / (work[0][lane] * work[0][lane] + work[3][lane] * work[3][lane]);
-        work[8][lane] = coef[0][lane] * work[12][lane];
-        const double t10 = work[3][lane] * work[8][lane];
-        const double t11 = 0.5 * (t5 - t10);
-        work[18][lane] = x2 - x3;
-        work[17][lane] = y2 - y3;
-        work[19][lane] = 1.0 / (work[17][lane] * work[17][lane] + work[18][lane] * work[18][lane]);
-        work[48][lane] = coef[0][lane] * work[19][lane];
-        const double t16 = 0.5 * (work[18][lane] * work[48][lane]);
-        const double t17 = 0.25 * (t10 + t16);
-        work[10][lane] = t11 - t17;
-        const double t19 = work[0][lane] * work[8][lane];
-        const double t20 = 0.5 * (work[17][lane] * work[48][lane]);
-        const double t21 = t19 + t20;
-        const double t22 = work[4][lane] * work[9][lane];
-        const double t23 = 0.25 * t22 - t19;
-        work[7][lane] = 0.25 * t21 - 0.5 * t23;
-        work[13][lane] = 2.0 * (work[0][lane] * work[10][lane]) + 2.0 * (work[3][lane] * work[7][lane]);
-        work[14][lane] = work[12][lane] * work[13][lane];
-        work[11][lane] = coef[1][lane] * work[13][lane];
-        work[15][lane] = work[12][lane] * work[11][lane];
-        work[34][lane] = 1.0 / 12.0 * (coef[1][lane] * (work[12][lane] * work[14][lane])) + 1.0 / 12.0 * (work[12][lane] * work[15][lane]);
-        const double t30 = 2.0 * (work[3][lane] * work[34][lane]);
-        work[16][lane] = coef[1][lane] * work[12][lane];
-        const double t32 = 1.0 / 3.0 * (work[16][lane] * work[7][lane]);
-        work[20][lane] = coef[1][lane] * work[19][lane];
-        const double t34 = (-0.25) * t22 - t20;
-        work[45][lane] = (-0.25) * t21 - t34;
-        const double t36 = t5 + t16;
-        work[44][lane] = t17 - t36;
-        work[43][lane] = 2.0 * (work[17][lane] * work[44][lane]) + 2.0 * (work[18][lane] * work[45][lane]);
-        work[42][lane] = work[19][lane] * work[43][lane];
-        work[41][lane] = coef[1][lane] * work[43][lane];
-        work[40][lane] = work[19][lane] * work[41][lane];
-        work[47][lane] = (-1.0 / 24.0) * (coef[1][lane] * (work[19][lane] * work[42][lane])) - 1.0 / 24.0 * (work[19][lane] * work[40][lane]);
-        const double t43 = 1.0 / 6.0 * (work[20][lane] * work[45][lane]) + 2.0 * (work[18][lane] * work[47][lane]);
-        const double t44 = 0.25 * (t30 - t32) - 0.25 * t43;
-        work[28][lane] = coef[1][lane] * work[23][lane];
-        work[27][lane] = (-0.5) * t23 - t34;
-        work[22][lane] = t11 - t36;
-        work[26][lane] = 2.0 * (work[4][lane] * work[22][lane]) + 2.0 * (work[6][lane] * work[27][lane]);
-        work[25][lane] = work[23][lane] * work[26][lane];
-        work[21][lane] = coef[1][lane] * work[26][lane];
-        work[24][lane] = work[23][lane] * work[21][lane];
-        work[39][lane] = (-1.0 / 48.0) * (coef[1][lane] * (work[23][lane] * work[25][lane])) - 1.0 / 48.0 * (work[23][lane] * work[24][lane]);
-        const double t53 = 1.0 / 12.0 * (work[28][lane] * work[27][lane]) + 2.0 * (work[6][lane] * work[39][lane]);
-        const double t54 = 0.5 * t53;
-        const double t55 = 0.5 * (t32 - t30);
-        work[2][lane] = t44 + (t54 - t55);
-        work[1][lane] = work[12][lane] * work[12][lane];
-        const double t58 = 1.0 / 3.0 * (work[16][lane] * work[10][lane]);
-        const double t59 = 2.0 * (work[0][lane] * work[34][lane]);
-        const double t60 = 1.0 / 6.0 * (work[20][lane] * work[44][lane]) + 2.0 * (work[17][lane] * work[47][lane]);
-        work[112][lane] = 0.25 * (t58 - t59 + t60);
-        const double t62 = 1.0 / 12.0 * (work[28][lane] * work[22][lane]) + 2.0 * (work[4][lane] * work[39][lane]);
-        work[111][lane] = 0.5 * (t59 - t58 + t62);
-        work[49][lane] = work[112][lane] - work[111][lane];
-        work[30][lane] = 1.0 / 12.0 * (work[14][lane] * work[11][lane]) + 1.0 / 12.0 * (work[13][lane] * work[15][lane]) + (coef[0][lane] * (work[3][lane] * work[49][lane] + work[0][lane] * work[2][lane]) - 1.0 / 6.0 * (coef[1][lane] * (work[10][lane] * work[10][lane] + work[7][lane] * work[7][lane])));
-        const double t66 = (-0.5) * (coef[2][lane] * work[12][lane]) - work[1][lane] * work[30][lane];
-        const double t67 = 2.0 * (work[10][lane] * work[34][lane]) + work[8][lane] * work[2][lane] + 2.0 * (work[0][lane] * t66);
-        const double t68 = t53 + t43;
-        work[36][lane] = 0.25 * t68 + 0.25 * (t55 - t54);
-        work[5][lane] = work[23][lane] * work[23][lane];
-        const double t71 = t62 + t60;
-        work[50][lane] = work[111][lane] - t71;
-        work[38][lane] = (-1.0 / 48.0) * (work[25][lane] * work[21][lane]) - 1.0 / 48.0 * (work[26][lane] * work[24][lane]) + (1.0 / 24.0 * (coef[1][lane] * (work[27][lane] * work[27][lane] + work[22][lane] * work[22][lane])) + coef[0][lane] * (work[4][lane] * work[36][lane] + 0.25 * (work[6][lane] * work[50][lane])));
-        work[35][lane] = 0.125 * (coef[2][lane] * work[23][lane]) - work[5][lane] * work[38][lane];
-        const double t75 = 2.0 * (work[22][lane] * work[39][lane]) + work[9][lane] * work[36][lane] + 2.0 * (work[4][lane] * work[35][lane]);
-        const double p_y1 = t67 + t75;
-        const double t76 = 2.0 * (work[7][lane] * work[34][lane]) + work[8][lane] * work[49][lane] + 2.0 * (work[3][lane] * t66);
-        const double t77 = 2.0 * (work[27][lane] * work[39][lane]) + 0.25 * (work[9][lane] * work[50][lane]) + 2.0 * (work[6][lane] * work[35][lane]);
-        const double p_x1 = t76 + t77;
-        work[75][lane] = t68 + t44;
-        work[46][lane] = work[19][lane] * work[19][lane];
-        work[86][lane] = work[112][lane] - t71;
-        work[85][lane] = (-1.0 / 24.0) * (work[42][lane] * work[41][lane]) - 1.0 / 24.0 * (work[43][lane] * work[40][lane]) + (1.0 / 12.0 * (coef[1][lane] * (work[45][lane] * work[45][lane] + work[44][lane] * work[44][lane])) + coef[0][lane] * (0.5 * (work[17][lane] * work[75][lane]) + 0.5 * (work[18][lane] * work[86][lane])));
-        work[130][lane] = 0.25 * (coef[2][lane] * work[19][lane]) - work[46][lane] * work[85][lane];
-        const double t83 = 2.0 * (work[44][lane] * work[47][lane]) + 0.5 * (work[48][lane] * work[75][lane]) + 2.0 * (work[17][lane] * work[130][lane]);
-        const double p_y2 = t83 - t67;
-        const double t84 = 2.0 * (work[45][lane] * work[47][lane]) + 0.5 * (work[48][lane] * work[86][lane]) + 2.0 * (work[18][lane] * work[130][lane]);
-        const double p_x2 = t84 - t76;
-        const double t85 = t75 + t83;
-        const double p_y3 = -t85;
-        const double t86 = t84 + t77;
-        const double t87 = 0.25 * work[9][lane];
-        const double t88 = work[6][lane] * work[5][lane];
-        work[56][lane] = coef[0][lane] * t88;
-        const double t90 = 0.5 * (work[6][lane] * work[56][lane]);
-        work[147][lane] = t87 - t90;
-        const double t92 = work[3][lane] * work[1][lane];
-        work[51][lane] = coef[0][lane] * t92;
-        const double t94 = 2.0 * (work[3][lane] * work[51][lane]);
-        work[74][lane] = t94 - work[8][lane];
-        const double t96 = 0.5 * (work[147][lane] + work[74][lane]);
-        work[78][lane] = work[8][lane] - t94;
-        const double t98 = 0.25 * work[78][lane];
-        const double t99 = t96 - t98;
-        work[118][lane] = 2.0 * (work[51][lane] * work[2][lane]);
-        work[79][lane] = 2.0 * work[7][lane];
-        work[77][lane] = work[0][lane] * work[51][lane];
-        work[76][lane] = 2.0 * work[77][lane];
-        work[155][lane] = work[4][lane] * work[56][lane];
-        work[149][lane] = 0.5 * work[155][lane];
-        const double t106 = 0.5 * (work[76][lane] - work[149][lane]);
-        work[53][lane] = (-0.5) * work[77][lane] - t106;
-        const double t108 = work[79][lane] + (2.0 * (work[3][lane] * work[53][lane]) + 2.0 * (work[0][lane] * t99));
-        const double t109 = coef[1][lane] * t108;
-        work[80][lane] = 1.0 / 6.0 * (t92 * work[11][lane]);
-        const double t111 = 1.0 / 12.0 * (work[12][lane] * t109) - work[80][lane];
-        work[81][lane] = 1.0 / 6.0 * (t92 * work[13][lane]);
-        const double t113 = 1.0 / 12.0 * (work[12][lane] * t108) - work[81][lane];
-        work[83][lane] = 1.0 / 6.0 * (t92 * work[14][lane]);
-        work[82][lane] = 1.0 / 6.0 * (t92 * work[15][lane]);
-        work[52][lane] = work[12][lane] * t111 + (coef[1][lane] * (work[12][lane] * t113 - work[83][lane]) - work[82][lane]);
-        work[32][lane] = 2.0 * work[39][lane];
-        const double t118 = coef[1][lane] * t88;
-        work[162][lane] = 1.0 / 6.0 * (t118 * work[27][lane]);
-        work[57][lane] = 0.5 * (work[149][lane] - work[76][lane]) - work[149][lane];
-        work[158][lane] = t88 * work[21][lane];
-        work[156][lane] = t90 - t87;
-        const double t123 = work[156][lane] + t96;
-        work[157][lane] = 2.0 * work[27][lane];
-        const double t125 = 2.0 * (work[4][lane] * t123) + (work[157][lane] + 2.0 * (work[6][lane] * work[57][lane]));
-        const double t126 = coef[1][lane] * t125;
-        const double t127 = 1.0 / 24.0 * work[158][lane] - 1.0 / 48.0 * (work[23][lane] * t126);
-        work[161][lane] = 1.0 / 24.0 * (t88 * work[24][lane]);
-        work[160][lane] = 1.0 / 24.0 * (t88 * work[25][lane]);
-        work[159][lane] = t88 * work[26][lane];
-        const double t131 = 1.0 / 24.0 * work[159][lane] - 1.0 / 48.0 * (work[23][lane] * t125);
-        work[58][lane] = work[23][lane] * t127 + (work[161][lane] + coef[1][lane] * (work[160][lane] + work[23][lane] * t131));
-        const double t133 = work[32][lane] - work[162][lane] + (1.0 / 12.0 * (work[28][lane] * work[57][lane]) + 2.0 * (work[6][lane] * work[58][lane]));
-        const double t134 = coef[1][lane] * t92;
-        work[84][lane] = t134 * work[7][lane];
-        const double t136 = 0.5 * work[77][lane];
-        const double t137 = t136 + t106;
-        work[31][lane] = 2.0 * work[34][lane];
-        const double t139 = 2.0 / 3.0 * work[84][lane] + 1.0 / 3.0 * (work[16][lane] * t137) + (work[31][lane] + 2.0 * (work[3][lane] * work[52][lane]));
-        const double t140 = 0.5 * t139;
-        work[69][lane] = t136 - work[149][lane];
-        work[70][lane] = work[156][lane] + t98;
-        work[65][lane] = 2.0 * (work[18][lane] * work[69][lane]) + 2.0 * (work[17][lane] * work[70][lane]);
-        work[66][lane] = work[19][lane] * work[65][lane];
-        work[67][lane] = coef[1][lane] * work[65][lane];
-        work[68][lane] = work[19][lane] * work[67][lane];
-        work[71][lane] = (-1.0 / 24.0) * (coef[1][lane] * (work[19][lane] * work[66][lane])) - 1.0 / 24.0 * (work[19][lane] * work[68][lane]);
-        const double t148 = 1.0 / 6.0 * (work[20][lane] * work[69][lane]) + 2.0 * (work[18][lane] * work[71][lane]);
-        work[64][lane] = 0.25 * t139 - 0.25 * t148;
-        const double t150 = 0.5 * t133 + t140 + work[64][lane];
-        work[29][lane] = work[12][lane] * work[1][lane];
-        work[113][lane] = work[29][lane] * (work[3][lane] * work[30][lane]);
-        const double t153 = t98 - t96;
-        const double t154 = 1.0 / 6.0 * (work[20][lane] * work[70][lane]) + 2.0 * (work[17][lane] * work[71][lane]);
-        work[93][lane] = 2.0 / 3.0 * (t134 * work[10][lane]);
-        const double t156 = work[93][lane] + 1.0 / 3.0 * (work[16][lane] * t153) + 2.0 * (work[0][lane] * work[52][lane]);
-        work[61][lane] = 0.25 * (t154 - t156);
-        work[164][lane] = 1.0 / 6.0 * (t118 * work[22][lane]);
-        const double t159 = 1.0 / 12.0 * (work[28][lane] * t123) + (2.0 * (work[4][lane] * work[58][lane]) - work[164][lane]);
-        const double t160 = 0.5 * (t156 + t159);
-        work[54][lane] = work[61][lane] - t160;
-        const double t162 = coef[2][lane] * (x2 - x1) + coef[1][lane] * (1.0 / 3.0 * (work[7][lane] * t137) + 1.0 / 3.0 * (work[10][lane] * t153)) + (1.0 / 12.0 * (work[15][lane] * t108) + work[11][lane] * t113) + (1.0 / 12.0 * (work[14][lane] * t109) + work[13][lane] * t111 + coef[0][lane] * (work[0][lane] * t150 + (work[49][lane] + work[3][lane] * work[54][lane])));
-        work[55][lane] = 4.0 * work[113][lane] - work[1][lane] * t162;
-        work[72][lane] = 2.0 * (t99 * work[34][lane]) - work[118][lane] + (2.0 * (work[10][lane] * work[52][lane]) + work[8][lane] * t150) + 2.0 * (work[0][lane] * work[55][lane]);
-        work[168][lane] = 2.0 * (work[56][lane] * work[36][lane]);
-        work[63][lane] = t148 + t133;
-        const double t167 = 0.25 * work[63][lane] + 0.25 * ((-0.5) * t133 - t140);
-        work[37][lane] = work[23][lane] * work[5][lane];
-        work[166][lane] = work[37][lane] * (work[6][lane] * work[38][lane]);
-        work[167][lane] = coef[2][lane] * work[6][lane];
-        work[165][lane] = 0.25 * work[50][lane];
-        work[62][lane] = t154 + t159;
-        work[59][lane] = t160 - work[62][lane];
-        const double t174 = coef[1][lane] * (1.0 / 12.0 * (work[27][lane] * work[57][lane]) + 1.0 / 12.0 * (work[22][lane] * t123)) + work[26][lane] * t127 + coef[0][lane] * (work[4][lane] * t167 + (work[165][lane] + 0.25 * (work[6][lane] * work[59][lane])));
-        work[60][lane] = 4.0 * work[166][lane] - work[5][lane] * (0.25 * work[167][lane] - 1.0 / 48.0 * (t125 * work[24][lane]) + (work[21][lane] * t131 - 1.0 / 48.0 * (work[25][lane] * t126)) + t174);
-        work[73][lane] = 2.0 * (t123 * work[39][lane]) - work[168][lane] + (2.0 * (work[22][lane] * work[58][lane]) + work[9][lane] * t167) + 2.0 * (work[4][lane] * work[60][lane]);
-        const double t177 = work[72][lane] + work[73][lane];
-        const double t178 = 0.5 * t177;
-        work[33][lane] = 2.0 * t66;
-        displacement[0][lane] = (-0.5) * p_y1;
-        increment[0][lane] = p_y1;
-        displacement[1][lane] = 0.5 * p_x1;
-        increment[1][lane] = -p_x1;
-        displacement[2][lane] = (-0.25) * p_y2;
-        increment[2][lane] = 0.5 * p_y2;
-        displacement[3][lane] = 0.25 * p_x2;
-        increment[3][lane] = (-0.5) * p_x2;
-        increment[4][lane] = 2.0 * t85;
-        displacement[4][lane] = p_y3;
-        displacement[5][lane] = t86;
-        increment[5][lane] = (-2.0) * t86;
-        increment_jacobian[0][lane] = t177;
-        increment_jacobian[7][lane] = -t177;
-        jacobian[0][lane] = 1.0 - t178;
-        jacobian[7][lane] = 1.0 + t178;
-    }
-}
-
-/* vortices3_linearise_lanes_part2 (part 2 of 4) */
-vortices3_APART static void vortices3_linearise_lanes_part2(vortices3_lanes coef[restrict 3],
-                                                            vortices3_lanes y[restrict 6],
-                                                            vortices3_lanes displacement[restrict 6],
-                                                            vortices3_lanes increment[restrict 6],
-                                                            vortices3_lanes jacobian[restrict 36],
-                                                            vortices3_lanes increment_jacobian[restrict 36],
-                                                            vortices3_lanes work[restrict 218])
-{
-    (void)displacement;
-    (void)increment;
-    vortices3_EACH_LANE
-    for (int lane = 0; lane < vortices3_LANES; ++lane) {
-        const double y1 = y[1][lane];
-        const double y2 = y[3][lane];
-        const double t180 = work[0][lane] * work[1][lane];
-        const double t181 = coef[0][lane] * t180;
-        work[134][lane] = 2.0 * (t181 * work[2][lane]);
-        work[122][lane] = work[3][lane] * t181;
-        const double t184 = 0.5 * work[122][lane];
-        work[119][lane] = 2.0 * work[122][lane];
-        const double t186 = work[4][lane] * work[5][lane];
-        const double t187 = coef[0][lane] * t186;
-        work[169][lane] = work[6][lane] * t187;
-        const double t189 = 0.5 * work[169][lane];
-        const double t190 = work[119][lane] - t189;
-        const double t191 = 0.5 * t190;
-        const double t192 = t184 + t191;
-        const double t193 = coef[1][lane] * t180;
-        work[129][lane] = 2.0 / 3.0 * (t193 * work[7][lane]);
-        const double t195 = 2.0 * (work[0][lane] * t181);
-        work[121][lane] = t195 - work[8][lane];
-        work[170][lane] = 2.0 * (work[4][lane] * t187);
-        const double t198 = 0.25 * (work[9][lane] - work[170][lane]);
-        const double t199 = 0.5 * (work[121][lane] + t198);
-        work[123][lane] = work[8][lane] - t195;
-        const double t201 = 0.25 * work[123][lane];
-        const double t202 = t199 - t201;
-        work[124][lane] = 2.0 * work[10][lane];
-        const double t204 = t201 - t199;
-        const double t205 = work[124][lane] + (2.0 * (work[0][lane] * t192) + 2.0 * (work[3][lane] * t204));
-        const double t206 = coef[1][lane] * t205;
-        work[125][lane] = 1.0 / 6.0 * (t180 * work[11][lane]);
-        const double t208 = 1.0 / 12.0 * (work[12][lane] * t206) - work[125][lane];
-        work[126][lane] = 1.0 / 6.0 * (t180 * work[13][lane]);
-        const double t210 = 1.0 / 12.0 * (work[12][lane] * t205) - work[126][lane];
-        work[128][lane] = 1.0 / 6.0 * (t180 * work[14][lane]);
-        work[127][lane] = 1.0 / 6.0 * (t180 * work[15][lane]);
-        const double t213 = work[12][lane] * t208 + (coef[1][lane] * (work[12][lane] * t210 - work[128][lane]) - work[127][lane]);
-        const double t214 = work[129][lane] + 1.0 / 3.0 * (work[16][lane] * t202) + 2.0 * (work[3][lane] * t213);
-        const double t215 = 0.25 * work[121][lane] + t198;
-        const double t216 = t189 - t184;
-        const double t217 = 2.0 * (work[17][lane] * t216) + 2.0 * (work[18][lane] * t215);
-        const double t218 = work[19][lane] * t217;
-        const double t219 = coef[1][lane] * t217;
-        const double t220 = work[19][lane] * t219;
-        const double t221 = (-1.0 / 24.0) * (coef[1][lane] * (work[19][lane] * t218)) - 1.0 / 24.0 * (work[19][lane] * t220);
-        const double t222 = 1.0 / 6.0 * (work[20][lane] * t215) + 2.0 * (work[18][lane] * t221);
-        const double t223 = 0.25 * t214 - 0.25 * t222;
-        const double t224 = t198 + 0.5 * (work[123][lane] - t198);
-        work[172][lane] = t186 * work[21][lane];
-        work[171][lane] = 2.0 * work[22][lane];
-        const double t227 = t189 + t191;
-        const double t228 = work[171][lane] + 2.0 * (work[4][lane] * t227) + 2.0 * (work[6][lane] * t224);
-        const double t229 = coef[1][lane] * t228;
-        const double t230 = 1.0 / 24.0 * work[172][lane] - 1.0 / 48.0 * (work[23][lane] * t229);
-        work[175][lane] = 1.0 / 24.0 * (t186 * work[24][lane]);
-        work[174][lane] = 1.0 / 24.0 * (t186 * work[25][lane]);
-        work[173][lane] = 1.0 / 24.0 * (t186 * work[26][lane]);
-        const double t234 = work[173][lane] - 1.0 / 48.0 * (work[23][lane] * t228);
-        const double t235 = work[23][lane] * t230 + (work[175][lane] + coef[1][lane] * (work[174][lane] + work[23][lane] * t234));
-        const double t236 = coef[1][lane] * t186;
-        work[176][lane] = 1.0 / 6.0 * (t236 * work[27][lane]);
-        const double t238 = 1.0 / 12.0 * (work[28][lane] * t224) + (2.0 * (work[6][lane] * t235) - work[176][lane]);
-        const double t239 = 0.5 * t214;
-        const double t240 = t223 + (0.5 * t238 + t239);
-        work[135][lane] = work[29][lane] * (work[0][lane] * work[30][lane]);
-        const double t242 = (-0.5) * t190 - t184;
-        const double t243 = 1.0 / 6.0 * (work[20][lane] * t216) + 2.0 * (work[17][lane] * t221);
-        work[133][lane] = t193 * work[10][lane];
-        const double t245 = 2.0 / 3.0 * work[133][lane] + 1.0 / 3.0 * (work[16][lane] * t242) + (work[31][lane] + 2.0 * (work[0][lane] * t213));
-        const double t246 = 0.25 * (t243 - t245);
-        work[177][lane] = 1.0 / 6.0 * (t236 * work[22][lane]);
-        const double t248 = work[32][lane] - work[177][lane] + (1.0 / 12.0 * (work[28][lane] * t227) + 2.0 * (work[4][lane] * t235));
-        const double t249 = 0.5 * (t248 + t245);
-        const double t250 = t246 - t249;
-        const double t251 = coef[2][lane] * (y2 - y1) + coef[1][lane] * (1.0 / 3.0 * (work[10][lane] * t242) + 1.0 / 3.0 * (work[7][lane] * t202)) + (1.0 / 12.0 * (work[15][lane] * t205) + work[11][lane] * t210) + (1.0 / 12.0 * (work[14][lane] * t206) + work[13][lane] * t208 + coef[0][lane] * (work[2][lane] + work[0][lane] * t240 + work[3][lane] * t250));
-        const double t252 = 4.0 * work[135][lane] - work[1][lane] * t251;
-        const double t253 = work[33][lane] - work[134][lane] + (2.0 * (t192 * work[34][lane]) + work[8][lane] * t240) + (2.0 * (work[10][lane] * t213) + 2.0 * (work[0][lane] * t252));
-        work[202][lane] = 2.0 * work[35][lane];
-        work[201][lane] = 2.0 * (t187 * work[36][lane]);
-        const double t256 = t222 + t238;
-        const double t257 = 0.25 * t256 + 0.25 * ((-0.5) * t238 - t239);
-        work[204][lane] = work[37][lane] * (work[4][lane] * work[38][lane]);
-        work[196][lane] = 0.25 * (coef[2][lane] * work[4][lane]);
-        const double t260 = t243 + t248;
-        const double t261 = t249 - t260;
-        const double t262 = coef[1][lane] * (1.0 / 12.0 * (work[22][lane] * t227) + 1.0 / 12.0 * (work[27][lane] * t224)) + work[26][lane] * t230 + coef[0][lane] * (0.25 * (work[6][lane] * t261) + (work[36][lane] + work[4][lane] * t257));
-        const double t263 = 4.0 * work[204][lane] - work[5][lane] * (work[196][lane] - 1.0 / 48.0 * (work[24][lane] * t228) + (work[21][lane] * t234 - 1.0 / 48.0 * (work[25][lane] * t229)) + t262);
-        const double t264 = 2.0 * (t227 * work[39][lane]) + 2.0 * (work[22][lane] * t235) + (work[202][lane] - work[201][lane]) + (work[9][lane] * t257 + 2.0 * (work[4][lane] * t263));
-        const double t265 = t253 + t264;
-        const double t266 = t246 - t260;
-        const double t267 = t256 + t223;
-        const double t268 = (-1.0 / 24.0) * (t217 * work[40][lane]) - 1.0 / 24.0 * (work[41][lane] * t218) + ((-1.0 / 24.0) * (work[42][lane] * t219) - 1.0 / 24.0 * (work[43][lane] * t220)) + (coef[1][lane] * (1.0 / 6.0 * (t216 * work[44][lane]) + 1.0 / 6.0 * (work[45][lane] * t215)) + coef[0][lane] * (0.5 * (work[17][lane] * t267) + 0.5 * (work[18][lane] * t266)));
-        const double t269 = work[46][lane] * t268;
-        const double t270 = 2.0 * (t215 * work[47][lane]) + 2.0 * (work[45][lane] * t221) + (0.5 * (work[48][lane] * t266) - 2.0 * (work[18][lane] * t269));
-        const double t271 = t270 - (2.0 * (t204 * work[34][lane]) - 2.0 * (t181 * work[49][lane]) + (2.0 * (work[7][lane] * t213) + work[8][lane] * t250) + 2.0 * (work[3][lane] * t252));
-        const double t272 = (-0.5) * t271;
-        const double t273 = 2.0 * (t216 * work[47][lane]) + 2.0 * (work[44][lane] * t221) + (0.5 * (work[48][lane] * t267) - 2.0 * (work[17][lane] * t269));
-        const double t274 = t273 - t253;
-        const double t275 = 2.0 * (t224 * work[39][lane]) - 0.5 * (t187 * work[50][lane]) + (2.0 * (work[27][lane] * t235) + 0.25 * (work[9][lane] * t261)) + 2.0 * (work[6][lane] * t263) + t270;
-        const double t276 = t273 + t264;
-        work[138][lane] = 2.0 * (work[51][lane] * work[49][lane]);
-        const double t278 = 2.0 * (work[7][lane] * work[52][lane]) - work[138][lane] + (2.0 * (work[53][lane] * work[34][lane]) + work[33][lane]) + (work[8][lane] * work[54][lane] + 2.0 * (work[3][lane] * work[55][lane]));
-        work[210][lane] = 0.5 * (work[56][lane] * work[50][lane]);
-        const double t280 = 2.0 * (work[57][lane] * work[39][lane]) + 2.0 * (work[27][lane] * work[58][lane]) + (work[202][lane] - work[210][lane]) + (0.25 * (work[9][lane] * work[59][lane]) + 2.0 * (work[6][lane] * work[60][lane]));
-        const double t281 = t278 + t280;
-        const double t282 = work[61][lane] - work[62][lane];
-        const double t283 = work[63][lane] + work[64][lane];
-        const double t284 = (-1.0 / 24.0) * (work[65][lane] * work[40][lane]) - 1.0 / 24.0 * (work[41][lane] * work[66][lane]) + ((-1.0 / 24.0) * (work[42][lane] * work[67][lane]) - 1.0 / 24.0 * (work[43][lane] * work[68][lane])) + (coef[1][lane] * (1.0 / 6.0 * (work[69][lane] * work[45][lane]) + 1.0 / 6.0 * (work[44][lane] * work[70][lane])) + coef[0][lane] * (0.5 * (work[18][lane] * t282) + 0.5 * (work[17][lane] * t283)));
-        const double t285 = work[46][lane] * t284;
-        const double t286 = 2.0 * (work[69][lane] * work[47][lane]) + 2.0 * (work[45][lane] * work[71][lane]) + (0.5 * (work[48][lane] * t282) - 2.0 * (work[18][lane] * t285));
-        const double t287 = t286 - t278;
-        const double t288 = 2.0 * (work[70][lane] * work[47][lane]) + 2.0 * (work[44][lane] * work[71][lane]) + (0.5 * (work[48][lane] * t283) - 2.0 * (work[17][lane] * t285));
-        const double t289 = t288 - work[72][lane];
-        const double t290 = 0.5 * t289;
-        const double t291 = t286 + t280;
-        const double t292 = work[73][lane] + t288;
-        const double t293 = work[18][lane] * work[46][lane];
-        work[136][lane] = coef[0][lane] * t293;
-        const double t295 = work[18][lane] * work[136][lane];
-        work[120][lane] = 0.5 * work[48][lane];
-        work[145][lane] = t295 - work[120][lane];
-        work[146][lane] = work[120][lane] - t295;
-        work[90][lane] = 0.25 * (work[146][lane] + work[74][lane]);
-        work[88][lane] = work[145][lane] + work[90][lane];
-        work[105][lane] = work[136][lane] * work[75][lane];
-        work[151][lane] = t293 * work[41][lane];
-        work[150][lane] = 2.0 * work[45][lane];
-        work[148][lane] = work[17][lane] * work[136][lane];
-        work[97][lane] = 0.25 * (work[148][lane] - work[76][lane]) - work[148][lane];
-        work[99][lane] = work[150][lane] + (2.0 * (work[18][lane] * work[97][lane]) + 2.0 * (work[17][lane] * work[88][lane]));
-        work[101][lane] = coef[1][lane] * work[99][lane];
-        work[100][lane] = 1.0 / 12.0 * work[151][lane] - 1.0 / 24.0 * (work[19][lane] * work[101][lane]);
-        work[154][lane] = 1.0 / 12.0 * (t293 * work[40][lane]);
-        work[153][lane] = 1.0 / 12.0 * (t293 * work[42][lane]);
-        work[152][lane] = 1.0 / 12.0 * (t293 * work[43][lane]);
-        work[98][lane] = work[152][lane] - 1.0 / 24.0 * (work[19][lane] * work[99][lane]);
-        work[89][lane] = work[19][lane] * work[100][lane] + (work[154][lane] + coef[1][lane] * (work[153][lane] + work[19][lane] * work[98][lane]));
-        work[144][lane] = work[77][lane] - work[148][lane];
-        work[91][lane] = 0.5 * work[78][lane];
-        work[94][lane] = work[145][lane] + work[91][lane];
-        work[140][lane] = 2.0 * (work[6][lane] * work[144][lane]) + 2.0 * (work[4][lane] * work[94][lane]);
-        work[141][lane] = work[23][lane] * work[140][lane];
-        work[142][lane] = coef[1][lane] * work[140][lane];
-        work[143][lane] = work[23][lane] * work[142][lane];
-        work[95][lane] = (-1.0 / 48.0) * (coef[1][lane] * (work[23][lane] * work[141][lane])) - 1.0 / 48.0 * (work[23][lane] * work[143][lane]);
-        work[107][lane] = 1.0 / 12.0 * (work[28][lane] * work[144][lane]) + 2.0 * (work[6][lane] * work[95][lane]);
-        work[87][lane] = coef[1][lane] * t293;
-        work[163][lane] = 1.0 / 3.0 * (work[87][lane] * work[45][lane]);
-        work[132][lane] = 2.0 * work[47][lane];
-        const double t326 = 1.0 / 6.0 * (work[20][lane] * work[97][lane]) - work[163][lane] + (work[132][lane] + 2.0 * (work[18][lane] * work[89][lane]));
-        work[139][lane] = work[107][lane] + t326;
-        const double t328 = work[76][lane] - work[148][lane];
-        work[109][lane] = (-0.25) * t328 - work[77][lane];
-        work[117][lane] = work[91][lane] - work[90][lane];
-        work[137][lane] = work[77][lane] + 0.25 * t328;
-        work[114][lane] = 2.0 * (work[0][lane] * work[117][lane]) + (2.0 * (work[3][lane] * work[137][lane]) - work[79][lane]);
-        work[115][lane] = coef[1][lane] * work[114][lane];
-        work[110][lane] = work[80][lane] + 1.0 / 12.0 * (work[12][lane] * work[115][lane]);
-        work[116][lane] = work[81][lane] + 1.0 / 12.0 * (work[12][lane] * work[114][lane]);
-        work[92][lane] = work[12][lane] * work[110][lane] + (work[82][lane] + coef[1][lane] * (work[83][lane] + work[12][lane] * work[116][lane]));
-        work[106][lane] = (-2.0 / 3.0) * work[84][lane] - work[31][lane] + (1.0 / 3.0 * (work[16][lane] * work[109][lane]) + 2.0 * (work[3][lane] * work[92][lane]));
-        work[108][lane] = 0.25 * work[106][lane] - 0.25 * t326;
-        work[102][lane] = work[139][lane] + work[108][lane];
-        work[131][lane] = work[19][lane] * work[46][lane];
-        work[104][lane] = work[131][lane] * (work[18][lane] * work[85][lane]);
-        work[96][lane] = 0.5 * (coef[2][lane] * work[18][lane]);
-        work[103][lane] = 0.5 * work[86][lane];
-        jacobian[1][lane] = (-0.5) * t265;
-        increment_jacobian[1][lane] = t265;
-        jacobian[19][lane] = 0.25 * t271;
-        increment_jacobian[2][lane] = t271;
-        jacobian[2][lane] = t272;
-        increment_jacobian[19][lane] = t272;
-        jacobian[3][lane] = (-0.5) * t274;
-        jacobian[13][lane] = (-0.25) * t274;
-        increment_jacobian[3][lane] = t274;
-        increment_jacobian[13][lane] = 0.5 * t274;
-        jacobian[4][lane] = 0.5 * t275;
-        jacobian[31][lane] = t275;
-        increment_jacobian[4][lane] = -t275;
-        increment_jacobian[31][lane] = (-2.0) * t275;
-        jacobian[5][lane] = 0.5 * t276;
-        jacobian[25][lane] = -t276;
-        increment_jacobian[5][lane] = -t276;
-        increment_jacobian[25][lane] = 2.0 * t276;
-        jacobian[6][lane] = 0.5 * t281;
-        increment_jacobian[6][lane] = -t281;
-        increment_jacobian[8][lane] = t278 - t286;
-        jacobian[8][lane] = 0.5 * t287;
-        jacobian[18][lane] = 0.25 * t287;
-        increment_jacobian[18][lane] = (-0.5) * t287;
-        increment_jacobian[9][lane] = work[72][lane] - t288;
-        jacobian[12][lane] = (-0.25) * t289;
-        jacobian[9][lane] = t290;
-        increment_jacobian[12][lane] = t290;
-        jacobian[10][lane] = (-0.5) * t291;
-        jacobian[30][lane] = t291;
-        increment_jacobian[10][lane] = t291;
-        increment_jacobian[30][lane] = (-2.0) * t291;
-        jacobian[11][lane] = (-0.5) * t292;
-        jacobian[24][lane] = -t292;
-        increment_jacobian[11][lane] = t292;
-        increment_jacobian[24][lane] = 2.0 * t292;
-    }
-}
-
-/* vortices3_linearise_lanes_part3 (part 3 of 4) */
-vortices3_APART static void vortices3_linearise_lanes_part3(vortices3_lanes coef[restrict 3],
-                                                            vortices3_lanes y[restrict 6],
-                                                            vortices3_lanes displacement[restrict 6],
-                                                            vortices3_lanes increment[restrict 6],
-                                                            vortices3_lanes jacobian[restrict 36],
-                                                            vortices3_lanes increment_jacobian[restrict 36],
-                                                            vortices3_lanes work[restrict 218])
-{
-    (void)y;
-    (void)displacement;
-    (void)increment;
-    vortices3_EACH_LANE
-    for (int lane = 0; lane < vortices3_LANES; ++lane) {
-        const double t344 = 1.0 / 3.0 * (work[87][lane] * work[44][lane]);
-        const double t345 = 1.0 / 6.0 * (work[20][lane] * work[88][lane]) - t344 + 2.0 * (work[17][lane] * work[89][lane]);
-        const double t346 = work[90][lane] - work[91][lane];
-        const double t347 = 1.0 / 3.0 * (work[16][lane] * t346) + (2.0 * (work[0][lane] * work[92][lane]) - work[93][lane]);
-        const double t348 = 0.25 * (t345 - t347);
-        const double t349 = 1.0 / 12.0 * (work[28][lane] * work[94][lane]) + 2.0 * (work[4][lane] * work[95][lane]);
-        const double t350 = t349 + t345;
-        const double t351 = t348 - t350;
-        const double t352 = work[96][lane] + coef[1][lane] * (1.0 / 6.0 * (work[45][lane] * work[97][lane]) + 1.0 / 6.0 * (work[44][lane] * work[88][lane])) + (work[41][lane] * work[98][lane] - 1.0 / 24.0 * (work[40][lane] * work[99][lane])) + (work[43][lane] * work[100][lane] - 1.0 / 24.0 * (work[42][lane] * work[101][lane]) + coef[0][lane] * (0.5 * (work[17][lane] * work[102][lane]) + (work[103][lane] + 0.5 * (work[18][lane] * t351))));
-        const double t353 = 4.0 * work[104][lane] - work[46][lane] * t352;
-        const double t354 = 2.0 * (work[88][lane] * work[47][lane]) - work[105][lane] + (2.0 * (work[44][lane] * work[89][lane]) + 0.5 * (work[48][lane] * work[102][lane])) + 2.0 * (work[17][lane] * t353);
-        const double t355 = 0.5 * work[106][lane];
-        const double t356 = 0.5 * work[107][lane] + t355 + work[108][lane];
-        const double t357 = 0.5 * (t349 + t347);
-        const double t358 = t348 - t357;
-        const double t359 = coef[1][lane] * (1.0 / 3.0 * (work[7][lane] * work[109][lane]) + 1.0 / 3.0 * (work[10][lane] * t346)) + work[13][lane] * work[110][lane] + coef[0][lane] * (work[0][lane] * t356 + (work[111][lane] - work[112][lane] + work[3][lane] * t358));
-        const double t360 = (-4.0) * work[113][lane] - work[1][lane] * (coef[2][lane] * work[3][lane] + 1.0 / 12.0 * (work[114][lane] * work[15][lane]) + (1.0 / 12.0 * (work[14][lane] * work[115][lane]) + work[11][lane] * work[116][lane]) + t359);
-        const double t361 = t354 - (2.0 * (work[117][lane] * work[34][lane]) + work[118][lane] + (2.0 * (work[10][lane] * work[92][lane]) + work[8][lane] * t356) + 2.0 * (work[0][lane] * t360));
-        const double t362 = 0.25 * t361;
-        const double t363 = work[17][lane] * work[46][lane];
-        const double t364 = coef[0][lane] * t363;
-        const double t365 = work[18][lane] * t364;
-        const double t366 = work[119][lane] - t365;
-        const double t367 = 0.25 * t366;
-        const double t368 = t365 + t367;
-        const double t369 = work[17][lane] * t364;
-        const double t370 = work[120][lane] - t369;
-        const double t371 = t370 + 0.5 * work[121][lane];
-        const double t372 = t365 - work[122][lane];
-        const double t373 = 2.0 * (work[4][lane] * t372) + 2.0 * (work[6][lane] * t371);
-        const double t374 = work[23][lane] * t373;
-        const double t375 = coef[1][lane] * t373;
-        const double t376 = work[23][lane] * t375;
-        const double t377 = (-1.0 / 48.0) * (coef[1][lane] * (work[23][lane] * t374)) - 1.0 / 48.0 * (work[23][lane] * t376);
-        const double t378 = 1.0 / 12.0 * (work[28][lane] * t371) + 2.0 * (work[6][lane] * t377);
-        const double t379 = 0.25 * (t370 + work[121][lane]);
-        const double t380 = t370 - t379;
-        const double t381 = coef[1][lane] * t363;
-        const double t382 = 1.0 / 3.0 * (t381 * work[45][lane]);
-        const double t383 = t363 * work[41][lane];
-        const double t384 = 2.0 * work[44][lane];
-        const double t385 = t384 + (2.0 * (work[17][lane] * t368) + 2.0 * (work[18][lane] * t380));
-        const double t386 = coef[1][lane] * t385;
-        const double t387 = 1.0 / 12.0 * t383 - 1.0 / 24.0 * (work[19][lane] * t386);
-        const double t388 = 1.0 / 12.0 * (t363 * work[40][lane]);
-        const double t389 = 1.0 / 12.0 * (t363 * work[42][lane]);
-        const double t390 = t363 * work[43][lane];
-        const double t391 = 1.0 / 12.0 * t390 - 1.0 / 24.0 * (work[19][lane] * t385);
-        const double t392 = work[19][lane] * t387 + (t388 + coef[1][lane] * (t389 + work[19][lane] * t391));
-        const double t393 = 1.0 / 6.0 * (work[20][lane] * t380) - t382 + 2.0 * (work[18][lane] * t392);
-        const double t394 = t378 + t393;
-        const double t395 = 0.5 * work[123][lane];
-        const double t396 = t395 - t379;
-        const double t397 = (-0.25) * t366 - work[122][lane];
-        const double t398 = 2.0 * (work[0][lane] * t397) - work[124][lane] + 2.0 * (work[3][lane] * (t379 - t395));
-        const double t399 = coef[1][lane] * t398;
-        const double t400 = work[125][lane] + 1.0 / 12.0 * (work[12][lane] * t399);
-        const double t401 = work[126][lane] + 1.0 / 12.0 * (work[12][lane] * t398);
-        const double t402 = work[12][lane] * t400 + (work[127][lane] + coef[1][lane] * (work[128][lane] + work[12][lane] * t401));
-        const double t403 = 1.0 / 3.0 * (work[16][lane] * t396) - work[129][lane] + 2.0 * (work[3][lane] * t402);
-        const double t404 = 0.25 * t403 - 0.25 * t393;
-        const double t405 = t394 + t404;
-        work[207][lane] = 2.0 * work[130][lane];
-        work[206][lane] = t364 * work[75][lane];
-        work[186][lane] = work[131][lane] * (work[17][lane] * work[85][lane]);
-        work[187][lane] = coef[2][lane] * work[17][lane];
-        work[185][lane] = 0.5 * work[75][lane];
-        const double t411 = 1.0 / 3.0 * (t381 * work[44][lane]);
-        const double t412 = 1.0 / 6.0 * (work[20][lane] * t368) - t411 + (work[132][lane] + 2.0 * (work[17][lane] * t392));
-        const double t413 = work[122][lane] + t367;
-        const double t414 = (-2.0 / 3.0) * work[133][lane] - work[31][lane] + (1.0 / 3.0 * (work[16][lane] * t413) + 2.0 * (work[0][lane] * t402));
-        const double t415 = 0.25 * (t412 - t414);
-        const double t416 = 1.0 / 12.0 * (work[28][lane] * t372) + 2.0 * (work[4][lane] * t377);
-        const double t417 = t416 + t412;
-        const double t418 = t415 - t417;
-        const double t419 = 0.5 * work[187][lane] + coef[1][lane] * (1.0 / 6.0 * (work[44][lane] * t368) + 1.0 / 6.0 * (work[45][lane] * t380)) + (work[41][lane] * t391 - 1.0 / 24.0 * (work[40][lane] * t385)) + (work[43][lane] * t387 - 1.0 / 24.0 * (work[42][lane] * t386) + coef[0][lane] * (work[185][lane] + 0.5 * (work[17][lane] * t405) + 0.5 * (work[18][lane] * t418)));
-        const double t420 = 4.0 * work[186][lane] - work[46][lane] * t419;
-        const double t421 = 2.0 * (t368 * work[47][lane]) + 0.5 * (work[48][lane] * t405) + (work[207][lane] - work[206][lane]) + (2.0 * (work[44][lane] * t392) + 2.0 * (work[17][lane] * t420));
-        const double t422 = 0.5 * t378;
-        const double t423 = t422 + 0.5 * t403 + t404;
-        const double t424 = 0.5 * (t416 + t414);
-        const double t425 = coef[2][lane] * work[0][lane] + coef[1][lane] * (1.0 / 3.0 * (work[10][lane] * t413) + 1.0 / 3.0 * (work[7][lane] * t396)) + (1.0 / 12.0 * (work[15][lane] * t398) + work[11][lane] * t401) + (1.0 / 12.0 * (work[14][lane] * t399) + work[13][lane] * t400 + coef[0][lane] * (work[3][lane] * (t415 - t424) + (work[0][lane] * t423 - work[2][lane])));
-        const double t426 = 2.0 * (t397 * work[34][lane]) + 2.0 * (work[10][lane] * t402) + (work[134][lane] - work[33][lane]) + (work[8][lane] * t423 + 2.0 * (work[0][lane] * ((-4.0) * work[135][lane] - work[1][lane] * t425)));
-        const double t427 = t421 - t426;
-        const double t428 = t424 - t417;
-        const double t429 = 0.25 * t394 + 0.25 * ((-0.5) * t403 - t422);
-        const double t430 = (-1.0 / 48.0) * (t373 * work[24][lane]) - 1.0 / 48.0 * (work[21][lane] * t374) + ((-1.0 / 48.0) * (work[25][lane] * t375) - 1.0 / 48.0 * (work[26][lane] * t376)) + (coef[1][lane] * (1.0 / 12.0 * (t372 * work[22][lane]) + 1.0 / 12.0 * (work[27][lane] * t371)) + coef[0][lane] * (work[4][lane] * t429 + 0.25 * (work[6][lane] * t428)));
-        const double t431 = work[5][lane] * t430;
-        const double t432 = 2.0 * (t371 * work[39][lane]) + 2.0 * (work[27][lane] * t377) + (0.25 * (work[9][lane] * t428) - 2.0 * (work[6][lane] * t431)) + (2.0 * (t380 * work[47][lane]) - t364 * work[86][lane] + (2.0 * (work[45][lane] * t392) + 0.5 * (work[48][lane] * t418)) + 2.0 * (work[18][lane] * t420));
-        const double t433 = 2.0 * (t372 * work[39][lane]) + 2.0 * (work[22][lane] * t377) + (work[9][lane] * t429 - 2.0 * (work[4][lane] * t431)) + t421;
-        work[213][lane] = work[136][lane] * work[86][lane];
-        const double t435 = 2.0 * (work[45][lane] * work[89][lane]) - work[213][lane] + (2.0 * (work[97][lane] * work[47][lane]) + work[207][lane]) + (0.5 * (work[48][lane] * t351) + 2.0 * (work[18][lane] * t353));
-        const double t436 = t435 - (2.0 * (work[137][lane] * work[34][lane]) + 2.0 * (work[7][lane] * work[92][lane]) + (work[138][lane] - work[33][lane]) + (work[8][lane] * t358 + 2.0 * (work[3][lane] * t360)));
-        const double t437 = t357 - t350;
-        const double t438 = 0.25 * work[139][lane] + 0.25 * ((-0.5) * work[107][lane] - t355);
-        const double t439 = (-1.0 / 48.0) * (work[140][lane] * work[24][lane]) - 1.0 / 48.0 * (work[21][lane] * work[141][lane]) + ((-1.0 / 48.0) * (work[25][lane] * work[142][lane]) - 1.0 / 48.0 * (work[26][lane] * work[143][lane])) + (coef[1][lane] * (1.0 / 12.0 * (work[144][lane] * work[27][lane]) + 1.0 / 12.0 * (work[22][lane] * work[94][lane])) + coef[0][lane] * (0.25 * (work[6][lane] * t437) + work[4][lane] * t438));
-        const double t440 = work[5][lane] * t439;
-        const double t441 = 2.0 * (work[144][lane] * work[39][lane]) + 2.0 * (work[27][lane] * work[95][lane]) + (0.25 * (work[9][lane] * t437) - 2.0 * (work[6][lane] * t440)) + t435;
-        const double t442 = 2.0 * (work[94][lane] * work[39][lane]) + 2.0 * (work[22][lane] * work[95][lane]) + (work[9][lane] * t438 - 2.0 * (work[4][lane] * t440)) + t354;
-        const double t443 = 0.25 * work[145][lane];
-        const double t444 = work[146][lane] + work[147][lane];
-        const double t445 = t443 + t444;
-        const double t446 = work[148][lane] + work[149][lane];
-        const double t447 = 0.25 * work[148][lane];
-        work[215][lane] = t446 - t447;
-        const double t449 = 2.0 * (work[18][lane] * work[215][lane]) + 2.0 * (work[17][lane] * t445);
-        const double t450 = coef[1][lane] * (t449 - work[150][lane]);
-        const double t451 = (-1.0 / 12.0) * work[151][lane] - 1.0 / 24.0 * (work[19][lane] * t450);
-        const double t452 = work[150][lane] - t449;
-        const double t453 = 1.0 / 24.0 * (work[19][lane] * t452) - work[152][lane];
-        work[214][lane] = work[19][lane] * t451 + (coef[1][lane] * (work[19][lane] * t453 - work[153][lane]) - work[154][lane]);
-        const double t455 = 0.25 * work[155][lane];
-        work[208][lane] = t446 - t455;
-        const double t457 = 0.5 * work[156][lane];
-        const double t458 = t444 + t457;
-        const double t459 = 2.0 * (work[6][lane] * work[208][lane]) - work[157][lane] + 2.0 * (work[4][lane] * t458);
-        const double t460 = coef[1][lane] * t459;
-        const double t461 = (-1.0 / 24.0) * work[158][lane] - 1.0 / 48.0 * (work[23][lane] * t460);
-        const double t462 = (-1.0 / 24.0) * work[159][lane] - 1.0 / 48.0 * (work[23][lane] * t459);
-        work[209][lane] = work[23][lane] * t461 + (coef[1][lane] * (work[23][lane] * t462 - work[160][lane]) - work[161][lane]);
-        const double t464 = work[162][lane] - work[32][lane] + (1.0 / 12.0 * (work[28][lane] * work[208][lane]) + 2.0 * (work[6][lane] * work[209][lane]));
-        const double t465 = 1.0 / 6.0 * (work[20][lane] * work[215][lane]) + work[163][lane] + (2.0 * (work[18][lane] * work[214][lane]) - work[132][lane]);
-        const double t466 = t464 + t465;
-        const double t467 = 2.0 * (work[3][lane] * (t447 - t455)) + 2.0 * (work[0][lane] * (t457 - t443));
-        const double t468 = 1.0 / 12.0 * (work[12][lane] * (work[12][lane] * (coef[1][lane] * t467))) + 1.0 / 12.0 * (coef[1][lane] * (work[12][lane] * (work[12][lane] * t467)));
-        const double t469 = 1.0 / 3.0 * (work[16][lane] * (t455 - t447)) + 2.0 * (work[3][lane] * t468);
-        const double t470 = t466 + (0.25 * t469 - 0.25 * t465);
-        const double t471 = t344 + 1.0 / 6.0 * (work[20][lane] * t445) + 2.0 * (work[17][lane] * work[214][lane]);
-        const double t472 = 1.0 / 3.0 * (work[16][lane] * (t443 - t457)) + 2.0 * (work[0][lane] * t468);
-        const double t473 = 1.0 / 12.0 * (work[28][lane] * t458) + (work[164][lane] + 2.0 * (work[4][lane] * work[209][lane]));
-        const double t474 = t471 + t473;
-        work[216][lane] = 0.25 * (t471 - t472) - t474;
-        const double t476 = coef[1][lane] * (1.0 / 6.0 * (work[45][lane] * work[215][lane]) + 1.0 / 6.0 * (work[44][lane] * t445)) - work[96][lane] + (1.0 / 24.0 * (work[40][lane] * t452) + work[41][lane] * t453) + (work[43][lane] * t451 - 1.0 / 24.0 * (work[42][lane] * t450) + coef[0][lane] * (0.5 * (work[18][lane] * work[216][lane]) - work[103][lane] + 0.5 * (work[17][lane] * t470)));
-        work[217][lane] = (-4.0) * work[104][lane] - work[46][lane] * t476;
-        const double t478 = 0.25 * t466 + 0.25 * ((-0.5) * t464 - 0.5 * t469);
-        work[211][lane] = 0.5 * (t472 + t473) - t474;
-        const double t480 = coef[1][lane] * (1.0 / 12.0 * (work[208][lane] * work[27][lane]) + 1.0 / 12.0 * (work[22][lane] * t458)) + work[26][lane] * t461 + coef[0][lane] * (work[4][lane] * t478 + (0.25 * (work[6][lane] * work[211][lane]) - work[165][lane]));
-        work[212][lane] = (-4.0) * work[166][lane] - work[5][lane] * ((-0.25) * work[167][lane] - 1.0 / 48.0 * (t459 * work[24][lane]) + (work[21][lane] * t462 - 1.0 / 48.0 * (work[25][lane] * t460)) + t480);
-        const double t482 = 2.0 * (t445 * work[47][lane]) + work[105][lane] + (2.0 * (work[44][lane] * work[214][lane]) + 0.5 * (work[48][lane] * t470)) + 2.0 * (work[17][lane] * work[217][lane]) + (2.0 * (t458 * work[39][lane]) + work[168][lane] + (2.0 * (work[22][lane] * work[209][lane]) + work[9][lane] * t478) + 2.0 * (work[4][lane] * work[212][lane]));
-        const double t483 = 0.25 * t365;
-        const double t484 = (-0.5) * work[169][lane] - t365;
-        work[180][lane] = t483 + t484;
-        const double t486 = t369 - work[120][lane];
-        const double t487 = work[170][lane] - work[9][lane];
-        const double t488 = t486 + 0.25 * t487;
-        work[181][lane] = 0.25 * t370 + t488;
-        work[188][lane] = 2.0 * (work[17][lane] * work[180][lane]) - t384 + 2.0 * (work[18][lane] * work[181][lane]);
-        work[190][lane] = coef[1][lane] * work[188][lane];
-        work[182][lane] = (-1.0 / 12.0) * t383 - 1.0 / 24.0 * (work[19][lane] * work[190][lane]);
-        work[189][lane] = (-1.0 / 12.0) * t390 - 1.0 / 24.0 * (work[19][lane] * work[188][lane]);
-        work[205][lane] = work[19][lane] * work[182][lane] + (coef[1][lane] * (work[19][lane] * work[189][lane] - t389) - t388);
-        const double t495 = 1.0 / 6.0 * (work[20][lane] * work[181][lane]) + (t382 + 2.0 * (work[18][lane] * work[205][lane]));
-        const double t496 = 0.125 * t487;
-        work[195][lane] = t488 - t496;
-        const double t498 = 0.25 * work[169][lane];
-        work[194][lane] = t498 + t484;
-        const double t500 = 2.0 * (work[4][lane] * work[194][lane]) + 2.0 * (work[6][lane] * work[195][lane]);
-        work[200][lane] = coef[1][lane] * (t500 - work[171][lane]);
-        work[199][lane] = (-1.0 / 24.0) * work[172][lane] - 1.0 / 48.0 * (work[23][lane] * work[200][lane]);
-        work[197][lane] = work[171][lane] - t500;
-        work[198][lane] = 1.0 / 48.0 * (work[23][lane] * work[197][lane]) - work[173][lane];
-        work[203][lane] = work[23][lane] * work[199][lane] + (coef[1][lane] * (work[23][lane] * work[198][lane] - work[174][lane]) - work[175][lane]);
-        work[193][lane] = work[176][lane] + 1.0 / 12.0 * (work[28][lane] * work[195][lane]) + 2.0 * (work[6][lane] * work[203][lane]);
-        work[191][lane] = t495 + work[193][lane];
-        const double t508 = 0.25 * t486;
-        const double t509 = 2.0 * (work[0][lane] * (t498 - t483)) + 2.0 * (work[3][lane] * (t508 - t496));
-        const double t510 = 1.0 / 12.0 * (coef[1][lane] * (work[12][lane] * (work[12][lane] * t509))) + 1.0 / 12.0 * (work[12][lane] * (work[12][lane] * (coef[1][lane] * t509)));
-        work[192][lane] = 1.0 / 3.0 * (work[16][lane] * (t496 - t508)) + 2.0 * (work[3][lane] * t510);
-        work[184][lane] = work[191][lane] + (0.25 * work[192][lane] - 0.25 * t495);
-        work[178][lane] = t411 - work[132][lane] + (1.0 / 6.0 * (work[20][lane] * work[180][lane]) + 2.0 * (work[17][lane] * work[205][lane]));
-        work[183][lane] = 1.0 / 3.0 * (work[16][lane] * (t483 - t498)) + 2.0 * (work[0][lane] * t510);
-        work[179][lane] = work[177][lane] + 1.0 / 12.0 * (work[28][lane] * work[194][lane]) + (2.0 * (work[4][lane] * work[203][lane]) - work[32][lane]);
-        increment_jacobian[14][lane] = 0.5 * t361;
-        increment_jacobian[21][lane] = (-0.5) * t361;
-        jacobian[14][lane] = 1.0 - t362;
-        jacobian[21][lane] = 1.0 + t362;
-        jacobian[15][lane] = (-0.25) * t427;
-        increment_jacobian[15][lane] = 0.5 * t427;
-        jacobian[16][lane] = 0.25 * t432;
-        jacobian[33][lane] = t432;
-        increment_jacobian[16][lane] = (-0.5) * t432;
-        increment_jacobian[33][lane] = (-2.0) * t432;
-        jacobian[17][lane] = 0.25 * t433;
-        jacobian[27][lane] = -t433;
-        increment_jacobian[17][lane] = (-0.5) * t433;
-        increment_jacobian[27][lane] = 2.0 * t433;
-        jacobian[20][lane] = 0.25 * t436;
-        increment_jacobian[20][lane] = (-0.5) * t436;
-        jacobian[22][lane] = (-0.25) * t441;
-        jacobian[32][lane] = t441;
-        increment_jacobian[22][lane] = 0.5 * t441;
-        increment_jacobian[32][lane] = (-2.0) * t441;
-        jacobian[23][lane] = (-0.25) * t442;
-        jacobian[26][lane] = -t442;
-        increment_jacobian[23][lane] = 0.5 * t442;
-        increment_jacobian[26][lane] = 2.0 * t442;
-        jacobian[28][lane] = 1.0 - t482;
-        jacobian[35][lane] = 1.0 + t482;
-        increment_jacobian[28][lane] = 2.0 * t482;
-        increment_jacobian[35][lane] = (-2.0) * t482;
-    }
-}
-
-/* vortices3_linearise_lanes_part4 (part 4 of 4) */
-vortices3_APART static void vortices3_linearise_lanes_part4(vortices3_lanes coef[restrict 3],
-                                                            vortices3_lanes y[restrict 6],
-                                                            vortices3_lanes displacement[restrict 6],
-                                                            vortices3_lanes increment[restrict 6],
-                                                            vortices3_lanes jacobian[restrict 36],
-                                                            vortices3_lanes increment_jacobian[restrict 36],
-                                                            vortices3_lanes work[restrict 218])
-{
-    (void)y;
-    (void)displacement;
-    (void)increment;
-    vortices3_EACH_LANE
-    for (int lane = 0; lane < vortices3_LANES; ++lane) {
-        const double t516 = work[178][lane] + work[179][lane];
-        const double t517 = coef[1][lane] * (1.0 / 6.0 * (work[180][lane] * work[44][lane]) + 1.0 / 6.0 * (work[45][lane] * work[181][lane])) + work[43][lane] * work[182][lane] + coef[0][lane] * (0.5 * (work[18][lane] * (0.25 * (work[178][lane] - work[183][lane]) - t516)) + (0.5 * (work[17][lane] * work[184][lane]) - work[185][lane]));
-        const double t518 = 2.0 * (work[17][lane] * ((-4.0) * work[186][lane] - work[46][lane] * ((-0.5) * work[187][lane] - 1.0 / 24.0 * (work[188][lane] * work[40][lane]) + (work[41][lane] * work[189][lane] - 1.0 / 24.0 * (work[42][lane] * work[190][lane])) + t517)));
-        const double t519 = 0.25 * work[191][lane] + 0.25 * ((-0.5) * work[192][lane] - 0.5 * work[193][lane]);
-        const double t520 = coef[1][lane] * (1.0 / 12.0 * (work[194][lane] * work[22][lane]) + 1.0 / 12.0 * (work[27][lane] * work[195][lane])) - work[196][lane] + (1.0 / 48.0 * (work[24][lane] * work[197][lane]) + work[21][lane] * work[198][lane]) + (work[26][lane] * work[199][lane] - 1.0 / 48.0 * (work[25][lane] * work[200][lane]) + coef[0][lane] * (work[4][lane] * t519 - work[36][lane] + 0.25 * (work[6][lane] * (0.5 * (work[183][lane] + work[179][lane]) - t516))));
-        const double t521 = 2.0 * (work[194][lane] * work[39][lane]) + work[9][lane] * t519 + (work[201][lane] - work[202][lane]) + (2.0 * (work[22][lane] * work[203][lane]) + 2.0 * (work[4][lane] * ((-4.0) * work[204][lane] - work[5][lane] * t520)));
-        const double t522 = 2.0 * (work[180][lane] * work[47][lane]) + 2.0 * (work[44][lane] * work[205][lane]) + (work[206][lane] - work[207][lane]) + (0.5 * (work[48][lane] * work[184][lane]) + t518) + t521;
-        const double t523 = 2.0 * (work[208][lane] * work[39][lane]) + 2.0 * (work[27][lane] * work[209][lane]) + (work[210][lane] - work[202][lane]) + (0.25 * (work[9][lane] * work[211][lane]) + 2.0 * (work[6][lane] * work[212][lane])) + (work[213][lane] + 2.0 * (work[45][lane] * work[214][lane]) + (2.0 * (work[215][lane] * work[47][lane]) - work[207][lane]) + (0.5 * (work[48][lane] * work[216][lane]) + 2.0 * (work[18][lane] * work[217][lane])));
-        jacobian[29][lane] = -t522;
-        increment_jacobian[29][lane] = 2.0 * t522;
-        jacobian[34][lane] = t523;
-        increment_jacobian[34][lane] = (-2.0) * t523;
-    }
-}
-
-/* vortices3_linearise in all lanes. */
-static void vortices3_linearise_lanes(vortices3_lanes coef[restrict 3], vortices3_lanes y[restrict 6],
-                                      vortices3_lanes displacement[restrict 6],
-                                      vortices3_lanes increment[restrict 6],
-                                      vortices3_lanes jacobian[restrict 36],
-                                      vortices3_lanes increment_jacobian[restrict 36])
-{
-    vortices3_lanes work[218];
-    vortices3_linearise_lanes_part1(coef, y, displacement, increment, jacobian, increment_jacobian, work);
-    vortices3_linearise_lanes_part2(coef, y, displacement, increment, jacobian, increment_jacobian, work);
-    vortices3_linearise_lanes_part3(coef, y, displacement, increment, jacobian, increment_jacobian, work);
-    vortices3_linearise_lanes_part4(coef, y, displacement, increment, jacobian, increment_jacobian, work);
-}
-
-/* vortices3_evaluate in all lanes. */
-static void vortices3_evaluate_lanes(vortices3_lanes coef[restrict 3], vortices3_lanes y[restrict 6],
-                                     vortices3_lanes displacement[restrict 6],
-                                     vortices3_lanes increment[restrict 6])
-{
-    vortices3_EACH_LANE
-    for (int lane = 0; lane < vortices3_LANES; ++lane) {
-        const double x1 = y[0][lane];
-        const double y1 = y[1][lane];
-        const double x2 = y[2][lane];
-        const double y2 = y[3][lane];
-        const double x3 = y[4][lane];
-        const double y3 = y[5][lane];
-        const double t1 = x1 - x3;
-        const double t2 = y1 - y3;
-        const double t3 = 1.0 / (t1 * t1 + t2 * t2);
-        const double t4 = coef[0][lane] * t3;
-        const double t5 = 0.25 * (t1 * t4);
-        const double t6 = x1 - x2;
-        const double t7 = y1 - y2;
-        const double t8 = 1.0 / (t7 * t7 + t6 * t6);
-        const double t9 = coef[0][lane] * t8;
-        const double t10 = t6 * t9;
-        const double t11 = 0.5 * (t5 - t10);
-        const double t12 = x2 - x3;
-        const double t13 = y2 - y3;
-        const double t14 = 1.0 / (t13 * t13 + t12 * t12);
-        const double t15 = coef[0][lane] * t14;
-        const double t16 = 0.5 * (t12 * t15);
-        const double t17 = 0.25 * (t10 + t16);
-        const double t18 = t11 - t17;
-        const double t19 = t7 * t9;
-        const double t20 = 0.5 * (t13 * t15);
-        const double t21 = t19 + t20;
-        const double t22 = t2 * t4;
-        const double t23 = 0.25 * t22 - t19;
-        const double t24 = 0.25 * t21 - 0.5 * t23;
-        const double t25 = 2.0 * (t7 * t18) + 2.0 * (t6 * t24);
-        const double t26 = t8 * t25;
-        const double t27 = coef[1][lane] * t25;
-        const double t28 = t8 * t27;
-        const double t29 = 1.0 / 12.0 * (coef[1][lane] * (t8 * t26)) + 1.0 / 12.0 * (t8 * t28);
-        const double t30 = 2.0 * (t6 * t29);
-        const double t31 = coef[1][lane] * t8;
-        const double t32 = 1.0 / 3.0 * (t31 * t24);
-        const double t33 = coef[1][lane] * t14;
-        const double t34 = (-0.25) * t22 - t20;
-        const double t35 = (-0.25) * t21 - t34;
-        const double t36 = t5 + t16;
-        const double t37 = t17 - t36;
-        const double t38 = 2.0 * (t13 * t37) + 2.0 * (t12 * t35);
-        const double t39 = t14 * t38;
-        const double t40 = coef[1][lane] * t38;
-        const double t41 = t14 * t40;
-        const double t42 = (-1.0 / 24.0) * (coef[1][lane] * (t14 * t39)) - 1.0 / 24.0 * (t14 * t41);
-        const double t43 = 1.0 / 6.0 * (t33 * t35) + 2.0 * (t12 * t42);
-        const double t44 = 0.25 * (t30 - t32) - 0.25 * t43;
-        const double t45 = coef[1][lane] * t3;
-        const double t46 = (-0.5) * t23 - t34;
-        const double t47 = t11 - t36;
-        const double t48 = 2.0 * (t2 * t47) + 2.0 * (t1 * t46);
-        const double t49 = t3 * t48;
-        const double t50 = coef[1][lane] * t48;
-        const double t51 = t3 * t50;
-        const double t52 = (-1.0 / 48.0) * (coef[1][lane] * (t3 * t49)) - 1.0 / 48.0 * (t3 * t51);
-        const double t53 = 1.0 / 12.0 * (t45 * t46) + 2.0 * (t1 * t52);
-        const double t54 = 0.5 * t53;
-        const double t55 = 0.5 * (t32 - t30);
-        const double t56 = t44 + (t54 - t55);
-        const double t57 = 1.0 / 3.0 * (t31 * t18);
-        const double t58 = 2.0 * (t7 * t29);
-        const double t59 = 1.0 / 6.0 * (t33 * t37) + 2.0 * (t13 * t42);
-        const double t60 = 0.25 * (t57 - t58 + t59);
-        const double t61 = 1.0 / 12.0 * (t45 * t47) + 2.0 * (t2 * t52);
-        const double t62 = 0.5 * (t58 - t57 + t61);
-        const double t63 = t60 - t62;
-        const double t64 = 1.0 / 12.0 * (t26 * t27) + 1.0 / 12.0 * (t25 * t28) + (coef[0][lane] * (t6 * t63 + t7 * t56) - 1.0 / 6.0 * (coef[1][lane] * (t18 * t18 + t24 * t24)));
-        const double t65 = (-0.5) * (coef[2][lane] * t8) - t8 * t8 * t64;
-        const double t66 = 2.0 * (t18 * t29) + t9 * t56 + 2.0 * (t7 * t65);
-        const double t67 = t53 + t43;
-        const double t68 = 0.25 * t67 + 0.25 * (t55 - t54);
-        const double t69 = t61 + t59;
-        const double t70 = t62 - t69;
-        const double t71 = (-1.0 / 48.0) * (t49 * t50) - 1.0 / 48.0 * (t48 * t51) + (1.0 / 24.0 * (coef[1][lane] * (t46 * t46 + t47 * t47)) + coef[0][lane] * (t2 * t68 + 0.25 * (t1 * t70)));
-        const double t72 = 0.125 * (coef[2][lane] * t3) - t3 * t3 * t71;
-        const double t73 = 2.0 * (t47 * t52) + t4 * t68 + 2.0 * (t2 * t72);
-        const double p_y1 = t66 + t73;
-        const double t74 = 2.0 * (t24 * t29) + t9 * t63 + 2.0 * (t6 * t65);
-        const double t75 = 2.0 * (t46 * t52) + 0.25 * (t4 * t70) + 2.0 * (t1 * t72);
-        const double p_x1 = t74 + t75;
-        const double t76 = t67 + t44;
-        const double t77 = t60 - t69;
-        const double t78 = (-1.0 / 24.0) * (t39 * t40) - 1.0 / 24.0 * (t38 * t41) + (1.0 / 12.0 * (coef[1][lane] * (t35 * t35 + t37 * t37)) + coef[0][lane] * (0.5 * (t13 * t76) + 0.5 * (t12 * t77)));
-        const double t79 = 0.25 * (coef[2][lane] * t14) - t14 * t14 * t78;
-        const double t80 = 2.0 * (t37 * t42) + 0.5 * (t15 * t76) + 2.0 * (t13 * t79);
-        const double p_y2 = t80 - t66;
-        const double t81 = 2.0 * (t35 * t42) + 0.5 * (t15 * t77) + 2.0 * (t12 * t79);
-        const double p_x2 = t81 - t74;
-        const double t82 = t73 + t80;
-        const double p_y3 = -t82;
-        const double t83 = t81 + t75;
-        displacement[0][lane] = (-0.5) * p_y1;
-        displacement[1][lane] = 0.5 * p_x1;
-        displacement[2][lane] = (-0.25) * p_y2;
-        displacement[3][lane] = 0.25 * p_x2;
-        displacement[4][lane] = p_y3;
-        displacement[5][lane] = t83;
-        increment[0][lane] = p_y1;
-        increment[1][lane] = -p_x1;
-        increment[2][lane] = 0.5 * p_y2;
-        increment[3][lane] = (-0.5) * p_x2;
-        increment[4][lane] = 2.0 * t82;
-        increment[5][lane] = (-2.0) * t83;
-    }
-}
-
-/* Invert the matrices of all lanes in place by elimination without pivoting: they are I + O(h). Infinite where a pivot is
-   far from 1. */
-static void vortices3_invert(vortices3_lanes matrix[restrict 36])
-{
-    for (int k = 0; k < 6; ++k) {
-        vortices3_lanes factor[6];
-        vortices3_EACH_LANE
-        for (int lane = 0; lane < vortices3_LANES; ++lane) {
-            const double reciprocal = 1.0 / matrix[k * 6 + k][lane];
-            matrix[k * 6 + k][lane] = 1.0;
-            for (int j = 0; j < 6; ++j) matrix[k * 6 + j][lane] *= reciprocal;
-            matrix[k * 6 + k][lane] += fabs(reciprocal) < 1e3 ? 0.0 : HUGE_VAL;
-        }
-        for (int i = 0; i < 6; ++i) {
-            vortices3_EACH_LANE
-            for (int lane = 0; lane < vortices3_LANES; ++lane) {
-                factor[i][lane] = matrix[i * 6 + k][lane];
-                if (i != k) matrix[i * 6 + k][lane] = 0.0;
-            }
-        }
-        for (int i = 0; i < 6; ++i)
-            for (int j = 0; j < 6 && i != k; ++j) {
-                vortices3_EACH_LANE
-                for (int lane = 0; lane < vortices3_LANES; ++lane)
-                    matrix[i * 6 + j][lane] -= factor[i][lane] * matrix[k * 6 + j][lane];
-            }
-    }
-}
-
-/* Everything about a stage at the points y. */
-static void vortices3_tabulate(vortices3_lanes coef[restrict], vortices3_model *model)
-{
-    vortices3_linearise_lanes(coef, model->y, model->displacement, model->increment, model->inverse, model->slope);
-    vortices3_invert(model->inverse);
-    for (int i = 0; i < 6; ++i)
-        for (int j = 0; j < 6; ++j) {
-            vortices3_lanes sum = { 0.0 };
-            for (int k = 0; k < 6; ++k) {
-                vortices3_EACH_LANE
-                for (int lane = 0; lane < vortices3_LANES; ++lane)
-                    sum[lane] += model->slope[i * 6 + k][lane] * model->inverse[k * 6 + j][lane];
-            }
-            memcpy(model->gain[i * 6 + j], sum, sizeof sum);
-        }
-}
-
-/* vortices3_size in all lanes, summed over the components. */
-static void vortices3_sizes(vortices3_lanes y[restrict 6], vortices3_lanes delta[restrict 6],
-    vortices3_lanes size)
-{
-    vortices3_lanes norm = { 0.0 };
-    memset(size, 0, vortices3_LANES * sizeof size[0]);
-    for (int i = 0; i < 6; ++i)
-        for (int lane = 0; lane < vortices3_LANES; ++lane)
-            norm[lane] = 1e-6 * fabs(y[i][lane]) > norm[lane] ? 1e-6 * fabs(y[i][lane]) : norm[lane];
-    for (int i = 0; i < 6; ++i) {
-        vortices3_EACH_LANE
-        for (int lane = 0; lane < vortices3_LANES; ++lane)
-            size[lane] += fabs(delta[i][lane]) / (fabs(y[i][lane]) + norm[lane] + DBL_MIN);
-    }
-}
-
-/* Correct y by the residuals, with the inverse in the table, and measure the corrections. */
-static void vortices3_correct(vortices3_model *model, vortices3_lanes size)
-{
-    vortices3_lanes delta[6];
-    memset(delta, 0, sizeof delta);
-    for (int i = 0; i < 6; ++i)
-        for (int j = 0; j < 6; ++j) {
-            vortices3_EACH_LANE
-            for (int lane = 0; lane < vortices3_LANES; ++lane)
-                delta[i][lane] += model->inverse[i * 6 + j][lane] * model->residual[j][lane];
-        }
-    vortices3_sizes(model->y, delta, size);
-    for (int i = 0; i < 6; ++i)
-        for (int lane = 0; lane < vortices3_LANES; ++lane) model->y[i][lane] -= delta[i][lane];
-}
-
-/* The largest of the lanes, none of which is negative; infinite if one is not finite. As integers, the bits of such
-   numbers have their order, and those of what is no number are larger. */
-static double vortices3_largest(const vortices3_lanes size)
-{
-    uint64_t bits[8], most = 0;
-    double largest;
-    memcpy(bits, size, sizeof bits);
-    for (int lane = 0; lane < vortices3_LANES; ++lane) most = bits[lane] > most ? bits[lane] : most;
-    memcpy(&largest, &most, sizeof largest);
-    return isfinite(largest) ? largest : HUGE_VAL;
-}
-
-/* vortices3_near for the guesses of all lanes, seen from one value. */
-static int vortices3_near_lanes(vortices3_lanes y[restrict 6], const double last[6])
-{
-    vortices3_lanes distance = { 0.0 };
-    double size = 0.0;
-    for (int i = 0; i < 6; ++i) {
-        size += fabs(last[i]);
-        vortices3_EACH_LANE
-        for (int lane = 0; lane < vortices3_LANES; ++lane) distance[lane] += fabs(y[i][lane] - last[i]);
-    }
-    return vortices3_largest(distance) <= 4.0 * size;
-}
-
-/* What is left after a correction of this size: quadratic in it, where the matrices are of the points corrected; where
-   they are of points further off, by bend, also of the order of size times bend. bound is what the last pass left. */
-static double vortices3_remaining(double size, double bend, double bound)
-{
-    const double growth = size / bound, left = size * (size + bend);
-    return growth > 1.0 ? growth * left : left;
-}
-
-/* The table of a stage, with its matrices or with those of the last pass. */
-static void vortices3_update(vortices3_lanes coef[restrict], vortices3_model *model, int matrices)
-{
-    if (matrices)
-        vortices3_tabulate(coef, model);
-    else
-        vortices3_evaluate_lanes(coef, model->y, model->displacement, model->increment);
-}
-
-/* The steps of a block one after the other, each along the linear model of its lane. As X, the state with its carry, gains
-   increment - gain residual, the next residual follows from this one; X itself is added up apart. */
-static void vortices3_chain(vortices3_model model[1], double x[6], double carry[6])
-{
-    double residual[6], sum[6], small[6];
-    for (int i = 0; i < 6; ++i) {
-        residual[i] = ((model->y[i][0] - x[i]) + model->displacement[i][0]) - carry[i];
-        sum[i] = x[i];
-        small[i] = carry[i];
-    }
-    for (int k = 0; k < 1 * vortices3_LANES; ++k) {
-        const int lane = k / 1, after = (k + 1) / 1 % vortices3_LANES;
-        vortices3_model *at = &model[k % 1], *next = &model[(k + 1) % 1];
-        double even[6] = { 0.0 }, odd[6] = { 0.0 }; /* two sums, so that no long chain of additions is waited for */
-        for (int i = 0; i < 6; ++i) {
-            at->residual[i][lane] = residual[i];
-            for (int j = 0; j < 6; j += 2) even[i] += at->gain[i * 6 + j][lane] * residual[j];
-            for (int j = 1; j < 6; j += 2) odd[i] += at->gain[i * 6 + j][lane] * residual[j];
-        }
-        for (int i = 0; i < 6; ++i) {
-            const double change = at->increment[i][lane], total = sum[i] + change, added = total - sum[i];
-            const double turn = (next->displacement[i][after] - at->displacement[i][lane]) - change;
-            const double moved = (next->y[i][after] - at->y[i][lane]) + turn;
-            residual[i] = ((moved + residual[i]) + odd[i]) + even[i];
-            small[i] += ((sum[i] - (total - added)) + (change - added)) - (even[i] + odd[i]);
-            sum[i] = total;
-        }
-    }
-    for (int i = 0; i < 6; ++i) {
-        x[i] = sum[i] + small[i];
-        carry[i] = small[i] - (x[i] - sum[i]);
-    }
-}
-
-/* Bring the table up to date: coefficients, and weights that were fitted since. */
-static void vortices3_refresh(const vortices3_solver *s, vortices3_table *table)
-{
-    for (int stage = 0; stage < 1; ++stage) {
-        if (table->fits[stage] == s->memory[stage].fits) continue;
-        table->fits[stage] = s->memory[stage].fits;
-        for (int k = 0; k < 3; ++k)
-            for (int lane = 0; lane < vortices3_LANES; ++lane) table->coef[stage][k][lane] = s->coef[stage][k];
-        memcpy(table->weight[stage], s->memory[stage].weight, (size_t)s->memory[stage].terms * sizeof table->weight[0][0]);
-    }
-}
-
-/* Guesses for the next vortices3_LANES values of a stage, by its recurrences. */
-static void vortices3_foresee(const vortices3_memory *memory, vortices3_lanes weight[restrict][6],
-    vortices3_lanes y[restrict 6])
-{
-    const int last = memory->count - 1;
-    for (int i = 0; i < 6; ++i) {
-        vortices3_lanes even = { 0.0 }, odd = { 0.0 };
-        for (int k = 0; k < memory->terms; k += 2) {
-            const double past = memory->past[last - k][i], earlier = memory->past[last - 1 - k][i];
-            vortices3_EACH_LANE
-            for (int lane = 0; lane < vortices3_LANES; ++lane) even[lane] += weight[k][i][lane] * past;
-            vortices3_EACH_LANE
-            for (int lane = 0; lane < vortices3_LANES; ++lane) odd[lane] += weight[k + 1][i][lane] * earlier;
-        }
-        vortices3_EACH_LANE
-        for (int lane = 0; lane < vortices3_LANES; ++lane) y[i][lane] = even[lane] + odd[lane];
-    }
-}
-
-/* vortices3_record for the values of all lanes, one after the other. */
-static void vortices3_record_lanes(vortices3_memory *memory, vortices3_lanes y[restrict 6])
-{
-    vortices3_make_room(memory, vortices3_LANES);
-    for (int lane = 0; lane < vortices3_LANES; ++lane)
-        for (int i = 0; i < 6; ++i) memory->past[memory->count + lane][i] = y[i][lane];
-    memory->count += vortices3_LANES;
-}
-
-/* Guesses where no recurrence is known: where alpha and beta have the means of steps by the classical Runge-Kutta
-   method, to leading order. */
-static void vortices3_march(const vortices3_solver *s, vortices3_table *table, vortices3_model model[1])
-{
-    static const double reach[4] = { 0.5, 0.5, 1.0, 0.0 }, weight[4] = { 1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0 };
-    double x[6], point[6], slope[6], mean[6];
-    memcpy(x, s->x, sizeof x);
-    for (int k = 0; k < 1 * vortices3_LANES; ++k) {
-        const double h = vortices3_fractions[k % 1] * s->h;
-        memcpy(point, x, sizeof x);
-        memset(mean, 0, sizeof mean);
-        for (int part = 0; part < 4; ++part) {
-            vortices3_vector_field(&s->params, point, slope);
-            for (int i = 0; i < 6; ++i) {
-                mean[i] += weight[part] * slope[i];
-                point[i] = x[i] + h * reach[part] * slope[i];
-            }
-        }
-        for (int i = 0; i < 6; ++i) {
-            model[k % 1].y[i][k / 1] = x[i] + 0.5 * h * mean[i];
-            x[i] += h * mean[i];
-        }
-    }
-    for (int stage = 0; stage < 1; ++stage) {
-        vortices3_model *at = &model[stage];
-        vortices3_evaluate_lanes(table->coef[stage], at->y, at->displacement, at->increment);
-        for (int i = 0; i < 6; ++i) {
-            vortices3_EACH_LANE
-            for (int lane = 0; lane < vortices3_LANES; ++lane)
-                at->y[i][lane] -= at->displacement[i][lane] + 0.5 * at->increment[i][lane];
-        }
-    }
-}
-
-/* vortices3_LANES steps at once: guess the points of all, and correct them together until the error that remains is as
-   small as after a single step. How many passes that took; 0, and the solver as before, where it takes more than most. */
-static int vortices3_block(vortices3_solver *s, vortices3_table *table, int most)
-{
-    vortices3_model model[1];
-    vortices3_lanes sizes;
-    double x[6], carry[6], previous = HUGE_VAL, bend = 0.0, bound = HUGE_VAL;
-    int passes = 0, solved = 0;
-    if (!s->foreseeing) vortices3_march(s, table, model);
-    for (int stage = 0; stage < 1; ++stage) {
-        if (s->foreseeing) vortices3_foresee(&s->memory[stage], table->weight[stage], model[stage].y);
-        if (!vortices3_near_lanes(model[stage].y, s->x)) return 0;
-    }
-    while (!solved) {
-        double size = 0.0;
-        const int matrices = previous > 1e-05;
-        for (int stage = 0; stage < 1; ++stage) vortices3_update(table->coef[stage], &model[stage], matrices);
-        memcpy(x, s->x, sizeof x);
-        memcpy(carry, s->carry, sizeof carry);
-        vortices3_chain(model, x, carry);
-        for (int stage = 0; stage < 1; ++stage) {
-            vortices3_correct(&model[stage], sizes);
-            const double largest = vortices3_largest(sizes);
-            size = largest > size ? largest : size;
-        }
-        s->evaluations += 1 * vortices3_LANES;
-        bend = matrices ? 0.0 : bend + previous;
-        bound = vortices3_remaining(size, bend, bound);
-        /* The second test: after the square of so small a correction there is rounding only. */
-        solved = bound <= 1e-20 || (previous < 1e-8 && size < 1e-10);
-        if ((++passes >= most || !(size < previous)) && !solved) return 0;
-        previous = size;
-    }
-    for (int stage = 0; stage < 1; ++stage)
-        if (!vortices3_near_lanes(model[stage].y, s->x)) return 0;
-    for (int i = 0; i < 6; ++i)
-        if (!isfinite(x[i])) return 0;
-    memcpy(s->x, x, sizeof x);
-    memcpy(s->carry, carry, sizeof carry);
-    s->steps += vortices3_LANES;
-    for (int stage = 0; stage < 1; ++stage) {
-        vortices3_memory *memory = &s->memory[stage];
-        vortices3_record_lanes(memory, model[stage].y);
-        memory->slow = passes > 1 ? memory->slow + vortices3_LANES : 0;
-        if (memory->slow > memory->patience && s->foreseeing) vortices3_fit(memory);
-    }
-    return passes;
-}
-
-/* Recurrences are given up for a while, the longer the more often that happens. */
-static void vortices3_give_up(vortices3_solver *s)
-{
-    s->foreseeing = s->setback = s->pause = 0;
-    s->doubt = 2 * s->doubt + 600;
-    s->retry = s->steps + s->doubt;
-}
-
-/* How the next block is guessed: by recurrences, fitted as soon as enough steps are to be made, or
-   have been, to repay that. */
-static void vortices3_choose_guess(vortices3_solver *s, size_t steps)
-{
-    for (int stage = 0; stage < 1; ++stage)
-        if (s->memory[stage].count < 111) {
-            s->foreseeing = 0;
-            return;
-        }
-    if (s->foreseeing || (steps < 600 && s->steps < 150) || s->steps < s->retry) return;
-    s->foreseeing = 1;
-    for (int stage = 0; stage < 1 && s->foreseeing; ++stage) {
-        vortices3_fit(&s->memory[stage]);
-        s->foreseeing = s->memory[stage].terms > 0;
-    }
-    s->pause = vortices3_LANES;
-    if (!s->foreseeing) vortices3_give_up(s);
-}
-
-/* Learn from a block: after one that failed single steps are made, the more the more often that happens. Recurrences
-   that fail repeatedly, or need more passes than steps by Runge-Kutta did, are given up. */
-static void vortices3_learn_from(vortices3_solver *s, int passes)
-{
-    if (passes > 0) {
-        s->setback /= 2;
-    } else {
-        s->setback = 2 * s->setback + vortices3_LANES > 1000 ? 1000 : 2 * s->setback + vortices3_LANES;
-        s->pause = s->setback;
-    }
-    if (!s->foreseeing) {
-        s->passes = passes > 0 ? passes : INT_MAX;
-    } else if (passes > s->passes || s->setback > 5 * vortices3_LANES) {
-        vortices3_give_up(s);
-    }
-}
-
-/* A single step, and the running mean of the evaluations that a stage of one takes. */
-static vortices3_status vortices3_single(vortices3_solver *s)
-{
-    const size_t before = s->evaluations;
-    const vortices3_status status = vortices3_step(s, s->h);
-    s->effort += 0.125 * ((double)(s->evaluations - before) / 1 - s->effort);
-    return status;
-}
-
-/* Blocks of steps where they cost less than single steps, with at most as many passes over a block as 2 for each
-   evaluation in a single step. The results differ by round-off only. */
 vortices3_status vortices3_integrate(vortices3_solver *s, double h, size_t steps)
 {
-    vortices3_table table;
     vortices3_status status = vortices3_set_step(s, h);
-    for (int stage = 0; stage < 1; ++stage) table.fits[stage] = -1;
-    while (status == vortices3_OK && steps > 0) {
-        if (steps >= vortices3_LANES && s->pause == 0) vortices3_choose_guess(s, steps);
-        if (steps >= vortices3_LANES && s->pause == 0) {
-            vortices3_refresh(s, &table);
-            const int passes = vortices3_block(s, &table, (int)(2 * s->effort + 0.5));
-            vortices3_learn_from(s, passes);
-            if (passes > 0) steps -= vortices3_LANES;
-        } else {
-            if (s->pause > 0) --s->pause;
-            status = vortices3_single(s);
-            if (status == vortices3_OK) --steps;
-        }
-    }
+    for (; steps > 0 && status == vortices3_OK; --steps) status = vortices3_step(s, h);
     return status;
-}
-
-/* Members of an ensemble, each in its lane. */
-typedef struct {
-    vortices3_lanes x[6], carry[6], coef[1][3];
-    vortices3_lanes past[1][111][6]; /* solved values, in a ring */
-    vortices3_lanes weight[1][40][6]; /* of past values, the latest first, for the next */
-    int latest;     /* the row of the latest values */
-    int count;      /* rows in use */
-    int order[1];   /* how many of them the extrapolation uses */
-    int terms[1];   /* how many of them the recurrences use */
-    int fits;       /* how often recurrences have been fitted */
-    int fitting[1]; /* whether they are the better guess */
-    int slow;       /* how many of the last steps took more than one iteration */
-    int patience;   /* how many of those before recurrences are fitted again */
-    int active[8];  /* whether the lane has a member that has not failed */
-    size_t left[8]; /* steps that are still to be made, where one has */
-} vortices3_group;
-
-/* The past values of a stage, the latest for k = 0. */
-static vortices3_lanes *vortices3_group_past(vortices3_group *group, int stage, int k)
-{
-    const int row = group->latest + k;
-    return group->past[stage][row < 111 ? row : row - 111];
-}
-
-/* Guess the values of a stage by the recurrences of the members. */
-static void vortices3_group_foresee(vortices3_group *group, int stage, vortices3_lanes y[restrict 6])
-{
-    memset(y, 0, 6 * sizeof y[0]);
-    for (int k = 0; k < group->terms[stage]; ++k) {
-        vortices3_lanes *past = vortices3_group_past(group, stage, k), *weight = group->weight[stage][k];
-        for (int i = 0; i < 6; ++i) {
-            vortices3_EACH_LANE
-            for (int lane = 0; lane < vortices3_LANES; ++lane) y[i][lane] += weight[i][lane] * past[i][lane];
-        }
-    }
-}
-
-/* Extrapolate the values of a stage. */
-static void vortices3_group_extrapolate(vortices3_group *group, int stage, vortices3_lanes y[restrict 6])
-{
-    const int order = group->order[stage];
-    double binomial = -1.0;
-    memcpy(y, group->x, 6 * sizeof y[0]);
-    if (order > 0) memset(y, 0, 6 * sizeof y[0]);
-    for (int k = 0; k < order; ++k) {
-        vortices3_lanes *past = vortices3_group_past(group, stage, k);
-        binomial *= -(double)(order - k) / (k + 1);
-        for (int i = 0; i < 6; ++i) {
-            vortices3_EACH_LANE
-            for (int lane = 0; lane < vortices3_LANES; ++lane) y[i][lane] += binomial * past[i][lane];
-        }
-    }
-}
-
-/* The sum over members of the absolute values of all components. */
-static double vortices3_group_sum(const vortices3_group *group, vortices3_lanes y[6])
-{
-    double sum = 0.0;
-    for (int i = 0; i < 6; ++i)
-        for (int lane = 0; lane < vortices3_LANES; ++lane) sum += group->active[lane] ? fabs(y[i][lane]) : 0.0;
-    return sum;
-}
-
-static void vortices3_group_subtract(vortices3_lanes y[restrict 6], vortices3_lanes other[restrict 6])
-{
-    for (int i = 0; i < 6; ++i) {
-        vortices3_EACH_LANE
-        for (int lane = 0; lane < vortices3_LANES; ++lane) y[i][lane] -= other[i][lane];
-    }
-}
-
-/* Choose the guess that would have been best for these values. */
-static void vortices3_group_judge(vortices3_group *group, int stage, vortices3_lanes y[6])
-{
-    vortices3_lanes row[8 + 1][6];
-    const int rows = group->count < 8 ? group->count : 8;
-    double least = HUGE_VAL;
-    memcpy(row[0], y, sizeof row[0]);
-    for (int k = 0; k < rows; ++k) memcpy(row[k + 1], vortices3_group_past(group, stage, k), sizeof row[0]);
-    if (group->order[stage] == 0) group->order[stage] = 1;
-    for (int order = 1; order <= rows; ++order) { /* row[0] becomes the backward difference of this order */
-        for (int k = 0; k <= rows - order; ++k) vortices3_group_subtract(row[k], row[k + 1]);
-        const double size = vortices3_group_sum(group, row[0]);
-        if (size < least) {
-            least = size;
-            group->order[stage] = order;
-        }
-    }
-    if (group->terms[stage] == 0) return;
-    vortices3_group_foresee(group, stage, row[0]);
-    vortices3_group_subtract(row[0], y);
-    group->fitting[stage] = vortices3_group_sum(group, row[0]) <= least;
-}
-
-/* Fit the recurrences of all members; with every time, wait longer before it is done again, and for long if it did not
-   help. */
-static void vortices3_group_fit(vortices3_group *group)
-{
-    vortices3_memory memory;
-    const int helped = group->fits == 0 || group->fitting[0];
-    memory.count = 111;
-    for (int stage = 0; stage < 1; ++stage) {
-        int found = 1;
-        group->terms[stage] = 0;
-        for (int lane = 0; lane < vortices3_LANES; ++lane)
-            for (int i = 0; i < 6 && group->active[lane] && found; ++i) {
-                for (int k = 0; k < 111; ++k)
-                    memory.past[111 - 1 - k][i] = vortices3_group_past(group, stage, k)[i][lane];
-                const int terms = vortices3_train(&memory, i);
-                found = terms > 0;
-                if (terms > group->terms[stage]) group->terms[stage] = terms;
-                for (int k = 0; k < 40; ++k) group->weight[stage][k][i][lane] = memory.weight[k][i][0];
-            }
-        if (!found) group->terms[stage] = 0;
-        group->fitting[stage] = found;
-    }
-    ++group->fits;
-    group->slow = 0;
-    group->patience = helped && group->patience < 10000 ? 2 * group->patience + 150 : 100 * 150;
-}
-
-/* Replace guesses that are not near the last values, as vortices3_near has it, by these; lane by lane. */
-static void vortices3_stay_near(vortices3_lanes y[restrict 6], vortices3_lanes last[restrict 6])
-{
-    vortices3_lanes distance = { 0.0 }, size = { 0.0 };
-    for (int i = 0; i < 6; ++i) {
-        vortices3_EACH_LANE
-        for (int lane = 0; lane < vortices3_LANES; ++lane) {
-            distance[lane] += fabs(y[i][lane] - last[i][lane]);
-            size[lane] += fabs(last[i][lane]);
-        }
-    }
-    for (int i = 0; i < 6; ++i) {
-        vortices3_EACH_LANE
-        for (int lane = 0; lane < vortices3_LANES; ++lane)
-            y[i][lane] = distance[lane] <= 4.0 * size[lane] ? y[i][lane] : last[i][lane];
-    }
-}
-
-/* Whether lanes are still to be solved after a correction of this size; those where nothing is finite leave the group.
-   bound is what remains in each lane. */
-static int vortices3_group_open(vortices3_group *group, const vortices3_lanes size, const vortices3_lanes previous,
-    double bend, vortices3_lanes bound)
-{
-    int open = 0;
-    vortices3_EACH_LANE
-    for (int lane = 0; lane < vortices3_LANES; ++lane)
-        bound[lane] = vortices3_remaining(size[lane], bend, bound[lane]);
-    if (vortices3_largest(bound) <= 1e-20) return 0;
-    for (int lane = 0; lane < vortices3_LANES; ++lane) {
-        const int solved = bound[lane] <= 1e-20 || (previous[lane] < 1e-8 && size[lane] < 1e-10);
-        if (!isfinite(size[lane])) group->active[lane] = 0;
-        open += group->active[lane] && !solved;
-    }
-    return open;
-}
-
-/* The guess for a stage: recurrences, or extrapolation; the state for members where that is not near. */
-static void vortices3_group_predict(vortices3_group *group, int stage, vortices3_lanes y[6])
-{
-    if (group->fitting[stage]) vortices3_group_foresee(group, stage, y);
-    else vortices3_group_extrapolate(group, stage, y);
-    vortices3_stay_near(y, group->x);
-}
-
-/* Newton's method for a stage, until the slowest lane is solved. The number of iterations; where that is the most
-   allowed, lanes that are not solved leave the group. */
-static int vortices3_group_solve(vortices3_group *group, int stage, vortices3_model *model)
-{
-    vortices3_lanes size, previous, bound;
-    double largest = HUGE_VAL, bend = 0.0;
-    int iterations = 0, open = 1;
-    for (int lane = 0; lane < vortices3_LANES; ++lane) size[lane] = bound[lane] = HUGE_VAL;
-    vortices3_group_predict(group, stage, model->y);
-    for (; open > 0 && iterations < 20; ++iterations) {
-        memcpy(previous, size, sizeof size);
-        vortices3_update(group->coef[stage], model, largest > 1e-05);
-        bend = largest > 1e-05 ? 0.0 : bend + largest;
-        for (int i = 0; i < 6; ++i) {
-            vortices3_EACH_LANE
-            for (int lane = 0; lane < vortices3_LANES; ++lane)
-                model->residual[i][lane] =
-                    ((model->y[i][lane] - group->x[i][lane]) + model->displacement[i][lane]) - group->carry[i][lane];
-        }
-        vortices3_correct(model, size);
-        open = vortices3_group_open(group, size, previous, bend, bound);
-        largest = vortices3_largest(size);
-    }
-    for (int lane = 0; lane < vortices3_LANES && open > 0; ++lane)
-        group->active[lane] = group->active[lane] && bound[lane] <= 1e-20;
-    return iterations;
-}
-
-/* Add the increments, corrected to first order, in compensated arithmetic as for a single step. */
-static void vortices3_group_advance(vortices3_lanes x[restrict 6], vortices3_lanes carry[restrict 6],
-    vortices3_model *model)
-{
-    for (int i = 0; i < 6; ++i)
-        for (int j = 0; j < 6; ++j) {
-            vortices3_EACH_LANE
-            for (int lane = 0; lane < vortices3_LANES; ++lane)
-                carry[i][lane] -= model->gain[i * 6 + j][lane] * model->residual[j][lane];
-        }
-    for (int i = 0; i < 6; ++i) {
-        vortices3_EACH_LANE
-        for (int lane = 0; lane < vortices3_LANES; ++lane) {
-            const double change = model->increment[i][lane], sum = x[i][lane] + change, added = sum - x[i][lane];
-            const double small = ((x[i][lane] - (sum - added)) + (change - added)) + carry[i][lane];
-            x[i][lane] = sum + small;
-            carry[i][lane] = small - (x[i][lane] - sum);
-        }
-    }
-}
-
-/* Members that failed, or whose state is not near the one before the step or not finite, keep that one, and leave. How many
-   stay. */
-static int vortices3_group_leave(vortices3_group *group, vortices3_lanes x[6], vortices3_lanes carry[6],
-    size_t remaining)
-{
-    vortices3_lanes moved = { 0.0 }, size = { 0.0 }, bad;
-    int active = 0;
-    for (int i = 0; i < 6; ++i) {
-        vortices3_EACH_LANE
-        for (int lane = 0; lane < vortices3_LANES; ++lane) {
-            moved[lane] += fabs(group->x[i][lane] - x[i][lane]);
-            size[lane] += fabs(x[i][lane]);
-        }
-    }
-    for (int lane = 0; lane < vortices3_LANES; ++lane) bad[lane] = moved[lane] <= 4.0 * size[lane] ? 0.0 : 1.0;
-    for (int lane = 0; lane < vortices3_LANES; ++lane) active += group->active[lane];
-    if (active == vortices3_LANES && !(vortices3_largest(bad) > 0.0)) return active;
-    active = 0;
-    for (int lane = 0; lane < vortices3_LANES; ++lane) {
-        group->active[lane] = group->active[lane] && !(bad[lane] > 0.0);
-        active += group->active[lane];
-        for (int i = 0; i < 6 && !group->active[lane]; ++i) {
-            group->x[i][lane] = x[i][lane];
-            group->carry[i][lane] = carry[i][lane];
-        }
-        if (!group->active[lane] && group->left[lane] == 0) group->left[lane] = remaining;
-    }
-    return active;
-}
-
-/* One step of all members, of as many as remain. How many members are left. */
-static int vortices3_group_step(vortices3_group *group, size_t remaining)
-{
-    vortices3_lanes x[6], carry[6];
-    vortices3_model model;
-    const int next = (group->latest > 0 ? group->latest : 111) - 1;
-    int most = 0;
-    memcpy(x, group->x, sizeof x);
-    memcpy(carry, group->carry, sizeof carry);
-    for (int stage = 0; stage < 1; ++stage) {
-        const int iterations = vortices3_group_solve(group, stage, &model);
-        vortices3_group_advance(group->x, group->carry, &model);
-        if (iterations > most) most = iterations;
-        if ((iterations > 1 && next % 8 == 0) || group->count < 8)
-            vortices3_group_judge(group, stage, model.y);
-        memcpy(group->past[stage][next], model.y, sizeof model.y);
-    }
-    group->latest = next;
-    if (group->count < 111) ++group->count;
-    group->slow = most > 1 ? group->slow + 1 : 0;
-    if (group->slow > group->patience && group->count == 111 && remaining >= 1200)
-        vortices3_group_fit(group);
-    return vortices3_group_leave(group, x, carry, remaining);
-}
-
-/* Put a member into a lane: its state, and its coefficients. */
-static vortices3_status vortices3_group_join(vortices3_group *group, int lane, const vortices3_params *params,
-    const double x0[6], double h)
-{
-    vortices3_solver s;
-    vortices3_status status = vortices3_init(&s, params, x0);
-    if (status == vortices3_OK) status = vortices3_set_step(&s, h);
-    if (status != vortices3_OK) return status;
-    for (int i = 0; i < 6; ++i) group->x[i][lane] = s.x[i];
-    for (int stage = 0; stage < 1; ++stage)
-        for (int k = 0; k < 3; ++k) group->coef[stage][k][lane] = s.coef[stage][k];
-    group->active[lane] = 1;
-    return status;
-}
-
-/* The steps that a member has still to make after it left the group, by itself. */
-static vortices3_status vortices3_group_finish(const vortices3_group *group, int lane, const vortices3_params *params,
-    double x[6], double h)
-{
-    vortices3_solver s;
-    vortices3_status status = vortices3_init(&s, params, x);
-    if (status != vortices3_OK) return status;
-    for (int i = 0; i < 6; ++i) s.carry[i] = group->carry[i][lane];
-    status = vortices3_integrate(&s, h, group->left[lane]);
-    memcpy(x, s.x, sizeof s.x);
-    return status;
-}
-
-/* The members from first on, as many as there are lanes. The first status that is not OK. */
-static vortices3_status vortices3_group_run(const vortices3_params *params, double *x, size_t members, size_t first,
-    double h, size_t steps, unsigned char *status)
-{
-    vortices3_group group;
-    vortices3_status worst = vortices3_OK, member[8];
-    const int count = members - first < vortices3_LANES ? (int)(members - first) : vortices3_LANES;
-    double state[6];
-    size_t left = steps;
-    memset(&group, 0, sizeof group);
-    for (int lane = 0; lane < count; ++lane) {
-        for (size_t i = 0; i < 6; ++i) state[i] = x[i * members + first + (size_t)lane];
-        member[lane] = vortices3_group_join(&group, lane, params, state, h);
-    }
-    for (int active = count; left > 0 && active > 2; --left) active = vortices3_group_step(&group, left);
-    for (int lane = 0; lane < count; ++lane) {
-        if (group.active[lane]) group.left[lane] = left;
-        for (int i = 0; i < 6; ++i) state[i] = group.x[i][lane];
-        if (member[lane] == vortices3_OK) {
-            if (group.left[lane] > 0) member[lane] = vortices3_group_finish(&group, lane, params, state, h);
-            for (size_t i = 0; i < 6; ++i) x[i * members + first + (size_t)lane] = state[i];
-        }
-        if (status != NULL) status[first + (size_t)lane] = (unsigned char)member[lane];
-        if (worst == vortices3_OK) worst = member[lane];
-    }
-    return worst;
-}
-
-vortices3_status vortices3_ensemble(const vortices3_params *params, double *x, size_t members, double h,
-                                    size_t steps, unsigned char *status)
-{
-    vortices3_status worst = isfinite(h) ? vortices3_OK : vortices3_BAD_ARGUMENT;
-    const vortices3_params own = params != NULL ? *params : vortices3_default_params;
-    size_t earliest = members;
-    if (x == NULL && members > 0) return vortices3_BAD_ARGUMENT;
-#ifdef _OPENMP
-#pragma omp parallel for schedule(dynamic)
-#endif
-    for (size_t first = 0; first < members; first += vortices3_LANES) {
-        const vortices3_status group = vortices3_group_run(&own, x, members, first, h, steps, status);
-        if (group == vortices3_OK) continue;
-#ifdef _OPENMP
-#pragma omp critical
-#endif
-        if (first < earliest) {
-            earliest = first;
-            worst = group;
-        }
-    }
-    return worst;
-}
-
-#if defined(__clang__)
-#pragma clang diagnostic pop
-#endif
-
-/* the Hamiltonian */
-static void vortices3_energy(const vortices3_params *params, const double x[6], double energy[restrict 1])
-{
-    (void)params;
-    const double x1 = x[0];
-    const double y1 = x[1];
-    const double x2 = x[2];
-    const double y2 = x[3];
-    const double x3 = x[4];
-    const double y3 = x[5];
-    const double t1 = y2 - y3;
-    const double t2 = x2 - x3;
-    const double t3 = y1 - y2;
-    const double t4 = x1 - x2;
-    const double t5 = x1 - x3;
-    const double t6 = y1 - y3;
-    const double t7 = log(t1 * t1 + t2 * t2) - (2.0 * log(t3 * t3 + t4 * t4) - 0.5 * log(t5 * t5 + t6 * t6));
-    energy[0] = 0.25 * (t7 / 3.141592653589793);
-}
-
-/* the Casimirs */
-static void vortices3_casimir_values(const vortices3_params *params, const double x[6], double out[restrict 1])
-{
-    (void)params;
-    (void)x;
-    (void)out;
-}
-
-/* pi(x) grad H(x) */
-static void vortices3_field(const vortices3_params *params, const double x[6], double out[restrict 6])
-{
-    (void)params;
-    const double x1 = x[0];
-    const double y1 = x[1];
-    const double x2 = x[2];
-    const double y2 = x[3];
-    const double x3 = x[4];
-    const double y3 = x[5];
-    const double t1 = y1 - y3;
-    const double t2 = 1.0 / 3.141592653589793;
-    const double t3 = x1 - x3;
-    const double t4 = t2 / (t3 * t3 + t1 * t1);
-    const double t5 = t1 * t4;
-    const double t6 = y1 - y2;
-    const double t7 = x1 - x2;
-    const double t8 = t2 / (t6 * t6 + t7 * t7);
-    const double t9 = t6 * t8;
-    const double t10 = t7 * t8;
-    const double t11 = t3 * t4;
-    const double t12 = y2 - y3;
-    const double t13 = x2 - x3;
-    const double t14 = t2 / (t12 * t12 + t13 * t13);
-    const double t15 = 0.5 * (t12 * t14);
-    const double t16 = 0.5 * (t13 * t14);
-    out[0] = 0.25 * t5 - t9;
-    out[1] = t10 - 0.25 * t11;
-    out[2] = 0.5 * (t9 + t15);
-    out[3] = (-0.5) * (t10 + t16);
-    out[4] = (-2.0) * ((-0.25) * t5 - t15);
-    out[5] = 2.0 * ((-0.25) * t11 - t16);
-}
-
-double vortices3_hamiltonian(const vortices3_params *params, const double x[6])
-{
-    double energy[1];
-    vortices3_energy(params != NULL ? params : &vortices3_default_params, x, energy);
-    return energy[0];
-}
-
-void vortices3_casimirs(const vortices3_params *params, const double x[6], double out[])
-{
-    double value[1]; /* out may overlap x */
-    vortices3_casimir_values(params != NULL ? params : &vortices3_default_params, x, value);
-    for (int i = 0; i < 0; ++i) out[i] = value[i];
-}
-
-void vortices3_vector_field(const vortices3_params *params, const double x[6], double out[6])
-{
-    double value[6];
-    vortices3_field(params != NULL ? params : &vortices3_default_params, x, value);
-    memcpy(out, value, sizeof value);
 }
 
 const char *vortices3_status_string(vortices3_status status)
 {
-    switch (status) {
-    case vortices3_OK: return "ok";
-    case vortices3_NO_CONVERGENCE: return "no convergence: the step is too large";
-    case vortices3_SINGULAR: return "singular Newton matrix: the step is too large";
-    case vortices3_NOT_FINITE: return "not finite: overflow, or outside the domain";
-    case vortices3_BAD_ARGUMENT: return "bad argument: a null pointer, or values that are not allowed";
-    }
-    return "unknown status";
+    static const char *const text[] = {
+        "ok",
+        "no convergence: the step is too large",
+        "singular Newton matrix: the step is too large",
+        "not finite: overflow, or outside the domain",
+        "bad argument: a null pointer, or values that are not allowed"
+    };
+    return (unsigned)status <= vortices3_BAD_ARGUMENT ? text[status] : "unknown status";
 }
 
 size_t vortices3_solver_size(void) { return sizeof(vortices3_solver); }
 
 size_t vortices3_solver_steps_done(const vortices3_solver *s) { return s->steps; }
+
+/* ---- Ensembles ---- */
+vortices3_status vortices3_ensemble(const vortices3_params *params, double *x, size_t members, double h,
+    size_t steps, unsigned char *status)
+{
+    vortices3_status worst = isfinite(h) ? vortices3_OK : vortices3_BAD_ARGUMENT;
+    const vortices3_params own = params != NULL ? *params : vortices3_default_params;
+    if (x == NULL && members > 0) return vortices3_BAD_ARGUMENT;
+    for (size_t m = 0; m < members; ++m) {
+        vortices3_solver s;
+        double x0[vortices3_DIM];
+        for (size_t i = 0; i < vortices3_DIM; ++i) x0[i] = x[i * members + m];
+        vortices3_status member = vortices3_init(&s, &own, x0);
+        if (member == vortices3_OK) {
+            member = vortices3_integrate(&s, h, steps);
+            for (size_t i = 0; i < vortices3_DIM; ++i) x[i * members + m] = s.x[i];
+        }
+        if (status != NULL) status[m] = (unsigned char)member;
+        if (worst == vortices3_OK) worst = member;
+    }
+    return worst;
+}

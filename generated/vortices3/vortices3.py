@@ -6,17 +6,17 @@
 #   step: implicit, Newton iteration with the analytic matrix
 #   one Newton iteration: 701 additions, 1358 multiplications, 3 divisions
 #
-# spec: vortices3, sha256 9f4ece29d2cb2bfd4d374437bcb1bba6d3a05731db8beb500f407873d6a3394c
+# spec: vortices3, sha256 037a04eba07f271265722e4dcbf9a974884f1b57a9cde7f8c30f2ddfde0882bc
 # to regenerate: phigen build vortices3
 # DO NOT EDIT: change the spec and regenerate; edits are noticed by the checksum below.
 #
 # SPDX-License-Identifier: 0BSD
 # This file belongs to whoever generated it; phigen claims no rights in it.
-# body-sha256: 400701409327c258507a8e673ebafa07117769193574c8ec0dbc07aa5977b528
+# body-sha256: f4c8bc887d5ad682c28c69e67881f5d1f90f30db9648282808b9d8adb210114a
 import numpy as np
 
 VERSION = "0.1.0"
-SPEC_SHA256 = "9f4ece29d2cb2bfd4d374437bcb1bba6d3a05731db8beb500f407873d6a3394c"
+SPEC_SHA256 = "037a04eba07f271265722e4dcbf9a974884f1b57a9cde7f8c30f2ddfde0882bc"
 DIM = 6
 ORDER = 4
 COORDINATES = ("x1", "y1", "x2", "y2", "x3", "y3",)

@@ -46,6 +46,7 @@ def command(
     targets: tuple[str, ...],
     order: int | None,
     scheme: str | None,
+    profile: str | None,
     single_file: bool,
     tangent: bool,
     modified: int | None,
@@ -63,7 +64,9 @@ def command(
     """
     if (checking or diff) and (compiling or certify):
         raise click.UsageError("--compile and --certify write files; --check and --diff write nothing")
-    options = Options(Path(output), tuple(dict.fromkeys(targets)), order, single_file, tangent, modified, scheme)
+    options = Options(
+        Path(output), tuple(dict.fromkeys(targets)), order, single_file, tangent, modified, scheme, profile
+    )
     compilations = _compile_all(console, spec_files, options)
     planned = _plan(console, compilations, options)
     if checking or diff:

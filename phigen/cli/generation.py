@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -13,6 +13,7 @@ import click
 from phigen import resources
 from phigen.cli.sources import CORRECTIONS, ORDER, scheme_option
 from phigen.registry import TARGETS
+from phigen.spec.names import PROFILES
 
 if TYPE_CHECKING:
     from phigen.compiler import Compilation
@@ -34,6 +35,7 @@ class Options:
     tangent: bool = False
     modified: int | None = None
     scheme: str | None = None
+    profile: str | None = None
 
     def extras_of(self, spec: Spec) -> Extras:
         """What the code offers beyond the solver: what the spec asks for, and the command line."""
@@ -59,6 +61,7 @@ class Options:
         words = [word for target in self.targets for word in ("-t", target)]
         words += ["--order", str(self.order)] if self.order else []
         words += ["--scheme", self.scheme] if self.scheme else []
+        words += ["--profile", self.profile] if self.profile else []
         words += ["--single-file"] if self.single_file else []
         words += ["--tangent"] if self.tangent else []
         words += ["--modified", str(self.modified)] if self.modified is not None else []
@@ -72,6 +75,9 @@ def output_options(command: F) -> F:
             "--modified", type=CORRECTIONS, metavar="N", help="Generate modified_hamiltonian, N corrections, too."
         ),
         click.option("--tangent", is_flag=True, help="Generate step_tangent, the derivative of a step, too."),
+        click.option(
+            "--profile", type=click.Choice(PROFILES), help="How much the C does for speed, instead of the spec's."
+        ),
         click.option("--single-file", is_flag=True, help="C in one file, NAME.c, without a header."),
         scheme_option,
         click.option("--order", metavar="K", type=ORDER, help="Order of the method, instead of the spec's."),
@@ -97,10 +103,13 @@ def generate(compilation: Compilation, target: str, options: Options) -> dict[st
     words += ["-t", target] if target not in spec.targets else []
     words += ["--order", str(options.order)] if options.order not in (None, spec.order) else []
     words += ["--scheme", options.scheme] if options.scheme not in (None, spec.scheme) else []
+    c = target == "c"
+    words += ["--profile", options.profile] if c and options.profile not in (None, spec.profile) else []
     words += ["--single-file"] if single else []
     words += ["--tangent"] if options.tangent and not spec.extras.tangent else []
     words += ["--modified", str(options.modified)] if options.modified is not None else []
-    return emit(compilation.program, target, " ".join(words), single_file=single)
+    program = replace(compilation.program, profile=options.profile or spec.profile)
+    return emit(program, target, " ".join(words), single_file=single)
 
 
 def _is_bundled(spec: Spec) -> bool:

@@ -71,6 +71,7 @@ def command(
     targets: tuple[str, ...],
     order: int | None,
     scheme: str | None,
+    profile: str | None,
     single_file: bool,
     tangent: bool,
     modified: int | None,
@@ -95,6 +96,7 @@ def command(
         tangent=tangent,
         modified=modified,
         scheme=scheme,
+        profile=profile,
     )
     if options.words and not spec_files:
         raise click.UsageError("options that change what is generated need the SPEC; without it, the manifest decides")

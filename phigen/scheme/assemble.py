@@ -49,6 +49,7 @@ def build_program(
     title: str = "",
     licence: str = "0BSD",
     spec_sha256: str = "",
+    profile: str = "fast",
 ) -> Program:
     """The solver of a system as a program. LimitError if a kernel exceeds `MOST_OPERATIONS`."""
     solver = solver or SolverOptions()
@@ -79,6 +80,7 @@ def build_program(
         modified=modified,
         extras=extras,
         lanes=solver.lanes,
+        profile=profile,
     )
 
 

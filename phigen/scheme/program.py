@@ -57,7 +57,8 @@ class Program:
     """A solver, ready to be printed.
 
     A step of size h is the composition of one ``step`` of each of the ``fractions`` of h. ``extras`` are what was asked
-    for beside it, ``lanes`` asks for code that does several steps or members at once.
+    for beside it, ``lanes`` asks for C that does several steps or members at once,
+    ``profile`` (``fast``, ``small``) says how much it does for speed.
     """
 
     name: str
@@ -73,6 +74,7 @@ class Program:
     modified: Modified | None = None
     extras: Extras = NO_EXTRAS
     lanes: bool = True
+    profile: str = "fast"
 
     @property
     def version(self) -> str:

@@ -33,6 +33,7 @@ def build_splitting(
     licence: str = "0BSD",
     spec_sha256: str = "",
     lanes: bool = True,
+    profile: str = "fast",
 ) -> Program:
     """The explicit solver as a program. LimitError if a kernel exceeds `MOST_OPERATIONS`."""
     _expect_no_modified(system, extras)
@@ -67,6 +68,7 @@ def build_splitting(
         observables=observables(system),
         extras=extras,
         lanes=lanes,
+        profile=profile,
     )
 
 

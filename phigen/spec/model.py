@@ -176,6 +176,7 @@ class Spec:
     composition: str = "auto"
     gauge: str | Mapping[str, Expression] = "auto"  # or the multiple of each Casimir
     scheme: str = "auto"
+    profile: str = "fast"
     solver: SolverOptions = SolverOptions()
     extras: Extras = NO_EXTRAS
     targets: tuple[str, ...] = DEFAULT

@@ -61,6 +61,9 @@ BIREALISATIONS = (
 )
 POISSON_FORMS = ("matrix", "brackets", "canonical", "log_canonical", "lie_algebra", "nambu", "product", "pullback")
 #: Compositions of the flows of the parts of a splitting, and all.
+#: How much the C does for speed.
+PROFILES = ("fast", "small")
+
 FLOW_COMPOSITIONS = ("blanes-moan", "blanes-moan-rkn", "nystrom", "force-gradient")
 COMPOSITIONS = (
     "auto",

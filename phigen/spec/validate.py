@@ -66,6 +66,7 @@ def _parts(raw: Mapping[str, Any], declared: Declarations) -> dict[str, Any]:
         "composition": raw.get("composition", "auto"),
         "gauge": _gauge(raw.get("gauge", "auto"), declared),
         "scheme": raw.get("scheme", "auto"),
+        "profile": raw.get("profile", "fast"),
         "solver": _solver(raw.get("solver", {}), declared),
         "targets": without_repetition(raw.get("targets", DEFAULT), ("targets",), declared),
         "extras": Extras(raw.get("tangent", False), raw.get("modified_hamiltonian", 0)),

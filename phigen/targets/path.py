@@ -28,6 +28,7 @@ class Syntax:
     following: str  # the statement that sets coefficient k ≥ 1 of series i
     slope: str  # the statement that sets coefficient k + 1 of coordinate i
     sums: str  # the prefix of the functions that sum over orders
+    held: str = "f{i}"  # fixed value i
 
 
 def statements(program: Program, path: Recurrences, syntax: Syntax) -> dict[str, list[str]]:
@@ -77,7 +78,7 @@ def _scope(program: Program, path: Recurrences, syntax: Syntax, series: str) -> 
     for i in range(len(path.series)):
         scope.bind(Symbol(SERIES, i), series.format(i=i))
     for i in range(len(path.fixed)):
-        scope.bind(Symbol(FIXED, i), f"f{i}")
+        scope.bind(Symbol(FIXED, i), syntax.held.format(i=i))
     return scope
 
 

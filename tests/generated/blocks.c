@@ -1,6 +1,6 @@
 /* Blocks of steps and groups of members against single steps, from inside the generated file.
    Compile with -DNAME=… -DSOURCE="…" -DSTEP=…, -DULPS=…, -DFORESEEN=0 or 1 (whether recurrences foresee the motion),
-   -DGROUPS=0 or 1 (whether there are groups), -DSTATE="…" (initial values separated by commas). */
+   -DSTAGES=…, -DGROUPS=0 or 1 (whether there are groups), -DSTATE="…" (initial values separated by commas). */
 #include <stdio.h>
 #include <stdlib.h>
 
@@ -10,7 +10,13 @@
 #define GLUE(a, b) GLUE2(a, b)
 #define F(name) GLUE(NAME, name)
 #define DIM F(DIM)
-#define STAGES ((int)(sizeof F(fractions) / sizeof F(fractions)[0]))
+#if STAGES == 1 /* then nothing is an array over stages */
+#define OF(array, stage) (array)
+#define STAGE(stage)
+#else
+#define OF(array, stage) (array)[stage]
+#define STAGE(stage) , stage
+#endif
 #define MEMBERS 11
 
 #define EXPECT(condition) \
@@ -51,12 +57,12 @@ static void block_equals_steps(int steps, int foreseeing)
     static F(table) table;
     begin(&together, steps);
     for (int stage = 0; stage < STAGES && foreseeing; ++stage) {
-        F(fit)(&together.memory[stage]);
-        EXPECT((together.memory[stage].terms > 0) == FORESEEN);
+        F(fit)(&OF(together.history, stage));
+        EXPECT((OF(together.history, stage).recurrence_terms > 0) == FORESEEN);
         if (!FORESEEN) return;
     }
-    together.foreseeing = foreseeing;
-    for (int stage = 0; stage < STAGES; ++stage) table.fits[stage] = -1;
+    together.blocks.use_recurrences = foreseeing;
+    for (int stage = 0; stage < STAGES; ++stage) OF(table.fits, stage) = -1;
     F(refresh)(&together, &table);
     singles = before = together;
     if (F(block)(&together, &table, 1) == 0) { /* as a rule one pass is too few for a march by Runge-Kutta */
@@ -72,7 +78,7 @@ static void block_equals_steps(int steps, int foreseeing)
     EXPECT(together.steps == singles.steps);
     EXPECT(close_to(together.x, singles.x, 1e-13));
     for (int stage = 0; stage < STAGES; ++stage) {
-        const F(memory) *a = &together.memory[stage], *b = &singles.memory[stage];
+        const F(history) *a = &OF(together.history, stage), *b = &OF(singles.history, stage);
         EXPECT(a->count == b->count);
         for (int k = 1; k <= F(LANES); ++k) EXPECT(close_to(a->past[a->count - k], b->past[b->count - k], 1e-9));
     }
@@ -110,7 +116,7 @@ static void group_equals_steps(int steps)
     for (int lane = 0; lane < F(LANES); ++lane) {
         if (lane == 3) continue;
         for (int i = 0; i < DIM; ++i) x[i] = start[i] * (1.0 + 1e-3 * lane);
-        EXPECT(group.left[lane] == 0);
+        EXPECT(group.steps_left[lane] == 0);
         EXPECT(F(init)(&singles, NULL, x) == F(OK));
         singly(&singles, steps);
         for (int i = 0; i < DIM; ++i) end[i] = group.x[i][lane];
@@ -122,21 +128,21 @@ static void group_equals_steps(int steps)
 static void group_fits(void)
 {
     static F(group) group;
-    enum { ROWS = (int)(sizeof group.past[0] / sizeof group.past[0][0]) };
+    enum { ROWS = F(REMEMBERED) };
     F(lanes) guess[DIM], rough[DIM], last[DIM];
     double apart = 0.0, moved = 0.0, a[DIM], b[DIM];
     memset(&group, 0, sizeof group);
     for (int lane = 0; lane < F(LANES); ++lane) EXPECT(F(group_join)(&group, lane, NULL, start, STEP) == F(OK));
     for (int k = 0; k < ROWS; ++k) F(group_step)(&group, 1);
     F(group_fit)(&group);
-    EXPECT((group.terms[0] > 0) == FORESEEN);
-    F(group_foresee)(&group, 0, guess);
-    F(group_extrapolate)(&group, 0, rough);
-    memcpy(last, group.past[0][group.latest], sizeof last);
+    EXPECT((OF(group.recurrence_terms, 0) > 0) == FORESEEN);
+    F(group_foresee)(&group STAGE(0), guess);
+    F(group_extrapolate)(&group STAGE(0), rough);
+    memcpy(last, OF(group.past, 0)[group.latest], sizeof last);
     F(group_step)(&group, 1);
     for (int lane = 0; lane < F(LANES); ++lane) {
         for (int i = 0; i < DIM; ++i) a[i] = guess[i][lane];
-        for (int i = 0; i < DIM; ++i) b[i] = group.past[0][group.latest][i][lane];
+        for (int i = 0; i < DIM; ++i) b[i] = OF(group.past, 0)[group.latest][i][lane];
         EXPECT(!FORESEEN || close_to(a, b, 1e-6));
         for (int i = 0; i < DIM; ++i) {
             apart += fabs(rough[i][lane] - b[i]);
@@ -154,11 +160,11 @@ static void increments_are_corrected(void)
     double a[DIM], b[DIM];
     memset(&group, 0, sizeof group);
     for (int lane = 0; lane < F(LANES); ++lane) EXPECT(F(group_join)(&group, lane, NULL, start, STEP) == F(OK));
-    F(group_solve)(&group, 0, &model);
+    F(group_solve)(&group STAGE(0), &model);
     for (int off = 0; off < 2; ++off) {
         for (int i = 0; i < DIM; ++i)
             for (int lane = 0; lane < F(LANES); ++lane) model.y[i][lane] *= 1.0 + 1e-6 * off * (lane - i);
-        F(update)(group.coef[0], &model, 1);
+        F(update)(OF(group.coef, 0), &model, 1);
         for (int i = 0; i < DIM; ++i)
             for (int lane = 0; lane < F(LANES); ++lane)
                 model.residual[i][lane] = (model.y[i][lane] - group.x[i][lane]) + model.displacement[i][lane];
@@ -188,18 +194,18 @@ static void far_guesses_are_not_used(void)
     EXPECT(F(group_step)(&group, 1) == F(LANES));
     for (int stage = 0; stage < STAGES; ++stage) {
         for (int i = 0; i < DIM; ++i) {
-            for (int l = 0; l < F(LANES); ++l) s.memory[stage].weight[0][i][l] = 1e8;
-            for (int lane = 0; lane < F(LANES); ++lane) group.weight[stage][0][i][lane] = 1e8;
+            for (int l = 0; l < F(LANES); ++l) OF(s.history, stage).weight[0][i][l] = 1e8;
+            for (int lane = 0; lane < F(LANES); ++lane) OF(group.weight, stage)[0][i][lane] = 1e8;
         }
-        s.memory[stage].terms = group.terms[stage] = 2;
-        s.memory[stage].fitting = group.fitting[stage] = 1;
-        table.fits[stage] = -1;
+        OF(s.history, stage).recurrence_terms = OF(group.recurrence_terms, stage) = 2;
+        OF(s.history, stage).use_recurrence = OF(group.use_recurrences, stage) = 1;
+        OF(table.fits, stage) = -1;
     }
-    EXPECT(!F(predict)(&s.memory[0], value));
-    s.foreseeing = 1;
+    EXPECT(!F(predict)(&OF(s.history, 0), value));
+    s.blocks.use_recurrences = 1;
     F(refresh)(&s, &table);
     EXPECT(F(block)(&s, &table, 8) == 0);
-    F(group_predict)(&group, 0, guess);
+    F(group_predict)(&group STAGE(0), guess);
     EXPECT(memcmp(guess, group.x, sizeof guess) == 0);
 }
 #endif

@@ -89,13 +89,13 @@ static void begin(double h, size_t steps)
 {
     double x0[DIM];
     memset(&group, 0, sizeof group);
-    group.packs = F(PACKS);
+    group.packs = F(PACK_COUNT);
     for (int m = 0; m < F(GROUP); ++m) {
         member(m, x0);
         EXPECT(F(init)(&group.s, NULL, x0) == F(OK));
         for (int i = 0; i < DIM; ++i) group.pack[m / F(LANES)].x[i][m % F(LANES)] = x0[i];
         group.active[m] = 1;
-        group.left[m] = steps;
+        group.steps_left[m] = steps;
     }
     EXPECT(F(set_step)(&group.s, h) == F(OK));
 }
@@ -107,7 +107,7 @@ static void groups_make_all_steps(double h)
     begin(h, 40);
     EXPECT(F(group_steps)(&group, 30) == F(GROUP));
     EXPECT(F(group_steps)(&group, 10) == F(GROUP));
-    for (int m = 0; m < F(GROUP); ++m) EXPECT(group.left[m] == 0);
+    for (int m = 0; m < F(GROUP); ++m) EXPECT(group.steps_left[m] == 0);
 #if FAR > 1
     EXPECT(group.far == (h != STEP));
 #endif
@@ -120,7 +120,7 @@ static void those_who_leave_go_on(void)
     const int m = F(LANES) + 3;
     begin(STEP, 70);
     EXPECT(F(group_steps)(&group, 40) == F(GROUP));
-    EXPECT(group.left[m] == 30);
+    EXPECT(group.steps_left[m] == 30);
     status[0] = F(group_end)(&group, m, STEP, x);
     member(m, x0);
     expect_steps(1, 0, x0, STEP, 70, ULPS);

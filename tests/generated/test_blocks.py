@@ -48,8 +48,12 @@ def test_blocks_with_sparse_factors_equal_single_steps(composition, optimisation
     n = 9
     rows = [[(j - i) % n == 1 for j in range(n)] for i in range(n)]
     pi = [[int(rows[i][j]) - int(rows[j][i]) for j in range(n)] for i in range(n)]
-    text = f"coordinates: [{', '.join(f'v{i}' for i in range(n))}]\nhamiltonian: {' + '.join(f'v{i}' for i in range(n))}\n"
-    text += f"poisson: {{log_canonical: {pi}}}\norder: {2 if composition == 'none' else 4}\ncomposition: {composition}\n"
+    text = (
+        f"coordinates: [{', '.join(f'v{i}' for i in range(n))}]\nhamiltonian: {' + '.join(f'v{i}' for i in range(n))}\n"
+    )
+    text += (
+        f"poisson: {{log_canonical: {pi}}}\norder: {2 if composition == 'none' else 4}\ncomposition: {composition}\n"
+    )
     start = [round(1 + 0.3 * (i % 4), 2) for i in range(n)]
     compilation = compile_text(f"{text}runs: {{r: {{initial: {start}, step: 0.2, steps: 10}}}}\n")
     assert compilation.program.step.factors and compilation.program.step.eliminate
@@ -76,6 +80,7 @@ def exercise(compilation, optimisation, folder, *, foreseen=True, units=2):
     at = setting(compilation)
     definitions = [f"-DNAME={name}", f'-DSOURCE="{name}.c"', f"-DSTEP={at.h!r}"]
     definitions.append(f"-DULPS={GROWING.get(name, units * len(compilation.program.fractions))}")
+    definitions.append(f"-DSTAGES={len(compilation.program.fractions)}")
     definitions.append(f"-DGROUPS={int(f'{name}_group;' in code[f'{name}.c'])}")
     definitions.append(f"-DFORESEEN={int(foreseen and name not in UNFORESEEN)}")
     definitions.append("-DSTATE=" + ", ".join(map(repr, at.x)))

@@ -1,11 +1,12 @@
 """The functions for the loops over lanes agree with the library to a few units of the last place."""
 
 import pytest
-from support import compiled, run, tool, write
+from support import run, tool, write
 
 from phigen.symbolic.special import SPECIAL
+from phigen.targets.c import lanes
+from phigen.targets.c.amalgamation import Amalgam
 from phigen.targets.c.kernels import LANE_FORMULAS, LANE_FUNCTIONS
-from phigen.targets.c.lanes import lane_functions
 
 #: Largest argument, and units of the last place; sums of exponentials lose one or two.
 RANGES = {"log": (1e308, 2), "exp": (600.0, 2), "expm1": (600.0, 3), "sin": (1e6, 2), "cos": (1e6, 2)}
@@ -37,8 +38,8 @@ int main(void)
 def test_lane_functions_agree_with_the_library(name, flags, tmp_path):
     """Over the whole range and, closer together, near 0; no number beyond it, so that steps there are made singly."""
     reach, units = RANGES[name]
-    program = compiled("pendulum").program
-    code = "\n".join(lane_functions(program, {name})).replace("pendulum_", "t_")
+    switches = {f"CALLS_{f.upper()}": f == name for f in RANGES} | {"PACKS": True, "COMPOSED": True}
+    code = Amalgam("t", switches, {"model.h": ""}).text("lanes.c")
     head = "#include <float.h>\n#include <math.h>\n#include <stdint.h>\n#include <string.h>\n"
     write(
         tmp_path,
@@ -58,7 +59,5 @@ def test_every_lane_function_is_tested_or_special():
 
 @pytest.mark.parametrize("op", LANE_FORMULAS)
 def test_what_formulas_call_is_emitted(op):
-    code = "".join(lane_functions(compiled("pendulum").program, {op}))
-    own = {f: f"pendulum_{f}_lane" for f in LANE_FUNCTIONS}
-    for name in own.values():
-        assert (f"{name}(" in LANE_FORMULAS[op].format_map(own)) == (f"double {name}(" in code)
+    called = lanes.with_formulas({op})
+    assert {f for f in LANE_FUNCTIONS if f"{{{f}}}" in LANE_FORMULAS[op]} == called - {op}

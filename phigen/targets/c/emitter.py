@@ -1,123 +1,120 @@
-"""A program as C source: `NAME.h` and `NAME.c`."""
+"""A program as C source: `NAME.h` and `NAME.c`.
+
+What depends on the model is printed: sizes, constants, kernels (`printed`). All else is the runtime, C that lies in
+``templates/c/runtime`` and is put together by `amalgamation` for the `features` of the program.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import replace
-from typing import Any
+import re
+from collections.abc import Iterable, Mapping, Sequence
 
 from phigen.scheme.kernel import Kernel
+from phigen.scheme.path import Recurrences
 from phigen.scheme.program import Program
-from phigen.scheme.steps import (
-    LONGEST_PATH,
-    MOST_PIECES,
-    PLAUSIBLE,
-    Explicit,
-    Implicit,
-    InnerSolve,
-    Newton,
-    Path,
-    Splitting,
-)
+from phigen.scheme.steps import Explicit, Implicit, Path, Splitting
 from phigen.spec.model import Parameter
-from phigen.targets import special
-from phigen.targets.c import extras, lanes, packs, small, splitting
-from phigen.targets.c.kernels import LANES, apart, function, members, printer, wrapped_arguments
+from phigen.targets.c import functions, lanes, packs, paths, splitting
+from phigen.targets.c.amalgamation import Amalgam
+from phigen.targets.c.features import switches
+from phigen.targets.c.kernels import function, members, printer
+from phigen.targets.c.layout import fitted
 from phigen.targets.header import CHECKSUM, checksum, header_lines, plain
-from phigen.targets.path import Syntax, kinds, reads_coefficients, statements
+from phigen.targets.path import Syntax, statements, tangent_program
 from phigen.targets.rendering import render
-
-#: Backward differences kept for the starting guess of the inner solve.
-HISTORY = 8
-
-#: Past values that the fitted recurrence may use, a multiple of 8, and values that it is fitted to; fewer where the
-#: solver would grow too large.
-WINDOW, FITTED, SMALLEST = 40, 112, 32
-
-#: The recurrence uses no more values than leave so little, in sizes of the largest.
-ENOUGH = 3e-12
-
-#: Values that a recurrence is not fitted to, but has to foresee, and how far it may be off, in sizes of the largest:
-#: beyond, the motion is chaotic or the step long, and other guesses are as good.
-CHECKS, HOPELESS = 8, 1e-7
-
-#: Steps that a fit costs, about; with the recurrences for whole blocks, four times as many are saved in.
-REPAY = 150
-
-#: Steps that a fit for a member of a group costs, for each coordinate: of eight steps at once, only one is foreseen.
-GROUP_REPAY = 200
-
-#: How far from the last value a guess may be, in sizes of that value.
-REACH = 4.0
-
-#: Values that the history of a solver may hold in all.
-MOST_HISTORY = 8_000
 
 #: Most terms of the expansion of a path; a path that needs more is cut into pieces.
 TERMS = 30
 
+#: Passes over a block that cost, per step, what an evaluation at one point costs: with loops that are vectorised, and
+#: with loops that are not as they call functions of the library, or with derivatives of paths, of which an evaluation
+#: at one point has no need.
+PASSES, PASSES_OF_CALLS = 2, 1
+
+Sizes = list[tuple[str, int, str]]
+
 
 def emit(program: Program, command: str, *, single_file: bool = False) -> dict[str, str]:
     """File names and their contents; with ``single_file`` only `NAME.c`, which then needs no header."""
-    name = program.name
-    values = _values(program)
-    declarations = _render("types.h", values) + "\n" + _render("functions.h", values)
-    body = _body(program)
+    name, lines = program.name, header_lines(program, command)
+    has = switches(program)
+    amalgam = Amalgam(name, has, printed(program, has))
+    declared = amalgam.text("solver.h") + "\n#ifdef __cplusplus\n}\n#endif\n"
+    defined = amalgam.text("runtime.c")
+    headers = "\n".join(sorted(amalgam.headers))
     if single_file:
-        return {f"{name}.c": _sealed(program, command, declarations + "\n" + body)}
+        body = fitted(f"{headers}\n{declared}\n{defined}")
+        return {f"{name}.c": _sealed(lines, body)}
     guard = f"{name.upper()}_H"
-    header = f"#ifndef {guard}\n#define {guard}\n\n{declarations}\n#endif /* {guard} */\n"
-    return {
-        f"{name}.h": _sealed(program, command, header),
-        f"{name}.c": _sealed(program, command, f'#include "{name}.h"\n\n{body}'),
-    }
+    header = fitted(f"#ifndef {guard}\n#define {guard}\n\n{declared}\n#endif /* {guard} */\n")
+    body = fitted(f'#include "{name}.h"\n\n{headers}\n\n{defined}')
+    return {f"{name}.h": _sealed(_declared_lines(program, command), header), f"{name}.c": _sealed(lines, body)}
 
 
-def _sealed(program: Program, command: str, body: str) -> str:
-    lines = header_lines(program, command)
-    comment = "\n".join(f" * {line}".rstrip() for line in lines)
-    return f"/*\n{comment}\n * {CHECKSUM} {checksum(body)}\n */\n{body}"
+def _declared_lines(program: Program, command: str) -> list[str]:
+    """The header comment of the declarations, shorter than that of the code."""
+    name = program.name
+    return [
+        f"{name}: the declarations of {name}.c, generated by phigen {program.version}.",
+        f"to regenerate: {command}",
+        "DO NOT EDIT: change the spec and regenerate; edits are noticed by the checksum below.",
+        f"SPDX-License-Identifier: {program.about.license}",
+    ]
 
 
-def _render(template: str, values: Mapping[str, object]) -> str:
-    return render("c", template, values)
+def _sealed(lines: Sequence[str], body: str) -> str:
+    chapters = re.findall(r"^/\* ---- (.*) ---- \*/$", body, re.MULTILINE)
+    contents = [""] * bool(chapters) + [f"  {k}. {chapter}" for k, chapter in enumerate(chapters, 1)]
+    text = "\n".join(f" * {line}".rstrip() for line in [*lines, *contents])
+    return f"/*\n{text}\n * {CHECKSUM} {checksum(body)}\n */\n{body}"
 
 
-def _values(program: Program) -> dict[str, object]:
-    parameters, member, step = program.parameters, members(program), program.step
-    inner = step.inner if isinstance(step, Implicit) else InnerSolve()
+def printed(program: Program, has: Mapping[str, bool]) -> dict[str, str]:
+    """What the runtime includes of the model, by the names that it has there."""
+    found = {}
+    step = program.step
+    if isinstance(step, Path):
+        found["path_model.h"] = _path(program, step.recurrences, "path")
+        if step.tangent:
+            varied = _path(tangent_program(program), step.tangent.recurrences, "tangent")
+            found["tangent_model.h"] = function(program, step.tangent.curvature) + "\n" + varied
+        if step.lanes and has["BLOCKS"]:
+            found["path_model_lanes.h"] = paths.printed(program, step, step.lanes)
+    if isinstance(step, Splitting):
+        found["flows.h"] = splitting.printed(program, step)
+        found["tangent_flows.h"] = splitting.tangent(program, step) if has["TANGENT"] else ""
+    if has["BLOCKS"] or has["PACKS"]:
+        found["model_lanes.h"] = "\n".join((lanes if has["BLOCKS"] else packs).printed(program))
+    declarations = render("c", "declarations.h", _declarations(program, has))
+    return {"declarations.h": declarations, "model.h": _model(program, has, found.values()), **found}
+
+
+def _declarations(program: Program, has: Mapping[str, bool]) -> dict[str, object]:
+    member = members(program)
+    sizes: Sizes = [("STAGES", len(program.fractions), "of a step")] if has["COMPOSED"] else []
+    sizes.append(("COEFFICIENTS", max(1, program.step.coefficients), "numbers that depend on params and h only"))
+    if program.gauge:
+        free = program.gauge.casimirs
+        sizes.append(("GAUGES", len(free), f"Casimirs whose multiples are taken from H: {', '.join(free)}"))
+    if has["RECURRENCES"]:
+        memory = lanes.remembered(program)
+        sizes.append(("REMEMBERED", memory["REMEMBERED"], "values that a recurrence is fitted to"))
+        sizes.append(("WINDOW", memory["WINDOW"], "of them that it may use"))
+        sizes.append(("AHEAD", memory["AHEAD"], "values that it foresees"))
     return {
         "NAME": program.name,
         "n": program.dimension,
-        "n2": program.dimension**2,
         "order": program.order,
         "casimir_count": len(program.casimirs),
-        "casimir_size": max(1, len(program.casimirs)),
+        "modified_power": program.modified.power if program.modified else 0,
         "version": program.version,
         "sha256": program.about.spec_sha256,
-        **_gauge_values(program),
-        "extra_declarations": extras.declarations(program),
-        "stages": len(program.fractions),
-        "fractions": ", ".join(repr(f) for f in program.fractions),
-        "terms": TERMS,
-        "series": len(step.recurrences.series) if isinstance(step, Path) else 0,
-        "coefficients": max(1, step.coefficients),
-        "history": HISTORY,
-        **_memory_values(program),
-        **_memory_lines(program),
-        "coordinates": ", ".join(f"{c} = x[{i}]" for i, c in enumerate(program.coordinates)),
-        "casimirs": ", ".join(f"{c} = out[{i}]" for i, c in enumerate(program.casimirs)) or "none",
-        "members": [(f"double {member[p.name]};", _about(p, member[p.name])) for p in parameters]
+        "coordinates": ", ".join(program.coordinates),
+        "casimirs": ", ".join(program.casimirs) or "none",
+        "gauges": "",
+        "members": [(f"double {member[p.name]};", _about(p, member[p.name])) for p in program.parameters]
         or [("char unused;", "this system has no parameters")],
-        "defaults": ", ".join(repr(float(p.value)) for p in parameters) or "0",
-        "max_iterations": inner.max_iterations,
-        "tolerance": repr(inner.tolerance),
-        **_admissible_values(program),
-        **{f"{key}_signature": "\n".join(lines) for key, lines in _signatures(program).items()},
-        "apart": apart(program),
-        **lanes.values(program, _memory_values(program)),
-        **packs.values(program),
-        "pivoting": f"{program.name}_solve" + ("_pivoting" if isinstance(step, Implicit) and step.eliminate else ""),
+        "sizes": sizes,
     }
 
 
@@ -127,190 +124,104 @@ def _about(parameter: Parameter, member: str) -> str:
     return said if member == parameter.name else f"{parameter.name}: {said}"
 
 
-def _memory_values(program: Program) -> dict[str, Any]:
-    affordable = MOST_HISTORY // (2 * program.dimension * len(program.fractions))
-    values = max(SMALLEST, min(FITTED, affordable))
-    window = 8 * (values * WINDOW // FITTED // 8)
-    ahead = LANES if lanes.blocks(program) else 1
-    checks = min(CHECKS, window // 4)
-    rows = 2 * ((values - window - ahead - checks + 1) // 2)
-    fitted = rows + checks + window + ahead - 1
-    return {
-        "fitted": fitted,
-        "kept": 2 * fitted,
-        "repay": REPAY,
-        "reach": repr(REACH),
-        "plausible": repr(PLAUSIBLE),
-        "longest_path": LONGEST_PATH,
-        "most_pieces": MOST_PIECES,
-        "most_repay": 4 * REPAY,
-        "group_repay": GROUP_REPAY * program.dimension,
-        "window": window,
-        "rows": rows,
-        "checks": checks,
-        "enough": repr(ENOUGH),
-        "hopeless": repr(HOPELESS),
-        "ahead": ahead,
-        "horizon": "the next values" if ahead > 1 else "the next value",
+def _constants(program: Program, has: Mapping[str, bool]) -> Sizes:
+    sizes: Sizes = []
+    step = program.step
+    if isinstance(step, Implicit):
+        sizes.append(("MAX_ITERATIONS", step.inner.max_iterations, "of an inner solve"))
+    if isinstance(step, Path):
+        sizes.append(("TERMS", TERMS, "most of the expansion of a path; one that needs more is cut into pieces"))
+        sizes.append(("SERIES", len(step.recurrences.series), "of a path, those of the coordinates first"))
+        sizes.append(("FIXED", max(1, len(step.recurrences.fixed)), "values that are constant along a path"))
+        if step.tangent:
+            varied = step.tangent.recurrences
+            sizes.append(("TANGENT_SERIES", len(varied.series), "of a path with its variation"))
+            sizes.append(("TANGENT_FIXED", max(1, len(varied.fixed)), "values that are constant along it"))
+    if has["RECURRENCES"]:
+        checks = lanes.remembered(program)["CHECKS"]
+        sizes.append(("CHECKS", checks, "values that a recurrence is not fitted to, but has to foresee"))
+    if has["BLOCKS"]:
+        passes = PASSES if lanes.vectorised(program) and not has["PATH"] else PASSES_OF_CALLS
+        sizes.append(("PASSES", passes, "over a block, that cost per step what an evaluation costs"))
+        if isinstance(step, Path) and step.lanes:
+            sizes += paths.sizes(step.lanes, lanes.slope_terms(program))
+    factors = lanes.factors_of(program)
+    if factors and has["SPARSE"]:
+        sizes.append(("FACTORS", len(factors.factorise.roots), "entries of the factors of a Newton matrix"))
+    return sizes + (splitting.sizes(step) if isinstance(step, Splitting) else [])
+
+
+def _model(program: Program, has: Mapping[str, bool], others: Iterable[str]) -> str:
+    step, seen, gauge = program.step, program.observables, program.gauge
+    body = functions.called(program)
+    own: list[Kernel | None] = []
+    if not isinstance(step, Splitting):
+        own = [step.prepare, step.main]
+    if isinstance(step, Implicit) and has["UNROLLED"]:
+        own.append(step.eliminate)
+    own += [gauge.guide, gauge.products] if gauge else []
+    own += [step.tangent] if isinstance(step, Explicit) else []
+    body += [function(program, kernel) for kernel in own if kernel]
+    body.append(function(program, seen.energy, name="hamiltonian", exported=True, returning=True))
+    body += [function(program, kernel, exported=True) for kernel in (seen.casimirs, seen.vector_field)]
+    if program.modified:
+        name = "modified_hamiltonian"
+        body.append(function(program, program.modified.kernel, name=name, exported=True, returning=True))
+    text = "\n".join(body)
+    member = members(program)
+    asked = [
+        f"isfinite(params->{member[p.name]})" + f" && params->{member[p.name]} > 0.0" * p.positive
+        for p in program.parameters
+    ]
+    schedule = step.schedule if isinstance(step, Splitting) else None
+    values = {
+        "NAME": program.name,
+        "defaults": ", ".join(repr(float(p.value)) for p in program.parameters) or "0",
+        "constants": _constants(program, has),
+        "tolerance": repr(step.inner.tolerance)
+        if isinstance(step, Implicit) and (has["NEWTON"] or has["BLOCKS"])
+        else "",
+        "asked": " && ".join(asked),
+        "fractions": ", ".join(map(repr, program.fractions)) if has["COMPOSED"] else "",
+        "times": ", ".join(map(repr, schedule.times)) if schedule else "",
+        "multiples": ", ".join(map(repr, schedule.multiples)) if schedule else "",
+        "path_slopes": ", ".join(map(str, step.recurrences.slopes)) if isinstance(step, Path) and has["BLOCKS"] else "",
+        "apart": has["PACKS"] or any("_APART" in part for part in [text, *others]),
     }
+    return render("c", "constants.c", values) + text
 
 
-def _memory_lines(program: Program) -> dict[str, object]:
-    """The memory of the inner solve, where there is one."""
-    name, stages = program.name, len(program.fractions)
-    if not isinstance(program.step, Implicit):
-        nothing: dict[str, object] = dict.fromkeys(("memory_type", "memory_members", "memory_reset", "retry"), ())
-        return nothing | {"remembered_value": "at.x"}
-    head = {"NAME": name, **_memory_values(program)}
-    return {
-        "memory_type": [*render("c", "memory.h", head).splitlines(), ""],
-        "memory_members": [f"{name}_memory memory[{stages}];"],
-        "memory_reset": [
-            "memset(s->memory, 0, sizeof s->memory);",
-            f"for (int stage = 0; stage < {stages}; ++stage) s->memory[stage].patience = {REPAY};",
-        ],
-        "retry": [
-            "/* A guess from earlier steps may have misled it: once more without. */",
-            f"if (status != {name}_OK && s->memory[stage].count > 0) {{",
-            "    memset(&s->memory[stage], 0, sizeof s->memory[stage]);",
-            f"    status = {name}_attempt(s, stage);",
-            "}",
-        ],
-        "remembered_value": "s->memory[k].past[s->memory[k].count - 1]",
-    }
-
-
-def _gauge_values(program: Program) -> dict[str, object]:
-    name, gauge = program.name, program.gauge
-    start = f"{name}_start(s, params, x0);"
-    if not gauge:
-        nothing: dict[str, object] = dict.fromkeys(("gauge_members", "gauge_declarations"), ())
-        own = {"gauges": 0, "products": 0, "prepare_arguments": "&s->params", "init_body": [f"return {start}"]}
-        return nothing | own
-    count = len(gauge.casimirs)
-    said = "Start at x0 with a gauge of one's own: the step is an exact Poisson map for each fixed gauge"
-    return {
-        "gauges": count,
-        "products": 1 + 2 * count,
-        "prepare_arguments": "&s->params, s->gauge",
-        "gauge_members": [f"double gauge[{count}]; /* multiples of {', '.join(gauge.casimirs)} taken from H */"],
-        "gauge_declarations": [
-            f"/* {said}. */",
-            *_init_gauge(program, count)[:-1],
-            _init_gauge(program, count)[-1] + ";\n",
-        ],
-        "init_body": [
-            f"const {name}_status status = {start}",
-            f"if (status == {name}_OK) {name}_choose_gauge(&s->params, s->x, s->gauge);",
-            "return status;",
-        ],
-    }
-
-
-def _admissible_values(program: Program) -> dict[str, object]:
-    """What is asked of parameters; without any, nothing."""
-    gauges, member = len(program.gauge.casimirs) if program.gauge else 0, members(program)
-    refuse = f"if (!{program.name}_admissible(&own)) return {program.name}_BAD_ARGUMENT;"
-    return {
-        "refusal": [refuse] if program.parameters else [],
-        "conditions": [
-            f"isfinite(params->{member[p.name]})" + (f" && params->{member[p.name]} > 0.0" if p.positive else "")
-            for p in program.parameters
-        ],
-        "zero_gauge": [f"const double gauge[{gauges}] = {{ 0.0 }};"] if gauges else [],
-        "admissible_arguments": "params, gauge" if gauges else "params",
-    }
-
-
-def _init_gauge(program: Program, count: int) -> list[str]:
-    name, n = program.name, program.dimension
-    arguments = [f"{name}_solver *s", f"const {name}_params *params", f"const double x0[{n}]"]
-    return wrapped_arguments(f"{name}_status {name}_init_gauge(", [*arguments, f"const double gauge[{count}]"])
-
-
-def _signatures(program: Program) -> dict[str, list[str]]:
-    """Signatures that are too long for one line with a long name."""
-    name, n = program.name, program.dimension
-    solver, params, status = f"{name}_solver *s", f"const {name}_params *params", f"{name}_status "
-    state = f"const double x[{n}]"
-    many = ["double *x", "size_t members", "double h", "size_t steps", "unsigned char *status"]
-    return {
-        "init_gauge": _init_gauge(program, len(program.gauge.casimirs) if program.gauge else 0),
-        "init": wrapped_arguments(f"{status}{name}_init(", [solver, params, f"const double x0[{n}]"]),
-        "ensemble": wrapped_arguments(f"{status}{name}_ensemble(", [params, *many]),
-        "hamiltonian": wrapped_arguments(f"double {name}_hamiltonian(", [params, state]),
-        "casimirs": wrapped_arguments(f"void {name}_casimirs(", [params, state, "double out[]"]),
-        "vector_field": wrapped_arguments(f"void {name}_vector_field(", [params, state, f"double out[{n}]"]),
-    }
-
-
-def _path_syntax(program: Program) -> Syntax:
-    return Syntax(
+def _path(program: Program, path: Recurrences, kind: str) -> str:
+    """The recurrences of a path, or of one with its variation."""
+    syntax = Syntax(
         printer=printer,
         covector="p[{i}]",
-        fixed="const double f{i} = {value};",
+        fixed="f[{i}] = {value};",
         first="s[{i}][0] = {value};",
         following="s[{i}][k] = {value};",
         slope="s[{i}][k + 1] = s[{slope}][k] / (k + 1);",
         sums=f"{program.name}_taylor",
+        held="f[{i}]",
+    )
+    found = statements(program, path, syntax)
+    begin, rules = [*found["fixed"], *found["first"]], [*found["rules"], *found["slopes"]]
+    return render(
+        "c",
+        "path.c",
+        {
+            **found,
+            "NAME": program.name,
+            "kind": kind,
+            "n": program.dimension,
+            "series": len(path.series),
+            "fixed_count": max(1, len(path.fixed)),
+            "unused_first": _unused(begin, ("coef", "p", "f")),
+            "unused_rules": _unused(rules, ("coef", "p", "f")),
+            "unused_field": _unused([*found["fixed"], *found["nodes"]], ("coef", "p")),
+        },
     )
 
 
-def _body(program: Program) -> str:
-    values, step = _values(program), program.step
-
-    def static(kernel: Kernel) -> str:
-        return function(program, kernel) + "\n"
-
-    pieces = [_render("preamble.c", values)]
-    pieces += [_render("phi.c", special.values(f, f"{program.name}_{f}")) for f in special.used(program)]
-    pieces += small.pieces(program)
-    if not isinstance(step, Splitting):
-        pieces.append(static(step.prepare))
-    if isinstance(step, Implicit):
-        pieces += [static(step.main), _render("pivoting.c", values)]
-        if step.eliminate:
-            pieces += [static(step.eliminate), _render("unrolled.c", values)]
-        pieces += [_render(f"{template}.c", values) for template in ("remember", "project", "train", "learn")]
-        pieces.append(_render("plausible.c", values))
-    if not isinstance(step, Splitting) or program.extras.tangent:
-        pieces.append(_render("advance.c", values))
-    match step:
-        case Path():
-            pieces += _path(program, step, values)
-        case Newton():
-            size = "size_relative.c" if step.inner.relative else "size.c"
-            pieces += [_render(size, values), _render("newton.c", values)]
-        case Splitting():
-            pieces += splitting.pieces(program, step, values)
-        case Explicit():
-            pieces += [static(step.increment), _render("explicit.c", values)]
-    if not isinstance(step, Splitting):
-        pieces.append(_render("compose.c", values))
-    if program.parameters:
-        pieces.append(_render("admissible.c", values))
-    pieces.append(_render("start.c", values))
-    if program.gauge:
-        pieces += [static(program.gauge.guide), static(program.gauge.products)]
-        pieces += [_render(f"{template}.c", values) for template in ("gauge", "gauge_line", "choose_gauge")]
-    if program.extras.tangent:
-        pieces += extras.tangent(program, values, _path_syntax(program))
-    if program.modified:
-        pieces += extras.modified(program, program.modified.kernel, values)
-    pieces += [_render("api.c", values)]
-    pieces += packs.pieces(program, values) if packs.packed(program) else lanes.pieces(program, values)
-    seen = program.observables
-    pieces += [static(seen.energy), static(replace(seen.casimirs, name="casimir_values"))]
-    pieces.append(static(replace(seen.vector_field, name="field")))
-    if any(apart(program) in piece for piece in pieces):
-        pieces.insert(1, _render("apart.c", values))
-    return "\n".join([*pieces, _render("observables.c", values)])
-
-
-def _path(program: Program, step: Path, values: Mapping[str, object]) -> list[str]:
-    path = step.recurrences
-    unused = [] if reads_coefficients(path) else ["(void)coef;"]
-    piece = {**values, **statements(program, path, _path_syntax(program)), "unused": unused}
-    pieces = [_render(f"taylor_{kind}.c", values) for kind in kinds(path)]
-    pieces += [_render("holds.c", piece), _render("piece.c", piece)]
-    return [*pieces, _render("path.c", values), _render("path_step.c", values)]
+def _unused(lines: list[str], names: tuple[str, ...]) -> list[str]:
+    text = "\n".join(lines)
+    return [f"(void){name};" for name in names if not re.search(rf"\b{name}\[", text)]

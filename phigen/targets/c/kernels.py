@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import re
-import textwrap
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from phigen.scheme.kernel import Kernel
+from phigen.scheme.lowering import Assignment
 from phigen.scheme.program import Program
 from phigen.symbolic import functions as elementary
-from phigen.symbolic.symbols import WORK, Symbol, kind_of
-from phigen.targets.code import Code, lower, parts
+from phigen.symbolic.expression import Expression, topological
+from phigen.symbolic.symbols import TEMPORARY, WORK, Symbol, kind_of
+from phigen.targets.c.layout import comment
+from phigen.targets.code import Code, Store, lower, parts
 from phigen.targets.header import plain
 from phigen.targets.names import Scope, identifiers
 from phigen.targets.printer import Printer
@@ -24,6 +26,9 @@ CONSTANTS = {"pi": "3.141592653589793", "E": "2.718281828459045"}
 #: Most assignments in one function; longer ones take quadratic time to compile.
 LONGEST_FUNCTION = 200
 
+#: Longest line that several temporaries share.
+SHARED_LINE = 100
+
 #: Points at which a kernel for lanes is evaluated at once: what one vector of AVX-512 holds.
 LANES = 8
 
@@ -32,10 +37,38 @@ LANE_FUNCTIONS = tuple(f.name for f in elementary.FUNCTIONS.values() if f.lanes 
 LANE_FORMULAS = {f.name: f.lanes for f in elementary.FUNCTIONS.values() if f.lanes not in ("", f.name)}
 
 
+@dataclass(frozen=True)
+class Form:
+    """How a kernel is printed: under which name; ``exported``, where NULL stands for the default parameters;
+    ``returning`` its only value; at one point or in ``lanes``; at a ``single`` lane; without zeros if ``sparse``; what
+    it calls; which arrays all lanes share; how large its workspace is, if it is a part."""
+
+    name: str
+    exported: bool = False
+    returning: bool = False
+    lanes: bool = False
+    single: bool = False
+    sparse: bool = False
+    functions: Mapping[str, str] = field(default_factory=lambda: FUNCTIONS)
+    shared: frozenset[str] = frozenset()
+    workspace: int = 0
+
+    def number(self, program: Program, array: str) -> str:
+        """The type of an entry of an array."""
+        return f"{program.name}_lanes" if self.lanes and array not in self.shared else "double"
+
+    def lane(self, array: str) -> str:
+        """The inner index of an array."""
+        return "[lane]" if self.lanes and array not in self.shared else ""
+
+
 def function(
     program: Program,
     kernel: Kernel,
     *,
+    name: str = "",
+    exported: bool = False,
+    returning: bool = False,
     lanes: bool = False,
     single: bool = False,
     sparse: bool = False,
@@ -48,24 +81,32 @@ def function(
     that are ``shared``. A ``single`` one is evaluated at one of these points, the argument ``lane``, and its outputs
     are numbers. What is always zero is not stored if ``sparse``. ``functions`` are the names of those that it calls.
     """
-    pieces = parts(lower(kernel), LONGEST_FUNCTION)
-    workspace = 1 + max((k for p in pieces for k in p.kept), default=0)
     if functions is None:
         functions = lane_calls(program) if lanes else FUNCTIONS
-    name = f"{program.name}_{kernel.name}{'_lane' if single else '_lanes' if lanes else ''}"
+    own = f"{program.name}_{name or kernel.name}{'_lane' if single else '_lanes' if lanes else ''}"
     plain_arrays = {*shared, "work", *(o.name for o in kernel.outputs)} if single else {*shared}
-    form = Form(name, lanes, functions, frozenset(plain_arrays), single=single, sparse=sparse)
+    form = Form(own, exported, returning, lanes, single, sparse, functions, frozenset(plain_arrays))
+    purpose = f"{program.name}_{kernel.name} in {'one lane' if single else 'all lanes'}" if lanes else kernel.purpose
+    code = lower(kernel)
+    pieces = parts(code if lanes else _in_order(kernel, code), LONGEST_FUNCTION)
+    head = [*_comment(purpose, ""), _signature(program, kernel, form) + "\n{"]
     if len(pieces) == 1:
-        return _definition(program, kernel, form, pieces[0])
+        return "\n".join([*head, *_body(program, kernel, form, pieces[0]), "}"]) + "\n"
+    workspace = 1 + max((k for p in pieces for k in p.kept), default=0)
     texts = []
     for k, piece in enumerate(pieces, 1):
-        part = replace(form, name=f"{form.name}_part{k}", workspace=workspace, part=(k, len(pieces)))
-        texts.append(_definition(program, kernel, part, piece))
+        part = replace(form, name=f"{own}_part{k}", workspace=workspace, exported=False, returning=False)
+        lines = [*_comment(f"{purpose} (part {k} of {len(pieces)})", ""), _signature(program, kernel, part) + "\n{"]
+        texts.append("\n".join([*lines, *_body(program, kernel, part, piece), "}\n"]))
     arguments = ", ".join([*kernel.inputs, *(["lane"] if single else []), *(o.name for o in kernel.outputs), "work"])
-    lines = [_purpose(program, kernel, form), *_signature(program, kernel, form), "{"]
-    lines.append(f"    {form.number(program, 'work')} work[{workspace}];")
-    lines += [f"    {form.name}_part{k}({arguments});" for k in range(1, len(pieces) + 1)]
-    return "\n\n".join([*texts, "\n".join([*lines, "}"])])
+    head.append(f"    {form.number(program, 'work')} work[{workspace}];")
+    if exported:
+        arguments = arguments.replace(f", {kernel.outputs[0].name}, work", ", value, work")
+        head += [f"    double value[{len(kernel.roots)}];", *_default_parameters(program, kernel, form)]
+    head += [f"    {own}_part{k}({arguments});" for k in range(1, len(pieces) + 1)]
+    if exported:
+        head.append("    return value[0];" if returning else "    memcpy(out, value, sizeof value);")
+    return "\n".join([*texts, *head, "}"]) + "\n"
 
 
 def lane_calls(program: Program) -> Mapping[str, str]:
@@ -74,54 +115,31 @@ def lane_calls(program: Program) -> Mapping[str, str]:
     return {**FUNCTIONS, **own, **{f: text.format_map(own) for f, text in LANE_FORMULAS.items()}}
 
 
-@dataclass(frozen=True)
-class Form:
-    """How a kernel is printed: name; at one point or in lanes; what it calls; which arrays all lanes share;
-    whole, or a ``part``; at a ``single`` lane; without zeros if ``sparse``."""
+def _in_order(kernel: Kernel, code: Code) -> Code:
+    """The same with what has a name first, then what each output needs beyond that, each with its stores."""
+    made = {a.target: a for a in code.assignments}
+    ordered: dict[str, Assignment] = {}
 
-    name: str
-    lanes: bool = False
-    functions: Mapping[str, str] = field(default_factory=lambda: FUNCTIONS)
-    shared: frozenset[str] = frozenset()
-    workspace: int = 0
-    part: tuple[int, int] = (1, 1)
-    single: bool = False
-    sparse: bool = False
+    def take(targets: Iterable[str]) -> None:
+        needed, left = set(), [*targets]
+        while left:
+            target = left.pop()
+            if target in made and target not in needed:
+                needed.add(target)
+                left += _reads(made[target].value)
+        ordered.update((a.target, a) for a in code.assignments if a.target in needed)
 
-    def number(self, program: Program, array: str) -> str:
-        """The type of an entry of an array."""
-        return f"{program.name}_lanes" if self.lanes and array not in self.shared else "double"
-
-    def lane(self, array: str) -> str:
-        """The inner index of an array."""
-        return "[lane]" if self.lanes and array not in self.shared else ""
+    take(name for name, _ in kernel.named)
+    for o in kernel.outputs:
+        take(r for s in code.stores if s.array == o.name for r in _reads(s.value))
+    return replace(code, assignments=tuple(ordered.values()))
 
 
-def _purpose(program: Program, kernel: Kernel, form: Form) -> str:
-    if form.single:
-        return _comment(f"{kernel.purpose}; in one lane")
-    if form.lanes:
-        return f"/* {program.name}_{kernel.name} in all lanes. */"
-    return _comment(kernel.purpose)
+def _reads(value: Expression) -> list[str]:
+    return [e.value for e in topological([value]) if e.op == "symbol"]
 
 
-def _definition(program: Program, kernel: Kernel, form: Form, code: Code) -> str:
-    part = f"(part {form.part[0]} of {form.part[1]})"
-    head = _purpose(program, kernel, form)
-    if form.part[1] > 1:
-        head = f"/* {form.name} {part} */" if form.lanes else _comment(f"{kernel.purpose} {part}")
-    body = _body(program, kernel, form, code)
-    if form.lanes and not form.single:
-        loop = [f"{each_lane(program)}", f"for (int lane = 0; lane < {program.name}_LANES; ++lane) {{"]
-        body = [line for line in body if "(void)" in line] + [
-            *(f"    {line}" for line in loop),
-            *(f"    {line}" for line in body if "(void)" not in line),
-            "    }",
-        ]
-    return "\n".join([head, *_signature(program, kernel, form), "{", *body, "}"])
-
-
-def _signature(program: Program, kernel: Kernel, form: Form) -> list[str]:
+def _signature(program: Program, kernel: Kernel, form: Form) -> str:
     # C99 has no conversion from double (*)[8] to const double (*)[8]: the inputs of lanes are not const.
     number = f"{program.name}_lanes" if form.lanes else "double"
     given, alone = (number, "restrict ") if form.lanes else ("const double", "")
@@ -134,24 +152,17 @@ def _signature(program: Program, kernel: Kernel, form: Form) -> list[str]:
         else f"{kinds[i][0]} {i}[{kinds[i][1]}{max(1, len(symbols))}]"
         for i, symbols in kernel.inputs.items()
     ]
-    # restrict: the outputs never overlap the inputs. All kernels are static; callers of the API get no such duty.
+    # restrict: the outputs never overlap the inputs of our own calls; callers of the API get no such duty.
+    qualifier = "" if form.exported else "restrict "
     arguments += ["int lane"] if form.single else []
-    arguments += [f"{form.number(program, o.name)} {o.name}[restrict {max(1, len(o.values))}]" for o in kernel.outputs]
+    for o in () if form.returning else kernel.outputs:
+        # The caller of NAME_casimirs sizes the array by NAME_CASIMIRS, which may be 0.
+        length = "" if form.exported and kernel.name == "casimirs" else f"{qualifier}{max(1, len(o.values))}"
+        arguments.append(f"{form.number(program, o.name)} {o.name}[{length}]")
     if form.workspace:
         arguments.append(f"{form.number(program, 'work')} work[restrict {form.workspace}]")
-    kind = f"{apart(program)} static void " if form.workspace else "static void "
-    return wrapped_arguments(f"{kind}{form.name}(", arguments)
-
-
-def wrapped_arguments(head: str, arguments: Sequence[str]) -> list[str]:
-    """``head(arguments)`` over as many lines as a width of 110 takes, continuation lines aligned."""
-    lines = [head]
-    for k, argument in enumerate(arguments):
-        piece = argument + ("," if k + 1 < len(arguments) else ")")
-        if len(lines[-1]) + len(piece) > 110 and lines[-1].strip():
-            lines.append(" " * len(head))
-        lines[-1] += piece if lines[-1].endswith("(") or not lines[-1].strip() else " " + piece
-    return lines
+    linkage = f"{program.name}_APART static " if form.workspace else "" if form.exported else "static "
+    return f"{linkage}{'double' if form.returning else 'void'} {form.name}({', '.join(arguments)})"
 
 
 def _body(program: Program, kernel: Kernel, form: Form, code: Code) -> list[str]:
@@ -159,41 +170,96 @@ def _body(program: Program, kernel: Kernel, form: Form, code: Code) -> list[str]
     calls = {f: f"{program.name}_{f}" for f in elementary.FUNCTIONS} | dict(form.functions)
     called = re.findall(r"[A-Za-z_]\w*", " ".join(calls.values()))
     scope = Scope(C_RESERVED | {*arrays, *called})
-    member = members(program)
-    lines: list[str] = []
-    touched: set[str] = set()
+    declared = _bound(program, kernel, form, code, scope)
+    for k in range(form.workspace):
+        scope.bind(Symbol(WORK, k), f"work[{k}]{form.lane('work')}")
+    for k, a in enumerate((a for a in code.assignments if kind_of(a.target) == TEMPORARY), 1):
+        scope.bind(a.target, f"t{k}")
+    show = printer(scope, calls)
+    stores = [s for s in code.stores if not (form.sparse and s.value.is_zero)]
+    touched = {i for i, symbols in kernel.inputs.items() if not code.used.isdisjoint(symbols)}
+    lines = [f"    const double {', '.join(declared)};"] if declared else []
+    lines += _statements(kernel, form, code, stores, scope, show)
+    unused = [i for i in kernel.inputs if i not in touched]
+    unused += [o.name for o in kernel.outputs if o.name not in {s.array for s in stores}]
+    if form.workspace and not any("work[" in line for line in lines):
+        unused.append("work")
+    if form.returning:
+        lines = [line.replace(f"{kernel.outputs[0].name}[0] =", "return", 1) for line in lines]
+    head = [f"    {', '.join(f'(void){u}' for u in unused)};"] if unused else []
+    head += _default_parameters(program, kernel, form) if "params" in touched else []
+    if not form.lanes or form.single:
+        return [*head, *lines]
+    loop = [f"    {program.name}_EACH_LANE", f"    for (int lane = 0; lane < {program.name}_LANES; ++lane) {{"]
+    return [*head, *loop, *(f"    {line}" for line in lines), "    }"]
+
+
+def _default_parameters(program: Program, kernel: Kernel, form: Form) -> list[str]:
+    given = form.exported and "params" in kernel.inputs
+    return [f"    if (params == NULL) params = &{program.name}_default_params;"] if given else []
+
+
+def _bound(program: Program, kernel: Kernel, form: Form, code: Code, scope: Scope) -> list[str]:
+    """Binds the inputs that are used to what they are called; the declarations of those that get a name."""
+    member, declared = members(program), []
     for array, symbols in kernel.inputs.items():
         for i, s in enumerate(symbols):
             if s not in code.used:
                 continue
-            touched.add(array)
             if array == "h":
                 scope.bind(s, "h")
-            elif array == "params":
+            elif array == "params" and not form.exported:
                 scope.bind(s, f"params->{member[s]}")
+            elif array == "params":  # all is read before anything is written: arguments of the API may overlap
+                declared.append(f"{scope[s]} = params->{member[s]}")
             elif isinstance(s, Symbol):
                 scope.bind(s, f"{array}[{i}]{form.lane(array)}")
             else:
-                lines.append(f"    const double {scope[s]} = {array}[{i}]{form.lane(array)};")
-    for k in range(form.workspace):
-        scope.bind(Symbol(WORK, k), f"work[{k}]{form.lane('work')}")
-    show = printer(scope, calls)
-    for a in code.assignments:
-        declare = "" if kind_of(a.target) == WORK else "const double "
-        lines.append(f"    {declare}{scope[a.target]} = {show(a.value)};")
-    stores = [s for s in code.stores if not (form.sparse and s.value.is_zero)]
-    filled = {s.array for s in stores}
-    lines += [f"    {s.array}[{s.index}]{form.lane(s.array)} = {show(s.value)};" for s in stores]
-    unused = [i for i in kernel.inputs if i not in touched]
-    unused += [o.name for o in kernel.outputs if o.name not in filled]
-    if form.workspace and not any("work[" in line for line in lines):
-        unused.append("work")
-    return [*(f"    (void){u};" for u in unused), *lines]
+                declared.append(f"{scope[s]} = {array}[{i}]{form.lane(array)}")
+    return declared
 
 
-def apart(program: Program) -> str:
-    """The macro that keeps the parts of a long function from being inlined into one again."""
-    return f"{program.name}_APART"
+def _statements(
+    kernel: Kernel, form: Form, code: Code, stores: Sequence[Store], scope: Scope, show: Printer
+) -> Iterator[str]:
+    """Assignments and stores; those of a kernel with several outputs under headings."""
+    order = {a.target: k for k, a in enumerate(code.assignments)}
+    split = len(kernel.outputs) > 1 and not form.lanes and not form.workspace
+    groups = (
+        [(o.name, [s for s in stores if s.array == o.name]) for o in kernel.outputs] if split else [("", [*stores])]
+    )
+    named = [order[name] for name, _ in kernel.named if name in order]
+    ends = [1 + max((order[r] for s in of for r in _reads(s.value) if r in order), default=-1) for _, of in groups]
+    done = 0
+    if split and named:
+        yield "    /* momenta */"
+        ends.insert(0, max(named) + 1)
+        groups.insert(0, ("", []))
+    if not split:
+        ends = [len(code.assignments)]
+    for (heading, of), end in zip(groups, ends, strict=True):
+        if heading:
+            yield f"    /* {heading.replace('_', ' ')} */"
+        yield from _declared((a.target, f"{scope[a.target]} = {show(a.value)}") for a in code.assignments[done:end])
+        done = max(done, end)
+        for s in of:
+            yield f"    {s.array}[{s.index}]{form.lane(s.array)} = {show(s.value)};"
+
+
+def _declared(assignments: Iterable[tuple[str, str]]) -> Iterator[str]:
+    """Statements for assignments to workspace or to constants; short temporaries share lines."""
+    line = ""
+    for target, text in assignments:
+        joined = f"{line}, {text}" if line else f"    const double {text}"
+        if line and (kind_of(target) != TEMPORARY or len(joined) > SHARED_LINE):
+            yield f"{line};"
+            joined = f"    const double {text}"
+        line = joined
+        if kind_of(target) != TEMPORARY:
+            yield f"    {text};" if kind_of(target) == WORK else f"{line};"
+            line = ""
+    if line:
+        yield f"{line};"
 
 
 def printer(scope: Scope, functions: Mapping[str, str] = FUNCTIONS) -> Printer:
@@ -201,15 +267,10 @@ def printer(scope: Scope, functions: Mapping[str, str] = FUNCTIONS) -> Printer:
     return Printer(lambda n: scope[n], functions, CONSTANTS, "pow")
 
 
-def each_lane(program: Program) -> str:
-    """The macro before a loop over lanes, which tells compilers that they are independent."""
-    return f"{program.name}_EACH_LANE"
-
-
 def members(program: Program) -> dict[str, str]:
     """The members of the parameter struct, by the names of the parameters."""
     return identifiers((p.name for p in program.parameters), C_RESERVED)
 
 
-def _comment(text: str) -> str:
-    return "\n".join(textwrap.wrap(f"/* {plain(text)} */", 110, subsequent_indent="   "))
+def _comment(text: str, indent: str) -> list[str]:
+    return comment(f"/* {plain(text)} */", indent)

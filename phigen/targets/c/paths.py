@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 from phigen.scheme.kernel import Kernel, Output
 from phigen.scheme.lowering import expand_powers
@@ -12,22 +11,16 @@ from phigen.scheme.program import Program
 from phigen.scheme.steps import Path, PathLanes
 from phigen.symbolic.expression import Expression, substitute, symbol
 from phigen.symbolic.symbols import FIXED, SERIES, Symbol, coefficient, momentum
-from phigen.targets.c.kernels import FUNCTIONS, each_lane, printer
+from phigen.targets.c.kernels import FUNCTIONS, printer
 from phigen.targets.names import Scope
 from phigen.targets.rendering import render
 from phigen.targets.reserved import Reserved
 
-#: Most terms of the expansion of a path from its middle.
+#: Most terms of the expansion of a path from its middle, as in the runtime.
 TERMS = 16
 
-#: Most terms of the expansion of its derivatives, fewer where the stack is too small; their accuracy.
-SLOPE_TERMS, SLOPE_ACCURACY = (12, 8), 1e-7
-
-#: Templates in the order in which they call one another.
-TEMPLATES = (
-    *("path_lanes", "path_follow", "path_expand", "path_holds", "path_settle", "path_rough"),
-    *("path_vary", "path_slopes", "path_update", "path_table"),
-)
+#: Most terms of the expansion of its derivatives, fewer where the stack is too small.
+SLOPE_TERMS = (12, 8)
 
 #: Longest loop over lanes, in statements.
 LONGEST_LOOP = 60
@@ -42,17 +35,6 @@ def stack(program: Program, slope_terms: int) -> tuple[int, int]:
     series = len(path.series) * (TERMS + 3) + len(slopes.series) * (slope_terms + 2)
     fixed = len(path.fixed) + len(slopes.fixed)
     return n + 2 * n * n, series + fixed + 2 * n * n * (slope_terms + 4) + 2 * n * n + 8 * n
-
-
-def model_members(program: Program) -> list[str]:
-    """What a model remembers of the path in its lane."""
-    if not isinstance(program.step, Path):
-        return []
-    name, n = program.name, program.dimension
-    return [
-        f"{name}_lanes middle[{n}]; /* of the path, less y */",
-        f"{name}_lanes alpha_y[{n * n}], increment_y[{n * n}]; /* of alpha and beta - alpha, with p held fixed */",
-    ]
 
 
 def kernels(program: Program, step: Path, lanes: PathLanes) -> list[Kernel]:
@@ -87,36 +69,34 @@ def kernels(program: Program, step: Path, lanes: PathLanes) -> list[Kernel]:
     ]
 
 
-def pieces(program: Program, step: Path, lanes: PathLanes, values: Mapping[str, Any], slope_terms: int) -> list[str]:
-    """A stage in all lanes: `NAME_update` and what it calls."""
+def sizes(lanes: PathLanes, slope_terms: int) -> list[tuple[str, int, str]]:
+    """The constants of paths in lanes."""
+    return [
+        ("SLOPE_TERMS", slope_terms, "most of the expansion of the derivatives of a path"),
+        ("SLOPE_SERIES", max(1, len(lanes.slopes.series)), "further series that these need"),
+        ("SLOPE_FIXED", max(1, len(lanes.slopes.fixed)), "further values that are constant along a path"),
+    ]
+
+
+def printed(program: Program, step: Path, lanes: PathLanes) -> str:
+    """The recurrences of all series in lanes."""
     path, slopes, n = step.recurrences, lanes.slopes, program.dimension
     show = _Show(program, path, slopes)
-    every = [*path.series, *slopes.series]
-    base = len(path.series)
+    every, base = [*path.series, *slopes.series], len(path.series)
+    follow, further = (
+        _rules(program, show, every, range(n, base)),
+        _rules(program, show, every, range(base, len(every))),
+    )
     own = {
-        **values,
-        "terms": TERMS,
-        "slope_terms": slope_terms,
-        "slope_accuracy": repr(SLOPE_ACCURACY),
-        "series": base,
-        "slope_series": max(1, len(slopes.series)),
-        "fixed": max(1, len(path.fixed)),
-        "slope_fixed": max(1, len(slopes.fixed)),
-        "n_twice": 2 * n,
-        "n2_twice": 2 * n * n,
-        "slopes": ", ".join(map(str, path.slopes)),
+        "NAME": program.name,
         "follow": [
-            (
-                "follow",
-                "the series that follow from those of the coordinates",
-                *_rules(program, show, every, range(n, base)),
-            ),
-            ("follow_slopes", "the further series", *_rules(program, show, every, range(base, len(every)))),
+            ("follow", "the series that follow from those of the coordinates", *follow),
+            ("follow_slopes", "the further series", *further),
         ],
         "vary": _variation(show, slopes.jacobian),
         "source": _source(show, slopes),
     }
-    return [render("c", f"{template}.c", own) for template in TEMPLATES]
+    return render("c", "path_lanes.c", own)
 
 
 def _symbols(kind: str, values: Sequence[object]) -> tuple[Symbol, ...]:
@@ -196,7 +176,7 @@ def _loops(program: Program, statements: Sequence[str]) -> list[str]:
     """Statements for one lane in loops over all, none of which is too long."""
     lines: list[str] = []
     for start in range(0, len(statements), LONGEST_LOOP):
-        lines += [each_lane(program), f"for (int lane = 0; lane < {program.name}_LANES; ++lane) {{"]
+        lines += [f"{program.name}_EACH_LANE", f"for (int lane = 0; lane < {program.name}_LANES; ++lane) {{"]
         lines += [f"    {line}" for line in statements[start : start + LONGEST_LOOP]]
         lines.append("}")
     return lines

@@ -8,55 +8,56 @@ from dataclasses import replace
 from phigen.scheme.kernel import Kernel, Output
 from phigen.scheme.program import Program
 from phigen.scheme.steps import Splitting
+from phigen.targets.c.functions import FLOW_FUNCTIONS
 from phigen.targets.c.kernels import FUNCTIONS, function
-from phigen.targets.c.small import FLOW_FUNCTIONS
 from phigen.targets.rendering import render
 
 
-def pieces(program: Program, step: Splitting, values: Mapping[str, object]) -> list[str]:
-    """The functions of the step."""
-    own = {**values, **_values(step)}
-    prepare = function(program, replace(step.prepare, name="prepare_row")) + "\n"
-    found, functions = [prepare, render("c", "add.c", values)], _functions(program)
+def sizes(step: Splitting) -> list[tuple[str, int, str]]:
+    """The constants of a splitting."""
+    found = [("ROWS_OF_FLOWS", len(step.schedule.times), "times of flows in a step, each with its coefficients")]
+    found.append(("ROW", max(1, step.row), "coefficients for one of them"))
+    return found + ([("FLOWS", len(step.schedule.flows), "in a step")] if step.tangents else [])
+
+
+def printed(program: Program, step: Splitting) -> str:
+    """The flows, and one step."""
+    n = program.dimension
+    found = [function(program, replace(step.prepare, name="prepare_row"))]
     for k, flow in enumerate(step.flows, 1):
-        kernel, moved = _compact(flow, k)
-        found.append(function(program, kernel, functions=functions) + "\n")
-        found.append(
-            render("c", "flow.c", own | {"k": k, "moved": list(enumerate(moved)), "count": max(1, len(moved))})
-        )
-    rows = "rows_kicks.c" if step.schedule.multiples else "rows.c"
-    calls = _calls(program, step, "", "x, moved, s->x")
-    return [*found, render("c", rows, own), render("c", "splitting.c", own | {"step": calls})]
+        kernel, values = _flow(program, flow, k)
+        found.append(function(program, kernel, functions=_functions(program)))
+        found.append(render("c", "flow.c", values))
+    arguments = f"const double *coef, double x[{n}], double moved[{n}], const double start[{n}]"
+    found.append(_steps(program, step, "", "inline ", arguments, "x, moved, start"))
+    return "\n".join(found)
 
 
-def in_lanes(
-    program: Program, step: Splitting, values: Mapping[str, object], form: str, functions: Mapping[str, str]
-) -> list[str]:
+def in_lanes(program: Program, step: Splitting, form: str, functions: Mapping[str, str]) -> list[str]:
     """Steps of the members of packs, which call ``functions``; ``form`` is added to the names."""
-    found, end = [], f"{form}_lanes"
+    found = []
     for k, flow in enumerate(step.flows, 1):
-        kernel, moved = _compact(flow, k)
+        kernel, values = _flow(program, flow, k)
         kernel = replace(kernel, name=kernel.name + form)
-        found.append(function(program, kernel, lanes=True, shared=["coef"], functions=functions) + "\n")
-        own = {"k": k, "form": end, "moved": list(enumerate(moved)), "count": max(1, len(moved))}
-        found.append(render("c", "flow_lanes.c", {**values, **own}))
-    calls = _calls(program, step, end, "pack, packs")
-    return [*found, render("c", "splitting_lanes.c", {**values, "form": end, "step": calls})]
+        found.append(function(program, kernel, lanes=True, shared=["coef"], functions=functions))
+        found.append(render("c", "flow.c", {**values, "form": f"{form}_lanes"}))
+    arguments = f"const double *coef, {program.name}_pack *pack, int packs"
+    return [*found, _steps(program, step, f"{form}_lanes", "", arguments, "pack, packs")]
 
 
-def tangent(program: Program, step: Splitting, values: Mapping[str, object]) -> list[str]:
-    """The derivative of a step."""
-    found = [function(program, kernel, functions=_functions(program)) + "\n" for kernel in step.tangents]
-    flows, count = step.schedule.flows, len(step.flows)
+def tangent(program: Program, step: Splitting) -> str:
+    """The derivatives of the flows."""
+    count, flows = len(step.flows), step.schedule.flows
     own = {
-        **values,
-        **_values(step),
-        "flows": len(flows),
+        "NAME": program.name,
+        "n": program.dimension,
+        "n2": program.dimension**2,
         "parts": [*((f"case {k}", k) for k in range(1, count)), ("default", count)],
         "part_of": ", ".join(str(part + 1) for part, _ in flows),
         "row_of": ", ".join(str(row) for _, row in flows),
     }
-    return [*found, render("c", "tangent_splitting.c", own)]
+    found = [function(program, kernel, functions=_functions(program)) for kernel in step.tangents]
+    return "\n".join([*found, render("c", "tangent_flows.c", own)])
 
 
 def _functions(program: Program) -> dict[str, str]:
@@ -64,32 +65,16 @@ def _functions(program: Program) -> dict[str, str]:
     return FUNCTIONS | {f: f"{program.name}_{f}" for f in FLOW_FUNCTIONS}
 
 
-def _values(step: Splitting) -> dict[str, object]:
-    schedule = step.schedule
-    return {
-        "rows": len(schedule.times),
-        "times": ", ".join(repr(t) for t in schedule.times),
-        "multiples": ", ".join(repr(m) for m in schedule.multiples),
-        "row": max(1, step.row),
-    }
+def _flow(program: Program, kernel: Kernel, k: int) -> tuple[Kernel, dict[str, object]]:
+    """The kernel of a flow without the zero increments, and what the template of the flow reads."""
+    moved = [i for i, e in enumerate(kernel.roots) if not e.is_zero]
+    output = Output("change", tuple(kernel.roots[i] for i in moved))
+    values = {"NAME": program.name, "n": program.dimension, "k": k, "moved": list(enumerate(moved)), "form": ""}
+    return replace(kernel, name=f"change{k}", outputs=(output,)), values | {"count": max(1, len(moved))}
 
 
-def _compact(kernel: Kernel, k: int) -> tuple[Kernel, list[int]]:
-    """The kernel without the zero increments, and the coordinates that move."""
-    values = kernel.roots
-    moved = [i for i, e in enumerate(values) if not e.is_zero]
-    output = Output("change", tuple(values[i] for i in moved))
-    return replace(kernel, name=f"change{k}", outputs=(output,)), moved
-
-
-def _calls(program: Program, step: Splitting, end: str, moved: str) -> list[str]:
-    """The calls of a step: of functions whose names end so, with what they move."""
-    name, row, schedule = program.name, max(1, step.row), step.schedule
-    lines = [f"{name}_flow1{end}(coef, {moved});"]
-    if schedule.stages:
-        lines += [f"coef += {row};", f"for (int k = 0; k < {schedule.stages}; ++k) {{"]
-        for part, at in schedule.pattern:
-            place = f"coef + {at} * {row}" if at else "coef"
-            lines.append(f"    {name}_flow{part + 1}{end}({place}, {moved});")
-        lines += [f"    coef += {schedule.rows} * {row};", "}"]
-    return lines
+def _steps(program: Program, step: Splitting, form: str, linkage: str, arguments: str, passed: str) -> str:
+    row, schedule = f"{program.name}_ROW", step.schedule
+    pattern = [(part + 1, f"coef + {at} * {row}" if at else "coef") for part, at in schedule.pattern]
+    own = {"form": form, "linkage": linkage, "arguments": arguments, "passed": passed, "pattern": pattern}
+    return render("c", "flows.c", {"NAME": program.name, "stages": schedule.stages, "rows": schedule.rows, **own})

@@ -1,0 +1,120 @@
+"""The runtime in C, put together for one solver.
+
+The files of ``templates/c/runtime`` are C99 as they lie there, with the prefix ``phi_`` and with switches and sizes
+(``PHI_BLOCKS``, ``PHI_DIM``) that a model defines. What a reader of the output should not see is resolved here, as a
+preprocessor would: ``#include "…"`` of these files, ``#if`` on switches, guards. All other directives stay.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+from phigen import resources
+
+#: Loops over stages, arrays with a place for each, and arguments that say which: what a solver with one stage lacks.
+_OVER_STAGES = re.compile(r"^( *)for \(int stage = 0; stage < PHI_STAGES; \+\+stage\)(?: (.*))?$")
+_ONE_STAGE = (
+    (re.compile(r"phi_fractions\[stage\] \* |PHI_STAGES \* "), ""),
+    (re.compile(r"\[(?:stage|PHI_STAGES)\]"), ""),
+    (re.compile(r"((?:->|\.)(?:coef|history|stage|use_recurrences))\[0\]"), r"\1"),
+    (re.compile(r", (?:int )?stage(?=[,)])"), ""),
+)
+
+
+@dataclass
+class Amalgam:
+    """What is put together: ``switches`` by their names, ``printed`` files by theirs; ``headers`` of the library."""
+
+    name: str
+    switches: Mapping[str, bool]
+    printed: Mapping[str, str]
+    headers: set[str] = field(default_factory=set)
+    _defined: set[str] = field(default_factory=set)
+
+    def text(self, file: str) -> str:
+        """The file with all that it includes and that was not included before."""
+        return re.sub(r"\n{3,}", "\n\n", "\n".join(self._expanded(file))).strip("\n") + "\n"
+
+    def _expanded(self, file: str) -> list[str]:
+        if file in self.printed:
+            done = file in self._defined
+            self._defined.add(file)
+            return [] if done else ["", *self.printed[file].splitlines(), ""]
+        lines: list[str] = []
+        own: list[str] = []
+        for line in self._selected((resources.templates() / "c/runtime" / file).read_text(encoding="utf-8")):
+            if line.startswith('#include "'):
+                lines += [*self._own(own), *self._expanded(line.split('"')[1])]
+                own = []
+            elif line.startswith("#include <"):
+                self.headers.add(line)
+            else:
+                own.append(line)
+        return [*lines, *self._own(own)]
+
+    def _selected(self, text: str) -> list[str]:
+        """The lines that the switches choose."""
+        chosen: list[str] = []
+        frames: list[list[bool]] = []  # of each condition: whether it is chosen, was chosen before, is one of ours
+        for line in text.splitlines():
+            directive, _, condition = line.partition(" ")
+            if directive in ("#if", "#ifdef", "#ifndef"):
+                ours = "PHI_" in condition
+                holds = not ours or (
+                    condition not in self._defined if directive == "#ifndef" else self._holds(condition)
+                )
+                frames.append([holds, holds, ours])
+                keep = not ours
+            elif directive in ("#elif", "#else", "#endif"):
+                frame = frames[-1]
+                keep = not frame[2]
+                if frame[2] and directive != "#endif":
+                    frame[0] = not frame[1] and (directive == "#else" or self._holds(condition))
+                    frame[1] = frame[1] or frame[0]
+                elif directive == "#endif":
+                    frames.pop()
+            elif directive == "#define" and condition.startswith("PHI_FILE_"):
+                keep = False
+                if all(frame[0] for frame in frames):
+                    self._defined.add(condition)
+            else:
+                keep = True
+            if keep and all(frame[0] for frame in frames):
+                chosen.append(line)
+        return chosen
+
+    def _holds(self, condition: str) -> bool:
+        return any(all(self._switch(s) for s in part.split(" && ")) for part in condition.split(" || "))
+
+    def _switch(self, text: str) -> bool:
+        return self.switches[text.removeprefix("!").removeprefix("PHI_")] != text.startswith("!")
+
+    def _own(self, lines: Sequence[str]) -> list[str]:
+        """Lines of the runtime with the prefix of the solver."""
+        kept = lines if self.switches["COMPOSED"] else one_stage(lines)
+        return [re.sub(r"\b(?:phi|PHI)_", f"{self.name}_", line) for line in kept]
+
+
+def one_stage(lines: Sequence[str]) -> list[str]:
+    """The lines for a solver with one stage: no loops over stages, no arrays of one."""
+    kept: list[str] = []
+    ends: list[tuple[str, str]] = []  # of each loop that was struck out: its indentation, and the line that ends it
+    for line in lines:
+        while ends and ends[-1][1] == "" and not line.startswith(ends[-1][0] + " "):
+            ends.pop()
+        if ends and line == ends[-1][1]:
+            ends.pop()
+            continue
+        shift = 4 * len(ends)
+        found = _OVER_STAGES.match(line)
+        if found is None:
+            kept.append(line[shift:] if line.startswith(" " * shift) else line)
+        elif found[2] in (None, "{"):
+            ends.append((found[1], f"{found[1]}}}" if found[2] else ""))
+        else:
+            kept.append(f"{found[1]}{found[2]}"[shift:])
+    for pattern, text in _ONE_STAGE:
+        kept = [pattern.sub(text, line) for line in kept]
+    return kept

@@ -1,0 +1,129 @@
+"""Functions of phigen's own in C: polynomials where these suffice, else libm."""
+
+from __future__ import annotations
+
+import math
+import textwrap
+from collections.abc import Mapping, Sequence, Set
+from fractions import Fraction
+
+from phigen.scheme.program import Program
+from phigen.scheme.steps import Splitting
+from phigen.symbolic.entire import ENTIRE
+from phigen.symbolic.expression import topological
+from phigen.symbolic.special import (
+    LANE_REACH,
+    SPECIAL,
+    lane_coefficients,
+    near_coefficients,
+    order_of,
+    rest_coefficients,
+)
+from phigen.targets import special
+from phigen.targets.c.layout import WIDTH
+from phigen.targets.polynomials import estrin
+from phigen.targets.rendering import render
+from phigen.targets.special import entire_used
+
+#: The names under which flows call functions that have a version here.
+FLOW_FUNCTIONS = ("expm1", "sin", "versin")
+
+#: Those that are polynomials near 0.
+NEAR_FUNCTIONS = (*ENTIRE, *FLOW_FUNCTIONS)
+
+
+def _inverse_factorials(first: int, step: int, count: int, signs: int) -> list[Fraction]:
+    """±1/first!, ±1/(first + step)!, …: alternating if ``signs`` is −1."""
+    return [Fraction(signs**k, math.factorial(first + k * step)) for k in range(count)]
+
+
+#: Meaning, radius, value outside, coefficients of P, and the value inside by P, t and z = t².
+_SMALL = {
+    "expm1": ("exp(t) - 1", 0.35, "expm1(t)", "t", _inverse_factorials(2, 1, 12, 1), "t + t * t * ({P})"),
+    "sin": ("sin(t)", 1.0, "sin(t)", "z", [-c for c in _inverse_factorials(3, 2, 8, -1)], "t + t * z * ({P})"),
+    "versin": (
+        "1 - cos(t)",
+        1.0,
+        "2.0 * sin(0.5 * t) * sin(0.5 * t)",
+        "z",
+        _inverse_factorials(2, 2, 9, -1),
+        "z * ({P})",
+    ),
+}
+_FAR = {
+    "cosroot": "s > 0.0 ? cos(sqrt(s)) : cosh(sqrt(-s))",
+    "sinroot": "s > 0.0 ? sin(sqrt(s)) / sqrt(s) : sinh(sqrt(-s)) / sqrt(-s)",
+    "sinroot1": "({NAME}_cosroot(s) - {NAME}_sinroot(s)) / (2.0 * s)",
+    "arcroot": "(1.0 - {NAME}_sinroot(s)) / s",
+    "exprel": "expm1(s) / s",
+    "exprel1": "(exp(s) - {NAME}_exprel(s)) / s",
+}
+
+
+def called(program: Program) -> list[str]:
+    """The functions of phigen's own that kernels call: φ and its derivatives, those of `ENTIRE`, and for a splitting
+    those that its flows call."""
+    step = program.step
+    flows = (*step.flows, *step.tangents) if isinstance(step, Splitting) else ()
+    used = {e.op for e in topological([e for kernel in flows for e in kernel.roots])}
+    small = [*entire_used(program), *(f for f in FLOW_FUNCTIONS if f in used)]
+    phis = [render("c", "phi.c", _phi(program, f)) for f in special.used(program)]
+    return [*phis, *(render("c", "small.c", _values(program, f)) for f in small)]
+
+
+def near(program: Program, ops: Set[str]) -> list[str]:
+    """Versions for the loops over lanes, of small arguments only, of the functions that these operations call."""
+    return [render("c", "small.c", _values(program, f) | {"near": True}) for f in NEAR_FUNCTIONS if f in ops]
+
+
+def phi_lanes(program: Program, ops: Set[str]) -> list[str]:
+    """φ and its derivatives for the loops over lanes, as far as these operations call them."""
+    found = []
+    for f in (f for f in SPECIAL if f in ops):
+        first, *rest = map(repr, lane_coefficients(order_of(f)))
+        before, last = rest[-2:]
+        others = list(zip(rest[-3::-2], rest[-4::-2], strict=True))
+        own = {"first": first, "before": before, "last": last, "others": others, "reach": repr(LANE_REACH)}
+        found.append(render("c", "phi_lane.c", {"NAME": program.name, "function": f, **own}))
+    return found
+
+
+def _phi(program: Program, f: str) -> Mapping[str, object]:
+    given = dict(special.values(f, f))
+    return given | {
+        "NAME": program.name,
+        "function": f,
+        "near_sum": _horner(near_coefficients(order_of(f)), "return "),
+        "rest_sum": _horner(rest_coefficients(order_of(f)), f"return {given['pole_part']} + "),
+    }
+
+
+def _horner(coefficients: Sequence[float], head: str) -> list[str]:
+    """The statement ``head`` Σ c_k s^k by Horner's rule, in lines."""
+    *others, last = map(repr, coefficients)
+    factors = ["s\N{NO-BREAK SPACE}*" for _ in others]
+    text = head + "".join(f"({c} + {s} " for c, s in zip(others, factors, strict=True)) + last + ")" * len(others)
+    lines = textwrap.wrap(text + ";", WIDTH - 12, subsequent_indent="    ", break_on_hyphens=False)
+    return [line.replace("\N{NO-BREAK SPACE}", " ") for line in lines]
+
+
+def _values(program: Program, f: str) -> dict[str, object]:
+    if f in ENTIRE:
+        found, t, form = ENTIRE[f], "s", "{P}"
+        meaning, radius, far = found.meaning, found.radius, _FAR[f]
+        lines, value = estrin(found.terms(), t)
+    else:
+        meaning, radius, far, variable, coefficients, form = _SMALL[f]
+        lines, value = estrin(coefficients, variable)
+        t, lines = "t", [*(["const double z = t * t;"] if variable == "z" else []), *lines]
+    return {
+        "NAME": program.name,
+        "function": f,
+        "meaning": meaning,
+        "t": t,
+        "radius": repr(radius),
+        "far": far.format(NAME=program.name),
+        "near": False,
+        "lines": lines,
+        "value": form.format(P=value),
+    }

@@ -1,0 +1,111 @@
+"""Lines of C that are no longer than a page is wide."""
+
+from __future__ import annotations
+
+import re
+import textwrap
+from collections.abc import Iterable, Iterator
+
+WIDTH = 110
+
+#: Code with a comment behind it.
+_BEHIND = re.compile(r"( *[^ /].*?[;,0-9A-Z]) +(/\*.*\*/)")
+_STRING = re.compile(r'"[^"]*"')
+
+#: What a level of parentheses costs a place to break at, in columns: outer places are preferred.
+_DEPTH = 14
+
+
+def fitted(text: str) -> str:
+    """The text with long lines of code broken, long comments wrapped anew, and comments behind code aligned."""
+    return "\n".join([*_aligned(_lines(text.split("\n")))][:-1])
+
+
+def _aligned(lines: Iterable[str]) -> Iterator[str]:
+    """The lines with the comments behind successive lines of code below one another, where they fit."""
+    run: list[tuple[str, str]] = []
+    for line in [*lines, ""]:
+        found = _BEHIND.fullmatch(line)
+        if found:
+            run.append((found[1], found[2]))
+            continue
+        width = max((len(code) for code, _ in run), default=0)
+        fits = all(width + 1 + len(said) <= WIDTH for _, said in run)
+        yield from (f"{code:{width}} {said}" if fits else f"{code} {said}" for code, said in run)
+        run = []
+        yield line
+
+
+def _lines(lines: list[str]) -> Iterator[str]:
+    k = 0
+    while k < len(lines):
+        end = k
+        if lines[k].lstrip().startswith("/*"):
+            end = next(j for j in range(k, len(lines)) if "*/" in lines[j])
+        elif not lines[k].startswith("#"):
+            end = _statement(lines, k)
+        block, k = lines[k : end + 1], end + 1
+        if max(map(len, block)) <= WIDTH:
+            yield from block
+        elif block[-1].endswith("*/") and block[0].lstrip().startswith("/*"):
+            yield from comment(" ".join(line.strip() for line in block), _indent(block[0]))
+        else:
+            yield from _code(" ".join([block[0], *(line.strip() for line in block[1:])]))
+
+
+def _statement(lines: list[str], first: int) -> int:
+    """The line in which the parentheses that are open at the end of this one are closed."""
+    depth = 0
+    for k in range(first, len(lines)):
+        code = _STRING.sub("", lines[k])
+        depth += code.count("(") - code.count(")")
+        if depth <= 0:
+            return k
+    return first
+
+
+def comment(text: str, indent: str = "") -> list[str]:
+    """A comment, marks included, over as many lines as it needs."""
+    return textwrap.wrap(
+        text,
+        WIDTH,
+        initial_indent=indent,
+        subsequent_indent=f"{indent}   ",
+        break_long_words=False,
+        break_on_hyphens=False,
+    )
+
+
+def _indent(line: str) -> str:
+    return line[: len(line) - len(line.lstrip())]
+
+
+def _code(line: str) -> Iterator[str]:
+    found = re.match(r"(.*?\S)\s+(/\*.*\*/)$", line)
+    if found:
+        yield from comment(found[2], _indent(line))
+        line = found[1]
+    further = _indent(line) + "    "
+    while len(line) > WIDTH:
+        place = max(_places(line, len(further)), default=(0, 0))[1]
+        if place == 0 and "(" in line[:WIDTH]:
+            place = line.index("(") + 1
+        if place == 0:
+            break
+        yield line[:place].rstrip()
+        line = further + line[place:].lstrip()
+    yield line
+
+
+def _places(line: str, least: int) -> Iterator[tuple[int, int]]:
+    """Where the line may be broken, each place behind its worth."""
+    depth, head = 0, re.match(r" *(for|if|while) \(", line)
+    line = _STRING.sub(lambda found: "'" * len(found[0]), line)
+    for k, c in enumerate(line[: WIDTH + 1]):
+        depth += (c in "([{") - (c in ")]}")
+        if c != " " or k <= least:
+            continue
+        after_loop = head is not None and depth == 0 and line[k - 1] == ")"
+        operator = re.match(r" (?:[-+*/?:<>]|&&|\|\||[<>=!]=) ", line[k:])
+        if line[k - 1] in ",;=" or operator or after_loop:
+            yield k - _DEPTH * depth + (WIDTH if after_loop else 0), k

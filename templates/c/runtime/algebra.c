@@ -1,0 +1,114 @@
+#ifndef PHI_FILE_ALGEBRA
+#define PHI_FILE_ALGEBRA
+#include <math.h>
+#include <string.h>
+
+#include "model.h"
+
+/* ---- Compensated sums, linear equations ---- */
+#if PHI_ADVANCE
+/* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to its last
+   bit: were it rounded with the change, corrections of one sign would add up to a drift. 0, and x as before, if the
+   sum is not finite. */
+static int phi_advance(phi_solver *s, const double change[PHI_DIM], const double correction[PHI_DIM])
+{
+    double x[PHI_DIM], carry[PHI_DIM];
+    for (int i = 0; i < PHI_DIM; ++i) {
+        const double sum = s->x[i] + change[i], added = sum - s->x[i];
+        const double lost = (s->x[i] - (sum - added)) + (change[i] - added);
+        const double small = lost + (s->carry[i] + correction[i]);
+        x[i] = sum + small;
+        carry[i] = small - (x[i] - sum);
+        if (!isfinite(x[i])) return 0;
+    }
+    memcpy(s->x, x, sizeof x);
+    memcpy(s->carry, carry, sizeof carry);
+    return 1;
+}
+
+#endif
+#if PHI_SPLITTING
+/* In a step from start, moved holds the sum of the changes so far, and the carry; x is start + moved, rounded. */
+static inline void phi_add(double x[PHI_DIM], double moved[PHI_DIM], const double start[PHI_DIM], int i, double change)
+{
+    moved[i] += change;
+    x[i] = start[i] + moved[i];
+}
+
+/* The end of a step: x + moved in compensated arithmetic. */
+static void phi_settle(double x[PHI_DIM], double carry[PHI_DIM], const double moved[PHI_DIM])
+{
+    for (int i = 0; i < PHI_DIM; ++i) {
+        const double sum = x[i] + moved[i], added = sum - x[i];
+        carry[i] = (x[i] - (sum - added)) + (moved[i] - added);
+        x[i] = sum;
+    }
+}
+
+#endif
+#if PHI_IMPLICIT
+#if PHI_UNROLLED || PHI_BLOCKS
+/* Newton matrices are I + O(h): a pivot whose reciprocal is larger than this is far from 1. */
+#define PHI_LARGEST_RECIPROCAL 1e3
+
+#endif
+#if PHI_PIVOTING
+/* Solve matrix * solution = side, both overwritten, by elimination with partial pivoting. 0 if singular. */
+#if PHI_UNROLLED
+static int phi_solve_pivoting(double matrix[PHI_DIM * PHI_DIM], double side[PHI_DIM])
+#else
+static int phi_solve(double matrix[PHI_DIM * PHI_DIM], double side[PHI_DIM])
+#endif
+{
+    for (int k = 0; k < PHI_DIM; ++k) {
+        int best = k;
+        for (int i = k + 1; i < PHI_DIM; ++i)
+            if (fabs(matrix[i * PHI_DIM + k]) > fabs(matrix[best * PHI_DIM + k])) best = i;
+        const double pivot = matrix[best * PHI_DIM + k], last = side[k];
+        if (!(fabs(pivot) > 0.0)) return 0;
+        for (int j = k; j < PHI_DIM && best != k; ++j) {
+            const double swap = matrix[k * PHI_DIM + j];
+            matrix[k * PHI_DIM + j] = matrix[best * PHI_DIM + j];
+            matrix[best * PHI_DIM + j] = swap;
+        }
+        side[k] = side[best];
+        side[best] = last;
+        for (int i = k + 1; i < PHI_DIM; ++i) {
+            const double factor = matrix[i * PHI_DIM + k] / pivot;
+            for (int j = k + 1; j < PHI_DIM; ++j) matrix[i * PHI_DIM + j] -= factor * matrix[k * PHI_DIM + j];
+            side[i] -= factor * side[k];
+        }
+    }
+    for (int i = PHI_DIM - 1; i >= 0; --i) {
+        for (int j = i + 1; j < PHI_DIM; ++j) side[i] -= matrix[i * PHI_DIM + j] * side[j];
+        side[i] /= matrix[i * PHI_DIM + i];
+    }
+    return 1;
+}
+
+#endif
+#if PHI_UNROLLED
+#if PHI_PIVOTING
+/* Solve matrix * solution = side, both overwritten. The matrix is I + O(h), so elimination without pivoting
+   does unless a pivot is far from 1. 0 if singular. */
+#else
+/* Solve matrix * solution = side, both overwritten. The matrix is I + O(h): 0 if a pivot is far from 1. */
+#endif
+static int phi_solve(double matrix[PHI_DIM * PHI_DIM], double side[PHI_DIM])
+{
+    double solution[PHI_DIM], reciprocal[PHI_DIM], largest = 0.0;
+    phi_eliminate(matrix, side, solution, reciprocal);
+    for (int i = 0; i < PHI_DIM; ++i)
+        if (!(fabs(reciprocal[i]) <= largest)) largest = fabs(reciprocal[i]);
+#if PHI_PIVOTING
+    if (!(largest < PHI_LARGEST_RECIPROCAL)) return phi_solve_pivoting(matrix, side);
+#else
+    if (!(largest < PHI_LARGEST_RECIPROCAL)) return 0;
+#endif
+    memcpy(side, solution, sizeof solution);
+    return 1;
+}
+
+#endif
+#endif
+#endif

@@ -1,0 +1,339 @@
+#ifndef PHI_FILE_BLOCKS
+#define PHI_FILE_BLOCKS
+#include <limits.h>
+#include <math.h>
+#include <string.h>
+
+#include "model.h"
+#include "newton_lanes.c"
+#include "solver.c"
+
+/* ---- Blocks of steps ---- */
+/* What all blocks share: coefficients, the same in each lane, and the recurrences by which they are foreseen. */
+typedef struct {
+    int fits[PHI_STAGES]; /* the fit that weight is of; -1 for none */
+    phi_lanes coef[PHI_STAGES][PHI_COEFFICIENTS], weight[PHI_STAGES][PHI_WINDOW][PHI_DIM];
+} phi_table;
+
+/* The stages of a step. */
+typedef struct {
+    phi_model stage[PHI_STAGES];
+} phi_models;
+
+/* phi_near for the guesses of all lanes, seen from one value. */
+static int phi_near_lanes(phi_lanes y[restrict PHI_DIM], const double last[PHI_DIM])
+{
+    phi_lanes distance = { 0.0 };
+    double size = 0.0;
+    for (int i = 0; i < PHI_DIM; ++i) {
+        size += fabs(last[i]);
+        PHI_EACH_LANE
+        for (int lane = 0; lane < PHI_LANES; ++lane) distance[lane] += fabs(y[i][lane] - last[i]);
+    }
+    return phi_largest(distance) <= PHI_REACH * size;
+}
+
+/* The steps of a block one after the other, each along the linear model of its lane. As X, the state with its carry, gains
+   increment - gain residual, the next residual follows from this one; X itself is added up apart. */
+static void phi_chain(phi_models *models, double x[PHI_DIM], double carry[PHI_DIM])
+{
+    double residual[PHI_DIM], sum[PHI_DIM], small[PHI_DIM];
+#if PHI_SPARSE
+    double delta[PHI_DIM], gained[PHI_DIM];
+#endif
+    for (int i = 0; i < PHI_DIM; ++i) {
+        residual[i] = ((models->stage[0].y[i][0] - x[i]) + models->stage[0].displacement[i][0]) - carry[i];
+        sum[i] = x[i];
+        small[i] = carry[i];
+    }
+#if PHI_COMPOSED
+    for (int k = 0; k < PHI_STAGES * PHI_LANES; ++k) {
+        const int lane = k / PHI_STAGES, after = (k + 1) / PHI_STAGES % PHI_LANES;
+        phi_model *at = &models->stage[k % PHI_STAGES], *next = &models->stage[(k + 1) % PHI_STAGES];
+#else
+    for (int lane = 0; lane < PHI_LANES; ++lane) {
+        const int after = (lane + 1) % PHI_LANES;
+        phi_model *at = &models->stage[0], *next = &models->stage[0];
+#endif
+#if PHI_SPARSE
+        phi_substitute_lane(at->factor, at->slope, residual, lane, delta, gained);
+        for (int i = 0; i < PHI_DIM; ++i) {
+            const double change = at->increment[i][lane], total = sum[i] + change, added = total - sum[i];
+            const double turn = (next->displacement[i][after] - at->displacement[i][lane]) - change;
+            at->residual[i][lane] = residual[i];
+            residual[i] = (((next->y[i][after] - at->y[i][lane]) + turn) + residual[i]) + gained[i];
+            small[i] += ((sum[i] - (total - added)) + (change - added)) - gained[i];
+            sum[i] = total;
+        }
+#else
+        double even[PHI_DIM] = { 0.0 }, odd[PHI_DIM] = { 0.0 }; /* two sums, so that no long chain of additions is waited for */
+        for (int i = 0; i < PHI_DIM; ++i) {
+            at->residual[i][lane] = residual[i];
+            for (int j = 0; j < PHI_DIM; j += 2) even[i] += at->gain[i * PHI_DIM + j][lane] * residual[j];
+            for (int j = 1; j < PHI_DIM; j += 2) odd[i] += at->gain[i * PHI_DIM + j][lane] * residual[j];
+        }
+        for (int i = 0; i < PHI_DIM; ++i) {
+            const double change = at->increment[i][lane], total = sum[i] + change, added = total - sum[i];
+            const double turn = (next->displacement[i][after] - at->displacement[i][lane]) - change;
+            const double moved = (next->y[i][after] - at->y[i][lane]) + turn;
+            residual[i] = ((moved + residual[i]) + odd[i]) + even[i];
+            small[i] += ((sum[i] - (total - added)) + (change - added)) - (even[i] + odd[i]);
+            sum[i] = total;
+        }
+#endif
+    }
+    for (int i = 0; i < PHI_DIM; ++i) {
+        x[i] = sum[i] + small[i];
+        carry[i] = small[i] - (x[i] - sum[i]);
+    }
+}
+
+/* Bring the table of a stage up to date: coefficients, and weights that were fitted since. */
+static void phi_refresh_stage(const phi_solver *s, int stage, phi_table *table)
+{
+    if (table->fits[stage] == s->history[stage].fits) return;
+    table->fits[stage] = s->history[stage].fits;
+    for (int k = 0; k < PHI_COEFFICIENTS; ++k)
+        for (int lane = 0; lane < PHI_LANES; ++lane) table->coef[stage][k][lane] = s->coef[stage][k];
+    memcpy(table->weight[stage], s->history[stage].weight,
+        (size_t)s->history[stage].recurrence_terms * PHI_DIM * sizeof(phi_lanes));
+}
+
+static void phi_refresh(const phi_solver *s, phi_table *table)
+{
+    for (int stage = 0; stage < PHI_STAGES; ++stage) phi_refresh_stage(s, stage, table);
+}
+
+/* Guesses for the next PHI_LANES values of a stage, by its recurrences. */
+static void phi_foresee(const phi_history *history, phi_lanes weight[restrict][PHI_DIM],
+    phi_lanes y[restrict PHI_DIM])
+{
+    const int last = history->count - 1;
+    for (int i = 0; i < PHI_DIM; ++i) {
+        phi_lanes even = { 0.0 }, odd = { 0.0 };
+        for (int k = 0; k < history->recurrence_terms; k += 2) {
+            const double past = history->past[last - k][i], earlier = history->past[last - 1 - k][i];
+            PHI_EACH_LANE
+            for (int lane = 0; lane < PHI_LANES; ++lane) even[lane] += weight[k][i][lane] * past;
+            PHI_EACH_LANE
+            for (int lane = 0; lane < PHI_LANES; ++lane) odd[lane] += weight[k + 1][i][lane] * earlier;
+        }
+        PHI_EACH_LANE
+        for (int lane = 0; lane < PHI_LANES; ++lane) y[i][lane] = even[lane] + odd[lane];
+    }
+}
+
+/* phi_record for the values of all lanes, one after the other. */
+static void phi_record_lanes(phi_history *history, phi_lanes y[restrict PHI_DIM])
+{
+    phi_make_room(history, PHI_LANES);
+    for (int lane = 0; lane < PHI_LANES; ++lane)
+        for (int i = 0; i < PHI_DIM; ++i) history->past[history->count + lane][i] = y[i][lane];
+    history->count += PHI_LANES;
+}
+
+/* y becomes the points whose alpha and beta have these means. */
+static void phi_from_means(phi_lanes coef[restrict], phi_model *model)
+{
+    phi_evaluate_lanes(coef, model->y, model->displacement, model->increment);
+    for (int i = 0; i < PHI_DIM; ++i) {
+        PHI_EACH_LANE
+        for (int lane = 0; lane < PHI_LANES; ++lane)
+            model->y[i][lane] -= model->displacement[i][lane] + 0.5 * model->increment[i][lane];
+    }
+}
+
+/* Guesses where no recurrence is known: where alpha and beta have the means of steps by the classical Runge-Kutta
+   method, to leading order. */
+static void phi_march(const phi_solver *s, phi_table *table, phi_models *models)
+{
+    static const double reach[4] = { 0.5, 0.5, 1.0, 0.0 }, weight[4] = { 1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0 };
+    double x[PHI_DIM], point[PHI_DIM], slope[PHI_DIM], mean[PHI_DIM];
+    memcpy(x, s->x, sizeof x);
+#if PHI_COMPOSED
+    for (int k = 0; k < PHI_STAGES * PHI_LANES; ++k) {
+        const int lane = k / PHI_STAGES;
+        const double h = phi_fractions[k % PHI_STAGES] * s->h;
+        phi_model *at = &models->stage[k % PHI_STAGES];
+#else
+    const double h = s->h;
+    phi_model *at = &models->stage[0];
+    for (int lane = 0; lane < PHI_LANES; ++lane) {
+#endif
+        memcpy(point, x, sizeof x);
+        memset(mean, 0, sizeof mean);
+        for (int part = 0; part < 4; ++part) {
+            phi_vector_field(&s->params, point, slope);
+            for (int i = 0; i < PHI_DIM; ++i) {
+                mean[i] += weight[part] * slope[i];
+                point[i] = x[i] + h * reach[part] * slope[i];
+            }
+        }
+        for (int i = 0; i < PHI_DIM; ++i) {
+            at->y[i][lane] = x[i] + 0.5 * h * mean[i];
+            x[i] += h * mean[i];
+        }
+    }
+    for (int stage = 0; stage < PHI_STAGES; ++stage) phi_from_means(table->coef[stage], &models->stage[stage]);
+}
+
+/* Guess the points of all stages and steps, by recurrences or else by Runge-Kutta steps. 0 if they are not near the state. */
+static int phi_guess(phi_solver *s, phi_table *table, phi_models *models)
+{
+    if (!s->blocks.use_recurrences) phi_march(s, table, models);
+    for (int stage = 0; stage < PHI_STAGES; ++stage) {
+        if (s->blocks.use_recurrences) phi_foresee(&s->history[stage], table->weight[stage], models->stage[stage].y);
+        if (!phi_near_lanes(models->stage[stage].y, s->x)) return 0;
+    }
+    return 1;
+}
+
+/* One pass over the points of a stage: correct them by the residuals. The largest correction. */
+static double phi_correct_stage(phi_model *model)
+{
+    phi_lanes sizes;
+    phi_correct(model, sizes);
+    return phi_largest(sizes);
+}
+
+/* Corrections below the first go on with the matrices of the last pass, as its error is then of third order. After the
+   square of so small a correction as the second, there is rounding only, if the next is below the third. */
+#define PHI_FROZEN 1e-5
+#define PHI_SMALL 1e-8
+#define PHI_ROUNDING 1e-10
+
+/* PHI_LANES steps at once: guess the points of all, and correct them together until the error that remains is as
+   small as after a single step. How many passes that took; 0, and the solver as before, where it takes more than most. */
+static int phi_block(phi_solver *s, phi_table *table, int most)
+{
+    phi_models models;
+    double x[PHI_DIM], carry[PHI_DIM], previous = HUGE_VAL, bend = 0.0, bound = HUGE_VAL;
+    int passes = 0, solved = 0;
+    if (!phi_guess(s, table, &models)) return 0;
+    while (!solved) {
+        double size = 0.0;
+        const int matrices = previous > PHI_FROZEN;
+        for (int stage = 0; stage < PHI_STAGES; ++stage) phi_update(table->coef[stage], &models.stage[stage], matrices);
+        memcpy(x, s->x, sizeof x);
+        memcpy(carry, s->carry, sizeof carry);
+        phi_chain(&models, x, carry);
+        for (int stage = 0; stage < PHI_STAGES; ++stage) {
+            const double largest = phi_correct_stage(&models.stage[stage]);
+            size = largest > size ? largest : size;
+        }
+        s->evaluations += PHI_STAGES * PHI_LANES;
+        bend = matrices ? 0.0 : bend + previous;
+        bound = phi_remaining(size, bend, bound);
+        solved = bound <= PHI_TOLERANCE || (previous < PHI_SMALL && size < PHI_ROUNDING);
+        if ((++passes >= most || !(size < previous)) && !solved) return 0;
+        previous = size;
+    }
+    for (int stage = 0; stage < PHI_STAGES; ++stage)
+        if (!phi_near_lanes(models.stage[stage].y, s->x)) return 0;
+    for (int i = 0; i < PHI_DIM; ++i)
+        if (!isfinite(x[i])) return 0;
+    memcpy(s->x, x, sizeof x);
+    memcpy(s->carry, carry, sizeof carry);
+    phi_count(s, PHI_LANES);
+    for (int stage = 0; stage < PHI_STAGES; ++stage) {
+        phi_history *history = &s->history[stage];
+        phi_record_lanes(history, models.stage[stage].y);
+        history->slow_steps = passes > 1 ? history->slow_steps + PHI_LANES : 0;
+        if (history->slow_steps > history->slow_steps_allowed && s->blocks.use_recurrences) phi_fit(history);
+    }
+    return passes;
+}
+
+enum {
+    PHI_REPAY_BLOCKS = 4 * PHI_REPAY, /* steps that fits for whole blocks are saved in */
+    PHI_MOST_SINGLE_STEPS = 1000      /* before blocks are tried again */
+};
+
+/* Recurrences are given up for a while, the longer the more often that happens. */
+static void phi_give_up(phi_solver *s)
+{
+    s->blocks.use_recurrences = s->blocks.last_single_steps = s->blocks.single_steps = 0;
+    s->blocks.steps_without_recurrences = 2 * s->blocks.steps_without_recurrences + PHI_REPAY_BLOCKS;
+    s->blocks.recurrences_from_step = s->steps + s->blocks.steps_without_recurrences;
+}
+
+/* Fit the recurrence of a stage. Whether it foresees. */
+static int phi_fitted(phi_history *history)
+{
+    phi_fit(history);
+    return history->recurrence_terms > 0;
+}
+
+/* How the next block is guessed: by recurrences, fitted as soon as enough steps are to be made, or
+   have been, to repay that. */
+static void phi_choose_guess(phi_solver *s, size_t steps)
+{
+    for (int stage = 0; stage < PHI_STAGES; ++stage)
+        if (s->history[stage].count < PHI_REMEMBERED) {
+            s->blocks.use_recurrences = 0;
+            return;
+        }
+    if (s->blocks.use_recurrences || s->steps < s->blocks.recurrences_from_step) return;
+    if (steps < PHI_REPAY_BLOCKS && s->steps < PHI_REPAY) return;
+    s->blocks.use_recurrences = 1;
+    for (int stage = 0; stage < PHI_STAGES; ++stage)
+        s->blocks.use_recurrences = s->blocks.use_recurrences && phi_fitted(&s->history[stage]);
+    s->blocks.single_steps = PHI_LANES;
+    if (!s->blocks.use_recurrences) phi_give_up(s);
+}
+
+/* Learn from a block: after one that failed single steps are made, the more the more often that happens. Recurrences
+   that fail repeatedly, or need more passes than steps by Runge-Kutta did, are given up. */
+static void phi_learn_from(phi_solver *s, int passes)
+{
+    if (passes > 0) {
+        s->blocks.last_single_steps /= 2;
+    } else {
+        const int longer = 2 * s->blocks.last_single_steps + PHI_LANES;
+        s->blocks.last_single_steps = longer > PHI_MOST_SINGLE_STEPS ? PHI_MOST_SINGLE_STEPS : longer;
+        s->blocks.single_steps = s->blocks.last_single_steps;
+    }
+    if (!s->blocks.use_recurrences) {
+        s->blocks.passes_without_recurrences = passes > 0 ? passes : INT_MAX;
+    } else if (passes > s->blocks.passes_without_recurrences || s->blocks.last_single_steps > 5 * PHI_LANES) {
+        phi_give_up(s);
+    }
+}
+
+/* A single step, and the running mean of the evaluations that a stage of one takes. */
+static phi_status phi_single(phi_solver *s)
+{
+    const size_t before = s->evaluations;
+    const phi_status status = phi_step(s, s->h);
+#if PHI_COMPOSED
+    const double evaluations = (double)(s->evaluations - before) / PHI_STAGES;
+#else
+    const double evaluations = (double)(s->evaluations - before);
+#endif
+    s->blocks.evaluations_per_stage += 0.125 * (evaluations - s->blocks.evaluations_per_stage);
+    return status;
+}
+
+/* Blocks of steps where they cost less than single steps, with at most as many passes over a block as PHI_PASSES for each
+   evaluation in a single step. The results differ by round-off only. */
+phi_status phi_integrate(phi_solver *s, double h, size_t steps)
+{
+    phi_table table;
+    phi_status status = phi_set_step(s, h);
+    for (int stage = 0; stage < PHI_STAGES; ++stage) table.fits[stage] = -1;
+    while (status == PHI_OK && steps > 0) {
+        if (steps >= PHI_LANES && s->blocks.single_steps == 0) phi_choose_guess(s, steps);
+        if (steps >= PHI_LANES && s->blocks.single_steps == 0) {
+            phi_refresh(s, &table);
+            const int passes = phi_block(s, &table, (int)(PHI_PASSES * s->blocks.evaluations_per_stage + 0.5));
+            phi_learn_from(s, passes);
+            if (passes > 0) steps -= PHI_LANES;
+        } else {
+            if (s->blocks.single_steps > 0) --s->blocks.single_steps;
+            status = phi_single(s);
+            if (status == PHI_OK) --steps;
+        }
+    }
+    return status;
+}
+#endif

@@ -1,0 +1,52 @@
+#ifndef PHI_FILE_EXPLICIT
+#define PHI_FILE_EXPLICIT
+#include <math.h>
+#include <string.h>
+
+#include "algebra.c"
+#include "model.h"
+
+/* ---- The explicit step ---- */
+#if PHI_EXPLICIT
+/* One explicit stage: x + increment(x). */
+static phi_status phi_stage(phi_solver *s, int stage)
+{
+    const double none[PHI_DIM] = { 0.0 };
+    double increment[PHI_DIM];
+    phi_explicit(s->coef[stage], s->x, increment);
+    ++s->evaluations;
+    return phi_advance(s, increment, none) ? PHI_OK : PHI_NOT_FINITE;
+}
+
+#else
+#include "flows.h"
+
+/* The coefficients of all flows of a step: a row for each time. */
+static void phi_prepare(const phi_params *params, double h, double *coef)
+{
+    for (int k = 0; k < PHI_ROWS_OF_FLOWS; ++k) {
+#if PHI_KICKS
+        const double kick[1] = { phi_multiples[k] * (h * h) };
+        phi_prepare_row(params, phi_times[k] * h, kick, coef + k * PHI_ROW);
+#else
+        phi_prepare_row(params, phi_times[k] * h, coef + k * PHI_ROW);
+#endif
+    }
+}
+
+/* One step: the exact flows of the parts of H, one after the other. If it fails, the state is as before. */
+static phi_status phi_stages(phi_solver *s)
+{
+    double x[PHI_DIM], moved[PHI_DIM];
+    memcpy(x, s->x, sizeof x);
+    memcpy(moved, s->carry, sizeof moved);
+    phi_flows(s->coef[0], x, moved, s->x);
+    ++s->evaluations;
+    for (int i = 0; i < PHI_DIM; ++i)
+        if (!isfinite(x[i])) return PHI_NOT_FINITE;
+    phi_settle(s->x, s->carry, moved);
+    return PHI_OK;
+}
+
+#endif
+#endif

@@ -1,0 +1,133 @@
+#ifndef PHI_FILE_GAUGE
+#define PHI_FILE_GAUGE
+#include <float.h>
+#include <math.h>
+#include <string.h>
+
+#include "model.h"
+
+/* ---- The choice of the gauge: multiples of Casimirs taken from H ---- */
+enum {
+    PHI_SAMPLES = 32, /* states along a short piece of the trajectory */
+#if PHI_QUICK_GAUGE
+    PHI_DEGREE = 6, /* S_3 is cubic in H, so the square of the error is of degree six in each multiple */
+#endif
+    PHI_SWEEPS = 4 /* most rounds over the multiples */
+};
+
+/* A short piece of the trajectory from x, by a Runge-Kutta method with steps of a fixed change. */
+static void phi_sample(const phi_params *params, const double x[PHI_DIM], double samples[][PHI_DIM])
+{
+    double slope[PHI_DIM], middle[PHI_DIM], size = 0.0, speed = DBL_MIN;
+    phi_vector_field(params, x, slope);
+    for (int i = 0; i < PHI_DIM; ++i) {
+        samples[0][i] = x[i];
+        size += fabs(x[i]);
+        speed += fabs(slope[i]);
+    }
+    const double h = 0.25 * size / speed;
+    for (int k = 1; k < PHI_SAMPLES; ++k) {
+        const double *y = samples[k - 1];
+        phi_vector_field(params, y, slope);
+        for (int i = 0; i < PHI_DIM; ++i) middle[i] = y[i] + 0.5 * h * slope[i];
+        phi_vector_field(params, middle, slope);
+        for (int i = 0; i < PHI_DIM; ++i) samples[k][i] = y[i] + h * slope[i];
+    }
+}
+
+/* Sum of |pi grad S_3|^2, the leading error of the method, over the samples. */
+static double phi_gauge_error(const phi_params *params, const double gauge[PHI_GAUGES], double samples[][PHI_DIM])
+{
+    double error[PHI_DIM], sum = 0.0;
+    for (int k = 0; k < PHI_SAMPLES; ++k) {
+        phi_guide(params, gauge, samples[k], error);
+        for (int i = 0; i < PHI_DIM; ++i) sum += error[i] * error[i];
+    }
+    return sum;
+}
+
+#if PHI_QUICK_GAUGE
+/* The error polynomial at centre + t width, by Newton's formula from forward differences. */
+static double phi_on_line(const double difference[PHI_DEGREE + 1], double t)
+{
+    double error = difference[PHI_DEGREE];
+    for (int k = PHI_DEGREE - 1; k >= 0; --k) error = difference[k] + (t + 3.0 - k) / (k + 1) * error;
+    return error;
+}
+
+/* How many widths multiple c is to be moved for the least error: the best on grids, each finer than the one before. */
+static double phi_least_on_line(const phi_params *params, const double gauge[PHI_GAUGES], int c, double width,
+    double samples[][PHI_DIM])
+{
+    double moved[PHI_GAUGES], difference[PHI_DEGREE + 1], size = 0.0, best = 0.0, mesh = 0.125;
+    memcpy(moved, gauge, sizeof moved);
+    for (int j = 0; j <= PHI_DEGREE; ++j) {
+        moved[c] = gauge[c] + (j - 3) * width;
+        difference[j] = phi_gauge_error(params, moved, samples);
+        size += difference[j];
+    }
+    for (int order = 1; order <= PHI_DEGREE; ++order)
+        for (int j = PHI_DEGREE; j >= order; --j) difference[j] -= difference[j - 1];
+    double least = phi_on_line(difference, best);
+    for (int level = 0; level < 3; ++level, mesh *= 0.125) {
+        const int reach = level == 0 ? 24 : 8;
+        const double centre = best;
+        for (int j = -reach; j <= reach; ++j) {
+            const double t = centre + j * mesh, error = phi_on_line(difference, t);
+            if (!(error < least - 1e-12 * size)) continue; /* close calls are not decided by rounding */
+            least = error;
+            best = t;
+        }
+    }
+    return best;
+}
+
+#else
+/* How many widths multiple c is to be moved for the least error: the best on grids, each finer than the one before. */
+static double phi_least_on_line(const phi_params *params, const double gauge[PHI_GAUGES], int c, double width,
+    double samples[][PHI_DIM])
+{
+    double moved[PHI_GAUGES], best = 0.0, mesh = 0.125, least = phi_gauge_error(params, gauge, samples);
+    memcpy(moved, gauge, sizeof moved);
+    for (int level = 0; level < 3; ++level, mesh *= 0.125) {
+        const int reach = level == 0 ? 24 : 8;
+        const double centre = best;
+        for (int j = -reach; j <= reach; ++j) {
+            moved[c] = gauge[c] + (centre + j * mesh) * width;
+            const double error = phi_gauge_error(params, moved, samples);
+            if (!(error < least - 1e-12 * least)) continue; /* close calls are not decided by rounding */
+            least = error;
+            best = centre + j * mesh;
+        }
+    }
+    return best;
+}
+
+#endif
+/* The multiples that minimise the leading error along a short piece of the trajectory, one after the other, from the
+   least-squares solution of grad H = sum of multiples of grad C. Zero where that gives nothing finite. */
+static void phi_choose_gauge(const phi_params *params, const double x[PHI_DIM], double gauge[PHI_GAUGES])
+{
+    double samples[PHI_SAMPLES][PHI_DIM], out[1 + 2 * PHI_GAUGES], sums[1 + 2 * PHI_GAUGES] = { 0.0 };
+    double width[PHI_GAUGES];
+    phi_sample(params, x, samples);
+    for (int k = 0; k < PHI_SAMPLES; ++k) {
+        phi_products(params, samples[k], out);
+        for (int i = 0; i < 1 + 2 * PHI_GAUGES; ++i) sums[i] += out[i];
+    }
+    for (int c = 0; c < PHI_GAUGES; ++c) {
+        const double norm = sums[2 + 2 * c] > 0.0 ? sums[2 + 2 * c] : HUGE_VAL;
+        gauge[c] = sums[1 + 2 * c] / norm;
+        width[c] = sqrt(sums[0] / norm);
+    }
+    for (int sweep = 0, moved = 1; sweep < PHI_SWEEPS && moved; ++sweep) {
+        moved = 0;
+        for (int c = 0; c < PHI_GAUGES; ++c) {
+            const double best = phi_least_on_line(params, gauge, c, width[c], samples);
+            gauge[c] += best * width[c];
+            moved = moved || best != 0.0;
+        }
+    }
+    if (!isfinite(phi_gauge_error(params, gauge, samples))) memset(gauge, 0, PHI_GAUGES * sizeof gauge[0]);
+}
+#endif

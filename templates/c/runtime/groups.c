@@ -1,0 +1,357 @@
+#ifndef PHI_FILE_GROUPS
+#define PHI_FILE_GROUPS
+#include <math.h>
+#include <string.h>
+
+#include "blocks.c"
+#include "model.h"
+
+/* ---- Groups of members ---- */
+enum {
+    PHI_GROUP = PHI_LANES,              /* members, one in each lane */
+    PHI_FEWEST = 3,                     /* fewer members are quicker one by one */
+    PHI_GROUP_REPAY = 200 * PHI_DIM,    /* steps that fits cost: of eight values at once, only one is foreseen */
+    PHI_HOPELESS_WAIT = 100 * PHI_REPAY /* steps until recurrences that did not help are fitted again */
+};
+
+/* Members of an ensemble, each in its lane. */
+typedef struct {
+    phi_lanes x[PHI_DIM], carry[PHI_DIM], coef[PHI_STAGES][PHI_COEFFICIENTS];
+    phi_lanes past[PHI_STAGES][PHI_REMEMBERED][PHI_DIM]; /* solved values, in a ring */
+    phi_lanes weight[PHI_STAGES][PHI_WINDOW][PHI_DIM]; /* of past values, the latest first, for the next */
+    int latest;     /* the row of the latest values */
+    int count;      /* rows in use */
+    int extrapolation_order[PHI_STAGES]; /* how many of them the extrapolation uses */
+    int recurrence_terms[PHI_STAGES];    /* how many of them the recurrences use */
+    int use_recurrences[PHI_STAGES];     /* whether these are the better guess */
+    int fits;               /* how often recurrences have been fitted */
+    int slow_steps;         /* how many of the last steps took more than one iteration */
+    int slow_steps_allowed; /* how many of those before recurrences are fitted again */
+    int active[PHI_LANES];  /* whether the lane has a member that has not failed */
+    size_t steps_left[PHI_LANES]; /* that are still to be made, where one has */
+#if PHI_GAUGE
+    double gauge[PHI_LANES][PHI_GAUGES]; /* of each member */
+#endif
+} phi_group;
+
+/* The past values of a stage, the latest for k = 0. */
+static phi_lanes *phi_group_past(phi_group *group, int stage, int k)
+{
+    const int row = group->latest + k;
+    return group->past[stage][row < PHI_REMEMBERED ? row : row - PHI_REMEMBERED];
+}
+
+/* Guess the values of a stage by the recurrences of the members. */
+static void phi_group_foresee(phi_group *group, int stage, phi_lanes y[restrict PHI_DIM])
+{
+    memset(y, 0, PHI_DIM * sizeof y[0]);
+    for (int k = 0; k < group->recurrence_terms[stage]; ++k) {
+        phi_lanes *past = phi_group_past(group, stage, k), *weight = group->weight[stage][k];
+        for (int i = 0; i < PHI_DIM; ++i) {
+            PHI_EACH_LANE
+            for (int lane = 0; lane < PHI_LANES; ++lane) y[i][lane] += weight[i][lane] * past[i][lane];
+        }
+    }
+}
+
+/* Extrapolate the values of a stage. */
+static void phi_group_extrapolate(phi_group *group, int stage, phi_lanes y[restrict PHI_DIM])
+{
+    const int order = group->extrapolation_order[stage];
+    double binomial = -1.0;
+    memcpy(y, group->x, PHI_DIM * sizeof y[0]);
+    if (order > 0) memset(y, 0, PHI_DIM * sizeof y[0]);
+    for (int k = 0; k < order; ++k) {
+        phi_lanes *past = phi_group_past(group, stage, k);
+        binomial *= -(double)(order - k) / (k + 1);
+        for (int i = 0; i < PHI_DIM; ++i) {
+            PHI_EACH_LANE
+            for (int lane = 0; lane < PHI_LANES; ++lane) y[i][lane] += binomial * past[i][lane];
+        }
+    }
+}
+
+/* The sum over members of the absolute values of all components. */
+static double phi_group_sum(const phi_group *group, phi_lanes y[PHI_DIM])
+{
+    double sum = 0.0;
+    for (int i = 0; i < PHI_DIM; ++i)
+        for (int lane = 0; lane < PHI_LANES; ++lane) sum += group->active[lane] ? fabs(y[i][lane]) : 0.0;
+    return sum;
+}
+
+static void phi_group_subtract(phi_lanes y[restrict PHI_DIM], phi_lanes other[restrict PHI_DIM])
+{
+    for (int i = 0; i < PHI_DIM; ++i) {
+        PHI_EACH_LANE
+        for (int lane = 0; lane < PHI_LANES; ++lane) y[i][lane] -= other[i][lane];
+    }
+}
+
+/* Choose the guess that would have been best for these values. */
+static void phi_group_judge(phi_group *group, int stage, phi_lanes y[PHI_DIM])
+{
+    phi_lanes row[PHI_HISTORY + 1][PHI_DIM];
+    const int rows = group->count < PHI_HISTORY ? group->count : PHI_HISTORY;
+    double least = HUGE_VAL;
+    memcpy(row[0], y, sizeof row[0]);
+    for (int k = 0; k < rows; ++k) memcpy(row[k + 1], phi_group_past(group, stage, k), sizeof row[0]);
+    if (group->extrapolation_order[stage] == 0) group->extrapolation_order[stage] = 1;
+    for (int order = 1; order <= rows; ++order) { /* row[0] becomes the backward difference of this order */
+        for (int k = 0; k <= rows - order; ++k) phi_group_subtract(row[k], row[k + 1]);
+        const double size = phi_group_sum(group, row[0]);
+        if (size < least) {
+            least = size;
+            group->extrapolation_order[stage] = order;
+        }
+    }
+    if (group->recurrence_terms[stage] == 0) return;
+    phi_group_foresee(group, stage, row[0]);
+    phi_group_subtract(row[0], y);
+    group->use_recurrences[stage] = phi_group_sum(group, row[0]) <= least;
+}
+
+/* Fit the recurrences of all members; with every time, wait longer before it is done again, and for long if it did not
+   help. */
+static void phi_group_fit(phi_group *group)
+{
+    phi_history member;
+    const int helped = group->fits == 0 || group->use_recurrences[0];
+    member.count = PHI_REMEMBERED;
+    for (int stage = 0; stage < PHI_STAGES; ++stage) {
+        int found = 1;
+        group->recurrence_terms[stage] = 0;
+        for (int lane = 0; lane < PHI_LANES; ++lane)
+            for (int i = 0; i < PHI_DIM && group->active[lane] && found; ++i) {
+                for (int k = 0; k < PHI_REMEMBERED; ++k)
+                    member.past[PHI_REMEMBERED - 1 - k][i] = phi_group_past(group, stage, k)[i][lane];
+                const int terms = phi_train(&member, i);
+                found = terms > 0;
+                if (terms > group->recurrence_terms[stage]) group->recurrence_terms[stage] = terms;
+                for (int k = 0; k < PHI_WINDOW; ++k) group->weight[stage][k][i][lane] = member.weight[k][i][0];
+            }
+        if (!found) group->recurrence_terms[stage] = 0;
+        group->use_recurrences[stage] = found;
+    }
+    ++group->fits;
+    group->slow_steps = 0;
+    group->slow_steps_allowed = helped && group->slow_steps_allowed < PHI_LONG_WAIT / 2 ? 2 * group->slow_steps_allowed + PHI_REPAY : PHI_HOPELESS_WAIT;
+}
+
+/* Replace guesses that are not near the last values, as phi_near has it, by these; lane by lane. */
+static void phi_stay_near(phi_lanes y[restrict PHI_DIM], phi_lanes last[restrict PHI_DIM])
+{
+    phi_lanes distance = { 0.0 }, size = { 0.0 };
+    for (int i = 0; i < PHI_DIM; ++i) {
+        PHI_EACH_LANE
+        for (int lane = 0; lane < PHI_LANES; ++lane) {
+            distance[lane] += fabs(y[i][lane] - last[i][lane]);
+            size[lane] += fabs(last[i][lane]);
+        }
+    }
+    for (int i = 0; i < PHI_DIM; ++i) {
+        PHI_EACH_LANE
+        for (int lane = 0; lane < PHI_LANES; ++lane)
+            y[i][lane] = distance[lane] <= PHI_REACH * size[lane] ? y[i][lane] : last[i][lane];
+    }
+}
+
+/* Whether lanes are still to be solved after a correction of this size; those where nothing is finite leave the group.
+   bound is what remains in each lane. */
+static int phi_group_open(phi_group *group, const phi_lanes size, const phi_lanes previous,
+    double bend, phi_lanes bound)
+{
+    int open = 0;
+    PHI_EACH_LANE
+    for (int lane = 0; lane < PHI_LANES; ++lane)
+        bound[lane] = phi_remaining(size[lane], bend, bound[lane]);
+    if (phi_largest(bound) <= PHI_TOLERANCE) return 0;
+    for (int lane = 0; lane < PHI_LANES; ++lane) {
+        const int solved = bound[lane] <= PHI_TOLERANCE || (previous[lane] < PHI_SMALL && size[lane] < PHI_ROUNDING);
+        if (!isfinite(size[lane])) group->active[lane] = 0;
+        open += group->active[lane] && !solved;
+    }
+    return open;
+}
+
+/* The guess for a stage: recurrences, or extrapolation; the state for members where that is not near. */
+static void phi_group_predict(phi_group *group, int stage, phi_lanes y[PHI_DIM])
+{
+    if (group->use_recurrences[stage]) phi_group_foresee(group, stage, y);
+    else phi_group_extrapolate(group, stage, y);
+    phi_stay_near(y, group->x);
+}
+
+/* Newton's method for a stage, until the slowest lane is solved. The number of iterations; where that is the most
+   allowed, lanes that are not solved leave the group. */
+static int phi_group_solve(phi_group *group, int stage, phi_model *model)
+{
+    phi_lanes size, previous, bound;
+    double largest = HUGE_VAL, bend = 0.0;
+    int iterations = 0, open = 1;
+    for (int lane = 0; lane < PHI_LANES; ++lane) size[lane] = bound[lane] = HUGE_VAL;
+    phi_group_predict(group, stage, model->y);
+    for (; open > 0 && iterations < PHI_MAX_ITERATIONS; ++iterations) {
+        memcpy(previous, size, sizeof size);
+        phi_update(group->coef[stage], model, largest > PHI_FROZEN);
+        bend = largest > PHI_FROZEN ? 0.0 : bend + largest;
+        for (int i = 0; i < PHI_DIM; ++i) {
+            PHI_EACH_LANE
+            for (int lane = 0; lane < PHI_LANES; ++lane)
+                model->residual[i][lane] =
+                    ((model->y[i][lane] - group->x[i][lane]) + model->displacement[i][lane]) - group->carry[i][lane];
+        }
+        phi_correct(model, size);
+        open = phi_group_open(group, size, previous, bend, bound);
+        largest = phi_largest(size);
+    }
+    for (int lane = 0; lane < PHI_LANES && open > 0; ++lane)
+        group->active[lane] = group->active[lane] && bound[lane] <= PHI_TOLERANCE;
+    return iterations;
+}
+
+/* Add the increments, corrected to first order, in compensated arithmetic as for a single step. */
+static void phi_group_advance(phi_lanes x[restrict PHI_DIM], phi_lanes carry[restrict PHI_DIM], phi_model *model)
+{
+#if !PHI_SPARSE
+    for (int i = 0; i < PHI_DIM; ++i)
+        for (int j = 0; j < PHI_DIM; ++j) {
+            PHI_EACH_LANE
+            for (int lane = 0; lane < PHI_LANES; ++lane)
+                carry[i][lane] -= model->gain[i * PHI_DIM + j][lane] * model->residual[j][lane];
+        }
+#endif
+    for (int i = 0; i < PHI_DIM; ++i) {
+        PHI_EACH_LANE
+        for (int lane = 0; lane < PHI_LANES; ++lane) {
+            const double change = model->increment[i][lane], sum = x[i][lane] + change, added = sum - x[i][lane];
+            const double lost = (x[i][lane] - (sum - added)) + (change - added);
+#if PHI_SPARSE
+            const double small = lost + (carry[i][lane] - model->gained[i][lane]);
+#else
+            const double small = lost + carry[i][lane];
+#endif
+            x[i][lane] = sum + small;
+            carry[i][lane] = small - (x[i][lane] - sum);
+        }
+    }
+}
+
+/* Members that failed, or whose state is not near the one before the step or not finite, keep that one, and leave. How many
+   stay. */
+static int phi_group_leave(phi_group *group, phi_lanes x[PHI_DIM], phi_lanes carry[PHI_DIM],
+    size_t remaining)
+{
+    phi_lanes moved = { 0.0 }, size = { 0.0 }, bad;
+    int active = 0;
+    for (int i = 0; i < PHI_DIM; ++i) {
+        PHI_EACH_LANE
+        for (int lane = 0; lane < PHI_LANES; ++lane) {
+            moved[lane] += fabs(group->x[i][lane] - x[i][lane]);
+            size[lane] += fabs(x[i][lane]);
+        }
+    }
+    for (int lane = 0; lane < PHI_LANES; ++lane) bad[lane] = moved[lane] <= PHI_REACH * size[lane] ? 0.0 : 1.0;
+    for (int lane = 0; lane < PHI_LANES; ++lane) active += group->active[lane];
+    if (active == PHI_LANES && !(phi_largest(bad) > 0.0)) return active;
+    active = 0;
+    for (int lane = 0; lane < PHI_LANES; ++lane) {
+        group->active[lane] = group->active[lane] && !(bad[lane] > 0.0);
+        active += group->active[lane];
+        for (int i = 0; i < PHI_DIM && !group->active[lane]; ++i) {
+            group->x[i][lane] = x[i][lane];
+            group->carry[i][lane] = carry[i][lane];
+        }
+        if (!group->active[lane] && group->steps_left[lane] == 0) group->steps_left[lane] = remaining;
+    }
+    return active;
+}
+
+/* One step of all members, of as many as remain. How many members are left. */
+static int phi_group_step(phi_group *group, size_t remaining)
+{
+    phi_lanes x[PHI_DIM], carry[PHI_DIM];
+    phi_model model;
+    const int next = (group->latest > 0 ? group->latest : PHI_REMEMBERED) - 1;
+    int most = 0;
+    memcpy(x, group->x, sizeof x);
+    memcpy(carry, group->carry, sizeof carry);
+    for (int stage = 0; stage < PHI_STAGES; ++stage) {
+        const int iterations = phi_group_solve(group, stage, &model);
+        phi_group_advance(group->x, group->carry, &model);
+        if (iterations > most) most = iterations;
+        if ((iterations > 1 && next % PHI_HISTORY == 0) || group->count < PHI_HISTORY)
+            phi_group_judge(group, stage, model.y);
+        memcpy(group->past[stage][next], model.y, sizeof model.y);
+    }
+    group->latest = next;
+    if (group->count < PHI_REMEMBERED) ++group->count;
+    group->slow_steps = most > 1 ? group->slow_steps + 1 : 0;
+    if (group->slow_steps > group->slow_steps_allowed && group->count == PHI_REMEMBERED && remaining >= PHI_GROUP_REPAY)
+        phi_group_fit(group);
+    return phi_group_leave(group, x, carry, remaining);
+}
+
+/* Put a member into a lane: its state, and its coefficients. */
+static phi_status phi_group_join(phi_group *group, int lane, const phi_params *params,
+    const double x0[PHI_DIM], double h)
+{
+    phi_solver s;
+    phi_status status = phi_init(&s, params, x0);
+    if (status == PHI_OK) status = phi_set_step(&s, h);
+    if (status != PHI_OK) return status;
+    for (int i = 0; i < PHI_DIM; ++i) group->x[i][lane] = s.x[i];
+    for (int stage = 0; stage < PHI_STAGES; ++stage)
+        for (int k = 0; k < PHI_COEFFICIENTS; ++k) group->coef[stage][k][lane] = s.coef[stage][k];
+#if PHI_GAUGE
+    memcpy(group->gauge[lane], s.gauge, sizeof s.gauge);
+#endif
+    group->active[lane] = 1;
+    return status;
+}
+
+/* The steps that a member has still to make after it left the group, by itself. */
+static phi_status phi_group_finish(const phi_group *group, int lane, const phi_params *params,
+    double x[PHI_DIM], double h)
+{
+    phi_solver s;
+#if PHI_GAUGE
+    phi_status status = phi_init_gauge(&s, params, x, group->gauge[lane]);
+#else
+    phi_status status = phi_init(&s, params, x);
+#endif
+    if (status != PHI_OK) return status;
+    for (int i = 0; i < PHI_DIM; ++i) s.carry[i] = group->carry[i][lane];
+    status = phi_integrate(&s, h, group->steps_left[lane]);
+    memcpy(x, s.x, sizeof s.x);
+    return status;
+}
+
+/* The members from first on, as many as there are lanes. The first status that is not OK. */
+static phi_status phi_group_run(const phi_params *params, double *x, size_t members, size_t first,
+    double h, size_t steps, unsigned char *status)
+{
+    phi_group group;
+    phi_status worst = PHI_OK, member[PHI_LANES];
+    const int count = members - first < PHI_LANES ? (int)(members - first) : PHI_LANES;
+    double state[PHI_DIM];
+    size_t left = steps;
+    memset(&group, 0, sizeof group);
+    for (int lane = 0; lane < count; ++lane) {
+        for (size_t i = 0; i < PHI_DIM; ++i) state[i] = x[i * members + first + (size_t)lane];
+        member[lane] = phi_group_join(&group, lane, params, state, h);
+    }
+    for (int active = count; left > 0 && active >= PHI_FEWEST; --left) active = phi_group_step(&group, left);
+    for (int lane = 0; lane < count; ++lane) {
+        if (group.active[lane]) group.steps_left[lane] = left;
+        for (int i = 0; i < PHI_DIM; ++i) state[i] = group.x[i][lane];
+        if (member[lane] == PHI_OK) {
+            if (group.steps_left[lane] > 0) member[lane] = phi_group_finish(&group, lane, params, state, h);
+            for (size_t i = 0; i < PHI_DIM; ++i) x[i * members + first + (size_t)lane] = state[i];
+        }
+        if (status != NULL) status[first + (size_t)lane] = (unsigned char)member[lane];
+        if (worst == PHI_OK) worst = member[lane];
+    }
+    return worst;
+}
+#endif

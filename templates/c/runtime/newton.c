@@ -1,0 +1,82 @@
+#ifndef PHI_FILE_NEWTON
+#define PHI_FILE_NEWTON
+#include <float.h>
+#include <math.h>
+#include <string.h>
+
+#include "algebra.c"
+#include "implicit.c"
+#include "model.h"
+
+/* ---- The implicit step, by Newton's method ---- */
+#if PHI_RELATIVE
+/* Size of a correction relative to each component of y (coordinates keep their sign, and may be of very
+   different size); NaN or infinite if the correction is. */
+static double phi_size(const double y[PHI_DIM], const double delta[PHI_DIM])
+{
+    double size = 0.0;
+    for (int i = 0; i < PHI_DIM; ++i) {
+        const double ratio = fabs(delta[i]) / (fabs(y[i]) + DBL_MIN);
+        if (!isfinite(ratio)) return ratio;
+        size = ratio > size ? ratio : size;
+    }
+    return size;
+}
+#else
+/* Components of y are measured no finer than by this part of the largest. */
+#define PHI_FLOOR 1e-6
+
+/* Size of a correction relative to each component of y; NaN or infinite if the correction is. */
+static double phi_size(const double y[PHI_DIM], const double delta[PHI_DIM])
+{
+    double norm = 0.0, size = 0.0;
+    for (int i = 0; i < PHI_DIM; ++i) norm = fabs(y[i]) > norm ? fabs(y[i]) : norm;
+    for (int i = 0; i < PHI_DIM; ++i) {
+        const double ratio = fabs(delta[i]) / (fabs(y[i]) + PHI_FLOOR * norm + DBL_MIN);
+        if (!isfinite(ratio)) return ratio;
+        size = ratio > size ? ratio : size;
+    }
+    return size;
+}
+#endif
+
+/* Corrections below the first that shrink by less than the second have reached the level of rounding. */
+#define PHI_NEARLY_SOLVED 1e-8
+#define PHI_SHRINKING 0.25
+
+/* Solve (y - x) + displacement(y) = 0 for y by Newton's method from the extrapolated guess, and advance. The
+   increment is corrected to first order by the last Newton correction, so that correction costs no evaluation:
+   a correction is accepted when the error that remains after it, quadratic in it, is below PHI_TOLERANCE. */
+static phi_status phi_attempt(phi_solver *s, int stage)
+{
+    double y[PHI_DIM], delta[PHI_DIM], displacement[PHI_DIM], increment[PHI_DIM];
+    double jacobian[PHI_DIM * PHI_DIM], increment_jacobian[PHI_DIM * PHI_DIM], previous = HUGE_VAL;
+    if (!phi_predict(&s->history[stage], y)) memcpy(y, s->x, sizeof y);
+    for (int iteration = 1; iteration <= PHI_MAX_ITERATIONS; ++iteration) {
+        phi_linearise(s->coef[stage], y, displacement, increment, jacobian, increment_jacobian);
+        ++s->evaluations;
+        for (int i = 0; i < PHI_DIM; ++i) delta[i] = ((y[i] - s->x[i]) + displacement[i]) - s->carry[i];
+        const int regular = phi_solve(jacobian, delta);
+        const double size = phi_size(y, delta), growth = size / (previous * previous);
+        if (!isfinite(size)) return PHI_NOT_FINITE;
+        if (!regular) return PHI_SINGULAR;
+        for (int i = 0; i < PHI_DIM; ++i) y[i] -= delta[i];
+        const double remaining = size * size * (growth > 1.0 ? growth : 1.0);
+        const int stalled = previous < PHI_NEARLY_SOLVED && size > PHI_SHRINKING * previous;
+        previous = size;
+        if (!(remaining <= PHI_TOLERANCE || stalled)) continue;
+        double correction[PHI_DIM] = { 0.0 };
+        for (int i = 0; i < PHI_DIM; ++i)
+            for (int j = 0; j < PHI_DIM; ++j) correction[i] -= increment_jacobian[i * PHI_DIM + j] * delta[j];
+        if (!phi_plausible(s, stage, increment)) return PHI_NO_CONVERGENCE;
+        if (!phi_advance(s, increment, correction)) return PHI_NOT_FINITE;
+#if PHI_RECURRENCES
+        phi_remember(&s->history[stage], y, iteration);
+#else
+        phi_remember(&s->history[stage], y);
+#endif
+        return PHI_OK;
+    }
+    return PHI_NO_CONVERGENCE;
+}
+#endif

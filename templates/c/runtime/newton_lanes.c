@@ -1,0 +1,193 @@
+#ifndef PHI_FILE_NEWTON_LANES
+#define PHI_FILE_NEWTON_LANES
+#include <float.h>
+#include <math.h>
+#include <stdint.h>
+#include <string.h>
+
+#include "algebra.c"
+#include "implicit.c"
+#include "model.h"
+#include "lanes.c"
+#include "model_lanes.h"
+
+/* ---- Newton's method in lanes ---- */
+/* Components of y are measured no finer than by this part of the largest. */
+#if PHI_RELATIVE
+#define PHI_FLOOR_OF_LANES 0.0
+#else
+#define PHI_FLOOR_OF_LANES 1e-6
+#endif
+
+/* A stage in all lanes, linearised around y. */
+typedef struct {
+    phi_lanes y[PHI_DIM], displacement[PHI_DIM], increment[PHI_DIM], residual[PHI_DIM];
+#if PHI_SPARSE
+    /* of the Jacobian of alpha(y); that of the increment; what corrections take from the increment */
+    phi_lanes factor[PHI_FACTORS], slope[PHI_DIM * PHI_DIM], gained[PHI_DIM];
+#else
+    /* a residual r of alpha(y) = x takes inverse r from y, and gain r from the increment */
+    phi_lanes inverse[PHI_DIM * PHI_DIM], slope[PHI_DIM * PHI_DIM], gain[PHI_DIM * PHI_DIM];
+#endif
+#if PHI_PATH
+    phi_lanes middle[PHI_DIM]; /* of the path, less y */
+    phi_lanes alpha_y[PHI_DIM * PHI_DIM], increment_y[PHI_DIM * PHI_DIM]; /* of alpha and beta - alpha, with p held fixed */
+#endif
+} phi_model;
+
+/* phi_size in all lanes, summed over the components. */
+static void phi_sizes(phi_lanes y[restrict PHI_DIM], phi_lanes delta[restrict PHI_DIM], phi_lanes size)
+{
+    phi_lanes norm = { 0.0 };
+    memset(size, 0, PHI_LANES * sizeof size[0]);
+    for (int i = 0; i < PHI_DIM; ++i)
+        for (int lane = 0; lane < PHI_LANES; ++lane)
+            norm[lane] = PHI_FLOOR_OF_LANES * fabs(y[i][lane]) > norm[lane] ? PHI_FLOOR_OF_LANES * fabs(y[i][lane]) : norm[lane];
+    for (int i = 0; i < PHI_DIM; ++i) {
+        PHI_EACH_LANE
+        for (int lane = 0; lane < PHI_LANES; ++lane)
+            size[lane] += fabs(delta[i][lane]) / (fabs(y[i][lane]) + norm[lane] + DBL_MIN);
+    }
+}
+
+/* The largest of the lanes, none of which is negative; infinite if one is not finite. As integers, the bits of such
+   numbers have their order, and those of what is no number are larger. */
+static double phi_largest(const phi_lanes size)
+{
+    uint64_t bits[PHI_LANES], most = 0;
+    double largest;
+    memcpy(bits, size, sizeof bits);
+    for (int lane = 0; lane < PHI_LANES; ++lane) most = bits[lane] > most ? bits[lane] : most;
+    memcpy(&largest, &most, sizeof largest);
+    return isfinite(largest) ? largest : HUGE_VAL;
+}
+
+#if PHI_SPARSE
+/* Correct y by the residuals, with the factors in the table, and measure the corrections; also find what they take from
+   the increments. */
+static void phi_correct(phi_model *model, phi_lanes size)
+{
+    phi_lanes delta[PHI_DIM];
+    phi_substitute_lanes(model->factor, model->slope, model->residual, delta, model->gained);
+    phi_sizes(model->y, delta, size);
+    for (int i = 0; i < PHI_DIM; ++i)
+        for (int lane = 0; lane < PHI_LANES; ++lane) model->y[i][lane] -= delta[i][lane];
+}
+
+#else
+/* Correct y by the residuals, with the inverse in the table, and measure the corrections. */
+static void phi_correct(phi_model *model, phi_lanes size)
+{
+    phi_lanes delta[PHI_DIM];
+    memset(delta, 0, sizeof delta);
+    for (int i = 0; i < PHI_DIM; ++i)
+        for (int j = 0; j < PHI_DIM; ++j) {
+            PHI_EACH_LANE
+            for (int lane = 0; lane < PHI_LANES; ++lane)
+                delta[i][lane] += model->inverse[i * PHI_DIM + j][lane] * model->residual[j][lane];
+        }
+    phi_sizes(model->y, delta, size);
+    for (int i = 0; i < PHI_DIM; ++i)
+        for (int lane = 0; lane < PHI_LANES; ++lane) model->y[i][lane] -= delta[i][lane];
+}
+
+#endif
+/* What is left after a correction of this size: quadratic in it, where the matrices are of the points corrected; where
+   they are of points further off, by bend, also of the order of size times bend. bound is what the last pass left. */
+static double phi_remaining(double size, double bend, double bound)
+{
+    const double growth = size / bound, left = size * (size + bend);
+    return growth > 1.0 ? growth * left : left;
+}
+
+#if PHI_PATH
+#include "path_lanes.c"
+#else
+#if PHI_SPARSE
+/* Everything about a stage at the points y. The matrices are I + O(h): where a pivot is far from 1, all is infinite. */
+static void phi_tabulate(phi_lanes coef[restrict], phi_model *model)
+{
+    phi_lanes matrix[PHI_DIM * PHI_DIM], bad = { 0.0 };
+    phi_linearise_lanes(coef, model->y, model->displacement, model->increment, matrix, model->slope);
+    phi_factorise_lanes(matrix, model->factor);
+    for (int k = 0; k < PHI_DIM; ++k) { /* the reciprocals of the pivots */
+        PHI_EACH_LANE
+        for (int lane = 0; lane < PHI_LANES; ++lane)
+            bad[lane] += fabs(model->factor[k][lane]) < PHI_LARGEST_RECIPROCAL ? 0.0 : HUGE_VAL;
+    }
+    for (int lane = 0; lane < PHI_LANES; ++lane) model->factor[0][lane] += bad[lane];
+}
+
+#elif PHI_INVERSE_UNROLLED
+/* Everything about a stage at the points y. The matrices are I + O(h): where a pivot is far from 1, all is infinite. */
+static void phi_tabulate(phi_lanes coef[restrict], phi_model *model)
+{
+    phi_lanes jacobian[PHI_DIM * PHI_DIM], reciprocal[PHI_DIM];
+    phi_linearise_lanes(coef, model->y, model->displacement, model->increment, jacobian, model->slope);
+    phi_invert_lanes(jacobian, model->slope, model->inverse, model->gain, reciprocal);
+    for (int i = 0; i < PHI_DIM; ++i) {
+        PHI_EACH_LANE
+        for (int lane = 0; lane < PHI_LANES; ++lane)
+            model->inverse[i][lane] += fabs(reciprocal[i][lane]) < PHI_LARGEST_RECIPROCAL ? 0.0 : HUGE_VAL;
+    }
+}
+
+#else
+/* Invert the matrices of all lanes in place by elimination without pivoting: they are I + O(h). Infinite where a pivot is
+   far from 1. */
+static void phi_invert(phi_lanes matrix[restrict PHI_DIM * PHI_DIM])
+{
+    for (int k = 0; k < PHI_DIM; ++k) {
+        phi_lanes factor[PHI_DIM];
+        PHI_EACH_LANE
+        for (int lane = 0; lane < PHI_LANES; ++lane) {
+            const double reciprocal = 1.0 / matrix[k * PHI_DIM + k][lane];
+            matrix[k * PHI_DIM + k][lane] = 1.0;
+            for (int j = 0; j < PHI_DIM; ++j) matrix[k * PHI_DIM + j][lane] *= reciprocal;
+            matrix[k * PHI_DIM + k][lane] += fabs(reciprocal) < PHI_LARGEST_RECIPROCAL ? 0.0 : HUGE_VAL;
+        }
+        for (int i = 0; i < PHI_DIM; ++i) {
+            PHI_EACH_LANE
+            for (int lane = 0; lane < PHI_LANES; ++lane) {
+                factor[i][lane] = matrix[i * PHI_DIM + k][lane];
+                if (i != k) matrix[i * PHI_DIM + k][lane] = 0.0;
+            }
+        }
+        for (int i = 0; i < PHI_DIM; ++i)
+            for (int j = 0; j < PHI_DIM && i != k; ++j) {
+                PHI_EACH_LANE
+                for (int lane = 0; lane < PHI_LANES; ++lane)
+                    matrix[i * PHI_DIM + j][lane] -= factor[i][lane] * matrix[k * PHI_DIM + j][lane];
+            }
+    }
+}
+
+/* Everything about a stage at the points y. */
+static void phi_tabulate(phi_lanes coef[restrict], phi_model *model)
+{
+    phi_linearise_lanes(coef, model->y, model->displacement, model->increment, model->inverse, model->slope);
+    phi_invert(model->inverse);
+    for (int i = 0; i < PHI_DIM; ++i)
+        for (int j = 0; j < PHI_DIM; ++j) {
+            phi_lanes sum = { 0.0 };
+            for (int k = 0; k < PHI_DIM; ++k) {
+                PHI_EACH_LANE
+                for (int lane = 0; lane < PHI_LANES; ++lane)
+                    sum[lane] += model->slope[i * PHI_DIM + k][lane] * model->inverse[k * PHI_DIM + j][lane];
+            }
+            memcpy(model->gain[i * PHI_DIM + j], sum, sizeof sum);
+        }
+}
+
+#endif
+/* The table of a stage, with its matrices or with those of the last pass. */
+static void phi_update(phi_lanes coef[restrict], phi_model *model, int matrices)
+{
+    if (matrices)
+        phi_tabulate(coef, model);
+    else
+        phi_evaluate_lanes(coef, model->y, model->displacement, model->increment);
+}
+
+#endif
+#endif

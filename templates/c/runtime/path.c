@@ -1,0 +1,153 @@
+#ifndef PHI_FILE_PATH
+#define PHI_FILE_PATH
+#include <float.h>
+#include <math.h>
+#include <string.h>
+
+#include "algebra.c"
+#include "implicit.c"
+#include "model.h"
+#include "taylor.c"
+#include "path_model.h"
+
+/* ---- The implicit step, along paths dm/dt = pi(m) p ---- */
+enum {
+    PHI_LONGEST_PATH = 128, /* pieces of a path, a power of 2 */
+    PHI_MOST_PIECES = 512   /* of all paths that are tried in a solve: steps that need more are wrong by as much as the state */
+};
+
+/* Whether dm/dt = pi(m) p holds at a point m, where the expansion has the given slope: one with gaps between its terms,
+   like t + t^9, or across the kink of an absolute value, only looks as if it had converged. */
+static int phi_holds(const double *coef, const double p[PHI_DIM], const double m[PHI_DIM],
+    const double slope[PHI_DIM])
+{
+    double field[PHI_DIM], scale = 0.0;
+    phi_path_field(coef, p, m, field);
+    for (int i = 0; i < PHI_DIM; ++i) scale += fabs(m[i]) + fabs(slope[i]);
+    for (int i = 0; i < PHI_DIM; ++i)
+        if (!(fabs(field[i] - slope[i]) <= 2e-15 * scale)) return 0;
+    return 1;
+}
+
+/* A path for 0 <= t <= 1, from start, by its Taylor series: change is m(1) - start, mean the mean of m - start. The number
+   of terms follows from their size; 0 if PHI_TERMS do not suffice. */
+static int phi_piece(const double *coef, const double p[PHI_DIM], const double start[PHI_DIM], double change[PHI_DIM],
+    double mean[PHI_DIM])
+{
+    double series[PHI_SERIES][PHI_TERMS + 1], fixed[PHI_FIXED], end[PHI_DIM], slope[PHI_DIM], norm = 0.0;
+    int small = 0;
+    for (int i = 0; i < PHI_DIM; ++i) {
+        series[i][0] = start[i];
+        change[i] = mean[i] = slope[i] = 0.0;
+        norm += fabs(start[i]);
+    }
+    phi_path_begin(coef, p, series, fixed);
+    for (int k = 0; k < PHI_TERMS; ++k) {
+        phi_path_order(coef, p, series, fixed, k);
+        int negligible = 1;
+        for (int i = 0; i < PHI_DIM; ++i) {
+            const double term = series[i][k + 1];
+            change[i] += term;
+            mean[i] += term / (k + 2);
+            slope[i] += (k + 1) * term;
+            end[i] = start[i] + change[i];
+            if (!(fabs(term) <= 1e-17 * (fabs(start[i]) + fabs(change[i]) + 1e-5 * norm))) negligible = 0;
+        }
+        small = negligible ? small + 1 : 0;
+        if (small >= 2 && phi_holds(coef, p, end, slope)) return 1;
+    }
+    return 0;
+}
+
+/* The whole path from x, in 1, 2, 4, ... pieces until each expansion converges. Whatever p is, the end of the path
+   lies on the symplectic leaf of x. 0 if the path is too long or leaves the domain. *made counts all pieces. */
+static int phi_path(const double *coef, const double x[PHI_DIM], const double p[PHI_DIM], double change[PHI_DIM],
+    double mean[PHI_DIM], int *made)
+{
+    for (int pieces = 1; pieces <= PHI_LONGEST_PATH; pieces *= 2) {
+        double q[PHI_DIM], point[PHI_DIM], shift[PHI_DIM], local[PHI_DIM];
+        int good = 1;
+        for (int i = 0; i < PHI_DIM; ++i) {
+            q[i] = p[i] / pieces;
+            change[i] = mean[i] = 0.0;
+        }
+        for (int piece = 0; piece < pieces && good; ++piece) {
+            for (int i = 0; i < PHI_DIM; ++i) point[i] = x[i] + change[i];
+            good = phi_piece(coef, q, point, shift, local);
+            ++*made;
+            for (int i = 0; i < PHI_DIM; ++i) {
+                mean[i] += (change[i] + local[i]) / pieces;
+                change[i] += shift[i];
+            }
+        }
+        if (good) return 1;
+    }
+    return 0;
+}
+
+/* The residual p - grad S_h(mean of the path) of the equation for p, with that mean y, the path's change of
+   x and an approximate Jacobian of the residual. 0 if the path cannot be followed. */
+static int phi_residual(phi_solver *s, const double *coef, const double p[PHI_DIM], double y[PHI_DIM],
+    double residual[PHI_DIM], double change[PHI_DIM], double jacobian[PHI_DIM * PHI_DIM], int *made)
+{
+    double mean[PHI_DIM];
+    if (!phi_path(coef, s->x, p, change, mean, made)) return 0;
+    for (int i = 0; i < PHI_DIM; ++i) y[i] = s->x[i] + mean[i];
+    phi_generate(coef, y, residual, jacobian);
+    for (int i = 0; i < PHI_DIM; ++i) residual[i] = p[i] - residual[i];
+    ++s->evaluations;
+    return 1;
+}
+
+/* The Jacobian by differences, for steps so large that the approximate one does not contract. */
+static int phi_differences(phi_solver *s, const double *coef, const double p[PHI_DIM], const double residual[PHI_DIM],
+    double jacobian[PHI_DIM * PHI_DIM], int *made)
+{
+    double q[PHI_DIM], y[PHI_DIM], moved[PHI_DIM], change[PHI_DIM], unused[PHI_DIM * PHI_DIM], norm = DBL_MIN;
+    for (int i = 0; i < PHI_DIM; ++i) norm = fabs(p[i]) > norm ? fabs(p[i]) : norm;
+    for (int j = 0; j < PHI_DIM; ++j) {
+        memcpy(q, p, sizeof q);
+        q[j] += 1e-7 * norm;
+        if (!phi_residual(s, coef, q, y, moved, change, unused, made)) return 0;
+        for (int i = 0; i < PHI_DIM; ++i) jacobian[i * PHI_DIM + j] = (moved[i] - residual[i]) / (q[j] - p[j]);
+    }
+    return 1;
+}
+
+/* Solve p = grad S_h(mean of the path from x under p) and move to the end of that path. Where that takes more than
+   PHI_MOST_PIECES pieces of paths, the step is so large that a solution would mean nothing. */
+static phi_status phi_attempt(phi_solver *s, int stage)
+{
+    const double *coef = s->coef[stage], none[PHI_DIM] = { 0.0 };
+    double p[PHI_DIM], y[PHI_DIM], residual[PHI_DIM], change[PHI_DIM], jacobian[PHI_DIM * PHI_DIM], previous = HUGE_VAL;
+    if (!phi_predict(&s->history[stage], y)) memcpy(y, s->x, sizeof y);
+    phi_generate(coef, y, p, jacobian);
+    for (int iteration = 0, made = 0; iteration < PHI_MAX_ITERATIONS && made <= PHI_MOST_PIECES; ++iteration) {
+        if (!phi_residual(s, coef, p, y, residual, change, jacobian, &made)) return PHI_NO_CONVERGENCE;
+        double size = 0.0, norm = DBL_MIN;
+        for (int i = 0; i < PHI_DIM; ++i) {
+            if (!isfinite(residual[i])) return PHI_NOT_FINITE;
+            size = fabs(residual[i]) > size ? fabs(residual[i]) : size;
+            norm = fabs(p[i]) > norm ? fabs(p[i]) : norm;
+        }
+        size /= norm;
+        /* The second test: residuals no longer shrink, the solve has reached the level of rounding. */
+        if (size <= 4e-16 || (previous < 1e-12 && size > 0.25 * previous)) {
+            if (!phi_plausible(s, stage, change)) return PHI_NO_CONVERGENCE;
+            if (!phi_advance(s, change, none)) return PHI_NOT_FINITE;
+#if PHI_RECURRENCES
+            phi_remember(&s->history[stage], y, iteration);
+#else
+            phi_remember(&s->history[stage], y);
+#endif
+            return PHI_OK;
+        }
+        const int slow = iteration >= 3 && size > 0.05 * previous;
+        if (slow && !phi_differences(s, coef, p, residual, jacobian, &made)) return PHI_NO_CONVERGENCE;
+        if (!phi_solve(jacobian, residual)) return PHI_SINGULAR;
+        for (int i = 0; i < PHI_DIM; ++i) p[i] -= residual[i];
+        previous = size;
+    }
+    return PHI_NO_CONVERGENCE;
+}
+#endif

@@ -1,0 +1,98 @@
+#ifndef PHI_FILE_RECURRENCE
+#define PHI_FILE_RECURRENCE
+#include <math.h>
+#include <string.h>
+
+#include "model.h"
+
+/* ---- Recurrences fitted to the last values ---- */
+/* A recurrence uses no more values than leave so little, in sizes of the largest. */
+#define PHI_ENOUGH 3e-12
+
+/* The ridge of the least squares: the level of rounding. */
+#define PHI_RIDGE 1e-15
+
+/* How far a recurrence may miss values that it was not fitted to, in sizes of the largest: beyond, the motion is chaotic
+   or the step long, and other guesses are as good. */
+#define PHI_HOPELESS 1e-7
+
+enum { PHI_ROWS = PHI_REMEMBERED - PHI_WINDOW - PHI_AHEAD - PHI_CHECKS + 1 }; /* equations of the least squares */
+
+/* Make eight columns orthogonal to one, by the multiples of it that are put into r. Where that one is among the eight, those
+   up to it stay as they are, and inverse becomes one over its squared length. The number of rows is even. */
+static void phi_project(int rows, double (*one)[8], int column, double *inverse, double (*eight)[8], double r[8])
+{
+    double even[8] = { 0.0 }, odd[8] = { 0.0 };
+    for (int i = 0; i < rows; i += 2) {
+        const double entry = one[i][column], next = one[i + 1][column];
+        for (int l = 0; l < 8; ++l) even[l] += entry * eight[i][l];
+        for (int l = 0; l < 8; ++l) odd[l] += next * eight[i + 1][l];
+    }
+    for (int l = 0; l < 8; ++l) even[l] += odd[l];
+    if (one == eight) {
+        *inverse = even[column] > 0.0 ? 1.0 / even[column] : 0.0;
+        memset(even, 0, ((size_t)column + 1) * sizeof even[0]);
+    }
+    for (int l = 0; l < 8; ++l) r[l] = even[l] *= *inverse;
+    for (int i = 0; i < rows; ++i) {
+        const double entry = one[i][column];
+        for (int l = 0; l < 8; ++l) eight[i][l] -= entry * even[l];
+    }
+}
+
+/* By how much recurrences miss the last of these values. */
+static double phi_missed(const double *value, double (*weight)[8])
+{
+    enum { AHEAD = PHI_AHEAD, WINDOW = PHI_WINDOW, CHECKS = PHI_CHECKS };
+    double most = 0.0;
+    for (int i = 0; i < CHECKS; ++i) {
+        double guess[8] = { 0.0 };
+        for (int k = 0; k < WINDOW; ++k)
+            for (int l = 0; l < 8; ++l) guess[l] += weight[k][l] * value[i + WINDOW - 1 - k];
+        for (int l = 0; l < AHEAD; ++l) most = fmax(most, fabs(guess[l] - value[i + WINDOW + l]));
+    }
+    return most;
+}
+
+/* Fit the recurrences value[m + l] = sum of weight[k][..][l] * value[m - 1 - k], l = 0 ... PHI_AHEAD - 1, to the history of
+   a component: ridge least squares by modified Gram-Schmidt, the ridge at the level of rounding. Columns are taken in by
+   eights, until they leave next to nothing of the right-hand sides. How many past values are used; 0 if the recurrences do
+   not foresee the last values, which they were not fitted to. */
+static int phi_train(phi_history *history, int component)
+{
+    enum { AHEAD = PHI_AHEAD, WINDOW = PHI_WINDOW, ROWS = PHI_ROWS };
+    double q[WINDOW / 8][ROWS + WINDOW][8], r[WINDOW / 8][WINDOW][8], inverse[WINDOW]; /* eight columns in each part */
+    double right[ROWS + WINDOW][8], weight[WINDOW][8], value[PHI_REMEMBERED], largest = 0.0, left = HUGE_VAL;
+    int terms = 0;
+    memset(q, 0, sizeof q);
+    memset(right, 0, sizeof right);
+    memset(weight, 0, sizeof weight);
+    for (int i = 0; i < PHI_REMEMBERED; ++i) {
+        value[i] = history->past[history->count - PHI_REMEMBERED + i][component];
+        if (fabs(value[i]) > largest) largest = fabs(value[i]);
+    }
+    for (int i = 0; i < ROWS; ++i)
+        for (int l = 0; l < AHEAD; ++l) right[i][l] = value[i + WINDOW + l];
+    while (terms < WINDOW && left > PHI_ENOUGH * largest) {
+        const int part = terms / 8, rows = ROWS + terms + 8; /* further rows of the ridge are zero in these columns */
+        for (int i = 0; i < ROWS; ++i)
+            for (int l = 0; l < 8; ++l) q[part][i][l] = value[i + WINDOW - 1 - terms - l];
+        for (int l = 0; l < 8; ++l) q[part][ROWS + terms + l][l] = PHI_RIDGE * largest;
+        for (int k = 0; k < terms; ++k) phi_project(rows, q[k / 8], k % 8, &inverse[k], q[part], r[part][k]);
+        for (int l = 0; l < 8; ++l, ++terms) {
+            phi_project(rows, q[part], l, &inverse[terms], q[part], r[part][terms]);
+            phi_project(rows, q[part], l, &inverse[terms], right, weight[terms]);
+        }
+        double sum[8] = { 0.0 };
+        for (int i = 0; i < ROWS; ++i)
+            for (int l = 0; l < 8; ++l) sum[l] += fabs(right[i][l]);
+        left = 0.0;
+        for (int l = 0; l < 8; ++l) left += sum[l] / ROWS;
+    }
+    for (int k = terms - 1; k >= 0; --k)
+        for (int j = k + 1; j < terms; ++j)
+            for (int l = 0; l < 8; ++l) weight[k][l] -= r[j / 8][k][j % 8] * weight[j][l];
+    for (int k = 0; k < WINDOW; ++k) memcpy(history->weight[k][component], weight[k], AHEAD * sizeof(double));
+    return phi_missed(value + ROWS, weight) <= PHI_HOPELESS * largest ? terms : 0;
+}
+#endif

@@ -1,0 +1,16 @@
+#include "solver.h"
+#include "model.h"
+#include "solver.c"
+#if PHI_TANGENT
+#include "tangent.c"
+#endif
+#if PHI_BLOCKS
+#include "blocks.c"
+#endif
+#include "ensemble.c"
+#if PHI_BLOCKS || PHI_PACKS
+
+#if defined(__clang__)
+#pragma clang diagnostic pop
+#endif
+#endif

@@ -1,0 +1,121 @@
+#ifndef PHI_FILE_SOLVER_H
+#define PHI_FILE_SOLVER_H
+#include "declarations.h"
+
+/* How a step ends. */
+typedef enum {
+    PHI_OK = 0,
+    PHI_NO_CONVERGENCE, /* the inner solve did not converge: the step is too large */
+    PHI_SINGULAR,       /* the Newton matrix is singular: the step is too large */
+    PHI_NOT_FINITE,     /* infinity or NaN: overflow, or outside the domain */
+    PHI_BAD_ARGUMENT    /* a null pointer, or values that are not allowed */
+} phi_status;
+
+#if PHI_IMPLICIT && !PHI_RECURRENCES
+enum { PHI_DIFFERENCES = 9 }; /* extrapolation of more than order 8 amplifies rounding more than it gains */
+
+/* The last value of the unknown and its backward differences, which the next is extrapolated by. For speed only. */
+typedef struct {
+    int count; /* differences that are known */
+    int order; /* how many of them the extrapolation adds up */
+    double difference[PHI_DIFFERENCES][PHI_DIM];
+} phi_history;
+
+#endif
+#if PHI_RECURRENCES
+enum { PHI_KEPT = 2 * PHI_REMEMBERED };
+
+/* Recent values of the unknown of the inner solve, for its starting guess: extrapolated, or by a linear recurrence
+   fitted to the last PHI_REMEMBERED values. For speed only. */
+typedef struct {
+    int count;                       /* values in past */
+    int extrapolation_order;         /* how many of them the extrapolation uses */
+    int recurrence_terms;            /* how many of them the recurrence uses; 0 if there is none */
+    int use_recurrence;              /* whether the recurrence is the better guess */
+    int fits;                        /* how often it has been fitted */
+    int slow_steps;                  /* how many of the last steps took more than one iteration */
+    int slow_steps_allowed;          /* how many of those before it is fitted again */
+    double past[PHI_KEPT][PHI_DIM]; /* values, the latest last */
+    double weight[PHI_WINDOW][PHI_DIM][PHI_AHEAD]; /* of past values, the latest first, for the next */
+} phi_history;
+
+#endif
+#if PHI_BLOCKS
+/* What was learnt about blocks of steps. For speed only. */
+typedef struct {
+    double evaluations_per_stage;      /* that single steps take */
+    int single_steps;                  /* to make before a block is tried */
+    int last_single_steps;             /* the same after the last failure, halved with every block that succeeds */
+    int use_recurrences;               /* whether blocks are guessed by recurrences */
+    int passes_without_recurrences;    /* that the last block took which was guessed by Runge-Kutta steps */
+    size_t steps_without_recurrences;  /* to wait before recurrences are tried again */
+    size_t recurrences_from_step;      /* when that is */
+} phi_learnt;
+
+#endif
+/* The solver is a plain value: copy it to branch, keep one per thread. Set it up with phi_init. */
+typedef struct {
+    double x[PHI_DIM];     /* the state; read it freely, change it only through phi_init */
+    double carry[PHI_DIM]; /* what rounding took from x: the state proper is x + carry */
+    size_t steps;          /* good steps since phi_init */
+    size_t evaluations;    /* of the generating function, for statistics */
+    double t;              /* time since phi_init */
+    double h;              /* the last step size */
+    phi_params params;
+#if PHI_GAUGE
+    double gauge[PHI_GAUGES]; /* multiples of Casimirs that are taken from H, in their order */
+#endif
+    double coef[PHI_STAGES][PHI_COEFFICIENTS]; /* all that depends on params and h only */
+    int prepared;          /* whether coef has been computed */
+    size_t steps_before_h; /* steps and t when h was set: t is counted from there, so no error adds up */
+    double t_before_h;
+#if PHI_IMPLICIT
+    phi_history history[PHI_STAGES]; /* for starting guesses */
+#endif
+#if PHI_BLOCKS
+    phi_learnt blocks;
+#endif
+} phi_solver;
+
+/* Start at x0. params may be NULL for the defaults. Arguments of all functions may be parts of the solver, or overlap.
+   PHI_BAD_ARGUMENT, and *s as before, if x0 or a parameter is not finite, one that has to be positive is not, or
+   what is computed from parameters alone is not finite. */
+phi_status phi_init(phi_solver *s, const phi_params *params, const double x0[PHI_DIM]);
+
+#if PHI_GAUGE
+/* Start at x0 with a gauge of one's own: the step is an exact Poisson map for each fixed gauge. */
+phi_status phi_init_gauge(phi_solver *s, const phi_params *params, const double x0[PHI_DIM],
+    const double gauge[PHI_GAUGES]);
+
+#endif
+/* One step of size h, of either sign. On failure the state is as before. */
+phi_status phi_step(phi_solver *s, double h);
+
+/* Many steps. On failure s->x is the last good state and s->steps counts the good steps. */
+phi_status phi_integrate(phi_solver *s, double h, size_t steps);
+
+/* Many members, in place: x[i * members + m] is coordinate i of member m. status (or NULL) receives the status of
+   each member; a failed member keeps its last good state. Returns the first status that is not OK. */
+#if PHI_GROUPS || PHI_PACKS
+/* Members are integrated side by side in groups; with OpenMP, groups in parallel. */
+#endif
+phi_status phi_ensemble(const phi_params *params, double *x, size_t members, double h, size_t steps,
+    unsigned char *status);
+
+#if PHI_TANGENT
+/* One step as phi_step makes it, and its derivative: tangent[i * PHI_DIM + j] is that of the new x_i along the old x_j,
+   to round-off, with any gauge held fixed. On failure both are as before. */
+phi_status phi_step_tangent(phi_solver *s, double h, double tangent[PHI_DIM * PHI_DIM]);
+
+#endif
+/* The Hamiltonian; the Casimirs; the right-hand side pi(x) grad H(x). params may be NULL. */
+double phi_hamiltonian(const phi_params *params, const double x[PHI_DIM]);
+void phi_casimirs(const phi_params *params, const double x[PHI_DIM], double out[]);
+void phi_vector_field(const phi_params *params, const double x[PHI_DIM], double out[PHI_DIM]);
+
+const char *phi_status_string(phi_status status);
+
+/* For bindings: the size of phi_solver, and its count of good steps. */
+size_t phi_solver_size(void);
+size_t phi_solver_steps_done(const phi_solver *s);
+#endif

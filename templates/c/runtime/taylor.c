@@ -1,0 +1,34 @@
+#ifndef PHI_FILE_TAYLOR
+#define PHI_FILE_TAYLOR
+#include "model.h"
+
+#if PHI_TAYLOR_PRODUCT
+/* Coefficient k of the product of two Taylor series. */
+static double phi_taylor_product(const double *a, const double *b, int k)
+{
+    double sum = 0.0;
+    for (int j = 0; j <= k; ++j) sum += a[j] * b[k - j];
+    return sum;
+}
+
+#endif
+#if PHI_TAYLOR_CHAIN
+/* Coefficient k >= 1 of the Taylor series of f(a), where d is that of f'(a): f(a)' = f'(a) a'. */
+static double phi_taylor_chain(const double *a, const double *d, int k)
+{
+    double sum = 0.0;
+    for (int j = 1; j <= k; ++j) sum += j * a[j] * d[k - j];
+    return sum / k;
+}
+
+#endif
+#if PHI_TAYLOR_POWER
+/* Coefficient k >= 1 of the Taylor series of b = a^r, times a[0]: a b' = r a' b. */
+static double phi_taylor_power(const double *a, const double *b, double r, int k)
+{
+    double sum = 0.0;
+    for (int j = 1; j <= k; ++j) sum += ((r + 1.0) * j - k) * a[j] * b[k - j];
+    return sum / k;
+}
+#endif
+#endif

@@ -1,0 +1,64 @@
+"""Short code does what fast code does, and is short."""
+
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from support import RawC, compiled, files, setting, solver
+
+GENERATED = Path(__file__).resolve().parents[2] / "generated"
+
+#: One of each kind of step; how far a regular motion of 300 steps may be apart, in sizes of the state.
+KINDS = {
+    ("rigid_body", None): 1e-14,
+    ("lotka_volterra", None): 1e-14,
+    ("nambu_pendulum", None): 1e-13,
+    ("pendulum_euler", None): 0.0,
+    ("kepler", "splitting"): 0.0,
+}
+
+
+def small(compilation):
+    """The same compilation with short C."""
+    return replace(compilation, program=replace(compilation.program, profile="small"))
+
+
+@pytest.mark.parametrize(("name", "scheme"), KINDS)
+def test_small_code_makes_the_steps_of_fast_code(name, scheme):
+    fast = compiled(name, 4 if scheme else None, scheme)
+    short, at = small(fast), setting(fast)
+    ends = []
+    for compilation in (fast, short):
+        raw = RawC(compilation)
+        assert raw.init(at.x, at.parameters) == 0
+        for _ in range(300):
+            assert raw.step(at.h) == 0
+        ends.append(raw.x + raw.carry)
+        assert raw.counters[0] == 300
+    near = KINDS[name, scheme] * np.max(np.abs(ends[0]))
+    np.testing.assert_allclose(ends[1], ends[0], rtol=0, atol=near)
+    members = np.multiply.outer([1.0, 1.001, 1.002], at.x)
+    many = [solver(c, "c").ensemble(members, at.h, 300, **at.parameters) for c in (fast, short)]
+    np.testing.assert_allclose(many[1], many[0], rtol=0, atol=max(near, 4e-16 * np.max(np.abs(many[0]))))
+
+
+@pytest.mark.parametrize(("name", "lines", "solver_bytes"), [("rigid_body", 750, 1000), ("pendulum_euler", 300, 150)])
+def test_small_code_is_short(name, lines, solver_bytes):
+    order = 4 if name == "rigid_body" else 1
+    compilation = small(compiled(name, order))
+    texts = files(compilation, "c").values()
+    assert sum(text.count("\n") for text in texts) <= lines
+    assert RawC(compilation).memory.size <= solver_bytes
+    assert not any(word in text for word in ("_LANES", "_block", "_group", "recurrence") for text in texts)
+
+
+@pytest.mark.parametrize("path", sorted(GENERATED.glob("*/*.[ch]")), ids=lambda p: p.name)
+def test_code_is_fit_to_be_read(path):
+    """No long lines, no loops over one stage, no traces of how the runtime was put together; contents that are true."""
+    text = path.read_text(encoding="utf-8")
+    assert max(map(len, text.splitlines())) <= 110
+    assert not re.search(r"\bphi_|PHI_(?!GEN)|% 1\b|\n\n\n", text)
+    assert "_STAGES" in text or not re.search(r"\bstage <|\[stage\]|\bint stage\b", text)
+    assert re.findall(r"^ \*   \d+\. (.*)$", text, re.M) == re.findall(r"^/\* ---- (.*) ---- \*/$", text, re.M)

@@ -1,0 +1,70 @@
+/* A pendulum, H = p^2/2 - g cos q, as a hand-written model for the runtime in templates/c/runtime. One of PHI_NEWTON, PHI_PATH,
+   PHI_EXPLICIT and PHI_SPLITTING is given, and others that are wanted; of these switches, generated files have no traces. */
+#ifndef DECLARATIONS_H
+#define DECLARATIONS_H
+#include <stddef.h>
+
+#define PHI_DIM 2
+#define PHI_CASIMIRS 0
+
+#ifndef PHI_NEWTON
+#define PHI_NEWTON 0
+#endif
+#ifndef PHI_PATH
+#define PHI_PATH 0
+#endif
+#ifndef PHI_EXPLICIT
+#define PHI_EXPLICIT 0
+#endif
+#ifndef PHI_SPLITTING
+#define PHI_SPLITTING 0
+#endif
+#ifndef PHI_COMPOSED
+#define PHI_COMPOSED 0
+#endif
+#ifndef PHI_FAST
+#define PHI_FAST 0
+#endif
+#ifndef PHI_TANGENT
+#define PHI_TANGENT 0
+#endif
+#define PHI_IMPLICIT (PHI_NEWTON || PHI_PATH)
+#define PHI_PARAMETERS 1
+#define PHI_KICKS 0
+#define PHI_GAUGE 0
+#define PHI_QUICK_GAUGE 0
+#define PHI_RELATIVE 0
+#define PHI_MODIFIED 0
+#define PHI_ADVANCE (!PHI_SPLITTING || PHI_TANGENT)
+#define PHI_UNROLLED 0
+#define PHI_PIVOTING 1
+#define PHI_RECURRENCES (PHI_FAST && PHI_IMPLICIT)
+#define PHI_BLOCKS PHI_RECURRENCES
+#define PHI_GROUPS PHI_BLOCKS
+#define PHI_PACKS (PHI_FAST && !PHI_IMPLICIT)
+#define PHI_FAR 0
+#define PHI_SPARSE 0
+#define PHI_INVERSE_UNROLLED 0
+#define PHI_CALLS_EXP 0
+#define PHI_CALLS_EXPM1 0
+#define PHI_CALLS_LOG 0
+#define PHI_CALLS_SIN 0
+#define PHI_CALLS_COS 0
+#define PHI_TAYLOR_PRODUCT 0
+#define PHI_TAYLOR_CHAIN 0
+#define PHI_TAYLOR_POWER 0
+
+typedef struct {
+    double g;
+} phi_params;
+
+extern const phi_params phi_default_params;
+
+#if PHI_COMPOSED
+enum { PHI_STAGES = 3 };
+#else
+enum { PHI_STAGES = 1 };
+#endif
+enum { PHI_COEFFICIENTS = PHI_SPLITTING ? 4 : 2 };
+enum { PHI_REMEMBERED = 111, PHI_WINDOW = 40, PHI_AHEAD = PHI_BLOCKS ? 8 : 1 };
+#endif

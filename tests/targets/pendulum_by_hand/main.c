@@ -1,0 +1,126 @@
+/* The runtime with the pendulum: what holds for each kind of step. */
+#include "runtime.c"
+
+#include <stdio.h>
+#include <stdlib.h>
+
+#define EXPECT(condition) \
+    do { \
+        if (!(condition)) { \
+            fprintf(stderr, "%s:%d: %s\n", __FILE__, __LINE__, #condition); \
+            exit(1); \
+        } \
+    } while (0)
+
+static const double start[2] = { 1.0, 0.2 }, H = 0.05;
+
+static double apart(const double a[2], const double b[2]) { return fmax(fabs(a[0] - b[0]), fabs(a[1] - b[1])); }
+
+static void refuses_what_is_not_allowed(void)
+{
+    const double nowhere[2] = { 0.0, (double)NAN };
+    const phi_params wrong = { -1.0 };
+    phi_solver s;
+    EXPECT(phi_init(&s, NULL, nowhere) == PHI_BAD_ARGUMENT);
+    EXPECT(phi_init(&s, &wrong, start) == PHI_BAD_ARGUMENT);
+    EXPECT(phi_init(NULL, NULL, start) == PHI_BAD_ARGUMENT);
+    EXPECT(phi_init(&s, NULL, start) == PHI_OK);
+    EXPECT(phi_step(&s, (double)INFINITY) == PHI_BAD_ARGUMENT);
+    EXPECT(s.steps == 0 && apart(s.x, start) <= 0.0);
+    EXPECT(phi_status_string(PHI_SINGULAR)[0] == 's' && phi_solver_size() == sizeof s);
+}
+
+/* Time is counted without an error that adds up, through changes of the step; steps are undone where the method is symmetric. */
+static void counts_time(void)
+{
+    phi_solver s;
+    EXPECT(phi_init(&s, NULL, start) == PHI_OK);
+    EXPECT(phi_integrate(&s, 0.1, 1000) == PHI_OK);
+    EXPECT(fabs(s.t - 100.0) <= 0.0);
+    for (int k = 0; k < 20; ++k) EXPECT(phi_step(&s, 0.2) == PHI_OK);
+    EXPECT(fabs(s.t - 104.0) <= 1e-13 && s.steps == 1020 && phi_solver_steps_done(&s) == 1020);
+    for (int k = 0; k < 20; ++k) EXPECT(phi_step(&s, -0.2) == PHI_OK);
+    EXPECT(phi_integrate(&s, -0.1, 1000) == PHI_OK);
+    EXPECT(PHI_EXPLICIT || apart(s.x, start) < 1e-11);
+}
+
+static void keeps_energy(void)
+{
+    phi_solver s;
+    EXPECT(phi_init(&s, NULL, start) == PHI_OK);
+    const double before = phi_hamiltonian(NULL, start);
+    for (int k = 0; k < 100; ++k) {
+        EXPECT(phi_integrate(&s, H, 100) == PHI_OK);
+        EXPECT(fabs(phi_hamiltonian(NULL, s.x) - before) < (PHI_EXPLICIT ? 0.05 : PHI_COMPOSED ? 2e-5 : 1e-3));
+    }
+}
+
+/* Blocks, groups and packs are single steps; all kinds of the midpoint rule are one method, whose values are known. */
+static void many_are_one(void)
+{
+    enum { MEMBERS = 41, STEPS = 400 };
+    static double x[2 * MEMBERS];
+    unsigned char status[MEMBERS];
+    phi_solver one, many;
+    for (int m = 0; m < MEMBERS; ++m)
+        for (int i = 0; i < 2; ++i) x[i * MEMBERS + m] = start[i] * (1.0 + 0.01 * m);
+    EXPECT(phi_ensemble(NULL, x, MEMBERS, H, STEPS, status) == PHI_OK);
+    for (int m = 0; m < MEMBERS; ++m) {
+        const double x0[2] = { start[0] * (1.0 + 0.01 * m), start[1] * (1.0 + 0.01 * m) };
+        const double end[2] = { x[m], x[MEMBERS + m] };
+        EXPECT(phi_init(&one, NULL, x0) == PHI_OK && phi_init(&many, NULL, x0) == PHI_OK);
+        for (int k = 0; k < STEPS; ++k) EXPECT(phi_step(&one, H) == PHI_OK);
+        EXPECT(phi_integrate(&many, H, STEPS) == PHI_OK);
+        EXPECT(status[m] == PHI_OK && apart(end, one.x) < 2e-13 && apart(many.x, one.x) < 2e-13);
+        EXPECT(one.steps == many.steps && fabs(one.t - many.t) <= 0.0);
+    }
+    EXPECT(phi_init(&one, NULL, start) == PHI_OK && phi_integrate(&one, H, 10) == PHI_OK);
+    printf("%.13f %.13f\n", one.x[0], one.x[1]);
+}
+
+/* Where no step can be made, the state stays as it is, and the ensemble says which member it was. */
+static void failures_change_nothing(void)
+{
+    const double far[2] = { 1e300, 1e300 };
+    double x[4] = { 1.0, 1e300, 0.2, 1e300 };
+    unsigned char status[2];
+    phi_solver s;
+    EXPECT(phi_init(&s, NULL, far) == PHI_OK);
+    EXPECT(phi_step(&s, 1e300) != PHI_OK);
+    EXPECT(s.steps == 0 && apart(s.x, far) <= 0.0);
+    EXPECT(phi_ensemble(NULL, x, 2, 1e300, 3, status) != PHI_OK && status[1] != PHI_OK);
+    EXPECT(phi_ensemble(NULL, NULL, 2, H, 1, NULL) == PHI_BAD_ARGUMENT);
+}
+
+#if PHI_TANGENT
+/* The derivative of a step has determinant 1, and is that of differences. */
+static void tangent_is_the_derivative(void)
+{
+    double tangent[4], ends[2][2];
+    phi_solver s;
+    EXPECT(phi_init(&s, NULL, start) == PHI_OK && phi_step_tangent(&s, H, tangent) == PHI_OK);
+    EXPECT(fabs(tangent[0] * tangent[3] - tangent[1] * tangent[2] - 1.0) < 1e-14);
+    for (int j = 0; j < 2; ++j) {
+        for (int side = 0; side < 2; ++side) {
+            double x[2] = { start[0], start[1] };
+            x[j] += side ? 1e-6 : -1e-6;
+            EXPECT(phi_init(&s, NULL, x) == PHI_OK && phi_step(&s, H) == PHI_OK);
+            memcpy(ends[side], s.x, sizeof s.x);
+        }
+        for (int i = 0; i < 2; ++i) EXPECT(fabs((ends[1][i] - ends[0][i]) / 2e-6 - tangent[2 * i + j]) < 1e-9);
+    }
+}
+
+#endif
+int main(void)
+{
+    refuses_what_is_not_allowed();
+    counts_time();
+    keeps_energy();
+    many_are_one();
+    failures_change_nothing();
+#if PHI_TANGENT
+    tangent_is_the_derivative();
+#endif
+    return 0;
+}

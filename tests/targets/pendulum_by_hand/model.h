@@ -1,0 +1,108 @@
+/* What the model computes at one point: coef = { h, h g }. */
+#ifndef MODEL_H
+#define MODEL_H
+#include <math.h>
+#include <string.h>
+
+#include "solver.h"
+
+enum { PHI_MAX_ITERATIONS = 20, PHI_CHECKS = 8, PHI_PASSES = 2, PHI_ROWS_OF_FLOWS = 2, PHI_ROW = 2, PHI_FLOWS = 3 };
+enum { PHI_TERMS = 30, PHI_SERIES = 4, PHI_FIXED = 1, PHI_TANGENT_SERIES = 8, PHI_TANGENT_FIXED = 1 };
+#define PHI_TOLERANCE 1e-20
+#define PHI_APART
+
+const phi_params phi_default_params = { 1.5 };
+
+#if PHI_COMPOSED
+static const double phi_fractions[PHI_STAGES] = { 1.3512071919596578, -1.7024143839193153, 1.3512071919596578 };
+#else
+static const double phi_fractions[PHI_STAGES] = { 1.0 };
+#endif
+
+static int phi_allowed(const phi_params *params) { return isfinite(params->g) && params->g > 0.0; }
+
+double phi_hamiltonian(const phi_params *params, const double x[PHI_DIM])
+{
+    const double g = params != NULL ? params->g : phi_default_params.g;
+    return 0.5 * (x[1] * x[1]) - g * cos(x[0]);
+}
+
+void phi_casimirs(const phi_params *params, const double x[PHI_DIM], double out[])
+{
+    (void)params, (void)x, (void)out;
+}
+
+void phi_vector_field(const phi_params *params, const double x[PHI_DIM], double out[PHI_DIM])
+{
+    const double g = params != NULL ? params->g : phi_default_params.g, q = x[0];
+    out[0] = x[1];
+    out[1] = -g * sin(q);
+}
+
+#if !PHI_SPLITTING
+static void phi_prepare(const phi_params *params, double h, double *coef)
+{
+    coef[0] = h;
+    coef[1] = h * params->g;
+}
+
+#endif
+#if PHI_NEWTON
+/* The midpoint rule: alpha and beta are y -+ half the increment. */
+static void phi_linearise(const double *coef, const double y[2], double displacement[2], double increment[2],
+    double jacobian[4], double increment_jacobian[4])
+{
+    const double kick = coef[1] * sin(y[0]), slope = coef[1] * cos(y[0]), h = coef[0];
+    const double own[2] = { h * y[1], -kick }, derivative[4] = { 0.0, h, -slope, 0.0 };
+    for (int i = 0; i < 2; ++i) {
+        increment[i] = own[i];
+        displacement[i] = -0.5 * own[i];
+    }
+    for (int i = 0; i < 4; ++i) {
+        increment_jacobian[i] = derivative[i];
+        jacobian[i] = (i % 3 == 0 ? 1.0 : 0.0) - 0.5 * derivative[i];
+    }
+}
+
+#endif
+#if PHI_PATH
+static void phi_generate(const double *coef, const double y[2], double slope[2], double jacobian[4])
+{
+    slope[0] = coef[1] * sin(y[0]);
+    slope[1] = coef[0] * y[1];
+    jacobian[0] = jacobian[3] = 1.0;
+    jacobian[1] = -0.5 * coef[1] * cos(y[0]);
+    jacobian[2] = 0.5 * coef[0];
+}
+
+static void phi_curvature(const double *coef, const double y[2], double slope[2], double hessian[4])
+{
+    slope[0] = coef[1] * sin(y[0]);
+    slope[1] = coef[0] * y[1];
+    hessian[0] = coef[1] * cos(y[0]);
+    hessian[1] = hessian[2] = 0.0;
+    hessian[3] = coef[0];
+}
+
+static const int phi_path_slopes[2] = { 2, 3 };
+
+#endif
+#if PHI_EXPLICIT
+/* The symplectic Euler method. */
+static void phi_explicit(const double *coef, const double state[2], double increment[2])
+{
+    const double kick = coef[1] * sin(state[0]);
+    increment[0] = coef[0] * (state[1] - kick);
+    increment[1] = -kick;
+}
+
+static void phi_explicit_tangent(const double *coef, const double state[2], double slope[4])
+{
+    slope[2] = -coef[1] * cos(state[0]);
+    slope[0] = coef[0] * slope[2];
+    slope[1] = coef[0];
+    slope[3] = 0.0;
+}
+
+#endif
+#endif

@@ -1,0 +1,103 @@
+"""The runtime of the C, as it lies in templates/c/runtime, with a pendulum written by hand: no generator takes part."""
+
+from math import sin
+from pathlib import Path
+
+import pytest
+from support import run, tool
+
+from phigen import resources
+from phigen.targets.c.amalgamation import one_stage
+from phigen.targets.c.layout import WIDTH, fitted
+
+BY_HAND = Path(__file__).with_name("pendulum_by_hand")
+RUNTIME = resources.templates() / "c/runtime"
+INCLUDED = [f"-I{BY_HAND}", f"-I{RUNTIME}"]
+WARNINGS = ("all", "extra", "pedantic", "conversion", "double-promotion", "shadow", "no-unused-function", "error")
+STRICT = ["-std=c99", *(f"-W{warning}" for warning in WARNINGS)]
+
+IMPLICIT = [
+    ("NEWTON",),
+    ("NEWTON", "FAST"),
+    ("NEWTON", "TANGENT"),
+    ("NEWTON", "COMPOSED"),
+    ("NEWTON", "COMPOSED", "FAST"),
+]
+IMPLICIT += [("PATH", *more) for _, *more in IMPLICIT]
+EXPLICIT = [(kind, *more) for kind in ("EXPLICIT", "SPLITTING") for more in ((), ("FAST",), ("TANGENT",))]
+
+
+def defined(switches):
+    """The compiler's options for switches."""
+    return [f"-DPHI_{switch}=1" for switch in switches]
+
+
+@pytest.mark.parametrize("switches", [*IMPLICIT, *EXPLICIT], ids=" ".join)
+def test_pendulum_by_hand_moves_as_it_should(switches, tmp_path):
+    """With the sanitisers: energy, time, reversibility, many as one, failures, the tangent map (see main.c)."""
+    flags = ["-O1", "-fsanitize=address,undefined", "-fno-sanitize-recover"]
+    main = [*defined(switches), *INCLUDED, BY_HAND / "main.c", "-o", "main", "-lm"]
+    run([tool("gcc"), *STRICT, *flags, *main], tmp_path)
+    printed = [float(v) for v in run([tmp_path / "main"], tmp_path).split()]
+    if switches in IMPLICIT:
+        assert printed == pytest.approx(midpoint_rule(), abs=1e-3 if "COMPOSED" in switches else 1e-12)
+
+
+def midpoint_rule(steps=10, h=0.05, g=1.5):
+    """q and p after steps of the implicit midpoint rule, by fixed-point iteration."""
+    q, p = 1.0, 0.2
+    for _ in range(steps):
+        a, b = q, p
+        for _ in range(60):
+            a, b = q + h / 2 * b, p - h / 2 * g * sin(a)
+        q, p = 2 * a - q, 2 * b - p
+    return [q, p]
+
+
+@pytest.mark.parametrize(
+    "switches", [("NEWTON", "COMPOSED", "FAST"), ("PATH", "FAST"), ("SPLITTING", "FAST")], ids=" ".join
+)
+def test_runtime_compiles_without_a_warning_by_clang(switches, tmp_path):
+    run([tool("clang"), *STRICT, "-fsyntax-only", *defined(switches), *INCLUDED, BY_HAND / "main.c"], tmp_path)
+
+
+@pytest.mark.parametrize("path", sorted(p for p in RUNTIME.glob("*.c") if p.name != "gauge.c"), ids=lambda p: p.name)
+def test_each_file_of_the_runtime_compiles_by_itself(path, tmp_path):
+    """But gauge.c, which needs Casimirs."""
+    kinds = {"packs.c": "SPLITTING", "explicit.c": "EXPLICIT", "path.c": "PATH", "path_lanes.c": "PATH"}
+    kind = kinds.get(path.name, "NEWTON")
+    switches = defined((kind, "FAST", "TANGENT"))
+    run([tool("gcc"), *STRICT, "-fsyntax-only", *switches, *INCLUDED, path], tmp_path)
+
+
+def test_one_stage_leaves_no_loops_over_stages():
+    several = """\
+    for (int stage = 0; stage < PHI_STAGES; ++stage)
+        phi_prepare(phi_fractions[stage] * h, s->coef[stage]);
+    for (int stage = 0; stage < PHI_STAGES; ++stage) {
+        for (int stage = 0; stage < PHI_STAGES; ++stage) phi_fit(s, stage);
+        x[0] = model.stage[0].y[0];
+    }
+    for (int stage = 0; stage < PHI_STAGES; ++stage)
+        if (good) {
+            again(s->history[stage].count, stage, h);
+        }
+    done();"""
+    one = """\
+    phi_prepare(h, s->coef);
+    phi_fit(s);
+    x[0] = model.stage.y[0];
+    if (good) {
+        again(s->history.count, h);
+    }
+    done();"""
+    assert "\n".join(one_stage(several.split("\n"))) == one
+
+
+def test_long_lines_are_broken_where_a_reader_would():
+    long = "    const double value = " + " + ".join(f"(first{k} * second{k})" for k in range(9)) + "; /* said */"
+    lines = fitted(long).split("\n")
+    assert lines[0] == "    /* said */"
+    assert lines[2].startswith("        + (first")
+    assert max(map(len, lines)) <= WIDTH
+    assert " ".join(line.strip() for line in lines[1:]) == long.strip().removesuffix(" /* said */")
