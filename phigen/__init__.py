@@ -12,7 +12,7 @@ TYPE_CHECKING = False  # not of typing, whose import takes longer than all of th
 if TYPE_CHECKING:
     from typing import Any
 
-    from phigen.api import compile, load
+    from phigen.api import compile, formulas, load
     from phigen.errors import (
         CheckError,
         LimitError,
@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 _HOMES = {
     "load": "phigen.api",
     "compile": "phigen.api",
+    "formulas": "phigen.api",
     "System": "phigen.geometry.system",
     "Solver": "phigen.runtime.solver",
     "Trajectory": "phigen.runtime.trajectory",
@@ -57,6 +58,7 @@ __all__ = [
     "Trajectory",
     "__version__",
     "compile",
+    "formulas",
     "load",
 ]
 

@@ -1,4 +1,4 @@
-"""The Python API: `load` a system, `compile` it to a solver.
+"""The Python API: `load` a system, `compile` it to a solver, look at its `formulas`.
 
 import phigen
 system = phigen.load("rigid_body.yaml")
@@ -27,6 +27,7 @@ from phigen.spec.names import ARGUMENT_HINT, ARGUMENTS, IDENTIFIER, PROFILES, SC
 from phigen.spec.taken import objection
 
 if TYPE_CHECKING:
+    from phigen.analysis.sympy_formulas import SympyFormulas
     from phigen.runtime.backend import Backend
     from phigen.runtime.interface import Interface
     from phigen.runtime.solver import Solver
@@ -76,6 +77,19 @@ def compile(
     if profile is not None:
         compilation = replace(compilation, program=replace(compilation.program, profile=profile))
     return solver_of(compilation, target)
+
+
+def formulas(source: Source, order: int | None = None, *, terms: int | None = None) -> SympyFormulas:
+    """α, β and S_1 … S_k of the method that `compile` makes, and the Hamiltonian it discretises, in sympy.
+
+    ``terms`` asks for S_1 … S_terms instead of those of the method. Raises as `compile`; `SpecError` for a splitting,
+    which has none of these.
+    """
+    from phigen.analysis.sympy_formulas import sympy_formulas
+
+    if terms is not None and not (isinstance(terms, int) and 1 <= terms <= limits.ORDER):
+        raise ValueError(f"terms must be an integer from 1 to {limits.ORDER}, not {terms!r}")
+    return sympy_formulas(compilation_of(source, order), terms)
 
 
 def compilation_of(

@@ -116,3 +116,47 @@ def test_error_of_load_shows_the_line(tmp_path):
     path.write_text("phigen: 1\nname: a\ncoordinates: [x, y]\npoisson: {lie_algebra: {name: so(3)}}\nhamiltonian: x\n")
     with pytest.raises(phigen.SpecError, match=r"a\.yaml:4:"):
         phigen.load(path)
+
+
+def test_formulas_are_those_of_the_method():
+    """The log-canonical chart and its S_3, as sympy objects that can be used as such."""
+    found = phigen.formulas(from_sympy(), order=4)
+    (x, y), (a, b) = found.system.coordinates, found.covector
+    assert found.degree is None
+    assert found.hamiltonian == found.series[0] == found.system.hamiltonian
+    bracket = sum(f.diff(q) * g.diff(p) - f.diff(p) * g.diff(q) for f, g in [found.alpha] for q, p in [(x, a), (y, b)])
+    assert sympy.simplify(bracket - found.alpha[0] * found.alpha[1]) == 0
+    assert [m.subs({a: -a, b: -b}, simultaneous=True) for m in found.alpha] == list(found.beta)
+    assert found.series[1] == 0
+    assert len(phigen.formulas(from_sympy(), terms=5).series) == 5
+
+
+def test_formulas_know_the_gauge_and_the_closed_form_of_phi():
+    found = phigen.formulas(RIGID_BODY)
+    (free,) = found.gauge.values()
+    assert sympy.expand(found.hamiltonian - found.system.hamiltonian + free * found.system.casimirs["C"]) == 0
+    x, p = sympy.Matrix(found.system.coordinates), sympy.Matrix(found.covector)
+    at = dict(zip([*x, *p], [0.3, 0.5, -0.2, 0.1, -0.3, 0.2], strict=True))
+    root = sympy.sqrt(p.dot(p))
+    even = p.cross(p.cross(x)) * (1 - root / 2 * sympy.cot(root / 2)) / root**2
+    turned = found.system.poisson * p
+    for maps, sign in ((found.alpha, -1), (found.beta, 1)):
+        assert max(abs((sympy.Matrix(maps) - x - even - sign * turned / 2).subs(at))) < 1e-15
+
+
+def test_formulas_of_paths_are_series_to_a_degree():
+    found = phigen.formulas(resources.bundled_specs() / "sir_epidemic.yaml", terms=4)
+    assert found.degree == 3
+    degrees = {sum(m) for a in found.alpha for m in sympy.Poly(a, *found.covector).monoms()}
+    assert degrees == {0, 1, 2, 3}
+
+
+def test_formulas_of_a_splitting_do_not_exist(tmp_path):
+    (tmp_path / "lv.yaml").write_text(
+        "phigen: 1\nname: lv\ncoordinates: [x, y]\npoisson: {log_canonical: [[0, 1], [-1, 0]]}\nhamiltonian: x + y\n"
+        "scheme: splitting\n"
+    )
+    with pytest.raises(phigen.SpecError, match="no S_i"):
+        phigen.formulas(tmp_path / "lv.yaml")
+    with pytest.raises(ValueError, match="terms must be"):
+        phigen.formulas(RIGID_BODY, terms=99)

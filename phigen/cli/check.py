@@ -14,6 +14,7 @@ from phigen.cli.sources import ORDER, load_all, many_specs, scheme_option
 from phigen.errors import CheckError
 
 if TYPE_CHECKING:
+    from phigen.analysis.independent import Comparison
     from phigen.analysis.proof import Examination
     from phigen.symbolic.verdict import Statement
 
@@ -24,11 +25,26 @@ _COLOURS = {"proved": "green", "refuted": "red", "checked numerically": "yellow"
 @many_specs
 @click.option("--order", metavar="K", type=ORDER, help="Order of the method, instead of the spec's.")
 @scheme_option
+@click.option("--independent", is_flag=True, help="Derive the S_i, α and β a second time, by sympy, and compare.")
+@click.option("--terms", metavar="K", type=ORDER, help="With --independent: S_1 … S_K, instead of those of the method.")
+@click.option(
+    "--seconds",
+    metavar="T",
+    type=click.FloatRange(0, min_open=True),
+    help="With --independent: time for one spec (60).",
+)
 @click.option("--json", "as_json", is_flag=True, help="For machines: one object per spec.")
 @verbosity
 @pass_console
 def command(
-    console: Console, spec_files: tuple[str, ...], order: int | None, scheme: str | None, as_json: bool
+    console: Console,
+    spec_files: tuple[str, ...],
+    order: int | None,
+    scheme: str | None,
+    independent: bool,
+    terms: int | None,
+    seconds: float | None,
+    as_json: bool,
 ) -> None:
     """Prove the mathematics of specs, or refute it.
 
@@ -39,17 +55,58 @@ def command(
     """
     from phigen.analysis.proof import examine
 
+    if not independent and (terms or seconds):
+        raise click.UsageError("--terms and --seconds are for --independent")
     collector, found = Collector(), []
     for spec in load_all(spec_files, collector):
         with collector.collecting():
             examination = examine(spec, order=order, scheme=scheme)
-            found.append(examination)
+            described = _described(examination)
             if not as_json:
                 _print(examination)
             _collect(examination, collector, console)
+            if independent:
+                compared = _compared(examination, terms, seconds, console, collector, shown=not as_json)
+                described["independent"] = [_described_comparison(c) for c in compared]
+            found.append(described)
+            if not as_json:
+                out("")
     if as_json:
-        out(json.dumps([_described(e) for e in found], indent=2, ensure_ascii=False))
+        out(json.dumps(found, indent=2, ensure_ascii=False))
     collector.finish()
+
+
+def _compared(
+    examination: Examination,
+    terms: int | None,
+    seconds: float | None,
+    console: Console,
+    collector: Collector,
+    *,
+    shown: bool,
+) -> list[Comparison]:
+    """What the second derivation says, shown line by line as it comes."""
+    from phigen.analysis.independent import SECONDS, compare
+    from phigen.symbolic.verdict import REFUTED
+
+    compilation, found = examination.compilation, []
+    if compilation is None:
+        return []
+    if compilation.splitting:
+        console.warn(f"{examination.spec.file}: a splitting has no S_i to be derived a second time")
+        return []
+    if shown:
+        out("  Second derivation, by sympy alone")
+    with collector.collecting():
+        for comparison in compare(compilation, terms, seconds or SECONDS):
+            found.append(comparison)
+            if shown:
+                out("\n".join(_lines(comparison.timed)))
+    refuted = [c.statement.name for c in found if c.statement.verdict == REFUTED]
+    if refuted:
+        message = f"{examination.spec.file}: refuted by the second derivation: {', '.join(refuted)}"
+        collector.errors.append(CheckError(message))
+    return found
 
 
 def _collect(examination: Examination, collector: Collector, console: Console) -> None:
@@ -71,7 +128,6 @@ def _print(examination: Examination) -> None:
             out("\n".join(_lines(statement)))
     if examination.unexamined:
         out(f"  Not examined, since they rest on it: {examination.unexamined}")
-    out("")
 
 
 def _lines(statement: Statement) -> list[str]:
@@ -86,7 +142,7 @@ def _lines(statement: Statement) -> list[str]:
 
 def _described(examination: Examination) -> dict[str, object]:
     listed = [
-        {"group": group, "name": s.name, "verdict": s.verdict, "detail": s.detail, "residual": s.residual}
+        {"group": group, **_described_statement(s)}
         for group, statements in examination.groups.items()
         for s in statements
     ]
@@ -99,3 +155,11 @@ def _described(examination: Examination) -> dict[str, object]:
         "obstacles": obstacle,
         "unexamined": examination.unexamined,
     }
+
+
+def _described_statement(s: Statement) -> dict[str, object]:
+    return {"name": s.name, "verdict": s.verdict, "detail": s.detail, "residual": s.residual}
+
+
+def _described_comparison(c: Comparison) -> dict[str, object]:
+    return {"term": c.term, **_described_statement(c.statement), "seconds": {"phigen": c.compiler, "sympy": c.sympy}}

@@ -92,6 +92,13 @@ def closed_function(order: int, s: Any) -> Any:
     return sympy.diff((1 - sympy.sqrt(u) / 2 * sympy.cot(sympy.sqrt(u) / 2)) / u, u, order).subs(u, s)
 
 
+def expanded_function(order: int, s: Any, degree: int) -> Any:
+    """A derivative of φ as a polynomial in s, right up to a degree: φ(s) = Σ |B_{2n+2}| s^n/(2n+2)!."""
+    u = sympy.Dummy("u")
+    known = (abs(sympy.bernoulli(2 * n + 2)) / sympy.factorial(2 * n + 2) * u**n for n in range(degree + order + 1))
+    return sympy.diff(sum(known), u, order).subs(u, s)
+
+
 class _Sympy(Arithmetic[Any]):
     """Expressions of sympy; see `to_sympy`."""
 

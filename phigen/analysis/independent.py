@@ -1,0 +1,250 @@
+"""The second derivation (`phigen.series.reference`) beside what the compiler uses, term by term."""
+
+from __future__ import annotations
+
+import signal
+import threading
+import time
+from collections.abc import Collection, Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from types import FrameType
+from typing import Any
+
+import mpmath
+import sympy
+
+from phigen import progress
+from phigen.analysis.proof import stage_order
+from phigen.analysis.sympy_formulas import Dictionary
+from phigen.compiler import Compilation
+from phigen.errors import Diagnostic, LimitError
+from phigen.geometry.shapes import LogCanonical
+from phigen.geometry.sympy_bridge import expanded_function
+from phigen.realisations import exponential, spray
+from phigen.scheme.discretisation import hamilton_jacobi
+from phigen.series.reference import Source, closed_form, generating_function
+from phigen.series.reference_axioms import defects
+from phigen.series.reference_functions import Functions, Sign
+from phigen.series.reference_paths import source_of_paths
+from phigen.symbolic.expression import Expression
+from phigen.symbolic.verdict import CHECKED, POINTS, PROVED, REFUTED, UNDECIDED, Statement, sample_point
+
+#: The time that the second derivation of one spec may take, unless the user says otherwise.
+SECONDS = 60.0
+
+#: Digits of values at points, and how many of them must agree.
+DIGITS, AGREEING = 120, 60
+_ATTEMPTS = 64
+_LONGEST = 160
+
+#: A pair that should be equal, with what it is.
+Pair = tuple[str, Any, Any]
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Whether both derivations agree on S_``term``, or on α and β where it is None.
+
+    ``sympy`` and ``compiler`` are the seconds that they took for S_1 … S_term; for α and β, of which the compiler has
+    closed forms, there is only the former.
+    """
+
+    statement: Statement
+    term: int | None
+    sympy: float
+    compiler: float | None = None
+
+    @property
+    def timed(self) -> Statement:
+        """The statement with the seconds."""
+        taken = f"in {self.sympy:.2f} s"
+        if self.compiler is not None:
+            what = "" if self.term == 1 else f"S_1 … S_{self.term} "
+            taken = f"{what}in {self.sympy:.2f} s, by phigen in {self.compiler:.3f} s"
+        return replace(self.statement, detail="; ".join(filter(None, [self.statement.detail, taken])))
+
+
+class OutOfTimeError(BaseException):
+    """The time is up. No `Exception`, so that nothing on the way takes it for a failure of its own."""
+
+
+def compare(compilation: Compilation, terms: int | None = None, seconds: float = SECONDS) -> Iterator[Comparison]:
+    """S_1 … S_terms, by default those of the method, then α and β: each when it is derived.
+
+    The compilation is not that of a splitting. Where steps follow paths, α and β are in the S_i alone. Raises
+    `LimitError` when all has taken so many ``seconds``, or when a polynomial has too many terms.
+    """
+    terms = terms or stage_order(compilation).terms
+    derivation: _Derivation | None = None
+    for i in (*range(1, terms + 1), *([] if compilation.chart.path else [None])):
+        what = f"S_{i}" if i else "α and β"
+        try:
+            with progress.stage(f"{what} by sympy") as stage, time_limit(seconds):
+                derivation = derivation or _Derivation(compilation, terms)
+                found = derivation.term(i) if i else derivation.maps()
+        except (OutOfTimeError, OverflowError) as error:
+            raise _limit(compilation, what, i or terms + 1, str(error)) from None
+        seconds -= stage.seconds
+        yield found
+
+
+def _limit(compilation: Compilation, what: str, i: int, reason: str) -> LimitError:
+    reason = reason or "the time was up"
+    before = ["nothing was compared", "S_1 was compared", f"S_1 … S_{i - 1} were compared"][min(i - 1, 2)]
+    message = f"{compilation.spec.file}: {what} was not derived a second time: {reason}; {before}"
+    hint = "--seconds gives it more time, --terms asks for fewer S_i"
+    return LimitError([Diagnostic(message, hint=hint)])
+
+
+@contextmanager
+def time_limit(seconds: float) -> Iterator[None]:
+    """Raises `OutOfTimeError` in what lasts longer; without effect outside the main thread, which has no signals."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+
+    def over(number: int, frame: FrameType | None) -> None:
+        raise OutOfTimeError
+
+    before = signal.signal(signal.SIGALRM, over)
+    signal.setitimer(signal.ITIMER_REAL, max(seconds, 1e-6))
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0)
+        signal.signal(signal.SIGALRM, before)
+
+
+class _Derivation:
+    """Both derivations of one compilation, as far as they have come."""
+
+    def __init__(self, compilation: Compilation, terms: int) -> None:
+        self._compilation, self._terms = compilation, terms
+        self._dictionary = Dictionary(compilation)
+        self._positive = compilation.system.positive
+        system, chart = compilation.discretised, compilation.chart
+        self._poisson = sympy.Matrix([[self._dictionary.expression(e) for e in row] for row in system.poisson])
+        source = self._path(0) if chart.path or chart.kind == exponential.KIND else self._given(chart.alpha)
+        hamiltonian = self._dictionary.expression(system.hamiltonian)
+        self._mine = generating_function(hamiltonian, source, self._dictionary.coordinates)
+        self._taken = 0.0
+
+    def _path(self, time: int) -> Source:
+        return source_of_paths(self._poisson, self._dictionary.coordinates, self._dictionary.covector, time)
+
+    def _given(self, maps: Sequence[Expression]) -> Source:
+        """α or β as the compiler has it, φ expanded at 0."""
+        p = self._dictionary.covector
+
+        def expanded(order: int, s: Any) -> Any:
+            least = min(sum(mu) for mu in closed_form([s], p)(self._degree)[0])
+            return expanded_function(order, s, self._degree // least)
+
+        return closed_form([self._dictionary.expression(e, expanded) for e in maps], p)
+
+    @property
+    def _degree(self) -> int:
+        """Up to which degree in p the maps are compared: as S_1 … S_terms need them, and at least up to 2."""
+        wanted, chart = max(self._terms - 1, 2), self._compilation.chart
+        return wanted if chart.exact or chart.degree is None else min(wanted, chart.degree)
+
+    def term(self, i: int) -> Comparison:
+        """S_i, after those before it."""
+        compilation = self._compilation
+        start = time.perf_counter()
+        mine = next(self._mine)
+        middle = time.perf_counter()
+        hamilton_jacobi(compilation.discretised, compilation.chart, i, compilation.gauge.symbols).polynomial(i)
+        end = time.perf_counter()
+        self._taken += middle - start
+        used = compilation.series.polynomial(i)
+        theirs = self._dictionary.expression(used.tower.expression(used.terms[i - 1]))
+        size = len(sympy.Add.make_args(mine)) if mine != 0 else 0
+        statement = decide(f"S_{i}", [("", theirs, mine)], self._positive, f"{size} term{'s' * (size != 1)}")
+        return Comparison(statement, i, self._taken, end - middle)
+
+    def maps(self) -> Comparison:
+        """α and β: from their path where they are ends of one, else by their axioms."""
+        return self._ends() if self._are_ends() else self._axioms()
+
+    def _are_ends(self) -> bool:
+        chart, choice = self._compilation.chart, self._compilation.spec.birealisation
+        natural = choice.spray == "auto" and isinstance(self._compilation.system.shape, LogCanonical)
+        flat = chart.kind == spray.KIND and not chart.exact and choice.spray in ("flat", "auto") and not natural
+        return chart.kind == exponential.KIND or flat
+
+    def _ends(self) -> Comparison:
+        coordinates, chart, d = self._compilation.system.coordinates, self._compilation.chart, self._degree
+        start = time.perf_counter()
+        pairs: list[Pair] = []
+        for name, maps, end in (("α", chart.alpha, 0), ("β", chart.beta, 1)):
+            for c, theirs, mine in zip(coordinates, self._given(maps)(d), self._path(end)(d), strict=True):
+                every = dict.fromkeys([*theirs, *mine])
+                pairs += [(f"{name}_{c}", theirs.get(mu, sympy.S.Zero), mine.get(mu, sympy.S.Zero)) for mu in every]
+        name = f"α and β up to degree {d} in p"
+        statement = decide(name, pairs, self._positive, "from the path ṁ = π(m)p about its mean")
+        return Comparison(statement, None, time.perf_counter() - start)
+
+    def _axioms(self) -> Comparison:
+        chart, d = self._compilation.chart, self._degree
+        x, p = self._dictionary.coordinates, self._dictionary.covector
+        start = time.perf_counter()
+        alpha, beta = (self._given(maps)(d) for maps in (chart.alpha, chart.beta))
+        rest = [(label, r, sympy.S.Zero) for label, r in defects(self._poisson, alpha, beta, x, p, d)]
+        statement = decide(f"axioms of α and β up to degree {d - 1} in p", rest, self._positive, "")
+        return Comparison(statement, None, time.perf_counter() - start)
+
+
+def decide(name: str, pairs: Iterable[Pair], positive: Collection[str], detail: str) -> Statement:
+    """Whether both of each pair are equal, as functions of their symbols.
+
+    They are if the difference is 0 as a polynomial in functions, by the relations of `Functions`: that is a proof. Else
+    values at points, in `DIGITS` digits, refute it or agree.
+    """
+    fewest, open_pairs = POINTS, 0
+    for label, theirs, mine in pairs:
+        functions = Functions([theirs, mine])
+        rest = functions.element(theirs) - functions.element(mine)
+        if rest == 0 or functions.vanishes(rest):
+            continue
+        open_pairs += 1
+        found = _tried([theirs, mine], positive)
+        if isinstance(found, str):
+            where = f"{label}, " if label else ""
+            return Statement(name, REFUTED, f"{where}at {found}", _cut(sympy.sstr(functions.expression(rest))))
+        fewest = min(fewest, found)
+    if not open_pairs:
+        return Statement(name, PROVED, detail)
+    if not fewest:
+        return Statement(name, UNDECIDED, f"no proof, and no point of the domain among {_ATTEMPTS} tried")
+    return Statement(name, CHECKED, f"{fewest} points, {AGREEING} digits")
+
+
+def _tried(pair: Sequence[Any], positive: Collection[str]) -> str | int:
+    """A point where both differ, with their values; else the number of points where they agree."""
+    symbols = sorted(set().union(*(e.free_symbols for e in pair)), key=str)
+    values = sympy.lambdify(symbols, list(pair), modules=[{Sign.__name__: mpmath.sign}, "mpmath"], cse=True)
+    agreeing = 0
+    for k in range(_ATTEMPTS):
+        point = sample_point([str(s) for s in symbols], positive, k)
+        with mpmath.workdps(DIGITS):
+            at = [mpmath.mpf(v.numerator) / v.denominator for v in point.values()]
+            try:
+                theirs, mine = (mpmath.mpf(v) for v in values(*at))
+            except (ArithmeticError, TypeError, ValueError):  # a pole, a complex value, not in the domain
+                continue
+            if not (mpmath.isfinite(theirs) and mpmath.isfinite(mine)):
+                continue
+            if abs(theirs - mine) > mpmath.mpf(10) ** -AGREEING * (1 + abs(mine)):
+                where = ", ".join(f"{n} = {v}" for n, v in point.items())
+                shown = where if len(where) <= _LONGEST else f"point {k}"
+                return f"{shown}: {mpmath.nstr(theirs, 12)}, not {mpmath.nstr(mine, 12)}"
+        agreeing += 1
+        if agreeing == POINTS or not symbols:
+            break
+    return agreeing
+
+
+def _cut(text: str) -> str:
+    return text if len(text) <= _LONGEST else text[: _LONGEST - 1] + "…"
