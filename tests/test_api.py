@@ -6,6 +6,7 @@ import sympy
 
 import phigen
 from phigen import resources, spec
+from phigen.compiler import compile_spec
 from phigen.spec import json_schema
 
 RIGID_BODY = resources.bundled_specs() / "rigid_body.yaml"
@@ -67,6 +68,15 @@ def test_the_order_that_nobody_asked_for_is_the_same_everywhere(tmp_path):
     assert orders == {json_schema.schema()["properties"]["order"]["default"]} == {4}
     three = spec.loads(f"{text}terms: 3\n")
     assert phigen.compile(three, target="numpy").order == phigen.compile(three, "numpy", scheme="splitting").order == 4
+
+
+def test_profile_is_that_of_the_spec_or_of_the_call():
+    text = "phigen: 1\nname: lv\ncoordinates: [x, y]\npoisson: {log_canonical: [[0, 1], [-1, 0]]}\nhamiltonian: x + y\n"
+    found, asked = spec.loads(f"{text}profile: small\n"), spec.loads(text)
+    assert [compile_spec(s).program.profile for s in (found, asked)] == ["small", "fast"]
+    assert phigen.compile(asked, target="numpy", profile="small").order == 4
+    with pytest.raises(ValueError, match="unknown profile 'tiny'; there are fast, small"):
+        phigen.compile(asked, profile="tiny")
 
 
 def test_refuted_mathematics_is_not_compiled():

@@ -228,6 +228,9 @@ def regenerate_line(path):
         ([], "a.c", "phigen build a.yaml"),
         (["--order", "4", "-o", "x/y"], "a.h", "phigen build a.yaml --order 4"),
         (["--order", "2"], "a.py", "phigen build a.yaml"),  # what the spec says anyway
+        (["--profile", "small"], "a.c", "phigen build a.yaml --profile small"),
+        (["--profile", "fast"], "a.h", "phigen build a.yaml"),
+        (["--profile", "small"], "a.py", "phigen build a.yaml"),  # says nothing of NumPy
         (["--single-file"], "a.c", "phigen build a.yaml --single-file"),
         (["--single-file"], "a.py", "phigen build a.yaml"),
         (["-t", "c"], "a.c", "phigen build a.yaml"),
