@@ -59,6 +59,7 @@ _LISTED = (
         compiled=True,
     ),
     Target("numpy", "NumPy", (".py",), "phigen.targets.numpy.emitter", "phigen.runtime.numpy_solver", default=True),
+    Target("js", "JavaScript", (".mjs",), "phigen.targets.js.emitter"),
 )
 
 #: All targets by name.

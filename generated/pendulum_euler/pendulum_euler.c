@@ -7,7 +7,7 @@
  *   step: explicit
  *   one step: 1 additions, 2 multiplications, 1 functions
  *
- * spec: pendulum_euler, sha256 8b9224d26c52b34d4e4bd936c41718dc0761cfe4b9e06bb0315047751d325409
+ * spec: pendulum_euler, sha256 10030022f93bccf90322e3b69b8a94dcdf9ef8ba03d95b772ef2b3dc4481dc59
  * to regenerate: phigen build pendulum_euler
  * DO NOT EDIT: change the spec and regenerate; edits are noticed by the checksum below.
  *

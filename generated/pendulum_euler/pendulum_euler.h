@@ -3,7 +3,7 @@
  * to regenerate: phigen build pendulum_euler
  * DO NOT EDIT: change the spec and regenerate; edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 8a715c705ac3cd038499fe04342de4f49b9d47538754b3ec365e2c3df63ec2aa
+ * body-sha256: 27a5711ac67478d7da5baedf683110473bd6ae6183435c24800ca358a34aadae
  */
 #ifndef PENDULUM_EULER_H
 #define PENDULUM_EULER_H
@@ -17,7 +17,7 @@ extern "C" {
 #define pendulum_euler_ORDER 1
 #define pendulum_euler_CASIMIRS 0
 #define pendulum_euler_PHIGEN_VERSION "0.1.0"
-#define pendulum_euler_SPEC_SHA256 "8b9224d26c52b34d4e4bd936c41718dc0761cfe4b9e06bb0315047751d325409"
+#define pendulum_euler_SPEC_SHA256 "10030022f93bccf90322e3b69b8a94dcdf9ef8ba03d95b772ef2b3dc4481dc59"
 
 /* State vectors: q, p. Casimirs: none. */
 typedef struct {

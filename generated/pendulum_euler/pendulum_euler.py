@@ -6,17 +6,17 @@
 #   step: explicit
 #   one step: 1 additions, 2 multiplications, 1 functions
 #
-# spec: pendulum_euler, sha256 8b9224d26c52b34d4e4bd936c41718dc0761cfe4b9e06bb0315047751d325409
+# spec: pendulum_euler, sha256 10030022f93bccf90322e3b69b8a94dcdf9ef8ba03d95b772ef2b3dc4481dc59
 # to regenerate: phigen build pendulum_euler
 # DO NOT EDIT: change the spec and regenerate; edits are noticed by the checksum below.
 #
 # SPDX-License-Identifier: 0BSD
 # This file belongs to whoever generated it; phigen claims no rights in it.
-# body-sha256: 11d179c68b90ee4433b5ecbed96f921961fb15582a3c9da1ba75195bc563ff38
+# body-sha256: 0384807223dc27f694e58510942c7c25af221d1db33a661edac88976051b2f01
 import numpy as np
 
 VERSION = "0.1.0"
-SPEC_SHA256 = "8b9224d26c52b34d4e4bd936c41718dc0761cfe4b9e06bb0315047751d325409"
+SPEC_SHA256 = "10030022f93bccf90322e3b69b8a94dcdf9ef8ba03d95b772ef2b3dc4481dc59"
 DIM = 2
 ORDER = 1
 COORDINATES = ("q", "p",)

@@ -8,7 +8,7 @@
  *   step: implicit, Newton iteration with the analytic matrix
  *   one Newton iteration: 135 additions, 164 multiplications, 2 functions
  *
- * spec: rigid_body, sha256 6c1237ccc7ee4b24a8f0a329e858795da7fd98ebe563770606bbfbaba9f6e23e
+ * spec: rigid_body, sha256 8810186c1e0019884e5b3b03e44e3be202fcaec17d97ceab9967252a6cdb2d99
  * to regenerate: phigen build rigid_body
  * DO NOT EDIT: change the spec and regenerate; edits are noticed by the checksum below.
  *

@@ -3,7 +3,7 @@
  * to regenerate: phigen build rigid_body
  * DO NOT EDIT: change the spec and regenerate; edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: a655f193ccc66e14fd34271f99cd20fda8aec40cfc5e588220cfd41df83c4f4f
+ * body-sha256: 5c64aeabb74e0281f387ee6071288f3e1957886b3d9e0fef54ad9418ace8eaee
  */
 #ifndef RIGID_BODY_H
 #define RIGID_BODY_H
@@ -17,7 +17,7 @@ extern "C" {
 #define rigid_body_ORDER 6
 #define rigid_body_CASIMIRS 1
 #define rigid_body_PHIGEN_VERSION "0.1.0"
-#define rigid_body_SPEC_SHA256 "6c1237ccc7ee4b24a8f0a329e858795da7fd98ebe563770606bbfbaba9f6e23e"
+#define rigid_body_SPEC_SHA256 "8810186c1e0019884e5b3b03e44e3be202fcaec17d97ceab9967252a6cdb2d99"
 
 /* State vectors: x1, x2, x3. Casimirs: C. */
 typedef struct {

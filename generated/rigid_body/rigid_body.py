@@ -7,17 +7,17 @@
 #   step: implicit, Newton iteration with the analytic matrix
 #   one Newton iteration: 135 additions, 164 multiplications, 2 functions
 #
-# spec: rigid_body, sha256 6c1237ccc7ee4b24a8f0a329e858795da7fd98ebe563770606bbfbaba9f6e23e
+# spec: rigid_body, sha256 8810186c1e0019884e5b3b03e44e3be202fcaec17d97ceab9967252a6cdb2d99
 # to regenerate: phigen build rigid_body
 # DO NOT EDIT: change the spec and regenerate; edits are noticed by the checksum below.
 #
 # SPDX-License-Identifier: 0BSD
 # This file belongs to whoever generated it; phigen claims no rights in it.
-# body-sha256: 615d351733aa64c2df1fa235422caf5bfa8503d24f96cb59a26ff3c0d8cb48b5
+# body-sha256: 3b651e7a87752d08e94a065700c808206f31c14ebd4179a1e0c4cebbeb3a6cdf
 import numpy as np
 
 VERSION = "0.1.0"
-SPEC_SHA256 = "6c1237ccc7ee4b24a8f0a329e858795da7fd98ebe563770606bbfbaba9f6e23e"
+SPEC_SHA256 = "8810186c1e0019884e5b3b03e44e3be202fcaec17d97ceab9967252a6cdb2d99"
 DIM = 3
 ORDER = 6
 COORDINATES = ("x1", "x2", "x3",)

@@ -7,7 +7,7 @@
  *   step: implicit in p, each path followed by its Taylor series to round-off
  *   one evaluation of the equation for p: 2 additions, 11 multiplications, 1 divisions
  *
- * spec: sir_epidemic, sha256 a13678a806dd22744a0465a1afcd9f1cd7c0aa55e2f372bdedeb916b1232077b
+ * spec: sir_epidemic, sha256 3cf6d26b9024102964d272d47dd11225be0d3e675077cabf3aa91f4af27a10e2
  * to regenerate: phigen build sir_epidemic
  * DO NOT EDIT: change the spec and regenerate; edits are noticed by the checksum below.
  *

@@ -3,7 +3,7 @@
  * to regenerate: phigen build sir_epidemic
  * DO NOT EDIT: change the spec and regenerate; edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: f375aa4c424cf56626dfe01fcf21b1490d4731ef728c8b0fa5f446cbc6211cc3
+ * body-sha256: 704cc652ec157576c83b86629af3b9bea95eedef1c6f08b7abb627a860df9f79
  */
 #ifndef SIR_EPIDEMIC_H
 #define SIR_EPIDEMIC_H
@@ -17,7 +17,7 @@ extern "C" {
 #define sir_epidemic_ORDER 4
 #define sir_epidemic_CASIMIRS 1
 #define sir_epidemic_PHIGEN_VERSION "0.1.0"
-#define sir_epidemic_SPEC_SHA256 "a13678a806dd22744a0465a1afcd9f1cd7c0aa55e2f372bdedeb916b1232077b"
+#define sir_epidemic_SPEC_SHA256 "3cf6d26b9024102964d272d47dd11225be0d3e675077cabf3aa91f4af27a10e2"
 
 /* State vectors: S, I, R. Casimirs: N. */
 typedef struct {

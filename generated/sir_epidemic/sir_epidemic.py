@@ -6,17 +6,17 @@
 #   step: implicit in p, each path followed by its Taylor series to round-off
 #   one evaluation of the equation for p: 2 additions, 11 multiplications, 1 divisions
 #
-# spec: sir_epidemic, sha256 a13678a806dd22744a0465a1afcd9f1cd7c0aa55e2f372bdedeb916b1232077b
+# spec: sir_epidemic, sha256 3cf6d26b9024102964d272d47dd11225be0d3e675077cabf3aa91f4af27a10e2
 # to regenerate: phigen build sir_epidemic
 # DO NOT EDIT: change the spec and regenerate; edits are noticed by the checksum below.
 #
 # SPDX-License-Identifier: 0BSD
 # This file belongs to whoever generated it; phigen claims no rights in it.
-# body-sha256: 7c07cd92b24ddc1d00830492a8c39b48d45c736b0f0c14985afd62b0b5917f5c
+# body-sha256: ddee32e5799cd2416f615bf6e1d577f9cdac5f8d5f908816fa1c66a5f9b67c3a
 import numpy as np
 
 VERSION = "0.1.0"
-SPEC_SHA256 = "a13678a806dd22744a0465a1afcd9f1cd7c0aa55e2f372bdedeb916b1232077b"
+SPEC_SHA256 = "3cf6d26b9024102964d272d47dd11225be0d3e675077cabf3aa91f4af27a10e2"
 DIM = 3
 ORDER = 4
 COORDINATES = ("S", "I", "R",)

@@ -22,7 +22,7 @@ from phigen.cli.console import Console
 COMMANDS = {
     "new": ("phigen.cli.new", "Write a commented spec to start from."),
     "check": ("phigen.cli.check", "Prove the mathematics of a spec, or refute it."),
-    "build": ("phigen.cli.build", "Write the C and NumPy solvers of specs."),
+    "build": ("phigen.cli.build", "Write the solvers of specs."),
     "run": ("phigen.cli.run", "Integrate an experiment of a spec and sum up what was conserved."),
     "vendor": ("phigen.cli.vendor", "Copy solvers into another project, and check them there."),
     "tune": ("phigen.cli.tune", "Find the cheapest setting and step for an accuracy."),
@@ -97,7 +97,7 @@ class Commands(click.Group):
 @click.group(cls=Commands, context_settings={"help_option_names": ["-h", "--help"]})
 @click.version_option(__version__, prog_name="phigen", message="%(prog)s %(version)s")
 def group() -> None:
-    """A compiler from specs of Poisson systems ẋ = π(x)∇H(x) to solvers in C and NumPy.
+    """A compiler from specs of Poisson systems ẋ = π(x)∇H(x) to solvers in C, NumPy and JavaScript.
 
     To start: `phigen demo`, then `phigen new mysystem`.
 

@@ -56,7 +56,7 @@ def command(
     diff: bool,
     force: bool,
 ) -> None:
-    """Write the solvers of specs: DIR/NAME/NAME.h, NAME.c and NAME.py.
+    """Write the solvers of specs: DIR/NAME/NAME.h, NAME.c, NAME.py and NAME.mjs.
 
     SPEC is a file, a folder that is searched for *.yaml, or the name of a bundled spec. What the spec claims is
     proved first; nothing is written if there is an error in any spec. Files that were edited by hand are not

@@ -58,8 +58,8 @@ class Function:
     letters: str = ""
 
 
-def _languages(c: str, numpy: str, javascript: str) -> dict[str, str]:
-    return {"c": c, "numpy": numpy, "javascript": javascript}
+def _languages(c: str, numpy: str, js: str) -> dict[str, str]:
+    return {"c": c, "numpy": numpy, "js": js}
 
 
 def _library(name: str, numpy: str = "") -> dict[str, str]:

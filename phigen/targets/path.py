@@ -27,7 +27,7 @@ class Syntax:
     first: str  # the statement that sets the first coefficient of series i
     following: str  # the statement that sets coefficient k ≥ 1 of series i
     slope: str  # the statement that sets coefficient k + 1 of coordinate i
-    sums: str  # the prefix of the functions that sum over orders
+    sums: str  # what a sum over orders is called, by its {kind} or {Kind}
     held: str = "f{i}"  # fixed value i
 
 
@@ -99,7 +99,8 @@ def _linear(index: int, factor: Expression, text: Text) -> tuple[str, str]:
 
 
 def _term(t: Term, sums: str) -> str:
+    function = sums.format(kind=t.kind, Kind=t.kind.capitalize())
     if t.kind == "power":
         exponent = f"{t.exponent.numerator}.0 / {t.exponent.denominator}.0"
-        return f"{sums}_power(s[{t.a}], s[{t.b}], {exponent}, k)"
-    return f"{sums}_{t.kind}(s[{t.a}], s[{t.b}], k)"
+        return f"{function}(s[{t.a}], s[{t.b}], {exponent}, k)"
+    return f"{function}(s[{t.a}], s[{t.b}], k)"

@@ -17,9 +17,15 @@ class Printer:
     """Prints lowered trees (see `phigen.scheme.lowering`); a target gives names, literals and functions."""
 
     def __init__(
-        self, name: Callable[[str], str], functions: Mapping[str, str], constants: Mapping[str, str], power: str
+        self,
+        name: Callable[[str], str],
+        functions: Mapping[str, str],
+        constants: Mapping[str, str],
+        power: str,
+        point: str = ".0",
     ) -> None:
-        self.name, self.functions, self.constants, self.power = name, functions, constants, power
+        """``point`` follows whole numbers."""
+        self.name, self.functions, self.constants, self.power, self.point = name, functions, constants, power, point
 
     def __call__(self, e: Expression) -> str:
         """The tree as text."""
@@ -30,11 +36,11 @@ class Printer:
         if value < 0:
             return "-" + self.literal(-value)[0], SUM
         if value.denominator == 1 and value < 2**53:
-            return f"{value.numerator}.0", ATOM
+            return f"{value.numerator}{self.point}", ATOM
         as_float = value.numerator / value.denominator
         if Fraction(as_float) == value or value.denominator > 10**6 or value.numerator > 10**6:
             return repr(as_float), ATOM
-        return f"{value.numerator}.0 / {value.denominator}.0", PRODUCT
+        return f"{value.numerator}{self.point} / {value.denominator}{self.point}", PRODUCT
 
     def _visit(self, e: Expression, args: list[Printed]) -> Printed:
         match e.op:
@@ -51,7 +57,10 @@ class Printer:
             case "mul":
                 for divisor, other in ((1, 0), (0, 1)):
                     if e.args[divisor].op == "pow" and e.args[divisor].value == -1:
-                        return f"{_in(args[other], PRODUCT)} / {args[divisor][0].removeprefix('1.0 / ')}", PRODUCT
+                        return (
+                            f"{_in(args[other], PRODUCT)} / {args[divisor][0].removeprefix(f'1{self.point} / ')}",
+                            PRODUCT,
+                        )
                 return f"{_in(args[0], PRODUCT)} * {_in(args[1], ATOM)}", PRODUCT
             case "pow":
                 return self._power(e.value, args[0])
@@ -67,7 +76,7 @@ class Printer:
             inner = _in(base, ATOM)
             return f"{inner} * {inner}", PRODUCT
         if exponent == -1:
-            return f"1.0 / {_in(base, ATOM)}", PRODUCT
+            return f"1{self.point} / {_in(base, ATOM)}", PRODUCT
         if exponent == Fraction(1, 2):
             return f"{self.functions['sqrt']}({base[0]})", ATOM
         if exponent == Fraction(1, 3):

@@ -12,7 +12,7 @@ IDS = [f"{path.parent.name}/{path.name}" for path in TEMPLATES]
 
 
 def test_every_target_has_templates():
-    assert {path.parent.name for path in TEMPLATES} >= {"c", "numpy"}
+    assert {path.parent.name for path in TEMPLATES} >= {"c", "numpy", "js"}
 
 
 @pytest.mark.parametrize("path", TEMPLATES, ids=IDS)

@@ -200,7 +200,7 @@ def _path(program: Program, path: Recurrences, kind: str) -> str:
         first="s[{i}][0] = {value};",
         following="s[{i}][k] = {value};",
         slope="s[{i}][k + 1] = s[{slope}][k] / (k + 1);",
-        sums=f"{program.name}_taylor",
+        sums=f"{program.name}_taylor_{{kind}}",
         held="f[{i}]",
     )
     found = statements(program, path, syntax)

@@ -50,7 +50,7 @@ PATH_SYNTAX = Syntax(
     first="s[{i}].append({value} + 0.0)",
     following="s[{i}].append({value})",
     slope="s[{i}].append(s[{slope}][k] / (k + 1))",
-    sums="",
+    sums="_{kind}",
 )
 
 

@@ -1,0 +1,196 @@
+"""A program as an ES module: `NAME.mjs`."""
+
+from __future__ import annotations
+
+import json
+import textwrap
+from collections.abc import Mapping
+from dataclasses import replace
+
+from phigen.scheme.kernel import Kernel
+from phigen.scheme.program import Program
+from phigen.scheme.steps import LONGEST_PATH, MOST_PIECES, Explicit, Implicit, Newton, Path, Splitting
+from phigen.symbolic.functions import FUNCTIONS, written_in
+from phigen.targets import special
+from phigen.targets.header import CHECKSUM, checksum, header_lines, plain
+from phigen.targets.js.functions import definitions
+from phigen.targets.js.runtime import assembled
+from phigen.targets.language import Language
+from phigen.targets.path import Syntax, kinds, statements
+from phigen.targets.rendering import render
+from phigen.targets.reserved import JAVASCRIPT_RESERVED
+
+#: Most terms of the expansion of a path, as in the C target.
+TERMS = 30
+
+#: The widest line.
+WIDTH = 110
+
+LANGUAGE = Language(
+    reserved=JAVASCRIPT_RESERVED,
+    functions={name: name for name in FUNCTIONS} | written_in("js"),
+    constants={"pi": "Math.PI", "E": "Math.E"},
+    declare="const {name} = {value};",
+    assign="{place} = {value};",
+    subscript="{array}[{index}]",
+    parameter="params.{name}",
+    point="",
+)
+
+PATH_SYNTAX = Syntax(
+    printer=LANGUAGE.printer,
+    covector="p[{i}]",
+    fixed="f[{i}] = {value};",
+    first="s[{i}][0] = {value};",
+    following="s[{i}][k] = {value};",
+    slope="s[{i}][k + 1] = s[{slope}][k] / (k + 1);",
+    sums="taylor{Kind}",
+    held="f[{i}]",
+)
+
+
+def emit(program: Program, command: str) -> dict[str, str]:
+    """The file name and its contents."""
+    step, features = program.step, _features(program)
+    chosen = {Newton: "newton", Explicit: "explicit", Path: "path", Splitting: "splitting"}[type(step)]
+    modules = ["solver", chosen]
+    modules += ["taylor"] if isinstance(step, Path) else []
+    modules += ["guess"] if features["IMPLICIT"] else []
+    modules += ["gauge"] if features["GAUGE"] else []
+    modules += ["algebra"] if not isinstance(step, Splitting) or features["GAUGE"] else []
+    body = f"{_model(program)}\n\n{assembled(modules, features)}\n"
+    comment = "\n".join(f" * {line}".rstrip() for line in header_lines(program, command))
+    return {f"{program.name}.mjs": f"/*\n{comment}\n * {CHECKSUM} {checksum(body)}\n */\n{body}"}
+
+
+def _features(program: Program) -> dict[str, bool]:
+    """What the runtime is asked for."""
+    step = program.step
+    sums = kinds(step.recurrences) if isinstance(step, Path) else []
+    return {
+        "IMPLICIT": isinstance(step, Implicit),
+        "GAUGE": program.gauge is not None,
+        "COMPOSED": len(program.fractions) > 1,
+        "SPLITTING": isinstance(step, Splitting),
+        "KICKS": isinstance(step, Splitting) and bool(step.schedule.multiples),
+        "MODIFIED": program.modified is not None,
+        **{f"TAYLOR_{kind.upper()}": kind in sums for kind in ("product", "chain", "power")},
+    }
+
+
+def _model(program: Program) -> str:
+    """What is printed of the system: constants and kernels."""
+    step = program.step
+    pieces = [render("js", "system.mjs", _system(program))]
+    pieces += [render("js", "implicit.mjs", _inner(step))] if isinstance(step, Implicit) else []
+    pieces += definitions(special.used(program), special.entire_used(program))
+    pieces += [_function(kernel) for kernel in _kernels(program)]
+    pieces += [_path(program, step)] if isinstance(step, Path) else []
+    return "\n\n".join(piece.strip("\n") for piece in pieces)
+
+
+def _system(program: Program) -> Mapping[str, object]:
+    step, parameters = program.step, program.parameters
+    schedule = step.schedule if isinstance(step, Splitting) else None
+    properties = [f" * @property {{number}} {p.name} {plain(p.description)}".rstrip() for p in parameters]
+    return {
+        "contents": [f" * {part}".rstrip() for line in _contents(program) for part in textwrap.wrap(line, 100) or [""]],
+        "name": program.name,
+        "version": program.version,
+        "sha256": program.about.spec_sha256,
+        "dimension": program.dimension,
+        "order": program.order,
+        "coordinates": json.dumps(program.coordinates),
+        "casimirs": json.dumps(program.casimirs),
+        "properties": properties,
+        "defaults": [f"{_key(p.name)}: {float(p.value)!r}" for p in parameters],
+        "positive": json.dumps([p.name for p in parameters if p.positive]),
+        "gauge": json.dumps(program.gauge.casimirs) if program.gauge else "",
+        "fractions": json.dumps(program.fractions),
+        "coefficients": step.row,
+        "times": json.dumps(schedule.times) if schedule else "",
+        "multiples": json.dumps(schedule.multiples) if schedule and schedule.multiples else "",
+        "schedule": json.dumps(schedule.flows) if schedule else "",
+        "flows": ", ".join(f"flow{k}" for k in range(1, len(step.flows) + 1)) if isinstance(step, Splitting) else "",
+    }
+
+
+def _inner(step: Newton | Path) -> Mapping[str, object]:
+    floor = "0" if step.inner.relative else "1e-6"
+    return {
+        "max_iterations": step.inner.max_iterations,
+        "tolerance": repr(step.inner.tolerance),
+        "floor": floor if isinstance(step, Newton) else "",
+        "series": len(step.recurrences.series) if isinstance(step, Path) else 0,
+        "fixed": len(step.recurrences.fixed) if isinstance(step, Path) else 0,
+        "terms": TERMS,
+        "longest_path": LONGEST_PATH,
+        "most_pieces": MOST_PIECES,
+    }
+
+
+def _contents(program: Program) -> list[str]:
+    """The table of contents."""
+    step = program.step
+    how = {
+        Newton: "Newton's method",
+        Explicit: "a formula",
+        Path: "paths, each followed by its Taylor series",
+        Splitting: "flows of parts of H",
+    }[type(step)]
+    lines = [
+        f"import {{ Solver, StepError }} from './{program.name}.mjs';",
+        "const solver = new Solver({ x0: [...], params: { ... } });",
+        "solver.integrate(h, steps); then solver.x, .t, .hamiltonian(), .casimirs(), .vectorField()",
+        "",
+        "Contents: the system, with its kernels; the class Solver; the step, by " + how + ".",
+    ]
+    if program.extras.tangent:
+        lines.append("The derivative of a step, step_tangent, is not offered in JavaScript.")
+    return lines
+
+
+def _key(name: str) -> str:
+    """A parameter as a key of an object; this one would be taken for its prototype."""
+    return f'["{name}"]' if name == "__proto__" else name
+
+
+def _kernels(program: Program) -> list[Kernel]:
+    """The kernels that the runtime calls."""
+    step, seen = program.step, program.observables
+    chosen = [program.gauge.guide, program.gauge.products] if program.gauge else []
+    modified = [program.modified.kernel] if program.modified else []
+    others = [*chosen, *modified, seen.energy, seen.casimirs, seen.vector_field]
+    if isinstance(step, Splitting):
+        return [replace(step.prepare, name="prepare_row"), *step.flows, *others]
+    return [step.prepare, step.main, *others]
+
+
+def _function(kernel: Kernel) -> str:
+    """A kernel as a function that fills arrays."""
+    arrays = {argument: _camel(argument) for argument in (*kernel.inputs, *(o.name for o in kernel.outputs))}
+    head = f"function {_camel(kernel.name)}({', '.join(arrays.values())}) {{"
+    lines = [part for line in LANGUAGE.statements(kernel, arrays) for part in _wrapped(line)]
+    return "\n".join([*_comment(kernel.purpose), head, *lines, "}"])
+
+
+def _path(program: Program, step: Path) -> str:
+    """The recurrences of a path."""
+    return render("js", "path.mjs", statements(program, step.recurrences, PATH_SYNTAX))
+
+
+def _wrapped(statement: str) -> list[str]:
+    """A statement of a kernel in lines that are not too wide; it has no strings, so any space will do."""
+    return textwrap.wrap(statement, WIDTH, initial_indent="  ", subsequent_indent="    ", break_long_words=False)
+
+
+def _camel(name: str) -> str:
+    first, *rest = name.split("_")
+    return first + "".join(word.capitalize() for word in rest)
+
+
+def _comment(text: str) -> list[str]:
+    said = f"{text[:1].upper()}{text[1:]}."
+    if len(said) <= WIDTH - 8:
+        return [f"/** {plain(said)} */"]
+    return ["/**", *textwrap.wrap(plain(said), WIDTH, initial_indent=" * ", subsequent_indent=" * "), " */"]

@@ -1,0 +1,56 @@
+"""Functions of phigen's own in JavaScript: polynomials where these suffice, else those of Math."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, cast
+
+from phigen.symbolic.entire import ENTIRE
+from phigen.symbolic.special import near_coefficients, order_of, rest_coefficients
+from phigen.targets import special
+from phigen.targets.rendering import render
+
+#: The closed forms of functions of `ENTIRE`, away from 0.
+_FAR = {
+    "cosroot": "s > 0 ? Math.cos(Math.sqrt(s)) : Math.cosh(Math.sqrt(-s))",
+    "sinroot": "s > 0 ? Math.sin(Math.sqrt(s)) / Math.sqrt(s) : Math.sinh(Math.sqrt(-s)) / Math.sqrt(-s)",
+    "sinroot1": "(cosroot(s) - sinroot(s)) / (2 * s)",
+    "arcroot": "(1 - sinroot(s)) / s",
+    "exprel": "Math.expm1(s) / s",
+    "exprel1": "(Math.exp(s) - exprel(s)) / s",
+}
+
+
+def definitions(phis: Sequence[str], entire: Sequence[str]) -> list[str]:
+    """The definitions of functions of `SPECIAL` and of `ENTIRE`."""
+    found = [render("js", "phi.mjs", _phi(f)) for f in phis] + [render("js", "entire.mjs", _entire(f)) for f in entire]
+    polynomial = [render("js", "polynomial.mjs", {})] if found else []
+    return [text.strip("\n") for text in (*polynomial, *found)]
+
+
+def _listed(numbers: Sequence[float]) -> list[str]:
+    """Numbers in lines, each with a comma after it."""
+    return [" ".join(f"{c!r}," for c in numbers[k : k + 4]) for k in range(0, len(numbers), 4)]
+
+
+def _phi(function: str) -> dict[str, Any]:
+    order = order_of(function)
+    values = cast(dict[str, Any], special.values(function, function))
+    return {
+        **values,
+        "near_coefficients": _listed(near_coefficients(order)),
+        "rest_coefficients": _listed(rest_coefficients(order)),
+        "closed": [line.replace("phi", "value") for line in values["closed"]],
+        "result": f"value{order}",
+    }
+
+
+def _entire(function: str) -> dict[str, Any]:
+    found = ENTIRE[function]
+    return {
+        "function": function,
+        "meaning": found.meaning,
+        "radius": repr(found.radius),
+        "coefficients": _listed([float(c) for c in found.terms()]),
+        "far": _FAR[function],
+    }

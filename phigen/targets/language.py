@@ -1,0 +1,64 @@
+"""What printing a kernel takes of a language whose kernels are functions of arrays, one number at a time."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from phigen.scheme.kernel import Kernel
+from phigen.symbolic.symbols import Symbol
+from phigen.targets.code import lower
+from phigen.targets.names import Scope
+from phigen.targets.printer import Printer
+from phigen.targets.reserved import Reserved
+
+
+@dataclass(frozen=True)
+class Language:
+    """How a language writes the pieces of a kernel.
+
+    ``functions`` are the names of functions, or texts with ``{0}`` for the argument, those that a file defines itself
+    among them. ``declare`` and ``assign`` are statements, ``subscript`` an entry of an array whose first index is
+    ``base``, ``parameter`` a parameter of the system. ``point`` follows whole numbers.
+    """
+
+    reserved: Reserved
+    functions: Mapping[str, str]
+    constants: Mapping[str, str]
+    declare: str
+    assign: str
+    subscript: str
+    parameter: str
+    base: int = 0
+    point: str = ".0"
+
+    def entry(self, array: str, index: int) -> str:
+        """An entry of an array, counted from 0 here."""
+        return self.subscript.format(array=array, index=index + self.base)
+
+    def printer(self, scope: Scope) -> Printer:
+        """Prints lowered trees with the names of a scope."""
+        return Printer(lambda n: scope[n], self.functions, self.constants, self.functions["power"], self.point)
+
+    def statements(self, kernel: Kernel, arrays: Mapping[str, str]) -> list[str]:
+        """The body of a kernel: its arguments are called as ``arrays`` says, entries are read and stored."""
+        code, taken = lower(kernel), [*arrays.values(), *self.functions.values()]
+        scope, lines = Scope(self.reserved | taken), list[str]()
+        for argument, symbols in kernel.inputs.items():
+            for i, s in enumerate(symbols):
+                if s not in code.used:
+                    continue
+                if argument == "params":
+                    scope.bind(s, self.parameter.format(name=s))
+                elif argument == "h":
+                    scope.bind(s, arrays[argument])
+                elif isinstance(s, Symbol):
+                    scope.bind(s, self.entry(arrays[argument], i))
+                else:
+                    lines.append(self.declare.format(name=scope[s], value=self.entry(arrays[argument], i)))
+        show = self.printer(scope)
+        lines += [self.declare.format(name=scope[a.target], value=show(a.value)) for a in code.assignments]
+        places = [self.entry(arrays[s.array], s.index) for s in code.stores]
+        return lines + [
+            self.assign.format(place=p, value=show(s.value)) for p, s in zip(places, code.stores, strict=True)
+        ]

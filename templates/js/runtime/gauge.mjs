@@ -1,0 +1,108 @@
+import { TINY } from "./algebra.mjs";
+import { DIM, GAUGE, guide, products, vectorField } from "./model.mjs";
+
+// ---- The choice of the gauge: multiples of Casimirs taken from H ----
+
+/** States along a short piece of the trajectory. */
+const SAMPLES = 32;
+
+/** S_3 is cubic in H, so the square of the error is of degree six in each multiple. */
+const DEGREE = 6;
+
+/** Most rounds over the multiples. */
+const SWEEPS = 4;
+
+/** A short piece of the trajectory from x, by a Runge-Kutta method with steps of a fixed change. */
+function sampled(params, x) {
+  const states = [Float64Array.from(x)];
+  const slope = new Float64Array(DIM);
+  vectorField(params, x, slope);
+  const total = (values) => values.reduce((sum, value) => sum + Math.abs(value), 0);
+  const h = (0.25 * total(states[0])) / (total(slope) + TINY);
+  while (states.length < SAMPLES) {
+    const y = states[states.length - 1];
+    vectorField(params, y, slope);
+    vectorField(params, y.map((value, i) => value + 0.5 * h * slope[i]), slope);
+    states.push(y.map((value, i) => value + h * slope[i]));
+  }
+  return states;
+}
+
+/** Sum of |pi grad S_3|^2, the leading error of the method, over the samples. */
+function gaugeError(params, gauge, samples) {
+  const error = new Float64Array(DIM);
+  let sum = 0;
+  for (const state of samples) {
+    guide(params, gauge, state, error);
+    for (const part of error) sum += part * part;
+  }
+  return sum;
+}
+
+/** The error polynomial at centre + t width, by Newton's formula from forward differences. */
+function errorOnLine(difference, t) {
+  let error = difference[DEGREE];
+  for (let k = DEGREE - 1; k >= 0; k--) error = difference[k] + ((t + 3 - k) / (k + 1)) * error;
+  return error;
+}
+
+/**
+ * How many widths multiple c is to be moved for the least error: the best on grids, each finer than the
+ * one before.
+ */
+function leastOnLine(params, gauge, c, width, samples) {
+  const errors = [];
+  for (let j = 0; j <= DEGREE; j++) {
+    const nearby = Float64Array.from(gauge);
+    nearby[c] = gauge[c] + (j - 3) * width;
+    errors.push(gaugeError(params, nearby, samples));
+  }
+  const size = errors.reduce((sum, error) => sum + error, 0);
+  for (let order = 1; order <= DEGREE; order++) {
+    for (let j = DEGREE; j >= order; j--) errors[j] -= errors[j - 1];
+  }
+  let best = 0;
+  let least = errorOnLine(errors, best);
+  for (const [reach, mesh] of [[24, 1 / 8], [8, 1 / 64], [8, 1 / 512]]) {
+    const centre = best;
+    for (let j = -reach; j <= reach; j++) {
+      const t = centre + j * mesh;
+      const error = errorOnLine(errors, t);
+      if (!(error < least - 1e-12 * size)) continue; // close calls are not decided by rounding
+      least = error;
+      best = t;
+    }
+  }
+  return best;
+}
+
+/**
+ * The multiples that minimise the leading error along a short piece of the trajectory, one after the
+ * other, from the least-squares solution of grad H = sum of multiples of grad C. Zero where that gives
+ * nothing finite.
+ *
+ * @param {Parameters} params
+ * @param {ArrayLike<number>} x
+ * @returns {Float64Array}
+ */
+export function chooseGauge(params, x) {
+  const samples = sampled(params, x);
+  const sums = new Float64Array(1 + 2 * GAUGE.length);
+  const out = new Float64Array(sums.length);
+  for (const state of samples) {
+    products(params, state, out);
+    for (let i = 0; i < sums.length; i++) sums[i] += out[i];
+  }
+  const norms = GAUGE.map((_, c) => (sums[2 + 2 * c] > 0 ? sums[2 + 2 * c] : Infinity));
+  const gauge = Float64Array.from(norms, (norm, c) => sums[1 + 2 * c] / norm);
+  const widths = norms.map((norm) => Math.sqrt(sums[0] / norm));
+  for (let sweep = 0, moving = true; sweep < SWEEPS && moving; sweep++) {
+    moving = false;
+    for (let c = 0; c < gauge.length; c++) {
+      const best = leastOnLine(params, gauge, c, widths[c], samples);
+      gauge[c] += best * widths[c];
+      moving = moving || best !== 0;
+    }
+  }
+  return Number.isFinite(gaugeError(params, gauge, samples)) ? gauge : new Float64Array(gauge.length);
+}

@@ -1,0 +1,74 @@
+import { TINY, advance, solve } from "./algebra.mjs";
+import { plausible, retried } from "./guess.mjs";
+import { DIM, FLOOR, MAX_ITERATIONS, TOLERANCE, linearise } from "./model.mjs";
+
+// ---- The implicit step, by Newton's method ----
+
+/** Corrections below the first that shrink by less than the second have reached the level of rounding. */
+const NEARLY_SOLVED = 1e-8;
+const SHRINKING = 0.25;
+
+/**
+ * Size of a correction relative to each component of y, but no finer than FLOOR of the largest; NaN if it
+ * is NaN.
+ */
+function relativeSize(y, correction) {
+  let norm = 0;
+  let size = 0;
+  for (let i = 0; i < DIM; i++) norm = Math.max(norm, Math.abs(y[i]));
+  for (let i = 0; i < DIM; i++) {
+    const ratio = Math.abs(correction[i]) / (Math.abs(y[i]) + FLOOR * norm + TINY);
+    if (!Number.isFinite(ratio)) return ratio;
+    size = Math.max(size, ratio);
+  }
+  return size;
+}
+
+const y = new Float64Array(DIM);
+const delta = new Float64Array(DIM);
+const displacement = new Float64Array(DIM);
+const increment = new Float64Array(DIM);
+const correction = new Float64Array(DIM);
+const jacobian = new Float64Array(DIM * DIM);
+const incrementJacobian = new Float64Array(DIM * DIM);
+
+/**
+ * Solve (y - x) + displacement(y) = 0 for y by Newton's method from the extrapolated guess, and advance.
+ * The increment is corrected to first order by the last Newton correction, so that correction costs no
+ * evaluation: a correction is accepted when the error that remains after it, quadratic in it, is below
+ * TOLERANCE.
+ */
+function attempt(solver, stage) {
+  const { x, carry } = solver;
+  const history = solver.history[stage];
+  let previous = Infinity;
+  if (!history.predict(y)) y.set(x);
+  for (let iteration = 1; iteration <= MAX_ITERATIONS; iteration++) {
+    linearise(solver.coef[stage], y, displacement, increment, jacobian, incrementJacobian);
+    solver.evaluations++;
+    for (let i = 0; i < DIM; i++) delta[i] = y[i] - x[i] + displacement[i] - carry[i];
+    const regular = solve(jacobian, delta);
+    const size = relativeSize(y, delta);
+    if (!Number.isFinite(size)) return "NOT_FINITE";
+    if (!regular) return "SINGULAR";
+    for (let i = 0; i < DIM; i++) y[i] -= delta[i];
+    const remaining = size * size * Math.max(1, size / (previous * previous));
+    const stalled = previous < NEARLY_SOLVED && size > SHRINKING * previous;
+    previous = size;
+    if (!(remaining <= TOLERANCE || stalled)) continue;
+    for (let i = 0; i < DIM; i++) {
+      correction[i] = 0;
+      for (let j = 0; j < DIM; j++) correction[i] -= incrementJacobian[i * DIM + j] * delta[j];
+    }
+    if (!plausible(solver, stage, increment)) return "NO_CONVERGENCE";
+    if (!advance(solver, increment, correction)) return "NOT_FINITE";
+    history.remember(y);
+    return "OK";
+  }
+  return "NO_CONVERGENCE";
+}
+
+/** One stage of a step: a status. */
+export function makeStage(solver, stage) {
+  return retried(solver, stage, attempt);
+}

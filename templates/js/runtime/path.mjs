@@ -1,0 +1,183 @@
+import { TINY, advance, solve } from "./algebra.mjs";
+import { plausible, retried } from "./guess.mjs";
+import { DIM, FIXED, LONGEST_PATH, MAX_ITERATIONS, MOST_PIECES, SERIES, TERMS } from "./model.mjs";
+import { generate, pathBegin, pathField, pathOrder } from "./model.mjs";
+
+// ---- The implicit step, along paths dm/dt = pi(m) p ----
+
+const series = Array.from({ length: SERIES }, () => new Float64Array(TERMS + 1));
+const fixed = new Float64Array(FIXED);
+const slope = new Float64Array(DIM);
+const end = new Float64Array(DIM);
+const field = new Float64Array(DIM);
+
+/**
+ * Whether dm/dt = pi(m) p holds at the end of an expansion, where it has the given slope: one with gaps
+ * between its terms, like t + t^9, or across the kink of an absolute value, only looks as if it had
+ * converged.
+ */
+function holds(coef, p) {
+  pathField(coef, p, fixed, end, field);
+  let scale = 0;
+  for (let i = 0; i < DIM; i++) scale += Math.abs(end[i]) + Math.abs(slope[i]);
+  for (let i = 0; i < DIM; i++) {
+    if (!(Math.abs(field[i] - slope[i]) <= 2e-15 * scale)) return false;
+  }
+  return true;
+}
+
+/**
+ * A path for 0 <= t <= 1, from start, by its Taylor series: shift is m(1) - start, mean the mean of m -
+ * start. The number of terms follows from their size; false if TERMS do not suffice.
+ */
+function followPiece(coef, p, start, shift, mean) {
+  let norm = 0;
+  let small = 0;
+  for (let i = 0; i < DIM; i++) {
+    series[i][0] = start[i];
+    shift[i] = mean[i] = slope[i] = 0;
+    norm += Math.abs(start[i]);
+  }
+  pathBegin(coef, p, series, fixed);
+  for (let k = 0; k < TERMS; k++) {
+    pathOrder(coef, p, series, fixed, k);
+    let negligible = true;
+    for (let i = 0; i < DIM; i++) {
+      const term = series[i][k + 1];
+      shift[i] += term;
+      mean[i] += term / (k + 2);
+      slope[i] += (k + 1) * term;
+      end[i] = start[i] + shift[i];
+      const size = Math.abs(start[i]) + Math.abs(shift[i]) + 1e-5 * norm;
+      if (!(Math.abs(term) <= 1e-17 * size)) negligible = false;
+    }
+    small = negligible ? small + 1 : 0;
+    if (small >= 2 && holds(coef, p)) return true;
+  }
+  return false;
+}
+
+const share = new Float64Array(DIM);
+const start = new Float64Array(DIM);
+const shift = new Float64Array(DIM);
+const local = new Float64Array(DIM);
+
+/**
+ * The whole path from x, in 1, 2, 4, ... pieces until each expansion converges. Whatever p is, the end of
+ * the path lies on the symplectic leaf of x.
+ *
+ * @returns {{good: boolean, made: number}} false if the path is too long or leaves the domain; all pieces
+ *   made
+ */
+function followPath(coef, x, p, change, mean) {
+  let made = 0;
+  for (let pieces = 1; pieces <= LONGEST_PATH; pieces *= 2) {
+    let good = true;
+    for (let i = 0; i < DIM; i++) {
+      share[i] = p[i] / pieces;
+      change[i] = mean[i] = 0;
+    }
+    for (let piece = 0; piece < pieces && good; piece++) {
+      for (let i = 0; i < DIM; i++) start[i] = x[i] + change[i];
+      good = followPiece(coef, share, start, shift, local);
+      made++;
+      for (let i = 0; i < DIM; i++) {
+        mean[i] += (change[i] + local[i]) / pieces;
+        change[i] += shift[i];
+      }
+    }
+    if (good) return { good, made };
+  }
+  return { good: false, made };
+}
+
+const mean = new Float64Array(DIM);
+
+/**
+ * The residual p - grad S_h(y) of the equation for p, y the mean of the path, with the path's change of x
+ * and an approximate Jacobian of the residual; see `followPath` for what it returns.
+ */
+function findResidual(solver, coef, p, y, residual, change, jacobian) {
+  const path = followPath(coef, solver.x, p, change, mean);
+  if (!path.good) return path;
+  for (let i = 0; i < DIM; i++) y[i] = solver.x[i] + mean[i];
+  generate(coef, y, residual, jacobian);
+  for (let i = 0; i < DIM; i++) residual[i] = p[i] - residual[i];
+  solver.evaluations++;
+  return path;
+}
+
+const moved = new Float64Array(DIM);
+const elsewhere = new Float64Array(DIM);
+const other = new Float64Array(DIM);
+const unused = new Float64Array(DIM * DIM);
+
+/** The Jacobian by differences, for steps so large that the approximate one does not contract. */
+function differentiate(solver, coef, p, residual, jacobian) {
+  let norm = TINY;
+  let made = 0;
+  for (let i = 0; i < DIM; i++) norm = Math.max(norm, Math.abs(p[i]));
+  for (let j = 0; j < DIM; j++) {
+    const q = Float64Array.from(p);
+    q[j] += 1e-7 * norm;
+    const path = findResidual(solver, coef, q, elsewhere, moved, other, unused);
+    made += path.made;
+    if (!path.good) return { good: false, made };
+    for (let i = 0; i < DIM; i++) jacobian[i * DIM + j] = (moved[i] - residual[i]) / (q[j] - p[j]);
+  }
+  return { good: true, made };
+}
+
+const p = new Float64Array(DIM);
+const y = new Float64Array(DIM);
+const residual = new Float64Array(DIM);
+const change = new Float64Array(DIM);
+const jacobian = new Float64Array(DIM * DIM);
+const nothing = new Float64Array(DIM);
+
+/**
+ * Solve p = grad S_h(mean of the path from x under p) and move to the end of that path. Where that takes
+ * more than MOST_PIECES pieces of paths, the step is so large that a solution would mean nothing.
+ */
+function attempt(solver, stage) {
+  const coef = solver.coef[stage];
+  const history = solver.history[stage];
+  let previous = Infinity;
+  let made = 0;
+  if (!history.predict(y)) y.set(solver.x);
+  generate(coef, y, p, jacobian);
+  for (let iteration = 0; iteration < MAX_ITERATIONS && made <= MOST_PIECES; iteration++) {
+    const path = findResidual(solver, coef, p, y, residual, change, jacobian);
+    made += path.made;
+    if (!path.good) return "NO_CONVERGENCE";
+    let size = 0;
+    let norm = TINY;
+    for (let i = 0; i < DIM; i++) {
+      if (!Number.isFinite(residual[i])) return "NOT_FINITE";
+      size = Math.max(size, Math.abs(residual[i]));
+      norm = Math.max(norm, Math.abs(p[i]));
+    }
+    size /= norm;
+    // The second test: residuals no longer shrink, the solve has reached the level of rounding.
+    if (size <= 4e-16 || (previous < 1e-12 && size > 0.25 * previous)) {
+      if (!plausible(solver, stage, change)) return "NO_CONVERGENCE";
+      if (!advance(solver, change, nothing)) return "NOT_FINITE";
+      history.remember(y);
+      return "OK";
+    }
+    if (iteration >= 3 && size > 0.05 * previous) {
+      const found = differentiate(solver, coef, p, residual, jacobian);
+      made += found.made;
+      if (!found.good) return "NO_CONVERGENCE";
+    }
+    if (!solve(jacobian, residual)) return "SINGULAR";
+    for (let i = 0; i < DIM; i++) p[i] -= residual[i];
+    previous = size;
+  }
+  return "NO_CONVERGENCE";
+}
+
+/** One stage of a step: a status. */
+export function makeStage(solver, stage) {
+  return retried(solver, stage, attempt);
+}

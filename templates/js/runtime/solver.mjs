@@ -1,0 +1,237 @@
+import { makeStage } from "./newton.mjs";
+// #if IMPLICIT
+import { History } from "./guess.mjs";
+// #endif
+// #if GAUGE
+import { chooseGauge } from "./gauge.mjs";
+import { GAUGE } from "./model.mjs";
+// #endif
+import { CASIMIRS, COORDINATES, DEFAULT_PARAMETERS, DIM, NAME, ORDER } from "./model.mjs";
+import { COEFFICIENTS, FRACTIONS, POSITIVE, SPEC_SHA256, VERSION } from "./model.mjs";
+import { casimirs, energy, prepare, vectorField } from "./model.mjs";
+// #if SPLITTING
+import { TIMES } from "./model.mjs";
+// #endif
+// #if MODIFIED
+import { modified } from "./model.mjs";
+// #endif
+
+// ---- The solver ----
+
+/** What statuses mean. */
+const STATUS = {
+  NO_CONVERGENCE: "no convergence: the step is too large",
+  SINGULAR: "singular Newton matrix: the step is too large",
+  NOT_FINITE: "not finite: overflow, or outside the domain",
+  BAD_ARGUMENT: "bad argument",
+};
+
+/** Why a step could not be made, or no solver; the state before it stands. */
+export class StepError extends Error {
+  /**
+   * @param {"NO_CONVERGENCE" | "SINGULAR" | "NOT_FINITE" | "BAD_ARGUMENT"} status
+   * @param {number} steps good steps until then
+   * @param {string} [detail]
+   */
+  constructor(status, steps, detail = "") {
+    super(`step ${steps}: ${STATUS[status]}${detail && `: ${detail}`}`);
+    this.name = "StepError";
+    this.status = status;
+    this.steps = steps;
+  }
+}
+
+const number = new Float64Array(1);
+
+/** Numbers as many as wanted, all finite; StepError otherwise. */
+function finite(values, length, what) {
+  const copy = Float64Array.from(values ?? []);
+  if (copy.length === length && copy.every(Number.isFinite)) return copy;
+  throw new StepError("BAD_ARGUMENT", 0, `${what} must be ${length} finite numbers`);
+}
+
+/** A table of coefficients for each stage. */
+function emptyTables() {
+  // #if SPLITTING
+  return [TIMES.map(() => new Float64Array(COEFFICIENTS))];
+  // #else
+  return FRACTIONS.map(() => new Float64Array(COEFFICIENTS));
+  // #endif
+}
+
+/**
+ * All parameters: those given, and defaults. StepError unless they are known and finite, positive where
+ * they have to be, and give finite coefficients for a step so short that it has no part in it.
+ */
+function admitted(given) {
+  const params = { ...DEFAULT_PARAMETERS, ...given };
+  const unknown = Object.keys(given).filter((name) => !Object.hasOwn(DEFAULT_PARAMETERS, name));
+  if (unknown.length) throw new StepError("BAD_ARGUMENT", 0, `there is no parameter ${unknown[0]}`);
+  for (const [name, value] of Object.entries(params)) {
+    const allowed = Number.isFinite(value) && (value > 0 || !POSITIVE.includes(name));
+    if (!allowed) throw new StepError("BAD_ARGUMENT", 0, `the parameter ${name} is ${value}`);
+  }
+  const [table] = emptyTables();
+  // #if GAUGE
+  prepare(params, new Float64Array(GAUGE.length), 1e-100, table);
+  // #else
+  prepare(params, 1e-100, table);
+  // #endif
+  if (![table].flat().every((row) => row.every(Number.isFinite))) {
+    throw new StepError("BAD_ARGUMENT", 0, "no step can be made with these parameters");
+  }
+  return Object.freeze(params);
+}
+
+/** A trajectory, and what makes its steps. */
+export class Solver {
+  static NAME = NAME;
+  static VERSION = VERSION;
+  static SPEC_SHA256 = SPEC_SHA256;
+  static DIM = DIM;
+  static ORDER = ORDER;
+  static COORDINATES = COORDINATES;
+  static CASIMIRS = CASIMIRS;
+  static DEFAULT_PARAMETERS = DEFAULT_PARAMETERS;
+
+  /** The state; read it freely, and make another solver to start elsewhere. */
+  x;
+  /** What rounding took from x: the state proper is x + carry. */
+  carry = new Float64Array(DIM);
+  /** Time since the start. */
+  t = 0;
+  /** Good steps since the start. */
+  steps = 0;
+  /** Evaluations of the generating function, for statistics. */
+  evaluations = 0;
+  /** The last step size. */
+  h = NaN;
+  /** @type {Readonly<Parameters>} */
+  params;
+  // #if GAUGE
+  /** Multiples of the Casimirs in GAUGE that are taken from H. */
+  gauge;
+  // #endif
+  /** All that depends on parameters and step size only, for each stage. */
+  coef = emptyTables();
+  // #if IMPLICIT
+  /** For starting guesses, for each stage. */
+  history = FRACTIONS.map(() => new History());
+  // #endif
+  /** Steps and time when h was set: time is counted from there, so that no error adds up. */
+  #stepsBefore = 0;
+  #timeBefore = 0;
+
+  /**
+   * Start at x0. Throws StepError for arguments that are not allowed.
+   *
+   * @param {object} options
+   * @param {ArrayLike<number>} options.x0 the coordinates, in the order of COORDINATES
+   * @param {Partial<Parameters>} [options.params] the defaults for those that are left out
+   * #if GAUGE
+   * @param {ArrayLike<number>} [options.gauge] multiples of one's own: the step is an exact Poisson map
+   *   for each
+   * #endif
+   */
+  constructor(options) {
+    this.x = finite(options.x0, DIM, "x0");
+    this.params = admitted(options.params ?? {});
+    // #if GAUGE
+    const { gauge } = options;
+    this.gauge = gauge ? finite(gauge, GAUGE.length, "gauge") : chooseGauge(this.params, this.x);
+    // #endif
+  }
+
+  /** What depends on the step size; nothing where that is as before. */
+  #setStep(h) {
+    if (!Number.isFinite(h)) throw new StepError("BAD_ARGUMENT", this.steps, `the step is ${h}`);
+    if (Object.is(h, this.h)) return;
+    FRACTIONS.forEach((fraction, stage) => {
+      // #if GAUGE
+      prepare(this.params, this.gauge, fraction * h, this.coef[stage]);
+      // #else
+      prepare(this.params, fraction * h, this.coef[stage]);
+      // #endif
+      // #if IMPLICIT
+      this.history[stage].clear();
+      // #endif
+    });
+    this.h = h;
+    this.#timeBefore = this.t;
+    this.#stepsBefore = this.steps;
+  }
+
+  /**
+   * One step of size h, of either sign. Throws StepError; then the state is as before.
+   *
+   * @param {number} h
+   * @returns {this}
+   */
+  step(h) {
+    this.#setStep(h);
+    // #if COMPOSED
+    const x = Float64Array.from(this.x);
+    const carry = Float64Array.from(this.carry);
+    // #endif
+    for (let stage = 0; stage < FRACTIONS.length; stage++) {
+      const status = makeStage(this, stage);
+      if (status === "OK") continue;
+      // #if COMPOSED
+      this.x.set(x);
+      this.carry.set(carry);
+      // #endif
+      throw new StepError(status, this.steps);
+    }
+    this.steps++;
+    this.t = this.#timeBefore + (this.steps - this.#stepsBefore) * h;
+    return this;
+  }
+
+  /**
+   * Many steps. Throws StepError; then x is the last good state, and steps counts the good ones.
+   *
+   * @param {number} h
+   * @param {number} count
+   * @returns {this}
+   */
+  integrate(h, count) {
+    this.#setStep(h);
+    if (!(Number.isInteger(count) && count >= 0)) {
+      throw new StepError("BAD_ARGUMENT", this.steps, `the number of steps is ${count}`);
+    }
+    for (let k = 0; k < count; k++) this.step(h);
+    return this;
+  }
+
+  /** The Hamiltonian, at x or elsewhere. */
+  hamiltonian(x = this.x) {
+    energy(this.params, x, number);
+    return number[0];
+  }
+
+  // #if MODIFIED
+  /** The Hamiltonian whose flow a step of size h is, up to O(h^MODIFIED_POWER), at x or elsewhere. */
+  modifiedHamiltonian(h, x = this.x) {
+    // #if GAUGE
+    modified(this.params, this.gauge, h, x, number);
+    // #else
+    modified(this.params, h, x, number);
+    // #endif
+    return number[0];
+  }
+
+  // #endif
+  /** The Casimirs, in the order of CASIMIRS. */
+  casimirs(x = this.x) {
+    const out = new Float64Array(CASIMIRS.length);
+    casimirs(this.params, x, out);
+    return out;
+  }
+
+  /** The right-hand side pi(x) grad H(x). */
+  vectorField(x = this.x) {
+    const out = new Float64Array(DIM);
+    vectorField(this.params, x, out);
+    return out;
+  }
+}

@@ -1,0 +1,246 @@
+"""Generated JavaScript, run by Node: equal to the other targets to round-off, errors included."""
+
+import json
+import re
+import subprocess
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+from shutil import copy
+
+import numpy as np
+import pytest
+from support import BODY, COMMAND, NAMES, compile_text, compiled, setting, solver, tool
+
+import phigen
+from phigen import resources, spec
+from phigen.compiler import compile_spec, emit
+from phigen.spec.model import BirealisationChoice, Extras
+from phigen.targets.header import is_edited
+from phigen.targets.js.runtime import resolved
+
+RUNTIME = sorted((resources.templates() / "js" / "runtime").glob("*.mjs"))
+STEPS = 20
+
+RUN = "runs: {r: {initial: [1, 0.5, -0.25], step: 0.1, steps: 20}}\n"
+
+#: What the corpus does not ask for: every kind of step, with one stage and with several, kicks, composed paths.
+VARIANTS = {
+    "splitting": lambda: compiled("toda3", 4, "splitting"),
+    "flow": lambda: compiled("rigid_body_paper", 2, "splitting"),
+    "kicks": lambda: compiled("kowalevski_top", 6, "splitting"),
+    "path": lambda: _by_paths("rigid_body", 4),
+    "path, composed": lambda: compile_text(f"{BODY}order: 6\nbirealisation: karasev\ncomposition: kahan-li\n{RUN}"),
+    "newton, composed": lambda: compile_text(f"{BODY}order: 6\ncomposition: kahan-li\n{RUN}"),
+    "newton, not symmetric": lambda: compiled("pendulum_euler", 3),
+    "gauge": lambda: compile_text(f"{BODY}casimirs: {{C: x1**2 + x2**2 + x3**2}}\norder: 4\n{RUN}"),
+    "modified": lambda: _modified("rigid_body", 2),
+}
+
+
+def _by_paths(name, order):
+    given = spec.load(resources.bundled_specs() / f"{name}.yaml")
+    return compile_spec(replace(given, birealisation=BirealisationChoice("karasev"), gauge="none"), order=order)
+
+
+def _modified(name, order):
+    return compile_spec(spec.load(resources.bundled_specs() / f"{name}.yaml"), order=order, extras=Extras(False, 1))
+
+
+@cache
+def compilation_of(case):
+    return VARIANTS[case]() if case in VARIANTS else compiled(case)
+
+
+def node(folder, jobs):
+    """The answers of one process to jobs (compilation, options, h, steps)."""
+    listed = []
+    for k, (compilation, options, h, steps) in enumerate(jobs):
+        (text,) = emit(compilation.program, "js", COMMAND).values()
+        path = folder / f"{k}.mjs"
+        path.write_text(text, encoding="utf-8")
+        listed.append({"module": path.as_uri(), "options": options, "h": h, "steps": steps})
+    (folder / "jobs.json").write_text(json.dumps(listed), encoding="utf-8")
+    command = [tool("node"), str(Path(__file__).with_name("javascript.mjs")), str(folder / "jobs.json")]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=300, check=False)
+    assert done.returncode == 0, done.stderr
+    return json.loads(done.stdout)
+
+
+@pytest.fixture(scope="module")
+def answers(tmp_path_factory):
+    """What the solvers of all cases say of the first run of their spec."""
+    cases, jobs = [*NAMES, *VARIANTS], []
+    for case in cases:
+        at = setting(compilation_of(case))
+        jobs.append((compilation_of(case), {"x0": at.x, "params": at.parameters}, at.h, STEPS))
+    return dict(zip(cases, node(tmp_path_factory.mktemp("javascript"), jobs), strict=True))
+
+
+def apart(found, expected):
+    """The largest difference, in sizes of the largest expected number."""
+    found, expected = np.asarray(found, dtype=float), np.asarray(expected, dtype=float)
+    return float(np.max(np.abs(found - expected), initial=0.0) / (np.max(np.abs(expected), initial=0.0) or 1.0))
+
+
+@pytest.mark.parametrize("case", [*NAMES, *VARIANTS])
+def test_steps_are_those_of_numpy_to_roundoff(case, answers):
+    at, found, numpy = setting(compilation_of(case)), answers[case], solver(compilation_of(case), "numpy")
+    expected = numpy.integrate(at.x, at.h, STEPS, **at.parameters).x[-1]
+    assert (found["done"], found["steps"]) == ({"value": STEPS}, STEPS)
+    assert found["t"] == pytest.approx(STEPS * at.h, rel=1e-15)
+    assert apart(found["x"], expected) < 1e-13
+    assert 0 < np.max(np.abs(found["carry"])) < 1e-15 * np.max(np.abs(expected))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("case", [*NAMES, *VARIANTS])
+def test_steps_are_those_of_c_to_roundoff(case, answers):
+    at = setting(compilation_of(case))
+    expected = solver(compilation_of(case), "c").integrate(at.x, at.h, STEPS, **at.parameters).x[-1]
+    assert apart(answers[case]["x"], expected) < 1e-13
+
+
+@pytest.mark.parametrize("case", NAMES)
+def test_observables_and_facts_are_those_of_the_system(case, answers):
+    at, found, numpy = setting(compilation_of(case)), answers[case], solver(compilation_of(case), "numpy")
+    program, x = compilation_of(case).program, np.array(found["x"])
+    backend = numpy.backend
+    scale = 1e-13 * np.max(np.abs(x))
+    assert found["energy"] == pytest.approx(backend.hamiltonian(x[np.newaxis], at.parameters)[0], rel=1e-13, abs=scale)
+    assert found["casimirs"] == pytest.approx(backend.casimirs(x[np.newaxis], at.parameters)[0], rel=1e-13, abs=scale)
+    assert apart(found["field"], backend.vector_field(x[np.newaxis], at.parameters)[0]) < 1e-13
+    assert found["facts"] == {
+        "NAME": program.name,
+        "VERSION": phigen.__version__,
+        "SPEC_SHA256": program.about.spec_sha256,
+        "DIM": program.dimension,
+        "ORDER": program.order,
+        "COORDINATES": list(program.coordinates),
+        "CASIMIRS": list(program.casimirs),
+        "DEFAULT_PARAMETERS": {p.name: float(p.value) for p in program.parameters},
+    }
+
+
+def test_the_gauge_is_chosen_as_in_numpy_or_given(answers, tmp_path):
+    compilation = compilation_of("gauge")
+    at = setting(compilation)
+    module = solver(compilation, "numpy").backend.module
+    assert answers["gauge"]["gauge"] == pytest.approx(module.gauge(at.x, **at.parameters), rel=1e-12)
+    (given,) = node(tmp_path, [(compilation, {"x0": at.x, "gauge": [0.25]}, at.h, 3)])
+    assert apart(given["x"], module.integrate(at.x, at.h, 3, gauge=[0.25])[-1]) < 1e-14
+
+
+def test_the_modified_hamiltonian_is_that_of_numpy(answers):
+    compilation, found = compilation_of("modified"), answers["modified"]
+    at = setting(compilation)
+    module = solver(compilation, "numpy").backend.module
+    assert found["modified"] == pytest.approx(module.modified_hamiltonian(at.x, at.h, **at.parameters), rel=1e-14)
+
+
+#: Systems and steps that end in an error: far too large ones for each kind of step, and what leads to another energy.
+FAILING = [("rigid_body", 40.0), ("sir_epidemic", 300.0), ("pendulum_euler", 1e200), ("toda3", 1e3), ("kepler", 30.0)]
+
+
+@pytest.fixture(scope="module")
+def failures(tmp_path_factory):
+    jobs = []
+    for name, h in FAILING:
+        at = setting(compiled(name))
+        jobs.append((compiled(name), {"x0": at.x, "params": at.parameters}, h, 50))
+    return dict(zip([name for name, _ in FAILING], node(tmp_path_factory.mktemp("failures"), jobs), strict=True))
+
+
+@pytest.mark.parametrize(("name", "h"), FAILING)
+def test_a_failing_step_is_an_exception_and_keeps_the_state(name, h, failures):
+    found, at, numpy = failures[name], setting(compiled(name)), solver(compiled(name), "numpy")
+    with pytest.raises(phigen.StepError) as expected:
+        numpy.integrate(at.x, h, 50, **at.parameters)
+    assert found["done"]["name"] == "StepError"
+    assert found["done"]["status"] == expected.value.status
+    assert found["done"]["steps"] == found["steps"] == expected.value.step
+    if found["steps"] == 0:
+        assert found["x"] == list(at.x)
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        ({"x0": [1, 2]}, "x0 must be 3 finite numbers"),
+        ({}, "x0 must be 3 finite numbers"),
+        ({"x0": [1, 2, "a"]}, "x0 must be 3 finite numbers"),
+        ({"x0": [1, 2, 3], "params": {"J": 1}}, "there is no parameter J"),
+        ({"x0": [1, 2, 3], "params": {"toString": 1}}, "there is no parameter toString"),
+        ({"x0": [1, 2, 3], "params": {"I1": "2"}}, "the parameter I1 is 2"),
+        ({"x0": [1, 2, 3], "params": {"I1": -1}}, "the parameter I1 is -1"),
+        ({"x0": [1, 2, 3], "params": {"I1": 1e-320}}, "no step can be made with these parameters"),
+    ],
+)
+def test_bad_arguments_are_told(options, said, tmp_path):
+    (found,) = node(tmp_path, [(compiled("rigid_body"), options, 0.1, 1)])
+    assert found["isStepError"]
+    assert found["made"]["status"] == "BAD_ARGUMENT"
+    assert said in found["made"]["message"]
+
+
+@pytest.mark.parametrize(("h", "steps"), [("NaN", 1), (0.1, -1), (0.1, 1.5)])
+def test_bad_steps_are_told(h, steps, tmp_path):
+    (found,) = node(tmp_path, [(compiled("rigid_body"), {"x0": [1, 1, 1]}, h, steps)])
+    assert found["done"]["status"] == "BAD_ARGUMENT"
+    assert found["x"] == [1, 1, 1]
+
+
+def test_names_of_the_user_may_be_words_of_javascript(tmp_path):
+    names = ["class", "Math", "arguments"]
+    pi = [[0, f"-{names[2]}", names[1]], [names[2], 0, f"-{names[0]}"], [f"-{names[1]}", names[0], 0]]
+    text = f"coordinates: {json.dumps(names)}\nparameters: {{__proto__: 2, constructor: 3, Solver: 1, NaN: 2}}\n"
+    text += f"poisson: {{matrix: {json.dumps(pi)}}}\norder: 4\nhamiltonian: "
+    text += "class**2/__proto__ + Math**2/constructor + Solver*arguments**4/NaN\n"
+    compilation = compile_text(text)
+    (found,) = node(tmp_path, [(compilation, {"x0": [1, 0.5, -0.25], "params": {"NaN": 4}}, 0.1, 5)])
+    expected = solver(compilation, "numpy").integrate([1, 0.5, -0.25], 0.1, 5, NaN=4)
+    assert apart(found["x"], expected.x[-1]) < 1e-14
+
+
+@pytest.mark.parametrize("path", RUNTIME, ids=lambda path: path.name)
+def test_the_runtime_is_javascript_as_it_lies_there(path):
+    done = subprocess.run([tool("node"), "--check", str(path)], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert max(map(len, path.read_text(encoding="utf-8").splitlines())) <= 110
+
+
+def test_modules_that_meet_declare_no_name_twice():
+    declared = {
+        path.stem: set(re.findall(r"^(?:export )?(?:const|function|class) (\w+)", path.read_text(), re.MULTILINE))
+        for path in RUNTIME
+    }
+    for step in ("newton", "path", "explicit", "splitting"):
+        met = [step, "solver", "gauge", "guess", "algebra", "taylor"]
+        every = [name for module in met for name in declared[module]]
+        assert len(every) == len(set(every)), sorted(n for n in set(every) if every.count(n) > 1)
+
+
+def test_parts_are_left_out_by_lines_in_comments():
+    text = (
+        "a\n// #if X\nb\n  // #if Y\n  c\n  // #else\n  d\n  // #endif\n// #endif\n/**\n * #if Y\n * e\n * #endif\n */"
+    )
+    assert resolved(text, {"X": True, "Y": False}) == ["a", "b", "  d", "/**", " */"]
+    assert resolved(text, {"X": False, "Y": True}) == ["a", "/**", " * e", " */"]
+    with pytest.raises(KeyError):
+        resolved(text, {"X": True})
+
+
+def test_edits_are_noticed():
+    (text,) = emit(compiled("rigid_body").program, "js", COMMAND).values()
+    assert not is_edited(text)
+    assert is_edited(text.replace("const DIM = 3", "const DIM = 4"))
+
+
+def test_the_example_of_the_documentation_prints_what_it_says(tmp_path):
+    root = resources.bundled_specs().parent
+    text = (root / "docs" / "javascript.md").read_text(encoding="utf-8")
+    code, printed = (re.search(rf"```{kind}\n(.*?)```", text, re.DOTALL)[1] for kind in ("js", "text"))
+    (tmp_path / "turn.mjs").write_text(code, encoding="utf-8")
+    copy(root / "generated" / "rigid_body" / "rigid_body.mjs", tmp_path)
+    done = subprocess.run([tool("node"), "turn.mjs"], cwd=tmp_path, capture_output=True, text=True, check=True)
+    assert done.stdout == printed
