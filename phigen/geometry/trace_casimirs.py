@@ -12,7 +12,7 @@ from phigen.symbolic.tower import Poly, Tower
 
 #: Powers are expanded; beyond this size of matrix they are not worth it.
 _LARGEST = 8
-_MOST_TERMS = 300
+_MOST_TERMS, _MOST_PRODUCTS = 300, 100_000
 
 
 def trace_casimirs(coordinates: Sequence[str], representation: Representation) -> Iterator[Expression]:
@@ -31,18 +31,22 @@ def trace_casimirs(coordinates: Sequence[str], representation: Representation) -
     span = Span(field, form)
     if span.dependent:
         return
-    tower = Tower(coordinates)
+    tower, n = Tower(coordinates), range(representation.size)
     element = _dual_element(tower, field, coordinates, matrices, span, representation.size)
-    power = element
+    powers = [[[tower.constant(int(i == j)) for j in n] for i in n], element]
     for m in range(1, representation.size + 1):
-        trace = tower.combine(power[i][i] for i in range(representation.size))
+        if m > 2 and m % 2:
+            powers.append(_times(tower, powers[-1], element))
+        # tr X^m from the powers of half its exponent, which have far fewer terms than X^(m-1).
+        pairs = [(powers[m // 2][i][j], powers[m - m // 2][j][i]) for i in n for j in n]
+        if sum(len(a) * len(b) for a, b in pairs) > _MOST_PRODUCTS:
+            return
+        trace = tower.combine(a * b for a, b in pairs)
         if len(trace) > _MOST_TERMS:
             return
         if trace != 0:
             integers = coprime_integers(dict(enumerate(trace.coeffs())))
             yield tower.expression(trace * (integers[0] / trace.leading_coefficient()))
-        if m < representation.size:
-            power = _times(tower, power, element)
 
 
 def _trace(field: Field, a: dict[tuple[int, int], Scalar], b: dict[tuple[int, int], Scalar]) -> Scalar:

@@ -45,7 +45,7 @@ class Collected:
 
 def collect(tower: Tower, elements: Sequence[Poly], coordinates: Sequence[str]) -> tuple[Collected, list[Terms]]:
     """Elements of a tower as collected polynomials, with the ring that differentiates them."""
-    state = [i for i in range(len(tower.names)) if tower.depends_on(tower.gens[i], coordinates)]
+    state = _state(tower, coordinates)
     static = [i for i in range(len(tower.names)) if i not in state]
     values = [symbol(n) for n in tower.symbols] + [g.expression for g in tower.generators]
 
@@ -58,3 +58,20 @@ def collect(tower: Tower, elements: Sequence[Poly], coordinates: Sequence[str]) 
 
     slopes = tuple(tuple(terms(tower.derivative(tower.gens[i], c)) for c in coordinates) for i in state)
     return Collected(tuple(values[i] for i in state), slopes), [terms(e) for e in elements]
+
+
+def exceeds(tower: Tower, elements: Sequence[Poly], coordinates: Sequence[str], most: int) -> bool:
+    """Whether the elements, collected, have more than so many monomials together: much faster than to collect them."""
+    state, count = _state(tower, coordinates), 0
+    if sum(map(len, elements)) <= most:
+        return False
+    for element in elements:
+        count += len({tuple(m[i] for i in state) for m in element.monoms()})
+        if count > most:
+            return True
+    return False
+
+
+def _state(tower: Tower, coordinates: Sequence[str]) -> list[int]:
+    """The variables of the ring that depend on the coordinates."""
+    return [i for i in range(len(tower.names)) if tower.depends_on(tower.gens[i], coordinates)]

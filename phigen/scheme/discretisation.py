@@ -14,12 +14,13 @@ from phigen.scheme.composition import find, orders
 from phigen.scheme.generating import GeneratingFunction, collected_form, graph_form
 from phigen.scheme.order import Order
 from phigen.series.hamilton_jacobi import HamiltonJacobi
+from phigen.spec import limits
 from phigen.spec.names import FLOW_COMPOSITIONS
 from phigen.symbolic.expression import Expression
 from phigen.symbolic.symbols import STEP
 
-#: Most operations in one kernel; about 5 MB of C and a minute of compilation.
-MOST_OPERATIONS = 100_000
+#: Most operations in one kernel.
+MOST_OPERATIONS = limits.OPERATIONS
 
 #: Below this cost of gradient and Hessian no composition is considered.
 COMPOSE_ABOVE = 2_000

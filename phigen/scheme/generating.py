@@ -13,10 +13,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
-from phigen.scheme.collected import collect
+from phigen.scheme.collected import collect, exceeds
 from phigen.scheme.lowering import cost
 from phigen.scheme.staging import Coefficients
-from phigen.series.hamilton_jacobi import PolynomialSeries
+from phigen.series.hamilton_jacobi import MOST_SLOPES, PolynomialSeries
 from phigen.symbolic.expression import Expression, derivatives, gradient, symbol, total
 from phigen.symbolic.symbols import STEP
 
@@ -49,7 +49,8 @@ def collected_form(
 ) -> list[GeneratingFunction]:
     """The collected gradient, with the Hessian collected entry by entry, and with the Hessian by differentiation.
 
-    Empty if even a gradient of one operation per term would cost more than ``worth``.
+    Empty if even a gradient of one operation per term would cost more than ``worth``. Raises `OverflowError` if it
+    is too large to be counted.
     """
     tower, n = series.tower, len(coordinates)
     h = tower.variable(STEP)
@@ -57,10 +58,11 @@ def collected_form(
     worth = max(worth, 200)
     if len(s) > 10 * worth:  # many terms may share a monomial in the coordinates, but not that many
         return []
+    slopes = [tower.derivative(s, c) for c in coordinates]
+    if exceeds(tower, slopes, coordinates, min(worth, MOST_SLOPES)):
+        return []
     ring, (terms,) = collect(tower, [s], coordinates)
     first = [ring.derivative(terms, j) for j in range(n)]
-    if sum(len(g) for g in first) > worth:
-        return []
     found = []
     for entrywise in (True, False):
         table = Coefficients(static)

@@ -14,8 +14,11 @@ from collections.abc import Callable, Sequence, Sized
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
+from math import log
 from typing import Any
 
+from phigen import progress
+from phigen.spec import limits
 from phigen.symbolic.expression import ZERO, Expression, gradient, substitute
 from phigen.symbolic.symbols import momentum
 from phigen.symbolic.taylor import ExpressionRing, Taylor, closure
@@ -23,6 +26,12 @@ from phigen.symbolic.tower import Poly, Tower
 
 #: A term S_i with more monomials than this ends the recursion: the next would take minutes.
 MOST_TERMS = 50_000
+
+#: A gradient ∇S_i with more monomials is of no use: with the Hessian it takes 4.3 to 10 operations for each, measured.
+MOST_SLOPES = limits.OPERATIONS // 4
+
+#: From S_i on, i at least this, the size of later terms is foreseen: it grows like a power of i, which is measured.
+FORESEEN = 7
 
 
 @dataclass(frozen=True)
@@ -157,22 +166,37 @@ class _Recursion:
         self._zero = ring.constant(0)
         self._found: list[Any] = []
         self._overflow: OverflowError | None = None
+        self._sizes: dict[int, int] = {}  # i → monomials of ∇S_i
 
     def first(self, terms: int) -> tuple[Any, ...]:
         """S_1 … S_terms. An `OverflowError` is final: what is asked for beyond the last good term raises it again."""
         while len(self._found) < terms:
             if self._overflow:
                 raise self._overflow
+            self._expect_small(terms)
             try:
-                self._found.append(self._next())
+                with progress.stage(f"S_{len(self._found) + 1}"):
+                    self._found.append(self._next())
             except OverflowError as error:
                 self._overflow = error
         return tuple(self._found[:terms])
+
+    def _expect_small(self, terms: int) -> None:
+        """Raise `OverflowError` if the sizes so far say that ∇S_terms will be of no use."""
+        *_, before, last = [0, 0, *self._sizes]
+        if last < FORESEEN or before == 0:
+            return
+        growth = log(self._sizes[last] / self._sizes[before]) / log(last / before)
+        size = self._sizes[last] * (terms / last) ** growth
+        if size > MOST_SLOPES:
+            raise OverflowError(f"the gradient of S_{terms} would have about {size:.0f} terms")
 
     def _next(self) -> Any:
         i, even = len(self._found), self._symmetric and len(self._found) % 2 == 1
         moves = i > 0 and not (self._symmetric and i % 2 == 0)
         slopes = self._slope(self._found[-1]) if moves else [self._zero] * len(self._momenta)
+        if moves and self.ring.bytes_per_term:
+            self._sizes[i] = max(1, sum(map(len, slopes)))
         self._taylor.advance(dict(zip(self._momenta, slopes, strict=True)))
         if i and isinstance(self._found[-1], Sized) and len(self._found[-1]) > MOST_TERMS:
             raise OverflowError(f"S_{i} has {len(self._found[-1])} terms")

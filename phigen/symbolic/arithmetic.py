@@ -12,7 +12,7 @@ T = TypeVar("T")
 
 
 class Arithmetic(Generic[T]):
-    """A kind of values that expressions may have; ``+``, ``-`` and ``*`` are those of the values themselves."""
+    """A kind of values that expressions may have; ``+`` and ``-`` are those of the values themselves."""
 
     def constant(self, value: Fraction) -> T:
         """A rational number as a value."""
@@ -21,6 +21,10 @@ class Arithmetic(Generic[T]):
     def variable(self, name: str) -> T:
         """The value of a symbol."""
         raise NotImplementedError
+
+    def product(self, a: T, b: T) -> T:
+        """a·b."""
+        return a * b  # type: ignore[operator, no-any-return]
 
     def power(self, base: T, exponent: Fraction) -> T:
         """A value to a rational power."""
@@ -44,7 +48,7 @@ class Arithmetic(Generic[T]):
             case "neg":
                 return -args[0]  # type: ignore[no-any-return]
             case "mul":
-                return args[0] * args[1]  # type: ignore[no-any-return]
+                return self.product(args[0], args[1])
             case "pow":
                 return self.power(args[0], node.value)
         return self.function(node.op, args)

@@ -9,7 +9,7 @@ Hamilton–Jacobi recursion compute each coefficient once.
 
 from __future__ import annotations
 
-from collections.abc import Sequence, Sized
+from collections.abc import Sequence
 from fractions import Fraction
 from typing import Any, Protocol
 
@@ -29,12 +29,19 @@ from phigen.symbolic.expression import (
 )
 from phigen.symbolic.special import SPECIAL, coefficient, order_of
 
-#: Terms of two polynomials that are still multiplied, as a product of counts: tenths of a second.
-MOST_PRODUCTS = 1_000_000
+#: Memory of all products that a series is made of, in bytes; beyond, it is refused.
+MOST_BYTES = 300 * 2**20
 
 
 class Ring(Protocol):
-    """What a ring of coefficients offers besides + − *."""
+    """What a ring of coefficients offers besides + and −."""
+
+    @property
+    def bytes_per_term(self) -> int:
+        """Memory of one term of an element that has a length; 0 where elements do not grow."""
+
+    def product(self, a: Any, b: Any) -> Any:
+        """a·b; raises `OverflowError` where that may be larger than memory."""
 
     def constant(self, value: int | Fraction) -> Any:
         """A rational number as an element."""
@@ -57,6 +64,12 @@ class Ring(Protocol):
 
 class ExpressionRing(Arithmetic[Expression]):
     """The ring of expression graphs: no expansion, sub-expressions shared."""
+
+    bytes_per_term = 0
+
+    def product(self, a: Expression, b: Expression) -> Expression:
+        """A product node."""
+        return a * b
 
     def constant(self, value: int | Fraction) -> Expression:
         """A literal number."""
@@ -101,15 +114,11 @@ def _by_derivative(e: Expression) -> bool:
     return bool(e.args) and e.op not in ("add", "sub", "neg", "mul", "pow", *SPECIAL)
 
 
-def product(a: Any, b: Any) -> Any:
-    """a·b. Raises `OverflowError` rather than multiply polynomials with too many terms for memory."""
-    if isinstance(a, Sized) and isinstance(b, Sized) and len(a) * len(b) > MOST_PRODUCTS:
-        raise OverflowError(f"a product of polynomials with {len(a)} and {len(b)} terms")
-    return a * b
-
-
 class Taylor:
-    """Series in t of the nodes of some expressions; ``series[id(node)]`` lists the coefficients so far."""
+    """Series in t of the nodes of some expressions; ``series[id(node)]`` lists the coefficients so far.
+
+    Polynomials that become too large, one of them or all together, raise `OverflowError`.
+    """
 
     def __init__(self, roots: Sequence[Expression], ring: Ring, variable_symbols: Sequence[str]) -> None:
         self.ring = ring
@@ -118,6 +127,7 @@ class Taylor:
         self.series: dict[int, list[Any]] = {id(e): [] for e in self.order}
         self._zero = ring.constant(0)
         self._powers: dict[int, list[list[Any]]] = {}
+        self._bytes = 0
 
     def coefficients(self, e: Expression) -> list[Any]:
         """The coefficients of a node, as far as they are known."""
@@ -128,6 +138,14 @@ class Taylor:
         for e in self.order:
             own = self.series[id(e)]
             own.append(self._coefficient(e, len(own), inputs))
+
+    def _product(self, a: Any, b: Any) -> Any:
+        found = self.ring.product(a, b)
+        if self.ring.bytes_per_term:
+            self._bytes += len(found) * self.ring.bytes_per_term
+            if self._bytes > MOST_BYTES:
+                raise OverflowError("a series of polynomials with too many terms")
+        return found
 
     def _coefficient(self, e: Expression, i: int, inputs: dict[str, Any]) -> Any:
         if not e.args:
@@ -158,9 +176,11 @@ class Taylor:
     def _convolve(self, a: list[Any], b: list[Any], i: int) -> Any:
         zero = self.ring.vanishes
         if a is b:
-            pairs = [product(a[j], a[i - j]) * self.ring.constant(2) for j in range((i + 1) // 2) if not zero(a[j])]
-            return self.ring.combine(pairs + ([product(a[i // 2], a[i // 2])] if i % 2 == 0 else []))
-        return self.ring.combine([product(a[j], b[i - j]) for j in range(i + 1) if not (zero(a[j]) or zero(b[i - j]))])
+            two, present = self.ring.constant(2), (j for j in range((i + 1) // 2) if not zero(a[j]))
+            pairs = [self._product(a[j], a[i - j]) * two for j in present]
+            return self.ring.combine(pairs + ([self._product(a[i // 2], a[i // 2])] if i % 2 == 0 else []))
+        present = (j for j in range(i + 1) if not (zero(a[j]) or zero(b[i - j])))
+        return self.ring.combine([self._product(a[j], b[i - j]) for j in present])
 
     def _power(self, e: Expression, a: list[Any], i: int) -> Any:
         exponent: Fraction = e.value
@@ -171,7 +191,7 @@ class Taylor:
         # c = a**r satisfies a·c' = r·a'·c.
         own, zero = self.series[id(e)], self.ring.vanishes
         terms = [
-            product(a[j], own[i - j]) * self.ring.constant((exponent * j - (i - j)) / i)
+            self._product(a[j], own[i - j]) * self.ring.constant((exponent * j - (i - j)) / i)
             for j in range(1, i + 1)
             if not (zero(a[j]) or zero(own[i - j]))
         ]
@@ -197,7 +217,7 @@ class Taylor:
         for partial, a in zip(partials(e), args, strict=True):
             d = self.series[id(partial)]
             terms += [
-                product(a[j], d[i - j]) * self.ring.constant(Fraction(j, i))
+                self._product(a[j], d[i - j]) * self.ring.constant(Fraction(j, i))
                 for j in range(1, i + 1)
                 if not (zero(a[j]) or zero(d[i - j]))
             ]

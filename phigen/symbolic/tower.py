@@ -8,6 +8,7 @@ relations (r·f = 1, w² = q, sin² + cos² = 1 …); `Tower.is_zero` eliminates
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
@@ -22,6 +23,9 @@ from phigen.symbolic.functions import FUNCTIONS
 from phigen.symbolic.horner import horner
 from phigen.symbolic.special import SPECIAL, coefficient, order_of
 from phigen.symbolic.symbols import Symbol
+
+#: A product or a power of polynomials that may have more terms, or take more memory, is refused: tenths of a second.
+MOST_TERMS, MOST_BYTES = 1_000_000, 128 * 2**20
 
 #: An element of a tower: ``flint.fmpq_mpoly``. Elements of different towers do not mix.
 Poly = Any
@@ -216,18 +220,39 @@ class Tower(Arithmetic[Poly]):
             return slope
         return (phi**2 - 5 * slope + 2 * s * phi * slope) * inverse
 
+    @property
+    def bytes_per_term(self) -> int:
+        """Memory of one term of an element, measured while products are made and added."""
+        return 60 + 3 * len(self.names)
+
+    def product(self, a: Poly, b: Poly) -> Poly:
+        """a·b. Raises `OverflowError` rather than make one that may be larger than memory."""
+        self._expect_room(len(a) * len(b))
+        return a * b
+
+    def integer_power(self, base: Poly, n: int) -> Poly:
+        """base ** n for n ≥ 0. Raises `OverflowError` as `product`."""
+        if n > 1 and len(base) > 1:
+            dense = math.prod(n * int(d) + 1 for d in base.degrees())
+            self._expect_room(min(math.comb(len(base) + n - 1, n), dense))
+        return base**n
+
+    def _expect_room(self, terms: int) -> None:
+        if terms > MOST_TERMS or terms * self.bytes_per_term > MOST_BYTES:
+            raise OverflowError(f"a polynomial of up to {terms} terms")
+
     def power(self, base: Poly, exponent: Fraction | int) -> Poly:
-        """base ** exponent for a rational exponent."""
+        """base ** exponent for a rational exponent. Raises `OverflowError` as `product`."""
         base, exponent = self.cancelled(base), Fraction(exponent)
         if exponent.denominator == 1:
             n = int(exponent)
-            return base**n if n >= 0 else self._reciprocal(base) ** (-n)
+            return self.integer_power(base, n) if n >= 0 else self._reciprocal(base) ** (-n)
         if base.is_constant() and (root := _rational_root(base, exponent.denominator)) is not None:
             return self.constant(root**exponent.numerator)
         n, k = exponent.denominator, exponent.numerator
         if k < 0:
             return self._generator("root", [base], n, True) ** (-k)
-        return base ** (k // n) * self._generator("root", [base], n, False) ** (k % n)
+        return self.integer_power(base, k // n) * self._generator("root", [base], n, False) ** (k % n)
 
     def inverse(self, base: Poly) -> Poly | None:
         """1/base, if the tower has it."""
@@ -287,7 +312,7 @@ class Tower(Arithmetic[Poly]):
             if chain != 0:
                 partial = element.derivative(self._index[g.name])
                 if partial != 0:
-                    result += partial * chain
+                    result += self.product(partial, chain)
         return self.cancelled(result)
 
     def depends_on(self, element: Poly, names: Iterable[str]) -> bool:
@@ -412,16 +437,11 @@ class Tower(Arithmetic[Poly]):
         pairs = [(i, j) for i, j in self._inverse_pairs() if degrees[i] and degrees[j]]
         if not pairs:
             return element
-        terms: dict[tuple[int, ...], Any] = {}
-        for m, c in element.to_dict().items():
-            exponents = [int(e) for e in m]
-            for i, j in pairs:
-                common = min(exponents[i], exponents[j])
-                exponents[i] -= common
-                exponents[j] -= common
-            key = tuple(exponents)
-            terms[key] = terms[key] + c if key in terms else c
-        return self.context.from_dict({m: c for m, c in terms.items() if c != 0})
+        for i, j in pairs:
+            one = self.gens[i] * self.gens[j]
+            for k in reversed(range(min(int(degrees[i]), int(degrees[j])).bit_length())):
+                _, element = divmod(element, one ** (2**k) - 1)
+        return element
 
     def _inverse_pairs(self) -> list[tuple[int, int]]:
         """Indices of ring variables whose product is 1."""

@@ -1,0 +1,29 @@
+"""The differential ring: what it refuses to multiply, and how it cancels."""
+
+import pytest
+
+from phigen.symbolic.expression import call, power, symbol, total
+from phigen.symbolic.tower import Tower
+
+NAMES = [f"x{i}" for i in range(10)]
+
+
+def test_powers_and_products_larger_than_memory_are_refused_before_they_are_made():
+    ring = Tower(NAMES)
+    every = ring.convert(total(map(symbol, NAMES)))
+    with pytest.raises(OverflowError):
+        ring.integer_power(every, 60)
+    large = ring.integer_power(every, 6)
+    with pytest.raises(OverflowError):
+        ring.product(large, large)
+    one = ring.integer_power(ring.convert(symbol("x0") + 1), 1000)
+    assert len(one) == 1001
+
+
+@pytest.mark.parametrize(("up", "down", "left"), [(1, 1, 0), (5, 3, 2), (3, 5, -2), (37, 100, -63)])
+def test_a_variable_and_its_reciprocal_cancel(up, down, left):
+    x = symbol("x0")
+    ring = Tower(NAMES, [1 / x, call("exp", x)])
+    v, w = ring.convert(x), ring.convert(1 / x)
+    rest = ring.convert(call("exp", x))
+    assert ring.cancelled(v**up * w**down * rest + w) == ring.convert(power(x, left)) * rest + w

@@ -1,0 +1,83 @@
+"""Specs that could exhaust the compiler are compiled or refused in seconds and in little memory."""
+
+import json
+import os
+import resource
+
+import pytest
+
+from phigen.analysis.proof import compile_proved
+from phigen.errors import PhigenError
+from phigen.spec import loads
+
+#: What a refusal may take, and the memory that stops a test.
+SECONDS, CEILING = 5, 2**31
+
+
+def names(count):
+    return [f"x{i}" for i in range(1, count + 1)]
+
+
+def spec(coordinates, poisson, hamiltonian, order=4):
+    return f"""\
+phigen: 1
+name: large
+coordinates: [{", ".join(coordinates)}]
+poisson: {{{poisson}}}
+hamiltonian: {hamiltonian}
+order: {order}
+"""
+
+
+def algebra(name, dimension):
+    return spec(names(dimension), f"lie_algebra: {{name: {name}}}", "x1**2")
+
+
+PLANE = (["x", "y"], "canonical: {q: [x], p: [y]}")
+
+
+def compiled_in_a_child(text):
+    """What compiling says, and the seconds of processor time and megabytes it took."""
+    receiver, sender = os.pipe()
+    child = os.fork()
+    if not child:
+        resource.setrlimit(resource.RLIMIT_CPU, (4 * SECONDS, 4 * SECONDS))
+        resource.setrlimit(resource.RLIMIT_AS, (CEILING, CEILING))
+        before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+        try:
+            compile_proved(loads(text))
+            said = "compiled"
+        except PhigenError as error:
+            said = f"{error.exit_code}: {error}"
+        more = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before
+        os.write(sender, json.dumps([said, more / 1024]).encode())
+        os._exit(0)
+    os.close(sender)
+    with os.fdopen(receiver) as report:
+        found = report.read()
+    _, status, usage = os.wait4(child, 0)
+    assert found, f"the child ended with {os.waitstatus_to_exitcode(status)}"
+    said, megabytes = json.loads(found)
+    return said, usage.ru_utime + usage.ru_stime, megabytes
+
+
+@pytest.mark.parametrize(
+    ("text", "said", "most"),
+    [
+        pytest.param(
+            spec(*PLANE, "(x**2 + y**2 + 1)**0.37*sin(x*y)/(1 + x**4)", order=16), "3: ", 100, id="an order too high"
+        ),
+        pytest.param(
+            spec(*PLANE, "exp(sin(x*y))*log(2 + cos(x)*y**2) + sqrt(1 + x**2)", order=8),
+            "compiled",
+            200,
+            id="an order that only a composition reaches",
+        ),
+        pytest.param(algebra("so(7)", 21), "compiled", 50, id="Casimirs with very many terms"),
+    ],
+)
+def test_every_stage_estimates_before_it_works(text, said, most):
+    found, seconds, megabytes = compiled_in_a_child(text)
+    assert found.startswith(said)
+    assert seconds < SECONDS
+    assert megabytes < most
