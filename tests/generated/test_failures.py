@@ -190,7 +190,7 @@ def test_parameters_that_give_no_steps_are_told_in_python(name, target):
 
 def test_a_gauge_and_its_solver_may_be_arguments_of_their_own_start():
     raw, size = RawC(kind("gauged")), ctypes.sizeof(ctypes.c_double)
-    x0, after = [0.3, 0.4, 0.5], 2 * 3 * size + raw.counters.nbytes
+    x0, after = [0.3, 0.4, 0.5], 2 * 3 * size + raw.counters.nbytes + 2 * size  # behind x, carry, the counters, t, h
     assert raw.init(x0) == STATUSES["OK"]
     gauge = raw.memory[after + 2 * size :][:size].view(np.float64)
     gauge[0] = 0.25
