@@ -10,13 +10,15 @@ seconds it took. `Gauged` holds the Hamilton–Jacobi series, which is computed 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, TypeVar
 
 from phigen import progress, registry
 from phigen import spec as specs
+from phigen.errors import LimitError
 from phigen.geometry.system import System, system_from_spec
 from phigen.realisations.catalogue import realise
 from phigen.realisations.protocol import BiRealisation
@@ -84,6 +86,16 @@ class Compilation:
         return self.gauged.series
 
 
+@contextmanager
+def bounded(spec: Spec) -> Iterator[None]:
+    """Polynomials that would be larger than memory are a `LimitError` of the spec."""
+    try:
+        yield
+    except OverflowError as error:
+        hint = "fewer terms, lower powers or a lower order; scheme: splitting needs no series"
+        raise LimitError([spec.diagnostic(("hamiltonian",), f"the spec needs {error}", hint)]) from error
+
+
 def compile_spec(
     spec: Spec,
     *,
@@ -97,6 +109,13 @@ def compile_spec(
     ``system`` is its system, where the caller has built it already. Raises `SpecError` (no bi-realisation applies, H
     does not split, …) and `LimitError` (the program would be too large).
     """
+    with bounded(spec):
+        return _compiled(spec, order, scheme, system, extras)
+
+
+def _compiled(
+    spec: Spec, order: int | None, scheme: str | None, system: System | None, extras: Extras | None
+) -> Compilation:
     clock = _Clock()
     source = system or clock.timed("system", lambda: system_from_spec(spec))
     extras = extras or spec.extras

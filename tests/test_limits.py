@@ -33,6 +33,7 @@ def algebra(name, dimension):
     return spec(names(dimension), f"lie_algebra: {{name: {name}}}", "x1**2")
 
 
+SPACE = (names(10), "canonical: {q: [x1, x2, x3, x4, x5], p: [x6, x7, x8, x9, x10]}")
 PLANE = (["x", "y"], "canonical: {q: [x], p: [y]}")
 
 
@@ -73,6 +74,17 @@ def compiled_in_a_child(text):
             200,
             id="an order that only a composition reaches",
         ),
+        pytest.param(
+            spec(*SPACE, f"({'+'.join(names(10))})**60"), "compiled", 200, id="a power that cannot be expanded"
+        ),
+        pytest.param(
+            spec(names(15), "lie_algebra: {name: so(6)}", "x1**2")
+            + f"casimirs: {{C: ({'+'.join(f'{x}**2' for x in names(15))})**12}}\n",
+            "compiled",
+            200,
+            id="a Casimir that cannot be expanded",
+        ),
+        pytest.param(algebra("so(8)", 28), "compiled", 200, id="an algebra whose adjoint traces mislead"),
         pytest.param(algebra("so(7)", 21), "compiled", 50, id="Casimirs with very many terms"),
     ],
 )

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 
 from phigen import progress
-from phigen.compiler import Compilation, compile_spec
+from phigen.compiler import Compilation, bounded, compile_spec
 from phigen.errors import CheckError, Diagnostic, LimitError, SpecError
 from phigen.geometry import checks
 from phigen.geometry.jacobi import jacobi_identity
@@ -84,7 +84,7 @@ def examine(
 
     Raises `SpecError` if the spec does not even define a system.
     """
-    with progress.stage(spec.name) as whole:
+    with bounded(spec), progress.stage(spec.name) as whole:
         try:
             with progress.stage("system") as building:
                 system = system or system_from_spec(spec)

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from itertools import combinations
 
+from phigen import progress
 from phigen.geometry.system import System
 from phigen.symbolic.expression import symbols_of
 from phigen.symbolic.tower import Poly, Tower
@@ -27,19 +27,23 @@ def jacobi_identity(system: System) -> Statement:
 
 
 def _residuals(system: System, tower: Tower) -> Iterator[tuple[str, Poly]]:
+    """The cyclic sums that are not 0, from the products that are not 0: few in large structures."""
     names = system.coordinates
     n = range(len(names))
     images = iter(tower.convert_all([e for row in system.poisson for e in row]))
-    pi = [[next(images) for _ in n] for _ in n]
-    # Sparse: the derivatives ∂_a π_ij that are not zero, as a → element.
-    slopes = {
-        (i, j): {a: d for a in n if (d := tower.derivative(pi[i][j], names[a])) != 0} for i in n for j in n if i != j
-    }
-    for i, j, k in combinations(n, 3):
-        residual = tower.zero
-        for first, second, third in ((i, j, k), (j, k, i), (k, i, j)):
-            for a, slope in slopes[first, second].items():
-                if pi[a][third] != 0:
-                    residual = residual + slope * pi[a][third]
+    rows: list[dict[int, Poly]] = [{j: image for j in n if (image := next(images)) != 0} for _ in n]
+    index = {name: i for i, name in enumerate(names)}
+    sums: dict[tuple[int, int, int], Poly] = {}
+    with progress.stage("Jacobi identity", len(names)) as running:
+        for i, row in enumerate(rows):
+            running.done = i
+            for j, entry in row.items():
+                for a in sorted(index[s] for s in tower.names_in(entry) if s in index):
+                    slope = tower.derivative(entry, names[a])
+                    for k, other in rows[a].items() if slope != 0 else ():
+                        if k not in (i, j) and (i < j < k or j < k < i or k < i < j):  # one of the cyclic order
+                            at = (min(i, j, k), i + j + k - min(i, j, k) - max(i, j, k), max(i, j, k))
+                            sums[at] = sums.get(at, tower.zero) + tower.product(slope, other)
+    for (i, j, k), residual in sorted(sums.items(), key=lambda item: item[0]):
         if residual != 0:
             yield f"({names[i]}, {names[j]}, {names[k]})", residual

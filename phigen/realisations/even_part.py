@@ -15,16 +15,21 @@ from the structure constants: if −s is the only non-zero eigenvalue of N, of m
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from fractions import Fraction
+
+from flint import fmpq, fmpq_mat
 
 from phigen.geometry.ideals import applied, ideal_projections
 from phigen.geometry.lie_algebra import LieAlgebra
 from phigen.geometry.representations import indecomposable_parts, restricted
 from phigen.symbolic.expression import ZERO, Expression, call, number, substitute, symbol, symbols_of, total
+from phigen.symbolic.numeric import DomainError, evaluate_exactly
 from phigen.symbolic.special import coefficient
 from phigen.symbolic.symbols import plain
 from phigen.symbolic.tower import Poly, Tower
+from phigen.symbolic.verdict import sample_point
 
 #: Most terms of one component of M^k x in p and x that are worth looking at.
 MOST_TERMS = 20_000
@@ -119,6 +124,8 @@ def _closed(algebra: LieAlgebra, x: Vector, p: Vector) -> EvenPart | None:
 def _root(tower: Tower, matrix: Sequence[Vector]) -> Poly | None:
     """The s for which 0 and −s can be the only eigenvalues of M²; None if there is none."""
     n = range(len(matrix))
+    if not _may_have_root(matrix):
+        return None
     flat = tower.convert_all([m for row in matrix for m in row])
     m = [flat[i * len(matrix) : (i + 1) * len(matrix)] for i in n]
     square = [[tower.combine(m[i][k] * m[k][j] for k in n if m[i][k] != 0 and m[k][j] != 0) for j in n] for i in n]
@@ -128,6 +135,18 @@ def _root(tower: Tower, matrix: Sequence[Vector]) -> Poly | None:
         if tower.is_zero(of_square * multiplicity - trace * trace):
             return trace * tower.constant(Fraction(-1, multiplicity))
     return None
+
+
+def _may_have_root(matrix: Sequence[Vector]) -> bool:
+    """Whether (tr M²)² is a multiple of tr M⁴ by 1, …, n at a point: symbolic squares of large matrices take long."""
+    flat, n = [e for row in matrix for e in row], len(matrix)
+    try:
+        values = evaluate_exactly(flat, sample_point(symbols_of(*flat), (), 0))
+    except DomainError:
+        return True
+    square = fmpq_mat(n, n, [fmpq(v.numerator, v.denominator) for v in values]) ** 2
+    trace, of_square = (sum(m[i, i] for i in range(n)) for m in (square, square * square))
+    return any(of_square * m == trace * trace for m in range(1, n + 1))
 
 
 def _nilpotent(tower: Tower, matrix: Sequence[Vector], x: Vector) -> EvenPart | None:
@@ -161,6 +180,9 @@ def _semisimple(tower: Tower, matrix: Sequence[Vector], x: Vector, root: Poly) -
 
 
 def _vanish(tower: Tower, vector: Sequence[Expression]) -> bool:
+    with suppress(DomainError):  # at a point first: where it does not vanish, its expansion may be larger than memory
+        if any(evaluate_exactly(vector, sample_point(symbols_of(*vector), (), 0))):
+            return False
     return all(tower.is_zero(v) for v in tower.convert_all(vector))
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
@@ -61,8 +61,11 @@ def decide_zero(
     refutation. ``positive`` names the symbols that take positive values only. ``detail`` is added to a proof.
     """
     listed = [(label, e) for label, e in residuals if not e.is_zero]
-    tower = Tower(symbols_of(*(e for _, e in listed)), [e for _, e in listed])
-    elements = tower.convert_all([e for _, e in listed])
+    try:
+        tower = Tower(symbols_of(*(e for _, e in listed)), [e for _, e in listed])
+        elements = tower.convert_all([e for _, e in listed])
+    except OverflowError:
+        return _at_points(name, listed, lambda k: str(listed[k][1]), positive)
     return decide_elements(
         name, tower, [(label, f) for (label, _), f in zip(listed, elements, strict=True)], positive, detail
     )
@@ -75,15 +78,25 @@ def decide_elements(
     pending = [(label, element) for label, element in residuals if not tower.is_zero(element)]
     if not pending:
         return Statement(name, PROVED, detail)
+    return _at_points(
+        name,
+        [(label, tower.expression(element)) for label, element in pending],
+        lambda k: str(of_polynomial(tower, tower.simplified(pending[k][1]))),
+        positive,
+    )
+
+
+def _at_points(
+    name: str, pending: Sequence[tuple[str, Expression]], shown: Callable[[int], str], positive: Collection[str]
+) -> Statement:
+    """The verdict on residuals that did not reduce to 0, or are too large to be tried: refuted at a point, or not."""
     fewest = POINTS
-    for label, element in pending:
-        expression = tower.expression(element)
+    for k, (label, expression) in enumerate(pending):
         found = _refuting_point(expression, positive)
         if isinstance(found, str):
             where = f"{label}, " if label else ""
             more = f"; {len(pending)} parts do not reduce to 0" if len(pending) > 1 else ""
-            residual = of_polynomial(tower, tower.simplified(element))
-            return Statement(name, REFUTED, f"{where}at {found}{more}", cut(str(residual)))
+            return Statement(name, REFUTED, f"{where}at {found}{more}", cut(shown(k)))
         fewest = min(fewest, found)
     parts = ", ".join(label for label, _ in pending if label)
     about = f" for {parts}" if parts and len(parts) <= LONGEST else ""
