@@ -13,8 +13,8 @@ from fractions import Fraction
 
 import numpy as np
 
-from phigen.analysis import measures
 from phigen.analysis.arrays import Floats, evaluate
+from phigen.analysis.conservation import Unit, units
 from phigen.analysis.methods import Method
 from phigen.compiler import Compilation
 from phigen.errors import LimitError, StepError
@@ -25,7 +25,8 @@ from phigen.symbolic.expression import Expression
 CORRECTIONS, MOST_ORDER = 2, 6
 #: Steps at the largest step size; doublings of the run's step and halvings of the largest one that are tried.
 STEPS, DOUBLINGS, HALVINGS = 16, 8, 6
-#: Changes of H̃ below this are of rounding, and of H above that of steps too large to tell an order.
+#: Changes of H̃ below this part of the terms of H are of rounding; and those of H above that, of steps too large to
+#: tell an order.
 ROUNDING, ASYMPTOTIC = 1e-13, 1e-3
 
 
@@ -37,7 +38,7 @@ class NotOfferedError(ValueError):
 class Modified:
     """The terms of H̃ = Σ h^j terms[j], with values of all symbols but coordinates.
 
-    With m corrections these are the first powers[m] terms. ``hamiltonian`` is H, whose size errors are relative to.
+    With m corrections these are the first powers[m] terms. ``hamiltonian`` is H, whose unit errors are in.
     """
 
     terms: tuple[Expression, ...]
@@ -47,12 +48,16 @@ class Modified:
     values: Mapping[str, float]
 
     def errors(self, rows: Floats, h: float) -> Floats:
-        """|H̃(x_n) − H̃(x_0)| with 0, 1, … corrections along steps of size h, (corrections + 1, rows), relative."""
+        """|H̃(x_n) − H̃(x_0)| with 0, 1, … corrections along steps of size h, (corrections + 1, rows)."""
         values = {**self.values, **{c: rows[:, i] for i, c in enumerate(self.coordinates)}}
         terms = [np.broadcast_to(t, len(rows)) for t in evaluate(list(self.terms), values)]
         sums: Floats = np.array([sum(h**j * t for j, t in enumerate(terms[:power])) for power in self.powers])
-        size = measures.size_of(self.hamiltonian, self.coordinates, values)
-        found: Floats = np.abs(sums - sums[:, :1]) / size
+        found: Floats = np.abs(sums - sums[:, :1]) / self.unit(rows[0]).size
+        return found
+
+    def unit(self, x: Floats) -> Unit:
+        """The unit of the energy along trajectories from a state (DIM,)."""
+        (found,) = units([self.hamiltonian], self.coordinates, self.values, x)
         return found
 
     def changes(self, method: Method, x: Floats, h: float, steps: int) -> Floats:
@@ -99,7 +104,7 @@ def observed_powers(found: Modified, method: Method, x: Floats, h: float) -> lis
 
     Steps are doubled from the run's step ``h`` until the changes stand out from rounding.
     """
-    observed = [math.inf] * len(found.powers)
+    observed, rounding = [math.inf] * len(found.powers), ROUNDING * found.unit(x).terms
     for doubling in range(1, DOUBLINGS + 1):
         step = h * 2**doubling
         try:
@@ -109,10 +114,10 @@ def observed_powers(found: Modified, method: Method, x: Floats, h: float) -> lis
             break
         if doubling > 1 and coarse[0] > ASYMPTOTIC:
             break
-        if fine[0] <= ROUNDING:
+        if fine[0] <= rounding:
             continue  # what a solver conserves exactly tells nothing
         for m, (large, small) in enumerate(zip(coarse.tolist(), fine.tolist(), strict=True)):
-            if math.isinf(observed[m]) and small > ROUNDING:
+            if math.isinf(observed[m]) and small > rounding:
                 observed[m] = math.log2(large / small)
     return observed
 
@@ -140,7 +145,7 @@ def constancy(found: Modified, method: Method, x: Floats, h: float) -> Constancy
 
     Raises `StepError`, and `NotOfferedError` if H itself changes by rounding only.
     """
-    largest, most = h, 0.0
+    largest, most, rounding = h, 0.0, ROUNDING * found.unit(x).terms
     for doubling in range(1, DOUBLINGS + 1):
         try:
             change = float(found.changes(method, x, h * 2**doubling, STEPS)[0])
@@ -149,12 +154,12 @@ def constancy(found: Modified, method: Method, x: Floats, h: float) -> Constancy
         if change > ASYMPTOTIC:
             break
         largest, most = h * 2**doubling, max(most, change)
-    if most <= ROUNDING:
+    if most <= rounding:
         raise NotOfferedError("H itself changes by no more than rounding")
     sizes: Floats = largest / 2.0 ** np.arange(HALVINGS + 1, dtype=np.float64)
     changes = np.array([found.changes(method, x, size, STEPS * 2**k) for k, size in enumerate(sizes.tolist())])
     # The finest step at which even the last correction leaves more than rounding.
-    telling = np.flatnonzero(changes[:, -1] > ROUNDING)
+    telling = np.flatnonzero(changes[:, -1] > rounding)
     shown = float(sizes[telling[-1] if len(telling) else 0])
     rows = method.rows(x, shown, round(STEPS * largest / shown), 1)
     times: Floats = shown * np.arange(len(rows), dtype=np.float64)

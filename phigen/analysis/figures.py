@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 from phigen.analysis.arrays import Floats
 from phigen.analysis.backward import Constancy
+from phigen.analysis.conservation import Unit
 from phigen.analysis.drawing import (
     backward_curves,
     error_curves,
@@ -55,14 +56,14 @@ def trajectory_figure(trajectory: Trajectory, casimirs: Mapping[str, Expression]
 
 
 @styled
-def error_figure(methods: Mapping[str, Trajectory]) -> Figure:
+def error_figure(methods: Mapping[str, Trajectory], units: Mapping[str, Unit] | None = None) -> Figure:
     """The errors of energy and Casimirs against time, of several methods by their labels; one panel per quantity.
 
-    Errors are relative to the initial value unless that is negligible. Of long runs the largest error of each of some
-    hundred windows is drawn. Zeros have a place of their own, marked 0; a cross marks where a method broke down.
+    Errors are in the ``units`` of `phigen.analysis.conservation.units_of`. Of long runs the largest error of each of
+    some hundred windows is drawn. Zeros have a place of their own, marked 0; a cross marks where a method broke down.
     """
     figure = _figure(error_curves.height(methods))
-    error_curves.draw_errors(figure, methods)
+    error_curves.draw_errors(figure, methods, units)
     return figure
 
 
@@ -119,6 +120,7 @@ def run_figure(
     sections: Mapping[str, Floats] | None = None,
     title: str = "",
     spectrum: Spectrum | None = None,
+    units: Mapping[str, Unit] | None = None,
 ) -> Figure:
     """All there is to see of a run on one page.
 
@@ -138,7 +140,7 @@ def run_figure(
         rows[0][1].append(draw_section)  # a single panel leaves room at its side
     elif sections:
         rows.append((_SECTION, [draw_section]))
-    rows.append((error_curves.height(methods), [lambda part: error_curves.draw_errors(part, methods)]))
+    rows.append((error_curves.height(methods), [lambda part: error_curves.draw_errors(part, methods, units)]))
     if spectrum:
         rows.append((exponents.HEIGHT, [lambda part: exponents.draw_exponents(part.add_subplot(), spectrum)]))
     heights = [height for height, _ in rows]

@@ -23,16 +23,23 @@ MEANINGS = (
     ),
     Meaning(
         "Casimir: largest error",
-        "how far a Casimir went from its value at the start, relative to its size, over all steps",
+        "how far a Casimir went from its value at the start, relative to that, over all steps",
         "the step leaves the symplectic leaf, or rounding adds up to a drift; the bound is a random walk of rounding "
-        "errors, 10⁻¹⁵ (20 + √steps)",
+        "errors, 10⁻¹⁵ (20 + √steps) of the largest terms of the Casimir",
     ),
-    Meaning("Casimir: last/first window", "the largest error in the last tenth of the run over that in the first"),
-    Meaning("energy: largest error", "how far H went from its value at the start; it depends on the step"),
+    Meaning(
+        "Casimir: last/first window",
+        "the largest error in the last tenth of the run over that in the first; nothing where errors are of rounding, "
+        "or where the first tenth has not seen every coordinate turn back and forth",
+    ),
+    Meaning(
+        "energy: largest error",
+        "how far H went from its value at the start, relative to that; it depends on the step",
+    ),
     Meaning(
         "energy: last/first window",
-        "the same quotient for the energy: about 1 if it oscillates, 10 if it drifts. It is judged if the error is "
-        "more than rounding, and the orbit stays where it was in the first half",
+        "the same quotient for the energy: about 1 if it oscillates, 10 if it drifts. It is judged if the orbit stays "
+        "where it was in the first half",
         "the solver does not follow the flow of any Hamiltonian near H, or the step is so large that H̃ says nothing",
     ),
     Meaning(

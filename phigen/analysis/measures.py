@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -13,10 +12,6 @@ from phigen.analysis.arrays import Floats, evaluate
 from phigen.analysis.methods import Method, by_differences
 from phigen.errors import StepError
 from phigen.geometry.system import System
-from phigen.symbolic.expression import Expression, gradient
-
-#: Windows of equal length in which the largest error is taken, to tell drift from oscillation.
-WINDOWS = 10
 
 #: Below this error, relative to the size of a quantity, differences say nothing about the method.
 ROUNDING = 4e-16
@@ -59,56 +54,6 @@ def observed_order(method: Method, reference: Callable[[float], tuple[Floats, fl
     pairs = tuple((t / n, e) for n, e in errors.items())
     exact = bool(errors) and max(errors.values()) <= 30 * floor
     return Observed(float(np.median(slopes[-3:])) if slopes else math.nan, pairs, floor, exact)
-
-
-@dataclass(frozen=True)
-class Drift:
-    """The largest error of a conserved quantity in each of `WINDOWS` equal parts of a trajectory, relative to its size.
-
-    A trajectory of fewer steps has one part for each.
-
-    The size at a state is Σ |x_i ∂_i C|, at least |C|: what rounding of the coordinates alone amounts to. As errors add
-    up, they are relative to the largest size up to the state that has them: the terms of C may all vanish there.
-    """
-
-    windows: tuple[float, ...]
-
-    @property
-    def error(self) -> float:
-        """The largest error."""
-        return max(self.windows)
-
-    @property
-    def growth(self) -> float:
-        """The error of the last window over that of the first; NaN if there is none."""
-        return self.windows[-1] / self.windows[0] if self.windows[0] > 0 else math.nan
-
-
-def drifts(
-    system: System, quantities: Mapping[str, Expression], parameters: Mapping[str, float], rows: Floats
-) -> dict[str, Drift]:
-    """The drift of each quantity along states (rows, DIM), the first of which is the start."""
-    values: dict[str, Any] = {**parameters, **{c: rows[:, i] for i, c in enumerate(system.coordinates)}}
-    found = {}
-    for name, quantity in quantities.items():
-        value, *slopes = (np.broadcast_to(a, len(rows)) for a in _with_gradient(quantity, system.coordinates, values))
-        size = np.maximum(np.abs(value[0]), sum(abs(rows[:, i] * g) for i, g in enumerate(slopes)))
-        size = np.maximum.accumulate(size)
-        error = np.abs(value - value[0]) / np.where(size > 0, size, 1.0)
-        windows = np.array_split(error[1:], min(WINDOWS, len(error) - 1))
-        found[name] = Drift(tuple(float(np.max(part)) for part in windows))
-    return found
-
-
-def _with_gradient(quantity: Expression, coordinates: Sequence[str], values: Mapping[str, Any]) -> list[Floats]:
-    return evaluate([quantity, *gradient(quantity, coordinates)], values)
-
-
-def size_of(quantity: Expression, coordinates: Sequence[str], values: Mapping[str, Any]) -> float:
-    """The largest size of a quantity along a trajectory, as `Drift` counts it."""
-    value, *slopes = _with_gradient(quantity, coordinates, values)
-    parts = sum(np.abs(values[c] * g) for c, g in zip(coordinates, slopes, strict=True))
-    return float(np.max(np.maximum(np.abs(value), parts))) or 1.0
 
 
 def poisson_matrix(system: System, parameters: Mapping[str, float], x: Floats) -> Floats:

@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from phigen.analysis.arrays import Floats
-from phigen.analysis.summary import errors_from
 from phigen.runtime.trajectory import Trajectory
 
 Numbers = NDArray[np.int64]
@@ -93,9 +92,8 @@ class Sketch:
         self._thinned.see(numbered)
         first = self._peaks["first"]
         windows = (numbered[:, 0] * WINDOWS // max(self._of, 1)).astype(np.int64).clip(0, WINDOWS - 1)
-        scale = float(np.max(np.abs(first[2 : 2 + self._dimension])))
         for k, values in enumerate(numbered[:, self._quantities].T):
-            errors, _ = errors_from(float(first[self._quantities][k]), values, scale)
+            errors = np.abs(values - first[self._quantities][k])
             for window in np.unique(windows):
                 part = np.flatnonzero(windows == window)
                 best = part[np.argmax(errors[part])]

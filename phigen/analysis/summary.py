@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from phigen.analysis.arrays import Floats, evaluate
+from phigen.analysis.conservation import ENERGY, RELATIVE, Unit, rounding, units
 from phigen.geometry.system import System
 from phigen.spec.model import Run
 from phigen.symbolic.symbols import ELAPSED, initial
@@ -18,29 +19,23 @@ from phigen.symbolic.symbols import ELAPSED, initial
 #: Windows of equal length in which the largest energy error is taken, to tell drift from oscillation.
 WINDOWS = 10
 
-#: A quantity that starts below this fraction of the largest coordinate counts as zero: its error is absolute.
-_NEGLIGIBLE = 1e-10
-
 #: The largest error of a window without rows.
 _NOTHING = -1.0
+#: Windows are compared if the first sees every coordinate that turns at all turn so often: back and forth once.
+_TURNS = 2
 
 
 @dataclass(frozen=True)
 class Drift:
-    """How far a conserved quantity went: the largest error, relative to the initial value unless that is 0.
+    """How far a conserved quantity went: the largest error, in a unit of its own.
 
-    ``growth`` is the largest error in the last tenth of the run over that in the first; 1 without drift, NaN if
-    there are too few rows or no error.
+    ``growth`` is the largest error in the last tenth of the run over that in the first; 1 without drift. It is NaN if
+    that says nothing: where the error is one of rounding, and where the first tenth has not seen the motion.
     """
 
     error: float
-    relative: bool
-    growth: float
-
-    @property
-    def kind(self) -> str:
-        """``relative`` or ``absolute``."""
-        return "relative" if self.relative else "absolute"
+    unit: Unit
+    growth: float = math.nan
 
 
 @dataclass(frozen=True)
@@ -58,6 +53,11 @@ class Summary:
     final: tuple[float, ...]
     good: int
     rows: int
+
+    @property
+    def units(self) -> dict[str, Unit]:
+        """What the errors are counted in, by the names of the quantities."""
+        return {ENERGY: self.energy.unit, **{n: d.unit for n, d in {**self.casimirs, **self.invariants}.items()}}
 
 
 def summarise(
@@ -82,11 +82,12 @@ class Watch:
         self._about = method, rows
         self._system, self._run, self._parameters = system, run, parameters
         self._groups = {
-            "energy": {"H": system.hamiltonian},
+            ENERGY: {"H": system.hamiltonian},
             "casimirs": system.casimirs,
             "invariants": system.invariants,
         }
         self._formulas = [formula for group in self._groups.values() for formula in group.values()]
+        self._found: list[Unit] = []
         states, quantities = np.full(len(system.coordinates), np.nan), len(self._formulas)
         self.state: dict[str, Any] = {
             "first": states,
@@ -94,6 +95,8 @@ class Watch:
             "start": np.zeros(quantities),
             "maxima": np.full((quantities, WINDOWS + 1), _NOTHING),
             "exact": np.zeros(()),
+            "turns": np.zeros((2, len(system.coordinates)), dtype=np.int64),
+            "heading": np.zeros(len(system.coordinates)),
             "good": np.zeros((), dtype=np.int64),
             "broken": np.zeros((), dtype=bool),
         }
@@ -116,32 +119,56 @@ class Watch:
         values = [np.broadcast_to(a, t.shape) for a in evaluate(self._formulas, {**self._parameters, **columns})]
         if good == 0:
             state |= {"first": x[0].copy(), "start": np.array([v[0] for v in values])}
+        state["good"] = np.asarray(good + count)
         windows = _windows(np.arange(good, good + count), self._about[1])
-        scale = float(np.max(np.abs(state["first"])))
-        for k, v in enumerate(values):
-            errors, _ = errors_from(float(state["start"][k]), v, scale)
-            np.maximum.at(state["maxima"][k], windows, errors)
+        for k, (v, unit) in enumerate(zip(values, self._units(), strict=True)):
+            np.maximum.at(state["maxima"][k], windows, unit.errors(v, float(state["start"][k])))
+        self._see_turns(x, windows)
         if self._run and self._run.exact:
             off = _against_exact(self._system, self._run, self._parameters, state["first"], t, x)
             state["exact"] = np.asarray(max(off, float(state["exact"])))
-        state |= {"final": x[-1].copy(), "good": np.asarray(good + count)}
+        state["final"] = x[-1].copy()
 
     def summary(self) -> Summary:
         """The summary of what was seen."""
         (method, rows), state = self._about, self.state
-        scale = float(np.max(np.abs(state["first"])))
-        found = iter([_drift(m, float(s), scale, rows) for m, s in zip(state["maxima"], state["start"], strict=True)])
-        drifts = {kind: {name: next(found) for name in group} for kind, group in self._groups.items()}
+        steps = self._run.steps if self._run else rows
+        telling = rows >= 2 * WINDOWS and _is_telling(state["turns"])
+        drifts = [_drift(m, unit, steps, telling) for m, unit in zip(state["maxima"], self._units(), strict=True)]
+        found = iter(drifts)
+        named = {kind: {name: next(found) for name in group} for kind, group in self._groups.items()}
         return Summary(
             method=method,
-            energy=drifts["energy"]["H"],
-            casimirs=drifts["casimirs"],
-            invariants=drifts["invariants"],
-            exact=Drift(float(state["exact"]), True, math.nan) if self._run and self._run.exact else None,
+            energy=named[ENERGY]["H"],
+            casimirs=named["casimirs"],
+            invariants=named["invariants"],
+            exact=Drift(float(state["exact"]), Unit(kind=RELATIVE)) if self._run and self._run.exact else None,
             final=tuple(state["final"].tolist()),
             good=int(state["good"]),
             rows=rows,
         )
+
+    def _units(self) -> Sequence[Unit]:
+        if not self._found and self.begun:
+            self._found = units(self._formulas, self._system.coordinates, self._parameters, self.state["first"])
+        return self._found or [Unit()] * len(self._formulas)
+
+    def _see_turns(self, x: Floats, windows: NDArray[np.int64]) -> None:
+        """Count where coordinates turn back: in the first window, and at all."""
+        state = self.state
+        before = state["final"] if np.isfinite(state["final"]).all() else x[0]
+        for i, moves in enumerate(np.diff(x, axis=0, prepend=before[None]).T):
+            moving = np.flatnonzero(moves)
+            signs = np.concatenate([[state["heading"][i]], np.sign(moves[moving])])
+            turned = windows[moving[signs[1:] * signs[:-1] < 0]]
+            state["turns"][:, i] += (int((turned == 0).sum()), len(turned))
+            state["heading"][i] = signs[-1]
+
+
+def _is_telling(turns: NDArray[np.int64]) -> bool:
+    """Whether the first window sees the motion, by the turns of each coordinate there and at all."""
+    turning = turns[1] > 0
+    return bool(turning.any() and (turns[0, turning] >= _TURNS).all())
 
 
 def _windows(rows: NDArray[np.int64], of: int) -> NDArray[np.int64]:
@@ -150,29 +177,11 @@ def _windows(rows: NDArray[np.int64], of: int) -> NDArray[np.int64]:
     return np.where(rows == 0, WINDOWS, np.searchsorted(ends, rows - 1, side="right"))
 
 
-def _drift(maxima: Floats, start: float, scale: float, rows: int) -> Drift:
+def _drift(maxima: Floats, unit: Unit, steps: int, telling: bool) -> Drift:
     first, last = float(maxima[0]), float(maxima[WINDOWS - 1])
-    usable = rows >= 2 * WINDOWS and first > 0 and last != _NOTHING
-    error = float(np.max(maxima)) if np.isfinite(maxima).all() else math.inf
-    return Drift(max(error, 0.0), _is_relative(start, scale), last / first if usable else math.nan)
-
-
-def errors_of(values: Floats, scale: float = 1.0) -> tuple[Floats, bool]:
-    """The errors (rows,) of a conserved quantity, and whether they are relative to its initial value.
-
-    They are absolute if that is negligible beside ``scale``, the largest coordinate.
-    """
-    return errors_from(float(values[0]), values, scale)
-
-
-def errors_from(start: float, values: Floats, scale: float) -> tuple[Floats, bool]:
-    """`errors_of` of later rows of a trajectory, given the initial value."""
-    relative = _is_relative(start, scale)
-    return np.abs(values - start) / (abs(start) if relative else 1.0), relative
-
-
-def _is_relative(start: float, scale: float) -> bool:
-    return abs(start) > _NEGLIGIBLE * scale
+    error = max(float(np.max(maxima)) if np.isfinite(maxima).all() else math.inf, 0.0)
+    compared = telling and first > 0 and last != _NOTHING and error > rounding(steps) * unit.terms
+    return Drift(error, unit, last / first if compared else math.nan)
 
 
 def exact_solution(

@@ -15,10 +15,13 @@ import numpy as np
 
 from phigen.analysis import backward, measures
 from phigen.analysis.arrays import Floats
+from phigen.analysis.conservation import Unit, largest_terms, rounding, units_of
 from phigen.analysis.methods import Method, of_classical, of_solver
+from phigen.analysis.summary import Drift, Summary, summarise
 from phigen.compiler import Compilation
 from phigen.errors import StepError
 from phigen.runtime.solver import Solver
+from phigen.symbolic.expression import Expression
 
 #: Observed orders may fall short of the stated one by this much.
 ORDER_SLACK = 0.3
@@ -34,11 +37,6 @@ GROWTH = 4.0
 MOST_STEPS, FEW_STEPS = 20_000, 2_000
 #: States along the run at which single steps are examined.
 STATES = 4
-
-
-def casimir_limit(steps: int) -> float:
-    """What round-off may make of a Casimir in so many steps: a random walk of some units in the last place."""
-    return 1e-15 * (20 + math.sqrt(steps))
 
 
 @dataclass(frozen=True)
@@ -58,7 +56,7 @@ class Check:
 
 @dataclass(frozen=True)
 class Verification:
-    """All checks of one spec on one run; ``label`` says what the solver claims to be."""
+    """All checks of one spec on one run; ``label`` says what the solver claims to be, ``units`` what errors are in."""
 
     name: str
     run: str
@@ -68,6 +66,7 @@ class Verification:
     targets: tuple[str, ...]
     compared: tuple[str, ...]
     checks: tuple[Check, ...]
+    units: Mapping[str, Unit]
 
     @property
     def failures(self) -> list[str]:
@@ -141,6 +140,7 @@ def verify(
             step_check(subject, states),
             *modified_checks(subject, gauge),
         ),
+        units_of(compilation.system, parameters, x),
     )
 
 
@@ -209,38 +209,49 @@ def _reference(subject: Subject) -> Callable[[float], tuple[Floats, float]]:
 def conservation_checks(subject: Subject, rows: Floats) -> Iterator[Check]:
     """Casimirs constant to round-off; energy without drift."""
     system, steps = subject.compilation.system, subject.steps
-    quantities = {**system.casimirs, "": system.hamiltonian}
-    own = measures.drifts(system, quantities, subject.parameters, rows)
-    others = {name: _drifts_of(subject, m) for name, m in subject.others.items()}
-    bound = casimir_limit(steps)
-    for name in system.casimirs:
-        compared = {m: d[name].error for m, d in others.items()}
+    own = _summary(subject, subject.main.name, rows)
+    others = {name: _summary_of(subject, m) for name, m in subject.others.items()}
+    for name, drift in own.casimirs.items():
+        bound = rounding(steps) * _terms(subject, system.casimirs[name], rows) / drift.unit.size
         limit = f"at most {bound:.1e}" if subject.exact else ""
-        passed = own[name].error <= bound or not subject.exact
-        reason = f"changed by {own[name].error:.1e} in {steps} steps"
-        yield Check(f"Casimir {name}: largest error", own[name].error, limit, passed, reason, compared)
-        yield Check(f"Casimir {name}: last/first window", own[name].growth, others=_growths(others, name))
-    energy = own[""]
-    yield Check("energy: largest error", energy.error, others={m: d[""].error for m, d in others.items()})
-    judged = energy.error > bound and subject.exact and _recurrent(rows)
+        passed = drift.error <= bound or not subject.exact
+        reason = f"changed by {drift.error:.1e} in {steps} steps"
+        drifts = {m: s.casimirs[name] if s else None for m, s in others.items()}
+        yield Check(f"Casimir {name}: largest error", drift.error, limit, passed, reason, _errors(drifts))
+        yield Check(f"Casimir {name}: last/first window", drift.growth, others=_growths(drifts))
+    energy, drifts = own.energy, {m: s.energy if s else None for m, s in others.items()}
+    yield Check("energy: largest error", energy.error, others=_errors(drifts))
+    judged = math.isfinite(energy.growth) and subject.exact and _recurrent(rows)
     passed = not judged or energy.growth <= GROWTH
     reason = f"the error of the last tenth is {energy.growth:.1f} times that of the first"
     limit = f"at most {GROWTH:g}" if judged else ""
-    yield Check("energy: last/first window", energy.growth, limit, passed, reason, _growths(others, ""))
+    yield Check("energy: last/first window", energy.growth, limit, passed, reason, _growths(drifts))
 
 
-def _growths(others: Mapping[str, Mapping[str, measures.Drift]], name: str) -> dict[str, float]:
-    return {m: d[name].growth for m, d in others.items()}
+def _errors(drifts: Mapping[str, Drift | None]) -> dict[str, float]:
+    return {m: d.error if d else math.inf for m, d in drifts.items()}
 
 
-def _drifts_of(subject: Subject, method: Method) -> dict[str, measures.Drift]:
-    system = subject.compilation.system
-    quantities = {**system.casimirs, "": system.hamiltonian}
+def _growths(drifts: Mapping[str, Drift | None]) -> dict[str, float]:
+    return {m: d.growth if d else math.nan for m, d in drifts.items()}
+
+
+def _terms(subject: Subject, quantity: Expression, rows: Floats) -> float:
+    columns = dict(zip(subject.compilation.system.coordinates, rows.T, strict=True))
+    return largest_terms(quantity, list(columns), {**subject.parameters, **columns})
+
+
+def _summary(subject: Subject, name: str, rows: Floats) -> Summary:
+    times: Floats = subject.h * np.arange(len(rows), dtype=np.float64)
+    return summarise(name, subject.compilation.system, None, subject.parameters, times, rows)
+
+
+def _summary_of(subject: Subject, method: Method) -> Summary | None:
+    """What another method conserves; None where a step of it cannot be made."""
     try:
-        rows = method.rows(subject.start, subject.h, subject.steps, 1)
+        return _summary(subject, method.name, method.rows(subject.start, subject.h, subject.steps, 1))
     except StepError:
-        return dict.fromkeys(quantities, measures.Drift((math.inf,) * measures.WINDOWS))
-    return measures.drifts(system, quantities, subject.parameters, rows)
+        return None
 
 
 def _recurrent(rows: Floats) -> bool:

@@ -57,20 +57,20 @@ def command(
 
     if not independent and (terms or seconds):
         raise click.UsageError("--terms and --seconds are for --independent")
-    collector, found = Collector(), []
+    collector, found = Collector(), list[dict[str, object]]()
     for spec in load_all(spec_files, collector):
         with collector.collecting():
             examination = examine(spec, order=order, scheme=scheme)
             described = _described(examination)
             if not as_json:
+                if found:
+                    out("")
                 _print(examination)
             _collect(examination, collector, console)
             if independent:
                 compared = _compared(examination, terms, seconds, console, collector, shown=not as_json)
                 described["independent"] = [_described_comparison(c) for c in compared]
             found.append(described)
-            if not as_json:
-                out("")
     if as_json:
         out(json.dumps(found, indent=2, ensure_ascii=False))
     collector.finish()

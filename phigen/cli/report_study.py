@@ -71,9 +71,9 @@ def _closed_form(compilation: Compilation, experiment: Experiment, x0: Floats) -
 
 
 def _casimirs(compilation: Compilation, experiment: Experiment, x0: Floats) -> Callable[[Floats], float] | None:
-    """The largest error of a Casimir at a state, relative to its size at the start."""
+    """The largest error of a Casimir at a state, in its unit."""
     from phigen.analysis.arrays import evaluate
-    from phigen.analysis.measures import size_of
+    from phigen.analysis.conservation import units
     from phigen.analysis.precision import ROUNDING
 
     system = compilation.system
@@ -85,7 +85,7 @@ def _casimirs(compilation: Compilation, experiment: Experiment, x0: Floats) -> C
         return {**experiment.parameters, **dict(zip(system.coordinates, x.tolist(), strict=True))}
 
     start = evaluate(formulas, at(x0))
-    sizes = [size_of(c, system.coordinates, at(x0)) for c in formulas]
+    sizes = [unit.size for unit in units(formulas, system.coordinates, experiment.parameters, x0)]
 
     def worst(x: Floats) -> float:
         values = evaluate(formulas, at(x))

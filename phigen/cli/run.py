@@ -95,7 +95,7 @@ def command(
     else:
         print_summary(compilation, recorder, summaries)
     if plot:
-        _draw(plot, recorder, drawn, compilation.system.casimirs)
+        _draw(plot, recorder, drawn, compilation.system.casimirs, summaries[0].units)
         console.note(f"wrote {plot}")
     if failure:
         raise failure
@@ -108,9 +108,9 @@ def _told(recorder: Recorder) -> str:
     return f"{done}; the same command with --resume goes on" if recorder.files.checkpoint else done
 
 
-def _draw(path: Path, recorder: Recorder, drawn: dict[str, Trajectory], casimirs: Any) -> None:
+def _draw(path: Path, recorder: Recorder, drawn: dict[str, Trajectory], casimirs: Any, units: Any) -> None:
     from phigen.analysis import figures
 
     sections = {f"{recorder.section_text} = 0": recorder.points.rows[:, 1:]} if recorder.finder else {}
     title = f"{recorder.solver.interface.name}, {recorder.experiment.run.name}"
-    figures.save(figures.run_figure(drawn, casimirs, sections, title, recorder.spectrum), path)
+    figures.save(figures.run_figure(drawn, casimirs, sections, title, recorder.spectrum, units), path)

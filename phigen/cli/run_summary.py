@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 
 def print_summary(compilation: Compilation, recorder: Recorder, summaries: Sequence[Summary]) -> None:
     """The table of a run: one column for each method; then crossings and exponents, if asked for."""
+    from phigen.analysis.conservation import stated
+
     run, solver, steps = recorder.experiment.run, recorder.solver, recorder.session.steps
     out(heading(f"{compilation.spec.name}, run {run.name}") + (f": {run.description}" if run.description else ""))
     chosen = f"{compilation.label}, order {solver.order}, target {solver.target}"
@@ -26,6 +28,7 @@ def print_summary(compilation: Compilation, recorder: Recorder, summaries: Seque
     out(f"  final state: {final}\n")
     for line in table(_rows(summaries), right=range(1, len(summaries) + 1)):
         out(f"  {line}")
+    out(f"  {stated(summaries[0].units)}")
     if recorder.finder:
         count = counted(recorder.points.seen, "rising crossing")
         out(f"\n  {count} of the section {recorder.section_text} = 0")
@@ -38,13 +41,13 @@ def print_summary(compilation: Compilation, recorder: Recorder, summaries: Seque
 def _rows(summaries: Sequence[Summary]) -> list[list[str]]:
     first = summaries[0]
     rows = [["largest error", *(s.method for s in summaries), ""]]
-    rows.append(["energy", *(_shown(s.energy) for s in summaries), first.energy.kind])
+    rows.append(["energy", *(_shown(s.energy) for s in summaries), first.energy.unit.kind])
     if any(math.isfinite(s.energy.growth) for s in summaries):
         growth = [f"{s.energy.growth:.3g}" if math.isfinite(s.energy.growth) else "–" for s in summaries]
         rows.append(["  last tenth/first", *growth, "1 is no drift"])
     for kind, noun in (("casimirs", "Casimir"), ("invariants", "invariant")):
         for name, drift in getattr(first, kind).items():
-            rows.append([f"{noun} {name}", *(_shown(getattr(s, kind)[name]) for s in summaries), drift.kind])
+            rows.append([f"{noun} {name}", *(_shown(getattr(s, kind)[name]) for s in summaries), drift.unit.kind])
     if first.exact:
         rows.append(["against closed form", *(_shown(s.exact) for s in summaries if s.exact), "relative"])
     if any(s.good < s.rows for s in summaries):

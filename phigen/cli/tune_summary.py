@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import replace
+from dataclasses import asdict, replace
 from typing import TYPE_CHECKING, Any
 
 from phigen.cli.console import heading, out, table
@@ -93,6 +93,8 @@ def scheme_of(curve: Curve) -> str:
 
 def remarks(found: Tuning) -> Iterator[str]:
     """What the numbers rest on, and what they do not say."""
+    from phigen.analysis.conservation import ENERGY, stated
+
     best = found.winner
     assert best is not None
     over, whole = best.point.time, found.horizon
@@ -104,6 +106,8 @@ def remarks(found: Tuning) -> Iterator[str]:
         yield f"Errors were measured up to t = {over:.4g}. Beyond, phigen's stay bounded but for rounding (~)."
     else:
         yield f"Errors were measured up to t = {over:.4g}; phigen's grow linearly, and so does ~ up to t = {whole:.6g}."
+    if found.measure == "energy":
+        yield stated({ENERGY: found.unit})
     if best.point.error * _SLACK < found.accuracy and best.point.step > 0.9 * best.curve.largest:
         yield "The accuracy would allow a larger step, but none can be made, or it would not show the motion."
     if found.orbit_error is not None:
@@ -180,6 +184,7 @@ def described(found: Tuning, spec: Spec, run: Run) -> dict[str, Any]:
         "run": run.name,
         "measure": found.measure,
         "accuracy": found.accuracy,
+        "unit": asdict(found.unit),
         "horizon": found.horizon,
         "scanned": found.piece,
         "finished": found.finished,

@@ -146,13 +146,15 @@ def fallen_short(verification: Verification) -> CheckError:
 
 def print_table(v: Verification) -> None:
     """The checks as a table for people."""
+    from phigen.analysis.conservation import stated
+
     out(heading(f"{v.name}, run {v.run}") + f": {v.label}")
     out(f"  {v.steps} steps of {v.step:.9g}, targets {', '.join(v.targets)}")
     rows = [["", "phigen", "required", "", *v.compared]]
     rows += [_row(check, v.compared) for check in v.checks]
     for line in table(rows, right=[1, *range(4, 4 + len(v.compared))]):
         out(f"  {line}")
-    out("")
+    out(f"  {stated(v.units)}\n")
 
 
 def _row(check: Check, compared: Sequence[str]) -> list[str]:

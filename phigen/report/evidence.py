@@ -8,6 +8,7 @@ from collections.abc import Iterator, Mapping, Sequence
 
 from markupsafe import Markup
 
+from phigen.analysis.conservation import stated
 from phigen.analysis.lyapunov import Spectrum
 from phigen.analysis.meanings import Meaning, meaning_of
 from phigen.analysis.summary import Drift, Summary
@@ -85,7 +86,7 @@ def measured_section(v: Verification) -> Markup:
     rows_explained = page.facts((m.row, page.typeset(_meaning(m))) for m in meanings)
     return page.joined(
         [page.paragraph(said), page.table("What the solver shows, and classical methods beside it", columns, rows),
-         page.paragraph("Errors are relative to the size of a quantity.", "note"),
+         page.paragraph(page.typeset(stated(v.units)), "note"),
          page.fold("What the rows mean", rows_explained)]
     )  # fmt: skip
 
@@ -106,7 +107,8 @@ def summary_table(summaries: Sequence[Summary]) -> Markup:
     if any(s.good < s.rows for s in summaries):
         rows.append(("rows before it broke down", [("number", f"{s.good} of {s.rows}") for s in summaries]))
     columns = [("", "quantity"), *(("number", s.method) for s in summaries)]
-    return page.table("Largest errors along the run, relative to the value at the start", columns, rows)
+    listed = page.table("Largest errors along the run", columns, rows)
+    return page.joined([listed, page.paragraph(page.typeset(stated(first.units)), "note")])
 
 
 def lyapunov_paragraph(spectrum: Spectrum) -> Markup:
@@ -132,7 +134,7 @@ def _check(check: Check, compared: Sequence[str]) -> tuple[str, list[page.Cell]]
 
 
 def _drift(drift: Drift) -> page.Cell:
-    return "number", page.scientific(drift.error) + ("" if drift.relative else " (absolute)")
+    return "number", page.scientific(drift.error)
 
 
 def _proofs_tile(statements: Sequence[Statement]) -> Tile:

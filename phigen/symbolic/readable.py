@@ -130,7 +130,9 @@ def _infix(e: Expression) -> str:
                 return f"1/{raised(args[0], -node.value)}", 2
             case "pow":
                 return raised(args[0], node.value), 4 if node.value == Fraction(1, 2) else 3
-            case _ if node.args and node.op not in ("pow", "power"):
+            case "power":
+                return f"{wrap(args[0], 4)}**{wrap(args[1], 4)}", 3
+            case _ if node.args:
                 return f"{_GREEK.get(node.op, node.op)}({', '.join(a for a, _ in args)})", 4
         written = text(node)
         return written, 4 if not node.args and written.isidentifier() else 3 if written.isdigit() else 2

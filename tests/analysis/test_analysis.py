@@ -9,7 +9,7 @@ from scipy.integrate import DOP853
 from support import series_of
 
 from phigen import resources, spec
-from phigen.analysis import arrays, classical, dop853, summary
+from phigen.analysis import arrays, classical, conservation, dop853, summary
 from phigen.compiler import compile_file
 from phigen.geometry.system import system_from_spec
 from phigen.realisations.catalogue import realise
@@ -74,26 +74,73 @@ def test_functions_on_arrays_agree_with_those_on_numbers(name):
     assert found == pytest.approx([expected] * 2, rel=1e-14)
 
 
-def test_drift_tells_growth_from_oscillation():
+def oscillator():
     system = compile_file(SPECS / "harmonic_oscillator.yaml").system
-    parameters = {p.name: 1.0 for p in system.parameters}
+    return system, {p.name: 1.0 for p in system.parameters}
+
+
+def drift_of(energies, t):
+    """The drift of the energy along an oscillation with these energies."""
+    system, parameters = oscillator()
+    x = np.sqrt(2 * energies)[:, None] * np.column_stack([np.cos(t), -np.sin(t)])
+    return summary.summarise("a", system, None, parameters, t, x).energy
+
+
+def test_drift_tells_growth_from_oscillation():
     t = np.arange(10001) / 100
-
-    def drift_of(energies):
-        x = np.column_stack([np.sqrt(2 * energies), np.zeros(len(t))])
-        return summary.summarise("a", system, None, parameters, t, x).energy
-
-    oscillation, growth = drift_of(1 + 1e-3 * np.sin(t)), drift_of(1 + 1e-3 * t)
+    oscillation, growth = drift_of(1 + 1e-3 * np.sin(t), t), drift_of(1 + 1e-3 * t, t)
     assert oscillation.growth == pytest.approx(1, abs=0.1)
     assert growth.growth == pytest.approx(10, abs=0.1)
     assert oscillation.error == pytest.approx(1e-3, rel=1e-2)
-    assert oscillation.relative
 
 
-def test_drift_of_what_starts_at_zero_is_absolute():
-    errors, relative = summary.errors_of(np.array([1e-17, 3e-16, 0.0]), scale=1.0)
-    assert not relative
-    assert np.max(errors) < 1e-15
+@pytest.mark.parametrize(
+    ("turns", "error", "telling"),
+    [(25, 1e-3, True), (11, 1e-3, True), (5, 1e-3, False), (0.4, 1e-3, False), (25, 1e-15, False)],
+)
+def test_last_tenth_is_compared_with_the_first_if_that_has_seen_the_motion_and_errors_are_not_of_rounding(
+    turns, error, telling
+):
+    t = np.linspace(0, 2 * np.pi * turns, 3001)
+    assert math.isfinite(drift_of(1 + error * np.sin(t) ** 2, t).growth) == telling
+
+
+def test_turns_are_counted_across_pieces_of_a_run():
+    system, parameters = oscillator()
+    t = np.linspace(0, 100, 4001)
+    x = (1 + 1e-4 * np.sin(3 * t))[:, None] * np.column_stack([np.cos(t), -np.sin(t)])
+    watch = summary.Watch("a", system, None, parameters, len(t))
+    for piece in np.array_split(np.arange(len(t)), 77):
+        watch.see(t[piece], x[piece])
+    assert watch.state["turns"].tolist() == [[3, 3], [31, 32]]
+    whole = summary.summarise("a", system, None, parameters, t, x)
+    assert watch.summary() == whole
+
+
+@pytest.mark.parametrize(
+    ("value", "terms", "kind", "size"),
+    [
+        (-2.0, 3.0, "relative", 2.0),
+        (1e6, 3.0, "relative", 1e6),
+        (0.01, 3.0, "relative", 0.01),
+        (1e-16, 3.0, "of its terms", 3.0),
+        (0.0, 0.0, "absolute", 1.0),
+        (math.nan, math.nan, "absolute", 1.0),
+    ],
+)
+def test_errors_are_relative_to_the_value_at_the_start_or_to_the_terms_that_cancel_there(value, terms, kind, size):
+    found = conservation.unit_of(value, terms)
+    assert (found.kind, found.size) == (kind, size)
+
+
+@pytest.mark.parametrize("constant", [0, 5])
+def test_energy_that_is_zero_at_the_start_is_measured_in_its_terms_whatever_constant_it_has(constant):
+    """H = p²/2 − cos q, from q = π/2 at rest."""
+    q, p = symbol("q"), symbol("p")
+    h = p**2 / 2 - call("cos", q) + constant
+    (found,) = conservation.units([h], ["q", "p"], {}, np.array([math.pi / 2, 0.0]))
+    assert found.size == pytest.approx(constant or math.pi / 2)
+    assert ("since H is nearly 0" in conservation.stated({"energy": found})) == (constant == 0)
 
 
 def test_summary_of_a_run_that_failed_is_about_its_finite_rows():

@@ -9,9 +9,10 @@ from click.testing import CliRunner
 from support import BODY, compiled
 
 from phigen import resources, spec
-from phigen.analysis import backward, measures, verification
+from phigen.analysis import backward, verification
 from phigen.analysis.meanings import meaning_of
 from phigen.analysis.methods import by_differences, of_classical, of_solver
+from phigen.analysis.summary import summarise
 from phigen.api import solver_of
 from phigen.cli import group
 from phigen.compiler import compile_spec, emit
@@ -64,11 +65,13 @@ casimirs: {casimirs}
 """
     compilation = compilation_of(text)
     start = np.array([0.3, 1.2, 0.0, 0.0, 0.0, -1.0])
-    rows = solver_of(compilation, "c").integrate(start, h=0.02, steps=10_000).x
-    drift = measures.drifts(compilation.system, compilation.system.casimirs, {}, rows)
-    assert drift["L"].error < 1e-14
+    made = solver_of(compilation, "c")
+    rows = made.integrate(start, h=0.02, steps=10_000).x
+    subject = verification.Subject(compilation, made, {"c": of_solver(made, {})}, {}, {}, start, 0.02, 10_000)
+    assert all(check.passed for check in verification.conservation_checks(subject, rows))
     rows[5000:, 0] += 1e-9
-    assert measures.drifts(compilation.system, compilation.system.casimirs, {}, rows)["L"].error > 1e-10
+    wrong = [check.name for check in verification.conservation_checks(subject, rows) if not check.passed]
+    assert wrong == ["Casimir L: largest error"]
 
 
 def test_modified_hamiltonian_is_constant_to_higher_order_for_each_correction():
@@ -156,11 +159,11 @@ def test_energy_drift_of_dissipative_methods_is_judged():
     """Whatever is judged must tell RK4 from a good method."""
     compilation = compilation_of()
     made = solver_of(compilation, "c")
-    quantities = {"": compilation.system.hamiltonian}
     rk4 = of_classical("rk4", made, {}).rows(START, 0.4, 2000, 1)
     own = of_solver(made, {}).rows(START, 0.4, 2000, 1)
-    drift = {k: measures.drifts(compilation.system, quantities, {}, r)[""] for k, r in (("rk4", rk4), ("own", own))}
-    assert drift["own"].growth < 1.5 < verification.GROWTH < drift["rk4"].growth
+    times = 0.4 * np.arange(2001)
+    growth = [summarise("", compilation.system, None, {}, times, rows).energy.growth for rows in (own, rk4)]
+    assert growth[0] < 1.5 < verification.GROWTH < growth[1]
 
 
 def test_approximate_realisations_are_labelled_and_held_to_their_order():

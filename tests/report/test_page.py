@@ -13,6 +13,7 @@ from html_check import Page
 from support import compiled
 
 from phigen import resources
+from phigen.analysis.conservation import RELATIVE, Unit
 from phigen.analysis.drawing.palette import PALETTE
 from phigen.analysis.proof import Examination
 from phigen.analysis.summary import Drift, Summary
@@ -25,7 +26,7 @@ from phigen.report.viewer import MOST_NUMBERS, viewer
 from phigen.runtime.trajectory import Trajectory
 from phigen.symbolic.verdict import CHECKED, PROVED, Statement
 
-NO_DRIFT = Drift(0.0, True, 1.0)
+NO_DRIFT = Drift(0.0, Unit(kind=RELATIVE), 1.0)
 SUMMARY = Summary("phigen", NO_DRIFT, {"C": NO_DRIFT}, {}, None, (0.0,), 3, 3)
 ASSETS = resources.templates() / "report"
 CSS = (ASSETS / "report.css").read_text(encoding="utf-8")

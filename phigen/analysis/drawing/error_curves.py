@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from phigen.analysis.arrays import Floats
+from phigen.analysis.conservation import ENERGY, Unit, unit_of
 from phigen.analysis.drawing.palette import MARK, SERIES
-from phigen.analysis.summary import errors_of
 from phigen.runtime.trajectory import Trajectory
 
 if TYPE_CHECKING:
@@ -51,24 +51,27 @@ def height(methods: Mapping[str, Trajectory]) -> float:
     return ROW * grid(methods)[0]
 
 
-def draw_errors(figure: FigureBase, methods: Mapping[str, Trajectory]) -> None:
-    """One panel for the energy and each Casimir, one curve for each method; the first method lies on top."""
+def draw_errors(figure: FigureBase, methods: Mapping[str, Trajectory], units: Mapping[str, Unit] | None = None) -> None:
+    """One panel for the energy and each Casimir, one curve for each method; the first method lies on top.
+
+    Errors are in the ``units``; without them relative to the value at the start, unless that is 0.
+    """
     first = next(iter(methods.values()))
-    panels = ["energy", *first.casimirs]
+    panels = [ENERGY, *first.casimirs]
     rows, columns = grid(methods)
     shared: Any = None
     for index, name in enumerate(panels, start=1):
         axes = figure.add_subplot(rows, columns, index, sharex=shared)
         shared = shared or axes
-        curves, relative = {}, True
-        for label, trajectory in methods.items():
-            values = trajectory.energy if index == 1 else trajectory.casimirs[name]
-            scale = float(np.max(np.abs(trajectory.x[0]), initial=0.0))
-            errors, relative = errors_of(values, scale)
-            curves[label] = windowed_maxima(trajectory.t, errors)
+        values = {label: t.energy if index == 1 else t.casimirs[name] for label, t in methods.items()}
+        unit = (units or {}).get(name) or unit_of(float(next(iter(values.values()))[0]), 0.0)
+        curves = {
+            label: windowed_maxima(methods[label].t, unit.errors(column, float(column[0])))
+            for label, column in values.items()
+        }
         _draw_panel(axes, curves)
         what = "energy" if index == 1 else f"Casimir {name}"
-        axes.set_title(f"{'relative' if relative else 'absolute'} error{' of the' if columns < 3 else ':'} {what}")
+        axes.set_title(f"{unit.adjective} error{' of the' if columns < 3 else ':'} {what}")
         if index > len(panels) - columns:
             axes.set_xlabel("t")
     if len(methods) > 1:

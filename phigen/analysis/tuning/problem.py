@@ -9,6 +9,7 @@ from typing import Protocol
 import numpy as np
 
 from phigen.analysis.arrays import Floats, evaluate
+from phigen.analysis.conservation import Unit, units
 from phigen.analysis.race import Runner
 from phigen.geometry.system import System
 from phigen.runtime.backend import Backend
@@ -29,6 +30,12 @@ class Problem:
     step: float
     horizon: float
     direction: float = 1.0
+
+    @property
+    def unit(self) -> Unit:
+        """What errors of the energy are counted in."""
+        (found,) = units([self.system.hamiltonian], self.system.coordinates, self.parameters, self.start)
+        return found
 
     def energies(self, states: Floats) -> Floats:
         """H of states (rows, DIM)."""

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from statistics import median
 
+from phigen.analysis.conservation import Unit
 from phigen.analysis.tuning import search
 from phigen.analysis.tuning.problem import Problem, steps_in
 from phigen.analysis.tuning.search import Curve
@@ -49,6 +50,7 @@ class Tuning:
     step; ``peers`` are classical methods at the accuracy, those that reach it. Scans were made over ``piece`` of the
     ``horizon``. ``refused`` tells why other candidates were not measured; ``finished`` whether no more seemed worth
     trying; ``orbit_error`` that of the best over the piece where the energy was measured, None if that is unknown.
+    ``unit`` is what errors of the energy are counted in.
     """
 
     measure: str
@@ -63,6 +65,7 @@ class Tuning:
     refused: Mapping[Setting, str] = field(default_factory=dict)
     finished: bool = True
     orbit_error: float | None = None
+    unit: Unit = field(default_factory=Unit)
 
     @property
     def winner(self) -> Finalist | None:
@@ -82,7 +85,7 @@ def tune(
 ) -> Tuning:  # fmt: skip
     """Measure the candidates of a spec on a run, and find the cheapest that meets the accuracy.
 
-    ``measure`` is ``energy``, the largest relative error of the energy on the way, or ``orbit``, the distance from a
+    ``measure`` is ``energy``, the largest error of the energy on the way, or ``orbit``, the distance from a
     reference. Takes about ``budget`` seconds at most. Raises `StepError` if the spec's own setting cannot make even
     small steps, `CheckError` if there is no reference, `ToolchainError` without a C compiler.
     """
@@ -101,7 +104,7 @@ def tune(
         measure, accuracy, problem.horizon, tuner.piece, (*tuner.tried.values(), *classical), tuple(ranked),
         next((f for f in ranked if f.curve is own), None), timed[-1] if present else None, tuple(peers),
         {s: why for s, why in tuner.refused.items() if why}, finished,
-        tuner.orbit_error(ranked[0].curve, ranked[0].point.step) if look else None,
+        tuner.orbit_error(ranked[0].curve, ranked[0].point.step) if look else None, problem.unit,
     )  # fmt: skip
 
 

@@ -9,7 +9,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from phigen.analysis.arrays import Floats
-from phigen.analysis.summary import errors_of
 from phigen.analysis.tuning.problem import Method, Problem, steps_in
 from phigen.analysis.tuning.timing import nanoseconds_per_step
 
@@ -58,12 +57,12 @@ def marks(span: float, h: float) -> tuple[int, int]:
 
 
 def energy_measure(problem: Problem, *, bounded: bool = True) -> Measure:
-    """The largest error of the energy on the way, relative to its initial value unless that is negligible.
+    """The largest error of the energy on the way, in its unit.
 
     That of Poisson maps is ``bounded``: the same over the horizon, but for rounding. That of others grows with time
     wherever it was seen to grow.
     """
-    scale = float(np.max(np.abs(problem.start), initial=0.0))
+    unit = problem.unit
 
     def measure(method: Method, h: float, span: float) -> Point | None:
         steps = steps_in(span, h)
@@ -71,7 +70,8 @@ def energy_measure(problem: Problem, *, bounded: bool = True) -> Measure:
         states = method.rows(h, steps, stride)
         if states is None:
             return None
-        errors, _ = errors_of(problem.energies(states), scale)
+        energies = problem.energies(states)
+        errors = unit.errors(energies, float(energies[0]))
         largest = float(np.max(errors))
         if not math.isfinite(largest):
             return None
