@@ -1,5 +1,5 @@
 import pytest
-from tools import not_tested
+from tools import WARNINGS, not_tested
 
 from phigen.runtime import toolchain
 
@@ -27,16 +27,16 @@ def pytest_collection_modifyitems(config, items):
 def compiled_solvers(request, tmp_path_factory):
     """Compiled C is shared by all tests and workers of one session, and not left in the cache of the user.
 
-    Compilers take a quarter of the time with -Og. Tests of what -O3 makes of loops ask for it themselves; with --all
-    every test has it.
+    Every solver that a test compiles must compile without a warning. Compilers take a quarter of the time with -Og.
+    Tests of what -O3 makes of loops ask for it themselves; with --all every test has it.
     """
     base = tmp_path_factory.getbasetemp()
     shared = (base.parent if base.name.startswith("popen-") else base) / "solvers"
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("PHIGEN_CACHE_DIR", str(shared))
-        if not request.config.option.all:
-            flags = tuple("-Og" if flag == "-O3" else flag for flag in toolchain.BASE_FLAGS)
-            patch.setattr(toolchain, "BASE_FLAGS", flags)
+        optimisation = "-O3" if request.config.option.all else "-Og"
+        flags = (optimisation if flag == "-O3" else flag for flag in toolchain.BASE_FLAGS)
+        patch.setattr(toolchain, "BASE_FLAGS", (*flags, *WARNINGS))
         yield shared
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 import mpmath
@@ -35,6 +36,16 @@ def _once(compilation: Compilation, key: str, make: Callable[[], Any]) -> Any:
 def files(compilation: Compilation, target: str) -> Mapping[str, str]:
     """The generated files."""
     return _once(compilation, f"files {target}", lambda: emit(compilation.program, target, COMMAND))
+
+
+def single_file(compilation: Compilation) -> Mapping[str, str]:
+    """The generated C in one file."""
+    return _once(compilation, "single file", lambda: emit(compilation.program, "c", COMMAND, single_file=True))
+
+
+def library(compilation: Compilation) -> Path:
+    """The generated C as a library, made without a warning."""
+    return library_cache.build(files(compilation, "c"))
 
 
 def interface(compilation: Compilation) -> Interface:

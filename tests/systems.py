@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cache
 from typing import Any
+
+import pytest
 
 from phigen import resources, spec
 from phigen.compiler import Compilation, compile_spec
@@ -24,6 +26,21 @@ NAMES = sorted(path.stem for path in resources.bundled_specs().glob("*.yaml"))
 
 #: Every run of the corpus, as pairs of names.
 RUNS = [(name, run) for name in NAMES for run in spec.load(resources.bundled_specs() / f"{name}.yaml").runs]
+
+#: One system for each kind of step and of bi-realisation that the corpus has; tests/test_corpus.py tells what they
+#: cover. What takes long is done for these by `make test`, and for all by `make test-all`.
+QUICK = (
+    "ablowitz_ladik3", "guiding_centre", "lagrange_top", "lotka_volterra", "nambu_pendulum", "pendulum",
+    "pendulum_euler", "poisson_not_hamiltonian", "rigid_body", "toda3",
+)  # fmt: skip
+
+
+def slow_but(quick: Iterable[Any], of: Iterable[Any] = NAMES) -> list[Any]:
+    """Parameters of a test, some of them quick and the others slow; tuples are several parameters."""
+    values = [each if isinstance(each, tuple) else (each,) for each in of]
+    chosen = [each if isinstance(each, tuple) else (each,) for each in quick]
+    return [pytest.param(*each, marks=() if each in chosen else pytest.mark.slow) for each in values]
+
 
 BODY = """coordinates: [x1, x2, x3]
 poisson: {brackets: {x1: {x2: -x3, x3: x2}, x2: {x3: -x1}}}

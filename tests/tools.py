@@ -12,6 +12,11 @@ from pathlib import Path
 
 import pytest
 
+#: What generated C compiles without, as gcc and clang call it.
+WARNINGS = (
+    "-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Wdouble-promotion", "-Wshadow", "-Werror",
+)  # fmt: skip
+
 _DEBIAN = {"clang": "clang libclang-rt-dev", "clang++": "clang libclang-rt-dev", "node": "nodejs"}
 _LACK = " is not installed"
 
