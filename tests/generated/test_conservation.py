@@ -7,6 +7,7 @@ from support import NAMES, RUNS, compiled, described, setting, solver, values
 from phigen.scheme.steps import Path
 from phigen.symbolic.expression import gradient
 
+#: With --all; five times fewer without.
 STEPS = 100_000
 WINDOWS = 10
 
@@ -27,21 +28,22 @@ PRECESSING = {("kepler", "A1"), ("kepler", "A2")}
 ROUND_OFF = 2e-13
 
 
-@pytest.fixture(scope="module")
-def trajectories():
-    """Long trajectories in C, each computed once."""
-    done = {}
+@pytest.fixture
+def trajectory(name, run, request):
+    """A long trajectory in C."""
+    compilation, steps = compiled(name), STEPS if request.config.option.all else STEPS // 5
+    at, steps = setting(compilation, run), min(steps, FEWER_STEPS.get((name, run), STEPS))
+    stride = max(1, steps // 4_000)
+    return solver(compilation, "c").integrate(at.x, at.h, steps, stride=stride, parameters=at.parameters)
 
-    def trajectory(name, run):
-        if (name, run) not in done:
-            compilation = compiled(name)
-            at, steps = setting(compilation, run), FEWER_STEPS.get((name, run), STEPS)
-            done[name, run] = solver(compilation, "c").integrate(
-                at.x, at.h, steps, stride=max(1, steps // 4_000), parameters=at.parameters
-            )
-        return done[name, run]
 
-    return trajectory
+@pytest.mark.parametrize(("name", "run"), RUNS)
+def test_what_is_conserved_stays_where_it_was(name, run, trajectory):
+    check_casimirs(name, run, trajectory)
+    if (name, run) != ("lotka_volterra", "blow_up"):
+        check_energy(name, trajectory)
+    if run == next(iter(compiled(name).spec.runs)):
+        check_invariants(name, trajectory)
 
 
 def conditioning(compilation, states, parameters, casimir):
@@ -54,9 +56,8 @@ def conditioning(compilation, states, parameters, casimir):
     return max(sizes)
 
 
-@pytest.mark.parametrize(("name", "run"), RUNS)
-def test_casimirs_are_constant_to_round_off(name, run, trajectories):
-    trajectory = trajectories(name, run)
+def check_casimirs(name, run, trajectory):
+    """Constant to round-off."""
     for casimir, found in trajectory.casimirs.items():
         scale = size_of_casimir(compiled(name), trajectory, casimir, growing=(name, run) in GROWING)
         assert np.max(np.abs(found - found[0])) <= 1e-13 * scale, casimir
@@ -89,10 +90,8 @@ def energy_scale(compilation, trajectory):
     return max(abs(trajectory.energy[0]), 1e-3 * float(np.abs(np.array(slope) * trajectory.x[0]).sum()))
 
 
-@pytest.mark.parametrize(("name", "run"), [pair for pair in RUNS if pair != ("lotka_volterra", "blow_up")])
-def test_energy_error_does_not_grow(name, run, trajectories):
+def check_energy(name, trajectory):
     """The largest error of the last window is below 1.5 times that of the first, or both are round-off."""
-    trajectory = trajectories(name, run)
     error = np.abs(trajectory.energy - trajectory.energy[0]) / energy_scale(compiled(name), trajectory)
     windows = [window.max() for window in np.array_split(error[1:], WINDOWS)]
     assert windows[-1] < 1.5 * windows[0] or max(windows) <= ROUND_OFF
@@ -100,12 +99,9 @@ def test_energy_error_does_not_grow(name, run, trajectories):
     assert abs(slope) <= max(0.5 * max(windows), ROUND_OFF), "a linear trend"
 
 
-@pytest.mark.parametrize("name", NAMES)
-def test_invariants_that_are_not_asked_for_do_not_drift(name, trajectories):
-    """Further first integrals of integrable systems keep to a window as well."""
+def check_invariants(name, trajectory):
+    """Further first integrals of integrable systems, which nobody asked for, keep to a window as well."""
     compilation = compiled(name)
-    run = next(iter(compilation.spec.runs))
-    trajectory = trajectories(name, run)
     rows = trajectory.x[:: len(trajectory) // 1000]
     for invariant, e in compilation.system.invariants.items():
         if (name, invariant) in PRECESSING:

@@ -1,10 +1,12 @@
 """Observed orders are the stated ones, on non-linear problems."""
 
+from itertools import product
+
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 from phigen.scheme.steps import Explicit, Newton
-from support import BODY, SPECIES, compile_text, solver
+from support import BODY, SPECIES, compile_text, slow_but, solver
 
 #: Below this the error is that of the reference and of rounding.
 FLOOR = 1e-13
@@ -39,26 +41,30 @@ def order_of(compilation, x0, time):
     return np.log2(errors[-2] / errors[-1])
 
 
-@pytest.mark.parametrize("order", [2, 4, 6, 8, 10, 12])
-@pytest.mark.parametrize(
-    ("text", "x0", "time"),
-    [
-        (BODY + "birealisation: cayley\n", [0.7, -1.1, 0.9], 6.0),
-        (BODY + "birealisation: exponential\n", [0.7, -1.1, 0.9], 6.0),
-        (SPECIES, [0.3, 0.9, 0.6], 3.0),
-    ],
-    ids=["rigid body by Cayley", "rigid body by exponential", "Lotka–Volterra"],
-)
-def test_symmetric_methods_have_even_orders(text, x0, time, order):
+SYMMETRIC = {
+    "rigid body by Cayley": (BODY + "birealisation: cayley\n", [0.7, -1.1, 0.9], 6.0),
+    "rigid body by exponential": (BODY + "birealisation: exponential\n", [0.7, -1.1, 0.9], 6.0),
+    "Lotka–Volterra": (SPECIES, [0.3, 0.9, 0.6], 3.0),
+}
+QUICK_SYMMETRIC = [*zip(2 * list(SYMMETRIC), [2, 4, 6, 8, 10, 12], strict=True)]
+
+
+@pytest.mark.parametrize(("name", "order"), slow_but(QUICK_SYMMETRIC, product(SYMMETRIC, [2, 4, 6, 8, 10, 12])))
+def test_symmetric_methods_have_even_orders(name, order):
+    text, x0, time = SYMMETRIC[name]
     compilation = compile_text(f"{text}order: {order}\ncomposition: none\n")
     assert compilation.order.order == order
     assert order_of(compilation, x0, time) == pytest.approx(order, abs=0.25)
 
 
-@pytest.mark.parametrize("order", [1, 2, 3, 4])
-@pytest.mark.parametrize("side", ["q", "p"])
-@pytest.mark.parametrize("text", [ROD, BEAD], ids=["separable", "not separable"])
-def test_one_sided_methods_have_every_order(text, side, order):
+ONE_SIDED = {"separable": ROD, "not separable": BEAD}
+QUICK_ONE_SIDED = [("separable", "q", k) for k in (1, 3)] + [("separable", "p", k) for k in (2, 4)]
+QUICK_ONE_SIDED += [("not separable", "q", k) for k in (2, 4)] + [("not separable", "p", k) for k in (1, 3)]
+
+
+@pytest.mark.parametrize(("kind", "side", "order"), slow_but(QUICK_ONE_SIDED, product(ONE_SIDED, "qp", [1, 2, 3, 4])))
+def test_one_sided_methods_have_every_order(kind, side, order):
+    text = ONE_SIDED[kind]
     compilation = compile_text(f"{text}birealisation: {{kind: canonical-euler, side: {side}}}\norder: {order}\n")
     assert isinstance(compilation.program.step, Explicit if text == ROD and order == 1 else Newton)
     assert order_of(compilation, [0.5, 0.8], 1.0) == pytest.approx(order, abs=0.25)
