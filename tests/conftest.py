@@ -1,7 +1,13 @@
+import re
+
 import pytest
+from systems import NAMES
 from tools import WARNINGS, not_tested
 
 from phigen.runtime import toolchain
+
+#: Rooms whose tests share what takes long to make.
+WHOLE = ("tests/report/", "tests/random/", "tests/generated/test_guesses.py", "tests/test_paper.py")
 
 
 def pytest_addoption(parser):
@@ -21,6 +27,19 @@ def pytest_collection_modifyitems(config, items):
     slow = [item for item in items if item.get_closest_marker("slow")]
     config.hook.pytest_deselected(items=slow)
     items[:] = [item for item in items if not item.get_closest_marker("slow")]
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config, log):
+    """One worker does all tests of one system of the corpus: what it has made of it is of use to all of them."""
+    from xdist.scheduler import LoadScopeScheduling
+
+    class BySystem(LoadScopeScheduling):
+        def _split_scope(self, nodeid):
+            systems = {part for part in re.split(r"[-\]\[]", nodeid) if part in NAMES}
+            return min(systems) if systems else next((room for room in WHOLE if nodeid.startswith(room)), nodeid)
+
+    return BySystem(config, log)
 
 
 @pytest.fixture(scope="session", autouse=True)

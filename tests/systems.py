@@ -71,6 +71,11 @@ def compiled(name: str, order: int | None = None, scheme: str | None = None) -> 
     return compile_spec(found, order=order, scheme=scheme)
 
 
+def golden(name: str, file: str) -> str:
+    """A file of generated/NAME: tells much of a solver without compiling it. That it is current is another test."""
+    return (resources.bundled_specs().parent / "generated" / name / file).read_text(encoding="utf-8")
+
+
 @cache
 def described(name: str) -> tuple[spec.Spec, System, BiRealisation]:
     """What is known of a system of the corpus before anything of its solver is made: quick, for choosing tests."""

@@ -1,11 +1,14 @@
 """Blocks of steps and groups of members do what single steps do, to round-off."""
 
 from dataclasses import replace
+from itertools import product
 from pathlib import Path
 
 import numpy as np
 import pytest
-from support import COMMAND, NAMES, compile_text, compiled, run, setting, solver, tool, write
+from support import (
+    COMMAND, NAMES, QUICK, compile_text, compiled, golden, run, setting, slow_but, solver, tool, write,
+)  # fmt: skip
 
 from phigen.compiler import compile_spec, emit
 from phigen.targets.c import lanes
@@ -22,12 +25,16 @@ UNFORESEEN = {"henon_heiles", "kowalevski_top"}
 EXERCISE = Path(__file__).with_name("blocks.c")
 
 
-@pytest.mark.parametrize("name", [n for n in NAMES if lanes.blocks(compiled(n).program)])
+#: The systems that have blocks.
+WITH_BLOCKS = [n for n in NAMES if f"{n}_block(" in golden(n, f"{n}.c")]
+
+
+@pytest.mark.parametrize("name", slow_but(QUICK, WITH_BLOCKS))
 def test_blocks_and_groups_equal_single_steps(name, tmp_path):
     exercise(compiled(name), "-O1", tmp_path)
 
 
-@pytest.mark.parametrize("name", ["rigid_body", "volterra5", "toda3", "kowalevski_top"])
+@pytest.mark.parametrize("name", slow_but(["rigid_body", "volterra5"], ["rigid_body", "volterra5", "toda3", "kowalevski_top"]))
 def test_vectorised_blocks_and_groups_equal_single_steps(name, tmp_path):
     """-O1 leaves the loops over lanes as they are, -O3 makes vector instructions of them."""
     exercise(compiled(name), "-O3", tmp_path)
@@ -41,8 +48,10 @@ def test_blocks_of_several_stages_equal_single_steps(name, tmp_path):
     exercise(compilation, "-O2", tmp_path)
 
 
-@pytest.mark.parametrize("composition", ["none", "suzuki"])
-@pytest.mark.parametrize("optimisation", ["-O1", "-O3"])
+@pytest.mark.parametrize(
+    ("composition", "optimisation"),
+    slow_but([("none", "-O3"), ("suzuki", "-O1")], product(["none", "suzuki"], ["-O1", "-O3"])),
+)
 def test_blocks_with_sparse_factors_equal_single_steps(composition, optimisation, tmp_path):
     """A ring of nine species, whose Newton matrix has three entries in each row."""
     n = 9

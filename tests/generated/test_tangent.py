@@ -72,7 +72,7 @@ def test_step_is_a_poisson_map(name, target):
 
 
 @pytest.mark.parametrize("target", TARGETS)
-@pytest.mark.parametrize("name", [n for n in KINDS if not isinstance(compiled(n).program.step, Explicit)])
+@pytest.mark.parametrize("name", [n for n in KINDS if n != "pendulum_euler"])
 def test_tangent_agrees_with_many_digits(name, target):
     compilation = with_tangent(name)
     at = setting(compilation)

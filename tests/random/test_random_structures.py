@@ -1,17 +1,18 @@
 """Random Poisson structures and Hamiltonians: everything that holds for the corpus holds for these.
 
-PHIGEN_RANDOM_SEEDS sets how many seeds of each kind are drawn.
+PHIGEN_RANDOM_SEEDS sets how many seeds of each kind are drawn with --all; without, it is one.
 """
 
 import os
 from functools import cache
+from itertools import product
 
 import mpmath
 import numpy as np
 import pytest
 from precise_path import PrecisePathStep, PreciseSystem, flow_at_one, state_of
 from random_structures import KINDS, draw
-from support import TARGETS, PreciseStep, RawC, compile_text, solver, values
+from support import TARGETS, PreciseStep, RawC, compile_text, slow_but, solver, values
 
 from phigen import spec
 from phigen.analysis.proof import examine
@@ -19,7 +20,7 @@ from phigen.symbolic.verdict import CHECKED, PROVED
 
 EPS = np.finfo(float).eps
 SEEDS = int(os.environ.get("PHIGEN_RANDOM_SEEDS", "2"))
-DRAWS = [pytest.param(kind, seed, id=f"{kind}-{seed}") for kind in KINDS for seed in range(SEEDS)]
+DRAWS = slow_but(product(KINDS, [0]), product(KINDS, range(SEEDS)))
 
 
 @cache
