@@ -1,7 +1,9 @@
 import json
+import re
 from pathlib import Path
 
 import pytest
+from support import NAMES, QUICK, described, golden
 
 from phigen import resources, spec
 
@@ -26,3 +28,15 @@ def test_reference_state_belongs_to_the_run_of_the_spec(name):
     assert run.step * run.steps == expected["time"]
     assert system.order == expected["order"]
     assert len(expected["state"]) == system.dimension
+
+
+def traits(name):
+    """The kind of the bi-realisation, and all functions that the generated C defines and calls."""
+    called = (word.replace(f"{name}_", "") for word in re.findall(r"\b(\w+)\(", golden(name, f"{name}.c")))
+    return {described(name)[2].kind, *(re.sub(r"(_part)?\d*$", "", word) for word in called)}
+
+
+def test_quick_systems_have_every_trait_of_the_corpus():
+    short = [name for name in NAMES if described(name)[0].profile == "small"]  # fast code has much beside
+    assert set().union(*map(traits, short)) - set().union(*map(traits, QUICK)) == set()
+    assert {described(name)[2].kind for name in NAMES} == {described(name)[2].kind for name in QUICK}
