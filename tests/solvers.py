@@ -12,13 +12,14 @@ import numpy as np
 from many_digits import precisely
 
 from phigen.compiler import Compilation, emit
+from phigen.registry import LOADABLE
 from phigen.runtime import cache as library_cache
 from phigen.runtime.c_solver import CSolver
 from phigen.runtime.interface import Interface
 from phigen.runtime.numpy_solver import NumpySolver
 from phigen.runtime.solver import Solver
 
-TARGETS = ("c", "numpy")
+TARGETS = LOADABLE
 
 COMMAND = "phigen build"
 
