@@ -73,6 +73,10 @@ class PhigenError(Exception):
 
     exit_code = 4
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        # By default, an exception is made anew from its message: not those with further arguments.
+        return _restored, (type(self), self.args, self.__dict__)
+
 
 class SpecError(PhigenError):
     """The spec is wrong; holds every diagnostic of the run, in the order of the file."""
@@ -127,3 +131,10 @@ class StepError(PhigenError):
 
 class ParameterError(StepError, ValueError):
     """Parameters with which no step can be made: what is computed from them alone is not finite."""
+
+
+def _restored(kind: type[PhigenError], args: tuple[Any, ...], parts: dict[str, Any]) -> PhigenError:
+    error = kind.__new__(kind, *args)
+    error.args = args
+    error.__dict__.update(parts)
+    return error

@@ -70,8 +70,8 @@ def solver(compilation: Compilation, target: str) -> Solver:
 def _solver(compilation: Compilation, target: str) -> Solver:
     names = interface(compilation)
     if target == "c":
-        return Solver(CSolver.compile(files(compilation, "c"), names), names)
-    return Solver(NumpySolver.from_source(files(compilation, "numpy")[f"{names.name}.py"], names), names)
+        return Solver(CSolver(files(compilation, "c"), names), names)
+    return Solver(NumpySolver(files(compilation, "numpy")[f"{names.name}.py"], names), names)
 
 
 class RawC:

@@ -11,7 +11,7 @@
 #
 # SPDX-License-Identifier: 0BSD
 # This file belongs to whoever generated it; phigen claims no rights in it.
-# body-sha256: ab970fcf70d10db2aada3313bae1098c9da7e04dff9f0104be1dccee324d3335
+# body-sha256: 08a4d3d7e5f5c7c3f55b832445c3241c7ffc772728db2991eb8eb66915466cf4
 import numpy as np
 
 VERSION = "0.1.0"
@@ -46,6 +46,9 @@ class StepError(ArithmeticError):
         super().__init__(f"step {step}: {status}, members {members}")
         self.step, self.status, self.members, self.states = step, status, members, states
 
+    def __reduce__(self):
+        return type(self), (self.step, self.status, self.members, self.states)
+
 
 def _at(coef, members):
     """The coefficients of some members; without a gauge all members share them."""
@@ -68,12 +71,20 @@ def _sum(x, carry, change):
     return total, (x - (total - added)) + (change - added)
 
 
+def _numbers(values):
+    """An array of numbers; ValueError where one is too large."""
+    try:
+        return np.array(values, dtype=float)
+    except OverflowError as error:
+        raise ValueError(f"{error}") from None
+
+
 def _values(parameters):
     """All parameters, as numbers of NumPy: dividing by zero, they give infinity."""
     unknown = sorted(set(parameters) - set(DEFAULT_PARAMETERS))
     if unknown:
         raise TypeError(f"unknown parameters {unknown}; known are {sorted(DEFAULT_PARAMETERS)}")
-    return {name: np.asarray(value, dtype=float)[()] for name, value in {**DEFAULT_PARAMETERS, **parameters}.items()}
+    return {name: _numbers(value)[()] for name, value in {**DEFAULT_PARAMETERS, **parameters}.items()}
 
 
 def _admissible(values):
@@ -360,15 +371,15 @@ def integrate(x0, h, steps, stride=1, gauge=None, **parameters):
     """States at steps 0, stride, 2*stride, ... and at the last step: shape (rows, ..., DIM).
 
     x0 has shape (..., DIM): leading axes are members, each integrated by itself. Raises ValueError for arguments that
-    are not allowed, and StepError as soon as a step of a member fails. gauge (one value for each Casimir in GAUGE) overrides the choice of the solver: the step
-    is an exact Poisson map for each fixed gauge.
+    are not allowed, and StepError as soon as a step of a member fails. gauge (one value for each Casimir in GAUGE)
+    overrides the choice of the solver: the step is an exact Poisson map for each fixed gauge.
     """
-    x = np.array(x0, dtype=float)
+    x, h = _numbers(x0), _numbers(h)
     if x.shape[-1:] != (DIM,):
         raise ValueError(f"x0 has shape {x.shape}, not (..., {DIM})")
     if steps < 0 or stride < 1:
         raise ValueError("steps must be at least 0 and stride at least 1")
-    if not (np.isfinite(x).all() and np.isfinite(h)):
+    if not (np.isfinite(x).all() and h.ndim == 0 and np.isfinite(h)):
         raise ValueError("x0 and h must be finite")
     values = _values(parameters)
     if not _admissible(values):

@@ -12,8 +12,9 @@ from typing import Any
 
 import sympy
 
-from phigen.errors import Diagnostic, SpecError
+from phigen.errors import Diagnostic, LimitError, SpecError
 from phigen.geometry.system import System, build_system
+from phigen.spec import limits
 from phigen.spec.model import MatrixForm, Parameter
 from phigen.symbolic.arithmetic import Arithmetic
 from phigen.symbolic.expression import (
@@ -41,8 +42,8 @@ _TO_SYMPY = {"abs": "Abs"}
 def expression(value: Any) -> Expression:
     """A sympy expression or a number as an `Expression`; Floats as the decimals they print.
 
-    Raises `SpecError` for functions and constants that phigen does not have. Text is refused: parsing it with
-    sympy would evaluate it as Python.
+    Raises `SpecError` for functions and constants that phigen does not have, `LimitError` for numbers out of range.
+    Text is refused: parsing it with sympy would evaluate it as Python.
     """
     if isinstance(value, str):
         raise SpecError([Diagnostic(f"{value!r} is text, not a sympy expression")])
@@ -59,10 +60,8 @@ def _convert(e: Any, known: dict[Any, Expression]) -> Expression:
 def _node(e: Any, args: list[Expression]) -> Expression:
     if e.is_Symbol:
         return symbol(e.name)
-    if e.is_Rational:
-        return number(Fraction(int(e.p), int(e.q)))
-    if e.is_Float and e.is_finite:
-        return number(Fraction(str(e)))
+    if e.is_Rational or (e.is_Float and e.is_finite):
+        return number(_rational(e))
     if e is sympy.pi:
         return PI
     if e is sympy.E:
@@ -72,6 +71,9 @@ def _node(e: Any, args: list[Expression]) -> Expression:
     if e.is_Mul:
         return product(args)
     if isinstance(e, sympy.Pow):
+        if args[1].is_number and abs(args[1].value) > limits.EXPONENT:
+            hint = f"exponents are between -{limits.EXPONENT} and {limits.EXPONENT}"
+            raise LimitError([Diagnostic("an exponent is out of range", hint=hint)])
         return power(args[0], args[1])
     name = type(e).__name__
     name = _FROM_SYMPY.get(name, name)
@@ -79,6 +81,17 @@ def _node(e: Any, args: list[Expression]) -> Expression:
     if known and known.arity == len(args) and (name == "sign" or not known.own):
         return call(name, *args)
     raise SpecError([Diagnostic(f"{e} has no counterpart in phigen", hint=f"known functions: {', '.join(FUNCTIONS)}")])
+
+
+def _rational(e: Any) -> Fraction:
+    """A number, within the limits that hold in spec files."""
+    # Bounded before the conversion: a Float of 1e999999 would have as many digits.
+    if abs(e) < limits.NUMBER and (e == 0 or abs(e) > Fraction(1, limits.DENOMINATOR)):
+        value = Fraction(str(e)) if e.is_Float else Fraction(int(e.p), int(e.q))
+        if limits.number_is_bounded(value):
+            return value
+    hint = "constants are below 1e40, with at most 79 decimals"
+    raise LimitError([Diagnostic("a number is out of range", hint=hint)])
 
 
 def named_function(order: int, s: Any) -> Any:

@@ -95,17 +95,18 @@ class CSession:
 
 
 class CSolver:
-    """The back end over a shared library; it holds no state, so that threads may share it."""
+    """The back end over the shared library of generated files (name → text); it holds no state, so that threads may
+    share it. The library comes from the cache, or is compiled: raises `ToolchainError`."""
 
     target = "c"
 
-    def __init__(self, library: ctypes.CDLL, interface: Interface, gauge: Floats | None = None) -> None:
+    def __init__(self, files: Mapping[str, str], interface: Interface, gauge: Floats | None = None) -> None:
         self.interface = interface
-        self._library, self._gauge = library, gauge
+        self._files, self._library, self._gauge = dict(files), cache.load(files), gauge
         self._c: Any = SimpleNamespace()
-        offered = {name: s for name, s in _EXTRAS.items() if hasattr(library, f"{interface.name}_{name}")}
+        offered = {name: s for name, s in _EXTRAS.items() if hasattr(self._library, f"{interface.name}_{name}")}
         for name, (result, arguments) in {**_SIGNATURES, **offered}.items():
-            function = getattr(library, f"{interface.name}_{name}", None)
+            function = getattr(self._library, f"{interface.name}_{name}", None)
             if function is None:
                 raise ToolchainError(
                     f"the compiled solver has no function {interface.name}_{name}\n"
@@ -114,14 +115,12 @@ class CSolver:
             function.restype, function.argtypes = result, arguments
             setattr(self._c, name, function)
 
+    def __reduce__(self) -> tuple[type[CSolver], tuple[Any, ...]]:
+        return CSolver, (self._files, self.interface, self._gauge)
+
     def with_gauge(self, gauge: Floats) -> CSolver:
         """See `phigen.runtime.backend.Backend`."""
-        return CSolver(self._library, self.interface, np.ascontiguousarray(gauge, dtype=np.float64))
-
-    @classmethod
-    def compile(cls, files: Mapping[str, str], interface: Interface) -> CSolver:
-        """Compile generated files (name → text), or take them from the cache; raises `ToolchainError`."""
-        return cls(cache.load(files), interface)
+        return CSolver(self._files, self.interface, np.ascontiguousarray(gauge, dtype=np.float64))
 
     @property
     def identity(self) -> str:
@@ -216,4 +215,4 @@ def _status(value: int) -> str:
 
 def load(files: Mapping[str, str], interface: Interface) -> CSolver:
     """The back end of generated files; see `phigen.registry`."""
-    return CSolver.compile(files, interface)
+    return CSolver(files, interface)

@@ -124,23 +124,21 @@ class NumpySession:
 
 
 class NumpySolver:
-    """The back end over a generated module; needs no compiler, and makes an ensemble one call."""
+    """The back end over a generated module, loaded from its text; needs no compiler, and makes an ensemble one call."""
 
     target = "numpy"
 
-    def __init__(self, module: ModuleType, interface: Interface, gauge: Floats | None = None) -> None:
+    def __init__(self, source: str, interface: Interface, gauge: Floats | None = None) -> None:
         self.interface = interface
-        self.module: Any = module
-        self._options = {} if gauge is None else {"gauge": gauge}
+        self.module: Any = load_module(source, interface.name)
+        self._source, self._gauge = source, gauge
+
+    def __reduce__(self) -> tuple[type[NumpySolver], tuple[Any, ...]]:
+        return NumpySolver, (self._source, self.interface, self._gauge)
 
     def with_gauge(self, gauge: Floats) -> NumpySolver:
         """See `phigen.runtime.backend.Backend`."""
-        return NumpySolver(self.module, self.interface, gauge)
-
-    @classmethod
-    def from_source(cls, source: str, interface: Interface) -> NumpySolver:
-        """Load the text of a generated module."""
-        return cls(load_module(source, interface.name), interface)
+        return NumpySolver(self._source, self.interface, gauge)
 
     @property
     def identity(self) -> str:
@@ -151,7 +149,7 @@ class NumpySolver:
         """See `phigen.runtime.backend.Backend`."""
         x = x0[np.newaxis].copy()
         self._expect_admissible(x, parameters)
-        gauge = self._options.get("gauge")
+        gauge = self._gauge
         if gauge is None and self.module.GAUGE:
             gauge = self.module.gauge(x0, **parameters)
         return NumpySession(self.module, parameters, x, np.zeros_like(x), gauge)
@@ -192,8 +190,7 @@ class NumpySolver:
         """The gauge of each member, None where there is no gauge."""
         if not self.module.GAUGE:
             return None
-        given = self._options.get("gauge")
-        chosen = self.module.gauge(x0, **parameters) if given is None else given
+        chosen = self.module.gauge(x0, **parameters) if self._gauge is None else self._gauge
         return np.broadcast_to(chosen, (len(x0), len(self.module.GAUGE)))
 
     def hamiltonian(self, x: Floats, parameters: Mapping[str, float]) -> Floats:
@@ -211,4 +208,4 @@ class NumpySolver:
 
 def load(files: Mapping[str, str], interface: Interface) -> NumpySolver:
     """The back end of generated files; see `phigen.registry`."""
-    return NumpySolver.from_source(files[f"{interface.name}.py"], interface)
+    return NumpySolver(files[f"{interface.name}.py"], interface)

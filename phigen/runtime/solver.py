@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import math
-import operator
 from collections.abc import Iterator, Mapping, Sequence
-from difflib import get_close_matches
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from phigen.errors import ParameterError, StepError
+from phigen.runtime import arguments
 from phigen.runtime.backend import Backend
 from phigen.runtime.crossings import CrossingFinder, Function, Section
 from phigen.runtime.interface import BackendError, Floats, Interface, MissingExtraError, Progress, row_steps
@@ -31,6 +29,7 @@ class Solver:
     ``parameters={…}``. What is not given has its default of the spec. Wrong arguments raise `ValueError` or
     `TypeError`, a step that cannot be made `phigen.StepError`, parameters with which no step can be made, such as a
     zero that something is divided by, `phigen.ParameterError`, which is both. Safe to use from several threads.
+    Solvers can be copied and pickled; compiled C is compiled again where the cache does not have it.
     """
 
     def __init__(self, backend: Backend, interface: Interface) -> None:
@@ -72,9 +71,9 @@ class Solver:
         A negative ``h`` goes back in time. ``progress`` is called now and then with the number of steps done.
         Raises `StepError`, whose ``trajectory`` ends with the state before the failing step.
         """
-        values = self._parameters(parameters, more)
-        start, h = self._state(x0, "x0"), _step_size(h)
-        steps, stride = _count(steps, "steps", 0), _count(stride, "stride", 1)
+        values = self._values(parameters, more)
+        start, h = arguments.state(x0, "x0", self.interface), arguments.step_size(h)
+        steps, stride = arguments.count(steps, "steps", 0), arguments.count(stride, "stride", 1)
         try:
             states = rows_along(self.backend.start(start, values), h, steps, stride, progress)
         except BackendError as error:
@@ -84,8 +83,8 @@ class Solver:
 
     def step(self, x: ArrayLike, h: float, *, parameters: Mapping[str, float] | None = None, **more: float) -> Floats:
         """The state (DIM,) one step of size ``h`` after ``x`` (DIM,); raises `StepError`."""
-        values = self._parameters(parameters, more)
-        start, h = self._state(x, "x"), _step_size(h)
+        values = self._values(parameters, more)
+        start, h = arguments.state(x, "x", self.interface), arguments.step_size(h)
         session = self._started(start, h, values)
         try:
             session.advance(h, 1)
@@ -101,8 +100,8 @@ class Solver:
         The derivative is exact to round-off; a gauge chosen by the solver is held fixed. Raises `StepError`, and
         `TypeError` if the solver was compiled without ``tangent=True``.
         """
-        values = self._parameters(parameters, more)
-        start, h = self._state(x, "x"), _step_size(h)
+        values = self._values(parameters, more)
+        start, h = arguments.state(x, "x", self.interface), arguments.step_size(h)
         session = self._started(start, h, values)
         tangent = self._with_tangent(session, h, values)
         return session.state(), tangent
@@ -114,8 +113,9 @@ class Solver:
 
         The steps are those of `integrate`. Raises what `step_tangent` does.
         """
-        values = self._parameters(parameters, more)
-        start, h, steps = self._state(x0, "x0"), _step_size(h), _count(steps, "steps", 0)
+        values = self._values(parameters, more)
+        start, h = arguments.state(x0, "x0", self.interface), arguments.step_size(h)
+        steps = arguments.count(steps, "steps", 0)
         session = self._started(start, h, values)
         for _ in range(steps):
             tangent = self._with_tangent(session, h, values)
@@ -138,8 +138,9 @@ class Solver:
         itself, from the state before it. A start with g = 0 counts if g rises from there. Raises `StepError`, whose
         ``trajectory`` is the `Section` so far.
         """
-        values = self._parameters(parameters, more)
-        start, h, steps = self._state(x0, "x0"), _step_size(h), _count(steps, "steps", 0)
+        values = self._values(parameters, more)
+        start, h = arguments.state(x0, "x0", self.interface), arguments.step_size(h)
+        steps = arguments.count(steps, "steps", 0)
         found: list[tuple[float, Floats]] = []
         finder = CrossingFinder[Session](g, h)
         try:
@@ -160,8 +161,9 @@ class Solver:
         Raises `StepError` if any member fails: its ``members`` are those that did, its ``trajectory`` the array of
         states (members, DIM) as far as each came.
         """
-        values = self._parameters(parameters, more)
-        start, h, steps = self._states(X0, "X0"), _step_size(h), _count(steps, "steps", 0)
+        values = self._values(parameters, more)
+        start, h = arguments.members(X0, "X0", self.interface), arguments.step_size(h)
+        steps = arguments.count(steps, "steps", 0)
         try:
             return self.backend.ensemble(start, h, steps, values)
         except BackendError as error:
@@ -169,24 +171,24 @@ class Solver:
 
     def hamiltonian(self, x: ArrayLike, *, parameters: Mapping[str, float] | None = None, **more: float) -> Floats:
         """H of the states ``x`` (…, DIM), shape (…)."""
-        states = self._array(x, "x")
+        states = arguments.states(x, "x", self.interface)
         rows = states.reshape(-1, self.interface.dimension)
-        return self.backend.hamiltonian(rows, self._parameters(parameters, more)).reshape(states.shape[:-1])
+        return self.backend.hamiltonian(rows, self._values(parameters, more)).reshape(states.shape[:-1])
 
     def casimirs(
         self, x: ArrayLike, *, parameters: Mapping[str, float] | None = None, **more: float
     ) -> dict[str, Floats]:
         """The Casimirs of the states ``x`` (…, DIM), by name, each of shape (…)."""
-        states = self._array(x, "x")
+        states = arguments.states(x, "x", self.interface)
         rows = states.reshape(-1, self.interface.dimension)
-        values = self.backend.casimirs(rows, self._parameters(parameters, more))
+        values = self.backend.casimirs(rows, self._values(parameters, more))
         return {name: values[:, i].reshape(states.shape[:-1]) for i, name in enumerate(self.interface.casimirs)}
 
     def vector_field(self, x: ArrayLike, *, parameters: Mapping[str, float] | None = None, **more: float) -> Floats:
         """π∇H at the states ``x`` (…, DIM), the same shape."""
-        states = self._array(x, "x")
+        states = arguments.states(x, "x", self.interface)
         rows = states.reshape(-1, self.interface.dimension)
-        return self.backend.vector_field(rows, self._parameters(parameters, more)).reshape(states.shape)
+        return self.backend.vector_field(rows, self._values(parameters, more)).reshape(states.shape)
 
     def _trajectory(self, x: Floats, stored: np.ndarray, h: float, parameters: dict[str, float]) -> Trajectory:
         casimirs = self.backend.casimirs(x, parameters)
@@ -243,82 +245,5 @@ class Solver:
         message = f"{where}: {error.status}" + (f", {_ADVICE[error.status]}" if error.status in _ADVICE else "")
         return StepError(message, step=error.step, status=error.status, trajectory=trajectory, members=error.members)
 
-    def _parameters(self, given: Mapping[str, float] | None, more: Mapping[str, float]) -> dict[str, float]:
-        known = self.interface.parameters
-        both = sorted(set(given or {}) & set(more))
-        if both:
-            raise TypeError(f"parameter {both[0]!r} is given twice")
-        values = {name: float(value) for name, value in known.items()}
-        for name, value in {**(given or {}), **more}.items():
-            if name not in known:
-                raise TypeError(_unknown(name, known))
-            values[name] = _number(value, f"parameter {name!r}")
-            if name in self.interface.positive and values[name] <= 0:
-                raise ValueError(f"parameter {name!r} must be positive, not {value!r}")
-        return values
-
-    def _state(self, x: ArrayLike, what: str) -> Floats:
-        state = self._array(x, what)
-        if state.ndim != 1:
-            expected = f"({self.interface.dimension},)"
-            raise ValueError(f"{what} must have shape {expected}, not {state.shape}; for many states use ensemble")
-        return state
-
-    def _states(self, x: ArrayLike, what: str) -> Floats:
-        states = self._array(x, what)
-        if states.ndim != 2:
-            raise ValueError(f"{what} must have shape (members, {self.interface.dimension}), not {states.shape}")
-        return states
-
-    def _array(self, x: ArrayLike, what: str) -> Floats:
-        if np.iscomplexobj(x):
-            raise TypeError(f"{what} must be real")
-        try:
-            # A copy: what the caller does to his array later is his affair.
-            states = np.array(x, dtype=np.float64)
-        except (TypeError, ValueError) as error:
-            raise TypeError(f"{what} must be an array of numbers: {error}") from None
-        names = self.interface.coordinates
-        if states.ndim == 0 or states.shape[-1] != len(names):
-            last = f"{len(names)} ({', '.join(names)})"
-            raise ValueError(f"{what} must have a last axis of length {last}, but its shape is {states.shape}")
-        if not np.isfinite(states).all():
-            index = tuple(np.argwhere(~np.isfinite(states))[0].tolist())
-            place = f"{names[index[-1]]}" + (f" of member {index[0]}" if len(index) > 1 else "")
-            raise ValueError(f"{what} must be finite, but {place} is {float(states[index])!r}")
-        return states
-
-
-def _unknown(name: str, known: Mapping[str, float]) -> str:
-    near = get_close_matches(name, known, n=1)
-    if near:
-        return f"unknown parameter {name!r}; did you mean {near[0]!r}?"
-    listed = f"the system has {', '.join(known)}" if known else "the system has none"
-    return f"unknown parameter {name!r}; {listed}"
-
-
-def _number(value: float, what: str) -> float:
-    try:
-        number = float(value)
-    except (TypeError, ValueError):
-        raise TypeError(f"{what} must be a number, not {value!r}") from None
-    if not math.isfinite(number):
-        raise ValueError(f"{what} must be finite, not {value!r}")
-    return number
-
-
-def _step_size(h: float) -> float:
-    size = _number(h, "the step size h")
-    if size == 0:
-        raise ValueError("the step size h must not be 0")
-    return size
-
-
-def _count(value: int, what: str, minimum: int) -> int:
-    try:
-        count = operator.index(value)
-    except TypeError:
-        raise TypeError(f"{what} must be an integer, not {value!r}") from None
-    if count < minimum:
-        raise ValueError(f"{what} must be at least {minimum}, not {count}")
-    return count
+    def _values(self, given: Mapping[str, float] | None, more: Mapping[str, float]) -> dict[str, float]:
+        return arguments.parameters(self.interface, given, more)

@@ -42,7 +42,7 @@ def from_source(compilation, change=lambda source: source):
     """A solver of the NumPy target, from its source after a change."""
     source = emit(compilation.program, "numpy", "phigen build")["t.py"]
     names = Interface("t", compilation.system.coordinates, compilation.program.order, {}, frozenset(), ("C",))
-    return Solver(NumpySolver.from_source(change(source), names), names)
+    return Solver(NumpySolver(change(source), names), names)
 
 
 def verified(compilation, solvers, steps=400, h=0.2):

@@ -1,5 +1,6 @@
 """What cannot be done is reported, and what was there before stands; members and copies are independent."""
 
+import copy
 import ctypes
 from dataclasses import replace
 from functools import cache
@@ -120,6 +121,22 @@ def test_a_hopeless_path_ends_early(monkeypatch):
     with pytest.raises(module.StepError, match="NO_CONVERGENCE"):
         module.step([1.7, 0.6, -0.5], 709.0)
     assert len(pieces) <= MOST_PIECES + 4 * 2 * LONGEST_PATH
+
+
+@pytest.mark.parametrize("changes", [{"h": 10**400}, {"h": [0.1, 0.2]}, {"h": np.nan}, {"m": 10**400}, {"x0": [10**400, 1]}])
+def test_generated_numpy_refuses_numbers_that_are_none(changes):
+    module = solver(kind("explicit"), "numpy").backend.module
+    with pytest.raises(ValueError, match="finite|too large"):
+        module.integrate(**{"x0": [0.3, 0.4], "h": 0.1, "steps": 0, **changes})
+
+
+def test_errors_of_generated_numpy_can_be_copied():
+    """As pools of processes do."""
+    module = solver(kind("explicit"), "numpy").backend.module
+    with pytest.raises(module.StepError) as caught:
+        module.integrate([[0.3, 0.4], [1e300, 0.4]], 0.1, 3)
+    error, twin = caught.value, copy.copy(caught.value)
+    assert (str(twin), twin.step, twin.status, twin.members) == (str(error), 0, "NOT_FINITE", (1,))
 
 
 # -- parameters with which there are no steps

@@ -6,7 +6,7 @@ import pytest
 import sympy
 from support import NAMES, described
 
-from phigen.errors import SpecError
+from phigen.errors import LimitError, SpecError
 from phigen.geometry.shapes import LiePoisson
 from phigen.geometry.sympy_bridge import expression, to_sympy
 from phigen.geometry.system import System
@@ -69,6 +69,24 @@ def test_symbolic_exponents_and_constants():
 def test_what_has_no_counterpart_is_refused(bad):
     with pytest.raises(SpecError):
         expression(bad)
+
+
+OUT_OF_RANGE = {
+    "integer": 10**400,
+    "integer that cannot be printed": -(10**5000),
+    "rational": sympy.Rational(1, 10**90),
+    "large float": sympy.Float("1e9999"),
+    "small float": sympy.Float("1e-400"),
+    "exponent": x**1001,
+}
+
+
+@pytest.mark.parametrize("what", OUT_OF_RANGE)
+def test_numbers_keep_the_limits_of_spec_files(what):
+    """Else they fail much later, where they become doubles."""
+    with pytest.raises(LimitError, match="out of range"):
+        System.from_sympy([x, y], [[0, 1], [-1, 0]], x + OUT_OF_RANGE[what] * y)
+    assert expression(sympy.Float("1e-30")).value == Fraction(1, 10**30)
 
 
 def test_text_is_never_evaluated():

@@ -1,10 +1,14 @@
+import copy
 import math
+import pickle
+from fractions import Fraction
 
 import numpy as np
 import pytest
 
-from phigen.errors import StepError
+from phigen.errors import Diagnostic, LimitError, Location, StepError
 from phigen.runtime.interface import row_steps
+from phigen.runtime.solver import Solver
 
 START = [1.0, 0.5, 2.0]
 
@@ -137,6 +141,15 @@ def test_progress_counts_up_to_the_number_of_steps(solver):
         ({"steps": -1}, ValueError, "at least 0"),
         ({"steps": 1.5}, TypeError, "integer"),
         ({"stride": 0}, ValueError, "at least 1"),
+        ({"h": 10**400}, ValueError, "finite, not an integer of 401 digits"),
+        ({"h": Fraction(10) ** 5000}, ValueError, "finite"),
+        ({"h": "0.1"}, TypeError, "must be a number, not '0.1'"),
+        ({"x0": [1, -(10**400), 3]}, ValueError, "x0 must be finite, but a number in it is too large"),
+        ({"x0": ["1", "2", "3"]}, TypeError, "array of numbers: texts are none"),
+        ({"steps": 10**400}, ValueError, "at most .*, not an integer of 401 digits"),
+        ({"steps": -(10**5000)}, ValueError, "at least 0, not an integer of 5001 digits"),
+        ({"stride": 2**63}, ValueError, "at most"),
+        ({"omega": 10**400}, ValueError, "'omega' must be finite, not an integer of 401 digits"),
         ({"omga": 1}, TypeError, "did you mean 'omega'"),
         ({"zzz": 1}, TypeError, "the system has omega, limit"),
         ({"omega": -1}, ValueError, "must be positive, not -1"),
@@ -148,6 +161,29 @@ def test_progress_counts_up_to_the_number_of_steps(solver):
 def test_wrong_arguments_are_named(solver, arguments, error, message):
     with pytest.raises(error, match=message):
         solver.integrate(**{"x0": START, "h": 0.1, "steps": 10, **arguments})
+
+
+def test_solvers_can_be_copied_and_pickled(solver):
+    """Also with a fixed gauge; a copy makes the same steps."""
+    expected = solver.integrate(START, 0.1, 5, omega=2).x.tolist()
+    for twin in (copy.copy(solver), copy.deepcopy(solver), pickle.loads(pickle.dumps(solver))):
+        assert twin is not solver
+        assert (repr(twin), twin.interface) == (repr(solver), solver.interface)
+        assert twin.integrate(START, 0.1, 5, omega=2).x.tolist() == expected
+    fixed = pickle.loads(pickle.dumps(Solver(solver.backend.with_gauge(np.array([0.5])), solver.interface)))
+    assert fixed.backend._gauge.tolist() == [0.5]
+
+
+def test_errors_can_be_pickled(solver):
+    """As pools of processes do."""
+    with pytest.raises(StepError) as caught:
+        solver.integrate(START, 0.1, 100, limit=1.05)
+    error, twin = caught.value, pickle.loads(pickle.dumps(caught.value))
+    assert (str(twin), twin.step, twin.status, twin.members) == (str(error), error.step, error.status, error.members)
+    assert twin.trajectory.x.tolist() == error.trajectory.x.tolist()
+    diagnostics = [Diagnostic("one"), Diagnostic("two", Location(1, 2))]
+    found = pickle.loads(pickle.dumps(LimitError(diagnostics)))
+    assert (type(found), found.diagnostics, str(found)) == (LimitError, diagnostics, str(LimitError(diagnostics)))
 
 
 def test_parameters_can_be_a_mapping(solver):

@@ -1,0 +1,124 @@
+"""What users give to a solver, checked: numbers, counts, states and parameters."""
+
+from __future__ import annotations
+
+import math
+import operator
+from collections.abc import Mapping
+from difflib import get_close_matches
+from reprlib import repr as shortened
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from phigen.runtime.interface import Floats, Interface
+
+#: What counts of steps have to fit into.
+_MOST = np.iinfo(np.int64).max
+
+
+def step_size(h: float) -> float:
+    """A step size: finite, and not 0."""
+    size = _number(h, "the step size h")
+    if size == 0:
+        raise ValueError("the step size h must not be 0")
+    return size
+
+
+def count(value: int, what: str, minimum: int) -> int:
+    """An integer from ``minimum`` on."""
+    try:
+        number = operator.index(value)
+    except TypeError:
+        raise TypeError(f"{what} must be an integer, not {_shown(value)}") from None
+    if number < minimum:
+        raise ValueError(f"{what} must be at least {minimum}, not {_shown(number)}")
+    if number > _MOST:
+        raise ValueError(f"{what} must be at most {_MOST}, not {_shown(number)}")
+    return number
+
+
+def parameters(interface: Interface, given: Mapping[str, float] | None, more: Mapping[str, float]) -> dict[str, float]:
+    """The values of all parameters: those ``given`` and ``more``, which exclude each other, and defaults."""
+    known = interface.parameters
+    both = sorted(set(given or {}) & set(more))
+    if both:
+        raise TypeError(f"parameter {both[0]!r} is given twice")
+    values = {name: float(value) for name, value in known.items()}
+    for name, value in {**(given or {}), **more}.items():
+        if name not in known:
+            raise TypeError(_unknown(name, known))
+        values[name] = _number(value, f"parameter {name!r}")
+        if name in interface.positive and values[name] <= 0:
+            raise ValueError(f"parameter {name!r} must be positive, not {_shown(value)}")
+    return values
+
+
+def state(x: ArrayLike, what: str, interface: Interface) -> Floats:
+    """One state (DIM,), a copy."""
+    found = states(x, what, interface)
+    if found.ndim != 1:
+        expected = f"({interface.dimension},)"
+        raise ValueError(f"{what} must have shape {expected}, not {found.shape}; for many states use ensemble")
+    return found
+
+
+def members(x: ArrayLike, what: str, interface: Interface) -> Floats:
+    """Many states (members, DIM), a copy."""
+    found = states(x, what, interface)
+    if found.ndim != 2:
+        raise ValueError(f"{what} must have shape (members, {interface.dimension}), not {found.shape}")
+    return found
+
+
+def states(x: ArrayLike, what: str, interface: Interface) -> Floats:
+    """States (…, DIM), a copy: what the caller does to his array later is his affair."""
+    if np.iscomplexobj(x):
+        raise TypeError(f"{what} must be real")
+    try:
+        if np.asarray(x).dtype.kind in "SU":
+            raise TypeError("texts are none")
+        found = np.array(x, dtype=np.float64)
+    except OverflowError:
+        raise ValueError(f"{what} must be finite, but a number in it is too large") from None
+    except (TypeError, ValueError) as error:
+        raise TypeError(f"{what} must be an array of numbers: {error}") from None
+    names = interface.coordinates
+    if found.ndim == 0 or found.shape[-1] != len(names):
+        last = f"{len(names)} ({', '.join(names)})"
+        raise ValueError(f"{what} must have a last axis of length {last}, but its shape is {found.shape}")
+    if not np.isfinite(found).all():
+        index = tuple(np.argwhere(~np.isfinite(found))[0].tolist())
+        place = f"{names[index[-1]]}" + (f" of member {index[0]}" if len(index) > 1 else "")
+        raise ValueError(f"{what} must be finite, but {place} is {float(found[index])!r}")
+    return found
+
+
+def _number(value: float, what: str) -> float:
+    if isinstance(value, str | bytes | bytearray):  # which float would read
+        raise TypeError(f"{what} must be a number, not {_shown(value)}")
+    try:
+        number = float(value)
+    except OverflowError:
+        raise ValueError(f"{what} must be finite, not {_shown(value)}") from None
+    except (TypeError, ValueError):
+        raise TypeError(f"{what} must be a number, not {_shown(value)}") from None
+    if not math.isfinite(number):
+        raise ValueError(f"{what} must be finite, not {_shown(value)}")
+    return number
+
+
+def _shown(value: Any) -> str:
+    """A value in a message; integers of thousands of digits cannot even be printed."""
+    if isinstance(value, int) and abs(value) > _MOST:
+        return f"an integer of {int(math.log10(abs(value))) + 1} digits"
+    return shortened(value)
+
+
+def _unknown(name: str, known: Mapping[str, float]) -> str:
+    near = get_close_matches(name, known, n=1)
+    if near:
+        return f"unknown parameter {name!r}; did you mean {near[0]!r}?"
+    listed = f"the system has {', '.join(known)}" if known else "the system has none"
+    return f"unknown parameter {name!r}; {listed}"
