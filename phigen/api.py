@@ -160,8 +160,7 @@ def chosen_target(target: str, tell: Callable[[str], None] = lambda message: Non
     try:
         toolchain.find()
     except toolchain.NoCompilerError as error:
-        what, _, hint = str(error).partition("\n")
-        tell(f"{what}; using NumPy, which is slower\n{hint}")
+        tell(f"using NumPy, which is slower: {error}")
         return "numpy"
     return "c"
 

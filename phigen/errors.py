@@ -112,6 +112,12 @@ class MissingPackageError(PhigenError):
     exit_code = 2
 
 
+class FileError(PhigenError):
+    """A file cannot be written, and there is more to say than which, and why."""
+
+    exit_code = 2
+
+
 class StepError(PhigenError):
     """A step could not be made; the state before it stands.
 

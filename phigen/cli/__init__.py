@@ -9,6 +9,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Sequence
 from importlib import import_module
+from io import TextIOWrapper
 from typing import Any
 
 import click
@@ -72,6 +73,9 @@ class Commands(click.Group):
     ) -> Any:
         """Run a command and end the process with its exit code; see `phigen.errors` for the codes."""
         console = extra.setdefault("obj", Console())
+        if isinstance(sys.stdout, TextIOWrapper):
+            # As stderr does: a letter that a terminal does not have ends no work.
+            sys.stdout.reconfigure(errors="backslashreplace")
         try:
             interrupts.working = True
             done = super().main(args, prog_name, standalone_mode=False, **extra)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shlex
+import tempfile
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
@@ -178,8 +179,8 @@ def _certify(console: Console, compilations: Sequence[Compilation], options: Opt
     """Verify what was written; systems that fall short get no certificate, and lose the one they had."""
     from phigen.analysis.proof import compile_proved
     from phigen.cli import certificate
-    from phigen.cli.outputs import write
     from phigen.cli.verify import fallen_short, verified, with_tangent
+    from phigen.writing import write
 
     collector = Collector()
     for compilation in compilations:
@@ -226,15 +227,16 @@ def _report(console: Console, folder: Path, compilation: Compilation, changes: S
 
 def _compile_library(console: Console, folder: Path, name: str) -> None:
     from phigen.runtime import toolchain
+    from phigen.writing import write
 
     found, start = toolchain.find(), time.perf_counter()
     compiler = replace(found, tuning=found.tuning + STRICT)
-    fresh, library = folder / f".{_library(name)}.new", folder / _library(name)
-    try:
+    library = folder / _library(name)
+    with tempfile.TemporaryDirectory(prefix="phigen-") as scratch:
+        fresh = Path(scratch) / library.name
         toolchain.compile_library([folder / f"{name}.c"], fresh, compiler)
-        fresh.replace(library)
-    finally:
-        fresh.unlink(missing_ok=True)
+        write(library, fresh.read_bytes())
+        library.chmod(fresh.stat().st_mode)
     console.note(f"compiled {library} with {found.command[0]} in {time.perf_counter() - start:.2f} s")
 
 

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from collections import Counter
 from typing import TYPE_CHECKING
 
 import click
 
-from phigen.cli.console import Console, heading, out, pass_console, verbosity
+from phigen.cli.console import Console, heading, out, out_json, pass_console, verbosity
 from phigen.cli.failures import Collector
 from phigen.cli.sources import ORDER, load_all, many_specs, scheme_option
 from phigen.errors import CheckError
@@ -72,7 +71,7 @@ def command(
                 described["independent"] = [_described_comparison(c) for c in compared]
             found.append(described)
     if as_json:
-        out(json.dumps(found, indent=2, ensure_ascii=False))
+        out_json(found)
     collector.finish()
 
 

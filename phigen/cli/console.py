@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import codecs
+import errno
+import json
 import os
 import sys
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import AbstractContextManager, contextmanager, suppress
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
@@ -18,7 +21,7 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 @dataclass
 class Console:
-    """The messages of one run of phigen. Data is not its affair: commands print that with `click.echo`."""
+    """The messages of one run of phigen. Data goes through `out`, `out_json` and `out_document`."""
 
     quiet: bool = False
     verbose: bool = False
@@ -28,7 +31,8 @@ class Console:
 
     def _say(self, message: str) -> None:
         self._display.erase()
-        click.echo(message, err=True, color=_colour())
+        with suppress(OSError):  # nobody can be told that nobody can be told
+            click.echo(message, err=True, color=_colour())
 
     def error(self, message: str) -> None:
         """A message about what failed; never silenced."""
@@ -124,8 +128,35 @@ def heading(text: str) -> str:
 
 
 def out(text: str) -> None:
-    """Data on stdout."""
-    click.echo(text, color=_colour())
+    """Lines for people on stdout."""
+    with _stdout():
+        click.echo(text, color=_colour())
+
+
+def out_json(value: Any) -> None:
+    """Data for machines on stdout; in ASCII where stdout is not UTF-8."""
+    encoding = getattr(sys.stdout, "encoding", None) or "utf-8"
+    ascii_only = codecs.lookup(encoding).name != "utf-8"
+    out(json.dumps(value, indent=2, ensure_ascii=ascii_only))
+
+
+def out_document(text: str) -> None:
+    """A whole file on stdout: in UTF-8 whatever the encoding of stdout is, and nothing added."""
+    with _stdout():
+        click.echo(text.encode("utf-8", "backslashreplace"), nl=False)
+
+
+@contextmanager
+def _stdout() -> Iterator[None]:
+    """Errors name stdout."""
+    if sys.stdout is None:
+        raise OSError(errno.EBADF, os.strerror(errno.EBADF), "stdout")
+    try:
+        yield
+    except BrokenPipeError:
+        raise
+    except OSError as error:
+        raise OSError(error.errno, error.strerror, "stdout") from error
 
 
 def _colour() -> bool | None:

@@ -6,7 +6,8 @@ import os
 import sys
 import traceback
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
+from pathlib import Path
 
 import click
 
@@ -58,7 +59,8 @@ def report(error: BaseException, console: Console) -> int:
         return interrupts.CODE
     match error:
         case click.ClickException():
-            error.show()
+            with suppress(OSError):
+                error.show()
             return error.exit_code if isinstance(error, click.UsageError) else USAGE
         case BrokenPipeError():
             # Whoever read our output has gone. Python would complain again when it flushes stdout at the end.
@@ -73,10 +75,22 @@ def report(error: BaseException, console: Console) -> int:
             if console.verbose and error.__cause__:
                 _show_traceback(error, console)
             return error.exit_code
-        case OSError() if error.filename is not None:
-            console.error(f"error: {os.fspath(error.filename)}: {error.strerror or error}")
+        case OSError() if error.errno is not None:
+            place = _place(error)
+            console.error(f"error: {place + ': ' if place else ''}{error.strerror}")
             return USAGE
     return _internal(error, console)
+
+
+def _place(error: OSError) -> str:
+    """The file an error is about; a working directory that was removed names none."""
+    if error.filename is not None:
+        return os.fsdecode(error.filename) if isinstance(error.filename, str | bytes) else str(error.filename)
+    try:
+        Path.cwd()
+    except OSError:
+        return "the working directory"
+    return ""
 
 
 def _is_interrupt(error: BaseException | None) -> bool:

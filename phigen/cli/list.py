@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from typing import TYPE_CHECKING
 
 import click
 
 from phigen.cli.completion import bundled_names
-from phigen.cli.console import out, table, verbosity
+from phigen.cli.console import out, out_json, table, verbosity
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -29,11 +28,11 @@ def command(name: str | None, as_json: bool) -> None:
 
     files = resources.bundled()
     if name is not None:
-        click.echo(_path_of(name, files))
+        out(_path_of(name, files))
         return
     specs = [spec.load(file) for file in files.values()]
     if as_json:
-        click.echo(json.dumps([_described(s, str(files[s.name])) for s in specs], indent=2, ensure_ascii=False))
+        out_json([_described(s, str(files[s.name])) for s in specs])
         return
     rows = [("NAME", "DIM", "STRUCTURE", "TITLE")]
     rows += [(s.name, str(s.dimension), kind_of_structure(s), s.title) for s in specs]

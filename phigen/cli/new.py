@@ -6,7 +6,8 @@ from pathlib import Path
 
 import click
 
-from phigen.cli.console import Console, pass_console, verbosity
+from phigen.cli.console import Console, out_document, pass_console, verbosity
+from phigen.writing import write
 
 
 @click.command("new")
@@ -29,12 +30,10 @@ def command(console: Console, name: str, output: str | None) -> None:
         (wrong,) = error.diagnostics
         raise click.UsageError(wrong.message + (f"; {wrong.hint}" if wrong.hint else "")) from None
     if output == "-":
-        click.echo(text, nl=False)
+        out_document(text)
         return
     path = Path(output or f"{stem}.yaml")
-    try:
-        with path.open("x", encoding="utf-8", newline="\n") as file:
-            file.write(text)
-    except FileExistsError:
-        raise click.UsageError(f"{path} exists already; choose another name, or remove it first") from None
+    if path.exists():
+        raise click.UsageError(f"{path} exists already; choose another name, or remove it first")
+    write(path, text)
     console.note(f"wrote {path}; next: phigen check {path}, phigen run {path}, phigen build {path}")

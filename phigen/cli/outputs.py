@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import contextlib
 import difflib
 import os
-import tempfile
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,6 +11,7 @@ from pathlib import Path
 from phigen.errors import CheckError
 from phigen.registry import suffixes
 from phigen.targets.header import is_edited, split
+from phigen.writing import write_all
 
 
 @dataclass(frozen=True)
@@ -75,37 +74,12 @@ def orphans(directory: Path, names: Iterable[str], targets: Iterable[str]) -> It
 
 
 def apply(planned: Iterable[Change]) -> None:
-    """Write and remove; each file is replaced as a whole, so that a reader never sees half of one."""
+    """Write all or nothing, then remove what is to go; a reader never sees half a file."""
+    planned = list(planned)
+    write_all({c.path: c.after for c in planned if c.after is not None and c.state != "unchanged"})
     for change in planned:
         if change.after is None:
             change.path.unlink(missing_ok=True)
-        elif change.state != "unchanged":
-            write(change.path, change.after)
-
-
-def write(path: Path, text: str) -> None:
-    """Replace a file as a whole."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    handle, temporary = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)
-    try:
-        with os.fdopen(handle, "w", encoding="utf-8", newline="\n") as file:
-            file.write(text)
-        Path(temporary).chmod(_mode(path))
-        Path(temporary).replace(path)
-    except BaseException:
-        with contextlib.suppress(OSError):
-            Path(temporary).unlink()
-        raise
-
-
-def _mode(path: Path) -> int:
-    """The permissions of the file that is replaced, else those of a new file; mkstemp makes private ones."""
-    try:
-        return path.stat().st_mode & 0o777
-    except OSError:
-        mask = os.umask(0)
-        os.umask(mask)
-        return 0o666 & ~mask
 
 
 def read(path: Path) -> str | None:

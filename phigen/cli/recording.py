@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -20,7 +21,7 @@ from phigen.cli.console import Console
 from phigen.cli.experiment import Experiment
 from phigen.cli.interruption import interruptible
 from phigen.compiler import Compilation
-from phigen.errors import StepError
+from phigen.errors import FileError, StepError
 from phigen.runtime import checkpoint
 from phigen.runtime.checkpoint import Checkpoint, MismatchError
 from phigen.runtime.crossings import CrossingFinder, section_columns
@@ -162,9 +163,18 @@ class Recorder:
             "section": about,
         }
         for name, table in self._tables.items():
-            table.close(scalars[name], keep)
-        if not keep and self.files.checkpoint:
+            table.close(scalars[name])
+        if keep:
+            return
+        for table in self._tables.values():
+            table.clean()
+        if self.files.checkpoint:
             self.files.checkpoint.unlink(missing_ok=True)
+
+    def discard(self) -> None:
+        """Leave nothing of a run that could not even begin."""
+        for table in self._tables.values():
+            table.discard()
 
     def trajectory(self, broken: bool) -> Trajectory:
         """As many rows as a figure can show; ``broken`` marks the end of a run that failed."""
@@ -208,9 +218,25 @@ def opened_recorder(recorder: Recorder, resume: bool, console: Console) -> Recor
         raise click.UsageError(
             f"{output} is there, but not {path}: its run is complete, and there is nothing to go on with"
         )
-    recorder.start()
-    recorder.save()
+    try:
+        recorder.start()
+        recorder.save()
+    except OSError:
+        recorder.discard()
+        raise
     return recorder
+
+
+@contextmanager
+def _kept(recorder: Recorder) -> Iterator[None]:
+    """A full disk ends a run as an interrupt does: its last checkpoint is there, to go on from."""
+    try:
+        yield
+    except OSError as error:
+        if recorder.files.checkpoint is None:
+            raise
+        hint = "its last checkpoint is kept; make room, and the same command with --resume goes on from there"
+        raise FileError(f"{error.filename}: {error.strerror}\n  hint: {hint}") from error
 
 
 def record(recorder: Recorder, console: Console) -> tuple[StepError | None, bool]:
@@ -218,7 +244,7 @@ def record(recorder: Recorder, console: Console) -> tuple[StepError | None, bool
     experiment, session, start = recorder.experiment, recorder.session, time.perf_counter()
     run, growth, failure = experiment.run, recorder.growth, None
     label = f"{recorder.solver.interface.name}, order {recorder.solver.order}"
-    with interruptible() as stop, console.progress(label, run.steps) as progress:
+    with _kept(recorder), interruptible() as stop, console.progress(label, run.steps) as progress:
         see_tangent = growth.see if growth else None
         begun = recorder.watch.begun
         pieces = march(session, experiment.h, run.steps, run.stride, recorder.finder, see_tangent, begun=begun)

@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING
 
 import click
 
-from phigen.cli.console import Console, out, pass_console, verbosity
+from phigen.cli.console import Console, out_document, pass_console, verbosity
 from phigen.cli.experiment import prepared
-from phigen.cli.sources import ORDER, load_one, one_spec, run_option, scheme_option
+from phigen.cli.sources import ORDER, expect_writable, load_one, one_spec, run_option, scheme_option
 from phigen.errors import CheckError
+from phigen.writing import write
 
 if TYPE_CHECKING:
     from phigen.report.material import Material
@@ -50,8 +51,8 @@ def command(
 
     spec = load_one(spec_file)
     target = output if output and output != "-" else f"{spec.name}.html"
-    if Path(target).is_dir() or not Path(target).parent.is_dir():
-        raise click.BadParameter(f"{target!r} is not a file in a folder that exists", param_hint="--output")
+    if output != "-":
+        expect_writable(Path(target), "--output")
     experiment = prepared(spec, name) if spec.runs or name or lyapunov else None
     if experiment is None:
         console.warn(f"{spec.file}: the spec has no runs, so the page has no measurements and no figures")
@@ -79,7 +80,7 @@ def _write(material: Material, output: str | None, target: str, console: Console
     if material.methods and not drawable():
         console.warn(NO_FIGURES)
     if output == "-":
-        out(text)
+        out_document(text)
         return
-    Path(target).write_text(text, encoding="utf-8")
-    console.note(f"wrote {target} ({len(text.encode()) // 1000} kB)")
+    write(Path(target), text)
+    console.note(f"wrote {target} ({len(text) // 1000} kB)")

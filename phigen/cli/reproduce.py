@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from phigen.cli.console import Console, heading, out, pass_console, table, verbosity
+from phigen.cli.console import Console, heading, out, out_json, pass_console, table, verbosity
 
 if TYPE_CHECKING:
     from phigen.analysis.paper.plate import Plate
@@ -46,7 +45,10 @@ def command(console: Console, what: str, folder: Path, suffix: str, names: tuple
         save(plates[name].figure, path)
         console.note(f"wrote {path}")
     findings = described(plates)
-    out(json.dumps(findings, indent=2, ensure_ascii=False) if as_json else "\n".join(lines_of(findings)))
+    if as_json:
+        out_json(findings)
+    else:
+        out("\n".join(lines_of(findings)))
 
 
 def described(plates: dict[str, Plate]) -> list[dict[str, Any]]:

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from phigen.cli.console import Console, out, pass_console, verbosity
+from phigen.cli.console import Console, out_json, pass_console, verbosity
 from phigen.cli.experiment import loaded, prepared
 from phigen.cli.interruption import InterruptedRunError
 from phigen.cli.run_summary import described_run, finite, print_summary
@@ -91,7 +90,7 @@ def command(
         watch, drawn[method] = compared(compilation, solver, experiment, method, console)
         summaries.append(watch.summary())
     if as_json:
-        out(json.dumps(finite(described_run(compilation, recorder, summaries)), indent=2, ensure_ascii=False))
+        out_json(finite(described_run(compilation, recorder, summaries)))
     else:
         print_summary(compilation, recorder, summaries)
     if plot:

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import json
-
 import click
 
-from phigen.cli.console import verbosity
+from phigen.cli.console import out_json, verbosity
 
 
 @click.command("schema")
@@ -19,4 +17,4 @@ def command() -> None:
     """
     from phigen import spec
 
-    click.echo(json.dumps(spec.schema(), indent=2, ensure_ascii=False))
+    out_json(spec.schema())

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import textwrap
 import unicodedata
 from collections.abc import Sequence
@@ -10,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from phigen.cli.console import heading, out, verbosity
+from phigen.cli.console import heading, out, out_json, verbosity
 from phigen.cli.sources import CORRECTIONS, ORDER, load_one, one_spec, scheme_option
 
 if TYPE_CHECKING:
@@ -50,7 +49,7 @@ def command(
         out(document(compilation, modified, None if full else SHOWN))
     elif as_json:
         corrections = {"corrections": dict(_modified(compilation, modified, None))} if modified else {}
-        out(json.dumps({**_described(compilation), **corrections}, indent=2, ensure_ascii=False))
+        out_json({**_described(compilation), **corrections})
     else:
         _print(compilation, modified, None if full else SHOWN)
 

@@ -50,13 +50,25 @@ def file_ending(*suffixes: str) -> Callable[[click.Context, click.Parameter, str
     """The callback of an option that names a file: checks its suffix and its folder before any work is done."""
 
     def checked(ctx: click.Context, parameter: click.Parameter, value: str | None) -> Path | None:
-        if value is not None and Path(value).suffix.lower() not in suffixes:
+        if value is None:
+            return None
+        if Path(value).suffix.lower() not in suffixes:
             raise click.BadParameter(f"{value!r} must end in {' or '.join(suffixes)}")
-        if value is not None and not Path(value).parent.is_dir():
-            raise click.BadParameter(f"there is no folder {str(Path(value).parent)!r}")
-        return Path(value) if value is not None else None
+        expect_writable(Path(value))
+        return Path(value)
 
     return checked
+
+
+def expect_writable(path: Path, option: str | None = None) -> None:
+    """Raises `click.BadParameter` for a file that could not be written after the work, so far as that can be known."""
+    device = path.exists() and not path.is_file() and not path.is_dir()
+    if path.is_dir():
+        raise click.BadParameter(f"{str(path)!r} is a folder", param_hint=option)
+    if not path.parent.is_dir():
+        raise click.BadParameter(f"there is no folder {str(path.parent)!r}", param_hint=option)
+    if not device and not os.access(path.parent, os.W_OK):
+        raise click.BadParameter(f"nothing can be written to the folder {str(path.parent)!r}", param_hint=option)
 
 
 def load_one(given: str) -> Spec:

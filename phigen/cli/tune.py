@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import json
 import math
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
-from phigen.cli.console import Console, out, pass_console, verbosity
+from phigen.cli.console import Console, out_json, pass_console, verbosity
 from phigen.cli.experiment import prepared
 from phigen.cli.sources import FIGURES, file_ending, load_one, one_spec, run_option
 from phigen.cli.tune_summary import described, print_tuning, unreached
@@ -74,15 +73,15 @@ def command(
     chosen_target("auto", console.note)
     problem = problem_of(compilation.system, experiment, horizon)
     found = tune(compilation, problem, measure, accuracy, budget, console.note)
+    if as_json:
+        out_json(described(found, spec, experiment.run))
+    elif found.winner:
+        print_tuning(found, spec, experiment.run)
     if plot:
         from phigen.analysis import figures
 
         figures.save(figures.tuning_figure(found, f"{spec.name}, run {experiment.run.name}"), str(plot))
         console.note(f"wrote {plot}")
-    if as_json:
-        out(json.dumps(described(found, spec, experiment.run), indent=2, ensure_ascii=False))
-    elif found.winner:
-        print_tuning(found, spec, experiment.run)
     if not found.winner:
         raise CheckError(unreached(found))
 

@@ -205,11 +205,11 @@ def _write(console: Console, folder: Path, entries: dict[str, Entry], made: Sequ
     obstacles = [o for m, changes in planned for c in changes if (o := _obstacle(c, entries.get(m.order.spec.name)))]
     if obstacles and not force:
         raise CheckError("\n".join(["nothing was written", *indented(obstacles), "  hint: --force overwrites"]))
-    for m, changes in planned:
-        apply(changes)
-        console.note(_done(folder, m, changes))
     text = manifest.text_of({**entries, **{m.order.spec.name: m.entry for m in made}})
-    apply([Change(folder / manifest.FILE, read(folder / manifest.FILE), text)])
+    listing = Change(folder / manifest.FILE, read(folder / manifest.FILE), text)
+    apply([*(c for _, changes in planned for c in changes), listing])
+    for m, changes in planned:
+        console.note(_done(folder, m, changes))
 
 
 def _obstacle(change: Change, known: Entry | None) -> str:

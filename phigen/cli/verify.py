@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Sequence
 from dataclasses import asdict
@@ -11,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from phigen.cli.console import Console, heading, out, pass_console, table, verbosity
+from phigen.cli.console import Console, heading, out, out_json, pass_console, table, verbosity
 from phigen.cli.experiment import Experiment, prepared
 from phigen.cli.failures import Collector
 from phigen.cli.sources import FIGURES, ORDER, file_ending, load_all, many_specs, run_option, scheme_option
@@ -77,7 +76,7 @@ def command(
             if verification.failures:
                 collector.errors.append(fallen_short(verification))
     if as_json:
-        out(json.dumps([described(v) for v in found], indent=2, ensure_ascii=False))
+        out_json([described(v) for v in found])
     collector.finish()
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import zipfile
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -11,6 +10,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+
+from phigen.writing import replacing
 
 _IDENTITY = "identity"
 #: Parts of an identity that are hashes.
@@ -32,12 +33,8 @@ class Checkpoint:
         """Replace the file at once: whenever the process is killed, there is a whole checkpoint."""
         text = np.frombuffer(json.dumps(self.identity).encode(), dtype=np.uint8)
         stored: dict[str, Any] = {_IDENTITY: text, **self.arrays}
-        scratch = path.with_name(path.name + ".new")
-        with scratch.open("wb") as file:
+        with replacing(path) as file:
             np.savez(file, allow_pickle=False, **stored)
-            file.flush()
-            os.fsync(file.fileno())
-        scratch.replace(path)
 
 
 def load(path: Path, identity: Mapping[str, Any]) -> Mapping[str, Any]:

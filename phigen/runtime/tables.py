@@ -9,6 +9,7 @@ from __future__ import annotations
 import os
 import zipfile
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, BinaryIO, Protocol
@@ -16,6 +17,7 @@ from typing import Any, BinaryIO, Protocol
 import numpy as np
 
 from phigen.runtime.interface import Floats
+from phigen.writing import naming, replacing
 
 SUFFIXES = (".csv", ".npz")
 
@@ -45,8 +47,16 @@ class Table(Protocol):
         """Hand what was written over to the disk; its size in bytes, which `opened` takes to go on from here."""
         ...
 
-    def close(self, scalars: Mapping[str, Any], keep: bool = False) -> None:
-        """Make the file complete; ``scalars`` are further arrays of a ``.npz``. ``keep`` what is needed to go on."""
+    def close(self, scalars: Mapping[str, Any]) -> None:
+        """Make the file complete; ``scalars`` are further arrays of a ``.npz``."""
+        ...
+
+    def clean(self) -> None:
+        """Remove what is needed only to go on."""
+        ...
+
+    def discard(self) -> None:
+        """Leave nothing of the table."""
         ...
 
 
@@ -67,27 +77,38 @@ def write(path: str | Path, columns: Sequence[Column], rows: Floats, scalars: Ma
     table = opened(path, columns)
     table.append(rows)
     table.close(scalars)
+    table.clean()
 
 
 class CsvTable:
     """Comma-separated values; every float reads back as the same float."""
 
     def __init__(self, path: Path, columns: Sequence[Column], size: int | None) -> None:
-        self._file = _opened(path, size)
+        self._path, self._file = path, _opened(path, size)
         if size is None:
             self._file.write((",".join(name for c in columns for name in c.names) + "\n").encode())
 
     def append(self, rows: Floats) -> None:
         """See `Table`."""
-        self._file.write("".join(",".join(map(repr, row)) + "\n" for row in rows.tolist()).encode())
+        with naming(self._path):
+            self._file.write("".join(",".join(map(repr, row)) + "\n" for row in rows.tolist()).encode())
 
     def flush(self) -> int:
         """See `Table`."""
-        return _flushed(self._file)
+        with naming(self._path):
+            return _flushed(self._file)
 
-    def close(self, scalars: Mapping[str, Any], keep: bool = False) -> None:
+    def close(self, scalars: Mapping[str, Any]) -> None:
         """See `Table`; there is no place for scalars."""
-        self._file.close()
+        with naming(self._path):
+            self._file.close()
+
+    def clean(self) -> None:
+        """See `Table`; the file itself is all there is."""
+
+    def discard(self) -> None:
+        """See `Table`."""
+        _discarded(self._file, self._path)
 
 
 class NpzTable:
@@ -99,21 +120,24 @@ class NpzTable:
 
     def append(self, rows: Floats) -> None:
         """See `Table`."""
-        self._file.write(np.ascontiguousarray(rows, dtype="<f8").tobytes())
+        with naming(self._part):
+            self._file.write(np.ascontiguousarray(rows, dtype="<f8").tobytes())
 
     def flush(self) -> int:
         """See `Table`."""
-        return _flushed(self._file)
+        with naming(self._part):
+            return _flushed(self._file)
 
-    def close(self, scalars: Mapping[str, Any], keep: bool = False) -> None:
+    def close(self, scalars: Mapping[str, Any]) -> None:
         """See `Table`."""
-        self._file.close()
+        with naming(self._part):
+            self._file.close()
         width = sum(len(c.names) for c in self._columns)
         count = self._part.stat().st_size // (8 * width)
         rows: Floats = np.empty((0, width))
         if count:  # an empty file cannot be mapped
             rows = np.memmap(self._part, dtype="<f8", mode="r", shape=(count, width))
-        with zipfile.ZipFile(self._path, "w", zipfile.ZIP_DEFLATED) as archive:
+        with replacing(self._path) as file, zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as archive:
             first = 0
             for column in self._columns:
                 self._store(archive, column, rows, first)
@@ -121,9 +145,14 @@ class NpzTable:
             for name, value in scalars.items():
                 with archive.open(f"{name}.npy", "w") as member:
                     np.lib.format.write_array(member, np.asarray(value), allow_pickle=False)
-        del rows
-        if not keep:
-            self._part.unlink()
+
+    def clean(self) -> None:
+        """See `Table`."""
+        self._part.unlink(missing_ok=True)
+
+    def discard(self) -> None:
+        """See `Table`."""
+        _discarded(self._file, self._part)
 
     def _store(self, archive: zipfile.ZipFile, column: Column, rows: Floats, first: int) -> None:
         count, width = len(rows), len(column.names)
@@ -145,6 +174,13 @@ def _opened(path: Path, size: int | None) -> BinaryIO:
     file.truncate(size)
     file.seek(size)
     return file
+
+
+def _discarded(file: BinaryIO, path: Path) -> None:
+    with suppress(OSError):  # the rows that a full disk has not taken
+        file.close()
+    with suppress(OSError):
+        path.unlink()
 
 
 def _flushed(file: BinaryIO) -> int:

@@ -85,7 +85,8 @@ def find() -> Compiler:
         reasons.append(f"{candidate} {found}")
     if set(reasons) == {f"{c} {_NOT_FOUND}" for c in _CANDIDATES}:
         reasons = [f"none of {', '.join(_CANDIDATES)} is there"]
-    raise NoCompilerError(f"no C compiler works: {'; '.join(reasons)}\n  hint: {_HINT}")
+    apart = "\n  " if any("\n" in reason for reason in reasons) else " "
+    raise NoCompilerError(f"no C compiler works:{apart}{f';{apart}'.join(reasons)}\n  hint: {_HINT}")
 
 
 def available() -> bool:

@@ -266,6 +266,6 @@ def test_the_same_run_is_drawn_with_the_same_bytes(phigen, write, suffix):
 def test_figures_without_matplotlib_are_refused_before_the_work(phigen, write, monkeypatch):
     monkeypatch.setitem(sys.modules, "matplotlib", None)
     done = phigen("run", write("a.yaml"), "--plot", "a.png", "-o", "a.csv")
-    assert done.exit_code == 6
+    assert done.exit_code == 2
     assert "pip install matplotlib" in done.stderr
     assert not Path("a.csv").exists()

@@ -111,7 +111,7 @@ def test_without_any_that_works_numpy_is_chosen_and_the_reasons_told(compiler, t
     assert chosen_target("auto", told.append) == "numpy"
     compiler("exit 5", name="gcc")
     assert chosen_target("auto", told.append) == "numpy"
-    assert "none of cc, gcc, clang is there; using NumPy" in told[0]
+    assert "using NumPy, which is slower: no C compiler works: none of cc, gcc, clang is there" in told[0]
     assert "cc is not there; gcc failed with exit code 5, and said nothing; clang is not there" in told[1]
 
 

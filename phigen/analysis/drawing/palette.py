@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 
 from phigen.errors import MissingPackageError
+from phigen.writing import write
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -120,7 +121,7 @@ def save(figure: Figure, path: str | Path) -> None:
     suffix = Path(path).suffix.lower()
     if suffix not in SUFFIXES:
         raise ValueError(f"cannot draw {str(path)!r}: the suffix must be one of {', '.join(SUFFIXES)}")
-    Path(path).write_bytes(_rendered(figure, suffix[1:]))
+    write(Path(path), _rendered(figure, suffix[1:]))
 
 
 @styled

@@ -1,0 +1,129 @@
+"""Files that appear whole, together, or not at all, and errors that tell the file they are about.
+
+Contents go to temporary files in the same folder first, which take the place of the files when all are on the disk. So
+a reader never sees half a file, and a full disk leaves what was there.
+"""
+
+from __future__ import annotations
+
+import errno
+import os
+import tempfile
+from collections.abc import Iterator, Mapping
+from contextlib import ExitStack, contextmanager, suppress
+from pathlib import Path
+from typing import BinaryIO
+
+#: Folders of files that are no files: devices, and names of what is open already.
+_DEVICES = ("/dev/", "/proc/")
+
+
+@contextmanager
+def naming(path: str | Path) -> Iterator[None]:
+    """Errors of the operating system name this file: a full disk names none, and a temporary file means nothing."""
+    try:
+        yield
+    except OSError as error:
+        raise OSError(error.errno or errno.EIO, error.strerror or str(error), str(path)) from error
+
+
+def write(path: Path, content: str | bytes) -> None:
+    """Replace a file as a whole; a device or a pipe is written to. Raises `OSError` naming the file."""
+    if str(path).startswith(_DEVICES) or (path.exists() and not path.is_file()):
+        with naming(path):
+            path.write_bytes(_encoded(content))
+        return
+    # Whoever made a link for the file wants to keep it.
+    write_all({path.resolve() if path.is_symlink() else path: content})
+
+
+def write_all(contents: Mapping[Path, str | bytes]) -> None:
+    """Replace files as wholes, all or none; folders are made. Raises `OSError` naming the file that was the reason."""
+    pending: list[_Pending] = []
+    with ExitStack() as undone:
+        for path, content in contents.items():
+            _make_folder(path.parent, undone)
+            pending.append(_Pending(path))
+            undone.callback(pending[-1].abandon)
+            with naming(path):
+                pending[-1].file.write(_encoded(content))
+                pending[-1].settle()
+        for p in pending:
+            p.take_place()
+        undone.pop_all()
+
+
+@contextmanager
+def replacing(path: Path) -> Iterator[BinaryIO]:
+    """A file to write to, which takes the place of ``path`` at the end. Raises `OSError` naming that."""
+    pending = _Pending(path)
+    try:
+        with naming(path):
+            yield pending.file
+            pending.settle()
+        pending.take_place()
+    except BaseException:
+        pending.abandon()
+        raise
+
+
+class _Pending:
+    """A temporary file that is to take the place of another."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        if path.is_dir():
+            raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(path))
+        with naming(path):
+            handle, temporary = tempfile.mkstemp(prefix=".phigen-", dir=path.parent)
+        self.file: BinaryIO = os.fdopen(handle, "wb")
+        self._temporary = Path(temporary)
+
+    def settle(self) -> None:
+        """Have everything on the disk, which may turn out to be full only now."""
+        self.file.flush()
+        os.fsync(self.file.fileno())
+        self.file.close()
+        self._temporary.chmod(_mode(self.path))
+
+    def take_place(self) -> None:
+        """Be the file from now on."""
+        with naming(self.path):
+            self._temporary.replace(self.path)
+
+    def abandon(self) -> None:
+        """Leave nothing."""
+        with suppress(OSError):
+            self.file.close()
+        with suppress(OSError):
+            self._temporary.unlink()
+
+
+def _make_folder(folder: Path, undone: ExitStack) -> None:
+    missing = []
+    while not folder.exists() and folder != folder.parent:
+        missing.append(folder)
+        folder = folder.parent
+    for made in reversed(missing):
+        made.mkdir(exist_ok=True)
+        undone.callback(_remove_folder, made)
+
+
+def _remove_folder(folder: Path) -> None:
+    with suppress(OSError):  # somebody else has put something there
+        folder.rmdir()
+
+
+def _mode(path: Path) -> int:
+    """The permissions of the file that is replaced, else those of a new file; mkstemp makes private ones."""
+    try:
+        return path.stat().st_mode & 0o777
+    except OSError:
+        mask = os.umask(0)
+        os.umask(mask)
+        return 0o666 & ~mask
+
+
+def _encoded(content: str | bytes) -> bytes:
+    # Names of files that are no UTF-8 have surrogates.
+    return content if isinstance(content, bytes) else content.encode("utf-8", "backslashreplace")
