@@ -33,6 +33,11 @@ def algebra(name, dimension):
     return spec(names(dimension), f"lie_algebra: {{name: {name}}}", "x1**2")
 
 
+def nambu(n):
+    casimirs = ["+".join(f"{i * j % 7 + 1}*x{i}**2" for i in range(1, n + 1)) for j in range(1, n - 1)]
+    return f"nambu: [{', '.join(casimirs)}]"
+
+
 SPACE = (names(10), "canonical: {q: [x1, x2, x3, x4, x5], p: [x6, x7, x8, x9, x10]}")
 PLANE = (["x", "y"], "canonical: {q: [x], p: [y]}")
 
@@ -84,6 +89,7 @@ def compiled_in_a_child(text):
             200,
             id="a Casimir that cannot be expanded",
         ),
+        pytest.param(spec(names(9), nambu(9), "x1**2 + x2*x3"), "compiled", 100, id="minors of large matrices"),
         pytest.param(algebra("so(8)", 28), "compiled", 200, id="an algebra whose adjoint traces mislead"),
         pytest.param(algebra("so(7)", 21), "compiled", 50, id="Casimirs with very many terms"),
     ],

@@ -115,25 +115,35 @@ def _nambu(coordinates: Sequence[str], casimirs: Sequence[Expression]) -> Matrix
     if len(casimirs) != n - 2:
         raise SpecError([Diagnostic(f"nambu: {n} coordinates need {n - 2} Casimirs, not {len(casimirs)}")])
     rows = [gradient(c, coordinates) for c in casimirs]
+    minors: dict[tuple[int, ...], Expression] = {}
     upper = {}
     for i in range(n):
         for j in range(i + 1, n):
             columns = [k for k in range(n) if k not in (i, j)]
-            minor = _determinant([[row[k] for k in columns] for row in rows])
+            minor = _minor(rows, columns, minors)
             upper[i, j] = minor if (i + j) % 2 else -minor
     return skew(upper, n)
 
 
-def _determinant(rows: list[list[Expression]]) -> Expression:
-    """Laplace expansion along the first row; the matrices here are small and often sparse."""
-    if not rows:
+def _minor(
+    rows: Sequence[Sequence[Expression]], columns: Sequence[int], known: dict[tuple[int, ...], Expression]
+) -> Expression:
+    """The determinant of as many of the last rows as there are columns, by Laplace expansion along the first of them.
+
+    ``known`` keeps the minors: there are 2ⁿ of them, where the expansion has n! terms.
+    """
+    if not columns:
         return ONE
-    terms = []
-    for k, entry in enumerate(rows[0]):
-        if not entry.is_zero:
-            minor = _determinant([row[:k] + row[k + 1 :] for row in rows[1:]])
-            terms.append(entry * minor if k % 2 == 0 else -(entry * minor))
-    return total(terms)
+    key = tuple(columns)
+    if key not in known:
+        terms = []
+        for k, column in enumerate(columns):
+            entry = rows[len(rows) - len(columns)][column]
+            if not entry.is_zero:
+                term = entry * _minor(rows, (*columns[:k], *columns[k + 1 :]), known)
+                terms.append(term if k % 2 == 0 else -term)
+        known[key] = total(terms)
+    return known[key]
 
 
 def _expect_dimension(name: str, dimension: int, coordinates: int) -> None:

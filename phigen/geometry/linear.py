@@ -30,6 +30,7 @@ class Span(Generic[Key]):
     def __init__(self, field: Field, vectors: Iterable[Mapping[Key, Scalar]]) -> None:
         self._field = field
         self._rows: list[_Row[Key]] = []
+        self._by_pivot: dict[Key, _Row[Key]] = {}
         self.dependent: list[int] = []
         for position, vector in enumerate(vectors):
             if not self._insert(position, vector):
@@ -60,17 +61,17 @@ class Span(Generic[Key]):
                 factor = row.entries[pivot]
                 add_multiple(row.entries, entries, -factor)
                 add_multiple(row.combination, combination, -factor)
-        self._rows.append(_Row(pivot, entries, combination))
+        row = self._by_pivot[pivot] = _Row(pivot, entries, combination)
+        self._rows.append(row)
         return True
 
     def _reduce(self, vector: Mapping[Key, Scalar]) -> tuple[dict[Key, Scalar], dict[int, Scalar]]:
         rest = {k: v for k, v in vector.items() if v != 0}
         combination: dict[int, Scalar] = {}
-        for row in self._rows:
-            factor = rest.get(row.pivot)
-            if factor is not None:
-                add_multiple(rest, row.entries, -factor)
-                add_multiple(combination, row.combination, -factor)
+        # Reduced rows: no row has the pivot of another, so those of the vector itself are all that matter.
+        for row, factor in [(self._by_pivot[k], v) for k, v in rest.items() if k in self._by_pivot]:
+            add_multiple(rest, row.entries, -factor)
+            add_multiple(combination, row.combination, -factor)
         return rest, combination
 
 

@@ -125,6 +125,7 @@ def _composed(
     return Discretisation(generating_function(system, series, 1), 1, found.fractions, note)
 
 
-def too_large(system: System, reason: str) -> LimitError:
-    """The error for a program beyond the budget."""
-    return LimitError([Diagnostic(reason, system.locations.get(("order",)), "ask for a lower order")])
+def too_large(system: System, reason: str, other: str = "for scheme: splitting, ") -> LimitError:
+    """The error for a program beyond the budget; ``other`` is what else than a lower order may help."""
+    hint = f"ask for a lower order, {other}or for fewer terms in H"
+    return LimitError([Diagnostic(reason, system.locations.get(("order",)), hint)])

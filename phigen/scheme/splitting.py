@@ -55,7 +55,8 @@ def build_splitting(
     for kernel in step.kernels:
         operations = cost(kernel.roots)
         if operations > MOST_OPERATIONS:
-            raise too_large(system, f"{kernel.name} would take {operations} operations, more than {MOST_OPERATIONS}")
+            reason = f"{kernel.name} would take {operations} operations, more than {MOST_OPERATIONS}"
+            raise too_large(system, reason, other="")
     said = (*gauge.facts, *facts(choice, step), choice.order.note)
     return Program(
         name=system.name,
