@@ -11,6 +11,8 @@ import numpy as np
 
 from phigen import resources, spec
 from phigen.analysis import figures
+from phigen.analysis.drawing.groups import groups
+from phigen.analysis.drawing.phase_space import joins
 from phigen.analysis.paper.runge_kutta import started
 from phigen.analysis.race import TABLEAUX
 from phigen.analysis.sections import function_of
@@ -21,21 +23,24 @@ from phigen.cli.show import readable_one
 from phigen.runtime.interface import BackendError
 from phigen.runtime.session import rows_along
 from phigen.runtime.solver import Solver
+from phigen.runtime.trajectory import Trajectory
 from phigen.spec.model import Run, Spec
 
 DOCS = Path(__file__).resolve().parent
 PAGE, FACTS, FIGURES = DOCS / "gallery.md", DOCS / "figures" / "gallery.json", DOCS / "figures" / "gallery"
 #: Steps of a run that are drawn, and crossings of a section.
 DRAWN, CROSSINGS = 1500, 1500
+#: Of a curve that winds too fast for its steps less is drawn, down to so many.
+SHORTEST = 100
 #: The longest formula that is shown.
 LONGEST = 160
 HEAD = """# Gallery
 
 The bundled specs, one run of each: the longest. The figures show how it begins, a dot where it starts, and the leaf
 if there is a Casimir of three coordinates. The tables have the largest errors over the whole run, relative to the
-initial value unless that is zero, of phigen's solver and of the classical method that the spec names, with the same
-step. `cp "$(phigen list --path kepler)" .` takes a spec as a start for your own; `phigen show` prints its formulas.
-How errors grow or do not grow is on the page that `phigen report` makes of any spec.
+value at the start unless that is nearly 0, of phigen's solver and of the classical method that the spec names, with
+the same step. `cp "$(phigen list --path kepler)" .` takes a spec as a start for your own; `phigen show` prints its
+formulas. How errors grow or do not grow is on the page that `phigen report` makes of any spec.
 
 This page is made by `python docs/make_gallery.py`.
 """
@@ -100,9 +105,17 @@ def draw(name: str) -> None:
     steps = min(run.steps, DRAWN if found.dimension <= 4 else DRAWN // 2)
     casimirs = compilation.system.casimirs if found.dimension <= 9 else {}
     trajectory = solver.integrate(run.initial, float(run.step), steps, parameters=parameters)
+    while len(trajectory) > SHORTEST and not _is_curve(trajectory):
+        trajectory = solver.integrate(run.initial, float(run.step), trajectory.steps // 2, parameters=parameters)
     figures.save(figures.trajectory_figure(trajectory, casimirs), FIGURES / f"{name}.svg")
     if sections := _sections(found, solver):
         figures.save(figures.section_figure(sections, solver.coordinates), FIGURES / f"{name}_section.svg")
+
+
+def _is_curve(trajectory: Trajectory) -> bool:
+    """Whether the rows of every panel make a line."""
+    panels = groups(trajectory.coordinates)
+    return all(joins(trajectory.x[:, [trajectory.coordinates.index(c) for c in panel]]) for panel in panels)
 
 
 def _sections(found: Spec, solver: Solver) -> dict[str, Any]:

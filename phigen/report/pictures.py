@@ -32,7 +32,9 @@ def trajectory_picture(compilation: Compilation, trajectory: Trajectory) -> Mark
     names = ", ".join(trajectory.coordinates)
     figure = figures.trajectory_figure(_thinned(trajectory), compilation.system.casimirs)
     caption = f"The trajectory of {names}, from the dot at t = 0 to t = {trajectory.t[-1]:.9g}."
-    return _picture("trajectory", figure, "Trajectory in phase space", caption, caption)
+    # Three coordinates are what the viewer shows, but on paper and without scripts.
+    instead = "instead" if len(trajectory.coordinates) == 3 else ""
+    return _picture("trajectory", figure, "Trajectory in phase space", caption, caption, instead)
 
 
 def error_picture(material: Material) -> Markup:
@@ -94,10 +96,11 @@ def work_picture(study: Study) -> Markup:
     return _picture("work", figure, "Work and precision", f"Seconds needed: {words}.", caption)
 
 
-def _picture(identifier: str, figure: Figure, title: str, description: str, caption: str) -> Markup:
+def _picture(identifier: str, figure: Figure, title: str, description: str, caption: str, instead: str = "") -> Markup:
     image = inlined(figures.svg(figure), identifier, title, description)
-    kind = "wide" if figure.get_figwidth() > figures.NARROW else ""
-    tabindex = "0" if kind else "-1"  # what is wider than the page scrolls, by the keyboard too
+    wide = figure.get_figwidth() > figures.NARROW
+    kind = " ".join(filter(None, ["wide" if wide else "", instead]))
+    tabindex = "0" if wide else "-1"  # what is wider than the page scrolls, by the keyboard too
     return page.block(
         "figure", identifier=f"figure-{identifier}", kind=kind, tabindex=tabindex, image=image, caption=caption
     )

@@ -38,6 +38,7 @@ def viewer(
         return Markup("")
     axes = _axes(first.coordinates)
     chosen = opening if opening and not _joined(methods, axes) and _joined(opening, axes) else methods
+    until = _until(methods, chosen)
     shown = {label: curve for label, curve in list(chosen.items())[:CURVES] if len(_finite(curve)) > 1}
     if not shown:
         return Markup("")
@@ -50,9 +51,15 @@ def viewer(
         axes=[(axis, options) for axis in "xyz"],
         curves=list(enumerate(shown, start=1)),
         last=len(given["curves"][0][0]) - 1,
-        until=f" It shows the first part of the run, up to t = {given['high'][-1]:.6g}." if chosen is opening else "",
+        until=until,
         data=page.data("viewer-data", given),
     )
+
+
+def _until(methods: Mapping[str, Trajectory], chosen: Mapping[str, Trajectory]) -> str:
+    """Said where what is chosen ends before the run does."""
+    end, shown = (_finite(next(iter(curves.values())))[-1, -1] for curves in (methods, chosen))
+    return f" It shows the first part of the run, up to t = {shown:.6g}." if abs(shown) < abs(end) else ""
 
 
 def _joined(methods: Mapping[str, Trajectory], axes: list[int]) -> bool:

@@ -116,8 +116,9 @@ def test_a_leaf_has_no_part_at_the_pole_of_its_casimir():
 @pytest.mark.parametrize(
     ("names", "expected"),
     [
-        ("x y px py", ["x px", "y py"]),
-        ("q1 q2 p1 p2", ["q1 p1", "q2 p2"]),
+        ("x y px py", ["x y", "px py"]),
+        ("q1 p1 q2 p2", ["q1 q2", "p1 p2"]),
+        ("q1 q2 q3 p1 p2 p3", ["q1 p1", "q2 p2", "q3 p3"]),
         ("P1 P2 P3 G1 G2 G3", ["P1 P2 P3", "G1 G2 G3"]),
         ("x1 y1 z1 x2 y2 z2", ["x1 y1 z1", "x2 y2 z2"]),
         ("a1 a2 b1 b2 b3", ["a1 a2", "b1 b2 b3"]),

@@ -19,7 +19,7 @@ from phigen.analysis.proof import Examination
 from phigen.analysis.summary import Drift, Summary
 from phigen.compiler import compile_spec
 from phigen.report import document as pages
-from phigen.report import page
+from phigen.report import page, pictures
 from phigen.report.material import Material
 from phigen.report.svg import inlined
 from phigen.report.viewer import MOST_NUMBERS, viewer
@@ -214,13 +214,29 @@ def test_viewer_is_bounded_and_has_axes_for_every_dimension(dimension, axes):
 
 
 def test_viewer_shows_the_opening_of_a_run_whose_rows_make_no_line():
-    angle = np.linspace(0, 3000, 1000)
-    far, near = (trajectory(np.column_stack([np.cos(a), np.sin(a), a / 9])) for a in (angle, angle / 200))
+    angles = np.linspace(0, 3000, 1000), np.linspace(0, 15, 500)
+    far, near = (trajectory(np.column_stack([np.cos(a), np.sin(a), a / 9])) for a in angles)
     data = viewer_data({"a": far}, {"a": near})
     assert data["joined"]
     assert data["high"][2] == pytest.approx(15 / 9)
     assert "first part of the run" in viewer({"a": far}, {"a": near}, {})
     assert "first part of the run" not in viewer({"a": near}, {"a": near}, {})
+
+
+def test_an_opening_that_is_all_of_the_run_is_not_said_to_be_its_first_part():
+    angles = np.linspace(0, 3000, 1000), np.linspace(0, 15, 1000)
+    far, all_of_it = (trajectory(np.column_stack([np.cos(a), np.sin(a), a / 9])) for a in angles)
+    assert viewer_data({"a": far}, {"a": all_of_it})["joined"]
+    assert "first part of the run" not in viewer({"a": far}, {"a": all_of_it}, {})
+
+
+def test_the_picture_is_not_shown_beside_the_viewer_of_the_same_curve():
+    figures = {}
+    for name in ("rigid_body", "kepler"):
+        coordinates = compiled(name).system.coordinates
+        figures[name] = pictures.trajectory_picture(compiled(name), trajectory(np.eye(len(coordinates)), coordinates))
+    assert 'class="instead"' in figures["rigid_body"]
+    assert "instead" not in figures["kepler"]
 
 
 def test_viewer_has_the_leaf_around_the_curve():

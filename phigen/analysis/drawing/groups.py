@@ -12,15 +12,33 @@ def groups(coordinates: Sequence[str]) -> list[Group]:
     """The coordinates in groups of up to three, in their order; a coordinate alone is drawn against the time.
 
     Up to three coordinates are one group. Otherwise, positions are paired with the momenta named after them (q and p,
-    q1 and p1, x and px); if there are none such, neighbours with the same letters or the same number make a group.
+    q1 and p1, x and px), but two positions are the orbit in a plane, and their momenta another group; if there are none
+    such, neighbours with the same letters or the same number make a group.
     """
     names = tuple(coordinates)
     if len(names) <= 3:
         return [names]
-    pairs: list[Group] = [(q, p) for q in names if (p := _momentum(q, names))]
+    pairs = _pairs(names)
+    if is_orbit(names):
+        return [(pairs[0][0], pairs[1][0]), (pairs[0][1], pairs[1][1])]
     if 2 * len(pairs) == len(names):
         return pairs
     return [part for run in _runs(names) for part in _parts(run)]
+
+
+def phase_planes(coordinates: Sequence[str]) -> list[Group]:
+    """Positions with their momenta where there are such, else `groups`: the planes of Poincaré sections."""
+    pairs = _pairs(tuple(coordinates))
+    return pairs if len(coordinates) > 3 and 2 * len(pairs) == len(coordinates) else groups(coordinates)
+
+
+def is_orbit(coordinates: Sequence[str]) -> bool:
+    """Whether they are two positions and their momenta: an orbit in a plane."""
+    return len(coordinates) == 4 and len(_pairs(tuple(coordinates))) == 2
+
+
+def _pairs(names: Group) -> list[Group]:
+    return [(q, p) for q in names if (p := _momentum(q, names))]
 
 
 def _momentum(q: str, names: Group) -> str | None:

@@ -10,7 +10,7 @@ import numpy as np
 
 from phigen.analysis.arrays import Floats
 from phigen.analysis.drawing.dots import draw_dots
-from phigen.analysis.drawing.groups import Group, groups
+from phigen.analysis.drawing.groups import Group, groups, is_orbit
 from phigen.analysis.drawing.leaf import Leaf, around, leaf_of, net
 from phigen.analysis.drawing.palette import PALETTE, SERIES
 from phigen.runtime.trajectory import Trajectory
@@ -59,7 +59,10 @@ def draw_trajectory(figure: FigureBase, trajectory: Trajectory, casimirs: Mappin
             axes = figure.add_subplot(rows, columns, index, projection="3d")
             draw_in_space(axes, group, points, leaf_of(casimirs, group, start, trajectory.parameters), zoom)
         elif len(group) == 2:
-            draw_in_plane(figure.add_subplot(rows, columns, index), group, points)
+            axes = figure.add_subplot(rows, columns, index)
+            draw_in_plane(axes, group, points)
+            if is_orbit(names):
+                axes.set_aspect("equal", adjustable="datalim")
         else:
             draw_in_plane(figure.add_subplot(rows, columns, index), ("t", *group), np.column_stack([t, points]))
 

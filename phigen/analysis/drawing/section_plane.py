@@ -10,7 +10,7 @@ import numpy as np
 
 from phigen.analysis.arrays import Floats
 from phigen.analysis.drawing.dots import draw_dots
-from phigen.analysis.drawing.groups import groups
+from phigen.analysis.drawing.groups import phase_planes
 from phigen.analysis.drawing.palette import SERIES
 
 #: A coordinate that varies less than this, relative to the largest, is that of the section itself.
@@ -22,7 +22,7 @@ def plane_of(names: Sequence[str], points: Floats) -> tuple[int, int]:
     span = np.ptp(points, axis=0) if len(points) else np.ones(len(names))
     constant = span <= _CONSTANT * max(float(span.max()), float(np.max(np.abs(points), initial=0.0)) * 1e-4)
     varying = [name for name, fixed in zip(names, constant, strict=True) if not fixed]
-    pairs = [found for group in groups(names) if len(found := [n for n in group if n in varying]) >= 2]
+    pairs = [found for group in phase_planes(names) if len(found := [n for n in group if n in varying]) >= 2]
     # Of an orbit that closes there is one point; a coordinate that is zero is likely to be that of the section.
     sizes = np.max(np.abs(points), axis=0, initial=0.0)
     rest = sorted((n for n in names if n not in varying), key=lambda n: -sizes[list(names).index(n)])
