@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 
@@ -9,6 +10,7 @@ from phigen import progress
 from phigen.compiler import Compilation, bounded, compile_spec
 from phigen.errors import CheckError, Diagnostic, LimitError, SpecError
 from phigen.geometry import checks
+from phigen.geometry.definedness import undefined_parts
 from phigen.geometry.jacobi import jacobi_identity
 from phigen.geometry.system import System, system_from_spec
 from phigen.realisations import axioms
@@ -25,7 +27,7 @@ Groups = Mapping[str, tuple[Statement, ...]]
 UNEXAMINED = "Casimirs, invariants, the method"
 
 PREFIX = "bi-realisation: "
-CASIMIRS, INVARIANTS = "Casimirs", "Invariants"
+DEFINEDNESS, CASIMIRS, INVARIANTS = "Definedness", "Casimirs", "Invariants"
 METHOD, SPLITTING = "Bi-realisation", "Splitting"
 
 #: Where a spec says what a group of statements is about.
@@ -68,7 +70,7 @@ class Examination:
         found = []
         for group, listed in self.groups.items():
             refuted = [(group, s) for s in listed if s.verdict == REFUTED]
-            found += refuted if group in (CASIMIRS, INVARIANTS) else refuted[:1]
+            found += refuted if group in (DEFINEDNESS, CASIMIRS, INVARIANTS) else refuted[:1]
         return found
 
 
@@ -91,7 +93,10 @@ def examine(
         except SpecError as error:
             raise located(error, spec) from None
         with progress.stage("proofs"):
-            groups = _tensor(system)
+            defined = _definedness(system, spec)
+            if any(s.verdict == REFUTED for group in defined.values() for s in group):
+                return Examination(spec, defined, unexamined=f"the bracket, {UNEXAMINED}")
+            groups = {**defined, **_tensor(system)}
             if any(s.verdict == REFUTED for group in groups.values() for s in group):
                 return Examination(spec, groups, unexamined=UNEXAMINED)
             groups |= _integrals(system)
@@ -122,6 +127,8 @@ def compile_proved(
     found = examine(spec, order=order, scheme=scheme, system=system, extras=extras)
     if found.refuted:
         raise CheckError(refutation(found))
+    for s in found.groups.get(DEFINEDNESS, ()):
+        warnings.warn(f"{spec.name}: {s}", RuntimeWarning, stacklevel=3)
     if found.compilation is None:
         raise found.obstacle or AssertionError("an examination without compilation has an obstacle")
     return replace(found.compilation, seconds=found.seconds)
@@ -133,11 +140,24 @@ def refutation(found: Examination) -> str:
     places: dict[str, tuple[str, ...]] = {f"{name} is a Casimir": ("casimirs", name) for name in spec.casimirs}
     places |= {f"{name} is invariant": ("invariants", name) for name in spec.invariants}
     hint = f"not examined, since they rest on it: {found.unexamined}" if found.unexamined else ""
+    places |= {"H is defined": ("hamiltonian",)}
+    places |= {f"{name} is defined": ("casimirs", name) for name in spec.casimirs}
+    places |= {f"{name} is defined": ("invariants", name) for name in spec.invariants}
     lines = []
     for group, s in found.mistakes:
         place = places.get(s.name, _PLACES.get(group.partition(" (")[0], ("poisson",)))
         lines.append(str(spec.diagnostic(place, str(s), hint)))
     return "\n".join(lines)
+
+
+def _definedness(system: System, spec: Spec) -> dict[str, tuple[Statement, ...]]:
+    """What has no value anywhere; nothing is said of what has."""
+    starts = []
+    for run in spec.runs.values():
+        initial = dict(zip(spec.coordinates, map(float, run.initial), strict=True))
+        starts.append(spec.parameters_of(run) | initial)
+    found = tuple(undefined_parts(system, starts))
+    return {DEFINEDNESS: found} if found else {}
 
 
 def _tensor(system: System) -> dict[str, tuple[Statement, ...]]:

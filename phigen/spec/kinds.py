@@ -24,6 +24,9 @@ from phigen.spec.yaml_source import Mapping as MappingNode
 from phigen.spec.yaml_source import Node, Scalar, describe, is_unprintable, kind_of
 from phigen.spec.yaml_source import Sequence as SequenceNode
 
+#: Dates of YAML, which as expressions would be differences: 2026-01-01 is 2024.
+_DATE = re.compile(r"\s*[0-9]{4}-[0-9]{1,2}-[0-9]{1,2}([Tt\s]|$)")
+
 Path = tuple[Any, ...]
 Schema = dict[str, Any]
 
@@ -207,6 +210,9 @@ class Formula(Kind):
             return self.mismatch(node, path, reader)
         if node.boolean is not None and self.constant:
             return self.mismatch(node, path, reader)
+        if _DATE.match(node.text):
+            hint = "as a difference it is written with spaces around -"
+            return reader.error(node, f"{label(path)}{shown(node.text)} is a date, not {self.expected}", hint)
         return node
 
     def schema(self) -> Schema:

@@ -1,0 +1,83 @@
+"""Whether the formulas of a system have values: nothing is divided by zero, and some point is in their domain."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from fractions import Fraction
+
+from phigen.geometry.system import System
+from phigen.symbolic.expression import Expression, symbols_of, topological
+from phigen.symbolic.numeric import DomainError, evaluate
+from phigen.symbolic.readable import shortened
+from phigen.symbolic.verdict import REFUTED, UNDECIDED, Statement, decide_zero, sample_point
+
+#: Points that are tried, and the factors by which they are tried: near 0, around 1 and far off.
+POINTS = 64
+SCALES = (Fraction(1), Fraction(1, 32), Fraction(30))
+#: Values that are not this small are not those of a disguised zero.
+_CLEARLY = 1e-6
+
+Point = Mapping[str, float]
+
+
+def undefined_parts(system: System, starts: Sequence[Point]) -> Iterator[Statement]:
+    """A statement for each of H, π, the Casimirs and the invariants that seems to have no value anywhere.
+
+    ``starts`` are the coordinates and parameters where runs start. Refuted is what divides by zero, by exact proof
+    where there is one, and what has a value neither at any sampled point nor at any of the starts; where there are no
+    starts, the latter is undecided.
+    """
+    parts: dict[str, Sequence[Expression]] = {"H": [system.hamiltonian]}
+    parts["π"] = [e for row in system.poisson for e in row]
+    parts |= {name: [e] for name, e in (*system.casimirs.items(), *system.invariants.items())}
+    for name, roots in parts.items():
+        found = _divided_by_zero(roots, system.positive)
+        if found:
+            yield Statement(f"{name} is defined", REFUTED, found)
+        elif not _has_value(roots, system.positive, starts):
+            tried = f"no value at any of {len(SCALES) * POINTS} points"
+            told = f"{tried}, nor where a run starts" if starts else tried
+            yield Statement(f"{name} is defined", REFUTED if starts else UNDECIDED, told)
+
+
+def _divided_by_zero(roots: Sequence[Expression], positive: Collection[str]) -> str:
+    """What is divided by, or has its logarithm taken, and is zero; empty if there is nothing of that kind."""
+    for e in topological(list(roots)):
+        if e.op == "log" or (e.op == "pow" and e.value < 0):
+            (argument,) = e.args
+            if _may_be_zero(argument, positive):
+                statement = decide_zero("", [("", argument)], positive)
+                if statement.holds:
+                    what = "the logarithm of" if e.op == "log" else "a division by"
+                    return f"{what} {shortened(argument)}, which is 0: {statement.verdict}"
+    return ""
+
+
+def _may_be_zero(e: Expression, positive: Collection[str]) -> bool:
+    """Whether the values at some points do not exclude that it vanishes."""
+    names = symbols_of(e)
+    for k in range(POINTS):
+        try:
+            (value,) = evaluate([e], {n: float(v) for n, v in sample_point(names, positive, k).items()})
+        except DomainError:
+            continue
+        return abs(value) < _CLEARLY
+    return False
+
+
+def _has_value(roots: Sequence[Expression], positive: Collection[str], starts: Sequence[Point]) -> bool:
+    names = symbols_of(*roots)
+    sampled = (
+        {name: float(scale * value) for name, value in sample_point(names, positive, k).items()}
+        for scale in SCALES
+        for k in range(POINTS)
+    )
+    return any(_is_defined(roots, point) for point in (*starts, *sampled))
+
+
+def _is_defined(roots: Sequence[Expression], point: Point) -> bool:
+    try:
+        evaluate(roots, point)
+    except DomainError:
+        return False
+    return True

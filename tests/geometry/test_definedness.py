@@ -1,0 +1,61 @@
+"""Formulas that have a value nowhere are found: by proof where something is divided by zero, else at points."""
+
+import pytest
+
+from phigen import CheckError, spec
+from phigen.analysis.proof import DEFINEDNESS, compile_proved, examine
+from phigen.symbolic.verdict import REFUTED, UNDECIDED
+
+PAIR = "phigen: 1\nname: t\ncoordinates: [x, y]\npoisson: {canonical: {q: [x], p: [y]}}\n"
+RUN = "runs: {one: {initial: [1, 0.5], step: 0.1, steps: 1}}\n"
+
+
+def statements(text):
+    return examine(spec.loads(PAIR + text)).groups.get(DEFINEDNESS, ())
+
+
+@pytest.mark.parametrize(
+    ("text", "name", "detail"),
+    [
+        (
+            "hamiltonian: 1/(sin(x)**2+cos(x)**2-1) + y\n",
+            "H",
+            "a division by cos(x)**2 + sin(x)**2 - 1, which is 0: proved",
+        ),
+        ("hamiltonian: x*y + log((x+y)**2-x**2-2*x*y-y**2)\n", "H", "which is 0: proved"),
+        ("hamiltonian: log(-1-x**2) + y\n" + RUN, "H", "no value at any of 192 points, nor where a run starts"),
+        (
+            "hamiltonian: x*y\ninvariants: {F: x*y/(exp(x)*exp(-x)-1)}\n",
+            "F",
+            "exp(-x) - 1, which is 0: proved",
+        ),
+    ],
+)
+def test_what_has_no_value_anywhere_is_refused_where_it_stands(text, name, detail):
+    (found,) = statements(text)
+    assert (found.name, found.verdict) == (f"{name} is defined", REFUTED)
+    with pytest.raises(CheckError, match=f"{name} is defined") as caught:
+        compile_proved(spec.loads(PAIR + text))
+    line = {"H": 5, "F": 6}[name]
+    assert str(caught.value).startswith(f"<string>:{line}:")
+    assert detail in found.detail
+
+
+def test_where_no_run_says_where_it_starts_a_search_in_vain_is_a_warning():
+    text = PAIR + "hamiltonian: sqrt(1e-6 - x**2) + y**2\n"
+    (found,) = examine(spec.loads(text)).groups[DEFINEDNESS]
+    assert (found.verdict, found.detail) == (UNDECIDED, "no value at any of 192 points")
+    with pytest.warns(RuntimeWarning, match="H is defined: undecided"):
+        compile_proved(spec.loads(text))
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "hamiltonian: sqrt(1e-6 - x**2) + y**2\n" + RUN.replace("1, 0.5", "0.0001, 0"),
+        "hamiltonian: sqrt(1 - x**2 - y**2) + acosh(2 + x) + 1/(x - y)\n",
+        "parameters: {a: 0}\nhamiltonian: x**2/(1 + a) + log(x*y)\n",
+    ],
+)
+def test_what_has_a_value_somewhere_is_not_mentioned(text):
+    assert statements(text) == ()
