@@ -10,10 +10,11 @@ sp(2n), gl(n), sl(2), su(2), se(n), aff(n), heisenberg(n), and not for sl(3). Th
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
+from phigen import progress
 from phigen.geometry.field import Field, Scalar
 from phigen.geometry.lie_algebra import LieAlgebra, Representation
 from phigen.geometry.linear import Span, add_multiple
@@ -58,14 +59,12 @@ def build(system: System, choice: BirealisationChoice) -> BiRealisation:
         raise refuse(f"birealisation {KIND} does not restrict to this affine π", "try exponential")
     x = [symbol(c) for c in system.coordinates]
     increment = hamiltonian_vector_field(system.poisson, covector_symbols(system.coordinates))
+    quadratic: list[dict[tuple[int, ...], Expression]] = [{} for _ in range(size)]
+    for (i, a, b, k), c in terms.items():
+        quadratic[i][tuple((m == a) + (m == b) for m in range(size)) + tuple(int(m == k) for m in range(size))] = c
     displacement = []
     for i in range(n):
-        quadratic = {
-            tuple((m == a) + (m == b) for m in range(size)) + tuple(int(m == k) for m in range(size)): c
-            for (row, a, b, k), c in terms.items()
-            if row == i
-        }
-        curvature = _factored(quadratic, [*dual.p, *dual.x])
+        curvature = _factored(quadratic[i], [*dual.p, *dual.x])
         displacement.append(-(number(Fraction(1, 2)) * increment[i]) - number(Fraction(1, 4)) * curvature)
     alpha = tuple(xi + d for xi, d in zip(x, displacement, strict=True))
     beta = tuple(reversed_covector(alpha, system.coordinates))
@@ -151,25 +150,27 @@ def _product(algebra: LieAlgebra, representation: Representation) -> Trilinear |
     field = Field(v for m in representation.matrices for v in m.values())
     matrices: list[Sparse] = [{at: field.convert(v) for at, v in m.items()} for m in representation.matrices]
     span = Span(field, matrices)
-    n = algebra.dimension
     rows = [_by_row(m) for m in matrices]
+    beginning: dict[int, list[int]] = {}  # row → the matrices that have entries in it
+    for b, row in enumerate(rows):
+        for r in row:
+            beginning.setdefault(r, []).append(b)
     terms: Trilinear = {}
-    for i in range(n):
-        left = [_times(matrices[a], rows[i]) for a in range(n)]  # E_a E_i
-        for a, b in _pairs(left, n):
-            image = _times(left[a], rows[b])
-            if a != b:
-                add_multiple(image, _times(left[b], rows[a]), field.one)
-            coordinates = span.coordinates(image)
-            if coordinates is None:
-                return _Escape(i, a, b)
-            for k, c in coordinates.items():
-                terms[i, a, b, k] = field.expression(c)
+    with progress.stage("Cayley transform", algebra.dimension) as running:
+        for i in range(algebra.dimension):
+            running.done = i
+            images: dict[tuple[int, int], Sparse] = {}  # (a, b), a ≤ b → E_a E_i E_b + E_b E_i E_a
+            for a, matrix in enumerate(matrices):
+                left = _times(matrix, rows[i])
+                for b in sorted({b for _, c in left for b in beginning.get(c, ())}):
+                    add_multiple(images.setdefault((min(a, b), max(a, b)), {}), _times(left, rows[b]), field.one)
+            for (a, b), image in sorted(images.items(), key=lambda item: item[0]):
+                coordinates = span.coordinates(image)
+                if coordinates is None:
+                    return _Escape(i, a, b)
+                for k, c in coordinates.items():
+                    terms[i, a, b, k] = field.expression(c)
     return terms
-
-
-def _pairs(left: Sequence[Sparse], n: int) -> Iterator[tuple[int, int]]:
-    return ((a, b) for a in range(n) for b in range(a, n) if left[a] or left[b])
 
 
 def _by_row(m: Sparse) -> dict[int, list[tuple[int, Scalar]]]:

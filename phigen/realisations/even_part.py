@@ -96,10 +96,12 @@ def _of_ideal(ideal: LieAlgebra, x: Vector, p: Vector) -> EvenPart | None:
 def matrix_of(algebra: LieAlgebra, p: Sequence[Expression]) -> list[Vector]:
     """M_p, (M_p)_ik = Σ_j c_ij^k p_j."""
     n = range(algebra.dimension)
-    brackets = [[algebra.bracket(i, j) for j in n] for i in n]
-    return [
-        [total(brackets[i][j][k] * p[j] for j in n if k in brackets[i][j] and not p[j].is_zero) for k in n] for i in n
-    ]
+    terms: list[list[list[Expression]]] = [[[] for _ in n] for _ in n]
+    for i in n:
+        for j in n:
+            for k, c in algebra.bracket(i, j).items() if not p[j].is_zero else ():
+                terms[i][k].append(c * p[j])
+    return [[total(entry) for entry in row] for row in terms]
 
 
 def times(matrix: Sequence[Sequence[Expression]], vector: Sequence[Expression]) -> Vector:
