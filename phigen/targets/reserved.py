@@ -108,11 +108,3 @@ __proto__ constructor globalThis Array Error Float64Array Infinity Math NaN Numb
 
 #: Keywords of modules in JavaScript, names with a meaning in objects, and globals that generated code may use.
 JAVASCRIPT_RESERVED = Reserved(frozenset(_JAVASCRIPT.split()))
-
-# -- JavaScript
-
-_JAVASCRIPT = """await break case catch class const continue debugger default delete do else enum export extends false
-finally for function if import in instanceof new null return super switch this throw true try typeof var void while with
-yield let static implements interface package private protected public eval arguments Math NaN Infinity undefined"""
-
-JAVASCRIPT_RESERVED = Reserved(frozenset(_JAVASCRIPT.split()))

@@ -113,6 +113,17 @@ double phi_hamiltonian(const phi_params *params, const double x[PHI_DIM]);
 void phi_casimirs(const phi_params *params, const double x[PHI_DIM], double out[]);
 void phi_vector_field(const phi_params *params, const double x[PHI_DIM], double out[PHI_DIM]);
 
+#if PHI_MODIFIED
+/* The Hamiltonian whose flow a step of size h is, up to O(h^PHI_MODIFIED_POWER): constant along a trajectory to that
+   order. */
+#if PHI_GAUGE
+double phi_modified_hamiltonian(const phi_params *params, const double gauge[PHI_GAUGES], double h,
+    const double x[PHI_DIM]);
+#else
+double phi_modified_hamiltonian(const phi_params *params, double h, const double x[PHI_DIM]);
+#endif
+
+#endif
 const char *phi_status_string(phi_status status);
 
 /* For bindings: the size of phi_solver, and its count of good steps. */
