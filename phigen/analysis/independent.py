@@ -125,7 +125,8 @@ class _Derivation:
         self._positive = compilation.system.positive
         system, chart = compilation.discretised, compilation.chart
         self._poisson = sympy.Matrix([[self._dictionary.expression(e) for e in row] for row in system.poisson])
-        source = self._path(0) if chart.path or chart.kind == exponential.KIND else self._given(chart.alpha)
+        self._alpha, self._beta = self._given(chart.alpha), self._given(chart.beta)
+        source = self._path(0) if chart.path or chart.kind == exponential.KIND else self._alpha
         hamiltonian = self._dictionary.expression(system.hamiltonian)
         self._mine = generating_function(hamiltonian, source, self._dictionary.coordinates)
         self._taken = 0.0
@@ -134,14 +135,16 @@ class _Derivation:
         return source_of_paths(self._poisson, self._dictionary.coordinates, self._dictionary.covector, time)
 
     def _given(self, maps: Sequence[Expression]) -> Source:
+        return closed_form(self._maps(maps), self._dictionary.covector)
+
+    def _maps(self, maps: Sequence[Expression]) -> list[Any]:
         """α or β as the compiler has it, φ expanded at 0."""
-        p = self._dictionary.covector
 
         def expanded(order: int, s: Any) -> Any:
-            least = min(sum(mu) for mu in closed_form([s], p)(self._degree)[0])
+            least = min(sum(mu) for mu in closed_form([s], self._dictionary.covector)(self._degree)[0])
             return expanded_function(order, s, self._degree // least)
 
-        return closed_form([self._dictionary.expression(e, expanded) for e in maps], p)
+        return [self._dictionary.expression(e, expanded) for e in maps]
 
     @property
     def _degree(self) -> int:
@@ -174,12 +177,21 @@ class _Derivation:
         flat = chart.kind == spray.KIND and not chart.exact and choice.spray in ("flat", "auto") and not natural
         return chart.kind == exponential.KIND or flat
 
+    def _at_origin(self) -> list[Pair]:
+        """α(x, 0) and β(x, 0) beside x, which the coefficients of higher degree leave out."""
+        chart, origin = self._compilation.chart, dict.fromkeys(self._dictionary.covector, 0)
+        return [
+            (f"{name}_{x} at p = 0", e.subs(origin), x)
+            for name, maps in (("α", self._maps(chart.alpha)), ("β", self._maps(chart.beta)))
+            for x, e in zip(self._dictionary.coordinates, maps, strict=True)
+        ]
+
     def _ends(self) -> Comparison:
-        coordinates, chart, d = self._compilation.system.coordinates, self._compilation.chart, self._degree
+        coordinates, d = self._compilation.system.coordinates, self._degree
         start = time.perf_counter()
-        pairs: list[Pair] = []
-        for name, maps, end in (("α", chart.alpha, 0), ("β", chart.beta, 1)):
-            for c, theirs, mine in zip(coordinates, self._given(maps)(d), self._path(end)(d), strict=True):
+        pairs = self._at_origin()
+        for name, given, end in (("α", self._alpha, 0), ("β", self._beta, 1)):
+            for c, theirs, mine in zip(coordinates, given(d), self._path(end)(d), strict=True):
                 every = dict.fromkeys([*theirs, *mine])
                 pairs += [(f"{name}_{c}", theirs.get(mu, sympy.S.Zero), mine.get(mu, sympy.S.Zero)) for mu in every]
         name = f"α and β up to degree {d} in p"
@@ -187,11 +199,10 @@ class _Derivation:
         return Comparison(statement, None, time.perf_counter() - start)
 
     def _axioms(self) -> Comparison:
-        chart, d = self._compilation.chart, self._degree
-        x, p = self._dictionary.coordinates, self._dictionary.covector
+        d, x, p = self._degree, self._dictionary.coordinates, self._dictionary.covector
         start = time.perf_counter()
-        alpha, beta = (self._given(maps)(d) for maps in (chart.alpha, chart.beta))
-        rest = [(label, r, sympy.S.Zero) for label, r in defects(self._poisson, alpha, beta, x, p, d)]
+        found = defects(self._poisson, self._alpha(d), self._beta(d), x, p, d)
+        rest = [*self._at_origin(), *((label, r, sympy.S.Zero) for label, r in found)]
         statement = decide(f"axioms of α and β up to degree {d - 1} in p", rest, self._positive, "")
         return Comparison(statement, None, time.perf_counter() - start)
 

@@ -20,7 +20,7 @@ from typing import Any
 
 import sympy
 
-from phigen.series.reference_functions import Functions, derivative
+from phigen.series.reference_functions import Functions, derivative, expanded
 
 #: A multi-index, one exponent for each variable.
 Index = tuple[int, ...]
@@ -47,6 +47,7 @@ def generating_function(hamiltonian: Any, source: Source, x: Sequence[Any]) -> I
 def closed_form(alpha: Sequence[Any], p: Sequence[Any]) -> Source:
     """The a_μ of expressions in x and p which are regular at p = 0 as they are written."""
 
+    @cache
     def source(degree: int) -> list[dict[Index, Any]]:
         return [{m: a for m, a in _at_origin(e, p, degree).items() if 0 < sum(m) <= degree} for e in alpha]
 
@@ -58,7 +59,7 @@ def _at_origin(f: Any, p: Sequence[Any], degree: int) -> dict[Index, Any]:
     functions = Functions([f, *p])
     if not any(g.has(*p) for g in functions if g not in p):
         return {m: functions.expression(c) for m, c in functions.split(functions.element(f), p).items()}
-    return {m: c.subs(dict.fromkeys(p, sympy.Integer(0))) for m, c in taylor(f, p, degree).items()}
+    return {m: expanded(c.subs(dict.fromkeys(p, sympy.Integer(0)))) for m, c in taylor(f, p, degree).items()}
 
 
 def taylor(f: Any, variables: Sequence[Any], degree: int) -> dict[Index, Any]:

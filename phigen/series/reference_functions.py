@@ -117,6 +117,12 @@ class Functions:
         return bool(element == 0)
 
 
+def expanded(e: Any) -> Any:
+    """The expression as a sum of products of functions."""
+    functions = Functions([e])
+    return functions.expression(functions.element(e))
+
+
 def _list_functions(expressions: Iterable[Any], listed: dict[Any, None]) -> None:
     """Add the functions that occur, each after those that its relation refers to."""
     for e in expressions:

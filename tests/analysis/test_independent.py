@@ -175,6 +175,14 @@ def test_a_wrong_sign_of_alpha_is_refuted(signs, verdict):
     assert verdicts(log_canonical(*signs), 3)[None] == verdict
 
 
+def test_maps_that_do_not_begin_at_the_identity_are_refuted():
+    """Canonical brackets have shifts for symmetries, so only α(x, 0) = x tells."""
+    text = PLANE + "poisson: {canonical: {q: [x], p: [y]}}\nhamiltonian: x**2 + y\nbirealisation:\n  kind: custom\n"
+    text += "  alpha: [x, y + p_x + 1]\n  beta: [x + p_y, y + 1]\n"
+    assert verdicts(compile_text(text), 2)[None] == REFUTED
+    assert verdicts(compile_text(text.replace(" + 1]", "]")), 2)[None] == PROVED
+
+
 def test_exchanged_ends_of_paths_are_refuted():
     compilation = compile_text(BODY + "hamiltonian: x**2 + y**2/2\nbirealisation: exponential\n")
     chart = compilation.chart
