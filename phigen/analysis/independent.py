@@ -162,9 +162,13 @@ class _Derivation:
         end = time.perf_counter()
         self._taken += middle - start
         used = compilation.series.polynomial(i)
-        theirs = self._dictionary.expression(used.tower.expression(used.terms[i - 1]))
-        size = len(sympy.Add.make_args(mine)) if mine != 0 else 0
-        statement = decide(f"S_{i}", [("", theirs, mine)], self._positive, f"{size} term{'s' * (size != 1)}")
+        theirs, size = used.tower.expression(used.terms[i - 1]), len(used.terms[i - 1])
+        statement = decide(
+            f"S_{i}",
+            [("", self._dictionary.expression(theirs), mine)],
+            self._positive,
+            f"{size} term{'s' * (size != 1)}",
+        )
         return Comparison(statement, i, self._taken, end - middle)
 
     def maps(self) -> Comparison:

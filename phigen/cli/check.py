@@ -51,6 +51,9 @@ def command(
     the axioms of a bi-realisation; S_1 … S_k solve the Hamilton–Jacobi equation; of a splitting, each flow solves its
     own equation. Each statement is proved in exact
     arithmetic, refuted with a residual, or checked at points. Exit code 5 if anything is refuted.
+
+    With --independent sympy derives the S_i a second time, in another way, and looks at α and β; what it says of each
+    term is shown as it comes. Exit code 3 when its time is up.
     """
     from phigen.analysis.proof import examine
 

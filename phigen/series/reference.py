@@ -81,15 +81,17 @@ def taylor(f: Any, variables: Sequence[Any], degree: int) -> dict[Index, Any]:
 
 
 def _coefficient(
-    i: int, energy: Coefficients, source: Sequence[Coefficients], found: Sequence[Any], x: Sequence[Any]
+    i: int, energy: Coefficients, source: Sequence[Coefficients], known: Sequence[Any], x: Sequence[Any]
 ) -> Any:
     """[t^i] Σ_ν H_ν Δ(t)^ν, with Δ(t) = Σ_μ a_μ p(t)^μ and p(t) = Σ_j t^j ∇S_j."""
-    slopes = [[derivative(s, c) for s in found] for c in x]
+    slopes = [[derivative(s, c) for s in known] for c in x]
     every = [*energy.values(), *(a for d in source for a in d.values()), *(g for row in slopes for g in row)]
     functions = Functions(every)
     momentum = Series(functions, lambda k, j: functions.element(slopes[k][j - 1]))
     displacement = Series(functions, lambda k, j: momentum.combined(source[k], j))
-    return functions.expression(displacement.combined(energy, i))
+    found = displacement.combined(energy, i)
+    zero = functions.seems_zero(found) and functions.vanishes(found)  # of even index in a symmetric bi-realisation
+    return sympy.Integer(0) if zero else functions.expression(found)
 
 
 class Series:

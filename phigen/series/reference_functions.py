@@ -7,14 +7,18 @@ whose exponent is a sum make products, and so do tan u = sin u/cos u, tanh u = s
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from functools import lru_cache
 from math import prod
 from typing import Any
 
+import mpmath
 import sympy
 from sympy.polys.rings import ring
 
 #: A polynomial with more terms than this ends the derivation: the next product would take minutes.
 MOST_TERMS = 200_000
+
+_DIGITS = 50
 
 _QUOTIENTS = {
     sympy.tan: (sympy.sin, sympy.cos),
@@ -116,9 +120,31 @@ class Functions:
                 element = self.total(c * own ** (e % power) * g ** (e // power) for e, c in parts.items())
         return bool(element == 0)
 
+    def seems_zero(self, element: Any) -> bool:
+        """Whether the element is 0 at one point: cheap, and a hint only."""
+        symbols = sorted(set().union(*(f.free_symbols for f in self._generators)), key=str)
+        at = [sympy.Rational(7 + 3 * k, 5 + 2 * k) for k in range(len(symbols))]
+        with mpmath.workdps(_DIGITS):
+            functions = sympy.lambdify(symbols, list(self._generators), modules=[{"Sign": mpmath.sign}, "mpmath"])
+            try:
+                values = functions(*(mpmath.mpf(v.p) / v.q for v in at))
+            except (ArithmeticError, ValueError):
+                return False
+            terms = [
+                mpmath.mpf(int(c.numerator)) / int(c.denominator) * _monomial(values, m) for m, c in element.items()
+            ]
+            return bool(abs(sum(terms)) <= mpmath.mpf(10) ** (-_DIGITS // 2) * sum(map(abs, terms)))
 
+
+def _monomial(values: Sequence[Any], exponents: Sequence[int]) -> Any:
+    return prod(v**e for v, e in zip(values, exponents, strict=False) if e)
+
+
+@lru_cache(maxsize=4096)
 def expanded(e: Any) -> Any:
     """The expression as a sum of products of functions."""
+    if e.is_Atom:
+        return e
     functions = Functions([e])
     return functions.expression(functions.element(e))
 
@@ -163,22 +189,23 @@ def _factors(e: Any) -> list[tuple[Any, int]]:
         return [(over(*e.args), 1), (1 / under(*e.args), 1)]
     if e.is_Pow or isinstance(e, sympy.exp):
         base, exponent = e.as_base_exp()
-        terms = sympy.Add.make_args(sympy.expand(exponent))
-        return [pair for term in terms for pair in _powers(sympy.expand(base), term)]
-    return [(e.func(*map(sympy.expand, e.args)) if e.args else e, 1)]
+        terms = sympy.Add.make_args(expanded(exponent))
+        return [pair for term in terms for pair in _powers(expanded(base), term)]
+    return [(e.func(*map(expanded, e.args)) if e.args else e, 1)]
 
 
 def _powers(base: Any, exponent: Any) -> list[tuple[Any, int]]:
-    """The factors of base^exponent, the exponent a number or a product."""
+    """The factors of base^exponent, where bases of functions have coprime coefficients."""
     c, m = exponent.as_coeff_Mul(rational=True)
     if m != 1:
         return [(base ** (sympy.sign(c) * m / c.q), abs(int(c.p)))]
     whole, rest = divmod(int(c.p), int(c.q))
-    root = [(base ** sympy.Rational(1, c.q), rest)] if rest else []
-    if whole >= 0:
-        return [(base, whole), *root] if whole else root
-    content, primitive = base.as_content_primitive()
-    if primitive.could_extract_minus_sign():
-        content, primitive = -content, -primitive
-    scale = [(content**whole, 1)] if content != 1 else []
-    return [*scale, (1 / primitive, -whole), *root]
+    content, primitive = (sympy.S.One, base) if base.is_number else base.primitive()
+    found = [(content**c, 1), (primitive ** sympy.Rational(1, c.q), rest)]
+    if whole > 0:
+        found.append((primitive, whole))
+    elif primitive.could_extract_minus_sign():
+        found += [(sympy.Integer(-1) ** whole, 1), (1 / -primitive, -whole)]
+    else:
+        found.append((1 / primitive, -whole))
+    return [(f, n) for f, n in found if n and f != 1]
