@@ -41,7 +41,16 @@ def built(name, setting):
     return build(spec, system, setting)
 
 
-@pytest.mark.parametrize("row", rows("Energy up to t = 100,000"), ids=lambda row: "-".join(row[:2]))
+ROWS = rows("Energy up to t = 100,000")
+
+
+def name_of(row):
+    return "-".join(row[:2])
+
+
+@pytest.mark.parametrize(
+    "row", [pytest.param(r, id=name_of(r), marks=pytest.mark.slow if "1e-12" in r else ()) for r in ROWS]
+)
 def test_proposed_settings_reach_their_accuracy_and_hardly_more(row):
     name, accuracy, kind, order, step, *_ = row
     assert 0.2 < energy_error(name, kind, order, step) / float(accuracy) <= 1

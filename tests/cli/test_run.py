@@ -64,7 +64,7 @@ def files(*names):
 @pytest.mark.parametrize(
     ("name", "target", "suffix"),
     [("rigid_body", "c", "csv"), ("rigid_body", "numpy", "npz"), ("pendulum_euler", "numpy", "csv"),
-     ("guiding_centre", "c", "npz")],
+     ("charged_particle", "c", "npz"), pytest.param("guiding_centre", "c", "npz", marks=pytest.mark.slow)],
 )  # fmt: skip
 def test_an_interrupted_run_goes_on_to_the_same_bytes(phigen, in_tmp, name, target, suffix):
     run = ("run", SPECS / f"{name}.yaml", "-t", target, "--steps", 60, "-o", f"a.{suffix}", "--json")

@@ -1,12 +1,13 @@
 """Karasev's construction beside closed forms: both exact, of the same order; for linear brackets the exponential."""
 
 from dataclasses import replace
+from itertools import product
 
 import mpmath
 import numpy as np
 import pytest
 from precise_path import PATH_DIGITS, PrecisePathStep, PreciseSystem, by_paths, compile_paths, numbers
-from support import BODY, SPECIES, compile_text, gradient, solver, values
+from support import BODY, SPECIES, compile_text, gradient, slow_but, solver, values
 
 from phigen import resources, spec
 from phigen.compiler import compile_spec
@@ -27,8 +28,9 @@ BOTH = {
 }
 
 
-@pytest.mark.parametrize("order", [2, 4])
-@pytest.mark.parametrize("name", BOTH)
+@pytest.mark.parametrize(
+    ("name", "order"), slow_but([("so(3)", 4), ("log-canonical", 4), ("constant", 2)], product(BOTH, [2, 4]))
+)
 def test_paths_and_closed_form_converge_to_the_same_flow(name, order):
     text, start, h, _ = BOTH[name]
     closed, paths = compile_text(text, order), compile_paths(text, order)
@@ -57,7 +59,7 @@ def test_both_keep_the_casimir_to_roundoff(name):
 LINEAR = ["rigid_body", "engel_geodesics", "maxwell_bloch", "lagrange_top", "gaussian_moments"]
 
 
-@pytest.mark.parametrize("name", LINEAR)
+@pytest.mark.parametrize("name", slow_but(["rigid_body", "engel_geodesics", "maxwell_bloch"], LINEAR))
 def test_paths_of_a_linear_bracket_are_the_exponential(name):
     given = spec.load(resources.bundled_specs() / f"{name}.yaml")
     run = "reference" if "reference" in given.runs else next(iter(given.runs))
