@@ -21,7 +21,7 @@
  *   4. The implicit step, along paths dm/dt = pi(m) p
  *   5. The solver
  *   6. Ensembles
- * body-sha256: e0ba75231c122d7a6625c7b0f85a4b11fb3271985d987b4afa13292531b83993
+ * body-sha256: 08842312f49610b254f18f3bd4061d7b78078581fe17c4f304d2fc37f59d7768
  */
 #include "ablowitz_ladik3.h"
 
@@ -612,14 +612,14 @@ ablowitz_ladik3_status ablowitz_ladik3_integrate(ablowitz_ladik3_solver *s, doub
 
 const char *ablowitz_ladik3_status_string(ablowitz_ladik3_status status)
 {
-    static const char *const text[] = {
-        "ok",
-        "no convergence: the step is too large",
-        "singular Newton matrix: the step is too large",
-        "not finite: overflow, or outside the domain",
-        "bad argument: a null pointer, or values that are not allowed"
-    };
-    return (unsigned)status <= ablowitz_ladik3_BAD_ARGUMENT ? text[status] : "unknown status";
+    switch (status) { /* no table, which would be data to relocate */
+    case ablowitz_ladik3_OK: return "ok";
+    case ablowitz_ladik3_NO_CONVERGENCE: return "no convergence: the step is too large";
+    case ablowitz_ladik3_SINGULAR: return "singular Newton matrix: the step is too large";
+    case ablowitz_ladik3_NOT_FINITE: return "not finite: overflow, or outside the domain";
+    case ablowitz_ladik3_BAD_ARGUMENT: return "bad argument: a null pointer, or values that are not allowed";
+    }
+    return "unknown status";
 }
 
 size_t ablowitz_ladik3_solver_size(void) { return sizeof(ablowitz_ladik3_solver); }

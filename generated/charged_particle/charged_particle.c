@@ -20,7 +20,7 @@
  *   4. The implicit step, along paths dm/dt = pi(m) p
  *   5. The solver
  *   6. Ensembles
- * body-sha256: ee3a7b2fb20a726f81b5008f3df1e26c78576c1ac5add14aeac295d4cad65fdb
+ * body-sha256: 7d9d841ce428b4e4162f3de5b06c7217b5183874158985cf2b0c035dadd30ef4
  */
 #include "charged_particle.h"
 
@@ -584,14 +584,14 @@ charged_particle_status charged_particle_integrate(charged_particle_solver *s, d
 
 const char *charged_particle_status_string(charged_particle_status status)
 {
-    static const char *const text[] = {
-        "ok",
-        "no convergence: the step is too large",
-        "singular Newton matrix: the step is too large",
-        "not finite: overflow, or outside the domain",
-        "bad argument: a null pointer, or values that are not allowed"
-    };
-    return (unsigned)status <= charged_particle_BAD_ARGUMENT ? text[status] : "unknown status";
+    switch (status) { /* no table, which would be data to relocate */
+    case charged_particle_OK: return "ok";
+    case charged_particle_NO_CONVERGENCE: return "no convergence: the step is too large";
+    case charged_particle_SINGULAR: return "singular Newton matrix: the step is too large";
+    case charged_particle_NOT_FINITE: return "not finite: overflow, or outside the domain";
+    case charged_particle_BAD_ARGUMENT: return "bad argument: a null pointer, or values that are not allowed";
+    }
+    return "unknown status";
 }
 
 size_t charged_particle_solver_size(void) { return sizeof(charged_particle_solver); }

@@ -20,7 +20,7 @@
  *   4. The implicit step, by Newton's method
  *   5. The solver
  *   6. Ensembles
- * body-sha256: e198402416a137736dbff1544999a1dd6b7bba371d0f1ba40e8eade2f192beb6
+ * body-sha256: adc5ca6be5a0f33e4beabf5b8b2775ad9976be43ce3306c97a765157875d992c
  */
 #include "cyclotron.h"
 
@@ -356,14 +356,14 @@ cyclotron_status cyclotron_integrate(cyclotron_solver *s, double h, size_t steps
 
 const char *cyclotron_status_string(cyclotron_status status)
 {
-    static const char *const text[] = {
-        "ok",
-        "no convergence: the step is too large",
-        "singular Newton matrix: the step is too large",
-        "not finite: overflow, or outside the domain",
-        "bad argument: a null pointer, or values that are not allowed"
-    };
-    return (unsigned)status <= cyclotron_BAD_ARGUMENT ? text[status] : "unknown status";
+    switch (status) { /* no table, which would be data to relocate */
+    case cyclotron_OK: return "ok";
+    case cyclotron_NO_CONVERGENCE: return "no convergence: the step is too large";
+    case cyclotron_SINGULAR: return "singular Newton matrix: the step is too large";
+    case cyclotron_NOT_FINITE: return "not finite: overflow, or outside the domain";
+    case cyclotron_BAD_ARGUMENT: return "bad argument: a null pointer, or values that are not allowed";
+    }
+    return "unknown status";
 }
 
 size_t cyclotron_solver_size(void) { return sizeof(cyclotron_solver); }

@@ -20,7 +20,7 @@
  *   4. The implicit step, by Newton's method
  *   5. The solver
  *   6. Ensembles
- * body-sha256: b2a11a9e3a5c50b93d1cb14d74bc531b1fc2590b735f84c1b7ffcc45cf099ee4
+ * body-sha256: cc4004f0fe6734c45d4abdec3aa22e85dc2009b4b2f43397e2434eb1231f97e7
  */
 #include "engel_geodesics.h"
 
@@ -394,14 +394,14 @@ engel_geodesics_status engel_geodesics_integrate(engel_geodesics_solver *s, doub
 
 const char *engel_geodesics_status_string(engel_geodesics_status status)
 {
-    static const char *const text[] = {
-        "ok",
-        "no convergence: the step is too large",
-        "singular Newton matrix: the step is too large",
-        "not finite: overflow, or outside the domain",
-        "bad argument: a null pointer, or values that are not allowed"
-    };
-    return (unsigned)status <= engel_geodesics_BAD_ARGUMENT ? text[status] : "unknown status";
+    switch (status) { /* no table, which would be data to relocate */
+    case engel_geodesics_OK: return "ok";
+    case engel_geodesics_NO_CONVERGENCE: return "no convergence: the step is too large";
+    case engel_geodesics_SINGULAR: return "singular Newton matrix: the step is too large";
+    case engel_geodesics_NOT_FINITE: return "not finite: overflow, or outside the domain";
+    case engel_geodesics_BAD_ARGUMENT: return "bad argument: a null pointer, or values that are not allowed";
+    }
+    return "unknown status";
 }
 
 size_t engel_geodesics_solver_size(void) { return sizeof(engel_geodesics_solver); }

@@ -20,7 +20,7 @@
  *   4. The implicit step, by Newton's method
  *   5. The solver
  *   6. Ensembles
- * body-sha256: cda4b4bfa1cf0a7a92371728df115d7f9fad6b758fe092a153c87e79a4ddb5b8
+ * body-sha256: 50fb0caa61d28f0b4027e18f4d859a6aeb3bbf286d84c344628ef87c12f20656
  */
 #include "gaussian_moments.h"
 
@@ -467,14 +467,14 @@ gaussian_moments_status gaussian_moments_integrate(gaussian_moments_solver *s, d
 
 const char *gaussian_moments_status_string(gaussian_moments_status status)
 {
-    static const char *const text[] = {
-        "ok",
-        "no convergence: the step is too large",
-        "singular Newton matrix: the step is too large",
-        "not finite: overflow, or outside the domain",
-        "bad argument: a null pointer, or values that are not allowed"
-    };
-    return (unsigned)status <= gaussian_moments_BAD_ARGUMENT ? text[status] : "unknown status";
+    switch (status) { /* no table, which would be data to relocate */
+    case gaussian_moments_OK: return "ok";
+    case gaussian_moments_NO_CONVERGENCE: return "no convergence: the step is too large";
+    case gaussian_moments_SINGULAR: return "singular Newton matrix: the step is too large";
+    case gaussian_moments_NOT_FINITE: return "not finite: overflow, or outside the domain";
+    case gaussian_moments_BAD_ARGUMENT: return "bad argument: a null pointer, or values that are not allowed";
+    }
+    return "unknown status";
 }
 
 size_t gaussian_moments_solver_size(void) { return sizeof(gaussian_moments_solver); }

@@ -21,7 +21,7 @@
  *   4. The implicit step, along paths dm/dt = pi(m) p
  *   5. The solver
  *   6. Ensembles
- * body-sha256: f9cf52e51731929777933e7840ac1e6392f86e4cc2b48ae918c7c58d09de3c11
+ * body-sha256: 4cda86a75c64c076061a32103e73acdb21d06da782e30f914d4f13aa4008c97f
  */
 #include "guiding_centre.h"
 
@@ -713,14 +713,14 @@ guiding_centre_status guiding_centre_integrate(guiding_centre_solver *s, double 
 
 const char *guiding_centre_status_string(guiding_centre_status status)
 {
-    static const char *const text[] = {
-        "ok",
-        "no convergence: the step is too large",
-        "singular Newton matrix: the step is too large",
-        "not finite: overflow, or outside the domain",
-        "bad argument: a null pointer, or values that are not allowed"
-    };
-    return (unsigned)status <= guiding_centre_BAD_ARGUMENT ? text[status] : "unknown status";
+    switch (status) { /* no table, which would be data to relocate */
+    case guiding_centre_OK: return "ok";
+    case guiding_centre_NO_CONVERGENCE: return "no convergence: the step is too large";
+    case guiding_centre_SINGULAR: return "singular Newton matrix: the step is too large";
+    case guiding_centre_NOT_FINITE: return "not finite: overflow, or outside the domain";
+    case guiding_centre_BAD_ARGUMENT: return "bad argument: a null pointer, or values that are not allowed";
+    }
+    return "unknown status";
 }
 
 size_t guiding_centre_solver_size(void) { return sizeof(guiding_centre_solver); }

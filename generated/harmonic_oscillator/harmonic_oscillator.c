@@ -20,7 +20,7 @@
  *   4. The implicit step, by Newton's method
  *   5. The solver
  *   6. Ensembles
- * body-sha256: db12759604f9379b9b5a57c775b021ca66fae055b0acc5e1cf122572e502d1c1
+ * body-sha256: ced9e360f8bdcd52c6cb4a0a6c1c251f0d76b2a3a24de49821f15d49992cbac0
  */
 #include "harmonic_oscillator.h"
 
@@ -369,14 +369,15 @@ harmonic_oscillator_status harmonic_oscillator_integrate(harmonic_oscillator_sol
 
 const char *harmonic_oscillator_status_string(harmonic_oscillator_status status)
 {
-    static const char *const text[] = {
-        "ok",
-        "no convergence: the step is too large",
-        "singular Newton matrix: the step is too large",
-        "not finite: overflow, or outside the domain",
-        "bad argument: a null pointer, or values that are not allowed"
-    };
-    return (unsigned)status <= harmonic_oscillator_BAD_ARGUMENT ? text[status] : "unknown status";
+    switch (status) { /* no table, which would be data to relocate */
+    case harmonic_oscillator_OK: return "ok";
+    case harmonic_oscillator_NO_CONVERGENCE: return "no convergence: the step is too large";
+    case harmonic_oscillator_SINGULAR: return "singular Newton matrix: the step is too large";
+    case harmonic_oscillator_NOT_FINITE: return "not finite: overflow, or outside the domain";
+    case harmonic_oscillator_BAD_ARGUMENT:
+        return "bad argument: a null pointer, or values that are not allowed";
+    }
+    return "unknown status";
 }
 
 size_t harmonic_oscillator_solver_size(void) { return sizeof(harmonic_oscillator_solver); }

@@ -20,7 +20,7 @@
  *   4. The implicit step, by Newton's method
  *   5. The solver
  *   6. Ensembles
- * body-sha256: 0fc7f00d71084587b343d30631eb28d2545edba1ae3bb1b87d854733fd81c6a0
+ * body-sha256: 111adfe017986c05a2e94f92892b4d5fdd45270ee48198f06419a1975942aa0b
  */
 #include "henon_heiles.h"
 
@@ -422,14 +422,14 @@ henon_heiles_status henon_heiles_integrate(henon_heiles_solver *s, double h, siz
 
 const char *henon_heiles_status_string(henon_heiles_status status)
 {
-    static const char *const text[] = {
-        "ok",
-        "no convergence: the step is too large",
-        "singular Newton matrix: the step is too large",
-        "not finite: overflow, or outside the domain",
-        "bad argument: a null pointer, or values that are not allowed"
-    };
-    return (unsigned)status <= henon_heiles_BAD_ARGUMENT ? text[status] : "unknown status";
+    switch (status) { /* no table, which would be data to relocate */
+    case henon_heiles_OK: return "ok";
+    case henon_heiles_NO_CONVERGENCE: return "no convergence: the step is too large";
+    case henon_heiles_SINGULAR: return "singular Newton matrix: the step is too large";
+    case henon_heiles_NOT_FINITE: return "not finite: overflow, or outside the domain";
+    case henon_heiles_BAD_ARGUMENT: return "bad argument: a null pointer, or values that are not allowed";
+    }
+    return "unknown status";
 }
 
 size_t henon_heiles_solver_size(void) { return sizeof(henon_heiles_solver); }

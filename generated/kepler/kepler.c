@@ -20,7 +20,7 @@
  *   4. The implicit step, by Newton's method
  *   5. The solver
  *   6. Ensembles
- * body-sha256: 3e3760f883f90fb56212036607145ef7f3a4baf0ba6fa7ab81c286e460570e04
+ * body-sha256: 933b5f891277f89d029e8ac55fb5656bf4623ab1a4373b9ebdc13b01768e1ca6
  */
 #include "kepler.h"
 
@@ -723,14 +723,14 @@ kepler_status kepler_integrate(kepler_solver *s, double h, size_t steps)
 
 const char *kepler_status_string(kepler_status status)
 {
-    static const char *const text[] = {
-        "ok",
-        "no convergence: the step is too large",
-        "singular Newton matrix: the step is too large",
-        "not finite: overflow, or outside the domain",
-        "bad argument: a null pointer, or values that are not allowed"
-    };
-    return (unsigned)status <= kepler_BAD_ARGUMENT ? text[status] : "unknown status";
+    switch (status) { /* no table, which would be data to relocate */
+    case kepler_OK: return "ok";
+    case kepler_NO_CONVERGENCE: return "no convergence: the step is too large";
+    case kepler_SINGULAR: return "singular Newton matrix: the step is too large";
+    case kepler_NOT_FINITE: return "not finite: overflow, or outside the domain";
+    case kepler_BAD_ARGUMENT: return "bad argument: a null pointer, or values that are not allowed";
+    }
+    return "unknown status";
 }
 
 size_t kepler_solver_size(void) { return sizeof(kepler_solver); }

@@ -25,7 +25,7 @@
  *   9. Blocks of steps
  *   10. Groups of members
  *   11. Ensembles
- * body-sha256: d61743a9af2d493660b9746c4d58c1e761e38683a9e62288258a0936cdb5557a
+ * body-sha256: bfa5abebbf69c4353c511230b2555a17c7bfb64527f02e647a7ee33965ffee51
  */
 #include "kowalevski_top.h"
 
@@ -1492,14 +1492,14 @@ kowalevski_top_status kowalevski_top_step(kowalevski_top_solver *s, double h)
 
 const char *kowalevski_top_status_string(kowalevski_top_status status)
 {
-    static const char *const text[] = {
-        "ok",
-        "no convergence: the step is too large",
-        "singular Newton matrix: the step is too large",
-        "not finite: overflow, or outside the domain",
-        "bad argument: a null pointer, or values that are not allowed"
-    };
-    return (unsigned)status <= kowalevski_top_BAD_ARGUMENT ? text[status] : "unknown status";
+    switch (status) { /* no table, which would be data to relocate */
+    case kowalevski_top_OK: return "ok";
+    case kowalevski_top_NO_CONVERGENCE: return "no convergence: the step is too large";
+    case kowalevski_top_SINGULAR: return "singular Newton matrix: the step is too large";
+    case kowalevski_top_NOT_FINITE: return "not finite: overflow, or outside the domain";
+    case kowalevski_top_BAD_ARGUMENT: return "bad argument: a null pointer, or values that are not allowed";
+    }
+    return "unknown status";
 }
 
 size_t kowalevski_top_solver_size(void) { return sizeof(kowalevski_top_solver); }

@@ -20,7 +20,7 @@
  *   4. The implicit step, by Newton's method
  *   5. The solver
  *   6. Ensembles
- * body-sha256: eebb98e4292ddf6a21f9aa3d8ca68cd55caeb72cb50d715eb157c0a23ed4946e
+ * body-sha256: 0f9d0052288450777ee9d78417ce5075facede26ecd59ed4808cb535d63f7689
  */
 #include "lagrange_top.h"
 
@@ -812,14 +812,14 @@ lagrange_top_status lagrange_top_integrate(lagrange_top_solver *s, double h, siz
 
 const char *lagrange_top_status_string(lagrange_top_status status)
 {
-    static const char *const text[] = {
-        "ok",
-        "no convergence: the step is too large",
-        "singular Newton matrix: the step is too large",
-        "not finite: overflow, or outside the domain",
-        "bad argument: a null pointer, or values that are not allowed"
-    };
-    return (unsigned)status <= lagrange_top_BAD_ARGUMENT ? text[status] : "unknown status";
+    switch (status) { /* no table, which would be data to relocate */
+    case lagrange_top_OK: return "ok";
+    case lagrange_top_NO_CONVERGENCE: return "no convergence: the step is too large";
+    case lagrange_top_SINGULAR: return "singular Newton matrix: the step is too large";
+    case lagrange_top_NOT_FINITE: return "not finite: overflow, or outside the domain";
+    case lagrange_top_BAD_ARGUMENT: return "bad argument: a null pointer, or values that are not allowed";
+    }
+    return "unknown status";
 }
 
 size_t lagrange_top_solver_size(void) { return sizeof(lagrange_top_solver); }

@@ -25,7 +25,7 @@
  *   9. Blocks of steps
  *   10. Groups of members
  *   11. Ensembles
- * body-sha256: 6ac0637e26c7addaa2919338895af6347eb4900fc62acaf9f381697d6a94a1dc
+ * body-sha256: 85ab56a8bd9ff44459d408ddfda6bb66f487e61173715a6edac2ec320f50da7c
  */
 #include "lotka_volterra.h"
 
@@ -630,14 +630,14 @@ lotka_volterra_status lotka_volterra_step(lotka_volterra_solver *s, double h)
 
 const char *lotka_volterra_status_string(lotka_volterra_status status)
 {
-    static const char *const text[] = {
-        "ok",
-        "no convergence: the step is too large",
-        "singular Newton matrix: the step is too large",
-        "not finite: overflow, or outside the domain",
-        "bad argument: a null pointer, or values that are not allowed"
-    };
-    return (unsigned)status <= lotka_volterra_BAD_ARGUMENT ? text[status] : "unknown status";
+    switch (status) { /* no table, which would be data to relocate */
+    case lotka_volterra_OK: return "ok";
+    case lotka_volterra_NO_CONVERGENCE: return "no convergence: the step is too large";
+    case lotka_volterra_SINGULAR: return "singular Newton matrix: the step is too large";
+    case lotka_volterra_NOT_FINITE: return "not finite: overflow, or outside the domain";
+    case lotka_volterra_BAD_ARGUMENT: return "bad argument: a null pointer, or values that are not allowed";
+    }
+    return "unknown status";
 }
 
 size_t lotka_volterra_solver_size(void) { return sizeof(lotka_volterra_solver); }

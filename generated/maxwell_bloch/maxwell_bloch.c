@@ -20,7 +20,7 @@
  *   4. The implicit step, by Newton's method
  *   5. The solver
  *   6. Ensembles
- * body-sha256: 0d4ea19bbf86d9d91520434df6f9e0b37fc8b2088c9b98faecb81963fd8e897f
+ * body-sha256: 4026b9814871cfdffccc602edd4ae54cd15b00681e9fdabc2a2612592a1448ca
  */
 #include "maxwell_bloch.h"
 
@@ -365,14 +365,14 @@ maxwell_bloch_status maxwell_bloch_integrate(maxwell_bloch_solver *s, double h, 
 
 const char *maxwell_bloch_status_string(maxwell_bloch_status status)
 {
-    static const char *const text[] = {
-        "ok",
-        "no convergence: the step is too large",
-        "singular Newton matrix: the step is too large",
-        "not finite: overflow, or outside the domain",
-        "bad argument: a null pointer, or values that are not allowed"
-    };
-    return (unsigned)status <= maxwell_bloch_BAD_ARGUMENT ? text[status] : "unknown status";
+    switch (status) { /* no table, which would be data to relocate */
+    case maxwell_bloch_OK: return "ok";
+    case maxwell_bloch_NO_CONVERGENCE: return "no convergence: the step is too large";
+    case maxwell_bloch_SINGULAR: return "singular Newton matrix: the step is too large";
+    case maxwell_bloch_NOT_FINITE: return "not finite: overflow, or outside the domain";
+    case maxwell_bloch_BAD_ARGUMENT: return "bad argument: a null pointer, or values that are not allowed";
+    }
+    return "unknown status";
 }
 
 size_t maxwell_bloch_solver_size(void) { return sizeof(maxwell_bloch_solver); }

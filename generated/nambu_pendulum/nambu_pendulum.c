@@ -26,7 +26,7 @@
  *   10. Blocks of steps
  *   11. Groups of members
  *   12. Ensembles
- * body-sha256: 22148abe844d5b524b69e8d449975c2d59f0dbc2239e70116ae4d49180ec973c
+ * body-sha256: e1a81d259127285edc948eec359fa40db32a9bfe56b6ec01b541f64a79661c4d
  */
 #include "nambu_pendulum.h"
 
@@ -809,14 +809,14 @@ nambu_pendulum_status nambu_pendulum_step(nambu_pendulum_solver *s, double h)
 
 const char *nambu_pendulum_status_string(nambu_pendulum_status status)
 {
-    static const char *const text[] = {
-        "ok",
-        "no convergence: the step is too large",
-        "singular Newton matrix: the step is too large",
-        "not finite: overflow, or outside the domain",
-        "bad argument: a null pointer, or values that are not allowed"
-    };
-    return (unsigned)status <= nambu_pendulum_BAD_ARGUMENT ? text[status] : "unknown status";
+    switch (status) { /* no table, which would be data to relocate */
+    case nambu_pendulum_OK: return "ok";
+    case nambu_pendulum_NO_CONVERGENCE: return "no convergence: the step is too large";
+    case nambu_pendulum_SINGULAR: return "singular Newton matrix: the step is too large";
+    case nambu_pendulum_NOT_FINITE: return "not finite: overflow, or outside the domain";
+    case nambu_pendulum_BAD_ARGUMENT: return "bad argument: a null pointer, or values that are not allowed";
+    }
+    return "unknown status";
 }
 
 size_t nambu_pendulum_solver_size(void) { return sizeof(nambu_pendulum_solver); }

@@ -20,7 +20,7 @@
  *   4. The implicit step, by Newton's method
  *   5. The solver
  *   6. Ensembles
- * body-sha256: 11fe950319a48a57272c3892a6c1f1a1b2fffc77da887a025f9b0eba0c417f56
+ * body-sha256: c885d2a87ad7c6f66f38eeeae12ebcfdef2c0d3b343a1cc25b215c53f6f69c72
  */
 #include "pendulum.h"
 
@@ -378,14 +378,14 @@ pendulum_status pendulum_integrate(pendulum_solver *s, double h, size_t steps)
 
 const char *pendulum_status_string(pendulum_status status)
 {
-    static const char *const text[] = {
-        "ok",
-        "no convergence: the step is too large",
-        "singular Newton matrix: the step is too large",
-        "not finite: overflow, or outside the domain",
-        "bad argument: a null pointer, or values that are not allowed"
-    };
-    return (unsigned)status <= pendulum_BAD_ARGUMENT ? text[status] : "unknown status";
+    switch (status) { /* no table, which would be data to relocate */
+    case pendulum_OK: return "ok";
+    case pendulum_NO_CONVERGENCE: return "no convergence: the step is too large";
+    case pendulum_SINGULAR: return "singular Newton matrix: the step is too large";
+    case pendulum_NOT_FINITE: return "not finite: overflow, or outside the domain";
+    case pendulum_BAD_ARGUMENT: return "bad argument: a null pointer, or values that are not allowed";
+    }
+    return "unknown status";
 }
 
 size_t pendulum_solver_size(void) { return sizeof(pendulum_solver); }

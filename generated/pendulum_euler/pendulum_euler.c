@@ -19,7 +19,7 @@
  *   3. The explicit step
  *   4. The solver
  *   5. Ensembles
- * body-sha256: 77998303edb421c4961d144d197577d985a27404a4bf306f488e1c882da4130c
+ * body-sha256: 91890511e3cfd562e1c8f0c91f5a0a95dab5555c459b96801c3a94963b90599d
  */
 #include "pendulum_euler.h"
 
@@ -169,14 +169,14 @@ pendulum_euler_status pendulum_euler_integrate(pendulum_euler_solver *s, double 
 
 const char *pendulum_euler_status_string(pendulum_euler_status status)
 {
-    static const char *const text[] = {
-        "ok",
-        "no convergence: the step is too large",
-        "singular Newton matrix: the step is too large",
-        "not finite: overflow, or outside the domain",
-        "bad argument: a null pointer, or values that are not allowed"
-    };
-    return (unsigned)status <= pendulum_euler_BAD_ARGUMENT ? text[status] : "unknown status";
+    switch (status) { /* no table, which would be data to relocate */
+    case pendulum_euler_OK: return "ok";
+    case pendulum_euler_NO_CONVERGENCE: return "no convergence: the step is too large";
+    case pendulum_euler_SINGULAR: return "singular Newton matrix: the step is too large";
+    case pendulum_euler_NOT_FINITE: return "not finite: overflow, or outside the domain";
+    case pendulum_euler_BAD_ARGUMENT: return "bad argument: a null pointer, or values that are not allowed";
+    }
+    return "unknown status";
 }
 
 size_t pendulum_euler_solver_size(void) { return sizeof(pendulum_euler_solver); }

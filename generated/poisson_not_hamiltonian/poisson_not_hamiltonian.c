@@ -20,7 +20,7 @@
  *   4. The implicit step, by Newton's method
  *   5. The solver
  *   6. Ensembles
- * body-sha256: 5a495e2a8433a143bb7ad337c6d2f490603918f6bb1767cbc9b03429b61f2b8c
+ * body-sha256: 05e94807c45ae7bd7c6491644c877a2c3466274b1008ddbf11c17c9919737d3d
  */
 #include "poisson_not_hamiltonian.h"
 
@@ -431,14 +431,15 @@ poisson_not_hamiltonian_status poisson_not_hamiltonian_integrate(poisson_not_ham
 
 const char *poisson_not_hamiltonian_status_string(poisson_not_hamiltonian_status status)
 {
-    static const char *const text[] = {
-        "ok",
-        "no convergence: the step is too large",
-        "singular Newton matrix: the step is too large",
-        "not finite: overflow, or outside the domain",
-        "bad argument: a null pointer, or values that are not allowed"
-    };
-    return (unsigned)status <= poisson_not_hamiltonian_BAD_ARGUMENT ? text[status] : "unknown status";
+    switch (status) { /* no table, which would be data to relocate */
+    case poisson_not_hamiltonian_OK: return "ok";
+    case poisson_not_hamiltonian_NO_CONVERGENCE: return "no convergence: the step is too large";
+    case poisson_not_hamiltonian_SINGULAR: return "singular Newton matrix: the step is too large";
+    case poisson_not_hamiltonian_NOT_FINITE: return "not finite: overflow, or outside the domain";
+    case poisson_not_hamiltonian_BAD_ARGUMENT:
+        return "bad argument: a null pointer, or values that are not allowed";
+    }
+    return "unknown status";
 }
 
 size_t poisson_not_hamiltonian_solver_size(void) { return sizeof(poisson_not_hamiltonian_solver); }

@@ -20,7 +20,7 @@
  *   4. The implicit step, by Newton's method
  *   5. The solver
  *   6. Ensembles
- * body-sha256: c763856ac00d8d1e2353f7b317b6e24fd1030685330c296253aab757e260cdc0
+ * body-sha256: 20c7e6add974e2e566487ad781522ad2f0caafaafc893f5fa6f5223355b3bb52
  */
 #include "predator_prey.h"
 
@@ -380,14 +380,14 @@ predator_prey_status predator_prey_integrate(predator_prey_solver *s, double h, 
 
 const char *predator_prey_status_string(predator_prey_status status)
 {
-    static const char *const text[] = {
-        "ok",
-        "no convergence: the step is too large",
-        "singular Newton matrix: the step is too large",
-        "not finite: overflow, or outside the domain",
-        "bad argument: a null pointer, or values that are not allowed"
-    };
-    return (unsigned)status <= predator_prey_BAD_ARGUMENT ? text[status] : "unknown status";
+    switch (status) { /* no table, which would be data to relocate */
+    case predator_prey_OK: return "ok";
+    case predator_prey_NO_CONVERGENCE: return "no convergence: the step is too large";
+    case predator_prey_SINGULAR: return "singular Newton matrix: the step is too large";
+    case predator_prey_NOT_FINITE: return "not finite: overflow, or outside the domain";
+    case predator_prey_BAD_ARGUMENT: return "bad argument: a null pointer, or values that are not allowed";
+    }
+    return "unknown status";
 }
 
 size_t predator_prey_solver_size(void) { return sizeof(predator_prey_solver); }

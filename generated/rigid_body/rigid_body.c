@@ -27,7 +27,7 @@
  *   10. Blocks of steps
  *   11. Groups of members
  *   12. Ensembles
- * body-sha256: 1b082407b7e8d2379c955c56d94468a63c5de3a7fb15479df04868ad3533e601
+ * body-sha256: 56f6aec11eedfb5ba49785f9819c233aae0b9e5e252fe831479572827d7042aa
  */
 #include "rigid_body.h"
 
@@ -953,14 +953,14 @@ rigid_body_status rigid_body_step(rigid_body_solver *s, double h)
 
 const char *rigid_body_status_string(rigid_body_status status)
 {
-    static const char *const text[] = {
-        "ok",
-        "no convergence: the step is too large",
-        "singular Newton matrix: the step is too large",
-        "not finite: overflow, or outside the domain",
-        "bad argument: a null pointer, or values that are not allowed"
-    };
-    return (unsigned)status <= rigid_body_BAD_ARGUMENT ? text[status] : "unknown status";
+    switch (status) { /* no table, which would be data to relocate */
+    case rigid_body_OK: return "ok";
+    case rigid_body_NO_CONVERGENCE: return "no convergence: the step is too large";
+    case rigid_body_SINGULAR: return "singular Newton matrix: the step is too large";
+    case rigid_body_NOT_FINITE: return "not finite: overflow, or outside the domain";
+    case rigid_body_BAD_ARGUMENT: return "bad argument: a null pointer, or values that are not allowed";
+    }
+    return "unknown status";
 }
 
 size_t rigid_body_solver_size(void) { return sizeof(rigid_body_solver); }

@@ -22,7 +22,7 @@
  *   5. The choice of the gauge: multiples of Casimirs taken from H
  *   6. The solver
  *   7. Ensembles
- * body-sha256: ead10cd5a5cf48af97429a0e0942d9ade63eba3120541ec1e9f938b71af42a77
+ * body-sha256: 17f6ca735f65b23d8f122c1a260d9d3e3dfdeddf1441275ed2fef371fa4c70df
  */
 #include "rigid_body_dual.h"
 
@@ -619,14 +619,14 @@ rigid_body_dual_status rigid_body_dual_integrate(rigid_body_dual_solver *s, doub
 
 const char *rigid_body_dual_status_string(rigid_body_dual_status status)
 {
-    static const char *const text[] = {
-        "ok",
-        "no convergence: the step is too large",
-        "singular Newton matrix: the step is too large",
-        "not finite: overflow, or outside the domain",
-        "bad argument: a null pointer, or values that are not allowed"
-    };
-    return (unsigned)status <= rigid_body_dual_BAD_ARGUMENT ? text[status] : "unknown status";
+    switch (status) { /* no table, which would be data to relocate */
+    case rigid_body_dual_OK: return "ok";
+    case rigid_body_dual_NO_CONVERGENCE: return "no convergence: the step is too large";
+    case rigid_body_dual_SINGULAR: return "singular Newton matrix: the step is too large";
+    case rigid_body_dual_NOT_FINITE: return "not finite: overflow, or outside the domain";
+    case rigid_body_dual_BAD_ARGUMENT: return "bad argument: a null pointer, or values that are not allowed";
+    }
+    return "unknown status";
 }
 
 size_t rigid_body_dual_solver_size(void) { return sizeof(rigid_body_dual_solver); }

@@ -20,7 +20,7 @@
  *   4. The implicit step, by Newton's method
  *   5. The solver
  *   6. Ensembles
- * body-sha256: c7a5da784838ce8f6882963dc53c9162d9727621a6a23a09d578cdfc0f376ab7
+ * body-sha256: 12bbb1b02239ef3e6dec228171db4e6af5e2ee1da02da2c31a4776fce431838a
  */
 #include "rigid_body_paper.h"
 
@@ -442,14 +442,14 @@ rigid_body_paper_status rigid_body_paper_integrate(rigid_body_paper_solver *s, d
 
 const char *rigid_body_paper_status_string(rigid_body_paper_status status)
 {
-    static const char *const text[] = {
-        "ok",
-        "no convergence: the step is too large",
-        "singular Newton matrix: the step is too large",
-        "not finite: overflow, or outside the domain",
-        "bad argument: a null pointer, or values that are not allowed"
-    };
-    return (unsigned)status <= rigid_body_paper_BAD_ARGUMENT ? text[status] : "unknown status";
+    switch (status) { /* no table, which would be data to relocate */
+    case rigid_body_paper_OK: return "ok";
+    case rigid_body_paper_NO_CONVERGENCE: return "no convergence: the step is too large";
+    case rigid_body_paper_SINGULAR: return "singular Newton matrix: the step is too large";
+    case rigid_body_paper_NOT_FINITE: return "not finite: overflow, or outside the domain";
+    case rigid_body_paper_BAD_ARGUMENT: return "bad argument: a null pointer, or values that are not allowed";
+    }
+    return "unknown status";
 }
 
 size_t rigid_body_paper_solver_size(void) { return sizeof(rigid_body_paper_solver); }

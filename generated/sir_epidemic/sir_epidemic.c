@@ -20,7 +20,7 @@
  *   4. The implicit step, along paths dm/dt = pi(m) p
  *   5. The solver
  *   6. Ensembles
- * body-sha256: fb57a3379cb13d9ebaf837119cae315aaf7117ecf6fa60eefb017bb4432c76d8
+ * body-sha256: 654994fe2a69608b5f6b8b5ec531527531c78e1ec7c460ac06179109bd535e34
  */
 #include "sir_epidemic.h"
 
@@ -515,14 +515,14 @@ sir_epidemic_status sir_epidemic_integrate(sir_epidemic_solver *s, double h, siz
 
 const char *sir_epidemic_status_string(sir_epidemic_status status)
 {
-    static const char *const text[] = {
-        "ok",
-        "no convergence: the step is too large",
-        "singular Newton matrix: the step is too large",
-        "not finite: overflow, or outside the domain",
-        "bad argument: a null pointer, or values that are not allowed"
-    };
-    return (unsigned)status <= sir_epidemic_BAD_ARGUMENT ? text[status] : "unknown status";
+    switch (status) { /* no table, which would be data to relocate */
+    case sir_epidemic_OK: return "ok";
+    case sir_epidemic_NO_CONVERGENCE: return "no convergence: the step is too large";
+    case sir_epidemic_SINGULAR: return "singular Newton matrix: the step is too large";
+    case sir_epidemic_NOT_FINITE: return "not finite: overflow, or outside the domain";
+    case sir_epidemic_BAD_ARGUMENT: return "bad argument: a null pointer, or values that are not allowed";
+    }
+    return "unknown status";
 }
 
 size_t sir_epidemic_solver_size(void) { return sizeof(sir_epidemic_solver); }

@@ -19,7 +19,7 @@
  *   4. The implicit step, along paths dm/dt = pi(m) p
  *   5. The solver
  *   6. Ensembles
- * body-sha256: 94cb55682df553ad63bafc62f0ba993df4334dea7689b9aeed381b022029d26f
+ * body-sha256: 0f9eb2e17902f05f34843cdb37f612c839b584aec19b0ca728183c16f65a1aa8
  */
 #include "sir_final_size.h"
 
@@ -524,14 +524,14 @@ sir_final_size_status sir_final_size_integrate(sir_final_size_solver *s, double 
 
 const char *sir_final_size_status_string(sir_final_size_status status)
 {
-    static const char *const text[] = {
-        "ok",
-        "no convergence: the step is too large",
-        "singular Newton matrix: the step is too large",
-        "not finite: overflow, or outside the domain",
-        "bad argument: a null pointer, or values that are not allowed"
-    };
-    return (unsigned)status <= sir_final_size_BAD_ARGUMENT ? text[status] : "unknown status";
+    switch (status) { /* no table, which would be data to relocate */
+    case sir_final_size_OK: return "ok";
+    case sir_final_size_NO_CONVERGENCE: return "no convergence: the step is too large";
+    case sir_final_size_SINGULAR: return "singular Newton matrix: the step is too large";
+    case sir_final_size_NOT_FINITE: return "not finite: overflow, or outside the domain";
+    case sir_final_size_BAD_ARGUMENT: return "bad argument: a null pointer, or values that are not allowed";
+    }
+    return "unknown status";
 }
 
 size_t sir_final_size_solver_size(void) { return sizeof(sir_final_size_solver); }

@@ -22,7 +22,7 @@
  *   5. The choice of the gauge: multiples of Casimirs taken from H
  *   6. The solver
  *   7. Ensembles
- * body-sha256: 2247981319e50a8548016719718eb6d214ad1fa58f33b939ec3ff0a89e52e562
+ * body-sha256: 408709af2f9bd76cf26c4c83fa61e311a152e88ee8db60dd3dc56c9eff2d7418
  */
 #include "sklyanin_gyrostat.h"
 
@@ -821,14 +821,15 @@ sklyanin_gyrostat_status sklyanin_gyrostat_integrate(sklyanin_gyrostat_solver *s
 
 const char *sklyanin_gyrostat_status_string(sklyanin_gyrostat_status status)
 {
-    static const char *const text[] = {
-        "ok",
-        "no convergence: the step is too large",
-        "singular Newton matrix: the step is too large",
-        "not finite: overflow, or outside the domain",
-        "bad argument: a null pointer, or values that are not allowed"
-    };
-    return (unsigned)status <= sklyanin_gyrostat_BAD_ARGUMENT ? text[status] : "unknown status";
+    switch (status) { /* no table, which would be data to relocate */
+    case sklyanin_gyrostat_OK: return "ok";
+    case sklyanin_gyrostat_NO_CONVERGENCE: return "no convergence: the step is too large";
+    case sklyanin_gyrostat_SINGULAR: return "singular Newton matrix: the step is too large";
+    case sklyanin_gyrostat_NOT_FINITE: return "not finite: overflow, or outside the domain";
+    case sklyanin_gyrostat_BAD_ARGUMENT:
+        return "bad argument: a null pointer, or values that are not allowed";
+    }
+    return "unknown status";
 }
 
 size_t sklyanin_gyrostat_solver_size(void) { return sizeof(sklyanin_gyrostat_solver); }

@@ -22,7 +22,7 @@
  *   5. The choice of the gauge: multiples of Casimirs taken from H
  *   6. The solver
  *   7. Ensembles
- * body-sha256: de6d3a7f323df7e7a605d005cd70f9a4af75cf1073e5b8dcd51a1df51807c63d
+ * body-sha256: 04b22f5e35a3eeadd195d74afebfa5b8919f24950e17d1b46b9cd695e55c49f4
  */
 #include "so4_manakov.h"
 
@@ -1017,14 +1017,14 @@ so4_manakov_status so4_manakov_integrate(so4_manakov_solver *s, double h, size_t
 
 const char *so4_manakov_status_string(so4_manakov_status status)
 {
-    static const char *const text[] = {
-        "ok",
-        "no convergence: the step is too large",
-        "singular Newton matrix: the step is too large",
-        "not finite: overflow, or outside the domain",
-        "bad argument: a null pointer, or values that are not allowed"
-    };
-    return (unsigned)status <= so4_manakov_BAD_ARGUMENT ? text[status] : "unknown status";
+    switch (status) { /* no table, which would be data to relocate */
+    case so4_manakov_OK: return "ok";
+    case so4_manakov_NO_CONVERGENCE: return "no convergence: the step is too large";
+    case so4_manakov_SINGULAR: return "singular Newton matrix: the step is too large";
+    case so4_manakov_NOT_FINITE: return "not finite: overflow, or outside the domain";
+    case so4_manakov_BAD_ARGUMENT: return "bad argument: a null pointer, or values that are not allowed";
+    }
+    return "unknown status";
 }
 
 size_t so4_manakov_solver_size(void) { return sizeof(so4_manakov_solver); }

@@ -22,7 +22,7 @@
  *   5. The choice of the gauge: multiples of Casimirs taken from H
  *   6. The solver
  *   7. Ensembles
- * body-sha256: e96d0bdc8cae5fb5ff10f6322fa0ad6367ecdf40e1258ea9bc9e866e71a3dfe2
+ * body-sha256: 94b07388a9495467f2f88fdce749cdf0cbb1419d611ffe80edc99940e6339939
  */
 #include "spin_chain5.h"
 
@@ -2221,14 +2221,14 @@ spin_chain5_status spin_chain5_integrate(spin_chain5_solver *s, double h, size_t
 
 const char *spin_chain5_status_string(spin_chain5_status status)
 {
-    static const char *const text[] = {
-        "ok",
-        "no convergence: the step is too large",
-        "singular Newton matrix: the step is too large",
-        "not finite: overflow, or outside the domain",
-        "bad argument: a null pointer, or values that are not allowed"
-    };
-    return (unsigned)status <= spin_chain5_BAD_ARGUMENT ? text[status] : "unknown status";
+    switch (status) { /* no table, which would be data to relocate */
+    case spin_chain5_OK: return "ok";
+    case spin_chain5_NO_CONVERGENCE: return "no convergence: the step is too large";
+    case spin_chain5_SINGULAR: return "singular Newton matrix: the step is too large";
+    case spin_chain5_NOT_FINITE: return "not finite: overflow, or outside the domain";
+    case spin_chain5_BAD_ARGUMENT: return "bad argument: a null pointer, or values that are not allowed";
+    }
+    return "unknown status";
 }
 
 size_t spin_chain5_solver_size(void) { return sizeof(spin_chain5_solver); }

@@ -20,7 +20,7 @@
  *   4. The implicit step, by Newton's method
  *   5. The solver
  *   6. Ensembles
- * body-sha256: 08aabdf224771c4eea02d8dc6ef565f9ea98904870ca06d1fd7b65f1913b3ef5
+ * body-sha256: 88578d8c85551b0f1955a3873770f0b454604e70d1cc0a074f358ce2cacef643
  */
 #include "toda3.h"
 
@@ -472,14 +472,14 @@ toda3_status toda3_integrate(toda3_solver *s, double h, size_t steps)
 
 const char *toda3_status_string(toda3_status status)
 {
-    static const char *const text[] = {
-        "ok",
-        "no convergence: the step is too large",
-        "singular Newton matrix: the step is too large",
-        "not finite: overflow, or outside the domain",
-        "bad argument: a null pointer, or values that are not allowed"
-    };
-    return (unsigned)status <= toda3_BAD_ARGUMENT ? text[status] : "unknown status";
+    switch (status) { /* no table, which would be data to relocate */
+    case toda3_OK: return "ok";
+    case toda3_NO_CONVERGENCE: return "no convergence: the step is too large";
+    case toda3_SINGULAR: return "singular Newton matrix: the step is too large";
+    case toda3_NOT_FINITE: return "not finite: overflow, or outside the domain";
+    case toda3_BAD_ARGUMENT: return "bad argument: a null pointer, or values that are not allowed";
+    }
+    return "unknown status";
 }
 
 size_t toda3_solver_size(void) { return sizeof(toda3_solver); }

@@ -20,7 +20,7 @@
  *   5. The implicit step, along paths dm/dt = pi(m) p
  *   6. The solver
  *   7. Ensembles
- * body-sha256: a56fe595515ad029df676245aa31118f1d37f1a139a16a11a4a792404667346c
+ * body-sha256: b02ebb93e990b57e4212b0695e0d287e0c79ad10f82f4804772f0b145605c1a8
  */
 #include "toda3_quadratic.h"
 
@@ -783,14 +783,14 @@ toda3_quadratic_status toda3_quadratic_integrate(toda3_quadratic_solver *s, doub
 
 const char *toda3_quadratic_status_string(toda3_quadratic_status status)
 {
-    static const char *const text[] = {
-        "ok",
-        "no convergence: the step is too large",
-        "singular Newton matrix: the step is too large",
-        "not finite: overflow, or outside the domain",
-        "bad argument: a null pointer, or values that are not allowed"
-    };
-    return (unsigned)status <= toda3_quadratic_BAD_ARGUMENT ? text[status] : "unknown status";
+    switch (status) { /* no table, which would be data to relocate */
+    case toda3_quadratic_OK: return "ok";
+    case toda3_quadratic_NO_CONVERGENCE: return "no convergence: the step is too large";
+    case toda3_quadratic_SINGULAR: return "singular Newton matrix: the step is too large";
+    case toda3_quadratic_NOT_FINITE: return "not finite: overflow, or outside the domain";
+    case toda3_quadratic_BAD_ARGUMENT: return "bad argument: a null pointer, or values that are not allowed";
+    }
+    return "unknown status";
 }
 
 size_t toda3_quadratic_solver_size(void) { return sizeof(toda3_quadratic_solver); }

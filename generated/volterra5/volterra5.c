@@ -20,7 +20,7 @@
  *   4. The implicit step, by Newton's method
  *   5. The solver
  *   6. Ensembles
- * body-sha256: f1f5e99eb00fd2aa5f97367e1277f1731f60258d215596fb2f14431a99ec13cc
+ * body-sha256: 7b7c2e632f92924d0b6bf9c4da878283a20022fda993475ecb39482a5c8c1d43
  */
 #include "volterra5.h"
 
@@ -431,14 +431,14 @@ volterra5_status volterra5_integrate(volterra5_solver *s, double h, size_t steps
 
 const char *volterra5_status_string(volterra5_status status)
 {
-    static const char *const text[] = {
-        "ok",
-        "no convergence: the step is too large",
-        "singular Newton matrix: the step is too large",
-        "not finite: overflow, or outside the domain",
-        "bad argument: a null pointer, or values that are not allowed"
-    };
-    return (unsigned)status <= volterra5_BAD_ARGUMENT ? text[status] : "unknown status";
+    switch (status) { /* no table, which would be data to relocate */
+    case volterra5_OK: return "ok";
+    case volterra5_NO_CONVERGENCE: return "no convergence: the step is too large";
+    case volterra5_SINGULAR: return "singular Newton matrix: the step is too large";
+    case volterra5_NOT_FINITE: return "not finite: overflow, or outside the domain";
+    case volterra5_BAD_ARGUMENT: return "bad argument: a null pointer, or values that are not allowed";
+    }
+    return "unknown status";
 }
 
 size_t volterra5_solver_size(void) { return sizeof(volterra5_solver); }

@@ -20,7 +20,7 @@
  *   4. The implicit step, by Newton's method
  *   5. The solver
  *   6. Ensembles
- * body-sha256: 6c09e594546fa02f4aeca02b82f44d494f6c15b539cc240b0689353e185eddec
+ * body-sha256: 35a04cd51048ae2464f580d0b70f2fb4af9fb39bb3696ed41e79ebc24f11676b
  */
 #include "vortices3.h"
 
@@ -994,14 +994,14 @@ vortices3_status vortices3_integrate(vortices3_solver *s, double h, size_t steps
 
 const char *vortices3_status_string(vortices3_status status)
 {
-    static const char *const text[] = {
-        "ok",
-        "no convergence: the step is too large",
-        "singular Newton matrix: the step is too large",
-        "not finite: overflow, or outside the domain",
-        "bad argument: a null pointer, or values that are not allowed"
-    };
-    return (unsigned)status <= vortices3_BAD_ARGUMENT ? text[status] : "unknown status";
+    switch (status) { /* no table, which would be data to relocate */
+    case vortices3_OK: return "ok";
+    case vortices3_NO_CONVERGENCE: return "no convergence: the step is too large";
+    case vortices3_SINGULAR: return "singular Newton matrix: the step is too large";
+    case vortices3_NOT_FINITE: return "not finite: overflow, or outside the domain";
+    case vortices3_BAD_ARGUMENT: return "bad argument: a null pointer, or values that are not allowed";
+    }
+    return "unknown status";
 }
 
 size_t vortices3_solver_size(void) { return sizeof(vortices3_solver); }

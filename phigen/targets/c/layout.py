@@ -107,5 +107,6 @@ def _places(line: str, least: int) -> Iterator[tuple[int, int]]:
             continue
         after_loop = head is not None and depth == 0 and line[k - 1] == ")"
         operator = re.match(r" (?:[-+*/?:<>]|&&|\|\||[<>=!]=) ", line[k:])
-        if line[k - 1] in ",;=" or operator or after_loop:
+        label = line[k - 1] == ":" and line.lstrip().startswith("case ")
+        if line[k - 1] in ",;=" or operator or after_loop or label:
             yield k - _DEPTH * depth + (WIDTH if after_loop else 0), k

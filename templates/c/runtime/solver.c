@@ -178,14 +178,14 @@ phi_status phi_integrate(phi_solver *s, double h, size_t steps)
 #endif
 const char *phi_status_string(phi_status status)
 {
-    static const char *const text[] = {
-        "ok",
-        "no convergence: the step is too large",
-        "singular Newton matrix: the step is too large",
-        "not finite: overflow, or outside the domain",
-        "bad argument: a null pointer, or values that are not allowed"
-    };
-    return (unsigned)status <= PHI_BAD_ARGUMENT ? text[status] : "unknown status";
+    switch (status) { /* no table, which would be data to relocate */
+    case PHI_OK: return "ok";
+    case PHI_NO_CONVERGENCE: return "no convergence: the step is too large";
+    case PHI_SINGULAR: return "singular Newton matrix: the step is too large";
+    case PHI_NOT_FINITE: return "not finite: overflow, or outside the domain";
+    case PHI_BAD_ARGUMENT: return "bad argument: a null pointer, or values that are not allowed";
+    }
+    return "unknown status";
 }
 
 size_t phi_solver_size(void) { return sizeof(phi_solver); }
