@@ -38,7 +38,8 @@ class Function:
 
     ``written`` is how a language writes it: a name, or a text with ``{0}`` for the argument; in languages that are not
     there a function of the generated file does it. ``lanes`` is the same for C's loops over lanes, by functions that
-    have a version for them, whose own entry is their name. ``letters`` is the name in mathematics.
+    have a version for them, whose own entry is their name; ``inline`` ones are instructions or arithmetic in any case.
+    ``near`` tells that flows call a polynomial where arguments are small. ``letters`` is the name in mathematics.
     """
 
     name: str
@@ -55,6 +56,8 @@ class Function:
     cost: int = 20
     written: Mapping[str, str] = field(default_factory=dict)
     lanes: str = ""
+    inline: bool = False
+    near: bool = False
     letters: str = ""
 
 
@@ -89,6 +92,7 @@ _LISTED = (
         known=lambda call, a: call("exp", a) - 1,
         written=_library("expm1"),
         lanes="expm1",
+        near=True,
     ),
     Function(  # 1 − cos(a) without cancellation
         "versin",
@@ -102,6 +106,7 @@ _LISTED = (
             "(2.0 * Math.sin(0.5 * ({0})) ** 2)",
         ),
         lanes="(2.0 * {sin}(0.5 * ({{0}})) * {sin}(0.5 * ({{0}})))",
+        near=True,
     ),
     Function(  # log(1 + a) without cancellation
         "log1p",
@@ -123,6 +128,7 @@ _LISTED = (
             "np.where({0} > 0.0, 1.0 / ({0}), np.nan)",
             "({0} > 0.0 ? 1.0 / ({0}) : NaN)",
         ),
+        inline=True,
     ),
     Function(
         "log",
@@ -139,6 +145,7 @@ _LISTED = (
         parity="odd",
         written=_library("sin"),
         lanes="sin",
+        near=True,
     ),
     Function(
         "cos",
@@ -235,6 +242,7 @@ _LISTED = (
         value=lambda library, a: abs(a),
         rational=True,
         written=_languages("fabs", "np.abs", "Math.abs"),
+        inline=True,
     ),
     Function(  # made by differentiating abs
         "sign",
@@ -244,6 +252,7 @@ _LISTED = (
         rational=True,
         parity="odd",
         written=_languages("(double)(({0} > 0.0) - ({0} < 0.0))", "np.sign", "Math.sign"),
+        inline=True,
         letters="sgn",
     ),
     Function(  # base**exponent with an exponent that is not a rational number
@@ -283,6 +292,7 @@ def _entire(name: str) -> Function:
         value=lambda library, s: entire.value(library, name, s),
         at_zero=given.coefficient(0),
         cost=18,
+        near=True,
     )
 
 

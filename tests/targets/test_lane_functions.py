@@ -3,10 +3,9 @@
 import pytest
 from support import run, tool, write
 
+from phigen.lanes.functions import LANE_FORMULAS, LANE_FUNCTIONS, with_formulas
 from phigen.symbolic.special import SPECIAL
-from phigen.targets.c import lanes
 from phigen.targets.c.amalgamation import Amalgam
-from phigen.targets.c.kernels import LANE_FORMULAS, LANE_FUNCTIONS
 
 #: Largest argument, and units of the last place; sums of exponentials lose one or two.
 RANGES = {"log": (1e308, 2), "exp": (600.0, 2), "expm1": (600.0, 3), "sin": (1e6, 2), "cos": (1e6, 2)}
@@ -59,5 +58,5 @@ def test_every_lane_function_is_tested_or_special():
 
 @pytest.mark.parametrize("op", LANE_FORMULAS)
 def test_what_formulas_call_is_emitted(op):
-    called = lanes.with_formulas({op})
+    called = with_formulas({op})
     assert {f for f in LANE_FUNCTIONS if f"{{{f}}}" in LANE_FORMULAS[op]} == called - {op}

@@ -9,15 +9,18 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Mapping, Sequence
 
+from phigen.lanes.lowering import Blocks, Lanes, in_lanes
 from phigen.scheme.kernel import Kernel
 from phigen.scheme.path import Recurrences
 from phigen.scheme.program import Program
 from phigen.scheme.steps import Explicit, Implicit, Path, Splitting
 from phigen.spec.model import Parameter
-from phigen.targets.c import functions, lanes, packs, paths, splitting
+from phigen.targets.c import functions, paths, splitting
 from phigen.targets.c.amalgamation import Amalgam
 from phigen.targets.c.features import switches
 from phigen.targets.c.kernels import function, members, printer
+from phigen.targets.c.lanes import printed as kernels_in_lanes
+from phigen.targets.c.lanes import remembered
 from phigen.targets.c.layout import fitted
 from phigen.targets.header import CHECKSUM, checksum, header_lines, plain
 from phigen.targets.path import Syntax, statements, tangent_program
@@ -37,8 +40,9 @@ Sizes = list[tuple[str, int, str]]
 def emit(program: Program, command: str, *, single_file: bool = False) -> dict[str, str]:
     """File names and their contents; with ``single_file`` only `NAME.c`, which then needs no header."""
     name, lines = program.name, header_lines(program, command)
-    has = switches(program)
-    amalgam = Amalgam(name, has, printed(program, has))
+    lanes = in_lanes(program)
+    has = switches(program, lanes)
+    amalgam = Amalgam(name, has, printed(program, lanes, has))
     declared = amalgam.text("solver.h") + "\n#ifdef __cplusplus\n}\n#endif\n"
     defined = amalgam.text("runtime.c")
     headers = "\n".join(sorted(amalgam.headers))
@@ -69,7 +73,7 @@ def _sealed(lines: Sequence[str], body: str) -> str:
     return f"/*\n{text}\n * {CHECKSUM} {checksum(body)}\n */\n{body}"
 
 
-def printed(program: Program, has: Mapping[str, bool]) -> dict[str, str]:
+def printed(program: Program, lanes: Lanes | None, has: Mapping[str, bool]) -> dict[str, str]:
     """What the runtime includes of the model, by the names that it has there."""
     found = {}
     step = program.step
@@ -83,13 +87,13 @@ def printed(program: Program, has: Mapping[str, bool]) -> dict[str, str]:
     if isinstance(step, Splitting):
         found["flows.h"] = splitting.printed(program, step)
         found["tangent_flows.h"] = splitting.tangent(program, step) if has["TANGENT"] else ""
-    if has["BLOCKS"] or has["PACKS"]:
-        found["model_lanes.h"] = "\n".join((lanes if has["BLOCKS"] else packs).printed(program))
-    declarations = render("c", "declarations.h", _declarations(program, has))
-    return {"declarations.h": declarations, "model.h": _model(program, has, found.values()), **found}
+    if lanes and (has["BLOCKS"] or has["PACKS"]):
+        found["model_lanes.h"] = "\n".join(kernels_in_lanes(program, lanes))
+    declarations = render("c", "declarations.h", _declarations(program, lanes, has))
+    return {"declarations.h": declarations, "model.h": _model(program, lanes, has, found.values()), **found}
 
 
-def _declarations(program: Program, has: Mapping[str, bool]) -> dict[str, object]:
+def _declarations(program: Program, lanes: Lanes | None, has: Mapping[str, bool]) -> dict[str, object]:
     member = members(program)
     sizes: Sizes = [("STAGES", len(program.fractions), "of a step")] if has["COMPOSED"] else []
     sizes.append(("COEFFICIENTS", max(1, program.step.coefficients), "numbers that depend on params and h only"))
@@ -97,7 +101,7 @@ def _declarations(program: Program, has: Mapping[str, bool]) -> dict[str, object
         free = program.gauge.casimirs
         sizes.append(("GAUGES", len(free), f"Casimirs whose multiples are taken from H: {', '.join(free)}"))
     if has["RECURRENCES"]:
-        memory = lanes.remembered(program)
+        memory = remembered(program, lanes)
         sizes.append(("REMEMBERED", memory["REMEMBERED"], "values that a recurrence is fitted to"))
         sizes.append(("WINDOW", memory["WINDOW"], "of them that it may use"))
         sizes.append(("AHEAD", memory["AHEAD"], "values that it foresees"))
@@ -124,7 +128,7 @@ def _about(parameter: Parameter, member: str) -> str:
     return said if member == parameter.name else f"{parameter.name}: {said}"
 
 
-def _constants(program: Program, has: Mapping[str, bool]) -> Sizes:
+def _constants(program: Program, lanes: Lanes | None, has: Mapping[str, bool]) -> Sizes:
     sizes: Sizes = []
     step = program.step
     if isinstance(step, Implicit):
@@ -138,20 +142,19 @@ def _constants(program: Program, has: Mapping[str, bool]) -> Sizes:
             sizes.append(("TANGENT_SERIES", len(varied.series), "of a path with its variation"))
             sizes.append(("TANGENT_FIXED", max(1, len(varied.fixed)), "values that are constant along it"))
     if has["RECURRENCES"]:
-        checks = lanes.remembered(program)["CHECKS"]
+        checks = remembered(program, lanes)["CHECKS"]
         sizes.append(("CHECKS", checks, "values that a recurrence is not fitted to, but has to foresee"))
-    if has["BLOCKS"]:
-        passes = PASSES if lanes.vectorised(program) and not has["PATH"] else PASSES_OF_CALLS
+    if has["BLOCKS"] and isinstance(lanes, Blocks):
+        passes = PASSES if lanes.vectorised and not has["PATH"] else PASSES_OF_CALLS
         sizes.append(("PASSES", passes, "over a block, that cost per step what an evaluation costs"))
-        if isinstance(step, Path) and step.lanes:
-            sizes += paths.sizes(step.lanes, lanes.slope_terms(program))
-    factors = lanes.factors_of(program)
-    if factors and has["SPARSE"]:
-        sizes.append(("FACTORS", len(factors.factorise.roots), "entries of the factors of a Newton matrix"))
+        sizes += paths.sizes(lanes.path, lanes.slope_terms) if lanes.path else []
+        if lanes.factors:
+            entries = len(lanes.factors.factorise.roots)
+            sizes.append(("FACTORS", entries, "entries of the factors of a Newton matrix"))
     return sizes + (splitting.sizes(step) if isinstance(step, Splitting) else [])
 
 
-def _model(program: Program, has: Mapping[str, bool], others: Iterable[str]) -> str:
+def _model(program: Program, lanes: Lanes | None, has: Mapping[str, bool], others: Iterable[str]) -> str:
     step, seen, gauge = program.step, program.observables, program.gauge
     body = functions.called(program)
     own: list[Kernel | None] = []
@@ -177,7 +180,7 @@ def _model(program: Program, has: Mapping[str, bool], others: Iterable[str]) -> 
     values = {
         "NAME": program.name,
         "defaults": ", ".join(repr(float(p.value)) for p in program.parameters) or "0",
-        "constants": _constants(program, has),
+        "constants": _constants(program, lanes, has),
         "tolerance": repr(step.inner.tolerance)
         if isinstance(step, Implicit) and (has["NEWTON"] or has["BLOCKS"])
         else "",

@@ -5,24 +5,27 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from phigen.lanes.lowering import Blocks, Lanes, Packs
 from phigen.scheme.path import Recurrences
 from phigen.scheme.program import Program
 from phigen.scheme.steps import Explicit, Implicit, Newton, Path, Splitting
-from phigen.targets.c import lanes, packs
+from phigen.targets.c.lanes import grouped
 from phigen.targets.path import kinds
 
 
 @dataclass(frozen=True)
 class Feature:
-    """A switch ``PHI_NAME`` of the runtime: ``when`` a program has it, if it has also what it ``requires``."""
+    """A switch ``PHI_NAME`` of the runtime: ``when`` a program has it, if it has also what it ``requires``, and if what
+    it has ``in_lanes`` says so too."""
 
     name: str
-    when: Callable[[Program], object]
+    when: Callable[[Program], object] = lambda program: True
     requires: tuple[str, ...] = ()
+    in_lanes: Callable[[Lanes | None], object] = lambda lanes: True
 
 
-def _calls(function: str) -> Callable[[Program], bool]:
-    return lambda program: function in lanes.called_in_lanes(program) | packs.called_in_lanes(program)
+def _calls(function: str) -> Callable[[Lanes | None], bool]:
+    return lambda lanes: lanes is not None and function in lanes.calls
 
 
 def _sums(kind: str) -> Callable[[Program], bool]:
@@ -60,20 +63,20 @@ FEATURES = (
     Feature("PIVOTING", lambda p: isinstance(p.step, Implicit) and (_fast(p) or not p.step.eliminate)),
     Feature("QUICK_GAUGE", _fast, ("GAUGE",)),
     Feature("RECURRENCES", _fast, ("IMPLICIT",)),
-    Feature("BLOCKS", lambda p: _fast(p) and lanes.blocks(p), ("RECURRENCES",)),
-    Feature("GROUPS", lanes.groups, ("BLOCKS",)),
-    Feature("PACKS", lambda p: _fast(p) and packs.packed(p)),
-    Feature("FAR", packs.two_ways, ("PACKS",)),
-    Feature("SPARSE", lanes.factors_of, ("BLOCKS",)),
+    Feature("BLOCKS", _fast, ("RECURRENCES",), lambda lanes: isinstance(lanes, Blocks)),
+    Feature("PACKS", _fast, (), lambda lanes: isinstance(lanes, Packs)),
+    Feature("FAR", requires=("PACKS",), in_lanes=lambda lanes: isinstance(lanes, Packs) and lanes.near),
+    Feature("SPARSE", requires=("BLOCKS",), in_lanes=lambda lanes: isinstance(lanes, Blocks) and lanes.factors),
     Feature("INVERSE_UNROLLED", lambda p: isinstance(p.step, Newton) and p.step.invert, ("BLOCKS",)),
-    *(Feature(f"CALLS_{f.upper()}", _calls(f)) for f in ("exp", "expm1", "log", "sin", "cos")),
+    *(Feature(f"CALLS_{f.upper()}", in_lanes=_calls(f)) for f in ("exp", "expm1", "log", "sin", "cos")),
     *(Feature(f"TAYLOR_{kind.upper()}", _sums(kind)) for kind in ("product", "chain", "power")),
 )
 
 
-def switches(program: Program) -> dict[str, bool]:
+def switches(program: Program, lanes: Lanes | None) -> dict[str, bool]:
     """Whether the program has each of the features."""
     found: dict[str, bool] = {}
     for feature in FEATURES:
-        found[feature.name] = all(found[name] for name in feature.requires) and bool(feature.when(program))
-    return found
+        asked = feature.when(program) and feature.in_lanes(lanes)
+        found[feature.name] = all(found[name] for name in feature.requires) and bool(asked)
+    return found | {"GROUPS": found["BLOCKS"] and grouped(program, lanes)}

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 import textwrap
-from collections.abc import Mapping, Sequence, Set
+from collections.abc import Iterable, Mapping, Sequence, Set
 from fractions import Fraction
 
+from phigen.lanes.functions import NEAR_FUNCTIONS
 from phigen.scheme.program import Program
 from phigen.scheme.steps import Splitting
 from phigen.symbolic.entire import ENTIRE
@@ -25,11 +26,8 @@ from phigen.targets.polynomials import estrin
 from phigen.targets.rendering import render
 from phigen.targets.special import entire_used
 
-#: The names under which flows call functions that have a version here.
-FLOW_FUNCTIONS = ("expm1", "sin", "versin")
-
-#: Those that are polynomials near 0.
-NEAR_FUNCTIONS = (*ENTIRE, *FLOW_FUNCTIONS)
+#: The functions of the library that have a version here, under whose name flows call them.
+FLOW_FUNCTIONS = tuple(f for f in NEAR_FUNCTIONS if f not in ENTIRE)
 
 
 def _inverse_factorials(first: int, step: int, count: int, signs: int) -> list[Fraction]:
@@ -71,9 +69,9 @@ def called(program: Program) -> list[str]:
     return [*phis, *(render("c", "small.c", _values(program, f)) for f in small)]
 
 
-def near(program: Program, ops: Set[str]) -> list[str]:
-    """Versions for the loops over lanes, of small arguments only, of the functions that these operations call."""
-    return [render("c", "small.c", _values(program, f) | {"near": True}) for f in NEAR_FUNCTIONS if f in ops]
+def near(program: Program, names: Iterable[str]) -> list[str]:
+    """Versions for the loops over lanes, of small arguments only, of these functions."""
+    return [render("c", "small.c", _values(program, f) | {"near": True}) for f in names]
 
 
 def phi_lanes(program: Program, ops: Set[str]) -> list[str]:

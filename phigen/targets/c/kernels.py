@@ -6,6 +6,7 @@ import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
+from phigen.lanes.functions import LANE_FORMULAS, LANE_FUNCTIONS
 from phigen.scheme.kernel import Kernel
 from phigen.scheme.lowering import Assignment
 from phigen.scheme.program import Program
@@ -28,13 +29,6 @@ LONGEST_FUNCTION = 200
 
 #: Longest line that several temporaries share.
 SHARED_LINE = 100
-
-#: Points at which a kernel for lanes is evaluated at once: what one vector of AVX-512 holds.
-LANES = 8
-
-#: Functions with a version of their own for the loops over lanes, and those that are formulas of these.
-LANE_FUNCTIONS = tuple(f.name for f in elementary.FUNCTIONS.values() if f.lanes == f.name)
-LANE_FORMULAS = {f.name: f.lanes for f in elementary.FUNCTIONS.values() if f.lanes not in ("", f.name)}
 
 
 @dataclass(frozen=True)
@@ -77,7 +71,7 @@ def function(
 ) -> str:
     """The C source of a kernel: one function, or a chain of static ones that share a workspace.
 
-    With ``lanes`` the kernel is evaluated at `LANES` points: each value becomes an array over them, but for the inputs
+    With ``lanes`` the kernel is evaluated at several points: each value becomes an array over them, but for the inputs
     that are ``shared``. A ``single`` one is evaluated at one of these points, the argument ``lane``, and its outputs
     are numbers. What is always zero is not stored if ``sparse``. ``functions`` are the names of those that it calls.
     """

@@ -1,72 +1,22 @@
-"""Paths in all lanes: what blocks of steps and groups of members need of a solver that follows paths."""
+"""Paths in lanes, in C: the recurrences of all series and of their derivatives."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
-from phigen.scheme.kernel import Kernel, Output
 from phigen.scheme.lowering import expand_powers
 from phigen.scheme.path import Entry, PathSlopes, Recurrences, Series, Term
 from phigen.scheme.program import Program
 from phigen.scheme.steps import Path, PathLanes
-from phigen.symbolic.expression import Expression, substitute, symbol
+from phigen.symbolic.expression import Expression
 from phigen.symbolic.symbols import FIXED, SERIES, Symbol, coefficient, momentum
 from phigen.targets.c.kernels import FUNCTIONS, printer
 from phigen.targets.names import Scope
 from phigen.targets.rendering import render
 from phigen.targets.reserved import Reserved
 
-#: Most terms of the expansion of a path from its middle, as in the runtime.
-TERMS = 16
-
-#: Most terms of the expansion of its derivatives, fewer where the stack is too small.
-SLOPE_TERMS = (12, 8)
-
 #: Longest loop over lanes, in statements.
 LONGEST_LOOP = 60
-
-
-def stack(program: Program, slope_terms: int) -> tuple[int, int]:
-    """Values in each lane on the stack: of a model, beside those of any step, and of an expansion."""
-    step, n = program.step, program.dimension
-    if not isinstance(step, Path) or step.lanes is None:
-        return 0, 0
-    path, slopes = step.recurrences, step.lanes.slopes
-    series = len(path.series) * (TERMS + 3) + len(slopes.series) * (slope_terms + 2)
-    fixed = len(path.fixed) + len(slopes.fixed)
-    return n + 2 * n * n, series + fixed + 2 * n * n * (slope_terms + 4) + 2 * n * n + 8 * n
-
-
-def kernels(program: Program, step: Path, lanes: PathLanes) -> list[Kernel]:
-    """The kernels at one point: p = ∇S_h with its derivative, and without; first coefficients of all series."""
-    path, slopes, curvature, coordinates = step.recurrences, lanes.slopes, lanes.curvature, program.coordinates
-    coef, covector = curvature.inputs["coef"], tuple(momentum(c) for c in coordinates)
-    values = _resolved(path.series, path.fixed, {})
-    base = [*_symbols(SERIES, path.series), *_symbols(FIXED, path.fixed)]
-    further = _resolved(slopes.series, slopes.fixed, {s: symbol(s) for s in base}, len(path.series), len(path.fixed))
-    return [
-        curvature,
-        Kernel("momentum", "p = grad S_h(y)", curvature.inputs, curvature.outputs[:1]),
-        Kernel(
-            "values",
-            "the values of all series at one point",
-            {"coef": coef, "p": covector, "m": coordinates},
-            (Output("value", values[0]), Output("fixed", values[1])),
-        ),
-        Kernel(
-            "slope_values",
-            "the values of the further series",
-            {
-                "coef": coef,
-                "p": covector,
-                "value": _symbols(SERIES, path.series),
-                "fixed": _symbols(FIXED, path.fixed),
-            },
-            (Output("slope", further[0]), Output("slope_fixed", further[1])),
-        ),
-        lanes.along_mean,
-        lanes.invert,
-    ]
 
 
 def sizes(lanes: PathLanes, slope_terms: int) -> list[tuple[str, int, str]]:
@@ -97,28 +47,6 @@ def printed(program: Program, step: Path, lanes: PathLanes) -> str:
         "source": _source(show, slopes),
     }
     return render("c", "path_lanes.c", own)
-
-
-def _symbols(kind: str, values: Sequence[object]) -> tuple[Symbol, ...]:
-    """A symbol for each of the values."""
-    return tuple(Symbol(kind, i) for i in range(len(values)))
-
-
-def _resolved(
-    series: Sequence[Series],
-    fixed: Sequence[Expression],
-    known: Mapping[str, Expression],
-    first: int = 0,
-    first_fixed: int = 0,
-) -> tuple[tuple[Expression, ...], tuple[Expression, ...]]:
-    """The first coefficients as expressions in what is known, with no symbols for one another."""
-    found = dict(known) | {Symbol(FIXED, first_fixed + i): e for i, e in enumerate(fixed)}
-    values = []
-    for i, q in enumerate(series):
-        (value,) = substitute([q.first], found)
-        found[Symbol(SERIES, first + i)] = value
-        values.append(value)
-    return tuple(values), tuple(fixed)
 
 
 class _Show:

@@ -1,0 +1,156 @@
+"""From a program to what is computed in lanes: blocks of implicit steps, or packs of members with explicit ones.
+
+A lane is one of `LANES` points at which kernels are evaluated at once. An integration with implicit steps solves a
+block of `LANES` of them together, and an ensemble groups of members; members with explicit steps are put into packs.
+This stage decides whether that is possible and worth its room, and which kernels it takes; targets print them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from phigen.lanes import paths
+from phigen.lanes.functions import NEAR_FUNCTIONS, library_calls, library_powers, operations, with_formulas
+from phigen.scheme.kernel import Kernel
+from phigen.scheme.program import Program
+from phigen.scheme.steps import Explicit, Factorisation, Newton, Path, PathLanes, Splitting
+from phigen.symbolic.expression import topological
+
+#: Points at which a kernel for lanes is evaluated at once: what one vector of AVX-512 holds.
+LANES = 8
+
+#: Bytes that the working arrays of a block, or of a group of members, may take on the stack.
+MOST_STACK = 256 * 1024
+
+#: Packs in a group, as in the runtime.
+PACKS = 4
+
+_DOUBLE = 8
+
+
+@dataclass(frozen=True)
+class LaneKernel:
+    """A kernel in lanes: inputs that are ``shared`` have one value for all of them.
+
+    A ``single`` one is evaluated at one lane, and its outputs are numbers; a ``sparse`` one does not store what is
+    always zero.
+    """
+
+    kernel: Kernel
+    shared: tuple[str, ...] = ()
+    single: bool = False
+    sparse: bool = False
+
+
+@dataclass(frozen=True)
+class Blocks:
+    """Implicit steps in lanes.
+
+    ``calls`` are the functions that the kernels call; without the library's they are ``vectorised``. ``factors`` are
+    those of the Newton matrix, if it has so many zeros that they are kept, not its inverse. ``path`` is what paths
+    need, with at most ``slope_terms`` terms of their derivatives. ``room`` are the values in each lane that a group of
+    members takes, without those that it remembers.
+    """
+
+    kernels: tuple[LaneKernel, ...]
+    calls: frozenset[str]
+    vectorised: bool
+    room: int
+    factors: Factorisation | None = None
+    path: PathLanes | None = None
+    slope_terms: int = 0
+
+    def grouped(self, remembered: int) -> bool:
+        """Whether members are integrated in groups, each with so many values that it remembers."""
+        return _DOUBLE * LANES * (self.room + remembered) <= MOST_STACK
+
+
+@dataclass(frozen=True)
+class Packs:
+    """Members with explicit steps, one in each lane.
+
+    ``kernels`` are those of a step, or of the flows of a splitting. ``near`` are the functions that are polynomials
+    near 0: where these do not reach, there is a longer way.
+    """
+
+    kernels: tuple[Kernel, ...]
+    calls: frozenset[str]
+    near: tuple[str, ...]
+
+
+Lanes = Blocks | Packs
+
+
+def in_lanes(program: Program) -> Lanes | None:
+    """What is computed in lanes; None where the spec says no, or it is not possible, or would need too much room."""
+    if not program.lanes:
+        return None
+    match program.step:
+        case Newton() as step:
+            return _newton(program, step)
+        case Path() as step if step.lanes:
+            return _paths(program, step, step.lanes)
+        case Explicit() as step:
+            return _packs(program, (step.increment,), ())
+        case Splitting() as step:
+            used = operations(step.flows)
+            return _packs(program, step.flows, tuple(f for f in NEAR_FUNCTIONS if f in used))
+    return None
+
+
+def _newton(program: Program, step: Newton) -> Blocks | None:
+    if _block(program) > MOST_STACK:
+        return None
+    found = [LaneKernel(step.linearise, sparse=step.factors is not None)]
+    found.append(LaneKernel(_without_matrices(step.linearise)))
+    if step.factors:
+        substitute = step.factors.substitute
+        found += [LaneKernel(step.factors.factorise), LaneKernel(substitute)]
+        found.append(LaneKernel(substitute, shared=("side",), single=True))
+    elif step.invert:
+        found.append(LaneKernel(step.invert))
+    ops = operations([step.linearise])
+    return Blocks(tuple(found), with_formulas(ops), not library_calls(ops), _group(program), step.factors)
+
+
+def _paths(program: Program, step: Path, lanes: PathLanes) -> Blocks | None:
+    room = {k: paths.stack(step, lanes, program.dimension, k) for k in paths.SLOPE_TERMS}
+    terms = next((k for k, more in room.items() if _block(program, *more) <= MOST_STACK), None)
+    if terms is None:
+        return None
+    kernels = paths.kernels(step, lanes, program.coordinates)
+    ops = operations(kernels)
+    needed = _group(program) + sum(room[terms])
+    found = tuple(LaneKernel(kernel) for kernel in kernels)
+    return Blocks(found, with_formulas(ops), not library_calls(ops), needed, path=lanes, slope_terms=terms)
+
+
+def _packs(program: Program, kernels: Sequence[Kernel], near: tuple[str, ...]) -> Packs | None:
+    """Packs, where all members have the same coefficients and every function has a version for lanes."""
+    ops = operations(kernels)
+    states = 2 * PACKS * LANES * 3 * program.dimension
+    if program.gauge or library_calls(ops) or library_powers(kernels) or _DOUBLE * states > MOST_STACK:
+        return None
+    return Packs(tuple(kernels), with_formulas(ops), near)
+
+
+def _block(program: Program, more: int = 0, once: int = 0) -> int:
+    """Bytes on the stack that a block takes, with ``more`` values in each lane for each stage, and some ``once``."""
+    n = program.dimension
+    each = program.step.coefficients + 4 * n + 3 * n * n + more
+    return _DOUBLE * LANES * (len(program.fractions) * each + once)
+
+
+def _group(program: Program) -> int:
+    """Values in each lane that a group of members takes."""
+    n = program.dimension
+    return len(program.fractions) * program.step.coefficients + 7 * n + 3 * n * n
+
+
+def _without_matrices(kernel: Kernel) -> Kernel:
+    """What a pass needs that goes on with the matrices of the last."""
+    outputs = tuple(o for o in kernel.outputs if "jacobian" not in o.name)
+    needed = set(topological([v for o in outputs for v in o.values]))
+    named = tuple((name, value) for name, value in kernel.named if value in needed)
+    return replace(kernel, name="evaluate", outputs=outputs, named=named)

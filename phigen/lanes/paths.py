@@ -1,0 +1,79 @@
+"""Paths in lanes: the kernels at one point, and the room that expansions take."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from phigen.scheme.kernel import Kernel, Output
+from phigen.scheme.path import Series
+from phigen.scheme.steps import Path, PathLanes
+from phigen.symbolic.expression import Expression, substitute, symbol
+from phigen.symbolic.symbols import FIXED, SERIES, Symbol, momentum
+
+#: Most terms of the expansion of a path from its middle, as in the runtime.
+TERMS = 16
+
+#: Most terms of the expansion of its derivatives, fewer where the stack is too small.
+SLOPE_TERMS = (12, 8)
+
+
+def stack(step: Path, lanes: PathLanes, dimension: int, slope_terms: int) -> tuple[int, int]:
+    """Values in each lane on the stack: of a model, beside those of any step, and of an expansion."""
+    n, path, slopes = dimension, step.recurrences, lanes.slopes
+    series = len(path.series) * (TERMS + 3) + len(slopes.series) * (slope_terms + 2)
+    fixed = len(path.fixed) + len(slopes.fixed)
+    return n + 2 * n * n, series + fixed + 2 * n * n * (slope_terms + 4) + 2 * n * n + 8 * n
+
+
+def kernels(step: Path, lanes: PathLanes, coordinates: Sequence[str]) -> list[Kernel]:
+    """The kernels at one point: p = ∇S_h with its derivative, and without; first coefficients of all series."""
+    path, slopes, curvature = step.recurrences, lanes.slopes, lanes.curvature
+    coef, covector = curvature.inputs["coef"], tuple(momentum(c) for c in coordinates)
+    values = _resolved(path.series, path.fixed, {})
+    base = [*_symbols(SERIES, path.series), *_symbols(FIXED, path.fixed)]
+    further = _resolved(slopes.series, slopes.fixed, {s: symbol(s) for s in base}, len(path.series), len(path.fixed))
+    return [
+        curvature,
+        Kernel("momentum", "p = grad S_h(y)", curvature.inputs, curvature.outputs[:1]),
+        Kernel(
+            "values",
+            "the values of all series at one point",
+            {"coef": coef, "p": covector, "m": tuple(coordinates)},
+            (Output("value", values[0]), Output("fixed", values[1])),
+        ),
+        Kernel(
+            "slope_values",
+            "the values of the further series",
+            {
+                "coef": coef,
+                "p": covector,
+                "value": _symbols(SERIES, path.series),
+                "fixed": _symbols(FIXED, path.fixed),
+            },
+            (Output("slope", further[0]), Output("slope_fixed", further[1])),
+        ),
+        lanes.along_mean,
+        lanes.invert,
+    ]
+
+
+def _symbols(kind: str, values: Sequence[object]) -> tuple[Symbol, ...]:
+    """A symbol for each of the values."""
+    return tuple(Symbol(kind, i) for i in range(len(values)))
+
+
+def _resolved(
+    series: Sequence[Series],
+    fixed: Sequence[Expression],
+    known: Mapping[str, Expression],
+    first: int = 0,
+    first_fixed: int = 0,
+) -> tuple[tuple[Expression, ...], tuple[Expression, ...]]:
+    """The first coefficients as expressions in what is known, with no symbols for one another."""
+    found = dict(known) | {Symbol(FIXED, first_fixed + i): e for i, e in enumerate(fixed)}
+    values = []
+    for i, q in enumerate(series):
+        (value,) = substitute([q.first], found)
+        found[Symbol(SERIES, first + i)] = value
+        values.append(value)
+    return tuple(values), tuple(fixed)
