@@ -11,7 +11,7 @@ from support import (
 )  # fmt: skip
 
 from phigen.compiler import compile_spec, emit
-from phigen.targets.c import lanes
+from phigen.lanes.lowering import Blocks, in_lanes
 
 #: Where 300 steps multiply round-off. Elsewhere blocks and single steps agree to two units of the last place for each
 #: stage: with uncompensated sums they would be ten apart.
@@ -30,7 +30,7 @@ WITH_BLOCKS = [name for name in NAMES if name not in WITHOUT_BLOCKS]
 
 
 def test_large_derivatives_of_paths_and_explicit_steps_have_no_blocks():
-    assert not [name for name in WITHOUT_BLOCKS if lanes.blocks(compiled(name).program)]
+    assert not [name for name in WITHOUT_BLOCKS if isinstance(in_lanes(compiled(name).program), Blocks)]
 
 
 @pytest.mark.parametrize("name", slow_but(QUICK, WITH_BLOCKS))

@@ -9,8 +9,8 @@ from precise_path import by_paths, compile_paths
 from support import BODY, COMMAND, RawC, compiled
 
 from phigen.compiler import emit
+from phigen.lanes.lowering import Blocks, in_lanes
 from phigen.scheme.assemble import MOST_IN_LANES
-from phigen.targets.c import lanes
 
 POLE = "coordinates: [x, y]\npoisson: {brackets: {x: {y: x**2}}}\nhamiltonian: y + x*y/9\n"
 LOGARITHM = "coordinates: [x, y]\npoisson: {brackets: {x: {y: log(x)}}}\nhamiltonian: y - x*y\n"
@@ -48,7 +48,7 @@ def alone(compilation, start, h, steps):
 def test_steps_and_failures_of_blocks_are_those_of_single_steps(name):
     _, start, h, steps, apart = SYSTEMS[name]
     compilation = system(name)
-    assert lanes.blocks(compilation.program)
+    assert isinstance(in_lanes(compilation.program), Blocks)
     for k in (0, 5):
         begin = np.add(start, k * np.array(apart))
         x, made, status = alone(compilation, begin, h, steps)
@@ -89,7 +89,7 @@ def test_paths_of_few_coordinates_are_followed_in_lanes():
     for name, few in (("nambu_pendulum", True), ("charged_particle", False)):
         program = compiled(name).program
         assert (program.dimension <= MOST_IN_LANES) == few
-        assert lanes.blocks(program) == few
+        assert isinstance(in_lanes(program), Blocks) == few
 
 
 def test_paths_where_the_spec_wants_no_lanes_have_no_blocks():
