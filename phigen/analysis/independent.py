@@ -25,9 +25,9 @@ from phigen.realisations import exponential, spray
 from phigen.scheme.discretisation import hamilton_jacobi
 from phigen.series.reference import Source, closed_form, generating_function
 from phigen.series.reference_axioms import defects
-from phigen.series.reference_functions import Functions, Sign
+from phigen.series.reference_functions import Functions, Sign, derivative
 from phigen.series.reference_paths import source_of_paths
-from phigen.symbolic.expression import Expression
+from phigen.symbolic.expression import Expression, substitute
 from phigen.symbolic.verdict import CHECKED, POINTS, PROVED, REFUTED, UNDECIDED, Statement, sample_point
 
 #: The time that the second derivation of one spec may take, unless the user says otherwise.
@@ -38,16 +38,19 @@ DIGITS, AGREEING = 120, 60
 _ATTEMPTS = 64
 _LONGEST = 160
 
+#: What is compared after the S_i.
+GRADIENT, MAPS = "∇S_h", "α and β"
+
 #: A pair that should be equal, with what it is.
 Pair = tuple[str, Any, Any]
 
 
 @dataclass(frozen=True)
 class Comparison:
-    """Whether both derivations agree on S_``term``, or on α and β where it is None.
+    """Whether both derivations agree on S_``term``, or where it is None on ∇S_h or on α and β.
 
-    ``sympy`` and ``compiler`` are the seconds that they took for S_1 … S_term; for α and β, of which the compiler has
-    closed forms, there is only the former.
+    ``sympy`` and ``compiler`` are the seconds that they took for S_1 … S_term; of what is there already, there is only
+    the former.
     """
 
     statement: Statement
@@ -70,29 +73,37 @@ class OutOfTimeError(BaseException):
 
 
 def compare(compilation: Compilation, terms: int | None = None, seconds: float = SECONDS) -> Iterator[Comparison]:
-    """S_1 … S_terms, by default those of the method, then α and β: each when it is derived.
+    """S_1 … S_terms, by default those of the method, then ∇S_h, α and β: each when it is derived.
 
-    The compilation is not that of a splitting. Where steps follow paths, α and β are in the S_i alone. Raises
-    `LimitError` when all has taken so many ``seconds``, or when a polynomial has too many terms.
+    The compilation is not that of a splitting. ∇S_h, as the program has it, is compared if it needs no further S_i.
+    Where steps follow paths, α and β are in the S_i alone. Raises `LimitError` when all has taken so many ``seconds``,
+    or when a polynomial has too many terms.
     """
     terms = terms or stage_order(compilation).terms
     derivation: _Derivation | None = None
-    for i in (*range(1, terms + 1), *([] if compilation.chart.path else [None])):
-        what = f"S_{i}" if i else "α and β"
+    for step in _steps(compilation, terms):
         try:
-            with progress.stage(f"{what} by sympy") as stage, time_limit(seconds):
+            with progress.stage(f"{step} by sympy") as stage, time_limit(seconds):
                 derivation = derivation or _Derivation(compilation, terms)
-                found = derivation.term(i) if i else derivation.maps()
+                found = derivation.compared(step)
         except (OutOfTimeError, OverflowError) as error:
-            raise _limit(compilation, what, i or terms + 1, str(error)) from None
+            raise _limit(compilation, step, derivation.reached if derivation else 0, str(error)) from None
         seconds -= stage.seconds
         yield found
 
 
-def _limit(compilation: Compilation, what: str, i: int, reason: str) -> LimitError:
+def _steps(compilation: Compilation, terms: int) -> list[str]:
+    """What is compared, by name."""
+    steps = [f"S_{i}" for i in range(1, terms + 1)]
+    if compilation.scheme and compilation.scheme.terms <= terms:
+        steps.append(GRADIENT)
+    return steps if compilation.chart.path else [*steps, MAPS]
+
+
+def _limit(compilation: Compilation, step: str, reached: int, reason: str) -> LimitError:
     reason = reason or "the time was up"
-    before = ["nothing was compared", "S_1 was compared", f"S_1 … S_{i - 1} were compared"][min(i - 1, 2)]
-    message = f"{compilation.spec.file}: {what} was not derived a second time: {reason}; {before}"
+    before = ["nothing was compared", "S_1 was compared", f"S_1 … S_{reached} were compared"][min(reached, 2)]
+    message = f"{compilation.spec.file}: {step} was not derived a second time: {reason}; {before}"
     hint = "--seconds gives it more time, --terms asks for fewer S_i"
     return LimitError([Diagnostic(message, hint=hint)])
 
@@ -129,6 +140,7 @@ class _Derivation:
         source = self._path(0) if chart.path or chart.kind == exponential.KIND else self._alpha
         hamiltonian = self._dictionary.expression(system.hamiltonian)
         self._mine = generating_function(hamiltonian, source, self._dictionary.coordinates)
+        self._found: list[Any] = []
         self._taken = 0.0
 
     def _path(self, time: int) -> Source:
@@ -152,8 +164,20 @@ class _Derivation:
         wanted, chart = max(self._terms - 1, 2), self._compilation.chart
         return wanted if chart.exact or chart.degree is None else min(wanted, chart.degree)
 
-    def term(self, i: int) -> Comparison:
-        """S_i, after those before it."""
+    @property
+    def reached(self) -> int:
+        """How many S_i were derived."""
+        return len(self._found)
+
+    def compared(self, step: str) -> Comparison:
+        """The next S_i, or what rests on them."""
+        if step == GRADIENT:
+            return self._gradient()
+        if step == MAPS:
+            return self._ends() if self._are_ends() else self._axioms()
+        return self._term(self.reached + 1)
+
+    def _term(self, i: int) -> Comparison:
         compilation = self._compilation
         start = time.perf_counter()
         mine = next(self._mine)
@@ -163,17 +187,24 @@ class _Derivation:
         self._taken += middle - start
         used = compilation.series.polynomial(i)
         theirs, size = used.tower.expression(used.terms[i - 1]), len(used.terms[i - 1])
-        statement = decide(
-            f"S_{i}",
-            [("", self._dictionary.expression(theirs), mine)],
-            self._positive,
-            f"{size} term{'s' * (size != 1)}",
-        )
+        pair = ("", self._dictionary.expression(theirs), mine)
+        statement = decide(f"S_{i}", [pair], self._positive, f"{size} term{'s' * (size != 1)}")
+        self._found.append(mine)
         return Comparison(statement, i, self._taken, end - middle)
 
-    def maps(self) -> Comparison:
-        """α and β: from their path where they are ends of one, else by their axioms."""
-        return self._ends() if self._are_ends() else self._axioms()
+    def _gradient(self) -> Comparison:
+        """∇S_h of one stage, coefficients written out."""
+        scheme, h = self._compilation.scheme, self._dictionary.step
+        assert scheme is not None
+        start = time.perf_counter()
+        table = scheme.generating.coefficients
+        slope = substitute(scheme.generating.slope, dict(zip(table.slots, table.values, strict=True)))
+        pairs: list[Pair] = []
+        for c, theirs in zip(self._dictionary.coordinates, slope, strict=True):
+            terms = (h**i * derivative(s, c) for i, s in enumerate(self._found[: scheme.terms], 1))
+            pairs.append((f"along {c}", self._dictionary.expression(theirs), sum(terms)))
+        statement = decide(GRADIENT, pairs, self._positive, f"as the program has it: {scheme.generating.form}")
+        return Comparison(statement, None, time.perf_counter() - start)
 
     def _are_ends(self) -> bool:
         chart, choice = self._compilation.chart, self._compilation.spec.birealisation

@@ -15,7 +15,7 @@ from phigen.realisations import karasev
 from phigen.scheme.discretisation import formal_alpha
 from phigen.series.reference import Coefficients, closed_form
 from phigen.symbolic.expression import Expression
-from phigen.symbolic.symbols import momentum
+from phigen.symbolic.symbols import STEP, momentum
 
 
 @dataclass(frozen=True)
@@ -45,10 +45,10 @@ class Dictionary:
         known = symbols_in_sympy(system)
         self.coordinates = tuple(known[c] for c in system.coordinates)
         self.covector = tuple(free_symbols([f"p_{c}" for c in system.coordinates], known))
-        free = free_symbols([f"lambda_{c}" for c in gauge.free], [*known, *self.covector])
+        self.step, *free = free_symbols(["h", *(f"lambda_{c}" for c in gauge.free)], [*known, *self.covector])
         self.gauge = dict(zip(gauge.free, free, strict=True))
         momenta = dict(zip(map(momentum, system.coordinates), self.covector, strict=True))
-        self._symbols = {**known, **momenta, **dict(zip(gauge.symbols, free, strict=True))}
+        self._symbols = {**known, **momenta, **dict(zip(gauge.symbols, free, strict=True)), STEP: self.step}
 
     def expression(self, e: Expression, special: Callable[[int, Any], Any] = closed_function) -> Any:
         """The expression in sympy; ``special`` is that of `to_sympy`."""

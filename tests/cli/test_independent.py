@@ -15,9 +15,9 @@ def test_each_term_has_a_verdict_and_the_seconds_of_both(phigen, write):
     assert result.exit_code == 0
     lines = result.stdout.partition("Second derivation, by sympy alone\n")[2].splitlines()
     shown = [
-        re.match(r" +proved +(S_\d|axioms of α and β up to degree 1 in p) \(.*in \d+\.\d\d s", line) for line in lines
+        re.match(r" +proved +(S_\d|∇S_h|axioms of α and β up to degree 1 in p) \(.*in \d+\.\d\d s", e) for e in lines
     ]
-    assert [m and m[1] for m in shown] == ["S_1", "S_2", "S_3", "axioms of α and β up to degree 1 in p"]
+    assert [m and m[1] for m in shown] == ["S_1", "S_2", "S_3", "∇S_h", "axioms of α and β up to degree 1 in p"]
     assert all("by phigen in" in line for line in lines[:3])
 
 
@@ -26,7 +26,7 @@ def test_json_has_the_terms_that_were_asked_for(phigen, write):
     result = phigen("check", "--independent", "--terms", "4", "--json", "a.yaml")
     assert result.exit_code == 0
     (found,) = json.loads(result.stdout)
-    assert [c["term"] for c in found["independent"]] == [1, 2, 3, 4, None]
+    assert [c["term"] for c in found["independent"]] == [1, 2, 3, 4, None, None]
     assert {c["verdict"] for c in found["independent"]} == {"proved"}
     assert set(found["independent"][0]["seconds"]) == {"phigen", "sympy"}
     assert "independent" not in json.loads(phigen("check", "--json", "a.yaml").stdout)[0]
@@ -38,7 +38,7 @@ def test_what_is_refuted_is_an_error_with_its_code(phigen, write, monkeypatch):
     result = phigen("check", "--independent", "a.yaml")
     assert result.exit_code == 5
     assert re.search(r"refuted +S_3 \(at .*: .*, not .*\n +residual: ", result.stdout)
-    assert "a.yaml: refuted by the second derivation: S_3" in result.stderr
+    assert "a.yaml: refuted by the second derivation: S_3, ∇S_h" in result.stderr
 
 
 def test_the_free_gauge_is_a_symbol_of_both(phigen):
