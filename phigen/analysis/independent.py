@@ -110,19 +110,25 @@ def _limit(compilation: Compilation, step: str, reached: int, reason: str) -> Li
 
 @contextmanager
 def time_limit(seconds: float) -> Iterator[None]:
-    """Raises `OutOfTimeError` in what lasts longer; without effect outside the main thread, which has no signals."""
+    """Raises `OutOfTimeError` in what lasts longer; without effect outside the main thread, which has no signals.
+
+    Python drops an exception in a destructor or the callback of a weak reference, so it is raised again every second.
+    """
     if threading.current_thread() is not threading.main_thread():
         yield
         return
+    lasting = True
 
     def over(number: int, frame: FrameType | None) -> None:
-        raise OutOfTimeError
+        if lasting:
+            raise OutOfTimeError
 
     before = signal.signal(signal.SIGALRM, over)
-    signal.setitimer(signal.ITIMER_REAL, max(seconds, 1e-6))
+    signal.setitimer(signal.ITIMER_REAL, max(seconds, 1e-6), 1.0)
     try:
         yield
     finally:
+        lasting = False
         signal.setitimer(signal.ITIMER_REAL, 0)
         signal.signal(signal.SIGALRM, before)
 

@@ -8,7 +8,7 @@ import pytest
 import sympy
 from support import NAMES, compile_text, compiled
 
-from phigen.analysis.independent import compare, decide
+from phigen.analysis.independent import OutOfTimeError, compare, decide, time_limit
 from phigen.errors import LimitError
 from phigen.realisations import karasev
 from phigen.series import hamilton_jacobi, reference_functions
@@ -258,6 +258,29 @@ def test_the_time_is_kept_and_what_was_compared_is_said():
     assert time.perf_counter() - start < 10
     assert len(found) > 1
     assert {c.statement.verdict for c in found} == {PROVED}
+
+
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
+def test_the_time_is_kept_where_python_drops_exceptions():
+    """Callbacks of weak references, of which caches of expressions have many, do as destructors do."""
+
+    def wait(seconds):
+        end = time.perf_counter() + seconds
+        while time.perf_counter() < end:
+            pass
+
+    class Slow:
+        def __del__(self):
+            wait(0.3)
+
+    def work():
+        Slow()
+        wait(30)
+
+    start = time.perf_counter()
+    with pytest.raises(OutOfTimeError), time_limit(0.1):
+        work()
+    assert time.perf_counter() - start < 15
 
 
 def test_too_many_terms_are_a_limit(monkeypatch):
