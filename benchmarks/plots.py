@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.measure import Result, Study
-from phigen.analysis.drawing.palette import SERIES, save, styled
+from phigen.drawing.palette import SERIES, save, styled
 
 #: Peers that are drawn, with line styles; the rest is in the tables. phigen's methods are drawn as full lines.
 PEERS = {

@@ -17,8 +17,7 @@ import sympy
 
 from benchmarks.problems import Problem
 from phigen import spec as specs
-from phigen.analysis.proof import compile_proved
-from phigen.compiler import emit
+from phigen.compiler import compile_proved, emit
 from phigen.errors import Diagnostic, LimitError
 from phigen.runtime import cache
 

@@ -18,8 +18,7 @@ from benchmarks.measure import ENERGY, ORBIT, SAMPLES, Cell, Judge, Study, cheap
 from benchmarks.problems import PROBLEMS, Problem, volterra
 from benchmarks.solvers import Method, build_phigen, c_peers, phigen_method, reference, vector_rk4
 from phigen import spec as specs
-from phigen.analysis.proof import compile_proved
-from phigen.compiler import emit
+from phigen.compiler import compile_proved, emit
 from phigen.errors import PhigenError
 from phigen.runtime import toolchain
 

@@ -10,21 +10,21 @@ from typing import Any
 import numpy as np
 
 from phigen import resources, spec
-from phigen.analysis import figures
-from phigen.analysis.drawing.groups import groups
-from phigen.analysis.drawing.phase_space import joins
-from phigen.analysis.paper.runge_kutta import started
-from phigen.analysis.race import TABLEAUX
-from phigen.analysis.sections import function_of
-from phigen.analysis.summary import Summary, summarise
 from phigen.api import compilation_of, solver_of
 from phigen.cli.list import kind_of_structure
 from phigen.cli.show import readable_one
+from phigen.drawing import figures
+from phigen.drawing.groups import groups
+from phigen.drawing.phase_space import joins
+from phigen.paper.runge_kutta import started
 from phigen.runtime.interface import BackendError
 from phigen.runtime.session import rows_along
 from phigen.runtime.solver import Solver
 from phigen.runtime.trajectory import Trajectory
 from phigen.spec.model import Run, Spec
+from phigen.study.race import TABLEAUX
+from phigen.study.sections import function_of
+from phigen.study.summary import Summary, summarise
 
 DOCS = Path(__file__).resolve().parent
 PAGE, FACTS, FIGURES = DOCS / "gallery.md", DOCS / "figures" / "gallery.json", DOCS / "figures" / "gallery"

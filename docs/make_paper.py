@@ -9,9 +9,9 @@ from pathlib import Path
 
 import click
 
-from phigen.analysis.drawing.palette import save
-from phigen.analysis.paper.plates import PLATES
 from phigen.cli.reproduce import described, lines_of
+from phigen.drawing.palette import save
+from phigen.paper.plates import PLATES
 
 DOCS = Path(__file__).resolve().parent
 PAGE, FIGURES = DOCS / "paper.md", DOCS / "figures"

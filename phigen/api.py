@@ -17,17 +17,18 @@ from typing import TYPE_CHECKING
 
 from phigen import registry
 from phigen import spec as specs
-from phigen.analysis.proof import compile_proved, located
-from phigen.compiler import Compilation, emit
+from phigen.compilation import Compilation
+from phigen.compiler import compile_proved, emit
 from phigen.errors import Diagnostic, SpecError
 from phigen.geometry.system import System, system_from_spec
+from phigen.proofs.examination import located
 from phigen.spec import limits
 from phigen.spec.model import Extras, Spec
 from phigen.spec.names import ARGUMENT_HINT, ARGUMENTS, IDENTIFIER, PROFILES, SCHEMES, SPEC_NAME
 from phigen.spec.taken import objection
 
 if TYPE_CHECKING:
-    from phigen.analysis.sympy_formulas import SympyFormulas
+    from phigen.formulas.sympy_formulas import SympyFormulas
     from phigen.runtime.backend import Backend
     from phigen.runtime.interface import Interface
     from phigen.runtime.solver import Solver
@@ -85,7 +86,7 @@ def formulas(source: Source, order: int | None = None, *, terms: int | None = No
     ``terms`` asks for S_1 … S_terms instead of those of the method. Raises as `compile`; `SpecError` for a splitting,
     which has none of these.
     """
-    from phigen.analysis.sympy_formulas import sympy_formulas
+    from phigen.formulas.sympy_formulas import sympy_formulas
 
     if terms is not None and not (isinstance(terms, int) and 1 <= terms <= limits.ORDER):
         raise ValueError(f"terms must be an integer from 1 to {limits.ORDER}, not {terms!r}")

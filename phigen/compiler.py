@@ -1,99 +1,43 @@
 """The pipeline, on one screen.
 
     spec file ─► Spec ─► System ─► BiRealisation ─► Gauged ─► Discretisation ─► Program ─► source files
-                                └─► Splitting ──────────────────────────────────┘
+                            │   └─► Splitting ──────────────────────────────────┘  │
+                            └───────────────────────► Examination ◄────────────────┘
 
 Each stage is a function from one frozen dataclass to the next; `Compilation` keeps what each of them made and the
 seconds it took. `Gauged` holds the Hamilton–Jacobi series, which is computed once, as far as any stage or proof asks;
-`Discretisation` the generating function.
+`Discretisation` the generating function. `Examination` holds what was proved, of the system before anything rests on
+it, and of the method that was compiled.
 """
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, TypeVar
 
 from phigen import progress, registry
 from phigen import spec as specs
-from phigen.errors import LimitError
+from phigen.compilation import Compilation
+from phigen.errors import CheckError, LimitError, SpecError
 from phigen.geometry.system import System, system_from_spec
+from phigen.proofs import statements
+from phigen.proofs.examination import UNEXAMINED, Examination, located, refutation, refuted
 from phigen.realisations.catalogue import realise
-from phigen.realisations.protocol import BiRealisation
 from phigen.scheme.assemble import build_program
 from phigen.scheme.choosing import plan as plan_splitting
-from phigen.scheme.discretisation import Discretisation, discretise
-from phigen.scheme.gauge import Gauge, Gauged, choose, given
-from phigen.scheme.order import Order, plan_order
+from phigen.scheme.discretisation import discretise
+from phigen.scheme.gauge import Gauge, choose, given
+from phigen.scheme.order import plan_order
 from phigen.scheme.program import Program
 from phigen.scheme.splitting import build_splitting
-from phigen.series.hamilton_jacobi import HamiltonJacobi
 from phigen.spec.model import Extras, Spec
-from phigen.splitting.parts import Splitting, split
+from phigen.splitting.parts import split
 
 T = TypeVar("T")
-
-
-@dataclass(frozen=True)
-class Compilation:
-    """Everything that compiling one spec made, stage by stage; ``seconds`` maps stages to their time."""
-
-    spec: Spec
-    system: System
-    realisation: BiRealisation | None
-    order: Order
-    program: Program
-    gauge: Gauge = field(default_factory=Gauge)
-    seconds: Mapping[str, float] = field(default_factory=dict)
-    splitting: Splitting | None = None
-    gauged: Gauged | None = None
-    scheme: Discretisation | None = None
-
-    @property
-    def chart(self) -> BiRealisation:
-        """The bi-realisation; a splitting has none, and must not be asked."""
-        if self.realisation is None:
-            raise ValueError(f"{self.spec.name} is compiled to a splitting, which has no bi-realisation")
-        return self.realisation
-
-    @property
-    def label(self) -> str:
-        """The kind of the method, for every place that names it to the user."""
-        return self.realisation.label if self.realisation else "splitting"
-
-    @property
-    def exact(self) -> bool:
-        """Whether a step is a Poisson map to round-off."""
-        return self.realisation is None or self.realisation.exact
-
-    @property
-    def symmetric(self) -> bool:
-        """Whether a step of −h undoes one of h."""
-        return self.realisation is None or self.realisation.symmetric
-
-    @property
-    def discretised(self) -> System:
-        """The system with the Hamiltonian that is discretised: H less the Casimirs of the gauge."""
-        return self.gauged.system if self.gauged else self.gauge.applied(self.system)
-
-    @property
-    def series(self) -> HamiltonJacobi:
-        """The series of `discretised`; the symbol ``gauge:C`` is the multiple of C that the solver chooses."""
-        if self.gauged is None:
-            raise ValueError(f"{self.spec.name} is compiled to a splitting, which has no generating function")
-        return self.gauged.series
-
-
-@contextmanager
-def bounded(spec: Spec) -> Iterator[None]:
-    """Polynomials that would be larger than memory are a `LimitError` of the spec."""
-    try:
-        yield
-    except OverflowError as error:
-        hint = "fewer terms, lower powers or a lower order; scheme: splitting needs no series"
-        raise LimitError([spec.diagnostic(("hamiltonian",), f"the spec needs {error}", hint)]) from error
 
 
 def compile_spec(
@@ -106,19 +50,85 @@ def compile_spec(
 ) -> Compilation:
     """Compile a spec; ``order`` overrides the order (and the terms) that it asks for, ``scheme`` and ``extras`` too.
 
-    ``system`` is its system, where the caller has built it already. Raises `SpecError` (no bi-realisation applies, H
-    does not split, …) and `LimitError` (the program would be too large).
+    ``system`` is its system, where the caller has built it already. Nothing is proved: see `compile_proved`. Raises
+    `SpecError` (no bi-realisation applies, H does not split, …) and `LimitError` (the program would be too large).
     """
+    clock = _Clock()
     with bounded(spec):
-        return _compiled(spec, order, scheme, system, extras)
+        source = system or clock.timed("system", lambda: system_from_spec(spec))
+        return _compiled(spec, source, order, scheme, extras or spec.extras, clock)
+
+
+def examine(
+    spec: Spec,
+    *,
+    order: int | None = None,
+    scheme: str | None = None,
+    system: System | None = None,
+    extras: Extras | None = None,
+) -> Examination:
+    """Compile a spec, and prove what can be proved about it, as far along the pipeline as it gets.
+
+    Raises `SpecError` if the spec does not even define a system.
+    """
+    clock = _Clock()
+    with bounded(spec), progress.stage(spec.name):
+        try:
+            source = system or clock.timed("system", lambda: system_from_spec(spec))
+        except SpecError as error:
+            raise located(error, spec) from None
+        groups = clock.timed("proofs", lambda: statements.definedness(source, spec))
+        if refuted(groups):
+            return Examination(spec, groups, unexamined=f"the bracket, {UNEXAMINED}")
+        groups = groups | clock.timed("proofs", lambda: statements.tensor(source))
+        if refuted(groups):
+            return Examination(spec, groups, unexamined=UNEXAMINED)
+        groups = groups | clock.timed("proofs", lambda: statements.integrals(source))
+        try:
+            compilation = _compiled(spec, source, order, scheme, extras or spec.extras, clock)
+        except SpecError as error:
+            return Examination(spec, groups, obstacle=located(error, spec))
+        groups = groups | clock.timed("proofs", lambda: statements.method(compilation))
+    return Examination(spec, groups, compilation)
+
+
+def compile_proved(
+    spec: Spec,
+    *,
+    order: int | None = None,
+    scheme: str | None = None,
+    system: System | None = None,
+    extras: Extras | None = None,
+) -> Compilation:
+    """`compile_spec`, refusing what is refuted.
+
+    Raises `CheckError` that names what is refuted, with the residual: no π that is not Poisson, no claimed Casimir
+    that is none, no wrong bi-realisation reaches the output. Raises `SpecError` and `LimitError` as `compile_spec`.
+    """
+    found = examine(spec, order=order, scheme=scheme, system=system, extras=extras)
+    if found.refuted:
+        raise CheckError(refutation(found))
+    for s in found.groups.get(statements.DEFINEDNESS, ()):
+        warnings.warn(f"{spec.name}: {s}", RuntimeWarning, stacklevel=3)
+    if found.compilation is None:
+        raise found.obstacle or AssertionError("an examination without compilation has an obstacle")
+    return found.compilation
+
+
+def compile_file(path: str | Path, *, order: int | None = None) -> Compilation:
+    """`compile_spec` for a file."""
+    return compile_spec(specs.load(path), order=order)
+
+
+def emit(program: Program, target: str, command: str, *, single_file: bool = False) -> dict[str, str]:
+    """The files of one target, by name; ``command`` is what regenerates them. `ValueError` for unknown targets."""
+    return registry.find(target).emit(program, command, single_file=single_file)
 
 
 def _compiled(
-    spec: Spec, order: int | None, scheme: str | None, system: System | None, extras: Extras | None
+    spec: Spec, source: System, order: int | None, scheme: str | None, extras: Extras, clock: _Clock
 ) -> Compilation:
-    clock = _Clock()
-    source = system or clock.timed("system", lambda: system_from_spec(spec))
-    extras = extras or spec.extras
+    """Compile a system, by the series or to a splitting."""
     described: dict[str, Any] = {
         "title": spec.title,
         "licence": spec.license,
@@ -156,8 +166,18 @@ def _split(spec: Spec, source: System, order: int | None, described: Mapping[str
     return Compilation(spec, source, None, choice.order, program, gauge, clock.seconds, choice.splitting)
 
 
+@contextmanager
+def bounded(spec: Spec) -> Iterator[None]:
+    """Polynomials that would be larger than memory are a `LimitError` of the spec."""
+    try:
+        yield
+    except OverflowError as error:
+        hint = "fewer terms, lower powers or a lower order; scheme: splitting needs no series"
+        raise LimitError([spec.diagnostic(("hamiltonian",), f"the spec needs {error}", hint)]) from error
+
+
 class _Clock:
-    """The seconds of each stage."""
+    """The seconds of each stage; a stage may be entered several times."""
 
     def __init__(self) -> None:
         self.seconds: dict[str, float] = {}
@@ -166,15 +186,5 @@ class _Clock:
         """The result of a stage."""
         with progress.stage(stage) as running:
             result = work()
-        self.seconds[stage] = running.seconds
+        self.seconds[stage] = self.seconds.get(stage, 0.0) + running.seconds
         return result
-
-
-def compile_file(path: str | Path, *, order: int | None = None) -> Compilation:
-    """`compile_spec` for a file."""
-    return compile_spec(specs.load(path), order=order)
-
-
-def emit(program: Program, target: str, command: str, *, single_file: bool = False) -> dict[str, str]:
-    """The files of one target, by name; ``command`` is what regenerates them. `ValueError` for unknown targets."""
-    return registry.find(target).emit(program, command, single_file=single_file)

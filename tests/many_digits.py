@@ -8,7 +8,7 @@ from typing import Any
 
 import mpmath
 
-from phigen.compiler import Compilation
+from phigen.compilation import Compilation
 from phigen.series.hamilton_jacobi import graph_series
 from phigen.symbolic.expression import Expression, derivatives, fold, gradient, number, total
 

@@ -16,7 +16,8 @@ import mpmath
 from support import RawC, Setting, relative_defect, values
 
 from phigen import resources, spec
-from phigen.compiler import Compilation, compile_spec
+from phigen.compilation import Compilation
+from phigen.compiler import compile_spec
 from phigen.realisations import karasev
 from phigen.series.hamilton_jacobi import graph_series
 from phigen.spec.model import BirealisationChoice

@@ -11,7 +11,8 @@ import mpmath
 import numpy as np
 from many_digits import precisely
 
-from phigen.compiler import Compilation, emit
+from phigen.compilation import Compilation
+from phigen.compiler import emit
 from phigen.registry import LOADABLE
 from phigen.runtime import cache as library_cache
 from phigen.runtime.c_solver import CSolver

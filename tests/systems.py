@@ -11,7 +11,8 @@ from typing import Any
 import pytest
 
 from phigen import resources, spec
-from phigen.compiler import Compilation, compile_spec
+from phigen.compilation import Compilation
+from phigen.compiler import compile_spec
 from phigen.geometry.system import System, system_from_spec
 from phigen.realisations.catalogue import realise
 from phigen.realisations.protocol import BiRealisation

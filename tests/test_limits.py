@@ -6,7 +6,7 @@ import resource
 
 import pytest
 
-from phigen.analysis.proof import compile_proved
+from phigen.compiler import compile_proved
 from phigen.errors import PhigenError
 from phigen.spec import loads
 

@@ -12,12 +12,12 @@ from walkthrough import follow, labels_of
 
 pytest.importorskip("matplotlib")
 
-from phigen.analysis.drawing.palette import svg
-from phigen.analysis.paper import rigid_body
-from phigen.analysis.paper.plate import Plate
-from phigen.analysis.paper.plates import PLATES
 from phigen.cli import group
 from phigen.cli.reproduce import described, lines_of
+from phigen.drawing.palette import svg
+from phigen.paper import rigid_body
+from phigen.paper.plate import Plate
+from phigen.paper.plates import PLATES
 
 DOCS = Path(__file__).resolve().parent.parent / "docs"
 STORED = {entry["figure"]: entry for entry in json.loads((DOCS / "figures" / "paper.json").read_text())}

@@ -21,7 +21,7 @@ from phigen.registry import TARGETS
 
 if TYPE_CHECKING:
     from phigen.cli.outputs import Change
-    from phigen.compiler import Compilation
+    from phigen.compilation import Compilation
 
 #: Beyond the flags of every local library: what phigen promises that its C passes.
 STRICT = ("-Wall", "-Wextra", "-Werror")
@@ -82,7 +82,7 @@ def command(
 
 
 def _compile_all(console: Console, spec_files: Sequence[str], options: Options) -> list[Compilation]:
-    from phigen.analysis.proof import compile_proved
+    from phigen.compiler import compile_proved
 
     collector, compilations = Collector(), []
     for spec in load_all(spec_files, collector):
@@ -177,9 +177,9 @@ def _write(
 
 def _certify(console: Console, compilations: Sequence[Compilation], options: Options) -> None:
     """Verify what was written; systems that fall short get no certificate, and lose the one they had."""
-    from phigen.analysis.proof import compile_proved
     from phigen.cli import certificate
     from phigen.cli.verify import fallen_short, verified, with_tangent
+    from phigen.compiler import compile_proved
     from phigen.writing import write
 
     collector = Collector()

@@ -11,8 +11,8 @@ from phigen._version import __version__
 from phigen.targets.header import split
 
 if TYPE_CHECKING:
-    from phigen.analysis.verification import Verification
-    from phigen.compiler import Compilation
+    from phigen.compilation import Compilation
+    from phigen.study.verification import Verification
 
 
 def path_of(folder: Path, name: str) -> Path:

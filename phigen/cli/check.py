@@ -13,8 +13,8 @@ from phigen.cli.sources import ORDER, load_all, many_specs, scheme_option
 from phigen.errors import CheckError
 
 if TYPE_CHECKING:
-    from phigen.analysis.independent import Comparison
-    from phigen.analysis.proof import Examination
+    from phigen.proofs.examination import Examination
+    from phigen.proofs.independent import Comparison
     from phigen.symbolic.verdict import Statement
 
 _COLOURS = {"proved": "green", "refuted": "red", "checked numerically": "yellow", "undecided": "yellow"}
@@ -55,7 +55,7 @@ def command(
     With --independent sympy derives the S_i a second time, in another way, and looks at α and β; what it says of each
     term is shown as it comes. Exit code 3 when its time is up.
     """
-    from phigen.analysis.proof import examine
+    from phigen.compiler import examine
 
     if not independent and (terms or seconds):
         raise click.UsageError("--terms and --seconds are for --independent")
@@ -88,7 +88,7 @@ def _compared(
     shown: bool,
 ) -> list[Comparison]:
     """What the second derivation says, shown line by line as it comes."""
-    from phigen.analysis.independent import SECONDS, compare
+    from phigen.proofs.independent import SECONDS, compare
     from phigen.symbolic.verdict import REFUTED
 
     compilation, found = examination.compilation, []

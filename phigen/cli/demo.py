@@ -13,7 +13,7 @@ from phigen.cli.experiment import Experiment, loaded, prepared
 from phigen.registry import LOADABLE
 
 if TYPE_CHECKING:
-    from phigen.compiler import Compilation
+    from phigen.compilation import Compilation
     from phigen.geometry.system import System
     from phigen.runtime.interface import Floats
 
@@ -39,8 +39,8 @@ def command(console: Console, target: str) -> None:
     import numpy as np
 
     from phigen import resources, spec
-    from phigen.analysis import classical
     from phigen.api import compilation_of
+    from phigen.study import classical
 
     start = time.perf_counter()
     source = spec.load(resources.bundled_specs() / f"{SPEC}.yaml")
@@ -92,8 +92,8 @@ def _errors(system: System, experiment: Experiment, t: Floats, x: Floats) -> tup
     """Relative errors (rows,) of the state and of the Casimir, and the exact states."""
     import numpy as np
 
-    from phigen.analysis.arrays import evaluate
-    from phigen.analysis.summary import exact_solution
+    from phigen.study.arrays import evaluate
+    from phigen.study.summary import exact_solution
 
     solution = exact_solution(system, experiment.run, experiment.parameters, x[0], t)
     exact = np.column_stack([solution[c] for c in system.coordinates])

@@ -15,7 +15,7 @@ from phigen.cli.console import Console
 from phigen.errors import Diagnostic, SpecError
 
 if TYPE_CHECKING:
-    from phigen.compiler import Compilation
+    from phigen.compilation import Compilation
     from phigen.runtime.solver import Solver
     from phigen.spec.model import Run, Spec
 

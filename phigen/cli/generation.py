@@ -16,7 +16,7 @@ from phigen.registry import TARGETS
 from phigen.spec.names import PROFILES
 
 if TYPE_CHECKING:
-    from phigen.compiler import Compilation
+    from phigen.compilation import Compilation
     from phigen.spec.model import Extras, Spec
 
 F = TypeVar("F", bound=Callable[..., Any])

@@ -13,14 +13,10 @@ import click
 import numpy as np
 
 from phigen._version import __version__
-from phigen.analysis.lyapunov import FrameGrowth, Spectrum
-from phigen.analysis.sections import function_of
-from phigen.analysis.sketch import POINTS, Sketch, Thinned
-from phigen.analysis.summary import Watch
 from phigen.cli.console import Console
 from phigen.cli.experiment import Experiment
 from phigen.cli.interruption import interruptible
-from phigen.compiler import Compilation
+from phigen.compilation import Compilation
 from phigen.errors import FileError, StepError
 from phigen.runtime import checkpoint
 from phigen.runtime.checkpoint import Checkpoint, MismatchError
@@ -31,6 +27,10 @@ from phigen.runtime.session import Session
 from phigen.runtime.solver import Solver
 from phigen.runtime.tables import Table, opened
 from phigen.runtime.trajectory import Trajectory, trajectory_columns
+from phigen.study.lyapunov import FrameGrowth, Spectrum
+from phigen.study.sections import function_of
+from phigen.study.sketch import POINTS, Sketch, Thinned
+from phigen.study.summary import Watch
 from phigen.symbolic.readable import readable
 
 #: Seconds between two checkpoints.
@@ -272,8 +272,8 @@ def compared(
     compilation: Compilation, solver: Solver, experiment: Experiment, method: str, console: Console
 ) -> tuple[Watch, Trajectory]:
     """A classical method on the same experiment: its errors, and its trajectory as far as a figure can show it."""
-    from phigen.analysis import classical
-    from phigen.analysis.methods import field_of
+    from phigen.study import classical
+    from phigen.study.methods import field_of
 
     run, parameters, names = experiment.run, experiment.parameters, solver.interface
     start, backend = time.perf_counter(), solver.backend

@@ -45,9 +45,10 @@ def command(
     needs no network. Nothing is written if the mathematics of the spec is refuted. Exit code 5 if the solver falls
     short of what it promises: the page says where.
     """
-    from phigen.analysis.proof import examine, refutation
     from phigen.cli.report_material import gathered
     from phigen.cli.verify import with_tangent
+    from phigen.compiler import examine
+    from phigen.proofs.examination import refutation
 
     spec = load_one(spec_file)
     target = output if output and output != "-" else f"{spec.name}.html"

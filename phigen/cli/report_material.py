@@ -14,12 +14,12 @@ from phigen.errors import PhigenError, StepError
 from phigen.report.material import Material
 
 if TYPE_CHECKING:
-    from phigen.analysis.proof import Examination
-    from phigen.analysis.verification import Verification
     from phigen.cli.recording import Recorder
-    from phigen.compiler import Compilation
+    from phigen.compilation import Compilation
+    from phigen.proofs.examination import Examination
     from phigen.runtime.solver import Solver
     from phigen.runtime.trajectory import Trajectory
+    from phigen.study.verification import Verification
 
 #: So many first steps are all shown by the viewer.
 _OPENING = 4_000
@@ -112,8 +112,8 @@ def _opening(
 
 def _with_constancy(material: Material, experiment: Experiment) -> Material:
     """With the constancy of the modified Hamiltonian, or why it was not measured."""
-    from phigen.analysis.backward import NotOfferedError
     from phigen.cli.verify import constancy_of
+    from phigen.study.backward import NotOfferedError
 
     try:
         return replace(material, constancy=constancy_of(material.compilation, experiment))

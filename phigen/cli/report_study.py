@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING
 from phigen.cli.console import Console
 
 if TYPE_CHECKING:
-    from phigen.analysis.precision import Study
     from phigen.cli.experiment import Experiment
-    from phigen.compiler import Compilation
+    from phigen.compilation import Compilation
     from phigen.runtime.interface import Floats
+    from phigen.study.precision import Study
 
 #: The methods to compare with, if the run names none.
 COMPARED = ("rk4",)
@@ -30,9 +30,9 @@ def studied(
     """The study of precision and time, or why there is none."""
     import numpy as np
 
-    from phigen.analysis import precision, race
     from phigen.api import solver_of
     from phigen.runtime import toolchain
+    from phigen.study import precision, race
 
     run, x0 = experiment.run, np.array(experiment.initial)
     methods = list(dict.fromkeys([*(run.compare or COMPARED), "dop853"]))
@@ -57,7 +57,7 @@ def _closed_form(compilation: Compilation, experiment: Experiment, x0: Floats) -
     """The closed form of the run, if it gives every coordinate."""
     import numpy as np
 
-    from phigen.analysis.summary import exact_solution
+    from phigen.study.summary import exact_solution
 
     system, run = compilation.system, experiment.run
     if set(run.exact) != set(system.coordinates):
@@ -72,9 +72,9 @@ def _closed_form(compilation: Compilation, experiment: Experiment, x0: Floats) -
 
 def _casimirs(compilation: Compilation, experiment: Experiment, x0: Floats) -> Callable[[Floats], float] | None:
     """The largest error of a Casimir at a state, in its unit."""
-    from phigen.analysis.arrays import evaluate
-    from phigen.analysis.conservation import units
-    from phigen.analysis.precision import ROUNDING
+    from phigen.study.arrays import evaluate
+    from phigen.study.conservation import units
+    from phigen.study.precision import ROUNDING
 
     system = compilation.system
     formulas = list(system.casimirs.values())

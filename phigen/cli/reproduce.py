@@ -10,7 +10,7 @@ import click
 from phigen.cli.console import Console, heading, out, out_json, pass_console, table, verbosity
 
 if TYPE_CHECKING:
-    from phigen.analysis.paper.plate import Plate
+    from phigen.paper.plate import Plate
 
 
 @click.command("reproduce")
@@ -28,8 +28,8 @@ def command(console: Console, what: str, folder: Path, suffix: str, names: tuple
     Files are DIR/NAME.svg, and overwritten. It needs matplotlib and a C compiler, and takes half a minute: the rigid
     body makes 10^8 steps with each of three methods.
     """
-    from phigen.analysis.drawing.palette import require_matplotlib, save
-    from phigen.analysis.paper.plates import PLATES
+    from phigen.drawing.palette import require_matplotlib, save
+    from phigen.paper.plates import PLATES
 
     require_matplotlib()
     wrong = [name for name in names if name not in PLATES]

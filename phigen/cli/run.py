@@ -70,7 +70,7 @@ def command(
     from phigen.cli.verify import with_tangent
 
     if plot:
-        from phigen.analysis.drawing.palette import require_matplotlib
+        from phigen.drawing.palette import require_matplotlib
 
         require_matplotlib()
     spec = load_one(spec_file)
@@ -108,7 +108,7 @@ def _told(recorder: Recorder) -> str:
 
 
 def _draw(path: Path, recorder: Recorder, drawn: dict[str, Trajectory], casimirs: Any, units: Any) -> None:
-    from phigen.analysis import figures
+    from phigen.drawing import figures
 
     sections = {f"{recorder.section_text} = 0": recorder.points.rows[:, 1:]} if recorder.finder else {}
     title = f"{recorder.solver.interface.name}, {recorder.experiment.run.name}"

@@ -9,15 +9,15 @@ from typing import TYPE_CHECKING, Any
 from phigen.cli.console import counted, heading, out, table
 
 if TYPE_CHECKING:
-    from phigen.analysis.lyapunov import Spectrum
-    from phigen.analysis.summary import Drift, Summary
     from phigen.cli.recording import Recorder
-    from phigen.compiler import Compilation
+    from phigen.compilation import Compilation
+    from phigen.study.lyapunov import Spectrum
+    from phigen.study.summary import Drift, Summary
 
 
 def print_summary(compilation: Compilation, recorder: Recorder, summaries: Sequence[Summary]) -> None:
     """The table of a run: one column for each method; then crossings and exponents, if asked for."""
-    from phigen.analysis.conservation import stated
+    from phigen.study.conservation import stated
 
     run, solver, steps = recorder.experiment.run, recorder.solver, recorder.session.steps
     out(heading(f"{compilation.spec.name}, run {run.name}") + (f": {run.description}" if run.description else ""))

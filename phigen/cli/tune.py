@@ -15,9 +15,9 @@ from phigen.cli.tune_summary import described, print_tuning, unreached
 from phigen.errors import CheckError
 
 if TYPE_CHECKING:
-    from phigen.analysis.tuning.problem import Problem
     from phigen.cli.experiment import Experiment
     from phigen.geometry.system import System
+    from phigen.tuning.problem import Problem
 
 
 @click.command("tune")
@@ -57,14 +57,14 @@ def command(
     of a run of the spec, confirms the best over the whole horizon if that is affordable, and prints the lines to paste
     into the spec. Classical methods stand beside them. Exit code 5 if nothing reaches the accuracy.
     """
-    from phigen.analysis.proof import compile_proved
-    from phigen.analysis.tuning.study import tune
     from phigen.api import chosen_target
+    from phigen.compiler import compile_proved
+    from phigen.tuning.study import tune
 
     _expect_positive(horizon, "--horizon")
     _expect_positive(budget, "--budget")
     if plot:
-        from phigen.analysis.drawing.palette import require_matplotlib
+        from phigen.drawing.palette import require_matplotlib
 
         require_matplotlib()
     spec = load_one(spec_file)
@@ -78,7 +78,7 @@ def command(
     elif found.winner:
         print_tuning(found, spec, experiment.run)
     if plot:
-        from phigen.analysis import figures
+        from phigen.drawing import figures
 
         figures.save(figures.tuning_figure(found, f"{spec.name}, run {experiment.run.name}"), str(plot))
         console.note(f"wrote {plot}")
@@ -95,7 +95,7 @@ def problem_of(system: System, experiment: Experiment, horizon: float | None) ->
     """The initial value problem of an experiment, over its own duration unless another is given."""
     import numpy as np
 
-    from phigen.analysis.tuning.problem import Problem
+    from phigen.tuning.problem import Problem
 
     run = experiment.run
     step = float(run.step)

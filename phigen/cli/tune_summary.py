@@ -11,9 +11,9 @@ from phigen.cli.console import heading, out, table
 from phigen.cli.run_summary import finite
 
 if TYPE_CHECKING:
-    from phigen.analysis.tuning.search import Curve
-    from phigen.analysis.tuning.study import Finalist, Tuning
     from phigen.spec.model import Run, Spec
+    from phigen.tuning.search import Curve
+    from phigen.tuning.study import Finalist, Tuning
 
 #: Other accuracies that are told, as factors.
 _OTHERS = (1e4, 1e2, 1e-2, 1e-4)
@@ -93,7 +93,7 @@ def scheme_of(curve: Curve) -> str:
 
 def remarks(found: Tuning) -> Iterator[str]:
     """What the numbers rest on, and what they do not say."""
-    from phigen.analysis.conservation import ENERGY, stated
+    from phigen.study.conservation import ENERGY, stated
 
     best = found.winner
     assert best is not None
@@ -132,7 +132,7 @@ def _extrapolated(found: Tuning) -> str:
 
 def _other_rows(found: Tuning) -> list[list[str]]:
     """The cheapest candidate at other accuracies, those that the scans reached."""
-    from phigen.analysis.tuning.search import cheapest_step
+    from phigen.tuning.search import cheapest_step
 
     rows = []
     for accuracy in (found.accuracy * factor for factor in _OTHERS):
@@ -161,7 +161,7 @@ def run_lines_of(found: Tuning, run: Run) -> list[str]:
 
 def unreached(found: Tuning) -> str:
     """Why nothing reaches the accuracy, and how near to it one came."""
-    from phigen.analysis.tuning.search import at_floor
+    from phigen.tuning.search import at_floor
 
     curve, point = found.closest
     told = curve.title

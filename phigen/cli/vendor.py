@@ -25,7 +25,7 @@ from phigen.registry import suffixes
 
 if TYPE_CHECKING:
     from phigen.cli.outputs import Change
-    from phigen.compiler import Compilation
+    from phigen.compilation import Compilation
     from phigen.spec.model import Spec
 
 
@@ -179,7 +179,7 @@ def _path_of_spec(folder: Path, entry: Entry) -> Path | None:
 
 
 def _made(order: Order, collector: Collector) -> Made | None:
-    from phigen.analysis.proof import compile_proved
+    from phigen.compiler import compile_proved
 
     options = order.options
     with collector.collecting():

@@ -18,10 +18,10 @@ from phigen.errors import CheckError, StepError
 from phigen.registry import loadable
 
 if TYPE_CHECKING:
-    from phigen.analysis.backward import Constancy
-    from phigen.analysis.verification import Check, Verification
-    from phigen.compiler import Compilation
+    from phigen.compilation import Compilation
     from phigen.spec.model import Spec
+    from phigen.study.backward import Constancy
+    from phigen.study.verification import Check, Verification
 
 _NOT_FINITE = {math.inf: "∞", -math.inf: "-∞"}
 
@@ -53,12 +53,12 @@ def command(
     that of the first), the Poisson identity with the exact tangent map, reversibility, agreement of the targets, and
     the largest step that can be made. Classical methods stand beside it. Exit code 5 if something falls short.
     """
-    from phigen.analysis.proof import compile_proved
+    from phigen.compiler import compile_proved
 
     collector, found = Collector(), []
     specs = load_all(spec_files, collector)
     if plot:
-        from phigen.analysis.drawing.palette import require_matplotlib
+        from phigen.drawing.palette import require_matplotlib
 
         require_matplotlib()
         if len(specs) > 1:
@@ -81,8 +81,8 @@ def command(
 
 
 def _draw(path: Path, compilation: Compilation, experiment: Experiment, console: Console) -> None:
-    from phigen.analysis import figures
-    from phigen.analysis.backward import NotOfferedError
+    from phigen.drawing import figures
+    from phigen.study.backward import NotOfferedError
 
     try:
         figures.save(figures.constancy_figure(constancy_of(compilation, experiment)), path)
@@ -96,10 +96,10 @@ def constancy_of(compilation: Compilation, experiment: Experiment) -> Constancy:
     """How constant the modified Hamiltonian is on a run. Raises `NotOfferedError` and `StepError`."""
     import numpy as np
 
-    from phigen.analysis import backward
-    from phigen.analysis.methods import of_solver
-    from phigen.analysis.verification import gauge_at
     from phigen.api import chosen_target, solver_of
+    from phigen.study import backward
+    from phigen.study.methods import of_solver
+    from phigen.study.verification import gauge_at
 
     parameters, x0 = experiment.parameters, np.array(experiment.initial)
     gauge = gauge_at(compilation, x0, parameters)
@@ -122,8 +122,8 @@ def verified(
 
     Targets that Python cannot run are left out.
     """
-    from phigen.analysis.verification import verify
     from phigen.api import chosen_target, solver_of
+    from phigen.study.verification import verify
 
     spec = compilation.spec
     experiment = prepared(spec, name)
@@ -145,7 +145,7 @@ def fallen_short(verification: Verification) -> CheckError:
 
 def print_table(v: Verification) -> None:
     """The checks as a table for people."""
-    from phigen.analysis.conservation import stated
+    from phigen.study.conservation import stated
 
     out(heading(f"{v.name}, run {v.run}") + f": {v.label}")
     out(f"  {v.steps} steps of {v.step:.9g}, targets {', '.join(v.targets)}")

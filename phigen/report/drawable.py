@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from importlib.util import find_spec
 
-from phigen.analysis.drawing.palette import INSTALLED_BY
+from phigen.drawing.palette import INSTALLED_BY
 
 #: What the page says where matplotlib is missing.
 NO_FIGURES = f"There are no figures on this page, since matplotlib was not installed: {INSTALLED_BY}."

@@ -8,16 +8,16 @@ from collections.abc import Iterator, Mapping, Sequence
 
 from markupsafe import Markup
 
-from phigen.analysis.conservation import stated
-from phigen.analysis.lyapunov import Spectrum
-from phigen.analysis.meanings import Meaning, meaning_of
-from phigen.analysis.summary import Drift, Summary
-from phigen.analysis.verification import Check, Verification
-from phigen.compiler import Compilation
+from phigen.compilation import Compilation
 from phigen.realisations.protocol import BiRealisation
 from phigen.registry import TARGETS
 from phigen.report import page
 from phigen.report.material import Material
+from phigen.study.conservation import stated
+from phigen.study.lyapunov import Spectrum
+from phigen.study.meanings import Meaning, meaning_of
+from phigen.study.summary import Drift, Summary
+from phigen.study.verification import Check, Verification
 from phigen.symbolic.verdict import PROVED, REFUTED, UNDECIDED, Statement
 
 #: One tile of the summary: class, value, label, note.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from phigen.analysis.mathml import math
+from phigen.formulas.mathml import math
 
 
 def _i(name: str) -> str:

@@ -5,16 +5,16 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from phigen.analysis.arrays import Floats
-from phigen.analysis.backward import Constancy
-from phigen.analysis.lyapunov import Spectrum
-from phigen.analysis.precision import Study
-from phigen.analysis.proof import Examination
-from phigen.analysis.summary import Summary
-from phigen.analysis.verification import Verification
-from phigen.compiler import Compilation
+from phigen.compilation import Compilation
+from phigen.proofs.examination import Examination
 from phigen.runtime.trajectory import Trajectory
 from phigen.spec.model import Run
+from phigen.study.arrays import Floats
+from phigen.study.backward import Constancy
+from phigen.study.lyapunov import Spectrum
+from phigen.study.precision import Study
+from phigen.study.summary import Summary
+from phigen.study.verification import Verification
 
 
 @dataclass(frozen=True)

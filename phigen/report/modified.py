@@ -6,9 +6,9 @@ from math import isfinite
 
 from markupsafe import Markup
 
-from phigen.analysis.backward import Constancy, truncation
 from phigen.report import page
 from phigen.report.drawable import drawable
+from phigen.study.backward import Constancy, truncation
 
 
 def modified_section(found: Constancy | None, why_not: str) -> Markup:

@@ -8,17 +8,17 @@ from typing import TYPE_CHECKING
 
 from markupsafe import Markup
 
-from phigen.analysis import figures
-from phigen.analysis.arrays import Floats
-from phigen.analysis.backward import Constancy, truncation
-from phigen.analysis.lyapunov import Spectrum
-from phigen.analysis.precision import Study
-from phigen.analysis.summary import Summary
-from phigen.compiler import Compilation
+from phigen.compilation import Compilation
+from phigen.drawing import figures
 from phigen.report import page
 from phigen.report.material import Material
 from phigen.report.svg import inlined
 from phigen.runtime.trajectory import Trajectory
+from phigen.study.arrays import Floats
+from phigen.study.backward import Constancy, truncation
+from phigen.study.lyapunov import Spectrum
+from phigen.study.precision import Study
+from phigen.study.summary import Summary
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from markupsafe import Markup
 
-from phigen.analysis.precision import Study
 from phigen.report import page
 from phigen.report.drawable import drawable
+from phigen.study.precision import Study
 
 #: Errors for which the time is tabulated.
 TOLERANCES = (1e-3, 1e-6, 1e-9, 1e-12)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from markupsafe import Markup
 
-from phigen.analysis import mathml, parts
+from phigen.formulas import mathml, parts
 from phigen.geometry.system import System
 from phigen.report import page
 from phigen.report.equations import group

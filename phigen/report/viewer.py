@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 from markupsafe import Markup
 
-from phigen.analysis.arrays import Floats
-from phigen.analysis.drawing.groups import groups
-from phigen.analysis.drawing.leaf import around, leaf_of, net
-from phigen.analysis.drawing.phase_space import box_of, joins
+from phigen.drawing.groups import groups
+from phigen.drawing.leaf import around, leaf_of, net
+from phigen.drawing.phase_space import box_of, joins
 from phigen.report import page
 from phigen.report.drawable import drawable
 from phigen.runtime.trajectory import Trajectory
+from phigen.study.arrays import Floats
 from phigen.symbolic.expression import Expression
 
 #: Numbers of all curves together, rows of one at most, and the steps to which a coordinate is rounded.

@@ -6,8 +6,8 @@ import pytest
 from click.testing import CliRunner
 from support import BODY
 
-from phigen.analysis import verification
 from phigen.cli import group
+from phigen.study import verification
 
 TEXT = f"phigen: 1\nname: t\n{BODY}order: 4\nruns: {{a: {{initial: [0.4, 1, 0.3], step: 0.1, steps: 200}}}}\n"
 

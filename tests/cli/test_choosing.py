@@ -9,10 +9,10 @@ import pytest
 from support import described
 
 from phigen import resources
-from phigen.analysis.tuning.building import build
-from phigen.analysis.tuning.problem import Candidate, Problem
-from phigen.analysis.tuning.settings import SPLITTING, Setting
-from phigen.analysis.tuning.trials import energy_measure
+from phigen.tuning.building import build
+from phigen.tuning.problem import Candidate, Problem
+from phigen.tuning.settings import SPLITTING, Setting
+from phigen.tuning.trials import energy_measure
 
 DOCS = resources.bundled_specs().parent / "docs"
 TEXT = (DOCS / "choosing.md").read_text(encoding="utf-8")

@@ -85,7 +85,7 @@ def test_internal_error_is_4_and_asks_for_a_report(phigen, write, monkeypatch):
     def broken(*args, **kwargs):
         raise IndexError("nobody expected this")
 
-    monkeypatch.setattr("phigen.analysis.proof.examine", broken)
+    monkeypatch.setattr("phigen.compiler.examine", broken)
     done = phigen("check", write("a.yaml"))
     assert done.exit_code == 4
     assert "nobody expected this" in done.stderr
@@ -279,7 +279,7 @@ def test_interrupt_inside_an_import_is_no_internal_error(phigen, write, monkeypa
         except KeyboardInterrupt:
             raise ImportError("half a module")  # noqa: B904
 
-    monkeypatch.setattr("phigen.analysis.proof.examine", broken)
+    monkeypatch.setattr("phigen.compiler.examine", broken)
     assert phigen("check", write("a.yaml")).exit_code == 130
 
 

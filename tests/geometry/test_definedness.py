@@ -3,7 +3,8 @@
 import pytest
 
 from phigen import CheckError, spec
-from phigen.analysis.proof import DEFINEDNESS, compile_proved, examine
+from phigen.compiler import compile_proved, examine
+from phigen.proofs.statements import DEFINEDNESS
 from phigen.symbolic.verdict import REFUTED, UNDECIDED
 
 PAIR = "phigen: 1\nname: t\ncoordinates: [x, y]\npoisson: {canonical: {q: [x], p: [y]}}\n"

@@ -15,7 +15,7 @@ from random_structures import KINDS, draw
 from support import TARGETS, PreciseStep, RawC, compile_text, slow_but, solver, values
 
 from phigen import spec
-from phigen.analysis.proof import examine
+from phigen.compiler import examine
 from phigen.symbolic.verdict import CHECKED, PROVED
 
 EPS = np.finfo(float).eps

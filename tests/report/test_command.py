@@ -7,8 +7,8 @@ from cli_specs import GOOD, NOT_POISSON
 from click.testing import CliRunner
 from html_check import Page
 
-from phigen.analysis import verification
 from phigen.cli import group
+from phigen.study import verification
 
 
 @pytest.fixture

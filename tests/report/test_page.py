@@ -13,17 +13,17 @@ from html_check import Page
 from support import compiled
 
 from phigen import resources
-from phigen.analysis.conservation import RELATIVE, Unit
-from phigen.analysis.drawing.palette import PALETTE
-from phigen.analysis.proof import Examination
-from phigen.analysis.summary import Drift, Summary
 from phigen.compiler import compile_spec
+from phigen.drawing.palette import PALETTE
+from phigen.proofs.examination import Examination
 from phigen.report import document as pages
 from phigen.report import page, pictures
 from phigen.report.material import Material
 from phigen.report.svg import inlined
 from phigen.report.viewer import MOST_NUMBERS, viewer
 from phigen.runtime.trajectory import Trajectory
+from phigen.study.conservation import RELATIVE, Unit
+from phigen.study.summary import Drift, Summary
 from phigen.symbolic.verdict import CHECKED, PROVED, Statement
 
 NO_DRIFT = Drift(0.0, Unit(kind=RELATIVE), 1.0)

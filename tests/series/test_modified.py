@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from support import BODY, PreciseStep, compile_text, compiled, precisely, series_of, setting, solver, values
 
-from phigen.analysis.arrays import evaluate
 from phigen.compiler import compile_spec
 from phigen.realisations import karasev
 from phigen.scheme.discretisation import formal_alpha
 from phigen.series.modified import FRACTION, modified_series, time_dependent
+from phigen.study.arrays import evaluate
 from phigen.symbolic.symbols import ELAPSED
 from phigen.symbolic.tower import rational
 

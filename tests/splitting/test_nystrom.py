@@ -10,12 +10,10 @@ import pytest
 from splitting import nystrom_algebra as algebra
 from support import TARGETS, compile_text, compiled, setting, solver
 
-from phigen.analysis import measures
-from phigen.analysis.flows import formulas
-from phigen.analysis.latex import document
-from phigen.analysis.methods import of_solver
 from phigen.compiler import emit
 from phigen.errors import SpecError
+from phigen.formulas.flows import formulas
+from phigen.formulas.latex import document
 from phigen.scheme import alternation, choosing, nystrom
 from phigen.scheme.order import Order
 from phigen.scheme.splitting import build_splitting
@@ -24,6 +22,8 @@ from phigen.splitting.kicks import kicks
 from phigen.splitting.parts import split
 from phigen.splitting.ring import KICK
 from phigen.splitting.statements import check
+from phigen.study import measures
+from phigen.study.methods import of_solver
 from phigen.symbolic.expression import derivatives, substitute, symbol
 from phigen.symbolic.verdict import REFUTED
 

@@ -7,16 +7,15 @@ import numpy as np
 import pytest
 from support import COMMAND, TARGETS, WARNINGS, compile_text, compiled, run, setting, solver, tool, write
 
-from phigen.analysis import measures
-from phigen.analysis.methods import of_solver
-from phigen.analysis.proof import examine
-from phigen.analysis.verification import verify
-from phigen.compiler import compile_spec, emit
+from phigen.compiler import compile_proved, compile_spec, emit, examine
 from phigen.errors import CheckError, StepError
 from phigen.scheme.choosing import plan
 from phigen.scheme.splitting import build_splitting
 from phigen.spec.model import Extras
 from phigen.splitting.parts import split
+from phigen.study import measures
+from phigen.study.methods import of_solver
+from phigen.study.verification import verify
 
 SYSTEMS = ["rigid_body", "kowalevski_top", "lotka_volterra", "toda3", "henon_heiles", "charged_particle"]
 TANGENT = Extras(tangent=True)
@@ -117,10 +116,9 @@ def test_a_wrong_sign_in_one_flow_falls_short_of_the_order():
 
 
 def test_refuted_flows_are_not_compiled(monkeypatch):
-    from phigen.analysis import proof
-    from phigen.splitting import statements
+    from phigen.proofs import statements
 
-    genuine = statements.check
+    genuine = statements.check_splitting
     found = compiled("rigid_body", 4, "splitting")
 
     def planted(system, splitting):
@@ -128,10 +126,10 @@ def test_refuted_flows_are_not_compiled(monkeypatch):
         wrong = replace(flow, increment=tuple(-e for e in flow.increment))
         return genuine(system, replace(splitting, flows=(splitting.flows[0], wrong, *splitting.flows[2:])))
 
-    monkeypatch.setattr(statements, "check", planted)
+    monkeypatch.setattr(statements, "check_splitting", planted)
     assert [s.name[:19] for s in examine(found.spec, scheme="splitting").refuted] == ["the flow Φ of H_2: "]
     with pytest.raises(CheckError, match="H_2"):
-        proof.compile_proved(found.spec, scheme="splitting")
+        compile_proved(found.spec, scheme="splitting")
 
 
 @pytest.mark.parametrize("compiler", ["gcc", "clang"])

@@ -1,0 +1,71 @@
+"""What compiling one spec made, stage by stage."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from phigen.geometry.system import System
+from phigen.realisations.protocol import BiRealisation
+from phigen.scheme.discretisation import Discretisation
+from phigen.scheme.gauge import Gauge, Gauged
+from phigen.scheme.order import Order
+from phigen.scheme.program import Program
+from phigen.series.hamilton_jacobi import HamiltonJacobi
+from phigen.spec.model import Spec
+from phigen.splitting.parts import Splitting
+
+
+@dataclass(frozen=True)
+class Compilation:
+    """Everything that compiling one spec made, stage by stage; ``seconds`` maps stages to their time."""
+
+    spec: Spec
+    system: System
+    realisation: BiRealisation | None
+    order: Order
+    program: Program
+    gauge: Gauge = field(default_factory=Gauge)
+    seconds: Mapping[str, float] = field(default_factory=dict)
+    splitting: Splitting | None = None
+    gauged: Gauged | None = None
+    scheme: Discretisation | None = None
+
+    @property
+    def chart(self) -> BiRealisation:
+        """The bi-realisation; a splitting has none, and must not be asked."""
+        if self.realisation is None:
+            raise ValueError(f"{self.spec.name} is compiled to a splitting, which has no bi-realisation")
+        return self.realisation
+
+    @property
+    def label(self) -> str:
+        """The kind of the method, for every place that names it to the user."""
+        return self.realisation.label if self.realisation else "splitting"
+
+    @property
+    def exact(self) -> bool:
+        """Whether a step is a Poisson map to round-off."""
+        return self.realisation is None or self.realisation.exact
+
+    @property
+    def symmetric(self) -> bool:
+        """Whether a step of −h undoes one of h."""
+        return self.realisation is None or self.realisation.symmetric
+
+    @property
+    def discretised(self) -> System:
+        """The system with the Hamiltonian that is discretised: H less the Casimirs of the gauge."""
+        return self.gauged.system if self.gauged else self.gauge.applied(self.system)
+
+    @property
+    def stage(self) -> Order:
+        """The order and the terms of one stage: those of the method, unless it is composed of stages of order 2."""
+        return self.order if len(self.program.fractions) == 1 else Order(2, 1)
+
+    @property
+    def series(self) -> HamiltonJacobi:
+        """The series of `discretised`; the symbol ``gauge:C`` is the multiple of C that the solver chooses."""
+        if self.gauged is None:
+            raise ValueError(f"{self.spec.name} is compiled to a splitting, which has no generating function")
+        return self.gauged.series

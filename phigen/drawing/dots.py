@@ -1,0 +1,26 @@
+"""Thousands of dots as one path: a tenth of the bytes that markers take in an SVG file."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from phigen.study.arrays import Floats
+
+
+def draw_dots(axes: Any, points: Floats, colour: str, size: float, order: float, label: str | None = None) -> None:
+    """Dots at points (rows, 2), ``size`` across in points of 1/72 inch: lines of no length with round ends."""
+    from matplotlib.patches import PathPatch
+    from matplotlib.path import Path
+
+    # What has no length at all is not drawn by every program.
+    offset = 1e-5 * np.max(np.abs(points), axis=0, initial=1e-300)
+    vertices = np.stack([points, points + offset], axis=1).reshape(-1, 2)
+    path = Path(vertices, np.tile([Path.MOVETO, Path.LINETO], len(points)).astype(np.uint8))
+    path.should_simplify = False
+    patch = PathPatch(path, facecolor="none", edgecolor=colour, linewidth=size, capstyle="round", zorder=order)
+    axes.add_patch(patch)
+    axes.plot([], [], ".", color=colour, label=label)
+    axes.update_datalim(points)
+    axes.autoscale_view()

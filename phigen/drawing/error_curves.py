@@ -1,0 +1,109 @@
+"""Errors of conserved quantities against time, on a logarithmic scale that also shows zeros."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from phigen.drawing.palette import MARK, SERIES
+from phigen.runtime.trajectory import Trajectory
+from phigen.study.arrays import Floats
+from phigen.study.conservation import ENERGY, Unit, unit_of
+
+if TYPE_CHECKING:
+    from matplotlib.figure import FigureBase
+
+#: Windows in which the largest error is drawn, where there are more rows.
+WINDOWS = 400
+#: The height of a row of panels in inches.
+ROW = 2.3
+#: The unit in the last place, drawn as the level that nothing can be expected to stay below.
+ROUNDING = 2.0**-52
+
+LINES: tuple[Any, ...] = ("-", (0, (5, 1.5)), (0, (1.2, 1.2)), (0, (5, 1.2, 1.2, 1.2)), (0, (8, 2)), (0, (2.5, 1)))
+
+
+def windowed_maxima(t: Floats, values: Floats, windows: int = WINDOWS) -> tuple[Floats, Floats]:
+    """The largest value of each of so many windows of rows and the time it is at: no peak is lost.
+
+    A window with a value that is not finite gives NaN. Up to twice as many rows as windows are kept all.
+    """
+    if len(t) <= 2 * windows:
+        return t, np.where(np.isfinite(values), values, np.nan)
+    parts = np.array_split(np.arange(len(t)), windows)
+    finite = np.where(np.isfinite(values), values, np.inf)
+    at = np.array([part[np.argmax(finite[part])] for part in parts])
+    return t[at], np.where(np.isfinite(values[at]), values[at], np.nan)
+
+
+def grid(methods: Mapping[str, Trajectory]) -> tuple[int, int]:
+    """Rows and columns of the panels that `draw_errors` makes."""
+    panels = 1 + len(next(iter(methods.values())).casimirs)
+    columns = panels if panels <= 3 else 2 if panels == 4 else 3
+    return -(-panels // columns), columns
+
+
+def height(methods: Mapping[str, Trajectory]) -> float:
+    """The height of all panels in inches."""
+    return ROW * grid(methods)[0]
+
+
+def draw_errors(figure: FigureBase, methods: Mapping[str, Trajectory], units: Mapping[str, Unit] | None = None) -> None:
+    """One panel for the energy and each Casimir, one curve for each method; the first method lies on top.
+
+    Errors are in the ``units``; without them relative to the value at the start, unless that is 0.
+    """
+    first = next(iter(methods.values()))
+    panels = [ENERGY, *first.casimirs]
+    rows, columns = grid(methods)
+    shared: Any = None
+    for index, name in enumerate(panels, start=1):
+        axes = figure.add_subplot(rows, columns, index, sharex=shared)
+        shared = shared or axes
+        values = {label: t.energy if index == 1 else t.casimirs[name] for label, t in methods.items()}
+        unit = (units or {}).get(name) or unit_of(float(next(iter(values.values()))[0]), 0.0)
+        curves = {
+            label: windowed_maxima(methods[label].t, unit.errors(column, float(column[0])))
+            for label, column in values.items()
+        }
+        _draw_panel(axes, curves)
+        what = "energy" if index == 1 else f"Casimir {name}"
+        axes.set_title(f"{unit.adjective} error{' of the' if columns < 3 else ':'} {what}")
+        if index > len(panels) - columns:
+            axes.set_xlabel("t")
+    if len(methods) > 1:
+        handles, labels = shared.get_legend_handles_labels()
+        figure.legend(handles, labels, loc="outside upper center", ncols=len(methods))
+
+
+def _draw_panel(axes: Any, curves: Mapping[str, tuple[Floats, Floats]]) -> None:
+    positive = np.concatenate([values[values > 0] for _, values in curves.values()])
+    low, high = (positive.min(), positive.max()) if len(positive) else (ROUNDING, ROUNDING)
+    lowest, highest = math.floor(math.log10(low)), max(math.ceil(math.log10(high)), math.floor(math.log10(low)) + 1)
+    # The decade below all errors is that of the zeros, which a logarithmic scale has no place for.
+    zeros = any((values == 0).any() for _, values in curves.values())
+    zero = 10.0 ** (lowest - 0.8)
+    axes.set(yscale="log", ylim=(10.0 ** (lowest - (1.4 if zeros else 0.1)), 10.0 ** (highest + 0.1)))
+    _set_ticks(axes, lowest, highest, zero if zeros else None)
+    axes.grid(True)
+    axes.axhline(ROUNDING, **MARK)
+    for place, (label, (t, values)) in enumerate(curves.items()):
+        style: dict[str, Any] = {"color": SERIES[place % len(SERIES)], "zorder": 3 - 0.1 * place}
+        line = LINES[place % len(LINES)]
+        axes.plot(t, np.where(values > 0, values, np.nan), linestyle=line, linewidth=1.0, label=label, **style)
+        none = t[values == 0]
+        axes.plot(none, np.full(len(none), zero), ".", markersize=2.5, markeredgewidth=0, **style)
+        if len(lost := np.flatnonzero(np.isnan(values))) and lost[0] > 0:
+            last = lost[0] - 1
+            axes.plot(t[last], max(values[last], zero), "x", markersize=6, markeredgewidth=1.5, **style)
+
+
+def _set_ticks(axes: Any, lowest: int, highest: int, zero: float | None) -> None:
+    """Powers of ten, at most six of them, and a 0 where zeros are drawn."""
+    powers = range(highest, lowest - 1, -max(1, math.ceil((highest - lowest) / 5)))
+    places, labels = [10.0**p for p in powers], [f"$10^{{{p}}}$" for p in powers]
+    axes.set_yticks([*places, zero] if zero else places, [*labels, "0"] if zero else labels)
+    axes.tick_params(axis="y", which="minor", length=0)

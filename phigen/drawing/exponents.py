@@ -1,0 +1,29 @@
+"""The convergence of Lyapunov exponents."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from phigen.drawing.palette import MARK, PALETTE, SERIES
+
+if TYPE_CHECKING:
+    from phigen.study.lyapunov import Spectrum
+
+#: The height of the panel in inches.
+HEIGHT = 2.4
+
+
+def draw_exponents(axes: Any, spectrum: Spectrum) -> None:
+    """All exponents against the time over which they were taken, the largest on top of the others."""
+    axes.axhline(0, **MARK)
+    for values in spectrum.history.T[:0:-1]:
+        axes.plot(spectrum.times, values, color=PALETTE["leaf"], linewidth=0.9, zorder=2)
+    axes.plot(spectrum.times, spectrum.history[:, 0], color=SERIES[0], linewidth=1.4, zorder=3)
+    # What the exponents are at the beginning says nothing, and would flatten the rest.
+    late = np.abs(spectrum.history[spectrum.times >= spectrum.t / 100])
+    height = 1.2 * float(np.max(late)) or 1.0
+    axes.set(xlim=(spectrum.t / 1000, 1.1 * spectrum.t), ylim=(-height, height))
+    axes.set(xscale="log", xlabel="t", title=f"Lyapunov exponents; the largest is {spectrum.largest:.3g}")
+    axes.grid(True)

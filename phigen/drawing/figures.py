@@ -1,0 +1,170 @@
+"""Figures of runs: trajectories, errors of what should be conserved, Poincaré sections, convergence, work.
+
+Each function returns a `matplotlib.figure.Figure` and leaves matplotlib's global state as it was. The colours are those
+of `phigen.drawing.palette.PALETTE`; `save` and `svg` there write figures so that their bytes are a function of
+what they show. matplotlib is the optional extra ``plot``; without it every function here raises `MissingPackageError`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING
+
+from phigen.drawing import (
+    backward_curves,
+    error_curves,
+    exponents,
+    phase_space,
+    precision_curves,
+    section_plane,
+    tuning_curves,
+)
+from phigen.drawing.palette import PALETTE, SUFFIXES, save, styled, svg
+from phigen.runtime.trajectory import Trajectory
+from phigen.study.arrays import Floats
+from phigen.study.backward import Constancy
+from phigen.study.conservation import Unit
+from phigen.study.precision import Study
+from phigen.symbolic.expression import Expression
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure, FigureBase
+
+    from phigen.study.lyapunov import Spectrum
+    from phigen.tuning.study import Tuning
+
+__all__ = ["PALETTE", "SUFFIXES", "WIDTH", "constancy_figure", "convergence_figure", "error_figure",
+           "lyapunov_figure", "run_figure", "save", "section_figure", "svg", "trajectory_figure", "tuning_figure",
+           "work_precision_figure"]  # fmt: skip
+
+#: The widths of a page and of a single panel, in inches; PNG files have 200 dots per inch.
+WIDTH, NARROW = 7.2, 4.8
+_SECTION, _SQUARE = 3.4, 3.8
+
+
+@styled
+def trajectory_figure(trajectory: Trajectory, casimirs: Mapping[str, Expression]) -> Figure:
+    """The curve in phase space, in a plane, in space or in several projections, by the number of coordinates.
+
+    ``casimirs`` are the formulas of the Casimirs. In space the leaf is drawn: the surface on which the first Casimir
+    of these three coordinates is constant.
+    """
+    _, columns = phase_space.grid(trajectory.coordinates)
+    figure = _figure(phase_space.height(trajectory.coordinates), WIDTH if columns > 1 else NARROW)
+    phase_space.draw_trajectory(figure, trajectory, casimirs)
+    return figure
+
+
+@styled
+def error_figure(methods: Mapping[str, Trajectory], units: Mapping[str, Unit] | None = None) -> Figure:
+    """The errors of energy and Casimirs against time, of several methods by their labels; one panel per quantity.
+
+    Errors are in the ``units`` of `phigen.study.conservation.units_of`. Of long runs the largest error of each of
+    some hundred windows is drawn. Zeros have a place of their own, marked 0; a cross marks where a method broke down.
+    """
+    figure = _figure(error_curves.height(methods))
+    error_curves.draw_errors(figure, methods, units)
+    return figure
+
+
+@styled
+def section_figure(sections: Mapping[str, Floats], names: Sequence[str]) -> Figure:
+    """Points (rows, DIM) of Poincaré sections by their labels, in a plane of two of the coordinates ``names``."""
+    figure = _figure(_SECTION, NARROW)
+    section_plane.draw_section(figure.add_subplot(), sections, names)
+    return figure
+
+
+@styled
+def convergence_figure(study: Study) -> Figure:
+    """Error at the end against the step size, one curve per method, each with a thin line of its stated order."""
+    figure = _figure(_SQUARE, NARROW)
+    precision_curves.draw_convergence(figure.add_subplot(), study)
+    return figure
+
+
+@styled
+def work_precision_figure(study: Study) -> Figure:
+    """Errors at the end against the time that the run took: of the solution and, if there are any, of the Casimirs."""
+    panels = [precision_curves.draw_work, precision_curves.draw_conserved][: 1 + study.has_casimirs]
+    figure = _figure(_SQUARE, WIDTH if len(panels) > 1 else NARROW)
+    for axes, draw in zip(figure.subplots(1, len(panels), squeeze=False)[0], panels, strict=True):
+        draw(axes, study)
+    return figure
+
+
+@styled
+def tuning_figure(found: Tuning, title: str = "") -> Figure:
+    """The error of all candidates of a tuning against the time they take, and what was proposed."""
+    figure = _figure(1.2 * _SQUARE, WIDTH)
+    if title:
+        figure.suptitle(title, fontsize=11)
+    tuning_curves.draw_tuning(figure.add_subplot(), found)
+    return figure
+
+
+@styled
+def constancy_figure(found: Constancy) -> Figure:
+    """How constant H and the modified Hamiltonian are: along a trajectory, and against the step size."""
+    figure = _figure(_SQUARE)
+    along, against = figure.subplots(1, 2)
+    backward_curves.draw_along(along, found)
+    backward_curves.draw_against_step(against, found)
+    return figure
+
+
+@styled
+def run_figure(
+    methods: Mapping[str, Trajectory],
+    casimirs: Mapping[str, Expression],
+    sections: Mapping[str, Floats] | None = None,
+    title: str = "",
+    spectrum: Spectrum | None = None,
+    units: Mapping[str, Unit] | None = None,
+) -> Figure:
+    """All there is to see of a run on one page.
+
+    The trajectory of the first method, the sections and the Lyapunov exponents if there are any, the errors of all.
+    """
+    first = next(iter(methods.values()))
+
+    def draw_section(part: FigureBase) -> None:
+        section_plane.draw_section(part.add_subplot(), sections or {}, first.coordinates)
+
+    def draw_trajectory(part: FigureBase) -> None:
+        phase_space.draw_trajectory(part, first, casimirs)
+
+    rows: list[tuple[float, list[Callable[[FigureBase], None]]]]
+    rows = [(phase_space.height(first.coordinates), [draw_trajectory])]
+    if sections and phase_space.grid(first.coordinates) == (1, 1):
+        rows[0][1].append(draw_section)  # a single panel leaves room at its side
+    elif sections:
+        rows.append((_SECTION, [draw_section]))
+    rows.append((error_curves.height(methods), [lambda part: error_curves.draw_errors(part, methods, units)]))
+    if spectrum:
+        rows.append((exponents.HEIGHT, [lambda part: exponents.draw_exponents(part.add_subplot(), spectrum)]))
+    heights = [height for height, _ in rows]
+    figure = _figure(sum(heights))
+    if title:
+        figure.suptitle(title, fontsize=11)
+    places = figure.subfigures(len(rows), 1, height_ratios=heights, squeeze=False)[:, 0]
+    for place, (_, parts) in zip(places, rows, strict=True):
+        for part, draw in zip(
+            place.subfigures(1, len(parts), width_ratios=[1.1, 1][: len(parts)], squeeze=False)[0], parts, strict=True
+        ):
+            draw(part)
+    return figure
+
+
+@styled
+def lyapunov_figure(spectrum: Spectrum) -> Figure:
+    """How the Lyapunov exponents of a trajectory converged."""
+    figure = _figure(exponents.HEIGHT, NARROW)
+    exponents.draw_exponents(figure.add_subplot(), spectrum)
+    return figure
+
+
+def _figure(height: float, width: float = WIDTH) -> Figure:
+    from matplotlib.figure import Figure
+
+    return Figure(figsize=(width, height), layout="constrained")

@@ -1,0 +1,98 @@
+"""The surface in space on which a Casimir is constant, as a net of its cuts with planes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from phigen.study.arrays import Floats, evaluate
+from phigen.symbolic.expression import Expression, gradient, symbols_of
+
+#: Planes per axis, points along the side of the grid in a plane, and Newton steps that put its lines on the surface.
+CUTS, GRID, NEWTON_STEPS = 9, 41, 8
+
+
+@dataclass(frozen=True)
+class Leaf:
+    """The surface ``casimir`` = ``level`` over three ``names``; ``parameters`` has the values of all other symbols."""
+
+    casimir: Expression
+    names: tuple[str, ...]
+    parameters: Mapping[str, float]
+    level: float
+
+    def value_and_gradient(self, points: Floats) -> tuple[Floats, Floats]:
+        """C − level of points (…, 3), shape (…), and ∇C, shape (…, 3)."""
+        values = {**self.parameters, **{name: points[..., i] for i, name in enumerate(self.names)}}
+        found = evaluate([self.casimir, *gradient(self.casimir, self.names)], values)
+        value, *slopes = (np.broadcast_to(a, points.shape[:-1]) for a in found)
+        return value - self.level, np.stack(slopes, axis=-1)
+
+
+def leaf_of(
+    casimirs: Mapping[str, Expression],
+    names: Sequence[str],
+    start: Mapping[str, float],
+    parameters: Mapping[str, float],
+) -> Leaf | None:
+    """The leaf through ``start`` (all coordinates) of the first Casimir of three names alone; None if there is none."""
+    for casimir in casimirs.values():
+        used = set(symbols_of(casimir)) & set(start)
+        if len(names) == 3 and used and used <= set(names):
+            level = float(evaluate([casimir], {**parameters, **start})[0])
+            return Leaf(casimir, tuple(names), parameters, level) if np.isfinite(level) else None
+    return None
+
+
+def around(leaf: Leaf, box: Floats) -> Floats:
+    """The box (2, 3) of the whole leaf if that is closed and not much larger than the given one, else the given one."""
+    middle, half = box.mean(axis=0), float(np.max(box[1] - box[0]))
+    large = np.stack([middle - half, middle + half])
+    lines = net(leaf, large)
+    if not lines:
+        return box
+    points = np.concatenate(lines)
+    low, high = points.min(axis=0), points.max(axis=0)
+    margin = 0.04 * (high - low)
+    inside = (low > large[0] + margin).all() and (high < large[1] - margin).all()
+    return np.stack([np.minimum(box[0], low - margin), np.maximum(box[1], high + margin)]) if inside else box
+
+
+def net(leaf: Leaf, box: Floats) -> list[Floats]:
+    """Lines (points, 3) of the leaf in a box (2, 3) of lower and upper bounds."""
+    lines = []
+    cell = (box[1] - box[0]) / (GRID - 1)
+    for axis in range(3):
+        for place in np.linspace(box[0, axis], box[1, axis], CUTS + 2)[1:-1]:
+            for line in _cut(leaf, box, axis, float(place)):
+                lines += _on_surface(leaf, line, axis, cell)
+    return lines
+
+
+def _cut(leaf: Leaf, box: Floats, axis: int, place: float) -> list[Floats]:
+    """Lines of the leaf in the plane x_axis = place, as far as straight pieces between points of a grid go."""
+    from contourpy import contour_generator
+
+    u, v = (np.linspace(box[0, i], box[1, i], GRID) for i in range(3) if i != axis)
+    grid = np.insert(np.stack(np.meshgrid(u, v), axis=-1), axis, place, axis=-1)
+    values, _ = leaf.value_and_gradient(grid)
+    # Where C is not defined there is no leaf.
+    found = contour_generator(u, v, np.ma.masked_invalid(values)).lines(0.0)
+    return [np.insert(np.asarray(line, dtype=np.float64), axis, place, axis=-1) for line in found]
+
+
+def _on_surface(leaf: Leaf, line: Floats, axis: int, cell: Floats) -> list[Floats]:
+    """The line moved onto the surface within its plane, cut where that fails: C changes its sign at a pole as well."""
+    moved = line.copy()
+    with np.errstate(all="ignore"):
+        for _ in range(NEWTON_STEPS):
+            value, slope = leaf.value_and_gradient(moved)
+            slope[:, axis] = 0.0
+            change = (value / np.sum(slope**2, axis=-1))[:, None] * slope
+            moved = moved - change
+        good = (np.abs(change) < 1e-3 * cell).all(axis=-1) & (np.abs(moved - line) < cell).all(axis=-1)
+    pieces = np.split(moved, np.flatnonzero(good[1:] != good[:-1]) + 1)
+    starts = np.r_[True, good[1:] != good[:-1]]
+    return [piece for piece, kept in zip(pieces, good[starts], strict=True) if kept and len(piece) > 1]

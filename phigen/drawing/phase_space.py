@@ -1,0 +1,215 @@
+"""Trajectories in phase space: planes, space with the leaf of a Casimir, coordinates over time."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from phigen.drawing.dots import draw_dots
+from phigen.drawing.groups import Group, groups, is_orbit
+from phigen.drawing.leaf import Leaf, around, leaf_of, net
+from phigen.drawing.palette import PALETTE, SERIES
+from phigen.runtime.trajectory import Trajectory
+from phigen.study.arrays import Floats
+from phigen.symbolic.expression import Expression
+
+if TYPE_CHECKING:
+    from matplotlib.figure import FigureBase
+
+#: Up to so many coordinates are drawn panel by panel, more as an image over time.
+MOST_COORDINATES = 24
+#: Rows are not joined if the typical angle between their chords is more than this, since the line would not be the
+#: orbit; of a long curve even chords that look right one by one cover the panel.
+TURN, FINE_TURN = math.radians(40), math.radians(15)
+#: A curve is long if it could cross its panel so many times.
+LONG = 60.0
+#: The views of a panel in space, in degrees, the usual one first; and the bands of distance that fade to the back.
+ELEVATION, AZIMUTHS, BANDS = 22.0, (-52.0, -22.0, 8.0, 38.0, -82.0, -112.0), 4
+
+
+def grid(coordinates: tuple[str, ...]) -> tuple[int, int]:
+    """Rows and columns of the panels of a trajectory."""
+    panels = 1 if len(coordinates) > MOST_COORDINATES else len(groups(coordinates))
+    columns = panels if panels < 4 else 2 if panels == 4 else 3
+    return -(-panels // columns), columns
+
+
+def height(coordinates: tuple[str, ...]) -> float:
+    """The height of all panels in inches."""
+    rows, columns = grid(coordinates)
+    return rows * (4.4 if len(coordinates) == 3 else 3.4 if columns < 3 else 2.4)
+
+
+def draw_trajectory(figure: FigureBase, trajectory: Trajectory, casimirs: Mapping[str, Expression]) -> None:
+    """All panels of a trajectory; rows that are not finite are left out."""
+    good = np.isfinite(trajectory.x).all(axis=1)
+    t, x, names = trajectory.t[good], trajectory.x[good], trajectory.coordinates
+    if len(names) > MOST_COORDINATES:
+        _draw_image(figure, names, t, x)
+        return
+    rows, columns = grid(names)
+    zoom = 0.9 if columns < 3 else 0.8  # the labels around the box are as large in small panels
+    start = dict(zip(names, x[0].tolist(), strict=True))
+    for index, group in enumerate(groups(names), start=1):
+        points = x[:, [names.index(name) for name in group]]
+        if len(group) == 3:
+            axes = figure.add_subplot(rows, columns, index, projection="3d")
+            draw_in_space(axes, group, points, leaf_of(casimirs, group, start, trajectory.parameters), zoom)
+        elif len(group) == 2:
+            axes = figure.add_subplot(rows, columns, index)
+            draw_in_plane(axes, group, points)
+            if is_orbit(names):
+                axes.set_aspect("equal", adjustable="datalim")
+        else:
+            draw_in_plane(figure.add_subplot(rows, columns, index), ("t", *group), np.column_stack([t, points]))
+
+
+def draw_in_plane(axes: Any, names: Group, points: Floats) -> None:
+    """A curve (rows, 2), and where it starts."""
+    _label(axes, names)
+    axes.grid(True)
+    _draw_curve(axes, points, SERIES[0], 1.0, 2.0, _width(points), joins(points))
+    axes.plot(*points[0], "o", color=PALETTE["ink"], markersize=4, zorder=3)
+    axes.locator_params(axis="x", nbins=5)
+
+
+def draw_in_space(axes: Any, names: Group, points: Floats, leaf: Leaf | None, zoom: float) -> None:
+    """A curve (rows, 3) over the net of its leaf, paler towards the back, and where it starts."""
+    box = around(leaf, box_of(points)) if leaf else box_of(points)
+    # The same unit of length along all axes, unless a coordinate would be squeezed flat.
+    size = box[1] - box[0]
+    axes.set_box_aspect(size if size.max() < 2.2 * size.min() else (1, 1, 1), zoom=zoom)
+    azimuth = _azimuth((points - points.mean(axis=0)) / size)
+    axes.view_init(ELEVATION, azimuth)
+    axes.set(xlim=box[:, 0], ylim=box[:, 1], zlim=box[:, 2])
+    _label(axes, names)
+    for axis in (axes.xaxis, axes.yaxis, axes.zaxis):
+        axis.pane.set_visible(False)
+        axis._axinfo["grid"].update(color=PALETTE["grid"], linewidth=0.4)
+        axis.set_major_locator(_few_ticks())
+    axes.tick_params(pad=-1, labelsize=7)
+    towards = _directions(azimuth)[2]
+    if leaf:
+        lines = [part for line in net(leaf, box) for part in (line, np.full((1, 3), np.nan))]
+        if lines:
+            _draw_faded(axes, box, towards, np.concatenate(lines), PALETTE["leaf"], 0.45, (0.2, 0.75), 1.0)
+    # Of a curve that winds around many times, bands would show where its chords happen to end.
+    alphas = (0.3, 1.0) if _length(points) < LONG else (0.8, 0.8)
+    _draw_faded(axes, box, towards, points, SERIES[0], _width(points), alphas, 1.5, joins(points))
+    axes.plot(*points[0], "o", color=PALETTE["ink"], markersize=4, zorder=20)
+
+
+def _directions(azimuth: float) -> Floats:
+    """The directions to the right, up and towards the viewer, as rows."""
+    e, a = math.radians(ELEVATION), math.radians(azimuth)
+    towards = np.array([math.cos(e) * math.cos(a), math.cos(e) * math.sin(a), math.sin(e)])
+    right = np.array([-math.sin(a), math.cos(a), 0.0])
+    return np.stack([right, np.cross(towards, right), towards])
+
+
+def _azimuth(centred: Floats) -> float:
+    """A view in which the curve is not seen from its edge: the usual one, if another does not show much more of it."""
+    spread = centred.T @ centred
+
+    def area(azimuth: float) -> float:
+        plane = _directions(azimuth)[:2]
+        return float(np.linalg.det(plane @ spread @ plane.T))
+
+    best = max(AZIMUTHS, key=area)
+    return best if area(best) > 3 * area(AZIMUTHS[0]) else AZIMUTHS[0]
+
+
+def _draw_faded(
+    axes: Any, box: Floats, towards: Floats, points: Floats, colour: str, width: float,
+    alphas: tuple[float, float], order: float, joined: bool = True,
+) -> None:  # fmt: skip
+    """Points (rows, 3) as a curve, in bands by their distance from the viewer."""
+    centred = (points - box.mean(axis=0)) / (box[1] - box[0])
+    depth = np.clip(centred @ towards / np.abs(towards).sum() * 2 + 0.5, 0, 1 - 1e-9)
+    band = np.where(np.isfinite(depth), np.floor(depth * BANDS), -1)
+    for level in range(BANDS):
+        # A band keeps the point after its last one, so that no gap opens between bands.
+        inside = band == level
+        shown = inside | np.r_[False, inside[:-1]] if joined else inside
+        alpha = alphas[0] + (alphas[1] - alphas[0]) * level / (BANDS - 1)
+        if inside.any():
+            kept = np.where(shown[:, None], points, np.nan)
+            _draw_curve(axes, kept, colour, alpha, order + 10 * (level >= BANDS / 2), width, joined)
+
+
+def _draw_curve(axes: Any, points: Floats, colour: str, alpha: float, order: float, width: float, joined: bool) -> None:
+    """A line, or dots where the rows are too far apart for one."""
+    if joined:
+        axes.plot(*points.T, "-", color=colour, linewidth=width, alpha=alpha, zorder=order)
+        return
+    size = float(np.clip(3.0 - 0.8 * math.log10(max(len(points), 1) / 100), 0.8, 3.0))
+    if points.shape[1] == 2:
+        draw_dots(axes, points, colour, size, order)
+    else:
+        axes.plot(*points.T, ".", color=colour, markersize=size, markeredgewidth=0, alpha=alpha, zorder=order)
+
+
+def _width(points: Floats) -> float:
+    """Of a line: the longer, the thinner."""
+    return float(np.clip(1.5 * math.sqrt(LONG / 2 / max(_length(points), 1e-9)), 0.3, 1.5))
+
+
+def joins(points: Floats) -> bool:
+    """Whether chords between the rows look like the curve."""
+    points = points[np.isfinite(points).all(axis=1)]
+    size = np.ptp(points, axis=0) if len(points) else np.zeros(points.shape[1])
+    chords = np.diff(points / np.where(size > 0, size, 1.0), axis=0)
+    lengths = np.linalg.norm(chords, axis=1)
+    moved = lengths > 1e-12
+    chords, lengths = chords[moved], lengths[moved]
+    if len(chords) < 3:
+        return True
+    cosines = np.sum(chords[1:] * chords[:-1], axis=1) / (lengths[1:] * lengths[:-1])
+    turn = float(np.median(np.arccos(np.clip(cosines, -1, 1))))
+    return turn < (TURN if np.sum(lengths) < LONG else FINE_TURN)
+
+
+def _draw_image(figure: FigureBase, names: Group, t: Floats, x: Floats) -> None:
+    """All coordinates over time, as colours."""
+    axes = figure.add_subplot()
+    most = float(np.max(np.abs(x))) or 1.0
+    times = np.linspace(0, len(t) - 1, min(len(t), 800)).astype(int)
+    shown = axes.imshow(
+        x[times].T, aspect="auto", origin="lower", cmap="RdBu_r", vmin=-most, vmax=most, interpolation="nearest",
+        extent=(t[0], t[-1], 0.5, x.shape[1] + 0.5),
+    )  # fmt: skip
+    named = range(0, len(names), -(-len(names) // 10))
+    axes.set_yticks([1.0 + i for i in named], [names[i] for i in named])
+    axes.set_xlabel("t")
+    figure.colorbar(shown, ax=axes, pad=0.02)
+
+
+def box_of(points: Floats) -> Floats:
+    """Bounds (2, 3) around points with a margin; flat in no direction, unless that has a scale of its own."""
+    low, high, most = points.min(axis=0), points.max(axis=0), np.max(np.abs(points), axis=0)
+    size = high - low
+    alike = most > 0.01 * most.max()
+    half = np.maximum(0.53 * size, np.where(alike, 0.2 * size.max(), 0.05 * most))
+    half[half == 0] = 0.2 * size.max() or 0.5
+    middle = (low + high) / 2
+    return np.stack([middle - half, middle + half])
+
+
+def _few_ticks() -> Any:
+    from matplotlib.ticker import MaxNLocator
+
+    return MaxNLocator(4)
+
+
+def _label(axes: Any, names: Group) -> None:
+    for axis, name, pad in zip("xyz"[: len(names)], names, (-6, -6, -2) if len(names) == 3 else (2, 2), strict=True):
+        getattr(axes, f"set_{axis}label")(name, labelpad=pad)
+
+
+def _length(points: Floats) -> float:
+    """The length of the curve if the space it fills had the size 1 in each direction."""
+    size = np.ptp(points, axis=0)
+    return float(np.sum(np.linalg.norm(np.diff(points / np.where(size > 0, size, 1.0), axis=0), axis=1)))

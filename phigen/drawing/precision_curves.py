@@ -1,0 +1,67 @@
+"""Error against step size, and against time."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+from phigen.drawing.error_curves import LINES
+from phigen.drawing.palette import MARK, SERIES
+from phigen.study.precision import Curve, Study
+
+_MARKERS = "osD^vX"
+
+
+def draw_convergence(axes: Any, study: Study) -> None:
+    """Error against step size, with the observed order of each method, and a thin line of the order of the first."""
+    for place, curve in enumerate(study.curves):
+        slope = f"slope {curve.slope:.2f}" if math.isfinite(curve.slope) else "slope unknown"
+        _draw(axes, place, [p.step for p in curve.points], [p.error for p in curve.points], f"{label(curve)}: {slope}")
+    _draw_slope(axes, study.curves[0])
+    axes.set(xlabel="step h", ylabel=f"relative error at t = {study.time:.4g}")
+    _finish(axes, study.floor)
+
+
+def draw_work(axes: Any, study: Study) -> None:
+    """Error of the solution against the seconds of a run."""
+    for place, curve in enumerate(study.curves):
+        _draw(axes, place, [p.seconds for p in curve.points], [p.error for p in curve.points], label(curve))
+    axes.set(xlabel="seconds of the run", title=f"relative error of the solution at t = {study.time:.4g}")
+    _finish(axes, study.floor)
+
+
+def draw_conserved(axes: Any, study: Study) -> None:
+    """The largest error of a Casimir against the seconds of a run."""
+    for place, curve in enumerate(study.curves):
+        _draw(axes, place, [p.seconds for p in curve.points], [p.casimirs for p in curve.points], label(curve))
+    axes.set(xlabel="seconds of the run", title=f"relative error of the Casimirs at t = {study.time:.4g}")
+    _finish(axes)
+
+
+def label(curve: Curve) -> str:
+    """The method and its stated order."""
+    return f"{curve.label} (order {curve.order})"
+
+
+def _draw(axes: Any, place: int, x: Sequence[float], y: Sequence[float], text: str) -> None:
+    axes.plot(
+        x, y, linestyle=LINES[place % len(LINES)], color=SERIES[place % len(SERIES)], label=text, linewidth=1.0,
+        marker=_MARKERS[place % len(_MARKERS)], markersize=3, markeredgewidth=0, zorder=3 - 0.1 * place,
+    )  # fmt: skip
+
+
+def _draw_slope(axes: Any, curve: Curve) -> None:
+    good = [p for p in curve.points if 1e-12 < p.error < 1e-2]
+    if len(good) > 1 and math.isfinite(curve.slope):
+        ends, scale = [good[0].step, good[-1].step], 2.0 * good[-1].error / good[-1].step ** curve.order
+        axes.plot(ends, [scale * h**curve.order for h in ends], color=SERIES[0], linewidth=0.6, alpha=0.7, zorder=1)
+
+
+def _finish(axes: Any, floor: float | None = None) -> None:
+    axes.set(xscale="log", yscale="log")
+    if floor is not None:
+        axes.axhline(floor, **MARK)
+    axes.grid(True)
+    axes.minorticks_off()
+    axes.legend(loc="best")

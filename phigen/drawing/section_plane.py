@@ -1,0 +1,60 @@
+"""Points of Poincaré sections."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from phigen.drawing.dots import draw_dots
+from phigen.drawing.groups import phase_planes
+from phigen.drawing.palette import SERIES
+from phigen.study.arrays import Floats
+
+#: A coordinate that varies less than this, relative to the largest, is that of the section itself.
+_CONSTANT = 1e-8
+
+
+def plane_of(names: Sequence[str], points: Floats) -> tuple[int, int]:
+    """The two columns (rows, names) to draw: a pair that belongs together, without the constant ones if possible."""
+    span = np.ptp(points, axis=0) if len(points) else np.ones(len(names))
+    constant = span <= _CONSTANT * max(float(span.max()), float(np.max(np.abs(points), initial=0.0)) * 1e-4)
+    varying = [name for name, fixed in zip(names, constant, strict=True) if not fixed]
+    pairs = [found for group in phase_planes(names) if len(found := [n for n in group if n in varying]) >= 2]
+    # Of an orbit that closes there is one point; a coordinate that is zero is likely to be that of the section.
+    sizes = np.max(np.abs(points), axis=0, initial=0.0)
+    rest = sorted((n for n in names if n not in varying), key=lambda n: -sizes[list(names).index(n)])
+    chosen = (pairs[0] if pairs else [*varying, *rest])[:2]
+    first, second = sorted(map(list(names).index, chosen))
+    return first, second
+
+
+def draw_section(axes: Any, sections: Mapping[str, Floats], names: Sequence[str]) -> None:
+    """Points (rows, names) of each section, a dot each."""
+    given = [points for points in sections.values() if len(points)]
+    i, j = plane_of(names, np.concatenate(given) if given else np.empty((0, len(names))))
+    for place, (label, points) in enumerate(sections.items()):
+        size = float(np.clip(4.0 - 1.1 * math.log10(max(len(points), 1) / 30), 0.8, 4.0))
+        draw_dots(axes, points[:, [i, j]], SERIES[place % len(SERIES)], size, 2.0, label)
+    axes.set(xlabel=names[i], ylabel=names[j])
+    axes.grid(True)
+    axes.locator_params(axis="x", nbins=6)
+    axes.set_box_aspect(0.75)
+    _widen(axes)
+    if len(sections) > 1:
+        axes.legend(loc="best")
+    else:
+        label, points = next(iter(sections.items()))
+        axes.set_title(f"section {label}: {len(points)} crossings")
+
+
+def _widen(axes: Any) -> None:
+    """Points in one place, up to rounding, are shown as that, not as a cloud of rounding errors."""
+    for kind in "xy":
+        low, high = getattr(axes, f"get_{kind}lim")()
+        middle, half = (low + high) / 2, (high - low) / 2
+        least = 0.05 * max(abs(middle), 1e-9)
+        if half < 1e-2 * least:
+            getattr(axes, f"set_{kind}lim")(middle - least, middle + least)

@@ -1,0 +1,1 @@
+"""Formulas for reading: in text, LaTeX and MathML."""

@@ -1,0 +1,56 @@
+"""The parts of a splitting and their flows, for reading."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from phigen.compilation import Compilation
+from phigen.scheme.steps import Splitting, Step
+from phigen.splitting.flow import Flow
+from phigen.symbolic.expression import Expression, symbol
+from phigen.symbolic.readable import readable
+
+
+def method(compilation: Compilation) -> str:
+    """``order 4, 2 parts with exact flows``."""
+    count = len(flows_of(compilation))
+    note = f" ({compilation.order.note})" if compilation.order.note else ""
+    return f"order {compilation.order.order}, {count} part{'s' * (count > 1)} with exact flows{note}"
+
+
+def flows_of(compilation: Compilation) -> tuple[Flow, ...]:
+    """The flows of a splitting; none of a series."""
+    return compilation.splitting.flows if compilation.splitting else ()
+
+
+def images(flow: Flow, coordinates: Sequence[str]) -> dict[str, Expression]:
+    """Where a flow takes the coordinates that move, in the time ``h:``."""
+    return {c: symbol(c) + e for c, e in zip(coordinates, flow.increment, strict=True) if not e.is_zero}
+
+
+def formulas(compilation: Compilation, most: int | None) -> list[tuple[str, str]]:
+    """The parts of H, and where the flow of each takes the coordinates, as pairs of a name and a text."""
+    listed = []
+    for k, flow in enumerate(flows_of(compilation), 1):
+        moved = images(flow, compilation.system.coordinates)
+        part, *texts = readable([flow.hamiltonian, *moved.values()], most)
+        listed += [(f"H_{k}", part), *((f"Φ_{k}: {c}", t) for c, t in zip(moved, texts, strict=True))]
+    return listed
+
+
+def schedule(step: Step) -> list[tuple[int, float]]:
+    """The flows of a splitting in order, as pairs of a part and a fraction of the step; none for other steps."""
+    if not isinstance(step, Splitting):
+        return []
+    return [(part, step.schedule.times[row]) for part, row in step.schedule.flows]
+
+
+def described(compilation: Compilation) -> dict[str, object]:
+    """The parts, and the flows of a step as pairs of a part, counted from 1, and a fraction of the step."""
+    parts = []
+    for flow in flows_of(compilation):
+        moved = images(flow, compilation.system.coordinates)
+        part, *texts = readable([flow.hamiltonian, *moved.values()], None)
+        parts.append({"hamiltonian": part, "flow": dict(zip(moved, texts, strict=True)), "manner": flow.manner})
+    steps = [[part + 1, time] for part, time in schedule(compilation.program.step)]
+    return {"scheme": "splitting", "parts": parts, "flows": steps}

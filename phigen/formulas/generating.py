@@ -1,0 +1,52 @@
+"""The generating function of a compilation: what the order rests on, and S_1 … S_k as formulas."""
+
+from __future__ import annotations
+
+from phigen.compilation import Compilation
+from phigen.errors import Diagnostic, SpecError
+from phigen.scheme.modified import corrections, expect_modified, powers
+from phigen.symbolic.readable import Formula, of_polynomial
+
+#: The leading term of the modified Hamiltonian costs one more coefficient of the series; beyond this it is left out.
+_MODIFIED_UP_TO = 6
+
+
+def method(compilation: Compilation) -> str:
+    """``order 6 from S_1 … S_5, symmetric: the even terms vanish``."""
+    plan, stage = compilation.order, compilation.stage
+    terms = "S_1" if stage.terms == 1 else f"S_1 … S_{stage.terms}"
+    if stage is not plan:
+        return f"order {plan.order}, composed of {len(compilation.program.fractions)} stages of order 2 from {terms}"
+    why = "symmetric, so the terms of even index vanish" if compilation.symmetric else "not symmetric"
+    note = f" ({plan.note})" if plan.note else ""
+    return f"order {plan.order} from {terms}; {why}{note}"
+
+
+def series_formulas(compilation: Compilation, most: int | None) -> tuple[list[tuple[int, Formula]], Formula | None]:
+    """The S_i that do not vanish, with their index; and −S_{p+1}, the leading term of the modified Hamiltonian.
+
+    The map of step h is the flow of H − h^p S_{p+1} + …, where p is the order and S the untruncated series.
+    """
+    plan = compilation.stage
+    more = plan is compilation.order and plan.order <= _MODIFIED_UP_TO
+    series = compilation.series.polynomial(plan.order + 1 if more else plan.terms)
+    listed = [(i, of_polynomial(series.tower, s, most)) for i, s in enumerate(series.terms[: plan.terms], 1) if s != 0]
+    return listed, of_polynomial(series.tower, -series.terms[plan.order], most) if more else None
+
+
+def modified_formulas(compilation: Compilation, count: int, most: int | None) -> list[tuple[int, Formula]]:
+    """The first ``count`` terms h^j H_j of the modified Hamiltonian H̃ = H + h^p H_p + …, as pairs of j and H_j.
+
+    With a count of 0 the leading one, where it costs little. Raises `SpecError` for a splitting, a composition and an
+    approximate bi-realisation if more are asked for.
+    """
+    if not count:
+        leading = None if compilation.splitting else series_formulas(compilation, most)[1]
+        return [] if leading is None else [(compilation.order.order, leading)]
+    if compilation.splitting:
+        raise SpecError([Diagnostic("the modified Hamiltonian is not computed for a splitting")])
+    system, chart = compilation.system, compilation.chart
+    expect_modified(system, chart, len(compilation.program.fractions))
+    found = corrections(system, chart, compilation.order, count, compilation.gauge)
+    listed = powers(compilation.order, count, symmetric=chart.symmetric)
+    return [(j, of_polynomial(found.tower, found.terms[j], most)) for j in listed]

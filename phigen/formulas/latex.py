@@ -1,0 +1,150 @@
+"""The formulas of a compilation as LaTeX, for a paper: a fragment that needs amsmath."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+from phigen.compilation import Compilation
+from phigen.formulas import flows, mathml, parts
+from phigen.formulas.generating import modified_formulas, series_formulas
+from phigen.formulas.typesetting import INDENT, LINE, latex, lines, width
+from phigen.geometry.system import System
+from phigen.symbolic.expression import Expression
+from phigen.symbolic.readable import SHOWN, Formula
+
+#: The left side of an equation and the pieces of its right side, all of them markup.
+Equation = tuple[str, Sequence[str]]
+
+_PLUS, _EQUALS, _TIMES = "<mo>+</mo>", "<mo>=</mo>", "<mo>&#x2062;</mo>"
+_DOTS = f"{_PLUS}<mo>…</mo>"
+#: The function φ of the exponential bi-realisation, and β of a symmetric pair.
+_PHI = "  \\varphi(s) &= \\frac{1}{s} \\left( 1 - \\frac{\\sqrt{s}}{2} \\cot \\frac{\\sqrt{s}}{2} \\right)"
+_BETA = "  \\beta(x, p) &= \\alpha(x, -p)"
+#: The width of an equals sign, and of the space between columns of a matrix.
+_RELATION, _COLUMN = 1.4, 1.2
+#: amsmath has matrices of ten columns.
+_COLUMNS = 10
+
+
+def document(compilation: Compilation, modified: int = 0, most: int | None = SHOWN) -> str:
+    """Equations for π, H, the Casimirs, α, β, S_1 … S_k, or the parts and flows of a splitting, and H̃.
+
+    Lines are broken to fit the text of an article. ``most`` bounds the terms shown of S_i and H̃, None shows all.
+    ``modified`` is the number of corrections; with 0, the leading one is shown where it costs little. Raises
+    `SpecError` where they are asked for and not computed.
+    """
+    system = compilation.system
+    blocks = [_tensor(system), _aligned(_assigned(["H"], [system.hamiltonian]))]
+    if first_integrals := {**system.casimirs, **system.invariants}:
+        blocks.append(_aligned(_assigned(list(first_integrals), list(first_integrals.values()))))
+    if compilation.splitting:
+        blocks += [_flow(compilation, k) for k in range(1, len(compilation.splitting.flows) + 1)]
+    else:
+        blocks += [*_maps(compilation), _aligned(_series(compilation, most))]
+    if listed := modified_formulas(compilation, modified, most):
+        sums = ["<mi>H</mi>", *(_PLUS + _scaled("H", j) for j, _ in listed), _DOTS]
+        tilde = '<mover accent="true"><mi>H</mi><mo>~</mo></mover>'
+        blocks.append(_aligned([(tilde, sums), *((_indexed("H", j), _pieces(f)) for j, f in listed)]))
+    head = f"% {compilation.spec.name}, order {compilation.order.order}; needs amsmath"
+    return "\n".join([head, "\\begingroup\\allowdisplaybreaks", *blocks, "\\endgroup"])
+
+
+def _tensor(system: System) -> str:
+    """π as a matrix, or its brackets if that is too wide."""
+    names, n = system.coordinates, system.dimension
+    cells = [[mathml.expression(e) for e in row] for row in system.poisson]
+    across = sum(max(width(row[j]) for row in cells) + _COLUMN for j in range(n))
+    if n <= _COLUMNS and across + _COLUMN + width("<mi>π</mi>", _EQUALS) <= LINE:
+        body = " \\\\ ".join(" & ".join(latex(cell) for cell in row) for row in cells)
+        return f"\\begin{{equation*}}\n  \\pi = \\begin{{pmatrix}} {body} \\end{{pmatrix}}\n\\end{{equation*}}"
+    pairs = [(i, j) for i in range(n) for j in range(i + 1, n) if not system.poisson[i][j].is_zero]
+    left = [mathml.bracket(names[i], names[j]) for i, j in pairs]
+    return _aligned(_equations(left, [system.poisson[i][j] for i, j in pairs]))
+
+
+def _flow(compilation: Compilation, k: int) -> str:
+    """A part of H, and where its flow for the time h takes the coordinates that move."""
+    flow = flows.flows_of(compilation)[k - 1]
+    moved = flows.images(flow, compilation.system.coordinates)
+    pulled = f"<msubsup><mi>Φ</mi><mn>{k}</mn><mi>∗</mi></msubsup>{_TIMES}"
+    left = [_indexed("H", k), *(pulled + mathml.name(c) for c in moved)]
+    return _aligned(_equations(left, [flow.hamiltonian, *moved.values()]))
+
+
+def _maps(compilation: Compilation) -> Iterator[str]:
+    """α and β, and φ if they contain it; of a path they are series, of which this is the beginning."""
+    realisation, names = compilation.chart, compilation.system.coordinates
+    more = [_DOTS] if realisation.path else []
+    letters = {"α": realisation.alpha} if realisation.symmetric else {"α": realisation.alpha, "β": realisation.beta}
+    for letter, maps in letters.items():
+        block = _aligned(_equations([mathml.indexed(letter, c) for c in names], maps, more))
+        yield block
+        if "\\varphi" in block and letter == "α":
+            yield _align([_PHI])
+    if realisation.symmetric:
+        yield _align([_BETA])
+
+
+def _gauged(compilation: Compilation) -> str:
+    """The Hamiltonian that the series is of, if Casimirs are subtracted, to stand before what S_1 is."""
+    gauge = compilation.gauge
+    factors = [mathml.name(s) for s in gauge.symbols] + [mathml.grouped(value) for value in gauge.fixed.values()]
+    parts = zip(factors, (*gauge.free, *gauge.fixed), strict=True)
+    taken = "".join(f"<mo>−</mo>{factor}{_TIMES}{mathml.name(casimir)}" for factor, casimir in parts)
+    return f"<mi>H</mi>{taken}{_EQUALS}" if taken else ""
+
+
+def _series(compilation: Compilation, most: int | None) -> Iterator[Equation]:
+    listed, _ = series_formulas(compilation, most)
+    yield _indexed("S", "h"), [_PLUS * (n > 0) + _scaled("S", i) for n, (i, _) in enumerate(listed)]
+    for i, formula in listed:
+        first, *others = _pieces(formula)
+        yield _indexed("S", i), [_gauged(compilation) * (i == 1) + first, *others]
+
+
+def _assigned(names: Sequence[str], expressions: Sequence[Expression]) -> list[Equation]:
+    return _equations([mathml.name(n) for n in names], expressions)
+
+
+def _equations(left: Sequence[str], expressions: Sequence[Expression], more: Sequence[str] = ()) -> list[Equation]:
+    """Equations for expressions that share parts, which get names and equations of their own, after these."""
+    found = parts.readable(expressions)
+    listed = [(name, [*mathml.pieces(form), *more]) for name, form in zip(left, found.forms, strict=True)]
+    return [*listed, *((mathml.name(name), mathml.pieces(e)) for name, e in found.parts)]
+
+
+def _pieces(formula: Formula) -> list[str]:
+    """A polynomial; the divisor before it, and after it how many terms it has if not all are shown."""
+    first, *others = mathml.pieces(replace(formula, divisor=1))
+    found = [first, *others]
+    if formula.divisor != 1:
+        scale = f"<mfrac><mn>1</mn><mn>{formula.divisor}</mn></mfrac>{_TIMES}"
+        found = [f"{scale}<mo>(</mo>{first}", *others]
+        found[-1] += "<mo>)</mo>"
+    return [*found, f"<mtext>({formula.size} terms)</mtext>"] if formula.hidden else found
+
+
+def _aligned(equations: Sequence[Equation] | Iterator[Equation]) -> str:
+    listed = list(equations)
+    room = LINE - max(width(left) for left, _ in listed) - _RELATION
+    written = []
+    for left, right in listed:
+        first, *others = lines(right, room)
+        written += [f"  {latex(left)} &= {first}", *(f"    &{INDENT}{line}" for line in others)]
+    return _align(written)
+
+
+def _align(written: Sequence[str]) -> str:
+    return "\n".join(["\\begin{align*}", " \\\\\n".join(written), "\\end{align*}"])
+
+
+def _indexed(letter: str, index: int | str) -> str:
+    tag = "mn" if isinstance(index, int) else "mi"
+    return f"<msub><mi>{letter}</mi><{tag}>{index}</{tag}></msub>"
+
+
+def _scaled(letter: str, i: int) -> str:
+    """``h^i S_i``."""
+    power = "<mi>h</mi>" if i == 1 else f"<msup><mi>h</mi><mn>{i}</mn></msup>"
+    return f"{power}{_TIMES}{_indexed(letter, i)}"

@@ -1,0 +1,101 @@
+"""What was compiled, in sympy: the Hamiltonian that is discretised, α, β and S_1 … S_k."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from math import prod
+from typing import Any
+
+from phigen.compilation import Compilation
+from phigen.errors import Diagnostic, LimitError, SpecError
+from phigen.geometry.sympy_bridge import SympySystem, closed_function, free_symbols, symbols_in_sympy, to_sympy
+from phigen.realisations import karasev
+from phigen.scheme.discretisation import formal_alpha
+from phigen.series.reference import Coefficients, closed_form
+from phigen.symbolic.expression import Expression
+from phigen.symbolic.symbols import STEP, momentum
+
+
+@dataclass(frozen=True)
+class SympyFormulas:
+    """The formulas of a method in sympy.
+
+    ``hamiltonian`` is what is discretised: H less λ C for each Casimir C of the gauge, whose λ is in ``gauge``. α and β
+    are n expressions in the coordinates of ``system`` and in ``covector``; where they are series in it, ``degree`` says
+    up to which degree they are given, else it is None. ``series`` has S_1 … S_k with S_h = Σ h^i S_i.
+    """
+
+    system: SympySystem
+    hamiltonian: Any
+    gauge: Mapping[str, Any]
+    covector: tuple[Any, ...]
+    alpha: tuple[Any, ...]
+    beta: tuple[Any, ...]
+    degree: int | None
+    series: tuple[Any, ...]
+
+
+class Dictionary:
+    """The symbols of a compilation in sympy, and how its expressions are said in them."""
+
+    def __init__(self, compilation: Compilation) -> None:
+        system, gauge = compilation.system, compilation.gauge
+        known = symbols_in_sympy(system)
+        self.coordinates = tuple(known[c] for c in system.coordinates)
+        self.covector = tuple(free_symbols([f"p_{c}" for c in system.coordinates], known))
+        self.step, *free = free_symbols(["h", *(f"lambda_{c}" for c in gauge.free)], [*known, *self.covector])
+        self.gauge = dict(zip(gauge.free, free, strict=True))
+        momenta = dict(zip(map(momentum, system.coordinates), self.covector, strict=True))
+        self._symbols = {**known, **momenta, **dict(zip(gauge.symbols, free, strict=True)), STEP: self.step}
+
+    def expression(self, e: Expression, special: Callable[[int, Any], Any] = closed_function) -> Any:
+        """The expression in sympy; ``special`` is that of `to_sympy`."""
+        return to_sympy(e, self._symbols, special)
+
+
+def sympy_formulas(compilation: Compilation, terms: int | None = None) -> SympyFormulas:
+    """The formulas of a compilation, with S_1 … S_terms, by default those of the method.
+
+    Raises `SpecError` for a splitting, `LimitError` if the terms are too many to be written out.
+    """
+    if compilation.splitting:
+        raise SpecError([Diagnostic("a splitting has no bi-realisation and no S_i", hint="ask for scheme series")])
+    dictionary, chart = Dictionary(compilation), compilation.chart
+    terms = terms or compilation.stage.terms
+    try:
+        series = compilation.series.polynomial(terms)
+    except OverflowError as error:
+        raise LimitError([Diagnostic(f"S_1 … S_{terms} are too large to be written out: {error}")]) from None
+    degree = max(terms - 1, karasev.DEGREE) if chart.path else chart.degree
+    if chart.path and degree:
+        alpha, beta = _ends_of_paths(compilation, dictionary, degree)
+    else:
+        alpha, beta = (tuple(dictionary.expression(e) for e in maps) for maps in (chart.alpha, chart.beta))
+    return SympyFormulas(
+        compilation.system.to_sympy(),
+        dictionary.expression(compilation.discretised.hamiltonian),
+        dictionary.gauge,
+        dictionary.covector,
+        alpha,
+        beta,
+        degree,
+        tuple(dictionary.expression(series.tower.expression(s)) for s in series.terms),
+    )
+
+
+def _ends_of_paths(
+    compilation: Compilation, dictionary: Dictionary, degree: int
+) -> tuple[tuple[Any, ...], tuple[Any, ...]]:
+    """α and β = α(x, −p) up to a degree in p; what the compiler has beyond it is not of the series."""
+    formal = formal_alpha(compilation.discretised, compilation.chart, degree + 1)
+    parts = closed_form([dictionary.expression(e) for e in formal], dictionary.covector)(degree)
+
+    def summed(x: Any, part: Coefficients, sign: int) -> Any:
+        monomials = {mu: prod(p**e for p, e in zip(dictionary.covector, mu, strict=True)) for mu in part}
+        return x + sum(sign ** sum(mu) * a * monomials[mu] for mu, a in part.items())
+
+    alpha, beta = (
+        tuple(summed(x, part, sign) for x, part in zip(dictionary.coordinates, parts, strict=True)) for sign in (1, -1)
+    )
+    return alpha, beta

@@ -1,0 +1,243 @@
+"""Formulas in LaTeX, broken into lines: the markup of `phigen.formulas.mathml`, with an estimate of its width.
+
+Widths are in em, for the fonts of TeX, and on the safe side. A line breaks before a plus or a minus, at an outer one
+if that leaves no large hole, else inside parentheses; and between factors where nothing else helps.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from xml.etree import ElementTree
+from xml.etree.ElementTree import Element
+
+#: The width of a line: a little less than that of the text of an article at 10, 11 and 12 points.
+LINE = 31.0
+#: What continued lines begin with, and its width.
+INDENT, INDENTED = "\\quad ", 1.0
+#: A line is left shorter by this part of it rather than broken one level of parentheses deeper.
+_SHORTER = 0.35
+#: Between factors a line breaks as if they were so many levels deeper.
+_FACTORS = 4
+#: What is wider than this part of a line is opened where that can be done: a fraction, a root, an exponent.
+_WIDE = 0.6
+
+_GREEK = {
+    "α": "alpha", "β": "beta", "γ": "gamma", "δ": "delta", "ε": "varepsilon", "ζ": "zeta", "η": "eta", "θ": "theta",
+    "ι": "iota", "κ": "kappa", "λ": "lambda", "μ": "mu", "ν": "nu", "ξ": "xi", "π": "pi", "ρ": "rho", "σ": "sigma",
+    "τ": "tau", "υ": "upsilon", "φ": "varphi", "χ": "chi", "ψ": "psi", "ω": "omega", "Γ": "Gamma", "Δ": "Delta",
+    "Θ": "Theta", "Λ": "Lambda", "Ξ": "Xi", "Π": "Pi", "Σ": "Sigma", "Φ": "Phi", "Ψ": "Psi", "Ω": "Omega",
+    "∗": "ast",
+}  # fmt: skip
+_FUNCTIONS = ("arccos", "arcsin", "arctan", "cos", "cosh", "cot", "exp", "log", "max", "min", "sin", "sinh", "tan",
+              "tanh")  # fmt: skip
+_TIMES, _APPLY = "\u2062", "\u2061"
+_SIGNS = {
+    "−": (" - ", 1.25), "+": (" + ", 1.25), "=": (" = ", 1.4), "·": (" \\cdot ", 0.8), "…": ("\\cdots", 1.3),
+    ",": (", ", 0.5), "{": ("\\{", 0.5), "}": ("\\}", 0.5), "|": ("|", 0.3), "/": ("/", 0.5), _TIMES: (" ", 0.0),
+    _APPLY: ("", 0.0),
+}  # fmt: skip
+_ACCENTS = {"˙": "dot", "~": "tilde"}
+_TALL = ("mfrac", "msqrt", "mroot", "mtable")
+
+
+@dataclass(frozen=True)
+class Atom:
+    """A part of a formula that no line ends in; ``level`` is that of the break before it, None for no break."""
+
+    text: str
+    width: float
+    level: int | None = None
+
+
+def latex(*markup: str) -> str:
+    """Elements side by side as LaTeX on one line."""
+    return _joined(_atoms(_elements(markup), whole=True))
+
+
+def width(*markup: str) -> float:
+    """Their estimated width on one line."""
+    return _width(_atoms(_elements(markup), whole=True))
+
+
+def lines(markup: Sequence[str], room: float) -> list[str]:
+    """Elements side by side as lines of LaTeX: the first has so much room, the others `INDENTED` less."""
+    elements = _elements(markup)
+    whole = _atoms(elements, whole=True)
+    if _width(whole) <= room:
+        return [_joined(whole)]
+    atoms, found, begin = _atoms(elements, whole=False), [], 0
+    while begin < len(atoms):
+        end = _end(atoms, begin, room - (INDENTED if begin else 0.0))
+        times = "\\cdot " if begin and (atoms[begin].level or 0) >= _FACTORS else ""
+        found.append(times + _joined(atoms[begin:end]))
+        begin = end
+    return found
+
+
+def _end(atoms: Sequence[Atom], begin: int, room: float) -> int:
+    """Where the line ends that begins there: at the best place within its room, else at the first beyond."""
+    used, best, least = 0.0, len(atoms), float("inf")
+    for place in range(begin, len(atoms)):
+        level = atoms[place].level
+        if level is not None and place > begin:
+            cost = (room - used) / room + _SHORTER * level
+            if used > room and best == len(atoms):
+                return place
+            if used <= room and cost <= least:
+                best, least = place, cost
+        used += atoms[place].width
+        if used > room and best < len(atoms):
+            return best
+    return len(atoms)
+
+
+def _joined(atoms: Sequence[Atom]) -> str:
+    return " ".join("".join(a.text for a in atoms).split())
+
+
+def _width(atoms: Sequence[Atom]) -> float:
+    return sum(a.width for a in atoms)
+
+
+def _elements(markup: Sequence[str]) -> list[Element]:
+    return list(ElementTree.fromstring(f"<mrow>{''.join(markup)}</mrow>"))
+
+
+def _flattened(elements: Sequence[Element]) -> Iterator[Element]:
+    for element in elements:
+        if element.tag == "mrow":
+            yield from _flattened(list(element))
+        else:
+            yield element
+
+
+def _atoms(elements: Sequence[Element], depth: int = 0, *, whole: bool) -> list[Atom]:
+    """Elements side by side; ``whole`` for what stays on one line."""
+    flat, found, bars = list(_flattened(elements)), list[Atom](), 0
+    tall = _tall_parentheses(flat)
+    for place, element in enumerate(flat):
+        text, before = element.text or "", flat[place - 1].text if place else "("
+        if element.tag != "mo":
+            called = place + 1 < len(flat) and flat[place + 1].text == _APPLY
+            found += _of_element(element, depth, called=called, whole=whole)
+        elif text in ("(", ")"):
+            depth += 1 if text == "(" else -1
+            found.append(_parenthesis(text, tall=place in tall, whole=whole))
+        elif text == "−" and (before in ("(", ",", "=") or (before == "|" and bars % 2)):
+            found.append(Atom("-", 0.8))
+        elif text in ("+", "−", "="):
+            found.append(Atom(*_SIGNS[text], level=None if before == "(" else depth))
+        elif text == _TIMES:
+            found.append(Atom(" ", 0.0, depth + _FACTORS))
+        else:
+            bars += text == "|"
+            found.append(Atom(*_SIGNS[text]))
+    return found
+
+
+def _parenthesis(text: str, *, tall: bool, whole: bool) -> Atom:
+    if not tall:
+        return Atom(text, 0.4)
+    sizes = ("\\left", "\\right") if whole else ("\\biggl", "\\biggr")
+    return Atom(f"{sizes[text == ')']}{text} ", 0.8)
+
+
+def _tall_parentheses(flat: Sequence[Element]) -> set[int]:
+    """The places of the parentheses with something tall between."""
+    found, opened = set(), list[int]()
+    for place, element in enumerate(flat):
+        if element.tag == "mo" and element.text == "(":
+            opened.append(place)
+        elif element.tag == "mo" and element.text == ")":
+            begin = opened.pop()
+            if any(part.tag in _TALL for e in flat[begin:place] for part in e.iter()):
+                found |= {begin, place}
+    return found
+
+
+def _of_element(element: Element, depth: int, *, called: bool, whole: bool) -> list[Atom]:
+    parts = list(element)
+    match element.tag:
+        case "mi":
+            return [_identifier(element.text or "", called=called)]
+        case "mn":
+            return [Atom(element.text or "", 0.5 * len(element.text or ""))]
+        case "mtext":
+            return [Atom(f"\\quad \\text{{{element.text}}}", 1 + 0.5 * len(element.text or ""), depth)]
+        case "mover":
+            inner = _one(parts[:1])
+            return [Atom(f"\\{_ACCENTS[parts[1].text or '']}{{{inner.text}}}", inner.width)]
+        case "msub" | "msup" | "msubsup":
+            return _scripts(element.tag, parts, depth, called=called, whole=whole)
+        case "mfrac":
+            return _fraction(parts, depth, whole=whole)
+        case "msqrt":
+            inner = _one(parts)
+            if not whole and inner.width > _WIDE * LINE:
+                return _raised(_enclosed(parts, depth), Atom("\\frac{1}{2}", 0.6))
+            return [Atom(f"\\sqrt{{{inner.text}}}", inner.width + 1.0)]
+        case "mroot":
+            inner, degree = _one(parts[:1]), _one(parts[1:])
+            return [Atom(f"\\sqrt[{degree.text}]{{{inner.text}}}", inner.width + 1.0)]
+    raise ValueError(f"no LaTeX for the element {element.tag}")
+
+
+def _one(elements: Sequence[Element]) -> Atom:
+    """Elements as a part that stays on one line."""
+    atoms = _atoms(elements, whole=True)
+    return Atom(_joined(atoms), _width(atoms))
+
+
+def _identifier(name: str, *, called: bool) -> Atom:
+    stem = name.rstrip("′″")
+    primes = name[len(stem) :].replace("′", "'").replace("″", "''")
+    if stem in _GREEK:
+        return Atom(f"\\{_GREEK[stem]}{primes} ", 0.65 + 0.3 * len(primes))
+    if stem in _FUNCTIONS and called:
+        return Atom(f"\\{stem} ", 0.5 * len(stem) + 0.2)
+    if not stem.isascii():
+        return Atom(f"\\text{{{stem}}}{primes}", 0.6 * len(name))
+    if len(stem) > 1:
+        escaped = stem.replace("_", "\\_")
+        return Atom(f"\\{'operatorname' if called else 'mathit'}{{{escaped}}}{primes}", 0.55 * len(name) + 0.2)
+    return Atom(f"{name}", 0.9 if stem in "mwMW" else 0.75 if stem.isupper() else 0.58)
+
+
+def _scripts(kind: str, parts: Sequence[Element], depth: int, *, called: bool, whole: bool) -> list[Atom]:
+    """What carries an index or an exponent; a sum in parentheses may be broken, and so may exp of a long sum."""
+    base, *scripts = parts
+    written = [_one([s]) for s in scripts]
+    if not whole and kind == "msup" and base.text == "e" and written[0].width > 0.75 * _WIDE * LINE:
+        return [Atom("\\exp ", 1.7), *_enclosed(scripts, depth)]
+    signs = {"msub": "_", "msup": "^", "msubsup": "_^"}[kind]
+    text = "".join(f"{sign}{{{script.text}}}" for sign, script in zip(signs, written, strict=True))
+    carrier = [_identifier(base.text or "", called=True)] if called else _atoms([base], depth, whole=whole)
+    return _raised(carrier, Atom(text, 0.75 * max(s.width for s in written) + 0.1), marks="")
+
+
+def _raised(atoms: list[Atom], script: Atom, marks: str = "^") -> list[Atom]:
+    last, text = atoms[-1], f"{marks}{{{script.text}}}" if marks else script.text
+    return [*atoms[:-1], replace(last, text=last.text.rstrip() + text, width=last.width + script.width)]
+
+
+def _fraction(parts: Sequence[Element], depth: int, *, whole: bool) -> list[Atom]:
+    above, below = (_one([part]) for part in parts)
+    if whole or max(above.width, below.width) <= _WIDE * LINE:
+        return [Atom(f"\\frac{{{above.text}}}{{{below.text}}}", max(above.width, below.width) + 0.3)]
+    if below.width > 0.5 * _WIDE * LINE:
+        return [*_factor(parts[:1], depth), Atom(" \\Big/ ", 0.8), *_enclosed(parts[1:], depth)]
+    return [Atom(f"\\frac{{1}}{{{below.text}}} ", below.width + 0.5), *_factor(parts[:1], depth)]
+
+
+def _enclosed(elements: Sequence[Element], depth: int) -> list[Atom]:
+    """Elements in parentheses."""
+    tall = any(part.tag in _TALL for e in elements for part in e.iter())
+    opened, closed = (_parenthesis(sign, tall=tall, whole=False) for sign in "()")
+    return [opened, *_atoms(elements, depth + 1, whole=False), closed]
+
+
+def _factor(elements: Sequence[Element], depth: int) -> list[Atom]:
+    """Elements as a factor: a sum in parentheses."""
+    plain = _atoms(elements, depth, whole=False)
+    return _enclosed(elements, depth) if any(a.level == depth for a in plain) else plain

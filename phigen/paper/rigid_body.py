@@ -1,0 +1,179 @@
+"""The rigid body: errors over a long run, its trajectory, a Poincaré section, and where Runge–Kutta ends."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from phigen.compilation import Compilation
+from phigen.drawing.dots import draw_dots
+from phigen.drawing.error_curves import draw_errors
+from phigen.drawing.leaf import leaf_of
+from phigen.drawing.palette import PALETTE, SERIES, styled
+from phigen.drawing.phase_space import draw_in_space
+from phigen.paper.plate import Finding, Plate, compiled, relative, trajectory_of
+from phigen.paper.runge_kutta import ClassicalCourse, started
+from phigen.runtime.crossings import CrossingFinder
+from phigen.runtime.session import rows_along
+from phigen.runtime.solver import Solver
+from phigen.runtime.trajectory import Trajectory
+from phigen.study.arrays import Floats
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+SPEC, RUN = "rigid_body_paper", "paper"
+#: The steps of the long run and of the first part of it, about which there are findings as well; rows of each run.
+LONG, EARLY, ROWS = 10**8, 10**6, 20_000
+#: PHI-2 of the paper is the Cayley realisation at order 2.
+PHI, RK4, BETTER = "phigen, order 2, Cayley", "RK4", "phigen, order 4"
+#: The step of the section, at which the drift of RK4 can be seen, and the time that it covers.
+COARSE, SECTION_STEPS = 0.004, 75_000
+#: Further steps after which RK4 stands still, and the crossings that are drawn.
+_REST, _DOTS = 10**6, 500
+
+
+@dataclass(frozen=True)
+class Bodies:
+    """The solvers, and the numbers of the run of the spec."""
+
+    compilation: Compilation
+    solver: Solver
+    better: Solver
+    x0: Floats
+    h: float
+    parameters: dict[str, float]
+
+
+def bodies() -> Bodies:
+    """PHI-2 of the paper and phigen's choice at order 4."""
+    compilation, solver = compiled(SPEC, 2, "cayley")
+    run = compilation.spec.runs[RUN]
+    parameters = compilation.spec.parameters_of(run)
+    x0 = np.array([float(v) for v in run.initial])
+    return Bodies(compilation, solver, compiled(SPEC, 4)[1], x0, float(run.step), parameters)
+
+
+def _runge_kutta(body: Bodies, h: float, steps: int, stride: int) -> Trajectory:
+    states = rows_along(started("rk4", body.compilation, body.x0, body.parameters), h, steps, stride, None)
+    return trajectory_of(body.solver, h * stride * np.arange(len(states), dtype=np.float64), states, h, body.parameters)
+
+
+def errors_plate(steps: int = LONG) -> Plate:
+    """The errors of energy and Casimir over so many steps of the paper's size."""
+    body = bodies()
+    stride = max(1, steps // ROWS)
+    methods = {
+        PHI: body.solver.integrate(body.x0, body.h, steps, stride),
+        BETTER: body.better.integrate(body.x0, body.h, steps, stride),
+        RK4: _runge_kutta(body, body.h, steps, stride),
+    }
+    zoom = body.solver.integrate(body.x0, body.h, 2000, 2)
+    findings = _early_findings(body) + (_late_findings(methods) if steps > EARLY else ())
+    return Plate("Rigid body: errors of energy and Casimir", _draw_errors(methods, zoom), findings)
+
+
+def _early_findings(body: Bodies) -> tuple[Finding, ...]:
+    """What a million steps show."""
+    stride = EARLY // ROWS
+    own, double, better = (
+        solver.integrate(body.x0, factor * body.h, EARLY // factor, stride)
+        for solver, factor in ((body.solver, 1), (body.solver, 2), (body.better, 1))
+    )
+    other = _runge_kutta(body, body.h, EARLY, stride)
+    amplitude = float(np.max(relative(own.energy)))
+    drift = float(relative(other.energy)[-1])
+    return (
+        Finding("energy, PHI-2: largest error up to t = 100", "small oscillation", amplitude),
+        Finding("energy, PHI-2: factor when the step is doubled", "4",
+                float(np.max(relative(double.energy))) / amplitude),
+        Finding("energy, RK4: error at t = 100", "larger than of PHI-2", drift),
+        Finding("time after which RK4 has the larger energy error", "–", 100 * amplitude / drift),
+        Finding("energy, phigen at order 4: largest error up to t = 100", "–", float(np.max(relative(better.energy)))),
+        Finding("Casimir, PHI-2: largest error up to t = 100", "machine precision", _casimir_error(own)),
+        Finding("Casimir, RK4: error at t = 100", "grows linearly", _casimir_error(other)),
+    )  # fmt: skip
+
+
+def _late_findings(methods: dict[str, Trajectory]) -> tuple[Finding, ...]:
+    end = f"t = {methods[PHI].t[-1]:g}"
+    return (
+        Finding(f"energy, PHI-2: largest error up to {end}", "as before", float(np.max(relative(methods[PHI].energy)))),
+        Finding(f"energy, RK4: error at {end}", "grows linearly", float(relative(methods[RK4].energy)[-1])),
+        Finding(f"Casimir, PHI-2: largest error up to {end}", "machine precision", _casimir_error(methods[PHI])),
+        Finding(f"Casimir, RK4: error at {end}", "grows linearly", _casimir_error(methods[RK4])),
+    )
+
+
+def _casimir_error(trajectory: Trajectory) -> float:
+    return float(np.max(relative(trajectory.casimirs["C"])))
+
+
+@styled
+def _draw_errors(methods: dict[str, Trajectory], zoom: Trajectory) -> Figure:
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(7.2, 4.8), layout="constrained")
+    above, below = np.ravel(figure.subfigures(2, 1, height_ratios=[2.7, 2], squeeze=False))
+    draw_errors(above, methods)
+    axes = below.add_subplot()
+    axes.plot(zoom.t, 1e7 * (zoom.energy / zoom.energy[0] - 1), color=SERIES[0], linewidth=1.2)
+    axes.set(xlabel="t", title=f"the beginning: relative error of the energy · 10⁷, {PHI}")
+    axes.grid(True)
+    return figure
+
+
+def section_plate() -> Plate:
+    """A trajectory, its section, and the sections of both methods."""
+    body = bodies()
+
+    def height(states: Floats) -> Floats:
+        return states[:, 1]
+
+    own = body.solver.section(body.x0, COARSE, SECTION_STEPS, height).x
+    course = started("rk4", body.compilation, body.x0, body.parameters)
+    finder = CrossingFinder[ClassicalCourse](height, COARSE)
+    blocks = finder.follow(course, SECTION_STEPS, lambda: course.advance(COARSE, 1))
+    other = np.array([x for _, crossings in blocks for _, x in crossings])
+    course.advance(COARSE, _REST)
+    rest, orbit = course.state(), body.solver.integrate(body.x0, body.h, 700)
+    findings = (
+        Finding("PHI-2, step 0.004: diameter of its crossings", "one point", _diameter(own)),
+        Finding("RK4, step 0.004: distance of its last crossing from the first", "moves away",
+                float(np.linalg.norm(other[-1] - other[0]))),
+        Finding("RK4, step 0.004: |x| in the end", "0", float(np.linalg.norm(rest))),
+        Finding("RK4, step 0.004: |π∇H| in the end", "0", float(np.linalg.norm(body.solver.vector_field(rest)))),
+    )  # fmt: skip
+    return Plate("Rigid body: trajectory and Poincaré section", _draw_section(body, orbit, own, other, rest), findings)
+
+
+def _diameter(points: Floats) -> float:
+    return float(np.linalg.norm(np.ptp(points, axis=0)))
+
+
+@styled
+def _draw_section(body: Bodies, orbit: Trajectory, own: Floats, other: Floats, rest: Floats) -> Figure:
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(8.6, 3.8), layout="constrained")
+    left, right = np.ravel(figure.subfigures(1, 2, width_ratios=[1, 1.1], squeeze=False))
+    space: Any = left.add_subplot(projection="3d")
+    names = orbit.coordinates
+    leaf = leaf_of(body.compilation.system.casimirs, names, dict(zip(names, body.x0, strict=True)), body.parameters)
+    draw_in_space(space, names, orbit.x, leaf, 0.95)
+    side = np.array([[-1.8, 1.8], [-1.8, 1.8]])
+    space.plot_surface(side, np.zeros((2, 2)), side.T, color=SERIES[2], alpha=0.25, shade=False)
+    space.set_title("trajectory on its leaf, and the plane x2 = 0")
+    axes = right.add_subplot()
+    draw_dots(axes, other[:: len(other) // _DOTS, [0, 2]], SERIES[1], 2.0, 2.0, "RK4")
+    draw_dots(axes, own[:1, [0, 2]], SERIES[0], 7.0, 3.0, f"{PHI}: all {len(own)} crossings")
+    exact = body.better.section(body.x0, body.h, 700, lambda x: x[:, 1]).x[0]
+    axes.plot(exact[0], exact[2], "o", color=PALETTE["ink"], markersize=7, fillstyle="none", label="exact", zorder=4)
+    axes.plot(rest[0], rest[2], "+", color=PALETTE["ink"], markersize=10, zorder=4)
+    axes.annotate("where RK4 comes to rest", (rest[0], rest[2]), (-4, -16), textcoords="offset points")
+    axes.set(xlabel="x1", ylabel="x3", title="x2 = 0, rising; steps of 0.004", ylim=(0.994, 1.018))
+    axes.grid(True)
+    axes.legend(loc="upper left")
+    return figure

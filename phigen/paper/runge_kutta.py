@@ -1,0 +1,46 @@
+"""Classical methods in compiled C, which go on step by step: long runs, and sections of them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from phigen.compilation import Compilation
+from phigen.runtime.interface import BackendError
+from phigen.study import race
+from phigen.study.arrays import Floats
+
+
+@dataclass
+class ClassicalCourse:
+    """See `phigen.runtime.session.Course`. The runner makes its steps from what stands in ``place``."""
+
+    runner: race.Runner
+    place: Floats
+    x: Floats
+    steps: int = 0
+
+    def state(self) -> Floats:
+        """See `Course`."""
+        return self.x.copy()
+
+    def advance(self, h: float, steps: int) -> None:
+        """See `Course`."""
+        self.place[:] = self.x
+        found = self.runner(h, steps, 1)
+        if found is None:
+            raise BackendError("NOT_FINITE", self.steps, self.x[None])
+        self.x = found
+        self.steps += steps
+
+    def branch(self) -> ClassicalCourse:
+        """See `Course`."""
+        return ClassicalCourse(self.runner, self.place, self.x, self.steps)
+
+
+def started(method: str, compilation: Compilation, x0: Floats, parameters: Mapping[str, float]) -> ClassicalCourse:
+    """The course of a method from x0 (DIM,). Raises `ToolchainError`."""
+    place = np.array(x0, dtype=np.float64)
+    return ClassicalCourse(race.compiled(compilation, [method], place, parameters).runners[method], place, place.copy())

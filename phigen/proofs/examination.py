@@ -1,0 +1,89 @@
+"""Everything phigen proves about one spec, in groups; what is refuted, and where the spec says it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+from phigen.compilation import Compilation
+from phigen.errors import Diagnostic, SpecError
+from phigen.proofs.statements import CASIMIRS, DEFINEDNESS, INVARIANTS, METHOD, SPLITTING, Groups
+from phigen.spec.model import Spec
+from phigen.symbolic.verdict import REFUTED, Statement
+
+#: What rests on π: if that is no Poisson tensor, all of it may fail, and says nothing more.
+UNEXAMINED = "Casimirs, invariants, the method"
+
+#: Where a spec says what a group of statements is about.
+_PLACES = {METHOD: ("birealisation",), SPLITTING: ("scheme",)}
+
+
+@dataclass(frozen=True)
+class Examination:
+    """What was proved about a spec.
+
+    ``compilation`` is None if there is none: ``obstacle`` then says why. An obstacle is no refutation: no
+    bi-realisation of the catalogue may apply to a perfectly good Poisson tensor. ``unexamined`` names what rests on
+    something refuted, and would only repeat that; it is empty if everything was examined.
+    """
+
+    spec: Spec
+    groups: Groups
+    compilation: Compilation | None = None
+    obstacle: SpecError | None = None
+    unexamined: str = ""
+
+    @property
+    def statements(self) -> list[Statement]:
+        """All statements, in order."""
+        return [s for group in self.groups.values() for s in group]
+
+    @property
+    def refuted(self) -> list[Statement]:
+        """The statements that are false."""
+        return refuted(self.groups)
+
+    @property
+    def mistakes(self) -> list[tuple[str, Statement]]:
+        """The statements that are false with their groups, without those that may follow from one before.
+
+        Casimirs and invariants stand for themselves. The axioms of a bi-realisation, and the flows of a splitting, are
+        about the same few formulas: the first that fails says what is wrong.
+        """
+        found = []
+        for group, listed in self.groups.items():
+            refuted = [(group, s) for s in listed if s.verdict == REFUTED]
+            found += refuted if group in (DEFINEDNESS, CASIMIRS, INVARIANTS) else refuted[:1]
+        return found
+
+
+def refuted(groups: Groups) -> list[Statement]:
+    """The statements that are false."""
+    return [s for group in groups.values() for s in group if s.verdict == REFUTED]
+
+
+def refutation(found: Examination) -> str:
+    """What is refuted, for a message, each with its place in the spec."""
+    spec = found.spec
+    places: dict[str, tuple[str, ...]] = {f"{name} is a Casimir": ("casimirs", name) for name in spec.casimirs}
+    places |= {f"{name} is invariant": ("invariants", name) for name in spec.invariants}
+    hint = f"not examined, since they rest on it: {found.unexamined}" if found.unexamined else ""
+    places |= {"H is defined": ("hamiltonian",)}
+    places |= {f"{name} is defined": ("casimirs", name) for name in spec.casimirs}
+    places |= {f"{name} is defined": ("invariants", name) for name in spec.invariants}
+    lines = []
+    for group, s in found.mistakes:
+        place = places.get(s.name, _PLACES.get(group.partition(" (")[0], ("poisson",)))
+        lines.append(str(spec.diagnostic(place, str(s), hint)))
+    return "\n".join(lines)
+
+
+def located(error: SpecError, spec: Spec) -> SpecError:
+    """The error with the line of the spec that each diagnostic is about."""
+    lines = spec.source.split("\n")
+
+    def shown(d: Diagnostic) -> Diagnostic:
+        if d.source_line or not d.location or d.location.line > len(lines):
+            return d
+        return replace(d, source_line=lines[d.location.line - 1])
+
+    return type(error)([shown(d) for d in error.diagnostics])

@@ -1,0 +1,301 @@
+"""The second derivation (`phigen.series.reference`) beside what the compiler uses, term by term."""
+
+from __future__ import annotations
+
+import signal
+import threading
+import time
+from collections.abc import Collection, Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from types import FrameType
+from typing import Any
+
+import mpmath
+import sympy
+
+from phigen import progress
+from phigen.compilation import Compilation
+from phigen.errors import Diagnostic, LimitError
+from phigen.formulas.sympy_formulas import Dictionary
+from phigen.geometry.shapes import LogCanonical
+from phigen.geometry.sympy_bridge import expanded_function
+from phigen.realisations import exponential, spray
+from phigen.scheme.discretisation import hamilton_jacobi
+from phigen.series.reference import Source, closed_form, generating_function
+from phigen.series.reference_axioms import defects
+from phigen.series.reference_functions import Functions, Sign, derivative
+from phigen.series.reference_paths import source_of_paths
+from phigen.symbolic.expression import Expression, substitute
+from phigen.symbolic.verdict import CHECKED, POINTS, PROVED, REFUTED, UNDECIDED, Statement, sample_point
+
+#: The time that the second derivation of one spec may take, unless the user says otherwise.
+SECONDS = 60.0
+
+#: Digits of values at points, and how many of them must agree.
+DIGITS, AGREEING = 120, 60
+_ATTEMPTS = 64
+_LONGEST = 160
+
+#: What is compared after the S_i.
+GRADIENT, MAPS = "∇S_h", "α and β"
+
+#: A pair that should be equal, with what it is.
+Pair = tuple[str, Any, Any]
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Whether both derivations agree on S_``term``, or where it is None on ∇S_h or on α and β.
+
+    ``sympy`` and ``compiler`` are the seconds that they took for S_1 … S_term; of what is there already, there is only
+    the former.
+    """
+
+    statement: Statement
+    term: int | None
+    sympy: float
+    compiler: float | None = None
+
+    @property
+    def timed(self) -> Statement:
+        """The statement with the seconds."""
+        taken = f"in {self.sympy:.2f} s"
+        if self.compiler is not None:
+            what = "" if self.term == 1 else f"S_1 … S_{self.term} "
+            taken = f"{what}in {self.sympy:.2f} s, by phigen in {self.compiler:.3f} s"
+        return replace(self.statement, detail="; ".join(filter(None, [self.statement.detail, taken])))
+
+
+class OutOfTimeError(BaseException):
+    """The time is up. No `Exception`, so that nothing on the way takes it for a failure of its own."""
+
+
+def compare(compilation: Compilation, terms: int | None = None, seconds: float = SECONDS) -> Iterator[Comparison]:
+    """S_1 … S_terms, by default those of the method, then ∇S_h, α and β: each when it is derived.
+
+    The compilation is not that of a splitting. ∇S_h, as the program has it, is compared if it needs no further S_i.
+    Where steps follow paths, α and β are in the S_i alone. Raises `LimitError` when all has taken so many ``seconds``,
+    or when a polynomial has too many terms.
+    """
+    terms = terms or compilation.stage.terms
+    derivation: _Derivation | None = None
+    for step in _steps(compilation, terms):
+        try:
+            with progress.stage(f"{step} by sympy") as stage, time_limit(seconds):
+                derivation = derivation or _Derivation(compilation, terms)
+                found = derivation.compared(step)
+        except (OutOfTimeError, OverflowError) as error:
+            raise _limit(compilation, step, derivation.reached if derivation else 0, str(error)) from None
+        seconds -= stage.seconds
+        yield found
+
+
+def _steps(compilation: Compilation, terms: int) -> list[str]:
+    """What is compared, by name."""
+    steps = [f"S_{i}" for i in range(1, terms + 1)]
+    if compilation.scheme and compilation.scheme.terms <= terms:
+        steps.append(GRADIENT)
+    return steps if compilation.chart.path else [*steps, MAPS]
+
+
+def _limit(compilation: Compilation, step: str, reached: int, reason: str) -> LimitError:
+    reason = reason or "the time was up"
+    before = ["nothing was compared", "S_1 was compared", f"S_1 … S_{reached} were compared"][min(reached, 2)]
+    message = f"{compilation.spec.file}: {step} was not derived a second time: {reason}; {before}"
+    hint = "--seconds gives it more time, --terms asks for fewer S_i"
+    return LimitError([Diagnostic(message, hint=hint)])
+
+
+@contextmanager
+def time_limit(seconds: float) -> Iterator[None]:
+    """Raises `OutOfTimeError` in what lasts longer; without effect outside the main thread, which has no signals.
+
+    Python drops an exception in a destructor or the callback of a weak reference, so it is raised again every second.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    lasting = True
+
+    def over(number: int, frame: FrameType | None) -> None:
+        if lasting:
+            raise OutOfTimeError
+
+    before = signal.signal(signal.SIGALRM, over)
+    signal.setitimer(signal.ITIMER_REAL, max(seconds, 1e-6), 1.0)
+    try:
+        yield
+    finally:
+        lasting = False
+        signal.setitimer(signal.ITIMER_REAL, 0)
+        signal.signal(signal.SIGALRM, before)
+
+
+class _Derivation:
+    """Both derivations of one compilation, as far as they have come."""
+
+    def __init__(self, compilation: Compilation, terms: int) -> None:
+        self._compilation, self._terms = compilation, terms
+        self._dictionary = Dictionary(compilation)
+        self._positive = compilation.system.positive
+        system, chart = compilation.discretised, compilation.chart
+        self._poisson = sympy.Matrix([[self._dictionary.expression(e) for e in row] for row in system.poisson])
+        self._alpha, self._beta = self._given(chart.alpha), self._given(chart.beta)
+        source = self._path(0) if chart.path or chart.kind == exponential.KIND else self._alpha
+        hamiltonian = self._dictionary.expression(system.hamiltonian)
+        self._mine = generating_function(hamiltonian, source, self._dictionary.coordinates)
+        self._found: list[Any] = []
+        self._taken = 0.0
+
+    def _path(self, time: int) -> Source:
+        return source_of_paths(self._poisson, self._dictionary.coordinates, self._dictionary.covector, time)
+
+    def _given(self, maps: Sequence[Expression]) -> Source:
+        return closed_form(self._maps(maps), self._dictionary.covector)
+
+    def _maps(self, maps: Sequence[Expression]) -> list[Any]:
+        """α or β as the compiler has it, φ expanded at 0."""
+
+        def expanded(order: int, s: Any) -> Any:
+            least = min(sum(mu) for mu in closed_form([s], self._dictionary.covector)(self._degree)[0])
+            return expanded_function(order, s, self._degree // least)
+
+        return [self._dictionary.expression(e, expanded) for e in maps]
+
+    @property
+    def _degree(self) -> int:
+        """Up to which degree in p the maps are compared: as S_1 … S_terms need them, and at least up to 2."""
+        wanted, chart = max(self._terms - 1, 2), self._compilation.chart
+        return wanted if chart.exact or chart.degree is None else min(wanted, chart.degree)
+
+    @property
+    def reached(self) -> int:
+        """How many S_i were derived."""
+        return len(self._found)
+
+    def compared(self, step: str) -> Comparison:
+        """The next S_i, or what rests on them."""
+        if step == GRADIENT:
+            return self._gradient()
+        if step == MAPS:
+            return self._ends() if self._are_ends() else self._axioms()
+        return self._term(self.reached + 1)
+
+    def _term(self, i: int) -> Comparison:
+        compilation = self._compilation
+        start = time.perf_counter()
+        mine = next(self._mine)
+        middle = time.perf_counter()
+        hamilton_jacobi(compilation.discretised, compilation.chart, i, compilation.gauge.symbols).polynomial(i)
+        end = time.perf_counter()
+        self._taken += middle - start
+        used = compilation.series.polynomial(i)
+        theirs, size = used.tower.expression(used.terms[i - 1]), len(used.terms[i - 1])
+        pair = ("", self._dictionary.expression(theirs), mine)
+        statement = decide(f"S_{i}", [pair], self._positive, f"{size} term{'s' * (size != 1)}")
+        self._found.append(mine)
+        return Comparison(statement, i, self._taken, end - middle)
+
+    def _gradient(self) -> Comparison:
+        """∇S_h of one stage, coefficients written out."""
+        scheme, h = self._compilation.scheme, self._dictionary.step
+        assert scheme is not None
+        start = time.perf_counter()
+        table = scheme.generating.coefficients
+        slope = substitute(scheme.generating.slope, dict(zip(table.slots, table.values, strict=True)))
+        pairs: list[Pair] = []
+        for c, theirs in zip(self._dictionary.coordinates, slope, strict=True):
+            terms = (h**i * derivative(s, c) for i, s in enumerate(self._found[: scheme.terms], 1))
+            pairs.append((f"along {c}", self._dictionary.expression(theirs), sum(terms)))
+        statement = decide(GRADIENT, pairs, self._positive, f"as the program has it: {scheme.generating.form}")
+        return Comparison(statement, None, time.perf_counter() - start)
+
+    def _are_ends(self) -> bool:
+        chart, choice = self._compilation.chart, self._compilation.spec.birealisation
+        natural = choice.spray == "auto" and isinstance(self._compilation.system.shape, LogCanonical)
+        flat = chart.kind == spray.KIND and not chart.exact and choice.spray in ("flat", "auto") and not natural
+        return chart.kind == exponential.KIND or flat
+
+    def _at_origin(self) -> list[Pair]:
+        """α(x, 0) and β(x, 0) beside x, which the coefficients of higher degree leave out."""
+        chart, origin = self._compilation.chart, dict.fromkeys(self._dictionary.covector, 0)
+        return [
+            (f"{name}_{x} at p = 0", e.subs(origin), x)
+            for name, maps in (("α", self._maps(chart.alpha)), ("β", self._maps(chart.beta)))
+            for x, e in zip(self._dictionary.coordinates, maps, strict=True)
+        ]
+
+    def _ends(self) -> Comparison:
+        coordinates, d = self._compilation.system.coordinates, self._degree
+        start = time.perf_counter()
+        pairs = self._at_origin()
+        for name, given, end in (("α", self._alpha, 0), ("β", self._beta, 1)):
+            for c, theirs, mine in zip(coordinates, given(d), self._path(end)(d), strict=True):
+                every = dict.fromkeys([*theirs, *mine])
+                pairs += [(f"{name}_{c}", theirs.get(mu, sympy.S.Zero), mine.get(mu, sympy.S.Zero)) for mu in every]
+        name = f"α and β up to degree {d} in p"
+        statement = decide(name, pairs, self._positive, "from the path ṁ = π(m)p about its mean")
+        return Comparison(statement, None, time.perf_counter() - start)
+
+    def _axioms(self) -> Comparison:
+        d, x, p = self._degree, self._dictionary.coordinates, self._dictionary.covector
+        start = time.perf_counter()
+        found = defects(self._poisson, self._alpha(d), self._beta(d), x, p, d)
+        rest = [*self._at_origin(), *((label, r, sympy.S.Zero) for label, r in found)]
+        statement = decide(f"axioms of α and β up to degree {d - 1} in p", rest, self._positive, "")
+        return Comparison(statement, None, time.perf_counter() - start)
+
+
+def decide(name: str, pairs: Iterable[Pair], positive: Collection[str], detail: str) -> Statement:
+    """Whether both of each pair are equal, as functions of their symbols.
+
+    They are if the difference is 0 as a polynomial in functions, by the relations of `Functions`: that is a proof. Else
+    values at points, in `DIGITS` digits, refute it or agree.
+    """
+    fewest, open_pairs = POINTS, 0
+    for label, theirs, mine in pairs:
+        functions = Functions([theirs, mine])
+        rest = functions.element(theirs) - functions.element(mine)
+        if rest == 0 or functions.vanishes(rest):
+            continue
+        open_pairs += 1
+        found = _tried([theirs, mine], positive)
+        if isinstance(found, str):
+            where = f"{label}, " if label else ""
+            return Statement(name, REFUTED, f"{where}at {found}", _cut(sympy.sstr(functions.expression(rest))))
+        fewest = min(fewest, found)
+    if not open_pairs:
+        return Statement(name, PROVED, detail)
+    if not fewest:
+        return Statement(name, UNDECIDED, f"no proof, and no point of the domain among {_ATTEMPTS} tried")
+    return Statement(name, CHECKED, f"{fewest} points, {AGREEING} digits")
+
+
+def _tried(pair: Sequence[Any], positive: Collection[str]) -> str | int:
+    """A point where both differ, with their values; else the number of points where they agree."""
+    symbols = sorted(set().union(*(e.free_symbols for e in pair)), key=str)
+    values = sympy.lambdify(symbols, list(pair), modules=[{Sign.__name__: mpmath.sign}, "mpmath"], cse=True)
+    agreeing = 0
+    for k in range(_ATTEMPTS):
+        point = sample_point([str(s) for s in symbols], positive, k)
+        with mpmath.workdps(DIGITS):
+            at = [mpmath.mpf(v.numerator) / v.denominator for v in point.values()]
+            try:
+                theirs, mine = (mpmath.mpf(v) for v in values(*at))
+            except (ArithmeticError, TypeError, ValueError):  # a pole, a complex value, not in the domain
+                continue
+            if not (mpmath.isfinite(theirs) and mpmath.isfinite(mine)):
+                continue
+            if abs(theirs - mine) > mpmath.mpf(10) ** -AGREEING * (1 + abs(mine)):
+                where = ", ".join(f"{n} = {v}" for n, v in point.items())
+                shown = where if len(where) <= _LONGEST else f"point {k}"
+                return f"{shown}: {mpmath.nstr(theirs, 12)}, not {mpmath.nstr(mine, 12)}"
+        agreeing += 1
+        if agreeing == POINTS or not symbols:
+            break
+    return agreeing
+
+
+def _cut(text: str) -> str:
+    return text if len(text) <= _LONGEST else text[: _LONGEST - 1] + "…"

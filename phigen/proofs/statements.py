@@ -1,0 +1,85 @@
+"""What is stated of a system and of the method that was compiled for it, in groups: proved, refuted, or checked."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+
+from phigen.compilation import Compilation
+from phigen.geometry import checks
+from phigen.geometry.definedness import undefined_parts
+from phigen.geometry.jacobi import jacobi_identity
+from phigen.geometry.system import System
+from phigen.realisations import axioms
+from phigen.series.hamilton_jacobi import residual
+from phigen.spec.model import Spec
+from phigen.splitting.statements import check as check_splitting
+from phigen.symbolic.verdict import REFUTED, UNDECIDED, Statement, decide_elements
+
+#: Statements by the part of the mathematics they belong to, in the order of the pipeline.
+Groups = Mapping[str, tuple[Statement, ...]]
+
+PREFIX = "bi-realisation: "
+DEFINEDNESS, CASIMIRS, INVARIANTS = "Definedness", "Casimirs", "Invariants"
+METHOD, SPLITTING = "Bi-realisation", "Splitting"
+
+
+def definedness(system: System, spec: Spec) -> dict[str, tuple[Statement, ...]]:
+    """What has no value anywhere; nothing is said of what has."""
+    starts = []
+    for run in spec.runs.values():
+        initial = dict(zip(spec.coordinates, map(float, run.initial), strict=True))
+        starts.append(spec.parameters_of(run) | initial)
+    found = tuple(undefined_parts(system, starts))
+    return {DEFINEDNESS: found} if found else {}
+
+
+def tensor(system: System) -> dict[str, tuple[Statement, ...]]:
+    """π is skew, and satisfies the Jacobi identity, which nothing is said of if it is not skew."""
+    skew = checks.skew_symmetry(system)
+    return {"Poisson tensor": (skew,) if skew.verdict == REFUTED else (skew, jacobi_identity(system))}
+
+
+def integrals(system: System) -> dict[str, tuple[Statement, ...]]:
+    """The Casimirs, the rank of π, and the invariants that the spec claims."""
+    casimirs = (*checks.casimir_statements(system), checks.rank_statement(system))
+    invariants = tuple(checks.invariant_statements(system))
+    return {CASIMIRS: casimirs} | ({INVARIANTS: invariants} if invariants else {})
+
+
+def method(compilation: Compilation) -> dict[str, tuple[Statement, ...]]:
+    """The flows of a splitting; or the axioms of the bi-realisation and the Hamilton–Jacobi equation."""
+    if compilation.splitting:
+        return {SPLITTING: tuple(check_splitting(compilation.discretised, compilation.splitting))}
+    found = axioms.check(compilation.system, compilation.chart)
+    stripped = [replace(s, name=s.name.removeprefix(PREFIX)) for s in found]
+    label = f"{METHOD} ({compilation.chart.kind})"
+    return {label: tuple(stripped), "Hamilton–Jacobi series": tuple(series_statements(compilation))}
+
+
+def series_statements(compilation: Compilation) -> Iterator[Statement]:
+    """S_1 … S_k solve the Hamilton–Jacobi equation; the S_i of even index vanish where the order rests on it."""
+    system, realisation, plan = compilation.discretised, compilation.chart, compilation.stage
+    terms = plan.terms + (1 if realisation.symmetric else 0)  # S_{k+1} = 0 is what makes the order k + 1
+    name = f"∂_t S_t = H(α(x, ∇S_t)) for S_t = {sum_of_terms(plan.terms)}"
+    try:
+        series = compilation.series.polynomial(terms)
+        rest = residual(series, system.hamiltonian, compilation.series.alpha, system.coordinates)
+    except OverflowError:
+        yield Statement(name, UNDECIDED, "too many terms to expand; the recursion itself is used, unexpanded")
+        return
+    listed = [(f"coefficient of t^{i}", r) for i, r in enumerate(rest)]
+    yield decide_elements(name, series.tower, listed[: plan.terms], system.positive, f"up to t^{plan.terms - 1}")
+    if realisation.symmetric:
+        even = ", ".join(f"S_{i}" for i in range(2, terms + 1, 2))
+        found = [entry for i, entry in enumerate(listed) if i % 2]
+        whose = "" if plan is compilation.order else " of each stage"
+        yield decide_elements(
+            f"{even} = 0", series.tower, found, system.positive, f"hence the order {plan.order}{whose}"
+        )
+
+
+def sum_of_terms(terms: int) -> str:
+    """``t S_1 + … + t^5 S_5``."""
+    shown = ["t S_1", *(f"t^{i} S_{i}" for i in range(2, terms + 1))]
+    return " + ".join(shown if terms < 4 else [shown[0], "…", shown[-1]])

@@ -1,0 +1,172 @@
+"""Backward error analysis, measured: the modified Hamiltonian along trajectories of a solver.
+
+A step is the exact flow of H̃ = H + h^p H_p + … . With m corrections, H̃ is constant along the numerical solution up to
+O(h^q), where q is the power of the first term left out: one order higher for each correction, two if it is symmetric.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from fractions import Fraction
+
+import numpy as np
+
+from phigen.compilation import Compilation
+from phigen.errors import LimitError, StepError
+from phigen.scheme.modified import corrections, powers
+from phigen.study.arrays import Floats, evaluate
+from phigen.study.conservation import Unit, units
+from phigen.study.methods import Method
+from phigen.symbolic.expression import Expression
+
+#: Corrections of the modified Hamiltonian, and the largest order of a method for which they are computed.
+CORRECTIONS, MOST_ORDER = 2, 6
+#: Steps at the largest step size; doublings of the run's step and halvings of the largest one that are tried.
+STEPS, DOUBLINGS, HALVINGS = 16, 8, 6
+#: Changes of H̃ below this part of the terms of H are of rounding; and those of H above that, of steps too large to
+#: tell an order.
+ROUNDING, ASYMPTOTIC = 1e-13, 1e-3
+
+
+class NotOfferedError(ValueError):
+    """There is no modified Hamiltonian of this method; the message says why."""
+
+
+@dataclass(frozen=True)
+class Modified:
+    """The terms of H̃ = Σ h^j terms[j], with values of all symbols but coordinates.
+
+    With m corrections these are the first powers[m] terms. ``hamiltonian`` is H, whose unit errors are in.
+    """
+
+    terms: tuple[Expression, ...]
+    powers: tuple[int, ...]
+    hamiltonian: Expression
+    coordinates: tuple[str, ...]
+    values: Mapping[str, float]
+
+    def errors(self, rows: Floats, h: float) -> Floats:
+        """|H̃(x_n) − H̃(x_0)| with 0, 1, … corrections along steps of size h, (corrections + 1, rows)."""
+        values = {**self.values, **{c: rows[:, i] for i, c in enumerate(self.coordinates)}}
+        terms = [np.broadcast_to(t, len(rows)) for t in evaluate(list(self.terms), values)]
+        sums: Floats = np.array([sum(h**j * t for j, t in enumerate(terms[:power])) for power in self.powers])
+        found: Floats = np.abs(sums - sums[:, :1]) / self.unit(rows[0]).size
+        return found
+
+    def unit(self, x: Floats) -> Unit:
+        """The unit of the energy along trajectories from a state (DIM,)."""
+        (found,) = units([self.hamiltonian], self.coordinates, self.values, x)
+        return found
+
+    def changes(self, method: Method, x: Floats, h: float, steps: int) -> Floats:
+        """The largest of these errors in so many steps from x, (corrections + 1,). Raises `StepError`."""
+        found: Floats = self.errors(method.rows(x, h, steps, 1), h).max(axis=1)
+        if not np.isfinite(found).all():
+            raise StepError("H̃ left the finite numbers", step=0, status="NOT_FINITE")
+        return found
+
+
+def modified(compilation: Compilation, parameters: Mapping[str, float], gauge: Floats | None) -> Modified:
+    """The modified Hamiltonian of a method with `CORRECTIONS` corrections. Raises `NotOfferedError`."""
+    system, order = compilation.system, compilation.order
+    if compilation.splitting or len(compilation.program.fractions) > 1:
+        raise NotOfferedError("a step is composed of several maps")
+    if not compilation.exact:
+        raise NotOfferedError("the bi-realisation is an approximate one")
+    if order.order > MOST_ORDER:
+        raise NotOfferedError(f"it is computed for orders up to {MOST_ORDER}")
+    # With numbers for the parameters there are fewer terms; but the series may have no place for their roots.
+    exact = {name: Fraction(repr(value)) for name, value in parameters.items()}
+    for known in (exact, {}):
+        try:
+            found = corrections(system, compilation.chart, order, CORRECTIONS, compilation.gauge, known)
+            break
+        except (LimitError, ArithmeticError):
+            continue
+    else:
+        raise NotOfferedError("its formula is too large")
+    values = dict(parameters)
+    if gauge is not None and compilation.gauge is not None:
+        values |= dict(zip(compilation.gauge.symbols, np.ravel(gauge).tolist(), strict=True))
+    return Modified(
+        tuple(map(found.tower.expression, found.terms)),
+        tuple(powers(order, CORRECTIONS + 1, symmetric=compilation.symmetric)),
+        system.hamiltonian,
+        system.coordinates,
+        values,
+    )
+
+
+def observed_powers(found: Modified, method: Method, x: Floats, h: float) -> list[float]:
+    """The powers of the step that the changes of H̃ with 0, 1, … corrections shrink like; infinity at rounding.
+
+    Steps are doubled from the run's step ``h`` until the changes stand out from rounding.
+    """
+    observed, rounding = [math.inf] * len(found.powers), ROUNDING * found.unit(x).terms
+    for doubling in range(1, DOUBLINGS + 1):
+        step = h * 2**doubling
+        try:
+            coarse = found.changes(method, x, step, STEPS)
+            fine = found.changes(method, x, step / 2, 2 * STEPS)
+        except StepError:
+            break
+        if doubling > 1 and coarse[0] > ASYMPTOTIC:
+            break
+        if fine[0] <= rounding:
+            continue  # what a solver conserves exactly tells nothing
+        for m, (large, small) in enumerate(zip(coarse.tolist(), fine.tolist(), strict=True)):
+            if math.isinf(observed[m]) and small > rounding:
+                observed[m] = math.log2(large / small)
+    return observed
+
+
+@dataclass(frozen=True, eq=False)
+class Constancy:
+    """How constant H̃ is with 0, 1, … corrections: ``powers[m]`` is the power of the step that it should show.
+
+    ``errors`` (corrections + 1, rows) are those at ``times`` (rows,), up to ``end``, of steps of size ``step``;
+    ``changes`` (sizes, corrections + 1) are the largest ones at the step sizes ``sizes``, the largest first.
+    """
+
+    powers: tuple[int, ...]
+    observed: tuple[float, ...]
+    step: float
+    times: Floats
+    errors: Floats
+    end: float
+    sizes: Floats
+    changes: Floats
+
+
+def constancy(found: Modified, method: Method, x: Floats, h: float) -> Constancy:
+    """Measure it at the largest steps that tell an order, which may be larger than the run's.
+
+    Raises `StepError`, and `NotOfferedError` if H itself changes by rounding only.
+    """
+    largest, most, rounding = h, 0.0, ROUNDING * found.unit(x).terms
+    for doubling in range(1, DOUBLINGS + 1):
+        try:
+            change = float(found.changes(method, x, h * 2**doubling, STEPS)[0])
+        except StepError:
+            break
+        if change > ASYMPTOTIC:
+            break
+        largest, most = h * 2**doubling, max(most, change)
+    if most <= rounding:
+        raise NotOfferedError("H itself changes by no more than rounding")
+    sizes: Floats = largest / 2.0 ** np.arange(HALVINGS + 1, dtype=np.float64)
+    changes = np.array([found.changes(method, x, size, STEPS * 2**k) for k, size in enumerate(sizes.tolist())])
+    # The finest step at which even the last correction leaves more than rounding.
+    telling = np.flatnonzero(changes[:, -1] > rounding)
+    shown = float(sizes[telling[-1] if len(telling) else 0])
+    rows = method.rows(x, shown, round(STEPS * largest / shown), 1)
+    times: Floats = shown * np.arange(len(rows), dtype=np.float64)
+    observed = tuple(observed_powers(found, method, x, h))
+    return Constancy(found.powers, observed, shown, times, found.errors(rows, shown), STEPS * largest, sizes, changes)
+
+
+def truncation(m: int) -> str:
+    """H̃ with m corrections, in words."""
+    return "H itself" if m == 0 else f"H̃ with {m} correction{'s' * (m > 1)}"

@@ -1,0 +1,108 @@
+"""What verification measures of a one-step method: numbers only, judged elsewhere."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from phigen.errors import StepError
+from phigen.geometry.system import System
+from phigen.study.arrays import Floats, evaluate
+from phigen.study.methods import Method, by_differences
+
+#: Below this error, relative to the size of a quantity, differences say nothing about the method.
+ROUNDING = 4e-16
+
+#: Refinements of the step, as factors: pairs two apart halve the step.
+_REFINEMENTS = tuple(f * 2**k for k in range(9) for f in (4, 6))
+
+
+@dataclass(frozen=True)
+class Observed:
+    """The observed order: the slope between the two finest steps in the asymptotic range; NaN if there are none.
+
+    ``pairs`` lists step sizes and errors relative to the solution, ``floor`` is the error of the reference.
+    ``exact`` tells that all errors are at the floor.
+    """
+
+    order: float
+    pairs: tuple[tuple[float, float], ...]
+    floor: float
+    exact: bool = False
+
+
+def observed_order(method: Method, reference: Callable[[float], tuple[Floats, float]], x: Floats, t: float) -> Observed:
+    """Errors at time t for steps t/4, t/6, t/8, t/12, …, against ``reference(t)``: a state and its relative error."""
+    solution, uncertainty = reference(t)
+    size = float(np.max(np.abs(solution)))
+    floor = max(uncertainty, 4 * ROUNDING)
+    errors: dict[int, float] = {}
+    for n in _REFINEMENTS:
+        try:
+            state = method.rows(x, t / n, n, n)[-1]
+        except StepError:
+            continue
+        errors[n] = float(np.max(np.abs(state - solution))) / size
+        if errors[n] < 10 * floor and len(errors) > 4:
+            break
+    # An order is a statement about small steps; at large ones the error may be of any size.
+    usable = {n: e for n, e in errors.items() if 30 * floor < e < 0.02}
+    slopes = [math.log2(e / usable[2 * n]) for n, e in usable.items() if 2 * n in usable]
+    pairs = tuple((t / n, e) for n, e in errors.items())
+    exact = bool(errors) and max(errors.values()) <= 30 * floor
+    return Observed(float(np.median(slopes[-3:])) if slopes else math.nan, pairs, floor, exact)
+
+
+def poisson_matrix(system: System, parameters: Mapping[str, float], x: Floats) -> Floats:
+    """π(x), (DIM, DIM)."""
+    at = {**parameters, **dict(zip(system.coordinates, x, strict=True))}
+    return np.array([float(e) for e in evaluate([e for row in system.poisson for e in row], at)]).reshape((len(x),) * 2)
+
+
+def poisson_defect(system: System, parameters: Mapping[str, float], method: Method, x: Floats, h: float) -> float:
+    """The largest entry of DΦ π DΦᵀ − π∘Φ, relative to |DΦ| |π| |DΦ|ᵀ; DΦ by differences if the code states none."""
+    tangent = method.tangent(x, h) if method.tangent else by_differences(method, x, h)
+    before, after = (poisson_matrix(system, parameters, state) for state in (x, method.step(x, h)))
+    size = float(np.max(np.abs(tangent) @ np.abs(before) @ np.abs(tangent).T))
+    return float(np.max(np.abs(tangent @ before @ tangent.T - after))) / (size or 1.0)
+
+
+def tangent_error(method: Method, x: Floats, h: float) -> float:
+    """How far the stated derivative is from differences of the step itself, relative to its largest entry."""
+    if method.tangent is None:
+        return 0.0
+    tangent = method.tangent(x, h)
+    return float(np.max(np.abs(tangent - by_differences(method, x, h)))) / float(np.max(np.abs(tangent)))
+
+
+def reversal(method: Method, x: Floats, h: float) -> float:
+    """|Φ_{−h}(Φ_h(x)) − x|, relative to the largest coordinate."""
+    return float(np.max(np.abs(method.step(method.step(x, h), -h) - x))) / float(np.max(np.abs(x)))
+
+
+def largest_step(method: Method, states: Sequence[Floats], h: float, most: float = 256.0) -> float:
+    """The largest factor f, to 5 %, for which a step of f·h can be made from all states; 0 if not even h/64."""
+
+    def works(factor: float) -> bool:
+        try:
+            return all(np.isfinite(method.step(x, factor * h)).all() for x in states)
+        except StepError:
+            return False
+
+    low = 1.0
+    while low > 1 / 64 and not works(low):
+        low /= 2
+    if not works(low):
+        return 0.0
+    high = 2 * low
+    while high <= most and works(high):
+        low, high = high, 2 * high
+    if high > most:
+        return low
+    while high / low > 1.05:
+        middle = math.sqrt(low * high)
+        low, high = (middle, high) if works(middle) else (low, middle)
+    return low

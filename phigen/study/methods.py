@@ -1,0 +1,83 @@
+"""One-step methods as verification sees them: generated solvers and classical methods behind one set of functions."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from phigen.errors import StepError
+from phigen.runtime.solver import Solver
+from phigen.study import classical
+from phigen.study.arrays import Floats
+
+#: The offset of differences in units of the state; with formulas of order 6 their error is about 1e-12.
+_WIDTH = 2e-3
+_WEIGHTS = ((1, 3 / 4), (2, -3 / 20), (3, 1 / 60))
+
+
+@dataclass(frozen=True)
+class Method:
+    """``step(x, h)`` maps states (DIM,), ``rows(x, h, steps, stride)`` gives (rows, DIM); both raise `StepError`.
+
+    ``tangent(x, h)`` is the derivative (DIM, DIM) of a step that the code itself states, None if it states none.
+    """
+
+    name: str
+    step: Callable[[Floats, float], Floats]
+    rows: Callable[[Floats, float, int, int], Floats]
+    tangent: Callable[[Floats, float], Floats] | None = None
+
+
+def of_solver(solver: Solver, parameters: Mapping[str, float], gauge: Floats | None = None) -> Method:
+    """A generated solver; with a ``gauge``, all steps are those of one map, whatever they start from."""
+    fixed = solver if gauge is None else Solver(solver.backend.with_gauge(gauge), solver.interface)
+    return Method(
+        solver.target,
+        lambda x, h: fixed.step(x, h, parameters=parameters),
+        lambda x, h, steps, stride: fixed.integrate(x, h, steps, stride, parameters=parameters).x,
+        lambda x, h: fixed.step_tangent(x, h, parameters=parameters)[1],
+    )
+
+
+def field_of(solver: Solver, parameters: Mapping[str, float]) -> Callable[[Floats], Floats]:
+    """The vector field of a solver at one state (DIM,), without the checks that the public method makes each time."""
+
+    def field(x: Floats) -> Floats:
+        slope: Floats = solver.backend.vector_field(x[None, :], parameters)[0]
+        return slope
+
+    return field
+
+
+def of_classical(name: str, solver: Solver, parameters: Mapping[str, float]) -> Method:
+    """A classical method on the vector field of a solver."""
+
+    field = field_of(solver, parameters)
+
+    def rows(x: Floats, h: float, steps: int, stride: int) -> Floats:
+        found = classical.integrate(name, field, x, h, steps, stride)
+        if not np.isfinite(found).all():
+            raise StepError(f"{name} left the finite numbers", step=0, status="NOT_FINITE")
+        return found
+
+    def step(x: Floats, h: float) -> Floats:
+        image: Floats = rows(x, h, 1, 1)[-1]
+        return image
+
+    return Method(name, step, rows)
+
+
+def by_differences(method: Method, x: Floats, h: float) -> Floats:
+    """The derivative (DIM, DIM) of a step by central differences of order 6."""
+    columns, size = [], float(np.max(np.abs(x))) or 1.0
+    for j in range(len(x)):
+        width = _WIDTH * (max(abs(x[j]), 0.1 * size) if x[j] else 0.1 * size)
+        total = np.zeros_like(x)
+        for k, weight in _WEIGHTS:
+            move = np.zeros_like(x)
+            move[j] = k * width
+            total += weight * (method.step(x + move, h) - method.step(x - move, h))
+        columns.append(total / width)
+    return np.column_stack(columns)

@@ -1,0 +1,178 @@
+"""Error against step size and against time: a solver and classical methods on one initial value problem."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from phigen.study import classical
+from phigen.study.arrays import Floats
+from phigen.study.race import OWN, Race, Runner
+
+#: Doublings of the step above that of the run, and halvings below it.
+COARSER, FINER = 6, 7
+#: Repetitions of a measurement, of which the fastest counts; the seconds each is to last at least, and one run at most.
+ROUNDS, LEAST_SECONDS, MOST_SECONDS = 5, 2e-3, 0.05
+#: Steps of the run that are studied, from the longest: errors that grow too fast tell no order.
+SPANS = (4096, 256, 16)
+#: Errors between the floor, times this, and this bound tell the order.
+ABOVE_FLOOR, ASYMPTOTIC = 30.0, 0.02
+#: No error is measured below this, relative to the solution; one below that may be of rounding.
+ROUNDING, SMALL = 2.0**-52, 1e-6
+
+
+@dataclass(frozen=True)
+class Point:
+    """Errors at the end, relative: of the solution and of the Casimirs; and the seconds of the fastest repetition."""
+
+    step: float
+    steps: int
+    error: float
+    casimirs: float
+    seconds: float
+
+
+@dataclass(frozen=True)
+class Curve:
+    """All points of one method, from the largest step; ``slope`` is the observed order, NaN if none can be told."""
+
+    label: str
+    order: int
+    points: tuple[Point, ...]
+    slope: float
+
+    def seconds_for(self, tolerance: float) -> float:
+        """The least time of a point with no larger error; NaN if there is none."""
+        return min((p.seconds for p in self.points if p.error <= tolerance), default=math.nan)
+
+
+@dataclass(frozen=True)
+class Study:
+    """What was measured from 0 to ``time``; errors below ``floor`` are those of the ``reference``.
+
+    ``set_up`` are the seconds that the solver takes once per trajectory; those of the points do not contain it.
+    ``language`` is that of all methods, ``rounds`` the number of repetitions.
+    """
+
+    time: float
+    steps: int
+    floor: float
+    reference: str
+    set_up: float
+    language: str
+    rounds: int
+    curves: tuple[Curve, ...]
+
+    @property
+    def has_casimirs(self) -> bool:
+        """Whether the errors of Casimirs were measured."""
+        return any(math.isfinite(p.casimirs) for c in self.curves for p in c.points)
+
+
+def study(
+    race: Race,
+    order: int,
+    h: float,
+    steps: int,
+    solution: Callable[[float], Floats] | None = None,
+    casimirs: Callable[[Floats], float] | None = None,
+    rounds: int = ROUNDS,
+) -> Study:
+    """Run all methods with steps of size ``h``, larger and smaller ones, over the first of at most ``steps`` steps.
+
+    ``solution`` is the closed form, if there is one; otherwise DOP853 at a step where halving changes no more.
+    ``casimirs`` gives the largest error of a Casimir at a state. Raises `ArithmeticError` if DOP853 cannot follow the
+    solution.
+    """
+    for span in sorted({min(steps, s) for s in SPANS}, reverse=True):
+        target, floor = (solution(h * span), 4 * ROUNDING) if solution else _by_dop853(race, h * span, span)
+        states = {label: _states(run, h * span, span, target, floor) for label, run in race.runners.items()}
+        errors = {label: {n: error_of(x, target) for n, x in found.items()} for label, found in states.items()}
+        slopes = {label: slope(found, floor) for label, found in errors.items()}
+        if math.isfinite(slopes[OWN]):
+            break
+    if not math.isfinite(floor):
+        raise ArithmeticError("DOP853 cannot follow the solution")
+    seconds = _times(race, {label: list(found) for label, found in errors.items()}, h * span, rounds)
+    orders = {OWN: order, **{m: o for m, (_, o) in classical.METHODS.items()}}
+    curves = []
+    for label, found in states.items():
+        points = tuple(
+            Point(h * span / n, n, errors[label][n], casimirs(x) if casimirs else math.nan, seconds[label, n])
+            for n, x in found.items()
+        )
+        curves.append(Curve(label, orders[label], points, slopes[label]))
+    reference = "the closed form" if solution else "DOP853 at small steps"
+    return Study(h * span, span, floor, reference, seconds["", 0], race.language, rounds, tuple(curves))
+
+
+def error_of(state: Floats, target: Floats) -> float:
+    """The largest error of a coordinate relative to the largest coordinate."""
+    size = float(np.max(np.abs(target))) or 1.0
+    return max(float(np.max(np.abs(state - target))) / size, ROUNDING)
+
+
+def slope(errors: Mapping[int, float], floor: float) -> float:
+    """The median slope of the last three halvings of the step in the asymptotic range; NaN if there are none."""
+    # Where a smaller step brings a larger error, rounding has taken over.
+    floor = max([floor, *(b for a, b in pairwise(errors.values()) if a < b and a < SMALL)])
+    usable = {n: e for n, e in errors.items() if ABOVE_FLOOR * floor < e < ASYMPTOTIC}
+    slopes = [math.log2(e / usable[2 * n]) for n, e in usable.items() if 2 * n in usable]
+    return float(np.median(slopes[-3:])) if slopes else math.nan
+
+
+def _states(run: Runner, end: float, span: int, target: Floats, floor: float) -> dict[int, Floats]:
+    """The state at the end for each number of steps that can be made in time, until rounding is all of its error."""
+    found: dict[int, Floats] = {}
+    least, done = math.inf, 0
+    for n in sorted({round(span * f * 2.0**k) for k in range(-COARSER, FINER + 1) for f in (1.0, 1.5)} - {0}):
+        start = time.perf_counter()
+        state = run(end / n, n, 1)
+        # NaN, of a solution that could not be had, is no error below 1.
+        if state is None or not (error := error_of(state, target)) < 1:
+            continue
+        found[n] = state
+        done += error <= 2 * floor or 2 * error > least < SMALL
+        least = min(least, error)
+        if done > 1 or time.perf_counter() - start > MOST_SECONDS:
+            break
+    return found
+
+
+def _times(race: Race, counts: Mapping[str, Sequence[int]], end: float, rounds: int) -> dict[tuple[str, int], float]:
+    """The seconds of one run of each method and number of steps: the least of several, methods taken in turn.
+
+    The seconds of setting up have the key ("", 0).
+    """
+    works: dict[tuple[str, int], Callable[[int], object]] = {("", 0): race.set_up}
+    for label, run in race.runners.items():
+        for n in counts[label]:
+            works[label, n] = lambda repeats, run=run, n=n: run(end / n, n, repeats)  # type: ignore[misc]
+    found = dict.fromkeys(works, math.inf)
+    repeats = dict.fromkeys(works, 1)
+    for _ in range(rounds):
+        for key, work in works.items():
+            start = time.perf_counter()
+            work(repeats[key])
+            taken = (time.perf_counter() - start) / repeats[key]
+            found[key] = min(taken, found[key])
+            repeats[key] = max(1, math.ceil(LEAST_SECONDS / max(taken, 1e-8)))
+    return found
+
+
+def _by_dop853(race: Race, end: float, span: int) -> tuple[Floats, float]:
+    """The solution at the end, and how far two results with steps h and h/2 agree at best; infinity if none do."""
+    best, last = (np.full(1, np.nan), math.inf), None
+    for k in range(-2, FINER):
+        n = max(1, math.ceil(span * 2.0**k))
+        state = race.runners["dop853"](end / n, n, 1)
+        if state is not None and last is not None:
+            difference = max(error_of(last, state), 4 * ROUNDING)
+            best = (state, difference) if difference < best[1] else best
+        last = state
+    return best

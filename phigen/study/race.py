@@ -1,0 +1,118 @@
+"""The solver and classical methods side by side, in compiled C: what a fair comparison of times needs.
+
+In Python a classical method would spend its time in the interpreter. Here all methods are one C file, compiled with
+the same flags, in which the vector field can be inlined.
+"""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from phigen.compilation import Compilation
+from phigen.compiler import emit
+from phigen.errors import StepError
+from phigen.runtime import cache
+from phigen.runtime.solver import Solver
+from phigen.study import classical, dop853
+from phigen.study.arrays import Floats
+from phigen.study.methods import field_of
+
+#: The label of the solver among the methods.
+OWN = "phigen"
+
+#: Explicit methods: the rows of the tableau below the first, and the weights.
+TABLEAUX: Mapping[str, tuple[Sequence[Mapping[int, float]], Mapping[int, float]]] = {
+    "euler": ((), {0: 1.0}),
+    "rk2": (({0: 0.5},), {1: 1.0}),
+    "rk4": (({0: 0.5}, {1: 0.5}, {2: 1.0}), {0: 1 / 6, 1: 1 / 3, 2: 1 / 3, 3: 1 / 6}),
+    "dop853": (dop853.A[1:], dop853.B),
+}
+
+#: Makes steps of size h from the start, so many times over; the last state, None if a step cannot be made.
+Runner = Callable[[float, int, int], Floats | None]
+
+
+@dataclass(frozen=True)
+class Race:
+    """The runners by their labels, and ``set_up``: what the solver does once per trajectory, so many times over.
+
+    ``language`` is what all of them are written in: ``C`` or ``Python``.
+    """
+
+    runners: Mapping[str, Runner]
+    set_up: Callable[[int], object]
+    language: str
+
+
+def compiled(compilation: Compilation, methods: Sequence[str], start: Floats, parameters: Mapping[str, float]) -> Race:
+    """The solver and those of the methods that are explicit, in C. Raises `ToolchainError`."""
+    from phigen.targets.rendering import render
+
+    name = compilation.program.name
+    files = emit(compilation.program, "c", "phigen report")
+    explicit = [m for m in methods if m in TABLEAUX]
+    values = {"name": name, "methods": [_printed(m) for m in explicit]}
+    source = render("timing", "race.c", values)
+    library = cache.load({f"{name}.h": files[f"{name}.h"], f"{name}.inc": files[f"{name}.c"], f"{name}_race.c": source})
+    packed = np.array(list(parameters.values()) or [0.0])
+
+    pointer, size = ctypes.c_void_p, ctypes.c_size_t
+    length, begin = getattr(library, f"{name}_race_size"), getattr(library, f"{name}_race_start")
+    length.restype, length.argtypes = size, ()
+    begin.restype, begin.argtypes = ctypes.c_int, (pointer, pointer, size, pointer)
+    begun = np.zeros(-(-length() // 8))
+
+    def set_up(repeats: int) -> int:
+        return int(begin(packed.ctypes.data, start.ctypes.data, repeats, begun.ctypes.data))
+
+    def runner(method: str, given: Floats) -> Runner:
+        function = getattr(library, f"{name}_race_{method}")
+        function.restype, function.argtypes = ctypes.c_int, (pointer, pointer, ctypes.c_double, size, size, pointer)
+
+        def run(h: float, steps: int, repeats: int) -> Floats | None:
+            x = np.empty_like(start)
+            failed = function(given.ctypes.data, start.ctypes.data, h, steps, repeats, x.ctypes.data)
+            return None if failed else x
+
+        return run
+
+    own = runner(OWN, begun) if set_up(1) == 0 else lambda h, steps, repeats: None
+    return Race({OWN: own, **{m: runner(m, packed) for m in explicit}}, set_up, "C")
+
+
+def interpreted(solver: Solver, methods: Sequence[str], start: Floats, parameters: Mapping[str, float]) -> Race:
+    """The solver and the methods as Python runs them."""
+
+    def own(h: float, steps: int, repeats: int) -> Floats | None:
+        try:
+            for _ in range(repeats):
+                found: Floats = solver.integrate(start, h, steps, steps, parameters=parameters).x[-1]
+        except StepError:
+            return None
+        return found
+
+    field = field_of(solver, parameters)
+
+    def runner(method: str) -> Runner:
+        def run(h: float, steps: int, repeats: int) -> Floats | None:
+            for _ in range(repeats):
+                found: Floats = classical.integrate(method, field, start, h, steps, steps)[-1]
+            return found if np.isfinite(found).all() else None
+
+        return run
+
+    runners = {OWN: own, **{method: runner(method) for method in methods}}
+    return Race(runners, lambda repeats: None, "Python")
+
+
+def _printed(method: str) -> tuple[str, int, list[tuple[int, str]], str]:
+    rows, weights = TABLEAUX[method]
+    return method, len(rows) + 1, [(i, _sum(row)) for i, row in enumerate(rows, start=1)], _sum(weights)
+
+
+def _sum(weights: Mapping[int, float]) -> str:
+    return " + ".join(f"{w!r} * k[{j}][i]" for j, w in weights.items())

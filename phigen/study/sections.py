@@ -1,0 +1,21 @@
+"""Sections that a spec names: the expression as a function of states."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from phigen.runtime.crossings import Function
+from phigen.study.arrays import Floats, evaluate
+from phigen.symbolic.expression import Expression
+
+
+def function_of(section: Expression, coordinates: Sequence[str], parameters: Mapping[str, float]) -> Function:
+    """The expression for states (rows, DIM), shape (rows,)."""
+
+    def g(states: Floats) -> Floats:
+        values = {**parameters, **{c: states[:, i] for i, c in enumerate(coordinates)}}
+        return np.broadcast_to(evaluate([section], values)[0], len(states))
+
+    return g

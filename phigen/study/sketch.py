@@ -1,0 +1,132 @@
+"""Runs of any length in as many rows as a figure can show."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from phigen.runtime.trajectory import Trajectory
+from phigen.study.arrays import Floats
+
+Numbers = NDArray[np.int64]
+
+#: Rows that are kept of a run, and windows of it whose largest errors are kept as well.
+ROWS, WINDOWS = 8000, 400
+#: Points that are kept of a section.
+POINTS = 20_000
+
+
+class Thinned:
+    """Of rows that come one after the other, at most so many: every first, second, fourth, … of them.
+
+    Which rows are kept depends on their number alone. ``state`` is all there is, as arrays.
+    """
+
+    def __init__(self, width: int, most: int) -> None:
+        self._most = most
+        self.state: dict[str, Any] = {
+            "rows": np.empty((0, width)),
+            "every": np.ones((), dtype=np.int64),
+            "seen": np.zeros((), dtype=np.int64),
+        }
+
+    @property
+    def rows(self) -> Floats:
+        """What is kept, (rows, width)."""
+        kept: Floats = self.state["rows"]
+        return kept
+
+    @property
+    def seen(self) -> int:
+        """How many rows there were."""
+        return int(self.state["seen"])
+
+    def see(self, rows: Floats) -> None:
+        """Take in the next rows (rows, width)."""
+        every, seen = int(self.state["every"]), self.seen
+        kept = np.concatenate([self.rows, rows[-seen % every :: every]])
+        while len(kept) > self._most:
+            every, kept = 2 * every, kept[::2]
+        self.state |= {"rows": kept, "every": np.asarray(every), "seen": np.asarray(seen + len(rows))}
+
+
+class Sketch:
+    """Enough of a run to draw it: every so-manieth row, and those with the largest errors of each of `WINDOWS` windows.
+
+    Rows are t, x, energy and Casimirs side by side, with their number before them. ``rows`` is how many there will be.
+    """
+
+    def __init__(self, dimension: int, casimirs: int, rows: int) -> None:
+        self._quantities = slice(2 + dimension, 3 + dimension + casimirs)
+        self._dimension, self._of = dimension, rows
+        width = 3 + dimension + casimirs
+        self._thinned = Thinned(width, ROWS)
+        self._peaks: dict[str, Any] = {
+            "first": np.full(width, np.nan),
+            "last": np.full(width, np.nan),
+            "errors": np.full((1 + casimirs, WINDOWS), -1.0),
+            "peaks": np.full((1 + casimirs, WINDOWS, width), np.nan),
+        }
+
+    @property
+    def state(self) -> dict[str, Any]:
+        """All there is, as arrays."""
+        return {**self._thinned.state, **self._peaks}
+
+    @state.setter
+    def state(self, arrays: Mapping[str, Any]) -> None:
+        self._thinned.state = {name: arrays[name] for name in self._thinned.state}
+        self._peaks = {name: arrays[name] for name in self._peaks}
+
+    def see(self, rows: Floats) -> None:
+        """Take in the next rows (rows, 2 + DIM + Casimirs): t, x, energy, Casimirs."""
+        if not len(rows):
+            return
+        numbered = np.column_stack([np.arange(self._thinned.seen, self._thinned.seen + len(rows)), rows])
+        if self._thinned.seen == 0:
+            self._peaks["first"] = numbered[0]
+        self._peaks["last"] = numbered[-1]
+        self._thinned.see(numbered)
+        first = self._peaks["first"]
+        windows = (numbered[:, 0] * WINDOWS // max(self._of, 1)).astype(np.int64).clip(0, WINDOWS - 1)
+        for k, values in enumerate(numbered[:, self._quantities].T):
+            errors = np.abs(values - first[self._quantities][k])
+            for window in np.unique(windows):
+                part = np.flatnonzero(windows == window)
+                best = part[np.argmax(errors[part])]
+                if not errors[best] <= self._peaks["errors"][k, window]:
+                    self._peaks["errors"][k, window] = errors[best]
+                    self._peaks["peaks"][k, window] = numbered[best]
+
+    def trajectory(
+        self,
+        coordinates: tuple[str, ...],
+        casimirs: tuple[str, ...],
+        h: float,
+        parameters: Mapping[str, float],
+        broken: bool = False,
+    ) -> Trajectory:
+        """The rows that were kept, in their order; if the run is ``broken`` off, a row of NaN comes after them."""
+        peaks = self._peaks["peaks"].reshape(-1, self._peaks["peaks"].shape[-1])
+        kept = np.concatenate(
+            [self._thinned.rows, peaks[self._peaks["errors"].ravel() >= 0], self._peaks["last"][None]]
+        )
+        _, places = np.unique(kept[:, 0], return_index=True)
+        rows = kept[places][:, 1:]
+        if broken:
+            rows = np.vstack([rows, np.full(rows.shape[1], np.nan)])
+            rows[-1, 0] = rows[-2, 0] + h
+        t, x, values = rows[:, 0], rows[:, 1 : 1 + self._dimension], rows[:, 2 + self._dimension :].T
+        return Trajectory(
+            t=t,
+            x=x,
+            energy=rows[:, 1 + self._dimension],
+            casimirs=dict(zip(casimirs, values, strict=True)),
+            steps=round(float(t[-1]) / h),
+            h=h,
+            parameters=parameters,
+            coordinates=coordinates,
+        )

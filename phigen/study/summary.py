@@ -1,0 +1,206 @@
+"""What a run conserved: numbers for one method, from the states it stored."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from phigen.geometry.system import System
+from phigen.spec.model import Run
+from phigen.study.arrays import Floats, evaluate
+from phigen.study.conservation import ENERGY, RELATIVE, Unit, rounding, units
+from phigen.symbolic.symbols import ELAPSED, initial
+
+#: Windows of equal length in which the largest energy error is taken, to tell drift from oscillation.
+WINDOWS = 10
+
+#: The largest error of a window without rows.
+_NOTHING = -1.0
+#: Windows are compared if the first sees every coordinate that turns at all turn so often: back and forth once.
+_TURNS = 2
+
+
+@dataclass(frozen=True)
+class Drift:
+    """How far a conserved quantity went: the largest error, in a unit of its own.
+
+    ``growth`` is the largest error in the last tenth of the run over that in the first; 1 without drift. It is NaN if
+    that says nothing: where the error is one of rounding, and where the first tenth has not seen the motion.
+    """
+
+    error: float
+    unit: Unit
+    growth: float = math.nan
+
+
+@dataclass(frozen=True)
+class Summary:
+    """What one method conserved; ``exact`` is the largest error against the closed form, None if there is none.
+
+    ``good`` rows of the states are finite; the numbers are about these.
+    """
+
+    method: str
+    energy: Drift
+    casimirs: Mapping[str, Drift]
+    invariants: Mapping[str, Drift]
+    exact: Drift | None
+    final: tuple[float, ...]
+    good: int
+    rows: int
+
+    @property
+    def units(self) -> dict[str, Unit]:
+        """What the errors are counted in, by the names of the quantities."""
+        return {ENERGY: self.energy.unit, **{n: d.unit for n, d in {**self.casimirs, **self.invariants}.items()}}
+
+
+def summarise(
+    method: str, system: System, run: Run | None, parameters: Mapping[str, float], t: Floats, x: Floats
+) -> Summary:
+    """The summary of states ``x`` (rows, DIM) at times ``t``, all quantities evaluated from their formulas."""
+    watch = Watch(method, system, run, parameters, len(x))
+    watch.see(t, x)
+    return watch.summary()
+
+
+class Watch:
+    """Sums up the states of one method as they come, in memory that does not grow with their number.
+
+    ``rows`` is how many there will be, for the windows in which drift is told from oscillation. ``state`` is all that
+    was seen, as arrays.
+    """
+
+    def __init__(
+        self, method: str, system: System, run: Run | None, parameters: Mapping[str, float], rows: int
+    ) -> None:
+        self._about = method, rows
+        self._system, self._run, self._parameters = system, run, parameters
+        self._groups = {
+            ENERGY: {"H": system.hamiltonian},
+            "casimirs": system.casimirs,
+            "invariants": system.invariants,
+        }
+        self._formulas = [formula for group in self._groups.values() for formula in group.values()]
+        self._found: list[Unit] = []
+        states, quantities = np.full(len(system.coordinates), np.nan), len(self._formulas)
+        self.state: dict[str, Any] = {
+            "first": states,
+            "final": states,
+            "start": np.zeros(quantities),
+            "maxima": np.full((quantities, WINDOWS + 1), _NOTHING),
+            "exact": np.zeros(()),
+            "turns": np.zeros((2, len(system.coordinates)), dtype=np.int64),
+            "heading": np.zeros(len(system.coordinates)),
+            "good": np.zeros((), dtype=np.int64),
+            "broken": np.zeros((), dtype=bool),
+        }
+
+    @property
+    def begun(self) -> bool:
+        """Whether the initial state has been seen."""
+        return bool(self.state["good"])
+
+    def see(self, t: Floats, x: Floats) -> None:
+        """Take in the next rows, times (rows,) and states (rows, DIM); those after one not finite do not count."""
+        state, good = self.state, int(self.state["good"])
+        finite = np.isfinite(x).all(axis=1)
+        count = 0 if state["broken"] else len(x) if finite.all() else int(np.argmin(finite))
+        state["broken"] = np.asarray(state["broken"] or count < len(x))
+        if count == 0:
+            return
+        t, x = t[:count], x[:count]
+        columns = {c: x[:, i] for i, c in enumerate(self._system.coordinates)}
+        values = [np.broadcast_to(a, t.shape) for a in evaluate(self._formulas, {**self._parameters, **columns})]
+        if good == 0:
+            state |= {"first": x[0].copy(), "start": np.array([v[0] for v in values])}
+        state["good"] = np.asarray(good + count)
+        windows = _windows(np.arange(good, good + count), self._about[1])
+        for k, (v, unit) in enumerate(zip(values, self._units(), strict=True)):
+            np.maximum.at(state["maxima"][k], windows, unit.errors(v, float(state["start"][k])))
+        self._see_turns(x, windows)
+        if self._run and self._run.exact:
+            off = _against_exact(self._system, self._run, self._parameters, state["first"], t, x)
+            state["exact"] = np.asarray(max(off, float(state["exact"])))
+        state["final"] = x[-1].copy()
+
+    def summary(self) -> Summary:
+        """The summary of what was seen."""
+        (method, rows), state = self._about, self.state
+        steps = self._run.steps if self._run else rows
+        telling = rows >= 2 * WINDOWS and _is_telling(state["turns"])
+        drifts = [_drift(m, unit, steps, telling) for m, unit in zip(state["maxima"], self._units(), strict=True)]
+        found = iter(drifts)
+        named = {kind: {name: next(found) for name in group} for kind, group in self._groups.items()}
+        return Summary(
+            method=method,
+            energy=named[ENERGY]["H"],
+            casimirs=named["casimirs"],
+            invariants=named["invariants"],
+            exact=Drift(float(state["exact"]), Unit(kind=RELATIVE)) if self._run and self._run.exact else None,
+            final=tuple(state["final"].tolist()),
+            good=int(state["good"]),
+            rows=rows,
+        )
+
+    def _units(self) -> Sequence[Unit]:
+        if not self._found and self.begun:
+            self._found = units(self._formulas, self._system.coordinates, self._parameters, self.state["first"])
+        return self._found or [Unit()] * len(self._formulas)
+
+    def _see_turns(self, x: Floats, windows: NDArray[np.int64]) -> None:
+        """Count where coordinates turn back: in the first window, and at all."""
+        state = self.state
+        before = state["final"] if np.isfinite(state["final"]).all() else x[0]
+        for i, moves in enumerate(np.diff(x, axis=0, prepend=before[None]).T):
+            moving = np.flatnonzero(moves)
+            signs = np.concatenate([[state["heading"][i]], np.sign(moves[moving])])
+            turned = windows[moving[signs[1:] * signs[:-1] < 0]]
+            state["turns"][:, i] += (int((turned == 0).sum()), len(turned))
+            state["heading"][i] = signs[-1]
+
+
+def _is_telling(turns: NDArray[np.int64]) -> bool:
+    """Whether the first window sees the motion, by the turns of each coordinate there and at all."""
+    turning = turns[1] > 0
+    return bool(turning.any() and (turns[0, turning] >= _TURNS).all())
+
+
+def _windows(rows: NDArray[np.int64], of: int) -> NDArray[np.int64]:
+    """The window of each row but the first, which has one of its own: `WINDOWS` parts of a run of so many rows."""
+    ends = np.cumsum([len(part) for part in np.array_split(np.arange(1, of), WINDOWS)])
+    return np.where(rows == 0, WINDOWS, np.searchsorted(ends, rows - 1, side="right"))
+
+
+def _drift(maxima: Floats, unit: Unit, steps: int, telling: bool) -> Drift:
+    first, last = float(maxima[0]), float(maxima[WINDOWS - 1])
+    error = max(float(np.max(maxima)) if np.isfinite(maxima).all() else math.inf, 0.0)
+    compared = telling and first > 0 and last != _NOTHING and error > rounding(steps) * unit.terms
+    return Drift(error, unit, last / first if compared else math.nan)
+
+
+def exact_solution(
+    system: System, run: Run, parameters: Mapping[str, float], x0: Floats, t: Floats
+) -> dict[str, Floats]:
+    """The closed form of a run, coordinate by coordinate, for those it gives."""
+    values: dict[str, Any] = {ELAPSED: t, **parameters}
+    values |= {initial(c): float(v) for c, v in zip(system.coordinates, x0, strict=True)}
+    arrays = evaluate(list(run.exact.values()), values)
+    return {c: np.broadcast_to(a, t.shape) for c, a in zip(run.exact, arrays, strict=True)}
+
+
+def _against_exact(
+    system: System, run: Run, parameters: Mapping[str, float], x0: Floats, t: Floats, x: Floats
+) -> float:
+    """The largest difference, relative to the largest coordinate of the closed form at that time."""
+    solution = exact_solution(system, run, parameters, x0, t)
+    columns = [system.coordinates.index(c) for c in solution]
+    expected = np.column_stack(list(solution.values()))
+    scale = np.max(np.abs(expected), axis=1)
+    errors = np.max(np.abs(x[:, columns] - expected), axis=1) / np.where(scale > 0, scale, 1.0)
+    return float(np.max(errors[np.isfinite(errors)], initial=0.0))

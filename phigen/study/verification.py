@@ -1,0 +1,351 @@
+"""Verification: what a generated solver must show, measured on a run and judged against limits that are stated.
+
+The limits are those of round-off where a property is exact: Casimirs, the Poisson identity, reversibility, agreement
+of the targets. The order must be the stated one, and energy must not drift. Solvers from approximate bi-realisations
+are Poisson up to a stated power of h only, and held to that power.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from phigen.compilation import Compilation
+from phigen.errors import StepError
+from phigen.runtime.solver import Solver
+from phigen.study import backward, measures
+from phigen.study.arrays import Floats
+from phigen.study.conservation import Unit, largest_terms, rounding, units_of
+from phigen.study.methods import Method, of_classical, of_solver
+from phigen.study.summary import Drift, Summary, summarise
+from phigen.symbolic.expression import Expression
+
+#: Observed orders may fall short of the stated one by this much.
+ORDER_SLACK = 0.3
+#: The power of the modified Hamiltonian may fall short by this part of what the last correction adds to it.
+MODIFIED_SLACK = 0.6
+#: One-step identities: the Poisson defect, reversibility, agreement of targets, each relative to its terms.
+ONE_STEP = 1e-13
+#: The stated derivative against differences of the step, whose own error this is.
+DIFFERENCES = 1e-7
+#: The largest energy error of the last tenth of the run may be this many times that of the first.
+GROWTH = 4.0
+#: Steps of a run that are made at most, and with --quick.
+MOST_STEPS, FEW_STEPS = 20_000, 2_000
+#: States along the run at which single steps are examined.
+STATES = 4
+
+
+@dataclass(frozen=True)
+class Check:
+    """One property: the measured ``value``, ``passed``, and the ``limit`` in words; empty for mere information.
+
+    ``reason`` says why it failed. ``others`` holds the values of the methods to compare with.
+    """
+
+    name: str
+    value: float
+    limit: str = ""
+    passed: bool = True
+    reason: str = ""
+    others: Mapping[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Verification:
+    """All checks of one spec on one run; ``label`` says what the solver claims to be, ``units`` what errors are in."""
+
+    name: str
+    run: str
+    label: str
+    step: float
+    steps: int
+    targets: tuple[str, ...]
+    compared: tuple[str, ...]
+    checks: tuple[Check, ...]
+    units: Mapping[str, Unit]
+
+    @property
+    def failures(self) -> list[str]:
+        """The reason of each check that failed."""
+        return [f"{c.name}: {c.reason}" for c in self.checks if not c.passed]
+
+
+@dataclass(frozen=True)
+class Subject:
+    """What is examined: the methods of all targets, those to compare with, and the numbers of the run."""
+
+    compilation: Compilation
+    solver: Solver
+    own: Mapping[str, Method]
+    others: Mapping[str, Method]
+    parameters: Mapping[str, float]
+    start: Floats
+    h: float
+    steps: int
+
+    @property
+    def main(self) -> Method:
+        """The target that is measured where one suffices: C, if it is there."""
+        return next(iter(self.own.values()))
+
+    @property
+    def exact(self) -> bool:
+        """Whether a step is a Poisson map to round-off."""
+        return self.compilation.exact
+
+
+def verify(
+    compilation: Compilation,
+    solvers: Mapping[str, Solver],
+    run: str,
+    start: Sequence[float],
+    parameters: Mapping[str, float],
+    h: float,
+    steps: int,
+    compare: Sequence[str] = ("rk4",),
+    *,
+    quick: bool = False,
+) -> Verification:
+    """Measure and judge the solvers of a compilation (by target, with their tangent maps) on the numbers of a run.
+
+    Raises `StepError` if the run itself cannot be made.
+    """
+    x = np.array(start, dtype=np.float64)
+    gauge = gauge_at(compilation, x, parameters)
+    own = {target: of_solver(solver, parameters, gauge) for target, solver in solvers.items()}
+    solver = next(iter(solvers.values()))
+    others = {name: of_classical(name, solver, parameters) for name in compare}
+    made = min(steps, FEW_STEPS if quick else MOST_STEPS)
+    subject = Subject(compilation, solver, own, others, parameters, x, h, made)
+    rows = subject.main.rows(x, h, made, 1)
+    states = [rows[i] for i in np.linspace(0, made, STATES, dtype=int)] if made >= STATES else [x]
+    order, symmetry = compilation.order.order, "symmetric" if compilation.symmetric else "not symmetric"
+    return Verification(
+        compilation.spec.name,
+        run,
+        f"order {order}, {compilation.label}, {symmetry}",
+        h,
+        made,
+        tuple(own),
+        tuple(others),
+        (
+            order_check(subject, quick=quick),
+            *conservation_checks(subject, rows),
+            *one_step_checks(subject, states),
+            agreement_check(subject, states),
+            step_check(subject, states),
+            *modified_checks(subject, gauge),
+        ),
+        units_of(compilation.system, parameters, x),
+    )
+
+
+def gauge_at(compilation: Compilation, x: Floats, parameters: Mapping[str, float]) -> Floats | None:
+    """The gauge that a solver chooses for the trajectory from x, None if it has none to choose."""
+    if not compilation.program.gauge:
+        return None
+    from phigen.api import solver_of
+
+    chosen: Floats = solver_of(compilation, "numpy").backend.module.gauge(x, **parameters)  # type: ignore[attr-defined]
+    return chosen
+
+
+def order_check(subject: Subject, *, quick: bool = False) -> Check:
+    """The observed order against the stated one."""
+    solver, stated = subject.main, subject.compilation.order.order
+    span = min(subject.steps, 32 if quick else 64)
+    reference = _reference(subject)
+    for length in (span, max(1, span // 8)):
+        found = measures.observed_order(solver, reference, subject.start, length * subject.h)
+        if found.exact or found.order >= stated - ORDER_SLACK:
+            break
+    limit = f"at least {stated - ORDER_SLACK:.1f}, stated {stated}"
+    others = {
+        name: measures.observed_order(m, reference, subject.start, length * subject.h).order
+        for name, m in subject.others.items()
+    }
+    if found.exact:
+        return Check("observed order (errors at round-off)", math.inf, limit, True, "", others)
+    if math.isnan(found.order):
+        reason = "no two steps have errors between round-off and 2 %"
+        worst = max((e for _, e in found.pairs), default=math.inf)
+        return Check("observed order", math.nan, limit, worst < 1e-6, reason, others)
+    passed = found.order >= stated - ORDER_SLACK
+    return Check("observed order", found.order, limit, passed, f"{found.order:.2f} instead of {stated}", others)
+
+
+def _reference(subject: Subject) -> Callable[[float], tuple[Floats, float]]:
+    """The solution at a time, by DOP853 with halved steps until two results agree; and how far they agree."""
+    solver = of_classical("dop853", subject.solver, subject.parameters)
+    found: dict[float, tuple[Floats, float]] = {}
+
+    def reference(t: float) -> tuple[Floats, float]:
+        if t not in found:
+            best: tuple[Floats, float] | None = None
+            last: Floats | None = None
+            for n in (128, 256, 512, 1024, 2048):
+                try:
+                    state = solver.rows(subject.start, t / n, n, n)[-1]
+                except StepError:
+                    last = None
+                    continue
+                if last is not None:
+                    error = float(np.max(np.abs(state - last)) / np.max(np.abs(state)))
+                    if best is None or error < best[1]:
+                        best = (state, error)
+                    if error <= 4 * measures.ROUNDING:
+                        break
+                last = state
+            found[t] = best or (np.full_like(subject.start, np.nan), math.inf)
+        return found[t]
+
+    return reference
+
+
+def conservation_checks(subject: Subject, rows: Floats) -> Iterator[Check]:
+    """Casimirs constant to round-off; energy without drift."""
+    system, steps = subject.compilation.system, subject.steps
+    own = _summary(subject, subject.main.name, rows)
+    others = {name: _summary_of(subject, m) for name, m in subject.others.items()}
+    for name, drift in own.casimirs.items():
+        bound = rounding(steps) * _terms(subject, system.casimirs[name], rows) / drift.unit.size
+        limit = f"at most {bound:.1e}" if subject.exact else ""
+        passed = drift.error <= bound or not subject.exact
+        reason = f"changed by {drift.error:.1e} in {steps} steps"
+        drifts = {m: s.casimirs[name] if s else None for m, s in others.items()}
+        yield Check(f"Casimir {name}: largest error", drift.error, limit, passed, reason, _errors(drifts))
+        yield Check(f"Casimir {name}: last/first window", drift.growth, others=_growths(drifts))
+    energy, drifts = own.energy, {m: s.energy if s else None for m, s in others.items()}
+    yield Check("energy: largest error", energy.error, others=_errors(drifts))
+    judged = math.isfinite(energy.growth) and subject.exact and _recurrent(rows)
+    passed = not judged or energy.growth <= GROWTH
+    reason = f"the error of the last tenth is {energy.growth:.1f} times that of the first"
+    limit = f"at most {GROWTH:g}" if judged else ""
+    yield Check("energy: last/first window", energy.growth, limit, passed, reason, _growths(drifts))
+
+
+def _errors(drifts: Mapping[str, Drift | None]) -> dict[str, float]:
+    return {m: d.error if d else math.inf for m, d in drifts.items()}
+
+
+def _growths(drifts: Mapping[str, Drift | None]) -> dict[str, float]:
+    return {m: d.growth if d else math.nan for m, d in drifts.items()}
+
+
+def _terms(subject: Subject, quantity: Expression, rows: Floats) -> float:
+    columns = dict(zip(subject.compilation.system.coordinates, rows.T, strict=True))
+    return largest_terms(quantity, list(columns), {**subject.parameters, **columns})
+
+
+def _summary(subject: Subject, name: str, rows: Floats) -> Summary:
+    times: Floats = subject.h * np.arange(len(rows), dtype=np.float64)
+    return summarise(name, subject.compilation.system, None, subject.parameters, times, rows)
+
+
+def _summary_of(subject: Subject, method: Method) -> Summary | None:
+    """What another method conserves; None where a step of it cannot be made."""
+    try:
+        return _summary(subject, method.name, method.rows(subject.start, subject.h, subject.steps, 1))
+    except StepError:
+        return None
+
+
+def _recurrent(rows: Floats) -> bool:
+    """Whether windows are comparable: the second half of the states stays within the range of the first and 20 %."""
+    half = len(rows) // 2
+    low, high = rows[:half].min(axis=0), rows[:half].max(axis=0)
+    margin = 0.2 * np.max(high - low)
+    return bool(((rows[half:] >= low - margin) & (rows[half:] <= high + margin)).all())
+
+
+def one_step_checks(subject: Subject, states: Sequence[Floats]) -> Iterator[Check]:
+    """The Poisson identity, with the stated derivative, which must be that of the step; reversibility."""
+    system, parameters = subject.compilation.system, subject.parameters
+    settings = [(x, f * subject.h) for x in states for f in (1.0, 0.5, -1.0)]
+
+    def worst(measure: Callable[[Method, Floats, float], float], method: Method) -> float:
+        return max(_or_infinite(measure, method, x, h) for x, h in settings)
+
+    def defect(method: Method, x: Floats, h: float) -> float:
+        return measures.poisson_defect(system, parameters, method, x, h)
+
+    found = max(worst(defect, m) for m in subject.own.values())
+    compared = {name: worst(defect, m) for name, m in subject.others.items()}
+    if subject.exact:
+        limit, passed, reason = f"at most {ONE_STEP:g}", found <= ONE_STEP, f"{found:.1e} is not round-off"
+    else:
+        limit, passed, reason = _approximate(subject, states, defect, found)
+    yield Check("Poisson defect, exact tangent", found, limit, passed, reason, compared)
+    slip = max(worst(measures.tangent_error, m) for m in subject.own.values())
+    reason = f"the tangent map is not the derivative of the step, {slip:.1e} off"
+    yield Check("tangent map against differences", slip, f"at most {DIFFERENCES:g}", slip <= DIFFERENCES, reason)
+    back = max(worst(measures.reversal, m) for m in subject.own.values())
+    symmetric = subject.compilation.symmetric
+    yield Check(
+        "reversibility: a step there and back",
+        back,
+        f"at most {ONE_STEP:g}" if symmetric else "",
+        back <= ONE_STEP or not symmetric,
+        f"a step back misses by {back:.1e}",
+        {name: worst(measures.reversal, m) for name, m in subject.others.items()},
+    )
+
+
+def _approximate(
+    subject: Subject, states: Sequence[Floats], defect: Callable[[Method, Floats, float], float], found: float
+) -> tuple[str, bool, str]:
+    """The limit for a truncation of degree d: a defect of O(h^(d+1))."""
+    degree = subject.compilation.chart.degree
+    if degree is None:
+        return "", True, ""
+    fine = max(_or_infinite(defect, subject.main, x, subject.h / 2) for x in states)
+    coarse = max(_or_infinite(defect, subject.main, x, subject.h) for x in states)
+    power = math.log2(coarse / fine) if fine > 0 else math.inf
+    passed = found <= ONE_STEP or fine <= ONE_STEP or power >= degree + 1 - 2 * ORDER_SLACK
+    return f"O(h^{degree + 1}): approximate", passed, f"shrinks like h^{power:.1f} instead of h^{degree + 1}"
+
+
+def _or_infinite(measure: Callable[[Method, Floats, float], float], method: Method, x: Floats, h: float) -> float:
+    try:
+        found = measure(method, x, h)
+    except StepError:
+        return math.inf
+    return found if math.isfinite(found) else math.inf
+
+
+def agreement_check(subject: Subject, states: Sequence[Floats]) -> Check:
+    """Single steps of all targets from the same states."""
+    name, difference = "agreement of " + " and ".join(subject.own), 0.0
+    if len(subject.own) < 2:
+        return Check(f"agreement: only one target, {subject.main.name}", math.nan)
+    for x in states:
+        images = [m.step(x, subject.h) for m in subject.own.values()]
+        size = float(np.max(np.abs(images[0])))
+        difference = max(difference, *(float(np.max(np.abs(i - images[0]))) / size for i in images[1:]))
+    passed = difference <= ONE_STEP
+    return Check(name, difference, f"at most {ONE_STEP:g}", passed, f"they differ by {difference:.1e} after one step")
+
+
+def modified_checks(subject: Subject, gauge: Floats | None) -> Iterator[Check]:
+    """The modified Hamiltonian with m corrections is constant to order p + m, or p + 2m of a symmetric method."""
+    try:
+        found = backward.modified(subject.compilation, subject.parameters, gauge)
+    except backward.NotOfferedError:
+        return
+    observed = backward.observed_powers(found, subject.main, subject.start, subject.h)
+    for m, (power, shown) in enumerate(zip(found.powers[1:], observed[1:], strict=True), 1):
+        # A wrong correction shows the power of the one before.
+        limit = power - MODIFIED_SLACK * (power - found.powers[m - 1])
+        reason = f"shrinks like h^{shown:.2f} instead of h^{power}"
+        name = f"modified H, {m} correction{'s' * (m > 1)}: order"
+        yield Check(name, shown, f"at least {limit:.1f}, stated {power}", shown >= limit, reason)
+
+
+def step_check(subject: Subject, states: Sequence[Floats]) -> Check:
+    """The largest step that can be made, in units of the run's."""
+    found = measures.largest_step(subject.main, states, subject.h)
+    return Check("largest step that converges, of the run's", found, "at least 1", found >= 1, "the run's step fails")

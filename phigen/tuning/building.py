@@ -1,0 +1,176 @@
+"""Building candidates beside each other, each in a process of its own, so that one that takes too long can be ended.
+
+A process generates the code and compiles it into the cache of solvers, where the calling process finds it.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import multiprocessing
+import os
+import signal
+import sys
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from multiprocessing.connection import Connection, wait
+from typing import Any
+
+from phigen.api import backend_of, chosen_target, interface_of
+from phigen.compilation import Compilation
+from phigen.compiler import compile_spec, emit
+from phigen.errors import PhigenError, SpecError
+from phigen.geometry.system import System
+from phigen.runtime import cache
+from phigen.runtime.backend import Backend
+from phigen.runtime.interface import Interface
+from phigen.scheme.steps import Splitting
+from phigen.spec.model import Spec
+from phigen.targets.header import split
+from phigen.tuning.settings import Setting
+
+#: Processes at a time, at most.
+WORKERS = 4
+#: Seconds that a process has to end after it was told to.
+_GRACE = 2.0
+
+
+@dataclass(frozen=True)
+class Built:
+    """A candidate, compiled: its files, what it turned out to be, and the seconds that making it took.
+
+    ``order`` may exceed that of the setting, since symmetric methods have even order. ``fingerprint`` is the same for
+    two settings that mean the same code.
+    """
+
+    setting: Setting
+    files: Mapping[str, str]
+    interface: Interface
+    kind: str
+    order: int
+    exact: bool
+    symmetric: bool
+    gauged: bool
+    stages: int
+    composition: str
+    seconds: float
+
+    @property
+    def fingerprint(self) -> str:
+        """A hash of the code without its headers."""
+        bodies = [split(text)[1] for _, text in sorted(self.files.items())]
+        return hashlib.sha256("\0".join(bodies).encode()).hexdigest()
+
+    def solver(self) -> Backend:
+        """The back end; the cache holds the library, if it is C."""
+        return backend_of(self.files, self.interface)
+
+
+@dataclass(frozen=True)
+class Refusal:
+    """Why there is no such candidate; ``inapplicable`` if that lies in the system, not in size or time."""
+
+    reason: str
+    inapplicable: bool = False
+    seconds: float = 0.0
+
+
+Outcome = Built | Refusal
+
+
+def build(spec: Spec, system: System, setting: Setting) -> Built:
+    """Generate and compile one candidate. Raises `PhigenError` as `compile_spec` and the compiler do."""
+    start = time.perf_counter()
+    return built(compile_spec(setting.applied(spec), system=system), setting, start)
+
+
+def built(compilation: Compilation, setting: Setting, start: float) -> Built:
+    """A compilation, compiled as C where there is a compiler; ``start`` is when the work on it began."""
+    program, target = compilation.program, chosen_target("auto")
+    files = emit(program, target, f"phigen build {program.name}.yaml")
+    if target == "c":
+        cache.build(files)
+    step = program.step
+    stages = step.schedule.stages if isinstance(step, Splitting) else len(program.fractions)
+    composition = step.composition if isinstance(step, Splitting) else ""
+    return Built(
+        setting, files, interface_of(program), compilation.label, program.order, compilation.exact,
+        compilation.symmetric, bool(program.gauge), stages, composition,
+        time.perf_counter() - start,
+    )  # fmt: skip
+
+
+def build_all(
+    spec: Spec, system: System, settings: Sequence[Setting], deadline: float
+) -> Iterator[tuple[Setting, Outcome]]:
+    """The outcome of each setting, in the order in which they are done; what is not done at the deadline is ended.
+
+    ``deadline`` is a time of `time.perf_counter`.
+    """
+    waiting, running = list(settings), dict[Connection, tuple[Setting, Any, float]]()
+    context: Any = multiprocessing.get_context("fork" if sys.platform != "win32" else "spawn")
+    try:
+        while waiting or running:
+            while waiting and len(running) < min(WORKERS, os.cpu_count() or 1) and time.perf_counter() < deadline:
+                setting = waiting.pop(0)
+                ours, theirs = context.Pipe(duplex=False)
+                process = context.Process(target=_work, args=(spec, system, setting, theirs), daemon=True)
+                process.start()
+                theirs.close()
+                running[ours] = (setting, process, time.perf_counter())
+            if time.perf_counter() >= deadline:
+                late = [*waiting, *(setting for setting, _, _ in running.values())]
+                yield from ((setting, Refusal("there was no time to build it")) for setting in late)
+                return
+            for ready in wait(list(running), max(0.0, deadline - time.perf_counter())):
+                assert isinstance(ready, Connection)
+                setting, process, start = running.pop(ready)
+                outcome = _received(ready, time.perf_counter() - start)
+                process.join(_GRACE)
+                yield setting, outcome
+    finally:
+        for connection, (_, process, _) in running.items():
+            _end(process)
+            connection.close()
+
+
+def _received(pipe: Connection, seconds: float) -> Outcome:
+    try:
+        outcome: Outcome = pipe.recv()
+    except EOFError:
+        return Refusal("building it failed", seconds=seconds)
+    finally:
+        pipe.close()
+    return outcome
+
+
+def _work(spec: Spec, system: System, setting: Setting, pipe: Connection) -> None:
+    """The body of a process. Ended from outside it still unwinds: that ends the C compiler it may be waiting for."""
+
+    def leave(*_: Any) -> None:
+        raise SystemExit(1)
+
+    for name in (signal.SIGTERM, signal.SIGINT):
+        signal.signal(name, leave)
+    # Whatever is to be told goes through the pipe; an interpreter that is ended may complain of it.
+    os.dup2(os.open(os.devnull, os.O_WRONLY), 2)
+    start, outcome = time.perf_counter(), Refusal("building it failed")
+    try:
+        pipe.send(build(spec, system, setting))
+        return
+    except SpecError as error:
+        inapplicable = error.exit_code == SpecError.exit_code
+        outcome = Refusal(error.diagnostics[0].message, inapplicable)
+    except PhigenError as error:
+        outcome = Refusal(str(error).split("\n")[0])
+    except (ArithmeticError, MemoryError, RecursionError) as error:
+        outcome = Refusal(f"{type(error).__name__}: {error}")
+    pipe.send(Refusal(outcome.reason, outcome.inapplicable, time.perf_counter() - start))
+
+
+def _end(process: Any) -> None:
+    process.terminate()
+    process.join(_GRACE)
+    if process.is_alive():
+        process.kill()
+        process.join()

@@ -1,0 +1,117 @@
+"""What is solved, and the methods that solve it: compiled, and started from its initial state."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from phigen.geometry.system import System
+from phigen.runtime.backend import Backend
+from phigen.runtime.interface import BackendError, row_steps
+from phigen.runtime.session import rows_along
+from phigen.study.arrays import Floats, evaluate
+from phigen.study.conservation import Unit, units
+from phigen.study.race import Runner
+
+
+@dataclass(frozen=True)
+class Problem:
+    """What is solved: the numbers of a run, and for how long. ``step`` is that of the run, a first guess.
+
+    Steps and times are positive here; ``direction`` is −1 for a run back in time.
+    """
+
+    system: System
+    start: Floats
+    parameters: Mapping[str, float]
+    step: float
+    horizon: float
+    direction: float = 1.0
+
+    @property
+    def unit(self) -> Unit:
+        """What errors of the energy are counted in."""
+        (found,) = units([self.system.hamiltonian], self.system.coordinates, self.parameters, self.start)
+        return found
+
+    def energies(self, states: Floats) -> Floats:
+        """H of states (rows, DIM)."""
+        values = {**self.parameters, **{c: states[:, i] for i, c in enumerate(self.system.coordinates)}}
+        (found,) = evaluate([self.system.hamiltonian], values)
+        return np.broadcast_to(found, (len(states),))
+
+
+class Method(Protocol):
+    """A compiled method, started from the problem's initial state."""
+
+    def rows(self, h: float, steps: int, stride: int) -> Floats | None:
+        """States (rows, DIM) after 0, stride, 2·stride, … and all steps; None if one cannot be made."""
+        ...
+
+    def walk(self, h: float) -> Callable[[int], object]:
+        """A function to be timed: from the start, it makes so many steps, and with each call so many more."""
+        ...
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A solver of phigen's as a method."""
+
+    solver: Backend
+    problem: Problem
+
+    def rows(self, h: float, steps: int, stride: int) -> Floats | None:
+        problem = self.problem
+        try:
+            session = self.solver.start(problem.start, problem.parameters)
+            found = rows_along(session, problem.direction * h, steps, stride, None)
+        except BackendError:
+            return None
+        return found if np.isfinite(found).all() else None
+
+    def reach(self, h: float, steps: int) -> tuple[float, str]:
+        """The time of the last step that can be made, and the status of the next, of so many."""
+        try:
+            session = self.solver.start(self.problem.start, self.problem.parameters)
+            session.advance(self.problem.direction * h, steps)
+        except BackendError as error:
+            return error.step * h, error.status
+        return steps * h, "OK"
+
+    def walk(self, h: float) -> Callable[[int], object]:
+        session = self.solver.start(self.problem.start, self.problem.parameters)
+        return lambda steps: session.advance(self.problem.direction * h, steps)
+
+
+@dataclass(frozen=True)
+class Classical:
+    """A classical method in compiled C as a method; ``state`` is where its runner starts."""
+
+    runner: Runner
+    state: Floats
+    problem: Problem
+
+    def rows(self, h: float, steps: int, stride: int) -> Floats | None:
+        marks = row_steps(steps, stride)
+        states = np.empty((len(marks), len(self.state)))
+        states[0] = self.problem.start
+        for row in range(1, len(marks)):
+            self.state[:] = states[row - 1]
+            found = self.runner(self.problem.direction * h, int(marks[row] - marks[row - 1]), 1)
+            if found is None:
+                return None
+            states[row] = found
+        return states
+
+    def walk(self, h: float) -> Callable[[int], object]:
+        # Its steps take the same time everywhere: all calls start where the problem does.
+        self.state[:] = self.problem.start
+        return lambda steps: self.runner(self.problem.direction * h, steps, 1)
+
+
+def steps_in(span: float, h: float) -> int:
+    """The number of steps that fill a span of time, at least one."""
+    return max(1, round(span / h))

@@ -1,0 +1,112 @@
+"""The solution to compare orbits with: by two methods of different kinds, trusted as far as these agree."""
+
+from __future__ import annotations
+
+import math
+import time
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from phigen.errors import CheckError
+from phigen.study.arrays import Floats
+from phigen.tuning.problem import Method
+from phigen.tuning.trials import MARKS
+
+#: Steps are halved until that changes no more than this part of the accuracy.
+CONVERGED = 0.02
+#: The two may differ by this part of the accuracy.
+AGREED = 0.2
+_HALVINGS = 16
+#: Where an orbit is looked at but no accuracy is asked of it: an error below this says enough.
+KNOWN = 1e-12
+
+
+@dataclass
+class Reference:
+    """The solution by one method at a step of at most ``step``: states (count + 1, DIM) at multiples of any spacing.
+
+    ``uncertainty`` is the distance of the other method, relative to the largest coordinate.
+    """
+
+    method: Method
+    step: float
+    uncertainty: float
+    _known: dict[tuple[float, int], Floats] = field(default_factory=dict)
+
+    def __call__(self, spacing: float, count: int) -> Floats:
+        key = (spacing, count)
+        if key not in self._known:
+            stride = math.ceil(spacing / self.step)
+            found = self.method.rows(spacing / stride, stride * count, stride)
+            if found is None:
+                raise CheckError(f"the reference solution cannot be followed to t = {spacing * count:.6g}")
+            self._known[key] = found
+        return self._known[key]
+
+
+def agreed(first: Method, second: Method, step: float, span: float, accuracy: float, seconds: float) -> Reference:
+    """The reference over a time span by the first method, confirmed by the second.
+
+    ``accuracy`` is the error that is to be measured, relative to the largest coordinate; each method may take so many
+    ``seconds``. Raises `CheckError` if the two do not agree well enough to measure that error.
+    """
+    spacing = span / MARKS
+    found = []
+    for method in (first, second):
+        converged = _converged(method, min(step, spacing), spacing, MARKS, accuracy, time.perf_counter() + seconds)
+        if converged is None:
+            raise CheckError(f"no reference solution: a method fails before t = {span:.6g}")
+        found.append(converged)
+    (states, h, _), (others, _, _) = found
+    difference = distance(states, others)
+    if difference > AGREED * accuracy:
+        size = float(np.max(np.abs(others))) or 1.0
+        apart = np.max(np.abs(states - others), axis=1) > AGREED * accuracy * size
+        raise CheckError(
+            f"no reference solution for the orbit: an error of {accuracy:.1e} is to be measured, but two methods at "
+            f"small steps agree to that only up to t = {spacing * int(np.argmax(apart)):.4g} of {span:.6g}\n"
+            "  hint: chaotic motion and rounding both do that; ask for a shorter --horizon or less accuracy, or "
+            "let --measure be energy"
+        )
+    return Reference(first, h, difference)
+
+
+def orbit_error(states: Floats, spacing: float, other: Method, step: float, seconds: float) -> float | None:
+    """How far states (rows, DIM) at multiples of a spacing are from those of another method at small steps.
+
+    Relative to the largest coordinate; None if the other method does not know the orbit that well in so many seconds.
+    """
+    count, until = len(states) - 1, time.perf_counter() + seconds
+    found = _converged(other, min(step, spacing), spacing, count, KNOWN, until)
+    if found is None:
+        return None
+    error = distance(states, found[0])
+    return error if found[2] < max(AGREED * error, KNOWN) else None
+
+
+def distance(states: Floats, others: Floats) -> float:
+    """The largest difference of states (rows, DIM), relative to the largest coordinate."""
+    return float(np.max(np.abs(states - others))) / (float(np.max(np.abs(others))) or 1.0)
+
+
+def _converged(
+    method: Method, step: float, spacing: float, count: int, accuracy: float, until: float
+) -> tuple[Floats, float, float] | None:
+    """States at a step where halving it changes nothing that counts, or no less than before; the step; that change."""
+    last: Floats | None = None
+    best: tuple[Floats, float, float] | None = None
+    change = math.inf
+    for k in range(_HALVINGS):
+        stride = max(1, math.ceil(spacing / step * 2.0**k))
+        states = method.rows(spacing / stride, stride * count, stride)
+        if states is None:
+            continue
+        if last is not None:
+            before, change = change, distance(last, states)
+            if change > before and best is not None:
+                break
+        best, last = (states, spacing / stride, change), states
+        if change <= CONVERGED * accuracy or time.perf_counter() > until:
+            break
+    return best

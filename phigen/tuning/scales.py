@@ -1,0 +1,42 @@
+"""The scales of a search: over what time a method is measured, and which steps are too large to be of use."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from phigen.study.arrays import Floats
+from phigen.tuning.problem import Candidate, Problem, steps_in
+from phigen.tuning.timing import nanoseconds_per_step
+
+#: A scan measures over so many steps of the run's size at most, and over so many seconds of CPU time.
+PIECE_STEPS, PIECE_SECONDS = 20_000, 0.02
+#: A step turns the fastest motion by this angle at most: fewer than three steps in a turn show no motion. And there
+#: are at least so many.
+MOST_TURN, LEAST_STEPS = 2.0, 24
+
+
+def scales(problem: Problem, method: Candidate) -> tuple[float, float]:
+    """The time over which candidates are scanned, and the largest step that shows the motion."""
+    h = problem.step
+    few = steps_in(min(problem.horizon, 500 * h), h)
+    states = method.rows(h, few, max(1, few // 16))
+    if states is None:
+        return problem.horizon, problem.horizon / LEAST_STEPS
+    nanoseconds = nanoseconds_per_step(method, h, few)
+    steps = min(max(1e9 * PIECE_SECONDS / nanoseconds, 500), PIECE_STEPS)
+    rate = fastest_rate(lambda x: method.solver.vector_field(x, problem.parameters), states)
+    return min(problem.horizon, steps * h), min(MOST_TURN / max(rate, 1e-300), problem.horizon / LEAST_STEPS)
+
+
+def fastest_rate(field: Callable[[Floats], Floats], states: Floats) -> float:
+    """The largest absolute eigenvalue of the derivative of the vector field at some states (rows, DIM)."""
+    size = float(np.max(np.abs(states))) or 1.0
+    width, rate = 1e-6 * size, 0.0
+    for x in states:
+        moves = width * np.eye(len(x))
+        jacobian = (field(x + moves) - field(x - moves)).T / (2 * width)
+        if np.isfinite(jacobian).all():
+            rate = max(rate, float(np.max(np.abs(np.linalg.eigvals(jacobian)))))
+    return rate

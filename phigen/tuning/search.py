@@ -1,0 +1,280 @@
+"""The choice: which step reaches an accuracy, which candidates to try next, which of them is the cheapest.
+
+Nothing here measures anything: all are functions of measured points.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+from phigen.tuning.settings import Setting, direct, variants
+from phigen.tuning.trials import ROUNDING, Point
+
+#: The factor between step sizes of a scan, and how many there are at most.
+FINER, MOST_POINTS = math.sqrt(2.0), 48
+#: Steps below the first guess that may fail.
+FAILURES = 16
+#: A scan goes on to this part of the accuracy, for the picture.
+BEYOND = 1 / 30
+#: The step aims at this part of the accuracy, since the largest error of a longer run is a little larger.
+AIM = 0.8
+#: Smaller steps are tried until one costs so much more than the cheapest: their iterations may be fewer.
+DEARER = 1.25
+#: Bi-realisations this many times as expensive as the best are not followed to other orders.
+KEEP = 3.0
+#: Halving the step twice gains at least this factor, unless rounding is all that is left.
+GAIN = 1.5
+
+
+@dataclass(frozen=True)
+class Curve:
+    """What was measured of one method: points from coarse to fine. ``setting`` is None for a classical method.
+
+    ``bounded`` says whether its energy error is: of Poisson maps, not of truncated ones and classical methods.
+    """
+
+    label: str
+    order: int
+    points: tuple[Point, ...]
+    setting: Setting | None = None
+    gauged: bool = False
+    symmetric: bool = True
+    bounded: bool = True
+    stages: int = 1
+    composition: str = ""
+    seconds: float = 0.0
+
+    @property
+    def key(self) -> Setting | str:
+        """What it is known by: its setting, or its label if it is classical."""
+        return self.setting or self.label
+
+    @property
+    def title(self) -> str:
+        """What distinguishes it, in words."""
+        return self.setting.described(self.label) if self.setting else self.label
+
+    @property
+    def largest(self) -> float:
+        """The largest step that could be made over the whole time, 0 if none."""
+        return max((p.step for p in self.points), default=0.0)
+
+    def cost(self, accuracy: float) -> float:
+        """Nanoseconds of a unit of time at an accuracy: measured, or by the order from the finest step; else inf."""
+        return cheapest_step(self.points, accuracy, self.order)[1]
+
+
+def _floor(points: Sequence[Point]) -> int:
+    """The index of the point with the smallest error, beyond which rounding grows; the last of all without rounding."""
+    least = min((p.error for p in points), default=0.0)
+    return next(
+        (i for i, p in enumerate(points) if p.error <= 2 * least and at_floor(points[: i + 1])), len(points) - 1
+    )
+
+
+def at_floor(points: Sequence[Point]) -> bool:
+    """Whether the last points show rounding only: halving the step has gained next to nothing, at small errors."""
+    if points and points[-1].rounding > points[-1].error / 2:
+        return True
+    if len(points) < 3:
+        return False
+    before, last = points[-3], points[-1]
+    return before.error < GAIN * last.error and before.measured < 1e-9
+
+
+def step_for(points: Sequence[Point], accuracy: float, order: int) -> float | None:
+    """The largest step whose error is the accuracy: between two measured ones, or by the order beyond the finest.
+
+    None if no step reaches it, as far as can be told.
+    """
+    points = points[: _floor(points) + 1]
+    if not points:
+        return None
+    meeting = [i for i, p in enumerate(points) if p.error <= accuracy]
+    if not meeting:
+        return _beyond(points, accuracy, order)
+    first = len(points)
+    while first > 0 and points[first - 1].error <= accuracy:
+        first -= 1
+    if first == len(points):  # a coarse step meets it by chance, the finest does not
+        return _beyond(points, accuracy, order)
+    if first == 0:
+        return points[0].step
+    return _between(points[first - 1], points[first], accuracy)
+
+
+def _beyond(points: Sequence[Point], accuracy: float, order: int) -> float | None:
+    """The step below the finest at which the error should be the accuracy; None if rounding is in the way."""
+    last = points[-1]
+    if at_floor(points) or accuracy < max(ROUNDING, last.rounding):
+        return None
+    return last.step * math.pow(accuracy / last.error, 1 / order)
+
+
+def cheapest_step(points: Sequence[Point], accuracy: float, order: int) -> tuple[float, float]:
+    """The step that meets the accuracy at the least cost, and that cost in nanoseconds per unit of time; or 0 and inf.
+
+    That need not be the largest: at a smaller one the predicted solution may be so good that an iteration less does.
+    """
+    largest = step_for(points, accuracy, order)
+    if largest is None:
+        return 0.0, math.inf
+    options = [(nanoseconds_at(points, largest) / largest, largest)]
+    options += [(p.cost, p.step) for p in points if p.step < largest and p.error <= accuracy]
+    cost, step = min(options)
+    return step, cost
+
+
+def _between(coarse: Point, fine: Point, accuracy: float) -> float:
+    """The step at which the error is the accuracy, on a straight line through two points in log–log scale."""
+    if coarse.error <= fine.error:
+        return fine.step
+    share = math.log(accuracy / fine.error) / math.log(coarse.error / fine.error)
+    return fine.step * math.pow(coarse.step / fine.step, min(max(share, 0.0), 1.0))
+
+
+def nanoseconds_at(points: Sequence[Point], step: float) -> float:
+    """The time of one step, between measured ones; that of the nearest outside."""
+    listed = sorted(points, key=lambda p: p.step)
+    for low, high in pairwise(listed):
+        if low.step <= step <= high.step:
+            share = math.log(step / low.step) / math.log(high.step / low.step)
+            return low.nanoseconds * math.pow(high.nanoseconds / low.nanoseconds, share)
+    return min(listed, key=lambda p: abs(math.log(p.step / step))).nanoseconds
+
+
+def scan(
+    measure: Callable[[float], Point | None],
+    first: float,
+    most: float,
+    accuracy: float,
+    order: int,
+    worth: float = math.inf,
+    patience: Callable[[], bool] = lambda: True,
+) -> tuple[Point, ...]:
+    """Points from the largest step that can be made, at most ``most``, down to the accuracy and to the cheapest step.
+
+    Ends early where the accuracy would cost more than ``worth`` nanoseconds per unit of time, where rounding is all
+    that is left, and when ``patience`` is gone.
+    """
+    points = _coarsest(measure, min(first, most), most, patience)
+    while points and len(points) < MOST_POINTS and patience():
+        if _enough(points, accuracy) or _hopeless(points, accuracy, order, worth):
+            break
+        found = measure(points[-1].step / FINER)
+        if found is None:
+            break
+        points.append(found)
+    for _ in range(2):
+        points = _refined(points, measure, step_for(points, AIM * accuracy, order), patience)
+    cheapest, _ = cheapest_step(points, AIM * accuracy, order)
+    for factor in (math.sqrt(FINER), 1 / math.sqrt(FINER)):
+        points = _refined(points, measure, cheapest * factor, patience)
+    return tuple(points)
+
+
+def _enough(points: Sequence[Point], accuracy: float) -> bool:
+    """Whether steps are fine enough for the accuracy, and finer ones cost more; or rounding is all that is left."""
+    last = points[-1]
+    costs = [p.cost for p in points if p.error <= accuracy]
+    if at_floor(points) and not costs:
+        return True
+    dearer = bool(costs) and last.cost > DEARER * min(costs)
+    return dearer and (last.error <= BEYOND * accuracy or at_floor(points))
+
+
+def _refined(
+    points: list[Point], measure: Callable[[float], Point | None], step: float | None, patience: Callable[[], bool]
+) -> list[Point]:
+    """The points with one more between them, unless one is there already."""
+    if not points or not step or not points[-1].step < step < points[0].step or not patience():
+        return points
+    if any(abs(math.log(p.step / step)) < 0.02 for p in points):
+        return points
+    found = measure(step)
+    return sorted([*points, found], key=lambda p: -p.step) if found else points
+
+
+def _coarsest(
+    measure: Callable[[float], Point | None], first: float, most: float, patience: Callable[[], bool]
+) -> list[Point]:
+    """The largest step that can be made, to a factor `FINER`, from a first guess; empty if there is none near it."""
+    step, found = first, measure(first)
+    for _ in range(FAILURES):
+        if found is not None or not patience():
+            break
+        step /= FINER
+        found = measure(step)
+    if found is None:
+        return []
+    points = [found]
+    while points[0].step < 0.97 * most and step == first:
+        coarser = measure(min(points[0].step * FINER, most))
+        if coarser is None:
+            break
+        points.insert(0, coarser)
+    return points
+
+
+def _hopeless(points: Sequence[Point], accuracy: float, order: int, worth: float) -> bool:
+    """Whether the accuracy, by the order, would cost more than it is worth."""
+    last = points[-1]
+    if last.cost > worth and last.error > accuracy:
+        return True
+    if len(points) < 4 or last.error > 1e-2 or last.error <= accuracy:
+        return False
+    gain = math.log(points[-3].error / last.error) / math.log(points[-3].step / last.step)
+    step = last.step * math.pow(accuracy / last.error, 1 / max(gain, order, 1))
+    return last.nanoseconds / step > worth
+
+
+def proposals(tried: Mapping[Setting, Curve], refused: Sequence[Setting], accuracy: float) -> list[Setting]:
+    """The settings to try next, the most promising first; empty when none is.
+
+    A bi-realisation that is not far behind the best goes to the next higher order while that pays, then to the next
+    lower one; the best is also tried without gauge and composed.
+    """
+    costs = {setting: curve.cost(accuracy) for setting, curve in tried.items()}
+    families: dict[Setting, dict[int, float]] = {}
+    for setting, cost in costs.items():
+        families.setdefault(setting.family, {})[setting.order] = cost
+    ranked = sorted(families, key=lambda family: min(families[family].values()))
+    least = min(costs.values(), default=math.inf)
+    found: list[Setting] = []
+    for family in ranked:
+        orders = families[family]
+        best = min(orders, key=lambda order: (orders[order], -order))
+        if orders[best] > KEEP * least:
+            continue
+        setting = next(s for s in tried if s.family == family and s.order == best)
+        found += _neighbours(setting, orders, refused)
+        if family == ranked[0] and family.composition == direct(family):
+            curve = tried[setting]
+            known = {(s.chart, s.composition, s.gauge * (s.composition == "none")) for s in (*tried, *refused)}
+            found += [
+                v for v in variants(setting, curve.gauged, curve.symmetric)
+                if (v.chart, v.composition, v.gauge * (v.composition == "none")) not in known
+            ]  # fmt: skip
+    return list(dict.fromkeys(found))
+
+
+def _neighbours(best: Setting, orders: Mapping[int, float], refused: Sequence[Setting]) -> list[Setting]:
+    """The next higher order, if it was not tried and not refused; else the next lower one."""
+    above = [k for k in best.orders if k > best.order]
+    below = [k for k in best.orders if k < best.order]
+    closed = {s.order for s in refused if s.family == best.family}
+    if above and above[0] not in orders and not any(k <= above[0] for k in closed if k > best.order):
+        return [replace(best, order=above[0])]
+    if below and below[-1] not in orders and below[-1] not in closed and math.isfinite(orders[best.order]):
+        return [replace(best, order=below[-1])]
+    return []
+
+
+def rounded_down(step: float, digits: int = 3) -> float:
+    """The step with so few digits that it can be read, never larger."""
+    exponent = math.floor(math.log10(step)) - digits + 1
+    found = float(f"{math.floor(step / 10.0**exponent + 1e-9)}e{exponent}")
+    return found if found <= step else step

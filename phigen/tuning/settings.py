@@ -1,0 +1,137 @@
+"""What can be chosen for a spec: bi-realisation, order, gauge, composition, scheme; and the lines that say it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+from phigen.compilation import Compilation
+from phigen.geometry.shapes import Affine, Canonical, Constant, LiePoisson
+from phigen.geometry.system import System
+from phigen.scheme import choosing
+from phigen.scheme.composition import COMPOSITIONS
+from phigen.spec import limits
+from phigen.spec.model import BirealisationChoice, Spec
+from phigen.spec.names import BIREALISATIONS
+
+#: What the spec itself says, where that cannot be said by a name: formulas, or options of a kind.
+OWN = "as in the spec"
+
+#: Orders of direct series; canonical-euler is also explicit at order 1, for separable H.
+ORDERS = tuple(range(2, limits.ORDER + 1, 2))
+
+#: The scheme that needs no bi-realisation, which stands in the place of its kind.
+SPLITTING = "splitting"
+
+#: Kinds that need formulas of the user, and those with choices of their own.
+_FORMULAS = ("custom", "group-map", "spray")
+_CHOICES = ("auto", "canonical-euler", "product", "pullback")
+_NESTED = (("product", "auto"), ("product", "cayley"), ("pullback", "auto"), ("pullback", "cayley"))
+
+
+@dataclass(frozen=True, order=True)
+class Setting:
+    """One way to solve a system; ``kind`` and ``gauge`` may be `OWN`. ``of`` is that of products and pull-backs.
+
+    A splitting has the kind `SPLITTING`, no gauge, and the composition ``auto``.
+    """
+
+    kind: str
+    order: int
+    gauge: str = "auto"
+    composition: str = "none"
+    of: str = "auto"
+
+    @property
+    def family(self) -> Setting:
+        """The setting without its order: what is common to methods that differ in the order alone."""
+        return replace(self, order=0)
+
+    @property
+    def chart(self) -> Setting:
+        """The bi-realisation alone."""
+        return Setting(self.kind, 0, of=self.of)
+
+    @property
+    def orders(self) -> tuple[int, ...]:
+        """The orders there are in its family."""
+        if self.is_splitting:
+            return tuple(choosing.orders(self.composition))
+        if self.composition not in ("none", "auto"):
+            return tuple(c.order for c in COMPOSITIONS if c.name == self.composition)
+        return (1, *ORDERS) if self.kind == "canonical-euler" else ORDERS
+
+    def described(self, kind: str = "") -> str:
+        """In words: ``exponential, order 8, without gauge, kahan-li``; ``kind`` is what it turned out to be."""
+        named = self.kind if self.of == "auto" else f"{self.kind} of {self.of}"
+        words = [kind or named, f"order {self.order}"]
+        words += ["without gauge"] if self.gauge == "none" and not self.is_splitting else []
+        return ", ".join([*words, self.composition] if self.composition not in ("none", "auto") else words)
+
+    @property
+    def is_splitting(self) -> bool:
+        """Whether its scheme is a splitting."""
+        return self.kind == SPLITTING
+
+    def lines(self) -> list[str]:
+        """The top-level lines of a spec that ask for it; what is `OWN` stays as it is there."""
+        kind = "auto" if self.is_splitting else self.kind
+        named = kind if self.of == "auto" else f"{{kind: {kind}, of: {self.of}}}"
+        lines = [f"scheme: {SPLITTING if self.is_splitting else 'series'}"]
+        lines += [] if kind == OWN else [f"birealisation: {named}"]
+        lines += [f"order: {self.order}", f"composition: {self.composition}"]
+        return lines if self.gauge == OWN else [*lines, f"gauge: {self.gauge}"]
+
+    def applied(self, spec: Spec) -> Spec:
+        """The spec with this setting."""
+        kind = "auto" if self.is_splitting else self.kind
+        choice = spec.birealisation if kind == OWN else BirealisationChoice(kind, of=self.of)
+        return replace(
+            spec, scheme=SPLITTING if self.is_splitting else "series", birealisation=replace(choice, order=self.order),
+            order=self.order, terms=None, composition=self.composition,
+            gauge=spec.gauge if self.gauge == OWN else self.gauge,
+        )  # fmt: skip
+
+
+def own_setting(compilation: Compilation) -> Setting:
+    """What a spec says now, in the words of what it was compiled to."""
+    spec, realisation, order = compilation.spec, compilation.realisation, compilation.order.order
+    gauge = spec.gauge if isinstance(spec.gauge, str) else OWN
+    if realisation is None:
+        return Setting(SPLITTING, order, gauge, spec.composition)
+    choice = spec.birealisation
+    plain = choice == BirealisationChoice(choice.kind) and choice.kind not in _FORMULAS
+    composed = len(compilation.program.fractions) > 1
+    return Setting(realisation.kind if plain else OWN, order, gauge, spec.composition if composed else "none")
+
+
+def charts(system: System, own: Setting) -> list[Setting]:
+    """Settings to begin with: one of order 4 for each bi-realisation that might apply, the spec's own at more orders.
+
+    Left out are those that need formulas of the user, and Karasev's paths where π is linear or constant: there its
+    maps are those of a closed form. Which of the others apply, building them shows.
+    """
+    linear = isinstance(system.shape, Constant | Canonical | LiePoisson | Affine)
+    plain = [kind for kind in BIREALISATIONS if kind not in (*_FORMULAS, *_CHOICES)]
+    named = [Setting(kind, 4) for kind in plain if not (kind == "karasev" and linear)]
+    nested = [Setting(kind, 4, of=of) for kind, of in _NESTED]
+    # The other side is the adjoint, whose errors are the same in reversed time.
+    euler = [Setting("canonical-euler", order) for order in (1, 4)]
+    split = [Setting(SPLITTING, order, "none", "auto") for order in (4, 6)]
+    first = [replace(own, order=order, composition=direct(own)) for order in (4, 8)]
+    others = [s for s in (*split, *named, *nested, *euler) if s.chart != own.chart]
+    return [s for s in (*first, *others) if s != own]
+
+
+def direct(setting: Setting) -> str:
+    """The composition of the plain methods of its kind."""
+    return "auto" if setting.is_splitting else "none"
+
+
+def variants(best: Setting, gauged: bool, symmetric: bool) -> list[Setting]:
+    """The same bi-realisation at about the same order otherwise: without gauge, or composed."""
+    found = [replace(best, gauge="none")] if gauged else []
+    if symmetric and not best.is_splitting:
+        recommended = {c.order: c.name for c in reversed(COMPOSITIONS)}
+        order = max((k for k in recommended if k <= best.order), default=min(recommended))
+        found.append(replace(best, composition=recommended[order], order=order))
+    return found

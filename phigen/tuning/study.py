@@ -1,0 +1,186 @@
+"""The whole of tuning one run of a spec: search, confirm, compare."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from statistics import median
+
+from phigen.compilation import Compilation
+from phigen.study.conservation import Unit
+from phigen.tuning import search
+from phigen.tuning.problem import Problem, steps_in
+from phigen.tuning.search import Curve
+from phigen.tuning.settings import Setting
+from phigen.tuning.timing import nanoseconds_per_step
+from phigen.tuning.trials import Point
+from phigen.tuning.tuner import Clock, Notify, Tuner
+
+#: The share of the budget that one confirming run may take, how many times as much if it must, the attempts at a step.
+CONFIRMING, PATIENCE, ATTEMPTS = 0.05, 4.0, 4
+#: Finalists, how far behind the best they may be, and the rounds in which all are timed in turn.
+FINALISTS, BEHIND, ROUNDS = 4, 2.0, 7
+#: Costs this close are equal: then the lower order wins.
+EQUAL = 1.1
+
+
+@dataclass(frozen=True)
+class Finalist:
+    """A method at the step proposed for it: confirmed over ``point.time``, and timed beside the others.
+
+    ``seconds`` are the CPU seconds of a unit of time, one for each round.
+    """
+
+    curve: Curve
+    point: Point
+    seconds: tuple[float, ...] = ()
+
+    @property
+    def cost(self) -> float:
+        """CPU seconds of a unit of time: the median."""
+        return median(self.seconds) if self.seconds else math.nan
+
+
+@dataclass(frozen=True)
+class Tuning:
+    """What was found. ``finalists`` meet the accuracy, the best first; there are none if nothing does.
+
+    ``own`` is the spec's own setting at the accuracy, None if it does not reach it; ``present`` that at the run's
+    step; ``peers`` are classical methods at the accuracy, those that reach it. Scans were made over ``piece`` of the
+    ``horizon``. ``refused`` tells why other candidates were not measured; ``finished`` whether no more seemed worth
+    trying; ``orbit_error`` that of the best over the piece where the energy was measured, None if that is unknown.
+    ``unit`` is what errors of the energy are counted in.
+    """
+
+    measure: str
+    accuracy: float
+    horizon: float
+    piece: float
+    curves: tuple[Curve, ...]
+    finalists: tuple[Finalist, ...]
+    own: Finalist | None
+    present: Finalist | None
+    peers: tuple[Finalist, ...] = ()
+    refused: Mapping[Setting, str] = field(default_factory=dict)
+    finished: bool = True
+    orbit_error: float | None = None
+    unit: Unit = field(default_factory=Unit)
+
+    @property
+    def winner(self) -> Finalist | None:
+        """The proposal."""
+        return self.finalists[0] if self.finalists else None
+
+    @property
+    def closest(self) -> tuple[Curve, Point]:
+        """The smallest error that was measured."""
+        listed = [(c, p) for c in self.curves for p in c.points if c.setting]
+        return min(listed, key=lambda pair: pair[1].error)
+
+
+def tune(
+    compilation: Compilation, problem: Problem, measure: str, accuracy: float, budget: float,
+    note: Notify = lambda text: None,
+) -> Tuning:  # fmt: skip
+    """Measure the candidates of a spec on a run, and find the cheapest that meets the accuracy.
+
+    ``measure`` is ``energy``, the largest error of the energy on the way, or ``orbit``, the distance from a
+    reference. Takes about ``budget`` seconds at most. Raises `StepError` if the spec's own setting cannot make even
+    small steps, `CheckError` if there is no reference, `ToolchainError` without a C compiler.
+    """
+    clock = Clock(budget)
+    tuner = Tuner(compilation, problem, accuracy, clock, note)
+    own = tuner.start(measure)
+    finished = tuner.search(own)
+    classical = tuner.peers()
+    finalists = final(tuner, own)
+    present = _present(tuner, own)
+    peers = [Finalist(c, p) for c in classical if (p := confirmed(tuner, c))]
+    timed = time_all([*finalists, *peers, *([present] if present else [])], tuner)
+    ranked, peers = ranking(timed[: len(finalists)]), timed[len(finalists) :][: len(peers)]
+    look = ranked and measure == "energy"
+    return Tuning(
+        measure, accuracy, problem.horizon, tuner.piece, (*tuner.tried.values(), *classical), tuple(ranked),
+        next((f for f in ranked if f.curve is own), None), timed[-1] if present else None, tuple(peers),
+        {s: why for s, why in tuner.refused.items() if why}, finished,
+        tuner.orbit_error(ranked[0].curve, ranked[0].point.step) if look else None, problem.unit,
+    )  # fmt: skip
+
+
+def ranking(finalists: Sequence[Finalist]) -> list[Finalist]:
+    """By cost; of those as cheap as the best, as far as can be told, the lowest order comes first, without gauge."""
+    ranked = sorted(finalists, key=lambda f: f.cost)
+    equal = [f for f in ranked if f.cost <= EQUAL * ranked[0].cost]
+    simple = min(equal, key=lambda f: (f.curve.order * max(f.curve.stages, 1), f.curve.gauged, f.cost), default=None)
+    return [simple, *(f for f in ranked if f is not simple)] if simple else []
+
+
+def final(tuner: Tuner, own: Curve) -> list[Finalist]:
+    """The best candidates and the spec's own setting, each at a step that was confirmed over a longer run."""
+    accuracy = tuner.accuracy
+    found: list[Finalist] = []
+    for curve in sorted(tuner.tried.values(), key=lambda c: c.cost(accuracy)):
+        enough = len(found) >= FINALISTS or tuner.clock.left(1.0) < 0
+        behind = bool(found) and curve.cost(accuracy) > BEHIND * found[0].point.cost
+        if math.isinf(curve.cost(accuracy)) or (found and (enough or behind) and curve is not own):
+            continue
+        point = confirmed(tuner, curve)
+        if point:
+            found.append(Finalist(curve, point))
+    return found
+
+
+def confirmed(tuner: Tuner, curve: Curve) -> Point | None:
+    """The cheapest step, with few digits, measured over the horizon or as much of it as there is time for.
+
+    One that misses the accuracy is reduced, some times. None if that does not help.
+    """
+    accuracy = tuner.accuracy
+    method, measure = tuner.methods[curve.key], tuner.measures[curve.bounded]
+    step, _ = search.cheapest_step(curve.points, search.AIM * accuracy, curve.order)
+    step = step or search.cheapest_step(curve.points, accuracy, curve.order)[0]
+    for _ in range(ATTEMPTS):
+        if not step:
+            return None
+        h = search.rounded_down(min(step, curve.largest))
+        span = confirming_span(tuner, curve, h)
+        if not span:
+            return None
+        point = measure(method, h, span)
+        if point and point.error <= accuracy:
+            return point
+        gain = math.pow(search.AIM * accuracy / point.error, 1 / curve.order) if point else 0.0
+        step = h * min(max(gain, 0.5), 0.95)
+    return None
+
+
+def confirming_span(tuner: Tuner, curve: Curve, h: float) -> float:
+    """The time that a confirming run covers: the horizon, or what its share of the budget allows.
+
+    Orbits are measured over the time of their reference. 0 if even the time of a scan would take too long.
+    """
+    seconds_per_step = 1e-9 * search.nanoseconds_at(curve.points, h)
+    affordable = h * CONFIRMING * tuner.clock.budget / seconds_per_step
+    if affordable * PATIENCE < tuner.piece:
+        return 0.0
+    return tuner.piece if tuner.referring else min(tuner.problem.horizon, max(affordable, tuner.piece))
+
+
+def _present(tuner: Tuner, own: Curve) -> Finalist | None:
+    """The spec as it is, with the step of the run."""
+    h = tuner.problem.step
+    span = confirming_span(tuner, own, h)
+    point = tuner.measures[own.bounded](tuner.methods[own.key], h, span) if span else None
+    return Finalist(own, point) if point else None
+
+
+def time_all(finalists: Sequence[Finalist], tuner: Tuner) -> list[Finalist]:
+    """All timed in turn, round after round, so that a disturbance meets all alike."""
+    seconds: list[list[float]] = [[] for _ in finalists]
+    for _ in range(ROUNDS):
+        for finalist, listed in zip(finalists, seconds, strict=True):
+            h = finalist.point.step
+            steps = steps_in(tuner.problem.horizon, h)
+            listed.append(1e-9 * nanoseconds_per_step(tuner.methods[finalist.curve.key], h, steps) / h)
+    return [replace(f, seconds=tuple(listed)) for f, listed in zip(finalists, seconds, strict=True)]

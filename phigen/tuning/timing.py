@@ -1,0 +1,56 @@
+"""How long a step takes, in a run of many."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable
+
+from phigen.runtime.interface import BackendError
+from phigen.tuning.problem import Method
+
+#: A measurement of time lasts at least so many seconds.
+LEAST_SECONDS = 2e-3
+#: Steps that are timed: first so few, then in parts that double from at most so many, and in all.
+FEW_STEPS, PART_STEPS, TIMED_STEPS = 64, 4096, 32_768
+
+
+def nanoseconds_per_step(method: Method, h: float, steps: int) -> float:
+    """CPU time on this thread of one of the steps of a run, the fastest of some; NaN if they cannot be made.
+
+    Without what is done once, such as choosing a gauge, and without the call from Python.
+    """
+    fastest = call = math.inf
+    spent = 0.0
+    try:
+        while spent < LEAST_SECONDS:
+            walk = method.walk(h)
+            walk(1)
+            call = min(call, _seconds(walk, 1))
+            taken, expected = _run_seconds(method.walk(h), steps)
+            fastest, spent = min(fastest, expected), spent + taken
+    except BackendError:
+        return math.nan
+    return 1e9 * max(fastest - call, 0.1 * fastest) / max(steps - 1, 1)
+
+
+def _run_seconds(walk: Callable[[int], object], steps: int) -> tuple[float, float]:
+    """The seconds that were taken, and those that all steps of a run would take.
+
+    Of a long run only so many are made that the rest should be as fast as the last of them: a solver in C first learns
+    the motion, then foresees it, and goes on in blocks of steps, several times as fast.
+    """
+    taken, done, part = 0.0, 0, min(FEW_STEPS, steps)
+    while True:
+        last = _seconds(walk, part)
+        taken, done = taken + last, done + part
+        if done >= min(steps, TIMED_STEPS) or last >= LEAST_SECONDS:
+            return taken, taken + last * (steps - done) / part
+        lasting = int(part * LEAST_SECONDS / last)
+        part = min(max(done, min(lasting, PART_STEPS)), steps - done)
+
+
+def _seconds(walk: Callable[[int], object], steps: int) -> float:
+    start = time.thread_time()
+    walk(steps)
+    return max(time.thread_time() - start, 1e-8)

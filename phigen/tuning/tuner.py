@@ -1,0 +1,266 @@
+"""The search for one run of a spec: candidates built and scanned, within a budget of time."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
+
+from phigen.api import chosen_target, solver_of
+from phigen.compilation import Compilation
+from phigen.errors import CheckError, StepError
+from phigen.study import race
+from phigen.tuning import search
+from phigen.tuning.building import Built, Outcome, Refusal, build_all, built
+from phigen.tuning.problem import Candidate, Classical, Method, Problem, steps_in
+from phigen.tuning.references import Reference, agreed, orbit_error
+from phigen.tuning.scales import scales
+from phigen.tuning.search import Curve
+from phigen.tuning.settings import SPLITTING, Setting, charts, direct, own_setting
+from phigen.tuning.trials import LINEAR, Measure, Point, energy_measure, marks, orbit_measure
+
+#: The share of the budget after which nothing more is built, that which one round of building may take, that which a
+#: first guess may be expected to take, and that of one scan and of one reference solution.
+SEARCHING, BUILDING, GUESSING, SCANNING, REFERRING = 0.65, 0.2, 0.1, 0.1, 0.05
+#: What the accuracy may cost a candidate relative to the best so far, and a classical method.
+WORTH, WORTH_KNOWING = 4.0, 100.0
+#: Classical methods beside which the result is shown: their names in tables, and orders.
+PEERS = {"rk4": ("RK4", 4), "dop853": ("DOP853", 8)}
+
+Notify = Callable[[str], object]
+
+
+class Clock:
+    """The budget of time."""
+
+    def __init__(self, budget: float) -> None:
+        self.budget, self.start = budget, time.perf_counter()
+
+    def at(self, share: float) -> float:
+        """The time of `time.perf_counter` at which this share is used up."""
+        return self.start + share * self.budget
+
+    def left(self, share: float) -> float:
+        """Seconds until then."""
+        return self.at(share) - time.perf_counter()
+
+
+class Tuner:
+    """The state of a search. ``measures`` maps True to the measure of Poisson maps, False to that of other methods.
+
+    ``piece`` is the time over which candidates are scanned, ``most`` the largest step that is of use, ``referring``
+    whether orbits are compared with a reference; ``target`` is C where there is a compiler.
+    """
+
+    def __init__(
+        self,
+        compilation: Compilation,
+        problem: Problem,
+        accuracy: float,
+        clock: Clock,
+        note: Notify = lambda text: None,
+    ) -> None:
+        self.compilation, self.problem, self.accuracy = compilation, problem, accuracy
+        self.clock, self.note = clock, note
+        self.target = chosen_target("auto")
+        self.tried: dict[Setting, Curve] = {}
+        self.refused: dict[Setting, str] = {}
+        self.methods: dict[Setting | str, Method] = {}
+        self.measures: Mapping[bool, Measure] = {own: energy_measure(problem, bounded=own) for own in (True, False)}
+        self.piece, self.most, self.referring = problem.horizon, math.inf, False
+        self._known: dict[str, Setting] = {}
+        self._made: dict[Setting, Built] = {}
+        self._race: race.Race | None = None
+        self._state = problem.start.copy()
+
+    def start(self, measure: str) -> Curve:
+        """Scan the spec's own setting: it gives the scales of the search, and what to compare with.
+
+        ``measure`` is ``energy`` or ``orbit``. Raises `CheckError` if there is no reference for the orbit, and
+        `StepError` if no step can be made at all.
+        """
+        compilation = self.compilation
+        setting = own_setting(compilation)
+        made = built(compilation, setting, time.perf_counter() - sum(compilation.seconds.values()))
+        method = Candidate(made.solver(), self.problem)
+        self.piece, self.most = scales(self.problem, method)
+        if measure == "orbit":
+            self._refer(setting, method)
+        curve = self.add(made, method, math.inf)
+        if not curve.points:
+            raise _unreachable(method, self.problem)
+        return curve
+
+    def search(self, own: Curve) -> bool:
+        """Try candidates until none promises more, True, or the time is up."""
+        assert own.setting is not None
+        guesses = charts(self.compilation.system, own.setting)
+        limit = GUESSING * self.clock.budget
+        wanted = [s for s in guesses if expected_seconds(s, [own]) < limit]
+        while wanted and self.clock.left(SEARCHING) > 0:
+            self.try_all(wanted)
+            wanted = search.proposals(self.tried, list(self.refused), self.accuracy)
+        return not wanted
+
+    def add(self, made: Built, method: Method, worth: float) -> Curve:
+        """Scan a candidate."""
+        setting = made.setting
+        self._known[made.fingerprint] = setting
+        points = self._scanned(method, made.order, worth, bounded=made.exact)
+        curve = Curve(
+            made.kind, made.order, points, setting,
+            gauged=made.gauged, symmetric=made.symmetric, bounded=made.exact, stages=made.stages,
+            composition=made.composition, seconds=made.seconds,
+        )  # fmt: skip
+        self.tried[setting], self.methods[setting] = curve, method
+        return curve
+
+    def peers(self) -> list[Curve]:
+        """The classical methods, scanned; none if there is no time to compile them."""
+        own = next(iter(self.tried.values()))
+        if self._race is None and own.seconds > self.clock.left(0.85):
+            return []
+        found = []
+        for name, (label, order) in PEERS.items():
+            label = f"{label} in {'C' if self.target == 'c' else 'Python'}"
+            self.methods[label] = self._classical(name)
+            points = self._scanned(self.methods[label], order, WORTH_KNOWING * self.least, bounded=False)
+            found.append(Curve(label, order, points, bounded=False))
+        return found
+
+    def try_all(self, settings: Sequence[Setting]) -> None:
+        """Build settings side by side; when all is still, measure them."""
+        outcomes: dict[Setting, Outcome] = {s: self._made[s] for s in settings if s in self._made}
+        until = min(self.clock.at(SEARCHING), time.perf_counter() + BUILDING * self.clock.budget)
+        wanted = self._affordable([s for s in settings if s not in self._made])
+        if wanted:
+            self.note(f"building {len(wanted)} more")
+        outcomes |= build_all(self.compilation.spec, self.compilation.system, wanted, until)
+        for setting in (s for s in settings if s in outcomes):
+            outcome = outcomes[setting]
+            if isinstance(outcome, Refusal):
+                self.refused[setting] = "" if outcome.inapplicable else outcome.reason
+            elif not outcome.exact:
+                self.refused[setting] = "it is not a Poisson map to round-off"
+            elif outcome.fingerprint in self._known:
+                self.refused[setting] = ""
+            else:
+                curve = self.add(outcome, Candidate(outcome.solver(), self.problem), WORTH * self.least)
+                cost = curve.cost(self.accuracy)
+                told = f"{1e-6 * cost * self.problem.horizon:.3g} ms" if math.isfinite(cost) else "not reached"
+                self.note(f"{curve.title}: {told}")
+
+    @property
+    def least(self) -> float:
+        """The least cost so far, in nanoseconds per unit of time."""
+        return min((c.cost(self.accuracy) for c in self.tried.values()), default=math.inf)
+
+    def orbit_error(self, curve: Curve, h: float) -> float | None:
+        """The error of the orbit over the time of a scan, by DOP853; None if that is unknown."""
+        stride, count = marks(self.piece, h)
+        states = self.methods[curve.key].rows(h, stride * count, stride)
+        if states is None or self._race is None:
+            return None
+        seconds = REFERRING * self.clock.budget
+        return orbit_error(states, stride * h, self._classical("dop853"), self.problem.step, seconds)
+
+    def _affordable(self, settings: Sequence[Setting]) -> list[Setting]:
+        """Without those that would not be built in time, as orders below let expect."""
+        kept = []
+        for setting in settings:
+            expected = expected_seconds(setting, self.tried.values())
+            if expected > self.clock.left(SEARCHING):
+                self.refused[setting] = f"building it would take some {expected:.0f} s"
+            else:
+                kept.append(setting)
+        return kept
+
+    def _scanned(self, method: Method, order: int, worth: float, *, bounded: bool) -> tuple[Point, ...]:
+        until = time.perf_counter() + min(SCANNING * self.clock.budget, max(self.clock.left(0.9), 0.0))
+        measure, piece = self.measures[bounded], self.piece
+        return search.scan(
+            lambda h: measure(method, h, piece), self.problem.step, self.most, self.accuracy, order, worth,
+            lambda: time.perf_counter() < until,
+        )  # fmt: skip
+
+    def _classical(self, name: str) -> Classical:
+        if self._race is None:
+            parameters = self.problem.parameters
+            if self.target == "c":
+                self._race = race.compiled(self.compilation, list(PEERS), self._state, parameters)
+            else:
+                solver = solver_of(self.compilation, self.target)
+                self._race = race.interpreted(solver, list(PEERS), self._state, parameters)
+        return Classical(self._race.runners[name], self._state, self.problem)
+
+    def _refer(self, setting: Setting, method: Candidate) -> None:
+        """Measure orbits from now on: against a solver of higher order, where there is one, confirmed by DOP853."""
+        problem, until = self.problem, time.perf_counter() + BUILDING * self.clock.budget
+        high = replace(setting, order=max(setting.order, 8), composition=direct(setting))
+        others = [s for s in (Setting(SPLITTING, 8, "none", "auto"), high) if s != setting]
+        if high != setting:
+            outcomes = build_all(self.compilation.spec, self.compilation.system, others, until)
+            self._made |= {s: outcome for s, outcome in outcomes if isinstance(outcome, Built)}
+            known = [self._made[s] for s in others if s in self._made]
+            method = Candidate(known[-1].solver(), problem) if known else method
+        reference = self._reference(method)
+        self.note(f"reference: two methods agree to {reference.uncertainty:.1e} over t = 0 … {self.piece:.6g}")
+        self.referring = True
+        self.measures = {own: orbit_measure(problem, reference, bounded=own) for own in (True, False)}
+        if self.piece < 0.99 * problem.horizon:
+            _expect_linear(self.measures[True], method, problem, self.piece)
+
+    def _reference(self, method: Method) -> Reference:
+        """The reference over the piece, which becomes shorter where rounding or chaos do not allow so much."""
+        problem, other, seconds = self.problem, self._classical("dop853"), REFERRING * self.clock.budget
+        for shorter in (1, 4, 16):
+            span = self.piece / shorter
+            try:
+                found = agreed(method, other, problem.step, span, self.accuracy * span / problem.horizon, seconds)
+            except CheckError as error:
+                failure = error
+                continue
+            self.piece = span
+            return found
+        raise failure
+
+
+def _unreachable(method: Candidate, problem: Problem) -> StepError:
+    """The error about a run that no step of the spec's own setting follows to its end."""
+    h = problem.step / 16
+    until, status = method.reach(h, steps_in(problem.horizon, h))
+    return StepError(
+        f"{problem.system.name}: the run cannot be followed to t = {problem.horizon:.6g}: with steps of {h:.3g} it "
+        f"ends at t = {until:.6g} ({status})\n  hint: the solution itself may end there; see --horizon",
+        step=round(until / h), status=status,
+    )  # fmt: skip
+
+
+def _expect_linear(measure: Measure, method: Method, problem: Problem, piece: float) -> None:
+    """Raise CheckError if the error of the orbit grows too fast to say anything about a longer run."""
+    h = problem.step
+    for _ in range(12):
+        point = measure(method, h, piece)
+        if point and 1e-11 < point.measured < 1e-3:
+            if point.growth > LINEAR:
+                raise CheckError(
+                    f"the error of the orbit grows like t^{point.growth:.1f}: the motion is chaotic, and what is "
+                    f"measured over t = 0 … {piece:.6g} says nothing about a longer run\n"
+                    f"  hint: --horizon {piece:.6g}, or --measure energy"
+                )
+            return
+        h = h / 2 if point is None or point.measured > 1e-3 else 2 * h
+
+
+def expected_seconds(setting: Setting, tried: Iterable[Curve]) -> float:
+    """How long building may take, from lower orders of the same family: it grows like a power of the order; else 0."""
+    known = sorted((c.order, c.seconds) for c in tried if c.setting and c.setting.family == setting.family)
+    below = [(order, seconds) for order, seconds in known if order < setting.order]
+    if not below:
+        return 0.0
+    order, seconds = below[-1]
+    growth = 2.0
+    if len(below) > 1:
+        growth = min(max((seconds / below[-2][1]) ** (2 / (order - below[-2][0])), 1.5), 8.0)
+    return seconds * math.pow(growth, (setting.order - order) / 2)

@@ -1,0 +1,289 @@
+"""What the compiler uses beside the second derivation by sympy: equal for the corpus, refuted with a planted bug."""
+
+import time
+from dataclasses import replace
+from fractions import Fraction
+
+import pytest
+import sympy
+from support import NAMES, compile_text, compiled
+
+from phigen.errors import LimitError
+from phigen.proofs.independent import OutOfTimeError, compare, decide, time_limit
+from phigen.realisations import karasev
+from phigen.series import hamilton_jacobi, reference_functions
+from phigen.symbolic.expression import fold, gradient, rebuild
+from phigen.symbolic.symbols import COEFFICIENT, kind_of
+from phigen.symbolic.verdict import CHECKED, PROVED, REFUTED, UNDECIDED
+
+#: So many S_i take a second or less.
+TERMS = {
+    "ablowitz_ladik3": 3,
+    "charged_particle": 5,
+    "cyclotron": 8,
+    "engel_geodesics": 6,
+    "gaussian_moments": 5,
+    "guiding_centre": 3,
+    "harmonic_oscillator": 12,
+    "henon_heiles": 8,
+    "kepler": 5,
+    "kowalevski_top": 3,
+    "lagrange_top": 4,
+    "lotka_volterra": 5,
+    "maxwell_bloch": 8,
+    "nambu_pendulum": 8,
+    "pendulum": 9,
+    "pendulum_euler": 8,
+    "poisson_not_hamiltonian": 2,
+    "predator_prey": 6,
+    "rigid_body": 5,
+    "rigid_body_dual": 5,
+    "rigid_body_paper": 5,
+    "sir_epidemic": 5,
+    "sir_final_size": 5,
+    "sklyanin_gyrostat": 3,
+    "so4_manakov": 3,
+    "spin_chain5": 2,
+    "toda3": 5,
+    "toda3_quadratic": 3,
+    "volterra5": 4,
+    "vortices3": 2,
+}
+
+#: And so many take a few seconds.
+MORE = {
+    "kepler": 8,
+    "kowalevski_top": 7,
+    "lagrange_top": 6,
+    "lotka_volterra": 8,
+    "poisson_not_hamiltonian": 4,
+    "rigid_body": 8,
+    "sir_epidemic": 7,
+    "sklyanin_gyrostat": 6,
+    "so4_manakov": 5,
+    "spin_chain5": 4,
+    "toda3": 7,
+    "toda3_quadratic": 6,
+    "volterra5": 7,
+    "vortices3": 4,
+}
+
+
+def verdicts(compilation, terms):
+    """By name, the first word of which is enough: S_1, S_2, …, ∇S_h, and α or axioms."""
+    return {c.statement.name.split()[0]: c.statement.verdict for c in compare(compilation, terms)}
+
+
+def expect_equal(compilation, terms):
+    found = list(compare(compilation, terms))
+    assert [c.statement.verdict for c in found] == [PROVED] * len(found), [str(c.statement) for c in found]
+    assert [c.term for c in found if c.term] == [*range(1, terms + 1)]
+    others = {c.statement.name.split()[0] for c in found if not c.term}
+    assert ("∇S_h" in others) == (compilation.scheme.terms <= terms)
+    assert bool(others & {"α", "axioms"}) != compilation.chart.path
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_corpus_is_what_sympy_derives(name):
+    expect_equal(compiled(name), TERMS.get(name, 3))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("name", "terms"), MORE.items())
+def test_more_terms_of_the_corpus_are_what_sympy_derives(name, terms):
+    expect_equal(compiled(name), terms)
+
+
+PLANE = "coordinates: [x, y]\n"
+THREE = "coordinates: [x, y, z]\n"
+LOG_CANONICAL = "poisson: {log_canonical: [[0, 1, 1], [-1, 0, 1], [-1, -1, 0]]}\n"
+BODY = THREE + 'poisson: {brackets: {x: {y: "-z", z: "y"}, y: {z: "-x"}}}\n'
+SYSTEMS = {
+    "gauge": BODY + "hamiltonian: x**2 + y**2/2 + a*z**2\nparameters: {a: 2}\ncasimirs: {C: x**2 + y**2 + z**2}\n"
+    "gauge: {C: a/3}\n",
+    "cayley": BODY + "hamiltonian: x**2 + y*z + exp(x)\nbirealisation: cayley\n",
+    "group map": BODY + "hamiltonian: x**2 + y*z\nbirealisation: {kind: group-map, tau: (1 + P/2)/(1 - P/2)}\n",
+    "flat spray": THREE + LOG_CANONICAL + "hamiltonian: x + y + z**2\nbirealisation: {kind: spray, spray: flat}\n",
+    "natural spray": THREE + LOG_CANONICAL + "hamiltonian: x + y*z\nbirealisation: spray\n",
+    "truncated spray": BODY + "hamiltonian: x**2 + y*z\nbirealisation: {kind: spray, spray: [0, p_x**2*y, p_x*p_y]}\n",
+    "gauged": PLANE + 'poisson: {brackets: {x: {y: "(1 + k*x**2)*exp(y)"}}}\nparameters: {k: 1}\n'
+    "hamiltonian: x**2 + y\nbirealisation: gauged\n",
+    "pullback": PLANE + "poisson:\n  pullback:\n    map: {u: x + y**2, v: y}\n    inverse: {x: u - v**2, y: v}\n"
+    "    of: {canonical: {q: [u], p: [v]}}\nhamiltonian: x**2 + y**2\n",
+    "not smooth": PLANE + "poisson: {canonical: {q: [x], p: [y]}}\nhamiltonian: y**2/2 + abs(x)*x**2\n",
+}
+
+
+@pytest.mark.parametrize("name", SYSTEMS)
+def test_other_bi_realisations_are_what_sympy_derives(name):
+    expect_equal(compile_text(SYSTEMS[name]), 4)
+
+
+# -- planted bugs
+
+
+def test_a_wrong_factor_in_the_recursion_is_refuted(monkeypatch):
+    """i for i + 1."""
+    monkeypatch.setattr(hamilton_jacobi, "Fraction", lambda a, b: Fraction(a, max(b - 1, 1)))
+    euler = "coordinates: [q, p]\npoisson: {canonical: {q: [q], p: [p]}}\nhamiltonian: p**2/2 + sin(q)\n"
+    assert verdicts(compile_text(euler + "birealisation: canonical-euler\n"), 3)["S_2"] == REFUTED
+    found = list(compare(compile_text(BODY + "hamiltonian: x**2 + y**2/2\nbirealisation: exponential\n"), 3))
+    assert [c.statement.verdict for c in found] == [PROVED, PROVED, REFUTED, REFUTED, PROVED]
+    assert ", not " in found[2].statement.detail
+    assert "x**" in found[2].statement.residual
+    assert found[3].statement.name == "∇S_h"
+
+
+def test_a_wrong_series_of_paths_is_refuted(monkeypatch):
+    """1/j! for 1/(j + 1)! in the mean."""
+    text = BODY + "hamiltonian: x**2 + y**2/2\nbirealisation: karasev\n"
+    assert set(verdicts(compile_text(text), 3).values()) == {PROVED}
+    monkeypatch.setattr(karasev, "factorial", lambda n: max(n - 1, 1))
+    assert verdicts(compile_text(text), 3)["S_3"] == REFUTED
+
+
+class Misprinted:
+    """The series of a compilation with the misprint of the paper in S_4: 1/3! {{α*H, S_2}, S_1} for 1/4 of it."""
+
+    def __init__(self, compilation):
+        self._true, system = compilation.series, compilation.system
+        first, second = (s for s in compilation.series.graph(2))
+        # With α = (q, p + a) on p = 0: {{α*H, S_2}, S_1} = ∂²H/∂p² ∂S_2/∂q ∂S_1/∂q.
+        curvature = gradient(gradient(system.hamiltonian, ["p"])[0], ["p"])[0]
+        bracket = curvature * gradient(second, ["q"])[0] * gradient(first, ["q"])[0]
+        self._added = bracket * (Fraction(1, 6) - Fraction(1, 4))
+
+    def polynomial(self, terms):
+        found = self._true.polynomial(terms)
+        added = [found.tower.convert(self._added) if i == 3 else found.tower.zero for i in range(terms)]
+        return replace(found, terms=tuple(s + a for s, a in zip(found.terms, added, strict=True)))
+
+
+def test_the_misprint_of_the_paper_is_refuted():
+    text = "coordinates: [q, p]\npoisson: {canonical: {q: [q], p: [p]}}\nhamiltonian: p**2/2 + q**2*p + q**3\n"
+    compilation = compile_text(text + "birealisation: canonical-euler\n")
+    wrong = replace(compilation, gauged=replace(compilation.gauged, series=Misprinted(compilation)))
+    assert [k for k, verdict in verdicts(wrong, 5).items() if verdict == REFUTED] == ["S_4"]
+
+
+def log_canonical(first, second):
+    """α = x exp(u/2) and β = x exp(−u/2) with signs before u, for {x, y} = xy."""
+    return compile_text(
+        f"{PLANE}poisson: {{brackets: {{x: {{y: x*y}}}}}}\nhamiltonian: x + y\nbirealisation:\n  kind: custom\n"
+        f"  alpha: [x*exp({first}(-y*p_y)/2), y*exp({second}(x*p_x)/2)]\n"
+        f"  beta: [x*exp({first}(y*p_y)/2), y*exp({second}(-x*p_x)/2)]\n"
+    )
+
+
+@pytest.mark.parametrize(("signs", "verdict"), [("++", PROVED), ("+-", REFUTED), ("-+", REFUTED), ("--", REFUTED)])
+def test_a_wrong_sign_of_alpha_is_refuted(signs, verdict):
+    """The S_i alone do not see it, since both derivations take them from that α."""
+    assert verdicts(log_canonical(*signs), 3)["axioms"] == verdict
+
+
+def test_maps_that_do_not_begin_at_the_identity_are_refuted():
+    """Canonical brackets have shifts for symmetries, so only α(x, 0) = x tells."""
+    text = PLANE + "poisson: {canonical: {q: [x], p: [y]}}\nhamiltonian: x**2 + y\nbirealisation:\n  kind: custom\n"
+    text += "  alpha: [x, y + p_x + 1]\n  beta: [x + p_y, y + 1]\n"
+    assert verdicts(compile_text(text), 2)["axioms"] == REFUTED
+    assert verdicts(compile_text(text.replace(" + 1]", "]")), 2)["axioms"] == PROVED
+
+
+def test_exchanged_ends_of_paths_are_refuted():
+    compilation = compile_text(BODY + "hamiltonian: x**2 + y**2/2\nbirealisation: exponential\n")
+    chart = compilation.chart
+    wrong = replace(compilation, realisation=replace(chart, alpha=chart.beta, beta=chart.alpha))
+    assert [k for k, verdict in verdicts(wrong, 3).items() if verdict == REFUTED] == ["α"]
+
+
+@pytest.mark.parametrize(
+    ("text", "form"),
+    [
+        (BODY + "hamiltonian: x**2 + y**2/3\n", "collected polynomial"),
+        (
+            PLANE + "poisson: {canonical: {q: [x], p: [y]}}\nhamiltonian: log(1 + x**2 + y**4)*exp(sin(x*y))\n",
+            "shared graph",
+        ),
+    ],
+)
+def test_a_wrong_sign_in_the_program_is_refuted(text, form):
+    compilation = compile_text(text)
+    generating = compilation.scheme.generating
+    assert generating.form == form
+    changed = []
+
+    def visit(node, args):
+        if not changed and (kind_of(node.value) == COEFFICIENT if node.op == "symbol" else node.op == "exp"):
+            changed.append(node)
+            return -rebuild(node, args)
+        return rebuild(node, args)
+
+    wrong = replace(generating, slope=tuple(fold(generating.slope, visit)))
+    found = verdicts(replace(compilation, scheme=replace(compilation.scheme, generating=wrong)), 3)
+    assert [k for k, verdict in found.items() if verdict == REFUTED] == ["∇S_h"]
+
+
+# -- verdicts and limits
+
+u, v = sympy.symbols("u v", real=True)
+
+
+@pytest.mark.parametrize(
+    ("left", "right", "verdict"),
+    [
+        ((u + v) ** 2, u**2 + 2 * u * v + v**2, PROVED),
+        (sympy.sin(2 * u), 2 * sympy.sin(u) * sympy.cos(u), CHECKED),
+        (sympy.log(u**2 * v**2), 2 * sympy.log(sympy.Abs(u * v)), CHECKED),
+        (sympy.exp(u), sympy.exp(u) + sympy.Rational(1, 10**30), REFUTED),
+        (u**2, u**2 + v / 10**40, REFUTED),
+        (sympy.sqrt(-1 - u**2), sympy.sqrt(-2 - u**2), UNDECIDED),
+    ],
+)
+def test_verdicts(left, right, verdict):
+    found = decide("equality", [("", left, right)], [], "")
+    assert found.verdict == verdict
+    assert bool(found.residual) == (verdict == REFUTED)
+
+
+def test_positive_symbols_stay_positive():
+    c = sympy.Symbol("c", positive=True)
+    assert decide("equality", [("", sympy.log(c * u**2), sympy.log(c) + sympy.log(u**2))], ["c"], "").verdict == CHECKED
+    assert decide("equality", [("", sympy.Abs(u), u)], [], "").verdict == REFUTED
+
+
+def test_the_time_is_kept_and_what_was_compared_is_said():
+    found, start = [], time.perf_counter()
+    with pytest.raises(LimitError, match=r"S_\d+ was not derived a second time: the time was up; S_1 … S_\d+ were"):
+        found.extend(compare(compiled("rigid_body"), 16, seconds=1.0))
+    assert time.perf_counter() - start < 10
+    assert len(found) > 1
+    assert {c.statement.verdict for c in found} == {PROVED}
+
+
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
+def test_the_time_is_kept_where_python_drops_exceptions():
+    """Callbacks of weak references, of which caches of expressions have many, do as destructors do."""
+
+    def wait(seconds):
+        end = time.perf_counter() + seconds
+        while time.perf_counter() < end:
+            pass
+
+    class Slow:
+        def __del__(self):
+            wait(0.3)
+
+    def work():
+        Slow()
+        wait(30)
+
+    start = time.perf_counter()
+    with pytest.raises(OutOfTimeError), time_limit(0.1):
+        work()
+    assert time.perf_counter() - start < 15
+
+
+def test_too_many_terms_are_a_limit(monkeypatch):
+    monkeypatch.setattr(reference_functions, "MOST_TERMS", 5)
+    with pytest.raises(LimitError, match="S_3 was not derived a second time: more than 5 terms; S_1 … S_2 were"):
+        list(compare(compiled("rigid_body"), 5))

@@ -1,0 +1,81 @@
+"""Lyapunov exponents against systems whose exponents are known."""
+
+import numpy as np
+import pytest
+from support import compiled
+
+from phigen import api, spec
+from phigen.study.lyapunov import spectrum
+
+#: H = a q1 p1 + b q2 p2: the exponents are ±a, ±b. The last coordinate is a Casimir.
+SADDLE = """
+phigen: 1
+name: saddle
+coordinates: [q1, q2, p1, p2, c]
+parameters: {a: 1.5, b: 0.25}
+poisson: {canonical: {q: [q1, q2], p: [p1, p2]}}
+hamiltonian: a*q1*p1 + b*q2*p2
+order: 10
+"""
+
+
+def solver(source, target="c", order=None):
+    return api.compile(source, target, order, tangent=True)
+
+
+@pytest.mark.parametrize("target", ["c", "numpy"])
+def test_a_linear_saddle_has_its_eigenvalues(target):
+    found = spectrum(solver(spec.loads(SADDLE), target), [0, 0, 0, 0, 1], 0.05, 2000)
+    # The frame that starts along the axes is the exact one; the order of the method is all there is.
+    assert np.max(np.abs(found.exponents - [1.5, 0.25, 0, -0.25, -1.5])) < 1e-12
+    assert found.t == 100
+
+
+def test_backwards_in_time_growth_and_decay_change_places():
+    found = spectrum(solver(spec.loads(SADDLE)), [0, 0, 0, 0, 1], -0.05, 500)
+    assert np.max(np.abs(found.exponents - [1.5, 0.25, 0, -0.25, -1.5])) < 1e-12
+
+
+def test_strongly_unstable_steps_lose_no_direction():
+    """A step multiplies lengths by e^4 and e^-4: without a new frame in time the small ones drown in rounding."""
+    found = spectrum(solver(spec.loads(SADDLE)), [0, 0, 0, 0, 1], 0.4, 400, {"a": 10.0, "b": 0.1})
+    assert np.max(np.abs(found.exponents[[1, 2, 3]] - [0.1, 0, -0.1])) < 1e-10
+    assert abs(found.pairing) < 1e-10
+
+
+def test_exponents_of_an_integrable_system_fall_like_log_t_over_t():
+    found = spectrum(solver(compiled("rigid_body").spec), [0.45, 0.0, 0.89], 0.05, 8000)
+    bound = 3 * np.log(found.times) / found.times
+    assert np.all(np.abs(found.history[found.times > 20]) < bound[found.times > 20, None])
+    assert found.uncertainty < 0.05
+
+
+def test_a_chaotic_orbit_has_a_positive_exponent_and_its_mirror_image():
+    henon_heiles = solver(compiled("henon_heiles").spec)
+    chaotic = spectrum(henon_heiles, [0, -0.15, 0.4747806515732606, 0], 0.1, 20_000)
+    assert 0.03 < chaotic.largest < 0.08  # 0.045 in the literature on this energy, 1/8
+    assert abs(chaotic.total) < 1e-13
+    assert chaotic.pairing < 2e-3
+    regular = spectrum(henon_heiles, [0, 0.1, 0.3966526605792183, 0], 0.1, 20_000)
+    assert regular.largest < 0.01
+
+
+@pytest.mark.parametrize("target", ["c", "numpy"])
+def test_directions_across_the_leaves_add_zeros(target):
+    """Two Casimirs of the top: their differentials are carried along unchanged, so two exponents vanish like 1/t."""
+    found = spectrum(solver(compiled("lagrange_top").spec, target), [0.2, -0.1, 3.0, 0.6, 0.0, 0.8], 0.05, 400)
+    middle = np.sort(np.abs(found.exponents))[:2]
+    assert np.all(middle < 0.3 / found.t)
+    assert abs(found.total) < 1e-12  # se(3) is unimodular: volume is conserved
+
+
+def test_growth_is_followed_along_the_trajectory_that_is_integrated():
+    """The gauge is chosen once, rounding errors are carried along: the tangents are those of `integrate`."""
+    body = solver(compiled("rigid_body").spec)
+    states = [x for x, _ in body.tangents([0.01, 1, 0.01], 0.1, 50)]
+    assert np.array(states).tolist() == body.integrate([0.01, 1, 0.01], 0.1, 50).x[1:].tolist()
+
+
+def test_a_solver_without_tangents_is_refused():
+    with pytest.raises(TypeError, match="tangent=True"):
+        spectrum(api.compile(spec.loads(SADDLE)), [0, 0, 0, 0, 1], 0.05, 10)

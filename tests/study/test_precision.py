@@ -1,0 +1,122 @@
+"""Errors and times beside classical methods: the same arithmetic in C, orders as stated, honest floors."""
+
+import math
+
+import numpy as np
+import pytest
+from support import compiled, solver
+
+from phigen.drawing import figures
+from phigen.study import classical, precision, race
+from phigen.study.precision import Curve, Point, Study
+
+START, PARAMETERS = np.array([1.0, 0.5, 0.8]), {"I1": 2.0, "I2": 1.0, "I3": 0.7}
+
+
+@pytest.fixture(scope="module")
+def body():
+    return compiled("rigid_body", 4)
+
+
+@pytest.fixture(scope="module")
+def in_c(body):
+    return race.compiled(body, list(race.TABLEAUX), START, PARAMETERS)
+
+
+def test_times_of_the_solver_do_not_contain_its_set_up(body):
+    start = START.copy()
+    found = race.compiled(body, ["rk4"], start, PARAMETERS)
+    own, rk4 = (found.runners[name](0.05, 10, 1) for name in (race.OWN, "rk4"))
+    start *= 2  # what is set up for each measurement would begin here
+    assert (found.runners[race.OWN](0.05, 10, 1) == own).all()
+    assert not np.allclose(found.runners["rk4"](0.05, 10, 1), rk4)
+
+
+@pytest.mark.parametrize("method", race.TABLEAUX)
+def test_classical_method_in_c_is_the_one_in_python(body, in_c, method):
+    field = solver(body, "numpy").vector_field
+    expected = classical.integrate(method, lambda x: field(x, **PARAMETERS), START, 0.05, 40)[-1]
+    assert in_c.runners[method](0.05, 40, 3) == pytest.approx(expected, rel=1e-12)
+
+
+def test_solver_in_the_race_is_the_solver(body, in_c):
+    expected = solver(body, "c").integrate(START, 0.05, 40, parameters=PARAMETERS).x[-1]
+    assert in_c.runners[race.OWN](0.05, 40, 2) == pytest.approx(expected, rel=1e-13)
+
+
+def test_a_step_that_cannot_be_made_has_no_result(in_c):
+    assert in_c.runners[race.OWN](1e6, 3, 1) is None
+    assert in_c.runners["rk4"](1e200, 3, 1) is None
+
+
+@pytest.mark.parametrize("make", ["c", "python"])
+def test_orders_of_a_study_are_the_stated_ones(body, in_c, make):
+    methods = ["rk4", "dop853"]
+    other = race.interpreted(solver(body, "numpy"), methods, START, PARAMETERS)
+    found = precision.study(in_c if make == "c" else other, 4, 0.4, 3, rounds=1)
+    slopes = {c.label: c.slope for c in found.curves}
+    assert slopes["phigen"] == pytest.approx(4, abs=0.2)
+    assert slopes["rk4"] == pytest.approx(4, abs=0.2)
+    assert found.floor < 1e-13
+    assert all(p.seconds > 0 for c in found.curves for p in c.points)
+    assert not found.has_casimirs
+
+
+def test_closed_form_is_the_reference_where_there_is_one():
+    oscillator = compiled("harmonic_oscillator", 2)
+    at = {p.name: 1.0 for p in oscillator.system.parameters}
+    one = race.compiled(oscillator, ["dop853"], np.array([1.0, 0.0]), at)
+
+    def exact(t):
+        return np.array([math.cos(t), -math.sin(t)])
+
+    with_form = precision.study(one, 2, 0.1, 16, exact, casimirs=lambda x: 1e-16, rounds=1)
+    without = precision.study(one, 2, 0.1, 16, rounds=1)
+    pairs = zip(with_form.curves[0].points, without.curves[0].points, strict=True)
+    assert all(a.error == pytest.approx(b.error, rel=1e-6, abs=1e-13) for a, b in pairs)
+    assert "closed form" in with_form.reference
+    assert with_form.has_casimirs
+
+
+def test_what_dop853_cannot_follow_is_said():
+    def lost(h, steps, repeats):
+        return None
+
+    with pytest.raises(ArithmeticError, match="DOP853"):
+        precision.study(race.Race({race.OWN: lost, "dop853": lost}, lambda repeats: None, "C"), 2, 0.1, 100, rounds=1)
+
+
+def test_slope_is_that_above_rounding():
+    errors = {2**k: 0.3 * 2.0 ** (-4 * k) + 1e-13 * (k % 3) for k in range(1, 16)}
+    assert precision.slope(errors, 1e-15) == pytest.approx(4, abs=0.1)
+    assert math.isnan(precision.slope({4: 1e-15, 8: 1e-15}, 1e-15))
+    assert math.isnan(precision.slope({4: 0.5, 8: 0.4}, 1e-15))
+
+
+def test_time_is_that_of_the_fastest_repetition(monkeypatch):
+    now = iter(range(10**6))
+    monkeypatch.setattr(precision.time, "perf_counter", lambda: 0.01 * next(now) ** 1.1)
+    runner = {race.OWN: lambda h, n, repeats: START}
+    found = precision._times(race.Race(runner, lambda repeats: None, "C"), {race.OWN: [1]}, 1.0, 3)
+    assert found[race.OWN, 1] == pytest.approx(0.01 * (3**1.1 - 2**1.1))
+
+
+def study(casimirs=1e-16):
+    curves = [
+        Curve(
+            label, order, tuple(Point(h, round(1 / h), h**order, casimirs, 1e-6 / h) for h in (0.1, 0.05, 0.025)), order
+        )
+        for label, order in (("phigen", 4), ("rk4", 4), ("dop853", 8))
+    ]
+    return Study(1.0, 10, 1e-15, "the closed form", 0.0, "C", 5, tuple(curves))
+
+
+def test_figures_name_methods_and_slopes():
+    text = figures.svg(figures.convergence_figure(study()))
+    assert "phigen (order 4): slope 4.00" in text
+    assert "rk4 (order 4)" in text
+
+
+@pytest.mark.parametrize("casimirs", [1e-16, math.nan])
+def test_work_has_a_panel_for_casimirs_if_there_are_any(casimirs):
+    assert len(figures.work_precision_figure(study(casimirs)).axes) == 1 + math.isfinite(casimirs)

@@ -1,0 +1,257 @@
+"""Verification passes what is right, and names what is wrong with solvers that were sabotaged."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+from support import BODY, compiled
+
+from phigen import resources, spec
+from phigen.api import solver_of
+from phigen.cli import group
+from phigen.compiler import compile_spec, emit
+from phigen.runtime.interface import Interface
+from phigen.runtime.numpy_solver import NumpySolver
+from phigen.runtime.solver import Solver
+from phigen.scheme.assemble import build_program
+from phigen.spec.model import Extras
+from phigen.study import backward, verification
+from phigen.study.meanings import meaning_of
+from phigen.study.methods import by_differences, of_classical, of_solver
+from phigen.study.summary import summarise
+from phigen.symbolic.expression import substitute, symbol
+from phigen.symbolic.symbols import momentum
+
+TEXT = f"""phigen: 1
+name: t
+{BODY}casimirs: {{C: x1**2 + x2**2 + x3**2}}
+order: 4
+gauge: none
+runs: {{tumbling: {{initial: [0.4, 1, 0.3], step: 0.2, steps: 2000, compare: [rk4]}}}}
+"""
+START = np.array([0.4, 1.0, 0.3])
+
+
+def compilation_of(text=TEXT):
+    return compile_spec(spec.loads(text), extras=Extras(tangent=True))
+
+
+def from_source(compilation, change=lambda source: source):
+    """A solver of the NumPy target, from its source after a change."""
+    source = emit(compilation.program, "numpy", "phigen build")["t.py"]
+    names = Interface("t", compilation.system.coordinates, compilation.program.order, {}, frozenset(), ("C",))
+    return Solver(NumpySolver(change(source), names), names)
+
+
+def verified(compilation, solvers, steps=400, h=0.2):
+    return verification.verify(compilation, solvers, "tumbling", START, {}, h, steps, ("rk4",))
+
+
+def failed(found):
+    return {check.name for check in found.checks if not check.passed}
+
+
+def test_rounding_is_seen_as_such_where_all_terms_of_a_casimir_vanish():
+    """A pendulum that swings through its lowest point, where m1 g1 + m2 g2 + m3 g3 is a sum of zeros."""
+    casimirs = "{G: g1**2 + g2**2 + g3**2, L: m1*g1 + m2*g2 + m3*g3}"
+    text = f"""phigen: 1
+name: t
+coordinates: [m1, m2, m3, g1, g2, g3]
+poisson: {{lie_algebra: {{name: se(3), sign: minus}}}}
+hamiltonian: (m1**2 + m2**2 + m3**2)/2 + 10*g3
+casimirs: {casimirs}
+"""
+    compilation = compilation_of(text)
+    start = np.array([0.3, 1.2, 0.0, 0.0, 0.0, -1.0])
+    made = solver_of(compilation, "c")
+    rows = made.integrate(start, h=0.02, steps=10_000).x
+    subject = verification.Subject(compilation, made, {"c": of_solver(made, {})}, {}, {}, start, 0.02, 10_000)
+    assert all(check.passed for check in verification.conservation_checks(subject, rows))
+    rows[5000:, 0] += 1e-9
+    wrong = [check.name for check in verification.conservation_checks(subject, rows) if not check.passed]
+    assert wrong == ["Casimir L: largest error"]
+
+
+def test_modified_hamiltonian_is_constant_to_higher_order_for_each_correction():
+    compilation = compilation_of()
+    found = verified(compilation, {"c": solver_of(compilation, "c")})
+    orders = {c.name: c.value for c in found.checks if c.name.startswith("modified")}
+    assert len(orders) == backward.CORRECTIONS
+    assert orders["modified H, 1 correction: order"] == pytest.approx(6, abs=0.2)
+
+
+def test_a_good_solver_passes_and_rk4_stands_beside_it():
+    compilation = compilation_of()
+    found = verified(compilation, {t: solver_of(compilation, t) for t in ("c", "numpy")}, steps=2000)
+    assert found.failures == []
+    checks = {c.name: c for c in found.checks}
+    assert checks["observed order"].value == pytest.approx(4, abs=0.1)
+    assert checks["observed order"].others["rk4"] == pytest.approx(4, abs=0.1)
+    assert checks["Casimir C: largest error"].value < 1e-14 < 1e-6 < checks["Casimir C: largest error"].others["rk4"]
+    assert checks["energy: last/first window"].limit
+    assert checks["energy: last/first window"].others["rk4"] > verification.GROWTH
+    assert checks["Poisson defect, exact tangent"].value < 1e-15 < checks["Poisson defect, exact tangent"].others["rk4"]
+    assert checks["largest step that converges, of the run's"].value > 1
+
+
+def test_rk4_posing_as_the_step_is_found_out():
+    compilation = compilation_of()
+
+    def change(source):
+        fake = (
+            "\n\ndef _advance(coef, x, carry, memory):\n    h = FAKE_STEP\n    f = lambda y: _vector_field({}, y)\n"
+            "    a = f(x)\n    b = f(x + h / 2 * a)\n    c = f(x + h / 2 * b)\n    d = f(x + h * c)\n"
+            "    change = h / 6 * (a + 2 * b + 2 * c + d)\n    return x + change, carry, memory, np.full(len(x), '')\n"
+            "\n\n_old_coefficients = _coefficients\n\n\ndef _coefficients(parameters, x, h, gauge):\n"
+            "    global FAKE_STEP\n    FAKE_STEP = h\n    return _old_coefficients(parameters, x, h, gauge)\n"
+        )
+        return source + fake
+
+    found = verified(compilation, {"c": solver_of(compilation, "c"), "numpy": from_source(compilation, change)})
+    assert "agreement of c and numpy" in failed(found)
+    assert "reversibility: a step there and back" in failed(found)
+    assert "tangent map against differences" in failed(found)
+    alone = verified(compilation, {"numpy": from_source(compilation, change)})
+    assert "Casimir C: largest error" in failed(alone)
+    assert "observed order" not in failed(alone)  # it is a fine method of order 4
+    assert any(f.startswith("Casimir C: largest error: changed by") for f in alone.failures)
+
+
+def test_a_wrong_sign_of_the_quadratic_term_is_found_out():
+    """α of the exponential bi-realisation, its terms of even degree in p with the other sign."""
+    compilation = compilation_of()
+    names = {momentum(c): -symbol(momentum(c)) for c in compilation.system.coordinates}
+    wrong = tuple(-e for e in substitute(compilation.realisation.displacement, names))
+    realisation = replace(compilation.realisation, displacement=wrong)
+    found = (compilation.system, realisation, compilation.order, compilation.gauged, compilation.scheme)
+    program = build_program(*found, extras=Extras(tangent=True))
+    bad = replace(compilation, program=program)
+    found = verified(bad, {"numpy": from_source(bad)})
+    assert {"Poisson defect, exact tangent", "observed order"} <= failed(found)
+    assert any("is not round-off" in f for f in found.failures)
+
+
+def test_a_loose_tolerance_is_found_out():
+    text = TEXT.replace("order: 4", "order: 4\nsolver: {tolerance: 1e-6}")
+    compilation = compilation_of(text)
+    found = verified(compilation, {"c": solver_of(compilation, "c")})
+    assert "reversibility: a step there and back" in failed(found)
+    assert any("a step back misses by" in f for f in found.failures)
+
+
+def test_a_lower_order_than_stated_is_found_out():
+    compilation = compilation_of()
+    low = compilation_of(TEXT.replace("order: 4", "order: 2"))
+    posing = replace(low, order=compilation.order)
+    found = verified(posing, {"c": solver_of(low, "c")})
+    assert "observed order: 2.00 instead of 4" in found.failures
+
+
+def test_targets_that_disagree_are_found_out():
+    compilation, low = compilation_of(), compilation_of(TEXT.replace("order: 4", "order: 2"))
+    found = verified(compilation, {"c": solver_of(compilation, "c"), "numpy": solver_of(low, "numpy")})
+    assert "agreement of c and numpy" in failed(found)
+
+
+def test_energy_drift_of_dissipative_methods_is_judged():
+    """Whatever is judged must tell RK4 from a good method."""
+    compilation = compilation_of()
+    made = solver_of(compilation, "c")
+    rk4 = of_classical("rk4", made, {}).rows(START, 0.4, 2000, 1)
+    own = of_solver(made, {}).rows(START, 0.4, 2000, 1)
+    times = 0.4 * np.arange(2001)
+    growth = [summarise("", compilation.system, None, {}, times, rows).energy.growth for rows in (own, rk4)]
+    assert growth[0] < 1.5 < verification.GROWTH < growth[1]
+
+
+def test_approximate_realisations_are_labelled_and_held_to_their_order():
+    text = TEXT.replace("order: 4", "order: 4\nbirealisation: {kind: spray}")
+    compilation = compilation_of(text)
+    assert not compilation.realisation.exact
+    found = verified(compilation, {"c": solver_of(compilation, "c"), "numpy": solver_of(compilation, "numpy")})
+    assert "approximate" in found.label
+    assert found.failures == []
+    assert "approximate" in {c.name: c for c in found.checks}["Poisson defect, exact tangent"].limit
+
+
+def test_differences_are_good_to_ten_digits():
+    compilation = compilation_of()
+    method = of_solver(solver_of(compilation, "c"), {})
+    assert np.max(np.abs(by_differences(method, START, 0.2) - method.tangent(START, 0.2))) < 1e-10
+
+
+def test_a_gauge_is_held_fixed():
+    compilation = compilation_of(TEXT.replace("gauge: none", "gauge: auto"))
+    assert compilation.program.gauge
+    found = verified(compilation, {t: solver_of(compilation, t) for t in ("c", "numpy")})
+    assert found.failures == []
+
+
+# -- the command
+
+
+@pytest.fixture
+def file(tmp_path):
+    path = tmp_path / "t.yaml"
+    path.write_text(TEXT, encoding="utf-8")
+    return path
+
+
+def test_command_prints_a_table(file):
+    result = CliRunner().invoke(group, ["verify", "--quick", str(file)])
+    assert result.exit_code == 0, result.output
+    assert "observed order" in result.output
+    assert "rk4" in result.output
+    assert "FAILED" not in result.output
+
+
+@pytest.mark.parametrize("steps", [1, 4])
+def test_a_run_of_few_steps_is_verified(file, steps):
+    file.write_text(TEXT.replace("steps: 2000", f"steps: {steps}"), encoding="utf-8")
+    result = CliRunner().invoke(group, ["verify", "--quick", str(file)])
+    assert result.exit_code == 0, result.output
+
+
+def test_command_for_machines_and_exit_code(file, monkeypatch):
+    monkeypatch.setattr(verification, "ONE_STEP", 0.0)
+    result = CliRunner().invoke(group, ["verify", "--quick", "--json", str(file)])
+    assert result.exit_code == 5
+    (data,) = json.loads(result.stdout)
+    assert data["passed"] is False
+    assert {c["name"] for c in data["checks"] if not c["passed"]}
+    assert "verification failed" in result.stderr
+    assert "reversibility" in result.stderr
+
+
+@pytest.mark.parametrize("name", ["rigid_body", "predator_prey"])
+def test_every_row_has_a_meaning_which_the_documentation_gives(name):
+    compilation = compile_spec(compiled(name).spec, extras=Extras(tangent=True))
+    run = next(iter(compilation.spec.runs.values()))
+    values = compilation.spec.parameters_of(run)
+    solvers = {"numpy": solver_of(compilation, "numpy")}
+    start = [float(v) for v in run.initial]
+    found = verification.verify(compilation, solvers, run.name, start, values, float(run.step), 8, quick=True)
+    page = (resources.bundled_specs().parent / "docs" / "commands.md").read_text(encoding="utf-8")
+    for check in found.checks:
+        meaning = meaning_of(check.name)
+        assert f"| {meaning.row} | {meaning.measures} | {meaning.failure or '–'} |" in page
+        assert meaning.failure or not check.limit, check.name
+
+
+def test_command_draws_the_modified_hamiltonian_of_one_spec(tmp_path):
+    (tmp_path / "a.yaml").write_text(TEXT, encoding="utf-8")
+    (tmp_path / "b.yaml").write_text(TEXT.replace("name: t", "name: b"), encoding="utf-8")
+    picture = tmp_path / "a.svg"
+
+    def verify(*files):
+        names = [str(tmp_path / file) for file in files]
+        return CliRunner().invoke(group, ["verify", "--quick", "--plot", str(picture), *names])
+
+    assert verify("a.yaml", "b.yaml").exit_code == 2
+    assert not picture.exists()
+    done = verify("a.yaml")
+    assert done.exit_code == 0
+    assert picture.read_text(encoding="utf-8").count("<path") > 10
+    assert f"wrote {picture}" in done.stderr
