@@ -28,7 +28,7 @@ from phigen.spec.names import ARGUMENT_HINT, ARGUMENTS, IDENTIFIER, PROFILES, SC
 from phigen.spec.taken import objection
 
 if TYPE_CHECKING:
-    from phigen.formulas.sympy_formulas import SympyFormulas
+    from phigen.notation.sympy_formulas import SympyFormulas
     from phigen.runtime.backend import Backend
     from phigen.runtime.interface import Interface
     from phigen.runtime.solver import Solver
@@ -86,7 +86,7 @@ def formulas(source: Source, order: int | None = None, *, terms: int | None = No
     ``terms`` asks for S_1 … S_terms instead of those of the method. Raises as `compile`; `SpecError` for a splitting,
     which has none of these.
     """
-    from phigen.formulas.sympy_formulas import sympy_formulas
+    from phigen.notation.sympy_formulas import sympy_formulas
 
     if terms is not None and not (isinstance(terms, int) and 1 <= terms <= limits.ORDER):
         raise ValueError(f"terms must be an integer from 1 to {limits.ORDER}, not {terms!r}")

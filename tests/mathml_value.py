@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from xml.etree import ElementTree
 
-from phigen.formulas import mathml
+from phigen.notation import mathml
 
 _TIMES, _APPLY = "\u2062", "\u2061"
 _OPERATORS = {"−": "-", "+": "+", _TIMES: "*", "·": "*", "/": "/", "(": "(", ")": ")", ",": ",", "…": "DOTS"}

@@ -44,7 +44,7 @@ def command(
         raise click.UsageError("--latex and --json exclude one another")
     compilation = compilation_of(load_one(spec_file), order, scheme=scheme)
     if as_latex:
-        from phigen.formulas.latex import document
+        from phigen.notation.latex import document
 
         out(document(compilation, modified, None if full else SHOWN))
     elif as_json:
@@ -55,7 +55,7 @@ def command(
 
 
 def _print(compilation: Compilation, modified: int, most: int | None) -> None:
-    from phigen.formulas import flows
+    from phigen.notation import flows
 
     spec, system = compilation.spec, compilation.system
     corrected = _modified(compilation, modified, most)
@@ -79,7 +79,7 @@ def _print(compilation: Compilation, modified: int, most: int | None) -> None:
 
 
 def _print_series(compilation: Compilation, most: int | None) -> None:
-    from phigen.formulas import generating
+    from phigen.notation import generating
 
     why = textwrap.wrap(compilation.chart.explanation, 100)
     maps = _assignments(_maps(compilation, most))
@@ -142,7 +142,7 @@ def _maps(compilation: Compilation, most: int | None) -> list[tuple[str, str]]:
 
 def _modified(compilation: Compilation, count: int, most: int | None) -> list[tuple[str, str]]:
     """H̃ = H + h^p H_p + …, and its first corrections."""
-    from phigen.formulas.generating import modified_formulas
+    from phigen.notation.generating import modified_formulas
 
     listed = modified_formulas(compilation, count, most)
     names = ["H", *(f"{_power(j)} H_{j}" for j, _ in listed), "…"]
@@ -157,7 +157,7 @@ def _gauged(compilation: Compilation) -> list[str]:
 
 
 def _series(compilation: Compilation, most: int | None) -> list[tuple[str, str]]:
-    from phigen.formulas.generating import series_formulas
+    from phigen.notation.generating import series_formulas
 
     listed, _ = series_formulas(compilation, most)
     return [("S_h", " + ".join(f"{_power(i)} S_{i}" for i, _ in listed)), *((f"S_{i}", str(f)) for i, f in listed)]
@@ -185,7 +185,7 @@ def _files(compilation: Compilation) -> dict[str, str]:
 
 
 def _described(compilation: Compilation) -> dict[str, object]:
-    from phigen.formulas import flows
+    from phigen.notation import flows
     from phigen.symbolic.readable import readable
 
     system, plan = compilation.system, compilation.order
@@ -207,7 +207,7 @@ def _described(compilation: Compilation) -> dict[str, object]:
 
 
 def _described_series(compilation: Compilation) -> dict[str, object]:
-    from phigen.formulas.generating import series_formulas
+    from phigen.notation.generating import series_formulas
     from phigen.symbolic.readable import readable
 
     realisation, plan = compilation.chart, compilation.order

@@ -17,9 +17,9 @@ import sympy
 from phigen import progress
 from phigen.compilation import Compilation
 from phigen.errors import Diagnostic, LimitError
-from phigen.formulas.sympy_formulas import Dictionary
 from phigen.geometry.shapes import LogCanonical
 from phigen.geometry.sympy_bridge import expanded_function
+from phigen.notation.sympy_formulas import Dictionary
 from phigen.realisations import exponential, spray
 from phigen.scheme.discretisation import hamilton_jacobi
 from phigen.series.reference import Source, closed_form, generating_function

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 from markupsafe import Markup
 
-from phigen.formulas.mathml import math, name
+from phigen.notation.mathml import math, name
 from phigen.report import evidence, page
 from phigen.report.drawable import NO_FIGURES, drawable
 from phigen.report.material import Material

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from markupsafe import Markup
 
-from phigen.formulas import mathml, parts
+from phigen.notation import mathml, parts
 from phigen.report import page
 from phigen.scheme.lowering import operation_counts
 from phigen.symbolic.expression import Expression

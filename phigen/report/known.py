@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from phigen.formulas.mathml import math
+from phigen.notation.mathml import math
 
 
 def _i(name: str) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from markupsafe import Markup
 
 from phigen.compilation import Compilation
-from phigen.formulas import flows, generating, mathml
+from phigen.notation import flows, generating, mathml
 from phigen.report import page
 from phigen.report.equations import equation, group, polynomial
 from phigen.report.known import ALPHA_BETA_OF_A_PATH, BETA_OF_ALPHA, GAUGED, MODIFIED, PATH_STEP, PHI, STEP

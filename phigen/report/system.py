@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from markupsafe import Markup
 
-from phigen.formulas import mathml, parts
 from phigen.geometry.system import System
+from phigen.notation import mathml, parts
 from phigen.report import page
 from phigen.report.equations import group
 from phigen.report.known import MOTION

@@ -12,8 +12,8 @@ from support import TARGETS, compile_text, compiled, setting, solver
 
 from phigen.compiler import emit
 from phigen.errors import SpecError
-from phigen.formulas.flows import formulas
-from phigen.formulas.latex import document
+from phigen.notation.flows import formulas
+from phigen.notation.latex import document
 from phigen.scheme import alternation, choosing, nystrom
 from phigen.scheme.order import Order
 from phigen.scheme.splitting import build_splitting

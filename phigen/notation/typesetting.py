@@ -1,4 +1,4 @@
-"""Formulas in LaTeX, broken into lines: the markup of `phigen.formulas.mathml`, with an estimate of its width.
+"""Formulas in LaTeX, broken into lines: the markup of `phigen.notation.mathml`, with an estimate of its width.
 
 Widths are in em, for the fonts of TeX, and on the safe side. A line breaks before a plus or a minus, at an outer one
 if that leaves no large hole, else inside parentheses; and between factors where nothing else helps.

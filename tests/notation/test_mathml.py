@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 from mathml_value import value_of
 
 from phigen import resources, spec
-from phigen.formulas import mathml, parts
 from phigen.geometry.system import system_from_spec
+from phigen.notation import mathml, parts
 from phigen.realisations.catalogue import realise
 from phigen.symbolic.expression import (
     EULER,

@@ -6,10 +6,10 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 from phigen.compilation import Compilation
-from phigen.formulas import flows, mathml, parts
-from phigen.formulas.generating import modified_formulas, series_formulas
-from phigen.formulas.typesetting import INDENT, LINE, latex, lines, width
 from phigen.geometry.system import System
+from phigen.notation import flows, mathml, parts
+from phigen.notation.generating import modified_formulas, series_formulas
+from phigen.notation.typesetting import INDENT, LINE, latex, lines, width
 from phigen.symbolic.expression import Expression
 from phigen.symbolic.readable import SHOWN, Formula
 

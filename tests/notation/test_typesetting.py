@@ -8,9 +8,9 @@ from fractions import Fraction
 import pytest
 from support import compiled
 
-from phigen.formulas import mathml
-from phigen.formulas.latex import document
-from phigen.formulas.typesetting import INDENTED, latex, lines, width
+from phigen.notation import mathml
+from phigen.notation.latex import document
+from phigen.notation.typesetting import INDENTED, latex, lines, width
 from phigen.symbolic.expression import call, power, symbol, total
 from phigen.symbolic.symbols import GAUGE, Symbol, momentum
 

@@ -1,1 +1,0 @@
-"""Formulas for reading: in text, LaTeX and MathML."""

@@ -1,0 +1,1 @@
+"""Formulas to read: in text, LaTeX and MathML."""
