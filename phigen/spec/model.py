@@ -24,12 +24,19 @@ Matrix = tuple[tuple[Expression, ...], ...]
 
 @dataclass(frozen=True)
 class Parameter:
-    """A run-time argument of the generated code, with its default."""
+    """A run-time argument of the generated code, with its default.
+
+    ``at`` says of a lattice whether it is one number (``all``), or an array with a value at each of the ``sites`` or
+    ``bonds``. ``formula`` is the default at sites where that depends on the site, in the symbols of its indices and of
+    the sizes (``i``, ``N_i``).
+    """
 
     name: str
     value: Fraction
     positive: bool = False
     description: str = ""
+    at: str = "all"
+    formula: Expression | None = None
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,244 @@
+"""One cell of a lattice: the fields of a site, their brackets with neighbours, and the density of H.
+
+Neighbours are ordinary symbols of the expression engine. On a grid ``x[i+1]`` and ``x[i-1,j+2]`` are x at the site
+that is so far away along the axes i and j; axes come in their order, those of offset 0 are left out, and ``x`` alone is
+x at the site itself. On graphs, and for all pairs, ``x[a]`` and ``x[b]`` are x at the two ends. Parameters that have a
+value at every site are written in the same way.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+
+from phigen.spec.model import Parameter
+from phigen.symbolic.expression import ZERO, Expression, gradient, mul, neg, substitute, symbol, symbols_of, total
+
+GRID, GRAPH, PAIRS = "grid", "graph", "pairs"
+PERIODIC, OPEN = "periodic", "open"
+
+#: Where a site is, from another: steps along the axes of a grid; an end, ``("a",)`` or ``("b",)``, of a bond or a pair;
+#: ``()`` for the site itself where there are no axes.
+Offset = tuple[int, ...] | tuple[str, ...]
+#: A field, or a parameter at sites, and where.
+Place = tuple[str, Offset]
+ENDS = ("a", "b")
+
+_NEIGHBOUR = re.compile(r"(?P<name>[^\[\]]+)\[(?P<index>[^\[\]]+)\]")
+_STEP = re.compile(r"(?P<axis>.+?)(?P<step>[+-][0-9]+)")
+
+
+@dataclass(frozen=True)
+class Cell:
+    """A lattice by its cell.
+
+    ``axes`` name the directions of a grid, the slowest first; ``boundary`` is `PERIODIC` or `OPEN` along each. Graphs
+    and pairs have neither. ``bracket`` maps (f, g at some offset), as symbols, to {f, g}: all that are not 0, in
+    both orders. ``hamiltonian`` is the density of a site, ``bond_hamiltonian`` and ``pair_hamiltonian`` those of a
+    bond from a to b and of a pair; ``bond_bracket`` maps ("f[a]", "g[b]") and ("g[b]", "f[a]") to their bracket along
+    a bond. H is the sum of the densities; at open ends without those of their `terms` that reach beyond.
+    ``casimirs`` maps names to a density and ``sites`` (one for each site), ``sum`` or ``product``; ``invariants`` are
+    sums over sites.
+    """
+
+    name: str
+    fields: tuple[str, ...]
+    hamiltonian: Expression
+    bracket: Mapping[tuple[str, str], Expression]
+    relation: str = GRID
+    axes: tuple[str, ...] = ()
+    boundary: tuple[str, ...] = ()
+    parameters: tuple[Parameter, ...] = ()
+    bond_hamiltonian: Expression = ZERO
+    pair_hamiltonian: Expression = ZERO
+    bond_bracket: Mapping[tuple[str, str], Expression] = field(default_factory=dict)
+    casimirs: Mapping[str, tuple[Expression, str]] = field(default_factory=dict)
+    invariants: Mapping[str, Expression] = field(default_factory=dict)
+
+    # --- symbols
+
+    @property
+    def origin(self) -> Offset:
+        """The offset of the site itself."""
+        return (0,) * len(self.axes)
+
+    @cached_property
+    def at_sites(self) -> tuple[str, ...]:
+        """What has a value at every site: the fields, then the parameters at sites."""
+        return (*self.fields, *(p.name for p in self.parameters if p.at == "sites"))
+
+    def at(self, name: str, offset: Offset) -> str:
+        """The symbol of a field, or of a parameter at sites, at an offset."""
+        if self.relation == GRID:
+            steps = [f"{a}{o:+d}" for a, o in zip(self.axes, offset, strict=True) if isinstance(o, int) and o]
+        else:
+            steps = [str(o) for o in offset]
+        return f"{name}[{','.join(steps)}]" if steps else name
+
+    def place(self, name: str) -> Place:
+        """The field, or parameter at sites, of a symbol, and its offset. `KeyError` for any other symbol."""
+        match = _NEIGHBOUR.fullmatch(name)
+        base = match["name"] if match else name
+        if base not in self.at_sites:
+            raise KeyError(f"{name!r} has no value at sites")
+        if match is None:
+            return base, self.origin
+        if self.relation != GRID:
+            return base, (match["index"],)
+        steps = dict.fromkeys(self.axes, 0)
+        for part in match["index"].split(","):
+            step = _STEP.fullmatch(part)
+            if step is None or step["axis"] not in steps:
+                raise KeyError(f"{name!r} is at no offset of the axes {', '.join(self.axes)}")
+            steps[step["axis"]] = int(step["step"])
+        return base, tuple(steps.values())
+
+    def places(self, *expressions: Expression) -> dict[str, Place]:
+        """All symbols of expressions that have a value at sites, with their places."""
+        found = {}
+        for name in symbols_of(*expressions):
+            if name.partition("[")[0] in self.at_sites:
+                found[name] = self.place(name)
+        return found
+
+    def shifted(self, expression: Expression, offset: Offset) -> Expression:
+        """The expression as it is at the site that lies so far away on the grid."""
+        return self.all_shifted([expression], offset)[0]
+
+    def all_shifted(self, expressions: Sequence[Expression], offset: Offset) -> list[Expression]:
+        """`shifted` for several expressions that share parts."""
+        if not any(offset):
+            return list(expressions)
+        moved = {name: symbol(self.at(base, plus(o, offset))) for name, (base, o) in self.places(*expressions).items()}
+        return substitute(expressions, moved)
+
+    def on(self, expression: Expression, end: str) -> Expression:
+        """A density of a site as it is at one end of a bond or a pair."""
+        moved = {name: symbol(self.at(base, (end,))) for name, (base, _) in self.places(expression).items()}
+        return substitute([expression], moved)[0]
+
+    # --- the density of H
+
+    @cached_property
+    def terms(self) -> tuple[Expression, ...]:
+        """The additive terms of the density of a site, as they are written; open ends leave out single ones."""
+        return tuple(self.additive_terms(self.hamiltonian))
+
+    def additive_terms(self, density: Expression) -> Iterator[Expression]:
+        """The terms of a sum; a factor that is the same at all sites is multiplied into a sum."""
+        yield from self._terms(density, ())
+
+    def _terms(self, density: Expression, factors: tuple[Expression, ...]) -> Iterator[Expression]:
+        args = density.args
+        if density.op in ("add", "sub"):
+            yield from self._terms(args[0], factors)
+            yield from self._terms(args[1] if density.op == "add" else neg(args[1]), factors)
+        elif density.op == "neg" and args[0].op in ("add", "sub", "mul"):
+            for term in self._terms(args[0], factors):
+                yield neg(term)
+        elif density.op == "mul" and any(not self.places(a) and self.places(b) for a, b in (args, args[::-1])):
+            constant, varying = args if not self.places(args[0]) else args[::-1]
+            yield from self._terms(varying, (constant, *factors))
+        elif not density.is_zero:
+            for factor in factors:
+                density = mul(factor, density)
+            yield density
+
+    def extent(self, expression: Expression) -> tuple[tuple[int, ...], tuple[int, ...]]:
+        """The least and the largest offsets along each axis of what a term of a grid mentions."""
+        offsets = [_steps(o) for _, o in self.places(expression).values()] or [_steps(self.origin)]
+        return tuple(map(min, zip(*offsets, strict=True))), tuple(map(max, zip(*offsets, strict=True)))
+
+    @cached_property
+    def poisson_reach(self) -> tuple[int, ...]:
+        """How far the brackets reach along each axis: to the other field, and by what they depend on."""
+        others = [symbol(other) for _, other in self.bracket]
+        return self._reach([*others, *self.bracket.values()])
+
+    @cached_property
+    def hamiltonian_reach(self) -> tuple[int, ...]:
+        """How far apart two sites of one term of H are at most, along each axis."""
+        widths = [[h - low for low, h in zip(*self.extent(t), strict=True)] for t in self.terms]
+        return tuple(max((w[k] for w in widths), default=0) for k in range(len(self.axes)))
+
+    def _reach(self, expressions: Iterable[Expression]) -> tuple[int, ...]:
+        offsets = [_steps(o) for _, o in self.places(*expressions).values()]
+        return tuple(max((abs(o[k]) for o in offsets), default=0) for k in range(len(self.axes)))
+
+    @property
+    def is_local(self) -> bool:
+        """Whether brackets couple the fields of one site only."""
+        return not self.bond_bracket and not any(self.poisson_reach)
+
+
+@dataclass(frozen=True)
+class Contribution:
+    """A term of ∂H/∂f at a site: ``low`` and ``high`` are the offsets that the term of H it comes from reaches.
+
+    Beside an open end it is there only if all offsets from ``low`` to ``high`` are on the lattice.
+    """
+
+    expression: Expression
+    low: tuple[int, ...]
+    high: tuple[int, ...]
+
+
+def contributions(cell: Cell) -> dict[str, tuple[Contribution, ...]]:
+    """∂H/∂f at a site of a grid, for each field f, term by term of H: of all densities that mention this site."""
+    found: dict[str, list[Contribution]] = {f: [] for f in cell.fields}
+    for term in cell.terms:
+        named = {name: p for name, p in cell.places(term).items() if p[0] in cell.fields}
+        low, high = cell.extent(term)
+        slopes = gradient(term, list(named))
+        for (base, offset), slope in zip(named.values(), slopes, strict=True):
+            if not slope.is_zero:
+                moved, back = cell.shifted(slope, minus(offset)), _steps(minus(offset))
+                found[base].append(Contribution(moved, _sum(low, back), _sum(high, back)))
+    return {f: tuple(listed) for f, listed in found.items()}
+
+
+def forces(cell: Cell) -> dict[str, Expression]:
+    """∂H/∂f at a site, for each field f, from the densities of sites; away from open ends.
+
+    On graphs and for pairs what bonds and pairs add is in `bond_forces`.
+    """
+    if cell.relation != GRID:
+        return dict(zip(cell.fields, gradient(cell.hamiltonian, cell.fields), strict=True))
+    return {f: total(c.expression for c in listed) for f, listed in contributions(cell).items()}
+
+
+def bond_forces(cell: Cell) -> dict[str, Expression]:
+    """The derivatives of the density of a bond, or a pair, by ``f[a]`` and ``f[b]`` for all fields f, without zeros."""
+    density = cell.bond_hamiltonian + cell.pair_hamiltonian
+    names = [cell.at(f, (end,)) for end in ENDS for f in cell.fields]
+    return {n: slope for n, slope in zip(names, gradient(density, names), strict=True) if not slope.is_zero}
+
+
+def vector_field(cell: Cell) -> dict[str, Expression]:
+    """ḟ at a site of a grid, for each field f, away from open ends."""
+    slopes = forces(cell)
+    rates: dict[str, list[Expression]] = {f: [] for f in cell.fields}
+    for (f, other), entry in cell.bracket.items():
+        base, offset = cell.place(other)
+        rates[f].append(entry * cell.shifted(slopes[base], offset))
+    return {f: total(listed) for f, listed in rates.items()}
+
+
+def plus(a: Offset, b: Offset) -> Offset:
+    """The sum of two offsets of a grid."""
+    return _sum(_steps(a), _steps(b))
+
+
+def minus(a: Offset) -> Offset:
+    """The way back."""
+    return tuple(-o for o in _steps(a))
+
+
+def _sum(a: tuple[int, ...], b: tuple[int, ...]) -> tuple[int, ...]:
+    return tuple(x + y for x, y in zip(a, b, strict=True))
+
+
+def _steps(offset: Offset) -> tuple[int, ...]:
+    return tuple(int(o) for o in offset)
