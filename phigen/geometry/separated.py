@@ -26,7 +26,7 @@ def separated(coordinates: Sequence[str], poisson: Matrix) -> Separated | None:
     upper = {(i, j): poisson[i][j] for j in range(len(coordinates)) for i in range(j)}
     others = [s for s in symbols_of(*upper.values()) if s not in coordinates]
     tower = Tower([*coordinates, *others], upper.values())
-    entries = dict(zip(upper, tower.convert_all(list(upper.values())), strict=True))
+    entries = {ij: tower.simplified(e) for ij, e in zip(upper, tower.convert_all(list(upper.values())), strict=True)}
     found: dict[int, list[tuple[Poly, int]]] = {}
     constants = {}
     for (i, j), element in entries.items():

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from phigen.geometry.identities import polynomial_by_identity
 from phigen.geometry.lie_algebra import LieAlgebra
 from phigen.symbolic.expression import ZERO, Expression, symbols_of
 from phigen.symbolic.tower import Poly, Tower
@@ -103,14 +104,17 @@ def recognise(coordinates: Sequence[str], poisson: Matrix) -> Shape:
 
 
 def coordinate_terms(coordinates: Sequence[str], expressions: Sequence[Expression]) -> list[Terms] | None:
-    """The expressions as polynomials in the coordinates; None if one of them is not."""
+    """The expressions as polynomials in the coordinates, be it by an identity; None if one of them is not."""
     names = list(coordinates) + [s for s in symbols_of(*expressions) if s not in coordinates]
     tower = Tower(names, expressions)
     found = []
-    for element in tower.convert_all(expressions):
+    for e, element in zip(expressions, tower.convert_all(expressions), strict=True):
         terms = _split(tower, element, coordinates)
         if terms is None:
-            return None
+            same = polynomial_by_identity(e, coordinates)
+            if same is None:
+                return None
+            (terms,) = coordinate_terms(coordinates, [same]) or [{}]
         found.append(terms)
     return found
 

@@ -88,7 +88,7 @@ def _motion(c: str, g: Expression, u: Expression, positive: Collection[str]) -> 
             return _exponential(g, u, b)
         return _quadratic(symbol(c), g, u, (a, b, constant), positive)
     rate = _constant(derivative(g, c) / g, c)
-    if rate is not None:
+    if rate is not None and not rate.is_zero:
         early, late = (-call("log", 1 + sign * _HALF * rate * u * g) / rate for sign in (1, -1))
         return _Motion(early, late, late - early)
     degree = _constant(symbol(c) * derivative(g, c) / g, c)

@@ -4,7 +4,7 @@ import pytest
 from geometry.building import family, system, typed
 
 from phigen.geometry.lie_algebra import LieAlgebra
-from phigen.geometry.shapes import Canonical, Constant, General, LiePoisson, LogCanonical
+from phigen.geometry.shapes import Affine, Canonical, Constant, General, LiePoisson, LogCanonical
 
 PARAMETERS = "parameters: {m: 2, l: {value: 3, positive: true}}"
 
@@ -17,6 +17,42 @@ def test_canonical_pairs_are_found_in_any_order_and_sign():
     found = shape("p q z y b", "{brackets: {q: {p: 1}, y: {b: '2/2'}}}")
     assert isinstance(found, Canonical)
     assert (found.q, found.p, found.rest) == (("q", "y"), ("p", "b"), ("z",))
+
+
+@pytest.mark.parametrize(
+    ("entry", "value"),
+    [
+        ("1 + sin(x)**2 + cos(x)**2", "2"),
+        ("m*exp(x + y)*exp(-x - y)", "m"),
+        ("(l*x + l)/(1 + x)", "l"),  # that has no value at −1 alone
+        ("log(x)/log(x) + l*(cosh(y)**2 - sinh(y)**2)", "1 + l"),  # neither at 0 nor at 1
+        ("sqrt(x)**2/x + atan(y) - atan(y)", "1"),
+    ],
+)
+def test_a_bracket_that_is_constant_by_an_identity_has_its_value(entry, value):
+    found = shape("x y", f"{{brackets: {{x: {{y: '{entry}'}}}}}}")
+    assert isinstance(found, Canonical if value == "1" else Constant)
+    assert str(found.matrix[0][1]) == value
+
+
+@pytest.mark.parametrize(
+    ("brackets", "kind"),
+    [
+        ("{x: {y: 'z*(sin(x)**2 + cos(x)**2)'}, y: {z: '(x**2 - x)/(x - 1)'}}", LiePoisson),
+        ("{x: {y: 'z*(sin(x)**2 + cos(x)**2) + (x**2 - y**2)/(x - y) - x - y + l'}}", Affine),
+        ("{x: {y: 'm*x*y*(cosh(z)**2 - sinh(z)**2)', z: 'x*z*exp(y)/exp(y)'}}", LogCanonical),
+    ],
+)
+def test_linear_affine_and_log_canonical_brackets_are_found_by_identities(brackets, kind):
+    found = shape("x y z", f"{{brackets: {brackets}}}")
+    assert isinstance(found, kind)
+    if kind is LogCanonical:
+        assert [str(e) for e in found.a[0]] == ["0", "m", "1"]
+
+
+@pytest.mark.parametrize("entry", ["abs(x)/x", "sqrt(x**2)/x", "abs(x)*y/x", "sqrt(x**4 + 1) - x**2"])
+def test_what_is_constant_in_parts_only_is_not_constant(entry):
+    assert isinstance(shape("x y", f"{{brackets: {{x: {{y: '{entry}'}}}}}}"), General)
 
 
 @pytest.mark.parametrize("value", ["2", "1/m", "m-1"])

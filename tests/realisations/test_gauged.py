@@ -95,6 +95,14 @@ def test_factors_are_found_up_to_constants():
     assert [str(e) for e in found.matrix[0]] == ["0", "2*a", "b"]
 
 
+def test_factors_that_are_constant_by_an_identity_are_constants():
+    s = tensor("x y z", "{x: {y: exp(x)*(1 + sin(y)**2 + cos(y)**2), z: a*exp(x)*(cosh(x)**2 - sinh(x)**2)}}")
+    found = separated(s.coordinates, s.poisson)
+    assert [str(g) for g in found.factors] == ["exp(x)", "1", "1"]
+    assert [str(e) for e in found.matrix[0]] == ["0", "2", "a"]
+    assert realise(s).kind == "gauged"
+
+
 @pytest.mark.parametrize(
     "brackets",
     [

@@ -1,0 +1,85 @@
+"""Functions that are polynomials by an identity, such as x·(sin(y)**2 + cos(y)**2) or (x**2 - 1)/(x - 1)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from fractions import Fraction
+from math import comb
+
+from phigen.symbolic.expression import Expression, gradient, number, substitute, symbol, symbols_of, total
+from phigen.symbolic.numeric import DomainError, evaluate_precisely, evaluate_with_scale
+from phigen.symbolic.tower import Tower
+from phigen.symbolic.verdict import DIGITS, ZERO_DIGITS, sample_point
+
+#: Degrees up to which polynomials are recognised: those of constant, linear and log-canonical tensors.
+DEGREE = 2
+#: Points in turn where the values are taken, (a, a + b, a + 2b, …); many functions are rational at the first two.
+_BASES = ((0, 0), (1, 0), (2, 1))
+#: Lines that are tried for one on which the function has values.
+_LINES = 8
+
+
+def polynomial_by_identity(e: Expression, coordinates: Sequence[str]) -> Expression | None:
+    """The polynomial in the coordinates, of degree ≤ `DEGREE`, that the expression equals; None if it is none.
+
+    The coefficients are Taylor coefficients at a point, and the equality is proved, in the ring of the functions that
+    occur. None too where there is no proof.
+    """
+    moving = [c for c in symbols_of(e) if c in coordinates]
+    if not _flat_on_a_line(e, moving):
+        return None
+    try:
+        candidate = _expansion(e, moving)
+        if candidate is None:
+            return None
+        tower = Tower(symbols_of(e, candidate), [e - candidate])
+        return candidate if tower.is_zero(tower.convert(e - candidate)) else None
+    except (OverflowError, ZeroDivisionError):
+        return None
+
+
+def _flat_on_a_line(e: Expression, moving: Sequence[str]) -> bool:
+    """Whether the difference of order `DEGREE` + 1 vanishes on a line: cheap, and false for nearly all functions."""
+    names = symbols_of(e)
+    for k in range(_LINES):
+        start = sample_point(names, names, k)
+        direction = {c: start[c] / (7 + i) for i, c in enumerate(moving)}
+        values = []
+        try:
+            for t in range(DEGREE + 2):
+                point = start | {c: start[c] + t * v for c, v in direction.items()}
+                values += evaluate_with_scale([e], point, DIGITS)
+        except DomainError:
+            continue
+        difference = sum((-1) ** t * comb(DEGREE + 1, t) * value for t, (value, _) in enumerate(values))
+        return bool(abs(difference) < max(scale for _, scale in values) * 10**-ZERO_DIGITS)
+    return False
+
+
+def _expansion(e: Expression, moving: Sequence[str]) -> Expression | None:
+    """The Taylor polynomial about the first point that has one; None if none has."""
+    slopes = gradient(e, moving)
+    parts = [e, *slopes, *(c for slope in slopes for c in gradient(slope, moving))]
+    others = [s for s in symbols_of(e) if s not in moving]
+    for first, step in _BASES:
+        base = {c: Fraction(first + k * step) for k, c in enumerate(moving)}
+        at_base = [_simplified(v) for v in _at(parts, base, others)]
+        if at_base:
+            d = [symbol(c) - v for c, v in base.items()]
+            directions = [number(1), *d, *(a * b / 2 for a in d for b in d)]
+            return total(value * direction for value, direction in zip(at_base, directions, strict=True))
+    return None
+
+
+def _at(parts: Sequence[Expression], base: Mapping[str, Fraction], others: Sequence[str]) -> list[Expression]:
+    """The expressions at a point of the coordinates; none if they have no values there."""
+    try:
+        evaluate_precisely(parts, {**sample_point(others, others, 0), **base}, DIGITS)
+    except DomainError:
+        return []
+    return substitute(parts, {c: number(v) for c, v in base.items()})
+
+
+def _simplified(e: Expression) -> Expression:
+    tower = Tower(symbols_of(e), [e])
+    return tower.expression(tower.simplified(tower.convert(e)))
