@@ -19,7 +19,7 @@ from phigen import registry
 from phigen import spec as specs
 from phigen.compilation import Compilation
 from phigen.compiler import compile_proved, emit
-from phigen.errors import Diagnostic, SpecError
+from phigen.errors import Diagnostic, PhigenWarning, SpecError
 from phigen.geometry.system import System, system_from_spec
 from phigen.proofs.examination import located
 from phigen.spec import limits
@@ -127,7 +127,7 @@ def solver_of(compilation: Compilation, target: str = "auto") -> Solver:
 
 
 def _warn(message: str) -> None:
-    warnings.warn(message, RuntimeWarning, stacklevel=2)
+    warnings.warn(message, PhigenWarning, stacklevel=2)
 
 
 def backend_of(files: Mapping[str, str], interface: Interface) -> Backend:

@@ -22,10 +22,10 @@ from typing import Any, TypeVar
 from phigen import progress, registry
 from phigen import spec as specs
 from phigen.compilation import Compilation
-from phigen.errors import CheckError, LimitError, SpecError
+from phigen.errors import CheckError, LimitError, PhigenWarning, SpecError
 from phigen.geometry.system import System, system_from_spec
 from phigen.proofs import statements
-from phigen.proofs.examination import UNEXAMINED, Examination, located, refutation, refuted
+from phigen.proofs.examination import UNEXAMINED, Examination, doubts, located, refutation, refuted
 from phigen.realisations.catalogue import realise
 from phigen.scheme.assemble import build_program
 from phigen.scheme.choosing import plan as plan_splitting
@@ -108,8 +108,8 @@ def compile_proved(
     found = examine(spec, order=order, scheme=scheme, system=system, extras=extras)
     if found.refuted:
         raise CheckError(refutation(found))
-    for s in found.groups.get(statements.DEFINEDNESS, ()):
-        warnings.warn(f"{spec.name}: {s}", RuntimeWarning, stacklevel=3)
+    for warning in doubts(found):
+        warnings.warn(str(warning), PhigenWarning, stacklevel=3)
     if found.compilation is None:
         raise found.obstacle or AssertionError("an examination without compilation has an obstacle")
     return found.compilation

@@ -78,6 +78,10 @@ class PhigenError(Exception):
         return _restored, (type(self), self.args, self.__dict__)
 
 
+class PhigenWarning(RuntimeWarning):
+    """Something the user should know, although the work goes on; the command line shows it as its own."""
+
+
 class SpecError(PhigenError):
     """The spec is wrong; holds every diagnostic of the run, in the order of the file."""
 

@@ -91,7 +91,7 @@ class Commands(click.Group):
     def invoke(self, ctx: click.Context) -> Any:
         console = ctx.ensure_object(Console)
         try:
-            with console.watching():
+            with console.heeding(), console.watching():
                 return super().invoke(ctx)
         except BrokenPipeError as error:
             # Not left to click, which would exit with 1, the code of a wrong spec.

@@ -7,6 +7,7 @@ import errno
 import json
 import os
 import sys
+import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager, suppress
 from dataclasses import dataclass
@@ -15,6 +16,7 @@ from typing import Any, TypeVar
 import click
 
 from phigen.cli.display import Display
+from phigen.errors import PhigenWarning
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -52,6 +54,23 @@ class Console:
         """What only -v asks for."""
         if self.verbose:
             self._say(message)
+
+    @contextmanager
+    def heeding(self) -> Iterator[None]:
+        """While it lasts, the warnings of phigen's library are messages like those of its commands."""
+        with warnings.catch_warnings():
+            plain = warnings.showwarning
+
+            def show(message: Warning | str, category: type[Warning], *place: Any, **more: Any) -> None:
+                if not issubclass(category, PhigenWarning):
+                    plain(message, category, *place, **more)
+                elif not self.quiet:
+                    text = str(message)
+                    self._say(_coloured(text if ": warning:" in text.split("\n")[0] else f"warning: {text}"))
+
+            warnings.showwarning = show
+            warnings.simplefilter("always", PhigenWarning)
+            yield
 
     def watching(self) -> AbstractContextManager[None]:
         """While it lasts, the stages of the compiler are shown: on a terminal, unless -q; with -v as messages."""

@@ -63,18 +63,26 @@ def refuted(groups: Groups) -> list[Statement]:
 
 def refutation(found: Examination) -> str:
     """What is refuted, for a message, each with its place in the spec."""
-    spec = found.spec
+    hint = f"not examined, since they rest on it: {found.unexamined}" if found.unexamined else ""
+    return "\n".join(str(found.spec.diagnostic(_place(found.spec, g, s), str(s), hint)) for g, s in found.mistakes)
+
+
+def doubts(found: Examination) -> list[Diagnostic]:
+    """Warnings of what seems to have no value anywhere, each with its place in the spec."""
+    listed = [
+        found.spec.diagnostic(_place(found.spec, DEFINEDNESS, s), str(s)) for s in found.groups.get(DEFINEDNESS, ())
+    ]
+    return [replace(d, severity="warning") for d in listed]
+
+
+def _place(spec: Spec, group: str, statement: Statement) -> tuple[str, ...]:
+    """The path of keys to what a statement is about."""
     places: dict[str, tuple[str, ...]] = {f"{name} is a Casimir": ("casimirs", name) for name in spec.casimirs}
     places |= {f"{name} is invariant": ("invariants", name) for name in spec.invariants}
-    hint = f"not examined, since they rest on it: {found.unexamined}" if found.unexamined else ""
     places |= {"H is defined": ("hamiltonian",)}
     places |= {f"{name} is defined": ("casimirs", name) for name in spec.casimirs}
     places |= {f"{name} is defined": ("invariants", name) for name in spec.invariants}
-    lines = []
-    for group, s in found.mistakes:
-        place = places.get(s.name, _PLACES.get(group.partition(" (")[0], ("poisson",)))
-        lines.append(str(spec.diagnostic(place, str(s), hint)))
-    return "\n".join(lines)
+    return places.get(statement.name, _PLACES.get(group.partition(" (")[0], ("poisson",)))
 
 
 def located(error: SpecError, spec: Spec) -> SpecError:

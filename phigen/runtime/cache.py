@@ -24,7 +24,7 @@ from collections.abc import Iterator, Mapping
 from functools import cache
 from pathlib import Path
 
-from phigen.errors import ToolchainError
+from phigen.errors import PhigenWarning, ToolchainError
 from phigen.runtime import toolchain
 from phigen.runtime.toolchain import Compiler
 
@@ -90,7 +90,7 @@ def build(files: Mapping[str, str], folder: Path | None = None) -> Path:
         warnings.warn(
             f"the cache {folder} cannot be written ({error.strerror or error}); compiled solvers last for this "
             "process only. Set PHIGEN_CACHE_DIR to a folder of yours",
-            RuntimeWarning,
+            PhigenWarning,
             stacklevel=2,
         )
         return _compile_into(fallback, name, files, compiler)

@@ -22,8 +22,21 @@ def did_you_mean(word: str, candidates: Iterable[str]) -> str:
     if len(word) > limits.NAME_LENGTH:
         return ""
     choices = list(candidates)
-    close = [c for c in choices if c.lower() == word.lower()] or difflib.get_close_matches(word, choices, n=1)
+    close = (
+        [c for c in choices if c.lower() == word.lower()]
+        or _numbered(word, choices)
+        or difflib.get_close_matches(word, choices, n=1)
+    )
     return f"did you mean {close[0]!r}?" if close else ""
+
+
+def _numbered(word: str, choices: Iterable[str]) -> list[str]:
+    """Where the word is one of a row x1, x2, … but for its number: the others, those with the nearest number first."""
+    stem = word.rstrip("0123456789")
+    row = [c for c in choices if c != stem and c[len(stem) :].isdecimal()] if stem and stem != word else []
+    return sorted(
+        (c for c in row if c.startswith(stem)), key=lambda c: abs(int(c[len(stem) :]) - int(word[len(stem) :]))
+    )
 
 
 def one_of(choices: Iterable[str]) -> str:
@@ -43,13 +56,13 @@ class Problems:
         self.file = file
         self.lines = source.split("\n")
         self.found: dict[tuple[Location, str], Diagnostic] = {}
-        self.limit = False
+        self.only_limits = True
 
     def add(self, message: str, location: Location, hint: str = "", *, limit: bool = False) -> None:
         """Record an error; the first mention of a message at a place counts. Raises when there are too many."""
         line = self.lines[location.line - 1] if location.line <= len(self.lines) else ""
         self.found.setdefault((location, message), Diagnostic(message, location, hint, line))
-        self.limit |= limit
+        self.only_limits &= limit
         if len(self.found) >= limits.ERRORS:
             raise self.error()
 
@@ -59,11 +72,11 @@ class Problems:
         return self.error()
 
     def error(self) -> SpecError:
-        """The exception that holds what was found; a `LimitError` if a limit is among it."""
+        """The exception that holds what was found; a `LimitError` if all of it are limits."""
         ordered = [self.found[key] for key in sorted(self.found, key=lambda key: key[0])]
         if len(ordered) >= limits.ERRORS:
             ordered.append(Diagnostic(f"there may be more: only {limits.ERRORS} errors are listed"))
-        return (LimitError if self.limit else SpecError)(ordered)
+        return (LimitError if self.only_limits else SpecError)(ordered)
 
     def finish(self) -> None:
         """Raise what was found, if anything was."""

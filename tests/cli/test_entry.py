@@ -67,6 +67,17 @@ def test_wrong_spec_is_1_with_all_errors_on_stderr(phigen, write):
     assert "b.yaml" in done.stderr
 
 
+def test_warnings_are_messages_with_their_place(phigen, write):
+    head = "phigen: 1\nname: a\ncoordinates: [x, y]\npoisson: {canonical: {q: [x], p: [y]}}\norder: 2\n"
+    write("a.yaml", head + "hamiltonian: log(-1 - x**2) + y\n")
+    done = phigen("build", "a.yaml", "-t", "numpy")
+    assert done.exit_code == 0
+    warning, line, caret, *_ = done.stderr.splitlines()
+    assert warning.startswith("a.yaml:6:14: warning: H is defined: undecided (no value at any of ")
+    assert line.index("log(") == caret.index("^")
+    assert phigen("build", "a.yaml", "-t", "numpy", "-q").stderr == ""
+
+
 @pytest.mark.parametrize(
     "args", [[], ["nonsense"], ["build"], ["build", "--order", "0", "a"], ["run", "a.yaml", "--run", "nobody"]]
 )

@@ -4,6 +4,7 @@ import pytest
 
 from phigen import CheckError, spec
 from phigen.compiler import compile_proved, examine
+from phigen.errors import PhigenWarning
 from phigen.proofs.statements import DEFINEDNESS
 from phigen.symbolic.verdict import REFUTED, UNDECIDED
 
@@ -46,7 +47,7 @@ def test_where_no_run_says_where_it_starts_a_search_in_vain_is_a_warning():
     text = PAIR + "hamiltonian: sqrt(1e-6 - x**2) + y**2\n"
     (found,) = examine(spec.loads(text)).groups[DEFINEDNESS]
     assert (found.verdict, found.detail) == (UNDECIDED, "no value at any of 192 points")
-    with pytest.warns(RuntimeWarning, match="H is defined: undecided"):
+    with pytest.warns(PhigenWarning, match=r"^<string>:5:14: warning: H is defined: undecided"):
         compile_proved(spec.loads(text))
 
 

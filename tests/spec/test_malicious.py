@@ -56,7 +56,8 @@ OVER_LIMITS = {
     "mappings 50,000 deep": "{a: " * 50_000,
     "30,000 values": "a: [" + "1," * 30_000 + "1]",
     "a name of 10,000 letters": HEAD + "hamiltonian: x1\ncasimirs: {" + "a" * 1000 + ": x1}\n",
-    "300 coordinates": "coordinates: [" + ", ".join(f"x{i}" for i in range(300)) + "]\n",
+    "300 coordinates": "phigen: 1\nname: many\npoisson: {brackets: {x0: {x1: 1}}}\nhamiltonian: x0\n"
+    f"coordinates: [{', '.join(f'x{i}' for i in range(300))}]\n",
     "a title of 1,000 characters": hamiltonian("x1") + "title: " + "a" * 1000 + "\n",
     "order 1,000": hamiltonian("x1") + "order: 1000\n",
 }
@@ -67,6 +68,13 @@ def test_limit_is_an_error_of_its_own(title: str, tmp_path: Path) -> None:
     error = refused(OVER_LIMITS[title], tmp_path)
     assert isinstance(error, LimitError)
     assert error.exit_code == 3
+
+
+def test_limits_beside_other_errors_have_the_code_of_those(tmp_path: Path) -> None:
+    error = refused(hamiltonian("x1**5000 + y1**5000"), tmp_path)
+    assert len(error.diagnostics) == 3
+    assert type(error) is SpecError
+    assert error.exit_code == 1
 
 
 ALIAS_BOMB = "a: &a [x, x]\n" + "".join(
