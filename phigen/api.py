@@ -12,10 +12,10 @@ import re
 import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from os import PathLike
+from os import PathLike, fspath
 from typing import TYPE_CHECKING
 
-from phigen import registry
+from phigen import registry, resources
 from phigen import spec as specs
 from phigen.compilation import Compilation
 from phigen.compiler import compile_proved, emit
@@ -39,11 +39,11 @@ Source = str | PathLike[str] | Spec | System | Compilation
 
 
 def load(path: str | PathLike[str]) -> System:
-    """The system in a spec file; its ``spec`` holds the rest of the file (order, runs, title, …).
+    """The system in a spec file, or in the bundled one of that name; its ``spec`` holds the rest of the file.
 
     Raises `SpecError` with all errors of the file.
     """
-    spec = specs.load(path)
+    spec = specs.load(resources.file_of(fspath(path)))
     try:
         return system_from_spec(spec)
     except SpecError as error:
@@ -59,7 +59,7 @@ def compile(
     tangent: bool = False,
     profile: str | None = None,
 ) -> Solver:
-    """A solver of a system: of one from `load` or `System.from_sympy`, of a spec, or of the path of a spec file.
+    """A solver of a `System` or a spec, of the path of a spec file, or of the name of a bundled one.
 
     ``target`` is ``c``, ``numpy``, or ``auto``: C if there is a compiler, else NumPy with a `RuntimeWarning`. ``order``
     overrides the order of the spec, ``scheme`` (``series``, ``splitting``, ``auto``) its scheme; ``tangent`` asks for
@@ -113,7 +113,7 @@ def compilation_of(
     if isinstance(source, Spec):
         return compile_proved(source, order=order, scheme=scheme, extras=extras)
     if isinstance(source, str | PathLike):
-        return compile_proved(specs.load(source), order=order, scheme=scheme, extras=extras)
+        return compile_proved(specs.load(resources.file_of(fspath(source))), order=order, scheme=scheme, extras=extras)
     raise TypeError(f"cannot compile {type(source).__name__}; give a path, a System or a Spec")
 
 

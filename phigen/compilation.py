@@ -16,7 +16,7 @@ from phigen.spec.model import Spec
 from phigen.splitting.parts import Splitting
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Compilation:
     """Everything that compiling one spec made, stage by stage; ``seconds`` maps stages to their time."""
 
@@ -30,6 +30,9 @@ class Compilation:
     splitting: Splitting | None = None
     gauged: Gauged | None = None
     scheme: Discretisation | None = None
+
+    def __repr__(self) -> str:
+        return f"<Compilation of {self.spec.name}: order {self.order.order}, {self.label}>"
 
     @property
     def chart(self) -> BiRealisation:
@@ -69,3 +72,15 @@ class Compilation:
         if self.gauged is None:
             raise ValueError(f"{self.spec.name} is compiled to a splitting, which has no generating function")
         return self.gauged.series
+
+    def _repr_latex_(self) -> str:
+        """The formulas of the system and of the method, for notebooks."""
+        from phigen.notation.latex import document
+
+        return document(self)
+
+    def _repr_html_(self) -> str:
+        """The system and what it was compiled to, for notebooks."""
+        from phigen.notation.notebook import compilation_html
+
+        return compilation_html(self)

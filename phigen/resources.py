@@ -34,6 +34,11 @@ def bundled_name(file: str) -> str | None:
     return path.stem if path.is_absolute() and bundled().get(path.stem) == path else None
 
 
+def file_of(given: str) -> str:
+    """The path itself if there is such a file, or none of the bundled specs has that name; else that of the spec."""
+    return given if Path(given).is_file() else str(bundled().get(given, given))
+
+
 def _find(name: str) -> Path:
     # The checkout comes second: a wheel must not pick up a stray folder of site-packages.
     for folder in (_PACKAGE / "_data" / name, _PACKAGE.parent / name):

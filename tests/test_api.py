@@ -170,3 +170,11 @@ def test_formulas_of_a_splitting_do_not_exist(tmp_path):
         phigen.formulas(tmp_path / "lv.yaml")
     with pytest.raises(ValueError, match="terms must be"):
         phigen.formulas(RIGID_BODY, terms=99)
+
+
+def test_bundled_specs_have_names_here_too(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert phigen.load("rigid_body").name == "rigid_body"
+    (tmp_path / "rigid_body").write_text("phigen: 1\n")  # a file comes first
+    with pytest.raises(phigen.SpecError):
+        phigen.load("rigid_body")

@@ -12,13 +12,16 @@ from phigen.geometry.forms import structure
 from phigen.geometry.lie_algebra import LieAlgebra
 from phigen.geometry.shapes import LiePoisson, Matrix, Shape
 from phigen.spec.model import Parameter, PoissonForm, Spec
-from phigen.symbolic.expression import Expression, gradient, total
+from phigen.symbolic.expression import Expression, gradient, text, total
 
 if TYPE_CHECKING:
     from phigen.geometry.sympy_bridge import SympySystem
 
+#: Characters of a Hamiltonian that the representation of a system shows.
+_SHOWN = 60
 
-@dataclass(frozen=True)
+
+@dataclass(frozen=True, repr=False)
 class System:
     """ẋ = π(x)∇H(x).
 
@@ -42,6 +45,11 @@ class System:
     notes: tuple[str, ...] = ()
     locations: Mapping[tuple[Any, ...], Location] = field(default_factory=dict)
     spec: Spec | None = field(default=None, repr=False, compare=False)
+
+    def __repr__(self) -> str:
+        shown = text(self.hamiltonian)
+        energy = shown if len(shown) <= _SHOWN else f"{shown[:_SHOWN]}…"
+        return f"<System {self.name}: ({', '.join(self.coordinates)}), H = {energy}>"
 
     @property
     def dimension(self) -> int:
@@ -94,6 +102,18 @@ class System:
         from phigen.geometry.sympy_bridge import given_back
 
         return given_back(self)
+
+    def _repr_latex_(self) -> str:
+        """π, H, Casimirs and invariants, for notebooks."""
+        from phigen.notation.notebook import system_latex
+
+        return system_latex(self)
+
+    def _repr_html_(self) -> str:
+        """The same with the parameters, for notebooks."""
+        from phigen.notation.notebook import system_html
+
+        return system_html(self)
 
 
 def system_from_spec(spec: Spec) -> System:

@@ -34,10 +34,7 @@ def document(compilation: Compilation, modified: int = 0, most: int | None = SHO
     ``modified`` is the number of corrections; with 0, the leading one is shown where it costs little. Raises
     `SpecError` where they are asked for and not computed.
     """
-    system = compilation.system
-    blocks = [_tensor(system), _aligned(_assigned(["H"], [system.hamiltonian]))]
-    if first_integrals := {**system.casimirs, **system.invariants}:
-        blocks.append(_aligned(_assigned(list(first_integrals), list(first_integrals.values()))))
+    blocks = system_blocks(compilation.system)
     if compilation.splitting:
         blocks += [_flow(compilation, k) for k in range(1, len(compilation.splitting.flows) + 1)]
     else:
@@ -48,6 +45,14 @@ def document(compilation: Compilation, modified: int = 0, most: int | None = SHO
         blocks.append(_aligned([(tilde, sums), *((_indexed("H", j), _pieces(f)) for j, f in listed)]))
     head = f"% {compilation.spec.name}, order {compilation.order.order}; needs amsmath"
     return "\n".join([head, "\\begingroup\\allowdisplaybreaks", *blocks, "\\endgroup"])
+
+
+def system_blocks(system: System) -> list[str]:
+    """Displayed equations for π, H, and the Casimirs and invariants if there are any."""
+    blocks = [_tensor(system), _aligned(_assigned(["H"], [system.hamiltonian]))]
+    if first_integrals := {**system.casimirs, **system.invariants}:
+        blocks.append(_aligned(_assigned(list(first_integrals), list(first_integrals.values()))))
+    return blocks
 
 
 def _tensor(system: System) -> str:

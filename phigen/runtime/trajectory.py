@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -13,6 +13,11 @@ from phigen.runtime.interface import Floats
 from phigen.runtime.tables import Column, write
 from phigen.targets.names import identifiers
 from phigen.targets.reserved import Reserved
+
+if TYPE_CHECKING:
+    import pandas as pd
+    import xarray as xr
+    from matplotlib.figure import Figure
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,6 +43,39 @@ class Trajectory:
     def __repr__(self) -> str:
         names = ", ".join(self.coordinates)
         return f"<Trajectory of ({names}): {self.steps} steps of {self.h!r}, {len(self)} rows>"
+
+    def _repr_html_(self) -> str:
+        """First and last row, and what was conserved, for notebooks."""
+        from phigen.notation.notebook import trajectory_html
+
+        return trajectory_html(self)
+
+    def plot(self) -> Figure:
+        """A figure of the orbit in phase space, and below it the errors of energy and Casimirs over time.
+
+        Notebooks show it; ``.savefig(path)`` writes it. Raises `MissingPackageError` without matplotlib.
+        """
+        from phigen.drawing.figures import run_figure
+
+        return run_figure({"phigen": self}, {})
+
+    def to_xarray(self) -> xr.Dataset:
+        """An `xarray.Dataset`: ``x`` (t, coordinate), ``energy`` (t), ``casimir_NAME`` (t); the rest are attributes.
+
+        Raises `MissingPackageError` without xarray.
+        """
+        from phigen.runtime.exchange import to_xarray
+
+        return to_xarray(self)
+
+    def to_pandas(self) -> pd.DataFrame:
+        """A `pandas.DataFrame` with the columns of a ``.csv``, indexed by t.
+
+        Raises `MissingPackageError` without pandas.
+        """
+        from phigen.runtime.exchange import to_pandas
+
+        return to_pandas(self)
 
     def column(self, coordinate: str) -> Floats:
         """The values (rows,) of one coordinate; raises `KeyError` for a name that is none."""

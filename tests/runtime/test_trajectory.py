@@ -1,8 +1,10 @@
 import csv
+import sys
 
 import numpy as np
 import pytest
 
+from phigen.errors import MissingPackageError
 from phigen.runtime.trajectory import Trajectory, trajectory_columns
 
 
@@ -49,3 +51,30 @@ def test_no_two_columns_have_one_name():
     columns = trajectory_columns(("t", "x", "energy", "t_"), ("C", "x"))
     assert [name for c in columns for name in c.names] == ["t", "t__", "x", "energy_", "t_", "energy", "C", "x_"]
     assert [c.key for c in columns] == ["t", "x", "energy", "casimir_C", "casimir_x"]
+
+
+def test_xarray_has_names_for_all_axes(trajectory):
+    found = trajectory.to_xarray()
+    assert found.x.sel(coordinate="p").values.tolist() == trajectory.x[:, 1].tolist()
+    assert found.casimir_C.sel(t=0.1).item() == trajectory.casimirs["C"][1]
+    assert found.attrs == {"h": 0.1, "steps": 2, "parameter_k": 2.0}
+
+
+def test_pandas_has_the_columns_of_the_csv(trajectory):
+    frame = trajectory.to_pandas()
+    assert (frame.index.name, list(frame.columns)) == ("t", ["q", "p", "energy", "C"])
+    np.testing.assert_array_equal(frame.to_numpy(), trajectory.rows()[:, 1:])
+    assert frame.attrs["parameter_k"] == 2.0
+
+
+@pytest.mark.parametrize("package", ["xarray", "pandas"])
+def test_without_the_package_it_is_said_how_to_get_it(trajectory, package, monkeypatch):
+    monkeypatch.setitem(sys.modules, package, None)
+    with pytest.raises(MissingPackageError, match=f"pip install {package}"):
+        getattr(trajectory, f"to_{package}")()
+
+
+def test_plot_draws_the_orbit_and_what_was_conserved(trajectory):
+    labels = [axes.get_title() for axes in trajectory.plot().axes]
+    assert any("energy" in label for label in labels)
+    assert any("Casimir C" in label for label in labels)

@@ -1,0 +1,75 @@
+"""How systems, compilations and trajectories show themselves in notebooks: LaTeX and HTML with MathML.
+
+The HTML has no style sheet and no script, so that it looks like the notebook it stands in.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from html import escape
+
+import numpy as np
+
+from phigen.compilation import Compilation
+from phigen.geometry.system import System
+from phigen.notation import latex, mathml
+from phigen.runtime.interface import Floats
+from phigen.runtime.trajectory import Trajectory
+
+
+def system_latex(system: System) -> str:
+    """π, H, Casimirs and invariants as displayed equations."""
+    return "\n".join(latex.system_blocks(system))
+
+
+def system_html(system: System) -> str:
+    """The brackets that do not vanish, H, Casimirs, invariants, and the parameters with their defaults."""
+    names, n = system.coordinates, system.dimension
+    rows = [(mathml.name("H"), mathml.expression(system.hamiltonian))]
+    for i in range(n):
+        rows += [
+            (mathml.bracket(names[i], names[j]), mathml.expression(system.poisson[i][j]))
+            for j in range(i + 1, n)
+            if not system.poisson[i][j].is_zero
+        ]
+    rows += [(mathml.name(c), mathml.expression(e)) for c, e in {**system.casimirs, **system.invariants}.items()]
+    lines = [_formula(left, right) for left, right in rows]
+    values = ", ".join(f"{p.name} = {float(p.value):g}" for p in system.parameters)
+    about = f"in ({', '.join(names)})" + (f", with {values}" if values else "")
+    return f"<div><strong>{escape(system.name)}</strong> {escape(about)}{''.join(lines)}</div>"
+
+
+def compilation_html(compilation: Compilation) -> str:
+    """The system, and what it was compiled to."""
+    program = compilation.program
+    said = f"compiled to order {program.order}: {compilation.label}, {program.step.manner}"
+    return system_html(compilation.system).removesuffix("</div>") + f"<p>{escape(said)}</p></div>"
+
+
+def trajectory_html(trajectory: Trajectory) -> str:
+    """First and last state, and how far energy and Casimirs went from their values at the start."""
+    head = ["", "t", *trajectory.coordinates, "energy", *trajectory.casimirs]
+    table = trajectory.rows()
+    body = [["start", *map(_number, table[0])], ["end", *map(_number, table[-1])]]
+    blank = [""] * (1 + len(trajectory.coordinates))
+    body.append(["spread", *blank, *(_spread(v) for v in (trajectory.energy, *trajectory.casimirs.values()))])
+    said = f"{trajectory.steps} steps of {trajectory.h!r}, {len(trajectory)} rows"
+    rows = "".join(_row("td", cells) for cells in body)
+    return f"<table><caption>{escape(said)}</caption>{_row('th', head)}{rows}</table>"
+
+
+def _formula(left: str, right: str) -> str:
+    markup = f"<mrow>{left}<mo>=</mo>{right}</mrow>"
+    return f'<div><math xmlns="http://www.w3.org/1998/Math/MathML" display="block">{markup}</math></div>'
+
+
+def _number(value: float) -> str:
+    return f"{value:.9g}"
+
+
+def _spread(values: Floats) -> str:
+    return f"{np.ptp(values):.2g}"
+
+
+def _row(tag: str, cells: Iterable[str]) -> str:
+    return "<tr>" + "".join(f"<{tag}>{escape(cell)}</{tag}>" for cell in cells) + "</tr>"

@@ -1,0 +1,49 @@
+"""Trajectories as objects of xarray and pandas; both packages are optional, and imported only here."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+from phigen.errors import MissingPackageError
+from phigen.runtime.trajectory import Trajectory, trajectory_columns
+
+if TYPE_CHECKING:
+    import pandas as pd
+    import xarray as xr
+
+
+def to_xarray(trajectory: Trajectory) -> xr.Dataset:
+    """A Dataset: ``x`` (t, coordinate), ``energy`` (t), ``casimir_NAME`` (t); the rest are attributes."""
+    xarray = _imported("xarray")
+    found: xr.Dataset = xarray.Dataset(
+        {
+            "x": (("t", "coordinate"), trajectory.x),
+            "energy": ("t", trajectory.energy),
+            **{f"casimir_{name}": ("t", values) for name, values in trajectory.casimirs.items()},
+        },
+        coords={"t": trajectory.t, "coordinate": list(trajectory.coordinates)},
+        attrs={"h": trajectory.h, "steps": trajectory.steps, **_parameters(trajectory)},
+    )
+    return found
+
+
+def to_pandas(trajectory: Trajectory) -> pd.DataFrame:
+    """A DataFrame with the columns of a ``.csv``, indexed by t; step and parameters are in its ``attrs``."""
+    pandas = _imported("pandas")
+    columns = trajectory_columns(trajectory.coordinates, tuple(trajectory.casimirs))
+    names = [name for column in columns for name in column.names]
+    frame: pd.DataFrame = pandas.DataFrame(trajectory.rows(), columns=names).set_index(names[0])
+    frame.attrs.update({"h": trajectory.h, "steps": trajectory.steps, **_parameters(trajectory)})
+    return frame
+
+
+def _parameters(trajectory: Trajectory) -> dict[str, float]:
+    return {f"parameter_{name}": value for name, value in trajectory.parameters.items()}
+
+
+def _imported(package: str) -> Any:
+    try:
+        return import_module(package)
+    except ImportError as error:
+        raise MissingPackageError(f"this needs {package}\n  hint: pip install {package}") from error
