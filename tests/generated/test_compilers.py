@@ -70,13 +70,19 @@ def test_library_has_no_state_and_needs_only_libm(name, of_every_library):
     assert all(symbol.startswith(f"{name}_") for symbol in exported)
 
 
-def build_exercise(name, folder, *command):
+def build_exercise(compilation, folder, *command):
     """The program of exercise.c for a system."""
-    at = setting(compiled(name))
+    at, name = setting(compilation), compilation.program.name
     definitions = [f"-DNAME={name}", f'-DHEADER="{name}.h"', f"-DSTEP={at.h!r}"]
     definitions.append("-DSTATE=" + ", ".join(map(repr, at.x)))
     run([*command, *definitions, "-I.", EXERCISE, f"{name}.c", "-o", "exercise", "-lm"], folder)
     return folder / "exercise"
+
+
+def check_with_sanitizers(compiler, compilation, folder):
+    flags = [*_SANITIZERS.split(), *(["-fsanitize=float-cast-overflow"] if compiler == "clang" else [])]
+    program = build_exercise(compilation, folder, tool(compiler), *flags, "-Wall", "-Wextra", "-Werror")
+    run([program], folder, ASAN_OPTIONS="detect_leaks=0:detect_stack_use_after_return=1")
 
 
 #: clang puts sanitizers into code in half the time that gcc takes.
@@ -85,14 +91,23 @@ BOTH = [("clang", name) for name in QUICK] + [("gcc", name) for name in ("lotka_
 
 @pytest.mark.parametrize(("compiler", "name"), slow_but(BOTH, [(c, n) for c in ("gcc", "clang") for n in NAMES]))
 def test_whole_interface_is_clean_under_sanitizers(compiler, name, sources):
-    flags = [*_SANITIZERS.split(), *(["-fsanitize=float-cast-overflow"] if compiler == "clang" else [])]
-    program = build_exercise(name, sources, tool(compiler), *flags, "-Wall", "-Wextra", "-Werror")
-    run([program], sources, ASAN_OPTIONS="detect_leaks=0:detect_stack_use_after_return=1")
+    check_with_sanitizers(compiler, compiled(name), sources)
+
+
+#: Their C shares little with that of the implicit steps.
+SPLITTINGS = ["kepler", "toda3_quadratic", "kowalevski_top"]
+
+
+@pytest.mark.parametrize("name", slow_but(["kepler"], SPLITTINGS))
+def test_whole_interface_of_splittings_is_clean_under_sanitizers(name, tmp_path):
+    compilation = compiled(name, 4, "splitting")
+    write(tmp_path, files(compilation, "c"))
+    check_with_sanitizers("clang", compilation, tmp_path)
 
 
 @pytest.mark.parametrize("name", slow_but(["toda3"]))
 def test_whole_interface_is_clean_under_valgrind(name, sources):
     """Uninitialised memory in particular, which the sanitizers do not see."""
     valgrind = tool("valgrind")
-    program = build_exercise(name, sources, tool("gcc"), "-std=c99", "-O1", "-g")
+    program = build_exercise(compiled(name), sources, tool("gcc"), "-std=c99", "-O1", "-g")
     run([valgrind, "--error-exitcode=9", "--quiet", "--track-origins=yes", program], sources)

@@ -31,8 +31,10 @@
 #define PHI_IMPLICIT (PHI_NEWTON || PHI_PATH)
 #define PHI_PARAMETERS 1
 #define PHI_KICKS 0
+#ifndef PHI_GAUGE
 #define PHI_GAUGE 0
-#define PHI_QUICK_GAUGE 0
+#endif
+#define PHI_QUICK_GAUGE (PHI_GAUGE && PHI_FAST)
 #define PHI_RELATIVE 0
 #define PHI_MODIFIED 0
 #define PHI_ADVANCE (!PHI_SPLITTING || PHI_TANGENT)
@@ -66,5 +68,8 @@ enum { PHI_STAGES = 3 };
 enum { PHI_STAGES = 1 };
 #endif
 enum { PHI_COEFFICIENTS = PHI_SPLITTING ? 4 : 2 };
+#if PHI_GAUGE
+enum { PHI_GAUGES = 2 };
+#endif
 enum { PHI_REMEMBERED = 111, PHI_WINDOW = 40, PHI_AHEAD = PHI_BLOCKS ? 8 : 1 };
 #endif

@@ -92,6 +92,19 @@ static void failures_change_nothing(void)
     EXPECT(phi_ensemble(NULL, NULL, 2, H, 1, NULL) == PHI_BAD_ARGUMENT);
 }
 
+#if PHI_GAUGE
+/* The least error is found to the finest mesh, 1/512 of the widths 2; or one's own multiples are taken. */
+static void gauge_is_the_best_or_that_given(void)
+{
+    const double given[2] = { 7.0, -3.0 }, nothing[2] = { 0.0, (double)NAN };
+    phi_solver s;
+    EXPECT(phi_init(&s, NULL, start) == PHI_OK);
+    EXPECT(fabs(s.gauge[0] - 0.25) < 4e-3 && fabs(s.gauge[1] + 1.5) < 4e-3);
+    EXPECT(phi_init_gauge(&s, NULL, start, nothing) == PHI_BAD_ARGUMENT);
+    EXPECT(phi_init_gauge(&s, NULL, start, given) == PHI_OK && apart(s.gauge, given) <= 0.0);
+}
+
+#endif
 #if PHI_TANGENT
 /* The derivative of a step has determinant 1, and is that of differences. */
 static void tangent_is_the_derivative(void)
@@ -119,6 +132,9 @@ int main(void)
     keeps_energy();
     many_are_one();
     failures_change_nothing();
+#if PHI_GAUGE
+    gauge_is_the_best_or_that_given();
+#endif
 #if PHI_TANGENT
     tangent_is_the_derivative();
 #endif
