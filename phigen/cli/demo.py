@@ -92,8 +92,8 @@ def _errors(system: System, experiment: Experiment, t: Floats, x: Floats) -> tup
     """Relative errors (rows,) of the state and of the Casimir, and the exact states."""
     import numpy as np
 
-    from phigen.study.arrays import evaluate
     from phigen.study.summary import exact_solution
+    from phigen.symbolic.arrays import evaluate
 
     solution = exact_solution(system, experiment.run, experiment.parameters, x[0], t)
     exact = np.column_stack([solution[c] for c in system.coordinates])

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from phigen.study.arrays import Floats
+from phigen.symbolic.arrays import Floats
 
 
 def draw_dots(axes: Any, points: Floats, colour: str, size: float, order: float, label: str | None = None) -> None:

@@ -10,8 +10,8 @@ import numpy as np
 
 from phigen.drawing.palette import MARK, SERIES
 from phigen.runtime.trajectory import Trajectory
-from phigen.study.arrays import Floats
 from phigen.study.conservation import ENERGY, Unit, unit_of
+from phigen.symbolic.arrays import Floats
 
 if TYPE_CHECKING:
     from matplotlib.figure import FigureBase

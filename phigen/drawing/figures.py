@@ -21,10 +21,10 @@ from phigen.drawing import (
 )
 from phigen.drawing.palette import PALETTE, SUFFIXES, save, styled, svg
 from phigen.runtime.trajectory import Trajectory
-from phigen.study.arrays import Floats
 from phigen.study.backward import Constancy
 from phigen.study.conservation import Unit
 from phigen.study.precision import Study
+from phigen.symbolic.arrays import Floats
 from phigen.symbolic.expression import Expression
 
 if TYPE_CHECKING:

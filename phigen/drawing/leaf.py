@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from phigen.study.arrays import Floats, evaluate
+from phigen.symbolic.arrays import Floats, evaluate
 from phigen.symbolic.expression import Expression, gradient, symbols_of
 
 #: Planes per axis, points along the side of the grid in a plane, and Newton steps that put its lines on the surface.

@@ -13,7 +13,7 @@ from phigen.drawing.groups import Group, groups, is_orbit
 from phigen.drawing.leaf import Leaf, around, leaf_of, net
 from phigen.drawing.palette import PALETTE, SERIES
 from phigen.runtime.trajectory import Trajectory
-from phigen.study.arrays import Floats
+from phigen.symbolic.arrays import Floats
 from phigen.symbolic.expression import Expression
 
 if TYPE_CHECKING:

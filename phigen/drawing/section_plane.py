@@ -11,7 +11,7 @@ import numpy as np
 from phigen.drawing.dots import draw_dots
 from phigen.drawing.groups import phase_planes
 from phigen.drawing.palette import SERIES
-from phigen.study.arrays import Floats
+from phigen.symbolic.arrays import Floats
 
 #: A coordinate that varies less than this, relative to the largest, is that of the section itself.
 _CONSTANT = 1e-8

@@ -12,8 +12,8 @@ from phigen.drawing.leaf import Leaf, net
 from phigen.drawing.palette import PALETTE, SERIES, styled
 from phigen.geometry.system import System
 from phigen.paper.plate import Finding, Plate
-from phigen.study.arrays import Floats
 from phigen.study.measures import poisson_matrix
+from phigen.symbolic.arrays import Floats
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -13,9 +13,9 @@ from phigen.drawing.palette import SERIES, styled
 from phigen.drawing.phase_space import draw_in_space
 from phigen.paper.plate import Finding, Plate, compiled, relative
 from phigen.runtime.trajectory import Trajectory
-from phigen.study.arrays import Floats, evaluate
 from phigen.study.measures import poisson_defect
 from phigen.study.methods import Method
+from phigen.symbolic.arrays import Floats, evaluate
 from phigen.symbolic.expression import gradient
 
 if TYPE_CHECKING:

@@ -17,9 +17,9 @@ from phigen.runtime.solver import Solver
 from phigen.runtime.trajectory import Trajectory
 from phigen.spec.model import Run
 from phigen.study import classical
-from phigen.study.arrays import Floats
 from phigen.study.methods import field_of
 from phigen.study.summary import exact_solution
+from phigen.symbolic.arrays import Floats
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

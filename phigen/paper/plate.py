@@ -13,7 +13,7 @@ from phigen.api import compilation_of, solver_of
 from phigen.compilation import Compilation
 from phigen.runtime.solver import Solver
 from phigen.runtime.trajectory import Trajectory
-from phigen.study.arrays import Floats
+from phigen.symbolic.arrays import Floats
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -19,7 +19,7 @@ from phigen.runtime.crossings import CrossingFinder
 from phigen.runtime.session import rows_along
 from phigen.runtime.solver import Solver
 from phigen.runtime.trajectory import Trajectory
-from phigen.study.arrays import Floats
+from phigen.symbolic.arrays import Floats
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -10,7 +10,7 @@ import numpy as np
 from phigen.compilation import Compilation
 from phigen.runtime.interface import BackendError
 from phigen.study import race
-from phigen.study.arrays import Floats
+from phigen.symbolic.arrays import Floats
 
 
 @dataclass

@@ -9,12 +9,12 @@ from phigen.compilation import Compilation
 from phigen.proofs.examination import Examination
 from phigen.runtime.trajectory import Trajectory
 from phigen.spec.model import Run
-from phigen.study.arrays import Floats
 from phigen.study.backward import Constancy
 from phigen.study.lyapunov import Spectrum
 from phigen.study.precision import Study
 from phigen.study.summary import Summary
 from phigen.study.verification import Verification
+from phigen.symbolic.arrays import Floats
 
 
 @dataclass(frozen=True)

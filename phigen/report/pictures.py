@@ -14,11 +14,11 @@ from phigen.report import page
 from phigen.report.material import Material
 from phigen.report.svg import inlined
 from phigen.runtime.trajectory import Trajectory
-from phigen.study.arrays import Floats
 from phigen.study.backward import Constancy, truncation
 from phigen.study.lyapunov import Spectrum
 from phigen.study.precision import Study
 from phigen.study.summary import Summary
+from phigen.symbolic.arrays import Floats
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

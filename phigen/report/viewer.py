@@ -14,7 +14,7 @@ from phigen.drawing.phase_space import box_of, joins
 from phigen.report import page
 from phigen.report.drawable import drawable
 from phigen.runtime.trajectory import Trajectory
-from phigen.study.arrays import Floats
+from phigen.symbolic.arrays import Floats
 from phigen.symbolic.expression import Expression
 
 #: Numbers of all curves together, rows of one at most, and the steps to which a coordinate is rounded.

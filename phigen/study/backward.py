@@ -16,9 +16,9 @@ import numpy as np
 from phigen.compilation import Compilation
 from phigen.errors import LimitError, StepError
 from phigen.scheme.modified import corrections, powers
-from phigen.study.arrays import Floats, evaluate
 from phigen.study.conservation import Unit, units
 from phigen.study.methods import Method
+from phigen.symbolic.arrays import Floats, evaluate
 from phigen.symbolic.expression import Expression
 
 #: Corrections of the modified Hamiltonian, and the largest order of a method for which they are computed.

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from phigen.geometry.system import System
-from phigen.study.arrays import Floats, evaluate
+from phigen.symbolic.arrays import Floats, evaluate
 from phigen.symbolic.expression import Expression, gradient
 
 #: A value below this part of its terms counts as zero.

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from phigen.runtime.solver import Solver
-from phigen.study.arrays import Floats
+from phigen.symbolic.arrays import Floats
 
 #: The numbers of steps at which the exponents are noted grow by this factor.
 _SPACING = 2 ** (1 / 8)

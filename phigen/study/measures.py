@@ -10,8 +10,8 @@ import numpy as np
 
 from phigen.errors import StepError
 from phigen.geometry.system import System
-from phigen.study.arrays import Floats, evaluate
 from phigen.study.methods import Method, by_differences
+from phigen.symbolic.arrays import Floats, evaluate
 
 #: Below this error, relative to the size of a quantity, differences say nothing about the method.
 ROUNDING = 4e-16

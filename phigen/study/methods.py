@@ -10,7 +10,7 @@ import numpy as np
 from phigen.errors import StepError
 from phigen.runtime.solver import Solver
 from phigen.study import classical
-from phigen.study.arrays import Floats
+from phigen.symbolic.arrays import Floats
 
 #: The offset of differences in units of the state; with formulas of order 6 their error is about 1e-12.
 _WIDTH = 2e-3

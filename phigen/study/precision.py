@@ -11,8 +11,8 @@ from itertools import pairwise
 import numpy as np
 
 from phigen.study import classical
-from phigen.study.arrays import Floats
 from phigen.study.race import OWN, Race, Runner
+from phigen.symbolic.arrays import Floats
 
 #: Doublings of the step above that of the run, and halvings below it.
 COARSER, FINER = 6, 7

@@ -18,8 +18,8 @@ from phigen.errors import StepError
 from phigen.runtime import cache
 from phigen.runtime.solver import Solver
 from phigen.study import classical, dop853
-from phigen.study.arrays import Floats
 from phigen.study.methods import field_of
+from phigen.symbolic.arrays import Floats
 
 #: The label of the solver among the methods.
 OWN = "phigen"

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from phigen.runtime.crossings import Function
-from phigen.study.arrays import Floats, evaluate
+from phigen.symbolic.arrays import Floats, evaluate
 from phigen.symbolic.expression import Expression
 
 

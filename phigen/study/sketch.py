@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from phigen.runtime.trajectory import Trajectory
-from phigen.study.arrays import Floats
+from phigen.symbolic.arrays import Floats
 
 Numbers = NDArray[np.int64]
 

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from phigen.geometry.system import System
 from phigen.spec.model import Run
-from phigen.study.arrays import Floats, evaluate
 from phigen.study.conservation import ENERGY, RELATIVE, Unit, rounding, units
+from phigen.symbolic.arrays import Floats, evaluate
 from phigen.symbolic.symbols import ELAPSED, initial
 
 #: Windows of equal length in which the largest energy error is taken, to tell drift from oscillation.

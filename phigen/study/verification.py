@@ -17,10 +17,10 @@ from phigen.compilation import Compilation
 from phigen.errors import StepError
 from phigen.runtime.solver import Solver
 from phigen.study import backward, measures
-from phigen.study.arrays import Floats
 from phigen.study.conservation import Unit, largest_terms, rounding, units_of
 from phigen.study.methods import Method, of_classical, of_solver
 from phigen.study.summary import Drift, Summary, summarise
+from phigen.symbolic.arrays import Floats
 from phigen.symbolic.expression import Expression
 
 #: Observed orders may fall short of the stated one by this much.

@@ -12,9 +12,9 @@ from phigen.geometry.system import System
 from phigen.runtime.backend import Backend
 from phigen.runtime.interface import BackendError, row_steps
 from phigen.runtime.session import rows_along
-from phigen.study.arrays import Floats, evaluate
 from phigen.study.conservation import Unit, units
 from phigen.study.race import Runner
+from phigen.symbolic.arrays import Floats, evaluate
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from phigen.errors import CheckError
-from phigen.study.arrays import Floats
+from phigen.symbolic.arrays import Floats
 from phigen.tuning.problem import Method
 from phigen.tuning.trials import MARKS
 

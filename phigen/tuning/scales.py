@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from phigen.study.arrays import Floats
+from phigen.symbolic.arrays import Floats
 from phigen.tuning.problem import Candidate, Problem, steps_in
 from phigen.tuning.timing import nanoseconds_per_step
 

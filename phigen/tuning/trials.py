@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from phigen.study.arrays import Floats
+from phigen.symbolic.arrays import Floats
 from phigen.tuning.problem import Method, Problem, steps_in
 from phigen.tuning.timing import nanoseconds_per_step
 

@@ -14,7 +14,7 @@ from support import (
 )  # fmt: skip
 
 from phigen import StepError, compile, resources, spec
-from phigen.study.arrays import evaluate
+from phigen.symbolic.arrays import evaluate
 from phigen.compiler import compile_spec
 from phigen.scheme.steps import Explicit, Path
 from phigen.spec.model import Extras

@@ -13,7 +13,7 @@ from phigen.compiler import compile_spec
 from phigen.realisations import karasev
 from phigen.scheme.discretisation import formal_alpha
 from phigen.series.modified import FRACTION, modified_series, time_dependent
-from phigen.study.arrays import evaluate
+from phigen.symbolic.arrays import evaluate
 from phigen.symbolic.symbols import ELAPSED
 from phigen.symbolic.tower import rational
 

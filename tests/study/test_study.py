@@ -14,8 +14,7 @@ from phigen.geometry.system import system_from_spec
 from phigen.realisations.catalogue import realise
 from phigen.spec.model import BirealisationChoice
 from phigen.spec.names import SPEC_FUNCTIONS
-from phigen.study import arrays, classical, conservation, dop853, summary
-from phigen.symbolic import readable
+from phigen.symbolic import arrays, classical, conservation, dop853, readable, summary
 from phigen.symbolic.expression import PI, call, number, power, symbol, text
 from phigen.symbolic.functions import FUNCTIONS
 from phigen.symbolic.numeric import evaluate
