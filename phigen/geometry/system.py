@@ -123,6 +123,10 @@ def system_from_spec(spec: Spec) -> System:
     Raises `SpecError` for matrices that do not span a Lie algebra, structure constants without Jacobi
     identity, and sizes that do not match the number of coordinates.
     """
+    if spec.lattice:
+        message = f"{spec.name} is a lattice, and this is for one system of a few coordinates"
+        hint = "phigen show --expand SIZES prints a small one as an ordinary spec"
+        raise SpecError([spec.diagnostic(("lattice",), message, hint)])
     system = build_system(
         spec.name,
         spec.coordinates,

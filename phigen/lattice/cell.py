@@ -8,26 +8,16 @@ value at every site are written in the same way.
 
 from __future__ import annotations
 
-import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 
 from phigen.spec.model import Parameter
-from phigen.symbolic.expression import ZERO, Expression, gradient, mul, neg, substitute, symbol, symbols_of, total
+from phigen.symbolic.expression import ZERO, Expression, gradient, mul, neg, symbol, total
+from phigen.symbolic.neighbours import ENDS, Neighbours, Offset, Place, minus, plus, steps
 
 GRID, GRAPH, PAIRS = "grid", "graph", "pairs"
 PERIODIC, OPEN = "periodic", "open"
-
-#: Where a site is, from another: steps along the axes of a grid; an end, ``("a",)`` or ``("b",)``, of a bond or a pair;
-#: ``()`` for the site itself where there are no axes.
-Offset = tuple[int, ...] | tuple[str, ...]
-#: A field, or a parameter at sites, and where.
-Place = tuple[str, Offset]
-ENDS = ("a", "b")
-
-_NEIGHBOUR = re.compile(r"(?P<name>[^\[\]]+)\[(?P<index>[^\[\]]+)\]")
-_STEP = re.compile(r"(?P<axis>.+?)(?P<step>[+-][0-9]+)")
 
 
 @dataclass(frozen=True)
@@ -59,65 +49,35 @@ class Cell:
 
     # --- symbols
 
+    @cached_property
+    def neighbours(self) -> Neighbours:
+        """The symbols of what has a value at every site: of the fields, then of the parameters at sites."""
+        return Neighbours((*self.fields, *(p.name for p in self.parameters if p.at == "sites")), self.axes)
+
     @property
     def origin(self) -> Offset:
         """The offset of the site itself."""
-        return (0,) * len(self.axes)
-
-    @cached_property
-    def at_sites(self) -> tuple[str, ...]:
-        """What has a value at every site: the fields, then the parameters at sites."""
-        return (*self.fields, *(p.name for p in self.parameters if p.at == "sites"))
+        return self.neighbours.origin
 
     def at(self, name: str, offset: Offset) -> str:
         """The symbol of a field, or of a parameter at sites, at an offset."""
-        if self.relation == GRID:
-            steps = [f"{a}{o:+d}" for a, o in zip(self.axes, offset, strict=True) if isinstance(o, int) and o]
-        else:
-            steps = [str(o) for o in offset]
-        return f"{name}[{','.join(steps)}]" if steps else name
+        return self.neighbours.at(name, offset)
 
     def place(self, name: str) -> Place:
         """The field, or parameter at sites, of a symbol, and its offset. `KeyError` for any other symbol."""
-        match = _NEIGHBOUR.fullmatch(name)
-        base = match["name"] if match else name
-        if base not in self.at_sites:
-            raise KeyError(f"{name!r} has no value at sites")
-        if match is None:
-            return base, self.origin
-        if self.relation != GRID:
-            return base, (match["index"],)
-        steps = dict.fromkeys(self.axes, 0)
-        for part in match["index"].split(","):
-            step = _STEP.fullmatch(part)
-            if step is None or step["axis"] not in steps:
-                raise KeyError(f"{name!r} is at no offset of the axes {', '.join(self.axes)}")
-            steps[step["axis"]] = int(step["step"])
-        return base, tuple(steps.values())
+        return self.neighbours.place(name)
 
     def places(self, *expressions: Expression) -> dict[str, Place]:
         """All symbols of expressions that have a value at sites, with their places."""
-        found = {}
-        for name in symbols_of(*expressions):
-            if name.partition("[")[0] in self.at_sites:
-                found[name] = self.place(name)
-        return found
+        return self.neighbours.places(*expressions)
 
     def shifted(self, expression: Expression, offset: Offset) -> Expression:
         """The expression as it is at the site that lies so far away on the grid."""
-        return self.all_shifted([expression], offset)[0]
-
-    def all_shifted(self, expressions: Sequence[Expression], offset: Offset) -> list[Expression]:
-        """`shifted` for several expressions that share parts."""
-        if not any(offset):
-            return list(expressions)
-        moved = {name: symbol(self.at(base, plus(o, offset))) for name, (base, o) in self.places(*expressions).items()}
-        return substitute(expressions, moved)
+        return self.neighbours.shifted([expression], offset)[0]
 
     def on(self, expression: Expression, end: str) -> Expression:
         """A density of a site as it is at one end of a bond or a pair."""
-        moved = {name: symbol(self.at(base, (end,))) for name, (base, _) in self.places(expression).items()}
-        return substitute([expression], moved)[0]
+        return self.neighbours.on(expression, end)
 
     # --- the density of H
 
@@ -148,7 +108,7 @@ class Cell:
 
     def extent(self, expression: Expression) -> tuple[tuple[int, ...], tuple[int, ...]]:
         """The least and the largest offsets along each axis of what a term of a grid mentions."""
-        offsets = [_steps(o) for _, o in self.places(expression).values()] or [_steps(self.origin)]
+        offsets = [steps(o) for _, o in self.places(expression).values()] or [steps(self.origin)]
         return tuple(map(min, zip(*offsets, strict=True))), tuple(map(max, zip(*offsets, strict=True)))
 
     @cached_property
@@ -164,7 +124,7 @@ class Cell:
         return tuple(max((w[k] for w in widths), default=0) for k in range(len(self.axes)))
 
     def _reach(self, expressions: Iterable[Expression]) -> tuple[int, ...]:
-        offsets = [_steps(o) for _, o in self.places(*expressions).values()]
+        offsets = [steps(o) for _, o in self.places(*expressions).values()]
         return tuple(max((abs(o[k]) for o in offsets), default=0) for k in range(len(self.axes)))
 
     @property
@@ -194,8 +154,8 @@ def contributions(cell: Cell) -> dict[str, tuple[Contribution, ...]]:
         slopes = gradient(term, list(named))
         for (base, offset), slope in zip(named.values(), slopes, strict=True):
             if not slope.is_zero:
-                moved, back = cell.shifted(slope, minus(offset)), _steps(minus(offset))
-                found[base].append(Contribution(moved, _sum(low, back), _sum(high, back)))
+                moved, back = cell.shifted(slope, minus(offset)), steps(minus(offset))
+                found[base].append(Contribution(moved, plus(low, back), plus(high, back)))
     return {f: tuple(listed) for f, listed in found.items()}
 
 
@@ -224,21 +184,3 @@ def vector_field(cell: Cell) -> dict[str, Expression]:
         base, offset = cell.place(other)
         rates[f].append(entry * cell.shifted(slopes[base], offset))
     return {f: total(listed) for f, listed in rates.items()}
-
-
-def plus(a: Offset, b: Offset) -> Offset:
-    """The sum of two offsets of a grid."""
-    return _sum(_steps(a), _steps(b))
-
-
-def minus(a: Offset) -> Offset:
-    """The way back."""
-    return tuple(-o for o in _steps(a))
-
-
-def _sum(a: tuple[int, ...], b: tuple[int, ...]) -> tuple[int, ...]:
-    return tuple(x + y for x, y in zip(a, b, strict=True))
-
-
-def _steps(offset: Offset) -> tuple[int, ...]:
-    return tuple(int(o) for o in offset)

@@ -13,15 +13,19 @@ from graphlib import CycleError, TopologicalSorter
 from typing import Any
 
 from phigen.spec.grammar import CONSTANTS, Scope, constant, names_in, parse
+from phigen.spec.indices import Indices
 from phigen.spec.kinds import Reader
-from phigen.spec.model import Parameter
+from phigen.spec.model import Lattice, Parameter
 from phigen.spec.names import ARGUMENT_HINT, ARGUMENTS, SPEC_FUNCTIONS
-from phigen.spec.problems import did_you_mean, shown
+from phigen.spec.problems import counted, did_you_mean, shown
+from phigen.spec.values import values
 from phigen.spec.yaml_source import Node, Scalar
 from phigen.symbolic.expression import Expression, symbol, symbols_of
+from phigen.symbolic.neighbours import ENDS, Neighbours, Offset
 
 Raw = Mapping[str, Any]
 NOTHING = Scope({})
+RENAME = "choose another name"
 
 
 @dataclass
@@ -41,20 +45,96 @@ class Declarations:
     nodes: dict[str, Scalar] = field(default_factory=dict)  # where each name is declared
     within: tuple[Any, ...] = ("poisson",)  # the path of keys to the Poisson structure that is being read
     refused: dict[str, tuple[str, str]] = field(default_factory=dict)  # names that mean nothing there: message, hint
+    lattice: Lattice | None = None
+    indexed: bool = True  # whether what is read may name neighbours
+
+    # --- lattices
+
+    @property
+    def relation(self) -> str:
+        """How sites are related; empty for an ordinary spec."""
+        return self.lattice.relation if self.lattice else ""
+
+    @property
+    def neighbours(self) -> Neighbours:
+        """The symbols of what has a value at every site."""
+        at_sites = (n for n, p in self.parameters.items() if p.at == "sites")
+        return Neighbours((*self.coordinates, *at_sites), self.lattice.axes if self.lattice else ())
+
+    def _at_bonds(self, names: Mapping[str, Expression]) -> dict[str, tuple[str, str]]:
+        """Names that have a value at bonds only."""
+        own = {n for n, p in self.parameters.items() if p.at == "bonds"}
+        found = {n for n, e in names.items() if own.intersection(symbols_of(e))} if own else set()
+        return {n: (f"{n!r} has a value at every bond, not at sites", "use it in bonds:") for n in found}
+
+    def _counters(self) -> dict[str, tuple[str, str]]:
+        """The names of indices and sizes, which are no part of a density."""
+        why, hint = "what is written here holds for all sites alike", "what differs is a parameter at: sites"
+        listed = [n for i in self.lattice.indices for n in (i, f"N_{i}")] if self.lattice else []
+        return {n: (f"{why}; {n!r} depends on the site" if n[:2] != "N_" else f"{why} and sizes", hint) for n in listed}
+
+    def _indices(self, names: Mapping[str, Expression], ends: tuple[str, ...] = ()) -> Indices | None:
+        """What may have an index: whatever depends on the site."""
+        if self.lattice is None or not self.indexed:
+            return None
+        found = self.neighbours
+        varying = {n: e for n, e in names.items() if found.places(e)}
+        hint = "an array is declared {value: …, at: sites}"
+        same = {n: (f"{n!r} is the same at all sites", hint) for n in names if n not in varying}
+        bonds = {n: (f"{n!r} belongs to the bond, not to its ends", "write it without index") for n in same if ends}
+        at_bonds = {n: bonds.get(n, why) for n, why in self._at_bonds(names).items()}
+        return Indices(found, varying, {**same, **at_bonds}, ends)
+
+    def bond_scope(self) -> Scope:
+        """For densities of bonds and pairs, and brackets along bonds: sites are the ends a and b."""
+        names = self.scope().names
+        indices = self._indices(names, ENDS)
+        local = indices.names if indices else {}
+        what = "a pair" if self.relation == "pairs" else "a bond"
+        ends = {n: (f"{n!r} is at which end of {what}?", f"write {n}[a] or {n}[b]") for n in local}
+        others = {n: e for n, e in names.items() if n not in local}
+        others |= {n: symbol(n) for n, p in self.parameters.items() if p.at == "bonds"}
+        return Scope(others, self.refused | self._counters() | ends, open=self.incomplete, indices=indices)
+
+    def site_numbers(self) -> Scope:
+        """For values at sites: the indices, counted from 0, and the sizes."""
+        indices = self.lattice.indices if self.lattice and self.relation != "graph" else ()
+        names = {n: symbol(n) for i in indices for n in (i, f"N_{i}")}
+        return Scope(names, self.numbers().refused)
+
+    def neighbour(self, node: Scalar, ends: tuple[str, ...] = ()) -> tuple[str, Offset] | None:
+        """The coordinate that a key names, and its offset."""
+        if "[" not in node.text:
+            index = self.coordinate(node)
+            return None if index is None else (self.coordinates[index], self.neighbours.origin)
+        known = {c: symbol(c) for c in self.coordinates}
+        scope = Scope({}, {c: (f"{c!r} has no end", f"write {c}[a] or {c}[b]") for c in known})
+        if self.lattice is not None:
+            refused = {n: (f"{n!r} is not a coordinate", "") for n in (*self.parameters, *self.definitions)}
+            scope = Scope(known, open=self.incomplete, indices=Indices(self.neighbours, known, refused, ends))
+        value = self.formula(node, scope)
+        if value is None or value.op != "symbol" or self.lattice is None:
+            return None
+        return self.neighbours.place(value.value)
 
     # --- scopes
 
     def scope(self, extra: Mapping[str, Expression] | None = None) -> Scope:
-        """Everything declared: for functions on phase space."""
-        names = {n: symbol(n) for n in (*self.coordinates, *self.parameters)}
-        return Scope(names | self.definitions | dict(extra or {}), self.refused, open=self.incomplete)
+        """Everything declared: for functions on phase space, of a lattice for densities of sites."""
+        names = {n: symbol(n) for n in (*self.coordinates, *self.parameters)} | self.definitions | dict(extra or {})
+        bonds = self._at_bonds(names)
+        known = {n: e for n, e in names.items() if n not in bonds}
+        refused = self.refused | self._counters() | bonds
+        return Scope(known, refused, open=self.incomplete, indices=self._indices(known))
 
     def constants(self, what: str, extra: Mapping[str, Expression] | None = None) -> Scope:
         """Parameters and what depends on them alone; ``what`` says for what in the message about others."""
         names = {n: symbol(n) for n in self.parameters}
         names |= {n: e for n, e in self.definitions.items() if n not in self.varying}
+        bonds = self._at_bonds(names)
+        names = {n: e for n, e in names.items() if n not in bonds}
         refused = {n: (f"{what} must not depend on the coordinate {n!r}", "") for n in self.coordinates}
-        refused |= {n: (f"{what} must not depend on coordinates, as {n!r} does", "") for n in self.varying}
+        refused |= {n: (f"{what} must not depend on coordinates, as {n!r} does", "") for n in self.varying} | bonds
         return Scope(names | dict(extra or {}), refused | self.refused, open=self.incomplete)
 
     def numbers(self) -> Scope:
@@ -113,12 +193,16 @@ class Declarations:
         """Whether a name is free; an error is reported if not."""
         name, first = node.text, self.nodes.get(node.text)
         if name in SPEC_FUNCTIONS:
-            self.reader.error(node, f"the {what} {name!r} has the name of a function", "choose another name")
+            self.reader.error(node, f"the {what} {name!r} has the name of a function", RENAME)
         elif first is not None:
             where = f"line {first.location.line}, column {first.location.column}"
             self.reader.error(node, f"the name {name!r} is declared twice; the first is in {where}")
         elif what == "parameter" and name in ARGUMENTS:
             self.reader.error(node, f"a parameter cannot be called {name!r}", ARGUMENT_HINT)
+        elif self.lattice and name in (*self.lattice.indices, *(f"N_{i}" for i in self.lattice.indices)):
+            self.reader.error(node, f"the {what} {name!r} has the name of an index or size of the lattice", RENAME)
+        elif self.lattice and name == self.lattice.graph:
+            self.reader.error(node, f"the {what} {name!r} has the name of the bonds of the lattice", RENAME)
         else:
             self.nodes[name] = node
             return True
@@ -127,7 +211,7 @@ class Declarations:
 
 def declare(raw: Raw, reader: Reader) -> Declarations:
     """Read ``coordinates``, ``parameters`` and ``definitions``."""
-    declared = Declarations(reader)
+    declared = Declarations(reader, lattice=_lattice(raw.get("lattice"), reader))
     coordinates = raw.get("coordinates")
     declared.incomplete = coordinates is None or None in coordinates
     declared.coordinates = tuple(
@@ -138,6 +222,33 @@ def declare(raw: Raw, reader: Reader) -> Declarations:
     return declared
 
 
+def _lattice(given: Raw | None, reader: Reader) -> Lattice | None:
+    """How sites are related; None for an ordinary spec."""
+    if given is None:
+        return None
+    nodes = [node for node in given.get("axes", ()) if node is not None]
+    axes = tuple(dict.fromkeys(node.text for node in nodes))
+    for index, node in enumerate(nodes):
+        if node.text in axes[:index] and nodes[index].text in [n.text for n in nodes[:index]]:
+            reader.error(node, f"lattice: the axis {node.text!r} is given twice")
+        elif node.text in SPEC_FUNCTIONS or node.text in CONSTANTS:
+            reader.error(node, f"lattice: {node.text!r} means something else in expressions", RENAME)
+    boundary = given.get("boundary", "periodic")
+    if "boundary" in given and not axes and ("graph" in given or "pairs" in given):
+        reader.problems.add("lattice: boundary belongs to axes", reader.locations["lattice", "boundary"])
+    if isinstance(boundary, str):
+        boundary = [boundary] * len(axes)
+    if len(boundary) != len(nodes) and axes:
+        message = (
+            f"lattice: {counted(len(boundary), 'boundary', 'boundaries')} for {counted(len(nodes), 'axis', 'axes')}"
+        )
+        reader.problems.add(message, reader.locations["lattice", "boundary"], "one word is for all axes")
+    graph = given.get("graph")
+    if not (axes or graph or "pairs" in given):  # what was wrong is reported
+        return Lattice(("i",), ("periodic",))
+    return Lattice(axes, tuple(b or "periodic" for b in boundary), graph.text if graph else "", "pairs" in given)
+
+
 def _declare_parameters(raw: Raw, declared: Declarations) -> None:
     others = {*declared.coordinates, *raw.get("parameters", {}), *raw.get("definitions", {})} - {*CONSTANTS}
     why = "the value of a parameter is a number"
@@ -146,14 +257,33 @@ def _declare_parameters(raw: Raw, declared: Declarations) -> None:
         if not declared.declare(key, "parameter"):
             continue
         options: dict[str, Any] = {"value": value} if isinstance(value, Scalar) else value or {}
-        number = declared.number(options.get("value"), numbers)
+        at, given, array = options.get("at", "all"), options.get("value"), None
+        _expect_place(name, at, declared)
+        if at != "all" and not (isinstance(given, Scalar) and given.is_numeric):
+            number, array = None, values(given, declared)
+        elif given is not None and not isinstance(given, Scalar):
+            number = declared.reader.problems.add(
+                f"the value of the parameter {name!r} is a number", key.location, "arrays are at: sites or at: bonds"
+            )
+        else:
+            number = declared.number(given, numbers)
         positive = options.get("positive", False)
         if number is not None and positive and number <= 0:
             message = f"the parameter {name!r} is positive by declaration, but its value is {options['value'].text}"
             declared.reader.error(options["value"], message)
         # A value with an error is reported; the name stays declared, so that its uses are not reported too.
         value = Fraction(1) if number is None else number
-        declared.parameters[name] = Parameter(name, value, positive, options.get("description", ""))
+        description = options.get("description", "")
+        declared.parameters[name] = Parameter(name, value, positive, description, at, array)
+
+
+def _expect_place(name: str, at: str, declared: Declarations) -> None:
+    """That there are sites, or bonds, at which a parameter has values."""
+    wanted = {"sites": ("grid", "graph", "pairs"), "bonds": ("graph",)}.get(at)
+    if wanted and declared.relation not in wanted:
+        needs = "a lattice with a graph" if at == "bonds" and declared.relation else "specs with lattice:"
+        place = declared.reader.locations["parameters", name, "at"]
+        declared.reader.problems.add(f"parameters: at: {at} is for {needs}", place)
 
 
 def _declare_definitions(entries: Mapping[str, tuple[Scalar, Scalar | None]], declared: Declarations) -> None:

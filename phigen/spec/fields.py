@@ -36,15 +36,20 @@ FORMAT_VERSION = 1
 
 NAME = Name(IDENTIFIER, "a name", "names are ASCII letters, digits and _, and start with a letter or _")
 RUN_NAME = Name(r"[A-Za-z0-9_][A-Za-z0-9_-]*", "the name of a run", "use ASCII letters, digits, _ and -")
+NEIGHBOUR = Name(IDENTIFIER + r" *(\[[^\[\]]*\])?", NAME.expected, NAME.hint)
 FORMULA, CONSTANT, INLINE, PROSE = Formula(), Formula(constant=True), Text(), Text(lines=True)
 FORMULAS = MapOf(NAME, FORMULA)
 MATRIX = ListOf(ListOf(FORMULA, least=1), least=1)
 BASIS = Name(r"E[1-9][0-9]*", "the name of a basis element", "basis elements are E1, E2, …")
 
+RANDOM = MapOf(NAME, CONSTANT, least=1)
+#: A number, a formula of the indices or a file; a list; {random: …, seed: …, scale: …}.
+VALUES = Either({Scalar: CONSTANT, Sequence: ListOf(CONSTANT, least=1), Mapping: RANDOM})
 PARAMETER = Record(
     "a parameter",
     (
-        Field("value", CONSTANT, "default value", required=True),
+        Field("value", VALUES, "default value", required=True),
+        Field("at", Choice(("all", "sites", "bonds")), "lattices: where it has a value of its own", default="all"),
         Field("positive", Boolean(), "the value is always greater than 0; simplifications may use it", default=False),
         Field("description", PROSE, "what it means"),
     ),
@@ -73,7 +78,10 @@ LIE_ALGEBRA = Record(
 )
 _FORMS: dict[str, tuple[Kind, str]] = {
     "matrix": (MATRIX, "π as an n×n matrix of brackets {x_i, x_j}"),
-    "brackets": (MapOf(NAME, FORMULAS), "{x1: {x2: f}} for {x1, x2} = f; missing pairs are 0"),
+    "brackets": (
+        MapOf(NAME, MapOf(NEIGHBOUR, FORMULA)),
+        '{x1: {x2: f}} for {x1, x2} = f; missing pairs are 0; of lattices also {x: {"y[i-1]": f}}',
+    ),
     "canonical": (CANONICAL, "{q_i, p_i} = 1"),
     "log_canonical": (MATRIX, "the n×n matrix a of {x_i, x_j} = a_ij x_i x_j"),
     "lie_algebra": (LIE_ALGEBRA, "the Lie–Poisson structure {x_i, x_j} = ± Σ c_ij^k x_k"),
@@ -100,9 +108,15 @@ def _structure(what: str, nested: int, *more: Field) -> Record:
         forms.append(Field("product", ListOf(block, least=2), "blocks side by side, without brackets between them"))
         forms.append(Field("pullback", pullback, "a structure in other coordinates"))
     keys = tuple(f.key for f in forms)
-    return Record(what, (*more, *forms), one=keys, exactly=True, planned=PLANNED["poisson"])
+    instead: tuple[str, ...] = ()
+    if what == "poisson":
+        instead = ("bonds",)
+        along = "graphs: {x[a]: {x[b]: f}} for the bracket of the ends of a bond; alone, or beside a form"
+        forms.append(Field("bonds", MapOf(NEIGHBOUR, MapOf(NEIGHBOUR, FORMULA)), along))
+    return Record(what, (*more, *forms), one=keys, exactly=True, planned=PLANNED["poisson"], instead=instead)
 
 
+BOUNDARY = Choice(("periodic", "open"))
 #: How deep products and pull-backs may be nested.
 NESTED = 2
 POISSON = _structure("poisson", NESTED)
@@ -131,20 +145,61 @@ SOLVER = Record(
         Field("lanes", Boolean(), "C: many steps, and ensembles, eight at a time; longer code", default=True),
     ),
 )
+LATTICE = Record(
+    "lattice",
+    (
+        Field("axes", ListOf(NAME, least=1, most=3), "the axes of a grid, the slowest first; x[i+1] is a neighbour"),
+        Field(
+            "boundary",
+            Either({Scalar: BOUNDARY, Sequence: ListOf(BOUNDARY)}),
+            "of all axes, or of each",
+            default="periodic",
+        ),
+        Field(
+            "graph", NAME, "the name of a list of bonds, which is given at run time; x[a] and x[b] are x at the ends"
+        ),
+        Field("pairs", Choice(("all",)), "each site is paired with each other"),
+    ),
+    one=("axes", "graph", "pairs"),
+    exactly=True,
+)
+DENSITIES = Record(
+    "hamiltonian",
+    (
+        Field("sites", FORMULA, "of each site"),
+        Field("bonds", FORMULA, "of each bond of a graph, from a to b"),
+        Field("pairs", FORMULA, "of each pair, a and b"),
+    ),
+)
+CASIMIR = Record(
+    "a Casimir",
+    (
+        Field("value", FORMULA, "the density", required=True),
+        Field("at", Choice(("sites", "sum", "product")), "lattices: one for each site, or their sum or product"),
+    ),
+)
 RUN = Record(
     "a run",
     (
         Field(
             "initial",
-            Either({Sequence: ListOf(CONSTANT, least=1), Mapping: MapOf(NAME, CONSTANT)}),
-            "initial values, as a list or by the name of the coordinate",
+            Either({Sequence: ListOf(CONSTANT, least=1), Mapping: MapOf(NAME, VALUES, least=1), Scalar: CONSTANT}),
+            "initial values, as a list or by the name of the coordinate; of lattices also a file or {random: sphere}",
             required=True,
+        ),
+        Field(
+            "sizes", ListOf(Integer(1, limits.SITES, limit=True), least=1, most=3), "lattices: the sizes of the axes"
+        ),
+        Field(
+            "bonds",
+            Either({Scalar: INLINE, Sequence: ListOf(ListOf(Integer(0, limits.SITES)), most=limits.BONDS)}),
+            "graphs: pairs of sites, counted from 0, or a file of them, .csv",
         ),
         Field("step", CONSTANT, "step size h", required=True),
         Field("steps", Integer(1, limits.STEPS, limit=True), "number of steps"),
         Field("duration", CONSTANT, "time span instead of the number of steps; a multiple of the step"),
         Field("stride", Integer(1, limits.STEPS, limit=True), "every how many steps are stored", default=1),
-        Field("parameters", MapOf(NAME, CONSTANT), "values that differ from the defaults"),
+        Field("parameters", MapOf(NAME, VALUES), "values that differ from the defaults"),
         Field("exact", FORMULAS, "closed form by coordinate, in t and x0_NAME for initial values"),
         Field("compare", ListOf(Choice(CLASSICAL_METHODS)), "classical methods to run beside it"),
         Field("section", FORMULA, "Poincaré section: where this expression rises through 0"),
@@ -180,9 +235,15 @@ SPEC = Record(
             "run-time arguments of the generated code, with defaults",
         ),
         Field("definitions", FORMULAS, "named sub-expressions, usable in every expression"),
+        Field("lattice", LATTICE, "how many like sites are related; the coordinates are those of every site"),
         Field("poisson", POISSON, "the Poisson structure, in one of its forms", required=True),
-        Field("hamiltonian", FORMULA, "the Hamiltonian H; ẋ = π∇H", required=True),
-        Field("casimirs", FORMULAS, "Casimirs by name; checked"),
+        Field(
+            "hamiltonian",
+            Either({Scalar: FORMULA, Mapping: DENSITIES}),
+            "the Hamiltonian H; ẋ = π∇H",
+            required=True,
+        ),
+        Field("casimirs", MapOf(NAME, Either({Scalar: FORMULA, Mapping: CASIMIR})), "Casimirs by name; checked"),
         Field("invariants", FORMULAS, "further first integrals by name; checked"),
         Field(
             "birealisation", Either({Scalar: KIND, Mapping: BIREALISATION}), "the bi-realisation to use", default="auto"

@@ -6,10 +6,11 @@
     product  = sign (("*" | "/") sign)*
     sign     = ("-" | "+") sign | power
     power    = atom ["**" sign]
-    atom     = number | name | function "(" sum ("," sum)* ")" | "(" sum ")"
+    atom     = number | name | indexed | function "(" sum ("," sum)* ")" | "(" sum ")"
 
-Precedences are Python's: ``-x**2`` is −(x²) and ``2**3**2`` is 2⁹. Nothing is ever evaluated as Python;
-decimals are exact rationals; constants and exponents are bounded before anything is computed with them.
+Names with an index, ``x[i+1]``, are for lattices: `phigen.spec.indices`. Precedences are Python's: ``-x**2`` is −(x²)
+and ``2**3**2`` is 2⁹. Nothing is ever evaluated as Python; decimals are exact rationals; constants and exponents are
+bounded before anything is computed with them.
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ from fractions import Fraction
 from typing import Protocol
 
 from phigen.spec import limits
+from phigen.spec.indices import Indices
 from phigen.spec.names import SPEC_FUNCTIONS
 from phigen.spec.problems import did_you_mean, shown
 from phigen.spec.yaml_source import describe
@@ -57,12 +59,13 @@ class Scope:
     """The names an expression may use.
 
     ``refused`` holds names that exist but not here, each with the message that says why and a hint.
-    With ``open``, any other name is taken for declared.
+    With ``open``, any other name is taken for declared. ``indices`` says what may have an index, if anything may.
     """
 
     names: Mapping[str, Expression]
     refused: Mapping[str, tuple[str, str]] = field(default_factory=dict)
     open: bool = False
+    indices: Indices | None = None
 
     def lookup(self, name: str) -> Expression | None:
         """What a name stands for; declared names win over constants."""
@@ -85,7 +88,7 @@ class Scope:
 _TOKEN = re.compile(
     r"[ \t\n]*(?:(?P<number>(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?)"
     r"|(?P<name>[A-Za-z_][A-Za-z0-9_]*)"
-    r"|(?P<operator>\*\*|[-+*/(),])"
+    r"|(?P<operator>\*\*|[-+*/(),\[\]])"
     r"|(?P<end>\Z)"
     r"|(?P<other>(?s:.)))"
 )
@@ -99,7 +102,6 @@ _CHARACTER_HINTS = {
     "³": "powers are written **3",
     "√": "square roots are written sqrt(…)",
     "π": "the constant is written pi",
-    "[": "an expression is a scalar: use ( )",
     "{": "an expression is a scalar: use ( )",
     "=": "an expression has no = sign",
     ".": "names have no parts: there is no attribute access",
@@ -165,13 +167,17 @@ def parse(source: str, scope: Scope, report: Report) -> Expression | None:
     if found is None:
         return None
     try:
-        result = _Parser(found, scope, note).whole()
+        result = Parser(found, scope, note).whole()
     except _AbandonedError:
         return None
     return None if failed else result
 
 
-class _Parser:
+class Parser:
+    """Reads tokens to an expression, by a method for each rule of the grammar."""
+
+    nothing = symbol(Symbol("unknown", ""))  # stands for what has an error
+
     def __init__(self, found: list[Token], scope: Scope, report: Report) -> None:
         self.tokens, self.scope, self.report = found, scope, report
         self.position = self.depth = self.nodes = 0
@@ -188,6 +194,12 @@ class _Parser:
         if token.kind != "operator" or token.text not in operators:
             return None
         self.position += 1
+        return token
+
+    def advance(self) -> Token:
+        """The token here, after which reading goes on; the end is never passed."""
+        token = self.here
+        self.position += token.kind != "end"
         return token
 
     def abandon(self, message: str, index: int, hint: str = "", *, limit: bool = False) -> _AbandonedError:
@@ -222,6 +234,8 @@ class _Parser:
     def misplaced(self) -> _AbandonedError:
         """The error for a token after a complete operand."""
         token, before = self.here, self.tokens[self.position - 1]
+        if token.text in ("[", "]"):
+            return self.bracket(token)
         if token.text in (")", ","):
             hint = "there is no ( before it" if token.text == ")" else "decimals have a point"
             return self.abandon(f"unexpected {token.text!r}", token.index, hint)
@@ -290,10 +304,20 @@ class _Parser:
         if token.kind == "number":
             return self.number(token)
         if token.kind == "name":
+            if self.here.text == "[" and self.scope.indices:
+                return self.scope.indices.read(self, token)
             return self.call(token) if self.here.text == "(" else self.name(token)
+        if token.text in ("[", "]"):
+            raise self.bracket(token)
         before = self.tokens[self.position - 2].text if self.position > 1 else ""
         hint = "powers are written **; there is no //" if token.text == "/" and before == "/" else ""
         raise self.abandon(f"unexpected {token.text!r}", token.index, hint)
+
+    def bracket(self, token: Token) -> _AbandonedError:
+        """The error for a bracket that is no index."""
+        follows = token.text == "[" and self.position and self.tokens[self.position - 1].kind == "name"
+        hint = "neighbours, x[i+1], are for specs with lattice:" if follows else "an expression is a scalar: use ( )"
+        return self.abandon(f"the character {token.text!r} does not belong in an expression", token.index, hint)
 
     def close(self, opening: Token) -> None:
         if self.accept(")"):

@@ -298,8 +298,8 @@ class Field:
 class Record(Kind):
     """A mapping with fixed keys; reads as key → value, keys in error absent.
 
-    ``one`` lists keys of which at most (``exactly``: exactly) one may be given. ``planned`` keys are known
-    and refused as not available yet.
+    ``one`` lists keys of which at most (``exactly``: exactly) one may be given; a key of ``instead`` does where one is
+    needed, and may stand beside it. ``planned`` keys are known and refused as not available yet.
     """
 
     what: str
@@ -307,6 +307,7 @@ class Record(Kind):
     one: tuple[str, ...] = ()
     exactly: bool = False
     planned: tuple[str, ...] = ()
+    instead: tuple[str, ...] = ()
 
     @property
     def expected(self) -> str:  # type: ignore[override]
@@ -344,7 +345,7 @@ class Record(Kind):
             message = f"{self.what}: {given[0]} and {name} exclude each other"
             reader.error(node.entries[name][0], message, "give one of them")
         strange = set(node.entries) - {f.key for f in self.fields}  # reported already
-        if self.exactly and not given and not strange:
+        if self.exactly and not given and not strange and not any(name in node.entries for name in self.instead):
             reader.error(node, f"{self.what}: one of {', '.join(self.one)} is needed")
 
     def schema(self) -> Schema:
@@ -357,7 +358,9 @@ class Record(Kind):
         if required := [f.key for f in self.fields if f.required]:
             schema["required"] = required
         if self.exactly:
-            schema["oneOf"] = [{"required": [key]} for key in self.one]
+            exclusive: Schema = {"oneOf": [{"required": [key]} for key in self.one]}
+            others = [{"required": [key]} for key in self.instead]
+            schema |= {"anyOf": [exclusive, *others]} if others else exclusive
         elif self.one:
             schema["not"] = {"required": list(self.one)}
         return schema

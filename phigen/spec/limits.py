@@ -25,6 +25,12 @@ NUMBER = 10**40
 DENOMINATOR = 10**80
 #: Absolute value of a literal exponent; ``x**n`` is emitted as products.
 EXPONENT = 1_000
+#: Offset of a neighbour along an axis of a lattice.
+OFFSET = 8
+#: Sites of a lattice.
+SITES = 10**10
+#: Bonds of a graph that stand in a spec; files may hold more.
+BONDS = 5_000
 #: Number of coordinates.
 COORDINATES = 256
 #: Entries of any other mapping or list of the user's.

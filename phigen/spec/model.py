@@ -14,7 +14,7 @@ from typing import Any
 
 from phigen.errors import Diagnostic, Location
 from phigen.registry import DEFAULT
-from phigen.symbolic.expression import Expression
+from phigen.symbolic.expression import ZERO, Expression
 
 #: The order of a method that nobody asked an order of.
 DEFAULT_ORDER = 4
@@ -23,12 +23,28 @@ Matrix = tuple[tuple[Expression, ...], ...]
 
 
 @dataclass(frozen=True)
+class Values:
+    """An array over the sites, or the bonds, of a lattice; exactly one of its sources is given.
+
+    ``formula`` uses the symbols of the indices and sizes, ``i`` and ``N_i``. ``listed`` is in the order of the array,
+    the last axis fastest. ``file`` is a path from the folder of the spec. ``random`` names a distribution: ``normal``,
+    ``uniform`` between −1 and 1, or, for all fields of a site together, ``sphere``; it is multiplied by ``scale``.
+    """
+
+    formula: Expression | None = None
+    listed: tuple[Fraction, ...] = ()
+    file: str = ""
+    random: str = ""
+    seed: int = 0
+    scale: Fraction = Fraction(1)
+
+
+@dataclass(frozen=True)
 class Parameter:
     """A run-time argument of the generated code, with its default.
 
     ``at`` says of a lattice whether it is one number (``all``), or an array with a value at each of the ``sites`` or
-    ``bonds``. ``formula`` is the default at sites where that depends on the site, in the symbols of its indices and of
-    the sizes (``i``, ``N_i``).
+    ``bonds``; ``values`` are its defaults where they are not all ``value``.
     """
 
     name: str
@@ -36,7 +52,7 @@ class Parameter:
     positive: bool = False
     description: str = ""
     at: str = "all"
-    formula: Expression | None = None
+    values: Values | None = None
 
 
 @dataclass(frozen=True)
@@ -164,11 +180,60 @@ class Run:
     compare: tuple[str, ...] = ()
     section: Expression | None = None
     description: str = ""
+    lattice: LatticeRun | None = None
+
+
+@dataclass(frozen=True)
+class LatticeRun:
+    """What a run of a lattice says besides.
+
+    ``sizes`` are those of the axes; where there are none, the number of sites. ``state`` has initial values by field,
+    or of all fields under the name ``""``. ``bonds`` are pairs of sites, counted from 0, or a file with them.
+    ``arrays`` are the values of parameters at sites and bonds that differ from the defaults.
+    """
+
+    sizes: tuple[int, ...] = ()
+    state: Mapping[str, Values] = field(default_factory=dict)
+    bonds: tuple[tuple[int, int], ...] | str = ()
+    arrays: Mapping[str, Values] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Lattice:
+    """That the coordinates of a spec are those of every site of a lattice, and how sites are related.
+
+    ``axes`` name the directions of a grid, with the ``boundary`` of each: ``periodic`` or ``open``. ``graph`` is the
+    name of the list of bonds; ``pairs`` says that each site is paired with each other. ``poisson`` and ``hamiltonian``
+    of the spec are those of a site. ``bonds`` is the density of H of a bond or a pair. ``brackets`` maps (f, g), as
+    symbols of two different sites, to their bracket, in one order of the two. ``kinds`` says of Casimirs whether they
+    are those of ``sites``, a ``sum`` or a ``product``.
+    """
+
+    axes: tuple[str, ...] = ()
+    boundary: tuple[str, ...] = ()
+    graph: str = ""
+    pairs: bool = False
+    bonds: Expression = ZERO
+    brackets: Mapping[tuple[str, str], Expression] = field(default_factory=dict)
+    kinds: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def indices(self) -> tuple[str, ...]:
+        """The names of the indices of a site."""
+        return self.axes or ("i",)
+
+    @property
+    def relation(self) -> str:
+        """``grid``, ``graph`` or ``pairs``."""
+        return "grid" if self.axes else "graph" if self.graph else "pairs"
 
 
 @dataclass(frozen=True)
 class Spec:
-    """A spec file; `locations` gives the place of a part by its path of keys, e.g. ``("casimirs", "C")``."""
+    """A spec file, about a cell where there is a ``lattice``.
+
+    `locations` gives the place of a part by its path of keys, e.g. ``("casimirs", "C")``.
+    """
 
     name: str
     coordinates: tuple[str, ...]
@@ -188,6 +253,7 @@ class Spec:
     extras: Extras = NO_EXTRAS
     targets: tuple[str, ...] = DEFAULT
     runs: Mapping[str, Run] = field(default_factory=dict)
+    lattice: Lattice | None = None
     title: str = ""
     description: str = ""
     references: tuple[str, ...] = ()

@@ -9,6 +9,7 @@ Only what can be said without mathematics is checked here: shapes, names, and do
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from typing import Any
 
 from phigen.spec.declarations import Declarations
@@ -27,6 +28,7 @@ from phigen.spec.names import FAMILIES, FAMILY_HELP, FAMILY_NAME, MEMBERS, SPEC_
 from phigen.spec.problems import counted, did_you_mean, shown
 from phigen.spec.yaml_source import Scalar
 from phigen.symbolic.expression import ZERO, Expression, neg
+from phigen.symbolic.neighbours import ENDS, minus
 
 Rows = list[list[Scalar | None] | None]
 Pairs = dict[tuple[int, int], tuple[Scalar, Expression]]
@@ -36,8 +38,63 @@ def poisson_form(given: Mapping[str, Any], declared: Declarations) -> PoissonFor
     """The form of ``poisson:``, or ``None`` after errors."""
     for form, read in _FORMS.items():
         if form in given:
-            return read(given[form], declared)
+            return read(given[form], declared if form in ("matrix", "brackets") else replace(declared, indexed=False))
     return None
+
+
+def brackets_of_sites(given: Mapping[str, Any], declared: Declarations) -> dict[tuple[str, str], Expression]:
+    """The brackets of fields of different sites of a lattice, in one order: on a grid, or along bonds."""
+    if "bonds" in given:
+        return _along_bonds(given["bonds"], declared)
+    return _of_neighbours(given.get("brackets") or {}, declared) if declared.relation == "grid" else {}
+
+
+def _of_neighbours(given: Mapping[str, Any], declared: Declarations) -> dict[tuple[str, str], Expression]:
+    found: dict[tuple[str, str], tuple[Scalar, Expression]] = {}
+    space, scope = declared.neighbours, declared.scope()
+    for key, row in given.values():
+        for other, cell in (row or {}).values():
+            if "[" not in other.text or key.text not in declared.coordinates:
+                continue
+            place, value = declared.neighbour(other), declared.formula(cell, scope)
+            if place is None or value is None:
+                continue
+            base, offset = place
+            if not any(offset):
+                declared.reader.error(other, f"{other.text!r} is at the site itself", f"write {base}")
+                continue
+            back = base, space.at(key.text, minus(offset))
+            if back in found and space.shifted([neg(value)], minus(offset))[0] is not found[back][1]:
+                where = found[back][0].location
+                message = f"{{{key.text}, {other.text}}} is not written as the negative of its mirror image"
+                declared.reader.error(other, message, f"that is in line {where.line}, column {where.column}")
+            elif back not in found:
+                found[key.text, space.at(base, offset)] = other, value
+    return {pair: value for pair, (_, value) in found.items()}
+
+
+def _along_bonds(given: Mapping[str, Any], declared: Declarations) -> dict[tuple[str, str], Expression]:
+    if declared.relation != "graph":
+        message = "poisson: bonds needs lattice: {graph: NAME}"
+        _fail(declared, ("bonds",), message, 'neighbours on a grid are named in brackets: {x: {"y[i+1]": …}}')
+        return {}
+    found: dict[tuple[str, str], Expression] = {}
+    space, scope = declared.neighbours, declared.bond_scope()
+    for key, row in given.values():
+        first = declared.neighbour(key, ENDS)
+        for other, cell in (row or {}).values():
+            second, value = declared.neighbour(other, ENDS), declared.formula(cell, scope)
+            if first is None or second is None or value is None:
+                continue
+            pair = space.at(*first), space.at(*second)
+            if {first[1], second[1]} != {(end,) for end in ENDS}:
+                declared.reader.error(other, "a bracket along a bond is one of its two ends, a and b", "x[a] with x[b]")
+            elif pair[::-1] in found and found[pair[::-1]] is not neg(value):
+                message = f"{{{pair[0]}, {pair[1]}}} is not written as the negative of {{{pair[1]}, {pair[0]}}}"
+                declared.reader.error(other, message, "give one of them")
+            elif pair[::-1] not in found:
+                found[pair] = value
+    return found
 
 
 def _fail(declared: Declarations, path: tuple[Any, ...], message: str, hint: str = "") -> None:
@@ -82,6 +139,8 @@ def _brackets(given: Mapping[str, Any], declared: Declarations) -> PoissonForm:
     for key, row in given.values():
         i = declared.coordinate(key)
         for other, cell in (row or {}).values():
+            if "[" in other.text and declared.relation == "grid":  # see `_of_neighbours`
+                continue
             j = declared.coordinate(other)
             value = declared.formula(cell, scope)
             if i is not None and j is not None and value is not None:

@@ -66,6 +66,10 @@ class Problems:
         if len(self.found) >= limits.ERRORS:
             raise self.error()
 
+    def forget(self, line: int) -> None:
+        """Drop the errors of a line, which follow from one that is reported instead."""
+        self.found = {at: d for at, d in self.found.items() if at[0].line != line}
+
     def stop(self, message: str, location: Location, hint: str = "", *, limit: bool = False) -> SpecError:
         """Record an error after which nothing can be read, and return the exception to raise."""
         self.add(message, location, hint, limit=limit)

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from fractions import Fraction
 from typing import Any
 
 from phigen.spec import limits
 from phigen.spec.declarations import Declarations
 from phigen.spec.grammar import Scope
-from phigen.spec.model import Run
+from phigen.spec.lattice import run_of_lattice
+from phigen.spec.model import Run, Values
 from phigen.spec.problems import counted, did_you_mean, shown
+from phigen.spec.values import values as site_values
 from phigen.spec.yaml_source import Scalar
 from phigen.symbolic.expression import Expression, symbol
 from phigen.symbolic.symbols import ELAPSED, initial
@@ -31,17 +34,20 @@ def run(name: str, raw: Mapping[str, Any], declared: Declarations) -> Run:
     if steps is not None and stride > steps:
         _fail(name, "stride", f"the stride {stride} is longer than the run of {steps} steps", declared)
     section = raw.get("section")
+    lattice = run_of_lattice(name, raw, declared)
+    numbers_of, arrays = _overrides(raw.get("parameters", {}), declared)
     return Run(
         name=name,
-        initial=_initial(name, raw.get("initial"), declared),
+        initial=() if lattice else _initial(name, raw.get("initial"), declared),
         step=step or Fraction(1),
         steps=steps or 1,
         stride=stride,
-        parameters=_overrides(raw.get("parameters", {}), declared),
+        parameters=numbers_of,
         exact=_exact(raw.get("exact", {}), declared),
         compare=without_repetition(raw.get("compare", ()), ("runs", name, "compare"), declared),
         section=declared.formula(section, declared.scope()),
         description=raw.get("description", ""),
+        lattice=replace(lattice, arrays=arrays) if lattice else None,
     )
 
 
@@ -76,8 +82,13 @@ def _steps(name: str, raw: Mapping[str, Any], step: Fraction | None, declared: D
 
 def _initial(name: str, given: Any, declared: Declarations) -> tuple[Fraction, ...]:
     n, scope = len(declared.coordinates), declared.numbers()
+    if isinstance(given, Scalar):
+        declared.reader.error(given, "initial: expected a list or a mapping", "[0.1, 1], or {x1: 0.1, x2: 1}")
+        return ()
     if isinstance(given, dict):
-        values = {k: (declared.coordinate(key), declared.number(node, scope)) for k, (key, node) in given.items()}
+        values = {
+            k: (declared.coordinate(key), _single(node, scope, key, declared)) for k, (key, node) in given.items()
+        }
         missing = [c for c in declared.coordinates if c not in values]
         if missing:
             _fail(name, "initial", f"initial: no value for {', '.join(missing[:10])}", declared)
@@ -89,11 +100,28 @@ def _initial(name: str, given: Any, declared: Declarations) -> tuple[Fraction, .
     return tuple(declared.number(node, scope) or Fraction(0) for node in given)
 
 
-def _overrides(given: Mapping[str, tuple[Scalar, Scalar | None]], declared: Declarations) -> dict[str, Fraction]:
-    values = {}
+def _single(node: Any, scope: Scope, key: Scalar, declared: Declarations) -> Fraction | None:
+    """The number where an ordinary spec has one, and a lattice may have an array."""
+    if node is None or isinstance(node, Scalar):
+        return declared.number(node, scope)
+    what = "a list" if isinstance(node, list) else "a mapping"
+    declared.reader.error(key, f"{key.text}: expected a number, found {what}")
+    return None
+
+
+def _overrides(
+    given: Mapping[str, tuple[Scalar, Any]], declared: Declarations
+) -> tuple[dict[str, Fraction], dict[str, Values]]:
+    """The values of parameters, numbers and arrays."""
+    values: dict[str, Fraction] = {}
+    arrays: dict[str, Values] = {}
     for name, (key, node) in given.items():
-        value = declared.number(node, declared.numbers())
         parameter = declared.parameters.get(name)
+        if parameter is not None and parameter.at != "all":
+            array = site_values(node, declared)
+            arrays |= {} if array is None else {name: array}
+            continue
+        value = _single(node, declared.numbers(), key, declared)
         if parameter is None:
             hint = did_you_mean(name, declared.parameters)
             declared.reader.error(key, f"{shown(name)} is not a parameter", hint)
@@ -102,7 +130,7 @@ def _overrides(given: Mapping[str, tuple[Scalar, Scalar | None]], declared: Decl
                 message = f"the parameter {name!r} is positive by declaration, but its value is {node.text}"
                 declared.reader.error(node, message)
             values[name] = value
-    return values
+    return values, arrays
 
 
 def _exact(given: Mapping[str, tuple[Scalar, Scalar | None]], declared: Declarations) -> dict[str, Expression]:

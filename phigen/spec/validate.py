@@ -11,9 +11,11 @@ from phigen.registry import DEFAULT
 from phigen.spec.declarations import Declarations, declare
 from phigen.spec.fields import SPEC
 from phigen.spec.kinds import Reader
+from phigen.spec.lattice import casimirs as read_casimirs
+from phigen.spec.lattice import densities, with_kinds
 from phigen.spec.model import DEFAULT_ORDER, BirealisationChoice, Extras, MatrixForm, SolverOptions, Spec
 from phigen.spec.names import LICENSE_REFERENCE, LICENSES
-from phigen.spec.poisson import poisson_form
+from phigen.spec.poisson import brackets_of_sites, poisson_form
 from phigen.spec.problems import Problems, counted, did_you_mean, shown
 from phigen.spec.runs import run, without_repetition
 from phigen.spec.taken import objection
@@ -52,13 +54,18 @@ def validate(data: bytes, file: str) -> Spec:
 def _parts(raw: Mapping[str, Any], declared: Declarations) -> dict[str, Any]:
     """The arguments of `Spec`; after errors, which are reported, some of them are stand-ins."""
     references = raw.get("references", ())
+    poisson = raw.get("poisson", {})
+    hamiltonian, coupling = densities(raw.get("hamiltonian"), declared)
+    casimirs, kinds = read_casimirs(raw.get("casimirs", {}), declared)
+    brackets = brackets_of_sites(poisson, declared)
+    lattice = declared.lattice and with_kinds(declared.lattice, casimirs, kinds, bonds=coupling, brackets=brackets)
     return {
         "name": _name(raw.get("name"), declared),
         "coordinates": declared.coordinates,
-        "poisson": poisson_form(raw.get("poisson", {}), declared) or MatrixForm(()),
-        "hamiltonian": declared.formula(raw.get("hamiltonian"), declared.scope()) or ZERO,
+        "poisson": poisson_form(poisson, declared) or _no_brackets(declared),
+        "hamiltonian": hamiltonian,
         "parameters": tuple(declared.parameters.values()),
-        "casimirs": _formulas(raw.get("casimirs", {}), declared),
+        "casimirs": casimirs,
         "invariants": _formulas(raw.get("invariants", {}), declared),
         "birealisation": _birealisation(raw.get("birealisation", "auto"), declared),
         "order": raw.get("order", None if "terms" in raw else DEFAULT_ORDER),
@@ -71,6 +78,7 @@ def _parts(raw: Mapping[str, Any], declared: Declarations) -> dict[str, Any]:
         "targets": without_repetition(raw.get("targets", DEFAULT), ("targets",), declared),
         "extras": Extras(raw.get("tangent", False), raw.get("modified_hamiltonian", 0)),
         "runs": {n: run(n, r, declared) for n, (_, r) in raw.get("runs", {}).items() if r is not None},
+        "lattice": lattice,
         "title": raw.get("title", ""),
         "description": raw.get("description", ""),
         "references": (references,) if isinstance(references, str) else tuple(r for r in references if r),
@@ -89,6 +97,12 @@ def _expect_consistent(raw: Mapping[str, Any], problems: Problems, reader: Reade
         if key in raw and raw[key] is not None and raw[key] not in harmless:
             message = f"{key} belongs to scheme: series; scheme: splitting follows exact flows of parts of H"
             problems.add(message, reader.locations[key,], f"remove {key}, or the scheme")
+
+
+def _no_brackets(declared: Declarations) -> MatrixForm:
+    """π of a site whose brackets are all along bonds; after errors it is a stand-in."""
+    n = len(declared.coordinates)
+    return MatrixForm(((ZERO,) * n,) * n)
 
 
 def _name(node: Scalar | None, declared: Declarations) -> str:

@@ -15,6 +15,7 @@ from typing import Any
 from phigen.errors import Location
 from phigen.spec import limits
 from phigen.spec.problems import Problems, shown
+from phigen.spec.quoting import needs_quotes, quoted
 
 
 @dataclass
@@ -199,6 +200,11 @@ class _Builder:
         hint = "put expressions and texts with special characters between quotes"
         if "\\t" in what or "'\t'" in what:
             hint = "indent with spaces, not with tabs"
+        line = self.text.split("\n")[location.line - 1]
+        if needs_quotes(line, location.column - 1):
+            self.problems.forget(location.line)  # what was made of the line before is no error of its own
+            what = "inside { } and [ ], what contains [ ] stands between quotes"
+            hint = f"write {quoted(line).strip()}"
         return self.problems.stop(f"not valid YAML: {what}", location, hint)
 
     def take(self, event: Any) -> None:

@@ -1,0 +1,75 @@
+"""From a spec with ``lattice:`` to its `Cell`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from phigen.errors import Diagnostic, SpecError
+from phigen.geometry.forms import algebra_of_form, poisson_matrix
+from phigen.lattice.cell import Cell
+from phigen.spec.model import Lattice, Run, Spec
+from phigen.symbolic.expression import ZERO, Expression, neg
+from phigen.symbolic.neighbours import Neighbours, minus
+
+
+def cell_from_spec(spec: Spec) -> Cell:
+    """The cell of a spec. Raises `SpecError` where a form of π does not fit, or a run is too small for the stencil."""
+    lattice = spec.lattice
+    if lattice is None:
+        raise ValueError(f"{spec.name} is no lattice")
+    brackets = _completed(spec, lattice)
+    cell = Cell(
+        spec.name,
+        spec.coordinates,
+        spec.hamiltonian,
+        _local(spec) | (brackets if lattice.axes else {}),
+        lattice.relation,
+        lattice.axes,
+        lattice.boundary,
+        spec.parameters,
+        ZERO if lattice.pairs else lattice.bonds,
+        lattice.bonds if lattice.pairs else ZERO,
+        {} if lattice.axes else brackets,
+        {name: (density, lattice.kinds[name]) for name, density in spec.casimirs.items()},
+        spec.invariants,
+    )
+    small = [d for run in spec.runs.values() for d in _too_small(spec, cell, run)]
+    if small:
+        raise SpecError(small)
+    return cell
+
+
+def least_sizes(cell: Cell) -> tuple[int, ...]:
+    """The sizes that a grid has at least: no site is its own neighbour, and an open one has room for all of H and π."""
+    return tuple(1 + max(h, p) for h, p in zip(cell.hamiltonian_reach, cell.poisson_reach, strict=True))
+
+
+def _local(spec: Spec) -> dict[tuple[str, str], Expression]:
+    matrix = poisson_matrix(spec.poisson, spec.coordinates, algebra_of_form(spec.poisson, spec.coordinates))
+    rows = zip(spec.coordinates, matrix, strict=True)
+    return {(f, g): e for f, row in rows for g, e in zip(spec.coordinates, row, strict=True) if not e.is_zero}
+
+
+def _completed(spec: Spec, lattice: Lattice) -> dict[tuple[str, str], Expression]:
+    """The brackets of different sites in both orders."""
+    at_sites = (p.name for p in spec.parameters if p.at == "sites")
+    neighbours = Neighbours((*spec.coordinates, *at_sites), lattice.axes)
+    both: dict[tuple[str, str], Expression] = {}
+    for (f, g), value in lattice.brackets.items():
+        both[f, g] = value
+        if lattice.axes:
+            base, offset = neighbours.place(g)
+            mirrored = neighbours.shifted([neg(value)], minus(offset))[0]
+            both[base, neighbours.at(f, minus(offset))] = mirrored
+        else:
+            both[g, f] = neg(value)
+    return {pair: e for pair, e in both.items() if not e.is_zero}
+
+
+def _too_small(spec: Spec, cell: Cell, run: Run) -> Iterator[Diagnostic]:
+    """The sizes of a run that the stencil does not fit in."""
+    sizes = run.lattice.sizes if run.lattice else ()
+    for axis, size, least in zip(cell.axes, sizes, least_sizes(cell), strict=False):
+        if size < least:
+            message = f"sizes: {size} along {axis} is too small: neighbours are up to {least - 1} sites away"
+            yield spec.diagnostic(("runs", run.name, "sizes"), message, f"sizes along {axis} are at least {least}")

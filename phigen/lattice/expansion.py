@@ -1,0 +1,219 @@
+"""A small lattice as an ordinary spec, with a coordinate for each field of each site: the meaning of a cell."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from fractions import Fraction
+from itertools import combinations, product
+from typing import Any
+
+from phigen.lattice.cell import OPEN, Cell
+from phigen.spec.model import MatrixForm, Parameter, Run, Spec
+from phigen.symbolic.expression import ZERO, Expression, substitute, symbol, total
+from phigen.symbolic.expression import product as product_of
+from phigen.symbolic.neighbours import ENDS, Offset, plus
+
+Site = tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class Expansion:
+    """A cell at given sizes; graphs with their bonds, pairs and graphs with their number of sites as the one size.
+
+    ``names`` maps (field or parameter, site) to the coordinate or parameter of the ordinary spec; ``bond_names``
+    (parameter, number of the bond). Coordinates go field by field, the sites of each in order, the last axis fastest: a
+    state of shape (fields, *sizes), flattened, is one of the expansion.
+    """
+
+    cell: Cell
+    sizes: tuple[int, ...]
+    bonds: tuple[tuple[int, int], ...] = ()
+    names: Mapping[tuple[str, Site], str] = field(default_factory=dict)
+    bond_names: Mapping[tuple[str, int], str] = field(default_factory=dict)
+
+    @property
+    def sites(self) -> list[Site]:
+        """All sites, the last axis fastest."""
+        return list(product(*map(range, self.sizes)))
+
+    @property
+    def coordinates(self) -> tuple[str, ...]:
+        """The coordinates of the ordinary spec."""
+        return tuple(self.names[f, s] for f in self.cell.fields for s in self.sites)
+
+    # --- expressions at sites
+
+    def neighbour(self, site: Site, offset: Offset) -> Site | None:
+        """The site at an offset; None beyond an open end."""
+        found = plus(site, offset)
+        inside = [0 <= n < size for n, size in zip(found, self.sizes, strict=True)]
+        if any(b == OPEN and not i for b, i in zip(self.cell.boundary, inside, strict=True)):
+            return None
+        return tuple(n % size for n, size in zip(found, self.sizes, strict=True))
+
+    def at(self, expression: Expression, site: Site) -> Expression | None:
+        """What a term without ends is at a site; None if it reaches beyond an open end."""
+        values = {}
+        for name, (base, offset) in self.cell.places(expression).items():
+            there = self.neighbour(site, offset) if self.cell.axes else site
+            if there is None:
+                return None
+            values[name] = symbol(self.names[base, there])
+        return substitute([expression], values)[0]
+
+    def between(self, expression: Expression, a: Site, b: Site, bond: int | None = None) -> Expression:
+        """What a density of a bond, or of a pair, is between two sites."""
+        where = dict(zip(ENDS, (a, b), strict=True))
+        places = self.cell.places(expression)
+        values = {n: symbol(self.names[base, where[str(end[0])]]) for n, (base, end) in places.items()}
+        if bond is not None:
+            own = (p.name for p in self.cell.parameters if p.at == "bonds")
+            values |= {n: symbol(self.bond_names[n, bond]) for n in own}
+        return substitute([expression], values)[0]
+
+    def summed(self, density: Expression) -> list[Expression]:
+        """The terms of the sum of a density over the sites, without those that reach beyond open ends."""
+        terms = [term for site in self.sites for t in self.cell.additive_terms(density) for term in [self.at(t, site)]]
+        return [t for t in terms if t is not None]
+
+    # --- the system
+
+    def hamiltonian_terms(self) -> list[Expression]:
+        """The terms whose sum is H."""
+        cell = self.cell
+        found = self.summed(cell.hamiltonian)
+        if not cell.bond_hamiltonian.is_zero:
+            found += [self.between(cell.bond_hamiltonian, (a,), (b,), k) for k, (a, b) in enumerate(self.bonds)]
+        if not cell.pair_hamiltonian.is_zero:
+            found += [self.between(cell.pair_hamiltonian, a, b) for a, b in combinations(self.sites, 2)]
+        return found
+
+    def poisson(self) -> dict[tuple[str, str], Expression]:
+        """The brackets of coordinates that are not 0, in both orders."""
+        entries: dict[tuple[str, str], list[Expression]] = {}
+        for (f, other), value in self.cell.bracket.items():
+            g, offset = self.cell.place(other)
+            for site in self.sites:
+                there = self.neighbour(site, offset) if self.cell.axes else site
+                if there is not None:
+                    terms = [self.at(t, site) for t in self.cell.additive_terms(value)]
+                    entries.setdefault((self.names[f, site], self.names[g, there]), []).extend(
+                        t for t in terms if t is not None
+                    )
+        for (f_end, g_end), value in self.cell.bond_bracket.items():
+            (f, at_f), (g, at_g) = self.cell.place(f_end), self.cell.place(g_end)
+            for k, (a, b) in enumerate(self.bonds):
+                where = {"a": (a,), "b": (b,)}
+                pair = self.names[f, where[str(at_f[0])]], self.names[g, where[str(at_g[0])]]
+                entries.setdefault(pair, []).append(self.between(value, (a,), (b,), k))
+        sums = {pair: total(terms) for pair, terms in entries.items()}
+        return {pair: e for pair, e in sums.items() if not e.is_zero}
+
+    def casimirs(self) -> dict[str, Expression]:
+        """Casimirs by name: one for each site, a sum or a product."""
+        found: dict[str, Expression] = {}
+        taken = {*self.names.values(), *self.bond_names.values(), *(p.name for p in self.cell.parameters)}
+        for name, (density, kind) in self.cell.casimirs.items():
+            if kind == "sum":
+                found[name] = total(self.summed(density))
+            else:
+                each = {site: e for site in self.sites for e in [self.at(density, site)] if e is not None}
+                if kind == "product":
+                    found[name] = product_of(each.values())
+                else:
+                    found |= {_free(name, site, taken): e for site, e in each.items()}
+        return found
+
+    def matrix(self) -> MatrixForm:
+        """π as a matrix."""
+        entries = self.poisson()
+        return MatrixForm(tuple(tuple(entries.get((a, b), ZERO) for b in self.coordinates) for a in self.coordinates))
+
+    def spec(self) -> Spec:
+        """The ordinary spec. Parameters at sites and bonds are parameters of it, all of the default of the cell."""
+        cell = self.cell
+        many: list[Parameter] = []
+        for p in cell.parameters:
+            names = {
+                "all": [p.name],
+                "sites": [self.names[p.name, s] for s in self.sites if p.at == "sites"],
+                "bonds": [self.bond_names[p.name, k] for k in range(len(self.bonds)) if p.at == "bonds"],
+            }[p.at]
+            many += [replace(p, name=n, at="all", values=None) for n in names]
+        return Spec(
+            name=_name(cell.name, self.sizes),
+            coordinates=self.coordinates,
+            poisson=self.matrix(),
+            hamiltonian=total(self.hamiltonian_terms()),
+            parameters=tuple(many),
+            casimirs=self.casimirs(),
+            invariants={name: total(self.summed(d)) for name, d in cell.invariants.items()},
+        )
+
+    def numbers(self, parameters: Mapping[str, Any]) -> dict[str, float]:
+        """The parameters of the ordinary spec, from numbers and arrays of the lattice."""
+        found = {}
+        for p in self.cell.parameters:
+            value = parameters[p.name]
+            if p.at == "all":
+                found[p.name] = float(value)
+            elif p.at == "sites":
+                found |= {self.names[p.name, s]: float(value[s]) for s in self.sites}
+            else:
+                found |= {self.bond_names[p.name, k]: float(value[k]) for k in range(len(self.bonds))}
+        return found
+
+
+def expand(cell: Cell, sizes: Sequence[int], bonds: Sequence[Sequence[int]] = ()) -> Expansion:
+    """The lattice at these sizes; for graphs and pairs that is one number, of sites, and graphs need their bonds.
+
+    Raises `ValueError` for sizes that do not fit.
+    """
+    if len(sizes) != (len(cell.axes) or 1) or any(n < 1 for n in sizes):
+        wanted = f"{len(cell.axes)}, along {', '.join(cell.axes)}" if cell.axes else "the number of sites"
+        raise ValueError(f"sizes are {wanted}; not {'x'.join(map(str, sizes))}")
+    ends = tuple((int(a), int(b)) for a, b in bonds)
+    if any(not (0 <= n < sizes[0]) for pair in ends for n in pair) or any(a == b for a, b in ends):
+        raise ValueError(f"bonds are pairs of different sites between 0 and {sizes[0] - 1}")
+    taken = {p.name for p in cell.parameters if p.at == "all"} | {*cell.casimirs, *cell.invariants}
+    sites = list(product(*map(range, sizes)))
+    names = {(n, s): _free(n, s, taken) for n in cell.neighbours.names for s in sites}
+    own = [p.name for p in cell.parameters if p.at == "bonds"]
+    bond_names = {(n, k): _free(n, (k,), taken) for n in own for k in range(len(ends))}
+    return Expansion(cell, tuple(sizes), ends, names, bond_names)
+
+
+def ring(sites: int) -> list[tuple[int, int]]:
+    """The bonds of a ring, and a chord: a small graph for those who do not give one."""
+    chord = [(0, sites // 2)] if sites > 3 else []
+    return [(k, (k + 1) % sites) for k in range(sites if sites > 2 else sites - 1)] + chord
+
+
+def run_of(expansion: Expansion, run: Run, state: Any, numbers: Mapping[str, float]) -> Run:
+    """A run of the ordinary spec, from the state and the parameters of one of the lattice."""
+    return replace(
+        run,
+        initial=tuple(_decimal(v) for v in state.reshape(-1)),
+        parameters={n: _decimal(v) for n, v in numbers.items()},
+        lattice=None,
+    )
+
+
+def _decimal(value: float) -> Fraction:
+    """The decimal that a double is written as."""
+    return Fraction(repr(float(value)))
+
+
+def _free(name: str, site: Site, taken: set[str]) -> str:
+    """``x_1_2``; with underscores added where that name has a meaning already."""
+    found = "_".join([name, *map(str, site)])
+    while found in taken:
+        found += "_"
+    taken.add(found)
+    return found
+
+
+def _name(name: str, sizes: Sequence[int]) -> str:
+    ending = "_" + "x".join(map(str, sizes))
+    return name[: 31 - len(ending)] + ending

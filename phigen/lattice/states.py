@@ -1,0 +1,153 @@
+"""Runs of lattices as arrays: initial states, parameters at sites and bonds, bonds."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from phigen.errors import SpecError
+from phigen.spec.model import LatticeRun, Run, Spec, Values
+from phigen.symbolic.arrays import evaluate
+
+Floats = NDArray[np.float64]
+Bonds = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Start:
+    """A run before its first step.
+
+    ``sizes`` are those of the axes, of graphs and pairs the number of sites. ``state`` has the shape (fields, *sizes).
+    ``parameters`` are numbers, and arrays over sites or bonds. ``bonds`` has the shape (bonds, 2).
+    """
+
+    sizes: tuple[int, ...]
+    state: Floats
+    parameters: Mapping[str, float | Floats]
+    bonds: Bonds
+
+
+def start_of(spec: Spec, run: Run) -> Start:
+    """What a run of a lattice starts from.
+
+    Raises `SpecError` for files that cannot be read and arrays that do not fit, with the place in the spec.
+    """
+    return _Reader(spec, run).start()
+
+
+class _Reader:
+    def __init__(self, spec: Spec, run: Run) -> None:
+        if spec.lattice is None or run.lattice is None:
+            raise ValueError(f"{spec.name} is no lattice")
+        self.spec, self.run, self.lattice, self.given = spec, run, spec.lattice, run.lattice
+        self.folder = Path(spec.file).parent
+
+    def start(self) -> Start:
+        bonds, columns = self._bonds(self.given)
+        sizes = self.given.sizes or (self._sites(bonds),)
+        if len(bonds) and bonds.max() >= sizes[0]:
+            raise self._error("bonds", f"a bond ends at site {bonds.max()}, but there are {sizes[0]} sites")
+        self.indices = self._counters(sizes)
+        parameters: dict[str, float | Floats] = dict(self.spec.parameters_of(self.run))
+        for p in self.spec.parameters:
+            if p.at != "all":
+                shape = sizes if p.at == "sites" else (len(bonds),)
+                found = self.given.arrays.get(p.name)
+                if found is None and p.at == "bonds" and p.name in columns:
+                    parameters[p.name] = columns[p.name]
+                else:
+                    found = found or p.values
+                    whole = np.full(shape, float(p.value))
+                    parameters[p.name] = whole if found is None else self._array(found, shape, p.name)
+                if p.positive and np.any(np.asarray(parameters[p.name]) <= 0):
+                    message = f"the parameter {p.name!r} is positive by declaration, but not all its values are"
+                    raise self._error("parameters", message)
+        return Start(sizes, self._state(sizes), parameters, bonds)
+
+    def _error(self, key: str, message: str, hint: str = "") -> SpecError:
+        return SpecError([self.spec.diagnostic(("runs", self.run.name, key), message, hint)])
+
+    def _sites(self, bonds: Bonds) -> int:
+        """The number of sites where the run does not say it: what bonds or lists of initial values have."""
+        lengths = [len(v.listed) for v in self.given.state.values() if v.listed]
+        if not lengths and not len(bonds):
+            raise self._error("initial", "the number of sites is not known", "sizes: [N]")
+        return max([*lengths, int(bonds.max()) + 1 if len(bonds) else 0])
+
+    def _counters(self, sizes: Sequence[int]) -> dict[str, Any]:
+        grids = np.meshgrid(*(np.arange(n, dtype=np.float64) for n in sizes), indexing="ij")
+        found: dict[str, Any] = dict(zip(self.lattice.indices, grids, strict=True))
+        return found | {f"N_{i}": float(n) for i, n in zip(self.lattice.indices, sizes, strict=True)}
+
+    def _state(self, sizes: tuple[int, ...]) -> Floats:
+        fields, given = self.spec.coordinates, self.given.state
+        shape = (len(fields), *sizes)
+        if "" not in given:
+            return np.stack([self._array(given[f], sizes, f) for f in fields])
+        values = given[""]
+        if values.random != "sphere":
+            return self._array(values, shape, "initial")
+        drawn = np.random.default_rng(values.seed).normal(size=shape)
+        return np.asarray(float(values.scale) * drawn / np.sqrt((drawn**2).sum(axis=0)))
+
+    def _array(self, values: Values, shape: tuple[int, ...], name: str) -> Floats:
+        if values.file:
+            found = self._loaded(values.file, name)
+        elif values.listed:
+            found = np.array([float(v) for v in values.listed])
+            if found.size == np.prod(shape):
+                found = found.reshape(shape)
+        elif values.random:
+            random = np.random.default_rng(values.seed)
+            drawn = random.normal(size=shape) if values.random == "normal" else random.uniform(-1, 1, size=shape)
+            found = float(values.scale) * drawn
+        else:
+            assert values.formula is not None
+            found = np.broadcast_to(evaluate([values.formula], self.indices)[0], shape).copy()
+        if found.shape != shape:
+            wanted, has = "×".join(map(str, shape)), "×".join(map(str, found.shape))
+            raise self._error(name if name == "initial" else "parameters", f"{name} has {has} values, not {wanted}")
+        if not np.all(np.isfinite(found)):
+            raise self._error(name if name == "initial" else "parameters", f"{name}: not all values are finite")
+        return found
+
+    def _loaded(self, file: str, name: str) -> Floats:
+        path = self.folder / file
+        try:
+            loaded = np.load(path, allow_pickle=False) if file.endswith(".npy") else _table(path)[0]
+        except (OSError, ValueError) as error:
+            raise self._error("initial", f"{name}: cannot read {file!r}: {_reason(error)}") from None
+        return np.asarray(loaded, dtype=np.float64)
+
+    def _bonds(self, given: LatticeRun) -> tuple[Bonds, dict[str, Floats]]:
+        if not isinstance(given.bonds, str):
+            return np.array(given.bonds, dtype=np.int64).reshape(-1, 2), {}
+        if not given.bonds:
+            return np.zeros((0, 2), dtype=np.int64), {}
+        try:
+            table, names = _table(self.folder / given.bonds)
+        except (OSError, ValueError) as error:
+            raise self._error("bonds", f"bonds: cannot read {given.bonds!r}: {_reason(error)}") from None
+        ends = table[:, :2]
+        if table.shape[1] < 2 or np.any(ends != np.round(ends)) or np.any(ends < 0) or np.any(ends[:, 0] == ends[:, 1]):
+            raise self._error("bonds", f"bonds: {given.bonds!r} is no list of pairs of different sites, counted from 0")
+        return ends.astype(np.int64), {n: table[:, k].copy() for k, n in enumerate(names) if k > 1}
+
+
+def _table(path: Path) -> tuple[Floats, list[str]]:
+    """The numbers of a CSV file, and the names of its columns where the first line has some."""
+    with path.open(encoding="utf-8") as stream:
+        first = stream.readline()
+        names = [n.strip() for n in first.split(",")] if any(c.isalpha() for c in first.replace("e", "")) else []
+        if not names:
+            stream.seek(0)
+        return np.loadtxt(stream, delimiter=",", ndmin=2), names
+
+
+def _reason(error: Exception) -> str:
+    return getattr(error, "strerror", None) or str(error).split("\n")[0]

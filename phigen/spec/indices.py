@@ -1,0 +1,105 @@
+"""Names with an index in expressions of a lattice: ``x[i+1]``, ``q[i-1, j+2]`` on a grid, ``x[a]`` on a bond.
+
+::
+
+    indexed  = name "[" step ("," step)* "]"
+    step     = axis [("+" | "-") integer] | "a" | "b"
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+from phigen.spec import limits
+from phigen.spec.problems import did_you_mean, shown
+from phigen.symbolic.expression import Expression
+from phigen.symbolic.neighbours import Neighbours
+
+if TYPE_CHECKING:
+    from phigen.spec.grammar import Parser, Token
+
+
+@dataclass(frozen=True)
+class Indices:
+    """What may have an index, and which.
+
+    ``names`` maps what has a value at sites to that at the site itself; ``refused`` has messages and hints for names
+    that have none. On a grid an index says how far away; on a bond, ``ends`` are what it may be.
+    """
+
+    neighbours: Neighbours
+    names: Mapping[str, Expression]
+    refused: Mapping[str, tuple[str, str]] = field(default_factory=dict)
+    ends: tuple[str, ...] = ()
+
+    def read(self, parser: Parser, token: Token) -> Expression:
+        """The value of a name with an index; the parser stands on the bracket."""
+        opening = parser.advance()
+        if not (self.ends or self.neighbours.axes):
+            message = f"{token.text}[…]: sites of this lattice have no neighbours by index"
+            couples = "hamiltonian: {sites: …, bonds: …}, or pairs:, takes x[a] and x[b]"
+            raise parser.abandon(message, opening.index, couples)
+        if self.ends:
+            end = self._end(parser, opening)
+        else:
+            offset = self._offset(parser, opening)
+        value = self.names.get(token.text)
+        if value is None:
+            message, hint = self.refused.get(token.text) or parser.scope.unknown(token.text)
+            parser.report(message, token.index, hint)
+            return parser.scope.lookup(token.text) or parser.nothing
+        return self.neighbours.on(value, end) if self.ends else self.neighbours.shifted([value], offset)[0]
+
+    def _end(self, parser: Parser, opening: Token) -> str:
+        token = parser.advance()
+        if token.text not in self.ends:
+            message = f"the index {shown(token.text)} is no end of a bond or pair"
+            raise parser.abandon(message, token.index, "write [a] or [b]")
+        self._closed(parser, opening)
+        return token.text
+
+    def _offset(self, parser: Parser, opening: Token) -> tuple[int, ...]:
+        axes, found = self.neighbours.axes, dict[str, int]()
+        while True:
+            token = parser.advance()
+            if token.text not in axes:
+                raise parser.abandon(*self._no_axis(token))
+            if token.text in found:
+                raise parser.abandon(f"the axis {token.text!r} is in this index twice", token.index)
+            found[token.text] = self._step(parser)
+            if not parser.accept(","):
+                self._closed(parser, opening)
+                return tuple(found.get(axis, 0) for axis in axes)
+
+    def _no_axis(self, token: Token) -> tuple[str, int, str]:
+        axes = self.neighbours.axes
+        example = f"an index is an axis and a whole number: [{axes[0]}+1]"
+        if token.kind == "name":
+            listed = f"{'axes are' if len(axes) > 1 else 'the axis is'} {', '.join(axes)}"
+            return f"{shown(token.text)} is not an axis", token.index, did_you_mean(token.text, axes) or listed
+        if token.kind == "end":
+            return "this index is never closed", token.index, example
+        return f"the index begins with {shown(token.text)}, not with an axis", token.index, example
+
+    def _step(self, parser: Parser) -> int:
+        sign = parser.accept("+", "-")
+        if sign is None:
+            return 0
+        token = parser.advance()
+        if token.kind != "number" or not token.text.isdigit():
+            what = shown(token.text) if token.text else "nothing"
+            raise parser.abandon(f"the offset {what} is not a whole number", token.index, "offsets are 1, 2, …")
+        if len(token.text) > 4 or int(token.text) > limits.OFFSET:
+            message = f"the offset {token.text[:20]} is larger than the limit of {limits.OFFSET}"
+            raise parser.abandon(message, token.index, limit=True)
+        return int(token.text) if sign.text == "+" else -int(token.text)
+
+    def _closed(self, parser: Parser, opening: Token) -> None:
+        if parser.accept("]"):
+            return
+        if parser.here.kind == "end":
+            raise parser.abandon("this [ is never closed", opening.index)
+        message = f"unexpected {shown(parser.here.text)} in an index"
+        raise parser.abandon(message, parser.here.index, "an index is an axis and a whole number" * (not self.ends))

@@ -1,0 +1,161 @@
+"""The parts of a spec that only lattices have: relations of sites, densities, brackets along bonds, runs."""
+
+# `return reader.error(…)` reports and returns None, the value of what has an error.
+# mypy: disable-error-code="func-returns-value"
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+from phigen.spec import limits
+from phigen.spec.declarations import Declarations, Raw
+from phigen.spec.model import Lattice, LatticeRun, Values
+from phigen.spec.problems import counted, did_you_mean, shown
+from phigen.spec.values import values
+from phigen.spec.yaml_source import Scalar
+from phigen.symbolic.expression import ZERO, Expression, symbols_of
+
+KINDS = ("sites", "sum", "product")
+#: Densities of H by what they belong to, and the relation that they need.
+COUPLINGS = {"bonds": "graph", "pairs": "pairs"}
+_WANTED = {"graph": "lattice: {graph: NAME}", "pairs": "lattice: {pairs: all}"}
+
+
+def densities(given: Any, declared: Declarations) -> tuple[Expression, Expression]:
+    """H of a site, and of a bond or pair, from ``hamiltonian:``, an expression or a mapping."""
+    if not isinstance(given, dict):
+        return declared.formula(given, declared.scope()) or ZERO, ZERO
+    sites, coupling = declared.formula(given.get("sites"), declared.scope()), ZERO
+    for key, needed in COUPLINGS.items():
+        node = given.get(key)
+        if node is None:
+            continue
+        if declared.relation != needed:
+            declared.reader.error(node, f"hamiltonian: {key} needs {_WANTED[needed]}", "x[i+1] couples sites of a grid")
+        else:
+            coupling = declared.formula(node, declared.bond_scope()) or ZERO
+    if declared.lattice is None:
+        place = declared.reader.locations["hamiltonian",]
+        declared.reader.problems.add("hamiltonian: sites, bonds and pairs are for specs with lattice:", place)
+    return sites or ZERO, coupling
+
+
+def casimirs(given: Mapping[str, Any], declared: Declarations) -> tuple[dict[str, Expression], dict[str, str]]:
+    """The densities of Casimirs, and whether they belong to sites, to a sum or to a product, where the spec says it."""
+    found, kinds = {}, {}
+    for name, (key, entry) in given.items():
+        options = entry if isinstance(entry, dict) else {"value": entry}
+        value = declared.formula(options.get("value"), declared.scope())
+        if "at" in options:
+            kinds[name] = options["at"]
+            if declared.lattice is None:
+                declared.reader.error(key, f"{name}: at is for specs with lattice:", "give the expression alone")
+        if value is not None:
+            found[name] = value
+    return found, kinds
+
+
+def with_kinds(lattice: Lattice, casimirs: Mapping[str, Expression], kinds: Mapping[str, str], **parts: Any) -> Lattice:
+    """The lattice with what was read since; a Casimir without neighbours is one of each site unless the spec says."""
+    local = {name: "sum" if any("[" in s for s in symbols_of(e)) else "sites" for name, e in casimirs.items()}
+    return replace(lattice, kinds={**local, **kinds}, **parts)
+
+
+def run_of_lattice(name: str, raw: Raw, declared: Declarations) -> LatticeRun | None:
+    """What a run says of sizes, bonds, the initial state, and parameters that are arrays."""
+    if declared.lattice is None:
+        for key in ("sizes", "bonds"):
+            if key in raw:
+                _fail(name, key, f"{key} is for specs with lattice:", declared)
+        return None
+    for key in ("exact", "section"):
+        if key in raw:
+            _fail(name, key, f"{key} is not available for lattices", declared)
+    return LatticeRun(
+        _sizes(name, raw, declared), _state(name, raw.get("initial"), declared), _bonds(name, raw, declared)
+    )
+
+
+def _fail(name: str, key: str, message: str, declared: Declarations, hint: str = "") -> None:
+    declared.reader.problems.add(message, declared.reader.locations["runs", name, key], hint)
+
+
+def _sizes(name: str, raw: Raw, declared: Declarations) -> tuple[int, ...]:
+    sizes, axes = raw.get("sizes"), declared.lattice.axes if declared.lattice else ()
+    wanted = len(axes) or 1
+    if sizes is None:
+        if axes:
+            example = ", ".join(["32"] * wanted)
+            declared.reader.problems.add(
+                f"the run {name!r} has no sizes", declared.reader.locations["runs", name], f"sizes: [{example}]"
+            )
+        return ()
+    if len(sizes) != wanted:
+        what = f"{counted(wanted, 'axis', 'axes')} {', '.join(axes)}" if axes else "the number of sites"
+        _fail(name, "sizes", f"sizes: {counted(len(sizes), 'size')} for {what}", declared)
+    sites = 1
+    for size in sizes:
+        sites *= size or 1
+    if sites > limits.SITES:
+        place = declared.reader.locations["runs", name, "sizes"]
+        declared.reader.problems.add(f"sizes: {sites} sites, the limit is {limits.SITES}", place, limit=True)
+    return tuple(size or 1 for size in sizes)
+
+
+def _bonds(name: str, raw: Raw, declared: Declarations) -> tuple[tuple[int, int], ...] | str:
+    given = raw.get("bonds")
+    if declared.relation != "graph":
+        if given is not None:
+            _fail(name, "bonds", "bonds are for lattice: {graph: NAME}", declared)
+        return ()
+    if given is None:
+        place, hint = declared.reader.locations["runs", name], "bonds: edges.csv, or bonds: [[0, 1], [1, 2]]"
+        declared.reader.problems.add(f"the run {name!r} has no bonds", place, hint)
+        return ()
+    if isinstance(given, str):
+        if not given.endswith(".csv"):
+            _fail(name, "bonds", f"bonds: the file {shown(given)} must end in .csv", declared)
+        return given
+    pairs = []
+    for index, pair in enumerate(given):
+        if pair is None or None in pair:
+            continue
+        if len(pair) != 2 or pair[0] == pair[1]:
+            message = f"bonds: {pair} is no bond of two different sites"
+            declared.reader.problems.add(message, declared.reader.locations["runs", name, "bonds", index])
+        else:
+            pairs.append((pair[0], pair[1]))
+    return tuple(pairs)
+
+
+def _state(name: str, given: Any, declared: Declarations) -> dict[str, Values]:
+    """Initial values by field, or of all fields under the name ``""``."""
+    fields = declared.coordinates
+    if given is None:
+        return {}
+    if isinstance(given, Scalar):
+        if not given.text.endswith(".npy"):
+            hint = "initial: {…} by field, or {random: sphere, seed: 1}"
+            declared.reader.error(given, f"initial: the file {shown(given.text)} must end in .npy", hint)
+        return {"": Values(file=given.text)}
+    if isinstance(given, list):
+        if len(given) != len(fields) and not declared.incomplete:
+            _fail(
+                name,
+                "initial",
+                f"initial: {counted(len(given), 'value')} for {counted(len(fields), 'field')}",
+                declared,
+            )
+        found = {c: values(node, declared) for c, node in zip(fields, given, strict=False)}
+    elif "random" in given and "random" not in fields:
+        return {"": values(given, declared, whole=True) or Values()}
+    else:
+        for c, (key, _) in given.items():
+            if c not in fields and not declared.incomplete:
+                declared.reader.error(key, f"{shown(c)} is not a coordinate", did_you_mean(c, fields))
+        if missing := [c for c in fields if c not in given]:
+            _fail(name, "initial", f"initial: no value for {', '.join(missing[:10])}", declared)
+        found = {c: values(node, declared) for c, (_, node) in given.items()}
+    return {c: v for c, v in found.items() if v is not None}

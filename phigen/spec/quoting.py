@@ -1,0 +1,40 @@
+"""What of a line of YAML needs quotes because it has an index, ``x[i+1]``, inside { } or [ ]."""
+
+from __future__ import annotations
+
+
+def needs_quotes(line: str, column: int) -> bool:
+    """Whether YAML stumbled there over an index: a bracket right after a name."""
+    return column < len(line) and line[column] == "[" and (column > 0) and _ends_name(line[:column])
+
+
+def quoted(line: str) -> str:
+    """The line with quotes about the keys and values that contain an index."""
+    out, part, depth, index, quote = "", "", 0, False, ""
+    for position, character in enumerate(line + "\n"):
+        following = line[position + 1 : position + 2]
+        if quote:
+            quote = "" if character == quote else quote
+        elif character in "\"'" and not part.strip():
+            quote = character
+        elif index or (character == "[" and _ends_name(part)):
+            index = character != "]"
+        elif character in "()":
+            depth += 1 if character == "(" else -1
+        elif character == "\n" or (depth <= 0 and (character in "{}[]," or (character == ":" and following in " \n"))):
+            out, part = out + _finished(part) + character, ""
+            continue
+        part += character
+    return out.rstrip("\n")
+
+
+def _ends_name(text: str) -> bool:
+    return text[-1:].isalnum() or text[-1:] == "_"
+
+
+def _finished(part: str) -> str:
+    """A key or a value, between quotes if it has an index and none yet."""
+    inner = part.strip()
+    if "[" not in inner or inner[:1] in "\"'":
+        return part
+    return part.replace(inner, f'"{inner}"')

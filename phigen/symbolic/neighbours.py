@@ -1,0 +1,94 @@
+"""Symbols of what has a value at every site of a lattice, and where: ``x[i+1]``, ``x[i-1,j+2]``, ``x[a]``.
+
+On a grid the offset is steps along axes, in their order, zeros left out; ``x`` alone is x at the site itself. Where
+there are no axes, it is an end, a or b, of a bond or a pair. These are ordinary symbols, told apart by their text:
+brackets are in no name of a spec.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from phigen.symbolic.expression import Expression, substitute, symbol, symbols_of
+
+#: Where a site is, from another: steps along the axes of a grid; an end, ``("a",)`` or ``("b",)``, of a bond or a pair;
+#: ``()`` for the site itself where there are no axes.
+Offset = tuple[int, ...] | tuple[str, ...]
+#: What has a value at sites, and where.
+Place = tuple[str, Offset]
+ENDS = ("a", "b")
+
+_NEIGHBOUR = re.compile(r"(?P<name>[^\[\]]+)\[(?P<index>[^\[\]]+)\]")
+_STEP = re.compile(r"(?P<axis>.+?)(?P<step>[+-][0-9]+)")
+
+
+@dataclass(frozen=True)
+class Neighbours:
+    """The symbols of a lattice: ``names`` have a value at every site, ``axes`` are the directions of a grid."""
+
+    names: tuple[str, ...]
+    axes: tuple[str, ...] = ()
+
+    @property
+    def origin(self) -> Offset:
+        """The offset of the site itself."""
+        return (0,) * len(self.axes)
+
+    def at(self, name: str, offset: Offset) -> str:
+        """The symbol of a name at an offset."""
+        if self.axes:
+            index = [f"{a}{o:+d}" for a, o in zip(self.axes, steps(offset), strict=True) if o]
+        else:
+            index = [str(o) for o in offset]
+        return f"{name}[{','.join(index)}]" if index else name
+
+    def place(self, symbol_name: str) -> Place:
+        """The name of a symbol, and its offset. `KeyError` for a symbol that has no value at sites."""
+        match = _NEIGHBOUR.fullmatch(symbol_name)
+        base = match["name"] if match else symbol_name
+        if base not in self.names:
+            raise KeyError(f"{symbol_name!r} has no value at sites")
+        if match is None:
+            return base, self.origin
+        if not self.axes:
+            return base, (match["index"],)
+        found = dict.fromkeys(self.axes, 0)
+        for part in match["index"].split(","):
+            step = _STEP.fullmatch(part)
+            if step is None or step["axis"] not in found:
+                raise KeyError(f"{symbol_name!r} is at no offset of the axes {', '.join(self.axes)}")
+            found[step["axis"]] = int(step["step"])
+        return base, tuple(found.values())
+
+    def places(self, *expressions: Expression) -> dict[str, Place]:
+        """All symbols of expressions that have a value at sites, with their places."""
+        return {n: self.place(n) for n in symbols_of(*expressions) if n.partition("[")[0] in self.names}
+
+    def shifted(self, expressions: Sequence[Expression], offset: Offset) -> list[Expression]:
+        """The expressions as they are at the site that lies so far away on a grid."""
+        if not any(offset):
+            return list(expressions)
+        moved = {name: symbol(self.at(base, plus(o, offset))) for name, (base, o) in self.places(*expressions).items()}
+        return substitute(expressions, moved)
+
+    def on(self, expression: Expression, end: str) -> Expression:
+        """The density of a site as it is at one end of a bond or a pair."""
+        moved = {name: symbol(self.at(base, (end,))) for name, (base, _) in self.places(expression).items()}
+        return substitute([expression], moved)[0]
+
+
+def steps(offset: Offset) -> tuple[int, ...]:
+    """An offset of a grid."""
+    return tuple(int(o) for o in offset)
+
+
+def plus(a: Offset, b: Offset) -> tuple[int, ...]:
+    """The sum of two offsets of a grid."""
+    return tuple(x + y for x, y in zip(steps(a), steps(b), strict=True))
+
+
+def minus(a: Offset) -> tuple[int, ...]:
+    """The way back."""
+    return tuple(-o for o in steps(a))
