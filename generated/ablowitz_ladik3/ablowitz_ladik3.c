@@ -21,7 +21,7 @@
  *   4. The implicit step, along paths dm/dt = pi(m) p
  *   5. The solver
  *   6. Ensembles
- * body-sha256: 08842312f49610b254f18f3bd4061d7b78078581fe17c4f304d2fc37f59d7768
+ * body-sha256: 471f9c1c0a26660c3a1c9b0f6728c896952fab547936d25de8b21f5737b1e60f
  */
 #include "ablowitz_ladik3.h"
 
@@ -58,9 +58,9 @@ static void ablowitz_ladik3_generate(const double coef[3], const double y[6], do
     const double x1 = y[0], y1 = y[1], x2 = y[2], y2 = y[3], x3 = y[4], y3 = y[5];
     /* slope */
     const double t1 = coef[1] * x2, t2 = coef[1] * x3, t3 = y1 * y1, t4 = x1 * x1;
-    const double t5 = 1.0 / (t3 + (-1.0 + t4)), t6 = coef[1] * y3, t7 = coef[1] * y2;
-    const double t8 = coef[1] * x1, t9 = y2 * y2, t10 = x2 * x2, t11 = 1.0 / (t9 + (-1.0 + t10));
-    const double t12 = coef[1] * y1, t13 = y3 * y3, t14 = x3 * x3, t15 = 1.0 / (t13 + (-1.0 + t14));
+    const double t5 = 1.0 / (t3 + (-1.0 + t4)), t6 = coef[1] * y3, t7 = coef[1] * y2, t8 = coef[1] * x1;
+    const double t9 = y2 * y2, t10 = x2 * x2, t11 = 1.0 / (t9 + (-1.0 + t10)), t12 = coef[1] * y1;
+    const double t13 = y3 * y3, t14 = x3 * x3, t15 = 1.0 / (t13 + (-1.0 + t14));
     slope[0] = t1 + t2 + coef[0] * (x1 * t5);
     slope[1] = t6 + t7 + coef[0] * (y1 * t5);
     slope[2] = t8 + t2 + coef[0] * (x2 * t11);
@@ -68,9 +68,9 @@ static void ablowitz_ladik3_generate(const double coef[3], const double y[6], do
     slope[4] = t1 + t8 + coef[0] * (x3 * t15);
     slope[5] = t12 + t7 + coef[0] * (y3 * t15);
     /* jacobian */
-    const double t16 = 1.0 - t4, t17 = t3 - t16, t18 = coef[2] * (x1 * y1 * (t5 * t5));
-    const double t19 = t16 - t3, t20 = 1.0 - t10, t21 = t20 - t9, t22 = (-0.5) * (coef[1] * t21);
-    const double t23 = 1.0 - t14, t24 = t23 - t13, t25 = (-0.5) * (coef[1] * t24), t26 = t9 - t20;
+    const double t16 = 1.0 - t4, t17 = t3 - t16, t18 = coef[2] * (x1 * y1 * (t5 * t5)), t19 = t16 - t3;
+    const double t20 = 1.0 - t10, t21 = t20 - t9, t22 = (-0.5) * (coef[1] * t21), t23 = 1.0 - t14;
+    const double t24 = t23 - t13, t25 = (-0.5) * (coef[1] * t24), t26 = t9 - t20;
     const double t27 = (-0.5) * (coef[1] * t26), t28 = t13 - t23, t29 = (-0.5) * (coef[1] * t28);
     const double t30 = (-0.5) * (coef[1] * t19), t31 = coef[2] * (x2 * y2 * (t11 * t11));
     const double t32 = (-0.5) * (coef[1] * t17), t33 = coef[2] * (x3 * y3 * (t15 * t15));
@@ -112,7 +112,6 @@ static void ablowitz_ladik3_generate(const double coef[3], const double y[6], do
     jacobian[35] = 1.0 - 0.5 * (t24 * t33);
 }
 
-/* the Hamiltonian */
 double ablowitz_ladik3_hamiltonian(const ablowitz_ladik3_params *params, const double x[6])
 {
     (void)params;
@@ -122,13 +121,11 @@ double ablowitz_ladik3_hamiltonian(const ablowitz_ladik3_params *params, const d
     return log(1.0 - x3 * x3 - y3 * y3) + (log(1.0 - x2 * x2 - y2 * y2) + t1);
 }
 
-/* the Casimirs */
 void ablowitz_ladik3_casimirs(const ablowitz_ladik3_params *params, const double x[6], double out[])
 {
     (void)params, (void)x, (void)out;
 }
 
-/* pi(x) grad H(x) */
 void ablowitz_ladik3_vector_field(const ablowitz_ladik3_params *params, const double x[6], double out[6])
 {
     (void)params;
@@ -145,19 +142,18 @@ void ablowitz_ladik3_vector_field(const ablowitz_ladik3_params *params, const do
 }
 
 /* ---- Compensated sums, linear equations ---- */
-/* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to
-   its last bit: were it rounded with the change, corrections of one sign would add up to a drift. 0, and x as
-   before, if the sum is not finite. */
+/* x + change + small in compensated arithmetic, where small is the carry and what is as small: were that
+   rounded with the change, corrections of one sign would add up to a drift. 0, and x as before, if the sum is
+   not finite. */
 static int ablowitz_ladik3_advance(ablowitz_ladik3_solver *s, const double change[ablowitz_ladik3_DIM],
-    const double correction[ablowitz_ladik3_DIM])
+    const double small[ablowitz_ladik3_DIM])
 {
     double x[ablowitz_ladik3_DIM], carry[ablowitz_ladik3_DIM];
     for (int i = 0; i < ablowitz_ladik3_DIM; ++i) {
         const double sum = s->x[i] + change[i], added = sum - s->x[i];
-        const double lost = (s->x[i] - (sum - added)) + (change[i] - added);
-        const double small = lost + (s->carry[i] + correction[i]);
-        x[i] = sum + small;
-        carry[i] = small - (x[i] - sum);
+        const double lost = ((s->x[i] - (sum - added)) + (change[i] - added)) + small[i];
+        x[i] = sum + lost;
+        carry[i] = lost - (x[i] - sum);
         if (!isfinite(x[i])) return 0;
     }
     memcpy(s->x, x, sizeof x);
@@ -199,12 +195,10 @@ static int ablowitz_ladik3_solve(double matrix[ablowitz_ladik3_DIM * ablowitz_la
 }
 
 /* ---- Starting guesses ---- */
-/* How far from the last value a guess may be, in sizes of that value. */
-#define ablowitz_ladik3_REACH 4.0
+#define ablowitz_ladik3_REACH 4.0 /* how far from the last value a guess may be, in sizes of that value */
 
-/* The guess for the next value from the last ones: the sum of their backward differences. 0 if there is none,
-   or if it is far away, where the equation of a step has solutions that have nothing to do with the motion.
-   */
+/* The guess for the next value, the sum of differences. 0 if there is none, or if it is far away, where the
+   equation of a step has solutions that have nothing to do with the motion. */
 static int ablowitz_ladik3_predict(const ablowitz_ladik3_history *history, double value[ablowitz_ladik3_DIM])
 {
     double distance = 0.0, size = 0.0;
@@ -241,10 +235,8 @@ static void ablowitz_ladik3_remember(ablowitz_ladik3_history *history,
     if (history->count < ablowitz_ladik3_DIFFERENCES) ++history->count;
 }
 
-/* How far a step may lead, in sizes of the state and of what the vector field says, if the energy is lost;
-   and the part of the energy that counts as lost. */
-#define ablowitz_ladik3_PLAUSIBLE 1.5
-#define ablowitz_ladik3_LOST 0.5
+#define ablowitz_ladik3_PLAUSIBLE 1.5 /* how far any step may lead, in sizes of the state and of its motion */
+#define ablowitz_ladik3_LOST 0.5      /* part of the energy that one which leads farther must not lose */
 
 /* Whether an increment is that of the motion. Where the step is too large, the equation may have been solved
    by a point far away, at another energy, that has nothing to do with it. */
@@ -256,19 +248,18 @@ static int ablowitz_ladik3_plausible(const ablowitz_ladik3_solver *s, int stage,
     for (int i = 0; i < ablowitz_ladik3_DIM; ++i) {
         moved += fabs(increment[i]);
         size += fabs(s->x[i]);
-    }
-    if (moved <= ablowitz_ladik3_PLAUSIBLE * size) return 1;
-    ablowitz_ladik3_vector_field(&s->params, s->x, field);
-    for (int i = 0; i < ablowitz_ladik3_DIM; ++i) {
-        size += fabs(ablowitz_ladik3_fractions[stage] * s->h * field[i]);
         middle[i] = s->x[i] + 0.5 * increment[i];
         end[i] = s->x[i] + increment[i];
     }
     if (moved <= ablowitz_ladik3_PLAUSIBLE * size) return 1;
-    const double before = ablowitz_ladik3_hamiltonian(&s->params, s->x), after =
-        ablowitz_ladik3_hamiltonian(&s->params, end);
-    const double scale = fabs(before) + fabs(ablowitz_ladik3_hamiltonian(&s->params, middle)) + fabs(after);
-    return fabs(after - before) <= ablowitz_ladik3_LOST * scale;
+    ablowitz_ladik3_vector_field(&s->params, s->x, field);
+    for (int i = 0; i < ablowitz_ladik3_DIM; ++i)
+        size += fabs(ablowitz_ladik3_fractions[stage] * s->h * field[i]);
+    if (moved <= ablowitz_ladik3_PLAUSIBLE * size) return 1;
+    const double before = ablowitz_ladik3_hamiltonian(&s->params, s->x);
+    const double after = ablowitz_ladik3_hamiltonian(&s->params, end), between =
+        ablowitz_ladik3_hamiltonian(&s->params, middle);
+    return fabs(after - before) <= ablowitz_ladik3_LOST * (fabs(before) + fabs(between) + fabs(after));
 }
 
 /* Coefficient k of the product of two Taylor series. */
@@ -496,11 +487,11 @@ static int ablowitz_ladik3_differences(ablowitz_ladik3_solver *s, const double *
 }
 
 /* Solve p = grad S_h(mean of the path from x under p) and move to the end of that path. Where that takes more
-   than ablowitz_ladik3_MOST_PIECES pieces of paths, the step is so large that a solution would mean nothing.
-   */
+   than ablowitz_ladik3_MOST_PIECES pieces of paths, the step is so large that a solution would mean
+   nothing. */
 static ablowitz_ladik3_status ablowitz_ladik3_attempt(ablowitz_ladik3_solver *s, int stage)
 {
-    const double *coef = s->coef[stage], none[ablowitz_ladik3_DIM] = { 0.0 };
+    const double *coef = s->coef[stage];
     double p[ablowitz_ladik3_DIM], y[ablowitz_ladik3_DIM], residual[ablowitz_ladik3_DIM],
         change[ablowitz_ladik3_DIM], jacobian[ablowitz_ladik3_DIM * ablowitz_ladik3_DIM], previous = HUGE_VAL;
     if (!ablowitz_ladik3_predict(&s->history[stage], y)) memcpy(y, s->x, sizeof y);
@@ -519,7 +510,7 @@ static ablowitz_ladik3_status ablowitz_ladik3_attempt(ablowitz_ladik3_solver *s,
         /* The second test: residuals no longer shrink, the solve has reached the level of rounding. */
         if (size <= 4e-16 || (previous < 1e-12 && size > 0.25 * previous)) {
             if (!ablowitz_ladik3_plausible(s, stage, change)) return ablowitz_ladik3_NO_CONVERGENCE;
-            if (!ablowitz_ladik3_advance(s, change, none)) return ablowitz_ladik3_NOT_FINITE;
+            if (!ablowitz_ladik3_advance(s, change, s->carry)) return ablowitz_ladik3_NOT_FINITE;
             ablowitz_ladik3_remember(&s->history[stage], y);
             return ablowitz_ladik3_OK;
         }
@@ -534,19 +525,17 @@ static ablowitz_ladik3_status ablowitz_ladik3_attempt(ablowitz_ladik3_solver *s,
 }
 
 /* ---- The solver ---- */
-/* The arguments may be parts of *s: they are read before it is written. */
+/* The arguments may be parts of *s, which is therefore written last. */
 ablowitz_ladik3_status ablowitz_ladik3_init(ablowitz_ladik3_solver *s, const ablowitz_ladik3_params *params,
     const double x0[ablowitz_ladik3_DIM])
 {
     if (s == NULL || x0 == NULL) return ablowitz_ladik3_BAD_ARGUMENT;
-    const ablowitz_ladik3_params own = params != NULL ? *params : ablowitz_ladik3_default_params;
-    double x[ablowitz_ladik3_DIM];
-    memcpy(x, x0, sizeof x);
+    ablowitz_ladik3_solver fresh = { .h = (double)NAN };
+    fresh.params = params != NULL ? *params : ablowitz_ladik3_default_params;
+    memcpy(fresh.x, x0, sizeof fresh.x);
     for (int i = 0; i < ablowitz_ladik3_DIM; ++i)
-        if (!isfinite(x[i])) return ablowitz_ladik3_BAD_ARGUMENT;
-    memset(s, 0, sizeof *s);
-    memcpy(s->x, x, sizeof s->x);
-    s->params = own;
+        if (!isfinite(fresh.x[i])) return ablowitz_ladik3_BAD_ARGUMENT;
+    *s = fresh;
     return ablowitz_ladik3_OK;
 }
 
@@ -554,26 +543,23 @@ ablowitz_ladik3_status ablowitz_ladik3_init(ablowitz_ladik3_solver *s, const abl
 static ablowitz_ladik3_status ablowitz_ladik3_set_step(ablowitz_ladik3_solver *s, double h)
 {
     if (s == NULL || !isfinite(h)) return ablowitz_ladik3_BAD_ARGUMENT;
-    if (s->prepared && memcmp(&h, &s->h, sizeof h) == 0) return ablowitz_ladik3_OK;
+    if (memcmp(&h, &s->h, sizeof h) == 0) return ablowitz_ladik3_OK;
     for (int stage = 0; stage < ablowitz_ladik3_STAGES; ++stage)
         ablowitz_ladik3_prepare(&s->params, ablowitz_ladik3_fractions[stage] * h, s->coef[stage]);
     memset(&s->history, 0, sizeof s->history);
     s->h = h;
     s->t_before_h = s->t;
     s->steps_before_h = s->steps;
-    s->prepared = 1;
     return ablowitz_ladik3_OK;
 }
 
 /* One stage. A guess from earlier steps may have misled it: then once more without. */
 static ablowitz_ladik3_status ablowitz_ladik3_stage(ablowitz_ladik3_solver *s, int stage)
 {
-    ablowitz_ladik3_status status = ablowitz_ladik3_attempt(s, stage);
-    if (status != ablowitz_ladik3_OK && s->history[stage].count > 0) {
-        memset(&s->history[stage], 0, sizeof s->history[stage]);
-        status = ablowitz_ladik3_attempt(s, stage);
-    }
-    return status;
+    const ablowitz_ladik3_status status = ablowitz_ladik3_attempt(s, stage);
+    if (status == ablowitz_ladik3_OK || s->history[stage].count == 0) return status;
+    memset(&s->history[stage], 0, sizeof s->history[stage]);
+    return ablowitz_ladik3_attempt(s, stage);
 }
 
 /* The stages of one step. If one fails, the state is as before the step. */
@@ -592,23 +578,20 @@ static ablowitz_ladik3_status ablowitz_ladik3_stages(ablowitz_ladik3_solver *s)
     return status;
 }
 
-ablowitz_ladik3_status ablowitz_ladik3_step(ablowitz_ladik3_solver *s, double h)
-{
-    ablowitz_ladik3_status status = ablowitz_ladik3_set_step(s, h);
-    if (status != ablowitz_ladik3_OK) return status;
-    status = ablowitz_ladik3_stages(s);
-    if (status != ablowitz_ladik3_OK) return status;
-    ++s->steps;
-    s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
-    return status;
-}
-
 ablowitz_ladik3_status ablowitz_ladik3_integrate(ablowitz_ladik3_solver *s, double h, size_t steps)
 {
     ablowitz_ladik3_status status = ablowitz_ladik3_set_step(s, h);
-    for (; steps > 0 && status == ablowitz_ladik3_OK; --steps) status = ablowitz_ladik3_step(s, h);
+    for (; steps > 0 && status == ablowitz_ladik3_OK; --steps) {
+        status = ablowitz_ladik3_stages(s);
+        if (status != ablowitz_ladik3_OK) break;
+        ++s->steps;
+        s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
+    }
     return status;
 }
+
+ablowitz_ladik3_status ablowitz_ladik3_step(ablowitz_ladik3_solver *s,
+    double h) { return ablowitz_ladik3_integrate(s, h, 1); }
 
 const char *ablowitz_ladik3_status_string(ablowitz_ladik3_status status)
 {
@@ -623,7 +606,6 @@ const char *ablowitz_ladik3_status_string(ablowitz_ladik3_status status)
 }
 
 size_t ablowitz_ladik3_solver_size(void) { return sizeof(ablowitz_ladik3_solver); }
-
 size_t ablowitz_ladik3_solver_steps_done(const ablowitz_ladik3_solver *s) { return s->steps; }
 
 /* ---- Ensembles ---- */

@@ -20,7 +20,7 @@
  *   4. The implicit step, along paths dm/dt = pi(m) p
  *   5. The solver
  *   6. Ensembles
- * body-sha256: 7d9d841ce428b4e4162f3de5b06c7217b5183874158985cf2b0c035dadd30ef4
+ * body-sha256: ef379ff533f79868a8fde87c9d7321150bedf3f70f84611963480c649bcc7a5b
  */
 #include "charged_particle.h"
 
@@ -124,7 +124,6 @@ static void charged_particle_generate(const double coef[14], const double y[6], 
     jacobian[35] = 1.0;
 }
 
-/* the Hamiltonian */
 double charged_particle_hamiltonian(const charged_particle_params *params, const double x[6])
 {
     (void)params;
@@ -132,13 +131,11 @@ double charged_particle_hamiltonian(const charged_particle_params *params, const
     return 1.0 / 10.0 * (2.0 * (z * z) + (x_ * x_ + y * y)) + 0.5 * (w * w + (v * v + u * u));
 }
 
-/* the Casimirs */
 void charged_particle_casimirs(const charged_particle_params *params, const double x[6], double out[])
 {
     (void)params, (void)x, (void)out;
 }
 
-/* pi(x) grad H(x) */
 void charged_particle_vector_field(const charged_particle_params *params, const double x[6], double out[6])
 {
     (void)params;
@@ -153,19 +150,18 @@ void charged_particle_vector_field(const charged_particle_params *params, const 
 }
 
 /* ---- Compensated sums, linear equations ---- */
-/* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to
-   its last bit: were it rounded with the change, corrections of one sign would add up to a drift. 0, and x as
-   before, if the sum is not finite. */
+/* x + change + small in compensated arithmetic, where small is the carry and what is as small: were that
+   rounded with the change, corrections of one sign would add up to a drift. 0, and x as before, if the sum is
+   not finite. */
 static int charged_particle_advance(charged_particle_solver *s, const double change[charged_particle_DIM],
-    const double correction[charged_particle_DIM])
+    const double small[charged_particle_DIM])
 {
     double x[charged_particle_DIM], carry[charged_particle_DIM];
     for (int i = 0; i < charged_particle_DIM; ++i) {
         const double sum = s->x[i] + change[i], added = sum - s->x[i];
-        const double lost = (s->x[i] - (sum - added)) + (change[i] - added);
-        const double small = lost + (s->carry[i] + correction[i]);
-        x[i] = sum + small;
-        carry[i] = small - (x[i] - sum);
+        const double lost = ((s->x[i] - (sum - added)) + (change[i] - added)) + small[i];
+        x[i] = sum + lost;
+        carry[i] = lost - (x[i] - sum);
         if (!isfinite(x[i])) return 0;
     }
     memcpy(s->x, x, sizeof x);
@@ -207,12 +203,10 @@ static int charged_particle_solve(double matrix[charged_particle_DIM * charged_p
 }
 
 /* ---- Starting guesses ---- */
-/* How far from the last value a guess may be, in sizes of that value. */
-#define charged_particle_REACH 4.0
+#define charged_particle_REACH 4.0 /* how far from the last value a guess may be, in sizes of that value */
 
-/* The guess for the next value from the last ones: the sum of their backward differences. 0 if there is none,
-   or if it is far away, where the equation of a step has solutions that have nothing to do with the motion.
-   */
+/* The guess for the next value, the sum of differences. 0 if there is none, or if it is far away, where the
+   equation of a step has solutions that have nothing to do with the motion. */
 static int charged_particle_predict(const charged_particle_history *history,
     double value[charged_particle_DIM])
 {
@@ -250,10 +244,9 @@ static void charged_particle_remember(charged_particle_history *history,
     if (history->count < charged_particle_DIFFERENCES) ++history->count;
 }
 
-/* How far a step may lead, in sizes of the state and of what the vector field says, if the energy is lost;
-   and the part of the energy that counts as lost. */
+/* how far any step may lead, in sizes of the state and of its motion */
 #define charged_particle_PLAUSIBLE 1.5
-#define charged_particle_LOST 0.5
+#define charged_particle_LOST 0.5 /* part of the energy that one which leads farther must not lose */
 
 /* Whether an increment is that of the motion. Where the step is too large, the equation may have been solved
    by a point far away, at another energy, that has nothing to do with it. */
@@ -265,19 +258,17 @@ static int charged_particle_plausible(const charged_particle_solver *s,
     for (int i = 0; i < charged_particle_DIM; ++i) {
         moved += fabs(increment[i]);
         size += fabs(s->x[i]);
-    }
-    if (moved <= charged_particle_PLAUSIBLE * size) return 1;
-    charged_particle_vector_field(&s->params, s->x, field);
-    for (int i = 0; i < charged_particle_DIM; ++i) {
-        size += fabs(s->h * field[i]);
         middle[i] = s->x[i] + 0.5 * increment[i];
         end[i] = s->x[i] + increment[i];
     }
     if (moved <= charged_particle_PLAUSIBLE * size) return 1;
-    const double before = charged_particle_hamiltonian(&s->params, s->x), after =
-        charged_particle_hamiltonian(&s->params, end);
-    const double scale = fabs(before) + fabs(charged_particle_hamiltonian(&s->params, middle)) + fabs(after);
-    return fabs(after - before) <= charged_particle_LOST * scale;
+    charged_particle_vector_field(&s->params, s->x, field);
+    for (int i = 0; i < charged_particle_DIM; ++i) size += fabs(s->h * field[i]);
+    if (moved <= charged_particle_PLAUSIBLE * size) return 1;
+    const double before = charged_particle_hamiltonian(&s->params, s->x);
+    const double after = charged_particle_hamiltonian(&s->params, end), between =
+        charged_particle_hamiltonian(&s->params, middle);
+    return fabs(after - before) <= charged_particle_LOST * (fabs(before) + fabs(between) + fabs(after));
 }
 
 /* Coefficient k of the product of two Taylor series. */
@@ -484,11 +475,11 @@ static int charged_particle_differences(charged_particle_solver *s, const double
 }
 
 /* Solve p = grad S_h(mean of the path from x under p) and move to the end of that path. Where that takes more
-   than charged_particle_MOST_PIECES pieces of paths, the step is so large that a solution would mean nothing.
-   */
+   than charged_particle_MOST_PIECES pieces of paths, the step is so large that a solution would mean
+   nothing. */
 static charged_particle_status charged_particle_attempt(charged_particle_solver *s)
 {
-    const double *coef = s->coef, none[charged_particle_DIM] = { 0.0 };
+    const double *coef = s->coef;
     double p[charged_particle_DIM], y[charged_particle_DIM], residual[charged_particle_DIM],
         change[charged_particle_DIM], jacobian[charged_particle_DIM * charged_particle_DIM], previous =
         HUGE_VAL;
@@ -508,7 +499,7 @@ static charged_particle_status charged_particle_attempt(charged_particle_solver 
         /* The second test: residuals no longer shrink, the solve has reached the level of rounding. */
         if (size <= 4e-16 || (previous < 1e-12 && size > 0.25 * previous)) {
             if (!charged_particle_plausible(s, change)) return charged_particle_NO_CONVERGENCE;
-            if (!charged_particle_advance(s, change, none)) return charged_particle_NOT_FINITE;
+            if (!charged_particle_advance(s, change, s->carry)) return charged_particle_NOT_FINITE;
             charged_particle_remember(&s->history, y);
             return charged_particle_OK;
         }
@@ -523,19 +514,17 @@ static charged_particle_status charged_particle_attempt(charged_particle_solver 
 }
 
 /* ---- The solver ---- */
-/* The arguments may be parts of *s: they are read before it is written. */
+/* The arguments may be parts of *s, which is therefore written last. */
 charged_particle_status charged_particle_init(charged_particle_solver *s,
     const charged_particle_params *params, const double x0[charged_particle_DIM])
 {
     if (s == NULL || x0 == NULL) return charged_particle_BAD_ARGUMENT;
-    const charged_particle_params own = params != NULL ? *params : charged_particle_default_params;
-    double x[charged_particle_DIM];
-    memcpy(x, x0, sizeof x);
+    charged_particle_solver fresh = { .h = (double)NAN };
+    fresh.params = params != NULL ? *params : charged_particle_default_params;
+    memcpy(fresh.x, x0, sizeof fresh.x);
     for (int i = 0; i < charged_particle_DIM; ++i)
-        if (!isfinite(x[i])) return charged_particle_BAD_ARGUMENT;
-    memset(s, 0, sizeof *s);
-    memcpy(s->x, x, sizeof s->x);
-    s->params = own;
+        if (!isfinite(fresh.x[i])) return charged_particle_BAD_ARGUMENT;
+    *s = fresh;
     return charged_particle_OK;
 }
 
@@ -543,44 +532,38 @@ charged_particle_status charged_particle_init(charged_particle_solver *s,
 static charged_particle_status charged_particle_set_step(charged_particle_solver *s, double h)
 {
     if (s == NULL || !isfinite(h)) return charged_particle_BAD_ARGUMENT;
-    if (s->prepared && memcmp(&h, &s->h, sizeof h) == 0) return charged_particle_OK;
+    if (memcmp(&h, &s->h, sizeof h) == 0) return charged_particle_OK;
     charged_particle_prepare(&s->params, h, s->coef);
     memset(&s->history, 0, sizeof s->history);
     s->h = h;
     s->t_before_h = s->t;
     s->steps_before_h = s->steps;
-    s->prepared = 1;
     return charged_particle_OK;
 }
 
 /* One stage. A guess from earlier steps may have misled it: then once more without. */
 static charged_particle_status charged_particle_stage(charged_particle_solver *s)
 {
-    charged_particle_status status = charged_particle_attempt(s);
-    if (status != charged_particle_OK && s->history.count > 0) {
-        memset(&s->history, 0, sizeof s->history);
-        status = charged_particle_attempt(s);
-    }
-    return status;
-}
-
-charged_particle_status charged_particle_step(charged_particle_solver *s, double h)
-{
-    charged_particle_status status = charged_particle_set_step(s, h);
-    if (status != charged_particle_OK) return status;
-    status = charged_particle_stage(s);
-    if (status != charged_particle_OK) return status;
-    ++s->steps;
-    s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
-    return status;
+    const charged_particle_status status = charged_particle_attempt(s);
+    if (status == charged_particle_OK || s->history.count == 0) return status;
+    memset(&s->history, 0, sizeof s->history);
+    return charged_particle_attempt(s);
 }
 
 charged_particle_status charged_particle_integrate(charged_particle_solver *s, double h, size_t steps)
 {
     charged_particle_status status = charged_particle_set_step(s, h);
-    for (; steps > 0 && status == charged_particle_OK; --steps) status = charged_particle_step(s, h);
+    for (; steps > 0 && status == charged_particle_OK; --steps) {
+        status = charged_particle_stage(s);
+        if (status != charged_particle_OK) break;
+        ++s->steps;
+        s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
+    }
     return status;
 }
+
+charged_particle_status charged_particle_step(charged_particle_solver *s,
+    double h) { return charged_particle_integrate(s, h, 1); }
 
 const char *charged_particle_status_string(charged_particle_status status)
 {
@@ -595,7 +578,6 @@ const char *charged_particle_status_string(charged_particle_status status)
 }
 
 size_t charged_particle_solver_size(void) { return sizeof(charged_particle_solver); }
-
 size_t charged_particle_solver_steps_done(const charged_particle_solver *s) { return s->steps; }
 
 /* ---- Ensembles ---- */

@@ -20,7 +20,7 @@
  *   4. The implicit step, by Newton's method
  *   5. The solver
  *   6. Ensembles
- * body-sha256: adc5ca6be5a0f33e4beabf5b8b2775ad9976be43ce3306c97a765157875d992c
+ * body-sha256: 1189fca892709e25bc9a1778a37a62d861f2db16c3b58064eb0d0b11198b5c76
  */
 #include "cyclotron.h"
 
@@ -32,9 +32,7 @@
 const cyclotron_params cyclotron_default_params = { 0 };
 
 enum { cyclotron_MAX_ITERATIONS = 20 }; /* of an inner solve */
-
-/* A correction is accepted when the error that it leaves is estimated to be below this. */
-#define cyclotron_TOLERANCE 1e-20
+#define cyclotron_TOLERANCE 1e-20       /* the error that an accepted correction may leave, as estimated */
 
 /* everything that depends on parameters and step size only */
 static void cyclotron_prepare(const cyclotron_params *params, double h, double coef[restrict 3])
@@ -53,9 +51,7 @@ static void cyclotron_linearise(const double coef[3], const double y[3], double 
 {
     const double u = y[0], v = y[1], b = y[2];
     /* momenta */
-    const double t1 = coef[0] + coef[1] * (b * b);
-    const double p_v = v * t1;
-    const double p_u = u * t1;
+    const double t1 = coef[0] + coef[1] * (b * b), p_v = v * t1, p_u = u * t1;
     /* displacement */
     const double t2 = b * p_v, t3 = b * p_u;
     displacement[0] = (-0.5) * t2;
@@ -88,25 +84,6 @@ static void cyclotron_linearise(const double coef[3], const double y[3], double 
     increment_jacobian[8] = 0.0;
 }
 
-/* elimination without pivoting: the solution, and the reciprocals of the pivots */
-static void cyclotron_eliminate(const double matrix[9], const double side[3], double solution[restrict 3],
-    double reciprocal[restrict 3])
-{
-    /* solution */
-    const double t1 = 1.0 / matrix[0], t2 = 1.0 / matrix[8];
-    const double t3 = side[0] - side[2] * (matrix[2] * t2), t4 = matrix[3] * t1;
-    const double t5 = 1.0 / (matrix[4] - matrix[1] * t4);
-    const double t6 = t5 * (side[1] - side[2] * (matrix[5] * t2) - t4 * t3);
-    solution[0] = t1 * (t3 - matrix[1] * t6);
-    solution[1] = t6;
-    solution[2] = side[2] * t2;
-    /* reciprocal */
-    reciprocal[0] = t1;
-    reciprocal[1] = t5;
-    reciprocal[2] = t2;
-}
-
-/* the Hamiltonian */
 double cyclotron_hamiltonian(const cyclotron_params *params, const double x[3])
 {
     (void)params;
@@ -114,7 +91,6 @@ double cyclotron_hamiltonian(const cyclotron_params *params, const double x[3])
     return 0.5 * (v * v + u * u);
 }
 
-/* the Casimirs */
 void cyclotron_casimirs(const cyclotron_params *params, const double x[3], double out[])
 {
     (void)params;
@@ -122,7 +98,6 @@ void cyclotron_casimirs(const cyclotron_params *params, const double x[3], doubl
     out[0] = b;
 }
 
-/* pi(x) grad H(x) */
 void cyclotron_vector_field(const cyclotron_params *params, const double x[3], double out[3])
 {
     (void)params;
@@ -133,19 +108,18 @@ void cyclotron_vector_field(const cyclotron_params *params, const double x[3], d
 }
 
 /* ---- Compensated sums, linear equations ---- */
-/* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to
-   its last bit: were it rounded with the change, corrections of one sign would add up to a drift. 0, and x as
-   before, if the sum is not finite. */
+/* x + change + small in compensated arithmetic, where small is the carry and what is as small: were that
+   rounded with the change, corrections of one sign would add up to a drift. 0, and x as before, if the sum is
+   not finite. */
 static int cyclotron_advance(cyclotron_solver *s, const double change[cyclotron_DIM],
-    const double correction[cyclotron_DIM])
+    const double small[cyclotron_DIM])
 {
     double x[cyclotron_DIM], carry[cyclotron_DIM];
     for (int i = 0; i < cyclotron_DIM; ++i) {
         const double sum = s->x[i] + change[i], added = sum - s->x[i];
-        const double lost = (s->x[i] - (sum - added)) + (change[i] - added);
-        const double small = lost + (s->carry[i] + correction[i]);
-        x[i] = sum + small;
-        carry[i] = small - (x[i] - sum);
+        const double lost = ((s->x[i] - (sum - added)) + (change[i] - added)) + small[i];
+        x[i] = sum + lost;
+        carry[i] = lost - (x[i] - sum);
         if (!isfinite(x[i])) return 0;
     }
     memcpy(s->x, x, sizeof x);
@@ -153,28 +127,41 @@ static int cyclotron_advance(cyclotron_solver *s, const double change[cyclotron_
     return 1;
 }
 
-/* Newton matrices are I + O(h): a pivot whose reciprocal is larger than this is far from 1. */
-#define cyclotron_LARGEST_RECIPROCAL 1e3
-
-/* Solve matrix * solution = side, both overwritten. The matrix is I + O(h): 0 if a pivot is far from 1. */
+/* Solve matrix * solution = side, both overwritten, by elimination with partial pivoting. 0 if singular. */
 static int cyclotron_solve(double matrix[cyclotron_DIM * cyclotron_DIM], double side[cyclotron_DIM])
 {
-    double solution[cyclotron_DIM], reciprocal[cyclotron_DIM], largest = 0.0;
-    cyclotron_eliminate(matrix, side, solution, reciprocal);
-    for (int i = 0; i < cyclotron_DIM; ++i)
-        if (!(fabs(reciprocal[i]) <= largest)) largest = fabs(reciprocal[i]);
-    if (!(largest < cyclotron_LARGEST_RECIPROCAL)) return 0;
-    memcpy(side, solution, sizeof solution);
+    for (int k = 0; k < cyclotron_DIM; ++k) {
+        int best = k;
+        for (int i = k + 1; i < cyclotron_DIM; ++i)
+            if (fabs(matrix[i * cyclotron_DIM + k]) > fabs(matrix[best * cyclotron_DIM + k])) best = i;
+        const double pivot = matrix[best * cyclotron_DIM + k], last = side[k];
+        if (!(fabs(pivot) > 0.0)) return 0;
+        for (int j = k; j < cyclotron_DIM && best != k; ++j) {
+            const double swap = matrix[k * cyclotron_DIM + j];
+            matrix[k * cyclotron_DIM + j] = matrix[best * cyclotron_DIM + j];
+            matrix[best * cyclotron_DIM + j] = swap;
+        }
+        side[k] = side[best];
+        side[best] = last;
+        for (int i = k + 1; i < cyclotron_DIM; ++i) {
+            const double factor = matrix[i * cyclotron_DIM + k] / pivot;
+            for (int j = k + 1; j < cyclotron_DIM; ++j)
+                matrix[i * cyclotron_DIM + j] -= factor * matrix[k * cyclotron_DIM + j];
+            side[i] -= factor * side[k];
+        }
+    }
+    for (int i = cyclotron_DIM - 1; i >= 0; --i) {
+        for (int j = i + 1; j < cyclotron_DIM; ++j) side[i] -= matrix[i * cyclotron_DIM + j] * side[j];
+        side[i] /= matrix[i * cyclotron_DIM + i];
+    }
     return 1;
 }
 
 /* ---- Starting guesses ---- */
-/* How far from the last value a guess may be, in sizes of that value. */
-#define cyclotron_REACH 4.0
+#define cyclotron_REACH 4.0 /* how far from the last value a guess may be, in sizes of that value */
 
-/* The guess for the next value from the last ones: the sum of their backward differences. 0 if there is none,
-   or if it is far away, where the equation of a step has solutions that have nothing to do with the motion.
-   */
+/* The guess for the next value, the sum of differences. 0 if there is none, or if it is far away, where the
+   equation of a step has solutions that have nothing to do with the motion. */
 static int cyclotron_predict(const cyclotron_history *history, double value[cyclotron_DIM])
 {
     double distance = 0.0, size = 0.0;
@@ -210,10 +197,8 @@ static void cyclotron_remember(cyclotron_history *history, const double value[cy
     if (history->count < cyclotron_DIFFERENCES) ++history->count;
 }
 
-/* How far a step may lead, in sizes of the state and of what the vector field says, if the energy is lost;
-   and the part of the energy that counts as lost. */
-#define cyclotron_PLAUSIBLE 1.5
-#define cyclotron_LOST 0.5
+#define cyclotron_PLAUSIBLE 1.5 /* how far any step may lead, in sizes of the state and of its motion */
+#define cyclotron_LOST 0.5      /* part of the energy that one which leads farther must not lose */
 
 /* Whether an increment is that of the motion. Where the step is too large, the equation may have been solved
    by a point far away, at another energy, that has nothing to do with it. */
@@ -223,24 +208,21 @@ static int cyclotron_plausible(const cyclotron_solver *s, const double increment
     for (int i = 0; i < cyclotron_DIM; ++i) {
         moved += fabs(increment[i]);
         size += fabs(s->x[i]);
-    }
-    if (moved <= cyclotron_PLAUSIBLE * size) return 1;
-    cyclotron_vector_field(&s->params, s->x, field);
-    for (int i = 0; i < cyclotron_DIM; ++i) {
-        size += fabs(s->h * field[i]);
         middle[i] = s->x[i] + 0.5 * increment[i];
         end[i] = s->x[i] + increment[i];
     }
     if (moved <= cyclotron_PLAUSIBLE * size) return 1;
-    const double before = cyclotron_hamiltonian(&s->params, s->x), after = cyclotron_hamiltonian(&s->params,
-        end);
-    const double scale = fabs(before) + fabs(cyclotron_hamiltonian(&s->params, middle)) + fabs(after);
-    return fabs(after - before) <= cyclotron_LOST * scale;
+    cyclotron_vector_field(&s->params, s->x, field);
+    for (int i = 0; i < cyclotron_DIM; ++i) size += fabs(s->h * field[i]);
+    if (moved <= cyclotron_PLAUSIBLE * size) return 1;
+    const double before = cyclotron_hamiltonian(&s->params, s->x);
+    const double after = cyclotron_hamiltonian(&s->params, end), between = cyclotron_hamiltonian(&s->params,
+        middle);
+    return fabs(after - before) <= cyclotron_LOST * (fabs(before) + fabs(between) + fabs(after));
 }
 
 /* ---- The implicit step, by Newton's method ---- */
-/* Components of y are measured no finer than by this part of the largest. */
-#define cyclotron_FLOOR 1e-6
+#define cyclotron_FLOOR 1e-6 /* components of y are measured no finer than by this part of the largest */
 
 /* Size of a correction relative to each component of y; NaN or infinite if the correction is. */
 static double cyclotron_size(const double y[cyclotron_DIM], const double delta[cyclotron_DIM])
@@ -255,9 +237,8 @@ static double cyclotron_size(const double y[cyclotron_DIM], const double delta[c
     return size;
 }
 
-/* Corrections below the first that shrink by less than the second have reached the level of rounding. */
-#define cyclotron_NEARLY_SOLVED 1e-8
-#define cyclotron_SHRINKING 0.25
+#define cyclotron_NEARLY_SOLVED 1e-8 /* corrections below this have reached the level of rounding, ... */
+#define cyclotron_SHRINKING 0.25     /* ... if one is more than this part of the one before */
 
 /* Solve (y - x) + displacement(y) = 0 for y by Newton's method from the extrapolated guess, and advance. The
    increment is corrected to first order by the last Newton correction, so that correction costs no
@@ -266,13 +247,14 @@ static double cyclotron_size(const double y[cyclotron_DIM], const double delta[c
 static cyclotron_status cyclotron_attempt(cyclotron_solver *s)
 {
     double y[cyclotron_DIM], delta[cyclotron_DIM], displacement[cyclotron_DIM], increment[cyclotron_DIM];
-    double jacobian[cyclotron_DIM * cyclotron_DIM], increment_jacobian[cyclotron_DIM * cyclotron_DIM],
-        previous = HUGE_VAL;
+    double jacobian[cyclotron_DIM * cyclotron_DIM], increment_jacobian[cyclotron_DIM * cyclotron_DIM];
+    double previous = HUGE_VAL;
     if (!cyclotron_predict(&s->history, y)) memcpy(y, s->x, sizeof y);
     for (int iteration = 1; iteration <= cyclotron_MAX_ITERATIONS; ++iteration) {
         cyclotron_linearise(s->coef, y, displacement, increment, jacobian, increment_jacobian);
         ++s->evaluations;
-        for (int i = 0; i < cyclotron_DIM; ++i) delta[i] = ((y[i] - s->x[i]) + displacement[i]) - s->carry[i];
+        for (int i = 0; i < cyclotron_DIM; ++i)
+            delta[i] = ((y[i] - s->x[i]) + displacement[i]) - s->carry[i];
         const int regular = cyclotron_solve(jacobian, delta);
         const double size = cyclotron_size(y, delta), growth = size / (previous * previous);
         if (!isfinite(size)) return cyclotron_NOT_FINITE;
@@ -282,12 +264,14 @@ static cyclotron_status cyclotron_attempt(cyclotron_solver *s)
         const int stalled = previous < cyclotron_NEARLY_SOLVED && size > cyclotron_SHRINKING * previous;
         previous = size;
         if (!(remaining <= cyclotron_TOLERANCE || stalled)) continue;
-        double correction[cyclotron_DIM] = { 0.0 };
-        for (int i = 0; i < cyclotron_DIM; ++i)
+        double small[cyclotron_DIM] = { 0.0 }; /* the correction of the increment, and the carry */
+        for (int i = 0; i < cyclotron_DIM; ++i) {
             for (int j = 0; j < cyclotron_DIM; ++j)
-                correction[i] -= increment_jacobian[i * cyclotron_DIM + j] * delta[j];
+                small[i] -= increment_jacobian[i * cyclotron_DIM + j] * delta[j];
+            small[i] += s->carry[i];
+        }
         if (!cyclotron_plausible(s, increment)) return cyclotron_NO_CONVERGENCE;
-        if (!cyclotron_advance(s, increment, correction)) return cyclotron_NOT_FINITE;
+        if (!cyclotron_advance(s, increment, small)) return cyclotron_NOT_FINITE;
         cyclotron_remember(&s->history, y);
         return cyclotron_OK;
     }
@@ -295,19 +279,17 @@ static cyclotron_status cyclotron_attempt(cyclotron_solver *s)
 }
 
 /* ---- The solver ---- */
-/* The arguments may be parts of *s: they are read before it is written. */
+/* The arguments may be parts of *s, which is therefore written last. */
 cyclotron_status cyclotron_init(cyclotron_solver *s, const cyclotron_params *params,
     const double x0[cyclotron_DIM])
 {
     if (s == NULL || x0 == NULL) return cyclotron_BAD_ARGUMENT;
-    const cyclotron_params own = params != NULL ? *params : cyclotron_default_params;
-    double x[cyclotron_DIM];
-    memcpy(x, x0, sizeof x);
+    cyclotron_solver fresh = { .h = (double)NAN };
+    fresh.params = params != NULL ? *params : cyclotron_default_params;
+    memcpy(fresh.x, x0, sizeof fresh.x);
     for (int i = 0; i < cyclotron_DIM; ++i)
-        if (!isfinite(x[i])) return cyclotron_BAD_ARGUMENT;
-    memset(s, 0, sizeof *s);
-    memcpy(s->x, x, sizeof s->x);
-    s->params = own;
+        if (!isfinite(fresh.x[i])) return cyclotron_BAD_ARGUMENT;
+    *s = fresh;
     return cyclotron_OK;
 }
 
@@ -315,44 +297,37 @@ cyclotron_status cyclotron_init(cyclotron_solver *s, const cyclotron_params *par
 static cyclotron_status cyclotron_set_step(cyclotron_solver *s, double h)
 {
     if (s == NULL || !isfinite(h)) return cyclotron_BAD_ARGUMENT;
-    if (s->prepared && memcmp(&h, &s->h, sizeof h) == 0) return cyclotron_OK;
+    if (memcmp(&h, &s->h, sizeof h) == 0) return cyclotron_OK;
     cyclotron_prepare(&s->params, h, s->coef);
     memset(&s->history, 0, sizeof s->history);
     s->h = h;
     s->t_before_h = s->t;
     s->steps_before_h = s->steps;
-    s->prepared = 1;
     return cyclotron_OK;
 }
 
 /* One stage. A guess from earlier steps may have misled it: then once more without. */
 static cyclotron_status cyclotron_stage(cyclotron_solver *s)
 {
-    cyclotron_status status = cyclotron_attempt(s);
-    if (status != cyclotron_OK && s->history.count > 0) {
-        memset(&s->history, 0, sizeof s->history);
-        status = cyclotron_attempt(s);
-    }
-    return status;
-}
-
-cyclotron_status cyclotron_step(cyclotron_solver *s, double h)
-{
-    cyclotron_status status = cyclotron_set_step(s, h);
-    if (status != cyclotron_OK) return status;
-    status = cyclotron_stage(s);
-    if (status != cyclotron_OK) return status;
-    ++s->steps;
-    s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
-    return status;
+    const cyclotron_status status = cyclotron_attempt(s);
+    if (status == cyclotron_OK || s->history.count == 0) return status;
+    memset(&s->history, 0, sizeof s->history);
+    return cyclotron_attempt(s);
 }
 
 cyclotron_status cyclotron_integrate(cyclotron_solver *s, double h, size_t steps)
 {
     cyclotron_status status = cyclotron_set_step(s, h);
-    for (; steps > 0 && status == cyclotron_OK; --steps) status = cyclotron_step(s, h);
+    for (; steps > 0 && status == cyclotron_OK; --steps) {
+        status = cyclotron_stage(s);
+        if (status != cyclotron_OK) break;
+        ++s->steps;
+        s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
+    }
     return status;
 }
+
+cyclotron_status cyclotron_step(cyclotron_solver *s, double h) { return cyclotron_integrate(s, h, 1); }
 
 const char *cyclotron_status_string(cyclotron_status status)
 {
@@ -367,7 +342,6 @@ const char *cyclotron_status_string(cyclotron_status status)
 }
 
 size_t cyclotron_solver_size(void) { return sizeof(cyclotron_solver); }
-
 size_t cyclotron_solver_steps_done(const cyclotron_solver *s) { return s->steps; }
 
 /* ---- Ensembles ---- */

@@ -20,7 +20,7 @@
  *   4. The implicit step, by Newton's method
  *   5. The solver
  *   6. Ensembles
- * body-sha256: cc4004f0fe6734c45d4abdec3aa22e85dc2009b4b2f43397e2434eb1231f97e7
+ * body-sha256: 0687c01179391f30a5327f3c1241ae7ed2ac7a0d5c99e7ab459bc501494293e9
  */
 #include "engel_geodesics.h"
 
@@ -32,9 +32,7 @@
 const engel_geodesics_params engel_geodesics_default_params = { 0 };
 
 enum { engel_geodesics_MAX_ITERATIONS = 20 }; /* of an inner solve */
-
-/* A correction is accepted when the error that it leaves is estimated to be below this. */
-#define engel_geodesics_TOLERANCE 1e-20
+#define engel_geodesics_TOLERANCE 1e-20 /* the error that an accepted correction may leave, as estimated */
 
 /* everything that depends on parameters and step size only */
 static void engel_geodesics_prepare(const engel_geodesics_params *params, double h, double coef[restrict 3])
@@ -54,11 +52,8 @@ static void engel_geodesics_linearise(const double coef[3], const double y[4],
 {
     const double h1 = y[0], h2 = y[1], h3 = y[2], h4 = y[3];
     /* momenta */
-    const double t1 = coef[0] + coef[1] * (h3 * h3);
-    const double p_h2 = h2 * t1;
-    const double p_h1 = h1 * t1;
-    const double t2 = coef[1] * (h1 * h1) + coef[1] * (h2 * h2);
-    const double p_h3 = h3 * t2;
+    const double t1 = coef[0] + coef[1] * (h3 * h3), p_h2 = h2 * t1, p_h1 = h1 * t1;
+    const double t2 = coef[1] * (h1 * h1) + coef[1] * (h2 * h2), p_h3 = h3 * t2;
     /* displacement */
     const double t3 = h4 * p_h1, t4 = h4 * p_h3 + h3 * p_h2, t5 = h3 * p_h1;
     displacement[0] = (-1.0 / 12.0) * (p_h2 * t3) - 0.5 * t4;
@@ -71,10 +66,9 @@ static void engel_geodesics_linearise(const double coef[3], const double y[4],
     increment[2] = -t3;
     increment[3] = 0.0;
     /* jacobian */
-    const double t6 = h4 * p_h2, t7 = coef[2] * (h1 * h3), t8 = h4 * t7, t9 = 0.5 * t8;
-    const double t10 = 0.5 * h3, t11 = (-1.0 / 12.0) * t3 - t10, t12 = coef[2] * (h2 * h3);
-    const double t13 = h4 * t12, t14 = h4 * t2, t15 = t10 + 1.0 / 12.0 * (t3 + t3), t16 = 0.5 * p_h1;
-    const double t17 = h4 * t1;
+    const double t6 = h4 * p_h2, t7 = coef[2] * (h1 * h3), t8 = h4 * t7, t9 = 0.5 * t8, t10 = 0.5 * h3;
+    const double t11 = (-1.0 / 12.0) * t3 - t10, t12 = coef[2] * (h2 * h3), t13 = h4 * t12, t14 = h4 * t2;
+    const double t15 = t10 + 1.0 / 12.0 * (t3 + t3), t16 = 0.5 * p_h1, t17 = h4 * t1;
     jacobian[0] = 1.0 + ((-1.0 / 12.0) * (t1 * t6) - t9);
     jacobian[1] = t1 * t11 - 0.5 * t13;
     jacobian[2] = t12 * t11 - 1.0 / 12.0 * (t7 * t6) - 0.5 * t14 - 0.5 * p_h2;
@@ -111,30 +105,6 @@ static void engel_geodesics_linearise(const double coef[3], const double y[4],
     increment_jacobian[15] = 0.0;
 }
 
-/* elimination without pivoting: the solution, and the reciprocals of the pivots */
-static void engel_geodesics_eliminate(const double matrix[16], const double side[4],
-    double solution[restrict 4], double reciprocal[restrict 4])
-{
-    /* solution */
-    const double t1 = 1.0 / matrix[5], t2 = matrix[1] * t1, t3 = 1.0 / (matrix[0] - matrix[4] * t2);
-    const double t4 = 1.0 / matrix[15], t5 = side[1] - side[3] * (matrix[7] * t4);
-    const double t6 = side[0] - side[3] * (matrix[3] * t4) - t2 * t5;
-    const double t7 = matrix[2] - matrix[6] * t2, t8 = matrix[8] * t3;
-    const double t9 = 1.0 / (matrix[10] - t7 * t8);
-    const double t10 = (side[2] - side[3] * (matrix[11] * t4) - t6 * t8) * t9;
-    const double t11 = t3 * (t6 - t7 * t10);
-    solution[0] = t11;
-    solution[1] = t1 * (t5 - (matrix[6] * t10 + matrix[4] * t11));
-    solution[2] = t10;
-    solution[3] = side[3] * t4;
-    /* reciprocal */
-    reciprocal[0] = t3;
-    reciprocal[1] = t1;
-    reciprocal[2] = t9;
-    reciprocal[3] = t4;
-}
-
-/* the Hamiltonian */
 double engel_geodesics_hamiltonian(const engel_geodesics_params *params, const double x[4])
 {
     (void)params;
@@ -142,7 +112,6 @@ double engel_geodesics_hamiltonian(const engel_geodesics_params *params, const d
     return 0.5 * (h2 * h2 + h1 * h1);
 }
 
-/* the Casimirs */
 void engel_geodesics_casimirs(const engel_geodesics_params *params, const double x[4], double out[])
 {
     (void)params;
@@ -151,7 +120,6 @@ void engel_geodesics_casimirs(const engel_geodesics_params *params, const double
     out[1] = h3 * h3 - 2.0 * (h2 * h4);
 }
 
-/* pi(x) grad H(x) */
 void engel_geodesics_vector_field(const engel_geodesics_params *params, const double x[4], double out[4])
 {
     (void)params;
@@ -163,19 +131,18 @@ void engel_geodesics_vector_field(const engel_geodesics_params *params, const do
 }
 
 /* ---- Compensated sums, linear equations ---- */
-/* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to
-   its last bit: were it rounded with the change, corrections of one sign would add up to a drift. 0, and x as
-   before, if the sum is not finite. */
+/* x + change + small in compensated arithmetic, where small is the carry and what is as small: were that
+   rounded with the change, corrections of one sign would add up to a drift. 0, and x as before, if the sum is
+   not finite. */
 static int engel_geodesics_advance(engel_geodesics_solver *s, const double change[engel_geodesics_DIM],
-    const double correction[engel_geodesics_DIM])
+    const double small[engel_geodesics_DIM])
 {
     double x[engel_geodesics_DIM], carry[engel_geodesics_DIM];
     for (int i = 0; i < engel_geodesics_DIM; ++i) {
         const double sum = s->x[i] + change[i], added = sum - s->x[i];
-        const double lost = (s->x[i] - (sum - added)) + (change[i] - added);
-        const double small = lost + (s->carry[i] + correction[i]);
-        x[i] = sum + small;
-        carry[i] = small - (x[i] - sum);
+        const double lost = ((s->x[i] - (sum - added)) + (change[i] - added)) + small[i];
+        x[i] = sum + lost;
+        carry[i] = lost - (x[i] - sum);
         if (!isfinite(x[i])) return 0;
     }
     memcpy(s->x, x, sizeof x);
@@ -183,29 +150,44 @@ static int engel_geodesics_advance(engel_geodesics_solver *s, const double chang
     return 1;
 }
 
-/* Newton matrices are I + O(h): a pivot whose reciprocal is larger than this is far from 1. */
-#define engel_geodesics_LARGEST_RECIPROCAL 1e3
-
-/* Solve matrix * solution = side, both overwritten. The matrix is I + O(h): 0 if a pivot is far from 1. */
+/* Solve matrix * solution = side, both overwritten, by elimination with partial pivoting. 0 if singular. */
 static int engel_geodesics_solve(double matrix[engel_geodesics_DIM * engel_geodesics_DIM],
     double side[engel_geodesics_DIM])
 {
-    double solution[engel_geodesics_DIM], reciprocal[engel_geodesics_DIM], largest = 0.0;
-    engel_geodesics_eliminate(matrix, side, solution, reciprocal);
-    for (int i = 0; i < engel_geodesics_DIM; ++i)
-        if (!(fabs(reciprocal[i]) <= largest)) largest = fabs(reciprocal[i]);
-    if (!(largest < engel_geodesics_LARGEST_RECIPROCAL)) return 0;
-    memcpy(side, solution, sizeof solution);
+    for (int k = 0; k < engel_geodesics_DIM; ++k) {
+        int best = k;
+        for (int i = k + 1; i < engel_geodesics_DIM; ++i)
+            if (fabs(matrix[i * engel_geodesics_DIM + k]) > fabs(matrix[best * engel_geodesics_DIM + k]))
+                best = i;
+        const double pivot = matrix[best * engel_geodesics_DIM + k], last = side[k];
+        if (!(fabs(pivot) > 0.0)) return 0;
+        for (int j = k; j < engel_geodesics_DIM && best != k; ++j) {
+            const double swap = matrix[k * engel_geodesics_DIM + j];
+            matrix[k * engel_geodesics_DIM + j] = matrix[best * engel_geodesics_DIM + j];
+            matrix[best * engel_geodesics_DIM + j] = swap;
+        }
+        side[k] = side[best];
+        side[best] = last;
+        for (int i = k + 1; i < engel_geodesics_DIM; ++i) {
+            const double factor = matrix[i * engel_geodesics_DIM + k] / pivot;
+            for (int j = k + 1; j < engel_geodesics_DIM; ++j)
+                matrix[i * engel_geodesics_DIM + j] -= factor * matrix[k * engel_geodesics_DIM + j];
+            side[i] -= factor * side[k];
+        }
+    }
+    for (int i = engel_geodesics_DIM - 1; i >= 0; --i) {
+        for (int j = i + 1; j < engel_geodesics_DIM; ++j)
+            side[i] -= matrix[i * engel_geodesics_DIM + j] * side[j];
+        side[i] /= matrix[i * engel_geodesics_DIM + i];
+    }
     return 1;
 }
 
 /* ---- Starting guesses ---- */
-/* How far from the last value a guess may be, in sizes of that value. */
-#define engel_geodesics_REACH 4.0
+#define engel_geodesics_REACH 4.0 /* how far from the last value a guess may be, in sizes of that value */
 
-/* The guess for the next value from the last ones: the sum of their backward differences. 0 if there is none,
-   or if it is far away, where the equation of a step has solutions that have nothing to do with the motion.
-   */
+/* The guess for the next value, the sum of differences. 0 if there is none, or if it is far away, where the
+   equation of a step has solutions that have nothing to do with the motion. */
 static int engel_geodesics_predict(const engel_geodesics_history *history, double value[engel_geodesics_DIM])
 {
     double distance = 0.0, size = 0.0;
@@ -242,10 +224,8 @@ static void engel_geodesics_remember(engel_geodesics_history *history,
     if (history->count < engel_geodesics_DIFFERENCES) ++history->count;
 }
 
-/* How far a step may lead, in sizes of the state and of what the vector field says, if the energy is lost;
-   and the part of the energy that counts as lost. */
-#define engel_geodesics_PLAUSIBLE 1.5
-#define engel_geodesics_LOST 0.5
+#define engel_geodesics_PLAUSIBLE 1.5 /* how far any step may lead, in sizes of the state and of its motion */
+#define engel_geodesics_LOST 0.5      /* part of the energy that one which leads farther must not lose */
 
 /* Whether an increment is that of the motion. Where the step is too large, the equation may have been solved
    by a point far away, at another energy, that has nothing to do with it. */
@@ -257,23 +237,21 @@ static int engel_geodesics_plausible(const engel_geodesics_solver *s,
     for (int i = 0; i < engel_geodesics_DIM; ++i) {
         moved += fabs(increment[i]);
         size += fabs(s->x[i]);
-    }
-    if (moved <= engel_geodesics_PLAUSIBLE * size) return 1;
-    engel_geodesics_vector_field(&s->params, s->x, field);
-    for (int i = 0; i < engel_geodesics_DIM; ++i) {
-        size += fabs(s->h * field[i]);
         middle[i] = s->x[i] + 0.5 * increment[i];
         end[i] = s->x[i] + increment[i];
     }
     if (moved <= engel_geodesics_PLAUSIBLE * size) return 1;
-    const double before = engel_geodesics_hamiltonian(&s->params, s->x), after =
-        engel_geodesics_hamiltonian(&s->params, end);
-    const double scale = fabs(before) + fabs(engel_geodesics_hamiltonian(&s->params, middle)) + fabs(after);
-    return fabs(after - before) <= engel_geodesics_LOST * scale;
+    engel_geodesics_vector_field(&s->params, s->x, field);
+    for (int i = 0; i < engel_geodesics_DIM; ++i) size += fabs(s->h * field[i]);
+    if (moved <= engel_geodesics_PLAUSIBLE * size) return 1;
+    const double before = engel_geodesics_hamiltonian(&s->params, s->x);
+    const double after = engel_geodesics_hamiltonian(&s->params, end), between =
+        engel_geodesics_hamiltonian(&s->params, middle);
+    return fabs(after - before) <= engel_geodesics_LOST * (fabs(before) + fabs(between) + fabs(after));
 }
 
 /* ---- The implicit step, by Newton's method ---- */
-/* Components of y are measured no finer than by this part of the largest. */
+/* components of y are measured no finer than by this part of the largest */
 #define engel_geodesics_FLOOR 1e-6
 
 /* Size of a correction relative to each component of y; NaN or infinite if the correction is. */
@@ -290,9 +268,9 @@ static double engel_geodesics_size(const double y[engel_geodesics_DIM],
     return size;
 }
 
-/* Corrections below the first that shrink by less than the second have reached the level of rounding. */
+/* corrections below this have reached the level of rounding, ... */
 #define engel_geodesics_NEARLY_SOLVED 1e-8
-#define engel_geodesics_SHRINKING 0.25
+#define engel_geodesics_SHRINKING 0.25 /* ... if one is more than this part of the one before */
 
 /* Solve (y - x) + displacement(y) = 0 for y by Newton's method from the extrapolated guess, and advance. The
    increment is corrected to first order by the last Newton correction, so that correction costs no
@@ -303,13 +281,14 @@ static engel_geodesics_status engel_geodesics_attempt(engel_geodesics_solver *s)
     double y[engel_geodesics_DIM], delta[engel_geodesics_DIM], displacement[engel_geodesics_DIM],
         increment[engel_geodesics_DIM];
     double jacobian[engel_geodesics_DIM * engel_geodesics_DIM], increment_jacobian[engel_geodesics_DIM
-        * engel_geodesics_DIM], previous = HUGE_VAL;
+        * engel_geodesics_DIM];
+    double previous = HUGE_VAL;
     if (!engel_geodesics_predict(&s->history, y)) memcpy(y, s->x, sizeof y);
     for (int iteration = 1; iteration <= engel_geodesics_MAX_ITERATIONS; ++iteration) {
         engel_geodesics_linearise(s->coef, y, displacement, increment, jacobian, increment_jacobian);
         ++s->evaluations;
-        for (int i = 0; i < engel_geodesics_DIM; ++i) delta[i] = ((y[i] - s->x[i]) + displacement[i])
-            - s->carry[i];
+        for (int i = 0; i < engel_geodesics_DIM; ++i)
+            delta[i] = ((y[i] - s->x[i]) + displacement[i]) - s->carry[i];
         const int regular = engel_geodesics_solve(jacobian, delta);
         const double size = engel_geodesics_size(y, delta), growth = size / (previous * previous);
         if (!isfinite(size)) return engel_geodesics_NOT_FINITE;
@@ -320,12 +299,14 @@ static engel_geodesics_status engel_geodesics_attempt(engel_geodesics_solver *s)
             * previous;
         previous = size;
         if (!(remaining <= engel_geodesics_TOLERANCE || stalled)) continue;
-        double correction[engel_geodesics_DIM] = { 0.0 };
-        for (int i = 0; i < engel_geodesics_DIM; ++i)
+        double small[engel_geodesics_DIM] = { 0.0 }; /* the correction of the increment, and the carry */
+        for (int i = 0; i < engel_geodesics_DIM; ++i) {
             for (int j = 0; j < engel_geodesics_DIM; ++j)
-                correction[i] -= increment_jacobian[i * engel_geodesics_DIM + j] * delta[j];
+                small[i] -= increment_jacobian[i * engel_geodesics_DIM + j] * delta[j];
+            small[i] += s->carry[i];
+        }
         if (!engel_geodesics_plausible(s, increment)) return engel_geodesics_NO_CONVERGENCE;
-        if (!engel_geodesics_advance(s, increment, correction)) return engel_geodesics_NOT_FINITE;
+        if (!engel_geodesics_advance(s, increment, small)) return engel_geodesics_NOT_FINITE;
         engel_geodesics_remember(&s->history, y);
         return engel_geodesics_OK;
     }
@@ -333,19 +314,17 @@ static engel_geodesics_status engel_geodesics_attempt(engel_geodesics_solver *s)
 }
 
 /* ---- The solver ---- */
-/* The arguments may be parts of *s: they are read before it is written. */
+/* The arguments may be parts of *s, which is therefore written last. */
 engel_geodesics_status engel_geodesics_init(engel_geodesics_solver *s, const engel_geodesics_params *params,
     const double x0[engel_geodesics_DIM])
 {
     if (s == NULL || x0 == NULL) return engel_geodesics_BAD_ARGUMENT;
-    const engel_geodesics_params own = params != NULL ? *params : engel_geodesics_default_params;
-    double x[engel_geodesics_DIM];
-    memcpy(x, x0, sizeof x);
+    engel_geodesics_solver fresh = { .h = (double)NAN };
+    fresh.params = params != NULL ? *params : engel_geodesics_default_params;
+    memcpy(fresh.x, x0, sizeof fresh.x);
     for (int i = 0; i < engel_geodesics_DIM; ++i)
-        if (!isfinite(x[i])) return engel_geodesics_BAD_ARGUMENT;
-    memset(s, 0, sizeof *s);
-    memcpy(s->x, x, sizeof s->x);
-    s->params = own;
+        if (!isfinite(fresh.x[i])) return engel_geodesics_BAD_ARGUMENT;
+    *s = fresh;
     return engel_geodesics_OK;
 }
 
@@ -353,44 +332,38 @@ engel_geodesics_status engel_geodesics_init(engel_geodesics_solver *s, const eng
 static engel_geodesics_status engel_geodesics_set_step(engel_geodesics_solver *s, double h)
 {
     if (s == NULL || !isfinite(h)) return engel_geodesics_BAD_ARGUMENT;
-    if (s->prepared && memcmp(&h, &s->h, sizeof h) == 0) return engel_geodesics_OK;
+    if (memcmp(&h, &s->h, sizeof h) == 0) return engel_geodesics_OK;
     engel_geodesics_prepare(&s->params, h, s->coef);
     memset(&s->history, 0, sizeof s->history);
     s->h = h;
     s->t_before_h = s->t;
     s->steps_before_h = s->steps;
-    s->prepared = 1;
     return engel_geodesics_OK;
 }
 
 /* One stage. A guess from earlier steps may have misled it: then once more without. */
 static engel_geodesics_status engel_geodesics_stage(engel_geodesics_solver *s)
 {
-    engel_geodesics_status status = engel_geodesics_attempt(s);
-    if (status != engel_geodesics_OK && s->history.count > 0) {
-        memset(&s->history, 0, sizeof s->history);
-        status = engel_geodesics_attempt(s);
-    }
-    return status;
-}
-
-engel_geodesics_status engel_geodesics_step(engel_geodesics_solver *s, double h)
-{
-    engel_geodesics_status status = engel_geodesics_set_step(s, h);
-    if (status != engel_geodesics_OK) return status;
-    status = engel_geodesics_stage(s);
-    if (status != engel_geodesics_OK) return status;
-    ++s->steps;
-    s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
-    return status;
+    const engel_geodesics_status status = engel_geodesics_attempt(s);
+    if (status == engel_geodesics_OK || s->history.count == 0) return status;
+    memset(&s->history, 0, sizeof s->history);
+    return engel_geodesics_attempt(s);
 }
 
 engel_geodesics_status engel_geodesics_integrate(engel_geodesics_solver *s, double h, size_t steps)
 {
     engel_geodesics_status status = engel_geodesics_set_step(s, h);
-    for (; steps > 0 && status == engel_geodesics_OK; --steps) status = engel_geodesics_step(s, h);
+    for (; steps > 0 && status == engel_geodesics_OK; --steps) {
+        status = engel_geodesics_stage(s);
+        if (status != engel_geodesics_OK) break;
+        ++s->steps;
+        s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
+    }
     return status;
 }
+
+engel_geodesics_status engel_geodesics_step(engel_geodesics_solver *s,
+    double h) { return engel_geodesics_integrate(s, h, 1); }
 
 const char *engel_geodesics_status_string(engel_geodesics_status status)
 {
@@ -405,7 +378,6 @@ const char *engel_geodesics_status_string(engel_geodesics_status status)
 }
 
 size_t engel_geodesics_solver_size(void) { return sizeof(engel_geodesics_solver); }
-
 size_t engel_geodesics_solver_steps_done(const engel_geodesics_solver *s) { return s->steps; }
 
 /* ---- Ensembles ---- */

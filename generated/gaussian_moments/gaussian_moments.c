@@ -20,7 +20,7 @@
  *   4. The implicit step, by Newton's method
  *   5. The solver
  *   6. Ensembles
- * body-sha256: 50fb0caa61d28f0b4027e18f4d859a6aeb3bbf286d84c344628ef87c12f20656
+ * body-sha256: b0b3a28fc6a25b882ea2575d78926149c80e30559231b77db4720baae98985fa
  */
 #include "gaussian_moments.h"
 
@@ -32,9 +32,7 @@
 const gaussian_moments_params gaussian_moments_default_params = { 1.0, 0.5 };
 
 enum { gaussian_moments_MAX_ITERATIONS = 20 }; /* of an inner solve */
-
-/* A correction is accepted when the error that it leaves is estimated to be below this. */
-#define gaussian_moments_TOLERANCE 1e-20
+#define gaussian_moments_TOLERANCE 1e-20 /* the error that an accepted correction may leave, as estimated */
 
 /* Whether all parameters are finite, and positive where they have to be. */
 static int gaussian_moments_allowed(const gaussian_moments_params *params)
@@ -42,51 +40,55 @@ static int gaussian_moments_allowed(const gaussian_moments_params *params)
     return isfinite(params->k) && isfinite(params->g);
 }
 
+/* The polynomial with these coefficients, the constant first. */
+static inline double gaussian_moments_polynomial(const double *coefficients, int count, double s)
+{
+    double value = coefficients[--count];
+    while (count > 0) value = value * s + coefficients[--count];
+    return value;
+}
+
 /* (1 - w cot w)/s with w = sqrt(s)/2, coth for negative s: the function of the exponential bi-realisation. */
 static double gaussian_moments_phi0(double s)
 {
-    if (fabs(s) < 0.25)
-        return (0.08333333333333333 + s * (0.001388888888888889 + s * (3.306878306878307e-05 + s *
-            (8.267195767195768e-07 + s * (2.08767569878681e-08 + s * (5.284190138687493e-10 + s *
-            (1.3382536530684679e-11 + s * (3.3896802963225827e-13 + s * 8.586062056277845e-15))))))));
+    static const double near[9] = { 0.08333333333333333, 0.001388888888888889, 3.306878306878307e-05,
+        8.267195767195768e-07, 2.08767569878681e-08, 5.284190138687493e-10, 1.3382536530684679e-11,
+        3.3896802963225827e-13, 8.586062056277845e-15 };
+    static const double rest[21] = { 0.03267274151216445, 0.000105641107053347, 5.637370282876845e-07,
+        3.357141926657451e-09, 2.0742872904166045e-11, 1.3000482138698975e-13, 8.196052055691008e-16,
+        5.180118196169724e-18, 3.277539174701792e-20, 2.0747401878593604e-22, 1.3136241807166534e-24,
+        8.318003195189264e-27, 5.267262996834231e-29, 3.3354842988221443e-31, 2.1122063323183885e-33,
+        1.3375664093215244e-35, 8.470227328650247e-38, 5.363831046655698e-40, 3.3966848266497805e-42,
+        2.1509755511832569e-44, 1.3621211117593843e-46 };
+    if (fabs(s) < 0.25) return gaussian_moments_polynomial(near, 9, s);
     if (fabs(s) < 16.0) {
         const double pole = 1.0 / (39.47841760435743 - s);
-        return 2.0 * pole + (0.03267274151216445 + s * (0.000105641107053347 + s * (5.637370282876845e-07
-            + s * (3.357141926657451e-09 + s * (2.0742872904166045e-11 + s * (1.3000482138698975e-13 + s *
-            (8.196052055691008e-16 + s * (5.180118196169724e-18 + s * (3.277539174701792e-20 + s *
-            (2.0747401878593604e-22 + s * (1.3136241807166534e-24 + s * (8.318003195189264e-27 + s *
-            (5.267262996834231e-29 + s * (3.3354842988221443e-31 + s * (2.1122063323183885e-33 + s *
-            (1.3375664093215244e-35 + s * (8.470227328650247e-38 + s * (5.363831046655698e-40 + s *
-            (3.3966848266497805e-42 + s * (2.1509755511832569e-44 + s *
-            1.3621211117593843e-46))))))))))))))))))));
+        return 2.0 * pole + gaussian_moments_polynomial(rest, 21, s);
     }
     const double w = 0.5 * sqrt(fabs(s)), c = w / (s > 0.0 ? tan(w) : tanh(w));
-    const double phi0 = (1.0 - c) / s;
-    return phi0;
+    return (1.0 - c) / s;
 }
 
 /* The derivative of (1 - w cot w)/s, w = sqrt(s)/2. */
 static double gaussian_moments_phi1(double s)
 {
-    if (fabs(s) < 0.25)
-        return (0.001388888888888889 + s * (6.613756613756614e-05 + s * (2.48015873015873e-06 + s *
-            (8.35070279514724e-08 + s * (2.6420950693437467e-09 + s * (8.029521918410807e-11 + s *
-            (2.372776207425808e-12 + s * (6.868849645022276e-14 + s * 1.9573818287022555e-15))))))));
+    static const double near[9] = { 0.001388888888888889, 6.613756613756614e-05, 2.48015873015873e-06,
+        8.35070279514724e-08, 2.6420950693437467e-09, 8.029521918410807e-11, 2.372776207425808e-12,
+        6.868849645022276e-14, 1.9573818287022555e-15 };
+    static const double rest[21] = { 0.000105641107053347, 1.127474056575369e-06, 1.0071425779972354e-08,
+        8.297149161666418e-11, 6.500241069349487e-13, 4.917631233414605e-15, 3.626082737318807e-17,
+        2.6220313397614337e-19, 1.8672661690734246e-21, 1.3136241807166533e-23, 9.149803514708191e-26,
+        6.320715596201077e-28, 4.336129588468787e-30, 2.957088865245744e-32, 2.0063496139822866e-34,
+        1.3552363725840395e-36, 9.118512779314688e-39, 6.114032687969605e-41, 4.0868535472481875e-43,
+        2.7242422235187686e-45, 1.8114038279637677e-47 };
+    if (fabs(s) < 0.25) return gaussian_moments_polynomial(near, 9, s);
     if (fabs(s) < 16.0) {
         const double pole = 1.0 / (39.47841760435743 - s);
-        return 2.0 * pole * pole + (0.000105641107053347 + s * (1.127474056575369e-06 + s *
-            (1.0071425779972354e-08 + s * (8.297149161666418e-11 + s * (6.500241069349487e-13 + s *
-            (4.917631233414605e-15 + s * (3.626082737318807e-17 + s * (2.6220313397614337e-19 + s *
-            (1.8672661690734246e-21 + s * (1.3136241807166533e-23 + s * (9.149803514708191e-26 + s *
-            (6.320715596201077e-28 + s * (4.336129588468787e-30 + s * (2.957088865245744e-32 + s *
-            (2.0063496139822866e-34 + s * (1.3552363725840395e-36 + s * (9.118512779314688e-39 + s *
-            (6.114032687969605e-41 + s * (4.0868535472481875e-43 + s * (2.7242422235187686e-45 + s *
-            1.8114038279637677e-47))))))))))))))))))));
+        return 2.0 * pole * pole + gaussian_moments_polynomial(rest, 21, s);
     }
     const double w = 0.5 * sqrt(fabs(s)), c = w / (s > 0.0 ? tan(w) : tanh(w));
     const double phi0 = (1.0 - c) / s;
-    const double phi1 = (0.5 * s * phi0 * phi0 - 1.5 * phi0 + 0.125) / s;
-    return phi1;
+    return (0.5 * s * phi0 * phi0 - 1.5 * phi0 + 0.125) / s;
 }
 
 /* everything that depends on parameters and step size only */
@@ -119,12 +121,10 @@ static void gaussian_moments_linearise(const double coef[14], const double y[3],
 {
     const double a = y[0], b = y[1], c = y[2];
     /* momenta */
-    const double t1 = b * coef[8];
-    const double p_b = coef[7] + t1 + a * (coef[2] + a * coef[9]);
+    const double t1 = b * coef[8], p_b = coef[7] + t1 + a * (coef[2] + a * coef[9]);
     const double t2 = coef[3] + b * coef[4];
     const double p_a = coef[0] + b * coef[2] + coef[1] * (c * c) + a * (t2 + a * (coef[5] + a * coef[6]));
-    const double t3 = coef[10] + a * coef[11];
-    const double p_c = c * t3;
+    const double t3 = coef[10] + a * coef[11], p_c = c * t3;
     /* displacement */
     const double t4 = p_b * p_a, t5 = 4.0 * (p_c * p_c), t6 = 4.0 * t4 - t5;
     const double t7 = gaussian_moments_phi0(t6), t8 = c * p_b, t9 = 2.0 * (a * p_c), t10 = t8 + t9;
@@ -175,26 +175,6 @@ static void gaussian_moments_linearise(const double coef[14], const double y[3],
     increment_jacobian[8] = (-2.0) * t45;
 }
 
-/* elimination without pivoting: the solution, and the reciprocals of the pivots */
-static void gaussian_moments_eliminate(const double matrix[9], const double side[3],
-    double solution[restrict 3], double reciprocal[restrict 3])
-{
-    /* solution */
-    const double t1 = 1.0 / matrix[0], t2 = matrix[6] * t1, t3 = matrix[3] * t1;
-    const double t4 = side[1] - side[0] * t3, t5 = 1.0 / (matrix[4] - matrix[1] * t3);
-    const double t6 = (matrix[7] - matrix[1] * t2) * t5, t7 = matrix[5] - matrix[2] * t3;
-    const double t8 = 1.0 / (matrix[8] - matrix[2] * t2 - t7 * t6);
-    const double t9 = (side[2] - side[0] * t2 - t4 * t6) * t8, t10 = t5 * (t4 - t7 * t9);
-    solution[0] = t1 * (side[0] - (matrix[2] * t9 + matrix[1] * t10));
-    solution[1] = t10;
-    solution[2] = t9;
-    /* reciprocal */
-    reciprocal[0] = t1;
-    reciprocal[1] = t5;
-    reciprocal[2] = t8;
-}
-
-/* the Hamiltonian */
 double gaussian_moments_hamiltonian(const gaussian_moments_params *params, const double x[3])
 {
     if (params == NULL) params = &gaussian_moments_default_params;
@@ -202,7 +182,6 @@ double gaussian_moments_hamiltonian(const gaussian_moments_params *params, const
     return b + a * k + 3.0 * (g * (a * a));
 }
 
-/* the Casimirs */
 void gaussian_moments_casimirs(const gaussian_moments_params *params, const double x[3], double out[])
 {
     (void)params;
@@ -210,7 +189,6 @@ void gaussian_moments_casimirs(const gaussian_moments_params *params, const doub
     out[0] = 4.0 * (a * b) - c * c;
 }
 
-/* pi(x) grad H(x) */
 void gaussian_moments_vector_field(const gaussian_moments_params *params, const double x[3], double out[3])
 {
     if (params == NULL) params = &gaussian_moments_default_params;
@@ -222,19 +200,18 @@ void gaussian_moments_vector_field(const gaussian_moments_params *params, const 
 }
 
 /* ---- Compensated sums, linear equations ---- */
-/* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to
-   its last bit: were it rounded with the change, corrections of one sign would add up to a drift. 0, and x as
-   before, if the sum is not finite. */
+/* x + change + small in compensated arithmetic, where small is the carry and what is as small: were that
+   rounded with the change, corrections of one sign would add up to a drift. 0, and x as before, if the sum is
+   not finite. */
 static int gaussian_moments_advance(gaussian_moments_solver *s, const double change[gaussian_moments_DIM],
-    const double correction[gaussian_moments_DIM])
+    const double small[gaussian_moments_DIM])
 {
     double x[gaussian_moments_DIM], carry[gaussian_moments_DIM];
     for (int i = 0; i < gaussian_moments_DIM; ++i) {
         const double sum = s->x[i] + change[i], added = sum - s->x[i];
-        const double lost = (s->x[i] - (sum - added)) + (change[i] - added);
-        const double small = lost + (s->carry[i] + correction[i]);
-        x[i] = sum + small;
-        carry[i] = small - (x[i] - sum);
+        const double lost = ((s->x[i] - (sum - added)) + (change[i] - added)) + small[i];
+        x[i] = sum + lost;
+        carry[i] = lost - (x[i] - sum);
         if (!isfinite(x[i])) return 0;
     }
     memcpy(s->x, x, sizeof x);
@@ -242,29 +219,44 @@ static int gaussian_moments_advance(gaussian_moments_solver *s, const double cha
     return 1;
 }
 
-/* Newton matrices are I + O(h): a pivot whose reciprocal is larger than this is far from 1. */
-#define gaussian_moments_LARGEST_RECIPROCAL 1e3
-
-/* Solve matrix * solution = side, both overwritten. The matrix is I + O(h): 0 if a pivot is far from 1. */
+/* Solve matrix * solution = side, both overwritten, by elimination with partial pivoting. 0 if singular. */
 static int gaussian_moments_solve(double matrix[gaussian_moments_DIM * gaussian_moments_DIM],
     double side[gaussian_moments_DIM])
 {
-    double solution[gaussian_moments_DIM], reciprocal[gaussian_moments_DIM], largest = 0.0;
-    gaussian_moments_eliminate(matrix, side, solution, reciprocal);
-    for (int i = 0; i < gaussian_moments_DIM; ++i)
-        if (!(fabs(reciprocal[i]) <= largest)) largest = fabs(reciprocal[i]);
-    if (!(largest < gaussian_moments_LARGEST_RECIPROCAL)) return 0;
-    memcpy(side, solution, sizeof solution);
+    for (int k = 0; k < gaussian_moments_DIM; ++k) {
+        int best = k;
+        for (int i = k + 1; i < gaussian_moments_DIM; ++i)
+            if (fabs(matrix[i * gaussian_moments_DIM + k]) > fabs(matrix[best * gaussian_moments_DIM + k]))
+                best = i;
+        const double pivot = matrix[best * gaussian_moments_DIM + k], last = side[k];
+        if (!(fabs(pivot) > 0.0)) return 0;
+        for (int j = k; j < gaussian_moments_DIM && best != k; ++j) {
+            const double swap = matrix[k * gaussian_moments_DIM + j];
+            matrix[k * gaussian_moments_DIM + j] = matrix[best * gaussian_moments_DIM + j];
+            matrix[best * gaussian_moments_DIM + j] = swap;
+        }
+        side[k] = side[best];
+        side[best] = last;
+        for (int i = k + 1; i < gaussian_moments_DIM; ++i) {
+            const double factor = matrix[i * gaussian_moments_DIM + k] / pivot;
+            for (int j = k + 1; j < gaussian_moments_DIM; ++j)
+                matrix[i * gaussian_moments_DIM + j] -= factor * matrix[k * gaussian_moments_DIM + j];
+            side[i] -= factor * side[k];
+        }
+    }
+    for (int i = gaussian_moments_DIM - 1; i >= 0; --i) {
+        for (int j = i + 1; j < gaussian_moments_DIM; ++j)
+            side[i] -= matrix[i * gaussian_moments_DIM + j] * side[j];
+        side[i] /= matrix[i * gaussian_moments_DIM + i];
+    }
     return 1;
 }
 
 /* ---- Starting guesses ---- */
-/* How far from the last value a guess may be, in sizes of that value. */
-#define gaussian_moments_REACH 4.0
+#define gaussian_moments_REACH 4.0 /* how far from the last value a guess may be, in sizes of that value */
 
-/* The guess for the next value from the last ones: the sum of their backward differences. 0 if there is none,
-   or if it is far away, where the equation of a step has solutions that have nothing to do with the motion.
-   */
+/* The guess for the next value, the sum of differences. 0 if there is none, or if it is far away, where the
+   equation of a step has solutions that have nothing to do with the motion. */
 static int gaussian_moments_predict(const gaussian_moments_history *history,
     double value[gaussian_moments_DIM])
 {
@@ -302,10 +294,9 @@ static void gaussian_moments_remember(gaussian_moments_history *history,
     if (history->count < gaussian_moments_DIFFERENCES) ++history->count;
 }
 
-/* How far a step may lead, in sizes of the state and of what the vector field says, if the energy is lost;
-   and the part of the energy that counts as lost. */
+/* how far any step may lead, in sizes of the state and of its motion */
 #define gaussian_moments_PLAUSIBLE 1.5
-#define gaussian_moments_LOST 0.5
+#define gaussian_moments_LOST 0.5 /* part of the energy that one which leads farther must not lose */
 
 /* Whether an increment is that of the motion. Where the step is too large, the equation may have been solved
    by a point far away, at another energy, that has nothing to do with it. */
@@ -317,23 +308,21 @@ static int gaussian_moments_plausible(const gaussian_moments_solver *s,
     for (int i = 0; i < gaussian_moments_DIM; ++i) {
         moved += fabs(increment[i]);
         size += fabs(s->x[i]);
-    }
-    if (moved <= gaussian_moments_PLAUSIBLE * size) return 1;
-    gaussian_moments_vector_field(&s->params, s->x, field);
-    for (int i = 0; i < gaussian_moments_DIM; ++i) {
-        size += fabs(s->h * field[i]);
         middle[i] = s->x[i] + 0.5 * increment[i];
         end[i] = s->x[i] + increment[i];
     }
     if (moved <= gaussian_moments_PLAUSIBLE * size) return 1;
-    const double before = gaussian_moments_hamiltonian(&s->params, s->x), after =
-        gaussian_moments_hamiltonian(&s->params, end);
-    const double scale = fabs(before) + fabs(gaussian_moments_hamiltonian(&s->params, middle)) + fabs(after);
-    return fabs(after - before) <= gaussian_moments_LOST * scale;
+    gaussian_moments_vector_field(&s->params, s->x, field);
+    for (int i = 0; i < gaussian_moments_DIM; ++i) size += fabs(s->h * field[i]);
+    if (moved <= gaussian_moments_PLAUSIBLE * size) return 1;
+    const double before = gaussian_moments_hamiltonian(&s->params, s->x);
+    const double after = gaussian_moments_hamiltonian(&s->params, end), between =
+        gaussian_moments_hamiltonian(&s->params, middle);
+    return fabs(after - before) <= gaussian_moments_LOST * (fabs(before) + fabs(between) + fabs(after));
 }
 
 /* ---- The implicit step, by Newton's method ---- */
-/* Components of y are measured no finer than by this part of the largest. */
+/* components of y are measured no finer than by this part of the largest */
 #define gaussian_moments_FLOOR 1e-6
 
 /* Size of a correction relative to each component of y; NaN or infinite if the correction is. */
@@ -350,9 +339,9 @@ static double gaussian_moments_size(const double y[gaussian_moments_DIM],
     return size;
 }
 
-/* Corrections below the first that shrink by less than the second have reached the level of rounding. */
+/* corrections below this have reached the level of rounding, ... */
 #define gaussian_moments_NEARLY_SOLVED 1e-8
-#define gaussian_moments_SHRINKING 0.25
+#define gaussian_moments_SHRINKING 0.25 /* ... if one is more than this part of the one before */
 
 /* Solve (y - x) + displacement(y) = 0 for y by Newton's method from the extrapolated guess, and advance. The
    increment is corrected to first order by the last Newton correction, so that correction costs no
@@ -363,13 +352,14 @@ static gaussian_moments_status gaussian_moments_attempt(gaussian_moments_solver 
     double y[gaussian_moments_DIM], delta[gaussian_moments_DIM], displacement[gaussian_moments_DIM],
         increment[gaussian_moments_DIM];
     double jacobian[gaussian_moments_DIM * gaussian_moments_DIM], increment_jacobian[gaussian_moments_DIM
-        * gaussian_moments_DIM], previous = HUGE_VAL;
+        * gaussian_moments_DIM];
+    double previous = HUGE_VAL;
     if (!gaussian_moments_predict(&s->history, y)) memcpy(y, s->x, sizeof y);
     for (int iteration = 1; iteration <= gaussian_moments_MAX_ITERATIONS; ++iteration) {
         gaussian_moments_linearise(s->coef, y, displacement, increment, jacobian, increment_jacobian);
         ++s->evaluations;
-        for (int i = 0; i < gaussian_moments_DIM; ++i) delta[i] = ((y[i] - s->x[i]) + displacement[i])
-            - s->carry[i];
+        for (int i = 0; i < gaussian_moments_DIM; ++i)
+            delta[i] = ((y[i] - s->x[i]) + displacement[i]) - s->carry[i];
         const int regular = gaussian_moments_solve(jacobian, delta);
         const double size = gaussian_moments_size(y, delta), growth = size / (previous * previous);
         if (!isfinite(size)) return gaussian_moments_NOT_FINITE;
@@ -380,12 +370,14 @@ static gaussian_moments_status gaussian_moments_attempt(gaussian_moments_solver 
             * previous;
         previous = size;
         if (!(remaining <= gaussian_moments_TOLERANCE || stalled)) continue;
-        double correction[gaussian_moments_DIM] = { 0.0 };
-        for (int i = 0; i < gaussian_moments_DIM; ++i)
+        double small[gaussian_moments_DIM] = { 0.0 }; /* the correction of the increment, and the carry */
+        for (int i = 0; i < gaussian_moments_DIM; ++i) {
             for (int j = 0; j < gaussian_moments_DIM; ++j)
-                correction[i] -= increment_jacobian[i * gaussian_moments_DIM + j] * delta[j];
+                small[i] -= increment_jacobian[i * gaussian_moments_DIM + j] * delta[j];
+            small[i] += s->carry[i];
+        }
         if (!gaussian_moments_plausible(s, increment)) return gaussian_moments_NO_CONVERGENCE;
-        if (!gaussian_moments_advance(s, increment, correction)) return gaussian_moments_NOT_FINITE;
+        if (!gaussian_moments_advance(s, increment, small)) return gaussian_moments_NOT_FINITE;
         gaussian_moments_remember(&s->history, y);
         return gaussian_moments_OK;
     }
@@ -393,32 +385,24 @@ static gaussian_moments_status gaussian_moments_attempt(gaussian_moments_solver 
 }
 
 /* ---- The solver ---- */
-/* Whether steps can be made with these parameters: allowed, and with finite coefficients for a step so short
-   that it has no part in it. */
-static int gaussian_moments_admissible(const gaussian_moments_params *params)
-{
-    double coef[gaussian_moments_COEFFICIENTS];
-    if (!gaussian_moments_allowed(params)) return 0;
-    gaussian_moments_prepare(params, 1e-100, coef);
-    for (int k = 0; k < gaussian_moments_COEFFICIENTS; ++k)
-        if (!isfinite(coef[k])) return 0;
-    return 1;
-}
+/* so short that it has no part in whether coefficients are finite */
+#define gaussian_moments_SHORT_STEP 1e-100
 
-/* The arguments may be parts of *s: they are read before it is written. */
+/* The arguments may be parts of *s, which is therefore written last. */
 gaussian_moments_status gaussian_moments_init(gaussian_moments_solver *s,
     const gaussian_moments_params *params, const double x0[gaussian_moments_DIM])
 {
     if (s == NULL || x0 == NULL) return gaussian_moments_BAD_ARGUMENT;
-    const gaussian_moments_params own = params != NULL ? *params : gaussian_moments_default_params;
-    double x[gaussian_moments_DIM];
-    memcpy(x, x0, sizeof x);
+    gaussian_moments_solver fresh = { .h = (double)NAN };
+    fresh.params = params != NULL ? *params : gaussian_moments_default_params;
+    memcpy(fresh.x, x0, sizeof fresh.x);
     for (int i = 0; i < gaussian_moments_DIM; ++i)
-        if (!isfinite(x[i])) return gaussian_moments_BAD_ARGUMENT;
-    if (!gaussian_moments_admissible(&own)) return gaussian_moments_BAD_ARGUMENT;
-    memset(s, 0, sizeof *s);
-    memcpy(s->x, x, sizeof s->x);
-    s->params = own;
+        if (!isfinite(fresh.x[i])) return gaussian_moments_BAD_ARGUMENT;
+    if (!gaussian_moments_allowed(&fresh.params)) return gaussian_moments_BAD_ARGUMENT;
+    gaussian_moments_prepare(&fresh.params, gaussian_moments_SHORT_STEP, fresh.coef);
+    for (int k = 0; k < gaussian_moments_COEFFICIENTS; ++k)
+        if (!isfinite(fresh.coef[k])) return gaussian_moments_BAD_ARGUMENT;
+    *s = fresh;
     return gaussian_moments_OK;
 }
 
@@ -426,44 +410,38 @@ gaussian_moments_status gaussian_moments_init(gaussian_moments_solver *s,
 static gaussian_moments_status gaussian_moments_set_step(gaussian_moments_solver *s, double h)
 {
     if (s == NULL || !isfinite(h)) return gaussian_moments_BAD_ARGUMENT;
-    if (s->prepared && memcmp(&h, &s->h, sizeof h) == 0) return gaussian_moments_OK;
+    if (memcmp(&h, &s->h, sizeof h) == 0) return gaussian_moments_OK;
     gaussian_moments_prepare(&s->params, h, s->coef);
     memset(&s->history, 0, sizeof s->history);
     s->h = h;
     s->t_before_h = s->t;
     s->steps_before_h = s->steps;
-    s->prepared = 1;
     return gaussian_moments_OK;
 }
 
 /* One stage. A guess from earlier steps may have misled it: then once more without. */
 static gaussian_moments_status gaussian_moments_stage(gaussian_moments_solver *s)
 {
-    gaussian_moments_status status = gaussian_moments_attempt(s);
-    if (status != gaussian_moments_OK && s->history.count > 0) {
-        memset(&s->history, 0, sizeof s->history);
-        status = gaussian_moments_attempt(s);
-    }
-    return status;
-}
-
-gaussian_moments_status gaussian_moments_step(gaussian_moments_solver *s, double h)
-{
-    gaussian_moments_status status = gaussian_moments_set_step(s, h);
-    if (status != gaussian_moments_OK) return status;
-    status = gaussian_moments_stage(s);
-    if (status != gaussian_moments_OK) return status;
-    ++s->steps;
-    s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
-    return status;
+    const gaussian_moments_status status = gaussian_moments_attempt(s);
+    if (status == gaussian_moments_OK || s->history.count == 0) return status;
+    memset(&s->history, 0, sizeof s->history);
+    return gaussian_moments_attempt(s);
 }
 
 gaussian_moments_status gaussian_moments_integrate(gaussian_moments_solver *s, double h, size_t steps)
 {
     gaussian_moments_status status = gaussian_moments_set_step(s, h);
-    for (; steps > 0 && status == gaussian_moments_OK; --steps) status = gaussian_moments_step(s, h);
+    for (; steps > 0 && status == gaussian_moments_OK; --steps) {
+        status = gaussian_moments_stage(s);
+        if (status != gaussian_moments_OK) break;
+        ++s->steps;
+        s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
+    }
     return status;
 }
+
+gaussian_moments_status gaussian_moments_step(gaussian_moments_solver *s,
+    double h) { return gaussian_moments_integrate(s, h, 1); }
 
 const char *gaussian_moments_status_string(gaussian_moments_status status)
 {
@@ -478,7 +456,6 @@ const char *gaussian_moments_status_string(gaussian_moments_status status)
 }
 
 size_t gaussian_moments_solver_size(void) { return sizeof(gaussian_moments_solver); }
-
 size_t gaussian_moments_solver_steps_done(const gaussian_moments_solver *s) { return s->steps; }
 
 /* ---- Ensembles ---- */

@@ -21,7 +21,7 @@
  *   4. The implicit step, along paths dm/dt = pi(m) p
  *   5. The solver
  *   6. Ensembles
- * body-sha256: 4cda86a75c64c076061a32103e73acdb21d06da782e30f914d4f13aa4008c97f
+ * body-sha256: edb2542361468997286a87ed8d9fc0c1cf73508c515e0fe0abbdacdcec029f16
  */
 #include "guiding_centre.h"
 
@@ -72,12 +72,11 @@ static void guiding_centre_generate(const double coef[5], const double y[4], dou
     slope[2] = coef[1] * z;
     slope[3] = coef[2] * u;
     /* jacobian */
-    const double t4 = t3 * (t3 * t3), t5 = coef[3] * y_ * t4, t6 = coef[0] * (x * t5);
-    const double t7 = coef[4] * u, t8 = t2 + 2.0 * (t7 / t1), t9 = 1.0 / (t2 * t8);
-    const double t10 = 0.5 * (t6 * t9), t11 = coef[0] * (t3 - x * (coef[3] * x * t4));
-    const double t12 = coef[4] * x, t13 = t12 * t9, t14 = coef[4] * y_, t15 = t14 * t9;
-    const double t16 = 1.0 + t7 * t4, t17 = 1.0 / t8, t18 = t12 * t16 * t17, t19 = t14 * t16 * t17;
-    const double t20 = coef[0] * (t3 - y_ * t5);
+    const double t4 = t3 * (t3 * t3), t5 = coef[3] * y_ * t4, t6 = coef[0] * (x * t5), t7 = coef[4] * u;
+    const double t8 = t2 + 2.0 * (t7 / t1), t9 = 1.0 / (t2 * t8), t10 = 0.5 * (t6 * t9);
+    const double t11 = coef[0] * (t3 - x * (coef[3] * x * t4)), t12 = coef[4] * x, t13 = t12 * t9;
+    const double t14 = coef[4] * y_, t15 = t14 * t9, t16 = 1.0 + t7 * t4, t17 = 1.0 / t8;
+    const double t18 = t12 * t16 * t17, t19 = t14 * t16 * t17, t20 = coef[0] * (t3 - y_ * t5);
     const double t21 = t17 * (1.0 + u * (t4 * (coef[4] * (1.0 + t1))));
     jacobian[0] = 1.0 + t10;
     jacobian[1] = 0.5 * (t11 * t9);
@@ -97,34 +96,6 @@ static void guiding_centre_generate(const double coef[5], const double y[4], dou
     jacobian[15] = 1.0;
 }
 
-/* elimination without pivoting: the solution, and the reciprocals of the pivots */
-static void guiding_centre_eliminate(const double matrix[16], const double side[4],
-    double solution[restrict 4], double reciprocal[restrict 4])
-{
-    /* solution */
-    const double t1 = 1.0 / matrix[0], t2 = matrix[12] * t1, t3 = matrix[4] * t1;
-    const double t4 = side[1] - side[0] * t3, t5 = 1.0 / (matrix[5] - matrix[1] * t3);
-    const double t6 = (matrix[13] - matrix[1] * t2) * t5, t7 = matrix[8] * t1;
-    const double t8 = (matrix[9] - matrix[1] * t7) * t5, t9 = side[2] - side[0] * t7 - t4 * t8;
-    const double t10 = matrix[6] - matrix[2] * t3;
-    const double t11 = 1.0 / (matrix[10] - matrix[2] * t7 - t10 * t8);
-    const double t12 = (matrix[14] - matrix[2] * t2 - t10 * t6) * t11;
-    const double t13 = matrix[7] - matrix[3] * t3, t14 = matrix[11] - matrix[3] * t7 - t13 * t8;
-    const double t15 = 1.0 / (matrix[15] - matrix[3] * t2 - t13 * t6 - t14 * t12);
-    const double t16 = (side[3] - side[0] * t2 - t4 * t6 - t9 * t12) * t15;
-    const double t17 = t11 * (t9 - t14 * t16), t18 = t5 * (t4 - (t13 * t16 + t10 * t17));
-    solution[0] = t1 * (side[0] - (matrix[3] * t16 + (matrix[2] * t17 + matrix[1] * t18)));
-    solution[1] = t18;
-    solution[2] = t17;
-    solution[3] = t16;
-    /* reciprocal */
-    reciprocal[0] = t1;
-    reciprocal[1] = t5;
-    reciprocal[2] = t11;
-    reciprocal[3] = t15;
-}
-
-/* the Hamiltonian */
 double guiding_centre_hamiltonian(const guiding_centre_params *params, const double x[4])
 {
     if (params == NULL) params = &guiding_centre_default_params;
@@ -135,13 +106,11 @@ double guiding_centre_hamiltonian(const guiding_centre_params *params, const dou
     return t1;
 }
 
-/* the Casimirs */
 void guiding_centre_casimirs(const guiding_centre_params *params, const double x[4], double out[])
 {
     (void)params, (void)x, (void)out;
 }
 
-/* pi(x) grad H(x) */
 void guiding_centre_vector_field(const guiding_centre_params *params, const double x[4], double out[4])
 {
     if (params == NULL) params = &guiding_centre_default_params;
@@ -150,8 +119,8 @@ void guiding_centre_vector_field(const guiding_centre_params *params, const doub
     const double t1 = k * z, t2 = kappa * x_, t3 = kappa * kappa, t4 = 1.0 + t3 * (x_ * x_ + y * y);
     const double t5 = sqrt(t4), t6 = kappa * u, t7 = t5 + 2.0 * (t6 / t4), t8 = 1.0 / (t5 * t7);
     const double t9 = t2 * t8, t10 = 1.0 / t5, t11 = t3 * (mu * t10), t12 = y * t11, t13 = kappa * y;
-    const double t14 = t10 * (t10 * t10), t15 = 1.0 + t6 * t14, t16 = 1.0 / t7;
-    const double t17 = t13 * t15 * t16, t18 = t2 * t15 * t16, t19 = x_ * t11, t20 = t13 * t8;
+    const double t14 = t10 * (t10 * t10), t15 = 1.0 + t6 * t14, t16 = 1.0 / t7, t17 = t13 * t15 * t16;
+    const double t18 = t2 * t15 * t16, t19 = x_ * t11, t20 = t13 * t8;
     const double t21 = t16 * (1.0 + u * (t14 * (kappa * (1.0 + t4))));
     out[0] = t1 * t9 - t12 * t8 - u * t17;
     out[1] = u * t18 + (t19 * t8 + t1 * t20);
@@ -160,19 +129,18 @@ void guiding_centre_vector_field(const guiding_centre_params *params, const doub
 }
 
 /* ---- Compensated sums, linear equations ---- */
-/* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to
-   its last bit: were it rounded with the change, corrections of one sign would add up to a drift. 0, and x as
-   before, if the sum is not finite. */
+/* x + change + small in compensated arithmetic, where small is the carry and what is as small: were that
+   rounded with the change, corrections of one sign would add up to a drift. 0, and x as before, if the sum is
+   not finite. */
 static int guiding_centre_advance(guiding_centre_solver *s, const double change[guiding_centre_DIM],
-    const double correction[guiding_centre_DIM])
+    const double small[guiding_centre_DIM])
 {
     double x[guiding_centre_DIM], carry[guiding_centre_DIM];
     for (int i = 0; i < guiding_centre_DIM; ++i) {
         const double sum = s->x[i] + change[i], added = sum - s->x[i];
-        const double lost = (s->x[i] - (sum - added)) + (change[i] - added);
-        const double small = lost + (s->carry[i] + correction[i]);
-        x[i] = sum + small;
-        carry[i] = small - (x[i] - sum);
+        const double lost = ((s->x[i] - (sum - added)) + (change[i] - added)) + small[i];
+        x[i] = sum + lost;
+        carry[i] = lost - (x[i] - sum);
         if (!isfinite(x[i])) return 0;
     }
     memcpy(s->x, x, sizeof x);
@@ -180,29 +148,44 @@ static int guiding_centre_advance(guiding_centre_solver *s, const double change[
     return 1;
 }
 
-/* Newton matrices are I + O(h): a pivot whose reciprocal is larger than this is far from 1. */
-#define guiding_centre_LARGEST_RECIPROCAL 1e3
-
-/* Solve matrix * solution = side, both overwritten. The matrix is I + O(h): 0 if a pivot is far from 1. */
+/* Solve matrix * solution = side, both overwritten, by elimination with partial pivoting. 0 if singular. */
 static int guiding_centre_solve(double matrix[guiding_centre_DIM * guiding_centre_DIM],
     double side[guiding_centre_DIM])
 {
-    double solution[guiding_centre_DIM], reciprocal[guiding_centre_DIM], largest = 0.0;
-    guiding_centre_eliminate(matrix, side, solution, reciprocal);
-    for (int i = 0; i < guiding_centre_DIM; ++i)
-        if (!(fabs(reciprocal[i]) <= largest)) largest = fabs(reciprocal[i]);
-    if (!(largest < guiding_centre_LARGEST_RECIPROCAL)) return 0;
-    memcpy(side, solution, sizeof solution);
+    for (int k = 0; k < guiding_centre_DIM; ++k) {
+        int best = k;
+        for (int i = k + 1; i < guiding_centre_DIM; ++i)
+            if (fabs(matrix[i * guiding_centre_DIM + k]) > fabs(matrix[best * guiding_centre_DIM + k]))
+                best = i;
+        const double pivot = matrix[best * guiding_centre_DIM + k], last = side[k];
+        if (!(fabs(pivot) > 0.0)) return 0;
+        for (int j = k; j < guiding_centre_DIM && best != k; ++j) {
+            const double swap = matrix[k * guiding_centre_DIM + j];
+            matrix[k * guiding_centre_DIM + j] = matrix[best * guiding_centre_DIM + j];
+            matrix[best * guiding_centre_DIM + j] = swap;
+        }
+        side[k] = side[best];
+        side[best] = last;
+        for (int i = k + 1; i < guiding_centre_DIM; ++i) {
+            const double factor = matrix[i * guiding_centre_DIM + k] / pivot;
+            for (int j = k + 1; j < guiding_centre_DIM; ++j)
+                matrix[i * guiding_centre_DIM + j] -= factor * matrix[k * guiding_centre_DIM + j];
+            side[i] -= factor * side[k];
+        }
+    }
+    for (int i = guiding_centre_DIM - 1; i >= 0; --i) {
+        for (int j = i + 1; j < guiding_centre_DIM; ++j)
+            side[i] -= matrix[i * guiding_centre_DIM + j] * side[j];
+        side[i] /= matrix[i * guiding_centre_DIM + i];
+    }
     return 1;
 }
 
 /* ---- Starting guesses ---- */
-/* How far from the last value a guess may be, in sizes of that value. */
-#define guiding_centre_REACH 4.0
+#define guiding_centre_REACH 4.0 /* how far from the last value a guess may be, in sizes of that value */
 
-/* The guess for the next value from the last ones: the sum of their backward differences. 0 if there is none,
-   or if it is far away, where the equation of a step has solutions that have nothing to do with the motion.
-   */
+/* The guess for the next value, the sum of differences. 0 if there is none, or if it is far away, where the
+   equation of a step has solutions that have nothing to do with the motion. */
 static int guiding_centre_predict(const guiding_centre_history *history, double value[guiding_centre_DIM])
 {
     double distance = 0.0, size = 0.0;
@@ -238,10 +221,8 @@ static void guiding_centre_remember(guiding_centre_history *history, const doubl
     if (history->count < guiding_centre_DIFFERENCES) ++history->count;
 }
 
-/* How far a step may lead, in sizes of the state and of what the vector field says, if the energy is lost;
-   and the part of the energy that counts as lost. */
-#define guiding_centre_PLAUSIBLE 1.5
-#define guiding_centre_LOST 0.5
+#define guiding_centre_PLAUSIBLE 1.5 /* how far any step may lead, in sizes of the state and of its motion */
+#define guiding_centre_LOST 0.5      /* part of the energy that one which leads farther must not lose */
 
 /* Whether an increment is that of the motion. Where the step is too large, the equation may have been solved
    by a point far away, at another energy, that has nothing to do with it. */
@@ -253,19 +234,18 @@ static int guiding_centre_plausible(const guiding_centre_solver *s, int stage,
     for (int i = 0; i < guiding_centre_DIM; ++i) {
         moved += fabs(increment[i]);
         size += fabs(s->x[i]);
-    }
-    if (moved <= guiding_centre_PLAUSIBLE * size) return 1;
-    guiding_centre_vector_field(&s->params, s->x, field);
-    for (int i = 0; i < guiding_centre_DIM; ++i) {
-        size += fabs(guiding_centre_fractions[stage] * s->h * field[i]);
         middle[i] = s->x[i] + 0.5 * increment[i];
         end[i] = s->x[i] + increment[i];
     }
     if (moved <= guiding_centre_PLAUSIBLE * size) return 1;
-    const double before = guiding_centre_hamiltonian(&s->params, s->x), after =
-        guiding_centre_hamiltonian(&s->params, end);
-    const double scale = fabs(before) + fabs(guiding_centre_hamiltonian(&s->params, middle)) + fabs(after);
-    return fabs(after - before) <= guiding_centre_LOST * scale;
+    guiding_centre_vector_field(&s->params, s->x, field);
+    for (int i = 0; i < guiding_centre_DIM; ++i)
+        size += fabs(guiding_centre_fractions[stage] * s->h * field[i]);
+    if (moved <= guiding_centre_PLAUSIBLE * size) return 1;
+    const double before = guiding_centre_hamiltonian(&s->params, s->x);
+    const double after = guiding_centre_hamiltonian(&s->params, end), between =
+        guiding_centre_hamiltonian(&s->params, middle);
+    return fabs(after - before) <= guiding_centre_LOST * (fabs(before) + fabs(between) + fabs(after));
 }
 
 /* Coefficient k of the product of two Taylor series. */
@@ -584,11 +564,11 @@ static int guiding_centre_differences(guiding_centre_solver *s, const double *co
 }
 
 /* Solve p = grad S_h(mean of the path from x under p) and move to the end of that path. Where that takes more
-   than guiding_centre_MOST_PIECES pieces of paths, the step is so large that a solution would mean nothing.
-   */
+   than guiding_centre_MOST_PIECES pieces of paths, the step is so large that a solution would mean
+   nothing. */
 static guiding_centre_status guiding_centre_attempt(guiding_centre_solver *s, int stage)
 {
-    const double *coef = s->coef[stage], none[guiding_centre_DIM] = { 0.0 };
+    const double *coef = s->coef[stage];
     double p[guiding_centre_DIM], y[guiding_centre_DIM], residual[guiding_centre_DIM],
         change[guiding_centre_DIM], jacobian[guiding_centre_DIM * guiding_centre_DIM], previous = HUGE_VAL;
     if (!guiding_centre_predict(&s->history[stage], y)) memcpy(y, s->x, sizeof y);
@@ -607,7 +587,7 @@ static guiding_centre_status guiding_centre_attempt(guiding_centre_solver *s, in
         /* The second test: residuals no longer shrink, the solve has reached the level of rounding. */
         if (size <= 4e-16 || (previous < 1e-12 && size > 0.25 * previous)) {
             if (!guiding_centre_plausible(s, stage, change)) return guiding_centre_NO_CONVERGENCE;
-            if (!guiding_centre_advance(s, change, none)) return guiding_centre_NOT_FINITE;
+            if (!guiding_centre_advance(s, change, s->carry)) return guiding_centre_NOT_FINITE;
             guiding_centre_remember(&s->history[stage], y);
             return guiding_centre_OK;
         }
@@ -622,32 +602,23 @@ static guiding_centre_status guiding_centre_attempt(guiding_centre_solver *s, in
 }
 
 /* ---- The solver ---- */
-/* Whether steps can be made with these parameters: allowed, and with finite coefficients for a step so short
-   that it has no part in it. */
-static int guiding_centre_admissible(const guiding_centre_params *params)
-{
-    double coef[guiding_centre_COEFFICIENTS];
-    if (!guiding_centre_allowed(params)) return 0;
-    guiding_centre_prepare(params, 1e-100, coef);
-    for (int k = 0; k < guiding_centre_COEFFICIENTS; ++k)
-        if (!isfinite(coef[k])) return 0;
-    return 1;
-}
+#define guiding_centre_SHORT_STEP 1e-100 /* so short that it has no part in whether coefficients are finite */
 
-/* The arguments may be parts of *s: they are read before it is written. */
+/* The arguments may be parts of *s, which is therefore written last. */
 guiding_centre_status guiding_centre_init(guiding_centre_solver *s, const guiding_centre_params *params,
     const double x0[guiding_centre_DIM])
 {
     if (s == NULL || x0 == NULL) return guiding_centre_BAD_ARGUMENT;
-    const guiding_centre_params own = params != NULL ? *params : guiding_centre_default_params;
-    double x[guiding_centre_DIM];
-    memcpy(x, x0, sizeof x);
+    guiding_centre_solver fresh = { .h = (double)NAN };
+    fresh.params = params != NULL ? *params : guiding_centre_default_params;
+    memcpy(fresh.x, x0, sizeof fresh.x);
     for (int i = 0; i < guiding_centre_DIM; ++i)
-        if (!isfinite(x[i])) return guiding_centre_BAD_ARGUMENT;
-    if (!guiding_centre_admissible(&own)) return guiding_centre_BAD_ARGUMENT;
-    memset(s, 0, sizeof *s);
-    memcpy(s->x, x, sizeof s->x);
-    s->params = own;
+        if (!isfinite(fresh.x[i])) return guiding_centre_BAD_ARGUMENT;
+    if (!guiding_centre_allowed(&fresh.params)) return guiding_centre_BAD_ARGUMENT;
+    guiding_centre_prepare(&fresh.params, guiding_centre_SHORT_STEP, fresh.coef[0]);
+    for (int k = 0; k < guiding_centre_COEFFICIENTS; ++k)
+        if (!isfinite(fresh.coef[0][k])) return guiding_centre_BAD_ARGUMENT;
+    *s = fresh;
     return guiding_centre_OK;
 }
 
@@ -655,26 +626,23 @@ guiding_centre_status guiding_centre_init(guiding_centre_solver *s, const guidin
 static guiding_centre_status guiding_centre_set_step(guiding_centre_solver *s, double h)
 {
     if (s == NULL || !isfinite(h)) return guiding_centre_BAD_ARGUMENT;
-    if (s->prepared && memcmp(&h, &s->h, sizeof h) == 0) return guiding_centre_OK;
+    if (memcmp(&h, &s->h, sizeof h) == 0) return guiding_centre_OK;
     for (int stage = 0; stage < guiding_centre_STAGES; ++stage)
         guiding_centre_prepare(&s->params, guiding_centre_fractions[stage] * h, s->coef[stage]);
     memset(&s->history, 0, sizeof s->history);
     s->h = h;
     s->t_before_h = s->t;
     s->steps_before_h = s->steps;
-    s->prepared = 1;
     return guiding_centre_OK;
 }
 
 /* One stage. A guess from earlier steps may have misled it: then once more without. */
 static guiding_centre_status guiding_centre_stage(guiding_centre_solver *s, int stage)
 {
-    guiding_centre_status status = guiding_centre_attempt(s, stage);
-    if (status != guiding_centre_OK && s->history[stage].count > 0) {
-        memset(&s->history[stage], 0, sizeof s->history[stage]);
-        status = guiding_centre_attempt(s, stage);
-    }
-    return status;
+    const guiding_centre_status status = guiding_centre_attempt(s, stage);
+    if (status == guiding_centre_OK || s->history[stage].count == 0) return status;
+    memset(&s->history[stage], 0, sizeof s->history[stage]);
+    return guiding_centre_attempt(s, stage);
 }
 
 /* The stages of one step. If one fails, the state is as before the step. */
@@ -693,23 +661,20 @@ static guiding_centre_status guiding_centre_stages(guiding_centre_solver *s)
     return status;
 }
 
-guiding_centre_status guiding_centre_step(guiding_centre_solver *s, double h)
-{
-    guiding_centre_status status = guiding_centre_set_step(s, h);
-    if (status != guiding_centre_OK) return status;
-    status = guiding_centre_stages(s);
-    if (status != guiding_centre_OK) return status;
-    ++s->steps;
-    s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
-    return status;
-}
-
 guiding_centre_status guiding_centre_integrate(guiding_centre_solver *s, double h, size_t steps)
 {
     guiding_centre_status status = guiding_centre_set_step(s, h);
-    for (; steps > 0 && status == guiding_centre_OK; --steps) status = guiding_centre_step(s, h);
+    for (; steps > 0 && status == guiding_centre_OK; --steps) {
+        status = guiding_centre_stages(s);
+        if (status != guiding_centre_OK) break;
+        ++s->steps;
+        s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
+    }
     return status;
 }
+
+guiding_centre_status guiding_centre_step(guiding_centre_solver *s,
+    double h) { return guiding_centre_integrate(s, h, 1); }
 
 const char *guiding_centre_status_string(guiding_centre_status status)
 {
@@ -724,7 +689,6 @@ const char *guiding_centre_status_string(guiding_centre_status status)
 }
 
 size_t guiding_centre_solver_size(void) { return sizeof(guiding_centre_solver); }
-
 size_t guiding_centre_solver_steps_done(const guiding_centre_solver *s) { return s->steps; }
 
 /* ---- Ensembles ---- */

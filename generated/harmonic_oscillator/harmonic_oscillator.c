@@ -20,7 +20,7 @@
  *   4. The implicit step, by Newton's method
  *   5. The solver
  *   6. Ensembles
- * body-sha256: ced9e360f8bdcd52c6cb4a0a6c1c251f0d76b2a3a24de49821f15d49992cbac0
+ * body-sha256: 14f3f7e6a74d03d9356011aded5179be12cccf4d5639877d37fe46fc5fdb22c0
  */
 #include "harmonic_oscillator.h"
 
@@ -32,8 +32,7 @@
 const harmonic_oscillator_params harmonic_oscillator_default_params = { 1.0, 1.0 };
 
 enum { harmonic_oscillator_MAX_ITERATIONS = 20 }; /* of an inner solve */
-
-/* A correction is accepted when the error that it leaves is estimated to be below this. */
+/* the error that an accepted correction may leave, as estimated */
 #define harmonic_oscillator_TOLERANCE 1e-20
 
 /* Whether all parameters are finite, and positive where they have to be. */
@@ -63,8 +62,7 @@ static void harmonic_oscillator_linearise(const double coef[5], const double y[2
 {
     const double q = y[0], p = y[1];
     /* momenta */
-    const double p_p = coef[1] * p;
-    const double p_q = coef[0] * q;
+    const double p_p = coef[1] * p, p_q = coef[0] * q;
     /* displacement */
     displacement[0] = (-0.5) * p_p;
     displacement[1] = 0.5 * p_q;
@@ -83,21 +81,6 @@ static void harmonic_oscillator_linearise(const double coef[5], const double y[2
     increment_jacobian[3] = 0.0;
 }
 
-/* elimination without pivoting: the solution, and the reciprocals of the pivots */
-static void harmonic_oscillator_eliminate(const double matrix[4], const double side[2],
-    double solution[restrict 2], double reciprocal[restrict 2])
-{
-    /* solution */
-    const double t1 = 1.0 / matrix[0], t2 = matrix[2] * t1, t3 = 1.0 / (matrix[3] - matrix[1] * t2);
-    const double t4 = (side[1] - side[0] * t2) * t3;
-    solution[0] = t1 * (side[0] - matrix[1] * t4);
-    solution[1] = t4;
-    /* reciprocal */
-    reciprocal[0] = t1;
-    reciprocal[1] = t3;
-}
-
-/* the Hamiltonian */
 double harmonic_oscillator_hamiltonian(const harmonic_oscillator_params *params, const double x[2])
 {
     if (params == NULL) params = &harmonic_oscillator_default_params;
@@ -105,13 +88,11 @@ double harmonic_oscillator_hamiltonian(const harmonic_oscillator_params *params,
     return 0.5 * (p * p / m) + 0.5 * (k * (q * q));
 }
 
-/* the Casimirs */
 void harmonic_oscillator_casimirs(const harmonic_oscillator_params *params, const double x[2], double out[])
 {
     (void)params, (void)x, (void)out;
 }
 
-/* pi(x) grad H(x) */
 void harmonic_oscillator_vector_field(const harmonic_oscillator_params *params, const double x[2],
     double out[2])
 {
@@ -122,19 +103,18 @@ void harmonic_oscillator_vector_field(const harmonic_oscillator_params *params, 
 }
 
 /* ---- Compensated sums, linear equations ---- */
-/* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to
-   its last bit: were it rounded with the change, corrections of one sign would add up to a drift. 0, and x as
-   before, if the sum is not finite. */
+/* x + change + small in compensated arithmetic, where small is the carry and what is as small: were that
+   rounded with the change, corrections of one sign would add up to a drift. 0, and x as before, if the sum is
+   not finite. */
 static int harmonic_oscillator_advance(harmonic_oscillator_solver *s,
-    const double change[harmonic_oscillator_DIM], const double correction[harmonic_oscillator_DIM])
+    const double change[harmonic_oscillator_DIM], const double small[harmonic_oscillator_DIM])
 {
     double x[harmonic_oscillator_DIM], carry[harmonic_oscillator_DIM];
     for (int i = 0; i < harmonic_oscillator_DIM; ++i) {
         const double sum = s->x[i] + change[i], added = sum - s->x[i];
-        const double lost = (s->x[i] - (sum - added)) + (change[i] - added);
-        const double small = lost + (s->carry[i] + correction[i]);
-        x[i] = sum + small;
-        carry[i] = small - (x[i] - sum);
+        const double lost = ((s->x[i] - (sum - added)) + (change[i] - added)) + small[i];
+        x[i] = sum + lost;
+        carry[i] = lost - (x[i] - sum);
         if (!isfinite(x[i])) return 0;
     }
     memcpy(s->x, x, sizeof x);
@@ -142,29 +122,44 @@ static int harmonic_oscillator_advance(harmonic_oscillator_solver *s,
     return 1;
 }
 
-/* Newton matrices are I + O(h): a pivot whose reciprocal is larger than this is far from 1. */
-#define harmonic_oscillator_LARGEST_RECIPROCAL 1e3
-
-/* Solve matrix * solution = side, both overwritten. The matrix is I + O(h): 0 if a pivot is far from 1. */
+/* Solve matrix * solution = side, both overwritten, by elimination with partial pivoting. 0 if singular. */
 static int harmonic_oscillator_solve(double matrix[harmonic_oscillator_DIM * harmonic_oscillator_DIM],
     double side[harmonic_oscillator_DIM])
 {
-    double solution[harmonic_oscillator_DIM], reciprocal[harmonic_oscillator_DIM], largest = 0.0;
-    harmonic_oscillator_eliminate(matrix, side, solution, reciprocal);
-    for (int i = 0; i < harmonic_oscillator_DIM; ++i)
-        if (!(fabs(reciprocal[i]) <= largest)) largest = fabs(reciprocal[i]);
-    if (!(largest < harmonic_oscillator_LARGEST_RECIPROCAL)) return 0;
-    memcpy(side, solution, sizeof solution);
+    for (int k = 0; k < harmonic_oscillator_DIM; ++k) {
+        int best = k;
+        for (int i = k + 1; i < harmonic_oscillator_DIM; ++i)
+            if (fabs(matrix[i * harmonic_oscillator_DIM + k]) > fabs(matrix[best * harmonic_oscillator_DIM
+                + k])) best = i;
+        const double pivot = matrix[best * harmonic_oscillator_DIM + k], last = side[k];
+        if (!(fabs(pivot) > 0.0)) return 0;
+        for (int j = k; j < harmonic_oscillator_DIM && best != k; ++j) {
+            const double swap = matrix[k * harmonic_oscillator_DIM + j];
+            matrix[k * harmonic_oscillator_DIM + j] = matrix[best * harmonic_oscillator_DIM + j];
+            matrix[best * harmonic_oscillator_DIM + j] = swap;
+        }
+        side[k] = side[best];
+        side[best] = last;
+        for (int i = k + 1; i < harmonic_oscillator_DIM; ++i) {
+            const double factor = matrix[i * harmonic_oscillator_DIM + k] / pivot;
+            for (int j = k + 1; j < harmonic_oscillator_DIM; ++j)
+                matrix[i * harmonic_oscillator_DIM + j] -= factor * matrix[k * harmonic_oscillator_DIM + j];
+            side[i] -= factor * side[k];
+        }
+    }
+    for (int i = harmonic_oscillator_DIM - 1; i >= 0; --i) {
+        for (int j = i + 1; j < harmonic_oscillator_DIM; ++j)
+            side[i] -= matrix[i * harmonic_oscillator_DIM + j] * side[j];
+        side[i] /= matrix[i * harmonic_oscillator_DIM + i];
+    }
     return 1;
 }
 
 /* ---- Starting guesses ---- */
-/* How far from the last value a guess may be, in sizes of that value. */
-#define harmonic_oscillator_REACH 4.0
+#define harmonic_oscillator_REACH 4.0 /* how far from the last value a guess may be, in sizes of that value */
 
-/* The guess for the next value from the last ones: the sum of their backward differences. 0 if there is none,
-   or if it is far away, where the equation of a step has solutions that have nothing to do with the motion.
-   */
+/* The guess for the next value, the sum of differences. 0 if there is none, or if it is far away, where the
+   equation of a step has solutions that have nothing to do with the motion. */
 static int harmonic_oscillator_predict(const harmonic_oscillator_history *history,
     double value[harmonic_oscillator_DIM])
 {
@@ -202,10 +197,9 @@ static void harmonic_oscillator_remember(harmonic_oscillator_history *history,
     if (history->count < harmonic_oscillator_DIFFERENCES) ++history->count;
 }
 
-/* How far a step may lead, in sizes of the state and of what the vector field says, if the energy is lost;
-   and the part of the energy that counts as lost. */
+/* how far any step may lead, in sizes of the state and of its motion */
 #define harmonic_oscillator_PLAUSIBLE 1.5
-#define harmonic_oscillator_LOST 0.5
+#define harmonic_oscillator_LOST 0.5 /* part of the energy that one which leads farther must not lose */
 
 /* Whether an increment is that of the motion. Where the step is too large, the equation may have been solved
    by a point far away, at another energy, that has nothing to do with it. */
@@ -217,24 +211,21 @@ static int harmonic_oscillator_plausible(const harmonic_oscillator_solver *s,
     for (int i = 0; i < harmonic_oscillator_DIM; ++i) {
         moved += fabs(increment[i]);
         size += fabs(s->x[i]);
-    }
-    if (moved <= harmonic_oscillator_PLAUSIBLE * size) return 1;
-    harmonic_oscillator_vector_field(&s->params, s->x, field);
-    for (int i = 0; i < harmonic_oscillator_DIM; ++i) {
-        size += fabs(s->h * field[i]);
         middle[i] = s->x[i] + 0.5 * increment[i];
         end[i] = s->x[i] + increment[i];
     }
     if (moved <= harmonic_oscillator_PLAUSIBLE * size) return 1;
-    const double before = harmonic_oscillator_hamiltonian(&s->params, s->x), after =
-        harmonic_oscillator_hamiltonian(&s->params, end);
-    const double scale = fabs(before) + fabs(harmonic_oscillator_hamiltonian(&s->params, middle))
-        + fabs(after);
-    return fabs(after - before) <= harmonic_oscillator_LOST * scale;
+    harmonic_oscillator_vector_field(&s->params, s->x, field);
+    for (int i = 0; i < harmonic_oscillator_DIM; ++i) size += fabs(s->h * field[i]);
+    if (moved <= harmonic_oscillator_PLAUSIBLE * size) return 1;
+    const double before = harmonic_oscillator_hamiltonian(&s->params, s->x);
+    const double after = harmonic_oscillator_hamiltonian(&s->params, end), between =
+        harmonic_oscillator_hamiltonian(&s->params, middle);
+    return fabs(after - before) <= harmonic_oscillator_LOST * (fabs(before) + fabs(between) + fabs(after));
 }
 
 /* ---- The implicit step, by Newton's method ---- */
-/* Components of y are measured no finer than by this part of the largest. */
+/* components of y are measured no finer than by this part of the largest */
 #define harmonic_oscillator_FLOOR 1e-6
 
 /* Size of a correction relative to each component of y; NaN or infinite if the correction is. */
@@ -251,9 +242,9 @@ static double harmonic_oscillator_size(const double y[harmonic_oscillator_DIM],
     return size;
 }
 
-/* Corrections below the first that shrink by less than the second have reached the level of rounding. */
+/* corrections below this have reached the level of rounding, ... */
 #define harmonic_oscillator_NEARLY_SOLVED 1e-8
-#define harmonic_oscillator_SHRINKING 0.25
+#define harmonic_oscillator_SHRINKING 0.25 /* ... if one is more than this part of the one before */
 
 /* Solve (y - x) + displacement(y) = 0 for y by Newton's method from the extrapolated guess, and advance. The
    increment is corrected to first order by the last Newton correction, so that correction costs no
@@ -264,13 +255,14 @@ static harmonic_oscillator_status harmonic_oscillator_attempt(harmonic_oscillato
     double y[harmonic_oscillator_DIM], delta[harmonic_oscillator_DIM], displacement[harmonic_oscillator_DIM],
         increment[harmonic_oscillator_DIM];
     double jacobian[harmonic_oscillator_DIM * harmonic_oscillator_DIM],
-        increment_jacobian[harmonic_oscillator_DIM * harmonic_oscillator_DIM], previous = HUGE_VAL;
+        increment_jacobian[harmonic_oscillator_DIM * harmonic_oscillator_DIM];
+    double previous = HUGE_VAL;
     if (!harmonic_oscillator_predict(&s->history, y)) memcpy(y, s->x, sizeof y);
     for (int iteration = 1; iteration <= harmonic_oscillator_MAX_ITERATIONS; ++iteration) {
         harmonic_oscillator_linearise(s->coef, y, displacement, increment, jacobian, increment_jacobian);
         ++s->evaluations;
-        for (int i = 0; i < harmonic_oscillator_DIM; ++i) delta[i] = ((y[i] - s->x[i]) + displacement[i])
-            - s->carry[i];
+        for (int i = 0; i < harmonic_oscillator_DIM; ++i)
+            delta[i] = ((y[i] - s->x[i]) + displacement[i]) - s->carry[i];
         const int regular = harmonic_oscillator_solve(jacobian, delta);
         const double size = harmonic_oscillator_size(y, delta), growth = size / (previous * previous);
         if (!isfinite(size)) return harmonic_oscillator_NOT_FINITE;
@@ -281,12 +273,14 @@ static harmonic_oscillator_status harmonic_oscillator_attempt(harmonic_oscillato
             > harmonic_oscillator_SHRINKING * previous;
         previous = size;
         if (!(remaining <= harmonic_oscillator_TOLERANCE || stalled)) continue;
-        double correction[harmonic_oscillator_DIM] = { 0.0 };
-        for (int i = 0; i < harmonic_oscillator_DIM; ++i)
+        double small[harmonic_oscillator_DIM] = { 0.0 }; /* the correction of the increment, and the carry */
+        for (int i = 0; i < harmonic_oscillator_DIM; ++i) {
             for (int j = 0; j < harmonic_oscillator_DIM; ++j)
-                correction[i] -= increment_jacobian[i * harmonic_oscillator_DIM + j] * delta[j];
+                small[i] -= increment_jacobian[i * harmonic_oscillator_DIM + j] * delta[j];
+            small[i] += s->carry[i];
+        }
         if (!harmonic_oscillator_plausible(s, increment)) return harmonic_oscillator_NO_CONVERGENCE;
-        if (!harmonic_oscillator_advance(s, increment, correction)) return harmonic_oscillator_NOT_FINITE;
+        if (!harmonic_oscillator_advance(s, increment, small)) return harmonic_oscillator_NOT_FINITE;
         harmonic_oscillator_remember(&s->history, y);
         return harmonic_oscillator_OK;
     }
@@ -294,32 +288,24 @@ static harmonic_oscillator_status harmonic_oscillator_attempt(harmonic_oscillato
 }
 
 /* ---- The solver ---- */
-/* Whether steps can be made with these parameters: allowed, and with finite coefficients for a step so short
-   that it has no part in it. */
-static int harmonic_oscillator_admissible(const harmonic_oscillator_params *params)
-{
-    double coef[harmonic_oscillator_COEFFICIENTS];
-    if (!harmonic_oscillator_allowed(params)) return 0;
-    harmonic_oscillator_prepare(params, 1e-100, coef);
-    for (int k = 0; k < harmonic_oscillator_COEFFICIENTS; ++k)
-        if (!isfinite(coef[k])) return 0;
-    return 1;
-}
+/* so short that it has no part in whether coefficients are finite */
+#define harmonic_oscillator_SHORT_STEP 1e-100
 
-/* The arguments may be parts of *s: they are read before it is written. */
+/* The arguments may be parts of *s, which is therefore written last. */
 harmonic_oscillator_status harmonic_oscillator_init(harmonic_oscillator_solver *s,
     const harmonic_oscillator_params *params, const double x0[harmonic_oscillator_DIM])
 {
     if (s == NULL || x0 == NULL) return harmonic_oscillator_BAD_ARGUMENT;
-    const harmonic_oscillator_params own = params != NULL ? *params : harmonic_oscillator_default_params;
-    double x[harmonic_oscillator_DIM];
-    memcpy(x, x0, sizeof x);
+    harmonic_oscillator_solver fresh = { .h = (double)NAN };
+    fresh.params = params != NULL ? *params : harmonic_oscillator_default_params;
+    memcpy(fresh.x, x0, sizeof fresh.x);
     for (int i = 0; i < harmonic_oscillator_DIM; ++i)
-        if (!isfinite(x[i])) return harmonic_oscillator_BAD_ARGUMENT;
-    if (!harmonic_oscillator_admissible(&own)) return harmonic_oscillator_BAD_ARGUMENT;
-    memset(s, 0, sizeof *s);
-    memcpy(s->x, x, sizeof s->x);
-    s->params = own;
+        if (!isfinite(fresh.x[i])) return harmonic_oscillator_BAD_ARGUMENT;
+    if (!harmonic_oscillator_allowed(&fresh.params)) return harmonic_oscillator_BAD_ARGUMENT;
+    harmonic_oscillator_prepare(&fresh.params, harmonic_oscillator_SHORT_STEP, fresh.coef);
+    for (int k = 0; k < harmonic_oscillator_COEFFICIENTS; ++k)
+        if (!isfinite(fresh.coef[k])) return harmonic_oscillator_BAD_ARGUMENT;
+    *s = fresh;
     return harmonic_oscillator_OK;
 }
 
@@ -327,45 +313,39 @@ harmonic_oscillator_status harmonic_oscillator_init(harmonic_oscillator_solver *
 static harmonic_oscillator_status harmonic_oscillator_set_step(harmonic_oscillator_solver *s, double h)
 {
     if (s == NULL || !isfinite(h)) return harmonic_oscillator_BAD_ARGUMENT;
-    if (s->prepared && memcmp(&h, &s->h, sizeof h) == 0) return harmonic_oscillator_OK;
+    if (memcmp(&h, &s->h, sizeof h) == 0) return harmonic_oscillator_OK;
     harmonic_oscillator_prepare(&s->params, h, s->coef);
     memset(&s->history, 0, sizeof s->history);
     s->h = h;
     s->t_before_h = s->t;
     s->steps_before_h = s->steps;
-    s->prepared = 1;
     return harmonic_oscillator_OK;
 }
 
 /* One stage. A guess from earlier steps may have misled it: then once more without. */
 static harmonic_oscillator_status harmonic_oscillator_stage(harmonic_oscillator_solver *s)
 {
-    harmonic_oscillator_status status = harmonic_oscillator_attempt(s);
-    if (status != harmonic_oscillator_OK && s->history.count > 0) {
-        memset(&s->history, 0, sizeof s->history);
-        status = harmonic_oscillator_attempt(s);
-    }
-    return status;
-}
-
-harmonic_oscillator_status harmonic_oscillator_step(harmonic_oscillator_solver *s, double h)
-{
-    harmonic_oscillator_status status = harmonic_oscillator_set_step(s, h);
-    if (status != harmonic_oscillator_OK) return status;
-    status = harmonic_oscillator_stage(s);
-    if (status != harmonic_oscillator_OK) return status;
-    ++s->steps;
-    s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
-    return status;
+    const harmonic_oscillator_status status = harmonic_oscillator_attempt(s);
+    if (status == harmonic_oscillator_OK || s->history.count == 0) return status;
+    memset(&s->history, 0, sizeof s->history);
+    return harmonic_oscillator_attempt(s);
 }
 
 harmonic_oscillator_status harmonic_oscillator_integrate(harmonic_oscillator_solver *s, double h,
     size_t steps)
 {
     harmonic_oscillator_status status = harmonic_oscillator_set_step(s, h);
-    for (; steps > 0 && status == harmonic_oscillator_OK; --steps) status = harmonic_oscillator_step(s, h);
+    for (; steps > 0 && status == harmonic_oscillator_OK; --steps) {
+        status = harmonic_oscillator_stage(s);
+        if (status != harmonic_oscillator_OK) break;
+        ++s->steps;
+        s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
+    }
     return status;
 }
+
+harmonic_oscillator_status harmonic_oscillator_step(harmonic_oscillator_solver *s,
+    double h) { return harmonic_oscillator_integrate(s, h, 1); }
 
 const char *harmonic_oscillator_status_string(harmonic_oscillator_status status)
 {
@@ -381,7 +361,6 @@ const char *harmonic_oscillator_status_string(harmonic_oscillator_status status)
 }
 
 size_t harmonic_oscillator_solver_size(void) { return sizeof(harmonic_oscillator_solver); }
-
 size_t harmonic_oscillator_solver_steps_done(const harmonic_oscillator_solver *s) { return s->steps; }
 
 /* ---- Ensembles ---- */

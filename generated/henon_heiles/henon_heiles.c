@@ -20,7 +20,7 @@
  *   4. The implicit step, by Newton's method
  *   5. The solver
  *   6. Ensembles
- * body-sha256: 111adfe017986c05a2e94f92892b4d5fdd45270ee48198f06419a1975942aa0b
+ * body-sha256: 4c62d720c8cd234ce81471edc25edaf7cef2049b2da0b5d3e4e4f1cd743032d8
  */
 #include "henon_heiles.h"
 
@@ -32,9 +32,7 @@
 const henon_heiles_params henon_heiles_default_params = { 0 };
 
 enum { henon_heiles_MAX_ITERATIONS = 20 }; /* of an inner solve */
-
-/* A correction is accepted when the error that it leaves is estimated to be below this. */
-#define henon_heiles_TOLERANCE 1e-20
+#define henon_heiles_TOLERANCE 1e-20       /* the error that an accepted correction may leave, as estimated */
 
 /* everything that depends on parameters and step size only */
 static void henon_heiles_prepare(const henon_heiles_params *params, double h, double coef[restrict 24])
@@ -79,12 +77,11 @@ static void henon_heiles_linearise(const double coef[24], const double y[4], dou
     const double x = y[0], y_ = y[1], px = y[2], py = y[3];
     /* momenta */
     const double t1 = py * x, t2 = coef[0] + coef[1] * y_, t3 = x * x;
-    const double t4 = coef[2] + coef[4] * t3 + y_ * (coef[16] + coef[3] * y_);
-    const double p_px = t1 * t2 + px * t4;
+    const double t4 = coef[2] + coef[4] * t3 + y_ * (coef[16] + coef[3] * y_), p_px = t1 * t2 + px * t4;
     const double t5 = px * x, t6 = coef[3] * t3, t7 = coef[2] + t6 + y_ * (coef[17] + coef[4] * y_);
-    const double p_py = t5 * t2 + py * t7;
-    const double t8 = px * py, t9 = py * py, t10 = px * px, t11 = coef[3] * t9 + coef[4] * t10;
-    const double t12 = coef[9] * t3, t13 = coef[5] + t12, t14 = y_ * (coef[6] + coef[7] * y_);
+    const double p_py = t5 * t2 + py * t7, t8 = px * py, t9 = py * py, t10 = px * px;
+    const double t11 = coef[3] * t9 + coef[4] * t10, t12 = coef[9] * t3, t13 = coef[5] + t12;
+    const double t14 = y_ * (coef[6] + coef[7] * y_);
     const double p_x = t8 * t2 + x * (t11 + (coef[2] + coef[8] * t3) + y_ * (t13 + t14));
     const double t15 = coef[1] * t8, t16 = coef[4] * t9 + coef[3] * t10 + (coef[2] + coef[6] * t3);
     const double p_y = coef[10] * t9 + coef[11] * t10 + x * (t15 + x * (coef[14] + t6)) + y_
@@ -101,9 +98,9 @@ static void henon_heiles_linearise(const double coef[24], const double y[4], dou
     increment[3] = -p_y;
     /* jacobian */
     const double t17 = coef[21] * t5 + py * t2, t18 = 0.5 * t17;
-    const double t19 = coef[1] * t1 + px * (coef[16] + coef[15] * y_), t20 = x * t2;
-    const double t21 = (-0.5) * t20, t22 = coef[15] * t1 + px * t2;
-    const double t23 = coef[1] * t5 + py * (coef[17] + coef[21] * y_), t24 = 0.5 * t23;
+    const double t19 = coef[1] * t1 + px * (coef[16] + coef[15] * y_), t20 = x * t2, t21 = (-0.5) * t20;
+    const double t22 = coef[15] * t1 + px * t2, t23 = coef[1] * t5 + py * (coef[17] + coef[21] * y_);
+    const double t24 = 0.5 * t23;
     const double t25 = t11 + (coef[2] + coef[18] * t3) + y_ * (coef[5] + coef[19] * t3 + t14);
     const double t26 = t15 + x * (y_ * (coef[20] + coef[9] * y_) + t13), t27 = 0.5 * t26;
     const double t28 = t16 + y_ * (y_ * (coef[18] + coef[23] * y_) + (coef[22] + t12));
@@ -142,34 +139,6 @@ static void henon_heiles_linearise(const double coef[24], const double y[4], dou
     increment_jacobian[15] = -t23;
 }
 
-/* elimination without pivoting: the solution, and the reciprocals of the pivots */
-static void henon_heiles_eliminate(const double matrix[16], const double side[4], double solution[restrict 4],
-    double reciprocal[restrict 4])
-{
-    /* solution */
-    const double t1 = 1.0 / matrix[0], t2 = matrix[12] * t1, t3 = matrix[4] * t1;
-    const double t4 = side[1] - side[0] * t3, t5 = 1.0 / (matrix[5] - matrix[1] * t3);
-    const double t6 = (matrix[13] - matrix[1] * t2) * t5, t7 = matrix[8] * t1;
-    const double t8 = (matrix[9] - matrix[1] * t7) * t5, t9 = side[2] - side[0] * t7 - t4 * t8;
-    const double t10 = matrix[6] - matrix[2] * t3;
-    const double t11 = 1.0 / (matrix[10] - matrix[2] * t7 - t10 * t8);
-    const double t12 = (matrix[14] - matrix[2] * t2 - t10 * t6) * t11;
-    const double t13 = matrix[7] - matrix[3] * t3, t14 = matrix[11] - matrix[3] * t7 - t13 * t8;
-    const double t15 = 1.0 / (matrix[15] - matrix[3] * t2 - t13 * t6 - t14 * t12);
-    const double t16 = (side[3] - side[0] * t2 - t4 * t6 - t9 * t12) * t15;
-    const double t17 = t11 * (t9 - t14 * t16), t18 = t5 * (t4 - (t13 * t16 + t10 * t17));
-    solution[0] = t1 * (side[0] - (matrix[3] * t16 + (matrix[2] * t17 + matrix[1] * t18)));
-    solution[1] = t18;
-    solution[2] = t17;
-    solution[3] = t16;
-    /* reciprocal */
-    reciprocal[0] = t1;
-    reciprocal[1] = t5;
-    reciprocal[2] = t11;
-    reciprocal[3] = t15;
-}
-
-/* the Hamiltonian */
 double henon_heiles_hamiltonian(const henon_heiles_params *params, const double x[4])
 {
     (void)params;
@@ -178,13 +147,11 @@ double henon_heiles_hamiltonian(const henon_heiles_params *params, const double 
     return y * t1 + (0.5 * (px * px + py * py) + 0.5 * (t1 + t2)) - 1.0 / 3.0 * (y * t2);
 }
 
-/* the Casimirs */
 void henon_heiles_casimirs(const henon_heiles_params *params, const double x[4], double out[])
 {
     (void)params, (void)x, (void)out;
 }
 
-/* pi(x) grad H(x) */
 void henon_heiles_vector_field(const henon_heiles_params *params, const double x[4], double out[4])
 {
     (void)params;
@@ -196,19 +163,18 @@ void henon_heiles_vector_field(const henon_heiles_params *params, const double x
 }
 
 /* ---- Compensated sums, linear equations ---- */
-/* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to
-   its last bit: were it rounded with the change, corrections of one sign would add up to a drift. 0, and x as
-   before, if the sum is not finite. */
+/* x + change + small in compensated arithmetic, where small is the carry and what is as small: were that
+   rounded with the change, corrections of one sign would add up to a drift. 0, and x as before, if the sum is
+   not finite. */
 static int henon_heiles_advance(henon_heiles_solver *s, const double change[henon_heiles_DIM],
-    const double correction[henon_heiles_DIM])
+    const double small[henon_heiles_DIM])
 {
     double x[henon_heiles_DIM], carry[henon_heiles_DIM];
     for (int i = 0; i < henon_heiles_DIM; ++i) {
         const double sum = s->x[i] + change[i], added = sum - s->x[i];
-        const double lost = (s->x[i] - (sum - added)) + (change[i] - added);
-        const double small = lost + (s->carry[i] + correction[i]);
-        x[i] = sum + small;
-        carry[i] = small - (x[i] - sum);
+        const double lost = ((s->x[i] - (sum - added)) + (change[i] - added)) + small[i];
+        x[i] = sum + lost;
+        carry[i] = lost - (x[i] - sum);
         if (!isfinite(x[i])) return 0;
     }
     memcpy(s->x, x, sizeof x);
@@ -216,29 +182,42 @@ static int henon_heiles_advance(henon_heiles_solver *s, const double change[heno
     return 1;
 }
 
-/* Newton matrices are I + O(h): a pivot whose reciprocal is larger than this is far from 1. */
-#define henon_heiles_LARGEST_RECIPROCAL 1e3
-
-/* Solve matrix * solution = side, both overwritten. The matrix is I + O(h): 0 if a pivot is far from 1. */
+/* Solve matrix * solution = side, both overwritten, by elimination with partial pivoting. 0 if singular. */
 static int henon_heiles_solve(double matrix[henon_heiles_DIM * henon_heiles_DIM],
     double side[henon_heiles_DIM])
 {
-    double solution[henon_heiles_DIM], reciprocal[henon_heiles_DIM], largest = 0.0;
-    henon_heiles_eliminate(matrix, side, solution, reciprocal);
-    for (int i = 0; i < henon_heiles_DIM; ++i)
-        if (!(fabs(reciprocal[i]) <= largest)) largest = fabs(reciprocal[i]);
-    if (!(largest < henon_heiles_LARGEST_RECIPROCAL)) return 0;
-    memcpy(side, solution, sizeof solution);
+    for (int k = 0; k < henon_heiles_DIM; ++k) {
+        int best = k;
+        for (int i = k + 1; i < henon_heiles_DIM; ++i)
+            if (fabs(matrix[i * henon_heiles_DIM + k]) > fabs(matrix[best * henon_heiles_DIM + k])) best = i;
+        const double pivot = matrix[best * henon_heiles_DIM + k], last = side[k];
+        if (!(fabs(pivot) > 0.0)) return 0;
+        for (int j = k; j < henon_heiles_DIM && best != k; ++j) {
+            const double swap = matrix[k * henon_heiles_DIM + j];
+            matrix[k * henon_heiles_DIM + j] = matrix[best * henon_heiles_DIM + j];
+            matrix[best * henon_heiles_DIM + j] = swap;
+        }
+        side[k] = side[best];
+        side[best] = last;
+        for (int i = k + 1; i < henon_heiles_DIM; ++i) {
+            const double factor = matrix[i * henon_heiles_DIM + k] / pivot;
+            for (int j = k + 1; j < henon_heiles_DIM; ++j)
+                matrix[i * henon_heiles_DIM + j] -= factor * matrix[k * henon_heiles_DIM + j];
+            side[i] -= factor * side[k];
+        }
+    }
+    for (int i = henon_heiles_DIM - 1; i >= 0; --i) {
+        for (int j = i + 1; j < henon_heiles_DIM; ++j) side[i] -= matrix[i * henon_heiles_DIM + j] * side[j];
+        side[i] /= matrix[i * henon_heiles_DIM + i];
+    }
     return 1;
 }
 
 /* ---- Starting guesses ---- */
-/* How far from the last value a guess may be, in sizes of that value. */
-#define henon_heiles_REACH 4.0
+#define henon_heiles_REACH 4.0 /* how far from the last value a guess may be, in sizes of that value */
 
-/* The guess for the next value from the last ones: the sum of their backward differences. 0 if there is none,
-   or if it is far away, where the equation of a step has solutions that have nothing to do with the motion.
-   */
+/* The guess for the next value, the sum of differences. 0 if there is none, or if it is far away, where the
+   equation of a step has solutions that have nothing to do with the motion. */
 static int henon_heiles_predict(const henon_heiles_history *history, double value[henon_heiles_DIM])
 {
     double distance = 0.0, size = 0.0;
@@ -274,10 +253,8 @@ static void henon_heiles_remember(henon_heiles_history *history, const double va
     if (history->count < henon_heiles_DIFFERENCES) ++history->count;
 }
 
-/* How far a step may lead, in sizes of the state and of what the vector field says, if the energy is lost;
-   and the part of the energy that counts as lost. */
-#define henon_heiles_PLAUSIBLE 1.5
-#define henon_heiles_LOST 0.5
+#define henon_heiles_PLAUSIBLE 1.5 /* how far any step may lead, in sizes of the state and of its motion */
+#define henon_heiles_LOST 0.5      /* part of the energy that one which leads farther must not lose */
 
 /* Whether an increment is that of the motion. Where the step is too large, the equation may have been solved
    by a point far away, at another energy, that has nothing to do with it. */
@@ -287,24 +264,21 @@ static int henon_heiles_plausible(const henon_heiles_solver *s, const double inc
     for (int i = 0; i < henon_heiles_DIM; ++i) {
         moved += fabs(increment[i]);
         size += fabs(s->x[i]);
-    }
-    if (moved <= henon_heiles_PLAUSIBLE * size) return 1;
-    henon_heiles_vector_field(&s->params, s->x, field);
-    for (int i = 0; i < henon_heiles_DIM; ++i) {
-        size += fabs(s->h * field[i]);
         middle[i] = s->x[i] + 0.5 * increment[i];
         end[i] = s->x[i] + increment[i];
     }
     if (moved <= henon_heiles_PLAUSIBLE * size) return 1;
-    const double before = henon_heiles_hamiltonian(&s->params, s->x), after =
-        henon_heiles_hamiltonian(&s->params, end);
-    const double scale = fabs(before) + fabs(henon_heiles_hamiltonian(&s->params, middle)) + fabs(after);
-    return fabs(after - before) <= henon_heiles_LOST * scale;
+    henon_heiles_vector_field(&s->params, s->x, field);
+    for (int i = 0; i < henon_heiles_DIM; ++i) size += fabs(s->h * field[i]);
+    if (moved <= henon_heiles_PLAUSIBLE * size) return 1;
+    const double before = henon_heiles_hamiltonian(&s->params, s->x);
+    const double after = henon_heiles_hamiltonian(&s->params, end), between =
+        henon_heiles_hamiltonian(&s->params, middle);
+    return fabs(after - before) <= henon_heiles_LOST * (fabs(before) + fabs(between) + fabs(after));
 }
 
 /* ---- The implicit step, by Newton's method ---- */
-/* Components of y are measured no finer than by this part of the largest. */
-#define henon_heiles_FLOOR 1e-6
+#define henon_heiles_FLOOR 1e-6 /* components of y are measured no finer than by this part of the largest */
 
 /* Size of a correction relative to each component of y; NaN or infinite if the correction is. */
 static double henon_heiles_size(const double y[henon_heiles_DIM], const double delta[henon_heiles_DIM])
@@ -319,9 +293,8 @@ static double henon_heiles_size(const double y[henon_heiles_DIM], const double d
     return size;
 }
 
-/* Corrections below the first that shrink by less than the second have reached the level of rounding. */
-#define henon_heiles_NEARLY_SOLVED 1e-8
-#define henon_heiles_SHRINKING 0.25
+#define henon_heiles_NEARLY_SOLVED 1e-8 /* corrections below this have reached the level of rounding, ... */
+#define henon_heiles_SHRINKING 0.25     /* ... if one is more than this part of the one before */
 
 /* Solve (y - x) + displacement(y) = 0 for y by Newton's method from the extrapolated guess, and advance. The
    increment is corrected to first order by the last Newton correction, so that correction costs no
@@ -332,13 +305,14 @@ static henon_heiles_status henon_heiles_attempt(henon_heiles_solver *s)
     double y[henon_heiles_DIM], delta[henon_heiles_DIM], displacement[henon_heiles_DIM],
         increment[henon_heiles_DIM];
     double jacobian[henon_heiles_DIM * henon_heiles_DIM], increment_jacobian[henon_heiles_DIM
-        * henon_heiles_DIM], previous = HUGE_VAL;
+        * henon_heiles_DIM];
+    double previous = HUGE_VAL;
     if (!henon_heiles_predict(&s->history, y)) memcpy(y, s->x, sizeof y);
     for (int iteration = 1; iteration <= henon_heiles_MAX_ITERATIONS; ++iteration) {
         henon_heiles_linearise(s->coef, y, displacement, increment, jacobian, increment_jacobian);
         ++s->evaluations;
-        for (int i = 0; i < henon_heiles_DIM; ++i) delta[i] = ((y[i] - s->x[i]) + displacement[i])
-            - s->carry[i];
+        for (int i = 0; i < henon_heiles_DIM; ++i)
+            delta[i] = ((y[i] - s->x[i]) + displacement[i]) - s->carry[i];
         const int regular = henon_heiles_solve(jacobian, delta);
         const double size = henon_heiles_size(y, delta), growth = size / (previous * previous);
         if (!isfinite(size)) return henon_heiles_NOT_FINITE;
@@ -348,12 +322,14 @@ static henon_heiles_status henon_heiles_attempt(henon_heiles_solver *s)
         const int stalled = previous < henon_heiles_NEARLY_SOLVED && size > henon_heiles_SHRINKING * previous;
         previous = size;
         if (!(remaining <= henon_heiles_TOLERANCE || stalled)) continue;
-        double correction[henon_heiles_DIM] = { 0.0 };
-        for (int i = 0; i < henon_heiles_DIM; ++i)
+        double small[henon_heiles_DIM] = { 0.0 }; /* the correction of the increment, and the carry */
+        for (int i = 0; i < henon_heiles_DIM; ++i) {
             for (int j = 0; j < henon_heiles_DIM; ++j)
-                correction[i] -= increment_jacobian[i * henon_heiles_DIM + j] * delta[j];
+                small[i] -= increment_jacobian[i * henon_heiles_DIM + j] * delta[j];
+            small[i] += s->carry[i];
+        }
         if (!henon_heiles_plausible(s, increment)) return henon_heiles_NO_CONVERGENCE;
-        if (!henon_heiles_advance(s, increment, correction)) return henon_heiles_NOT_FINITE;
+        if (!henon_heiles_advance(s, increment, small)) return henon_heiles_NOT_FINITE;
         henon_heiles_remember(&s->history, y);
         return henon_heiles_OK;
     }
@@ -361,19 +337,17 @@ static henon_heiles_status henon_heiles_attempt(henon_heiles_solver *s)
 }
 
 /* ---- The solver ---- */
-/* The arguments may be parts of *s: they are read before it is written. */
+/* The arguments may be parts of *s, which is therefore written last. */
 henon_heiles_status henon_heiles_init(henon_heiles_solver *s, const henon_heiles_params *params,
     const double x0[henon_heiles_DIM])
 {
     if (s == NULL || x0 == NULL) return henon_heiles_BAD_ARGUMENT;
-    const henon_heiles_params own = params != NULL ? *params : henon_heiles_default_params;
-    double x[henon_heiles_DIM];
-    memcpy(x, x0, sizeof x);
+    henon_heiles_solver fresh = { .h = (double)NAN };
+    fresh.params = params != NULL ? *params : henon_heiles_default_params;
+    memcpy(fresh.x, x0, sizeof fresh.x);
     for (int i = 0; i < henon_heiles_DIM; ++i)
-        if (!isfinite(x[i])) return henon_heiles_BAD_ARGUMENT;
-    memset(s, 0, sizeof *s);
-    memcpy(s->x, x, sizeof s->x);
-    s->params = own;
+        if (!isfinite(fresh.x[i])) return henon_heiles_BAD_ARGUMENT;
+    *s = fresh;
     return henon_heiles_OK;
 }
 
@@ -381,44 +355,38 @@ henon_heiles_status henon_heiles_init(henon_heiles_solver *s, const henon_heiles
 static henon_heiles_status henon_heiles_set_step(henon_heiles_solver *s, double h)
 {
     if (s == NULL || !isfinite(h)) return henon_heiles_BAD_ARGUMENT;
-    if (s->prepared && memcmp(&h, &s->h, sizeof h) == 0) return henon_heiles_OK;
+    if (memcmp(&h, &s->h, sizeof h) == 0) return henon_heiles_OK;
     henon_heiles_prepare(&s->params, h, s->coef);
     memset(&s->history, 0, sizeof s->history);
     s->h = h;
     s->t_before_h = s->t;
     s->steps_before_h = s->steps;
-    s->prepared = 1;
     return henon_heiles_OK;
 }
 
 /* One stage. A guess from earlier steps may have misled it: then once more without. */
 static henon_heiles_status henon_heiles_stage(henon_heiles_solver *s)
 {
-    henon_heiles_status status = henon_heiles_attempt(s);
-    if (status != henon_heiles_OK && s->history.count > 0) {
-        memset(&s->history, 0, sizeof s->history);
-        status = henon_heiles_attempt(s);
-    }
-    return status;
-}
-
-henon_heiles_status henon_heiles_step(henon_heiles_solver *s, double h)
-{
-    henon_heiles_status status = henon_heiles_set_step(s, h);
-    if (status != henon_heiles_OK) return status;
-    status = henon_heiles_stage(s);
-    if (status != henon_heiles_OK) return status;
-    ++s->steps;
-    s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
-    return status;
+    const henon_heiles_status status = henon_heiles_attempt(s);
+    if (status == henon_heiles_OK || s->history.count == 0) return status;
+    memset(&s->history, 0, sizeof s->history);
+    return henon_heiles_attempt(s);
 }
 
 henon_heiles_status henon_heiles_integrate(henon_heiles_solver *s, double h, size_t steps)
 {
     henon_heiles_status status = henon_heiles_set_step(s, h);
-    for (; steps > 0 && status == henon_heiles_OK; --steps) status = henon_heiles_step(s, h);
+    for (; steps > 0 && status == henon_heiles_OK; --steps) {
+        status = henon_heiles_stage(s);
+        if (status != henon_heiles_OK) break;
+        ++s->steps;
+        s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
+    }
     return status;
 }
+
+henon_heiles_status henon_heiles_step(henon_heiles_solver *s, double h) { return henon_heiles_integrate(s, h,
+    1); }
 
 const char *henon_heiles_status_string(henon_heiles_status status)
 {
@@ -433,7 +401,6 @@ const char *henon_heiles_status_string(henon_heiles_status status)
 }
 
 size_t henon_heiles_solver_size(void) { return sizeof(henon_heiles_solver); }
-
 size_t henon_heiles_solver_steps_done(const henon_heiles_solver *s) { return s->steps; }
 
 /* ---- Ensembles ---- */

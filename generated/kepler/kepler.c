@@ -20,7 +20,7 @@
  *   4. The implicit step, by Newton's method
  *   5. The solver
  *   6. Ensembles
- * body-sha256: 933b5f891277f89d029e8ac55fb5656bf4623ab1a4373b9ebdc13b01768e1ca6
+ * body-sha256: 1d73101648db0eabfd78a362d144578cd3e02df88e6577dfd382aaee5af004e5
  */
 #include "kepler.h"
 
@@ -32,9 +32,7 @@
 const kepler_params kepler_default_params = { 1.0 };
 
 enum { kepler_MAX_ITERATIONS = 20 }; /* of an inner solve */
-
-/* A correction is accepted when the error that it leaves is estimated to be below this. */
-#define kepler_TOLERANCE 1e-20
+#define kepler_TOLERANCE 1e-20       /* the error that an accepted correction may leave, as estimated */
 
 /* Whether all parameters are finite, and positive where they have to be. */
 static int kepler_allowed(const kepler_params *params)
@@ -52,23 +50,21 @@ static int kepler_allowed(const kepler_params *params)
 /* everything that depends on parameters and step size only */
 static void kepler_prepare(const kepler_params *params, double h, double coef[restrict 118])
 {
-    const double t1 = h * params->mu, t2 = h * h, t3 = h * t2, t4 = params->mu * t3;
-    const double t5 = (-0.125) * t4, t6 = h * (t2 * t2), t7 = params->mu * params->mu, t8 = t6 * t7;
-    const double t9 = (-1.0 / 40.0) * t8, t10 = t9 - 1.0 / 80.0 * t8, t11 = params->mu * t6;
-    const double t12 = 0.0234375 * t11, t13 = t5 - 0.25 * t4, t14 = t9 - 7.0 / 80.0 * t8;
-    const double t15 = 0.09375 * t11, t16 = t15 + 0.046875 * t11, t17 = t15 + t12, t18 = t3 * t7;
-    const double t19 = params->mu * t7 * t6, t20 = (-3.0 / 80.0) * t19 - 1.0 / 20.0 * t19;
-    const double t21 = 0.625 * t4, t22 = 7.0 / 20.0 * t8, t23 = 11.0 / 80.0 * t8, t24 = t22 + t23;
-    const double t25 = (-0.328125) * t11, t26 = 1.0 / 20.0 * t8, t27 = t23 + t26;
-    const double t28 = 0.65625 * t11, t29 = t25 - t28, t30 = 1.25 * t4, t31 = 3.0 / 5.0 * t8;
-    const double t32 = 33.0 / 80.0 * t8 + t31, t33 = (-0.65625) * t11, t34 = t33 - t28;
-    const double t35 = (-1.375) * t8, t36 = 1.96875 * t11, t37 = t22 + 11.0 / 40.0 * t8;
+    const double t1 = h * params->mu, t2 = h * h, t3 = h * t2, t4 = params->mu * t3, t5 = (-0.125) * t4;
+    const double t6 = h * (t2 * t2), t7 = params->mu * params->mu, t8 = t6 * t7, t9 = (-1.0 / 40.0) * t8;
+    const double t10 = t9 - 1.0 / 80.0 * t8, t11 = params->mu * t6, t12 = 0.0234375 * t11;
+    const double t13 = t5 - 0.25 * t4, t14 = t9 - 7.0 / 80.0 * t8, t15 = 0.09375 * t11;
+    const double t16 = t15 + 0.046875 * t11, t17 = t15 + t12, t18 = t3 * t7, t19 = params->mu * t7 * t6;
+    const double t20 = (-3.0 / 80.0) * t19 - 1.0 / 20.0 * t19, t21 = 0.625 * t4, t22 = 7.0 / 20.0 * t8;
+    const double t23 = 11.0 / 80.0 * t8, t24 = t22 + t23, t25 = (-0.328125) * t11, t26 = 1.0 / 20.0 * t8;
+    const double t27 = t23 + t26, t28 = 0.65625 * t11, t29 = t25 - t28, t30 = 1.25 * t4;
+    const double t31 = 3.0 / 5.0 * t8, t32 = 33.0 / 80.0 * t8 + t31, t33 = (-0.65625) * t11;
+    const double t34 = t33 - t28, t35 = (-1.375) * t8, t36 = 1.96875 * t11, t37 = t22 + 11.0 / 40.0 * t8;
     const double t38 = t25 - 0.21875 * t11, t39 = 2.953125 * t11, t40 = 8.0 * t10;
     const double t41 = (-0.1640625) * t11, t42 = 8.0 * t14, t43 = 11.0 * t20, t44 = (-10.0) * t24;
     const double t45 = 2.0625 * t8, t46 = (-10.0) * t27, t47 = (-10.0) * t32, t48 = 5.90625 * t11;
     const double t49 = 2.75 * t8, t50 = (-0.5) * t18, t51 = 3.0 / 40.0 * t19, t52 = (-0.5) * t8;
-    const double t53 = (-10.0) * t37, t54 = 2.0 * t24, t55 = 2.0 * t27, t56 = 2.0 * t29;
-    const double t57 = 1.375 * t8;
+    const double t53 = (-10.0) * t37, t54 = 2.0 * t24, t55 = 2.0 * t27, t56 = 2.0 * t29, t57 = 1.375 * t8;
     coef[0] = t1;
     coef[1] = t5;
     coef[2] = t10;
@@ -220,9 +216,9 @@ kepler_APART static void kepler_linearise_part1(const double coef[118], const do
         + work[9] * (coef[20] * t13 + coef[42] * t14 + t25));
     const double t27 = coef[37] * px + work[33] * (coef[18] * work[26] + px * (t4 + (t5 + t6)) + work[9]
         * (coef[38] * px + work[9] * (t7 * t10 + t26)));
-    const double p_px = coef[36] * px + work[32] * t27;
-    const double t28 = px * t3, t29 = t5 + coef[18] * work[7], t30 = py * work[19];
-    const double t31 = coef[22] * work[5], t32 = t31 + t9, t33 = coef[41] * work[6], t34 = t33 + t31;
+    const double p_px = coef[36] * px + work[32] * t27, t28 = px * t3, t29 = t5 + coef[18] * work[7];
+    const double t30 = py * work[19], t31 = coef[22] * work[5], t32 = t31 + t9, t33 = coef[41] * work[6];
+    const double t34 = t33 + t31;
     const double t35 = t30 * t32 + y_ * (coef[43] * work[3] + px * (coef[22] * t12 + x * t34) + work[9]
         * (coef[20] * t14 + coef[42] * t13 + t25));
     const double p_py = coef[36] * py + work[32] * (coef[37] * py + work[33] * (coef[18] * t28 + py
@@ -435,34 +431,6 @@ static void kepler_linearise(const double coef[118], const double y[4], double d
     kepler_linearise_part2(coef, y, displacement, increment, jacobian, increment_jacobian, work);
 }
 
-/* elimination without pivoting: the solution, and the reciprocals of the pivots */
-static void kepler_eliminate(const double matrix[16], const double side[4], double solution[restrict 4],
-    double reciprocal[restrict 4])
-{
-    /* solution */
-    const double t1 = 1.0 / matrix[0], t2 = matrix[12] * t1, t3 = matrix[4] * t1;
-    const double t4 = side[1] - side[0] * t3, t5 = 1.0 / (matrix[5] - matrix[1] * t3);
-    const double t6 = (matrix[13] - matrix[1] * t2) * t5, t7 = matrix[8] * t1;
-    const double t8 = (matrix[9] - matrix[1] * t7) * t5, t9 = side[2] - side[0] * t7 - t4 * t8;
-    const double t10 = matrix[6] - matrix[2] * t3;
-    const double t11 = 1.0 / (matrix[10] - matrix[2] * t7 - t10 * t8);
-    const double t12 = (matrix[14] - matrix[2] * t2 - t10 * t6) * t11;
-    const double t13 = matrix[7] - matrix[3] * t3, t14 = matrix[11] - matrix[3] * t7 - t13 * t8;
-    const double t15 = 1.0 / (matrix[15] - matrix[3] * t2 - t13 * t6 - t14 * t12);
-    const double t16 = (side[3] - side[0] * t2 - t4 * t6 - t9 * t12) * t15;
-    const double t17 = t11 * (t9 - t14 * t16), t18 = t5 * (t4 - (t13 * t16 + t10 * t17));
-    solution[0] = t1 * (side[0] - (matrix[3] * t16 + (matrix[2] * t17 + matrix[1] * t18)));
-    solution[1] = t18;
-    solution[2] = t17;
-    solution[3] = t16;
-    /* reciprocal */
-    reciprocal[0] = t1;
-    reciprocal[1] = t5;
-    reciprocal[2] = t11;
-    reciprocal[3] = t15;
-}
-
-/* the Hamiltonian */
 double kepler_hamiltonian(const kepler_params *params, const double x[4])
 {
     if (params == NULL) params = &kepler_default_params;
@@ -470,13 +438,11 @@ double kepler_hamiltonian(const kepler_params *params, const double x[4])
     return 0.5 * (px * px + py * py) - mu / sqrt(x_ * x_ + y * y);
 }
 
-/* the Casimirs */
 void kepler_casimirs(const kepler_params *params, const double x[4], double out[])
 {
     (void)params, (void)x, (void)out;
 }
 
-/* pi(x) grad H(x) */
 void kepler_vector_field(const kepler_params *params, const double x[4], double out[4])
 {
     if (params == NULL) params = &kepler_default_params;
@@ -489,19 +455,17 @@ void kepler_vector_field(const kepler_params *params, const double x[4], double 
 }
 
 /* ---- Compensated sums, linear equations ---- */
-/* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to
-   its last bit: were it rounded with the change, corrections of one sign would add up to a drift. 0, and x as
-   before, if the sum is not finite. */
-static int kepler_advance(kepler_solver *s, const double change[kepler_DIM],
-    const double correction[kepler_DIM])
+/* x + change + small in compensated arithmetic, where small is the carry and what is as small: were that
+   rounded with the change, corrections of one sign would add up to a drift. 0, and x as before, if the sum is
+   not finite. */
+static int kepler_advance(kepler_solver *s, const double change[kepler_DIM], const double small[kepler_DIM])
 {
     double x[kepler_DIM], carry[kepler_DIM];
     for (int i = 0; i < kepler_DIM; ++i) {
         const double sum = s->x[i] + change[i], added = sum - s->x[i];
-        const double lost = (s->x[i] - (sum - added)) + (change[i] - added);
-        const double small = lost + (s->carry[i] + correction[i]);
-        x[i] = sum + small;
-        carry[i] = small - (x[i] - sum);
+        const double lost = ((s->x[i] - (sum - added)) + (change[i] - added)) + small[i];
+        x[i] = sum + lost;
+        carry[i] = lost - (x[i] - sum);
         if (!isfinite(x[i])) return 0;
     }
     memcpy(s->x, x, sizeof x);
@@ -509,28 +473,41 @@ static int kepler_advance(kepler_solver *s, const double change[kepler_DIM],
     return 1;
 }
 
-/* Newton matrices are I + O(h): a pivot whose reciprocal is larger than this is far from 1. */
-#define kepler_LARGEST_RECIPROCAL 1e3
-
-/* Solve matrix * solution = side, both overwritten. The matrix is I + O(h): 0 if a pivot is far from 1. */
+/* Solve matrix * solution = side, both overwritten, by elimination with partial pivoting. 0 if singular. */
 static int kepler_solve(double matrix[kepler_DIM * kepler_DIM], double side[kepler_DIM])
 {
-    double solution[kepler_DIM], reciprocal[kepler_DIM], largest = 0.0;
-    kepler_eliminate(matrix, side, solution, reciprocal);
-    for (int i = 0; i < kepler_DIM; ++i)
-        if (!(fabs(reciprocal[i]) <= largest)) largest = fabs(reciprocal[i]);
-    if (!(largest < kepler_LARGEST_RECIPROCAL)) return 0;
-    memcpy(side, solution, sizeof solution);
+    for (int k = 0; k < kepler_DIM; ++k) {
+        int best = k;
+        for (int i = k + 1; i < kepler_DIM; ++i)
+            if (fabs(matrix[i * kepler_DIM + k]) > fabs(matrix[best * kepler_DIM + k])) best = i;
+        const double pivot = matrix[best * kepler_DIM + k], last = side[k];
+        if (!(fabs(pivot) > 0.0)) return 0;
+        for (int j = k; j < kepler_DIM && best != k; ++j) {
+            const double swap = matrix[k * kepler_DIM + j];
+            matrix[k * kepler_DIM + j] = matrix[best * kepler_DIM + j];
+            matrix[best * kepler_DIM + j] = swap;
+        }
+        side[k] = side[best];
+        side[best] = last;
+        for (int i = k + 1; i < kepler_DIM; ++i) {
+            const double factor = matrix[i * kepler_DIM + k] / pivot;
+            for (int j = k + 1; j < kepler_DIM; ++j)
+                matrix[i * kepler_DIM + j] -= factor * matrix[k * kepler_DIM + j];
+            side[i] -= factor * side[k];
+        }
+    }
+    for (int i = kepler_DIM - 1; i >= 0; --i) {
+        for (int j = i + 1; j < kepler_DIM; ++j) side[i] -= matrix[i * kepler_DIM + j] * side[j];
+        side[i] /= matrix[i * kepler_DIM + i];
+    }
     return 1;
 }
 
 /* ---- Starting guesses ---- */
-/* How far from the last value a guess may be, in sizes of that value. */
-#define kepler_REACH 4.0
+#define kepler_REACH 4.0 /* how far from the last value a guess may be, in sizes of that value */
 
-/* The guess for the next value from the last ones: the sum of their backward differences. 0 if there is none,
-   or if it is far away, where the equation of a step has solutions that have nothing to do with the motion.
-   */
+/* The guess for the next value, the sum of differences. 0 if there is none, or if it is far away, where the
+   equation of a step has solutions that have nothing to do with the motion. */
 static int kepler_predict(const kepler_history *history, double value[kepler_DIM])
 {
     double distance = 0.0, size = 0.0;
@@ -566,10 +543,8 @@ static void kepler_remember(kepler_history *history, const double value[kepler_D
     if (history->count < kepler_DIFFERENCES) ++history->count;
 }
 
-/* How far a step may lead, in sizes of the state and of what the vector field says, if the energy is lost;
-   and the part of the energy that counts as lost. */
-#define kepler_PLAUSIBLE 1.5
-#define kepler_LOST 0.5
+#define kepler_PLAUSIBLE 1.5 /* how far any step may lead, in sizes of the state and of its motion */
+#define kepler_LOST 0.5      /* part of the energy that one which leads farther must not lose */
 
 /* Whether an increment is that of the motion. Where the step is too large, the equation may have been solved
    by a point far away, at another energy, that has nothing to do with it. */
@@ -579,23 +554,21 @@ static int kepler_plausible(const kepler_solver *s, const double increment[keple
     for (int i = 0; i < kepler_DIM; ++i) {
         moved += fabs(increment[i]);
         size += fabs(s->x[i]);
-    }
-    if (moved <= kepler_PLAUSIBLE * size) return 1;
-    kepler_vector_field(&s->params, s->x, field);
-    for (int i = 0; i < kepler_DIM; ++i) {
-        size += fabs(s->h * field[i]);
         middle[i] = s->x[i] + 0.5 * increment[i];
         end[i] = s->x[i] + increment[i];
     }
     if (moved <= kepler_PLAUSIBLE * size) return 1;
-    const double before = kepler_hamiltonian(&s->params, s->x), after = kepler_hamiltonian(&s->params, end);
-    const double scale = fabs(before) + fabs(kepler_hamiltonian(&s->params, middle)) + fabs(after);
-    return fabs(after - before) <= kepler_LOST * scale;
+    kepler_vector_field(&s->params, s->x, field);
+    for (int i = 0; i < kepler_DIM; ++i) size += fabs(s->h * field[i]);
+    if (moved <= kepler_PLAUSIBLE * size) return 1;
+    const double before = kepler_hamiltonian(&s->params, s->x);
+    const double after = kepler_hamiltonian(&s->params, end), between = kepler_hamiltonian(&s->params,
+        middle);
+    return fabs(after - before) <= kepler_LOST * (fabs(before) + fabs(between) + fabs(after));
 }
 
 /* ---- The implicit step, by Newton's method ---- */
-/* Components of y are measured no finer than by this part of the largest. */
-#define kepler_FLOOR 1e-6
+#define kepler_FLOOR 1e-6 /* components of y are measured no finer than by this part of the largest */
 
 /* Size of a correction relative to each component of y; NaN or infinite if the correction is. */
 static double kepler_size(const double y[kepler_DIM], const double delta[kepler_DIM])
@@ -610,9 +583,8 @@ static double kepler_size(const double y[kepler_DIM], const double delta[kepler_
     return size;
 }
 
-/* Corrections below the first that shrink by less than the second have reached the level of rounding. */
-#define kepler_NEARLY_SOLVED 1e-8
-#define kepler_SHRINKING 0.25
+#define kepler_NEARLY_SOLVED 1e-8 /* corrections below this have reached the level of rounding, ... */
+#define kepler_SHRINKING 0.25     /* ... if one is more than this part of the one before */
 
 /* Solve (y - x) + displacement(y) = 0 for y by Newton's method from the extrapolated guess, and advance. The
    increment is corrected to first order by the last Newton correction, so that correction costs no
@@ -621,13 +593,14 @@ static double kepler_size(const double y[kepler_DIM], const double delta[kepler_
 static kepler_status kepler_attempt(kepler_solver *s)
 {
     double y[kepler_DIM], delta[kepler_DIM], displacement[kepler_DIM], increment[kepler_DIM];
-    double jacobian[kepler_DIM * kepler_DIM], increment_jacobian[kepler_DIM * kepler_DIM], previous =
-        HUGE_VAL;
+    double jacobian[kepler_DIM * kepler_DIM], increment_jacobian[kepler_DIM * kepler_DIM];
+    double previous = HUGE_VAL;
     if (!kepler_predict(&s->history, y)) memcpy(y, s->x, sizeof y);
     for (int iteration = 1; iteration <= kepler_MAX_ITERATIONS; ++iteration) {
         kepler_linearise(s->coef, y, displacement, increment, jacobian, increment_jacobian);
         ++s->evaluations;
-        for (int i = 0; i < kepler_DIM; ++i) delta[i] = ((y[i] - s->x[i]) + displacement[i]) - s->carry[i];
+        for (int i = 0; i < kepler_DIM; ++i)
+            delta[i] = ((y[i] - s->x[i]) + displacement[i]) - s->carry[i];
         const int regular = kepler_solve(jacobian, delta);
         const double size = kepler_size(y, delta), growth = size / (previous * previous);
         if (!isfinite(size)) return kepler_NOT_FINITE;
@@ -637,12 +610,14 @@ static kepler_status kepler_attempt(kepler_solver *s)
         const int stalled = previous < kepler_NEARLY_SOLVED && size > kepler_SHRINKING * previous;
         previous = size;
         if (!(remaining <= kepler_TOLERANCE || stalled)) continue;
-        double correction[kepler_DIM] = { 0.0 };
-        for (int i = 0; i < kepler_DIM; ++i)
+        double small[kepler_DIM] = { 0.0 }; /* the correction of the increment, and the carry */
+        for (int i = 0; i < kepler_DIM; ++i) {
             for (int j = 0; j < kepler_DIM; ++j)
-                correction[i] -= increment_jacobian[i * kepler_DIM + j] * delta[j];
+                small[i] -= increment_jacobian[i * kepler_DIM + j] * delta[j];
+            small[i] += s->carry[i];
+        }
         if (!kepler_plausible(s, increment)) return kepler_NO_CONVERGENCE;
-        if (!kepler_advance(s, increment, correction)) return kepler_NOT_FINITE;
+        if (!kepler_advance(s, increment, small)) return kepler_NOT_FINITE;
         kepler_remember(&s->history, y);
         return kepler_OK;
     }
@@ -650,31 +625,22 @@ static kepler_status kepler_attempt(kepler_solver *s)
 }
 
 /* ---- The solver ---- */
-/* Whether steps can be made with these parameters: allowed, and with finite coefficients for a step so short
-   that it has no part in it. */
-static int kepler_admissible(const kepler_params *params)
-{
-    double coef[kepler_COEFFICIENTS];
-    if (!kepler_allowed(params)) return 0;
-    kepler_prepare(params, 1e-100, coef);
-    for (int k = 0; k < kepler_COEFFICIENTS; ++k)
-        if (!isfinite(coef[k])) return 0;
-    return 1;
-}
+#define kepler_SHORT_STEP 1e-100 /* so short that it has no part in whether coefficients are finite */
 
-/* The arguments may be parts of *s: they are read before it is written. */
+/* The arguments may be parts of *s, which is therefore written last. */
 kepler_status kepler_init(kepler_solver *s, const kepler_params *params, const double x0[kepler_DIM])
 {
     if (s == NULL || x0 == NULL) return kepler_BAD_ARGUMENT;
-    const kepler_params own = params != NULL ? *params : kepler_default_params;
-    double x[kepler_DIM];
-    memcpy(x, x0, sizeof x);
+    kepler_solver fresh = { .h = (double)NAN };
+    fresh.params = params != NULL ? *params : kepler_default_params;
+    memcpy(fresh.x, x0, sizeof fresh.x);
     for (int i = 0; i < kepler_DIM; ++i)
-        if (!isfinite(x[i])) return kepler_BAD_ARGUMENT;
-    if (!kepler_admissible(&own)) return kepler_BAD_ARGUMENT;
-    memset(s, 0, sizeof *s);
-    memcpy(s->x, x, sizeof s->x);
-    s->params = own;
+        if (!isfinite(fresh.x[i])) return kepler_BAD_ARGUMENT;
+    if (!kepler_allowed(&fresh.params)) return kepler_BAD_ARGUMENT;
+    kepler_prepare(&fresh.params, kepler_SHORT_STEP, fresh.coef);
+    for (int k = 0; k < kepler_COEFFICIENTS; ++k)
+        if (!isfinite(fresh.coef[k])) return kepler_BAD_ARGUMENT;
+    *s = fresh;
     return kepler_OK;
 }
 
@@ -682,44 +648,37 @@ kepler_status kepler_init(kepler_solver *s, const kepler_params *params, const d
 static kepler_status kepler_set_step(kepler_solver *s, double h)
 {
     if (s == NULL || !isfinite(h)) return kepler_BAD_ARGUMENT;
-    if (s->prepared && memcmp(&h, &s->h, sizeof h) == 0) return kepler_OK;
+    if (memcmp(&h, &s->h, sizeof h) == 0) return kepler_OK;
     kepler_prepare(&s->params, h, s->coef);
     memset(&s->history, 0, sizeof s->history);
     s->h = h;
     s->t_before_h = s->t;
     s->steps_before_h = s->steps;
-    s->prepared = 1;
     return kepler_OK;
 }
 
 /* One stage. A guess from earlier steps may have misled it: then once more without. */
 static kepler_status kepler_stage(kepler_solver *s)
 {
-    kepler_status status = kepler_attempt(s);
-    if (status != kepler_OK && s->history.count > 0) {
-        memset(&s->history, 0, sizeof s->history);
-        status = kepler_attempt(s);
-    }
-    return status;
-}
-
-kepler_status kepler_step(kepler_solver *s, double h)
-{
-    kepler_status status = kepler_set_step(s, h);
-    if (status != kepler_OK) return status;
-    status = kepler_stage(s);
-    if (status != kepler_OK) return status;
-    ++s->steps;
-    s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
-    return status;
+    const kepler_status status = kepler_attempt(s);
+    if (status == kepler_OK || s->history.count == 0) return status;
+    memset(&s->history, 0, sizeof s->history);
+    return kepler_attempt(s);
 }
 
 kepler_status kepler_integrate(kepler_solver *s, double h, size_t steps)
 {
     kepler_status status = kepler_set_step(s, h);
-    for (; steps > 0 && status == kepler_OK; --steps) status = kepler_step(s, h);
+    for (; steps > 0 && status == kepler_OK; --steps) {
+        status = kepler_stage(s);
+        if (status != kepler_OK) break;
+        ++s->steps;
+        s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
+    }
     return status;
 }
+
+kepler_status kepler_step(kepler_solver *s, double h) { return kepler_integrate(s, h, 1); }
 
 const char *kepler_status_string(kepler_status status)
 {
@@ -734,7 +693,6 @@ const char *kepler_status_string(kepler_status status)
 }
 
 size_t kepler_solver_size(void) { return sizeof(kepler_solver); }
-
 size_t kepler_solver_steps_done(const kepler_solver *s) { return s->steps; }
 
 /* ---- Ensembles ---- */

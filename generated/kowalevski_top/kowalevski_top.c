@@ -25,7 +25,7 @@
  *   9. Blocks of steps
  *   10. Groups of members
  *   11. Ensembles
- * body-sha256: bfa5abebbf69c4353c511230b2555a17c7bfb64527f02e647a7ee33965ffee51
+ * body-sha256: 8713e86710d7f7f0f4c39eb7233e898bfb6bc5b798eed6b575e662ed23cd0b42
  */
 #include "kowalevski_top.h"
 
@@ -41,9 +41,7 @@ const kowalevski_top_params kowalevski_top_default_params = { 0 };
 enum { kowalevski_top_MAX_ITERATIONS = 20 }; /* of an inner solve */
 enum { kowalevski_top_CHECKS = 8 }; /* values that a recurrence is not fitted to, but has to foresee */
 enum { kowalevski_top_PASSES = 2 }; /* over a block, that cost per step what an evaluation costs */
-
-/* A correction is accepted when the error that it leaves is estimated to be below this. */
-#define kowalevski_top_TOLERANCE 1e-20
+#define kowalevski_top_TOLERANCE 1e-20 /* the error that an accepted correction may leave, as estimated */
 
 /* Functions to be kept apart: very long ones compile in quadratic time. */
 #if defined(__GNUC__)
@@ -52,76 +50,78 @@ enum { kowalevski_top_PASSES = 2 }; /* over a block, that cost per step what an 
 #define kowalevski_top_APART
 #endif
 
+/* The polynomial with these coefficients, the constant first. */
+static inline double kowalevski_top_polynomial(const double *coefficients, int count, double s)
+{
+    double value = coefficients[--count];
+    while (count > 0) value = value * s + coefficients[--count];
+    return value;
+}
+
 /* (1 - w cot w)/s with w = sqrt(s)/2, coth for negative s: the function of the exponential bi-realisation. */
 static double kowalevski_top_phi0(double s)
 {
-    if (fabs(s) < 0.25)
-        return (0.08333333333333333 + s * (0.001388888888888889 + s * (3.306878306878307e-05 + s *
-            (8.267195767195768e-07 + s * (2.08767569878681e-08 + s * (5.284190138687493e-10 + s *
-            (1.3382536530684679e-11 + s * (3.3896802963225827e-13 + s * 8.586062056277845e-15))))))));
+    static const double near[9] = { 0.08333333333333333, 0.001388888888888889, 3.306878306878307e-05,
+        8.267195767195768e-07, 2.08767569878681e-08, 5.284190138687493e-10, 1.3382536530684679e-11,
+        3.3896802963225827e-13, 8.586062056277845e-15 };
+    static const double rest[21] = { 0.03267274151216445, 0.000105641107053347, 5.637370282876845e-07,
+        3.357141926657451e-09, 2.0742872904166045e-11, 1.3000482138698975e-13, 8.196052055691008e-16,
+        5.180118196169724e-18, 3.277539174701792e-20, 2.0747401878593604e-22, 1.3136241807166534e-24,
+        8.318003195189264e-27, 5.267262996834231e-29, 3.3354842988221443e-31, 2.1122063323183885e-33,
+        1.3375664093215244e-35, 8.470227328650247e-38, 5.363831046655698e-40, 3.3966848266497805e-42,
+        2.1509755511832569e-44, 1.3621211117593843e-46 };
+    if (fabs(s) < 0.25) return kowalevski_top_polynomial(near, 9, s);
     if (fabs(s) < 16.0) {
         const double pole = 1.0 / (39.47841760435743 - s);
-        return 2.0 * pole + (0.03267274151216445 + s * (0.000105641107053347 + s * (5.637370282876845e-07
-            + s * (3.357141926657451e-09 + s * (2.0742872904166045e-11 + s * (1.3000482138698975e-13 + s *
-            (8.196052055691008e-16 + s * (5.180118196169724e-18 + s * (3.277539174701792e-20 + s *
-            (2.0747401878593604e-22 + s * (1.3136241807166534e-24 + s * (8.318003195189264e-27 + s *
-            (5.267262996834231e-29 + s * (3.3354842988221443e-31 + s * (2.1122063323183885e-33 + s *
-            (1.3375664093215244e-35 + s * (8.470227328650247e-38 + s * (5.363831046655698e-40 + s *
-            (3.3966848266497805e-42 + s * (2.1509755511832569e-44 + s *
-            1.3621211117593843e-46))))))))))))))))))));
+        return 2.0 * pole + kowalevski_top_polynomial(rest, 21, s);
     }
     const double w = 0.5 * sqrt(fabs(s)), c = w / (s > 0.0 ? tan(w) : tanh(w));
-    const double phi0 = (1.0 - c) / s;
-    return phi0;
+    return (1.0 - c) / s;
 }
 
 /* The derivative of (1 - w cot w)/s, w = sqrt(s)/2. */
 static double kowalevski_top_phi1(double s)
 {
-    if (fabs(s) < 0.25)
-        return (0.001388888888888889 + s * (6.613756613756614e-05 + s * (2.48015873015873e-06 + s *
-            (8.35070279514724e-08 + s * (2.6420950693437467e-09 + s * (8.029521918410807e-11 + s *
-            (2.372776207425808e-12 + s * (6.868849645022276e-14 + s * 1.9573818287022555e-15))))))));
+    static const double near[9] = { 0.001388888888888889, 6.613756613756614e-05, 2.48015873015873e-06,
+        8.35070279514724e-08, 2.6420950693437467e-09, 8.029521918410807e-11, 2.372776207425808e-12,
+        6.868849645022276e-14, 1.9573818287022555e-15 };
+    static const double rest[21] = { 0.000105641107053347, 1.127474056575369e-06, 1.0071425779972354e-08,
+        8.297149161666418e-11, 6.500241069349487e-13, 4.917631233414605e-15, 3.626082737318807e-17,
+        2.6220313397614337e-19, 1.8672661690734246e-21, 1.3136241807166533e-23, 9.149803514708191e-26,
+        6.320715596201077e-28, 4.336129588468787e-30, 2.957088865245744e-32, 2.0063496139822866e-34,
+        1.3552363725840395e-36, 9.118512779314688e-39, 6.114032687969605e-41, 4.0868535472481875e-43,
+        2.7242422235187686e-45, 1.8114038279637677e-47 };
+    if (fabs(s) < 0.25) return kowalevski_top_polynomial(near, 9, s);
     if (fabs(s) < 16.0) {
         const double pole = 1.0 / (39.47841760435743 - s);
-        return 2.0 * pole * pole + (0.000105641107053347 + s * (1.127474056575369e-06 + s *
-            (1.0071425779972354e-08 + s * (8.297149161666418e-11 + s * (6.500241069349487e-13 + s *
-            (4.917631233414605e-15 + s * (3.626082737318807e-17 + s * (2.6220313397614337e-19 + s *
-            (1.8672661690734246e-21 + s * (1.3136241807166533e-23 + s * (9.149803514708191e-26 + s *
-            (6.320715596201077e-28 + s * (4.336129588468787e-30 + s * (2.957088865245744e-32 + s *
-            (2.0063496139822866e-34 + s * (1.3552363725840395e-36 + s * (9.118512779314688e-39 + s *
-            (6.114032687969605e-41 + s * (4.0868535472481875e-43 + s * (2.7242422235187686e-45 + s *
-            1.8114038279637677e-47))))))))))))))))))));
+        return 2.0 * pole * pole + kowalevski_top_polynomial(rest, 21, s);
     }
     const double w = 0.5 * sqrt(fabs(s)), c = w / (s > 0.0 ? tan(w) : tanh(w));
     const double phi0 = (1.0 - c) / s;
-    const double phi1 = (0.5 * s * phi0 * phi0 - 1.5 * phi0 + 0.125) / s;
-    return phi1;
+    return (0.5 * s * phi0 * phi0 - 1.5 * phi0 + 0.125) / s;
 }
 
 /* The second derivative of (1 - w cot w)/s, w = sqrt(s)/2. */
 static double kowalevski_top_phi2(double s)
 {
-    if (fabs(s) < 0.25)
-        return (6.613756613756614e-05 + s * (4.96031746031746e-06 + s * (2.505210838544172e-07 + s *
-            (1.0568380277374987e-08 + s * (4.0147609592054037e-10 + s * (1.4236657244554848e-11 + s *
-            (4.808194751515593e-13 + s * (1.5659054629618044e-14 + s * 4.958102545524207e-16))))))));
+    static const double near[9] = { 6.613756613756614e-05, 4.96031746031746e-06, 2.505210838544172e-07,
+        1.0568380277374987e-08, 4.0147609592054037e-10, 1.4236657244554848e-11, 4.808194751515593e-13,
+        1.5659054629618044e-14, 4.958102545524207e-16 };
+    static const double rest[21] = { 1.127474056575369e-06, 2.0142851559944708e-08, 2.4891447484999256e-10,
+        2.600096427739795e-12, 2.4588156167073025e-14, 2.1756496423912842e-16, 1.8354219378330035e-18,
+        1.4938129352587397e-20, 1.182261762644988e-22, 9.149803514708191e-25, 6.952787155821185e-27,
+        5.203355506162545e-29, 3.844215524819467e-31, 2.8088894595752015e-33, 2.032854558876059e-35,
+        1.45896204469035e-37, 1.0393855569548329e-39, 7.356336385046738e-42, 5.17606022468566e-44,
+        3.622807655927535e-46, 2.5235866986281763e-48 };
+    if (fabs(s) < 0.25) return kowalevski_top_polynomial(near, 9, s);
     if (fabs(s) < 16.0) {
         const double pole = 1.0 / (39.47841760435743 - s);
-        return 4.0 * pole * pole * pole + (1.127474056575369e-06 + s * (2.0142851559944708e-08 + s *
-            (2.4891447484999256e-10 + s * (2.600096427739795e-12 + s * (2.4588156167073025e-14 + s *
-            (2.1756496423912842e-16 + s * (1.8354219378330035e-18 + s * (1.4938129352587397e-20 + s *
-            (1.182261762644988e-22 + s * (9.149803514708191e-25 + s * (6.952787155821185e-27 + s *
-            (5.203355506162545e-29 + s * (3.844215524819467e-31 + s * (2.8088894595752015e-33 + s *
-            (2.032854558876059e-35 + s * (1.45896204469035e-37 + s * (1.0393855569548329e-39 + s *
-            (7.356336385046738e-42 + s * (5.17606022468566e-44 + s * (3.622807655927535e-46 + s *
-            2.5235866986281763e-48))))))))))))))))))));
+        return 4.0 * pole * pole * pole + kowalevski_top_polynomial(rest, 21, s);
     }
     const double w = 0.5 * sqrt(fabs(s)), c = w / (s > 0.0 ? tan(w) : tanh(w));
     const double phi0 = (1.0 - c) / s;
     const double phi1 = (0.5 * s * phi0 * phi0 - 1.5 * phi0 + 0.125) / s;
-    const double phi2 = (0.5 * phi0 * phi0 - 2.5 * phi1 + s * phi0 * phi1) / s;
-    return phi2;
+    return (0.5 * phi0 * phi0 - 2.5 * phi1 + s * phi0 * phi1) / s;
 }
 
 /* everything that depends on parameters and step size only */
@@ -616,8 +616,7 @@ kowalevski_top_APART static void kowalevski_top_linearise_part2(const double coe
     const double t36 = work[15] * (t30 * work[6] + 2.0 * (work[20] * work[7]) + (work[8] * work[257] - work[0]
         * work[232] + (work[11] * work[258] - work[13] * work[234]))) + 2.0 * (work[231] * t1);
     work[159] = t30 * work[14] + 2.0 * (work[235] * work[7]) - t36;
-    const double t37 = coef[1] * work[29], t38 = coef[132] + G1 * coef[65];
-    const double t39 = coef[133] * work[29];
+    const double t37 = coef[1] * work[29], t38 = coef[132] + G1 * coef[65], t39 = coef[133] * work[29];
     const double t40 = G2 * (t14 + P3 * (work[47] + (work[49] + work[46]))) + P2
         * (G3 * (work[68] + (coef[122] * work[30] + work[69])) + P3 * (work[70] + P1
         * (work[71] + (t38 + (t39 + coef[133] * work[30])))));
@@ -804,9 +803,8 @@ kowalevski_top_APART static void kowalevski_top_linearise_part3(const double coe
     const double t25 = t10 - work[15] * (t11 + (work[8] * work[180] - work[0] * work[181] + (work[11] * t17
         - work[13] * t21))) - t22 + (t23 * work[157] + t24 * work[155] + (work[179] * work[159] + work[178]
         * work[161] + (work[154] * work[163] + work[177] * work[165])));
-    const double t26 = 0.5 * work[0], t27 = t5 * work[14], t28 = t5 * work[6];
-    const double t29 = work[0] * work[151], t30 = work[13] * t5, t31 = t29 - t12 + (t30 - t15);
-    const double t32 = t18 + t2, t33 = t32 + t32;
+    const double t26 = 0.5 * work[0], t27 = t5 * work[14], t28 = t5 * work[6], t29 = work[0] * work[151];
+    const double t30 = work[13] * t5, t31 = t29 - t12 + (t30 - t15), t32 = t18 + t2, t33 = t32 + t32;
     const double t34 = work[8] * work[151] + work[2] * work[125] + (work[11] * t5 + work[20] * t33);
     const double t35 = work[29] * (work[182] + (coef[53] * work[27] + work[183])) + (work[27] * work[184]
         + (work[185] + (coef[170] * work[57] + work[186]))) + P1 * (coef[171] * work[26] + work[28] + P1
@@ -819,9 +817,8 @@ kowalevski_top_APART static void kowalevski_top_linearise_part3(const double coe
         * work[166])));
     const double t39 = work[198] * work[14], t40 = work[198] * work[6], t41 = work[11] * work[198];
     const double t42 = work[13] * work[199], t43 = work[200] - work[201] + (t41 - t42);
-    const double t44 = t39 - work[15] * (t40 + (work[20] * work[202] - work[11] * t43));
-    const double t45 = 0.5 * G1, t46 = work[13] * work[203];
-    const double t47 = work[3] + (work[11] * work[204] - t46);
+    const double t44 = t39 - work[15] * (t40 + (work[20] * work[202] - work[11] * t43)), t45 = 0.5 * G1;
+    const double t46 = work[13] * work[203], t47 = work[3] + (work[11] * work[204] - t46);
     const double t48 = t45 + (work[204] * work[14] - work[15] * (work[204] * work[6] + (work[205] - work[206]
         + (work[20] * work[207] - work[11] * t47))));
     const double t49 = work[208] * work[14], t50 = work[208] * work[6], t51 = work[11] * work[208];
@@ -922,14 +919,13 @@ kowalevski_top_APART static void kowalevski_top_linearise_part3(const double coe
     const double t114 = work[249] + t113;
     const double t115 = t87 + 2.0 * (work[17] * work[227]) - (work[15] * (t88 + 2.0 * work[205]
         + (work[247] + work[13] * t59 - work[20] * work[261])) + 2.0 * (work[226] * work[273]));
-    const double t116 = t115 - t45, t117 = G2 * work[190], t118 = G3 * work[179];
-    const double t119 = P2 * work[237], t120 = P3 * work[238], t121 = G3 * work[178];
-    const double t122 = G2 * work[188], t123 = G2 * work[156], t124 = G3 * work[154];
-    const double t125 = G3 * work[158], t126 = G3 * work[160], t127 = P1 * work[241];
-    const double t128 = G1 * work[189], t129 = G1 * work[188], t130 = G1 * t23;
-    const double t131 = G2 * work[158], t132 = G1 * work[178], t133 = G1 * work[177];
-    const double t134 = G2 * work[164], t135 = G2 * work[237], t136 = G3 * work[238];
-    const double t137 = G1 * work[241];
+    const double t116 = t115 - t45, t117 = G2 * work[190], t118 = G3 * work[179], t119 = P2 * work[237];
+    const double t120 = P3 * work[238], t121 = G3 * work[178], t122 = G2 * work[188];
+    const double t123 = G2 * work[156], t124 = G3 * work[154], t125 = G3 * work[158];
+    const double t126 = G3 * work[160], t127 = P1 * work[241], t128 = G1 * work[189];
+    const double t129 = G1 * work[188], t130 = G1 * t23, t131 = G2 * work[158], t132 = G1 * work[178];
+    const double t133 = G1 * work[177], t134 = G2 * work[164], t135 = G2 * work[237];
+    const double t136 = G3 * work[238], t137 = G1 * work[241];
     jacobian[3] = t9;
     increment_jacobian[4] = work[8] + (G2 * t23 - G3 * t24 + (P2 * work[177] - P3 * work[178]));
     increment_jacobian[16] = G1 * t24 + (P1 * work[178] - P2 * work[179] - G2 * work[154]) - work[2];
@@ -1011,7 +1007,6 @@ static void kowalevski_top_linearise(const double coef[172], const double y[6],
     kowalevski_top_linearise_part3(coef, y, displacement, increment, jacobian, increment_jacobian, work);
 }
 
-/* the Hamiltonian */
 double kowalevski_top_hamiltonian(const kowalevski_top_params *params, const double x[6])
 {
     (void)params;
@@ -1019,7 +1014,6 @@ double kowalevski_top_hamiltonian(const kowalevski_top_params *params, const dou
     return G1 + 0.5 * (P3 * P3 + (0.5 * (P1 * P1) + 0.5 * (P2 * P2)));
 }
 
-/* the Casimirs */
 void kowalevski_top_casimirs(const kowalevski_top_params *params, const double x[6], double out[])
 {
     (void)params;
@@ -1028,7 +1022,6 @@ void kowalevski_top_casimirs(const kowalevski_top_params *params, const double x
     out[1] = G3 * P3 + (G2 * P2 + G1 * P1);
 }
 
-/* pi(x) grad H(x) */
 void kowalevski_top_vector_field(const kowalevski_top_params *params, const double x[6], double out[6])
 {
     (void)params;
@@ -1043,19 +1036,18 @@ void kowalevski_top_vector_field(const kowalevski_top_params *params, const doub
 }
 
 /* ---- Compensated sums, linear equations ---- */
-/* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to
-   its last bit: were it rounded with the change, corrections of one sign would add up to a drift. 0, and x as
-   before, if the sum is not finite. */
+/* x + change + small in compensated arithmetic, where small is the carry and what is as small: were that
+   rounded with the change, corrections of one sign would add up to a drift. 0, and x as before, if the sum is
+   not finite. */
 static int kowalevski_top_advance(kowalevski_top_solver *s, const double change[kowalevski_top_DIM],
-    const double correction[kowalevski_top_DIM])
+    const double small[kowalevski_top_DIM])
 {
     double x[kowalevski_top_DIM], carry[kowalevski_top_DIM];
     for (int i = 0; i < kowalevski_top_DIM; ++i) {
         const double sum = s->x[i] + change[i], added = sum - s->x[i];
-        const double lost = (s->x[i] - (sum - added)) + (change[i] - added);
-        const double small = lost + (s->carry[i] + correction[i]);
-        x[i] = sum + small;
-        carry[i] = small - (x[i] - sum);
+        const double lost = ((s->x[i] - (sum - added)) + (change[i] - added)) + small[i];
+        x[i] = sum + lost;
+        carry[i] = lost - (x[i] - sum);
         if (!isfinite(x[i])) return 0;
     }
     memcpy(s->x, x, sizeof x);
@@ -1063,7 +1055,7 @@ static int kowalevski_top_advance(kowalevski_top_solver *s, const double change[
     return 1;
 }
 
-/* Newton matrices are I + O(h): a pivot whose reciprocal is larger than this is far from 1. */
+/* Newton matrices are I + O(h): a pivot with a larger one is far from 1 */
 #define kowalevski_top_LARGEST_RECIPROCAL 1e3
 
 /* Solve matrix * solution = side, both overwritten, by elimination with partial pivoting. 0 if singular. */
@@ -1200,8 +1192,7 @@ static int kowalevski_top_train(kowalevski_top_history *history, int component)
     for (int k = 0; k < WINDOW; ++k) memcpy(history->weight[k][component], weight[k], AHEAD * sizeof(double));
     return kowalevski_top_missed(value + ROWS, weight) <= kowalevski_top_HOPELESS * largest ? terms : 0;
 }
-/* How far from the last value a guess may be, in sizes of that value. */
-#define kowalevski_top_REACH 4.0
+#define kowalevski_top_REACH 4.0 /* how far from the last value a guess may be, in sizes of that value */
 
 /* Whether a guess is where the next values may be. Far away the equation of a step has solutions that have
    nothing to do with the motion. */
@@ -1316,10 +1307,8 @@ static void kowalevski_top_remember(kowalevski_top_history *history, const doubl
         kowalevski_top_fit(history);
 }
 
-/* How far a step may lead, in sizes of the state and of what the vector field says, if the energy is lost;
-   and the part of the energy that counts as lost. */
-#define kowalevski_top_PLAUSIBLE 1.5
-#define kowalevski_top_LOST 0.5
+#define kowalevski_top_PLAUSIBLE 1.5 /* how far any step may lead, in sizes of the state and of its motion */
+#define kowalevski_top_LOST 0.5      /* part of the energy that one which leads farther must not lose */
 
 /* Whether an increment is that of the motion. Where the step is too large, the equation may have been solved
    by a point far away, at another energy, that has nothing to do with it. */
@@ -1331,24 +1320,21 @@ static int kowalevski_top_plausible(const kowalevski_top_solver *s,
     for (int i = 0; i < kowalevski_top_DIM; ++i) {
         moved += fabs(increment[i]);
         size += fabs(s->x[i]);
-    }
-    if (moved <= kowalevski_top_PLAUSIBLE * size) return 1;
-    kowalevski_top_vector_field(&s->params, s->x, field);
-    for (int i = 0; i < kowalevski_top_DIM; ++i) {
-        size += fabs(s->h * field[i]);
         middle[i] = s->x[i] + 0.5 * increment[i];
         end[i] = s->x[i] + increment[i];
     }
     if (moved <= kowalevski_top_PLAUSIBLE * size) return 1;
-    const double before = kowalevski_top_hamiltonian(&s->params, s->x), after =
-        kowalevski_top_hamiltonian(&s->params, end);
-    const double scale = fabs(before) + fabs(kowalevski_top_hamiltonian(&s->params, middle)) + fabs(after);
-    return fabs(after - before) <= kowalevski_top_LOST * scale;
+    kowalevski_top_vector_field(&s->params, s->x, field);
+    for (int i = 0; i < kowalevski_top_DIM; ++i) size += fabs(s->h * field[i]);
+    if (moved <= kowalevski_top_PLAUSIBLE * size) return 1;
+    const double before = kowalevski_top_hamiltonian(&s->params, s->x);
+    const double after = kowalevski_top_hamiltonian(&s->params, end), between =
+        kowalevski_top_hamiltonian(&s->params, middle);
+    return fabs(after - before) <= kowalevski_top_LOST * (fabs(before) + fabs(between) + fabs(after));
 }
 
 /* ---- The implicit step, by Newton's method ---- */
-/* Components of y are measured no finer than by this part of the largest. */
-#define kowalevski_top_FLOOR 1e-6
+#define kowalevski_top_FLOOR 1e-6 /* components of y are measured no finer than by this part of the largest */
 
 /* Size of a correction relative to each component of y; NaN or infinite if the correction is. */
 static double kowalevski_top_size(const double y[kowalevski_top_DIM], const double delta[kowalevski_top_DIM])
@@ -1363,9 +1349,8 @@ static double kowalevski_top_size(const double y[kowalevski_top_DIM], const doub
     return size;
 }
 
-/* Corrections below the first that shrink by less than the second have reached the level of rounding. */
-#define kowalevski_top_NEARLY_SOLVED 1e-8
-#define kowalevski_top_SHRINKING 0.25
+#define kowalevski_top_NEARLY_SOLVED 1e-8 /* corrections below this have reached the level of rounding, ... */
+#define kowalevski_top_SHRINKING 0.25     /* ... if one is more than this part of the one before */
 
 /* Solve (y - x) + displacement(y) = 0 for y by Newton's method from the extrapolated guess, and advance. The
    increment is corrected to first order by the last Newton correction, so that correction costs no
@@ -1376,13 +1361,14 @@ static kowalevski_top_status kowalevski_top_attempt(kowalevski_top_solver *s)
     double y[kowalevski_top_DIM], delta[kowalevski_top_DIM], displacement[kowalevski_top_DIM],
         increment[kowalevski_top_DIM];
     double jacobian[kowalevski_top_DIM * kowalevski_top_DIM], increment_jacobian[kowalevski_top_DIM
-        * kowalevski_top_DIM], previous = HUGE_VAL;
+        * kowalevski_top_DIM];
+    double previous = HUGE_VAL;
     if (!kowalevski_top_predict(&s->history, y)) memcpy(y, s->x, sizeof y);
     for (int iteration = 1; iteration <= kowalevski_top_MAX_ITERATIONS; ++iteration) {
         kowalevski_top_linearise(s->coef, y, displacement, increment, jacobian, increment_jacobian);
         ++s->evaluations;
-        for (int i = 0; i < kowalevski_top_DIM; ++i) delta[i] = ((y[i] - s->x[i]) + displacement[i])
-            - s->carry[i];
+        for (int i = 0; i < kowalevski_top_DIM; ++i)
+            delta[i] = ((y[i] - s->x[i]) + displacement[i]) - s->carry[i];
         const int regular = kowalevski_top_solve(jacobian, delta);
         const double size = kowalevski_top_size(y, delta), growth = size / (previous * previous);
         if (!isfinite(size)) return kowalevski_top_NOT_FINITE;
@@ -1393,12 +1379,14 @@ static kowalevski_top_status kowalevski_top_attempt(kowalevski_top_solver *s)
             * previous;
         previous = size;
         if (!(remaining <= kowalevski_top_TOLERANCE || stalled)) continue;
-        double correction[kowalevski_top_DIM] = { 0.0 };
-        for (int i = 0; i < kowalevski_top_DIM; ++i)
+        double small[kowalevski_top_DIM] = { 0.0 }; /* the correction of the increment, and the carry */
+        for (int i = 0; i < kowalevski_top_DIM; ++i) {
             for (int j = 0; j < kowalevski_top_DIM; ++j)
-                correction[i] -= increment_jacobian[i * kowalevski_top_DIM + j] * delta[j];
+                small[i] -= increment_jacobian[i * kowalevski_top_DIM + j] * delta[j];
+            small[i] += s->carry[i];
+        }
         if (!kowalevski_top_plausible(s, increment)) return kowalevski_top_NO_CONVERGENCE;
-        if (!kowalevski_top_advance(s, increment, correction)) return kowalevski_top_NOT_FINITE;
+        if (!kowalevski_top_advance(s, increment, small)) return kowalevski_top_NOT_FINITE;
         kowalevski_top_remember(&s->history, y, iteration);
         return kowalevski_top_OK;
     }
@@ -1429,19 +1417,17 @@ typedef double kowalevski_top_lanes[kowalevski_top_LANES];
 #endif
 
 /* ---- The solver ---- */
-/* The arguments may be parts of *s: they are read before it is written. */
+/* The arguments may be parts of *s, which is therefore written last. */
 kowalevski_top_status kowalevski_top_init(kowalevski_top_solver *s, const kowalevski_top_params *params,
     const double x0[kowalevski_top_DIM])
 {
     if (s == NULL || x0 == NULL) return kowalevski_top_BAD_ARGUMENT;
-    const kowalevski_top_params own = params != NULL ? *params : kowalevski_top_default_params;
-    double x[kowalevski_top_DIM];
-    memcpy(x, x0, sizeof x);
+    kowalevski_top_solver fresh = { .h = (double)NAN };
+    fresh.params = params != NULL ? *params : kowalevski_top_default_params;
+    memcpy(fresh.x, x0, sizeof fresh.x);
     for (int i = 0; i < kowalevski_top_DIM; ++i)
-        if (!isfinite(x[i])) return kowalevski_top_BAD_ARGUMENT;
-    memset(s, 0, sizeof *s);
-    memcpy(s->x, x, sizeof s->x);
-    s->params = own;
+        if (!isfinite(fresh.x[i])) return kowalevski_top_BAD_ARGUMENT;
+    *s = fresh;
     return kowalevski_top_OK;
 }
 
@@ -1449,7 +1435,7 @@ kowalevski_top_status kowalevski_top_init(kowalevski_top_solver *s, const kowale
 static kowalevski_top_status kowalevski_top_set_step(kowalevski_top_solver *s, double h)
 {
     if (s == NULL || !isfinite(h)) return kowalevski_top_BAD_ARGUMENT;
-    if (s->prepared && memcmp(&h, &s->h, sizeof h) == 0) return kowalevski_top_OK;
+    if (memcmp(&h, &s->h, sizeof h) == 0) return kowalevski_top_OK;
     kowalevski_top_prepare(&s->params, h, s->coef);
     memset(&s->history, 0, sizeof s->history);
     s->history.slow_steps_allowed = kowalevski_top_REPAY;
@@ -1459,7 +1445,6 @@ static kowalevski_top_status kowalevski_top_set_step(kowalevski_top_solver *s, d
     s->h = h;
     s->t_before_h = s->t;
     s->steps_before_h = s->steps;
-    s->prepared = 1;
     return kowalevski_top_OK;
 }
 
@@ -1473,12 +1458,10 @@ static void kowalevski_top_count(kowalevski_top_solver *s, size_t steps)
 /* One stage. A guess from earlier steps may have misled it: then once more without. */
 static kowalevski_top_status kowalevski_top_stage(kowalevski_top_solver *s)
 {
-    kowalevski_top_status status = kowalevski_top_attempt(s);
-    if (status != kowalevski_top_OK && s->history.count > 0) {
-        memset(&s->history, 0, sizeof s->history);
-        status = kowalevski_top_attempt(s);
-    }
-    return status;
+    const kowalevski_top_status status = kowalevski_top_attempt(s);
+    if (status == kowalevski_top_OK || s->history.count == 0) return status;
+    memset(&s->history, 0, sizeof s->history);
+    return kowalevski_top_attempt(s);
 }
 
 kowalevski_top_status kowalevski_top_step(kowalevski_top_solver *s, double h)
@@ -1503,7 +1486,6 @@ const char *kowalevski_top_status_string(kowalevski_top_status status)
 }
 
 size_t kowalevski_top_solver_size(void) { return sizeof(kowalevski_top_solver); }
-
 size_t kowalevski_top_solver_steps_done(const kowalevski_top_solver *s) { return s->steps; }
 
 /* kowalevski_top_phi0 for the loops over lanes: no branches. No number beyond |s| = 4.0. */
@@ -2151,9 +2133,8 @@ kowalevski_top_APART static void kowalevski_top_linearise_lanes_part3(kowalevski
     for (int lane = 0; lane < kowalevski_top_LANES; ++lane) {
         const double P1 = y[0][lane], P2 = y[1][lane], P3 = y[2][lane], G1 = y[3][lane], G2 = y[4][lane], G3 =
             y[5][lane];
-        const double t1 = work[8][lane] * work[11][lane], t2 = work[0][lane] * work[13][lane];
-        const double t3 = t1 + t2, t4 = t3 + t3;
-        const double t5 = work[8][lane] * work[20][lane] + work[2][lane] * work[11][lane];
+        const double t1 = work[8][lane] * work[11][lane], t2 = work[0][lane] * work[13][lane], t3 = t1 + t2;
+        const double t4 = t3 + t3, t5 = work[8][lane] * work[20][lane] + work[2][lane] * work[11][lane];
         const double t6 = work[2][lane] * work[151][lane] + work[8][lane] * work[152][lane] + (work[20][lane]
             * t5 + work[11][lane] * t4);
         const double t7 = work[0][lane] * work[20][lane] + work[2][lane] * work[13][lane];
@@ -2167,9 +2148,8 @@ kowalevski_top_APART static void kowalevski_top_linearise_lanes_part3(kowalevski
         const double t10 = t7 * work[14][lane], t11 = t7 * work[6][lane];
         const double t12 = work[2][lane] * work[168][lane], t13 = work[8][lane] * work[153][lane];
         const double t14 = work[8][lane] * work[13][lane] + work[0][lane] * work[11][lane];
-        const double t15 = work[20][lane] * t14, t16 = work[11][lane] * t7;
-        const double t17 = t12 - t13 + (t15 - t16), t18 = work[2][lane] * work[20][lane], t19 = t18 + t1;
-        const double t20 = t19 + t19;
+        const double t15 = work[20][lane] * t14, t16 = work[11][lane] * t7, t17 = t12 - t13 + (t15 - t16);
+        const double t18 = work[2][lane] * work[20][lane], t19 = t18 + t1, t20 = t19 + t19;
         const double t21 = work[0][lane] * work[153][lane] + work[2][lane] * work[169][lane] + (work[13][lane]
             * t7 + work[20][lane] * t20);
         const double t22 = 0.5 * work[8][lane];
@@ -2211,8 +2191,7 @@ kowalevski_top_APART static void kowalevski_top_linearise_lanes_part3(kowalevski
             * work[6][lane] + (work[205][lane] - work[206][lane] + (work[20][lane] * work[207][lane]
             - work[11][lane] * t47))));
         const double t49 = work[208][lane] * work[14][lane], t50 = work[208][lane] * work[6][lane];
-        const double t51 = work[11][lane] * work[208][lane];
-        const double t52 = t51 - work[13][lane] * work[209][lane];
+        const double t51 = work[11][lane] * work[208][lane], t52 = t51 - work[13][lane] * work[209][lane];
         const double t53 = t49 - work[15][lane] * (t50 + (work[10][lane] + (work[20][lane] * work[210][lane]
             - work[11][lane] * t52))) - work[211][lane];
         const double t54 = 0.5 * P1, t55 = work[3][lane] - work[11][lane] * work[212][lane] - t46;
@@ -2343,15 +2322,13 @@ kowalevski_top_APART static void kowalevski_top_linearise_lanes_part3(kowalevski
             * (t88 + 2.0 * work[205][lane] + (work[247][lane] + work[13][lane] * t59 - work[20][lane]
             * work[261][lane])) + 2.0 * (work[226][lane] * work[273][lane]));
         const double t116 = t115 - t45, t117 = G2 * work[190][lane], t118 = G3 * work[179][lane];
-        const double t119 = P2 * work[237][lane], t120 = P3 * work[238][lane];
-        const double t121 = G3 * work[178][lane], t122 = G2 * work[188][lane];
-        const double t123 = G2 * work[156][lane], t124 = G3 * work[154][lane];
-        const double t125 = G3 * work[158][lane], t126 = G3 * work[160][lane];
-        const double t127 = P1 * work[241][lane], t128 = G1 * work[189][lane];
-        const double t129 = G1 * work[188][lane], t130 = G1 * t23, t131 = G2 * work[158][lane];
-        const double t132 = G1 * work[178][lane], t133 = G1 * work[177][lane];
-        const double t134 = G2 * work[164][lane], t135 = G2 * work[237][lane];
-        const double t136 = G3 * work[238][lane], t137 = G1 * work[241][lane];
+        const double t119 = P2 * work[237][lane], t120 = P3 * work[238][lane], t121 = G3 * work[178][lane];
+        const double t122 = G2 * work[188][lane], t123 = G2 * work[156][lane], t124 = G3 * work[154][lane];
+        const double t125 = G3 * work[158][lane], t126 = G3 * work[160][lane], t127 = P1 * work[241][lane];
+        const double t128 = G1 * work[189][lane], t129 = G1 * work[188][lane], t130 = G1 * t23;
+        const double t131 = G2 * work[158][lane], t132 = G1 * work[178][lane], t133 = G1 * work[177][lane];
+        const double t134 = G2 * work[164][lane], t135 = G2 * work[237][lane], t136 = G3 * work[238][lane];
+        const double t137 = G1 * work[241][lane];
         jacobian[3][lane] = t9;
         increment_jacobian[4][lane] = work[8][lane] + (G2 * t23 - G3 * t24 + (P2 * work[177][lane] - P3
             * work[178][lane]));
@@ -2466,10 +2443,9 @@ static void kowalevski_top_evaluate_lanes(kowalevski_top_lanes coef[restrict 172
         const double P1 = y[0][lane], P2 = y[1][lane], P3 = y[2][lane], G1 = y[3][lane], G2 = y[4][lane], G3 =
             y[5][lane];
         const double t1 = G2 * P2, t2 = P2 * P2, t3 = coef[77][lane] * t2;
-        const double t4 = coef[38][lane] + G1 * coef[47][lane];
-        const double t5 = coef[10][lane] + G1 * coef[15][lane], t6 = coef[18][lane] * t2;
-        const double t7 = G1 * (coef[3][lane] + G1 * coef[4][lane]), t8 = G3 * G3, t9 = G2 * G2;
-        const double t10 = coef[0][lane] + coef[2][lane] * t9;
+        const double t4 = coef[38][lane] + G1 * coef[47][lane], t5 = coef[10][lane] + G1 * coef[15][lane];
+        const double t6 = coef[18][lane] * t2, t7 = G1 * (coef[3][lane] + G1 * coef[4][lane]), t8 = G3 * G3;
+        const double t9 = G2 * G2, t10 = coef[0][lane] + coef[2][lane] * t9;
         const double t11 = t2 * (t5 + t6) + (t7 + (coef[1][lane] * t8 + t10)), t12 = coef[64][lane] * t1;
         const double t13 = P1 * P1;
         const double t14 = coef[10][lane] + G1 * coef[59][lane] + (coef[86][lane] * t2 + coef[18][lane]
@@ -2500,8 +2476,8 @@ static void kowalevski_top_evaluate_lanes(kowalevski_top_lanes coef[restrict 172
             + P1 * (t24 + P1 * t30));
         const double t31 = coef[8][lane] * t8, t32 = t31 + coef[9][lane] * t9;
         const double t33 = coef[10][lane] + G1 * coef[11][lane], t34 = coef[2][lane] * t2;
-        const double t35 = coef[20][lane] + G1 * coef[22][lane], t36 = coef[31][lane] * t2;
-        const double t37 = P1 * P2, t38 = coef[21][lane] + G1 * coef[23][lane];
+        const double t35 = coef[20][lane] + G1 * coef[22][lane], t36 = coef[31][lane] * t2, t37 = P1 * P2;
+        const double t38 = coef[21][lane] + G1 * coef[23][lane];
         const double t39 = coef[19][lane] + coef[33][lane] * (G1 * G1 * t2) + t8
             * (t35 + (t36 + coef[43][lane] * t13)) + G2 * (coef[41][lane] * (G1 * t37) + G2
             * (t38 + (coef[44][lane] * t13 + coef[32][lane] * t2)));
@@ -2514,10 +2490,9 @@ static void kowalevski_top_evaluate_lanes(kowalevski_top_lanes coef[restrict 172
         const double t49 = G3 * (t11 + P1 * (coef[30][lane] * t1 + P1 * (coef[38][lane] + G1 * coef[39][lane]
             + (coef[42][lane] * t2 + coef[46][lane] * t13)))) + P3 * (t22 * t40 + P2 * (coef[16][lane] * t23
             + G2 * (t41 + (t42 + t43))) + P1 * t48);
-        const double p_P1 = t1 * (t32 + G1 * (t33 + t34)) + P1 * t39 + P3 * t49;
-        const double t50 = coef[48][lane] * t15, t51 = t22 * (t4 + t50), t52 = coef[65][lane] * t13;
-        const double t53 = coef[64][lane] * (G3 * P1), t54 = coef[17][lane] * t13;
-        const double t55 = coef[58][lane] * t2, t56 = coef[33][lane] * t13;
+        const double p_P1 = t1 * (t32 + G1 * (t33 + t34)) + P1 * t39 + P3 * t49, t50 = coef[48][lane] * t15;
+        const double t51 = t22 * (t4 + t50), t52 = coef[65][lane] * t13, t53 = coef[64][lane] * (G3 * P1);
+        const double t54 = coef[17][lane] * t13, t55 = coef[58][lane] * t2, t56 = coef[33][lane] * t13;
         const double t57 = t9 * (t55 + (coef[12][lane] + coef[32][lane] * t13)) + (coef[19][lane] + t8
             * (t42 + (coef[49][lane] + coef[31][lane] * t13))) + G1 * (G1 * (coef[12][lane] + G1
             * coef[52][lane] + (t56 + coef[59][lane] * t2)) + (coef[50][lane] * t8 + G2 * (G2 * coef[51][lane]
@@ -2530,8 +2505,8 @@ static void kowalevski_top_evaluate_lanes(kowalevski_top_lanes coef[restrict 172
             * coef[61][lane] + (coef[63][lane] * t13 + coef[63][lane] * t2))) + P3 * t59));
         const double p_P2 = G2 * (t51 + P1 * (t32 + G1 * (t52 + t33) + P3 * (t53 + P3 * (t41 + (t54 + t43)))))
             + t60;
-        const double t61 = p_P3 * p_P3 + (p_P1 * p_P1 + p_P2 * p_P2);
-        const double t62 = kowalevski_top_phi0_lane(t61), t63 = G1 * coef[90][lane];
+        const double t61 = p_P3 * p_P3 + (p_P1 * p_P1 + p_P2 * p_P2), t62 = kowalevski_top_phi0_lane(t61);
+        const double t63 = G1 * coef[90][lane];
         const double t64 = t2 * (coef[87][lane] * t2 + (coef[49][lane] + t58)) + (G1 * (coef[38][lane] + t63)
             + (coef[115][lane] * t8 + (coef[114][lane] + coef[108][lane] * t9))) + P1 * (coef[118][lane] * t1
             + P1 * (t35 + (t36 + coef[119][lane] * t13)));
@@ -2540,8 +2515,7 @@ static void kowalevski_top_evaluate_lanes(kowalevski_top_lanes coef[restrict 172
             * (coef[25][lane] * t22 + t12 + P1 * (t65 + t14));
         const double t67 = P3 * (t22 * (coef[49][lane] + G1 * coef[68][lane] + coef[116][lane] * t15) + P2
             * (coef[53][lane] * t23 + G2 * (t4 + (t3 + t50))) + P1 * t66);
-        const double p_G3 = G3 * t64 + t67;
-        const double t68 = G3 * p_P1 - G1 * p_P3, t69 = G1 * coef[91][lane];
+        const double p_G3 = G3 * t64 + t67, t68 = G3 * p_P1 - G1 * p_P3, t69 = G1 * coef[91][lane];
         const double t70 = t15 * (coef[111][lane] * t15 + (coef[67][lane] + G1 * coef[69][lane]))
             + (G1 * (coef[110][lane] + t69) + (coef[108][lane] * t8 + (coef[107][lane] + coef[109][lane]
             * t9))) + P1 * (coef[113][lane] * t22 + P1 * (t38 + (coef[26][lane] * t15 + coef[36][lane]
@@ -2569,13 +2543,11 @@ static void kowalevski_top_evaluate_lanes(kowalevski_top_lanes coef[restrict 172
         const double t79 = kowalevski_top_phi1_lane(t61), t80 = G2 * p_P3 - G3 * p_P2;
         const double t81 = p_P2 * t80 - p_P1 * t68, t82 = p_P3 * t68 - p_P2 * t72;
         const double t83 = p_P1 * t81 - p_P3 * t82, t84 = p_P1 * t72 - p_P3 * t80;
-        const double t85 = p_P2 * t82 - p_P1 * t84;
-        const double t86 = G2 * p_G3 - G3 * p_G2 + (P2 * p_P3 - P3 * p_P2);
+        const double t85 = p_P2 * t82 - p_P1 * t84, t86 = G2 * p_G3 - G3 * p_G2 + (P2 * p_P3 - P3 * p_P2);
         const double t87 = p_G2 * t80 - p_G1 * t68 + (p_P2 * t86 - p_P1 * t76);
         const double t88 = p_G1 * t81 - p_G3 * t82 + (p_P1 * t87 - p_P3 * t78);
         const double t89 = p_G1 * t72 - p_G3 * t80 + (p_P1 * t77 - p_P3 * t86);
-        const double t90 = p_G2 * t82 - p_G1 * t84 + (p_P2 * t78 - p_P1 * t89);
-        const double t91 = p_P3 * t84 - p_P2 * t81;
+        const double t90 = p_G2 * t82 - p_G1 * t84 + (p_P2 * t78 - p_P1 * t89), t91 = p_P3 * t84 - p_P2 * t81;
         const double t92 = p_G3 * t84 - p_G2 * t81 + (p_P3 * t89 - p_P2 * t87);
         displacement[0][lane] = t62 * t78 - t79 * (t61 * t78 + (p_G3 * t83 - p_G2 * t85 + (p_P3 * t88 - p_P2
             * t90))) - 0.5 * t86;
@@ -2725,8 +2697,8 @@ static void kowalevski_top_update(kowalevski_top_lanes coef[restrict], kowalevsk
 }
 
 /* ---- Blocks of steps ---- */
-/* What all blocks share: coefficients, the same in each lane, and the recurrences by which they are foreseen.
-   */
+/* What all blocks share: coefficients, the same in each lane, and the recurrences by which they are
+   foreseen. */
 typedef struct {
     int fits; /* the fit that weight is of; -1 for none */
     kowalevski_top_lanes coef[kowalevski_top_COEFFICIENTS], weight[kowalevski_top_WINDOW][kowalevski_top_DIM];
@@ -3178,8 +3150,8 @@ static void kowalevski_top_group_fit(kowalevski_top_group *group)
         * group->slow_steps_allowed + kowalevski_top_REPAY : kowalevski_top_HOPELESS_WAIT;
 }
 
-/* Replace guesses that are not near the last values, as kowalevski_top_near has it, by these; lane by lane.
-   */
+/* Replace guesses that are not near the last values, as kowalevski_top_near has it, by these; lane by
+   lane. */
 static void kowalevski_top_stay_near(kowalevski_top_lanes y[restrict kowalevski_top_DIM],
     kowalevski_top_lanes last[restrict kowalevski_top_DIM])
 {

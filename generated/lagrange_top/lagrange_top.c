@@ -20,7 +20,7 @@
  *   4. The implicit step, by Newton's method
  *   5. The solver
  *   6. Ensembles
- * body-sha256: 0f9d0052288450777ee9d78417ce5075facede26ecd59ed4808cb535d63f7689
+ * body-sha256: 98b5fd8ac01886aafc3c609df75249527fcccf75ddcff226cc3f5a59a13f5036
  */
 #include "lagrange_top.h"
 
@@ -32,9 +32,7 @@
 const lagrange_top_params lagrange_top_default_params = { 2.0, 1.0, 1.0 };
 
 enum { lagrange_top_MAX_ITERATIONS = 20 }; /* of an inner solve */
-
-/* A correction is accepted when the error that it leaves is estimated to be below this. */
-#define lagrange_top_TOLERANCE 1e-20
+#define lagrange_top_TOLERANCE 1e-20       /* the error that an accepted correction may leave, as estimated */
 
 /* Whether all parameters are finite, and positive where they have to be. */
 static int lagrange_top_allowed(const lagrange_top_params *params)
@@ -50,83 +48,84 @@ static int lagrange_top_allowed(const lagrange_top_params *params)
 #define lagrange_top_APART
 #endif
 
+/* The polynomial with these coefficients, the constant first. */
+static inline double lagrange_top_polynomial(const double *coefficients, int count, double s)
+{
+    double value = coefficients[--count];
+    while (count > 0) value = value * s + coefficients[--count];
+    return value;
+}
+
 /* (1 - w cot w)/s with w = sqrt(s)/2, coth for negative s: the function of the exponential bi-realisation. */
 static double lagrange_top_phi0(double s)
 {
-    if (fabs(s) < 0.25)
-        return (0.08333333333333333 + s * (0.001388888888888889 + s * (3.306878306878307e-05 + s *
-            (8.267195767195768e-07 + s * (2.08767569878681e-08 + s * (5.284190138687493e-10 + s *
-            (1.3382536530684679e-11 + s * (3.3896802963225827e-13 + s * 8.586062056277845e-15))))))));
+    static const double near[9] = { 0.08333333333333333, 0.001388888888888889, 3.306878306878307e-05,
+        8.267195767195768e-07, 2.08767569878681e-08, 5.284190138687493e-10, 1.3382536530684679e-11,
+        3.3896802963225827e-13, 8.586062056277845e-15 };
+    static const double rest[21] = { 0.03267274151216445, 0.000105641107053347, 5.637370282876845e-07,
+        3.357141926657451e-09, 2.0742872904166045e-11, 1.3000482138698975e-13, 8.196052055691008e-16,
+        5.180118196169724e-18, 3.277539174701792e-20, 2.0747401878593604e-22, 1.3136241807166534e-24,
+        8.318003195189264e-27, 5.267262996834231e-29, 3.3354842988221443e-31, 2.1122063323183885e-33,
+        1.3375664093215244e-35, 8.470227328650247e-38, 5.363831046655698e-40, 3.3966848266497805e-42,
+        2.1509755511832569e-44, 1.3621211117593843e-46 };
+    if (fabs(s) < 0.25) return lagrange_top_polynomial(near, 9, s);
     if (fabs(s) < 16.0) {
         const double pole = 1.0 / (39.47841760435743 - s);
-        return 2.0 * pole + (0.03267274151216445 + s * (0.000105641107053347 + s * (5.637370282876845e-07
-            + s * (3.357141926657451e-09 + s * (2.0742872904166045e-11 + s * (1.3000482138698975e-13 + s *
-            (8.196052055691008e-16 + s * (5.180118196169724e-18 + s * (3.277539174701792e-20 + s *
-            (2.0747401878593604e-22 + s * (1.3136241807166534e-24 + s * (8.318003195189264e-27 + s *
-            (5.267262996834231e-29 + s * (3.3354842988221443e-31 + s * (2.1122063323183885e-33 + s *
-            (1.3375664093215244e-35 + s * (8.470227328650247e-38 + s * (5.363831046655698e-40 + s *
-            (3.3966848266497805e-42 + s * (2.1509755511832569e-44 + s *
-            1.3621211117593843e-46))))))))))))))))))));
+        return 2.0 * pole + lagrange_top_polynomial(rest, 21, s);
     }
     const double w = 0.5 * sqrt(fabs(s)), c = w / (s > 0.0 ? tan(w) : tanh(w));
-    const double phi0 = (1.0 - c) / s;
-    return phi0;
+    return (1.0 - c) / s;
 }
 
 /* The derivative of (1 - w cot w)/s, w = sqrt(s)/2. */
 static double lagrange_top_phi1(double s)
 {
-    if (fabs(s) < 0.25)
-        return (0.001388888888888889 + s * (6.613756613756614e-05 + s * (2.48015873015873e-06 + s *
-            (8.35070279514724e-08 + s * (2.6420950693437467e-09 + s * (8.029521918410807e-11 + s *
-            (2.372776207425808e-12 + s * (6.868849645022276e-14 + s * 1.9573818287022555e-15))))))));
+    static const double near[9] = { 0.001388888888888889, 6.613756613756614e-05, 2.48015873015873e-06,
+        8.35070279514724e-08, 2.6420950693437467e-09, 8.029521918410807e-11, 2.372776207425808e-12,
+        6.868849645022276e-14, 1.9573818287022555e-15 };
+    static const double rest[21] = { 0.000105641107053347, 1.127474056575369e-06, 1.0071425779972354e-08,
+        8.297149161666418e-11, 6.500241069349487e-13, 4.917631233414605e-15, 3.626082737318807e-17,
+        2.6220313397614337e-19, 1.8672661690734246e-21, 1.3136241807166533e-23, 9.149803514708191e-26,
+        6.320715596201077e-28, 4.336129588468787e-30, 2.957088865245744e-32, 2.0063496139822866e-34,
+        1.3552363725840395e-36, 9.118512779314688e-39, 6.114032687969605e-41, 4.0868535472481875e-43,
+        2.7242422235187686e-45, 1.8114038279637677e-47 };
+    if (fabs(s) < 0.25) return lagrange_top_polynomial(near, 9, s);
     if (fabs(s) < 16.0) {
         const double pole = 1.0 / (39.47841760435743 - s);
-        return 2.0 * pole * pole + (0.000105641107053347 + s * (1.127474056575369e-06 + s *
-            (1.0071425779972354e-08 + s * (8.297149161666418e-11 + s * (6.500241069349487e-13 + s *
-            (4.917631233414605e-15 + s * (3.626082737318807e-17 + s * (2.6220313397614337e-19 + s *
-            (1.8672661690734246e-21 + s * (1.3136241807166533e-23 + s * (9.149803514708191e-26 + s *
-            (6.320715596201077e-28 + s * (4.336129588468787e-30 + s * (2.957088865245744e-32 + s *
-            (2.0063496139822866e-34 + s * (1.3552363725840395e-36 + s * (9.118512779314688e-39 + s *
-            (6.114032687969605e-41 + s * (4.0868535472481875e-43 + s * (2.7242422235187686e-45 + s *
-            1.8114038279637677e-47))))))))))))))))))));
+        return 2.0 * pole * pole + lagrange_top_polynomial(rest, 21, s);
     }
     const double w = 0.5 * sqrt(fabs(s)), c = w / (s > 0.0 ? tan(w) : tanh(w));
     const double phi0 = (1.0 - c) / s;
-    const double phi1 = (0.5 * s * phi0 * phi0 - 1.5 * phi0 + 0.125) / s;
-    return phi1;
+    return (0.5 * s * phi0 * phi0 - 1.5 * phi0 + 0.125) / s;
 }
 
 /* The second derivative of (1 - w cot w)/s, w = sqrt(s)/2. */
 static double lagrange_top_phi2(double s)
 {
-    if (fabs(s) < 0.25)
-        return (6.613756613756614e-05 + s * (4.96031746031746e-06 + s * (2.505210838544172e-07 + s *
-            (1.0568380277374987e-08 + s * (4.0147609592054037e-10 + s * (1.4236657244554848e-11 + s *
-            (4.808194751515593e-13 + s * (1.5659054629618044e-14 + s * 4.958102545524207e-16))))))));
+    static const double near[9] = { 6.613756613756614e-05, 4.96031746031746e-06, 2.505210838544172e-07,
+        1.0568380277374987e-08, 4.0147609592054037e-10, 1.4236657244554848e-11, 4.808194751515593e-13,
+        1.5659054629618044e-14, 4.958102545524207e-16 };
+    static const double rest[21] = { 1.127474056575369e-06, 2.0142851559944708e-08, 2.4891447484999256e-10,
+        2.600096427739795e-12, 2.4588156167073025e-14, 2.1756496423912842e-16, 1.8354219378330035e-18,
+        1.4938129352587397e-20, 1.182261762644988e-22, 9.149803514708191e-25, 6.952787155821185e-27,
+        5.203355506162545e-29, 3.844215524819467e-31, 2.8088894595752015e-33, 2.032854558876059e-35,
+        1.45896204469035e-37, 1.0393855569548329e-39, 7.356336385046738e-42, 5.17606022468566e-44,
+        3.622807655927535e-46, 2.5235866986281763e-48 };
+    if (fabs(s) < 0.25) return lagrange_top_polynomial(near, 9, s);
     if (fabs(s) < 16.0) {
         const double pole = 1.0 / (39.47841760435743 - s);
-        return 4.0 * pole * pole * pole + (1.127474056575369e-06 + s * (2.0142851559944708e-08 + s *
-            (2.4891447484999256e-10 + s * (2.600096427739795e-12 + s * (2.4588156167073025e-14 + s *
-            (2.1756496423912842e-16 + s * (1.8354219378330035e-18 + s * (1.4938129352587397e-20 + s *
-            (1.182261762644988e-22 + s * (9.149803514708191e-25 + s * (6.952787155821185e-27 + s *
-            (5.203355506162545e-29 + s * (3.844215524819467e-31 + s * (2.8088894595752015e-33 + s *
-            (2.032854558876059e-35 + s * (1.45896204469035e-37 + s * (1.0393855569548329e-39 + s *
-            (7.356336385046738e-42 + s * (5.17606022468566e-44 + s * (3.622807655927535e-46 + s *
-            2.5235866986281763e-48))))))))))))))))))));
+        return 4.0 * pole * pole * pole + lagrange_top_polynomial(rest, 21, s);
     }
     const double w = 0.5 * sqrt(fabs(s)), c = w / (s > 0.0 ? tan(w) : tanh(w));
     const double phi0 = (1.0 - c) / s;
     const double phi1 = (0.5 * s * phi0 * phi0 - 1.5 * phi0 + 0.125) / s;
-    const double phi2 = (0.5 * phi0 * phi0 - 2.5 * phi1 + s * phi0 * phi1) / s;
-    return phi2;
+    return (0.5 * phi0 * phi0 - 2.5 * phi1 + s * phi0 * phi1) / s;
 }
 
 /* everything that depends on parameters and step size only */
 static void lagrange_top_prepare(const lagrange_top_params *params, double h, double coef[restrict 8])
 {
-    const double t1 = 1.0 / params->I3, t2 = 1.0 / params->I1, t3 = 1.0 / 12.0 * t2;
-    const double t4 = h * (h * h);
+    const double t1 = 1.0 / params->I3, t2 = 1.0 / params->I1, t3 = 1.0 / 12.0 * t2, t4 = h * (h * h);
     const double t5 = t4 * t2 * (1.0 / 24.0 * (t2 * t2) + t1 * (1.0 / 24.0 * t1 - t3));
     const double t6 = h * params->mgl;
     coef[0] = (1.0 / 12.0 * t1 - t3) * (t2 * (params->mgl * t4));
@@ -336,9 +335,8 @@ lagrange_top_APART static void lagrange_top_linearise_part2(const double coef[8]
 {
     (void)displacement, (void)increment;
     const double P1 = y[0], P2 = y[1], P3 = y[2], G1 = y[3], G2 = y[4], G3 = y[5];
-    const double t1 = P2 * coef[0], t2 = P1 * coef[0], t3 = work[11] * work[3];
-    const double t4 = coef[5] * work[12], t5 = t3 + t4, t6 = t5 + t5;
-    const double t7 = work[11] * work[10] + work[13] * work[3];
+    const double t1 = P2 * coef[0], t2 = P1 * coef[0], t3 = work[11] * work[3], t4 = coef[5] * work[12];
+    const double t5 = t3 + t4, t6 = t5 + t5, t7 = work[11] * work[10] + work[13] * work[3];
     const double t8 = work[13] * work[14] + work[11] * work[15] + (work[10] * t7 + work[3] * t6);
     const double t9 = coef[5] * work[10] + work[13] * work[12];
     const double t10 = work[13] * work[16] + coef[5] * work[15] + (work[10] * t9 + work[12] * t6);
@@ -362,8 +360,7 @@ lagrange_top_APART static void lagrange_top_linearise_part2(const double coef[8]
     const double t39 = 2.0 * (work[39] * work[40]) + work[19] * (work[22] * work[37] + 2.0 * work[41]
         + (work[13] * work[42] - coef[5] * t37 + (work[43] + work[10] * work[44] - work[12] * t38)));
     const double t40 = work[18] * work[37] + 2.0 * (work[45] * work[46]) - t39 - work[47];
-    const double t41 = work[35] * work[18], t42 = work[22] * work[35];
-    const double t43 = t36 - work[3] * work[48];
+    const double t41 = work[35] * work[18], t42 = work[22] * work[35], t43 = t36 - work[3] * work[48];
     const double t44 = t41 - work[19] * (t42 + (work[49] + (work[10] * work[50] - work[12] * t43)))
         - work[51];
     const double t45 = 0.5 * P1, t46 = work[52] - work[12] * work[53] - work[3] * work[54];
@@ -447,9 +444,9 @@ lagrange_top_APART static void lagrange_top_linearise_part2(const double coef[8]
     const double t105 = t83 + 2.0 * (work[69] * work[76]) - (work[19] * (t84 + 2.0 * work[110]
         + (work[91] + work[3] * t56 - work[10] * work[94])) + 2.0 * (work[75] * work[109]));
     const double t106 = t105 - t85, t107 = P2 * work[7], t108 = P3 * work[63], t109 = G3 * work[17];
-    const double t110 = P3 * work[17], t111 = G3 * coef[4], t112 = P1 * work[2];
-    const double t113 = G2 * work[17], t114 = G1 * work[17], t115 = G1 * t1, t116 = G2 * t2;
-    const double t117 = G2 * work[7], t118 = G3 * work[63], t119 = G1 * work[2];
+    const double t110 = P3 * work[17], t111 = G3 * coef[4], t112 = P1 * work[2], t113 = G2 * work[17];
+    const double t114 = G1 * work[17], t115 = G1 * t1, t116 = G2 * t2, t117 = G2 * work[7];
+    const double t118 = G3 * work[63], t119 = G1 * work[2];
     jacobian[23] = work[0];
     increment_jacobian[2] = P2 * work[1] - P3 * work[2] - G3 * t1 - work[3];
     increment_jacobian[10] = -(P1 * t1);
@@ -524,7 +521,6 @@ static void lagrange_top_linearise(const double coef[8], const double y[6], doub
     lagrange_top_linearise_part2(coef, y, displacement, increment, jacobian, increment_jacobian, work);
 }
 
-/* the Hamiltonian */
 double lagrange_top_hamiltonian(const lagrange_top_params *params, const double x[6])
 {
     if (params == NULL) params = &lagrange_top_default_params;
@@ -533,7 +529,6 @@ double lagrange_top_hamiltonian(const lagrange_top_params *params, const double 
     return G3 * mgl + 0.5 * (P3 * P3 / I3 + (P1 * P1 + P2 * P2) / I1);
 }
 
-/* the Casimirs */
 void lagrange_top_casimirs(const lagrange_top_params *params, const double x[6], double out[])
 {
     (void)params;
@@ -542,7 +537,6 @@ void lagrange_top_casimirs(const lagrange_top_params *params, const double x[6],
     out[1] = G3 * P3 + (G2 * P2 + G1 * P1);
 }
 
-/* pi(x) grad H(x) */
 void lagrange_top_vector_field(const lagrange_top_params *params, const double x[6], double out[6])
 {
     if (params == NULL) params = &lagrange_top_default_params;
@@ -558,19 +552,18 @@ void lagrange_top_vector_field(const lagrange_top_params *params, const double x
 }
 
 /* ---- Compensated sums, linear equations ---- */
-/* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to
-   its last bit: were it rounded with the change, corrections of one sign would add up to a drift. 0, and x as
-   before, if the sum is not finite. */
+/* x + change + small in compensated arithmetic, where small is the carry and what is as small: were that
+   rounded with the change, corrections of one sign would add up to a drift. 0, and x as before, if the sum is
+   not finite. */
 static int lagrange_top_advance(lagrange_top_solver *s, const double change[lagrange_top_DIM],
-    const double correction[lagrange_top_DIM])
+    const double small[lagrange_top_DIM])
 {
     double x[lagrange_top_DIM], carry[lagrange_top_DIM];
     for (int i = 0; i < lagrange_top_DIM; ++i) {
         const double sum = s->x[i] + change[i], added = sum - s->x[i];
-        const double lost = (s->x[i] - (sum - added)) + (change[i] - added);
-        const double small = lost + (s->carry[i] + correction[i]);
-        x[i] = sum + small;
-        carry[i] = small - (x[i] - sum);
+        const double lost = ((s->x[i] - (sum - added)) + (change[i] - added)) + small[i];
+        x[i] = sum + lost;
+        carry[i] = lost - (x[i] - sum);
         if (!isfinite(x[i])) return 0;
     }
     memcpy(s->x, x, sizeof x);
@@ -610,12 +603,10 @@ static int lagrange_top_solve(double matrix[lagrange_top_DIM * lagrange_top_DIM]
 }
 
 /* ---- Starting guesses ---- */
-/* How far from the last value a guess may be, in sizes of that value. */
-#define lagrange_top_REACH 4.0
+#define lagrange_top_REACH 4.0 /* how far from the last value a guess may be, in sizes of that value */
 
-/* The guess for the next value from the last ones: the sum of their backward differences. 0 if there is none,
-   or if it is far away, where the equation of a step has solutions that have nothing to do with the motion.
-   */
+/* The guess for the next value, the sum of differences. 0 if there is none, or if it is far away, where the
+   equation of a step has solutions that have nothing to do with the motion. */
 static int lagrange_top_predict(const lagrange_top_history *history, double value[lagrange_top_DIM])
 {
     double distance = 0.0, size = 0.0;
@@ -651,10 +642,8 @@ static void lagrange_top_remember(lagrange_top_history *history, const double va
     if (history->count < lagrange_top_DIFFERENCES) ++history->count;
 }
 
-/* How far a step may lead, in sizes of the state and of what the vector field says, if the energy is lost;
-   and the part of the energy that counts as lost. */
-#define lagrange_top_PLAUSIBLE 1.5
-#define lagrange_top_LOST 0.5
+#define lagrange_top_PLAUSIBLE 1.5 /* how far any step may lead, in sizes of the state and of its motion */
+#define lagrange_top_LOST 0.5      /* part of the energy that one which leads farther must not lose */
 
 /* Whether an increment is that of the motion. Where the step is too large, the equation may have been solved
    by a point far away, at another energy, that has nothing to do with it. */
@@ -664,24 +653,21 @@ static int lagrange_top_plausible(const lagrange_top_solver *s, const double inc
     for (int i = 0; i < lagrange_top_DIM; ++i) {
         moved += fabs(increment[i]);
         size += fabs(s->x[i]);
-    }
-    if (moved <= lagrange_top_PLAUSIBLE * size) return 1;
-    lagrange_top_vector_field(&s->params, s->x, field);
-    for (int i = 0; i < lagrange_top_DIM; ++i) {
-        size += fabs(s->h * field[i]);
         middle[i] = s->x[i] + 0.5 * increment[i];
         end[i] = s->x[i] + increment[i];
     }
     if (moved <= lagrange_top_PLAUSIBLE * size) return 1;
-    const double before = lagrange_top_hamiltonian(&s->params, s->x), after =
-        lagrange_top_hamiltonian(&s->params, end);
-    const double scale = fabs(before) + fabs(lagrange_top_hamiltonian(&s->params, middle)) + fabs(after);
-    return fabs(after - before) <= lagrange_top_LOST * scale;
+    lagrange_top_vector_field(&s->params, s->x, field);
+    for (int i = 0; i < lagrange_top_DIM; ++i) size += fabs(s->h * field[i]);
+    if (moved <= lagrange_top_PLAUSIBLE * size) return 1;
+    const double before = lagrange_top_hamiltonian(&s->params, s->x);
+    const double after = lagrange_top_hamiltonian(&s->params, end), between =
+        lagrange_top_hamiltonian(&s->params, middle);
+    return fabs(after - before) <= lagrange_top_LOST * (fabs(before) + fabs(between) + fabs(after));
 }
 
 /* ---- The implicit step, by Newton's method ---- */
-/* Components of y are measured no finer than by this part of the largest. */
-#define lagrange_top_FLOOR 1e-6
+#define lagrange_top_FLOOR 1e-6 /* components of y are measured no finer than by this part of the largest */
 
 /* Size of a correction relative to each component of y; NaN or infinite if the correction is. */
 static double lagrange_top_size(const double y[lagrange_top_DIM], const double delta[lagrange_top_DIM])
@@ -696,9 +682,8 @@ static double lagrange_top_size(const double y[lagrange_top_DIM], const double d
     return size;
 }
 
-/* Corrections below the first that shrink by less than the second have reached the level of rounding. */
-#define lagrange_top_NEARLY_SOLVED 1e-8
-#define lagrange_top_SHRINKING 0.25
+#define lagrange_top_NEARLY_SOLVED 1e-8 /* corrections below this have reached the level of rounding, ... */
+#define lagrange_top_SHRINKING 0.25     /* ... if one is more than this part of the one before */
 
 /* Solve (y - x) + displacement(y) = 0 for y by Newton's method from the extrapolated guess, and advance. The
    increment is corrected to first order by the last Newton correction, so that correction costs no
@@ -709,13 +694,14 @@ static lagrange_top_status lagrange_top_attempt(lagrange_top_solver *s)
     double y[lagrange_top_DIM], delta[lagrange_top_DIM], displacement[lagrange_top_DIM],
         increment[lagrange_top_DIM];
     double jacobian[lagrange_top_DIM * lagrange_top_DIM], increment_jacobian[lagrange_top_DIM
-        * lagrange_top_DIM], previous = HUGE_VAL;
+        * lagrange_top_DIM];
+    double previous = HUGE_VAL;
     if (!lagrange_top_predict(&s->history, y)) memcpy(y, s->x, sizeof y);
     for (int iteration = 1; iteration <= lagrange_top_MAX_ITERATIONS; ++iteration) {
         lagrange_top_linearise(s->coef, y, displacement, increment, jacobian, increment_jacobian);
         ++s->evaluations;
-        for (int i = 0; i < lagrange_top_DIM; ++i) delta[i] = ((y[i] - s->x[i]) + displacement[i])
-            - s->carry[i];
+        for (int i = 0; i < lagrange_top_DIM; ++i)
+            delta[i] = ((y[i] - s->x[i]) + displacement[i]) - s->carry[i];
         const int regular = lagrange_top_solve(jacobian, delta);
         const double size = lagrange_top_size(y, delta), growth = size / (previous * previous);
         if (!isfinite(size)) return lagrange_top_NOT_FINITE;
@@ -725,12 +711,14 @@ static lagrange_top_status lagrange_top_attempt(lagrange_top_solver *s)
         const int stalled = previous < lagrange_top_NEARLY_SOLVED && size > lagrange_top_SHRINKING * previous;
         previous = size;
         if (!(remaining <= lagrange_top_TOLERANCE || stalled)) continue;
-        double correction[lagrange_top_DIM] = { 0.0 };
-        for (int i = 0; i < lagrange_top_DIM; ++i)
+        double small[lagrange_top_DIM] = { 0.0 }; /* the correction of the increment, and the carry */
+        for (int i = 0; i < lagrange_top_DIM; ++i) {
             for (int j = 0; j < lagrange_top_DIM; ++j)
-                correction[i] -= increment_jacobian[i * lagrange_top_DIM + j] * delta[j];
+                small[i] -= increment_jacobian[i * lagrange_top_DIM + j] * delta[j];
+            small[i] += s->carry[i];
+        }
         if (!lagrange_top_plausible(s, increment)) return lagrange_top_NO_CONVERGENCE;
-        if (!lagrange_top_advance(s, increment, correction)) return lagrange_top_NOT_FINITE;
+        if (!lagrange_top_advance(s, increment, small)) return lagrange_top_NOT_FINITE;
         lagrange_top_remember(&s->history, y);
         return lagrange_top_OK;
     }
@@ -738,32 +726,23 @@ static lagrange_top_status lagrange_top_attempt(lagrange_top_solver *s)
 }
 
 /* ---- The solver ---- */
-/* Whether steps can be made with these parameters: allowed, and with finite coefficients for a step so short
-   that it has no part in it. */
-static int lagrange_top_admissible(const lagrange_top_params *params)
-{
-    double coef[lagrange_top_COEFFICIENTS];
-    if (!lagrange_top_allowed(params)) return 0;
-    lagrange_top_prepare(params, 1e-100, coef);
-    for (int k = 0; k < lagrange_top_COEFFICIENTS; ++k)
-        if (!isfinite(coef[k])) return 0;
-    return 1;
-}
+#define lagrange_top_SHORT_STEP 1e-100 /* so short that it has no part in whether coefficients are finite */
 
-/* The arguments may be parts of *s: they are read before it is written. */
+/* The arguments may be parts of *s, which is therefore written last. */
 lagrange_top_status lagrange_top_init(lagrange_top_solver *s, const lagrange_top_params *params,
     const double x0[lagrange_top_DIM])
 {
     if (s == NULL || x0 == NULL) return lagrange_top_BAD_ARGUMENT;
-    const lagrange_top_params own = params != NULL ? *params : lagrange_top_default_params;
-    double x[lagrange_top_DIM];
-    memcpy(x, x0, sizeof x);
+    lagrange_top_solver fresh = { .h = (double)NAN };
+    fresh.params = params != NULL ? *params : lagrange_top_default_params;
+    memcpy(fresh.x, x0, sizeof fresh.x);
     for (int i = 0; i < lagrange_top_DIM; ++i)
-        if (!isfinite(x[i])) return lagrange_top_BAD_ARGUMENT;
-    if (!lagrange_top_admissible(&own)) return lagrange_top_BAD_ARGUMENT;
-    memset(s, 0, sizeof *s);
-    memcpy(s->x, x, sizeof s->x);
-    s->params = own;
+        if (!isfinite(fresh.x[i])) return lagrange_top_BAD_ARGUMENT;
+    if (!lagrange_top_allowed(&fresh.params)) return lagrange_top_BAD_ARGUMENT;
+    lagrange_top_prepare(&fresh.params, lagrange_top_SHORT_STEP, fresh.coef);
+    for (int k = 0; k < lagrange_top_COEFFICIENTS; ++k)
+        if (!isfinite(fresh.coef[k])) return lagrange_top_BAD_ARGUMENT;
+    *s = fresh;
     return lagrange_top_OK;
 }
 
@@ -771,44 +750,38 @@ lagrange_top_status lagrange_top_init(lagrange_top_solver *s, const lagrange_top
 static lagrange_top_status lagrange_top_set_step(lagrange_top_solver *s, double h)
 {
     if (s == NULL || !isfinite(h)) return lagrange_top_BAD_ARGUMENT;
-    if (s->prepared && memcmp(&h, &s->h, sizeof h) == 0) return lagrange_top_OK;
+    if (memcmp(&h, &s->h, sizeof h) == 0) return lagrange_top_OK;
     lagrange_top_prepare(&s->params, h, s->coef);
     memset(&s->history, 0, sizeof s->history);
     s->h = h;
     s->t_before_h = s->t;
     s->steps_before_h = s->steps;
-    s->prepared = 1;
     return lagrange_top_OK;
 }
 
 /* One stage. A guess from earlier steps may have misled it: then once more without. */
 static lagrange_top_status lagrange_top_stage(lagrange_top_solver *s)
 {
-    lagrange_top_status status = lagrange_top_attempt(s);
-    if (status != lagrange_top_OK && s->history.count > 0) {
-        memset(&s->history, 0, sizeof s->history);
-        status = lagrange_top_attempt(s);
-    }
-    return status;
-}
-
-lagrange_top_status lagrange_top_step(lagrange_top_solver *s, double h)
-{
-    lagrange_top_status status = lagrange_top_set_step(s, h);
-    if (status != lagrange_top_OK) return status;
-    status = lagrange_top_stage(s);
-    if (status != lagrange_top_OK) return status;
-    ++s->steps;
-    s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
-    return status;
+    const lagrange_top_status status = lagrange_top_attempt(s);
+    if (status == lagrange_top_OK || s->history.count == 0) return status;
+    memset(&s->history, 0, sizeof s->history);
+    return lagrange_top_attempt(s);
 }
 
 lagrange_top_status lagrange_top_integrate(lagrange_top_solver *s, double h, size_t steps)
 {
     lagrange_top_status status = lagrange_top_set_step(s, h);
-    for (; steps > 0 && status == lagrange_top_OK; --steps) status = lagrange_top_step(s, h);
+    for (; steps > 0 && status == lagrange_top_OK; --steps) {
+        status = lagrange_top_stage(s);
+        if (status != lagrange_top_OK) break;
+        ++s->steps;
+        s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
+    }
     return status;
 }
+
+lagrange_top_status lagrange_top_step(lagrange_top_solver *s, double h) { return lagrange_top_integrate(s, h,
+    1); }
 
 const char *lagrange_top_status_string(lagrange_top_status status)
 {
@@ -823,7 +796,6 @@ const char *lagrange_top_status_string(lagrange_top_status status)
 }
 
 size_t lagrange_top_solver_size(void) { return sizeof(lagrange_top_solver); }
-
 size_t lagrange_top_solver_steps_done(const lagrange_top_solver *s) { return s->steps; }
 
 /* ---- Ensembles ---- */

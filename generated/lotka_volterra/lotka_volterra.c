@@ -25,7 +25,7 @@
  *   9. Blocks of steps
  *   10. Groups of members
  *   11. Ensembles
- * body-sha256: 85ab56a8bd9ff44459d408ddfda6bb66f487e61173715a6edac2ec320f50da7c
+ * body-sha256: 0ada9d00762eb6fc3877669d15dcdd546c47cd5ff181056229b6b1cf9d55bba0
  */
 #include "lotka_volterra.h"
 
@@ -41,9 +41,7 @@ const lotka_volterra_params lotka_volterra_default_params = { 0 };
 enum { lotka_volterra_MAX_ITERATIONS = 20 }; /* of an inner solve */
 enum { lotka_volterra_CHECKS = 8 }; /* values that a recurrence is not fitted to, but has to foresee */
 enum { lotka_volterra_PASSES = 2 }; /* over a block, that cost per step what an evaluation costs */
-
-/* A correction is accepted when the error that it leaves is estimated to be below this. */
-#define lotka_volterra_TOLERANCE 1e-20
+#define lotka_volterra_TOLERANCE 1e-20 /* the error that an accepted correction may leave, as estimated */
 
 /* everything that depends on parameters and step size only */
 static void lotka_volterra_prepare(const lotka_volterra_params *params, double h, double coef[restrict 1])
@@ -59,8 +57,8 @@ static void lotka_volterra_linearise(const double coef[1], const double y[3], do
 {
     const double x1 = y[0], x2 = y[1], x3 = y[2];
     /* displacement */
-    const double t1 = coef[0] * x2, t2 = coef[0] * x3, t3 = expm1((-0.5) * (t1 + t2));
-    const double t4 = coef[0] * x1, t5 = expm1(0.5 * (t4 - t2)), t6 = expm1(0.5 * (t1 + t4));
+    const double t1 = coef[0] * x2, t2 = coef[0] * x3, t3 = expm1((-0.5) * (t1 + t2)), t4 = coef[0] * x1;
+    const double t5 = expm1(0.5 * (t4 - t2)), t6 = expm1(0.5 * (t1 + t4));
     displacement[0] = x1 * t3;
     displacement[1] = x2 * t5;
     displacement[2] = x3 * t6;
@@ -117,7 +115,6 @@ static void lotka_volterra_eliminate(const double matrix[9], const double side[3
     reciprocal[2] = t8;
 }
 
-/* the Hamiltonian */
 double lotka_volterra_hamiltonian(const lotka_volterra_params *params, const double x[3])
 {
     (void)params;
@@ -125,7 +122,6 @@ double lotka_volterra_hamiltonian(const lotka_volterra_params *params, const dou
     return x3 + (x1 + x2);
 }
 
-/* the Casimirs */
 void lotka_volterra_casimirs(const lotka_volterra_params *params, const double x[3], double out[])
 {
     (void)params;
@@ -133,7 +129,6 @@ void lotka_volterra_casimirs(const lotka_volterra_params *params, const double x
     out[0] = x1 * x3 / x2;
 }
 
-/* pi(x) grad H(x) */
 void lotka_volterra_vector_field(const lotka_volterra_params *params, const double x[3], double out[3])
 {
     (void)params;
@@ -145,19 +140,18 @@ void lotka_volterra_vector_field(const lotka_volterra_params *params, const doub
 }
 
 /* ---- Compensated sums, linear equations ---- */
-/* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to
-   its last bit: were it rounded with the change, corrections of one sign would add up to a drift. 0, and x as
-   before, if the sum is not finite. */
+/* x + change + small in compensated arithmetic, where small is the carry and what is as small: were that
+   rounded with the change, corrections of one sign would add up to a drift. 0, and x as before, if the sum is
+   not finite. */
 static int lotka_volterra_advance(lotka_volterra_solver *s, const double change[lotka_volterra_DIM],
-    const double correction[lotka_volterra_DIM])
+    const double small[lotka_volterra_DIM])
 {
     double x[lotka_volterra_DIM], carry[lotka_volterra_DIM];
     for (int i = 0; i < lotka_volterra_DIM; ++i) {
         const double sum = s->x[i] + change[i], added = sum - s->x[i];
-        const double lost = (s->x[i] - (sum - added)) + (change[i] - added);
-        const double small = lost + (s->carry[i] + correction[i]);
-        x[i] = sum + small;
-        carry[i] = small - (x[i] - sum);
+        const double lost = ((s->x[i] - (sum - added)) + (change[i] - added)) + small[i];
+        x[i] = sum + lost;
+        carry[i] = lost - (x[i] - sum);
         if (!isfinite(x[i])) return 0;
     }
     memcpy(s->x, x, sizeof x);
@@ -165,7 +159,7 @@ static int lotka_volterra_advance(lotka_volterra_solver *s, const double change[
     return 1;
 }
 
-/* Newton matrices are I + O(h): a pivot whose reciprocal is larger than this is far from 1. */
+/* Newton matrices are I + O(h): a pivot with a larger one is far from 1 */
 #define lotka_volterra_LARGEST_RECIPROCAL 1e3
 
 /* Solve matrix * solution = side, both overwritten, by elimination with partial pivoting. 0 if singular. */
@@ -316,8 +310,7 @@ static int lotka_volterra_train(lotka_volterra_history *history, int component)
     for (int k = 0; k < WINDOW; ++k) memcpy(history->weight[k][component], weight[k], AHEAD * sizeof(double));
     return lotka_volterra_missed(value + ROWS, weight) <= lotka_volterra_HOPELESS * largest ? terms : 0;
 }
-/* How far from the last value a guess may be, in sizes of that value. */
-#define lotka_volterra_REACH 4.0
+#define lotka_volterra_REACH 4.0 /* how far from the last value a guess may be, in sizes of that value */
 
 /* Whether a guess is where the next values may be. Far away the equation of a step has solutions that have
    nothing to do with the motion. */
@@ -432,10 +425,8 @@ static void lotka_volterra_remember(lotka_volterra_history *history, const doubl
         lotka_volterra_fit(history);
 }
 
-/* How far a step may lead, in sizes of the state and of what the vector field says, if the energy is lost;
-   and the part of the energy that counts as lost. */
-#define lotka_volterra_PLAUSIBLE 1.5
-#define lotka_volterra_LOST 0.5
+#define lotka_volterra_PLAUSIBLE 1.5 /* how far any step may lead, in sizes of the state and of its motion */
+#define lotka_volterra_LOST 0.5      /* part of the energy that one which leads farther must not lose */
 
 /* Whether an increment is that of the motion. Where the step is too large, the equation may have been solved
    by a point far away, at another energy, that has nothing to do with it. */
@@ -447,19 +438,17 @@ static int lotka_volterra_plausible(const lotka_volterra_solver *s,
     for (int i = 0; i < lotka_volterra_DIM; ++i) {
         moved += fabs(increment[i]);
         size += fabs(s->x[i]);
-    }
-    if (moved <= lotka_volterra_PLAUSIBLE * size) return 1;
-    lotka_volterra_vector_field(&s->params, s->x, field);
-    for (int i = 0; i < lotka_volterra_DIM; ++i) {
-        size += fabs(s->h * field[i]);
         middle[i] = s->x[i] + 0.5 * increment[i];
         end[i] = s->x[i] + increment[i];
     }
     if (moved <= lotka_volterra_PLAUSIBLE * size) return 1;
-    const double before = lotka_volterra_hamiltonian(&s->params, s->x), after =
-        lotka_volterra_hamiltonian(&s->params, end);
-    const double scale = fabs(before) + fabs(lotka_volterra_hamiltonian(&s->params, middle)) + fabs(after);
-    return fabs(after - before) <= lotka_volterra_LOST * scale;
+    lotka_volterra_vector_field(&s->params, s->x, field);
+    for (int i = 0; i < lotka_volterra_DIM; ++i) size += fabs(s->h * field[i]);
+    if (moved <= lotka_volterra_PLAUSIBLE * size) return 1;
+    const double before = lotka_volterra_hamiltonian(&s->params, s->x);
+    const double after = lotka_volterra_hamiltonian(&s->params, end), between =
+        lotka_volterra_hamiltonian(&s->params, middle);
+    return fabs(after - before) <= lotka_volterra_LOST * (fabs(before) + fabs(between) + fabs(after));
 }
 
 /* ---- The implicit step, by Newton's method ---- */
@@ -476,9 +465,8 @@ static double lotka_volterra_size(const double y[lotka_volterra_DIM], const doub
     return size;
 }
 
-/* Corrections below the first that shrink by less than the second have reached the level of rounding. */
-#define lotka_volterra_NEARLY_SOLVED 1e-8
-#define lotka_volterra_SHRINKING 0.25
+#define lotka_volterra_NEARLY_SOLVED 1e-8 /* corrections below this have reached the level of rounding, ... */
+#define lotka_volterra_SHRINKING 0.25     /* ... if one is more than this part of the one before */
 
 /* Solve (y - x) + displacement(y) = 0 for y by Newton's method from the extrapolated guess, and advance. The
    increment is corrected to first order by the last Newton correction, so that correction costs no
@@ -489,13 +477,14 @@ static lotka_volterra_status lotka_volterra_attempt(lotka_volterra_solver *s)
     double y[lotka_volterra_DIM], delta[lotka_volterra_DIM], displacement[lotka_volterra_DIM],
         increment[lotka_volterra_DIM];
     double jacobian[lotka_volterra_DIM * lotka_volterra_DIM], increment_jacobian[lotka_volterra_DIM
-        * lotka_volterra_DIM], previous = HUGE_VAL;
+        * lotka_volterra_DIM];
+    double previous = HUGE_VAL;
     if (!lotka_volterra_predict(&s->history, y)) memcpy(y, s->x, sizeof y);
     for (int iteration = 1; iteration <= lotka_volterra_MAX_ITERATIONS; ++iteration) {
         lotka_volterra_linearise(s->coef, y, displacement, increment, jacobian, increment_jacobian);
         ++s->evaluations;
-        for (int i = 0; i < lotka_volterra_DIM; ++i) delta[i] = ((y[i] - s->x[i]) + displacement[i])
-            - s->carry[i];
+        for (int i = 0; i < lotka_volterra_DIM; ++i)
+            delta[i] = ((y[i] - s->x[i]) + displacement[i]) - s->carry[i];
         const int regular = lotka_volterra_solve(jacobian, delta);
         const double size = lotka_volterra_size(y, delta), growth = size / (previous * previous);
         if (!isfinite(size)) return lotka_volterra_NOT_FINITE;
@@ -506,12 +495,14 @@ static lotka_volterra_status lotka_volterra_attempt(lotka_volterra_solver *s)
             * previous;
         previous = size;
         if (!(remaining <= lotka_volterra_TOLERANCE || stalled)) continue;
-        double correction[lotka_volterra_DIM] = { 0.0 };
-        for (int i = 0; i < lotka_volterra_DIM; ++i)
+        double small[lotka_volterra_DIM] = { 0.0 }; /* the correction of the increment, and the carry */
+        for (int i = 0; i < lotka_volterra_DIM; ++i) {
             for (int j = 0; j < lotka_volterra_DIM; ++j)
-                correction[i] -= increment_jacobian[i * lotka_volterra_DIM + j] * delta[j];
+                small[i] -= increment_jacobian[i * lotka_volterra_DIM + j] * delta[j];
+            small[i] += s->carry[i];
+        }
         if (!lotka_volterra_plausible(s, increment)) return lotka_volterra_NO_CONVERGENCE;
-        if (!lotka_volterra_advance(s, increment, correction)) return lotka_volterra_NOT_FINITE;
+        if (!lotka_volterra_advance(s, increment, small)) return lotka_volterra_NOT_FINITE;
         lotka_volterra_remember(&s->history, y, iteration);
         return lotka_volterra_OK;
     }
@@ -567,19 +558,17 @@ static inline double lotka_volterra_expm1_lane(double u)
 }
 
 /* ---- The solver ---- */
-/* The arguments may be parts of *s: they are read before it is written. */
+/* The arguments may be parts of *s, which is therefore written last. */
 lotka_volterra_status lotka_volterra_init(lotka_volterra_solver *s, const lotka_volterra_params *params,
     const double x0[lotka_volterra_DIM])
 {
     if (s == NULL || x0 == NULL) return lotka_volterra_BAD_ARGUMENT;
-    const lotka_volterra_params own = params != NULL ? *params : lotka_volterra_default_params;
-    double x[lotka_volterra_DIM];
-    memcpy(x, x0, sizeof x);
+    lotka_volterra_solver fresh = { .h = (double)NAN };
+    fresh.params = params != NULL ? *params : lotka_volterra_default_params;
+    memcpy(fresh.x, x0, sizeof fresh.x);
     for (int i = 0; i < lotka_volterra_DIM; ++i)
-        if (!isfinite(x[i])) return lotka_volterra_BAD_ARGUMENT;
-    memset(s, 0, sizeof *s);
-    memcpy(s->x, x, sizeof s->x);
-    s->params = own;
+        if (!isfinite(fresh.x[i])) return lotka_volterra_BAD_ARGUMENT;
+    *s = fresh;
     return lotka_volterra_OK;
 }
 
@@ -587,7 +576,7 @@ lotka_volterra_status lotka_volterra_init(lotka_volterra_solver *s, const lotka_
 static lotka_volterra_status lotka_volterra_set_step(lotka_volterra_solver *s, double h)
 {
     if (s == NULL || !isfinite(h)) return lotka_volterra_BAD_ARGUMENT;
-    if (s->prepared && memcmp(&h, &s->h, sizeof h) == 0) return lotka_volterra_OK;
+    if (memcmp(&h, &s->h, sizeof h) == 0) return lotka_volterra_OK;
     lotka_volterra_prepare(&s->params, h, s->coef);
     memset(&s->history, 0, sizeof s->history);
     s->history.slow_steps_allowed = lotka_volterra_REPAY;
@@ -597,7 +586,6 @@ static lotka_volterra_status lotka_volterra_set_step(lotka_volterra_solver *s, d
     s->h = h;
     s->t_before_h = s->t;
     s->steps_before_h = s->steps;
-    s->prepared = 1;
     return lotka_volterra_OK;
 }
 
@@ -611,12 +599,10 @@ static void lotka_volterra_count(lotka_volterra_solver *s, size_t steps)
 /* One stage. A guess from earlier steps may have misled it: then once more without. */
 static lotka_volterra_status lotka_volterra_stage(lotka_volterra_solver *s)
 {
-    lotka_volterra_status status = lotka_volterra_attempt(s);
-    if (status != lotka_volterra_OK && s->history.count > 0) {
-        memset(&s->history, 0, sizeof s->history);
-        status = lotka_volterra_attempt(s);
-    }
-    return status;
+    const lotka_volterra_status status = lotka_volterra_attempt(s);
+    if (status == lotka_volterra_OK || s->history.count == 0) return status;
+    memset(&s->history, 0, sizeof s->history);
+    return lotka_volterra_attempt(s);
 }
 
 lotka_volterra_status lotka_volterra_step(lotka_volterra_solver *s, double h)
@@ -641,7 +627,6 @@ const char *lotka_volterra_status_string(lotka_volterra_status status)
 }
 
 size_t lotka_volterra_solver_size(void) { return sizeof(lotka_volterra_solver); }
-
 size_t lotka_volterra_solver_steps_done(const lotka_volterra_solver *s) { return s->steps; }
 
 /* lotka_volterra_linearise in all lanes */
@@ -845,8 +830,8 @@ static void lotka_volterra_update(lotka_volterra_lanes coef[restrict], lotka_vol
 }
 
 /* ---- Blocks of steps ---- */
-/* What all blocks share: coefficients, the same in each lane, and the recurrences by which they are foreseen.
-   */
+/* What all blocks share: coefficients, the same in each lane, and the recurrences by which they are
+   foreseen. */
 typedef struct {
     int fits; /* the fit that weight is of; -1 for none */
     lotka_volterra_lanes coef[lotka_volterra_COEFFICIENTS], weight[lotka_volterra_WINDOW][lotka_volterra_DIM];
@@ -1298,8 +1283,8 @@ static void lotka_volterra_group_fit(lotka_volterra_group *group)
         * group->slow_steps_allowed + lotka_volterra_REPAY : lotka_volterra_HOPELESS_WAIT;
 }
 
-/* Replace guesses that are not near the last values, as lotka_volterra_near has it, by these; lane by lane.
-   */
+/* Replace guesses that are not near the last values, as lotka_volterra_near has it, by these; lane by
+   lane. */
 static void lotka_volterra_stay_near(lotka_volterra_lanes y[restrict lotka_volterra_DIM],
     lotka_volterra_lanes last[restrict lotka_volterra_DIM])
 {

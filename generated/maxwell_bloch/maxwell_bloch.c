@@ -20,7 +20,7 @@
  *   4. The implicit step, by Newton's method
  *   5. The solver
  *   6. Ensembles
- * body-sha256: 4026b9814871cfdffccc602edd4ae54cd15b00681e9fdabc2a2612592a1448ca
+ * body-sha256: 2e762cb970922ea004181fe08b4f415b1a2989b98a4e83af8917d109be85d0a3
  */
 #include "maxwell_bloch.h"
 
@@ -32,9 +32,7 @@
 const maxwell_bloch_params maxwell_bloch_default_params = { 0 };
 
 enum { maxwell_bloch_MAX_ITERATIONS = 20 }; /* of an inner solve */
-
-/* A correction is accepted when the error that it leaves is estimated to be below this. */
-#define maxwell_bloch_TOLERANCE 1e-20
+#define maxwell_bloch_TOLERANCE 1e-20 /* the error that an accepted correction may leave, as estimated */
 
 /* everything that depends on parameters and step size only */
 static void maxwell_bloch_prepare(const maxwell_bloch_params *params, double h, double coef[restrict 3])
@@ -53,11 +51,8 @@ static void maxwell_bloch_linearise(const double coef[3], const double y[3], dou
 {
     const double x = y[0], y_ = y[1], z = y[2];
     /* momenta */
-    const double t1 = coef[1] + coef[0] * (x * x);
-    const double p_y = y_ * t1;
-    const double p_z = z * t1;
-    const double t2 = coef[0] * (y_ * y_) + coef[0] * (z * z);
-    const double p_x = x * t2;
+    const double t1 = coef[1] + coef[0] * (x * x), p_y = y_ * t1, p_z = z * t1;
+    const double t2 = coef[0] * (y_ * y_) + coef[0] * (z * z), p_x = x * t2;
     /* displacement */
     const double t3 = x * p_z - p_x, t4 = x * p_y;
     displacement[0] = (-0.5) * p_y;
@@ -92,25 +87,6 @@ static void maxwell_bloch_linearise(const double coef[3], const double y[3], dou
     increment_jacobian[8] = 0.0;
 }
 
-/* elimination without pivoting: the solution, and the reciprocals of the pivots */
-static void maxwell_bloch_eliminate(const double matrix[9], const double side[3], double solution[restrict 3],
-    double reciprocal[restrict 3])
-{
-    /* solution */
-    const double t1 = 1.0 / matrix[0], t2 = matrix[3] * t1, t3 = 1.0 / (matrix[4] - matrix[1] * t2);
-    const double t4 = side[1] - side[0] * t2, t5 = matrix[6] * t1;
-    const double t6 = (matrix[7] - matrix[1] * t5) * t3, t7 = 1.0 / (matrix[8] - matrix[5] * t6);
-    const double t8 = (side[2] - side[0] * t5 - t4 * t6) * t7, t9 = t3 * (t4 - matrix[5] * t8);
-    solution[0] = t1 * (side[0] - matrix[1] * t9);
-    solution[1] = t9;
-    solution[2] = t8;
-    /* reciprocal */
-    reciprocal[0] = t1;
-    reciprocal[1] = t3;
-    reciprocal[2] = t7;
-}
-
-/* the Hamiltonian */
 double maxwell_bloch_hamiltonian(const maxwell_bloch_params *params, const double x[3])
 {
     (void)params;
@@ -118,7 +94,6 @@ double maxwell_bloch_hamiltonian(const maxwell_bloch_params *params, const doubl
     return 0.5 * (y * y + z * z);
 }
 
-/* the Casimirs */
 void maxwell_bloch_casimirs(const maxwell_bloch_params *params, const double x[3], double out[])
 {
     (void)params;
@@ -126,7 +101,6 @@ void maxwell_bloch_casimirs(const maxwell_bloch_params *params, const double x[3
     out[0] = z + 0.5 * (x_ * x_);
 }
 
-/* pi(x) grad H(x) */
 void maxwell_bloch_vector_field(const maxwell_bloch_params *params, const double x[3], double out[3])
 {
     (void)params;
@@ -137,19 +111,18 @@ void maxwell_bloch_vector_field(const maxwell_bloch_params *params, const double
 }
 
 /* ---- Compensated sums, linear equations ---- */
-/* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to
-   its last bit: were it rounded with the change, corrections of one sign would add up to a drift. 0, and x as
-   before, if the sum is not finite. */
+/* x + change + small in compensated arithmetic, where small is the carry and what is as small: were that
+   rounded with the change, corrections of one sign would add up to a drift. 0, and x as before, if the sum is
+   not finite. */
 static int maxwell_bloch_advance(maxwell_bloch_solver *s, const double change[maxwell_bloch_DIM],
-    const double correction[maxwell_bloch_DIM])
+    const double small[maxwell_bloch_DIM])
 {
     double x[maxwell_bloch_DIM], carry[maxwell_bloch_DIM];
     for (int i = 0; i < maxwell_bloch_DIM; ++i) {
         const double sum = s->x[i] + change[i], added = sum - s->x[i];
-        const double lost = (s->x[i] - (sum - added)) + (change[i] - added);
-        const double small = lost + (s->carry[i] + correction[i]);
-        x[i] = sum + small;
-        carry[i] = small - (x[i] - sum);
+        const double lost = ((s->x[i] - (sum - added)) + (change[i] - added)) + small[i];
+        x[i] = sum + lost;
+        carry[i] = lost - (x[i] - sum);
         if (!isfinite(x[i])) return 0;
     }
     memcpy(s->x, x, sizeof x);
@@ -157,29 +130,44 @@ static int maxwell_bloch_advance(maxwell_bloch_solver *s, const double change[ma
     return 1;
 }
 
-/* Newton matrices are I + O(h): a pivot whose reciprocal is larger than this is far from 1. */
-#define maxwell_bloch_LARGEST_RECIPROCAL 1e3
-
-/* Solve matrix * solution = side, both overwritten. The matrix is I + O(h): 0 if a pivot is far from 1. */
+/* Solve matrix * solution = side, both overwritten, by elimination with partial pivoting. 0 if singular. */
 static int maxwell_bloch_solve(double matrix[maxwell_bloch_DIM * maxwell_bloch_DIM],
     double side[maxwell_bloch_DIM])
 {
-    double solution[maxwell_bloch_DIM], reciprocal[maxwell_bloch_DIM], largest = 0.0;
-    maxwell_bloch_eliminate(matrix, side, solution, reciprocal);
-    for (int i = 0; i < maxwell_bloch_DIM; ++i)
-        if (!(fabs(reciprocal[i]) <= largest)) largest = fabs(reciprocal[i]);
-    if (!(largest < maxwell_bloch_LARGEST_RECIPROCAL)) return 0;
-    memcpy(side, solution, sizeof solution);
+    for (int k = 0; k < maxwell_bloch_DIM; ++k) {
+        int best = k;
+        for (int i = k + 1; i < maxwell_bloch_DIM; ++i)
+            if (fabs(matrix[i * maxwell_bloch_DIM + k]) > fabs(matrix[best * maxwell_bloch_DIM + k]))
+                best = i;
+        const double pivot = matrix[best * maxwell_bloch_DIM + k], last = side[k];
+        if (!(fabs(pivot) > 0.0)) return 0;
+        for (int j = k; j < maxwell_bloch_DIM && best != k; ++j) {
+            const double swap = matrix[k * maxwell_bloch_DIM + j];
+            matrix[k * maxwell_bloch_DIM + j] = matrix[best * maxwell_bloch_DIM + j];
+            matrix[best * maxwell_bloch_DIM + j] = swap;
+        }
+        side[k] = side[best];
+        side[best] = last;
+        for (int i = k + 1; i < maxwell_bloch_DIM; ++i) {
+            const double factor = matrix[i * maxwell_bloch_DIM + k] / pivot;
+            for (int j = k + 1; j < maxwell_bloch_DIM; ++j)
+                matrix[i * maxwell_bloch_DIM + j] -= factor * matrix[k * maxwell_bloch_DIM + j];
+            side[i] -= factor * side[k];
+        }
+    }
+    for (int i = maxwell_bloch_DIM - 1; i >= 0; --i) {
+        for (int j = i + 1; j < maxwell_bloch_DIM; ++j)
+            side[i] -= matrix[i * maxwell_bloch_DIM + j] * side[j];
+        side[i] /= matrix[i * maxwell_bloch_DIM + i];
+    }
     return 1;
 }
 
 /* ---- Starting guesses ---- */
-/* How far from the last value a guess may be, in sizes of that value. */
-#define maxwell_bloch_REACH 4.0
+#define maxwell_bloch_REACH 4.0 /* how far from the last value a guess may be, in sizes of that value */
 
-/* The guess for the next value from the last ones: the sum of their backward differences. 0 if there is none,
-   or if it is far away, where the equation of a step has solutions that have nothing to do with the motion.
-   */
+/* The guess for the next value, the sum of differences. 0 if there is none, or if it is far away, where the
+   equation of a step has solutions that have nothing to do with the motion. */
 static int maxwell_bloch_predict(const maxwell_bloch_history *history, double value[maxwell_bloch_DIM])
 {
     double distance = 0.0, size = 0.0;
@@ -215,10 +203,8 @@ static void maxwell_bloch_remember(maxwell_bloch_history *history, const double 
     if (history->count < maxwell_bloch_DIFFERENCES) ++history->count;
 }
 
-/* How far a step may lead, in sizes of the state and of what the vector field says, if the energy is lost;
-   and the part of the energy that counts as lost. */
-#define maxwell_bloch_PLAUSIBLE 1.5
-#define maxwell_bloch_LOST 0.5
+#define maxwell_bloch_PLAUSIBLE 1.5 /* how far any step may lead, in sizes of the state and of its motion */
+#define maxwell_bloch_LOST 0.5      /* part of the energy that one which leads farther must not lose */
 
 /* Whether an increment is that of the motion. Where the step is too large, the equation may have been solved
    by a point far away, at another energy, that has nothing to do with it. */
@@ -229,24 +215,21 @@ static int maxwell_bloch_plausible(const maxwell_bloch_solver *s, const double i
     for (int i = 0; i < maxwell_bloch_DIM; ++i) {
         moved += fabs(increment[i]);
         size += fabs(s->x[i]);
-    }
-    if (moved <= maxwell_bloch_PLAUSIBLE * size) return 1;
-    maxwell_bloch_vector_field(&s->params, s->x, field);
-    for (int i = 0; i < maxwell_bloch_DIM; ++i) {
-        size += fabs(s->h * field[i]);
         middle[i] = s->x[i] + 0.5 * increment[i];
         end[i] = s->x[i] + increment[i];
     }
     if (moved <= maxwell_bloch_PLAUSIBLE * size) return 1;
-    const double before = maxwell_bloch_hamiltonian(&s->params, s->x), after =
-        maxwell_bloch_hamiltonian(&s->params, end);
-    const double scale = fabs(before) + fabs(maxwell_bloch_hamiltonian(&s->params, middle)) + fabs(after);
-    return fabs(after - before) <= maxwell_bloch_LOST * scale;
+    maxwell_bloch_vector_field(&s->params, s->x, field);
+    for (int i = 0; i < maxwell_bloch_DIM; ++i) size += fabs(s->h * field[i]);
+    if (moved <= maxwell_bloch_PLAUSIBLE * size) return 1;
+    const double before = maxwell_bloch_hamiltonian(&s->params, s->x);
+    const double after = maxwell_bloch_hamiltonian(&s->params, end), between =
+        maxwell_bloch_hamiltonian(&s->params, middle);
+    return fabs(after - before) <= maxwell_bloch_LOST * (fabs(before) + fabs(between) + fabs(after));
 }
 
 /* ---- The implicit step, by Newton's method ---- */
-/* Components of y are measured no finer than by this part of the largest. */
-#define maxwell_bloch_FLOOR 1e-6
+#define maxwell_bloch_FLOOR 1e-6 /* components of y are measured no finer than by this part of the largest */
 
 /* Size of a correction relative to each component of y; NaN or infinite if the correction is. */
 static double maxwell_bloch_size(const double y[maxwell_bloch_DIM], const double delta[maxwell_bloch_DIM])
@@ -261,9 +244,8 @@ static double maxwell_bloch_size(const double y[maxwell_bloch_DIM], const double
     return size;
 }
 
-/* Corrections below the first that shrink by less than the second have reached the level of rounding. */
-#define maxwell_bloch_NEARLY_SOLVED 1e-8
-#define maxwell_bloch_SHRINKING 0.25
+#define maxwell_bloch_NEARLY_SOLVED 1e-8 /* corrections below this have reached the level of rounding, ... */
+#define maxwell_bloch_SHRINKING 0.25     /* ... if one is more than this part of the one before */
 
 /* Solve (y - x) + displacement(y) = 0 for y by Newton's method from the extrapolated guess, and advance. The
    increment is corrected to first order by the last Newton correction, so that correction costs no
@@ -274,13 +256,14 @@ static maxwell_bloch_status maxwell_bloch_attempt(maxwell_bloch_solver *s)
     double y[maxwell_bloch_DIM], delta[maxwell_bloch_DIM], displacement[maxwell_bloch_DIM],
         increment[maxwell_bloch_DIM];
     double jacobian[maxwell_bloch_DIM * maxwell_bloch_DIM], increment_jacobian[maxwell_bloch_DIM
-        * maxwell_bloch_DIM], previous = HUGE_VAL;
+        * maxwell_bloch_DIM];
+    double previous = HUGE_VAL;
     if (!maxwell_bloch_predict(&s->history, y)) memcpy(y, s->x, sizeof y);
     for (int iteration = 1; iteration <= maxwell_bloch_MAX_ITERATIONS; ++iteration) {
         maxwell_bloch_linearise(s->coef, y, displacement, increment, jacobian, increment_jacobian);
         ++s->evaluations;
-        for (int i = 0; i < maxwell_bloch_DIM; ++i) delta[i] = ((y[i] - s->x[i]) + displacement[i])
-            - s->carry[i];
+        for (int i = 0; i < maxwell_bloch_DIM; ++i)
+            delta[i] = ((y[i] - s->x[i]) + displacement[i]) - s->carry[i];
         const int regular = maxwell_bloch_solve(jacobian, delta);
         const double size = maxwell_bloch_size(y, delta), growth = size / (previous * previous);
         if (!isfinite(size)) return maxwell_bloch_NOT_FINITE;
@@ -291,12 +274,14 @@ static maxwell_bloch_status maxwell_bloch_attempt(maxwell_bloch_solver *s)
             * previous;
         previous = size;
         if (!(remaining <= maxwell_bloch_TOLERANCE || stalled)) continue;
-        double correction[maxwell_bloch_DIM] = { 0.0 };
-        for (int i = 0; i < maxwell_bloch_DIM; ++i)
+        double small[maxwell_bloch_DIM] = { 0.0 }; /* the correction of the increment, and the carry */
+        for (int i = 0; i < maxwell_bloch_DIM; ++i) {
             for (int j = 0; j < maxwell_bloch_DIM; ++j)
-                correction[i] -= increment_jacobian[i * maxwell_bloch_DIM + j] * delta[j];
+                small[i] -= increment_jacobian[i * maxwell_bloch_DIM + j] * delta[j];
+            small[i] += s->carry[i];
+        }
         if (!maxwell_bloch_plausible(s, increment)) return maxwell_bloch_NO_CONVERGENCE;
-        if (!maxwell_bloch_advance(s, increment, correction)) return maxwell_bloch_NOT_FINITE;
+        if (!maxwell_bloch_advance(s, increment, small)) return maxwell_bloch_NOT_FINITE;
         maxwell_bloch_remember(&s->history, y);
         return maxwell_bloch_OK;
     }
@@ -304,19 +289,17 @@ static maxwell_bloch_status maxwell_bloch_attempt(maxwell_bloch_solver *s)
 }
 
 /* ---- The solver ---- */
-/* The arguments may be parts of *s: they are read before it is written. */
+/* The arguments may be parts of *s, which is therefore written last. */
 maxwell_bloch_status maxwell_bloch_init(maxwell_bloch_solver *s, const maxwell_bloch_params *params,
     const double x0[maxwell_bloch_DIM])
 {
     if (s == NULL || x0 == NULL) return maxwell_bloch_BAD_ARGUMENT;
-    const maxwell_bloch_params own = params != NULL ? *params : maxwell_bloch_default_params;
-    double x[maxwell_bloch_DIM];
-    memcpy(x, x0, sizeof x);
+    maxwell_bloch_solver fresh = { .h = (double)NAN };
+    fresh.params = params != NULL ? *params : maxwell_bloch_default_params;
+    memcpy(fresh.x, x0, sizeof fresh.x);
     for (int i = 0; i < maxwell_bloch_DIM; ++i)
-        if (!isfinite(x[i])) return maxwell_bloch_BAD_ARGUMENT;
-    memset(s, 0, sizeof *s);
-    memcpy(s->x, x, sizeof s->x);
-    s->params = own;
+        if (!isfinite(fresh.x[i])) return maxwell_bloch_BAD_ARGUMENT;
+    *s = fresh;
     return maxwell_bloch_OK;
 }
 
@@ -324,44 +307,38 @@ maxwell_bloch_status maxwell_bloch_init(maxwell_bloch_solver *s, const maxwell_b
 static maxwell_bloch_status maxwell_bloch_set_step(maxwell_bloch_solver *s, double h)
 {
     if (s == NULL || !isfinite(h)) return maxwell_bloch_BAD_ARGUMENT;
-    if (s->prepared && memcmp(&h, &s->h, sizeof h) == 0) return maxwell_bloch_OK;
+    if (memcmp(&h, &s->h, sizeof h) == 0) return maxwell_bloch_OK;
     maxwell_bloch_prepare(&s->params, h, s->coef);
     memset(&s->history, 0, sizeof s->history);
     s->h = h;
     s->t_before_h = s->t;
     s->steps_before_h = s->steps;
-    s->prepared = 1;
     return maxwell_bloch_OK;
 }
 
 /* One stage. A guess from earlier steps may have misled it: then once more without. */
 static maxwell_bloch_status maxwell_bloch_stage(maxwell_bloch_solver *s)
 {
-    maxwell_bloch_status status = maxwell_bloch_attempt(s);
-    if (status != maxwell_bloch_OK && s->history.count > 0) {
-        memset(&s->history, 0, sizeof s->history);
-        status = maxwell_bloch_attempt(s);
-    }
-    return status;
-}
-
-maxwell_bloch_status maxwell_bloch_step(maxwell_bloch_solver *s, double h)
-{
-    maxwell_bloch_status status = maxwell_bloch_set_step(s, h);
-    if (status != maxwell_bloch_OK) return status;
-    status = maxwell_bloch_stage(s);
-    if (status != maxwell_bloch_OK) return status;
-    ++s->steps;
-    s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
-    return status;
+    const maxwell_bloch_status status = maxwell_bloch_attempt(s);
+    if (status == maxwell_bloch_OK || s->history.count == 0) return status;
+    memset(&s->history, 0, sizeof s->history);
+    return maxwell_bloch_attempt(s);
 }
 
 maxwell_bloch_status maxwell_bloch_integrate(maxwell_bloch_solver *s, double h, size_t steps)
 {
     maxwell_bloch_status status = maxwell_bloch_set_step(s, h);
-    for (; steps > 0 && status == maxwell_bloch_OK; --steps) status = maxwell_bloch_step(s, h);
+    for (; steps > 0 && status == maxwell_bloch_OK; --steps) {
+        status = maxwell_bloch_stage(s);
+        if (status != maxwell_bloch_OK) break;
+        ++s->steps;
+        s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
+    }
     return status;
 }
+
+maxwell_bloch_status maxwell_bloch_step(maxwell_bloch_solver *s, double h) { return maxwell_bloch_integrate(s,
+    h, 1); }
 
 const char *maxwell_bloch_status_string(maxwell_bloch_status status)
 {
@@ -376,7 +353,6 @@ const char *maxwell_bloch_status_string(maxwell_bloch_status status)
 }
 
 size_t maxwell_bloch_solver_size(void) { return sizeof(maxwell_bloch_solver); }
-
 size_t maxwell_bloch_solver_steps_done(const maxwell_bloch_solver *s) { return s->steps; }
 
 /* ---- Ensembles ---- */

@@ -26,7 +26,7 @@
  *   10. Blocks of steps
  *   11. Groups of members
  *   12. Ensembles
- * body-sha256: e1a81d259127285edc948eec359fa40db32a9bfe56b6ec01b541f64a79661c4d
+ * body-sha256: 07530090e32187c7acbd0f605a0127960ea5b0d25d5920effed6ee4fe9972aab
  */
 #include "nambu_pendulum.h"
 
@@ -49,9 +49,7 @@ enum { nambu_pendulum_PASSES = 1 };       /* over a block, that cost per step wh
 enum { nambu_pendulum_SLOPE_TERMS = 12 }; /* most of the expansion of the derivatives of a path */
 enum { nambu_pendulum_SLOPE_SERIES = 5 }; /* further series that these need */
 enum { nambu_pendulum_SLOPE_FIXED = 1 };  /* further values that are constant along a path */
-
-/* A correction is accepted when the error that it leaves is estimated to be below this. */
-#define nambu_pendulum_TOLERANCE 1e-20
+#define nambu_pendulum_TOLERANCE 1e-20    /* the error that an accepted correction may leave, as estimated */
 
 /* The series of dm_i/dt along a path, for each i. */
 static const int nambu_pendulum_path_slopes[nambu_pendulum_DIM] = { 10, 6, 7 };
@@ -106,7 +104,6 @@ static void nambu_pendulum_eliminate(const double matrix[9], const double side[3
     reciprocal[2] = t8;
 }
 
-/* the Hamiltonian */
 double nambu_pendulum_hamiltonian(const nambu_pendulum_params *params, const double x[3])
 {
     (void)params;
@@ -114,7 +111,6 @@ double nambu_pendulum_hamiltonian(const nambu_pendulum_params *params, const dou
     return V + 0.5 * (p * p);
 }
 
-/* the Casimirs */
 void nambu_pendulum_casimirs(const nambu_pendulum_params *params, const double x[3], double out[])
 {
     (void)params;
@@ -122,7 +118,6 @@ void nambu_pendulum_casimirs(const nambu_pendulum_params *params, const double x
     out[0] = V + cos(theta);
 }
 
-/* pi(x) grad H(x) */
 void nambu_pendulum_vector_field(const nambu_pendulum_params *params, const double x[3], double out[3])
 {
     (void)params;
@@ -134,19 +129,18 @@ void nambu_pendulum_vector_field(const nambu_pendulum_params *params, const doub
 }
 
 /* ---- Compensated sums, linear equations ---- */
-/* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to
-   its last bit: were it rounded with the change, corrections of one sign would add up to a drift. 0, and x as
-   before, if the sum is not finite. */
+/* x + change + small in compensated arithmetic, where small is the carry and what is as small: were that
+   rounded with the change, corrections of one sign would add up to a drift. 0, and x as before, if the sum is
+   not finite. */
 static int nambu_pendulum_advance(nambu_pendulum_solver *s, const double change[nambu_pendulum_DIM],
-    const double correction[nambu_pendulum_DIM])
+    const double small[nambu_pendulum_DIM])
 {
     double x[nambu_pendulum_DIM], carry[nambu_pendulum_DIM];
     for (int i = 0; i < nambu_pendulum_DIM; ++i) {
         const double sum = s->x[i] + change[i], added = sum - s->x[i];
-        const double lost = (s->x[i] - (sum - added)) + (change[i] - added);
-        const double small = lost + (s->carry[i] + correction[i]);
-        x[i] = sum + small;
-        carry[i] = small - (x[i] - sum);
+        const double lost = ((s->x[i] - (sum - added)) + (change[i] - added)) + small[i];
+        x[i] = sum + lost;
+        carry[i] = lost - (x[i] - sum);
         if (!isfinite(x[i])) return 0;
     }
     memcpy(s->x, x, sizeof x);
@@ -154,7 +148,7 @@ static int nambu_pendulum_advance(nambu_pendulum_solver *s, const double change[
     return 1;
 }
 
-/* Newton matrices are I + O(h): a pivot whose reciprocal is larger than this is far from 1. */
+/* Newton matrices are I + O(h): a pivot with a larger one is far from 1 */
 #define nambu_pendulum_LARGEST_RECIPROCAL 1e3
 
 /* Solve matrix * solution = side, both overwritten, by elimination with partial pivoting. 0 if singular. */
@@ -305,8 +299,7 @@ static int nambu_pendulum_train(nambu_pendulum_history *history, int component)
     for (int k = 0; k < WINDOW; ++k) memcpy(history->weight[k][component], weight[k], AHEAD * sizeof(double));
     return nambu_pendulum_missed(value + ROWS, weight) <= nambu_pendulum_HOPELESS * largest ? terms : 0;
 }
-/* How far from the last value a guess may be, in sizes of that value. */
-#define nambu_pendulum_REACH 4.0
+#define nambu_pendulum_REACH 4.0 /* how far from the last value a guess may be, in sizes of that value */
 
 /* Whether a guess is where the next values may be. Far away the equation of a step has solutions that have
    nothing to do with the motion. */
@@ -421,10 +414,8 @@ static void nambu_pendulum_remember(nambu_pendulum_history *history, const doubl
         nambu_pendulum_fit(history);
 }
 
-/* How far a step may lead, in sizes of the state and of what the vector field says, if the energy is lost;
-   and the part of the energy that counts as lost. */
-#define nambu_pendulum_PLAUSIBLE 1.5
-#define nambu_pendulum_LOST 0.5
+#define nambu_pendulum_PLAUSIBLE 1.5 /* how far any step may lead, in sizes of the state and of its motion */
+#define nambu_pendulum_LOST 0.5      /* part of the energy that one which leads farther must not lose */
 
 /* Whether an increment is that of the motion. Where the step is too large, the equation may have been solved
    by a point far away, at another energy, that has nothing to do with it. */
@@ -436,19 +427,17 @@ static int nambu_pendulum_plausible(const nambu_pendulum_solver *s,
     for (int i = 0; i < nambu_pendulum_DIM; ++i) {
         moved += fabs(increment[i]);
         size += fabs(s->x[i]);
-    }
-    if (moved <= nambu_pendulum_PLAUSIBLE * size) return 1;
-    nambu_pendulum_vector_field(&s->params, s->x, field);
-    for (int i = 0; i < nambu_pendulum_DIM; ++i) {
-        size += fabs(s->h * field[i]);
         middle[i] = s->x[i] + 0.5 * increment[i];
         end[i] = s->x[i] + increment[i];
     }
     if (moved <= nambu_pendulum_PLAUSIBLE * size) return 1;
-    const double before = nambu_pendulum_hamiltonian(&s->params, s->x), after =
-        nambu_pendulum_hamiltonian(&s->params, end);
-    const double scale = fabs(before) + fabs(nambu_pendulum_hamiltonian(&s->params, middle)) + fabs(after);
-    return fabs(after - before) <= nambu_pendulum_LOST * scale;
+    nambu_pendulum_vector_field(&s->params, s->x, field);
+    for (int i = 0; i < nambu_pendulum_DIM; ++i) size += fabs(s->h * field[i]);
+    if (moved <= nambu_pendulum_PLAUSIBLE * size) return 1;
+    const double before = nambu_pendulum_hamiltonian(&s->params, s->x);
+    const double after = nambu_pendulum_hamiltonian(&s->params, end), between =
+        nambu_pendulum_hamiltonian(&s->params, middle);
+    return fabs(after - before) <= nambu_pendulum_LOST * (fabs(before) + fabs(between) + fabs(after));
 }
 
 /* Coefficient k >= 1 of the Taylor series of f(a), where d is that of f'(a): f(a)' = f'(a) a'. */
@@ -631,11 +620,11 @@ static int nambu_pendulum_differences(nambu_pendulum_solver *s, const double *co
 }
 
 /* Solve p = grad S_h(mean of the path from x under p) and move to the end of that path. Where that takes more
-   than nambu_pendulum_MOST_PIECES pieces of paths, the step is so large that a solution would mean nothing.
-   */
+   than nambu_pendulum_MOST_PIECES pieces of paths, the step is so large that a solution would mean
+   nothing. */
 static nambu_pendulum_status nambu_pendulum_attempt(nambu_pendulum_solver *s)
 {
-    const double *coef = s->coef, none[nambu_pendulum_DIM] = { 0.0 };
+    const double *coef = s->coef;
     double p[nambu_pendulum_DIM], y[nambu_pendulum_DIM], residual[nambu_pendulum_DIM],
         change[nambu_pendulum_DIM], jacobian[nambu_pendulum_DIM * nambu_pendulum_DIM], previous = HUGE_VAL;
     if (!nambu_pendulum_predict(&s->history, y)) memcpy(y, s->x, sizeof y);
@@ -654,7 +643,7 @@ static nambu_pendulum_status nambu_pendulum_attempt(nambu_pendulum_solver *s)
         /* The second test: residuals no longer shrink, the solve has reached the level of rounding. */
         if (size <= 4e-16 || (previous < 1e-12 && size > 0.25 * previous)) {
             if (!nambu_pendulum_plausible(s, change)) return nambu_pendulum_NO_CONVERGENCE;
-            if (!nambu_pendulum_advance(s, change, none)) return nambu_pendulum_NOT_FINITE;
+            if (!nambu_pendulum_advance(s, change, s->carry)) return nambu_pendulum_NOT_FINITE;
             nambu_pendulum_remember(&s->history, y, iteration);
             return nambu_pendulum_OK;
         }
@@ -746,19 +735,17 @@ static inline double nambu_pendulum_cos_lane(double u)
 }
 
 /* ---- The solver ---- */
-/* The arguments may be parts of *s: they are read before it is written. */
+/* The arguments may be parts of *s, which is therefore written last. */
 nambu_pendulum_status nambu_pendulum_init(nambu_pendulum_solver *s, const nambu_pendulum_params *params,
     const double x0[nambu_pendulum_DIM])
 {
     if (s == NULL || x0 == NULL) return nambu_pendulum_BAD_ARGUMENT;
-    const nambu_pendulum_params own = params != NULL ? *params : nambu_pendulum_default_params;
-    double x[nambu_pendulum_DIM];
-    memcpy(x, x0, sizeof x);
+    nambu_pendulum_solver fresh = { .h = (double)NAN };
+    fresh.params = params != NULL ? *params : nambu_pendulum_default_params;
+    memcpy(fresh.x, x0, sizeof fresh.x);
     for (int i = 0; i < nambu_pendulum_DIM; ++i)
-        if (!isfinite(x[i])) return nambu_pendulum_BAD_ARGUMENT;
-    memset(s, 0, sizeof *s);
-    memcpy(s->x, x, sizeof s->x);
-    s->params = own;
+        if (!isfinite(fresh.x[i])) return nambu_pendulum_BAD_ARGUMENT;
+    *s = fresh;
     return nambu_pendulum_OK;
 }
 
@@ -766,7 +753,7 @@ nambu_pendulum_status nambu_pendulum_init(nambu_pendulum_solver *s, const nambu_
 static nambu_pendulum_status nambu_pendulum_set_step(nambu_pendulum_solver *s, double h)
 {
     if (s == NULL || !isfinite(h)) return nambu_pendulum_BAD_ARGUMENT;
-    if (s->prepared && memcmp(&h, &s->h, sizeof h) == 0) return nambu_pendulum_OK;
+    if (memcmp(&h, &s->h, sizeof h) == 0) return nambu_pendulum_OK;
     nambu_pendulum_prepare(&s->params, h, s->coef);
     memset(&s->history, 0, sizeof s->history);
     s->history.slow_steps_allowed = nambu_pendulum_REPAY;
@@ -776,7 +763,6 @@ static nambu_pendulum_status nambu_pendulum_set_step(nambu_pendulum_solver *s, d
     s->h = h;
     s->t_before_h = s->t;
     s->steps_before_h = s->steps;
-    s->prepared = 1;
     return nambu_pendulum_OK;
 }
 
@@ -790,12 +776,10 @@ static void nambu_pendulum_count(nambu_pendulum_solver *s, size_t steps)
 /* One stage. A guess from earlier steps may have misled it: then once more without. */
 static nambu_pendulum_status nambu_pendulum_stage(nambu_pendulum_solver *s)
 {
-    nambu_pendulum_status status = nambu_pendulum_attempt(s);
-    if (status != nambu_pendulum_OK && s->history.count > 0) {
-        memset(&s->history, 0, sizeof s->history);
-        status = nambu_pendulum_attempt(s);
-    }
-    return status;
+    const nambu_pendulum_status status = nambu_pendulum_attempt(s);
+    if (status == nambu_pendulum_OK || s->history.count == 0) return status;
+    memset(&s->history, 0, sizeof s->history);
+    return nambu_pendulum_attempt(s);
 }
 
 nambu_pendulum_status nambu_pendulum_step(nambu_pendulum_solver *s, double h)
@@ -820,7 +804,6 @@ const char *nambu_pendulum_status_string(nambu_pendulum_status status)
 }
 
 size_t nambu_pendulum_solver_size(void) { return sizeof(nambu_pendulum_solver); }
-
 size_t nambu_pendulum_solver_steps_done(const nambu_pendulum_solver *s) { return s->steps; }
 
 /* nambu_pendulum_curvature in all lanes */
@@ -911,20 +894,19 @@ static void nambu_pendulum_along_mean_lanes(nambu_pendulum_lanes even[restrict 1
 {
     nambu_pendulum_EACH_LANE
     for (int lane = 0; lane < nambu_pendulum_LANES; ++lane) {
-        const double t1 = even[2][lane] - odd[2][lane], t2 = 1.0 / mean[0][lane];
-        const double t3 = mean[1][lane] * t2, t4 = mean[13][lane] - mean[12][lane] * t3;
+        const double t1 = even[2][lane] - odd[2][lane], t2 = 1.0 / mean[0][lane], t3 = mean[1][lane] * t2;
+        const double t4 = mean[13][lane] - mean[12][lane] * t3;
         const double t5 = 1.0 / (mean[7][lane] - mean[6][lane] * t3), t6 = mean[6][lane] * t2 * t5;
         const double t7 = mean[2][lane] * t2, t8 = (mean[8][lane] - mean[6][lane] * t7) * t5;
         const double t9 = 1.0 / (mean[14][lane] - mean[12][lane] * t7 - t4 * t8);
         const double t10 = (t4 * t6 - mean[12][lane] * t2) * t9, t11 = even[0][lane] - odd[0][lane];
-        const double t12 = t7 - t3 * t8, t13 = t2 + t3 * t6 - t12 * t10;
-        const double t14 = even[1][lane] - odd[1][lane], t15 = t6 + t8 * t10, t16 = t4 * t5 * t9;
-        const double t17 = t5 + t8 * t16, t18 = t12 * t16 - t3 * t5, t19 = t12 * t9, t20 = t8 * t9;
-        const double t21 = even[8][lane] - odd[8][lane], t22 = even[6][lane] - odd[6][lane];
-        const double t23 = even[7][lane] - odd[7][lane], t24 = even[14][lane] - odd[14][lane];
-        const double t25 = even[12][lane] - odd[12][lane], t26 = even[13][lane] - odd[13][lane];
-        const double t27 = even[5][lane] - odd[5][lane], t28 = even[4][lane] - odd[4][lane];
-        const double t29 = even[3][lane] - odd[3][lane];
+        const double t12 = t7 - t3 * t8, t13 = t2 + t3 * t6 - t12 * t10, t14 = even[1][lane] - odd[1][lane];
+        const double t15 = t6 + t8 * t10, t16 = t4 * t5 * t9, t17 = t5 + t8 * t16, t18 = t12 * t16 - t3 * t5;
+        const double t19 = t12 * t9, t20 = t8 * t9, t21 = even[8][lane] - odd[8][lane];
+        const double t22 = even[6][lane] - odd[6][lane], t23 = even[7][lane] - odd[7][lane];
+        const double t24 = even[14][lane] - odd[14][lane], t25 = even[12][lane] - odd[12][lane];
+        const double t26 = even[13][lane] - odd[13][lane], t27 = even[5][lane] - odd[5][lane];
+        const double t28 = even[4][lane] - odd[4][lane], t29 = even[3][lane] - odd[3][lane];
         const double t30 = hessian[6][lane] * mean[11][lane] + (hessian[0][lane] * mean[9][lane]
             + hessian[3][lane] * mean[10][lane]);
         const double t31 = 1.0 - (hessian[6][lane] * mean[5][lane] + (hessian[3][lane] * mean[4][lane]
@@ -939,8 +921,8 @@ static void nambu_pendulum_along_mean_lanes(nambu_pendulum_lanes even[restrict 1
             + hessian[1][lane] * mean[9][lane]));
         const double t38 = hessian[7][lane] * mean[5][lane] + (hessian[4][lane] * mean[4][lane]
             + hessian[1][lane] * mean[3][lane]);
-        const double t39 = t36 * t19 + (t37 * t18 - t38 * t13);
-        const double t40 = t36 * t20 + (t37 * t17 + t38 * t15), t41 = t36 * t9 + (t37 * t16 + t38 * t10);
+        const double t39 = t36 * t19 + (t37 * t18 - t38 * t13), t40 = t36 * t20 + (t37 * t17 + t38 * t15);
+        const double t41 = t36 * t9 + (t37 * t16 + t38 * t10);
         const double t42 = 1.0 - (hessian[8][lane] * mean[17][lane] + (hessian[2][lane] * mean[15][lane]
             + hessian[5][lane] * mean[16][lane]));
         const double t43 = hessian[8][lane] * mean[11][lane] + (hessian[5][lane] * mean[10][lane]
@@ -1590,8 +1572,8 @@ static void nambu_pendulum_update(nambu_pendulum_lanes coef[restrict], nambu_pen
 }
 
 /* ---- Blocks of steps ---- */
-/* What all blocks share: coefficients, the same in each lane, and the recurrences by which they are foreseen.
-   */
+/* What all blocks share: coefficients, the same in each lane, and the recurrences by which they are
+   foreseen. */
 typedef struct {
     int fits; /* the fit that weight is of; -1 for none */
     nambu_pendulum_lanes coef[nambu_pendulum_COEFFICIENTS], weight[nambu_pendulum_WINDOW][nambu_pendulum_DIM];
@@ -2043,8 +2025,8 @@ static void nambu_pendulum_group_fit(nambu_pendulum_group *group)
         * group->slow_steps_allowed + nambu_pendulum_REPAY : nambu_pendulum_HOPELESS_WAIT;
 }
 
-/* Replace guesses that are not near the last values, as nambu_pendulum_near has it, by these; lane by lane.
-   */
+/* Replace guesses that are not near the last values, as nambu_pendulum_near has it, by these; lane by
+   lane. */
 static void nambu_pendulum_stay_near(nambu_pendulum_lanes y[restrict nambu_pendulum_DIM],
     nambu_pendulum_lanes last[restrict nambu_pendulum_DIM])
 {

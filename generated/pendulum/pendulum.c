@@ -20,7 +20,7 @@
  *   4. The implicit step, by Newton's method
  *   5. The solver
  *   6. Ensembles
- * body-sha256: c885d2a87ad7c6f66f38eeeae12ebcfdef2c0d3b343a1cc25b215c53f6f69c72
+ * body-sha256: 737f2a8c66155e08d1a350147cec85bc8495167cf26dd3067e9e1b7d3efebce9
  */
 #include "pendulum.h"
 
@@ -32,9 +32,7 @@
 const pendulum_params pendulum_default_params = { 1.0 };
 
 enum { pendulum_MAX_ITERATIONS = 20 }; /* of an inner solve */
-
-/* A correction is accepted when the error that it leaves is estimated to be below this. */
-#define pendulum_TOLERANCE 1e-20
+#define pendulum_TOLERANCE 1e-20       /* the error that an accepted correction may leave, as estimated */
 
 /* Whether all parameters are finite, and positive where they have to be. */
 static int pendulum_allowed(const pendulum_params *params)
@@ -45,10 +43,9 @@ static int pendulum_allowed(const pendulum_params *params)
 /* everything that depends on parameters and step size only */
 static void pendulum_prepare(const pendulum_params *params, double h, double coef[restrict 19])
 {
-    const double t1 = h * h, t2 = h * t1, t3 = params->g * params->g, t4 = t2 * t3;
-    const double t5 = h * (t1 * t1), t6 = t5 * (params->g * t3), t7 = t5 * t3;
-    const double t8 = (-1.0 / 240.0) * t7, t9 = 1.0 / 120.0 * t7, t10 = t8 - t9;
-    const double t11 = params->g * t2, t12 = params->g * t5;
+    const double t1 = h * h, t2 = h * t1, t3 = params->g * params->g, t4 = t2 * t3, t5 = h * (t1 * t1);
+    const double t6 = t5 * (params->g * t3), t7 = t5 * t3, t8 = (-1.0 / 240.0) * t7;
+    const double t9 = 1.0 / 120.0 * t7, t10 = t8 - t9, t11 = params->g * t2, t12 = params->g * t5;
     coef[0] = 1.0 / 12.0 * t4;
     coef[1] = params->g * h;
     coef[2] = (-1.0 / 240.0) * t6;
@@ -78,10 +75,8 @@ static void pendulum_linearise(const double coef[19], const double y[2], double 
     const double q = y[0], p = y[1];
     /* momenta */
     const double t1 = sin(q), t2 = t1 * t1, t3 = coef[7] + coef[8] * t2, t4 = cos(q), t5 = p * p;
-    const double t6 = coef[9] + coef[10] * t4;
-    const double p_p = p * (t3 + t4 * (coef[11] * t5 + t6));
-    const double t7 = t5 * (coef[6] * t5 + (coef[5] + coef[4] * t4));
-    const double t8 = t4 * (coef[0] + coef[3] * t4);
+    const double t6 = coef[9] + coef[10] * t4, p_p = p * (t3 + t4 * (coef[11] * t5 + t6));
+    const double t7 = t5 * (coef[6] * t5 + (coef[5] + coef[4] * t4)), t8 = t4 * (coef[0] + coef[3] * t4);
     const double p_q = t1 * (t7 + (t8 + (coef[1] + coef[2] * t2)));
     /* displacement */
     displacement[0] = (-0.5) * p_p;
@@ -104,21 +99,6 @@ static void pendulum_linearise(const double coef[19], const double y[2], double 
     increment_jacobian[3] = -t9;
 }
 
-/* elimination without pivoting: the solution, and the reciprocals of the pivots */
-static void pendulum_eliminate(const double matrix[4], const double side[2], double solution[restrict 2],
-    double reciprocal[restrict 2])
-{
-    /* solution */
-    const double t1 = 1.0 / matrix[0], t2 = matrix[2] * t1, t3 = 1.0 / (matrix[3] - matrix[1] * t2);
-    const double t4 = (side[1] - side[0] * t2) * t3;
-    solution[0] = t1 * (side[0] - matrix[1] * t4);
-    solution[1] = t4;
-    /* reciprocal */
-    reciprocal[0] = t1;
-    reciprocal[1] = t3;
-}
-
-/* the Hamiltonian */
 double pendulum_hamiltonian(const pendulum_params *params, const double x[2])
 {
     if (params == NULL) params = &pendulum_default_params;
@@ -126,13 +106,11 @@ double pendulum_hamiltonian(const pendulum_params *params, const double x[2])
     return 0.5 * (p * p) - g * cos(q);
 }
 
-/* the Casimirs */
 void pendulum_casimirs(const pendulum_params *params, const double x[2], double out[])
 {
     (void)params, (void)x, (void)out;
 }
 
-/* pi(x) grad H(x) */
 void pendulum_vector_field(const pendulum_params *params, const double x[2], double out[2])
 {
     if (params == NULL) params = &pendulum_default_params;
@@ -142,19 +120,18 @@ void pendulum_vector_field(const pendulum_params *params, const double x[2], dou
 }
 
 /* ---- Compensated sums, linear equations ---- */
-/* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to
-   its last bit: were it rounded with the change, corrections of one sign would add up to a drift. 0, and x as
-   before, if the sum is not finite. */
+/* x + change + small in compensated arithmetic, where small is the carry and what is as small: were that
+   rounded with the change, corrections of one sign would add up to a drift. 0, and x as before, if the sum is
+   not finite. */
 static int pendulum_advance(pendulum_solver *s, const double change[pendulum_DIM],
-    const double correction[pendulum_DIM])
+    const double small[pendulum_DIM])
 {
     double x[pendulum_DIM], carry[pendulum_DIM];
     for (int i = 0; i < pendulum_DIM; ++i) {
         const double sum = s->x[i] + change[i], added = sum - s->x[i];
-        const double lost = (s->x[i] - (sum - added)) + (change[i] - added);
-        const double small = lost + (s->carry[i] + correction[i]);
-        x[i] = sum + small;
-        carry[i] = small - (x[i] - sum);
+        const double lost = ((s->x[i] - (sum - added)) + (change[i] - added)) + small[i];
+        x[i] = sum + lost;
+        carry[i] = lost - (x[i] - sum);
         if (!isfinite(x[i])) return 0;
     }
     memcpy(s->x, x, sizeof x);
@@ -162,28 +139,41 @@ static int pendulum_advance(pendulum_solver *s, const double change[pendulum_DIM
     return 1;
 }
 
-/* Newton matrices are I + O(h): a pivot whose reciprocal is larger than this is far from 1. */
-#define pendulum_LARGEST_RECIPROCAL 1e3
-
-/* Solve matrix * solution = side, both overwritten. The matrix is I + O(h): 0 if a pivot is far from 1. */
+/* Solve matrix * solution = side, both overwritten, by elimination with partial pivoting. 0 if singular. */
 static int pendulum_solve(double matrix[pendulum_DIM * pendulum_DIM], double side[pendulum_DIM])
 {
-    double solution[pendulum_DIM], reciprocal[pendulum_DIM], largest = 0.0;
-    pendulum_eliminate(matrix, side, solution, reciprocal);
-    for (int i = 0; i < pendulum_DIM; ++i)
-        if (!(fabs(reciprocal[i]) <= largest)) largest = fabs(reciprocal[i]);
-    if (!(largest < pendulum_LARGEST_RECIPROCAL)) return 0;
-    memcpy(side, solution, sizeof solution);
+    for (int k = 0; k < pendulum_DIM; ++k) {
+        int best = k;
+        for (int i = k + 1; i < pendulum_DIM; ++i)
+            if (fabs(matrix[i * pendulum_DIM + k]) > fabs(matrix[best * pendulum_DIM + k])) best = i;
+        const double pivot = matrix[best * pendulum_DIM + k], last = side[k];
+        if (!(fabs(pivot) > 0.0)) return 0;
+        for (int j = k; j < pendulum_DIM && best != k; ++j) {
+            const double swap = matrix[k * pendulum_DIM + j];
+            matrix[k * pendulum_DIM + j] = matrix[best * pendulum_DIM + j];
+            matrix[best * pendulum_DIM + j] = swap;
+        }
+        side[k] = side[best];
+        side[best] = last;
+        for (int i = k + 1; i < pendulum_DIM; ++i) {
+            const double factor = matrix[i * pendulum_DIM + k] / pivot;
+            for (int j = k + 1; j < pendulum_DIM; ++j)
+                matrix[i * pendulum_DIM + j] -= factor * matrix[k * pendulum_DIM + j];
+            side[i] -= factor * side[k];
+        }
+    }
+    for (int i = pendulum_DIM - 1; i >= 0; --i) {
+        for (int j = i + 1; j < pendulum_DIM; ++j) side[i] -= matrix[i * pendulum_DIM + j] * side[j];
+        side[i] /= matrix[i * pendulum_DIM + i];
+    }
     return 1;
 }
 
 /* ---- Starting guesses ---- */
-/* How far from the last value a guess may be, in sizes of that value. */
-#define pendulum_REACH 4.0
+#define pendulum_REACH 4.0 /* how far from the last value a guess may be, in sizes of that value */
 
-/* The guess for the next value from the last ones: the sum of their backward differences. 0 if there is none,
-   or if it is far away, where the equation of a step has solutions that have nothing to do with the motion.
-   */
+/* The guess for the next value, the sum of differences. 0 if there is none, or if it is far away, where the
+   equation of a step has solutions that have nothing to do with the motion. */
 static int pendulum_predict(const pendulum_history *history, double value[pendulum_DIM])
 {
     double distance = 0.0, size = 0.0;
@@ -219,10 +209,8 @@ static void pendulum_remember(pendulum_history *history, const double value[pend
     if (history->count < pendulum_DIFFERENCES) ++history->count;
 }
 
-/* How far a step may lead, in sizes of the state and of what the vector field says, if the energy is lost;
-   and the part of the energy that counts as lost. */
-#define pendulum_PLAUSIBLE 1.5
-#define pendulum_LOST 0.5
+#define pendulum_PLAUSIBLE 1.5 /* how far any step may lead, in sizes of the state and of its motion */
+#define pendulum_LOST 0.5      /* part of the energy that one which leads farther must not lose */
 
 /* Whether an increment is that of the motion. Where the step is too large, the equation may have been solved
    by a point far away, at another energy, that has nothing to do with it. */
@@ -232,24 +220,21 @@ static int pendulum_plausible(const pendulum_solver *s, const double increment[p
     for (int i = 0; i < pendulum_DIM; ++i) {
         moved += fabs(increment[i]);
         size += fabs(s->x[i]);
-    }
-    if (moved <= pendulum_PLAUSIBLE * size) return 1;
-    pendulum_vector_field(&s->params, s->x, field);
-    for (int i = 0; i < pendulum_DIM; ++i) {
-        size += fabs(s->h * field[i]);
         middle[i] = s->x[i] + 0.5 * increment[i];
         end[i] = s->x[i] + increment[i];
     }
     if (moved <= pendulum_PLAUSIBLE * size) return 1;
-    const double before = pendulum_hamiltonian(&s->params, s->x), after = pendulum_hamiltonian(&s->params,
-        end);
-    const double scale = fabs(before) + fabs(pendulum_hamiltonian(&s->params, middle)) + fabs(after);
-    return fabs(after - before) <= pendulum_LOST * scale;
+    pendulum_vector_field(&s->params, s->x, field);
+    for (int i = 0; i < pendulum_DIM; ++i) size += fabs(s->h * field[i]);
+    if (moved <= pendulum_PLAUSIBLE * size) return 1;
+    const double before = pendulum_hamiltonian(&s->params, s->x);
+    const double after = pendulum_hamiltonian(&s->params, end), between = pendulum_hamiltonian(&s->params,
+        middle);
+    return fabs(after - before) <= pendulum_LOST * (fabs(before) + fabs(between) + fabs(after));
 }
 
 /* ---- The implicit step, by Newton's method ---- */
-/* Components of y are measured no finer than by this part of the largest. */
-#define pendulum_FLOOR 1e-6
+#define pendulum_FLOOR 1e-6 /* components of y are measured no finer than by this part of the largest */
 
 /* Size of a correction relative to each component of y; NaN or infinite if the correction is. */
 static double pendulum_size(const double y[pendulum_DIM], const double delta[pendulum_DIM])
@@ -264,9 +249,8 @@ static double pendulum_size(const double y[pendulum_DIM], const double delta[pen
     return size;
 }
 
-/* Corrections below the first that shrink by less than the second have reached the level of rounding. */
-#define pendulum_NEARLY_SOLVED 1e-8
-#define pendulum_SHRINKING 0.25
+#define pendulum_NEARLY_SOLVED 1e-8 /* corrections below this have reached the level of rounding, ... */
+#define pendulum_SHRINKING 0.25     /* ... if one is more than this part of the one before */
 
 /* Solve (y - x) + displacement(y) = 0 for y by Newton's method from the extrapolated guess, and advance. The
    increment is corrected to first order by the last Newton correction, so that correction costs no
@@ -275,13 +259,14 @@ static double pendulum_size(const double y[pendulum_DIM], const double delta[pen
 static pendulum_status pendulum_attempt(pendulum_solver *s)
 {
     double y[pendulum_DIM], delta[pendulum_DIM], displacement[pendulum_DIM], increment[pendulum_DIM];
-    double jacobian[pendulum_DIM * pendulum_DIM], increment_jacobian[pendulum_DIM * pendulum_DIM], previous =
-        HUGE_VAL;
+    double jacobian[pendulum_DIM * pendulum_DIM], increment_jacobian[pendulum_DIM * pendulum_DIM];
+    double previous = HUGE_VAL;
     if (!pendulum_predict(&s->history, y)) memcpy(y, s->x, sizeof y);
     for (int iteration = 1; iteration <= pendulum_MAX_ITERATIONS; ++iteration) {
         pendulum_linearise(s->coef, y, displacement, increment, jacobian, increment_jacobian);
         ++s->evaluations;
-        for (int i = 0; i < pendulum_DIM; ++i) delta[i] = ((y[i] - s->x[i]) + displacement[i]) - s->carry[i];
+        for (int i = 0; i < pendulum_DIM; ++i)
+            delta[i] = ((y[i] - s->x[i]) + displacement[i]) - s->carry[i];
         const int regular = pendulum_solve(jacobian, delta);
         const double size = pendulum_size(y, delta), growth = size / (previous * previous);
         if (!isfinite(size)) return pendulum_NOT_FINITE;
@@ -291,12 +276,14 @@ static pendulum_status pendulum_attempt(pendulum_solver *s)
         const int stalled = previous < pendulum_NEARLY_SOLVED && size > pendulum_SHRINKING * previous;
         previous = size;
         if (!(remaining <= pendulum_TOLERANCE || stalled)) continue;
-        double correction[pendulum_DIM] = { 0.0 };
-        for (int i = 0; i < pendulum_DIM; ++i)
+        double small[pendulum_DIM] = { 0.0 }; /* the correction of the increment, and the carry */
+        for (int i = 0; i < pendulum_DIM; ++i) {
             for (int j = 0; j < pendulum_DIM; ++j)
-                correction[i] -= increment_jacobian[i * pendulum_DIM + j] * delta[j];
+                small[i] -= increment_jacobian[i * pendulum_DIM + j] * delta[j];
+            small[i] += s->carry[i];
+        }
         if (!pendulum_plausible(s, increment)) return pendulum_NO_CONVERGENCE;
-        if (!pendulum_advance(s, increment, correction)) return pendulum_NOT_FINITE;
+        if (!pendulum_advance(s, increment, small)) return pendulum_NOT_FINITE;
         pendulum_remember(&s->history, y);
         return pendulum_OK;
     }
@@ -304,32 +291,23 @@ static pendulum_status pendulum_attempt(pendulum_solver *s)
 }
 
 /* ---- The solver ---- */
-/* Whether steps can be made with these parameters: allowed, and with finite coefficients for a step so short
-   that it has no part in it. */
-static int pendulum_admissible(const pendulum_params *params)
-{
-    double coef[pendulum_COEFFICIENTS];
-    if (!pendulum_allowed(params)) return 0;
-    pendulum_prepare(params, 1e-100, coef);
-    for (int k = 0; k < pendulum_COEFFICIENTS; ++k)
-        if (!isfinite(coef[k])) return 0;
-    return 1;
-}
+#define pendulum_SHORT_STEP 1e-100 /* so short that it has no part in whether coefficients are finite */
 
-/* The arguments may be parts of *s: they are read before it is written. */
+/* The arguments may be parts of *s, which is therefore written last. */
 pendulum_status pendulum_init(pendulum_solver *s, const pendulum_params *params,
     const double x0[pendulum_DIM])
 {
     if (s == NULL || x0 == NULL) return pendulum_BAD_ARGUMENT;
-    const pendulum_params own = params != NULL ? *params : pendulum_default_params;
-    double x[pendulum_DIM];
-    memcpy(x, x0, sizeof x);
+    pendulum_solver fresh = { .h = (double)NAN };
+    fresh.params = params != NULL ? *params : pendulum_default_params;
+    memcpy(fresh.x, x0, sizeof fresh.x);
     for (int i = 0; i < pendulum_DIM; ++i)
-        if (!isfinite(x[i])) return pendulum_BAD_ARGUMENT;
-    if (!pendulum_admissible(&own)) return pendulum_BAD_ARGUMENT;
-    memset(s, 0, sizeof *s);
-    memcpy(s->x, x, sizeof s->x);
-    s->params = own;
+        if (!isfinite(fresh.x[i])) return pendulum_BAD_ARGUMENT;
+    if (!pendulum_allowed(&fresh.params)) return pendulum_BAD_ARGUMENT;
+    pendulum_prepare(&fresh.params, pendulum_SHORT_STEP, fresh.coef);
+    for (int k = 0; k < pendulum_COEFFICIENTS; ++k)
+        if (!isfinite(fresh.coef[k])) return pendulum_BAD_ARGUMENT;
+    *s = fresh;
     return pendulum_OK;
 }
 
@@ -337,44 +315,37 @@ pendulum_status pendulum_init(pendulum_solver *s, const pendulum_params *params,
 static pendulum_status pendulum_set_step(pendulum_solver *s, double h)
 {
     if (s == NULL || !isfinite(h)) return pendulum_BAD_ARGUMENT;
-    if (s->prepared && memcmp(&h, &s->h, sizeof h) == 0) return pendulum_OK;
+    if (memcmp(&h, &s->h, sizeof h) == 0) return pendulum_OK;
     pendulum_prepare(&s->params, h, s->coef);
     memset(&s->history, 0, sizeof s->history);
     s->h = h;
     s->t_before_h = s->t;
     s->steps_before_h = s->steps;
-    s->prepared = 1;
     return pendulum_OK;
 }
 
 /* One stage. A guess from earlier steps may have misled it: then once more without. */
 static pendulum_status pendulum_stage(pendulum_solver *s)
 {
-    pendulum_status status = pendulum_attempt(s);
-    if (status != pendulum_OK && s->history.count > 0) {
-        memset(&s->history, 0, sizeof s->history);
-        status = pendulum_attempt(s);
-    }
-    return status;
-}
-
-pendulum_status pendulum_step(pendulum_solver *s, double h)
-{
-    pendulum_status status = pendulum_set_step(s, h);
-    if (status != pendulum_OK) return status;
-    status = pendulum_stage(s);
-    if (status != pendulum_OK) return status;
-    ++s->steps;
-    s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
-    return status;
+    const pendulum_status status = pendulum_attempt(s);
+    if (status == pendulum_OK || s->history.count == 0) return status;
+    memset(&s->history, 0, sizeof s->history);
+    return pendulum_attempt(s);
 }
 
 pendulum_status pendulum_integrate(pendulum_solver *s, double h, size_t steps)
 {
     pendulum_status status = pendulum_set_step(s, h);
-    for (; steps > 0 && status == pendulum_OK; --steps) status = pendulum_step(s, h);
+    for (; steps > 0 && status == pendulum_OK; --steps) {
+        status = pendulum_stage(s);
+        if (status != pendulum_OK) break;
+        ++s->steps;
+        s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
+    }
     return status;
 }
+
+pendulum_status pendulum_step(pendulum_solver *s, double h) { return pendulum_integrate(s, h, 1); }
 
 const char *pendulum_status_string(pendulum_status status)
 {
@@ -389,7 +360,6 @@ const char *pendulum_status_string(pendulum_status status)
 }
 
 size_t pendulum_solver_size(void) { return sizeof(pendulum_solver); }
-
 size_t pendulum_solver_steps_done(const pendulum_solver *s) { return s->steps; }
 
 /* ---- Ensembles ---- */

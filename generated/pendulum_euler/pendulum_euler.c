@@ -19,7 +19,7 @@
  *   3. The explicit step
  *   4. The solver
  *   5. Ensembles
- * body-sha256: 91890511e3cfd562e1c8f0c91f5a0a95dab5555c459b96801c3a94963b90599d
+ * body-sha256: aab2383ce36271aa7baeabb83a73f0682fe561c53204580ff79cc73009b3a33e
  */
 #include "pendulum_euler.h"
 
@@ -51,7 +51,6 @@ static void pendulum_euler_explicit(const double coef[2], const double state[2],
     increment[1] = -t1;
 }
 
-/* the Hamiltonian */
 double pendulum_euler_hamiltonian(const pendulum_euler_params *params, const double x[2])
 {
     if (params == NULL) params = &pendulum_euler_default_params;
@@ -59,13 +58,11 @@ double pendulum_euler_hamiltonian(const pendulum_euler_params *params, const dou
     return 0.5 * (p * p) - g * cos(q);
 }
 
-/* the Casimirs */
 void pendulum_euler_casimirs(const pendulum_euler_params *params, const double x[2], double out[])
 {
     (void)params, (void)x, (void)out;
 }
 
-/* pi(x) grad H(x) */
 void pendulum_euler_vector_field(const pendulum_euler_params *params, const double x[2], double out[2])
 {
     if (params == NULL) params = &pendulum_euler_default_params;
@@ -75,19 +72,18 @@ void pendulum_euler_vector_field(const pendulum_euler_params *params, const doub
 }
 
 /* ---- Compensated sums, linear equations ---- */
-/* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to
-   its last bit: were it rounded with the change, corrections of one sign would add up to a drift. 0, and x as
-   before, if the sum is not finite. */
+/* x + change + small in compensated arithmetic, where small is the carry and what is as small: were that
+   rounded with the change, corrections of one sign would add up to a drift. 0, and x as before, if the sum is
+   not finite. */
 static int pendulum_euler_advance(pendulum_euler_solver *s, const double change[pendulum_euler_DIM],
-    const double correction[pendulum_euler_DIM])
+    const double small[pendulum_euler_DIM])
 {
     double x[pendulum_euler_DIM], carry[pendulum_euler_DIM];
     for (int i = 0; i < pendulum_euler_DIM; ++i) {
         const double sum = s->x[i] + change[i], added = sum - s->x[i];
-        const double lost = (s->x[i] - (sum - added)) + (change[i] - added);
-        const double small = lost + (s->carry[i] + correction[i]);
-        x[i] = sum + small;
-        carry[i] = small - (x[i] - sum);
+        const double lost = ((s->x[i] - (sum - added)) + (change[i] - added)) + small[i];
+        x[i] = sum + lost;
+        carry[i] = lost - (x[i] - sum);
         if (!isfinite(x[i])) return 0;
     }
     memcpy(s->x, x, sizeof x);
@@ -99,40 +95,30 @@ static int pendulum_euler_advance(pendulum_euler_solver *s, const double change[
 /* One explicit stage: x + increment(x). */
 static pendulum_euler_status pendulum_euler_stage(pendulum_euler_solver *s)
 {
-    const double none[pendulum_euler_DIM] = { 0.0 };
     double increment[pendulum_euler_DIM];
     pendulum_euler_explicit(s->coef, s->x, increment);
     ++s->evaluations;
-    return pendulum_euler_advance(s, increment, none) ? pendulum_euler_OK : pendulum_euler_NOT_FINITE;
+    return pendulum_euler_advance(s, increment, s->carry) ? pendulum_euler_OK : pendulum_euler_NOT_FINITE;
 }
 
 /* ---- The solver ---- */
-/* Whether steps can be made with these parameters: allowed, and with finite coefficients for a step so short
-   that it has no part in it. */
-static int pendulum_euler_admissible(const pendulum_euler_params *params)
-{
-    double coef[pendulum_euler_COEFFICIENTS];
-    if (!pendulum_euler_allowed(params)) return 0;
-    pendulum_euler_prepare(params, 1e-100, coef);
-    for (int k = 0; k < pendulum_euler_COEFFICIENTS; ++k)
-        if (!isfinite(coef[k])) return 0;
-    return 1;
-}
+#define pendulum_euler_SHORT_STEP 1e-100 /* so short that it has no part in whether coefficients are finite */
 
-/* The arguments may be parts of *s: they are read before it is written. */
+/* The arguments may be parts of *s, which is therefore written last. */
 pendulum_euler_status pendulum_euler_init(pendulum_euler_solver *s, const pendulum_euler_params *params,
     const double x0[pendulum_euler_DIM])
 {
     if (s == NULL || x0 == NULL) return pendulum_euler_BAD_ARGUMENT;
-    const pendulum_euler_params own = params != NULL ? *params : pendulum_euler_default_params;
-    double x[pendulum_euler_DIM];
-    memcpy(x, x0, sizeof x);
+    pendulum_euler_solver fresh = { .h = (double)NAN };
+    fresh.params = params != NULL ? *params : pendulum_euler_default_params;
+    memcpy(fresh.x, x0, sizeof fresh.x);
     for (int i = 0; i < pendulum_euler_DIM; ++i)
-        if (!isfinite(x[i])) return pendulum_euler_BAD_ARGUMENT;
-    if (!pendulum_euler_admissible(&own)) return pendulum_euler_BAD_ARGUMENT;
-    memset(s, 0, sizeof *s);
-    memcpy(s->x, x, sizeof s->x);
-    s->params = own;
+        if (!isfinite(fresh.x[i])) return pendulum_euler_BAD_ARGUMENT;
+    if (!pendulum_euler_allowed(&fresh.params)) return pendulum_euler_BAD_ARGUMENT;
+    pendulum_euler_prepare(&fresh.params, pendulum_euler_SHORT_STEP, fresh.coef);
+    for (int k = 0; k < pendulum_euler_COEFFICIENTS; ++k)
+        if (!isfinite(fresh.coef[k])) return pendulum_euler_BAD_ARGUMENT;
+    *s = fresh;
     return pendulum_euler_OK;
 }
 
@@ -140,32 +126,28 @@ pendulum_euler_status pendulum_euler_init(pendulum_euler_solver *s, const pendul
 static pendulum_euler_status pendulum_euler_set_step(pendulum_euler_solver *s, double h)
 {
     if (s == NULL || !isfinite(h)) return pendulum_euler_BAD_ARGUMENT;
-    if (s->prepared && memcmp(&h, &s->h, sizeof h) == 0) return pendulum_euler_OK;
+    if (memcmp(&h, &s->h, sizeof h) == 0) return pendulum_euler_OK;
     pendulum_euler_prepare(&s->params, h, s->coef);
     s->h = h;
     s->t_before_h = s->t;
     s->steps_before_h = s->steps;
-    s->prepared = 1;
     return pendulum_euler_OK;
-}
-
-pendulum_euler_status pendulum_euler_step(pendulum_euler_solver *s, double h)
-{
-    pendulum_euler_status status = pendulum_euler_set_step(s, h);
-    if (status != pendulum_euler_OK) return status;
-    status = pendulum_euler_stage(s);
-    if (status != pendulum_euler_OK) return status;
-    ++s->steps;
-    s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
-    return status;
 }
 
 pendulum_euler_status pendulum_euler_integrate(pendulum_euler_solver *s, double h, size_t steps)
 {
     pendulum_euler_status status = pendulum_euler_set_step(s, h);
-    for (; steps > 0 && status == pendulum_euler_OK; --steps) status = pendulum_euler_step(s, h);
+    for (; steps > 0 && status == pendulum_euler_OK; --steps) {
+        status = pendulum_euler_stage(s);
+        if (status != pendulum_euler_OK) break;
+        ++s->steps;
+        s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
+    }
     return status;
 }
+
+pendulum_euler_status pendulum_euler_step(pendulum_euler_solver *s,
+    double h) { return pendulum_euler_integrate(s, h, 1); }
 
 const char *pendulum_euler_status_string(pendulum_euler_status status)
 {
@@ -180,7 +162,6 @@ const char *pendulum_euler_status_string(pendulum_euler_status status)
 }
 
 size_t pendulum_euler_solver_size(void) { return sizeof(pendulum_euler_solver); }
-
 size_t pendulum_euler_solver_steps_done(const pendulum_euler_solver *s) { return s->steps; }
 
 /* ---- Ensembles ---- */

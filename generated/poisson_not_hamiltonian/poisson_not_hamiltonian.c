@@ -20,7 +20,7 @@
  *   4. The implicit step, by Newton's method
  *   5. The solver
  *   6. Ensembles
- * body-sha256: 05e94807c45ae7bd7c6491644c877a2c3466274b1008ddbf11c17c9919737d3d
+ * body-sha256: 80e06be14d8f5399eb29b5dd5e577ad302a09ba006ea34da2bab708ec62cde09
  */
 #include "poisson_not_hamiltonian.h"
 
@@ -32,8 +32,7 @@
 const poisson_not_hamiltonian_params poisson_not_hamiltonian_default_params = { 0 };
 
 enum { poisson_not_hamiltonian_MAX_ITERATIONS = 20 }; /* of an inner solve */
-
-/* A correction is accepted when the error that it leaves is estimated to be below this. */
+/* the error that an accepted correction may leave, as estimated */
 #define poisson_not_hamiltonian_TOLERANCE 1e-20
 
 /* everything that depends on parameters and step size only */
@@ -53,16 +52,14 @@ static void poisson_not_hamiltonian_linearise(const double coef[2], const double
 {
     const double x = y[0], y_ = y[1], z = y[2];
     /* momenta */
-    const double p_z = coef[1] * y_ + coef[0] * z;
-    const double p_y = coef[1] * z + coef[0] * y_;
-    const double p_x = coef[0] * x;
+    const double p_z = coef[1] * y_ + coef[0] * z, p_y = coef[1] * z + coef[0] * y_, p_x = coef[0] * x;
     /* displacement */
-    const double t1 = y_ - z, t2 = p_z + (p_y + 2.0 * p_x), t3 = t1 * t2, t4 = p_y - p_z;
-    const double t5 = x * t4, t6 = exp(0.25 * (t3 - t5)), t7 = 0.25 * (t1 * t4 + x * t2);
-    const double t8 = cos(t7), t9 = x * t8, t10 = sin(t7), t11 = t1 * t10, t12 = t9 - t11;
-    const double t13 = t6 * t12, t14 = 0.5 * (y_ + z - x), t15 = x + t1, t16 = t15 * t8;
-    const double t17 = x - t1, t18 = t17 * t10, t19 = t16 + t18, t20 = t14 + 0.5 * (t6 * t19);
-    const double t21 = t17 * t8, t22 = t15 * t10, t23 = t21 - t22, t24 = t14 + 0.5 * (t6 * t23);
+    const double t1 = y_ - z, t2 = p_z + (p_y + 2.0 * p_x), t3 = t1 * t2, t4 = p_y - p_z, t5 = x * t4;
+    const double t6 = exp(0.25 * (t3 - t5)), t7 = 0.25 * (t1 * t4 + x * t2), t8 = cos(t7), t9 = x * t8;
+    const double t10 = sin(t7), t11 = t1 * t10, t12 = t9 - t11, t13 = t6 * t12, t14 = 0.5 * (y_ + z - x);
+    const double t15 = x + t1, t16 = t15 * t8, t17 = x - t1, t18 = t17 * t10, t19 = t16 + t18;
+    const double t20 = t14 + 0.5 * (t6 * t19), t21 = t17 * t8, t22 = t15 * t10, t23 = t21 - t22;
+    const double t24 = t14 + 0.5 * (t6 * t23);
     displacement[0] = t13 - x;
     displacement[1] = t20 - y_;
     displacement[2] = t24 - z;
@@ -73,33 +70,32 @@ static void poisson_not_hamiltonian_linearise(const double coef[2], const double
     increment[2] = t14 + 0.5 * (t25 * t28) - t24;
     /* jacobian */
     const double t29 = t1 * t6, t30 = x * t10, t31 = x * t30, t32 = 0.5 * (t1 * t9);
-    const double t33 = 0.5 * (t29 * t12) + t6 * ((-0.5) * t31 - t32), t34 = p_z - p_y;
-    const double t35 = t34 * t6, t36 = t2 * t10, t37 = t8 - 0.25 * (x * t36), t38 = t2 * t8;
-    const double t39 = 0.25 * (t1 * t38), t40 = 0.25 * (t35 * t12) + t6 * (t37 - t39), t41 = t2 * t6;
-    const double t42 = 0.25 * (t41 * t12), t43 = t4 * t10, t44 = x * t43, t45 = t4 * t8;
-    const double t46 = t10 + 0.25 * (t1 * t45), t47 = t42 + t6 * ((-0.25) * t44 - t46);
-    const double t48 = (t1 - x) * t6, t49 = x * t22, t50 = 0.25 * (t1 * t16);
-    const double t51 = 0.25 * (t48 * t12) + t6 * ((-0.25) * t49 - t50), t52 = t15 * t6, t53 = z - y_;
-    const double t54 = x + t53, t55 = t54 * t10, t56 = x * t55, t57 = t54 * t8;
-    const double t58 = 0.25 * (t1 * t57), t59 = 0.25 * (t52 * t12) + t6 * ((-0.25) * t56 - t58);
-    const double t60 = t34 * t8, t61 = 0.25 * (t1 * t60), t62 = t34 * t10, t63 = 0.25 * (x * t62);
+    const double t33 = 0.5 * (t29 * t12) + t6 * ((-0.5) * t31 - t32), t34 = p_z - p_y, t35 = t34 * t6;
+    const double t36 = t2 * t10, t37 = t8 - 0.25 * (x * t36), t38 = t2 * t8, t39 = 0.25 * (t1 * t38);
+    const double t40 = 0.25 * (t35 * t12) + t6 * (t37 - t39), t41 = t2 * t6, t42 = 0.25 * (t41 * t12);
+    const double t43 = t4 * t10, t44 = x * t43, t45 = t4 * t8, t46 = t10 + 0.25 * (t1 * t45);
+    const double t47 = t42 + t6 * ((-0.25) * t44 - t46), t48 = (t1 - x) * t6, t49 = x * t22;
+    const double t50 = 0.25 * (t1 * t16), t51 = 0.25 * (t48 * t12) + t6 * ((-0.25) * t49 - t50);
+    const double t52 = t15 * t6, t53 = z - y_, t54 = x + t53, t55 = t54 * t10, t56 = x * t55;
+    const double t57 = t54 * t8, t58 = 0.25 * (t1 * t57);
+    const double t59 = 0.25 * (t52 * t12) + t6 * ((-0.25) * t56 - t58), t60 = t34 * t8;
+    const double t61 = 0.25 * (t1 * t60), t62 = t34 * t10, t63 = 0.25 * (x * t62);
     const double t64 = t6 * (t10 - t61 - t63), t65 = 0.5 * (t17 * t9), t66 = t15 * t30;
     const double t67 = 0.5 * (t29 * t19) + t6 * (t65 - 0.5 * t66), t68 = t8 - 0.25 * (t15 * t36);
     const double t69 = t10 + 0.25 * (t17 * t38);
-    const double t70 = -0.5 + 0.5 * (0.25 * (t35 * t19) + t6 * (t68 + t69));
-    const double t71 = 0.25 * (t17 * t16), t72 = t15 * t22;
-    const double t73 = 0.25 * (t48 * t19) + t6 * (t71 - 0.25 * t72), t74 = 0.25 * (t17 * t57);
-    const double t75 = t15 * t55, t76 = 0.25 * (t52 * t19) + t6 * (t74 - 0.25 * t75);
-    const double t77 = 0.25 * (t41 * t19), t78 = t8 - 0.25 * (t15 * t43), t79 = 0.25 * (t17 * t45);
-    const double t80 = 0.5 + 0.5 * (t77 + t6 * (t78 + (t79 - t10)));
-    const double t81 = (-0.25) * (t15 * t62) - t8, t82 = t10 + 0.25 * (t17 * t60);
-    const double t83 = 0.5 + 0.5 * (t6 * (t81 + t82) - t77), t84 = t17 * t30, t85 = 0.5 * (t15 * t9);
+    const double t70 = -0.5 + 0.5 * (0.25 * (t35 * t19) + t6 * (t68 + t69)), t71 = 0.25 * (t17 * t16);
+    const double t72 = t15 * t22, t73 = 0.25 * (t48 * t19) + t6 * (t71 - 0.25 * t72);
+    const double t74 = 0.25 * (t17 * t57), t75 = t15 * t55;
+    const double t76 = 0.25 * (t52 * t19) + t6 * (t74 - 0.25 * t75), t77 = 0.25 * (t41 * t19);
+    const double t78 = t8 - 0.25 * (t15 * t43), t79 = 0.25 * (t17 * t45);
+    const double t80 = 0.5 + 0.5 * (t77 + t6 * (t78 + (t79 - t10))), t81 = (-0.25) * (t15 * t62) - t8;
+    const double t82 = t10 + 0.25 * (t17 * t60), t83 = 0.5 + 0.5 * (t6 * (t81 + t82) - t77);
+    const double t84 = t17 * t30, t85 = 0.5 * (t15 * t9);
     const double t86 = 0.5 * (t29 * t23) + t6 * ((-0.5) * t84 - t85), t87 = t8 - 0.25 * (t17 * t36);
     const double t88 = t10 + 0.25 * (t15 * t38);
-    const double t89 = -0.5 + 0.5 * (0.25 * (t35 * t23) + t6 * (t87 - t88));
-    const double t90 = 0.25 * (t41 * t23), t91 = (-0.25) * (t17 * t43) - t8;
-    const double t92 = t10 + 0.25 * (t15 * t45), t93 = 0.5 + 0.5 * (t90 + t6 * (t91 - t92));
-    const double t94 = t17 * t22, t95 = 0.25 * (t15 * t16);
+    const double t89 = -0.5 + 0.5 * (0.25 * (t35 * t23) + t6 * (t87 - t88)), t90 = 0.25 * (t41 * t23);
+    const double t91 = (-0.25) * (t17 * t43) - t8, t92 = t10 + 0.25 * (t15 * t45);
+    const double t93 = 0.5 + 0.5 * (t90 + t6 * (t91 - t92)), t94 = t17 * t22, t95 = 0.25 * (t15 * t16);
     const double t96 = 0.25 * (t48 * t23) + t6 * ((-0.25) * t94 - t95), t97 = t17 * t55;
     const double t98 = 0.25 * (t15 * t57), t99 = 0.25 * (t52 * t23) + t6 * ((-0.25) * t97 - t98);
     const double t100 = t8 - 0.25 * (t17 * t62), t101 = 0.25 * (t15 * t60);
@@ -143,26 +139,6 @@ static void poisson_not_hamiltonian_linearise(const double coef[2], const double
         * t118);
 }
 
-/* elimination without pivoting: the solution, and the reciprocals of the pivots */
-static void poisson_not_hamiltonian_eliminate(const double matrix[9], const double side[3],
-    double solution[restrict 3], double reciprocal[restrict 3])
-{
-    /* solution */
-    const double t1 = 1.0 / matrix[0], t2 = matrix[6] * t1, t3 = matrix[3] * t1;
-    const double t4 = side[1] - side[0] * t3, t5 = 1.0 / (matrix[4] - matrix[1] * t3);
-    const double t6 = (matrix[7] - matrix[1] * t2) * t5, t7 = matrix[5] - matrix[2] * t3;
-    const double t8 = 1.0 / (matrix[8] - matrix[2] * t2 - t7 * t6);
-    const double t9 = (side[2] - side[0] * t2 - t4 * t6) * t8, t10 = t5 * (t4 - t7 * t9);
-    solution[0] = t1 * (side[0] - (matrix[2] * t9 + matrix[1] * t10));
-    solution[1] = t10;
-    solution[2] = t9;
-    /* reciprocal */
-    reciprocal[0] = t1;
-    reciprocal[1] = t5;
-    reciprocal[2] = t8;
-}
-
-/* the Hamiltonian */
 double poisson_not_hamiltonian_hamiltonian(const poisson_not_hamiltonian_params *params, const double x[3])
 {
     (void)params;
@@ -171,7 +147,6 @@ double poisson_not_hamiltonian_hamiltonian(const poisson_not_hamiltonian_params 
     return 0.25 * (x_ * x_ + t1 * t1);
 }
 
-/* the Casimirs */
 void poisson_not_hamiltonian_casimirs(const poisson_not_hamiltonian_params *params, const double x[3],
     double out[])
 {
@@ -180,7 +155,6 @@ void poisson_not_hamiltonian_casimirs(const poisson_not_hamiltonian_params *para
     out[0] = y + z - x_;
 }
 
-/* pi(x) grad H(x) */
 void poisson_not_hamiltonian_vector_field(const poisson_not_hamiltonian_params *params, const double x[3],
     double out[3])
 {
@@ -193,19 +167,18 @@ void poisson_not_hamiltonian_vector_field(const poisson_not_hamiltonian_params *
 }
 
 /* ---- Compensated sums, linear equations ---- */
-/* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to
-   its last bit: were it rounded with the change, corrections of one sign would add up to a drift. 0, and x as
-   before, if the sum is not finite. */
+/* x + change + small in compensated arithmetic, where small is the carry and what is as small: were that
+   rounded with the change, corrections of one sign would add up to a drift. 0, and x as before, if the sum is
+   not finite. */
 static int poisson_not_hamiltonian_advance(poisson_not_hamiltonian_solver *s,
-    const double change[poisson_not_hamiltonian_DIM], const double correction[poisson_not_hamiltonian_DIM])
+    const double change[poisson_not_hamiltonian_DIM], const double small[poisson_not_hamiltonian_DIM])
 {
     double x[poisson_not_hamiltonian_DIM], carry[poisson_not_hamiltonian_DIM];
     for (int i = 0; i < poisson_not_hamiltonian_DIM; ++i) {
         const double sum = s->x[i] + change[i], added = sum - s->x[i];
-        const double lost = (s->x[i] - (sum - added)) + (change[i] - added);
-        const double small = lost + (s->carry[i] + correction[i]);
-        x[i] = sum + small;
-        carry[i] = small - (x[i] - sum);
+        const double lost = ((s->x[i] - (sum - added)) + (change[i] - added)) + small[i];
+        x[i] = sum + lost;
+        carry[i] = lost - (x[i] - sum);
         if (!isfinite(x[i])) return 0;
     }
     memcpy(s->x, x, sizeof x);
@@ -213,29 +186,46 @@ static int poisson_not_hamiltonian_advance(poisson_not_hamiltonian_solver *s,
     return 1;
 }
 
-/* Newton matrices are I + O(h): a pivot whose reciprocal is larger than this is far from 1. */
-#define poisson_not_hamiltonian_LARGEST_RECIPROCAL 1e3
-
-/* Solve matrix * solution = side, both overwritten. The matrix is I + O(h): 0 if a pivot is far from 1. */
+/* Solve matrix * solution = side, both overwritten, by elimination with partial pivoting. 0 if singular. */
 static int poisson_not_hamiltonian_solve(double matrix[poisson_not_hamiltonian_DIM
     * poisson_not_hamiltonian_DIM], double side[poisson_not_hamiltonian_DIM])
 {
-    double solution[poisson_not_hamiltonian_DIM], reciprocal[poisson_not_hamiltonian_DIM], largest = 0.0;
-    poisson_not_hamiltonian_eliminate(matrix, side, solution, reciprocal);
-    for (int i = 0; i < poisson_not_hamiltonian_DIM; ++i)
-        if (!(fabs(reciprocal[i]) <= largest)) largest = fabs(reciprocal[i]);
-    if (!(largest < poisson_not_hamiltonian_LARGEST_RECIPROCAL)) return 0;
-    memcpy(side, solution, sizeof solution);
+    for (int k = 0; k < poisson_not_hamiltonian_DIM; ++k) {
+        int best = k;
+        for (int i = k + 1; i < poisson_not_hamiltonian_DIM; ++i)
+            if (fabs(matrix[i * poisson_not_hamiltonian_DIM + k])
+                > fabs(matrix[best * poisson_not_hamiltonian_DIM + k])) best = i;
+        const double pivot = matrix[best * poisson_not_hamiltonian_DIM + k], last = side[k];
+        if (!(fabs(pivot) > 0.0)) return 0;
+        for (int j = k; j < poisson_not_hamiltonian_DIM && best != k; ++j) {
+            const double swap = matrix[k * poisson_not_hamiltonian_DIM + j];
+            matrix[k * poisson_not_hamiltonian_DIM + j] = matrix[best * poisson_not_hamiltonian_DIM + j];
+            matrix[best * poisson_not_hamiltonian_DIM + j] = swap;
+        }
+        side[k] = side[best];
+        side[best] = last;
+        for (int i = k + 1; i < poisson_not_hamiltonian_DIM; ++i) {
+            const double factor = matrix[i * poisson_not_hamiltonian_DIM + k] / pivot;
+            for (int j = k + 1; j < poisson_not_hamiltonian_DIM; ++j)
+                matrix[i * poisson_not_hamiltonian_DIM + j] -= factor * matrix[k * poisson_not_hamiltonian_DIM
+                + j];
+            side[i] -= factor * side[k];
+        }
+    }
+    for (int i = poisson_not_hamiltonian_DIM - 1; i >= 0; --i) {
+        for (int j = i + 1; j < poisson_not_hamiltonian_DIM; ++j)
+            side[i] -= matrix[i * poisson_not_hamiltonian_DIM + j] * side[j];
+        side[i] /= matrix[i * poisson_not_hamiltonian_DIM + i];
+    }
     return 1;
 }
 
 /* ---- Starting guesses ---- */
-/* How far from the last value a guess may be, in sizes of that value. */
+/* how far from the last value a guess may be, in sizes of that value */
 #define poisson_not_hamiltonian_REACH 4.0
 
-/* The guess for the next value from the last ones: the sum of their backward differences. 0 if there is none,
-   or if it is far away, where the equation of a step has solutions that have nothing to do with the motion.
-   */
+/* The guess for the next value, the sum of differences. 0 if there is none, or if it is far away, where the
+   equation of a step has solutions that have nothing to do with the motion. */
 static int poisson_not_hamiltonian_predict(const poisson_not_hamiltonian_history *history,
     double value[poisson_not_hamiltonian_DIM])
 {
@@ -273,9 +263,9 @@ static void poisson_not_hamiltonian_remember(poisson_not_hamiltonian_history *hi
     if (history->count < poisson_not_hamiltonian_DIFFERENCES) ++history->count;
 }
 
-/* How far a step may lead, in sizes of the state and of what the vector field says, if the energy is lost;
-   and the part of the energy that counts as lost. */
+/* how far any step may lead, in sizes of the state and of its motion */
 #define poisson_not_hamiltonian_PLAUSIBLE 1.5
+/* part of the energy that one which leads farther must not lose */
 #define poisson_not_hamiltonian_LOST 0.5
 
 /* Whether an increment is that of the motion. Where the step is too large, the equation may have been solved
@@ -288,24 +278,22 @@ static int poisson_not_hamiltonian_plausible(const poisson_not_hamiltonian_solve
     for (int i = 0; i < poisson_not_hamiltonian_DIM; ++i) {
         moved += fabs(increment[i]);
         size += fabs(s->x[i]);
-    }
-    if (moved <= poisson_not_hamiltonian_PLAUSIBLE * size) return 1;
-    poisson_not_hamiltonian_vector_field(&s->params, s->x, field);
-    for (int i = 0; i < poisson_not_hamiltonian_DIM; ++i) {
-        size += fabs(s->h * field[i]);
         middle[i] = s->x[i] + 0.5 * increment[i];
         end[i] = s->x[i] + increment[i];
     }
     if (moved <= poisson_not_hamiltonian_PLAUSIBLE * size) return 1;
-    const double before = poisson_not_hamiltonian_hamiltonian(&s->params, s->x), after =
-        poisson_not_hamiltonian_hamiltonian(&s->params, end);
-    const double scale = fabs(before) + fabs(poisson_not_hamiltonian_hamiltonian(&s->params, middle))
-        + fabs(after);
-    return fabs(after - before) <= poisson_not_hamiltonian_LOST * scale;
+    poisson_not_hamiltonian_vector_field(&s->params, s->x, field);
+    for (int i = 0; i < poisson_not_hamiltonian_DIM; ++i) size += fabs(s->h * field[i]);
+    if (moved <= poisson_not_hamiltonian_PLAUSIBLE * size) return 1;
+    const double before = poisson_not_hamiltonian_hamiltonian(&s->params, s->x);
+    const double after = poisson_not_hamiltonian_hamiltonian(&s->params, end), between =
+        poisson_not_hamiltonian_hamiltonian(&s->params, middle);
+    return fabs(after - before) <= poisson_not_hamiltonian_LOST * (fabs(before) + fabs(between)
+        + fabs(after));
 }
 
 /* ---- The implicit step, by Newton's method ---- */
-/* Components of y are measured no finer than by this part of the largest. */
+/* components of y are measured no finer than by this part of the largest */
 #define poisson_not_hamiltonian_FLOOR 1e-6
 
 /* Size of a correction relative to each component of y; NaN or infinite if the correction is. */
@@ -322,9 +310,9 @@ static double poisson_not_hamiltonian_size(const double y[poisson_not_hamiltonia
     return size;
 }
 
-/* Corrections below the first that shrink by less than the second have reached the level of rounding. */
+/* corrections below this have reached the level of rounding, ... */
 #define poisson_not_hamiltonian_NEARLY_SOLVED 1e-8
-#define poisson_not_hamiltonian_SHRINKING 0.25
+#define poisson_not_hamiltonian_SHRINKING 0.25 /* ... if one is more than this part of the one before */
 
 /* Solve (y - x) + displacement(y) = 0 for y by Newton's method from the extrapolated guess, and advance. The
    increment is corrected to first order by the last Newton correction, so that correction costs no
@@ -335,13 +323,14 @@ static poisson_not_hamiltonian_status poisson_not_hamiltonian_attempt(poisson_no
     double y[poisson_not_hamiltonian_DIM], delta[poisson_not_hamiltonian_DIM],
         displacement[poisson_not_hamiltonian_DIM], increment[poisson_not_hamiltonian_DIM];
     double jacobian[poisson_not_hamiltonian_DIM * poisson_not_hamiltonian_DIM],
-        increment_jacobian[poisson_not_hamiltonian_DIM * poisson_not_hamiltonian_DIM], previous = HUGE_VAL;
+        increment_jacobian[poisson_not_hamiltonian_DIM * poisson_not_hamiltonian_DIM];
+    double previous = HUGE_VAL;
     if (!poisson_not_hamiltonian_predict(&s->history, y)) memcpy(y, s->x, sizeof y);
     for (int iteration = 1; iteration <= poisson_not_hamiltonian_MAX_ITERATIONS; ++iteration) {
         poisson_not_hamiltonian_linearise(s->coef, y, displacement, increment, jacobian, increment_jacobian);
         ++s->evaluations;
-        for (int i = 0; i < poisson_not_hamiltonian_DIM; ++i) delta[i] = ((y[i] - s->x[i]) + displacement[i])
-            - s->carry[i];
+        for (int i = 0; i < poisson_not_hamiltonian_DIM; ++i)
+            delta[i] = ((y[i] - s->x[i]) + displacement[i]) - s->carry[i];
         const int regular = poisson_not_hamiltonian_solve(jacobian, delta);
         const double size = poisson_not_hamiltonian_size(y, delta), growth = size / (previous * previous);
         if (!isfinite(size)) return poisson_not_hamiltonian_NOT_FINITE;
@@ -352,13 +341,15 @@ static poisson_not_hamiltonian_status poisson_not_hamiltonian_attempt(poisson_no
             > poisson_not_hamiltonian_SHRINKING * previous;
         previous = size;
         if (!(remaining <= poisson_not_hamiltonian_TOLERANCE || stalled)) continue;
-        double correction[poisson_not_hamiltonian_DIM] = { 0.0 };
-        for (int i = 0; i < poisson_not_hamiltonian_DIM; ++i)
+        /* the correction of the increment, and the carry */
+        double small[poisson_not_hamiltonian_DIM] = { 0.0 };
+        for (int i = 0; i < poisson_not_hamiltonian_DIM; ++i) {
             for (int j = 0; j < poisson_not_hamiltonian_DIM; ++j)
-                correction[i] -= increment_jacobian[i * poisson_not_hamiltonian_DIM + j] * delta[j];
+                small[i] -= increment_jacobian[i * poisson_not_hamiltonian_DIM + j] * delta[j];
+            small[i] += s->carry[i];
+        }
         if (!poisson_not_hamiltonian_plausible(s, increment)) return poisson_not_hamiltonian_NO_CONVERGENCE;
-        if (!poisson_not_hamiltonian_advance(s, increment, correction))
-            return poisson_not_hamiltonian_NOT_FINITE;
+        if (!poisson_not_hamiltonian_advance(s, increment, small)) return poisson_not_hamiltonian_NOT_FINITE;
         poisson_not_hamiltonian_remember(&s->history, y);
         return poisson_not_hamiltonian_OK;
     }
@@ -366,20 +357,17 @@ static poisson_not_hamiltonian_status poisson_not_hamiltonian_attempt(poisson_no
 }
 
 /* ---- The solver ---- */
-/* The arguments may be parts of *s: they are read before it is written. */
+/* The arguments may be parts of *s, which is therefore written last. */
 poisson_not_hamiltonian_status poisson_not_hamiltonian_init(poisson_not_hamiltonian_solver *s,
     const poisson_not_hamiltonian_params *params, const double x0[poisson_not_hamiltonian_DIM])
 {
     if (s == NULL || x0 == NULL) return poisson_not_hamiltonian_BAD_ARGUMENT;
-    const poisson_not_hamiltonian_params own = params != NULL ? *params
-        : poisson_not_hamiltonian_default_params;
-    double x[poisson_not_hamiltonian_DIM];
-    memcpy(x, x0, sizeof x);
+    poisson_not_hamiltonian_solver fresh = { .h = (double)NAN };
+    fresh.params = params != NULL ? *params : poisson_not_hamiltonian_default_params;
+    memcpy(fresh.x, x0, sizeof fresh.x);
     for (int i = 0; i < poisson_not_hamiltonian_DIM; ++i)
-        if (!isfinite(x[i])) return poisson_not_hamiltonian_BAD_ARGUMENT;
-    memset(s, 0, sizeof *s);
-    memcpy(s->x, x, sizeof s->x);
-    s->params = own;
+        if (!isfinite(fresh.x[i])) return poisson_not_hamiltonian_BAD_ARGUMENT;
+    *s = fresh;
     return poisson_not_hamiltonian_OK;
 }
 
@@ -388,46 +376,39 @@ static poisson_not_hamiltonian_status poisson_not_hamiltonian_set_step(poisson_n
     double h)
 {
     if (s == NULL || !isfinite(h)) return poisson_not_hamiltonian_BAD_ARGUMENT;
-    if (s->prepared && memcmp(&h, &s->h, sizeof h) == 0) return poisson_not_hamiltonian_OK;
+    if (memcmp(&h, &s->h, sizeof h) == 0) return poisson_not_hamiltonian_OK;
     poisson_not_hamiltonian_prepare(&s->params, h, s->coef);
     memset(&s->history, 0, sizeof s->history);
     s->h = h;
     s->t_before_h = s->t;
     s->steps_before_h = s->steps;
-    s->prepared = 1;
     return poisson_not_hamiltonian_OK;
 }
 
 /* One stage. A guess from earlier steps may have misled it: then once more without. */
 static poisson_not_hamiltonian_status poisson_not_hamiltonian_stage(poisson_not_hamiltonian_solver *s)
 {
-    poisson_not_hamiltonian_status status = poisson_not_hamiltonian_attempt(s);
-    if (status != poisson_not_hamiltonian_OK && s->history.count > 0) {
-        memset(&s->history, 0, sizeof s->history);
-        status = poisson_not_hamiltonian_attempt(s);
-    }
-    return status;
-}
-
-poisson_not_hamiltonian_status poisson_not_hamiltonian_step(poisson_not_hamiltonian_solver *s, double h)
-{
-    poisson_not_hamiltonian_status status = poisson_not_hamiltonian_set_step(s, h);
-    if (status != poisson_not_hamiltonian_OK) return status;
-    status = poisson_not_hamiltonian_stage(s);
-    if (status != poisson_not_hamiltonian_OK) return status;
-    ++s->steps;
-    s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
-    return status;
+    const poisson_not_hamiltonian_status status = poisson_not_hamiltonian_attempt(s);
+    if (status == poisson_not_hamiltonian_OK || s->history.count == 0) return status;
+    memset(&s->history, 0, sizeof s->history);
+    return poisson_not_hamiltonian_attempt(s);
 }
 
 poisson_not_hamiltonian_status poisson_not_hamiltonian_integrate(poisson_not_hamiltonian_solver *s, double h,
     size_t steps)
 {
     poisson_not_hamiltonian_status status = poisson_not_hamiltonian_set_step(s, h);
-    for (; steps > 0 && status == poisson_not_hamiltonian_OK; --steps)
-        status = poisson_not_hamiltonian_step(s, h);
+    for (; steps > 0 && status == poisson_not_hamiltonian_OK; --steps) {
+        status = poisson_not_hamiltonian_stage(s);
+        if (status != poisson_not_hamiltonian_OK) break;
+        ++s->steps;
+        s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
+    }
     return status;
 }
+
+poisson_not_hamiltonian_status poisson_not_hamiltonian_step(poisson_not_hamiltonian_solver *s,
+    double h) { return poisson_not_hamiltonian_integrate(s, h, 1); }
 
 const char *poisson_not_hamiltonian_status_string(poisson_not_hamiltonian_status status)
 {
@@ -443,7 +424,6 @@ const char *poisson_not_hamiltonian_status_string(poisson_not_hamiltonian_status
 }
 
 size_t poisson_not_hamiltonian_solver_size(void) { return sizeof(poisson_not_hamiltonian_solver); }
-
 size_t poisson_not_hamiltonian_solver_steps_done(const poisson_not_hamiltonian_solver *s) { return s->steps; }
 
 /* ---- Ensembles ---- */

@@ -20,7 +20,7 @@
  *   4. The implicit step, by Newton's method
  *   5. The solver
  *   6. Ensembles
- * body-sha256: 20c7e6add974e2e566487ad781522ad2f0caafaafc893f5fa6f5223355b3bb52
+ * body-sha256: d89ae7c687f7a1292fcf112e9a0aa316385498669a7dcf33881e3545f92b74cf
  */
 #include "predator_prey.h"
 
@@ -32,9 +32,7 @@
 const predator_prey_params predator_prey_default_params = { 1.0, 0.1, 0.05, 0.5 };
 
 enum { predator_prey_MAX_ITERATIONS = 20 }; /* of an inner solve */
-
-/* A correction is accepted when the error that it leaves is estimated to be below this. */
-#define predator_prey_TOLERANCE 1e-20
+#define predator_prey_TOLERANCE 1e-20 /* the error that an accepted correction may leave, as estimated */
 
 /* Whether all parameters are finite, and positive where they have to be. */
 static int predator_prey_allowed(const predator_prey_params *params)
@@ -86,8 +84,7 @@ static void predator_prey_linearise(const double coef[11], const double y[2], do
     /* jacobian */
     const double t15 = t2 + t4, t16 = predator * t7, t17 = prey * t16, t18 = p_predator * t7;
     const double t19 = coef[7] * prey + coef[10] * (t1 * t1), t20 = p_prey * t11;
-    const double t21 = coef[4] * predator + coef[9] * (t3 * t3), t22 = prey * t11;
-    const double t23 = predator * t22;
+    const double t21 = coef[4] * predator + coef[9] * (t3 * t3), t22 = prey * t11, t23 = predator * t22;
     jacobian[0] = 1.0 + (t5 - 0.5 * (t15 * t17));
     jacobian[1] = (-0.5) * (prey * t18) - 0.5 * (t19 * t17);
     jacobian[2] = 0.5 * (predator * t20) + 0.5 * (t21 * t23);
@@ -101,21 +98,6 @@ static void predator_prey_linearise(const double coef[11], const double y[2], do
     increment_jacobian[3] = -(t14 + t15 * t27);
 }
 
-/* elimination without pivoting: the solution, and the reciprocals of the pivots */
-static void predator_prey_eliminate(const double matrix[4], const double side[2], double solution[restrict 2],
-    double reciprocal[restrict 2])
-{
-    /* solution */
-    const double t1 = 1.0 / matrix[0], t2 = matrix[2] * t1, t3 = 1.0 / (matrix[3] - matrix[1] * t2);
-    const double t4 = (side[1] - side[0] * t2) * t3;
-    solution[0] = t1 * (side[0] - matrix[1] * t4);
-    solution[1] = t4;
-    /* reciprocal */
-    reciprocal[0] = t1;
-    reciprocal[1] = t3;
-}
-
-/* the Hamiltonian */
 double predator_prey_hamiltonian(const predator_prey_params *params, const double x[2])
 {
     if (params == NULL) params = &predator_prey_default_params;
@@ -124,13 +106,11 @@ double predator_prey_hamiltonian(const predator_prey_params *params, const doubl
     return death * log(prey) + (growth * log(predator) - attack * predator) - gain * prey;
 }
 
-/* the Casimirs */
 void predator_prey_casimirs(const predator_prey_params *params, const double x[2], double out[])
 {
     (void)params, (void)x, (void)out;
 }
 
-/* pi(x) grad H(x) */
 void predator_prey_vector_field(const predator_prey_params *params, const double x[2], double out[2])
 {
     if (params == NULL) params = &predator_prey_default_params;
@@ -142,19 +122,18 @@ void predator_prey_vector_field(const predator_prey_params *params, const double
 }
 
 /* ---- Compensated sums, linear equations ---- */
-/* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to
-   its last bit: were it rounded with the change, corrections of one sign would add up to a drift. 0, and x as
-   before, if the sum is not finite. */
+/* x + change + small in compensated arithmetic, where small is the carry and what is as small: were that
+   rounded with the change, corrections of one sign would add up to a drift. 0, and x as before, if the sum is
+   not finite. */
 static int predator_prey_advance(predator_prey_solver *s, const double change[predator_prey_DIM],
-    const double correction[predator_prey_DIM])
+    const double small[predator_prey_DIM])
 {
     double x[predator_prey_DIM], carry[predator_prey_DIM];
     for (int i = 0; i < predator_prey_DIM; ++i) {
         const double sum = s->x[i] + change[i], added = sum - s->x[i];
-        const double lost = (s->x[i] - (sum - added)) + (change[i] - added);
-        const double small = lost + (s->carry[i] + correction[i]);
-        x[i] = sum + small;
-        carry[i] = small - (x[i] - sum);
+        const double lost = ((s->x[i] - (sum - added)) + (change[i] - added)) + small[i];
+        x[i] = sum + lost;
+        carry[i] = lost - (x[i] - sum);
         if (!isfinite(x[i])) return 0;
     }
     memcpy(s->x, x, sizeof x);
@@ -162,29 +141,44 @@ static int predator_prey_advance(predator_prey_solver *s, const double change[pr
     return 1;
 }
 
-/* Newton matrices are I + O(h): a pivot whose reciprocal is larger than this is far from 1. */
-#define predator_prey_LARGEST_RECIPROCAL 1e3
-
-/* Solve matrix * solution = side, both overwritten. The matrix is I + O(h): 0 if a pivot is far from 1. */
+/* Solve matrix * solution = side, both overwritten, by elimination with partial pivoting. 0 if singular. */
 static int predator_prey_solve(double matrix[predator_prey_DIM * predator_prey_DIM],
     double side[predator_prey_DIM])
 {
-    double solution[predator_prey_DIM], reciprocal[predator_prey_DIM], largest = 0.0;
-    predator_prey_eliminate(matrix, side, solution, reciprocal);
-    for (int i = 0; i < predator_prey_DIM; ++i)
-        if (!(fabs(reciprocal[i]) <= largest)) largest = fabs(reciprocal[i]);
-    if (!(largest < predator_prey_LARGEST_RECIPROCAL)) return 0;
-    memcpy(side, solution, sizeof solution);
+    for (int k = 0; k < predator_prey_DIM; ++k) {
+        int best = k;
+        for (int i = k + 1; i < predator_prey_DIM; ++i)
+            if (fabs(matrix[i * predator_prey_DIM + k]) > fabs(matrix[best * predator_prey_DIM + k]))
+                best = i;
+        const double pivot = matrix[best * predator_prey_DIM + k], last = side[k];
+        if (!(fabs(pivot) > 0.0)) return 0;
+        for (int j = k; j < predator_prey_DIM && best != k; ++j) {
+            const double swap = matrix[k * predator_prey_DIM + j];
+            matrix[k * predator_prey_DIM + j] = matrix[best * predator_prey_DIM + j];
+            matrix[best * predator_prey_DIM + j] = swap;
+        }
+        side[k] = side[best];
+        side[best] = last;
+        for (int i = k + 1; i < predator_prey_DIM; ++i) {
+            const double factor = matrix[i * predator_prey_DIM + k] / pivot;
+            for (int j = k + 1; j < predator_prey_DIM; ++j)
+                matrix[i * predator_prey_DIM + j] -= factor * matrix[k * predator_prey_DIM + j];
+            side[i] -= factor * side[k];
+        }
+    }
+    for (int i = predator_prey_DIM - 1; i >= 0; --i) {
+        for (int j = i + 1; j < predator_prey_DIM; ++j)
+            side[i] -= matrix[i * predator_prey_DIM + j] * side[j];
+        side[i] /= matrix[i * predator_prey_DIM + i];
+    }
     return 1;
 }
 
 /* ---- Starting guesses ---- */
-/* How far from the last value a guess may be, in sizes of that value. */
-#define predator_prey_REACH 4.0
+#define predator_prey_REACH 4.0 /* how far from the last value a guess may be, in sizes of that value */
 
-/* The guess for the next value from the last ones: the sum of their backward differences. 0 if there is none,
-   or if it is far away, where the equation of a step has solutions that have nothing to do with the motion.
-   */
+/* The guess for the next value, the sum of differences. 0 if there is none, or if it is far away, where the
+   equation of a step has solutions that have nothing to do with the motion. */
 static int predator_prey_predict(const predator_prey_history *history, double value[predator_prey_DIM])
 {
     double distance = 0.0, size = 0.0;
@@ -220,10 +214,8 @@ static void predator_prey_remember(predator_prey_history *history, const double 
     if (history->count < predator_prey_DIFFERENCES) ++history->count;
 }
 
-/* How far a step may lead, in sizes of the state and of what the vector field says, if the energy is lost;
-   and the part of the energy that counts as lost. */
-#define predator_prey_PLAUSIBLE 1.5
-#define predator_prey_LOST 0.5
+#define predator_prey_PLAUSIBLE 1.5 /* how far any step may lead, in sizes of the state and of its motion */
+#define predator_prey_LOST 0.5      /* part of the energy that one which leads farther must not lose */
 
 /* Whether an increment is that of the motion. Where the step is too large, the equation may have been solved
    by a point far away, at another energy, that has nothing to do with it. */
@@ -234,19 +226,17 @@ static int predator_prey_plausible(const predator_prey_solver *s, const double i
     for (int i = 0; i < predator_prey_DIM; ++i) {
         moved += fabs(increment[i]);
         size += fabs(s->x[i]);
-    }
-    if (moved <= predator_prey_PLAUSIBLE * size) return 1;
-    predator_prey_vector_field(&s->params, s->x, field);
-    for (int i = 0; i < predator_prey_DIM; ++i) {
-        size += fabs(s->h * field[i]);
         middle[i] = s->x[i] + 0.5 * increment[i];
         end[i] = s->x[i] + increment[i];
     }
     if (moved <= predator_prey_PLAUSIBLE * size) return 1;
-    const double before = predator_prey_hamiltonian(&s->params, s->x), after =
-        predator_prey_hamiltonian(&s->params, end);
-    const double scale = fabs(before) + fabs(predator_prey_hamiltonian(&s->params, middle)) + fabs(after);
-    return fabs(after - before) <= predator_prey_LOST * scale;
+    predator_prey_vector_field(&s->params, s->x, field);
+    for (int i = 0; i < predator_prey_DIM; ++i) size += fabs(s->h * field[i]);
+    if (moved <= predator_prey_PLAUSIBLE * size) return 1;
+    const double before = predator_prey_hamiltonian(&s->params, s->x);
+    const double after = predator_prey_hamiltonian(&s->params, end), between =
+        predator_prey_hamiltonian(&s->params, middle);
+    return fabs(after - before) <= predator_prey_LOST * (fabs(before) + fabs(between) + fabs(after));
 }
 
 /* ---- The implicit step, by Newton's method ---- */
@@ -263,9 +253,8 @@ static double predator_prey_size(const double y[predator_prey_DIM], const double
     return size;
 }
 
-/* Corrections below the first that shrink by less than the second have reached the level of rounding. */
-#define predator_prey_NEARLY_SOLVED 1e-8
-#define predator_prey_SHRINKING 0.25
+#define predator_prey_NEARLY_SOLVED 1e-8 /* corrections below this have reached the level of rounding, ... */
+#define predator_prey_SHRINKING 0.25     /* ... if one is more than this part of the one before */
 
 /* Solve (y - x) + displacement(y) = 0 for y by Newton's method from the extrapolated guess, and advance. The
    increment is corrected to first order by the last Newton correction, so that correction costs no
@@ -276,13 +265,14 @@ static predator_prey_status predator_prey_attempt(predator_prey_solver *s)
     double y[predator_prey_DIM], delta[predator_prey_DIM], displacement[predator_prey_DIM],
         increment[predator_prey_DIM];
     double jacobian[predator_prey_DIM * predator_prey_DIM], increment_jacobian[predator_prey_DIM
-        * predator_prey_DIM], previous = HUGE_VAL;
+        * predator_prey_DIM];
+    double previous = HUGE_VAL;
     if (!predator_prey_predict(&s->history, y)) memcpy(y, s->x, sizeof y);
     for (int iteration = 1; iteration <= predator_prey_MAX_ITERATIONS; ++iteration) {
         predator_prey_linearise(s->coef, y, displacement, increment, jacobian, increment_jacobian);
         ++s->evaluations;
-        for (int i = 0; i < predator_prey_DIM; ++i) delta[i] = ((y[i] - s->x[i]) + displacement[i])
-            - s->carry[i];
+        for (int i = 0; i < predator_prey_DIM; ++i)
+            delta[i] = ((y[i] - s->x[i]) + displacement[i]) - s->carry[i];
         const int regular = predator_prey_solve(jacobian, delta);
         const double size = predator_prey_size(y, delta), growth = size / (previous * previous);
         if (!isfinite(size)) return predator_prey_NOT_FINITE;
@@ -293,12 +283,14 @@ static predator_prey_status predator_prey_attempt(predator_prey_solver *s)
             * previous;
         previous = size;
         if (!(remaining <= predator_prey_TOLERANCE || stalled)) continue;
-        double correction[predator_prey_DIM] = { 0.0 };
-        for (int i = 0; i < predator_prey_DIM; ++i)
+        double small[predator_prey_DIM] = { 0.0 }; /* the correction of the increment, and the carry */
+        for (int i = 0; i < predator_prey_DIM; ++i) {
             for (int j = 0; j < predator_prey_DIM; ++j)
-                correction[i] -= increment_jacobian[i * predator_prey_DIM + j] * delta[j];
+                small[i] -= increment_jacobian[i * predator_prey_DIM + j] * delta[j];
+            small[i] += s->carry[i];
+        }
         if (!predator_prey_plausible(s, increment)) return predator_prey_NO_CONVERGENCE;
-        if (!predator_prey_advance(s, increment, correction)) return predator_prey_NOT_FINITE;
+        if (!predator_prey_advance(s, increment, small)) return predator_prey_NOT_FINITE;
         predator_prey_remember(&s->history, y);
         return predator_prey_OK;
     }
@@ -306,32 +298,23 @@ static predator_prey_status predator_prey_attempt(predator_prey_solver *s)
 }
 
 /* ---- The solver ---- */
-/* Whether steps can be made with these parameters: allowed, and with finite coefficients for a step so short
-   that it has no part in it. */
-static int predator_prey_admissible(const predator_prey_params *params)
-{
-    double coef[predator_prey_COEFFICIENTS];
-    if (!predator_prey_allowed(params)) return 0;
-    predator_prey_prepare(params, 1e-100, coef);
-    for (int k = 0; k < predator_prey_COEFFICIENTS; ++k)
-        if (!isfinite(coef[k])) return 0;
-    return 1;
-}
+#define predator_prey_SHORT_STEP 1e-100 /* so short that it has no part in whether coefficients are finite */
 
-/* The arguments may be parts of *s: they are read before it is written. */
+/* The arguments may be parts of *s, which is therefore written last. */
 predator_prey_status predator_prey_init(predator_prey_solver *s, const predator_prey_params *params,
     const double x0[predator_prey_DIM])
 {
     if (s == NULL || x0 == NULL) return predator_prey_BAD_ARGUMENT;
-    const predator_prey_params own = params != NULL ? *params : predator_prey_default_params;
-    double x[predator_prey_DIM];
-    memcpy(x, x0, sizeof x);
+    predator_prey_solver fresh = { .h = (double)NAN };
+    fresh.params = params != NULL ? *params : predator_prey_default_params;
+    memcpy(fresh.x, x0, sizeof fresh.x);
     for (int i = 0; i < predator_prey_DIM; ++i)
-        if (!isfinite(x[i])) return predator_prey_BAD_ARGUMENT;
-    if (!predator_prey_admissible(&own)) return predator_prey_BAD_ARGUMENT;
-    memset(s, 0, sizeof *s);
-    memcpy(s->x, x, sizeof s->x);
-    s->params = own;
+        if (!isfinite(fresh.x[i])) return predator_prey_BAD_ARGUMENT;
+    if (!predator_prey_allowed(&fresh.params)) return predator_prey_BAD_ARGUMENT;
+    predator_prey_prepare(&fresh.params, predator_prey_SHORT_STEP, fresh.coef);
+    for (int k = 0; k < predator_prey_COEFFICIENTS; ++k)
+        if (!isfinite(fresh.coef[k])) return predator_prey_BAD_ARGUMENT;
+    *s = fresh;
     return predator_prey_OK;
 }
 
@@ -339,44 +322,38 @@ predator_prey_status predator_prey_init(predator_prey_solver *s, const predator_
 static predator_prey_status predator_prey_set_step(predator_prey_solver *s, double h)
 {
     if (s == NULL || !isfinite(h)) return predator_prey_BAD_ARGUMENT;
-    if (s->prepared && memcmp(&h, &s->h, sizeof h) == 0) return predator_prey_OK;
+    if (memcmp(&h, &s->h, sizeof h) == 0) return predator_prey_OK;
     predator_prey_prepare(&s->params, h, s->coef);
     memset(&s->history, 0, sizeof s->history);
     s->h = h;
     s->t_before_h = s->t;
     s->steps_before_h = s->steps;
-    s->prepared = 1;
     return predator_prey_OK;
 }
 
 /* One stage. A guess from earlier steps may have misled it: then once more without. */
 static predator_prey_status predator_prey_stage(predator_prey_solver *s)
 {
-    predator_prey_status status = predator_prey_attempt(s);
-    if (status != predator_prey_OK && s->history.count > 0) {
-        memset(&s->history, 0, sizeof s->history);
-        status = predator_prey_attempt(s);
-    }
-    return status;
-}
-
-predator_prey_status predator_prey_step(predator_prey_solver *s, double h)
-{
-    predator_prey_status status = predator_prey_set_step(s, h);
-    if (status != predator_prey_OK) return status;
-    status = predator_prey_stage(s);
-    if (status != predator_prey_OK) return status;
-    ++s->steps;
-    s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
-    return status;
+    const predator_prey_status status = predator_prey_attempt(s);
+    if (status == predator_prey_OK || s->history.count == 0) return status;
+    memset(&s->history, 0, sizeof s->history);
+    return predator_prey_attempt(s);
 }
 
 predator_prey_status predator_prey_integrate(predator_prey_solver *s, double h, size_t steps)
 {
     predator_prey_status status = predator_prey_set_step(s, h);
-    for (; steps > 0 && status == predator_prey_OK; --steps) status = predator_prey_step(s, h);
+    for (; steps > 0 && status == predator_prey_OK; --steps) {
+        status = predator_prey_stage(s);
+        if (status != predator_prey_OK) break;
+        ++s->steps;
+        s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
+    }
     return status;
 }
+
+predator_prey_status predator_prey_step(predator_prey_solver *s, double h) { return predator_prey_integrate(s,
+    h, 1); }
 
 const char *predator_prey_status_string(predator_prey_status status)
 {
@@ -391,7 +368,6 @@ const char *predator_prey_status_string(predator_prey_status status)
 }
 
 size_t predator_prey_solver_size(void) { return sizeof(predator_prey_solver); }
-
 size_t predator_prey_solver_steps_done(const predator_prey_solver *s) { return s->steps; }
 
 /* ---- Ensembles ---- */

@@ -27,7 +27,7 @@
  *   10. Blocks of steps
  *   11. Groups of members
  *   12. Ensembles
- * body-sha256: 56f6aec11eedfb5ba49785f9819c233aae0b9e5e252fe831479572827d7042aa
+ * body-sha256: 6f2da435b56319fcaafcebabe99edbe15814d0074b90c05cc983d014803dac9b
  */
 #include "rigid_body.h"
 
@@ -43,9 +43,7 @@ const rigid_body_params rigid_body_default_params = { 2.0, 1.0, 0.66666666666666
 enum { rigid_body_MAX_ITERATIONS = 20 }; /* of an inner solve */
 enum { rigid_body_CHECKS = 8 };          /* values that a recurrence is not fitted to, but has to foresee */
 enum { rigid_body_PASSES = 2 };          /* over a block, that cost per step what an evaluation costs */
-
-/* A correction is accepted when the error that it leaves is estimated to be below this. */
-#define rigid_body_TOLERANCE 1e-20
+#define rigid_body_TOLERANCE 1e-20       /* the error that an accepted correction may leave, as estimated */
 
 /* Whether all parameters are finite, and positive where they have to be. */
 static int rigid_body_allowed(const rigid_body_params *params)
@@ -54,51 +52,55 @@ static int rigid_body_allowed(const rigid_body_params *params)
         && isfinite(params->I3) && params->I3 > 0.0;
 }
 
+/* The polynomial with these coefficients, the constant first. */
+static inline double rigid_body_polynomial(const double *coefficients, int count, double s)
+{
+    double value = coefficients[--count];
+    while (count > 0) value = value * s + coefficients[--count];
+    return value;
+}
+
 /* (1 - w cot w)/s with w = sqrt(s)/2, coth for negative s: the function of the exponential bi-realisation. */
 static double rigid_body_phi0(double s)
 {
-    if (fabs(s) < 0.25)
-        return (0.08333333333333333 + s * (0.001388888888888889 + s * (3.306878306878307e-05 + s *
-            (8.267195767195768e-07 + s * (2.08767569878681e-08 + s * (5.284190138687493e-10 + s *
-            (1.3382536530684679e-11 + s * (3.3896802963225827e-13 + s * 8.586062056277845e-15))))))));
+    static const double near[9] = { 0.08333333333333333, 0.001388888888888889, 3.306878306878307e-05,
+        8.267195767195768e-07, 2.08767569878681e-08, 5.284190138687493e-10, 1.3382536530684679e-11,
+        3.3896802963225827e-13, 8.586062056277845e-15 };
+    static const double rest[21] = { 0.03267274151216445, 0.000105641107053347, 5.637370282876845e-07,
+        3.357141926657451e-09, 2.0742872904166045e-11, 1.3000482138698975e-13, 8.196052055691008e-16,
+        5.180118196169724e-18, 3.277539174701792e-20, 2.0747401878593604e-22, 1.3136241807166534e-24,
+        8.318003195189264e-27, 5.267262996834231e-29, 3.3354842988221443e-31, 2.1122063323183885e-33,
+        1.3375664093215244e-35, 8.470227328650247e-38, 5.363831046655698e-40, 3.3966848266497805e-42,
+        2.1509755511832569e-44, 1.3621211117593843e-46 };
+    if (fabs(s) < 0.25) return rigid_body_polynomial(near, 9, s);
     if (fabs(s) < 16.0) {
         const double pole = 1.0 / (39.47841760435743 - s);
-        return 2.0 * pole + (0.03267274151216445 + s * (0.000105641107053347 + s * (5.637370282876845e-07
-            + s * (3.357141926657451e-09 + s * (2.0742872904166045e-11 + s * (1.3000482138698975e-13 + s *
-            (8.196052055691008e-16 + s * (5.180118196169724e-18 + s * (3.277539174701792e-20 + s *
-            (2.0747401878593604e-22 + s * (1.3136241807166534e-24 + s * (8.318003195189264e-27 + s *
-            (5.267262996834231e-29 + s * (3.3354842988221443e-31 + s * (2.1122063323183885e-33 + s *
-            (1.3375664093215244e-35 + s * (8.470227328650247e-38 + s * (5.363831046655698e-40 + s *
-            (3.3966848266497805e-42 + s * (2.1509755511832569e-44 + s *
-            1.3621211117593843e-46))))))))))))))))))));
+        return 2.0 * pole + rigid_body_polynomial(rest, 21, s);
     }
     const double w = 0.5 * sqrt(fabs(s)), c = w / (s > 0.0 ? tan(w) : tanh(w));
-    const double phi0 = (1.0 - c) / s;
-    return phi0;
+    return (1.0 - c) / s;
 }
 
 /* The derivative of (1 - w cot w)/s, w = sqrt(s)/2. */
 static double rigid_body_phi1(double s)
 {
-    if (fabs(s) < 0.25)
-        return (0.001388888888888889 + s * (6.613756613756614e-05 + s * (2.48015873015873e-06 + s *
-            (8.35070279514724e-08 + s * (2.6420950693437467e-09 + s * (8.029521918410807e-11 + s *
-            (2.372776207425808e-12 + s * (6.868849645022276e-14 + s * 1.9573818287022555e-15))))))));
+    static const double near[9] = { 0.001388888888888889, 6.613756613756614e-05, 2.48015873015873e-06,
+        8.35070279514724e-08, 2.6420950693437467e-09, 8.029521918410807e-11, 2.372776207425808e-12,
+        6.868849645022276e-14, 1.9573818287022555e-15 };
+    static const double rest[21] = { 0.000105641107053347, 1.127474056575369e-06, 1.0071425779972354e-08,
+        8.297149161666418e-11, 6.500241069349487e-13, 4.917631233414605e-15, 3.626082737318807e-17,
+        2.6220313397614337e-19, 1.8672661690734246e-21, 1.3136241807166533e-23, 9.149803514708191e-26,
+        6.320715596201077e-28, 4.336129588468787e-30, 2.957088865245744e-32, 2.0063496139822866e-34,
+        1.3552363725840395e-36, 9.118512779314688e-39, 6.114032687969605e-41, 4.0868535472481875e-43,
+        2.7242422235187686e-45, 1.8114038279637677e-47 };
+    if (fabs(s) < 0.25) return rigid_body_polynomial(near, 9, s);
     if (fabs(s) < 16.0) {
         const double pole = 1.0 / (39.47841760435743 - s);
-        return 2.0 * pole * pole + (0.000105641107053347 + s * (1.127474056575369e-06 + s *
-            (1.0071425779972354e-08 + s * (8.297149161666418e-11 + s * (6.500241069349487e-13 + s *
-            (4.917631233414605e-15 + s * (3.626082737318807e-17 + s * (2.6220313397614337e-19 + s *
-            (1.8672661690734246e-21 + s * (1.3136241807166533e-23 + s * (9.149803514708191e-26 + s *
-            (6.320715596201077e-28 + s * (4.336129588468787e-30 + s * (2.957088865245744e-32 + s *
-            (2.0063496139822866e-34 + s * (1.3552363725840395e-36 + s * (9.118512779314688e-39 + s *
-            (6.114032687969605e-41 + s * (4.0868535472481875e-43 + s * (2.7242422235187686e-45 + s *
-            1.8114038279637677e-47))))))))))))))))))));
+        return 2.0 * pole * pole + rigid_body_polynomial(rest, 21, s);
     }
     const double w = 0.5 * sqrt(fabs(s)), c = w / (s > 0.0 ? tan(w) : tanh(w));
     const double phi0 = (1.0 - c) / s;
-    const double phi1 = (0.5 * s * phi0 * phi0 - 1.5 * phi0 + 0.125) / s;
-    return phi1;
+    return (0.5 * s * phi0 * phi0 - 1.5 * phi0 + 0.125) / s;
 }
 
 /* everything that depends on parameters and step size only */
@@ -107,18 +109,16 @@ static void rigid_body_prepare(const rigid_body_params *params, const double gau
 {
     const double t1 = 1.0 / params->I1, t2 = h * h, t3 = h * t2, t4 = t1 * t1, t5 = 1.0 / params->I2;
     const double t6 = 1.0 / 24.0 * t5, t7 = 1.0 / 12.0 * gauge[0], t8 = 1.0 / params->I3;
-    const double t9 = 1.0 / 24.0 * t8, t10 = 1.0 / 12.0 * t1, t11 = 1.0 / 6.0 * t1;
-    const double t12 = 1.0 / 12.0 * t8;
+    const double t9 = 1.0 / 24.0 * t8, t10 = 1.0 / 12.0 * t1, t11 = 1.0 / 6.0 * t1, t12 = 1.0 / 12.0 * t8;
     const double t13 = t3 * (t4 * (t6 - t7) + t8 * (t5 * (t9 - t10) + gauge[0] * (t11 - t12)));
-    const double t14 = h * (t2 * t2), t15 = t5 * t5, t16 = 1.0 / 72.0 * t1;
-    const double t17 = 1.0 / 180.0 * gauge[0], t18 = gauge[0] * (t16 - t17);
-    const double t19 = 1.0 / 72.0 * (t1 * t5), t20 = gauge[0] * gauge[0], t21 = gauge[0] * t20;
-    const double t22 = 1.0 / 90.0 * t21, t23 = 1.0 / 24.0 * gauge[0], t24 = 1.0 / 80.0 * t5;
-    const double t25 = 1.0 / 720.0 * t1, t26 = 1.0 / 30.0 * t20, t27 = 1.0 / 720.0 * t8;
-    const double t28 = 1.0 / 240.0 * t5, t29 = 1.0 / 72.0 * t5, t30 = (-1.0 / 180.0) * gauge[0];
-    const double t31 = 1.0 / 240.0 * t8, t32 = t30 - t31, t33 = 1.0 / 180.0 * t21;
-    const double t34 = 1.0 / 40.0 * gauge[0], t35 = t34 + 1.0 / 120.0 * t8, t36 = 1.0 / 240.0 * t1;
-    const double t37 = 1.0 / 1440.0 * t8, t38 = 1.0 / 1440.0 * t4;
+    const double t14 = h * (t2 * t2), t15 = t5 * t5, t16 = 1.0 / 72.0 * t1, t17 = 1.0 / 180.0 * gauge[0];
+    const double t18 = gauge[0] * (t16 - t17), t19 = 1.0 / 72.0 * (t1 * t5), t20 = gauge[0] * gauge[0];
+    const double t21 = gauge[0] * t20, t22 = 1.0 / 90.0 * t21, t23 = 1.0 / 24.0 * gauge[0];
+    const double t24 = 1.0 / 80.0 * t5, t25 = 1.0 / 720.0 * t1, t26 = 1.0 / 30.0 * t20;
+    const double t27 = 1.0 / 720.0 * t8, t28 = 1.0 / 240.0 * t5, t29 = 1.0 / 72.0 * t5;
+    const double t30 = (-1.0 / 180.0) * gauge[0], t31 = 1.0 / 240.0 * t8, t32 = t30 - t31;
+    const double t33 = 1.0 / 180.0 * t21, t34 = 1.0 / 40.0 * gauge[0], t35 = t34 + 1.0 / 120.0 * t8;
+    const double t36 = 1.0 / 240.0 * t1, t37 = 1.0 / 1440.0 * t8, t38 = 1.0 / 1440.0 * t4;
     const double t39 = t8 * (t5 * (t27 - t28) + gauge[0] * (t29 + t32)) - t33 + t1
         * (gauge[0] * (t35 + ((-1.0 / 24.0) * t5 - t36)) + (t8 * (t37 - t28 - t25)
         + (t38 + t5 * (t36 + t24))));
@@ -140,9 +140,9 @@ static void rigid_body_prepare(const rigid_body_params *params, const double gau
     const double t62 = t56 * (t57 - t55) + t5 * (t58 * (t57 - 1.0 / 360.0 * t5) + t1 * (t59 + t5 * (t24 - t60)
         + t8 * (t61 - 1.0 / 144.0 * t5 - t60)));
     const double t63 = t14 * (gauge[0] * (t49 + t54) + (t15 * t4 * ((-1.0 / 360.0) * t5 - t55) + t8 * t62));
-    const double t64 = t8 * t8, t65 = 1.0 / 72.0 * (t1 * t8), t66 = t23 - t61;
-    const double t67 = 1.0 / 720.0 * t5, t68 = t51 - t17, t69 = 1.0 / 120.0 * t5, t70 = t34 - t9;
-    const double t71 = 1.0 / 1440.0 * t5, t72 = t38 + t5 * (t71 - t25);
+    const double t64 = t8 * t8, t65 = 1.0 / 72.0 * (t1 * t8), t66 = t23 - t61, t67 = 1.0 / 720.0 * t5;
+    const double t68 = t51 - t17, t69 = 1.0 / 120.0 * t5, t70 = t34 - t9, t71 = 1.0 / 1440.0 * t5;
+    const double t72 = t38 + t5 * (t71 - t25);
     const double t73 = t5 * (t8 * (t67 - t31) + gauge[0] * (t68 - t28)) - t33 + t1
         * (gauge[0] * (t69 - t36 + t70) + (t8 * (t36 + (t61 - t28)) + t72));
     const double t74 = t4 * (1.0 / 240.0 * (t1 * t64) + gauge[0] * (t18 - t65)) + t5
@@ -226,10 +226,10 @@ static void rigid_body_linearise(const double coef[35], const double y[3], doubl
         * t2))));
     /* displacement */
     const double t12 = x3 * p_x1, t13 = x1 * p_x3, t14 = t12 - t13, t15 = x1 * p_x2, t16 = x2 * p_x1;
-    const double t17 = t15 - t16, t18 = p_x3 * t14 - p_x2 * t17, t19 = p_x3 * p_x3;
-    const double t20 = p_x1 * p_x1, t21 = p_x2 * p_x2, t22 = t20 + t21, t23 = t19 + t22;
-    const double t24 = rigid_body_phi0(t23), t25 = x2 * p_x3, t26 = x3 * p_x2, t27 = t25 - t26;
-    const double t28 = p_x1 * t17 - p_x3 * t27, t29 = p_x2 * t27 - p_x1 * t14;
+    const double t17 = t15 - t16, t18 = p_x3 * t14 - p_x2 * t17, t19 = p_x3 * p_x3, t20 = p_x1 * p_x1;
+    const double t21 = p_x2 * p_x2, t22 = t20 + t21, t23 = t19 + t22, t24 = rigid_body_phi0(t23);
+    const double t25 = x2 * p_x3, t26 = x3 * p_x2, t27 = t25 - t26, t28 = p_x1 * t17 - p_x3 * t27;
+    const double t29 = p_x2 * t27 - p_x1 * t14;
     displacement[0] = t18 * t24 - 0.5 * t27;
     displacement[1] = t28 * t24 - 0.5 * t14;
     displacement[2] = t24 * t29 - 0.5 * t17;
@@ -246,15 +246,14 @@ static void rigid_body_linearise(const double coef[35], const double y[3], doubl
     const double t36 = x2 * p_x2, t37 = x3 * p_x3, t38 = p_x1 * t31;
     const double t39 = (t36 + t37) * t24 + 2.0 * (t18 * t38);
     const double t40 = x1 * x2 * (coef[21] + coef[24] * t1 + (coef[22] * t4 + coef[23] * t2));
-    const double t41 = 0.5 * x3, t42 = p_x2 * t31;
-    const double t43 = t41 + (2.0 * (t18 * t42) - (t15 + t17) * t24), t44 = p_x1 * p_x2 * t24;
-    const double t45 = 0.5 * p_x3;
+    const double t41 = 0.5 * x3, t42 = p_x2 * t31, t43 = t41 + (2.0 * (t18 * t42) - (t15 + t17) * t24);
+    const double t44 = p_x1 * p_x2 * t24, t45 = 0.5 * p_x3;
     const double t46 = x2 * x3 * (coef[31] * t4 + coef[32] * t2 + (coef[30] + coef[22] * t1));
     const double t47 = t1 * (t10 + (t7 + coef[29] * t2)) + (coef[8] + t4 * (t11 + (coef[9] + coef[28] * t2)));
     const double t48 = 0.5 * p_x2, t49 = p_x1 * p_x3 * t24;
     const double t50 = t1 * (t3 + coef[34] * t4 + t5) + (coef[14] + t2 * (coef[33] * t4 + t6));
-    const double t51 = 0.5 * x1, t52 = t51 + (2.0 * (t28 * t32) - (t25 + t27) * t24);
-    const double t53 = x1 * p_x1, t54 = (t53 + t37) * t24 + 2.0 * (t28 * t42);
+    const double t51 = 0.5 * x1, t52 = t51 + (2.0 * (t28 * t32) - (t25 + t27) * t24), t53 = x1 * p_x1;
+    const double t54 = (t53 + t37) * t24 + 2.0 * (t28 * t42);
     const double t55 = (t17 - t16) * t24 + 2.0 * (t28 * t38) - t41, t56 = p_x2 * p_x3 * t24;
     const double t57 = 0.5 * p_x1, t58 = (t36 + t53) * t24 + 2.0 * (t29 * t32);
     const double t59 = (t27 - t26) * t24 + 2.0 * (t29 * t42) - t51;
@@ -309,8 +308,7 @@ static void rigid_body_guide(const rigid_body_params *params, const double gauge
     const double t5 = 1.0 / 12.0 * (t3 * t4), t6 = x2 * x2, t7 = 1.0 / 12.0 * t2;
     const double t8 = 1.0 / 6.0 * gauge[0], t9 = t7 - t8, t10 = 1.0 / 6.0 * (t3 * (gauge[0] * t4));
     const double t11 = 1.0 / params->I3, t12 = 1.0 / 3.0 * t1, t13 = 1.0 / 6.0 * t11;
-    const double t14 = 1.0 / 12.0 * t11, t15 = 1.0 / 6.0 * t1, t16 = 1.0 / 6.0 * t2;
-    const double t17 = 1.0 / 3.0 * t2;
+    const double t14 = 1.0 / 12.0 * t11, t15 = 1.0 / 6.0 * t1, t16 = 1.0 / 6.0 * t2, t17 = 1.0 / 3.0 * t2;
     const double t18 = t1 * (t5 + t6 * (t1 * t9)) - t10 + t11 * (t6 * (gauge[0] * (t12 - t13) + t2
         * (t14 - t15)) + t4 * (t1 * (t14 - t16) + gauge[0] * (t17 - t13)));
     const double t19 = x3 * t18, t20 = x3 * x3, t21 = 1.0 / 12.0 * t1, t22 = 1.0 / 3.0 * t11;
@@ -336,7 +334,6 @@ static void rigid_body_products(const rigid_body_params *params, const double x[
     out[2] = 4.0 * (x3 * x3) + (4.0 * (x2 * x2) + 4.0 * (x1 * x1));
 }
 
-/* the Hamiltonian */
 double rigid_body_hamiltonian(const rigid_body_params *params, const double x[3])
 {
     if (params == NULL) params = &rigid_body_default_params;
@@ -344,7 +341,6 @@ double rigid_body_hamiltonian(const rigid_body_params *params, const double x[3]
     return 0.5 * (x3 * x3 / I3 + (x2 * x2 / I2 + x1 * x1 / I1));
 }
 
-/* the Casimirs */
 void rigid_body_casimirs(const rigid_body_params *params, const double x[3], double out[])
 {
     (void)params;
@@ -352,7 +348,6 @@ void rigid_body_casimirs(const rigid_body_params *params, const double x[3], dou
     out[0] = x3 * x3 + (x2 * x2 + x1 * x1);
 }
 
-/* pi(x) grad H(x) */
 void rigid_body_vector_field(const rigid_body_params *params, const double x[3], double out[3])
 {
     if (params == NULL) params = &rigid_body_default_params;
@@ -364,19 +359,18 @@ void rigid_body_vector_field(const rigid_body_params *params, const double x[3],
 }
 
 /* ---- Compensated sums, linear equations ---- */
-/* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to
-   its last bit: were it rounded with the change, corrections of one sign would add up to a drift. 0, and x as
-   before, if the sum is not finite. */
+/* x + change + small in compensated arithmetic, where small is the carry and what is as small: were that
+   rounded with the change, corrections of one sign would add up to a drift. 0, and x as before, if the sum is
+   not finite. */
 static int rigid_body_advance(rigid_body_solver *s, const double change[rigid_body_DIM],
-    const double correction[rigid_body_DIM])
+    const double small[rigid_body_DIM])
 {
     double x[rigid_body_DIM], carry[rigid_body_DIM];
     for (int i = 0; i < rigid_body_DIM; ++i) {
         const double sum = s->x[i] + change[i], added = sum - s->x[i];
-        const double lost = (s->x[i] - (sum - added)) + (change[i] - added);
-        const double small = lost + (s->carry[i] + correction[i]);
-        x[i] = sum + small;
-        carry[i] = small - (x[i] - sum);
+        const double lost = ((s->x[i] - (sum - added)) + (change[i] - added)) + small[i];
+        x[i] = sum + lost;
+        carry[i] = lost - (x[i] - sum);
         if (!isfinite(x[i])) return 0;
     }
     memcpy(s->x, x, sizeof x);
@@ -384,7 +378,7 @@ static int rigid_body_advance(rigid_body_solver *s, const double change[rigid_bo
     return 1;
 }
 
-/* Newton matrices are I + O(h): a pivot whose reciprocal is larger than this is far from 1. */
+/* Newton matrices are I + O(h): a pivot with a larger one is far from 1 */
 #define rigid_body_LARGEST_RECIPROCAL 1e3
 
 /* Solve matrix * solution = side, both overwritten, by elimination with partial pivoting. 0 if singular. */
@@ -532,8 +526,7 @@ static int rigid_body_train(rigid_body_history *history, int component)
     for (int k = 0; k < WINDOW; ++k) memcpy(history->weight[k][component], weight[k], AHEAD * sizeof(double));
     return rigid_body_missed(value + ROWS, weight) <= rigid_body_HOPELESS * largest ? terms : 0;
 }
-/* How far from the last value a guess may be, in sizes of that value. */
-#define rigid_body_REACH 4.0
+#define rigid_body_REACH 4.0 /* how far from the last value a guess may be, in sizes of that value */
 
 /* Whether a guess is where the next values may be. Far away the equation of a step has solutions that have
    nothing to do with the motion. */
@@ -648,10 +641,8 @@ static void rigid_body_remember(rigid_body_history *history, const double value[
         rigid_body_fit(history);
 }
 
-/* How far a step may lead, in sizes of the state and of what the vector field says, if the energy is lost;
-   and the part of the energy that counts as lost. */
-#define rigid_body_PLAUSIBLE 1.5
-#define rigid_body_LOST 0.5
+#define rigid_body_PLAUSIBLE 1.5 /* how far any step may lead, in sizes of the state and of its motion */
+#define rigid_body_LOST 0.5      /* part of the energy that one which leads farther must not lose */
 
 /* Whether an increment is that of the motion. Where the step is too large, the equation may have been solved
    by a point far away, at another energy, that has nothing to do with it. */
@@ -661,24 +652,21 @@ static int rigid_body_plausible(const rigid_body_solver *s, const double increme
     for (int i = 0; i < rigid_body_DIM; ++i) {
         moved += fabs(increment[i]);
         size += fabs(s->x[i]);
-    }
-    if (moved <= rigid_body_PLAUSIBLE * size) return 1;
-    rigid_body_vector_field(&s->params, s->x, field);
-    for (int i = 0; i < rigid_body_DIM; ++i) {
-        size += fabs(s->h * field[i]);
         middle[i] = s->x[i] + 0.5 * increment[i];
         end[i] = s->x[i] + increment[i];
     }
     if (moved <= rigid_body_PLAUSIBLE * size) return 1;
-    const double before = rigid_body_hamiltonian(&s->params, s->x), after = rigid_body_hamiltonian(&s->params,
-        end);
-    const double scale = fabs(before) + fabs(rigid_body_hamiltonian(&s->params, middle)) + fabs(after);
-    return fabs(after - before) <= rigid_body_LOST * scale;
+    rigid_body_vector_field(&s->params, s->x, field);
+    for (int i = 0; i < rigid_body_DIM; ++i) size += fabs(s->h * field[i]);
+    if (moved <= rigid_body_PLAUSIBLE * size) return 1;
+    const double before = rigid_body_hamiltonian(&s->params, s->x);
+    const double after = rigid_body_hamiltonian(&s->params, end), between = rigid_body_hamiltonian(&s->params,
+        middle);
+    return fabs(after - before) <= rigid_body_LOST * (fabs(before) + fabs(between) + fabs(after));
 }
 
 /* ---- The implicit step, by Newton's method ---- */
-/* Components of y are measured no finer than by this part of the largest. */
-#define rigid_body_FLOOR 1e-6
+#define rigid_body_FLOOR 1e-6 /* components of y are measured no finer than by this part of the largest */
 
 /* Size of a correction relative to each component of y; NaN or infinite if the correction is. */
 static double rigid_body_size(const double y[rigid_body_DIM], const double delta[rigid_body_DIM])
@@ -693,9 +681,8 @@ static double rigid_body_size(const double y[rigid_body_DIM], const double delta
     return size;
 }
 
-/* Corrections below the first that shrink by less than the second have reached the level of rounding. */
-#define rigid_body_NEARLY_SOLVED 1e-8
-#define rigid_body_SHRINKING 0.25
+#define rigid_body_NEARLY_SOLVED 1e-8 /* corrections below this have reached the level of rounding, ... */
+#define rigid_body_SHRINKING 0.25     /* ... if one is more than this part of the one before */
 
 /* Solve (y - x) + displacement(y) = 0 for y by Newton's method from the extrapolated guess, and advance. The
    increment is corrected to first order by the last Newton correction, so that correction costs no
@@ -704,14 +691,14 @@ static double rigid_body_size(const double y[rigid_body_DIM], const double delta
 static rigid_body_status rigid_body_attempt(rigid_body_solver *s)
 {
     double y[rigid_body_DIM], delta[rigid_body_DIM], displacement[rigid_body_DIM], increment[rigid_body_DIM];
-    double jacobian[rigid_body_DIM * rigid_body_DIM], increment_jacobian[rigid_body_DIM * rigid_body_DIM],
-        previous = HUGE_VAL;
+    double jacobian[rigid_body_DIM * rigid_body_DIM], increment_jacobian[rigid_body_DIM * rigid_body_DIM];
+    double previous = HUGE_VAL;
     if (!rigid_body_predict(&s->history, y)) memcpy(y, s->x, sizeof y);
     for (int iteration = 1; iteration <= rigid_body_MAX_ITERATIONS; ++iteration) {
         rigid_body_linearise(s->coef, y, displacement, increment, jacobian, increment_jacobian);
         ++s->evaluations;
-        for (int i = 0; i < rigid_body_DIM; ++i) delta[i] = ((y[i] - s->x[i]) + displacement[i])
-            - s->carry[i];
+        for (int i = 0; i < rigid_body_DIM; ++i)
+            delta[i] = ((y[i] - s->x[i]) + displacement[i]) - s->carry[i];
         const int regular = rigid_body_solve(jacobian, delta);
         const double size = rigid_body_size(y, delta), growth = size / (previous * previous);
         if (!isfinite(size)) return rigid_body_NOT_FINITE;
@@ -721,12 +708,14 @@ static rigid_body_status rigid_body_attempt(rigid_body_solver *s)
         const int stalled = previous < rigid_body_NEARLY_SOLVED && size > rigid_body_SHRINKING * previous;
         previous = size;
         if (!(remaining <= rigid_body_TOLERANCE || stalled)) continue;
-        double correction[rigid_body_DIM] = { 0.0 };
-        for (int i = 0; i < rigid_body_DIM; ++i)
+        double small[rigid_body_DIM] = { 0.0 }; /* the correction of the increment, and the carry */
+        for (int i = 0; i < rigid_body_DIM; ++i) {
             for (int j = 0; j < rigid_body_DIM; ++j)
-                correction[i] -= increment_jacobian[i * rigid_body_DIM + j] * delta[j];
+                small[i] -= increment_jacobian[i * rigid_body_DIM + j] * delta[j];
+            small[i] += s->carry[i];
+        }
         if (!rigid_body_plausible(s, increment)) return rigid_body_NO_CONVERGENCE;
-        if (!rigid_body_advance(s, increment, correction)) return rigid_body_NOT_FINITE;
+        if (!rigid_body_advance(s, increment, small)) return rigid_body_NOT_FINITE;
         rigid_body_remember(&s->history, y, iteration);
         return rigid_body_OK;
     }
@@ -864,39 +853,27 @@ typedef double rigid_body_lanes[rigid_body_LANES];
 #endif
 
 /* ---- The solver ---- */
-/* Whether steps can be made with these parameters: allowed, and with finite coefficients for a step so short
-   that it has no part in it. */
-static int rigid_body_admissible(const rigid_body_params *params)
-{
-    double coef[rigid_body_COEFFICIENTS];
-    if (!rigid_body_allowed(params)) return 0;
-    rigid_body_prepare(params, (const double[rigid_body_GAUGES]){ 0.0 }, 1e-100, coef);
-    for (int k = 0; k < rigid_body_COEFFICIENTS; ++k)
-        if (!isfinite(coef[k])) return 0;
-    return 1;
-}
+#define rigid_body_SHORT_STEP 1e-100 /* so short that it has no part in whether coefficients are finite */
 
-/* The arguments may be parts of *s: they are read before it is written. */
+/* The arguments may be parts of *s, which is therefore written last. */
 rigid_body_status rigid_body_init_gauge(rigid_body_solver *s, const rigid_body_params *params,
     const double x0[rigid_body_DIM], const double gauge[rigid_body_GAUGES])
 {
     if (s == NULL || x0 == NULL) return rigid_body_BAD_ARGUMENT;
-    const rigid_body_params own = params != NULL ? *params : rigid_body_default_params;
-    double x[rigid_body_DIM];
-    memcpy(x, x0, sizeof x);
+    rigid_body_solver fresh = { .h = (double)NAN };
+    fresh.params = params != NULL ? *params : rigid_body_default_params;
+    memcpy(fresh.x, x0, sizeof fresh.x);
     for (int i = 0; i < rigid_body_DIM; ++i)
-        if (!isfinite(x[i])) return rigid_body_BAD_ARGUMENT;
-    double multiples[rigid_body_GAUGES] = { 0.0 };
-    const int given = gauge != NULL;
-    if (given) memcpy(multiples, gauge, sizeof multiples);
+        if (!isfinite(fresh.x[i])) return rigid_body_BAD_ARGUMENT;
+    if (!rigid_body_allowed(&fresh.params)) return rigid_body_BAD_ARGUMENT;
+    rigid_body_prepare(&fresh.params, fresh.gauge, rigid_body_SHORT_STEP, fresh.coef);
+    for (int k = 0; k < rigid_body_COEFFICIENTS; ++k)
+        if (!isfinite(fresh.coef[k])) return rigid_body_BAD_ARGUMENT;
+    if (gauge == NULL) rigid_body_choose_gauge(&fresh.params, fresh.x, fresh.gauge);
+    else memcpy(fresh.gauge, gauge, sizeof fresh.gauge);
     for (int c = 0; c < rigid_body_GAUGES; ++c)
-        if (!isfinite(multiples[c])) return rigid_body_BAD_ARGUMENT;
-    if (!rigid_body_admissible(&own)) return rigid_body_BAD_ARGUMENT;
-    memset(s, 0, sizeof *s);
-    memcpy(s->x, x, sizeof s->x);
-    s->params = own;
-    if (!given) rigid_body_choose_gauge(&own, x, multiples);
-    memcpy(s->gauge, multiples, sizeof s->gauge);
+        if (!isfinite(fresh.gauge[c])) return rigid_body_BAD_ARGUMENT;
+    *s = fresh;
     return rigid_body_OK;
 }
 
@@ -910,7 +887,7 @@ rigid_body_status rigid_body_init(rigid_body_solver *s, const rigid_body_params 
 static rigid_body_status rigid_body_set_step(rigid_body_solver *s, double h)
 {
     if (s == NULL || !isfinite(h)) return rigid_body_BAD_ARGUMENT;
-    if (s->prepared && memcmp(&h, &s->h, sizeof h) == 0) return rigid_body_OK;
+    if (memcmp(&h, &s->h, sizeof h) == 0) return rigid_body_OK;
     rigid_body_prepare(&s->params, s->gauge, h, s->coef);
     memset(&s->history, 0, sizeof s->history);
     s->history.slow_steps_allowed = rigid_body_REPAY;
@@ -920,7 +897,6 @@ static rigid_body_status rigid_body_set_step(rigid_body_solver *s, double h)
     s->h = h;
     s->t_before_h = s->t;
     s->steps_before_h = s->steps;
-    s->prepared = 1;
     return rigid_body_OK;
 }
 
@@ -934,12 +910,10 @@ static void rigid_body_count(rigid_body_solver *s, size_t steps)
 /* One stage. A guess from earlier steps may have misled it: then once more without. */
 static rigid_body_status rigid_body_stage(rigid_body_solver *s)
 {
-    rigid_body_status status = rigid_body_attempt(s);
-    if (status != rigid_body_OK && s->history.count > 0) {
-        memset(&s->history, 0, sizeof s->history);
-        status = rigid_body_attempt(s);
-    }
-    return status;
+    const rigid_body_status status = rigid_body_attempt(s);
+    if (status == rigid_body_OK || s->history.count == 0) return status;
+    memset(&s->history, 0, sizeof s->history);
+    return rigid_body_attempt(s);
 }
 
 rigid_body_status rigid_body_step(rigid_body_solver *s, double h)
@@ -964,7 +938,6 @@ const char *rigid_body_status_string(rigid_body_status status)
 }
 
 size_t rigid_body_solver_size(void) { return sizeof(rigid_body_solver); }
-
 size_t rigid_body_solver_steps_done(const rigid_body_solver *s) { return s->steps; }
 
 /* rigid_body_phi0 for the loops over lanes: no branches. No number beyond |s| = 4.0. */
@@ -1048,9 +1021,8 @@ static void rigid_body_linearise_lanes(rigid_body_lanes coef[restrict 35], rigid
         const double t39 = (t36 + t37) * t24 + 2.0 * (t18 * t38);
         const double t40 = x1 * x2 * (coef[21][lane] + coef[24][lane] * t1 + (coef[22][lane] * t4
             + coef[23][lane] * t2));
-        const double t41 = 0.5 * x3, t42 = p_x2 * t31;
-        const double t43 = t41 + (2.0 * (t18 * t42) - (t15 + t17) * t24), t44 = p_x1 * p_x2 * t24;
-        const double t45 = 0.5 * p_x3;
+        const double t41 = 0.5 * x3, t42 = p_x2 * t31, t43 = t41 + (2.0 * (t18 * t42) - (t15 + t17) * t24);
+        const double t44 = p_x1 * p_x2 * t24, t45 = 0.5 * p_x3;
         const double t46 = x2 * x3 * (coef[31][lane] * t4 + coef[32][lane] * t2 + (coef[30][lane]
             + coef[22][lane] * t1));
         const double t47 = t1 * (t13 + (t7 + coef[29][lane] * t2)) + (coef[8][lane] + t4
@@ -1058,8 +1030,8 @@ static void rigid_body_linearise_lanes(rigid_body_lanes coef[restrict 35], rigid
         const double t48 = 0.5 * p_x2, t49 = p_x1 * p_x3 * t24;
         const double t50 = t1 * (t3 + coef[34][lane] * t4 + t5) + (coef[14][lane] + t2 * (coef[33][lane] * t4
             + t6));
-        const double t51 = 0.5 * x1, t52 = t51 + (2.0 * (t28 * t32) - (t25 + t27) * t24);
-        const double t53 = x1 * p_x1, t54 = (t53 + t37) * t24 + 2.0 * (t28 * t42);
+        const double t51 = 0.5 * x1, t52 = t51 + (2.0 * (t28 * t32) - (t25 + t27) * t24), t53 = x1 * p_x1;
+        const double t54 = (t53 + t37) * t24 + 2.0 * (t28 * t42);
         const double t55 = (t17 - t16) * t24 + 2.0 * (t28 * t38) - t41, t56 = p_x2 * p_x3 * t24;
         const double t57 = 0.5 * p_x1, t58 = (t36 + t53) * t24 + 2.0 * (t29 * t32);
         const double t59 = (t27 - t26) * t24 + 2.0 * (t29 * t42) - t51;
@@ -1252,8 +1224,8 @@ static void rigid_body_update(rigid_body_lanes coef[restrict], rigid_body_model 
 }
 
 /* ---- Blocks of steps ---- */
-/* What all blocks share: coefficients, the same in each lane, and the recurrences by which they are foreseen.
-   */
+/* What all blocks share: coefficients, the same in each lane, and the recurrences by which they are
+   foreseen. */
 typedef struct {
     int fits; /* the fit that weight is of; -1 for none */
     rigid_body_lanes coef[rigid_body_COEFFICIENTS], weight[rigid_body_WINDOW][rigid_body_DIM];

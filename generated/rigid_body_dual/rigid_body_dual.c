@@ -22,7 +22,7 @@
  *   5. The choice of the gauge: multiples of Casimirs taken from H
  *   6. The solver
  *   7. Ensembles
- * body-sha256: 17f6ca735f65b23d8f122c1a260d9d3e3dfdeddf1441275ed2fef371fa4c70df
+ * body-sha256: 31d7e5fc2e672a8e1ff261b8232685eb0e56b9a60237c0949d1ed2262abe61f4
  */
 #include "rigid_body_dual.h"
 
@@ -34,9 +34,7 @@
 const rigid_body_dual_params rigid_body_dual_default_params = { 2.0, 1.0, 0.6666666666666666 };
 
 enum { rigid_body_dual_MAX_ITERATIONS = 20 }; /* of an inner solve */
-
-/* A correction is accepted when the error that it leaves is estimated to be below this. */
-#define rigid_body_dual_TOLERANCE 1e-20
+#define rigid_body_dual_TOLERANCE 1e-20 /* the error that an accepted correction may leave, as estimated */
 
 /* Whether all parameters are finite, and positive where they have to be. */
 static int rigid_body_dual_allowed(const rigid_body_dual_params *params)
@@ -45,51 +43,55 @@ static int rigid_body_dual_allowed(const rigid_body_dual_params *params)
         && isfinite(params->I3) && params->I3 > 0.0;
 }
 
+/* The polynomial with these coefficients, the constant first. */
+static inline double rigid_body_dual_polynomial(const double *coefficients, int count, double s)
+{
+    double value = coefficients[--count];
+    while (count > 0) value = value * s + coefficients[--count];
+    return value;
+}
+
 /* (1 - w cot w)/s with w = sqrt(s)/2, coth for negative s: the function of the exponential bi-realisation. */
 static double rigid_body_dual_phi0(double s)
 {
-    if (fabs(s) < 0.25)
-        return (0.08333333333333333 + s * (0.001388888888888889 + s * (3.306878306878307e-05 + s *
-            (8.267195767195768e-07 + s * (2.08767569878681e-08 + s * (5.284190138687493e-10 + s *
-            (1.3382536530684679e-11 + s * (3.3896802963225827e-13 + s * 8.586062056277845e-15))))))));
+    static const double near[9] = { 0.08333333333333333, 0.001388888888888889, 3.306878306878307e-05,
+        8.267195767195768e-07, 2.08767569878681e-08, 5.284190138687493e-10, 1.3382536530684679e-11,
+        3.3896802963225827e-13, 8.586062056277845e-15 };
+    static const double rest[21] = { 0.03267274151216445, 0.000105641107053347, 5.637370282876845e-07,
+        3.357141926657451e-09, 2.0742872904166045e-11, 1.3000482138698975e-13, 8.196052055691008e-16,
+        5.180118196169724e-18, 3.277539174701792e-20, 2.0747401878593604e-22, 1.3136241807166534e-24,
+        8.318003195189264e-27, 5.267262996834231e-29, 3.3354842988221443e-31, 2.1122063323183885e-33,
+        1.3375664093215244e-35, 8.470227328650247e-38, 5.363831046655698e-40, 3.3966848266497805e-42,
+        2.1509755511832569e-44, 1.3621211117593843e-46 };
+    if (fabs(s) < 0.25) return rigid_body_dual_polynomial(near, 9, s);
     if (fabs(s) < 16.0) {
         const double pole = 1.0 / (39.47841760435743 - s);
-        return 2.0 * pole + (0.03267274151216445 + s * (0.000105641107053347 + s * (5.637370282876845e-07
-            + s * (3.357141926657451e-09 + s * (2.0742872904166045e-11 + s * (1.3000482138698975e-13 + s *
-            (8.196052055691008e-16 + s * (5.180118196169724e-18 + s * (3.277539174701792e-20 + s *
-            (2.0747401878593604e-22 + s * (1.3136241807166534e-24 + s * (8.318003195189264e-27 + s *
-            (5.267262996834231e-29 + s * (3.3354842988221443e-31 + s * (2.1122063323183885e-33 + s *
-            (1.3375664093215244e-35 + s * (8.470227328650247e-38 + s * (5.363831046655698e-40 + s *
-            (3.3966848266497805e-42 + s * (2.1509755511832569e-44 + s *
-            1.3621211117593843e-46))))))))))))))))))));
+        return 2.0 * pole + rigid_body_dual_polynomial(rest, 21, s);
     }
     const double w = 0.5 * sqrt(fabs(s)), c = w / (s > 0.0 ? tan(w) : tanh(w));
-    const double phi0 = (1.0 - c) / s;
-    return phi0;
+    return (1.0 - c) / s;
 }
 
 /* The derivative of (1 - w cot w)/s, w = sqrt(s)/2. */
 static double rigid_body_dual_phi1(double s)
 {
-    if (fabs(s) < 0.25)
-        return (0.001388888888888889 + s * (6.613756613756614e-05 + s * (2.48015873015873e-06 + s *
-            (8.35070279514724e-08 + s * (2.6420950693437467e-09 + s * (8.029521918410807e-11 + s *
-            (2.372776207425808e-12 + s * (6.868849645022276e-14 + s * 1.9573818287022555e-15))))))));
+    static const double near[9] = { 0.001388888888888889, 6.613756613756614e-05, 2.48015873015873e-06,
+        8.35070279514724e-08, 2.6420950693437467e-09, 8.029521918410807e-11, 2.372776207425808e-12,
+        6.868849645022276e-14, 1.9573818287022555e-15 };
+    static const double rest[21] = { 0.000105641107053347, 1.127474056575369e-06, 1.0071425779972354e-08,
+        8.297149161666418e-11, 6.500241069349487e-13, 4.917631233414605e-15, 3.626082737318807e-17,
+        2.6220313397614337e-19, 1.8672661690734246e-21, 1.3136241807166533e-23, 9.149803514708191e-26,
+        6.320715596201077e-28, 4.336129588468787e-30, 2.957088865245744e-32, 2.0063496139822866e-34,
+        1.3552363725840395e-36, 9.118512779314688e-39, 6.114032687969605e-41, 4.0868535472481875e-43,
+        2.7242422235187686e-45, 1.8114038279637677e-47 };
+    if (fabs(s) < 0.25) return rigid_body_dual_polynomial(near, 9, s);
     if (fabs(s) < 16.0) {
         const double pole = 1.0 / (39.47841760435743 - s);
-        return 2.0 * pole * pole + (0.000105641107053347 + s * (1.127474056575369e-06 + s *
-            (1.0071425779972354e-08 + s * (8.297149161666418e-11 + s * (6.500241069349487e-13 + s *
-            (4.917631233414605e-15 + s * (3.626082737318807e-17 + s * (2.6220313397614337e-19 + s *
-            (1.8672661690734246e-21 + s * (1.3136241807166533e-23 + s * (9.149803514708191e-26 + s *
-            (6.320715596201077e-28 + s * (4.336129588468787e-30 + s * (2.957088865245744e-32 + s *
-            (2.0063496139822866e-34 + s * (1.3552363725840395e-36 + s * (9.118512779314688e-39 + s *
-            (6.114032687969605e-41 + s * (4.0868535472481875e-43 + s * (2.7242422235187686e-45 + s *
-            1.8114038279637677e-47))))))))))))))))))));
+        return 2.0 * pole * pole + rigid_body_dual_polynomial(rest, 21, s);
     }
     const double w = 0.5 * sqrt(fabs(s)), c = w / (s > 0.0 ? tan(w) : tanh(w));
     const double phi0 = (1.0 - c) / s;
-    const double phi1 = (0.5 * s * phi0 * phi0 - 1.5 * phi0 + 0.125) / s;
-    return phi1;
+    return (0.5 * s * phi0 * phi0 - 1.5 * phi0 + 0.125) / s;
 }
 
 /* everything that depends on parameters and step size only */
@@ -126,16 +128,13 @@ static void rigid_body_dual_linearise(const double coef[12], const double y[3],
 {
     const double x1 = y[0], x2 = y[1], x3 = y[2];
     /* momenta */
-    const double t1 = x2 * x2, t2 = x1 * x1, t3 = coef[4] * t1 + (coef[5] + coef[1] * t2);
-    const double p_x3 = x3 * t3;
-    const double t4 = x3 * x3, t5 = coef[1] * t4 + (coef[0] + coef[2] * t1);
-    const double p_x1 = x1 * t5;
-    const double t6 = coef[4] * t4 + (coef[3] + coef[2] * t2);
-    const double p_x2 = x2 * t6;
+    const double t1 = x2 * x2, t2 = x1 * x1, t3 = coef[4] * t1 + (coef[5] + coef[1] * t2), p_x3 = x3 * t3;
+    const double t4 = x3 * x3, t5 = coef[1] * t4 + (coef[0] + coef[2] * t1), p_x1 = x1 * t5;
+    const double t6 = coef[4] * t4 + (coef[3] + coef[2] * t2), p_x2 = x2 * t6;
     /* displacement */
-    const double t7 = coef[9] * p_x3, t8 = coef[10] * p_x1, t9 = coef[11] * p_x3;
-    const double t10 = x3 * t8 - x1 * t9, t11 = coef[10] * p_x2, t12 = coef[11] * p_x2;
-    const double t13 = coef[9] * p_x1, t14 = x1 * t12 - x2 * t13, t15 = t7 * t10 - t11 * t14;
+    const double t7 = coef[9] * p_x3, t8 = coef[10] * p_x1, t9 = coef[11] * p_x3, t10 = x3 * t8 - x1 * t9;
+    const double t11 = coef[10] * p_x2, t12 = coef[11] * p_x2, t13 = coef[9] * p_x1;
+    const double t14 = x1 * t12 - x2 * t13, t15 = t7 * t10 - t11 * t14;
     const double t16 = coef[11] * (coef[10] * (p_x2 * p_x2)) + coef[9] * (coef[10] * (p_x1 * p_x1) + coef[11]
         * (p_x3 * p_x3));
     const double t17 = rigid_body_dual_phi0(t16), t18 = coef[9] * x2, t19 = coef[10] * x3;
@@ -185,51 +184,6 @@ static void rigid_body_dual_linearise(const double coef[12], const double y[3],
     increment_jacobian[8] = t54 - t52;
 }
 
-/* elimination without pivoting: the solution, and the reciprocals of the pivots */
-static void rigid_body_dual_eliminate(const double matrix[9], const double side[3],
-    double solution[restrict 3], double reciprocal[restrict 3])
-{
-    /* solution */
-    const double t1 = 1.0 / matrix[0], t2 = matrix[6] * t1, t3 = matrix[3] * t1;
-    const double t4 = side[1] - side[0] * t3, t5 = 1.0 / (matrix[4] - matrix[1] * t3);
-    const double t6 = (matrix[7] - matrix[1] * t2) * t5, t7 = matrix[5] - matrix[2] * t3;
-    const double t8 = 1.0 / (matrix[8] - matrix[2] * t2 - t7 * t6);
-    const double t9 = (side[2] - side[0] * t2 - t4 * t6) * t8, t10 = t5 * (t4 - t7 * t9);
-    solution[0] = t1 * (side[0] - (matrix[2] * t9 + matrix[1] * t10));
-    solution[1] = t10;
-    solution[2] = t9;
-    /* reciprocal */
-    reciprocal[0] = t1;
-    reciprocal[1] = t5;
-    reciprocal[2] = t8;
-}
-
-/* the leading error vector pi grad S_3, as a function of the gauge */
-static void rigid_body_dual_guide(const rigid_body_dual_params *params, const double gauge[1],
-    const double x[3], double error[restrict 3])
-{
-    const double x1 = x[0], x2 = x[1], x3 = x[2];
-    const double t1 = 1.0 / params->I2, t2 = x2 * t1, t3 = 1.0 / params->I3, t4 = x2 * x2;
-    const double t5 = 1.0 / 6.0 * t1, t6 = 1.0 / 12.0 * t3, t7 = t5 - t6, t8 = 1.0 / params->I1;
-    const double t9 = x1 * x1, t10 = 1.0 / 6.0 * t8, t11 = t10 - t6, t12 = t1 * t1;
-    const double t13 = t3 * (t4 * (t7 + gauge[0] * (t8 * t7)) + t9 * (t11 + gauge[0] * (t1 * t11)))
-        + (t8 * (t9 * (t8 * (-1.0 / 12.0 - 1.0 / 12.0 * (gauge[0] * t1))) - 1.0 / 12.0
-        * (t12 * (gauge[0] * t4))) - 1.0 / 12.0 * (t4 * t12));
-    const double t14 = x3 * t13, t15 = x3 * t3, t16 = -1.0 / 12.0 - 1.0 / 12.0 * (gauge[0] * t3);
-    const double t17 = t3 * t3, t18 = x3 * x3, t19 = 1.0 / 12.0 * (t17 * (gauge[0] * t18));
-    const double t20 = 1.0 / 12.0 * (t18 * t17), t21 = 1.0 / 6.0 * t3, t22 = 1.0 / 12.0 * t1;
-    const double t23 = t21 - t22, t24 = t10 - t22;
-    const double t25 = t8 * (t9 * (t8 * t16) - t19) - t20 + t1 * (t18 * (t23 + gauge[0] * (t8 * t23)) + t9
-        * (t24 + gauge[0] * (t3 * t24)));
-    const double t26 = x2 * t25, t27 = 1.0 / 12.0 * t8, t28 = t5 - t27, t29 = t21 - t27;
-    const double t30 = t1 * (t4 * (t1 * t16) - t19) - t20 + t8 * (t4 * (t28 + gauge[0] * (t3 * t28)) + t18
-        * (t29 + gauge[0] * (t1 * t29)));
-    const double t31 = x1 * t30, t32 = x1 * t8;
-    error[0] = t2 * t14 - t15 * t26;
-    error[1] = t15 * t31 - t32 * t14;
-    error[2] = t32 * t26 - t2 * t31;
-}
-
 /* grad H . grad H, then grad H . grad C and grad C . grad C for each Casimir of the gauge */
 static void rigid_body_dual_products(const rigid_body_dual_params *params, const double x[3],
     double out[restrict 3])
@@ -241,7 +195,6 @@ static void rigid_body_dual_products(const rigid_body_dual_params *params, const
     out[2] = t1 * t1 + (t2 * t2 + t3 * t3);
 }
 
-/* the Hamiltonian */
 double rigid_body_dual_hamiltonian(const rigid_body_dual_params *params, const double x[3])
 {
     (void)params;
@@ -249,7 +202,6 @@ double rigid_body_dual_hamiltonian(const rigid_body_dual_params *params, const d
     return (-0.5) * (x3 * x3 + (x2 * x2 + x1 * x1));
 }
 
-/* the Casimirs */
 void rigid_body_dual_casimirs(const rigid_body_dual_params *params, const double x[3], double out[])
 {
     if (params == NULL) params = &rigid_body_dual_default_params;
@@ -257,7 +209,6 @@ void rigid_body_dual_casimirs(const rigid_body_dual_params *params, const double
     out[0] = 0.5 * (x3 * x3 / I3 + (x2 * x2 / I2 + x1 * x1 / I1));
 }
 
-/* pi(x) grad H(x) */
 void rigid_body_dual_vector_field(const rigid_body_dual_params *params, const double x[3], double out[3])
 {
     if (params == NULL) params = &rigid_body_dual_default_params;
@@ -269,19 +220,18 @@ void rigid_body_dual_vector_field(const rigid_body_dual_params *params, const do
 }
 
 /* ---- Compensated sums, linear equations ---- */
-/* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to
-   its last bit: were it rounded with the change, corrections of one sign would add up to a drift. 0, and x as
-   before, if the sum is not finite. */
+/* x + change + small in compensated arithmetic, where small is the carry and what is as small: were that
+   rounded with the change, corrections of one sign would add up to a drift. 0, and x as before, if the sum is
+   not finite. */
 static int rigid_body_dual_advance(rigid_body_dual_solver *s, const double change[rigid_body_dual_DIM],
-    const double correction[rigid_body_dual_DIM])
+    const double small[rigid_body_dual_DIM])
 {
     double x[rigid_body_dual_DIM], carry[rigid_body_dual_DIM];
     for (int i = 0; i < rigid_body_dual_DIM; ++i) {
         const double sum = s->x[i] + change[i], added = sum - s->x[i];
-        const double lost = (s->x[i] - (sum - added)) + (change[i] - added);
-        const double small = lost + (s->carry[i] + correction[i]);
-        x[i] = sum + small;
-        carry[i] = small - (x[i] - sum);
+        const double lost = ((s->x[i] - (sum - added)) + (change[i] - added)) + small[i];
+        x[i] = sum + lost;
+        carry[i] = lost - (x[i] - sum);
         if (!isfinite(x[i])) return 0;
     }
     memcpy(s->x, x, sizeof x);
@@ -289,29 +239,44 @@ static int rigid_body_dual_advance(rigid_body_dual_solver *s, const double chang
     return 1;
 }
 
-/* Newton matrices are I + O(h): a pivot whose reciprocal is larger than this is far from 1. */
-#define rigid_body_dual_LARGEST_RECIPROCAL 1e3
-
-/* Solve matrix * solution = side, both overwritten. The matrix is I + O(h): 0 if a pivot is far from 1. */
+/* Solve matrix * solution = side, both overwritten, by elimination with partial pivoting. 0 if singular. */
 static int rigid_body_dual_solve(double matrix[rigid_body_dual_DIM * rigid_body_dual_DIM],
     double side[rigid_body_dual_DIM])
 {
-    double solution[rigid_body_dual_DIM], reciprocal[rigid_body_dual_DIM], largest = 0.0;
-    rigid_body_dual_eliminate(matrix, side, solution, reciprocal);
-    for (int i = 0; i < rigid_body_dual_DIM; ++i)
-        if (!(fabs(reciprocal[i]) <= largest)) largest = fabs(reciprocal[i]);
-    if (!(largest < rigid_body_dual_LARGEST_RECIPROCAL)) return 0;
-    memcpy(side, solution, sizeof solution);
+    for (int k = 0; k < rigid_body_dual_DIM; ++k) {
+        int best = k;
+        for (int i = k + 1; i < rigid_body_dual_DIM; ++i)
+            if (fabs(matrix[i * rigid_body_dual_DIM + k]) > fabs(matrix[best * rigid_body_dual_DIM + k]))
+                best = i;
+        const double pivot = matrix[best * rigid_body_dual_DIM + k], last = side[k];
+        if (!(fabs(pivot) > 0.0)) return 0;
+        for (int j = k; j < rigid_body_dual_DIM && best != k; ++j) {
+            const double swap = matrix[k * rigid_body_dual_DIM + j];
+            matrix[k * rigid_body_dual_DIM + j] = matrix[best * rigid_body_dual_DIM + j];
+            matrix[best * rigid_body_dual_DIM + j] = swap;
+        }
+        side[k] = side[best];
+        side[best] = last;
+        for (int i = k + 1; i < rigid_body_dual_DIM; ++i) {
+            const double factor = matrix[i * rigid_body_dual_DIM + k] / pivot;
+            for (int j = k + 1; j < rigid_body_dual_DIM; ++j)
+                matrix[i * rigid_body_dual_DIM + j] -= factor * matrix[k * rigid_body_dual_DIM + j];
+            side[i] -= factor * side[k];
+        }
+    }
+    for (int i = rigid_body_dual_DIM - 1; i >= 0; --i) {
+        for (int j = i + 1; j < rigid_body_dual_DIM; ++j)
+            side[i] -= matrix[i * rigid_body_dual_DIM + j] * side[j];
+        side[i] /= matrix[i * rigid_body_dual_DIM + i];
+    }
     return 1;
 }
 
 /* ---- Starting guesses ---- */
-/* How far from the last value a guess may be, in sizes of that value. */
-#define rigid_body_dual_REACH 4.0
+#define rigid_body_dual_REACH 4.0 /* how far from the last value a guess may be, in sizes of that value */
 
-/* The guess for the next value from the last ones: the sum of their backward differences. 0 if there is none,
-   or if it is far away, where the equation of a step has solutions that have nothing to do with the motion.
-   */
+/* The guess for the next value, the sum of differences. 0 if there is none, or if it is far away, where the
+   equation of a step has solutions that have nothing to do with the motion. */
 static int rigid_body_dual_predict(const rigid_body_dual_history *history, double value[rigid_body_dual_DIM])
 {
     double distance = 0.0, size = 0.0;
@@ -348,10 +313,8 @@ static void rigid_body_dual_remember(rigid_body_dual_history *history,
     if (history->count < rigid_body_dual_DIFFERENCES) ++history->count;
 }
 
-/* How far a step may lead, in sizes of the state and of what the vector field says, if the energy is lost;
-   and the part of the energy that counts as lost. */
-#define rigid_body_dual_PLAUSIBLE 1.5
-#define rigid_body_dual_LOST 0.5
+#define rigid_body_dual_PLAUSIBLE 1.5 /* how far any step may lead, in sizes of the state and of its motion */
+#define rigid_body_dual_LOST 0.5      /* part of the energy that one which leads farther must not lose */
 
 /* Whether an increment is that of the motion. Where the step is too large, the equation may have been solved
    by a point far away, at another energy, that has nothing to do with it. */
@@ -363,23 +326,21 @@ static int rigid_body_dual_plausible(const rigid_body_dual_solver *s,
     for (int i = 0; i < rigid_body_dual_DIM; ++i) {
         moved += fabs(increment[i]);
         size += fabs(s->x[i]);
-    }
-    if (moved <= rigid_body_dual_PLAUSIBLE * size) return 1;
-    rigid_body_dual_vector_field(&s->params, s->x, field);
-    for (int i = 0; i < rigid_body_dual_DIM; ++i) {
-        size += fabs(s->h * field[i]);
         middle[i] = s->x[i] + 0.5 * increment[i];
         end[i] = s->x[i] + increment[i];
     }
     if (moved <= rigid_body_dual_PLAUSIBLE * size) return 1;
-    const double before = rigid_body_dual_hamiltonian(&s->params, s->x), after =
-        rigid_body_dual_hamiltonian(&s->params, end);
-    const double scale = fabs(before) + fabs(rigid_body_dual_hamiltonian(&s->params, middle)) + fabs(after);
-    return fabs(after - before) <= rigid_body_dual_LOST * scale;
+    rigid_body_dual_vector_field(&s->params, s->x, field);
+    for (int i = 0; i < rigid_body_dual_DIM; ++i) size += fabs(s->h * field[i]);
+    if (moved <= rigid_body_dual_PLAUSIBLE * size) return 1;
+    const double before = rigid_body_dual_hamiltonian(&s->params, s->x);
+    const double after = rigid_body_dual_hamiltonian(&s->params, end), between =
+        rigid_body_dual_hamiltonian(&s->params, middle);
+    return fabs(after - before) <= rigid_body_dual_LOST * (fabs(before) + fabs(between) + fabs(after));
 }
 
 /* ---- The implicit step, by Newton's method ---- */
-/* Components of y are measured no finer than by this part of the largest. */
+/* components of y are measured no finer than by this part of the largest */
 #define rigid_body_dual_FLOOR 1e-6
 
 /* Size of a correction relative to each component of y; NaN or infinite if the correction is. */
@@ -396,9 +357,9 @@ static double rigid_body_dual_size(const double y[rigid_body_dual_DIM],
     return size;
 }
 
-/* Corrections below the first that shrink by less than the second have reached the level of rounding. */
+/* corrections below this have reached the level of rounding, ... */
 #define rigid_body_dual_NEARLY_SOLVED 1e-8
-#define rigid_body_dual_SHRINKING 0.25
+#define rigid_body_dual_SHRINKING 0.25 /* ... if one is more than this part of the one before */
 
 /* Solve (y - x) + displacement(y) = 0 for y by Newton's method from the extrapolated guess, and advance. The
    increment is corrected to first order by the last Newton correction, so that correction costs no
@@ -409,13 +370,14 @@ static rigid_body_dual_status rigid_body_dual_attempt(rigid_body_dual_solver *s)
     double y[rigid_body_dual_DIM], delta[rigid_body_dual_DIM], displacement[rigid_body_dual_DIM],
         increment[rigid_body_dual_DIM];
     double jacobian[rigid_body_dual_DIM * rigid_body_dual_DIM], increment_jacobian[rigid_body_dual_DIM
-        * rigid_body_dual_DIM], previous = HUGE_VAL;
+        * rigid_body_dual_DIM];
+    double previous = HUGE_VAL;
     if (!rigid_body_dual_predict(&s->history, y)) memcpy(y, s->x, sizeof y);
     for (int iteration = 1; iteration <= rigid_body_dual_MAX_ITERATIONS; ++iteration) {
         rigid_body_dual_linearise(s->coef, y, displacement, increment, jacobian, increment_jacobian);
         ++s->evaluations;
-        for (int i = 0; i < rigid_body_dual_DIM; ++i) delta[i] = ((y[i] - s->x[i]) + displacement[i])
-            - s->carry[i];
+        for (int i = 0; i < rigid_body_dual_DIM; ++i)
+            delta[i] = ((y[i] - s->x[i]) + displacement[i]) - s->carry[i];
         const int regular = rigid_body_dual_solve(jacobian, delta);
         const double size = rigid_body_dual_size(y, delta), growth = size / (previous * previous);
         if (!isfinite(size)) return rigid_body_dual_NOT_FINITE;
@@ -426,12 +388,14 @@ static rigid_body_dual_status rigid_body_dual_attempt(rigid_body_dual_solver *s)
             * previous;
         previous = size;
         if (!(remaining <= rigid_body_dual_TOLERANCE || stalled)) continue;
-        double correction[rigid_body_dual_DIM] = { 0.0 };
-        for (int i = 0; i < rigid_body_dual_DIM; ++i)
+        double small[rigid_body_dual_DIM] = { 0.0 }; /* the correction of the increment, and the carry */
+        for (int i = 0; i < rigid_body_dual_DIM; ++i) {
             for (int j = 0; j < rigid_body_dual_DIM; ++j)
-                correction[i] -= increment_jacobian[i * rigid_body_dual_DIM + j] * delta[j];
+                small[i] -= increment_jacobian[i * rigid_body_dual_DIM + j] * delta[j];
+            small[i] += s->carry[i];
+        }
         if (!rigid_body_dual_plausible(s, increment)) return rigid_body_dual_NO_CONVERGENCE;
-        if (!rigid_body_dual_advance(s, increment, correction)) return rigid_body_dual_NOT_FINITE;
+        if (!rigid_body_dual_advance(s, increment, small)) return rigid_body_dual_NOT_FINITE;
         rigid_body_dual_remember(&s->history, y);
         return rigid_body_dual_OK;
     }
@@ -439,132 +403,43 @@ static rigid_body_dual_status rigid_body_dual_attempt(rigid_body_dual_solver *s)
 }
 
 /* ---- The choice of the gauge: multiples of Casimirs taken from H ---- */
-enum {
-    rigid_body_dual_SAMPLES = 32, /* states along a short piece of the trajectory */
-    rigid_body_dual_SWEEPS = 4    /* most rounds over the multiples */
-};
-
-/* A short piece of the trajectory from x, by a Runge-Kutta method with steps of a fixed change. */
-static void rigid_body_dual_sample(const rigid_body_dual_params *params, const double x[rigid_body_dual_DIM],
-    double samples[][rigid_body_dual_DIM])
-{
-    double slope[rigid_body_dual_DIM], middle[rigid_body_dual_DIM], size = 0.0, speed = DBL_MIN;
-    rigid_body_dual_vector_field(params, x, slope);
-    for (int i = 0; i < rigid_body_dual_DIM; ++i) {
-        samples[0][i] = x[i];
-        size += fabs(x[i]);
-        speed += fabs(slope[i]);
-    }
-    const double h = 0.25 * size / speed;
-    for (int k = 1; k < rigid_body_dual_SAMPLES; ++k) {
-        const double *y = samples[k - 1];
-        rigid_body_dual_vector_field(params, y, slope);
-        for (int i = 0; i < rigid_body_dual_DIM; ++i) middle[i] = y[i] + 0.5 * h * slope[i];
-        rigid_body_dual_vector_field(params, middle, slope);
-        for (int i = 0; i < rigid_body_dual_DIM; ++i) samples[k][i] = y[i] + h * slope[i];
-    }
-}
-
-/* Sum of |pi grad S_3|^2, the leading error of the method, over the samples. */
-static double rigid_body_dual_gauge_error(const rigid_body_dual_params *params,
-    const double gauge[rigid_body_dual_GAUGES], double samples[][rigid_body_dual_DIM])
-{
-    double error[rigid_body_dual_DIM], sum = 0.0;
-    for (int k = 0; k < rigid_body_dual_SAMPLES; ++k) {
-        rigid_body_dual_guide(params, gauge, samples[k], error);
-        for (int i = 0; i < rigid_body_dual_DIM; ++i) sum += error[i] * error[i];
-    }
-    return sum;
-}
-
-/* How many widths multiple c is to be moved for the least error: the best on grids, each finer than the one
-   before. */
-static double rigid_body_dual_least_on_line(const rigid_body_dual_params *params,
-    const double gauge[rigid_body_dual_GAUGES], int c, double width, double samples[][rigid_body_dual_DIM])
-{
-    double moved[rigid_body_dual_GAUGES], best = 0.0, mesh = 0.125, least =
-        rigid_body_dual_gauge_error(params, gauge, samples);
-    memcpy(moved, gauge, sizeof moved);
-    for (int level = 0; level < 3; ++level, mesh *= 0.125) {
-        const int reach = level == 0 ? 24 : 8;
-        const double centre = best;
-        for (int j = -reach; j <= reach; ++j) {
-            moved[c] = gauge[c] + (centre + j * mesh) * width;
-            const double error = rigid_body_dual_gauge_error(params, moved, samples);
-            if (!(error < least - 1e-12 * least)) continue; /* close calls are not decided by rounding */
-            least = error;
-            best = centre + j * mesh;
-        }
-    }
-    return best;
-}
-
-/* The multiples that minimise the leading error along a short piece of the trajectory, one after the other,
-   from the least-squares solution of grad H = sum of multiples of grad C. Zero where that gives nothing
-   finite. */
+/* For each Casimir C the multiple by which grad H less it times grad C is smallest at the start; zero where
+   that gives nothing finite. */
 static void rigid_body_dual_choose_gauge(const rigid_body_dual_params *params,
     const double x[rigid_body_dual_DIM], double gauge[rigid_body_dual_GAUGES])
 {
-    double samples[rigid_body_dual_SAMPLES][rigid_body_dual_DIM], out[1 + 2 * rigid_body_dual_GAUGES],
-        sums[1 + 2 * rigid_body_dual_GAUGES] = { 0.0 };
-    double width[rigid_body_dual_GAUGES];
-    rigid_body_dual_sample(params, x, samples);
-    for (int k = 0; k < rigid_body_dual_SAMPLES; ++k) {
-        rigid_body_dual_products(params, samples[k], out);
-        for (int i = 0; i < 1 + 2 * rigid_body_dual_GAUGES; ++i) sums[i] += out[i];
-    }
+    double out[1 + 2 * rigid_body_dual_GAUGES];
+    rigid_body_dual_products(params, x, out);
     for (int c = 0; c < rigid_body_dual_GAUGES; ++c) {
-        const double norm = sums[2 + 2 * c] > 0.0 ? sums[2 + 2 * c] : HUGE_VAL;
-        gauge[c] = sums[1 + 2 * c] / norm;
-        width[c] = sqrt(sums[0] / norm);
+        const double multiple = out[1 + 2 * c] / out[2 + 2 * c];
+        gauge[c] = isfinite(multiple) ? multiple : 0.0;
     }
-    for (int sweep = 0, moved = 1; sweep < rigid_body_dual_SWEEPS && moved; ++sweep) {
-        moved = 0;
-        for (int c = 0; c < rigid_body_dual_GAUGES; ++c) {
-            const double best = rigid_body_dual_least_on_line(params, gauge, c, width[c], samples);
-            gauge[c] += best * width[c];
-            moved = moved || best != 0.0;
-        }
-    }
-    if (!isfinite(rigid_body_dual_gauge_error(params, gauge, samples)))
-        memset(gauge, 0, rigid_body_dual_GAUGES * sizeof gauge[0]);
 }
 
 /* ---- The solver ---- */
-/* Whether steps can be made with these parameters: allowed, and with finite coefficients for a step so short
-   that it has no part in it. */
-static int rigid_body_dual_admissible(const rigid_body_dual_params *params)
-{
-    double coef[rigid_body_dual_COEFFICIENTS];
-    if (!rigid_body_dual_allowed(params)) return 0;
-    rigid_body_dual_prepare(params, (const double[rigid_body_dual_GAUGES]){ 0.0 }, 1e-100, coef);
-    for (int k = 0; k < rigid_body_dual_COEFFICIENTS; ++k)
-        if (!isfinite(coef[k])) return 0;
-    return 1;
-}
+/* so short that it has no part in whether coefficients are finite */
+#define rigid_body_dual_SHORT_STEP 1e-100
 
-/* The arguments may be parts of *s: they are read before it is written. */
+/* The arguments may be parts of *s, which is therefore written last. */
 rigid_body_dual_status rigid_body_dual_init_gauge(rigid_body_dual_solver *s,
     const rigid_body_dual_params *params, const double x0[rigid_body_dual_DIM],
     const double gauge[rigid_body_dual_GAUGES])
 {
     if (s == NULL || x0 == NULL) return rigid_body_dual_BAD_ARGUMENT;
-    const rigid_body_dual_params own = params != NULL ? *params : rigid_body_dual_default_params;
-    double x[rigid_body_dual_DIM];
-    memcpy(x, x0, sizeof x);
+    rigid_body_dual_solver fresh = { .h = (double)NAN };
+    fresh.params = params != NULL ? *params : rigid_body_dual_default_params;
+    memcpy(fresh.x, x0, sizeof fresh.x);
     for (int i = 0; i < rigid_body_dual_DIM; ++i)
-        if (!isfinite(x[i])) return rigid_body_dual_BAD_ARGUMENT;
-    double multiples[rigid_body_dual_GAUGES] = { 0.0 };
-    const int given = gauge != NULL;
-    if (given) memcpy(multiples, gauge, sizeof multiples);
+        if (!isfinite(fresh.x[i])) return rigid_body_dual_BAD_ARGUMENT;
+    if (!rigid_body_dual_allowed(&fresh.params)) return rigid_body_dual_BAD_ARGUMENT;
+    rigid_body_dual_prepare(&fresh.params, fresh.gauge, rigid_body_dual_SHORT_STEP, fresh.coef);
+    for (int k = 0; k < rigid_body_dual_COEFFICIENTS; ++k)
+        if (!isfinite(fresh.coef[k])) return rigid_body_dual_BAD_ARGUMENT;
+    if (gauge == NULL) rigid_body_dual_choose_gauge(&fresh.params, fresh.x, fresh.gauge);
+    else memcpy(fresh.gauge, gauge, sizeof fresh.gauge);
     for (int c = 0; c < rigid_body_dual_GAUGES; ++c)
-        if (!isfinite(multiples[c])) return rigid_body_dual_BAD_ARGUMENT;
-    if (!rigid_body_dual_admissible(&own)) return rigid_body_dual_BAD_ARGUMENT;
-    memset(s, 0, sizeof *s);
-    memcpy(s->x, x, sizeof s->x);
-    s->params = own;
-    if (!given) rigid_body_dual_choose_gauge(&own, x, multiples);
-    memcpy(s->gauge, multiples, sizeof s->gauge);
+        if (!isfinite(fresh.gauge[c])) return rigid_body_dual_BAD_ARGUMENT;
+    *s = fresh;
     return rigid_body_dual_OK;
 }
 
@@ -578,44 +453,38 @@ rigid_body_dual_status rigid_body_dual_init(rigid_body_dual_solver *s, const rig
 static rigid_body_dual_status rigid_body_dual_set_step(rigid_body_dual_solver *s, double h)
 {
     if (s == NULL || !isfinite(h)) return rigid_body_dual_BAD_ARGUMENT;
-    if (s->prepared && memcmp(&h, &s->h, sizeof h) == 0) return rigid_body_dual_OK;
+    if (memcmp(&h, &s->h, sizeof h) == 0) return rigid_body_dual_OK;
     rigid_body_dual_prepare(&s->params, s->gauge, h, s->coef);
     memset(&s->history, 0, sizeof s->history);
     s->h = h;
     s->t_before_h = s->t;
     s->steps_before_h = s->steps;
-    s->prepared = 1;
     return rigid_body_dual_OK;
 }
 
 /* One stage. A guess from earlier steps may have misled it: then once more without. */
 static rigid_body_dual_status rigid_body_dual_stage(rigid_body_dual_solver *s)
 {
-    rigid_body_dual_status status = rigid_body_dual_attempt(s);
-    if (status != rigid_body_dual_OK && s->history.count > 0) {
-        memset(&s->history, 0, sizeof s->history);
-        status = rigid_body_dual_attempt(s);
-    }
-    return status;
-}
-
-rigid_body_dual_status rigid_body_dual_step(rigid_body_dual_solver *s, double h)
-{
-    rigid_body_dual_status status = rigid_body_dual_set_step(s, h);
-    if (status != rigid_body_dual_OK) return status;
-    status = rigid_body_dual_stage(s);
-    if (status != rigid_body_dual_OK) return status;
-    ++s->steps;
-    s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
-    return status;
+    const rigid_body_dual_status status = rigid_body_dual_attempt(s);
+    if (status == rigid_body_dual_OK || s->history.count == 0) return status;
+    memset(&s->history, 0, sizeof s->history);
+    return rigid_body_dual_attempt(s);
 }
 
 rigid_body_dual_status rigid_body_dual_integrate(rigid_body_dual_solver *s, double h, size_t steps)
 {
     rigid_body_dual_status status = rigid_body_dual_set_step(s, h);
-    for (; steps > 0 && status == rigid_body_dual_OK; --steps) status = rigid_body_dual_step(s, h);
+    for (; steps > 0 && status == rigid_body_dual_OK; --steps) {
+        status = rigid_body_dual_stage(s);
+        if (status != rigid_body_dual_OK) break;
+        ++s->steps;
+        s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
+    }
     return status;
 }
+
+rigid_body_dual_status rigid_body_dual_step(rigid_body_dual_solver *s,
+    double h) { return rigid_body_dual_integrate(s, h, 1); }
 
 const char *rigid_body_dual_status_string(rigid_body_dual_status status)
 {
@@ -630,7 +499,6 @@ const char *rigid_body_dual_status_string(rigid_body_dual_status status)
 }
 
 size_t rigid_body_dual_solver_size(void) { return sizeof(rigid_body_dual_solver); }
-
 size_t rigid_body_dual_solver_steps_done(const rigid_body_dual_solver *s) { return s->steps; }
 
 /* ---- Ensembles ---- */

@@ -13,7 +13,7 @@
 #
 # SPDX-License-Identifier: 0BSD
 # This file belongs to whoever generated it; phigen claims no rights in it.
-# body-sha256: 1c35e89156ec1dd22700e736498c47161ba5bd93f9fde949492261ae16c28fe7
+# body-sha256: 30bf3e29eb9fd1c6cdd62652ba9642654e04ed938a00e357c1b7c7b389a4473b
 import numpy as np
 
 VERSION = "0.1.0"
@@ -406,115 +406,15 @@ def _advance(stage, x, carry, memory):
     return following, rest, (y - x, memory[0] if memory[0].any() else y - x), status
 
 
-def _line(error_of, gauge, c, width):
-    """The error where one multiple varies, of centre + (j - 3) width for j = 0 ... 6, as forward differences (7, members).
-
-    S_3 is cubic in H, so these are those of a polynomial of degree six. Also their size, before.
-    """
-    moved, errors = gauge.copy(), []
-    for j in range(7):
-        moved[:, c] = gauge[:, c] + (j - 3) * width
-        errors.append(error_of(moved))
-    return np.array([np.diff(errors, k, axis=0)[0] for k in range(7)]), sum(errors)
-
-
-def _least_on_line(difference, size):
-    """Where that polynomial is least, in units of width: the best t on grids, each finer than the one before."""
-
-    def value(t):
-        error = difference[6]
-        for k in range(5, -1, -1):
-            error = difference[k] + (t + 3.0 - k) / (k + 1) * error
-        return error
-
-    best = np.zeros_like(size)
-    least = value(best)
-    for reach, mesh in ((24, 1 / 8), (8, 1 / 64), (8, 1 / 512)):
-        centre = best
-        for j in range(-reach, reach + 1):
-            t = centre + j * mesh
-            error = value(t)
-            better = error < least - 1e-12 * size  # close calls are not decided by rounding
-            least, best = np.where(better, error, least), np.where(better, t, best)
-    return best
-
-
-def _samples(parameters, x, count=32):
-    """A short piece of each trajectory, by a Runge-Kutta method with steps of a fixed change."""
-    speed = np.abs(_vector_field(parameters, x)).sum(axis=-1) + np.finfo(float).tiny
-    h = (0.25 * np.abs(x).sum(axis=-1) / speed)[:, np.newaxis]
-    points = [x]
-    for _ in range(count - 1):
-        y = points[-1]
-        middle = y + 0.5 * h * _vector_field(parameters, y)
-        points.append(y + h * _vector_field(parameters, middle))
-    return np.array(points)
-
-
 def _choose_gauge(parameters, x):
-    """The lambda that minimise the leading error along a short piece of each trajectory: (members, number of them).
+    """For each Casimir C the lambda by which grad H - lambda grad C is smallest at x: (members, number of them).
 
-    One after the other, from the least-squares solution of grad H = sum of lambda grad C; zero where that gives
-    nothing finite.
+    Zero where that gives nothing finite.
     """
-    points = _samples(parameters, x)
-    sums = _products(parameters, points).sum(axis=0)
-
-    def error_of(gauge):
-        return (_guide(parameters, gauge.T, points) ** 2).sum(axis=(0, -1))
-
-    norms = np.where(sums[:, 2::2] > 0, sums[:, 2::2], np.inf)
-    gauge, width = sums[:, 1::2] / norms, np.sqrt(sums[:, :1] / norms)
-    for _ in range(4):
-        before = gauge.copy()
-        for c in range(gauge.shape[1]):
-            gauge[:, c] += _least_on_line(*_line(error_of, gauge, c, width[:, c])) * width[:, c]
-        if np.array_equal(before, gauge, equal_nan=True):
-            break
-    return np.where(np.isfinite(error_of(gauge))[:, np.newaxis], gauge, 0.0)
-
-
-def _guide(parameters, gauge, x):
-    """The leading error vector pi grad S_3, as a function of the gauge."""
-    I1 = parameters["I1"]
-    I2 = parameters["I2"]
-    I3 = parameters["I3"]
-    x1 = x[..., 0]
-    x2 = x[..., 1]
-    x3 = x[..., 2]
-    t1 = 1.0 / I2
-    t2 = x2 * t1
-    t3 = 1.0 / I3
-    t4 = x2 * x2
-    t5 = 1.0 / 6.0 * t1
-    t6 = 1.0 / 12.0 * t3
-    t7 = t5 - t6
-    t8 = 1.0 / I1
-    t9 = x1 * x1
-    t10 = 1.0 / 6.0 * t8
-    t11 = t10 - t6
-    t12 = t1 * t1
-    t13 = t3 * (t4 * (t7 + gauge[0] * (t8 * t7)) + t9 * (t11 + gauge[0] * (t1 * t11))) + (t8 * (t9 * (t8 * (-1.0 / 12.0 - 1.0 / 12.0 * (gauge[0] * t1))) - 1.0 / 12.0 * (t12 * (gauge[0] * t4))) - 1.0 / 12.0 * (t4 * t12))
-    t14 = x3 * t13
-    t15 = x3 * t3
-    t16 = -1.0 / 12.0 - 1.0 / 12.0 * (gauge[0] * t3)
-    t17 = t3 * t3
-    t18 = x3 * x3
-    t19 = 1.0 / 12.0 * (t17 * (gauge[0] * t18))
-    t20 = 1.0 / 12.0 * (t18 * t17)
-    t21 = 1.0 / 6.0 * t3
-    t22 = 1.0 / 12.0 * t1
-    t23 = t21 - t22
-    t24 = t10 - t22
-    t25 = t8 * (t9 * (t8 * t16) - t19) - t20 + t1 * (t18 * (t23 + gauge[0] * (t8 * t23)) + t9 * (t24 + gauge[0] * (t3 * t24)))
-    t26 = x2 * t25
-    t27 = 1.0 / 12.0 * t8
-    t28 = t5 - t27
-    t29 = t21 - t27
-    t30 = t1 * (t4 * (t1 * t16) - t19) - t20 + t8 * (t4 * (t28 + gauge[0] * (t3 * t28)) + t18 * (t29 + gauge[0] * (t1 * t29)))
-    t31 = x1 * t30
-    t32 = x1 * t8
-    return _filled(x, [t2 * t14 - t15 * t26, t15 * t31 - t32 * t14, t32 * t26 - t2 * t31])
+    products = _products(parameters, x)
+    with np.errstate(all="ignore"):
+        gauge = products[:, 1::2] / products[:, 2::2]
+    return np.where(np.isfinite(gauge), gauge, 0.0)
 
 
 def _products(parameters, x):

@@ -20,7 +20,7 @@
  *   4. The implicit step, by Newton's method
  *   5. The solver
  *   6. Ensembles
- * body-sha256: 12bbb1b02239ef3e6dec228171db4e6af5e2ee1da02da2c31a4776fce431838a
+ * body-sha256: 7ae4e0bc79a3f7ef627aa10646d683092a2f65c58d18f8a1d7676ad2c396c67f
  */
 #include "rigid_body_paper.h"
 
@@ -32,9 +32,7 @@
 const rigid_body_paper_params rigid_body_paper_default_params = { 1.0, 3.141592653589793, 100.0 };
 
 enum { rigid_body_paper_MAX_ITERATIONS = 20 }; /* of an inner solve */
-
-/* A correction is accepted when the error that it leaves is estimated to be below this. */
-#define rigid_body_paper_TOLERANCE 1e-20
+#define rigid_body_paper_TOLERANCE 1e-20 /* the error that an accepted correction may leave, as estimated */
 
 /* Whether all parameters are finite, and positive where they have to be. */
 static int rigid_body_paper_allowed(const rigid_body_paper_params *params)
@@ -43,51 +41,55 @@ static int rigid_body_paper_allowed(const rigid_body_paper_params *params)
         && isfinite(params->J3) && params->J3 > 0.0;
 }
 
+/* The polynomial with these coefficients, the constant first. */
+static inline double rigid_body_paper_polynomial(const double *coefficients, int count, double s)
+{
+    double value = coefficients[--count];
+    while (count > 0) value = value * s + coefficients[--count];
+    return value;
+}
+
 /* (1 - w cot w)/s with w = sqrt(s)/2, coth for negative s: the function of the exponential bi-realisation. */
 static double rigid_body_paper_phi0(double s)
 {
-    if (fabs(s) < 0.25)
-        return (0.08333333333333333 + s * (0.001388888888888889 + s * (3.306878306878307e-05 + s *
-            (8.267195767195768e-07 + s * (2.08767569878681e-08 + s * (5.284190138687493e-10 + s *
-            (1.3382536530684679e-11 + s * (3.3896802963225827e-13 + s * 8.586062056277845e-15))))))));
+    static const double near[9] = { 0.08333333333333333, 0.001388888888888889, 3.306878306878307e-05,
+        8.267195767195768e-07, 2.08767569878681e-08, 5.284190138687493e-10, 1.3382536530684679e-11,
+        3.3896802963225827e-13, 8.586062056277845e-15 };
+    static const double rest[21] = { 0.03267274151216445, 0.000105641107053347, 5.637370282876845e-07,
+        3.357141926657451e-09, 2.0742872904166045e-11, 1.3000482138698975e-13, 8.196052055691008e-16,
+        5.180118196169724e-18, 3.277539174701792e-20, 2.0747401878593604e-22, 1.3136241807166534e-24,
+        8.318003195189264e-27, 5.267262996834231e-29, 3.3354842988221443e-31, 2.1122063323183885e-33,
+        1.3375664093215244e-35, 8.470227328650247e-38, 5.363831046655698e-40, 3.3966848266497805e-42,
+        2.1509755511832569e-44, 1.3621211117593843e-46 };
+    if (fabs(s) < 0.25) return rigid_body_paper_polynomial(near, 9, s);
     if (fabs(s) < 16.0) {
         const double pole = 1.0 / (39.47841760435743 - s);
-        return 2.0 * pole + (0.03267274151216445 + s * (0.000105641107053347 + s * (5.637370282876845e-07
-            + s * (3.357141926657451e-09 + s * (2.0742872904166045e-11 + s * (1.3000482138698975e-13 + s *
-            (8.196052055691008e-16 + s * (5.180118196169724e-18 + s * (3.277539174701792e-20 + s *
-            (2.0747401878593604e-22 + s * (1.3136241807166534e-24 + s * (8.318003195189264e-27 + s *
-            (5.267262996834231e-29 + s * (3.3354842988221443e-31 + s * (2.1122063323183885e-33 + s *
-            (1.3375664093215244e-35 + s * (8.470227328650247e-38 + s * (5.363831046655698e-40 + s *
-            (3.3966848266497805e-42 + s * (2.1509755511832569e-44 + s *
-            1.3621211117593843e-46))))))))))))))))))));
+        return 2.0 * pole + rigid_body_paper_polynomial(rest, 21, s);
     }
     const double w = 0.5 * sqrt(fabs(s)), c = w / (s > 0.0 ? tan(w) : tanh(w));
-    const double phi0 = (1.0 - c) / s;
-    return phi0;
+    return (1.0 - c) / s;
 }
 
 /* The derivative of (1 - w cot w)/s, w = sqrt(s)/2. */
 static double rigid_body_paper_phi1(double s)
 {
-    if (fabs(s) < 0.25)
-        return (0.001388888888888889 + s * (6.613756613756614e-05 + s * (2.48015873015873e-06 + s *
-            (8.35070279514724e-08 + s * (2.6420950693437467e-09 + s * (8.029521918410807e-11 + s *
-            (2.372776207425808e-12 + s * (6.868849645022276e-14 + s * 1.9573818287022555e-15))))))));
+    static const double near[9] = { 0.001388888888888889, 6.613756613756614e-05, 2.48015873015873e-06,
+        8.35070279514724e-08, 2.6420950693437467e-09, 8.029521918410807e-11, 2.372776207425808e-12,
+        6.868849645022276e-14, 1.9573818287022555e-15 };
+    static const double rest[21] = { 0.000105641107053347, 1.127474056575369e-06, 1.0071425779972354e-08,
+        8.297149161666418e-11, 6.500241069349487e-13, 4.917631233414605e-15, 3.626082737318807e-17,
+        2.6220313397614337e-19, 1.8672661690734246e-21, 1.3136241807166533e-23, 9.149803514708191e-26,
+        6.320715596201077e-28, 4.336129588468787e-30, 2.957088865245744e-32, 2.0063496139822866e-34,
+        1.3552363725840395e-36, 9.118512779314688e-39, 6.114032687969605e-41, 4.0868535472481875e-43,
+        2.7242422235187686e-45, 1.8114038279637677e-47 };
+    if (fabs(s) < 0.25) return rigid_body_paper_polynomial(near, 9, s);
     if (fabs(s) < 16.0) {
         const double pole = 1.0 / (39.47841760435743 - s);
-        return 2.0 * pole * pole + (0.000105641107053347 + s * (1.127474056575369e-06 + s *
-            (1.0071425779972354e-08 + s * (8.297149161666418e-11 + s * (6.500241069349487e-13 + s *
-            (4.917631233414605e-15 + s * (3.626082737318807e-17 + s * (2.6220313397614337e-19 + s *
-            (1.8672661690734246e-21 + s * (1.3136241807166533e-23 + s * (9.149803514708191e-26 + s *
-            (6.320715596201077e-28 + s * (4.336129588468787e-30 + s * (2.957088865245744e-32 + s *
-            (2.0063496139822866e-34 + s * (1.3552363725840395e-36 + s * (9.118512779314688e-39 + s *
-            (6.114032687969605e-41 + s * (4.0868535472481875e-43 + s * (2.7242422235187686e-45 + s *
-            1.8114038279637677e-47))))))))))))))))))));
+        return 2.0 * pole * pole + rigid_body_paper_polynomial(rest, 21, s);
     }
     const double w = 0.5 * sqrt(fabs(s)), c = w / (s > 0.0 ? tan(w) : tanh(w));
     const double phi0 = (1.0 - c) / s;
-    const double phi1 = (0.5 * s * phi0 * phi0 - 1.5 * phi0 + 0.125) / s;
-    return phi1;
+    return (0.5 * s * phi0 * phi0 - 1.5 * phi0 + 0.125) / s;
 }
 
 /* everything that depends on parameters and step size only */
@@ -107,9 +109,7 @@ static void rigid_body_paper_linearise(const double coef[3], const double y[3],
 {
     const double x1 = y[0], x2 = y[1], x3 = y[2];
     /* momenta */
-    const double p_x3 = coef[2] * x3;
-    const double p_x1 = coef[0] * x1;
-    const double p_x2 = coef[1] * x2;
+    const double p_x3 = coef[2] * x3, p_x1 = coef[0] * x1, p_x2 = coef[1] * x2;
     /* displacement */
     const double t1 = x3 * p_x1, t2 = x1 * p_x3, t3 = t1 - t2, t4 = x1 * p_x2, t5 = x2 * p_x1;
     const double t6 = t4 - t5, t7 = p_x3 * t3 - p_x2 * t6, t8 = p_x3 * p_x3, t9 = p_x2 * p_x2;
@@ -124,11 +124,10 @@ static void rigid_body_paper_linearise(const double coef[3], const double y[3],
     increment[1] = t3;
     increment[2] = t6;
     /* jacobian */
-    const double t19 = x2 * p_x2, t20 = x3 * p_x3, t21 = rigid_body_paper_phi1(t12);
-    const double t22 = p_x1 * t21, t23 = p_x1 * p_x2 * t13, t24 = 0.5 * p_x3, t25 = 0.5 * x3;
-    const double t26 = p_x2 * t21, t27 = 0.5 * p_x2, t28 = p_x3 * p_x1 * t13, t29 = p_x3 * t21;
-    const double t30 = 0.5 * x2, t31 = x1 * p_x1, t32 = p_x3 * p_x2 * t13, t33 = 0.5 * p_x1;
-    const double t34 = 0.5 * x1;
+    const double t19 = x2 * p_x2, t20 = x3 * p_x3, t21 = rigid_body_paper_phi1(t12), t22 = p_x1 * t21;
+    const double t23 = p_x1 * p_x2 * t13, t24 = 0.5 * p_x3, t25 = 0.5 * x3, t26 = p_x2 * t21;
+    const double t27 = 0.5 * p_x2, t28 = p_x3 * p_x1 * t13, t29 = p_x3 * t21, t30 = 0.5 * x2;
+    const double t31 = x1 * p_x1, t32 = p_x3 * p_x2 * t13, t33 = 0.5 * p_x1, t34 = 0.5 * x1;
     jacobian[0] = 1.0 + (coef[0] * ((t19 + t20) * t13 + 2.0 * (t7 * t22)) - (t9 + t8) * t13);
     jacobian[1] = t23 - t24 + coef[1] * (t25 + (2.0 * (t7 * t26) - (t4 + t6) * t13));
     jacobian[2] = t27 + t28 + coef[2] * ((t3 - t2) * t13 + 2.0 * (t7 * t29) - t30);
@@ -150,26 +149,6 @@ static void rigid_body_paper_linearise(const double coef[3], const double y[3],
     increment_jacobian[8] = 0.0;
 }
 
-/* elimination without pivoting: the solution, and the reciprocals of the pivots */
-static void rigid_body_paper_eliminate(const double matrix[9], const double side[3],
-    double solution[restrict 3], double reciprocal[restrict 3])
-{
-    /* solution */
-    const double t1 = 1.0 / matrix[0], t2 = matrix[6] * t1, t3 = matrix[3] * t1;
-    const double t4 = side[1] - side[0] * t3, t5 = 1.0 / (matrix[4] - matrix[1] * t3);
-    const double t6 = (matrix[7] - matrix[1] * t2) * t5, t7 = matrix[5] - matrix[2] * t3;
-    const double t8 = 1.0 / (matrix[8] - matrix[2] * t2 - t7 * t6);
-    const double t9 = (side[2] - side[0] * t2 - t4 * t6) * t8, t10 = t5 * (t4 - t7 * t9);
-    solution[0] = t1 * (side[0] - (matrix[2] * t9 + matrix[1] * t10));
-    solution[1] = t10;
-    solution[2] = t9;
-    /* reciprocal */
-    reciprocal[0] = t1;
-    reciprocal[1] = t5;
-    reciprocal[2] = t8;
-}
-
-/* the Hamiltonian */
 double rigid_body_paper_hamiltonian(const rigid_body_paper_params *params, const double x[3])
 {
     if (params == NULL) params = &rigid_body_paper_default_params;
@@ -177,7 +156,6 @@ double rigid_body_paper_hamiltonian(const rigid_body_paper_params *params, const
     return 0.5 * ((J1 + J2) * (x3 * x3) + ((J2 + J3) * (x1 * x1) + x2 * x2 * (J1 + J3)));
 }
 
-/* the Casimirs */
 void rigid_body_paper_casimirs(const rigid_body_paper_params *params, const double x[3], double out[])
 {
     (void)params;
@@ -185,7 +163,6 @@ void rigid_body_paper_casimirs(const rigid_body_paper_params *params, const doub
     out[0] = x3 * x3 + (x2 * x2 + x1 * x1);
 }
 
-/* pi(x) grad H(x) */
 void rigid_body_paper_vector_field(const rigid_body_paper_params *params, const double x[3], double out[3])
 {
     if (params == NULL) params = &rigid_body_paper_default_params;
@@ -197,19 +174,18 @@ void rigid_body_paper_vector_field(const rigid_body_paper_params *params, const 
 }
 
 /* ---- Compensated sums, linear equations ---- */
-/* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to
-   its last bit: were it rounded with the change, corrections of one sign would add up to a drift. 0, and x as
-   before, if the sum is not finite. */
+/* x + change + small in compensated arithmetic, where small is the carry and what is as small: were that
+   rounded with the change, corrections of one sign would add up to a drift. 0, and x as before, if the sum is
+   not finite. */
 static int rigid_body_paper_advance(rigid_body_paper_solver *s, const double change[rigid_body_paper_DIM],
-    const double correction[rigid_body_paper_DIM])
+    const double small[rigid_body_paper_DIM])
 {
     double x[rigid_body_paper_DIM], carry[rigid_body_paper_DIM];
     for (int i = 0; i < rigid_body_paper_DIM; ++i) {
         const double sum = s->x[i] + change[i], added = sum - s->x[i];
-        const double lost = (s->x[i] - (sum - added)) + (change[i] - added);
-        const double small = lost + (s->carry[i] + correction[i]);
-        x[i] = sum + small;
-        carry[i] = small - (x[i] - sum);
+        const double lost = ((s->x[i] - (sum - added)) + (change[i] - added)) + small[i];
+        x[i] = sum + lost;
+        carry[i] = lost - (x[i] - sum);
         if (!isfinite(x[i])) return 0;
     }
     memcpy(s->x, x, sizeof x);
@@ -217,29 +193,44 @@ static int rigid_body_paper_advance(rigid_body_paper_solver *s, const double cha
     return 1;
 }
 
-/* Newton matrices are I + O(h): a pivot whose reciprocal is larger than this is far from 1. */
-#define rigid_body_paper_LARGEST_RECIPROCAL 1e3
-
-/* Solve matrix * solution = side, both overwritten. The matrix is I + O(h): 0 if a pivot is far from 1. */
+/* Solve matrix * solution = side, both overwritten, by elimination with partial pivoting. 0 if singular. */
 static int rigid_body_paper_solve(double matrix[rigid_body_paper_DIM * rigid_body_paper_DIM],
     double side[rigid_body_paper_DIM])
 {
-    double solution[rigid_body_paper_DIM], reciprocal[rigid_body_paper_DIM], largest = 0.0;
-    rigid_body_paper_eliminate(matrix, side, solution, reciprocal);
-    for (int i = 0; i < rigid_body_paper_DIM; ++i)
-        if (!(fabs(reciprocal[i]) <= largest)) largest = fabs(reciprocal[i]);
-    if (!(largest < rigid_body_paper_LARGEST_RECIPROCAL)) return 0;
-    memcpy(side, solution, sizeof solution);
+    for (int k = 0; k < rigid_body_paper_DIM; ++k) {
+        int best = k;
+        for (int i = k + 1; i < rigid_body_paper_DIM; ++i)
+            if (fabs(matrix[i * rigid_body_paper_DIM + k]) > fabs(matrix[best * rigid_body_paper_DIM + k]))
+                best = i;
+        const double pivot = matrix[best * rigid_body_paper_DIM + k], last = side[k];
+        if (!(fabs(pivot) > 0.0)) return 0;
+        for (int j = k; j < rigid_body_paper_DIM && best != k; ++j) {
+            const double swap = matrix[k * rigid_body_paper_DIM + j];
+            matrix[k * rigid_body_paper_DIM + j] = matrix[best * rigid_body_paper_DIM + j];
+            matrix[best * rigid_body_paper_DIM + j] = swap;
+        }
+        side[k] = side[best];
+        side[best] = last;
+        for (int i = k + 1; i < rigid_body_paper_DIM; ++i) {
+            const double factor = matrix[i * rigid_body_paper_DIM + k] / pivot;
+            for (int j = k + 1; j < rigid_body_paper_DIM; ++j)
+                matrix[i * rigid_body_paper_DIM + j] -= factor * matrix[k * rigid_body_paper_DIM + j];
+            side[i] -= factor * side[k];
+        }
+    }
+    for (int i = rigid_body_paper_DIM - 1; i >= 0; --i) {
+        for (int j = i + 1; j < rigid_body_paper_DIM; ++j)
+            side[i] -= matrix[i * rigid_body_paper_DIM + j] * side[j];
+        side[i] /= matrix[i * rigid_body_paper_DIM + i];
+    }
     return 1;
 }
 
 /* ---- Starting guesses ---- */
-/* How far from the last value a guess may be, in sizes of that value. */
-#define rigid_body_paper_REACH 4.0
+#define rigid_body_paper_REACH 4.0 /* how far from the last value a guess may be, in sizes of that value */
 
-/* The guess for the next value from the last ones: the sum of their backward differences. 0 if there is none,
-   or if it is far away, where the equation of a step has solutions that have nothing to do with the motion.
-   */
+/* The guess for the next value, the sum of differences. 0 if there is none, or if it is far away, where the
+   equation of a step has solutions that have nothing to do with the motion. */
 static int rigid_body_paper_predict(const rigid_body_paper_history *history,
     double value[rigid_body_paper_DIM])
 {
@@ -277,10 +268,9 @@ static void rigid_body_paper_remember(rigid_body_paper_history *history,
     if (history->count < rigid_body_paper_DIFFERENCES) ++history->count;
 }
 
-/* How far a step may lead, in sizes of the state and of what the vector field says, if the energy is lost;
-   and the part of the energy that counts as lost. */
+/* how far any step may lead, in sizes of the state and of its motion */
 #define rigid_body_paper_PLAUSIBLE 1.5
-#define rigid_body_paper_LOST 0.5
+#define rigid_body_paper_LOST 0.5 /* part of the energy that one which leads farther must not lose */
 
 /* Whether an increment is that of the motion. Where the step is too large, the equation may have been solved
    by a point far away, at another energy, that has nothing to do with it. */
@@ -292,23 +282,21 @@ static int rigid_body_paper_plausible(const rigid_body_paper_solver *s,
     for (int i = 0; i < rigid_body_paper_DIM; ++i) {
         moved += fabs(increment[i]);
         size += fabs(s->x[i]);
-    }
-    if (moved <= rigid_body_paper_PLAUSIBLE * size) return 1;
-    rigid_body_paper_vector_field(&s->params, s->x, field);
-    for (int i = 0; i < rigid_body_paper_DIM; ++i) {
-        size += fabs(s->h * field[i]);
         middle[i] = s->x[i] + 0.5 * increment[i];
         end[i] = s->x[i] + increment[i];
     }
     if (moved <= rigid_body_paper_PLAUSIBLE * size) return 1;
-    const double before = rigid_body_paper_hamiltonian(&s->params, s->x), after =
-        rigid_body_paper_hamiltonian(&s->params, end);
-    const double scale = fabs(before) + fabs(rigid_body_paper_hamiltonian(&s->params, middle)) + fabs(after);
-    return fabs(after - before) <= rigid_body_paper_LOST * scale;
+    rigid_body_paper_vector_field(&s->params, s->x, field);
+    for (int i = 0; i < rigid_body_paper_DIM; ++i) size += fabs(s->h * field[i]);
+    if (moved <= rigid_body_paper_PLAUSIBLE * size) return 1;
+    const double before = rigid_body_paper_hamiltonian(&s->params, s->x);
+    const double after = rigid_body_paper_hamiltonian(&s->params, end), between =
+        rigid_body_paper_hamiltonian(&s->params, middle);
+    return fabs(after - before) <= rigid_body_paper_LOST * (fabs(before) + fabs(between) + fabs(after));
 }
 
 /* ---- The implicit step, by Newton's method ---- */
-/* Components of y are measured no finer than by this part of the largest. */
+/* components of y are measured no finer than by this part of the largest */
 #define rigid_body_paper_FLOOR 1e-6
 
 /* Size of a correction relative to each component of y; NaN or infinite if the correction is. */
@@ -325,9 +313,9 @@ static double rigid_body_paper_size(const double y[rigid_body_paper_DIM],
     return size;
 }
 
-/* Corrections below the first that shrink by less than the second have reached the level of rounding. */
+/* corrections below this have reached the level of rounding, ... */
 #define rigid_body_paper_NEARLY_SOLVED 1e-8
-#define rigid_body_paper_SHRINKING 0.25
+#define rigid_body_paper_SHRINKING 0.25 /* ... if one is more than this part of the one before */
 
 /* Solve (y - x) + displacement(y) = 0 for y by Newton's method from the extrapolated guess, and advance. The
    increment is corrected to first order by the last Newton correction, so that correction costs no
@@ -338,13 +326,14 @@ static rigid_body_paper_status rigid_body_paper_attempt(rigid_body_paper_solver 
     double y[rigid_body_paper_DIM], delta[rigid_body_paper_DIM], displacement[rigid_body_paper_DIM],
         increment[rigid_body_paper_DIM];
     double jacobian[rigid_body_paper_DIM * rigid_body_paper_DIM], increment_jacobian[rigid_body_paper_DIM
-        * rigid_body_paper_DIM], previous = HUGE_VAL;
+        * rigid_body_paper_DIM];
+    double previous = HUGE_VAL;
     if (!rigid_body_paper_predict(&s->history, y)) memcpy(y, s->x, sizeof y);
     for (int iteration = 1; iteration <= rigid_body_paper_MAX_ITERATIONS; ++iteration) {
         rigid_body_paper_linearise(s->coef, y, displacement, increment, jacobian, increment_jacobian);
         ++s->evaluations;
-        for (int i = 0; i < rigid_body_paper_DIM; ++i) delta[i] = ((y[i] - s->x[i]) + displacement[i])
-            - s->carry[i];
+        for (int i = 0; i < rigid_body_paper_DIM; ++i)
+            delta[i] = ((y[i] - s->x[i]) + displacement[i]) - s->carry[i];
         const int regular = rigid_body_paper_solve(jacobian, delta);
         const double size = rigid_body_paper_size(y, delta), growth = size / (previous * previous);
         if (!isfinite(size)) return rigid_body_paper_NOT_FINITE;
@@ -355,12 +344,14 @@ static rigid_body_paper_status rigid_body_paper_attempt(rigid_body_paper_solver 
             * previous;
         previous = size;
         if (!(remaining <= rigid_body_paper_TOLERANCE || stalled)) continue;
-        double correction[rigid_body_paper_DIM] = { 0.0 };
-        for (int i = 0; i < rigid_body_paper_DIM; ++i)
+        double small[rigid_body_paper_DIM] = { 0.0 }; /* the correction of the increment, and the carry */
+        for (int i = 0; i < rigid_body_paper_DIM; ++i) {
             for (int j = 0; j < rigid_body_paper_DIM; ++j)
-                correction[i] -= increment_jacobian[i * rigid_body_paper_DIM + j] * delta[j];
+                small[i] -= increment_jacobian[i * rigid_body_paper_DIM + j] * delta[j];
+            small[i] += s->carry[i];
+        }
         if (!rigid_body_paper_plausible(s, increment)) return rigid_body_paper_NO_CONVERGENCE;
-        if (!rigid_body_paper_advance(s, increment, correction)) return rigid_body_paper_NOT_FINITE;
+        if (!rigid_body_paper_advance(s, increment, small)) return rigid_body_paper_NOT_FINITE;
         rigid_body_paper_remember(&s->history, y);
         return rigid_body_paper_OK;
     }
@@ -368,32 +359,24 @@ static rigid_body_paper_status rigid_body_paper_attempt(rigid_body_paper_solver 
 }
 
 /* ---- The solver ---- */
-/* Whether steps can be made with these parameters: allowed, and with finite coefficients for a step so short
-   that it has no part in it. */
-static int rigid_body_paper_admissible(const rigid_body_paper_params *params)
-{
-    double coef[rigid_body_paper_COEFFICIENTS];
-    if (!rigid_body_paper_allowed(params)) return 0;
-    rigid_body_paper_prepare(params, 1e-100, coef);
-    for (int k = 0; k < rigid_body_paper_COEFFICIENTS; ++k)
-        if (!isfinite(coef[k])) return 0;
-    return 1;
-}
+/* so short that it has no part in whether coefficients are finite */
+#define rigid_body_paper_SHORT_STEP 1e-100
 
-/* The arguments may be parts of *s: they are read before it is written. */
+/* The arguments may be parts of *s, which is therefore written last. */
 rigid_body_paper_status rigid_body_paper_init(rigid_body_paper_solver *s,
     const rigid_body_paper_params *params, const double x0[rigid_body_paper_DIM])
 {
     if (s == NULL || x0 == NULL) return rigid_body_paper_BAD_ARGUMENT;
-    const rigid_body_paper_params own = params != NULL ? *params : rigid_body_paper_default_params;
-    double x[rigid_body_paper_DIM];
-    memcpy(x, x0, sizeof x);
+    rigid_body_paper_solver fresh = { .h = (double)NAN };
+    fresh.params = params != NULL ? *params : rigid_body_paper_default_params;
+    memcpy(fresh.x, x0, sizeof fresh.x);
     for (int i = 0; i < rigid_body_paper_DIM; ++i)
-        if (!isfinite(x[i])) return rigid_body_paper_BAD_ARGUMENT;
-    if (!rigid_body_paper_admissible(&own)) return rigid_body_paper_BAD_ARGUMENT;
-    memset(s, 0, sizeof *s);
-    memcpy(s->x, x, sizeof s->x);
-    s->params = own;
+        if (!isfinite(fresh.x[i])) return rigid_body_paper_BAD_ARGUMENT;
+    if (!rigid_body_paper_allowed(&fresh.params)) return rigid_body_paper_BAD_ARGUMENT;
+    rigid_body_paper_prepare(&fresh.params, rigid_body_paper_SHORT_STEP, fresh.coef);
+    for (int k = 0; k < rigid_body_paper_COEFFICIENTS; ++k)
+        if (!isfinite(fresh.coef[k])) return rigid_body_paper_BAD_ARGUMENT;
+    *s = fresh;
     return rigid_body_paper_OK;
 }
 
@@ -401,44 +384,38 @@ rigid_body_paper_status rigid_body_paper_init(rigid_body_paper_solver *s,
 static rigid_body_paper_status rigid_body_paper_set_step(rigid_body_paper_solver *s, double h)
 {
     if (s == NULL || !isfinite(h)) return rigid_body_paper_BAD_ARGUMENT;
-    if (s->prepared && memcmp(&h, &s->h, sizeof h) == 0) return rigid_body_paper_OK;
+    if (memcmp(&h, &s->h, sizeof h) == 0) return rigid_body_paper_OK;
     rigid_body_paper_prepare(&s->params, h, s->coef);
     memset(&s->history, 0, sizeof s->history);
     s->h = h;
     s->t_before_h = s->t;
     s->steps_before_h = s->steps;
-    s->prepared = 1;
     return rigid_body_paper_OK;
 }
 
 /* One stage. A guess from earlier steps may have misled it: then once more without. */
 static rigid_body_paper_status rigid_body_paper_stage(rigid_body_paper_solver *s)
 {
-    rigid_body_paper_status status = rigid_body_paper_attempt(s);
-    if (status != rigid_body_paper_OK && s->history.count > 0) {
-        memset(&s->history, 0, sizeof s->history);
-        status = rigid_body_paper_attempt(s);
-    }
-    return status;
-}
-
-rigid_body_paper_status rigid_body_paper_step(rigid_body_paper_solver *s, double h)
-{
-    rigid_body_paper_status status = rigid_body_paper_set_step(s, h);
-    if (status != rigid_body_paper_OK) return status;
-    status = rigid_body_paper_stage(s);
-    if (status != rigid_body_paper_OK) return status;
-    ++s->steps;
-    s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
-    return status;
+    const rigid_body_paper_status status = rigid_body_paper_attempt(s);
+    if (status == rigid_body_paper_OK || s->history.count == 0) return status;
+    memset(&s->history, 0, sizeof s->history);
+    return rigid_body_paper_attempt(s);
 }
 
 rigid_body_paper_status rigid_body_paper_integrate(rigid_body_paper_solver *s, double h, size_t steps)
 {
     rigid_body_paper_status status = rigid_body_paper_set_step(s, h);
-    for (; steps > 0 && status == rigid_body_paper_OK; --steps) status = rigid_body_paper_step(s, h);
+    for (; steps > 0 && status == rigid_body_paper_OK; --steps) {
+        status = rigid_body_paper_stage(s);
+        if (status != rigid_body_paper_OK) break;
+        ++s->steps;
+        s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
+    }
     return status;
 }
+
+rigid_body_paper_status rigid_body_paper_step(rigid_body_paper_solver *s,
+    double h) { return rigid_body_paper_integrate(s, h, 1); }
 
 const char *rigid_body_paper_status_string(rigid_body_paper_status status)
 {
@@ -453,7 +430,6 @@ const char *rigid_body_paper_status_string(rigid_body_paper_status status)
 }
 
 size_t rigid_body_paper_solver_size(void) { return sizeof(rigid_body_paper_solver); }
-
 size_t rigid_body_paper_solver_steps_done(const rigid_body_paper_solver *s) { return s->steps; }
 
 /* ---- Ensembles ---- */

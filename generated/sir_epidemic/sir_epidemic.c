@@ -20,7 +20,7 @@
  *   4. The implicit step, along paths dm/dt = pi(m) p
  *   5. The solver
  *   6. Ensembles
- * body-sha256: 654994fe2a69608b5f6b8b5ec531527531c78e1ec7c460ac06179109bd535e34
+ * body-sha256: b2c701829480a272555ee8ca4920aa86756b7c19bbaaa9d13afc6fe57e084d2c
  */
 #include "sir_epidemic.h"
 
@@ -76,26 +76,6 @@ static void sir_epidemic_generate(const double coef[4], const double y[3], doubl
     jacobian[8] = 1.0;
 }
 
-/* elimination without pivoting: the solution, and the reciprocals of the pivots */
-static void sir_epidemic_eliminate(const double matrix[9], const double side[3], double solution[restrict 3],
-    double reciprocal[restrict 3])
-{
-    /* solution */
-    const double t1 = 1.0 / matrix[0], t2 = matrix[6] * t1, t3 = matrix[3] * t1;
-    const double t4 = side[1] - side[0] * t3, t5 = 1.0 / (matrix[4] - matrix[1] * t3);
-    const double t6 = (matrix[7] - matrix[1] * t2) * t5, t7 = matrix[5] - matrix[2] * t3;
-    const double t8 = 1.0 / (matrix[8] - matrix[2] * t2 - t7 * t6);
-    const double t9 = (side[2] - side[0] * t2 - t4 * t6) * t8, t10 = t5 * (t4 - t7 * t9);
-    solution[0] = t1 * (side[0] - (matrix[2] * t9 + matrix[1] * t10));
-    solution[1] = t10;
-    solution[2] = t9;
-    /* reciprocal */
-    reciprocal[0] = t1;
-    reciprocal[1] = t5;
-    reciprocal[2] = t8;
-}
-
-/* the Hamiltonian */
 double sir_epidemic_hamiltonian(const sir_epidemic_params *params, const double x[3])
 {
     if (params == NULL) params = &sir_epidemic_default_params;
@@ -103,7 +83,6 @@ double sir_epidemic_hamiltonian(const sir_epidemic_params *params, const double 
     return gamma * log(S) - beta * (I_ + S);
 }
 
-/* the Casimirs */
 void sir_epidemic_casimirs(const sir_epidemic_params *params, const double x[3], double out[])
 {
     (void)params;
@@ -111,7 +90,6 @@ void sir_epidemic_casimirs(const sir_epidemic_params *params, const double x[3],
     out[0] = R + (I_ + S);
 }
 
-/* pi(x) grad H(x) */
 void sir_epidemic_vector_field(const sir_epidemic_params *params, const double x[3], double out[3])
 {
     if (params == NULL) params = &sir_epidemic_default_params;
@@ -123,19 +101,18 @@ void sir_epidemic_vector_field(const sir_epidemic_params *params, const double x
 }
 
 /* ---- Compensated sums, linear equations ---- */
-/* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to
-   its last bit: were it rounded with the change, corrections of one sign would add up to a drift. 0, and x as
-   before, if the sum is not finite. */
+/* x + change + small in compensated arithmetic, where small is the carry and what is as small: were that
+   rounded with the change, corrections of one sign would add up to a drift. 0, and x as before, if the sum is
+   not finite. */
 static int sir_epidemic_advance(sir_epidemic_solver *s, const double change[sir_epidemic_DIM],
-    const double correction[sir_epidemic_DIM])
+    const double small[sir_epidemic_DIM])
 {
     double x[sir_epidemic_DIM], carry[sir_epidemic_DIM];
     for (int i = 0; i < sir_epidemic_DIM; ++i) {
         const double sum = s->x[i] + change[i], added = sum - s->x[i];
-        const double lost = (s->x[i] - (sum - added)) + (change[i] - added);
-        const double small = lost + (s->carry[i] + correction[i]);
-        x[i] = sum + small;
-        carry[i] = small - (x[i] - sum);
+        const double lost = ((s->x[i] - (sum - added)) + (change[i] - added)) + small[i];
+        x[i] = sum + lost;
+        carry[i] = lost - (x[i] - sum);
         if (!isfinite(x[i])) return 0;
     }
     memcpy(s->x, x, sizeof x);
@@ -143,29 +120,42 @@ static int sir_epidemic_advance(sir_epidemic_solver *s, const double change[sir_
     return 1;
 }
 
-/* Newton matrices are I + O(h): a pivot whose reciprocal is larger than this is far from 1. */
-#define sir_epidemic_LARGEST_RECIPROCAL 1e3
-
-/* Solve matrix * solution = side, both overwritten. The matrix is I + O(h): 0 if a pivot is far from 1. */
+/* Solve matrix * solution = side, both overwritten, by elimination with partial pivoting. 0 if singular. */
 static int sir_epidemic_solve(double matrix[sir_epidemic_DIM * sir_epidemic_DIM],
     double side[sir_epidemic_DIM])
 {
-    double solution[sir_epidemic_DIM], reciprocal[sir_epidemic_DIM], largest = 0.0;
-    sir_epidemic_eliminate(matrix, side, solution, reciprocal);
-    for (int i = 0; i < sir_epidemic_DIM; ++i)
-        if (!(fabs(reciprocal[i]) <= largest)) largest = fabs(reciprocal[i]);
-    if (!(largest < sir_epidemic_LARGEST_RECIPROCAL)) return 0;
-    memcpy(side, solution, sizeof solution);
+    for (int k = 0; k < sir_epidemic_DIM; ++k) {
+        int best = k;
+        for (int i = k + 1; i < sir_epidemic_DIM; ++i)
+            if (fabs(matrix[i * sir_epidemic_DIM + k]) > fabs(matrix[best * sir_epidemic_DIM + k])) best = i;
+        const double pivot = matrix[best * sir_epidemic_DIM + k], last = side[k];
+        if (!(fabs(pivot) > 0.0)) return 0;
+        for (int j = k; j < sir_epidemic_DIM && best != k; ++j) {
+            const double swap = matrix[k * sir_epidemic_DIM + j];
+            matrix[k * sir_epidemic_DIM + j] = matrix[best * sir_epidemic_DIM + j];
+            matrix[best * sir_epidemic_DIM + j] = swap;
+        }
+        side[k] = side[best];
+        side[best] = last;
+        for (int i = k + 1; i < sir_epidemic_DIM; ++i) {
+            const double factor = matrix[i * sir_epidemic_DIM + k] / pivot;
+            for (int j = k + 1; j < sir_epidemic_DIM; ++j)
+                matrix[i * sir_epidemic_DIM + j] -= factor * matrix[k * sir_epidemic_DIM + j];
+            side[i] -= factor * side[k];
+        }
+    }
+    for (int i = sir_epidemic_DIM - 1; i >= 0; --i) {
+        for (int j = i + 1; j < sir_epidemic_DIM; ++j) side[i] -= matrix[i * sir_epidemic_DIM + j] * side[j];
+        side[i] /= matrix[i * sir_epidemic_DIM + i];
+    }
     return 1;
 }
 
 /* ---- Starting guesses ---- */
-/* How far from the last value a guess may be, in sizes of that value. */
-#define sir_epidemic_REACH 4.0
+#define sir_epidemic_REACH 4.0 /* how far from the last value a guess may be, in sizes of that value */
 
-/* The guess for the next value from the last ones: the sum of their backward differences. 0 if there is none,
-   or if it is far away, where the equation of a step has solutions that have nothing to do with the motion.
-   */
+/* The guess for the next value, the sum of differences. 0 if there is none, or if it is far away, where the
+   equation of a step has solutions that have nothing to do with the motion. */
 static int sir_epidemic_predict(const sir_epidemic_history *history, double value[sir_epidemic_DIM])
 {
     double distance = 0.0, size = 0.0;
@@ -201,10 +191,8 @@ static void sir_epidemic_remember(sir_epidemic_history *history, const double va
     if (history->count < sir_epidemic_DIFFERENCES) ++history->count;
 }
 
-/* How far a step may lead, in sizes of the state and of what the vector field says, if the energy is lost;
-   and the part of the energy that counts as lost. */
-#define sir_epidemic_PLAUSIBLE 1.5
-#define sir_epidemic_LOST 0.5
+#define sir_epidemic_PLAUSIBLE 1.5 /* how far any step may lead, in sizes of the state and of its motion */
+#define sir_epidemic_LOST 0.5      /* part of the energy that one which leads farther must not lose */
 
 /* Whether an increment is that of the motion. Where the step is too large, the equation may have been solved
    by a point far away, at another energy, that has nothing to do with it. */
@@ -214,19 +202,17 @@ static int sir_epidemic_plausible(const sir_epidemic_solver *s, const double inc
     for (int i = 0; i < sir_epidemic_DIM; ++i) {
         moved += fabs(increment[i]);
         size += fabs(s->x[i]);
-    }
-    if (moved <= sir_epidemic_PLAUSIBLE * size) return 1;
-    sir_epidemic_vector_field(&s->params, s->x, field);
-    for (int i = 0; i < sir_epidemic_DIM; ++i) {
-        size += fabs(s->h * field[i]);
         middle[i] = s->x[i] + 0.5 * increment[i];
         end[i] = s->x[i] + increment[i];
     }
     if (moved <= sir_epidemic_PLAUSIBLE * size) return 1;
-    const double before = sir_epidemic_hamiltonian(&s->params, s->x), after =
-        sir_epidemic_hamiltonian(&s->params, end);
-    const double scale = fabs(before) + fabs(sir_epidemic_hamiltonian(&s->params, middle)) + fabs(after);
-    return fabs(after - before) <= sir_epidemic_LOST * scale;
+    sir_epidemic_vector_field(&s->params, s->x, field);
+    for (int i = 0; i < sir_epidemic_DIM; ++i) size += fabs(s->h * field[i]);
+    if (moved <= sir_epidemic_PLAUSIBLE * size) return 1;
+    const double before = sir_epidemic_hamiltonian(&s->params, s->x);
+    const double after = sir_epidemic_hamiltonian(&s->params, end), between =
+        sir_epidemic_hamiltonian(&s->params, middle);
+    return fabs(after - before) <= sir_epidemic_LOST * (fabs(before) + fabs(between) + fabs(after));
 }
 
 /* Coefficient k of the product of two Taylor series. */
@@ -407,7 +393,7 @@ static int sir_epidemic_differences(sir_epidemic_solver *s, const double *coef,
    than sir_epidemic_MOST_PIECES pieces of paths, the step is so large that a solution would mean nothing. */
 static sir_epidemic_status sir_epidemic_attempt(sir_epidemic_solver *s)
 {
-    const double *coef = s->coef, none[sir_epidemic_DIM] = { 0.0 };
+    const double *coef = s->coef;
     double p[sir_epidemic_DIM], y[sir_epidemic_DIM], residual[sir_epidemic_DIM], change[sir_epidemic_DIM],
         jacobian[sir_epidemic_DIM * sir_epidemic_DIM], previous = HUGE_VAL;
     if (!sir_epidemic_predict(&s->history, y)) memcpy(y, s->x, sizeof y);
@@ -426,7 +412,7 @@ static sir_epidemic_status sir_epidemic_attempt(sir_epidemic_solver *s)
         /* The second test: residuals no longer shrink, the solve has reached the level of rounding. */
         if (size <= 4e-16 || (previous < 1e-12 && size > 0.25 * previous)) {
             if (!sir_epidemic_plausible(s, change)) return sir_epidemic_NO_CONVERGENCE;
-            if (!sir_epidemic_advance(s, change, none)) return sir_epidemic_NOT_FINITE;
+            if (!sir_epidemic_advance(s, change, s->carry)) return sir_epidemic_NOT_FINITE;
             sir_epidemic_remember(&s->history, y);
             return sir_epidemic_OK;
         }
@@ -441,32 +427,23 @@ static sir_epidemic_status sir_epidemic_attempt(sir_epidemic_solver *s)
 }
 
 /* ---- The solver ---- */
-/* Whether steps can be made with these parameters: allowed, and with finite coefficients for a step so short
-   that it has no part in it. */
-static int sir_epidemic_admissible(const sir_epidemic_params *params)
-{
-    double coef[sir_epidemic_COEFFICIENTS];
-    if (!sir_epidemic_allowed(params)) return 0;
-    sir_epidemic_prepare(params, 1e-100, coef);
-    for (int k = 0; k < sir_epidemic_COEFFICIENTS; ++k)
-        if (!isfinite(coef[k])) return 0;
-    return 1;
-}
+#define sir_epidemic_SHORT_STEP 1e-100 /* so short that it has no part in whether coefficients are finite */
 
-/* The arguments may be parts of *s: they are read before it is written. */
+/* The arguments may be parts of *s, which is therefore written last. */
 sir_epidemic_status sir_epidemic_init(sir_epidemic_solver *s, const sir_epidemic_params *params,
     const double x0[sir_epidemic_DIM])
 {
     if (s == NULL || x0 == NULL) return sir_epidemic_BAD_ARGUMENT;
-    const sir_epidemic_params own = params != NULL ? *params : sir_epidemic_default_params;
-    double x[sir_epidemic_DIM];
-    memcpy(x, x0, sizeof x);
+    sir_epidemic_solver fresh = { .h = (double)NAN };
+    fresh.params = params != NULL ? *params : sir_epidemic_default_params;
+    memcpy(fresh.x, x0, sizeof fresh.x);
     for (int i = 0; i < sir_epidemic_DIM; ++i)
-        if (!isfinite(x[i])) return sir_epidemic_BAD_ARGUMENT;
-    if (!sir_epidemic_admissible(&own)) return sir_epidemic_BAD_ARGUMENT;
-    memset(s, 0, sizeof *s);
-    memcpy(s->x, x, sizeof s->x);
-    s->params = own;
+        if (!isfinite(fresh.x[i])) return sir_epidemic_BAD_ARGUMENT;
+    if (!sir_epidemic_allowed(&fresh.params)) return sir_epidemic_BAD_ARGUMENT;
+    sir_epidemic_prepare(&fresh.params, sir_epidemic_SHORT_STEP, fresh.coef);
+    for (int k = 0; k < sir_epidemic_COEFFICIENTS; ++k)
+        if (!isfinite(fresh.coef[k])) return sir_epidemic_BAD_ARGUMENT;
+    *s = fresh;
     return sir_epidemic_OK;
 }
 
@@ -474,44 +451,38 @@ sir_epidemic_status sir_epidemic_init(sir_epidemic_solver *s, const sir_epidemic
 static sir_epidemic_status sir_epidemic_set_step(sir_epidemic_solver *s, double h)
 {
     if (s == NULL || !isfinite(h)) return sir_epidemic_BAD_ARGUMENT;
-    if (s->prepared && memcmp(&h, &s->h, sizeof h) == 0) return sir_epidemic_OK;
+    if (memcmp(&h, &s->h, sizeof h) == 0) return sir_epidemic_OK;
     sir_epidemic_prepare(&s->params, h, s->coef);
     memset(&s->history, 0, sizeof s->history);
     s->h = h;
     s->t_before_h = s->t;
     s->steps_before_h = s->steps;
-    s->prepared = 1;
     return sir_epidemic_OK;
 }
 
 /* One stage. A guess from earlier steps may have misled it: then once more without. */
 static sir_epidemic_status sir_epidemic_stage(sir_epidemic_solver *s)
 {
-    sir_epidemic_status status = sir_epidemic_attempt(s);
-    if (status != sir_epidemic_OK && s->history.count > 0) {
-        memset(&s->history, 0, sizeof s->history);
-        status = sir_epidemic_attempt(s);
-    }
-    return status;
-}
-
-sir_epidemic_status sir_epidemic_step(sir_epidemic_solver *s, double h)
-{
-    sir_epidemic_status status = sir_epidemic_set_step(s, h);
-    if (status != sir_epidemic_OK) return status;
-    status = sir_epidemic_stage(s);
-    if (status != sir_epidemic_OK) return status;
-    ++s->steps;
-    s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
-    return status;
+    const sir_epidemic_status status = sir_epidemic_attempt(s);
+    if (status == sir_epidemic_OK || s->history.count == 0) return status;
+    memset(&s->history, 0, sizeof s->history);
+    return sir_epidemic_attempt(s);
 }
 
 sir_epidemic_status sir_epidemic_integrate(sir_epidemic_solver *s, double h, size_t steps)
 {
     sir_epidemic_status status = sir_epidemic_set_step(s, h);
-    for (; steps > 0 && status == sir_epidemic_OK; --steps) status = sir_epidemic_step(s, h);
+    for (; steps > 0 && status == sir_epidemic_OK; --steps) {
+        status = sir_epidemic_stage(s);
+        if (status != sir_epidemic_OK) break;
+        ++s->steps;
+        s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
+    }
     return status;
 }
+
+sir_epidemic_status sir_epidemic_step(sir_epidemic_solver *s, double h) { return sir_epidemic_integrate(s, h,
+    1); }
 
 const char *sir_epidemic_status_string(sir_epidemic_status status)
 {
@@ -526,7 +497,6 @@ const char *sir_epidemic_status_string(sir_epidemic_status status)
 }
 
 size_t sir_epidemic_solver_size(void) { return sizeof(sir_epidemic_solver); }
-
 size_t sir_epidemic_solver_steps_done(const sir_epidemic_solver *s) { return s->steps; }
 
 /* ---- Ensembles ---- */

@@ -19,7 +19,7 @@
  *   4. The implicit step, along paths dm/dt = pi(m) p
  *   5. The solver
  *   6. Ensembles
- * body-sha256: 0f9eb2e17902f05f34843cdb37f612c839b584aec19b0ca728183c16f65a1aa8
+ * body-sha256: 1bc616dc87060ba64ef0ec3db1625c2ab96085b2a868e7f92e307843ab10d1ec
  */
 #include "sir_final_size.h"
 
@@ -71,26 +71,6 @@ static void sir_final_size_generate(const double coef[3], const double y[3], dou
     jacobian[8] = 1.0;
 }
 
-/* elimination without pivoting: the solution, and the reciprocals of the pivots */
-static void sir_final_size_eliminate(const double matrix[9], const double side[3],
-    double solution[restrict 3], double reciprocal[restrict 3])
-{
-    /* solution */
-    const double t1 = 1.0 / matrix[0], t2 = matrix[6] * t1, t3 = matrix[3] * t1;
-    const double t4 = side[1] - side[0] * t3, t5 = 1.0 / (matrix[4] - matrix[1] * t3);
-    const double t6 = (matrix[7] - matrix[1] * t2) * t5, t7 = matrix[5] - matrix[2] * t3;
-    const double t8 = 1.0 / (matrix[8] - matrix[2] * t2 - t7 * t6);
-    const double t9 = (side[2] - side[0] * t2 - t4 * t6) * t8, t10 = t5 * (t4 - t7 * t9);
-    solution[0] = t1 * (side[0] - (matrix[2] * t9 + matrix[1] * t10));
-    solution[1] = t10;
-    solution[2] = t9;
-    /* reciprocal */
-    reciprocal[0] = t1;
-    reciprocal[1] = t5;
-    reciprocal[2] = t8;
-}
-
-/* the Hamiltonian */
 double sir_final_size_hamiltonian(const sir_final_size_params *params, const double x[3])
 {
     (void)params;
@@ -98,7 +78,6 @@ double sir_final_size_hamiltonian(const sir_final_size_params *params, const dou
     return R + (I_ + S);
 }
 
-/* the Casimirs */
 void sir_final_size_casimirs(const sir_final_size_params *params, const double x[3], double out[])
 {
     if (params == NULL) params = &sir_final_size_default_params;
@@ -106,7 +85,6 @@ void sir_final_size_casimirs(const sir_final_size_params *params, const double x
     out[0] = beta * (I_ + S) - gamma * log(S);
 }
 
-/* pi(x) grad H(x) */
 void sir_final_size_vector_field(const sir_final_size_params *params, const double x[3], double out[3])
 {
     if (params == NULL) params = &sir_final_size_default_params;
@@ -118,19 +96,18 @@ void sir_final_size_vector_field(const sir_final_size_params *params, const doub
 }
 
 /* ---- Compensated sums, linear equations ---- */
-/* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to
-   its last bit: were it rounded with the change, corrections of one sign would add up to a drift. 0, and x as
-   before, if the sum is not finite. */
+/* x + change + small in compensated arithmetic, where small is the carry and what is as small: were that
+   rounded with the change, corrections of one sign would add up to a drift. 0, and x as before, if the sum is
+   not finite. */
 static int sir_final_size_advance(sir_final_size_solver *s, const double change[sir_final_size_DIM],
-    const double correction[sir_final_size_DIM])
+    const double small[sir_final_size_DIM])
 {
     double x[sir_final_size_DIM], carry[sir_final_size_DIM];
     for (int i = 0; i < sir_final_size_DIM; ++i) {
         const double sum = s->x[i] + change[i], added = sum - s->x[i];
-        const double lost = (s->x[i] - (sum - added)) + (change[i] - added);
-        const double small = lost + (s->carry[i] + correction[i]);
-        x[i] = sum + small;
-        carry[i] = small - (x[i] - sum);
+        const double lost = ((s->x[i] - (sum - added)) + (change[i] - added)) + small[i];
+        x[i] = sum + lost;
+        carry[i] = lost - (x[i] - sum);
         if (!isfinite(x[i])) return 0;
     }
     memcpy(s->x, x, sizeof x);
@@ -138,29 +115,44 @@ static int sir_final_size_advance(sir_final_size_solver *s, const double change[
     return 1;
 }
 
-/* Newton matrices are I + O(h): a pivot whose reciprocal is larger than this is far from 1. */
-#define sir_final_size_LARGEST_RECIPROCAL 1e3
-
-/* Solve matrix * solution = side, both overwritten. The matrix is I + O(h): 0 if a pivot is far from 1. */
+/* Solve matrix * solution = side, both overwritten, by elimination with partial pivoting. 0 if singular. */
 static int sir_final_size_solve(double matrix[sir_final_size_DIM * sir_final_size_DIM],
     double side[sir_final_size_DIM])
 {
-    double solution[sir_final_size_DIM], reciprocal[sir_final_size_DIM], largest = 0.0;
-    sir_final_size_eliminate(matrix, side, solution, reciprocal);
-    for (int i = 0; i < sir_final_size_DIM; ++i)
-        if (!(fabs(reciprocal[i]) <= largest)) largest = fabs(reciprocal[i]);
-    if (!(largest < sir_final_size_LARGEST_RECIPROCAL)) return 0;
-    memcpy(side, solution, sizeof solution);
+    for (int k = 0; k < sir_final_size_DIM; ++k) {
+        int best = k;
+        for (int i = k + 1; i < sir_final_size_DIM; ++i)
+            if (fabs(matrix[i * sir_final_size_DIM + k]) > fabs(matrix[best * sir_final_size_DIM + k]))
+                best = i;
+        const double pivot = matrix[best * sir_final_size_DIM + k], last = side[k];
+        if (!(fabs(pivot) > 0.0)) return 0;
+        for (int j = k; j < sir_final_size_DIM && best != k; ++j) {
+            const double swap = matrix[k * sir_final_size_DIM + j];
+            matrix[k * sir_final_size_DIM + j] = matrix[best * sir_final_size_DIM + j];
+            matrix[best * sir_final_size_DIM + j] = swap;
+        }
+        side[k] = side[best];
+        side[best] = last;
+        for (int i = k + 1; i < sir_final_size_DIM; ++i) {
+            const double factor = matrix[i * sir_final_size_DIM + k] / pivot;
+            for (int j = k + 1; j < sir_final_size_DIM; ++j)
+                matrix[i * sir_final_size_DIM + j] -= factor * matrix[k * sir_final_size_DIM + j];
+            side[i] -= factor * side[k];
+        }
+    }
+    for (int i = sir_final_size_DIM - 1; i >= 0; --i) {
+        for (int j = i + 1; j < sir_final_size_DIM; ++j)
+            side[i] -= matrix[i * sir_final_size_DIM + j] * side[j];
+        side[i] /= matrix[i * sir_final_size_DIM + i];
+    }
     return 1;
 }
 
 /* ---- Starting guesses ---- */
-/* How far from the last value a guess may be, in sizes of that value. */
-#define sir_final_size_REACH 4.0
+#define sir_final_size_REACH 4.0 /* how far from the last value a guess may be, in sizes of that value */
 
-/* The guess for the next value from the last ones: the sum of their backward differences. 0 if there is none,
-   or if it is far away, where the equation of a step has solutions that have nothing to do with the motion.
-   */
+/* The guess for the next value, the sum of differences. 0 if there is none, or if it is far away, where the
+   equation of a step has solutions that have nothing to do with the motion. */
 static int sir_final_size_predict(const sir_final_size_history *history, double value[sir_final_size_DIM])
 {
     double distance = 0.0, size = 0.0;
@@ -196,10 +188,8 @@ static void sir_final_size_remember(sir_final_size_history *history, const doubl
     if (history->count < sir_final_size_DIFFERENCES) ++history->count;
 }
 
-/* How far a step may lead, in sizes of the state and of what the vector field says, if the energy is lost;
-   and the part of the energy that counts as lost. */
-#define sir_final_size_PLAUSIBLE 1.5
-#define sir_final_size_LOST 0.5
+#define sir_final_size_PLAUSIBLE 1.5 /* how far any step may lead, in sizes of the state and of its motion */
+#define sir_final_size_LOST 0.5      /* part of the energy that one which leads farther must not lose */
 
 /* Whether an increment is that of the motion. Where the step is too large, the equation may have been solved
    by a point far away, at another energy, that has nothing to do with it. */
@@ -211,19 +201,17 @@ static int sir_final_size_plausible(const sir_final_size_solver *s,
     for (int i = 0; i < sir_final_size_DIM; ++i) {
         moved += fabs(increment[i]);
         size += fabs(s->x[i]);
-    }
-    if (moved <= sir_final_size_PLAUSIBLE * size) return 1;
-    sir_final_size_vector_field(&s->params, s->x, field);
-    for (int i = 0; i < sir_final_size_DIM; ++i) {
-        size += fabs(s->h * field[i]);
         middle[i] = s->x[i] + 0.5 * increment[i];
         end[i] = s->x[i] + increment[i];
     }
     if (moved <= sir_final_size_PLAUSIBLE * size) return 1;
-    const double before = sir_final_size_hamiltonian(&s->params, s->x), after =
-        sir_final_size_hamiltonian(&s->params, end);
-    const double scale = fabs(before) + fabs(sir_final_size_hamiltonian(&s->params, middle)) + fabs(after);
-    return fabs(after - before) <= sir_final_size_LOST * scale;
+    sir_final_size_vector_field(&s->params, s->x, field);
+    for (int i = 0; i < sir_final_size_DIM; ++i) size += fabs(s->h * field[i]);
+    if (moved <= sir_final_size_PLAUSIBLE * size) return 1;
+    const double before = sir_final_size_hamiltonian(&s->params, s->x);
+    const double after = sir_final_size_hamiltonian(&s->params, end), between =
+        sir_final_size_hamiltonian(&s->params, middle);
+    return fabs(after - before) <= sir_final_size_LOST * (fabs(before) + fabs(between) + fabs(after));
 }
 
 /* Coefficient k of the product of two Taylor series. */
@@ -412,11 +400,11 @@ static int sir_final_size_differences(sir_final_size_solver *s, const double *co
 }
 
 /* Solve p = grad S_h(mean of the path from x under p) and move to the end of that path. Where that takes more
-   than sir_final_size_MOST_PIECES pieces of paths, the step is so large that a solution would mean nothing.
-   */
+   than sir_final_size_MOST_PIECES pieces of paths, the step is so large that a solution would mean
+   nothing. */
 static sir_final_size_status sir_final_size_attempt(sir_final_size_solver *s)
 {
-    const double *coef = s->coef, none[sir_final_size_DIM] = { 0.0 };
+    const double *coef = s->coef;
     double p[sir_final_size_DIM], y[sir_final_size_DIM], residual[sir_final_size_DIM],
         change[sir_final_size_DIM], jacobian[sir_final_size_DIM * sir_final_size_DIM], previous = HUGE_VAL;
     if (!sir_final_size_predict(&s->history, y)) memcpy(y, s->x, sizeof y);
@@ -435,7 +423,7 @@ static sir_final_size_status sir_final_size_attempt(sir_final_size_solver *s)
         /* The second test: residuals no longer shrink, the solve has reached the level of rounding. */
         if (size <= 4e-16 || (previous < 1e-12 && size > 0.25 * previous)) {
             if (!sir_final_size_plausible(s, change)) return sir_final_size_NO_CONVERGENCE;
-            if (!sir_final_size_advance(s, change, none)) return sir_final_size_NOT_FINITE;
+            if (!sir_final_size_advance(s, change, s->carry)) return sir_final_size_NOT_FINITE;
             sir_final_size_remember(&s->history, y);
             return sir_final_size_OK;
         }
@@ -450,32 +438,23 @@ static sir_final_size_status sir_final_size_attempt(sir_final_size_solver *s)
 }
 
 /* ---- The solver ---- */
-/* Whether steps can be made with these parameters: allowed, and with finite coefficients for a step so short
-   that it has no part in it. */
-static int sir_final_size_admissible(const sir_final_size_params *params)
-{
-    double coef[sir_final_size_COEFFICIENTS];
-    if (!sir_final_size_allowed(params)) return 0;
-    sir_final_size_prepare(params, 1e-100, coef);
-    for (int k = 0; k < sir_final_size_COEFFICIENTS; ++k)
-        if (!isfinite(coef[k])) return 0;
-    return 1;
-}
+#define sir_final_size_SHORT_STEP 1e-100 /* so short that it has no part in whether coefficients are finite */
 
-/* The arguments may be parts of *s: they are read before it is written. */
+/* The arguments may be parts of *s, which is therefore written last. */
 sir_final_size_status sir_final_size_init(sir_final_size_solver *s, const sir_final_size_params *params,
     const double x0[sir_final_size_DIM])
 {
     if (s == NULL || x0 == NULL) return sir_final_size_BAD_ARGUMENT;
-    const sir_final_size_params own = params != NULL ? *params : sir_final_size_default_params;
-    double x[sir_final_size_DIM];
-    memcpy(x, x0, sizeof x);
+    sir_final_size_solver fresh = { .h = (double)NAN };
+    fresh.params = params != NULL ? *params : sir_final_size_default_params;
+    memcpy(fresh.x, x0, sizeof fresh.x);
     for (int i = 0; i < sir_final_size_DIM; ++i)
-        if (!isfinite(x[i])) return sir_final_size_BAD_ARGUMENT;
-    if (!sir_final_size_admissible(&own)) return sir_final_size_BAD_ARGUMENT;
-    memset(s, 0, sizeof *s);
-    memcpy(s->x, x, sizeof s->x);
-    s->params = own;
+        if (!isfinite(fresh.x[i])) return sir_final_size_BAD_ARGUMENT;
+    if (!sir_final_size_allowed(&fresh.params)) return sir_final_size_BAD_ARGUMENT;
+    sir_final_size_prepare(&fresh.params, sir_final_size_SHORT_STEP, fresh.coef);
+    for (int k = 0; k < sir_final_size_COEFFICIENTS; ++k)
+        if (!isfinite(fresh.coef[k])) return sir_final_size_BAD_ARGUMENT;
+    *s = fresh;
     return sir_final_size_OK;
 }
 
@@ -483,44 +462,38 @@ sir_final_size_status sir_final_size_init(sir_final_size_solver *s, const sir_fi
 static sir_final_size_status sir_final_size_set_step(sir_final_size_solver *s, double h)
 {
     if (s == NULL || !isfinite(h)) return sir_final_size_BAD_ARGUMENT;
-    if (s->prepared && memcmp(&h, &s->h, sizeof h) == 0) return sir_final_size_OK;
+    if (memcmp(&h, &s->h, sizeof h) == 0) return sir_final_size_OK;
     sir_final_size_prepare(&s->params, h, s->coef);
     memset(&s->history, 0, sizeof s->history);
     s->h = h;
     s->t_before_h = s->t;
     s->steps_before_h = s->steps;
-    s->prepared = 1;
     return sir_final_size_OK;
 }
 
 /* One stage. A guess from earlier steps may have misled it: then once more without. */
 static sir_final_size_status sir_final_size_stage(sir_final_size_solver *s)
 {
-    sir_final_size_status status = sir_final_size_attempt(s);
-    if (status != sir_final_size_OK && s->history.count > 0) {
-        memset(&s->history, 0, sizeof s->history);
-        status = sir_final_size_attempt(s);
-    }
-    return status;
-}
-
-sir_final_size_status sir_final_size_step(sir_final_size_solver *s, double h)
-{
-    sir_final_size_status status = sir_final_size_set_step(s, h);
-    if (status != sir_final_size_OK) return status;
-    status = sir_final_size_stage(s);
-    if (status != sir_final_size_OK) return status;
-    ++s->steps;
-    s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
-    return status;
+    const sir_final_size_status status = sir_final_size_attempt(s);
+    if (status == sir_final_size_OK || s->history.count == 0) return status;
+    memset(&s->history, 0, sizeof s->history);
+    return sir_final_size_attempt(s);
 }
 
 sir_final_size_status sir_final_size_integrate(sir_final_size_solver *s, double h, size_t steps)
 {
     sir_final_size_status status = sir_final_size_set_step(s, h);
-    for (; steps > 0 && status == sir_final_size_OK; --steps) status = sir_final_size_step(s, h);
+    for (; steps > 0 && status == sir_final_size_OK; --steps) {
+        status = sir_final_size_stage(s);
+        if (status != sir_final_size_OK) break;
+        ++s->steps;
+        s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
+    }
     return status;
 }
+
+sir_final_size_status sir_final_size_step(sir_final_size_solver *s,
+    double h) { return sir_final_size_integrate(s, h, 1); }
 
 const char *sir_final_size_status_string(sir_final_size_status status)
 {
@@ -535,7 +508,6 @@ const char *sir_final_size_status_string(sir_final_size_status status)
 }
 
 size_t sir_final_size_solver_size(void) { return sizeof(sir_final_size_solver); }
-
 size_t sir_final_size_solver_steps_done(const sir_final_size_solver *s) { return s->steps; }
 
 /* ---- Ensembles ---- */

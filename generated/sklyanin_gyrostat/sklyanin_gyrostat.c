@@ -22,7 +22,7 @@
  *   5. The choice of the gauge: multiples of Casimirs taken from H
  *   6. The solver
  *   7. Ensembles
- * body-sha256: 408709af2f9bd76cf26c4c83fa61e311a152e88ee8db60dd3dc56c9eff2d7418
+ * body-sha256: 05056c5df114b57d3fef41596a842b843a6e780b9916a9d0290d5eedadbe7ca2
  */
 #include "sklyanin_gyrostat.h"
 
@@ -93,8 +93,8 @@ static void sklyanin_gyrostat_generate(const double coef[31], const double y[4],
     const double S0 = y[0], S1 = y[1], S2 = y[2], S3 = y[3];
     /* slope */
     const double t1 = S3 * S3, t2 = S2 * coef[6], t3 = coef[4] * t1 + S2 * (coef[5] + t2);
-    const double t4 = S2 * coef[10], t5 = S2 * (coef[9] + t4) + (coef[7] + coef[8] * t1);
-    const double t6 = S1 * t5, t7 = coef[1] * t1, t8 = coef[2] + coef[3] * t1, t9 = S2 * t8;
+    const double t4 = S2 * coef[10], t5 = S2 * (coef[9] + t4) + (coef[7] + coef[8] * t1), t6 = S1 * t5;
+    const double t7 = coef[1] * t1, t8 = coef[2] + coef[3] * t1, t9 = S2 * t8;
     const double t10 = S1 * (t3 + t6) + (coef[0] * t1 + S2 * (t7 + t9)), t11 = S0 * S0;
     const double t12 = coef[14] + t2;
     const double t13 = coef[20] + t11 * (S1 * (coef[4] + S1 * coef[8]) + (coef[0] + S2 * (coef[1] + S2
@@ -112,10 +112,9 @@ static void sklyanin_gyrostat_generate(const double coef[31], const double y[4],
     const double t23 = t18 * t22, t24 = S1 * S3, t25 = S1 * (coef[9] + t15);
     const double t26 = S0 * (t7 + S2 * (coef[25] + coef[26] * t1) + S1 * (coef[5] + S2 * coef[27] + t25));
     const double t27 = 3.0 * (t24 * t26), t28 = S0 * S2, t29 = S0 * S1, t30 = coef[12] + t11 * t5;
-    const double t31 = S3 * t11, t32 = (coef[4] + t20) * t31, t33 = t11 * (t12 + t25);
-    const double t34 = t28 * t32, t35 = 2.0 * (t19 * t33), t36 = t31 * (coef[1] + t21);
-    const double t37 = coef[17] + t11 * (t8 + S1 * (coef[6] + S1 * coef[10]));
-    const double t38 = 2.0 * (t29 * t36);
+    const double t31 = S3 * t11, t32 = (coef[4] + t20) * t31, t33 = t11 * (t12 + t25), t34 = t28 * t32;
+    const double t35 = 2.0 * (t19 * t33), t36 = t31 * (coef[1] + t21);
+    const double t37 = coef[17] + t11 * (t8 + S1 * (coef[6] + S1 * coef[10])), t38 = 2.0 * (t29 * t36);
     jacobian[0] = 1.0 - 0.5 * (t17 + (t23 - t27));
     jacobian[1] = (-0.5) * (2.0 * (t28 * t22) - 2.0 * (t19 * t26) - 2.0 * (t14 * t10));
     jacobian[2] = (-0.5) * (2.0 * (t19 * t16) + 3.0 * (t24 * t10) - 2.0 * (t29 * t22));
@@ -134,65 +133,6 @@ static void sklyanin_gyrostat_generate(const double coef[31], const double y[4],
     jacobian[15] = 1.0 - 0.5 * (t38 + ((-2.0) * t34 - t23));
 }
 
-/* elimination without pivoting: the solution, and the reciprocals of the pivots */
-static void sklyanin_gyrostat_eliminate(const double matrix[16], const double side[4],
-    double solution[restrict 4], double reciprocal[restrict 4])
-{
-    /* solution */
-    const double t1 = 1.0 / matrix[0], t2 = matrix[12] * t1, t3 = matrix[4] * t1;
-    const double t4 = side[1] - side[0] * t3, t5 = 1.0 / (matrix[5] - matrix[1] * t3);
-    const double t6 = (matrix[13] - matrix[1] * t2) * t5, t7 = matrix[8] * t1;
-    const double t8 = (matrix[9] - matrix[1] * t7) * t5, t9 = side[2] - side[0] * t7 - t4 * t8;
-    const double t10 = matrix[6] - matrix[2] * t3;
-    const double t11 = 1.0 / (matrix[10] - matrix[2] * t7 - t10 * t8);
-    const double t12 = (matrix[14] - matrix[2] * t2 - t10 * t6) * t11;
-    const double t13 = matrix[7] - matrix[3] * t3, t14 = matrix[11] - matrix[3] * t7 - t13 * t8;
-    const double t15 = 1.0 / (matrix[15] - matrix[3] * t2 - t13 * t6 - t14 * t12);
-    const double t16 = (side[3] - side[0] * t2 - t4 * t6 - t9 * t12) * t15;
-    const double t17 = t11 * (t9 - t14 * t16), t18 = t5 * (t4 - (t13 * t16 + t10 * t17));
-    solution[0] = t1 * (side[0] - (matrix[3] * t16 + (matrix[2] * t17 + matrix[1] * t18)));
-    solution[1] = t18;
-    solution[2] = t17;
-    solution[3] = t16;
-    /* reciprocal */
-    reciprocal[0] = t1;
-    reciprocal[1] = t5;
-    reciprocal[2] = t11;
-    reciprocal[3] = t15;
-}
-
-/* the leading error vector pi grad S_3, as a function of the gauge */
-static void sklyanin_gyrostat_guide(const sklyanin_gyrostat_params *params, const double gauge[1],
-    const double x[4], double error[restrict 4])
-{
-    (void)params;
-    const double S0 = x[0], S1 = x[1], S2 = x[2], S3 = x[3];
-    const double t1 = S1 * S3, t2 = S0 * S0, t3 = S3 * S3;
-    const double t4 = S2 * (1.0 / 900.0 - 1.0 / 150.0 * gauge[0] + t3 * (1.0 / 108.0 - 1.0 / 54.0
-        * gauge[0]));
-    const double t5 = -1.0 / 450.0 + 1.0 / 75.0 * gauge[0], t6 = 1.0 / 15.0 * gauge[0];
-    const double t7 = S2 * (1.0 / 90.0 - t6), t8 = S2 * (1.0 / 36.0 - 1.0 / 6.0 * gauge[0]);
-    const double t9 = t2 * (t3 * (1.0 / 90.0 - 1.0 / 45.0 * gauge[0]) + t4 + S1 * (t5 + t7 + S1 * (-1.0 / 90.0
-        + t6 + t8)));
-    const double t10 = S2 * S3, t11 = 2.0 / 45.0 * gauge[0], t12 = 1.0 / 30.0 * gauge[0];
-    const double t13 = 2.0 / 75.0 * gauge[0];
-    const double t14 = S1 * (1.0 / 225.0 - t13 + t3 * (2.0 / 27.0 - 8.0 / 27.0 * gauge[0]) + S2 * (-1.0 / 45.0
-        + 2.0 / 15.0 * gauge[0] + t8));
-    const double t15 = t2 * (t3 * (1.0 / 90.0 - t11) + S2 * (t5 + S2 * (1.0 / 180.0 - t12)) + t14);
-    const double t16 = S1 * S2;
-    const double t17 = S1 * (1.0 / 45.0 + 2.0 / 27.0 * S1) + (3.0 / 200.0 + S2 * (1.0 / 45.0 + 1.0 / 108.0
-        * S2)) + gauge[0] * (S1 * (-4.0 / 45.0 - 8.0 / 27.0 * S1) + (-1.0 / 30.0 + S2 * (-2.0 / 45.0 - 1.0
-        / 54.0 * S2)));
-    const double t18 = S3 * t2 * t17, t19 = S0 * S3;
-    const double t20 = t3 * (3.0 / 200.0 - t12) + S2 * (t3 * (1.0 / 45.0 - t11) + t4) + S1
-        * (t3 * (1.0 / 45.0 - 4.0 / 45.0 * gauge[0]) + S2 * (-1.0 / 225.0 + t13 + t7) + t14);
-    const double t21 = S0 * t20, t22 = S0 * S2, t23 = S0 * S1;
-    error[0] = 3.0 * (t1 * t9) - 2.0 * (t10 * t15) - t16 * t18;
-    error[1] = 2.0 * (t19 * t9) + 2.0 * (t10 * t21) - 2.0 * (t22 * t18);
-    error[2] = 2.0 * (t23 * t18) + ((-3.0) * (t1 * t21) - 2.0 * (t19 * t15));
-    error[3] = 2.0 * (t22 * t15) + t16 * t21 - 2.0 * (t23 * t9);
-}
-
 /* grad H . grad H, then grad H . grad C and grad C . grad C for each Casimir of the gauge */
 static void sklyanin_gyrostat_products(const sklyanin_gyrostat_params *params, const double x[4],
     double out[restrict 3])
@@ -205,7 +145,6 @@ static void sklyanin_gyrostat_products(const sklyanin_gyrostat_params *params, c
     out[2] = 4.0 * (S1 * S1) + (4.0 * (S2 * S2) + 4.0 * t2);
 }
 
-/* the Hamiltonian */
 double sklyanin_gyrostat_hamiltonian(const sklyanin_gyrostat_params *params, const double x[4])
 {
     (void)params;
@@ -213,7 +152,6 @@ double sklyanin_gyrostat_hamiltonian(const sklyanin_gyrostat_params *params, con
     return 1.0 / 5.0 * S2 + (1.0 / 10.0 * S1 + 0.5 * (1.0 / 3.0 * (S3 * S3) + (S1 * S1 + 0.5 * (S2 * S2))));
 }
 
-/* the Casimirs */
 void sklyanin_gyrostat_casimirs(const sklyanin_gyrostat_params *params, const double x[4], double out[])
 {
     (void)params;
@@ -223,7 +161,6 @@ void sklyanin_gyrostat_casimirs(const sklyanin_gyrostat_params *params, const do
     out[1] = 2.5 * t1 + (t3 + S0 * S0 + 1.5 * t2);
 }
 
-/* pi(x) grad H(x) */
 void sklyanin_gyrostat_vector_field(const sklyanin_gyrostat_params *params, const double x[4], double out[4])
 {
     (void)params;
@@ -237,19 +174,18 @@ void sklyanin_gyrostat_vector_field(const sklyanin_gyrostat_params *params, cons
 }
 
 /* ---- Compensated sums, linear equations ---- */
-/* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to
-   its last bit: were it rounded with the change, corrections of one sign would add up to a drift. 0, and x as
-   before, if the sum is not finite. */
+/* x + change + small in compensated arithmetic, where small is the carry and what is as small: were that
+   rounded with the change, corrections of one sign would add up to a drift. 0, and x as before, if the sum is
+   not finite. */
 static int sklyanin_gyrostat_advance(sklyanin_gyrostat_solver *s, const double change[sklyanin_gyrostat_DIM],
-    const double correction[sklyanin_gyrostat_DIM])
+    const double small[sklyanin_gyrostat_DIM])
 {
     double x[sklyanin_gyrostat_DIM], carry[sklyanin_gyrostat_DIM];
     for (int i = 0; i < sklyanin_gyrostat_DIM; ++i) {
         const double sum = s->x[i] + change[i], added = sum - s->x[i];
-        const double lost = (s->x[i] - (sum - added)) + (change[i] - added);
-        const double small = lost + (s->carry[i] + correction[i]);
-        x[i] = sum + small;
-        carry[i] = small - (x[i] - sum);
+        const double lost = ((s->x[i] - (sum - added)) + (change[i] - added)) + small[i];
+        x[i] = sum + lost;
+        carry[i] = lost - (x[i] - sum);
         if (!isfinite(x[i])) return 0;
     }
     memcpy(s->x, x, sizeof x);
@@ -257,29 +193,44 @@ static int sklyanin_gyrostat_advance(sklyanin_gyrostat_solver *s, const double c
     return 1;
 }
 
-/* Newton matrices are I + O(h): a pivot whose reciprocal is larger than this is far from 1. */
-#define sklyanin_gyrostat_LARGEST_RECIPROCAL 1e3
-
-/* Solve matrix * solution = side, both overwritten. The matrix is I + O(h): 0 if a pivot is far from 1. */
+/* Solve matrix * solution = side, both overwritten, by elimination with partial pivoting. 0 if singular. */
 static int sklyanin_gyrostat_solve(double matrix[sklyanin_gyrostat_DIM * sklyanin_gyrostat_DIM],
     double side[sklyanin_gyrostat_DIM])
 {
-    double solution[sklyanin_gyrostat_DIM], reciprocal[sklyanin_gyrostat_DIM], largest = 0.0;
-    sklyanin_gyrostat_eliminate(matrix, side, solution, reciprocal);
-    for (int i = 0; i < sklyanin_gyrostat_DIM; ++i)
-        if (!(fabs(reciprocal[i]) <= largest)) largest = fabs(reciprocal[i]);
-    if (!(largest < sklyanin_gyrostat_LARGEST_RECIPROCAL)) return 0;
-    memcpy(side, solution, sizeof solution);
+    for (int k = 0; k < sklyanin_gyrostat_DIM; ++k) {
+        int best = k;
+        for (int i = k + 1; i < sklyanin_gyrostat_DIM; ++i)
+            if (fabs(matrix[i * sklyanin_gyrostat_DIM + k]) > fabs(matrix[best * sklyanin_gyrostat_DIM + k]))
+                best = i;
+        const double pivot = matrix[best * sklyanin_gyrostat_DIM + k], last = side[k];
+        if (!(fabs(pivot) > 0.0)) return 0;
+        for (int j = k; j < sklyanin_gyrostat_DIM && best != k; ++j) {
+            const double swap = matrix[k * sklyanin_gyrostat_DIM + j];
+            matrix[k * sklyanin_gyrostat_DIM + j] = matrix[best * sklyanin_gyrostat_DIM + j];
+            matrix[best * sklyanin_gyrostat_DIM + j] = swap;
+        }
+        side[k] = side[best];
+        side[best] = last;
+        for (int i = k + 1; i < sklyanin_gyrostat_DIM; ++i) {
+            const double factor = matrix[i * sklyanin_gyrostat_DIM + k] / pivot;
+            for (int j = k + 1; j < sklyanin_gyrostat_DIM; ++j)
+                matrix[i * sklyanin_gyrostat_DIM + j] -= factor * matrix[k * sklyanin_gyrostat_DIM + j];
+            side[i] -= factor * side[k];
+        }
+    }
+    for (int i = sklyanin_gyrostat_DIM - 1; i >= 0; --i) {
+        for (int j = i + 1; j < sklyanin_gyrostat_DIM; ++j)
+            side[i] -= matrix[i * sklyanin_gyrostat_DIM + j] * side[j];
+        side[i] /= matrix[i * sklyanin_gyrostat_DIM + i];
+    }
     return 1;
 }
 
 /* ---- Starting guesses ---- */
-/* How far from the last value a guess may be, in sizes of that value. */
-#define sklyanin_gyrostat_REACH 4.0
+#define sklyanin_gyrostat_REACH 4.0 /* how far from the last value a guess may be, in sizes of that value */
 
-/* The guess for the next value from the last ones: the sum of their backward differences. 0 if there is none,
-   or if it is far away, where the equation of a step has solutions that have nothing to do with the motion.
-   */
+/* The guess for the next value, the sum of differences. 0 if there is none, or if it is far away, where the
+   equation of a step has solutions that have nothing to do with the motion. */
 static int sklyanin_gyrostat_predict(const sklyanin_gyrostat_history *history,
     double value[sklyanin_gyrostat_DIM])
 {
@@ -317,10 +268,9 @@ static void sklyanin_gyrostat_remember(sklyanin_gyrostat_history *history,
     if (history->count < sklyanin_gyrostat_DIFFERENCES) ++history->count;
 }
 
-/* How far a step may lead, in sizes of the state and of what the vector field says, if the energy is lost;
-   and the part of the energy that counts as lost. */
+/* how far any step may lead, in sizes of the state and of its motion */
 #define sklyanin_gyrostat_PLAUSIBLE 1.5
-#define sklyanin_gyrostat_LOST 0.5
+#define sklyanin_gyrostat_LOST 0.5 /* part of the energy that one which leads farther must not lose */
 
 /* Whether an increment is that of the motion. Where the step is too large, the equation may have been solved
    by a point far away, at another energy, that has nothing to do with it. */
@@ -332,19 +282,17 @@ static int sklyanin_gyrostat_plausible(const sklyanin_gyrostat_solver *s,
     for (int i = 0; i < sklyanin_gyrostat_DIM; ++i) {
         moved += fabs(increment[i]);
         size += fabs(s->x[i]);
-    }
-    if (moved <= sklyanin_gyrostat_PLAUSIBLE * size) return 1;
-    sklyanin_gyrostat_vector_field(&s->params, s->x, field);
-    for (int i = 0; i < sklyanin_gyrostat_DIM; ++i) {
-        size += fabs(s->h * field[i]);
         middle[i] = s->x[i] + 0.5 * increment[i];
         end[i] = s->x[i] + increment[i];
     }
     if (moved <= sklyanin_gyrostat_PLAUSIBLE * size) return 1;
-    const double before = sklyanin_gyrostat_hamiltonian(&s->params, s->x), after =
-        sklyanin_gyrostat_hamiltonian(&s->params, end);
-    const double scale = fabs(before) + fabs(sklyanin_gyrostat_hamiltonian(&s->params, middle)) + fabs(after);
-    return fabs(after - before) <= sklyanin_gyrostat_LOST * scale;
+    sklyanin_gyrostat_vector_field(&s->params, s->x, field);
+    for (int i = 0; i < sklyanin_gyrostat_DIM; ++i) size += fabs(s->h * field[i]);
+    if (moved <= sklyanin_gyrostat_PLAUSIBLE * size) return 1;
+    const double before = sklyanin_gyrostat_hamiltonian(&s->params, s->x);
+    const double after = sklyanin_gyrostat_hamiltonian(&s->params, end), between =
+        sklyanin_gyrostat_hamiltonian(&s->params, middle);
+    return fabs(after - before) <= sklyanin_gyrostat_LOST * (fabs(before) + fabs(between) + fabs(after));
 }
 
 /* Coefficient k of the product of two Taylor series. */
@@ -618,7 +566,7 @@ static int sklyanin_gyrostat_differences(sklyanin_gyrostat_solver *s, const doub
    nothing. */
 static sklyanin_gyrostat_status sklyanin_gyrostat_attempt(sklyanin_gyrostat_solver *s)
 {
-    const double *coef = s->coef, none[sklyanin_gyrostat_DIM] = { 0.0 };
+    const double *coef = s->coef;
     double p[sklyanin_gyrostat_DIM], y[sklyanin_gyrostat_DIM], residual[sklyanin_gyrostat_DIM],
         change[sklyanin_gyrostat_DIM], jacobian[sklyanin_gyrostat_DIM * sklyanin_gyrostat_DIM], previous =
         HUGE_VAL;
@@ -638,7 +586,7 @@ static sklyanin_gyrostat_status sklyanin_gyrostat_attempt(sklyanin_gyrostat_solv
         /* The second test: residuals no longer shrink, the solve has reached the level of rounding. */
         if (size <= 4e-16 || (previous < 1e-12 && size > 0.25 * previous)) {
             if (!sklyanin_gyrostat_plausible(s, change)) return sklyanin_gyrostat_NO_CONVERGENCE;
-            if (!sklyanin_gyrostat_advance(s, change, none)) return sklyanin_gyrostat_NOT_FINITE;
+            if (!sklyanin_gyrostat_advance(s, change, s->carry)) return sklyanin_gyrostat_NOT_FINITE;
             sklyanin_gyrostat_remember(&s->history, y);
             return sklyanin_gyrostat_OK;
         }
@@ -653,120 +601,36 @@ static sklyanin_gyrostat_status sklyanin_gyrostat_attempt(sklyanin_gyrostat_solv
 }
 
 /* ---- The choice of the gauge: multiples of Casimirs taken from H ---- */
-enum {
-    sklyanin_gyrostat_SAMPLES = 32, /* states along a short piece of the trajectory */
-    sklyanin_gyrostat_SWEEPS = 4    /* most rounds over the multiples */
-};
-
-/* A short piece of the trajectory from x, by a Runge-Kutta method with steps of a fixed change. */
-static void sklyanin_gyrostat_sample(const sklyanin_gyrostat_params *params,
-    const double x[sklyanin_gyrostat_DIM], double samples[][sklyanin_gyrostat_DIM])
-{
-    double slope[sklyanin_gyrostat_DIM], middle[sklyanin_gyrostat_DIM], size = 0.0, speed = DBL_MIN;
-    sklyanin_gyrostat_vector_field(params, x, slope);
-    for (int i = 0; i < sklyanin_gyrostat_DIM; ++i) {
-        samples[0][i] = x[i];
-        size += fabs(x[i]);
-        speed += fabs(slope[i]);
-    }
-    const double h = 0.25 * size / speed;
-    for (int k = 1; k < sklyanin_gyrostat_SAMPLES; ++k) {
-        const double *y = samples[k - 1];
-        sklyanin_gyrostat_vector_field(params, y, slope);
-        for (int i = 0; i < sklyanin_gyrostat_DIM; ++i) middle[i] = y[i] + 0.5 * h * slope[i];
-        sklyanin_gyrostat_vector_field(params, middle, slope);
-        for (int i = 0; i < sklyanin_gyrostat_DIM; ++i) samples[k][i] = y[i] + h * slope[i];
-    }
-}
-
-/* Sum of |pi grad S_3|^2, the leading error of the method, over the samples. */
-static double sklyanin_gyrostat_gauge_error(const sklyanin_gyrostat_params *params,
-    const double gauge[sklyanin_gyrostat_GAUGES], double samples[][sklyanin_gyrostat_DIM])
-{
-    double error[sklyanin_gyrostat_DIM], sum = 0.0;
-    for (int k = 0; k < sklyanin_gyrostat_SAMPLES; ++k) {
-        sklyanin_gyrostat_guide(params, gauge, samples[k], error);
-        for (int i = 0; i < sklyanin_gyrostat_DIM; ++i) sum += error[i] * error[i];
-    }
-    return sum;
-}
-
-/* How many widths multiple c is to be moved for the least error: the best on grids, each finer than the one
-   before. */
-static double sklyanin_gyrostat_least_on_line(const sklyanin_gyrostat_params *params,
-    const double gauge[sklyanin_gyrostat_GAUGES], int c, double width,
-    double samples[][sklyanin_gyrostat_DIM])
-{
-    double moved[sklyanin_gyrostat_GAUGES], best = 0.0, mesh = 0.125, least =
-        sklyanin_gyrostat_gauge_error(params, gauge, samples);
-    memcpy(moved, gauge, sizeof moved);
-    for (int level = 0; level < 3; ++level, mesh *= 0.125) {
-        const int reach = level == 0 ? 24 : 8;
-        const double centre = best;
-        for (int j = -reach; j <= reach; ++j) {
-            moved[c] = gauge[c] + (centre + j * mesh) * width;
-            const double error = sklyanin_gyrostat_gauge_error(params, moved, samples);
-            if (!(error < least - 1e-12 * least)) continue; /* close calls are not decided by rounding */
-            least = error;
-            best = centre + j * mesh;
-        }
-    }
-    return best;
-}
-
-/* The multiples that minimise the leading error along a short piece of the trajectory, one after the other,
-   from the least-squares solution of grad H = sum of multiples of grad C. Zero where that gives nothing
-   finite. */
+/* For each Casimir C the multiple by which grad H less it times grad C is smallest at the start; zero where
+   that gives nothing finite. */
 static void sklyanin_gyrostat_choose_gauge(const sklyanin_gyrostat_params *params,
     const double x[sklyanin_gyrostat_DIM], double gauge[sklyanin_gyrostat_GAUGES])
 {
-    double samples[sklyanin_gyrostat_SAMPLES][sklyanin_gyrostat_DIM], out[1 + 2 * sklyanin_gyrostat_GAUGES],
-        sums[1 + 2 * sklyanin_gyrostat_GAUGES] = { 0.0 };
-    double width[sklyanin_gyrostat_GAUGES];
-    sklyanin_gyrostat_sample(params, x, samples);
-    for (int k = 0; k < sklyanin_gyrostat_SAMPLES; ++k) {
-        sklyanin_gyrostat_products(params, samples[k], out);
-        for (int i = 0; i < 1 + 2 * sklyanin_gyrostat_GAUGES; ++i) sums[i] += out[i];
-    }
+    double out[1 + 2 * sklyanin_gyrostat_GAUGES];
+    sklyanin_gyrostat_products(params, x, out);
     for (int c = 0; c < sklyanin_gyrostat_GAUGES; ++c) {
-        const double norm = sums[2 + 2 * c] > 0.0 ? sums[2 + 2 * c] : HUGE_VAL;
-        gauge[c] = sums[1 + 2 * c] / norm;
-        width[c] = sqrt(sums[0] / norm);
+        const double multiple = out[1 + 2 * c] / out[2 + 2 * c];
+        gauge[c] = isfinite(multiple) ? multiple : 0.0;
     }
-    for (int sweep = 0, moved = 1; sweep < sklyanin_gyrostat_SWEEPS && moved; ++sweep) {
-        moved = 0;
-        for (int c = 0; c < sklyanin_gyrostat_GAUGES; ++c) {
-            const double best = sklyanin_gyrostat_least_on_line(params, gauge, c, width[c], samples);
-            gauge[c] += best * width[c];
-            moved = moved || best != 0.0;
-        }
-    }
-    if (!isfinite(sklyanin_gyrostat_gauge_error(params, gauge, samples)))
-        memset(gauge, 0, sklyanin_gyrostat_GAUGES * sizeof gauge[0]);
 }
 
 /* ---- The solver ---- */
-/* The arguments may be parts of *s: they are read before it is written. */
+/* The arguments may be parts of *s, which is therefore written last. */
 sklyanin_gyrostat_status sklyanin_gyrostat_init_gauge(sklyanin_gyrostat_solver *s,
     const sklyanin_gyrostat_params *params, const double x0[sklyanin_gyrostat_DIM],
     const double gauge[sklyanin_gyrostat_GAUGES])
 {
     if (s == NULL || x0 == NULL) return sklyanin_gyrostat_BAD_ARGUMENT;
-    const sklyanin_gyrostat_params own = params != NULL ? *params : sklyanin_gyrostat_default_params;
-    double x[sklyanin_gyrostat_DIM];
-    memcpy(x, x0, sizeof x);
+    sklyanin_gyrostat_solver fresh = { .h = (double)NAN };
+    fresh.params = params != NULL ? *params : sklyanin_gyrostat_default_params;
+    memcpy(fresh.x, x0, sizeof fresh.x);
     for (int i = 0; i < sklyanin_gyrostat_DIM; ++i)
-        if (!isfinite(x[i])) return sklyanin_gyrostat_BAD_ARGUMENT;
-    double multiples[sklyanin_gyrostat_GAUGES] = { 0.0 };
-    const int given = gauge != NULL;
-    if (given) memcpy(multiples, gauge, sizeof multiples);
+        if (!isfinite(fresh.x[i])) return sklyanin_gyrostat_BAD_ARGUMENT;
+    if (gauge == NULL) sklyanin_gyrostat_choose_gauge(&fresh.params, fresh.x, fresh.gauge);
+    else memcpy(fresh.gauge, gauge, sizeof fresh.gauge);
     for (int c = 0; c < sklyanin_gyrostat_GAUGES; ++c)
-        if (!isfinite(multiples[c])) return sklyanin_gyrostat_BAD_ARGUMENT;
-    memset(s, 0, sizeof *s);
-    memcpy(s->x, x, sizeof s->x);
-    s->params = own;
-    if (!given) sklyanin_gyrostat_choose_gauge(&own, x, multiples);
-    memcpy(s->gauge, multiples, sizeof s->gauge);
+        if (!isfinite(fresh.gauge[c])) return sklyanin_gyrostat_BAD_ARGUMENT;
+    *s = fresh;
     return sklyanin_gyrostat_OK;
 }
 
@@ -780,44 +644,38 @@ sklyanin_gyrostat_status sklyanin_gyrostat_init(sklyanin_gyrostat_solver *s,
 static sklyanin_gyrostat_status sklyanin_gyrostat_set_step(sklyanin_gyrostat_solver *s, double h)
 {
     if (s == NULL || !isfinite(h)) return sklyanin_gyrostat_BAD_ARGUMENT;
-    if (s->prepared && memcmp(&h, &s->h, sizeof h) == 0) return sklyanin_gyrostat_OK;
+    if (memcmp(&h, &s->h, sizeof h) == 0) return sklyanin_gyrostat_OK;
     sklyanin_gyrostat_prepare(&s->params, s->gauge, h, s->coef);
     memset(&s->history, 0, sizeof s->history);
     s->h = h;
     s->t_before_h = s->t;
     s->steps_before_h = s->steps;
-    s->prepared = 1;
     return sklyanin_gyrostat_OK;
 }
 
 /* One stage. A guess from earlier steps may have misled it: then once more without. */
 static sklyanin_gyrostat_status sklyanin_gyrostat_stage(sklyanin_gyrostat_solver *s)
 {
-    sklyanin_gyrostat_status status = sklyanin_gyrostat_attempt(s);
-    if (status != sklyanin_gyrostat_OK && s->history.count > 0) {
-        memset(&s->history, 0, sizeof s->history);
-        status = sklyanin_gyrostat_attempt(s);
-    }
-    return status;
-}
-
-sklyanin_gyrostat_status sklyanin_gyrostat_step(sklyanin_gyrostat_solver *s, double h)
-{
-    sklyanin_gyrostat_status status = sklyanin_gyrostat_set_step(s, h);
-    if (status != sklyanin_gyrostat_OK) return status;
-    status = sklyanin_gyrostat_stage(s);
-    if (status != sklyanin_gyrostat_OK) return status;
-    ++s->steps;
-    s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
-    return status;
+    const sklyanin_gyrostat_status status = sklyanin_gyrostat_attempt(s);
+    if (status == sklyanin_gyrostat_OK || s->history.count == 0) return status;
+    memset(&s->history, 0, sizeof s->history);
+    return sklyanin_gyrostat_attempt(s);
 }
 
 sklyanin_gyrostat_status sklyanin_gyrostat_integrate(sklyanin_gyrostat_solver *s, double h, size_t steps)
 {
     sklyanin_gyrostat_status status = sklyanin_gyrostat_set_step(s, h);
-    for (; steps > 0 && status == sklyanin_gyrostat_OK; --steps) status = sklyanin_gyrostat_step(s, h);
+    for (; steps > 0 && status == sklyanin_gyrostat_OK; --steps) {
+        status = sklyanin_gyrostat_stage(s);
+        if (status != sklyanin_gyrostat_OK) break;
+        ++s->steps;
+        s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
+    }
     return status;
 }
+
+sklyanin_gyrostat_status sklyanin_gyrostat_step(sklyanin_gyrostat_solver *s,
+    double h) { return sklyanin_gyrostat_integrate(s, h, 1); }
 
 const char *sklyanin_gyrostat_status_string(sklyanin_gyrostat_status status)
 {
@@ -833,7 +691,6 @@ const char *sklyanin_gyrostat_status_string(sklyanin_gyrostat_status status)
 }
 
 size_t sklyanin_gyrostat_solver_size(void) { return sizeof(sklyanin_gyrostat_solver); }
-
 size_t sklyanin_gyrostat_solver_steps_done(const sklyanin_gyrostat_solver *s) { return s->steps; }
 
 /* ---- Ensembles ---- */

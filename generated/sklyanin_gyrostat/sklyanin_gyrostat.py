@@ -13,7 +13,7 @@
 #
 # SPDX-License-Identifier: 0BSD
 # This file belongs to whoever generated it; phigen claims no rights in it.
-# body-sha256: 2529d84d671cdeb8d3d1a07752f1fbae2e31ef449d4fb893b2cce48e5b7338e3
+# body-sha256: 793dbbc8f2d36d1afae46b6f959449defe074aec71396850574f3efcf7533ef3
 import numpy as np
 
 VERSION = "0.1.0"
@@ -519,109 +519,15 @@ def _advance(stage, x, carry, memory):
     return following, rest, (p, memory[0] if memory[0].any() else p), status
 
 
-def _line(error_of, gauge, c, width):
-    """The error where one multiple varies, of centre + (j - 3) width for j = 0 ... 6, as forward differences (7, members).
-
-    S_3 is cubic in H, so these are those of a polynomial of degree six. Also their size, before.
-    """
-    moved, errors = gauge.copy(), []
-    for j in range(7):
-        moved[:, c] = gauge[:, c] + (j - 3) * width
-        errors.append(error_of(moved))
-    return np.array([np.diff(errors, k, axis=0)[0] for k in range(7)]), sum(errors)
-
-
-def _least_on_line(difference, size):
-    """Where that polynomial is least, in units of width: the best t on grids, each finer than the one before."""
-
-    def value(t):
-        error = difference[6]
-        for k in range(5, -1, -1):
-            error = difference[k] + (t + 3.0 - k) / (k + 1) * error
-        return error
-
-    best = np.zeros_like(size)
-    least = value(best)
-    for reach, mesh in ((24, 1 / 8), (8, 1 / 64), (8, 1 / 512)):
-        centre = best
-        for j in range(-reach, reach + 1):
-            t = centre + j * mesh
-            error = value(t)
-            better = error < least - 1e-12 * size  # close calls are not decided by rounding
-            least, best = np.where(better, error, least), np.where(better, t, best)
-    return best
-
-
-def _samples(parameters, x, count=32):
-    """A short piece of each trajectory, by a Runge-Kutta method with steps of a fixed change."""
-    speed = np.abs(_vector_field(parameters, x)).sum(axis=-1) + np.finfo(float).tiny
-    h = (0.25 * np.abs(x).sum(axis=-1) / speed)[:, np.newaxis]
-    points = [x]
-    for _ in range(count - 1):
-        y = points[-1]
-        middle = y + 0.5 * h * _vector_field(parameters, y)
-        points.append(y + h * _vector_field(parameters, middle))
-    return np.array(points)
-
-
 def _choose_gauge(parameters, x):
-    """The lambda that minimise the leading error along a short piece of each trajectory: (members, number of them).
+    """For each Casimir C the lambda by which grad H - lambda grad C is smallest at x: (members, number of them).
 
-    One after the other, from the least-squares solution of grad H = sum of lambda grad C; zero where that gives
-    nothing finite.
+    Zero where that gives nothing finite.
     """
-    points = _samples(parameters, x)
-    sums = _products(parameters, points).sum(axis=0)
-
-    def error_of(gauge):
-        return (_guide(parameters, gauge.T, points) ** 2).sum(axis=(0, -1))
-
-    norms = np.where(sums[:, 2::2] > 0, sums[:, 2::2], np.inf)
-    gauge, width = sums[:, 1::2] / norms, np.sqrt(sums[:, :1] / norms)
-    for _ in range(4):
-        before = gauge.copy()
-        for c in range(gauge.shape[1]):
-            gauge[:, c] += _least_on_line(*_line(error_of, gauge, c, width[:, c])) * width[:, c]
-        if np.array_equal(before, gauge, equal_nan=True):
-            break
-    return np.where(np.isfinite(error_of(gauge))[:, np.newaxis], gauge, 0.0)
-
-
-def _guide(parameters, gauge, x):
-    """The leading error vector pi grad S_3, as a function of the gauge."""
-    S0 = x[..., 0]
-    S1 = x[..., 1]
-    S2 = x[..., 2]
-    S3 = x[..., 3]
-    t1 = S1 * S3
-    t2 = S0 * S0
-    t3 = S3 * S3
-    t4 = S2 * (1.0 / 900.0 - 1.0 / 150.0 * gauge[0] + t3 * (1.0 / 108.0 - 1.0 / 54.0 * gauge[0]))
-    t5 = -1.0 / 450.0 + 1.0 / 75.0 * gauge[0]
-    t6 = 1.0 / 15.0 * gauge[0]
-    t7 = S2 * (1.0 / 90.0 - t6)
-    t8 = S2 * (1.0 / 36.0 - 1.0 / 6.0 * gauge[0])
-    t9 = t2 * (t3 * (1.0 / 90.0 - 1.0 / 45.0 * gauge[0]) + t4 + S1 * (t5 + t7 + S1 * (-1.0 / 90.0 + t6 + t8)))
-    t10 = S2 * S3
-    t11 = 2.0 / 45.0 * gauge[0]
-    t12 = 1.0 / 30.0 * gauge[0]
-    t13 = 2.0 / 75.0 * gauge[0]
-    t14 = S1 * (1.0 / 225.0 - t13 + t3 * (2.0 / 27.0 - 8.0 / 27.0 * gauge[0]) + S2 * (-1.0 / 45.0 + 2.0 / 15.0 * gauge[0] + t8))
-    t15 = t2 * (t3 * (1.0 / 90.0 - t11) + S2 * (t5 + S2 * (1.0 / 180.0 - t12)) + t14)
-    t16 = S1 * S2
-    t17 = S1 * (1.0 / 45.0 + 2.0 / 27.0 * S1) + (3.0 / 200.0 + S2 * (1.0 / 45.0 + 1.0 / 108.0 * S2)) + gauge[0] * (S1 * (-4.0 / 45.0 - 8.0 / 27.0 * S1) + (-1.0 / 30.0 + S2 * (-2.0 / 45.0 - 1.0 / 54.0 * S2)))
-    t18 = S3 * t2 * t17
-    t19 = S0 * S3
-    t20 = t3 * (3.0 / 200.0 - t12) + S2 * (t3 * (1.0 / 45.0 - t11) + t4) + S1 * (t3 * (1.0 / 45.0 - 4.0 / 45.0 * gauge[0]) + S2 * (-1.0 / 225.0 + t13 + t7) + t14)
-    t21 = S0 * t20
-    t22 = S0 * S2
-    t23 = S0 * S1
-    return _filled(x, [
-            3.0 * (t1 * t9) - 2.0 * (t10 * t15) - t16 * t18,
-            2.0 * (t19 * t9) + 2.0 * (t10 * t21) - 2.0 * (t22 * t18),
-            2.0 * (t23 * t18) + ((-3.0) * (t1 * t21) - 2.0 * (t19 * t15)),
-            2.0 * (t22 * t15) + t16 * t21 - 2.0 * (t23 * t9),
-        ])
+    products = _products(parameters, x)
+    with np.errstate(all="ignore"):
+        gauge = products[:, 1::2] / products[:, 2::2]
+    return np.where(np.isfinite(gauge), gauge, 0.0)
 
 
 def _products(parameters, x):

@@ -22,7 +22,7 @@
  *   5. The choice of the gauge: multiples of Casimirs taken from H
  *   6. The solver
  *   7. Ensembles
- * body-sha256: 04b22f5e35a3eeadd195d74afebfa5b8919f24950e17d1b46b9cd695e55c49f4
+ * body-sha256: 7724e40c618fd8bfa3a633c5524774ba7d6b0299c2ff81a4212c3c7156c12f6d
  */
 #include "so4_manakov.h"
 
@@ -34,9 +34,7 @@
 const so4_manakov_params so4_manakov_default_params = { 0 };
 
 enum { so4_manakov_MAX_ITERATIONS = 20 }; /* of an inner solve */
-
-/* A correction is accepted when the error that it leaves is estimated to be below this. */
-#define so4_manakov_TOLERANCE 1e-20
+#define so4_manakov_TOLERANCE 1e-20       /* the error that an accepted correction may leave, as estimated */
 
 /* Functions to be kept apart: very long ones compile in quadratic time. */
 #if defined(__GNUC__)
@@ -45,51 +43,55 @@ enum { so4_manakov_MAX_ITERATIONS = 20 }; /* of an inner solve */
 #define so4_manakov_APART
 #endif
 
+/* The polynomial with these coefficients, the constant first. */
+static inline double so4_manakov_polynomial(const double *coefficients, int count, double s)
+{
+    double value = coefficients[--count];
+    while (count > 0) value = value * s + coefficients[--count];
+    return value;
+}
+
 /* (1 - w cot w)/s with w = sqrt(s)/2, coth for negative s: the function of the exponential bi-realisation. */
 static double so4_manakov_phi0(double s)
 {
-    if (fabs(s) < 0.25)
-        return (0.08333333333333333 + s * (0.001388888888888889 + s * (3.306878306878307e-05 + s *
-            (8.267195767195768e-07 + s * (2.08767569878681e-08 + s * (5.284190138687493e-10 + s *
-            (1.3382536530684679e-11 + s * (3.3896802963225827e-13 + s * 8.586062056277845e-15))))))));
+    static const double near[9] = { 0.08333333333333333, 0.001388888888888889, 3.306878306878307e-05,
+        8.267195767195768e-07, 2.08767569878681e-08, 5.284190138687493e-10, 1.3382536530684679e-11,
+        3.3896802963225827e-13, 8.586062056277845e-15 };
+    static const double rest[21] = { 0.03267274151216445, 0.000105641107053347, 5.637370282876845e-07,
+        3.357141926657451e-09, 2.0742872904166045e-11, 1.3000482138698975e-13, 8.196052055691008e-16,
+        5.180118196169724e-18, 3.277539174701792e-20, 2.0747401878593604e-22, 1.3136241807166534e-24,
+        8.318003195189264e-27, 5.267262996834231e-29, 3.3354842988221443e-31, 2.1122063323183885e-33,
+        1.3375664093215244e-35, 8.470227328650247e-38, 5.363831046655698e-40, 3.3966848266497805e-42,
+        2.1509755511832569e-44, 1.3621211117593843e-46 };
+    if (fabs(s) < 0.25) return so4_manakov_polynomial(near, 9, s);
     if (fabs(s) < 16.0) {
         const double pole = 1.0 / (39.47841760435743 - s);
-        return 2.0 * pole + (0.03267274151216445 + s * (0.000105641107053347 + s * (5.637370282876845e-07
-            + s * (3.357141926657451e-09 + s * (2.0742872904166045e-11 + s * (1.3000482138698975e-13 + s *
-            (8.196052055691008e-16 + s * (5.180118196169724e-18 + s * (3.277539174701792e-20 + s *
-            (2.0747401878593604e-22 + s * (1.3136241807166534e-24 + s * (8.318003195189264e-27 + s *
-            (5.267262996834231e-29 + s * (3.3354842988221443e-31 + s * (2.1122063323183885e-33 + s *
-            (1.3375664093215244e-35 + s * (8.470227328650247e-38 + s * (5.363831046655698e-40 + s *
-            (3.3966848266497805e-42 + s * (2.1509755511832569e-44 + s *
-            1.3621211117593843e-46))))))))))))))))))));
+        return 2.0 * pole + so4_manakov_polynomial(rest, 21, s);
     }
     const double w = 0.5 * sqrt(fabs(s)), c = w / (s > 0.0 ? tan(w) : tanh(w));
-    const double phi0 = (1.0 - c) / s;
-    return phi0;
+    return (1.0 - c) / s;
 }
 
 /* The derivative of (1 - w cot w)/s, w = sqrt(s)/2. */
 static double so4_manakov_phi1(double s)
 {
-    if (fabs(s) < 0.25)
-        return (0.001388888888888889 + s * (6.613756613756614e-05 + s * (2.48015873015873e-06 + s *
-            (8.35070279514724e-08 + s * (2.6420950693437467e-09 + s * (8.029521918410807e-11 + s *
-            (2.372776207425808e-12 + s * (6.868849645022276e-14 + s * 1.9573818287022555e-15))))))));
+    static const double near[9] = { 0.001388888888888889, 6.613756613756614e-05, 2.48015873015873e-06,
+        8.35070279514724e-08, 2.6420950693437467e-09, 8.029521918410807e-11, 2.372776207425808e-12,
+        6.868849645022276e-14, 1.9573818287022555e-15 };
+    static const double rest[21] = { 0.000105641107053347, 1.127474056575369e-06, 1.0071425779972354e-08,
+        8.297149161666418e-11, 6.500241069349487e-13, 4.917631233414605e-15, 3.626082737318807e-17,
+        2.6220313397614337e-19, 1.8672661690734246e-21, 1.3136241807166533e-23, 9.149803514708191e-26,
+        6.320715596201077e-28, 4.336129588468787e-30, 2.957088865245744e-32, 2.0063496139822866e-34,
+        1.3552363725840395e-36, 9.118512779314688e-39, 6.114032687969605e-41, 4.0868535472481875e-43,
+        2.7242422235187686e-45, 1.8114038279637677e-47 };
+    if (fabs(s) < 0.25) return so4_manakov_polynomial(near, 9, s);
     if (fabs(s) < 16.0) {
         const double pole = 1.0 / (39.47841760435743 - s);
-        return 2.0 * pole * pole + (0.000105641107053347 + s * (1.127474056575369e-06 + s *
-            (1.0071425779972354e-08 + s * (8.297149161666418e-11 + s * (6.500241069349487e-13 + s *
-            (4.917631233414605e-15 + s * (3.626082737318807e-17 + s * (2.6220313397614337e-19 + s *
-            (1.8672661690734246e-21 + s * (1.3136241807166533e-23 + s * (9.149803514708191e-26 + s *
-            (6.320715596201077e-28 + s * (4.336129588468787e-30 + s * (2.957088865245744e-32 + s *
-            (2.0063496139822866e-34 + s * (1.3552363725840395e-36 + s * (9.118512779314688e-39 + s *
-            (6.114032687969605e-41 + s * (4.0868535472481875e-43 + s * (2.7242422235187686e-45 + s *
-            1.8114038279637677e-47))))))))))))))))))));
+        return 2.0 * pole * pole + so4_manakov_polynomial(rest, 21, s);
     }
     const double w = 0.5 * sqrt(fabs(s)), c = w / (s > 0.0 ? tan(w) : tanh(w));
     const double phi0 = (1.0 - c) / s;
-    const double phi1 = (0.5 * s * phi0 * phi0 - 1.5 * phi0 + 0.125) / s;
-    return phi1;
+    return (0.5 * s * phi0 * phi0 - 1.5 * phi0 + 0.125) / s;
 }
 
 /* everything that depends on parameters and step size only */
@@ -185,8 +187,8 @@ so4_manakov_APART static void so4_manakov_linearise_part1(const double coef[32],
     work[26] = 0.5 * work[108];
     work[42] = 0.5 * work[111];
     work[30] = work[26] + work[42];
-    const double t20 = x23 * work[21], t21 = x34 * work[30], t22 = x14 * work[21];
-    const double t23 = x12 * work[30], t24 = t20 - t21 + (t22 - t23), t25 = t23 - t22 + (t21 - t20);
+    const double t20 = x23 * work[21], t21 = x34 * work[30], t22 = x14 * work[21], t23 = x12 * work[30];
+    const double t24 = t20 - t21 + (t22 - t23), t25 = t23 - t22 + (t21 - t20);
     const double t26 = t19 + work[30] * t24 + (t19 - work[30] * t25), t27 = work[23] * t26;
     const double t28 = work[119] - t10, t29 = work[110] + t12, t30 = work[111] - t15;
     const double t31 = work[119] * t28 + (work[110] * t29 + (t14 + work[111] * t30));
@@ -378,33 +380,31 @@ so4_manakov_APART static void so4_manakov_linearise_part2(const double coef[32],
     const double t53 = t52 + work[83], t54 = (t53 + t53) * work[1], t55 = work[21] * work[21];
     const double t56 = work[84] + t55, t57 = (t56 + t56) * work[23], t58 = t54 - t57;
     const double t59 = work[18] * work[52], t60 = work[18] * work[29], t61 = (t59 - t60) * work[1];
-    const double t62 = work[30] * work[22], t63 = (t62 + t62) * work[23];
-    const double t64 = (t60 - t59) * work[1], t65 = t54 + t57, t66 = (t3 - t2) * work[1];
-    const double t67 = work[52] * work[19], t68 = t13 + (t67 + t67) * work[1];
-    const double t69 = work[87] * work[18] + t38, t70 = work[51] * work[18] + t37;
-    const double t71 = work[1] * (t69 - t70), t72 = work[88] * work[47] - t34;
-    const double t73 = work[89] * work[57] + work[23] * (t72 + t72);
+    const double t62 = work[30] * work[22], t63 = (t62 + t62) * work[23], t64 = (t60 - t59) * work[1];
+    const double t65 = t54 + t57, t66 = (t3 - t2) * work[1], t67 = work[52] * work[19];
+    const double t68 = t13 + (t67 + t67) * work[1], t69 = work[87] * work[18] + t38;
+    const double t70 = work[51] * work[18] + t37, t71 = work[1] * (t69 - t70);
+    const double t72 = work[88] * work[47] - t34, t73 = work[89] * work[57] + work[23] * (t72 + t72);
     const double t74 = work[73] + (work[90] * work[56] + t71 + t73);
     const double t75 = work[23] * (work[91] * work[21] + work[92] - (work[88] * work[21] + work[93]));
     const double t76 = work[89] * work[66] + t75, t77 = work[51] * work[19] - work[94];
     const double t78 = work[68] + (t76 + (work[61] * work[90] + work[1] * (t77 + t77)));
-    const double t79 = t41 * work[18], t80 = t33 * work[47];
-    const double t81 = (t80 - t21 + (t80 + t44)) * work[23], t82 = t81 + work[89] * work[76];
+    const double t79 = t41 * work[18], t80 = t33 * work[47], t81 = (t80 - t21 + (t80 + t44)) * work[23];
+    const double t82 = t81 + work[89] * work[76];
     const double t83 = (t25 + work[95] + (t25 - t79)) * work[1] + work[3] * work[90] + t82;
     const double t84 = t81 + work[89] * work[74], t85 = work[50] * work[19];
     const double t86 = t84 + ((t85 - work[95] + (work[96] + t85)) * work[1] + work[72] * work[90]);
     const double t87 = t45 * work[47] + t34, t88 = work[23] * (t87 + t87) + work[89] * work[80];
-    const double t89 = work[79] * work[90] + t71 + t88 - work[75];
-    const double t90 = work[87] * work[19] + work[94], t91 = t75 + work[89] * work[82];
+    const double t89 = work[79] * work[90] + t71 + t88 - work[75], t90 = work[87] * work[19] + work[94];
+    const double t91 = t75 + work[89] * work[82];
     const double t92 = work[90] * work[81] + work[1] * (t90 + t90) + t91 - work[0];
     const double t93 = work[30] * work[47], t94 = (t93 + t93) * work[23], t95 = t52 - work[44];
-    const double t96 = work[97] - t55, t97 = (t96 + t96) * work[23];
-    const double t98 = (t95 + t95) * work[1] + t97, t99 = work[19] * work[19] + work[44];
+    const double t96 = work[97] - t55, t97 = (t96 + t96) * work[23], t98 = (t95 + t95) * work[1] + t97;
+    const double t99 = work[19] * work[19] + work[44];
     const double t100 = (t99 + t99) * work[1] + t97 + (work[120] * t74 + work[112] * t78 + (work[35] * t83
         + work[39] * t86 + (work[15] * t92 + work[116] * t89)));
     const double t101 = work[20] * work[52], t102 = t13 + (t101 + t101) * work[1];
-    const double t103 = work[1] * (t70 - t69);
-    const double t104 = work[75] + (t73 + (work[98] * work[56] + t103));
+    const double t103 = work[1] * (t70 - t69), t104 = work[75] + (t73 + (work[98] * work[56] + t103));
     const double t105 = work[51] * work[20] + work[94];
     const double t106 = work[1] * (t105 + t105) + work[98] * work[61] + t76 - work[0];
     const double t107 = work[53] * work[20];
@@ -416,18 +416,15 @@ so4_manakov_APART static void so4_manakov_linearise_part2(const double coef[32],
     const double t113 = work[20] * work[20] + work[44];
     const double t114 = (t113 + t113) * work[1] + t97 + (work[113] * t106 + work[121] * t104
         + (work[34] * t108 + work[35] * t109 + (work[17] * t111 + work[115] * t112)));
-    const double t115 = work[49] - t21;
-    const double t116 = t27 + ((t115 + t115) * work[23] + work[99] * work[57]);
+    const double t115 = work[49] - t21, t116 = t27 + ((t115 + t115) * work[23] + work[99] * work[57]);
     const double t117 = work[78] + (work[99] * work[66] - t30 + t31), t118 = t46 - t44;
     const double t119 = t48 + ((t118 + t118) * work[23] + work[99] * work[80]);
     const double t120 = work[67] + (work[99] * work[82] - t30 + t50);
     const double t121 = work[99] * work[74] + t36 + t39 - work[75];
-    const double t122 = t36 + work[99] * work[76] + t42 - work[73];
-    const double t123 = work[52] * work[52] + work[44];
+    const double t122 = t36 + work[99] * work[76] + t42 - work[73], t123 = work[52] * work[52] + work[44];
     const double t124 = work[100] + ((t24 + work[95] + (t24 - work[96])) * work[1] + work[101] * work[61]);
     const double t125 = work[1] * (work[102] - work[103]);
-    const double t126 = t125 + work[101] * work[56] + work[104] - work[78];
-    const double t127 = work[87] * work[52];
+    const double t126 = t125 + work[101] * work[56] + work[104] - work[78], t127 = work[87] * work[52];
     const double t128 = (t127 - work[95] + (t127 + work[96])) * work[1] + work[101] * work[81] + work[105];
     const double t129 = work[67] + (work[106] + (work[101] * work[79] + t125));
     const double t130 = work[50] * work[52] - work[94];
@@ -534,14 +531,13 @@ so4_manakov_APART static void so4_manakov_linearise_part3(const double coef[32],
 {
     (void)coef, (void)displacement, (void)increment, (void)jacobian;
     const double x12 = y[0], x13 = y[1], x14 = y[2], x23 = y[3], x24 = y[4], x34 = y[5];
-    const double t1 = x14 * work[7], t2 = x14 * work[114], t3 = x34 * work[115];
-    const double t4 = x12 * work[116], t5 = x12 * work[35], t6 = x34 * work[35], t7 = x23 * work[9];
-    const double t8 = x12 * work[120], t9 = x34 * work[121], t10 = x23 * work[7];
-    const double t11 = x13 * work[7], t12 = x12 * work[27], t13 = x12 * work[121];
-    const double t14 = x13 * work[113], t15 = x34 * work[116], t16 = x24 * work[15];
-    const double t17 = x34 * work[27], t18 = x24 * work[7], t19 = x12 * work[115];
-    const double t20 = x13 * work[17], t21 = x24 * work[112], t22 = x34 * work[120];
-    const double t23 = x14 * work[13], t24 = x23 * work[123];
+    const double t1 = x14 * work[7], t2 = x14 * work[114], t3 = x34 * work[115], t4 = x12 * work[116];
+    const double t5 = x12 * work[35], t6 = x34 * work[35], t7 = x23 * work[9], t8 = x12 * work[120];
+    const double t9 = x34 * work[121], t10 = x23 * work[7], t11 = x13 * work[7], t12 = x12 * work[27];
+    const double t13 = x12 * work[121], t14 = x13 * work[113], t15 = x34 * work[116];
+    const double t16 = x24 * work[15], t17 = x34 * work[27], t18 = x24 * work[7], t19 = x12 * work[115];
+    const double t20 = x13 * work[17], t21 = x24 * work[112], t22 = x34 * work[120], t23 = x14 * work[13];
+    const double t24 = x23 * work[123];
     increment_jacobian[6] = t1 + (x23 * work[11] - (x12 * work[15] + x34 * work[17])) - work[108];
     increment_jacobian[29] = x34 * work[112] + x12 * work[113] - t1 - x23 * work[46] + work[108];
     increment_jacobian[7] = t2 + (work[117] - (t3 + t4));
@@ -581,47 +577,6 @@ static void so4_manakov_linearise(const double coef[32], const double y[6], doub
     so4_manakov_linearise_part3(coef, y, displacement, increment, jacobian, increment_jacobian, work);
 }
 
-/* the leading error vector pi grad S_3, as a function of the gauge */
-static void so4_manakov_guide(const so4_manakov_params *params, const double gauge[1], const double x[6],
-    double error[restrict 6])
-{
-    (void)params;
-    const double x12 = x[0], x13 = x[1], x14 = x[2], x23 = x[3], x24 = x[4], x34 = x[5];
-    const double t1 = 1.0 / 15120.0 - 1.0 / 1800.0 * gauge[0];
-    const double t2 = -1.0 / 3780.0 + 4.0 / 1575.0 * gauge[0];
-    const double t3 = x13 * x24 * t1 + x12 * (x34 * t2), t4 = x34 * x34, t5 = x24 * x24;
-    const double t6 = x12 * x12, t7 = x13 * x13;
-    const double t8 = gauge[0] * ((-2.0 / 675.0) * t6 - 1.0 / 2400.0 * t7 + ((-1.0 / 5400.0) * t5 - 2.0
-        / 3675.0 * t4));
-    const double t9 = x14 * t3 + x23 * (1.0 / 22050.0 * t4 + 1.0 / 75600.0 * t5 + (1.0 / 2700.0 * t6 + 1.0
-        / 14400.0 * t7) + t8);
-    const double t10 = x14 * x23, t11 = 1.0 / 3024.0 - 5.0 / 1512.0 * gauge[0];
-    const double t12 = t10 * t1 + x12 * (x34 * t11), t13 = x14 * x14, t14 = x23 * x23;
-    const double t15 = 1.0 / 32400.0 * t13 + 1.0 / 2160.0 * t6 + (1.0 / 105840.0 * t4 + 1.0 / 75600.0 * t14)
-        + gauge[0] * ((-1.0 / 216.0) * t6 - 1.0 / 5400.0 * t13 + ((-1.0 / 5400.0) * t14 - 1.0 / 10584.0
-        * t4));
-    const double t16 = x13 * t12 + x24 * t15;
-    const double t17 = 3.0 / 15680.0 * t4 + 1.0 / 14400.0 * t14 + (1.0 / 33600.0 * t13 + 1.0 / 8640.0 * t6)
-        + gauge[0] * ((-1.0 / 864.0) * t6 - 1.0 / 2400.0 * t13 + ((-1.0 / 2400.0) * t14 - 3.0 / 1568.0 * t4));
-    const double t18 = x24 * t12 + x13 * t17;
-    const double t19 = x23 * t3 + x14 * (1.0 / 4050.0 * t6 + 1.0 / 33600.0 * t7 + (1.0 / 32400.0 * t5 + 1.0
-        / 14700.0 * t4) + t8);
-    const double t20 = t10 * t2 + x13 * (x24 * t11);
-    const double t21 = 1.0 / 2700.0 * t14 + 1.0 / 2160.0 * t5 + (1.0 / 4050.0 * t13 + 1.0 / 8640.0 * t7)
-        + gauge[0] * ((-2.0 / 675.0) * t14 - 1.0 / 216.0 * t5 + ((-1.0 / 864.0) * t7 - 2.0 / 675.0 * t13));
-    const double t22 = x34 * t20 + x12 * t21;
-    const double t23 = 3.0 / 15680.0 * t7 + 1.0 / 14700.0 * t13 + (1.0 / 105840.0 * t5 + 1.0 / 22050.0 * t14)
-        + gauge[0] * ((-3.0 / 1568.0) * t7 - 2.0 / 3675.0 * t13 + ((-2.0 / 3675.0) * t14 - 1.0 / 10584.0
-        * t5));
-    const double t24 = x12 * t20 + x34 * t23;
-    error[0] = x13 * t9 + x14 * t16 - (x23 * t18 + x24 * t19);
-    error[1] = x23 * t22 - x34 * t19 + (x14 * t24 - x12 * t9);
-    error[2] = x34 * t18 + x24 * t22 - (x12 * t16 + x13 * t24);
-    error[3] = x12 * t18 - x13 * t22 + (x24 * t24 - x34 * t16);
-    error[4] = x12 * t19 - x14 * t22 + (x34 * t9 - x23 * t24);
-    error[5] = x23 * t16 - x24 * t9 + (x13 * t19 - x14 * t18);
-}
-
 /* grad H . grad H, then grad H . grad C and grad C . grad C for each Casimir of the gauge */
 static void so4_manakov_products(const so4_manakov_params *params, const double x[6], double out[restrict 3])
 {
@@ -636,7 +591,6 @@ static void so4_manakov_products(const so4_manakov_params *params, const double 
     out[2] = 4.0 * t1 + 4.0 * t2 + (4.0 * t5 + 4.0 * t6 + (4.0 * t3 + 4.0 * t4));
 }
 
-/* the Hamiltonian */
 double so4_manakov_hamiltonian(const so4_manakov_params *params, const double x[6])
 {
     (void)params;
@@ -646,7 +600,6 @@ double so4_manakov_hamiltonian(const so4_manakov_params *params, const double x[
     return 0.5 * t1;
 }
 
-/* the Casimirs */
 void so4_manakov_casimirs(const so4_manakov_params *params, const double x[6], double out[])
 {
     (void)params;
@@ -655,7 +608,6 @@ void so4_manakov_casimirs(const so4_manakov_params *params, const double x[6], d
     out[1] = x14 * x23 + (x12 * x34 - x13 * x24);
 }
 
-/* pi(x) grad H(x) */
 void so4_manakov_vector_field(const so4_manakov_params *params, const double x[6], double out[6])
 {
     (void)params;
@@ -672,19 +624,18 @@ void so4_manakov_vector_field(const so4_manakov_params *params, const double x[6
 }
 
 /* ---- Compensated sums, linear equations ---- */
-/* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to
-   its last bit: were it rounded with the change, corrections of one sign would add up to a drift. 0, and x as
-   before, if the sum is not finite. */
+/* x + change + small in compensated arithmetic, where small is the carry and what is as small: were that
+   rounded with the change, corrections of one sign would add up to a drift. 0, and x as before, if the sum is
+   not finite. */
 static int so4_manakov_advance(so4_manakov_solver *s, const double change[so4_manakov_DIM],
-    const double correction[so4_manakov_DIM])
+    const double small[so4_manakov_DIM])
 {
     double x[so4_manakov_DIM], carry[so4_manakov_DIM];
     for (int i = 0; i < so4_manakov_DIM; ++i) {
         const double sum = s->x[i] + change[i], added = sum - s->x[i];
-        const double lost = (s->x[i] - (sum - added)) + (change[i] - added);
-        const double small = lost + (s->carry[i] + correction[i]);
-        x[i] = sum + small;
-        carry[i] = small - (x[i] - sum);
+        const double lost = ((s->x[i] - (sum - added)) + (change[i] - added)) + small[i];
+        x[i] = sum + lost;
+        carry[i] = lost - (x[i] - sum);
         if (!isfinite(x[i])) return 0;
     }
     memcpy(s->x, x, sizeof x);
@@ -723,12 +674,10 @@ static int so4_manakov_solve(double matrix[so4_manakov_DIM * so4_manakov_DIM], d
 }
 
 /* ---- Starting guesses ---- */
-/* How far from the last value a guess may be, in sizes of that value. */
-#define so4_manakov_REACH 4.0
+#define so4_manakov_REACH 4.0 /* how far from the last value a guess may be, in sizes of that value */
 
-/* The guess for the next value from the last ones: the sum of their backward differences. 0 if there is none,
-   or if it is far away, where the equation of a step has solutions that have nothing to do with the motion.
-   */
+/* The guess for the next value, the sum of differences. 0 if there is none, or if it is far away, where the
+   equation of a step has solutions that have nothing to do with the motion. */
 static int so4_manakov_predict(const so4_manakov_history *history, double value[so4_manakov_DIM])
 {
     double distance = 0.0, size = 0.0;
@@ -764,10 +713,8 @@ static void so4_manakov_remember(so4_manakov_history *history, const double valu
     if (history->count < so4_manakov_DIFFERENCES) ++history->count;
 }
 
-/* How far a step may lead, in sizes of the state and of what the vector field says, if the energy is lost;
-   and the part of the energy that counts as lost. */
-#define so4_manakov_PLAUSIBLE 1.5
-#define so4_manakov_LOST 0.5
+#define so4_manakov_PLAUSIBLE 1.5 /* how far any step may lead, in sizes of the state and of its motion */
+#define so4_manakov_LOST 0.5      /* part of the energy that one which leads farther must not lose */
 
 /* Whether an increment is that of the motion. Where the step is too large, the equation may have been solved
    by a point far away, at another energy, that has nothing to do with it. */
@@ -777,24 +724,21 @@ static int so4_manakov_plausible(const so4_manakov_solver *s, const double incre
     for (int i = 0; i < so4_manakov_DIM; ++i) {
         moved += fabs(increment[i]);
         size += fabs(s->x[i]);
-    }
-    if (moved <= so4_manakov_PLAUSIBLE * size) return 1;
-    so4_manakov_vector_field(&s->params, s->x, field);
-    for (int i = 0; i < so4_manakov_DIM; ++i) {
-        size += fabs(s->h * field[i]);
         middle[i] = s->x[i] + 0.5 * increment[i];
         end[i] = s->x[i] + increment[i];
     }
     if (moved <= so4_manakov_PLAUSIBLE * size) return 1;
-    const double before = so4_manakov_hamiltonian(&s->params, s->x), after =
-        so4_manakov_hamiltonian(&s->params, end);
-    const double scale = fabs(before) + fabs(so4_manakov_hamiltonian(&s->params, middle)) + fabs(after);
-    return fabs(after - before) <= so4_manakov_LOST * scale;
+    so4_manakov_vector_field(&s->params, s->x, field);
+    for (int i = 0; i < so4_manakov_DIM; ++i) size += fabs(s->h * field[i]);
+    if (moved <= so4_manakov_PLAUSIBLE * size) return 1;
+    const double before = so4_manakov_hamiltonian(&s->params, s->x);
+    const double after = so4_manakov_hamiltonian(&s->params, end), between =
+        so4_manakov_hamiltonian(&s->params, middle);
+    return fabs(after - before) <= so4_manakov_LOST * (fabs(before) + fabs(between) + fabs(after));
 }
 
 /* ---- The implicit step, by Newton's method ---- */
-/* Components of y are measured no finer than by this part of the largest. */
-#define so4_manakov_FLOOR 1e-6
+#define so4_manakov_FLOOR 1e-6 /* components of y are measured no finer than by this part of the largest */
 
 /* Size of a correction relative to each component of y; NaN or infinite if the correction is. */
 static double so4_manakov_size(const double y[so4_manakov_DIM], const double delta[so4_manakov_DIM])
@@ -809,9 +753,8 @@ static double so4_manakov_size(const double y[so4_manakov_DIM], const double del
     return size;
 }
 
-/* Corrections below the first that shrink by less than the second have reached the level of rounding. */
-#define so4_manakov_NEARLY_SOLVED 1e-8
-#define so4_manakov_SHRINKING 0.25
+#define so4_manakov_NEARLY_SOLVED 1e-8 /* corrections below this have reached the level of rounding, ... */
+#define so4_manakov_SHRINKING 0.25     /* ... if one is more than this part of the one before */
 
 /* Solve (y - x) + displacement(y) = 0 for y by Newton's method from the extrapolated guess, and advance. The
    increment is corrected to first order by the last Newton correction, so that correction costs no
@@ -821,14 +764,14 @@ static so4_manakov_status so4_manakov_attempt(so4_manakov_solver *s)
 {
     double y[so4_manakov_DIM], delta[so4_manakov_DIM], displacement[so4_manakov_DIM],
         increment[so4_manakov_DIM];
-    double jacobian[so4_manakov_DIM * so4_manakov_DIM], increment_jacobian[so4_manakov_DIM * so4_manakov_DIM],
-        previous = HUGE_VAL;
+    double jacobian[so4_manakov_DIM * so4_manakov_DIM], increment_jacobian[so4_manakov_DIM * so4_manakov_DIM];
+    double previous = HUGE_VAL;
     if (!so4_manakov_predict(&s->history, y)) memcpy(y, s->x, sizeof y);
     for (int iteration = 1; iteration <= so4_manakov_MAX_ITERATIONS; ++iteration) {
         so4_manakov_linearise(s->coef, y, displacement, increment, jacobian, increment_jacobian);
         ++s->evaluations;
-        for (int i = 0; i < so4_manakov_DIM; ++i) delta[i] = ((y[i] - s->x[i]) + displacement[i])
-            - s->carry[i];
+        for (int i = 0; i < so4_manakov_DIM; ++i)
+            delta[i] = ((y[i] - s->x[i]) + displacement[i]) - s->carry[i];
         const int regular = so4_manakov_solve(jacobian, delta);
         const double size = so4_manakov_size(y, delta), growth = size / (previous * previous);
         if (!isfinite(size)) return so4_manakov_NOT_FINITE;
@@ -838,12 +781,14 @@ static so4_manakov_status so4_manakov_attempt(so4_manakov_solver *s)
         const int stalled = previous < so4_manakov_NEARLY_SOLVED && size > so4_manakov_SHRINKING * previous;
         previous = size;
         if (!(remaining <= so4_manakov_TOLERANCE || stalled)) continue;
-        double correction[so4_manakov_DIM] = { 0.0 };
-        for (int i = 0; i < so4_manakov_DIM; ++i)
+        double small[so4_manakov_DIM] = { 0.0 }; /* the correction of the increment, and the carry */
+        for (int i = 0; i < so4_manakov_DIM; ++i) {
             for (int j = 0; j < so4_manakov_DIM; ++j)
-                correction[i] -= increment_jacobian[i * so4_manakov_DIM + j] * delta[j];
+                small[i] -= increment_jacobian[i * so4_manakov_DIM + j] * delta[j];
+            small[i] += s->carry[i];
+        }
         if (!so4_manakov_plausible(s, increment)) return so4_manakov_NO_CONVERGENCE;
-        if (!so4_manakov_advance(s, increment, correction)) return so4_manakov_NOT_FINITE;
+        if (!so4_manakov_advance(s, increment, small)) return so4_manakov_NOT_FINITE;
         so4_manakov_remember(&s->history, y);
         return so4_manakov_OK;
     }
@@ -851,118 +796,35 @@ static so4_manakov_status so4_manakov_attempt(so4_manakov_solver *s)
 }
 
 /* ---- The choice of the gauge: multiples of Casimirs taken from H ---- */
-enum {
-    so4_manakov_SAMPLES = 32, /* states along a short piece of the trajectory */
-    so4_manakov_SWEEPS = 4    /* most rounds over the multiples */
-};
-
-/* A short piece of the trajectory from x, by a Runge-Kutta method with steps of a fixed change. */
-static void so4_manakov_sample(const so4_manakov_params *params, const double x[so4_manakov_DIM],
-    double samples[][so4_manakov_DIM])
-{
-    double slope[so4_manakov_DIM], middle[so4_manakov_DIM], size = 0.0, speed = DBL_MIN;
-    so4_manakov_vector_field(params, x, slope);
-    for (int i = 0; i < so4_manakov_DIM; ++i) {
-        samples[0][i] = x[i];
-        size += fabs(x[i]);
-        speed += fabs(slope[i]);
-    }
-    const double h = 0.25 * size / speed;
-    for (int k = 1; k < so4_manakov_SAMPLES; ++k) {
-        const double *y = samples[k - 1];
-        so4_manakov_vector_field(params, y, slope);
-        for (int i = 0; i < so4_manakov_DIM; ++i) middle[i] = y[i] + 0.5 * h * slope[i];
-        so4_manakov_vector_field(params, middle, slope);
-        for (int i = 0; i < so4_manakov_DIM; ++i) samples[k][i] = y[i] + h * slope[i];
-    }
-}
-
-/* Sum of |pi grad S_3|^2, the leading error of the method, over the samples. */
-static double so4_manakov_gauge_error(const so4_manakov_params *params,
-    const double gauge[so4_manakov_GAUGES], double samples[][so4_manakov_DIM])
-{
-    double error[so4_manakov_DIM], sum = 0.0;
-    for (int k = 0; k < so4_manakov_SAMPLES; ++k) {
-        so4_manakov_guide(params, gauge, samples[k], error);
-        for (int i = 0; i < so4_manakov_DIM; ++i) sum += error[i] * error[i];
-    }
-    return sum;
-}
-
-/* How many widths multiple c is to be moved for the least error: the best on grids, each finer than the one
-   before. */
-static double so4_manakov_least_on_line(const so4_manakov_params *params,
-    const double gauge[so4_manakov_GAUGES], int c, double width, double samples[][so4_manakov_DIM])
-{
-    double moved[so4_manakov_GAUGES], best = 0.0, mesh = 0.125, least = so4_manakov_gauge_error(params, gauge,
-        samples);
-    memcpy(moved, gauge, sizeof moved);
-    for (int level = 0; level < 3; ++level, mesh *= 0.125) {
-        const int reach = level == 0 ? 24 : 8;
-        const double centre = best;
-        for (int j = -reach; j <= reach; ++j) {
-            moved[c] = gauge[c] + (centre + j * mesh) * width;
-            const double error = so4_manakov_gauge_error(params, moved, samples);
-            if (!(error < least - 1e-12 * least)) continue; /* close calls are not decided by rounding */
-            least = error;
-            best = centre + j * mesh;
-        }
-    }
-    return best;
-}
-
-/* The multiples that minimise the leading error along a short piece of the trajectory, one after the other,
-   from the least-squares solution of grad H = sum of multiples of grad C. Zero where that gives nothing
-   finite. */
+/* For each Casimir C the multiple by which grad H less it times grad C is smallest at the start; zero where
+   that gives nothing finite. */
 static void so4_manakov_choose_gauge(const so4_manakov_params *params, const double x[so4_manakov_DIM],
     double gauge[so4_manakov_GAUGES])
 {
-    double samples[so4_manakov_SAMPLES][so4_manakov_DIM], out[1 + 2 * so4_manakov_GAUGES],
-        sums[1 + 2 * so4_manakov_GAUGES] = { 0.0 };
-    double width[so4_manakov_GAUGES];
-    so4_manakov_sample(params, x, samples);
-    for (int k = 0; k < so4_manakov_SAMPLES; ++k) {
-        so4_manakov_products(params, samples[k], out);
-        for (int i = 0; i < 1 + 2 * so4_manakov_GAUGES; ++i) sums[i] += out[i];
-    }
+    double out[1 + 2 * so4_manakov_GAUGES];
+    so4_manakov_products(params, x, out);
     for (int c = 0; c < so4_manakov_GAUGES; ++c) {
-        const double norm = sums[2 + 2 * c] > 0.0 ? sums[2 + 2 * c] : HUGE_VAL;
-        gauge[c] = sums[1 + 2 * c] / norm;
-        width[c] = sqrt(sums[0] / norm);
+        const double multiple = out[1 + 2 * c] / out[2 + 2 * c];
+        gauge[c] = isfinite(multiple) ? multiple : 0.0;
     }
-    for (int sweep = 0, moved = 1; sweep < so4_manakov_SWEEPS && moved; ++sweep) {
-        moved = 0;
-        for (int c = 0; c < so4_manakov_GAUGES; ++c) {
-            const double best = so4_manakov_least_on_line(params, gauge, c, width[c], samples);
-            gauge[c] += best * width[c];
-            moved = moved || best != 0.0;
-        }
-    }
-    if (!isfinite(so4_manakov_gauge_error(params, gauge, samples)))
-        memset(gauge, 0, so4_manakov_GAUGES * sizeof gauge[0]);
 }
 
 /* ---- The solver ---- */
-/* The arguments may be parts of *s: they are read before it is written. */
+/* The arguments may be parts of *s, which is therefore written last. */
 so4_manakov_status so4_manakov_init_gauge(so4_manakov_solver *s, const so4_manakov_params *params,
     const double x0[so4_manakov_DIM], const double gauge[so4_manakov_GAUGES])
 {
     if (s == NULL || x0 == NULL) return so4_manakov_BAD_ARGUMENT;
-    const so4_manakov_params own = params != NULL ? *params : so4_manakov_default_params;
-    double x[so4_manakov_DIM];
-    memcpy(x, x0, sizeof x);
+    so4_manakov_solver fresh = { .h = (double)NAN };
+    fresh.params = params != NULL ? *params : so4_manakov_default_params;
+    memcpy(fresh.x, x0, sizeof fresh.x);
     for (int i = 0; i < so4_manakov_DIM; ++i)
-        if (!isfinite(x[i])) return so4_manakov_BAD_ARGUMENT;
-    double multiples[so4_manakov_GAUGES] = { 0.0 };
-    const int given = gauge != NULL;
-    if (given) memcpy(multiples, gauge, sizeof multiples);
+        if (!isfinite(fresh.x[i])) return so4_manakov_BAD_ARGUMENT;
+    if (gauge == NULL) so4_manakov_choose_gauge(&fresh.params, fresh.x, fresh.gauge);
+    else memcpy(fresh.gauge, gauge, sizeof fresh.gauge);
     for (int c = 0; c < so4_manakov_GAUGES; ++c)
-        if (!isfinite(multiples[c])) return so4_manakov_BAD_ARGUMENT;
-    memset(s, 0, sizeof *s);
-    memcpy(s->x, x, sizeof s->x);
-    s->params = own;
-    if (!given) so4_manakov_choose_gauge(&own, x, multiples);
-    memcpy(s->gauge, multiples, sizeof s->gauge);
+        if (!isfinite(fresh.gauge[c])) return so4_manakov_BAD_ARGUMENT;
+    *s = fresh;
     return so4_manakov_OK;
 }
 
@@ -976,44 +838,38 @@ so4_manakov_status so4_manakov_init(so4_manakov_solver *s, const so4_manakov_par
 static so4_manakov_status so4_manakov_set_step(so4_manakov_solver *s, double h)
 {
     if (s == NULL || !isfinite(h)) return so4_manakov_BAD_ARGUMENT;
-    if (s->prepared && memcmp(&h, &s->h, sizeof h) == 0) return so4_manakov_OK;
+    if (memcmp(&h, &s->h, sizeof h) == 0) return so4_manakov_OK;
     so4_manakov_prepare(&s->params, s->gauge, h, s->coef);
     memset(&s->history, 0, sizeof s->history);
     s->h = h;
     s->t_before_h = s->t;
     s->steps_before_h = s->steps;
-    s->prepared = 1;
     return so4_manakov_OK;
 }
 
 /* One stage. A guess from earlier steps may have misled it: then once more without. */
 static so4_manakov_status so4_manakov_stage(so4_manakov_solver *s)
 {
-    so4_manakov_status status = so4_manakov_attempt(s);
-    if (status != so4_manakov_OK && s->history.count > 0) {
-        memset(&s->history, 0, sizeof s->history);
-        status = so4_manakov_attempt(s);
-    }
-    return status;
-}
-
-so4_manakov_status so4_manakov_step(so4_manakov_solver *s, double h)
-{
-    so4_manakov_status status = so4_manakov_set_step(s, h);
-    if (status != so4_manakov_OK) return status;
-    status = so4_manakov_stage(s);
-    if (status != so4_manakov_OK) return status;
-    ++s->steps;
-    s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
-    return status;
+    const so4_manakov_status status = so4_manakov_attempt(s);
+    if (status == so4_manakov_OK || s->history.count == 0) return status;
+    memset(&s->history, 0, sizeof s->history);
+    return so4_manakov_attempt(s);
 }
 
 so4_manakov_status so4_manakov_integrate(so4_manakov_solver *s, double h, size_t steps)
 {
     so4_manakov_status status = so4_manakov_set_step(s, h);
-    for (; steps > 0 && status == so4_manakov_OK; --steps) status = so4_manakov_step(s, h);
+    for (; steps > 0 && status == so4_manakov_OK; --steps) {
+        status = so4_manakov_stage(s);
+        if (status != so4_manakov_OK) break;
+        ++s->steps;
+        s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
+    }
     return status;
 }
+
+so4_manakov_status so4_manakov_step(so4_manakov_solver *s, double h) { return so4_manakov_integrate(s, h, 1);
+    }
 
 const char *so4_manakov_status_string(so4_manakov_status status)
 {
@@ -1028,7 +884,6 @@ const char *so4_manakov_status_string(so4_manakov_status status)
 }
 
 size_t so4_manakov_solver_size(void) { return sizeof(so4_manakov_solver); }
-
 size_t so4_manakov_solver_steps_done(const so4_manakov_solver *s) { return s->steps; }
 
 /* ---- Ensembles ---- */

@@ -13,7 +13,7 @@
 #
 # SPDX-License-Identifier: 0BSD
 # This file belongs to whoever generated it; phigen claims no rights in it.
-# body-sha256: d26d9983c507a2a7ec1e41048c7cca4dfe76b002fbb2b92bfb7b5230d4ac0bc0
+# body-sha256: 98223d3ff18e37f6c5c4475a19bf2c418027dea6b1b17cc41b7cb87b636a06cf
 import numpy as np
 
 VERSION = "0.1.0"
@@ -794,114 +794,15 @@ def _advance(stage, x, carry, memory):
     return following, rest, (y - x, memory[0] if memory[0].any() else y - x), status
 
 
-def _line(error_of, gauge, c, width):
-    """The error where one multiple varies, of centre + (j - 3) width for j = 0 ... 6, as forward differences (7, members).
-
-    S_3 is cubic in H, so these are those of a polynomial of degree six. Also their size, before.
-    """
-    moved, errors = gauge.copy(), []
-    for j in range(7):
-        moved[:, c] = gauge[:, c] + (j - 3) * width
-        errors.append(error_of(moved))
-    return np.array([np.diff(errors, k, axis=0)[0] for k in range(7)]), sum(errors)
-
-
-def _least_on_line(difference, size):
-    """Where that polynomial is least, in units of width: the best t on grids, each finer than the one before."""
-
-    def value(t):
-        error = difference[6]
-        for k in range(5, -1, -1):
-            error = difference[k] + (t + 3.0 - k) / (k + 1) * error
-        return error
-
-    best = np.zeros_like(size)
-    least = value(best)
-    for reach, mesh in ((24, 1 / 8), (8, 1 / 64), (8, 1 / 512)):
-        centre = best
-        for j in range(-reach, reach + 1):
-            t = centre + j * mesh
-            error = value(t)
-            better = error < least - 1e-12 * size  # close calls are not decided by rounding
-            least, best = np.where(better, error, least), np.where(better, t, best)
-    return best
-
-
-def _samples(parameters, x, count=32):
-    """A short piece of each trajectory, by a Runge-Kutta method with steps of a fixed change."""
-    speed = np.abs(_vector_field(parameters, x)).sum(axis=-1) + np.finfo(float).tiny
-    h = (0.25 * np.abs(x).sum(axis=-1) / speed)[:, np.newaxis]
-    points = [x]
-    for _ in range(count - 1):
-        y = points[-1]
-        middle = y + 0.5 * h * _vector_field(parameters, y)
-        points.append(y + h * _vector_field(parameters, middle))
-    return np.array(points)
-
-
 def _choose_gauge(parameters, x):
-    """The lambda that minimise the leading error along a short piece of each trajectory: (members, number of them).
+    """For each Casimir C the lambda by which grad H - lambda grad C is smallest at x: (members, number of them).
 
-    One after the other, from the least-squares solution of grad H = sum of lambda grad C; zero where that gives
-    nothing finite.
+    Zero where that gives nothing finite.
     """
-    points = _samples(parameters, x)
-    sums = _products(parameters, points).sum(axis=0)
-
-    def error_of(gauge):
-        return (_guide(parameters, gauge.T, points) ** 2).sum(axis=(0, -1))
-
-    norms = np.where(sums[:, 2::2] > 0, sums[:, 2::2], np.inf)
-    gauge, width = sums[:, 1::2] / norms, np.sqrt(sums[:, :1] / norms)
-    for _ in range(4):
-        before = gauge.copy()
-        for c in range(gauge.shape[1]):
-            gauge[:, c] += _least_on_line(*_line(error_of, gauge, c, width[:, c])) * width[:, c]
-        if np.array_equal(before, gauge, equal_nan=True):
-            break
-    return np.where(np.isfinite(error_of(gauge))[:, np.newaxis], gauge, 0.0)
-
-
-def _guide(parameters, gauge, x):
-    """The leading error vector pi grad S_3, as a function of the gauge."""
-    x12 = x[..., 0]
-    x13 = x[..., 1]
-    x14 = x[..., 2]
-    x23 = x[..., 3]
-    x24 = x[..., 4]
-    x34 = x[..., 5]
-    t1 = 1.0 / 15120.0 - 1.0 / 1800.0 * gauge[0]
-    t2 = -1.0 / 3780.0 + 4.0 / 1575.0 * gauge[0]
-    t3 = x13 * x24 * t1 + x12 * (x34 * t2)
-    t4 = x34 * x34
-    t5 = x24 * x24
-    t6 = x12 * x12
-    t7 = x13 * x13
-    t8 = gauge[0] * ((-2.0 / 675.0) * t6 - 1.0 / 2400.0 * t7 + ((-1.0 / 5400.0) * t5 - 2.0 / 3675.0 * t4))
-    t9 = x14 * t3 + x23 * (1.0 / 22050.0 * t4 + 1.0 / 75600.0 * t5 + (1.0 / 2700.0 * t6 + 1.0 / 14400.0 * t7) + t8)
-    t10 = x14 * x23
-    t11 = 1.0 / 3024.0 - 5.0 / 1512.0 * gauge[0]
-    t12 = t10 * t1 + x12 * (x34 * t11)
-    t13 = x14 * x14
-    t14 = x23 * x23
-    t15 = 1.0 / 32400.0 * t13 + 1.0 / 2160.0 * t6 + (1.0 / 105840.0 * t4 + 1.0 / 75600.0 * t14) + gauge[0] * ((-1.0 / 216.0) * t6 - 1.0 / 5400.0 * t13 + ((-1.0 / 5400.0) * t14 - 1.0 / 10584.0 * t4))
-    t16 = x13 * t12 + x24 * t15
-    t17 = 3.0 / 15680.0 * t4 + 1.0 / 14400.0 * t14 + (1.0 / 33600.0 * t13 + 1.0 / 8640.0 * t6) + gauge[0] * ((-1.0 / 864.0) * t6 - 1.0 / 2400.0 * t13 + ((-1.0 / 2400.0) * t14 - 3.0 / 1568.0 * t4))
-    t18 = x24 * t12 + x13 * t17
-    t19 = x23 * t3 + x14 * (1.0 / 4050.0 * t6 + 1.0 / 33600.0 * t7 + (1.0 / 32400.0 * t5 + 1.0 / 14700.0 * t4) + t8)
-    t20 = t10 * t2 + x13 * (x24 * t11)
-    t21 = 1.0 / 2700.0 * t14 + 1.0 / 2160.0 * t5 + (1.0 / 4050.0 * t13 + 1.0 / 8640.0 * t7) + gauge[0] * ((-2.0 / 675.0) * t14 - 1.0 / 216.0 * t5 + ((-1.0 / 864.0) * t7 - 2.0 / 675.0 * t13))
-    t22 = x34 * t20 + x12 * t21
-    t23 = 3.0 / 15680.0 * t7 + 1.0 / 14700.0 * t13 + (1.0 / 105840.0 * t5 + 1.0 / 22050.0 * t14) + gauge[0] * ((-3.0 / 1568.0) * t7 - 2.0 / 3675.0 * t13 + ((-2.0 / 3675.0) * t14 - 1.0 / 10584.0 * t5))
-    t24 = x12 * t20 + x34 * t23
-    return _filled(x, [
-            x13 * t9 + x14 * t16 - (x23 * t18 + x24 * t19),
-            x23 * t22 - x34 * t19 + (x14 * t24 - x12 * t9),
-            x34 * t18 + x24 * t22 - (x12 * t16 + x13 * t24),
-            x12 * t18 - x13 * t22 + (x24 * t24 - x34 * t16),
-            x12 * t19 - x14 * t22 + (x34 * t9 - x23 * t24),
-            x23 * t16 - x24 * t9 + (x13 * t19 - x14 * t18),
-        ])
+    products = _products(parameters, x)
+    with np.errstate(all="ignore"):
+        gauge = products[:, 1::2] / products[:, 2::2]
+    return np.where(np.isfinite(gauge), gauge, 0.0)
 
 
 def _products(parameters, x):

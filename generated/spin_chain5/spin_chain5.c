@@ -22,7 +22,7 @@
  *   5. The choice of the gauge: multiples of Casimirs taken from H
  *   6. The solver
  *   7. Ensembles
- * body-sha256: 94b07388a9495467f2f88fdce749cdf0cbb1419d611ffe80edc99940e6339939
+ * body-sha256: 013eb5bac5feb0760a5fecef744d61cb28deda248ab84a9b28b74b6000b742ff
  */
 #include "spin_chain5.h"
 
@@ -34,9 +34,7 @@
 const spin_chain5_params spin_chain5_default_params = { 1.0 };
 
 enum { spin_chain5_MAX_ITERATIONS = 20 }; /* of an inner solve */
-
-/* A correction is accepted when the error that it leaves is estimated to be below this. */
-#define spin_chain5_TOLERANCE 1e-20
+#define spin_chain5_TOLERANCE 1e-20       /* the error that an accepted correction may leave, as estimated */
 
 /* Whether all parameters are finite, and positive where they have to be. */
 static int spin_chain5_allowed(const spin_chain5_params *params)
@@ -51,51 +49,55 @@ static int spin_chain5_allowed(const spin_chain5_params *params)
 #define spin_chain5_APART
 #endif
 
+/* The polynomial with these coefficients, the constant first. */
+static inline double spin_chain5_polynomial(const double *coefficients, int count, double s)
+{
+    double value = coefficients[--count];
+    while (count > 0) value = value * s + coefficients[--count];
+    return value;
+}
+
 /* (1 - w cot w)/s with w = sqrt(s)/2, coth for negative s: the function of the exponential bi-realisation. */
 static double spin_chain5_phi0(double s)
 {
-    if (fabs(s) < 0.25)
-        return (0.08333333333333333 + s * (0.001388888888888889 + s * (3.306878306878307e-05 + s *
-            (8.267195767195768e-07 + s * (2.08767569878681e-08 + s * (5.284190138687493e-10 + s *
-            (1.3382536530684679e-11 + s * (3.3896802963225827e-13 + s * 8.586062056277845e-15))))))));
+    static const double near[9] = { 0.08333333333333333, 0.001388888888888889, 3.306878306878307e-05,
+        8.267195767195768e-07, 2.08767569878681e-08, 5.284190138687493e-10, 1.3382536530684679e-11,
+        3.3896802963225827e-13, 8.586062056277845e-15 };
+    static const double rest[21] = { 0.03267274151216445, 0.000105641107053347, 5.637370282876845e-07,
+        3.357141926657451e-09, 2.0742872904166045e-11, 1.3000482138698975e-13, 8.196052055691008e-16,
+        5.180118196169724e-18, 3.277539174701792e-20, 2.0747401878593604e-22, 1.3136241807166534e-24,
+        8.318003195189264e-27, 5.267262996834231e-29, 3.3354842988221443e-31, 2.1122063323183885e-33,
+        1.3375664093215244e-35, 8.470227328650247e-38, 5.363831046655698e-40, 3.3966848266497805e-42,
+        2.1509755511832569e-44, 1.3621211117593843e-46 };
+    if (fabs(s) < 0.25) return spin_chain5_polynomial(near, 9, s);
     if (fabs(s) < 16.0) {
         const double pole = 1.0 / (39.47841760435743 - s);
-        return 2.0 * pole + (0.03267274151216445 + s * (0.000105641107053347 + s * (5.637370282876845e-07
-            + s * (3.357141926657451e-09 + s * (2.0742872904166045e-11 + s * (1.3000482138698975e-13 + s *
-            (8.196052055691008e-16 + s * (5.180118196169724e-18 + s * (3.277539174701792e-20 + s *
-            (2.0747401878593604e-22 + s * (1.3136241807166534e-24 + s * (8.318003195189264e-27 + s *
-            (5.267262996834231e-29 + s * (3.3354842988221443e-31 + s * (2.1122063323183885e-33 + s *
-            (1.3375664093215244e-35 + s * (8.470227328650247e-38 + s * (5.363831046655698e-40 + s *
-            (3.3966848266497805e-42 + s * (2.1509755511832569e-44 + s *
-            1.3621211117593843e-46))))))))))))))))))));
+        return 2.0 * pole + spin_chain5_polynomial(rest, 21, s);
     }
     const double w = 0.5 * sqrt(fabs(s)), c = w / (s > 0.0 ? tan(w) : tanh(w));
-    const double phi0 = (1.0 - c) / s;
-    return phi0;
+    return (1.0 - c) / s;
 }
 
 /* The derivative of (1 - w cot w)/s, w = sqrt(s)/2. */
 static double spin_chain5_phi1(double s)
 {
-    if (fabs(s) < 0.25)
-        return (0.001388888888888889 + s * (6.613756613756614e-05 + s * (2.48015873015873e-06 + s *
-            (8.35070279514724e-08 + s * (2.6420950693437467e-09 + s * (8.029521918410807e-11 + s *
-            (2.372776207425808e-12 + s * (6.868849645022276e-14 + s * 1.9573818287022555e-15))))))));
+    static const double near[9] = { 0.001388888888888889, 6.613756613756614e-05, 2.48015873015873e-06,
+        8.35070279514724e-08, 2.6420950693437467e-09, 8.029521918410807e-11, 2.372776207425808e-12,
+        6.868849645022276e-14, 1.9573818287022555e-15 };
+    static const double rest[21] = { 0.000105641107053347, 1.127474056575369e-06, 1.0071425779972354e-08,
+        8.297149161666418e-11, 6.500241069349487e-13, 4.917631233414605e-15, 3.626082737318807e-17,
+        2.6220313397614337e-19, 1.8672661690734246e-21, 1.3136241807166533e-23, 9.149803514708191e-26,
+        6.320715596201077e-28, 4.336129588468787e-30, 2.957088865245744e-32, 2.0063496139822866e-34,
+        1.3552363725840395e-36, 9.118512779314688e-39, 6.114032687969605e-41, 4.0868535472481875e-43,
+        2.7242422235187686e-45, 1.8114038279637677e-47 };
+    if (fabs(s) < 0.25) return spin_chain5_polynomial(near, 9, s);
     if (fabs(s) < 16.0) {
         const double pole = 1.0 / (39.47841760435743 - s);
-        return 2.0 * pole * pole + (0.000105641107053347 + s * (1.127474056575369e-06 + s *
-            (1.0071425779972354e-08 + s * (8.297149161666418e-11 + s * (6.500241069349487e-13 + s *
-            (4.917631233414605e-15 + s * (3.626082737318807e-17 + s * (2.6220313397614337e-19 + s *
-            (1.8672661690734246e-21 + s * (1.3136241807166533e-23 + s * (9.149803514708191e-26 + s *
-            (6.320715596201077e-28 + s * (4.336129588468787e-30 + s * (2.957088865245744e-32 + s *
-            (2.0063496139822866e-34 + s * (1.3552363725840395e-36 + s * (9.118512779314688e-39 + s *
-            (6.114032687969605e-41 + s * (4.0868535472481875e-43 + s * (2.7242422235187686e-45 + s *
-            1.8114038279637677e-47))))))))))))))))))));
+        return 2.0 * pole * pole + spin_chain5_polynomial(rest, 21, s);
     }
     const double w = 0.5 * sqrt(fabs(s)), c = w / (s > 0.0 ? tan(w) : tanh(w));
     const double phi0 = (1.0 - c) / s;
-    const double phi1 = (0.5 * s * phi0 * phi0 - 1.5 * phi0 + 0.125) / s;
-    return phi1;
+    return (0.5 * s * phi0 * phi0 - 1.5 * phi0 + 0.125) / s;
 }
 
 /* everything that depends on parameters and step size only */
@@ -105,12 +107,11 @@ static void spin_chain5_prepare(const spin_chain5_params *params, const double g
     const double t1 = 1.0 / 6.0 * gauge[4], t2 = 1.0 / 6.0 * params->J, t3 = h * (h * h);
     const double t4 = params->J * params->J, t5 = t3 * t4, t6 = t5 * (t2 - t1);
     const double t7 = t3 * (params->J * t4), t8 = 1.0 / 6.0 * gauge[1], t9 = (t2 - t8) * t5;
-    const double t10 = t8 - t2, t11 = 1.0 / 6.0 * gauge[0], t12 = t11 - t2;
-    const double t13 = 1.0 / 12.0 * params->J, t14 = t13 - 1.0 / 12.0 * gauge[0];
-    const double t15 = 1.0 / 12.0 * gauge[4], t16 = (t2 - t11) * t5, t17 = 1.0 / 12.0 * gauge[1];
-    const double t18 = 1.0 / 6.0 * gauge[2], t19 = (t2 - t18) * t5, t20 = t18 - t2;
-    const double t21 = 1.0 / 12.0 * gauge[2], t22 = 1.0 / 6.0 * gauge[3], t23 = (t2 - t22) * t5;
-    const double t24 = t22 - t2, t25 = 1.0 / 12.0 * gauge[3];
+    const double t10 = t8 - t2, t11 = 1.0 / 6.0 * gauge[0], t12 = t11 - t2, t13 = 1.0 / 12.0 * params->J;
+    const double t14 = t13 - 1.0 / 12.0 * gauge[0], t15 = 1.0 / 12.0 * gauge[4], t16 = (t2 - t11) * t5;
+    const double t17 = 1.0 / 12.0 * gauge[1], t18 = 1.0 / 6.0 * gauge[2], t19 = (t2 - t18) * t5;
+    const double t20 = t18 - t2, t21 = 1.0 / 12.0 * gauge[2], t22 = 1.0 / 6.0 * gauge[3];
+    const double t23 = (t2 - t22) * t5, t24 = t22 - t2, t25 = 1.0 / 12.0 * gauge[3];
     coef[0] = -(params->J * h);
     coef[1] = (t1 - t2) * t5;
     coef[2] = t6;
@@ -617,8 +618,7 @@ spin_chain5_APART static void spin_chain5_linearise_part3(const double coef[33],
     work[183] = x2 * t8 + work[114];
     work[232] = coef[9] * y1 + coef[6] * y3;
     const double t9 = y2 * work[232], t10 = z2 * (coef[6] * z3 + coef[9] * z1), t11 = coef[8] * y1;
-    const double t12 = y5 * (work[115] + t11), t13 = coef[8] * z1;
-    const double t14 = coef[0] + z5 * (work[116] + t13);
+    const double t12 = y5 * (work[115] + t11), t13 = coef[8] * z1, t14 = coef[0] + z5 * (work[116] + t13);
     work[185] = t9 + (t10 + (t12 + t14));
     work[226] = coef[13] * y1;
     const double t15 = work[226] + coef[5] * y3;
@@ -786,8 +786,7 @@ spin_chain5_APART static void spin_chain5_linearise_part4(const double coef[33],
     work[445] = z2 * t1 + (work[164] + work[165]);
     const double t5 = 0.5 * x1;
     const double t6 = t5 + (2.0 * (work[166] * work[167]) - (work[168] + work[169]) * work[103]);
-    const double t7 = x1 * work[82];
-    const double t8 = (t7 + work[170]) * work[103] + 2.0 * (work[166] * work[171]);
+    const double t7 = x1 * work[82], t8 = (t7 + work[170]) * work[103] + 2.0 * (work[166] * work[171]);
     const double t9 = (work[108] - work[172]) * work[103] + 2.0 * (work[166] * work[173]) - work[174];
     const double t10 = work[81] * work[80] * work[103], t11 = 0.5 * work[82];
     const double t12 = (t7 + work[211]) * work[103] + 2.0 * (work[212] * work[167]);
@@ -984,8 +983,8 @@ spin_chain5_APART static void spin_chain5_linearise_part5(const double coef[33],
     work[452] = z1 * work[263] + z3 * work[278];
     work[454] = t2 + (work[279] + t3 + work[280]);
     const double t4 = (work[223] - work[281]) * work[220] + 2.0 * (work[282] * work[283]) - work[284];
-    const double t5 = x2 * work[83];
-    const double t6 = (t5 + work[285]) * work[220] + 2.0 * (work[282] * work[286]), t7 = 0.5 * x2;
+    const double t5 = x2 * work[83], t6 = (t5 + work[285]) * work[220] + 2.0 * (work[282] * work[286]);
+    const double t7 = 0.5 * x2;
     const double t8 = t7 + (2.0 * (work[282] * work[287]) - (work[288] + work[289]) * work[220]);
     const double t9 = work[85] * work[84] * work[220], t10 = 0.5 * work[83];
     const double t11 = work[317] + (2.0 * (work[318] * work[283]) - (work[319] + work[224]) * work[220]);
@@ -1183,8 +1182,8 @@ spin_chain5_APART static void spin_chain5_linearise_part6(const double coef[33],
     const double t6 = y4 * work[94], t7 = z4 * work[92], t8 = spin_chain5_phi1(work[408]);
     const double t9 = work[90] * t8, t10 = (t6 + t7) * work[87] + 2.0 * (work[88] * t9);
     const double t11 = work[92] * t8, t12 = 0.5 * y4;
-    const double t13 = (work[93] - work[409]) * work[87] + 2.0 * (work[88] * t11) - t12;
-    const double t14 = 0.5 * z4, t15 = work[94] * t8;
+    const double t13 = (work[93] - work[409]) * work[87] + 2.0 * (work[88] * t11) - t12, t14 = 0.5 * z4;
+    const double t15 = work[94] * t8;
     const double t16 = t14 + (2.0 * (work[88] * t15) - (work[410] + work[91]) * work[87]);
     const double t17 = y3 * work[411], t18 = z3 * work[412], t19 = y5 * (coef[29] * y5);
     const double t20 = coef[28] + z5 * (coef[29] * z5), t21 = t17 + (t18 + (t19 + t20));
@@ -1195,8 +1194,8 @@ spin_chain5_APART static void spin_chain5_linearise_part6(const double coef[33],
     work[504] = z3 * work[416] + z5 * (coef[22] * y3 + coef[27] * y5);
     const double t25 = x3 * work[417], t26 = x5 * (coef[29] * x5), t27 = t25 + (t18 + (t26 + t20));
     const double t28 = 0.5 * work[94], t29 = work[92] * work[90] * work[87];
-    const double t30 = t25 + (t17 + (t26 + (coef[28] + t19))), t31 = y3 * work[358];
-    const double t32 = z3 * work[355], t33 = coef[1] * y1 + coef[27] * y4, t34 = y5 * t33;
+    const double t30 = t25 + (t17 + (t26 + (coef[28] + t19))), t31 = y3 * work[358], t32 = z3 * work[355];
+    const double t33 = coef[1] * y1 + coef[27] * y4, t34 = y5 * t33;
     const double t35 = coef[0] + z5 * (coef[1] * z1 + coef[27] * z4);
     work[487] = t31 + (t32 + (t34 + t35));
     const double t36 = work[418] + (work[337] + coef[30] * z4), t37 = coef[29] * z4;
@@ -1374,17 +1373,15 @@ spin_chain5_APART static void spin_chain5_linearise_part7(const double coef[33],
     const double t4 = 0.5 * work[97], t5 = work[95] * work[96] * work[438];
     const double t6 = t1 + (work[473] + (t2 + (coef[31] + work[474]))), t7 = 0.5 * x5;
     const double t8 = t7 + (2.0 * (work[476] * work[477]) - (work[478] + work[479]) * work[438]);
-    const double t9 = x5 * work[96];
-    const double t10 = (t9 + work[480]) * work[438] + 2.0 * (work[476] * work[481]);
+    const double t9 = x5 * work[96], t10 = (t9 + work[480]) * work[438] + 2.0 * (work[476] * work[481]);
     const double t11 = (work[441] - work[482]) * work[438] + 2.0 * (work[476] * work[483]) - work[484];
     const double t12 = work[95] * work[97] * work[438], t13 = 0.5 * work[96];
     const double t14 = (t9 + work[496]) * work[438] + 2.0 * (work[497] * work[477]);
     const double t15 = work[498] + (2.0 * (work[497] * work[483]) - (work[499] + work[436]) * work[438]);
     const double t16 = (work[479] - work[500]) * work[438] + 2.0 * (work[497] * work[481]) - t7;
-    const double t17 = y1 * work[177], t18 = z1 * work[178], t19 = x1 * work[180];
-    const double t20 = y2 * work[294], t21 = z2 * work[293], t22 = x2 * work[296];
-    const double t23 = y3 * work[370], t24 = z3 * work[371], t25 = x3 * work[373];
-    const double t26 = y4 * work[502], t27 = z4 * work[503], t28 = x4 * work[504];
+    const double t17 = y1 * work[177], t18 = z1 * work[178], t19 = x1 * work[180], t20 = y2 * work[294];
+    const double t21 = z2 * work[293], t22 = x2 * work[296], t23 = y3 * work[370], t24 = z3 * work[371];
+    const double t25 = x3 * work[373], t26 = y4 * work[502], t27 = z4 * work[503], t28 = x4 * work[504];
     const double t29 = y5 * work[475], t30 = z5 * work[470], t31 = x5 * work[468];
     jacobian[193] = work[466] - work[467] + (work[468] * work[469] + (work[470] * work[471] + t3
         * work[472]));
@@ -1456,328 +1453,6 @@ static void spin_chain5_linearise(const double coef[33], const double y[15], dou
     spin_chain5_linearise_part7(coef, y, displacement, increment, jacobian, increment_jacobian, work);
 }
 
-/* the leading error vector pi grad S_3, as a function of the gauge (part 1 of 2) */
-spin_chain5_APART static void spin_chain5_guide_part1(const spin_chain5_params *params, const double gauge[5],
-    const double x[15], double error[restrict 15], double work[restrict 114])
-{
-    const double x1 = x[0], y1 = x[1], z1 = x[2], x2 = x[3], y2 = x[4], z2 = x[5], x3 = x[6], y3 = x[7], z3 =
-        x[8], x4 = x[9], y4 = x[10], z4 = x[11], x5 = x[12], y5 = x[13], z5 = x[14];
-    work[25] = params->J * params->J;
-    work[33] = (-1.0 / 6.0) * x2;
-    work[67] = 1.0 / 3.0 * x5;
-    const double t1 = x2 * (work[33] - work[67]), t2 = (-1.0 / 6.0) * (x5 * x5), t3 = y5 * y5;
-    work[75] = t2 - 1.0 / 6.0 * t3;
-    work[34] = (-1.0 / 6.0) * y2;
-    work[68] = 1.0 / 3.0 * y5;
-    const double t4 = y2 * (work[34] - work[68]);
-    work[30] = 1.0 / 6.0 * z5;
-    work[49] = 1.0 / 6.0 * z2;
-    work[5] = work[30] + work[49];
-    const double t5 = x2 * work[5] + x5 * work[5], t6 = y2 * work[5] + y5 * work[5];
-    work[90] = 1.0 / 6.0 * y1;
-    work[29] = 1.0 / 6.0 * y3;
-    const double t7 = work[90] + work[29];
-    work[99] = (-1.0 / 6.0) * z1;
-    work[40] = 1.0 / 6.0 * z3;
-    const double t8 = work[99] - work[40];
-    work[88] = 1.0 / 6.0 * x1;
-    work[31] = 1.0 / 6.0 * x3;
-    const double t9 = work[88] + work[31];
-    work[46] = gauge[1] * (y2 * (z2 * t7 + y2 * t8) + x2 * (x2 * t8 + z2 * t9));
-    work[52] = 1.0 / 6.0 * y4;
-    const double t10 = work[90] + work[52], t11 = z5 * t10;
-    work[39] = 1.0 / 6.0 * z4;
-    const double t12 = work[99] - work[39];
-    work[59] = 1.0 / 6.0 * x4;
-    work[86] = work[88] + work[59];
-    const double t13 = z5 * work[86];
-    work[74] = gauge[4] * (y5 * (t11 + y5 * t12) + x5 * (t13 + x5 * t12));
-    work[6] = 1.0 / 12.0 * x5;
-    work[7] = 1.0 / 12.0 * x4;
-    work[36] = 1.0 / 6.0 * x2;
-    work[47] = work[6] + (work[7] + work[36]);
-    work[48] = (-1.0 / 6.0) * z2;
-    const double t14 = work[48] - work[30];
-    work[10] = x1 * t14;
-    const double t15 = work[36] + work[67];
-    work[100] = 1.0 / 12.0 * z4;
-    const double t16 = work[48] - work[100];
-    work[69] = x5 * z4;
-    const double t17 = 1.0 / 12.0 * work[69];
-    work[70] = x4 * z5;
-    const double t18 = 1.0 / 12.0 * work[70], t19 = t17 - t18;
-    work[12] = x3 * t16 + t19;
-    work[50] = 1.0 / 12.0 * y5;
-    work[89] = 1.0 / 12.0 * y4;
-    work[41] = 1.0 / 6.0 * y2;
-    work[43] = work[50] + (work[89] + work[41]);
-    work[102] = y1 * t14;
-    const double t20 = work[41] + work[68];
-    work[71] = y5 * z4;
-    const double t21 = 1.0 / 12.0 * work[71];
-    work[72] = y4 * z5;
-    const double t22 = 1.0 / 12.0 * work[72], t23 = t21 - t22, t24 = y3 * t16 + t23;
-    work[38] = 1.0 / 12.0 * z2;
-    const double t25 = work[100] - work[38];
-    work[109] = x3 * t25;
-    const double t26 = (-1.0 / 12.0) * z3 - work[30];
-    work[110] = x4 * t26;
-    work[101] = 1.0 / 6.0 * z1;
-    const double t27 = work[39] + work[101];
-    work[103] = y3 * t25;
-    work[104] = y4 * t26;
-    const double t28 = y5 * t27;
-    const double t29 = y2 * (z3 * work[43] + (work[102] + (z1 * t20 + t24)))
-        + (x5 * (work[10] + (work[109] + (work[110] + x5 * t27))) + y5
-        * (work[102] + (work[103] + (work[104] + t28))));
-    const double t30 = gauge[0] * (z1 * (t1 + (work[75] + t4)) + (x1 * t5 + y1 * t6)) + (work[46] + work[74])
-        + params->J * (x2 * (z3 * work[47] + (work[10] + (z1 * t15 + work[12]))) + t29);
-    const double t31 = work[25] * t30;
-    work[28] = 1.0 / 6.0 * y5;
-    work[4] = work[28] + work[41];
-    const double t32 = x5 * work[4] + x2 * work[4];
-    work[76] = 1.0 / 3.0 * z5;
-    const double t33 = z2 * (work[48] - work[76]), t34 = 1.0 / 6.0 * (z5 * z5);
-    work[81] = t2 - t34;
-    work[85] = (-1.0 / 6.0) * y1;
-    const double t35 = work[85] - work[29], t36 = work[40] + work[101];
-    work[57] = gauge[1] * (x2 * (x2 * t35 + y2 * t9) + z2 * (z2 * t35 + y2 * t36));
-    const double t37 = y5 * work[86], t38 = work[85] - work[52];
-    work[80] = gauge[4] * (x5 * (t37 + x5 * t38) + z5 * (z5 * t38 + t28));
-    const double t39 = work[34] - work[28];
-    work[22] = x1 * t39;
-    work[77] = x5 * y4;
-    const double t40 = 1.0 / 12.0 * work[77];
-    work[78] = x4 * y5;
-    const double t41 = 1.0 / 12.0 * work[78], t42 = t40 - t41, t43 = work[34] - work[89];
-    work[24] = t42 + x3 * t43;
-    work[37] = 1.0 / 12.0 * z5;
-    work[53] = work[37] + (work[100] + work[49]);
-    const double t44 = work[49] + work[76];
-    work[91] = z1 * t39;
-    work[45] = t22 - t21;
-    const double t45 = work[91] + (z3 * t43 + work[45]);
-    work[51] = 1.0 / 12.0 * y2;
-    const double t46 = work[89] - work[51];
-    work[92] = z3 * t46;
-    const double t47 = (-1.0 / 12.0) * y3 - work[28];
-    work[93] = z4 * t47;
-    work[112] = x3 * t46;
-    work[113] = x4 * t47;
-    const double t48 = z2 * (y3 * work[53] + (y1 * t44 + t45))
-        + (z5 * (work[91] + (work[92] + (t11 + work[93]))) + x5
-        * (work[22] + (work[112] + (x5 * t10 + work[113]))));
-    const double t49 = gauge[0] * (z1 * t6 + x1 * t32 + y1 * (t1 + (t33 + work[81]))) + (work[57] + work[80])
-        + params->J * (x2 * (y3 * work[47] + (work[22] + (y1 * t15 + work[24]))) + t48);
-    const double t50 = work[25] * t49, t51 = (-1.0 / 6.0) * (y2 * y2) - 1.0 / 6.0 * (z2 * z2);
-    const double t52 = y2 * t7, t53 = z2 * t36;
-    work[19] = t52 + t53;
-    work[64] = gauge[1] * (x1 * t51 + x3 * t51 + x2 * work[19]);
-    work[98] = z5 * t27;
-    work[87] = y5 * t10;
-    work[111] = work[98] + work[87];
-    work[83] = (-1.0 / 6.0) * t3 - t34;
-    work[82] = gauge[4] * (x5 * work[111] + (x4 * work[83] + x1 * work[83]));
-    work[32] = 1.0 / 6.0 * x5;
-    work[3] = work[33] - work[32];
-    work[106] = y1 * work[3];
-    const double t54 = work[33] - work[7];
-    work[14] = t41 - t40;
-    const double t55 = work[106] + (y3 * t54 + work[14]);
-    work[95] = z1 * work[3];
-    work[18] = t18 - t17;
-    const double t56 = work[95] + (work[18] + z3 * t54);
-    work[58] = 1.0 / 12.0 * x2;
-    const double t57 = work[7] - work[58];
-    work[96] = z3 * t57;
-    const double t58 = (-1.0 / 12.0) * x3 - work[32];
-    work[97] = z4 * t58;
-    work[107] = y3 * t57;
-    work[108] = y4 * t58;
-    const double t59 = z2 * (x3 * work[53] + (x1 * t44 + t56))
-        + (z5 * (work[95] + (work[96] + (t13 + work[97]))) + y5
-        * (work[106] + (work[107] + (work[108] + t37))));
-    const double t60 = work[64] + work[82] + gauge[0] * (z1 * t5 + y1 * t32 + x1 * (t4 + (t33 + work[83])))
-        + params->J * (y2 * (x3 * work[43] + (x1 * t20 + t55)) + t59);
-    const double t61 = work[25] * t60;
-    work[0] = work[41] + work[52];
-    const double t62 = z3 * work[0], t63 = work[48] - work[39];
-    work[42] = y3 * t63;
-    work[16] = x3 * t63;
-    work[35] = work[59] + work[36];
-    work[17] = z3 * work[35];
-    work[73] = gauge[2] * (y3 * (t62 + work[42]) + x3 * (work[16] + work[17]));
-    const double t64 = work[32] + work[36];
-    work[11] = z1 * t64;
-    const double t65 = z1 * work[4];
-    work[94] = gauge[0] * (x1 * (work[11] + work[10]) + y1 * (work[102] + t65));
-    const double t66 = x2 * t9, t67 = t52 + t66;
-    work[84] = (-1.0 / 6.0) * x1;
-    const double t68 = x1 * (work[84] - 1.0 / 3.0 * x3), t69 = (-1.0 / 6.0) * (x3 * x3);
-    const double t70 = y3 * y3;
-    work[20] = y1 * (work[85] - 1.0 / 3.0 * y3);
-    const double t71 = work[37] + (work[100] + 1.0 / 3.0 * z2);
-    work[8] = work[34] - work[50];
-    work[54] = z1 * work[8];
-    work[1] = work[39] + work[49];
-    const double t72 = y3 * work[1], t73 = work[34] - work[52];
-    work[56] = z3 * t73;
-    work[55] = work[56] + t23;
-    const double t74 = work[33] - work[6];
-    work[60] = z1 * t74;
-    const double t75 = work[33] - work[59];
-    work[63] = z3 * t75;
-    work[61] = t19 + work[63];
-    const double t76 = y1 * work[5];
-    const double t77 = x1 * (x3 * t71 + (x1 * work[5] + t56)) + (y3 * (work[54] + (t72 + work[55])) + x3
-        * (work[60] + (x3 * work[1] + work[61])) + y1 * (y3 * t71 + (t76 + t45)));
-    work[26] = work[25] * (work[73] + work[94] + gauge[1] * (z1 * t67 + z3 * t67 + z2
-        * (t68 + (t69 - 1.0 / 6.0 * t70 + work[20]))) + params->J * t77);
-    work[23] = y1 * t64;
-    work[105] = gauge[0] * (x1 * (work[23] + work[22]) + z1 * (work[91] + t76));
-    work[15] = y3 * work[35];
-    work[13] = x3 * t73;
-    work[79] = gauge[2] * (x3 * (work[15] + work[13]) + z3 * (work[56] + t72));
-    work[21] = z1 * (work[99] - 1.0 / 3.0 * z3);
-    const double t78 = 1.0 / 6.0 * (z3 * z3), t79 = t53 + t66;
-    const double t80 = work[50] + (work[89] + 1.0 / 3.0 * y2);
-    work[65] = y1 * t74;
-    work[62] = y3 * t75;
-    work[66] = t42 + work[62];
-    work[9] = work[48] - work[37];
-    work[44] = y1 * work[9];
-    const double t81 = x3 * (work[65] + (x3 * work[0] + work[66])) + z3
-        * (work[44] + (work[42] + (t62 + work[45]))) + z1 * (z3 * t80 + (work[102] + (t65 + t24)));
-    const double t82 = work[105] + work[79] + gauge[1] * (y2 * (t68 + (work[21] + (t69 - t78)))
-        + (y1 * t79 + y3 * t79)) + params->J * (x1 * (x3 * t80 + (x1 * work[4] + t55)) + t81);
-    work[27] = work[25] * t82;
-    work[2] = (-1.0 / 6.0) * t70 - t78;
-    error[0] = y1 * t31 - z1 * t50;
-    error[1] = z1 * t61 - x1 * t31;
-    error[2] = x1 * t50 - y1 * t61;
-    error[3] = y2 * work[26] - z2 * work[27];
-}
-
-/* the leading error vector pi grad S_3, as a function of the gauge (part 2 of 2) */
-spin_chain5_APART static void spin_chain5_guide_part2(const spin_chain5_params *params, const double gauge[5],
-    const double x[15], double error[restrict 15], double work[restrict 114])
-{
-    const double x1 = x[0], y1 = x[1], z1 = x[2], x2 = x[3], y2 = x[4], z2 = x[5], x3 = x[6], y3 = x[7], z3 =
-        x[8], x4 = x[9], y4 = x[10], z4 = x[11], x5 = x[12], y5 = x[13], z5 = x[14];
-    const double t1 = y3 * work[0], t2 = z3 * work[1], t3 = t1 + t2;
-    const double t4 = gauge[2] * (x4 * work[2] + x2 * work[2] + x3 * t3);
-    const double t5 = gauge[0] * (y1 * y1 * work[3] + z1 * z1 * work[3] + x1 * (y1 * work[4] + z1 * work[5]));
-    const double t6 = work[6] + (1.0 / 3.0 * x2 + work[7]), t7 = x1 * work[8], t8 = x1 * work[9];
-    const double t9 = z1 * (z3 * t6 + (work[10] + (work[11] + work[12])))
-        + (y3 * (t7 + (work[13] + (work[14] + work[15]))) + z3 * (t8 + (work[16] + (work[17] + work[18]))));
-    const double t10 = gauge[1] * (x3 * work[19] + x1 * work[19] + x2 * (work[20] + (work[2] + work[21])))
-        + (t4 + t5) + params->J * (y1 * (y3 * t6 + (work[22] + (work[23] + work[24]))) + t9);
-    const double t11 = work[25] * t10, t12 = work[28] + work[29], t13 = z4 * t12;
-    const double t14 = (-1.0 / 6.0) * z3, t15 = t14 - work[30], t16 = work[31] + work[32];
-    const double t17 = z4 * t16, t18 = gauge[3] * (y4 * (t13 + y4 * t15) + x4 * (x4 * t15 + t17));
-    const double t19 = 1.0 / 3.0 * x4, t20 = x2 * (work[33] - t19), t21 = (-1.0 / 6.0) * (x4 * x4);
-    const double t22 = y4 * y4, t23 = t21 - 1.0 / 6.0 * t22, t24 = 1.0 / 3.0 * y4;
-    const double t25 = y2 * (work[34] - t24), t26 = x3 * work[35], t27 = t26 + t1;
-    const double t28 = t19 + work[36], t29 = work[37] - work[38], t30 = y1 * t29;
-    const double t31 = (-1.0 / 12.0) * z1 - work[39], t32 = y5 * t31, t33 = work[30] + work[40];
-    const double t34 = y4 * t33, t35 = x1 * t29, t36 = x5 * t31, t37 = work[41] + t24;
-    const double t38 = y4 * (t30 + (work[42] + (t32 + t34))) + x4 * (t35 + (work[16] + (x4 * t33 + t36))) + y2
-        * (z1 * work[43] + (work[44] + (work[42] + (work[45] + z3 * t37))));
-    const double t39 = work[46] + t18 + gauge[2] * (z3 * (t20 + (t23 + t25)) + (z2 * t27 + z4 * t27))
-        + params->J * (x2 * (z1 * work[47] + (t8 + (work[16] + (work[18] + z3 * t28)))) + t38);
-    const double t40 = work[25] * t39, t41 = (-1.0 / 6.0) * y3, t42 = t41 - work[28], t43 = y4 * t16;
-    const double t44 = gauge[3] * (z4 * (z4 * t42 + t34) + x4 * (t43 + x4 * t42));
-    const double t45 = 1.0 / 6.0 * (z4 * z4), t46 = t21 - t45, t47 = 1.0 / 3.0 * z4;
-    const double t48 = z2 * (work[48] - t47), t49 = t26 + t2, t50 = work[49] + t47;
-    const double t51 = work[50] - work[51], t52 = z1 * t51, t53 = (-1.0 / 12.0) * y1 - work[52];
-    const double t54 = z5 * t53, t55 = x1 * t51, t56 = x5 * t53;
-    const double t57 = z2 * (y1 * work[53] + (work[54] + (y3 * t50 + work[55])))
-        + (z4 * (t52 + (work[56] + (t13 + t54))) + x4 * (t55 + (work[13] + (t56 + x4 * t12))));
-    const double t58 = work[57] + t44 + gauge[2] * (y3 * (t20 + (t46 + t48)) + (y2 * t49 + y4 * t49))
-        + params->J * (x2 * (y1 * work[47] + (t7 + (work[13] + (work[14] + y3 * t28)))) + t57);
-    const double t59 = work[25] * t58, t60 = (-1.0 / 6.0) * t22 - t45, t61 = y4 * t12;
-    const double t62 = z4 * t33, t63 = t61 + t62, t64 = gauge[3] * (x3 * t60 + x5 * t60 + x4 * t63);
-    const double t65 = work[6] - work[58], t66 = y1 * t65, t67 = (-1.0 / 12.0) * x1 - work[59];
-    const double t68 = y5 * t67, t69 = z1 * t65, t70 = z5 * t67;
-    const double t71 = z2 * (x1 * work[53] + (work[60] + (x3 * t50 + work[61])))
-        + (y4 * (t66 + (work[62] + (t68 + t43))) + z4 * (t69 + (work[63] + (t17 + t70))));
-    const double t72 = work[64] + t64 + gauge[2] * (x3 * (t25 + (t60 + t48)) + (x2 * t3 + x4 * t3))
-        + params->J * (y2 * (x1 * work[43] + (work[65] + (x3 * t37 + work[66]))) + t71);
-    const double t73 = work[25] * t72, t74 = x3 * ((-1.0 / 6.0) * x3 - work[67]);
-    const double t75 = y3 * (t41 - work[68]), t76 = x4 * t16, t77 = t61 + t76;
-    const double t78 = work[6] + (1.0 / 12.0 * x1 + work[31]), t79 = work[31] + work[67];
-    const double t80 = (-1.0 / 12.0) * z2, t81 = t80 - work[30], t82 = x1 * t81;
-    const double t83 = work[58] + work[32], t84 = 1.0 / 6.0 * work[69], t85 = 1.0 / 6.0 * work[70];
-    const double t86 = (-1.0 / 12.0) * x2, t87 = t86 - work[59], t88 = t84 - t85 + z3 * t87;
-    const double t89 = y1 * t81, t90 = work[51] + work[28], t91 = 1.0 / 6.0 * work[71];
-    const double t92 = 1.0 / 6.0 * work[72], t93 = (-1.0 / 12.0) * y2, t94 = t93 - work[52];
-    const double t95 = t91 - t92 + z3 * t94, t96 = work[50] + (1.0 / 12.0 * y1 + work[29]);
-    const double t97 = work[29] + work[68];
-    const double t98 = x5 * (t82 + (z1 * t83 + t88)) + y5 * (t89 + (z1 * t90 + t95)) + y3
-        * (z2 * t96 + (t52 + (work[56] + (z4 * t97 + t54))));
-    const double t99 = work[73] + work[74] + gauge[3] * (z4 * (t74 + (work[75] + t75)) + (z3 * t77 + z5
-        * t77)) + params->J * (x3 * (z2 * t78 + (t69 + (work[63] + (z4 * t79 + t70)))) + t98);
-    const double t100 = work[25] * t99, t101 = t76 + t62, t102 = z3 * (t14 - work[76]);
-    const double t103 = work[37] + (1.0 / 12.0 * z1 + work[40]), t104 = work[40] + work[76];
-    const double t105 = work[30] + work[38], t106 = t93 - work[28], t107 = z1 * t106;
-    const double t108 = t92 - t91, t109 = t80 - work[39], t110 = y3 * t109, t111 = x1 * t106;
-    const double t112 = 1.0 / 6.0 * work[77], t113 = 1.0 / 6.0 * work[78];
-    const double t114 = t112 - t113 + y3 * t87;
-    const double t115 = z3 * (y2 * t103 + (t30 + (work[42] + (y4 * t104 + t32))))
-        + (z5 * (y1 * t105 + (t107 + (t108 + t110))) + x5 * (t111 + (y1 * t83 + t114)));
-    const double t116 = work[79] + work[80] + gauge[3] * (y3 * t101 + y5 * t101 + y4
-        * (t74 + (t102 + work[81]))) + params->J * (x3 * (y2 * t78 + (t66 + (work[62] + (t68 + y4 * t79))))
-        + t115);
-    const double t117 = work[25] * t116, t118 = t86 - work[32], t119 = z1 * t118, t120 = x3 * t109;
-    const double t121 = t85 - t84, t122 = y1 * t118, t123 = x3 * t94, t124 = t113 - t112;
-    const double t125 = z5 * (x1 * t105 + (t119 + (t120 + t121))) + y5 * (x1 * t90 + (t122 + (t123 + t124)))
-        + z3 * (x2 * t103 + (t35 + (work[16] + (x4 * t104 + t36))));
-    const double t126 = work[82] + t4 + gauge[3] * (x5 * t63 + x3 * t63 + x4 * (t75 + (work[83] + t102)))
-        + params->J * (y3 * (x2 * t96 + (t55 + (work[13] + (t56 + x4 * t97)))) + t125);
-    const double t127 = work[25] * t126, t128 = x1 * (work[84] - t19), t129 = y1 * (work[85] - t24);
-    const double t130 = x5 * work[86], t131 = t130 + work[87];
-    const double t132 = work[7] + (work[88] + 1.0 / 12.0 * x3), t133 = work[88] + t19;
-    const double t134 = work[51] + work[52], t135 = work[59] + work[58];
-    const double t136 = work[89] + (1.0 / 12.0 * y3 + work[90]), t137 = work[90] + t24;
-    const double t138 = y4 * (t107 + (t110 + (z3 * t134 + t108))) + x4 * (t119 + (t120 + (z3 * t135 + t121)))
-        + y1 * (z2 * t136 + (work[91] + (work[92] + (work[93] + z5 * t137))));
-    const double t139 = gauge[4] * (z5 * (t128 + (t129 + t23)) + (z4 * t131 + z1 * t131)) + (work[94] + t18)
-        + params->J * (x1 * (z2 * t132 + (work[95] + (work[96] + (z5 * t133 + work[97])))) + t138);
-    const double t140 = work[25] * t139, t141 = t130 + work[98], t142 = z1 * (work[99] - t47);
-    const double t143 = work[100] + (1.0 / 12.0 * z3 + work[101]), t144 = t47 + work[101];
-    const double t145 = work[39] + work[38];
-    const double t146 = z1 * (y2 * t143 + (work[102] + (work[103] + (work[104] + y5 * t144))))
-        + (x4 * (t122 + (t123 + (y3 * t135 + t124))) + z4 * (t89 + (y3 * t145 + t95)));
-    const double t147 = gauge[4] * (y4 * t141 + y1 * t141 + y5 * (t128 + (t46 + t142))) + (work[105] + t44)
-        + params->J * (x1 * (y2 * t132 + (work[106] + (work[107] + (y5 * t133 + work[108])))) + t146);
-    const double t148 = work[25] * t147;
-    const double t149 = z4 * (t82 + (x3 * t145 + t88)) + y4 * (t111 + (x3 * t134 + t114)) + z1
-        * (x2 * t143 + (work[10] + (work[109] + (work[110] + x5 * t144))));
-    const double t150 = gauge[4] * (x4 * work[111] + x1 * work[111] + x5 * (t129 + (t60 + t142))) + (t64 + t5)
-        + params->J * (y1 * (x2 * t136 + (work[22] + (work[112] + (x5 * t137 + work[113])))) + t149);
-    const double t151 = work[25] * t150;
-    error[4] = z2 * t11 - x2 * work[26];
-    error[5] = x2 * work[27] - y2 * t11;
-    error[6] = y3 * t40 - z3 * t59;
-    error[7] = z3 * t73 - x3 * t40;
-    error[8] = x3 * t59 - y3 * t73;
-    error[9] = y4 * t100 - z4 * t117;
-    error[10] = z4 * t127 - x4 * t100;
-    error[11] = x4 * t117 - y4 * t127;
-    error[12] = y5 * t140 - z5 * t148;
-    error[13] = z5 * t151 - x5 * t140;
-    error[14] = x5 * t148 - y5 * t151;
-}
-
-/* the leading error vector pi grad S_3, as a function of the gauge */
-static void spin_chain5_guide(const spin_chain5_params *params, const double gauge[5], const double x[15],
-    double error[restrict 15])
-{
-    double work[114];
-    spin_chain5_guide_part1(params, gauge, x, error, work);
-    spin_chain5_guide_part2(params, gauge, x, error, work);
-}
-
 /* grad H . grad H, then grad H . grad C and grad C . grad C for each Casimir of the gauge */
 static void spin_chain5_products(const spin_chain5_params *params, const double x[15],
     double out[restrict 11])
@@ -1807,7 +1482,6 @@ static void spin_chain5_products(const spin_chain5_params *params, const double 
     out[10] = 4.0 * (z5 * z5) + (4.0 * (y5 * y5) + 4.0 * (x5 * x5));
 }
 
-/* the Hamiltonian */
 double spin_chain5_hamiltonian(const spin_chain5_params *params, const double x[15])
 {
     if (params == NULL) params = &spin_chain5_default_params;
@@ -1820,7 +1494,6 @@ double spin_chain5_hamiltonian(const spin_chain5_params *params, const double x[
     return -t2;
 }
 
-/* the Casimirs */
 void spin_chain5_casimirs(const spin_chain5_params *params, const double x[15], double out[])
 {
     (void)params;
@@ -1833,7 +1506,6 @@ void spin_chain5_casimirs(const spin_chain5_params *params, const double x[15], 
     out[4] = z5 * z5 + (y5 * y5 + x5 * x5);
 }
 
-/* pi(x) grad H(x) */
 void spin_chain5_vector_field(const spin_chain5_params *params, const double x[15], double out[15])
 {
     if (params == NULL) params = &spin_chain5_default_params;
@@ -1841,10 +1513,10 @@ void spin_chain5_vector_field(const spin_chain5_params *params, const double x[1
         y3 = x[7], z3 = x[8], x4 = x[9], y4 = x[10], z4 = x[11], x5 = x[12], y5 = x[13], z5 = x[14];
     const double t1 = J * y5, t2 = J * y2, t3 = t1 + t2, t4 = J * z5, t5 = J * z2, t6 = t4 + t5;
     const double t7 = J * x5, t8 = J * x2, t9 = t7 + t8, t10 = J * y1, t11 = J * y3, t12 = t10 + t11;
-    const double t13 = J * z1, t14 = J * z3, t15 = t13 + t14, t16 = J * x3, t17 = J * x1;
-    const double t18 = t16 + t17, t19 = J * y4, t20 = t2 + t19, t21 = J * z4, t22 = t21 + t5;
-    const double t23 = J * x4, t24 = t23 + t8, t25 = t1 + t11, t26 = t4 + t14, t27 = t7 + t16;
-    const double t28 = t10 + t19, t29 = t21 + t13, t30 = t23 + t17;
+    const double t13 = J * z1, t14 = J * z3, t15 = t13 + t14, t16 = J * x3, t17 = J * x1, t18 = t16 + t17;
+    const double t19 = J * y4, t20 = t2 + t19, t21 = J * z4, t22 = t21 + t5, t23 = J * x4, t24 = t23 + t8;
+    const double t25 = t1 + t11, t26 = t4 + t14, t27 = t7 + t16, t28 = t10 + t19, t29 = t21 + t13;
+    const double t30 = t23 + t17;
     out[0] = z1 * t3 - y1 * t6;
     out[1] = x1 * t6 - z1 * t9;
     out[2] = y1 * t9 - x1 * t3;
@@ -1863,19 +1535,18 @@ void spin_chain5_vector_field(const spin_chain5_params *params, const double x[1
 }
 
 /* ---- Compensated sums, linear equations ---- */
-/* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to
-   its last bit: were it rounded with the change, corrections of one sign would add up to a drift. 0, and x as
-   before, if the sum is not finite. */
+/* x + change + small in compensated arithmetic, where small is the carry and what is as small: were that
+   rounded with the change, corrections of one sign would add up to a drift. 0, and x as before, if the sum is
+   not finite. */
 static int spin_chain5_advance(spin_chain5_solver *s, const double change[spin_chain5_DIM],
-    const double correction[spin_chain5_DIM])
+    const double small[spin_chain5_DIM])
 {
     double x[spin_chain5_DIM], carry[spin_chain5_DIM];
     for (int i = 0; i < spin_chain5_DIM; ++i) {
         const double sum = s->x[i] + change[i], added = sum - s->x[i];
-        const double lost = (s->x[i] - (sum - added)) + (change[i] - added);
-        const double small = lost + (s->carry[i] + correction[i]);
-        x[i] = sum + small;
-        carry[i] = small - (x[i] - sum);
+        const double lost = ((s->x[i] - (sum - added)) + (change[i] - added)) + small[i];
+        x[i] = sum + lost;
+        carry[i] = lost - (x[i] - sum);
         if (!isfinite(x[i])) return 0;
     }
     memcpy(s->x, x, sizeof x);
@@ -1914,12 +1585,10 @@ static int spin_chain5_solve(double matrix[spin_chain5_DIM * spin_chain5_DIM], d
 }
 
 /* ---- Starting guesses ---- */
-/* How far from the last value a guess may be, in sizes of that value. */
-#define spin_chain5_REACH 4.0
+#define spin_chain5_REACH 4.0 /* how far from the last value a guess may be, in sizes of that value */
 
-/* The guess for the next value from the last ones: the sum of their backward differences. 0 if there is none,
-   or if it is far away, where the equation of a step has solutions that have nothing to do with the motion.
-   */
+/* The guess for the next value, the sum of differences. 0 if there is none, or if it is far away, where the
+   equation of a step has solutions that have nothing to do with the motion. */
 static int spin_chain5_predict(const spin_chain5_history *history, double value[spin_chain5_DIM])
 {
     double distance = 0.0, size = 0.0;
@@ -1955,10 +1624,8 @@ static void spin_chain5_remember(spin_chain5_history *history, const double valu
     if (history->count < spin_chain5_DIFFERENCES) ++history->count;
 }
 
-/* How far a step may lead, in sizes of the state and of what the vector field says, if the energy is lost;
-   and the part of the energy that counts as lost. */
-#define spin_chain5_PLAUSIBLE 1.5
-#define spin_chain5_LOST 0.5
+#define spin_chain5_PLAUSIBLE 1.5 /* how far any step may lead, in sizes of the state and of its motion */
+#define spin_chain5_LOST 0.5      /* part of the energy that one which leads farther must not lose */
 
 /* Whether an increment is that of the motion. Where the step is too large, the equation may have been solved
    by a point far away, at another energy, that has nothing to do with it. */
@@ -1968,24 +1635,21 @@ static int spin_chain5_plausible(const spin_chain5_solver *s, const double incre
     for (int i = 0; i < spin_chain5_DIM; ++i) {
         moved += fabs(increment[i]);
         size += fabs(s->x[i]);
-    }
-    if (moved <= spin_chain5_PLAUSIBLE * size) return 1;
-    spin_chain5_vector_field(&s->params, s->x, field);
-    for (int i = 0; i < spin_chain5_DIM; ++i) {
-        size += fabs(s->h * field[i]);
         middle[i] = s->x[i] + 0.5 * increment[i];
         end[i] = s->x[i] + increment[i];
     }
     if (moved <= spin_chain5_PLAUSIBLE * size) return 1;
-    const double before = spin_chain5_hamiltonian(&s->params, s->x), after =
-        spin_chain5_hamiltonian(&s->params, end);
-    const double scale = fabs(before) + fabs(spin_chain5_hamiltonian(&s->params, middle)) + fabs(after);
-    return fabs(after - before) <= spin_chain5_LOST * scale;
+    spin_chain5_vector_field(&s->params, s->x, field);
+    for (int i = 0; i < spin_chain5_DIM; ++i) size += fabs(s->h * field[i]);
+    if (moved <= spin_chain5_PLAUSIBLE * size) return 1;
+    const double before = spin_chain5_hamiltonian(&s->params, s->x);
+    const double after = spin_chain5_hamiltonian(&s->params, end), between =
+        spin_chain5_hamiltonian(&s->params, middle);
+    return fabs(after - before) <= spin_chain5_LOST * (fabs(before) + fabs(between) + fabs(after));
 }
 
 /* ---- The implicit step, by Newton's method ---- */
-/* Components of y are measured no finer than by this part of the largest. */
-#define spin_chain5_FLOOR 1e-6
+#define spin_chain5_FLOOR 1e-6 /* components of y are measured no finer than by this part of the largest */
 
 /* Size of a correction relative to each component of y; NaN or infinite if the correction is. */
 static double spin_chain5_size(const double y[spin_chain5_DIM], const double delta[spin_chain5_DIM])
@@ -2000,9 +1664,8 @@ static double spin_chain5_size(const double y[spin_chain5_DIM], const double del
     return size;
 }
 
-/* Corrections below the first that shrink by less than the second have reached the level of rounding. */
-#define spin_chain5_NEARLY_SOLVED 1e-8
-#define spin_chain5_SHRINKING 0.25
+#define spin_chain5_NEARLY_SOLVED 1e-8 /* corrections below this have reached the level of rounding, ... */
+#define spin_chain5_SHRINKING 0.25     /* ... if one is more than this part of the one before */
 
 /* Solve (y - x) + displacement(y) = 0 for y by Newton's method from the extrapolated guess, and advance. The
    increment is corrected to first order by the last Newton correction, so that correction costs no
@@ -2012,14 +1675,14 @@ static spin_chain5_status spin_chain5_attempt(spin_chain5_solver *s)
 {
     double y[spin_chain5_DIM], delta[spin_chain5_DIM], displacement[spin_chain5_DIM],
         increment[spin_chain5_DIM];
-    double jacobian[spin_chain5_DIM * spin_chain5_DIM], increment_jacobian[spin_chain5_DIM * spin_chain5_DIM],
-        previous = HUGE_VAL;
+    double jacobian[spin_chain5_DIM * spin_chain5_DIM], increment_jacobian[spin_chain5_DIM * spin_chain5_DIM];
+    double previous = HUGE_VAL;
     if (!spin_chain5_predict(&s->history, y)) memcpy(y, s->x, sizeof y);
     for (int iteration = 1; iteration <= spin_chain5_MAX_ITERATIONS; ++iteration) {
         spin_chain5_linearise(s->coef, y, displacement, increment, jacobian, increment_jacobian);
         ++s->evaluations;
-        for (int i = 0; i < spin_chain5_DIM; ++i) delta[i] = ((y[i] - s->x[i]) + displacement[i])
-            - s->carry[i];
+        for (int i = 0; i < spin_chain5_DIM; ++i)
+            delta[i] = ((y[i] - s->x[i]) + displacement[i]) - s->carry[i];
         const int regular = spin_chain5_solve(jacobian, delta);
         const double size = spin_chain5_size(y, delta), growth = size / (previous * previous);
         if (!isfinite(size)) return spin_chain5_NOT_FINITE;
@@ -2029,12 +1692,14 @@ static spin_chain5_status spin_chain5_attempt(spin_chain5_solver *s)
         const int stalled = previous < spin_chain5_NEARLY_SOLVED && size > spin_chain5_SHRINKING * previous;
         previous = size;
         if (!(remaining <= spin_chain5_TOLERANCE || stalled)) continue;
-        double correction[spin_chain5_DIM] = { 0.0 };
-        for (int i = 0; i < spin_chain5_DIM; ++i)
+        double small[spin_chain5_DIM] = { 0.0 }; /* the correction of the increment, and the carry */
+        for (int i = 0; i < spin_chain5_DIM; ++i) {
             for (int j = 0; j < spin_chain5_DIM; ++j)
-                correction[i] -= increment_jacobian[i * spin_chain5_DIM + j] * delta[j];
+                small[i] -= increment_jacobian[i * spin_chain5_DIM + j] * delta[j];
+            small[i] += s->carry[i];
+        }
         if (!spin_chain5_plausible(s, increment)) return spin_chain5_NO_CONVERGENCE;
-        if (!spin_chain5_advance(s, increment, correction)) return spin_chain5_NOT_FINITE;
+        if (!spin_chain5_advance(s, increment, small)) return spin_chain5_NOT_FINITE;
         spin_chain5_remember(&s->history, y);
         return spin_chain5_OK;
     }
@@ -2042,131 +1707,41 @@ static spin_chain5_status spin_chain5_attempt(spin_chain5_solver *s)
 }
 
 /* ---- The choice of the gauge: multiples of Casimirs taken from H ---- */
-enum {
-    spin_chain5_SAMPLES = 32, /* states along a short piece of the trajectory */
-    spin_chain5_SWEEPS = 4    /* most rounds over the multiples */
-};
-
-/* A short piece of the trajectory from x, by a Runge-Kutta method with steps of a fixed change. */
-static void spin_chain5_sample(const spin_chain5_params *params, const double x[spin_chain5_DIM],
-    double samples[][spin_chain5_DIM])
-{
-    double slope[spin_chain5_DIM], middle[spin_chain5_DIM], size = 0.0, speed = DBL_MIN;
-    spin_chain5_vector_field(params, x, slope);
-    for (int i = 0; i < spin_chain5_DIM; ++i) {
-        samples[0][i] = x[i];
-        size += fabs(x[i]);
-        speed += fabs(slope[i]);
-    }
-    const double h = 0.25 * size / speed;
-    for (int k = 1; k < spin_chain5_SAMPLES; ++k) {
-        const double *y = samples[k - 1];
-        spin_chain5_vector_field(params, y, slope);
-        for (int i = 0; i < spin_chain5_DIM; ++i) middle[i] = y[i] + 0.5 * h * slope[i];
-        spin_chain5_vector_field(params, middle, slope);
-        for (int i = 0; i < spin_chain5_DIM; ++i) samples[k][i] = y[i] + h * slope[i];
-    }
-}
-
-/* Sum of |pi grad S_3|^2, the leading error of the method, over the samples. */
-static double spin_chain5_gauge_error(const spin_chain5_params *params,
-    const double gauge[spin_chain5_GAUGES], double samples[][spin_chain5_DIM])
-{
-    double error[spin_chain5_DIM], sum = 0.0;
-    for (int k = 0; k < spin_chain5_SAMPLES; ++k) {
-        spin_chain5_guide(params, gauge, samples[k], error);
-        for (int i = 0; i < spin_chain5_DIM; ++i) sum += error[i] * error[i];
-    }
-    return sum;
-}
-
-/* How many widths multiple c is to be moved for the least error: the best on grids, each finer than the one
-   before. */
-static double spin_chain5_least_on_line(const spin_chain5_params *params,
-    const double gauge[spin_chain5_GAUGES], int c, double width, double samples[][spin_chain5_DIM])
-{
-    double moved[spin_chain5_GAUGES], best = 0.0, mesh = 0.125, least = spin_chain5_gauge_error(params, gauge,
-        samples);
-    memcpy(moved, gauge, sizeof moved);
-    for (int level = 0; level < 3; ++level, mesh *= 0.125) {
-        const int reach = level == 0 ? 24 : 8;
-        const double centre = best;
-        for (int j = -reach; j <= reach; ++j) {
-            moved[c] = gauge[c] + (centre + j * mesh) * width;
-            const double error = spin_chain5_gauge_error(params, moved, samples);
-            if (!(error < least - 1e-12 * least)) continue; /* close calls are not decided by rounding */
-            least = error;
-            best = centre + j * mesh;
-        }
-    }
-    return best;
-}
-
-/* The multiples that minimise the leading error along a short piece of the trajectory, one after the other,
-   from the least-squares solution of grad H = sum of multiples of grad C. Zero where that gives nothing
-   finite. */
+/* For each Casimir C the multiple by which grad H less it times grad C is smallest at the start; zero where
+   that gives nothing finite. */
 static void spin_chain5_choose_gauge(const spin_chain5_params *params, const double x[spin_chain5_DIM],
     double gauge[spin_chain5_GAUGES])
 {
-    double samples[spin_chain5_SAMPLES][spin_chain5_DIM], out[1 + 2 * spin_chain5_GAUGES],
-        sums[1 + 2 * spin_chain5_GAUGES] = { 0.0 };
-    double width[spin_chain5_GAUGES];
-    spin_chain5_sample(params, x, samples);
-    for (int k = 0; k < spin_chain5_SAMPLES; ++k) {
-        spin_chain5_products(params, samples[k], out);
-        for (int i = 0; i < 1 + 2 * spin_chain5_GAUGES; ++i) sums[i] += out[i];
-    }
+    double out[1 + 2 * spin_chain5_GAUGES];
+    spin_chain5_products(params, x, out);
     for (int c = 0; c < spin_chain5_GAUGES; ++c) {
-        const double norm = sums[2 + 2 * c] > 0.0 ? sums[2 + 2 * c] : HUGE_VAL;
-        gauge[c] = sums[1 + 2 * c] / norm;
-        width[c] = sqrt(sums[0] / norm);
+        const double multiple = out[1 + 2 * c] / out[2 + 2 * c];
+        gauge[c] = isfinite(multiple) ? multiple : 0.0;
     }
-    for (int sweep = 0, moved = 1; sweep < spin_chain5_SWEEPS && moved; ++sweep) {
-        moved = 0;
-        for (int c = 0; c < spin_chain5_GAUGES; ++c) {
-            const double best = spin_chain5_least_on_line(params, gauge, c, width[c], samples);
-            gauge[c] += best * width[c];
-            moved = moved || best != 0.0;
-        }
-    }
-    if (!isfinite(spin_chain5_gauge_error(params, gauge, samples)))
-        memset(gauge, 0, spin_chain5_GAUGES * sizeof gauge[0]);
 }
 
 /* ---- The solver ---- */
-/* Whether steps can be made with these parameters: allowed, and with finite coefficients for a step so short
-   that it has no part in it. */
-static int spin_chain5_admissible(const spin_chain5_params *params)
-{
-    double coef[spin_chain5_COEFFICIENTS];
-    if (!spin_chain5_allowed(params)) return 0;
-    spin_chain5_prepare(params, (const double[spin_chain5_GAUGES]){ 0.0 }, 1e-100, coef);
-    for (int k = 0; k < spin_chain5_COEFFICIENTS; ++k)
-        if (!isfinite(coef[k])) return 0;
-    return 1;
-}
+#define spin_chain5_SHORT_STEP 1e-100 /* so short that it has no part in whether coefficients are finite */
 
-/* The arguments may be parts of *s: they are read before it is written. */
+/* The arguments may be parts of *s, which is therefore written last. */
 spin_chain5_status spin_chain5_init_gauge(spin_chain5_solver *s, const spin_chain5_params *params,
     const double x0[spin_chain5_DIM], const double gauge[spin_chain5_GAUGES])
 {
     if (s == NULL || x0 == NULL) return spin_chain5_BAD_ARGUMENT;
-    const spin_chain5_params own = params != NULL ? *params : spin_chain5_default_params;
-    double x[spin_chain5_DIM];
-    memcpy(x, x0, sizeof x);
+    spin_chain5_solver fresh = { .h = (double)NAN };
+    fresh.params = params != NULL ? *params : spin_chain5_default_params;
+    memcpy(fresh.x, x0, sizeof fresh.x);
     for (int i = 0; i < spin_chain5_DIM; ++i)
-        if (!isfinite(x[i])) return spin_chain5_BAD_ARGUMENT;
-    double multiples[spin_chain5_GAUGES] = { 0.0 };
-    const int given = gauge != NULL;
-    if (given) memcpy(multiples, gauge, sizeof multiples);
+        if (!isfinite(fresh.x[i])) return spin_chain5_BAD_ARGUMENT;
+    if (!spin_chain5_allowed(&fresh.params)) return spin_chain5_BAD_ARGUMENT;
+    spin_chain5_prepare(&fresh.params, fresh.gauge, spin_chain5_SHORT_STEP, fresh.coef);
+    for (int k = 0; k < spin_chain5_COEFFICIENTS; ++k)
+        if (!isfinite(fresh.coef[k])) return spin_chain5_BAD_ARGUMENT;
+    if (gauge == NULL) spin_chain5_choose_gauge(&fresh.params, fresh.x, fresh.gauge);
+    else memcpy(fresh.gauge, gauge, sizeof fresh.gauge);
     for (int c = 0; c < spin_chain5_GAUGES; ++c)
-        if (!isfinite(multiples[c])) return spin_chain5_BAD_ARGUMENT;
-    if (!spin_chain5_admissible(&own)) return spin_chain5_BAD_ARGUMENT;
-    memset(s, 0, sizeof *s);
-    memcpy(s->x, x, sizeof s->x);
-    s->params = own;
-    if (!given) spin_chain5_choose_gauge(&own, x, multiples);
-    memcpy(s->gauge, multiples, sizeof s->gauge);
+        if (!isfinite(fresh.gauge[c])) return spin_chain5_BAD_ARGUMENT;
+    *s = fresh;
     return spin_chain5_OK;
 }
 
@@ -2180,44 +1755,38 @@ spin_chain5_status spin_chain5_init(spin_chain5_solver *s, const spin_chain5_par
 static spin_chain5_status spin_chain5_set_step(spin_chain5_solver *s, double h)
 {
     if (s == NULL || !isfinite(h)) return spin_chain5_BAD_ARGUMENT;
-    if (s->prepared && memcmp(&h, &s->h, sizeof h) == 0) return spin_chain5_OK;
+    if (memcmp(&h, &s->h, sizeof h) == 0) return spin_chain5_OK;
     spin_chain5_prepare(&s->params, s->gauge, h, s->coef);
     memset(&s->history, 0, sizeof s->history);
     s->h = h;
     s->t_before_h = s->t;
     s->steps_before_h = s->steps;
-    s->prepared = 1;
     return spin_chain5_OK;
 }
 
 /* One stage. A guess from earlier steps may have misled it: then once more without. */
 static spin_chain5_status spin_chain5_stage(spin_chain5_solver *s)
 {
-    spin_chain5_status status = spin_chain5_attempt(s);
-    if (status != spin_chain5_OK && s->history.count > 0) {
-        memset(&s->history, 0, sizeof s->history);
-        status = spin_chain5_attempt(s);
-    }
-    return status;
-}
-
-spin_chain5_status spin_chain5_step(spin_chain5_solver *s, double h)
-{
-    spin_chain5_status status = spin_chain5_set_step(s, h);
-    if (status != spin_chain5_OK) return status;
-    status = spin_chain5_stage(s);
-    if (status != spin_chain5_OK) return status;
-    ++s->steps;
-    s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
-    return status;
+    const spin_chain5_status status = spin_chain5_attempt(s);
+    if (status == spin_chain5_OK || s->history.count == 0) return status;
+    memset(&s->history, 0, sizeof s->history);
+    return spin_chain5_attempt(s);
 }
 
 spin_chain5_status spin_chain5_integrate(spin_chain5_solver *s, double h, size_t steps)
 {
     spin_chain5_status status = spin_chain5_set_step(s, h);
-    for (; steps > 0 && status == spin_chain5_OK; --steps) status = spin_chain5_step(s, h);
+    for (; steps > 0 && status == spin_chain5_OK; --steps) {
+        status = spin_chain5_stage(s);
+        if (status != spin_chain5_OK) break;
+        ++s->steps;
+        s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
+    }
     return status;
 }
+
+spin_chain5_status spin_chain5_step(spin_chain5_solver *s, double h) { return spin_chain5_integrate(s, h, 1);
+    }
 
 const char *spin_chain5_status_string(spin_chain5_status status)
 {
@@ -2232,7 +1801,6 @@ const char *spin_chain5_status_string(spin_chain5_status status)
 }
 
 size_t spin_chain5_solver_size(void) { return sizeof(spin_chain5_solver); }
-
 size_t spin_chain5_solver_steps_done(const spin_chain5_solver *s) { return s->steps; }
 
 /* ---- Ensembles ---- */

@@ -20,7 +20,7 @@
  *   4. The implicit step, by Newton's method
  *   5. The solver
  *   6. Ensembles
- * body-sha256: 88578d8c85551b0f1955a3873770f0b454604e70d1cc0a074f358ce2cacef643
+ * body-sha256: 22269bb086c6c9320b87b454ca416196b54c82f55fcfd37fcfbea86bd71c8931
  */
 #include "toda3.h"
 
@@ -32,55 +32,57 @@
 const toda3_params toda3_default_params = { 0 };
 
 enum { toda3_MAX_ITERATIONS = 20 }; /* of an inner solve */
+#define toda3_TOLERANCE 1e-20       /* the error that an accepted correction may leave, as estimated */
 
-/* A correction is accepted when the error that it leaves is estimated to be below this. */
-#define toda3_TOLERANCE 1e-20
+/* The polynomial with these coefficients, the constant first. */
+static inline double toda3_polynomial(const double *coefficients, int count, double s)
+{
+    double value = coefficients[--count];
+    while (count > 0) value = value * s + coefficients[--count];
+    return value;
+}
 
 /* (1 - w cot w)/s with w = sqrt(s)/2, coth for negative s: the function of the exponential bi-realisation. */
 static double toda3_phi0(double s)
 {
-    if (fabs(s) < 0.25)
-        return (0.08333333333333333 + s * (0.001388888888888889 + s * (3.306878306878307e-05 + s *
-            (8.267195767195768e-07 + s * (2.08767569878681e-08 + s * (5.284190138687493e-10 + s *
-            (1.3382536530684679e-11 + s * (3.3896802963225827e-13 + s * 8.586062056277845e-15))))))));
+    static const double near[9] = { 0.08333333333333333, 0.001388888888888889, 3.306878306878307e-05,
+        8.267195767195768e-07, 2.08767569878681e-08, 5.284190138687493e-10, 1.3382536530684679e-11,
+        3.3896802963225827e-13, 8.586062056277845e-15 };
+    static const double rest[21] = { 0.03267274151216445, 0.000105641107053347, 5.637370282876845e-07,
+        3.357141926657451e-09, 2.0742872904166045e-11, 1.3000482138698975e-13, 8.196052055691008e-16,
+        5.180118196169724e-18, 3.277539174701792e-20, 2.0747401878593604e-22, 1.3136241807166534e-24,
+        8.318003195189264e-27, 5.267262996834231e-29, 3.3354842988221443e-31, 2.1122063323183885e-33,
+        1.3375664093215244e-35, 8.470227328650247e-38, 5.363831046655698e-40, 3.3966848266497805e-42,
+        2.1509755511832569e-44, 1.3621211117593843e-46 };
+    if (fabs(s) < 0.25) return toda3_polynomial(near, 9, s);
     if (fabs(s) < 16.0) {
         const double pole = 1.0 / (39.47841760435743 - s);
-        return 2.0 * pole + (0.03267274151216445 + s * (0.000105641107053347 + s * (5.637370282876845e-07
-            + s * (3.357141926657451e-09 + s * (2.0742872904166045e-11 + s * (1.3000482138698975e-13 + s *
-            (8.196052055691008e-16 + s * (5.180118196169724e-18 + s * (3.277539174701792e-20 + s *
-            (2.0747401878593604e-22 + s * (1.3136241807166534e-24 + s * (8.318003195189264e-27 + s *
-            (5.267262996834231e-29 + s * (3.3354842988221443e-31 + s * (2.1122063323183885e-33 + s *
-            (1.3375664093215244e-35 + s * (8.470227328650247e-38 + s * (5.363831046655698e-40 + s *
-            (3.3966848266497805e-42 + s * (2.1509755511832569e-44 + s *
-            1.3621211117593843e-46))))))))))))))))))));
+        return 2.0 * pole + toda3_polynomial(rest, 21, s);
     }
     const double w = 0.5 * sqrt(fabs(s)), c = w / (s > 0.0 ? tan(w) : tanh(w));
-    const double phi0 = (1.0 - c) / s;
-    return phi0;
+    return (1.0 - c) / s;
 }
 
 /* The derivative of (1 - w cot w)/s, w = sqrt(s)/2. */
 static double toda3_phi1(double s)
 {
-    if (fabs(s) < 0.25)
-        return (0.001388888888888889 + s * (6.613756613756614e-05 + s * (2.48015873015873e-06 + s *
-            (8.35070279514724e-08 + s * (2.6420950693437467e-09 + s * (8.029521918410807e-11 + s *
-            (2.372776207425808e-12 + s * (6.868849645022276e-14 + s * 1.9573818287022555e-15))))))));
+    static const double near[9] = { 0.001388888888888889, 6.613756613756614e-05, 2.48015873015873e-06,
+        8.35070279514724e-08, 2.6420950693437467e-09, 8.029521918410807e-11, 2.372776207425808e-12,
+        6.868849645022276e-14, 1.9573818287022555e-15 };
+    static const double rest[21] = { 0.000105641107053347, 1.127474056575369e-06, 1.0071425779972354e-08,
+        8.297149161666418e-11, 6.500241069349487e-13, 4.917631233414605e-15, 3.626082737318807e-17,
+        2.6220313397614337e-19, 1.8672661690734246e-21, 1.3136241807166533e-23, 9.149803514708191e-26,
+        6.320715596201077e-28, 4.336129588468787e-30, 2.957088865245744e-32, 2.0063496139822866e-34,
+        1.3552363725840395e-36, 9.118512779314688e-39, 6.114032687969605e-41, 4.0868535472481875e-43,
+        2.7242422235187686e-45, 1.8114038279637677e-47 };
+    if (fabs(s) < 0.25) return toda3_polynomial(near, 9, s);
     if (fabs(s) < 16.0) {
         const double pole = 1.0 / (39.47841760435743 - s);
-        return 2.0 * pole * pole + (0.000105641107053347 + s * (1.127474056575369e-06 + s *
-            (1.0071425779972354e-08 + s * (8.297149161666418e-11 + s * (6.500241069349487e-13 + s *
-            (4.917631233414605e-15 + s * (3.626082737318807e-17 + s * (2.6220313397614337e-19 + s *
-            (1.8672661690734246e-21 + s * (1.3136241807166533e-23 + s * (9.149803514708191e-26 + s *
-            (6.320715596201077e-28 + s * (4.336129588468787e-30 + s * (2.957088865245744e-32 + s *
-            (2.0063496139822866e-34 + s * (1.3552363725840395e-36 + s * (9.118512779314688e-39 + s *
-            (6.114032687969605e-41 + s * (4.0868535472481875e-43 + s * (2.7242422235187686e-45 + s *
-            1.8114038279637677e-47))))))))))))))))))));
+        return 2.0 * pole * pole + toda3_polynomial(rest, 21, s);
     }
     const double w = 0.5 * sqrt(fabs(s)), c = w / (s > 0.0 ? tan(w) : tanh(w));
     const double phi0 = (1.0 - c) / s;
-    const double phi1 = (0.5 * s * phi0 * phi0 - 1.5 * phi0 + 0.125) / s;
-    return phi1;
+    return (0.5 * s * phi0 * phi0 - 1.5 * phi0 + 0.125) / s;
 }
 
 /* everything that depends on parameters and step size only */
@@ -107,25 +109,22 @@ static void toda3_linearise(const double coef[10], const double y[5], double dis
 {
     const double a1 = y[0], a2 = y[1], b1 = y[2], b2 = y[3], b3 = y[4];
     /* momenta */
-    const double t1 = a2 * a2, t2 = b2 * coef[6];
-    const double p_b3 = b3 * coef[5] + t1 * (t2 + b3 * coef[1]);
+    const double t1 = a2 * a2, t2 = b2 * coef[6], p_b3 = b3 * coef[5] + t1 * (t2 + b3 * coef[1]);
     const double t3 = a1 * a1, t4 = coef[1] * t1, t5 = coef[5] + coef[1] * t3, t6 = t4 + t5;
-    const double p_b2 = coef[6] * (b1 * t3) + coef[6] * (b3 * t1) + b2 * t6;
-    const double t7 = b1 * coef[1];
-    const double p_b1 = b1 * coef[5] + t3 * (t2 + t7);
-    const double t8 = b2 * coef[2], t9 = b1 * (t7 + t8), t10 = coef[3] * t1 + coef[1] * (b2 * b2);
-    const double p_a1 = a1 * (t9 + (coef[0] + coef[4] * t3 + t10));
-    const double t11 = b3 * coef[2], t12 = b2 * (b2 * coef[1] + t11), t13 = coef[0] + coef[3] * t3;
-    const double t14 = coef[1] * (b3 * b3);
+    const double p_b2 = coef[6] * (b1 * t3) + coef[6] * (b3 * t1) + b2 * t6, t7 = b1 * coef[1];
+    const double p_b1 = b1 * coef[5] + t3 * (t2 + t7), t8 = b2 * coef[2], t9 = b1 * (t7 + t8);
+    const double t10 = coef[3] * t1 + coef[1] * (b2 * b2);
+    const double p_a1 = a1 * (t9 + (coef[0] + coef[4] * t3 + t10)), t11 = b3 * coef[2];
+    const double t12 = b2 * (b2 * coef[1] + t11), t13 = coef[0] + coef[3] * t3, t14 = coef[1] * (b3 * b3);
     const double p_a2 = a2 * (t12 + (t13 + (coef[4] * t1 + t14)));
     /* displacement */
-    const double t15 = p_b3 - p_b2, t16 = t15 + (p_b2 - p_b3), t17 = t16 * (a1 * t16);
-    const double t18 = 2.0 * p_b3, t19 = t18 - p_b2, t20 = p_b2 * t19 - p_b3 * p_b3;
-    const double t21 = toda3_phi0(t20), t22 = p_b2 - p_b1, t23 = a1 * t22, t24 = t22 * t23;
-    const double t25 = 2.0 * p_b2, t26 = t25 - p_b1, t27 = p_b1 * t26 - p_b2 * p_b2;
-    const double t28 = toda3_phi0(t27), t29 = a1 * p_b2 - a1 * p_b1, t30 = a2 * t15, t31 = t15 * t30;
-    const double t32 = a2 * p_b3 - a2 * p_b2, t33 = p_a1 * t23, t34 = t33 * t28, t35 = a1 * p_a1;
-    const double t36 = p_a2 * t30, t37 = t36 * t21, t38 = a2 * p_a2, t39 = t38 - t35;
+    const double t15 = p_b3 - p_b2, t16 = t15 + (p_b2 - p_b3), t17 = t16 * (a1 * t16), t18 = 2.0 * p_b3;
+    const double t19 = t18 - p_b2, t20 = p_b2 * t19 - p_b3 * p_b3, t21 = toda3_phi0(t20);
+    const double t22 = p_b2 - p_b1, t23 = a1 * t22, t24 = t22 * t23, t25 = 2.0 * p_b2, t26 = t25 - p_b1;
+    const double t27 = p_b1 * t26 - p_b2 * p_b2, t28 = toda3_phi0(t27), t29 = a1 * p_b2 - a1 * p_b1;
+    const double t30 = a2 * t15, t31 = t15 * t30, t32 = a2 * p_b3 - a2 * p_b2, t33 = p_a1 * t23;
+    const double t34 = t33 * t28, t35 = a1 * p_a1, t36 = p_a2 * t30, t37 = t36 * t21, t38 = a2 * p_a2;
+    const double t39 = t38 - t35;
     displacement[0] = t17 * t21 + t24 * t28 - 0.5 * t29;
     displacement[1] = t31 * t21 - 0.5 * t32;
     displacement[2] = t34 - 0.5 * t35;
@@ -143,16 +142,16 @@ static void toda3_linearise(const double coef[10], const double y[5], double dis
     const double t46 = b2 * coef[9], t47 = a1 * (t46 + b1 * coef[2]), t48 = toda3_phi1(t20);
     const double t49 = (t19 - p_b2) * t48, t50 = (2.0 * p_b1 - t25) * t42;
     const double t51 = t17 * t49 + (t44 + t24 * t50) - t41, t52 = a2 * (t8 + b3 * coef[9]);
-    const double t53 = (t25 - t18) * t48, t54 = t17 * t53, t55 = a2 * (t46 + t11);
-    const double t56 = coef[6] * t3, t57 = coef[6] * t1, t58 = coef[5] + t4, t59 = 0.5 * a2;
-    const double t60 = (t30 + t30) * t21, t61 = t59 + (t31 * t49 - t60), t62 = t60 + t31 * t53 - t59;
-    const double t63 = p_a1 * t22 * t28, t64 = 0.5 * p_a1, t65 = t9 + (coef[0] + coef[7] * t3 + t10);
-    const double t66 = t23 * t28, t67 = t66 - t41, t68 = t35 * t28, t69 = t68 + t33 * t50;
-    const double t70 = t33 * t43, t71 = t70 - t68, t72 = coef[8] * (a1 * a2), t73 = t30 * t21;
-    const double t74 = t73 - t59, t75 = t41 - t66, t76 = t68 - t70, t77 = t36 * t49, t78 = t38 * t21;
-    const double t79 = t77 - t78 - t69, t80 = p_a2 * t15 * t21, t81 = 0.5 * p_a2;
-    const double t82 = t78 + t36 * t53, t83 = t52 * t82, t84 = t12 + (coef[7] * t1 + t14 + t13);
-    const double t85 = t57 * t82, t86 = t58 * t82, t87 = t59 - t73, t88 = t78 - t77;
+    const double t53 = (t25 - t18) * t48, t54 = t17 * t53, t55 = a2 * (t46 + t11), t56 = coef[6] * t3;
+    const double t57 = coef[6] * t1, t58 = coef[5] + t4, t59 = 0.5 * a2, t60 = (t30 + t30) * t21;
+    const double t61 = t59 + (t31 * t49 - t60), t62 = t60 + t31 * t53 - t59, t63 = p_a1 * t22 * t28;
+    const double t64 = 0.5 * p_a1, t65 = t9 + (coef[0] + coef[7] * t3 + t10), t66 = t23 * t28;
+    const double t67 = t66 - t41, t68 = t35 * t28, t69 = t68 + t33 * t50, t70 = t33 * t43;
+    const double t71 = t70 - t68, t72 = coef[8] * (a1 * a2), t73 = t30 * t21, t74 = t73 - t59;
+    const double t75 = t41 - t66, t76 = t68 - t70, t77 = t36 * t49, t78 = t38 * t21;
+    const double t79 = t77 - t78 - t69, t80 = p_a2 * t15 * t21, t81 = 0.5 * p_a2, t82 = t78 + t36 * t53;
+    const double t83 = t52 * t82, t84 = t12 + (coef[7] * t1 + t14 + t13), t85 = t57 * t82;
+    const double t86 = t58 * t82, t87 = t59 - t73, t88 = t78 - t77;
     jacobian[0] = 1.0 + (t16 * t16 * t21 + t22 * t22 * t28 - 0.5 * t22 + (t40 * t45 + t47 * t51));
     jacobian[1] = t52 * t54 + t55 * t51;
     jacobian[2] = t5 * t45 + t56 * t51;
@@ -208,7 +207,6 @@ static void toda3_linearise(const double coef[10], const double y[5], double dis
     increment_jacobian[24] = -t92;
 }
 
-/* the Hamiltonian */
 double toda3_hamiltonian(const toda3_params *params, const double x[5])
 {
     (void)params;
@@ -216,7 +214,6 @@ double toda3_hamiltonian(const toda3_params *params, const double x[5])
     return a2 * a2 + (a1 * a1 + 0.5 * (b3 * b3 + (b1 * b1 + b2 * b2)));
 }
 
-/* the Casimirs */
 void toda3_casimirs(const toda3_params *params, const double x[5], double out[])
 {
     (void)params;
@@ -224,7 +221,6 @@ void toda3_casimirs(const toda3_params *params, const double x[5], double out[])
     out[0] = b3 + (b1 + b2);
 }
 
-/* pi(x) grad H(x) */
 void toda3_vector_field(const toda3_params *params, const double x[5], double out[5])
 {
     (void)params;
@@ -238,18 +234,17 @@ void toda3_vector_field(const toda3_params *params, const double x[5], double ou
 }
 
 /* ---- Compensated sums, linear equations ---- */
-/* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to
-   its last bit: were it rounded with the change, corrections of one sign would add up to a drift. 0, and x as
-   before, if the sum is not finite. */
-static int toda3_advance(toda3_solver *s, const double change[toda3_DIM], const double correction[toda3_DIM])
+/* x + change + small in compensated arithmetic, where small is the carry and what is as small: were that
+   rounded with the change, corrections of one sign would add up to a drift. 0, and x as before, if the sum is
+   not finite. */
+static int toda3_advance(toda3_solver *s, const double change[toda3_DIM], const double small[toda3_DIM])
 {
     double x[toda3_DIM], carry[toda3_DIM];
     for (int i = 0; i < toda3_DIM; ++i) {
         const double sum = s->x[i] + change[i], added = sum - s->x[i];
-        const double lost = (s->x[i] - (sum - added)) + (change[i] - added);
-        const double small = lost + (s->carry[i] + correction[i]);
-        x[i] = sum + small;
-        carry[i] = small - (x[i] - sum);
+        const double lost = ((s->x[i] - (sum - added)) + (change[i] - added)) + small[i];
+        x[i] = sum + lost;
+        carry[i] = lost - (x[i] - sum);
         if (!isfinite(x[i])) return 0;
     }
     memcpy(s->x, x, sizeof x);
@@ -288,12 +283,10 @@ static int toda3_solve(double matrix[toda3_DIM * toda3_DIM], double side[toda3_D
 }
 
 /* ---- Starting guesses ---- */
-/* How far from the last value a guess may be, in sizes of that value. */
-#define toda3_REACH 4.0
+#define toda3_REACH 4.0 /* how far from the last value a guess may be, in sizes of that value */
 
-/* The guess for the next value from the last ones: the sum of their backward differences. 0 if there is none,
-   or if it is far away, where the equation of a step has solutions that have nothing to do with the motion.
-   */
+/* The guess for the next value, the sum of differences. 0 if there is none, or if it is far away, where the
+   equation of a step has solutions that have nothing to do with the motion. */
 static int toda3_predict(const toda3_history *history, double value[toda3_DIM])
 {
     double distance = 0.0, size = 0.0;
@@ -329,10 +322,8 @@ static void toda3_remember(toda3_history *history, const double value[toda3_DIM]
     if (history->count < toda3_DIFFERENCES) ++history->count;
 }
 
-/* How far a step may lead, in sizes of the state and of what the vector field says, if the energy is lost;
-   and the part of the energy that counts as lost. */
-#define toda3_PLAUSIBLE 1.5
-#define toda3_LOST 0.5
+#define toda3_PLAUSIBLE 1.5 /* how far any step may lead, in sizes of the state and of its motion */
+#define toda3_LOST 0.5      /* part of the energy that one which leads farther must not lose */
 
 /* Whether an increment is that of the motion. Where the step is too large, the equation may have been solved
    by a point far away, at another energy, that has nothing to do with it. */
@@ -342,23 +333,20 @@ static int toda3_plausible(const toda3_solver *s, const double increment[toda3_D
     for (int i = 0; i < toda3_DIM; ++i) {
         moved += fabs(increment[i]);
         size += fabs(s->x[i]);
-    }
-    if (moved <= toda3_PLAUSIBLE * size) return 1;
-    toda3_vector_field(&s->params, s->x, field);
-    for (int i = 0; i < toda3_DIM; ++i) {
-        size += fabs(s->h * field[i]);
         middle[i] = s->x[i] + 0.5 * increment[i];
         end[i] = s->x[i] + increment[i];
     }
     if (moved <= toda3_PLAUSIBLE * size) return 1;
-    const double before = toda3_hamiltonian(&s->params, s->x), after = toda3_hamiltonian(&s->params, end);
-    const double scale = fabs(before) + fabs(toda3_hamiltonian(&s->params, middle)) + fabs(after);
-    return fabs(after - before) <= toda3_LOST * scale;
+    toda3_vector_field(&s->params, s->x, field);
+    for (int i = 0; i < toda3_DIM; ++i) size += fabs(s->h * field[i]);
+    if (moved <= toda3_PLAUSIBLE * size) return 1;
+    const double before = toda3_hamiltonian(&s->params, s->x);
+    const double after = toda3_hamiltonian(&s->params, end), between = toda3_hamiltonian(&s->params, middle);
+    return fabs(after - before) <= toda3_LOST * (fabs(before) + fabs(between) + fabs(after));
 }
 
 /* ---- The implicit step, by Newton's method ---- */
-/* Components of y are measured no finer than by this part of the largest. */
-#define toda3_FLOOR 1e-6
+#define toda3_FLOOR 1e-6 /* components of y are measured no finer than by this part of the largest */
 
 /* Size of a correction relative to each component of y; NaN or infinite if the correction is. */
 static double toda3_size(const double y[toda3_DIM], const double delta[toda3_DIM])
@@ -373,9 +361,8 @@ static double toda3_size(const double y[toda3_DIM], const double delta[toda3_DIM
     return size;
 }
 
-/* Corrections below the first that shrink by less than the second have reached the level of rounding. */
-#define toda3_NEARLY_SOLVED 1e-8
-#define toda3_SHRINKING 0.25
+#define toda3_NEARLY_SOLVED 1e-8 /* corrections below this have reached the level of rounding, ... */
+#define toda3_SHRINKING 0.25     /* ... if one is more than this part of the one before */
 
 /* Solve (y - x) + displacement(y) = 0 for y by Newton's method from the extrapolated guess, and advance. The
    increment is corrected to first order by the last Newton correction, so that correction costs no
@@ -384,12 +371,14 @@ static double toda3_size(const double y[toda3_DIM], const double delta[toda3_DIM
 static toda3_status toda3_attempt(toda3_solver *s)
 {
     double y[toda3_DIM], delta[toda3_DIM], displacement[toda3_DIM], increment[toda3_DIM];
-    double jacobian[toda3_DIM * toda3_DIM], increment_jacobian[toda3_DIM * toda3_DIM], previous = HUGE_VAL;
+    double jacobian[toda3_DIM * toda3_DIM], increment_jacobian[toda3_DIM * toda3_DIM];
+    double previous = HUGE_VAL;
     if (!toda3_predict(&s->history, y)) memcpy(y, s->x, sizeof y);
     for (int iteration = 1; iteration <= toda3_MAX_ITERATIONS; ++iteration) {
         toda3_linearise(s->coef, y, displacement, increment, jacobian, increment_jacobian);
         ++s->evaluations;
-        for (int i = 0; i < toda3_DIM; ++i) delta[i] = ((y[i] - s->x[i]) + displacement[i]) - s->carry[i];
+        for (int i = 0; i < toda3_DIM; ++i)
+            delta[i] = ((y[i] - s->x[i]) + displacement[i]) - s->carry[i];
         const int regular = toda3_solve(jacobian, delta);
         const double size = toda3_size(y, delta), growth = size / (previous * previous);
         if (!isfinite(size)) return toda3_NOT_FINITE;
@@ -399,12 +388,13 @@ static toda3_status toda3_attempt(toda3_solver *s)
         const int stalled = previous < toda3_NEARLY_SOLVED && size > toda3_SHRINKING * previous;
         previous = size;
         if (!(remaining <= toda3_TOLERANCE || stalled)) continue;
-        double correction[toda3_DIM] = { 0.0 };
-        for (int i = 0; i < toda3_DIM; ++i)
-            for (int j = 0; j < toda3_DIM; ++j)
-                correction[i] -= increment_jacobian[i * toda3_DIM + j] * delta[j];
+        double small[toda3_DIM] = { 0.0 }; /* the correction of the increment, and the carry */
+        for (int i = 0; i < toda3_DIM; ++i) {
+            for (int j = 0; j < toda3_DIM; ++j) small[i] -= increment_jacobian[i * toda3_DIM + j] * delta[j];
+            small[i] += s->carry[i];
+        }
         if (!toda3_plausible(s, increment)) return toda3_NO_CONVERGENCE;
-        if (!toda3_advance(s, increment, correction)) return toda3_NOT_FINITE;
+        if (!toda3_advance(s, increment, small)) return toda3_NOT_FINITE;
         toda3_remember(&s->history, y);
         return toda3_OK;
     }
@@ -412,18 +402,16 @@ static toda3_status toda3_attempt(toda3_solver *s)
 }
 
 /* ---- The solver ---- */
-/* The arguments may be parts of *s: they are read before it is written. */
+/* The arguments may be parts of *s, which is therefore written last. */
 toda3_status toda3_init(toda3_solver *s, const toda3_params *params, const double x0[toda3_DIM])
 {
     if (s == NULL || x0 == NULL) return toda3_BAD_ARGUMENT;
-    const toda3_params own = params != NULL ? *params : toda3_default_params;
-    double x[toda3_DIM];
-    memcpy(x, x0, sizeof x);
+    toda3_solver fresh = { .h = (double)NAN };
+    fresh.params = params != NULL ? *params : toda3_default_params;
+    memcpy(fresh.x, x0, sizeof fresh.x);
     for (int i = 0; i < toda3_DIM; ++i)
-        if (!isfinite(x[i])) return toda3_BAD_ARGUMENT;
-    memset(s, 0, sizeof *s);
-    memcpy(s->x, x, sizeof s->x);
-    s->params = own;
+        if (!isfinite(fresh.x[i])) return toda3_BAD_ARGUMENT;
+    *s = fresh;
     return toda3_OK;
 }
 
@@ -431,44 +419,37 @@ toda3_status toda3_init(toda3_solver *s, const toda3_params *params, const doubl
 static toda3_status toda3_set_step(toda3_solver *s, double h)
 {
     if (s == NULL || !isfinite(h)) return toda3_BAD_ARGUMENT;
-    if (s->prepared && memcmp(&h, &s->h, sizeof h) == 0) return toda3_OK;
+    if (memcmp(&h, &s->h, sizeof h) == 0) return toda3_OK;
     toda3_prepare(&s->params, h, s->coef);
     memset(&s->history, 0, sizeof s->history);
     s->h = h;
     s->t_before_h = s->t;
     s->steps_before_h = s->steps;
-    s->prepared = 1;
     return toda3_OK;
 }
 
 /* One stage. A guess from earlier steps may have misled it: then once more without. */
 static toda3_status toda3_stage(toda3_solver *s)
 {
-    toda3_status status = toda3_attempt(s);
-    if (status != toda3_OK && s->history.count > 0) {
-        memset(&s->history, 0, sizeof s->history);
-        status = toda3_attempt(s);
-    }
-    return status;
-}
-
-toda3_status toda3_step(toda3_solver *s, double h)
-{
-    toda3_status status = toda3_set_step(s, h);
-    if (status != toda3_OK) return status;
-    status = toda3_stage(s);
-    if (status != toda3_OK) return status;
-    ++s->steps;
-    s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
-    return status;
+    const toda3_status status = toda3_attempt(s);
+    if (status == toda3_OK || s->history.count == 0) return status;
+    memset(&s->history, 0, sizeof s->history);
+    return toda3_attempt(s);
 }
 
 toda3_status toda3_integrate(toda3_solver *s, double h, size_t steps)
 {
     toda3_status status = toda3_set_step(s, h);
-    for (; steps > 0 && status == toda3_OK; --steps) status = toda3_step(s, h);
+    for (; steps > 0 && status == toda3_OK; --steps) {
+        status = toda3_stage(s);
+        if (status != toda3_OK) break;
+        ++s->steps;
+        s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
+    }
     return status;
 }
+
+toda3_status toda3_step(toda3_solver *s, double h) { return toda3_integrate(s, h, 1); }
 
 const char *toda3_status_string(toda3_status status)
 {
@@ -483,7 +464,6 @@ const char *toda3_status_string(toda3_status status)
 }
 
 size_t toda3_solver_size(void) { return sizeof(toda3_solver); }
-
 size_t toda3_solver_steps_done(const toda3_solver *s) { return s->steps; }
 
 /* ---- Ensembles ---- */

@@ -20,7 +20,7 @@
  *   5. The implicit step, along paths dm/dt = pi(m) p
  *   6. The solver
  *   7. Ensembles
- * body-sha256: b02ebb93e990b57e4212b0695e0d287e0c79ad10f82f4804772f0b145605c1a8
+ * body-sha256: 1895fd01aa07cd03f1b409ec698dae46491b6abc1604ac847ff500bf6ef8f3f3
  */
 #include "toda3_quadratic.h"
 
@@ -84,7 +84,6 @@ static void toda3_quadratic_generate(const double coef[1], const double y[5], do
     jacobian[24] = 1.0;
 }
 
-/* the Hamiltonian */
 double toda3_quadratic_hamiltonian(const toda3_quadratic_params *params, const double x[5])
 {
     (void)params;
@@ -92,7 +91,6 @@ double toda3_quadratic_hamiltonian(const toda3_quadratic_params *params, const d
     return b3 + (b1 + b2);
 }
 
-/* the Casimirs */
 void toda3_quadratic_casimirs(const toda3_quadratic_params *params, const double x[5], double out[])
 {
     (void)params;
@@ -100,7 +98,6 @@ void toda3_quadratic_casimirs(const toda3_quadratic_params *params, const double
     out[0] = b3 * (b1 * b2) - b3 * (a1 * a1) - b1 * (a2 * a2);
 }
 
-/* pi(x) grad H(x) */
 void toda3_quadratic_vector_field(const toda3_quadratic_params *params, const double x[5], double out[5])
 {
     (void)params;
@@ -114,19 +111,18 @@ void toda3_quadratic_vector_field(const toda3_quadratic_params *params, const do
 }
 
 /* ---- Compensated sums, linear equations ---- */
-/* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to
-   its last bit: were it rounded with the change, corrections of one sign would add up to a drift. 0, and x as
-   before, if the sum is not finite. */
+/* x + change + small in compensated arithmetic, where small is the carry and what is as small: were that
+   rounded with the change, corrections of one sign would add up to a drift. 0, and x as before, if the sum is
+   not finite. */
 static int toda3_quadratic_advance(toda3_quadratic_solver *s, const double change[toda3_quadratic_DIM],
-    const double correction[toda3_quadratic_DIM])
+    const double small[toda3_quadratic_DIM])
 {
     double x[toda3_quadratic_DIM], carry[toda3_quadratic_DIM];
     for (int i = 0; i < toda3_quadratic_DIM; ++i) {
         const double sum = s->x[i] + change[i], added = sum - s->x[i];
-        const double lost = (s->x[i] - (sum - added)) + (change[i] - added);
-        const double small = lost + (s->carry[i] + correction[i]);
-        x[i] = sum + small;
-        carry[i] = small - (x[i] - sum);
+        const double lost = ((s->x[i] - (sum - added)) + (change[i] - added)) + small[i];
+        x[i] = sum + lost;
+        carry[i] = lost - (x[i] - sum);
         if (!isfinite(x[i])) return 0;
     }
     memcpy(s->x, x, sizeof x);
@@ -268,8 +264,7 @@ static int toda3_quadratic_train(toda3_quadratic_history *history, int component
     for (int k = 0; k < WINDOW; ++k) memcpy(history->weight[k][component], weight[k], AHEAD * sizeof(double));
     return toda3_quadratic_missed(value + ROWS, weight) <= toda3_quadratic_HOPELESS * largest ? terms : 0;
 }
-/* How far from the last value a guess may be, in sizes of that value. */
-#define toda3_quadratic_REACH 4.0
+#define toda3_quadratic_REACH 4.0 /* how far from the last value a guess may be, in sizes of that value */
 
 /* Whether a guess is where the next values may be. Far away the equation of a step has solutions that have
    nothing to do with the motion. */
@@ -385,10 +380,8 @@ static void toda3_quadratic_remember(toda3_quadratic_history *history,
         toda3_quadratic_fit(history);
 }
 
-/* How far a step may lead, in sizes of the state and of what the vector field says, if the energy is lost;
-   and the part of the energy that counts as lost. */
-#define toda3_quadratic_PLAUSIBLE 1.5
-#define toda3_quadratic_LOST 0.5
+#define toda3_quadratic_PLAUSIBLE 1.5 /* how far any step may lead, in sizes of the state and of its motion */
+#define toda3_quadratic_LOST 0.5      /* part of the energy that one which leads farther must not lose */
 
 /* Whether an increment is that of the motion. Where the step is too large, the equation may have been solved
    by a point far away, at another energy, that has nothing to do with it. */
@@ -400,19 +393,17 @@ static int toda3_quadratic_plausible(const toda3_quadratic_solver *s,
     for (int i = 0; i < toda3_quadratic_DIM; ++i) {
         moved += fabs(increment[i]);
         size += fabs(s->x[i]);
-    }
-    if (moved <= toda3_quadratic_PLAUSIBLE * size) return 1;
-    toda3_quadratic_vector_field(&s->params, s->x, field);
-    for (int i = 0; i < toda3_quadratic_DIM; ++i) {
-        size += fabs(s->h * field[i]);
         middle[i] = s->x[i] + 0.5 * increment[i];
         end[i] = s->x[i] + increment[i];
     }
     if (moved <= toda3_quadratic_PLAUSIBLE * size) return 1;
-    const double before = toda3_quadratic_hamiltonian(&s->params, s->x), after =
-        toda3_quadratic_hamiltonian(&s->params, end);
-    const double scale = fabs(before) + fabs(toda3_quadratic_hamiltonian(&s->params, middle)) + fabs(after);
-    return fabs(after - before) <= toda3_quadratic_LOST * scale;
+    toda3_quadratic_vector_field(&s->params, s->x, field);
+    for (int i = 0; i < toda3_quadratic_DIM; ++i) size += fabs(s->h * field[i]);
+    if (moved <= toda3_quadratic_PLAUSIBLE * size) return 1;
+    const double before = toda3_quadratic_hamiltonian(&s->params, s->x);
+    const double after = toda3_quadratic_hamiltonian(&s->params, end), between =
+        toda3_quadratic_hamiltonian(&s->params, middle);
+    return fabs(after - before) <= toda3_quadratic_LOST * (fabs(before) + fabs(between) + fabs(after));
 }
 
 /* Coefficient k of the product of two Taylor series. */
@@ -683,11 +674,11 @@ static int toda3_quadratic_differences(toda3_quadratic_solver *s, const double *
 }
 
 /* Solve p = grad S_h(mean of the path from x under p) and move to the end of that path. Where that takes more
-   than toda3_quadratic_MOST_PIECES pieces of paths, the step is so large that a solution would mean nothing.
-   */
+   than toda3_quadratic_MOST_PIECES pieces of paths, the step is so large that a solution would mean
+   nothing. */
 static toda3_quadratic_status toda3_quadratic_attempt(toda3_quadratic_solver *s)
 {
-    const double *coef = s->coef, none[toda3_quadratic_DIM] = { 0.0 };
+    const double *coef = s->coef;
     double p[toda3_quadratic_DIM], y[toda3_quadratic_DIM], residual[toda3_quadratic_DIM],
         change[toda3_quadratic_DIM], jacobian[toda3_quadratic_DIM * toda3_quadratic_DIM], previous = HUGE_VAL;
     if (!toda3_quadratic_predict(&s->history, y)) memcpy(y, s->x, sizeof y);
@@ -706,7 +697,7 @@ static toda3_quadratic_status toda3_quadratic_attempt(toda3_quadratic_solver *s)
         /* The second test: residuals no longer shrink, the solve has reached the level of rounding. */
         if (size <= 4e-16 || (previous < 1e-12 && size > 0.25 * previous)) {
             if (!toda3_quadratic_plausible(s, change)) return toda3_quadratic_NO_CONVERGENCE;
-            if (!toda3_quadratic_advance(s, change, none)) return toda3_quadratic_NOT_FINITE;
+            if (!toda3_quadratic_advance(s, change, s->carry)) return toda3_quadratic_NOT_FINITE;
             toda3_quadratic_remember(&s->history, y, iteration);
             return toda3_quadratic_OK;
         }
@@ -721,19 +712,17 @@ static toda3_quadratic_status toda3_quadratic_attempt(toda3_quadratic_solver *s)
 }
 
 /* ---- The solver ---- */
-/* The arguments may be parts of *s: they are read before it is written. */
+/* The arguments may be parts of *s, which is therefore written last. */
 toda3_quadratic_status toda3_quadratic_init(toda3_quadratic_solver *s, const toda3_quadratic_params *params,
     const double x0[toda3_quadratic_DIM])
 {
     if (s == NULL || x0 == NULL) return toda3_quadratic_BAD_ARGUMENT;
-    const toda3_quadratic_params own = params != NULL ? *params : toda3_quadratic_default_params;
-    double x[toda3_quadratic_DIM];
-    memcpy(x, x0, sizeof x);
+    toda3_quadratic_solver fresh = { .h = (double)NAN };
+    fresh.params = params != NULL ? *params : toda3_quadratic_default_params;
+    memcpy(fresh.x, x0, sizeof fresh.x);
     for (int i = 0; i < toda3_quadratic_DIM; ++i)
-        if (!isfinite(x[i])) return toda3_quadratic_BAD_ARGUMENT;
-    memset(s, 0, sizeof *s);
-    memcpy(s->x, x, sizeof s->x);
-    s->params = own;
+        if (!isfinite(fresh.x[i])) return toda3_quadratic_BAD_ARGUMENT;
+    *s = fresh;
     return toda3_quadratic_OK;
 }
 
@@ -741,45 +730,39 @@ toda3_quadratic_status toda3_quadratic_init(toda3_quadratic_solver *s, const tod
 static toda3_quadratic_status toda3_quadratic_set_step(toda3_quadratic_solver *s, double h)
 {
     if (s == NULL || !isfinite(h)) return toda3_quadratic_BAD_ARGUMENT;
-    if (s->prepared && memcmp(&h, &s->h, sizeof h) == 0) return toda3_quadratic_OK;
+    if (memcmp(&h, &s->h, sizeof h) == 0) return toda3_quadratic_OK;
     toda3_quadratic_prepare(&s->params, h, s->coef);
     memset(&s->history, 0, sizeof s->history);
     s->history.slow_steps_allowed = toda3_quadratic_REPAY;
     s->h = h;
     s->t_before_h = s->t;
     s->steps_before_h = s->steps;
-    s->prepared = 1;
     return toda3_quadratic_OK;
 }
 
 /* One stage. A guess from earlier steps may have misled it: then once more without. */
 static toda3_quadratic_status toda3_quadratic_stage(toda3_quadratic_solver *s)
 {
-    toda3_quadratic_status status = toda3_quadratic_attempt(s);
-    if (status != toda3_quadratic_OK && s->history.count > 0) {
-        memset(&s->history, 0, sizeof s->history);
-        status = toda3_quadratic_attempt(s);
-    }
-    return status;
-}
-
-toda3_quadratic_status toda3_quadratic_step(toda3_quadratic_solver *s, double h)
-{
-    toda3_quadratic_status status = toda3_quadratic_set_step(s, h);
-    if (status != toda3_quadratic_OK) return status;
-    status = toda3_quadratic_stage(s);
-    if (status != toda3_quadratic_OK) return status;
-    ++s->steps;
-    s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
-    return status;
+    const toda3_quadratic_status status = toda3_quadratic_attempt(s);
+    if (status == toda3_quadratic_OK || s->history.count == 0) return status;
+    memset(&s->history, 0, sizeof s->history);
+    return toda3_quadratic_attempt(s);
 }
 
 toda3_quadratic_status toda3_quadratic_integrate(toda3_quadratic_solver *s, double h, size_t steps)
 {
     toda3_quadratic_status status = toda3_quadratic_set_step(s, h);
-    for (; steps > 0 && status == toda3_quadratic_OK; --steps) status = toda3_quadratic_step(s, h);
+    for (; steps > 0 && status == toda3_quadratic_OK; --steps) {
+        status = toda3_quadratic_stage(s);
+        if (status != toda3_quadratic_OK) break;
+        ++s->steps;
+        s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
+    }
     return status;
 }
+
+toda3_quadratic_status toda3_quadratic_step(toda3_quadratic_solver *s,
+    double h) { return toda3_quadratic_integrate(s, h, 1); }
 
 const char *toda3_quadratic_status_string(toda3_quadratic_status status)
 {
@@ -794,7 +777,6 @@ const char *toda3_quadratic_status_string(toda3_quadratic_status status)
 }
 
 size_t toda3_quadratic_solver_size(void) { return sizeof(toda3_quadratic_solver); }
-
 size_t toda3_quadratic_solver_steps_done(const toda3_quadratic_solver *s) { return s->steps; }
 
 /* ---- Ensembles ---- */

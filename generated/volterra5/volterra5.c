@@ -20,7 +20,7 @@
  *   4. The implicit step, by Newton's method
  *   5. The solver
  *   6. Ensembles
- * body-sha256: 7b7c2e632f92924d0b6bf9c4da878283a20022fda993475ecb39482a5c8c1d43
+ * body-sha256: cc14e5836a4ba7c808648cb2c817c28f3dd3dd8f7ef5bf255f71b5b66cb2d9a3
  */
 #include "volterra5.h"
 
@@ -32,9 +32,7 @@
 const volterra5_params volterra5_default_params = { 0 };
 
 enum { volterra5_MAX_ITERATIONS = 20 }; /* of an inner solve */
-
-/* A correction is accepted when the error that it leaves is estimated to be below this. */
-#define volterra5_TOLERANCE 1e-20
+#define volterra5_TOLERANCE 1e-20       /* the error that an accepted correction may leave, as estimated */
 
 /* everything that depends on parameters and step size only */
 static void volterra5_prepare(const volterra5_params *params, double h, double coef[restrict 4])
@@ -56,15 +54,12 @@ static void volterra5_linearise(const double coef[4], const double y[5], double 
     /* momenta */
     const double t1 = coef[2] * v4, t2 = coef[3] * v5, t3 = coef[1] * v1, t4 = coef[2] * v2;
     const double t5 = coef[1] * v4, t6 = coef[2] * v3;
-    const double p_v5 = v1 * (t1 + t2 + (t3 + t4)) + (coef[0] + v4 * (t2 + (t5 + t6)));
-    const double t7 = coef[2] * v5, t8 = t7 + t6, t9 = coef[3] * v2, t10 = coef[1] * v3;
-    const double t11 = t1 + (t9 + t10);
-    const double p_v2 = v1 * (t8 + (t9 + t3)) + (coef[0] + v3 * t11);
-    const double t12 = coef[3] * v1, t13 = coef[1] * v2, t14 = t8 + (t12 + t13), t15 = coef[1] * v5;
-    const double t16 = t15 + (t12 + t1);
-    const double p_v1 = v2 * t14 + (coef[0] + v5 * t16);
-    const double t17 = coef[3] * v3, t18 = coef[2] * v1, t19 = t7 + (t5 + t17);
-    const double p_v3 = v2 * (t17 + t1 + (t13 + t18)) + (coef[0] + v4 * t19);
+    const double p_v5 = v1 * (t1 + t2 + (t3 + t4)) + (coef[0] + v4 * (t2 + (t5 + t6))), t7 = coef[2] * v5;
+    const double t8 = t7 + t6, t9 = coef[3] * v2, t10 = coef[1] * v3, t11 = t1 + (t9 + t10);
+    const double p_v2 = v1 * (t8 + (t9 + t3)) + (coef[0] + v3 * t11), t12 = coef[3] * v1;
+    const double t13 = coef[1] * v2, t14 = t8 + (t12 + t13), t15 = coef[1] * v5, t16 = t15 + (t12 + t1);
+    const double p_v1 = v2 * t14 + (coef[0] + v5 * t16), t17 = coef[3] * v3, t18 = coef[2] * v1;
+    const double t19 = t7 + (t5 + t17), p_v3 = v2 * (t17 + t1 + (t13 + t18)) + (coef[0] + v4 * t19);
     const double t20 = coef[3] * v4, t21 = t15 + (t20 + t18);
     const double p_v4 = v3 * (t7 + t20 + (t10 + t4)) + (coef[0] + v5 * t21);
     /* displacement */
@@ -88,15 +83,15 @@ static void volterra5_linearise(const double coef[4], const double y[5], double 
     increment[3] = -(v4 * t47);
     increment[4] = -(v5 * t51);
     /* jacobian */
-    const double t52 = t4 + (t15 + t16), t53 = v5 * t32, t54 = v1 * t53, t55 = t13 + t14;
-    const double t56 = v2 * t32, t57 = v1 * t56, t58 = t12 + t17, t59 = p_v2 * t32;
-    const double t60 = t18 + (t10 + t11), t61 = t6 + (t15 + t21), t62 = p_v5 * t32, t63 = t12 + t20;
-    const double t64 = p_v1 * t36, t65 = t9 + t2, t66 = v1 * t36, t67 = v2 * t66, t68 = v3 * t36;
-    const double t69 = v2 * t68, t70 = t9 + t20, t71 = p_v3 * t36, t72 = t4 + (t5 + t19);
-    const double t73 = v2 * t40, t74 = v3 * t73, t75 = v4 * t40, t76 = v3 * t75, t77 = p_v2 * t40;
-    const double t78 = t17 + t2, t79 = p_v4 * t40, t80 = v3 * t44, t81 = v4 * t80, t82 = v5 * t44;
-    const double t83 = v4 * t82, t84 = p_v3 * t44, t85 = p_v5 * t44, t86 = v4 * t48, t87 = v5 * t86;
-    const double t88 = v1 * t48, t89 = v5 * t88, t90 = p_v1 * t48, t91 = p_v4 * t48;
+    const double t52 = t4 + (t15 + t16), t53 = v5 * t32, t54 = v1 * t53, t55 = t13 + t14, t56 = v2 * t32;
+    const double t57 = v1 * t56, t58 = t12 + t17, t59 = p_v2 * t32, t60 = t18 + (t10 + t11);
+    const double t61 = t6 + (t15 + t21), t62 = p_v5 * t32, t63 = t12 + t20, t64 = p_v1 * t36;
+    const double t65 = t9 + t2, t66 = v1 * t36, t67 = v2 * t66, t68 = v3 * t36, t69 = v2 * t68;
+    const double t70 = t9 + t20, t71 = p_v3 * t36, t72 = t4 + (t5 + t19), t73 = v2 * t40, t74 = v3 * t73;
+    const double t75 = v4 * t40, t76 = v3 * t75, t77 = p_v2 * t40, t78 = t17 + t2, t79 = p_v4 * t40;
+    const double t80 = v3 * t44, t81 = v4 * t80, t82 = v5 * t44, t83 = v4 * t82, t84 = p_v3 * t44;
+    const double t85 = p_v5 * t44, t86 = v4 * t48, t87 = v5 * t86, t88 = v1 * t48, t89 = v5 * t88;
+    const double t90 = p_v1 * t48, t91 = p_v4 * t48;
     jacobian[0] = 1.0 + (t24 + (0.5 * (t52 * t54) - 0.5 * (t55 * t57)));
     jacobian[1] = 0.5 * (t18 * t54) - 0.5 * (t58 * t57) - 0.5 * (v1 * t59);
     jacobian[2] = 0.5 * (t1 * t54) - 0.5 * (t60 * t57);
@@ -166,7 +161,6 @@ static void volterra5_linearise(const double coef[4], const double y[5], double 
     increment_jacobian[24] = -(t51 + (t52 * t105 + t61 * t106));
 }
 
-/* the Hamiltonian */
 double volterra5_hamiltonian(const volterra5_params *params, const double x[5])
 {
     (void)params;
@@ -174,7 +168,6 @@ double volterra5_hamiltonian(const volterra5_params *params, const double x[5])
     return v5 + (v4 + (v3 + (v1 + v2)));
 }
 
-/* the Casimirs */
 void volterra5_casimirs(const volterra5_params *params, const double x[5], double out[])
 {
     (void)params;
@@ -182,7 +175,6 @@ void volterra5_casimirs(const volterra5_params *params, const double x[5], doubl
     out[0] = v5 * (v4 * (v3 * (v1 * v2)));
 }
 
-/* pi(x) grad H(x) */
 void volterra5_vector_field(const volterra5_params *params, const double x[5], double out[5])
 {
     (void)params;
@@ -196,19 +188,18 @@ void volterra5_vector_field(const volterra5_params *params, const double x[5], d
 }
 
 /* ---- Compensated sums, linear equations ---- */
-/* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to
-   its last bit: were it rounded with the change, corrections of one sign would add up to a drift. 0, and x as
-   before, if the sum is not finite. */
+/* x + change + small in compensated arithmetic, where small is the carry and what is as small: were that
+   rounded with the change, corrections of one sign would add up to a drift. 0, and x as before, if the sum is
+   not finite. */
 static int volterra5_advance(volterra5_solver *s, const double change[volterra5_DIM],
-    const double correction[volterra5_DIM])
+    const double small[volterra5_DIM])
 {
     double x[volterra5_DIM], carry[volterra5_DIM];
     for (int i = 0; i < volterra5_DIM; ++i) {
         const double sum = s->x[i] + change[i], added = sum - s->x[i];
-        const double lost = (s->x[i] - (sum - added)) + (change[i] - added);
-        const double small = lost + (s->carry[i] + correction[i]);
-        x[i] = sum + small;
-        carry[i] = small - (x[i] - sum);
+        const double lost = ((s->x[i] - (sum - added)) + (change[i] - added)) + small[i];
+        x[i] = sum + lost;
+        carry[i] = lost - (x[i] - sum);
         if (!isfinite(x[i])) return 0;
     }
     memcpy(s->x, x, sizeof x);
@@ -247,12 +238,10 @@ static int volterra5_solve(double matrix[volterra5_DIM * volterra5_DIM], double 
 }
 
 /* ---- Starting guesses ---- */
-/* How far from the last value a guess may be, in sizes of that value. */
-#define volterra5_REACH 4.0
+#define volterra5_REACH 4.0 /* how far from the last value a guess may be, in sizes of that value */
 
-/* The guess for the next value from the last ones: the sum of their backward differences. 0 if there is none,
-   or if it is far away, where the equation of a step has solutions that have nothing to do with the motion.
-   */
+/* The guess for the next value, the sum of differences. 0 if there is none, or if it is far away, where the
+   equation of a step has solutions that have nothing to do with the motion. */
 static int volterra5_predict(const volterra5_history *history, double value[volterra5_DIM])
 {
     double distance = 0.0, size = 0.0;
@@ -288,10 +277,8 @@ static void volterra5_remember(volterra5_history *history, const double value[vo
     if (history->count < volterra5_DIFFERENCES) ++history->count;
 }
 
-/* How far a step may lead, in sizes of the state and of what the vector field says, if the energy is lost;
-   and the part of the energy that counts as lost. */
-#define volterra5_PLAUSIBLE 1.5
-#define volterra5_LOST 0.5
+#define volterra5_PLAUSIBLE 1.5 /* how far any step may lead, in sizes of the state and of its motion */
+#define volterra5_LOST 0.5      /* part of the energy that one which leads farther must not lose */
 
 /* Whether an increment is that of the motion. Where the step is too large, the equation may have been solved
    by a point far away, at another energy, that has nothing to do with it. */
@@ -301,19 +288,17 @@ static int volterra5_plausible(const volterra5_solver *s, const double increment
     for (int i = 0; i < volterra5_DIM; ++i) {
         moved += fabs(increment[i]);
         size += fabs(s->x[i]);
-    }
-    if (moved <= volterra5_PLAUSIBLE * size) return 1;
-    volterra5_vector_field(&s->params, s->x, field);
-    for (int i = 0; i < volterra5_DIM; ++i) {
-        size += fabs(s->h * field[i]);
         middle[i] = s->x[i] + 0.5 * increment[i];
         end[i] = s->x[i] + increment[i];
     }
     if (moved <= volterra5_PLAUSIBLE * size) return 1;
-    const double before = volterra5_hamiltonian(&s->params, s->x), after = volterra5_hamiltonian(&s->params,
-        end);
-    const double scale = fabs(before) + fabs(volterra5_hamiltonian(&s->params, middle)) + fabs(after);
-    return fabs(after - before) <= volterra5_LOST * scale;
+    volterra5_vector_field(&s->params, s->x, field);
+    for (int i = 0; i < volterra5_DIM; ++i) size += fabs(s->h * field[i]);
+    if (moved <= volterra5_PLAUSIBLE * size) return 1;
+    const double before = volterra5_hamiltonian(&s->params, s->x);
+    const double after = volterra5_hamiltonian(&s->params, end), between = volterra5_hamiltonian(&s->params,
+        middle);
+    return fabs(after - before) <= volterra5_LOST * (fabs(before) + fabs(between) + fabs(after));
 }
 
 /* ---- The implicit step, by Newton's method ---- */
@@ -330,9 +315,8 @@ static double volterra5_size(const double y[volterra5_DIM], const double delta[v
     return size;
 }
 
-/* Corrections below the first that shrink by less than the second have reached the level of rounding. */
-#define volterra5_NEARLY_SOLVED 1e-8
-#define volterra5_SHRINKING 0.25
+#define volterra5_NEARLY_SOLVED 1e-8 /* corrections below this have reached the level of rounding, ... */
+#define volterra5_SHRINKING 0.25     /* ... if one is more than this part of the one before */
 
 /* Solve (y - x) + displacement(y) = 0 for y by Newton's method from the extrapolated guess, and advance. The
    increment is corrected to first order by the last Newton correction, so that correction costs no
@@ -341,13 +325,14 @@ static double volterra5_size(const double y[volterra5_DIM], const double delta[v
 static volterra5_status volterra5_attempt(volterra5_solver *s)
 {
     double y[volterra5_DIM], delta[volterra5_DIM], displacement[volterra5_DIM], increment[volterra5_DIM];
-    double jacobian[volterra5_DIM * volterra5_DIM], increment_jacobian[volterra5_DIM * volterra5_DIM],
-        previous = HUGE_VAL;
+    double jacobian[volterra5_DIM * volterra5_DIM], increment_jacobian[volterra5_DIM * volterra5_DIM];
+    double previous = HUGE_VAL;
     if (!volterra5_predict(&s->history, y)) memcpy(y, s->x, sizeof y);
     for (int iteration = 1; iteration <= volterra5_MAX_ITERATIONS; ++iteration) {
         volterra5_linearise(s->coef, y, displacement, increment, jacobian, increment_jacobian);
         ++s->evaluations;
-        for (int i = 0; i < volterra5_DIM; ++i) delta[i] = ((y[i] - s->x[i]) + displacement[i]) - s->carry[i];
+        for (int i = 0; i < volterra5_DIM; ++i)
+            delta[i] = ((y[i] - s->x[i]) + displacement[i]) - s->carry[i];
         const int regular = volterra5_solve(jacobian, delta);
         const double size = volterra5_size(y, delta), growth = size / (previous * previous);
         if (!isfinite(size)) return volterra5_NOT_FINITE;
@@ -357,12 +342,14 @@ static volterra5_status volterra5_attempt(volterra5_solver *s)
         const int stalled = previous < volterra5_NEARLY_SOLVED && size > volterra5_SHRINKING * previous;
         previous = size;
         if (!(remaining <= volterra5_TOLERANCE || stalled)) continue;
-        double correction[volterra5_DIM] = { 0.0 };
-        for (int i = 0; i < volterra5_DIM; ++i)
+        double small[volterra5_DIM] = { 0.0 }; /* the correction of the increment, and the carry */
+        for (int i = 0; i < volterra5_DIM; ++i) {
             for (int j = 0; j < volterra5_DIM; ++j)
-                correction[i] -= increment_jacobian[i * volterra5_DIM + j] * delta[j];
+                small[i] -= increment_jacobian[i * volterra5_DIM + j] * delta[j];
+            small[i] += s->carry[i];
+        }
         if (!volterra5_plausible(s, increment)) return volterra5_NO_CONVERGENCE;
-        if (!volterra5_advance(s, increment, correction)) return volterra5_NOT_FINITE;
+        if (!volterra5_advance(s, increment, small)) return volterra5_NOT_FINITE;
         volterra5_remember(&s->history, y);
         return volterra5_OK;
     }
@@ -370,19 +357,17 @@ static volterra5_status volterra5_attempt(volterra5_solver *s)
 }
 
 /* ---- The solver ---- */
-/* The arguments may be parts of *s: they are read before it is written. */
+/* The arguments may be parts of *s, which is therefore written last. */
 volterra5_status volterra5_init(volterra5_solver *s, const volterra5_params *params,
     const double x0[volterra5_DIM])
 {
     if (s == NULL || x0 == NULL) return volterra5_BAD_ARGUMENT;
-    const volterra5_params own = params != NULL ? *params : volterra5_default_params;
-    double x[volterra5_DIM];
-    memcpy(x, x0, sizeof x);
+    volterra5_solver fresh = { .h = (double)NAN };
+    fresh.params = params != NULL ? *params : volterra5_default_params;
+    memcpy(fresh.x, x0, sizeof fresh.x);
     for (int i = 0; i < volterra5_DIM; ++i)
-        if (!isfinite(x[i])) return volterra5_BAD_ARGUMENT;
-    memset(s, 0, sizeof *s);
-    memcpy(s->x, x, sizeof s->x);
-    s->params = own;
+        if (!isfinite(fresh.x[i])) return volterra5_BAD_ARGUMENT;
+    *s = fresh;
     return volterra5_OK;
 }
 
@@ -390,44 +375,37 @@ volterra5_status volterra5_init(volterra5_solver *s, const volterra5_params *par
 static volterra5_status volterra5_set_step(volterra5_solver *s, double h)
 {
     if (s == NULL || !isfinite(h)) return volterra5_BAD_ARGUMENT;
-    if (s->prepared && memcmp(&h, &s->h, sizeof h) == 0) return volterra5_OK;
+    if (memcmp(&h, &s->h, sizeof h) == 0) return volterra5_OK;
     volterra5_prepare(&s->params, h, s->coef);
     memset(&s->history, 0, sizeof s->history);
     s->h = h;
     s->t_before_h = s->t;
     s->steps_before_h = s->steps;
-    s->prepared = 1;
     return volterra5_OK;
 }
 
 /* One stage. A guess from earlier steps may have misled it: then once more without. */
 static volterra5_status volterra5_stage(volterra5_solver *s)
 {
-    volterra5_status status = volterra5_attempt(s);
-    if (status != volterra5_OK && s->history.count > 0) {
-        memset(&s->history, 0, sizeof s->history);
-        status = volterra5_attempt(s);
-    }
-    return status;
-}
-
-volterra5_status volterra5_step(volterra5_solver *s, double h)
-{
-    volterra5_status status = volterra5_set_step(s, h);
-    if (status != volterra5_OK) return status;
-    status = volterra5_stage(s);
-    if (status != volterra5_OK) return status;
-    ++s->steps;
-    s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
-    return status;
+    const volterra5_status status = volterra5_attempt(s);
+    if (status == volterra5_OK || s->history.count == 0) return status;
+    memset(&s->history, 0, sizeof s->history);
+    return volterra5_attempt(s);
 }
 
 volterra5_status volterra5_integrate(volterra5_solver *s, double h, size_t steps)
 {
     volterra5_status status = volterra5_set_step(s, h);
-    for (; steps > 0 && status == volterra5_OK; --steps) status = volterra5_step(s, h);
+    for (; steps > 0 && status == volterra5_OK; --steps) {
+        status = volterra5_stage(s);
+        if (status != volterra5_OK) break;
+        ++s->steps;
+        s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
+    }
     return status;
 }
+
+volterra5_status volterra5_step(volterra5_solver *s, double h) { return volterra5_integrate(s, h, 1); }
 
 const char *volterra5_status_string(volterra5_status status)
 {
@@ -442,7 +420,6 @@ const char *volterra5_status_string(volterra5_status status)
 }
 
 size_t volterra5_solver_size(void) { return sizeof(volterra5_solver); }
-
 size_t volterra5_solver_steps_done(const volterra5_solver *s) { return s->steps; }
 
 /* ---- Ensembles ---- */

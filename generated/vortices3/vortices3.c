@@ -20,7 +20,7 @@
  *   4. The implicit step, by Newton's method
  *   5. The solver
  *   6. Ensembles
- * body-sha256: 35a04cd51048ae2464f580d0b70f2fb4af9fb39bb3696ed41e79ebc24f11676b
+ * body-sha256: 4b870477d9f5c474bc40c026cfc5088c5f40c1539eae42a4840a5a306aa88387
  */
 #include "vortices3.h"
 
@@ -32,9 +32,7 @@
 const vortices3_params vortices3_default_params = { 0 };
 
 enum { vortices3_MAX_ITERATIONS = 20 }; /* of an inner solve */
-
-/* A correction is accepted when the error that it leaves is estimated to be below this. */
-#define vortices3_TOLERANCE 1e-20
+#define vortices3_TOLERANCE 1e-20       /* the error that an accepted correction may leave, as estimated */
 
 /* Functions to be kept apart: very long ones compile in quadratic time. */
 #if defined(__GNUC__)
@@ -107,8 +105,8 @@ vortices3_APART static void vortices3_linearise_part1(const double coef[3], cons
     work[21] = coef[1] * work[26];
     work[24] = work[23] * work[21];
     work[39] = (-1.0 / 48.0) * (coef[1] * (work[23] * work[25])) - 1.0 / 48.0 * (work[23] * work[24]);
-    const double t17 = 1.0 / 12.0 * (work[28] * work[27]) + 2.0 * (work[6] * work[39]);
-    const double t18 = 0.5 * t17, t19 = 0.5 * (t12 - t11);
+    const double t17 = 1.0 / 12.0 * (work[28] * work[27]) + 2.0 * (work[6] * work[39]), t18 = 0.5 * t17;
+    const double t19 = 0.5 * (t12 - t11);
     work[2] = t16 + (t18 - t19);
     work[1] = work[12] * work[12];
     const double t20 = 1.0 / 3.0 * (work[16] * work[10]), t21 = 2.0 * (work[0] * work[34]);
@@ -148,10 +146,8 @@ vortices3_APART static void vortices3_linearise_part1(const double coef[3], cons
     const double p_y2 = t31 - t25;
     const double t32 = 2.0 * (work[45] * work[47]) + 0.5 * (work[48] * work[86]) + 2.0
         * (work[18] * work[130]);
-    const double p_x2 = t32 - t29;
-    const double t33 = t28 + t31;
-    const double p_y3 = -t33;
-    const double t34 = t32 + t30, t35 = 0.25 * work[9], t36 = work[6] * work[5];
+    const double p_x2 = t32 - t29, t33 = t28 + t31, p_y3 = -t33, t34 = t32 + t30, t35 = 0.25 * work[9];
+    const double t36 = work[6] * work[5];
     work[56] = coef[0] * t36;
     const double t37 = 0.5 * (work[6] * work[56]);
     work[147] = t35 - t37;
@@ -215,8 +211,7 @@ vortices3_APART static void vortices3_linearise_part1(const double coef[3], cons
     const double t61 = 0.5 * t54 + t59 + work[64];
     work[29] = work[12] * work[1];
     work[113] = work[29] * (work[3] * work[30]);
-    const double t62 = t41 - t40;
-    const double t63 = 1.0 / 6.0 * (work[20] * work[70]) + 2.0 * (work[17] * work[71]);
+    const double t62 = t41 - t40, t63 = 1.0 / 6.0 * (work[20] * work[70]) + 2.0 * (work[17] * work[71]);
     work[93] = 2.0 / 3.0 * (t55 * work[10]);
     const double t64 = work[93] + 1.0 / 3.0 * (work[16] * t62) + 2.0 * (work[0] * work[52]);
     work[61] = 0.25 * (t63 - t64);
@@ -492,19 +487,19 @@ vortices3_APART static void vortices3_linearise_part3(const double coef[3], cons
     const double t10 = 4.0 * work[104] - work[46] * t9;
     const double t11 = 2.0 * (work[88] * work[47]) - work[105] + (2.0 * (work[44] * work[89]) + 0.5
         * (work[48] * work[102])) + 2.0 * (work[17] * t10);
-    const double t12 = 0.5 * work[106], t13 = 0.5 * work[107] + t12 + work[108];
-    const double t14 = 0.5 * (t6 + t4), t15 = t5 - t14;
+    const double t12 = 0.5 * work[106], t13 = 0.5 * work[107] + t12 + work[108], t14 = 0.5 * (t6 + t4);
+    const double t15 = t5 - t14;
     const double t16 = coef[1] * (1.0 / 3.0 * (work[7] * work[109]) + 1.0 / 3.0 * (work[10] * t3)) + work[13]
         * work[110] + coef[0] * (work[0] * t13 + (work[111] - work[112] + work[3] * t15));
     const double t17 = (-4.0) * work[113] - work[1] * (coef[2] * work[3] + 1.0 / 12.0 * (work[114] * work[15])
         + (1.0 / 12.0 * (work[14] * work[115]) + work[11] * work[116]) + t16);
     const double t18 = t11 - (2.0 * (work[117] * work[34]) + work[118] + (2.0 * (work[10] * work[92])
         + work[8] * t13) + 2.0 * (work[0] * t17));
-    const double t19 = 0.25 * t18, t20 = work[17] * work[46], t21 = coef[0] * t20;
-    const double t22 = work[18] * t21, t23 = work[119] - t22, t24 = 0.25 * t23, t25 = t22 + t24;
-    const double t26 = work[17] * t21, t27 = work[120] - t26, t28 = t27 + 0.5 * work[121];
-    const double t29 = t22 - work[122], t30 = 2.0 * (work[4] * t29) + 2.0 * (work[6] * t28);
-    const double t31 = work[23] * t30, t32 = coef[1] * t30, t33 = work[23] * t32;
+    const double t19 = 0.25 * t18, t20 = work[17] * work[46], t21 = coef[0] * t20, t22 = work[18] * t21;
+    const double t23 = work[119] - t22, t24 = 0.25 * t23, t25 = t22 + t24, t26 = work[17] * t21;
+    const double t27 = work[120] - t26, t28 = t27 + 0.5 * work[121], t29 = t22 - work[122];
+    const double t30 = 2.0 * (work[4] * t29) + 2.0 * (work[6] * t28), t31 = work[23] * t30;
+    const double t32 = coef[1] * t30, t33 = work[23] * t32;
     const double t34 = (-1.0 / 48.0) * (coef[1] * (work[23] * t31)) - 1.0 / 48.0 * (work[23] * t33);
     const double t35 = 1.0 / 12.0 * (work[28] * t28) + 2.0 * (work[6] * t34);
     const double t36 = 0.25 * (t27 + work[121]), t37 = t27 - t36, t38 = coef[1] * t20;
@@ -532,9 +527,8 @@ vortices3_APART static void vortices3_linearise_part3(const double coef[3], cons
     const double t65 = work[122] + t24;
     const double t66 = (-2.0 / 3.0) * work[133] - work[31] + (1.0 / 3.0 * (work[16] * t65) + 2.0
         * (work[0] * t59));
-    const double t67 = 0.25 * (t64 - t66);
-    const double t68 = 1.0 / 12.0 * (work[28] * t29) + 2.0 * (work[4] * t34), t69 = t68 + t64;
-    const double t70 = t67 - t69;
+    const double t67 = 0.25 * (t64 - t66), t68 = 1.0 / 12.0 * (work[28] * t29) + 2.0 * (work[4] * t34);
+    const double t69 = t68 + t64, t70 = t67 - t69;
     const double t71 = 0.5 * work[187] + coef[1] * (1.0 / 6.0 * (work[44] * t25) + 1.0 / 6.0
         * (work[45] * t37)) + (work[41] * t48 - 1.0 / 24.0 * (work[40] * t42)) + (work[43] * t44 - 1.0 / 24.0
         * (work[42] * t43) + coef[0] * (work[185] + 0.5 * (work[17] * t62) + 0.5 * (work[18] * t70)));
@@ -584,8 +578,7 @@ vortices3_APART static void vortices3_linearise_part3(const double coef[3], cons
     work[208] = t97 - t104;
     const double t105 = 0.5 * work[156], t106 = t95 + t105;
     const double t107 = 2.0 * (work[6] * work[208]) - work[157] + 2.0 * (work[4] * t106);
-    const double t108 = coef[1] * t107;
-    const double t109 = (-1.0 / 24.0) * work[158] - 1.0 / 48.0 * (work[23] * t108);
+    const double t108 = coef[1] * t107, t109 = (-1.0 / 24.0) * work[158] - 1.0 / 48.0 * (work[23] * t108);
     const double t110 = (-1.0 / 24.0) * work[159] - 1.0 / 48.0 * (work[23] * t107);
     work[209] = work[23] * t109 + (coef[1] * (work[23] * t110 - work[160]) - work[161]);
     const double t111 = work[162] - work[32] + (1.0 / 12.0 * (work[28] * work[208]) + 2.0
@@ -721,7 +714,6 @@ static void vortices3_linearise(const double coef[3], const double y[6], double 
     vortices3_linearise_part4(coef, y, displacement, increment, jacobian, increment_jacobian, work);
 }
 
-/* the Hamiltonian */
 double vortices3_hamiltonian(const vortices3_params *params, const double x[6])
 {
     (void)params;
@@ -731,22 +723,19 @@ double vortices3_hamiltonian(const vortices3_params *params, const double x[6])
     return 0.25 * (t7 / 3.141592653589793);
 }
 
-/* the Casimirs */
 void vortices3_casimirs(const vortices3_params *params, const double x[6], double out[])
 {
     (void)params, (void)x, (void)out;
 }
 
-/* pi(x) grad H(x) */
 void vortices3_vector_field(const vortices3_params *params, const double x[6], double out[6])
 {
     (void)params;
     const double x1 = x[0], y1 = x[1], x2 = x[2], y2 = x[3], x3 = x[4], y3 = x[5];
-    const double t1 = y1 - y3, t2 = 1.0 / 3.141592653589793, t3 = x1 - x3;
-    const double t4 = t2 / (t3 * t3 + t1 * t1), t5 = t1 * t4, t6 = y1 - y2, t7 = x1 - x2;
-    const double t8 = t2 / (t6 * t6 + t7 * t7), t9 = t6 * t8, t10 = t7 * t8, t11 = t3 * t4;
-    const double t12 = y2 - y3, t13 = x2 - x3, t14 = t2 / (t12 * t12 + t13 * t13);
-    const double t15 = 0.5 * (t12 * t14), t16 = 0.5 * (t13 * t14);
+    const double t1 = y1 - y3, t2 = 1.0 / 3.141592653589793, t3 = x1 - x3, t4 = t2 / (t3 * t3 + t1 * t1);
+    const double t5 = t1 * t4, t6 = y1 - y2, t7 = x1 - x2, t8 = t2 / (t6 * t6 + t7 * t7), t9 = t6 * t8;
+    const double t10 = t7 * t8, t11 = t3 * t4, t12 = y2 - y3, t13 = x2 - x3;
+    const double t14 = t2 / (t12 * t12 + t13 * t13), t15 = 0.5 * (t12 * t14), t16 = 0.5 * (t13 * t14);
     out[0] = 0.25 * t5 - t9;
     out[1] = t10 - 0.25 * t11;
     out[2] = 0.5 * (t9 + t15);
@@ -756,19 +745,18 @@ void vortices3_vector_field(const vortices3_params *params, const double x[6], d
 }
 
 /* ---- Compensated sums, linear equations ---- */
-/* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to
-   its last bit: were it rounded with the change, corrections of one sign would add up to a drift. 0, and x as
-   before, if the sum is not finite. */
+/* x + change + small in compensated arithmetic, where small is the carry and what is as small: were that
+   rounded with the change, corrections of one sign would add up to a drift. 0, and x as before, if the sum is
+   not finite. */
 static int vortices3_advance(vortices3_solver *s, const double change[vortices3_DIM],
-    const double correction[vortices3_DIM])
+    const double small[vortices3_DIM])
 {
     double x[vortices3_DIM], carry[vortices3_DIM];
     for (int i = 0; i < vortices3_DIM; ++i) {
         const double sum = s->x[i] + change[i], added = sum - s->x[i];
-        const double lost = (s->x[i] - (sum - added)) + (change[i] - added);
-        const double small = lost + (s->carry[i] + correction[i]);
-        x[i] = sum + small;
-        carry[i] = small - (x[i] - sum);
+        const double lost = ((s->x[i] - (sum - added)) + (change[i] - added)) + small[i];
+        x[i] = sum + lost;
+        carry[i] = lost - (x[i] - sum);
         if (!isfinite(x[i])) return 0;
     }
     memcpy(s->x, x, sizeof x);
@@ -807,12 +795,10 @@ static int vortices3_solve(double matrix[vortices3_DIM * vortices3_DIM], double 
 }
 
 /* ---- Starting guesses ---- */
-/* How far from the last value a guess may be, in sizes of that value. */
-#define vortices3_REACH 4.0
+#define vortices3_REACH 4.0 /* how far from the last value a guess may be, in sizes of that value */
 
-/* The guess for the next value from the last ones: the sum of their backward differences. 0 if there is none,
-   or if it is far away, where the equation of a step has solutions that have nothing to do with the motion.
-   */
+/* The guess for the next value, the sum of differences. 0 if there is none, or if it is far away, where the
+   equation of a step has solutions that have nothing to do with the motion. */
 static int vortices3_predict(const vortices3_history *history, double value[vortices3_DIM])
 {
     double distance = 0.0, size = 0.0;
@@ -848,10 +834,8 @@ static void vortices3_remember(vortices3_history *history, const double value[vo
     if (history->count < vortices3_DIFFERENCES) ++history->count;
 }
 
-/* How far a step may lead, in sizes of the state and of what the vector field says, if the energy is lost;
-   and the part of the energy that counts as lost. */
-#define vortices3_PLAUSIBLE 1.5
-#define vortices3_LOST 0.5
+#define vortices3_PLAUSIBLE 1.5 /* how far any step may lead, in sizes of the state and of its motion */
+#define vortices3_LOST 0.5      /* part of the energy that one which leads farther must not lose */
 
 /* Whether an increment is that of the motion. Where the step is too large, the equation may have been solved
    by a point far away, at another energy, that has nothing to do with it. */
@@ -861,24 +845,21 @@ static int vortices3_plausible(const vortices3_solver *s, const double increment
     for (int i = 0; i < vortices3_DIM; ++i) {
         moved += fabs(increment[i]);
         size += fabs(s->x[i]);
-    }
-    if (moved <= vortices3_PLAUSIBLE * size) return 1;
-    vortices3_vector_field(&s->params, s->x, field);
-    for (int i = 0; i < vortices3_DIM; ++i) {
-        size += fabs(s->h * field[i]);
         middle[i] = s->x[i] + 0.5 * increment[i];
         end[i] = s->x[i] + increment[i];
     }
     if (moved <= vortices3_PLAUSIBLE * size) return 1;
-    const double before = vortices3_hamiltonian(&s->params, s->x), after = vortices3_hamiltonian(&s->params,
-        end);
-    const double scale = fabs(before) + fabs(vortices3_hamiltonian(&s->params, middle)) + fabs(after);
-    return fabs(after - before) <= vortices3_LOST * scale;
+    vortices3_vector_field(&s->params, s->x, field);
+    for (int i = 0; i < vortices3_DIM; ++i) size += fabs(s->h * field[i]);
+    if (moved <= vortices3_PLAUSIBLE * size) return 1;
+    const double before = vortices3_hamiltonian(&s->params, s->x);
+    const double after = vortices3_hamiltonian(&s->params, end), between = vortices3_hamiltonian(&s->params,
+        middle);
+    return fabs(after - before) <= vortices3_LOST * (fabs(before) + fabs(between) + fabs(after));
 }
 
 /* ---- The implicit step, by Newton's method ---- */
-/* Components of y are measured no finer than by this part of the largest. */
-#define vortices3_FLOOR 1e-6
+#define vortices3_FLOOR 1e-6 /* components of y are measured no finer than by this part of the largest */
 
 /* Size of a correction relative to each component of y; NaN or infinite if the correction is. */
 static double vortices3_size(const double y[vortices3_DIM], const double delta[vortices3_DIM])
@@ -893,9 +874,8 @@ static double vortices3_size(const double y[vortices3_DIM], const double delta[v
     return size;
 }
 
-/* Corrections below the first that shrink by less than the second have reached the level of rounding. */
-#define vortices3_NEARLY_SOLVED 1e-8
-#define vortices3_SHRINKING 0.25
+#define vortices3_NEARLY_SOLVED 1e-8 /* corrections below this have reached the level of rounding, ... */
+#define vortices3_SHRINKING 0.25     /* ... if one is more than this part of the one before */
 
 /* Solve (y - x) + displacement(y) = 0 for y by Newton's method from the extrapolated guess, and advance. The
    increment is corrected to first order by the last Newton correction, so that correction costs no
@@ -904,13 +884,14 @@ static double vortices3_size(const double y[vortices3_DIM], const double delta[v
 static vortices3_status vortices3_attempt(vortices3_solver *s)
 {
     double y[vortices3_DIM], delta[vortices3_DIM], displacement[vortices3_DIM], increment[vortices3_DIM];
-    double jacobian[vortices3_DIM * vortices3_DIM], increment_jacobian[vortices3_DIM * vortices3_DIM],
-        previous = HUGE_VAL;
+    double jacobian[vortices3_DIM * vortices3_DIM], increment_jacobian[vortices3_DIM * vortices3_DIM];
+    double previous = HUGE_VAL;
     if (!vortices3_predict(&s->history, y)) memcpy(y, s->x, sizeof y);
     for (int iteration = 1; iteration <= vortices3_MAX_ITERATIONS; ++iteration) {
         vortices3_linearise(s->coef, y, displacement, increment, jacobian, increment_jacobian);
         ++s->evaluations;
-        for (int i = 0; i < vortices3_DIM; ++i) delta[i] = ((y[i] - s->x[i]) + displacement[i]) - s->carry[i];
+        for (int i = 0; i < vortices3_DIM; ++i)
+            delta[i] = ((y[i] - s->x[i]) + displacement[i]) - s->carry[i];
         const int regular = vortices3_solve(jacobian, delta);
         const double size = vortices3_size(y, delta), growth = size / (previous * previous);
         if (!isfinite(size)) return vortices3_NOT_FINITE;
@@ -920,12 +901,14 @@ static vortices3_status vortices3_attempt(vortices3_solver *s)
         const int stalled = previous < vortices3_NEARLY_SOLVED && size > vortices3_SHRINKING * previous;
         previous = size;
         if (!(remaining <= vortices3_TOLERANCE || stalled)) continue;
-        double correction[vortices3_DIM] = { 0.0 };
-        for (int i = 0; i < vortices3_DIM; ++i)
+        double small[vortices3_DIM] = { 0.0 }; /* the correction of the increment, and the carry */
+        for (int i = 0; i < vortices3_DIM; ++i) {
             for (int j = 0; j < vortices3_DIM; ++j)
-                correction[i] -= increment_jacobian[i * vortices3_DIM + j] * delta[j];
+                small[i] -= increment_jacobian[i * vortices3_DIM + j] * delta[j];
+            small[i] += s->carry[i];
+        }
         if (!vortices3_plausible(s, increment)) return vortices3_NO_CONVERGENCE;
-        if (!vortices3_advance(s, increment, correction)) return vortices3_NOT_FINITE;
+        if (!vortices3_advance(s, increment, small)) return vortices3_NOT_FINITE;
         vortices3_remember(&s->history, y);
         return vortices3_OK;
     }
@@ -933,19 +916,17 @@ static vortices3_status vortices3_attempt(vortices3_solver *s)
 }
 
 /* ---- The solver ---- */
-/* The arguments may be parts of *s: they are read before it is written. */
+/* The arguments may be parts of *s, which is therefore written last. */
 vortices3_status vortices3_init(vortices3_solver *s, const vortices3_params *params,
     const double x0[vortices3_DIM])
 {
     if (s == NULL || x0 == NULL) return vortices3_BAD_ARGUMENT;
-    const vortices3_params own = params != NULL ? *params : vortices3_default_params;
-    double x[vortices3_DIM];
-    memcpy(x, x0, sizeof x);
+    vortices3_solver fresh = { .h = (double)NAN };
+    fresh.params = params != NULL ? *params : vortices3_default_params;
+    memcpy(fresh.x, x0, sizeof fresh.x);
     for (int i = 0; i < vortices3_DIM; ++i)
-        if (!isfinite(x[i])) return vortices3_BAD_ARGUMENT;
-    memset(s, 0, sizeof *s);
-    memcpy(s->x, x, sizeof s->x);
-    s->params = own;
+        if (!isfinite(fresh.x[i])) return vortices3_BAD_ARGUMENT;
+    *s = fresh;
     return vortices3_OK;
 }
 
@@ -953,44 +934,37 @@ vortices3_status vortices3_init(vortices3_solver *s, const vortices3_params *par
 static vortices3_status vortices3_set_step(vortices3_solver *s, double h)
 {
     if (s == NULL || !isfinite(h)) return vortices3_BAD_ARGUMENT;
-    if (s->prepared && memcmp(&h, &s->h, sizeof h) == 0) return vortices3_OK;
+    if (memcmp(&h, &s->h, sizeof h) == 0) return vortices3_OK;
     vortices3_prepare(&s->params, h, s->coef);
     memset(&s->history, 0, sizeof s->history);
     s->h = h;
     s->t_before_h = s->t;
     s->steps_before_h = s->steps;
-    s->prepared = 1;
     return vortices3_OK;
 }
 
 /* One stage. A guess from earlier steps may have misled it: then once more without. */
 static vortices3_status vortices3_stage(vortices3_solver *s)
 {
-    vortices3_status status = vortices3_attempt(s);
-    if (status != vortices3_OK && s->history.count > 0) {
-        memset(&s->history, 0, sizeof s->history);
-        status = vortices3_attempt(s);
-    }
-    return status;
-}
-
-vortices3_status vortices3_step(vortices3_solver *s, double h)
-{
-    vortices3_status status = vortices3_set_step(s, h);
-    if (status != vortices3_OK) return status;
-    status = vortices3_stage(s);
-    if (status != vortices3_OK) return status;
-    ++s->steps;
-    s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
-    return status;
+    const vortices3_status status = vortices3_attempt(s);
+    if (status == vortices3_OK || s->history.count == 0) return status;
+    memset(&s->history, 0, sizeof s->history);
+    return vortices3_attempt(s);
 }
 
 vortices3_status vortices3_integrate(vortices3_solver *s, double h, size_t steps)
 {
     vortices3_status status = vortices3_set_step(s, h);
-    for (; steps > 0 && status == vortices3_OK; --steps) status = vortices3_step(s, h);
+    for (; steps > 0 && status == vortices3_OK; --steps) {
+        status = vortices3_stage(s);
+        if (status != vortices3_OK) break;
+        ++s->steps;
+        s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
+    }
     return status;
 }
+
+vortices3_status vortices3_step(vortices3_solver *s, double h) { return vortices3_integrate(s, h, 1); }
 
 const char *vortices3_status_string(vortices3_status status)
 {
@@ -1005,7 +979,6 @@ const char *vortices3_status_string(vortices3_status status)
 }
 
 size_t vortices3_solver_size(void) { return sizeof(vortices3_solver); }
-
 size_t vortices3_solver_steps_done(const vortices3_solver *s) { return s->steps; }
 
 /* ---- Ensembles ---- */

@@ -76,7 +76,7 @@ def output_options(command: F) -> F:
         ),
         click.option("--tangent", is_flag=True, help="Generate step_tangent, the derivative of a step, too."),
         click.option(
-            "--profile", type=click.Choice(PROFILES), help="How much the C does for speed, instead of the spec's."
+            "--profile", type=click.Choice(PROFILES), help="How much the code does for speed, instead of the spec's."
         ),
         click.option("--single-file", is_flag=True, help="C in one file, NAME.c, without a header."),
         scheme_option,
@@ -103,8 +103,7 @@ def generate(compilation: Compilation, target: str, options: Options) -> dict[st
     words += ["-t", target] if target not in spec.targets else []
     words += ["--order", str(options.order)] if options.order not in (None, spec.order) else []
     words += ["--scheme", options.scheme] if options.scheme not in (None, spec.scheme) else []
-    c = target == "c"
-    words += ["--profile", options.profile] if c and options.profile not in (None, spec.profile) else []
+    words += ["--profile", options.profile] if options.profile not in (None, spec.profile) else []
     words += ["--single-file"] if single else []
     words += ["--tangent"] if options.tangent and not spec.extras.tangent else []
     words += ["--modified", str(options.modified)] if options.modified is not None else []

@@ -87,9 +87,19 @@ class Program:
         return len(self.coordinates)
 
     @property
+    def searches_gauge(self) -> bool:
+        """Whether the gauge of a trajectory is searched for, and not given by a formula."""
+        return self.gauge is not None and self.profile == "fast"
+
+    @property
+    def choice(self) -> tuple[Kernel, ...]:
+        """The kernels by which the gauge of a trajectory is chosen."""
+        guide = (self.gauge.guide,) if self.gauge and self.searches_gauge else ()
+        return (*guide, *((self.gauge.products,) if self.gauge else ()))
+
+    @property
     def kernels(self) -> tuple[Kernel, ...]:
         """All kernels, each once."""
         seen = self.observables
-        chosen = (self.gauge.guide, self.gauge.products) if self.gauge else ()
         modified = (self.modified.kernel,) if self.modified else ()
-        return (*self.step.kernels, *modified, seen.energy, seen.casimirs, seen.vector_field, *chosen)
+        return (*self.step.kernels, *modified, seen.energy, seen.casimirs, seen.vector_field, *self.choice)

@@ -258,7 +258,7 @@ SPEC = Record(
             default="auto",
         ),
         Field("scheme", _switch("scheme", *SCHEMES), "how the one-step map is made", default="auto"),
-        Field("profile", Choice(PROFILES), "C: small is short and readable, without blocks and lanes", default="fast"),
+        Field("profile", Choice(PROFILES), "small is short and readable, without blocks and searches", default="fast"),
         Field("solver", SOLVER, "the inner solve of a step"),
         Field("tangent", Boolean(), "also generate step_tangent, the derivative of a step", default=False),
         Field(

@@ -44,8 +44,13 @@ def values(function: str, name: str) -> Mapping[str, object]:
         "near_others": [repr(c) for c in near[-2::-1]],
         "rest_last": repr(rest[-1]),
         "rest_others": [repr(c) for c in rest[-2::-1]],
-        "closed": _CLOSED[: order + 1],
+        "closed": closed(order),
     }
+
+
+def closed(order: int) -> tuple[str, ...]:
+    """The closed form of a derivative of φ, and what it needs, from c = w cot w, in C and in Python."""
+    return _CLOSED[: order + 1]
 
 
 _FAR = {

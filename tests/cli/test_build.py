@@ -226,11 +226,11 @@ def regenerate_line(path):
     ("options", "file", "line"),
     [
         ([], "a.c", "phigen build a.yaml"),
-        (["--order", "4", "-o", "x/y"], "a.h", "phigen build a.yaml --order 4"),
+        (["--order", "4", "-o", "x/y"], "a.c", "phigen build a.yaml --order 4"),
         (["--order", "2"], "a.py", "phigen build a.yaml"),  # what the spec says anyway
         (["--profile", "small"], "a.c", "phigen build a.yaml --profile small"),
-        (["--profile", "fast"], "a.h", "phigen build a.yaml"),
-        (["--profile", "small"], "a.py", "phigen build a.yaml"),  # says nothing of NumPy
+        (["--profile", "fast"], "a.c", "phigen build a.yaml"),
+        (["--profile", "small"], "a.py", "phigen build a.yaml --profile small"),
         (["--single-file"], "a.c", "phigen build a.yaml --single-file"),
         (["--single-file"], "a.py", "phigen build a.yaml"),
         (["-t", "c"], "a.c", "phigen build a.yaml"),

@@ -184,7 +184,7 @@ def test_changed_copy_of_a_bundled_spec_is_regenerated_from_its_file(phigen, wri
     for title, command in ((None, "phigen build cyclotron"), ("title: Mine", "phigen build cyclotron.yaml")):
         write("here/cyclotron.yaml", re.sub("title: .*", title, text) if title else text)
         assert phigen("build", "here").exit_code == 0
-        assert f"to regenerate: {command}\n" in Path("generated/cyclotron/cyclotron.h").read_text()
+        assert f"to regenerate: {command}\n" in Path("generated/cyclotron/cyclotron.c").read_text()
 
 
 def test_no_colour_in_pipes_and_under_no_color(phigen, write):

@@ -33,7 +33,8 @@ VARIANTS = {
     "path, composed": lambda: compile_text(f"{BODY}order: 6\nbirealisation: karasev\ncomposition: kahan-li\n{RUN}"),
     "newton, composed": lambda: compile_text(f"{BODY}order: 6\ncomposition: kahan-li\n{RUN}"),
     "newton, not symmetric": lambda: compiled("pendulum_euler", 3),
-    "gauge": lambda: compile_text(f"{BODY}casimirs: {{C: x1**2 + x2**2 + x3**2}}\norder: 4\n{RUN}"),
+    "gauge": lambda: _gauged("fast"),
+    "gauge by a formula": lambda: _gauged("small"),
     "modified": lambda: _modified("rigid_body", 2),
 }
 
@@ -41,6 +42,11 @@ VARIANTS = {
 def _by_paths(name, order):
     given = spec.load(resources.bundled_specs() / f"{name}.yaml")
     return compile_spec(replace(given, birealisation=BirealisationChoice("karasev"), gauge="none"), order=order)
+
+
+def _gauged(profile):
+    text = f"phigen: 1\nname: t\n{BODY}casimirs: {{C: x1**2 + x2**2 + x3**2}}\norder: 4\nprofile: {profile}\n{RUN}"
+    return compile_spec(spec.loads(text))
 
 
 def _modified(name, order):
@@ -122,11 +128,12 @@ def test_observables_and_facts_are_those_of_the_system(case, answers):
     }
 
 
-def test_the_gauge_is_chosen_as_in_numpy_or_given(answers, tmp_path):
-    compilation = compilation_of("gauge")
+@pytest.mark.parametrize("case", ["gauge", "gauge by a formula"])
+def test_the_gauge_is_chosen_as_in_numpy_or_given(case, answers, tmp_path):
+    compilation = compilation_of(case)
     at = setting(compilation)
     module = solver(compilation, "numpy").backend.module
-    assert answers["gauge"]["gauge"] == pytest.approx(module.gauge(at.x, **at.parameters), rel=1e-12)
+    assert answers[case]["gauge"] == pytest.approx(module.gauge(at.x, **at.parameters), rel=1e-12)
     (given,) = node(tmp_path, [(compilation, {"x0": at.x, "gauge": [0.25]}, at.h, 3)])
     assert apart(given["x"], module.integrate(at.x, at.h, 3, gauge=[0.25])[-1]) < 1e-14
 

@@ -66,7 +66,8 @@ def called(program: Program) -> list[str]:
     used = {e.op for e in topological([e for kernel in flows for e in kernel.roots])}
     small = [*entire_used(program), *(f for f in FLOW_FUNCTIONS if f in used)]
     phis = [render("c", "phi.c", _phi(program, f)) for f in special.used(program)]
-    return [*phis, *(render("c", "small.c", _values(program, f)) for f in small)]
+    polynomial = [render("c", "polynomial.c", {"NAME": program.name})] if phis else []
+    return [*polynomial, *phis, *(render("c", "small.c", _values(program, f)) for f in small)]
 
 
 def near(program: Program, names: Iterable[str]) -> list[str]:
@@ -87,22 +88,18 @@ def phi_lanes(program: Program, ops: Set[str]) -> list[str]:
 
 
 def _phi(program: Program, f: str) -> Mapping[str, object]:
-    given = dict(special.values(f, f))
-    return given | {
-        "NAME": program.name,
-        "function": f,
-        "near_sum": _horner(near_coefficients(order_of(f)), "return "),
-        "rest_sum": _horner(rest_coefficients(order_of(f)), f"return {given['pole_part']} + "),
-    }
+    near, rest = near_coefficients(order_of(f)), rest_coefficients(order_of(f))
+    tables = [line for name, numbers in (("near", near), ("rest", rest)) for line in _table(name, numbers)]
+    given = dict(special.values(f, f)) | {"NAME": program.name, "function": f, "tables": tables}
+    *closed, last = special.closed(order_of(f))
+    own = {"closed": closed, "value": last.split(" = ")[1]}
+    return given | own | {"near_count": len(near), "rest_count": len(rest)}
 
 
-def _horner(coefficients: Sequence[float], head: str) -> list[str]:
-    """The statement ``head`` Σ c_k s^k by Horner's rule, in lines."""
-    *others, last = map(repr, coefficients)
-    factors = ["s\N{NO-BREAK SPACE}*" for _ in others]
-    text = head + "".join(f"({c} + {s} " for c, s in zip(others, factors, strict=True)) + last + ")" * len(others)
-    lines = textwrap.wrap(text + ";", WIDTH - 12, subsequent_indent="    ", break_on_hyphens=False)
-    return [line.replace("\N{NO-BREAK SPACE}", " ") for line in lines]
+def _table(name: str, numbers: Sequence[float]) -> list[str]:
+    """The declaration of a table, in lines."""
+    text = f"static const double {name}[{len(numbers)}] = {{ {', '.join(map(repr, numbers))} }};"
+    return textwrap.wrap(text, WIDTH - 4, subsequent_indent="    ", break_on_hyphens=False)
 
 
 def _values(program: Program, f: str) -> dict[str, object]:

@@ -28,7 +28,7 @@ CONSTANTS = {"pi": "3.141592653589793", "E": "2.718281828459045"}
 LONGEST_FUNCTION = 200
 
 #: Longest line that several temporaries share.
-SHARED_LINE = 100
+SHARED_LINE = 105
 
 
 @dataclass(frozen=True)
@@ -83,7 +83,8 @@ def function(
     purpose = f"{program.name}_{kernel.name} in {'one lane' if single else 'all lanes'}" if lanes else kernel.purpose
     code = lower(kernel)
     pieces = parts(code if lanes else _in_order(kernel, code), LONGEST_FUNCTION)
-    head = [*_comment(purpose, ""), _signature(program, kernel, form) + "\n{"]
+    said = [] if exported else _comment(purpose, "")  # the header says it
+    head = [*said, _signature(program, kernel, form) + "\n{"]
     if len(pieces) == 1:
         return "\n".join([*head, *_body(program, kernel, form, pieces[0]), "}"]) + "\n"
     workspace = 1 + max((k for p in pieces for k in p.kept), default=0)
@@ -241,16 +242,16 @@ def _statements(
 
 
 def _declared(assignments: Iterable[tuple[str, str]]) -> Iterator[str]:
-    """Statements for assignments to workspace or to constants; short temporaries share lines."""
+    """Statements for assignments to workspace or to constants; short ones share lines."""
     line = ""
     for target, text in assignments:
         joined = f"{line}, {text}" if line else f"    const double {text}"
-        if line and (kind_of(target) != TEMPORARY or len(joined) > SHARED_LINE):
+        if line and (kind_of(target) == WORK or len(joined) > SHARED_LINE):
             yield f"{line};"
             joined = f"    const double {text}"
         line = joined
-        if kind_of(target) != TEMPORARY:
-            yield f"    {text};" if kind_of(target) == WORK else f"{line};"
+        if kind_of(target) == WORK:
+            yield f"    {text};"
             line = ""
     if line:
         yield f"{line};"

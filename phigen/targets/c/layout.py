@@ -65,15 +65,16 @@ def _statement(lines: list[str], first: int) -> int:
 
 
 def comment(text: str, indent: str = "") -> list[str]:
-    """A comment, marks included, over as many lines as it needs."""
-    return textwrap.wrap(
-        text,
+    """A comment, marks included, over as many lines as it needs; none is left to the mark at its end."""
+    lines = textwrap.wrap(
+        text.replace(" */", "\N{NO-BREAK SPACE}*/"),
         WIDTH,
         initial_indent=indent,
         subsequent_indent=f"{indent}   ",
         break_long_words=False,
         break_on_hyphens=False,
     )
+    return [line.replace("\N{NO-BREAK SPACE}", " ") for line in lines]
 
 
 def _indent(line: str) -> str:

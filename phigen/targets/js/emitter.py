@@ -56,8 +56,8 @@ def emit(program: Program, command: str) -> dict[str, str]:
     modules = ["solver", chosen]
     modules += ["taylor"] if isinstance(step, Path) else []
     modules += ["guess"] if features["IMPLICIT"] else []
-    modules += ["gauge"] if features["GAUGE"] else []
-    modules += ["algebra"] if not isinstance(step, Splitting) or features["GAUGE"] else []
+    modules += ["gauge" if program.searches_gauge else "gauge_formula"] if program.gauge else []
+    modules += ["algebra"] if not isinstance(step, Splitting) or program.searches_gauge else []
     body = f"{_model(program)}\n\n{assembled(modules, features)}\n"
     comment = "\n".join(f" * {line}".rstrip() for line in header_lines(program, command))
     return {f"{program.name}.mjs": f"/*\n{comment}\n * {CHECKSUM} {checksum(body)}\n */\n{body}"}
@@ -158,9 +158,8 @@ def _key(name: str) -> str:
 def _kernels(program: Program) -> list[Kernel]:
     """The kernels that the runtime calls."""
     step, seen = program.step, program.observables
-    chosen = [program.gauge.guide, program.gauge.products] if program.gauge else []
     modified = [program.modified.kernel] if program.modified else []
-    others = [*chosen, *modified, seen.energy, seen.casimirs, seen.vector_field]
+    others = [*program.choice, *modified, seen.energy, seen.casimirs, seen.vector_field]
     if isinstance(step, Splitting):
         return [replace(step.prepare, name="prepare_row"), *step.flows, *others]
     return [step.prepare, step.main, *others]

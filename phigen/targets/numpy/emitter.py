@@ -56,14 +56,15 @@ PATH_SYNTAX = Syntax(
 
 def emit(program: Program, command: str) -> dict[str, str]:
     """The file name and its contents."""
-    seen, gauge = program.observables, program.gauge
+    seen = program.observables
     pieces = [render("numpy", part, _values(program)) for part in ("preamble.py", "parameters.py")]
     pieces += [render("numpy", "phi.py", special.values(f, f"_{f}")) for f in special.used(program)]
     pieces += [render("numpy", "entire.py", special.entire_values(f)) for f in special.entire_used(program)]
     pieces += _step(program)
-    templates = ("gauge_line.py", "gauge.py") if gauge else ("no_gauge.py",)
+    search = ("gauge_line.py", "gauge.py") if program.searches_gauge else ("gauge_formula.py",)
+    templates = search if program.gauge else ("no_gauge.py",)
     pieces += [render("numpy", template, _values(program)) for template in templates]
-    pieces += [_function(program, kernel) for kernel in (gauge.guide, gauge.products)] if gauge else []
+    pieces += [_function(program, kernel) for kernel in program.choice]
     pieces += [render("numpy", part, _values(program)) for part in ("coefficients.py", "api.py")]
     pieces += [_function(program, kernel) for kernel in (seen.energy, seen.casimirs, seen.vector_field)]
     pieces += [render("numpy", "observables.py", _values(program))]

@@ -7,18 +7,16 @@
 
 /* ---- Compensated sums, linear equations ---- */
 #if PHI_ADVANCE
-/* x + change + correction in compensated arithmetic; the correction, far smaller than the change, is kept to its last
-   bit: were it rounded with the change, corrections of one sign would add up to a drift. 0, and x as before, if the
-   sum is not finite. */
-static int phi_advance(phi_solver *s, const double change[PHI_DIM], const double correction[PHI_DIM])
+/* x + change + small in compensated arithmetic, where small is the carry and what is as small: were that rounded with
+   the change, corrections of one sign would add up to a drift. 0, and x as before, if the sum is not finite. */
+static int phi_advance(phi_solver *s, const double change[PHI_DIM], const double small[PHI_DIM])
 {
     double x[PHI_DIM], carry[PHI_DIM];
     for (int i = 0; i < PHI_DIM; ++i) {
         const double sum = s->x[i] + change[i], added = sum - s->x[i];
-        const double lost = (s->x[i] - (sum - added)) + (change[i] - added);
-        const double small = lost + (s->carry[i] + correction[i]);
-        x[i] = sum + small;
-        carry[i] = small - (x[i] - sum);
+        const double lost = ((s->x[i] - (sum - added)) + (change[i] - added)) + small[i];
+        x[i] = sum + lost;
+        carry[i] = lost - (x[i] - sum);
         if (!isfinite(x[i])) return 0;
     }
     memcpy(s->x, x, sizeof x);
@@ -48,11 +46,9 @@ static void phi_settle(double x[PHI_DIM], double carry[PHI_DIM], const double mo
 #endif
 #if PHI_IMPLICIT
 #if PHI_UNROLLED || PHI_BLOCKS
-/* Newton matrices are I + O(h): a pivot whose reciprocal is larger than this is far from 1. */
-#define PHI_LARGEST_RECIPROCAL 1e3
+#define PHI_LARGEST_RECIPROCAL 1e3 /* Newton matrices are I + O(h): a pivot with a larger one is far from 1 */
 
 #endif
-#if PHI_PIVOTING
 /* Solve matrix * solution = side, both overwritten, by elimination with partial pivoting. 0 if singular. */
 #if PHI_UNROLLED
 static int phi_solve_pivoting(double matrix[PHI_DIM * PHI_DIM], double side[PHI_DIM])
@@ -86,25 +82,16 @@ static int phi_solve(double matrix[PHI_DIM * PHI_DIM], double side[PHI_DIM])
     return 1;
 }
 
-#endif
 #if PHI_UNROLLED
-#if PHI_PIVOTING
 /* Solve matrix * solution = side, both overwritten. The matrix is I + O(h), so elimination without pivoting
    does unless a pivot is far from 1. 0 if singular. */
-#else
-/* Solve matrix * solution = side, both overwritten. The matrix is I + O(h): 0 if a pivot is far from 1. */
-#endif
 static int phi_solve(double matrix[PHI_DIM * PHI_DIM], double side[PHI_DIM])
 {
     double solution[PHI_DIM], reciprocal[PHI_DIM], largest = 0.0;
     phi_eliminate(matrix, side, solution, reciprocal);
     for (int i = 0; i < PHI_DIM; ++i)
         if (!(fabs(reciprocal[i]) <= largest)) largest = fabs(reciprocal[i]);
-#if PHI_PIVOTING
     if (!(largest < PHI_LARGEST_RECIPROCAL)) return phi_solve_pivoting(matrix, side);
-#else
-    if (!(largest < PHI_LARGEST_RECIPROCAL)) return 0;
-#endif
     memcpy(side, solution, sizeof solution);
     return 1;
 }

@@ -11,11 +11,10 @@
 /* One explicit stage: x + increment(x). */
 static phi_status phi_stage(phi_solver *s, int stage)
 {
-    const double none[PHI_DIM] = { 0.0 };
     double increment[PHI_DIM];
     phi_explicit(s->coef[stage], s->x, increment);
     ++s->evaluations;
-    return phi_advance(s, increment, none) ? PHI_OK : PHI_NOT_FINITE;
+    return phi_advance(s, increment, s->carry) ? PHI_OK : PHI_NOT_FINITE;
 }
 
 #else

@@ -7,11 +7,10 @@
 #include "model.h"
 
 /* ---- The choice of the gauge: multiples of Casimirs taken from H ---- */
+#if PHI_GAUGE_SEARCH
 enum {
     PHI_SAMPLES = 32, /* states along a short piece of the trajectory */
-#if PHI_QUICK_GAUGE
     PHI_DEGREE = 6, /* S_3 is cubic in H, so the square of the error is of degree six in each multiple */
-#endif
     PHI_SWEEPS = 4 /* most rounds over the multiples */
 };
 
@@ -46,7 +45,6 @@ static double phi_gauge_error(const phi_params *params, const double gauge[PHI_G
     return sum;
 }
 
-#if PHI_QUICK_GAUGE
 /* The error polynomial at centre + t width, by Newton's formula from forward differences. */
 static double phi_on_line(const double difference[PHI_DEGREE + 1], double t)
 {
@@ -82,28 +80,6 @@ static double phi_least_on_line(const phi_params *params, const double gauge[PHI
     return best;
 }
 
-#else
-/* How many widths multiple c is to be moved for the least error: the best on grids, each finer than the one before. */
-static double phi_least_on_line(const phi_params *params, const double gauge[PHI_GAUGES], int c, double width,
-    double samples[][PHI_DIM])
-{
-    double moved[PHI_GAUGES], best = 0.0, mesh = 0.125, least = phi_gauge_error(params, gauge, samples);
-    memcpy(moved, gauge, sizeof moved);
-    for (int level = 0; level < 3; ++level, mesh *= 0.125) {
-        const int reach = level == 0 ? 24 : 8;
-        const double centre = best;
-        for (int j = -reach; j <= reach; ++j) {
-            moved[c] = gauge[c] + (centre + j * mesh) * width;
-            const double error = phi_gauge_error(params, moved, samples);
-            if (!(error < least - 1e-12 * least)) continue; /* close calls are not decided by rounding */
-            least = error;
-            best = centre + j * mesh;
-        }
-    }
-    return best;
-}
-
-#endif
 /* The multiples that minimise the leading error along a short piece of the trajectory, one after the other, from the
    least-squares solution of grad H = sum of multiples of grad C. Zero where that gives nothing finite. */
 static void phi_choose_gauge(const phi_params *params, const double x[PHI_DIM], double gauge[PHI_GAUGES])
@@ -130,4 +106,18 @@ static void phi_choose_gauge(const phi_params *params, const double x[PHI_DIM], 
     }
     if (!isfinite(phi_gauge_error(params, gauge, samples))) memset(gauge, 0, PHI_GAUGES * sizeof gauge[0]);
 }
+
+#else
+/* For each Casimir C the multiple by which grad H less it times grad C is smallest at the start; zero where that gives
+   nothing finite. */
+static void phi_choose_gauge(const phi_params *params, const double x[PHI_DIM], double gauge[PHI_GAUGES])
+{
+    double out[1 + 2 * PHI_GAUGES];
+    phi_products(params, x, out);
+    for (int c = 0; c < PHI_GAUGES; ++c) {
+        const double multiple = out[1 + 2 * c] / out[2 + 2 * c];
+        gauge[c] = isfinite(multiple) ? multiple : 0.0;
+    }
+}
+#endif
 #endif

@@ -9,8 +9,7 @@
 #if PHI_RECURRENCES
 #include "recurrence.c"
 #endif
-/* How far from the last value a guess may be, in sizes of that value. */
-#define PHI_REACH 4.0
+#define PHI_REACH 4.0 /* how far from the last value a guess may be, in sizes of that value */
 
 #if PHI_RECURRENCES
 /* Whether a guess is where the next values may be. Far away the equation of a step has solutions that have nothing to do
@@ -122,8 +121,8 @@ static void phi_remember(phi_history *history, const double value[PHI_DIM], int 
 }
 
 #else
-/* The guess for the next value from the last ones: the sum of their backward differences. 0 if there is none, or if it
-   is far away, where the equation of a step has solutions that have nothing to do with the motion. */
+/* The guess for the next value, the sum of differences. 0 if there is none, or if it is far away, where the equation of
+   a step has solutions that have nothing to do with the motion. */
 static int phi_predict(const phi_history *history, double value[PHI_DIM])
 {
     double distance = 0.0, size = 0.0;
@@ -159,10 +158,8 @@ static void phi_remember(phi_history *history, const double value[PHI_DIM])
 }
 
 #endif
-/* How far a step may lead, in sizes of the state and of what the vector field says, if the energy is lost; and the part
-   of the energy that counts as lost. */
-#define PHI_PLAUSIBLE 1.5
-#define PHI_LOST 0.5
+#define PHI_PLAUSIBLE 1.5 /* how far any step may lead, in sizes of the state and of its motion */
+#define PHI_LOST 0.5      /* part of the energy that one which leads farther must not lose */
 
 /* Whether an increment is that of the motion. Where the step is too large, the equation may have been solved by a point far
    away, at another energy, that has nothing to do with it. */
@@ -172,17 +169,15 @@ static int phi_plausible(const phi_solver *s, int stage, const double increment[
     for (int i = 0; i < PHI_DIM; ++i) {
         moved += fabs(increment[i]);
         size += fabs(s->x[i]);
-    }
-    if (moved <= PHI_PLAUSIBLE * size) return 1;
-    phi_vector_field(&s->params, s->x, field);
-    for (int i = 0; i < PHI_DIM; ++i) {
-        size += fabs(phi_fractions[stage] * s->h * field[i]);
         middle[i] = s->x[i] + 0.5 * increment[i];
         end[i] = s->x[i] + increment[i];
     }
     if (moved <= PHI_PLAUSIBLE * size) return 1;
-    const double before = phi_hamiltonian(&s->params, s->x), after = phi_hamiltonian(&s->params, end);
-    const double scale = fabs(before) + fabs(phi_hamiltonian(&s->params, middle)) + fabs(after);
-    return fabs(after - before) <= PHI_LOST * scale;
+    phi_vector_field(&s->params, s->x, field);
+    for (int i = 0; i < PHI_DIM; ++i) size += fabs(phi_fractions[stage] * s->h * field[i]);
+    if (moved <= PHI_PLAUSIBLE * size) return 1;
+    const double before = phi_hamiltonian(&s->params, s->x);
+    const double after = phi_hamiltonian(&s->params, end), between = phi_hamiltonian(&s->params, middle);
+    return fabs(after - before) <= PHI_LOST * (fabs(before) + fabs(between) + fabs(after));
 }
 #endif

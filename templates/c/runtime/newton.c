@@ -23,8 +23,7 @@ static double phi_size(const double y[PHI_DIM], const double delta[PHI_DIM])
     return size;
 }
 #else
-/* Components of y are measured no finer than by this part of the largest. */
-#define PHI_FLOOR 1e-6
+#define PHI_FLOOR 1e-6 /* components of y are measured no finer than by this part of the largest */
 
 /* Size of a correction relative to each component of y; NaN or infinite if the correction is. */
 static double phi_size(const double y[PHI_DIM], const double delta[PHI_DIM])
@@ -40,9 +39,8 @@ static double phi_size(const double y[PHI_DIM], const double delta[PHI_DIM])
 }
 #endif
 
-/* Corrections below the first that shrink by less than the second have reached the level of rounding. */
-#define PHI_NEARLY_SOLVED 1e-8
-#define PHI_SHRINKING 0.25
+#define PHI_NEARLY_SOLVED 1e-8 /* corrections below this have reached the level of rounding, ... */
+#define PHI_SHRINKING 0.25     /* ... if one is more than this part of the one before */
 
 /* Solve (y - x) + displacement(y) = 0 for y by Newton's method from the extrapolated guess, and advance. The
    increment is corrected to first order by the last Newton correction, so that correction costs no evaluation:
@@ -50,12 +48,14 @@ static double phi_size(const double y[PHI_DIM], const double delta[PHI_DIM])
 static phi_status phi_attempt(phi_solver *s, int stage)
 {
     double y[PHI_DIM], delta[PHI_DIM], displacement[PHI_DIM], increment[PHI_DIM];
-    double jacobian[PHI_DIM * PHI_DIM], increment_jacobian[PHI_DIM * PHI_DIM], previous = HUGE_VAL;
+    double jacobian[PHI_DIM * PHI_DIM], increment_jacobian[PHI_DIM * PHI_DIM];
+    double previous = HUGE_VAL;
     if (!phi_predict(&s->history[stage], y)) memcpy(y, s->x, sizeof y);
     for (int iteration = 1; iteration <= PHI_MAX_ITERATIONS; ++iteration) {
         phi_linearise(s->coef[stage], y, displacement, increment, jacobian, increment_jacobian);
         ++s->evaluations;
-        for (int i = 0; i < PHI_DIM; ++i) delta[i] = ((y[i] - s->x[i]) + displacement[i]) - s->carry[i];
+        for (int i = 0; i < PHI_DIM; ++i)
+            delta[i] = ((y[i] - s->x[i]) + displacement[i]) - s->carry[i];
         const int regular = phi_solve(jacobian, delta);
         const double size = phi_size(y, delta), growth = size / (previous * previous);
         if (!isfinite(size)) return PHI_NOT_FINITE;
@@ -65,11 +65,13 @@ static phi_status phi_attempt(phi_solver *s, int stage)
         const int stalled = previous < PHI_NEARLY_SOLVED && size > PHI_SHRINKING * previous;
         previous = size;
         if (!(remaining <= PHI_TOLERANCE || stalled)) continue;
-        double correction[PHI_DIM] = { 0.0 };
-        for (int i = 0; i < PHI_DIM; ++i)
-            for (int j = 0; j < PHI_DIM; ++j) correction[i] -= increment_jacobian[i * PHI_DIM + j] * delta[j];
+        double small[PHI_DIM] = { 0.0 }; /* the correction of the increment, and the carry */
+        for (int i = 0; i < PHI_DIM; ++i) {
+            for (int j = 0; j < PHI_DIM; ++j) small[i] -= increment_jacobian[i * PHI_DIM + j] * delta[j];
+            small[i] += s->carry[i];
+        }
         if (!phi_plausible(s, stage, increment)) return PHI_NO_CONVERGENCE;
-        if (!phi_advance(s, increment, correction)) return PHI_NOT_FINITE;
+        if (!phi_advance(s, increment, small)) return PHI_NOT_FINITE;
 #if PHI_RECURRENCES
         phi_remember(&s->history[stage], y, iteration);
 #else

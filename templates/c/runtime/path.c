@@ -118,7 +118,7 @@ static int phi_differences(phi_solver *s, const double *coef, const double p[PHI
    PHI_MOST_PIECES pieces of paths, the step is so large that a solution would mean nothing. */
 static phi_status phi_attempt(phi_solver *s, int stage)
 {
-    const double *coef = s->coef[stage], none[PHI_DIM] = { 0.0 };
+    const double *coef = s->coef[stage];
     double p[PHI_DIM], y[PHI_DIM], residual[PHI_DIM], change[PHI_DIM], jacobian[PHI_DIM * PHI_DIM], previous = HUGE_VAL;
     if (!phi_predict(&s->history[stage], y)) memcpy(y, s->x, sizeof y);
     phi_generate(coef, y, p, jacobian);
@@ -134,7 +134,7 @@ static phi_status phi_attempt(phi_solver *s, int stage)
         /* The second test: residuals no longer shrink, the solve has reached the level of rounding. */
         if (size <= 4e-16 || (previous < 1e-12 && size > 0.25 * previous)) {
             if (!phi_plausible(s, stage, change)) return PHI_NO_CONVERGENCE;
-            if (!phi_advance(s, change, none)) return PHI_NOT_FINITE;
+            if (!phi_advance(s, change, s->carry)) return PHI_NOT_FINITE;
 #if PHI_RECURRENCES
             phi_remember(&s->history[stage], y, iteration);
 #else

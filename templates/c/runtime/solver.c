@@ -22,24 +22,10 @@
 
 /* ---- The solver ---- */
 #if PHI_PARAMETERS
-/* Whether steps can be made with these parameters: allowed, and with finite coefficients for a step so short that it has
-   no part in it. */
-static int phi_admissible(const phi_params *params)
-{
-    double coef[PHI_COEFFICIENTS];
-    if (!phi_allowed(params)) return 0;
-#if PHI_GAUGE
-    phi_prepare(params, (const double[PHI_GAUGES]){ 0.0 }, 1e-100, coef);
-#else
-    phi_prepare(params, 1e-100, coef);
-#endif
-    for (int k = 0; k < PHI_COEFFICIENTS; ++k)
-        if (!isfinite(coef[k])) return 0;
-    return 1;
-}
+#define PHI_SHORT_STEP 1e-100 /* so short that it has no part in whether coefficients are finite */
 
 #endif
-/* The arguments may be parts of *s: they are read before it is written. */
+/* The arguments may be parts of *s, which is therefore written last. */
 #if PHI_GAUGE
 phi_status phi_init_gauge(phi_solver *s, const phi_params *params, const double x0[PHI_DIM],
     const double gauge[PHI_GAUGES])
@@ -48,28 +34,28 @@ phi_status phi_init(phi_solver *s, const phi_params *params, const double x0[PHI
 #endif
 {
     if (s == NULL || x0 == NULL) return PHI_BAD_ARGUMENT;
-    const phi_params own = params != NULL ? *params : phi_default_params;
-    double x[PHI_DIM];
-    memcpy(x, x0, sizeof x);
+    phi_solver fresh = { .h = (double)NAN };
+    fresh.params = params != NULL ? *params : phi_default_params;
+    memcpy(fresh.x, x0, sizeof fresh.x);
     for (int i = 0; i < PHI_DIM; ++i)
-        if (!isfinite(x[i])) return PHI_BAD_ARGUMENT;
-#if PHI_GAUGE
-    double multiples[PHI_GAUGES] = { 0.0 };
-    const int given = gauge != NULL;
-    if (given) memcpy(multiples, gauge, sizeof multiples);
-    for (int c = 0; c < PHI_GAUGES; ++c)
-        if (!isfinite(multiples[c])) return PHI_BAD_ARGUMENT;
-#endif
+        if (!isfinite(fresh.x[i])) return PHI_BAD_ARGUMENT;
 #if PHI_PARAMETERS
-    if (!phi_admissible(&own)) return PHI_BAD_ARGUMENT;
-#endif
-    memset(s, 0, sizeof *s);
-    memcpy(s->x, x, sizeof s->x);
-    s->params = own;
+    if (!phi_allowed(&fresh.params)) return PHI_BAD_ARGUMENT;
 #if PHI_GAUGE
-    if (!given) phi_choose_gauge(&own, x, multiples);
-    memcpy(s->gauge, multiples, sizeof s->gauge);
+    phi_prepare(&fresh.params, fresh.gauge, PHI_SHORT_STEP, fresh.coef[0]);
+#else
+    phi_prepare(&fresh.params, PHI_SHORT_STEP, fresh.coef[0]);
 #endif
+    for (int k = 0; k < PHI_COEFFICIENTS; ++k)
+        if (!isfinite(fresh.coef[0][k])) return PHI_BAD_ARGUMENT;
+#endif
+#if PHI_GAUGE
+    if (gauge == NULL) phi_choose_gauge(&fresh.params, fresh.x, fresh.gauge);
+    else memcpy(fresh.gauge, gauge, sizeof fresh.gauge);
+    for (int c = 0; c < PHI_GAUGES; ++c)
+        if (!isfinite(fresh.gauge[c])) return PHI_BAD_ARGUMENT;
+#endif
+    *s = fresh;
     return PHI_OK;
 }
 
@@ -84,7 +70,7 @@ phi_status phi_init(phi_solver *s, const phi_params *params, const double x0[PHI
 static phi_status phi_set_step(phi_solver *s, double h)
 {
     if (s == NULL || !isfinite(h)) return PHI_BAD_ARGUMENT;
-    if (s->prepared && memcmp(&h, &s->h, sizeof h) == 0) return PHI_OK;
+    if (memcmp(&h, &s->h, sizeof h) == 0) return PHI_OK;
     for (int stage = 0; stage < PHI_STAGES; ++stage)
 #if PHI_GAUGE
         phi_prepare(&s->params, s->gauge, phi_fractions[stage] * h, s->coef[stage]);
@@ -105,7 +91,6 @@ static phi_status phi_set_step(phi_solver *s, double h)
     s->h = h;
     s->t_before_h = s->t;
     s->steps_before_h = s->steps;
-    s->prepared = 1;
     return PHI_OK;
 }
 
@@ -122,12 +107,10 @@ static void phi_count(phi_solver *s, size_t steps)
 /* One stage. A guess from earlier steps may have misled it: then once more without. */
 static phi_status phi_stage(phi_solver *s, int stage)
 {
-    phi_status status = phi_attempt(s, stage);
-    if (status != PHI_OK && s->history[stage].count > 0) {
-        memset(&s->history[stage], 0, sizeof s->history[stage]);
-        status = phi_attempt(s, stage);
-    }
-    return status;
+    const phi_status status = phi_attempt(s, stage);
+    if (status == PHI_OK || s->history[stage].count == 0) return status;
+    memset(&s->history[stage], 0, sizeof s->history[stage]);
+    return phi_attempt(s, stage);
 }
 
 #endif
@@ -148,32 +131,38 @@ static phi_status phi_stages(phi_solver *s)
 }
 
 #endif
+#if PHI_BLOCKS
 phi_status phi_step(phi_solver *s, double h)
 {
     phi_status status = phi_set_step(s, h);
     if (status != PHI_OK) return status;
-#if PHI_COMPOSED || PHI_SPLITTING
+#if PHI_COMPOSED
     status = phi_stages(s);
 #else
     for (int stage = 0; stage < PHI_STAGES; ++stage) status = phi_stage(s, stage);
 #endif
-#if PHI_BLOCKS
     if (status == PHI_OK) phi_count(s, 1);
-#else
-    if (status != PHI_OK) return status;
-    ++s->steps;
-    s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
-#endif
     return status;
 }
 
-#if !PHI_BLOCKS
+#else
 phi_status phi_integrate(phi_solver *s, double h, size_t steps)
 {
     phi_status status = phi_set_step(s, h);
-    for (; steps > 0 && status == PHI_OK; --steps) status = phi_step(s, h);
+    for (; steps > 0 && status == PHI_OK; --steps) {
+#if PHI_COMPOSED || PHI_SPLITTING
+        status = phi_stages(s);
+#else
+        for (int stage = 0; stage < PHI_STAGES; ++stage) status = phi_stage(s, stage);
+#endif
+        if (status != PHI_OK) break;
+        ++s->steps;
+        s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
+    }
     return status;
 }
+
+phi_status phi_step(phi_solver *s, double h) { return phi_integrate(s, h, 1); }
 
 #endif
 const char *phi_status_string(phi_status status)
@@ -189,6 +178,5 @@ const char *phi_status_string(phi_status status)
 }
 
 size_t phi_solver_size(void) { return sizeof(phi_solver); }
-
 size_t phi_solver_steps_done(const phi_solver *s) { return s->steps; }
 #endif

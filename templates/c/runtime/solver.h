@@ -2,19 +2,15 @@
 #define PHI_FILE_SOLVER_H
 #include "declarations.h"
 
-/* How a step ends. */
+/* How a step ends; phi_status_string says it in words. */
 typedef enum {
-    PHI_OK = 0,
-    PHI_NO_CONVERGENCE, /* the inner solve did not converge: the step is too large */
-    PHI_SINGULAR,       /* the Newton matrix is singular: the step is too large */
-    PHI_NOT_FINITE,     /* infinity or NaN: overflow, or outside the domain */
-    PHI_BAD_ARGUMENT    /* a null pointer, or values that are not allowed */
+    PHI_OK = 0, PHI_NO_CONVERGENCE, PHI_SINGULAR, PHI_NOT_FINITE, PHI_BAD_ARGUMENT
 } phi_status;
 
 #if PHI_IMPLICIT && !PHI_RECURRENCES
-enum { PHI_DIFFERENCES = 9 }; /* extrapolation of more than order 8 amplifies rounding more than it gains */
+enum { PHI_DIFFERENCES = 9 }; /* those of higher order amplify rounding more than they gain */
 
-/* The last value of the unknown and its backward differences, which the next is extrapolated by. For speed only. */
+/* The last value of the unknown and its backward differences, for a guess at the next. */
 typedef struct {
     int count; /* differences that are known */
     int order; /* how many of them the extrapolation adds up */
@@ -60,13 +56,12 @@ typedef struct {
     size_t steps;          /* good steps since phi_init */
     size_t evaluations;    /* of the generating function, for statistics */
     double t;              /* time since phi_init */
-    double h;              /* the last step size */
+    double h;              /* the last step size; NaN before the first step */
     phi_params params;
 #if PHI_GAUGE
     double gauge[PHI_GAUGES]; /* multiples of Casimirs that are taken from H, in their order */
 #endif
     double coef[PHI_STAGES][PHI_COEFFICIENTS]; /* all that depends on params and h only */
-    int prepared;          /* whether coef has been computed */
     size_t steps_before_h; /* steps and t when h was set: t is counted from there, so no error adds up */
     double t_before_h;
 #if PHI_IMPLICIT
@@ -94,8 +89,8 @@ phi_status phi_step(phi_solver *s, double h);
 /* Many steps. On failure s->x is the last good state and s->steps counts the good steps. */
 phi_status phi_integrate(phi_solver *s, double h, size_t steps);
 
-/* Many members, in place: x[i * members + m] is coordinate i of member m. status (or NULL) receives the status of
-   each member; a failed member keeps its last good state. Returns the first status that is not OK. */
+/* Many members, in place: x[i * members + m] is coordinate i of member m. One that fails keeps its last good state.
+   status (or NULL) receives the status of each; the first that is not OK is returned. */
 #if PHI_GROUPS || PHI_PACKS
 /* Members are integrated side by side in groups; with OpenMP, groups in parallel. */
 #endif

@@ -223,7 +223,6 @@ static phi_status phi_tangent_stage(const double *coef, const double x[PHI_DIM],
 /* Move at through one stage of the step that s has made, and multiply product by the derivative. */
 static phi_status phi_tangent_of(const phi_solver *s, int stage, phi_solver *at, double product[PHI_DIM * PHI_DIM])
 {
-    const double none[PHI_DIM] = { 0.0 };
     double derivative[PHI_DIM * PHI_DIM], both[PHI_DIM * PHI_DIM], change[PHI_DIM];
 #if PHI_RECURRENCES
     const phi_history *history = &s->history[stage];
@@ -235,7 +234,7 @@ static phi_status phi_tangent_of(const phi_solver *s, int stage, phi_solver *at,
 #endif
     const phi_status status = phi_tangent_stage(s->coef[stage], at->x, at->carry, value, change, derivative);
     if (status != PHI_OK) return status;
-    if (!phi_advance(at, change, none)) return PHI_NOT_FINITE;
+    if (!phi_advance(at, change, at->carry)) return PHI_NOT_FINITE;
     phi_tangent_product(derivative, product, both);
     memcpy(product, both, sizeof both);
     return PHI_OK;
