@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from phigen.cli.console import heading, out, out_json, verbosity
+from phigen.cli.console import heading, out, out_document, out_json, verbosity
 from phigen.cli.sources import CORRECTIONS, ORDER, load_one, one_spec, scheme_option
 
 if TYPE_CHECKING:
@@ -24,6 +24,9 @@ if TYPE_CHECKING:
 @click.option(
     "--modified", metavar="N", type=CORRECTIONS, default=0, help="So many corrections of the modified Hamiltonian."
 )
+@click.option(
+    "--expand", "sizes", metavar="SIZES", help="Of a lattice: the ordinary spec of a small one; 3x3, or a run's name."
+)
 @click.option("--latex", "as_latex", is_flag=True, help="The formulas as LaTeX, ready for \\input.")
 @click.option("--json", "as_json", is_flag=True, help="For machines: one object of texts.")
 @verbosity
@@ -33,16 +36,27 @@ def command(
     scheme: str | None,
     full: bool,
     modified: int,
+    sizes: str | None,
     as_latex: bool,
     as_json: bool,
 ) -> None:
-    """Show the formulas of a spec: π, Casimirs, α, β, S_1 … S_k, the modified Hamiltonian, operation counts."""
+    """Show the formulas of a spec: π, Casimirs, α, β, S_1 … S_k, the modified Hamiltonian, operation counts.
+
+    Of a lattice it shows the cell; with --expand a small lattice as an ordinary spec, a coordinate for each field of
+    each site.
+    """
     from phigen.api import compilation_of
     from phigen.symbolic.readable import SHOWN
 
     if as_latex and as_json:
         raise click.UsageError("--latex and --json exclude one another")
-    compilation = compilation_of(load_one(spec_file), order, scheme=scheme)
+    spec = load_one(spec_file)
+    if sizes is not None:
+        from phigen.cli.expanding import expanded_text
+
+        out_document(expanded_text(spec, sizes))
+        return
+    compilation = compilation_of(spec, order, scheme=scheme)
     if as_latex:
         from phigen.notation.latex import document
 

@@ -73,7 +73,7 @@ class Declarations:
         listed = [n for i in self.lattice.indices for n in (i, f"N_{i}")] if self.lattice else []
         return {n: (f"{why}; {n!r} depends on the site" if n[:2] != "N_" else f"{why} and sizes", hint) for n in listed}
 
-    def _indices(self, names: Mapping[str, Expression], ends: tuple[str, ...] = ()) -> Indices | None:
+    def indices(self, names: Mapping[str, Expression], ends: tuple[str, ...] = ()) -> Indices | None:
         """What may have an index: whatever depends on the site."""
         if self.lattice is None or not self.indexed:
             return None
@@ -88,7 +88,7 @@ class Declarations:
     def bond_scope(self) -> Scope:
         """For densities of bonds and pairs, and brackets along bonds: sites are the ends a and b."""
         names = self.scope().names
-        indices = self._indices(names, ENDS)
+        indices = self.indices(names, ENDS)
         local = indices.names if indices else {}
         what = "a pair" if self.relation == "pairs" else "a bond"
         ends = {n: (f"{n!r} is at which end of {what}?", f"write {n}[a] or {n}[b]") for n in local}
@@ -125,7 +125,7 @@ class Declarations:
         bonds = self._at_bonds(names)
         known = {n: e for n, e in names.items() if n not in bonds}
         refused = self.refused | self._counters() | bonds
-        return Scope(known, refused, open=self.incomplete, indices=self._indices(known))
+        return Scope(known, refused, open=self.incomplete, indices=self.indices(known))
 
     def constants(self, what: str, extra: Mapping[str, Expression] | None = None) -> Scope:
         """Parameters and what depends on them alone; ``what`` says for what in the message about others."""
@@ -291,12 +291,13 @@ def _declare_definitions(entries: Mapping[str, tuple[Scalar, Scalar | None]], de
     uses = {name: names_in(node.text) if node else [] for name, node in sources.items()}
     coordinates = set(declared.coordinates)
     # Placeholders first: only the members of a cycle, which is an error, meet one.
-    names = {**declared.scope().names, **{name: symbol(name) for name in sources}}
-    scope = Scope(names, open=declared.incomplete)
+    known = declared.scope()
+    names = {**known.names, **{name: symbol(name) for name in sources}}
     for name in _in_order(uses, entries, declared.reader):
         if any(u in coordinates or u in declared.varying for u in uses[name]):
             declared.varying.add(name)
-        expression = declared.formula(sources[name], scope)
+        here = replace(known, names=names, indices=declared.indices(names))
+        expression = declared.formula(sources[name], here)
         # After an error the name stays declared, so that its uses are not reported too.
         declared.definitions[name] = names[name] = symbol(name) if expression is None else expression
 

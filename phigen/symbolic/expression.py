@@ -468,11 +468,11 @@ def gradient(e: Expression, names: Sequence[str]) -> list[Expression]:
 _PRECEDENCE = {"add": 1, "sub": 1, "neg": 1, "mul": 2, "pow": 3}
 
 
-def text(e: Expression) -> str:
+def text(e: Expression, longest: int = 2000) -> str:
     """The expression in the syntax of a spec; parsing it gives an equal expression.
 
-    Meant for messages: a shared sub-expression is written out wherever it occurs, and what would be
-    longer than 2,000 characters is cut with an ellipsis.
+    Meant for messages: a shared sub-expression is written out wherever it occurs, and what would be longer
+    is cut with an ellipsis.
     """
 
     def wrap(part: tuple[str, int], level: int) -> str:
@@ -511,6 +511,6 @@ def text(e: Expression) -> str:
                 out = f"{wrap(args[0], 4)}**({args[1][0]})", 3
             case _:
                 out = f"{node.op}({', '.join(a for a, _ in args)})", 4
-        return (out[0], out[1]) if len(out[0]) <= 2000 else ("…", 4)
+        return (out[0], out[1]) if len(out[0]) <= longest else ("…", 4)
 
     return fold([e], visit)[0][0]

@@ -94,11 +94,11 @@ def readable(expressions: Sequence[Expression], most: int | None = SHOWN) -> lis
 
 
 def _written(e: Expression) -> str:
-    return _infix(e) if len(topological([e])) <= _LARGE else text(e)
+    return infix(e) if len(topological([e])) <= _LARGE else text(e)
 
 
-def _infix(e: Expression) -> str:
-    """The expression as text with no more parentheses than mathematics needs, unlike `text`, which keeps the tree."""
+def infix(e: Expression) -> str:
+    """The expression as text of any length, with no more parentheses than mathematics needs; `text` keeps the tree."""
 
     def wrap(part: tuple[str, int], level: int) -> str:
         return part[0] if part[1] >= level else f"({part[0]})"
@@ -135,7 +135,7 @@ def _infix(e: Expression) -> str:
             case _ if node.args:
                 return f"{_GREEK.get(node.op, node.op)}({', '.join(a for a, _ in args)})", 4
         written = text(node)
-        return written, 4 if not node.args and written.isidentifier() else 3 if written.isdigit() else 2
+        return written, 4 if node.op == "symbol" or written.isidentifier() else 3 if written.isdigit() else 2
 
     return fold([e], visit)[0][0]
 

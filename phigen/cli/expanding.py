@@ -1,0 +1,79 @@
+"""``phigen show --expand``: a small lattice, printed as an ordinary spec."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import click
+
+from phigen.errors import Diagnostic, LimitError, SpecError
+
+if TYPE_CHECKING:
+    from phigen.lattice.cell import Cell
+    from phigen.lattice.expansion import Expansion
+    from phigen.spec.model import Run, Spec
+
+OPTION = "--expand"
+
+
+def expanded_text(spec: Spec, sizes: str) -> str:
+    """The text of a spec for the lattice at sizes such as ``3x3``, or at those of the run of that name."""
+    from phigen.lattice.building import cell_from_spec
+    from phigen.spec.yaml_text import spec_text
+
+    if spec.lattice is None:
+        message = f"{spec.name} is no lattice, and has nothing to expand"
+        raise click.BadParameter(message, param_hint=OPTION)
+    cell = cell_from_spec(spec)
+    expansion = _expansion(spec, cell, sizes)
+    runs = {name: made for name, run in spec.runs.items() for made in [_run(spec, expansion, run)] if made}
+    title = f"{spec.title or spec.name}, {' × '.join(map(str, expansion.sizes))}"
+    return spec_text(replace(expansion.spec(), title=title, runs=runs, order=spec.order))
+
+
+def _expansion(spec: Spec, cell: Cell, given: str) -> Expansion:
+    from phigen.lattice.building import least_sizes
+    from phigen.lattice.expansion import expand, ring
+    from phigen.lattice.states import start_of
+    from phigen.spec import limits
+
+    if given in spec.runs:
+        start = start_of(spec, spec.runs[given])
+        sizes, bonds = start.sizes, [(int(a), int(b)) for a, b in start.bonds]
+    elif re.fullmatch(r"[1-9][0-9]{0,6}(x[1-9][0-9]{0,6})*", given):
+        sizes = tuple(map(int, given.split("x")))
+        bonds = ring(sizes[0]) if cell.relation == "graph" else []
+    else:
+        runs = f", or the name of a run: {', '.join(spec.runs)}" if spec.runs else ""
+        raise click.BadParameter(f"{given!r} is not sizes such as 3x3{runs}", param_hint=OPTION)
+    count = len(cell.fields)
+    for size in sizes:
+        count *= size
+    if count > limits.COORDINATES:
+        message = f"{count} coordinates; an ordinary spec has at most {limits.COORDINATES}"
+        raise LimitError([Diagnostic(f"{spec.file}: {OPTION} {given}: {message}")])
+    small = [n < least for n, least in zip(sizes, least_sizes(cell), strict=False)]
+    if any(small):
+        least = "x".join(map(str, least_sizes(cell)))
+        raise SpecError([Diagnostic(f"{spec.file}: {given} is too small for the stencil; sizes are at least {least}")])
+    try:
+        return expand(cell, sizes, bonds)
+    except ValueError as error:
+        raise click.BadParameter(str(error), param_hint=OPTION) from None
+
+
+def _run(spec: Spec, expansion: Expansion, run: Run) -> Run | None:
+    """A run at other sizes; None where its arrays are of other sizes."""
+    from phigen.lattice.expansion import run_of
+    from phigen.lattice.states import start_of
+
+    assert run.lattice is not None
+    bonds = expansion.bonds if expansion.cell.relation == "graph" else ()
+    resized = replace(run, lattice=replace(run.lattice, sizes=expansion.sizes, bonds=bonds))
+    try:
+        start = start_of(spec, resized)
+    except SpecError:
+        return None
+    return run_of(expansion, run, start.state, expansion.numbers(start.parameters))

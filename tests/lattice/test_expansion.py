@@ -1,0 +1,176 @@
+"""The expansion of a lattice into an ordinary spec, against sums over sites by plain loops and array shifts."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+from lattice.lattices import LATTICES
+
+from phigen.geometry.checks import check
+from phigen.geometry.system import System, system_from_spec
+from phigen.lattice.building import cell_from_spec
+from phigen.lattice.cell import Cell, bond_forces, contributions, vector_field
+from phigen.lattice.expansion import Expansion, expand, run_of
+from phigen.lattice.states import Start, start_of
+from phigen.spec import loads
+from phigen.spec.model import Spec
+from phigen.spec.yaml_text import spec_text
+from phigen.symbolic.arrays import evaluate
+from phigen.symbolic.expression import Expression, gradient
+from phigen.symbolic.verdict import REFUTED
+
+GRIDS = [n for n, text in LATTICES.items() if "axes" in text]
+
+
+@cache
+def prepared(name: str) -> tuple[Spec, Cell, Start, Expansion, System]:
+    """A lattice, its first run, and both as an ordinary system."""
+    spec = loads(LATTICES[name])
+    cell, start = cell_from_spec(spec), start_of(spec, next(iter(spec.runs.values())))
+    expansion = expand(cell, start.sizes, start.bonds)
+    return spec, cell, start, expansion, system_from_spec(expansion.spec())
+
+
+def values(name: str) -> dict[str, float]:
+    """Coordinates and parameters of the ordinary system, where the run starts."""
+    _, _, start, expansion, system = prepared(name)
+    return expansion.numbers(start.parameters) | dict(zip(system.coordinates, start.state.reshape(-1), strict=True))
+
+
+def on_grid(cell: Cell, start: Start, expression: Expression) -> np.ndarray:
+    """An expression at every site of a periodic grid, neighbours by shifted arrays."""
+    found = {n: v for n, v in start.parameters.items() if n not in cell.neighbours.names}
+    fields = dict(zip(cell.fields, start.state, strict=True))
+    for symbol, (base, offset) in cell.places(expression).items():
+        array = fields[base] if base in fields else start.parameters[base]
+        found[symbol] = np.roll(array, [-o for o in offset], axis=tuple(range(len(offset))))
+    return np.broadcast_to(evaluate([expression], found)[0], start.sizes)
+
+
+@pytest.mark.parametrize("name", [n for n in GRIDS if "open" not in LATTICES[n]])
+def test_the_field_at_a_site_is_that_of_the_expansion(name: str) -> None:
+    _, cell, start, _, system = prepared(name)
+    expanded = np.array(evaluate(system.vector_field(), values(name))).reshape(start.state.shape)
+    rates = vector_field(cell)
+    for k, f in enumerate(cell.fields):
+        np.testing.assert_allclose(on_grid(cell, start, rates[f]), expanded[k], rtol=1e-13, atol=1e-13)
+
+
+@pytest.mark.parametrize("name", GRIDS)
+def test_forces_are_the_gradient_of_h_at_open_ends_too(name: str) -> None:
+    _, cell, start, expansion, system = prepared(name)
+    slopes = evaluate(gradient(system.hamiltonian, system.coordinates), values(name))
+    found = dict(zip(system.coordinates, slopes, strict=True))
+    for f, listed in contributions(cell).items():
+        for site in expansion.sites:
+            force = 0.0
+            for c in listed:
+                inside = all(
+                    b == "periodic" or (s + low >= 0 and s + high < n)
+                    for b, s, low, high, n in zip(cell.boundary, site, c.low, c.high, start.sizes, strict=True)
+                )
+                term = expansion.at(c.expression, site) if inside else None
+                force += float(evaluate([term], values(name))[0]) if term is not None else 0.0
+            np.testing.assert_allclose(force, found[expansion.names[f, site]], rtol=1e-12, atol=1e-13)
+
+
+@pytest.mark.parametrize("name", [n for n in GRIDS if "open" not in LATTICES[n]])
+def test_h_is_the_sum_of_the_density(name: str) -> None:
+    _, cell, start, _, system = prepared(name)
+    expected = evaluate([system.hamiltonian], values(name))[0]
+    np.testing.assert_allclose(on_grid(cell, start, cell.hamiltonian).sum(), expected, rtol=1e-13)
+
+
+def test_open_ends_leave_out_the_terms_that_reach_beyond() -> None:
+    _, _, start, _, system = prepared("fput_open")
+    q, p = start.state
+    r = q[1:] - q[:-1]
+    energy = (p**2 / 2).sum() + (r**2 / 2 + 0.25 * r**3 / 3 + 0.5 * r**4 / 4).sum()
+    np.testing.assert_allclose(evaluate([system.hamiltonian], values("fput_open"))[0], energy, rtol=1e-14)
+
+
+def test_bonds_are_summed_with_their_own_parameters() -> None:
+    _, cell, start, _, system = prepared("spin_graph")
+    x, y, z = start.state
+    J, D = start.parameters["J"], start.parameters["D"]
+    energy = -(start.parameters["B"] * z).sum()
+    force = np.zeros_like(x)
+    for k, (a, b) in enumerate(start.bonds):
+        energy -= J[k] * (x[a] * x[b] + y[a] * y[b] + z[a] * z[b]) + D * (x[a] * y[b] - y[a] * x[b])
+        ends = {f"{f}[{e}]": v[s] for f, v in zip("xyz", start.state, strict=True) for e, s in (("a", a), ("b", b))}
+        slopes = bond_forces(cell)
+        force[a] += evaluate([slopes["x[a]"]], ends | {"J": J[k], "D": D})[0]
+        force[b] += evaluate([slopes["x[b]"]], ends | {"J": J[k], "D": D})[0]
+    slopes = evaluate(gradient(system.hamiltonian, system.coordinates[:4]), values("spin_graph"))
+    np.testing.assert_allclose(evaluate([system.hamiltonian], values("spin_graph"))[0], energy, rtol=1e-14)
+    np.testing.assert_allclose(slopes, force, rtol=1e-13)
+
+
+def test_brackets_along_bonds_add_up() -> None:
+    _, _, start, expansion, system = prepared("food_web")
+    x, A = start.state[0], start.parameters["A"]
+    expected = np.zeros((4, 4))
+    for k, (a, b) in enumerate(start.bonds):
+        expected[a, b] += A[k] * x[a] * x[b]
+        expected[b, a] -= A[k] * x[a] * x[b]
+    found = [evaluate(row, values("food_web")) for row in system.poisson]
+    np.testing.assert_allclose(np.array(found, dtype=float), expected, rtol=1e-14)
+    assert expansion.coordinates == ("x_0", "x_1", "x_2", "x_3")
+
+
+def test_every_pair_is_counted_once() -> None:
+    _, _, start, _, system = prepared("vortices")
+    x, y = start.state
+    G = start.parameters["G"]
+    energy = 0.0
+    for a in range(4):
+        for b in range(a):
+            energy -= G[a] * G[b] * np.log((x[a] - x[b]) ** 2 + (y[a] - y[b]) ** 2) / (4 * np.pi)
+    np.testing.assert_allclose(evaluate([system.hamiltonian], values("vortices"))[0], energy, rtol=1e-14)
+
+
+@pytest.mark.parametrize("name", LATTICES)
+def test_the_expansion_is_a_poisson_system_with_what_the_spec_claims(name: str) -> None:
+    system = prepared(name)[-1]
+    assert [str(s) for s in check(system) if s.verdict == REFUTED] == []
+    assert len(system.casimirs) >= len(prepared(name)[1].casimirs)
+
+
+@pytest.mark.parametrize("name", LATTICES)
+def test_the_text_of_an_expansion_reads_as_the_same_spec(name: str) -> None:
+    spec, _, start, expansion, _ = prepared(name)
+    (run,) = spec.runs.values()
+    numbers = expansion.numbers(start.parameters)
+    made = replace(expansion.spec(), runs={run.name: run_of(expansion, run, start.state, numbers)})
+    read = loads(spec_text(made))
+    here = values(name)
+    assert (read.coordinates, [p.name for p in read.parameters]) == (
+        made.coordinates,
+        [p.name for p in made.parameters],
+    )
+    pairs = [(read.hamiltonian, made.hamiltonian)]
+    rows = zip(read.poisson.entries, made.poisson.entries, strict=True)
+    pairs += [pair for r, s in rows for pair in zip(r, s, strict=True)]
+    pairs += [(read.casimirs[n], e) for n, e in made.casimirs.items()]
+    pairs += [(read.invariants[n], e) for n, e in made.invariants.items()]
+    for left, right in pairs:
+        np.testing.assert_allclose(*evaluate([left, right], here), rtol=1e-13, atol=1e-15)
+    assert read.runs[run.name].initial == made.runs[run.name].initial
+    assert read.runs[run.name].parameters == made.runs[run.name].parameters
+
+
+def test_sizes_that_do_not_fit_are_refused() -> None:
+    cell = prepared("spins_2")[1]
+    with pytest.raises(ValueError, match="sizes are 2, along i, j; not 3"):
+        expand(cell, (3,))
+    with pytest.raises(ValueError, match="between 0 and 2"):
+        expand(prepared("spin_graph")[1], (3,), [(0, 3)])
+
+
+def test_names_of_sites_do_not_clash_with_others() -> None:
+    text = LATTICES["toda"].replace("{B: {value: b, at: sum}, A:", "{b_1: {value: b, at: sum}, A:")
+    cell = cell_from_spec(loads(text))
+    assert expand(cell, (3,)).names["b", (1,)] == "b_1_"
