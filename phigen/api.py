@@ -146,6 +146,7 @@ def interface_of(program: Program) -> Interface:
         parameters={p.name: float(p.value) for p in program.parameters},
         positive=frozenset(p.name for p in program.parameters if p.positive),
         casimirs=program.casimirs,
+        time=program.time,
     )
 
 
@@ -174,6 +175,7 @@ def _spec_of(system: System) -> Spec:
         coordinates=system.coordinates,
         poisson=system.form,
         hamiltonian=system.hamiltonian,
+        time=system.time,
         parameters=system.parameters,
         casimirs={name: system.casimirs[name] for name in system.declared},
         invariants=system.invariants,

@@ -155,6 +155,9 @@ def _compiled(
 
 def _split(spec: Spec, source: System, order: int | None, described: Mapping[str, Any], clock: _Clock) -> Compilation:
     """Compile to a splitting."""
+    if source.time:
+        reason = f"scheme: splitting is not offered yet where H depends on the time {source.time}"
+        raise SpecError([spec.diagnostic(("scheme",), reason, "scheme: series takes it")])
     gauge = Gauge() if isinstance(spec.gauge, str) else given(source, spec.gauge)
     discretised = gauge.applied(source)
     parts = clock.timed("splitting", lambda: split(discretised))

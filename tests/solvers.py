@@ -60,6 +60,7 @@ def interface(compilation: Compilation) -> Interface:
         {p.name: float(p.value) for p in program.parameters},
         frozenset(p.name for p in program.parameters if p.positive),
         program.casimirs,
+        program.time,
     )
 
 

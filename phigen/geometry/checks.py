@@ -41,12 +41,14 @@ def casimir_statements(system: System) -> Iterator[Statement]:
 
 
 def invariant_statements(system: System) -> Iterator[Statement]:
-    """{F, H} = 0 for each further first integral."""
+    """{F, H} + ∂_t F = 0 for each further first integral F."""
     flow = system.vector_field()
     for name, invariant in system.invariants.items():
         slopes = gradient(invariant, system.coordinates)
         rate = total(s * f for s, f in zip(slopes, flow, strict=True) if not s.is_zero)
-        yield decide_zero(f"{name} is invariant", [(f"{{{name}, H}}", rate)], system.positive)
+        rate += total(gradient(invariant, system.times))
+        label = f"{{{name}, H}} + ∂{name}/∂{system.time}" if system.time else f"{{{name}, H}}"
+        yield decide_zero(f"{name} is invariant", [(label, rate)], system.positive)
 
 
 def rank_statement(system: System) -> Statement:

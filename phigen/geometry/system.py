@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from fractions import Fraction
 from typing import TYPE_CHECKING, Any
 
 from phigen.errors import Diagnostic, Location, SpecError
@@ -23,13 +24,14 @@ _SHOWN = 60
 
 @dataclass(frozen=True, repr=False)
 class System:
-    """ẋ = π(x)∇H(x).
+    """ẋ = π(x)∇H(x), or ẋ = π(x)∇H(t, x).
 
     ``poisson`` is the n×n matrix π_ij = {x_i, x_j}; expressions use the coordinates and parameters as
     symbols. ``casimirs`` holds the declared ones first, in the order of the spec, then the found ones
     (``C1``, ``C2``, …; ``declared`` has the names of the former). ``shape`` is what π was recognised as,
-    ``form`` what the spec said. ``notes`` says what was not searched for, and why. ``spec`` is where it comes
-    from, None for a system built in Python.
+    ``form`` what the spec said. ``time`` is the symbol of t, which H and the invariants may contain; empty if there is
+    none. ``notes`` says what was not searched for, and why. ``spec`` is where it comes from, None for a system built in
+    Python.
     """
 
     name: str
@@ -41,6 +43,7 @@ class System:
     invariants: Mapping[str, Expression]
     shape: Shape
     form: PoissonForm
+    time: str = ""
     declared: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
     locations: Mapping[tuple[Any, ...], Location] = field(default_factory=dict)
@@ -60,6 +63,17 @@ class System:
     def parameter_names(self) -> tuple[str, ...]:
         """Names of the parameters, in the order of the spec."""
         return tuple(p.name for p in self.parameters)
+
+    @property
+    def times(self) -> tuple[str, ...]:
+        """The symbol of the time, if there is one."""
+        return (self.time,) if self.time else ()
+
+    @property
+    def frozen(self) -> System:
+        """The system whose time stands still: one more parameter."""
+        standing = tuple(Parameter(t, Fraction(0)) for t in self.times)
+        return replace(self, parameters=(*self.parameters, *standing), time="")
 
     @property
     def positive(self) -> tuple[str, ...]:
@@ -136,6 +150,7 @@ def system_from_spec(spec: Spec) -> System:
         casimirs=spec.casimirs,
         invariants=spec.invariants,
         locations=spec.locations,
+        time=spec.time,
     )
     return replace(system, spec=spec)
 
@@ -150,6 +165,7 @@ def build_system(
     casimirs: Mapping[str, Expression] | None = None,
     invariants: Mapping[str, Expression] | None = None,
     locations: Mapping[tuple[Any, ...], Location] | None = None,
+    time: str = "",
 ) -> System:
     """A `System` from its parts; see `system_from_spec`."""
     locations = locations or {}
@@ -158,7 +174,7 @@ def build_system(
         matrix, shape = structure(form, coordinates)
     except SpecError as error:
         raise _located(error, locations) from None
-    taken = {*coordinates, *(p.name for p in parameters), *declared, *(invariants or {})}
+    taken = {*coordinates, time, *(p.name for p in parameters), *declared, *(invariants or {})}
     found, notes = found_casimirs(coordinates, matrix, shape, form, declared, taken)
     return System(
         name,
@@ -170,6 +186,7 @@ def build_system(
         dict(invariants or {}),
         shape,
         form,
+        time,
         tuple(declared),
         notes,
         locations,

@@ -84,7 +84,7 @@ Lanes = Blocks | Packs
 
 def in_lanes(program: Program) -> Lanes | None:
     """What is computed in lanes; None where the spec says no, or it is not possible, or would need too much room."""
-    if not program.lanes:
+    if not program.lanes or program.time:
         return None
     match program.step:
         case Newton() as step:

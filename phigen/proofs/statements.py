@@ -29,7 +29,7 @@ def definedness(system: System, spec: Spec) -> dict[str, tuple[Statement, ...]]:
     starts = []
     for run in spec.runs.values():
         initial = dict(zip(spec.coordinates, map(float, run.initial), strict=True))
-        starts.append(spec.parameters_of(run) | initial)
+        starts.append(spec.parameters_of(run) | initial | dict.fromkeys(system.times, float(run.start)))
     found = tuple(undefined_parts(system, starts))
     return {DEFINEDNESS: found} if found else {}
 
@@ -61,10 +61,11 @@ def series_statements(compilation: Compilation) -> Iterator[Statement]:
     """S_1 … S_k solve the Hamilton–Jacobi equation; the S_i of even index vanish where the order rests on it."""
     system, realisation, plan = compilation.discretised, compilation.chart, compilation.stage
     terms = plan.terms + (1 if realisation.symmetric else 0)  # S_{k+1} = 0 is what makes the order k + 1
-    name = f"∂_t S_t = H(α(x, ∇S_t)) for S_t = {sum_of_terms(plan.terms)}"
+    equation = "∂_t S_t = H(α(x, ∇S_t))" if not system.time else "∂_t S_t = H(τ − t/2, α(x, ∇S_t)) + ½ ∂_τ S_t"
+    name = f"{equation} for S_t = {sum_of_terms(plan.terms)}"
     try:
         series = compilation.series.polynomial(terms)
-        rest = residual(series, system.hamiltonian, compilation.series.alpha, system.coordinates)
+        rest = residual(series, system.hamiltonian, compilation.series.alpha, system.coordinates, system.times)
     except OverflowError:
         yield Statement(name, UNDECIDED, "too many terms to expand; the recursion itself is used, unexpanded")
         return

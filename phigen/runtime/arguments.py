@@ -39,6 +39,31 @@ def count(value: int, what: str, minimum: int) -> int:
     return number
 
 
+def start_time(t0: float | None, interface: Interface, more: dict[str, float]) -> float:
+    """The time of a start, 0 by default. Without a time, t0 may be a parameter, which joins ``more``."""
+    if t0 is None or interface.time:
+        return 0.0 if t0 is None else _number(t0, "the time t0")
+    if "t0" not in interface.parameters:
+        raise TypeError(f"t0 was given, but the Hamiltonian of {interface.name} does not depend on the time")
+    more["t0"] = t0
+    return 0.0
+
+
+def times(t: ArrayLike | None, interface: Interface, shape: tuple[int, ...], more: dict[str, Any]) -> Floats | None:
+    """The times of states of a ``shape``, one row; None where there is no time, and t may be a parameter."""
+    if not interface.time:
+        if t is not None and "t" not in interface.parameters:
+            raise TypeError(f"t was given, but the Hamiltonian of {interface.name} does not depend on the time")
+        more |= {} if t is None else {"t": t}
+        return None
+    if t is None:
+        raise TypeError(f"t is missing: the Hamiltonian of {interface.name} depends on the time")
+    found = np.array(np.broadcast_to(np.asarray(t, dtype=np.float64), shape)).reshape(-1)
+    if not np.isfinite(found).all():
+        raise ValueError("the times t must be finite")
+    return found
+
+
 def parameters(interface: Interface, given: Mapping[str, float] | None, more: Mapping[str, float]) -> dict[str, float]:
     """The values of all parameters: those ``given`` and ``more``, which exclude each other, and defaults."""
     known = interface.parameters

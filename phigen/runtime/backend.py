@@ -13,7 +13,8 @@ class Backend(Protocol):
     """A loaded solver.
 
     States are float64 arrays whose last axis is the coordinates. ``parameters`` holds every parameter, in the order
-    of declaration. Arguments were checked by the caller. A failing step raises `BackendError`.
+    of declaration. Arguments were checked by the caller. A failing step raises `BackendError`. The times ``t0`` of a
+    start and ``t`` (rows,) of states are given where the Hamiltonian depends on the time, and 0 and None else.
     """
 
     target: str
@@ -23,7 +24,7 @@ class Backend(Protocol):
         """A hash of all that decides the results, and what bytes of a session mean."""
         ...
 
-    def start(self, x0: Floats, parameters: Mapping[str, float]) -> Session:
+    def start(self, x0: Floats, parameters: Mapping[str, float], t0: float = 0.0) -> Session:
         """A session at x0 (DIM,)."""
         ...
 
@@ -35,11 +36,11 @@ class Backend(Protocol):
         """A back end whose trajectories all have the given gauge, one value for each Casimir of the gauge."""
         ...
 
-    def ensemble(self, x0: Floats, h: float, steps: int, parameters: Mapping[str, float]) -> Floats:
+    def ensemble(self, x0: Floats, h: float, steps: int, parameters: Mapping[str, float], t0: float = 0.0) -> Floats:
         """Final states (members, DIM) of initial states (members, DIM)."""
         ...
 
-    def hamiltonian(self, x: Floats, parameters: Mapping[str, float]) -> Floats:
+    def hamiltonian(self, x: Floats, parameters: Mapping[str, float], t: Floats | None = None) -> Floats:
         """H of the states (rows, DIM), shape (rows,)."""
         ...
 
@@ -47,6 +48,6 @@ class Backend(Protocol):
         """Casimirs of the states (rows, DIM), shape (rows, number of Casimirs)."""
         ...
 
-    def vector_field(self, x: Floats, parameters: Mapping[str, float]) -> Floats:
+    def vector_field(self, x: Floats, parameters: Mapping[str, float], t: Floats | None = None) -> Floats:
         """π∇H at the states (rows, DIM), the same shape."""
         ...

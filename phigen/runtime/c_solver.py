@@ -42,6 +42,14 @@ _SIGNATURES = {
 }
 
 
+# Where there is a time, in place of those of the same name.
+_TIMED = {
+    "init_at": (_INT, (_POINTER, _POINTER, _POINTER, _DOUBLE)),
+    "ensemble_at": (_INT, (_POINTER, _POINTER, _SIZE, _DOUBLE, _DOUBLE, _SIZE, _POINTER)),
+    "hamiltonian": (_DOUBLE, (_POINTER, _DOUBLE, _POINTER)),
+    "vector_field": (None, (_POINTER, _DOUBLE, _POINTER, _POINTER)),
+}
+
 # What is there only if it was asked for.
 _EXTRAS = {
     "step_tangent": (_INT, (_POINTER, _DOUBLE, _POINTER)),
@@ -105,7 +113,8 @@ class CSolver:
         self._files, self._library, self._gauge = dict(files), cache.load(files), gauge
         self._c: Any = SimpleNamespace()
         offered = {name: s for name, s in _EXTRAS.items() if hasattr(self._library, f"{interface.name}_{name}")}
-        for name, (result, arguments) in {**_SIGNATURES, **offered}.items():
+        timed = _TIMED if interface.time else {}
+        for name, (result, arguments) in {**_SIGNATURES, **timed, **offered}.items():
             function = getattr(self._library, f"{interface.name}_{name}", None)
             if function is None:
                 raise ToolchainError(
@@ -127,11 +136,13 @@ class CSolver:
         """See `phigen.runtime.backend.Backend`."""
         return cache.key_of(self._library)
 
-    def start(self, x0: Floats, parameters: Mapping[str, float]) -> CSession:
+    def start(self, x0: Floats, parameters: Mapping[str, float], t0: float = 0.0) -> CSession:
         """See `phigen.runtime.backend.Backend`."""
         session = CSession(self._c, _aligned(self._c.solver_size()), self.interface.dimension)
         packed, first = self._packed(parameters), np.ascontiguousarray(x0, dtype=np.float64)
-        if self._gauge is None:
+        if self.interface.time:
+            status = self._c.init_at(session.address, packed.ctypes.data, first.ctypes.data, t0)
+        elif self._gauge is None:
             status = self._c.init(session.address, packed.ctypes.data, first.ctypes.data)
         else:
             gauge = self._gauge.ctypes.data
@@ -146,7 +157,7 @@ class CSolver:
             raise ValueError(f"{len(saved)} bytes are no {self.interface.name}_solver of this library")
         return CSession(self._c, _aligned_copy(np.frombuffer(saved, dtype=np.uint8)), self.interface.dimension)
 
-    def ensemble(self, x0: Floats, h: float, steps: int, parameters: Mapping[str, float]) -> Floats:
+    def ensemble(self, x0: Floats, h: float, steps: int, parameters: Mapping[str, float], t0: float = 0.0) -> Floats:
         """See `phigen.runtime.backend.Backend`."""
         packed = self._packed(parameters)
         final, status = np.empty_like(x0, order="C"), np.zeros(len(x0), dtype=np.uint8)
@@ -155,9 +166,11 @@ class CSolver:
         for start in range(0, len(x0), chunk):
             part = slice(start, start + chunk)
             x = np.array(x0[part].T, order="C")  # x[DIM][members]
-            failure = self._c.ensemble(
-                packed.ctypes.data, x.ctypes.data, x.shape[1], h, steps, status[part].ctypes.data
-            )
+            members, rest = (packed.ctypes.data, x.ctypes.data, x.shape[1]), (h, steps, status[part].ctypes.data)
+            if self.interface.time:
+                failure = self._c.ensemble_at(*members, t0, *rest)
+            else:
+                failure = self._c.ensemble(*members, *rest)
             overall = overall or failure
             final[part] = x.T
         if overall or status.any():
@@ -166,29 +179,37 @@ class CSolver:
             raise BackendError(_status(first), -1, final, failed)
         return final
 
-    def hamiltonian(self, x: Floats, parameters: Mapping[str, float]) -> Floats:
+    def hamiltonian(self, x: Floats, parameters: Mapping[str, float], t: Floats | None = None) -> Floats:
         """See `phigen.runtime.backend.Backend`."""
         packed, x = self._packed(parameters), np.ascontiguousarray(x)
-        return np.array([self._c.hamiltonian(packed.ctypes.data, row) for row in _addresses(x)], dtype=np.float64)
+        rows = zip(*_times(t), _addresses(x), strict=True)
+        return np.array([self._c.hamiltonian(packed.ctypes.data, *row) for row in rows], dtype=np.float64)
 
     def casimirs(self, x: Floats, parameters: Mapping[str, float]) -> Floats:
         """See `phigen.runtime.backend.Backend`."""
         out = np.empty((len(x), len(self.interface.casimirs)))
         return self._fill(self._c.casimirs, x, out, parameters) if self.interface.casimirs else out
 
-    def vector_field(self, x: Floats, parameters: Mapping[str, float]) -> Floats:
+    def vector_field(self, x: Floats, parameters: Mapping[str, float], t: Floats | None = None) -> Floats:
         """See `phigen.runtime.backend.Backend`."""
-        return self._fill(self._c.vector_field, x, np.empty_like(x, order="C"), parameters)
+        return self._fill(self._c.vector_field, x, np.empty_like(x, order="C"), parameters, t)
 
-    def _fill(self, function: Any, x: Floats, out: Floats, parameters: Mapping[str, float]) -> Floats:
+    def _fill(
+        self, function: Any, x: Floats, out: Floats, parameters: Mapping[str, float], t: Floats | None = None
+    ) -> Floats:
         packed, x = self._packed(parameters), np.ascontiguousarray(x)
-        for source, target in zip(_addresses(x), _addresses(out), strict=True):
-            function(packed.ctypes.data, source, target)
+        for row in zip(*_times(t), _addresses(x), _addresses(out), strict=True):
+            function(packed.ctypes.data, *row)
         return out
 
     def _packed(self, parameters: Mapping[str, float]) -> Floats:
         # A struct without parameters has one unused char, which the zero covers.
         return np.array(list(parameters.values()) or [0.0], dtype=np.float64)
+
+
+def _times(t: Floats | None) -> list[list[float]]:
+    """The times of rows, as the first of their arguments; none where there is no time."""
+    return [] if t is None else [t.tolist()]
 
 
 def _addresses(x: Floats) -> range:

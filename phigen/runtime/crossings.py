@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
-from typing import Generic, TypeVar
+from typing import Any, Generic, TypeVar
 
 import numpy as np
 
@@ -22,8 +22,8 @@ from phigen.runtime.trajectory import trajectory_columns
 
 C = TypeVar("C", bound=Course)
 
-#: A function of states (rows, DIM), shape (rows,).
-Function = Callable[[Floats], Floats]
+#: A function of states (rows, DIM), and of their times (rows,) where there is a time: shape (rows,).
+Function = Callable[..., Floats]
 
 #: Steps whose solvers are kept at a time.
 BLOCK = 64
@@ -67,13 +67,17 @@ class CrossingFinder(Generic[C]):
     An interval between two steps has one crossing at most. Where g has an extremum near a step and one sign around it,
     it is looked up whether the sign changes twice there. A start on the section counts if g rises from it.
 
-    ``past`` holds solvers that stand at the last steps but the latest; ``values`` is g there and at the latest.
+    ``past`` holds solvers that stand at the last steps but the latest; ``values`` is g there and at the latest, and
+    ``first`` the number of the first of them. ``t0`` is the time of step 0; g is told times if it is ``timed``.
     """
 
     g: Function
     h: float
+    t0: float = 0.0
+    timed: bool = False
     past: list[C] = field(default_factory=list)
     values: list[float] = field(default_factory=list)
+    first: int = 0
 
     def follow(
         self, session: C, steps: int, move: Callable[[], object]
@@ -83,7 +87,8 @@ class CrossingFinder(Generic[C]):
         Raises `BackendError` after the last state that there is.
         """
         if not self.values:
-            self.values = [self._value(session)]
+            self.first = session.steps
+            self.values = [self._value(session, 0, 0.0)]
         while steps > 0:
             states, failure, known = [], None, len(self.values) - 1
             for _ in range(min(steps, BLOCK)):
@@ -98,29 +103,35 @@ class CrossingFinder(Generic[C]):
             steps -= len(states)
             if states:
                 rows = np.array(states)
-                self.values += self._values(rows).tolist()
-                yield rows, list(self._crossings(session.steps, known))
+                self.first = session.steps - len(rows) - known
+                self.values += self._values(rows, self._time(known + 1 + np.arange(len(rows)))).tolist()
+                yield rows, list(self._crossings(known))
                 self.past, self.values = self.past[-1:], self.values[-2:]
             if failure:
                 raise failure
 
-    def _values(self, states: Floats) -> Floats:
+    def _time(self, j: Any, fraction: float = 0.0) -> Any:
+        """The time in interval j, counted from the first of the values."""
+        return self.t0 + (self.first + j + fraction) * self.h
+
+    def _values(self, states: Floats, t: Floats) -> Floats:
         # A section is crossed where g rises in time, whether time goes forwards or backwards.
-        return math.copysign(1.0, self.h) * np.asarray(self.g(states), dtype=np.float64)
+        found = self.g(states, t) if self.timed else self.g(states)
+        return math.copysign(1.0, self.h) * np.asarray(found, dtype=np.float64)
 
-    def _value(self, session: C) -> float:
-        return float(self._values(session.state()[np.newaxis])[0])
+    def _value(self, session: C, j: int, fraction: float) -> float:
+        return float(self._values(session.state()[np.newaxis], np.array([self._time(j, fraction)]))[0])
 
-    def _crossings(self, latest: int, known: int) -> Iterator[tuple[float, Floats]]:
+    def _crossings(self, known: int) -> Iterator[tuple[float, Floats]]:
         """The crossings of this block, whose first ``known`` intervals are those of an earlier one."""
-        v, first = self.values, latest - len(self.values) + 1
+        v = self.values
         if known == 0 and v[0] == 0 < v[1]:
-            yield first * self.h, self.past[0].state()
+            yield self._time(0), self.past[0].state()
         for i in range(len(v) - 1):
             if i >= 1 and (found := self._hidden(i)):
-                yield self._located(first, *found)
+                yield self._located(*found)
             if i >= known and v[i] < 0 <= v[i + 1]:
-                yield self._located(first, i, 0.0, v[i], 1.0, v[i + 1])
+                yield self._located(i, 0.0, v[i], 1.0, v[i + 1])
 
     def _hidden(self, i: int) -> tuple[int, float, float, float, float] | None:
         """An interval before or after step i, and a bracket in it, where an extremum near step i changes the sign."""
@@ -161,7 +172,7 @@ class CrossingFinder(Generic[C]):
         return left if sign * at_left < sign * at_right else right
 
     def _at(self, j: int, fraction: float, substeps: Sequence[int] = SUBSTEPS) -> float:
-        return self._value(self._moved(j, fraction, substeps))
+        return self._value(self._moved(j, fraction, substeps), j, fraction)
 
     def _moved(self, j: int, fraction: float, substeps: Sequence[int]) -> C:
         """A solver that went a fraction of step j, in the first number of equal steps that works."""
@@ -176,9 +187,7 @@ class CrossingFinder(Generic[C]):
                 break
         return session
 
-    def _located(
-        self, first: int, j: int, low: float, at_low: float, high: float, at_high: float
-    ) -> tuple[float, Floats]:
+    def _located(self, j: int, low: float, at_low: float, high: float, at_high: float) -> tuple[float, Floats]:
         """Time and state of the crossing in interval j between two fractions of the step."""
         for count in SUBSTEPS:
             # The same number for all fractions: g is a smooth function of the fraction then.
@@ -190,7 +199,7 @@ class CrossingFinder(Generic[C]):
                     raise
             else:
                 break
-        return (first + j + fraction) * self.h, state
+        return self._time(j, fraction), state
 
 
 def root(f: Callable[[float], float], low: float, at_low: float, high: float, at_high: float) -> float:

@@ -25,6 +25,7 @@ class Interface:
     parameters: Mapping[str, float]  # defaults
     positive: frozenset[str] = frozenset()  # the parameters that must be positive
     casimirs: tuple[str, ...] = ()
+    time: str = ""  # its name, where the Hamiltonian depends on it
 
     @property
     def dimension(self) -> int:

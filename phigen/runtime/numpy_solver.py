@@ -1,7 +1,7 @@
 """A generated NumPy module, loaded from its source text.
 
 Beside the documented functions, sessions use the parts of ``integrate``: ``_values``, ``_admissible``,
-``_coefficients``, ``_advance`` and, with tangents, ``_tangent_stage``.
+``_coefficients``, ``_renewed`` where there is a time, ``_advance`` and, with tangents, ``_tangent_stage``.
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ import numpy as np
 from phigen.runtime.interface import BackendError, Floats, Interface, MissingExtraError
 
 Pair = tuple[Floats, Floats]
-#: Coefficients, parameters and step of a stage, passed on to the module.
-Stage = tuple[Floats, Mapping[str, float], float]
+#: Coefficients, parameters and step of a stage, and its time where there is one: passed on to the module.
+Stage = tuple[Any, ...]
 
 
 def load_module(source: str, name: str) -> ModuleType:
@@ -37,10 +37,19 @@ class NumpySession:
     """What the loop of the module's ``integrate`` holds. See `phigen.runtime.session.Session`."""
 
     def __init__(
-        self, module: Any, parameters: Mapping[str, float], x: Floats, carry: Floats, gauge: Floats | None
+        self,
+        module: Any,
+        parameters: Mapping[str, float],
+        x: Floats,
+        carry: Floats,
+        gauge: Floats | None,
+        t0: float = 0.0,
     ) -> None:
         self.steps = 0
+        # The time and the steps when the size of the step was set: the time is counted from there, without adding up.
+        self._t, self._counted = t0, 0
         self._module, self._parameters, self._gauge = module, parameters, gauge
+        self._timed = hasattr(module, "_renewed")
         self._x, self._carry = x, carry
         self._h = np.nan
         self._stages: list[Stage] = []
@@ -75,7 +84,8 @@ class NumpySession:
 
     def branch(self) -> NumpySession:
         """See `Session`."""
-        twin = NumpySession(self._module, self._parameters, self._x, self._carry, self._gauge)
+        twin = NumpySession(self._module, self._parameters, self._x, self._carry, self._gauge, self._t)
+        twin._counted = self._counted
         twin.steps, twin._h, twin._stages, twin._memory = self.steps, self._h, self._stages, list(self._memory)
         return twin
 
@@ -84,7 +94,8 @@ class NumpySession:
         buffer = io.BytesIO()
         gauge = np.empty(0) if self._gauge is None else self._gauge
         memory = np.array(self._memory)
-        np.savez(buffer, x=self._x, carry=self._carry, memory=memory, gauge=gauge, h=self._h, steps=self.steps)
+        clock = {"t": self._t, "counted": self._counted, "h": self._h, "steps": self.steps}
+        np.savez(buffer, x=self._x, carry=self._carry, memory=memory, gauge=gauge, allow_pickle=False, **clock)
         return buffer.getvalue()
 
     @classmethod
@@ -97,10 +108,16 @@ class NumpySession:
             if np.isfinite(stored["h"]):
                 session._prepare(float(stored["h"]))
                 session._memory = [(pair[0], pair[1]) for pair in stored["memory"]]
+            session._t, session._counted = float(stored["t"]), int(stored["counted"])
         return session
+
+    def _now(self) -> float:
+        """The time of the state."""
+        return self._t + (self.steps - self._counted) * self._h if self.steps > self._counted else self._t
 
     def _prepare(self, h: float) -> None:
         if h != self._h:
+            self._t, self._counted = self._now(), self.steps
             values = self._module._values(dict(self._parameters))
             with np.errstate(all="ignore"):
                 self._stages = self._module._coefficients(values, self._x, h, self._gauge)
@@ -110,7 +127,8 @@ class NumpySession:
     def _tried(self) -> tuple[Floats, Floats, list[Pair], list[tuple[Stage, Floats, Floats, Floats]]]:
         """State, carry and memory after one step, and of each stage: itself, its start and what it solved for."""
         x, carry, memory, stages = self._x, self._carry, list(self._memory), []
-        for k, stage in enumerate(self._stages):
+        for k, prepared in enumerate(self._stages):
+            stage = self._module._renewed(prepared, self._now(), self._h) if self._timed else prepared
             before = stage, x, carry
             x, carry, memory[k], status = self._module._advance(stage, x, carry, memory[k])
             if status[0] != "":
@@ -145,27 +163,28 @@ class NumpySolver:
         """See `phigen.runtime.backend.Backend`."""
         return str(self.module.__file__)
 
-    def start(self, x0: Floats, parameters: Mapping[str, float]) -> NumpySession:
+    def start(self, x0: Floats, parameters: Mapping[str, float], t0: float = 0.0) -> NumpySession:
         """See `phigen.runtime.backend.Backend`."""
         x = x0[np.newaxis].copy()
         self._expect_admissible(x, parameters)
         gauge = self._gauge
         if gauge is None and self.module.GAUGE:
             gauge = self.module.gauge(x0, **parameters)
-        return NumpySession(self.module, parameters, x, np.zeros_like(x), gauge)
+        return NumpySession(self.module, parameters, x, np.zeros_like(x), gauge, t0)
 
     def restored(self, saved: bytes, parameters: Mapping[str, float]) -> NumpySession:
         """See `phigen.runtime.backend.Backend`."""
         return NumpySession.from_bytes(self.module, parameters, saved)
 
-    def ensemble(self, x0: Floats, h: float, steps: int, parameters: Mapping[str, float]) -> Floats:
+    def ensemble(self, x0: Floats, h: float, steps: int, parameters: Mapping[str, float], t0: float = 0.0) -> Floats:
         """See `phigen.runtime.backend.Backend`. Where members fail, the others go on without them."""
         self._expect_admissible(x0, parameters)
         x, remaining, gauge = x0.copy(), np.arange(len(x0)), self._gauges(x0, parameters)
         failures: dict[int, str] = {}
         done, first = 0, -1
         while done < steps and remaining.size:
-            options = {} if gauge is None else {"gauge": gauge[remaining]}
+            options: dict[str, Any] = {} if gauge is None else {"gauge": gauge[remaining]}
+            options |= {"t0": t0 + done * h} if self.interface.time else {}
             try:
                 x[remaining] = self.module.integrate(
                     x[remaining], h, steps - done, stride=steps - done, **options, **parameters
@@ -193,17 +212,19 @@ class NumpySolver:
         chosen = self.module.gauge(x0, **parameters) if self._gauge is None else self._gauge
         return np.broadcast_to(chosen, (len(x0), len(self.module.GAUGE)))
 
-    def hamiltonian(self, x: Floats, parameters: Mapping[str, float]) -> Floats:
+    def hamiltonian(self, x: Floats, parameters: Mapping[str, float], t: Floats | None = None) -> Floats:
         """See `phigen.runtime.backend.Backend`."""
-        return np.asarray(self.module.hamiltonian(x, **parameters), dtype=np.float64)
+        when = () if t is None else (t,)
+        return np.asarray(self.module.hamiltonian(x, *when, **parameters), dtype=np.float64)
 
     def casimirs(self, x: Floats, parameters: Mapping[str, float]) -> Floats:
         """See `phigen.runtime.backend.Backend`."""
         return np.asarray(self.module.casimirs(x, **parameters), dtype=np.float64)
 
-    def vector_field(self, x: Floats, parameters: Mapping[str, float]) -> Floats:
+    def vector_field(self, x: Floats, parameters: Mapping[str, float], t: Floats | None = None) -> Floats:
         """See `phigen.runtime.backend.Backend`."""
-        return np.asarray(self.module.vector_field(x, **parameters), dtype=np.float64)
+        when = () if t is None else (t,)
+        return np.asarray(self.module.vector_field(x, *when, **parameters), dtype=np.float64)
 
 
 def load(files: Mapping[str, str], interface: Interface) -> NumpySolver:

@@ -62,30 +62,42 @@ class Solver:
         steps: int,
         stride: int = 1,
         *,
+        t0: float | None = None,
         progress: Progress | None = None,
         parameters: Mapping[str, float] | None = None,
         **more: float,
     ) -> Trajectory:
         """Make ``steps`` steps of size ``h`` from ``x0`` (DIM,), storing every ``stride``-th state and the last.
 
-        A negative ``h`` goes back in time. ``progress`` is called now and then with the number of steps done.
+        A negative ``h`` goes back in time. ``t0`` is the time of ``x0``, 0 by default, for Hamiltonians that depend on
+        the time. ``progress`` is called now and then with the number of steps done.
         Raises `StepError`, whose ``trajectory`` ends with the state before the failing step.
         """
+        begin = arguments.start_time(t0, self.interface, more)
         values = self._values(parameters, more)
         start, h = arguments.state(x0, "x0", self.interface), arguments.step_size(h)
         steps, stride = arguments.count(steps, "steps", 0), arguments.count(stride, "stride", 1)
         try:
-            states = rows_along(self.backend.start(start, values), h, steps, stride, progress)
+            states = rows_along(self.backend.start(start, values, begin), h, steps, stride, progress)
         except BackendError as error:
-            trajectory = self._trajectory(error.states, row_steps(error.step, stride), h, values)
+            trajectory = self._trajectory(error.states, row_steps(error.step, stride), h, values, begin)
             raise self.failure(error, h, trajectory, values) from error
-        return self._trajectory(states, row_steps(steps, stride), h, values)
+        return self._trajectory(states, row_steps(steps, stride), h, values, begin)
 
-    def step(self, x: ArrayLike, h: float, *, parameters: Mapping[str, float] | None = None, **more: float) -> Floats:
-        """The state (DIM,) one step of size ``h`` after ``x`` (DIM,); raises `StepError`."""
+    def step(
+        self,
+        x: ArrayLike,
+        h: float,
+        *,
+        t0: float | None = None,
+        parameters: Mapping[str, float] | None = None,
+        **more: float,
+    ) -> Floats:
+        """The state (DIM,) one step of size ``h`` after ``x`` (DIM,), whose time is ``t0``; raises `StepError`."""
+        begin = arguments.start_time(t0, self.interface, more)
         values = self._values(parameters, more)
         start, h = arguments.state(x, "x", self.interface), arguments.step_size(h)
-        session = self._started(start, h, values)
+        session = self._started(start, h, values, begin)
         try:
             session.advance(h, 1)
         except BackendError as error:
@@ -93,30 +105,45 @@ class Solver:
         return session.state()
 
     def step_tangent(
-        self, x: ArrayLike, h: float, *, parameters: Mapping[str, float] | None = None, **more: float
+        self,
+        x: ArrayLike,
+        h: float,
+        *,
+        t0: float | None = None,
+        parameters: Mapping[str, float] | None = None,
+        **more: float,
     ) -> tuple[Floats, Floats]:
         """The state (DIM,) one step after ``x`` (DIM,), and its derivative (DIM, DIM), row i along the old coordinates.
 
         The derivative is exact to round-off; a gauge chosen by the solver is held fixed. Raises `StepError`, and
         `TypeError` if the solver was compiled without ``tangent=True``.
         """
+        begin = arguments.start_time(t0, self.interface, more)
         values = self._values(parameters, more)
         start, h = arguments.state(x, "x", self.interface), arguments.step_size(h)
-        session = self._started(start, h, values)
+        session = self._started(start, h, values, begin)
         tangent = self._with_tangent(session, h, values)
         return session.state(), tangent
 
     def tangents(
-        self, x0: ArrayLike, h: float, steps: int, *, parameters: Mapping[str, float] | None = None, **more: float
+        self,
+        x0: ArrayLike,
+        h: float,
+        steps: int,
+        *,
+        t0: float | None = None,
+        parameters: Mapping[str, float] | None = None,
+        **more: float,
     ) -> Iterator[tuple[Floats, Floats]]:
         """After each step of a trajectory, its state (DIM,) and the derivative (DIM, DIM) of that step.
 
         The steps are those of `integrate`. Raises what `step_tangent` does.
         """
+        begin = arguments.start_time(t0, self.interface, more)
         values = self._values(parameters, more)
         start, h = arguments.state(x0, "x0", self.interface), arguments.step_size(h)
         steps = arguments.count(steps, "steps", 0)
-        session = self._started(start, h, values)
+        session = self._started(start, h, values, begin)
         for _ in range(steps):
             tangent = self._with_tangent(session, h, values)
             yield session.state(), tangent
@@ -128,23 +155,25 @@ class Solver:
         steps: int,
         g: Function,
         *,
+        t0: float | None = None,
         progress: Progress | None = None,
         parameters: Mapping[str, float] | None = None,
         **more: float,
     ) -> Section:
         """Where ``g`` rises through zero along the trajectory of ``steps`` steps of size ``h`` from ``x0`` (DIM,).
 
-        ``g`` takes states (rows, DIM) and gives (rows,). Each crossing is found to round-off by steps of the solver
-        itself, from the state before it. A start with g = 0 counts if g rises from there. Raises `StepError`, whose
-        ``trajectory`` is the `Section` so far.
+        ``g`` takes states (rows, DIM), and their times (rows,) where there is a time, and gives (rows,). Each crossing
+        is found to round-off by steps of the solver itself, from the state before it. A start with g = 0 counts if g
+        rises from there. Raises `StepError`, whose ``trajectory`` is the `Section` so far.
         """
+        begin = arguments.start_time(t0, self.interface, more)
         values = self._values(parameters, more)
         start, h = arguments.state(x0, "x0", self.interface), arguments.step_size(h)
         steps = arguments.count(steps, "steps", 0)
         found: list[tuple[float, Floats]] = []
-        finder = CrossingFinder[Session](g, h)
+        finder = CrossingFinder[Session](g, h, begin, timed=bool(self.interface.time))
         try:
-            session = self.backend.start(start, values)
+            session = self.backend.start(start, values, begin)
             for _, crossings in finder.follow(session, steps, lambda: session.advance(h, 1)):
                 found += crossings
                 if progress:
@@ -154,26 +183,45 @@ class Solver:
         return self._section(found)
 
     def ensemble(
-        self, X0: ArrayLike, h: float, steps: int, *, parameters: Mapping[str, float] | None = None, **more: float
+        self,
+        X0: ArrayLike,
+        h: float,
+        steps: int,
+        *,
+        t0: float | None = None,
+        parameters: Mapping[str, float] | None = None,
+        **more: float,
     ) -> Floats:
-        """Final states (members, DIM) of the initial states ``X0`` (members, DIM).
+        """Final states (members, DIM) of the initial states ``X0`` (members, DIM), all at the time ``t0``.
 
         Raises `StepError` if any member fails: its ``members`` are those that did, its ``trajectory`` the array of
         states (members, DIM) as far as each came.
         """
+        begin = arguments.start_time(t0, self.interface, more)
         values = self._values(parameters, more)
         start, h = arguments.members(X0, "X0", self.interface), arguments.step_size(h)
         steps = arguments.count(steps, "steps", 0)
         try:
-            return self.backend.ensemble(start, h, steps, values)
+            return self.backend.ensemble(start, h, steps, values, begin)
         except BackendError as error:
             raise self.failure(error, h, error.states, values) from error
 
-    def hamiltonian(self, x: ArrayLike, *, parameters: Mapping[str, float] | None = None, **more: float) -> Floats:
-        """H of the states ``x`` (…, DIM), shape (…)."""
+    def hamiltonian(
+        self,
+        x: ArrayLike,
+        t: ArrayLike | None = None,
+        *,
+        parameters: Mapping[str, float] | None = None,
+        **more: float,
+    ) -> Floats:
+        """H of the states ``x`` (…, DIM), shape (…).
+
+        Where H depends on the time, ``t`` is that of the states, a number or one for each.
+        """
         states = arguments.states(x, "x", self.interface)
         rows = states.reshape(-1, self.interface.dimension)
-        return self.backend.hamiltonian(rows, self._values(parameters, more)).reshape(states.shape[:-1])
+        when = arguments.times(t, self.interface, states.shape[:-1], more)
+        return self.backend.hamiltonian(rows, self._values(parameters, more), when).reshape(states.shape[:-1])
 
     def casimirs(
         self, x: ArrayLike, *, parameters: Mapping[str, float] | None = None, **more: float
@@ -184,18 +232,33 @@ class Solver:
         values = self.backend.casimirs(rows, self._values(parameters, more))
         return {name: values[:, i].reshape(states.shape[:-1]) for i, name in enumerate(self.interface.casimirs)}
 
-    def vector_field(self, x: ArrayLike, *, parameters: Mapping[str, float] | None = None, **more: float) -> Floats:
-        """π∇H at the states ``x`` (…, DIM), the same shape."""
+    def vector_field(
+        self,
+        x: ArrayLike,
+        t: ArrayLike | None = None,
+        *,
+        parameters: Mapping[str, float] | None = None,
+        **more: float,
+    ) -> Floats:
+        """π∇H at the states ``x`` (…, DIM), the same shape; ``t`` as for `hamiltonian`."""
         states = arguments.states(x, "x", self.interface)
         rows = states.reshape(-1, self.interface.dimension)
-        return self.backend.vector_field(rows, self._values(parameters, more)).reshape(states.shape)
+        when = arguments.times(t, self.interface, states.shape[:-1], more)
+        return self.backend.vector_field(rows, self._values(parameters, more), when).reshape(states.shape)
 
-    def _trajectory(self, x: Floats, stored: np.ndarray, h: float, parameters: dict[str, float]) -> Trajectory:
+    def energies(self, x: Floats, t: Floats, parameters: Mapping[str, float]) -> Floats:
+        """H along a trajectory: of the states (rows, DIM) at the times (rows,)."""
+        return self.backend.hamiltonian(x, parameters, t if self.interface.time else None)
+
+    def _trajectory(
+        self, x: Floats, stored: np.ndarray, h: float, parameters: dict[str, float], t0: float
+    ) -> Trajectory:
         casimirs = self.backend.casimirs(x, parameters)
+        t = t0 + h * stored
         return Trajectory(
-            t=h * stored,
+            t=t,
             x=x,
-            energy=self.backend.hamiltonian(x, parameters),
+            energy=self.energies(x, t, parameters),
             casimirs={name: casimirs[:, i] for i, name in enumerate(self.interface.casimirs)},
             steps=int(stored[-1]),
             h=h,
@@ -203,9 +266,9 @@ class Solver:
             coordinates=self.interface.coordinates,
         )
 
-    def _started(self, start: Floats, h: float, values: Mapping[str, float]) -> Session:
+    def _started(self, start: Floats, h: float, values: Mapping[str, float], t0: float) -> Session:
         try:
-            return self.backend.start(start, values)
+            return self.backend.start(start, values, t0)
         except BackendError as error:
             raise self.failure(error, h, None, values) from error
 
@@ -241,7 +304,7 @@ class Solver:
             shown = ", ".join(map(str, error.members[:5])) + (", …" if len(error.members) > 5 else "")
             where += f" for {len(error.members)} member(s) of the ensemble ({shown})"
         elif error.step >= 0 and isinstance(trajectory, Trajectory):
-            where += f" at t = {error.step * h:.12g}"
+            where += f" at t = {trajectory.t[0] + error.step * h:.12g}"
         message = f"{where}: {error.status}" + (f", {_ADVICE[error.status]}" if error.status in _ADVICE else "")
         return StepError(message, step=error.step, status=error.status, trajectory=trajectory, members=error.members)
 

@@ -70,6 +70,7 @@ def build_program(
             operation_counts(step.main.roots),
         ),
         coordinates=system.coordinates,
+        time=system.time,
         parameters=system.parameters,
         casimirs=tuple(system.casimirs),
         order=order.order,
@@ -104,10 +105,12 @@ def _step(
     if increment is None:
         linearise = linearise_kernel(system, realisation, generating, coefficients)
         solvers = newton_solvers(linearise)
-        prepare = _prepare(system, gauge, coefficients)
-        return Newton(prepare, linearise, inner, solvers.eliminate, solvers.invert, solvers.factors)
+        refresh, prepare = coefficients.refresh(t=system.times), _prepare(system, gauge, coefficients)
+        newton = Newton(prepare, linearise, inner, solvers.eliminate, solvers.invert, solvers.factors, refresh=refresh)
+        return coefficients.settled(newton)
     tangent = explicit_jacobian(increment, system.coordinates, coefficients) if extras.tangent else None
-    return Explicit(_prepare(system, gauge, coefficients), increment, tangent)
+    refresh, prepare = coefficients.refresh(t=system.times), _prepare(system, gauge, coefficients)
+    return coefficients.settled(Explicit(prepare, increment, tangent, refresh=refresh))
 
 
 def _path(
@@ -123,8 +126,10 @@ def _path(
     if tangent:
         kernel = several.curvature if several else curvature(system, generating, coefficients)
         varied = PathTangent(tangent_path(system, coefficients), kernel)
-    prepare = _prepare(system, gauge, coefficients)
-    return Path(prepare, recurrences, generate, inner, path_elimination(n), several, varied)
+    refresh, prepare = coefficients.refresh(t=system.times), _prepare(system, gauge, coefficients)
+    return coefficients.settled(
+        Path(prepare, recurrences, generate, inner, path_elimination(n), several, varied, refresh=refresh)
+    )
 
 
 def _prepare(system: System, gauge: Gauge, coefficients: Coefficients) -> Kernel:

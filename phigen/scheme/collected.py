@@ -43,18 +43,28 @@ class Collected:
         return horner({m: coefficients.slot(c) for m, c in terms.items()}, self.variables)
 
 
-def collect(tower: Tower, elements: Sequence[Poly], coordinates: Sequence[str]) -> tuple[Collected, list[Terms]]:
-    """Elements of a tower as collected polynomials, with the ring that differentiates them."""
-    state = _state(tower, coordinates)
-    static = [i for i in range(len(tower.names)) if i not in state]
+def collect(
+    tower: Tower, elements: Sequence[Poly], coordinates: Sequence[str], times: Sequence[str] = ()
+) -> tuple[Collected, list[Terms]]:
+    """Elements of a tower as collected polynomials, with the ring that differentiates them.
+
+    Coefficients that depend on ``times`` are polynomials in what does, whose coefficients depend on parameters only.
+    """
+    state, dated = _state(tower, coordinates), _state(tower, times)
+    static = [i for i in range(len(tower.names)) if i not in state and i not in dated]
+    dated = [i for i in dated if i not in state]
     values = [symbol(n) for n in tower.symbols] + [g.expression for g in tower.generators]
 
     def terms(element: Poly) -> Terms:
-        groups: dict[Monomial, dict[Monomial, Expression]] = {}
+        groups: dict[Monomial, dict[Monomial, dict[Monomial, Expression]]] = {}
         for m, c in element.to_dict().items():
-            key = tuple(int(m[i]) for i in state)
-            groups.setdefault(key, {})[tuple(int(m[i]) for i in static)] = number(rational(c))
-        return {key: horner(part, [values[i] for i in static]) for key, part in sorted(groups.items())}
+            key, when, rest = (tuple(int(m[i]) for i in among) for among in (state, dated, static))
+            groups.setdefault(key, {}).setdefault(when, {})[rest] = number(rational(c))
+        return {key: in_time(parts) for key, parts in sorted(groups.items())}
+
+    def in_time(parts: Mapping[Monomial, Mapping[Monomial, Expression]]) -> Expression:
+        found = {when: horner(part, [values[i] for i in static]) for when, part in sorted(parts.items())}
+        return horner(found, [values[i] for i in dated]) if dated else next(iter(found.values()))
 
     slopes = tuple(tuple(terms(tower.derivative(tower.gens[i], c)) for c in coordinates) for i in state)
     return Collected(tuple(values[i] for i in state), slopes), [terms(e) for e in elements]

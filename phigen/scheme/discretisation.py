@@ -51,6 +51,7 @@ def hamilton_jacobi(
         [*system.parameter_names, *static, STEP],
         most,
         symmetric=realisation.symmetric,
+        times=system.times,
     )
 
 
@@ -58,10 +59,10 @@ def generating_function(system: System, series: HamiltonJacobi, terms: int) -> G
     """∇S_h and Hess S_h in the cheapest form. LimitError if every form is too large."""
     candidates = []
     if terms <= GRAPH_TERMS:
-        candidates.append(graph_form(series.graph(terms), series.coordinates, series.static))
+        candidates.append(graph_form(series.graph(terms), series.coordinates, series.static, series.times))
     worth = min((c.cost() for c in candidates), default=MOST_OPERATIONS)
     with suppress(OverflowError):
-        collected = collected_form(series.polynomial(terms), series.coordinates, series.static, worth)
+        collected = collected_form(series.polynomial(terms), series.coordinates, series.static, worth, series.times)
         candidates = [*collected, *candidates]
     if not candidates or min(c.cost() for c in candidates) > MOST_OPERATIONS:
         raise too_large(system, f"S_1 … S_{terms} take more than {MOST_OPERATIONS} operations")

@@ -72,12 +72,12 @@ def choose(system: System, realisation: BiRealisation, setting: str | Mapping[st
     """The system in the gauge of a setting: ``none``, ``auto``, or a value for some Casimirs.
 
     ``auto`` frees a Casimir if S_3 depends on its λ (in log-canonical structures it never does) and has hardly
-    more terms with it (on tops it has many more, for little).
+    more terms with it (on tops it has many more, for little); none where H depends on the time.
     """
     if not isinstance(setting, str):
         return _gauged(system, realisation, given(system, setting))
     chosen = plain = _gauged(system, realisation, Gauge())
-    if setting == "none" or not realisation.exact or not realisation.symmetric:
+    if setting == "none" or not realisation.exact or not realisation.symmetric or system.time:
         return plain
     for name in system.casimirs:
         candidate = _gauged(system, realisation, Gauge((*chosen.gauge.free, name)))

@@ -25,7 +25,7 @@ from phigen.symbolic.symbols import STEP
 class GeneratingFunction:
     """∇S_h (``slope``) and Hess S_h (``hessian``, full n×n) as expressions, and how they were written.
 
-    ``coefficients`` is the table that their symbols ``c:k`` refer to.
+    ``coefficients`` is the table that their symbols ``c:k`` refer to, those that are renewed in every step included.
     """
 
     slope: tuple[Expression, ...]
@@ -45,7 +45,7 @@ class GeneratingFunction:
 
 
 def collected_form(
-    series: PolynomialSeries, coordinates: Sequence[str], static: Sequence[str], worth: int
+    series: PolynomialSeries, coordinates: Sequence[str], static: Sequence[str], worth: int, times: Sequence[str] = ()
 ) -> list[GeneratingFunction]:
     """The collected gradient, with the Hessian collected entry by entry, and with the Hessian by differentiation.
 
@@ -61,11 +61,11 @@ def collected_form(
     slopes = [tower.derivative(s, c) for c in coordinates]
     if exceeds(tower, slopes, coordinates, min(worth, MOST_SLOPES)):
         return []
-    ring, (terms,) = collect(tower, [s], coordinates)
+    ring, (terms,) = collect(tower, [s], coordinates, times)
     first = [ring.derivative(terms, j) for j in range(n)]
     found = []
     for entrywise in (True, False):
-        table = Coefficients(static)
+        table = Coefficients(static, times)
         slope = tuple(ring.expression(g, table) for g in first)
         if entrywise:
             hessian = _symmetric(
@@ -77,13 +77,15 @@ def collected_form(
     return found
 
 
-def graph_form(series: Sequence[Expression], coordinates: Sequence[str], static: Sequence[str]) -> GeneratingFunction:
+def graph_form(
+    series: Sequence[Expression], coordinates: Sequence[str], static: Sequence[str], times: Sequence[str] = ()
+) -> GeneratingFunction:
     """Gradient by reverse, Hessian by repeated reverse differentiation of the shared graph."""
     h = symbol(STEP)
     s = total(h ** (i + 1) * term for i, term in enumerate(series) if not term.is_zero)
     slope = tuple(gradient(s, coordinates))
     rows = [gradient(slope[i], coordinates[i:]) for i in range(len(coordinates))]  # one reverse sweep a row
-    return GeneratingFunction(slope, _symmetric(rows), "shared graph", 0, Coefficients(static))
+    return GeneratingFunction(slope, _symmetric(rows), "shared graph", 0, Coefficients(static, times))
 
 
 def _differentiated(slope: Sequence[Expression], coordinates: Sequence[str]) -> tuple[tuple[Expression, ...], ...]:

@@ -10,6 +10,9 @@ from dataclasses import dataclass
 
 from phigen.symbolic.expression import Expression
 
+#: Arguments of kernels that are numbers, not arrays: the step, or the time of a flow; the time.
+SCALARS = ("h", "t")
+
 
 @dataclass(frozen=True)
 class Output:

@@ -180,12 +180,18 @@ def _outputs(values: Sequence[Expression], names: Sequence[str], sizes: Sequence
     return tuple(result)
 
 
+def system_inputs(system: System) -> dict[str, tuple[str, ...]]:
+    """The arguments of a function on phase space: parameters, the time if there is one, coordinates."""
+    time = {"t": system.times} if system.time else {}
+    return {"params": system.parameter_names, **time, "x": system.coordinates}
+
+
 def observables(system: System) -> Observables:
     """The Hamiltonian, the Casimirs and the vector field."""
-    inputs = {"params": system.parameter_names, "x": system.coordinates}
+    inputs, timeless = system_inputs(system), {"params": system.parameter_names, "x": system.coordinates}
     field = system.vector_field()
     return Observables(
         Kernel("energy", "the Hamiltonian", inputs, (Output("energy", (system.hamiltonian,)),)),
-        Kernel("casimirs", "the Casimirs", inputs, (Output("out", tuple(system.casimirs.values())),)),
+        Kernel("casimirs", "the Casimirs", timeless, (Output("out", tuple(system.casimirs.values())),)),
         Kernel("vector_field", "pi(x) grad H(x)", inputs, (Output("out", field),)),
     )

@@ -70,8 +70,9 @@ def modified_hamiltonian(
 
 def expect_modified(system: System, realisation: BiRealisation, stages: int) -> None:
     """Raise `SpecError` for compositions and approximate bi-realisations, for which it is not computed."""
-    if stages > 1 or not realisation.exact:
+    if stages > 1 or not realisation.exact or system.time:
         why = "a composition" if stages > 1 else "an approximate bi-realisation"
+        why = "a Hamiltonian that depends on the time" if system.time else why
         place = system.locations.get(("modified_hamiltonian",))
         raise SpecError([Diagnostic(f"modified_hamiltonian is not offered for {why}", place)])
 

@@ -8,6 +8,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from fractions import Fraction
+from itertools import accumulate, pairwise
 
 from phigen._version import __version__
 from phigen.scheme.kernel import Kernel
@@ -56,9 +58,9 @@ class Modified:
 class Program:
     """A solver, ready to be printed.
 
-    A step of size h is the composition of one ``step`` of each of the ``fractions`` of h. ``extras`` are what was asked
-    for beside it, ``lanes`` asks for C that does several steps or members at once,
-    ``profile`` (``fast``, ``small``) says how much it does for speed.
+    A step of size h is the composition of one ``step`` of each of the ``fractions`` of h. ``time`` is the name of t,
+    where H depends on it. ``extras`` are what was asked for beside it, ``lanes`` asks for C that does several steps or
+    members at once, ``profile`` (``fast``, ``small``) says how much it does for speed.
     """
 
     name: str
@@ -70,6 +72,7 @@ class Program:
     step: Step
     observables: Observables
     fractions: tuple[float, ...] = (1.0,)
+    time: str = ""
     gauge: FreeGauge | None = None
     modified: Modified | None = None
     extras: Extras = NO_EXTRAS
@@ -96,6 +99,12 @@ class Program:
         """The kernels by which the gauge of a trajectory is chosen."""
         guide = (self.gauge.guide,) if self.gauge and self.searches_gauge else ()
         return (*guide, *((self.gauge.products,) if self.gauge else ()))
+
+    @property
+    def midpoints(self) -> tuple[float, ...]:
+        """Where the middle of each stage lies, as a fraction of the step."""
+        ends = [Fraction(0), *accumulate(Fraction(f) for f in self.fractions)]
+        return tuple(float((a + b) / 2) for a, b in pairwise(ends))
 
     @property
     def kernels(self) -> tuple[Kernel, ...]:

@@ -1,41 +1,61 @@
-"""Staging: values that do not depend on the state move to ``prepare``."""
+"""Staging: values that do not depend on the state move to ``prepare``, or to ``refresh``.
+
+Symbols are of three stages. *Static* ones, parameters and the step size, are known before the first step; *inputs* of a
+step, such as the time in its middle, are new in every step; all others belong to the state, and change with every
+evaluation. What depends on static symbols only is computed by ``prepare``, once; what depends on inputs too by
+``refresh``, once in every stage of a step. Both fill one table, that of the coefficients ``c:0``, ``c:1``, …, in which
+the static ones come first.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import fields, is_dataclass, replace
+from typing import Any, TypeVar
 
+from phigen.scheme.kernel import Kernel, Output
 from phigen.symbolic.expression import Expression, fold, rebuild, substitute, symbol, symbols_of, topological
-from phigen.symbolic.symbols import COEFFICIENT, Symbol, coefficient, kind_of
+from phigen.symbolic.symbols import COEFFICIENT, RENEWED, Symbol, coefficient, kind_of
+
+T = TypeVar("T")
+
+#: The argument of kernels that is the table of coefficients, and the output of ``refresh``, its last part.
+TABLE, NOW = "coef", "now"
 
 
 class Coefficients:
-    """The table of state-independent values; `hoist` fills it and is idempotent on equal values."""
+    """The table of state-independent values; `hoist` fills it and is idempotent on equal values.
 
-    def __init__(self, static: Iterable[str]) -> None:
-        self._static = set(static)
+    ``values`` are those of ``prepare``, ``renewed`` those that depend on ``inputs`` of a step. Of the latter nobody
+    knows the place in the table before it is full: until `settled` they are symbols of their own kind.
+    """
+
+    def __init__(self, static: Iterable[str], inputs: Iterable[str] = ()) -> None:
+        self._static, self._inputs = set(static), set(inputs)
         self.values: list[Expression] = []
-        self._index: dict[int, int] = {}
+        self.renewed: list[Expression] = []
+        self._index: dict[int, Symbol] = {}
 
     @property
     def slots(self) -> tuple[str, ...]:
-        """The symbols of all coefficients so far."""
+        """The symbols of all coefficients of ``prepare`` so far."""
         return tuple(coefficient(k) for k in range(len(self.values)))
 
     def empty(self) -> Coefficients:
-        """A table with the same static symbols and no values."""
-        return Coefficients(self._static)
+        """A table with the same symbols and no values."""
+        return Coefficients(self._static, self._inputs)
 
     def hoist(self, roots: Sequence[Expression]) -> list[Expression]:
         """The roots with each largest state-independent part replaced by a coefficient ``c:k``.
 
         Plain numbers stay where they are: a literal is cheaper than a load.
         """
+        return self._hoisted(roots, lambda name: self._is_fixed(name) or self._is_new(name))
+
+    def _hoisted(self, roots: Sequence[Expression], early: Callable[[str], bool]) -> list[Expression]:
         fixed: dict[int, bool] = {}
         for e in topological(roots):
-            if e.op == "symbol":
-                fixed[id(e)] = e.value in self._static or kind_of(e.value) == COEFFICIENT
-            else:
-                fixed[id(e)] = all(fixed[id(a)] for a in e.args)
+            fixed[id(e)] = early(e.value) if e.op == "symbol" else all(fixed[id(a)] for a in e.args)
 
         def visit(e: Expression, args: list[Expression]) -> Expression:
             if fixed[id(e)]:
@@ -48,19 +68,83 @@ class Coefficients:
 
     def is_static(self, e: Expression) -> bool:
         """Whether an expression does not depend on the state."""
-        return all(name in self._static for name in symbols_of(e))
+        return all(name in self._static or name in self._inputs for name in symbols_of(e))
 
     def slot(self, e: Expression) -> Expression:
         """The coefficient that stands for a state-independent expression; a number stands for itself."""
         if e.is_number:
             return e
-        k = self._index.get(id(e))
-        if k is None:
-            k = self._index[id(e)] = len(self.values)
-            self.values.append(e)
-        return symbol(coefficient(k))
+        found = self._index.get(id(e))
+        if found is None:
+            new = any(map(self._is_new, symbols_of(e)))
+            kept = self.renewed if new else self.values
+            found = self._index[id(e)] = Symbol(RENEWED if new else COEFFICIENT, len(kept))
+            kept.append(e)
+        return symbol(found)
+
+    def refresh(self, **inputs: Sequence[str]) -> Kernel | None:
+        """The kernel that computes what depends on the inputs of a step, None if nothing does.
+
+        Call it before ``prepare`` is made, for which it may find more values.
+        """
+        if not self.renewed:
+            return None
+        values = tuple(self._hoisted(self.renewed, self._is_fixed))
+        return Kernel(
+            "refresh",
+            "everything that depends on the time, but not on the state",
+            {TABLE: self.slots, **{name: tuple(symbols) for name, symbols in inputs.items()}},
+            (Output(NOW, values),),
+        )
+
+    def settled(self, made: T) -> T:
+        """What was made with a table that is full now: kernels, recurrences, in whatever frozen dataclasses and tuples.
+
+        Every coefficient has its place: those that are renewed in each step come after those that are not.
+        """
+        if not self.renewed:
+            return made
+        places = [coefficient(len(self.values) + k) for k in range(len(self.renewed))]
+        names: dict[str, Expression] = {Symbol(RENEWED, k): symbol(place) for k, place in enumerate(places)}
+        listed = list(_expressions(made))
+        renamed = {id(e): r for e, r in zip(listed, substitute(listed, names), strict=True)}
+        settled: T = _rebuilt(made, renamed, (*self.slots, *places))
+        return settled
+
+    def _is_fixed(self, name: str) -> bool:
+        return name in self._static or kind_of(name) == COEFFICIENT
+
+    def _is_new(self, name: str) -> bool:
+        return name in self._inputs or kind_of(name) == RENEWED
 
     def _written_out(self, e: Expression) -> Expression:
         """The expression with coefficients that occur in it replaced by what they stand for."""
-        used = [n for n in symbols_of(e) if isinstance(n, Symbol) and n.kind == COEFFICIENT]
-        return substitute([e], {n: self.values[int(n.key[0])] for n in used})[0] if used else e
+        used = [n for n in symbols_of(e) if isinstance(n, Symbol) and n.kind in (COEFFICIENT, RENEWED)]
+        tables = {COEFFICIENT: self.values, RENEWED: self.renewed}
+        return substitute([e], {n: tables[n.kind][int(n.key[0])] for n in used})[0] if used else e
+
+
+def _expressions(made: Any) -> Iterable[Expression]:
+    """All expressions inside tuples and dataclasses."""
+    if isinstance(made, Expression):
+        yield made
+    elif isinstance(made, tuple):
+        for part in made:
+            yield from _expressions(part)
+    elif is_dataclass(made):
+        for f in fields(made):
+            yield from _expressions(getattr(made, f.name))
+
+
+def _rebuilt(made: Any, renamed: dict[int, Expression], slots: tuple[str, ...]) -> Any:
+    """The same with other expressions; kernels that read the table are told of all of it."""
+    if isinstance(made, Expression):
+        return renamed[id(made)]
+    if isinstance(made, tuple):
+        return tuple(_rebuilt(part, renamed, slots) for part in made)
+    if not is_dataclass(made) or isinstance(made, type):
+        return made
+    parts: dict[str, Any] = {f.name: _rebuilt(getattr(made, f.name), renamed, slots) for f in fields(made)}
+    if isinstance(made, Kernel) and TABLE in made.inputs and made.outputs[0].name != NOW:
+        parts["inputs"] = {**made.inputs, TABLE: slots}
+    return replace(made, **parts)

@@ -1,13 +1,15 @@
 """The kinds of steps, each with the kernels that make it: ``Step = Newton | Explicit | Path | Splitting``.
 
-Kernels of a step are of two stages. ``prepare`` computes, from parameters and step size, every value that does not
-depend on the state: the coefficients ``c:0``, ``c:1``, …. All others read these and the state only.
+Kernels of a step are of three stages. ``prepare`` computes, from parameters and step size, every value that does not
+depend on the state, nor on inputs of the single step: the coefficients ``c:0``, ``c:1``, … Where H depends on the time,
+``refresh`` computes from these, and from the time in the middle of a stage, those that come after them, once in each
+stage. All others read the coefficients and the state only.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from phigen.scheme.alternation import Schedule
 from phigen.scheme.kernel import Kernel
@@ -26,11 +28,22 @@ class _Staged:
     """Any step."""
 
     prepare: Kernel
+    refresh: Kernel | None = field(default=None, kw_only=True)
+
+    @property
+    def prepared(self) -> int:
+        """Values that ``prepare`` computes in one call."""
+        return len(self.prepare.outputs[0].values)
+
+    @property
+    def renewed(self) -> int:
+        """Values that ``refresh`` computes in one call."""
+        return len(self.refresh.outputs[0].values) if self.refresh else 0
 
     @property
     def row(self) -> int:
-        """Values that ``prepare`` computes in one call."""
-        return len(self.prepare.outputs[0].values)
+        """Values that are computed by one call of each."""
+        return self.prepared + self.renewed
 
     @property
     def coefficients(self) -> int:
@@ -87,7 +100,7 @@ class Newton(_Staged):
     def kernels(self) -> tuple[Kernel, ...]:
         """All kernels, each once."""
         factors = (self.factors.factorise, self.factors.substitute) if self.factors else ()
-        return _present((self.prepare, self.linearise, self.eliminate, self.invert, *factors))
+        return _present((self.prepare, self.refresh, self.linearise, self.eliminate, self.invert, *factors))
 
 
 @dataclass(frozen=True)
@@ -108,7 +121,7 @@ class Explicit(_Staged):
     @property
     def kernels(self) -> tuple[Kernel, ...]:
         """All kernels, each once."""
-        return _present((self.prepare, self.increment, self.tangent))
+        return _present((self.prepare, self.refresh, self.increment, self.tangent))
 
 
 @dataclass(frozen=True)
@@ -153,7 +166,7 @@ class Path(_Staged):
         """All kernels, each once."""
         lanes = (self.lanes.curvature, self.lanes.along_mean, self.lanes.invert) if self.lanes else ()
         varied = (self.tangent.curvature,) if self.tangent and not self.lanes else ()
-        return _present((self.prepare, self.generate, self.eliminate, *lanes, *varied))
+        return _present((self.prepare, self.refresh, self.generate, self.eliminate, *lanes, *varied))
 
 
 @dataclass(frozen=True)
@@ -180,7 +193,7 @@ class Splitting(_Staged):
     @property
     def kernels(self) -> tuple[Kernel, ...]:
         """All kernels, each once."""
-        return (self.prepare, *self.flows, *self.tangents)
+        return _present((self.prepare, self.refresh, *self.flows, *self.tangents))
 
 
 Step = Newton | Explicit | Path | Splitting

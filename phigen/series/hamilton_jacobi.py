@@ -6,6 +6,15 @@ S_t solves ∂_t S_t(x) = H(α(x, ∇S_t(x))), S_0 = 0, hence S_1 = H and
 
 The S_i of the paper (section 4, step 1) carry a further factor i!. In a symmetric bi-realisation,
 β(x, p) = α(x, −p), every S_i of even index vanishes; that is used, and `residual` proves it on demand.
+
+For H(τ, x) adjoin the time τ and its conjugate e, {τ, e} = 1, in the midpoint realisation, and take H + e. Its
+generating function is t e + S_t(τ, x), from which e has gone:
+
+    ∂_t S_t = H(τ − t/2, α(x, ∇S_t)) + ½ ∂_τ S_t,    S_0 = 0,
+
+where τ is the time in the middle of the step. So in the series the time is one more symbol that moves, and
+
+    (i+1) S_{i+1} = coefficient of t^i in H(τ − t/2, α(x, ∇(S_1 t + … + S_i t^i))) + ½ ∂_τ S_i t^i.
 """
 
 from __future__ import annotations
@@ -47,10 +56,15 @@ def composed(hamiltonian: Expression, coordinates: Sequence[str], alpha: Sequenc
     return substitute([hamiltonian], dict(zip(coordinates, alpha, strict=True)))[0]
 
 
-def series_tower(target: Expression, coordinates: Sequence[str], parameters: Sequence[str]) -> Tower:
-    """The smallest tower that holds the series of H∘α: what is left of its nodes at p = 0."""
+def series_tower(
+    target: Expression, coordinates: Sequence[str], parameters: Sequence[str], times: Sequence[str] = ()
+) -> Tower:
+    """The smallest tower that holds the series of H∘α: what is left of its nodes at p = 0.
+
+    ``times`` is the symbol of the time, if there is one; it is among the ``parameters``.
+    """
     at_zero = substitute(closure([target]), {momentum(c): ZERO for c in coordinates})
-    return Tower([*coordinates, *parameters], at_zero, coordinates)
+    return Tower([*coordinates, *parameters], at_zero, [*coordinates, *times])
 
 
 def polynomial_series(
@@ -61,12 +75,13 @@ def polynomial_series(
     terms: int,
     *,
     symmetric: bool,
+    times: Sequence[str] = (),
 ) -> PolynomialSeries:
-    """S_1 … S_terms in a tower (exact rational arithmetic, parameters symbolic).
+    """S_1 … S_terms in a tower (exact rational arithmetic, parameters symbolic); ``times`` as for `series_tower`.
 
     Raises `OverflowError` if a term has more than `MOST_TERMS` monomials.
     """
-    recursion = _polynomial_recursion(hamiltonian, alpha, coordinates, parameters, symmetric)
+    recursion = _polynomial_recursion(hamiltonian, alpha, coordinates, parameters, symmetric, times)
     return PolynomialSeries(recursion.ring, recursion.first(terms))
 
 
@@ -86,7 +101,7 @@ class HamiltonJacobi:
     """S_1, S_2, … of one Hamiltonian in one bi-realisation, computed as far as they are asked for, and once.
 
     ``alpha`` gives the source map to the degree in p that so many terms need, for now for S_1 … S_most: see `reach`.
-    ``static`` are the parameters and the other symbols of the tower.
+    ``static`` are the parameters and the other symbols of the tower, ``times`` the symbol of the time, if there is one.
     """
 
     def __init__(
@@ -98,9 +113,10 @@ class HamiltonJacobi:
         most: int,
         *,
         symmetric: bool,
+        times: Sequence[str] = (),
     ) -> None:
         self.hamiltonian, self.coordinates, self.symmetric = hamiltonian, tuple(coordinates), symmetric
-        self.static = tuple(static)
+        self.static, self.times = tuple(static), tuple(times)
         self._source, self._most = alpha, most
 
     @cached_property
@@ -129,11 +145,12 @@ class HamiltonJacobi:
 
     @cached_property
     def _polynomials(self) -> _Recursion:
-        return _polynomial_recursion(self.hamiltonian, self.alpha, self.coordinates, self.static, self.symmetric)
+        static = [*self.static, *self.times]
+        return _polynomial_recursion(self.hamiltonian, self.alpha, self.coordinates, static, self.symmetric, self.times)
 
     @cached_property
     def _graphs(self) -> _Recursion:
-        return _graph_recursion(self.hamiltonian, self.alpha, self.coordinates, self.symmetric)
+        return _graph_recursion(self.hamiltonian, self.alpha, self.coordinates, self.symmetric, self.times)
 
 
 def _polynomial_recursion(
@@ -142,27 +159,46 @@ def _polynomial_recursion(
     coordinates: Sequence[str],
     parameters: Sequence[str],
     symmetric: bool,
+    times: Sequence[str],
 ) -> _Recursion:
     target = composed(hamiltonian, coordinates, alpha)
-    tower = series_tower(target, coordinates, parameters)
-    return _Recursion(target, tower, coordinates, symmetric, lambda s: [tower.derivative(s, c) for c in coordinates])
+    tower = series_tower(target, coordinates, parameters, times)
+    return _Recursion(
+        target, tower, coordinates, times, symmetric, lambda s, names: [tower.derivative(s, c) for c in names]
+    )
 
 
 def _graph_recursion(
-    hamiltonian: Expression, alpha: Sequence[Expression], coordinates: Sequence[str], symmetric: bool
+    hamiltonian: Expression,
+    alpha: Sequence[Expression],
+    coordinates: Sequence[str],
+    symmetric: bool,
+    times: Sequence[str] = (),
 ) -> _Recursion:
     target = composed(hamiltonian, coordinates, alpha)
-    return _Recursion(target, ExpressionRing(), coordinates, symmetric, lambda s: gradient(s, coordinates))
+    return _Recursion(target, ExpressionRing(), coordinates, times, symmetric, gradient)
 
 
 class _Recursion:
-    """The recursion in a ring, one term after the other: ``target`` is H(α(x, p)), ``slope`` the gradient of a term."""
+    """The recursion in a ring, one term after the other: ``target`` is H(α(x, p)).
 
-    def __init__(self, target: Expression, ring: Any, coordinates: Sequence[str], symmetric: bool, slope: Any) -> None:
+    ``slope`` gives the derivatives of a term along some symbols.
+    """
+
+    def __init__(
+        self,
+        target: Expression,
+        ring: Any,
+        coordinates: Sequence[str],
+        times: Sequence[str],
+        symmetric: bool,
+        slope: Callable[[Any, Sequence[str]], list[Any]],
+    ) -> None:
         self.ring = ring
         self._target, self._symmetric, self._slope = target, symmetric, slope
+        self._coordinates, self._times = coordinates, times
         self._momenta = [momentum(c) for c in coordinates]
-        self._taylor = Taylor([target], ring, self._momenta)
+        self._taylor = Taylor([target], ring, [*self._momenta, *times])
         self._zero = ring.constant(0)
         self._found: list[Any] = []
         self._overflow: OverflowError | None = None
@@ -194,28 +230,47 @@ class _Recursion:
     def _next(self) -> Any:
         i, even = len(self._found), self._symmetric and len(self._found) % 2 == 1
         moves = i > 0 and not (self._symmetric and i % 2 == 0)
-        slopes = self._slope(self._found[-1]) if moves else [self._zero] * len(self._momenta)
+        slopes = self._slope(self._found[-1], self._coordinates) if moves else [self._zero] * len(self._momenta)
         if moves and self.ring.bytes_per_term:
             self._sizes[i] = max(1, sum(map(len, slopes)))
-        self._taylor.advance(dict(zip(self._momenta, slopes, strict=True)))
+        self._taylor.advance(dict(zip(self._momenta, slopes, strict=True)) | beginning(self.ring, self._times, i))
         if i and isinstance(self._found[-1], Sized) and len(self._found[-1]) > MOST_TERMS:
             raise OverflowError(f"S_{i} has {len(self._found[-1])} terms")
         if even:
             return self._zero
-        return self._taylor.coefficients(self._target)[i] * self.ring.constant(Fraction(1, i + 1))
+        found = self._taylor.coefficients(self._target)[i]
+        for rate in self._slope(self._found[-1], self._times) if moves else ():
+            found = found + rate * self.ring.constant(Fraction(1, 2))
+        return found * self.ring.constant(Fraction(1, i + 1))
+
+
+def beginning(ring: Any, times: Sequence[str], i: int) -> dict[str, Any]:
+    """The coefficient of t^i in τ − t/2, the time at the beginning of a step of size t, for the symbol of τ."""
+    values = {0: ring.variable, 1: lambda _: ring.constant(Fraction(-1, 2))}
+    return {t: values.get(i, lambda _: ring.constant(0))(t) for t in times}
 
 
 def residual(
-    series: PolynomialSeries, hamiltonian: Expression, alpha: Sequence[Expression], coordinates: Sequence[str]
+    series: PolynomialSeries,
+    hamiltonian: Expression,
+    alpha: Sequence[Expression],
+    coordinates: Sequence[str],
+    times: Sequence[str] = (),
 ) -> list[Poly]:
-    """Coefficients of t^0 … t^(k−1) in ∂_t S_t − H(α(x, ∇S_t)): all 0 if S_1 … S_k solve the equation."""
+    """Coefficients of t^0 … t^(k−1) in ∂_t S_t − H(α(x, ∇S_t)): all 0 if S_1 … S_k solve the equation.
+
+    With a time τ, in ∂_t S_t − H(τ − t/2, α(x, ∇S_t)) − ½ ∂_τ S_t.
+    """
     target = composed(hamiltonian, coordinates, alpha)
     tower, momenta = series.tower, [momentum(c) for c in coordinates]
-    taylor = Taylor([target], tower, momenta)
+    taylor = Taylor([target], tower, [*momenta, *times])
     slopes = [[tower.zero] * len(momenta)]
     slopes += [[tower.derivative(s, c) for c in coordinates] for s in series.terms]
     result = []
     for i, s in enumerate(series.terms):
-        taylor.advance(dict(zip(momenta, slopes[i], strict=True)))
-        result.append(s * tower.constant(i + 1) - taylor.coefficients(target)[i])
+        taylor.advance(dict(zip(momenta, slopes[i], strict=True)) | beginning(tower, times, i))
+        rest = s * tower.constant(i + 1) - taylor.coefficients(target)[i]
+        for t in times if i else ():
+            rest -= tower.derivative(series.terms[i - 1], t) * tower.constant(Fraction(1, 2))
+        result.append(rest)
     return result

@@ -1,4 +1,4 @@
-"""Coordinates, parameters and definitions: the names of a spec, and the expressions that use them."""
+"""Coordinates, time, parameters and definitions: the names of a spec, and the expressions that use them."""
 
 # `return reader.error(…)` reports and returns None, the value of what has an error.
 # mypy: disable-error-code="func-returns-value"
@@ -16,7 +16,7 @@ from phigen.spec.grammar import CONSTANTS, Scope, constant, names_in, parse
 from phigen.spec.indices import Indices
 from phigen.spec.kinds import Reader
 from phigen.spec.model import Lattice, Parameter
-from phigen.spec.names import ARGUMENT_HINT, ARGUMENTS, SPEC_FUNCTIONS
+from phigen.spec.names import ARGUMENT_HINT, ARGUMENTS, SPEC_FUNCTIONS, TIMED_ARGUMENTS
 from phigen.spec.problems import counted, did_you_mean, shown
 from phigen.spec.values import values
 from phigen.spec.yaml_source import Node, Scalar
@@ -41,6 +41,8 @@ class Declarations:
     parameters: dict[str, Parameter] = field(default_factory=dict)
     definitions: dict[str, Expression] = field(default_factory=dict)
     varying: set[str] = field(default_factory=set)  # definitions that depend on coordinates
+    time: str = ""  # the name of the time, if there is one
+    dated: set[str] = field(default_factory=set)  # definitions that depend on it
     incomplete: bool = False
     nodes: dict[str, Scalar] = field(default_factory=dict)  # where each name is declared
     within: tuple[Any, ...] = ("poisson",)  # the path of keys to the Poisson structure that is being read
@@ -120,26 +122,41 @@ class Declarations:
     # --- scopes
 
     def scope(self, extra: Mapping[str, Expression] | None = None) -> Scope:
-        """Everything declared: for functions on phase space, of a lattice for densities of sites."""
-        names = {n: symbol(n) for n in (*self.coordinates, *self.parameters)} | self.definitions | dict(extra or {})
+        """Everything declared but the time: for functions on phase space, of a lattice for densities of sites."""
+        names = {n: symbol(n) for n in (*self.coordinates, *self.parameters)}
+        names |= {n: e for n, e in self.definitions.items() if n not in self.dated} | dict(extra or {})
         bonds = self._at_bonds(names)
         known = {n: e for n, e in names.items() if n not in bonds}
-        refused = self.refused | self._counters() | bonds
+        refused = self._timeless() | self.refused | self._counters() | bonds
         return Scope(known, refused, open=self.incomplete, indices=self.indices(known))
+
+    def dated_scope(self) -> Scope:
+        """Everything declared: for functions on phase space that may depend on the time."""
+        scope = self.scope()
+        dated = {n: self.definitions[n] for n in self.dated} | ({self.time: symbol(self.time)} if self.time else {})
+        refused = {n: why for n, why in scope.refused.items() if n not in dated}
+        return replace(scope, names={**scope.names, **dated}, refused=refused)
+
+    def _timeless(self) -> dict[str, tuple[str, str]]:
+        """The refusal of the time where nothing may depend on it."""
+        hint = "the Hamiltonian, invariants, sections and exact solutions may"
+        refused = {n: (f"this must not depend on the time, as {n!r} does", hint) for n in sorted(self.dated)}
+        return refused | ({self.time: (f"this must not depend on the time {self.time!r}", hint)} if self.time else {})
 
     def constants(self, what: str, extra: Mapping[str, Expression] | None = None) -> Scope:
         """Parameters and what depends on them alone; ``what`` says for what in the message about others."""
         names = {n: symbol(n) for n in self.parameters}
-        names |= {n: e for n, e in self.definitions.items() if n not in self.varying}
+        names |= {n: e for n, e in self.definitions.items() if n not in self.varying | self.dated}
         bonds = self._at_bonds(names)
         names = {n: e for n, e in names.items() if n not in bonds}
-        refused = {n: (f"{what} must not depend on the coordinate {n!r}", "") for n in self.coordinates}
+        refused = self._timeless()
+        refused |= {n: (f"{what} must not depend on the coordinate {n!r}", "") for n in self.coordinates}
         refused |= {n: (f"{what} must not depend on coordinates, as {n!r} does", "") for n in self.varying} | bonds
         return Scope(names | dict(extra or {}), refused | self.refused, open=self.incomplete)
 
     def numbers(self) -> Scope:
         """No declared name at all: for defaults and initial values."""
-        declared = (*self.coordinates, *self.parameters, *self.definitions)
+        declared = (*self.coordinates, *self.parameters, *self.definitions, *filter(None, [self.time]))
         return Scope({}, {n: (f"expected a number; {n!r} stands for something that varies", "") for n in declared})
 
     def inside(self, within: tuple[Any, ...], coordinates: tuple[str, ...], message: str) -> Declarations:
@@ -197,7 +214,7 @@ class Declarations:
         elif first is not None:
             where = f"line {first.location.line}, column {first.location.column}"
             self.reader.error(node, f"the name {name!r} is declared twice; the first is in {where}")
-        elif what == "parameter" and name in ARGUMENTS:
+        elif what == "parameter" and name in (TIMED_ARGUMENTS if self.time else ARGUMENTS):
             self.reader.error(node, f"a parameter cannot be called {name!r}", ARGUMENT_HINT)
         elif self.lattice and name in (*self.lattice.indices, *(f"N_{i}" for i in self.lattice.indices)):
             self.reader.error(node, f"the {what} {name!r} has the name of an index or size of the lattice", RENAME)
@@ -210,13 +227,18 @@ class Declarations:
 
 
 def declare(raw: Raw, reader: Reader) -> Declarations:
-    """Read ``coordinates``, ``parameters`` and ``definitions``."""
+    """Read ``coordinates``, ``time``, ``parameters`` and ``definitions``."""
     declared = Declarations(reader, lattice=_lattice(raw.get("lattice"), reader))
     coordinates = raw.get("coordinates")
     declared.incomplete = coordinates is None or None in coordinates
     declared.coordinates = tuple(
         c.text for c in coordinates or () if c is not None and declared.declare(c, "coordinate")
     )
+    time = raw.get("time")
+    if time is not None and declared.lattice:
+        reader.error(time, "time: lattices depend on no time in this version")
+    elif time is not None and declared.declare(time, "time"):
+        declared.time = time.text
     _declare_parameters(raw, declared)
     _declare_definitions(raw.get("definitions", {}), declared)
     return declared
@@ -250,7 +272,12 @@ def _lattice(given: Raw | None, reader: Reader) -> Lattice | None:
 
 
 def _declare_parameters(raw: Raw, declared: Declarations) -> None:
-    others = {*declared.coordinates, *raw.get("parameters", {}), *raw.get("definitions", {})} - {*CONSTANTS}
+    others = {
+        *declared.coordinates,
+        *filter(None, [declared.time]),
+        *raw.get("parameters", {}),
+        *raw.get("definitions", {}),
+    } - {*CONSTANTS}
     why = "the value of a parameter is a number"
     numbers = Scope({}, {n: (why, f"what depends on {n!r} can be a definition") for n in others})
     for name, (key, value) in raw.get("parameters", {}).items():
@@ -291,11 +318,13 @@ def _declare_definitions(entries: Mapping[str, tuple[Scalar, Scalar | None]], de
     uses = {name: names_in(node.text) if node else [] for name, node in sources.items()}
     coordinates = set(declared.coordinates)
     # Placeholders first: only the members of a cycle, which is an error, meet one.
-    known = declared.scope()
+    known = declared.dated_scope()
     names = {**known.names, **{name: symbol(name) for name in sources}}
     for name in _in_order(uses, entries, declared.reader):
         if any(u in coordinates or u in declared.varying for u in uses[name]):
             declared.varying.add(name)
+        if any(u == declared.time or u in declared.dated for u in uses[name]):
+            declared.dated.add(name)
         here = replace(known, names=names, indices=declared.indices(names))
         expression = declared.formula(sources[name], here)
         # After an error the name stays declared, so that its uses are not reported too.

@@ -26,7 +26,7 @@ _WANTED = {"graph": "lattice: {graph: NAME}", "pairs": "lattice: {pairs: all}"}
 def densities(given: Any, declared: Declarations) -> tuple[Expression, Expression]:
     """H of a site, and of a bond or pair, from ``hamiltonian:``, an expression or a mapping."""
     if not isinstance(given, dict):
-        return declared.formula(given, declared.scope()) or ZERO, ZERO
+        return declared.formula(given, declared.dated_scope()) or ZERO, ZERO
     sites, coupling = declared.formula(given.get("sites"), declared.scope()), ZERO
     for key, needed in COUPLINGS.items():
         node = given.get(key)

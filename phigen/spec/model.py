@@ -175,8 +175,9 @@ class Run:
     step: Fraction
     steps: int
     stride: int = 1
+    start: Fraction = Fraction(0)  # the time at the start
     parameters: Mapping[str, Fraction] = field(default_factory=dict)
-    exact: Mapping[str, Expression] = field(default_factory=dict)  # in ELAPSED, initial(NAME), parameters
+    exact: Mapping[str, Expression] = field(default_factory=dict)  # in ELAPSED, the time, initial(NAME), parameters
     compare: tuple[str, ...] = ()
     section: Expression | None = None
     description: str = ""
@@ -239,6 +240,7 @@ class Spec:
     coordinates: tuple[str, ...]
     poisson: PoissonForm
     hamiltonian: Expression
+    time: str = ""  # the name of the time, where functions may depend on it
     parameters: tuple[Parameter, ...] = ()
     casimirs: Mapping[str, Expression] = field(default_factory=dict)
     invariants: Mapping[str, Expression] = field(default_factory=dict)

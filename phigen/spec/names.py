@@ -15,6 +15,8 @@ IDENTIFIER = r"[A-Za-z_][A-Za-z0-9_]*"
 
 #: Parameters are passed by keyword beside these arguments of the generated functions.
 ARGUMENTS = frozenset(["x", "x0", "X0", "h", "steps", "stride", "gauge"])
+#: The same, where there is a time.
+TIMED_ARGUMENTS = ARGUMENTS | {"t", "t0"}
 ARGUMENT_HINT = "it is the name of an argument of the generated functions"
 
 _LICENSES = """0BSD AFL-3.0 AGPL-3.0-only AGPL-3.0-or-later Apache-2.0 Artistic-2.0 BSD-1-Clause BSD-2-Clause

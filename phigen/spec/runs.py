@@ -15,7 +15,7 @@ from phigen.spec.model import Run, Values
 from phigen.spec.problems import counted, did_you_mean, shown
 from phigen.spec.values import values as site_values
 from phigen.spec.yaml_source import Scalar
-from phigen.symbolic.expression import Expression, symbol
+from phigen.symbolic.expression import Expression, substitute, symbol
 from phigen.symbolic.symbols import ELAPSED, initial
 
 #: A duration counts as a multiple of the step up to this relative error: decimals of users are rounded.
@@ -43,9 +43,10 @@ def run(name: str, raw: Mapping[str, Any], declared: Declarations) -> Run:
         steps=steps or 1,
         stride=stride,
         parameters=numbers_of,
+        start=_start(name, raw.get("start"), declared),
         exact=_exact(raw.get("exact", {}), declared),
         compare=without_repetition(raw.get("compare", ()), ("runs", name, "compare"), declared),
-        section=declared.formula(section, declared.scope()),
+        section=declared.formula(section, declared.dated_scope()),
         description=raw.get("description", ""),
         lattice=replace(lattice, arrays=arrays) if lattice else None,
     )
@@ -53,6 +54,12 @@ def run(name: str, raw: Mapping[str, Any], declared: Declarations) -> Run:
 
 def _fail(name: str, key: str, message: str, declared: Declarations, hint: str = "") -> None:
     declared.reader.problems.add(message, declared.reader.locations["runs", name, key], hint)
+
+
+def _start(name: str, given: Scalar | None, declared: Declarations) -> Fraction:
+    if given is not None and not declared.time:
+        _fail(name, "start", "start: this system has no time", declared, "time: t declares the name of the time")
+    return declared.number(given, declared.numbers()) or Fraction(0)
 
 
 def _steps(name: str, raw: Mapping[str, Any], step: Fraction | None, declared: Declarations) -> int | None:
@@ -136,12 +143,14 @@ def _overrides(
 def _exact(given: Mapping[str, tuple[Scalar, Scalar | None]], declared: Declarations) -> dict[str, Expression]:
     if not given:
         return {}
-    own = {"t": symbol(ELAPSED)} | {f"x0_{c}": symbol(initial(c)) for c in declared.coordinates}
+    own = {declared.time or "t": symbol(ELAPSED)} | {f"x0_{c}": symbol(initial(c)) for c in declared.coordinates}
     for name in (*declared.parameters, *declared.definitions):
         if name in own:
             message = f"the name {name!r} has a meaning of its own in the exact solution of a run"
             declared.reader.error(declared.nodes[name], message, "choose another name")
-    scope = declared.constants("an exact solution", own)
+    dated = {n: declared.definitions[n] for n in declared.dated - declared.varying}
+    at = dict(zip(dated, substitute(list(dated.values()), {declared.time: symbol(ELAPSED)}), strict=True))
+    scope = declared.constants("an exact solution", own | at)
     hints = {c: (scope.refused[c][0], f"initial values are written x0_{c}") for c in declared.coordinates}
     # A coordinate t is no obstacle: an exact solution is about the time.
     refused = {n: why for n, why in {**scope.refused, **hints}.items() if n not in own}

@@ -10,6 +10,7 @@ from typing import Any
 from phigen.registry import DEFAULT
 from phigen.spec.declarations import Declarations, declare
 from phigen.spec.fields import SPEC
+from phigen.spec.grammar import Scope
 from phigen.spec.kinds import Reader
 from phigen.spec.lattice import casimirs as read_casimirs
 from phigen.spec.lattice import densities, with_kinds
@@ -64,9 +65,10 @@ def _parts(raw: Mapping[str, Any], declared: Declarations) -> dict[str, Any]:
         "coordinates": declared.coordinates,
         "poisson": poisson_form(poisson, declared) or _no_brackets(declared),
         "hamiltonian": hamiltonian,
+        "time": declared.time,
         "parameters": tuple(declared.parameters.values()),
         "casimirs": casimirs,
-        "invariants": _formulas(raw.get("invariants", {}), declared),
+        "invariants": _formulas(raw.get("invariants", {}), declared, declared.dated_scope()),
         "birealisation": _birealisation(raw.get("birealisation", "auto"), declared),
         "order": raw.get("order", None if "terms" in raw else DEFAULT_ORDER),
         "terms": raw.get("terms"),
@@ -114,8 +116,10 @@ def _name(node: Scalar | None, declared: Declarations) -> str:
     return node.text
 
 
-def _formulas(given: Mapping[str, tuple[Scalar, Scalar | None]], declared: Declarations) -> dict[str, Expression]:
-    scope = declared.scope()
+def _formulas(
+    given: Mapping[str, tuple[Scalar, Scalar | None]], declared: Declarations, scope: Scope | None = None
+) -> dict[str, Expression]:
+    scope = scope or declared.scope()
     values = {name: declared.formula(node, scope) for name, (_, node) in given.items()}
     return {name: value for name, value in values.items() if value is not None}
 

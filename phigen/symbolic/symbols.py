@@ -6,7 +6,7 @@ from typing import Any
 
 #: Kinds that several modules tell apart. A kind without keys has one symbol only, such as the step size.
 MOMENTUM, VARIATION, GAUGE = "p", "v", "gauge"
-COEFFICIENT, SERIES, FIXED = "c", "s", "f"
+COEFFICIENT, RENEWED, SERIES, FIXED = "c", "n", "s", "f"
 TEMPORARY, WORK, PART = "t", "w", "part"
 
 
@@ -31,7 +31,7 @@ class Symbol(str):
         return (self.kind, *self.key)
 
 
-#: The size of a step, or the time of a flow; the time since the start; a matrix Σ p_i E_i.
+#: The size of a step, or the time of a flow; the time of an exact solution; a matrix Σ p_i E_i.
 STEP, ELAPSED, MATRIX = Symbol("h"), Symbol("time"), Symbol("P")
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from phigen.scheme.kernel import Kernel
+from phigen.scheme.kernel import SCALARS, Kernel
 from phigen.symbolic.symbols import Symbol
 from phigen.targets.code import lower
 from phigen.targets.names import Scope
@@ -50,7 +50,7 @@ class Language:
                     continue
                 if argument == "params":
                     scope.bind(s, self.parameter.format(name=s))
-                elif argument == "h":
+                elif argument in SCALARS:
                     scope.bind(s, arrays[argument])
                 elif isinstance(s, Symbol):
                     scope.bind(s, self.entry(arrays[argument], i))

@@ -95,7 +95,8 @@ def printed(program: Program, lanes: Lanes | None, has: Mapping[str, bool]) -> d
 def _declarations(program: Program, lanes: Lanes | None, has: Mapping[str, bool]) -> dict[str, object]:
     member = members(program)
     sizes: Sizes = [("STAGES", len(program.fractions), "of a step")] if has["COMPOSED"] else []
-    sizes.append(("COEFFICIENTS", max(1, program.step.coefficients), "numbers that depend on params and h only"))
+    only = ", and on the time" if program.step.refresh else " only"
+    sizes.append(("COEFFICIENTS", max(1, program.step.coefficients), f"numbers that depend on params and h{only}"))
     if program.gauge:
         free = program.gauge.casimirs
         sizes.append(("GAUGES", len(free), f"Casimirs whose multiples are taken from H: {', '.join(free)}"))
@@ -130,6 +131,8 @@ def _about(parameter: Parameter, member: str) -> str:
 def _constants(program: Program, lanes: Lanes | None, has: Mapping[str, bool]) -> Sizes:
     sizes: Sizes = []
     step = program.step
+    if step.refresh:
+        sizes.append(("PREPARED", step.prepared, "coefficients that depend on params and h only, before the others"))
     if isinstance(step, Implicit):
         sizes.append(("MAX_ITERATIONS", step.inner.max_iterations, "of an inner solve"))
     if isinstance(step, Path):
@@ -158,7 +161,7 @@ def _model(program: Program, lanes: Lanes | None, has: Mapping[str, bool], other
     body = functions.called(program)
     own: list[Kernel | None] = []
     if not isinstance(step, Splitting):
-        own = [step.prepare, step.main]
+        own = [step.prepare, step.refresh, step.main]
     if isinstance(step, Implicit) and has["UNROLLED"]:
         own.append(step.eliminate)
     own += program.choice
@@ -190,6 +193,8 @@ def _model(program: Program, lanes: Lanes | None, has: Mapping[str, bool], other
         "path_slopes": ", ".join(map(str, step.recurrences.slopes)) if isinstance(step, Path) and has["BLOCKS"] else "",
         "apart": has["PACKS"] or any("_APART" in part for part in [text, *others]),
     }
+    values["middles"] = ", ".join(map(repr, program.midpoints))
+    values["middles"] = render("c", "middles.c", values) if step.refresh and not schedule else ""
     return render("c", "constants.c", values) + text
 
 

@@ -54,6 +54,8 @@ FEATURES = (
     Feature("PARAMETERS", lambda p: p.parameters),
     Feature("COMPOSED", lambda p: len(p.fractions) > 1),
     Feature("KICKS", lambda p: isinstance(p.step, Splitting) and p.step.schedule.multiples),
+    Feature("TIMED", lambda p: p.time),
+    Feature("RENEWED", lambda p: p.step.refresh),
     Feature("GAUGE", lambda p: p.gauge),
     Feature("RELATIVE", lambda p: isinstance(p.step, Implicit) and p.step.inner.relative),
     Feature("TANGENT", lambda p: p.extras.tangent),

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from phigen.lanes.functions import LANE_FORMULAS, LANE_FUNCTIONS
-from phigen.scheme.kernel import Kernel
+from phigen.scheme.kernel import SCALARS, Kernel
 from phigen.scheme.lowering import Assignment
 from phigen.scheme.program import Program
 from phigen.symbolic import functions as elementary
@@ -142,8 +142,8 @@ def _signature(program: Program, kernel: Kernel, form: Form) -> str:
     arguments = [
         f"const {program.name}_params *params"
         if i == "params"
-        else "double h"
-        if i == "h"
+        else f"double {i}"
+        if i in SCALARS
         else f"{kinds[i][0]} {i}[{kinds[i][1]}{max(1, len(symbols))}]"
         for i, symbols in kernel.inputs.items()
     ]
@@ -201,8 +201,8 @@ def _bound(program: Program, kernel: Kernel, form: Form, code: Code, scope: Scop
         for i, s in enumerate(symbols):
             if s not in code.used:
                 continue
-            if array == "h":
-                scope.bind(s, "h")
+            if array in SCALARS:
+                scope.bind(s, array)
             elif array == "params" and not form.exported:
                 scope.bind(s, f"params->{member[s]}")
             elif array == "params":  # all is read before anything is written: arguments of the API may overlap

@@ -73,6 +73,8 @@ def _features(program: Program) -> dict[str, bool]:
         "COMPOSED": len(program.fractions) > 1,
         "SPLITTING": isinstance(step, Splitting),
         "KICKS": isinstance(step, Splitting) and bool(step.schedule.multiples),
+        "TIMED": bool(program.time),
+        "RENEWED": step.refresh is not None,
         "MODIFIED": program.modified is not None,
         **{f"TAYLOR_{kind.upper()}": kind in sums for kind in ("product", "chain", "power")},
     }
@@ -107,11 +109,22 @@ def _system(program: Program) -> Mapping[str, object]:
         "positive": json.dumps([p.name for p in parameters if p.positive]),
         "gauge": json.dumps(program.gauge.casimirs) if program.gauge else "",
         "fractions": json.dumps(program.fractions),
-        "coefficients": step.row,
+        "table": render("js", "table.mjs", _table(program)).strip("\n"),
         "times": json.dumps(schedule.times) if schedule else "",
         "multiples": json.dumps(schedule.multiples) if schedule and schedule.multiples else "",
         "schedule": json.dumps(schedule.flows) if schedule else "",
         "flows": ", ".join(f"flow{k}" for k in range(1, len(step.flows) + 1)) if isinstance(step, Splitting) else "",
+    }
+
+
+def _table(program: Program) -> Mapping[str, object]:
+    """The sizes of the table of coefficients."""
+    step = program.step
+    return {
+        "middles": json.dumps(program.midpoints) if step.refresh else "",
+        "prepared": step.prepared,
+        "coefficients": step.row,
+        "times": isinstance(step, Splitting),
     }
 
 
@@ -140,7 +153,7 @@ def _contents(program: Program) -> list[str]:
     }[type(step)]
     lines = [
         f"import {{ Solver, StepError }} from './{program.name}.mjs';",
-        "const solver = new Solver({ x0: [...], params: { ... } });",
+        f"const solver = new Solver({{ x0: [...],{' t0,' * bool(program.time)} params: {{ ... }} }});",
         "solver.integrate(h, steps); then solver.x, .t, .hamiltonian(), .casimirs(), .vectorField()",
         "",
         "Contents: the system, with its kernels; the class Solver; the step, by " + how + ".",
@@ -162,7 +175,8 @@ def _kernels(program: Program) -> list[Kernel]:
     others = [*program.choice, *modified, seen.energy, seen.casimirs, seen.vector_field]
     if isinstance(step, Splitting):
         return [replace(step.prepare, name="prepare_row"), *step.flows, *others]
-    return [step.prepare, step.main, *others]
+    refresh = [step.refresh] if step.refresh else []
+    return [step.prepare, *refresh, step.main, *others]
 
 
 def _function(kernel: Kernel) -> str:

@@ -6,8 +6,9 @@ import textwrap
 from collections.abc import Sequence
 from dataclasses import replace
 
-from phigen.scheme.kernel import Kernel
+from phigen.scheme.kernel import SCALARS, Kernel
 from phigen.scheme.program import Program
+from phigen.scheme.staging import NOW, TABLE
 from phigen.scheme.steps import (
     LONGEST_PATH,
     MOST_PIECES,
@@ -65,7 +66,8 @@ def emit(program: Program, command: str) -> dict[str, str]:
     templates = search if program.gauge else ("no_gauge.py",)
     pieces += [render("numpy", template, _values(program)) for template in templates]
     pieces += [_function(program, kernel) for kernel in program.choice]
-    pieces += [render("numpy", part, _values(program)) for part in ("coefficients.py", "api.py")]
+    coefficients = "coefficients_in_time.py" if program.time else "coefficients.py"
+    pieces += [render("numpy", part, _values(program)) for part in (coefficients, "api.py")]
     pieces += [_function(program, kernel) for kernel in (seen.energy, seen.casimirs, seen.vector_field)]
     pieces += [render("numpy", "observables.py", _values(program))]
     if program.extras.tangent:
@@ -85,21 +87,24 @@ def _step(program: Program) -> list[str]:
     def rendered(*parts: str) -> list[str]:
         return [render("numpy", f"{part}.py", values) for part in parts]
 
+    refresh, prepare = program.step.refresh, program.step.prepare
+    renewing = [_function(program, refresh)] if refresh else []
+    early = [_function(program, prepare), *renewing]
     match program.step:
-        case Splitting(prepare=prepare, flows=flows, schedule=schedule) as step:
+        case Splitting(flows=flows, schedule=schedule) as step:
             values |= _splitting_values(step)
             row = _function(program, replace(prepare, name="prepare_row"))
             rows = "rows_kicks" if schedule.multiples else "rows"
-            return [row, *(_function(program, flow) for flow in flows), *rendered("splitting", rows)]
-        case Explicit(prepare=prepare, increment=increment):
-            return [_function(program, prepare), _function(program, increment), *rendered("explicit")]
-        case Path(prepare=prepare, recurrences=path, generate=generate):
+            return [row, *renewing, *(_function(program, flow) for flow in flows), *rendered("splitting", rows)]
+        case Explicit(increment=increment):
+            return [*early, _function(program, increment), *rendered("explicit")]
+        case Path(recurrences=path, generate=generate):
             values |= statements(program, path, PATH_SYNTAX)
             parts = rendered("holds", "piece", "path", "residual", "solve", "plausible", "path_step")
-            return [_function(program, prepare), _function(program, generate), *parts]
-        case Newton(prepare=prepare, linearise=linearise):
+            return [*early, _function(program, generate), *parts]
+        case Newton(linearise=linearise):
             parts = rendered("solve", "plausible", "newton")
-            return [_function(program, prepare), _function(program, linearise), *parts]
+            return [*early, _function(program, linearise), *parts]
 
 
 def _splitting_values(step: Splitting) -> dict[str, object]:
@@ -153,6 +158,16 @@ def _values(program: Program) -> dict[str, object]:
         "plausible": repr(PLAUSIBLE),
         "path_pieces": repr(tuple(1 << k for k in range(LONGEST_PATH.bit_length()))),
         "most_pieces": MOST_PIECES,
+        "time": bool(program.time),
+        "at_t": "t, " * bool(program.time),
+        "t0_given": ", t0=0.0" * bool(program.time),
+        "t0_passed": ", t0=t0" * bool(program.time),
+        "said_from_t0": ", from the time t0" * bool(program.time),
+        "said_of_t0": " t0 is the time of x0." * bool(program.time),
+        "and_t0_is_finite": " and np.isfinite(t0)" * bool(program.time),
+        "stages_now": "[_renewed(s, t0 + done * h, h) for s in stages]" if program.time else "stages",
+        "renewed": step.renewed,
+        "middles": "(" + "".join(f"{m!r}, " for m in program.midpoints).rstrip() + ")",
         "fractions": "(" + "".join(f"{f!r}, " for f in program.fractions).rstrip() + ")",
         "terms": TERMS,
         "series": len(step.recurrences.series) if isinstance(step, Path) else 0,
@@ -192,8 +207,8 @@ def _bindings(kernel: Kernel, code: Code, scope: Scope) -> list[str]:
         for i, s in enumerate(symbols):
             if s not in code.used:
                 continue
-            if array == "h":
-                scope.bind(s, "h")
+            if array in SCALARS:
+                scope.bind(s, array)
             elif array == "params":
                 lines.append(f'    {scope[s]} = parameters["{s}"]')
             elif isinstance(s, Symbol):
@@ -207,9 +222,10 @@ def _result(program: Program, kernel: Kernel, code: Code, printer: Printer) -> s
     values: dict[str, list[Expression]] = {o.name: [] for o in kernel.outputs}
     for s in code.stores:
         values[s.array].append(s.value)
-    if kernel.outputs[0].name == "coef":
-        return "    return " + _list([printer(v) for v in values["coef"]])
-    state = next(a for a in kernel.inputs if a not in ("coef", "params", "gauge", "h"))
+    table = kernel.outputs[0].name
+    if table in (TABLE, NOW):
+        return "    return " + _list([printer(v) for v in values[table]])
+    state = next(a for a in kernel.inputs if a not in (TABLE, "params", "gauge", *SCALARS))
     n = program.dimension
     arrays = []
     for name, entries in values.items():

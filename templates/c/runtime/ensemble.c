@@ -38,8 +38,13 @@ phi_status phi_ensemble(const phi_params *params, double *x, size_t members, dou
 }
 
 #else
+#if PHI_TIMED
+phi_status phi_ensemble_at(const phi_params *params, double *x, size_t members, double t0, double h, size_t steps,
+    unsigned char *status)
+#else
 phi_status phi_ensemble(const phi_params *params, double *x, size_t members, double h, size_t steps,
     unsigned char *status)
+#endif
 {
     phi_status worst = isfinite(h) ? PHI_OK : PHI_BAD_ARGUMENT;
     const phi_params own = params != NULL ? *params : phi_default_params;
@@ -48,7 +53,11 @@ phi_status phi_ensemble(const phi_params *params, double *x, size_t members, dou
         phi_solver s;
         double x0[PHI_DIM];
         for (size_t i = 0; i < PHI_DIM; ++i) x0[i] = x[i * members + m];
+#if PHI_TIMED
+        phi_status member = phi_init_at(&s, &own, x0, t0);
+#else
         phi_status member = phi_init(&s, &own, x0);
+#endif
         if (member == PHI_OK) {
             member = phi_integrate(&s, h, steps);
             for (size_t i = 0; i < PHI_DIM; ++i) x[i * members + m] = s.x[i];
@@ -57,6 +66,14 @@ phi_status phi_ensemble(const phi_params *params, double *x, size_t members, dou
         if (worst == PHI_OK) worst = member;
     }
     return worst;
+}
+#endif
+#if PHI_TIMED
+
+phi_status phi_ensemble(const phi_params *params, double *x, size_t members, double h, size_t steps,
+    unsigned char *status)
+{
+    return phi_ensemble_at(params, x, members, 0.0, h, steps, status);
 }
 #endif
 #endif

@@ -173,11 +173,20 @@ static int phi_plausible(const phi_solver *s, int stage, const double increment[
         end[i] = s->x[i] + increment[i];
     }
     if (moved <= PHI_PLAUSIBLE * size) return 1;
+#if PHI_TIMED
+    phi_vector_field(&s->params, s->t, s->x, field);
+#else
     phi_vector_field(&s->params, s->x, field);
+#endif
     for (int i = 0; i < PHI_DIM; ++i) size += fabs(phi_fractions[stage] * s->h * field[i]);
     if (moved <= PHI_PLAUSIBLE * size) return 1;
+#if PHI_TIMED
+    const double before = phi_hamiltonian(&s->params, s->t, s->x), after = phi_hamiltonian(&s->params, s->t, end);
+    const double between = phi_hamiltonian(&s->params, s->t, middle);
+#else
     const double before = phi_hamiltonian(&s->params, s->x);
     const double after = phi_hamiltonian(&s->params, end), between = phi_hamiltonian(&s->params, middle);
+#endif
     return fabs(after - before) <= PHI_LOST * (fabs(before) + fabs(between) + fabs(after));
 }
 #endif

@@ -29,14 +29,23 @@
 #if PHI_GAUGE
 phi_status phi_init_gauge(phi_solver *s, const phi_params *params, const double x0[PHI_DIM],
     const double gauge[PHI_GAUGES])
+#elif PHI_TIMED
+phi_status phi_init_at(phi_solver *s, const phi_params *params, const double x0[PHI_DIM], double t0)
 #else
 phi_status phi_init(phi_solver *s, const phi_params *params, const double x0[PHI_DIM])
 #endif
 {
+#if PHI_TIMED
+    if (s == NULL || x0 == NULL || !isfinite(t0)) return PHI_BAD_ARGUMENT;
+#else
     if (s == NULL || x0 == NULL) return PHI_BAD_ARGUMENT;
+#endif
     phi_solver fresh = { .h = (double)NAN };
     fresh.params = params != NULL ? *params : phi_default_params;
     memcpy(fresh.x, x0, sizeof fresh.x);
+#if PHI_TIMED
+    fresh.t = t0;
+#endif
     for (int i = 0; i < PHI_DIM; ++i)
         if (!isfinite(fresh.x[i])) return PHI_BAD_ARGUMENT;
 #if PHI_PARAMETERS
@@ -63,6 +72,13 @@ phi_status phi_init(phi_solver *s, const phi_params *params, const double x0[PHI
 phi_status phi_init(phi_solver *s, const phi_params *params, const double x0[PHI_DIM])
 {
     return phi_init_gauge(s, params, x0, NULL);
+}
+
+#endif
+#if PHI_TIMED
+phi_status phi_init(phi_solver *s, const phi_params *params, const double x0[PHI_DIM])
+{
+    return phi_init_at(s, params, x0, 0.0);
 }
 
 #endif
@@ -94,6 +110,15 @@ static phi_status phi_set_step(phi_solver *s, double h)
     return PHI_OK;
 }
 
+#if PHI_RENEWED
+/* What depends on the time of the next step. */
+static void phi_renew(phi_solver *s)
+{
+    for (int stage = 0; stage < PHI_STAGES; ++stage)
+        phi_refresh(s->coef[stage], s->t + phi_middles[stage] * s->h, s->coef[stage] + PHI_PREPARED);
+}
+
+#endif
 #if PHI_BLOCKS
 /* Some good steps have been made. */
 static void phi_count(phi_solver *s, size_t steps)
@@ -136,6 +161,9 @@ phi_status phi_step(phi_solver *s, double h)
 {
     phi_status status = phi_set_step(s, h);
     if (status != PHI_OK) return status;
+#if PHI_RENEWED
+    phi_renew(s);
+#endif
 #if PHI_COMPOSED
     status = phi_stages(s);
 #else
@@ -150,6 +178,9 @@ phi_status phi_integrate(phi_solver *s, double h, size_t steps)
 {
     phi_status status = phi_set_step(s, h);
     for (; steps > 0 && status == PHI_OK; --steps) {
+#if PHI_RENEWED
+        phi_renew(s);
+#endif
 #if PHI_COMPOSED || PHI_SPLITTING
         status = phi_stages(s);
 #else

@@ -55,13 +55,21 @@ typedef struct {
     double carry[PHI_DIM]; /* what rounding took from x: the state proper is x + carry */
     size_t steps;          /* good steps since phi_init */
     size_t evaluations;    /* of the generating function, for statistics */
+#if PHI_TIMED
+    double t;              /* the time of x */
+#else
     double t;              /* time since phi_init */
+#endif
     double h;              /* the last step size; NaN before the first step */
     phi_params params;
 #if PHI_GAUGE
     double gauge[PHI_GAUGES]; /* multiples of Casimirs that are taken from H, in their order */
 #endif
+#if PHI_RENEWED
+    double coef[PHI_STAGES][PHI_COEFFICIENTS]; /* what depends on params and h only, then on the time of the step as well */
+#else
     double coef[PHI_STAGES][PHI_COEFFICIENTS]; /* all that depends on params and h only */
+#endif
     size_t steps_before_h; /* steps and t when h was set: t is counted from there, so no error adds up */
     double t_before_h;
 #if PHI_IMPLICIT
@@ -77,6 +85,11 @@ typedef struct {
    what is computed from parameters alone is not finite. */
 phi_status phi_init(phi_solver *s, const phi_params *params, const double x0[PHI_DIM]);
 
+#if PHI_TIMED
+/* The same at the time t0, which phi_init takes to be 0. */
+phi_status phi_init_at(phi_solver *s, const phi_params *params, const double x0[PHI_DIM], double t0);
+
+#endif
 #if PHI_GAUGE
 /* Start at x0 with a gauge of one's own: the step is an exact Poisson map for each fixed gauge. */
 phi_status phi_init_gauge(phi_solver *s, const phi_params *params, const double x0[PHI_DIM],
@@ -97,16 +110,29 @@ phi_status phi_integrate(phi_solver *s, double h, size_t steps);
 phi_status phi_ensemble(const phi_params *params, double *x, size_t members, double h, size_t steps,
     unsigned char *status);
 
+#if PHI_TIMED
+/* The same from the time t0 of all members on, which phi_ensemble takes to be 0. */
+phi_status phi_ensemble_at(const phi_params *params, double *x, size_t members, double t0, double h, size_t steps,
+    unsigned char *status);
+
+#endif
 #if PHI_TANGENT
 /* One step as phi_step makes it, and its derivative: tangent[i * PHI_DIM + j] is that of the new x_i along the old x_j,
    to round-off, with any gauge held fixed. On failure both are as before. */
 phi_status phi_step_tangent(phi_solver *s, double h, double tangent[PHI_DIM * PHI_DIM]);
 
 #endif
+#if PHI_TIMED
+/* The Hamiltonian at the time t; the Casimirs; the right-hand side pi(x) grad H(t, x). params may be NULL. */
+double phi_hamiltonian(const phi_params *params, double t, const double x[PHI_DIM]);
+void phi_casimirs(const phi_params *params, const double x[PHI_DIM], double out[]);
+void phi_vector_field(const phi_params *params, double t, const double x[PHI_DIM], double out[PHI_DIM]);
+#else
 /* The Hamiltonian; the Casimirs; the right-hand side pi(x) grad H(x). params may be NULL. */
 double phi_hamiltonian(const phi_params *params, const double x[PHI_DIM]);
 void phi_casimirs(const phi_params *params, const double x[PHI_DIM], double out[]);
 void phi_vector_field(const phi_params *params, const double x[PHI_DIM], double out[PHI_DIM]);
+#endif
 
 #if PHI_MODIFIED
 /* The Hamiltonian whose flow a step of size h is, up to O(h^PHI_MODIFIED_POWER): constant along a trajectory to that

@@ -103,22 +103,37 @@ export function plausible(solver, stage, increment) {
     size += Math.abs(x[i]);
   }
   if (moved <= PLAUSIBLE * size) return true;
+  // #if TIMED
+  vectorField(params, solver.t, x, speed);
+  // #else
   vectorField(params, x, speed);
+  // #endif
   for (let i = 0; i < DIM; i++) size += Math.abs(FRACTIONS[stage] * solver.h * speed[i]);
   if (moved <= PLAUSIBLE * size) return true;
   const [before, middle, after] = [0, 0.5, 1].map((part) => {
     for (let i = 0; i < DIM; i++) point[i] = x[i] + part * increment[i];
+    // #if TIMED
+    return energyAt(params, solver.t, point);
+    // #else
     return energyAt(params, point);
+    // #endif
   });
   return Math.abs(after - before) <= LOST * (Math.abs(before) + Math.abs(middle) + Math.abs(after));
 }
 
 const value = new Float64Array(1);
 
+// #if TIMED
+function energyAt(params, t, x) {
+  energy(params, t, x, value);
+  return value[0];
+}
+// #else
 function energyAt(params, x) {
   energy(params, x, value);
   return value[0];
 }
+// #endif
 
 /**
  * One stage. A guess from earlier steps may have misled it: then once more without.

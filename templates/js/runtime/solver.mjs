@@ -12,6 +12,9 @@ import { casimirs, energy, prepare, vectorField } from "./model.mjs";
 // #if SPLITTING
 import { TIMES } from "./model.mjs";
 // #endif
+// #if RENEWED
+import { MIDDLES, PREPARED, refresh } from "./model.mjs";
+// #endif
 // #if MODIFIED
 import { modified } from "./model.mjs";
 // #endif
@@ -98,8 +101,13 @@ export class Solver {
   x;
   /** What rounding took from x: the state proper is x + carry. */
   carry = new Float64Array(DIM);
+  // #if TIMED
+  /** The time of x. */
+  t;
+  // #else
   /** Time since the start. */
   t = 0;
+  // #endif
   /** Good steps since the start. */
   steps = 0;
   /** Evaluations of the generating function, for statistics. */
@@ -112,7 +120,11 @@ export class Solver {
   /** Multiples of the Casimirs in GAUGE that are taken from H. */
   gauge;
   // #endif
+  // #if RENEWED
+  /** What depends on parameters and step size only, then on the time of the step too, for each stage. */
+  // #else
   /** All that depends on parameters and step size only, for each stage. */
+  // #endif
   coef = emptyTables();
   // #if IMPLICIT
   /** For starting guesses, for each stage. */
@@ -128,6 +140,9 @@ export class Solver {
    * @param {object} options
    * @param {ArrayLike<number>} options.x0 the coordinates, in the order of COORDINATES
    * @param {Partial<Parameters>} [options.params] the defaults for those that are left out
+   * #if TIMED
+   * @param {number} [options.t0] the time of x0, 0 by default
+   * #endif
    * #if GAUGE
    * @param {ArrayLike<number>} [options.gauge] multiples of one's own: the step is an exact Poisson map
    *   for each
@@ -136,6 +151,9 @@ export class Solver {
   constructor(options) {
     this.x = finite(options.x0, DIM, "x0");
     this.params = admitted(options.params ?? {});
+    // #if TIMED
+    [this.t] = finite([options.t0 ?? 0], 1, "t0");
+    // #endif
     // #if GAUGE
     const { gauge } = options;
     this.gauge = gauge ? finite(gauge, GAUGE.length, "gauge") : chooseGauge(this.params, this.x);
@@ -161,6 +179,13 @@ export class Solver {
     this.#stepsBefore = this.steps;
   }
 
+  // #if RENEWED
+  /** What depends on the time of the next step. */
+  #renew() {
+    this.coef.forEach((coef, stage) => refresh(coef, this.t + MIDDLES[stage] * this.h, coef.subarray(PREPARED)));
+  }
+
+  // #endif
   /**
    * One step of size h, of either sign. Throws StepError; then the state is as before.
    *
@@ -169,6 +194,9 @@ export class Solver {
    */
   step(h) {
     this.#setStep(h);
+    // #if RENEWED
+    this.#renew();
+    // #endif
     // #if COMPOSED
     const x = Float64Array.from(this.x);
     const carry = Float64Array.from(this.carry);
@@ -203,11 +231,19 @@ export class Solver {
     return this;
   }
 
+  // #if TIMED
+  /** The Hamiltonian, at x and its time or elsewhere. */
+  hamiltonian(x = this.x, t = this.t) {
+    energy(this.params, t, x, number);
+    return number[0];
+  }
+  // #else
   /** The Hamiltonian, at x or elsewhere. */
   hamiltonian(x = this.x) {
     energy(this.params, x, number);
     return number[0];
   }
+  // #endif
 
   // #if MODIFIED
   /** The Hamiltonian whose flow a step of size h is, up to O(h^MODIFIED_POWER), at x or elsewhere. */
@@ -228,10 +264,19 @@ export class Solver {
     return out;
   }
 
+  // #if TIMED
+  /** The right-hand side pi(x) grad H(t, x). */
+  vectorField(x = this.x, t = this.t) {
+    const out = new Float64Array(DIM);
+    vectorField(this.params, t, x, out);
+    return out;
+  }
+  // #else
   /** The right-hand side pi(x) grad H(x). */
   vectorField(x = this.x) {
     const out = new Float64Array(DIM);
     vectorField(this.params, x, out);
     return out;
   }
+  // #endif
 }

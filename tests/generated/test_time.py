@@ -1,0 +1,282 @@
+"""Hamiltonians that depend on the time: the series, the order, the targets, beside the same with a pair typed by hand."""
+
+import json
+import subprocess
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from support import COMMAND, compile_text, solver, tool
+
+import phigen
+from phigen import spec
+from phigen.compiler import compile_spec, emit, examine
+from phigen.errors import SpecError
+from phigen.geometry.system import system_from_spec
+from phigen.realisations.catalogue import realise
+from phigen.scheme.discretisation import hamilton_jacobi
+from phigen.series.hamilton_jacobi import graph_series, residual
+from phigen.spec.model import BirealisationChoice
+from phigen.symbolic.expression import substitute, symbol
+from phigen.symbolic.numeric import evaluate
+from phigen.symbolic.verdict import decide_zero, sample_point
+
+T0, H, STEPS = 0.3, 0.1, 20
+
+PENDULUM = """time: t
+coordinates: [q, p]
+parameters: {A: 0.5, omega: 2}
+poisson: {canonical: {q: [q], p: [p]}}
+definitions: {drive: A*cos(omega*t)}
+hamiltonian: p**2/2 - cos(q) - q*drive
+"""
+
+#: The same with the time and its conjugate as coordinates.
+BY_HAND = """coordinates: [q, t, p, e]
+parameters: {A: 0.5, omega: 2}
+poisson: {canonical: {q: [q, t], p: [p, e]}}
+hamiltonian: p**2/2 - cos(q) - q*A*cos(omega*t) + e
+"""
+
+BODY = """time: t
+coordinates: [m1, m2, m3]
+parameters: {b: 0.4, omega: 1.5}
+poisson: {brackets: {m1: {m2: -m3, m3: m2}, m2: {m3: -m1}}}
+casimirs: {C: m1**2 + m2**2 + m3**2}
+hamiltonian: m1**2/2 + m2**2/4 + m3**2/6 - b*(m1*cos(omega*t) + m2*sin(omega*t))
+tangent: true
+"""
+
+SEASONS = """time: t
+coordinates: [x, y]
+parameters: {s: 0.3, omega: 2}
+poisson: {log_canonical: [[0, 1], [-1, 0]]}
+hamiltonian: x + y - (1 + s*cos(omega*t))*log(x) - 1.5*log(y)
+tangent: true
+"""
+
+STARTS = {PENDULUM: [1.0, 0.0], BODY: [0.6, 0.5, 0.7], SEASONS: [0.6, 1.5]}
+
+#: Every kind of step: text, order, bi-realisation, composition.
+KINDS = {
+    "newton": (PENDULUM, 4, "auto", "auto"),
+    "newton, non-linear π": (BODY, 6, "auto", "auto"),
+    "newton, log-canonical": (SEASONS, 4, "auto", "auto"),
+    "newton, order 2": (BODY, 2, "cayley", "auto"),
+    "newton, not symmetric": (PENDULUM, 4, "canonical-euler", "auto"),
+    "explicit": (PENDULUM, 1, "canonical-euler", "auto"),
+    "path": (BODY, 4, "karasev", "auto"),
+    "newton, composed": (BODY, 6, "auto", "kahan-li"),
+    "path, composed": (BODY, 4, "karasev", "suzuki"),
+}
+
+
+@cache
+def compilation_of(kind):
+    text, order, birealisation, composition = KINDS[kind]
+    given = spec.loads(f"phigen: 1\nname: t\n{text}order: {order}\n")
+    given = replace(given, birealisation=BirealisationChoice(birealisation), composition=composition)
+    return compile_spec(given)
+
+
+def start_of(kind):
+    return np.array(STARTS[KINDS[kind][0]])
+
+
+def terms_of(text, kind, count):
+    system = system_from_spec(spec.loads(f"phigen: 1\nname: t\n{text}"))
+    realisation = realise(system, BirealisationChoice(kind))
+    return system, realisation, hamilton_jacobi(system, realisation, count).polynomial(count)
+
+
+@pytest.mark.parametrize("kind", ["constant", "canonical-euler"])
+def test_the_series_is_that_of_the_pair_typed_by_hand(kind):
+    system, realisation, found = terms_of(PENDULUM, kind, 4)
+    both, whole, by_hand = terms_of(BY_HAND, "constant", 4)
+    if kind == "canonical-euler":  # the pair keeps the midpoint
+        alpha = [*realisation.alpha[:1], whole.alpha[1], *realisation.alpha[1:], whole.alpha[3]]
+        listed = graph_series(both.hamiltonian, alpha, both.coordinates, 4, symmetric=False)
+    else:
+        listed = [by_hand.tower.expression(s) for s in by_hand.terms]
+    for i, (mine, theirs) in enumerate(zip(found.terms, listed, strict=True), 1):
+        difference = found.tower.expression(mine) - theirs + (symbol("e") if i == 1 else 0)
+        assert decide_zero(f"S_{i}", [("", difference)]).verdict == "proved"
+
+
+def test_the_residual_knows_both_terms_of_the_equation():
+    system, realisation, series = terms_of(PENDULUM, "canonical-euler", 3)
+    whole = residual(series, system.hamiltonian, realisation.alpha, system.coordinates, system.times)
+    assert all(r == 0 for r in whole)
+    frozen = residual(series, system.hamiltonian, realisation.alpha, system.coordinates)
+    assert [bool(r == 0) for r in frozen] == [True, True, False]  # −½ ∂_τ H and ½ ∂_τ S_1 cancel in the second
+
+
+@pytest.mark.parametrize("order", [2, 6])
+def test_steps_are_those_with_the_pair_typed_by_hand(order):
+    mine = solver(compile_text(PENDULUM, order), "numpy").integrate([1, 0], H, 100, t0=T0)
+    theirs = solver(compile_text(BY_HAND, order), "numpy").integrate([1, T0, 0, 0], H, 100)
+    assert mine.x == pytest.approx(theirs.x[:, [0, 2]], abs=1e-14)
+    assert mine.t == pytest.approx(theirs.x[:, 1], abs=1e-14)
+
+
+def errors(solve, field, x0, span, counts):
+    reference = solve_ivp(field, (T0, T0 + span), x0, method="DOP853", rtol=1e-13, atol=1e-15).y[:, -1]
+    return np.array([np.max(np.abs(solve(x0, span / n, n) - reference)) for n in counts])
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_the_order_is_that_of_autonomous_systems(kind):
+    compilation = compilation_of(kind)
+    found = solver(compilation, "numpy")
+    steps = (20, 40) if compilation.order.order < 6 else (8, 16)
+    coarse, fine = errors(
+        lambda x, h, n: found.integrate(x, h, n, n, t0=T0).x[-1],
+        lambda t, x: found.vector_field(x, t),
+        start_of(kind),
+        2.0,
+        steps,
+    )
+    assert np.log2(coarse / fine) == pytest.approx(compilation.order.order, abs=0.45)
+
+
+@pytest.mark.parametrize("shift", [-H / 2, H / 2])
+def test_the_time_at_an_end_of_the_step_gives_order_one_only(shift):
+    found = solver(compilation_of("newton"), "numpy")
+    coarse, fine = errors(
+        lambda x, h, n: found.integrate(x, h, n, n, t0=T0 + shift * h / H).x[-1],
+        lambda t, x: found.vector_field(x, t),
+        start_of("newton"),
+        2.0,
+        (20, 40),
+    )
+    assert np.log2(coarse / fine) == pytest.approx(1, abs=0.1)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_targets_agree_to_roundoff(kind, tmp_path):
+    compilation, x0 = compilation_of(kind), start_of(kind)
+    expected = solver(compilation, "numpy").integrate(x0, H, STEPS, t0=T0)
+    c = solver(compilation, "c").integrate(x0, H, STEPS, t0=T0)
+    assert c.x == pytest.approx(expected.x, abs=1e-13)
+    assert c.t == pytest.approx(expected.t, abs=0)
+    assert c.energy == pytest.approx(expected.energy, abs=1e-13)
+    small = replace(compilation, program=replace(compilation.program, profile="small"))
+    assert solver(small, "c").integrate(x0, H, STEPS, t0=T0).x == pytest.approx(expected.x, abs=1e-13)
+    (text,) = emit(compilation.program, "js", COMMAND).values()
+    (tmp_path / "t.mjs").write_text(text, encoding="utf-8")
+    script = (
+        f"import {{ Solver }} from './t.mjs'; const s = new Solver({{ x0: {x0.tolist()}, t0: {T0} }});"
+        f"s.integrate({H}, {STEPS}); console.log(JSON.stringify([[...s.x], s.t, s.hamiltonian(), [...s.vectorField()]]))"
+    )
+    (tmp_path / "run.mjs").write_text(script, encoding="utf-8")
+    done = subprocess.run([tool("node"), str(tmp_path / "run.mjs")], capture_output=True, text=True, check=True)
+    x, t, energy, field = json.loads(done.stdout)
+    assert x == pytest.approx(expected.x[-1], abs=1e-13)
+    assert (t, energy) == pytest.approx((expected.t[-1], expected.energy[-1]), abs=1e-13)
+    assert field == pytest.approx(solver(compilation, "c").vector_field(c.x[-1], c.t[-1]), abs=1e-13)
+
+
+def test_the_time_is_counted_not_added_up():
+    found = solver(compilation_of("newton"), "c")
+    t = found.integrate([1, 0], 0.1, 1000, 1000, t0=0.3).t
+    assert t.tolist() == [0.3, 0.3 + 1000 * 0.1]
+    assert found.integrate([1, 0], H, 7, t0=T0).x[-1].tolist() == steps_in_two(found, 3, 4)
+
+
+def steps_in_two(found, first, second):
+    """The state after so many steps, with a break between them in which the session is saved."""
+    session = found.backend.start(np.array([1.0, 0.0]), {"A": 0.5, "omega": 2.0}, T0)
+    session.advance(H, first)
+    session = found.backend.restored(session.saved(), {"A": 0.5, "omega": 2.0})
+    session.advance(H, second)
+    return session.state().tolist()
+
+
+def test_a_saved_session_goes_on_at_its_time():
+    found = solver(compilation_of("newton"), "numpy")
+    assert found.integrate([1, 0], H, 7, t0=T0).x[-1].tolist() == steps_in_two(found, 3, 4)
+
+
+@pytest.mark.parametrize("target", ["c", "numpy"])
+def test_ensembles_start_at_the_time_of_all_members(target):
+    found = solver(compilation_of("newton, non-linear π"), target)
+    starts = np.random.default_rng(3).normal(size=(5, 3))
+    ends = found.ensemble(starts, H, STEPS, t0=T0)
+    for x0, end in zip(starts, ends, strict=True):
+        assert end == pytest.approx(found.integrate(x0, H, STEPS, STEPS, t0=T0).x[-1], abs=1e-13)
+
+
+@pytest.mark.parametrize("kind", ["newton, non-linear π", "newton, log-canonical", "path"])
+@pytest.mark.parametrize("target", ["c", "numpy"])
+def test_steps_are_poisson_maps(kind, target):
+    compilation = compilation_of(kind)
+    system = compilation.system
+    x, tangent = solver(compilation, target).step_tangent(start_of(kind), H, t0=T0)
+
+    def tensor(at):
+        flat = evaluate([e for row in system.poisson for e in row], dict(zip(system.coordinates, at, strict=True)))
+        return np.reshape(flat, (len(at), len(at)))
+
+    assert tangent @ tensor(start_of(kind)) @ tangent.T == pytest.approx(tensor(x), abs=1e-13)
+
+
+def test_casimirs_are_constant_and_the_statements_are_proved():
+    long = solver(compilation_of("newton, non-linear π"), "c").integrate([0.6, 0.5, 0.7], H, 5000, 50)
+    assert np.ptp(long.casimirs["C"]) < 1e-13
+    assert np.ptp(long.energy) > 0.1
+    found = examine(spec.loads(f"phigen: 1\nname: t\n{BODY}"))
+    assert {s.verdict for s in found.groups["Hamilton–Jacobi series"]} == {"proved"}
+
+
+def test_invariants_may_depend_on_the_time():
+    moving = "time: t\ncoordinates: [q, p]\npoisson: {canonical: {q: [q], p: [p]}}\nhamiltonian: p**2/2 - q*t\n"
+    for invariant, verdict in (("p - t**2/2", "proved"), ("p - t**2/3", "refuted")):
+        found = examine(spec.loads(f"phigen: 1\nname: t\n{moving}invariants: {{F: {invariant}}}\n"))
+        assert [s.verdict for s in found.groups["Invariants"]] == [verdict]
+
+
+def test_what_depends_on_the_time_only_is_computed_once_in_a_step():
+    step = compilation_of("newton, non-linear π").program.step
+    assert "t" not in step.linearise.inputs
+    assert step.renewed > 0
+    text = emit(compilation_of("newton, non-linear π").program, "c", COMMAND)["t.c"]
+    assert text.count("cos(") == text.count("sin(") == 3  # refresh, the Hamiltonian, the vector field
+
+
+def test_sections_may_depend_on_the_time():
+    found = solver(compilation_of("newton"), "c").section([1, 0], H, 100, lambda x, t: np.sin(t + x[:, 0]), t0=T0)
+    assert len(found) > 0
+    assert np.sin(found.t + found.x[:, 0]) == pytest.approx(0, abs=1e-13)
+
+
+def test_a_time_is_asked_for_where_there_is_one_and_refused_where_there_is_none():
+    timed, timeless = solver(compilation_of("newton"), "c"), solver(compile_text(BY_HAND, 2), "c")
+    with pytest.raises(TypeError, match="t is missing"):
+        timed.hamiltonian([1, 0])
+    with pytest.raises(TypeError, match="does not depend on the time"):
+        timeless.integrate([1, 0, 0, 0], H, 1, t0=1.0)
+    with pytest.raises(ValueError, match="t0 must be finite"):
+        timed.integrate([1, 0], H, 1, t0=np.inf)
+    with pytest.raises(SpecError, match="scheme: splitting is not offered"):
+        compile_text(PENDULUM, 2, "splitting")
+
+
+def test_the_hamiltonian_takes_a_time_for_each_state():
+    compilation = compilation_of("newton")
+    point = sample_point(["q", "p", "t"], (), 1)
+    x, t = [[float(point["q"]), float(point["p"])]] * 2, [float(point["t"]), 2.0]
+    formula = substitute([compilation.system.hamiltonian], {})
+    for target in ("c", "numpy"):
+        values = solver(compilation, target).hamiltonian(x, t)
+        for value, at in zip(values, t, strict=True):
+            named = {"q": x[0][0], "p": x[0][1], "t": at, "A": 0.5, "omega": 2.0}
+            assert value == pytest.approx(evaluate(formula, named)[0], rel=1e-14)
+
+
+def test_the_python_api_takes_a_start(tmp_path):
+    path = tmp_path / "driven.yaml"
+    path.write_text(f"phigen: 1\nname: driven\n{PENDULUM}", encoding="utf-8")
+    found = phigen.compile(phigen.load(path), target="numpy")
+    assert found.step([1, 0], H, t0=T0) == pytest.approx(found.integrate([1, 0], H, 1, t0=T0).x[-1], abs=0)
