@@ -64,6 +64,7 @@ def without_compiler(monkeypatch, tmp_path_factory):
     """As on a machine that has none."""
     monkeypatch.delenv("CC", raising=False)
     monkeypatch.setenv("PATH", str(tmp_path_factory.mktemp("empty")))
+    monkeypatch.setattr(toolchain, "find_spec", lambda name: None)
 
 
 def pytest_terminal_summary(terminalreporter):

@@ -17,7 +17,12 @@ WARNINGS = (
     "-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Wdouble-promotion", "-Wshadow", "-Werror",
 )  # fmt: skip
 
-_DEBIAN = {"clang": "clang libclang-rt-dev", "clang++": "clang libclang-rt-dev", "node": "nodejs"}
+_DEBIAN = {
+    "clang": "clang libclang-rt-dev",
+    "clang++": "clang libclang-rt-dev",
+    "node": "nodejs",
+    "qemu-aarch64-static": "qemu-user-static",
+}
 _LACK = " is not installed"
 
 

@@ -16,7 +16,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 _NUMBER = r"(?<![\w./-])-?\d+\.\d+(?:e[+-]\d+)?(?![\w./])"
-_FILES = ("yaml", "python", "c", "sh")
+_FILES = ("yaml", "python", "c", "js", "sh")
 
 
 def blocks(text: str) -> list[tuple[str, str, str]]:

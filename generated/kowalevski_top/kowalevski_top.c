@@ -25,7 +25,7 @@
  *   9. Blocks of steps
  *   10. Groups of members
  *   11. Ensembles
- * body-sha256: 8713e86710d7f7f0f4c39eb7233e898bfb6bc5b798eed6b575e662ed23cd0b42
+ * body-sha256: 88e6cfaa4b87fb1278142227231df874ebc2e680c1e5f6f94619ce1f0ce53802
  */
 #include "kowalevski_top.h"
 
@@ -1184,7 +1184,7 @@ static int kowalevski_top_train(kowalevski_top_history *history, int component)
         for (int i = 0; i < ROWS; ++i)
             for (int l = 0; l < 8; ++l) sum[l] += fabs(right[i][l]);
         left = 0.0;
-        for (int l = 0; l < 8; ++l) left += sum[l] / ROWS;
+        for (int l = 0; l < 8; ++l) left += sum[l] / (double)ROWS;
     }
     for (int k = terms - 1; k >= 0; --k)
         for (int j = k + 1; j < terms; ++j)
@@ -2997,7 +2997,7 @@ kowalevski_top_status kowalevski_top_integrate(kowalevski_top_solver *s, double 
             kowalevski_top_choose_guess(s, steps);
         if (steps >= kowalevski_top_LANES && s->blocks.single_steps == 0) {
             kowalevski_top_refresh(s, &table);
-            const int passes = kowalevski_top_block(s, &table, (int)(kowalevski_top_PASSES
+            const int passes = kowalevski_top_block(s, &table, (int)((double)kowalevski_top_PASSES
                 * s->blocks.evaluations_per_stage + 0.5));
             kowalevski_top_learn_from(s, passes);
             if (passes > 0) steps -= kowalevski_top_LANES;

@@ -25,7 +25,7 @@
  *   9. Blocks of steps
  *   10. Groups of members
  *   11. Ensembles
- * body-sha256: 0ada9d00762eb6fc3877669d15dcdd546c47cd5ff181056229b6b1cf9d55bba0
+ * body-sha256: 4ac46bc37e134cc721f46102baac4312d370130783f22a4ef4b1f2daa2eccaf9
  */
 #include "lotka_volterra.h"
 
@@ -302,7 +302,7 @@ static int lotka_volterra_train(lotka_volterra_history *history, int component)
         for (int i = 0; i < ROWS; ++i)
             for (int l = 0; l < 8; ++l) sum[l] += fabs(right[i][l]);
         left = 0.0;
-        for (int l = 0; l < 8; ++l) left += sum[l] / ROWS;
+        for (int l = 0; l < 8; ++l) left += sum[l] / (double)ROWS;
     }
     for (int k = terms - 1; k >= 0; --k)
         for (int j = k + 1; j < terms; ++j)
@@ -1130,7 +1130,7 @@ lotka_volterra_status lotka_volterra_integrate(lotka_volterra_solver *s, double 
             lotka_volterra_choose_guess(s, steps);
         if (steps >= lotka_volterra_LANES && s->blocks.single_steps == 0) {
             lotka_volterra_refresh(s, &table);
-            const int passes = lotka_volterra_block(s, &table, (int)(lotka_volterra_PASSES
+            const int passes = lotka_volterra_block(s, &table, (int)((double)lotka_volterra_PASSES
                 * s->blocks.evaluations_per_stage + 0.5));
             lotka_volterra_learn_from(s, passes);
             if (passes > 0) steps -= lotka_volterra_LANES;

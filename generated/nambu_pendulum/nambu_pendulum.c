@@ -26,7 +26,7 @@
  *   10. Blocks of steps
  *   11. Groups of members
  *   12. Ensembles
- * body-sha256: 07530090e32187c7acbd0f605a0127960ea5b0d25d5920effed6ee4fe9972aab
+ * body-sha256: bdc7fe16395069de7b8f6a757d076f926428d5087a215856f20ba9c2a540c0bc
  */
 #include "nambu_pendulum.h"
 
@@ -291,7 +291,7 @@ static int nambu_pendulum_train(nambu_pendulum_history *history, int component)
         for (int i = 0; i < ROWS; ++i)
             for (int l = 0; l < 8; ++l) sum[l] += fabs(right[i][l]);
         left = 0.0;
-        for (int l = 0; l < 8; ++l) left += sum[l] / ROWS;
+        for (int l = 0; l < 8; ++l) left += sum[l] / (double)ROWS;
     }
     for (int k = terms - 1; k >= 0; --k)
         for (int j = k + 1; j < terms; ++j)
@@ -1872,7 +1872,7 @@ nambu_pendulum_status nambu_pendulum_integrate(nambu_pendulum_solver *s, double 
             nambu_pendulum_choose_guess(s, steps);
         if (steps >= nambu_pendulum_LANES && s->blocks.single_steps == 0) {
             nambu_pendulum_refresh(s, &table);
-            const int passes = nambu_pendulum_block(s, &table, (int)(nambu_pendulum_PASSES
+            const int passes = nambu_pendulum_block(s, &table, (int)((double)nambu_pendulum_PASSES
                 * s->blocks.evaluations_per_stage + 0.5));
             nambu_pendulum_learn_from(s, passes);
             if (passes > 0) steps -= nambu_pendulum_LANES;

@@ -27,7 +27,7 @@
  *   10. Blocks of steps
  *   11. Groups of members
  *   12. Ensembles
- * body-sha256: 6f2da435b56319fcaafcebabe99edbe15814d0074b90c05cc983d014803dac9b
+ * body-sha256: 4016cfe6ffed106ab44f727d4fd5d5f441b0f4af2371455558b8507ce83f6810
  */
 #include "rigid_body.h"
 
@@ -518,7 +518,7 @@ static int rigid_body_train(rigid_body_history *history, int component)
         for (int i = 0; i < ROWS; ++i)
             for (int l = 0; l < 8; ++l) sum[l] += fabs(right[i][l]);
         left = 0.0;
-        for (int l = 0; l < 8; ++l) left += sum[l] / ROWS;
+        for (int l = 0; l < 8; ++l) left += sum[l] / (double)ROWS;
     }
     for (int k = terms - 1; k >= 0; --k)
         for (int j = k + 1; j < terms; ++j)
@@ -1513,7 +1513,7 @@ rigid_body_status rigid_body_integrate(rigid_body_solver *s, double h, size_t st
         if (steps >= rigid_body_LANES && s->blocks.single_steps == 0) rigid_body_choose_guess(s, steps);
         if (steps >= rigid_body_LANES && s->blocks.single_steps == 0) {
             rigid_body_refresh(s, &table);
-            const int passes = rigid_body_block(s, &table, (int)(rigid_body_PASSES
+            const int passes = rigid_body_block(s, &table, (int)((double)rigid_body_PASSES
                 * s->blocks.evaluations_per_stage + 0.5));
             rigid_body_learn_from(s, passes);
             if (passes > 0) steps -= rigid_body_LANES;

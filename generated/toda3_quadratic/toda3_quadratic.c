@@ -20,7 +20,7 @@
  *   5. The implicit step, along paths dm/dt = pi(m) p
  *   6. The solver
  *   7. Ensembles
- * body-sha256: 1895fd01aa07cd03f1b409ec698dae46491b6abc1604ac847ff500bf6ef8f3f3
+ * body-sha256: 29a6787a73cfce6c640ecb709c4bd8fde2ffa10497208fb0d0490dabc7bee3b3
  */
 #include "toda3_quadratic.h"
 
@@ -256,7 +256,7 @@ static int toda3_quadratic_train(toda3_quadratic_history *history, int component
         for (int i = 0; i < ROWS; ++i)
             for (int l = 0; l < 8; ++l) sum[l] += fabs(right[i][l]);
         left = 0.0;
-        for (int l = 0; l < 8; ++l) left += sum[l] / ROWS;
+        for (int l = 0; l < 8; ++l) left += sum[l] / (double)ROWS;
     }
     for (int k = terms - 1; k >= 0; --k)
         for (int j = k + 1; j < terms; ++j)

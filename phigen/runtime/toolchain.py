@@ -11,11 +11,13 @@ import shlex
 import shutil
 import signal
 import subprocess
+import sys
 import tempfile
 import threading
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
+from importlib.util import find_spec
 from pathlib import Path
 from typing import BinaryIO
 
@@ -32,7 +34,12 @@ TUNING_FLAGS = ("-march=native", "-ffp-contract=fast", "-fno-math-errno")
 TIMEOUT = 300.0
 
 _CANDIDATES = ("cc", "gcc", "clang")
-_HINT = "install gcc or clang, or name a compiler in the environment variable CC; the numpy target needs none"
+#: A C compiler that comes as a Python package, and how its trial may take longer: it first builds its own runtime.
+_PACKAGE, _FIRST_TRIAL = "ziglang", 120.0
+_HINT = (
+    "install gcc or clang, or the compiler of the package ziglang (pip install ziglang), or name one in the "
+    "environment variable CC; the numpy target needs none"
+)
 _MESSAGE_LINES = 8
 _MESSAGE_BYTES = 1 << 16
 _TRIAL_TIMEOUT = 20.0  # for --version, and for a library of one line
@@ -67,7 +74,9 @@ class NoCompilerError(ToolchainError):
 
 
 def find() -> Compiler:
-    """The compiler named in CC, else the first of cc, gcc and clang that works: that makes a library of one line.
+    """The compiler named in CC, else the first of cc, gcc, clang and zig that works: that makes a library of one line.
+
+    zig is that of the Python package ziglang.
 
     Raises `ToolchainError` saying what is wrong with the one that is named, else `NoCompilerError` about all.
     """
@@ -83,6 +92,11 @@ def find() -> Compiler:
         if isinstance(found, Compiler):
             return found
         reasons.append(f"{candidate} {found}")
+    if find_spec(_PACKAGE):
+        found = _answering((sys.executable, "-m", _PACKAGE, "cc"))
+        if isinstance(found, Compiler):
+            return found
+        reasons.append(f"{_PACKAGE} {found}")
     if set(reasons) == {f"{c} {_NOT_FOUND}" for c in _CANDIDATES}:
         reasons = [f"none of {', '.join(_CANDIDATES)} is there"]
     apart = "\n  " if any("\n" in reason for reason in reasons) else " "
@@ -157,12 +171,13 @@ def _answering(command: tuple[str, ...]) -> Compiler | str:
 
 def _tried(command: tuple[str, ...], version: str, folder: Path) -> Compiler | str:
     """The compiler with those flags that it takes; all are tried at once, one by one only if that fails."""
+    patience = _FIRST_TRIAL if _PACKAGE in command else _TRIAL_TIMEOUT
     source, library = folder / "trial.c", folder / "trial.so"
     source.write_text(_TRIAL, encoding="utf-8")
 
     def failure(*more: str) -> str:
         library.unlink(missing_ok=True)
-        return _made(command, (*BASE_FLAGS, *more), [source], library, _TRIAL_TIMEOUT)
+        return _made(command, (*BASE_FLAGS, *more), [source], library, patience)
 
     # -Werror turns clang's warning about an unused flag into a refusal.
     if not failure("-Werror", *TUNING_FLAGS):

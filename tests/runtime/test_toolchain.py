@@ -106,6 +106,7 @@ def test_without_a_name_the_first_that_works_is_taken(compiler, tmp_path, monkey
 def test_without_any_that_works_numpy_is_chosen_and_the_reasons_told(compiler, tmp_path, monkeypatch):
     monkeypatch.delenv("CC", raising=False)
     monkeypatch.setenv("PATH", str(tmp_path))
+    monkeypatch.setattr(toolchain, "find_spec", lambda name: None)
     told = []
     assert not toolchain.available()
     assert chosen_target("auto", told.append) == "numpy"

@@ -306,7 +306,7 @@ static phi_status phi_single(phi_solver *s)
     const size_t before = s->evaluations;
     const phi_status status = phi_step(s, s->h);
 #if PHI_COMPOSED
-    const double evaluations = (double)(s->evaluations - before) / PHI_STAGES;
+    const double evaluations = (double)(s->evaluations - before) / (double)PHI_STAGES;
 #else
     const double evaluations = (double)(s->evaluations - before);
 #endif
@@ -325,7 +325,7 @@ phi_status phi_integrate(phi_solver *s, double h, size_t steps)
         if (steps >= PHI_LANES && s->blocks.single_steps == 0) phi_choose_guess(s, steps);
         if (steps >= PHI_LANES && s->blocks.single_steps == 0) {
             phi_refresh(s, &table);
-            const int passes = phi_block(s, &table, (int)(PHI_PASSES * s->blocks.evaluations_per_stage + 0.5));
+            const int passes = phi_block(s, &table, (int)((double)PHI_PASSES * s->blocks.evaluations_per_stage + 0.5));
             phi_learn_from(s, passes);
             if (passes > 0) steps -= PHI_LANES;
         } else {

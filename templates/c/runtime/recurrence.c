@@ -87,7 +87,7 @@ static int phi_train(phi_history *history, int component)
         for (int i = 0; i < ROWS; ++i)
             for (int l = 0; l < 8; ++l) sum[l] += fabs(right[i][l]);
         left = 0.0;
-        for (int l = 0; l < 8; ++l) left += sum[l] / ROWS;
+        for (int l = 0; l < 8; ++l) left += sum[l] / (double)ROWS;
     }
     for (int k = terms - 1; k >= 0; --k)
         for (int j = k + 1; j < terms; ++j)
