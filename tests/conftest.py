@@ -1,3 +1,4 @@
+import gc
 import re
 
 import pytest
@@ -15,6 +16,8 @@ def pytest_addoption(parser):
 
 
 def pytest_configure(config):
+    # What is compiled is kept for the tests that follow: there is much to go through, and little of it is garbage.
+    gc.set_threshold(200_000, 20, 100)
     if not toolchain.available():
         raise pytest.UsageError("the tests need a C compiler; on Debian: apt-get install gcc libc6-dev")
     config.addinivalue_line("markers", "slow: long; left out unless --all or -m is given, or the test is named by `::`")

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Callable, Mapping, Sequence
 from fractions import Fraction
+from functools import lru_cache, partial
 from typing import Any
 
 import mpmath
 
 from phigen.compilation import Compilation
 from phigen.series.hamilton_jacobi import graph_series
-from phigen.symbolic.expression import Expression, derivatives, fold, gradient, number, total
+from phigen.symbolic.expression import Expression, derivatives, gradient, number, topological, total
 
 DIGITS = 50
 
@@ -28,46 +30,38 @@ def precisely(function: Callable[..., Any]) -> Callable[..., Any]:
 
 def values(roots: Sequence[Expression], at: Mapping[str, Any]) -> list[Any]:
     """Values of expressions as mpmath numbers of the current precision, by rules of its own."""
-    return fold(roots, lambda e, args: _value(e, args, at))
+    plan, ends = _plan(tuple(roots))
+    found: list[Any] = []
+    for rule, places in plan:
+        found.append(mpmath.mpf(at[rule]) if isinstance(rule, str) else rule(*[found[i] for i in places]))
+    return [found[i] for i in ends]
 
 
-def _value(e: Expression, args: list[Any], at: Mapping[str, Any]) -> Any:
-    match e.op:
-        case "number":
-            return mpmath.mpf(e.value.numerator) / e.value.denominator
-        case "symbol":
-            return mpmath.mpf(at[e.value])
-        case "pi":
-            return +mpmath.pi
-        case "E":
-            return +mpmath.e
-        case "add":
-            return args[0] + args[1]
-        case "sub":
-            return args[0] - args[1]
-        case "neg":
-            return -args[0]
-        case "mul":
-            return args[0] * args[1]
-        case "pow":
-            if e.value.denominator == 1:
-                return args[0] ** int(e.value)
-            return mpmath.power(args[0], mpmath.mpf(e.value.numerator) / e.value.denominator)
-        case "power":
-            return mpmath.power(*args)
-        case "abs":
-            return abs(args[0])
-        case "sign":
-            return mpmath.sign(args[0])
-        case "versin":
-            return 1 - mpmath.cos(args[0])
-        case "inv":
-            return 1 / args[0] if args[0] > 0 else mpmath.nan
-        case "phi0" | "phi1" | "phi2":
-            return _phi(int(e.op[3:]), args[0])
-        case "cosroot" | "sinroot" | "sinroot1" | "arcroot" | "exprel" | "exprel1":
-            return _entire(e.op, args[0])
-    return getattr(mpmath, e.op)(*args)
+@lru_cache(maxsize=1024)
+def _plan(roots: tuple[Expression, ...]) -> tuple[list[tuple[Any, tuple[int, ...]]], list[int]]:
+    """The rule of each node below the roots, arguments first, and the places of its arguments; those of the roots.
+
+    The vector field of a path is evaluated thousands of times.
+    """
+    places: dict[Expression, int] = {}
+    plan = []
+    for node in topological(roots):
+        plan.append((_rule(node), tuple(places[a] for a in node.args)))
+        places[node] = len(places)
+    return plan, [places[root] for root in roots]
+
+
+def _rule(e: Expression) -> Any:
+    """The name of a symbol; else the function that gives the value of a node from those of its arguments."""
+    if e.op == "symbol":
+        return e.value
+    if e.op == "number":
+        return lambda: mpmath.mpf(e.value.numerator) / e.value.denominator
+    if e.op == "pow" and e.value.denominator == 1:
+        return lambda s: s ** int(e.value)
+    if e.op == "pow":
+        return lambda s: mpmath.power(s, mpmath.mpf(e.value.numerator) / e.value.denominator)
+    return _RULES.get(e.op) or getattr(mpmath, e.op)
 
 
 def _entire(name: str, s: Any) -> Any:
@@ -101,6 +95,22 @@ def _phi(order: int, s: Any) -> Any:
         result, n = result + term, n + 1
         if abs(term) <= mpmath.eps * abs(result):
             return result
+
+
+_RULES: dict[str, Callable[..., Any]] = {
+    "add": operator.add,
+    "sub": operator.sub,
+    "neg": operator.neg,
+    "mul": operator.mul,
+    "abs": abs,
+    "power": mpmath.power,
+    "pi": lambda: +mpmath.pi,
+    "E": lambda: +mpmath.e,
+    "versin": lambda s: 1 - mpmath.cos(s),
+    "inv": lambda s: 1 / s if s > 0 else mpmath.nan,
+    **{f"phi{order}": partial(_phi, order) for order in range(3)},
+    **{name: partial(_entire, name) for name in ("cosroot", "sinroot", "sinroot1", "arcroot", "exprel", "exprel1")},
+}
 
 
 class PreciseStep:

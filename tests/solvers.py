@@ -37,7 +37,8 @@ def _once(compilation: Compilation, key: str, make: Callable[[], Any]) -> Any:
 
 def files(compilation: Compilation, target: str) -> Mapping[str, str]:
     """The generated files."""
-    return _once(compilation, f"files {target}", lambda: emit(compilation.program, target, COMMAND))
+    command = f"{COMMAND} {compilation.program.name}"
+    return _once(compilation, f"files {target}", lambda: emit(compilation.program, target, command))
 
 
 def single_file(compilation: Compilation) -> Mapping[str, str]:

@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from walkthrough import typed
 
 from phigen import resources
 
@@ -57,9 +58,14 @@ def test_python_example_prints_what_the_readme_says(workshop):
     assert workshop(sys.executable, "example.py") == block("What it prints")
 
 
-def test_commands_of_the_text_work(workshop):
-    for command in re.findall(r"`(phigen (?:run|show) [^`]*)`", README.replace("\n", " ")):
-        assert workshop("sh", "-c", command)
+def test_commands_of_the_text_work(tmp_path):
+    (tmp_path / "tumbler.yaml").write_text(block("`tumbler.yaml`"), encoding="utf-8")
+    commands = re.findall(r"`(phigen (?:run|show) [^`]*)`", README.replace("\n", " "))
+    assert len(commands) > 2
+    for command in commands:
+        status, said = typed(command, tmp_path, {})
+        assert status == 0, said
+        assert said
 
 
 def test_links_lead_somewhere():

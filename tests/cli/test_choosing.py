@@ -56,7 +56,13 @@ def test_proposed_settings_reach_their_accuracy_and_hardly_more(row):
     assert 0.2 < energy_error(name, kind, order, step) / float(accuracy) <= 1
 
 
-@pytest.mark.parametrize("row", rows("What each choice does"), ids=lambda row: "-".join(row[:3]))
+@pytest.mark.parametrize(
+    "row",
+    [
+        pytest.param(r, id="-".join(r[:3]), marks=pytest.mark.slow if r[1] == "12" else ())
+        for r in rows("What each choice does")
+    ],
+)
 def test_steps_for_one_accuracy(row):
     kind, order, gauge, step, _ = row
     assert 0.3 < energy_error("rigid_body", kind, order, step, gauge) / 1e-8 < 3

@@ -6,7 +6,7 @@ from fractions import Fraction
 
 import pytest
 import sympy
-from support import NAMES, compile_text, compiled
+from support import QUICK, compile_text, compiled, slow_but
 
 from phigen.errors import LimitError
 from phigen.proofs.independent import OutOfTimeError, compare, decide, time_limit
@@ -83,7 +83,7 @@ def expect_equal(compilation, terms):
     assert bool(others & {"α", "axioms"}) != compilation.chart.path
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", slow_but(QUICK))
 def test_the_corpus_is_what_sympy_derives(name):
     expect_equal(compiled(name), TERMS.get(name, 3))
 

@@ -1,9 +1,11 @@
 """Poincaré sections, against closed forms."""
 
+from itertools import product
+
 import numpy as np
 import pytest
 from scipy.special import ellipj, ellipk
-from support import compiled, setting, solver
+from support import TARGETS, compiled, setting, slow_but, solver
 
 from phigen.errors import StepError
 from phigen.runtime.crossings import CrossingFinder, root
@@ -39,8 +41,11 @@ def test_crossings_of_the_pendulum_are_at_the_exact_times():
     assert np.max(np.abs(section.x[:, 0])) < ULP
 
 
-@pytest.mark.parametrize("target", ["c", "numpy"])
-@pytest.mark.parametrize("name", ["henon_heiles", "rigid_body", "guiding_centre", "pendulum_euler", "predator_prey"])
+SECTIONS = [*product(["henon_heiles", "rigid_body", "pendulum_euler", "predator_prey"], TARGETS)]
+SECTIONS.append(("nambu_pendulum", "c"))
+
+
+@pytest.mark.parametrize(("name", "target"), slow_but(SECTIONS, [*SECTIONS, *product(["guiding_centre"], TARGETS)]))
 def test_crossings_lie_on_the_section_and_on_the_leaf(name, target):
     """g is an inclined plane through the mean of the first steps: nothing about it is special."""
     it, at = solver(compiled(name), target), setting(compiled(name))

@@ -58,7 +58,7 @@ static void keeps_energy(void)
 /* Blocks, groups and packs are single steps; all kinds of the midpoint rule are one method, whose values are known. */
 static void many_are_one(void)
 {
-    enum { MEMBERS = 41, STEPS = 400 };
+    enum { MEMBERS = 41, STEPS = 200 };
     static double x[2 * MEMBERS];
     unsigned char status[MEMBERS];
     phi_solver one, many;
