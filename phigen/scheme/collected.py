@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 from phigen.scheme.staging import Coefficients
 from phigen.symbolic.expression import Expression, number, symbol
@@ -25,12 +26,18 @@ class Collected:
     variables: tuple[Expression, ...]
     slopes: tuple[tuple[Terms, ...], ...]  # slopes[v][j] = ∂variable_v / ∂x_j
 
+    @cached_property
+    def _moving(self) -> list[list[int]]:
+        """For each coordinate the variables that depend on it."""
+        return [[v for v, row in enumerate(self.slopes) if row[j]] for j in range(len(self.slopes[0]))]
+
     def derivative(self, terms: Terms, j: int) -> Terms:
         """The total derivative along coordinate j."""
         result: dict[Monomial, Expression] = {}
+        moving = self._moving[j]
         for m, c in terms.items():
-            for v, e in enumerate(m):
-                if e:
+            for v in moving:
+                if e := m[v]:
                     rest = (*m[:v], e - 1, *m[v + 1 :])
                     for k, factor in self.slopes[v][j].items():
                         key = tuple(a + b for a, b in zip(rest, k, strict=True))

@@ -58,11 +58,13 @@ class Factors:
     def solved(self, side: Sequence[Expression]) -> list[Expression]:
         """The solution for a right-hand side."""
         b, x = list(side), [ZERO] * len(side)
+        rows: list[list[tuple[int, Expression]]] = [[] for _ in side]
+        for (k, j), e in self.upper.items():
+            rows[k].append((j, e))
         for (i, k), factor in self.lower.items():
             b[i] = b[i] - factor * b[k]
         for k in reversed(self.order):
-            rest = total(e * x[j] for (row, j), e in self.upper.items() if row == k)
-            x[k] = (b[k] - rest) * self.reciprocals[k]
+            x[k] = (b[k] - total(e * x[j] for j, e in rows[k])) * self.reciprocals[k]
         return x
 
 
@@ -77,10 +79,11 @@ def factorise(pattern: Pattern) -> Factors:
     for position, k in enumerate(order):
         later = order[position + 1 :]
         reciprocals[k] = 1 / a[k][k]
-        upper |= {(k, j): a[k][j] for j in later if not a[k][j].is_zero}
+        filled = [j for j in later if not a[k][j].is_zero]
+        upper |= {(k, j): a[k][j] for j in filled}
         for i in (i for i in later if not a[i][k].is_zero):
             factor = lower[i, k] = a[i][k] * reciprocals[k]
-            for j in later:
+            for j in filled:
                 a[i][j] = a[i][j] - factor * a[k][j]
     return Factors(tuple(order), lower, upper, tuple(reciprocals))
 

@@ -20,15 +20,16 @@ from phigen.symbolic.expression import (
     ONE,
     ZERO,
     Expression,
-    derivatives,
+    sparse_derivatives,
     substitute,
     symbol,
     symbols_of,
-    total,
+    total_at,
 )
 from phigen.symbolic.symbols import momentum
 
 Matrix = list[list[Expression]]
+SparseRow = dict[int, Expression]
 
 
 @dataclass(frozen=True)
@@ -57,24 +58,32 @@ def linearise(
     """a, d and their total derivatives along y, with p = ∇S_h(y)."""
     n = len(coordinates)
     both = [*displacement, *increment]
-    by_x = _columns(both, coordinates)
-    by_p = _columns(both, [momentum(c) for c in coordinates])
-    flat = [*both, *(e for row in by_x for e in row), *(e for row in by_p for e in row)]
-    flat = at_momenta(flat, coordinates, generating.slope)
-    values, flat = flat[: 2 * n], flat[2 * n :]
-    x_part = [flat[i * n : (i + 1) * n] for i in range(2 * n)]
-    p_part = [flat[(2 * n + i) * n : (2 * n + i + 1) * n] for i in range(2 * n)]
-    hessian = generating.hessian
-    jacobians = [
-        [x_part[i][j] + total(p_part[i][k] * hessian[k][j] for k in range(n)) for j in range(n)] for i in range(2 * n)
-    ]
+    by_x = _rows(both, coordinates)
+    by_p = _rows(both, [momentum(c) for c in coordinates])
+    flat = [*both, *(e for row in (*by_x, *by_p) for e in row.values())]
+    values = at_momenta(flat, coordinates, generating.slope)
+    rest = iter(values[2 * n :])
+    by_x, by_p = ([{j: next(rest) for j in row} for row in rows] for rows in (by_x, by_p))
+    hessian = [{j: e for j, e in enumerate(row) if not e.is_zero} for row in generating.hessian]
+    jacobians = [_along(x_part, p_part, hessian) for x_part, p_part in zip(by_x, by_p, strict=True)]
     jacobian = [[e + (ONE if i == j else ZERO) for j, e in enumerate(row)] for i, row in enumerate(jacobians[:n])]
-    return Linearised(values[:n], values[n:], jacobian, jacobians[n:])
+    return Linearised(values[:n], values[n : 2 * n], jacobian, jacobians[n:])
 
 
-def _columns(expressions: Sequence[Expression], names: Sequence[str]) -> Matrix:
-    columns = [derivatives(expressions, name) for name in names]
-    return [[column[i] for column in columns] for i in range(len(expressions))]
+def _rows(expressions: Sequence[Expression], names: Sequence[str]) -> list[SparseRow]:
+    """The derivatives that are not 0, by the index of the name."""
+    index = {name: j for j, name in enumerate(names)}
+    return [{index[name]: d for name, d in row.items()} for row in sparse_derivatives(expressions, names)]
+
+
+def _along(x_part: SparseRow, p_part: SparseRow, hessian: Sequence[SparseRow]) -> list[Expression]:
+    """A row of ∂_x + ∂_p · Hess S_h."""
+    n = len(hessian)
+    products: list[SparseRow] = [{} for _ in range(n)]
+    for k, e in p_part.items():
+        for j, curvature in hessian[k].items():
+            products[j][k] = e * curvature
+    return [x_part.get(j, ZERO) + total_at(products[j]) for j in range(n)]
 
 
 def explicit_order(displacement: Sequence[Expression], coordinates: Sequence[str]) -> list[int] | None:

@@ -312,6 +312,18 @@ def total(terms: Iterable[Expression]) -> Expression:
     return _balanced(add, list(terms), ZERO)
 
 
+def total_at(terms: Mapping[int, Expression]) -> Expression:
+    """`total` of a list that has these terms at their places and 0 elsewhere: the same tree, without the zeros."""
+    items = dict(sorted(terms.items()))
+    while len(items) > 1 or any(items):
+        sums: dict[int, Expression] = {}
+        for place, e in items.items():
+            half = place // 2
+            sums[half] = add(sums[half], e) if half in sums else e
+        items = sums
+    return items.get(0, ZERO)
+
+
 def product(factors: Iterable[Expression]) -> Expression:
     """The product of the factors, as a balanced tree."""
     return _balanced(mul, list(factors), ONE)
@@ -435,6 +447,24 @@ def derivatives(roots: Sequence[Expression], name: str) -> list[Expression]:
         return node, reduce(add, terms)
 
     return [d for _, d in fold(roots, visit)]
+
+
+def sparse_derivatives(roots: Sequence[Expression], names: Iterable[str]) -> list[dict[str, Expression]]:
+    """The derivatives of each root that are not 0, by name: those of `derivatives`, in one sweep for all names."""
+    wanted = frozenset(names)
+    slopes: dict[int, dict[str, Expression]] = {}
+    for node in topological(roots):
+        if node.op == "symbol":
+            slopes[id(node)] = {node.value: ONE} if node.value in wanted else {}
+            continue
+        found: dict[str, Expression] = {}
+        if any(slopes[id(a)] for a in node.args):
+            for partial, a in zip(partials(node), node.args, strict=True):
+                for name, d in slopes[id(a)].items():
+                    term = partial * d
+                    found[name] = found[name] + term if name in found else term
+        slopes[id(node)] = {name: d for name, d in found.items() if not d.is_zero}
+    return [slopes[id(r)] for r in roots]
 
 
 def derivative(e: Expression, name: str) -> Expression:

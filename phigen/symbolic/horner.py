@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from operator import sub
 
 from phigen.symbolic.expression import ZERO, Expression, power, product, total
 
@@ -19,15 +20,23 @@ def horner(terms: Mapping[Monomial, Expression], variables: Sequence[Expression]
     left = {m: c for m, c in terms.items() if not c.is_zero}
     if not left:
         return ZERO
+    used = [i for i in range(len(variables)) if any(m[i] for m in left)]
+    if len(used) < len(variables):
+        left = {tuple(m[i] for i in used): c for m, c in left.items()}
+    return _nested(left, [variables[i] for i in used])
+
+
+def _nested(left: Mapping[Monomial, Expression], variables: Sequence[Expression]) -> Expression:
+    """`horner` of terms that are not 0."""
     if len(left) == 1:
         ((monomial, coefficient),) = left.items()
         return coefficient * _monomial(monomial, variables)
-    common = tuple(min(m[i] for m in left) for i in range(len(variables)))
+    common = tuple(map(min, zip(*left, strict=True)))
     if any(common):
-        inner = {tuple(e - c for e, c in zip(m, common, strict=True)): v for m, v in left.items()}
-        return _monomial(common, variables) * horner(inner, variables)
-    counts = [sum(1 for m in left if m[i]) for i in range(len(variables))]
-    best = max(range(len(variables)), key=lambda i: (counts[i], -i))
+        inner = {tuple(map(sub, m, common)): v for m, v in left.items()}
+        return _monomial(common, variables) * _nested(inner, variables)
+    counts = [len(left) - column.count(0) for column in zip(*left, strict=True)]
+    best = counts.index(max(counts))
     if counts[best] <= 1:
         ordered = sorted(left.items(), key=lambda item: (sum(item[0]), tuple(-e for e in item[0])))
         return total(c * _monomial(m, variables) for m, c in ordered)

@@ -307,12 +307,11 @@ class Tower(Arithmetic[Poly]):
     def derivative(self, element: Poly, name: str) -> Poly:
         """Total derivative with respect to one of `variables`, through the generators."""
         result = element.derivative(self._index[name])
+        degrees = element.degrees()
         for g in self.generators:
-            chain = g.derivative[name]
-            if chain != 0:
-                partial = element.derivative(self._index[g.name])
-                if partial != 0:
-                    result += self.product(partial, chain)
+            k = self._index[g.name]
+            if degrees[k] > 0 and (chain := g.derivative[name]) != 0:
+                result += self.product(element.derivative(k), chain)
         return self.cancelled(result)
 
     def depends_on(self, element: Poly, names: Iterable[str]) -> bool:
@@ -336,24 +335,31 @@ class Tower(Arithmetic[Poly]):
 
     def is_zero(self, element: Poly) -> bool:
         """True proves that the element vanishes identically; False only that it did not reduce to 0."""
-        return bool(self.numerator(element) == 0)
+        return bool(element == 0 or self.numerator(element) == 0)
 
     def numerator(self, element: Poly) -> Poly:
         """A multiple of the element by a non-vanishing function, with relations between generators used up."""
+        degrees = element.degrees()
         for g in reversed(self.generators):
-            element = self._eliminate(element, g)
+            if degrees[self._index[g.name]] > 0:
+                element = self._eliminate(element, g)
+                degrees = element.degrees()
         return element
 
     def simplified(self, element: Poly) -> Poly:
         """The same function with fewer terms, by relations that keep its value: r·f = 1, w² = q, sin² + cos² = 1."""
+        degrees = element.degrees()
         for g in reversed(self.generators):
+            if degrees[self._index[g.name]] <= 0:
+                continue
             if g.kind == "reciprocal" or (g.kind == "root" and g.inverse):
                 found = self._divided(element, g)
             elif g.kind in ("sin", "cosh", "cosroot", "sign") or (g.kind == "root" and not self._partner(g)):
                 found = self._eliminate(element, g)
             else:
                 continue
-            element = found if len(found) < len(element) else element
+            if len(found) < len(element):
+                element, degrees = found, found.degrees()
         return element
 
     def _divided(self, element: Poly, g: Generator) -> Poly:
