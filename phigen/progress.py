@@ -13,7 +13,7 @@ from contextlib import contextmanager
 
 
 class Stage:
-    """Some work: how much of it is done out of ``total`` pieces (0: not known), and since when."""
+    """Some work: how much of it is done out of ``total`` pieces (0: not known how many), and since when."""
 
     __slots__ = ("_end", "_stack", "began", "done", "name", "total")
 
@@ -40,7 +40,9 @@ class Stage:
         return self._end - self.began
 
     def __str__(self) -> str:
-        return f"{self.name}, {self.done} of {self.total}" if self.total else self.name
+        if self.total:
+            return f"{self.name}, {self.done} of {self.total}"
+        return f"{self.name}, {self.done}" if self.done else self.name
 
 
 #: What is told when a stage begins or ends: the stages that last, the outermost first.

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from phigen import progress
 from phigen.geometry.system import hamiltonian_vector_field
 from phigen.splitting import exponential, scalar
 from phigen.splitting.closure import motion_of
@@ -51,19 +52,24 @@ class NoFlowError(Exception):
 
 def flow_of(ring: Ring, terms: Sequence[Term]) -> Flow:
     """The flow of a sum of commuting terms. Raises `NoFlowError` for the first term that has none."""
+    whole = joint_flow(ring, terms)
+    if isinstance(whole, Flow):
+        return whole
+    if len(terms) == 1:
+        raise NoFlowError(terms[0], whole)
     pieces: list[tuple[list[Term], Flow]] = []
-    for term in terms:
-        if pieces:
-            joint = joint_flow(ring, [*pieces[-1][0], term])
-            if isinstance(joint, Flow):
-                pieces[-1] = ([*pieces[-1][0], term], joint)
-                continue
-        alone = joint_flow(ring, [term])
-        if not isinstance(alone, Flow):
-            raise NoFlowError(term, alone)
-        pieces.append(([term], alone))
-    flows = [flow for _, flow in pieces]
-    return flows[0] if len(flows) == 1 else _composed(ring, flows)
+    with progress.stage("flows of terms", len(terms)) as running:
+        for running.done, term in enumerate(terms):
+            if pieces:
+                joint = joint_flow(ring, [*pieces[-1][0], term])
+                if isinstance(joint, Flow):
+                    pieces[-1] = ([*pieces[-1][0], term], joint)
+                    continue
+            alone = joint_flow(ring, [term])
+            if not isinstance(alone, Flow):
+                raise NoFlowError(term, alone)
+            pieces.append(([term], alone))
+    return _composed(ring, [flow for _, flow in pieces])
 
 
 def _composed(ring: Ring, flows: Sequence[Flow]) -> Flow:

@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
+from phigen import progress
 from phigen.errors import Diagnostic, SpecError
 from phigen.geometry.system import System
-from phigen.splitting.conflicts import grouped
+from phigen.splitting.conflicts import Conflicts
 from phigen.splitting.flow import Flow, NoFlowError, Term, flow_of, joint_flow
 from phigen.splitting.regrouping import by_blocks, with_companions
 from phigen.splitting.ring import Ring, ring_of
@@ -41,8 +42,9 @@ def split(system: System) -> Splitting:
     terms = terms_of(ring, listed)
     refused: NoFlowError | None = None
     best: list[Flow] | None = None
-    for candidate in _candidates(system, ring, terms):
-        parts = grouped(ring, candidate)
+    conflicts = Conflicts(ring)
+    for candidate in _candidates(system, conflicts, terms):
+        parts = conflicts.grouped(candidate)
         if best is not None and len(parts) >= len(best):
             continue
         try:
@@ -54,18 +56,25 @@ def split(system: System) -> Splitting:
     return Splitting(tuple(_merged(ring, best)))
 
 
-def _candidates(system: System, ring: Ring, terms: list[Term]) -> Iterator[list[Term]]:
+def _candidates(system: System, conflicts: Conflicts, terms: list[Term]) -> Iterator[list[Term]]:
     """The terms as they are, with companions taken out, and by blocks of π."""
     yield terms
+    ring = conflicts.ring
     blocked = by_blocks(system, ring, terms)
     if blocked:
         yield blocked
     for _ in range(ROUNDS):
-        fewest = len(grouped(ring, terms))
-        found = [c for c in with_companions(system, ring, terms) if len(grouped(ring, c)) < fewest]
+        fewest = len(conflicts.grouped(terms))
+        if fewest == 1:
+            return
+        with progress.stage("companions of the terms") as running:
+            found = []
+            for running.done, c in enumerate(with_companions(system, conflicts, terms), 1):
+                if len(conflicts.grouped(c)) < fewest:
+                    found.append(c)
         if not found:
             return
-        found.sort(key=lambda c: (len(grouped(ring, c)), _size(system, ring, c)))
+        found.sort(key=lambda c: (len(conflicts.grouped(c)), _size(system, ring, c)))
         yield from found
         terms = found[0]
 

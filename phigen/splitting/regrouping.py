@@ -14,7 +14,7 @@ from collections.abc import Iterator, Sequence
 from phigen.geometry.blocks import blocks
 from phigen.geometry.polynomial_casimirs import polynomial_casimirs
 from phigen.geometry.system import System
-from phigen.splitting.conflicts import conflicts
+from phigen.splitting.conflicts import Conflicts
 from phigen.splitting.flow import Term
 from phigen.splitting.ring import Ring
 from phigen.splitting.terms import joined, monomial_terms
@@ -25,11 +25,12 @@ from phigen.symbolic.tower import Poly
 MOST_COORDINATES = 8
 
 
-def with_companions(system: System, ring: Ring, terms: Sequence[Term]) -> Iterator[list[Term]]:
+def with_companions(system: System, found: Conflicts, terms: Sequence[Term]) -> Iterator[list[Term]]:
     """The terms with λC taken out of them, for each companion C and each λ that makes a monomial disappear."""
-    for companion in _companions(system, ring, terms):
+    ring = found.ring
+    for companion in _companions(system, found, terms):
         inside = ring.terms(companion.element, ring.state)
-        affected = [t for t in terms if set(ring.terms(t.element, ring.state)) & set(inside)]
+        affected = [t for t in terms if not found.monomials(t).isdisjoint(inside)]
         if not affected:
             continue
         others = [t for t in terms if t not in affected]
@@ -48,13 +49,13 @@ def with_companions(system: System, ring: Ring, terms: Sequence[Term]) -> Iterat
             yield [*others, *joined(ring, monomial_terms(ring, rest)), taken]
 
 
-def _companions(system: System, ring: Ring, terms: Sequence[Term]) -> Iterator[Term]:
+def _companions(system: System, conflicts: Conflicts, terms: Sequence[Term]) -> Iterator[Term]:
     """Casimirs, and quadratic Casimirs of the closed brackets that pairs of conflicting terms generate."""
-    found = list(system.casimirs.values())
+    ring, found = conflicts.ring, list(system.casimirs.values())
     seen: set[tuple[int, ...]] = set()
-    for i, neighbours in enumerate(conflicts(ring, terms)):
+    for i, neighbours in enumerate(conflicts.graph(terms)):
         for j in sorted(n for n in neighbours if n < i):
-            inside = _closure(ring, {*ring.support(terms[i].element), *ring.support(terms[j].element)})
+            inside = _closure(ring, {*conflicts.support(terms[i]), *conflicts.support(terms[j])})
             if len(inside) < min(len(ring.coordinates), MOST_COORDINATES + 1) and inside not in seen:
                 seen.add(inside)
                 found += _casimirs_within(system, inside)

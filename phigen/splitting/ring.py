@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from operator import mul, sub
 from typing import Any
 
 from phigen.geometry.shapes import Matrix
@@ -55,6 +56,12 @@ class Ring:
         n = len(self.coordinates)
         return frozenset((i, j) for i in range(n) for j in range(n) if self.tower.is_zero(self.poisson[i][j]))
 
+    @cached_property
+    def brackets_of(self) -> list[list[int]]:
+        """For each coordinate those with which its bracket is not 0."""
+        n = range(len(self.coordinates))
+        return [[j for j in n if (i, j) not in self.zero_pairs] for i in n]
+
     def support(self, element: Poly) -> tuple[int, ...]:
         """The coordinates that an element depends on, directly or inside a function, as indices."""
         names = self.tower.names_in(element)
@@ -62,11 +69,13 @@ class Ring:
 
     def field(self, g: Poly) -> list[Poly]:
         """π∇g."""
-        slope = {i: self.tower.derivative(g, self.coordinates[i]) for i in self.support(g)}
-        return [
-            self.lowest(self.tower.combine(row[i] * d for i, d in slope.items() if (i, j) not in self.zero_pairs))
-            for j, row in enumerate(self.poisson)
-        ]
+        sums: dict[int, list[Poly]] = {}
+        for i in self.support(g):
+            slope = self.tower.derivative(g, self.coordinates[i])
+            for j in self.brackets_of[i]:
+                sums.setdefault(j, []).append(self.poisson[j][i] * slope)
+        zero = self.tower.zero
+        return [self.lowest(self.tower.combine(sums[j])) if j in sums else zero for j in range(len(self.poisson))]
 
     def lowest(self, element: Poly) -> Poly:
         """The element with q·(1/q) cancelled where q is a polynomial that divides what stands beside 1/q."""
@@ -105,9 +114,12 @@ class Ring:
     def terms(self, element: Poly, variables: Collection[int]) -> dict[Monomial, Poly]:
         """The element as a polynomial in some of the ring's variables, its coefficients in the others."""
         groups: dict[Monomial, dict[Monomial, Any]] = {}
+        wanted = frozenset(variables)
+        inside = [int(i in wanted) for i in range(len(self.tower.gens))]
         for m, c in element.to_dict().items():
-            key = tuple(int(e) if i in variables else 0 for i, e in enumerate(m))
-            rest = tuple(0 if i in variables else int(e) for i, e in enumerate(m))
+            exponents = tuple(map(int, m))
+            key = tuple(map(mul, exponents, inside))
+            rest = tuple(map(sub, exponents, key))
             groups.setdefault(key, {})[rest] = c
         return {m: self.tower.context.from_dict(part) for m, part in groups.items()}
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from fractions import Fraction
+from functools import cache
 from typing import Any
 
 from phigen.symbolic.arithmetic import Arithmetic
@@ -95,6 +96,7 @@ def _precise_power(context: Any, base: Any, exponent: Any) -> Any:
     return context.root(base, exponent.denominator) ** exponent.numerator
 
 
+@cache
 def _mpmath_context(digits: int) -> Any:
     from mpmath.ctx_mp import MPContext  # here: importing it takes 60 ms
 

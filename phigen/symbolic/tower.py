@@ -18,7 +18,7 @@ from flint import Ordering, fmpq, fmpq_mpoly_ctx
 
 from phigen.symbolic.arithmetic import Arithmetic
 from phigen.symbolic.entire import ENTIRE
-from phigen.symbolic.expression import EULER, ONE, PI, Expression, call, derivatives, number, power, symbol
+from phigen.symbolic.expression import EULER, ONE, PI, Expression, call, number, power, sparse_derivatives, symbol
 from phigen.symbolic.functions import FUNCTIONS
 from phigen.symbolic.horner import horner
 from phigen.symbolic.special import SPECIAL, coefficient, order_of
@@ -33,7 +33,7 @@ Poly = Any
 
 @dataclass
 class Generator:
-    """A function value as a variable of the ring.
+    """A function value as a variable of the ring; ``derivative`` has those of its derivatives that are not 0.
 
     ``kind`` is the function's name, ``constant`` (pi, E), ``reciprocal`` (1/argument, the argument
     irreducible) or ``root`` (argument**(±1/degree)).
@@ -128,7 +128,7 @@ class Tower(Arithmetic[Poly]):
             g.derivative = {v: self._lift(d) for v, d in g.derivative.items()}
 
     def _lift(self, element: Poly) -> Poly:
-        size = len(self.names)
+        size = len(self.symbols) + len(self.generators)
         return self.context.from_dict(
             {m + (0,) * (size - len(m)) if len(m) < size else m[:size]: c for m, c in element.to_dict().items()}
         )
@@ -137,10 +137,11 @@ class Tower(Arithmetic[Poly]):
         """Add generators until the derivative of each is in the ring."""
         done = 0
         while done < len(self.generators):
+            (rules,) = sparse_derivatives([self.generators[done].expression], self.variables)
             for v in self.variables:
-                (rule,) = derivatives([self.generators[done].expression], v)
-                value = self._absorb(rule)
-                self.generators[done].derivative[v] = value
+                if v in rules:
+                    value = self._absorb(rules[v])  # which may replace the generators by larger ones
+                    self.generators[done].derivative[v] = value
             done += 1
 
     # -- conversion -------------------------------------------------------------------------------
@@ -310,7 +311,8 @@ class Tower(Arithmetic[Poly]):
         degrees = element.degrees()
         for g in self.generators:
             k = self._index[g.name]
-            if degrees[k] > 0 and (chain := g.derivative[name]) != 0:
+            chain = g.derivative.get(name) if degrees[k] > 0 else None
+            if chain is not None and chain != 0:
                 result += self.product(element.derivative(k), chain)
         return self.cancelled(result)
 
