@@ -33,6 +33,13 @@ def algebra(name, dimension):
     return spec(names(dimension), f"lie_algebra: {{name: {name}}}", "x1**2")
 
 
+def fput(masses):
+    q, p = ([f"{c}{i}" for i in range(1, masses + 1)] for c in "qp")
+    springs = [f"(q{i % masses + 1} - q{i})" for i in range(1, masses + 1)]
+    terms = [*(f"{c}**2/2" for c in p), *(f"{s}**2/2 + {s}**3/12 + {s}**4/40" for s in springs)]
+    return spec([*q, *p], f"canonical: {{q: [{', '.join(q)}], p: [{', '.join(p)}]}}", " + ".join(terms))
+
+
 def nambu(n):
     casimirs = ["+".join(f"{i * j % 7 + 1}*x{i}**2" for i in range(1, n + 1)) for j in range(1, n - 1)]
     return f"nambu: [{', '.join(casimirs)}]"
@@ -91,6 +98,7 @@ def compiled_in_a_child(text):
         ),
         pytest.param(spec(names(9), nambu(9), "x1**2 + x2*x3"), "compiled", 100, id="minors of large matrices"),
         pytest.param(algebra("so(8)", 28), "compiled", 200, id="an algebra whose adjoint traces mislead"),
+        pytest.param(fput(32) + "scheme: splitting\n", "compiled", 50, id="a lattice, by splitting"),
         pytest.param(algebra("so(7)", 21), "compiled", 50, id="Casimirs with very many terms"),
     ],
 )
