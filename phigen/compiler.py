@@ -23,7 +23,8 @@ from phigen import progress, registry
 from phigen import spec as specs
 from phigen.compilation import Compilation
 from phigen.errors import CheckError, LimitError, PhigenWarning, SpecError
-from phigen.geometry.system import System, system_from_spec
+from phigen.geometry.system import System, system_from_spec, system_of_lattice
+from phigen.lattice.building import cell_from_spec
 from phigen.proofs import statements
 from phigen.proofs.examination import UNEXAMINED, Examination, doubts, located, refutation, refuted
 from phigen.realisations.catalogue import realise
@@ -72,6 +73,8 @@ def examine(
     Raises `SpecError` if the spec does not even define a system.
     """
     clock = _Clock()
+    if spec.lattice:
+        return _examine_lattice(spec, clock)
     with bounded(spec), progress.stage(spec.name):
         try:
             source = system or clock.timed("system", lambda: system_from_spec(spec))
@@ -110,6 +113,8 @@ def compile_proved(
         raise CheckError(refutation(found))
     for warning in doubts(found):
         warnings.warn(str(warning), PhigenWarning, stacklevel=3)
+    if spec.lattice:
+        raise system_of_lattice(spec)
     if found.compilation is None:
         raise found.obstacle or AssertionError("an examination without compilation has an obstacle")
     return found.compilation
@@ -123,6 +128,17 @@ def compile_file(path: str | Path, *, order: int | None = None) -> Compilation:
 def emit(program: Program, target: str, command: str, *, single_file: bool = False) -> dict[str, str]:
     """The files of one target, by name; ``command`` is what regenerates them. `ValueError` for unknown targets."""
     return registry.find(target).emit(program, command, single_file=single_file)
+
+
+def _examine_lattice(spec: Spec, clock: _Clock) -> Examination:
+    """Prove what can be proved about a lattice, for all sizes at once."""
+    with bounded(spec), progress.stage(spec.name):
+        try:
+            cell = clock.timed("cell", lambda: cell_from_spec(spec))
+        except SpecError as error:
+            raise located(error, spec) from None
+        groups = clock.timed("proofs", lambda: statements.lattice(cell))
+    return Examination(spec, groups, unexamined=UNEXAMINED if refuted(groups) and len(groups) == 1 else "")
 
 
 def _compiled(

@@ -138,9 +138,7 @@ def system_from_spec(spec: Spec) -> System:
     identity, and sizes that do not match the number of coordinates.
     """
     if spec.lattice:
-        message = f"{spec.name} is a lattice, and this is for one system of a few coordinates"
-        hint = "phigen show --expand SIZES prints a small one as an ordinary spec"
-        raise SpecError([spec.diagnostic(("lattice",), message, hint)])
+        raise system_of_lattice(spec)
     system = build_system(
         spec.name,
         spec.coordinates,
@@ -153,6 +151,13 @@ def system_from_spec(spec: Spec) -> System:
         time=spec.time,
     )
     return replace(system, spec=spec)
+
+
+def system_of_lattice(spec: Spec) -> SpecError:
+    """The error for a lattice where one system of a few coordinates is wanted."""
+    message = f"{spec.name} is a lattice, and this is for one system of a few coordinates"
+    hint = "phigen show --expand SIZES prints a small one as an ordinary spec"
+    return SpecError([spec.diagnostic(("lattice",), message, hint)])
 
 
 def build_system(

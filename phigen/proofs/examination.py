@@ -79,7 +79,7 @@ def _place(spec: Spec, group: str, statement: Statement) -> tuple[str, ...]:
     """The path of keys to what a statement is about."""
     places: dict[str, tuple[str, ...]] = {f"{name} is a Casimir": ("casimirs", name) for name in spec.casimirs}
     places |= {f"{name} is invariant": ("invariants", name) for name in spec.invariants}
-    places |= {"H is defined": ("hamiltonian",)}
+    places |= {"H is defined": ("hamiltonian",), "the density of a pair is symmetric": ("hamiltonian", "pairs")}
     places |= {f"{name} is defined": ("casimirs", name) for name in spec.casimirs}
     places |= {f"{name} is defined": ("invariants", name) for name in spec.invariants}
     return places.get(statement.name, _PLACES.get(group.partition(" (")[0], ("poisson",)))

@@ -10,6 +10,8 @@ from phigen.geometry import checks
 from phigen.geometry.definedness import undefined_parts
 from phigen.geometry.jacobi import jacobi_identity
 from phigen.geometry.system import System
+from phigen.lattice import proofs as of_lattices
+from phigen.lattice.cell import Cell
 from phigen.realisations import axioms
 from phigen.series.hamilton_jacobi import residual
 from phigen.spec.model import Spec
@@ -45,6 +47,19 @@ def integrals(system: System) -> dict[str, tuple[Statement, ...]]:
     casimirs = (*checks.casimir_statements(system), checks.rank_statement(system))
     invariants = tuple(checks.invariant_statements(system))
     return {CASIMIRS: casimirs} | ({INVARIANTS: invariants} if invariants else {})
+
+
+def lattice(cell: Cell) -> dict[str, tuple[Statement, ...]]:
+    """What `tensor` and `integrals` say, of a lattice of any size."""
+    groups = {"Poisson tensor": of_lattices.tensor(cell)}
+    if any(s.verdict == REFUTED for s in groups["Poisson tensor"]):
+        return groups
+    found = {
+        CASIMIRS: tuple(of_lattices.casimirs(cell)),
+        INVARIANTS: tuple(of_lattices.invariants(cell)),
+        "Hamiltonian": tuple(of_lattices.pair_symmetry(cell)),
+    }
+    return groups | {group: listed for group, listed in found.items() if listed}
 
 
 def method(compilation: Compilation) -> dict[str, tuple[Statement, ...]]:
