@@ -21,7 +21,7 @@
  *   4. The implicit step, along paths dm/dt = pi(m) p
  *   5. The solver
  *   6. Ensembles
- * body-sha256: 471f9c1c0a26660c3a1c9b0f6728c896952fab547936d25de8b21f5737b1e60f
+ * body-sha256: bce9edd80c22ef7261b55af7db60ca083e0e7d0b0ecd728921456ce32ad5fcaf
  */
 #include "ablowitz_ladik3.h"
 
@@ -376,8 +376,24 @@ static void ablowitz_ladik3_path_field(const double *coef, const double p[6], co
 enum {
     ablowitz_ladik3_LONGEST_PATH = 128, /* pieces of a path, a power of 2 */
     /* of all paths that are tried in a solve: steps that need more are wrong by as much as the state */
-    ablowitz_ladik3_MOST_PIECES = 512
+    ablowitz_ladik3_MOST_PIECES = 512,
+    /* iterations with the approximate Jacobian, before it is asked whether it contracts */
+    ablowitz_ladik3_PATIENCE = 3
 };
+
+/* terms that rounding hides in their sum, in sizes of the path */
+#define ablowitz_ladik3_NEGLIGIBLE 1e-17
+/* coordinates are measured no finer than by this part of all together */
+#define ablowitz_ladik3_LEAST_SHARE 1e-5
+/* rounding of the slope of a path, in sizes of the path and its slope */
+#define ablowitz_ladik3_ROUNDED_SLOPE 2e-15
+/* of arguments in a quotient, in sizes of p: about the root of rounding */
+#define ablowitz_ladik3_DIFFERENCE 1e-7
+#define ablowitz_ladik3_SOLVED 4e-16        /* a residual, in sizes of p, that is rounding; */
+#define ablowitz_ladik3_NEARLY_SOLVED 1e-12 /* one below this is so too if it is ... */
+#define ablowitz_ladik3_SHRINKING 0.25      /* ... more than this part of the one before */
+/* part of the residual that an iteration with a useful Jacobian leaves at most */
+#define ablowitz_ladik3_CONTRACTING 0.05
 
 /* Whether dm/dt = pi(m) p holds at a point m, where the expansion has the given slope: one with gaps between
    its terms, like t + t^9, or across the kink of an absolute value, only looks as if it had converged. */
@@ -388,7 +404,7 @@ static int ablowitz_ladik3_holds(const double *coef, const double p[ablowitz_lad
     ablowitz_ladik3_path_field(coef, p, m, field);
     for (int i = 0; i < ablowitz_ladik3_DIM; ++i) scale += fabs(m[i]) + fabs(slope[i]);
     for (int i = 0; i < ablowitz_ladik3_DIM; ++i)
-        if (!(fabs(field[i] - slope[i]) <= 2e-15 * scale)) return 0;
+        if (!(fabs(field[i] - slope[i]) <= ablowitz_ladik3_ROUNDED_SLOPE * scale)) return 0;
     return 1;
 }
 
@@ -416,7 +432,8 @@ static int ablowitz_ladik3_piece(const double *coef, const double p[ablowitz_lad
             mean[i] += term / (k + 2);
             slope[i] += (k + 1) * term;
             end[i] = start[i] + change[i];
-            if (!(fabs(term) <= 1e-17 * (fabs(start[i]) + fabs(change[i]) + 1e-5 * norm))) negligible = 0;
+            const double measure = fabs(start[i]) + fabs(change[i]) + ablowitz_ladik3_LEAST_SHARE * norm;
+            if (!(fabs(term) <= ablowitz_ladik3_NEGLIGIBLE * measure)) negligible = 0;
         }
         small = negligible ? small + 1 : 0;
         if (small >= 2 && ablowitz_ladik3_holds(coef, p, end, slope)) return 1;
@@ -478,7 +495,7 @@ static int ablowitz_ladik3_differences(ablowitz_ladik3_solver *s, const double *
     for (int i = 0; i < ablowitz_ladik3_DIM; ++i) norm = fabs(p[i]) > norm ? fabs(p[i]) : norm;
     for (int j = 0; j < ablowitz_ladik3_DIM; ++j) {
         memcpy(q, p, sizeof q);
-        q[j] += 1e-7 * norm;
+        q[j] += ablowitz_ladik3_DIFFERENCE * norm;
         if (!ablowitz_ladik3_residual(s, coef, q, y, moved, change, unused, made)) return 0;
         for (int i = 0; i < ablowitz_ladik3_DIM; ++i)
             jacobian[i * ablowitz_ladik3_DIM + j] = (moved[i] - residual[i]) / (q[j] - p[j]);
@@ -507,14 +524,16 @@ static ablowitz_ladik3_status ablowitz_ladik3_attempt(ablowitz_ladik3_solver *s,
             norm = fabs(p[i]) > norm ? fabs(p[i]) : norm;
         }
         size /= norm;
-        /* The second test: residuals no longer shrink, the solve has reached the level of rounding. */
-        if (size <= 4e-16 || (previous < 1e-12 && size > 0.25 * previous)) {
+        const int stalled = previous < ablowitz_ladik3_NEARLY_SOLVED && size > ablowitz_ladik3_SHRINKING
+            * previous;
+        if (size <= ablowitz_ladik3_SOLVED || stalled) {
             if (!ablowitz_ladik3_plausible(s, stage, change)) return ablowitz_ladik3_NO_CONVERGENCE;
             if (!ablowitz_ladik3_advance(s, change, s->carry)) return ablowitz_ladik3_NOT_FINITE;
             ablowitz_ladik3_remember(&s->history[stage], y);
             return ablowitz_ladik3_OK;
         }
-        const int slow = iteration >= 3 && size > 0.05 * previous;
+        const int slow = iteration >= ablowitz_ladik3_PATIENCE && size > ablowitz_ladik3_CONTRACTING
+            * previous;
         if (slow && !ablowitz_ladik3_differences(s, coef, p, residual, jacobian, &made))
             return ablowitz_ladik3_NO_CONVERGENCE;
         if (!ablowitz_ladik3_solve(jacobian, residual)) return ablowitz_ladik3_SINGULAR;

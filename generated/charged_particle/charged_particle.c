@@ -20,7 +20,7 @@
  *   4. The implicit step, along paths dm/dt = pi(m) p
  *   5. The solver
  *   6. Ensembles
- * body-sha256: ef379ff533f79868a8fde87c9d7321150bedf3f70f84611963480c649bcc7a5b
+ * body-sha256: ba9c553aeb77f54137d5756122466eae96854eaa0c0bb965ef4d96a9b878916a
  */
 #include "charged_particle.h"
 
@@ -363,8 +363,24 @@ static void charged_particle_path_field(const double *coef, const double p[6], c
 enum {
     charged_particle_LONGEST_PATH = 128, /* pieces of a path, a power of 2 */
     /* of all paths that are tried in a solve: steps that need more are wrong by as much as the state */
-    charged_particle_MOST_PIECES = 512
+    charged_particle_MOST_PIECES = 512,
+    /* iterations with the approximate Jacobian, before it is asked whether it contracts */
+    charged_particle_PATIENCE = 3
 };
+
+/* terms that rounding hides in their sum, in sizes of the path */
+#define charged_particle_NEGLIGIBLE 1e-17
+/* coordinates are measured no finer than by this part of all together */
+#define charged_particle_LEAST_SHARE 1e-5
+/* rounding of the slope of a path, in sizes of the path and its slope */
+#define charged_particle_ROUNDED_SLOPE 2e-15
+/* of arguments in a quotient, in sizes of p: about the root of rounding */
+#define charged_particle_DIFFERENCE 1e-7
+#define charged_particle_SOLVED 4e-16        /* a residual, in sizes of p, that is rounding; */
+#define charged_particle_NEARLY_SOLVED 1e-12 /* one below this is so too if it is ... */
+#define charged_particle_SHRINKING 0.25      /* ... more than this part of the one before */
+/* part of the residual that an iteration with a useful Jacobian leaves at most */
+#define charged_particle_CONTRACTING 0.05
 
 /* Whether dm/dt = pi(m) p holds at a point m, where the expansion has the given slope: one with gaps between
    its terms, like t + t^9, or across the kink of an absolute value, only looks as if it had converged. */
@@ -375,7 +391,7 @@ static int charged_particle_holds(const double *coef, const double p[charged_par
     charged_particle_path_field(coef, p, m, field);
     for (int i = 0; i < charged_particle_DIM; ++i) scale += fabs(m[i]) + fabs(slope[i]);
     for (int i = 0; i < charged_particle_DIM; ++i)
-        if (!(fabs(field[i] - slope[i]) <= 2e-15 * scale)) return 0;
+        if (!(fabs(field[i] - slope[i]) <= charged_particle_ROUNDED_SLOPE * scale)) return 0;
     return 1;
 }
 
@@ -403,7 +419,8 @@ static int charged_particle_piece(const double *coef, const double p[charged_par
             mean[i] += term / (k + 2);
             slope[i] += (k + 1) * term;
             end[i] = start[i] + change[i];
-            if (!(fabs(term) <= 1e-17 * (fabs(start[i]) + fabs(change[i]) + 1e-5 * norm))) negligible = 0;
+            const double measure = fabs(start[i]) + fabs(change[i]) + charged_particle_LEAST_SHARE * norm;
+            if (!(fabs(term) <= charged_particle_NEGLIGIBLE * measure)) negligible = 0;
         }
         small = negligible ? small + 1 : 0;
         if (small >= 2 && charged_particle_holds(coef, p, end, slope)) return 1;
@@ -466,7 +483,7 @@ static int charged_particle_differences(charged_particle_solver *s, const double
     for (int i = 0; i < charged_particle_DIM; ++i) norm = fabs(p[i]) > norm ? fabs(p[i]) : norm;
     for (int j = 0; j < charged_particle_DIM; ++j) {
         memcpy(q, p, sizeof q);
-        q[j] += 1e-7 * norm;
+        q[j] += charged_particle_DIFFERENCE * norm;
         if (!charged_particle_residual(s, coef, q, y, moved, change, unused, made)) return 0;
         for (int i = 0; i < charged_particle_DIM; ++i)
             jacobian[i * charged_particle_DIM + j] = (moved[i] - residual[i]) / (q[j] - p[j]);
@@ -496,14 +513,16 @@ static charged_particle_status charged_particle_attempt(charged_particle_solver 
             norm = fabs(p[i]) > norm ? fabs(p[i]) : norm;
         }
         size /= norm;
-        /* The second test: residuals no longer shrink, the solve has reached the level of rounding. */
-        if (size <= 4e-16 || (previous < 1e-12 && size > 0.25 * previous)) {
+        const int stalled = previous < charged_particle_NEARLY_SOLVED && size > charged_particle_SHRINKING
+            * previous;
+        if (size <= charged_particle_SOLVED || stalled) {
             if (!charged_particle_plausible(s, change)) return charged_particle_NO_CONVERGENCE;
             if (!charged_particle_advance(s, change, s->carry)) return charged_particle_NOT_FINITE;
             charged_particle_remember(&s->history, y);
             return charged_particle_OK;
         }
-        const int slow = iteration >= 3 && size > 0.05 * previous;
+        const int slow = iteration >= charged_particle_PATIENCE && size > charged_particle_CONTRACTING
+            * previous;
         if (slow && !charged_particle_differences(s, coef, p, residual, jacobian, &made))
             return charged_particle_NO_CONVERGENCE;
         if (!charged_particle_solve(jacobian, residual)) return charged_particle_SINGULAR;

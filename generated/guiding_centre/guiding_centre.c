@@ -21,7 +21,7 @@
  *   4. The implicit step, along paths dm/dt = pi(m) p
  *   5. The solver
  *   6. Ensembles
- * body-sha256: edb2542361468997286a87ed8d9fc0c1cf73508c515e0fe0abbdacdcec029f16
+ * body-sha256: bef4b80dfa1d683aded215188423336a99efe6f66c825cc091ef6c1166cd3f8f
  */
 #include "guiding_centre.h"
 
@@ -453,8 +453,24 @@ static void guiding_centre_path_field(const double *coef, const double p[4], con
 enum {
     guiding_centre_LONGEST_PATH = 128, /* pieces of a path, a power of 2 */
     /* of all paths that are tried in a solve: steps that need more are wrong by as much as the state */
-    guiding_centre_MOST_PIECES = 512
+    guiding_centre_MOST_PIECES = 512,
+    /* iterations with the approximate Jacobian, before it is asked whether it contracts */
+    guiding_centre_PATIENCE = 3
 };
+
+/* terms that rounding hides in their sum, in sizes of the path */
+#define guiding_centre_NEGLIGIBLE 1e-17
+/* coordinates are measured no finer than by this part of all together */
+#define guiding_centre_LEAST_SHARE 1e-5
+/* rounding of the slope of a path, in sizes of the path and its slope */
+#define guiding_centre_ROUNDED_SLOPE 2e-15
+/* of arguments in a quotient, in sizes of p: about the root of rounding */
+#define guiding_centre_DIFFERENCE 1e-7
+#define guiding_centre_SOLVED 4e-16        /* a residual, in sizes of p, that is rounding; */
+#define guiding_centre_NEARLY_SOLVED 1e-12 /* one below this is so too if it is ... */
+#define guiding_centre_SHRINKING 0.25      /* ... more than this part of the one before */
+/* part of the residual that an iteration with a useful Jacobian leaves at most */
+#define guiding_centre_CONTRACTING 0.05
 
 /* Whether dm/dt = pi(m) p holds at a point m, where the expansion has the given slope: one with gaps between
    its terms, like t + t^9, or across the kink of an absolute value, only looks as if it had converged. */
@@ -465,7 +481,7 @@ static int guiding_centre_holds(const double *coef, const double p[guiding_centr
     guiding_centre_path_field(coef, p, m, field);
     for (int i = 0; i < guiding_centre_DIM; ++i) scale += fabs(m[i]) + fabs(slope[i]);
     for (int i = 0; i < guiding_centre_DIM; ++i)
-        if (!(fabs(field[i] - slope[i]) <= 2e-15 * scale)) return 0;
+        if (!(fabs(field[i] - slope[i]) <= guiding_centre_ROUNDED_SLOPE * scale)) return 0;
     return 1;
 }
 
@@ -493,7 +509,8 @@ static int guiding_centre_piece(const double *coef, const double p[guiding_centr
             mean[i] += term / (k + 2);
             slope[i] += (k + 1) * term;
             end[i] = start[i] + change[i];
-            if (!(fabs(term) <= 1e-17 * (fabs(start[i]) + fabs(change[i]) + 1e-5 * norm))) negligible = 0;
+            const double measure = fabs(start[i]) + fabs(change[i]) + guiding_centre_LEAST_SHARE * norm;
+            if (!(fabs(term) <= guiding_centre_NEGLIGIBLE * measure)) negligible = 0;
         }
         small = negligible ? small + 1 : 0;
         if (small >= 2 && guiding_centre_holds(coef, p, end, slope)) return 1;
@@ -555,7 +572,7 @@ static int guiding_centre_differences(guiding_centre_solver *s, const double *co
     for (int i = 0; i < guiding_centre_DIM; ++i) norm = fabs(p[i]) > norm ? fabs(p[i]) : norm;
     for (int j = 0; j < guiding_centre_DIM; ++j) {
         memcpy(q, p, sizeof q);
-        q[j] += 1e-7 * norm;
+        q[j] += guiding_centre_DIFFERENCE * norm;
         if (!guiding_centre_residual(s, coef, q, y, moved, change, unused, made)) return 0;
         for (int i = 0; i < guiding_centre_DIM; ++i)
             jacobian[i * guiding_centre_DIM + j] = (moved[i] - residual[i]) / (q[j] - p[j]);
@@ -584,14 +601,15 @@ static guiding_centre_status guiding_centre_attempt(guiding_centre_solver *s, in
             norm = fabs(p[i]) > norm ? fabs(p[i]) : norm;
         }
         size /= norm;
-        /* The second test: residuals no longer shrink, the solve has reached the level of rounding. */
-        if (size <= 4e-16 || (previous < 1e-12 && size > 0.25 * previous)) {
+        const int stalled = previous < guiding_centre_NEARLY_SOLVED && size > guiding_centre_SHRINKING
+            * previous;
+        if (size <= guiding_centre_SOLVED || stalled) {
             if (!guiding_centre_plausible(s, stage, change)) return guiding_centre_NO_CONVERGENCE;
             if (!guiding_centre_advance(s, change, s->carry)) return guiding_centre_NOT_FINITE;
             guiding_centre_remember(&s->history[stage], y);
             return guiding_centre_OK;
         }
-        const int slow = iteration >= 3 && size > 0.05 * previous;
+        const int slow = iteration >= guiding_centre_PATIENCE && size > guiding_centre_CONTRACTING * previous;
         if (slow && !guiding_centre_differences(s, coef, p, residual, jacobian, &made))
             return guiding_centre_NO_CONVERGENCE;
         if (!guiding_centre_solve(jacobian, residual)) return guiding_centre_SINGULAR;

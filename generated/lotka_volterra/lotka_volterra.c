@@ -25,7 +25,7 @@
  *   9. Blocks of steps
  *   10. Groups of members
  *   11. Ensembles
- * body-sha256: 4ac46bc37e134cc721f46102baac4312d370130783f22a4ef4b1f2daa2eccaf9
+ * body-sha256: 7c0e862c6327a58fbff7cec9f940007928f589d12a0e563460fd6b78a56633ad
  */
 #include "lotka_volterra.h"
 
@@ -532,16 +532,20 @@ typedef double lotka_volterra_lanes[lotka_volterra_LANES];
 #define lotka_volterra_EACH_LANE
 #endif
 
-/* exp(u) - 1 for the loops over lanes: u = k log 2 + r, no branches. No number beyond |u| = 700.0. */
-static inline double lotka_volterra_expm1_lane(double u)
+/* 1.5 2^52: a number added to it and taken off again is rounded to an integer */
+#define lotka_volterra_ROUNDER 6755399441055744.0
+
+/* exp(u) - 2^k, and 2^k, where u = k log 2 + r: no branches. */
+static inline double lotka_volterra_exp_parts(double u, double *power)
 {
-    const double shifted = u * 1.4426950408889634 + 6755399441055744.0, k = shifted - 6755399441055744.0;
+    const double shifted = u * 1.4426950408889634 + lotka_volterra_ROUNDER, k = shifted
+        - lotka_volterra_ROUNDER;
     const double r = (u - k * 0.6931471803691238) - k * 1.9082149292705877e-10, rr = r * r;
     uint64_t bits; /* the last bits of shifted are k */
-    double power, sum = 1.1470745597729725e-11, other = 1.6059043836821613e-10;
+    double sum = 1.1470745597729725e-11, other = 1.6059043836821613e-10;
     memcpy(&bits, &shifted, sizeof bits);
     bits = (bits + 1023) << 52;
-    memcpy(&power, &bits, sizeof power);
+    memcpy(power, &bits, sizeof *power);
     sum = sum * rr + 2.08767569878681e-09;
     other = other * rr + 2.505210838544172e-08;
     sum = sum * rr + 2.755731922398589e-07;
@@ -554,7 +558,15 @@ static inline double lotka_volterra_expm1_lane(double u)
     other = other * rr + 0.16666666666666666;
     sum = (sum * r + other) * r + 0.5;
     sum = sum * rr + r;
-    return power * sum + (power - 1.0) + (fabs(u) <= 700.0 ? 0.0 : (double)NAN);
+    return *power * sum;
+}
+
+/* exp(u) - 1 for the loops over lanes. No number beyond |u| = 700. */
+static inline double lotka_volterra_expm1_lane(double u)
+{
+    double power;
+    const double rest = lotka_volterra_exp_parts(u, &power);
+    return rest + (power - 1.0) + (fabs(u) <= 700.0 ? 0.0 : (double)NAN);
 }
 
 /* ---- The solver ---- */

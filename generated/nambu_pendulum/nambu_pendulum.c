@@ -26,7 +26,7 @@
  *   10. Blocks of steps
  *   11. Groups of members
  *   12. Ensembles
- * body-sha256: bdc7fe16395069de7b8f6a757d076f926428d5087a215856f20ba9c2a540c0bc
+ * body-sha256: 19c0e35b765dcc0c3ed7aca175b2cfdf5c37c64a53e6049008c97b26cc39804f
  */
 #include "nambu_pendulum.h"
 
@@ -509,8 +509,24 @@ static void nambu_pendulum_path_field(const double *coef, const double p[3], con
 enum {
     nambu_pendulum_LONGEST_PATH = 128, /* pieces of a path, a power of 2 */
     /* of all paths that are tried in a solve: steps that need more are wrong by as much as the state */
-    nambu_pendulum_MOST_PIECES = 512
+    nambu_pendulum_MOST_PIECES = 512,
+    /* iterations with the approximate Jacobian, before it is asked whether it contracts */
+    nambu_pendulum_PATIENCE = 3
 };
+
+/* terms that rounding hides in their sum, in sizes of the path */
+#define nambu_pendulum_NEGLIGIBLE 1e-17
+/* coordinates are measured no finer than by this part of all together */
+#define nambu_pendulum_LEAST_SHARE 1e-5
+/* rounding of the slope of a path, in sizes of the path and its slope */
+#define nambu_pendulum_ROUNDED_SLOPE 2e-15
+/* of arguments in a quotient, in sizes of p: about the root of rounding */
+#define nambu_pendulum_DIFFERENCE 1e-7
+#define nambu_pendulum_SOLVED 4e-16        /* a residual, in sizes of p, that is rounding; */
+#define nambu_pendulum_NEARLY_SOLVED 1e-12 /* one below this is so too if it is ... */
+#define nambu_pendulum_SHRINKING 0.25      /* ... more than this part of the one before */
+/* part of the residual that an iteration with a useful Jacobian leaves at most */
+#define nambu_pendulum_CONTRACTING 0.05
 
 /* Whether dm/dt = pi(m) p holds at a point m, where the expansion has the given slope: one with gaps between
    its terms, like t + t^9, or across the kink of an absolute value, only looks as if it had converged. */
@@ -521,7 +537,7 @@ static int nambu_pendulum_holds(const double *coef, const double p[nambu_pendulu
     nambu_pendulum_path_field(coef, p, m, field);
     for (int i = 0; i < nambu_pendulum_DIM; ++i) scale += fabs(m[i]) + fabs(slope[i]);
     for (int i = 0; i < nambu_pendulum_DIM; ++i)
-        if (!(fabs(field[i] - slope[i]) <= 2e-15 * scale)) return 0;
+        if (!(fabs(field[i] - slope[i]) <= nambu_pendulum_ROUNDED_SLOPE * scale)) return 0;
     return 1;
 }
 
@@ -549,7 +565,8 @@ static int nambu_pendulum_piece(const double *coef, const double p[nambu_pendulu
             mean[i] += term / (k + 2);
             slope[i] += (k + 1) * term;
             end[i] = start[i] + change[i];
-            if (!(fabs(term) <= 1e-17 * (fabs(start[i]) + fabs(change[i]) + 1e-5 * norm))) negligible = 0;
+            const double measure = fabs(start[i]) + fabs(change[i]) + nambu_pendulum_LEAST_SHARE * norm;
+            if (!(fabs(term) <= nambu_pendulum_NEGLIGIBLE * measure)) negligible = 0;
         }
         small = negligible ? small + 1 : 0;
         if (small >= 2 && nambu_pendulum_holds(coef, p, end, slope)) return 1;
@@ -611,7 +628,7 @@ static int nambu_pendulum_differences(nambu_pendulum_solver *s, const double *co
     for (int i = 0; i < nambu_pendulum_DIM; ++i) norm = fabs(p[i]) > norm ? fabs(p[i]) : norm;
     for (int j = 0; j < nambu_pendulum_DIM; ++j) {
         memcpy(q, p, sizeof q);
-        q[j] += 1e-7 * norm;
+        q[j] += nambu_pendulum_DIFFERENCE * norm;
         if (!nambu_pendulum_residual(s, coef, q, y, moved, change, unused, made)) return 0;
         for (int i = 0; i < nambu_pendulum_DIM; ++i)
             jacobian[i * nambu_pendulum_DIM + j] = (moved[i] - residual[i]) / (q[j] - p[j]);
@@ -640,14 +657,15 @@ static nambu_pendulum_status nambu_pendulum_attempt(nambu_pendulum_solver *s)
             norm = fabs(p[i]) > norm ? fabs(p[i]) : norm;
         }
         size /= norm;
-        /* The second test: residuals no longer shrink, the solve has reached the level of rounding. */
-        if (size <= 4e-16 || (previous < 1e-12 && size > 0.25 * previous)) {
+        const int stalled = previous < nambu_pendulum_NEARLY_SOLVED && size > nambu_pendulum_SHRINKING
+            * previous;
+        if (size <= nambu_pendulum_SOLVED || stalled) {
             if (!nambu_pendulum_plausible(s, change)) return nambu_pendulum_NO_CONVERGENCE;
             if (!nambu_pendulum_advance(s, change, s->carry)) return nambu_pendulum_NOT_FINITE;
             nambu_pendulum_remember(&s->history, y, iteration);
             return nambu_pendulum_OK;
         }
-        const int slow = iteration >= 3 && size > 0.05 * previous;
+        const int slow = iteration >= nambu_pendulum_PATIENCE && size > nambu_pendulum_CONTRACTING * previous;
         if (slow && !nambu_pendulum_differences(s, coef, p, residual, jacobian, &made))
             return nambu_pendulum_NO_CONVERGENCE;
         if (!nambu_pendulum_solve(jacobian, residual)) return nambu_pendulum_SINGULAR;
@@ -680,15 +698,18 @@ typedef double nambu_pendulum_lanes[nambu_pendulum_LANES];
 #define nambu_pendulum_EACH_LANE
 #endif
 
-/* sin u for the loops over lanes: u = k pi + r with |r| <= pi/2, no branches. No number beyond |u| =
-   1000000.0. */
-static inline double nambu_pendulum_sin_lane(double u)
+/* 1.5 2^52: a number added to it and taken off again is rounded to an integer */
+#define nambu_pendulum_ROUNDER 6755399441055744.0
+
+/* sin(u + offset pi) for offset 0 or 0.5: u = (k - offset) pi + r with |r| <= pi/2, no branches. No number
+   beyond |u| = 10^6. */
+static inline double nambu_pendulum_turned_sin(double u, double offset)
 {
-    const double shifted = (u * 0.3183098861837907 + 0.0) + 6755399441055744.0;
-    const double k = (shifted - 6755399441055744.0) - 0.0;
-    const double r = ((u - k * 3.141592651605606) - k * 1.9841871479187034e-09) - k * 1.1442377452219664e-17,
-        q = r * r, qq = q * q;
-    uint64_t parity, bits; /* the last bit of shifted is the parity of k + 0.0 */
+    const double shifted = (u * 0.3183098861837907 + offset) + nambu_pendulum_ROUNDER, k =
+        (shifted - nambu_pendulum_ROUNDER) - offset;
+    const double near = (u - k * 3.141592651605606) - k * 1.9841871479187034e-09;
+    const double r = near - k * 1.1442377452219664e-17, q = r * r, qq = q * q;
+    uint64_t parity, bits; /* the last bit of shifted is the parity of k + offset */
     double value, sum = -3.868170170630684e-23, other = 1.9572941063391263e-20;
     sum = sum * qq + -8.22063524662433e-18;
     other = other * qq + 2.8114572543455206e-15;
@@ -704,35 +725,14 @@ static inline double nambu_pendulum_sin_lane(double u)
     memcpy(&bits, &value, sizeof bits);
     bits ^= parity << 63;
     memcpy(&value, &bits, sizeof bits);
-    return value + (fabs(u) <= 1000000.0 ? 0.0 : (double)NAN);
+    return value + (fabs(u) <= 1e6 ? 0.0 : (double)NAN);
 }
 
-/* cos u for the loops over lanes: u = k pi + r with |r| <= pi/2, no branches. No number beyond |u| =
-   1000000.0. */
-static inline double nambu_pendulum_cos_lane(double u)
-{
-    const double shifted = (u * 0.3183098861837907 + 0.5) + 6755399441055744.0;
-    const double k = (shifted - 6755399441055744.0) - 0.5;
-    const double r = ((u - k * 3.141592651605606) - k * 1.9841871479187034e-09) - k * 1.1442377452219664e-17,
-        q = r * r, qq = q * q;
-    uint64_t parity, bits; /* the last bit of shifted is the parity of k + 0.5 */
-    double value, sum = -3.868170170630684e-23, other = 1.9572941063391263e-20;
-    sum = sum * qq + -8.22063524662433e-18;
-    other = other * qq + 2.8114572543455206e-15;
-    sum = sum * qq + -7.647163731819816e-13;
-    other = other * qq + 1.6059043836821613e-10;
-    sum = sum * qq + -2.505210838544172e-08;
-    other = other * qq + 2.7557319223985893e-06;
-    sum = sum * qq + -0.0001984126984126984;
-    other = other * qq + 0.008333333333333333;
-    sum = (sum * q + other) * q + -0.16666666666666666;
-    value = r + r * q * sum;
-    memcpy(&parity, &shifted, sizeof parity);
-    memcpy(&bits, &value, sizeof bits);
-    bits ^= parity << 63;
-    memcpy(&value, &bits, sizeof bits);
-    return value + (fabs(u) <= 1000000.0 ? 0.0 : (double)NAN);
-}
+/* sin u for the loops over lanes. */
+static inline double nambu_pendulum_sin_lane(double u) { return nambu_pendulum_turned_sin(u, 0.0); }
+
+/* cos u for the loops over lanes. */
+static inline double nambu_pendulum_cos_lane(double u) { return nambu_pendulum_turned_sin(u, 0.5); }
 
 /* ---- The solver ---- */
 /* The arguments may be parts of *s, which is therefore written last. */
@@ -1132,10 +1132,16 @@ static double nambu_pendulum_remaining(double size, double bend, double bound)
 }
 
 /* ---- Paths in lanes ---- */
-enum { nambu_pendulum_TERMS_OF_LANES = 16 }; /* most of the expansion of a path from its middle */
+enum {
+    nambu_pendulum_TERMS_OF_LANES = 16, /* most of the expansion of a path from its middle */
+    nambu_pendulum_ROUNDS = 12          /* of the iteration for the middle, which gains some digits in each */
+};
 
-/* Accuracy of the derivatives of paths. */
-#define nambu_pendulum_SLOPE_ACCURACY 1e-7
+#define nambu_pendulum_SLOPE_ACCURACY 1e-7 /* of the derivatives of paths */
+#define nambu_pendulum_SETTLED 1e-9        /* accuracy of middles: what is left, the passes mend */
+/* what a round leaves of the error at best: so long an expansion it gets */
+#define nambu_pendulum_GAIN_OF_ROUND 1e-4
+#define nambu_pendulum_GUESS_ACCURACY 1e-6 /* of expansions for guesses, which are no better */
 
 /* The paths of all lanes as Taylor series about their middle, with half of p: they take the time from -1 to
    1, and need fewer terms than from their start. s[i][k] is coefficient k of series i, the coordinates first;
@@ -1286,7 +1292,7 @@ static void nambu_pendulum_begin(nambu_pendulum_lanes coef[restrict], nambu_pend
     for (int i = 0; i < nambu_pendulum_DIM; ++i) {
         nambu_pendulum_EACH_LANE
         for (int lane = 0; lane < nambu_pendulum_LANES; ++lane)
-            e->unit[i][lane] = 1.0 / (e->unit[i][lane] + 1e-5 * norm[lane]);
+            e->unit[i][lane] = 1.0 / (e->unit[i][lane] + nambu_pendulum_LEAST_SHARE * norm[lane]);
     }
 }
 
@@ -1338,7 +1344,7 @@ static void nambu_pendulum_check_end(nambu_pendulum_lanes coef[restrict], nambu_
         nambu_pendulum_EACH_LANE
         for (int lane = 0; lane < nambu_pendulum_LANES; ++lane) {
             const double off = fabs(value[nambu_pendulum_path_slopes[i]][lane] - slope[i][lane]);
-            wrong[lane] += off <= 2e-15 * scale[lane] ? 0.0 : HUGE_VAL;
+            wrong[lane] += off <= nambu_pendulum_ROUNDED_SLOPE * scale[lane] ? 0.0 : HUGE_VAL;
         }
     }
 }
@@ -1391,14 +1397,14 @@ static void nambu_pendulum_settle(nambu_pendulum_lanes coef[restrict], nambu_pen
     nambu_pendulum_lanes size, norm;
     double left = 1.0;
     memset(model->middle, 0, sizeof model->middle);
-    for (int round = 0; left > 1e-9 && round < 12; ++round) {
+    for (int round = 0; left > nambu_pendulum_SETTLED && round < nambu_pendulum_ROUNDS; ++round) {
         for (int i = 0; i < nambu_pendulum_DIM && round > 0; ++i) {
             nambu_pendulum_EACH_LANE
             for (int lane = 0; lane < nambu_pendulum_LANES; ++lane)
                 model->middle[i][lane] = -e->mean[i][lane];
         }
         nambu_pendulum_begin_at(coef, model, e);
-        nambu_pendulum_extend(coef, e, 1e-4 * left);
+        nambu_pendulum_extend(coef, e, nambu_pendulum_GAIN_OF_ROUND * left);
         memset(size, 0, sizeof size);
         memset(norm, 0, sizeof norm);
         for (int i = 0; i < nambu_pendulum_DIM; ++i) {
@@ -1413,8 +1419,8 @@ static void nambu_pendulum_settle(nambu_pendulum_lanes coef[restrict], nambu_pen
         left = nambu_pendulum_largest_finite(size);
         if (left > 1.0) left = 1.0;
     }
-    for (int lane = 0; lane < nambu_pendulum_LANES && left > 1e-9; ++lane)
-        if (size[lane] > 1e-9) model->middle[0][lane] = HUGE_VAL;
+    for (int lane = 0; lane < nambu_pendulum_LANES && left > nambu_pendulum_SETTLED; ++lane)
+        if (size[lane] > nambu_pendulum_SETTLED) model->middle[0][lane] = HUGE_VAL;
 }
 
 /* Half of p: paths take the time from -1 to 1. */
@@ -1436,7 +1442,7 @@ static void nambu_pendulum_evaluate_lanes(nambu_pendulum_lanes coef[restrict],
     nambu_pendulum_momentum_lanes(coef, y, e.p);
     nambu_pendulum_halve(e.p);
     nambu_pendulum_begin(coef, &e, y);
-    nambu_pendulum_extend(coef, &e, 1e-6);
+    nambu_pendulum_extend(coef, &e, nambu_pendulum_GUESS_ACCURACY);
     for (int i = 0; i < nambu_pendulum_DIM; ++i) {
         nambu_pendulum_EACH_LANE
         for (int lane = 0; lane < nambu_pendulum_LANES; ++lane) {
@@ -1550,7 +1556,8 @@ static void nambu_pendulum_linearise_paths(nambu_pendulum_lanes coef[restrict], 
     for (int i = 0; i < 2 * nambu_pendulum_DIM; ++i) {
         nambu_pendulum_EACH_LANE
         for (int lane = 0; lane < nambu_pendulum_LANES; ++lane)
-            model->inverse[i % nambu_pendulum_DIM][lane] += fabs(reciprocal[i][lane]) < 1e3 ? 0.0 : HUGE_VAL;
+            model->inverse[i % nambu_pendulum_DIM][lane] += fabs(reciprocal[i][lane])
+                < nambu_pendulum_LARGEST_RECIPROCAL ? 0.0 : HUGE_VAL;
     }
 }
 
@@ -1565,7 +1572,7 @@ static void nambu_pendulum_update(nambu_pendulum_lanes coef[restrict], nambu_pen
     nambu_pendulum_halve(e.p);
     if (matrices) nambu_pendulum_settle(coef, model, &e);
     else nambu_pendulum_begin_at(coef, model, &e);
-    nambu_pendulum_extend(coef, &e, 1e-17);
+    nambu_pendulum_extend(coef, &e, nambu_pendulum_NEGLIGIBLE);
     nambu_pendulum_check_ends(coef, &e, wrong);
     if (matrices) nambu_pendulum_linearise_paths(coef, model, &e, hessian);
     nambu_pendulum_read_ends(model, &e, wrong);

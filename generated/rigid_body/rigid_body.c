@@ -27,7 +27,7 @@
  *   10. Blocks of steps
  *   11. Groups of members
  *   12. Ensembles
- * body-sha256: 4016cfe6ffed106ab44f727d4fd5d5f441b0f4af2371455558b8507ce83f6810
+ * body-sha256: 8c8950e58982f53352654cddfbfa83e0d583982c29cdcffc2fc53904bd7b8828
  */
 #include "rigid_body.h"
 
@@ -729,6 +729,8 @@ enum {
     rigid_body_DEGREE = 6,
     rigid_body_SWEEPS = 4 /* most rounds over the multiples */
 };
+/* errors, in sizes of all on a line, that are as good: rounding does not decide */
+#define rigid_body_CLOSE_CALL 1e-12
 
 /* A short piece of the trajectory from x, by a Runge-Kutta method with steps of a fixed change. */
 static void rigid_body_sample(const rigid_body_params *params, const double x[rigid_body_DIM],
@@ -791,7 +793,7 @@ static double rigid_body_least_on_line(const rigid_body_params *params, const do
         const double centre = best;
         for (int j = -reach; j <= reach; ++j) {
             const double t = centre + j * mesh, error = rigid_body_on_line(difference, t);
-            if (!(error < least - 1e-12 * size)) continue; /* close calls are not decided by rounding */
+            if (!(error < least - rigid_body_CLOSE_CALL * size)) continue;
             least = error;
             best = t;
         }

@@ -20,7 +20,7 @@
  *   4. The implicit step, along paths dm/dt = pi(m) p
  *   5. The solver
  *   6. Ensembles
- * body-sha256: b2c701829480a272555ee8ca4920aa86756b7c19bbaaa9d13afc6fe57e084d2c
+ * body-sha256: 678646ab6df6b750512563f27a7b0900cdf2c171fd8b9889a1552aeab919fabb
  */
 #include "sir_epidemic.h"
 
@@ -281,8 +281,23 @@ static void sir_epidemic_path_field(const double *coef, const double p[3], const
 enum {
     sir_epidemic_LONGEST_PATH = 128, /* pieces of a path, a power of 2 */
     /* of all paths that are tried in a solve: steps that need more are wrong by as much as the state */
-    sir_epidemic_MOST_PIECES = 512
+    sir_epidemic_MOST_PIECES = 512,
+    /* iterations with the approximate Jacobian, before it is asked whether it contracts */
+    sir_epidemic_PATIENCE = 3
 };
+
+#define sir_epidemic_NEGLIGIBLE 1e-17 /* terms that rounding hides in their sum, in sizes of the path */
+/* coordinates are measured no finer than by this part of all together */
+#define sir_epidemic_LEAST_SHARE 1e-5
+/* rounding of the slope of a path, in sizes of the path and its slope */
+#define sir_epidemic_ROUNDED_SLOPE 2e-15
+/* of arguments in a quotient, in sizes of p: about the root of rounding */
+#define sir_epidemic_DIFFERENCE 1e-7
+#define sir_epidemic_SOLVED 4e-16        /* a residual, in sizes of p, that is rounding; */
+#define sir_epidemic_NEARLY_SOLVED 1e-12 /* one below this is so too if it is ... */
+#define sir_epidemic_SHRINKING 0.25      /* ... more than this part of the one before */
+/* part of the residual that an iteration with a useful Jacobian leaves at most */
+#define sir_epidemic_CONTRACTING 0.05
 
 /* Whether dm/dt = pi(m) p holds at a point m, where the expansion has the given slope: one with gaps between
    its terms, like t + t^9, or across the kink of an absolute value, only looks as if it had converged. */
@@ -293,7 +308,7 @@ static int sir_epidemic_holds(const double *coef, const double p[sir_epidemic_DI
     sir_epidemic_path_field(coef, p, m, field);
     for (int i = 0; i < sir_epidemic_DIM; ++i) scale += fabs(m[i]) + fabs(slope[i]);
     for (int i = 0; i < sir_epidemic_DIM; ++i)
-        if (!(fabs(field[i] - slope[i]) <= 2e-15 * scale)) return 0;
+        if (!(fabs(field[i] - slope[i]) <= sir_epidemic_ROUNDED_SLOPE * scale)) return 0;
     return 1;
 }
 
@@ -320,7 +335,8 @@ static int sir_epidemic_piece(const double *coef, const double p[sir_epidemic_DI
             mean[i] += term / (k + 2);
             slope[i] += (k + 1) * term;
             end[i] = start[i] + change[i];
-            if (!(fabs(term) <= 1e-17 * (fabs(start[i]) + fabs(change[i]) + 1e-5 * norm))) negligible = 0;
+            const double measure = fabs(start[i]) + fabs(change[i]) + sir_epidemic_LEAST_SHARE * norm;
+            if (!(fabs(term) <= sir_epidemic_NEGLIGIBLE * measure)) negligible = 0;
         }
         small = negligible ? small + 1 : 0;
         if (small >= 2 && sir_epidemic_holds(coef, p, end, slope)) return 1;
@@ -381,7 +397,7 @@ static int sir_epidemic_differences(sir_epidemic_solver *s, const double *coef,
     for (int i = 0; i < sir_epidemic_DIM; ++i) norm = fabs(p[i]) > norm ? fabs(p[i]) : norm;
     for (int j = 0; j < sir_epidemic_DIM; ++j) {
         memcpy(q, p, sizeof q);
-        q[j] += 1e-7 * norm;
+        q[j] += sir_epidemic_DIFFERENCE * norm;
         if (!sir_epidemic_residual(s, coef, q, y, moved, change, unused, made)) return 0;
         for (int i = 0; i < sir_epidemic_DIM; ++i)
             jacobian[i * sir_epidemic_DIM + j] = (moved[i] - residual[i]) / (q[j] - p[j]);
@@ -409,14 +425,14 @@ static sir_epidemic_status sir_epidemic_attempt(sir_epidemic_solver *s)
             norm = fabs(p[i]) > norm ? fabs(p[i]) : norm;
         }
         size /= norm;
-        /* The second test: residuals no longer shrink, the solve has reached the level of rounding. */
-        if (size <= 4e-16 || (previous < 1e-12 && size > 0.25 * previous)) {
+        const int stalled = previous < sir_epidemic_NEARLY_SOLVED && size > sir_epidemic_SHRINKING * previous;
+        if (size <= sir_epidemic_SOLVED || stalled) {
             if (!sir_epidemic_plausible(s, change)) return sir_epidemic_NO_CONVERGENCE;
             if (!sir_epidemic_advance(s, change, s->carry)) return sir_epidemic_NOT_FINITE;
             sir_epidemic_remember(&s->history, y);
             return sir_epidemic_OK;
         }
-        const int slow = iteration >= 3 && size > 0.05 * previous;
+        const int slow = iteration >= sir_epidemic_PATIENCE && size > sir_epidemic_CONTRACTING * previous;
         if (slow && !sir_epidemic_differences(s, coef, p, residual, jacobian, &made))
             return sir_epidemic_NO_CONVERGENCE;
         if (!sir_epidemic_solve(jacobian, residual)) return sir_epidemic_SINGULAR;

@@ -19,7 +19,7 @@
  *   4. The implicit step, along paths dm/dt = pi(m) p
  *   5. The solver
  *   6. Ensembles
- * body-sha256: 1bc616dc87060ba64ef0ec3db1625c2ab96085b2a868e7f92e307843ab10d1ec
+ * body-sha256: fbc53e8d9d8cc7e2ca33caab1a94d09d31059e8260d5bc507f5511dbd30f1a88
  */
 #include "sir_final_size.h"
 
@@ -289,8 +289,24 @@ static void sir_final_size_path_field(const double *coef, const double p[3], con
 enum {
     sir_final_size_LONGEST_PATH = 128, /* pieces of a path, a power of 2 */
     /* of all paths that are tried in a solve: steps that need more are wrong by as much as the state */
-    sir_final_size_MOST_PIECES = 512
+    sir_final_size_MOST_PIECES = 512,
+    /* iterations with the approximate Jacobian, before it is asked whether it contracts */
+    sir_final_size_PATIENCE = 3
 };
+
+/* terms that rounding hides in their sum, in sizes of the path */
+#define sir_final_size_NEGLIGIBLE 1e-17
+/* coordinates are measured no finer than by this part of all together */
+#define sir_final_size_LEAST_SHARE 1e-5
+/* rounding of the slope of a path, in sizes of the path and its slope */
+#define sir_final_size_ROUNDED_SLOPE 2e-15
+/* of arguments in a quotient, in sizes of p: about the root of rounding */
+#define sir_final_size_DIFFERENCE 1e-7
+#define sir_final_size_SOLVED 4e-16        /* a residual, in sizes of p, that is rounding; */
+#define sir_final_size_NEARLY_SOLVED 1e-12 /* one below this is so too if it is ... */
+#define sir_final_size_SHRINKING 0.25      /* ... more than this part of the one before */
+/* part of the residual that an iteration with a useful Jacobian leaves at most */
+#define sir_final_size_CONTRACTING 0.05
 
 /* Whether dm/dt = pi(m) p holds at a point m, where the expansion has the given slope: one with gaps between
    its terms, like t + t^9, or across the kink of an absolute value, only looks as if it had converged. */
@@ -301,7 +317,7 @@ static int sir_final_size_holds(const double *coef, const double p[sir_final_siz
     sir_final_size_path_field(coef, p, m, field);
     for (int i = 0; i < sir_final_size_DIM; ++i) scale += fabs(m[i]) + fabs(slope[i]);
     for (int i = 0; i < sir_final_size_DIM; ++i)
-        if (!(fabs(field[i] - slope[i]) <= 2e-15 * scale)) return 0;
+        if (!(fabs(field[i] - slope[i]) <= sir_final_size_ROUNDED_SLOPE * scale)) return 0;
     return 1;
 }
 
@@ -329,7 +345,8 @@ static int sir_final_size_piece(const double *coef, const double p[sir_final_siz
             mean[i] += term / (k + 2);
             slope[i] += (k + 1) * term;
             end[i] = start[i] + change[i];
-            if (!(fabs(term) <= 1e-17 * (fabs(start[i]) + fabs(change[i]) + 1e-5 * norm))) negligible = 0;
+            const double measure = fabs(start[i]) + fabs(change[i]) + sir_final_size_LEAST_SHARE * norm;
+            if (!(fabs(term) <= sir_final_size_NEGLIGIBLE * measure)) negligible = 0;
         }
         small = negligible ? small + 1 : 0;
         if (small >= 2 && sir_final_size_holds(coef, p, end, slope)) return 1;
@@ -391,7 +408,7 @@ static int sir_final_size_differences(sir_final_size_solver *s, const double *co
     for (int i = 0; i < sir_final_size_DIM; ++i) norm = fabs(p[i]) > norm ? fabs(p[i]) : norm;
     for (int j = 0; j < sir_final_size_DIM; ++j) {
         memcpy(q, p, sizeof q);
-        q[j] += 1e-7 * norm;
+        q[j] += sir_final_size_DIFFERENCE * norm;
         if (!sir_final_size_residual(s, coef, q, y, moved, change, unused, made)) return 0;
         for (int i = 0; i < sir_final_size_DIM; ++i)
             jacobian[i * sir_final_size_DIM + j] = (moved[i] - residual[i]) / (q[j] - p[j]);
@@ -420,14 +437,15 @@ static sir_final_size_status sir_final_size_attempt(sir_final_size_solver *s)
             norm = fabs(p[i]) > norm ? fabs(p[i]) : norm;
         }
         size /= norm;
-        /* The second test: residuals no longer shrink, the solve has reached the level of rounding. */
-        if (size <= 4e-16 || (previous < 1e-12 && size > 0.25 * previous)) {
+        const int stalled = previous < sir_final_size_NEARLY_SOLVED && size > sir_final_size_SHRINKING
+            * previous;
+        if (size <= sir_final_size_SOLVED || stalled) {
             if (!sir_final_size_plausible(s, change)) return sir_final_size_NO_CONVERGENCE;
             if (!sir_final_size_advance(s, change, s->carry)) return sir_final_size_NOT_FINITE;
             sir_final_size_remember(&s->history, y);
             return sir_final_size_OK;
         }
-        const int slow = iteration >= 3 && size > 0.05 * previous;
+        const int slow = iteration >= sir_final_size_PATIENCE && size > sir_final_size_CONTRACTING * previous;
         if (slow && !sir_final_size_differences(s, coef, p, residual, jacobian, &made))
             return sir_final_size_NO_CONVERGENCE;
         if (!sir_final_size_solve(jacobian, residual)) return sir_final_size_SINGULAR;

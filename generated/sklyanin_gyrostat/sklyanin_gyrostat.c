@@ -22,7 +22,7 @@
  *   5. The choice of the gauge: multiples of Casimirs taken from H
  *   6. The solver
  *   7. Ensembles
- * body-sha256: 05056c5df114b57d3fef41596a842b843a6e780b9916a9d0290d5eedadbe7ca2
+ * body-sha256: 6cab2fb13e012cf1691c1cd34b9e256201a8cfc0b79b8a296c9d5e80f7cfb5bb
  */
 #include "sklyanin_gyrostat.h"
 
@@ -450,8 +450,24 @@ static void sklyanin_gyrostat_path_field(const double *coef, const double p[4], 
 enum {
     sklyanin_gyrostat_LONGEST_PATH = 128, /* pieces of a path, a power of 2 */
     /* of all paths that are tried in a solve: steps that need more are wrong by as much as the state */
-    sklyanin_gyrostat_MOST_PIECES = 512
+    sklyanin_gyrostat_MOST_PIECES = 512,
+    /* iterations with the approximate Jacobian, before it is asked whether it contracts */
+    sklyanin_gyrostat_PATIENCE = 3
 };
+
+/* terms that rounding hides in their sum, in sizes of the path */
+#define sklyanin_gyrostat_NEGLIGIBLE 1e-17
+/* coordinates are measured no finer than by this part of all together */
+#define sklyanin_gyrostat_LEAST_SHARE 1e-5
+/* rounding of the slope of a path, in sizes of the path and its slope */
+#define sklyanin_gyrostat_ROUNDED_SLOPE 2e-15
+/* of arguments in a quotient, in sizes of p: about the root of rounding */
+#define sklyanin_gyrostat_DIFFERENCE 1e-7
+#define sklyanin_gyrostat_SOLVED 4e-16        /* a residual, in sizes of p, that is rounding; */
+#define sklyanin_gyrostat_NEARLY_SOLVED 1e-12 /* one below this is so too if it is ... */
+#define sklyanin_gyrostat_SHRINKING 0.25      /* ... more than this part of the one before */
+/* part of the residual that an iteration with a useful Jacobian leaves at most */
+#define sklyanin_gyrostat_CONTRACTING 0.05
 
 /* Whether dm/dt = pi(m) p holds at a point m, where the expansion has the given slope: one with gaps between
    its terms, like t + t^9, or across the kink of an absolute value, only looks as if it had converged. */
@@ -462,7 +478,7 @@ static int sklyanin_gyrostat_holds(const double *coef, const double p[sklyanin_g
     sklyanin_gyrostat_path_field(coef, p, m, field);
     for (int i = 0; i < sklyanin_gyrostat_DIM; ++i) scale += fabs(m[i]) + fabs(slope[i]);
     for (int i = 0; i < sklyanin_gyrostat_DIM; ++i)
-        if (!(fabs(field[i] - slope[i]) <= 2e-15 * scale)) return 0;
+        if (!(fabs(field[i] - slope[i]) <= sklyanin_gyrostat_ROUNDED_SLOPE * scale)) return 0;
     return 1;
 }
 
@@ -490,7 +506,8 @@ static int sklyanin_gyrostat_piece(const double *coef, const double p[sklyanin_g
             mean[i] += term / (k + 2);
             slope[i] += (k + 1) * term;
             end[i] = start[i] + change[i];
-            if (!(fabs(term) <= 1e-17 * (fabs(start[i]) + fabs(change[i]) + 1e-5 * norm))) negligible = 0;
+            const double measure = fabs(start[i]) + fabs(change[i]) + sklyanin_gyrostat_LEAST_SHARE * norm;
+            if (!(fabs(term) <= sklyanin_gyrostat_NEGLIGIBLE * measure)) negligible = 0;
         }
         small = negligible ? small + 1 : 0;
         if (small >= 2 && sklyanin_gyrostat_holds(coef, p, end, slope)) return 1;
@@ -553,7 +570,7 @@ static int sklyanin_gyrostat_differences(sklyanin_gyrostat_solver *s, const doub
     for (int i = 0; i < sklyanin_gyrostat_DIM; ++i) norm = fabs(p[i]) > norm ? fabs(p[i]) : norm;
     for (int j = 0; j < sklyanin_gyrostat_DIM; ++j) {
         memcpy(q, p, sizeof q);
-        q[j] += 1e-7 * norm;
+        q[j] += sklyanin_gyrostat_DIFFERENCE * norm;
         if (!sklyanin_gyrostat_residual(s, coef, q, y, moved, change, unused, made)) return 0;
         for (int i = 0; i < sklyanin_gyrostat_DIM; ++i)
             jacobian[i * sklyanin_gyrostat_DIM + j] = (moved[i] - residual[i]) / (q[j] - p[j]);
@@ -583,14 +600,16 @@ static sklyanin_gyrostat_status sklyanin_gyrostat_attempt(sklyanin_gyrostat_solv
             norm = fabs(p[i]) > norm ? fabs(p[i]) : norm;
         }
         size /= norm;
-        /* The second test: residuals no longer shrink, the solve has reached the level of rounding. */
-        if (size <= 4e-16 || (previous < 1e-12 && size > 0.25 * previous)) {
+        const int stalled = previous < sklyanin_gyrostat_NEARLY_SOLVED && size > sklyanin_gyrostat_SHRINKING
+            * previous;
+        if (size <= sklyanin_gyrostat_SOLVED || stalled) {
             if (!sklyanin_gyrostat_plausible(s, change)) return sklyanin_gyrostat_NO_CONVERGENCE;
             if (!sklyanin_gyrostat_advance(s, change, s->carry)) return sklyanin_gyrostat_NOT_FINITE;
             sklyanin_gyrostat_remember(&s->history, y);
             return sklyanin_gyrostat_OK;
         }
-        const int slow = iteration >= 3 && size > 0.05 * previous;
+        const int slow = iteration >= sklyanin_gyrostat_PATIENCE && size > sklyanin_gyrostat_CONTRACTING
+            * previous;
         if (slow && !sklyanin_gyrostat_differences(s, coef, p, residual, jacobian, &made))
             return sklyanin_gyrostat_NO_CONVERGENCE;
         if (!sklyanin_gyrostat_solve(jacobian, residual)) return sklyanin_gyrostat_SINGULAR;

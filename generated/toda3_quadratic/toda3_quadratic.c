@@ -20,7 +20,7 @@
  *   5. The implicit step, along paths dm/dt = pi(m) p
  *   6. The solver
  *   7. Ensembles
- * body-sha256: 29a6787a73cfce6c640ecb709c4bd8fde2ffa10497208fb0d0490dabc7bee3b3
+ * body-sha256: d44955b43dedac71ae5ea3f22c8d296291121b91d95cbb3f8aa4bf14ddd0e9c7
  */
 #include "toda3_quadratic.h"
 
@@ -563,8 +563,24 @@ static void toda3_quadratic_path_field(const double *coef, const double p[5], co
 enum {
     toda3_quadratic_LONGEST_PATH = 128, /* pieces of a path, a power of 2 */
     /* of all paths that are tried in a solve: steps that need more are wrong by as much as the state */
-    toda3_quadratic_MOST_PIECES = 512
+    toda3_quadratic_MOST_PIECES = 512,
+    /* iterations with the approximate Jacobian, before it is asked whether it contracts */
+    toda3_quadratic_PATIENCE = 3
 };
+
+/* terms that rounding hides in their sum, in sizes of the path */
+#define toda3_quadratic_NEGLIGIBLE 1e-17
+/* coordinates are measured no finer than by this part of all together */
+#define toda3_quadratic_LEAST_SHARE 1e-5
+/* rounding of the slope of a path, in sizes of the path and its slope */
+#define toda3_quadratic_ROUNDED_SLOPE 2e-15
+/* of arguments in a quotient, in sizes of p: about the root of rounding */
+#define toda3_quadratic_DIFFERENCE 1e-7
+#define toda3_quadratic_SOLVED 4e-16        /* a residual, in sizes of p, that is rounding; */
+#define toda3_quadratic_NEARLY_SOLVED 1e-12 /* one below this is so too if it is ... */
+#define toda3_quadratic_SHRINKING 0.25      /* ... more than this part of the one before */
+/* part of the residual that an iteration with a useful Jacobian leaves at most */
+#define toda3_quadratic_CONTRACTING 0.05
 
 /* Whether dm/dt = pi(m) p holds at a point m, where the expansion has the given slope: one with gaps between
    its terms, like t + t^9, or across the kink of an absolute value, only looks as if it had converged. */
@@ -575,7 +591,7 @@ static int toda3_quadratic_holds(const double *coef, const double p[toda3_quadra
     toda3_quadratic_path_field(coef, p, m, field);
     for (int i = 0; i < toda3_quadratic_DIM; ++i) scale += fabs(m[i]) + fabs(slope[i]);
     for (int i = 0; i < toda3_quadratic_DIM; ++i)
-        if (!(fabs(field[i] - slope[i]) <= 2e-15 * scale)) return 0;
+        if (!(fabs(field[i] - slope[i]) <= toda3_quadratic_ROUNDED_SLOPE * scale)) return 0;
     return 1;
 }
 
@@ -603,7 +619,8 @@ static int toda3_quadratic_piece(const double *coef, const double p[toda3_quadra
             mean[i] += term / (k + 2);
             slope[i] += (k + 1) * term;
             end[i] = start[i] + change[i];
-            if (!(fabs(term) <= 1e-17 * (fabs(start[i]) + fabs(change[i]) + 1e-5 * norm))) negligible = 0;
+            const double measure = fabs(start[i]) + fabs(change[i]) + toda3_quadratic_LEAST_SHARE * norm;
+            if (!(fabs(term) <= toda3_quadratic_NEGLIGIBLE * measure)) negligible = 0;
         }
         small = negligible ? small + 1 : 0;
         if (small >= 2 && toda3_quadratic_holds(coef, p, end, slope)) return 1;
@@ -665,7 +682,7 @@ static int toda3_quadratic_differences(toda3_quadratic_solver *s, const double *
     for (int i = 0; i < toda3_quadratic_DIM; ++i) norm = fabs(p[i]) > norm ? fabs(p[i]) : norm;
     for (int j = 0; j < toda3_quadratic_DIM; ++j) {
         memcpy(q, p, sizeof q);
-        q[j] += 1e-7 * norm;
+        q[j] += toda3_quadratic_DIFFERENCE * norm;
         if (!toda3_quadratic_residual(s, coef, q, y, moved, change, unused, made)) return 0;
         for (int i = 0; i < toda3_quadratic_DIM; ++i)
             jacobian[i * toda3_quadratic_DIM + j] = (moved[i] - residual[i]) / (q[j] - p[j]);
@@ -694,14 +711,16 @@ static toda3_quadratic_status toda3_quadratic_attempt(toda3_quadratic_solver *s)
             norm = fabs(p[i]) > norm ? fabs(p[i]) : norm;
         }
         size /= norm;
-        /* The second test: residuals no longer shrink, the solve has reached the level of rounding. */
-        if (size <= 4e-16 || (previous < 1e-12 && size > 0.25 * previous)) {
+        const int stalled = previous < toda3_quadratic_NEARLY_SOLVED && size > toda3_quadratic_SHRINKING
+            * previous;
+        if (size <= toda3_quadratic_SOLVED || stalled) {
             if (!toda3_quadratic_plausible(s, change)) return toda3_quadratic_NO_CONVERGENCE;
             if (!toda3_quadratic_advance(s, change, s->carry)) return toda3_quadratic_NOT_FINITE;
             toda3_quadratic_remember(&s->history, y, iteration);
             return toda3_quadratic_OK;
         }
-        const int slow = iteration >= 3 && size > 0.05 * previous;
+        const int slow = iteration >= toda3_quadratic_PATIENCE && size > toda3_quadratic_CONTRACTING
+            * previous;
         if (slow && !toda3_quadratic_differences(s, coef, p, residual, jacobian, &made))
             return toda3_quadratic_NO_CONVERGENCE;
         if (!toda3_quadratic_solve(jacobian, residual)) return toda3_quadratic_SINGULAR;

@@ -13,6 +13,7 @@ enum {
     PHI_DEGREE = 6, /* S_3 is cubic in H, so the square of the error is of degree six in each multiple */
     PHI_SWEEPS = 4 /* most rounds over the multiples */
 };
+#define PHI_CLOSE_CALL 1e-12 /* errors, in sizes of all on a line, that are as good: rounding does not decide */
 
 /* A short piece of the trajectory from x, by a Runge-Kutta method with steps of a fixed change. */
 static void phi_sample(const phi_params *params, const double x[PHI_DIM], double samples[][PHI_DIM])
@@ -72,7 +73,7 @@ static double phi_least_on_line(const phi_params *params, const double gauge[PHI
         const double centre = best;
         for (int j = -reach; j <= reach; ++j) {
             const double t = centre + j * mesh, error = phi_on_line(difference, t);
-            if (!(error < least - 1e-12 * size)) continue; /* close calls are not decided by rounding */
+            if (!(error < least - PHI_CLOSE_CALL * size)) continue;
             least = error;
             best = t;
         }

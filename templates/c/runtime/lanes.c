@@ -34,17 +34,21 @@ typedef double phi_lanes[PHI_LANES];
 #define PHI_EACH_LANE
 #endif
 
-#if PHI_CALLS_EXP
-/* exp(u) for the loops over lanes: u = k log 2 + r, no branches. No number beyond |u| = 700.0. */
-static inline double phi_exp_lane(double u)
+#if PHI_CALLS_EXP || PHI_CALLS_EXPM1 || PHI_CALLS_SIN || PHI_CALLS_COS
+#define PHI_ROUNDER 6755399441055744.0 /* 1.5 2^52: a number added to it and taken off again is rounded to an integer */
+
+#endif
+#if PHI_CALLS_EXP || PHI_CALLS_EXPM1
+/* exp(u) - 2^k, and 2^k, where u = k log 2 + r: no branches. */
+static inline double phi_exp_parts(double u, double *power)
 {
-    const double shifted = u * 1.4426950408889634 + 6755399441055744.0, k = shifted - 6755399441055744.0;
+    const double shifted = u * 1.4426950408889634 + PHI_ROUNDER, k = shifted - PHI_ROUNDER;
     const double r = (u - k * 0.6931471803691238) - k * 1.9082149292705877e-10, rr = r * r;
     uint64_t bits; /* the last bits of shifted are k */
-    double power, sum = 1.1470745597729725e-11, other = 1.6059043836821613e-10;
+    double sum = 1.1470745597729725e-11, other = 1.6059043836821613e-10;
     memcpy(&bits, &shifted, sizeof bits);
     bits = (bits + 1023) << 52;
-    memcpy(&power, &bits, sizeof power);
+    memcpy(power, &bits, sizeof *power);
     sum = sum * rr + 2.08767569878681e-09;
     other = other * rr + 2.505210838544172e-08;
     sum = sum * rr + 2.755731922398589e-07;
@@ -57,34 +61,27 @@ static inline double phi_exp_lane(double u)
     other = other * rr + 0.16666666666666666;
     sum = (sum * r + other) * r + 0.5;
     sum = sum * rr + r;
-    return power * sum + power + (fabs(u) <= 700.0 ? 0.0 : (double)NAN);
+    return *power * sum;
+}
+
+#endif
+#if PHI_CALLS_EXP
+/* exp(u) for the loops over lanes. No number beyond |u| = 700. */
+static inline double phi_exp_lane(double u)
+{
+    double power;
+    const double rest = phi_exp_parts(u, &power);
+    return rest + power + (fabs(u) <= 700.0 ? 0.0 : (double)NAN);
 }
 
 #endif
 #if PHI_CALLS_EXPM1
-/* exp(u) - 1 for the loops over lanes: u = k log 2 + r, no branches. No number beyond |u| = 700.0. */
+/* exp(u) - 1 for the loops over lanes. No number beyond |u| = 700. */
 static inline double phi_expm1_lane(double u)
 {
-    const double shifted = u * 1.4426950408889634 + 6755399441055744.0, k = shifted - 6755399441055744.0;
-    const double r = (u - k * 0.6931471803691238) - k * 1.9082149292705877e-10, rr = r * r;
-    uint64_t bits; /* the last bits of shifted are k */
-    double power, sum = 1.1470745597729725e-11, other = 1.6059043836821613e-10;
-    memcpy(&bits, &shifted, sizeof bits);
-    bits = (bits + 1023) << 52;
-    memcpy(&power, &bits, sizeof power);
-    sum = sum * rr + 2.08767569878681e-09;
-    other = other * rr + 2.505210838544172e-08;
-    sum = sum * rr + 2.755731922398589e-07;
-    other = other * rr + 2.7557319223985893e-06;
-    sum = sum * rr + 2.48015873015873e-05;
-    other = other * rr + 0.0001984126984126984;
-    sum = sum * rr + 0.001388888888888889;
-    other = other * rr + 0.008333333333333333;
-    sum = sum * rr + 0.041666666666666664;
-    other = other * rr + 0.16666666666666666;
-    sum = (sum * r + other) * r + 0.5;
-    sum = sum * rr + r;
-    return power * sum + (power - 1.0) + (fabs(u) <= 700.0 ? 0.0 : (double)NAN);
+    double power;
+    const double rest = phi_exp_parts(u, &power);
+    return rest + (power - 1.0) + (fabs(u) <= 700.0 ? 0.0 : (double)NAN);
 }
 
 #endif
@@ -119,14 +116,15 @@ static inline double phi_log_lane(double u)
 }
 
 #endif
-#if PHI_CALLS_SIN
-/* sin u for the loops over lanes: u = k pi + r with |r| <= pi/2, no branches. No number beyond |u| = 1000000.0. */
-static inline double phi_sin_lane(double u)
+#if PHI_CALLS_SIN || PHI_CALLS_COS
+/* sin(u + offset pi) for offset 0 or 0.5: u = (k - offset) pi + r with |r| <= pi/2, no branches. No number beyond
+   |u| = 10^6. */
+static inline double phi_turned_sin(double u, double offset)
 {
-    const double shifted = (u * 0.3183098861837907 + 0.0) + 6755399441055744.0;
-    const double k = (shifted - 6755399441055744.0) - 0.0;
-    const double r = ((u - k * 3.141592651605606) - k * 1.9841871479187034e-09) - k * 1.1442377452219664e-17, q = r * r, qq = q * q;
-    uint64_t parity, bits; /* the last bit of shifted is the parity of k + 0.0 */
+    const double shifted = (u * 0.3183098861837907 + offset) + PHI_ROUNDER, k = (shifted - PHI_ROUNDER) - offset;
+    const double near = (u - k * 3.141592651605606) - k * 1.9841871479187034e-09;
+    const double r = near - k * 1.1442377452219664e-17, q = r * r, qq = q * q;
+    uint64_t parity, bits; /* the last bit of shifted is the parity of k + offset */
     double value, sum = -3.868170170630684e-23, other = 1.9572941063391263e-20;
     sum = sum * qq + -8.22063524662433e-18;
     other = other * qq + 2.8114572543455206e-15;
@@ -142,34 +140,17 @@ static inline double phi_sin_lane(double u)
     memcpy(&bits, &value, sizeof bits);
     bits ^= parity << 63;
     memcpy(&value, &bits, sizeof bits);
-    return value + (fabs(u) <= 1000000.0 ? 0.0 : (double)NAN);
+    return value + (fabs(u) <= 1e6 ? 0.0 : (double)NAN);
 }
 
 #endif
+#if PHI_CALLS_SIN
+/* sin u for the loops over lanes. */
+static inline double phi_sin_lane(double u) { return phi_turned_sin(u, 0.0); }
+
+#endif
 #if PHI_CALLS_COS
-/* cos u for the loops over lanes: u = k pi + r with |r| <= pi/2, no branches. No number beyond |u| = 1000000.0. */
-static inline double phi_cos_lane(double u)
-{
-    const double shifted = (u * 0.3183098861837907 + 0.5) + 6755399441055744.0;
-    const double k = (shifted - 6755399441055744.0) - 0.5;
-    const double r = ((u - k * 3.141592651605606) - k * 1.9841871479187034e-09) - k * 1.1442377452219664e-17, q = r * r, qq = q * q;
-    uint64_t parity, bits; /* the last bit of shifted is the parity of k + 0.5 */
-    double value, sum = -3.868170170630684e-23, other = 1.9572941063391263e-20;
-    sum = sum * qq + -8.22063524662433e-18;
-    other = other * qq + 2.8114572543455206e-15;
-    sum = sum * qq + -7.647163731819816e-13;
-    other = other * qq + 1.6059043836821613e-10;
-    sum = sum * qq + -2.505210838544172e-08;
-    other = other * qq + 2.7557319223985893e-06;
-    sum = sum * qq + -0.0001984126984126984;
-    other = other * qq + 0.008333333333333333;
-    sum = (sum * q + other) * q + -0.16666666666666666;
-    value = r + r * q * sum;
-    memcpy(&parity, &shifted, sizeof parity);
-    memcpy(&bits, &value, sizeof bits);
-    bits ^= parity << 63;
-    memcpy(&value, &bits, sizeof bits);
-    return value + (fabs(u) <= 1000000.0 ? 0.0 : (double)NAN);
-}
+/* cos u for the loops over lanes. */
+static inline double phi_cos_lane(double u) { return phi_turned_sin(u, 0.5); }
 #endif
 #endif

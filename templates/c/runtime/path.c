@@ -13,8 +13,18 @@
 /* ---- The implicit step, along paths dm/dt = pi(m) p ---- */
 enum {
     PHI_LONGEST_PATH = 128, /* pieces of a path, a power of 2 */
-    PHI_MOST_PIECES = 512   /* of all paths that are tried in a solve: steps that need more are wrong by as much as the state */
+    PHI_MOST_PIECES = 512,  /* of all paths that are tried in a solve: steps that need more are wrong by as much as the state */
+    PHI_PATIENCE = 3        /* iterations with the approximate Jacobian, before it is asked whether it contracts */
 };
+
+#define PHI_NEGLIGIBLE 1e-17      /* terms that rounding hides in their sum, in sizes of the path */
+#define PHI_LEAST_SHARE 1e-5      /* coordinates are measured no finer than by this part of all together */
+#define PHI_ROUNDED_SLOPE 2e-15   /* rounding of the slope of a path, in sizes of the path and its slope */
+#define PHI_DIFFERENCE 1e-7       /* of arguments in a quotient, in sizes of p: about the root of rounding */
+#define PHI_SOLVED 4e-16          /* a residual, in sizes of p, that is rounding; */
+#define PHI_NEARLY_SOLVED 1e-12   /* one below this is so too if it is ... */
+#define PHI_SHRINKING 0.25        /* ... more than this part of the one before */
+#define PHI_CONTRACTING 0.05      /* part of the residual that an iteration with a useful Jacobian leaves at most */
 
 /* Whether dm/dt = pi(m) p holds at a point m, where the expansion has the given slope: one with gaps between its terms,
    like t + t^9, or across the kink of an absolute value, only looks as if it had converged. */
@@ -25,7 +35,7 @@ static int phi_holds(const double *coef, const double p[PHI_DIM], const double m
     phi_path_field(coef, p, m, field);
     for (int i = 0; i < PHI_DIM; ++i) scale += fabs(m[i]) + fabs(slope[i]);
     for (int i = 0; i < PHI_DIM; ++i)
-        if (!(fabs(field[i] - slope[i]) <= 2e-15 * scale)) return 0;
+        if (!(fabs(field[i] - slope[i]) <= PHI_ROUNDED_SLOPE * scale)) return 0;
     return 1;
 }
 
@@ -51,7 +61,8 @@ static int phi_piece(const double *coef, const double p[PHI_DIM], const double s
             mean[i] += term / (k + 2);
             slope[i] += (k + 1) * term;
             end[i] = start[i] + change[i];
-            if (!(fabs(term) <= 1e-17 * (fabs(start[i]) + fabs(change[i]) + 1e-5 * norm))) negligible = 0;
+            const double measure = fabs(start[i]) + fabs(change[i]) + PHI_LEAST_SHARE * norm;
+            if (!(fabs(term) <= PHI_NEGLIGIBLE * measure)) negligible = 0;
         }
         small = negligible ? small + 1 : 0;
         if (small >= 2 && phi_holds(coef, p, end, slope)) return 1;
@@ -107,7 +118,7 @@ static int phi_differences(phi_solver *s, const double *coef, const double p[PHI
     for (int i = 0; i < PHI_DIM; ++i) norm = fabs(p[i]) > norm ? fabs(p[i]) : norm;
     for (int j = 0; j < PHI_DIM; ++j) {
         memcpy(q, p, sizeof q);
-        q[j] += 1e-7 * norm;
+        q[j] += PHI_DIFFERENCE * norm;
         if (!phi_residual(s, coef, q, y, moved, change, unused, made)) return 0;
         for (int i = 0; i < PHI_DIM; ++i) jacobian[i * PHI_DIM + j] = (moved[i] - residual[i]) / (q[j] - p[j]);
     }
@@ -131,8 +142,8 @@ static phi_status phi_attempt(phi_solver *s, int stage)
             norm = fabs(p[i]) > norm ? fabs(p[i]) : norm;
         }
         size /= norm;
-        /* The second test: residuals no longer shrink, the solve has reached the level of rounding. */
-        if (size <= 4e-16 || (previous < 1e-12 && size > 0.25 * previous)) {
+        const int stalled = previous < PHI_NEARLY_SOLVED && size > PHI_SHRINKING * previous;
+        if (size <= PHI_SOLVED || stalled) {
             if (!phi_plausible(s, stage, change)) return PHI_NO_CONVERGENCE;
             if (!phi_advance(s, change, s->carry)) return PHI_NOT_FINITE;
 #if PHI_RECURRENCES
@@ -142,7 +153,7 @@ static phi_status phi_attempt(phi_solver *s, int stage)
 #endif
             return PHI_OK;
         }
-        const int slow = iteration >= 3 && size > 0.05 * previous;
+        const int slow = iteration >= PHI_PATIENCE && size > PHI_CONTRACTING * previous;
         if (slow && !phi_differences(s, coef, p, residual, jacobian, &made)) return PHI_NO_CONVERGENCE;
         if (!phi_solve(jacobian, residual)) return PHI_SINGULAR;
         for (int i = 0; i < PHI_DIM; ++i) p[i] -= residual[i];

@@ -8,12 +8,18 @@
 #include "model.h"
 #include "model_lanes.h"
 #include "newton_lanes.c"
+#include "path.c"
 
 /* ---- Paths in lanes ---- */
-enum { PHI_TERMS_OF_LANES = 16 }; /* most of the expansion of a path from its middle */
+enum {
+    PHI_TERMS_OF_LANES = 16, /* most of the expansion of a path from its middle */
+    PHI_ROUNDS = 12          /* of the iteration for the middle, which gains some digits in each */
+};
 
-/* Accuracy of the derivatives of paths. */
-#define PHI_SLOPE_ACCURACY 1e-7
+#define PHI_SLOPE_ACCURACY 1e-7  /* of the derivatives of paths */
+#define PHI_SETTLED 1e-9         /* accuracy of middles: what is left, the passes mend */
+#define PHI_GAIN_OF_ROUND 1e-4   /* what a round leaves of the error at best: so long an expansion it gets */
+#define PHI_GUESS_ACCURACY 1e-6  /* of expansions for guesses, which are no better */
 
 /* The paths of all lanes as Taylor series about their middle, with half of p: they take the time from -1 to 1, and need
    fewer terms than from their start. s[i][k] is coefficient k of series i, the coordinates first; slope goes on with the
@@ -70,7 +76,7 @@ static void phi_begin(phi_lanes coef[restrict], phi_expansion *e, phi_lanes m[re
     }
     for (int i = 0; i < PHI_DIM; ++i) {
         PHI_EACH_LANE
-        for (int lane = 0; lane < PHI_LANES; ++lane) e->unit[i][lane] = 1.0 / (e->unit[i][lane] + 1e-5 * norm[lane]);
+        for (int lane = 0; lane < PHI_LANES; ++lane) e->unit[i][lane] = 1.0 / (e->unit[i][lane] + PHI_LEAST_SHARE * norm[lane]);
     }
 }
 
@@ -119,7 +125,7 @@ static void phi_check_end(phi_lanes coef[restrict], phi_expansion *e, phi_lanes 
         PHI_EACH_LANE
         for (int lane = 0; lane < PHI_LANES; ++lane) {
             const double off = fabs(value[phi_path_slopes[i]][lane] - slope[i][lane]);
-            wrong[lane] += off <= 2e-15 * scale[lane] ? 0.0 : HUGE_VAL;
+            wrong[lane] += off <= PHI_ROUNDED_SLOPE * scale[lane] ? 0.0 : HUGE_VAL;
         }
     }
 }
@@ -167,13 +173,13 @@ static void phi_settle(phi_lanes coef[restrict], phi_model *model, phi_expansion
     phi_lanes size, norm;
     double left = 1.0;
     memset(model->middle, 0, sizeof model->middle);
-    for (int round = 0; left > 1e-9 && round < 12; ++round) {
+    for (int round = 0; left > PHI_SETTLED && round < PHI_ROUNDS; ++round) {
         for (int i = 0; i < PHI_DIM && round > 0; ++i) {
             PHI_EACH_LANE
             for (int lane = 0; lane < PHI_LANES; ++lane) model->middle[i][lane] = -e->mean[i][lane];
         }
         phi_begin_at(coef, model, e);
-        phi_extend(coef, e, 1e-4 * left);
+        phi_extend(coef, e, PHI_GAIN_OF_ROUND * left);
         memset(size, 0, sizeof size);
         memset(norm, 0, sizeof norm);
         for (int i = 0; i < PHI_DIM; ++i) {
@@ -188,8 +194,8 @@ static void phi_settle(phi_lanes coef[restrict], phi_model *model, phi_expansion
         left = phi_largest_finite(size);
         if (left > 1.0) left = 1.0;
     }
-    for (int lane = 0; lane < PHI_LANES && left > 1e-9; ++lane)
-        if (size[lane] > 1e-9) model->middle[0][lane] = HUGE_VAL;
+    for (int lane = 0; lane < PHI_LANES && left > PHI_SETTLED; ++lane)
+        if (size[lane] > PHI_SETTLED) model->middle[0][lane] = HUGE_VAL;
 }
 
 /* Half of p: paths take the time from -1 to 1. */
@@ -209,7 +215,7 @@ static void phi_evaluate_lanes(phi_lanes coef[restrict], phi_lanes y[restrict PH
     phi_momentum_lanes(coef, y, e.p);
     phi_halve(e.p);
     phi_begin(coef, &e, y);
-    phi_extend(coef, &e, 1e-6);
+    phi_extend(coef, &e, PHI_GUESS_ACCURACY);
     for (int i = 0; i < PHI_DIM; ++i) {
         PHI_EACH_LANE
         for (int lane = 0; lane < PHI_LANES; ++lane) {
@@ -315,7 +321,7 @@ static void phi_linearise_paths(phi_lanes coef[restrict], phi_model *model, phi_
     for (int i = 0; i < 2 * PHI_DIM; ++i) {
         PHI_EACH_LANE
         for (int lane = 0; lane < PHI_LANES; ++lane)
-            model->inverse[i % PHI_DIM][lane] += fabs(reciprocal[i][lane]) < 1e3 ? 0.0 : HUGE_VAL;
+            model->inverse[i % PHI_DIM][lane] += fabs(reciprocal[i][lane]) < PHI_LARGEST_RECIPROCAL ? 0.0 : HUGE_VAL;
     }
 }
 
@@ -329,7 +335,7 @@ static void phi_update(phi_lanes coef[restrict], phi_model *model, int matrices)
     phi_halve(e.p);
     if (matrices) phi_settle(coef, model, &e);
     else phi_begin_at(coef, model, &e);
-    phi_extend(coef, &e, 1e-17);
+    phi_extend(coef, &e, PHI_NEGLIGIBLE);
     phi_check_ends(coef, &e, wrong);
     if (matrices) phi_linearise_paths(coef, model, &e, hessian);
     phi_read_ends(model, &e, wrong);

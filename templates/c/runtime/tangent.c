@@ -15,6 +15,17 @@
 #include "tangent_flows.h"
 #endif
 
+#if PHI_IMPLICIT
+#define PHI_TANGENT_SOLVED 1e-15        /* a correction of this size is rounding; */
+#define PHI_TANGENT_NEARLY_SOLVED 1e-10 /* one below this is so too if it is ... */
+#define PHI_TANGENT_SHRINKING 0.25      /* ... more than this part of the one before */
+
+#endif
+#if PHI_PATH
+#define PHI_TANGENT_NEGLIGIBLE 1e-18    /* terms that rounding hides in their sum, in sizes of start and sum */
+#define PHI_TANGENT_ROUNDED_SLOPE 1e-13 /* rounding of slopes, in sizes of the path and its slope: variations add some */
+
+#endif
 /* The product of two matrices, into a third. */
 static void phi_tangent_product(const double a[PHI_DIM * PHI_DIM], const double b[PHI_DIM * PHI_DIM], double product[PHI_DIM * PHI_DIM])
 {
@@ -27,6 +38,13 @@ static void phi_tangent_product(const double a[PHI_DIM * PHI_DIM], const double 
 }
 
 #if PHI_IMPLICIT
+/* Whether a solve has reached the level of rounding, by its last two corrections. */
+static int phi_tangent_solved(double size, double previous)
+{
+    const int stalled = size < PHI_TANGENT_NEARLY_SOLVED && size > PHI_TANGENT_SHRINKING * previous;
+    return size <= PHI_TANGENT_SOLVED || stalled;
+}
+
 /* Solve matrix * solution = sides for all columns of sides, which are overwritten. 0 if singular. */
 static int phi_tangent_solve(const double matrix[PHI_DIM * PHI_DIM], double sides[PHI_DIM * PHI_DIM])
 {
@@ -70,7 +88,7 @@ static phi_status phi_tangent_stage(const double *coef, const double x[PHI_DIM],
         if (!phi_solve(matrix, side)) return PHI_SINGULAR;
         const double size = phi_size(y, side);
         if (!isfinite(size)) return PHI_NOT_FINITE;
-        if (size <= 1e-15 || (size < 1e-10 && size > 0.25 * previous)) break;
+        if (phi_tangent_solved(size, previous)) break;
         if (iteration == PHI_MAX_ITERATIONS) return PHI_NO_CONVERGENCE;
         for (int i = 0; i < PHI_DIM; ++i) y[i] -= side[i];
         previous = size;
@@ -92,7 +110,7 @@ static int phi_tangent_holds(const double *coef, const double p[2 * PHI_DIM], co
     phi_tangent_field(coef, p, m, field);
     for (int i = 0; i < 2 * PHI_DIM; ++i) scale[i / PHI_DIM] += fabs(m[i]) + fabs(slope[i]);
     for (int i = 0; i < 2 * PHI_DIM; ++i)
-        if (!(fabs(field[i] - slope[i]) <= 1e-13 * scale[i / PHI_DIM])) return 0;
+        if (!(fabs(field[i] - slope[i]) <= PHI_TANGENT_ROUNDED_SLOPE * scale[i / PHI_DIM])) return 0;
     return 1;
 }
 
@@ -118,7 +136,7 @@ static int phi_tangent_piece(const double *coef, const double p[2 * PHI_DIM], co
             mean[i] += term / (k + 2);
             slope[i] += (k + 1) * term;
             end[i] = start[i] + change[i];
-            if (!(fabs(term) <= 1e-18 * (norm[i / PHI_DIM] + fabs(change[i])))) negligible = 0;
+            if (!(fabs(term) <= PHI_TANGENT_NEGLIGIBLE * (norm[i / PHI_DIM] + fabs(change[i])))) negligible = 0;
         }
         small = negligible ? small + 1 : 0;
         if (small >= 2 && phi_tangent_holds(coef, p, end, slope)) return 1;
@@ -185,7 +203,7 @@ static phi_status phi_tangent_stage(const double *coef, const double x[PHI_DIM],
         }
         size /= norm;
         if (!isfinite(size)) return PHI_NOT_FINITE;
-        if (size <= 1e-15 || (size < 1e-10 && size > 0.25 * previous)) break;
+        if (phi_tangent_solved(size, previous)) break;
         if (iteration == PHI_MAX_ITERATIONS) return PHI_NO_CONVERGENCE;
         for (int i = 0; i < PHI_DIM; ++i) p[i] -= side[i];
         previous = size;
