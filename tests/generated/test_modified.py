@@ -2,6 +2,7 @@
 
 import ctypes
 import math
+import warnings
 
 import numpy as np
 import pytest
@@ -51,6 +52,13 @@ def test_targets_agree(name):
     found = raw.call("modified_hamiltonian", ctypes.c_double, None, *middle, ctypes.c_double(0.1), place)
     assert found == pytest.approx(float(module.modified_hamiltonian(x[:n], 0.1)), rel=1e-14)
     assert found != pytest.approx(float(module.hamiltonian(x[:n])), rel=1e-6)
+
+
+def test_numpy_is_as_silent_where_it_overflows_as_the_other_functions():
+    module = solver(compile_with(SYSTEMS["plain"], 2), "numpy").backend.module
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert not np.isfinite(module.modified_hamiltonian(np.full(module.DIM, 1e200), 0.1))
 
 
 def test_only_on_request():
