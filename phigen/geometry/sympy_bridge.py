@@ -8,12 +8,11 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any
+from typing import Any, Protocol
 
 import sympy
 
 from phigen.errors import Diagnostic, LimitError, SpecError
-from phigen.geometry.system import System, build_system
 from phigen.spec import limits
 from phigen.spec.model import MatrixForm, Parameter
 from phigen.symbolic.arithmetic import Arithmetic
@@ -166,7 +165,26 @@ class SympySystem:
     invariants: Mapping[str, Any]
 
 
-def symbols_in_sympy(system: System) -> dict[str, Any]:
+class Described(Protocol):
+    """What a `System` says of itself, as far as it has a counterpart in sympy."""
+
+    @property
+    def name(self) -> str: ...
+    @property
+    def coordinates(self) -> tuple[str, ...]: ...
+    @property
+    def parameters(self) -> tuple[Parameter, ...]: ...
+    @property
+    def poisson(self) -> tuple[tuple[Expression, ...], ...]: ...
+    @property
+    def hamiltonian(self) -> Expression: ...
+    @property
+    def casimirs(self) -> Mapping[str, Expression]: ...
+    @property
+    def invariants(self) -> Mapping[str, Expression]: ...
+
+
+def symbols_in_sympy(system: Described) -> dict[str, Any]:
     """The symbols of the coordinates and the parameters, by name."""
     real = {c: sympy.Symbol(c, real=True) for c in system.coordinates}
     given = {p.name: sympy.Symbol(p.name, **_assumed(p)) for p in system.parameters}
@@ -189,7 +207,7 @@ def free_symbols(names: Iterable[str], taken: Iterable[str]) -> list[Any]:
     return result
 
 
-def given_back(system: System) -> SympySystem:
+def given_back(system: Described) -> SympySystem:
     """See `System.to_sympy`."""
     symbols = symbols_in_sympy(system)
 
@@ -207,16 +225,15 @@ def given_back(system: System) -> SympySystem:
     )
 
 
-def system(
+def parts(
     coordinates: Sequence[Any],
     poisson: Any,
     hamiltonian: Any,
     parameters: Mapping[Any, Any] | None,
     casimirs: Mapping[str, Any] | None,
     invariants: Mapping[str, Any] | None,
-    name: str,
-) -> System:
-    """See `System.from_sympy`."""
+) -> dict[str, Any]:
+    """What a system from sympy is built of, by the names of `build_system`; see `System.from_sympy`."""
     names = tuple(_name(c) for c in coordinates)
     matrix = sympy.Matrix(poisson)
     rows = tuple(tuple(expression(matrix[i, j]) for j in range(matrix.cols)) for i in range(matrix.rows))
@@ -224,15 +241,14 @@ def system(
     formulas = {key: expression(e) for key, e in {**(casimirs or {}), **(invariants or {})}.items()}
     energy = expression(hamiltonian)
     _expect_known(names, given, [*(e for row in rows for e in row), energy, *formulas.values()])
-    return build_system(
-        name,
-        names,
-        given,
-        MatrixForm(rows),
-        energy,
-        casimirs={key: formulas[key] for key in casimirs or {}},
-        invariants={key: formulas[key] for key in invariants or {}},
-    )
+    return {
+        "coordinates": names,
+        "parameters": given,
+        "form": MatrixForm(rows),
+        "hamiltonian": energy,
+        "casimirs": {key: formulas[key] for key in casimirs or {}},
+        "invariants": {key: formulas[key] for key in invariants or {}},
+    }
 
 
 def _name(given: Any) -> str:

@@ -107,9 +107,9 @@ class System:
         maps symbols (or names) to default values; a symbol declared positive makes a positive parameter.
         Raises `SpecError` for a matrix of the wrong size, unknown symbols and functions.
         """
-        from phigen.geometry.sympy_bridge import system as build
+        from phigen.geometry.sympy_bridge import parts
 
-        return build(coordinates, poisson, hamiltonian, parameters, casimirs, invariants, name)
+        return build_system(name, **parts(coordinates, poisson, hamiltonian, parameters, casimirs, invariants))
 
     def to_sympy(self) -> SympySystem:
         """Coordinates, π, H, parameters, Casimirs and invariants as sympy objects; see `SympySystem`."""
