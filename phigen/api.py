@@ -162,9 +162,10 @@ def chosen_target(target: str, tell: Callable[[str], None] = lambda message: Non
     try:
         toolchain.find()
     except toolchain.NoCompilerError as error:
-        tell(f"using NumPy, which is slower: {error}")
-        return "numpy"
-    return "c"
+        target = registry.automatic(compiler=False)
+        tell(f"using {registry.TARGETS[target].title}, which is slower: {error}")
+        return target
+    return registry.automatic(compiler=True)
 
 
 def _spec_of(system: System) -> Spec:

@@ -80,6 +80,11 @@ def find(name: str) -> Target:
     return TARGETS[name]
 
 
+def automatic(*, compiler: bool) -> str:
+    """The target that is taken where none is named: the first that Python can run with what there is."""
+    return next(name for name in LOADABLE if compiler or not TARGETS[name].compiled)
+
+
 def suffixes(targets: Iterable[str] = TARGETS) -> list[str]:
     """The suffixes of the files of these targets, of all by default."""
     return [suffix for target in targets for suffix in TARGETS[target].suffixes]

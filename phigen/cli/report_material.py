@@ -124,9 +124,10 @@ def _with_constancy(material: Material, experiment: Experiment) -> Material:
 
 
 def _verified(compilation: Compilation, experiment: Experiment, quick: bool, console: Console) -> Verification:
+    from phigen import registry
     from phigen.cli.verify import verified
     from phigen.runtime import toolchain
 
     console.note(f"{compilation.spec.name}: verifying")
-    targets = compilation.spec.targets if toolchain.available() else ("numpy",)
+    targets = compilation.spec.targets if toolchain.available() else (registry.automatic(compiler=False),)
     return verified(compilation, experiment.run.name, quick, console, targets)
