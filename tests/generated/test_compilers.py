@@ -9,6 +9,7 @@ from support import NAMES, QUICK, WARNINGS, compile_text, compiled, files, libra
 _CPP_FLAGS = "-std=c++11 -Wall -Wextra -Wpedantic -Wconversion -Wshadow -Wold-style-cast -Werror"
 _SANITIZERS = "-std=c99 -O0 -g -fsanitize=address,undefined -fno-sanitize-recover=all -fno-omit-frame-pointer"
 EXERCISE = Path(__file__).with_name("exercise.c")
+GENERATED = Path(__file__).resolve().parents[2] / "generated"
 
 #: What a library may need from outside.
 _LIBM = "exp expm1 fmax log sin cos tan asin acos atan atan2 sinh cosh tanh asinh acosh atanh pow sqrt cbrt fabs sincos"
@@ -42,6 +43,15 @@ def test_header_compiles_as_cpp(name, compiler, sources):
     user = f'#include "{name}.h"\n#include "{name}.h"\nint main() {{ return {name}_solver_size() ? 0 : 1; }}\n'
     write(sources, {"user.cpp": user})
     run([tool(compiler), *_CPP_FLAGS.split(), "-fsyntax-only", "user.cpp"], sources)
+
+
+@pytest.mark.parametrize("compiler", ["gcc", "clang"])
+def test_all_solvers_can_be_one_translation_unit(compiler, tmp_path):
+    """No name of one is a name of another, static ones and macros included."""
+    solvers = sorted(GENERATED.glob("*/*.c"))
+    write(tmp_path, {"all.c": "".join(f'#include "{path}"\n' for path in solvers)})
+    assert len(solvers) > 20
+    run([tool(compiler), "-std=c99", *WARNINGS, "-fsyntax-only", "all.c"], tmp_path)
 
 
 def symbols_in(path):
