@@ -40,7 +40,10 @@ def command(name: str | None, as_json: bool) -> None:
 
 
 def kind_of_structure(spec: Spec) -> str:
-    """The shape of π, recognised from its matrix."""
+    """The shape of π, recognised from its matrix; of a lattice how its sites are related."""
+    if spec.lattice:
+        axes = len(spec.lattice.axes)
+        return f"lattice, {axes}-dimensional" if axes else f"lattice, {spec.lattice.relation}"
     from phigen.geometry.forms import algebra_of_form, poisson_matrix
     from phigen.geometry.shapes import recognise
 

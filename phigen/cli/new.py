@@ -12,20 +12,22 @@ from phigen.writing import write
 
 @click.command("new")
 @click.argument("name")
+@click.option("--lattice", is_flag=True, help="A lattice of like sites, instead of one system.")
 @click.option("-o", "--output", metavar="FILE", help="Where to write it; - is stdout.  [default: NAME.yaml]")
 @verbosity
 @pass_console
-def command(console: Console, name: str, output: str | None) -> None:
+def command(console: Console, name: str, lattice: bool, output: str | None) -> None:
     """Write NAME.yaml, a commented spec to start from.
 
-    It is the free rigid body, ready to run: change it into your system. Existing files are left alone.
+    It is the free rigid body, or a chain of spins, ready to run: change it into your system. Existing files are left
+    alone.
     """
     from phigen import spec
     from phigen.errors import SpecError
 
     stem = name.removesuffix(".yaml")
     try:
-        text = spec.starter(stem)
+        text = spec.starter(stem, lattice=lattice)
     except SpecError as error:  # located in a file that does not exist yet
         (wrong,) = error.diagnostics
         raise click.UsageError(wrong.message + (f"; {wrong.hint}" if wrong.hint else "")) from None

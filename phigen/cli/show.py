@@ -14,6 +14,7 @@ from phigen.cli.sources import CORRECTIONS, ORDER, load_one, one_spec, scheme_op
 
 if TYPE_CHECKING:
     from phigen.compilation import Compilation
+    from phigen.spec.model import Spec
 
 
 @click.command("show")
@@ -56,6 +57,9 @@ def command(
 
         out_document(expanded_text(spec, sizes))
         return
+    if spec.lattice:
+        _show_cell(spec, None if full else SHOWN, as_latex=as_latex, as_json=as_json)
+        return
     compilation = compilation_of(spec, order, scheme=scheme)
     if as_latex:
         from phigen.notation.latex import document
@@ -68,6 +72,20 @@ def command(
         _print(compilation, modified, None if full else SHOWN)
 
 
+def _show_cell(spec: Spec, most: int | None, *, as_latex: bool, as_json: bool) -> None:
+    from phigen.cli.show_lattice import described_cell, print_cell
+    from phigen.lattice.building import cell_from_spec
+    from phigen.notation.lattices import document
+
+    cell = cell_from_spec(spec)
+    if as_latex:
+        out(document(cell))
+    elif as_json:
+        out_json(described_cell(spec, cell))
+    else:
+        print_cell(spec, cell, most)
+
+
 def _print(compilation: Compilation, modified: int, most: int | None) -> None:
     from phigen.notation import flows
 
@@ -76,41 +94,43 @@ def _print(compilation: Compilation, modified: int, most: int | None) -> None:
     out(heading(f"{spec.name}: {spec.title}" if spec.title else spec.name))
     if system.parameters:
         listed = ", ".join(f"{p.name} = {float(p.value):.9g}" + (" > 0" * p.positive) for p in system.parameters)
-        _section("Parameters", [listed])
-    _section(f"Poisson tensor: {system.shape}", _assignments(brackets(compilation)))
-    _section("Hamiltonian", _assignments([("H", readable_one(system.hamiltonian, most))]))
+        section("Parameters", [listed])
+    section(f"Poisson tensor: {system.shape}", assignments(brackets(compilation)))
+    section("Hamiltonian", assignments([("H", readable_one(system.hamiltonian, most))]))
     if system.casimirs:
-        _section("Casimirs", _assignments(_named(system.casimirs, most)))
+        section("Casimirs", assignments(_named(system.casimirs, most)))
     if system.invariants:
-        _section("Invariants", _assignments(_named(system.invariants, most)))
+        section("Invariants", assignments(_named(system.invariants, most)))
     if compilation.splitting:
-        _section(f"Splitting: {flows.method(compilation)}", _assignments(flows.formulas(compilation, most)))
+        section(f"Splitting: {flows.method(compilation)}", assignments(flows.formulas(compilation, most)))
     else:
         _print_series(compilation, most)
     if corrected:
-        _section("Modified Hamiltonian", _assignments(corrected))
-    _section("Generated code", _code(compilation))
+        section("Modified Hamiltonian", assignments(corrected))
+    section("Generated code", _code(compilation))
 
 
 def _print_series(compilation: Compilation, most: int | None) -> None:
     from phigen.notation import generating
 
     why = textwrap.wrap(compilation.chart.explanation, 100)
-    maps = _assignments(_maps(compilation, most))
+    maps = assignments(_maps(compilation, most))
     if any("φ" in line for line in maps):
         maps.append("where φ(s) = (1 − (√s/2) cot(√s/2))/s = 1/12 + s/720 + …")
-    _section(f"Bi-realisation: {compilation.chart.kind}", [*why, *maps])
-    series = [*_gauged(compilation), *_assignments(_series(compilation, most))]
-    _section(f"Generating function: {generating.method(compilation)}", series)
+    section(f"Bi-realisation: {compilation.chart.kind}", [*why, *maps])
+    series = [*_gauged(compilation), *assignments(_series(compilation, most))]
+    section(f"Generating function: {generating.method(compilation)}", series)
 
 
-def _section(title: str, lines: Sequence[str]) -> None:
+def section(title: str, lines: Sequence[str]) -> None:
+    """Indented lines under a heading."""
     out("\n" + heading(title))
     for line in lines:
         out(f"  {line}")
 
 
-def _assignments(pairs: Sequence[tuple[str, str]]) -> list[str]:
+def assignments(pairs: Sequence[tuple[str, str]]) -> list[str]:
+    """Lines ``name = value``, the signs below one another."""
     width = max((_width(name) for name, _ in pairs), default=0)
     return [f"{name}{' ' * (width - _width(name))} = {value}" for name, value in pairs]
 

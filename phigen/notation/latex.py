@@ -38,20 +38,20 @@ def document(compilation: Compilation, modified: int = 0, most: int | None = SHO
     if compilation.splitting:
         blocks += [_flow(compilation, k) for k in range(1, len(compilation.splitting.flows) + 1)]
     else:
-        blocks += [*_maps(compilation), _aligned(_series(compilation, most))]
+        blocks += [*_maps(compilation), aligned(_series(compilation, most))]
     if listed := modified_formulas(compilation, modified, most):
         sums = ["<mi>H</mi>", *(_PLUS + _scaled("H", j) for j, _ in listed), _DOTS]
         tilde = '<mover accent="true"><mi>H</mi><mo>~</mo></mover>'
-        blocks.append(_aligned([(tilde, sums), *((_indexed("H", j), _pieces(f)) for j, f in listed)]))
+        blocks.append(aligned([(tilde, sums), *((_indexed("H", j), _pieces(f)) for j, f in listed)]))
     head = f"% {compilation.spec.name}, order {compilation.order.order}; needs amsmath"
     return "\n".join([head, "\\begingroup\\allowdisplaybreaks", *blocks, "\\endgroup"])
 
 
 def system_blocks(system: System) -> list[str]:
     """Displayed equations for π, H, and the Casimirs and invariants if there are any."""
-    blocks = [_tensor(system), _aligned(_assigned(["H"], [system.hamiltonian]))]
+    blocks = [_tensor(system), aligned(_assigned(["H"], [system.hamiltonian]))]
     if first_integrals := {**system.casimirs, **system.invariants}:
-        blocks.append(_aligned(_assigned(list(first_integrals), list(first_integrals.values()))))
+        blocks.append(aligned(_assigned(list(first_integrals), list(first_integrals.values()))))
     return blocks
 
 
@@ -65,7 +65,7 @@ def _tensor(system: System) -> str:
         return f"\\begin{{equation*}}\n  \\pi = \\begin{{pmatrix}} {body} \\end{{pmatrix}}\n\\end{{equation*}}"
     pairs = [(i, j) for i in range(n) for j in range(i + 1, n) if not system.poisson[i][j].is_zero]
     left = [mathml.bracket(names[i], names[j]) for i, j in pairs]
-    return _aligned(_equations(left, [system.poisson[i][j] for i, j in pairs]))
+    return aligned(_equations(left, [system.poisson[i][j] for i, j in pairs]))
 
 
 def _flow(compilation: Compilation, k: int) -> str:
@@ -74,7 +74,7 @@ def _flow(compilation: Compilation, k: int) -> str:
     moved = flows.images(flow, compilation.system.coordinates)
     pulled = f"<msubsup><mi>Φ</mi><mn>{k}</mn><mi>∗</mi></msubsup>{_TIMES}"
     left = [_indexed("H", k), *(pulled + mathml.name(c) for c in moved)]
-    return _aligned(_equations(left, [flow.hamiltonian, *moved.values()]))
+    return aligned(_equations(left, [flow.hamiltonian, *moved.values()]))
 
 
 def _maps(compilation: Compilation) -> Iterator[str]:
@@ -83,7 +83,7 @@ def _maps(compilation: Compilation) -> Iterator[str]:
     more = [_DOTS] if realisation.path else []
     letters = {"α": realisation.alpha} if realisation.symmetric else {"α": realisation.alpha, "β": realisation.beta}
     for letter, maps in letters.items():
-        block = _aligned(_equations([mathml.indexed(letter, c) for c in names], maps, more))
+        block = aligned(_equations([mathml.indexed(letter, c) for c in names], maps, more))
         yield block
         if "\\varphi" in block and letter == "α":
             yield _align([_PHI])
@@ -130,7 +130,8 @@ def _pieces(formula: Formula) -> list[str]:
     return [*found, f"<mtext>({formula.size} terms)</mtext>"] if formula.hidden else found
 
 
-def _aligned(equations: Sequence[Equation] | Iterator[Equation]) -> str:
+def aligned(equations: Sequence[Equation] | Iterator[Equation]) -> str:
+    """Equations below one another, long ones in lines."""
     listed = list(equations)
     room = LINE - max(width(left) for left, _ in listed) - _RELATION
     written = []

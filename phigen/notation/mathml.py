@@ -324,10 +324,21 @@ def _name(identifier: str) -> Factor:
         return Factor(f"<mi>{escape(letter)}</mi>", index=index, key=key)
     if identifier.isdigit():
         return Factor(f"<mn>{identifier}</mn>")
+    if identifier.endswith("]"):
+        return _at_neighbour(identifier, key)
     found = re.fullmatch(r"([^\W\d_]+)_?([0-9]+)|([^\W_]+)_(\w+)", identifier)
     stem, index = (found[1] or found[3], found[2] or found[4]) if found else (identifier, "")
     letter = _GREEK.get(stem, stem)
     return Factor(f"<mi>{escape(letter)}</mi>", index=name(index) if index else "", word=len(letter) > 1, key=key)
+
+
+def _at_neighbour(identifier: str, key: Any) -> Factor:
+    """``x[i+1,j]`` as x with the index i+1, j; an index of the name itself comes before."""
+    name_, _, index = identifier[:-1].partition("[")
+    base = _name(name_)
+    signs = {"+": "<mo>+</mo>", "-": "<mo>−</mo>", ",": "<mo>,</mo>"}
+    parts = [signs.get(part) or name(part) for part in re.split(r"([+,-])", index)]
+    return replace(base, index=_row((f"{base.index}<mo>,</mo>" if base.index else "") + "".join(parts)), key=key)
 
 
 def _product(coefficient: Fraction, factors: Sequence[Factor]) -> str:

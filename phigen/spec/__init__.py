@@ -52,8 +52,8 @@ def schema() -> dict[str, Any]:
     return build()
 
 
-def starter(name: str) -> str:
+def starter(name: str, *, lattice: bool = False) -> str:
     """A commented spec to start from. Raises `SpecError` if the name is not one for a spec."""
     from phigen.spec.first_spec import starter as build
 
-    return build(name)
+    return build(name, lattice=lattice)

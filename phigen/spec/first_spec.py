@@ -1,4 +1,4 @@
-"""The spec that ``phigen new NAME`` prints: a working system with comments on what to change."""
+"""The specs that ``phigen new NAME`` prints: working systems with comments on what to change."""
 
 from __future__ import annotations
 
@@ -54,11 +54,54 @@ runs:
 """
 
 
-def starter(name: str) -> str:
-    """The starter spec of that name.
+_LATTICE = """\
+# A lattice of like sites for phigen. This one is a chain of spins: change it into yours, then run
+#   phigen check {name}.yaml    # proved for all sizes: Jacobi identity, Casimirs, invariants
+#   phigen show {name}.yaml --expand 4   # a small one as an ordinary spec
+phigen: 1                       # version of this format
+name: {name}
+title: Chain of spins
+license: 0BSD                   # of the generated code
+
+# One to three axes, the slowest first; boundary: periodic, open, or a list. Sizes are given by runs.
+# For other relations: {{graph: bonds}}, with a list of bonds, or {{pairs: all}}.
+lattice: {{axes: [i], boundary: periodic}}
+coordinates: [x, y, z]          # of every site
+
+parameters:
+  J: 1
+  Delta: 1.3
+  B: {{value: 0.1*cos(2*pi*i/N_i), at: sites}}   # an array: a number, a formula of i and N_i, a list, a file, or random
+
+# The structure of one site, in any form. `brackets` may name neighbours: {{a: {{"b[i-1]": -a/2}}}}.
+poisson: {{lie_algebra: {{name: so(3)}}}}
+
+# The density: H is its sum over the sites. x[i+1] is x at the next site; inside {{ }} it needs quotes.
+hamiltonian: -J*(x*x[i+1] + y*y[i+1] + Delta*z*z[i+1]) - B*z
+
+casimirs:                       # one for each site; {{value: …, at: sum}} or product for others
+  C: x**2 + y**2 + z**2
+invariants:                     # sums of densities
+  M: z
+
+order: 4                        # of the method
+
+# Experiments for phigen run, verify and report.
+runs:
+  quench:
+    sizes: [64]
+    initial: {{random: sphere, seed: 1}}   # or by field: {{x: sin(2*pi*i/N_i), …}}, or a file state.npy
+    step: 0.05
+    duration: 50                # or steps: 1000
+    stride: 10                  # every how many steps are stored
+"""
+
+
+def starter(name: str, *, lattice: bool = False) -> str:
+    """The starter spec of that name, for one system or for a lattice.
 
     Raises `SpecError` if the name is not one for a spec.
     """
-    text = _TEMPLATE.format(name=name)
+    text = (_LATTICE if lattice else _TEMPLATE).format(name=name)
     loads(text, f"{name}.yaml")
     return text

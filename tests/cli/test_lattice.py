@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+
 import pytest
 from lattice.lattices import LATTICES
 
@@ -26,6 +28,40 @@ def test_an_expansion_compiles_as_an_ordinary_spec(phigen, lattice, name):
     printed = phigen("show", lattice(name), "--expand", "4").stdout
     compilation = compiler.compile_proved(loads(printed), scheme="splitting")
     assert compilation.spec.name == f"{name.partition('_')[0]}_4"
+
+
+def test_the_starter_of_a_lattice_reads_and_is_proved(phigen, tmp_path):
+    path = tmp_path / "chain.yaml"
+    assert phigen("new", "chain", "--lattice", "-o", path).exit_code == 0
+    done = phigen("check", path)
+    assert (done.exit_code, "C is a Casimir (at every site, for all sizes)" in done.stdout) == (0, True)
+
+
+def test_show_prints_the_cell(phigen, lattice):
+    shown = phigen("show", lattice("toda")).stdout
+    assert "{a, b[i+1]} = -a/2" in shown
+    assert "da/dt = (a*b - a*b[i+1])/2" in shown
+    assert "Π A = a" in shown
+
+
+def test_show_writes_latex_with_all_indices(phigen, lattice):
+    shown = phigen("show", lattice("spins_2"), "--latex").stdout
+    assert r"\{x_{i, j}, y_{i, j}\} &= z_{i, j}" in shown
+    assert r"x_{i + 1, j} x_{i, j}" in shown
+    assert r"H &= \sum_{a < b}" in phigen("show", lattice("vortices"), "--latex").stdout
+
+
+def test_show_describes_a_cell_for_machines(phigen, lattice):
+    shown = json.loads(phigen("show", lattice("spin_graph"), "--json").stdout)
+    assert (shown["lattice"]["relation"], shown["parameters"]["J"]["at"]) == ("graph", "bonds")
+    assert shown["casimirs"] == {"C": {"value": "z**2 + (x**2 + y**2)", "at": "sites"}}
+
+
+def test_check_refutes_a_wrong_invariant_of_a_lattice_at_its_place(phigen, lattice):
+    path = lattice("toda")
+    path.write_text(path.read_text(encoding="utf-8").replace("b**3/3 + 2", "b**3/3 - 2"), encoding="utf-8")
+    done = phigen("check", path)
+    assert (done.exit_code, "refuted              K is invariant" in done.stdout) == (5, True)
 
 
 def test_a_run_names_the_sizes_of_its_expansion(phigen, lattice):

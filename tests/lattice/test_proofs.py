@@ -7,6 +7,7 @@ import random
 import pytest
 from lattice.lattices import FOOD_WEB, FPUT, LATTICES, SPIN_GRAPH, TODA, VOLTERRA, VORTICES, spins
 
+from phigen import resources
 from phigen.compiler import examine
 from phigen.geometry.jacobi import jacobi_identity
 from phigen.geometry.system import system_from_spec
@@ -35,6 +36,13 @@ def stated(text: str, name: str) -> str:
 @pytest.mark.parametrize("name", LATTICES)
 def test_everything_true_of_a_lattice_is_proved_for_all_sizes(name: str) -> None:
     assert {n: v for n, v in verdicts(LATTICES[name]).items() if v != PROVED} == {}
+
+
+def test_the_example_of_the_reference_is_proved() -> None:
+    page = (resources.bundled_specs().parent / "docs" / "lattices.md").read_text(encoding="utf-8")
+    example = page.split("```yaml\n")[1].split("```")[0]
+    assert set(verdicts(example).values()) == {PROVED}
+    assert len(verdicts(example)) == 4
 
 
 # --- planted errors

@@ -1,0 +1,56 @@
+"""``phigen show`` of a lattice: its cell, as text, LaTeX or JSON."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from phigen.cli.console import heading, out
+
+if TYPE_CHECKING:
+    from phigen.lattice.cell import Cell
+    from phigen.spec.model import Parameter, Spec
+
+
+def print_cell(spec: Spec, cell: Cell, most: int | None) -> None:
+    """The formulas of a cell."""
+    from phigen.cli.show import assignments, section
+    from phigen.notation.lattices import described, sections
+
+    out(heading(f"{spec.name}: {spec.title}" if spec.title else spec.name))
+    reach = [f"{a} {h}" for a, h in zip(cell.axes, cell.hamiltonian_reach, strict=True)]
+    more = f"; H reaches {', '.join(reach)} sites far" if any(cell.hamiltonian_reach) else ""
+    section("Lattice", [described(cell) + more])
+    if cell.parameters:
+        section("Parameters", [", ".join(map(_parameter, cell.parameters))])
+    for title, lines in sections(cell, most):
+        section(title, assignments(lines))
+
+
+def _parameter(p: Parameter) -> str:
+    where = {"all": "", "sites": " at every site", "bonds": " at every bond"}[p.at]
+    value = "" if p.values else f" = {float(p.value):.9g}"
+    return f"{p.name}{value}{' > 0' * p.positive}{where}"
+
+
+def described_cell(spec: Spec, cell: Cell) -> dict[str, object]:
+    """The cell for machines."""
+    from phigen.notation.lattices import brackets, rates
+    from phigen.symbolic.expression import text
+
+    return {
+        "name": spec.name,
+        "title": spec.title,
+        "lattice": {"relation": cell.relation, "axes": list(cell.axes), "boundary": list(cell.boundary)},
+        "coordinates": list(cell.fields),
+        "parameters": {p.name: {"value": float(p.value), "at": p.at} for p in cell.parameters},
+        "poisson": {name: text(e) for name, e in brackets(cell)},
+        "hamiltonian": {
+            "sites": text(cell.hamiltonian),
+            "bonds": text(cell.bond_hamiltonian),
+            "pairs": text(cell.pair_hamiltonian),
+        },
+        "casimirs": {name: {"value": text(e), "at": kind} for name, (e, kind) in cell.casimirs.items()},
+        "invariants": {name: text(e) for name, e in cell.invariants.items()},
+        "rates": {name: text(e) for name, e in rates(cell)},
+        "reach": {"poisson": list(cell.poisson_reach), "hamiltonian": list(cell.hamiltonian_reach)},
+    }

@@ -1,0 +1,131 @@
+"""The formulas of a cell: brackets at a site, the density of H, Casimirs, invariants, and the field at a site."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from phigen.lattice.cell import GRID, Cell, bond_forces, forces, vector_field
+from phigen.notation import mathml
+from phigen.notation.latex import Equation, aligned
+from phigen.symbolic.expression import Expression, substitute, symbol
+from phigen.symbolic.neighbours import Offset, steps
+from phigen.symbolic.readable import SHOWN, readable
+
+#: A formula: what is on the left, as text and as markup, and the right side.
+Named = tuple[str, str, Expression]
+
+KINDS = {"sites": "", "sum": "Σ ", "product": "Π "}
+
+
+def described(cell: Cell) -> str:
+    """How the sites are related, in words."""
+    if cell.relation == GRID:
+        axes = ", ".join(f"{a} ({b})" for a, b in zip(cell.axes, cell.boundary, strict=True))
+        return f"grid with the axes {axes}" if len(cell.axes) > 1 else f"chain along {axes}"
+    return "graph, its bonds given at run time" if cell.relation == "graph" else "each site paired with each other"
+
+
+def brackets(cell: Cell) -> list[tuple[str, Expression]]:
+    """The brackets that are not 0, in one order: of fields of a site first, then with neighbours."""
+    found: list[tuple[str, Expression]] = []
+    seen: set[tuple[str, str]] = set()
+    for (f, other), value in (*cell.bracket.items(), *cell.bond_bracket.items()):
+        if (f, other) not in seen:
+            found.append((f"{{{f}, {other}}}", value))
+            seen |= {(f, other), _mirrored(cell, f, other)}
+    return found
+
+
+def _mirrored(cell: Cell, f: str, other: str) -> tuple[str, str]:
+    if cell.relation != GRID:
+        return other, f
+    base, offset = cell.place(other)
+    return base, cell.at(f, tuple(-o for o in steps(offset)))
+
+
+def sections(cell: Cell, most: int | None = SHOWN) -> list[tuple[str, list[tuple[str, str]]]]:
+    """Titles with lines (left, right) of text."""
+    found = [
+        ("Poisson tensor of a site" if cell.is_local else "Poisson tensor", brackets(cell)),
+        ("Hamiltonian, the sum of", _densities(cell)),
+        ("Casimirs", [(KINDS[kind] + name, density) for name, (density, kind) in cell.casimirs.items()]),
+        ("Invariants, sums of", list(cell.invariants.items())),
+        ("At a site", rates(cell)),
+    ]
+    return [
+        (title, list(zip((n for n, _ in listed), readable([e for _, e in listed], most), strict=True)))
+        for title, listed in found
+        if listed
+    ]
+
+
+def _densities(cell: Cell) -> list[tuple[str, Expression]]:
+    each = {"sites": cell.hamiltonian, "bonds": cell.bond_hamiltonian, "pairs": cell.pair_hamiltonian}
+    return [(f"h, of {what}", e) for what, e in each.items() if not e.is_zero]
+
+
+def rates(cell: Cell) -> list[tuple[str, Expression]]:
+    """The field at a site of a grid; where sites have bonds, what each adds to the gradient of H."""
+    if cell.relation == GRID:
+        return [(f"d{f}/dt", e) for f, e in vector_field(cell).items()]
+    own = [(f"∂h/∂{f}", e) for f, e in forces(cell).items() if not e.is_zero]
+    return own + [(f"∂h/∂{f}", e) for f, e in bond_forces(cell).items()]
+
+
+def document(cell: Cell) -> str:
+    """The formulas as LaTeX, with all indices: {x_i, y_{i+1}}."""
+    left = [(_bracket(cell, name), e) for name, e in brackets(cell)]
+    blocks = [aligned(_equations(cell, left))] if left else []
+    sums = {"sites": cell.axes or ("i",), "bonds": ("a", "b"), "pairs": ("a", "b")}
+    each = {"sites": cell.hamiltonian, "bonds": cell.bond_hamiltonian, "pairs": cell.pair_hamiltonian}
+    pieces: list[str] = []
+    for what, density in each.items():
+        if not density.is_zero:
+            written = mathml.grouped(_indexed(cell, density)) if what == "sites" else mathml.grouped(density)
+            pieces.append(("<mo>+</mo>" if pieces else "") + _sum("∑", sums[what], what) + written)
+    blocks.append(aligned([("<mi>H</mi>", pieces or ["<mn>0</mn>"])]))
+    integrals = [(n, e, kind) for n, (e, kind) in cell.casimirs.items()]
+    integrals += [(n, e, "sum") for n, e in cell.invariants.items()]
+    if integrals:
+        blocks.append(aligned([_integral(cell, *listed) for listed in integrals]))
+    if cell.relation == GRID:
+        field = [(mathml.dotted(_site(cell, f, cell.origin)), e) for f, e in vector_field(cell).items()]
+        blocks.append(aligned(_equations(cell, field)))
+    head = f"% {cell.name}, {described(cell)}; needs amsmath"
+    return "\n".join([head, "\\begingroup\\allowdisplaybreaks", *blocks, "\\endgroup"])
+
+
+def _integral(cell: Cell, name: str, density: Expression, kind: str) -> Equation:
+    axes = cell.axes or ("i",)
+    left = mathml.name(_site(cell, name, cell.origin) if kind == "sites" else name)
+    sign = {"sites": "", "sum": _sum("∑", axes, "sites"), "product": _sum("∏", axes, "sites")}[kind]
+    whole = _indexed(cell, density)
+    return left, [sign + mathml.grouped(whole)] if sign else mathml.pieces(whole)
+
+
+def _equations(cell: Cell, formulas: Sequence[tuple[str, Expression]]) -> list[Equation]:
+    return [(left, mathml.pieces(_indexed(cell, e))) for left, e in formulas]
+
+
+def _indexed(cell: Cell, e: Expression) -> Expression:
+    """The expression with all indices written, those of the site itself too."""
+    moved = {name: symbol(_site(cell, *place)) for name, place in cell.places(e).items()}
+    return substitute([e], moved)[0]
+
+
+def _site(cell: Cell, name: str, offset: Offset) -> str:
+    if cell.relation != GRID:
+        return f"{name}[{offset[0] if offset else 'i'}]"
+    index = [f"{a}{o:+d}" if o else a for a, o in zip(cell.axes, steps(offset) or (0,) * len(cell.axes), strict=True)]
+    return f"{name}[{','.join(index)}]"
+
+
+def _bracket(cell: Cell, name: str) -> str:
+    f, other = name[1:-1].split(", ", 1)
+    return mathml.bracket(_site(cell, *cell.place(f)), _site(cell, *cell.place(other)))
+
+
+def _sum(sign: str, indices: Sequence[str], what: str) -> str:
+    between = {"sites": "<mo>,</mo>", "bonds": "<mo>,</mo>", "pairs": "<mo>&lt;</mo>"}[what]
+    listed = between.join(f"<mi>{i}</mi>" for i in indices)
+    return f"<msub><mo>{sign}</mo><mrow>{listed}</mrow></msub>"
