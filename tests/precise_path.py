@@ -42,6 +42,7 @@ def with_paths(given: spec.Spec, order: int | None = None, composition: str = "a
     return compile_spec(chosen, order=order)
 
 
+@cache
 def compile_paths(text: str, order: int | None = None, composition: str = "auto") -> Compilation:
     """The same for a spec given as YAML without its first two keys."""
     return with_paths(spec.loads(f"phigen: 1\nname: t\n{text}"), order, composition)

@@ -60,9 +60,15 @@ def plain(given: spec.Spec) -> spec.Spec:
     return replace(given, profile="fast", gauge="none" if given.gauge == "auto" else given.gauge)
 
 
+@cache
 def compile_text(text: str, order: int | None = None, scheme: str | None = None, **more: Any) -> Compilation:
     """The compilation of a spec given as YAML without its first two keys."""
     return compile_spec(plain(spec.loads(f"phigen: 1\nname: t\n{text}")), order=order, scheme=scheme, **more)
+
+
+def small(compilation: Compilation) -> Compilation:
+    """The same compilation with short C, which compiles in a third of the time."""
+    return replace(compilation, program=replace(compilation.program, profile="small"))
 
 
 @cache

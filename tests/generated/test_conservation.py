@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from support import NAMES, RUNS, compiled, described, setting, solver, values
+from support import NAMES, QUICK, RUNS, compiled, described, setting, slow_but, solver, values
 
 from phigen.scheme.steps import Path
 from phigen.symbolic.expression import gradient
@@ -63,7 +63,10 @@ def check_casimirs(name, run, trajectory):
         assert np.max(np.abs(found - found[0])) <= 1e-13 * scale, casimir
 
 
-@pytest.mark.parametrize("name", [name for name in NAMES if described(name)[1].casimirs])
+WITH_CASIMIRS = [name for name in NAMES if described(name)[1].casimirs]
+
+
+@pytest.mark.parametrize("name", slow_but(QUICK, WITH_CASIMIRS))
 def test_casimirs_are_constant_to_round_off_in_numpy(name):
     compilation = compiled(name)
     at, steps = setting(compilation), 20 if isinstance(compilation.program.step, Path) else 200

@@ -4,11 +4,14 @@ import copy
 import ctypes
 from dataclasses import replace
 from functools import cache
+from itertools import product
 
 import mpmath
 import numpy as np
 import pytest
-from support import BODY, NAMES, SPECIES, TARGETS, PreciseStep, RawC, compile_text, compiled, described, setting, solver
+from support import (
+    BODY, NAMES, QUICK, SPECIES, TARGETS, PreciseStep, RawC, compile_text, compiled, described, setting, slow_but, solver,
+)  # fmt: skip
 
 from phigen import spec
 from phigen.compiler import compile_spec
@@ -275,16 +278,18 @@ def members_of(name, count):
     return np.array([[v * (1 + 0.003 * k) + 0.001 * k for v in at.x] for k in range(count)]), at
 
 
-@pytest.mark.parametrize("name", NAMES)
-def test_members_of_an_ensemble_are_trajectories(name):
+QUICK_MEMBERS = [*product(["c"], NAMES), *product(["numpy"], QUICK)]
+
+
+@pytest.mark.parametrize(("target", "name"), slow_but(QUICK_MEMBERS, product(TARGETS, NAMES)))
+def test_members_of_an_ensemble_are_trajectories(name, target):
     start, at = members_of(name, 5)
     compilation, steps = compiled(name), 5 if isinstance(compiled(name).program.step, Path) else 20
-    for target in TARGETS:
-        solve = solver(compilation, target)
-        together = solve.ensemble(start, at.h, steps, parameters=at.parameters)
-        for x0, end in zip(start, together, strict=True):
-            alone = solve.integrate(x0, at.h, steps, stride=steps, parameters=at.parameters).x[-1]
-            np.testing.assert_allclose(end, alone, rtol=0, atol=2e-15 * np.max(np.abs(alone)))
+    solve = solver(compilation, target)
+    together = solve.ensemble(start, at.h, steps, parameters=at.parameters)
+    for x0, end in zip(start, together, strict=True):
+        alone = solve.integrate(x0, at.h, steps, stride=steps, parameters=at.parameters).x[-1]
+        np.testing.assert_allclose(end, alone, rtol=0, atol=2e-15 * np.max(np.abs(alone)))
 
 
 @pytest.mark.parametrize("target", TARGETS)

@@ -3,6 +3,7 @@
 import ctypes
 import math
 import warnings
+from functools import cache
 
 import numpy as np
 import pytest
@@ -20,6 +21,7 @@ SYSTEMS = {
 }
 
 
+@cache
 def compile_with(text, count):
     return compile_spec(spec.loads(f"phigen: 1\nname: t\nmodified_hamiltonian: {count}\n{text}"))
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from support import RawC, compiled, files, setting, solver
+from support import RawC, compiled, files, setting, small, solver
 
 from phigen import resources, spec
 from phigen.compiler import compile_spec
@@ -21,11 +21,6 @@ KINDS = {
     ("pendulum_euler", None): 0.0,
     ("kepler", "splitting"): 0.0,
 }
-
-
-def small(compilation):
-    """The same compilation with short C."""
-    return replace(compilation, program=replace(compilation.program, profile="small"))
 
 
 @pytest.mark.parametrize(("name", "scheme"), KINDS)

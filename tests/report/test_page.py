@@ -103,7 +103,7 @@ def test_measured_times_are_marked(html):
 # -- systems of every kind, without measurements
 
 
-@pytest.mark.parametrize("name", ["pendulum_euler", "poisson_not_hamiltonian", "guiding_centre", "spin_chain5"])
+@pytest.mark.parametrize("name", ["pendulum_euler", "poisson_not_hamiltonian", "sir_epidemic", "spin_chain5"])
 def test_page_without_measurements_is_sound(name):
     text = bare(compiled(name))
     assert Page(text).errors == []

@@ -9,7 +9,7 @@ from phigen.runtime.interface import BackendError
 
 STEPS = 24
 #: One system for each driver: newton, explicit and path.
-DRIVERS = ("rigid_body", "pendulum_euler", "guiding_centre")
+DRIVERS = ("rigid_body", "pendulum_euler", "sir_epidemic")
 
 
 def session_of(name, target):

@@ -3,12 +3,13 @@
 import time
 from dataclasses import replace
 from fractions import Fraction
+from functools import cache
 from itertools import pairwise
 
 import numpy as np
 import pytest
 from splitting import nystrom_algebra as algebra
-from support import TARGETS, compile_text, compiled, setting, solver
+from support import TARGETS, compile_text, compiled, setting, small, solver
 
 from phigen.compiler import emit
 from phigen.errors import SpecError
@@ -131,13 +132,20 @@ def test_three_parts_and_orders_that_a_name_lacks_are_refused():
         compile_text(PLANE + "hamiltonian: p**2/2 + cos(q)\ncomposition: force-gradient\n", 6, "series")
 
 
+@cache
 def forced(name, method):
-    """A system of the corpus with a method, and its tangent map."""
-    found = compiled(name, method.order, "splitting")
+    """A system of the corpus with a method, and its tangent map; without packs of members, in short C."""
+    found = small(compiled(name, method.order, "splitting"))
     (kick,) = [k for k in kicks(found.system, split(found.system)) if k.modified or not method.multiples]
     choice = choosing.chosen(split(found.system), Order(method.order, 0), method, kick)
-    program = build_splitting(found.system, choice, found.gauge, extras=Extras(tangent=True))
+    program = build_splitting(found.system, choice, found.gauge, extras=Extras(tangent=True), profile="small")
     return replace(found, program=program, splitting=choice.splitting)
+
+
+@cache
+def reference(name):
+    """The solver of a high order."""
+    return solver(small(compiled(name, 10, "splitting")), "c")
 
 
 #: Times over which errors are between those of rounding and 1.
@@ -147,9 +155,9 @@ SPANS = {"kowalevski_top": 6, "henon_heiles": 8, "nambu_pendulum": 4}
 @METHODS
 @pytest.mark.parametrize("name", SPANS)
 def test_observed_order_is_the_stated_one(name, method):
-    found, at = forced(name, method), setting(compiled(name))
-    solve, span = solver(found, "c"), SPANS[name]
-    fine = solver(compiled(name, 10, "splitting"), "c").integrate(at.x, span / 512, 512, parameters=at.parameters).x[-1]
+    found = forced(name, method)
+    at, solve, span = setting(found), solver(found, "c"), SPANS[name]
+    fine = reference(name).integrate(at.x, span / 512, 512, parameters=at.parameters).x[-1]
 
     def error(steps):
         end = solve.integrate(at.x, span / steps, steps, parameters=at.parameters).x[-1]
@@ -163,7 +171,8 @@ def test_observed_order_is_the_stated_one(name, method):
 
 @METHODS
 def test_step_is_a_reversible_poisson_map_in_both_targets(method):
-    found, at = forced("kowalevski_top", method), setting(compiled("kowalevski_top"))
+    found = forced("kowalevski_top", method)
+    at = setting(found)
     images = []
     for target in TARGETS:
         step, x = of_solver(solver(found, target), at.parameters, None), np.array(at.x)

@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -34,6 +35,7 @@ runs: {{tumbling: {{initial: [0.4, 1, 0.3], step: 0.2, steps: 2000, compare: [rk
 START = np.array([0.4, 1.0, 0.3])
 
 
+@cache
 def compilation_of(text=TEXT):
     return compile_spec(spec.loads(text), extras=Extras(tangent=True))
 
