@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: c039a7e07eb3a253f0e4cd42de957df9fd0fc37771c42124d10fe06816192f4d
+ * body-sha256: 9c4e9c9c44e62aabfd9a418fce886c6e088761982a40e10fd801c2f04e30277f
  */
 /*
  * import { Solver, StepError } from './pendulum_euler.mjs';
@@ -232,6 +232,31 @@ export class Solver {
     return this;
   }
 
+  /**
+   * Many steps of many states, each of which has its own gauge. One that fails keeps its last good state.
+   *
+   * @param {Iterable<ArrayLike<number>>} members
+   * @param {number} h
+   * @param {number} count
+   * @param {{params?: Partial<Parameters>}} [options] as of the constructor
+   * @returns {{x: Float64Array[], status: string[]}} where each ends, and how: "OK" or a status
+   */
+  static ensemble(members, h, count, options = {}) {
+    const ends = Array.from(members, (x0) => {
+      let end = Float64Array.from(x0);
+      try {
+        const solver = new Solver({ ...options, x0 });
+        end = solver.x;
+        solver.integrate(h, count);
+        return { end, status: "OK" };
+      } catch (error) {
+        if (!(error instanceof StepError)) throw error;
+        return { end, status: error.status };
+      }
+    });
+    return { x: ends.map(({ end }) => end), status: ends.map(({ status }) => status) };
+  }
+
   /** The Hamiltonian, at x or elsewhere. */
   hamiltonian(x = this.x) {
     energy(this.params, x, number);
@@ -256,13 +281,12 @@ export class Solver {
 // ---- The explicit step ----
 
 const increment = new Float64Array(DIM);
-const nothing = new Float64Array(DIM);
 
 /** One stage of a step, x + increment(x): a status. */
 function makeStage(solver, stage) {
   explicit(solver.coef[stage], solver.x, increment);
   solver.evaluations++;
-  return advance(solver, increment, nothing) ? "OK" : "NOT_FINITE";
+  return advance(solver, increment, solver.carry) ? "OK" : "NOT_FINITE";
 }
 
 // ---- Compensated sums, linear equations ----
@@ -271,24 +295,21 @@ const sums = new Float64Array(DIM);
 const rests = new Float64Array(DIM);
 
 /**
- * The state moved by change + correction in compensated arithmetic; the correction, far smaller than the
- * change, is kept to its last bit: were it rounded with the change, corrections of one sign would add up
- * to a drift.
+ * The state moved by change + small in compensated arithmetic, where small is the carry and what is as
+ * small: were that rounded with the change, corrections of one sign would add up to a drift.
  *
- * @param {Solver} solver
+ * @param {{x: Float64Array, carry: Float64Array}} state
  * @param {ArrayLike<number>} change
- * @param {ArrayLike<number>} correction
+ * @param {ArrayLike<number>} small
  * @returns {boolean} false, and the state as before, if the sum is not finite
  */
-function advance(solver, change, correction) {
-  const { x, carry } = solver;
+function advance({ x, carry }, change, small) {
   for (let i = 0; i < DIM; i++) {
     const sum = x[i] + change[i];
     const added = sum - x[i];
-    const lost = (x[i] - (sum - added)) + (change[i] - added);
-    const small = lost + (carry[i] + correction[i]);
-    sums[i] = sum + small;
-    rests[i] = small - (sums[i] - sum);
+    const lost = (x[i] - (sum - added)) + (change[i] - added) + small[i];
+    sums[i] = sum + lost;
+    rests[i] = lost - (sums[i] - sum);
     if (!Number.isFinite(sums[i])) return false;
   }
   x.set(sums);

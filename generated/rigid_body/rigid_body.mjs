@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: cf9729c35338825176b49e3a0e598e60bb682219f8e73ae81b9620df1e54ed5f
+ * body-sha256: c35661fd2b039b49ff0e3d5f693a58f9f2616239b71cc55ba9edf66704ce1f6d
  */
 /*
  * import { Solver, StepError } from './rigid_body.mjs';
@@ -617,6 +617,31 @@ export class Solver {
     return this;
   }
 
+  /**
+   * Many steps of many states, each of which has its own gauge. One that fails keeps its last good state.
+   *
+   * @param {Iterable<ArrayLike<number>>} members
+   * @param {number} h
+   * @param {number} count
+   * @param {{params?: Partial<Parameters>}} [options] as of the constructor
+   * @returns {{x: Float64Array[], status: string[]}} where each ends, and how: "OK" or a status
+   */
+  static ensemble(members, h, count, options = {}) {
+    const ends = Array.from(members, (x0) => {
+      let end = Float64Array.from(x0);
+      try {
+        const solver = new Solver({ ...options, x0 });
+        end = solver.x;
+        solver.integrate(h, count);
+        return { end, status: "OK" };
+      } catch (error) {
+        if (!(error instanceof StepError)) throw error;
+        return { end, status: error.status };
+      }
+    });
+    return { x: ends.map(({ end }) => end), status: ends.map(({ status }) => status) };
+  }
+
   /** The Hamiltonian, at x or elsewhere. */
   hamiltonian(x = this.x) {
     energy(this.params, x, number);
@@ -664,7 +689,7 @@ const y = new Float64Array(DIM);
 const delta = new Float64Array(DIM);
 const displacement = new Float64Array(DIM);
 const increment = new Float64Array(DIM);
-const correction = new Float64Array(DIM);
+const small = new Float64Array(DIM);
 const jacobian = new Float64Array(DIM * DIM);
 const incrementJacobian = new Float64Array(DIM * DIM);
 
@@ -693,11 +718,12 @@ function attempt(solver, stage) {
     previous = size;
     if (!(remaining <= TOLERANCE || stalled)) continue;
     for (let i = 0; i < DIM; i++) {
-      correction[i] = 0;
-      for (let j = 0; j < DIM; j++) correction[i] -= incrementJacobian[i * DIM + j] * delta[j];
+      small[i] = 0;
+      for (let j = 0; j < DIM; j++) small[i] -= incrementJacobian[i * DIM + j] * delta[j];
+      small[i] += carry[i];
     }
     if (!plausible(solver, stage, increment)) return "NO_CONVERGENCE";
-    if (!advance(solver, increment, correction)) return "NOT_FINITE";
+    if (!advance(solver, increment, small)) return "NOT_FINITE";
     history.remember(y);
     return "OK";
   }
@@ -817,14 +843,14 @@ function plausible(solver, stage, increment) {
   if (moved <= PLAUSIBLE * size) return true;
   const [before, middle, after] = [0, 0.5, 1].map((part) => {
     for (let i = 0; i < DIM; i++) point[i] = x[i] + part * increment[i];
-    return energyAt(params, point);
+    return energyAt(params, solver.t, point);
   });
   return Math.abs(after - before) <= LOST * (Math.abs(before) + Math.abs(middle) + Math.abs(after));
 }
 
 const value = new Float64Array(1);
 
-function energyAt(params, x) {
+function energyAt(params, t, x) {
   energy(params, x, value);
   return value[0];
 }
@@ -960,24 +986,21 @@ const sums = new Float64Array(DIM);
 const rests = new Float64Array(DIM);
 
 /**
- * The state moved by change + correction in compensated arithmetic; the correction, far smaller than the
- * change, is kept to its last bit: were it rounded with the change, corrections of one sign would add up
- * to a drift.
+ * The state moved by change + small in compensated arithmetic, where small is the carry and what is as
+ * small: were that rounded with the change, corrections of one sign would add up to a drift.
  *
- * @param {Solver} solver
+ * @param {{x: Float64Array, carry: Float64Array}} state
  * @param {ArrayLike<number>} change
- * @param {ArrayLike<number>} correction
+ * @param {ArrayLike<number>} small
  * @returns {boolean} false, and the state as before, if the sum is not finite
  */
-function advance(solver, change, correction) {
-  const { x, carry } = solver;
+function advance({ x, carry }, change, small) {
   for (let i = 0; i < DIM; i++) {
     const sum = x[i] + change[i];
     const added = sum - x[i];
-    const lost = (x[i] - (sum - added)) + (change[i] - added);
-    const small = lost + (carry[i] + correction[i]);
-    sums[i] = sum + small;
-    rests[i] = small - (sums[i] - sum);
+    const lost = (x[i] - (sum - added)) + (change[i] - added) + small[i];
+    sums[i] = sum + lost;
+    rests[i] = lost - (sums[i] - sum);
     if (!Number.isFinite(sums[i])) return false;
   }
   x.set(sums);

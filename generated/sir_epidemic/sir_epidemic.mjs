@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 38507ac98d56196982c7e2cfdbaec56ff432179eeb1d96f61efe2247148630f0
+ * body-sha256: 8acdf9159c2e1894835048a598fd17e3ed4761b501509a190eeb34a796916455
  */
 /*
  * import { Solver, StepError } from './sir_epidemic.mjs';
@@ -316,6 +316,31 @@ export class Solver {
     return this;
   }
 
+  /**
+   * Many steps of many states, each of which has its own gauge. One that fails keeps its last good state.
+   *
+   * @param {Iterable<ArrayLike<number>>} members
+   * @param {number} h
+   * @param {number} count
+   * @param {{params?: Partial<Parameters>}} [options] as of the constructor
+   * @returns {{x: Float64Array[], status: string[]}} where each ends, and how: "OK" or a status
+   */
+  static ensemble(members, h, count, options = {}) {
+    const ends = Array.from(members, (x0) => {
+      let end = Float64Array.from(x0);
+      try {
+        const solver = new Solver({ ...options, x0 });
+        end = solver.x;
+        solver.integrate(h, count);
+        return { end, status: "OK" };
+      } catch (error) {
+        if (!(error instanceof StepError)) throw error;
+        return { end, status: error.status };
+      }
+    });
+    return { x: ends.map(({ end }) => end), status: ends.map(({ status }) => status) };
+  }
+
   /** The Hamiltonian, at x or elsewhere. */
   hamiltonian(x = this.x) {
     energy(this.params, x, number);
@@ -467,7 +492,6 @@ const y = new Float64Array(DIM);
 const residual = new Float64Array(DIM);
 const change = new Float64Array(DIM);
 const jacobian = new Float64Array(DIM * DIM);
-const nothing = new Float64Array(DIM);
 
 /**
  * Solve p = grad S_h(mean of the path from x under p) and move to the end of that path. Where that takes
@@ -495,7 +519,7 @@ function attempt(solver, stage) {
     // The second test: residuals no longer shrink, the solve has reached the level of rounding.
     if (size <= 4e-16 || (previous < 1e-12 && size > 0.25 * previous)) {
       if (!plausible(solver, stage, change)) return "NO_CONVERGENCE";
-      if (!advance(solver, change, nothing)) return "NOT_FINITE";
+      if (!advance(solver, change, solver.carry)) return "NOT_FINITE";
       history.remember(y);
       return "OK";
     }
@@ -633,14 +657,14 @@ function plausible(solver, stage, increment) {
   if (moved <= PLAUSIBLE * size) return true;
   const [before, middle, after] = [0, 0.5, 1].map((part) => {
     for (let i = 0; i < DIM; i++) point[i] = x[i] + part * increment[i];
-    return energyAt(params, point);
+    return energyAt(params, solver.t, point);
   });
   return Math.abs(after - before) <= LOST * (Math.abs(before) + Math.abs(middle) + Math.abs(after));
 }
 
 const value = new Float64Array(1);
 
-function energyAt(params, x) {
+function energyAt(params, t, x) {
   energy(params, x, value);
   return value[0];
 }
@@ -670,24 +694,21 @@ const sums = new Float64Array(DIM);
 const rests = new Float64Array(DIM);
 
 /**
- * The state moved by change + correction in compensated arithmetic; the correction, far smaller than the
- * change, is kept to its last bit: were it rounded with the change, corrections of one sign would add up
- * to a drift.
+ * The state moved by change + small in compensated arithmetic, where small is the carry and what is as
+ * small: were that rounded with the change, corrections of one sign would add up to a drift.
  *
- * @param {Solver} solver
+ * @param {{x: Float64Array, carry: Float64Array}} state
  * @param {ArrayLike<number>} change
- * @param {ArrayLike<number>} correction
+ * @param {ArrayLike<number>} small
  * @returns {boolean} false, and the state as before, if the sum is not finite
  */
-function advance(solver, change, correction) {
-  const { x, carry } = solver;
+function advance({ x, carry }, change, small) {
   for (let i = 0; i < DIM; i++) {
     const sum = x[i] + change[i];
     const added = sum - x[i];
-    const lost = (x[i] - (sum - added)) + (change[i] - added);
-    const small = lost + (carry[i] + correction[i]);
-    sums[i] = sum + small;
-    rests[i] = small - (sums[i] - sum);
+    const lost = (x[i] - (sum - added)) + (change[i] - added) + small[i];
+    sums[i] = sum + lost;
+    rests[i] = lost - (sums[i] - sum);
     if (!Number.isFinite(sums[i])) return false;
   }
   x.set(sums);

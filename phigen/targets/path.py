@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from phigen.scheme.lowering import expand_powers
 from phigen.scheme.path import Recurrences, Series, Term
 from phigen.scheme.program import Program
+from phigen.scheme.steps import Path
 from phigen.symbolic.expression import Expression, symbols_of
 from phigen.symbolic.symbols import COEFFICIENT, FIXED, SERIES, Symbol, coefficient, kind_of, momentum, variation
 from phigen.targets.names import Scope
@@ -56,6 +57,14 @@ def statements(program: Program, path: Recurrences, syntax: Syntax) -> dict[str,
 def tangent_program(program: Program) -> Program:
     """The program with the coordinates of its tangent path: the state, then its variation."""
     return replace(program, coordinates=(*program.coordinates, *map(variation, program.coordinates)))
+
+
+def recurrences(program: Program) -> list[Recurrences]:
+    """Those of the path, and of the path with its variation; none for other steps."""
+    step = program.step
+    if not isinstance(step, Path):
+        return []
+    return [step.recurrences, *([step.tangent.recurrences] if step.tangent else [])]
 
 
 def reads_coefficients(path: Recurrences) -> bool:

@@ -10,6 +10,23 @@ function attempted(work) {
   }
 }
 
+/** One step with its derivative; a step that fails leaves all as it was. */
+function varied(Solver, job) {
+  const solver = new Solver(job.options);
+  if (!solver.stepTangent) return null;
+  const failure = attempted(() => solver.stepTangent(1e200));
+  const untouched = solver.steps === 0 && solver.t === new Solver(job.options).t;
+  return { derivative: [...solver.stepTangent(job.h)], x: [...solver.x], t: solver.t, failure, untouched };
+}
+
+/** Two members, and one that is refused. */
+function many(Solver, job, start) {
+  const { params, t0 } = job.options;
+  const members = [start, start.map((x) => 1.01 * x), start.map(() => NaN)];
+  const { x, status } = Solver.ensemble(members, job.h, job.steps, { params, t0 });
+  return { x: x.map((end) => [...end]), status };
+}
+
 async function answer(job) {
   const { Solver, StepError } = await import(job.module);
   const made = attempted(() => new Solver(job.options));
@@ -33,6 +50,8 @@ async function answer(job) {
     modified: solver.modifiedHamiltonian?.(job.h, start),
     facts: { NAME, VERSION, SPEC_SHA256, DIM, ORDER, COORDINATES, CASIMIRS, DEFAULT_PARAMETERS },
     exports: typeof StepError,
+    tangent: varied(Solver, job),
+    many: many(Solver, job, start),
   };
 }
 

@@ -22,6 +22,8 @@ from phigen.targets.js.runtime import resolved
 RUNTIME = sorted((resources.templates() / "js" / "runtime").glob("*.mjs"))
 STEPS = 20
 
+PENDULUM = "coordinates: [q, p]\npoisson: {canonical: {q: [q], p: [p]}}\nhamiltonian: p**2/2 - cos(q)\n"
+PENDULUM_RUN = "runs: {r: {initial: [1, 0.5], step: 0.1, steps: 20}}\n"
 RUN = "runs: {r: {initial: [1, 0.5, -0.25], step: 0.1, steps: 20}}\n"
 
 #: What the corpus does not ask for: every kind of step, with one stage and with several, kicks, composed paths.
@@ -38,6 +40,17 @@ VARIANTS = {
     "modified": lambda: _modified("rigid_body", 2),
 }
 
+#: Every kind of step with its derivative.
+VARIED = {
+    "newton": lambda: _varied(f"{BODY}casimirs: {{C: x1**2 + x2**2 + x3**2}}\norder: 4\n{RUN}"),
+    "newton, composed": lambda: _varied(f"{BODY}order: 6\ncomposition: kahan-li\n{RUN}"),
+    "path": lambda: _varied(f"{BODY}order: 4\nbirealisation: karasev\n{RUN}"),
+    "path, composed": lambda: _varied(f"{BODY}order: 4\nbirealisation: karasev\ncomposition: suzuki\n{RUN}"),
+    "explicit": lambda: _varied(f"{PENDULUM}birealisation: canonical-euler\norder: 1\n{PENDULUM_RUN}"),
+    "splitting": lambda: _varied(f"{PENDULUM}scheme: splitting\norder: 4\n{PENDULUM_RUN}"),
+}
+VARIANTS |= {f"{case}, varied": made for case, made in VARIED.items()}
+
 
 def _by_paths(name, order):
     given = spec.load(resources.bundled_specs() / f"{name}.yaml")
@@ -47,6 +60,10 @@ def _by_paths(name, order):
 def _gauged(profile):
     text = f"phigen: 1\nname: t\n{BODY}casimirs: {{C: x1**2 + x2**2 + x3**2}}\norder: 4\nprofile: {profile}\n{RUN}"
     return compile_spec(spec.loads(text))
+
+
+def _varied(text):
+    return compile_spec(spec.loads(f"phigen: 1\nname: t\n{text}"), extras=Extras(tangent=True))
 
 
 def _modified(name, order):
@@ -145,6 +162,30 @@ def test_the_modified_hamiltonian_is_that_of_numpy(answers):
     assert found["modified"] == pytest.approx(module.modified_hamiltonian(at.x, at.h, **at.parameters), rel=1e-14)
 
 
+@pytest.mark.parametrize("case", [f"{case}, varied" for case in VARIED])
+def test_the_derivative_of_a_step_is_that_of_numpy(case, answers):
+    compilation, found = compilation_of(case), answers[case]["tangent"]
+    at, made = setting(compilation), solver(compilation, "numpy")
+    image, tangent = made.step_tangent(at.x, at.h, parameters=at.parameters)
+    assert apart(np.reshape(found["derivative"], tangent.shape), tangent) < 1e-14
+    assert (apart(found["x"], image) < 1e-15, found["t"]) == (True, at.h)
+    assert (found["failure"]["name"], found["untouched"]) == ("StepError", True)
+
+
+def test_code_that_was_not_asked_for_derivatives_has_none(answers):
+    assert answers["gauge"]["tangent"] is None
+
+
+@pytest.mark.parametrize("case", NAMES)
+def test_an_ensemble_is_its_members_one_by_one(case, answers):
+    found, at = answers[case]["many"], setting(compilation_of(case))
+    assert found["status"] == ["OK", "OK", "BAD_ARGUMENT"]
+    assert found["x"][0] == answers[case]["x"]
+    members = np.multiply.outer([1.0, 1.01], at.x)
+    expected = solver(compilation_of(case), "numpy").ensemble(members, at.h, STEPS, **at.parameters)
+    assert apart(found["x"][:2], expected) < 1e-13
+
+
 #: Systems and steps that end in an error: far too large ones for each kind of step, and what leads to another energy.
 FAILING = [("rigid_body", 40.0), ("sir_epidemic", 300.0), ("pendulum_euler", 1e200), ("toda3", 1e3), ("kepler", 30.0)]
 
@@ -222,7 +263,7 @@ def test_modules_that_meet_declare_no_name_twice():
         for path in RUNTIME
     }
     for step in ("newton", "path", "explicit", "splitting"):
-        met = [step, "solver", "gauge", "guess", "algebra", "taylor"]
+        met = [step, f"tangent_{step}", "tangent", "solver", "gauge", "guess", "algebra", "taylor"]
         every = [name for module in met for name in declared[module]]
         assert len(every) == len(set(every)), sorted(n for n in set(every) if every.count(n) > 1)
 

@@ -6,11 +6,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from phigen.lanes.lowering import Blocks, Lanes, Packs
-from phigen.scheme.path import Recurrences
 from phigen.scheme.program import Program
 from phigen.scheme.steps import Explicit, Implicit, Newton, Path, Splitting
 from phigen.targets.c.lanes import grouped
-from phigen.targets.path import kinds
+from phigen.targets.path import kinds, recurrences
 
 
 @dataclass(frozen=True)
@@ -30,14 +29,6 @@ def _calls(function: str) -> Callable[[Lanes | None], bool]:
 
 def _sums(kind: str) -> Callable[[Program], bool]:
     return lambda p: any(kind in kinds(path) for path in recurrences(p))
-
-
-def recurrences(program: Program) -> list[Recurrences]:
-    """Those of the path, and of the path with its variation."""
-    step = program.step
-    if not isinstance(step, Path):
-        return []
-    return [step.recurrences, *([step.tangent.recurrences] if step.tangent else [])]
 
 
 def _fast(program: Program) -> bool:

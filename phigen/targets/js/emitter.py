@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import json
 import textwrap
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from phigen.scheme.kernel import Kernel
+from phigen.scheme.path import Recurrences
 from phigen.scheme.program import Program
 from phigen.scheme.steps import LONGEST_PATH, MOST_PIECES, Explicit, Implicit, Newton, Path, Splitting
 from phigen.symbolic.functions import FUNCTIONS, written_in
@@ -16,7 +17,7 @@ from phigen.targets.header import CHECKSUM, checksum, header_lines, plain
 from phigen.targets.js.functions import definitions
 from phigen.targets.js.runtime import assembled
 from phigen.targets.language import Language
-from phigen.targets.path import Syntax, kinds, statements
+from phigen.targets.path import Syntax, kinds, recurrences, statements, tangent_program
 from phigen.targets.rendering import render
 from phigen.targets.reserved import JAVASCRIPT_RESERVED
 
@@ -57,7 +58,9 @@ def emit(program: Program, command: str) -> dict[str, str]:
     modules += ["taylor"] if isinstance(step, Path) else []
     modules += ["guess"] if features["IMPLICIT"] else []
     modules += ["gauge" if program.searches_gauge else "gauge_formula"] if program.gauge else []
-    modules += ["algebra"] if not isinstance(step, Splitting) or program.searches_gauge else []
+    modules += ["tangent", f"tangent_{chosen}"] if program.extras.tangent else []
+    algebra = not isinstance(step, Splitting) or program.searches_gauge or program.extras.tangent
+    modules += ["algebra"] if algebra else []
     body = f"{_model(program)}\n\n{assembled(modules, features)}\n"
     comment = "\n".join(f" * {line}".rstrip() for line in header_lines(program, command))
     return {f"{program.name}.mjs": f"/*\n{comment}\n * {CHECKSUM} {checksum(body)}\n */\n{body}"}
@@ -66,7 +69,7 @@ def emit(program: Program, command: str) -> dict[str, str]:
 def _features(program: Program) -> dict[str, bool]:
     """What the runtime is asked for."""
     step = program.step
-    sums = kinds(step.recurrences) if isinstance(step, Path) else []
+    sums = {kind for path in recurrences(program) for kind in kinds(path)}
     return {
         "IMPLICIT": isinstance(step, Implicit),
         "GAUGE": program.gauge is not None,
@@ -76,6 +79,7 @@ def _features(program: Program) -> dict[str, bool]:
         "TIMED": bool(program.time),
         "RENEWED": step.refresh is not None,
         "MODIFIED": program.modified is not None,
+        "TANGENT": program.extras.tangent,
         **{f"TAYLOR_{kind.upper()}": kind in sums for kind in ("product", "chain", "power")},
     }
 
@@ -87,7 +91,9 @@ def _model(program: Program) -> str:
     pieces += [render("js", "implicit.mjs", _inner(step))] if isinstance(step, Implicit) else []
     pieces += definitions(special.used(program), special.entire_used(program))
     pieces += [_function(kernel) for kernel in _kernels(program)]
-    pieces += [_path(program, step)] if isinstance(step, Path) else []
+    pieces += [_path(program, step.recurrences, "path")] if isinstance(step, Path) else []
+    if isinstance(step, Path) and step.tangent:
+        pieces.append(_path(tangent_program(program), step.tangent.recurrences, "tangent"))
     return "\n\n".join(piece.strip("\n") for piece in pieces)
 
 
@@ -113,8 +119,13 @@ def _system(program: Program) -> Mapping[str, object]:
         "times": json.dumps(schedule.times) if schedule else "",
         "multiples": json.dumps(schedule.multiples) if schedule and schedule.multiples else "",
         "schedule": json.dumps(schedule.flows) if schedule else "",
-        "flows": ", ".join(f"flow{k}" for k in range(1, len(step.flows) + 1)) if isinstance(step, Splitting) else "",
+        "flows": _numbered("flow", step.flows if isinstance(step, Splitting) else ()),
+        "tangents": _numbered("tangent", step.tangents if isinstance(step, Splitting) else ()),
     }
+
+
+def _numbered(name: str, kernels: Sequence[Kernel]) -> str:
+    return ", ".join(f"{name}{k}" for k in range(1, len(kernels) + 1))
 
 
 def _table(program: Program) -> Mapping[str, object]:
@@ -129,6 +140,7 @@ def _table(program: Program) -> Mapping[str, object]:
 
 
 def _inner(step: Newton | Path) -> Mapping[str, object]:
+    varied = step.tangent.recurrences if isinstance(step, Path) and step.tangent else None
     floor = "0" if step.inner.relative else "1e-6"
     return {
         "max_iterations": step.inner.max_iterations,
@@ -136,6 +148,8 @@ def _inner(step: Newton | Path) -> Mapping[str, object]:
         "floor": floor if isinstance(step, Newton) else "",
         "series": len(step.recurrences.series) if isinstance(step, Path) else 0,
         "fixed": len(step.recurrences.fixed) if isinstance(step, Path) else 0,
+        "tangent_series": len(varied.series) if varied else 0,
+        "tangent_fixed": len(varied.fixed) if varied else 0,
         "terms": TERMS,
         "longest_path": LONGEST_PATH,
         "most_pieces": MOST_PIECES,
@@ -158,8 +172,6 @@ def _contents(program: Program) -> list[str]:
         "",
         "Contents: the system, with its kernels; the class Solver; the step, by " + how + ".",
     ]
-    if program.extras.tangent:
-        lines.append("The derivative of a step, step_tangent, is not offered in JavaScript.")
     return lines
 
 
@@ -174,9 +186,11 @@ def _kernels(program: Program) -> list[Kernel]:
     modified = [program.modified.kernel] if program.modified else []
     others = [*program.choice, *modified, seen.energy, seen.casimirs, seen.vector_field]
     if isinstance(step, Splitting):
-        return [replace(step.prepare, name="prepare_row"), *step.flows, *others]
+        return [replace(step.prepare, name="prepare_row"), *step.flows, *step.tangents, *others]
     refresh = [step.refresh] if step.refresh else []
-    return [step.prepare, *refresh, step.main, *others]
+    varied = [step.tangent] if isinstance(step, Explicit) and step.tangent else []
+    varied += [step.tangent.curvature] if isinstance(step, Path) and step.tangent else []
+    return [step.prepare, *refresh, step.main, *varied, *others]
 
 
 def _function(kernel: Kernel) -> str:
@@ -187,9 +201,9 @@ def _function(kernel: Kernel) -> str:
     return "\n".join([*_comment(kernel.purpose), head, *lines, "}"])
 
 
-def _path(program: Program, step: Path) -> str:
-    """The recurrences of a path."""
-    return render("js", "path.mjs", statements(program, step.recurrences, PATH_SYNTAX))
+def _path(program: Program, path: Recurrences, kind: str) -> str:
+    """The recurrences of a path, or of one with its variation."""
+    return render("js", "path.mjs", {**statements(program, path, PATH_SYNTAX), "kind": kind})
 
 
 def _wrapped(statement: str) -> list[str]:

@@ -11,24 +11,21 @@ const sums = new Float64Array(DIM);
 const rests = new Float64Array(DIM);
 
 /**
- * The state moved by change + correction in compensated arithmetic; the correction, far smaller than the
- * change, is kept to its last bit: were it rounded with the change, corrections of one sign would add up
- * to a drift.
+ * The state moved by change + small in compensated arithmetic, where small is the carry and what is as
+ * small: were that rounded with the change, corrections of one sign would add up to a drift.
  *
- * @param {Solver} solver
+ * @param {{x: Float64Array, carry: Float64Array}} state
  * @param {ArrayLike<number>} change
- * @param {ArrayLike<number>} correction
+ * @param {ArrayLike<number>} small
  * @returns {boolean} false, and the state as before, if the sum is not finite
  */
-export function advance(solver, change, correction) {
-  const { x, carry } = solver;
+export function advance({ x, carry }, change, small) {
   for (let i = 0; i < DIM; i++) {
     const sum = x[i] + change[i];
     const added = sum - x[i];
-    const lost = (x[i] - (sum - added)) + (change[i] - added);
-    const small = lost + (carry[i] + correction[i]);
-    sums[i] = sum + small;
-    rests[i] = small - (sums[i] - sum);
+    const lost = (x[i] - (sum - added)) + (change[i] - added) + small[i];
+    sums[i] = sum + lost;
+    rests[i] = lost - (sums[i] - sum);
     if (!Number.isFinite(sums[i])) return false;
   }
   x.set(sums);

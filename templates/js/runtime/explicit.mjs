@@ -4,11 +4,10 @@ import { DIM, explicit } from "./model.mjs";
 // ---- The explicit step ----
 
 const increment = new Float64Array(DIM);
-const nothing = new Float64Array(DIM);
 
 /** One stage of a step, x + increment(x): a status. */
 export function makeStage(solver, stage) {
   explicit(solver.coef[stage], solver.x, increment);
   solver.evaluations++;
-  return advance(solver, increment, nothing) ? "OK" : "NOT_FINITE";
+  return advance(solver, increment, solver.carry) ? "OK" : "NOT_FINITE";
 }

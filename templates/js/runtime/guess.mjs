@@ -25,6 +25,13 @@ export class History {
     for (const row of this.#difference) row.fill(0);
   }
 
+  // #if TANGENT
+  /** The last value. */
+  last() {
+    return Float64Array.from(this.#difference[0]);
+  }
+
+  // #endif
   /**
    * The guess for the next value: the sum of the differences.
    *
@@ -112,28 +119,21 @@ export function plausible(solver, stage, increment) {
   if (moved <= PLAUSIBLE * size) return true;
   const [before, middle, after] = [0, 0.5, 1].map((part) => {
     for (let i = 0; i < DIM; i++) point[i] = x[i] + part * increment[i];
-    // #if TIMED
     return energyAt(params, solver.t, point);
-    // #else
-    return energyAt(params, point);
-    // #endif
   });
   return Math.abs(after - before) <= LOST * (Math.abs(before) + Math.abs(middle) + Math.abs(after));
 }
 
 const value = new Float64Array(1);
 
-// #if TIMED
 function energyAt(params, t, x) {
+  // #if TIMED
   energy(params, t, x, value);
-  return value[0];
-}
-// #else
-function energyAt(params, x) {
+  // #else
   energy(params, x, value);
+  // #endif
   return value[0];
 }
-// #endif
 
 /**
  * One stage. A guess from earlier steps may have misled it: then once more without.

@@ -12,7 +12,7 @@ const SHRINKING = 0.25;
  * Size of a correction relative to each component of y, but no finer than FLOOR of the largest; NaN if it
  * is NaN.
  */
-function relativeSize(y, correction) {
+export function relativeSize(y, correction) {
   let norm = 0;
   let size = 0;
   for (let i = 0; i < DIM; i++) norm = Math.max(norm, Math.abs(y[i]));
@@ -28,7 +28,7 @@ const y = new Float64Array(DIM);
 const delta = new Float64Array(DIM);
 const displacement = new Float64Array(DIM);
 const increment = new Float64Array(DIM);
-const correction = new Float64Array(DIM);
+const small = new Float64Array(DIM);
 const jacobian = new Float64Array(DIM * DIM);
 const incrementJacobian = new Float64Array(DIM * DIM);
 
@@ -57,11 +57,12 @@ function attempt(solver, stage) {
     previous = size;
     if (!(remaining <= TOLERANCE || stalled)) continue;
     for (let i = 0; i < DIM; i++) {
-      correction[i] = 0;
-      for (let j = 0; j < DIM; j++) correction[i] -= incrementJacobian[i * DIM + j] * delta[j];
+      small[i] = 0;
+      for (let j = 0; j < DIM; j++) small[i] -= incrementJacobian[i * DIM + j] * delta[j];
+      small[i] += carry[i];
     }
     if (!plausible(solver, stage, increment)) return "NO_CONVERGENCE";
-    if (!advance(solver, increment, correction)) return "NOT_FINITE";
+    if (!advance(solver, increment, small)) return "NOT_FINITE";
     history.remember(y);
     return "OK";
   }

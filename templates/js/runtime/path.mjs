@@ -133,7 +133,6 @@ const y = new Float64Array(DIM);
 const residual = new Float64Array(DIM);
 const change = new Float64Array(DIM);
 const jacobian = new Float64Array(DIM * DIM);
-const nothing = new Float64Array(DIM);
 
 /**
  * Solve p = grad S_h(mean of the path from x under p) and move to the end of that path. Where that takes
@@ -161,7 +160,7 @@ function attempt(solver, stage) {
     // The second test: residuals no longer shrink, the solve has reached the level of rounding.
     if (size <= 4e-16 || (previous < 1e-12 && size > 0.25 * previous)) {
       if (!plausible(solver, stage, change)) return "NO_CONVERGENCE";
-      if (!advance(solver, change, nothing)) return "NOT_FINITE";
+      if (!advance(solver, change, solver.carry)) return "NOT_FINITE";
       history.remember(y);
       return "OK";
     }

@@ -18,6 +18,9 @@ import { MIDDLES, PREPARED, refresh } from "./model.mjs";
 // #if MODIFIED
 import { modified } from "./model.mjs";
 // #endif
+// #if TANGENT
+import { tangentOf } from "./tangent.mjs";
+// #endif
 
 // ---- The solver ----
 
@@ -182,7 +185,9 @@ export class Solver {
   // #if RENEWED
   /** What depends on the time of the next step. */
   #renew() {
-    this.coef.forEach((coef, stage) => refresh(coef, this.t + MIDDLES[stage] * this.h, coef.subarray(PREPARED)));
+    this.coef.forEach((coef, stage) => {
+      refresh(coef, this.t + MIDDLES[stage] * this.h, coef.subarray(PREPARED));
+    });
   }
 
   // #endif
@@ -229,6 +234,57 @@ export class Solver {
     }
     for (let k = 0; k < count; k++) this.step(h);
     return this;
+  }
+
+  // #if TANGENT
+  /**
+   * One step as `step` makes it, and its derivative, to round-off, with any gauge held fixed. Throws
+   * StepError; then the state is as before.
+   *
+   * @param {number} h
+   * @returns {Float64Array} entry i * DIM + j is the derivative of the new x[i] along the old x[j]
+   */
+  stepTangent(h) {
+    const { t, steps } = this;
+    const before = { x: Float64Array.from(this.x), carry: Float64Array.from(this.carry) };
+    const at = { x: Float64Array.from(this.x), carry: Float64Array.from(this.carry) };
+    this.step(h);
+    const { status, tangent } = tangentOf(this, at);
+    if (status === "OK") return tangent;
+    this.x.set(before.x);
+    this.carry.set(before.carry);
+    Object.assign(this, { t, steps, h: NaN }); // what h prepared counts from the step taken back
+    throw new StepError(status, steps);
+  }
+
+  // #endif
+  /**
+   * Many steps of many states, each of which has its own gauge. One that fails keeps its last good state.
+   *
+   * @param {Iterable<ArrayLike<number>>} members
+   * @param {number} h
+   * @param {number} count
+   * #if TIMED
+   * @param {{params?: Partial<Parameters>, t0?: number}} [options] as of the constructor
+   * #else
+   * @param {{params?: Partial<Parameters>}} [options] as of the constructor
+   * #endif
+   * @returns {{x: Float64Array[], status: string[]}} where each ends, and how: "OK" or a status
+   */
+  static ensemble(members, h, count, options = {}) {
+    const ends = Array.from(members, (x0) => {
+      let end = Float64Array.from(x0);
+      try {
+        const solver = new Solver({ ...options, x0 });
+        end = solver.x;
+        solver.integrate(h, count);
+        return { end, status: "OK" };
+      } catch (error) {
+        if (!(error instanceof StepError)) throw error;
+        return { end, status: error.status };
+      }
+    });
+    return { x: ends.map(({ end }) => end), status: ends.map(({ status }) => status) };
   }
 
   // #if TIMED

@@ -1,0 +1,33 @@
+import { solve } from "./algebra.mjs";
+import { DIM, MAX_ITERATIONS, linearise } from "./model.mjs";
+import { relativeSize } from "./newton.mjs";
+import { identity, multiplied, solvedForAll, tangentSolved } from "./tangent.mjs";
+
+// ---- The derivative of an implicit stage ----
+
+/**
+ * alpha = x gives Dy = jacobian^-1, and the stage is 1 + incrementJacobian Dy. All is evaluated at the y of
+ * the stage itself, found from its remembered value by corrections that shrink no more.
+ */
+export function differentiateStage(solver, stage, at) {
+  const y = solver.history[stage].last();
+  const [side, displacement, change] = [0, 0, 0].map(() => new Float64Array(DIM));
+  const [jacobian, slope] = [0, 0].map(() => new Float64Array(DIM * DIM));
+  let previous = Infinity;
+  for (let iteration = 0; ; iteration++) {
+    linearise(solver.coef[stage], y, displacement, change, jacobian, slope);
+    for (let i = 0; i < DIM; i++) side[i] = y[i] - at.x[i] + displacement[i] - at.carry[i];
+    if (!solve(Float64Array.from(jacobian), side)) return { status: "SINGULAR" };
+    const size = relativeSize(y, side);
+    if (!Number.isFinite(size)) return { status: "NOT_FINITE" };
+    if (tangentSolved(size, previous)) break;
+    if (iteration === MAX_ITERATIONS) return { status: "NO_CONVERGENCE" };
+    for (let i = 0; i < DIM; i++) y[i] -= side[i];
+    previous = size;
+  }
+  const inverse = solvedForAll(jacobian, identity());
+  if (!inverse) return { status: "SINGULAR" };
+  const derivative = multiplied(slope, inverse);
+  for (let i = 0; i < DIM; i++) derivative[i * DIM + i] += 1;
+  return { status: "OK", change, derivative };
+}

@@ -1,0 +1,24 @@
+import { DIM, FLOWS, SCHEDULE, TANGENTS } from "./model.mjs";
+import { identity, multiplied } from "./tangent.mjs";
+
+// ---- The derivative of a step of flows ----
+
+/** The product of the derivatives of the flows. */
+export function differentiateStage(solver, stage, at) {
+  const y = Float64Array.from(at.x);
+  const moved = Float64Array.from(at.carry);
+  const increment = new Float64Array(DIM);
+  const slope = new Float64Array(DIM * DIM);
+  const derivative = identity();
+  for (const [part, row] of SCHEDULE) {
+    TANGENTS[part](solver.coef[0][row], y, slope);
+    FLOWS[part](solver.coef[0][row], y, increment);
+    const product = multiplied(slope, derivative);
+    for (let k = 0; k < DIM * DIM; k++) derivative[k] += product[k];
+    for (let i = 0; i < DIM; i++) {
+      moved[i] += increment[i];
+      y[i] = at.x[i] + moved[i];
+    }
+  }
+  return { status: "OK", change: moved.map((value, i) => value - at.carry[i]), derivative };
+}
