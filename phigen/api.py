@@ -24,7 +24,7 @@ from phigen.geometry.system import System, system_from_spec
 from phigen.proofs.examination import located
 from phigen.spec import limits
 from phigen.spec.model import Extras, Spec
-from phigen.spec.names import ARGUMENT_HINT, ARGUMENTS, IDENTIFIER, PROFILES, SCHEMES, SPEC_NAME
+from phigen.spec.names import ARGUMENT_HINT, ARGUMENTS, IDENTIFIER, PROFILES, SCHEMES, SPEC_NAME, TIMED_ARGUMENTS
 from phigen.spec.taken import objection
 
 if TYPE_CHECKING:
@@ -189,10 +189,11 @@ def _expect_names(system: System) -> None:
     problems = [objection(system.name)] if re.fullmatch(SPEC_NAME, system.name) else [_malformed(system.name, _HINT)]
     problems += [
         _malformed(name, "letters, digits and _, not starting with a digit")
-        for name in (*system.coordinates, *system.parameter_names)
+        for name in (*system.coordinates, *system.times, *system.parameter_names)
         if not re.fullmatch(IDENTIFIER, name)
     ]
-    wrong = [name for name in system.parameter_names if name in ARGUMENTS]
+    taken = TIMED_ARGUMENTS if system.time else ARGUMENTS
+    wrong = [name for name in system.parameter_names if name in taken]
     problems += [(f"a parameter cannot be called {name!r}", ARGUMENT_HINT) for name in wrong]
     found = [Diagnostic(message, hint=hint) for message, hint in filter(None, problems)]
     if found:

@@ -34,6 +34,11 @@ class Experiment:
         return float(self.run.step)
 
     @property
+    def t0(self) -> float:
+        """The time at the start."""
+        return float(self.run.start)
+
+    @property
     def rows(self) -> int:
         """How many states are stored: those of every stride-th step, and the last."""
         return self.run.steps // self.run.stride + 1 + (self.run.steps % self.run.stride > 0)

@@ -63,7 +63,8 @@ class Recorder:
         self.points = Thinned(1 + names.dimension, POINTS)
         self.finder = None
         if run.section is not None:
-            self.finder = CrossingFinder[Session](function_of(run.section, names.coordinates, parameters), experiment.h)
+            section = function_of(run.section, names.coordinates, parameters, names.time)
+            self.finder = CrossingFinder[Session](section, experiment.h, experiment.t0, timed=bool(names.time))
         self.identity = {
             "phigen": __version__,
             "spec": compilation.spec.source_sha256,
@@ -75,6 +76,7 @@ class Recorder:
             "steps": run.steps,
             "stride": run.stride,
             "initial": list(experiment.initial),
+            **({"start": experiment.t0} if names.time else {}),
             "parameters": parameters,
             "files": [path.name if path else None for path in (files.output, files.section)],
             "lyapunov": lyapunov,
@@ -104,7 +106,7 @@ class Recorder:
         """Stand at the initial state, with new files."""
         initial = np.array(self.experiment.initial)
         try:
-            self.session = self.solver.backend.start(initial, self.experiment.parameters)
+            self.session = self.solver.backend.start(initial, self.experiment.parameters, self.experiment.t0)
         except BackendError as error:
             raise self.solver.failure(error, self.experiment.h, None, self.experiment.parameters) from error
         self._open({})
@@ -126,8 +128,8 @@ class Recorder:
 
     def see(self, piece: Piece) -> None:
         """Take in what a piece of the integration gave."""
-        t = self.experiment.h * piece.numbers.astype(np.float64)
-        energy = self.solver.backend.hamiltonian(piece.x, self.experiment.parameters)
+        t = self.experiment.t0 + self.experiment.h * piece.numbers.astype(np.float64)
+        energy = self.solver.energies(piece.x, t, self.experiment.parameters)
         casimirs = self.solver.backend.casimirs(piece.x, self.experiment.parameters)
         rows = np.column_stack([t, piece.x, energy, casimirs])
         self.watch.see(t, piece.x)
@@ -273,7 +275,7 @@ def compared(
 ) -> tuple[Watch, Trajectory]:
     """A classical method on the same experiment: its errors, and its trajectory as far as a figure can show it."""
     from phigen.study import classical
-    from phigen.study.methods import field_of
+    from phigen.study.methods import extended, field_of
 
     run, parameters, names = experiment.run, experiment.parameters, solver.interface
     start, backend = time.perf_counter(), solver.backend
@@ -282,12 +284,18 @@ def compared(
 
     with console.progress(method, run.steps) as progress:
         x0 = np.array(experiment.initial)
-        for numbers, x in classical.pieces_of(
-            method, field_of(solver, parameters), x0, experiment.h, run.steps, run.stride
+        for numbers, found in classical.pieces_of(
+            method,
+            field_of(solver, parameters),
+            extended(solver, x0, experiment.t0),
+            experiment.h,
+            run.steps,
+            run.stride,
         ):
-            t = experiment.h * numbers.astype(np.float64)
+            x = found[:, : len(x0)]
+            t = experiment.t0 + experiment.h * numbers.astype(np.float64)
             watch.see(t, x)
-            energy, casimirs = backend.hamiltonian(x, parameters), backend.casimirs(x, parameters)
+            energy, casimirs = solver.energies(x, t, parameters), backend.casimirs(x, parameters)
             sketch.see(np.column_stack([t, x, energy, casimirs]))
             if progress and len(numbers):
                 progress(int(numbers[-1]))

@@ -38,9 +38,9 @@ def studied(
     methods = list(dict.fromkeys([*(run.compare or COMPARED), "dop853"]))
     console.note(f"{compilation.spec.name}: measuring errors and times")
     if toolchain.available():
-        compared = race.compiled(compilation, methods, x0, experiment.parameters)
+        compared = race.compiled(compilation, methods, x0, experiment.parameters, experiment.t0)
     else:
-        compared = race.interpreted(solver_of(compilation, "numpy"), methods, x0, experiment.parameters)
+        compared = race.interpreted(solver_of(compilation, "numpy"), methods, x0, experiment.parameters, experiment.t0)
     steps = min(run.steps, _FEW_STEPS) if quick else run.steps
     solution, casimirs = _closed_form(compilation, experiment, x0), _casimirs(compilation, experiment, x0)
     rounds = _FEW_ROUNDS if quick else _ROUNDS
@@ -64,7 +64,7 @@ def _closed_form(compilation: Compilation, experiment: Experiment, x0: Floats) -
         return None
 
     def solution(t: float) -> Floats:
-        found = exact_solution(system, run, experiment.parameters, x0, np.array([t]))
+        found = exact_solution(system, run, experiment.parameters, x0, np.array([experiment.t0 + t]))
         return np.array([float(found[c][0]) for c in system.coordinates])
 
     return solution

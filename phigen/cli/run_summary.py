@@ -22,13 +22,16 @@ def print_summary(compilation: Compilation, recorder: Recorder, summaries: Seque
     run, solver, steps = recorder.experiment.run, recorder.solver, recorder.session.steps
     out(heading(f"{compilation.spec.name}, run {run.name}") + (f": {run.description}" if run.description else ""))
     chosen = f"{compilation.label}, order {solver.order}, target {solver.target}"
-    out(f"  {steps} steps of {float(run.step):.9g}, t = 0 … {recorder.experiment.h * steps:.9g}; {chosen}")
+    begin, end = recorder.experiment.t0, recorder.experiment.t0 + recorder.experiment.h * steps
+    out(f"  {steps} steps of {float(run.step):.9g}, t = {begin:.9g} … {end:.9g}; {chosen}")
     state = recorder.session.state().tolist()
     final = ", ".join(f"{c} = {v:.9g}" for c, v in zip(solver.coordinates, state, strict=True))
     out(f"  final state: {final}\n")
-    for line in table(_rows(summaries), right=range(1, len(summaries) + 1)):
+    for line in table(_rows(summaries, timed=bool(compilation.system.time)), right=range(1, len(summaries) + 1)):
         out(f"  {line}")
     out(f"  {stated(summaries[0].units)}")
+    if compilation.system.time:
+        out("  The energy balance is H − ∫ ∂H/∂t dt, integrated along the stored states by a rule of order 8.")
     if recorder.finder:
         count = counted(recorder.points.seen, "rising crossing")
         out(f"\n  {count} of the section {recorder.section_text} = 0")
@@ -38,10 +41,13 @@ def print_summary(compilation: Compilation, recorder: Recorder, summaries: Seque
         out(f"  {', '.join(f'{value:.4g}' for value in spectrum.exponents.tolist())};  sum {spectrum.total:.1g}")
 
 
-def _rows(summaries: Sequence[Summary]) -> list[list[str]]:
+def _rows(summaries: Sequence[Summary], *, timed: bool) -> list[list[str]]:
     first = summaries[0]
     rows = [["largest error", *(s.method for s in summaries), ""]]
-    rows.append(["energy", *(_shown(s.energy) for s in summaries), first.energy.unit.kind])
+    energy = "energy balance" if timed else "energy"
+    rows.append([energy, *(_shown(s.energy) for s in summaries), first.energy.unit.kind])
+    if timed:
+        rows.append(["  its integral may be off by", *(f"{s.off:.1e}" for s in summaries), ""])
     if any(math.isfinite(s.energy.growth) for s in summaries):
         growth = [f"{s.energy.growth:.3g}" if math.isfinite(s.energy.growth) else "–" for s in summaries]
         rows.append(["  last tenth/first", *growth, "1 is no drift"])
@@ -75,6 +81,7 @@ def described_run(compilation: Compilation, recorder: Recorder, summaries: Seque
         "step": experiment.h,
         "steps": session.steps,
         "time": experiment.h * session.steps,
+        **({"start": experiment.t0} if solver.interface.time else {}),
         "parameters": experiment.parameters,
         "initial": dict(zip(solver.coordinates, experiment.initial, strict=True)),
         "final": dict(zip(solver.coordinates, session.state().tolist(), strict=True)),

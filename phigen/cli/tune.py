@@ -12,7 +12,7 @@ from phigen.cli.console import Console, out_json, pass_console, verbosity
 from phigen.cli.experiment import prepared
 from phigen.cli.sources import FIGURES, file_ending, load_one, one_spec, run_option
 from phigen.cli.tune_summary import described, print_tuning, unreached
-from phigen.errors import CheckError
+from phigen.errors import CheckError, SpecError
 
 if TYPE_CHECKING:
     from phigen.cli.experiment import Experiment
@@ -68,6 +68,9 @@ def command(
 
         require_matplotlib()
     spec = load_one(spec_file)
+    if spec.time:
+        message = "phigen tune does not compare settings where H depends on the time"
+        raise SpecError([spec.diagnostic(("time",), message, "phigen verify and phigen run measure what is chosen")])
     experiment = prepared(spec, name, settings=settings)
     compilation = compile_proved(spec)
     chosen_target("auto", console.note)

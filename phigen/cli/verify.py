@@ -133,7 +133,7 @@ def verified(
     console.detail(f"{spec.name}: built {', '.join(solvers)}")
     return verify(
         compilation, solvers, run.name, experiment.initial, experiment.parameters, float(run.step), run.steps,
-        run.compare or ("rk4",), quick=quick,
+        run.compare or ("rk4",), t0=float(run.start), quick=quick,
     )  # fmt: skip
 
 

@@ -154,6 +154,7 @@ class SympySystem:
 
     Symbols are real, those of parameters that are positive in the system positive. ``poisson`` is an immutable n×n
     matrix, ``parameters`` maps symbols to their default values. ``casimirs`` are the declared ones and those found.
+    ``time`` is the symbol of the time, None if there is none.
     """
 
     name: str
@@ -163,6 +164,7 @@ class SympySystem:
     parameters: Mapping[Any, Any]
     casimirs: Mapping[str, Any]
     invariants: Mapping[str, Any]
+    time: Any = None
 
 
 class Described(Protocol):
@@ -172,6 +174,10 @@ class Described(Protocol):
     def name(self) -> str: ...
     @property
     def coordinates(self) -> tuple[str, ...]: ...
+    @property
+    def time(self) -> str: ...
+    @property
+    def times(self) -> tuple[str, ...]: ...
     @property
     def parameters(self) -> tuple[Parameter, ...]: ...
     @property
@@ -185,8 +191,8 @@ class Described(Protocol):
 
 
 def symbols_in_sympy(system: Described) -> dict[str, Any]:
-    """The symbols of the coordinates and the parameters, by name."""
-    real = {c: sympy.Symbol(c, real=True) for c in system.coordinates}
+    """The symbols of the coordinates, the parameters and the time, by name."""
+    real = {c: sympy.Symbol(c, real=True) for c in (*system.coordinates, *system.times)}
     given = {p.name: sympy.Symbol(p.name, **_assumed(p)) for p in system.parameters}
     return real | given
 
@@ -222,6 +228,7 @@ def given_back(system: Described) -> SympySystem:
         {symbols[p.name]: sympy.Rational(p.value.numerator, p.value.denominator) for p in system.parameters},
         {name: formula(e) for name, e in system.casimirs.items()},
         {name: formula(e) for name, e in system.invariants.items()},
+        symbols.get(system.time),
     )
 
 
@@ -232,21 +239,26 @@ def parts(
     parameters: Mapping[Any, Any] | None,
     casimirs: Mapping[str, Any] | None,
     invariants: Mapping[str, Any] | None,
+    time: Any = None,
 ) -> dict[str, Any]:
     """What a system from sympy is built of, by the names of `build_system`; see `System.from_sympy`."""
+    when = "" if time is None else _name(time)
     names = tuple(_name(c) for c in coordinates)
     matrix = sympy.Matrix(poisson)
     rows = tuple(tuple(expression(matrix[i, j]) for j in range(matrix.cols)) for i in range(matrix.rows))
     given = tuple(_parameter(p, value) for p, value in (parameters or {}).items())
     formulas = {key: expression(e) for key, e in {**(casimirs or {}), **(invariants or {})}.items()}
     energy = expression(hamiltonian)
-    _expect_known(names, given, [*(e for row in rows for e in row), energy, *formulas.values()])
+    kept = [formulas[key] for key in casimirs or {}]
+    _expect_known(names, given, [*(e for row in rows for e in row), *kept])
+    _expect_known((*names, *filter(None, [when])), given, [energy, *formulas.values()])
     return {
         "coordinates": names,
         "parameters": given,
         "form": MatrixForm(rows),
         "hamiltonian": energy,
         "casimirs": {key: formulas[key] for key in casimirs or {}},
+        "time": when,
         "invariants": {key: formulas[key] for key in invariants or {}},
     }
 

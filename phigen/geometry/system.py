@@ -100,16 +100,18 @@ class System:
         casimirs: Mapping[str, Any] | None = None,
         invariants: Mapping[str, Any] | None = None,
         name: str = "system",
+        time: Any = None,
     ) -> System:
         """A system from sympy objects.
 
         ``coordinates`` are symbols (or names), ``poisson`` an n×n matrix or nested sequence, ``parameters``
-        maps symbols (or names) to default values; a symbol declared positive makes a positive parameter.
+        maps symbols (or names) to default values; a symbol declared positive makes a positive parameter. ``time`` is
+        the symbol (or name) of the time, if the Hamiltonian depends on it.
         Raises `SpecError` for a matrix of the wrong size, unknown symbols and functions.
         """
         from phigen.geometry.sympy_bridge import parts
 
-        return build_system(name, **parts(coordinates, poisson, hamiltonian, parameters, casimirs, invariants))
+        return build_system(name, **parts(coordinates, poisson, hamiltonian, parameters, casimirs, invariants, time))
 
     def to_sympy(self) -> SympySystem:
         """Coordinates, π, H, parameters, Casimirs and invariants as sympy objects; see `SympySystem`."""

@@ -43,6 +43,7 @@ class Dictionary:
         system, gauge = compilation.system, compilation.gauge
         known = symbols_in_sympy(system)
         self.coordinates = tuple(known[c] for c in system.coordinates)
+        self.times = tuple(known[t] for t in system.times)
         self.covector = tuple(free_symbols([f"p_{c}" for c in system.coordinates], known))
         self.step, *free = free_symbols(["h", *(f"lambda_{c}" for c in gauge.free)], [*known, *self.covector])
         self.gauge = dict(zip(gauge.free, free, strict=True))

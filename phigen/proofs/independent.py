@@ -26,7 +26,7 @@ from phigen.series.reference import Source, closed_form, generating_function
 from phigen.series.reference_axioms import defects
 from phigen.series.reference_functions import Functions, Sign, derivative
 from phigen.series.reference_paths import source_of_paths
-from phigen.symbolic.expression import Expression, substitute
+from phigen.symbolic.expression import Expression
 from phigen.symbolic.verdict import CHECKED, POINTS, PROVED, REFUTED, UNDECIDED, Statement, sample_point
 
 #: The time that the second derivation of one spec may take, unless the user says otherwise.
@@ -144,7 +144,7 @@ class _Derivation:
         self._alpha, self._beta = self._given(chart.alpha), self._given(chart.beta)
         source = self._path(0) if chart.path or chart.kind == exponential.KIND else self._alpha
         hamiltonian = self._dictionary.expression(system.hamiltonian)
-        self._mine = generating_function(hamiltonian, source, self._dictionary.coordinates)
+        self._mine = generating_function(hamiltonian, source, self._dictionary.coordinates, self._dictionary.times)
         self._found: list[Any] = []
         self._taken = 0.0
 
@@ -202,8 +202,7 @@ class _Derivation:
         scheme, h = self._compilation.scheme, self._dictionary.step
         assert scheme is not None
         start = time.perf_counter()
-        table = scheme.generating.coefficients
-        slope = substitute(scheme.generating.slope, dict(zip(table.slots, table.values, strict=True)))
+        slope = scheme.generating.coefficients.written_out(scheme.generating.slope)
         pairs: list[Pair] = []
         for c, theirs in zip(self._dictionary.coordinates, slope, strict=True):
             terms = (h**i * derivative(s, c) for i, s in enumerate(self._found[: scheme.terms], 1))

@@ -52,6 +52,7 @@ def corrections(
             order.terms,
             power,
             symmetric=realisation.symmetric,
+            times=system.times,
         )
     except (OverflowError, ValueError) as error:
         raise too_large(system, f"the modified Hamiltonian with {count} corrections is too large: {error}") from None
@@ -70,9 +71,8 @@ def modified_hamiltonian(
 
 def expect_modified(system: System, realisation: BiRealisation, stages: int) -> None:
     """Raise `SpecError` for compositions and approximate bi-realisations, for which it is not computed."""
-    if stages > 1 or not realisation.exact or system.time:
+    if stages > 1 or not realisation.exact:
         why = "a composition" if stages > 1 else "an approximate bi-realisation"
-        why = "a Hamiltonian that depends on the time" if system.time else why
         place = system.locations.get(("modified_hamiltonian",))
         raise SpecError([Diagnostic(f"modified_hamiltonian is not offered for {why}", place)])
 
@@ -83,10 +83,11 @@ def modified_of(
     """The modified Hamiltonian as a kernel. Raises `SpecError` where `expect_modified` does."""
     expect_modified(system, realisation, stages)
     value = modified_hamiltonian(system, realisation, order, count, gauge)
+    time = {"t": system.times} if system.time else {}
     kernel = Kernel(
         "modified",
         f"the Hamiltonian whose flow the step is, with {count} corrections",
-        {"params": system.parameter_names, **gauge.inputs, "h": (STEP,), "x": system.coordinates},
+        {"params": system.parameter_names, **gauge.inputs, "h": (STEP,), **time, "x": system.coordinates},
         (Output("energy", (value,)),),
     )
     return Modified(kernel, order.order + (2 if realisation.symmetric else 1) * count)

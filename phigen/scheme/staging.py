@@ -70,6 +70,10 @@ class Coefficients:
         """Whether an expression does not depend on the state."""
         return all(name in self._static or name in self._inputs for name in symbols_of(e))
 
+    def written_out(self, roots: Sequence[Expression]) -> list[Expression]:
+        """The roots with all coefficients replaced by what they stand for."""
+        return [self._written_out(e) for e in roots]
+
     def slot(self, e: Expression) -> Expression:
         """The coefficient that stands for a state-independent expression; a number stands for itself."""
         if e.is_number:

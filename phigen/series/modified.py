@@ -7,14 +7,16 @@ time written σh, the transform S(σ) = Σ h^r s_r(σ) of H̃_h solves
     ∂_σ s_r = coefficient of h^(r−1) in H̃_h(α(x, ∇S(σ))) = H_{r−1} + known terms,    s_r(0) = 0,
 
 and s_r(1) is S_r for r ≤ k and 0 beyond: one linear equation for each H_{r−1}. The first correction is −h^k S_{k+1}.
-In a symmetric bi-realisation H̃_h is even in h. See section 6 of E. Hairer, C. Lubich, G. Wanner, Geometric Numerical
-Integration, chapter IX, for generating functions on canonical structures.
+In a symmetric bi-realisation H̃_h is even in h. Where H depends on a time τ, so does H̃_h: it is taken at τ − σh/2 on
+the right, to which ½ ∂_τ s_(r−1) is added, as in `phigen.series.hamilton_jacobi`. See section 6 of E. Hairer,
+C. Lubich, G. Wanner, Geometric Numerical Integration, chapter IX, for generating functions on canonical structures.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from fractions import Fraction
 from typing import Any
 
 from phigen.series.hamilton_jacobi import PolynomialSeries, composed, polynomial_series
@@ -47,14 +49,17 @@ def modified_series(
     power: int,
     *,
     symmetric: bool,
+    times: Sequence[str] = (),
 ) -> ModifiedSeries:
     """H_0 … H_power of the method that takes S_1 … S_terms; α must be right up to degree ``power`` in p.
 
     Raises `OverflowError` if a correction has more than `MOST_TERMS` monomials.
     """
-    symbols = [*parameters, FRACTION]
-    kept = polynomial_series(hamiltonian, alpha, coordinates, symbols, min(terms, power + 1), symmetric=symmetric)
-    found = _Recursion(kept, alpha, coordinates)
+    symbols = [*parameters, FRACTION, *times]
+    kept = polynomial_series(
+        hamiltonian, alpha, coordinates, symbols, min(terms, power + 1), symmetric=symmetric, times=times
+    )
+    found = _Recursion(kept, alpha, coordinates, times)
     for r in range(1, power + 2):
         found.advance(r, vanishing=symmetric and r % 2 == 0)
     return ModifiedSeries(kept.tower, tuple(found.terms))
@@ -63,9 +68,12 @@ def modified_series(
 class _Recursion:
     """The state of the recursion: H_0 … H_{r−1}, and the slopes of s_1 … s_r along the coordinates."""
 
-    def __init__(self, kept: PolynomialSeries, alpha: Sequence[Expression], coordinates: Sequence[str]) -> None:
+    def __init__(
+        self, kept: PolynomialSeries, alpha: Sequence[Expression], coordinates: Sequence[str], times: Sequence[str]
+    ) -> None:
         self.tower, self.kept = kept.tower, kept.terms
-        self.alpha, self.coordinates = alpha, coordinates
+        self.alpha, self.coordinates, self.times = alpha, coordinates, times
+        self.last = self.tower.zero  # s_(r−1)
         self.momenta = [momentum(c) for c in coordinates]
         self.terms: list[Poly] = []
         self.slopes: list[list[Poly]] = [[self.tower.zero] * len(coordinates)]
@@ -77,7 +85,11 @@ class _Recursion:
         if vanishing:
             self._keep(self.tower.zero, self.tower.zero)
             return
-        known = self._integral(self.tower.combine([self._level(j, r - 1 - j) for j in range(r - 1)]))
+        levels = [self._level(j, r - 1 - j) for j in range(r - 1)]
+        half = self.tower.constant(Fraction(1, 2))
+        known = self._integral(
+            self.tower.combine([*levels, *(half * self.tower.derivative(self.last, t) for t in self.times)])
+        )
         wanted = self.kept[r - 1] if r <= len(self.kept) else self.tower.zero
         correction = wanted - self._at_one(known)
         if len(correction) > MOST_TERMS:
@@ -85,13 +97,14 @@ class _Recursion:
         self._keep(correction, known + self.tower.variable(FRACTION) * correction)
 
     def _keep(self, correction: Poly, s: Poly) -> None:
+        self.last = s
         self.terms.append(correction)
         self.slopes.append([self.tower.derivative(s, c) for c in self.coordinates])
         if correction == 0:
             self.composed.append(None)
             return
         target = composed(self.tower.expression(correction), self.coordinates, self.alpha)
-        self.composed.append((target, Taylor([target], self.tower, self.momenta)))
+        self.composed.append((target, Taylor([target], self.tower, [*self.momenta, *self.times])))
 
     def _level(self, j: int, level: int) -> Poly:
         """The coefficient of h^level in H_j(α(x, ∇S(σ)))."""
@@ -100,8 +113,14 @@ class _Recursion:
             return self.tower.zero
         target, taylor = pair
         while len(taylor.coefficients(target)) <= level:
-            taylor.advance(dict(zip(self.momenta, self.slopes[len(taylor.coefficients(target))], strict=True)))
+            k = len(taylor.coefficients(target))
+            taylor.advance(dict(zip(self.momenta, self.slopes[k], strict=True)) | self._beginning(k))
         return taylor.coefficients(target)[level]
+
+    def _beginning(self, k: int) -> dict[str, Poly]:
+        """The coefficient of h^k in τ − σh/2, for the symbol of τ."""
+        shift = self.tower.variable(FRACTION) * self.tower.constant(Fraction(-1, 2))
+        return {t: self.tower.variable(t) if k == 0 else shift if k == 1 else self.tower.zero for t in self.times}
 
     def _integral(self, element: Poly) -> Poly:
         """∫_0^σ of an element."""

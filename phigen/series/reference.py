@@ -9,6 +9,9 @@ S_t(x) = t S_1 + t² S_2 + … solves ∂_t S_t(x) = H(α(x, ∇S_t(x))), S_0 = 
 with multi-indices μ ≠ 0 and ν. The coefficients of t^i are (i + 1) S_{i+1} on the left, and on the right a
 polynomial in a_μ, H_ν and ∇S_1 … ∇S_i with |μ|, |ν| ≤ i, since p(t) and Δ(t) begin with t.
 
+Where H depends on a time τ, ∂_t S_t(τ, x) = H(τ − t/2, x + Δ(t)) + ½ ∂_τ S_t: the time is one more variable of Taylor's
+formula, with Δ_τ(t) = −t/2.
+
 The compiler knows none of this: it shares neither the ring, nor derivatives, nor the arithmetic of series.
 """
 
@@ -32,15 +35,16 @@ Coefficients = Mapping[Index, Any]
 Source = Callable[[int], Sequence[Coefficients]]
 
 
-def generating_function(hamiltonian: Any, source: Source, x: Sequence[Any]) -> Iterator[Any]:
+def generating_function(hamiltonian: Any, source: Source, x: Sequence[Any], times: Sequence[Any] = ()) -> Iterator[Any]:
     """S_1, S_2, … without end, as sympy expressions in x and the parameters.
 
-    ``hamiltonian`` is H, ``source`` gives the a_μ: see `closed_form` and `phigen.series.reference_paths`.
+    ``hamiltonian`` is H, ``source`` gives the a_μ: see `closed_form` and `phigen.series.reference_paths`. ``times`` is
+    the time, if H depends on it.
     """
     found: list[Any] = []
     while True:
         i = len(found)
-        found.append(_coefficient(i, taylor(hamiltonian, x, i), source(i), found, x) / (i + 1))
+        found.append(_coefficient(i, taylor(hamiltonian, [*x, *times], i), source(i), found, x, times) / (i + 1))
         yield found[-1]
 
 
@@ -81,15 +85,25 @@ def taylor(f: Any, variables: Sequence[Any], degree: int) -> dict[Index, Any]:
 
 
 def _coefficient(
-    i: int, energy: Coefficients, source: Sequence[Coefficients], known: Sequence[Any], x: Sequence[Any]
+    i: int,
+    energy: Coefficients,
+    source: Sequence[Coefficients],
+    known: Sequence[Any],
+    x: Sequence[Any],
+    times: Sequence[Any],
 ) -> Any:
-    """[t^i] Σ_ν H_ν Δ(t)^ν, with Δ(t) = Σ_μ a_μ p(t)^μ and p(t) = Σ_j t^j ∇S_j."""
+    """[t^i] Σ_ν H_ν Δ(t)^ν + ½ ∂_τ S_t, with Δ(t) = Σ_μ a_μ p(t)^μ, p(t) = Σ_j t^j ∇S_j, and Δ_τ(t) = −t/2."""
     slopes = [[derivative(s, c) for s in known] for c in x]
     every = [*energy.values(), *(a for d in source for a in d.values()), *(g for row in slopes for g in row)]
-    functions = Functions(every)
+    rates = [derivative(s, t) / 2 for t in times for s in known[-1:]]
+    functions = Functions([*every, *rates])
     momentum = Series(functions, lambda k, j: functions.element(slopes[k][j - 1]))
-    displacement = Series(functions, lambda k, j: momentum.combined(source[k], j))
-    found = displacement.combined(energy, i)
+    back = {1: functions.element(sympy.Rational(-1, 2))}
+    displacement = Series(
+        functions,
+        lambda k, j: momentum.combined(source[k], j) if k < len(x) else back.get(j, functions.ring.zero),
+    )
+    found = functions.total([displacement.combined(energy, i), *map(functions.element, rates)])
     zero = functions.seems_zero(found) and functions.vanishes(found)  # of even index in a symmetric bi-realisation
     return sympy.Integer(0) if zero else functions.expression(found)
 

@@ -99,7 +99,12 @@ class FrameGrowth:
 
 
 def spectrum(
-    solver: Solver, x0: ArrayLike, h: float, steps: int, parameters: Mapping[str, float] | None = None
+    solver: Solver,
+    x0: ArrayLike,
+    h: float,
+    steps: int,
+    parameters: Mapping[str, float] | None = None,
+    t0: float | None = None,
 ) -> Spectrum:
     """The Lyapunov exponents along ``steps`` steps of size ``h`` from ``x0`` (DIM,).
 
@@ -107,6 +112,6 @@ def spectrum(
     arguments.
     """
     growth = FrameGrowth(len(solver.coordinates), h)
-    for _, tangent in solver.tangents(x0, h, steps, parameters=parameters):
+    for _, tangent in solver.tangents(x0, h, steps, t0=t0, parameters=parameters):
         growth.see(tangent)
     return growth.spectrum()

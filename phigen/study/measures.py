@@ -80,7 +80,7 @@ def tangent_error(method: Method, x: Floats, h: float) -> float:
 
 def reversal(method: Method, x: Floats, h: float) -> float:
     """|Φ_{−h}(Φ_h(x)) − x|, relative to the largest coordinate."""
-    return float(np.max(np.abs(method.step(method.step(x, h), -h) - x))) / float(np.max(np.abs(x)))
+    return float(np.max(np.abs(method.after(h).step(method.step(x, h), -h) - x))) / float(np.max(np.abs(x)))
 
 
 def largest_step(method: Method, states: Sequence[Floats], h: float, most: float = 256.0) -> float:

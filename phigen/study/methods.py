@@ -21,28 +21,41 @@ _WEIGHTS = ((1, 3 / 4), (2, -3 / 20), (3, 1 / 60))
 class Method:
     """``step(x, h)`` maps states (DIM,), ``rows(x, h, steps, stride)`` gives (rows, DIM); both raise `StepError`.
 
-    ``tangent(x, h)`` is the derivative (DIM, DIM) of a step that the code itself states, None if it states none.
+    ``tangent(x, h)`` is the derivative (DIM, DIM) of a step that the code itself states, None if it states none. All
+    begin at one time; ``later(h)`` is the method that begins later.
     """
 
     name: str
     step: Callable[[Floats, float], Floats]
     rows: Callable[[Floats, float, int, int], Floats]
     tangent: Callable[[Floats, float], Floats] | None = None
+    later: Callable[[float], Method] | None = None
+
+    def after(self, h: float) -> Method:
+        """The method for what begins so much later."""
+        return self.later(h) if self.later else self
 
 
-def of_solver(solver: Solver, parameters: Mapping[str, float], gauge: Floats | None = None) -> Method:
+def of_solver(solver: Solver, parameters: Mapping[str, float], gauge: Floats | None = None, t0: float = 0.0) -> Method:
     """A generated solver; with a ``gauge``, all steps are those of one map, whatever they start from."""
     fixed = solver if gauge is None else Solver(solver.backend.with_gauge(gauge), solver.interface)
+    begin = t0 if solver.interface.time else None
     return Method(
         solver.target,
-        lambda x, h: fixed.step(x, h, parameters=parameters),
-        lambda x, h, steps, stride: fixed.integrate(x, h, steps, stride, parameters=parameters).x,
-        lambda x, h: fixed.step_tangent(x, h, parameters=parameters)[1],
+        lambda x, h: fixed.step(x, h, t0=begin, parameters=parameters),
+        lambda x, h, steps, stride: fixed.integrate(x, h, steps, stride, t0=begin, parameters=parameters).x,
+        lambda x, h: fixed.step_tangent(x, h, t0=begin, parameters=parameters)[1],
+        (lambda h: of_solver(solver, parameters, gauge, t0 + h)) if solver.interface.time else None,
     )
 
 
 def field_of(solver: Solver, parameters: Mapping[str, float]) -> Callable[[Floats], Floats]:
-    """The vector field of a solver at one state (DIM,), without the checks that the public method makes each time."""
+    """The vector field of a solver at one state (DIM,), without the checks that the public method makes each time.
+
+    Where it depends on the time, that is one more coordinate, the last: see `extended`.
+    """
+    if solver.interface.time:
+        return lambda x: np.append(solver.backend.vector_field(x[None, :-1], parameters, x[-1:])[0], 1.0)
 
     def field(x: Floats) -> Floats:
         slope: Floats = solver.backend.vector_field(x[None, :], parameters)[0]
@@ -51,13 +64,18 @@ def field_of(solver: Solver, parameters: Mapping[str, float]) -> Callable[[Float
     return field
 
 
-def of_classical(name: str, solver: Solver, parameters: Mapping[str, float]) -> Method:
+def extended(solver: Solver, x: Floats, t0: float) -> Floats:
+    """The state that `field_of` starts from."""
+    return np.append(x, t0) if solver.interface.time else x
+
+
+def of_classical(name: str, solver: Solver, parameters: Mapping[str, float], t0: float = 0.0) -> Method:
     """A classical method on the vector field of a solver."""
 
     field = field_of(solver, parameters)
 
     def rows(x: Floats, h: float, steps: int, stride: int) -> Floats:
-        found = classical.integrate(name, field, x, h, steps, stride)
+        found = classical.integrate(name, field, extended(solver, x, t0), h, steps, stride)[:, : len(x)]
         if not np.isfinite(found).all():
             raise StepError(f"{name} left the finite numbers", step=0, status="NOT_FINITE")
         return found
@@ -66,7 +84,8 @@ def of_classical(name: str, solver: Solver, parameters: Mapping[str, float]) -> 
         image: Floats = rows(x, h, 1, 1)[-1]
         return image
 
-    return Method(name, step, rows)
+    later = (lambda h: of_classical(name, solver, parameters, t0 + h)) if solver.interface.time else None
+    return Method(name, step, rows, later=later)
 
 
 def by_differences(method: Method, x: Floats, h: float) -> Floats:

@@ -18,7 +18,7 @@ from phigen.errors import StepError
 from phigen.runtime import cache
 from phigen.runtime.solver import Solver
 from phigen.study import classical, dop853
-from phigen.study.methods import field_of
+from phigen.study.methods import extended, field_of
 from phigen.symbolic.arrays import Floats
 
 #: The label of the solver among the methods.
@@ -48,14 +48,18 @@ class Race:
     language: str
 
 
-def compiled(compilation: Compilation, methods: Sequence[str], start: Floats, parameters: Mapping[str, float]) -> Race:
+def compiled(
+    compilation: Compilation, methods: Sequence[str], start: Floats, parameters: Mapping[str, float], t0: float = 0.0
+) -> Race:
     """The solver and those of the methods that are explicit, in C. Raises `ToolchainError`."""
     from phigen.targets.rendering import render
 
     name = compilation.program.name
     files = emit(compilation.program, "c", "phigen report")
     explicit = [m for m in methods if m in TABLEAUX]
-    values = {"name": name, "methods": [_printed(m) for m in explicit]}
+    timed = bool(compilation.program.time)
+    values: dict[str, object] = {"name": name, "methods": [_printed(m, timed=timed) for m in explicit], "time": timed}
+    values |= {"start": f", {t0!r}" * timed, "now": f"{t0!r} + (double)n * h, " * timed}
     source = render("timing", "race.c", values)
     library = cache.load({f"{name}.h": files[f"{name}.h"], f"{name}.inc": files[f"{name}.c"], f"{name}_race.c": source})
     packed = np.array(list(parameters.values()) or [0.0])
@@ -84,23 +88,27 @@ def compiled(compilation: Compilation, methods: Sequence[str], start: Floats, pa
     return Race({OWN: own, **{m: runner(m, packed) for m in explicit}}, set_up, "C")
 
 
-def interpreted(solver: Solver, methods: Sequence[str], start: Floats, parameters: Mapping[str, float]) -> Race:
+def interpreted(
+    solver: Solver, methods: Sequence[str], start: Floats, parameters: Mapping[str, float], t0: float = 0.0
+) -> Race:
     """The solver and the methods as Python runs them."""
+
+    begin = t0 if solver.interface.time else None
 
     def own(h: float, steps: int, repeats: int) -> Floats | None:
         try:
             for _ in range(repeats):
-                found: Floats = solver.integrate(start, h, steps, steps, parameters=parameters).x[-1]
+                found: Floats = solver.integrate(start, h, steps, steps, t0=begin, parameters=parameters).x[-1]
         except StepError:
             return None
         return found
 
-    field = field_of(solver, parameters)
+    field, first = field_of(solver, parameters), extended(solver, start, t0)
 
     def runner(method: str) -> Runner:
         def run(h: float, steps: int, repeats: int) -> Floats | None:
             for _ in range(repeats):
-                found: Floats = classical.integrate(method, field, start, h, steps, steps)[-1]
+                found: Floats = classical.integrate(method, field, first, h, steps, steps)[-1, : len(start)]
             return found if np.isfinite(found).all() else None
 
         return run
@@ -109,9 +117,10 @@ def interpreted(solver: Solver, methods: Sequence[str], start: Floats, parameter
     return Race(runners, lambda repeats: None, "Python")
 
 
-def _printed(method: str) -> tuple[str, int, list[tuple[int, str]], str]:
+def _printed(method: str, *, timed: bool) -> tuple[str, int, list[tuple[int, str, str]], str]:
     rows, weights = TABLEAUX[method]
-    return method, len(rows) + 1, [(i, _sum(row)) for i, row in enumerate(rows, start=1)], _sum(weights)
+    stages = [(i, _sum(row), f"t + {sum(row.values())!r} * h, " * timed) for i, row in enumerate(rows, start=1)]
+    return method, len(rows) + 1, stages, _sum(weights)
 
 
 def _sum(weights: Mapping[int, float]) -> str:

@@ -11,11 +11,13 @@ from phigen.symbolic.arrays import Floats, evaluate
 from phigen.symbolic.expression import Expression
 
 
-def function_of(section: Expression, coordinates: Sequence[str], parameters: Mapping[str, float]) -> Function:
-    """The expression for states (rows, DIM), shape (rows,)."""
+def function_of(
+    section: Expression, coordinates: Sequence[str], parameters: Mapping[str, float], time: str = ""
+) -> Function:
+    """The expression for states (rows, DIM), and for their times (rows,) where there is a time: shape (rows,)."""
 
-    def g(states: Floats) -> Floats:
-        values = {**parameters, **{c: states[:, i] for i, c in enumerate(coordinates)}}
+    def g(states: Floats, *t: Floats) -> Floats:
+        values = {**parameters, **{c: states[:, i] for i, c in enumerate(coordinates)}, **dict.fromkeys([time], *t)}
         return np.broadcast_to(evaluate([section], values)[0], len(states))
 
     return g

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from phigen.geometry.system import System
 from phigen.spec.model import Run
+from phigen.study.balance import powers, works
 from phigen.study.conservation import ENERGY, RELATIVE, Unit, rounding, units
 from phigen.symbolic.arrays import Floats, evaluate
 from phigen.symbolic.symbols import ELAPSED, initial
@@ -42,7 +43,8 @@ class Drift:
 class Summary:
     """What one method conserved; ``exact`` is the largest error against the closed form, None if there is none.
 
-    ``good`` rows of the states are finite; the numbers are about these.
+    ``good`` rows of the states are finite; the numbers are about these. Where H depends on the time, ``energy`` is
+    about H − ∫ ∂_tH dt, an integral that may be ``off`` by so much in the same unit.
     """
 
     method: str
@@ -53,6 +55,7 @@ class Summary:
     final: tuple[float, ...]
     good: int
     rows: int
+    off: float = math.nan
 
     @property
     def units(self) -> dict[str, Unit]:
@@ -100,6 +103,10 @@ class Watch:
             "good": np.zeros((), dtype=np.int64),
             "broken": np.zeros((), dtype=bool),
         }
+        self._powers = powers(system)
+        if self._powers:  # the last time with the powers there; the work since the start, and how far that may be off
+            self.state |= {"instant": np.full(1 + len(self._powers), np.nan), "work": np.zeros(2)}
+            self.state["since"] = np.zeros(())
 
     @property
     def begun(self) -> bool:
@@ -115,8 +122,11 @@ class Watch:
         if count == 0:
             return
         t, x = t[:count], x[:count]
-        columns = {c: x[:, i] for i, c in enumerate(self._system.coordinates)}
-        values = [np.broadcast_to(a, t.shape) for a in evaluate(self._formulas, {**self._parameters, **columns})]
+        columns = {c: x[:, i] for i, c in enumerate(self._system.coordinates)} | dict.fromkeys(self._system.times, t)
+        known = {**self._parameters, **columns}
+        values = [np.broadcast_to(a, t.shape) for a in evaluate(self._formulas, known)]
+        if self._powers:
+            values[0] = values[0] - self._work(t, [np.broadcast_to(a, t.shape) for a in evaluate(self._powers, known)])
         if good == 0:
             state |= {"first": x[0].copy(), "start": np.array([v[0] for v in values])}
         state["good"] = np.asarray(good + count)
@@ -128,6 +138,18 @@ class Watch:
             off = _against_exact(self._system, self._run, self._parameters, state["first"], t, x)
             state["exact"] = np.asarray(max(off, float(state["exact"])))
         state["final"] = x[-1].copy()
+
+    def _work(self, t: Floats, found: Sequence[Floats]) -> Floats:
+        """∫ ∂_tH dt up to each of the times, which follow those seen before, from the powers there."""
+        state = self.state
+        if not self.begun:
+            state |= {"instant": np.array([t[0], *(f[0] for f in found)]), "since": np.asarray(t[0])}
+        rows = np.concatenate([state["instant"][:, np.newaxis], np.array([t, *found])], axis=1)
+        parts, off = works(rows[0], rows[1:])
+        sums: Floats = state["work"][0] + np.cumsum(parts)
+        state["work"] = np.array([sums[-1], state["work"][1] + np.sum(off)])
+        state["instant"] = rows[:, -1].copy()
+        return sums
 
     def summary(self) -> Summary:
         """The summary of what was seen."""
@@ -146,11 +168,13 @@ class Watch:
             final=tuple(state["final"].tolist()),
             good=int(state["good"]),
             rows=rows,
+            off=float(state["work"][1]) / named[ENERGY]["H"].unit.size if self._powers else math.nan,
         )
 
     def _units(self) -> Sequence[Unit]:
         if not self._found and self.begun:
-            self._found = units(self._formulas, self._system.coordinates, self._parameters, self.state["first"])
+            known = {**self._parameters, **{t: float(self.state["since"]) for t in self._system.times}}
+            self._found = units(self._formulas, self._system.coordinates, known, self.state["first"])
         return self._found or [Unit()] * len(self._formulas)
 
     def _see_turns(self, x: Floats, windows: NDArray[np.int64]) -> None:

@@ -86,6 +86,7 @@ class Subject:
     start: Floats
     h: float
     steps: int
+    t0: float = 0.0
 
     @property
     def main(self) -> Method:
@@ -108,19 +109,22 @@ def verify(
     steps: int,
     compare: Sequence[str] = ("rk4",),
     *,
+    t0: float = 0.0,
     quick: bool = False,
 ) -> Verification:
     """Measure and judge the solvers of a compilation (by target, with their tangent maps) on the numbers of a run.
+
+    All begins at the time ``t0``, single steps from states along the run too.
 
     Raises `StepError` if the run itself cannot be made.
     """
     x = np.array(start, dtype=np.float64)
     gauge = gauge_at(compilation, x, parameters)
-    own = {target: of_solver(solver, parameters, gauge) for target, solver in solvers.items()}
+    own = {target: of_solver(solver, parameters, gauge, t0) for target, solver in solvers.items()}
     solver = next(iter(solvers.values()))
-    others = {name: of_classical(name, solver, parameters) for name in compare}
+    others = {name: of_classical(name, solver, parameters, t0) for name in compare}
     made = min(steps, FEW_STEPS if quick else MOST_STEPS)
-    subject = Subject(compilation, solver, own, others, parameters, x, h, made)
+    subject = Subject(compilation, solver, own, others, parameters, x, h, made, t0)
     rows = subject.main.rows(x, h, made, 1)
     states = [rows[i] for i in np.linspace(0, made, STATES, dtype=int)] if made >= STATES else [x]
     order, symmetry = compilation.order.order, "symmetric" if compilation.symmetric else "not symmetric"
@@ -140,7 +144,7 @@ def verify(
             step_check(subject, states),
             *modified_checks(subject, gauge),
         ),
-        units_of(compilation.system, parameters, x),
+        units_of(compilation.system, {**parameters, **dict.fromkeys(compilation.system.times, t0)}, x),
     )
 
 
@@ -180,7 +184,7 @@ def order_check(subject: Subject, *, quick: bool = False) -> Check:
 
 def _reference(subject: Subject) -> Callable[[float], tuple[Floats, float]]:
     """The solution at a time, by DOP853 with halved steps until two results agree; and how far they agree."""
-    solver = of_classical("dop853", subject.solver, subject.parameters)
+    solver = of_classical("dop853", subject.solver, subject.parameters, subject.t0)
     found: dict[float, tuple[Floats, float]] = {}
 
     def reference(t: float) -> tuple[Floats, float]:
@@ -220,12 +224,13 @@ def conservation_checks(subject: Subject, rows: Floats) -> Iterator[Check]:
         yield Check(f"Casimir {name}: largest error", drift.error, limit, passed, reason, _errors(drifts))
         yield Check(f"Casimir {name}: last/first window", drift.growth, others=_growths(drifts))
     energy, drifts = own.energy, {m: s.energy if s else None for m, s in others.items()}
-    yield Check("energy: largest error", energy.error, others=_errors(drifts))
+    what = "energy balance" if system.time else "energy"
+    yield Check(f"{what}: largest error", energy.error, others=_errors(drifts))
     judged = math.isfinite(energy.growth) and subject.exact and _recurrent(rows)
     passed = not judged or energy.growth <= GROWTH
     reason = f"the error of the last tenth is {energy.growth:.1f} times that of the first"
     limit = f"at most {GROWTH:g}" if judged else ""
-    yield Check("energy: last/first window", energy.growth, limit, passed, reason, _growths(drifts))
+    yield Check(f"{what}: last/first window", energy.growth, limit, passed, reason, _growths(drifts))
 
 
 def _errors(drifts: Mapping[str, Drift | None]) -> dict[str, float]:
@@ -242,7 +247,7 @@ def _terms(subject: Subject, quantity: Expression, rows: Floats) -> float:
 
 
 def _summary(subject: Subject, name: str, rows: Floats) -> Summary:
-    times: Floats = subject.h * np.arange(len(rows), dtype=np.float64)
+    times: Floats = subject.t0 + subject.h * np.arange(len(rows), dtype=np.float64)
     return summarise(name, subject.compilation.system, None, subject.parameters, times, rows)
 
 

@@ -7,6 +7,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+import sympy
 from scipy.integrate import solve_ivp
 from support import COMMAND, compile_text, solver, tool
 
@@ -15,6 +16,7 @@ from phigen import spec
 from phigen.compiler import compile_spec, emit, examine
 from phigen.errors import SpecError
 from phigen.geometry.system import system_from_spec
+from phigen.proofs.independent import compare
 from phigen.realisations.catalogue import realise
 from phigen.scheme.discretisation import hamilton_jacobi
 from phigen.series.hamilton_jacobi import graph_series, residual
@@ -280,3 +282,37 @@ def test_the_python_api_takes_a_start(tmp_path):
     path.write_text(f"phigen: 1\nname: driven\n{PENDULUM}", encoding="utf-8")
     found = phigen.compile(phigen.load(path), target="numpy")
     assert found.step([1, 0], H, t0=T0) == pytest.approx(found.integrate([1, 0], H, 1, t0=T0).x[-1], abs=0)
+
+
+@pytest.mark.parametrize("kind", ["constant", "canonical-euler"])
+def test_a_step_is_the_flow_of_the_modified_hamiltonian_which_depends_on_the_time(kind):
+    given = spec.loads(f"phigen: 1\nname: t\n{PENDULUM}order: 2\nmodified_hamiltonian: 2\n")
+    compilation = compile_spec(replace(given, birealisation=BirealisationChoice(kind)))
+    found, x0 = solver(compilation, "numpy"), np.array([0.6, 0.5])
+    modified, width = found.backend.module.modified_hamiltonian, 1e-4
+
+    def field(t, x, h):
+        q, p = ((modified(x + e, h, t) - modified(x - e, h, t)) / (2 * width) for e in width * np.eye(2))
+        return [p, -q]
+
+    missed = []
+    for h in (0.4, 0.2):
+        flow = solve_ivp(field, (T0, T0 + h), x0, method="DOP853", rtol=1e-12, atol=1e-13, args=(h,)).y[:, -1]
+        missed.append(np.max(np.abs(found.step(x0, h, t0=T0) - flow)))
+    assert np.log2(missed[0] / missed[1]) > compilation.program.modified.power + 0.6
+
+
+@pytest.mark.parametrize("kind", ["newton, log-canonical", "newton, not symmetric"])
+def test_sympy_derives_the_same_series(kind):
+    found = list(compare(compilation_of(kind), 3))
+    assert {c.statement.verdict for c in found} == {"proved"}
+    assert ("∇S_h" in [c.statement.name for c in found]) == compilation_of(kind).realisation.symmetric
+
+
+def test_systems_from_sympy_may_have_a_time():
+    q, p, t = sympy.symbols("q p t", real=True)
+    system = phigen.System.from_sympy([q, p], [[0, 1], [-1, 0]], p**2 / 2 + q**2 / 2 - q * sympy.cos(t), time=t)
+    assert system.to_sympy().time == t
+    assert phigen.compile(system, target="numpy").integrate([1, 0], H, 3, t0=1.0).t[-1] == 1.0 + 3 * H
+    with pytest.raises(SpecError, match="unknown symbol t"):
+        phigen.System.from_sympy([q, p], [[0, t], [-t, 0]], p**2 / 2, time=t)

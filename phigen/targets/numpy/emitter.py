@@ -73,7 +73,12 @@ def emit(program: Program, command: str) -> dict[str, str]:
     if program.extras.tangent:
         pieces += _tangent(program)
     if program.modified:
-        values = {"modified_power": program.modified.power}
+        values = {
+            "modified_power": program.modified.power,
+            "t_given": ", t" * bool(program.time),
+            "said_at_t": " at the time t" * bool(program.time),
+            "t_passed": ", np.asarray(t, dtype=float)" * bool(program.time),
+        }
         pieces += [_function(program, program.modified.kernel), render("numpy", "modified.py", values)]
     body = "\n\n".join(p.strip("\n") + "\n" for p in pieces)
     comment = "\n".join(f"# {line}".rstrip() for line in header_lines(program, command))

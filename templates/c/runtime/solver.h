@@ -140,6 +140,8 @@ void phi_vector_field(const phi_params *params, const double x[PHI_DIM], double 
 #if PHI_GAUGE
 double phi_modified_hamiltonian(const phi_params *params, const double gauge[PHI_GAUGES], double h,
     const double x[PHI_DIM]);
+#elif PHI_TIMED
+double phi_modified_hamiltonian(const phi_params *params, double h, double t, const double x[PHI_DIM]);
 #else
 double phi_modified_hamiltonian(const phi_params *params, double h, const double x[PHI_DIM]);
 #endif

@@ -303,6 +303,12 @@ export class Solver {
 
   // #if MODIFIED
   /** The Hamiltonian whose flow a step of size h is, up to O(h^MODIFIED_POWER), at x or elsewhere. */
+  // #if TIMED
+  modifiedHamiltonian(h, x = this.x, t = this.t) {
+    modified(this.params, h, t, x, number);
+    return number[0];
+  }
+  // #else
   modifiedHamiltonian(h, x = this.x) {
     // #if GAUGE
     modified(this.params, this.gauge, h, x, number);
@@ -311,6 +317,7 @@ export class Solver {
     // #endif
     return number[0];
   }
+  // #endif
 
   // #endif
   /** The Casimirs, in the order of CASIMIRS. */

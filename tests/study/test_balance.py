@@ -1,0 +1,88 @@
+"""Where H depends on the time: the balance of energy, and verification from any time on."""
+
+import json
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+from scipy.integrate import quad
+from support import compile_text, solver
+
+from phigen.cli import group
+from phigen.geometry.system import system_from_spec
+from phigen.spec import loads
+from phigen.study.balance import powers, works
+from phigen.study.summary import summarise
+from phigen.study.verification import verify
+
+DUFFING = """time: t
+coordinates: [q, p]
+poisson: {canonical: {q: [q], p: [p]}}
+hamiltonian: p**2/2 - q**2/2 + q**4/4 - 0.3*q*cos(1.2*t)
+order: 6
+tangent: true
+"""
+
+
+def test_the_rule_is_of_order_eight():
+    t = np.array([0.3, 0.8, 2.0])
+    by_degree = [np.polynomial.Polynomial.basis(degree) for degree in range(9)]
+    for degree, p in enumerate(by_degree):
+        f = np.array([p.deriv(k)(t) if k else p(t) for k in range(4)])
+        parts, off = works(t, f)
+        exact = np.diff(p.integ()(t))
+        assert (np.max(np.abs(parts - exact)) < 1e-12) == (degree < 8)
+        assert (np.max(off) < 1e-12) == (degree < 6)
+
+
+def test_powers_are_derivatives_along_the_motion():
+    system = system_from_spec(loads(f"phigen: 1\nname: t\n{DUFFING}"))
+    assert len(powers(system)) == 4
+    t = np.arange(0, 4.0, 0.25)
+    free = "time: t\ncoordinates: [q, p]\npoisson: {canonical: {q: [q], p: [p]}}\nhamiltonian: p**2/2 - q*t"
+    x = np.stack([t**3 / 6, t**2 / 2], axis=1)  # q¨ = t, and the power is −q
+    found = summarise("exact", system_from_spec(loads(f"phigen: 1\nname: t\n{free}\n")), None, {}, t, x)
+    assert found.energy.error < 1e-14
+    assert found.off < 1e-14
+
+
+def test_the_balance_is_kept_to_the_order_of_the_method_and_has_no_drift():
+    compilation = compile_text(DUFFING)
+    errors = []
+    for h in (0.1, 0.05):
+        rows = solver(compilation, "c").integrate([1.2, 0], h, round(100 / h), t0=0.4)
+        found = summarise("phigen", compilation.system, None, {}, rows.t, rows.x)
+        errors.append(found.energy.error)
+        assert found.energy.growth < 4
+    assert np.log2(errors[0] / errors[1]) == pytest.approx(6, abs=0.5)
+    work = quad(lambda t: 0.36 * np.interp(t, rows.t, rows.x[:, 0]) * np.sin(1.2 * t), 0.4, 10.4, limit=500)[0]
+    assert rows.energy[200] - rows.energy[0] == pytest.approx(work, abs=2e-3)
+
+
+def test_all_checks_hold_from_any_time_on():
+    compilation = compile_text(DUFFING)
+    solvers = {target: solver(compilation, target) for target in ("c", "numpy")}
+    found = verify(compilation, solvers, "r", [1.2, 0], {}, 0.1, 200, t0=0.7, quick=True)
+    assert found.failures == []
+    named = {c.name: c for c in found.checks}
+    assert named["observed order"].value > 5.7
+    assert named["Poisson defect, exact tangent"].value < 1e-13
+    assert named["energy balance: largest error"].value < named["energy balance: largest error"].others["rk4"]
+
+
+def test_a_run_begins_at_its_time(tmp_path):
+    runner = CliRunner()
+    path = tmp_path / "duffing.yaml"
+    run = "{initial: [1.2, 0], step: 0.1, steps: 60, start: 0.7, section: q - cos(t), compare: [rk4]}"
+    path.write_text(f"phigen: 1\nname: duffing\n{DUFFING}runs: {{r: {run}}}\n", encoding="utf-8")
+    done = runner.invoke(group, ["run", str(path), "--json", "--output", str(tmp_path / "o.npz")])
+    assert done.exit_code == 0, done.output
+    told = json.loads(done.stdout)
+    stored = np.load(tmp_path / "o.npz")
+    assert told["start"] == 0.7
+    assert stored["t"][[0, -1]].tolist() == [0.7, 0.7 + 60 * 0.1]
+    mine, other = (m["energy"]["error"] for m in told["methods"])
+    assert 0 < mine < other
+    shown = runner.invoke(group, ["run", str(path)])
+    assert "energy balance" in shown.output
+    assert "t = 0.7 … 6.7" in shown.output
