@@ -2,6 +2,13 @@
 
 from __future__ import annotations
 
+import numpy as np
+
+from phigen.lattice.cell import Cell
+from phigen.lattice.states import Start
+from phigen.symbolic.arrays import evaluate
+from phigen.symbolic.expression import Expression
+
 SPINS = """\
 phigen: 1
 name: spins
@@ -137,3 +144,13 @@ LATTICES = {
     "food_web": FOOD_WEB,
     "vortices": VORTICES,
 }
+
+
+def on_grid(cell: Cell, start: Start, expression: Expression) -> np.ndarray:
+    """An expression at every site of a periodic grid, neighbours by shifted arrays."""
+    found = {n: v for n, v in start.parameters.items() if n not in cell.neighbours.names}
+    fields = dict(zip(cell.fields, start.state, strict=True))
+    for symbol, (base, offset) in cell.places(expression).items():
+        array = fields[base] if base in fields else start.parameters[base]
+        found[symbol] = np.roll(array, [-o for o in offset], axis=tuple(range(len(offset))))
+    return np.broadcast_to(evaluate([expression], found)[0], start.sizes)

@@ -7,7 +7,7 @@ from functools import cache
 
 import numpy as np
 import pytest
-from lattice.lattices import LATTICES
+from lattice.lattices import LATTICES, on_grid
 
 from phigen.geometry.checks import check
 from phigen.geometry.system import System, system_from_spec
@@ -19,7 +19,7 @@ from phigen.spec import loads
 from phigen.spec.model import Spec
 from phigen.spec.yaml_text import spec_text
 from phigen.symbolic.arrays import evaluate
-from phigen.symbolic.expression import Expression, gradient
+from phigen.symbolic.expression import gradient
 from phigen.symbolic.verdict import REFUTED
 
 GRIDS = [n for n, text in LATTICES.items() if "axes" in text]
@@ -38,16 +38,6 @@ def values(name: str) -> dict[str, float]:
     """Coordinates and parameters of the ordinary system, where the run starts."""
     _, _, start, expansion, system = prepared(name)
     return expansion.numbers(start.parameters) | dict(zip(system.coordinates, start.state.reshape(-1), strict=True))
-
-
-def on_grid(cell: Cell, start: Start, expression: Expression) -> np.ndarray:
-    """An expression at every site of a periodic grid, neighbours by shifted arrays."""
-    found = {n: v for n, v in start.parameters.items() if n not in cell.neighbours.names}
-    fields = dict(zip(cell.fields, start.state, strict=True))
-    for symbol, (base, offset) in cell.places(expression).items():
-        array = fields[base] if base in fields else start.parameters[base]
-        found[symbol] = np.roll(array, [-o for o in offset], axis=tuple(range(len(offset))))
-    return np.broadcast_to(evaluate([expression], found)[0], start.sizes)
 
 
 @pytest.mark.parametrize("name", [n for n in GRIDS if "open" not in LATTICES[n]])

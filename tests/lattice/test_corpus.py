@@ -1,0 +1,62 @@
+"""The lattices that come with phigen: documented, proved, and the same as their expansions."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from lattice.lattices import on_grid
+
+from phigen.compiler import examine
+from phigen.geometry.system import system_from_spec
+from phigen.lattice.building import cell_from_spec, least_sizes
+from phigen.lattice.cell import vector_field
+from phigen.lattice.expansion import expand
+from phigen.lattice.states import start_of
+from phigen.spec import load
+from phigen.symbolic.arrays import evaluate
+from phigen.symbolic.verdict import PROVED
+
+FILES = sorted(Path(__file__).with_name("corpus").glob("*.yaml"))
+PERIODIC = [f for f in FILES if "axes" in f.read_text(encoding="utf-8") and "open" not in f.read_text(encoding="utf-8")]
+
+
+def test_the_corpus_has_every_relation_of_sites() -> None:
+    assert len(FILES) >= 14
+    cells = [cell_from_spec(load(f)) for f in FILES]
+    assert {c.relation for c in cells} == {"grid", "graph", "pairs"}
+    assert {len(c.axes) for c in cells} == {0, 1, 2, 3}
+    assert any(not c.is_local and c.relation == "grid" for c in cells)
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda p: p.stem)
+def test_a_lattice_is_documented_proved_and_starts(path: Path) -> None:
+    spec = load(path)
+    assert spec.name == path.stem
+    assert spec.title
+    assert spec.references
+    assert {s.name: s.verdict for s in examine(spec).statements if s.verdict != PROVED} == {}
+    for run in spec.runs.values():
+        start = start_of(spec, run)
+        assert start.state.shape == (len(spec.coordinates), *start.sizes)
+        assert np.all(np.isfinite(start.state))
+
+
+@pytest.mark.parametrize("path", PERIODIC, ids=lambda p: p.stem)
+def test_a_small_one_moves_as_its_expansion(path: Path) -> None:
+    spec = load(path)
+    cell = cell_from_spec(spec)
+    run = next(iter(spec.runs.values()))
+    sizes = tuple(n + 1 for n in least_sizes(cell))
+    start = start_of(spec, replace(run, lattice=replace(run.lattice, sizes=sizes)))
+    state = start.state + np.random.default_rng(1).uniform(0.1, 0.3, size=start.state.shape)
+    start = replace(start, state=state)
+    expansion = expand(cell, sizes)
+    system = system_from_spec(expansion.spec())
+    values = expansion.numbers(start.parameters) | dict(zip(system.coordinates, state.reshape(-1), strict=True))
+    energy, *rates = evaluate([system.hamiltonian, *system.vector_field()], values)
+    np.testing.assert_allclose(on_grid(cell, start, cell.hamiltonian).sum(), energy, rtol=1e-12)
+    for mine, theirs in zip(vector_field(cell).values(), np.reshape(rates, state.shape), strict=True):
+        np.testing.assert_allclose(on_grid(cell, start, mine), theirs, rtol=1e-11, atol=1e-11)
