@@ -13,15 +13,16 @@ import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from os import PathLike, fspath
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from phigen import registry, resources
 from phigen import spec as specs
 from phigen.compilation import Compilation
 from phigen.compiler import compile_proved, emit
 from phigen.errors import Diagnostic, PhigenWarning, SpecError
-from phigen.geometry.system import System, system_from_spec
+from phigen.geometry.system import System, system_from_spec, system_of_lattice
 from phigen.proofs.examination import located
+from phigen.scheme.steps import Sweeps
 from phigen.spec import limits
 from phigen.spec.model import Extras, Spec
 from phigen.spec.names import ARGUMENT_HINT, ARGUMENTS, IDENTIFIER, PROFILES, SCHEMES, SPEC_NAME, TIMED_ARGUMENTS
@@ -31,6 +32,7 @@ if TYPE_CHECKING:
     from phigen.notation.sympy_formulas import SympyFormulas
     from phigen.runtime.backend import Backend
     from phigen.runtime.interface import Interface
+    from phigen.runtime.lattice import LatticeSolver
     from phigen.runtime.solver import Solver
     from phigen.scheme.program import Program
 
@@ -58,14 +60,15 @@ def compile(
     scheme: str | None = None,
     tangent: bool = False,
     profile: str | None = None,
-) -> Solver:
+) -> Any:
     """A solver of a `System` or a spec, of the path of a spec file, or of the name of a bundled one.
 
     ``target`` is ``c``, ``numpy``, or ``auto``: C if there is a compiler, else NumPy with a `RuntimeWarning`. ``order``
     overrides the order of the spec, ``scheme`` (``series``, ``splitting``, ``auto``) its scheme; ``tangent`` asks for
     `Solver.step_tangent`, ``profile`` (``fast``, ``small``) overrides that of the C. Compiled C is cached by its
-    content. Raises `SpecError`, `LimitError`, `CheckError` if the mathematics is refuted, e.g. since π is not Poisson,
-    and `ToolchainError` if C was asked for in vain, or by naming a compiler in CC that does not work.
+    content. Gives a `Solver`, of a lattice a `LatticeSolver`. Raises `SpecError`, `LimitError`, `CheckError` if the
+    mathematics is refuted, e.g. since π is not Poisson, and `ToolchainError` if C was asked for in vain, or by naming a
+    compiler in CC that does not work.
     """
     if target != "auto" and not registry.find(target).loader:
         runnable = ", ".join(registry.LOADABLE)
@@ -77,7 +80,7 @@ def compile(
     compilation = compilation_of(source, order, Extras(tangent=True) if tangent else None, scheme)
     if profile is not None:
         compilation = replace(compilation, program=replace(compilation.program, profile=profile))
-    return solver_of(compilation, target)
+    return lattice_solver_of(compilation, target) if compilation.cell else solver_of(compilation, target)
 
 
 def formulas(source: Source, order: int | None = None, *, terms: int | None = None) -> SympyFormulas:
@@ -121,9 +124,23 @@ def solver_of(compilation: Compilation, target: str = "auto") -> Solver:
     """The loaded solver of a compilation. Raises `ToolchainError` if C was asked for and cannot be compiled."""
     from phigen.runtime.solver import Solver
 
-    program, interface = compilation.program, interface_of(compilation.program)
+    if compilation.cell:
+        raise system_of_lattice(compilation.spec)
+    return Solver(*_loaded(compilation.program, target))
+
+
+def lattice_solver_of(compilation: Compilation, target: str = "auto") -> LatticeSolver:
+    """The same for a lattice."""
+    from phigen.runtime.lattice import LatticeSolver
+
+    return LatticeSolver(*_loaded(compilation.program, target))
+
+
+def _loaded(program: Program, target: str) -> tuple[Any, Any]:
+    """The back end of a program, and its interface."""
+    interface = interface_of(program)
     files = emit(program, chosen_target(target, _warn), f"phigen build {program.name}.yaml")
-    return Solver(backend_of(files, interface), interface)
+    return backend_of(files, interface), interface
 
 
 def _warn(message: str) -> None:
@@ -137,9 +154,9 @@ def backend_of(files: Mapping[str, str], interface: Interface) -> Backend:
 
 def interface_of(program: Program) -> Interface:
     """The names of a program, as the runtime needs them."""
-    from phigen.runtime.interface import Interface
+    from phigen.runtime.interface import Interface, LatticeInterface
 
-    return Interface(
+    about = Interface(
         name=program.name,
         coordinates=program.coordinates,
         order=program.order,
@@ -147,6 +164,17 @@ def interface_of(program: Program) -> Interface:
         positive=frozenset(p.name for p in program.parameters if p.positive),
         casimirs=program.casimirs,
         time=program.time,
+    )
+    if not isinstance(program.step, Sweeps):
+        return about
+    sites = program.step.sites
+    return LatticeInterface(
+        **vars(about),
+        axes=sites.axes,
+        at_sites=sites.parameters,
+        casimir_kinds=program.step.casimir_kinds,
+        periods=sites.periods,
+        least=sites.least,
     )
 
 

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
-from phigen.geometry.system import System
+from phigen.geometry.system import System, system_of_lattice
+from phigen.lattice.cell import Cell
 from phigen.realisations.protocol import BiRealisation
 from phigen.scheme.discretisation import Discretisation
 from phigen.scheme.gauge import Gauge, Gauged
@@ -16,9 +18,24 @@ from phigen.spec.model import Spec
 from phigen.splitting.parts import Splitting
 
 
+class NoSystem:
+    """What a lattice has in place of a system of a fixed number of coordinates: whoever asks for one is told so."""
+
+    def __init__(self, spec: Spec) -> None:
+        self._spec = spec
+
+    def __getattr__(self, name: str) -> Any:
+        if name.startswith("_"):
+            raise AttributeError(name)
+        raise system_of_lattice(self._spec)
+
+
 @dataclass(frozen=True, repr=False)
 class Compilation:
-    """Everything that compiling one spec made, stage by stage; ``seconds`` maps stages to their time."""
+    """Everything that compiling one spec made, stage by stage; ``seconds`` maps stages to their time.
+
+    A lattice has a ``cell``, and its system is a `NoSystem`.
+    """
 
     spec: Spec
     system: System
@@ -30,6 +47,7 @@ class Compilation:
     splitting: Splitting | None = None
     gauged: Gauged | None = None
     scheme: Discretisation | None = None
+    cell: Cell | None = None
 
     def __repr__(self) -> str:
         return f"<Compilation of {self.spec.name}: order {self.order.order}, {self.label}>"
@@ -44,7 +62,7 @@ class Compilation:
     @property
     def label(self) -> str:
         """The kind of the method, for every place that names it to the user."""
-        return self.realisation.label if self.realisation else "splitting"
+        return self.realisation.label if self.realisation else "splitting of a lattice" if self.cell else "splitting"
 
     @property
     def exact(self) -> bool:

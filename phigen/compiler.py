@@ -21,10 +21,11 @@ from typing import Any, TypeVar
 
 from phigen import progress, registry
 from phigen import spec as specs
-from phigen.compilation import Compilation
+from phigen.compilation import Compilation, NoSystem
 from phigen.errors import CheckError, LimitError, PhigenWarning, SpecError
-from phigen.geometry.system import System, system_from_spec, system_of_lattice
+from phigen.geometry.system import System, system_from_spec
 from phigen.lattice.building import cell_from_spec
+from phigen.lattice.sweeps import build_sweeps
 from phigen.proofs import statements
 from phigen.proofs.examination import UNEXAMINED, Examination, doubts, located, refutation, refuted
 from phigen.realisations.catalogue import realise
@@ -32,7 +33,7 @@ from phigen.scheme.assemble import build_program
 from phigen.scheme.choosing import plan as plan_splitting
 from phigen.scheme.discretisation import discretise
 from phigen.scheme.gauge import Gauge, choose, given
-from phigen.scheme.order import plan_order
+from phigen.scheme.order import Order, plan_order
 from phigen.scheme.program import Program
 from phigen.scheme.splitting import build_splitting
 from phigen.spec.model import Extras, Spec
@@ -54,6 +55,8 @@ def compile_spec(
     ``system`` is its system, where the caller has built it already. Nothing is proved: see `compile_proved`. Raises
     `SpecError` (no bi-realisation applies, H does not split, …) and `LimitError` (the program would be too large).
     """
+    if spec.lattice:
+        return compile_lattice(spec, order=order, scheme=scheme, extras=extras)
     clock = _Clock()
     with bounded(spec):
         source = system or clock.timed("system", lambda: system_from_spec(spec))
@@ -114,10 +117,37 @@ def compile_proved(
     for warning in doubts(found):
         warnings.warn(str(warning), PhigenWarning, stacklevel=3)
     if spec.lattice:
-        raise system_of_lattice(spec)
+        return compile_lattice(spec, order=order, scheme=scheme, extras=extras)
     if found.compilation is None:
         raise found.obstacle or AssertionError("an examination without compilation has an obstacle")
     return found.compilation
+
+
+def compile_lattice(
+    spec: Spec, *, order: int | None = None, scheme: str | None = None, extras: Extras | None = None
+) -> Compilation:
+    """Compile a lattice, of any sizes, to sweeps over its sites. Raises `SpecError` where H does not split."""
+    clock = _Clock()
+    with bounded(spec):
+        cell = clock.timed("cell", lambda: cell_from_spec(spec))
+        program = clock.timed(
+            "program",
+            lambda: build_sweeps(
+                cell,
+                order=order or spec.wanted_order,
+                scheme=scheme or spec.scheme,
+                composition=spec.composition,
+                extras=extras or spec.extras,
+                title=spec.title,
+                licence=spec.license,
+                spec_sha256=spec.source_sha256,
+                profile=spec.profile,
+                lanes=spec.solver.lanes,
+                spec=spec,
+            ),
+        )
+    nothing: Any = NoSystem(spec)
+    return Compilation(spec, nothing, None, Order(program.order, 0), program, seconds=clock.seconds, cell=cell)
 
 
 def compile_file(path: str | Path, *, order: int | None = None) -> Compilation:

@@ -14,7 +14,7 @@ from phigen.lanes import paths
 from phigen.lanes.functions import NEAR_FUNCTIONS, library_calls, library_powers, operations, with_formulas
 from phigen.scheme.kernel import Kernel
 from phigen.scheme.program import Program
-from phigen.scheme.steps import Explicit, Factorisation, Newton, Path, PathLanes, Splitting
+from phigen.scheme.steps import Explicit, Factorisation, Newton, Path, PathLanes, Splitting, Sweeps
 from phigen.symbolic.expression import topological
 
 #: Points at which a kernel for lanes is evaluated at once: what one vector of AVX-512 holds.
@@ -79,11 +79,25 @@ class Packs:
     near: tuple[str, ...]
 
 
-Lanes = Blocks | Packs
+@dataclass(frozen=True)
+class Rows:
+    """Sites of a lattice, side by side in rows; ``near`` as in packs."""
+
+    calls: frozenset[str]
+    near: tuple[str, ...]
+
+    def calls_near(self, kernel: Kernel) -> bool:
+        """Whether a kernel calls one of those."""
+        return not operations([kernel]).isdisjoint(self.near)
+
+
+Lanes = Blocks | Packs | Rows
 
 
 def in_lanes(program: Program) -> Lanes | None:
     """What is computed in lanes; None where the spec says no, or it is not possible, or would need too much room."""
+    if isinstance(program.step, Sweeps):
+        return _rows(program, program.step)
     if not program.lanes or program.time:
         return None
     match program.step:
@@ -97,6 +111,15 @@ def in_lanes(program: Program) -> Lanes | None:
             used = operations(step.flows)
             return _packs(program, step.flows, tuple(f for f in NEAR_FUNCTIONS if f in used))
     return None
+
+
+def _rows(program: Program, step: Sweeps) -> Rows:
+    """Sites are in rows in any case; the short way near 0 is for speed."""
+    swept = [sweep.kernel for part in step.parts for sweep in part]
+    seen = program.observables
+    ops = operations([*swept, seen.energy, seen.casimirs, seen.vector_field])
+    used = operations(swept) if program.lanes and program.profile == "fast" else set()
+    return Rows(with_formulas(ops), tuple(f for f in NEAR_FUNCTIONS if f in used))
 
 
 def _newton(program: Program, step: Newton) -> Blocks | None:

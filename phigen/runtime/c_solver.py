@@ -17,12 +17,17 @@ from numpy.typing import NDArray
 
 from phigen.errors import ToolchainError
 from phigen.runtime import cache
-from phigen.runtime.interface import BackendError, Floats, Interface, MissingExtraError
+from phigen.runtime.c_lattice import CLattice
+from phigen.runtime.interface import (
+    BackendError,
+    Floats,
+    Interface,
+    LatticeInterface,
+    MissingExtraError,
+    status_name,
+)
 
 Bytes = NDArray[np.uint8]
-
-#: Names of NAME_status, by value, without the prefix.
-STATUSES = ("OK", "NO_CONVERGENCE", "SINGULAR", "NOT_FINITE", "BAD_ARGUMENT")
 
 # Between two calls Python can deliver a keyboard interrupt.
 _STEPS_PER_CALL = 1 << 16
@@ -80,7 +85,7 @@ class CSession:
             chunk = min(steps, _STEPS_PER_CALL)
             status = self._c.integrate(self.address, h, chunk)
             if status:
-                raise BackendError(_status(status), self.steps, self._x.reshape(1, -1).copy())
+                raise BackendError(status_name(status), self.steps, self._x.reshape(1, -1).copy())
             steps -= chunk
 
     def advance_tangent(self, h: float) -> Floats:
@@ -90,7 +95,7 @@ class CSession:
         tangent = np.empty((len(self._x), len(self._x)))
         status = self._c.step_tangent(self.address, h, tangent.ctypes.data)
         if status:
-            raise BackendError(_status(status), self.steps, self._x.reshape(1, -1).copy())
+            raise BackendError(status_name(status), self.steps, self._x.reshape(1, -1).copy())
         return tangent
 
     def branch(self) -> CSession:
@@ -148,7 +153,7 @@ class CSolver:
             gauge = self._gauge.ctypes.data
             status = self._c.init_gauge(session.address, packed.ctypes.data, first.ctypes.data, gauge)
         if status:
-            raise BackendError(_status(status), 0, first.reshape(1, -1))
+            raise BackendError(status_name(status), 0, first.reshape(1, -1))
         return session
 
     def restored(self, saved: bytes, parameters: Mapping[str, float]) -> CSession:
@@ -176,7 +181,7 @@ class CSolver:
         if overall or status.any():
             failed = tuple(np.flatnonzero(status).tolist())
             first = int(status[failed[0]]) if failed else overall
-            raise BackendError(_status(first), -1, final, failed)
+            raise BackendError(status_name(first), -1, final, failed)
         return final
 
     def hamiltonian(self, x: Floats, parameters: Mapping[str, float], t: Floats | None = None) -> Floats:
@@ -230,10 +235,8 @@ def _aligned_copy(struct: Bytes) -> Bytes:
     return copy
 
 
-def _status(value: int) -> str:
-    return STATUSES[value] if value < len(STATUSES) else f"STATUS_{value}"
-
-
-def load(files: Mapping[str, str], interface: Interface) -> CSolver:
+def load(files: Mapping[str, str], interface: Interface) -> CSolver | CLattice:
     """The back end of generated files; see `phigen.registry`."""
+    if isinstance(interface, LatticeInterface):
+        return CLattice(files, interface)
     return CSolver(files, interface)

@@ -50,18 +50,19 @@ def directory() -> Path:
     return home / ("Library/Caches" if sys.platform == "darwin" else ".cache") / "phigen"
 
 
-def load(files: Mapping[str, str]) -> ctypes.CDLL:
+def load(files: Mapping[str, str], *, threads: bool = False) -> ctypes.CDLL:
     """The shared library compiled from C files (name → text), built unless the cache has it.
 
-    Every name that ends in ``.c`` is compiled, the others are headers. Raises `ToolchainError`.
+    Every name that ends in ``.c`` is compiled, the others are headers; with OpenMP if ``threads`` and the compiler has
+    it. Raises `ToolchainError`.
     """
-    path = build(files)
+    path = build(files, threads=threads)
     try:
         return ctypes.CDLL(str(path))
     except OSError:
         # Either somebody cleared the cache this very moment, or its folder does not let libraries be loaded
         # (mounted noexec): both are cured by a library of our own.
-        path = build(files, _private_directory())
+        path = build(files, _private_directory(), threads=threads)
     try:
         return ctypes.CDLL(str(path))
     except OSError as error:
@@ -69,12 +70,12 @@ def load(files: Mapping[str, str]) -> ctypes.CDLL:
         raise ToolchainError(f"the compiled solver cannot be loaded: {error}\n  hint: {hint}") from error
 
 
-def build(files: Mapping[str, str], folder: Path | None = None) -> Path:
+def build(files: Mapping[str, str], folder: Path | None = None, *, threads: bool = False) -> Path:
     """The path of the library compiled from C files, verified, in ``folder`` or else in the cache.
 
     Where the cache cannot be written, the library goes to a private temporary folder, with a warning.
     """
-    compiler = toolchain.find()
+    compiler = toolchain.threaded(toolchain.find()) if threads else toolchain.find()
     name = _key(files, compiler)
     folder = folder or directory()
     found = _look_up(folder, name)

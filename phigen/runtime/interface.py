@@ -15,6 +15,15 @@ Floats = NDArray[np.float64]
 Progress = Callable[[int], Any]
 
 
+#: Names of NAME_status in C, by value, without the prefix.
+STATUSES = ("OK", "NO_CONVERGENCE", "SINGULAR", "NOT_FINITE", "BAD_ARGUMENT")
+
+
+def status_name(value: int) -> str:
+    """The name of a status in C."""
+    return STATUSES[value] if value < len(STATUSES) else f"STATUS_{value}"
+
+
 @dataclass(frozen=True)
 class Interface:
     """The names a generated solver speaks of, all in the order of declaration."""
@@ -31,6 +40,22 @@ class Interface:
     def dimension(self) -> int:
         """Number of coordinates."""
         return len(self.coordinates)
+
+
+@dataclass(frozen=True)
+class LatticeInterface(Interface):
+    """The solver of a lattice: ``coordinates`` are those of a site, and states have the shape (coordinates, *sizes).
+
+    ``at_sites`` are the parameters with a value at each site. ``casimir_kinds`` tells of each Casimir whether it is one
+    for each of the ``sites``, or a ``sum`` or ``product`` over them. Sizes are multiples of ``periods``, at least
+    ``least``.
+    """
+
+    axes: tuple[str, ...] = ()
+    at_sites: tuple[str, ...] = ()
+    casimir_kinds: tuple[str, ...] = ()
+    periods: tuple[int, ...] = ()
+    least: tuple[int, ...] = ()
 
 
 class BackendError(Exception):

@@ -6,31 +6,19 @@ Beside the documented functions, sessions use the parts of ``integrate``: ``_val
 
 from __future__ import annotations
 
-import hashlib
 import io
-import linecache
 from collections.abc import Mapping
-from types import ModuleType
 from typing import Any
 
 import numpy as np
 
-from phigen.runtime.interface import BackendError, Floats, Interface, MissingExtraError
+from phigen.runtime.interface import BackendError, Floats, Interface, LatticeInterface, MissingExtraError
+from phigen.runtime.modules import load_module
+from phigen.runtime.numpy_lattice import NumpyLattice
 
 Pair = tuple[Floats, Floats]
 #: Coefficients, parameters and step of a stage, and its time where there is one: passed on to the module.
 Stage = tuple[Any, ...]
-
-
-def load_module(source: str, name: str) -> ModuleType:
-    """The module of a source text; tracebacks through it show its lines."""
-    filename = f"<phigen {name} {hashlib.sha256(source.encode()).hexdigest()[:12]}>"
-    # No modification time: linecache.checkcache leaves such entries alone.
-    linecache.cache[filename] = (len(source), None, source.splitlines(keepends=True), filename)
-    module = ModuleType(name)
-    module.__file__ = filename
-    exec(compile(source, filename, "exec"), module.__dict__)  # text that phigen itself generated
-    return module
 
 
 class NumpySession:
@@ -227,6 +215,8 @@ class NumpySolver:
         return np.asarray(self.module.vector_field(x, *when, **parameters), dtype=np.float64)
 
 
-def load(files: Mapping[str, str], interface: Interface) -> NumpySolver:
+def load(files: Mapping[str, str], interface: Interface) -> NumpySolver | NumpyLattice:
     """The back end of generated files; see `phigen.registry`."""
+    if isinstance(interface, LatticeInterface):
+        return NumpyLattice(files, interface)
     return NumpySolver(files[f"{interface.name}.py"], interface)

@@ -15,7 +15,7 @@ import sys
 import tempfile
 import threading
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
@@ -29,6 +29,9 @@ BASE_FLAGS = ("-std=c99", "-O3", "-fPIC", "-shared")
 #: Tuning for this processor, each used if the compiler takes it. Fused products change results by round-off only:
 #: the compensated sums of the generated code contain no product that could be fused.
 TUNING_FLAGS = ("-march=native", "-ffp-contract=fast", "-fno-math-errno")
+
+#: For threads, which only lattices use.
+OPENMP = "-fopenmp"
 
 #: Seconds after which a compilation is given up.
 TIMEOUT = 300.0
@@ -45,6 +48,7 @@ _MESSAGE_BYTES = 1 << 16
 _TRIAL_TIMEOUT = 20.0  # for --version, and for a library of one line
 _GRACE = 1.0  # for what a compiler started, to end after it
 _TRIAL = "#include <math.h>\ndouble trial(double x);\ndouble trial(double x) { return sin(x); }\n"
+_TRIAL_OF_THREADS = "#include <omp.h>\nint trial(void);\nint trial(void) { return omp_get_max_threads(); }\n"
 
 #: How files of shared libraries begin: ELF, Mach-O of both byte orders and universal, PE.
 _ELF = b"\x7fELF"
@@ -110,6 +114,20 @@ def available() -> bool:
     except NoCompilerError:
         return False
     return True
+
+
+@cache
+def threaded(compiler: Compiler) -> Compiler:
+    """The compiler with OpenMP, if it has that."""
+    with tempfile.TemporaryDirectory(prefix="phigen-") as folder:
+        source, library = Path(folder) / "trial.c", Path(folder) / "trial.so"
+        source.write_text(_TRIAL_OF_THREADS, encoding="utf-8")
+        flags = (*BASE_FLAGS, "-Werror", OPENMP)
+        try:
+            found = not _made(compiler.command, flags, [source], library, _TRIAL_TIMEOUT)
+        except (OSError, subprocess.TimeoutExpired):
+            found = False
+    return replace(compiler, tuning=(*compiler.tuning, OPENMP)) if found else compiler
 
 
 def compile_library(

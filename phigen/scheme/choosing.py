@@ -8,10 +8,11 @@ given accuracy costs. All others take the recommended alternation of the order.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any, Protocol
 
-from phigen.errors import Diagnostic, SpecError
+from phigen.errors import Diagnostic, Location, SpecError
 from phigen.geometry.system import System
 from phigen.scheme import alternation, nystrom
 from phigen.scheme.alternation import Alternation, Schedule
@@ -44,28 +45,44 @@ class Choice:
         return alternation.schedule(self.method, len(self.splitting.flows))
 
 
+class Host(Protocol):
+    """What the parts are of."""
+
+    @property
+    def locations(self) -> Mapping[tuple[Any, ...], Location]:
+        """Where its keys are in the spec."""
+        ...
+
+
 def plan(system: System, splitting: Splitting, wanted: int, composition: str) -> Choice:
     """The method that gives an order; odd orders round up.
 
     Raises `SpecError` for orders that the composition lacks, and for parts that it does not apply to.
     """
+    return planned(system, splitting, wanted, composition, lambda: kicks(system, splitting))
+
+
+def planned(
+    system: Host, splitting: Splitting, wanted: int, composition: str, kicks_of: Callable[[], Sequence[Kick]]
+) -> Choice:
+    """`plan` for parts of which ``kicks_of`` tells which can be V."""
     even = wanted + wanted % 2
     note = "" if even == wanted else f"order {wanted} was asked for; a symmetric method has even order"
-    planned = Order(even, 0, note)
+    order = Order(even, 0, note)
     named = composition in nystrom.NAMES
     if named or composition == "auto":
-        found = list(_applicable(system, splitting, even, composition))
+        found = list(_applicable(kicks_of, even, composition))
         if found:
             method, kick = min(found, key=lambda pair: _price(splitting, *pair))
-            return chosen(splitting, planned, method, kick)
+            return chosen(splitting, order, method, kick)
     known = orders(composition)
     if even not in known:
         raise _no_order(system, composition, known, even)
     if named:
-        raise _not_applicable(system, splitting, composition)
+        raise _not_applicable(system, splitting, composition, kicks_of)
     recommended = alternation.find(composition, even)
     assert recommended is not None
-    return Choice(planned, recommended, arranged(splitting))
+    return Choice(order, recommended, arranged(splitting))
 
 
 def chosen(splitting: Splitting, order: Order, method: Nystrom, kick: Kick) -> Choice:
@@ -87,9 +104,9 @@ def arranged(splitting: Splitting) -> Splitting:
     return Splitting((*by_cost[-2:-1], *by_cost[:-2], *by_cost[-1:]))
 
 
-def _applicable(system: System, splitting: Splitting, order: int, name: str) -> Iterator[tuple[Nystrom, Kick]]:
+def _applicable(kicks_of: Callable[[], Sequence[Kick]], order: int, name: str) -> Iterator[tuple[Nystrom, Kick]]:
     methods = [m for m in nystrom.METHODS if m.order == order and name in ("auto", m.name)]
-    for kick in kicks(system, splitting) if methods else ():
+    for kick in kicks_of() if methods else ():
         for method in methods:
             if kick.modified or not method.multiples:
                 yield method, kick
@@ -120,7 +137,7 @@ def _why(method: Nystrom) -> str:
     return f"{{{v}, {{{v}, {{{v}, {t}}}}}}} = 0{modified}"
 
 
-def _no_order(system: System, composition: str, known: Sequence[int], order: int) -> SpecError:
+def _no_order(system: Host, composition: str, known: Sequence[int], order: int) -> SpecError:
     place = system.locations.get(("composition",)) or system.locations.get(("order",))
     offered = ", ".join(map(str, known)) or "none"
     who = "splittings offer" if composition == "auto" else f"composition {composition} offers"
@@ -128,12 +145,14 @@ def _no_order(system: System, composition: str, known: Sequence[int], order: int
     return SpecError([Diagnostic(message, place, "scheme: series reaches order 16")])
 
 
-def _not_applicable(system: System, splitting: Splitting, composition: str) -> SpecError:
+def _not_applicable(
+    system: Host, splitting: Splitting, composition: str, kicks_of: Callable[[], Sequence[Kick]]
+) -> SpecError:
     """Why a method for kicks does not apply."""
     count = len(splitting.flows)
     if count != 2:
         reason = f"H = T + V, of two parts; here there {'is one' if count == 1 else f'are {count}'}"
-    elif kicks(system, splitting):
+    elif kicks_of():
         reason = "a flow of V + κ{V, {V, T}} in closed form, which phigen does not find"
     else:
         reason = "{V, {V, {V, T}}} = 0 with one of the two parts as V, which does not hold here"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Sequence
 
 from phigen.errors import Diagnostic, SpecError
 from phigen.geometry.system import System
@@ -88,7 +89,7 @@ def facts(choice: Choice, step: Splitting) -> list[str]:
 
 
 def _flow_kernel(system: System, flow: Flow, k: int, coefficients: Coefficients) -> Kernel:
-    increment = _staged(flow, coefficients)
+    increment = staged(flow.increment, coefficients)
     return Kernel(
         f"flow{k}",
         f"the flow of H_{k} = {flow.hamiltonian}: {flow.manner}".replace(KICK, KICK.kind),
@@ -97,10 +98,10 @@ def _flow_kernel(system: System, flow: Flow, k: int, coefficients: Coefficients)
     )
 
 
-def _staged(flow: Flow, coefficients: Coefficients) -> list[Expression]:
+def staged(increment: Sequence[Expression], coefficients: Coefficients) -> list[Expression]:
     """The increments with coefficients for what does not depend on the state, in the cheaper of two ways."""
-    hoisted, gathered = (cost(way(coefficients.empty(), flow.increment)) for way in (Coefficients.hoist, gather))
-    return gather(coefficients, flow.increment) if gathered < hoisted else coefficients.hoist(flow.increment)
+    hoisted, gathered = (cost(way(coefficients.empty(), increment)) for way in (Coefficients.hoist, gather))
+    return gather(coefficients, increment) if gathered < hoisted else coefficients.hoist(increment)
 
 
 def _operations(step: Splitting) -> dict[str, int]:

@@ -1,4 +1,4 @@
-"""The kinds of steps, each with the kernels that make it: ``Step = Newton | Explicit | Path | Splitting``.
+"""The kinds of steps, each with the kernels that make it: ``Step = Newton | Explicit | Path | Splitting | Sweeps``.
 
 Kernels of a step are of three stages. ``prepare`` computes, from parameters and step size, every value that does not
 depend on the state, nor on inputs of the single step: the coefficients ``c:0``, ``c:1``, … Where H depends on the time,
@@ -8,7 +8,7 @@ stage. All others read the coefficients and the state only.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
 from phigen.scheme.alternation import Schedule
@@ -196,7 +196,63 @@ class Splitting(_Staged):
         return _present((self.prepare, self.refresh, *self.flows, *self.tangents))
 
 
-Step = Newton | Explicit | Path | Splitting
+@dataclass(frozen=True)
+class Sites:
+    """The sites of a lattice, whose number is an argument of the solver.
+
+    ``places`` tells of each symbol of kernels the field, or parameter at sites, and the offset, the fastest axis last.
+    A site has the colour Σ ``weights``·position modulo ``colours``; sizes are multiples of ``periods``, at least
+    ``least``.
+    """
+
+    axes: tuple[str, ...]
+    open: tuple[bool, ...]
+    parameters: tuple[str, ...]
+    places: Mapping[str, tuple[str, tuple[int, ...]]]
+    colours: int = 1
+    weights: tuple[int, ...] = ()
+    periods: tuple[int, ...] = ()
+    least: tuple[int, ...] = ()
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """Changes of the ``moved`` fields (indices) at all sites of one ``colour``, read from what stands still.
+
+    The inputs of the ``kernel`` are ``coef``, ``site`` and ``present``, symbols that are 1 where a term of H reaches
+    beyond no open end, else 0.
+    """
+
+    kernel: Kernel
+    moved: tuple[int, ...]
+    colour: int = 0
+
+
+@dataclass(frozen=True)
+class Sweeps(_Staged):
+    """A splitting of a lattice: each of the ``parts`` is a list of sweeps, which may be made in any order."""
+
+    sites: Sites
+    parts: tuple[tuple[Sweep, ...], ...]
+    schedule: Schedule
+    composition: str
+    casimir_kinds: tuple[str, ...] = ()
+
+    unit = "step of one site"
+    manner = "explicit"
+
+    @property
+    def coefficients(self) -> int:
+        """Coefficients of one step, in all rows."""
+        return self.row * len(self.schedule.times)
+
+    @property
+    def kernels(self) -> tuple[Kernel, ...]:
+        """All kernels, each once."""
+        return (self.prepare, *(sweep.kernel for part in self.parts for sweep in part))
+
+
+Step = Newton | Explicit | Path | Splitting | Sweeps
 
 #: Those that solve an equation.
 Implicit = Newton | Path

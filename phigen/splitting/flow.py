@@ -7,7 +7,8 @@ flow; otherwise it is the composition of the flows of the terms, in any order, s
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import reduce
 
 from phigen import progress
 from phigen.geometry.system import hamiltonian_vector_field
@@ -17,7 +18,8 @@ from phigen.splitting.exponential import NoClosedFormError
 from phigen.splitting.integrals import reduced
 from phigen.splitting.ring import TIME, Ring
 from phigen.symbolic.expression import ZERO, Expression, gradient, substitute, symbol, topological, total
-from phigen.symbolic.tower import Poly
+from phigen.symbolic.symbols import Symbol
+from phigen.symbolic.tower import Poly, Tower
 
 
 @dataclass(frozen=True)
@@ -90,19 +92,14 @@ def joint_flow(ring: Ring, terms: Sequence[Term], *, linear: bool = False) -> Fl
     """
     g = total(t.expression for t in terms)
     field = ring.field(ring.tower.combine(t.element for t in terms))
-    found = _solved(ring, field, linear)
-    if isinstance(found, str) and not linear:
-        by_integrals = _with_integrals(ring, field)
-        if by_integrals is None:
-            return found
-        found = by_integrals
+    found = solved(ring, field, linear=linear)
     if isinstance(found, str):
         return found
     return Flow(g, tuple(_as_written(ring, g, found)), found.manner)
 
 
 @dataclass(frozen=True)
-class _Solved:
+class Solved:
     """Increments, how the coordinates move, and those that move at a constant rate (indices)."""
 
     increments: list[Expression]
@@ -110,7 +107,18 @@ class _Solved:
     shifted: tuple[int, ...]
 
 
-def _solved(ring: Ring, field: Sequence[Poly], linear: bool = False) -> _Solved | str:
+def solved(ring: Ring, field: Sequence[Poly], *, linear: bool = False) -> Solved | str:
+    """The increments along a vector field, with linear first integrals put in where they help; or why there are none.
+
+    The field need not be that of a Hamiltonian.
+    """
+    found = _solved(ring, field, linear)
+    if isinstance(found, str) and not linear:
+        return _with_integrals(ring, field) or _with_common_factor(ring, field) or found
+    return found
+
+
+def _solved(ring: Ring, field: Sequence[Poly], linear: bool = False) -> Solved | str:
     """The increments along a vector field, or why there are none."""
     motion = motion_of(ring, field)
     increments: list[Expression] = [ZERO] * len(ring.coordinates)
@@ -131,10 +139,10 @@ def _solved(ring: Ring, field: Sequence[Poly], linear: bool = False) -> _Solved 
             increments[i] = e
         manners.setdefault(solution.manner, []).extend(equations.coordinates)
     said = [f"{', '.join(ring.coordinates[i] for i in moved)} {manner}" for manner, moved in manners.items()]
-    return _Solved(increments, "; ".join(said) or "nothing moves", tuple(manners.get(exponential.SHIFTED, ())))
+    return Solved(increments, "; ".join(said) or "nothing moves", tuple(manners.get(exponential.SHIFTED, ())))
 
 
-def _with_integrals(ring: Ring, field: Sequence[Poly]) -> _Solved | None:
+def _with_integrals(ring: Ring, field: Sequence[Poly]) -> Solved | None:
     """The same with linear first integrals put in as constants."""
     smaller = reduced(ring, field)
     found = None if smaller is None else _solved(smaller.ring, smaller.field)
@@ -145,10 +153,28 @@ def _with_integrals(ring: Ring, field: Sequence[Poly]) -> _Solved | None:
     for i, form in smaller.forms.items():
         changes[i] = -substitute([form], along)[0]
     names = ", ".join(ring.coordinates[i] for i in smaller.forms)
-    return _Solved(changes, f"{found.manner}; {names} by linear integrals", ())
+    return Solved(changes, f"{found.manner}; {names} by linear integrals", ())
 
 
-def _as_written(ring: Ring, g: Expression, found: _Solved) -> list[Expression]:
+def _with_common_factor(ring: Ring, field: Sequence[Poly]) -> Solved | None:
+    """The same with a common factor of all rates put in as a constant, if it is one along the flow.
+
+    Functions of a first integral move as it does, faster: (q² + p²)² turns q and p by an angle that grows with q² + p².
+    """
+    moving = [f for f in field if f != 0]
+    factor = reduce(lambda a, b: a.gcd(b), moving) if moving else ring.tower.constant(1)
+    if factor.is_constant() or not ring.support(factor) or ring.rate(factor, field) != 0:
+        return None
+    name = Symbol("integral", "factor")
+    rates = [symbol(name) * ring.tower.expression(f / factor) for f in field]
+    tower = Tower([*(s for s in ring.tower.symbols if s != TIME), name, TIME], rates, ring.tower.variables)
+    found = _solved(replace(ring, tower=tower, poisson=()), tower.convert_all(rates))
+    if isinstance(found, str):
+        return None
+    return replace(found, increments=substitute(found.increments, {name: ring.expression(factor)}), shifted=())
+
+
+def _as_written(ring: Ring, g: Expression, found: Solved) -> list[Expression]:
     """t π∇g of g as it was written, for coordinates that are shifted, where it has fewer operations: (x − y)⁴ has."""
     slope = gradient(symbol(TIME) * g, ring.coordinates)
     written = hamiltonian_vector_field(ring.brackets, slope)

@@ -69,22 +69,22 @@ def _graded(ring: Ring, v: Poly, t: Poly) -> bool:
     outside = [i for i in everything if i not in inside]
     return (
         all((i, j) in ring.zero_pairs for i in inside for j in inside)
-        and all(_degree(ring, ring.poisson[i][j], outside) <= 1 for i in outside for j in outside)
-        and _degree(ring, t, outside) <= 2
+        and all(degree(ring, ring.poisson[i][j], outside) <= 1 for i in outside for j in outside)
+        and degree(ring, t, outside) <= 2
     )
 
 
-def _degree(ring: Ring, element: Poly, coordinates: Sequence[int]) -> float:
+def degree(ring: Ring, element: Poly, coordinates: Sequence[int]) -> float:
     """The degree of an element in some coordinates; infinite if it is no polynomial in them."""
     names = [ring.coordinates[i] for i in coordinates]
-    degree = 0.0
+    highest = 0.0
     for exponents in element.to_dict():
         of_this = 0.0
         for variable, exponent in enumerate(exponents):
             if exponent and ring.tower.depends_on(ring.tower.gens[variable], names):
                 of_this += int(exponent) if ring.tower.names[variable] in names else math.inf
-        degree = max(degree, of_this)
-    return degree
+        highest = max(highest, of_this)
+    return highest
 
 
 def _bracket(ring: Ring, f: Poly, g: Poly) -> Poly:

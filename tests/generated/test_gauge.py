@@ -12,7 +12,7 @@ from phigen import resources, spec
 from phigen.api import solver_of
 from phigen.compiler import compile_spec
 from phigen.errors import SpecError
-from phigen.runtime.numpy_solver import load_module
+from phigen.runtime.modules import load_module
 from phigen.spec.model import Extras
 from phigen.symbolic.numeric import evaluate
 

@@ -1,6 +1,6 @@
 import traceback
 
-from phigen.runtime.numpy_solver import load_module
+from phigen.runtime.modules import load_module
 
 
 def test_traceback_shows_the_generated_line():

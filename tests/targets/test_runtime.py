@@ -11,6 +11,7 @@ from phigen.targets.c.amalgamation import one_stage
 from phigen.targets.c.layout import WIDTH, fitted
 
 BY_HAND = Path(__file__).with_name("pendulum_by_hand")
+CHAIN = Path(__file__).with_name("chain_by_hand")
 RUNTIME = resources.templates() / "c/runtime"
 INCLUDED = [f"-I{BY_HAND}", f"-I{RUNTIME}"]
 WARNINGS = ("all", "extra", "pedantic", "conversion", "double-promotion", "shadow", "no-unused-function", "error")
@@ -62,7 +63,22 @@ def test_runtime_compiles_without_a_warning_by_clang(switches, tmp_path):
     run([tool("clang"), *STRICT, "-fsyntax-only", *defined(switches), *INCLUDED, BY_HAND / "main.c"], tmp_path)
 
 
-@pytest.mark.parametrize("path", sorted(RUNTIME.glob("*.c")), ids=lambda p: p.name)
+def test_pendula_of_a_lattice_by_hand_move_as_they_should(tmp_path):
+    """With the sanitisers: energy, reversibility, the field, failures, sizes that are not allowed (see main.c)."""
+    flags = ["-O0", "-fsanitize=address,undefined", "-fno-sanitize-recover"]
+    main = ["-I", CHAIN, "-I", RUNTIME, CHAIN / "main.c", "-o", "main", "-lm"]
+    run([tool("gcc"), *STRICT, *flags, *main], tmp_path)
+    assert run([tmp_path / "main"], tmp_path) == "ok\n"
+
+
+@pytest.mark.parametrize("name", ["lattice.c", "rows.c", "lane_functions.c", "status.c"])
+def test_each_file_of_lattices_compiles_by_itself(name, tmp_path):
+    run([tool("gcc"), *STRICT, "-fsyntax-only", "-I", CHAIN, "-I", RUNTIME, RUNTIME / name], tmp_path)
+
+
+@pytest.mark.parametrize(
+    "path", [p for p in sorted(RUNTIME.glob("*.c")) if p.name not in ("lattice.c", "rows.c")], ids=lambda p: p.name
+)
 def test_each_file_of_the_runtime_compiles_by_itself(path, tmp_path):
     kinds = {"packs.c": "SPLITTING", "explicit.c": "EXPLICIT", "path.c": "PATH", "path_lanes.c": "PATH"}
     kind = kinds.get(path.name, "NEWTON")

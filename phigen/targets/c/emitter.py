@@ -9,13 +9,13 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Mapping, Sequence
 
-from phigen.lanes.lowering import Blocks, Lanes, in_lanes
+from phigen.lanes.lowering import Blocks, Lanes, Rows, in_lanes
 from phigen.scheme.kernel import Kernel
 from phigen.scheme.path import Recurrences
 from phigen.scheme.program import Program
-from phigen.scheme.steps import Explicit, Implicit, Path, Splitting
+from phigen.scheme.steps import Explicit, Implicit, Path, Splitting, Sweeps
 from phigen.spec.model import Parameter
-from phigen.targets.c import functions, paths, splitting
+from phigen.targets.c import functions, paths, splitting, sweeps
 from phigen.targets.c.amalgamation import Amalgam
 from phigen.targets.c.features import switches
 from phigen.targets.c.kernels import function, members, printer
@@ -40,11 +40,9 @@ Sizes = list[tuple[str, int, str]]
 def emit(program: Program, command: str, *, single_file: bool = False) -> dict[str, str]:
     """File names and their contents; with ``single_file`` only `NAME.c`, which then needs no header."""
     name, lines = program.name, header_lines(program, command)
-    lanes = in_lanes(program)
-    has = switches(program, lanes)
-    amalgam = Amalgam(name, has, printed(program, lanes, has))
-    declared = amalgam.text("solver.h") + "\n#ifdef __cplusplus\n}\n#endif\n"
-    defined = amalgam.text("runtime.c")
+    amalgam, header, code = _amalgam(program)
+    declared = amalgam.text(header) + "\n#ifdef __cplusplus\n}\n#endif\n"
+    defined = amalgam.text(code)
     headers = "\n".join(sorted(amalgam.headers))
     if single_file:
         body = fitted(f"{headers}\n{declared}\n{defined}")
@@ -53,6 +51,23 @@ def emit(program: Program, command: str, *, single_file: bool = False) -> dict[s
     header = fitted(f"#ifndef {guard}\n#define {guard}\n\n{declared}\n#endif /* {guard} */\n")
     body = fitted(f'#include "{name}.h"\n\n{headers}\n\n{defined}')
     return {f"{name}.h": _sealed(_declared_lines(program), header), f"{name}.c": _sealed(lines, body)}
+
+
+def _amalgam(program: Program) -> tuple[Amalgam, str, str]:
+    """What is put together, and the files of the runtime to begin with: of a header, and of the code."""
+    lanes = in_lanes(program)
+    has = switches(program, lanes)
+    if not isinstance(program.step, Sweeps):
+        return Amalgam(program.name, has, printed(program, lanes, has)), "solver.h", "runtime.c"
+    assert isinstance(lanes, Rows)
+    step = program.step
+    has |= sweeps.switches(program, step, sweeps.layout_of(program, step)) | {"NEAR": bool(lanes.near)}
+    texts = {
+        "declarations.h": sweeps.declarations(program, step),
+        "model.h": sweeps.model(program, step),
+        "sweeps.h": sweeps.sweeps(program, step, lanes),
+    }
+    return Amalgam(program.name, has, texts), "lattice.h", "lattice.c"
 
 
 def _declared_lines(program: Program) -> list[str]:
@@ -160,7 +175,7 @@ def _model(program: Program, lanes: Lanes | None, has: Mapping[str, bool], other
     step, seen = program.step, program.observables
     body = functions.called(program)
     own: list[Kernel | None] = []
-    if not isinstance(step, Splitting):
+    if not isinstance(step, Splitting | Sweeps):
         own = [step.prepare, step.refresh, step.main]
     if isinstance(step, Implicit) and has["UNROLLED"]:
         own.append(step.eliminate)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from phigen.lanes.lowering import Blocks, Lanes, Packs
 from phigen.scheme.program import Program
-from phigen.scheme.steps import Explicit, Implicit, Newton, Path, Splitting
+from phigen.scheme.steps import Explicit, Implicit, Newton, Path, Splitting, Sweeps
 from phigen.targets.c.lanes import grouped
 from phigen.targets.path import kinds, recurrences
 
@@ -44,7 +44,7 @@ FEATURES = (
     Feature("IMPLICIT", lambda p: isinstance(p.step, Implicit)),
     Feature("PARAMETERS", lambda p: p.parameters),
     Feature("COMPOSED", lambda p: len(p.fractions) > 1),
-    Feature("KICKS", lambda p: isinstance(p.step, Splitting) and p.step.schedule.multiples),
+    Feature("KICKS", lambda p: isinstance(p.step, Splitting | Sweeps) and p.step.schedule.multiples),
     Feature("TIMED", lambda p: p.time),
     Feature("RENEWED", lambda p: p.step.refresh),
     Feature("GAUGE", lambda p: p.gauge),

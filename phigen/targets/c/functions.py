@@ -10,6 +10,7 @@ from fractions import Fraction
 from phigen.lanes.functions import NEAR_FUNCTIONS
 from phigen.scheme.program import Program
 from phigen.scheme.steps import Splitting
+from phigen.symbolic.economised import economised
 from phigen.symbolic.entire import ENTIRE
 from phigen.symbolic.expression import topological
 from phigen.symbolic.special import (
@@ -62,7 +63,7 @@ def called(program: Program) -> list[str]:
     """The functions of phigen's own that kernels call: φ and its derivatives, those of `ENTIRE`, and for a splitting
     those that its flows call."""
     step = program.step
-    flows = (*step.flows, *step.tangents) if isinstance(step, Splitting) else ()
+    flows = (*step.flows, *step.tangents) if isinstance(step, Splitting) else ()  # loops over sites have their own
     used = {e.op for e in topological([e for kernel in flows for e in kernel.roots])}
     small = [*entire_used(program), *(f for f in FLOW_FUNCTIONS if f in used)]
     phis = [render("c", "phi.c", _phi(program, f)) for f in special.used(program)]
@@ -73,6 +74,47 @@ def called(program: Program) -> list[str]:
 def near(program: Program, names: Iterable[str]) -> list[str]:
     """Versions for the loops over lanes, of small arguments only, of these functions."""
     return [render("c", "small.c", _values(program, f) | {"near": True}) for f in names]
+
+
+#: The same for the loops over sites, where arguments are those of short steps: radius, number of coefficients, and the
+#: value by P in z, which is t or t².
+_ROWS = {
+    "expm1": (Fraction(1, 4), 9, "z + z * z * {P}"),
+    "sin": (Fraction(1, 2), 5, "{t} + {t} * z * {P}"),
+    "versin": (Fraction(1, 2), 6, "z * {P}"),
+}
+
+
+def near_rows(program: Program, names: Iterable[str]) -> list[str]:
+    """Versions for the loops over sites, of small arguments only: the fewest operations that keep all digits."""
+    return [render("c", "row_near.c", _row_values(program, f)) for f in names]
+
+
+def _row_values(program: Program, f: str) -> dict[str, object]:
+    if f in ENTIRE:
+        found, t = ENTIRE[f], "s"
+        meaning, radius, squared, form = found.meaning, Fraction(found.radius), False, "{P}"
+        coefficients = list(found.terms())
+    else:
+        meaning, _, _, variable, _, _ = _SMALL[f]
+        (radius, count, form), t, squared = _ROWS[f], "t", variable == "z"
+        first, step, sign = {"expm1": (2, 1, 1), "sin": (3, 2, -1), "versin": (2, 2, -1)}[f]
+        series = _inverse_factorials(first, step, count + 8, sign)
+        overall = -1 if f == "sin" else 1
+        coefficients = [
+            overall * c for c in economised(series, radius**2 if squared else radius, count, symmetric=not squared)
+        ]
+    polynomial = _nested([float(c) for c in coefficients])
+    text = f"return {form.format(P=polynomial, t=t)};"
+    lines = textwrap.wrap(text, WIDTH - 12, subsequent_indent="    ", break_on_hyphens=False)
+    own = {"meaning": meaning, "t": t, "radius": repr(float(radius)), "squared": squared}
+    return {"NAME": program.name, "function": f, "lines": lines, **own}
+
+
+def _nested(coefficients: Sequence[float]) -> str:
+    """Σ c_k z^k by Horner's rule."""
+    *others, last = map(repr, coefficients)
+    return "".join(f"({c} + z * " for c in others) + last + ")" * len(others)
 
 
 def phi_lanes(program: Program, ops: Set[str]) -> list[str]:

@@ -46,7 +46,7 @@ def printed(program: Program, lanes: Lanes) -> list[str]:
             function(program, k.kernel, lanes=True, single=k.single, sparse=k.sparse, shared=k.shared)
             for k in lanes.kernels
         ]
-    return found + _packs(program, lanes)
+    return found + (_packs(program, lanes) if isinstance(lanes, Packs) else [])
 
 
 def _packs(program: Program, packs: Packs) -> list[str]:

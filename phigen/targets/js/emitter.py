@@ -7,10 +7,11 @@ import textwrap
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
+from phigen.errors import Diagnostic, SpecError
 from phigen.scheme.kernel import Kernel
 from phigen.scheme.path import Recurrences
 from phigen.scheme.program import Program
-from phigen.scheme.steps import LONGEST_PATH, MOST_PIECES, Explicit, Implicit, Newton, Path, Splitting
+from phigen.scheme.steps import LONGEST_PATH, MOST_PIECES, Explicit, Implicit, Newton, Path, Splitting, Sweeps
 from phigen.symbolic.functions import FUNCTIONS, written_in
 from phigen.targets import special
 from phigen.targets.header import CHECKSUM, checksum, header_lines, plain
@@ -51,7 +52,10 @@ PATH_SYNTAX = Syntax(
 
 
 def emit(program: Program, command: str) -> dict[str, str]:
-    """The file name and its contents."""
+    """The file name and its contents. Raises `SpecError` for lattices, which are not offered."""
+    if isinstance(program.step, Sweeps):
+        message = f"{program.name} is a lattice; lattices are not offered in JavaScript"
+        raise SpecError([Diagnostic(message, hint="the targets c and numpy have them")])
     step, features = program.step, _features(program)
     chosen = {Newton: "newton", Explicit: "explicit", Path: "path", Splitting: "splitting"}[type(step)]
     modules = ["solver", chosen]
@@ -187,6 +191,7 @@ def _kernels(program: Program) -> list[Kernel]:
     others = [*program.choice, *modified, seen.energy, seen.casimirs, seen.vector_field]
     if isinstance(step, Splitting):
         return [replace(step.prepare, name="prepare_row"), *step.flows, *step.tangents, *others]
+    assert not isinstance(step, Sweeps)
     refresh = [step.refresh] if step.refresh else []
     varied = [step.tangent] if isinstance(step, Explicit) and step.tangent else []
     varied += [step.tangent.curvature] if isinstance(step, Path) and step.tangent else []

@@ -19,6 +19,7 @@ from phigen.scheme.steps import (
     Newton,
     Path,
     Splitting,
+    Sweeps,
 )
 from phigen.symbolic import functions as elementary
 from phigen.symbolic.expression import Expression
@@ -27,6 +28,7 @@ from phigen.targets import special
 from phigen.targets.code import Code, lower
 from phigen.targets.header import CHECKSUM, checksum, header_lines, plain
 from phigen.targets.names import Scope
+from phigen.targets.numpy import lattice
 from phigen.targets.path import Syntax, statements, tangent_program
 from phigen.targets.printer import Printer
 from phigen.targets.rendering import render
@@ -57,6 +59,15 @@ PATH_SYNTAX = Syntax(
 
 def emit(program: Program, command: str) -> dict[str, str]:
     """The file name and its contents."""
+    body = _body(program)
+    comment = "\n".join(f"# {line}".rstrip() for line in header_lines(program, command))
+    return {f"{program.name}.py": f"{comment}\n# {CHECKSUM} {checksum(body)}\n{body}"}
+
+
+def _body(program: Program) -> str:
+    """The module without its header."""
+    if isinstance(program.step, Sweeps):
+        return lattice.body(program, program.step, _function(program, program.step.prepare))
     seen = program.observables
     pieces = [render("numpy", part, _values(program)) for part in ("preamble.py", "parameters.py")]
     pieces += [render("numpy", "phi.py", special.values(f, f"_{f}")) for f in special.used(program)]
@@ -80,9 +91,7 @@ def emit(program: Program, command: str) -> dict[str, str]:
             "t_passed": ", np.asarray(t, dtype=float)" * bool(program.time),
         }
         pieces += [_function(program, program.modified.kernel), render("numpy", "modified.py", values)]
-    body = "\n\n".join(p.strip("\n") + "\n" for p in pieces)
-    comment = "\n".join(f"# {line}".rstrip() for line in header_lines(program, command))
-    return {f"{program.name}.py": f"{comment}\n# {CHECKSUM} {checksum(body)}\n{body}"}
+    return "\n\n".join(p.strip("\n") + "\n" for p in pieces)
 
 
 def _step(program: Program) -> list[str]:
@@ -110,6 +119,8 @@ def _step(program: Program) -> list[str]:
         case Newton(linearise=linearise):
             parts = rendered("solve", "plausible", "newton")
             return [*early, _function(program, linearise), *parts]
+        case Sweeps():
+            raise AssertionError("lattices have a module of their own")
 
 
 def _splitting_values(step: Splitting) -> dict[str, object]:

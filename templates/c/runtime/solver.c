@@ -196,17 +196,7 @@ phi_status phi_integrate(phi_solver *s, double h, size_t steps)
 phi_status phi_step(phi_solver *s, double h) { return phi_integrate(s, h, 1); }
 
 #endif
-const char *phi_status_string(phi_status status)
-{
-    switch (status) { /* no table, which would be data to relocate */
-    case PHI_OK: return "ok";
-    case PHI_NO_CONVERGENCE: return "no convergence: the step is too large";
-    case PHI_SINGULAR: return "singular Newton matrix: the step is too large";
-    case PHI_NOT_FINITE: return "not finite: overflow, or outside the domain";
-    case PHI_BAD_ARGUMENT: return "bad argument: a null pointer, or values that are not allowed";
-    }
-    return "unknown status";
-}
+#include "status.c"
 
 size_t phi_solver_size(void) { return sizeof(phi_solver); }
 size_t phi_solver_steps_done(const phi_solver *s) { return s->steps; }

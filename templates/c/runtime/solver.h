@@ -1,11 +1,7 @@
 #ifndef PHI_FILE_SOLVER_H
 #define PHI_FILE_SOLVER_H
 #include "declarations.h"
-
-/* How a step ends; phi_status_string says it in words. */
-typedef enum {
-    PHI_OK = 0, PHI_NO_CONVERGENCE, PHI_SINGULAR, PHI_NOT_FINITE, PHI_BAD_ARGUMENT
-} phi_status;
+#include "status.h"
 
 #if PHI_IMPLICIT && !PHI_RECURRENCES
 enum { PHI_DIFFERENCES = 9 }; /* those of higher order amplify rounding more than they gain */

@@ -1,0 +1,95 @@
+"""Which of two parts of a lattice kicks, and its modified potential: see `phigen.splitting.kicks`.
+
+The bracket of two sums over sites is one again, {F, G} = Σ_s Σ ∂F/∂f(s) {f, g}(s) ∂G/∂g(s + d), and its density reaches
+as far as those of F and G together.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+from phigen.lattice.cell import GRID, Cell
+from phigen.lattice.parts import CellFlow, CellSplitting, PartSearch, Summand
+from phigen.splitting.kicks import MOST_MONOMIALS, Kick, degree
+from phigen.splitting.ring import Ring
+from phigen.symbolic.expression import Expression, gradient, symbols_of
+from phigen.symbolic.neighbours import minus
+from phigen.symbolic.tower import Tower
+
+
+def cell_kicks(cell: Cell, splitting: CellSplitting) -> tuple[Kick, ...]:
+    """The parts that can be V, proved by degrees; none unless there are two parts, on a grid without colours."""
+    if len(splitting.flows) != 2 or splitting.colouring.count > 1 or cell.relation != GRID:
+        return ()
+    found = []
+    for part in (0, 1):
+        v, t = splitting.flows[part], splitting.flows[1 - part]
+        if _graded(cell, v, t):
+            found.append(Kick(part, _modified(cell, splitting, v, t)))
+    return tuple(found)
+
+
+def _graded(cell: Cell, v: CellFlow, t: CellFlow) -> bool:
+    """Whether {V, {V, {V, T}}} = 0 follows from degrees."""
+    inside = {f for s, _ in v.summands for f in _fields(cell, s.expression)}
+    while True:
+        entries = [e for (f, _), e in cell.bracket.items() if f in inside]
+        more = {f for e in entries for f in _fields(cell, e)} - inside
+        if not more:
+            break
+        inside |= more
+    outside = set(cell.fields) - inside
+    pairs = [(f, cell.place(g)[0], e) for (f, g), e in cell.bracket.items()]
+    return (
+        not any(f in inside and g in inside for f, g, _ in pairs)
+        and all(_degree(cell, e, outside) <= 1 for f, g, e in pairs if f in outside and g in outside)
+        and all(_degree(cell, s.expression, outside) <= 2 for s, _ in t.summands)
+    )
+
+
+def _fields(cell: Cell, e: Expression) -> set[str]:
+    return {f for f, _ in cell.places(e).values() if f in cell.fields}
+
+
+def _degree(cell: Cell, e: Expression, fields: set[str]) -> float:
+    names = [n for n, (f, _) in cell.places(e).items() if f in cell.fields]
+    others = [n for n in symbols_of(e) if n not in names]
+    ring = Ring(Tower([*names, *others], [e], names), tuple(names), (), ())
+    chosen = [i for i, n in enumerate(names) if cell.place(n)[0] in fields]
+    return degree(ring, ring.tower.convert(e), chosen)
+
+
+def _modified(cell: Cell, splitting: CellSplitting, v: CellFlow, t: CellFlow) -> CellFlow | None:
+    """The flow of V + κ{V, {V, T}}."""
+    potential, kinetic = ([s for s, _ in flow.summands] for flow in (v, t))
+    twice = list(_bracket(cell, potential, list(_bracket(cell, potential, kinetic))))
+    if not twice or len(twice) > MOST_MONOMIALS:
+        return None
+    search = PartSearch(cell, splitting.colouring)
+    return search.flow([(s, 0) for s in potential], [(s, 0) for s in twice])
+
+
+def _bracket(cell: Cell, left: Sequence[Summand], right: Sequence[Summand]) -> Iterator[Summand]:
+    """{Σ left, Σ right} term by term."""
+    slopes = {f: list(_slopes(cell, left, f)) for f in cell.fields}
+    others = {f: list(_slopes(cell, right, f)) for f in cell.fields}
+    for (f, other), entry in cell.bracket.items():
+        g, d = cell.place(other)
+        steps = tuple(int(o) for o in d)
+        for a in slopes[f]:
+            for b in others[g]:
+                low = tuple(min(0, x, s, y + s) for x, y, s in zip(a.low, b.low, steps, strict=True))
+                high = tuple(max(0, x, s, y + s) for x, y, s in zip(a.high, b.high, steps, strict=True))
+                yield Summand(a.expression * entry * cell.shifted(b.expression, d), low, high)
+
+
+def _slopes(cell: Cell, summands: Sequence[Summand], field: str) -> Iterator[Summand]:
+    """The derivatives by a field at a site, of all terms that mention it."""
+    for s in summands:
+        places = {n: o for n, (f, o) in cell.places(s.expression).items() if f == field}
+        for slope, offset in zip(gradient(s.expression, list(places)), places.values(), strict=True):
+            if not slope.is_zero:
+                back = [-int(o) for o in offset]
+                low = tuple(x + b for x, b in zip(s.low, back, strict=True))
+                high = tuple(x + b for x, b in zip(s.high, back, strict=True))
+                yield Summand(cell.shifted(slope, minus(offset)), low, high)

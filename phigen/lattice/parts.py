@@ -1,0 +1,398 @@
+"""H of a lattice as a sum of parts whose flows move each site by itself.
+
+A part is a sum over sites of terms whose coordinates commute over all the lattice: its gradient is constant along its
+flow, and each site moves by ẋ = Σ {x, a} ∂V/∂a with the values of its neighbours as constants, an equation of one site.
+Where π couples neighbours, or a term mixes what does not commute, sites get colours: the terms that begin at sites of
+one colour are then taken apart from the others. Terms of one site alone may be parts by their own flow too.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+from phigen.errors import Diagnostic, SpecError
+from phigen.lattice.cell import GRID, PERIODIC, Cell
+from phigen.splitting.conflicts import Conflicts, coloured
+from phigen.splitting.flow import Flow, NoFlowError, Solved, Term, flow_of, joint_flow, solved
+from phigen.splitting.ring import KICK, TIME, Ring
+from phigen.symbolic.expression import (
+    ONE,
+    ZERO,
+    Expression,
+    gradient,
+    substitute,
+    symbol,
+    symbols_of,
+    total,
+)
+from phigen.symbolic.neighbours import Offset, minus, plus, steps
+from phigen.symbolic.symbols import Symbol
+from phigen.symbolic.tower import Tower
+
+#: Most colours of sites.
+MOST_COLOURS = 4
+
+#: Kinds of symbols: a component of the gradient of a part; what bonds or pairs add to it; 1 where a term reaches beyond
+#: no open end, else 0.
+FORCE, GATHERED, PRESENT = "force", "gathered", "present"
+
+Steps = tuple[int, ...]
+#: A field, and the colour of the sites where it is meant.
+Coordinate = tuple[str, int]
+
+
+@dataclass(frozen=True)
+class Summand:
+    """A term of H: at sites, or of a ``bond`` or a pair. ``low`` and ``high`` are the offsets that it reaches."""
+
+    expression: Expression
+    low: Steps = ()
+    high: Steps = ()
+    bond: bool = False
+
+
+@dataclass(frozen=True)
+class Colouring:
+    """The colour of a site: Σ weights·position modulo ``count``."""
+
+    count: int = 1
+    weights: Steps = ()
+
+    def at(self, colour: int, offset: Offset) -> int:
+        """The colour of the site at an offset from one of a given colour."""
+        if self.count == 1:
+            return 0
+        return (colour + sum(w * o for w, o in zip(self.weights, steps(offset), strict=True))) % self.count
+
+    def periods(self, boundary: Sequence[str]) -> Steps:
+        """What sizes must be multiples of, along each axis."""
+        return tuple(
+            self.count // math.gcd(self.count, w) if b == PERIODIC and w else 1
+            for w, b in zip(self.weights or (0,) * len(boundary), boundary, strict=True)
+        )
+
+
+@dataclass(frozen=True)
+class SiteMotion:
+    """How sites of one colour move: increments of the fields, which read the site and neighbours that stand still.
+
+    ``gathered`` are the fields whose force is a sum over bonds or pairs, the symbols `GATHERED` of the increments.
+    """
+
+    colour: int
+    increments: Mapping[str, Expression]
+    gathered: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class CellFlow(Flow):
+    """The flow of a part of H over the lattice: all ``motions`` may be made in any order, at all sites in any order.
+
+    ``summands`` are the terms of the part with the colours of the sites where they begin.
+    """
+
+    motions: tuple[SiteMotion, ...] = ()
+    summands: tuple[tuple[Summand, tuple[int, ...]], ...] = ()
+
+
+@dataclass(frozen=True)
+class CellSplitting:
+    """The flows of the parts of H, with the colours that they need."""
+
+    flows: tuple[CellFlow, ...]
+    colouring: Colouring
+
+
+class _NoPartError(Exception):
+    """A term belongs to no part with a flow; the text says why."""
+
+    def __init__(self, expression: Expression, reason: str) -> None:
+        super().__init__(reason)
+        self.expression, self.reason = expression, reason
+
+
+def split_cell(cell: Cell) -> CellSplitting:
+    """H as a sum of parts with elementary flows. Raises `SpecError` naming the term that stands in the way."""
+    refused: _NoPartError | None = None
+    best: CellSplitting | None = None
+    for colouring in _colourings(cell):
+        if best is not None and colouring.count > best.colouring.count:
+            break
+        try:
+            found = PartSearch(cell, colouring).splitting()
+        except _NoPartError as error:
+            refused = refused or error
+            continue
+        if best is None or len(found.flows) < len(best.flows):
+            best = found
+    if best is None:
+        assert refused is not None
+        message = f"scheme splitting: the term {refused.expression} has no elementary flow on the lattice"
+        hint = "terms in coordinates that commute over the whole lattice split, and terms of one site with a flow"
+        raise SpecError([Diagnostic(f"{message}: {refused.reason}", None, hint)])
+    return best
+
+
+def _colourings(cell: Cell) -> Iterator[Colouring]:
+    yield Colouring(1, (0,) * len(cell.axes))
+    if cell.relation != GRID:
+        return
+    for count in range(2, MOST_COLOURS + 1):
+        for weights in itertools.product(range(count), repeat=len(cell.axes)):
+            if any(weights):
+                yield Colouring(count, weights)
+
+
+def summands_of(cell: Cell) -> list[Summand]:
+    """The terms of H as they are written."""
+    if cell.relation == GRID:
+        return [Summand(term, *cell.extent(term)) for term in cell.terms]
+    bonds = cell.bond_hamiltonian + cell.pair_hamiltonian
+    return [
+        *(Summand(term) for term in cell.terms),
+        *(Summand(term, bond=True) for term in cell.additive_terms(bonds)),
+    ]
+
+
+@dataclass
+class PartSearch:
+    """The search for parts with one colouring."""
+
+    cell: Cell
+    colouring: Colouring
+    _couples: dict[str, list[tuple[str, Offset]]] = field(default_factory=dict)
+    _manner: str = ""
+
+    def __post_init__(self) -> None:
+        for f, other in self.cell.bracket:
+            self._couples.setdefault(f, []).append(self.cell.place(other))
+        for f, other in self.cell.bond_bracket:
+            self._couples.setdefault(f.partition("[")[0], []).append((other.partition("[")[0], ()))
+
+    def splitting(self) -> CellSplitting:
+        """All parts."""
+        own: list[Summand] = []
+        classes: list[tuple[Summand, int]] = []
+        for term in summands_of(self.cell):
+            for piece in self._pieces(term):
+                found = [(piece, c) for c in range(self.colouring.count)]
+                if all(self._commute(c, c) for c in found):
+                    classes += found
+                elif self._is_own(piece):
+                    own.append(piece)
+                else:
+                    reason = "it mixes coordinates that do not commute"
+                    raise _NoPartError(piece.expression, reason)
+        neighbours = [
+            {j for j, b in enumerate(classes) if j != i and not self._commute(a, b)} for i, a in enumerate(classes)
+        ]
+        numbers: dict[Coordinate, int] = {}
+        supports = [[numbers.setdefault(f, len(numbers)) for f in self._support(c)] for c in classes]
+        colours = coloured(neighbours, supports)
+        flows = [
+            self.flow([c for c, k in zip(classes, colours, strict=True) if k == colour])
+            for colour in sorted(set(colours))
+        ]
+        return CellSplitting((*flows, *self._own_flows(own)), self.colouring)
+
+    # --- what commutes
+
+    def _support(self, term: tuple[Summand, int]) -> list[Coordinate]:
+        summand, colour = term
+        places = self.cell.places(summand.expression).values()
+        fields = {(f, self.colouring.at(colour, o)) for f, o in places if f in self.cell.fields}
+        return sorted(fields)
+
+    def _commute(self, a: tuple[Summand, int], b: tuple[Summand, int]) -> bool:
+        return not any(self._coupled(f, g) for f in self._support(a) for g in self._support(b))
+
+    def _coupled(self, a: Coordinate, b: Coordinate) -> bool:
+        """Whether some site of the one colour has a bracket with one of the other."""
+        return any(g == b[0] and self.colouring.at(a[1], d) == b[1] for g, d in self._couples.get(a[0], ()))
+
+    def _is_own(self, term: Summand) -> bool:
+        """Whether it is a function of one site, and π local."""
+        places = self.cell.places(term.expression).values()
+        return self.cell.is_local and not term.bond and all(o == self.cell.origin for _, o in places)
+
+    def _pieces(self, term: Summand) -> list[Summand]:
+        """The term, or its monomials where it mixes what does not commute at different sites."""
+        found = [(term, c) for c in range(self.colouring.count)]
+        if all(self._commute(c, c) for c in found) or self._is_own(term):
+            return [term]
+        names = [n for n, (f, _) in self.cell.places(term.expression).items() if f in self.cell.fields]
+        ring = _ring(names, [term.expression])
+        element = ring.tower.convert(term.expression)
+        monomials = ring.terms(element, ring.state)
+        return [replace(term, expression=ring.expression(c * ring.monomial(m))) for m, c in monomials.items()]
+
+    # --- flows
+
+    def flow(self, part: Sequence[tuple[Summand, int]], more: Sequence[tuple[Summand, int]] = ()) -> CellFlow:
+        """The flow of a sum of terms that commute; ``more`` are multiplied by `KICK`."""
+        motions = []
+        for colour in range(self.colouring.count):
+            motion = self._motion(part, more, colour)
+            if motion.increments:
+                motions.append(motion)
+        by_term: dict[int, tuple[Summand, list[int]]] = {}
+        for summand, colour in (*part, *((replace(s, expression=symbol(KICK) * s.expression), c) for s, c in more)):
+            by_term.setdefault(id(summand.expression), (summand, []))[1].append(colour)
+        listed = tuple((s, tuple(c)) for s, c in by_term.values())
+        increments = tuple(e for m in motions for e in m.increments.values())
+        manner = self._manner
+        return CellFlow(total(s.expression for s, _ in listed), increments, manner, tuple(motions), listed)
+
+    def force(
+        self, part: Iterable[tuple[Summand, int]], field: str, colour: int, shift: Offset = (), factor: Expression = ONE
+    ) -> Expression:
+        """∂V/∂field at the site ``shift`` away, which has some colour: from terms at sites, weighted at open ends."""
+        found = []
+        for summand, begins in part:
+            places = {} if summand.bond else self.cell.places(summand.expression)
+            for name, (base, offset) in places.items():
+                if base != field or self.colouring.at(colour, _back(offset)) != begins:
+                    continue
+                (slope,) = gradient(summand.expression, [name])
+                if slope.is_zero:
+                    continue
+                if self.cell.relation == GRID:
+                    way = plus(shift or self.cell.origin, minus(offset))
+                    weight = present(self.cell, summand.low, summand.high, [int(o) for o in way])
+                    slope = weight * self.cell.shifted(slope, way)
+                found.append(factor * slope)
+        return total(found)
+
+    def _motion(
+        self, part: Sequence[tuple[Summand, int]], more: Sequence[tuple[Summand, int]], colour: int
+    ) -> SiteMotion:
+        cell = self.cell
+        moves = {c for s in (*part, *more) for c in self._support(s)}
+        rates: dict[str, list[Expression]] = {f: [] for f in cell.fields}
+        forces: dict[str, Expression] = {}
+        gathered: list[str] = []
+        for (f, other), entry in cell.bracket.items():
+            g, d = cell.place(other)
+            there = self.colouring.at(colour, d)
+            if (g, there) not in moves:
+                continue
+            force = self.force(part, g, there, d) + self.force(more, g, there, d, symbol(KICK))
+            if any(s.bond and g in {b for b, _ in cell.places(s.expression).values()} for s, _ in part):
+                gathered.append(g)
+                force = force + symbol(Symbol(GATHERED, g))
+            if force.is_zero:
+                continue
+            name = Symbol(FORCE, g, *d)
+            forces[name] = force
+            rates[f].append(entry * symbol(name))
+        field = {f: total(r) for f, r in rates.items() if r}
+        if not field:
+            return SiteMotion(colour, {})
+        found = self._solved(field, part)
+        self._expect_still(field, colour, part)
+        increments = dict(zip(cell.fields, substitute(found.increments, forces), strict=True))
+        self._manner = found.manner
+        moved = {f: e for f, e in increments.items() if not e.is_zero}
+        return SiteMotion(colour, moved, tuple(dict.fromkeys(gathered)))
+
+    def _solved(self, rates: Mapping[str, Expression], part: Sequence[tuple[Summand, int]]) -> Solved:
+        ring = _ring(self.cell.fields, rates.values())
+        field = ring.tower.convert_all([rates.get(f, ZERO) for f in self.cell.fields])
+        found = solved(ring, field)
+        if isinstance(found, str):
+            raise _NoPartError(part[0][0].expression, found)
+        return found
+
+    def _expect_still(self, rates: Mapping[str, Expression], colour: int, part: Sequence[tuple[Summand, int]]) -> None:
+        """Neighbours that an equation of a site reads must not move themselves."""
+        moving = {f for f, e in rates.items() if not e.is_zero}
+        for f, o in self.cell.places(*rates.values()).values():
+            if f in moving and any(o) and self._moves(f, self.colouring.at(colour, o), part):
+                raise _NoPartError(
+                    part[0][0].expression, f"the equation of a site has {f} of its neighbours, which moves"
+                )
+
+    def _moves(self, field: str, colour: int, part: Sequence[tuple[Summand, int]]) -> bool:
+        moves = {c for s in part for c in self._support(s)}
+        return any((g, self.colouring.at(colour, d)) in moves for g, d in self._couples.get(field, ()))
+
+    def _own_flows(self, terms: Sequence[Summand]) -> list[CellFlow]:
+        """Flows of functions of one site."""
+        if not terms:
+            return []
+        cell = self.cell
+        ring = site_ring(cell, [t.expression for t in terms])
+        listed = [Term(t.expression, ring.tower.convert(t.expression)) for t in terms]
+        joint = joint_flow(ring, listed)
+        try:
+            flows = (
+                [joint]
+                if isinstance(joint, Flow)
+                else [flow_of(ring, group) for group in Conflicts(ring).grouped(listed)]
+            )
+        except NoFlowError as error:
+            raise _NoPartError(error.term.expression, error.reason) from None
+        colours = tuple(range(self.colouring.count))
+        origin = cell.origin if cell.relation == GRID else ()
+        steps = tuple(int(o) for o in origin)
+        found = []
+        for flow in flows:
+            moved = {f: e for f, e in zip(cell.fields, flow.increment, strict=True) if not e.is_zero}
+            motions = tuple(SiteMotion(c, moved) for c in colours) if moved else ()
+            own = ((Summand(flow.hamiltonian, steps, steps), colours),)
+            found.append(CellFlow(flow.hamiltonian, flow.increment, flow.manner, motions, own))
+        return found
+
+
+def field_at_site(cell: Cell) -> tuple[Expression, ...]:
+    """ẋ of all fields at a site, weighted at open ends."""
+    search = PartSearch(cell, Colouring(1, (0,) * len(cell.axes)))
+    every = [(s, 0) for s in summands_of(cell)]
+    rates: dict[str, list[Expression]] = {f: [] for f in cell.fields}
+    for (f, other), entry in cell.bracket.items():
+        g, d = cell.place(other)
+        rates[f].append(entry * search.force(every, g, 0, d))
+    return tuple(total(listed) for listed in rates.values())
+
+
+def present(cell: Cell, low: Sequence[int], high: Sequence[int], offset: Sequence[int]) -> Expression:
+    """1 where a term that reaches from ``low`` to ``high``, both moved by an offset, is on the lattice, else 0."""
+    reach = [
+        (a + o, b + o) if boundary != PERIODIC else (0, 0)
+        for a, b, o, boundary in zip(low, high, offset, cell.boundary, strict=True)
+    ]
+    if not any(a < 0 or b > 0 for a, b in reach):
+        return ONE
+    return symbol(Symbol(PRESENT, *(v for pair in reach for v in pair)))
+
+
+def _back(offset: Offset) -> tuple[int, ...]:
+    """The way back from an offset of a grid; at one site otherwise."""
+    return tuple(-o for o in offset if isinstance(o, int))
+
+
+def _ring(coordinates: Sequence[str], expressions: Iterable[Expression]) -> Ring:
+    """A ring with these coordinates, in which all else is constant."""
+    roots = list(expressions)
+    others = [n for n in symbols_of(*roots) if n not in coordinates and n != TIME]
+    tower = Tower([*coordinates, *others, TIME], roots, coordinates)
+    return Ring(tower, tuple(coordinates), (), ())
+
+
+def site_ring(cell: Cell, expressions: Sequence[Expression], symbols: Sequence[str] = ()) -> Ring:
+    """The ring of one site with its own bracket."""
+    n = cell.fields
+    brackets = tuple(tuple(cell.bracket.get((f, g), ZERO) for g in n) for f in n)
+    roots = [*expressions, *(e for row in brackets for e in row)]
+    others = [s for s in symbols_of(*roots) if s not in n and s != TIME]
+    tower = Tower([*n, *dict.fromkeys([*others, *symbols]), TIME], roots, n)
+    images = tower.convert_all([e for row in brackets for e in row])
+    size = len(n)
+    poisson = tuple(tuple(images[i * size : (i + 1) * size]) for i in range(size))
+    return Ring(tower, n, poisson, brackets)
+
+
+__all__ = ["FORCE", "GATHERED", "PRESENT", "CellFlow", "CellSplitting", "Colouring", "SiteMotion", "split_cell"]

@@ -1,0 +1,491 @@
+"""Solvers of lattices: states of shape (coordinates, *sizes), any sizes, frames in memory or streamed to disk."""
+
+from __future__ import annotations
+
+import hashlib
+import zipfile
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from phigen.errors import ParameterError, StepError
+from phigen.runtime import arguments, checkpoint
+from phigen.runtime.checkpoint import Checkpoint
+from phigen.runtime.interface import BackendError, Floats, LatticeInterface, Progress, row_steps
+from phigen.writing import replacing
+
+#: Where frames can be streamed to.
+STREAMS = (".npy", ".npz")
+
+
+class LatticeSession(Protocol):
+    """A lattice being integrated. A failing step raises `BackendError` and leaves the state before it."""
+
+    @property
+    def steps(self) -> int:
+        """Good steps since the start."""
+        ...
+
+    def state(self) -> Floats:
+        """A copy of the state (coordinates, *sizes)."""
+        ...
+
+    def advance(self, h: float, steps: int) -> None:
+        """Make so many steps."""
+        ...
+
+    def hamiltonian(self) -> float:
+        """H of the state."""
+        ...
+
+    def density(self) -> Floats:
+        """The density of H at the sites (*sizes)."""
+        ...
+
+    def casimirs(self) -> Floats:
+        """The densities of the Casimirs (Casimirs, *sizes)."""
+        ...
+
+    def vector_field(self) -> Floats:
+        """π∇H (coordinates, *sizes)."""
+        ...
+
+
+class LatticeBackend(Protocol):
+    """A loaded solver of one target."""
+
+    target: str
+
+    @property
+    def identity(self) -> str:
+        """A hash of all that decides the results."""
+        ...
+
+    def start(self, x0: Floats, parameters: Mapping[str, Any]) -> LatticeSession:
+        """A session at x0 (coordinates, *sizes)."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class LatticeTrajectory:
+    """Frames of one integration: the first is the initial state, the last always the final one.
+
+    ``t`` (frames,), ``x`` (frames, coordinates, *sizes), mapped from disk where it was streamed there, ``energy``
+    (frames,). ``steps`` were made with step size ``h``; the frames are those of every stride-th step and of the last.
+    """
+
+    t: Floats
+    x: Floats
+    energy: Floats
+    steps: int
+    h: float
+    parameters: Mapping[str, Any]
+    coordinates: tuple[str, ...]
+    axes: tuple[str, ...]
+    solver: LatticeSolver = field(repr=False)
+
+    def __len__(self) -> int:
+        return len(self.t)
+
+    def __repr__(self) -> str:
+        sizes = "×".join(map(str, self.x.shape[2:]))
+        return f"<LatticeTrajectory of ({', '.join(self.coordinates)}) on {sizes} sites: {len(self)} frames>"
+
+    @property
+    def casimirs(self) -> dict[str, Floats]:
+        """The Casimirs by name: (frames, *sizes) for those of sites, (frames,) for sums and products."""
+        rows = [self.solver.casimirs(x, parameters=self.parameters) for x in self.x]
+        return {name: np.array([row[name] for row in rows]) for name in self.solver.interface.casimirs}
+
+    def column(self, coordinate: str) -> Floats:
+        """The frames (frames, *sizes) of one coordinate; raises `KeyError` for a name that is none."""
+        if coordinate not in self.coordinates:
+            raise KeyError(f"{coordinate!r} is not a coordinate; there are {', '.join(self.coordinates)}")
+        return self.x[:, self.coordinates.index(coordinate)]
+
+    def save(self, path: str | Path) -> None:
+        """Write ``.npz`` (t, x, energy, coordinates, axes, steps, h and parameter_NAME) or the frames as ``.npy``."""
+        target = _stream_path(path)
+        if target.suffix == ".npy":
+            with replacing(target) as file:
+                np.lib.format.write_array(file, np.asarray(self.x), allow_pickle=False)
+            return
+        with replacing(target) as file, zipfile.ZipFile(file, "w", zipfile.ZIP_STORED) as archive:
+            _add(archive, "x", self.x)
+            for name, value in self._further().items():
+                _add(archive, name, value)
+
+    def _further(self) -> dict[str, Any]:
+        about = {"t": self.t, "energy": self.energy, "steps": self.steps, "h": self.h}
+        named = {"coordinates": np.array(self.coordinates), "axes": np.array(self.axes)}
+        return {**about, **named, **{f"parameter_{name}": value for name, value in self.parameters.items()}}
+
+
+class LatticeSolver:
+    """A compiled lattice: ``solver.integrate(x0, h=0.05, steps=1000, stride=10, J=2.0)``, x0 (coordinates, *sizes).
+
+    Parameters are keyword arguments, or in ``parameters={…}``; those at sites are arrays (*sizes), or one number for
+    all. What is not given has its default of the spec. Wrong arguments raise `ValueError` or `TypeError`, a step that
+    cannot be made `phigen.StepError`. Safe to use from several threads.
+    """
+
+    def __init__(self, backend: LatticeBackend, interface: LatticeInterface) -> None:
+        self.backend, self.interface = backend, interface
+
+    def __repr__(self) -> str:
+        about = self.interface
+        fields = ", ".join(about.coordinates)
+        return f"<LatticeSolver {about.name}: order {about.order}, target {self.target}, ({fields})>"
+
+    @property
+    def target(self) -> str:
+        """``c`` or ``numpy``."""
+        return self.backend.target
+
+    @property
+    def order(self) -> int:
+        """The order of the method."""
+        return self.interface.order
+
+    @property
+    def coordinates(self) -> tuple[str, ...]:
+        """Names of the coordinates of a site."""
+        return self.interface.coordinates
+
+    # --- runs
+
+    def integrate(
+        self,
+        x0: ArrayLike,
+        h: float,
+        steps: int,
+        stride: int = 1,
+        *,
+        output: str | Path | None = None,
+        checkpoints: str | Path | None = None,
+        progress: Progress | None = None,
+        parameters: Mapping[str, Any] | None = None,
+        **more: Any,
+    ) -> LatticeTrajectory:
+        """Make ``steps`` steps of size ``h`` from ``x0`` (coordinates, *sizes), framed every ``stride`` and at the end.
+
+        With ``output``, a path that ends in .npy or .npz, frames go to that file one by one. With ``checkpoints``, a
+        path, the state is kept there at every frame; a call with the same arguments goes on from it, and removes it at
+        the end. ``progress`` is called after each frame with the number of steps done. Raises `StepError`, whose
+        ``trajectory`` ends with the state before the failing step.
+        """
+        start, h = self._state(x0, "x0"), arguments.step_size(h)
+        steps, stride = arguments.count(steps, "steps", 0), arguments.count(stride, "stride", 1)
+        values = self._values(parameters, more, start.shape[1:])
+        marks = row_steps(steps, stride)
+        frames = _Frames(_stream_path(output) if output else None, (len(marks), *start.shape))
+        run = _Run(self, start, h, marks, values, frames, Path(checkpoints) if checkpoints else None)
+        try:
+            count = run.made(progress)
+        except BackendError as error:
+            frames.discard()
+            run.energy.append(run.session.hamiltonian())
+            kept = np.array([*frames.kept(run.count), error.states[-1]])
+            t = np.array([h * mark for mark in [*marks[: run.count], error.step]], dtype=np.float64)
+            found = self._trajectory(t, kept, np.array(run.energy), error.step, h, values)
+            raise self._failure(error, h, found, values) from error
+        found = self._trajectory(
+            np.asarray(h * marks[:count], dtype=np.float64), frames.array, np.array(run.energy), steps, h, values
+        )
+        frames.finish(found)
+        return found
+
+    def step(self, x: ArrayLike, h: float, *, parameters: Mapping[str, Any] | None = None, **more: Any) -> Floats:
+        """The state one step of size ``h`` after ``x`` (coordinates, *sizes); raises `StepError`."""
+        start, h = self._state(x, "x"), arguments.step_size(h)
+        values = self._values(parameters, more, start.shape[1:])
+        session = self._started(start, h, values)
+        try:
+            session.advance(h, 1)
+        except BackendError as error:
+            raise self._failure(error, h, None, values) from error
+        return session.state()
+
+    def ensemble(
+        self, X0: ArrayLike, h: float, steps: int, *, parameters: Mapping[str, Any] | None = None, **more: Any
+    ) -> Floats:
+        """Final states (members, coordinates, *sizes) of several lattices of one size.
+
+        Parameters at sites may have a first axis of members: disorder. Raises `StepError` with the ``members`` that
+        failed and the states as far as each came.
+        """
+        states = np.array(X0, dtype=np.float64)
+        if states.ndim != 2 + len(self.interface.axes):
+            raise ValueError(f"X0 must have shape (members, {self._shape_text()}), not {states.shape}")
+        checked = [self._state(x, "X0") for x in states]
+        h, steps = arguments.step_size(h), arguments.count(steps, "steps", 0)
+        failed: list[int] = []
+        last: BackendError | None = None
+        for m, start in enumerate(checked):
+            values = self._values(self._of_member(parameters, m, len(checked)), self._of_member(more, m, len(checked)),
+                                  start.shape[1:])  # fmt: skip
+            session = self._started(start, h, values)
+            try:
+                session.advance(h, steps)
+            except BackendError as error:
+                failed.append(m)
+                last = error
+            states[m] = session.state()
+        if last is not None:
+            told = BackendError(last.status, -1, states, tuple(failed))
+            raise self._failure(told, h, states, {}) from last
+        return states
+
+    def _of_member(self, given: Mapping[str, Any] | None, member: int, members: int) -> dict[str, Any]:
+        found = {}
+        for name, value in (given or {}).items():
+            array = np.asarray(value)
+            many = name in self.interface.at_sites and array.ndim == 1 + len(self.interface.axes)
+            if many and len(array) != members:
+                raise ValueError(f"parameter {name!r} has {len(array)} members, not {members}")
+            found[name] = array[member] if many else value
+        return found
+
+    # --- what is seen
+
+    def hamiltonian(self, x: ArrayLike, *, parameters: Mapping[str, Any] | None = None, **more: Any) -> float:
+        """H of a state (coordinates, *sizes)."""
+        return self._seen(x, parameters, more).hamiltonian()
+
+    def density(self, x: ArrayLike, *, parameters: Mapping[str, Any] | None = None, **more: Any) -> Floats:
+        """The density of H at the sites (*sizes), whose sum is H."""
+        return self._seen(x, parameters, more).density()
+
+    def casimirs(self, x: ArrayLike, *, parameters: Mapping[str, Any] | None = None, **more: Any) -> dict[str, Any]:
+        """The Casimirs of a state, by name: (*sizes) for those of sites, numbers for sums and products."""
+        about, found = self.interface, self._seen(x, parameters, more).casimirs()
+        kinds = zip(about.casimirs, about.casimir_kinds, found, strict=True)
+        return {name: _reduced(kind, values) for name, kind, values in kinds}
+
+    def vector_field(self, x: ArrayLike, *, parameters: Mapping[str, Any] | None = None, **more: Any) -> Floats:
+        """π∇H of a state (coordinates, *sizes), the same shape."""
+        return self._seen(x, parameters, more).vector_field()
+
+    def _seen(self, x: ArrayLike, parameters: Mapping[str, Any] | None, more: Mapping[str, Any]) -> LatticeSession:
+        state = self._state(x, "x")
+        return self._started(state, 1.0, self._values(parameters, more, state.shape[1:]))
+
+    # --- arguments
+
+    def _shape_text(self) -> str:
+        return ", ".join([str(len(self.coordinates)), *(f"N_{axis}" for axis in self.interface.axes)])
+
+    def _state(self, x: ArrayLike, what: str) -> Floats:
+        """A state, a copy, checked with its sizes."""
+        about = self.interface
+        if np.iscomplexobj(x):
+            raise TypeError(f"{what} must be real")
+        try:
+            found = np.array(x, dtype=np.float64)
+        except (TypeError, ValueError, OverflowError) as error:
+            raise TypeError(f"{what} must be an array of numbers: {error}") from None
+        if found.ndim != 1 + len(about.axes) or found.shape[0] != len(about.coordinates):
+            raise ValueError(f"{what} must have shape ({self._shape_text()}), not {found.shape}")
+        for axis, size, least, period in zip(about.axes, found.shape[1:], about.least, about.periods, strict=True):
+            if size < least:
+                raise ValueError(f"{what} has {size} sites along {axis}; neighbours and brackets need {least} or more")
+            if size % period:
+                raise ValueError(
+                    f"{what} has {size} sites along {axis}; the colours of sites need multiples of {period}"
+                )
+        if not np.isfinite(found).all():
+            place = tuple(np.argwhere(~np.isfinite(found))[0].tolist())
+            where = ", ".join(map(str, place[1:]))
+            raise ValueError(f"{what} must be finite, but {about.coordinates[place[0]]} at ({where}) is not")
+        return found
+
+    def _values(self, given: Mapping[str, Any] | None, more: Mapping[str, Any], sizes: Sequence[int]) -> dict[str, Any]:
+        """All parameters: numbers, and arrays over the sites."""
+        about = self.interface
+        arrays = {n: v for n, v in {**(given or {}), **more}.items() if n in about.at_sites}
+        numbers = [{n: v for n, v in part.items() if n not in about.at_sites} for part in (given or {}, more)]
+        values: dict[str, Any] = dict(arguments.parameters(about, *numbers))
+        for name, value in arrays.items():
+            array = np.asarray(value, dtype=np.float64)
+            if array.shape not in ((), tuple(sizes)):
+                raise ValueError(f"parameter {name!r} must be a number or have shape {tuple(sizes)}, not {array.shape}")
+            if not np.isfinite(array).all():
+                raise ValueError(f"parameter {name!r} must be finite at all sites")
+            if name in about.positive and not (array > 0).all():
+                raise ValueError(f"parameter {name!r} must be positive at all sites")
+            values[name] = array
+        return values
+
+    def _started(self, start: Floats, h: float, values: Mapping[str, Any]) -> LatticeSession:
+        try:
+            return self.backend.start(start, values)
+        except BackendError as error:
+            raise self._failure(error, h, None, values) from error
+
+    def _failure(self, error: BackendError, h: float, so_far: Any, values: Mapping[str, Any]) -> StepError:
+        name = self.interface.name
+        told = {"step": error.step, "status": error.status, "trajectory": so_far, "members": error.members}
+        if error.status == "BAD_ARGUMENT":
+            given = ", ".join(f"{n} = {v!r}" for n, v in values.items() if np.ndim(v) == 0)
+            message = f"{name}: no step can be made with {given}: what is computed from parameters alone is not finite"
+            return ParameterError(message, **{**told, "step": 0})
+        where = f"step {error.step} of size {h!r} failed" if error.step >= 0 else "a step failed"
+        if error.members:
+            where += f" for {len(error.members)} member(s) of the ensemble ({', '.join(map(str, error.members[:5]))})"
+        advice = "the state left the range of the formulas; a smaller step helps, unless the solution ends here"
+        return StepError(f"{name}: {where}: {error.status}, {advice}", **told)
+
+    def _trajectory(
+        self, t: Floats, x: Floats, energy: Floats, steps: int, h: float, values: Mapping[str, Any]
+    ) -> LatticeTrajectory:
+        return LatticeTrajectory(t, x, energy, steps, h, values, self.coordinates, self.interface.axes, self)
+
+
+@dataclass
+class _Run:
+    """One call of `LatticeSolver.integrate`: ``count`` frames have been made."""
+
+    solver: LatticeSolver
+    start: Floats
+    h: float
+    marks: Any
+    values: Mapping[str, Any]
+    frames: _Frames
+    checkpoints: Path | None
+    energy: list[float] = field(default_factory=list)
+    count: int = 0
+    session: Any = None
+
+    def made(self, progress: Progress | None) -> int:
+        """All frames that are left."""
+        first = self._resumed()
+        self.session = self.solver._started(first, self.h, self.values)
+        before = int(self.marks[self.count - 1]) if self.count else 0
+        if not self.count:
+            self._store(first)
+        for mark in self.marks[self.count :].tolist():
+            try:
+                self.session.advance(self.h, mark - before - self.session.steps)
+            except BackendError as error:
+                raise BackendError(error.status, before + self.session.steps, error.states) from error
+            self._store(self.session.state())
+            self._save(mark)
+            if progress:
+                progress(mark)
+        if self.checkpoints:
+            self.checkpoints.unlink(missing_ok=True)
+        return self.count
+
+    def _store(self, state: Floats) -> None:
+        self.frames.put(self.count, state)
+        self.energy.append(self.session.hamiltonian())
+        self.count += 1
+
+    def _identity(self) -> dict[str, Any]:
+        arrays = {name: np.asarray(value) for name, value in self.values.items() if np.ndim(value)}
+        numbers = {name: float(value) for name, value in self.values.items() if not np.ndim(value)}
+        hashes = {name: hashlib.sha256(a.tobytes()).hexdigest() for name, a in {**arrays, "": self.start}.items()}
+        marks = [len(self.marks), int(self.marks[-1]), int(self.marks[min(1, len(self.marks) - 1)])]
+        about = {"solver": self.solver.backend.identity, "h": self.h, "sizes": list(self.start.shape), "steps": marks}
+        return {**about, "parameters": numbers, "arrays": hashes}
+
+    def _save(self, mark: int) -> None:
+        if self.checkpoints:
+            self.frames.flush()
+            arrays = {"state": self.session.state(), "count": np.array(self.count), "energy": np.array(self.energy)}
+            if self.frames.path is None:
+                arrays["frames"] = self.frames.array[: self.count]
+            Checkpoint(self._identity(), arrays).save(self.checkpoints)
+
+    def _resumed(self) -> Floats:
+        """The state to go on from."""
+        if self.checkpoints is None or not self.checkpoints.exists():
+            return self.start
+        arrays = checkpoint.load(self.checkpoints, self._identity())
+        self.count, self.energy = int(arrays["count"]), arrays["energy"].tolist()
+        self.frames.restore(arrays.get("frames"), self.count)
+        return np.asarray(arrays["state"])
+
+
+class _Frames:
+    """Where frames go: an array in memory, or a file."""
+
+    def __init__(self, path: Path | None, shape: tuple[int, ...]) -> None:
+        self.path = path
+        self._part = path.with_name(path.name + ".part.npy") if path else None
+        self._shape = shape
+        self._array: Floats | None = None
+
+    @property
+    def array(self) -> Floats:
+        """All frames."""
+        if self._array is None:
+            if self._part is None:
+                self._array = np.empty(self._shape)
+            else:
+                self._array = np.lib.format.open_memmap(self._part, "w+", np.float64, self._shape)
+        return self._array
+
+    def put(self, k: int, state: Floats) -> None:
+        """Store frame k."""
+        self.array[k] = state
+
+    def kept(self, count: int) -> Iterator[Floats]:
+        """The first frames, still there after `discard`."""
+        return iter(self.array[:count])
+
+    def flush(self) -> None:
+        """Hand over to the disk what is not there yet."""
+        if isinstance(self._array, np.memmap):
+            self._array.flush()
+
+    def restore(self, frames: Floats | None, count: int) -> None:
+        """Go on after the first frames."""
+        if frames is not None:
+            self.array[:count] = frames
+        elif self._part is not None and self._part.exists():
+            self._array = np.lib.format.open_memmap(self._part, "r+")
+            if self._array.shape != self._shape:
+                raise ValueError(f"{self._part} does not hold the frames of this run")
+
+    def discard(self) -> None:
+        """Remove the file of a run that failed; what was mapped from it stays readable."""
+        if self._part is not None and self._array is not None:
+            self._array = np.array(self._array)
+            self._part.unlink(missing_ok=True)
+
+    def finish(self, found: LatticeTrajectory) -> None:
+        """Give the file its name, and what else belongs into it."""
+        if self.path is None or self._part is None:
+            return
+        self.flush()
+        if self.path.suffix == ".npz":
+            found.save(self.path)
+            with ExitStack() as last:
+                last.callback(self._part.unlink, missing_ok=True)
+        else:
+            self._part.replace(self.path)
+
+
+def _reduced(kind: str, densities: Floats) -> Any:
+    """A Casimir from its densities at the sites."""
+    if kind == "sites":
+        return densities
+    return float(densities.sum() if kind == "sum" else densities.prod())
+
+
+def _stream_path(path: str | Path) -> Path:
+    found = Path(path)
+    if found.suffix not in STREAMS:
+        raise ValueError(f"frames go to files that end in {' or '.join(STREAMS)}, not {str(path)!r}")
+    return found
+
+
+def _add(archive: zipfile.ZipFile, name: str, value: Any) -> None:
+    with archive.open(f"{name}.npy", "w", force_zip64=True) as member:
+        np.lib.format.write_array(member, np.asarray(value), allow_pickle=False)

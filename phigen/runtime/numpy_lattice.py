@@ -1,0 +1,82 @@
+"""The generated NumPy module of a lattice. See `phigen.runtime.lattice`."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from phigen.runtime.interface import BackendError, Floats, LatticeInterface
+from phigen.runtime.modules import load_module
+
+
+class NumpyLatticeSession:
+    """What the loop of the module's ``integrate`` holds."""
+
+    def __init__(self, module: Any, x0: Floats, parameters: Mapping[str, Any]) -> None:
+        self.steps = 0
+        self._module, self._x = module, np.array(x0)
+        try:
+            self._sites = module._Sites(x0.shape, parameters)
+            module._coefficients(self._sites, 1e-100)
+        except ValueError:
+            raise BackendError("BAD_ARGUMENT", 0, self._x[None]) from None
+        self._h = np.nan
+        self._rows: Any = None
+
+    def state(self) -> Floats:
+        """A copy of the state (coordinates, *sizes)."""
+        return self._x.copy()
+
+    def advance(self, h: float, steps: int) -> None:
+        """Make so many steps."""
+        if h != self._h:
+            self._h, self._rows = h, self._module._coefficients(self._sites, h)
+        with np.errstate(all="ignore"):
+            for _ in range(steps):
+                following = self._module._advance(self._sites, self._rows, self._x)
+                if not np.isfinite(following).all():
+                    raise BackendError("NOT_FINITE", self.steps, self._x[None].copy())
+                self._x = following
+                self.steps += 1
+
+    def hamiltonian(self) -> float:
+        """H of the state."""
+        return float(self.density().sum())
+
+    def density(self) -> Floats:
+        """The density of H at the sites (*sizes)."""
+        return np.asarray(self._module._energy(self._sites.parameters, self._x, self._sites)[0])
+
+    def casimirs(self) -> Floats:
+        """The densities of the Casimirs (Casimirs, *sizes)."""
+        return np.asarray(self._module._casimirs(self._sites.parameters, self._x, self._sites))
+
+    def vector_field(self) -> Floats:
+        """π∇H (coordinates, *sizes)."""
+        return np.asarray(self._module._vector_field(self._sites.parameters, self._x, self._sites))
+
+
+class NumpyLattice:
+    """The back end over the text of a generated module."""
+
+    target = "numpy"
+
+    def __init__(self, files: Mapping[str, str], interface: LatticeInterface) -> None:
+        self.interface, self._files = interface, dict(files)
+        self._text = files[f"{interface.name}.py"]
+        self._module = load_module(self._text, interface.name)
+
+    def __reduce__(self) -> tuple[type[NumpyLattice], tuple[Any, ...]]:
+        return NumpyLattice, (self._files, self.interface)
+
+    @property
+    def identity(self) -> str:
+        """A hash of all that decides the results."""
+        return hashlib.sha256(f"{np.__version__}\n{self._text}".encode()).hexdigest()[:40]
+
+    def start(self, x0: Floats, parameters: Mapping[str, Any]) -> NumpyLatticeSession:
+        """A session at x0 (coordinates, *sizes)."""
+        return NumpyLatticeSession(self._module, x0, parameters)

@@ -1,0 +1,38 @@
+"""Power series cut short by Chebyshev polynomials, in exact arithmetic: the same digits with fewer terms."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from fractions import Fraction
+
+
+def economised(
+    coefficients: Sequence[Fraction], radius: Fraction, terms: int, *, symmetric: bool = False
+) -> list[Fraction]:
+    """Σ c_k z^k for 0 ≤ z ≤ radius, or −radius ≤ z ≤ radius if ``symmetric``, with so many ``terms``.
+
+    By Lanczos' method (C. Lanczos, Applied Analysis, 1956): the highest power is replaced, one after the other, by what
+    the Chebyshev polynomial of its degree leaves of it.
+    """
+    scaled = [c * radius**k for k, c in enumerate(coefficients)]
+    while len(scaled) > terms:
+        chebyshev = _chebyshev(len(scaled) - 1, [0, 2] if symmetric else [-2, 4])
+        multiple = scaled[-1] / chebyshev[-1]
+        scaled = [c - multiple * t for c, t in zip(scaled, chebyshev, strict=True)][:-1]
+    return [c / radius**k for k, c in enumerate(scaled)]
+
+
+def _chebyshev(degree: int, twice: Sequence[int]) -> list[int]:
+    """The coefficients of T_n(y) in u, where 2y = ``twice[0]`` + ``twice[1]`` u: on −1 ≤ y ≤ 1."""
+    before, last = [1], [twice[0] // 2, twice[1] // 2]
+    if degree == 0:
+        return before
+    for _ in range(degree - 1):
+        after = [0] * (len(last) + 1)
+        for k, c in enumerate(last):
+            after[k] += twice[0] * c
+            after[k + 1] += twice[1] * c
+        for k, c in enumerate(before):
+            after[k] -= c
+        before, last = last, after
+    return last

@@ -1,0 +1,407 @@
+"""Lattices in C: kernels as loops over the sites of a row, and the tables that the runtime goes by."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+from phigen.lanes.lowering import Rows
+from phigen.scheme.kernel import Kernel, Output
+from phigen.scheme.program import Program
+from phigen.scheme.steps import Sweep, Sweeps
+from phigen.spec.model import Parameter
+from phigen.symbolic import functions as elementary
+from phigen.symbolic.expression import ONE, substitute
+from phigen.symbolic.symbols import COEFFICIENT, Symbol, kind_of
+from phigen.targets.c import functions
+from phigen.targets.c.kernels import function, lane_calls, members, printer
+from phigen.targets.c.layout import comment
+from phigen.targets.code import Code, lower
+from phigen.targets.header import plain
+from phigen.targets.names import Scope
+from phigen.targets.rendering import render
+from phigen.targets.reserved import C_RESERVED
+
+#: What the loops call their own.
+_OWN = frozenset({"coef", "params", "row", "from", "to", "out", "apart", "i", "part", "far"})
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Where things are: lines are rows beside a row, by their offsets; halo the sites that are copied beside it."""
+
+    step: Sweeps
+    lines: tuple[tuple[int, ...], ...]
+    halo: int
+    weights: tuple[str, ...]
+    arrays: tuple[str, ...]
+
+    def line(self, offset: Sequence[int]) -> int:
+        """The line of a neighbour."""
+        return self.lines.index(tuple(offset[:-1]))
+
+    @property
+    def colour_step(self) -> int:
+        """The distance in a row from a site to the next of its colour."""
+        sites = self.step.sites
+        return next(k for k in range(1, sites.colours + 1) if k * sites.weights[-1] % sites.colours == 0)
+
+    @property
+    def open_rows(self) -> bool:
+        """Whether rows have open ends, or there are others."""
+        return any(self.step.sites.open)
+
+
+def layout_of(program: Program, step: Sweeps) -> Layout:
+    """The layout of a lattice."""
+    sites = step.sites
+    offsets = [offset for _, offset in sites.places.values()]
+    lines = dict.fromkeys([(0,) * (len(sites.axes) - 1), *sorted({o[:-1] for o in offsets})])
+    weights = dict.fromkeys(w for kernel in _at_sites(program, step) for w in kernel.inputs["present"])
+    halo = max((abs(o[-1]) for o in offsets), default=0)
+    return Layout(step, tuple(lines), halo, tuple(weights), (*program.coordinates, *sites.parameters))
+
+
+def _at_sites(program: Program, step: Sweeps) -> list[Kernel]:
+    seen = program.observables
+    own = [sweep.kernel for part in step.parts for sweep in part]
+    return [*own, seen.energy, seen.casimirs, seen.vector_field]
+
+
+def switches(program: Program, step: Sweeps, layout: Layout) -> dict[str, bool]:
+    """The switches of the runtime for lattices."""
+    return {
+        "OPEN": bool(layout.weights),
+        "OPEN_ROWS": step.sites.open[-1],
+        "HALO": layout.halo > 0,
+        "COLOURS": step.sites.colours > 1,
+        "SITE_PARAMETERS": bool(step.sites.parameters),
+    }
+
+
+def declarations(program: Program, step: Sweeps) -> str:
+    """What users see: sizes and parameters."""
+    member, layout = members(program), layout_of(program, step)
+    listed = [_declared(p, member[p.name]) for p in program.parameters]
+    arrays = len(layout.arrays)
+    sizes = [
+        ("ARRAYS", arrays, "arrays over the sites: fields, then parameters"),
+        ("COEFFICIENTS", max(1, step.row * (len(step.schedule.times) + 1)), "numbers that depend on params and h only"),
+    ]
+    values = {
+        "NAME": program.name,
+        "axes": len(step.sites.axes),
+        "axis_names": ", ".join(step.sites.axes),
+        "n": program.dimension,
+        "order": program.order,
+        "casimir_count": len(program.casimirs),
+        "version": program.version,
+        "sha256": program.about.spec_sha256,
+        "coordinates": ", ".join(program.coordinates),
+        "casimirs": ", ".join(program.casimirs) or "none",
+        "members": listed or [("char unused;", "this system has no parameters")],
+        "sizes": sizes,
+    }
+    return render("c", "lattice.h", values)
+
+
+def _declared(parameter: Parameter, member: str) -> tuple[str, str]:
+    said = plain(parameter.description) or f"default {float(parameter.value)!r}"
+    said = said if member == parameter.name else f"{parameter.name}: {said}"
+    if parameter.at == "sites":
+        return f"const double *{member};", f"at sites: {said}; NULL for the default at all of them"
+    return f"double {member};", said
+
+
+def model(program: Program, step: Sweeps) -> str:
+    """Tables, and what is computed before the steps."""
+    member, layout, schedule, sites = members(program), layout_of(program, step), step.schedule, step.sites
+    flows = schedule.flows
+    joined = schedule.times[flows[0][1]] + schedule.times[flows[-1][1]]
+    multiples = [*schedule.multiples, *schedule.multiples[:1]]
+    constants = [
+        ("HALO", layout.halo, "sites that are copied beside a row"),
+        ("LINES", len(layout.lines), "rows that kernels read: the row itself and those beside it"),
+        ("ROW", max(1, step.row), "coefficients of one flow"),
+        ("FLOWS", len(flows), "in a step"),
+        ("JOINED", len(schedule.times), "the row of the last flow of a step and the first of the next together"),
+        ("ROWS_OF_FLOWS", len(schedule.times) + 1, "rows of coefficients"),
+    ]
+    constants += [("WEIGHTS", len(layout.weights), "kinds of terms that open ends take away")] * bool(layout.weights)
+    if sites.colours > 1:
+        constants += [("COLOUR_COUNT", sites.colours, "colours of sites")]
+        constants += [("COLOUR_STRIDE", sites.weights[-1], "what a step along a row adds to the colour")]
+    numbers = [p for p in program.parameters if p.at == "all"]
+    asked = [
+        f"isfinite(params->{member[p.name]})" + f" && params->{member[p.name]} > 0.0" * p.positive for p in numbers
+    ]
+    arrays = [(member[p.name], p.positive) for p in program.parameters if p.at == "sites"]
+    values = {
+        "NAME": program.name,
+        "defaults": ", ".join("NULL" if p.at == "sites" else repr(float(p.value)) for p in program.parameters) or "0",
+        "constants": constants,
+        "least": ", ".join(map(str, sites.least)),
+        "periods": ", ".join(map(str, sites.periods)),
+        "open": ", ".join(str(int(o)) for o in sites.open),
+        "lines": ", ".join(_braced([*line, 0]) for line in layout.lines),
+        "weights": ", ".join(_braced([_braced(pair) for pair in _bounds(w)]) for w in layout.weights),
+        "colours": ", ".join(map(str, sites.weights)) if sites.colours > 1 else "",
+        "times": ", ".join(map(repr, [*schedule.times, joined])),
+        "multiples": ", ".join(map(repr, multiples)) if schedule.multiples else "",
+        "parts": ", ".join(str(part + 1) for part, _ in flows),
+        "rows": ", ".join(str(row) for _, row in flows),
+        "allowed": [*_allowed(asked, arrays)],
+    }
+    prepare = function(program, step.prepare)
+    return render("c", "lattice.c", values) + prepare
+
+
+def _allowed(asked: Sequence[str], arrays: Sequence[tuple[str, bool]]) -> Iterator[str]:
+    """The statements that return 0 for parameters that are not allowed."""
+    if asked:
+        yield f"if (!({' && '.join(asked)})) return 0;"
+    for member, positive in arrays:
+        wrong = f"!isfinite(params->{member}[k])" + f" || params->{member}[k] <= 0.0" * positive
+        yield f"for (size_t k = 0; params->{member} != NULL && k < sites; ++k)"
+        yield f"    if ({wrong}) return 0;"
+    unused = ["params"] * (not asked and not arrays) + ["sites"] * (not arrays)
+    if unused:
+        yield ", ".join(f"(void){u}" for u in unused) + ";"
+
+
+def _braced(items: Sequence[object]) -> str:
+    return "{ " + ", ".join(map(str, items)) + " }"
+
+
+def _bounds(weight: str) -> list[tuple[int, int]]:
+    """The least and the largest offset of a term along each axis."""
+    assert isinstance(weight, Symbol)
+    bounds = [int(k) for k in weight.key]
+    return list(zip(bounds[::2], bounds[1::2], strict=True))
+
+
+def sweeps(program: Program, step: Sweeps, rows: Rows) -> str:
+    """All kernels as loops over sites, and which of them make which part of H."""
+    layout, name, member, calls = layout_of(program, step), program.name, members(program), _functions(program)
+    found = [*functions.called(program), *functions.phi_lanes(program, rows.calls)]
+    found += functions.near_rows(program, rows.near)
+    near = {**calls, **{f: f"{name}_{f}_near" for f in rows.near}}
+    for k, part in enumerate(step.parts, 1):
+        two = any(rows.calls_near(sweep.kernel) for sweep in part)
+        found += _part(program, layout, k, part, {"_far": calls, "_near": near} if two else {"": calls})
+    seen = program.observables
+    found += [_seen(program, layout, k) for k in (seen.energy, seen.casimirs, seen.vector_field)]
+    sites = [p for p in program.parameters if p.at == "sites"]
+    numbers = range(1, len(step.parts) + 1)
+    values = {
+        "NAME": name,
+        "arrays": [(member[p.name], layout.arrays.index(p.name), repr(float(p.value))) for p in sites],
+        "labels": [("default" if k == len(step.parts) else f"case {k}", k) for k in numbers],
+    }
+    return "\n".join([*found, render("c", "sweeps.c", values)])
+
+
+def _part(
+    program: Program, layout: Layout, k: int, part: Sequence[Sweep], forms: Mapping[str, Mapping[str, str]]
+) -> Iterator[str]:
+    """The loops of a part of H over rows and their sites, in each form: by different functions."""
+    for form, calls in forms.items():
+        for sweep in part:
+            yield from _sweep_forms(program, layout, sweep, form, calls)
+    beside = program.profile == "fast" and any(sweep.kernel.inputs["present"] for sweep in part)
+    conditions = ("if (far) ", "else ") if len(forms) > 1 else ("",)
+    last = [_bounds(w)[-1] for w in layout.weights]
+    values = {
+        "NAME": program.name,
+        "k": k,
+        "alone": len(forms) == 1,
+        "loops": [
+            (condition, [line for sweep in part for line in _calls(program.name, sweep, form, beside)])
+            for form, condition in zip(forms, conditions, strict=True)
+        ],
+        "beside": beside,
+        "low": max([0, *(-low for low, _ in last)]),
+        "high": max([0, *(high for _, high in last)]),
+        "moved": sorted({f for sweep in part for f in sweep.moved}) if layout.halo else [],
+    }
+    yield render("c", "sweep_part.c", values)
+
+
+def _functions(program: Program) -> dict[str, str]:
+    """What the loops call: versions for lanes where there are such, else phigen's own or the library's."""
+    return {f: f"{program.name}_{f}" for f in elementary.FUNCTIONS} | dict(lane_calls(program))
+
+
+def _sweep_forms(program: Program, layout: Layout, sweep: Sweep, form: str, calls: Mapping[str, str]) -> Iterator[str]:
+    """The loop, and that beside open ends; short code has one for both."""
+    kernel = sweep.kernel
+    if kernel.inputs["present"] and program.profile == "fast":
+        yield _sweep(program, layout, replace(sweep, kernel=_inside(kernel)), form, calls)
+        yield _sweep(program, layout, sweep, f"{form}_end", calls)
+    else:
+        yield _sweep(program, layout, sweep, form, calls)
+
+
+def _inside(kernel: Kernel) -> Kernel:
+    """The kernel away from open ends."""
+    values = substitute(kernel.roots, dict.fromkeys(kernel.inputs["present"], ONE))
+    output = kernel.outputs[0].name
+    return replace(kernel, inputs={**kernel.inputs, "present": ()}, outputs=(Output(output, tuple(values)),))
+
+
+def _calls(name: str, sweep: Sweep, form: str, beside: bool) -> Iterator[str]:
+    """The calls of the loops for a piece of a row."""
+    own = f"{name}_{sweep.kernel.name}{form}"
+    if not beside or not sweep.kernel.inputs["present"]:
+        yield f"{own}(coef, &at.row, at.from, at.to);"
+        return
+    yield f"{own}_end(coef, &at.row, at.from, second);"
+    yield f"{own}(coef, &at.row, second, third);"
+    yield f"{own}_end(coef, &at.row, third, at.to);"
+
+
+def _sweep(program: Program, layout: Layout, sweep: Sweep, form: str, calls: Mapping[str, str]) -> str:
+    """A kernel as a loop that changes some fields of the sites of a row."""
+    kernel, name = sweep.kernel, program.name
+    code = lower(kernel)
+    names = _Names(program, layout, kernel, code, {program.coordinates[i] for i in sweep.moved}, calls)
+    purpose = {"_far": "the same for large arguments of functions", "_end": "the same beside open ends"}
+    said = next((text for key, text in purpose.items() if form.endswith(key)), kernel.purpose)
+    head = [*comment(f"/* {plain(said)} */", "")]
+    head.append(
+        f"static inline void {name}_{kernel.name}{form}("
+        f"const double *coef, const {name}_row *row, ptrdiff_t from, ptrdiff_t to)\n{{"
+    )
+    body = names.loaded()
+    body += [f"const double {names.scope[a.target]} = {names.show(a.value)};" for a in code.assignments]
+    stores = [(program.coordinates[sweep.moved[s.index]], names.show(s.value)) for s in code.stores]
+    changes = [f"const double change{k} = {value};" for k, (_, value) in enumerate(stores)]
+    if len(stores) > 1:
+        body += changes
+        stores = [(f, f"change{k}") for k, (f, _) in enumerate(stores)]
+    body += [f"{names.pointer(f, 0)}[i] {_added(names.scope[f], f in code.used, value)};" for f, value in stores]
+    unused = [] if any(kind_of(s) == COEFFICIENT for s in code.used) else ["    (void)coef;"]
+    colours = layout.step.sites.colours
+    start = f"{name}_first(row, {sweep.colour}, from)" if colours > 1 else "from"
+    onward = f"i += {layout.colour_step}" if colours > 1 else "++i"
+    return _looped([*head, *unused], names, body, name, f"ptrdiff_t i = {start}; i < to; {onward}")
+
+
+def _added(name: str, read: bool, value: str) -> str:
+    """What is added to a field, which may have been read before."""
+    return f"= {name} + {value}" if read else f"+= {value}"
+
+
+def _seen(program: Program, layout: Layout, kernel: Kernel) -> str:
+    """A kernel as a loop that fills arrays over the sites."""
+    name, code = program.name, lower(kernel)
+    names = _Names(program, layout, kernel, code, set(), _functions(program))
+    head = [*comment(f"/* {plain(kernel.purpose)}, of the sites of a row: out[k * apart + i - from] */", "")]
+    head.append(
+        f"static void {name}_{kernel.name}_row(const {name}_params *params, const {name}_row *row, ptrdiff_t from, "
+        f"ptrdiff_t to, double *restrict out, size_t apart)\n{{"
+    )
+    body = names.loaded()
+    body += [f"const double {names.scope[a.target]} = {names.show(a.value)};" for a in code.assignments]
+    for s in code.stores:
+        place = {0: "i - from", 1: "(ptrdiff_t)apart + i - from"}.get(
+            s.index, f"{s.index} * (ptrdiff_t)apart + i - from"
+        )
+        body.append(f"out[{place}] = {names.show(s.value)};")
+    unused = [] if any(s in code.used for s in kernel.inputs["params"]) else ["params"]
+    unused += [] if len(code.stores) > 1 else ["apart"]
+    if not code.stores:
+        unused += ["row", "from", "to", "out"]
+        return "\n".join([*head, *(f"    (void){u};" for u in unused), "}"]) + "\n"
+    head += ["    " + ", ".join(f"(void){u}" for u in unused) + ";"] if unused else []
+    return _looped(head, names, body, name, "ptrdiff_t i = from; i < to; ++i")
+
+
+def _looped(head: list[str], names: _Names, body: list[str], name: str, loop: str) -> str:
+    lines = [*head, *(f"    {line}" for line in names.pointers())]
+    lines += [f"    {name}_EACH_SITE", f"    for ({loop}) {{", *(f"        {line}" for line in body), "    }", "}"]
+    return "\n".join(lines) + "\n"
+
+
+def _together(values: Sequence[str]) -> list[str]:
+    """One declaration of several constants."""
+    return [f"const double {', '.join(values)};"] if values else []
+
+
+class _Names:
+    """What the symbols of a kernel are called in a loop over sites."""
+
+    def __init__(
+        self,
+        program: Program,
+        layout: Layout,
+        kernel: Kernel,
+        code: Code,
+        moved: set[str],
+        calls: Mapping[str, str],
+    ) -> None:
+        self.layout, self.moved, self.code = layout, moved, code
+        called = {word.strip("({") for text in calls.values() for word in text.split("(")}
+        self.scope = Scope(C_RESERVED | _OWN | called | {"change0", "change1", "change2"})
+        self.show = printer(self.scope, calls)
+        self._pointers: dict[tuple[str, int], str] = {}
+        self._loaded: list[str] = []
+        self._weights: list[str] = []
+        self._first: list[str] = []
+        member = members(program)
+        for s in (s for symbols in kernel.inputs.values() for s in symbols if s in code.used):
+            if isinstance(s, Symbol) and s.kind == COEFFICIENT:
+                named = f"c{s.key[0]}"
+                self.scope.bind(s, named)
+                self._first.append(f"{named} = coef[{s.key[0]}]")
+            elif isinstance(s, Symbol):
+                self._bind_weight(s)
+            elif s in layout.step.sites.places:
+                self._bind_site(s)
+            else:
+                self._first.append(f"{self.scope[s]} = params->{member[s]}")
+
+    def _bind_weight(self, s: Symbol) -> None:
+        k = self.layout.weights.index(s)
+        named = f"w{k}"
+        self.scope.bind(s, named)
+        low, high = _bounds(s)[-1]
+        tests = [f"i + {-low * -1} >= 0".replace("+ -", "- ")] * (low < 0) + [f"i + {high} < row->length"] * (high > 0)
+        if tests:
+            self._weights.append(f"const double {named} = {' && '.join(tests)} ? row->present[{k}] : 0.0;")
+        else:
+            self._first.append(f"{named} = row->present[{k}]")
+
+    def _bind_site(self, s: str) -> None:
+        base, offset = self.layout.step.sites.places[s]
+        pointer = self.pointer(base, self.layout.line(offset))
+        if offset[-1] == 0 and not any(offset):
+            self._loaded.append(f"{self.scope[s]} = {pointer}[i]")
+        else:
+            self.scope.bind(
+                s, f"{pointer}[i{offset[-1]:+d}]".replace("+", " + ").replace("-", " - ").replace(" + 0", "")
+            )
+
+    def pointer(self, base: str, line: int) -> str:
+        """The name of the row of an array at a line."""
+        key = (base, line)
+        if key not in self._pointers:
+            self._pointers[key] = self.scope[f"{base}_row{line or ''}"]
+        return self._pointers[key]
+
+    def loaded(self) -> list[str]:
+        """What is read at the beginning of the loop."""
+        return [*_together(self._loaded), *self._weights]
+
+    def pointers(self) -> list[str]:
+        """What is read before the loop."""
+        lines = _together(self._first)
+        for f in sorted(self.moved):
+            self.pointer(f, 0)
+        for (base, line), named in self._pointers.items():
+            mine = base in self.moved and line == 0
+            constant = "" if mine else "const "
+            alone = "" if base in self.moved else "restrict "
+            place = self.layout.arrays.index(base)
+            lines.append(f"{constant}double *{alone}{named} = row->x[{place}] + row->at[{line}];")
+        return lines

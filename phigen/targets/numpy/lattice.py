@@ -1,0 +1,116 @@
+"""A lattice as a Python module: kernels work on whole arrays over the sites."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+from phigen.scheme.kernel import Kernel
+from phigen.scheme.program import Program
+from phigen.scheme.steps import Sweep, Sweeps
+from phigen.symbolic import functions as elementary
+from phigen.symbolic.symbols import COEFFICIENT, Symbol
+from phigen.targets import special
+from phigen.targets.code import Code, lower
+from phigen.targets.names import Scope
+from phigen.targets.printer import Printer
+from phigen.targets.rendering import render
+from phigen.targets.reserved import PYTHON_RESERVED
+
+#: How functions are written: those of NumPy, and those that the file defines.
+FUNCTIONS = {name: f"_{name}" for name in elementary.FUNCTIONS} | elementary.written_in("numpy")
+CONSTANTS = {"pi": "np.pi", "E": "np.e"}
+
+_OWN = frozenset({"coef", "x", "sites", "parameters", "h", "kick", "np", *FUNCTIONS.values()})
+
+
+def body(program: Program, step: Sweeps, prepare: str) -> str:
+    """The text of the module; ``prepare`` is the function that computes coefficients."""
+    sites, schedule = step.sites, step.schedule
+    values = {
+        "version": program.version,
+        "sha256": program.about.spec_sha256,
+        "n": program.dimension,
+        "order": program.order,
+        "axes": _tuple(map(repr, sites.axes)),
+        "coordinates": _tuple(map(repr, program.coordinates)),
+        "casimirs": _tuple(map(repr, program.casimirs)),
+        "defaults": [f'"{p.name}": {float(p.value)!r}' for p in program.parameters],
+        "at_sites": _tuple(map(repr, sites.parameters)),
+        "positive": _tuple(repr(p.name) for p in program.parameters if p.positive),
+        "open": _tuple(map(repr, sites.open)),
+        "least": _tuple(map(repr, sites.least)),
+        "periods": _tuple(map(repr, sites.periods)),
+        "colours": sites.colours,
+        "colour_weights": _tuple(map(repr, sites.weights)),
+        "times": _tuple(map(repr, schedule.times)),
+        "multiples": _tuple(map(repr, schedule.multiples)),
+        "schedule": repr(tuple(schedule.flows)),
+        "kicks": bool(schedule.multiples),
+    }
+    pieces = [render("numpy", f"{part}.py", values) for part in ("lattice", "lattice_sites", "lattice_steps")]
+    pieces += [render("numpy", "lattice_seen.py", values), prepare]
+    pieces += [render("numpy", "phi.py", special.values(f, f"_{f}")) for f in special.used(program)]
+    pieces += [render("numpy", "entire.py", special.entire_values(f)) for f in special.entire_used(program)]
+    pieces += [_sweep(program, step, sweep) for part in step.parts for sweep in part]
+    parts = ["    (" + ", ".join(f"_{sweep.kernel.name}" for sweep in part) + ",)," for part in step.parts]
+    pieces.append("\n".join(["# The sweeps of each part of H.", "PARTS = (", *parts, ")\n"]))
+    seen = program.observables
+    pieces += [_seen(program, step, kernel) for kernel in (seen.energy, seen.casimirs, seen.vector_field)]
+    return "\n\n".join(piece.strip("\n") + "\n" for piece in pieces)
+
+
+def _tuple(items: Iterable[str]) -> str:
+    return "(" + "".join(f"{i}, " for i in items).rstrip() + ")"
+
+
+def _sweep(program: Program, step: Sweeps, sweep: Sweep) -> str:
+    """One sweep as a function from a state to the next."""
+    kernel, code = sweep.kernel, lower(sweep.kernel)
+    scope = Scope(PYTHON_RESERVED | _OWN | {"moved"})
+    lines = [f"def _{kernel.name}(coef, x, sites):", *_body(program, step, kernel, code, scope), "    moved = x.copy()"]
+    show = _printer(scope)
+    for store in code.stores:
+        place = f"[{sweep.moved[store.index]}]"
+        new = f"x{place} + ({show(store.value)})"
+        lines.append(f"    moved{place} = sites.coloured({sweep.colour}, {new}, x{place})")
+    return "\n".join([*lines, "    return moved\n"])
+
+
+def _seen(program: Program, step: Sweeps, kernel: Kernel) -> str:
+    """A kernel as a function that fills arrays over the sites."""
+    code = lower(kernel)
+    scope = Scope(PYTHON_RESERVED | _OWN | {"out"})
+    lines = [f"def _{kernel.name}(parameters, x, sites):", *_body(program, step, kernel, code, scope)]
+    lines.append(f"    out = np.empty(({len(code.stores)}, *sites.sizes))")
+    show = _printer(scope)
+    lines += [f"    out[{s.index}] = {show(s.value)}" for s in code.stores]
+    return "\n".join([*lines, "    return out\n"])
+
+
+def _body(program: Program, step: Sweeps, kernel: Kernel, code: Code, scope: Scope) -> list[str]:
+    """What is read, and the assignments."""
+    lines: list[str] = []
+    for array, symbols in kernel.inputs.items():
+        for i, s in enumerate(symbols):
+            if s not in code.used:
+                continue
+            if isinstance(s, Symbol):
+                bounds = ", ".join(map(str, s.key))
+                scope.bind(s, f"coef[{i}]" if s.kind == COEFFICIENT else f"sites.present({bounds})")
+            elif array == "params":
+                lines.append(f'    {scope[s]} = parameters["{s}"]')
+            else:
+                lines.append(f"    {scope[s]} = {_read(program, step, s)}")
+    show = _printer(scope)
+    return lines + [f"    {scope[a.target]} = {show(a.value)}" for a in code.assignments]
+
+
+def _read(program: Program, step: Sweeps, name: str) -> str:
+    base, offset = step.sites.places[name]
+    fields: Sequence[str] = program.coordinates
+    text = f"x[{fields.index(base)}]" if base in fields else f'sites.parameters["{base}"]'
+    return f"sites.shifted({text}, {', '.join(map(str, offset))})" if any(offset) else text
+
+
+def _printer(scope: Scope) -> Printer:
+    return Printer(lambda n: scope[n], FUNCTIONS, CONSTANTS, "np.power")

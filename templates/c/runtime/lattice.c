@@ -1,0 +1,294 @@
+#ifndef PHI_FILE_LATTICE
+#define PHI_FILE_LATTICE
+#include <math.h>
+#include <stdint.h>
+#include <string.h>
+#ifdef _OPENMP
+#include <omp.h>
+#endif
+
+#include "lattice.h"
+#include "model.h"
+#include "rows.c"
+#include "lane_functions.c"
+#include "sweeps.h"
+
+/* ---- The lattice ---- */
+enum {
+    PHI_STRETCH = 32,  /* steps before the state is looked at: what is not finite stays so */
+    PHI_LEAD = (PHI_HALO + 7) / 8 * 8,
+    PHI_BUFFER = 256
+};
+
+/* Sizes as they have to be: the widths of rows and the number of rows, 0 if they are not allowed. */
+static size_t phi_shape(const size_t sizes[PHI_AXES], ptrdiff_t *width)
+{
+    const size_t most = SIZE_MAX / 64 / PHI_ARRAYS;
+    size_t rows = 1;
+    for (int a = 0; a < PHI_AXES; ++a) {
+        if (sizes[a] < phi_least[a] || sizes[a] % phi_periods[a] != 0 || sizes[a] > most / 2) return 0;
+        if (a < PHI_AXES - 1) {
+            if (rows > most / sizes[a]) return 0;
+            rows *= sizes[a];
+        }
+    }
+    size_t wide = PHI_LEAD + (sizes[PHI_AXES - 1] + PHI_HALO + 7) / 8 * 8;
+    if (wide % 512 == 0) wide += 8; /* rows a multiple of a page apart would share lines of the cache */
+    if (rows > most / wide) return 0;
+    *width = (ptrdiff_t)wide;
+    return rows;
+}
+
+size_t phi_work_size(const size_t sizes[PHI_AXES])
+{
+    ptrdiff_t width;
+    const size_t rows = sizes == NULL ? 0 : phi_shape(sizes, &width);
+    const size_t row = (PHI_ARRAYS + PHI_DIM) * (size_t)width * sizeof(double) + PHI_LINES * sizeof(ptrdiff_t);
+    return rows == 0 ? 0 : rows * row + 64;
+}
+
+/* Values of sites, the last axis fastest, into rows. */
+static void phi_put(const phi_solver *s, double *rows, const double *values)
+{
+    for (size_t r = 0; r < s->rows; ++r) {
+        double *row = rows + (ptrdiff_t)r * s->width;
+        memset(row - PHI_LEAD, 0, (size_t)s->width * sizeof *row);
+        memcpy(row, values + r * (size_t)s->length, (size_t)s->length * sizeof *row);
+        phi_ends(row, s->length, 0, s->length);
+    }
+}
+
+#if PHI_SITE_PARAMETERS
+/* The values of a parameter at sites, or one value for all. */
+static void phi_put_parameter(const phi_solver *s, double *rows, const double *values, double value)
+{
+    if (values != NULL) {
+        phi_put(s, rows, values);
+        return;
+    }
+    for (ptrdiff_t i = -PHI_LEAD; i < (ptrdiff_t)s->rows * s->width - PHI_LEAD; ++i) rows[i] = value;
+}
+
+#endif
+/* Where a row is, and those beside it. */
+static void phi_find_lines(const phi_solver *s, size_t index, ptrdiff_t at[PHI_LINES])
+{
+    ptrdiff_t place[PHI_AXES];
+    phi_place(s, index, place);
+    for (int k = 0; k < PHI_LINES; ++k) {
+        ptrdiff_t line = 0;
+        for (int a = 0; a < PHI_AXES - 1; ++a) {
+            const ptrdiff_t size = (ptrdiff_t)s->sizes[a];
+            ptrdiff_t p = place[a] + phi_lines[k][a];
+            if (phi_open[a]) { /* mirrored, as in phi_ends */
+                p = p < 0 ? -p : p < size ? p : 2 * (size - 1) - p;
+                p = p < 0 ? 0 : p < size ? p : size - 1;
+            } else {
+                p += (p < 0 ? size : 0) - (p >= size ? size : 0);
+            }
+            line = line * size + p;
+        }
+        at[k] = line * s->width;
+    }
+}
+
+/* ---- The solver ---- */
+static void phi_prepare_step(const phi_params *params, double h, double *coef)
+{
+    for (int k = 0; k < PHI_ROWS_OF_FLOWS; ++k) {
+#if PHI_KICKS
+        const double kick[1] = { phi_multiples[k] * (h * h) };
+        phi_prepare(params, phi_times[k] * h, kick, coef + k * PHI_ROW);
+#else
+        phi_prepare(params, phi_times[k] * h, coef + k * PHI_ROW);
+#endif
+    }
+}
+
+static int phi_finite(const double *values, size_t count)
+{
+    double zero = 0.0;
+    for (size_t k = 0; k < count; ++k) zero += 0.0 * values[k];
+    return zero == 0.0;
+}
+
+phi_status phi_init(phi_solver *s, const phi_params *params, const size_t sizes[PHI_AXES], const double *x0, void *work)
+{
+    ptrdiff_t width;
+    if (s == NULL || sizes == NULL || x0 == NULL || work == NULL) return PHI_BAD_ARGUMENT;
+    const phi_params own = params != NULL ? *params : phi_default_params;
+    const size_t rows = phi_shape(sizes, &width), length = sizes[PHI_AXES - 1], sites = rows * length;
+    if (rows == 0 || !phi_finite(x0, PHI_DIM * sites) || !phi_allowed(&own, sites)) return PHI_BAD_ARGUMENT;
+    double coef[PHI_COEFFICIENTS];
+    phi_prepare_step(&own, 1e-100, coef);
+    if (!phi_finite(coef, PHI_COEFFICIENTS)) return PHI_BAD_ARGUMENT;
+    memset(s, 0, sizeof *s);
+    memcpy(s->sizes, sizes, sizeof s->sizes);
+    s->sites = sites;
+    s->rows = rows;
+    s->length = (ptrdiff_t)length;
+    s->width = width;
+    s->params = own;
+    double *aligned = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64) + PHI_LEAD;
+    const size_t block = rows * (size_t)width;
+    s->lines = (ptrdiff_t *)(void *)(aligned - PHI_LEAD + (PHI_ARRAYS + PHI_DIM) * block);
+    for (size_t r = 0; r < rows; ++r) phi_find_lines(s, r, s->lines + r * PHI_LINES);
+    for (size_t k = 0; k < PHI_ARRAYS; ++k) s->x[k] = aligned + k * block;
+    for (size_t k = 0; k < PHI_DIM; ++k) s->before[k] = aligned + (PHI_ARRAYS + k) * block;
+    for (size_t k = 0; k < PHI_DIM; ++k) phi_put(s, s->x[k], x0 + k * sites);
+#if PHI_SITE_PARAMETERS
+    phi_put_parameters(s, &own);
+#endif
+    return PHI_OK;
+}
+
+/* What depends on the step size; nothing where that is as before. */
+static phi_status phi_set_step(phi_solver *s, double h)
+{
+    if (s == NULL || !isfinite(h)) return PHI_BAD_ARGUMENT;
+    if (s->prepared && memcmp(&h, &s->h, sizeof h) == 0) return PHI_OK;
+    phi_prepare_step(&s->params, h, s->coef);
+    s->h = h;
+    s->t_before_h = s->t;
+    s->steps_before_h = s->steps;
+    s->prepared = 1;
+    return PHI_OK;
+}
+
+/* One part of H. */
+static void phi_sweep(const phi_solver *s, int part, const double *coef, int far)
+{
+    const size_t units = s->rows * phi_pieces(s);
+#ifdef _OPENMP
+    const size_t threads = (size_t)omp_get_num_threads(), own = (size_t)omp_get_thread_num();
+    phi_sweep_rows(s, part, coef, far, units / threads * own + (own < units % threads ? own : units % threads),
+        units / threads * (own + 1) + (own + 1 < units % threads ? own + 1 : units % threads));
+#pragma omp barrier
+#else
+    phi_sweep_rows(s, part, coef, far, 0, units);
+#endif
+}
+
+/* Some steps, joined. */
+static void phi_steps(const phi_solver *s, int steps, int far)
+{
+#ifdef _OPENMP
+#pragma omp parallel if (s->sites > 4096)
+#endif
+    for (int step = 0; step < steps; ++step) {
+        const int last = step == steps - 1;
+        if (step == 0) phi_sweep(s, phi_flow_parts[0], s->coef + phi_flow_rows[0] * PHI_ROW, far);
+        for (int k = 1; k < PHI_FLOWS - 1; ++k)
+            phi_sweep(s, phi_flow_parts[k], s->coef + phi_flow_rows[k] * PHI_ROW, far);
+        if (PHI_FLOWS > 1)
+            phi_sweep(s, phi_flow_parts[0], s->coef + (last ? phi_flow_rows[PHI_FLOWS - 1] : PHI_JOINED) * PHI_ROW, far);
+        else if (!last)
+            phi_sweep(s, phi_flow_parts[0], s->coef, far);
+    }
+}
+
+/* Whether all values at sites are finite. */
+static int phi_holds(const phi_solver *s)
+{
+    for (size_t k = 0; k < PHI_DIM; ++k)
+        for (size_t r = 0; r < s->rows; ++r)
+            if (!phi_finite(s->x[k] + (ptrdiff_t)r * s->width, (size_t)s->length)) return 0;
+    return 1;
+}
+
+static void phi_copy(double *const to[PHI_DIM], double *const from[PHI_DIM], const phi_solver *s)
+{
+    const size_t block = s->rows * (size_t)s->width * sizeof **from;
+    for (size_t k = 0; k < PHI_DIM; ++k) memcpy(to[k] - PHI_LEAD, from[k] - PHI_LEAD, block);
+}
+
+/* Some steps; if they lead to what is not finite, none. */
+static int phi_try(phi_solver *s, int steps)
+{
+    phi_copy(s->before, s->x, s);
+#if PHI_NEAR
+    phi_steps(s, steps, 0);
+    if (phi_holds(s)) return 1;
+    phi_copy(s->x, s->before, s);
+#endif
+    phi_steps(s, steps, 1);
+    if (phi_holds(s)) return 1;
+    phi_copy(s->x, s->before, s);
+    return 0;
+}
+
+phi_status phi_integrate(phi_solver *s, double h, size_t steps)
+{
+    const phi_status status = phi_set_step(s, h);
+    if (status != PHI_OK) return status;
+    for (size_t stretch = PHI_STRETCH; steps > 0;) {
+        const size_t now = steps < stretch ? steps : stretch;
+        if (phi_try(s, (int)now)) {
+            steps -= now;
+            s->steps += now;
+            s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
+        } else if (now == 1) {
+            return PHI_NOT_FINITE;
+        } else {
+            stretch = 1;
+        }
+    }
+    return PHI_OK;
+}
+
+phi_status phi_step(phi_solver *s, double h) { return phi_integrate(s, h, 1); }
+
+void phi_state(const phi_solver *s, double *x)
+{
+    for (size_t k = 0; k < PHI_DIM; ++k)
+        for (size_t r = 0; r < s->rows; ++r)
+            memcpy(x + k * s->sites + r * (size_t)s->length, s->x[k] + (ptrdiff_t)r * s->width,
+                (size_t)s->length * sizeof *x);
+}
+
+/* ---- What is seen at sites ---- */
+double phi_hamiltonian(const phi_solver *s)
+{
+    double density[PHI_BUFFER], sum = 0.0, rest = 0.0;
+    phi_row row;
+    for (size_t r = 0; r < s->rows; ++r) {
+        phi_locate(s, r, &row);
+        for (ptrdiff_t from = 0; from < s->length; from += PHI_BUFFER) {
+            const ptrdiff_t to = s->length - from > PHI_BUFFER ? from + PHI_BUFFER : s->length;
+            phi_energy_row(&s->params, &row, from, to, density, 0);
+            for (ptrdiff_t i = 0; i < to - from; ++i) { /* compensated, after A. Neumaier */
+                const double total = sum + density[i];
+                rest += fabs(sum) >= fabs(density[i]) ? (sum - total) + density[i] : (density[i] - total) + sum;
+                sum = total;
+            }
+        }
+    }
+    return sum + rest;
+}
+
+/* A kernel that fills arrays over the sites, for all rows. */
+typedef void phi_kernel(const phi_params *, const phi_row *, ptrdiff_t, ptrdiff_t, double *restrict, size_t);
+
+static void phi_fill(const phi_solver *s, phi_kernel *kernel, double *out)
+{
+    phi_row row;
+    for (size_t r = 0; r < s->rows; ++r) {
+        phi_locate(s, r, &row);
+        kernel(&s->params, &row, 0, s->length, out + r * (size_t)s->length, s->sites);
+    }
+}
+
+void phi_density(const phi_solver *s, double *out) { phi_fill(s, phi_energy_row, out); }
+void phi_casimirs(const phi_solver *s, double *out) { phi_fill(s, phi_casimirs_row, out); }
+void phi_vector_field(const phi_solver *s, double *out) { phi_fill(s, phi_vector_field_row, out); }
+
+#include "status.c"
+
+size_t phi_solver_size(void) { return sizeof(phi_solver); }
+
+size_t phi_solver_steps_done(const phi_solver *s) { return s->steps; }
+
+#if defined(__clang__)
+#pragma clang diagnostic pop
+#endif
+#endif

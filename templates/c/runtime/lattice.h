@@ -1,0 +1,54 @@
+#ifndef PHI_FILE_LATTICE_H
+#define PHI_FILE_LATTICE_H
+#include "declarations.h"
+#include "status.h"
+
+/* The solver keeps the state in memory of the caller, row by row: a row is all sites along the last axis, with copies
+   of the other end beside it. Set it up with phi_init; a copy of the struct is the same solver, not another one. */
+typedef struct {
+    size_t sizes[PHI_AXES];
+    size_t sites, rows;
+    ptrdiff_t length, width;  /* sites of a row; doubles between the beginnings of two rows */
+    double *x[PHI_ARRAYS];    /* in rows, each field, then each parameter at sites: the first site of the first row */
+    ptrdiff_t *lines;         /* of each row, where it is and where those beside it are */
+    double *before[PHI_DIM];  /* the fields before the steps that are being made */
+    size_t steps;             /* good steps since phi_init */
+    double t;                 /* time since phi_init */
+    double h;                 /* the last step size */
+    phi_params params;
+    double coef[PHI_COEFFICIENTS]; /* all that depends on params and h only */
+    int prepared;             /* whether coef has been computed */
+    size_t steps_before_h;    /* steps and t when h was set: t is counted from there, so no error adds up */
+    double t_before_h;
+} phi_solver;
+
+/* The bytes that the solver of a lattice needs as its memory; 0 for sizes that are not allowed. */
+size_t phi_work_size(const size_t sizes[PHI_AXES]);
+
+/* Start at x0[field][site], the last axis fastest, with phi_work_size(sizes) bytes of memory, as from malloc, which must stay. params
+   may be NULL for the defaults; its arrays are copied. PHI_BAD_ARGUMENT if sizes are not allowed, x0 or a parameter is
+   not finite, or one that has to be positive is not. */
+phi_status phi_init(phi_solver *s, const phi_params *params, const size_t sizes[PHI_AXES], const double *x0, void *work);
+
+/* Steps of size h, of either sign. If one fails, the state is that before it, and s->steps counts the good ones. Steps of
+   one call are joined: where a step ends as the next begins, both are one flow. With OpenMP rows are worked at in
+   parallel, with the same bits for any number of threads. */
+phi_status phi_step(phi_solver *s, double h);
+phi_status phi_integrate(phi_solver *s, double h, size_t steps);
+
+/* The state x[field][site]. */
+void phi_state(const phi_solver *s, double *x);
+
+/* The Hamiltonian; its density at each site; the densities out[k][site] of the Casimirs; the right-hand side
+   out[field][site]. */
+double phi_hamiltonian(const phi_solver *s);
+void phi_density(const phi_solver *s, double *out);
+void phi_casimirs(const phi_solver *s, double *out);
+void phi_vector_field(const phi_solver *s, double *out);
+
+const char *phi_status_string(phi_status status);
+
+/* For bindings: the size of phi_solver, and its count of good steps. */
+size_t phi_solver_size(void);
+size_t phi_solver_steps_done(const phi_solver *s);
+#endif

@@ -1,0 +1,127 @@
+#ifndef PHI_FILE_ROWS
+#define PHI_FILE_ROWS
+#include <stdint.h>
+
+#include "lattice.h"
+#include "model.h"
+
+/* ---- Rows of sites ---- */
+/* Where one row is. */
+typedef struct {
+    double *const *x;             /* see phi_solver */
+    const ptrdiff_t *at;          /* the row itself and those beside it, from the first row on */
+    ptrdiff_t length;             /* sites of a row */
+#if PHI_OPEN
+    double present[PHI_WEIGHTS];  /* 1 for terms of H that are there as far as the other axes say, else 0 */
+    int whole;                    /* whether all of them are */
+#endif
+#if PHI_COLOURS
+    int colour;                   /* of the first site */
+#endif
+} phi_row;
+
+/* Before a loop over sites: tells compilers that they are independent. */
+#if defined(__clang__)
+#define PHI_EACH_SITE _Pragma("clang loop vectorize(assume_safety)")
+#pragma clang diagnostic push
+#pragma clang diagnostic ignored "-Wpass-failed"
+#elif defined(__GNUC__)
+#define PHI_EACH_SITE _Pragma("GCC ivdep")
+#else
+#define PHI_EACH_SITE
+#endif
+
+#if PHI_COLOURS
+/* The first site of a colour in a row, from a given one on. */
+static ptrdiff_t phi_first(const phi_row *row, int colour, ptrdiff_t from)
+{
+    for (ptrdiff_t i = from; i < from + PHI_COLOUR_COUNT; ++i)
+        if ((row->colour + (int)(i % PHI_COLOUR_COUNT) * PHI_COLOUR_STRIDE) % PHI_COLOUR_COUNT == colour) return i;
+    return row->length;
+}
+
+#endif
+/* The copies beside a row, of the ends that are among the sites from..to: of the other end, or mirrored at open ends,
+   where terms that read them have weight 0. */
+static inline void phi_ends(double *row, ptrdiff_t length, ptrdiff_t from, ptrdiff_t to)
+{
+#if PHI_HALO
+#if PHI_OPEN_ROWS
+    for (ptrdiff_t k = 1; k <= PHI_HALO; ++k) {
+        const ptrdiff_t inside = k < length ? k : length - 1;
+        if (from == 0) row[-k] = row[inside];
+        if (to == length) row[length - 1 + k] = row[length - 1 - inside];
+    }
+#else
+    if (from == 0)
+        for (ptrdiff_t k = 0; k < PHI_HALO; ++k) row[length + k] = row[k];
+    if (to == length)
+        for (ptrdiff_t k = 1; k <= PHI_HALO; ++k) row[-k] = row[length - k];
+#endif
+#else
+    (void)row, (void)length, (void)from, (void)to;
+#endif
+}
+
+/* The position of a row along all axes but the last. */
+static inline void phi_place(const phi_solver *s, size_t index, ptrdiff_t place[PHI_AXES])
+{
+    place[PHI_AXES - 1] = 0;
+    for (int a = PHI_AXES - 2; a >= 0; --a) {
+        place[a] = (ptrdiff_t)(index % s->sizes[a]);
+        index /= s->sizes[a];
+    }
+}
+
+/* What kernels are told of a row. */
+static inline void phi_locate(const phi_solver *s, size_t index, phi_row *row)
+{
+    row->x = s->x;
+    row->at = s->lines + index * PHI_LINES;
+    row->length = s->length;
+#if PHI_OPEN || PHI_COLOURS
+    ptrdiff_t place[PHI_AXES];
+    phi_place(s, index, place);
+#endif
+#if PHI_OPEN
+    row->whole = 1;
+    for (int k = 0; k < PHI_WEIGHTS; ++k) {
+        int there = 1;
+        for (int a = 0; a < PHI_AXES - 1; ++a)
+            there = there && place[a] + phi_weights[k][a][0] >= 0 &&
+                place[a] + phi_weights[k][a][1] < (ptrdiff_t)s->sizes[a];
+        row->present[k] = there ? 1.0 : 0.0;
+        row->whole = row->whole && there;
+    }
+#endif
+#if PHI_COLOURS
+    row->colour = 0;
+    for (int a = 0; a < PHI_AXES - 1; ++a)
+        row->colour = (int)((row->colour + place[a] * phi_colours[a]) % PHI_COLOUR_COUNT);
+#endif
+}
+
+enum { PHI_PIECE = 2048 }; /* sites of a row that are worked at in one go, with any number of threads */
+
+/* The pieces of a row; the last is the longest, so that no copied end reaches into another. */
+static size_t phi_pieces(const phi_solver *s)
+{
+    return s->length < 2 * PHI_PIECE ? 1 : (size_t)s->length / PHI_PIECE;
+}
+
+typedef struct {
+    phi_row row;
+    ptrdiff_t from, to;
+} phi_piece;
+
+/* The piece of that number. */
+static inline phi_piece phi_piece_of(const phi_solver *s, size_t unit)
+{
+    const size_t pieces = phi_pieces(s), index = pieces == 1 ? unit : unit / pieces, part = unit - index * pieces;
+    phi_piece piece;
+    phi_locate(s, index, &piece.row);
+    piece.from = (ptrdiff_t)part * PHI_PIECE;
+    piece.to = part == pieces - 1 ? s->length : piece.from + PHI_PIECE;
+    return piece;
+}
+#endif

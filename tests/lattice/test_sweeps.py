@@ -1,0 +1,332 @@
+"""Lattices by sweeps over their sites, beside the ordinary system of a few of them: field, H, steps, orders, π."""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import replace
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pytest
+from systems import compile_text
+
+from phigen import spec as specs
+from phigen.api import lattice_solver_of
+from phigen.compilation import Compilation
+from phigen.compiler import compile_spec, emit
+from phigen.errors import SpecError, StepError
+from phigen.lattice.building import cell_from_spec
+from phigen.lattice.expansion import Expansion, expand
+from phigen.runtime.lattice import LatticeSolver
+from phigen.runtime.modules import load_module
+from phigen.symbolic.arrays import evaluate
+
+SPINS = """
+coordinates: [x, y, z]
+poisson: {lie_algebra: {name: so(3)}}
+casimirs: {C: x**2 + y**2 + z**2}
+"""
+CANONICAL = "coordinates: [q, p]\npoisson: {canonical: {q: [q], p: [p]}}\n"
+BOND = '"-J*(x*x[i+1] + y*y[i+1] + 1.3*z*z[i+1]) - B*z + A*x**2"'
+TEXTS = {
+    "xxz": f"lattice: {{axes: [i], boundary: periodic}}\nparameters: {{J: 1.2, A: 0.3, B: {{value: 0.2, at: sites}}}}"
+    f"{SPINS}hamiltonian: {BOND}",
+    "xxz_open": f"lattice: {{axes: [i], boundary: open}}\nparameters: {{J: 1.2, A: 0.3, B: {{value: 0.2, at: sites}}}}"
+    f"{SPINS}hamiltonian: {BOND}",
+    "sheet": f"lattice: {{axes: [i, j], boundary: [periodic, open]}}{SPINS}hamiltonian: "
+    '"-(x*x[i+1] + y*y[i+1] + z*z[i+1] + x*x[j+1] + y*y[j+1] + z*z[j+1]) + (x*y[j+2] - y*x[j+2])/2"',
+    "cube": "lattice: {axes: [i, j, k], boundary: [open, periodic, periodic]}\n"
+    f'{CANONICAL}hamiltonian: "p**2/2 + q**4/4 + ((q[i+1]-q)**2 + (q[j+1]-q)**2 + (q[k+1]-q)**2)/2"',
+    "fput": "lattice: {axes: [i], boundary: open}\nparameters: {a: 0.25, b: {value: 0.5, positive: true}}\n"
+    f'{CANONICAL}hamiltonian: "p**2/2 + (q[i+1]-q)**2/2 + a*(q[i+1]-q)**3/3 + b*(q[i+1]-q)**4/4"',
+    "dnls": "lattice: {axes: [i], boundary: periodic}\nparameters: {e: {value: 0.1, at: sites}}\n"
+    f'{CANONICAL}hamiltonian: "-(q*q[i+1] + p*p[i+1]) + e*(q**2 + p**2) + (q**2 + p**2)**2/4"',
+    "ablowitz_ladik": "lattice: {axes: [i], boundary: periodic}\ncoordinates: [q, p]\n"
+    "poisson: {brackets: {q: {p: 1 + q**2 + p**2}}}\n"
+    'hamiltonian: "-(q*q[i+1] + p*p[i+1]) + log(1 + q**2 + p**2)"',
+    "toda": "lattice: {axes: [i], boundary: open}\ncoordinates: [a, b]\n"
+    'poisson: {brackets: {a: {b: a/2, "b[i+1]": -a/2}}}\nhamiltonian: b**2/2 + 2*a**2',
+    "volterra": "lattice: {axes: [i], boundary: periodic}\ncoordinates: [a]\n"
+    'poisson: {brackets: {a: {"a[i+1]": "a*a[i+1]"}}}\nhamiltonian: a',
+}
+SIZES = {"sheet": (4, 5), "cube": (3, 4, 3), "volterra": (6,), "toda": (5,)}
+FEW = {"sheet": (3, 3), "cube": (2, 2, 2)}
+
+
+@cache
+def compiled(name: str, order: int = 4, composition: str = "auto") -> Compilation:
+    text = f"phigen: 1\nname: {name}\norder: {order}\ncomposition: {composition}\n{TEXTS[name]}\n"
+    return compile_spec(specs.loads(text))
+
+
+@cache
+def solver(name: str, order: int = 4, target: str = "numpy", composition: str = "auto") -> LatticeSolver:
+    return lattice_solver_of(compiled(name, order, composition), target)
+
+
+@cache
+def expansion(name: str, sizes: tuple[int, ...]) -> Expansion:
+    return expand(cell_from_spec(compiled(name).spec), sizes)
+
+
+def start(name: str, sizes: tuple[int, ...] | None = None, seed: int = 1) -> np.ndarray:
+    sizes = sizes or SIZES.get(name, (7,))
+    fields = len(compiled(name).spec.coordinates)
+    x = 0.6 * np.random.default_rng(seed).normal(size=(fields, *sizes))
+    return np.abs(x) + 0.2 if name in ("volterra", "toda") else x
+
+
+def disorder(name: str, x: np.ndarray) -> dict[str, Any]:
+    about = solver(name).interface
+    return {p: np.random.default_rng(7).normal(size=x.shape[1:]) for p in about.at_sites}
+
+
+def values_of(whole: Expansion, x: np.ndarray, parameters: dict[str, Any]) -> dict[str, float]:
+    numbers = {p.name: parameters.get(p.name, np.full(whole.sizes, float(p.value)) if p.at == "sites" else p.value)
+               for p in whole.cell.parameters}  # fmt: skip
+    return dict(zip(whole.coordinates, x.reshape(-1), strict=True)) | whole.numbers(numbers)
+
+
+def poisson_at(whole: Expansion, x: np.ndarray, parameters: dict[str, Any]) -> np.ndarray:
+    entries, index = whole.poisson(), {c: k for k, c in enumerate(whole.coordinates)}
+    found = evaluate(list(entries.values()), values_of(whole, x, parameters))
+    matrix = np.zeros((len(index), len(index)))
+    for (a, b), value in zip(entries, found, strict=True):
+        matrix[index[a], index[b]] = float(value)
+    return matrix
+
+
+@pytest.mark.parametrize("name", TEXTS)
+@pytest.mark.parametrize("target", ["numpy", "c"])
+def test_field_and_energy_are_those_of_the_ordinary_system(name: str, target: str) -> None:
+    x = start(name, FEW.get(name))
+    parameters, whole = disorder(name, x), expansion(name, x.shape[1:])
+    ordinary = whole.spec()
+    gradient = np.empty(x.size)
+    values = values_of(whole, x, parameters)
+    (energy,) = evaluate([ordinary.hamiltonian], values)
+    from phigen.symbolic.expression import gradient as slopes
+
+    gradient = np.array(evaluate(slopes(ordinary.hamiltonian, whole.coordinates), values), dtype=float)
+    field = poisson_at(whole, x, parameters) @ gradient
+    found = solver(name, target=target)
+    np.testing.assert_allclose(found.vector_field(x, **parameters).reshape(-1), field, atol=1e-13)
+    assert found.hamiltonian(x, **parameters) == pytest.approx(float(energy), rel=1e-13, abs=1e-13)
+
+
+@pytest.mark.parametrize("name", TEXTS)
+def test_c_makes_the_steps_of_numpy(name: str) -> None:
+    x = start(name)
+    by = {t: solver(name, target=t).integrate(x, 0.05, 40, 15, **disorder(name, x)) for t in ("c", "numpy")}
+    np.testing.assert_allclose(by["c"].x, by["numpy"].x, rtol=0, atol=3e-14)
+    np.testing.assert_allclose(by["c"].energy, by["numpy"].energy, atol=1e-13)
+
+
+@pytest.mark.parametrize("name", ["fput", "cube", "toda"])
+def test_steps_are_those_of_the_ordinary_splitting_with_the_same_parts(name: str) -> None:
+    x = start(name, FEW.get(name, (4,)))
+    lattice = solver(name, 4, "numpy", "suzuki").integrate(x, 0.1, 10)
+    whole = replace(expansion(name, x.shape[1:]).spec(), order=4, scheme="splitting", composition="suzuki")
+    from phigen.api import solver_of
+
+    ordinary = solver_of(compile_spec(whole), "numpy").integrate(x.reshape(-1), 0.1, 10)
+    np.testing.assert_allclose(lattice.x.reshape(len(lattice), -1), ordinary.x, rtol=0, atol=1e-13)
+
+
+@pytest.mark.parametrize(
+    ("name", "order"), [*((name, 4) for name in TEXTS), ("xxz", 2), ("fput", 6), ("ablowitz_ladik", 2), ("dnls", 8)]
+)
+def test_order_is_that_of_the_method(name: str, order: int) -> None:
+    x, found = start(name), solver(name, order, "c")
+    parameters, span = disorder(name, x), 0.8
+    far = found.integrate(x, span / 512, 512, 512, **parameters).x[-1]
+    errors = [np.abs(found.integrate(x, span / n, n, n, **parameters).x[-1] - far).max() for n in (8, 16)]
+    assert np.log2(errors[0] / errors[1]) > order - 0.35
+
+
+def module_of(name: str) -> Any:
+    return load_module(emit(compiled(name).program, "numpy", "phigen")[f"{name}.py"], name)
+
+
+def jacobian(module: Any, x: np.ndarray, h: float, parameters: dict[str, Any]) -> tuple[np.ndarray, np.ndarray]:
+    """The step and its derivative."""
+    sites = module._Sites(x.shape, parameters)
+    rows = module._coefficients(sites, h)
+    columns = []
+    for k in range(x.size):
+        unit = np.zeros(x.shape)
+        unit.reshape(-1)[k] = 1.0
+        columns.append(_slope(lambda t, unit=unit: module._advance(sites, rows, x + t * unit)))
+    return module._advance(sites, rows, x).real, np.array(columns).T
+
+
+def _slope(curve: Any) -> np.ndarray:
+    """The derivative at 0: by a complex step, or by differences where functions take real numbers only."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", np.exceptions.ComplexWarning)
+        try:
+            return curve(1e-30j).imag.reshape(-1) / 1e-30
+        except np.exceptions.ComplexWarning:
+            weights = {1: 3 / 4, 2: -3 / 20, 3: 1 / 60}
+            return sum(w * (curve(k * 4e-3) - curve(-k * 4e-3)) for k, w in weights.items()).reshape(-1) / 4e-3
+
+
+def poisson_defect(name: str, module: Any) -> float:
+    """The largest entry of DΦ π DΦᵀ − π∘Φ on the ordinary system."""
+    x = start(name, FEW.get(name))
+    parameters, whole = disorder(name, x), expansion(name, x.shape[1:])
+    after, derivative = jacobian(module, x, 0.2, parameters)
+    moved = derivative @ poisson_at(whole, x, parameters) @ derivative.T
+    return float(np.abs(moved - poisson_at(whole, after, parameters)).max())
+
+
+@pytest.mark.parametrize("name", TEXTS)
+def test_a_step_is_a_poisson_map(name: str) -> None:
+    assert poisson_defect(name, module_of(name)) < (1e-9 if name == "ablowitz_ladik" else 1e-12)
+
+
+@pytest.mark.parametrize("name", ["volterra", "sheet"])
+def test_neighbours_moved_at_once_where_brackets_couple_them_are_noticed(name: str) -> None:
+    module = module_of(name)
+    module.COLOURS = 1  # every sweep moves all sites
+    assert poisson_defect(name, module) > 1e-4
+
+
+def test_the_midpoint_rule_is_noticed() -> None:
+    module = module_of("xxz")
+
+    def midpoint(sites: Any, rows: Any, x: np.ndarray) -> np.ndarray:
+        def field(y: np.ndarray) -> np.ndarray:
+            real, imaginary = (
+                module._vector_field(sites.parameters, part, sites) for part in (y.real, y.real + 1e20 * y.imag)
+            )
+            return real + 1e-20j * (imaginary - real)
+
+        return x + 0.2 * field(x + 0.1 * field(x))
+
+    module._advance = midpoint
+    assert poisson_defect("xxz", module) > 1e-4
+
+
+def test_spins_keep_their_lengths() -> None:
+    x = start("xxz", (16,))
+    run = solver("xxz", 2, "c").integrate(x / np.sqrt((x**2).sum(axis=0)), 0.05, 20_000, 20_000)
+    lengths = run.casimirs["C"]
+    assert lengths.shape == (2, 16)
+    assert np.abs(lengths[-1] - lengths[0]).max() < 5e-14
+
+
+def test_large_angles_are_turned_exactly_too() -> None:
+    x = start("xxz", (9,))
+    by = [solver("xxz", 2, t).step(x, 3.0, J=4.0) for t in ("c", "numpy")]
+    np.testing.assert_allclose(by[0], by[1], atol=2e-13)
+
+
+def test_code_does_not_grow_with_the_lattice() -> None:
+    for name in TEXTS.keys() - {"sheet"}:  # three parts of two colours with nine neighbours
+        program = replace(compiled(name).program, profile="small")
+        lines = sum(len(text.splitlines()) for text in emit(program, "c", "phigen").values())
+        assert lines < 800, (name, lines)
+
+
+def test_threads_make_the_same_bits() -> None:
+    import ctypes
+
+    found, x = solver("sheet", 2, "c"), start("sheet", (70, 90))
+    try:
+        library = ctypes.CDLL("libgomp.so.1")
+    except OSError:
+        pytest.skip("no OpenMP")
+    runs = []
+    for threads in (1, 2, 3):
+        library.omp_set_num_threads(threads)
+        runs.append(found.integrate(x, 0.05, 5, 5).x[-1].tobytes())
+    library.omp_set_num_threads(2)
+    assert runs[0] == runs[1] == runs[2]
+
+
+def test_long_rows_in_pieces_make_the_same_steps() -> None:
+    x = start("xxz", (5000,))
+    by = [solver("xxz", 2, t).integrate(x, 0.1, 3, 3).x[-1] for t in ("c", "numpy")]
+    np.testing.assert_allclose(by[0], by[1], atol=1e-14)
+
+
+def test_frames_go_to_files(tmp_path: Any) -> None:
+    x, found = start("fput"), solver("fput", target="c")
+    plain = found.integrate(x, 0.1, 10, 4)
+    streamed = found.integrate(x, 0.1, 10, 4, output=tmp_path / "frames.npy")
+    assert np.array_equal(np.load(tmp_path / "frames.npy"), plain.x)
+    assert np.array_equal(streamed.x, plain.x)
+    assert plain.x.shape == (4, 2, 7)
+    found.integrate(x, 0.1, 10, 4, output=tmp_path / "run.npz", a=0.3)
+    with np.load(tmp_path / "run.npz") as stored:
+        assert stored["x"].shape == (4, 2, 7)
+        assert stored["parameter_a"] == 0.3
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["frames.npy", "run.npz"]
+
+
+def test_a_run_goes_on_from_its_checkpoint(tmp_path: Any) -> None:
+    x, found = start("fput"), solver("fput", target="c")
+    whole = found.integrate(x, 0.1, 12, 3)
+
+    def stop(done: int) -> None:
+        if done == 6:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        found.integrate(x, 0.1, 12, 3, checkpoints=tmp_path / "state", progress=stop)
+    resumed = found.integrate(x, 0.1, 12, 3, checkpoints=tmp_path / "state")
+    assert np.array_equal(resumed.x, whole.x)
+    assert not (tmp_path / "state").exists()
+
+
+def test_an_ensemble_has_disorder_of_its_own() -> None:
+    x, found = start("dnls"), solver("dnls", target="c")
+    energies = np.random.default_rng(3).normal(size=(3, 7))
+    final = found.ensemble(np.stack([x] * 3), 0.1, 20, e=energies)
+    for member in range(3):
+        assert np.array_equal(final[member], found.integrate(x, 0.1, 20, 20, e=energies[member]).x[-1])
+
+
+def test_a_failing_step_leaves_the_state_before_it() -> None:
+    x = np.array([[0.0, 9.0, 0.0, -9.0, 3.0]] * 2)
+    with pytest.raises(StepError, match="NOT_FINITE") as failure:
+        solver("fput", target="c").integrate(x, 0.5, 100, 7)
+    run = failure.value.trajectory
+    assert np.isfinite(run.x).all()
+    assert len(run) >= 1
+
+
+@pytest.mark.parametrize(
+    ("x", "more", "error", "said"),
+    [
+        (np.zeros((2, 7)), {}, ValueError, r"shape \(3, N_i\)"),
+        (np.zeros((3, 1)), {}, ValueError, "1 sites along i"),
+        (np.full((3, 7), np.nan), {}, ValueError, "finite"),
+        (np.zeros((3, 7)), {"B": np.zeros(6)}, ValueError, r"shape \(7,\)"),
+        (np.zeros((3, 7)), {"K": 1.0}, TypeError, "unknown parameter"),
+    ],
+)
+def test_wrong_arguments_are_told(x: np.ndarray, more: dict[str, Any], error: type[Exception], said: str) -> None:
+    with pytest.raises(error, match=said):
+        solver("xxz").integrate(x, 0.1, 1, **more)
+
+
+def test_odd_sizes_do_not_fit_two_colours() -> None:
+    with pytest.raises(ValueError, match="multiples of 2"):
+        solver("volterra").integrate(np.ones((1, 7)), 0.1, 1)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("lattice: {axes: [i], boundary: periodic}\ncoordinates: [q, p]\n"
+         'poisson: {canonical: {q: [q], p: [p]}}\nhamiltonian: "exp(q*p[i+1] + p)"', "do not commute"),
+        ("lattice: {axes: [i], boundary: periodic}\ncoordinates: [q, p]\nscheme: series\n"
+         'poisson: {canonical: {q: [q], p: [p]}}\nhamiltonian: "p**2/2 + q*q[i+1]"', "not offered for lattices"),
+    ],
+)  # fmt: skip
+def test_what_cannot_be_split_is_refused(text: str, said: str) -> None:
+    with pytest.raises(SpecError, match=said):
+        compile_text(text)
