@@ -14,7 +14,8 @@ from phigen.geometry.system import system_from_spec
 from phigen.realisations.catalogue import realise
 from phigen.spec.model import BirealisationChoice
 from phigen.spec.names import SPEC_FUNCTIONS
-from phigen.symbolic import arrays, classical, conservation, dop853, readable, summary
+from phigen.study import classical, conservation, dop853, summary
+from phigen.symbolic import arrays, readable
 from phigen.symbolic.expression import PI, call, number, power, symbol, text
 from phigen.symbolic.functions import FUNCTIONS
 from phigen.symbolic.numeric import evaluate
@@ -186,8 +187,8 @@ def test_fewer_parentheses_do_not_change_the_value(formula):
     e = spec.loads(f"{head}hamiltonian: {formula}\n").hamiltonian
     values = {"x": 1.3, "y": 0.7, "z": 2.1}
     functions = {"exp": math.exp, "sqrt": math.sqrt}
-    assert eval(readable._infix(e), {**functions, **values}) == pytest.approx(evaluate([e], values)[0], rel=1e-14)
-    assert "**(-" not in readable._infix(e)  # denominators are written as such
+    assert eval(readable.infix(e), {**functions, **values}) == pytest.approx(evaluate([e], values)[0], rel=1e-14)
+    assert "**(-" not in readable.infix(e)  # denominators are written as such
 
 
 def test_starter_spec_summary_agrees_with_the_solver():
