@@ -58,6 +58,7 @@ def compile_spec(
     if spec.lattice:
         return compile_lattice(spec, order=order, scheme=scheme, extras=extras)
     clock = _Clock()
+    _tell_of_lattice(spec)
     with bounded(spec):
         source = system or clock.timed("system", lambda: system_from_spec(spec))
         return _compiled(spec, source, order, scheme, extras or spec.extras, clock)
@@ -78,6 +79,7 @@ def examine(
     clock = _Clock()
     if spec.lattice:
         return _examine_lattice(spec, clock)
+    _tell_of_lattice(spec)
     with bounded(spec), progress.stage(spec.name):
         try:
             source = system or clock.timed("system", lambda: system_from_spec(spec))
@@ -158,6 +160,21 @@ def compile_file(path: str | Path, *, order: int | None = None) -> Compilation:
 def emit(program: Program, target: str, command: str, *, single_file: bool = False) -> dict[str, str]:
     """The files of one target, by name; ``command`` is what regenerates them. `ValueError` for unknown targets."""
     return registry.find(target).emit(program, command, single_file=single_file)
+
+
+def _tell_of_lattice(spec: Spec) -> None:
+    """A warning for a lattice that is typed out, before it takes the time that one of any size would not."""
+    from phigen.lattice.recognition import SITES, written_out
+
+    if spec.dimension < SITES:
+        return
+    found = written_out(spec)
+    if found is not None and found.lattice is not None:
+        sites = spec.dimension // len(found.coordinates)
+        message = f"{spec.name} is a lattice of {sites} like sites, written out"
+        hint = f"phigen show --lattice {spec.file} prints a spec of one site, for any number of them"
+        place = replace(spec.diagnostic(("coordinates",), message, hint), severity="warning")
+        warnings.warn(str(place), PhigenWarning, stacklevel=4)
 
 
 def _examine_lattice(spec: Spec, clock: _Clock) -> Examination:

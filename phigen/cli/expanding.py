@@ -1,4 +1,4 @@
-"""``phigen show --expand``: a small lattice, printed as an ordinary spec."""
+"""``phigen show --expand`` and ``--lattice``: a small lattice as an ordinary spec, and back."""
 
 from __future__ import annotations
 
@@ -31,6 +31,19 @@ def expanded_text(spec: Spec, sizes: str) -> str:
     runs = {name: made for name, run in spec.runs.items() for made in [_run(spec, expansion, run)] if made}
     title = f"{spec.title or spec.name}, {' × '.join(map(str, expansion.sizes))}"
     return spec_text(replace(expansion.spec(), title=title, runs=runs, order=spec.order))
+
+
+def lattice_text(spec: Spec) -> str:
+    """The text of a spec of one site, for an ordinary spec in which like sites are written out."""
+    from phigen.lattice.recognition import LEAST, written_out
+    from phigen.spec.yaml_text import spec_text
+
+    found = None if spec.lattice else written_out(spec, least=LEAST)
+    if found is None:
+        message = f"{spec.name} is not recognised as a lattice"
+        hint = f"names such as x1, x2, … or x_0_0, … of at least {LEAST} sites along each axis, all with the same terms"
+        raise SpecError([spec.diagnostic(("coordinates",), message, hint)])
+    return spec_text(found)
 
 
 def _expansion(spec: Spec, cell: Cell, given: str) -> Expansion:

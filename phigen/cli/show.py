@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 @click.option(
     "--expand", "sizes", metavar="SIZES", help="Of a lattice: the ordinary spec of a small one; 3x3, or a run's name."
 )
+@click.option("--lattice", "as_lattice", is_flag=True, help="Of like sites written out: a spec of one, for any number.")
 @click.option("--latex", "as_latex", is_flag=True, help="The formulas as LaTeX, ready for \\input.")
 @click.option("--json", "as_json", is_flag=True, help="For machines: one object of texts.")
 @verbosity
@@ -38,6 +39,7 @@ def command(
     full: bool,
     modified: int,
     sizes: str | None,
+    as_lattice: bool,
     as_latex: bool,
     as_json: bool,
 ) -> None:
@@ -56,6 +58,11 @@ def command(
         from phigen.cli.expanding import expanded_text
 
         out_document(expanded_text(spec, sizes))
+        return
+    if as_lattice:
+        from phigen.cli.expanding import lattice_text
+
+        out_document(lattice_text(spec))
         return
     if spec.lattice:
         _show_cell(spec, None if full else SHOWN, as_latex=as_latex, as_json=as_json)

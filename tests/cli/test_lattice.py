@@ -82,3 +82,10 @@ def test_a_run_names_the_sizes_of_its_expansion(phigen, lattice):
 def test_sizes_that_do_not_fit_say_so(phigen, lattice, sizes, code, message):
     done = phigen("show", lattice("spins_2"), "--expand", sizes)
     assert (done.exit_code, message in " ".join(done.stderr.split())) == (code, True)
+
+
+def test_show_prints_the_lattice_of_a_system_written_out(phigen):
+    shown = loads(phigen("show", "spin_chain5", "--lattice").stdout)
+    assert shown.lattice.axes == ("i",)
+    done = phigen("show", "kepler", "--lattice")
+    assert (done.exit_code, "kepler is not recognised as a lattice" in done.stderr) == (1, True)

@@ -1,0 +1,377 @@
+"""Ordinary systems that are lattices typed out: found by the names of their coordinates, and proved to be the same.
+
+Numbers in names are taken for sites: ``x1 … x16``, ``q_0_0 … q_7_7``, ``S3_x``. The terms of H are moved to one
+site, and where each kind of them is at every site, they make a density; brackets likewise. What is guessed from values
+at one point is then expanded and proved to be the system that was given.
+"""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
+from fractions import Fraction
+from itertools import product
+from math import prod
+
+from phigen.errors import SpecError
+from phigen.geometry.forms import algebra_of_form, poisson_matrix
+from phigen.geometry.shapes import Matrix
+from phigen.lattice.building import cell_from_spec
+from phigen.lattice.expansion import Expansion
+from phigen.spec import limits
+from phigen.spec.model import Lattice, LatticeRun, MatrixForm, Parameter, Run, Spec, Values
+from phigen.spec.names import SPEC_FUNCTIONS
+from phigen.symbolic.expression import ONE, ZERO, Expression, mul, neg, substitute, symbol, symbols_of, total
+from phigen.symbolic.expression import product as product_of
+from phigen.symbolic.neighbours import Neighbours
+from phigen.symbolic.numeric import DomainError, evaluate
+from phigen.symbolic.verdict import decide_zero
+
+#: Lattices of so many sites are worth a warning.
+SITES = 8
+#: Axes have at least so many sites: fewer may look alike by chance.
+LEAST = 4
+
+Site = tuple[int, ...]
+Terms = list[tuple[Site, Expression]]
+
+
+class _OtherError(Exception):
+    """It is no lattice, or not one by these names."""
+
+
+@dataclass(frozen=True)
+class _Names:
+    """Where coordinates, and parameters that differ from site to site, are: ``sites`` by name."""
+
+    fields: tuple[str, ...]
+    sizes: tuple[int, ...]
+    boundary: tuple[str, ...]
+    sites: Mapping[str, tuple[str, Site]]
+    space: Neighbours
+    point: dict[str, float] = field(default_factory=dict)
+
+
+def written_out(spec: Spec, least: int = SITES) -> Spec | None:
+    """The lattice that an ordinary spec is, if it is one of at least so many sites; None for matrices that fit not."""
+    if not any(prod(_sizes(names)) >= least for names in _readings(spec.coordinates)):
+        return None
+    try:
+        matrix = poisson_matrix(spec.poisson, spec.coordinates, algebra_of_form(spec.poisson, spec.coordinates))
+    except SpecError:
+        return None
+    return recognised(spec, matrix)
+
+
+def recognised(spec: Spec, poisson: Matrix) -> Spec | None:
+    """The lattice that an ordinary spec with this π is, for any number of sites; None if it is none."""
+    for names in _readings(spec.coordinates):
+        for boundary in product(("periodic", "open"), repeat=len(_sizes(names))):
+            try:
+                return _lattice(spec, poisson, names, boundary)
+            except (_OtherError, DomainError):
+                continue
+    return None
+
+
+# --- names
+
+
+def _readings(coordinates: Sequence[str]) -> Iterator[dict[str, tuple[str, Site]]]:
+    """Ways to read coordinates as a field and a site: all numbers in a name are its site, or one of them."""
+    groups = {len(re.findall(r"[0-9]+", c)) for c in coordinates}
+    if len(groups) != 1 or groups == {0}:
+        return
+    (count,) = groups
+    choices = [tuple(range(count))] * (count <= 3) + [(k,) for k in range(count) if count > 1]
+    for chosen in choices:
+        found = {c: _split(c, chosen) for c in coordinates}
+        if _is_full(found):
+            yield found
+
+
+def _split(name: str, chosen: Sequence[int]) -> tuple[str, Site]:
+    parts = re.split(r"([0-9]+)", name)
+    site = tuple(int(parts[2 * k + 1]) for k in chosen)
+    for k in chosen:
+        parts[2 * k + 1] = ""
+    return re.sub(r"_+", "_", "".join(parts)).strip("_") or "x", site
+
+
+def _sizes(found: Mapping[str, tuple[str, Site]]) -> tuple[int, ...]:
+    columns = zip(*(site for _, site in found.values()), strict=True)
+    return tuple(len(set(column)) for column in columns)
+
+
+def _is_full(found: Mapping[str, tuple[str, Site]]) -> bool:
+    """Whether each field has each site of a box once."""
+    sizes = _sizes(found)
+    sites = Counter(site for _, site in found.values())
+    fields = {f for f, _ in found.values()}
+    columns = [sorted(set(c)) for c in zip(*(s for _, s in found.values()), strict=True)]
+    gapless = all(c[-1] - c[0] + 1 == len(c) for c in columns)
+    return (
+        gapless
+        and min(sizes) >= LEAST
+        and len(set(found.values())) == len(found) == len(fields) * prod(sizes)
+        and set(sites.values()) == {len(fields)}
+    )
+
+
+# --- the lattice
+
+
+def _lattice(
+    spec: Spec, poisson: Matrix, coordinates: Mapping[str, tuple[str, Site]], boundary: tuple[str, ...]
+) -> Spec:
+    names = _names(spec, coordinates, boundary)
+    at_sites = {names.sites[p.name][0] for p in spec.parameters if p.name in names.sites}
+    parameters = _parameters(spec, names, at_sites)
+    local, far = _brackets(spec, poisson, names)
+    casimirs, kinds = _casimirs(spec, names)
+    found = Spec(
+        name=spec.name,
+        coordinates=names.fields,
+        poisson=MatrixForm(tuple(tuple(local.get((f, g), ZERO) for g in names.fields) for f in names.fields)),
+        hamiltonian=total(_density(spec.hamiltonian, names)),
+        parameters=parameters,
+        casimirs=casimirs,
+        invariants=_invariants(spec, names),
+        order=spec.order,
+        title=spec.title,
+        lattice=Lattice(names.space.axes, boundary, brackets=far, kinds=kinds),
+    )
+    _prove(spec, poisson, found, names)
+    return replace(found, runs={n: _run(spec, run, names) for n, run in spec.runs.items()})
+
+
+def _names(spec: Spec, coordinates: Mapping[str, tuple[str, Site]], boundary: tuple[str, ...]) -> _Names:
+    """The sites counted from 0, with parameters that have numbers as the coordinates do."""
+    first = tuple(min(c) for c in zip(*(s for _, s in coordinates.values()), strict=True))
+    fields = tuple(dict.fromkeys(f for f, _ in coordinates.values()))
+    sizes = _sizes(coordinates)
+    all_sites = {s for _, s in coordinates.values()}
+    found = dict(coordinates)
+    plain = [p.name for p in spec.parameters if len(re.findall(r"[0-9]+", p.name)) == len(sizes)]
+    by_stem: dict[str, dict[str, Site]] = {}
+    for name in plain:
+        stem, site = _split(name, range(len(sizes)))
+        by_stem.setdefault(stem, {})[name] = site
+    for stem, listed in by_stem.items():
+        if set(listed.values()) == all_sites and len(listed) == len(all_sites) and stem not in fields:
+            found |= {name: (stem, site) for name, site in listed.items()}
+    moved = {n: (f, tuple(a - b for a, b in zip(s, first, strict=True))) for n, (f, s) in found.items()}
+    stems = tuple(dict.fromkeys(f for f, _ in moved.values()))
+    others = {p.name for p in spec.parameters if p.name not in moved} | {*SPEC_FUNCTIONS}
+    taken = {*stems, *others}
+    letters = [a for a in ("i", "j", "k", "l", "m", "n") if a not in taken and f"N_{a}" not in taken]
+    if len(letters) < len(sizes) or {*stems} & others:
+        raise _OtherError
+    axes = tuple(letters[: len(sizes)])
+    return _Names(fields, sizes, boundary, moved, Neighbours(stems, axes))
+
+
+def _parameters(spec: Spec, names: _Names, at_sites: set[str]) -> tuple[Parameter, ...]:
+    found = [p for p in spec.parameters if p.name not in names.sites]
+    for stem in sorted(at_sites):
+        values = {names.sites[p.name][1]: p for p in spec.parameters if names.sites.get(p.name, ("",))[0] == stem}
+        listed = [values[s] for s in sorted(values)]
+        alike = len({p.value for p in listed}) == 1
+        array = None if alike else Values(listed=tuple(p.value for p in listed))
+        positive = all(p.positive for p in listed)
+        found.append(Parameter(stem, listed[0].value, positive, listed[0].description, "sites", array))
+    return tuple(found)
+
+
+def _moved(e: Expression, names: _Names, base: Site | None = None) -> tuple[Site, Expression]:
+    """A term as it is at one site, and where that is: the corner of the smallest box about all it mentions."""
+    own = {n: names.sites[n] for n in symbols_of(e) if n in names.sites}
+    if base is None:
+        if not own:
+            raise _OtherError
+        columns = list(zip(*(site for _, site in own.values()), strict=True))
+        base = tuple(_start(set(c), n, b) for c, n, b in zip(columns, names.sizes, names.boundary, strict=True))
+    values = {n: symbol(names.space.at(f, _offset(site, base, names))) for n, (f, site) in own.items()}
+    return base, substitute([e], values)[0]
+
+
+def _start(sites: set[int], size: int, boundary: str) -> int:
+    """Where the shortest stretch of an axis begins that holds the sites."""
+    if boundary == "open":
+        return min(sites)
+    ordered = sorted(sites)
+    gaps = [((b - a - 1) % size, b) for a, b in zip(ordered, [*ordered[1:], ordered[0]], strict=True)]
+    return max(gaps)[1] if len(ordered) > 1 else ordered[0]
+
+
+def _offset(site: Site, base: Site, names: _Names) -> Site:
+    found = []
+    for a, b, n, boundary in zip(site, base, names.sizes, names.boundary, strict=True):
+        step = a - b
+        if boundary == "periodic":
+            step = (step + n // 2) % n - n // 2
+        # What reaches half the way round may have wound up anywhere.
+        if abs(step) > limits.OFFSET or 2 * abs(step) >= n:
+            raise _OtherError
+        found.append(step)
+    return tuple(found)
+
+
+def _key(e: Expression, names: _Names) -> float:
+    """A value that tells terms of one site apart."""
+    for name in symbols_of(e):
+        # Multiples of the golden ratio modulo 1 are all different, and evenly spread.
+        names.point.setdefault(name, 0.5 + (0.6180339887498949 * (len(names.point) + 1)) % 1)
+    return float(f"{evaluate([e], names.point)[0]:.9g}")
+
+
+def _orbits(terms: Iterable[tuple[Site, Expression]], names: _Names) -> list[Expression]:
+    """The terms of a density, from those of a sum: each kind must be wherever there is room for it, equally often."""
+    kinds: dict[float, tuple[Expression, Counter[Site]]] = {}
+    for base, term in terms:
+        kinds.setdefault(_key(term, names), (term, Counter()))[1][base] += 1
+    found = []
+    for term, where in kinds.values():
+        (times,) = {*where.values()} if len({*where.values()}) == 1 else {0}
+        if not times or len(where) != _room(term, names):
+            raise _OtherError
+        found.append(term if times == 1 else times * term)
+    return found
+
+
+def _room(term: Expression, names: _Names) -> int:
+    """At how many sites a term can be."""
+    offsets = [o for _, o in names.space.places(term).values()] or [(0,) * len(names.sizes)]
+    wide = [max(map(int, c)) - min(0, *map(int, c)) for c in zip(*offsets, strict=True)]
+    return prod(n - (w if b == "open" else 0) for n, w, b in zip(names.sizes, wide, names.boundary, strict=True))
+
+
+def _density(e: Expression, names: _Names) -> list[Expression]:
+    return _orbits((_moved(t, names) for t in _terms(e, names, ONE)), names)
+
+
+def _terms(e: Expression, names: _Names, factor: Expression) -> Iterator[Expression]:
+    """The terms of a sum; a factor that is the same at all sites is multiplied into it."""
+    args = e.args
+    if e.op in ("add", "sub"):
+        yield from _terms(args[0], names, factor)
+        yield from _terms(args[1] if e.op == "add" else neg(args[1]), names, factor)
+    elif e.op == "neg":
+        yield from _terms(args[0], names, neg(factor))
+    elif e.op == "mul" and any(not _varies(a, names) for a in args):
+        constant, varying = args if not _varies(args[0], names) else args[::-1]
+        yield from _terms(varying, names, mul(constant, factor))
+    elif not e.is_zero:
+        yield mul(factor, e)
+
+
+def _varies(e: Expression, names: _Names) -> bool:
+    return any(n in names.sites for n in symbols_of(e))
+
+
+def _brackets(
+    spec: Spec, poisson: Matrix, names: _Names
+) -> tuple[dict[tuple[str, str], Expression], dict[tuple[str, str], Expression]]:
+    """The brackets of fields of a site, and of different sites in one order."""
+    kinds: dict[tuple[str, str], dict[Site, Expression]] = {}
+    for c, row in zip(spec.coordinates, poisson, strict=True):
+        f, site = names.sites[c]
+        for d, entry in zip(spec.coordinates, row, strict=True):
+            if not entry.is_zero:
+                g, there = names.sites[d]
+                pair = f, names.space.at(g, _offset(there, site, names))
+                kinds.setdefault(pair, {})[site] = _moved(entry, names, site)[1]
+    local, far = {}, dict[tuple[str, str], Expression]()
+    for (f, g), entries in kinds.items():
+        if len({_key(e, names) for e in entries.values()}) != 1:
+            raise _OtherError
+        first = next(iter(entries.values()))
+        base, offset = names.space.place(g)
+        if not any(offset):
+            local[f, g] = first
+        elif (base, names.space.at(f, tuple(-int(o) for o in offset))) not in far:
+            far[f, g] = first
+    return local, far
+
+
+def _casimirs(spec: Spec, names: _Names) -> tuple[dict[str, Expression], dict[str, str]]:
+    """Casimirs of every site, sums and products; others are left out."""
+    found, kinds = dict[str, Expression](), dict[str, str]()
+    alike: dict[float, list[tuple[str, Expression]]] = {}
+    taken = {*names.space.names, *(p.name for p in spec.parameters)}
+    for name, e in spec.casimirs.items():
+        for kind, density in (("product", _product_of), ("sum", _sum_of)):
+            try:
+                found[name], kinds[name] = density(e, names), kind
+                break
+            except _OtherError:
+                continue
+        else:
+            with suppress(_OtherError):
+                own = _moved(e, names)[1]
+                alike.setdefault(_key(own, names), []).append((name, own))
+    for listed in alike.values():
+        if len(listed) == prod(names.sizes):
+            name = re.sub(r"[0-9_]+$", "", listed[0][0]) or "C"
+            while name in taken or name in found:
+                name += "_"
+            found[name], kinds[name] = listed[0][1], "sites"
+    return found, kinds
+
+
+def _sum_of(e: Expression, names: _Names) -> Expression:
+    return total(_density(e, names))
+
+
+def _product_of(e: Expression, names: _Names) -> Expression:
+    factors, stack = [], [e]
+    while stack:
+        node = stack.pop()
+        if node.op == "mul":
+            stack += node.args
+        elif not node.is_number:
+            factors.append(node)
+    return product_of(_orbits([_moved(f, names) for f in factors], names))
+
+
+def _invariants(spec: Spec, names: _Names) -> dict[str, Expression]:
+    found = {}
+    for name, e in spec.invariants.items():
+        try:
+            found[name] = _sum_of(e, names)
+        except _OtherError:
+            continue
+    return found
+
+
+def _prove(spec: Spec, poisson: Matrix, found: Spec, names: _Names) -> None:
+    """That the lattice expands to the spec."""
+    by_site = {(f, site): n for n, (f, site) in names.sites.items()}
+    expansion = Expansion(cell_from_spec(found), names.sizes, (), by_site)
+    entries = expansion.poisson()
+    listed = [("H", spec.hamiltonian - total(expansion.hamiltonian_terms()))]
+    for c, row in zip(spec.coordinates, poisson, strict=True):
+        listed += [(f"{{{c}, {d}}}", e - entries.get((c, d), ZERO)) for d, e in zip(spec.coordinates, row, strict=True)]
+    if not decide_zero("the same system", listed).holds:
+        raise _OtherError
+
+
+def _run(spec: Spec, run: Run, names: _Names) -> Run:
+    by_field: dict[str, dict[Site, Fraction]] = {}
+    for c, value in zip(spec.coordinates, run.initial, strict=True):
+        f, site = names.sites[c]
+        by_field.setdefault(f, {})[site] = value
+    state = {f: Values(listed=tuple(v[s] for s in sorted(v))) for f, v in by_field.items()}
+    arrays: dict[str, dict[Site, Fraction]] = {}
+    changed = {names.sites[n][0] for n in run.parameters if n in names.sites}
+    for p in spec.parameters:
+        stem, site = names.sites.get(p.name, ("", ()))
+        if stem in changed:
+            arrays.setdefault(stem, {})[site] = run.parameters.get(p.name, p.value)
+    listed = {stem: Values(listed=tuple(v[s] for s in sorted(v))) for stem, v in arrays.items()}
+    numbers = {n: v for n, v in run.parameters.items() if n not in names.sites}
+    lattice = LatticeRun(names.sizes, state, (), listed)
+    return replace(run, initial=(), parameters=numbers, exact={}, section=None, lattice=lattice)
