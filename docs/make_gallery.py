@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import sys
 from pathlib import Path
 from typing import Any
@@ -22,6 +23,7 @@ from phigen.runtime.session import rows_along
 from phigen.runtime.solver import Solver
 from phigen.runtime.trajectory import Trajectory
 from phigen.spec.model import Run, Spec
+from phigen.study.methods import of_classical
 from phigen.study.race import TABLEAUX
 from phigen.study.sections import function_of
 from phigen.study.summary import Summary, summarise
@@ -61,6 +63,11 @@ def longest_run(found: Spec) -> Run:
     return max(found.runs.values(), key=lambda run: run.steps)
 
 
+def start_of(found: Spec, run: Run) -> float | None:
+    """The time at the start of a run, None without a time."""
+    return float(run.start) if found.time else None
+
+
 def facts(name: str) -> dict[str, Any]:
     """What is measured of a spec."""
     found = source(name)
@@ -68,11 +75,14 @@ def facts(name: str) -> dict[str, Any]:
     solver, run = solver_of(compilation), longest_run(found)
     parameters = found.parameters_of(run)
     x0, h = np.array([float(v) for v in run.initial]), float(run.step)
-    own = solver.integrate(x0, h, run.steps, run.stride, parameters=parameters)
+    own = solver.integrate(x0, h, run.steps, run.stride, t0=start_of(found, run), parameters=parameters)
     summaries = [summarise("phigen", compilation.system, run, parameters, own.t, own.x)]
     for method in [m for m in run.compare if m in TABLEAUX]:
         try:
-            x = rows_along(started(method, compilation, x0, parameters), h, run.steps, run.stride, None)
+            if found.time:
+                x = of_classical(method, solver, parameters, float(run.start)).rows(x0, h, run.steps, run.stride)
+            else:
+                x = rows_along(started(method, compilation, x0, parameters), h, run.steps, run.stride, None)
         except BackendError as error:
             x = error.states
         summaries.append(summarise(method.upper(), compilation.system, run, parameters, own.t[: len(x)], x))
@@ -89,7 +99,8 @@ def facts(name: str) -> dict[str, Any]:
 
 
 def _errors(summary: Summary) -> dict[str, float]:
-    drifts = {"H": summary.energy, **summary.casimirs, **summary.invariants}
+    energy = "H" if math.isnan(summary.off) else "H, balance"
+    drifts = {energy: summary.energy, **summary.casimirs, **summary.invariants}
     if summary.exact:
         drifts["solution"] = summary.exact
     return {quantity: drift.error for quantity, drift in drifts.items()}
@@ -104,9 +115,12 @@ def draw(name: str) -> None:
     # Many panels would make a large file: fewer steps there, and of very many no leaves.
     steps = min(run.steps, DRAWN if found.dimension <= 4 else DRAWN // 2)
     casimirs = compilation.system.casimirs if found.dimension <= 9 else {}
-    trajectory = solver.integrate(run.initial, float(run.step), steps, parameters=parameters)
+    begin = start_of(found, run)
+    trajectory = solver.integrate(run.initial, float(run.step), steps, t0=begin, parameters=parameters)
     while len(trajectory) > SHORTEST and not _is_curve(trajectory):
-        trajectory = solver.integrate(run.initial, float(run.step), trajectory.steps // 2, parameters=parameters)
+        trajectory = solver.integrate(
+            run.initial, float(run.step), trajectory.steps // 2, t0=begin, parameters=parameters
+        )
     figures.save(figures.trajectory_figure(trajectory, casimirs), FIGURES / f"{name}.svg")
     if sections := _sections(found, solver):
         figures.save(figures.section_figure(sections, solver.coordinates), FIGURES / f"{name}_section.svg")
@@ -122,10 +136,10 @@ def _sections(found: Spec, solver: Solver) -> dict[str, Any]:
     """The crossings of each run that has a section; in three dimensions these are a point, which is no picture."""
     sections = {}
     for run in found.runs.values():
-        if run.section is not None and found.dimension > 3:
+        if run.section is not None and (found.dimension > 3 or found.time):
             parameters = found.parameters_of(run)
-            g = function_of(run.section, solver.coordinates, parameters)
-            points = solver.section(run.initial, float(run.step), run.steps, g, parameters=parameters).x
+            g, begin = function_of(run.section, solver.coordinates, parameters, found.time), start_of(found, run)
+            points = solver.section(run.initial, float(run.step), run.steps, g, t0=begin, parameters=parameters).x
             sections[f"{run.name}: {readable_one(run.section, None)} = 0"] = points[:CROSSINGS]
     return sections
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import sympy
 from scipy.integrate import solve_ivp
-from support import COMMAND, compile_text, solver, tool
+from support import COMMAND, compile_text, compiled, solver, tool
 
 import phigen
 from phigen import spec
@@ -21,6 +21,7 @@ from phigen.realisations.catalogue import realise
 from phigen.scheme.discretisation import hamilton_jacobi
 from phigen.series.hamilton_jacobi import graph_series, residual
 from phigen.spec.model import BirealisationChoice
+from phigen.study.summary import exact_solution
 from phigen.symbolic.expression import substitute, symbol
 from phigen.symbolic.numeric import evaluate
 from phigen.symbolic.verdict import decide_zero, sample_point
@@ -316,3 +317,14 @@ def test_systems_from_sympy_may_have_a_time():
     assert phigen.compile(system, target="numpy").integrate([1, 0], H, 3, t0=1.0).t[-1] == 1.0 + 3 * H
     with pytest.raises(SpecError, match="unknown symbol t"):
         phigen.System.from_sympy([q, p], [[0, t], [-t, 0]], p**2 / 2, time=t)
+
+
+@pytest.mark.parametrize("h", [0.1, 0.05])
+def test_a_spin_in_resonance_follows_rabis_solution(h):
+    compilation = compiled("spin_resonance")
+    run = compilation.spec.runs["resonance"]
+    found = solver(compilation, "c").integrate([0, 0, 1], h, round(20 / h))
+    solution = exact_solution(compilation.system, run, compilation.spec.parameters_of(run), found.x[0], found.t)
+    error = np.max(np.abs(found.x - np.stack([solution[c] for c in compilation.system.coordinates], axis=1)))
+    assert error < 1e-6 * (h / 0.1) ** 4 * 1.1
+    assert found.x[-1, 2] == pytest.approx(np.cos(0.3 * 20), abs=1e-6)

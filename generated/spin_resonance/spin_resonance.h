@@ -1,0 +1,108 @@
+/*
+ * spin_resonance.h: the declarations; spin_resonance.c says how they were made.
+ * DO NOT EDIT: edits are noticed by the checksum below.
+ * SPDX-License-Identifier: 0BSD
+ * body-sha256: 1298ec76532d39f532167747ee28a70a55f0987ce87ad1f3da500fd0a973395e
+ */
+#ifndef SPIN_RESONANCE_H
+#define SPIN_RESONANCE_H
+
+#include <stddef.h>
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+#define spin_resonance_DIM 3
+#define spin_resonance_ORDER 4
+#define spin_resonance_CASIMIRS 1
+#define spin_resonance_PHIGEN_VERSION "0.1.0"
+#define spin_resonance_SPEC_SHA256 "5ddcd1cafa805e373cf495543a70a36ab54b37b0b9b46774ed678f920e677a3b"
+
+/* State vectors: m1, m2, m3. Casimirs: size. */
+typedef struct {
+    double b0;    /* steady field */
+    double b;     /* rotating field */
+    double omega; /* its frequency */
+    double D;     /* anisotropy: an easy plane if it is positive */
+} spin_resonance_params;
+
+extern const spin_resonance_params spin_resonance_default_params;
+
+enum { spin_resonance_COEFFICIENTS = 15 }; /* numbers that depend on params and h, and on the time */
+
+/* How a step ends; spin_resonance_status_string says it in words. */
+typedef enum {
+    spin_resonance_OK = 0, spin_resonance_NO_CONVERGENCE, spin_resonance_SINGULAR, spin_resonance_NOT_FINITE,
+        spin_resonance_BAD_ARGUMENT
+} spin_resonance_status;
+
+enum { spin_resonance_DIFFERENCES = 9 }; /* those of higher order amplify rounding more than they gain */
+
+/* The last value of the unknown and its backward differences, for a guess at the next. */
+typedef struct {
+    int count; /* differences that are known */
+    int order; /* how many of them the extrapolation adds up */
+    double difference[spin_resonance_DIFFERENCES][spin_resonance_DIM];
+} spin_resonance_history;
+
+/* The solver is a plain value: copy it to branch, keep one per thread. Set it up with spin_resonance_init. */
+typedef struct {
+    /* the state; read it freely, change it only through spin_resonance_init */
+    double x[spin_resonance_DIM];
+    double carry[spin_resonance_DIM]; /* what rounding took from x: the state proper is x + carry */
+    size_t steps;                     /* good steps since spin_resonance_init */
+    size_t evaluations;               /* of the generating function, for statistics */
+    double t;                         /* the time of x */
+    double h;                         /* the last step size; NaN before the first step */
+    spin_resonance_params params;
+    /* what depends on params and h only, then on the time of the step as well */
+    double coef[spin_resonance_COEFFICIENTS];
+    size_t steps_before_h; /* steps and t when h was set: t is counted from there, so no error adds up */
+    double t_before_h;
+    spin_resonance_history history; /* for starting guesses */
+} spin_resonance_solver;
+
+/* Start at x0. params may be NULL for the defaults. Arguments of all functions may be parts of the solver, or
+   overlap. spin_resonance_BAD_ARGUMENT, and *s as before, if x0 or a parameter is not finite, one that has to
+   be positive is not, or what is computed from parameters alone is not finite. */
+spin_resonance_status spin_resonance_init(spin_resonance_solver *s, const spin_resonance_params *params,
+    const double x0[spin_resonance_DIM]);
+
+/* The same at the time t0, which spin_resonance_init takes to be 0. */
+spin_resonance_status spin_resonance_init_at(spin_resonance_solver *s, const spin_resonance_params *params,
+    const double x0[spin_resonance_DIM], double t0);
+
+/* One step of size h, of either sign. On failure the state is as before. */
+spin_resonance_status spin_resonance_step(spin_resonance_solver *s, double h);
+
+/* Many steps. On failure s->x is the last good state and s->steps counts the good steps. */
+spin_resonance_status spin_resonance_integrate(spin_resonance_solver *s, double h, size_t steps);
+
+/* Many members, in place: x[i * members + m] is coordinate i of member m. One that fails keeps its last good
+   state. status (or NULL) receives the status of each; the first that is not OK is returned. */
+spin_resonance_status spin_resonance_ensemble(const spin_resonance_params *params, double *x, size_t members,
+    double h, size_t steps, unsigned char *status);
+
+/* The same from the time t0 of all members on, which spin_resonance_ensemble takes to be 0. */
+spin_resonance_status spin_resonance_ensemble_at(const spin_resonance_params *params, double *x,
+    size_t members, double t0, double h, size_t steps, unsigned char *status);
+
+/* The Hamiltonian at the time t; the Casimirs; the right-hand side pi(x) grad H(t, x). params may be NULL. */
+double spin_resonance_hamiltonian(const spin_resonance_params *params, double t,
+    const double x[spin_resonance_DIM]);
+void spin_resonance_casimirs(const spin_resonance_params *params, const double x[spin_resonance_DIM],
+    double out[]);
+void spin_resonance_vector_field(const spin_resonance_params *params, double t,
+    const double x[spin_resonance_DIM], double out[spin_resonance_DIM]);
+
+const char *spin_resonance_status_string(spin_resonance_status status);
+
+/* For bindings: the size of spin_resonance_solver, and its count of good steps. */
+size_t spin_resonance_solver_size(void);
+size_t spin_resonance_solver_steps_done(const spin_resonance_solver *s);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif /* SPIN_RESONANCE_H */
