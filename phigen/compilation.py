@@ -66,8 +66,13 @@ class Compilation:
 
     @property
     def exact(self) -> bool:
-        """Whether a step is a Poisson map to round-off."""
+        """Whether a step starts and ends at the ends of one p to round-off; see `poisson`."""
         return self.realisation is None or self.realisation.exact
+
+    @property
+    def poisson(self) -> bool:
+        """Whether a step is a Poisson map to round-off: that of an exact bi-realisation, without forces."""
+        return self.exact and self.system.forces is None
 
     @property
     def symmetric(self) -> bool:

@@ -221,6 +221,9 @@ def _split(spec: Spec, source: System, order: int | None, described: Mapping[str
     if source.time:
         reason = f"scheme: splitting is not offered yet where H depends on the time {source.time}"
         raise SpecError([spec.diagnostic(("scheme",), reason, "scheme: series takes it")])
+    if source.forces:
+        reason = "scheme: splitting takes no forces and no damping"
+        raise SpecError([spec.diagnostic(("scheme",), reason, "scheme: series takes them")])
     gauge = Gauge() if isinstance(spec.gauge, str) else given(source, spec.gauge)
     discretised = gauge.applied(source)
     parts = clock.timed("splitting", lambda: split(discretised))

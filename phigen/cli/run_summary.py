@@ -27,11 +27,12 @@ def print_summary(compilation: Compilation, recorder: Recorder, summaries: Seque
     state = recorder.session.state().tolist()
     final = ", ".join(f"{c} = {v:.9g}" for c, v in zip(solver.coordinates, state, strict=True))
     out(f"  final state: {final}\n")
-    for line in table(_rows(summaries, timed=bool(compilation.system.time)), right=range(1, len(summaries) + 1)):
+    for line in table(_rows(summaries, driven=compilation.system.driven), right=range(1, len(summaries) + 1)):
         out(f"  {line}")
     out(f"  {stated(summaries[0].units)}")
-    if compilation.system.time:
-        out("  The energy balance is H − ∫ ∂H/∂t dt, integrated along the stored states by a rule of order 8.")
+    if compilation.system.driven:
+        power = "∂H/∂t" if not compilation.system.forces else "(∂H/∂t + the power of the forces)"
+        out(f"  The energy balance is H − ∫ {power} dt, integrated along the stored states by a rule of order 8.")
     if recorder.finder:
         count = counted(recorder.points.seen, "rising crossing")
         out(f"\n  {count} of the section {recorder.section_text} = 0")
@@ -41,12 +42,13 @@ def print_summary(compilation: Compilation, recorder: Recorder, summaries: Seque
         out(f"  {', '.join(f'{value:.4g}' for value in spectrum.exponents.tolist())};  sum {spectrum.total:.1g}")
 
 
-def _rows(summaries: Sequence[Summary], *, timed: bool) -> list[list[str]]:
+def _rows(summaries: Sequence[Summary], *, driven: bool) -> list[list[str]]:
     first = summaries[0]
     rows = [["largest error", *(s.method for s in summaries), ""]]
-    energy = "energy balance" if timed else "energy"
+    energy = "energy balance" if driven else "energy"
     rows.append([energy, *(_shown(s.energy) for s in summaries), first.energy.unit.kind])
-    if timed:
+    if driven:
+        rows.append(["  the integral, work done", *(f"{s.work:.4g}" for s in summaries), ""])
         rows.append(["  its integral may be off by", *(f"{s.off:.1e}" for s in summaries), ""])
     if any(math.isfinite(s.energy.growth) for s in summaries):
         growth = [f"{s.energy.growth:.3g}" if math.isfinite(s.energy.growth) else "–" for s in summaries]

@@ -14,6 +14,7 @@ from phigen.cli.sources import CORRECTIONS, ORDER, load_one, one_spec, scheme_op
 
 if TYPE_CHECKING:
     from phigen.compilation import Compilation
+    from phigen.geometry.system import System
     from phigen.spec.model import Spec
 
 
@@ -104,6 +105,8 @@ def _print(compilation: Compilation, modified: int, most: int | None) -> None:
         section("Parameters", [listed])
     section(f"Poisson tensor: {system.shape}", assignments(brackets(compilation)))
     section("Hamiltonian", assignments([("H", readable_one(system.hamiltonian, most))]))
+    if system.forces:
+        section("Forces: ẋ = π(∇H + ζ) + f", assignments(_forces(system, most)))
     if system.casimirs:
         section("Casimirs", assignments(_named(system.casimirs, most)))
     if system.invariants:
@@ -115,6 +118,16 @@ def _print(compilation: Compilation, modified: int, most: int | None) -> None:
     if corrected:
         section("Modified Hamiltonian", assignments(corrected))
     section("Generated code", _code(compilation))
+
+
+def _forces(system: System, most: int | None) -> list[tuple[str, str]]:
+    """ζ without the damping, which has a line of its own, f, and the damping."""
+    from phigen.spec.model import SpecForces
+
+    given = system.spec.forces if system.spec else SpecForces()
+    listed = {f"ζ_{c}": e for c, e in given.covector.items()} | {f"f_{c}": e for c, e in given.vector.items()}
+    damping = [("λ", f"{readable_one(given.damping, most)}, and ζ has λ π∇H beside that")] if given.damping else []
+    return [*_named(listed, most), *damping]
 
 
 def _print_series(compilation: Compilation, most: int | None) -> None:

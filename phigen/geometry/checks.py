@@ -9,7 +9,7 @@ from phigen.geometry.rank import ATTEMPTS, POINTS, generic_ranks
 from phigen.geometry.system import System, hamiltonian_vector_field
 from phigen.symbolic.expression import gradient, total
 from phigen.symbolic.readable import shortened
-from phigen.symbolic.verdict import CHECKED, UNDECIDED, Statement, decide_zero
+from phigen.symbolic.verdict import CHECKED, PROVED, UNDECIDED, Statement, decide_zero
 
 
 def check(system: System) -> list[Statement]:
@@ -47,8 +47,26 @@ def invariant_statements(system: System) -> Iterator[Statement]:
         slopes = gradient(invariant, system.coordinates)
         rate = total(s * f for s, f in zip(slopes, flow, strict=True) if not s.is_zero)
         rate += total(gradient(invariant, system.times))
-        label = f"{{{name}, H}} + ∂{name}/∂{system.time}" if system.time else f"{{{name}, H}}"
+        plain = f"d{name}/dt" if system.forces else f"{{{name}, H}}"
+        label = f"{{{name}, H}} + ∂{name}/∂{system.time}" if system.time and not system.forces else plain
         yield decide_zero(f"{name} is invariant", [(label, rate)], system.positive)
+
+
+def force_statements(system: System) -> Iterator[Statement]:
+    """How forces change Casimirs, and that the damping takes energy as it should."""
+    if system.forces is None:
+        return
+    for name, casimir in system.casimirs.items():
+        rate = system.forced_rate_of_casimir(casimir)
+        kept = decide_zero(f"the forces keep {name}", [(f"d{name}/dt", rate)], system.positive)
+        yield kept if kept.holds else Statement(f"d{name}/dt = {shortened(rate)}, by the vector force", PROVED)
+    damping = system.forces.damping
+    if not damping.is_zero:
+        slope = gradient(system.hamiltonian, system.coordinates)
+        flow = hamiltonian_vector_field(system.poisson, slope)
+        bracket = hamiltonian_vector_field(system.poisson, flow)
+        work = total(s * b for s, b in zip(slope, bracket, strict=True)) + total(f * f for f in flow)
+        yield decide_zero("the damping changes H at the rate -λ |π∇H|²", [("", work)], system.positive)
 
 
 def rank_statement(system: System) -> Statement:

@@ -28,6 +28,8 @@ def undefined_parts(system: System, starts: Sequence[Point]) -> Iterator[Stateme
     starts, the latter is undecided.
     """
     parts: dict[str, Sequence[Expression]] = {"H": [system.hamiltonian]}
+    if system.forces:
+        parts["the force"] = [*system.forces.covector, *system.forces.vector]
     parts["π"] = [e for row in system.poisson for e in row]
     parts |= {name: [e] for name, e in (*system.casimirs.items(), *system.invariants.items())}
     for name, roots in parts.items():

@@ -9,11 +9,12 @@ from typing import TYPE_CHECKING, Any
 
 from phigen.errors import Diagnostic, Location, SpecError
 from phigen.geometry.casimirs import found_casimirs
+from phigen.geometry.forces import Forces, forces_of
 from phigen.geometry.forms import structure
 from phigen.geometry.lie_algebra import LieAlgebra
 from phigen.geometry.shapes import LiePoisson, Matrix, Shape
-from phigen.spec.model import Parameter, PoissonForm, Spec
-from phigen.symbolic.expression import Expression, gradient, text, total
+from phigen.spec.model import Parameter, PoissonForm, Spec, SpecForces
+from phigen.symbolic.expression import ZERO, Expression, gradient, text, total
 
 if TYPE_CHECKING:
     from phigen.geometry.sympy_bridge import SympySystem
@@ -24,7 +25,7 @@ _SHOWN = 60
 
 @dataclass(frozen=True, repr=False)
 class System:
-    """ẋ = π(x)∇H(x), or ẋ = π(x)∇H(t, x).
+    """ẋ = π(x)∇H(x), or ẋ = π(x)∇H(t, x), or with ``forces`` beside that.
 
     ``poisson`` is the n×n matrix π_ij = {x_i, x_j}; expressions use the coordinates and parameters as
     symbols. ``casimirs`` holds the declared ones first, in the order of the spec, then the found ones
@@ -44,6 +45,7 @@ class System:
     shape: Shape
     form: PoissonForm
     time: str = ""
+    forces: Forces | None = None
     declared: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
     locations: Mapping[tuple[Any, ...], Location] = field(default_factory=dict)
@@ -70,6 +72,11 @@ class System:
         return (self.time,) if self.time else ()
 
     @property
+    def driven(self) -> bool:
+        """Whether H is no invariant: it depends on the time, or forces do work."""
+        return bool(self.time) or self.forces is not None
+
+    @property
     def frozen(self) -> System:
         """The system whose time stands still: one more parameter."""
         standing = tuple(Parameter(t, Fraction(0)) for t in self.times)
@@ -86,8 +93,28 @@ class System:
         return self.shape.algebra if isinstance(self.shape, LiePoisson) else None
 
     def vector_field(self) -> tuple[Expression, ...]:
-        """π∇H, one expression for each coordinate."""
-        return hamiltonian_vector_field(self.poisson, gradient(self.hamiltonian, self.coordinates))
+        """π∇H, and what the forces add, one expression for each coordinate."""
+        slope = gradient(self.hamiltonian, self.coordinates)
+        if self.forces is None:
+            return hamiltonian_vector_field(self.poisson, slope)
+        covector = [s + z for s, z in zip(slope, self.forces.covector, strict=True)]
+        tangent = hamiltonian_vector_field(self.poisson, covector)
+        return tuple(a + b for a, b in zip(tangent, self.forces.vector, strict=True))
+
+    def forced_rate(self, function: Expression) -> Expression:
+        """What the forces add to the rate of change of a function F: ∇F·(πζ + f). For H it is their work."""
+        if self.forces is None:
+            return ZERO
+        moved = hamiltonian_vector_field(self.poisson, self.forces.covector)
+        slopes = gradient(function, self.coordinates)
+        return total(s * (a + b) for s, a, b in zip(slopes, moved, self.forces.vector, strict=True) if not s.is_zero)
+
+    def forced_rate_of_casimir(self, casimir: Expression) -> Expression:
+        """The same of a Casimir, which πζ does not change: ∇C·f."""
+        if self.forces is None:
+            return ZERO
+        slopes = gradient(casimir, self.coordinates)
+        return total(s * f for s, f in zip(slopes, self.forces.vector, strict=True) if not s.is_zero)
 
     @classmethod
     def from_sympy(
@@ -151,6 +178,7 @@ def system_from_spec(spec: Spec) -> System:
         invariants=spec.invariants,
         locations=spec.locations,
         time=spec.time,
+        forces=spec.forces,
     )
     return replace(system, spec=spec)
 
@@ -173,6 +201,7 @@ def build_system(
     invariants: Mapping[str, Expression] | None = None,
     locations: Mapping[tuple[Any, ...], Location] | None = None,
     time: str = "",
+    forces: SpecForces | None = None,
 ) -> System:
     """A `System` from its parts; see `system_from_spec`."""
     locations = locations or {}
@@ -183,6 +212,9 @@ def build_system(
         raise _located(error, locations) from None
     taken = {*coordinates, time, *(p.name for p in parameters), *declared, *(invariants or {})}
     found, notes = found_casimirs(coordinates, matrix, shape, form, declared, taken)
+    acting = None
+    if forces:
+        acting = forces_of(forces, coordinates, hamiltonian_vector_field(matrix, gradient(hamiltonian, coordinates)))
     return System(
         name,
         tuple(coordinates),
@@ -194,6 +226,7 @@ def build_system(
         shape,
         form,
         time,
+        acting,
         tuple(declared),
         notes,
         locations,

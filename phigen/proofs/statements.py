@@ -22,7 +22,7 @@ from phigen.symbolic.verdict import REFUTED, UNDECIDED, Statement, decide_elemen
 Groups = Mapping[str, tuple[Statement, ...]]
 
 PREFIX = "bi-realisation: "
-DEFINEDNESS, CASIMIRS, INVARIANTS = "Definedness", "Casimirs", "Invariants"
+DEFINEDNESS, CASIMIRS, FORCES, INVARIANTS = "Definedness", "Casimirs", "Forces", "Invariants"
 METHOD, SPLITTING = "Bi-realisation", "Splitting"
 
 
@@ -43,10 +43,12 @@ def tensor(system: System) -> dict[str, tuple[Statement, ...]]:
 
 
 def integrals(system: System) -> dict[str, tuple[Statement, ...]]:
-    """The Casimirs, the rank of π, and the invariants that the spec claims."""
+    """The Casimirs, the rank of π, what the forces do to them, and the invariants that the spec claims."""
     casimirs = (*checks.casimir_statements(system), checks.rank_statement(system))
     invariants = tuple(checks.invariant_statements(system))
-    return {CASIMIRS: casimirs} | ({INVARIANTS: invariants} if invariants else {})
+    forces = tuple(checks.force_statements(system))
+    found = {CASIMIRS: casimirs} | ({FORCES: forces} if forces else {})
+    return found | ({INVARIANTS: invariants} if invariants else {})
 
 
 def lattice(cell: Cell) -> dict[str, tuple[Statement, ...]]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 from phigen.geometry.shapes import LogCanonical
 from phigen.geometry.system import System
@@ -30,6 +30,7 @@ from phigen.scheme.staging import Coefficients
 from phigen.scheme.steps import Explicit, InnerSolve, Newton, Path, PathLanes, PathTangent, Step
 from phigen.scheme.tangent import curvature, explicit_jacobian, tangent_path
 from phigen.spec.model import NO_EXTRAS, Extras, SolverOptions
+from phigen.symbolic.expression import Expression
 from phigen.symbolic.symbols import STEP
 
 #: Largest dimension in which paths are followed in lanes. In five and six their derivatives cost what lanes save:
@@ -66,11 +67,12 @@ def build_program(
             title,
             licence,
             spec_sha256,
-            tuple(fact for fact in _facts(realisation, scheme, gauge, step, order) if fact),
+            tuple(fact for fact in _facts(system, realisation, scheme, gauge, step, order) if fact),
             operation_counts(step.main.roots),
         ),
         coordinates=system.coordinates,
         time=system.time,
+        forced=system.forces is not None,
         parameters=system.parameters,
         casimirs=tuple(system.casimirs),
         order=order.order,
@@ -142,7 +144,9 @@ def _prepare(system: System, gauge: Gauge, coefficients: Coefficients) -> Kernel
     )
 
 
-def _facts(realisation: BiRealisation, scheme: Discretisation, gauge: Gauge, step: Step, order: Order) -> Iterator[str]:
+def _facts(
+    system: System, realisation: BiRealisation, scheme: Discretisation, gauge: Gauge, step: Step, order: Order
+) -> Iterator[str]:
     """The lines of the header; some may be empty."""
     generating = scheme.generating
     series = "S_1" if scheme.terms == 1 else f"S_1 ... S_{scheme.terms}"
@@ -151,9 +155,24 @@ def _facts(realisation: BiRealisation, scheme: Discretisation, gauge: Gauge, ste
     yield from approximation(realisation)
     yield f"generating function: {series} ({generating.form}{terms})"
     yield from gauge.facts
+    yield from _forces(system)
     yield f"step: {step.manner}"
     yield scheme.note
     yield order.note
+
+
+def _forces(system: System) -> Iterator[str]:
+    """What is said of forces: with them a step is no Poisson map."""
+    if system.forces is None:
+        return
+    yield "forces: p = h (grad H + zeta)" + ", impulse h f by halves before and after" * _acts(system.forces.vector)
+    changed = [name for name, c in system.casimirs.items() if not system.forced_rate_of_casimir(c).is_zero]
+    kept = f"they change {', '.join(changed)}" if changed else "they keep all Casimirs"
+    yield f"with forces a step is no Poisson map; {kept}"
+
+
+def _acts(force: Sequence[Expression]) -> bool:
+    return any(not f.is_zero for f in force)
 
 
 def approximation(realisation: BiRealisation) -> list[str]:

@@ -66,7 +66,8 @@ def generating_function(system: System, series: HamiltonJacobi, terms: int) -> G
         candidates = [*collected, *candidates]
     if not candidates or min(c.cost() for c in candidates) > MOST_OPERATIONS:
         raise too_large(system, f"S_1 … S_{terms} take more than {MOST_OPERATIONS} operations")
-    return min(candidates, key=GeneratingFunction.cost)
+    best = min(candidates, key=GeneratingFunction.cost)
+    return best.forced(system.forces.covector, system.coordinates) if system.forces else best
 
 
 @dataclass(frozen=True)
@@ -91,6 +92,8 @@ def discretise(
     ``auto`` composes only if the direct series is beyond the budget or costs more than `DIRECT_WORTH` times
     the stages of a composition, since its error constant is much smaller.
     """
+    if system.forces:
+        return _forced(system, realisation, series, order, composition)
     series.reach(order.order)  # S_{k+1} = 0 is what makes a symmetric method of order k + 1: it will be proved
     if composition not in ("auto", "none"):
         return _composed(system, realisation, series, order, composition)
@@ -106,6 +109,25 @@ def discretise(
     composed = _composed(system, realisation, series, order, "auto")
     price = DIRECT_WORTH * len(composed.fractions) * (composed.generating.cost() + system.dimension**2)
     return composed if direct.generating.cost() > price else direct
+
+
+def _forced(
+    system: System, realisation: BiRealisation, series: HamiltonJacobi, order: Order, composition: str
+) -> Discretisation:
+    """With forces p = h(∇H + ζ), of order 2 by symmetry; higher orders are compositions."""
+    if realisation.path and system.forces and any(not f.is_zero for f in system.forces.vector):
+        reason = f"forces: a vector needs a bi-realisation in closed form; {realisation.kind} follows paths"
+        place = system.locations.get(("forces", "vector"))
+        raise SpecError([Diagnostic(reason, place, "a covector is taken; or choose another birealisation")])
+    lowest = 2 if series.symmetric else 1
+    if order.order > lowest and (composition == "none" or not series.symmetric):
+        reason = f"with forces, {realisation.kind} has order {lowest} without a composition, not {order.order}"
+        place = system.locations.get(("order",)) or system.locations.get(("forces",))
+        hint = f"order: {lowest}" + ("" if not series.symmetric else ", or composition: auto")
+        raise SpecError([Diagnostic(reason, place, hint)])
+    if order.order <= lowest:
+        return Discretisation(generating_function(system, series, 1), 1)
+    return _composed(system, realisation, series, order, composition)
 
 
 def _composed(

@@ -77,7 +77,7 @@ def choose(system: System, realisation: BiRealisation, setting: str | Mapping[st
     if not isinstance(setting, str):
         return _gauged(system, realisation, given(system, setting))
     chosen = plain = _gauged(system, realisation, Gauge())
-    if setting == "none" or not realisation.exact or not realisation.symmetric or system.time:
+    if setting == "none" or not realisation.exact or not realisation.symmetric or system.time or system.forces:
         return plain
     for name in system.casimirs:
         candidate = _gauged(system, realisation, Gauge((*chosen.gauge.free, name)))

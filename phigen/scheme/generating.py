@@ -10,7 +10,7 @@ graph wins. The decision is by operation count.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 from phigen.scheme.collected import collect, exceeds
@@ -33,6 +33,14 @@ class GeneratingFunction:
     form: str
     terms: int
     coefficients: Coefficients
+
+    def forced(self, covector: Sequence[Expression], coordinates: Sequence[str]) -> GeneratingFunction:
+        """With p = ∇S_h + hζ in place of p = ∇S_h, for a covector field ζ; then the Hessian need not be symmetric."""
+        push = [symbol(STEP) * z for z in covector]
+        columns = [derivatives(push, c) for c in coordinates]
+        slope = tuple(s + z for s, z in zip(self.slope, push, strict=True))
+        rows = [[e + columns[j][i] for j, e in enumerate(row)] for i, row in enumerate(self.hessian)]
+        return replace(self, slope=slope, hessian=tuple(map(tuple, rows)))
 
     def cost(self) -> int:
         """Cost of one evaluation of gradient and Hessian, after staging."""

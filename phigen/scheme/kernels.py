@@ -18,11 +18,23 @@ from phigen.scheme.staging import Coefficients
 from phigen.scheme.step import at_momenta, explicit_increment, explicit_order, linearise
 from phigen.scheme.steps import Factorisation
 from phigen.symbolic.expression import ONE, ZERO, Expression, number, symbol, total
-from phigen.symbolic.symbols import Symbol, momentum
+from phigen.symbolic.symbols import STEP, Symbol, momentum
 
 #: Largest dimension whose elimination is unrolled in any case; beyond, where zeros leave no more than such a part of n³
 #: operations (a full matrix takes 0.7).
 UNROLLED, SPARSE = 4, 0.6
+
+
+def ends(system: System, realisation: BiRealisation) -> tuple[Sequence[Expression], Sequence[Expression]]:
+    """α − y and β − α; with a vector force f, half of whose impulse hf is given before and half after the motion.
+
+    That is α(y, p) = x + hf(y)/2 and x' = β(y, p) + hf(y)/2: symmetric if the bi-realisation is, hence of order 2.
+    """
+    if system.forces is None:
+        return realisation.displacement, realisation.increment
+    impulse, half = [symbol(STEP) * f for f in system.forces.vector], number(Fraction(1, 2))
+    apart = [a - half * f for a, f in zip(realisation.displacement, impulse, strict=True)]
+    return apart, [d + f for d, f in zip(realisation.increment, impulse, strict=True)]
 
 
 def explicit_kernel(
@@ -30,11 +42,12 @@ def explicit_kernel(
 ) -> Kernel | None:
     """The increment of a step, where y can be found by substitution; else None."""
     coordinates = system.coordinates
-    displacement = at_momenta(realisation.displacement, coordinates, generating.slope)
+    apart, across = ends(system, realisation)
+    displacement = at_momenta(apart, coordinates, generating.slope)
     sequence = explicit_order(displacement, coordinates)
     if sequence is None:
         return None
-    increment = at_momenta(realisation.increment, coordinates, generating.slope)
+    increment = at_momenta(across, coordinates, generating.slope)
     values = coefficients.hoist(explicit_increment(displacement, increment, coordinates, sequence))
     return Kernel(
         "explicit",
@@ -49,7 +62,7 @@ def linearise_kernel(
 ) -> Kernel:
     """What one Newton iteration needs at a point, see `phigen.scheme.step`."""
     n, coordinates = system.dimension, system.coordinates
-    point = linearise(realisation.displacement, realisation.increment, coordinates, generating)
+    point = linearise(*ends(system, realisation), coordinates, generating)
     flat = [
         *point.displacement,
         *point.increment,

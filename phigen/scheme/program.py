@@ -73,6 +73,7 @@ class Program:
     observables: Observables
     fractions: tuple[float, ...] = (1.0,)
     time: str = ""
+    forced: bool = False
     gauge: FreeGauge | None = None
     modified: Modified | None = None
     extras: Extras = NO_EXTRAS

@@ -178,6 +178,14 @@ CASIMIR = Record(
         Field("at", Choice(("sites", "sum", "product")), "lattices: one for each site, or their sum or product"),
     ),
 )
+FORCES = Record(
+    "forces",
+    (
+        Field("covector", FORMULAS, "by coordinate: tangent to the leaves, so it keeps Casimirs"),
+        Field("vector", FORMULAS, "by coordinate: torques, thrust, growth; changes Casimirs"),
+    ),
+)
+
 RUN = Record(
     "a run",
     (
@@ -245,6 +253,8 @@ SPEC = Record(
             "the Hamiltonian H; ẋ = π∇H",
             required=True,
         ),
+        Field("forces", FORCES, "what acts beside H: ẋ = π(∇H + covector) + vector"),
+        Field("damping", FORMULA, "λ ≥ 0 of the damping −λ π πᵀ∇H, which keeps the leaves: dH/dt = −λ |π∇H|²"),
         Field("casimirs", MapOf(NAME, Either({Scalar: FORMULA, Mapping: CASIMIR})), "Casimirs by name; checked"),
         Field("invariants", FORMULAS, "further first integrals by name; checked"),
         Field(

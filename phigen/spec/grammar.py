@@ -81,6 +81,8 @@ class Scope:
             return self.refused[name]
         if name.lower() in ("nan", "inf", "infinity"):
             return f"{shown(name)} is not a finite number", ""
+        if name == "t":
+            return "the name 't' is not declared", "where things depend on the time, time: t declares its name"
         candidates = [*self.names, *SPEC_FUNCTIONS, *CONSTANTS]
         return f"the name {shown(name)} is not declared", did_you_mean(name, candidates)
 

@@ -19,7 +19,7 @@ from typing import Any
 from phigen.errors import Location
 from phigen.spec import limits
 from phigen.spec.names import planned
-from phigen.spec.problems import Problems, counted, did_you_mean, one_of, shown
+from phigen.spec.problems import Problems, counted, did_you_mean, meant, one_of, shown
 from phigen.spec.yaml_source import Mapping as MappingNode
 from phigen.spec.yaml_source import Node, Scalar, describe, is_unprintable, kind_of
 from phigen.spec.yaml_source import Sequence as SequenceNode
@@ -322,7 +322,7 @@ class Record(Kind):
             if name in self.planned:
                 reader.error(key, planned(f"{self.what}: {name}"), one_of(known))
             elif name not in known:
-                hint = did_you_mean(name, known) or "keys: " + ", ".join(known)
+                hint = meant(name, known) or did_you_mean(name, known) or "keys: " + ", ".join(known)
                 reader.error(key, f"{self.what} has no key {shown(name)}", hint)
             else:
                 inner = (*path, name)

@@ -230,6 +230,18 @@ class Lattice:
 
 
 @dataclass(frozen=True)
+class SpecForces:
+    """What ``forces:`` and ``damping:`` say: ζ and f by coordinates, where they are not 0, and λ."""
+
+    covector: Mapping[str, Expression] = field(default_factory=dict)
+    vector: Mapping[str, Expression] = field(default_factory=dict)
+    damping: Expression | None = None
+
+    def __bool__(self) -> bool:
+        return bool(self.covector or self.vector or self.damping is not None)
+
+
+@dataclass(frozen=True)
 class Spec:
     """A spec file, about a cell where there is a ``lattice``.
 
@@ -241,6 +253,7 @@ class Spec:
     poisson: PoissonForm
     hamiltonian: Expression
     time: str = ""  # the name of the time, where functions may depend on it
+    forces: SpecForces = SpecForces()
     parameters: tuple[Parameter, ...] = ()
     casimirs: Mapping[str, Expression] = field(default_factory=dict)
     invariants: Mapping[str, Expression] = field(default_factory=dict)

@@ -19,6 +19,15 @@ ARGUMENTS = frozenset(["x", "x0", "X0", "h", "steps", "stride", "gauge"])
 TIMED_ARGUMENTS = ARGUMENTS | {"t", "t0"}
 ARGUMENT_HINT = "it is the name of an argument of the generated functions"
 
+#: What other programs call it, and users type here.
+MEANT = {
+    "friction": "damping", "dissipation": "damping", "drag": "damping", "force": "forces", "torque": "forces",
+    "forcing": "forces", "drive": "forces", "energy": "hamiltonian", "H": "hamiltonian", "pi": "poisson",
+    "variables": "coordinates", "state": "coordinates", "constants": "parameters", "t": "time", "times": "time",
+    "dt": "step", "h": "step", "x0": "initial", "t_end": "duration", "tol": "tolerance", "algebra": "lie_algebra",
+    "conserved": "invariants", "precision": "order", "method": "scheme", "integrator": "scheme",
+}  # fmt: skip
+
 _LICENSES = """0BSD AFL-3.0 AGPL-3.0-only AGPL-3.0-or-later Apache-2.0 Artistic-2.0 BSD-1-Clause BSD-2-Clause
 BSD-2-Clause-Patent BSD-3-Clause BSD-3-Clause-Clear BSD-4-Clause BSL-1.0 CC-BY-4.0 CC-BY-SA-4.0 CC0-1.0 CECILL-2.1
 CECILL-B CECILL-C ECL-2.0 EPL-1.0 EPL-2.0 EUPL-1.1 EUPL-1.2 GPL-2.0-only GPL-2.0-or-later GPL-3.0-only

@@ -7,6 +7,7 @@ from collections.abc import Iterable
 
 from phigen.errors import Diagnostic, LimitError, Location, SpecError
 from phigen.spec import limits
+from phigen.spec.names import MEANT
 
 
 def shown(value: object, length: int = 60) -> str:
@@ -15,6 +16,12 @@ def shown(value: object, length: int = 60) -> str:
     if len(text) > length:
         text = text[: length - 1] + "…"
     return repr(text)
+
+
+def meant(word: str, known: Iterable[str]) -> str:
+    """``did you mean 'damping'?`` for a word that other programs use for one of those known, else nothing."""
+    other = MEANT.get(word)
+    return f"did you mean {other!r}?" if other in set(known) else ""
 
 
 def did_you_mean(word: str, candidates: Iterable[str]) -> str:

@@ -14,7 +14,7 @@ from phigen.spec.grammar import Scope
 from phigen.spec.kinds import Reader
 from phigen.spec.lattice import casimirs as read_casimirs
 from phigen.spec.lattice import densities, with_kinds
-from phigen.spec.model import DEFAULT_ORDER, BirealisationChoice, Extras, MatrixForm, SolverOptions, Spec
+from phigen.spec.model import DEFAULT_ORDER, BirealisationChoice, Extras, MatrixForm, SolverOptions, Spec, SpecForces
 from phigen.spec.names import LICENSE_REFERENCE, LICENSES
 from phigen.spec.poisson import brackets_of_sites, poisson_form
 from phigen.spec.problems import Problems, counted, did_you_mean, shown
@@ -66,6 +66,7 @@ def _parts(raw: Mapping[str, Any], declared: Declarations) -> dict[str, Any]:
         "poisson": poisson_form(poisson, declared) or _no_brackets(declared),
         "hamiltonian": hamiltonian,
         "time": declared.time,
+        "forces": _forces(raw, declared),
         "parameters": tuple(declared.parameters.values()),
         "casimirs": casimirs,
         "invariants": _formulas(raw.get("invariants", {}), declared, declared.dated_scope()),
@@ -122,6 +123,24 @@ def _formulas(
     scope = scope or declared.scope()
     values = {name: declared.formula(node, scope) for name, (_, node) in given.items()}
     return {name: value for name, value in values.items() if value is not None}
+
+
+def _forces(raw: Mapping[str, Any], declared: Declarations) -> SpecForces:
+    """``forces`` and ``damping``; by coordinates."""
+    given, damping = raw.get("forces") or {}, raw.get("damping")
+    if (given or damping) and declared.lattice:
+        place = declared.reader.locations["forces" if given else "damping",]
+        declared.reader.problems.add("forces and damping: not for lattices in this version", place)
+        return SpecForces()
+    found: dict[str, dict[str, Expression]] = {}
+    for kind in ("covector", "vector"):
+        entries = given.get(kind) or {}
+        for name, (key, _) in entries.items():
+            if name not in declared.coordinates and not declared.incomplete:
+                hint = did_you_mean(name, declared.coordinates)
+                declared.reader.error(key, f"forces: {name!r} is not a coordinate", hint)
+        found[kind] = _formulas(entries, declared, declared.dated_scope())
+    return SpecForces(found["covector"], found["vector"], declared.formula(damping, declared.dated_scope()))
 
 
 def _gauge(

@@ -77,6 +77,8 @@ def modified(compilation: Compilation, parameters: Mapping[str, float], gauge: F
         raise NotOfferedError("it depends on the time, and is not constant")
     if not compilation.exact:
         raise NotOfferedError("the bi-realisation is an approximate one")
+    if system.forces:
+        raise NotOfferedError("with forces a step is not the flow of a Hamiltonian")
     if order.order > MOST_ORDER:
         raise NotOfferedError(f"it is computed for orders up to {MOST_ORDER}")
     # With numbers for the parameters there are fewer terms; but the series may have no place for their roots.

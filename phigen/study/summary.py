@@ -43,8 +43,8 @@ class Drift:
 class Summary:
     """What one method conserved; ``exact`` is the largest error against the closed form, None if there is none.
 
-    ``good`` rows of the states are finite; the numbers are about these. Where H depends on the time, ``energy`` is
-    about H − ∫ ∂_tH dt, an integral that may be ``off`` by so much in the same unit.
+    ``good`` rows of the states are finite; the numbers are about these. Where H is no invariant, ``energy`` is
+    about H − ``work``, an integral that may be ``off`` by so much in the same unit.
     """
 
     method: str
@@ -56,6 +56,7 @@ class Summary:
     good: int
     rows: int
     off: float = math.nan
+    work: float = 0.0
 
     @property
     def units(self) -> dict[str, Unit]:
@@ -168,6 +169,7 @@ class Watch:
             final=tuple(state["final"].tolist()),
             good=int(state["good"]),
             rows=rows,
+            work=float(state["work"][0]) if self._powers else 0.0,
             off=float(state["work"][1]) / named[ENERGY]["H"].unit.size if self._powers else math.nan,
         )
 

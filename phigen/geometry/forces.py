@@ -1,0 +1,37 @@
+"""Forces beside the Hamiltonian: ẋ = π(∇H + ζ) + f, with a covector field ζ and a vector field f.
+
+πζ is tangent to the leaves, so ζ keeps all Casimirs; every field tangent to the leaves is of this form. Damping by the
+double bracket is ζ = λ π∇H, for which dH/dt = −λ |π∇H|². f may be anything, and changes Casimirs, as a rule.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from phigen.spec.model import SpecForces
+from phigen.symbolic.expression import ZERO, Expression, substitute
+
+
+@dataclass(frozen=True)
+class Forces:
+    """``covector`` ζ with the damping in it and ``vector`` f, by coordinates; ``damping`` λ, 0 if there is none."""
+
+    covector: tuple[Expression, ...]
+    vector: tuple[Expression, ...]
+    damping: Expression = ZERO
+
+    def substituted(self, values: Mapping[str, Expression]) -> Forces:
+        """The forces with some symbols replaced."""
+        n = len(self.vector)
+        done = substitute([*self.covector, *self.vector, self.damping], values)
+        return Forces(tuple(done[:n]), tuple(done[n : 2 * n]), done[2 * n])
+
+
+def forces_of(given: SpecForces, coordinates: Sequence[str], field: Sequence[Expression]) -> Forces | None:
+    """The forces of a spec, None where it has none; ``field`` is π∇H."""
+    if not given:
+        return None
+    damping = given.damping or ZERO
+    covector = [given.covector.get(c, ZERO) + damping * f for c, f in zip(coordinates, field, strict=True)]
+    return Forces(tuple(covector), tuple(given.vector.get(c, ZERO) for c in coordinates), damping)

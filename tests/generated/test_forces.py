@@ -1,0 +1,170 @@
+"""Forces and damping: orders, leaves, targets, derivatives, and what is proved and claimed of them."""
+
+import json
+import subprocess
+from functools import cache
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from support import COMMAND, compile_text, solver, tool
+
+from phigen.compiler import emit, examine
+from phigen.errors import SpecError
+from phigen.study.summary import summarise
+from phigen.study.verification import verify
+
+SPAN = 2.0
+
+SPIN = """time: t
+coordinates: [x, y, z]
+parameters: {lam: {value: 0.3, positive: true}, g: 0.4}
+poisson: {lie_algebra: {name: so(3)}}
+hamiltonian: -z - 0.3*x**2
+casimirs: {C: x**2 + y**2 + z**2}
+damping: lam
+tangent: true
+"""
+
+#: Systems by kind of step: their text, a start, and the lowest order.
+SYSTEMS = {
+    "damped": (SPIN, [0.8, 0.1, 0.5]),
+    "covector": (SPIN + "forces: {covector: {x: g*y*z, y: sin(t)*x}}\n", [0.8, 0.1, 0.5]),
+    "vector": (SPIN + "forces: {covector: {x: g*y*z}, vector: {z: 0.5*sin(t)*x, y: -g*y}}\n", [0.8, 0.1, 0.5]),
+    "populations": (
+        """coordinates: [x, y]
+poisson: {log_canonical: [[0, 1], [-1, 0]]}
+hamiltonian: x + y - log(x) - 1.5*log(y)
+forces: {covector: {x: 0.2*y, y: -0.1*x}, vector: {x: -0.1*x**2}}
+tangent: true
+""",
+        [0.6, 1.5],
+    ),
+    "path": (
+        """coordinates: [x, y, z]
+poisson: {nambu: [x**2/2 + y**2/2 + z**4/4]}
+hamiltonian: x*y + z**2/2
+casimirs: {C: x**2/2 + y**2/2 + z**4/4}
+birealisation: karasev
+damping: 0.2
+forces: {covector: {x: 0.3*z}}
+tangent: true
+""",
+        [0.4, 0.5, 0.6],
+    ),
+}
+
+
+@cache
+def made(kind, order=2):
+    return compile_text(SYSTEMS[kind][0] + f"order: {order}\n")
+
+
+def final(kind, n, order=2, target="numpy"):
+    return solver(made(kind, order), target).integrate(SYSTEMS[kind][1], SPAN / n, n, n).x[-1]
+
+
+def reference(kind):
+    found, timed = solver(made(kind), "numpy"), bool(made(kind).program.time)
+
+    def field(t, x):
+        return found.vector_field(x, t) if timed else found.vector_field(x)
+
+    return solve_ivp(field, (0, SPAN), SYSTEMS[kind][1], method="DOP853", rtol=1e-13, atol=1e-15).y[:, -1]
+
+
+@pytest.mark.parametrize("order", [2, 4])
+@pytest.mark.parametrize("kind", SYSTEMS)
+def test_the_order_is_reached(kind, order):
+    coarse, fine = (np.max(np.abs(final(kind, n, order) - reference(kind))) for n in (20, 40))
+    assert np.log2(coarse / fine) == pytest.approx(order, abs=0.3)
+
+
+@pytest.mark.parametrize("kind", SYSTEMS)
+def test_targets_agree_to_roundoff(kind, tmp_path):
+    expected = final(kind, 20, 4)
+    assert final(kind, 20, 4, "c") == pytest.approx(expected, abs=1e-13)
+    (text,) = emit(made(kind, 4).program, "js", COMMAND).values()
+    (tmp_path / "t.mjs").write_text(text, encoding="utf-8")
+    script = (
+        f"import {{ Solver }} from './t.mjs'; const s = new Solver({{ x0: {SYSTEMS[kind][1]} }});"
+        f"s.integrate({SPAN / 20}, 20); console.log(JSON.stringify([...s.x]))"
+    )
+    (tmp_path / "run.mjs").write_text(script, encoding="utf-8")
+    done = subprocess.run([tool("node"), str(tmp_path / "run.mjs")], capture_output=True, text=True, check=True)
+    assert json.loads(done.stdout) == pytest.approx(expected, abs=1e-13)
+
+
+@pytest.mark.parametrize("kind", ["damped", "covector", "path"])
+def test_covectors_keep_casimirs(kind):
+    """A force put beside the leaves, such as f for πζ, changes them at the order of the step."""
+    found = solver(made(kind), "c").integrate(SYSTEMS[kind][1], 0.1, 20_000, 100)
+    assert np.ptp(found.casimirs["C"]) < 1e-13
+
+
+def test_damping_takes_energy_down_to_the_minimum():
+    energy = solver(made("damped"), "c").integrate(SYSTEMS["damped"][1], 0.1, 2_000).energy
+    assert (np.diff(energy) <= 1e-15).all()
+    assert energy[-1] == pytest.approx(-np.sqrt(0.9), abs=1e-12)  # the spin along the field
+
+
+@pytest.mark.parametrize("kind", ["covector", "vector"])
+def test_the_energy_is_what_time_and_forces_put_in(kind):
+    """The balance has the error of the method, while the work itself is large."""
+    found = {}
+    for n in (100, 200):
+        rows = solver(made(kind), "c").integrate(SYSTEMS[kind][1], 10 / n, n)
+        found[n] = summarise("phigen", made(kind).system, None, dict(rows.parameters), rows.t, rows.x)
+    assert abs(found[100].work) > 0.1
+    assert found[100].energy.error / found[200].energy.error == pytest.approx(4, rel=0.2)
+
+
+def test_an_ensemble_takes_the_steps_of_its_members():
+    starts = np.array([[0.8, 0.1, 0.5], [0.1, 0.9, 0.2], [0.3, 0.3, 0.9]])
+    found = solver(made("vector"), "c").ensemble(starts, 0.1, 50)
+    single = [solver(made("vector"), "c").integrate(x, 0.1, 50, 50).x[-1] for x in starts]
+    assert found == pytest.approx(np.array(single), abs=1e-13)
+
+
+@pytest.mark.parametrize("kind", ["populations", "path"])
+def test_verification_asks_for_what_is_promised(kind):
+    """The derivative is that of a step though ∂(∇S + hζ) is not symmetric; energy and Poisson identity are not judged."""
+    solvers = {target: solver(made(kind), target) for target in ("c", "numpy")}
+    found = verify(made(kind), solvers, "test", SYSTEMS[kind][1], {}, 0.1, 50, quick=True)
+    assert found.failures == []
+    required = {c.name.partition(":")[0] for c in found.checks if c.limit}
+    assert "tangent map against differences" in required
+    assert "Poisson defect, exact tangent" not in required
+    assert ("Casimir C" in required) == (kind == "path")
+
+
+def test_what_is_proved_of_forces():
+    groups = examine(made("damped").spec).groups
+    assert [(s.name, s.verdict) for s in groups["Forces"]] == [
+        ("the forces keep C", "proved"),
+        ("the damping changes H at the rate -λ |π∇H|²", "proved"),
+    ]
+    (rate, _) = examine(made("vector").spec).groups["Forces"]
+    assert rate.name.startswith("dC/dt = ")
+    assert rate.name.endswith(", by the vector force")
+
+
+def test_the_code_does_not_claim_a_poisson_map():
+    text = "\n".join(emit(made("vector").program, "c", COMMAND).values())
+    assert "A Poisson Hamiltonian integrator" not in text
+    assert "with forces a step is no Poisson map; they change C" in text
+
+
+@pytest.mark.parametrize(
+    ("more", "message"),
+    [
+        ("scheme: splitting", "takes no forces and no damping"),
+        ("order: 4\ncomposition: none", "has order 2 without a composition"),
+        ("birealisation: karasev\nforces: {vector: {x: 1}}", "a vector needs a bi-realisation in closed form"),
+        ("order: 2\nmodified_hamiltonian: 1", "not offered for a system with forces"),
+    ],
+)
+def test_what_cannot_be_done_is_refused(more, message):
+    text = SPIN.replace("damping: lam", "damping: lam" if "vector" not in more else "order: 2")
+    with pytest.raises(SpecError, match=message):
+        compile_text(text.replace("time: t\n", "") + more + "\n")
