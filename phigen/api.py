@@ -175,6 +175,7 @@ def interface_of(program: Program) -> Interface:
         casimir_kinds=program.step.casimir_kinds,
         periods=sites.periods,
         least=sites.least,
+        required=frozenset(p.name for p in program.parameters if p.values is not None),
     )
 
 

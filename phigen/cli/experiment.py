@@ -44,16 +44,31 @@ class Experiment:
         return self.run.steps // self.run.stride + 1 + (self.run.steps % self.run.stride > 0)
 
 
-def prepared(
-    spec: Spec, name: str | None, step: float | None = None, steps: int | None = None, settings: Iterable[str] = ()
-) -> Experiment:
-    """The run of that name, the first by default, with changes of the command line."""
+def expect_system(spec: Spec) -> None:
+    """Refuse lattices, with the way to one of a few sites."""
+    if spec.lattice:
+        from phigen.geometry.system import system_of_lattice
+
+        raise system_of_lattice(spec)
+
+
+def run_of(spec: Spec, name: str | None) -> Run:
+    """The run of that name, the first by default."""
     if not spec.runs:
         hint = "add one under runs:, with initial, step and steps; phigen new shows how"
         raise SpecError([Diagnostic(f"{spec.file}: the spec has no runs", hint=hint)])
     run = spec.runs.get(name) if name else next(iter(spec.runs.values()))
     if run is None:
         raise click.BadParameter(f"there is no run {name!r}; the spec has {', '.join(spec.runs)}", param_hint="--run")
+    return run
+
+
+def prepared(
+    spec: Spec, name: str | None, step: float | None = None, steps: int | None = None, settings: Iterable[str] = ()
+) -> Experiment:
+    """The run of that name, the first by default, with changes of the command line; not of a lattice."""
+    expect_system(spec)
+    run = run_of(spec, name)
     if step is not None:
         if step == 0 or not math.isfinite(step):
             raise click.BadParameter("the step must be a finite number, and not 0", param_hint="--step")

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import click
 
 from phigen.cli.console import Console, out_document, pass_console, verbosity
-from phigen.cli.experiment import prepared
+from phigen.cli.experiment import expect_system, prepared
 from phigen.cli.sources import ORDER, expect_writable, load_one, one_spec, run_option, scheme_option
 from phigen.errors import CheckError
 from phigen.writing import write
@@ -54,6 +54,7 @@ def command(
     target = output if output and output != "-" else f"{spec.name}.html"
     if output != "-":
         expect_writable(Path(target), "--output")
+    expect_system(spec)
     experiment = prepared(spec, name) if spec.runs or name or lyapunov else None
     if experiment is None:
         console.warn(f"{spec.file}: the spec has no runs, so the page has no measurements and no figures")

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from phigen.cli.console import Console, out_json, pass_console, verbosity
-from phigen.cli.experiment import loaded, prepared
+from phigen.cli.experiment import loaded, prepared, run_of
 from phigen.cli.interruption import InterruptedRunError
+from phigen.cli.lattice_run import changed, expect_no, run_lattice
 from phigen.cli.run_summary import described_run, finite, print_summary
 from phigen.cli.sources import FIGURES, ORDER, file_ending, load_one, one_spec, run_option, scheme_option
 from phigen.registry import LOADABLE
@@ -74,6 +75,12 @@ def command(
 
         require_matplotlib()
     spec = load_one(spec_file)
+    if spec.lattice:
+        expect_no(section=section, lyapunov=lyapunov)
+        chosen = changed(run_of(spec, name), step, steps)
+        given: Any = {"target": target, "order": order, "scheme": scheme, "settings": settings, "output": output}
+        run_lattice(console, spec, chosen, **given, plot=plot, resume=resume, as_json=as_json)
+        return
     experiment = prepared(spec, name, step, steps, settings)
     if section and experiment.run.section is None:
         raise click.BadParameter(f"the run {experiment.run.name} has no section: in the spec", param_hint="--section")

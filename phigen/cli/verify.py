@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from phigen.cli.console import Console, heading, out, out_json, pass_console, table, verbosity
-from phigen.cli.experiment import Experiment, prepared
+from phigen.cli.experiment import Experiment, expect_system, prepared
 from phigen.cli.failures import Collector
 from phigen.cli.sources import FIGURES, ORDER, file_ending, load_all, many_specs, run_option, scheme_option
 from phigen.errors import CheckError, StepError
@@ -65,6 +65,7 @@ def command(
             raise click.BadParameter(f"one spec is drawn, not {len(specs)}", param_hint="--plot")
     for spec in specs:
         with collector.collecting():
+            expect_system(spec)
             extras = with_tangent(spec)
             compilation = compile_proved(spec, order=order, scheme=scheme, extras=extras)
             verification = verified(compilation, name, quick, console)

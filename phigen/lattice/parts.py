@@ -13,7 +13,7 @@ import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
-from phigen.errors import Diagnostic, SpecError
+from phigen.errors import Diagnostic, Location, SpecError
 from phigen.lattice.cell import GRID, PERIODIC, Cell
 from phigen.splitting.conflicts import Conflicts, coloured
 from phigen.splitting.flow import Flow, NoFlowError, Solved, Term, flow_of, joint_flow, solved
@@ -114,8 +114,8 @@ class _NoPartError(Exception):
         self.expression, self.reason = expression, reason
 
 
-def split_cell(cell: Cell) -> CellSplitting:
-    """H as a sum of parts with elementary flows. Raises `SpecError` naming the term that stands in the way."""
+def split_cell(cell: Cell, place: Location | None = None) -> CellSplitting:
+    """H as a sum of parts with elementary flows. Raises `SpecError`, at ``place``, naming the term in the way."""
     refused: _NoPartError | None = None
     best: CellSplitting | None = None
     for colouring in _colourings(cell):
@@ -132,7 +132,7 @@ def split_cell(cell: Cell) -> CellSplitting:
         assert refused is not None
         message = f"scheme splitting: the term {refused.expression} has no elementary flow on the lattice"
         hint = "terms in coordinates that commute over the whole lattice split, and terms of one site with a flow"
-        raise SpecError([Diagnostic(f"{message}: {refused.reason}", None, hint)])
+        raise SpecError([Diagnostic(f"{message}: {refused.reason}", place, hint)])
     return best
 
 

@@ -48,7 +48,7 @@ def build_sweeps(
     """The solver of a lattice as a program. Raises `SpecError` where H does not split, and for what is not offered."""
     host = spec or _Nowhere()
     _expect_offered(cell, scheme, extras, host.locations)
-    parts = split_cell(cell)
+    parts = split_cell(cell, host.locations.get(("hamiltonian",)))
     plain = Splitting(parts.flows)
     choice = planned(host, plain, order, composition, lambda: cell_kicks(cell, parts))
     flows = [flow for flow in choice.splitting.flows if isinstance(flow, CellFlow)]

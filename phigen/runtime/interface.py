@@ -56,6 +56,7 @@ class LatticeInterface(Interface):
     casimir_kinds: tuple[str, ...] = ()
     periods: tuple[int, ...] = ()
     least: tuple[int, ...] = ()
+    required: frozenset[str] = frozenset()  # parameters at sites whose defaults are not one number
 
 
 class BackendError(Exception):

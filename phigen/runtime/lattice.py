@@ -97,6 +97,11 @@ class LatticeTrajectory:
         return f"<LatticeTrajectory of ({', '.join(self.coordinates)}) on {sizes} sites: {len(self)} frames>"
 
     @property
+    def energy_scale(self) -> float:
+        """The sum of the magnitudes of the energies of all sites at the start: the unit of errors of energy."""
+        return float(np.abs(self.solver.density(self.x[0], parameters=self.parameters)).sum())
+
+    @property
     def casimirs(self) -> dict[str, Floats]:
         """The Casimirs by name: (frames, *sizes) for those of sites, (frames,) for sums and products."""
         rows = [self.solver.casimirs(x, parameters=self.parameters) for x in self.x]
@@ -310,6 +315,9 @@ class LatticeSolver:
         arrays = {n: v for n, v in {**(given or {}), **more}.items() if n in about.at_sites}
         numbers = [{n: v for n, v in part.items() if n not in about.at_sites} for part in (given or {}, more)]
         values: dict[str, Any] = dict(arguments.parameters(about, *numbers))
+        missing = sorted(about.required - set(arrays))
+        if missing:
+            raise TypeError(f"parameter {missing[0]!r} has no default for all sizes; give an array, or one number")
         for name, value in arrays.items():
             array = np.asarray(value, dtype=np.float64)
             if array.shape not in ((), tuple(sizes)):

@@ -330,3 +330,10 @@ def test_odd_sizes_do_not_fit_two_colours() -> None:
 def test_what_cannot_be_split_is_refused(text: str, said: str) -> None:
     with pytest.raises(SpecError, match=said):
         compile_text(text)
+
+
+def test_disorder_by_a_formula_has_to_be_given() -> None:
+    text = TEXTS["dnls"].replace("value: 0.1", 'value: "cos(i)"')
+    found = lattice_solver_of(compile_spec(specs.loads(f"phigen: 1\nname: disordered\n{text}\n")), "numpy")
+    with pytest.raises(TypeError, match="'e' has no default for all sizes"):
+        found.integrate(start("dnls"), 0.1, 1)

@@ -109,7 +109,8 @@ def _declared(parameter: Parameter, member: str) -> tuple[str, str]:
     said = plain(parameter.description) or f"default {float(parameter.value)!r}"
     said = said if member == parameter.name else f"{parameter.name}: {said}"
     if parameter.at == "sites":
-        return f"const double *{member};", f"at sites: {said}; NULL for the default at all of them"
+        default = "" if parameter.values else "; NULL for the default at all of them"
+        return f"const double *{member};", f"at sites: {said}{default}"
     return f"double {member};", said
 
 
@@ -135,7 +136,7 @@ def model(program: Program, step: Sweeps) -> str:
     asked = [
         f"isfinite(params->{member[p.name]})" + f" && params->{member[p.name]} > 0.0" * p.positive for p in numbers
     ]
-    arrays = [(member[p.name], p.positive) for p in program.parameters if p.at == "sites"]
+    arrays = [(member[p.name], p.positive, p.values is not None) for p in program.parameters if p.at == "sites"]
     values = {
         "NAME": program.name,
         "defaults": ", ".join("NULL" if p.at == "sites" else repr(float(p.value)) for p in program.parameters) or "0",
@@ -156,11 +157,13 @@ def model(program: Program, step: Sweeps) -> str:
     return render("c", "lattice.c", values) + prepare
 
 
-def _allowed(asked: Sequence[str], arrays: Sequence[tuple[str, bool]]) -> Iterator[str]:
+def _allowed(asked: Sequence[str], arrays: Sequence[tuple[str, bool, bool]]) -> Iterator[str]:
     """The statements that return 0 for parameters that are not allowed."""
     if asked:
         yield f"if (!({' && '.join(asked)})) return 0;"
-    for member, positive in arrays:
+    for member, positive, required in arrays:
+        if required:
+            yield f"if (params->{member} == NULL) return 0;"
         wrong = f"!isfinite(params->{member}[k])" + f" || params->{member}[k] <= 0.0" * positive
         yield f"for (size_t k = 0; params->{member} != NULL && k < sites; ++k)"
         yield f"    if ({wrong}) return 0;"

@@ -1,0 +1,119 @@
+"""``phigen run`` of a lattice."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+from fractions import Fraction
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from phigen.cli.console import Console, heading, out, out_json, table
+from phigen.cli.run_summary import finite
+from phigen.errors import StepError
+
+if TYPE_CHECKING:
+    from phigen.lattice.states import Start
+    from phigen.spec.model import Run, Spec
+
+#: Options of ``phigen run`` that lattices do not have.
+_ABSENT = "phigen run has no {option} for lattices"
+
+
+def run_lattice(
+    console: Console,
+    spec: Spec,
+    run: Run,
+    *,
+    target: str,
+    order: int | None,
+    scheme: str | None,
+    settings: Iterable[str],
+    output: Path | None,
+    plot: Path | None,
+    resume: bool,
+    as_json: bool,
+) -> None:
+    """Integrate a run, and print what was conserved. Raises `StepError` after that if it did not come to its end."""
+    from phigen.api import chosen_target, compilation_of, lattice_solver_of
+    from phigen.lattice.observing import errors_of
+    from phigen.lattice.states import start_of
+
+    if output and output.suffix != ".npz":
+        raise click.BadParameter("frames of lattices go to .npz files", param_hint="--output")
+    compilation = compilation_of(spec, order, scheme=scheme)
+    assert compilation.cell is not None
+    start = start_of(spec, run)
+    parameters = _parameters(start, settings)
+    solver = lattice_solver_of(compilation, chosen_target(target, console.note))
+    kept = output.with_name(output.name + ".checkpoint") if output else None
+    if kept and not resume:
+        kept.unlink(missing_ok=True)
+    failure: StepError | None = None
+    with console.progress(f"{spec.name} {run.name}", run.steps) as progress:
+        try:
+            made = solver.integrate(
+                start.state, float(run.step), run.steps, run.stride,
+                output=output, checkpoints=kept, progress=progress, parameters=parameters,
+            )  # fmt: skip
+        except StepError as error:
+            failure, made = error, error.trajectory
+    if output and not failure:
+        console.note(f"wrote {output}")
+    errors = errors_of(compilation.cell, made)
+    largest = {name: float(e.max()) for name, e in errors.items()}
+    if as_json:
+        sizes = {"sizes": list(start.sizes), "frames": len(made)}
+        method = {"target": solver.target, "order": solver.order, "step": made.h, "steps": made.steps}
+        out_json(finite({"name": spec.name, "run": run.name, **sizes, **method, "errors": largest}))
+    else:
+        _print(spec, run, start, f"{compilation.label}, order {solver.order}, target {solver.target}", made, largest)
+    if plot:
+        from phigen.drawing.figures import save
+        from phigen.drawing.lattices import lattice_figure
+
+        save(lattice_figure(made, errors, f"{spec.name}, {run.name}"), plot)
+        console.note(f"wrote {plot}")
+    if failure:
+        raise failure
+
+
+def changed(run: Run, step: float | None, steps: int | None) -> Run:
+    """The run with what the command line says."""
+    if step is not None:
+        run = replace(run, step=Fraction(step))
+    return replace(run, steps=steps, stride=min(run.stride, steps)) if steps is not None else run
+
+
+def expect_no(**options: object) -> None:
+    """Refuse options that lattices do not have."""
+    for name, value in options.items():
+        if value:
+            raise click.BadParameter(_ABSENT.format(option=f"--{name}"), param_hint=f"--{name}")
+
+
+def _parameters(start: Start, settings: Iterable[str]) -> dict[str, Any]:
+    parameters: dict[str, Any] = dict(start.parameters)
+    for setting in settings:
+        name, _, text = (part.strip() for part in setting.partition("="))
+        if name not in parameters:
+            known = ", ".join(parameters) or "none"
+            raise click.BadParameter(f"{name!r} is no parameter ({known})", param_hint="--set")
+        try:
+            parameters[name] = float(Fraction(text)) if "/" in text else float(text)
+        except (ValueError, ZeroDivisionError):
+            raise click.BadParameter(f"{setting!r} is not NAME=VALUE with a number", param_hint="--set") from None
+    return parameters
+
+
+def _print(spec: Spec, run: Run, start: Start, method: str, made: Any, errors: dict[str, float]) -> None:
+    out(heading(f"{spec.name}, run {run.name}") + (f": {run.description}" if run.description else ""))
+    sizes = " × ".join(map(str, start.sizes))
+    out(f"  {sizes} sites; {made.steps} steps of {made.h:.9g}, t = {made.t[0]:.9g} … {made.t[-1]:.9g}; {method}\n")
+    kinds = {"energy": "relative to the energies of the sites"} | dict.fromkeys(spec.casimirs, "at the worst site")
+    rows = [["largest error", "", ""]]
+    rows += [[name, f"{error:.1e}" if error else "0", kinds.get(name, "relative")] for name, error in errors.items()]
+    for line in table(rows, right=[1]):
+        out(f"  {line}")

@@ -1,0 +1,81 @@
+"""Runs of lattices: space–time diagrams of chains, snapshots of planes, and what was conserved."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from phigen.drawing.palette import SERIES, styled
+from phigen.runtime.lattice import LatticeTrajectory
+from phigen.symbolic.arrays import Floats
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+#: Most panels of coordinates, times in a diagram, and snapshots in a row.
+MOST_PANELS, MOST_TIMES, SNAPSHOTS = 4, 800, 4
+
+
+@styled
+def lattice_figure(run: LatticeTrajectory, errors: Mapping[str, Floats], title: str) -> Figure:
+    """The coordinates over space and time, and the ``errors`` (frames,) of what is conserved, by name."""
+    from matplotlib.figure import Figure
+
+    names = run.coordinates[:MOST_PANELS]
+    figure = Figure(figsize=(8.2, 2.2 * len(names) + 2.4), layout="constrained")
+    figure.suptitle(title, fontsize=10)
+    heights = [2.2] * len(names) + [1.8]
+    parts: Any = figure.subfigures(len(heights), 1, height_ratios=heights)
+    for part, name in zip(parts, names, strict=False):
+        values = run.column(name)
+        if values.ndim == 2:
+            _draw_diagram(part, name, run, values)
+        else:
+            _draw_snapshots(part, name, run, values)
+    _draw_errors(parts[-1].add_subplot(), run, errors)
+    return figure
+
+
+def _draw_diagram(part: Any, name: str, run: LatticeTrajectory, values: Floats) -> None:
+    """One coordinate of a chain: sites upwards, time to the right."""
+    axes, most = part.add_subplot(), _largest(values)
+    times = np.linspace(0, len(run) - 1, min(len(run), MOST_TIMES)).astype(int)
+    shown = axes.imshow(
+        values[times].T, aspect="auto", origin="lower", cmap="RdBu_r", vmin=-most, vmax=most, interpolation="nearest",
+        extent=(run.t[0], run.t[-1], -0.5, values.shape[1] - 0.5),
+    )  # fmt: skip
+    axes.set_xlabel("t")
+    axes.set_ylabel(run.axes[0])
+    part.colorbar(shown, ax=axes, pad=0.02, label=name)
+
+
+def _draw_snapshots(part: Any, name: str, run: LatticeTrajectory, values: Floats) -> None:
+    """One coordinate of a plane, or of the middle plane across the first axis, at some times."""
+    frames = np.unique(np.linspace(0, len(run) - 1, min(len(run), SNAPSHOTS)).astype(int))
+    planes = values if values.ndim == 3 else values[:, values.shape[1] // 2]
+    most = _largest(planes)
+    panels = np.atleast_1d(part.subplots(1, len(frames)))
+    for axes, k in zip(panels, frames.tolist(), strict=True):
+        shown = axes.imshow(
+            planes[k].T, origin="lower", cmap="RdBu_r", vmin=-most, vmax=most, interpolation="nearest", aspect="equal"
+        )
+        axes.set_title(f"t = {run.t[k]:.4g}")
+        axes.set_xlabel(run.axes[-2])
+    panels[0].set_ylabel(run.axes[-1])
+    part.colorbar(shown, ax=list(panels), pad=0.02, label=name)
+
+
+def _draw_errors(axes: Any, run: LatticeTrajectory, errors: Mapping[str, Floats]) -> None:
+    for (name, error), colour in zip(errors.items(), [*SERIES] * (1 + len(errors) // len(SERIES)), strict=False):
+        axes.plot(run.t, np.where(error > 0, error, np.nan), color=colour, label=name, linewidth=1.0)
+    axes.set_yscale("log")
+    axes.set_xlabel("t")
+    axes.set_ylabel("error")
+    axes.grid(True)
+    axes.legend(loc="lower right", ncols=3)
+
+
+def _largest(values: Floats) -> float:
+    return float(np.max(np.abs(values))) or 1.0

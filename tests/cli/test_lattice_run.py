@@ -1,0 +1,54 @@
+"""Runs of lattices on the command line."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+CHAIN = """phigen: 1
+name: chain
+lattice: {axes: [i], boundary: open}
+coordinates: [q, p]
+parameters: {a: 0.25, m: {value: 1, at: sites, positive: true}}
+poisson: {canonical: {q: [q], p: [p]}}
+hamiltonian: "p**2/(2*m) + (q[i+1] - q)**2/2 + a*(q[i+1] - q)**4/4"
+invariants: {P: p}
+runs:
+  wave: {sizes: [12], initial: {q: sin(pi*i/N_i), p: 0}, step: 0.05, steps: 40, stride: 10}
+"""
+
+
+@pytest.fixture
+def chain(tmp_path):
+    path = tmp_path / "chain.yaml"
+    path.write_text(CHAIN, encoding="utf-8")
+    return path
+
+
+def test_a_run_keeps_what_it_should(phigen, chain, tmp_path):
+    out = tmp_path / "wave.npz"
+    told = json.loads(phigen("run", chain, "-t", "numpy", "--json", "-o", out, "--set", "a=0.5").stdout)
+    assert told["sizes"] == [12]
+    assert 0 < told["errors"]["energy"] < 1e-6
+    assert told["errors"]["P"] < 1e-14
+    with np.load(out) as stored:
+        assert stored["x"].shape == (5, 2, 12)
+        assert stored["parameter_a"] == 0.5
+    assert [p.name for p in tmp_path.iterdir() if "chain" not in p.name] == ["wave.npz"]
+
+
+def test_a_run_is_drawn_over_space_and_time(phigen, chain, tmp_path):
+    pytest.importorskip("matplotlib")
+    done = phigen("run", chain, "-t", "numpy", "--plot", tmp_path / "wave.svg")
+    assert done.exit_code == 0
+    assert "largest error" in done.stdout
+    assert "<svg" in (tmp_path / "wave.svg").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("command", [["verify"], ["tune"], ["report"], ["build", "-t", "js"], ["run", "--lyapunov"]])
+def test_what_lattices_do_not_have_is_refused(phigen, chain, tmp_path, command):
+    done = phigen(*command, chain, *(["-o", tmp_path] if command[0] == "build" else []))
+    assert done.exit_code in (1, 2)
+    assert "lattice" in done.stderr
