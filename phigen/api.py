@@ -11,7 +11,6 @@ from __future__ import annotations
 import re
 import warnings
 from collections.abc import Callable, Mapping
-from dataclasses import replace
 from os import PathLike, fspath
 from typing import TYPE_CHECKING, Any
 
@@ -77,9 +76,7 @@ def compile(
         raise ValueError(f"unknown scheme {scheme!r}; there are {', '.join(SCHEMES)}")
     if profile is not None and profile not in PROFILES:
         raise ValueError(f"unknown profile {profile!r}; there are {', '.join(PROFILES)}")
-    compilation = compilation_of(source, order, Extras(tangent=True) if tangent else None, scheme)
-    if profile is not None:
-        compilation = replace(compilation, program=replace(compilation.program, profile=profile))
+    compilation = compilation_of(source, order, Extras(tangent=True) if tangent else None, scheme, profile)
     return lattice_solver_of(compilation, target) if compilation.cell else solver_of(compilation, target)
 
 
@@ -97,7 +94,11 @@ def formulas(source: Source, order: int | None = None, *, terms: int | None = No
 
 
 def compilation_of(
-    source: Source, order: int | None = None, extras: Extras | None = None, scheme: str | None = None
+    source: Source,
+    order: int | None = None,
+    extras: Extras | None = None,
+    scheme: str | None = None,
+    profile: str | None = None,
 ) -> Compilation:
     """The compilation of a source, proved; see `compile` for its arguments and errors.
 
@@ -106,17 +107,19 @@ def compilation_of(
     if order is not None and not (isinstance(order, int) and 1 <= order <= limits.ORDER):
         raise ValueError(f"order must be an integer from 1 to {limits.ORDER}, not {order!r}")
     if isinstance(source, Compilation):
-        if order is None and scheme is None and extras in (None, source.program.extras):
+        same = extras in (None, source.program.extras) and profile in (None, source.program.profile)
+        if order is None and scheme is None and same:
             return source
         order = order or source.order.order
         scheme = scheme or ("splitting" if source.splitting else "series")
         source = source.system
+    wanted: dict[str, Any] = {"order": order, "scheme": scheme, "extras": extras, "profile": profile}
     if isinstance(source, System):
-        return compile_proved(source.spec or _spec_of(source), order=order, scheme=scheme, system=source, extras=extras)
+        return compile_proved(source.spec or _spec_of(source), system=source, **wanted)
     if isinstance(source, Spec):
-        return compile_proved(source, order=order, scheme=scheme, extras=extras)
+        return compile_proved(source, **wanted)
     if isinstance(source, str | PathLike):
-        return compile_proved(specs.load(resources.file_of(fspath(source))), order=order, scheme=scheme, extras=extras)
+        return compile_proved(specs.load(resources.file_of(fspath(source))), **wanted)
     raise TypeError(f"cannot compile {type(source).__name__}; give a path, a System or a Spec")
 
 

@@ -49,8 +49,11 @@ def compile_spec(
     scheme: str | None = None,
     system: System | None = None,
     extras: Extras | None = None,
+    profile: str | None = None,
 ) -> Compilation:
-    """Compile a spec; ``order`` overrides the order (and the terms) that it asks for, ``scheme`` and ``extras`` too.
+    """Compile a spec; ``order`` overrides the order (and the terms) that it asks for.
+
+    So do ``scheme``, ``extras`` and ``profile``.
 
     ``system`` is its system, where the caller has built it already. Nothing is proved: see `compile_proved`. Raises
     `SpecError` (no bi-realisation applies, H does not split, …) and `LimitError` (the program would be too large).
@@ -61,7 +64,7 @@ def compile_spec(
     _tell_of_lattice(spec)
     with bounded(spec):
         source = system or clock.timed("system", lambda: system_from_spec(spec))
-        return _compiled(spec, source, order, scheme, extras or spec.extras, clock)
+        return _compiled(spec, source, order, scheme, extras or spec.extras, profile or spec.profile, clock)
 
 
 def examine(
@@ -71,6 +74,7 @@ def examine(
     scheme: str | None = None,
     system: System | None = None,
     extras: Extras | None = None,
+    profile: str | None = None,
 ) -> Examination:
     """Compile a spec, and prove what can be proved about it, as far along the pipeline as it gets.
 
@@ -93,7 +97,7 @@ def examine(
             return Examination(spec, groups, unexamined=UNEXAMINED)
         groups = groups | clock.timed("proofs", lambda: statements.integrals(source))
         try:
-            compilation = _compiled(spec, source, order, scheme, extras or spec.extras, clock)
+            compilation = _compiled(spec, source, order, scheme, extras or spec.extras, profile or spec.profile, clock)
         except SpecError as error:
             return Examination(spec, groups, obstacle=located(error, spec))
         groups = groups | clock.timed("proofs", lambda: statements.method(compilation))
@@ -107,13 +111,14 @@ def compile_proved(
     scheme: str | None = None,
     system: System | None = None,
     extras: Extras | None = None,
+    profile: str | None = None,
 ) -> Compilation:
     """`compile_spec`, refusing what is refuted.
 
     Raises `CheckError` that names what is refuted, with the residual: no π that is not Poisson, no claimed Casimir
     that is none, no wrong bi-realisation reaches the output. Raises `SpecError` and `LimitError` as `compile_spec`.
     """
-    found = examine(spec, order=order, scheme=scheme, system=system, extras=extras)
+    found = examine(spec, order=order, scheme=scheme, system=system, extras=extras, profile=profile)
     if found.refuted:
         raise CheckError(refutation(found))
     for warning in doubts(found):
@@ -189,7 +194,7 @@ def _examine_lattice(spec: Spec, clock: _Clock) -> Examination:
 
 
 def _compiled(
-    spec: Spec, source: System, order: int | None, scheme: str | None, extras: Extras, clock: _Clock
+    spec: Spec, source: System, order: int | None, scheme: str | None, extras: Extras, profile: str, clock: _Clock
 ) -> Compilation:
     """Compile a system, by the series or to a splitting."""
     described: dict[str, Any] = {
@@ -197,7 +202,7 @@ def _compiled(
         "licence": spec.license,
         "spec_sha256": spec.source_sha256,
         "extras": extras,
-        "profile": spec.profile,
+        "profile": profile,
     }
     if (scheme or spec.scheme) == "splitting":
         return _split(spec, source, order, described, clock)

@@ -48,6 +48,7 @@ def command(
     order: int | None,
     scheme: str | None,
     profile: str | None,
+    without: tuple[str, ...],
     single_file: bool,
     tangent: bool,
     modified: int | None,
@@ -66,7 +67,7 @@ def command(
     if (checking or diff) and (compiling or certify):
         raise click.UsageError("--compile and --certify write files; --check and --diff write nothing")
     options = Options(
-        Path(output), tuple(dict.fromkeys(targets)), order, single_file, tangent, modified, scheme, profile
+        Path(output), tuple(dict.fromkeys(targets)), order, single_file, tangent, modified, scheme, profile, without
     )
     compilations = _compile_all(console, spec_files, options)
     planned = _plan(console, compilations, options)
@@ -82,14 +83,11 @@ def command(
 
 
 def _compile_all(console: Console, spec_files: Sequence[str], options: Options) -> list[Compilation]:
-    from phigen.compiler import compile_proved
-
     collector, compilations = Collector(), []
     for spec in load_all(spec_files, collector):
         start = time.perf_counter()
         with collector.collecting():
-            extras = options.extras_of(spec)
-            compilations.append(compile_proved(spec, order=options.order, scheme=options.scheme, extras=extras))
+            compilations.append(options.compiled(spec))
             stages = ", ".join(f"{stage} {seconds:.2f}" for stage, seconds in compilations[-1].seconds.items())
             console.detail(f"{spec.name}: {time.perf_counter() - start:.2f} s ({stages})")
     collector.finish()
@@ -191,7 +189,9 @@ def _certify(console: Console, compilations: Sequence[Compilation], options: Opt
         with collector.collecting():
             path.unlink(missing_ok=True)
             extras = with_tangent(spec)
-            subject = compile_proved(spec, order=options.order, scheme=options.scheme, extras=extras)
+            subject = compile_proved(
+                spec, order=options.order, scheme=options.scheme, extras=extras, profile=options.profile
+            )
             verification = verified(subject, None, False, console, options.targets_of(compilation))
             if verification.failures:
                 raise fallen_short(verification)

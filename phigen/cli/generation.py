@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -13,7 +13,7 @@ import click
 from phigen import resources
 from phigen.cli.sources import CORRECTIONS, ORDER, scheme_option
 from phigen.registry import TARGETS
-from phigen.spec.names import PROFILES
+from phigen.spec.names import PARTS, PROFILES
 
 if TYPE_CHECKING:
     from phigen.compilation import Compilation
@@ -36,13 +36,22 @@ class Options:
     modified: int | None = None
     scheme: str | None = None
     profile: str | None = None
+    without: tuple[str, ...] = ()
 
     def extras_of(self, spec: Spec) -> Extras:
         """What the code offers beyond the solver: what the spec asks for, and the command line."""
         from phigen.spec.model import Extras
 
-        tangent = self.tangent or spec.extras.tangent
-        return Extras(tangent, spec.extras.modified_hamiltonian if self.modified is None else self.modified)
+        given = spec.extras
+        modified = given.modified_hamiltonian if self.modified is None else self.modified
+        return Extras(self.tangent or given.tangent, modified, given.without | {*self.without})
+
+    def compiled(self, spec: Spec) -> Compilation:
+        """The compilation of a spec with these options, proved; see `phigen.compiler.compile_proved`."""
+        from phigen.compiler import compile_proved
+
+        extras = self.extras_of(spec)
+        return compile_proved(spec, order=self.order, scheme=self.scheme, extras=extras, profile=self.profile)
 
     def targets_of(self, compilation: Compilation) -> tuple[str, ...]:
         """The targets to write: those of the command line, else those of the spec."""
@@ -62,6 +71,7 @@ class Options:
         words += ["--order", str(self.order)] if self.order else []
         words += ["--scheme", self.scheme] if self.scheme else []
         words += ["--profile", self.profile] if self.profile else []
+        words += [word for part in self.without for word in ("--without", part)]
         words += ["--single-file"] if self.single_file else []
         words += ["--tangent"] if self.tangent else []
         words += ["--modified", str(self.modified)] if self.modified is not None else []
@@ -77,6 +87,9 @@ def output_options(command: F) -> F:
         click.option("--tangent", is_flag=True, help="Generate step_tangent, the derivative of a step, too."),
         click.option(
             "--profile", type=click.Choice(PROFILES), help="How much the code does for speed, instead of the spec's."
+        ),
+        click.option(
+            "--without", multiple=True, type=click.Choice(PARTS), help="Leave out a part of the code; may be repeated."
         ),
         click.option("--single-file", is_flag=True, help="C in one file, NAME.c, without a header."),
         scheme_option,
@@ -104,11 +117,11 @@ def generate(compilation: Compilation, target: str, options: Options) -> dict[st
     words += ["--order", str(options.order)] if options.order not in (None, spec.order) else []
     words += ["--scheme", options.scheme] if options.scheme not in (None, spec.scheme) else []
     words += ["--profile", options.profile] if options.profile not in (None, spec.profile) else []
+    words += [f"--without {part}" for part in options.without if part not in spec.extras.without]
     words += ["--single-file"] if single else []
     words += ["--tangent"] if options.tangent and not spec.extras.tangent else []
     words += ["--modified", str(options.modified)] if options.modified is not None else []
-    program = replace(compilation.program, profile=options.profile or spec.profile)
-    return emit(program, target, " ".join(words), single_file=single)
+    return emit(compilation.program, target, " ".join(words), single_file=single)
 
 
 def _is_bundled(spec: Spec) -> bool:

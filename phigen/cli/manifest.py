@@ -21,7 +21,7 @@ from phigen.cli.generation import Options
 from phigen.errors import CheckError
 from phigen.registry import TARGETS, suffixes
 from phigen.spec import limits
-from phigen.spec.names import PROFILES, SCHEMES, SPEC_NAME
+from phigen.spec.names import PARTS, PROFILES, SCHEMES, SPEC_NAME
 
 FILE = "phigen-vendor.json"
 FORMAT = 1
@@ -134,10 +134,12 @@ def _entry(name: str, part: Mapping[str, Any]) -> Entry:
 
 def _options(name: str, given: dict[str, Any]) -> Options:
     targets = tuple(_list_of_texts(given.pop("targets", [])))
-    options = Options(targets=targets, **given)
+    without = tuple(_list_of_texts(given.pop("without", [])))
+    options = Options(targets=targets, without=without, **given)
     order, modified = options.order, options.modified
     if (
         not set(targets) <= set(TARGETS)
+        or not set(without) <= set(PARTS)
         or not (order is None or (type(order) is int and 1 <= order <= limits.ORDER))
         or not (modified is None or (type(modified) is int and 0 <= modified <= limits.CORRECTIONS))
         or options.scheme not in (None, *SCHEMES)

@@ -72,6 +72,7 @@ def command(
     order: int | None,
     scheme: str | None,
     profile: str | None,
+    without: tuple[str, ...],
     single_file: bool,
     tangent: bool,
     modified: int | None,
@@ -97,6 +98,7 @@ def command(
         modified=modified,
         scheme=scheme,
         profile=profile,
+        without=without,
     )
     if options.words and not spec_files:
         raise click.UsageError("options that change what is generated need the SPEC; without it, the manifest decides")
@@ -179,12 +181,9 @@ def _path_of_spec(folder: Path, entry: Entry) -> Path | None:
 
 
 def _made(order: Order, collector: Collector) -> Made | None:
-    from phigen.compiler import compile_proved
-
     options = order.options
     with collector.collecting():
-        extras = options.extras_of(order.spec)
-        compilation = compile_proved(order.spec, order=options.order, scheme=options.scheme, extras=extras)
+        compilation = options.compiled(order.spec)
         return Made(order, compilation, files_of(compilation, options))
     return None
 

@@ -98,7 +98,7 @@ def in_lanes(program: Program) -> Lanes | None:
     """What is computed in lanes; None where the spec says no, or it is not possible, or would need too much room."""
     if isinstance(program.step, Sweeps):
         return _rows(program, program.step)
-    if not program.lanes or program.time:
+    if not (program.lanes and program.offers("lanes")) or program.time:
         return None
     match program.step:
         case Newton() as step:

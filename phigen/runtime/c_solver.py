@@ -40,7 +40,6 @@ _SIGNATURES = {
     "solver_steps_done": (_SIZE, (_POINTER,)),
     "init": (_INT, (_POINTER, _POINTER, _POINTER)),
     "integrate": (_INT, (_POINTER, _DOUBLE, _SIZE)),
-    "ensemble": (_INT, (_POINTER, _POINTER, _SIZE, _DOUBLE, _SIZE, _POINTER)),
     "hamiltonian": (_DOUBLE, (_POINTER, _POINTER)),
     "casimirs": (None, (_POINTER, _POINTER, _POINTER)),
     "vector_field": (None, (_POINTER, _POINTER, _POINTER)),
@@ -55,8 +54,9 @@ _TIMED = {
     "vector_field": (None, (_POINTER, _DOUBLE, _POINTER, _POINTER)),
 }
 
-# What is there only if it was asked for.
+# What is there only if it was asked for, or not left out.
 _EXTRAS = {
+    "ensemble": (_INT, (_POINTER, _POINTER, _SIZE, _DOUBLE, _SIZE, _POINTER)),
     "step_tangent": (_INT, (_POINTER, _DOUBLE, _POINTER)),
     "init_gauge": (_INT, (_POINTER, _POINTER, _POINTER, _POINTER)),
 }
@@ -164,6 +164,8 @@ class CSolver:
 
     def ensemble(self, x0: Floats, h: float, steps: int, parameters: Mapping[str, float], t0: float = 0.0) -> Floats:
         """See `phigen.runtime.backend.Backend`."""
+        if not hasattr(self._c, "ensemble"):
+            raise TypeError(f"{self.interface.name} was compiled without ensembles: its spec leaves them out")
         packed = self._packed(parameters)
         final, status = np.empty_like(x0, order="C"), np.zeros(len(x0), dtype=np.uint8)
         overall = 0

@@ -55,7 +55,8 @@ def build_program(
     """The solver of a system as a program. LimitError if a kernel exceeds `MOST_OPERATIONS`."""
     solver = solver or SolverOptions()
     gauge = gauged.gauge
-    step = _step(system, realisation, scheme.generating, gauge, solver, extras)
+    lanes = solver.lanes and extras.offers("lanes", profile)
+    step = _step(system, realisation, scheme.generating, gauge, solver, extras, lanes=lanes)
     modified, count = None, extras.modified_hamiltonian
     if count:
         modified = modified_of(system, realisation, order, gauge, count, len(scheme.fractions))
@@ -94,6 +95,8 @@ def _step(
     gauge: Gauge,
     solver: SolverOptions,
     extras: Extras,
+    *,
+    lanes: bool,
 ) -> Newton | Explicit | Path:
     inner = InnerSolve(
         solver.max_iterations,
@@ -101,7 +104,7 @@ def _step(
         isinstance(system.shape, LogCanonical),
     )
     if realisation.path:
-        return _path(system, generating, gauge, inner, lanes=solver.lanes, tangent=extras.tangent)
+        return _path(system, generating, gauge, inner, lanes=lanes, tangent=extras.tangent)
     coefficients = generating.coefficients
     increment = explicit_kernel(system, realisation, generating, coefficients)
     if increment is None:

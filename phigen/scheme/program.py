@@ -90,10 +90,14 @@ class Program:
         """Number of coordinates."""
         return len(self.coordinates)
 
+    def offers(self, part: str) -> bool:
+        """Whether the code has a part of `phigen.spec.names.PARTS`, where it applies."""
+        return self.extras.offers(part, self.profile)
+
     @property
     def searches_gauge(self) -> bool:
         """Whether the gauge of a trajectory is searched for, and not given by a formula."""
-        return self.gauge is not None and self.profile == "fast"
+        return self.gauge is not None and self.offers("gauge-search")
 
     @property
     def choice(self) -> tuple[Kernel, ...]:

@@ -25,6 +25,7 @@ from phigen.spec.names import (
     COMPOSITIONS,
     FAMILY_HELP,
     IDENTIFIER,
+    PARTS,
     PLANNED,
     PROFILES,
     SCHEMES,
@@ -271,6 +272,7 @@ SPEC = Record(
         ),
         Field("scheme", _switch("scheme", *SCHEMES), "how the one-step map is made", default="auto"),
         Field("profile", Choice(PROFILES), "small is short and readable, without blocks and searches", default="fast"),
+        Field("without", ListOf(Choice(PARTS)), "parts of the code to leave out"),
         Field("solver", SOLVER, "the inner solve of a step"),
         Field("tangent", Boolean(), "also generate step_tangent, the derivative of a step", default=False),
         Field(

@@ -14,6 +14,7 @@ from typing import Any
 
 from phigen.errors import Diagnostic, Location
 from phigen.registry import DEFAULT
+from phigen.spec.names import LEFT_OUT
 from phigen.symbolic.expression import ZERO, Expression
 
 #: The order of a method that nobody asked an order of.
@@ -156,11 +157,17 @@ class SolverOptions:
 class Extras:
     """What the generated code offers beyond the solver: ``tangent`` adds ``step_tangent``, the derivative of a step.
 
-    ``modified_hamiltonian`` adds the function of that name, with so many correction terms; 0 for none.
+    ``modified_hamiltonian`` adds the function of that name, with so many correction terms; 0 for none. ``without`` are
+    parts to leave out (`phigen.spec.names.PARTS`).
     """
 
     tangent: bool = False
     modified_hamiltonian: int = 0
+    without: frozenset[str] = frozenset()
+
+    def offers(self, part: str, profile: str) -> bool:
+        """Whether the code of a profile has a part, where it applies."""
+        return part not in self.without | LEFT_OUT[profile]
 
 
 NO_EXTRAS = Extras()

@@ -79,7 +79,11 @@ def _parts(raw: Mapping[str, Any], declared: Declarations) -> dict[str, Any]:
         "profile": raw.get("profile", "fast"),
         "solver": _solver(raw.get("solver", {}), declared),
         "targets": without_repetition(raw.get("targets", DEFAULT), ("targets",), declared),
-        "extras": Extras(raw.get("tangent", False), raw.get("modified_hamiltonian", 0)),
+        "extras": Extras(
+            raw.get("tangent", False),
+            raw.get("modified_hamiltonian", 0),
+            frozenset(without_repetition(raw.get("without", ()), ("without",), declared)),
+        ),
         "runs": {n: run(n, r, declared) for n, (_, r) in raw.get("runs", {}).items() if r is not None},
         "lattice": lattice,
         "title": raw.get("title", ""),

@@ -231,6 +231,7 @@ def regenerate_line(path):
         (["--profile", "small"], "a.c", "phigen build a.yaml --profile small"),
         (["--profile", "fast"], "a.c", "phigen build a.yaml"),
         (["--profile", "small"], "a.py", "phigen build a.yaml --profile small"),
+        (["--without", "ensemble"], "a.c", "phigen build a.yaml --without ensemble"),
         (["--single-file"], "a.c", "phigen build a.yaml --single-file"),
         (["--single-file"], "a.py", "phigen build a.yaml"),
         (["-t", "c"], "a.c", "phigen build a.yaml"),

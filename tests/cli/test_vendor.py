@@ -61,7 +61,9 @@ def test_manifest_depends_on_specs_and_options_alone(phigen, write, monkeypatch)
     assert str(Path.cwd()).encode() not in first[manifest.FILE]
 
 
-@pytest.mark.parametrize("options", ["", " -t c --order 4 --profile small --single-file --tangent --modified 1"])
+@pytest.mark.parametrize(
+    "options", ["", " -t c --order 4 --profile small --without ensemble --single-file --tangent --modified 1"]
+)
 def test_command_of_the_manifest_makes_the_same_bytes(phigen, write, options, monkeypatch):
     phigen("vendor", *options.split(), write("models/a.yaml"), EXT)
     before = tree()

@@ -10,6 +10,8 @@ from support import RawC, compiled, files, setting, small, solver
 
 from phigen import resources, spec
 from phigen.compiler import compile_spec
+from phigen.spec.model import Extras
+from phigen.spec.names import PARTS
 
 GENERATED = Path(__file__).resolve().parents[2] / "generated"
 
@@ -53,6 +55,42 @@ def test_small_code_is_short(name, order, lines, solver_bytes):
     assert sum(text.count("\n") for text in texts) <= lines
     assert RawC(compilation).memory.size <= solver_bytes
     assert not any(word in text for word in ("_LANES", "_block", "_group", "recurrence") for text in texts)
+
+
+#: Of each part that can be left out, a word in code that has it.
+WORDS = {"ensemble": "_ensemble(", "gauge-search": "_guide(", "lanes": "_LANES", "recurrences": "_RIDGE"}
+
+
+def described(name, profile, without=()):
+    """The compilation of a system of the corpus, gauge included, without some parts."""
+    given = spec.load(resources.bundled_specs() / f"{name}.yaml")
+    return compile_spec(given, order=4, profile=profile, extras=Extras(without=frozenset(without)))
+
+
+@pytest.mark.parametrize("part", PARTS)
+def test_a_part_can_be_left_out_of_fast_code(part):
+    """The steps are those of NumPy, which leaves it out too where it has it."""
+    compilation = described("rigid_body", "fast", [part])
+    texts = files(compilation, "c").values()
+    has = {other: any(word in text for text in texts) for other, word in WORDS.items()}
+    assert has == {other: other != part and (part, other) != ("recurrences", "lanes") for other in PARTS}
+    at, ends = setting(compilation), []
+    for target in ("c", "numpy"):
+        ends.append(solver(compilation, target).integrate(at.x, at.h, 200, **at.parameters).x[-1])
+    np.testing.assert_allclose(ends[0], ends[1], rtol=0, atol=2e-14)
+    if part == "ensemble":
+        with pytest.raises(TypeError, match="compiled without ensembles"):
+            solver(compilation, "c").ensemble([at.x], at.h, 1)
+
+
+def test_small_code_has_no_part_that_serves_speed_and_carries_nothing_for_one():
+    texts = files(described("rigid_body", "small"), "c").values()
+    assert {part: any(word in text for text in texts) for part, word in WORDS.items()} == {
+        part: part == "ensemble" for part in PARTS
+    }
+    paths = [described("nambu_pendulum", profile).program.step for profile in ("fast", "small")]
+    assert paths[0].lanes
+    assert not paths[1].lanes
 
 
 @pytest.mark.parametrize("path", sorted(GENERATED.glob("*/*.[ch]")), ids=lambda p: p.name)

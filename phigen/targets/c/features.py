@@ -15,12 +15,13 @@ from phigen.targets.path import kinds, recurrences
 @dataclass(frozen=True)
 class Feature:
     """A switch ``PHI_NAME`` of the runtime: ``when`` a program has it, if it has also what it ``requires``, and if what
-    it has ``in_lanes`` says so too."""
+    it has ``in_lanes`` says so too; ``part`` is the name by which users leave it out."""
 
     name: str
     when: Callable[[Program], object] = lambda program: True
     requires: tuple[str, ...] = ()
     in_lanes: Callable[[Lanes | None], object] = lambda lanes: True
+    part: str = ""
 
 
 def _calls(function: str) -> Callable[[Lanes | None], bool]:
@@ -53,10 +54,11 @@ FEATURES = (
     Feature("MODIFIED", lambda p: p.modified),
     Feature("ADVANCE", lambda p: not isinstance(p.step, Splitting) or p.extras.tangent),
     Feature("UNROLLED", lambda p: isinstance(p.step, Implicit) and _fast(p) and p.step.eliminate),
-    Feature("GAUGE_SEARCH", lambda p: p.searches_gauge),
-    Feature("RECURRENCES", _fast, ("IMPLICIT",)),
-    Feature("BLOCKS", _fast, ("RECURRENCES",), lambda lanes: isinstance(lanes, Blocks)),
-    Feature("PACKS", _fast, (), lambda lanes: isinstance(lanes, Packs)),
+    Feature("ENSEMBLE", part="ensemble"),
+    Feature("GAUGE_SEARCH", requires=("GAUGE",), part="gauge-search"),
+    Feature("RECURRENCES", requires=("IMPLICIT",), part="recurrences"),
+    Feature("BLOCKS", requires=("RECURRENCES",), in_lanes=lambda lanes: isinstance(lanes, Blocks), part="lanes"),
+    Feature("PACKS", requires=("ENSEMBLE",), in_lanes=lambda lanes: isinstance(lanes, Packs), part="lanes"),
     Feature("FAR", requires=("PACKS",), in_lanes=lambda lanes: isinstance(lanes, Packs) and lanes.near),
     Feature("SPARSE", requires=("BLOCKS",), in_lanes=lambda lanes: isinstance(lanes, Blocks) and lanes.factors),
     Feature("INVERSE_UNROLLED", lambda p: isinstance(p.step, Newton) and p.step.invert, ("BLOCKS",)),
@@ -69,6 +71,6 @@ def switches(program: Program, lanes: Lanes | None) -> dict[str, bool]:
     """Whether the program has each of the features."""
     found: dict[str, bool] = {}
     for feature in FEATURES:
-        asked = feature.when(program) and feature.in_lanes(lanes)
+        asked = feature.when(program) and feature.in_lanes(lanes) and program.offers(feature.part)
         found[feature.name] = all(found[name] for name in feature.requires) and bool(asked)
-    return found | {"GROUPS": found["BLOCKS"] and grouped(program, lanes)}
+    return found | {"GROUPS": found["BLOCKS"] and found["ENSEMBLE"] and grouped(program, lanes)}

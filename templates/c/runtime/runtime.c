@@ -7,7 +7,9 @@
 #if PHI_BLOCKS
 #include "blocks.c"
 #endif
+#if PHI_ENSEMBLE
 #include "ensemble.c"
+#endif
 #if PHI_BLOCKS || PHI_PACKS
 
 #if defined(__clang__)

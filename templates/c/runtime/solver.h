@@ -98,6 +98,7 @@ phi_status phi_step(phi_solver *s, double h);
 /* Many steps. On failure s->x is the last good state and s->steps counts the good steps. */
 phi_status phi_integrate(phi_solver *s, double h, size_t steps);
 
+#if PHI_ENSEMBLE
 /* Many members, in place: x[i * members + m] is coordinate i of member m. One that fails keeps its last good state.
    status (or NULL) receives the status of each; the first that is not OK is returned. */
 #if PHI_GROUPS || PHI_PACKS
@@ -110,6 +111,8 @@ phi_status phi_ensemble(const phi_params *params, double *x, size_t members, dou
 /* The same from the time t0 of all members on, which phi_ensemble takes to be 0. */
 phi_status phi_ensemble_at(const phi_params *params, double *x, size_t members, double t0, double h, size_t steps,
     unsigned char *status);
+
+#endif
 
 #endif
 #if PHI_TANGENT

@@ -258,6 +258,7 @@ export class Solver {
   }
 
   // #endif
+  // #if ENSEMBLE
   /**
    * Many steps of many states, each of which has its own gauge. One that fails keeps its last good state.
    *
@@ -287,6 +288,7 @@ export class Solver {
     return { x: ends.map(({ end }) => end), status: ends.map(({ status }) => status) };
   }
 
+  // #endif
   // #if TIMED
   /** The Hamiltonian, at x and its time or elsewhere. */
   hamiltonian(x = this.x, t = this.t) {
