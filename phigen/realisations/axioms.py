@@ -13,13 +13,21 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from fractions import Fraction
 
+from phigen import progress
 from phigen.geometry.system import System
 from phigen.realisations import truncated
-from phigen.realisations.protocol import BiRealisation, covector_names
+from phigen.realisations.protocol import BiRealisation, covector_names, is_symmetric
 from phigen.realisations.pullback import is_composed
+from phigen.realisations.sampled import brackets_at_points, is_large
 from phigen.symbolic.expression import ZERO, Expression, call, fold, number, rebuild, substitute, symbol, symbols_of
 from phigen.symbolic.tower import Poly, Tower
 from phigen.symbolic.verdict import Statement, decide_elements, decide_zero
+
+#: What is stated, and proved or refuted.
+ALPHA, BETA, MIXED = "{α_i, α_j} = π_ij∘α", "{β_i, β_j} = −π_ij∘β", "{α_i, β_j} = 0"
+
+#: Two indices, and what should be 0.
+Residual = tuple[int, int, Poly]
 
 
 def check(system: System, realisation: BiRealisation) -> list[Statement]:
@@ -81,60 +89,62 @@ def _pulled_back(system: System, maps: Sequence[Expression], pairs: Sequence[tup
 
 
 def _brackets(system: System, realisation: BiRealisation) -> Iterator[Statement]:
+    if is_large(system, realisation):
+        yield from brackets_at_points(system, realisation, (ALPHA, BETA, MIXED))
+        return
     covector = covector_names(system.coordinates)
     variables = [*system.coordinates, *covector]
     alpha, beta = list(realisation.alpha), list(realisation.beta)
-    pairs = [(i, j) for j in range(len(alpha)) for i in range(j)]
-    at_alpha = _pulled_back(system, alpha, pairs)
-    at_beta = _pulled_back(system, beta, pairs)
-    everything = [*alpha, *beta, *at_alpha, *at_beta]
+    n = len(alpha)
+    pairs = [(i, j) for j in range(n) for i in range(j)]
+    pulled = _pulled_back(system, alpha, pairs), _pulled_back(system, beta, pairs)
+    # p ↦ −p turns the sign of brackets: where it takes α to β, half of them say what the others do.
+    mirrored = realisation.symmetric and is_symmetric(alpha, beta, system.coordinates)
+    everything = [*alpha, *beta, *pulled[0], *([] if mirrored else pulled[1])]
     others = [s for s in symbols_of(*everything) if s not in variables]
     tower = Tower([*variables, *others], everything, variables)
-    images = tower.convert_all(everything)
-    n, m = len(alpha), len(pairs)
-    a = [_Differential(tower, f, system.coordinates, covector) for f in images[:n]]
-    b = [_Differential(tower, f, system.coordinates, covector) for f in images[n : 2 * n]]
-    pulled_a, pulled_b = images[2 * n : 2 * n + m], images[2 * n + m :]
+    images = tower.convert_all([*alpha, *beta])
+    a, b = ([_Differential(tower, f, system.coordinates, covector) for f in half] for half in (images[:n], images[n:]))
 
-    def label(i: int, j: int) -> str:
-        return f"({system.coordinates[i]}, {system.coordinates[j]})"
+    def own(half: list[_Differential], targets: Sequence[Expression], sign: int) -> Iterator[Residual]:
+        for (i, j), target in zip(pairs, targets, strict=True):
+            yield i, j, half[i].bracket(half[j]) - sign * tower.convert(target)
 
-    name = "bi-realisation: "
-    yield decide_elements(
-        name + "{α_i, α_j} = π_ij∘α",
-        tower,
-        [(label(i, j), a[i].bracket(a[j]) - f) for (i, j), f in zip(pairs, pulled_a, strict=True)],
-        system.positive,
-    )
-    yield decide_elements(
-        name + "{β_i, β_j} = −π_ij∘β",
-        tower,
-        [(label(i, j), b[i].bracket(b[j]) + f) for (i, j), f in zip(pairs, pulled_b, strict=True)],
-        system.positive,
-    )
-    yield decide_elements(
-        name + "{α_i, β_j} = 0",
-        tower,
-        [(label(i, j), a[i].bracket(b[j])) for i in range(n) for j in range(n)],
-        system.positive,
-    )
+    def decided(title: str, count: int, residuals: Iterator[Residual]) -> Statement:
+        names, listed = system.coordinates, []
+        with progress.stage(title, count) as running:
+            for i, j, element in residuals:
+                running.done += 1
+                if element != 0:
+                    listed.append((f"({names[i]}, {names[j]})", element))
+        return decide_elements("bi-realisation: " + title, tower, listed, system.positive)
+
+    first = decided(ALPHA, len(pairs), own(a, pulled[0], 1))
+    yield first
+    if mirrored:
+        yield replace(first, name="bi-realisation: " + BETA, detail="as for α, by β(x, p) = α(x, −p)", residual="")
+    else:
+        yield decided(BETA, len(pairs), own(b, pulled[1], -1))
+    across = [(i, j) for i in range(n) for j in range(i if mirrored else 0, n)]
+    yield decided(MIXED, len(across), ((i, j, a[i].bracket(b[j])) for i, j in across))
 
 
 class _Differential:
     """The non-zero partial derivatives of an element in x and in p."""
 
     def __init__(self, tower: Tower, element: Poly, coordinates: Sequence[str], covector: Sequence[str]) -> None:
-        self._zero = tower.zero
-        self.in_x = {i: d for i, c in enumerate(coordinates) if (d := tower.derivative(element, c)) != 0}
-        self.in_p = {i: d for i, c in enumerate(covector) if (d := tower.derivative(element, c)) != 0}
+        self._zero, used = tower.zero, tower.names_in(element)
+
+        def slopes(names: Sequence[str]) -> dict[int, Poly]:
+            return {i: d for i, c in enumerate(names) if c in used and (d := tower.derivative(element, c)) != 0}
+
+        self.in_x, self.in_p = slopes(coordinates), slopes(covector)
 
     def bracket(self, other: _Differential) -> Poly:
         """{self, other}."""
         result = self._zero
-        for i, d in self.in_x.items():
-            if i in other.in_p:
-                result = result + d * other.in_p[i]
-        for i, d in self.in_p.items():
-            if i in other.in_x:
-                result = result - d * other.in_x[i]
+        for i in self.in_x.keys() & other.in_p.keys():
+            result += self.in_x[i] * other.in_p[i]
+        for i in self.in_p.keys() & other.in_x.keys():
+            result -= self.in_p[i] * other.in_x[i]
         return result

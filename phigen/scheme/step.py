@@ -57,7 +57,11 @@ def linearise(
 ) -> Linearised:
     """a, d and their total derivatives along y, with p = ∇S_h(y)."""
     n = len(coordinates)
-    both = [*displacement, *increment]
+    # Momenta that are 0 are left out at once: of a large system, H depends on few coordinates.
+    absent: dict[str, Expression] = {
+        momentum(c): ZERO for c, g in zip(coordinates, generating.slope, strict=True) if g.is_zero
+    }
+    both = substitute([*displacement, *increment], absent)
     by_x = _rows(both, coordinates)
     by_p = _rows(both, [momentum(c) for c in coordinates])
     flat = [*both, *(e for row in (*by_x, *by_p) for e in row.values())]

@@ -33,9 +33,6 @@ from phigen.symbolic.symbols import momentum
 from phigen.symbolic.taylor import ExpressionRing, Taylor, closure
 from phigen.symbolic.tower import Poly, Tower
 
-#: A term S_i with more monomials than this ends the recursion: the next would take minutes.
-MOST_TERMS = 50_000
-
 #: A gradient ∇S_i with more monomials is of no use: with the Hessian it takes 4.3 to 10 operations for each, measured.
 MOST_SLOPES = limits.OPERATIONS // 4
 
@@ -79,7 +76,7 @@ def polynomial_series(
 ) -> PolynomialSeries:
     """S_1 … S_terms in a tower (exact rational arithmetic, parameters symbolic); ``times`` as for `series_tower`.
 
-    Raises `OverflowError` if a term has more than `MOST_TERMS` monomials.
+    Raises `OverflowError` if a term has more than `limits.SERIES_TERMS` monomials.
     """
     recursion = _polynomial_recursion(hamiltonian, alpha, coordinates, parameters, symmetric, times)
     return PolynomialSeries(recursion.ring, recursion.first(terms))
@@ -234,7 +231,7 @@ class _Recursion:
         if moves and self.ring.bytes_per_term:
             self._sizes[i] = max(1, sum(map(len, slopes)))
         self._taylor.advance(dict(zip(self._momenta, slopes, strict=True)) | beginning(self.ring, self._times, i))
-        if i and isinstance(self._found[-1], Sized) and len(self._found[-1]) > MOST_TERMS:
+        if i and isinstance(self._found[-1], Sized) and len(self._found[-1]) > limits.SERIES_TERMS:
             raise OverflowError(f"S_{i} has {len(self._found[-1])} terms")
         if even:
             return self._zero

@@ -7,6 +7,10 @@ from __future__ import annotations
 
 from fractions import Fraction
 
+from phigen.symbolic.budgets import PRODUCT_BYTES, PRODUCT_TERMS, TAYLOR_BYTES
+
+__all__ = ["PRODUCT_BYTES", "PRODUCT_TERMS", "TAYLOR_BYTES", "number_is_bounded"]
+
 #: Size of a spec file, in bytes.
 FILE_BYTES = 512 * 1024
 #: YAML nodes (scalars, sequences, mappings, keys) in a file.
@@ -46,6 +50,10 @@ ORDER = 16
 CORRECTIONS = 8
 #: Operations of one kernel, gradient and Hessian of S_h foremost; about 5 MB of C and a minute of compilation.
 OPERATIONS = 100_000
+#: Terms of an S_i: the next would take minutes.
+SERIES_TERMS = 50_000
+#: Products of terms in the proof of a bi-realisation, by estimate: ten seconds. Beyond, it is checked at points.
+PROOF_PRODUCTS = 20_000_000
 #: Steps of a run.
 STEPS = 10**12
 #: Errors listed in one run; a file with more is rarely improved by the rest.

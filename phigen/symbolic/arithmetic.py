@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from fractions import Fraction
 from typing import Any, Generic, TypeVar
 
-from phigen.symbolic.expression import Expression, fold
+from phigen.symbolic.expression import Expression, topological
 
 T = TypeVar("T")
 
@@ -54,5 +55,15 @@ class Arithmetic(Generic[T]):
         return self.function(node.op, args)
 
     def values(self, roots: Sequence[Expression]) -> list[T]:
-        """The values of expressions; what they share is computed once."""
-        return fold(roots, self.visit)
+        """The values of expressions; what they share is computed once, and kept for as long as it is needed."""
+        order = topological(roots)
+        uses = Counter(id(a) for node in order for a in node.args)
+        uses.update(map(id, roots))
+        values: dict[int, T] = {}
+        for node in order:
+            values[id(node)] = self.visit(node, [values[id(a)] for a in node.args])
+            for a in node.args:
+                uses[id(a)] -= 1
+                if not uses[id(a)]:
+                    del values[id(a)]
+        return [values[id(r)] for r in roots]

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from operator import sub
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
 
 from phigen.symbolic.expression import ZERO, Expression, power, product, total
 
 Monomial = tuple[int, ...]
+#: The variables of a monomial, by index, with their exponents: few, in large systems.
+Powers = tuple[tuple[int, int], ...]
 
 
 def horner(terms: Mapping[Monomial, Expression], variables: Sequence[Expression]) -> Expression:
@@ -17,35 +19,56 @@ def horner(terms: Mapping[Monomial, Expression], variables: Sequence[Expression]
     polynomials in the squares of the variables, since the least exponent of the terms that share a
     variable is factored, and squares are shared nodes. Deterministic in the terms.
     """
-    left = {m: c for m, c in terms.items() if not c.is_zero}
-    if not left:
-        return ZERO
-    used = [i for i in range(len(variables)) if any(m[i] for m in left)]
-    if len(used) < len(variables):
-        left = {tuple(m[i] for i in used): c for m, c in left.items()}
-    return _nested(left, [variables[i] for i in used])
+    left = {_powers(m): c for m, c in terms.items() if not c.is_zero}
+    return _nested(left, variables) if left else ZERO
 
 
-def _nested(left: Mapping[Monomial, Expression], variables: Sequence[Expression]) -> Expression:
+def _powers(monomial: Monomial) -> Powers:
+    return tuple((i, e) for i, e in enumerate(monomial) if e)
+
+
+def _nested(terms: Mapping[Powers, Expression], variables: Sequence[Expression]) -> Expression:
     """`horner` of terms that are not 0."""
-    if len(left) == 1:
-        ((monomial, coefficient),) = left.items()
+    if len(terms) == 1:
+        ((monomial, coefficient),) = terms.items()
         return coefficient * _monomial(monomial, variables)
-    common = tuple(map(min, zip(*left, strict=True)))
-    if any(common):
-        inner = {tuple(map(sub, m, common)): v for m, v in left.items()}
-        return _monomial(common, variables) * _nested(inner, variables)
-    counts = [len(left) - column.count(0) for column in zip(*left, strict=True)]
-    best = counts.index(max(counts))
+    common = _common(terms)
+    if common:
+        inner = {tuple((i, e - common.get(i, 0)) for i, e in m if e > common.get(i, 0)): c for m, c in terms.items()}
+        return _monomial(tuple(common.items()), variables) * _nested(inner, variables)
+    counts = Counter(i for m in terms for i, _ in m)
+    best = min(counts, key=lambda i: (-counts[i], i))
     if counts[best] <= 1:
-        ordered = sorted(left.items(), key=lambda item: (sum(item[0]), tuple(-e for e in item[0])))
+        ordered = sorted(terms.items(), key=lambda item: _graded(item[0]))
         return total(c * _monomial(m, variables) for m, c in ordered)
-    step = min(m[best] for m in left if m[best])
-    inside = {(*m[:best], m[best] - step, *m[best + 1 :]): c for m, c in left.items() if m[best]}
-    outside = {m: c for m, c in left.items() if not m[best]}
-    nested = power(variables[best], step) * horner(inside, variables)
-    return nested + horner(outside, variables) if outside else nested
+    found = {m: dict(m).get(best, 0) for m in terms}
+    step = min(e for e in found.values() if e)
+    inside = {
+        tuple((i, e - step if i == best else e) for i, e in m if i != best or e > step): c
+        for m, c in terms.items()
+        if found[m]
+    }
+    outside = {m: c for m, c in terms.items() if not found[m]}
+    nested = power(variables[best], step) * _nested(inside, variables)
+    return nested + _nested(outside, variables) if outside else nested
 
 
-def _monomial(monomial: Monomial, variables: Sequence[Expression]) -> Expression:
-    return product(power(v, e) for v, e in zip(variables, monomial, strict=True) if e)
+def _common(terms: Iterable[Powers]) -> dict[int, int]:
+    """The powers that divide all terms."""
+    first, *others = terms
+    common = dict(first)
+    for m in others:
+        exponents = dict(m)
+        common = {i: min(e, exponents[i]) for i, e in common.items() if i in exponents}
+        if not common:
+            break
+    return common
+
+
+def _graded(monomial: Powers) -> tuple[int, list[tuple[int, int]]]:
+    """The key of the order by degree, and by the exponents of the first variables that differ, the larger first."""
+    return sum(e for _, e in monomial), [(i, -e) for i, e in monomial]
+
+
+def _monomial(monomial: Powers, variables: Sequence[Expression]) -> Expression:
+    return product(power(variables[i], e) for i, e in monomial)

@@ -13,6 +13,7 @@ from collections.abc import Sequence
 from fractions import Fraction
 from typing import Any, Protocol
 
+from phigen.symbolic import budgets
 from phigen.symbolic.arithmetic import Arithmetic
 from phigen.symbolic.expression import (
     EULER,
@@ -28,9 +29,6 @@ from phigen.symbolic.expression import (
     total,
 )
 from phigen.symbolic.special import SPECIAL, coefficient, order_of
-
-#: Memory of all products that a series is made of, in bytes; beyond, it is refused.
-MOST_BYTES = 300 * 2**20
 
 
 class Ring(Protocol):
@@ -143,7 +141,7 @@ class Taylor:
         found = self.ring.product(a, b)
         if self.ring.bytes_per_term:
             self._bytes += len(found) * self.ring.bytes_per_term
-            if self._bytes > MOST_BYTES:
+            if self._bytes > budgets.TAYLOR_BYTES:
                 raise OverflowError("a series of polynomials with too many terms")
         return found
 

@@ -16,16 +16,25 @@ from typing import Any
 
 from flint import Ordering, fmpq, fmpq_mpoly_ctx
 
+from phigen.symbolic import budgets
 from phigen.symbolic.arithmetic import Arithmetic
 from phigen.symbolic.entire import ENTIRE
-from phigen.symbolic.expression import EULER, ONE, PI, Expression, call, number, power, sparse_derivatives, symbol
+from phigen.symbolic.expression import (
+    EULER,
+    ONE,
+    PI,
+    Expression,
+    call,
+    number,
+    power,
+    sparse_derivatives,
+    symbol,
+    topological,
+)
 from phigen.symbolic.functions import FUNCTIONS
 from phigen.symbolic.horner import horner
 from phigen.symbolic.special import SPECIAL, coefficient, order_of
 from phigen.symbolic.symbols import Symbol
-
-#: A product or a power of polynomials that may have more terms, or take more memory, is refused: tenths of a second.
-MOST_TERMS, MOST_BYTES = 1_000_000, 128 * 2**20
 
 #: An element of a tower: ``flint.fmpq_mpoly``. Elements of different towers do not mix.
 Poly = Any
@@ -69,8 +78,9 @@ class Tower(Arithmetic[Poly]):
         self.variables = tuple(variables)
         self.generators: list[Generator] = []
         self._set_context()
-        for e in expressions:
-            self._absorb(e)
+        for e in topological(list(expressions)):
+            if not _is_arithmetic(e):
+                self._absorb(e)
         self._close()
 
     # -- the ring ---------------------------------------------------------------------------------
@@ -85,6 +95,7 @@ class Tower(Arithmetic[Poly]):
         self.gens = self.context.gens()
         self._index = {n: i for i, n in enumerate(self.names)}
         self._pairs: list[tuple[int, int]] | None = None
+        self._meanings: list[Expression] | None = None
 
     def constant(self, value: int | Fraction) -> Poly:
         """The rational number as an element."""
@@ -239,7 +250,7 @@ class Tower(Arithmetic[Poly]):
         return base**n
 
     def _expect_room(self, terms: int) -> None:
-        if terms > MOST_TERMS or terms * self.bytes_per_term > MOST_BYTES:
+        if terms > budgets.PRODUCT_TERMS or terms * self.bytes_per_term > budgets.PRODUCT_BYTES:
             raise OverflowError(f"a polynomial of up to {terms} terms")
 
     def power(self, base: Poly, exponent: Fraction | int) -> Poly:
@@ -298,8 +309,11 @@ class Tower(Arithmetic[Poly]):
 
     def expression_in(self, element: Poly, values: Mapping[str, Expression]) -> Expression:
         """`expression` with some of the ring's variables replaced."""
-        variables = [values.get(n, symbol(n)) for n in self.symbols]
-        variables += [values.get(g.name, g.expression) for g in self.generators]
+        if self._meanings is None:
+            self._meanings = [*map(symbol, self.symbols), *(g.expression for g in self.generators)]
+        variables = self._meanings
+        if values:
+            variables = [values.get(n, meaning) for n, meaning in zip(self.names, variables, strict=True)]
         terms = {_exponents(m): number(rational(c)) for m, c in element.to_dict().items()}
         return horner({m[: len(variables)]: c for m, c in terms.items()}, variables)
 
@@ -470,6 +484,13 @@ class Tower(Arithmetic[Poly]):
     def vanishes(self, element: Poly) -> bool:
         """Whether the element is 0 as a polynomial (no relations used)."""
         return bool(element == 0)
+
+
+def _is_arithmetic(e: Expression) -> bool:
+    """Whether a node needs no generator: it is a polynomial in its arguments."""
+    if e.op == "pow":
+        return bool(e.value > 0 and e.value.denominator == 1)
+    return e.op in ("number", "symbol", "add", "sub", "neg", "mul")
 
 
 def rational(c: Any) -> Fraction:

@@ -10,7 +10,7 @@ from phigen.geometry.system import system_from_spec
 from phigen.realisations.axioms import check
 from phigen.realisations.catalogue import realise
 from phigen.resources import bundled_specs
-from phigen.spec import load, loads
+from phigen.spec import limits, load, loads
 from phigen.spec.model import BirealisationChoice
 from phigen.symbolic.expression import substitute, symbol, symbols_of, topological
 from phigen.symbolic.symbols import momentum
@@ -221,3 +221,38 @@ def test_mixed_brackets_are_checked_for_all_pairs(beta, pair):
     mixed = custom("x y", "{brackets: {}}", "[x, y]", beta)[MIXED]
     assert mixed.verdict == REFUTED
     assert mixed.detail.startswith(pair)
+
+
+def broken(realisation):
+    """The same with twice the quadratic terms in α, and in β, so that β(x, p) = α(x, −p) still holds."""
+    p = [momentum(c) for c in realisation.coordinates]
+    twice = {name: 2 * symbol(name) for name in p}
+    half = [a + (b - a) / 2 for a, b in zip(realisation.alpha, realisation.beta, strict=True)]
+    wrong = substitute(half, twice)
+    maps = (
+        [a - m + w for a, m, w in zip(side, half, wrong, strict=True)] for side in (realisation.alpha, realisation.beta)
+    )
+    return replace(realisation, alpha=next(maps), beta=next(maps))
+
+
+def test_what_the_symmetry_gives_is_not_multiplied_out_again():
+    s = family("so", 4)
+    realisation = realise(s, BirealisationChoice("cayley"))
+    found = check(s, realisation)
+    assert (found[BETA].verdict, found[BETA].detail) == (PROVED, "as for α, by β(x, p) = α(x, −p)")
+    assert verdicts(check(s, broken(realisation))[ALPHA:FORMS]) == [REFUTED] * 3
+    wrong = replace(realisation, beta=tuple(realisation.alpha))  # whatever it says of itself
+    assert verdicts(check(s, wrong)[ALPHA:FORMS]) == [PROVED, REFUTED, REFUTED]
+
+
+def test_large_bi_realisations_are_checked_at_points(monkeypatch):
+    monkeypatch.setattr(limits, "PROOF_PRODUCTS", 0)
+    s = family("so", 4)
+    realisation = realise(s, BirealisationChoice("cayley"))
+    found = check(s, realisation)
+    assert verdicts(found) == [PROVED, CHECKED, CHECKED, CHECKED, PROVED]
+    assert found[ALPHA].detail.startswith("3 points, exactly")
+    assert verdicts(check(s, broken(realisation))[ALPHA:FORMS]) == [REFUTED] * 3
+    assert verdicts(check(s, replace(realisation, beta=realisation.alpha))[ALPHA:FORMS]) == [CHECKED, REFUTED, REFUTED]
+    exponential = family("so", 3)  # α is not rational
+    assert verdicts(check(exponential, realise(exponential))) == [PROVED] * 5

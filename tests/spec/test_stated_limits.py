@@ -29,6 +29,11 @@ ROWS = {
     "ORDER": "order, and terms",
     "CORRECTIONS": "corrections of the modified Hamiltonian",
     "OPERATIONS": "operations of one function of the generated code",
+    "PRODUCT_TERMS": "terms of a product of polynomials",
+    "PRODUCT_BYTES": "memory of such a product, in bytes",
+    "TAYLOR_BYTES": "memory of all products of a series, in bytes",
+    "SERIES_TERMS": "terms of one S_i",
+    "PROOF_PRODUCTS": "products of terms in the proof of a bi-realisation",
     "STEPS": "steps of a run",
     "ERRORS": "errors that are listed",
 }

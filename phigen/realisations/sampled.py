@@ -1,0 +1,109 @@
+"""The axioms of a large bi-realisation, checked in exact arithmetic at points: a proof would multiply out too much.
+
+At a point the brackets of all pairs together are products of two matrices of numbers, the derivatives in x and in p.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from fractions import Fraction
+from typing import Any
+
+from flint import fmpq, fmpq_mat
+
+from phigen import progress
+from phigen.geometry.system import System
+from phigen.realisations.protocol import BiRealisation, covector_names
+from phigen.spec import limits
+from phigen.symbolic.expression import Expression, gradient, symbols_of, topological
+from phigen.symbolic.numeric import DomainError, evaluate_exactly, is_rational
+from phigen.symbolic.tower import rational
+from phigen.symbolic.verdict import CHECKED, REFUTED, UNDECIDED, Statement, sample_point
+
+#: Points, and how many are tried at most.
+POINTS, ATTEMPTS = 3, 16
+
+Point = Mapping[str, Fraction]
+
+
+def is_large(system: System, realisation: BiRealisation) -> bool:
+    """Whether the brackets of α and β are to be checked at points; those that are not rational never are."""
+    maps = [*realisation.alpha, *realisation.beta]
+    if not is_rational(*maps, *(e for row in system.poisson for e in row)):
+        return False
+    # Each term of α_i meets the derivatives of α_j along one pair (x_k, p_k) of n, for all i and j.
+    sizes = sum(len(topological([e])) for e in realisation.alpha)
+    return 2 * sizes**2 // system.dimension > limits.PROOF_PRODUCTS
+
+
+def brackets_at_points(system: System, realisation: BiRealisation, titles: Sequence[str]) -> Iterator[Statement]:
+    """The statements on {α_i, α_j}, {β_i, β_j} and {α_i, β_j}, with their titles."""
+    with progress.stage("derivatives of α and β"):
+        maps = realisation.alpha, realisation.beta
+        variables = [*system.coordinates, *covector_names(system.coordinates)]
+        slopes = tuple([gradient(e, variables) for e in half] for half in maps)
+    names = symbols_of(*(e for half in maps for e in half), *(e for row in system.poisson for e in row))
+    missing = [v for v in variables if v not in names]
+    found: list[list[str]] = []
+    with progress.stage("brackets at points", POINTS) as running:
+        for k in range(ATTEMPTS):
+            point = sample_point([*names, *missing], system.positive, k)
+            try:
+                found.append(_failures(system, maps, slopes, point))
+            except DomainError:
+                continue
+            running.done += 1
+            if len(found) == POINTS:
+                break
+    for title, failures in zip(titles, zip(*found, strict=True) if found else [()] * len(titles), strict=True):
+        yield _statement(f"bi-realisation: {title}", failures)
+
+
+def _statement(name: str, failures: Sequence[str]) -> Statement:
+    if not failures:
+        return Statement(name, UNDECIDED, f"no point of the domain among {ATTEMPTS} tried")
+    if any(failures):
+        return Statement(name, REFUTED, next(filter(None, failures)))
+    return Statement(name, CHECKED, f"{len(failures)} points, exactly; too large to be multiplied out")
+
+
+def _failures(
+    system: System,
+    maps: tuple[Sequence[Expression], Sequence[Expression]],
+    slopes: tuple[list[list[Expression]], ...],
+    point: Point,
+) -> list[str]:
+    """For each of the three families a pair whose bracket is wrong at the point, as text; empty if there is none."""
+    n, names = system.dimension, system.coordinates
+    values = iter(evaluate_exactly([e for half in slopes for row in half for e in row], point))
+    (a_x, a_p), (b_x, b_p) = (_halves([[next(values) for _ in range(2 * n)] for _ in names]) for _ in maps)
+    at_alpha, at_beta = (_tensor(system, half, point) for half in maps)
+
+    def wrong(bracket: Any, expected: Any) -> str:
+        rest = bracket - expected
+        pairs = ((i, j) for i in range(n) for j in range(n) if rest[i, j] != 0)
+        i, j = next(pairs, (-1, -1))
+        return "" if i < 0 else f"({names[i]}, {names[j]}), at a point: {float(rational(rest[i, j])):.4g}"
+
+    return [
+        wrong(a_x * a_p.transpose() - a_p * a_x.transpose(), at_alpha),
+        wrong(b_x * b_p.transpose() - b_p * b_x.transpose(), -at_beta),
+        wrong(a_x * b_p.transpose() - a_p * b_x.transpose(), fmpq_mat(n, n)),
+    ]
+
+
+def _halves(rows: list[list[Fraction]]) -> tuple[Any, Any]:
+    """The derivatives in x, and those in p."""
+    n = len(rows)
+    return _matrix([row[:n] for row in rows]), _matrix([row[n:] for row in rows])
+
+
+def _tensor(system: System, maps: Sequence[Expression], point: Point) -> Any:
+    """π at the image of the point."""
+    image = dict(zip(system.coordinates, evaluate_exactly(maps, point), strict=True))
+    values = iter(evaluate_exactly([e for row in system.poisson for e in row], {**point, **image}))
+    return _matrix([[next(values) for _ in row] for row in system.poisson])
+
+
+def _matrix(rows: list[list[Fraction]]) -> Any:
+    return fmpq_mat([[fmpq(v.numerator, v.denominator) for v in row] for row in rows])
