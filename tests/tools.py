@@ -20,6 +20,7 @@ WARNINGS = (
 _DEBIAN = {
     "clang": "clang libclang-rt-dev",
     "clang++": "clang libclang-rt-dev",
+    "ninja": "ninja-build",
     "node": "nodejs",
     "qemu-aarch64-static": "qemu-user-static",
 }

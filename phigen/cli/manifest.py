@@ -11,12 +11,13 @@ import json
 import os
 import re
 import shlex
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
 from phigen._version import __version__
+from phigen.cli.build_files import FILES
 from phigen.cli.generation import Options
 from phigen.errors import CheckError
 from phigen.registry import TARGETS, suffixes
@@ -92,25 +93,33 @@ def relative(spec_file: str, folder: Path) -> str | None:
     return Path(os.path.relpath(source, target)).as_posix()
 
 
-def text_of(entries: Mapping[str, Entry]) -> str:
-    """The manifest as JSON."""
+def text_of(entries: Mapping[str, Entry], builds: Collection[str] = ()) -> str:
+    """The manifest as JSON; ``builds`` are the build systems that have files in the folder."""
     solvers = {name: entry.described() for name, entry in sorted(entries.items())}
-    return json.dumps({"manifest": FORMAT, "about": _ABOUT, "solvers": solvers}, indent=2, ensure_ascii=False) + "\n"
+    wanted = {"build_files": sorted(builds)} if builds else {}
+    data = {"manifest": FORMAT, "about": _ABOUT, **wanted, "solvers": solvers}
+    return json.dumps(data, indent=2, ensure_ascii=False) + "\n"
 
 
-def read(folder: Path) -> dict[str, Entry]:
-    """The entries of a folder's manifest, none if there is no manifest. Raises `CheckError` if it is damaged."""
+def read(folder: Path) -> tuple[dict[str, Entry], tuple[str, ...]]:
+    """The entries of a folder's manifest and its build systems, none if there is no manifest.
+
+    Raises `CheckError` if it is damaged.
+    """
     path = folder / FILE
     try:
         data = json.loads(path.read_text(encoding="utf-8"))
     except (FileNotFoundError, NotADirectoryError):
-        return {}
+        return {}, ()
     except ValueError as error:
         raise _damaged(path, f"it is not JSON: {error}") from None
     if not isinstance(data, dict) or data.get("manifest") != FORMAT:
         raise _damaged(path, f"it is not a manifest of format {FORMAT}, the one that phigen {__version__} reads")
     try:
-        return {name: _entry(name, part) for name, part in data["solvers"].items()}
+        builds = tuple(_list_of_texts(data.get("build_files", [])))
+        if not set(builds) <= set(FILES):
+            raise ValueError(f"build systems that do not exist: {builds}")
+        return {name: _entry(name, part) for name, part in data["solvers"].items()}, builds
     except (KeyError, TypeError, AttributeError, ValueError) as error:
         what = f"{error} is missing" if isinstance(error, KeyError) else str(error)
         raise _damaged(path, what) from None

@@ -14,6 +14,7 @@ import click
 from phigen import resources
 from phigen._version import __version__
 from phigen.cli import manifest
+from phigen.cli.build_files import FILES, build_files, sources_lack
 from phigen.cli.completion import specs
 from phigen.cli.console import Console, counted, indented, mend, pass_console, verbosity
 from phigen.cli.failures import Collector
@@ -61,6 +62,9 @@ class Made:
 @click.command("vendor")
 @click.argument("paths", metavar="[SPEC...] DEST", nargs=-1, required=True, type=click.Path(), shell_complete=specs)
 @output_options
+@click.option("--cmake", is_flag=True, help="Write a CMakeLists.txt for the folder, too.")
+@click.option("--meson", is_flag=True, help="Write a meson.build for the folder, too.")
+@click.option("--python", is_flag=True, help="Write an __init__.py, which makes the folder a package, too.")
 @click.option("--check", "checking", is_flag=True, help="Write nothing; fail if a file is not as it should be.")
 @click.option("--force", is_flag=True, help="Overwrite files that were edited by hand or are not phigen's.")
 @verbosity
@@ -76,6 +80,9 @@ def command(
     single_file: bool,
     tangent: bool,
     modified: int | None,
+    cmake: bool,
+    meson: bool,
+    python: bool,
     checking: bool,
     force: bool,
 ) -> None:
@@ -102,21 +109,23 @@ def command(
     )
     if options.words and not spec_files:
         raise click.UsageError("options that change what is generated need the SPEC; without it, the manifest decides")
-    entries, collector = manifest.read(folder), Collector()
+    (entries, known), collector = manifest.read(folder), Collector()
+    asked = {"cmake": cmake, "meson": meson, "python": python}
+    wanted = [system for system in FILES if asked[system] or system in known]
     orders = _from_specs(spec_files, folder, options, entries, checking, collector)
     if not spec_files:
         orders = _from_manifest(folder, entries, collector)
     made = [m for m in (_made(order, collector) for order in orders) if m]
     if checking:
         problems = [p for m in made for p in _problems(folder, entries, m, spec_files)]
-        problems += [] if spec_files else _extra(folder, entries)
+        problems += [] if spec_files else [*_extra(folder, entries), *_wrong_builds(folder, entries, wanted)]
         with collector.collecting():
             _judge(folder, problems)
         collector.finish()
         _report_check(console, folder, made)
         return
     collector.finish()
-    _write(console, folder, entries, made, force)
+    _write(console, folder, entries, made, wanted, force)
 
 
 def _expect_folder(folder: Path, spec_files: Sequence[str], checking: bool) -> None:
@@ -191,7 +200,14 @@ def _made(order: Order, collector: Collector) -> Made | None:
 # -- writing
 
 
-def _write(console: Console, folder: Path, entries: dict[str, Entry], made: Sequence[Made], force: bool) -> None:
+def _write(
+    console: Console,
+    folder: Path,
+    entries: dict[str, Entry],
+    made: Sequence[Made],
+    builds: Sequence[str],
+    force: bool,
+) -> None:
     from phigen.cli.outputs import Change, apply, read
 
     planned: list[tuple[Made, list[Change]]] = []
@@ -201,14 +217,25 @@ def _write(console: Console, folder: Path, entries: dict[str, Entry], made: Sequ
         left = [folder / file for file in (known.files if known else ()) if file not in m.files]
         changes += [Change(path, before, None) for path in left if (before := read(path)) is not None]
         planned.append((m, changes))
+    listed = {**entries, **{m.order.spec.name: m.entry for m in made}}
+    texts = build_files(builds, {name: entry.files for name, entry in listed.items()})
+    for system in sources_lack(builds, {name: entry.files for name, entry in listed.items()}):
+        file, suffix = FILES[system]
+        target = "numpy" if suffix == ".py" else "c"
+        raise click.UsageError(f"{file} is for {suffix[1:]} files, and no solver here has one; -t {target} makes it")
+    others = [Change(folder / file, read(folder / file), text) for file, text in texts.items()]
     obstacles = [o for m, changes in planned for c in changes if (o := _obstacle(c, entries.get(m.order.spec.name)))]
+    obstacles += [c.obstacle for c in others if c.obstacle]
     if obstacles and not force:
         raise CheckError("\n".join(["nothing was written", *indented(obstacles), "  hint: --force overwrites"]))
-    text = manifest.text_of({**entries, **{m.order.spec.name: m.entry for m in made}})
+    text = manifest.text_of(listed, builds)
     listing = Change(folder / manifest.FILE, read(folder / manifest.FILE), text)
-    apply([*(c for _, changes in planned for c in changes), listing])
+    apply([*(c for _, changes in planned for c in changes), *others, listing])
     for m, changes in planned:
         console.note(_done(folder, m, changes))
+    for change in others:
+        if change.state != "unchanged":
+            console.note(f"{folder}: wrote {change.path.name}")
 
 
 def _obstacle(change: Change, known: Entry | None) -> str:
@@ -284,12 +311,24 @@ def _cause(known: Entry | None, made: Made) -> str:
     return "; ".join(causes) or "phigen makes something else of its spec"
 
 
+def _wrong_builds(folder: Path, entries: Mapping[str, Entry], builds: Sequence[str]) -> Iterator[Problem]:
+    """Files of build systems that are not as the manifest wants them."""
+    from phigen.cli.outputs import Change, read
+
+    for file, text in build_files(builds, {name: entry.files for name, entry in entries.items()}).items():
+        change = Change(folder / file, read(folder / file), text)
+        if change.state != "unchanged":
+            what = "missing" if change.before is None else "edited by hand" if change.obstacle else "stale"
+            force = ["--force"] if change.obstacle else []
+            yield Problem(change.path, what, shlex.join(["phigen", "vendor", str(folder), *force]))
+
+
 def _extra(folder: Path, entries: Mapping[str, Entry]) -> Iterator[Problem]:
     """Generated files that the manifest does not know; others are the user's."""
     from phigen.cli.outputs import read
     from phigen.targets.header import split
 
-    known = {file for entry in entries.values() for file in entry.files}
+    known = {file for entry in entries.values() for file in entry.files} | {file for file, _ in FILES.values()}
     for path in sorted(folder.iterdir()):
         if path.suffix in suffixes() and path.is_file() and path.name not in known and split(read(path) or "")[0]:
             yield Problem(path, "extra: generated, but not in the manifest", shlex.join(["rm", str(path)]))

@@ -2,9 +2,12 @@
 
 import json
 import shlex
+import sys
 from pathlib import Path
 
 import pytest
+from tools import run, tool
+from tools import write as write_files
 
 from phigen import resources
 from phigen.cli import manifest
@@ -270,3 +273,73 @@ def test_wrong_usage_is_explained(phigen, write):
     assert phigen("vendor", "--check", "nothing").exit_code == 5
     assert phigen("vendor", "a.yaml", "c.yaml", "ext").exit_code == 1
     assert not Path("ext").exists()
+
+
+def test_build_files_are_kept_up_with_the_solvers(phigen, vendored, write):
+    phigen("vendor", EXT, "--cmake", "--meson")
+    assert solvers().keys() == {"a", "b"}
+    assert "unmodified and current" in vendored().stderr
+    phigen("vendor", write("models/c.yaml"), EXT, "-t", "c")
+    assert "add_library(phigen_c STATIC c.c)" in (EXT / "CMakeLists.txt").read_text()
+    assert "c_dep = declare_dependency" in (EXT / "meson.build").read_text()
+    edit("CMakeLists.txt", "STATIC", "SHARED")
+    done = vendored()
+    assert done.exit_code == 5
+    assert f"{EXT / 'CMakeLists.txt'}: edited by hand" in done.stderr
+    assert phigen("vendor", EXT).exit_code == 5
+    assert phigen("vendor", EXT, "--force").exit_code == 0
+    assert "unmodified and current" in vendored().stderr
+    (EXT / "meson.build").unlink()
+    assert f"{EXT / 'meson.build'}: missing" in vendored().stderr
+
+
+def test_a_package_needs_modules(phigen, vendored):
+    done = phigen("vendor", EXT, "--python")
+    assert done.exit_code == 2
+    assert "-t numpy" in done.stderr
+
+
+MAIN = """#include "a.h"
+#include "b.h"
+int main(void)
+{
+    a_solver s;
+    const double x[a_DIM] = {1.0, 0.5};
+    return a_init(&s, NULL, x) != a_OK || a_integrate(&s, 0.1, 100) != a_OK || b_solver_size() == 0;
+}
+"""
+
+PROJECTS = {
+    "cmake": {
+        "CMakeLists.txt": "cmake_minimum_required(VERSION 3.13)\nproject(mine C)\nadd_subdirectory(ext)\n"
+        "add_executable(main main.c)\ntarget_link_libraries(main phigen::a phigen::b)\n",
+    },
+    "meson": {
+        "meson.build": "project('mine', 'c')\nsubdir('ext')\n"
+        "executable('main', 'main.c', dependencies: [a_dep, b_dep])\n",
+    },
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("system", PROJECTS)
+def test_foreign_projects_build(system, phigen, vendored):
+    phigen("vendor", EXT, f"--{system}")
+    project = EXT.parent.resolve()
+    write_files(project, {"main.c": MAIN, **PROJECTS[system]})
+    if system == "cmake":
+        run([tool("cmake"), "-S", ".", "-B", "build"], project)
+        run([tool("cmake"), "--build", "build"], project)
+    else:
+        pytest.importorskip("mesonbuild")
+        tool("ninja")
+        run([sys.executable, "-m", "mesonbuild.mesonmain", "setup", "build"], project)
+        run([sys.executable, "-m", "mesonbuild.mesonmain", "compile", "-C", "build"], project)
+    run([project / "build" / "main"], project)
+
+
+def test_a_package_is_imported(phigen, write):
+    phigen("vendor", write("a.yaml"), write("b.yaml"), "solvers", "-t", "numpy", "--python")
+    script = "import solvers; print(solvers.a.integrate([1.0, 0.5], 0.1, 10).shape, solvers.__all__)"
+    assert run([sys.executable, "-c", script], Path.cwd()).startswith("(")
+    assert phigen("vendor", "--check", "solvers").exit_code == 0

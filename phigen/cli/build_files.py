@@ -1,0 +1,41 @@
+"""Files by which other build systems take a folder of vendored solvers: CMake, Meson, a Python package."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from pathlib import Path
+
+#: The file of each build system, and the suffix of the sources that it is about.
+FILES = {"cmake": ("CMakeLists.txt", ".c"), "meson": ("meson.build", ".c"), "python": ("__init__.py", ".py")}
+
+
+def build_files(systems: Collection[str], solvers: Mapping[str, Collection[str]]) -> dict[str, str]:
+    """The texts of the files, by name; ``solvers`` maps the names of all that are in the folder to their files.
+
+    A build system for which there are no sources has a file all the same, which says nothing.
+    """
+    return {FILES[system][0]: _text(system, solvers) for system in sorted(systems)}
+
+
+def sources_lack(systems: Collection[str], solvers: Mapping[str, Collection[str]]) -> list[str]:
+    """The build systems for which no solver has sources."""
+    endings = {Path(file).suffix for files in solvers.values() for file in files}
+    return [system for system in sorted(systems) if FILES[system][1] not in endings]
+
+
+def _text(system: str, solvers: Mapping[str, Collection[str]]) -> str:
+    from phigen._version import __version__
+    from phigen.targets.header import CHECKSUM, checksum
+    from phigen.targets.rendering import render
+
+    file, suffix = FILES[system]
+    found = [(name, sorted(f for f in files if f.endswith(suffix))) for name, files in sorted(solvers.items())]
+    found = [(name, sources) for name, sources in found if sources]
+    values = {"solvers": found, "names": [name for name, _ in found], "quoted": _quoted}
+    body = render("vendor", file, values)
+    head = [f"Made by phigen vendor {__version__}, for the solvers beside it; made again whenever they are."]
+    return "".join(f"# {line}\n" for line in [*head, f"{CHECKSUM} {checksum(body)}"]) + body
+
+
+def _quoted(texts: Sequence[str]) -> str:
+    return ", ".join(f"'{text}'" for text in texts)
