@@ -13,9 +13,9 @@ from functools import cache
 from typing import Any
 
 import mpmath
-from support import RawC, Setting, relative_defect, values
+from support import RawC, Setting, relative_defect, spec_of, values
 
-from phigen import resources, spec
+from phigen import spec
 from phigen.compilation import Compilation
 from phigen.compiler import compile_spec
 from phigen.realisations import karasev
@@ -33,7 +33,7 @@ STAGE = Symbol("h", "stage")
 @cache
 def by_paths(name: str, order: int | None = None) -> Compilation:
     """A system of the corpus compiled with the bi-realisation karasev, whatever its spec asks for."""
-    return with_paths(spec.load(resources.bundled_specs() / f"{name}.yaml"), order)
+    return with_paths(spec_of(name), order)
 
 
 def with_paths(given: spec.Spec, order: int | None = None, composition: str = "auto") -> Compilation:

@@ -26,8 +26,15 @@ from phigen.symbolic.symbols import momentum
 TIMED = ("duffing", "spin_resonance")
 NAMES = sorted({path.stem for path in resources.bundled_specs().glob("*.yaml")} - {*TIMED})
 
+
+@cache
+def spec_of(name: str) -> spec.Spec:
+    """The spec of a system of the corpus."""
+    return spec.load(resources.bundled_specs() / f"{name}.yaml")
+
+
 #: Every run of the corpus, as pairs of names.
-RUNS = [(name, run) for name in NAMES for run in spec.load(resources.bundled_specs() / f"{name}.yaml").runs]
+RUNS = [(name, run) for name in NAMES for run in spec_of(name).runs]
 
 #: One system for each kind of step and of bi-realisation that the corpus has; tests/test_corpus.py tells what they
 #: cover. What takes long is done for these by `make test`, and for all by `make test-all`.
@@ -75,16 +82,16 @@ def small(compilation: Compilation) -> Compilation:
 @cache
 def as_given(name: str) -> Compilation:
     """The compilation of a spec of the corpus, as it stands."""
-    return compile_spec(spec.load(resources.bundled_specs() / f"{name}.yaml"))
+    return compile_spec(spec_of(name), system=described(name)[1])
 
 
 @cache
 def compiled(name: str, order: int | None = None, scheme: str | None = None) -> Compilation:
     """The compilation of a system of the corpus, plain."""
-    found = spec.load(resources.bundled_specs() / f"{name}.yaml")
+    found = spec_of(name)
     if order is None and scheme is None and found.profile == "fast" and not as_given(name).program.gauge:
         return as_given(name)
-    return compile_spec(plain(found), order=order, scheme=scheme)
+    return compile_spec(plain(found), order=order, scheme=scheme, system=described(name)[1])
 
 
 def golden(name: str, file: str) -> str:
@@ -95,7 +102,7 @@ def golden(name: str, file: str) -> str:
 @cache
 def described(name: str) -> tuple[spec.Spec, System, BiRealisation]:
     """What is known of a system of the corpus before anything of its solver is made: quick, for choosing tests."""
-    found = spec.load(resources.bundled_specs() / f"{name}.yaml")
+    found = spec_of(name)
     system = system_from_spec(found)
     return found, system, realise(system, found.birealisation)
 

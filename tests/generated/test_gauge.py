@@ -6,9 +6,9 @@ from functools import cache
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
-from support import NAMES, files, golden, slow_but
+from support import NAMES, files, golden, slow_but, spec_of
 
-from phigen import resources, spec
+from phigen import spec
 from phigen.api import solver_of
 from phigen.compiler import compile_spec
 from phigen.errors import SpecError
@@ -17,13 +17,9 @@ from phigen.spec.model import Extras
 from phigen.symbolic.numeric import evaluate
 
 
-def given(name):
-    return spec.load(resources.bundled_specs() / f"{name}.yaml")
-
-
 @cache
 def gauged(name, profile="fast"):
-    return compile_spec(replace(given(name), profile=profile), extras=Extras(tangent=True))
+    return compile_spec(replace(spec_of(name), profile=profile), extras=Extras(tangent=True))
 
 
 def module(compilation):
@@ -36,7 +32,7 @@ QUICK = ["rigid_body", "sklyanin_gyrostat"]
 
 
 def start_of(name):
-    run = next(iter(given(name).runs.values()))
+    run = next(iter(spec_of(name).runs.values()))
     return np.array([float(v) for v in run.initial]), float(run.step)
 
 
@@ -129,7 +125,7 @@ def test_order_is_kept_and_the_error_is_smaller(order):
     reference = solve_ivp(lambda _, y: field(y), (0, 10), x, method="DOP853", rtol=2.3e-14, atol=1e-16).y[:, -1]
     errors = {}
     for setting in ("auto", "none"):
-        solver = solver_of(compile_spec(replace(given("rigid_body"), gauge=setting), order=order), "c")
+        solver = solver_of(compile_spec(replace(spec_of("rigid_body"), gauge=setting), order=order), "c")
         steps = (20, 40) if order > 2 else (100, 200)
         ends = [solver.integrate(x, h=10 / n, steps=n).x[-1] for n in steps]
         errors[setting] = [np.max(np.abs(end - reference)) for end in ends]

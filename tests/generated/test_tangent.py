@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from precise_path import PrecisePathStep
 from support import (
-    BODY, NAMES, QUICK, TARGETS, WARNINGS, PreciseStep, RawC, compiled, files, plain, run, setting,
-    slow_but, solver, tool, write,
+    BODY, NAMES, QUICK, TARGETS, WARNINGS, PreciseStep, RawC, compiled, described, files, plain, run, setting,
+    slow_but, solver, spec_of, tool, write,
 )  # fmt: skip
 
 from phigen import StepError, compile, resources, spec
@@ -27,7 +27,7 @@ COMPOSED = f"{BODY}order: 6\ncomposition: kahan-li\ngauge: none\n"
 
 @cache
 def with_tangent(name):
-    return compile_spec(plain(spec.load(resources.bundled_specs() / f"{name}.yaml")), extras=TANGENT)
+    return compile_spec(plain(spec_of(name)), extras=TANGENT, system=described(name)[1])
 
 
 @cache

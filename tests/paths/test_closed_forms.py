@@ -7,9 +7,8 @@ import mpmath
 import numpy as np
 import pytest
 from precise_path import PATH_DIGITS, PrecisePathStep, PreciseSystem, by_paths, compile_paths, numbers
-from support import BODY, SPECIES, compile_text, gradient, slow_but, solver, values
+from support import BODY, SPECIES, compile_text, gradient, slow_but, solver, spec_of, values
 
-from phigen import resources, spec
 from phigen.compiler import compile_spec
 from phigen.spec.model import BirealisationChoice
 
@@ -61,7 +60,7 @@ LINEAR = ["rigid_body", "engel_geodesics", "maxwell_bloch", "lagrange_top", "gau
 
 @pytest.mark.parametrize("name", slow_but(["rigid_body", "engel_geodesics", "maxwell_bloch"], LINEAR))
 def test_paths_of_a_linear_bracket_are_the_exponential(name):
-    given = spec.load(resources.bundled_specs() / f"{name}.yaml")
+    given = spec_of(name)
     run = "reference" if "reference" in given.runs else next(iter(given.runs))
     exponential = compile_spec(replace(given, birealisation=BirealisationChoice("exponential"), gauge="none"), order=4)
     paths = by_paths(name, 4)

@@ -24,7 +24,10 @@ def test_the_files_of_a_target_have_its_suffixes_and_tell_it(program, target):
     assert registry.target_of(files, program.name).name == target
 
 
-@pytest.mark.parametrize(("target", "hint"), [("numpyy", "did you mean 'numpy'"), ("fortran", "there are c, numpy")])
+@pytest.mark.parametrize(
+    ("target", "hint"),
+    [("numpyy", "did you mean 'numpy'"), ("JavaScript", "did you mean 'js'"), ("fortran", "there are c, numpy")],
+)
 def test_an_unknown_target_is_an_error_with_a_hint(program, target, hint):
     with pytest.raises(ValueError, match=f"unknown target '{target}'; {hint}"):
         emit(program, target, COMMAND)
