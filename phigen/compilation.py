@@ -8,6 +8,7 @@ from typing import Any
 
 from phigen.geometry.system import System, system_of_lattice
 from phigen.lattice.cell import Cell
+from phigen.lattice.sweeps import LatticePlan
 from phigen.realisations.protocol import BiRealisation
 from phigen.scheme.discretisation import Discretisation
 from phigen.scheme.gauge import Gauge, Gauged
@@ -48,6 +49,7 @@ class Compilation:
     gauged: Gauged | None = None
     scheme: Discretisation | None = None
     cell: Cell | None = None
+    sweeps: LatticePlan | None = None
 
     def __repr__(self) -> str:
         return f"<Compilation of {self.spec.name}: order {self.order.order}, {self.label}>"

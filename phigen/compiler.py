@@ -25,7 +25,7 @@ from phigen.compilation import Compilation, NoSystem
 from phigen.errors import CheckError, LimitError, PhigenWarning, SpecError
 from phigen.geometry.system import System, system_from_spec
 from phigen.lattice.building import cell_from_spec
-from phigen.lattice.sweeps import build_sweeps
+from phigen.lattice.sweeps import build_sweeps, plan_sweeps
 from phigen.proofs import statements
 from phigen.proofs.examination import UNEXAMINED, Examination, doubts, located, refutation, refuted
 from phigen.realisations.catalogue import realise
@@ -33,7 +33,7 @@ from phigen.scheme.assemble import build_program
 from phigen.scheme.choosing import plan as plan_splitting
 from phigen.scheme.discretisation import discretise
 from phigen.scheme.gauge import Gauge, choose, given
-from phigen.scheme.order import Order, plan_order
+from phigen.scheme.order import plan_order
 from phigen.scheme.program import Program
 from phigen.scheme.splitting import build_splitting
 from phigen.spec.model import Extras, Spec
@@ -82,7 +82,7 @@ def examine(
     """
     clock = _Clock()
     if spec.lattice:
-        return _examine_lattice(spec, clock)
+        return _examine_lattice(spec, order, scheme, extras, clock)
     _tell_of_lattice(spec)
     with bounded(spec), progress.stage(spec.name):
         try:
@@ -123,8 +123,6 @@ def compile_proved(
         raise CheckError(refutation(found))
     for warning in doubts(found):
         warnings.warn(str(warning), PhigenWarning, stacklevel=3)
-    if spec.lattice:
-        return compile_lattice(spec, order=order, scheme=scheme, extras=extras)
     if found.compilation is None:
         raise found.obstacle or AssertionError("an examination without compilation has an obstacle")
     return found.compilation
@@ -137,24 +135,24 @@ def compile_lattice(
     clock = _Clock()
     with bounded(spec):
         cell = clock.timed("cell", lambda: cell_from_spec(spec))
+        asked: dict[str, Any] = {"scheme": scheme or spec.scheme, "composition": spec.composition}
+        asked |= {"order": order or spec.wanted_order, "extras": extras or spec.extras}
+        plan = clock.timed("splitting", lambda: plan_sweeps(cell, spec=spec, **asked))
         program = clock.timed(
             "program",
             lambda: build_sweeps(
                 cell,
-                order=order or spec.wanted_order,
-                scheme=scheme or spec.scheme,
-                composition=spec.composition,
+                plan,
                 extras=extras or spec.extras,
                 title=spec.title,
                 licence=spec.license,
                 spec_sha256=spec.source_sha256,
                 profile=spec.profile,
                 lanes=spec.solver.lanes,
-                spec=spec,
             ),
         )
     nothing: Any = NoSystem(spec)
-    return Compilation(spec, nothing, None, Order(program.order, 0), program, seconds=clock.seconds, cell=cell)
+    return Compilation(spec, nothing, None, plan.choice.order, program, seconds=clock.seconds, cell=cell, sweeps=plan)
 
 
 def compile_file(path: str | Path, *, order: int | None = None) -> Compilation:
@@ -182,7 +180,9 @@ def _tell_of_lattice(spec: Spec) -> None:
         warnings.warn(str(place), PhigenWarning, stacklevel=4)
 
 
-def _examine_lattice(spec: Spec, clock: _Clock) -> Examination:
+def _examine_lattice(
+    spec: Spec, order: int | None, scheme: str | None, extras: Extras | None, clock: _Clock
+) -> Examination:
     """Prove what can be proved about a lattice, for all sizes at once."""
     with bounded(spec), progress.stage(spec.name):
         try:
@@ -190,7 +190,14 @@ def _examine_lattice(spec: Spec, clock: _Clock) -> Examination:
         except SpecError as error:
             raise located(error, spec) from None
         groups = clock.timed("proofs", lambda: statements.lattice(cell))
-    return Examination(spec, groups, unexamined=UNEXAMINED if refuted(groups) and len(groups) == 1 else "")
+        if refuted(groups):
+            return Examination(spec, groups, unexamined=UNEXAMINED if len(groups) == 1 else "")
+        try:
+            compilation = compile_lattice(spec, order=order, scheme=scheme, extras=extras)
+        except SpecError as error:
+            return Examination(spec, groups, obstacle=located(error, spec))
+        groups = groups | clock.timed("proofs", lambda: statements.sweeps(compilation))
+    return Examination(spec, groups, compilation)
 
 
 def _compiled(

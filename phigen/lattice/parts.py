@@ -80,11 +80,14 @@ class SiteMotion:
     """How sites of one colour move: increments of the fields, which read the site and neighbours that stand still.
 
     ``gathered`` are the fields whose force is a sum over bonds or pairs, the symbols `GATHERED` of the increments.
+    ``solution`` are the increments with a symbol for each component of the gradient, which solve ẋ = ``rates``.
     """
 
     colour: int
     increments: Mapping[str, Expression]
     gathered: tuple[str, ...] = ()
+    rates: Mapping[str, Expression] = field(default_factory=dict)
+    solution: Mapping[str, Expression] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -296,7 +299,8 @@ class PartSearch:
         increments = dict(zip(cell.fields, substitute(found.increments, forces), strict=True))
         self._manner = found.manner
         moved = {f: e for f, e in increments.items() if not e.is_zero}
-        return SiteMotion(colour, moved, tuple(dict.fromkeys(gathered)))
+        solution = {f: e for f, e in zip(cell.fields, found.increments, strict=True) if f in moved}
+        return SiteMotion(colour, moved, tuple(dict.fromkeys(gathered)), field, solution)
 
     def _solved(self, rates: Mapping[str, Expression], part: Sequence[tuple[Summand, int]]) -> Solved:
         ring = _ring(self.cell.fields, rates.values())
@@ -341,7 +345,13 @@ class PartSearch:
         found = []
         for flow in flows:
             moved = {f: e for f, e in zip(cell.fields, flow.increment, strict=True) if not e.is_zero}
-            motions = tuple(SiteMotion(c, moved) for c in colours) if moved else ()
+            slopes = dict(zip(cell.fields, gradient(flow.hamiltonian, cell.fields), strict=True))
+            rates: dict[str, list[Expression]] = {f: [] for f in moved}
+            for (f, g), entry in cell.bracket.items():
+                if f in moved:
+                    rates[f].append(entry * slopes[g])
+            field = {f: total(listed) for f, listed in rates.items()}
+            motions = tuple(SiteMotion(c, moved, (), field, moved) for c in colours) if moved else ()
             own = ((Summand(flow.hamiltonian, steps, steps), colours),)
             found.append(CellFlow(flow.hamiltonian, flow.increment, flow.manner, motions, own))
         return found

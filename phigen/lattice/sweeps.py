@@ -4,13 +4,23 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 from phigen.errors import Diagnostic, Location, SpecError
 from phigen.lattice.building import least_sizes
 from phigen.lattice.cell import GRID, PERIODIC, Cell
 from phigen.lattice.kicks import cell_kicks
-from phigen.lattice.parts import PRESENT, CellFlow, SiteMotion, field_at_site, present, split_cell, summands_of
+from phigen.lattice.parts import (
+    PRESENT,
+    CellFlow,
+    CellSplitting,
+    SiteMotion,
+    field_at_site,
+    present,
+    split_cell,
+    summands_of,
+)
 from phigen.scheme.choosing import Choice, planned
 from phigen.scheme.kernel import Kernel, Output
 from phigen.scheme.lowering import operation_counts
@@ -31,27 +41,49 @@ class _Nowhere:
     locations: Mapping[tuple[Any, ...], Location] = {}
 
 
-def build_sweeps(
+@dataclass(frozen=True)
+class LatticePlan:
+    """The parts of H of a lattice, and the method with the flows in the order of its steps."""
+
+    parts: CellSplitting
+    choice: Choice
+
+    @property
+    def flows(self) -> tuple[CellFlow, ...]:
+        """The flows in the order of a step."""
+        return tuple(flow for flow in self.choice.splitting.flows if isinstance(flow, CellFlow))
+
+
+def plan_sweeps(
     cell: Cell,
     *,
     order: int = 4,
     scheme: str = "auto",
     composition: str = "auto",
     extras: Extras = NO_EXTRAS,
+    spec: Spec | None = None,
+) -> LatticePlan:
+    """The parts and the method. Raises `SpecError` where H does not split, and for what is not offered."""
+    host = spec or _Nowhere()
+    _expect_offered(cell, scheme, extras, host.locations)
+    parts = split_cell(cell, host.locations.get(("hamiltonian",)))
+    plain = Splitting(parts.flows)
+    return LatticePlan(parts, planned(host, plain, order, composition, lambda: cell_kicks(cell, parts)))
+
+
+def build_sweeps(
+    cell: Cell,
+    plan: LatticePlan,
+    *,
+    extras: Extras = NO_EXTRAS,
     title: str = "",
     licence: str = "0BSD",
     spec_sha256: str = "",
     profile: str = "fast",
     lanes: bool = True,
-    spec: Spec | None = None,
 ) -> Program:
-    """The solver of a lattice as a program. Raises `SpecError` where H does not split, and for what is not offered."""
-    host = spec or _Nowhere()
-    _expect_offered(cell, scheme, extras, host.locations)
-    parts = split_cell(cell, host.locations.get(("hamiltonian",)))
-    plain = Splitting(parts.flows)
-    choice = planned(host, plain, order, composition, lambda: cell_kicks(cell, parts))
-    flows = [flow for flow in choice.splitting.flows if isinstance(flow, CellFlow)]
+    """The solver of a lattice as a program."""
+    parts, choice, flows = plan.parts, plan.choice, plan.flows
     coefficients = Coefficients([*(p.name for p in cell.parameters if p.at == "all"), TIME, KICK])
     schedule = choice.schedule()
     swept = tuple(

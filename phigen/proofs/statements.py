@@ -10,6 +10,7 @@ from phigen.geometry import checks
 from phigen.geometry.definedness import undefined_parts
 from phigen.geometry.jacobi import jacobi_identity
 from phigen.geometry.system import System
+from phigen.lattice import flow_proofs
 from phigen.lattice import proofs as of_lattices
 from phigen.lattice.cell import Cell
 from phigen.realisations import axioms
@@ -62,6 +63,12 @@ def lattice(cell: Cell) -> dict[str, tuple[Statement, ...]]:
         "Hamiltonian": tuple(of_lattices.pair_symmetry(cell)),
     }
     return groups | {group: listed for group, listed in found.items() if listed}
+
+
+def sweeps(compilation: Compilation) -> dict[str, tuple[Statement, ...]]:
+    """The parts of H of a lattice and their flows."""
+    cell, plan = compilation.cell, compilation.sweeps
+    return {SPLITTING: tuple(flow_proofs.check(cell, plan))} if cell and plan else {}
 
 
 def method(compilation: Compilation) -> dict[str, tuple[Statement, ...]]:

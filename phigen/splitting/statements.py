@@ -61,7 +61,7 @@ def _bracket(system: System, f: Expression, g: Expression) -> Expression:
     return total(a * b for a, b in zip(gradient(f, names), field, strict=True))
 
 
-def _angles_added(e: Expression) -> Expression:
+def angles_added(e: Expression) -> Expression:
     """sin, cos and exp of sums and differences by the addition theorems, which the ring does not know."""
 
     def visit(node: Expression, args: list[Expression]) -> Expression:
@@ -85,6 +85,6 @@ def _flow_statement(system: System, flow: Flow, k: int) -> Statement:
     point = {c: symbol(c) + e for c, e in zip(names, flow.increment, strict=True) if not e.is_zero}
     required = substitute(field, point)
     residuals = [(f"{c} at t = 0", e) for c, e in zip(names, start, strict=True)]
-    residuals += [(f"rate of {c}", a - _angles_added(b)) for c, a, b in zip(names, rates, required, strict=True)]
+    residuals += [(f"rate of {c}", a - angles_added(b)) for c, a, b in zip(names, rates, required, strict=True)]
     name = f"the flow Φ of H_{k}: Φ_0 = 1, dΦ_t/dt = π∇H_{k}∘Φ_t"
     return decide_zero(name, residuals, system.positive, flow.manner)

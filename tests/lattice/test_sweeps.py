@@ -18,9 +18,11 @@ from phigen.compiler import compile_spec, emit
 from phigen.errors import SpecError, StepError
 from phigen.lattice.building import cell_from_spec
 from phigen.lattice.expansion import Expansion, expand
+from phigen.proofs import statements
 from phigen.runtime.lattice import LatticeSolver
 from phigen.runtime.modules import load_module
 from phigen.symbolic.arrays import evaluate
+from phigen.symbolic.verdict import PROVED, REFUTED
 
 SPINS = """
 coordinates: [x, y, z]
@@ -337,3 +339,23 @@ def test_disorder_by_a_formula_has_to_be_given() -> None:
     found = lattice_solver_of(compile_spec(specs.loads(f"phigen: 1\nname: disordered\n{text}\n")), "numpy")
     with pytest.raises(TypeError, match="'e' has no default for all sizes"):
         found.integrate(start("dnls"), 0.1, 1)
+
+
+@pytest.mark.parametrize("name", TEXTS)
+def test_parts_and_flows_are_proved(name: str) -> None:
+    compilation = compiled(name)
+    found = statements.sweeps(compilation)[statements.SPLITTING]
+    assert len(found) == 1 + len(compilation.program.step.parts)
+    assert {s.verdict for s in found} == {PROVED}
+
+
+def test_a_wrong_flow_is_refuted() -> None:
+    compilation = compiled("xxz")
+    plan = compilation.sweeps
+    first, *others = plan.flows
+    (motion,) = first.motions
+    wrong = {f: -e if f == "y" else e for f, e in motion.solution.items()}
+    flows = (replace(first, motions=(replace(motion, solution=wrong),)), *others)
+    broken = replace(plan, choice=replace(plan.choice, splitting=replace(plan.choice.splitting, flows=flows)))
+    verdicts = [s.verdict for s in statements.sweeps(replace(compilation, sweeps=broken))[statements.SPLITTING]]
+    assert verdicts == [PROVED, REFUTED, PROVED, PROVED]

@@ -1,0 +1,47 @@
+"""What makes the splitting of a lattice right, proved for all sizes at once.
+
+Parts sum to H; coordinates of a part commute over all the lattice, so the components of its gradient are constant along
+its flow; and with these as constants, and neighbours that do not move, the motion of a site solves its equation.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from phigen.lattice.cell import Cell
+from phigen.lattice.parts import SiteMotion, summands_of
+from phigen.lattice.sweeps import LatticePlan
+from phigen.splitting.ring import KICK, TIME
+from phigen.splitting.statements import angles_added
+from phigen.symbolic.expression import ZERO, Expression, derivatives, number, substitute, symbol, symbols_of, total
+from phigen.symbolic.verdict import Statement, decide_zero
+
+
+def check(cell: Cell, plan: LatticePlan) -> Iterator[Statement]:
+    """The statements, those on flows in the order of the parts."""
+    count, flows = plan.parts.colouring.count, plan.flows
+    positive = tuple(p.name for p in cell.parameters if p.positive)
+    parts = [number(len(colours)) * s.expression for flow in flows for s, colours in flow.summands]
+    rest = number(count) * total(s.expression for s in summands_of(cell)) - total(substitute(parts, {KICK: ZERO}))
+    modified = any(KICK in symbols_of(flow.hamiltonian) for flow in flows)
+    name = "H = " + " + ".join(f"H_{k}" for k in range(1, len(flows) + 1)) + " at κ = 0" * modified
+    yield decide_zero(name, [("", rest)], positive, f"sites of {count} colours" if count > 1 else "")
+    for k, flow in enumerate(flows, 1):
+        residuals = [r for motion in flow.motions for r in _residuals(motion)]
+        name = f"the flow Φ of H_{k} at each site: Φ_0 = 1, dΦ_t/dt = π∇H_{k}∘Φ_t"
+        yield decide_zero(name, residuals, positive, flow.manner)
+
+
+def _residuals(motion: SiteMotion) -> Iterator[tuple[str, Expression]]:
+    """What must vanish for the motion of a site to be the flow."""
+    names, increments = list(motion.solution), list(motion.solution.values())
+    start = substitute(increments, {TIME: ZERO})
+    speeds = derivatives(increments, TIME)
+    point = {f: symbol(f) + e for f, e in motion.solution.items()}
+    required = substitute([motion.rates.get(f, ZERO) for f in names], point)
+    yield from zip((f"{f} at t = 0" for f in names), start, strict=True)
+    for f, a, b in zip(names, speeds, required, strict=True):
+        yield f"rate of {f}", a - angles_added(b)
+    for f, rate in motion.rates.items():
+        if f not in motion.solution:
+            yield f"rate of {f}", rate
