@@ -7,16 +7,18 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from lattice.lattices import on_grid
+from lattice.lattices import LATTICES, on_grid
 
 from phigen.compiler import examine
 from phigen.geometry.system import system_from_spec
 from phigen.lattice.building import cell_from_spec, least_sizes
 from phigen.lattice.cell import vector_field
 from phigen.lattice.expansion import expand
+from phigen.lattice.observing import summed
 from phigen.lattice.states import start_of
-from phigen.spec import load
+from phigen.spec import load, loads
 from phigen.symbolic.arrays import evaluate
+from phigen.symbolic.expression import total
 from phigen.symbolic.verdict import PROVED
 
 FILES = sorted(Path(__file__).with_name("corpus").glob("*.yaml"))
@@ -42,6 +44,19 @@ def test_a_lattice_is_documented_proved_and_starts(path: Path) -> None:
         start = start_of(spec, run)
         assert start.state.shape == (len(spec.coordinates), *start.sizes)
         assert np.all(np.isfinite(start.state))
+
+
+def test_sums_over_open_and_periodic_grids_are_those_of_expansions() -> None:
+    for name, text in LATTICES.items():
+        spec = loads(text)
+        cell, start = cell_from_spec(spec), start_of(spec, next(iter(spec.runs.values())))
+        if cell.axes:
+            expansion = expand(cell, start.sizes)
+            values = expansion.numbers(start.parameters)
+            values |= dict(zip(expansion.coordinates, start.state.reshape(-1), strict=True))
+            (expected,) = evaluate([total(expansion.summed(cell.hamiltonian))], values)
+            mine, _ = summed(cell, cell.hamiltonian, start.state, start.parameters)
+            np.testing.assert_allclose(mine, expected, rtol=1e-13, atol=1e-13, err_msg=name)
 
 
 @pytest.mark.parametrize("path", PERIODIC, ids=lambda p: p.stem)
