@@ -167,6 +167,7 @@ def interface_of(program: Program) -> Interface:
         positive=frozenset(p.name for p in program.parameters if p.positive),
         casimirs=program.casimirs,
         time=program.time,
+        monitored=program.monitor is not None,
     )
     if not isinstance(program.step, Sweeps):
         return about

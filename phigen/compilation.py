@@ -17,6 +17,7 @@ from phigen.scheme.program import Program
 from phigen.series.hamilton_jacobi import HamiltonJacobi
 from phigen.spec.model import Spec
 from phigen.splitting.parts import Splitting
+from phigen.symbolic.expression import Expression
 
 
 class NoSystem:
@@ -90,6 +91,11 @@ class Compilation:
     def stage(self) -> Order:
         """The order and the terms of one stage: those of the method, unless it is composed of stages of order 2."""
         return self.order if len(self.program.fractions) == 1 else Order(2, 1)
+
+    @property
+    def monitor(self) -> Expression | None:
+        """dt/dτ, where steps are equal in τ."""
+        return self.gauge.monitor
 
     @property
     def series(self) -> HamiltonJacobi:

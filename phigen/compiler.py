@@ -33,6 +33,7 @@ from phigen.scheme.assemble import build_program
 from phigen.scheme.choosing import plan as plan_splitting
 from phigen.scheme.discretisation import discretise
 from phigen.scheme.gauge import Gauge, choose, given
+from phigen.scheme.monitor import monitor_of
 from phigen.scheme.order import plan_order
 from phigen.scheme.program import Program
 from phigen.scheme.splitting import build_splitting
@@ -96,6 +97,9 @@ def examine(
         if refuted(groups):
             return Examination(spec, groups, unexamined=UNEXAMINED)
         groups = groups | clock.timed("proofs", lambda: statements.integrals(source))
+        groups = groups | statements.monitor(source, spec)
+        if refuted({name: found for name, found in groups.items() if name == statements.MONITOR}):
+            return Examination(spec, groups, unexamined="the method")
         try:
             compilation = _compiled(spec, source, order, scheme, extras or spec.extras, profile or spec.profile, clock)
         except SpecError as error:
@@ -216,7 +220,7 @@ def _compiled(
     choice = replace(spec.birealisation, order=order) if order else spec.birealisation
     realisation = clock.timed("bi-realisation", lambda: realise(source, choice))
     plan = plan_order(order or spec.order, None if order else spec.terms, symmetric=realisation.symmetric)
-    gauged = clock.timed("gauge", lambda: choose(source, realisation, spec.gauge))
+    gauged = clock.timed("gauge", lambda: choose(source, realisation, spec.gauge, monitor_of(spec)))
     reached = clock.timed(
         "generating function", lambda: discretise(gauged.system, realisation, gauged.series, plan, spec.composition)
     )

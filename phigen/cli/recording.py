@@ -92,6 +92,12 @@ class Recorder:
         return f"phigen, order {self.solver.order}"
 
     @property
+    def time(self) -> float:
+        """The physical time of the state."""
+        monitored = self.solver.interface.monitored
+        return self.session.time() if monitored else self.experiment.t0 + self.experiment.h * self.session.steps
+
+    @property
     def section_text(self) -> str:
         """The expression of the section, for people."""
         section = self.experiment.run.section
@@ -129,6 +135,8 @@ class Recorder:
     def see(self, piece: Piece) -> None:
         """Take in what a piece of the integration gave."""
         t = self.experiment.t0 + self.experiment.h * piece.numbers.astype(np.float64)
+        if self.solver.interface.monitored:
+            t = piece.passed
         energy = self.solver.energies(piece.x, t, self.experiment.parameters)
         casimirs = self.solver.backend.casimirs(piece.x, self.experiment.parameters)
         rows = np.column_stack([t, piece.x, energy, casimirs])
@@ -271,29 +279,28 @@ def record(recorder: Recorder, console: Console) -> tuple[StepError | None, bool
 
 
 def compared(
-    compilation: Compilation, solver: Solver, experiment: Experiment, method: str, console: Console
+    compilation: Compilation, solver: Solver, experiment: Experiment, method: str, console: Console, end: float
 ) -> tuple[Watch, Trajectory]:
-    """A classical method on the same experiment: its errors, and its trajectory as far as a figure can show it."""
+    """A classical method on the same experiment: its errors, and its trajectory as far as a figure can show it.
+
+    It makes as many steps; with a monitor they are equal in t, and end at the same time.
+    """
     from phigen.study import classical
     from phigen.study.methods import extended, field_of
 
     run, parameters, names = experiment.run, experiment.parameters, solver.interface
     start, backend = time.perf_counter(), solver.backend
+    h = end / run.steps if solver.interface.monitored else experiment.h
     watch = Watch(method, compilation.system, run, parameters, experiment.rows)
     sketch = Sketch(names.dimension, len(names.casimirs), experiment.rows)
 
     with console.progress(method, run.steps) as progress:
         x0 = np.array(experiment.initial)
         for numbers, found in classical.pieces_of(
-            method,
-            field_of(solver, parameters),
-            extended(solver, x0, experiment.t0),
-            experiment.h,
-            run.steps,
-            run.stride,
+            method, field_of(solver, parameters), extended(solver, x0, experiment.t0), h, run.steps, run.stride
         ):
             x = found[:, : len(x0)]
-            t = experiment.t0 + experiment.h * numbers.astype(np.float64)
+            t = experiment.t0 + h * numbers.astype(np.float64)
             watch.see(t, x)
             energy, casimirs = solver.energies(x, t, parameters), backend.casimirs(x, parameters)
             sketch.see(np.column_stack([t, x, energy, casimirs]))
@@ -301,4 +308,4 @@ def compared(
                 progress(int(numbers[-1]))
     console.detail(f"{method}: {time.perf_counter() - start:.3f} s")
     broken = int(watch.state["good"]) < experiment.rows
-    return watch, sketch.trajectory(names.coordinates, names.casimirs, experiment.h, parameters, broken)
+    return watch, sketch.trajectory(names.coordinates, names.casimirs, h, parameters, broken)

@@ -67,7 +67,7 @@ def _integrated(
     failure = _recorded(recorder, console)
     methods, summaries = {recorder.label: recorder.trajectory(failure is not None)}, [recorder.watch.summary()]
     for method in (run.compare or COMPARED) if failure is None else ():
-        watch, methods[method] = compared(compilation, solver, experiment, method, console)
+        watch, methods[method] = compared(compilation, solver, experiment, method, console, recorder.time)
         summaries.append(watch.summary())
     opening = _opening(compilation, solver, experiment, list(methods)[1:2], console) if failure is None else {}
     made = replace(
@@ -106,7 +106,7 @@ def _opening(
     first = replace(experiment, run=replace(run, steps=min(run.steps, _OPENING), stride=1, section=None))
     recorder = Recorder(compilation, solver, first, Files(), lyapunov=False)
     failure = _recorded(recorder, console)
-    beside = {method: compared(compilation, solver, first, method, console)[1] for method in others}
+    beside = {method: compared(compilation, solver, first, method, console, recorder.time)[1] for method in others}
     return {recorder.label: recorder.trajectory(failure is not None), **beside}
 
 

@@ -94,7 +94,7 @@ def command(
             console.note(f"wrote {file}" + (", as far as the run came" if failure or interrupted else ""))
     summaries, drawn = [recorder.watch.summary()], {recorder.label: recorder.trajectory(failure is not None)}
     for method in experiment.run.compare if not (failure or interrupted) else ():
-        watch, drawn[method] = compared(compilation, solver, experiment, method, console)
+        watch, drawn[method] = compared(compilation, solver, experiment, method, console, recorder.time)
         summaries.append(watch.summary())
     if as_json:
         out_json(finite(described_run(compilation, recorder, summaries)))

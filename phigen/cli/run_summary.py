@@ -22,8 +22,9 @@ def print_summary(compilation: Compilation, recorder: Recorder, summaries: Seque
     run, solver, steps = recorder.experiment.run, recorder.solver, recorder.session.steps
     out(heading(f"{compilation.spec.name}, run {run.name}") + (f": {run.description}" if run.description else ""))
     chosen = f"{compilation.label}, order {solver.order}, target {solver.target}"
-    begin, end = recorder.experiment.t0, recorder.experiment.t0 + recorder.experiment.h * steps
-    out(f"  {steps} steps of {float(run.step):.9g}, t = {begin:.9g} … {end:.9g}; {chosen}")
+    unit = " in τ" if solver.interface.monitored else ""
+    times = f"{recorder.experiment.t0:.9g} … {recorder.time:.9g}"
+    out(f"  {steps} steps of {float(run.step):.9g}{unit}, t = {times}; {chosen}")
     state = recorder.session.state().tolist()
     final = ", ".join(f"{c} = {v:.9g}" for c, v in zip(solver.coordinates, state, strict=True))
     out(f"  final state: {final}\n")
@@ -82,7 +83,7 @@ def described_run(compilation: Compilation, recorder: Recorder, summaries: Seque
         "exact": compilation.exact,
         "step": experiment.h,
         "steps": session.steps,
-        "time": experiment.h * session.steps,
+        "time": recorder.time - experiment.t0,
         **({"start": experiment.t0} if solver.interface.time else {}),
         "parameters": experiment.parameters,
         "initial": dict(zip(solver.coordinates, experiment.initial, strict=True)),

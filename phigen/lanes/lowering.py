@@ -133,6 +133,7 @@ def _newton(program: Program, step: Newton) -> Blocks | None:
         found.append(LaneKernel(substitute, shared=("side",), single=True))
     elif step.invert:
         found.append(LaneKernel(step.invert))
+    found += _elapsed(program)
     ops = operations([step.linearise])
     return Blocks(tuple(found), with_formulas(ops), not library_calls(ops), _group(program), step.factors)
 
@@ -145,15 +146,20 @@ def _paths(program: Program, step: Path, lanes: PathLanes) -> Blocks | None:
     kernels = paths.kernels(step, lanes, program.coordinates)
     ops = operations(kernels)
     needed = _group(program) + sum(room[terms])
-    found = tuple(LaneKernel(kernel) for kernel in kernels)
+    found = (*(LaneKernel(kernel) for kernel in kernels), *_elapsed(program))
     return Blocks(found, with_formulas(ops), not library_calls(ops), needed, path=lanes, slope_terms=terms)
+
+
+def _elapsed(program: Program) -> list[LaneKernel]:
+    """The time that the steps of a block take, of a monitored solver."""
+    return [LaneKernel(program.monitor.elapsed)] if program.monitor and program.monitor.elapsed else []
 
 
 def _packs(program: Program, kernels: Sequence[Kernel], near: tuple[str, ...]) -> Packs | None:
     """Packs, where all members have the same coefficients and every function has a version for lanes."""
     ops = operations(kernels)
     states = 2 * PACKS * LANES * 3 * program.dimension
-    if program.gauge or library_calls(ops) or library_powers(kernels) or _DOUBLE * states > MOST_STACK:
+    if program.held or library_calls(ops) or library_powers(kernels) or _DOUBLE * states > MOST_STACK:
         return None
     return Packs(tuple(kernels), with_formulas(ops), near)
 

@@ -94,7 +94,7 @@ def _maps(compilation: Compilation) -> Iterator[str]:
 def _gauged(compilation: Compilation) -> str:
     """The Hamiltonian that the series is of, if Casimirs are subtracted, to stand before what S_1 is."""
     gauge = compilation.gauge
-    factors = [mathml.name(s) for s in gauge.symbols] + [mathml.grouped(value) for value in gauge.fixed.values()]
+    factors = [mathml.name(s) for s in gauge.multiples] + [mathml.grouped(value) for value in gauge.fixed.values()]
     parts = zip(factors, (*gauge.free, *gauge.fixed), strict=True)
     taken = "".join(f"<mo>−</mo>{factor}{_TIMES}{mathml.name(casimir)}" for factor, casimir in parts)
     return f"<mi>H</mi>{taken}{_EQUALS}" if taken else ""

@@ -9,6 +9,7 @@ from phigen.compilation import Compilation
 from phigen.geometry import checks
 from phigen.geometry.definedness import undefined_parts
 from phigen.geometry.jacobi import jacobi_identity
+from phigen.geometry.positivity import positivity
 from phigen.geometry.system import System
 from phigen.lattice import flow_proofs
 from phigen.lattice import proofs as of_lattices
@@ -24,17 +25,30 @@ Groups = Mapping[str, tuple[Statement, ...]]
 
 PREFIX = "bi-realisation: "
 DEFINEDNESS, CASIMIRS, FORCES, INVARIANTS = "Definedness", "Casimirs", "Forces", "Invariants"
+MONITOR = "Monitor"
 METHOD, SPLITTING = "Bi-realisation", "Splitting"
 
 
 def definedness(system: System, spec: Spec) -> dict[str, tuple[Statement, ...]]:
     """What has no value anywhere; nothing is said of what has."""
+    found = tuple(undefined_parts(system, _starts(system, spec)))
+    return {DEFINEDNESS: found} if found else {}
+
+
+def _starts(system: System, spec: Spec) -> list[dict[str, float]]:
+    """Coordinates, parameters and times where runs start."""
     starts = []
     for run in spec.runs.values():
         initial = dict(zip(spec.coordinates, map(float, run.initial), strict=True))
         starts.append(spec.parameters_of(run) | initial | dict.fromkeys(system.times, float(run.start)))
-    found = tuple(undefined_parts(system, starts))
-    return {DEFINEDNESS: found} if found else {}
+    return starts
+
+
+def monitor(system: System, spec: Spec) -> dict[str, tuple[Statement, ...]]:
+    """g of dt = g dτ is positive; nothing where there is none."""
+    if spec.monitor is None or isinstance(spec.monitor, str):
+        return {}
+    return {MONITOR: (positivity("g > 0", spec.monitor, system.positive, _starts(system, spec)),)}
 
 
 def tensor(system: System) -> dict[str, tuple[Statement, ...]]:

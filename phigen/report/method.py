@@ -27,7 +27,7 @@ def method_section(compilation: Compilation) -> Markup:
 def _gauge(compilation: Compilation) -> list[Markup]:
     gauge = compilation.gauge
     taken = [
-        f"{mathml.name(s)}<mo>&#x2062;</mo>{mathml.name(c)}" for s, c in zip(gauge.symbols, gauge.free, strict=True)
+        f"{mathml.name(s)}<mo>&#x2062;</mo>{mathml.name(c)}" for s, c in zip(gauge.multiples, gauge.free, strict=True)
     ]
     taken += [f"{mathml.grouped(value)}<mo>&#x2062;</mo>{mathml.name(c)}" for c, value in gauge.fixed.items()]
     if not taken:

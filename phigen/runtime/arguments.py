@@ -26,6 +26,14 @@ def step_size(h: float) -> float:
     return size
 
 
+def end(until: float, begin: float, h: float) -> float:
+    """The span of time until an end, of the sign of the step."""
+    span = _number(until, "the time until") - begin
+    if span * h <= 0:
+        raise ValueError(f"until = {until!r} is never reached from {begin!r} by steps of {h!r}")
+    return span
+
+
 def count(value: int, what: str, minimum: int) -> int:
     """An integer from ``minimum`` on."""
     try:

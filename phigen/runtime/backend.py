@@ -51,3 +51,7 @@ class Backend(Protocol):
     def vector_field(self, x: Floats, parameters: Mapping[str, float], t: Floats | None = None) -> Floats:
         """π∇H at the states (rows, DIM), the same shape."""
         ...
+
+    def rate(self, x: Floats, parameters: Mapping[str, float]) -> Floats:
+        """dt/dτ at the states (rows, DIM), shape (rows,), of a monitored solver."""
+        ...

@@ -8,6 +8,7 @@ the first member, ``double x[DIM]``, is looked at; it is copied and stored as th
 from __future__ import annotations
 
 import ctypes
+import math
 from collections.abc import Mapping
 from types import SimpleNamespace
 from typing import Any
@@ -59,6 +60,8 @@ _EXTRAS = {
     "ensemble": (_INT, (_POINTER, _POINTER, _SIZE, _DOUBLE, _SIZE, _POINTER)),
     "step_tangent": (_INT, (_POINTER, _DOUBLE, _POINTER)),
     "init_gauge": (_INT, (_POINTER, _POINTER, _POINTER, _POINTER)),
+    "solver_time": (_DOUBLE, (_POINTER,)),
+    "monitor": (_DOUBLE, (_POINTER, _POINTER)),
 }
 
 
@@ -78,6 +81,10 @@ class CSession:
     def state(self) -> Floats:
         """See `Session`."""
         return self._x.copy()
+
+    def time(self) -> float:
+        """See `Session`."""
+        return float(self._c.solver_time(self.address)) if hasattr(self._c, "solver_time") else math.nan
 
     def advance(self, h: float, steps: int) -> None:
         """See `Session`."""
@@ -101,6 +108,12 @@ class CSession:
     def branch(self) -> CSession:
         """See `Session`."""
         return CSession(self._c, _aligned_copy(self._struct), len(self._x))
+
+    def placed(self, x: Floats) -> CSession:
+        """See `Session`."""
+        copy = self.branch()
+        copy._x[:] = x
+        return copy
 
     def saved(self) -> bytes:
         """See `Session`."""
@@ -200,6 +213,11 @@ class CSolver:
     def vector_field(self, x: Floats, parameters: Mapping[str, float], t: Floats | None = None) -> Floats:
         """See `phigen.runtime.backend.Backend`."""
         return self._fill(self._c.vector_field, x, np.empty_like(x, order="C"), parameters, t)
+
+    def rate(self, x: Floats, parameters: Mapping[str, float]) -> Floats:
+        """See `phigen.runtime.backend.Backend`."""
+        packed, x = self._packed(parameters), np.ascontiguousarray(x)
+        return np.array([self._c.monitor(packed.ctypes.data, row) for row in _addresses(x)], dtype=np.float64)
 
     def _fill(
         self, function: Any, x: Floats, out: Floats, parameters: Mapping[str, float], t: Floats | None = None

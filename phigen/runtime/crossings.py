@@ -126,7 +126,7 @@ class CrossingFinder(Generic[C]):
         """The crossings of this block, whose first ``known`` intervals are those of an earlier one."""
         v = self.values
         if known == 0 and v[0] == 0 < v[1]:
-            yield self._time(0), self.past[0].state()
+            yield self._clock(self.past[0], self._time(0)), self.past[0].state()
         for i in range(len(v) - 1):
             if i >= 1 and (found := self._hidden(i)):
                 yield self._located(*found)
@@ -193,13 +193,18 @@ class CrossingFinder(Generic[C]):
             # The same number for all fractions: g is a smooth function of the fraction then.
             try:
                 fraction = root(partial(self._at, j, substeps=(count,)), low, at_low, high, at_high)
-                state = self._moved(j, fraction, (count,)).state()
+                there = self._moved(j, fraction, (count,))
             except BackendError:
                 if count == SUBSTEPS[-1]:
                     raise
             else:
                 break
-        return self._time(j, fraction), state
+        return self._clock(there, self._time(j, fraction)), there.state()
+
+    def _clock(self, session: C, counted: float) -> float:
+        """The time of a session: its own where steps are equal in τ, else what was counted."""
+        own = getattr(session, "time", lambda: math.nan)()
+        return counted if math.isnan(own) else float(own)
 
 
 def root(f: Callable[[float], float], low: float, at_low: float, high: float, at_high: float) -> float:

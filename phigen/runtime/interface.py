@@ -35,6 +35,7 @@ class Interface:
     positive: frozenset[str] = frozenset()  # the parameters that must be positive
     casimirs: tuple[str, ...] = ()
     time: str = ""  # its name, where the Hamiltonian depends on it
+    monitored: bool = False  # whether steps are equal in τ, not in t
 
     @property
     def dimension(self) -> int:

@@ -22,12 +22,14 @@ _MOST_STEPS, _MOST_ROWS = 1 << 20, 1 << 12
 class Piece:
     """What a piece of an integration gave: the stored steps and their states, and crossings of the section.
 
-    ``numbers`` (rows,), ``x`` (rows, DIM), ``crossings`` as pairs of time and state (DIM,).
+    ``numbers`` (rows,), ``x`` (rows, DIM), ``crossings`` as pairs of time and state (DIM,). ``passed`` (rows,) is the
+    physical time of each where the solver keeps it, NaN elsewhere.
     """
 
     numbers: NDArray[np.int64]
     x: Floats
     crossings: list[tuple[float, Floats]]
+    passed: Floats
 
 
 def march(
@@ -48,24 +50,26 @@ def march(
     """
     size = 1
     if not begun:
-        yield Piece(np.zeros(1, dtype=np.int64), session.state()[np.newaxis], [])
+        yield Piece(np.zeros(1, dtype=np.int64), session.state()[np.newaxis], [], np.array([session.time()]))
     while session.steps < steps:
         start = time.perf_counter()
-        rows: dict[int, Floats] = {}
+        rows: dict[int, tuple[Floats, float]] = {}
         crossings: list[tuple[float, Floats]] = []
         failure = None
         try:
-            for number, states, found in _states(
+            for number, states, times, found in _states(
                 session, h, min(steps, session.steps + size), stride, finder, see_tangent
             ):
                 crossings += found
-                rows |= {number + k: state for k, state in enumerate(states) if (number + k) % stride == 0}
+                here = zip(states, times, strict=False)
+                rows |= {number + k: row for k, row in enumerate(here) if (number + k) % stride == 0}
         except BackendError as error:
             failure = error
         if session.steps == steps or (failure and session.steps):
-            rows[session.steps] = session.state()
-        x = np.array(list(rows.values())).reshape(len(rows), len(session.state()))
-        yield Piece(np.array(list(rows), dtype=np.int64), x, crossings)
+            rows[session.steps] = session.state(), session.time()
+        x = np.array([state for state, _ in rows.values()]).reshape(len(rows), len(session.state()))
+        passed = np.array([time for _, time in rows.values()])
+        yield Piece(np.array(list(rows), dtype=np.int64), x, crossings, passed)
         if failure:
             raise failure
         quick = time.perf_counter() - start < _SECONDS
@@ -79,18 +83,21 @@ def _states(
     stride: int,
     finder: CrossingFinder[Session] | None,
     see_tangent: Callable[[Floats], None] | None,
-) -> Iterator[tuple[int, Sequence[Floats] | Floats, list[tuple[float, Floats]]]]:
-    """The number of a step, its state and those of the steps after it, and crossings; no stored state is left out."""
+) -> Iterator[tuple[int, Sequence[Floats] | Floats, Sequence[float], list[tuple[float, Floats]]]]:
+    """The number of a step, its state and time and those of the steps after it, and crossings; nothing is left out."""
+    times: list[float] = []
 
     def move() -> None:
         if see_tangent:
             see_tangent(session.advance_tangent(h))
         else:
             session.advance(h, 1)
+        times.append(session.time())
 
     if finder:
         for states, found in finder.follow(session, target - session.steps, move):
-            yield session.steps - len(states) + 1, states, found
+            yield session.steps - len(states) + 1, states, times, found
+            times.clear()
         return
     done = session.steps
     while done < target:
@@ -100,4 +107,4 @@ def _states(
         else:
             session.advance(h, count)
         done += count
-        yield done, [session.state()], []
+        yield done, [session.state()], [session.time()], []

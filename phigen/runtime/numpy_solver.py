@@ -1,7 +1,8 @@
 """A generated NumPy module, loaded from its source text.
 
 Beside the documented functions, sessions use the parts of ``integrate``: ``_values``, ``_admissible``,
-``_coefficients``, ``_renewed`` where there is a time, ``_advance`` and, with tangents, ``_tangent_stage``.
+``_coefficients``, ``_renewed`` where there is a time, ``_advance`` and, with tangents, ``_tangent_stage``, with a
+monitor ``_time_of``.
 """
 
 from __future__ import annotations
@@ -19,6 +20,9 @@ from phigen.runtime.numpy_lattice import NumpyLattice
 Pair = tuple[Floats, Floats]
 #: Coefficients, parameters and step of a stage, and its time where there is one: passed on to the module.
 Stage = tuple[Any, ...]
+
+#: A stage, its start (state and carry), and what it solved for.
+Made = tuple[Stage, Floats, Floats, Floats]
 
 
 class NumpySession:
@@ -39,6 +43,7 @@ class NumpySession:
         self._module, self._parameters, self._gauge = module, parameters, gauge
         self._timed = hasattr(module, "_renewed")
         self._x, self._carry = x, carry
+        self._passed = (np.zeros(len(x)),) * 2  # physical time, where steps are equal in tau, and its carry
         self._h = np.nan
         self._stages: list[Stage] = []
         self._memory: list[Pair] = []
@@ -47,12 +52,22 @@ class NumpySession:
         """See `Session`."""
         return np.array(self._x[0])
 
+    def time(self) -> float:
+        """See `Session`."""
+        return float((self._passed[0] + self._passed[1])[0]) if hasattr(self._module, "_time_of") else np.nan
+
+    def placed(self, x: Floats) -> NumpySession:
+        """See `Session`."""
+        copy = self.branch()
+        copy._x = x[np.newaxis].copy()
+        return copy
+
     def advance(self, h: float, steps: int) -> None:
         """See `Session`."""
         self._prepare(h)
         with np.errstate(all="ignore"):
             for _ in range(steps):
-                self._commit(*self._tried()[:3])
+                self._commit(*self._tried())
 
     def advance_tangent(self, h: float) -> Floats:
         """See `Session`."""
@@ -67,13 +82,13 @@ class NumpySession:
                 if not (found.all() and np.isfinite(stage).all()):
                     raise BackendError("NO_CONVERGENCE", self.steps, self._x.copy())
                 tangent = stage[0] @ tangent
-        self._commit(x, carry, memory)
+        self._commit(x, carry, memory, stages)
         return tangent
 
     def branch(self) -> NumpySession:
         """See `Session`."""
         twin = NumpySession(self._module, self._parameters, self._x, self._carry, self._gauge, self._t)
-        twin._counted = self._counted
+        twin._counted, twin._passed = self._counted, self._passed
         twin.steps, twin._h, twin._stages, twin._memory = self.steps, self._h, self._stages, list(self._memory)
         return twin
 
@@ -82,7 +97,8 @@ class NumpySession:
         buffer = io.BytesIO()
         gauge = np.empty(0) if self._gauge is None else self._gauge
         memory = np.array(self._memory)
-        clock = {"t": self._t, "counted": self._counted, "h": self._h, "steps": self.steps}
+        clock: dict[str, Any] = {"t": self._t, "counted": self._counted, "h": self._h, "steps": self.steps}
+        clock["passed"] = np.array(self._passed)
         np.savez(buffer, x=self._x, carry=self._carry, memory=memory, gauge=gauge, allow_pickle=False, **clock)
         return buffer.getvalue()
 
@@ -97,6 +113,7 @@ class NumpySession:
                 session._prepare(float(stored["h"]))
                 session._memory = [(pair[0], pair[1]) for pair in stored["memory"]]
             session._t, session._counted = float(stored["t"]), int(stored["counted"])
+            session._passed = (stored["passed"][0], stored["passed"][1])
         return session
 
     def _now(self) -> float:
@@ -112,7 +129,7 @@ class NumpySession:
             self._memory = [(np.zeros_like(self._x),) * 2] * len(self._stages)
             self._h = h
 
-    def _tried(self) -> tuple[Floats, Floats, list[Pair], list[tuple[Stage, Floats, Floats, Floats]]]:
+    def _tried(self) -> tuple[Floats, Floats, list[Pair], list[Made]]:
         """State, carry and memory after one step, and of each stage: itself, its start and what it solved for."""
         x, carry, memory, stages = self._x, self._carry, list(self._memory), []
         for k, prepared in enumerate(self._stages):
@@ -124,7 +141,15 @@ class NumpySession:
             stages.append((*before, memory[k][0]))
         return x, carry, memory, stages
 
-    def _commit(self, x: Floats, carry: Floats, memory: list[Pair]) -> None:
+    def _commit(self, x: Floats, carry: Floats, memory: list[Pair], stages: list[Made]) -> None:
+        if hasattr(self._module, "_time_of"):
+            passed = self._passed
+            for stage, start, _, value in stages:
+                elapsed = self._module._time_of(stage, start, value)
+                if np.isnan(elapsed[0]):
+                    raise BackendError("NOT_FINITE", self.steps, self._x.copy())
+                passed = self._module._sum(*passed, elapsed)
+            self._passed = passed
         self._x, self._carry, self._memory = x, carry, memory
         self.steps += 1
 
@@ -190,8 +215,10 @@ class NumpySolver:
         return x
 
     def _expect_admissible(self, x0: Floats, parameters: Mapping[str, float]) -> None:
-        if not self.module._admissible(self.module._values(parameters)):
-            raise BackendError("BAD_ARGUMENT", 0, x0, tuple(range(len(x0))))
+        values = self.module._values(parameters)
+        refused = self.module._refused(values, x0) if hasattr(self.module, "_refused") else ()
+        if len(refused) or not self.module._admissible(values):
+            raise BackendError("BAD_ARGUMENT", 0, x0, tuple(refused) or tuple(range(len(x0))))
 
     def _gauges(self, x0: Floats, parameters: Mapping[str, float]) -> Floats | None:
         """The gauge of each member, None where there is no gauge."""
@@ -213,6 +240,11 @@ class NumpySolver:
         """See `phigen.runtime.backend.Backend`."""
         when = () if t is None else (t,)
         return np.asarray(self.module.vector_field(x, *when, **parameters), dtype=np.float64)
+
+    def rate(self, x: Floats, parameters: Mapping[str, float]) -> Floats:
+        """See `phigen.runtime.backend.Backend`."""
+        found: Floats = self.module._monitor(self.module._values(parameters), x)[:, 0]
+        return found
 
 
 def load(files: Mapping[str, str], interface: Interface) -> NumpySolver | NumpyLattice:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Protocol, Self
 
 import numpy as np
@@ -42,8 +43,16 @@ class Session(Course, Protocol):
     Steps are those of one integration, to the last bit, however they are split into calls.
     """
 
+    def time(self) -> float:
+        """The physical time since the start, where steps are equal in τ and the solver keeps it; NaN elsewhere."""
+        ...
+
     def advance_tangent(self, h: float) -> Floats:
         """Make one step; its derivative (DIM, DIM). Raises `MissingExtraError` without the extra ``tangent``."""
+        ...
+
+    def placed(self, x: Floats) -> Self:
+        """A copy of a session that stands at its start, moved to ``x`` (DIM,): what it holds fixed stays."""
         ...
 
     def saved(self) -> bytes:
@@ -51,15 +60,19 @@ class Session(Course, Protocol):
         ...
 
 
-def rows_along(session: Course, h: float, steps: int, stride: int, progress: Progress | None) -> Floats:
+def rows_along(
+    session: Course, h: float, steps: int, stride: int, progress: Progress | None, see: Callable[[int], object] = id
+) -> Floats:
     """States (rows, DIM) after 0, stride, 2·stride, … steps and the last, of a session that stands at its start.
 
-    Raises `BackendError`, whose rows end with the last good state.
+    ``see`` is told the number of each row when the session stands there. Raises `BackendError`, whose rows end with
+    the last good state.
     """
     marks = row_steps(steps, stride)
     start = session.state()
     states = np.empty((len(marks), len(start)))
     states[0] = start
+    see(0)
     report_every, reported = max(1, steps // _REPORTS), 0
     for row, mark in enumerate(marks.tolist()[1:], start=1):
         try:
@@ -69,8 +82,10 @@ def rows_along(session: Course, h: float, steps: int, stride: int, progress: Pro
             kept = states[: len(row_steps(good, stride))].copy()
             # The last row of a trajectory is its last state, whether or not a stride ends there.
             kept[-1] = session.state()
+            see(len(kept) - 1)
             raise BackendError(error.status, good, kept) from error
         states[row] = session.state()
+        see(row)
         if progress and (mark - reported >= report_every or mark == steps):
             reported = mark
             progress(mark)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -12,7 +13,9 @@ from phigen.runtime import arguments
 from phigen.runtime.backend import Backend
 from phigen.runtime.crossings import CrossingFinder, Function, Section
 from phigen.runtime.interface import BackendError, Floats, Interface, MissingExtraError, Progress, row_steps
+from phigen.runtime.retrying import Retrying
 from phigen.runtime.session import Session, rows_along
+from phigen.runtime.timed import along_until, states_at
 from phigen.runtime.trajectory import Trajectory
 
 _ADVICE = {
@@ -20,6 +23,16 @@ _ADVICE = {
     "SINGULAR": "the inner equation is singular; a smaller step helps",
     "NOT_FINITE": "the state left the range of the formulas; a smaller step helps, unless the solution ends here",
 }
+
+
+@dataclass(frozen=True)
+class Marks:
+    """Where the rows of a trajectory are: in τ, and in the time that has ``passed`` if steps are equal in τ."""
+
+    tau: Floats
+    passed: Floats
+    steps: int
+    retried: tuple[int, ...] = ()
 
 
 class Solver:
@@ -59,9 +72,11 @@ class Solver:
         self,
         x0: ArrayLike,
         h: float,
-        steps: int,
+        steps: int | None = None,
         stride: int = 1,
         *,
+        until: float | None = None,
+        retry: int = 0,
         t0: float | None = None,
         progress: Progress | None = None,
         parameters: Mapping[str, float] | None = None,
@@ -70,19 +85,70 @@ class Solver:
         """Make ``steps`` steps of size ``h`` from ``x0`` (DIM,), storing every ``stride``-th state and the last.
 
         A negative ``h`` goes back in time. ``t0`` is the time of ``x0``, 0 by default, for Hamiltonians that depend on
-        the time. ``progress`` is called now and then with the number of steps done.
+        the time. With ``until`` in place of ``steps``, the last step is the part of one that ends at that time. A step
+        that fails is made in 2, 4, …, 2**retry equal parts; then it is another map than the others, as Poisson as they
+        are, on the same leaf. ``progress`` is called now and then with the number of steps done.
         Raises `StepError`, whose ``trajectory`` ends with the state before the failing step.
         """
         begin = arguments.start_time(t0, self.interface, more)
         values = self._values(parameters, more)
         start, h = arguments.state(x0, "x0", self.interface), arguments.step_size(h)
-        steps, stride = arguments.count(steps, "steps", 0), arguments.count(stride, "stride", 1)
+        stride, retry = arguments.count(stride, "stride", 1), arguments.count(retry, "retry", 0)
+        course = Retrying(self._started(start, h, values, begin), retry)
+        passed = dict[int, float]()
+
+        def see(row: int) -> None:
+            passed[row] = course.time()
+
+        def made(states: Floats, done: int) -> Trajectory:
+            tau: Floats = h * row_steps(done, stride).astype(np.float64)
+            marks = Marks(tau, np.array(list(passed.values())), done, tuple(course.retried))
+            return self._trajectory(states, marks, h, values, begin)
+
+        if (steps is None) == (until is None):
+            raise TypeError("integrate takes either steps or until")
+        if until is not None:
+            return self._until(course, h, arguments.end(until, begin, h), stride, values, begin)
+        steps = arguments.count(steps if steps is not None else 0, "steps", 0)
         try:
-            states = rows_along(self.backend.start(start, values, begin), h, steps, stride, progress)
+            states = rows_along(course, h, steps, stride, progress, see)
         except BackendError as error:
-            trajectory = self._trajectory(error.states, row_steps(error.step, stride), h, values, begin)
-            raise self.failure(error, h, trajectory, values) from error
-        return self._trajectory(states, row_steps(steps, stride), h, values, begin)
+            raise self.failure(error, h, made(error.states, error.step), values) from error
+        return made(states, steps)
+
+    def _until(
+        self, course: Retrying, h: float, span: float, stride: int, values: dict[str, float], t0: float
+    ) -> Trajectory:
+        """`integrate` for a span of time."""
+        seen: list[tuple[Floats, float, float, int]] = []
+
+        def see(at: Retrying, tau: float) -> None:
+            seen.append((at.state(), tau, at.time(), at.steps))
+
+        def made() -> Trajectory:
+            x, tau, passed, steps = zip(*seen, strict=True)
+            return self._trajectory(np.array(x), Marks(np.array(tau), np.array(passed), steps[-1]), h, values, t0)
+
+        try:
+            along_until(course, h, span, stride, see)
+        except BackendError as error:
+            raise self.failure(error, h, made(), values) from error
+        return made()
+
+    def states_at(self, trajectory: Trajectory, times: Floats) -> Floats:
+        """The states (times, DIM) of a trajectory of this solver at given times; see `Trajectory.at`."""
+        values, h = dict(trajectory.parameters), trajectory.h
+        first = self._started(trajectory.x[0], h, values, float(trajectory.t[0]) if self.interface.time else 0.0)
+
+        def place(row: int) -> Session:
+            if self.interface.time:
+                return self.backend.start(trajectory.x[row], values, float(trajectory.t[row]))
+            return first.placed(trajectory.x[row])
+
+        try:
+            return states_at(place, trajectory.t, trajectory.x, h, times)
+        except BackendError as error:
+            raise self.failure(error, h, None, values) from error
 
     def step(
         self,
@@ -250,17 +316,18 @@ class Solver:
         """H along a trajectory: of the states (rows, DIM) at the times (rows,)."""
         return self.backend.hamiltonian(x, parameters, t if self.interface.time else None)
 
-    def _trajectory(
-        self, x: Floats, stored: np.ndarray, h: float, parameters: dict[str, float], t0: float
-    ) -> Trajectory:
+    def _trajectory(self, x: Floats, marks: Marks, h: float, parameters: dict[str, float], t0: float) -> Trajectory:
         casimirs = self.backend.casimirs(x, parameters)
-        t = t0 + h * stored
+        t = marks.passed if self.interface.monitored else t0 + marks.tau
         return Trajectory(
+            tau=marks.tau if self.interface.monitored else t,
+            retried=marks.retried,
+            solver=self,
             t=t,
             x=x,
             energy=self.energies(x, t, parameters),
             casimirs={name: casimirs[:, i] for i, name in enumerate(self.interface.casimirs)},
-            steps=int(stored[-1]),
+            steps=marks.steps,
             h=h,
             parameters=parameters,
             coordinates=self.interface.coordinates,
@@ -298,6 +365,8 @@ class Solver:
             # The other arguments were checked.
             given = ", ".join(f"{name} = {value!r}" for name, value in parameters.items())
             message = f"{name}: no step can be made with {given}: what is computed from parameters alone is not finite"
+            if self.interface.monitored:
+                message += ", or there the monitor is not positive"
             return ParameterError(message, step=0, status=error.status, trajectory=trajectory, members=error.members)
         where = f"{name}: step {error.step} of size {h!r} failed" if error.step >= 0 else f"{name}: a step failed"
         if error.members:

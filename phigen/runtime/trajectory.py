@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from phigen.runtime.interface import Floats
 from phigen.runtime.tables import Column, write
@@ -19,13 +20,17 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
+    from phigen.runtime.solver import Solver
+
 
 @dataclass(frozen=True, eq=False)
 class Trajectory:
     """States of one integration: row 0 is the initial state, the last row always the final one.
 
     ``t`` (rows,), ``x`` (rows, DIM), ``energy`` (rows,): H of the rows, and ``casimirs``: name → (rows,).
-    ``steps`` were made with step size ``h``; the rows are those of every stride-th step and of the last.
+    ``steps`` were made with step size ``h``; the rows are those of every stride-th step and of the last. With a monitor
+    h is a step in τ, and ``tau`` (rows,) its values; else that is t. ``retried`` are the numbers of the steps that were
+    made in parts.
     """
 
     t: Floats
@@ -36,6 +41,13 @@ class Trajectory:
     h: float
     parameters: Mapping[str, float]
     coordinates: tuple[str, ...]
+    tau: Floats = field(default_factory=lambda: np.empty(0))
+    retried: tuple[int, ...] = ()
+    solver: Solver | None = field(default=None, repr=False)
+
+    def __post_init__(self) -> None:
+        if len(self.tau) != len(self.t):
+            object.__setattr__(self, "tau", self.t)
 
     def __len__(self) -> int:
         return len(self.t)
@@ -82,6 +94,21 @@ class Trajectory:
         if coordinate not in self.coordinates:
             raise KeyError(f"{coordinate!r} is not a coordinate; there are {', '.join(self.coordinates)}")
         return self.x[:, self.coordinates.index(coordinate)]
+
+    def at(self, times: ArrayLike) -> Floats:
+        """The states (times, DIM) at given times, by steps of the same method from the nearest row.
+
+        No interpolation: each state is one further step, of the size that takes the rest of the time, so it lies on the
+        leaf. Raises `ValueError` for times out of the range of t, and `StepError`.
+        """
+        if self.solver is None:
+            raise TypeError("this trajectory was not made by a solver of phigen")
+        wanted = np.atleast_1d(np.asarray(times, dtype=np.float64))
+        low, high = sorted((float(self.t[0]), float(self.t[-1])))
+        slack = 1e-9 * (high - low)
+        if wanted.ndim != 1 or not ((wanted >= low - slack) & (wanted <= high + slack)).all():
+            raise ValueError(f"times must be numbers between {low!r} and {high!r}")
+        return self.solver.states_at(self, wanted)
 
     def save(self, path: str | Path) -> None:
         """Write a file by the suffix of the path; raises `ValueError` for any other.

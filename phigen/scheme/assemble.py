@@ -23,9 +23,10 @@ from phigen.scheme.kernels import (
 from phigen.scheme.lowering import cost, operation_counts
 from phigen.scheme.mean import along_mean
 from phigen.scheme.modified import modified_of
+from phigen.scheme.monitor import elapsed_kernel, monitor_facts, rate_kernel
 from phigen.scheme.order import Order
 from phigen.scheme.path import build_path, build_slopes
-from phigen.scheme.program import About, Program
+from phigen.scheme.program import About, Monitor, Program
 from phigen.scheme.staging import Coefficients
 from phigen.scheme.steps import Explicit, InnerSolve, Newton, Path, PathLanes, PathTangent, Step
 from phigen.scheme.tangent import curvature, explicit_jacobian, tangent_path
@@ -56,6 +57,7 @@ def build_program(
     solver = solver or SolverOptions()
     gauge = gauged.gauge
     lanes = solver.lanes and extras.offers("lanes", profile)
+    elapsed = elapsed_kernel(system, scheme.generating)
     step = _step(system, realisation, scheme.generating, gauge, solver, extras, lanes=lanes)
     modified, count = None, extras.modified_hamiltonian
     if count:
@@ -81,6 +83,7 @@ def build_program(
         observables=observables(system),
         fractions=scheme.fractions,
         gauge=free_gauge(system, gauged),
+        monitor=Monitor(rate_kernel(system, gauge.monitor), elapsed) if gauge.monitor else None,
         modified=modified,
         extras=extras,
         lanes=solver.lanes,
@@ -106,7 +109,8 @@ def _step(
     if realisation.path:
         return _path(system, generating, gauge, inner, lanes=lanes, tangent=extras.tangent)
     coefficients = generating.coefficients
-    increment = explicit_kernel(system, realisation, generating, coefficients)
+    # A monitored step keeps its y, by which it tells the time.
+    increment = None if gauge.monitor else explicit_kernel(system, realisation, generating, coefficients)
     if increment is None:
         linearise = linearise_kernel(system, realisation, generating, coefficients)
         solvers = newton_solvers(linearise)
@@ -157,6 +161,7 @@ def _facts(
     yield f"bi-realisation: {realisation.kind}, {'symmetric' if realisation.symmetric else 'not symmetric'}"
     yield from approximation(realisation)
     yield f"generating function: {series} ({generating.form}{terms})"
+    yield from monitor_facts(gauge.monitor)
     yield from gauge.facts
     yield from _forces(system)
     yield f"step: {step.manner}"

@@ -19,7 +19,7 @@ from phigen.scheme.kernel import Kernel, Output
 from phigen.scheme.program import FreeGauge
 from phigen.series.hamilton_jacobi import HamiltonJacobi, PolynomialSeries
 from phigen.symbolic.expression import Expression, gradient, symbol, total
-from phigen.symbolic.symbols import GAUGE, Symbol
+from phigen.symbolic.symbols import GAUGE, LEVEL, Symbol
 
 #: Gauged series may have this many times the terms of the plain one; beyond, the gauge costs more than it gains.
 MOST_GROWTH = 1.3
@@ -30,33 +30,53 @@ GUIDE = 3
 
 @dataclass(frozen=True)
 class Gauge:
-    """``free``: Casimirs whose λ the solver chooses; ``fixed``: the part subtracted once for all."""
+    """``free``: Casimirs whose λ the solver chooses; ``fixed``: the part subtracted once for all.
+
+    A ``monitor`` g makes K = g(H + e) of H before that (`phigen.scheme.monitor`); then no λ is free.
+    """
 
     free: tuple[str, ...] = ()
     fixed: Mapping[str, Expression] = field(default_factory=dict)
+    monitor: Expression | None = None
 
     @property
     def symbols(self) -> tuple[str, ...]:
+        """What each trajectory holds fixed at a value of its own: the free λ, or e."""
+        return (LEVEL,) if self.monitor else self.multiples
+
+    @property
+    def multiples(self) -> tuple[str, ...]:
         """The symbols of the free λ."""
         return tuple(Symbol(GAUGE, name) for name in self.free)
 
     @property
     def inputs(self) -> dict[str, tuple[str, ...]]:
-        """The argument that passes the free λ to a kernel, if there are any."""
-        return {"gauge": self.symbols} if self.free else {}
+        """The argument that passes the symbols to a kernel, if there are any."""
+        return {"gauge": self.symbols} if self.symbols else {}
 
     @property
     def facts(self) -> list[str]:
         """What the header says of the gauge."""
         free = [f"gauge: the multiple of {', '.join(self.free)} is chosen at the start of each trajectory"]
         fixed = ", ".join(f"({value}) {name}" for name, value in self.fixed.items())
-        return (free if self.free else []) + ([f"gauge: H - {fixed}"] if fixed else [])
+        return (free if self.free else []) + ([f"gauge: {self.letter} - {fixed}"] if fixed else [])
+
+    @property
+    def letter(self) -> str:
+        """What the Casimirs are taken from."""
+        return "K" if self.monitor else "H"
+
+    def timed(self, hamiltonian: Expression) -> Expression:
+        """H, or K = g(H + e)."""
+        return self.monitor * (hamiltonian + symbol(LEVEL)) if self.monitor else hamiltonian
 
     def applied(self, system: System) -> System:
-        """The system with H − Σ λ_c C_c for H, to be discretised; its vector field is that of the system."""
-        parts = [symbol(s) * system.casimirs[c] for s, c in zip(self.symbols, self.free, strict=True)]
+        """The system with H − Σ λ_c C_c, or K − Σ λ_c C_c, for H, to be discretised."""
+        parts = [symbol(s) * system.casimirs[c] for s, c in zip(self.multiples, self.free, strict=True)]
         parts += [value * system.casimirs[c] for c, value in self.fixed.items()]
-        return replace(system, hamiltonian=system.hamiltonian - total(parts)) if parts else system
+        if not parts and not self.monitor:
+            return system
+        return replace(system, hamiltonian=self.timed(system.hamiltonian) - total(parts))
 
 
 @dataclass(frozen=True)
@@ -68,16 +88,22 @@ class Gauged:
     series: HamiltonJacobi
 
 
-def choose(system: System, realisation: BiRealisation, setting: str | Mapping[str, Expression]) -> Gauged:
+def choose(
+    system: System,
+    realisation: BiRealisation,
+    setting: str | Mapping[str, Expression],
+    monitor: Expression | None = None,
+) -> Gauged:
     """The system in the gauge of a setting: ``none``, ``auto``, or a value for some Casimirs.
 
     ``auto`` frees a Casimir if S_3 depends on its λ (in log-canonical structures it never does) and has hardly
-    more terms with it (on tops it has many more, for little); none where H depends on the time.
+    more terms with it (on tops it has many more, for little); none where H depends on the time, or with a monitor.
     """
     if not isinstance(setting, str):
-        return _gauged(system, realisation, given(system, setting))
-    chosen = plain = _gauged(system, realisation, Gauge())
-    if setting == "none" or not realisation.exact or not realisation.symmetric or system.time or system.forces:
+        return _gauged(system, realisation, replace(given(system, setting), monitor=monitor))
+    chosen = plain = _gauged(system, realisation, Gauge(monitor=monitor))
+    open_ = setting != "none" and realisation.exact and realisation.symmetric
+    if not open_ or system.time or system.forces or monitor:
         return plain
     for name in system.casimirs:
         candidate = _gauged(system, realisation, Gauge((*chosen.gauge.free, name)))

@@ -18,7 +18,7 @@ from phigen.scheme.lowering import cost
 from phigen.scheme.staging import Coefficients
 from phigen.series.hamilton_jacobi import MOST_SLOPES, PolynomialSeries
 from phigen.symbolic.expression import Expression, derivatives, gradient, symbol, total
-from phigen.symbolic.symbols import STEP
+from phigen.symbolic.symbols import LEVEL, STEP
 
 
 @dataclass(frozen=True)
@@ -26,6 +26,7 @@ class GeneratingFunction:
     """∇S_h (``slope``) and Hess S_h (``hessian``, full n×n) as expressions, and how they were written.
 
     ``coefficients`` is the table that their symbols ``c:k`` refer to, those that are renewed in every step included.
+    Of a monitored system, ``elapsed`` is ∂S_h/∂e, the time that a step takes.
     """
 
     slope: tuple[Expression, ...]
@@ -33,6 +34,7 @@ class GeneratingFunction:
     form: str
     terms: int
     coefficients: Coefficients
+    elapsed: Expression | None = None
 
     def forced(self, covector: Sequence[Expression], coordinates: Sequence[str]) -> GeneratingFunction:
         """With p = ∇S_h + hζ in place of p = ∇S_h, for a covector field ζ; then the Hessian need not be symmetric."""
@@ -69,7 +71,8 @@ def collected_form(
     slopes = [tower.derivative(s, c) for c in coordinates]
     if exceeds(tower, slopes, coordinates, min(worth, MOST_SLOPES)):
         return []
-    ring, (terms,) = collect(tower, [s], coordinates, times)
+    monitored = [tower.partial(s, LEVEL)] if LEVEL in static else []
+    ring, (terms, *elapsed) = collect(tower, [s, *monitored], coordinates, times)
     first = [ring.derivative(terms, j) for j in range(n)]
     found = []
     for entrywise in (True, False):
@@ -81,7 +84,8 @@ def collected_form(
             )
         else:
             hessian = _differentiated(slope, coordinates)
-        found.append(GeneratingFunction(slope, hessian, "collected polynomial", len(terms), table))
+        duration = ring.expression(elapsed[0], table) if elapsed else None
+        found.append(GeneratingFunction(slope, hessian, "collected polynomial", len(terms), table, duration))
     return found
 
 
@@ -93,7 +97,8 @@ def graph_form(
     s = total(h ** (i + 1) * term for i, term in enumerate(series) if not term.is_zero)
     slope = tuple(gradient(s, coordinates))
     rows = [gradient(slope[i], coordinates[i:]) for i in range(len(coordinates))]  # one reverse sweep a row
-    return GeneratingFunction(slope, _symmetric(rows), "shared graph", 0, Coefficients(static, times))
+    elapsed = derivatives([s], LEVEL)[0] if LEVEL in static else None
+    return GeneratingFunction(slope, _symmetric(rows), "shared graph", 0, Coefficients(static, times), elapsed)
 
 
 def _differentiated(slope: Sequence[Expression], coordinates: Sequence[str]) -> tuple[tuple[Expression, ...], ...]:

@@ -65,7 +65,8 @@ def modified_hamiltonian(
     found = corrections(system, realisation, order, count, gauge)
     h = found.tower.variable(STEP)
     summed = found.tower.expression(found.tower.combine([t * h**j for j, t in enumerate(found.terms)]))
-    taken = system.hamiltonian - (gauge or Gauge()).applied(system).hamiltonian
+    gauge = gauge or Gauge()
+    taken = gauge.timed(system.hamiltonian) - gauge.applied(system).hamiltonian
     return summed + taken
 
 

@@ -15,6 +15,7 @@ from phigen._version import __version__
 from phigen.scheme.kernel import Kernel
 from phigen.scheme.steps import Step
 from phigen.spec.model import NO_EXTRAS, Extras, Parameter
+from phigen.symbolic.symbols import LEVEL
 
 
 @dataclass(frozen=True)
@@ -47,6 +48,17 @@ class FreeGauge:
 
 
 @dataclass(frozen=True)
+class Monitor:
+    """Steps of equal size in τ: ``rate`` is dt/dτ at a state, ``elapsed`` the time that a step takes (at its point y).
+
+    In a splitting the flows themselves say what time they take, and ``elapsed`` is None.
+    """
+
+    rate: Kernel
+    elapsed: Kernel | None
+
+
+@dataclass(frozen=True)
 class Modified:
     """The modified Hamiltonian as a kernel, and the first power of h that it leaves out."""
 
@@ -75,6 +87,7 @@ class Program:
     time: str = ""
     forced: bool = False
     gauge: FreeGauge | None = None
+    monitor: Monitor | None = None
     modified: Modified | None = None
     extras: Extras = NO_EXTRAS
     lanes: bool = True
@@ -112,8 +125,14 @@ class Program:
         return tuple(float((a + b) / 2) for a, b in pairwise(ends))
 
     @property
+    def held(self) -> tuple[str, ...]:
+        """What each trajectory holds fixed at a value of its own: Casimirs, for their multiples, or e."""
+        return (LEVEL.kind,) if self.monitor else self.gauge.casimirs if self.gauge else ()
+
+    @property
     def kernels(self) -> tuple[Kernel, ...]:
         """All kernels, each once."""
         seen = self.observables
         modified = (self.modified.kernel,) if self.modified else ()
-        return (*self.step.kernels, *modified, seen.energy, seen.casimirs, seen.vector_field, *self.choice)
+        timed = [k for k in (self.monitor.elapsed, self.monitor.rate) if k] if self.monitor else []
+        return (*self.step.kernels, *timed, *modified, seen.energy, seen.casimirs, seen.vector_field, *self.choice)

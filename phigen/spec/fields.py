@@ -270,6 +270,7 @@ SPEC = Record(
             "Casimirs subtracted from H before discretising",
             default="auto",
         ),
+        Field("monitor", FORMULA, "equal steps of τ, dt = g dτ: g > 0, or log for a splitting"),
         Field("scheme", _switch("scheme", *SCHEMES), "how the one-step map is made", default="auto"),
         Field("profile", Choice(PROFILES), "small is short and readable, without blocks and searches", default="fast"),
         Field("without", ListOf(Choice(PARTS)), "parts of the code to leave out"),

@@ -269,6 +269,7 @@ class Spec:
     terms: int | None = None
     composition: str = "auto"
     gauge: str | Mapping[str, Expression] = "auto"  # or the multiple of each Casimir
+    monitor: str | Expression | None = None  # log, or g of dt = g dτ
     scheme: str = "auto"
     profile: str = "fast"
     solver: SolverOptions = SolverOptions()

@@ -90,6 +90,8 @@ COMPOSITIONS = (
     "sofroniou-spaletta",
     *FLOW_COMPOSITIONS,
 )
+#: The monitor of a splitting in two, K = log(A + e) − log(−B).
+LOGARITHMIC = "log"
 SCHEMES = ("auto", "series", "splitting")
 PLANNED: dict[str, tuple[str, ...]] = {
     "birealisation": (),

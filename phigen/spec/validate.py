@@ -15,7 +15,7 @@ from phigen.spec.kinds import Reader
 from phigen.spec.lattice import casimirs as read_casimirs
 from phigen.spec.lattice import densities, with_kinds
 from phigen.spec.model import DEFAULT_ORDER, BirealisationChoice, Extras, MatrixForm, SolverOptions, Spec, SpecForces
-from phigen.spec.names import LICENSE_REFERENCE, LICENSES
+from phigen.spec.names import LICENSE_REFERENCE, LICENSES, LOGARITHMIC
 from phigen.spec.poisson import brackets_of_sites, poisson_form
 from phigen.spec.problems import Problems, counted, did_you_mean, shown
 from phigen.spec.runs import run, without_repetition
@@ -75,6 +75,7 @@ def _parts(raw: Mapping[str, Any], declared: Declarations) -> dict[str, Any]:
         "terms": raw.get("terms"),
         "composition": raw.get("composition", "auto"),
         "gauge": _gauge(raw.get("gauge", "auto"), declared),
+        "monitor": _monitor(raw.get("monitor"), declared),
         "scheme": raw.get("scheme", "auto"),
         "profile": raw.get("profile", "fast"),
         "solver": _solver(raw.get("solver", {}), declared),
@@ -161,6 +162,15 @@ def _gauge(
             message = f"gauge: the multiple of {name} must not depend on coordinates, and {moving[0]} is one"
             declared.reader.problems.add(message, place, "numbers and parameters are fine")
     return values
+
+
+def _monitor(node: Scalar | None, declared: Declarations) -> str | Expression | None:
+    """log, or g of dt = g dτ; a coordinate or another declared name ``log`` cannot stand alone there."""
+    if node is None:
+        return None
+    if node.text == LOGARITHMIC:
+        return LOGARITHMIC
+    return declared.formula(node, declared.scope())
 
 
 def _license(given: str, declared: Declarations) -> str:

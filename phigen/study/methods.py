@@ -69,10 +69,15 @@ def extended(solver: Solver, x: Floats, t0: float) -> Floats:
     return np.append(x, t0) if solver.interface.time else x
 
 
-def of_classical(name: str, solver: Solver, parameters: Mapping[str, float], t0: float = 0.0) -> Method:
-    """A classical method on the vector field of a solver."""
-
-    field = field_of(solver, parameters)
+def of_classical(
+    name: str,
+    solver: Solver,
+    parameters: Mapping[str, float],
+    t0: float = 0.0,
+    given: Callable[[Floats], Floats] | None = None,
+) -> Method:
+    """A classical method on the vector field of a solver, or on the one that is ``given`` in its place."""
+    field = given or field_of(solver, parameters)
 
     def rows(x: Floats, h: float, steps: int, stride: int) -> Floats:
         found = classical.integrate(name, field, extended(solver, x, t0), h, steps, stride)[:, : len(x)]
@@ -84,7 +89,7 @@ def of_classical(name: str, solver: Solver, parameters: Mapping[str, float], t0:
         image: Floats = rows(x, h, 1, 1)[-1]
         return image
 
-    later = (lambda h: of_classical(name, solver, parameters, t0 + h)) if solver.interface.time else None
+    later = (lambda h: of_classical(name, solver, parameters, t0 + h, given)) if solver.interface.time else None
     return Method(name, step, rows, later=later)
 
 

@@ -7,9 +7,10 @@ are Poisson up to a stated power of h only, and held to that power.
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -18,7 +19,8 @@ from phigen.errors import StepError
 from phigen.runtime.solver import Solver
 from phigen.study import backward, measures
 from phigen.study.conservation import Unit, largest_terms, rounding, units_of
-from phigen.study.methods import Method, of_classical, of_solver
+from phigen.study.methods import Method, field_of, of_classical, of_solver
+from phigen.study.monitored import field_in_tau, with_time
 from phigen.study.summary import Drift, Summary, summarise
 from phigen.symbolic.arrays import Floats
 from phigen.symbolic.expression import Expression
@@ -51,7 +53,7 @@ class Check:
     limit: str = ""
     passed: bool = True
     reason: str = ""
-    others: Mapping[str, float] = field(default_factory=dict)
+    others: Mapping[str, float] = dataclasses.field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -86,7 +88,8 @@ class Subject:
     start: Floats
     h: float
     steps: int
-    t0: float = 0.0
+    t0: float
+    field: Callable[[Floats], Floats]  # the motion in the variable that steps are equal in
 
     @property
     def main(self) -> Method:
@@ -122,9 +125,10 @@ def verify(
     gauge = gauge_at(compilation, x, parameters)
     own = {target: of_solver(solver, parameters, gauge, t0) for target, solver in solvers.items()}
     solver = next(iter(solvers.values()))
-    others = {name: of_classical(name, solver, parameters, t0) for name in compare}
+    field = field_in_tau(solver, parameters) if compilation.monitor else field_of(solver, parameters)
+    others = {name: of_classical(name, solver, parameters, t0, field) for name in compare}
     made = min(steps, FEW_STEPS if quick else MOST_STEPS)
-    subject = Subject(compilation, solver, own, others, parameters, x, h, made, t0)
+    subject = Subject(compilation, solver, own, others, parameters, x, h, made, t0, field)
     rows = subject.main.rows(x, h, made, 1)
     states = [rows[i] for i in np.linspace(0, made, STATES, dtype=int)] if made >= STATES else [x]
     order, symmetry = compilation.order.order, "symmetric" if compilation.symmetric else "not symmetric"
@@ -138,6 +142,7 @@ def verify(
         tuple(others),
         (
             order_check(subject, quick=quick),
+            *time_checks(subject, gauge, quick=quick),
             *conservation_checks(subject, rows),
             *one_step_checks(subject, states),
             agreement_check(subject, states),
@@ -150,7 +155,7 @@ def verify(
 
 def gauge_at(compilation: Compilation, x: Floats, parameters: Mapping[str, float]) -> Floats | None:
     """The gauge that a solver chooses for the trajectory from x, None if it has none to choose."""
-    if not compilation.program.gauge:
+    if not compilation.program.held:
         return None
     from phigen.api import solver_of
 
@@ -160,6 +165,19 @@ def gauge_at(compilation: Compilation, x: Floats, parameters: Mapping[str, float
 
 def order_check(subject: Subject, *, quick: bool = False) -> Check:
     """The observed order against the stated one."""
+    return _order_check("observed order", subject, quick=quick)
+
+
+def time_checks(subject: Subject, gauge: Floats | None, *, quick: bool = False) -> Iterator[Check]:
+    """The observed order of the state with its time, of steps that are equal in τ."""
+    if subject.compilation.monitor is None or gauge is None:
+        return
+    main = with_time(subject.solver, subject.parameters, gauge)
+    timed = replace(subject, own={main.name: main}, others={}, start=np.append(subject.start, 0.0))
+    yield _order_check("observed order, with the time", timed, quick=quick)
+
+
+def _order_check(title: str, subject: Subject, *, quick: bool) -> Check:
     solver, stated = subject.main, subject.compilation.order.order
     span = min(subject.steps, 32 if quick else 64)
     reference = _reference(subject)
@@ -173,18 +191,18 @@ def order_check(subject: Subject, *, quick: bool = False) -> Check:
         for name, m in subject.others.items()
     }
     if found.exact:
-        return Check("observed order (errors at round-off)", math.inf, limit, True, "", others)
+        return Check(f"{title} (errors at round-off)", math.inf, limit, True, "", others)
     if math.isnan(found.order):
         reason = "no two steps have errors between round-off and 2 %"
         worst = max((e for _, e in found.pairs), default=math.inf)
-        return Check("observed order", math.nan, limit, worst < 1e-6, reason, others)
+        return Check(title, math.nan, limit, worst < 1e-6, reason, others)
     passed = found.order >= stated - ORDER_SLACK
-    return Check("observed order", found.order, limit, passed, f"{found.order:.2f} instead of {stated}", others)
+    return Check(title, found.order, limit, passed, f"{found.order:.2f} instead of {stated}", others)
 
 
 def _reference(subject: Subject) -> Callable[[float], tuple[Floats, float]]:
     """The solution at a time, by DOP853 with halved steps until two results agree; and how far they agree."""
-    solver = of_classical("dop853", subject.solver, subject.parameters, subject.t0)
+    solver = of_classical("dop853", subject.solver, subject.parameters, subject.t0, subject.field)
     found: dict[float, tuple[Floats, float]] = {}
 
     def reference(t: float) -> tuple[Floats, float]:

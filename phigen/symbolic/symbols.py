@@ -34,6 +34,9 @@ class Symbol(str):
 #: The size of a step, or the time of a flow; the time of an exact solution; a matrix Σ p_i E_i.
 STEP, ELAPSED, MATRIX = Symbol("h"), Symbol("time"), Symbol("P")
 
+#: e = −H(x₀), which a monitored step holds fixed.
+LEVEL = Symbol("e")
+
 
 def momentum(name: str) -> Symbol:
     """The symbol of the covector component that belongs to a coordinate."""

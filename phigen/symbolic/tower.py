@@ -330,6 +330,12 @@ class Tower(Arithmetic[Poly]):
                 result += self.product(element.derivative(k), chain)
         return self.cancelled(result)
 
+    def partial(self, element: Poly, name: str) -> Poly:
+        """Derivative along a symbol that no generator contains."""
+        if any(self.depends_on(a, [name]) for g in self.generators for a in g.arguments):
+            raise ValueError(f"{name} is in a function")
+        return element.derivative(self._index[name])
+
     def depends_on(self, element: Poly, names: Iterable[str]) -> bool:
         """Whether some of the symbols occur, directly or inside a generator."""
         return not self.names_in(element).isdisjoint(names)

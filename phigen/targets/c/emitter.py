@@ -112,9 +112,9 @@ def _declarations(program: Program, lanes: Lanes | None, has: Mapping[str, bool]
     sizes: Sizes = [("STAGES", len(program.fractions), "of a step")] if has["COMPOSED"] else []
     only = ", and on the time" if program.step.refresh else " only"
     sizes.append(("COEFFICIENTS", max(1, program.step.coefficients), f"numbers that depend on params and h{only}"))
-    if program.gauge:
-        free = program.gauge.casimirs
-        sizes.append(("GAUGES", len(free), f"Casimirs whose multiples are taken from H: {', '.join(free)}"))
+    if program.held:
+        whose = f"Casimirs whose multiples are taken from H: {', '.join(program.held)}"
+        sizes.append(("GAUGES", len(program.held), "that a trajectory holds fixed: e" if program.monitor else whose))
     if has["RECURRENCES"]:
         memory = remembered(program, lanes)
         sizes.append(("REMEMBERED", memory["REMEMBERED"], "values that a recurrence is fitted to"))
@@ -180,10 +180,13 @@ def _model(program: Program, lanes: Lanes | None, has: Mapping[str, bool], other
     if isinstance(step, Implicit) and has["UNROLLED"]:
         own.append(step.eliminate)
     own += program.choice
+    own += [program.monitor.elapsed] if program.monitor else []
     own += [step.tangent] if isinstance(step, Explicit) else []
     body += [function(program, kernel) for kernel in own if kernel]
     body.append(function(program, seen.energy, name="hamiltonian", exported=True, returning=True))
     body += [function(program, kernel, exported=True) for kernel in (seen.casimirs, seen.vector_field)]
+    if program.monitor:
+        body.append(function(program, program.monitor.rate, exported=True, returning=True))
     if program.modified:
         name = "modified_hamiltonian"
         body.append(function(program, program.modified.kernel, name=name, exported=True, returning=True))

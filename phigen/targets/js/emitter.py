@@ -62,6 +62,7 @@ def emit(program: Program, command: str) -> dict[str, str]:
     modules += ["taylor"] if isinstance(step, Path) else []
     modules += ["guess"] if features["IMPLICIT"] else []
     modules += ["gauge" if program.searches_gauge else "gauge_formula"] if program.gauge else []
+    modules += ["level"] if program.monitor else []
     modules += ["tangent", f"tangent_{chosen}"] if program.extras.tangent else []
     algebra = not isinstance(step, Splitting) or program.searches_gauge or program.extras.tangent
     modules += ["algebra"] if algebra else []
@@ -77,6 +78,9 @@ def _features(program: Program) -> dict[str, bool]:
     return {
         "IMPLICIT": isinstance(step, Implicit),
         "GAUGE": program.gauge is not None,
+        "HELD": bool(program.held),
+        "MONITOR": program.monitor is not None,
+        "EQUAL_IN_T": program.monitor is None,
         "COMPOSED": len(program.fractions) > 1,
         "SPLITTING": isinstance(step, Splitting),
         "KICKS": isinstance(step, Splitting) and bool(step.schedule.multiples),
@@ -118,7 +122,8 @@ def _system(program: Program) -> Mapping[str, object]:
         "properties": properties,
         "defaults": [f"{_key(p.name)}: {float(p.value)!r}" for p in parameters],
         "positive": json.dumps([p.name for p in parameters if p.positive]),
-        "gauge": json.dumps(program.gauge.casimirs) if program.gauge else "",
+        "gauge": json.dumps(program.held) if program.held else "",
+        "monitored": program.monitor is not None,
         "fractions": json.dumps(program.fractions),
         "table": render("js", "table.mjs", _table(program)).strip("\n"),
         "times": json.dumps(schedule.times) if schedule else "",
@@ -189,7 +194,8 @@ def _kernels(program: Program) -> list[Kernel]:
     """The kernels that the runtime calls."""
     step, seen = program.step, program.observables
     modified = [program.modified.kernel] if program.modified else []
-    others = [*program.choice, *modified, seen.energy, seen.casimirs, seen.vector_field]
+    timed = [k for k in (program.monitor.elapsed, program.monitor.rate) if k] if program.monitor else []
+    others = [*program.choice, *timed, *modified, seen.energy, seen.casimirs, seen.vector_field]
     if isinstance(step, Splitting):
         return [replace(step.prepare, name="prepare_row"), *step.flows, *step.tangents, *others]
     assert not isinstance(step, Sweeps)

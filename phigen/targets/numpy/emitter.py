@@ -74,9 +74,10 @@ def _body(program: Program) -> str:
     pieces += [render("numpy", "entire.py", special.entire_values(f)) for f in special.entire_used(program)]
     pieces += _step(program)
     search = ("gauge_line.py", "gauge.py") if program.searches_gauge else ("gauge_formula.py",)
-    templates = search if program.gauge else ("no_gauge.py",)
+    templates = search if program.gauge else ("level.py",) if program.monitor else ("no_gauge.py",)
     pieces += [render("numpy", template, _values(program)) for template in templates]
     pieces += [_function(program, kernel) for kernel in program.choice]
+    pieces += _monitor(program)
     coefficients = "coefficients_in_time.py" if program.time else "coefficients.py"
     pieces += [render("numpy", part, _values(program)) for part in (coefficients, "api.py")]
     pieces += [_function(program, kernel) for kernel in (seen.energy, seen.casimirs, seen.vector_field)]
@@ -121,6 +122,14 @@ def _step(program: Program) -> list[str]:
             return [*early, _function(program, linearise), *parts]
         case Sweeps():
             raise AssertionError("lattices have a module of their own")
+
+
+def _monitor(program: Program) -> list[str]:
+    """The time that steps take, of a monitored solver."""
+    if not program.monitor:
+        return []
+    kernels = [k for k in (program.monitor.elapsed, program.monitor.rate) if k]
+    return [*(_function(program, kernel) for kernel in kernels), render("numpy", "elapsed.py", _values(program))]
 
 
 def _splitting_values(step: Splitting) -> dict[str, object]:
@@ -169,8 +178,11 @@ def _values(program: Program) -> dict[str, object]:
         "casimirs": _strings(program.casimirs),
         "defaults": [f'"{p.name}": {float(p.value)!r}' for p in program.parameters],
         "positive": _strings([p.name for p in program.parameters if p.positive]),
-        "gauge": _strings(program.gauge.casimirs if program.gauge else ()),
-        "prepare_arguments": "values, np.zeros((len(GAUGE), 1)), 1e-100" if program.gauge else "values, 1e-100",
+        "gauge": _strings(program.held),
+        "monitored": program.monitor is not None,
+        "path": isinstance(step, Path),
+        "splitting": isinstance(step, Splitting),
+        "prepare_arguments": "values, np.zeros((len(GAUGE), 1)), 1e-100" if program.held else "values, 1e-100",
         "plausible": repr(PLAUSIBLE),
         "path_pieces": repr(tuple(1 << k for k in range(LONGEST_PATH.bit_length()))),
         "most_pieces": MOST_PIECES,

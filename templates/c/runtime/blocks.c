@@ -164,6 +164,10 @@ static void phi_march(const phi_solver *s, phi_table *table, phi_models *models)
         memset(mean, 0, sizeof mean);
         for (int part = 0; part < 4; ++part) {
             phi_vector_field(&s->params, point, slope);
+#if PHI_MONITOR
+            const double rate = phi_monitor(&s->params, point);
+            for (int i = 0; i < PHI_DIM; ++i) slope[i] *= rate;
+#endif
             for (int i = 0; i < PHI_DIM; ++i) {
                 mean[i] += weight[part] * slope[i];
                 point[i] = x[i] + h * reach[part] * slope[i];
@@ -202,6 +206,20 @@ static double phi_correct_stage(phi_model *model)
 #define PHI_SMALL 1e-8
 #define PHI_ROUNDING 1e-10
 
+#if PHI_MONITOR
+/* The times that the stages of a block take, by their points. 0 unless all have the sign of their stage. */
+static int phi_elapse(const phi_solver *s, phi_table *table, phi_models *models, phi_lanes elapsed[PHI_STAGES][1])
+{
+    int good = 1;
+    for (int stage = 0; stage < PHI_STAGES; ++stage) {
+        phi_elapsed_lanes(table->coef[stage], models->stage[stage].y, elapsed[stage]);
+        for (int lane = 0; lane < PHI_LANES; ++lane)
+            good = good && elapsed[stage][0][lane] * (phi_fractions[stage] * s->h) > 0.0;
+    }
+    return good;
+}
+
+#endif
 /* PHI_LANES steps at once: guess the points of all, and correct them together until the error that remains is as
    small as after a single step. How many passes that took; 0, and the solver as before, where it takes more than most. */
 static int phi_block(phi_solver *s, phi_table *table, int most)
@@ -232,8 +250,16 @@ static int phi_block(phi_solver *s, phi_table *table, int most)
         if (!phi_near_lanes(models.stage[stage].y, s->x)) return 0;
     for (int i = 0; i < PHI_DIM; ++i)
         if (!isfinite(x[i])) return 0;
+#if PHI_MONITOR
+    phi_lanes elapsed[PHI_STAGES][1];
+    if (!phi_elapse(s, table, &models, elapsed)) return 0;
+#endif
     memcpy(s->x, x, sizeof x);
     memcpy(s->carry, carry, sizeof carry);
+#if PHI_MONITOR
+    for (int lane = 0; lane < PHI_LANES; ++lane)
+        for (int stage = 0; stage < PHI_STAGES; ++stage) phi_pass(s, elapsed[stage][0][lane]);
+#endif
     phi_count(s, PHI_LANES);
     for (int stage = 0; stage < PHI_STAGES; ++stage) {
         phi_history *history = &s->history[stage];

@@ -178,7 +178,12 @@ static int phi_plausible(const phi_solver *s, int stage, const double increment[
 #else
     phi_vector_field(&s->params, s->x, field);
 #endif
+#if PHI_MONITOR
+    const double rate = phi_monitor(&s->params, s->x);
+    for (int i = 0; i < PHI_DIM; ++i) size += fabs(phi_fractions[stage] * s->h * rate * field[i]);
+#else
     for (int i = 0; i < PHI_DIM; ++i) size += fabs(phi_fractions[stage] * s->h * field[i]);
+#endif
     if (moved <= PHI_PLAUSIBLE * size) return 1;
 #if PHI_TIMED
     const double before = phi_hamiltonian(&s->params, s->t, s->x), after = phi_hamiltonian(&s->params, s->t, end);

@@ -71,7 +71,15 @@ static phi_status phi_attempt(phi_solver *s, int stage)
             small[i] += s->carry[i];
         }
         if (!phi_plausible(s, stage, increment)) return PHI_NO_CONVERGENCE;
+#if PHI_MONITOR
+        double elapsed[1];
+        phi_elapsed(s->coef[stage], y, elapsed);
+        if (!(elapsed[0] * (phi_fractions[stage] * s->h) > 0.0)) return PHI_NOT_FINITE;
+#endif
         if (!phi_advance(s, increment, small)) return PHI_NOT_FINITE;
+#if PHI_MONITOR
+        phi_pass(s, elapsed[0]);
+#endif
 #if PHI_RECURRENCES
         phi_remember(&s->history[stage], y, iteration);
 #else

@@ -145,7 +145,15 @@ static phi_status phi_attempt(phi_solver *s, int stage)
         const int stalled = previous < PHI_NEARLY_SOLVED && size > PHI_SHRINKING * previous;
         if (size <= PHI_SOLVED || stalled) {
             if (!phi_plausible(s, stage, change)) return PHI_NO_CONVERGENCE;
+#if PHI_MONITOR
+            double elapsed[1];
+            phi_elapsed(coef, y, elapsed);
+            if (!(elapsed[0] * (phi_fractions[stage] * s->h) > 0.0)) return PHI_NOT_FINITE;
+#endif
             if (!phi_advance(s, change, s->carry)) return PHI_NOT_FINITE;
+#if PHI_MONITOR
+            phi_pass(s, elapsed[0]);
+#endif
 #if PHI_RECURRENCES
             phi_remember(&s->history[stage], y, iteration);
 #else

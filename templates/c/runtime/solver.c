@@ -11,7 +11,9 @@
 #else
 #include "explicit.c"
 #endif
-#if PHI_GAUGE
+#if PHI_MONITOR
+#include "level.c"
+#elif PHI_GAUGE
 #include "gauge.c"
 #endif
 #if PHI_BLOCKS
@@ -64,6 +66,10 @@ phi_status phi_init(phi_solver *s, const phi_params *params, const double x0[PHI
     for (int c = 0; c < PHI_GAUGES; ++c)
         if (!isfinite(fresh.gauge[c])) return PHI_BAD_ARGUMENT;
 #endif
+#if PHI_MONITOR
+    const double rate = phi_monitor(&fresh.params, fresh.x);
+    if (!isfinite(rate) || !(rate > 0.0)) return PHI_BAD_ARGUMENT;
+#endif
     *s = fresh;
     return PHI_OK;
 }
@@ -105,8 +111,10 @@ static phi_status phi_set_step(phi_solver *s, double h)
     s->blocks.passes_without_recurrences = INT_MAX;
 #endif
     s->h = h;
+#if !PHI_MONITOR
     s->t_before_h = s->t;
     s->steps_before_h = s->steps;
+#endif
     return PHI_OK;
 }
 
@@ -124,7 +132,9 @@ static void phi_renew(phi_solver *s)
 static void phi_count(phi_solver *s, size_t steps)
 {
     s->steps += steps;
+#if !PHI_MONITOR
     s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
+#endif
 }
 
 #endif
@@ -145,12 +155,19 @@ static phi_status phi_stages(phi_solver *s)
 {
     double x[PHI_DIM], carry[PHI_DIM];
     phi_status status = PHI_OK;
+#if PHI_MONITOR
+    const double t = s->t, t_carry = s->t_carry;
+#endif
     memcpy(x, s->x, sizeof x);
     memcpy(carry, s->carry, sizeof carry);
     for (int stage = 0; stage < PHI_STAGES && status == PHI_OK; ++stage) status = phi_stage(s, stage);
     if (status != PHI_OK) {
         memcpy(s->x, x, sizeof x);
         memcpy(s->carry, carry, sizeof carry);
+#if PHI_MONITOR
+        s->t = t;
+        s->t_carry = t_carry;
+#endif
     }
     return status;
 }
@@ -188,8 +205,12 @@ phi_status phi_integrate(phi_solver *s, double h, size_t steps)
 #endif
         if (status != PHI_OK) break;
         ++s->steps;
+#if PHI_MONITOR
+    }
+#else
         s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
     }
+#endif
     return status;
 }
 
@@ -200,4 +221,7 @@ phi_status phi_step(phi_solver *s, double h) { return phi_integrate(s, h, 1); }
 
 size_t phi_solver_size(void) { return sizeof(phi_solver); }
 size_t phi_solver_steps_done(const phi_solver *s) { return s->steps; }
+#if PHI_MONITOR
+double phi_solver_time(const phi_solver *s) { return s->t + s->t_carry; }
+#endif
 #endif

@@ -51,14 +51,18 @@ typedef struct {
     double carry[PHI_DIM]; /* what rounding took from x: the state proper is x + carry */
     size_t steps;          /* good steps since phi_init */
     size_t evaluations;    /* of the generating function, for statistics */
-#if PHI_TIMED
+#if PHI_MONITOR
+    double t, t_carry;     /* physical time since phi_init, t + t_carry: steps are equal in tau, not in it */
+#elif PHI_TIMED
     double t;              /* the time of x */
 #else
     double t;              /* time since phi_init */
 #endif
     double h;              /* the last step size; NaN before the first step */
     phi_params params;
-#if PHI_GAUGE
+#if PHI_MONITOR
+    double gauge[PHI_GAUGES]; /* e = -H(x0): K = monitor (H + e) is 0 along the trajectory */
+#elif PHI_GAUGE
     double gauge[PHI_GAUGES]; /* multiples of Casimirs that are taken from H, in their order */
 #endif
 #if PHI_RENEWED
@@ -66,8 +70,10 @@ typedef struct {
 #else
     double coef[PHI_STAGES][PHI_COEFFICIENTS]; /* all that depends on params and h only */
 #endif
+#if !PHI_MONITOR
     size_t steps_before_h; /* steps and t when h was set: t is counted from there, so no error adds up */
     double t_before_h;
+#endif
 #if PHI_IMPLICIT
     phi_history history[PHI_STAGES]; /* for starting guesses */
 #endif
@@ -79,6 +85,9 @@ typedef struct {
 /* Start at x0. params may be NULL for the defaults. Arguments of all functions may be parts of the solver, or overlap.
    PHI_BAD_ARGUMENT, and *s as before, if x0 or a parameter is not finite, one that has to be positive is not, or
    what is computed from parameters alone is not finite. */
+#if PHI_MONITOR
+/* Also if phi_monitor is not positive at x0. */
+#endif
 phi_status phi_init(phi_solver *s, const phi_params *params, const double x0[PHI_DIM]);
 
 #if PHI_TIMED
@@ -86,13 +95,22 @@ phi_status phi_init(phi_solver *s, const phi_params *params, const double x0[PHI
 phi_status phi_init_at(phi_solver *s, const phi_params *params, const double x0[PHI_DIM], double t0);
 
 #endif
-#if PHI_GAUGE
+#if PHI_MONITOR
+/* Start at x0 with an e of one's own: the step is an exact Poisson map for each fixed e. */
+#elif PHI_GAUGE
 /* Start at x0 with a gauge of one's own: the step is an exact Poisson map for each fixed gauge. */
+#endif
+#if PHI_GAUGE
 phi_status phi_init_gauge(phi_solver *s, const phi_params *params, const double x0[PHI_DIM],
     const double gauge[PHI_GAUGES]);
 
 #endif
+#if PHI_MONITOR
+/* One step of size h in tau, of either sign; s->t gains the physical time that it takes. On failure the state is as
+   before. */
+#else
 /* One step of size h, of either sign. On failure the state is as before. */
+#endif
 phi_status phi_step(phi_solver *s, double h);
 
 /* Many steps. On failure s->x is the last good state and s->steps counts the good steps. */
@@ -117,7 +135,11 @@ phi_status phi_ensemble_at(const phi_params *params, double *x, size_t members, 
 #endif
 #if PHI_TANGENT
 /* One step as phi_step makes it, and its derivative: tangent[i * PHI_DIM + j] is that of the new x_i along the old x_j,
+#if PHI_MONITOR
+   to round-off, with e held fixed. On failure both are as before. */
+#else
    to round-off, with any gauge held fixed. On failure both are as before. */
+#endif
 phi_status phi_step_tangent(phi_solver *s, double h, double tangent[PHI_DIM * PHI_DIM]);
 
 #endif
@@ -133,6 +155,11 @@ void phi_casimirs(const phi_params *params, const double x[PHI_DIM], double out[
 void phi_vector_field(const phi_params *params, const double x[PHI_DIM], double out[PHI_DIM]);
 #endif
 
+#if PHI_MONITOR
+/* dt/dtau at x; params may be NULL. */
+double phi_monitor(const phi_params *params, const double x[PHI_DIM]);
+
+#endif
 #if PHI_MODIFIED
 /* The Hamiltonian whose flow a step of size h is, up to O(h^PHI_MODIFIED_POWER): constant along a trajectory to that
    order. */
@@ -151,4 +178,7 @@ const char *phi_status_string(phi_status status);
 /* For bindings: the size of phi_solver, and its count of good steps. */
 size_t phi_solver_size(void);
 size_t phi_solver_steps_done(const phi_solver *s);
+#if PHI_MONITOR
+double phi_solver_time(const phi_solver *s);
+#endif
 #endif

@@ -1,4 +1,7 @@
 import { DIM, FRACTIONS, energy, vectorField } from "./model.mjs";
+// #if MONITOR
+import { rateAt } from "./level.mjs";
+// #endif
 
 // ---- Starting guesses, and whether a solution may be right ----
 
@@ -115,7 +118,12 @@ export function plausible(solver, stage, increment) {
   // #else
   vectorField(params, x, speed);
   // #endif
+  // #if MONITOR
+  const rate = rateAt(params, x);
+  for (let i = 0; i < DIM; i++) size += Math.abs(FRACTIONS[stage] * solver.h * rate * speed[i]);
+  // #else
   for (let i = 0; i < DIM; i++) size += Math.abs(FRACTIONS[stage] * solver.h * speed[i]);
+  // #endif
   if (moved <= PLAUSIBLE * size) return true;
   const [before, middle, after] = [0, 0.5, 1].map((part) => {
     for (let i = 0; i < DIM; i++) point[i] = x[i] + part * increment[i];

@@ -1,5 +1,8 @@
 import { TINY, advance, solve } from "./algebra.mjs";
 import { plausible, retried } from "./guess.mjs";
+// #if MONITOR
+import { pass, timeOf } from "./level.mjs";
+// #endif
 import { DIM, FLOOR, MAX_ITERATIONS, TOLERANCE, linearise } from "./model.mjs";
 
 // ---- The implicit step, by Newton's method ----
@@ -62,7 +65,14 @@ function attempt(solver, stage) {
       small[i] += carry[i];
     }
     if (!plausible(solver, stage, increment)) return "NO_CONVERGENCE";
+    // #if MONITOR
+    const time = timeOf(solver, stage, y);
+    if (Number.isNaN(time)) return "NOT_FINITE";
+    // #endif
     if (!advance(solver, increment, small)) return "NOT_FINITE";
+    // #if MONITOR
+    pass(solver, time);
+    // #endif
     history.remember(y);
     return "OK";
   }

@@ -1,5 +1,8 @@
 import { TINY, advance, solve } from "./algebra.mjs";
 import { plausible, retried } from "./guess.mjs";
+// #if MONITOR
+import { pass, timeOf } from "./level.mjs";
+// #endif
 import { DIM, FIXED, LONGEST_PATH, MAX_ITERATIONS, MOST_PIECES, SERIES, TERMS } from "./model.mjs";
 import { generate, pathBegin, pathField, pathOrder } from "./model.mjs";
 
@@ -160,7 +163,14 @@ function attempt(solver, stage) {
     // The second test: residuals no longer shrink, the solve has reached the level of rounding.
     if (size <= 4e-16 || (previous < 1e-12 && size > 0.25 * previous)) {
       if (!plausible(solver, stage, change)) return "NO_CONVERGENCE";
+      // #if MONITOR
+      const time = timeOf(solver, stage, y);
+      if (Number.isNaN(time)) return "NOT_FINITE";
+      // #endif
       if (!advance(solver, change, solver.carry)) return "NOT_FINITE";
+      // #if MONITOR
+      pass(solver, time);
+      // #endif
       history.remember(y);
       return "OK";
     }

@@ -6,6 +6,10 @@ import { History } from "./guess.mjs";
 import { chooseGauge } from "./gauge.mjs";
 import { GAUGE } from "./model.mjs";
 // #endif
+// #if MONITOR
+import { chooseGauge, rateAt } from "./level.mjs";
+import { GAUGE } from "./model.mjs";
+// #endif
 import { CASIMIRS, COORDINATES, DEFAULT_PARAMETERS, DIM, NAME, ORDER } from "./model.mjs";
 import { COEFFICIENTS, FRACTIONS, POSITIVE, SPEC_SHA256, VERSION } from "./model.mjs";
 import { casimirs, energy, prepare, vectorField } from "./model.mjs";
@@ -78,7 +82,7 @@ function admitted(given) {
     if (!allowed) throw new StepError("BAD_ARGUMENT", 0, `the parameter ${name} is ${value}`);
   }
   const [table] = emptyTables();
-  // #if GAUGE
+  // #if HELD
   prepare(params, new Float64Array(GAUGE.length), 1e-100, table);
   // #else
   prepare(params, 1e-100, table);
@@ -104,6 +108,10 @@ export class Solver {
   x;
   /** What rounding took from x: the state proper is x + carry. */
   carry = new Float64Array(DIM);
+  // #if MONITOR
+  /** What rounding took from t, the physical time: steps are equal in tau, not in it. */
+  tCarry = 0;
+  // #endif
   // #if TIMED
   /** The time of x. */
   t;
@@ -123,6 +131,10 @@ export class Solver {
   /** Multiples of the Casimirs in GAUGE that are taken from H. */
   gauge;
   // #endif
+  // #if MONITOR
+  /** e = -H(x0): K = monitor (H + e) is 0 along the trajectory. */
+  gauge;
+  // #endif
   // #if RENEWED
   /** What depends on parameters and step size only, then on the time of the step too, for each stage. */
   // #else
@@ -133,9 +145,11 @@ export class Solver {
   /** For starting guesses, for each stage. */
   history = FRACTIONS.map(() => new History());
   // #endif
+  // #if EQUAL_IN_T
   /** Steps and time when h was set: time is counted from there, so that no error adds up. */
   #stepsBefore = 0;
   #timeBefore = 0;
+  // #endif
 
   /**
    * Start at x0. Throws StepError for arguments that are not allowed.
@@ -150,6 +164,9 @@ export class Solver {
    * @param {ArrayLike<number>} [options.gauge] multiples of one's own: the step is an exact Poisson map
    *   for each
    * #endif
+   * #if MONITOR
+   * @param {ArrayLike<number>} [options.gauge] an e of one's own: the step is an exact Poisson map for each
+   * #endif
    */
   constructor(options) {
     this.x = finite(options.x0, DIM, "x0");
@@ -157,9 +174,15 @@ export class Solver {
     // #if TIMED
     [this.t] = finite([options.t0 ?? 0], 1, "t0");
     // #endif
-    // #if GAUGE
+    // #if HELD
     const { gauge } = options;
     this.gauge = gauge ? finite(gauge, GAUGE.length, "gauge") : chooseGauge(this.params, this.x);
+    // #endif
+    // #if MONITOR
+    const rate = rateAt(this.params, this.x);
+    if (!(Number.isFinite(rate) && rate > 0 && Number.isFinite(this.gauge[0]))) {
+      throw new StepError("BAD_ARGUMENT", 0, `the monitor is ${rate} at x0`);
+    }
     // #endif
   }
 
@@ -168,7 +191,7 @@ export class Solver {
     if (!Number.isFinite(h)) throw new StepError("BAD_ARGUMENT", this.steps, `the step is ${h}`);
     if (Object.is(h, this.h)) return;
     FRACTIONS.forEach((fraction, stage) => {
-      // #if GAUGE
+      // #if HELD
       prepare(this.params, this.gauge, fraction * h, this.coef[stage]);
       // #else
       prepare(this.params, fraction * h, this.coef[stage]);
@@ -178,8 +201,10 @@ export class Solver {
       // #endif
     });
     this.h = h;
+    // #if EQUAL_IN_T
     this.#timeBefore = this.t;
     this.#stepsBefore = this.steps;
+    // #endif
   }
 
   // #if RENEWED
@@ -205,6 +230,9 @@ export class Solver {
     // #if COMPOSED
     const x = Float64Array.from(this.x);
     const carry = Float64Array.from(this.carry);
+    // #if MONITOR
+    const { t, tCarry } = this;
+    // #endif
     // #endif
     for (let stage = 0; stage < FRACTIONS.length; stage++) {
       const status = makeStage(this, stage);
@@ -212,11 +240,16 @@ export class Solver {
       // #if COMPOSED
       this.x.set(x);
       this.carry.set(carry);
+      // #if MONITOR
+      Object.assign(this, { t, tCarry });
+      // #endif
       // #endif
       throw new StepError(status, this.steps);
     }
     this.steps++;
+    // #if EQUAL_IN_T
     this.t = this.#timeBefore + (this.steps - this.#stepsBefore) * h;
+    // #endif
     return this;
   }
 
@@ -245,7 +278,11 @@ export class Solver {
    * @returns {Float64Array} entry i * DIM + j is the derivative of the new x[i] along the old x[j]
    */
   stepTangent(h) {
+    // #if MONITOR
+    const { t, tCarry, steps } = this;
+    // #else
     const { t, steps } = this;
+    // #endif
     const before = { x: Float64Array.from(this.x), carry: Float64Array.from(this.carry) };
     const at = { x: Float64Array.from(this.x), carry: Float64Array.from(this.carry) };
     this.step(h);
@@ -253,6 +290,9 @@ export class Solver {
     if (status === "OK") return tangent;
     this.x.set(before.x);
     this.carry.set(before.carry);
+    // #if MONITOR
+    this.tCarry = tCarry;
+    // #endif
     Object.assign(this, { t, steps, h: NaN }); // what h prepared counts from the step taken back
     throw new StepError(status, steps);
   }
@@ -312,7 +352,7 @@ export class Solver {
   }
   // #else
   modifiedHamiltonian(h, x = this.x) {
-    // #if GAUGE
+    // #if HELD
     modified(this.params, this.gauge, h, x, number);
     // #else
     modified(this.params, h, x, number);

@@ -1,0 +1,61 @@
+"""Whether an expression is positive: by its form, or at the points where runs start."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from fractions import Fraction
+
+from phigen.symbolic.expression import Expression, fold
+from phigen.symbolic.numeric import DomainError, evaluate
+from phigen.symbolic.readable import shortened
+from phigen.symbolic.verdict import CHECKED, PROVED, REFUTED, UNDECIDED, Statement
+
+#: Signs that the form of an expression shows, of real values; None for no such.
+POSITIVE, NOT_NEGATIVE = "positive", "not negative"
+_ALWAYS = {"exp": POSITIVE, "cosh": POSITIVE, "abs": NOT_NEGATIVE, "pi": POSITIVE, "E": POSITIVE}
+
+
+def positivity(name: str, e: Expression, positive: Collection[str], starts: Sequence[Mapping[str, float]]) -> Statement:
+    """Whether ``e`` is positive wherever it is defined and not 0; ``positive`` names symbols that are.
+
+    Proved by the form alone; refuted by a point of ``starts`` where it is not; checked at these otherwise.
+    """
+    for point in starts:
+        try:
+            (value,) = evaluate([e], point)
+        except DomainError:
+            return Statement(name, REFUTED, "no value where a run starts", shortened(e))
+        if not value > 0:
+            return Statement(name, REFUTED, f"{value:.6g} where a run starts", shortened(e))
+    sign = sign_of(e, positive)
+    if sign == POSITIVE:
+        return Statement(name, PROVED, "by its form")
+    if sign == NOT_NEGATIVE:
+        return Statement(name, PROVED, "by its form, except where it is 0")
+    if starts:
+        return Statement(name, CHECKED, f"where runs start, {len(starts)}; a step on which it is not fails")
+    return Statement(name, UNDECIDED, "no run starts anywhere; a step on which it is not fails")
+
+
+def sign_of(e: Expression, positive: Collection[str]) -> str | None:
+    """The sign that the form shows."""
+
+    def visit(e: Expression, args: list[str | None]) -> str | None:
+        if e.op == "number":
+            return POSITIVE if e.value > 0 else NOT_NEGATIVE if e.value == 0 else None
+        if e.op == "symbol":
+            return POSITIVE if e.value in positive else None
+        if e.op == "add":
+            return None if None in args else POSITIVE if POSITIVE in args else NOT_NEGATIVE
+        if e.op == "mul":
+            if e.args[0] is e.args[1]:
+                return args[0] or NOT_NEGATIVE
+            return None if None in args else NOT_NEGATIVE if NOT_NEGATIVE in args else POSITIVE
+        if e.op == "pow":
+            # A fractional power is that of a value which is not negative, and not negative itself.
+            even = Fraction(e.value).denominator % 2 == 0 or Fraction(e.value).numerator % 2 == 0
+            return args[0] or (NOT_NEGATIVE if even else None)
+        return _ALWAYS.get(e.op)
+
+    (found,) = fold([e], visit)
+    return found

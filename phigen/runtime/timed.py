@@ -1,0 +1,157 @@
+"""States at given times, by a further step of the same method from a state nearby; ends in time.
+
+A step of any size is a Poisson map, and stays on the leaf that it started from. With a monitor steps are of given size
+in τ, and the one that takes a given time is found by secants, to rounding.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Protocol, Self, TypeVar
+
+import numpy as np
+
+from phigen.runtime.interface import BackendError, Floats
+from phigen.runtime.session import Session
+
+
+class Clocked(Protocol):
+    """What is asked of a session."""
+
+    @property
+    def steps(self) -> int: ...
+    def state(self) -> Floats: ...
+    def time(self) -> float: ...
+    def advance(self, h: float, steps: int) -> None: ...
+    def branch(self) -> Self: ...
+
+
+C = TypeVar("C", bound=Clocked)
+
+#: Most secants; they converge in four to seven.
+MOST = 30
+
+
+def reached(session: C, h: float, span: float) -> tuple[C, float]:
+    """A copy that made one step more, the one that takes the time ``span``, and its size; h is a whole step.
+
+    Raises `BackendError`.
+    """
+    if not np.isfinite(session.time()):
+        return _moved(session, span), span
+    begin = session.time()
+    target = begin + span
+    size, before, missed_before = h, 0.0, -span
+    while True:  # a step that does not fail, from which to begin
+        try:
+            copy = _moved(session, size)
+            break
+        except BackendError:
+            size /= 2
+            if abs(size) < 1e-3 * abs(h):
+                raise
+    missed = copy.time() - target
+    for _ in range(MOST):
+        if missed == 0 or size == before or missed == missed_before:
+            break
+        following = size - missed * (size - before) / (missed - missed_before)
+        if abs(following - size) <= 1e-16 * abs(size):
+            break
+        try:
+            found = _moved(session, following)
+        except BackendError:
+            break
+        ahead = found.time() - target
+        if abs(ahead) >= abs(missed) and abs(missed) <= 8 * np.finfo(float).eps * max(abs(begin), abs(span)):
+            break
+        before, missed_before = size, missed
+        size, missed, copy = following, ahead, found
+    if abs(missed) > 1e-9 * max(abs(begin), abs(span)):
+        raise BackendError("NO_CONVERGENCE", session.steps, session.state()[np.newaxis])
+    return copy, size
+
+
+def along_until(session: C, h: float, span: float, stride: int, see: Callable[[C, float], object]) -> None:
+    """Go on for a span of time, the last step being part of one; ``see`` every stride-th state and the last, with τ.
+
+    Raises `BackendError`.
+    """
+    see(session, 0.0)
+    done = 0
+    if not np.isfinite(session.time()):
+        whole = _whole_steps(h, span)
+        while done < whole:
+            count = min(stride - done % stride, whole - done)
+            session.advance(h, count)
+            done += count
+            if done % stride == 0:
+                see(session, done * h)
+        left = span - done * h
+    else:
+        chunk, growing = 1, True
+        while chunk:
+            chunk = min(chunk, stride - done % stride)
+            copy = session.branch()
+            copy.advance(h, chunk)
+            if (span - copy.time()) * np.sign(span) < 0:  # beyond the end
+                chunk, growing = chunk // 2, False
+                continue
+            session, done = copy, done + chunk
+            chunk = 2 * chunk if growing else chunk
+            if done % stride == 0:
+                see(session, done * h)
+        left = span - session.time()
+    if abs(left) <= 8 * np.finfo(float).eps * abs(span):
+        if done % stride:
+            see(session, done * h)
+        return
+    end, size = reached(session, h, left)
+    see(end, done * h + size)
+
+
+def states_at(place: Callable[[int], Session], t: Floats, x: Floats, h: float, times: Floats) -> Floats:
+    """The states (times, DIM) at given times of a trajectory with rows ``t`` and ``x``, where ``place`` puts sessions.
+
+    Each is reached from the nearest row by steps of size h, of either sign, and part of one. Raises `BackendError`.
+    """
+    states = np.empty((len(times), x.shape[1]))
+    for k, time in enumerate(np.asarray(times, dtype=np.float64).tolist()):
+        row = int(np.argmin(np.abs(t - time)))
+        span = time - float(t[row])
+        states[k] = x[row]
+        if span:
+            states[k] = _from(place(row), h, span).state()
+    return states
+
+
+def _from(session: Session, h: float, span: float) -> Session:
+    """The session after the time ``span``, in whole steps as far as they go."""
+    step = np.copysign(h, span)
+    if not np.isfinite(session.time()):
+        whole = _whole_steps(step, span)
+        session.advance(step, whole)
+        left = span - whole * step
+        return reached(session, step, left)[0] if abs(left) > 8 * np.finfo(float).eps * abs(span) else session
+    while True:
+        copy = session.branch()
+        try:
+            copy.advance(step, 1)
+        except BackendError:
+            break
+        if abs(copy.time()) > abs(span):
+            break
+        session = copy
+    left = span - session.time()
+    return reached(session, step, left)[0] if left else session
+
+
+def _whole_steps(h: float, span: float) -> int:
+    """How many steps fit into a span of time; one that it falls short of by rounding does."""
+    ratio = span / h
+    return round(ratio) if abs(ratio - round(ratio)) <= 1e-12 * max(1.0, abs(ratio)) else max(0, int(np.floor(ratio)))
+
+
+def _moved(session: C, size: float) -> C:
+    copy = session.branch()
+    copy.advance(size, 1)
+    return copy

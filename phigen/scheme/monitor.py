@@ -1,0 +1,62 @@
+"""Steps of equal size in τ, dt = g dτ, g > 0, that are Poisson maps: a monitored system.
+
+With a canonical pair (t, e) beside the coordinates, K = g(x)(H(x) + e) has the orbits of H where K = 0, that is for
+e = −H(x₀), and along them dt/dτ = ∂K/∂e = g. K does not depend on t; so e is constant, to the solver a parameter that
+each trajectory has a value of. In the midpoint realisation of the pair the step is that of the series S_τ(x; e) of K in
+x alone, and t₁ − t₀ = ∂S_τ/∂e at its point y: to the order of the method, since (t, x) is one step of one method.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from phigen.errors import SpecError
+from phigen.geometry.system import System
+from phigen.scheme.generating import GeneratingFunction
+from phigen.scheme.kernel import Kernel, Output
+from phigen.spec.model import Spec
+from phigen.symbolic.expression import Expression
+
+
+def elapsed_kernel(system: System, generating: GeneratingFunction) -> Kernel | None:
+    """∂S_τ/∂e at the point y of a step; None for a system that is not monitored."""
+    if generating.elapsed is None:
+        return None
+    (value,) = generating.coefficients.hoist([generating.elapsed])
+    return Kernel(
+        "elapsed",
+        "the time that a step takes, by its point y: the derivative of S_h by e",
+        {"coef": generating.coefficients.slots, "y": system.coordinates},
+        (Output("elapsed", (value,)),),
+    )
+
+
+def rate_kernel(system: System, monitor: Expression) -> Kernel:
+    """dt/dτ at a state."""
+    return Kernel(
+        "monitor",
+        "dt/dtau, which has to be positive",
+        {"params": system.parameter_names, "x": system.coordinates},
+        (Output("rate", (monitor,)),),
+    )
+
+
+def monitor_facts(monitor: Expression | None) -> Iterator[str]:
+    """What the header says."""
+    if monitor:
+        yield f"monitor: dt = g dtau with g = {monitor}, steps are equal in tau; the step is that of K = g (H + e)"
+
+
+def monitor_of(spec: Spec) -> Expression | None:
+    """g of a spec whose step is that of a series. Raises `SpecError` for what does not go with it."""
+    if spec.monitor is None:
+        return None
+    others = {"time:": spec.time, "lattice:": spec.lattice, "forces:": spec.forces}
+    for key, given in others.items():
+        if given:
+            message = f"monitor: not together with {key} e = -H(x0) would not be constant, or nothing would adapt"
+            raise SpecError([spec.diagnostic(("monitor",), message)])
+    if isinstance(spec.monitor, str):
+        hint = "scheme: splitting, or dt/dtau as an expression in the coordinates"
+        raise SpecError([spec.diagnostic(("monitor",), "monitor: log needs H = A + B split in two", hint)])
+    return spec.monitor

@@ -1,0 +1,35 @@
+"""The motion of a monitored system in τ: what its steps are measured against."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+import numpy as np
+
+from phigen.runtime.solver import Solver
+from phigen.study.methods import Method
+from phigen.symbolic.arrays import Floats
+
+
+def field_in_tau(solver: Solver, parameters: Mapping[str, float]) -> Callable[[Floats], Floats]:
+    """g π∇H at a state (DIM,), which is the motion in τ where K = 0; followed by dt/dτ where the time is behind it."""
+    n, backend = solver.interface.dimension, solver.backend
+
+    def field(x: Floats) -> Floats:
+        state = x[None, :n]
+        rate = backend.rate(state, parameters)
+        slope: Floats = np.append(rate * backend.vector_field(state, parameters)[0], rate)[: len(x)]
+        return slope
+
+    return field
+
+
+def with_time(solver: Solver, parameters: Mapping[str, float], gauge: Floats) -> Method:
+    """A generated solver whose rows have the time behind the state; e is held fixed."""
+    fixed = Solver(solver.backend.with_gauge(gauge), solver.interface)
+
+    def rows(x: Floats, h: float, steps: int, stride: int) -> Floats:
+        found = fixed.integrate(x[:-1], h, steps, stride, parameters=parameters)
+        return np.column_stack([found.x, found.t])
+
+    return Method(solver.target, lambda x, h: rows(x, h, 1, 1)[-1], rows)

@@ -1,0 +1,32 @@
+import { FRACTIONS, elapsed, energy, monitor } from "./model.mjs";
+
+// ---- Physical time, of steps that are equal in tau ----
+
+const one = new Float64Array(1);
+
+/** e = -H(x0), which a trajectory holds fixed: K = monitor (H + e) is 0 along it. */
+export function chooseGauge(params, x) {
+  energy(params, x, one);
+  return Float64Array.of(-one[0]);
+}
+
+/** dt/dtau at a state. */
+export function rateAt(params, x) {
+  monitor(params, x, one);
+  return one[0];
+}
+
+/** The time that a stage takes, by its point y; NaN unless it has the sign of the stage. */
+export function timeOf(solver, stage, y) {
+  elapsed(solver.coef[stage], y, one);
+  return one[0] * (FRACTIONS[stage] * solver.h) > 0 ? one[0] : NaN;
+}
+
+/** The time of a solver gains that of a stage. */
+export function pass(solver, time) {
+  const sum = solver.t + time;
+  const added = sum - solver.t;
+  const small = solver.tCarry + ((solver.t - (sum - added)) + (time - added));
+  solver.t = sum + small;
+  solver.tCarry = small - (solver.t - sum);
+}
