@@ -24,7 +24,9 @@ from phigen.symbolic.symbols import momentum
 
 #: The corpus, without the systems that depend on the time: tests/generated/test_time.py is about these.
 TIMED = ("duffing", "spin_resonance")
-NAMES = sorted({path.stem for path in resources.bundled_specs().glob("*.yaml")} - {*TIMED})
+#: Those with forces: tests/generated/test_forces.py.
+FORCED = ("landau_lifshitz", "thruster_body")
+NAMES = sorted({path.stem for path in resources.bundled_specs().glob("*.yaml")} - {*TIMED, *FORCED})
 
 
 @cache

@@ -56,7 +56,8 @@ def _rows(summaries: Sequence[Summary], *, driven: bool) -> list[list[str]]:
         rows.append(["  last tenth/first", *growth, "1 is no drift"])
     for kind, noun in (("casimirs", "Casimir"), ("invariants", "invariant")):
         for name, drift in getattr(first, kind).items():
-            rows.append([f"{noun} {name}", *(_shown(getattr(s, kind)[name]) for s in summaries), drift.unit.kind])
+            label = f"change of the {noun} {name}" if drift.unit.moves else f"{noun} {name}"
+            rows.append([label, *(_shown(getattr(s, kind)[name]) for s in summaries), drift.unit.kind])
     if first.exact:
         rows.append(["against closed form", *(_shown(s.exact) for s in summaries if s.exact), "relative"])
     if any(s.good < s.rows for s in summaries):

@@ -71,7 +71,7 @@ def draw_errors(figure: FigureBase, methods: Mapping[str, Trajectory], units: Ma
         }
         _draw_panel(axes, curves)
         what = "energy" if index == 1 else f"Casimir {name}"
-        axes.set_title(f"{unit.adjective} error{' of the' if columns < 3 else ':'} {what}")
+        axes.set_title(f"{unit.adjective} {unit.noun}{' of the' if columns < 3 else ':'} {what}")
         if index > len(panels) - columns:
             axes.set_xlabel("t")
     if len(methods) > 1:

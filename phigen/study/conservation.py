@@ -37,12 +37,19 @@ def rounding(steps: int) -> float:
 class Unit:
     """What errors of a quantity are divided by: ``size``, of the ``kind`` `RELATIVE`, `TERMS` or `ABSOLUTE`.
 
-    ``terms`` are those of the quantity at the start, which rounding is in proportion to, in this unit.
+    ``terms`` are those of the quantity at the start, which rounding is in proportion to, in this unit. ``moves`` tells
+    that the quantity is no invariant, since time or forces change it: what it differs by is no error.
     """
 
     size: float = 1.0
     kind: str = ABSOLUTE
     terms: float = 1.0
+    moves: bool = False
+
+    @property
+    def noun(self) -> str:
+        """``error`` or ``change``."""
+        return "change" if self.moves else "error"
 
     @property
     def adjective(self) -> str:
@@ -68,6 +75,12 @@ def units_of(system: System, parameters: Mapping[str, float], start: Floats) -> 
     """The units of the energy and the Casimirs of a system, by their names."""
     named = {ENERGY: system.hamiltonian, **system.casimirs}
     return dict(zip(named, units(named.values(), system.coordinates, parameters, start), strict=True))
+
+
+def moving(system: System) -> list[str]:
+    """The names of energy and Casimirs that time or forces change."""
+    pushed = [name for name, c in system.casimirs.items() if not system.forced_rate_of_casimir(c).is_zero]
+    return [ENERGY, *pushed] if system.driven else []
 
 
 def unit_of(value: float, terms: float) -> Unit:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from phigen.geometry.system import System
 from phigen.spec.model import Run
 from phigen.study.balance import powers, works
-from phigen.study.conservation import ENERGY, RELATIVE, Unit, rounding, units
+from phigen.study.conservation import ENERGY, RELATIVE, Unit, moving, rounding, units
 from phigen.symbolic.arrays import Floats, evaluate
 from phigen.symbolic.symbols import ELAPSED, initial
 
@@ -176,7 +176,9 @@ class Watch:
     def _units(self) -> Sequence[Unit]:
         if not self._found and self.begun:
             known = {**self._parameters, **{t: float(self.state["since"]) for t in self._system.times}}
-            self._found = units(self._formulas, self._system.coordinates, known, self.state["first"])
+            found = units(self._formulas, self._system.coordinates, known, self.state["first"])
+            names, moved = [ENERGY, *self._groups["casimirs"], *self._groups["invariants"]], moving(self._system)
+            self._found = [replace(unit, moves=name in moved) for name, unit in zip(names, found, strict=True)]
         return self._found or [Unit()] * len(self._formulas)
 
     def _see_turns(self, x: Floats, windows: NDArray[np.int64]) -> None:

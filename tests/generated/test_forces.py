@@ -116,6 +116,8 @@ def test_the_energy_is_what_time_and_forces_put_in(kind):
         rows = solver(made(kind), "c").integrate(SYSTEMS[kind][1], 10 / n, n)
         found[n] = summarise("phigen", made(kind).system, None, dict(rows.parameters), rows.t, rows.x)
     assert abs(found[100].work) > 0.1
+    assert found[100].units["energy"].moves
+    assert found[100].units["C"].moves == (kind == "vector")
     assert found[100].energy.error / found[200].energy.error == pytest.approx(4, rel=0.2)
 
 

@@ -1,0 +1,100 @@
+/*
+ * thruster_body.h: the declarations; thruster_body.c says how they were made.
+ * DO NOT EDIT: edits are noticed by the checksum below.
+ * SPDX-License-Identifier: 0BSD
+ * body-sha256: ae3c75d31f4dd33acb652d1a3454c92856602057c06dfd06714b1401b08a3f9c
+ */
+#ifndef THRUSTER_BODY_H
+#define THRUSTER_BODY_H
+
+#include <stddef.h>
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+#define thruster_body_DIM 3
+#define thruster_body_ORDER 4
+#define thruster_body_CASIMIRS 1
+#define thruster_body_PHIGEN_VERSION "0.1.0"
+#define thruster_body_SPEC_SHA256 "d7008fc5692e1b59f1c3b14bb2c026902f9cbe75a2384109edc23562163c7f67"
+
+/* State vectors: m1, m2, m3. Casimirs: C. */
+typedef struct {
+    double I1;     /* default 2.0 */
+    double I2;     /* default 3.0 */
+    double I3;     /* default 4.0 */
+    double torque; /* about the third axis */
+    double drag;   /* default 0.05 */
+} thruster_body_params;
+
+extern const thruster_body_params thruster_body_default_params;
+
+enum { thruster_body_STAGES = 5 };       /* of a step */
+enum { thruster_body_COEFFICIENTS = 8 }; /* numbers that depend on params and h only */
+
+/* How a step ends; thruster_body_status_string says it in words. */
+typedef enum {
+    thruster_body_OK = 0, thruster_body_NO_CONVERGENCE, thruster_body_SINGULAR, thruster_body_NOT_FINITE,
+        thruster_body_BAD_ARGUMENT
+} thruster_body_status;
+
+enum { thruster_body_DIFFERENCES = 9 }; /* those of higher order amplify rounding more than they gain */
+
+/* The last value of the unknown and its backward differences, for a guess at the next. */
+typedef struct {
+    int count; /* differences that are known */
+    int order; /* how many of them the extrapolation adds up */
+    double difference[thruster_body_DIFFERENCES][thruster_body_DIM];
+} thruster_body_history;
+
+/* The solver is a plain value: copy it to branch, keep one per thread. Set it up with thruster_body_init. */
+typedef struct {
+    /* the state; read it freely, change it only through thruster_body_init */
+    double x[thruster_body_DIM];
+    double carry[thruster_body_DIM]; /* what rounding took from x: the state proper is x + carry */
+    size_t steps;                    /* good steps since thruster_body_init */
+    size_t evaluations;              /* of the generating function, for statistics */
+    double t;                        /* time since thruster_body_init */
+    double h;                        /* the last step size; NaN before the first step */
+    thruster_body_params params;
+    double coef[thruster_body_STAGES][thruster_body_COEFFICIENTS]; /* all that depends on params and h only */
+    size_t steps_before_h; /* steps and t when h was set: t is counted from there, so no error adds up */
+    double t_before_h;
+    thruster_body_history history[thruster_body_STAGES]; /* for starting guesses */
+} thruster_body_solver;
+
+/* Start at x0. params may be NULL for the defaults. Arguments of all functions may be parts of the solver, or
+   overlap. thruster_body_BAD_ARGUMENT, and *s as before, if x0 or a parameter is not finite, one that has to
+   be positive is not, or what is computed from parameters alone is not finite. */
+thruster_body_status thruster_body_init(thruster_body_solver *s, const thruster_body_params *params,
+    const double x0[thruster_body_DIM]);
+
+/* One step of size h, of either sign. On failure the state is as before. */
+thruster_body_status thruster_body_step(thruster_body_solver *s, double h);
+
+/* Many steps. On failure s->x is the last good state and s->steps counts the good steps. */
+thruster_body_status thruster_body_integrate(thruster_body_solver *s, double h, size_t steps);
+
+/* Many members, in place: x[i * members + m] is coordinate i of member m. One that fails keeps its last good
+   state. status (or NULL) receives the status of each; the first that is not OK is returned. */
+thruster_body_status thruster_body_ensemble(const thruster_body_params *params, double *x, size_t members,
+    double h, size_t steps, unsigned char *status);
+
+/* The Hamiltonian; the Casimirs; the right-hand side pi(x) grad H(x). params may be NULL. */
+double thruster_body_hamiltonian(const thruster_body_params *params, const double x[thruster_body_DIM]);
+void thruster_body_casimirs(const thruster_body_params *params, const double x[thruster_body_DIM],
+    double out[]);
+void thruster_body_vector_field(const thruster_body_params *params, const double x[thruster_body_DIM],
+    double out[thruster_body_DIM]);
+
+const char *thruster_body_status_string(thruster_body_status status);
+
+/* For bindings: the size of thruster_body_solver, and its count of good steps. */
+size_t thruster_body_solver_size(void);
+size_t thruster_body_solver_steps_done(const thruster_body_solver *s);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif /* THRUSTER_BODY_H */
