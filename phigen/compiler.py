@@ -234,15 +234,12 @@ def _compiled(
 
 def _split(spec: Spec, source: System, order: int | None, described: Mapping[str, Any], clock: _Clock) -> Compilation:
     """Compile to a splitting."""
-    if source.time:
-        reason = f"scheme: splitting is not offered yet where H depends on the time {source.time}"
-        raise SpecError([spec.diagnostic(("scheme",), reason, "scheme: series takes it")])
     if source.forces:
         reason = "scheme: splitting takes no forces and no damping"
         raise SpecError([spec.diagnostic(("scheme",), reason, "scheme: series takes them")])
     gauge = Gauge() if isinstance(spec.gauge, str) else given(source, spec.gauge)
     discretised = gauge.applied(source)
-    parts = clock.timed("splitting", lambda: split(discretised))
+    parts = clock.timed("splitting", lambda: split(discretised.frozen))
     choice = clock.timed(
         "composition", lambda: plan_splitting(discretised, parts, order or spec.wanted_order, spec.composition)
     )

@@ -10,7 +10,7 @@ splitting is α = (½, ½), and a symmetric composition of it has α = (γ_1/2, 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 
 from phigen.scheme.composition import COMPOSITIONS, Composition
@@ -83,13 +83,15 @@ class Schedule:
     """The flows of one step: part 0 for ``times[0]``, then ``stages`` times the ``pattern``.
 
     The pattern lists parts with the row of ``times`` that each takes, counted from the first row of the stage.
-    Kicks with modified potential have a multiple each, in units of h²: ``multiples`` by row, 0 for other flows.
+    Kicks with modified potential have a multiple each, in units of h²: ``multiples`` by row, 0 for other flows. Where H
+    depends on the time, ``moments`` says for each row at which fraction of the step it stands still.
     """
 
     times: tuple[float, ...]
     stages: int
     pattern: tuple[tuple[int, int], ...]
     multiples: tuple[float, ...] = ()
+    moments: tuple[float, ...] = ()
 
     @property
     def rows(self) -> int:
@@ -101,6 +103,23 @@ class Schedule:
         """All flows of a step in order: part and row of ``times``."""
         later = [(part, 1 + k * self.rows + row) for k in range(self.stages) for part, row in self.pattern]
         return [(0, 0), *later]
+
+
+def with_clock(schedule: Schedule, carrier: int, parts: int) -> Schedule:
+    """The schedule of ``parts`` flows where the time advances with the part ``carrier``, the first or the last one.
+
+    The conjugate e of the time, in H + e, belongs to that part: if there is no such flow, it is that of e alone, and is
+    left out. All other parts see the time stand still.
+    """
+    clock, moments = Fraction(0), dict[int, Fraction]()
+    for part, row in schedule.flows:
+        if part == carrier:
+            clock += Fraction(schedule.times[row])
+        elif moments.setdefault(row, clock) != clock:
+            raise ValueError(f"row {row} would need two times")
+    pattern = tuple(flow for flow in schedule.pattern if flow[0] < parts)
+    found = tuple(float(moments.get(row, Fraction(0))) for row in range(len(schedule.times)))
+    return replace(schedule, pattern=pattern, moments=found)
 
 
 def schedule(method: Alternation, parts: int) -> Schedule:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
 from phigen.errors import Diagnostic, Location, SpecError
@@ -22,6 +22,9 @@ from phigen.scheme.order import Order
 from phigen.splitting.flow import Flow
 from phigen.splitting.kicks import Kick, kicks
 from phigen.splitting.parts import Splitting
+from phigen.splitting.statements import bracket
+from phigen.symbolic.expression import gradient, symbols_of
+from phigen.symbolic.verdict import PROVED, decide_zero
 
 #: Operations that a flow costs beside its formulas, for each coordinate that it moves: mostly it waits for the flow
 #: before. Found by timing: of fourteen pairs of methods on seven systems the faster is taken in twelve, and in the
@@ -31,18 +34,25 @@ OVERHEAD = 12
 
 @dataclass(frozen=True)
 class Choice:
-    """A method with the flows in the order of its steps, kicks modified if it wants that; ``why`` is for the user."""
+    """A method with the flows in the order of its steps, kicks modified if it wants that; ``why`` is for the user.
+
+    Where H depends on the time, that advances with the flow ``carrier``, or by itself if no flow has that number.
+    """
 
     order: Order
     method: Alternation | Nystrom
     splitting: Splitting
     why: str = ""
+    carrier: int | None = None
 
     def schedule(self) -> Schedule:
         """The flows of a step."""
-        if isinstance(self.method, Nystrom):
-            return self.method.schedule()
-        return alternation.schedule(self.method, len(self.splitting.flows))
+        count, method = len(self.splitting.flows), self.method
+        if self.carrier is None:
+            return method.schedule() if isinstance(method, Nystrom) else alternation.schedule(method, count)
+        parts = max(count, self.carrier + 1)
+        flows = method.schedule() if isinstance(method, Nystrom) else alternation.schedule(method, parts)
+        return alternation.with_clock(flows, self.carrier, count)
 
 
 class Host(Protocol):
@@ -59,7 +69,43 @@ def plan(system: System, splitting: Splitting, wanted: int, composition: str) ->
 
     Raises `SpecError` for orders that the composition lacks, and for parts that it does not apply to.
     """
-    return planned(system, splitting, wanted, composition, lambda: kicks(system, splitting))
+    if not system.time:
+        return planned(system, splitting, wanted, composition, lambda: kicks(system, splitting))
+    choice = planned(system, splitting, wanted, composition, lambda: _kicks_in_time(system, splitting))
+    return _with_carrier(system, choice)
+
+
+def _kicks_in_time(system: System, splitting: Splitting) -> list[Kick]:
+    """The parts that can be V beside T + e: T does not depend on the time, and V commutes with ∂V/∂t."""
+    found = []
+    for kick in kicks(system.frozen, splitting):
+        drift, v = splitting.flows[1 - kick.part], splitting.flows[kick.part].hamiltonian
+        rate = bracket(system, v, gradient(v, system.times)[0])
+        if not _is_dated(system, drift) and decide_zero("", [("", rate)]).verdict == PROVED:
+            found.append(kick)
+    return found
+
+
+def _with_carrier(system: System, choice: Choice) -> Choice:
+    """The choice with a flow that the time advances with, the first or the last, which does not depend on it.
+
+    Else the time advances by itself, in the place of a last part.
+    """
+    flows = choice.splitting.flows
+    if isinstance(choice.method, Nystrom):
+        return replace(choice, carrier=1 - (choice.splitting.kick or 0))
+    if not _is_dated(system, flows[-1]):
+        return replace(choice, carrier=len(flows) - 1)
+    free = [flow for flow in flows if not _is_dated(system, flow)]
+    if not free:
+        return replace(choice, carrier=len(flows))
+    ordered = (free[0], *(flow for flow in flows if flow is not free[0]))
+    return replace(choice, splitting=Splitting(ordered), carrier=0)
+
+
+def _is_dated(system: System, flow: Flow) -> bool:
+    """Whether a flow depends on the time."""
+    return system.time in symbols_of(flow.hamiltonian)
 
 
 def planned(

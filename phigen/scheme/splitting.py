@@ -39,30 +39,32 @@ def build_splitting(
     """The explicit solver as a program. LimitError if a kernel exceeds `MOST_OPERATIONS`."""
     _expect_no_modified(system, extras)
     splitting, steps = choice.splitting, choice.schedule()
-    coefficients = Coefficients([*system.parameter_names, TIME, KICK])
+    coefficients = Coefficients([*system.parameter_names, TIME, KICK], system.times)
     flows = tuple(_flow_kernel(system, flow, k, coefficients) for k, flow in enumerate(splitting.flows, 1))
     tangents = tuple(
         explicit_jacobian(flow, system.coordinates, coefficients, f"tangent{k}")
         for k, flow in enumerate(flows, 1)
         if extras.tangent
     )
+    refresh = coefficients.refresh(t=system.times)
     prepare = Kernel(
         "prepare",
         "everything that depends on parameters and the time of a flow only",
         {"params": system.parameter_names, "h": (TIME,), **({"kick": (KICK,)} if steps.multiples else {})},
         (Output("coef", tuple(coefficients.values)),),
     )
-    step = Splitting(prepare, flows, steps, choice.method.name, tangents)
+    step = coefficients.settled(Splitting(prepare, flows, steps, choice.method.name, tangents, refresh=refresh))
     for kernel in step.kernels:
         operations = cost(kernel.roots)
         if operations > MOST_OPERATIONS:
             reason = f"{kernel.name} would take {operations} operations, more than {MOST_OPERATIONS}"
             raise too_large(system, reason, other="")
-    said = (*gauge.facts, *facts(choice, step), choice.order.note)
+    said = (*gauge.facts, *facts(choice, step), _clock(choice), choice.order.note)
     return Program(
         name=system.name,
         about=About(title, licence, spec_sha256, tuple(fact for fact in said if fact), _operations(step)),
         coordinates=system.coordinates,
+        time=system.time,
         parameters=system.parameters,
         casimirs=tuple(system.casimirs),
         order=choice.order.order,
@@ -77,7 +79,7 @@ def build_splitting(
 def facts(choice: Choice, step: Splitting) -> list[str]:
     """What the header says of the method."""
     count, flows, method = len(step.flows), len(step.schedule.flows), choice.method
-    if count == 1:
+    if count == 1 and choice.carrier is None:
         return ["scheme: the exact flow of H, which is elementary", f"step: {step.manner}"]
     parts = " + ".join(f"H_{k}" for k in range(1, count + 1))
     why = f", since {choice.why}" if choice.why else ""
@@ -86,6 +88,15 @@ def facts(choice: Choice, step: Splitting) -> list[str]:
         f"composition: {method.name}, {method.stages} stage{'s' * (method.stages > 1)}, {flows} flows{why}",
         f"step: {step.manner}",
     ]
+
+
+def _clock(choice: Choice) -> str:
+    """How the time advances, empty without a time."""
+    if choice.carrier is None:
+        return ""
+    with_part = choice.carrier < len(choice.splitting.flows)
+    how = f"with H_{choice.carrier + 1}" if with_part else "between the flows"
+    return f"time: advances {how}, and stands still in {'all other' if with_part else 'all'} flows"
 
 
 def _flow_kernel(system: System, flow: Flow, k: int, coefficients: Coefficients) -> Kernel:

@@ -38,6 +38,10 @@ def check(system: System, splitting: Splitting) -> Iterator[Statement]:
         yield _flow_statement(system, flow, k)
     if splitting.kick is not None:
         yield from _kick_statements(system, splitting, plain)
+        for time in system.times:
+            v, name = plain[splitting.kick], f"H_{1 + splitting.kick}"
+            rate = bracket(system, v, gradient(v, [time])[0])
+            yield decide_zero(f"{{{name}, ∂{name}/∂{time}}} = 0", [("", rate)], system.positive)
 
 
 def _kick_statements(system: System, splitting: Splitting, plain: Sequence[Expression]) -> Iterator[Statement]:
@@ -45,16 +49,16 @@ def _kick_statements(system: System, splitting: Splitting, plain: Sequence[Expre
     assert splitting.kick is not None
     v, t = plain[splitting.kick], plain[1 - splitting.kick]
     name_v, name_t = f"H_{1 + splitting.kick}", f"H_{2 - splitting.kick}"
-    twice = _bracket(system, v, _bracket(system, v, t))
+    twice = bracket(system, v, bracket(system, v, t))
     name = f"{{{name_v}, {{{name_v}, {{{name_v}, {name_t}}}}}}} = 0"
-    yield decide_zero(name, [("", _bracket(system, v, twice))], system.positive)
+    yield decide_zero(name, [("", bracket(system, v, twice))], system.positive)
     (multiplied,) = derivatives([splitting.flows[splitting.kick].hamiltonian], KICK)
     if not multiplied.is_zero:
         name = f"d{name_v}/dκ = {{{name_v}, {{{name_v}, {name_t}}}}}"
         yield decide_zero(name, [("", multiplied - twice)], system.positive)
 
 
-def _bracket(system: System, f: Expression, g: Expression) -> Expression:
+def bracket(system: System, f: Expression, g: Expression) -> Expression:
     """{f, g} = ∇f·π∇g."""
     names = system.coordinates
     field = hamiltonian_vector_field(system.poisson, gradient(g, names))

@@ -18,9 +18,14 @@ from phigen.errors import SpecError
 from phigen.geometry.system import system_from_spec
 from phigen.proofs.independent import compare
 from phigen.realisations.catalogue import realise
+from phigen.scheme.alternation import STRANG, Alternation, schedule, with_clock
+from phigen.scheme.choosing import plan
 from phigen.scheme.discretisation import hamilton_jacobi
+from phigen.scheme.nystrom import Nystrom
 from phigen.series.hamilton_jacobi import graph_series, residual
 from phigen.spec.model import BirealisationChoice
+from phigen.splitting.parts import split
+from phigen.splitting.statements import check as check_splitting
 from phigen.study.summary import exact_solution
 from phigen.symbolic.expression import substitute, symbol
 from phigen.symbolic.numeric import evaluate
@@ -60,9 +65,19 @@ hamiltonian: x + y - (1 + s*cos(omega*t))*log(x) - 1.5*log(y)
 tangent: true
 """
 
-STARTS = {PENDULUM: [1.0, 0.0], BODY: [0.6, 0.5, 0.7], SEASONS: [0.6, 1.5]}
+#: All parts depend on the time: one, or three that do not commute.
+SPIN = """time: t
+coordinates: [m1, m2, m3]
+poisson: {lie_algebra: {name: so(3)}}
+hamiltonian: m1*cos(t) + m2*sin(t) + 0.4*m3*t
+tangent: true
+"""
+DRIVEN = SPIN.replace("m1*cos(t) + m2*sin(t) + 0.4*m3*t", "m1**2*cos(t)/2 + m2**2*sin(t)/3 + m3**2*exp(-t)/4")
 
-#: Every kind of step: text, order, bi-realisation, composition.
+STARTS = {PENDULUM: [1.0, 0.0], BODY: [0.6, 0.5, 0.7], SEASONS: [0.6, 1.5]}
+STARTS |= dict.fromkeys([SPIN, DRIVEN], STARTS[BODY])
+
+#: Every kind of step: text, order, bi-realisation, composition. A splitting has a scheme in place of a bi-realisation.
 KINDS = {
     "newton": (PENDULUM, 4, "auto", "auto"),
     "newton, non-linear π": (BODY, 6, "auto", "auto"),
@@ -73,6 +88,11 @@ KINDS = {
     "path": (BODY, 4, "karasev", "auto"),
     "newton, composed": (BODY, 6, "auto", "kahan-li"),
     "path, composed": (BODY, 4, "karasev", "suzuki"),
+    "splitting, time with T": (PENDULUM, 4, "splitting", "force-gradient"),
+    "splitting, non-linear π": (BODY, 4, "splitting", "auto"),
+    "splitting, log-canonical": (SEASONS, 2, "splitting", "auto"),
+    "splitting, time by itself": (SPIN, 4, "splitting", "auto"),
+    "splitting in three, time by itself": (DRIVEN, 4, "splitting", "suzuki"),
 }
 
 
@@ -80,6 +100,8 @@ KINDS = {
 def compilation_of(kind):
     text, order, birealisation, composition = KINDS[kind]
     given = spec.loads(f"phigen: 1\nname: t\n{text}order: {order}\n")
+    if birealisation == "splitting":
+        return compile_spec(replace(given, composition=composition), scheme="splitting")
     given = replace(given, birealisation=BirealisationChoice(birealisation), composition=composition)
     return compile_spec(given)
 
@@ -211,7 +233,10 @@ def test_ensembles_start_at_the_time_of_all_members(target):
         assert end == pytest.approx(found.integrate(x0, H, STEPS, STEPS, t0=T0).x[-1], abs=1e-13)
 
 
-@pytest.mark.parametrize("kind", ["newton, non-linear π", "newton, log-canonical", "path"])
+POISSON = ["newton, non-linear π", "newton, log-canonical", "path", "splitting, time by itself"]
+
+
+@pytest.mark.parametrize("kind", POISSON)
 @pytest.mark.parametrize("target", ["c", "numpy"])
 def test_steps_are_poisson_maps(kind, target):
     compilation = compilation_of(kind)
@@ -262,8 +287,6 @@ def test_a_time_is_asked_for_where_there_is_one_and_refused_where_there_is_none(
         timeless.integrate([1, 0, 0, 0], H, 1, t0=1.0)
     with pytest.raises(ValueError, match="t0 must be finite"):
         timed.integrate([1, 0], H, 1, t0=np.inf)
-    with pytest.raises(SpecError, match="scheme: splitting is not offered"):
-        compile_text(PENDULUM, 2, "splitting")
 
 
 def test_the_hamiltonian_takes_a_time_for_each_state():
@@ -328,3 +351,30 @@ def test_a_spin_in_resonance_follows_rabis_solution(h):
     error = np.max(np.abs(found.x - np.stack([solution[c] for c in compilation.system.coordinates], axis=1)))
     assert error < 1e-6 * (h / 0.1) ** 4 * 1.1
     assert found.x[-1, 2] == pytest.approx(np.cos(0.3 * 20), abs=1e-6)
+
+
+@pytest.mark.parametrize("kind", [kind for kind in KINDS if kind.startswith("splitting")])
+def test_splittings_are_proved_with_the_time_at_rest(kind):
+    compilation = compilation_of(kind)
+    statements = list(check_splitting(compilation.discretised, compilation.splitting))
+    assert all(s.holds for s in statements)
+    kicks = [s.name for s in statements if "∂t" in s.name]
+    assert kicks == (["{H_2, ∂H_2/∂t} = 0"] if kind == "splitting, time with T" else [])
+
+
+def test_a_drift_that_depends_on_the_time_rules_kicks_out():
+    """For V + e as V the conditions of these methods do not hold; it would be an order too low."""
+    heavy = PENDULUM.replace("p**2/2 - cos(q) - q*drive", "p**2/2*(1 + cos(t)/2) - cos(q)")
+    for text, kind in ((PENDULUM, Nystrom), (heavy, Alternation)):
+        system = system_from_spec(spec.loads(f"phigen: 1\nname: t\n{text}"))
+        assert isinstance(plan(system, split(system.frozen), 4, "auto").method, kind)
+
+
+def test_every_flow_sees_the_time_of_its_place():
+    halves = schedule(STRANG, 2)
+    assert with_clock(halves, 0, 2).moments == (0.0, 0.5, 0.0)  # ½ T, V, ½ T: V in the middle
+    assert with_clock(halves, 1, 2).moments == (0.0, 0.0, 1.0)
+    alone = with_clock(halves, 1, 1)
+    assert (alone.flows, alone.moments) == ([(0, 0), (0, 2)], (0.0, 0.0, 1.0))
+    with pytest.raises(ValueError, match="two times"):
+        with_clock(schedule(STRANG, 5), 2, 5)

@@ -212,7 +212,8 @@ def _model(program: Program, lanes: Lanes | None, has: Mapping[str, bool], other
         "apart": has["PACKS"] or any("_APART" in part for part in [text, *others]),
     }
     values["middles"] = ", ".join(map(repr, program.midpoints))
-    values["middles"] = render("c", "middles.c", values) if step.refresh and not schedule else ""
+    values["moments"] = ", ".join(map(repr, schedule.moments)) if schedule else ""
+    values["middles"] = render("c", "middles.c", values) if step.refresh else ""
     return render("c", "constants.c", values) + text
 
 

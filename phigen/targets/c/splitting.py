@@ -24,6 +24,7 @@ def printed(program: Program, step: Splitting) -> str:
     """The flows, and one step."""
     n = program.dimension
     found = [function(program, replace(step.prepare, name="prepare_row"))]
+    found += [function(program, step.refresh)] if step.refresh else []
     for k, flow in enumerate(step.flows, 1):
         kernel, values = _flow(program, flow, k)
         found.append(function(program, kernel, functions=_functions(program)))

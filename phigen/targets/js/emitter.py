@@ -145,6 +145,7 @@ def _table(program: Program) -> Mapping[str, object]:
         "middles": json.dumps(program.midpoints) if step.refresh else "",
         "prepared": step.prepared,
         "coefficients": step.row,
+        "moments": json.dumps(step.schedule.moments) if isinstance(step, Splitting) and step.refresh else "",
         "times": isinstance(step, Splitting),
     }
 
@@ -194,12 +195,12 @@ def _kernels(program: Program) -> list[Kernel]:
     """The kernels that the runtime calls."""
     step, seen = program.step, program.observables
     modified = [program.modified.kernel] if program.modified else []
+    refresh = [step.refresh] if step.refresh else []
     timed = [k for k in (program.monitor.elapsed, program.monitor.rate) if k] if program.monitor else []
     others = [*program.choice, *timed, *modified, seen.energy, seen.casimirs, seen.vector_field]
     if isinstance(step, Splitting):
-        return [replace(step.prepare, name="prepare_row"), *step.flows, *step.tangents, *others]
+        return [replace(step.prepare, name="prepare_row"), *refresh, *step.flows, *step.tangents, *others]
     assert not isinstance(step, Sweeps)
-    refresh = [step.refresh] if step.refresh else []
     varied = [step.tangent] if isinstance(step, Explicit) and step.tangent else []
     varied += [step.tangent.curvature] if isinstance(step, Path) and step.tangent else []
     return [step.prepare, *refresh, step.main, *varied, *others]

@@ -195,6 +195,10 @@ def _values(program: Program) -> dict[str, object]:
         "and_t0_is_finite": " and np.isfinite(t0)" * bool(program.time),
         "stages_now": "[_renewed(s, t0 + done * h, h) for s in stages]" if program.time else "stages",
         "renewed": step.renewed,
+        "prepared": step.prepared,
+        "moments": "(" + "".join(f"{m!r}, " for m in step.schedule.moments).rstrip() + ")"
+        if isinstance(step, Splitting) and step.refresh
+        else "",
         "middles": "(" + "".join(f"{m!r}, " for m in program.midpoints).rstrip() + ")",
         "fractions": "(" + "".join(f"{f!r}, " for f in program.fractions).rstrip() + ")",
         "terms": TERMS,

@@ -17,7 +17,7 @@ import { casimirs, energy, prepare, vectorField } from "./model.mjs";
 import { TIMES } from "./model.mjs";
 // #endif
 // #if RENEWED
-import { MIDDLES, PREPARED, refresh } from "./model.mjs";
+import { MIDDLES, MOMENTS, PREPARED, refresh } from "./model.mjs";
 // #endif
 // #if MODIFIED
 import { modified } from "./model.mjs";
@@ -210,9 +210,13 @@ export class Solver {
   // #if RENEWED
   /** What depends on the time of the next step. */
   #renew() {
+    // #if SPLITTING
+    this.coef[0].forEach((row, k) => refresh(row, this.t + MOMENTS[k] * this.h, row.subarray(PREPARED)));
+    // #else
     this.coef.forEach((coef, stage) => {
       refresh(coef, this.t + MIDDLES[stage] * this.h, coef.subarray(PREPARED));
     });
+    // #endif
   }
 
   // #endif
