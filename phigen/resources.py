@@ -16,7 +16,7 @@ def templates() -> Path:
 
 
 def bundled_specs() -> Path:
-    """The folder of the bundled spec files, ``NAME.yaml``.
+    """The folder of the bundled spec files, ``NAME.yaml``; those of lattices are in ``lattices``.
 
     Raises `FileNotFoundError` if the installation is incomplete.
     """
@@ -25,7 +25,7 @@ def bundled_specs() -> Path:
 
 def bundled() -> dict[str, Path]:
     """The files of the bundled specs by their names."""
-    return {path.stem: path for path in sorted(bundled_specs().glob("*.yaml"))}
+    return {path.stem: path for path in sorted(bundled_specs().rglob("*.yaml"))}
 
 
 def bundled_name(file: str) -> str | None:

@@ -299,7 +299,7 @@ def test_schema_accepts_the_starter(phigen):
 
 def test_list_shows_every_bundled_spec(phigen):
     listed = json.loads(phigen("list", "--json").stdout)
-    assert {s["name"] for s in listed} == {p.stem for p in SPECS.glob("*.yaml")}
+    assert {s["name"] for s in listed} == {p.stem for p in SPECS.rglob("*.yaml")}
     table = phigen("list").stdout
     assert all(s["title"] in table for s in listed)
     assert phigen("list", "--path", "kepler").stdout.strip() == str(SPECS / "kepler.yaml")

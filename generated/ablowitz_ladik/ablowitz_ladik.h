@@ -1,0 +1,95 @@
+/*
+ * ablowitz_ladik.h: the declarations; ablowitz_ladik.c says how they were made.
+ * DO NOT EDIT: edits are noticed by the checksum below.
+ * SPDX-License-Identifier: 0BSD
+ * body-sha256: 4edaa3f7bc5ceac0b1df02916a69174c16806f336c89cdc91c00dc8c28b0d58d
+ */
+#ifndef ABLOWITZ_LADIK_H
+#define ABLOWITZ_LADIK_H
+
+#include <stddef.h>
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+#define ablowitz_ladik_AXES 1
+#define ablowitz_ladik_DIM 2
+#define ablowitz_ladik_ORDER 4
+#define ablowitz_ladik_CASIMIRS 0
+#define ablowitz_ladik_PHIGEN_VERSION "0.1.0"
+#define ablowitz_ladik_SPEC_SHA256 "fdcac05ca3267c8d72f9b764571bd16dc6325331ec1c10b08ff5e44d3ea449c7"
+
+/* Axes, the slowest first: i. Fields of a site: x, y. Casimirs: none. */
+typedef struct {
+    char unused; /* this system has no parameters */
+} ablowitz_ladik_params;
+
+extern const ablowitz_ladik_params ablowitz_ladik_default_params;
+
+enum { ablowitz_ladik_ARRAYS = 2 };         /* arrays over the sites: fields, then parameters */
+enum { ablowitz_ladik_COEFFICIENTS = 104 }; /* numbers that depend on params and h only */
+
+/* How a step ends; ablowitz_ladik_status_string says it in words. */
+typedef enum {
+    ablowitz_ladik_OK = 0, ablowitz_ladik_NO_CONVERGENCE, ablowitz_ladik_SINGULAR, ablowitz_ladik_NOT_FINITE,
+        ablowitz_ladik_BAD_ARGUMENT
+} ablowitz_ladik_status;
+
+/* The solver keeps the state in memory of the caller, row by row: a row is all sites along the last axis,
+   with copies of the other end beside it. Set it up with ablowitz_ladik_init; a copy of the struct is the
+   same solver, not another one. */
+typedef struct {
+    size_t sizes[ablowitz_ladik_AXES];
+    size_t sites, rows;
+    ptrdiff_t length, width; /* sites of a row; doubles between the beginnings of two rows */
+    /* in rows, each field, then each parameter at sites: the first site of the first row */
+    double *x[ablowitz_ladik_ARRAYS];
+    ptrdiff_t *lines;                   /* of each row, where it is and where those beside it are */
+    double *before[ablowitz_ladik_DIM]; /* the fields before the steps that are being made */
+    size_t steps;                       /* good steps since ablowitz_ladik_init */
+    double t;                           /* time since ablowitz_ladik_init */
+    double h;                           /* the last step size */
+    ablowitz_ladik_params params;
+    double coef[ablowitz_ladik_COEFFICIENTS]; /* all that depends on params and h only */
+    int prepared; /* whether coef has been computed */
+    size_t steps_before_h; /* steps and t when h was set: t is counted from there, so no error adds up */
+    double t_before_h;
+} ablowitz_ladik_solver;
+
+/* The bytes that the solver of a lattice needs as its memory; 0 for sizes that are not allowed. */
+size_t ablowitz_ladik_work_size(const size_t sizes[ablowitz_ladik_AXES]);
+
+/* Start at x0[field][site], the last axis fastest, with ablowitz_ladik_work_size(sizes) bytes of memory, as
+   from malloc, which must stay. params may be NULL for the defaults; its arrays are copied.
+   ablowitz_ladik_BAD_ARGUMENT if sizes are not allowed, x0 or a parameter is not finite, or one that has to
+   be positive is not. */
+ablowitz_ladik_status ablowitz_ladik_init(ablowitz_ladik_solver *s, const ablowitz_ladik_params *params,
+    const size_t sizes[ablowitz_ladik_AXES], const double *x0, void *work);
+
+/* Steps of size h, of either sign. If one fails, the state is that before it, and s->steps counts the good
+   ones. Steps of one call are joined: where a step ends as the next begins, both are one flow. With OpenMP
+   rows are worked at in parallel, with the same bits for any number of threads. */
+ablowitz_ladik_status ablowitz_ladik_step(ablowitz_ladik_solver *s, double h);
+ablowitz_ladik_status ablowitz_ladik_integrate(ablowitz_ladik_solver *s, double h, size_t steps);
+
+/* The state x[field][site]. */
+void ablowitz_ladik_state(const ablowitz_ladik_solver *s, double *x);
+
+/* The Hamiltonian; its density at each site; the densities out[k][site] of the Casimirs; the right-hand side
+   out[field][site]. */
+double ablowitz_ladik_hamiltonian(const ablowitz_ladik_solver *s);
+void ablowitz_ladik_density(const ablowitz_ladik_solver *s, double *out);
+void ablowitz_ladik_casimirs(const ablowitz_ladik_solver *s, double *out);
+void ablowitz_ladik_vector_field(const ablowitz_ladik_solver *s, double *out);
+
+const char *ablowitz_ladik_status_string(ablowitz_ladik_status status);
+
+/* For bindings: the size of ablowitz_ladik_solver, and its count of good steps. */
+size_t ablowitz_ladik_solver_size(void);
+size_t ablowitz_ladik_solver_steps_done(const ablowitz_ladik_solver *s);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif /* ABLOWITZ_LADIK_H */

@@ -1,0 +1,96 @@
+/*
+ * heisenberg.h: the declarations; heisenberg.c says how they were made.
+ * DO NOT EDIT: edits are noticed by the checksum below.
+ * SPDX-License-Identifier: 0BSD
+ * body-sha256: 226f8b4dddc92c43b1fd86abd57ddc9e5e55b931c644a765f0bfc704255f69e7
+ */
+#ifndef HEISENBERG_H
+#define HEISENBERG_H
+
+#include <stddef.h>
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+#define heisenberg_AXES 3
+#define heisenberg_DIM 3
+#define heisenberg_ORDER 2
+#define heisenberg_CASIMIRS 1
+#define heisenberg_PHIGEN_VERSION "0.1.0"
+#define heisenberg_SPEC_SHA256 "db9e76c21c97df18ba40343805d35a8a7c249010c0d791ca8dab69a55383c332"
+
+/* Axes, the slowest first: i, j, k. Fields of a site: x, y, z. Casimirs: C. */
+typedef struct {
+    double J;        /* default 1.0 */
+    const double *B; /* at sites: field along z; NULL for the default at all of them */
+} heisenberg_params;
+
+extern const heisenberg_params heisenberg_default_params;
+
+enum { heisenberg_ARRAYS = 4 };        /* arrays over the sites: fields, then parameters */
+enum { heisenberg_COEFFICIENTS = 18 }; /* numbers that depend on params and h only */
+
+/* How a step ends; heisenberg_status_string says it in words. */
+typedef enum {
+    heisenberg_OK = 0, heisenberg_NO_CONVERGENCE, heisenberg_SINGULAR, heisenberg_NOT_FINITE,
+        heisenberg_BAD_ARGUMENT
+} heisenberg_status;
+
+/* The solver keeps the state in memory of the caller, row by row: a row is all sites along the last axis,
+   with copies of the other end beside it. Set it up with heisenberg_init; a copy of the struct is the same
+   solver, not another one. */
+typedef struct {
+    size_t sizes[heisenberg_AXES];
+    size_t sites, rows;
+    ptrdiff_t length, width; /* sites of a row; doubles between the beginnings of two rows */
+    /* in rows, each field, then each parameter at sites: the first site of the first row */
+    double *x[heisenberg_ARRAYS];
+    ptrdiff_t *lines;               /* of each row, where it is and where those beside it are */
+    double *before[heisenberg_DIM]; /* the fields before the steps that are being made */
+    size_t steps;                   /* good steps since heisenberg_init */
+    double t;                       /* time since heisenberg_init */
+    double h;                       /* the last step size */
+    heisenberg_params params;
+    double coef[heisenberg_COEFFICIENTS]; /* all that depends on params and h only */
+    int prepared; /* whether coef has been computed */
+    size_t steps_before_h; /* steps and t when h was set: t is counted from there, so no error adds up */
+    double t_before_h;
+} heisenberg_solver;
+
+/* The bytes that the solver of a lattice needs as its memory; 0 for sizes that are not allowed. */
+size_t heisenberg_work_size(const size_t sizes[heisenberg_AXES]);
+
+/* Start at x0[field][site], the last axis fastest, with heisenberg_work_size(sizes) bytes of memory, as from
+   malloc, which must stay. params may be NULL for the defaults; its arrays are copied.
+   heisenberg_BAD_ARGUMENT if sizes are not allowed, x0 or a parameter is not finite, or one that has to be
+   positive is not. */
+heisenberg_status heisenberg_init(heisenberg_solver *s, const heisenberg_params *params,
+    const size_t sizes[heisenberg_AXES], const double *x0, void *work);
+
+/* Steps of size h, of either sign. If one fails, the state is that before it, and s->steps counts the good
+   ones. Steps of one call are joined: where a step ends as the next begins, both are one flow. With OpenMP
+   rows are worked at in parallel, with the same bits for any number of threads. */
+heisenberg_status heisenberg_step(heisenberg_solver *s, double h);
+heisenberg_status heisenberg_integrate(heisenberg_solver *s, double h, size_t steps);
+
+/* The state x[field][site]. */
+void heisenberg_state(const heisenberg_solver *s, double *x);
+
+/* The Hamiltonian; its density at each site; the densities out[k][site] of the Casimirs; the right-hand side
+   out[field][site]. */
+double heisenberg_hamiltonian(const heisenberg_solver *s);
+void heisenberg_density(const heisenberg_solver *s, double *out);
+void heisenberg_casimirs(const heisenberg_solver *s, double *out);
+void heisenberg_vector_field(const heisenberg_solver *s, double *out);
+
+const char *heisenberg_status_string(heisenberg_status status);
+
+/* For bindings: the size of heisenberg_solver, and its count of good steps. */
+size_t heisenberg_solver_size(void);
+size_t heisenberg_solver_steps_done(const heisenberg_solver *s);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif /* HEISENBERG_H */
