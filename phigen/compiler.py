@@ -166,7 +166,8 @@ def compile_file(path: str | Path, *, order: int | None = None) -> Compilation:
 
 def emit(program: Program, target: str, command: str, *, single_file: bool = False) -> dict[str, str]:
     """The files of one target, by name; ``command`` is what regenerates them. `ValueError` for unknown targets."""
-    return registry.find(target).emit(program, command, single_file=single_file)
+    with progress.stage(f"{program.name}: emission of {target}"):
+        return registry.find(target).emit(program, command, single_file=single_file)
 
 
 def _tell_of_lattice(spec: Spec) -> None:

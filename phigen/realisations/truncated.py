@@ -15,7 +15,7 @@ from phigen.realisations.protocol import BiRealisation, covector_names
 from phigen.symbolic.expression import ZERO, Expression, substitute, symbols_of
 from phigen.symbolic.taylor import Taylor, closure
 from phigen.symbolic.tower import Poly, Tower
-from phigen.symbolic.verdict import Statement, decide_elements
+from phigen.symbolic.verdict import UNDECIDED, Statement, decide_elements
 
 
 class _Parts:
@@ -63,7 +63,15 @@ def brackets(system: System, realisation: BiRealisation, degree: int) -> Iterato
         for m in (realisation.alpha, realisation.beta)
         for e in substitute([system.poisson[i][j] for i, j in pairs], dict(zip(system.coordinates, m, strict=True)))
     ]
-    parts = _Parts(system, [*maps, *pulled], degree)
+    titles = "{α_i, α_j} = π_ij∘α", "{β_i, β_j} = −π_ij∘β", "{α_i, β_j} = 0"
+    suffix = f", up to degree {degree - 1} in p"
+    try:
+        parts = _Parts(system, [*maps, *pulled], degree)
+    except OverflowError:
+        beyond = "exact by Karasev's theorem" if realisation.path else "not checked"
+        for title in titles:
+            yield Statement(f"bi-realisation: {title}{suffix}", UNDECIDED, f"too many terms to expand; {beyond}")
+        return
 
     def label(i: int, j: int, m: int) -> str:
         return f"({system.coordinates[i]}, {system.coordinates[j]}) in degree {m}"
@@ -72,7 +80,7 @@ def brackets(system: System, realisation: BiRealisation, degree: int) -> Iterato
     beyond = "followed as a path, exact by Karasev's theorem" if realisation.path else "approximate beyond"
 
     def decided(name: str, residuals: Iterator[tuple[str, Poly]]) -> Statement:
-        title = f"bi-realisation: {name}, up to degree {degree - 1} in p"
+        title = f"bi-realisation: {name}{suffix}"
         return decide_elements(title, parts.tower, residuals, system.positive, f"degree by degree; {beyond}")
 
     def own(first: int, sign: int) -> Iterator[tuple[str, Poly]]:
@@ -80,7 +88,7 @@ def brackets(system: System, realisation: BiRealisation, degree: int) -> Iterato
             for k, (i, j) in enumerate(pairs, 2 * n + (len(pairs) if first else 0)):
                 yield label(i, j, m), parts.bracket(first + i, first + j, m) - parts.parts[k][m] * sign
 
-    yield decided("{α_i, α_j} = π_ij∘α", own(0, 1))
-    yield decided("{β_i, β_j} = −π_ij∘β", own(n, -1))
+    yield decided(titles[0], own(0, 1))
+    yield decided(titles[1], own(n, -1))
     mixed = ((label(i, j, m), parts.bracket(i, n + j, m)) for m in range(degree) for i in range(n) for j in range(n))
-    yield decided("{α_i, β_j} = 0", mixed)
+    yield decided(titles[2], mixed)

@@ -21,6 +21,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import BinaryIO
 
+from phigen import progress
 from phigen.errors import ToolchainError
 
 #: Every C99 compiler of interest takes these.
@@ -141,7 +142,8 @@ def compile_library(
     compiler = compiler or find()
     output.unlink(missing_ok=True)
     try:
-        failure = _made(compiler.command, compiler.flags, sources, output, timeout)
+        with progress.stage(f"{sources[0].stem}: C compiler"):
+            failure = _made(compiler.command, compiler.flags, sources, output, timeout)
     except subprocess.TimeoutExpired as error:
         raise ToolchainError(
             f"{compiler} did not finish within {timeout:g} s\n"

@@ -18,8 +18,9 @@ from phigen.scheme.discretisation import hamilton_jacobi
 from phigen.scheme.kernel import Kernel, Output
 from phigen.scheme.program import FreeGauge
 from phigen.series.hamilton_jacobi import HamiltonJacobi, PolynomialSeries
-from phigen.symbolic.expression import Expression, gradient, symbol, total
+from phigen.symbolic.expression import Expression, gradient, symbol, symbols_of, total
 from phigen.symbolic.symbols import GAUGE, LEVEL, Symbol
+from phigen.symbolic.tower import Tower
 
 #: Gauged series may have this many times the terms of the plain one; beyond, the gauge costs more than it gains.
 MOST_GROWTH = 1.3
@@ -130,14 +131,21 @@ def given(system: System, values: Mapping[str, Expression]) -> Gauge:
 def _worthwhile(plain: Gauged, gauged: Gauged, name: str) -> bool:
     try:
         most = MOST_GROWTH * _state_terms(plain.series.polynomial(GUIDE), plain.system)
-        if _state_terms(gauged.series.polynomial(1), plain.system) > most:
-            return False  # before S_3 of a long Casimir is computed
+        if _state_terms(_first_term(gauged), plain.system) > most:
+            return False  # before the series of a long Casimir is begun
         after = gauged.series.polynomial(GUIDE)
     except OverflowError:
         return False
     if not after.tower.depends_on(after.terms[GUIDE - 1], [name]):
         return False
     return _state_terms(after, plain.system) <= most
+
+
+def _first_term(gauged: Gauged) -> PolynomialSeries:
+    """S_1, which is H, in a ring of its own."""
+    h = gauged.system.hamiltonian
+    tower = Tower(symbols_of(h), [h])
+    return PolynomialSeries(tower, (tower.convert(h),))
 
 
 def _state_terms(series: PolynomialSeries, system: System) -> int:

@@ -9,11 +9,12 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from phigen import progress
 from phigen.compilation import Compilation
 from phigen.errors import StepError
 from phigen.runtime.solver import Solver
@@ -140,17 +141,31 @@ def verify(
         made,
         tuple(own),
         tuple(others),
-        (
-            order_check(subject, quick=quick),
-            *time_checks(subject, gauge, quick=quick),
-            *conservation_checks(subject, rows),
-            *one_step_checks(subject, states),
-            agreement_check(subject, states),
-            step_check(subject, states),
-            *modified_checks(subject, gauge),
+        _measured(
+            compilation.spec.name,
+            {
+                "order": lambda: [order_check(subject, quick=quick)],
+                "time": lambda: time_checks(subject, gauge, quick=quick),
+                "conservation": lambda: conservation_checks(subject, rows),
+                "single steps": lambda: one_step_checks(subject, states),
+                "agreement": lambda: [agreement_check(subject, states)],
+                "largest step": lambda: [step_check(subject, states)],
+                "modified Hamiltonian": lambda: modified_checks(subject, gauge),
+            },
         ),
         units_of(compilation.system, {**parameters, **dict.fromkeys(compilation.system.times, t0)}, x),
     )
+
+
+def _measured(name: str, groups: Mapping[str, Callable[[], Iterable[Check]]]) -> tuple[Check, ...]:
+    """The checks of all groups, each group a stage for those who watch."""
+    found: list[Check] = []
+    with progress.stage(f"{name}: measurements", len(groups)) as running:
+        for title, checks in groups.items():
+            with progress.stage(title):
+                found += checks()
+            running.done += 1
+    return tuple(found)
 
 
 def gauge_at(compilation: Compilation, x: Floats, parameters: Mapping[str, float]) -> Floats | None:

@@ -82,3 +82,15 @@ def test_verbose_lists_stages_without_a_terminal(phigen, write):
     listed = phigen("check", "-v", write("a.yaml")).stderr.splitlines()
     assert [line for line in listed if line in ("a: system", "a: program")] == ["a: system", "a: program"]
     assert phigen("check", "a.yaml").stderr.startswith("a.yaml: ")
+
+
+def test_emission_the_compiler_and_measurements_are_stages(phigen, write):
+    written = phigen("build", "-v", "--compile", write("a.yaml")).stderr.splitlines()
+    assert [line for line in written if line in ("a: emission of c", "a: C compiler")] == [
+        "a: emission of c",
+        "a: C compiler",
+    ]
+    measured = phigen("verify", "-v", "--quick", "a.yaml").stderr.splitlines()
+    assert [line for line in measured if line.startswith("a: measurements, 3 of 7")] == [
+        "a: measurements, 3 of 7: single steps"
+    ]

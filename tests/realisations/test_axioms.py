@@ -12,9 +12,10 @@ from phigen.realisations.catalogue import realise
 from phigen.resources import bundled_specs
 from phigen.spec import limits, load, loads
 from phigen.spec.model import BirealisationChoice
+from phigen.symbolic import budgets
 from phigen.symbolic.expression import substitute, symbol, symbols_of, topological
 from phigen.symbolic.symbols import momentum
-from phigen.symbolic.verdict import CHECKED, PROVED, REFUTED, Statement, decide_zero
+from phigen.symbolic.verdict import CHECKED, PROVED, REFUTED, UNDECIDED, Statement, decide_zero
 
 UNIT, ALPHA, BETA, MIXED, FORMS = range(5)
 
@@ -256,3 +257,11 @@ def test_large_bi_realisations_are_checked_at_points(monkeypatch):
     assert verdicts(check(s, replace(realisation, beta=realisation.alpha))[ALPHA:FORMS]) == [CHECKED, REFUTED, REFUTED]
     exponential = family("so", 3)  # α is not rational
     assert verdicts(check(exponential, realise(exponential))) == [PROVED] * 5
+
+
+def test_a_path_whose_series_is_too_large_to_expand_is_undecided_and_not_refused(monkeypatch):
+    s = system("x y z", "{nambu: [x**2*y + exp(z)]}", "x**2 + y*z")
+    monkeypatch.setattr(budgets, "TAYLOR_BYTES", 1000)
+    found = check(s, realise(s))
+    assert verdicts(found[ALPHA:FORMS]) == [UNDECIDED] * 3
+    assert found[ALPHA].detail == "too many terms to expand; exact by Karasev's theorem"
