@@ -82,7 +82,7 @@ def test_each_file_of_lattices_compiles_by_itself(name, tmp_path):
 def test_each_file_of_the_runtime_compiles_by_itself(path, tmp_path):
     kinds = {"packs.c": "SPLITTING", "explicit.c": "EXPLICIT", "path.c": "PATH", "path_lanes.c": "PATH"}
     kind = kinds.get(path.name, "NEWTON")
-    switches = defined((kind, "FAST", "TANGENT", *(["GAUGE"] if path.name == "gauge.c" else [])))
+    switches = defined((kind, "FAST", "TANGENT", *(["GAUGE"] if path.name in ("gauge.c", "level.c") else [])))
     run([tool("gcc"), *STRICT, "-fsyntax-only", *switches, *INCLUDED, path], tmp_path)
 
 

@@ -134,10 +134,11 @@ phi_status phi_ensemble_at(const phi_params *params, double *x, size_t members, 
 
 #endif
 #if PHI_TANGENT
-/* One step as phi_step makes it, and its derivative: tangent[i * PHI_DIM + j] is that of the new x_i along the old x_j,
 #if PHI_MONITOR
+/* One step as phi_step makes it, and its derivative: tangent[i * PHI_DIM + j] is that of the new x_i along the old x_j,
    to round-off, with e held fixed. On failure both are as before. */
 #else
+/* One step as phi_step makes it, and its derivative: tangent[i * PHI_DIM + j] is that of the new x_i along the old x_j,
    to round-off, with any gauge held fixed. On failure both are as before. */
 #endif
 phi_status phi_step_tangent(phi_solver *s, double h, double tangent[PHI_DIM * PHI_DIM]);
