@@ -140,8 +140,8 @@ class Recorder:
         energy = self.solver.energies(piece.x, t, self.experiment.parameters)
         casimirs = self.solver.backend.casimirs(piece.x, self.experiment.parameters)
         rows = np.column_stack([t, piece.x, energy, casimirs])
-        self.watch.see(t, piece.x)
-        self.sketch.see(rows)
+        worked = self.watch.see(t, piece.x)
+        self.sketch.see(np.column_stack([t, piece.x, energy - worked, casimirs]))
         crossings = np.array([[t, *x] for t, x in piece.crossings]).reshape(-1, 1 + piece.x.shape[1])
         self.points.see(crossings)
         for name, found in (("output", rows), ("section", crossings)):
@@ -301,9 +301,9 @@ def compared(
         ):
             x = found[:, : len(x0)]
             t = experiment.t0 + h * numbers.astype(np.float64)
-            watch.see(t, x)
+            worked = watch.see(t, x)
             energy, casimirs = solver.energies(x, t, parameters), backend.casimirs(x, parameters)
-            sketch.see(np.column_stack([t, x, energy, casimirs]))
+            sketch.see(np.column_stack([t, x, energy - worked, casimirs]))
             if progress and len(numbers):
                 progress(int(numbers[-1]))
     console.detail(f"{method}: {time.perf_counter() - start:.3f} s")

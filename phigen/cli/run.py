@@ -18,6 +18,7 @@ from phigen.registry import LOADABLE
 if TYPE_CHECKING:
     from phigen.cli.recording import Recorder
     from phigen.runtime.trajectory import Trajectory
+    from phigen.study.summary import Summary
 
 _TABLES = (".csv", ".npz")
 
@@ -101,7 +102,7 @@ def command(
     else:
         print_summary(compilation, recorder, summaries)
     if plot:
-        _draw(plot, recorder, drawn, compilation.system.casimirs, summaries[0].units)
+        _draw(plot, recorder, drawn, compilation.system.casimirs, summaries[0])
         console.note(f"wrote {plot}")
     if failure:
         raise failure
@@ -114,9 +115,12 @@ def _told(recorder: Recorder) -> str:
     return f"{done}; the same command with --resume goes on" if recorder.files.checkpoint else done
 
 
-def _draw(path: Path, recorder: Recorder, drawn: dict[str, Trajectory], casimirs: Any, units: Any) -> None:
+def _draw(path: Path, recorder: Recorder, drawn: dict[str, Trajectory], casimirs: Any, summary: Summary) -> None:
     from phigen.drawing import figures
 
     sections = {f"{recorder.section_text} = 0": recorder.points.rows[:, 1:]} if recorder.finder else {}
     title = f"{recorder.solver.interface.name}, {recorder.experiment.run.name}"
-    figures.save(figures.run_figure(drawn, casimirs, sections, title, recorder.spectrum, units), path)
+    figure = figures.run_figure(
+        drawn, casimirs, sections, title, recorder.spectrum, summary.units, balance=summary.is_balance
+    )
+    figures.save(figure, path)

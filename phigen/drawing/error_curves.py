@@ -51,10 +51,17 @@ def height(methods: Mapping[str, Trajectory]) -> float:
     return ROW * grid(methods)[0]
 
 
-def draw_errors(figure: FigureBase, methods: Mapping[str, Trajectory], units: Mapping[str, Unit] | None = None) -> None:
+def draw_errors(
+    figure: FigureBase,
+    methods: Mapping[str, Trajectory],
+    units: Mapping[str, Unit] | None = None,
+    *,
+    balance: bool = False,
+) -> None:
     """One panel for the energy and each Casimir, one curve for each method; the first method lies on top.
 
-    Errors are in the ``units``; without them relative to the value at the start, unless that is 0.
+    Errors are in the ``units``; without them relative to the value at the start, unless that is 0. ``balance``
+    says that the energy is its balance.
     """
     first = next(iter(methods.values()))
     panels = [ENERGY, *first.casimirs]
@@ -70,7 +77,7 @@ def draw_errors(figure: FigureBase, methods: Mapping[str, Trajectory], units: Ma
             for label, column in values.items()
         }
         _draw_panel(axes, curves)
-        what = "energy" if index == 1 else f"Casimir {name}"
+        what = ("energy balance" if balance else "energy") if index == 1 else f"Casimir {name}"
         axes.set_title(f"{unit.adjective} {unit.noun}{' of the' if columns < 3 else ':'} {what}")
         if index > len(panels) - columns:
             axes.set_xlabel("t")

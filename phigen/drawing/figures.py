@@ -8,6 +8,7 @@ what they show. matplotlib is the optional extra ``plot``; without it every func
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from typing import TYPE_CHECKING
 
 from phigen.drawing import (
@@ -56,14 +57,16 @@ def trajectory_figure(trajectory: Trajectory, casimirs: Mapping[str, Expression]
 
 
 @styled
-def error_figure(methods: Mapping[str, Trajectory], units: Mapping[str, Unit] | None = None) -> Figure:
+def error_figure(
+    methods: Mapping[str, Trajectory], units: Mapping[str, Unit] | None = None, *, balance: bool = False
+) -> Figure:
     """The errors of energy and Casimirs against time, of several methods by their labels; one panel per quantity.
 
     Errors are in the ``units`` of `phigen.study.conservation.units_of`. Of long runs the largest error of each of
     some hundred windows is drawn. Zeros have a place of their own, marked 0; a cross marks where a method broke down.
     """
     figure = _figure(error_curves.height(methods))
-    error_curves.draw_errors(figure, methods, units)
+    error_curves.draw_errors(figure, methods, units, balance=balance)
     return figure
 
 
@@ -121,6 +124,8 @@ def run_figure(
     title: str = "",
     spectrum: Spectrum | None = None,
     units: Mapping[str, Unit] | None = None,
+    *,
+    balance: bool = False,
 ) -> Figure:
     """All there is to see of a run on one page.
 
@@ -140,7 +145,10 @@ def run_figure(
         rows[0][1].append(draw_section)  # a single panel leaves room at its side
     elif sections:
         rows.append((_SECTION, [draw_section]))
-    rows.append((error_curves.height(methods), [lambda part: error_curves.draw_errors(part, methods, units)]))
+    errors: Callable[[FigureBase], None] = partial(
+        error_curves.draw_errors, methods=methods, units=units, balance=balance
+    )
+    rows.append((error_curves.height(methods), [errors]))
     if spectrum:
         rows.append((exponents.HEIGHT, [lambda part: exponents.draw_exponents(part.add_subplot(), spectrum)]))
     heights = [height for height, _ in rows]

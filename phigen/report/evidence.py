@@ -158,6 +158,7 @@ def _measured_tiles(v: Verification) -> Iterator[Tile]:
         yield _tile(worst, label, {m: max(c.others.get(m, math.nan) for c in casimirs) for m in v.compared})
     for name, label in (
         ("energy: largest error", "largest error of the energy"),
+        ("energy balance: largest error", "largest error of the energy balance"),
         ("observed order", "observed order"),
         ("Poisson defect", "Poisson defect of a step"),
         ("reversibility", "error of a step there and back"),

@@ -37,9 +37,18 @@ MEANINGS = (
         "how far H went from its value at the start, relative to that; it depends on the step",
     ),
     Meaning(
+        "energy balance: largest error",
+        "the same of H less the work that was done, where H depends on the time or forces act",
+    ),
+    Meaning(
         "energy: last/first window",
         "the same quotient for the energy: about 1 if it oscillates, 10 if it drifts. It is judged if the orbit stays "
         "where it was in the first half",
+        "the solver does not follow the flow of any Hamiltonian near H, or the step is so large that H̃ says nothing",
+    ),
+    Meaning(
+        "energy balance: last/first window",
+        "the same quotient for the balance of energy",
         "the solver does not follow the flow of any Hamiltonian near H, or the step is so large that H̃ says nothing",
     ),
     Meaning(

@@ -59,6 +59,11 @@ class Summary:
     work: float = 0.0
 
     @property
+    def is_balance(self) -> bool:
+        """Whether ``energy`` is about the balance of energy."""
+        return math.isfinite(self.off)
+
+    @property
     def units(self) -> dict[str, Unit]:
         """What the errors are counted in, by the names of the quantities."""
         return {ENERGY: self.energy.unit, **{n: d.unit for n, d in {**self.casimirs, **self.invariants}.items()}}
@@ -114,20 +119,25 @@ class Watch:
         """Whether the initial state has been seen."""
         return bool(self.state["good"])
 
-    def see(self, t: Floats, x: Floats) -> None:
-        """Take in the next rows, times (rows,) and states (rows, DIM); those after one not finite do not count."""
+    def see(self, t: Floats, x: Floats) -> Floats:
+        """Take in the next rows, times (rows,) and states (rows, DIM); those after one not finite do not count.
+
+        The work that was done on the system up to each of them, (rows,), which the balance of energy takes from H.
+        """
+        done = np.zeros(len(t))
         state, good = self.state, int(self.state["good"])
         finite = np.isfinite(x).all(axis=1)
         count = 0 if state["broken"] else len(x) if finite.all() else int(np.argmin(finite))
         state["broken"] = np.asarray(state["broken"] or count < len(x))
         if count == 0:
-            return
+            return done
         t, x = t[:count], x[:count]
         columns = {c: x[:, i] for i, c in enumerate(self._system.coordinates)} | dict.fromkeys(self._system.times, t)
         known = {**self._parameters, **columns}
         values = [np.broadcast_to(a, t.shape) for a in evaluate(self._formulas, known)]
         if self._powers:
-            values[0] = values[0] - self._work(t, [np.broadcast_to(a, t.shape) for a in evaluate(self._powers, known)])
+            done[:count] = self._work(t, [np.broadcast_to(a, t.shape) for a in evaluate(self._powers, known)])
+            values[0] = values[0] - done[:count]
         if good == 0:
             state |= {"first": x[0].copy(), "start": np.array([v[0] for v in values])}
         state["good"] = np.asarray(good + count)
@@ -139,6 +149,7 @@ class Watch:
             off = _against_exact(self._system, self._run, self._parameters, state["first"], t, x)
             state["exact"] = np.asarray(max(off, float(state["exact"])))
         state["final"] = x[-1].copy()
+        return done
 
     def _work(self, t: Floats, found: Sequence[Floats]) -> Floats:
         """∫ ∂_tH dt up to each of the times, which follow those seen before, from the powers there."""

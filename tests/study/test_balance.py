@@ -12,6 +12,7 @@ from phigen.cli import group
 from phigen.geometry.system import system_from_spec
 from phigen.spec import loads
 from phigen.study.balance import powers, works
+from phigen.study.meanings import meaning_of
 from phigen.study.summary import summarise
 from phigen.study.verification import verify
 
@@ -67,6 +68,7 @@ def test_all_checks_hold_from_any_time_on():
     named = {c.name: c for c in found.checks}
     assert named["observed order"].value > 5.7
     assert named["Poisson defect, exact tangent"].value < 1e-13
+    assert all(meaning_of(c.name) for c in found.checks)
     assert named["energy balance: largest error"].value < named["energy balance: largest error"].others["rk4"]
 
 
@@ -86,3 +88,17 @@ def test_a_run_begins_at_its_time(tmp_path):
     shown = runner.invoke(group, ["run", str(path)])
     assert "energy balance" in shown.output
     assert "t = 0.7 … 6.7" in shown.output
+
+
+def test_figures_and_reports_show_the_balance(tmp_path):
+    path = tmp_path / "duffing.yaml"
+    text = DUFFING.replace(
+        "tangent: true", "runs: {r: {initial: [1.2, 0], step: 0.1, steps: 100, start: 0.7, compare: [rk4]}}"
+    )
+    path.write_text(f"phigen: 1\nname: duffing\n{text}", encoding="utf-8")
+    done = CliRunner().invoke(group, ["run", str(path), "--plot", str(tmp_path / "d.svg"), "--target", "numpy"])
+    assert done.exit_code == 0, done.output
+    assert (tmp_path / "d.svg").stat().st_size > 10_000
+    done = CliRunner().invoke(group, ["report", str(path), "-o", str(tmp_path / "d.html"), "--quick"])
+    assert done.exit_code == 0, done.output
+    assert "largest error of the energy balance" in (tmp_path / "d.html").read_text(encoding="utf-8")

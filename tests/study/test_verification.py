@@ -20,7 +20,7 @@ from phigen.scheme.assemble import build_program
 from phigen.spec.model import Extras
 from phigen.study import backward, verification
 from phigen.study.meanings import meaning_of
-from phigen.study.methods import by_differences, of_classical, of_solver
+from phigen.study.methods import by_differences, field_of, of_classical, of_solver
 from phigen.study.summary import summarise
 from phigen.symbolic.expression import substitute, symbol
 from phigen.symbolic.symbols import momentum
@@ -69,7 +69,9 @@ casimirs: {casimirs}
     start = np.array([0.3, 1.2, 0.0, 0.0, 0.0, -1.0])
     made = solver_of(compilation, "c")
     rows = made.integrate(start, h=0.02, steps=10_000).x
-    subject = verification.Subject(compilation, made, {"c": of_solver(made, {})}, {}, {}, start, 0.02, 10_000)
+    subject = verification.Subject(
+        compilation, made, {"c": of_solver(made, {})}, {}, {}, start, 0.02, 10_000, 0.0, field_of(made, {})
+    )
     assert all(check.passed for check in verification.conservation_checks(subject, rows))
     rows[5000:, 0] += 1e-9
     wrong = [check.name for check in verification.conservation_checks(subject, rows) if not check.passed]
