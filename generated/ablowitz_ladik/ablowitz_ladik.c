@@ -20,7 +20,7 @@
  *   3. The lattice
  *   4. The solver
  *   5. What is seen at sites
- * body-sha256: 98e903a7f38570816a34e36d2543e5c4732eff57c28f3e68607890cc0b15b2c4
+ * body-sha256: 450ae8803ec77a6cbc6980625dc63185c72fc089c6ad9cbae9b4275f409ed18b
  */
 #include "ablowitz_ladik.h"
 
@@ -365,7 +365,8 @@ static void ablowitz_ladik_sweep_rows(
 enum {
     ablowitz_ladik_STRETCH = 32, /* steps before the state is looked at: what is not finite stays so */
     ablowitz_ladik_LEAD = (ablowitz_ladik_HALO + 7) / 8 * 8,
-    ablowitz_ladik_BUFFER = 256
+    ablowitz_ladik_BUFFER = 256,
+    ablowitz_ladik_RESERVED = ablowitz_ladik_ARRAYS + ablowitz_ladik_DIM
 };
 
 /* Sizes as they have to be: the widths of rows and the number of rows, 0 if they are not allowed. */
@@ -392,8 +393,8 @@ size_t ablowitz_ladik_work_size(const size_t sizes[ablowitz_ladik_AXES])
 {
     ptrdiff_t width;
     const size_t rows = sizes == NULL ? 0 : ablowitz_ladik_shape(sizes, &width);
-    const size_t row = (ablowitz_ladik_ARRAYS + ablowitz_ladik_DIM) * (size_t)width * sizeof(double)
-        + ablowitz_ladik_LINES * sizeof(ptrdiff_t);
+    const size_t row = ablowitz_ladik_RESERVED * (size_t)width * sizeof(double) + ablowitz_ladik_LINES
+        * sizeof(ptrdiff_t);
     return rows == 0 ? 0 : rows * row + 64;
 }
 
@@ -469,8 +470,7 @@ ablowitz_ladik_status ablowitz_ladik_init(ablowitz_ladik_solver *s, const ablowi
     double *aligned = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64)
         + ablowitz_ladik_LEAD;
     const size_t block = rows * (size_t)width;
-    s->lines = (ptrdiff_t *)(void *)(aligned - ablowitz_ladik_LEAD + (ablowitz_ladik_ARRAYS
-        + ablowitz_ladik_DIM) * block);
+    s->lines = (ptrdiff_t *)(void *)(aligned - ablowitz_ladik_LEAD + ablowitz_ladik_RESERVED * block);
     for (size_t r = 0; r < rows; ++r) ablowitz_ladik_find_lines(s, r, s->lines + r * ablowitz_ladik_LINES);
     for (size_t k = 0; k < ablowitz_ladik_ARRAYS; ++k) s->x[k] = aligned + k * block;
     for (size_t k = 0; k < ablowitz_ladik_DIM; ++k) s->before[k] = aligned + (ablowitz_ladik_ARRAYS + k)

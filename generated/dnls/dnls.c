@@ -20,7 +20,7 @@
  *   3. The lattice
  *   4. The solver
  *   5. What is seen at sites
- * body-sha256: 9f1b01e54b8554915c88593674db5140c0a33c7aa29fc7f916a7a934e97040df
+ * body-sha256: 235cbd31088e928d052236d6552c9a2b96396e8b8ada1dd0d337bffc129ae2de
  */
 #include "dnls.h"
 
@@ -324,7 +324,8 @@ static void dnls_sweep_rows(
 enum {
     dnls_STRETCH = 32, /* steps before the state is looked at: what is not finite stays so */
     dnls_LEAD = (dnls_HALO + 7) / 8 * 8,
-    dnls_BUFFER = 256
+    dnls_BUFFER = 256,
+    dnls_RESERVED = dnls_ARRAYS + dnls_DIM
 };
 
 /* Sizes as they have to be: the widths of rows and the number of rows, 0 if they are not allowed. */
@@ -350,8 +351,7 @@ size_t dnls_work_size(const size_t sizes[dnls_AXES])
 {
     ptrdiff_t width;
     const size_t rows = sizes == NULL ? 0 : dnls_shape(sizes, &width);
-    const size_t row = (dnls_ARRAYS + dnls_DIM) * (size_t)width * sizeof(double) + dnls_LINES
-        * sizeof(ptrdiff_t);
+    const size_t row = dnls_RESERVED * (size_t)width * sizeof(double) + dnls_LINES * sizeof(ptrdiff_t);
     return rows == 0 ? 0 : rows * row + 64;
 }
 
@@ -424,7 +424,7 @@ dnls_status dnls_init(dnls_solver *s, const dnls_params *params, const size_t si
     s->params = own;
     double *aligned = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64) + dnls_LEAD;
     const size_t block = rows * (size_t)width;
-    s->lines = (ptrdiff_t *)(void *)(aligned - dnls_LEAD + (dnls_ARRAYS + dnls_DIM) * block);
+    s->lines = (ptrdiff_t *)(void *)(aligned - dnls_LEAD + dnls_RESERVED * block);
     for (size_t r = 0; r < rows; ++r) dnls_find_lines(s, r, s->lines + r * dnls_LINES);
     for (size_t k = 0; k < dnls_ARRAYS; ++k) s->x[k] = aligned + k * block;
     for (size_t k = 0; k < dnls_DIM; ++k) s->before[k] = aligned + (dnls_ARRAYS + k) * block;

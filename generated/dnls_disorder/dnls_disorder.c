@@ -20,7 +20,7 @@
  *   3. The lattice
  *   4. The solver
  *   5. What is seen at sites
- * body-sha256: 91711317ac34dac8b42420fc227aae0ca1c3d29ea97e34e613e8d7f525eecc33
+ * body-sha256: 847f5917ca6d944fff0651dddd4e0abdee7ca8d43ea696ebd45560e4f2de8e3f
  */
 #include "dnls_disorder.h"
 
@@ -374,7 +374,8 @@ static void dnls_disorder_sweep_rows(
 enum {
     dnls_disorder_STRETCH = 32, /* steps before the state is looked at: what is not finite stays so */
     dnls_disorder_LEAD = (dnls_disorder_HALO + 7) / 8 * 8,
-    dnls_disorder_BUFFER = 256
+    dnls_disorder_BUFFER = 256,
+    dnls_disorder_RESERVED = dnls_disorder_ARRAYS + dnls_disorder_DIM
 };
 
 /* Sizes as they have to be: the widths of rows and the number of rows, 0 if they are not allowed. */
@@ -401,8 +402,8 @@ size_t dnls_disorder_work_size(const size_t sizes[dnls_disorder_AXES])
 {
     ptrdiff_t width;
     const size_t rows = sizes == NULL ? 0 : dnls_disorder_shape(sizes, &width);
-    const size_t row = (dnls_disorder_ARRAYS + dnls_disorder_DIM) * (size_t)width * sizeof(double)
-        + dnls_disorder_LINES * sizeof(ptrdiff_t);
+    const size_t row = dnls_disorder_RESERVED * (size_t)width * sizeof(double) + dnls_disorder_LINES
+        * sizeof(ptrdiff_t);
     return rows == 0 ? 0 : rows * row + 64;
 }
 
@@ -490,8 +491,7 @@ dnls_disorder_status dnls_disorder_init(dnls_disorder_solver *s, const dnls_diso
     double *aligned = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64)
         + dnls_disorder_LEAD;
     const size_t block = rows * (size_t)width;
-    s->lines = (ptrdiff_t *)(void *)(aligned - dnls_disorder_LEAD + (dnls_disorder_ARRAYS + dnls_disorder_DIM)
-        * block);
+    s->lines = (ptrdiff_t *)(void *)(aligned - dnls_disorder_LEAD + dnls_disorder_RESERVED * block);
     for (size_t r = 0; r < rows; ++r) dnls_disorder_find_lines(s, r, s->lines + r * dnls_disorder_LINES);
     for (size_t k = 0; k < dnls_disorder_ARRAYS; ++k) s->x[k] = aligned + k * block;
     for (size_t k = 0; k < dnls_disorder_DIM; ++k) s->before[k] = aligned + (dnls_disorder_ARRAYS + k)

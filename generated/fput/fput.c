@@ -20,7 +20,7 @@
  *   3. The lattice
  *   4. The solver
  *   5. What is seen at sites
- * body-sha256: 809c6f8756c66de9d0cc519bf4788ba68fd0e7ee3b61739d77143962d5be4210
+ * body-sha256: 238c4936c2f8dfc04277801c682c813185981f327a1b9bb6461b1d0d23cfa4fb
  */
 #include "fput.h"
 
@@ -269,7 +269,8 @@ static void fput_sweep_rows(
 enum {
     fput_STRETCH = 32, /* steps before the state is looked at: what is not finite stays so */
     fput_LEAD = (fput_HALO + 7) / 8 * 8,
-    fput_BUFFER = 256
+    fput_BUFFER = 256,
+    fput_RESERVED = fput_ARRAYS + fput_DIM
 };
 
 /* Sizes as they have to be: the widths of rows and the number of rows, 0 if they are not allowed. */
@@ -295,8 +296,7 @@ size_t fput_work_size(const size_t sizes[fput_AXES])
 {
     ptrdiff_t width;
     const size_t rows = sizes == NULL ? 0 : fput_shape(sizes, &width);
-    const size_t row = (fput_ARRAYS + fput_DIM) * (size_t)width * sizeof(double) + fput_LINES
-        * sizeof(ptrdiff_t);
+    const size_t row = fput_RESERVED * (size_t)width * sizeof(double) + fput_LINES * sizeof(ptrdiff_t);
     return rows == 0 ? 0 : rows * row + 64;
 }
 
@@ -369,7 +369,7 @@ fput_status fput_init(fput_solver *s, const fput_params *params, const size_t si
     s->params = own;
     double *aligned = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64) + fput_LEAD;
     const size_t block = rows * (size_t)width;
-    s->lines = (ptrdiff_t *)(void *)(aligned - fput_LEAD + (fput_ARRAYS + fput_DIM) * block);
+    s->lines = (ptrdiff_t *)(void *)(aligned - fput_LEAD + fput_RESERVED * block);
     for (size_t r = 0; r < rows; ++r) fput_find_lines(s, r, s->lines + r * fput_LINES);
     for (size_t k = 0; k < fput_ARRAYS; ++k) s->x[k] = aligned + k * block;
     for (size_t k = 0; k < fput_DIM; ++k) s->before[k] = aligned + (fput_ARRAYS + k) * block;

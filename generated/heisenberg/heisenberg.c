@@ -20,7 +20,7 @@
  *   3. The lattice
  *   4. The solver
  *   5. What is seen at sites
- * body-sha256: 751821b39e61316048e2993ec2f932ccb6929f9a82a7d783235914e214664641
+ * body-sha256: 9cfee5be9dfec0b5717430741093b4e915ff5313d42a7b3e8edd252ebc9def5c
  */
 #include "heisenberg.h"
 
@@ -513,7 +513,8 @@ static void heisenberg_sweep_rows(
 enum {
     heisenberg_STRETCH = 32, /* steps before the state is looked at: what is not finite stays so */
     heisenberg_LEAD = (heisenberg_HALO + 7) / 8 * 8,
-    heisenberg_BUFFER = 256
+    heisenberg_BUFFER = 256,
+    heisenberg_RESERVED = heisenberg_ARRAYS + heisenberg_DIM
 };
 
 /* Sizes as they have to be: the widths of rows and the number of rows, 0 if they are not allowed. */
@@ -540,8 +541,8 @@ size_t heisenberg_work_size(const size_t sizes[heisenberg_AXES])
 {
     ptrdiff_t width;
     const size_t rows = sizes == NULL ? 0 : heisenberg_shape(sizes, &width);
-    const size_t row = (heisenberg_ARRAYS + heisenberg_DIM) * (size_t)width * sizeof(double)
-        + heisenberg_LINES * sizeof(ptrdiff_t);
+    const size_t row = heisenberg_RESERVED * (size_t)width * sizeof(double) + heisenberg_LINES
+        * sizeof(ptrdiff_t);
     return rows == 0 ? 0 : rows * row + 64;
 }
 
@@ -627,8 +628,7 @@ heisenberg_status heisenberg_init(heisenberg_solver *s, const heisenberg_params 
     s->params = own;
     double *aligned = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64) + heisenberg_LEAD;
     const size_t block = rows * (size_t)width;
-    s->lines = (ptrdiff_t *)(void *)(aligned - heisenberg_LEAD + (heisenberg_ARRAYS + heisenberg_DIM)
-        * block);
+    s->lines = (ptrdiff_t *)(void *)(aligned - heisenberg_LEAD + heisenberg_RESERVED * block);
     for (size_t r = 0; r < rows; ++r) heisenberg_find_lines(s, r, s->lines + r * heisenberg_LINES);
     for (size_t k = 0; k < heisenberg_ARRAYS; ++k) s->x[k] = aligned + k * block;
     for (size_t k = 0; k < heisenberg_DIM; ++k) s->before[k] = aligned + (heisenberg_ARRAYS + k) * block;

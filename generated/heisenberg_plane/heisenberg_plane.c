@@ -20,7 +20,7 @@
  *   3. The lattice
  *   4. The solver
  *   5. What is seen at sites
- * body-sha256: 1faae4ab1e485a9e380ad5fd45c8e67c9a90197a7f06f13e95bc58294f55977c
+ * body-sha256: 7d744013b50fc64e43b6d67da5c4c475bb09e78288bdfd49b872bef6ab87cf32
  */
 #include "heisenberg_plane.h"
 
@@ -412,7 +412,8 @@ static void heisenberg_plane_sweep_rows(
 enum {
     heisenberg_plane_STRETCH = 32, /* steps before the state is looked at: what is not finite stays so */
     heisenberg_plane_LEAD = (heisenberg_plane_HALO + 7) / 8 * 8,
-    heisenberg_plane_BUFFER = 256
+    heisenberg_plane_BUFFER = 256,
+    heisenberg_plane_RESERVED = heisenberg_plane_ARRAYS + heisenberg_plane_DIM
 };
 
 /* Sizes as they have to be: the widths of rows and the number of rows, 0 if they are not allowed. */
@@ -440,8 +441,8 @@ size_t heisenberg_plane_work_size(const size_t sizes[heisenberg_plane_AXES])
 {
     ptrdiff_t width;
     const size_t rows = sizes == NULL ? 0 : heisenberg_plane_shape(sizes, &width);
-    const size_t row = (heisenberg_plane_ARRAYS + heisenberg_plane_DIM) * (size_t)width * sizeof(double)
-        + heisenberg_plane_LINES * sizeof(ptrdiff_t);
+    const size_t row = heisenberg_plane_RESERVED * (size_t)width * sizeof(double) + heisenberg_plane_LINES
+        * sizeof(ptrdiff_t);
     return rows == 0 ? 0 : rows * row + 64;
 }
 
@@ -518,8 +519,7 @@ heisenberg_plane_status heisenberg_plane_init(heisenberg_plane_solver *s,
     double *aligned = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64)
         + heisenberg_plane_LEAD;
     const size_t block = rows * (size_t)width;
-    s->lines = (ptrdiff_t *)(void *)(aligned - heisenberg_plane_LEAD + (heisenberg_plane_ARRAYS
-        + heisenberg_plane_DIM) * block);
+    s->lines = (ptrdiff_t *)(void *)(aligned - heisenberg_plane_LEAD + heisenberg_plane_RESERVED * block);
     for (size_t r = 0; r < rows; ++r)
         heisenberg_plane_find_lines(s, r, s->lines + r * heisenberg_plane_LINES);
     for (size_t k = 0; k < heisenberg_plane_ARRAYS; ++k) s->x[k] = aligned + k * block;

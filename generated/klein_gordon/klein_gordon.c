@@ -20,7 +20,7 @@
  *   3. The lattice
  *   4. The solver
  *   5. What is seen at sites
- * body-sha256: 031e5e6188e7caa31c7dacd7661c99741edef064a090ac8ad17a9725f28ec7aa
+ * body-sha256: a0a388d23ebdb94431a9a225e6d2f02b16bf969cb078c553c0d92ac2a0d02077
  */
 #include "klein_gordon.h"
 
@@ -267,7 +267,8 @@ static void klein_gordon_sweep_rows(
 enum {
     klein_gordon_STRETCH = 32, /* steps before the state is looked at: what is not finite stays so */
     klein_gordon_LEAD = (klein_gordon_HALO + 7) / 8 * 8,
-    klein_gordon_BUFFER = 256
+    klein_gordon_BUFFER = 256,
+    klein_gordon_RESERVED = klein_gordon_ARRAYS + klein_gordon_DIM
 };
 
 /* Sizes as they have to be: the widths of rows and the number of rows, 0 if they are not allowed. */
@@ -294,8 +295,8 @@ size_t klein_gordon_work_size(const size_t sizes[klein_gordon_AXES])
 {
     ptrdiff_t width;
     const size_t rows = sizes == NULL ? 0 : klein_gordon_shape(sizes, &width);
-    const size_t row = (klein_gordon_ARRAYS + klein_gordon_DIM) * (size_t)width * sizeof(double)
-        + klein_gordon_LINES * sizeof(ptrdiff_t);
+    const size_t row = klein_gordon_RESERVED * (size_t)width * sizeof(double) + klein_gordon_LINES
+        * sizeof(ptrdiff_t);
     return rows == 0 ? 0 : rows * row + 64;
 }
 
@@ -370,8 +371,7 @@ klein_gordon_status klein_gordon_init(klein_gordon_solver *s, const klein_gordon
     s->params = own;
     double *aligned = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64) + klein_gordon_LEAD;
     const size_t block = rows * (size_t)width;
-    s->lines = (ptrdiff_t *)(void *)(aligned - klein_gordon_LEAD + (klein_gordon_ARRAYS + klein_gordon_DIM)
-        * block);
+    s->lines = (ptrdiff_t *)(void *)(aligned - klein_gordon_LEAD + klein_gordon_RESERVED * block);
     for (size_t r = 0; r < rows; ++r) klein_gordon_find_lines(s, r, s->lines + r * klein_gordon_LINES);
     for (size_t k = 0; k < klein_gordon_ARRAYS; ++k) s->x[k] = aligned + k * block;
     for (size_t k = 0; k < klein_gordon_DIM; ++k) s->before[k] = aligned + (klein_gordon_ARRAYS + k) * block;

@@ -20,7 +20,7 @@
  *   3. The lattice
  *   4. The solver
  *   5. What is seen at sites
- * body-sha256: fa8832e634a2ab8759ec8f11abd175baebdc8a56d42cc6af226f79b014ee34af
+ * body-sha256: 8dfafb920cfb16c9c6ccbf2420484fa317b5e101b4f6209ff377121a75b7380c
  */
 #include "nonlinear_wave.h"
 
@@ -274,7 +274,8 @@ static void nonlinear_wave_sweep_rows(
 enum {
     nonlinear_wave_STRETCH = 32, /* steps before the state is looked at: what is not finite stays so */
     nonlinear_wave_LEAD = (nonlinear_wave_HALO + 7) / 8 * 8,
-    nonlinear_wave_BUFFER = 256
+    nonlinear_wave_BUFFER = 256,
+    nonlinear_wave_RESERVED = nonlinear_wave_ARRAYS + nonlinear_wave_DIM
 };
 
 /* Sizes as they have to be: the widths of rows and the number of rows, 0 if they are not allowed. */
@@ -301,8 +302,8 @@ size_t nonlinear_wave_work_size(const size_t sizes[nonlinear_wave_AXES])
 {
     ptrdiff_t width;
     const size_t rows = sizes == NULL ? 0 : nonlinear_wave_shape(sizes, &width);
-    const size_t row = (nonlinear_wave_ARRAYS + nonlinear_wave_DIM) * (size_t)width * sizeof(double)
-        + nonlinear_wave_LINES * sizeof(ptrdiff_t);
+    const size_t row = nonlinear_wave_RESERVED * (size_t)width * sizeof(double) + nonlinear_wave_LINES
+        * sizeof(ptrdiff_t);
     return rows == 0 ? 0 : rows * row + 64;
 }
 
@@ -378,8 +379,7 @@ nonlinear_wave_status nonlinear_wave_init(nonlinear_wave_solver *s, const nonlin
     double *aligned = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64)
         + nonlinear_wave_LEAD;
     const size_t block = rows * (size_t)width;
-    s->lines = (ptrdiff_t *)(void *)(aligned - nonlinear_wave_LEAD + (nonlinear_wave_ARRAYS
-        + nonlinear_wave_DIM) * block);
+    s->lines = (ptrdiff_t *)(void *)(aligned - nonlinear_wave_LEAD + nonlinear_wave_RESERVED * block);
     for (size_t r = 0; r < rows; ++r) nonlinear_wave_find_lines(s, r, s->lines + r * nonlinear_wave_LINES);
     for (size_t k = 0; k < nonlinear_wave_ARRAYS; ++k) s->x[k] = aligned + k * block;
     for (size_t k = 0; k < nonlinear_wave_DIM; ++k) s->before[k] = aligned + (nonlinear_wave_ARRAYS + k)

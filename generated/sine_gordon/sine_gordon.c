@@ -20,7 +20,7 @@
  *   3. The lattice
  *   4. The solver
  *   5. What is seen at sites
- * body-sha256: f0eeb60791e48a22ef2f4e9b5edd4e92a909a65190a352874103a9fc1d536e96
+ * body-sha256: 6281a1b7406ea952c0ea2f437a7358c608c008911ab90468857a12c4c1c80533
  */
 #include "sine_gordon.h"
 
@@ -303,7 +303,8 @@ static void sine_gordon_sweep_rows(
 enum {
     sine_gordon_STRETCH = 32, /* steps before the state is looked at: what is not finite stays so */
     sine_gordon_LEAD = (sine_gordon_HALO + 7) / 8 * 8,
-    sine_gordon_BUFFER = 256
+    sine_gordon_BUFFER = 256,
+    sine_gordon_RESERVED = sine_gordon_ARRAYS + sine_gordon_DIM
 };
 
 /* Sizes as they have to be: the widths of rows and the number of rows, 0 if they are not allowed. */
@@ -330,8 +331,8 @@ size_t sine_gordon_work_size(const size_t sizes[sine_gordon_AXES])
 {
     ptrdiff_t width;
     const size_t rows = sizes == NULL ? 0 : sine_gordon_shape(sizes, &width);
-    const size_t row = (sine_gordon_ARRAYS + sine_gordon_DIM) * (size_t)width * sizeof(double)
-        + sine_gordon_LINES * sizeof(ptrdiff_t);
+    const size_t row = sine_gordon_RESERVED * (size_t)width * sizeof(double) + sine_gordon_LINES
+        * sizeof(ptrdiff_t);
     return rows == 0 ? 0 : rows * row + 64;
 }
 
@@ -405,8 +406,7 @@ sine_gordon_status sine_gordon_init(sine_gordon_solver *s, const sine_gordon_par
     s->params = own;
     double *aligned = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64) + sine_gordon_LEAD;
     const size_t block = rows * (size_t)width;
-    s->lines = (ptrdiff_t *)(void *)(aligned - sine_gordon_LEAD + (sine_gordon_ARRAYS + sine_gordon_DIM)
-        * block);
+    s->lines = (ptrdiff_t *)(void *)(aligned - sine_gordon_LEAD + sine_gordon_RESERVED * block);
     for (size_t r = 0; r < rows; ++r) sine_gordon_find_lines(s, r, s->lines + r * sine_gordon_LINES);
     for (size_t k = 0; k < sine_gordon_ARRAYS; ++k) s->x[k] = aligned + k * block;
     for (size_t k = 0; k < sine_gordon_DIM; ++k) s->before[k] = aligned + (sine_gordon_ARRAYS + k) * block;

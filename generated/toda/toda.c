@@ -20,7 +20,7 @@
  *   3. The lattice
  *   4. The solver
  *   5. What is seen at sites
- * body-sha256: def2669eb2d859e73e62c28c6ab2ade074316f00994c72b0567cd1d1aebf58f8
+ * body-sha256: 95365f00d086226dcc191ad03b6d08ec936ac265b378ba36cda3f498a25e3b52
  */
 #include "toda.h"
 
@@ -292,7 +292,8 @@ static void toda_sweep_rows(
 enum {
     toda_STRETCH = 32, /* steps before the state is looked at: what is not finite stays so */
     toda_LEAD = (toda_HALO + 7) / 8 * 8,
-    toda_BUFFER = 256
+    toda_BUFFER = 256,
+    toda_RESERVED = toda_ARRAYS + toda_DIM
 };
 
 /* Sizes as they have to be: the widths of rows and the number of rows, 0 if they are not allowed. */
@@ -318,8 +319,7 @@ size_t toda_work_size(const size_t sizes[toda_AXES])
 {
     ptrdiff_t width;
     const size_t rows = sizes == NULL ? 0 : toda_shape(sizes, &width);
-    const size_t row = (toda_ARRAYS + toda_DIM) * (size_t)width * sizeof(double) + toda_LINES
-        * sizeof(ptrdiff_t);
+    const size_t row = toda_RESERVED * (size_t)width * sizeof(double) + toda_LINES * sizeof(ptrdiff_t);
     return rows == 0 ? 0 : rows * row + 64;
 }
 
@@ -392,7 +392,7 @@ toda_status toda_init(toda_solver *s, const toda_params *params, const size_t si
     s->params = own;
     double *aligned = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64) + toda_LEAD;
     const size_t block = rows * (size_t)width;
-    s->lines = (ptrdiff_t *)(void *)(aligned - toda_LEAD + (toda_ARRAYS + toda_DIM) * block);
+    s->lines = (ptrdiff_t *)(void *)(aligned - toda_LEAD + toda_RESERVED * block);
     for (size_t r = 0; r < rows; ++r) toda_find_lines(s, r, s->lines + r * toda_LINES);
     for (size_t k = 0; k < toda_ARRAYS; ++k) s->x[k] = aligned + k * block;
     for (size_t k = 0; k < toda_DIM; ++k) s->before[k] = aligned + (toda_ARRAYS + k) * block;

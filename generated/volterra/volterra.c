@@ -20,7 +20,7 @@
  *   3. The lattice
  *   4. The solver
  *   5. What is seen at sites
- * body-sha256: 507862a000862900c0df551be04969649f8ce49a93d3784f0f42be719a4b6208
+ * body-sha256: b371ba5631cade24c4cb69f8ec06dff5f48df675937a97b726dafbc1c1825a7a
  */
 #include "volterra.h"
 
@@ -304,7 +304,8 @@ static void volterra_sweep_rows(
 enum {
     volterra_STRETCH = 32, /* steps before the state is looked at: what is not finite stays so */
     volterra_LEAD = (volterra_HALO + 7) / 8 * 8,
-    volterra_BUFFER = 256
+    volterra_BUFFER = 256,
+    volterra_RESERVED = volterra_ARRAYS + volterra_DIM
 };
 
 /* Sizes as they have to be: the widths of rows and the number of rows, 0 if they are not allowed. */
@@ -331,7 +332,7 @@ size_t volterra_work_size(const size_t sizes[volterra_AXES])
 {
     ptrdiff_t width;
     const size_t rows = sizes == NULL ? 0 : volterra_shape(sizes, &width);
-    const size_t row = (volterra_ARRAYS + volterra_DIM) * (size_t)width * sizeof(double) + volterra_LINES
+    const size_t row = volterra_RESERVED * (size_t)width * sizeof(double) + volterra_LINES
         * sizeof(ptrdiff_t);
     return rows == 0 ? 0 : rows * row + 64;
 }
@@ -406,7 +407,7 @@ volterra_status volterra_init(volterra_solver *s, const volterra_params *params,
     s->params = own;
     double *aligned = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64) + volterra_LEAD;
     const size_t block = rows * (size_t)width;
-    s->lines = (ptrdiff_t *)(void *)(aligned - volterra_LEAD + (volterra_ARRAYS + volterra_DIM) * block);
+    s->lines = (ptrdiff_t *)(void *)(aligned - volterra_LEAD + volterra_RESERVED * block);
     for (size_t r = 0; r < rows; ++r) volterra_find_lines(s, r, s->lines + r * volterra_LINES);
     for (size_t k = 0; k < volterra_ARRAYS; ++k) s->x[k] = aligned + k * block;
     for (size_t k = 0; k < volterra_DIM; ++k) s->before[k] = aligned + (volterra_ARRAYS + k) * block;

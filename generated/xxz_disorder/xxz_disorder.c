@@ -20,7 +20,7 @@
  *   3. The lattice
  *   4. The solver
  *   5. What is seen at sites
- * body-sha256: 042fa0aaefb5a7ed3e1091cb1f9bbab932eef2cf3ee7bc78bee60c65165f7cc1
+ * body-sha256: 30820d77dc4893a021b48ed1ecc7bff91abd718538f2c9de6db805e5af0fd8f2
  */
 #include "xxz_disorder.h"
 
@@ -372,7 +372,8 @@ static void xxz_disorder_sweep_rows(
 enum {
     xxz_disorder_STRETCH = 32, /* steps before the state is looked at: what is not finite stays so */
     xxz_disorder_LEAD = (xxz_disorder_HALO + 7) / 8 * 8,
-    xxz_disorder_BUFFER = 256
+    xxz_disorder_BUFFER = 256,
+    xxz_disorder_RESERVED = xxz_disorder_ARRAYS + xxz_disorder_DIM
 };
 
 /* Sizes as they have to be: the widths of rows and the number of rows, 0 if they are not allowed. */
@@ -399,8 +400,8 @@ size_t xxz_disorder_work_size(const size_t sizes[xxz_disorder_AXES])
 {
     ptrdiff_t width;
     const size_t rows = sizes == NULL ? 0 : xxz_disorder_shape(sizes, &width);
-    const size_t row = (xxz_disorder_ARRAYS + xxz_disorder_DIM) * (size_t)width * sizeof(double)
-        + xxz_disorder_LINES * sizeof(ptrdiff_t);
+    const size_t row = xxz_disorder_RESERVED * (size_t)width * sizeof(double) + xxz_disorder_LINES
+        * sizeof(ptrdiff_t);
     return rows == 0 ? 0 : rows * row + 64;
 }
 
@@ -487,8 +488,7 @@ xxz_disorder_status xxz_disorder_init(xxz_disorder_solver *s, const xxz_disorder
     s->params = own;
     double *aligned = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64) + xxz_disorder_LEAD;
     const size_t block = rows * (size_t)width;
-    s->lines = (ptrdiff_t *)(void *)(aligned - xxz_disorder_LEAD + (xxz_disorder_ARRAYS + xxz_disorder_DIM)
-        * block);
+    s->lines = (ptrdiff_t *)(void *)(aligned - xxz_disorder_LEAD + xxz_disorder_RESERVED * block);
     for (size_t r = 0; r < rows; ++r) xxz_disorder_find_lines(s, r, s->lines + r * xxz_disorder_LINES);
     for (size_t k = 0; k < xxz_disorder_ARRAYS; ++k) s->x[k] = aligned + k * block;
     for (size_t k = 0; k < xxz_disorder_DIM; ++k) s->before[k] = aligned + (xxz_disorder_ARRAYS + k) * block;

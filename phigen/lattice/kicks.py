@@ -18,14 +18,14 @@ from phigen.symbolic.tower import Tower
 
 
 def cell_kicks(cell: Cell, splitting: CellSplitting) -> tuple[Kick, ...]:
-    """The parts that can be V, proved by degrees; none unless there are two parts, on a grid without colours."""
-    if len(splitting.flows) != 2 or splitting.colouring.count > 1 or cell.relation != GRID:
+    """The parts that can be V, proved by degrees; none unless there are two parts without colours."""
+    if len(splitting.flows) != 2 or splitting.colouring.count > 1 or cell.bond_bracket:
         return ()
     found = []
     for part in (0, 1):
         v, t = splitting.flows[part], splitting.flows[1 - part]
         if _graded(cell, v, t):
-            found.append(Kick(part, _modified(cell, splitting, v, t)))
+            found.append(Kick(part, _modified(cell, splitting, v, t) if cell.relation == GRID else None))
     return tuple(found)
 
 

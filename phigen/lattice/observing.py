@@ -34,7 +34,7 @@ def _relative(values: Floats, scale: float) -> Floats:
 
 
 def summed(cell: Cell, density: Expression, x: Floats, parameters: Mapping[str, Any]) -> tuple[float, float]:
-    """The sum of a density over the sites of a grid, and that of the magnitudes of its terms."""
+    """The sum of a density over the sites, and that of the magnitudes of its terms."""
     sums = [_term(cell, term, x, parameters) for term in cell.additive_terms(density)]
     return float(sum(values.sum() for values in sums)), float(sum(np.abs(values).sum() for values in sums))
 
@@ -45,7 +45,7 @@ def _term(cell: Cell, term: Expression, x: Floats, parameters: Mapping[str, Any]
     values: dict[str, Any] = {n: v for n, v in parameters.items() if np.ndim(v) == 0}
     for name, (base, offset) in cell.places(term).items():
         own = x[cell.fields.index(base)] if base in cell.fields else np.broadcast_to(parameters[base], sizes)
-        values[name] = np.roll(own, [-int(o) for o in offset], axes)
+        values[name] = np.roll(own, [-int(o) for o in offset], axes) if offset else own
     there = np.ones(sizes, dtype=bool)
     low, high = cell.extent(term)
     for axis, boundary in enumerate(cell.boundary):

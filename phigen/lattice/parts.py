@@ -14,7 +14,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from phigen.errors import Diagnostic, Location, SpecError
-from phigen.lattice.cell import GRID, PERIODIC, Cell
+from phigen.lattice.cell import GRID, PERIODIC, Cell, bond_forces
 from phigen.splitting.conflicts import Conflicts, coloured
 from phigen.splitting.flow import Flow, NoFlowError, Solved, Term, flow_of, joint_flow, solved
 from phigen.splitting.ring import KICK, TIME, Ring
@@ -29,15 +29,14 @@ from phigen.symbolic.expression import (
     total,
 )
 from phigen.symbolic.neighbours import Offset, minus, plus, steps
-from phigen.symbolic.symbols import Symbol
+from phigen.symbolic.symbols import GATHERED, PRESENT, Symbol
 from phigen.symbolic.tower import Tower
 
 #: Most colours of sites.
 MOST_COLOURS = 4
 
-#: Kinds of symbols: a component of the gradient of a part; what bonds or pairs add to it; 1 where a term reaches beyond
-#: no open end, else 0.
-FORCE, GATHERED, PRESENT = "force", "gathered", "present"
+#: The kind of symbols of the components of the gradient of a part.
+FORCE = "force"
 
 Steps = tuple[int, ...]
 #: A field, and the colour of the sites where it is meant.
@@ -245,9 +244,16 @@ class PartSearch:
         for summand, colour in (*part, *((replace(s, expression=symbol(KICK) * s.expression), c) for s, c in more)):
             by_term.setdefault(id(summand.expression), (summand, []))[1].append(colour)
         listed = tuple((s, tuple(c)) for s, c in by_term.values())
-        increments = tuple(e for m in motions for e in m.increments.values())
+        added: dict[str, Expression] = {Symbol(GATHERED, f): e for f, e in self._of_bonds(part).items()}
+        increments = tuple(substitute([e for m in motions for e in m.increments.values()], added))
         manner = self._manner
         return CellFlow(total(s.expression for s, _ in listed), increments, manner, tuple(motions), listed)
+
+    def _of_bonds(self, part: Iterable[tuple[Summand, int]]) -> dict[str, Expression]:
+        """What one bond or pair adds to the forces at its site a: it decides what the flow costs."""
+        bonds = total(s.expression for s, _ in part if s.bond)
+        names = {f: self.cell.at(f, ("a",)) for f in self.cell.fields} if not bonds.is_zero else {}
+        return dict(zip(names, gradient(bonds, list(names.values())), strict=True))
 
     def force(
         self, part: Iterable[tuple[Summand, int]], field: str, colour: int, shift: Offset = (), factor: Expression = ONE
@@ -364,7 +370,10 @@ def field_at_site(cell: Cell) -> tuple[Expression, ...]:
     rates: dict[str, list[Expression]] = {f: [] for f in cell.fields}
     for (f, other), entry in cell.bracket.items():
         g, d = cell.place(other)
-        rates[f].append(entry * search.force(every, g, 0, d))
+        force = search.force(every, g, 0, d)
+        if cell.relation != GRID and cell.at(g, ("a",)) in bond_forces(cell):
+            force = force + symbol(Symbol(GATHERED, g))
+        rates[f].append(entry * force)
     return tuple(total(listed) for listed in rates.values())
 
 
@@ -403,6 +412,3 @@ def site_ring(cell: Cell, expressions: Sequence[Expression], symbols: Sequence[s
     size = len(n)
     poisson = tuple(tuple(images[i * size : (i + 1) * size]) for i in range(size))
     return Ring(tower, n, poisson, brackets)
-
-
-__all__ = ["FORCE", "GATHERED", "PRESENT", "CellFlow", "CellSplitting", "Colouring", "SiteMotion", "split_cell"]

@@ -4,15 +4,14 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from phigen.errors import Diagnostic, Location, SpecError
 from phigen.lattice.building import least_sizes
-from phigen.lattice.cell import GRID, PERIODIC, Cell
+from phigen.lattice.cell import GRAPH, PAIRS, PERIODIC, Cell, bond_forces
 from phigen.lattice.kicks import cell_kicks
 from phigen.lattice.parts import (
-    PRESENT,
     CellFlow,
     CellSplitting,
     SiteMotion,
@@ -27,12 +26,13 @@ from phigen.scheme.lowering import operation_counts
 from phigen.scheme.program import About, Observables, Program
 from phigen.scheme.splitting import staged
 from phigen.scheme.staging import Coefficients
-from phigen.scheme.steps import Sites, Sweep, Sweeps
+from phigen.scheme.steps import Gather, Pairs, Sites, Sweep, Sweeps
 from phigen.spec.model import NO_EXTRAS, Extras, Spec
 from phigen.splitting.parts import Splitting
 from phigen.splitting.ring import KICK, TIME
-from phigen.symbolic.expression import Expression, symbols_of, total
-from phigen.symbolic.symbols import Symbol
+from phigen.symbolic.expression import Expression, gradient, symbols_of, total
+from phigen.symbolic.neighbours import steps
+from phigen.symbolic.symbols import GATHERED, PRESENT, Symbol
 
 
 class _Nowhere:
@@ -100,7 +100,12 @@ def build_sweeps(
     kernels = [sweep.kernel for part in swept for sweep in part]
     sites = _sites(cell, parts.colouring.count, parts.colouring.weights, parts.colouring.periods(cell.boundary),
                    [*kernels, observed.energy, observed.casimirs, observed.vector_field])  # fmt: skip
-    step = Sweeps(prepare, sites, swept, schedule, choice.method.name, tuple(k for _, k in cell.casimirs.values()))
+    kinds, pairs = tuple(k for _, k in cell.casimirs.values()), _pairs(cell) if cell.relation == PAIRS else None
+    if pairs:
+        gathers = [sweep.gather.kernel for part in swept for sweep in part if sweep.gather]
+        kernels = [*gathers, pairs.energy, pairs.forces.kernel]
+        sites = replace(sites, ends=_ends(cell, kernels))
+    step = Sweeps(prepare, sites, swept, schedule, choice.method.name, kinds, pairs)
     facts = [*_facts(cell, choice, parts.colouring.count), choice.order.note]
     return Program(
         name=cell.name,
@@ -122,9 +127,12 @@ def _expect_offered(cell: Cell, scheme: str, extras: Extras, locations: Mapping[
     if scheme == "series":
         message = "scheme series is not offered for lattices: they are split"
         problems.append(Diagnostic(message, locations.get(("scheme",)), "scheme: auto"))
-    if cell.relation != GRID:
-        message = f"lattices given as {cell.relation} are not compiled yet; phigen show --expand has an ordinary spec"
+    if cell.relation == GRAPH:
+        message = "lattices given as graphs are not compiled yet; phigen show --expand has an ordinary spec"
         problems.append(Diagnostic(message, locations.get(("lattice",))))
+    if cell.bond_bracket and cell.relation == PAIRS:
+        message = "brackets between the sites of pairs are not compiled"
+        problems.append(Diagnostic(message, locations.get(("poisson",))))
     asked = [name for name in ("modified_hamiltonian", "tangent") if getattr(extras, name)]
     problems += [Diagnostic(f"{name} is not offered for lattices", locations.get((name,))) for name in asked]
     if problems:
@@ -136,7 +144,28 @@ def _sweep(cell: Cell, flow: CellFlow, motion: SiteMotion, k: int, coefficients:
     moved = tuple(cell.fields.index(f) for f in motion.increments)
     suffix = f"_{motion.colour}" if len(flow.motions) > 1 else ""
     named = f"the flow of H_{k} = sum of {flow.hamiltonian}: {flow.manner}".replace(KICK, KICK.kind)
-    return Sweep(_kernel(cell, f"sweep{k}{suffix}", named, increments, "change", coefficients), moved, motion.colour)
+    kernel = _kernel(cell, f"sweep{k}{suffix}", named, increments, "change", coefficients)
+    return Sweep(kernel, moved, motion.colour, _gather(cell, flow, motion.gathered, k, coefficients))
+
+
+def _gather(cell: Cell, flow: CellFlow, fields: Sequence[str], k: int, coefficients: Coefficients) -> Gather | None:
+    """What pairs add to the forces of a part."""
+    if not fields:
+        return None
+    bonds = [s.expression for s, _ in flow.summands if s.bond]
+    names = [cell.at(f, ("a",)) for f in fields]
+    slopes = coefficients.hoist([total(e) for e in zip(*(gradient(b, names) for b in bonds), strict=True)])
+    purpose = f"what all other sites b add to the forces of H_{k} at a site a"
+    kernel = _kernel(cell, f"gather{k}", purpose, slopes, "force", coefficients)
+    return Gather(kernel, tuple(cell.fields.index(f) for f in fields))
+
+
+def _pairs(cell: Cell) -> Pairs:
+    """The energy of a pair, and all forces at a site a."""
+    forces = {f: slope for f in cell.fields if (slope := bond_forces(cell).get(cell.at(f, ("a",)))) is not None}
+    energy = _kernel(cell, "pair_energy", "the energy of a pair", [cell.pair_hamiltonian], "energy")
+    kernel = _kernel(cell, "pair_forces", "what a site b adds to the forces at a site a", [*forces.values()], "force")
+    return Pairs(energy, Gather(kernel, tuple(cell.fields.index(f) for f in forces)))
 
 
 def _kernel(
@@ -153,13 +182,15 @@ def _kernel(
     weights = tuple(n for n in used if isinstance(n, Symbol) and n.kind == PRESENT)
     plain = tuple(p.name for p in cell.parameters if p.at == "all")
     first = {"coef": coefficients.slots} if coefficients else {"params": plain}
-    return Kernel(name, purpose, {**first, "site": tuple(places), "present": weights}, (Output(output, tuple(values)),))
+    gathered = tuple(n for n in used if isinstance(n, Symbol) and n.kind == GATHERED)
+    inputs = {**first, "site": tuple(places), "present": weights, "gathered": gathered}
+    return Kernel(name, purpose, inputs, (Output(output, tuple(values)),))
 
 
 def _observables(cell: Cell) -> Observables:
     """The densities of the Hamiltonian and of the Casimirs, and the vector field at a site."""
     origin = [0] * len(cell.axes)
-    density = total(present(cell, s.low, s.high, origin) * s.expression for s in summands_of(cell))
+    density = total(present(cell, s.low, s.high, origin) * s.expression for s in summands_of(cell) if not s.bond)
     casimirs = [density for density, _ in cell.casimirs.values()]
     return Observables(
         _kernel(cell, "energy", "the density of the Hamiltonian", [density], "out"),
@@ -172,29 +203,36 @@ def _sites(
     cell: Cell, colours: int, weights: Sequence[int], periods: Sequence[int], kernels: Sequence[Kernel]
 ) -> Sites:
     places = {
-        n: (f, tuple(int(o) for o in offset))
-        for kernel in kernels
-        for n, (f, offset) in cell.places(*kernel.roots).items()
+        n: (f, steps(offset) or (0,)) for kernel in kernels for n, (f, offset) in cell.places(*kernel.roots).items()
     }
-    reach = [max((abs(o[a]) for _, o in places.values()), default=0) for a in range(len(cell.axes))]
-    least = [max(a, b) for a, b in zip(reach, least_sizes(cell), strict=True)]
+    axes, boundary = cell.axes or ("i",), cell.boundary or (PERIODIC,)
+    reach = [max((abs(o[a]) for _, o in places.values()), default=0) for a in range(len(axes))]
+    least = [max(a, b) for a, b in zip(reach, least_sizes(cell) or (1,), strict=True)]
     return Sites(
-        cell.axes,
-        tuple(b != PERIODIC for b in cell.boundary),
+        axes,
+        tuple(b != PERIODIC for b in boundary),
         tuple(p.name for p in cell.parameters if p.at == "sites"),
         places,
         colours,
-        tuple(weights),
-        tuple(periods),
+        tuple(weights) or (0,),
+        tuple(periods) or (1,),
         tuple(least),
     )
+
+
+def _ends(cell: Cell, kernels: Sequence[Kernel]) -> dict[str, tuple[str, str]]:
+    """What kernels of pairs read, with the end of the pair."""
+    places = [p for kernel in kernels for p in cell.places(*kernel.roots).items()]
+    return {name: (f, str(offset[0])) for name, (f, offset) in places}
 
 
 def _facts(cell: Cell, choice: Choice, colours: int) -> list[str]:
     """What the header says of the method."""
     count, flows, method = len(choice.splitting.flows), len(choice.schedule().flows), choice.method
     boundary = ", ".join(f"{a} {b}" for a, b in zip(cell.axes, cell.boundary, strict=True))
-    lattice = f"lattice: {boundary}; any size" + (f", sites of {colours} colours" if colours > 1 else "")
+    lattice = f"lattice: {boundary or 'all pairs of sites'}; any size" + (
+        f", sites of {colours} colours" if colours > 1 else ""
+    )
     if count == 1:
         return [lattice, "scheme: the exact flow of H, which is elementary", "step: explicit"]
     parts = " + ".join(f"H_{k}" for k in range(1, count + 1))

@@ -213,19 +213,40 @@ class Sites:
     weights: tuple[int, ...] = ()
     periods: tuple[int, ...] = ()
     least: tuple[int, ...] = ()
+    ends: Mapping[str, tuple[str, str]] = field(default_factory=dict)  # of pairs: what is read at a, or at b
+
+
+@dataclass(frozen=True)
+class Gather:
+    """For each of some ``fields`` (indices) what all pairs with other sites add to the force at a site a.
+
+    The inputs of the ``kernel`` are ``coef`` or ``params``, and ``site``.
+    """
+
+    kernel: Kernel
+    fields: tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class Pairs:
+    """All pairs of sites: the energy of a pair, and the forces on all fields from the parameters."""
+
+    energy: Kernel
+    forces: Gather
 
 
 @dataclass(frozen=True)
 class Sweep:
     """Changes of the ``moved`` fields (indices) at all sites of one ``colour``, read from what stands still.
 
-    The inputs of the ``kernel`` are ``coef``, ``site`` and ``present``, symbols that are 1 where a term of H reaches
-    beyond no open end, else 0.
+    The inputs of the ``kernel`` are ``coef``, ``site``, ``present``, symbols that are 1 where a term of H reaches
+    beyond no open end, else 0, and ``gathered``, what ``gather`` gives for fields.
     """
 
     kernel: Kernel
     moved: tuple[int, ...]
     colour: int = 0
+    gather: Gather | None = None
 
 
 @dataclass(frozen=True)
@@ -237,6 +258,7 @@ class Sweeps(_Staged):
     schedule: Schedule
     composition: str
     casimir_kinds: tuple[str, ...] = ()
+    pairs: Pairs | None = None
 
     unit = "step of one site"
     manner = "explicit"
@@ -249,7 +271,10 @@ class Sweeps(_Staged):
     @property
     def kernels(self) -> tuple[Kernel, ...]:
         """All kernels, each once."""
-        return (self.prepare, *(sweep.kernel for part in self.parts for sweep in part))
+        swept = [sweep for part in self.parts for sweep in part]
+        pairs = [sweep.gather.kernel for sweep in swept if sweep.gather]
+        pairs += [self.pairs.energy, self.pairs.forces.kernel] if self.pairs else []
+        return (self.prepare, *(sweep.kernel for sweep in swept), *pairs)
 
 
 Step = Newton | Explicit | Path | Splitting | Sweeps

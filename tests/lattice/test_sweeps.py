@@ -49,11 +49,15 @@ TEXTS = {
     'hamiltonian: "-(q*q[i+1] + p*p[i+1]) + log(1 + q**2 + p**2)"',
     "toda": "lattice: {axes: [i], boundary: open}\ncoordinates: [a, b]\n"
     'poisson: {brackets: {a: {b: a/2, "b[i+1]": -a/2}}}\nhamiltonian: b**2/2 + 2*a**2',
+    "charges": "lattice: {pairs: all}\ncoordinates: [x, y, px, py]\n"
+    "parameters: {k: 0.5, m: {value: 1.2, at: sites, positive: true}}\n"
+    "poisson: {canonical: {q: [x, y], p: [px, py]}}\nhamiltonian: {sites: (px**2 + py**2)/(2*m) + (x**2 + y**2)/2, "
+    'pairs: "k/sqrt(1/4 + (x[a] - x[b])**2 + (y[a] - y[b])**2)"}',
     "volterra": "lattice: {axes: [i], boundary: periodic}\ncoordinates: [a]\n"
     'poisson: {brackets: {a: {"a[i+1]": "a*a[i+1]"}}}\nhamiltonian: a',
 }
 SIZES = {"sheet": (4, 5), "cube": (3, 4, 3), "volterra": (6,), "toda": (5,)}
-FEW = {"sheet": (3, 3), "cube": (2, 2, 2)}
+FEW = {"sheet": (3, 3), "cube": (2, 2, 2), "charges": (4,)}
 
 
 @cache
@@ -81,7 +85,8 @@ def start(name: str, sizes: tuple[int, ...] | None = None, seed: int = 1) -> np.
 
 def disorder(name: str, x: np.ndarray) -> dict[str, Any]:
     about = solver(name).interface
-    return {p: np.random.default_rng(7).normal(size=x.shape[1:]) for p in about.at_sites}
+    drawn = {p: np.random.default_rng(7).normal(size=x.shape[1:]) for p in about.at_sites}
+    return {p: np.abs(values) + 0.5 if p in about.positive else values for p, values in drawn.items()}
 
 
 def values_of(whole: Expansion, x: np.ndarray, parameters: dict[str, Any]) -> dict[str, float]:
@@ -125,7 +130,7 @@ def test_c_makes_the_steps_of_numpy(name: str) -> None:
     np.testing.assert_allclose(by["c"].energy, by["numpy"].energy, atol=1e-13)
 
 
-@pytest.mark.parametrize("name", ["fput", "cube", "toda"])
+@pytest.mark.parametrize("name", ["fput", "cube", "toda", "charges"])
 def test_steps_are_those_of_the_ordinary_splitting_with_the_same_parts(name: str) -> None:
     x = start(name, FEW.get(name, (4,)))
     lattice = solver(name, 4, "numpy", "suzuki").integrate(x, 0.1, 10)

@@ -8,11 +8,11 @@ from dataclasses import dataclass, replace
 from phigen.lanes.lowering import Rows
 from phigen.scheme.kernel import Kernel, Output
 from phigen.scheme.program import Program
-from phigen.scheme.steps import Sweep, Sweeps
+from phigen.scheme.steps import Gather, Sweep, Sweeps
 from phigen.spec.model import Parameter
 from phigen.symbolic import functions as elementary
 from phigen.symbolic.expression import ONE, substitute
-from phigen.symbolic.symbols import COEFFICIENT, Symbol, kind_of
+from phigen.symbolic.symbols import COEFFICIENT, GATHERED, Symbol, kind_of
 from phigen.targets.c import functions
 from phigen.targets.c.kernels import function, lane_calls, members, printer
 from phigen.targets.c.layout import comment
@@ -23,7 +23,7 @@ from phigen.targets.rendering import render
 from phigen.targets.reserved import C_RESERVED
 
 #: What the loops call their own.
-_OWN = frozenset({"coef", "params", "row", "from", "to", "out", "apart", "i", "part", "far"})
+_OWN = frozenset({"coef", "params", "row", "from", "to", "out", "apart", "i", "j", "part", "far"})
 
 
 @dataclass(frozen=True)
@@ -75,6 +75,7 @@ def switches(program: Program, step: Sweeps, layout: Layout) -> dict[str, bool]:
         "OPEN_ROWS": step.sites.open[-1],
         "HALO": layout.halo > 0,
         "COLOURS": step.sites.colours > 1,
+        "PAIRS": step.pairs is not None,
         "SITE_PARAMETERS": bool(step.sites.parameters),
     }
 
@@ -193,6 +194,7 @@ def sweeps(program: Program, step: Sweeps, rows: Rows) -> str:
         two = any(rows.calls_near(sweep.kernel) for sweep in part)
         found += _part(program, layout, k, part, {"_far": calls, "_near": near} if two else {"": calls})
     seen = program.observables
+    found += _pair_functions(program, layout, step)
     found += [_seen(program, layout, k) for k in (seen.energy, seen.casimirs, seen.vector_field)]
     sites = [p for p in program.parameters if p.at == "sites"]
     numbers = range(1, len(step.parts) + 1)
@@ -208,6 +210,9 @@ def _part(
     program: Program, layout: Layout, k: int, part: Sequence[Sweep], forms: Mapping[str, Mapping[str, str]]
 ) -> Iterator[str]:
     """The loops of a part of H over rows and their sites, in each form: by different functions."""
+    for sweep in part:
+        if sweep.gather:
+            yield _gathering(program, layout, sweep.gather, f"const double *coef, const {program.name}_row *row")
     for form, calls in forms.items():
         for sweep in part:
             yield from _sweep_forms(program, layout, sweep, form, calls)
@@ -254,6 +259,8 @@ def _inside(kernel: Kernel) -> Kernel:
 
 def _calls(name: str, sweep: Sweep, form: str, beside: bool) -> Iterator[str]:
     """The calls of the loops for a piece of a row."""
+    if sweep.gather:
+        yield f"{name}_{sweep.gather.kernel.name}(coef, &at.row, at.from, at.to);"
     own = f"{name}_{sweep.kernel.name}{form}"
     if not beside or not sweep.kernel.inputs["present"]:
         yield f"{own}(coef, &at.row, at.from, at.to);"
@@ -295,6 +302,59 @@ def _added(name: str, read: bool, value: str) -> str:
     return f"= {name} + {value}" if read else f"+= {value}"
 
 
+def _pair_functions(program: Program, layout: Layout, step: Sweeps) -> Iterator[str]:
+    """The forces of all pairs from the parameters, and half of their energies at each site."""
+    if step.pairs:
+        arguments = f"const {program.name}_params *params, const {program.name}_row *row"
+        yield _gathering(program, layout, step.pairs.forces, arguments)
+        yield _half_energies(program, layout, step.pairs.energy, arguments)
+
+
+def _gathering(program: Program, layout: Layout, gather: Gather, arguments: str) -> str:
+    """What all pairs with other sites add at some sites: for each other site, a loop over these."""
+    targets = [f"g{k}" for k in range(len(gather.fields))]
+    pointers = [f"double *restrict {t} = row->gathered[{f}];" for t, f in zip(targets, gather.fields, strict=True)]
+    body = [f"{t}[i] += i == j ? 0.0 : {{{k}}};" for k, t in enumerate(targets)]
+    begin = [f"for (ptrdiff_t i = from; i < to; ++i) {' = '.join(f'{t}[i]' for t in targets)} = 0.0;"]
+    head = f"{arguments}, ptrdiff_t from, ptrdiff_t to"
+    return _over_pairs(program, layout, gather.kernel, head, [*pointers, *begin], body)
+
+
+def _half_energies(program: Program, layout: Layout, kernel: Kernel, arguments: str) -> str:
+    """Adds half the energies of all pairs of a site to its own."""
+    head = f"{arguments}, ptrdiff_t from, ptrdiff_t to, double *restrict out"
+    return _over_pairs(program, layout, kernel, head, [], ["out[i - from] += i == j ? 0.0 : 0.5 * ({0});"])
+
+
+def _over_pairs(
+    program: Program, layout: Layout, kernel: Kernel, arguments: str, begin: Sequence[str], body: Sequence[str]
+) -> str:
+    """A loop over all sites b, in it one over the sites a of a piece; statements with the values of the kernel."""
+    name, code = program.name, lower(kernel)
+    names = _Names(program, layout, kernel, code, set(), _functions(program))
+    other, own = names.of_pair()
+    lines = [*own, *(f"const double {names.scope[a.target]} = {names.show(a.value)};" for a in code.assignments)]
+    lines += [text.format(*(names.show(s.value) for s in code.stores)) for text in body]
+    first = "params" if arguments.startswith(f"const {name}_params") else "coef"
+    used = any(s in code.used for s in kernel.inputs[first])
+    return "\n".join(
+        [
+            *comment(f"/* {plain(kernel.purpose)} */", ""),
+            f"static inline void {name}_{kernel.name}({arguments})",
+            "{",
+            *(f"    {line}" for line in [*([] if used else [f"(void){first};"]), *names.pointers(), *begin]),
+            "    for (ptrdiff_t j = 0; j < row->length; ++j) {",
+            *(f"        {line}" for line in other),
+            f"        {name}_EACH_SITE",
+            "        for (ptrdiff_t i = from; i < to; ++i) {",
+            *(f"            {line}" for line in lines),
+            "        }",
+            "    }",
+            "}\n",
+        ]
+    )
+
+
 def _seen(program: Program, layout: Layout, kernel: Kernel) -> str:
     """A kernel as a loop that fills arrays over the sites."""
     name, code = program.name, lower(kernel)
@@ -311,13 +371,20 @@ def _seen(program: Program, layout: Layout, kernel: Kernel) -> str:
             s.index, f"{s.index} * (ptrdiff_t)apart + i - from"
         )
         body.append(f"out[{place}] = {names.show(s.value)};")
-    unused = [] if any(s in code.used for s in kernel.inputs["params"]) else ["params"]
+    pairs = layout.step.pairs
+    early, late = list[str](), list[str]()
+    if pairs and kernel.name == "energy":
+        late = [f"    {name}_{pairs.energy.name}(params, row, from, to, out);"]
+    elif pairs and kernel.name == "vector_field":
+        early = [f"    {name}_{pairs.forces.kernel.name}(params, row, from, to);"]
+    unused = [] if early or late or any(s in code.used for s in kernel.inputs["params"]) else ["params"]
     unused += [] if len(code.stores) > 1 else ["apart"]
     if not code.stores:
         unused += ["row", "from", "to", "out"]
         return "\n".join([*head, *(f"    (void){u};" for u in unused), "}"]) + "\n"
     head += ["    " + ", ".join(f"(void){u}" for u in unused) + ";"] if unused else []
-    return _looped(head, names, body, name, "ptrdiff_t i = from; i < to; ++i")
+    text = _looped([*head, *early], names, body, name, "ptrdiff_t i = from; i < to; ++i")
+    return text.removesuffix("}\n") + "\n".join([*late, "}\n"])
 
 
 def _looped(head: list[str], names: _Names, body: list[str], name: str, loop: str) -> str:
@@ -350,6 +417,8 @@ class _Names:
         self._pointers: dict[tuple[str, int], str] = {}
         self._loaded: list[str] = []
         self._weights: list[str] = []
+        self._at_a: list[str] = []
+        self._at_b: list[str] = []
         self._first: list[str] = []
         member = members(program)
         for s in (s for symbols in kernel.inputs.values() for s in symbols if s in code.used):
@@ -357,12 +426,26 @@ class _Names:
                 named = f"c{s.key[0]}"
                 self.scope.bind(s, named)
                 self._first.append(f"{named} = coef[{s.key[0]}]")
+            elif isinstance(s, Symbol) and s.kind == GATHERED:
+                self.scope.bind(s, f"row->gathered[{program.coordinates.index(str(s.key[0]))}][i]")
             elif isinstance(s, Symbol):
                 self._bind_weight(s)
+            elif s in layout.step.sites.ends:
+                self._bind_end(s)
             elif s in layout.step.sites.places:
                 self._bind_site(s)
             else:
                 self._first.append(f"{self.scope[s]} = params->{member[s]}")
+
+    def _bind_end(self, s: str) -> None:
+        base, end = self.layout.step.sites.ends[s]
+        pointer = self.pointer(base, 0)
+        named = self.scope[s]
+        (self._at_a if end == "a" else self._at_b).append(f"{named} = {pointer}[{'i' if end == 'a' else 'j'}]")
+
+    def of_pair(self) -> tuple[list[str], list[str]]:
+        """What is read at a site b, and at a site a."""
+        return _together(self._at_b), _together(self._at_a)
 
     def _bind_weight(self, s: Symbol) -> None:
         k = self.layout.weights.index(s)

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 
 from phigen.scheme.kernel import Kernel
 from phigen.scheme.program import Program
 from phigen.scheme.steps import Sweep, Sweeps
 from phigen.symbolic import functions as elementary
-from phigen.symbolic.symbols import COEFFICIENT, Symbol
+from phigen.symbolic.symbols import COEFFICIENT, GATHERED, Symbol
 from phigen.targets import special
 from phigen.targets.code import Code, lower
 from phigen.targets.names import Scope
@@ -51,6 +51,7 @@ def body(program: Program, step: Sweeps, prepare: str) -> str:
     pieces += [render("numpy", "lattice_seen.py", values), prepare]
     pieces += [render("numpy", "phi.py", special.values(f, f"_{f}")) for f in special.used(program)]
     pieces += [render("numpy", "entire.py", special.entire_values(f)) for f in special.entire_used(program)]
+    pieces += _pairs(program, step)
     pieces += [_sweep(program, step, sweep) for part in step.parts for sweep in part]
     parts = ["    (" + ", ".join(f"_{sweep.kernel.name}" for sweep in part) + ",)," for part in step.parts]
     pieces.append("\n".join(["# The sweeps of each part of H.", "PARTS = (", *parts, ")\n"]))
@@ -66,8 +67,11 @@ def _tuple(items: Iterable[str]) -> str:
 def _sweep(program: Program, step: Sweeps, sweep: Sweep) -> str:
     """One sweep as a function from a state to the next."""
     kernel, code = sweep.kernel, lower(sweep.kernel)
-    scope = Scope(PYTHON_RESERVED | _OWN | {"moved"})
-    lines = [f"def _{kernel.name}(coef, x, sites):", *_body(program, step, kernel, code, scope), "    moved = x.copy()"]
+    scope = Scope(PYTHON_RESERVED | _OWN | {"moved", "gathered"})
+    lines = [f"def _{kernel.name}(coef, x, sites):"]
+    lines += [f"    gathered = _{sweep.gather.kernel.name}(coef, x, sites)"] if sweep.gather else []
+    fields = sweep.gather.fields if sweep.gather else ()
+    lines += [*_body(program, step, kernel, code, scope, fields), "    moved = x.copy()"]
     show = _printer(scope)
     for store in code.stores:
         place = f"[{sweep.moved[store.index]}]"
@@ -79,22 +83,56 @@ def _sweep(program: Program, step: Sweeps, sweep: Sweep) -> str:
 def _seen(program: Program, step: Sweeps, kernel: Kernel) -> str:
     """A kernel as a function that fills arrays over the sites."""
     code = lower(kernel)
-    scope = Scope(PYTHON_RESERVED | _OWN | {"out"})
-    lines = [f"def _{kernel.name}(parameters, x, sites):", *_body(program, step, kernel, code, scope)]
+    scope = Scope(PYTHON_RESERVED | _OWN | {"out", "gathered"})
+    lines, pairs = [f"def _{kernel.name}(parameters, x, sites):"], step.pairs
+    fields: Sequence[int] = ()
+    if pairs and kernel.name == "vector_field":
+        lines.append(f"    gathered = _{pairs.forces.kernel.name}(parameters, x, sites)")
+        fields = pairs.forces.fields
+    lines += _body(program, step, kernel, code, scope, fields)
     lines.append(f"    out = np.empty(({len(code.stores)}, *sites.sizes))")
     show = _printer(scope)
     lines += [f"    out[{s.index}] = {show(s.value)}" for s in code.stores]
+    if pairs and kernel.name == "energy":
+        lines.append(f"    out += 0.5 * _{pairs.energy.name}(parameters, x, sites)")
     return "\n".join([*lines, "    return out\n"])
 
 
-def _body(program: Program, step: Sweeps, kernel: Kernel, code: Code, scope: Scope) -> list[str]:
+def _pairs(program: Program, step: Sweeps) -> Iterator[str]:
+    """What pairs add, as functions of the state."""
+    if step.pairs:
+        yield render("numpy", "pairs.py", {})
+        gathers = [sweep.gather.kernel for part in step.parts for sweep in part if sweep.gather]
+        for kernel in gathers:
+            yield _gather(program, step, kernel, "coef")
+        for kernel in (step.pairs.energy, step.pairs.forces.kernel):
+            yield _gather(program, step, kernel, "parameters")
+
+
+def _gather(program: Program, step: Sweeps, kernel: Kernel, first: str) -> str:
+    """A kernel of pairs, summed over the other sites."""
+    code = lower(kernel)
+    scope = Scope(PYTHON_RESERVED | _OWN | {"out", "gathered"})
+    body = _body(program, step, kernel, code, scope)
+    show = _printer(scope)
+    values = "".join(f"_over_others({show(s.value)}, sites), " for s in code.stores)
+    lines = [f"def _{kernel.name}({first}, x, sites):", '    with np.errstate(all="ignore"):']
+    return "\n".join([*lines, *(f"    {line}" for line in body), f"        return np.array([{values.rstrip(', ')}])\n"])
+
+
+def _body(
+    program: Program, step: Sweeps, kernel: Kernel, code: Code, scope: Scope, gathered: Sequence[int] = ()
+) -> list[str]:
     """What is read, and the assignments."""
     lines: list[str] = []
     for array, symbols in kernel.inputs.items():
         for i, s in enumerate(symbols):
             if s not in code.used:
                 continue
-            if isinstance(s, Symbol):
+            if isinstance(s, Symbol) and s.kind == GATHERED:
+                place = [program.coordinates[f] for f in gathered].index(str(s.key[0]))
+                scope.bind(s, f"gathered[{place}]")
+            elif isinstance(s, Symbol):
                 bounds = ", ".join(map(str, s.key))
                 scope.bind(s, f"coef[{i}]" if s.kind == COEFFICIENT else f"sites.present({bounds})")
             elif array == "params":
@@ -106,8 +144,12 @@ def _body(program: Program, step: Sweeps, kernel: Kernel, code: Code, scope: Sco
 
 
 def _read(program: Program, step: Sweeps, name: str) -> str:
-    base, offset = step.sites.places[name]
     fields: Sequence[str] = program.coordinates
+    if name in step.sites.ends:
+        base, end = step.sites.ends[name]
+        text = f"x[{fields.index(base)}]" if base in fields else f'sites.parameters["{base}"]'
+        return f"{text}[:, None]" if end == "a" else text
+    base, offset = step.sites.places[name]
     text = f"x[{fields.index(base)}]" if base in fields else f'sites.parameters["{base}"]'
     return f"sites.shifted({text}, {', '.join(map(str, offset))})" if any(offset) else text
 

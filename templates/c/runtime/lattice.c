@@ -17,7 +17,12 @@
 enum {
     PHI_STRETCH = 32,  /* steps before the state is looked at: what is not finite stays so */
     PHI_LEAD = (PHI_HALO + 7) / 8 * 8,
-    PHI_BUFFER = 256
+    PHI_BUFFER = 256,
+#if PHI_PAIRS
+    PHI_RESERVED = PHI_ARRAYS + 2 * PHI_DIM
+#else
+    PHI_RESERVED = PHI_ARRAYS + PHI_DIM
+#endif
 };
 
 /* Sizes as they have to be: the widths of rows and the number of rows, 0 if they are not allowed. */
@@ -43,7 +48,7 @@ size_t phi_work_size(const size_t sizes[PHI_AXES])
 {
     ptrdiff_t width;
     const size_t rows = sizes == NULL ? 0 : phi_shape(sizes, &width);
-    const size_t row = (PHI_ARRAYS + PHI_DIM) * (size_t)width * sizeof(double) + PHI_LINES * sizeof(ptrdiff_t);
+    const size_t row = PHI_RESERVED * (size_t)width * sizeof(double) + PHI_LINES * sizeof(ptrdiff_t);
     return rows == 0 ? 0 : rows * row + 64;
 }
 
@@ -131,10 +136,13 @@ phi_status phi_init(phi_solver *s, const phi_params *params, const size_t sizes[
     s->params = own;
     double *aligned = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64) + PHI_LEAD;
     const size_t block = rows * (size_t)width;
-    s->lines = (ptrdiff_t *)(void *)(aligned - PHI_LEAD + (PHI_ARRAYS + PHI_DIM) * block);
+    s->lines = (ptrdiff_t *)(void *)(aligned - PHI_LEAD + PHI_RESERVED * block);
     for (size_t r = 0; r < rows; ++r) phi_find_lines(s, r, s->lines + r * PHI_LINES);
     for (size_t k = 0; k < PHI_ARRAYS; ++k) s->x[k] = aligned + k * block;
     for (size_t k = 0; k < PHI_DIM; ++k) s->before[k] = aligned + (PHI_ARRAYS + k) * block;
+#if PHI_PAIRS
+    for (size_t k = 0; k < PHI_DIM; ++k) s->gathered[k] = aligned + (PHI_ARRAYS + PHI_DIM + k) * block;
+#endif
     for (size_t k = 0; k < PHI_DIM; ++k) phi_put(s, s->x[k], x0 + k * sites);
 #if PHI_SITE_PARAMETERS
     phi_put_parameters(s, &own);
@@ -173,7 +181,11 @@ static void phi_sweep(const phi_solver *s, int part, const double *coef, int far
 static void phi_steps(const phi_solver *s, int steps, int far)
 {
 #ifdef _OPENMP
+#if PHI_PAIRS
+#pragma omp parallel if (s->sites > 512)
+#else
 #pragma omp parallel if (s->sites > 4096)
+#endif
 #endif
     for (int step = 0; step < steps; ++step) {
         const int last = step == steps - 1;

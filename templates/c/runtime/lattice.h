@@ -11,6 +11,9 @@ typedef struct {
     ptrdiff_t length, width;  /* sites of a row; doubles between the beginnings of two rows */
     double *x[PHI_ARRAYS];    /* in rows, each field, then each parameter at sites: the first site of the first row */
     ptrdiff_t *lines;         /* of each row, where it is and where those beside it are */
+#if PHI_PAIRS
+    double *gathered[PHI_DIM]; /* for each field, what pairs add to the force at each site */
+#endif
     double *before[PHI_DIM];  /* the fields before the steps that are being made */
     size_t steps;             /* good steps since phi_init */
     double t;                 /* time since phi_init */

@@ -11,6 +11,9 @@ typedef struct {
     double *const *x;             /* see phi_solver */
     const ptrdiff_t *at;          /* the row itself and those beside it, from the first row on */
     ptrdiff_t length;             /* sites of a row */
+#if PHI_PAIRS
+    double *const *gathered;      /* see phi_solver */
+#endif
 #if PHI_OPEN
     double present[PHI_WEIGHTS];  /* 1 for terms of H that are there as far as the other axes say, else 0 */
     int whole;                    /* whether all of them are */
@@ -79,6 +82,9 @@ static inline void phi_locate(const phi_solver *s, size_t index, phi_row *row)
     row->x = s->x;
     row->at = s->lines + index * PHI_LINES;
     row->length = s->length;
+#if PHI_PAIRS
+    row->gathered = s->gathered;
+#endif
 #if PHI_OPEN || PHI_COLOURS
     ptrdiff_t place[PHI_AXES];
     phi_place(s, index, place);
@@ -101,7 +107,11 @@ static inline void phi_locate(const phi_solver *s, size_t index, phi_row *row)
 #endif
 }
 
+#if PHI_PAIRS
+enum { PHI_PIECE = 256 }; /* sites that are worked at in one go, with any number of threads */
+#else
 enum { PHI_PIECE = 2048 }; /* sites of a row that are worked at in one go, with any number of threads */
+#endif
 
 /* The pieces of a row; the last is the longest, so that no copied end reaches into another. */
 static size_t phi_pieces(const phi_solver *s)

@@ -11,6 +11,7 @@
 #define PHI_OPEN 1
 #define PHI_OPEN_ROWS 1
 #define PHI_COLOURS 0
+#define PHI_PAIRS 0
 #define PHI_SITE_PARAMETERS 0
 #define PHI_KICKS 0
 #define PHI_NEAR 0
