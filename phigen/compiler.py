@@ -31,8 +31,10 @@ from phigen.proofs.examination import UNEXAMINED, Examination, doubts, located, 
 from phigen.realisations.catalogue import realise
 from phigen.scheme.assemble import build_program
 from phigen.scheme.choosing import plan as plan_splitting
+from phigen.scheme.choosing import planned as plan_without_kicks
 from phigen.scheme.discretisation import discretise
 from phigen.scheme.gauge import Gauge, choose, given
+from phigen.scheme.logarithmic import composition_of, logarithmic_of
 from phigen.scheme.monitor import monitor_of
 from phigen.scheme.order import plan_order
 from phigen.scheme.program import Program
@@ -241,10 +243,16 @@ def _split(spec: Spec, source: System, order: int | None, described: Mapping[str
     gauge = Gauge() if isinstance(spec.gauge, str) else given(source, spec.gauge)
     discretised = gauge.applied(source)
     parts = clock.timed("splitting", lambda: split(discretised.frozen))
+    monitor, wanted = logarithmic_of(spec, source, parts.flows), order or spec.wanted_order
     choice = clock.timed(
-        "composition", lambda: plan_splitting(discretised, parts, order or spec.wanted_order, spec.composition)
+        "composition",
+        lambda: (
+            plan_without_kicks(discretised, parts, wanted, composition_of(spec.composition, wanted), lambda: ())
+            if monitor
+            else plan_splitting(discretised, parts, wanted, spec.composition)
+        ),
     )
-    described = {**described, "lanes": spec.solver.lanes}
+    described = {**described, "lanes": spec.solver.lanes, "monitor": monitor}
     program = clock.timed("program", lambda: build_splitting(source, choice, gauge, **described))
     return Compilation(spec, source, None, choice.order, program, gauge, clock.seconds, choice.splitting)
 

@@ -37,12 +37,25 @@ def positivity(name: str, e: Expression, positive: Collection[str], starts: Sequ
     return Statement(name, UNDECIDED, "no run starts anywhere; a step on which it is not fails")
 
 
+def _sign_of_negative(e: Expression, positive: Collection[str]) -> str | None:
+    if e.op == "number":
+        return POSITIVE if e.value < 0 else None
+    if e.op == "mul":
+        first, second = e.args
+        if first.op == "number" and first.value < 0:
+            return sign_of(second, positive)
+        return sign_of(second, positive) if _sign_of_negative(first, positive) == POSITIVE else None
+    return sign_of(e.args[0], positive) if e.op == "neg" else None
+
+
 def sign_of(e: Expression, positive: Collection[str]) -> str | None:
     """The sign that the form shows."""
 
     def visit(e: Expression, args: list[str | None]) -> str | None:
         if e.op == "number":
             return POSITIVE if e.value > 0 else NOT_NEGATIVE if e.value == 0 else None
+        if e.op == "neg":  # of a negative number, or of a product with one
+            return _sign_of_negative(e.args[0], positive)
         if e.op == "symbol":
             return POSITIVE if e.value in positive else None
         if e.op == "add":

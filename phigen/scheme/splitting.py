@@ -13,6 +13,7 @@ from phigen.scheme.gathering import gather
 from phigen.scheme.gauge import Gauge
 from phigen.scheme.kernel import Kernel, Output
 from phigen.scheme.kernels import observables
+from phigen.scheme.logarithmic import Logarithmic, trimmed
 from phigen.scheme.lowering import cost, operation_counts
 from phigen.scheme.program import About, Program
 from phigen.scheme.staging import Coefficients
@@ -22,6 +23,7 @@ from phigen.spec.model import NO_EXTRAS, Extras
 from phigen.splitting.flow import Flow
 from phigen.splitting.ring import KICK, TIME
 from phigen.symbolic.expression import Expression
+from phigen.symbolic.symbols import LEVEL
 
 
 def build_splitting(
@@ -35,14 +37,16 @@ def build_splitting(
     spec_sha256: str = "",
     lanes: bool = True,
     profile: str = "fast",
+    monitor: Logarithmic | None = None,
 ) -> Program:
     """The explicit solver as a program. LimitError if a kernel exceeds `MOST_OPERATIONS`."""
     _expect_no_modified(system, extras)
     splitting, steps = choice.splitting, choice.schedule()
-    coefficients = Coefficients([*system.parameter_names, TIME, KICK], system.times)
-    flows = tuple(_flow_kernel(system, flow, k, coefficients) for k, flow in enumerate(splitting.flows, 1))
+    held = (LEVEL,) if monitor else ()
+    coefficients = Coefficients([*system.parameter_names, *held, TIME, KICK], system.times)
+    flows = tuple(_flow_kernel(system, flow, k, coefficients, monitor) for k, flow in enumerate(splitting.flows, 1))
     tangents = tuple(
-        explicit_jacobian(flow, system.coordinates, coefficients, f"tangent{k}")
+        explicit_jacobian(trimmed(flow, system.dimension), system.coordinates, coefficients, f"tangent{k}")
         for k, flow in enumerate(flows, 1)
         if extras.tangent
     )
@@ -50,7 +54,12 @@ def build_splitting(
     prepare = Kernel(
         "prepare",
         "everything that depends on parameters and the time of a flow only",
-        {"params": system.parameter_names, "h": (TIME,), **({"kick": (KICK,)} if steps.multiples else {})},
+        {
+            "params": system.parameter_names,
+            **({"gauge": held} if held else {}),
+            "h": (TIME,),
+            **({"kick": (KICK,)} if steps.multiples else {}),
+        },
         (Output("coef", tuple(coefficients.values)),),
     )
     step = coefficients.settled(Splitting(prepare, flows, steps, choice.method.name, tangents, refresh=refresh))
@@ -59,7 +68,8 @@ def build_splitting(
         if operations > MOST_OPERATIONS:
             reason = f"{kernel.name} would take {operations} operations, more than {MOST_OPERATIONS}"
             raise too_large(system, reason, other="")
-    said = (*gauge.facts, *facts(choice, step), _clock(choice), choice.order.note)
+    monitored = [monitor.fact] if monitor else []
+    said = (*monitored, *gauge.facts, *facts(choice, step), _clock(choice), choice.order.note)
     return Program(
         name=system.name,
         about=About(title, licence, spec_sha256, tuple(fact for fact in said if fact), _operations(step)),
@@ -73,6 +83,7 @@ def build_splitting(
         extras=extras,
         lanes=lanes,
         profile=profile,
+        monitor=monitor.monitor(system) if monitor else None,
     )
 
 
@@ -99,8 +110,8 @@ def _clock(choice: Choice) -> str:
     return f"time: advances {how}, and stands still in {'all other' if with_part else 'all'} flows"
 
 
-def _flow_kernel(system: System, flow: Flow, k: int, coefficients: Coefficients) -> Kernel:
-    increment = staged(flow.increment, coefficients)
+def _flow_kernel(system: System, flow: Flow, k: int, coefficients: Coefficients, monitor: Logarithmic | None) -> Kernel:
+    increment = staged(monitor.outputs(flow) if monitor else flow.increment, coefficients)
     return Kernel(
         f"flow{k}",
         f"the flow of H_{k} = {flow.hamiltonian}: {flow.manner}".replace(KICK, KICK.kind),

@@ -126,7 +126,7 @@ def verify(
     gauge = gauge_at(compilation, x, parameters)
     own = {target: of_solver(solver, parameters, gauge, t0) for target, solver in solvers.items()}
     solver = next(iter(solvers.values()))
-    field = field_in_tau(solver, parameters) if compilation.monitor else field_of(solver, parameters)
+    field = field_in_tau(solver, parameters) if compilation.program.monitor else field_of(solver, parameters)
     others = {name: of_classical(name, solver, parameters, t0, field) for name in compare}
     made = min(steps, FEW_STEPS if quick else MOST_STEPS)
     subject = Subject(compilation, solver, own, others, parameters, x, h, made, t0, field)
@@ -185,7 +185,7 @@ def order_check(subject: Subject, *, quick: bool = False) -> Check:
 
 def time_checks(subject: Subject, gauge: Floats | None, *, quick: bool = False) -> Iterator[Check]:
     """The observed order of the state with its time, of steps that are equal in τ."""
-    if subject.compilation.monitor is None or gauge is None:
+    if subject.compilation.program.monitor is None or gauge is None:
         return
     main = with_time(subject.solver, subject.parameters, gauge)
     timed = replace(subject, own={main.name: main}, others={}, start=np.append(subject.start, 0.0))

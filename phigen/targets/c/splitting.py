@@ -22,14 +22,14 @@ def sizes(step: Splitting) -> list[tuple[str, int, str]]:
 
 def printed(program: Program, step: Splitting) -> str:
     """The flows, and one step."""
-    n = program.dimension
     found = [function(program, replace(step.prepare, name="prepare_row"))]
     found += [function(program, step.refresh)] if step.refresh else []
     for k, flow in enumerate(step.flows, 1):
         kernel, values = _flow(program, flow, k)
         found.append(function(program, kernel, functions=_functions(program)))
         found.append(render("c", "flow.c", values))
-    arguments = f"const double *coef, double x[{n}], double moved[{n}], const double start[{n}]"
+    along = _along(program)
+    arguments = f"const double *coef, double x[{along}], double moved[{along}], const double start[{along}]"
     found.append(_steps(program, step, "", "inline ", arguments, "x, moved, start"))
     return "\n".join(found)
 
@@ -52,6 +52,7 @@ def tangent(program: Program, step: Splitting) -> str:
     own = {
         "NAME": program.name,
         "n": program.dimension,
+        "along": _along(program),
         "n2": program.dimension**2,
         "parts": [*((f"case {k}", k) for k in range(1, count)), ("default", count)],
         "part_of": ", ".join(str(part + 1) for part, _ in flows),
@@ -59,6 +60,11 @@ def tangent(program: Program, step: Splitting) -> str:
     }
     found = [function(program, kernel, functions=_functions(program)) for kernel in step.tangents]
     return "\n".join([*found, render("c", "tangent_flows.c", own)])
+
+
+def _along(program: Program) -> int:
+    """What flows move: the coordinates; with a monitor also the time, and a sum that is no number out of the domain."""
+    return program.dimension + (2 if program.monitor else 0)
 
 
 def _functions(program: Program) -> dict[str, str]:
@@ -70,7 +76,7 @@ def _flow(program: Program, kernel: Kernel, k: int) -> tuple[Kernel, dict[str, o
     """The kernel of a flow without the zero increments, and what the template of the flow reads."""
     moved = [i for i, e in enumerate(kernel.roots) if not e.is_zero]
     output = Output("change", tuple(kernel.roots[i] for i in moved))
-    values = {"NAME": program.name, "n": program.dimension, "k": k, "moved": list(enumerate(moved)), "form": ""}
+    values = {"NAME": program.name, "n": _along(program), "k": k, "moved": list(enumerate(moved)), "form": ""}
     return replace(kernel, name=f"change{k}", outputs=(output,)), values | {"count": max(1, len(moved))}
 
 

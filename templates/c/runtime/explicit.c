@@ -21,18 +21,46 @@ static phi_status phi_stage(phi_solver *s, int stage)
 #include "flows.h"
 
 /* The coefficients of all flows of a step: a row for each time. */
+#if PHI_MONITOR
+static void phi_prepare(const phi_params *params, const double gauge[PHI_GAUGES], double h, double *coef)
+#else
 static void phi_prepare(const phi_params *params, double h, double *coef)
+#endif
 {
     for (int k = 0; k < PHI_ROWS_OF_FLOWS; ++k) {
 #if PHI_KICKS
         const double kick[1] = { phi_multiples[k] * (h * h) };
         phi_prepare_row(params, phi_times[k] * h, kick, coef + k * PHI_ROW);
+#elif PHI_MONITOR
+        phi_prepare_row(params, gauge, phi_times[k] * h, coef + k * PHI_ROW);
 #else
         phi_prepare_row(params, phi_times[k] * h, coef + k * PHI_ROW);
 #endif
     }
 }
 
+#if PHI_MONITOR
+/* What flows move: the state, the physical time, and a sum that is no number where a logarithm has none. */
+enum { PHI_TIME = PHI_DIM, PHI_DOMAIN, PHI_ALONG };
+
+/* One step: the exact flows of the parts of K, one after the other. If it fails, the state is as before. */
+static phi_status phi_stages(phi_solver *s)
+{
+    double x[PHI_ALONG] = { 0.0 }, moved[PHI_ALONG] = { 0.0 }, start[PHI_ALONG] = { 0.0 };
+    memcpy(x, s->x, sizeof s->x);
+    memcpy(start, s->x, sizeof s->x);
+    memcpy(moved, s->carry, sizeof s->carry);
+    phi_flows(s->coef[0], x, moved, start);
+    ++s->evaluations;
+    for (int i = 0; i < PHI_ALONG; ++i)
+        if (!isfinite(x[i])) return PHI_NOT_FINITE;
+    if (!(moved[PHI_TIME] * s->h > 0.0)) return PHI_NOT_FINITE;
+    phi_settle(s->x, s->carry, moved);
+    phi_pass(s, moved[PHI_TIME]);
+    return PHI_OK;
+}
+
+#else
 /* One step: the exact flows of the parts of H, one after the other. If it fails, the state is as before. */
 static phi_status phi_stages(phi_solver *s)
 {
@@ -47,5 +75,6 @@ static phi_status phi_stages(phi_solver *s)
     return PHI_OK;
 }
 
+#endif
 #endif
 #endif

@@ -16,11 +16,14 @@ export function rateAt(params, x) {
   return one[0];
 }
 
+// #if IMPLICIT
 /** The time that a stage takes, by its point y; NaN unless it has the sign of the stage. */
 export function timeOf(solver, stage, y) {
   elapsed(solver.coef[stage], y, one);
   return one[0] * (FRACTIONS[stage] * solver.h) > 0 ? one[0] : NaN;
 }
+
+// #endif
 
 /** The time of a solver gains that of a stage. */
 export function pass(solver, time) {

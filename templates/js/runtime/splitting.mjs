@@ -1,8 +1,16 @@
+// #if MONITOR
+import { pass } from "./level.mjs";
+// #endif
 import { DIM, FLOWS, MULTIPLES, SCHEDULE, TIMES, prepareRow } from "./model.mjs";
 
 // ---- The step of a splitting: flows of parts of H, one after the other ----
 
 /** The coefficients of all flows of a step: a row for each time. */
+// #if MONITOR
+export function prepare(params, gauge, h, rows) {
+  TIMES.forEach((time, k) => prepareRow(params, gauge, time * h, rows[k]));
+}
+// #else
 export function prepare(params, h, rows) {
   // #if KICKS
   TIMES.forEach((time, k) => prepareRow(params, time * h, [MULTIPLES[k] * (h * h)], rows[k]));
@@ -10,10 +18,16 @@ export function prepare(params, h, rows) {
   TIMES.forEach((time, k) => prepareRow(params, time * h, rows[k]));
   // #endif
 }
+// #endif
 
 const at = new Float64Array(DIM);
 const moved = new Float64Array(DIM);
+// #if MONITOR
+/** Increments, the time that a flow takes, and what is no number where a logarithm has none. */
+const change = new Float64Array(DIM + 2);
+// #else
 const change = new Float64Array(DIM);
+// #endif
 
 /** One step: a status. If it fails, the state is as before. */
 export function makeStage(solver) {
@@ -21,8 +35,14 @@ export function makeStage(solver) {
   const [rows] = solver.coef;
   at.set(x);
   moved.set(carry);
+  // #if MONITOR
+  let time = 0;
+  // #endif
   for (const [part, row] of SCHEDULE) {
     FLOWS[part](rows[row], at, change);
+    // #if MONITOR
+    time += change[DIM] + 0 * change[DIM + 1];
+    // #endif
     for (let i = 0; i < DIM; i++) {
       moved[i] += change[i];
       at[i] = x[i] + moved[i];
@@ -30,6 +50,10 @@ export function makeStage(solver) {
   }
   solver.evaluations++;
   if (!at.every(Number.isFinite)) return "NOT_FINITE";
+  // #if MONITOR
+  if (!(time * solver.h > 0)) return "NOT_FINITE";
+  pass(solver, time);
+  // #endif
   for (let i = 0; i < DIM; i++) {
     const sum = x[i] + moved[i];
     const added = sum - x[i];

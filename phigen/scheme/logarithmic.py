@@ -1,0 +1,105 @@
+"""The explicit monitor of a splitting in two, H = A + B: K = log(A + e) − log(−B).
+
+A is constant along its own flow, so the flow of log(A + e) is that of A over the time τ/(A + e), and the flow of
+−log(−B) that of B over τ/(−B). The orbits are those of H where K = 0, that is A + e = −B; e = −H(x₀) is held fixed. The
+flow of A takes the physical time ∂K/∂e τ = τ/(A + e), that of B none. Needs A + e > 0 and −B > 0: S. Mikkola,
+K. Tanikawa, Celestial Mechanics and Dynamical Astronomy 74 (1999); M. Preto, S. Tremaine, Astron. J. 118 (1999).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from fractions import Fraction
+
+from phigen.errors import SpecError
+from phigen.geometry.positivity import POSITIVE, sign_of
+from phigen.geometry.system import System
+from phigen.scheme.composition import find
+from phigen.scheme.kernel import Kernel
+from phigen.scheme.monitor import rate_kernel
+from phigen.scheme.program import Monitor
+from phigen.spec.model import Spec
+from phigen.splitting.flow import Flow
+from phigen.splitting.ring import TIME
+from phigen.symbolic.expression import ZERO, Expression, power, substitute, symbol
+from phigen.symbolic.numeric import DomainError, evaluate
+from phigen.symbolic.symbols import LEVEL
+
+
+@dataclass(frozen=True)
+class Logarithmic:
+    """The parts of H, by the expression of the Hamiltonian of their flows: ``negative`` is B."""
+
+    negative: Expression
+
+    def outputs(self, flow: Flow) -> tuple[Expression, ...]:
+        """The increments of a flow of K, the physical time that it takes, and what is no number out of the domain."""
+        other = -flow.hamiltonian if self._is_negative(flow) else flow.hamiltonian + symbol(LEVEL)
+        time = symbol(TIME) * power(other, -1)
+        increments = substitute(flow.increment, {TIME: time})
+        return (*increments, ZERO if self._is_negative(flow) else time, power(other, Fraction(1, 2)))
+
+    def monitor(self, system: System) -> Monitor:
+        """dt/dτ = 1/(−B)."""
+        return Monitor(rate_kernel(system, power(-self.negative, -1)), None)
+
+    def _is_negative(self, flow: Flow) -> bool:
+        return flow.hamiltonian is self.negative
+
+    @property
+    def fact(self) -> str:
+        """What the header says."""
+        return f"monitor: log, steps are equal in tau; K = log(A + e) - log(-B) with B = {self.negative}"
+
+
+def logarithmic_of(spec: Spec, system: System, flows: Sequence[Flow]) -> Logarithmic | None:
+    """The monitor of a splitting; None where the spec has none. Raises `SpecError` for what it does not apply to."""
+    if spec.monitor is None:
+        return None
+    message = ""
+    if not isinstance(spec.monitor, str):
+        message = "monitor: an expression makes K = g(H + e), which does not split; scheme: splitting takes log"
+    elif spec.time:
+        message = "monitor: not together with time: e = -H(x0) would not be constant"
+    elif len(flows) != 2:
+        message = f"monitor: log needs H = A + B of two parts with elementary flows; here there are {len(flows)}"
+    elif not isinstance(spec.gauge, str):
+        message = "monitor: log takes no gauge, since the parts of H would not be those of the motion"
+    if message:
+        raise SpecError([spec.diagnostic(("monitor",), message, "scheme: series takes an expression for g")])
+    found = next((f for f in flows if _below_zero(spec, system, f.hamiltonian)), None)
+    if found is None:
+        told = ", ".join(str(f.hamiltonian) for f in flows)
+        message = f"monitor: log needs a part that is negative, at least where runs start; the parts are {told}"
+        raise SpecError([spec.diagnostic(("monitor",), message, "a constant can be taken from a part, in hamiltonian")])
+    return Logarithmic(found.hamiltonian)
+
+
+def composition_of(asked: str, order: int) -> str:
+    """The composition of a splitting with this monitor: one of Strang's, where none is asked for.
+
+    Steps of Strang's splitting of K, of any size, stay on the orbit of a Kepler motion; those of others need not.
+    """
+    found = find("auto", order + order % 2)
+    return found.name if asked == "auto" and found else asked
+
+
+def _below_zero(spec: Spec, system: System, e: Expression) -> bool:
+    """Whether an expression is negative: by its form, or else where all runs start."""
+    if sign_of(-e, system.positive) == POSITIVE:
+        return True
+    values = []
+    for run in spec.runs.values():
+        initial = dict(zip(spec.coordinates, map(float, run.initial), strict=True))
+        try:
+            values += evaluate([e], {**spec.parameters_of(run), **initial})
+        except DomainError:
+            return False
+    return bool(values) and all(v < 0 for v in values)
+
+
+def trimmed(kernel: Kernel, count: int) -> Kernel:
+    """The kernel of a flow with the increments of the coordinates only."""
+    (output,) = kernel.outputs
+    return replace(kernel, outputs=(replace(output, values=output.values[:count]),))

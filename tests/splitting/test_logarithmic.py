@@ -1,0 +1,116 @@
+"""monitor: log, K = log(A + e) − log(−B): explicit steps equal in τ, each exactly Poisson."""
+
+import json
+import subprocess
+
+import numpy as np
+import pytest
+from support import files, tool
+
+from phigen import SpecError, StepError, spec
+from phigen.api import solver_of
+from phigen.compiler import compile_spec
+from phigen.spec.model import Extras
+from phigen.study import verification
+
+KEPLER = """phigen: 1
+name: kepler_log
+coordinates: [q1, q2, p1, p2]
+poisson: {canonical: {q: [q1, q2], p: [p1, p2]}}
+hamiltonian: (p1**2 + p2**2)/2 - 1/sqrt(q1**2 + q2**2)
+scheme: splitting
+monitor: log
+runs: {comet: {initial: [0.01, 0, 0, 14.106735979665885], step: 0.05, steps: 200}}
+"""
+ECCENTRICITY = 0.99
+START = np.array([1 - ECCENTRICITY, 0, 0, np.sqrt((1 + ECCENTRICITY) / (1 - ECCENTRICITY))])
+
+
+def compiled_text(text, order=4):
+    return compile_spec(spec.loads(text), order=order, extras=Extras(tangent=True))
+
+
+@pytest.fixture(scope="module")
+def kepler():
+    compilation = compiled_text(KEPLER)
+    return compilation, {target: solver_of(compilation, target) for target in ("c", "numpy")}
+
+
+@pytest.mark.parametrize("order", [2, 4, 8])
+def test_the_orbit_of_a_kepler_motion_is_exact_however_eccentric(order):
+    found = solver_of(compiled_text(KEPLER, order), "c").integrate(START, 0.05, 4000)
+    r = np.hypot(found.x[:, 0], found.x[:, 1])
+    ellipse = r + ECCENTRICITY * found.x[:, 0] - (1 - ECCENTRICITY**2)
+    assert np.abs(ellipse).max() < 1e-12
+    assert np.abs(found.energy + 0.5).max() < 1e-12
+    assert r.max() > 1.9
+    assert found.t[-1] > 100
+
+
+def test_verification_finds_the_order_in_tau_and_of_the_time_and_no_poisson_defect(kepler):
+    compilation, solvers = kepler
+    found = verification.verify(compilation, solvers, "comet", np.array([0.5, 0, 0, 1.7]), {}, 0.1, 60, (), quick=True)
+    assert not found.failures
+
+
+def test_all_targets_make_the_same_steps_and_take_the_same_time(kepler, tmp_path):
+    compilation, solvers = kepler
+    c, numpy = (solvers[target].integrate(START, 0.05, 100) for target in ("c", "numpy"))
+    np.testing.assert_allclose(c.x, numpy.x, rtol=1e-11, atol=1e-12)
+    np.testing.assert_allclose(c.t, numpy.t, rtol=1e-12)
+    (tmp_path / "k.mjs").write_text(next(iter(files(compilation, "js").values())))
+    code = f"import {{Solver}} from './k.mjs'; const s = new Solver({{x0: {START.tolist()}}}); s.integrate(0.05, 100);"
+    code += "console.log(JSON.stringify([...s.x, s.t]))"
+    ran = subprocess.run(
+        [tool("node"), "--input-type=module", "-e", code], cwd=tmp_path, capture_output=True, check=True, timeout=60
+    )
+    np.testing.assert_allclose(json.loads(ran.stdout), [*numpy.x[-1], numpy.t[-1]], rtol=1e-11, atol=1e-12)
+
+
+def test_until_ends_at_a_time_and_the_bytes_of_a_session_go_on(kepler):
+    made = kepler[1]["c"]
+    ended = made.integrate(START, 0.01, until=2 * np.pi, stride=10_000)
+    assert ended.t[-1] == pytest.approx(2 * np.pi, rel=1e-15)
+    whole, first = made.backend.start(START, {}), made.backend.start(START, {})
+    whole.advance(0.05, 40)
+    first.advance(0.05, 20)
+    resumed = made.backend.restored(first.saved(), {})
+    resumed.advance(0.05, 20)
+    assert resumed.time() == whole.time()
+    assert np.array_equal(resumed.state(), whole.state())
+
+
+TRAP = """phigen: 1
+name: trap
+coordinates: [q, p]
+poisson: {canonical: {q: [q], p: [p]}}
+hamiltonian: p**2/2 - cos(q)
+scheme: splitting
+monitor: log
+runs: {near: {initial: [0.1, 0], step: 0.05, steps: 10}}
+"""
+
+
+@pytest.mark.parametrize("target", ["c", "numpy"])
+def test_where_minus_b_is_not_positive_nothing_starts_and_a_step_fails(target):
+    made = solver_of(compiled_text(TRAP), target)
+    assert np.ptp(made.integrate([0.1, 0], 0.05, 100).energy) < 1e-6
+    with pytest.raises(StepError, match="monitor is not positive"):
+        made.integrate([2, 0], 0.05, 1)
+    with pytest.raises(StepError, match="NOT_FINITE"):
+        made.integrate([0.1, 3.0], 0.05, 100)
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (("monitor: log", "monitor: q1**2 + 1"), "does not split"),
+        (("- 1/sqrt", "+ 1/sqrt"), "a part that is negative"),
+        (("(p1**2 + p2**2)/2 - 1/sqrt(q1**2 + q2**2)", "(p1**2 + p2**2)/2"), "of two parts"),
+        (("monitor: log", "monitor: log\ncomposition: nystrom"), "composition nystrom"),
+    ],
+    ids=["expression", "repelling", "one part", "kicks"],
+)
+def test_what_does_not_apply_is_an_error_of_the_spec(change, said):
+    with pytest.raises(SpecError, match=said):
+        compiled_text(KEPLER.replace(*change))
