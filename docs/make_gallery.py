@@ -49,8 +49,8 @@ This page is made by `python docs/make_gallery.py`.
 
 
 def names() -> list[str]:
-    """The corpus, in the order of `phigen list`."""
-    return list(resources.bundled())
+    """The corpus, in the order of `phigen list`, without lattices: docs/lattices.md is about these."""
+    return [name for name, path in resources.bundled().items() if path.parent == resources.bundled_specs()]
 
 
 def source(name: str) -> Spec:

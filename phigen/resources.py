@@ -24,8 +24,10 @@ def bundled_specs() -> Path:
 
 
 def bundled() -> dict[str, Path]:
-    """The files of the bundled specs by their names."""
-    return {path.stem: path for path in sorted(bundled_specs().rglob("*.yaml"))}
+    """The files of the bundled specs by their names, lattices last."""
+    folder = bundled_specs()
+    files = [*sorted(folder.glob("*.yaml")), *sorted(folder.glob("lattices/*.yaml"))]
+    return {path.stem: path for path in files}
 
 
 def bundled_name(file: str) -> str | None:

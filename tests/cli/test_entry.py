@@ -305,7 +305,7 @@ def test_completion_script_is_offered():
     ("line", "offered"),
     [
         ("run kep", ["plain,kepler"]),
-        ("run k", ["plain,krill.yaml", "plain,kelp/", "plain,kepler", "plain,kowalevski_top"]),
+        ("run k", ["plain,krill.yaml", "plain,kelp/", "plain,kepler", "plain,kowalevski_top", "plain,klein_gordon"]),
         ("vendor kep", ["plain,kepler"]),
         ("run kr", ["file,kr"]),
         ("run kelp/", ["file,kelp/"]),
