@@ -168,6 +168,8 @@ def interface_of(program: Program) -> Interface:
         casimirs=program.casimirs,
         time=program.time,
         monitored=program.monitor is not None,
+        attitude=program.attitude.shape if program.attitude else (),
+        position=bool(program.attitude and program.attitude.group.translation),
     )
     if not isinstance(program.step, Sweeps):
         return about

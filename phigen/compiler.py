@@ -21,6 +21,7 @@ from typing import Any, TypeVar
 
 from phigen import progress, registry
 from phigen import spec as specs
+from phigen.attitude.group import group_of
 from phigen.compilation import Compilation, NoSystem
 from phigen.errors import CheckError, LimitError, PhigenWarning, SpecError
 from phigen.geometry.system import System, system_from_spec
@@ -227,9 +228,9 @@ def _compiled(
     reached = clock.timed(
         "generating function", lambda: discretise(gauged.system, realisation, gauged.series, plan, spec.composition)
     )
-    program = clock.timed(
-        "program", lambda: build_program(source, realisation, plan, gauged, reached, solver=spec.solver, **described)
-    )
+    group = group_of(source, spec.reconstruct, realisation.kind) if spec.reconstruct else None
+    described |= {"solver": spec.solver, "group": group}
+    program = clock.timed("program", lambda: build_program(source, realisation, plan, gauged, reached, **described))
     return Compilation(
         spec, source, realisation, plan, program, gauged.gauge, clock.seconds, gauged=gauged, scheme=reached
     )
@@ -252,7 +253,8 @@ def _split(spec: Spec, source: System, order: int | None, described: Mapping[str
             else plan_splitting(discretised, parts, wanted, spec.composition)
         ),
     )
-    described = {**described, "lanes": spec.solver.lanes, "monitor": monitor}
+    group = group_of(source, spec.reconstruct, "exponential") if spec.reconstruct else None
+    described = {**described, "lanes": spec.solver.lanes, "monitor": monitor, "group": group}
     program = clock.timed("program", lambda: build_splitting(source, choice, gauge, **described))
     return Compilation(spec, source, None, choice.order, program, gauge, clock.seconds, choice.splitting)
 

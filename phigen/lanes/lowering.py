@@ -134,7 +134,8 @@ def _newton(program: Program, step: Newton) -> Blocks | None:
     elif step.invert:
         found.append(LaneKernel(step.invert))
     found += _elapsed(program)
-    ops = operations([step.linearise])
+    found += _turns(program)
+    ops = operations([step.linearise, *(k.kernel for k in _turns(program))])
     return Blocks(tuple(found), with_formulas(ops), not library_calls(ops), _group(program), step.factors)
 
 
@@ -143,7 +144,7 @@ def _paths(program: Program, step: Path, lanes: PathLanes) -> Blocks | None:
     terms = next((k for k, more in room.items() if _block(program, *more) <= MOST_STACK), None)
     if terms is None:
         return None
-    kernels = paths.kernels(step, lanes, program.coordinates)
+    kernels = [*paths.kernels(step, lanes, program.coordinates), *(k.kernel for k in _turns(program))]
     ops = operations(kernels)
     needed = _group(program) + sum(room[terms])
     found = (*(LaneKernel(kernel) for kernel in kernels), *_elapsed(program))
@@ -153,6 +154,11 @@ def _paths(program: Program, step: Path, lanes: PathLanes) -> Blocks | None:
 def _elapsed(program: Program) -> list[LaneKernel]:
     """The time that the steps of a block take, of a monitored solver."""
     return [LaneKernel(program.monitor.elapsed)] if program.monitor and program.monitor.elapsed else []
+
+
+def _turns(program: Program) -> list[LaneKernel]:
+    """The kernel of the elements that attitudes are products of."""
+    return [LaneKernel(program.attitude.turn)] if program.attitude and program.attitude.turn else []
 
 
 def _packs(program: Program, kernels: Sequence[Kernel], near: tuple[str, ...]) -> Packs | None:

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 from phigen.compilation import Compilation
 from phigen.errors import Diagnostic, SpecError
-from phigen.proofs.statements import CASIMIRS, DEFINEDNESS, INVARIANTS, METHOD, MONITOR, SPLITTING, Groups
+from phigen.proofs.statements import ATTITUDE, CASIMIRS, DEFINEDNESS, INVARIANTS, METHOD, MONITOR, SPLITTING, Groups
 from phigen.spec.model import Spec
 from phigen.symbolic.verdict import REFUTED, Statement
 
@@ -14,7 +14,7 @@ from phigen.symbolic.verdict import REFUTED, Statement
 UNEXAMINED = "Casimirs, invariants, the method"
 
 #: Where a spec says what a group of statements is about.
-_PLACES = {METHOD: ("birealisation",), MONITOR: ("monitor",), SPLITTING: ("scheme",)}
+_PLACES = {METHOD: ("birealisation",), MONITOR: ("monitor",), SPLITTING: ("scheme",), ATTITUDE: ("reconstruct",)}
 
 
 @dataclass(frozen=True)

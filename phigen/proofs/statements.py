@@ -14,6 +14,7 @@ from phigen.geometry.system import System
 from phigen.lattice import flow_proofs
 from phigen.lattice import proofs as of_lattices
 from phigen.lattice.cell import Cell
+from phigen.proofs import attitude
 from phigen.realisations import axioms
 from phigen.series.hamilton_jacobi import residual
 from phigen.spec.model import Spec
@@ -26,7 +27,7 @@ Groups = Mapping[str, tuple[Statement, ...]]
 PREFIX = "bi-realisation: "
 DEFINEDNESS, CASIMIRS, FORCES, INVARIANTS = "Definedness", "Casimirs", "Forces", "Invariants"
 MONITOR = "Monitor"
-METHOD, SPLITTING = "Bi-realisation", "Splitting"
+METHOD, SPLITTING, ATTITUDE = "Bi-realisation", "Splitting", "Attitude"
 
 
 def definedness(system: System, spec: Spec) -> dict[str, tuple[Statement, ...]]:
@@ -87,12 +88,14 @@ def sweeps(compilation: Compilation) -> dict[str, tuple[Statement, ...]]:
 
 def method(compilation: Compilation) -> dict[str, tuple[Statement, ...]]:
     """The flows of a splitting; or the axioms of the bi-realisation and the Hamilton–Jacobi equation."""
+    turned = tuple(attitude.check(compilation))
+    last = {ATTITUDE: turned} if turned else {}
     if compilation.splitting:
-        return {SPLITTING: tuple(check_splitting(compilation.discretised, compilation.splitting))}
+        return {SPLITTING: tuple(check_splitting(compilation.discretised, compilation.splitting))} | last
     found = axioms.check(compilation.system, compilation.chart)
     stripped = [replace(s, name=s.name.removeprefix(PREFIX)) for s in found]
     label = f"{METHOD} ({compilation.chart.kind})"
-    return {label: tuple(stripped), "Hamilton–Jacobi series": tuple(series_statements(compilation))}
+    return {label: tuple(stripped), "Hamilton–Jacobi series": tuple(series_statements(compilation))} | last
 
 
 def series_statements(compilation: Compilation) -> Iterator[Statement]:

@@ -13,6 +13,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from itertools import chain
 
 from phigen import progress
 from phigen.geometry.field import Field, Scalar
@@ -79,6 +80,20 @@ def build(system: System, choice: BirealisationChoice) -> BiRealisation:
         explanation=f"π is {'linear' if size == n else 'affine'}: Cayley transform, {explanation}; symmetric",
         reference=f"{PAPER}, the proposition on Lie–Poisson structures and its example so(n), with 2 for 4",
     )
+
+
+def closed_representation(algebra: LieAlgebra) -> Representation | None:
+    """The representation of the whole algebra that `closed_product` uses; None if it is none, or one for each part."""
+    given = [algebra.representation] if algebra.representation else []
+    if not given and len(indecomposable_parts(algebra)) > 1:
+        return None
+    return next((r for r in chain(given, candidates(algebra)) if trilinear(algebra, r) is not None), None)
+
+
+def trilinear(algebra: LieAlgebra, representation: Representation) -> Trilinear | None:
+    """The trilinear form of P E_i P in a representation; None if it leaves the algebra."""
+    found = _product(algebra, representation)
+    return None if isinstance(found, _Escape) else found
 
 
 def _factored(terms: dict[tuple[int, ...], Expression], variables: Sequence[Expression]) -> Expression:

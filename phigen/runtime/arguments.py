@@ -128,6 +128,42 @@ def states(x: ArrayLike, what: str, interface: Interface) -> Floats:
     return found
 
 
+def first(attitude0: ArrayLike | None, position0: ArrayLike | None, interface: Interface) -> Floats | None:
+    """The numbers of an attitude, a quaternion of length 1 or a matrix, and a position; None if neither is given."""
+    if attitude0 is None and position0 is None:
+        return None
+    for given, there, what in (
+        (attitude0, bool(interface.attitude), "attitude0"),
+        (position0, interface.position, "position0"),
+    ):
+        if given is not None and not there:
+            where = "reconstruct: quaternion or matrix in its spec asks for one, positions belong to se(3)"
+            raise TypeError(f"{interface.name} has no {what[:-1]}: {where}")
+    shape = interface.attitude
+    start = np.eye(shape[0]) if len(shape) == 2 else np.eye(4)[0]
+    attitude = start if attitude0 is None else _array(attitude0, "attitude0", shape)
+    if len(shape) == 1:
+        if not attitude.any():
+            raise ValueError("attitude0 must not be 0")
+        attitude = attitude / np.abs(attitude).max()
+        attitude /= np.sqrt(attitude @ attitude)
+    place = np.zeros(3) if position0 is None else _array(position0, "position0", (3,))
+    return np.concatenate([attitude.ravel(), place]) if interface.position else attitude.ravel()
+
+
+def _array(given: ArrayLike, what: str, shape: tuple[int, ...]) -> Floats:
+    """A copy of an array of finite numbers of that shape."""
+    try:
+        found = np.array(given, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise TypeError(f"{what} must be an array of numbers: {error}") from None
+    if found.shape != shape:
+        raise ValueError(f"{what} must have shape {shape}, not {found.shape}")
+    if not np.isfinite(found).all():
+        raise ValueError(f"{what} must be finite")
+    return found
+
+
 def _number(value: float, what: str) -> float:
     if isinstance(value, str | bytes | bytearray):  # which float would read
         raise TypeError(f"{what} must be a number, not {_shown(value)}")

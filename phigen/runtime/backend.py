@@ -24,8 +24,10 @@ class Backend(Protocol):
         """A hash of all that decides the results, and what bytes of a session mean."""
         ...
 
-    def start(self, x0: Floats, parameters: Mapping[str, float], t0: float = 0.0) -> Session:
-        """A session at x0 (DIM,)."""
+    def start(
+        self, x0: Floats, parameters: Mapping[str, float], t0: float = 0.0, first: Floats | None = None
+    ) -> Session:
+        """A session at x0 (DIM,), with an attitude and position ``first`` (numbers,); None for the identity."""
         ...
 
     def restored(self, saved: bytes, parameters: Mapping[str, float]) -> Session:

@@ -62,14 +62,16 @@ _EXTRAS = {
     "init_gauge": (_INT, (_POINTER, _POINTER, _POINTER, _POINTER)),
     "solver_time": (_DOUBLE, (_POINTER,)),
     "monitor": (_DOUBLE, (_POINTER, _POINTER)),
+    "attitude": (None, (_POINTER, _POINTER)),
+    "set_attitude": (_INT, (_POINTER, _POINTER, _POINTER)),
 }
 
 
 class CSession:
     """A struct NAME_solver; being a plain value, its bytes are all there is to know. See `Session`."""
 
-    def __init__(self, functions: Any, struct: Bytes, dimension: int) -> None:
-        self._c, self._struct = functions, struct
+    def __init__(self, functions: Any, struct: Bytes, dimension: int, element: int = 0) -> None:
+        self._c, self._struct, self._element = functions, struct, element
         self.address = ctypes.c_void_p(struct.ctypes.data)
         self._x = struct[: 8 * dimension].view(np.float64)
 
@@ -107,7 +109,14 @@ class CSession:
 
     def branch(self) -> CSession:
         """See `Session`."""
-        return CSession(self._c, _aligned_copy(self._struct), len(self._x))
+        return CSession(self._c, _aligned_copy(self._struct), len(self._x), self._element)
+
+    def element(self) -> Floats:
+        """See `Session`."""
+        found = np.empty(self._element)
+        if self._element:
+            self._c.attitude(self.address, found.ctypes.data)
+        return found
 
     def placed(self, x: Floats) -> CSession:
         """See `Session`."""
@@ -154,26 +163,34 @@ class CSolver:
         """See `phigen.runtime.backend.Backend`."""
         return cache.key_of(self._library)
 
-    def start(self, x0: Floats, parameters: Mapping[str, float], t0: float = 0.0) -> CSession:
+    def start(
+        self, x0: Floats, parameters: Mapping[str, float], t0: float = 0.0, first: Floats | None = None
+    ) -> CSession:
         """See `phigen.runtime.backend.Backend`."""
-        session = CSession(self._c, _aligned(self._c.solver_size()), self.interface.dimension)
-        packed, first = self._packed(parameters), np.ascontiguousarray(x0, dtype=np.float64)
-        if self.interface.time:
-            status = self._c.init_at(session.address, packed.ctypes.data, first.ctypes.data, t0)
+        interface = self.interface
+        session = CSession(self._c, _aligned(self._c.solver_size()), interface.dimension, interface.element)
+        packed, start = self._packed(parameters), np.ascontiguousarray(x0, dtype=np.float64)
+        if interface.time:
+            status = self._c.init_at(session.address, packed.ctypes.data, start.ctypes.data, t0)
         elif self._gauge is None:
-            status = self._c.init(session.address, packed.ctypes.data, first.ctypes.data)
+            status = self._c.init(session.address, packed.ctypes.data, start.ctypes.data)
         else:
             gauge = self._gauge.ctypes.data
-            status = self._c.init_gauge(session.address, packed.ctypes.data, first.ctypes.data, gauge)
+            status = self._c.init_gauge(session.address, packed.ctypes.data, start.ctypes.data, gauge)
+        if status == 0 and first is not None:
+            given = np.ascontiguousarray(first, dtype=np.float64)
+            place = given[math.prod(interface.attitude) :].ctypes.data if interface.position else None
+            status = self._c.set_attitude(session.address, given.ctypes.data, place)
         if status:
-            raise BackendError(status_name(status), 0, first.reshape(1, -1))
+            raise BackendError(status_name(status), 0, start.reshape(1, -1))
         return session
 
     def restored(self, saved: bytes, parameters: Mapping[str, float]) -> CSession:
         """See `phigen.runtime.backend.Backend`; the parameters are part of the bytes."""
         if len(saved) != self._c.solver_size():
             raise ValueError(f"{len(saved)} bytes are no {self.interface.name}_solver of this library")
-        return CSession(self._c, _aligned_copy(np.frombuffer(saved, dtype=np.uint8)), self.interface.dimension)
+        struct, interface = _aligned_copy(np.frombuffer(saved, dtype=np.uint8)), self.interface
+        return CSession(self._c, struct, interface.dimension, interface.element)
 
     def ensemble(self, x0: Floats, h: float, steps: int, parameters: Mapping[str, float], t0: float = 0.0) -> Floats:
         """See `phigen.runtime.backend.Backend`."""

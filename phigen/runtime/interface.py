@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -36,11 +37,18 @@ class Interface:
     casimirs: tuple[str, ...] = ()
     time: str = ""  # its name, where the Hamiltonian depends on it
     monitored: bool = False  # whether steps are equal in τ, not in t
+    attitude: tuple[int, ...] = ()  # the shape of an attitude, if there is one
+    position: bool = False  # whether there is a position too
 
     @property
     def dimension(self) -> int:
         """Number of coordinates."""
         return len(self.coordinates)
+
+    @property
+    def element(self) -> int:
+        """Numbers of an attitude and a position."""
+        return math.prod(self.attitude) + 3 * self.position if self.attitude else 0
 
 
 @dataclass(frozen=True)

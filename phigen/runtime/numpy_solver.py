@@ -1,15 +1,15 @@
 """A generated NumPy module, loaded from its source text.
 
 Beside the documented functions, sessions use the parts of ``integrate``: ``_values``, ``_admissible``,
-``_coefficients``, ``_renewed`` where there is a time, ``_advance`` and, with tangents, ``_tangent_stage``, with a
-monitor ``_time_of``.
+``_coefficients``, ``_renewed`` where there is a time, ``_advance``, with tangents ``_tangent_stage``, with a monitor
+``_time_of``, and with attitudes what ``reconstruct`` uses.
 """
 
 from __future__ import annotations
 
 import io
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -23,6 +23,28 @@ Stage = tuple[Any, ...]
 
 #: A stage, its start (state and carry), and what it solved for.
 Made = tuple[Stage, Floats, Floats, Floats]
+
+
+class Turned(NamedTuple):
+    """An attitude on its way: the element it began with, and when; the product of all steps, what rounding took of
+    that, and the rate of Casimirs."""
+
+    first: Floats
+    begun: float
+    element: Floats
+    lost: Floats
+    rate: Floats | None
+
+    def arrays(self) -> dict[str, Any]:
+        """What a session saves."""
+        rate = np.empty(0) if self.rate is None else self.rate
+        return {"first": self.first, "begun": self.begun, "element": self.element, "lost": self.lost, "rate": rate}
+
+    @classmethod
+    def from_arrays(cls, stored: Mapping[str, Any]) -> Turned:
+        """The inverse of `arrays`."""
+        rate = stored["rate"] if stored["rate"].size else None
+        return cls(stored["first"], float(stored["begun"]), stored["element"], stored["lost"], rate)
 
 
 class NumpySession:
@@ -47,6 +69,7 @@ class NumpySession:
         self._h = np.nan
         self._stages: list[Stage] = []
         self._memory: list[Pair] = []
+        self._turned: Turned | None = None
 
     def state(self) -> Floats:
         """See `Session`."""
@@ -61,6 +84,22 @@ class NumpySession:
         copy = self.branch()
         copy._x = x[np.newaxis].copy()
         return copy
+
+    def element(self) -> Floats:
+        """See `Session`."""
+        if self._turned is None:
+            return np.empty(0)
+        turned = self._turned
+        elapsed = self._now() - turned.begun
+        return np.array(self._module._attitude(turned.first, turned.element, turned.rate, elapsed)[0])
+
+    def turn_from(self, first: Floats | None) -> None:
+        """Follow the attitude, from an element at the present state; None for the identity."""
+        values, still = self._module._values(dict(self._parameters)), self._module._identity(1)
+        gauge = None if self._gauge is None else np.broadcast_to(self._gauge, (1, len(self._module.GAUGE)))
+        rate = self._module._rates(values, self._x, gauge)
+        begun = still if first is None else first[np.newaxis]
+        self._turned = Turned(begun, self._now(), still, np.zeros_like(still), rate)
 
     def advance(self, h: float, steps: int) -> None:
         """See `Session`."""
@@ -90,6 +129,7 @@ class NumpySession:
         twin = NumpySession(self._module, self._parameters, self._x, self._carry, self._gauge, self._t)
         twin._counted, twin._passed = self._counted, self._passed
         twin.steps, twin._h, twin._stages, twin._memory = self.steps, self._h, self._stages, list(self._memory)
+        twin._turned = self._turned
         return twin
 
     def saved(self) -> bytes:
@@ -99,7 +139,9 @@ class NumpySession:
         memory = np.array(self._memory)
         clock: dict[str, Any] = {"t": self._t, "counted": self._counted, "h": self._h, "steps": self.steps}
         clock["passed"] = np.array(self._passed)
-        np.savez(buffer, x=self._x, carry=self._carry, memory=memory, gauge=gauge, allow_pickle=False, **clock)
+        turned = {} if self._turned is None else self._turned.arrays()
+        arrays = {"x": self._x, "carry": self._carry, "memory": memory, "gauge": gauge, **turned}
+        np.savez(buffer, allow_pickle=False, **arrays, **clock)
         return buffer.getvalue()
 
     @classmethod
@@ -109,6 +151,7 @@ class NumpySession:
             gauge = stored["gauge"] if stored["gauge"].size else None
             session = cls(module, parameters, stored["x"], stored["carry"], gauge)
             session.steps = int(stored["steps"])
+            session._turned = Turned.from_arrays(stored) if "first" in stored else None
             if np.isfinite(stored["h"]):
                 session._prepare(float(stored["h"]))
                 session._memory = [(pair[0], pair[1]) for pair in stored["memory"]]
@@ -150,6 +193,11 @@ class NumpySession:
                     raise BackendError("NOT_FINITE", self.steps, self._x.copy())
                 passed = self._module._sum(*passed, elapsed)
             self._passed = passed
+        if self._turned is not None:
+            element, lost = self._turned.element, self._turned.lost
+            for made in stages:
+                element, lost = self._module._turn_stage(*made, element, lost)
+            self._turned = self._turned._replace(element=element, lost=lost)
         self._x, self._carry, self._memory = x, carry, memory
         self.steps += 1
 
@@ -176,14 +224,19 @@ class NumpySolver:
         """See `phigen.runtime.backend.Backend`."""
         return str(self.module.__file__)
 
-    def start(self, x0: Floats, parameters: Mapping[str, float], t0: float = 0.0) -> NumpySession:
+    def start(
+        self, x0: Floats, parameters: Mapping[str, float], t0: float = 0.0, first: Floats | None = None
+    ) -> NumpySession:
         """See `phigen.runtime.backend.Backend`."""
         x = x0[np.newaxis].copy()
         self._expect_admissible(x, parameters)
         gauge = self._gauge
         if gauge is None and self.module.GAUGE:
             gauge = self.module.gauge(x0, **parameters)
-        return NumpySession(self.module, parameters, x, np.zeros_like(x), gauge, t0)
+        session = NumpySession(self.module, parameters, x, np.zeros_like(x), gauge, t0)
+        if self.interface.attitude:
+            session.turn_from(first)
+        return session
 
     def restored(self, saved: bytes, parameters: Mapping[str, float]) -> NumpySession:
         """See `phigen.runtime.backend.Backend`."""

@@ -31,6 +31,10 @@ class Retrying:
         """See `Session`."""
         return self.session.time()
 
+    def element(self) -> Floats:
+        """See `Session`."""
+        return self.session.element()
+
     def advance(self, h: float, steps: int) -> None:
         """Make so many steps."""
         target = self.steps + steps

@@ -55,6 +55,10 @@ class Session(Course, Protocol):
         """A copy of a session that stands at its start, moved to ``x`` (DIM,): what it holds fixed stays."""
         ...
 
+    def element(self) -> Floats:
+        """A copy of the numbers of the attitude, and of the position; none if they are not followed."""
+        ...
+
     def saved(self) -> bytes:
         """All there is to know, for `Backend.restored`."""
         ...

@@ -16,7 +16,7 @@ from phigen.runtime.interface import BackendError, Floats, Interface, MissingExt
 from phigen.runtime.retrying import Retrying
 from phigen.runtime.session import Session, rows_along
 from phigen.runtime.timed import along_until, states_at
-from phigen.runtime.trajectory import Trajectory
+from phigen.runtime.trajectory import Trajectory, turned_into
 
 _ADVICE = {
     "NO_CONVERGENCE": "the inner iteration did not converge; a smaller step helps",
@@ -27,10 +27,14 @@ _ADVICE = {
 
 @dataclass(frozen=True)
 class Marks:
-    """Where the rows of a trajectory are: in τ, and in the time that has ``passed`` if steps are equal in τ."""
+    """Where the rows of a trajectory are: in τ, and in the time that has ``passed`` if steps are equal in τ.
+
+    ``turned`` are the numbers of their attitudes and positions.
+    """
 
     tau: Floats
     passed: Floats
+    turned: Floats
     steps: int
     retried: tuple[int, ...] = ()
 
@@ -78,6 +82,8 @@ class Solver:
         until: float | None = None,
         retry: int = 0,
         t0: float | None = None,
+        attitude0: ArrayLike | None = None,
+        position0: ArrayLike | None = None,
         progress: Progress | None = None,
         parameters: Mapping[str, float] | None = None,
         **more: float,
@@ -87,22 +93,25 @@ class Solver:
         A negative ``h`` goes back in time. ``t0`` is the time of ``x0``, 0 by default, for Hamiltonians that depend on
         the time. With ``until`` in place of ``steps``, the last step is the part of one that ends at that time. A step
         that fails is made in 2, 4, …, 2**retry equal parts; then it is another map than the others, as Poisson as they
-        are, on the same leaf. ``progress`` is called now and then with the number of steps done.
+        are, on the same leaf. ``attitude0`` and ``position0`` are those at the start, the identity and the origin by
+        default, for systems that reconstruct them. ``progress`` is called now and then with the number of steps done.
         Raises `StepError`, whose ``trajectory`` ends with the state before the failing step.
         """
         begin = arguments.start_time(t0, self.interface, more)
         values = self._values(parameters, more)
         start, h = arguments.state(x0, "x0", self.interface), arguments.step_size(h)
         stride, retry = arguments.count(stride, "stride", 1), arguments.count(retry, "retry", 0)
-        course = Retrying(self._started(start, h, values, begin), retry)
-        passed = dict[int, float]()
+        first = arguments.first(attitude0, position0, self.interface)
+        course = Retrying(self._started(start, h, values, begin, first), retry)
+        passed, elements = dict[int, float](), dict[int, Floats]()
 
         def see(row: int) -> None:
-            passed[row] = course.time()
+            passed[row], elements[row] = course.time(), course.element()
 
         def made(states: Floats, done: int) -> Trajectory:
             tau: Floats = h * row_steps(done, stride).astype(np.float64)
-            marks = Marks(tau, np.array(list(passed.values())), done, tuple(course.retried))
+            turned = np.array(list(elements.values()))
+            marks = Marks(tau, np.array(list(passed.values())), turned, done, tuple(course.retried))
             return self._trajectory(states, marks, h, values, begin)
 
         if (steps is None) == (until is None):
@@ -120,14 +129,15 @@ class Solver:
         self, course: Retrying, h: float, span: float, stride: int, values: dict[str, float], t0: float
     ) -> Trajectory:
         """`integrate` for a span of time."""
-        seen: list[tuple[Floats, float, float, int]] = []
+        seen: list[tuple[Floats, float, float, Floats, int]] = []
 
         def see(at: Retrying, tau: float) -> None:
-            seen.append((at.state(), tau, at.time(), at.steps))
+            seen.append((at.state(), tau, at.time(), at.element(), at.steps))
 
         def made() -> Trajectory:
-            x, tau, passed, steps = zip(*seen, strict=True)
-            return self._trajectory(np.array(x), Marks(np.array(tau), np.array(passed), steps[-1]), h, values, t0)
+            x, tau, passed, turned, steps = zip(*seen, strict=True)
+            marks = Marks(np.array(tau), np.array(passed), np.array(turned), steps[-1])
+            return self._trajectory(np.array(x), marks, h, values, t0)
 
         try:
             along_until(course, h, span, stride, see)
@@ -319,6 +329,7 @@ class Solver:
     def _trajectory(self, x: Floats, marks: Marks, h: float, parameters: dict[str, float], t0: float) -> Trajectory:
         casimirs = self.backend.casimirs(x, parameters)
         t = marks.passed if self.interface.monitored else t0 + marks.tau
+        attitude, position = turned_into(self.interface, marks.turned)
         return Trajectory(
             tau=marks.tau if self.interface.monitored else t,
             retried=marks.retried,
@@ -331,11 +342,15 @@ class Solver:
             h=h,
             parameters=parameters,
             coordinates=self.interface.coordinates,
+            attitude=attitude,
+            position=position,
         )
 
-    def _started(self, start: Floats, h: float, values: Mapping[str, float], t0: float) -> Session:
+    def _started(
+        self, start: Floats, h: float, values: Mapping[str, float], t0: float, first: Floats | None = None
+    ) -> Session:
         try:
-            return self.backend.start(start, values, t0)
+            return self.backend.start(start, values, t0, first)
         except BackendError as error:
             raise self.failure(error, h, None, values) from error
 

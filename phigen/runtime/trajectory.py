@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -10,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from phigen.runtime.interface import Floats
+from phigen.runtime.interface import Floats, Interface
 from phigen.runtime.tables import Column, write
 from phigen.targets.names import identifiers
 from phigen.targets.reserved import Reserved
@@ -30,7 +31,8 @@ class Trajectory:
     ``t`` (rows,), ``x`` (rows, DIM), ``energy`` (rows,): H of the rows, and ``casimirs``: name → (rows,).
     ``steps`` were made with step size ``h``; the rows are those of every stride-th step and of the last. With a monitor
     h is a step in τ, and ``tau`` (rows,) its values; else that is t. ``retried`` are the numbers of the steps that were
-    made in parts.
+    made in parts. ``attitude`` (rows, 4), a quaternion (w, x, y, z), or (rows, n, n), and ``position`` (rows, 3)
+    are there if the spec asks for them.
     """
 
     t: Floats
@@ -41,6 +43,8 @@ class Trajectory:
     h: float
     parameters: Mapping[str, float]
     coordinates: tuple[str, ...]
+    attitude: Floats | None = None
+    position: Floats | None = None
     tau: Floats = field(default_factory=lambda: np.empty(0))
     retried: tuple[int, ...] = ()
     solver: Solver | None = field(default=None, repr=False)
@@ -126,6 +130,15 @@ class Trajectory:
         """What a ``.npz`` holds beside the columns."""
         about = {"coordinates": np.array(self.coordinates), "steps": self.steps, "h": self.h}
         return {**about, **{f"parameter_{name}": value for name, value in self.parameters.items()}}
+
+
+def turned_into(interface: Interface, elements: Floats) -> tuple[Floats | None, Floats | None]:
+    """Attitudes (rows, …) and positions (rows, 3) of rows of their numbers; None for what is not followed."""
+    if not interface.attitude:
+        return None, None
+    size = math.prod(interface.attitude)
+    attitude = elements[:, :size].reshape(len(elements), *interface.attitude)
+    return attitude, elements[:, size:] if interface.position else None
 
 
 def trajectory_columns(coordinates: tuple[str, ...], casimirs: tuple[str, ...]) -> list[Column]:

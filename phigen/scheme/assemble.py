@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
+from phigen.attitude.group import Group
 from phigen.geometry.shapes import LogCanonical
 from phigen.geometry.system import System
 from phigen.realisations.protocol import BiRealisation
+from phigen.scheme.attitude import expect_element, stage_attitude
 from phigen.scheme.discretisation import MOST_OPERATIONS, Discretisation, too_large
 from phigen.scheme.gauge import Gauge, Gauged, free_gauge
 from phigen.scheme.generating import GeneratingFunction
@@ -46,6 +48,7 @@ def build_program(
     gauged: Gauged,
     scheme: Discretisation,
     *,
+    group: Group | None = None,
     solver: SolverOptions | None = None,
     extras: Extras = NO_EXTRAS,
     title: str = "",
@@ -55,10 +58,14 @@ def build_program(
 ) -> Program:
     """The solver of a system as a program. LimitError if a kernel exceeds `MOST_OPERATIONS`."""
     solver = solver or SolverOptions()
-    gauge = gauged.gauge
+    gauge, attitude = gauged.gauge, None
+    if group:
+        expect_element(system, realisation)
+        attitude = stage_attitude(system, group, realisation, scheme.generating, gauge)
     lanes = solver.lanes and extras.offers("lanes", profile)
     elapsed = elapsed_kernel(system, scheme.generating)
     step = _step(system, realisation, scheme.generating, gauge, solver, extras, lanes=lanes)
+    attitude = scheme.generating.coefficients.settled(attitude)
     modified, count = None, extras.modified_hamiltonian
     if count:
         modified = modified_of(system, realisation, order, gauge, count, len(scheme.fractions))
@@ -85,6 +92,7 @@ def build_program(
         gauge=free_gauge(system, gauged),
         monitor=Monitor(rate_kernel(system, gauge.monitor), elapsed) if gauge.monitor else None,
         modified=modified,
+        attitude=attitude,
         extras=extras,
         lanes=solver.lanes,
         profile=profile,

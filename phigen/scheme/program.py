@@ -12,6 +12,7 @@ from fractions import Fraction
 from itertools import accumulate, pairwise
 
 from phigen._version import __version__
+from phigen.attitude.group import Group
 from phigen.scheme.kernel import Kernel
 from phigen.scheme.steps import Step
 from phigen.spec.model import NO_EXTRAS, Extras, Parameter
@@ -67,6 +68,35 @@ class Modified:
 
 
 @dataclass(frozen=True)
+class Attitude:
+    """The group element that each stage, or each flow, is the action of.
+
+    ``turn`` is that of an implicit stage as a function of the solved y, ``along`` as one of p, ``turns`` are those of
+    the flows of a splitting. For quaternions an element is what `phigen.attitude.elements` has; for matrices the
+    generator P, of which the element is exp(P), or its Cayley transform. ``rate`` is the gradient of the Casimirs that
+    were taken from H: the body turns by them too, without moving x.
+    """
+
+    group: Group
+    cayley: bool
+    turn: Kernel | None = None
+    along: Kernel | None = None
+    turns: tuple[Kernel, ...] = ()
+    rate: Kernel | None = None
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """The shape of an attitude as an array."""
+        rows = len(self.group.matrices[0]) if self.group.matrices else 0
+        return (rows, rows) if rows else (4,)
+
+    @property
+    def kernels(self) -> tuple[Kernel, ...]:
+        """All kernels, each once."""
+        return tuple(k for k in (self.turn, self.along, *self.turns, self.rate) if k is not None)
+
+
+@dataclass(frozen=True)
 class Program:
     """A solver, ready to be printed.
 
@@ -89,6 +119,7 @@ class Program:
     gauge: FreeGauge | None = None
     monitor: Monitor | None = None
     modified: Modified | None = None
+    attitude: Attitude | None = None
     extras: Extras = NO_EXTRAS
     lanes: bool = True
     profile: str = "fast"
@@ -135,4 +166,6 @@ class Program:
         seen = self.observables
         modified = (self.modified.kernel,) if self.modified else ()
         timed = [k for k in (self.monitor.elapsed, self.monitor.rate) if k] if self.monitor else []
-        return (*self.step.kernels, *timed, *modified, seen.energy, seen.casimirs, seen.vector_field, *self.choice)
+        turned = self.attitude.kernels if self.attitude else ()
+        observed = (seen.energy, seen.casimirs, seen.vector_field)
+        return (*self.step.kernels, *turned, *timed, *modified, *observed, *self.choice)

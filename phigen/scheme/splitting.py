@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 
+from phigen.attitude.group import Group
 from phigen.errors import Diagnostic, SpecError
 from phigen.geometry.system import System
+from phigen.scheme.attitude import flow_attitude
 from phigen.scheme.choosing import Choice
 from phigen.scheme.discretisation import MOST_OPERATIONS, too_large
 from phigen.scheme.gathering import gather
@@ -31,6 +33,7 @@ def build_splitting(
     choice: Choice,
     gauge: Gauge,
     *,
+    group: Group | None = None,
     extras: Extras = NO_EXTRAS,
     title: str = "",
     licence: str = "0BSD",
@@ -50,6 +53,7 @@ def build_splitting(
         for k, flow in enumerate(flows, 1)
         if extras.tangent
     )
+    attitude = flow_attitude(system, group, splitting.flows, gauge, coefficients) if group else None
     refresh = coefficients.refresh(t=system.times)
     prepare = Kernel(
         "prepare",
@@ -80,6 +84,7 @@ def build_splitting(
         order=choice.order.order,
         step=step,
         observables=observables(system),
+        attitude=attitude,
         extras=extras,
         lanes=lanes,
         profile=profile,

@@ -28,6 +28,7 @@ from phigen.spec.names import (
     PARTS,
     PLANNED,
     PROFILES,
+    RECONSTRUCTIONS,
     SCHEMES,
     SPEC_NAME,
 )
@@ -281,6 +282,11 @@ SPEC = Record(
             Integer(0, limits.CORRECTIONS, limit=True),
             "also generate the modified Hamiltonian, with so many correction terms",
             default=0,
+        ),
+        Field(
+            "reconstruct",
+            Choice(RECONSTRUCTIONS),
+            "on the dual of a Lie algebra: also the attitude, as a quaternion (se(3): with the position) or a matrix",
         ),
         Field("targets", ListOf(Choice(tuple(TARGETS)), least=1), "languages of the generated code"),
         Field("runs", MapOf(RUN_NAME, RUN), "named experiments"),

@@ -274,6 +274,7 @@ class Spec:
     profile: str = "fast"
     solver: SolverOptions = SolverOptions()
     extras: Extras = NO_EXTRAS
+    reconstruct: str = ""  # quaternion, matrix: the attitude beside the state
     targets: tuple[str, ...] = DEFAULT
     runs: Mapping[str, Run] = field(default_factory=dict)
     lattice: Lattice | None = None

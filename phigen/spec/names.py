@@ -14,7 +14,7 @@ SPEC_NAME = r"[a-z][a-z0-9_]{0,30}"
 IDENTIFIER = r"[A-Za-z_][A-Za-z0-9_]*"
 
 #: Parameters are passed by keyword beside these arguments of the generated functions.
-ARGUMENTS = frozenset(["x", "x0", "X0", "h", "steps", "stride", "gauge"])
+ARGUMENTS = frozenset(["x", "x0", "X0", "h", "steps", "stride", "gauge", "attitude0", "position0"])
 #: The same, where there is a time.
 TIMED_ARGUMENTS = ARGUMENTS | {"t", "t0"}
 ARGUMENT_HINT = "it is the name of an argument of the generated functions"
@@ -78,6 +78,9 @@ PROFILES = ("fast", "small")
 #: What can be left out of the code one by one; the profile small leaves out all but the first.
 PARTS = ("ensemble", "gauge-search", "lanes", "recurrences")
 LEFT_OUT = {"fast": frozenset[str](), "small": frozenset(PARTS[1:])}
+
+#: How attitudes are given.
+RECONSTRUCTIONS = ("quaternion", "matrix")
 
 FLOW_COMPOSITIONS = ("blanes-moan", "blanes-moan-rkn", "nystrom", "force-gradient")
 COMPOSITIONS = (

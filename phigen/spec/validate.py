@@ -85,6 +85,7 @@ def _parts(raw: Mapping[str, Any], declared: Declarations) -> dict[str, Any]:
             raw.get("modified_hamiltonian", 0),
             frozenset(without_repetition(raw.get("without", ()), ("without",), declared)),
         ),
+        "reconstruct": raw.get("reconstruct", ""),
         "runs": {n: run(n, r, declared) for n, (_, r) in raw.get("runs", {}).items() if r is not None},
         "lattice": lattice,
         "title": raw.get("title", ""),

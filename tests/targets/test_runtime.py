@@ -81,9 +81,16 @@ def test_each_file_of_lattices_compiles_by_itself(name, tmp_path):
 )
 def test_each_file_of_the_runtime_compiles_by_itself(path, tmp_path):
     kinds = {"packs.c": "SPLITTING", "explicit.c": "EXPLICIT", "path.c": "PATH", "path_lanes.c": "PATH"}
+    own = {"gauge.c": ["GAUGE"], "level.c": ["GAUGE"], "attitude.c": ["ATTITUDE"]}
     kind = kinds.get(path.name, "NEWTON")
-    switches = defined((kind, "FAST", "TANGENT", *(["GAUGE"] if path.name in ("gauge.c", "level.c") else [])))
+    switches = defined((kind, "FAST", "TANGENT", *own.get(path.name, ())))
     run([tool("gcc"), *STRICT, "-fsyntax-only", *switches, *INCLUDED, path], tmp_path)
+
+
+@pytest.mark.parametrize("more", [(), ("SPATIAL",), ("MATRICES",), ("MATRICES", "SPATIAL")], ids=" ".join)
+def test_attitudes_compile_with_every_kind_of_group(more, tmp_path):
+    switches = defined(("NEWTON", "COMPOSED", "FAST", "ATTITUDE", *more))
+    run([tool("gcc"), *STRICT, "-fsyntax-only", *switches, *INCLUDED, RUNTIME / "runtime.c"], tmp_path)
 
 
 def test_one_stage_leaves_no_loops_over_stages():

@@ -12,7 +12,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from phigen.lanes.lowering import Blocks, Lanes, Rows, in_lanes
 from phigen.scheme.kernel import Kernel
 from phigen.scheme.path import Recurrences
-from phigen.scheme.program import Program
+from phigen.scheme.program import Attitude, Program
 from phigen.scheme.steps import Explicit, Implicit, Path, Splitting, Sweeps
 from phigen.spec.model import Parameter
 from phigen.targets.c import functions, paths, splitting, sweeps
@@ -115,6 +115,7 @@ def _declarations(program: Program, lanes: Lanes | None, has: Mapping[str, bool]
     if program.held:
         whose = f"Casimirs whose multiples are taken from H: {', '.join(program.held)}"
         sizes.append(("GAUGES", len(program.held), "that a trajectory holds fixed: e" if program.monitor else whose))
+    sizes += _of_attitude(program.attitude) if program.attitude else []
     if has["RECURRENCES"]:
         memory = remembered(program, lanes)
         sizes.append(("REMEMBERED", memory["REMEMBERED"], "values that a recurrence is fitted to"))
@@ -135,6 +136,17 @@ def _declarations(program: Program, lanes: Lanes | None, has: Mapping[str, bool]
         or [("char unused;", "this system has no parameters")],
         "sizes": sizes,
     }
+
+
+def _of_attitude(attitude: Attitude) -> Sizes:
+    group, rate = attitude.group, attitude.rate
+    rows = len(group.matrices[0]) if group.matrices else 0
+    shown = f"numbers of an attitude, a matrix of {rows} rows" if rows else "numbers of an attitude, a quaternion"
+    sizes = [("ATTITUDE_SIZE", rows**2 or 4, shown)]
+    position = ", with the position" * bool(group.translation)
+    sizes.append(("ELEMENT", group.size, f"numbers of an element of the group{position}"))
+    sizes += [("ROWS_OF_ATTITUDE", rows, "of a matrix")] if rows else []
+    return sizes + ([("RATE", len(rate.roots), "numbers of what the Casimirs turn")] if rate else [])
 
 
 def _about(parameter: Parameter, member: str) -> str:
@@ -182,6 +194,7 @@ def _model(program: Program, lanes: Lanes | None, has: Mapping[str, bool], other
     own += program.choice
     own += [program.monitor.elapsed] if program.monitor else []
     own += [step.tangent] if isinstance(step, Explicit) else []
+    own += [program.attitude.turn, program.attitude.rate] if program.attitude else []
     body += [function(program, kernel) for kernel in own if kernel]
     body.append(function(program, seen.energy, name="hamiltonian", exported=True, returning=True))
     body += [function(program, kernel, exported=True) for kernel in (seen.casimirs, seen.vector_field)]

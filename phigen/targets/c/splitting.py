@@ -24,13 +24,19 @@ def printed(program: Program, step: Splitting) -> str:
     """The flows, and one step."""
     found = [function(program, replace(step.prepare, name="prepare_row"))]
     found += [function(program, step.refresh)] if step.refresh else []
+    more = f", double element[{program.name}_ELEMENT], double lost[{program.name}_ELEMENT]" if program.attitude else ""
     for k, flow in enumerate(step.flows, 1):
         kernel, values = _flow(program, flow, k)
         found.append(function(program, kernel, functions=_functions(program)))
+        turn = program.attitude.turns[k - 1] if program.attitude else None
+        turned = turn is not None and any(not e.is_zero for e in turn.roots)
+        found += [function(program, turn, functions=_functions(program))] if turn and turned else []
+        values |= {"turned": turned, "more": more, "still": turn is not None and not turned}
         found.append(render("c", "flow.c", values))
     along = _along(program)
     arguments = f"const double *coef, double x[{along}], double moved[{along}], const double start[{along}]"
-    found.append(_steps(program, step, "", "inline ", arguments, "x, moved, start"))
+    passed = "x, moved, start" + ", element, lost" * bool(program.attitude)
+    found.append(_steps(program, step, "", "inline ", arguments + more, passed))
     return "\n".join(found)
 
 

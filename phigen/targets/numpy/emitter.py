@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from phigen.scheme.kernel import SCALARS, Kernel
-from phigen.scheme.program import Program
+from phigen.scheme.program import Attitude, Program
 from phigen.scheme.staging import NOW, TABLE
 from phigen.scheme.steps import (
     LONGEST_PATH,
@@ -84,6 +84,8 @@ def _body(program: Program) -> str:
     pieces += [render("numpy", "observables.py", _values(program))]
     if program.extras.tangent:
         pieces += _tangent(program)
+    if program.attitude:
+        pieces += _attitude(program, program.attitude)
     if program.modified:
         values = {
             "modified_power": program.modified.power,
@@ -163,6 +165,56 @@ def _tangent(program: Program) -> list[str]:
     pieces = [_function(program, kernel) for kernel in kernels]
     pieces += [render("numpy", f"tangent_{part}.py", values) for part in parts]
     return [*pieces, render("numpy", "tangent.py", values)]
+
+
+def _attitude(program: Program, attitude: Attitude) -> list[str]:
+    """Attitudes: the kernels, and their use."""
+    group, step = attitude.group, program.step
+    rows = len(group.matrices[0]) if group.matrices else 0
+    shown = f"Attitudes have shape (rows, ..., {rows}, {rows})" if rows else "Attitudes have shape (rows, ..., 4)"
+    values = {
+        **_values(program),
+        "size": group.size,
+        "what": f"matrix of {rows} rows" if rows else "quaternion" + " and a position" * bool(group.translation),
+        "rows": rows,
+        "position": bool(group.translation),
+        "cayley": attitude.cayley,
+        "normalise": group.orthogonal,
+        "splitting": isinstance(step, Splitting),
+        "rates": f"_rate(parameters, {'gauge.T, ' * bool(program.gauge)}x)" if attitude.rate else "None",
+        "turn_of_stage": "_along(solved)" if isinstance(step, Path) else "_turn(stage[0], x + solved)",
+        "shaped": _shaped(rows, bool(group.translation)),
+        **_ordered(group.spatial),
+        "shapes": shown + ", positions (rows, ..., 3)" * bool(group.translation),
+    }
+    turns = "TURNS = (" + ", ".join(f"_turn{k}" for k in range(1, len(attitude.turns) + 1)) + ",)\n"
+    unused = attitude.turn if attitude.along else attitude.along
+    pieces = [_function(program, kernel) for kernel in attitude.kernels if kernel is not unused]
+    pieces += [turns] if attitude.turns else []
+    own = ("matrices", "matrix_start") if rows else ("quaternions", "rotations", "start")
+    parts = [*(f"attitude_{part}" for part in own), "attitude", "reconstruct"]
+    return [*pieces, *(render("numpy", f"{part}.py", values) for part in parts)]
+
+
+def _shaped(rows: int, position: bool) -> str:
+    """The arrays that users get of rows of elements."""
+    if rows:
+        return f"elements.reshape(shape + ({rows}, {rows}))"
+    if not position:
+        return "elements.reshape(shape + (4,))"
+    return "elements[..., :4].reshape(shape + (4,)), elements[..., 4:].reshape(shape + (3,))"
+
+
+def _ordered(spatial: bool) -> dict[str, str]:
+    """Factors of products: later ones stand on the left where momenta are in space."""
+    pairs = {
+        "uniform_first": ("first", "_uniform(rate, t)"),
+        "element_first": ("first", "element"),
+        "factor_element": ("element", "factor"),
+        "quaternions": ("element[..., :4]", "turn[..., :4]"),
+    }
+    moved = "turn + np.eye(1, ELEMENT), element[..., 4:]" if spatial else "element, turn[..., 4:]"
+    return {"moved": moved} | {name: ", ".join(p[::-1] if spatial else p) for name, p in pairs.items()}
 
 
 def _values(program: Program) -> dict[str, object]:

@@ -220,6 +220,31 @@ static int phi_elapse(const phi_solver *s, phi_table *table, phi_models *models,
 }
 
 #endif
+#if PHI_ATTITUDE
+/* The elements of a stage in all lanes, each to its place in the sequence. */
+static void phi_take_stage(phi_lanes turns[PHI_ELEMENT], int stage, double sequence[][PHI_ELEMENT])
+{
+    for (int lane = 0; lane < PHI_LANES; ++lane)
+#if PHI_COMPOSED
+        for (int i = 0; i < PHI_ELEMENT; ++i) sequence[PHI_STAGES * lane + stage][i] = turns[i][lane];
+#else
+        for (int i = 0; i < PHI_ELEMENT; ++i) sequence[lane][i] = turns[i][lane];
+#endif
+}
+
+/* The elements of a block that was solved, one after the other. */
+static void phi_turn_block(phi_solver *s, phi_table *table, phi_models *models)
+{
+    phi_lanes turns[PHI_ELEMENT];
+    double sequence[PHI_STAGES * PHI_LANES][PHI_ELEMENT];
+    for (int stage = 0; stage < PHI_STAGES; ++stage) {
+        phi_turn_lanes(table->coef[stage], models->stage[stage].y, turns);
+        phi_take_stage(turns, stage, sequence);
+    }
+    phi_turn_sequence(s, sequence, PHI_STAGES * PHI_LANES);
+}
+
+#endif
 /* PHI_LANES steps at once: guess the points of all, and correct them together until the error that remains is as
    small as after a single step. How many passes that took; 0, and the solver as before, where it takes more than most. */
 static int phi_block(phi_solver *s, phi_table *table, int most)
@@ -261,6 +286,9 @@ static int phi_block(phi_solver *s, phi_table *table, int most)
         for (int stage = 0; stage < PHI_STAGES; ++stage) phi_pass(s, elapsed[stage][0][lane]);
 #endif
     phi_count(s, PHI_LANES);
+#if PHI_ATTITUDE
+    phi_turn_block(s, table, &models);
+#endif
     for (int stage = 0; stage < PHI_STAGES; ++stage) {
         phi_history *history = &s->history[stage];
         phi_record_lanes(history, models.stage[stage].y);
@@ -330,7 +358,11 @@ static void phi_learn_from(phi_solver *s, int passes)
 static phi_status phi_single(phi_solver *s)
 {
     const size_t before = s->evaluations;
+#if PHI_ATTITUDE
+    const phi_status status = phi_unread_step(s, s->h);
+#else
     const phi_status status = phi_step(s, s->h);
+#endif
 #if PHI_COMPOSED
     const double evaluations = (double)(s->evaluations - before) / (double)PHI_STAGES;
 #else
@@ -360,6 +392,9 @@ phi_status phi_integrate(phi_solver *s, double h, size_t steps)
             if (status == PHI_OK) --steps;
         }
     }
+#if PHI_ATTITUDE
+    if (s != NULL) phi_read_attitude(s);
+#endif
     return status;
 }
 #endif

@@ -18,6 +18,9 @@ static phi_status phi_stage(phi_solver *s, int stage)
 }
 
 #else
+#if PHI_ATTITUDE
+#include "attitude.c"
+#endif
 #include "flows.h"
 
 /* The coefficients of all flows of a step: a row for each time. */
@@ -67,11 +70,25 @@ static phi_status phi_stages(phi_solver *s)
     double x[PHI_DIM], moved[PHI_DIM];
     memcpy(x, s->x, sizeof x);
     memcpy(moved, s->carry, sizeof moved);
+#if PHI_ATTITUDE
+    double turned[PHI_ELEMENT], lost[PHI_ELEMENT];
+    memcpy(turned, s->turned, sizeof turned);
+    memcpy(lost, s->turned_carry, sizeof lost);
+    phi_flows(s->coef[0], x, moved, s->x, turned, lost);
+#if PHI_NORMALISE
+    phi_normalise(turned, lost);
+#endif
+#else
     phi_flows(s->coef[0], x, moved, s->x);
+#endif
     ++s->evaluations;
     for (int i = 0; i < PHI_DIM; ++i)
         if (!isfinite(x[i])) return PHI_NOT_FINITE;
     phi_settle(s->x, s->carry, moved);
+#if PHI_ATTITUDE
+    memcpy(s->turned, turned, sizeof turned);
+    memcpy(s->turned_carry, lost, sizeof lost);
+#endif
     return PHI_OK;
 }
 

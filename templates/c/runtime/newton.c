@@ -6,6 +6,9 @@
 
 #include "algebra.c"
 #include "implicit.c"
+#if PHI_ATTITUDE
+#include "attitude.c"
+#endif
 #include "model.h"
 
 /* ---- The implicit step, by Newton's method ---- */
@@ -84,6 +87,9 @@ static phi_status phi_attempt(phi_solver *s, int stage)
         phi_remember(&s->history[stage], y, iteration);
 #else
         phi_remember(&s->history[stage], y);
+#endif
+#if PHI_ATTITUDE
+        phi_turn_stage(s, stage, y);
 #endif
         return PHI_OK;
     }

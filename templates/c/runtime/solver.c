@@ -11,6 +11,9 @@
 #else
 #include "explicit.c"
 #endif
+#if PHI_ATTITUDE
+#include "attitude.c"
+#endif
 #if PHI_MONITOR
 #include "level.c"
 #elif PHI_GAUGE
@@ -69,6 +72,13 @@ phi_status phi_init(phi_solver *s, const phi_params *params, const double x0[PHI
 #if PHI_MONITOR
     const double rate = phi_monitor(&fresh.params, fresh.x);
     if (!isfinite(rate) || !(rate > 0.0)) return PHI_BAD_ARGUMENT;
+#endif
+#if PHI_ATTITUDE
+    double identity[PHI_ELEMENT] = { 1.0 };
+#if PHI_MATRICES
+    for (int i = 0; i < PHI_ELEMENT; i += PHI_ROWS_OF_ATTITUDE + 1) identity[i] = 1.0;
+#endif
+    phi_begin_attitude(&fresh, identity);
 #endif
     *s = fresh;
     return PHI_OK;
@@ -167,10 +177,19 @@ static phi_status phi_stages(phi_solver *s)
 #endif
     memcpy(x, s->x, sizeof x);
     memcpy(carry, s->carry, sizeof carry);
+#if PHI_ATTITUDE
+    double turned[PHI_ELEMENT], turned_carry[PHI_ELEMENT];
+    memcpy(turned, s->turned, sizeof turned);
+    memcpy(turned_carry, s->turned_carry, sizeof turned_carry);
+#endif
     for (int stage = 0; stage < PHI_STAGES && status == PHI_OK; ++stage) status = phi_stage(s, stage);
     if (status != PHI_OK) {
         memcpy(s->x, x, sizeof x);
         memcpy(s->carry, carry, sizeof carry);
+#if PHI_ATTITUDE
+        memcpy(s->turned, turned, sizeof turned);
+        memcpy(s->turned_carry, turned_carry, sizeof turned_carry);
+#endif
 #if PHI_MONITOR
         s->t = t;
         s->t_carry = t_carry;
@@ -181,7 +200,12 @@ static phi_status phi_stages(phi_solver *s)
 
 #endif
 #if PHI_BLOCKS
+#if PHI_ATTITUDE
+/* One step; s->attitude is left to phi_read_attitude. */
+static phi_status phi_unread_step(phi_solver *s, double h)
+#else
 phi_status phi_step(phi_solver *s, double h)
+#endif
 {
     phi_status status = phi_set_step(s, h);
     if (status != PHI_OK) return status;
@@ -197,6 +221,15 @@ phi_status phi_step(phi_solver *s, double h)
     return status;
 }
 
+#if PHI_ATTITUDE
+phi_status phi_step(phi_solver *s, double h)
+{
+    const phi_status status = phi_unread_step(s, h);
+    if (status == PHI_OK) phi_read_attitude(s);
+    return status;
+}
+
+#endif
 #else
 phi_status phi_integrate(phi_solver *s, double h, size_t steps)
 {
@@ -217,6 +250,9 @@ phi_status phi_integrate(phi_solver *s, double h, size_t steps)
 #else
         s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
     }
+#endif
+#if PHI_ATTITUDE
+    if (s != NULL) phi_read_attitude(s);
 #endif
     return status;
 }

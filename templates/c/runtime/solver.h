@@ -70,6 +70,22 @@ typedef struct {
 #else
     double coef[PHI_STAGES][PHI_COEFFICIENTS]; /* all that depends on params and h only */
 #endif
+#if PHI_ATTITUDE
+#if PHI_MATRICES
+    double attitude[PHI_ATTITUDE_SIZE]; /* a matrix, row by row; change it only through phi_set_attitude */
+#else
+    double attitude[PHI_ATTITUDE_SIZE]; /* the quaternion (w, x, y, z) that turns body into space; see phi_set_attitude */
+#endif
+#if PHI_POSITION
+    double position[3]; /* of the body, in space */
+#endif
+    double first[PHI_ELEMENT]; /* where the attitude began */
+    double turned[PHI_ELEMENT], turned_carry[PHI_ELEMENT]; /* the product of what steps turned it by; what rounding took */
+#if PHI_RATE_OF_GAUGE
+    double rate[PHI_RATE]; /* the gradient of the Casimirs that are taken from H: the body turns by them too */
+    double attitude_from; /* the time when the attitude began */
+#endif
+#endif
 #if !PHI_MONITOR
     size_t steps_before_h; /* steps and t when h was set: t is counted from there, so no error adds up */
     double t_before_h;
@@ -93,6 +109,21 @@ phi_status phi_init(phi_solver *s, const phi_params *params, const double x0[PHI
 #if PHI_TIMED
 /* The same at the time t0, which phi_init takes to be 0. */
 phi_status phi_init_at(phi_solver *s, const phi_params *params, const double x0[PHI_DIM], double t0);
+
+#endif
+#if PHI_ATTITUDE
+/* The attitude, from now on. phi_init begins with the identity. */
+#if PHI_MATRICES
+/* PHI_BAD_ARGUMENT where an entry is not finite. */
+#else
+/* Of any length but 0. PHI_BAD_ARGUMENT where it is not finite, or 0. */
+#endif
+#if PHI_POSITION
+/* The position may be NULL for the origin. */
+phi_status phi_set_attitude(phi_solver *s, const double attitude[PHI_ATTITUDE_SIZE], const double position[3]);
+#else
+phi_status phi_set_attitude(phi_solver *s, const double attitude[PHI_ATTITUDE_SIZE]);
+#endif
 
 #endif
 #if PHI_MONITOR
@@ -179,6 +210,12 @@ const char *phi_status_string(phi_status status);
 /* For bindings: the size of phi_solver, and its count of good steps. */
 size_t phi_solver_size(void);
 size_t phi_solver_steps_done(const phi_solver *s);
+#if PHI_ATTITUDE
+#if PHI_POSITION
+/* The attitude, then the position. */
+#endif
+void phi_attitude(const phi_solver *s, double out[PHI_ELEMENT]);
+#endif
 #if PHI_MONITOR
 double phi_solver_time(const phi_solver *s);
 #endif

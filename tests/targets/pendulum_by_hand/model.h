@@ -79,6 +79,21 @@ static void phi_prepare(const phi_params *params, double h, double *coef)
 }
 
 #endif
+#if PHI_ATTITUDE
+/* A pendulum has no attitude: these show what the runtime asks for. */
+static void phi_turn(const double *coef, const double y[2], double turn[PHI_ELEMENT])
+{
+    (void)coef;
+    for (int i = 0; i < PHI_ELEMENT; ++i) turn[i] = 0.0 * y[0];
+}
+
+static void phi_rate(const phi_params *params, const double x[2], double rate[PHI_RATE])
+{
+    (void)params;
+    for (int i = 0; i < PHI_RATE; ++i) rate[i] = 0.0 * x[0];
+}
+
+#endif
 #if PHI_NEWTON
 /* The midpoint rule: alpha and beta are y -+ half the increment. */
 static void phi_linearise(const double *coef, const double y[2], double displacement[2], double increment[2],

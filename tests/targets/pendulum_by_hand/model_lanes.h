@@ -6,6 +6,14 @@
 
 enum { PHI_SLOPE_TERMS = 8, PHI_SLOPE_SERIES = 2, PHI_SLOPE_FIXED = 1, PHI_FACTORS = 1 };
 
+#if PHI_ATTITUDE
+static void phi_turn_lanes(phi_lanes coef[], phi_lanes y[2], phi_lanes turn[PHI_ELEMENT])
+{
+    for (int i = 0; i < PHI_ELEMENT; ++i)
+        for (int lane = 0; lane < PHI_LANES; ++lane) turn[i][lane] = 0.0 * coef[0][lane] * y[0][lane];
+}
+
+#endif
 #if PHI_NEWTON
 static void phi_linearise_lanes(phi_lanes coef[], phi_lanes y[2], phi_lanes displacement[2], phi_lanes increment[2],
     phi_lanes jacobian[4], phi_lanes slope[4])

@@ -1,0 +1,115 @@
+"""Elements of the rotation group and of the group of motions, as formulas in which nothing cancels.
+
+A rotation is the unit quaternion (w, x, y, z) less 1: small numbers for small rotations. With φ as in
+`phigen.symbolic.special` and |p|² = s, exp(p/2) is the quaternion (c, p/4) divided by its length, c = 1 − φ(s/4)s/4,
+and exp(p) its square, which needs no root:
+
+    (c² − u, cp/2)/(c² + u),    u = s/16.
+
+The Cayley transform of p is (1, p/2) divided by its length. exp(p, t) translates by
+
+    (c(c² − u) t + c²/2 p×t + (c + 2c² + u − 4c³φ(s/4))/16 p (p·t))/(c² + u)²
+
+and the Cayley transform by (t + ½p×t + ¼p (p·t))/(1 + s/4).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from fractions import Fraction
+
+from phigen.symbolic.expression import ONE, ZERO, Expression, call, number, sqrt, total
+
+Vector = Sequence[Expression]
+
+_HALF = number(Fraction(1, 2))
+
+
+@dataclass(frozen=True)
+class Direction:
+    """An element before division: the quaternion ``turn`` by its ``length``, ``shift`` by the square of that.
+
+    ``factor`` is that by which ``turn`` is a multiple of the one in `with_phi`.
+    """
+
+    turn: tuple[Expression, ...]
+    shift: tuple[Expression, ...]
+    length: Expression
+    factor: Expression = ONE
+
+
+def direction(p: Vector, t: Vector, *, cayley: bool) -> Direction:
+    """exp(p, t), or its Cayley transform; ``t`` may be empty."""
+    s = dot(p, p)
+    if cayley:
+        found = with_phi(p, t, ZERO)
+        return replace(found, length=sqrt(found.length))
+    phi, u = call("phi0", s / 4), s / 16
+    c = ONE - s / 4 * phi
+    square = c**2
+    turn = (square - u, *(c / 2 * pi for pi in p))
+    factors = (c * (square - u), square / 2, (c + 2 * square + u - 4 * c * square * phi) / 16)
+    return Direction(turn, _shift(p, t, factors), square + u, c)
+
+
+def with_phi(p: Vector, t: Vector, phi: Expression) -> Direction:
+    """The same by φ(s) for any value of that, with the square of the length: ((1 − sφ), p/2). 0 makes it Cayley's."""
+    s = dot(p, p)
+    c = ONE - s * phi
+    return Direction((c, *(pi / 2 for pi in p)), _shift(p, t, (c, _HALF, (ONE - 4 * c * phi) / 4)), c**2 + s / 4)
+
+
+def _shift(p: Vector, t: Vector, factors: Vector) -> tuple[Expression, ...]:
+    """The combination of t, p×t and p (p·t)."""
+    if not t:
+        return ()
+    a, b, along = factors[0], factors[1], factors[2] * dot(p, t)
+    return tuple(a * u + b * v + along * w for u, v, w in zip(t, cross(p, t), p, strict=True))
+
+
+def element(p: Vector, t: Vector, *, cayley: bool) -> tuple[Expression, ...]:
+    """The quaternion of p less 1, and what it translates by if ``t`` is not empty."""
+    found = direction(p, t, cayley=cayley)
+    per = ONE / found.length
+    s = dot(p, p)
+    shorter = s / 4 * per / (ONE + found.length) if cayley else s / 8 * per
+    return (-shorter, *(per * v for v in found.turn[1:]), *(per**2 * a for a in found.shift))
+
+
+def rotation_by(r: Vector, t: Vector) -> tuple[Expression, ...]:
+    """exp(r), or exp(r, t), in the same form, for rotations by any angle."""
+    s = dot(r, r)
+    sine, cosine = call("sinroot", s / 16), call("cosroot", s / 16)
+    rotation = (-(s / 8) * sine**2, *(_HALF * (sine * cosine) * ri for ri in r))
+    if not t:
+        return rotation
+    once = cross(r, t)
+    versine, rest = _HALF * call("sinroot", s / 4) ** 2, call("arcroot", s)
+    return (*rotation, *(a + versine * b + rest * c for a, b, c in zip(t, once, cross(r, once), strict=True)))
+
+
+def dot(a: Vector, b: Vector) -> Expression:
+    """a·b."""
+    return total(x * y for x, y in zip(a, b, strict=True))
+
+
+def cross(a: Vector, b: Vector) -> list[Expression]:
+    """a × b."""
+    return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+
+
+def product(a: Vector, b: Vector) -> list[Expression]:
+    """The product of two quaternions."""
+    turned = cross(a[1:], b[1:])
+    return [
+        a[0] * b[0] - dot(a[1:], b[1:]),
+        *(a[0] * y + b[0] * x + z for x, y, z in zip(a[1:], b[1:], turned, strict=True)),
+    ]
+
+
+def rotated(q: Vector, v: Vector) -> list[Expression]:
+    """q v q̄: the vector rotated, and stretched by |q|²."""
+    w, u = q[0], q[1:]
+    along, size, once = dot(u, v), w**2 - dot(u, u), cross(u, v)
+    return [size * a + 2 * along * b + 2 * w * c for a, b, c in zip(v, u, once, strict=True)]

@@ -1,0 +1,267 @@
+"""What is stated of attitudes: a step leaves the momentum in the other frame as it is, and turns as H says.
+
+With x the momenta in the body, g₁ = g₀ τ and x₁ = Ad*_τ x₀, so that the momentum in space is constant; with x those
+in space g₁ = τ g₀, and that in the body is. Any element with this property would do as well with one more that fixes x,
+such as what a Casimir turns: so a second statement is about the rate, which for h → 0 must be ∇H with all Casimirs that
+were taken from it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from fractions import Fraction
+from itertools import combinations
+
+from phigen.attitude.elements import cross, direction, dot, element, product, rotated, with_phi
+from phigen.attitude.group import Group
+from phigen.attitude.parts import constancy, factor_elements, joined, turnings
+from phigen.compilation import Compilation
+from phigen.geometry.lie_algebra import LieAlgebra, Representation
+from phigen.geometry.system import System, hamiltonian_vector_field
+from phigen.realisations.cayley import trilinear
+from phigen.realisations.protocol import BiRealisation, covector_names, covector_symbols
+from phigen.scheme.program import Attitude
+from phigen.splitting.ring import KICK
+from phigen.symbolic.expression import ONE, ZERO, Expression, fold, gradient, number, rebuild, substitute, symbol, total
+from phigen.symbolic.special import SPECIAL
+from phigen.symbolic.symbols import Symbol
+from phigen.symbolic.verdict import Statement, decide_zero
+
+Vector = Sequence[Expression]
+
+#: The attitude before a step: any quaternion.
+BEFORE = tuple(symbol(Symbol("attitude", i)) for i in range(4))
+
+
+def check(compilation: Compilation) -> Iterator[Statement]:
+    """The statements about the attitude of a method."""
+    attitude, system = compilation.program.attitude, compilation.system
+    if attitude is None:
+        return
+    group = attitude.group
+    if compilation.splitting:
+        yield from _splitting_statements(compilation, group)
+    elif group.matrices:
+        yield from _matrix_statements(system, compilation.chart, attitude)
+    elif compilation.chart.path:
+        yield path_statement(system, group)
+    else:
+        chart, p = compilation.chart, covector_symbols(system.coordinates)
+        made = element([p[i] for i in group.rotation], [p[i] for i in group.translation], cayley=attitude.cayley)
+        yield from element_statements(
+            group, made, p, chart.alpha, chart.beta, cayley=attitude.cayley, positive=system.positive
+        )
+    if not compilation.splitting:
+        first = compilation.series.polynomial(1)
+        yield rate_statement(system, attitude, gradient(first.tower.expression(first.terms[0]), system.coordinates))
+
+
+def rate_statement(system: System, attitude: Attitude, slope: Vector) -> Statement:
+    """∇S_1, ``slope``, and what is put back for Casimirs, are ∇H together: in the components that turn."""
+    group, wanted = attitude.group, gradient(system.hamiltonian, system.coordinates)
+    whole = [w - s for w, s in zip(wanted, slope, strict=True)]
+    shown = group.generator(whole) if group.matrices else [whole[i] for i in (*group.rotation, *group.translation)]
+    put_back = attitude.rate.roots if attitude.rate else [ZERO] * len(shown)
+    where = "∇S_1" + " + ∇(λC)" * bool(attitude.rate)
+    residuals = [("", a - b) for a, b in zip(shown, put_back, strict=True)]
+    return decide_zero(f"ġ is that of H: {where} = ∇H", residuals, system.positive, "the attitude has the order of x")
+
+
+def path_statement(system: System, group: Group) -> Statement:
+    """Along ṁ = π(m)p with ġ = g·p, or p·g, momenta in the other frame are constant; α, β are ends of such a path."""
+    m, p = [symbol(c) for c in system.coordinates], covector_symbols(system.coordinates)
+    slope = hamiltonian_vector_field(system.poisson, p)
+    r, t = [p[i] for i in group.rotation], [p[i] for i in group.translation]
+    residuals = []
+    for triple in (group.rotation, *group.vectors):
+        turned = cross([m[i] for i in triple], r)
+        if triple == group.rotation and t:
+            turned = [a + b for a, b in zip(turned, cross([m[i] for i in group.translation], t), strict=True)]
+        if triple == group.rotation and group.vectors and not t:
+            continue
+        residuals += [("", slope[i] + (a if group.spatial else -a)) for i, a in zip(triple, turned, strict=True)]
+    name = "d/dt Ad*_g m = 0 for ṁ = π(m)p, ġ = " + ("p g" if group.spatial else "g p")
+    return decide_zero(name, residuals, system.positive, "so τ = exp(p) for the path of p")
+
+
+def _splitting_statements(compilation: Compilation, group: Group) -> Iterator[Statement]:
+    """Of each part, that its gradient is constant along its flow; that all of them together with Casimirs are H."""
+    system, splitting = compilation.system, compilation.splitting
+    assert splitting is not None
+    turned = turnings(compilation.discretised, group, splitting.flows)
+    order = "exp(t∇H_{k}) g₀" if group.spatial else "g₀ exp(t∇H_{k})"
+    for k, (turning, flow) in enumerate(zip(turned, splitting.flows, strict=True), 1):
+        parts = [e for e in (turning.casimir, *turning.factors) if not e.is_zero]
+        name = f"∇H_{k} is constant along the flow of H_{k}, hence g₁ = {order.format(k=k)}"
+        if len(parts) > 1:
+            name = (
+                f"H_{k} in {len(parts)} parts with gradients constant along their flows, hence g₁ = {order.format(k=k)}"
+            )
+        residuals = [("sum", flow.hamiltonian - total(parts))]
+        stated = constancy(system, turning, name)
+        whole = decide_zero(name, residuals, system.positive)
+        yield stated if whole.holds else whole
+        if turning.casimir.is_zero and not group.matrices and len(turning.factors) == 1:
+            made = joined(group, factor_elements(system, group, turning))
+            start = [symbol(c) for c in system.coordinates]
+            end = [a + b for a, b in zip(start, flow.increment, strict=True)]
+            name = f"Ad*_g₁ x₁ = Ad*_g₀ x₀ for the flow of H_{k}"
+            listed = _residuals(group, [ONE + made[0], *made[1:4]], made[4:], start, end)
+            yield decide_zero(name, listed, system.positive, "any g₀")
+    put_back = [turning.casimir for turning in turned if not turning.casimir.is_zero]
+    attitude = compilation.program.attitude
+    assert attitude is not None
+    plain = substitute([f.hamiltonian for f in splitting.flows], {KICK: ZERO})
+    slope = gradient(total(plain) - total(put_back), system.coordinates)
+    yield rate_statement(system, attitude, slope)
+
+
+def _matrix_statements(system: System, chart: BiRealisation, attitude: Attitude) -> Iterator[Statement]:
+    """The matrices represent the bracket; the element is the exponential, or the Cayley transform, of p."""
+    algebra = system.lie_algebra
+    assert algebra is not None
+    yield representation_statement(system, algebra, attitude.group)
+    if attitude.cayley:
+        yield cayley_statement(system, algebra, attitude.group, chart.alpha, chart.beta)
+    elif not chart.path:
+        yield ends_statement(system, chart.beta)
+
+
+def representation_statement(system: System, algebra: LieAlgebra, group: Group) -> Statement:
+    """[E_i, E_j] = ± Σ c_ij^k E_k: + where elements are multiplied from the left, for {x_i, x_j} = Σ c_ij^k x_k."""
+    n, size = range(algebra.dimension), range(len(group.matrices[0]))
+    residuals = []
+    for i, j in combinations(n, 2):
+        a, b, row = group.matrices[i], group.matrices[j], algebra.bracket(i, j)
+        for r in size:
+            for s in size:
+                commutator = total(a[r][k] * b[k][s] - b[r][k] * a[k][s] for k in size)
+                wanted = total(c * group.matrices[k][r][s] for k, c in row.items())
+                residuals.append((f"({i + 1}, {j + 1})", commutator + (-wanted if group.spatial else wanted)))
+    sign = "" if group.spatial else "−"
+    name = f"[E_i, E_j] = {sign}Σ c_ij^k E_k, so that Ad*_g m is constant for ṁ = π(m)p, ġ = "
+    return decide_zero(name + ("P g" if group.spatial else "g P"), residuals, system.positive)
+
+
+def ends_statement(system: System, beta: Vector) -> Statement:
+    """β(x, p) is the end of the path ṁ = π(m)p of mean x, for a β that is linear in x.
+
+    That is b(M)x for Mx = π(x)p, b(z) = z/(1 − e^{−z}), the only solution of z b' = b + z b − b² with b(0) = 1.
+    """
+    names, p = system.coordinates, covector_symbols(system.coordinates)
+    twice = substitute(beta, dict(zip(names, beta, strict=True)))
+    moved = substitute(hamiltonian_vector_field(system.poisson, p), dict(zip(names, beta, strict=True)))
+    scaled = [total(pi * d for pi, d in zip(p, gradient(b, covector_names(names)), strict=True)) for b in beta]
+    residuals = [(c, d - (b + m - t)) for c, d, b, m, t in zip(names, scaled, beta, moved, twice, strict=True)]
+    name = "p·∂β/∂p = β + π(β)p − β(β, p): α and β are ends of the path of p, hence τ = exp(p)"
+    return decide_zero(name, residuals, system.positive)
+
+
+def cayley_statement(system: System, algebra: LieAlgebra, group: Group, alpha: Vector, beta: Vector) -> Statement:
+    """Ad*_g₁ β = Ad*_g₀ α for the Cayley transform τ of P, on all elements of the form (1 ± P/2) E_i (1 ∓ P/2)."""
+    p, n = covector_symbols(system.coordinates), range(algebra.dimension)
+    sign = 1 if group.spatial else -1
+    matrices = tuple(
+        {(r, s): e for r, row in enumerate(m) for s, e in enumerate(row) if not e.is_zero} for m in group.matrices
+    )
+    found = trilinear(algebra, Representation("", len(group.matrices[0]), matrices))
+    terms = found or {}
+    residuals = []
+    for i in n:
+        half = [total(sign * c * p[a] / 2 for a in n for m, c in algebra.bracket(a, i).items() if m == k) for k in n]
+        square = [total(c * p[a] * p[b] / 4 for (j, a, b, m), c in terms.items() if (j, m) == (i, k)) for k in n]
+        ends = (beta, alpha) if group.spatial else (alpha, beta)
+        # ⟨β, (1 + P/2) E_i (1 − P/2)⟩ = ⟨α, (1 − P/2) E_i (1 + P/2)⟩, where x are in space; else with −P.
+        more = [total((h - q) * x for h, q, x in zip(half, square, ends[0], strict=True)), ends[0][i]]
+        less = [total((-h - q) * x for h, q, x in zip(half, square, ends[1], strict=True)), ends[1][i]]
+        residuals.append((f"E_{i + 1}", total(more) - total(less)))
+    order = "τ g₀" if group.spatial else "g₀ τ"
+    return decide_zero(f"Ad*_g₁ x₁ = Ad*_g₀ x₀ for g₁ = {order}, τ = (1 + P/2)/(1 − P/2)", residuals, system.positive)
+
+
+def element_statements(
+    group: Group, made: Vector, p: Vector, start: Vector, end: Vector, *, cayley: bool, positive: Sequence[str]
+) -> Iterator[Statement]:
+    """``made`` is the element of p, written by φ(s/4) or not, and leaves the momentum in the other frame as it is.
+
+    ``start`` and ``end`` are those of a step, for all components; the attitude before it is any quaternion.
+    """
+    given = [p[i] for i in group.rotation], [p[i] for i in group.translation]
+    found = direction(*given, cayley=cayley)
+    phi = ZERO if cayley else _doubled(dot(given[0], given[0]))
+    plain, factor = with_phi(*given, phi), found.factor
+    listed = [("length", dot(found.turn, found.turn) - found.length**2)]
+    listed += [
+        ("quaternion", found.length * a - b) for a, b in zip([ONE + made[0], *made[1:4]], found.turn, strict=True)
+    ]
+    listed += [("position", found.length**2 * a - b) for a, b in zip(made[4:], found.shift, strict=True)]
+    listed += [("φ(s)", a - factor * b) for a, b in zip(found.turn, plain.turn, strict=True)]
+    listed += [("φ(s)", a - factor**2 * b) for a, b in zip(found.shift, plain.shift, strict=True)]
+    name = "τ = (1 + P/2)/(1 − P/2)" if cayley else "τ = exp(p)"
+    residuals = zip([label for label, _ in listed], _with_phi([e for _, e in listed], _quarter), strict=True)
+    yield decide_zero(f"the quaternion of {name} has length 1", residuals, positive)
+    simple = with_phi(*given, ZERO if cayley else _any(ZERO))
+    first, last = (_with_phi(part, _any) for part in (start, end))
+    order = "τ g₀" if group.spatial else "g₀ τ"
+    where = "body" if group.spatial else "space"
+    kept = _residuals(group, simple.turn, simple.shift, first, last)
+    yield decide_zero(f"Ad*_g₁ x₁ = Ad*_g₀ x₀ for g₁ = {order}", kept, positive, f"the momentum in {where}, any g₀")
+
+
+def _residuals(
+    group: Group, turn: Vector, shift: Vector, start: Vector, end: Vector
+) -> Iterator[tuple[str, Expression]]:
+    """Momenta after less those before, times |τ|², and |g₀|² for those of se(3)."""
+    square = dot(turn, turn)
+    after = product(turn, BEFORE) if group.spatial else product(BEFORE, turn)
+    first, last = (_conjugate(q) if group.spatial else list(q) for q in (BEFORE, after))
+    triples = [("rotated vector", v) for v in group.vectors] or [("momentum", group.rotation)]
+    for label, triple in triples:
+        old, new = rotated(first, [start[i] for i in triple]), rotated(last, [end[i] for i in triple])
+        yield from ((label, a - square * b) for a, b in zip(new, old, strict=True))
+    if group.translation:
+        yield from (("momentum", e) for e in _screwed(group, turn, shift, start, end))
+
+
+def _screwed(group: Group, turn: Vector, shift: Vector, start: Vector, end: Vector) -> list[Expression]:
+    """The residual of the angular momentum of se(3) for g₀ = 1, where the product is the element itself."""
+    square = dot(turn, turn)
+    (old, _), (new, force) = (([x[i] for i in group.rotation], [x[i] for i in group.translation]) for x in (start, end))
+    if group.spatial:
+        pushed = cross(shift, force)
+        new = [square * a - b for a, b in zip(new, pushed, strict=True)]
+        return [a - square**2 * b for a, b in zip(rotated(_conjugate(turn), new), old, strict=True)]
+    pushed = cross(shift, rotated(turn, force))
+    return [square * (a - square * b) + c for a, b, c in zip(rotated(turn, new), old, pushed, strict=True)]
+
+
+def _with_phi(expressions: Sequence[Expression], value: Callable[[Expression], Expression]) -> list[Expression]:
+    """The expressions with another value of φ, and φ′ by the differential equation: of φ no more is used."""
+
+    def visit(e: Expression, args: list[Expression]) -> Expression:
+        if e.op not in SPECIAL:
+            return rebuild(e, args)
+        phi, s = value(args[0]), args[0]
+        return phi if e.op == SPECIAL[0] else (s * phi**2 / 2 - 3 * phi / 2 + number(Fraction(1, 8))) / s
+
+    return fold(expressions, visit)
+
+
+def _any(s: Expression) -> Expression:
+    """φ, of which nothing is used."""
+    return symbol(Symbol("phi"))
+
+
+def _quarter(s: Expression) -> Expression:
+    """φ(s/4) by c = 1 − φ(s/4)s/4, of which nothing is used."""
+    return (ONE - symbol(Symbol("cosine"))) / s
+
+
+def _doubled(s: Expression) -> Expression:
+    """φ(s) from φ(s/4): with c = 1 − φ(s/4)s/4 = w cot w for w = √s/4, 2w cot 2w = (c² − w²)/c."""
+    c = symbol(Symbol("cosine"))
+    return (ONE - (c**2 - s / 16) / c) / s
+
+
+def _conjugate(q: Vector) -> list[Expression]:
+    return [q[0], *(-v for v in q[1:])]

@@ -1,0 +1,356 @@
+#ifndef PHI_FILE_ATTITUDE
+#define PHI_FILE_ATTITUDE
+#include <float.h>
+#include <math.h>
+#include <string.h>
+
+#include "model.h"
+
+/* ---- Attitude ---- */
+#if PHI_MATRICES
+/* The product of two square matrices. */
+static void phi_matrix_product(const double a[PHI_ELEMENT], const double b[PHI_ELEMENT], double product[PHI_ELEMENT])
+{
+    enum { N = PHI_ROWS_OF_ATTITUDE };
+    for (int i = 0; i < N; ++i)
+        for (int j = 0; j < N; ++j) {
+            double sum = 0.0;
+            for (int k = 0; k < N; ++k) sum += a[i * N + k] * b[k * N + j];
+            product[i * N + j] = sum;
+        }
+}
+
+#if !PHI_CAYLEY || PHI_RATE_OF_GAUGE
+/* exp(P) - 1 by its Taylor series at P/2^k, doubled k times. */
+static void phi_matrix_exponential(const double p[PHI_ELEMENT], double element[PHI_ELEMENT])
+{
+    double small[PHI_ELEMENT], term[PHI_ELEMENT], next[PHI_ELEMENT], size = 0.0, left = 1.0;
+    int doublings = 0;
+    for (int i = 0; i < PHI_ELEMENT; ++i) size += fabs(p[i]);
+    while (isfinite(size) && ldexp(size, -doublings) > 0.5) ++doublings;
+    for (int i = 0; i < PHI_ELEMENT; ++i) element[i] = term[i] = small[i] = ldexp(p[i], -doublings);
+    for (int k = 2; k < 20 && left > 1e-18; ++k) {
+        phi_matrix_product(term, small, next);
+        left = 0.0;
+        for (int i = 0; i < PHI_ELEMENT; ++i) {
+            term[i] = next[i] / k;
+            element[i] += term[i];
+            left += fabs(term[i]);
+        }
+    }
+    for (; doublings > 0; --doublings) {
+        phi_matrix_product(element, element, next);
+        for (int i = 0; i < PHI_ELEMENT; ++i) element[i] = 2.0 * element[i] + next[i];
+    }
+}
+
+#endif
+#if PHI_CAYLEY
+/* (1 - P/2)^-1 (1 + P/2) - 1 = (1 - P/2)^-1 P, by elimination with pivoting. */
+static void phi_matrix_element(const double p[PHI_ELEMENT], double element[PHI_ELEMENT])
+{
+    enum { N = PHI_ROWS_OF_ATTITUDE };
+    double matrix[PHI_ELEMENT];
+    for (int i = 0; i < PHI_ELEMENT; ++i) {
+        matrix[i] = (i % (N + 1) == 0 ? 1.0 : 0.0) - 0.5 * p[i];
+        element[i] = p[i];
+    }
+    for (int k = 0; k < N; ++k) {
+        int best = k;
+        for (int i = k + 1; i < N; ++i)
+            if (fabs(matrix[i * N + k]) > fabs(matrix[best * N + k])) best = i;
+        for (int j = 0; j < N; ++j) {
+            const double a = matrix[k * N + j], b = element[k * N + j];
+            matrix[k * N + j] = matrix[best * N + j];
+            element[k * N + j] = element[best * N + j];
+            matrix[best * N + j] = a;
+            element[best * N + j] = b;
+        }
+        for (int i = 0; i < N; ++i) {
+            const double factor = i == k ? 0.0 : matrix[i * N + k] / matrix[k * N + k];
+            for (int j = 0; j < N; ++j) {
+                matrix[i * N + j] -= factor * matrix[k * N + j];
+                element[i * N + j] -= factor * element[k * N + j];
+            }
+        }
+    }
+    for (int i = 0; i < PHI_ELEMENT; ++i) element[i] /= matrix[i / N * (N + 1)];
+}
+
+#else
+static void phi_matrix_element(const double p[PHI_ELEMENT], double element[PHI_ELEMENT])
+{
+    phi_matrix_exponential(p, element);
+}
+
+#endif
+/* The product of two elements. */
+static void phi_product(const double a[PHI_ELEMENT], const double b[PHI_ELEMENT], double product[PHI_ELEMENT])
+{
+    phi_matrix_product(a, b, product);
+}
+
+#if PHI_RATE_OF_GAUGE
+/* The element of the motion with a constant rate, for some time. */
+static void phi_uniform(const double rate[PHI_RATE], double t, double element[PHI_ELEMENT])
+{
+    double p[PHI_ELEMENT];
+    for (int i = 0; i < PHI_ELEMENT; ++i) p[i] = t * rate[i];
+    phi_matrix_exponential(p, element);
+    for (int i = 0; i < PHI_ELEMENT; i += PHI_ROWS_OF_ATTITUDE + 1) element[i] += 1.0;
+}
+
+#endif
+#if PHI_NORMALISE
+/* Bring a matrix that is nearly orthogonal nearer to that: G (G^T G - 1)/2 is taken from it. */
+static void phi_normalise(const double g[PHI_ELEMENT], double carry[PHI_ELEMENT])
+{
+    enum { N = PHI_ROWS_OF_ATTITUDE };
+    double excess[PHI_ELEMENT];
+    for (int i = 0; i < N; ++i)
+        for (int j = 0; j < N; ++j) {
+            double sum = i == j ? -1.0 : 0.0;
+            for (int k = 0; k < N; ++k) sum += g[k * N + i] * g[k * N + j];
+            excess[i * N + j] = 0.5 * sum;
+        }
+    for (int i = 0; i < N; ++i)
+        for (int j = 0; j < N; ++j)
+            for (int k = 0; k < N; ++k) carry[i * N + j] -= g[i * N + k] * excess[k * N + j];
+}
+
+#endif
+/* What a factor, P in turn, adds to an element. */
+static void phi_added(const double element[PHI_ELEMENT], const double turn[PHI_ELEMENT], double change[PHI_ELEMENT])
+{
+    double factor[PHI_ELEMENT];
+    phi_matrix_element(turn, factor);
+#if PHI_SPATIAL
+    phi_matrix_product(factor, element, change);
+#else
+    phi_matrix_product(element, factor, change);
+#endif
+}
+
+#else
+/* The product of two quaternions. */
+static void phi_quaternion_product(const double a[4], const double b[4], double product[4])
+{
+    product[0] = (a[0] * b[0] - a[1] * b[1]) - (a[2] * b[2] + a[3] * b[3]);
+    product[1] = (a[0] * b[1] + a[1] * b[0]) + (a[2] * b[3] - a[3] * b[2]);
+    product[2] = (a[0] * b[2] + a[2] * b[0]) + (a[3] * b[1] - a[1] * b[3]);
+    product[3] = (a[0] * b[3] + a[3] * b[0]) + (a[1] * b[2] - a[2] * b[1]);
+}
+
+#if PHI_POSITION
+/* What rotating a vector by a quaternion adds to it. */
+static void phi_rotation(const double q[4], const double v[3], double change[3])
+{
+    const double x = q[2] * v[2] - q[3] * v[1], y = q[3] * v[0] - q[1] * v[2], z = q[1] * v[1] - q[2] * v[0];
+    change[0] = 2.0 * (q[0] * x + (q[2] * z - q[3] * y));
+    change[1] = 2.0 * (q[0] * y + (q[3] * x - q[1] * z));
+    change[2] = 2.0 * (q[0] * z + (q[1] * y - q[2] * x));
+}
+
+#endif
+/* The product of two elements. */
+static void phi_product(const double a[PHI_ELEMENT], const double b[PHI_ELEMENT], double product[PHI_ELEMENT])
+{
+    phi_quaternion_product(a, b, product);
+#if PHI_POSITION
+    phi_rotation(a, b + 4, product + 4);
+    for (int i = 4; i < 7; ++i) product[i] += a[i] + b[i];
+#endif
+}
+
+#if PHI_RATE_OF_GAUGE
+/* The element of the motion with a constant rate, for some time. */
+static void phi_uniform(const double rate[PHI_RATE], double t, double element[PHI_ELEMENT])
+{
+    const double speed = sqrt(rate[0] * rate[0] + (rate[1] * rate[1] + rate[2] * rate[2]));
+    const double angle = t * speed, scale = speed > 0.0 ? sin(0.5 * angle) / speed : 0.0;
+    element[0] = cos(0.5 * angle);
+    for (int i = 0; i < 3; ++i) element[i + 1] = scale * rate[i];
+#if PHI_POSITION
+    const double *w = rate, *v = rate + 3, sine = speed > 0.0 ? sin(angle) / speed : t;
+    const double versine = 2.0 * scale * scale, along = (w[0] * v[0] + w[1] * v[1]) + w[2] * v[2];
+    const double rest = speed > 0.0 ? (t - sine) / (speed * speed) * along : 0.0;
+    element[4] = sine * v[0] + versine * (w[1] * v[2] - w[2] * v[1]) + rest * w[0];
+    element[5] = sine * v[1] + versine * (w[2] * v[0] - w[0] * v[2]) + rest * w[1];
+    element[6] = sine * v[2] + versine * (w[0] * v[1] - w[1] * v[0]) + rest * w[2];
+#endif
+}
+
+#endif
+/* What a factor adds to an element. The quaternion of the factor is given less 1. */
+static void phi_added(const double element[PHI_ELEMENT], const double turn[PHI_ELEMENT], double change[PHI_ELEMENT])
+{
+#if PHI_SPATIAL
+    phi_quaternion_product(turn, element, change);
+#else
+    phi_quaternion_product(element, turn, change);
+#endif
+#if PHI_POSITION && PHI_SPATIAL
+    const double q[4] = { 1.0 + turn[0], turn[1], turn[2], turn[3] };
+    phi_rotation(q, element + 4, change + 4);
+    for (int i = 4; i < 7; ++i) change[i] += turn[i];
+#elif PHI_POSITION
+    phi_rotation(element, turn + 4, change + 4);
+    for (int i = 4; i < 7; ++i) change[i] += turn[i];
+#endif
+}
+
+/* Bring the length of a quaternion nearer to 1; what rounding leaves of that has no direction, and does not add up. */
+static void phi_normalise(const double q[4], double carry[4])
+{
+    const double excess = 0.5 * (((q[0] * q[0] - 1.0) + q[1] * q[1]) + (q[2] * q[2] + q[3] * q[3]));
+    for (int i = 0; i < 4; ++i) carry[i] -= excess * q[i];
+}
+
+#endif
+/* Multiply an element by that of a stage, or of a flow, in compensated arithmetic. */
+static inline void phi_turned(double element[PHI_ELEMENT], double carry[PHI_ELEMENT], const double turn[PHI_ELEMENT])
+{
+    double change[PHI_ELEMENT];
+    phi_added(element, turn, change);
+    for (int i = 0; i < PHI_ELEMENT; ++i) {
+        const double moved = change[i] + carry[i], sum = element[i] + moved, added = sum - element[i];
+        carry[i] = (element[i] - (sum - added)) + (moved - added);
+        element[i] = sum;
+    }
+}
+
+#if PHI_IMPLICIT
+/* The element of a stage that was solved by y. */
+static inline void phi_turn_stage(phi_solver *s, int stage, const double y[PHI_DIM])
+{
+    double turn[PHI_ELEMENT];
+    phi_turn(s->coef[stage], y, turn);
+    phi_turned(s->turned, s->turned_carry, turn);
+#if PHI_NORMALISE
+    phi_normalise(s->turned, s->turned_carry);
+#endif
+}
+
+#endif
+#if PHI_BLOCKS
+#if !PHI_MATRICES
+/* Two factors as one, in place of the first; both less 1. */
+static void phi_joined(const double first[PHI_ELEMENT], const double second[PHI_ELEMENT], double both[PHI_ELEMENT])
+{
+    double change[PHI_ELEMENT];
+#if PHI_SPATIAL
+    phi_quaternion_product(second, first, change);
+#else
+    phi_quaternion_product(first, second, change);
+#endif
+#if PHI_POSITION && PHI_SPATIAL
+    const double q[4] = { 1.0 + second[0], second[1], second[2], second[3] };
+    phi_rotation(q, first + 4, change + 4);
+#elif PHI_POSITION
+    const double q[4] = { 1.0 + first[0], first[1], first[2], first[3] };
+    phi_rotation(q, second + 4, change + 4);
+#endif
+    for (int i = 0; i < PHI_ELEMENT; ++i) both[i] = (first[i] + second[i]) + change[i];
+}
+
+#endif
+/* Multiply by the elements of many stages in turn. */
+static void phi_turn_sequence(phi_solver *s, double sequence[][PHI_ELEMENT], int count)
+{
+#if !PHI_MATRICES
+    for (; count % 2 == 0; count /= 2) /* neighbours first: their products do not wait for one another */
+        for (int k = 0; k < count / 2; ++k) phi_joined(sequence[2 * k], sequence[2 * k + 1], sequence[k]);
+#endif
+    for (int k = 0; k < count; ++k) phi_turned(s->turned, s->turned_carry, sequence[k]);
+#if PHI_NORMALISE
+    phi_normalise(s->turned, s->turned_carry);
+#endif
+}
+
+#endif
+/* The attitude proper: the first, then what the Casimirs that were taken from H have turned it by, which in the frame where
+   momenta are constant is a uniform motion, then the product of the elements of all steps. */
+static void phi_read_attitude(phi_solver *s)
+{
+    double found[PHI_ELEMENT], element[PHI_ELEMENT];
+#if PHI_RATE_OF_GAUGE
+    double uniform[PHI_ELEMENT];
+    phi_uniform(s->rate, s->t - s->attitude_from, uniform);
+#if PHI_SPATIAL
+    phi_product(uniform, s->first, element);
+#else
+    phi_product(s->first, uniform, element);
+#endif
+#else
+    memcpy(element, s->first, sizeof element);
+#endif
+#if PHI_SPATIAL
+    phi_product(s->turned, element, found);
+#else
+    phi_product(element, s->turned, found);
+#endif
+    memcpy(s->attitude, found, sizeof s->attitude);
+#if PHI_POSITION
+    memcpy(s->position, found + 4, sizeof s->position);
+#endif
+}
+
+/* Begin at an element, where x is now. */
+static void phi_begin_attitude(phi_solver *s, const double first[PHI_ELEMENT])
+{
+    memcpy(s->first, first, sizeof s->first);
+    memset(s->turned, 0, sizeof s->turned);
+    memset(s->turned_carry, 0, sizeof s->turned_carry);
+#if PHI_MATRICES
+    for (int i = 0; i < PHI_ELEMENT; i += PHI_ROWS_OF_ATTITUDE + 1) s->turned[i] = 1.0;
+#else
+    s->turned[0] = 1.0;
+#endif
+#if PHI_RATE_OF_GAUGE
+#if PHI_GAUGE
+    phi_rate(&s->params, s->gauge, s->x, s->rate);
+#else
+    phi_rate(&s->params, s->x, s->rate);
+#endif
+    s->attitude_from = s->t;
+#endif
+    phi_read_attitude(s);
+}
+
+#if PHI_POSITION
+phi_status phi_set_attitude(phi_solver *s, const double attitude[PHI_ATTITUDE_SIZE], const double position[3])
+#else
+phi_status phi_set_attitude(phi_solver *s, const double attitude[PHI_ATTITUDE_SIZE])
+#endif
+{
+    double first[PHI_ELEMENT], size = 0.0;
+    if (s == NULL || attitude == NULL) return PHI_BAD_ARGUMENT;
+    memcpy(first, attitude, PHI_ATTITUDE_SIZE * sizeof first[0]);
+#if PHI_POSITION
+    if (position != NULL) memcpy(first + 4, position, 3 * sizeof first[0]);
+    else memset(first + 4, 0, 3 * sizeof first[0]);
+#endif
+    for (int i = 0; i < PHI_ELEMENT; ++i)
+        if (!isfinite(first[i])) return PHI_BAD_ARGUMENT;
+    for (int i = 0; i < PHI_ATTITUDE_SIZE; ++i) size = fabs(first[i]) > size ? fabs(first[i]) : size;
+    if (!(size > 0.0)) return PHI_BAD_ARGUMENT;
+#if !PHI_MATRICES
+    double square = 0.0;
+    for (int i = 0; i < 4; ++i) {
+        first[i] /= size;
+        square += first[i] * first[i];
+    }
+    for (int i = 0; i < 4; ++i) first[i] /= sqrt(square);
+#endif
+    phi_begin_attitude(s, first);
+    return PHI_OK;
+}
+
+void phi_attitude(const phi_solver *s, double out[PHI_ELEMENT])
+{
+    memcpy(out, s->attitude, sizeof s->attitude);
+#if PHI_POSITION
+    memcpy(out + 4, s->position, sizeof s->position);
+#endif
+}
+#endif

@@ -1,0 +1,400 @@
+"""Attitudes: proved, and measured against Jacobi's elliptic functions and against the equations of the whole motion."""
+
+from dataclasses import replace
+from functools import cache
+
+import mpmath
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.special import ellipj
+
+import phigen
+from phigen import spec as specs
+from phigen.api import interface_of, solver_of
+from phigen.compiler import compile_spec, examine
+from phigen.errors import SpecError
+from phigen.proofs import attitude as proofs
+from phigen.proofs.statements import ATTITUDE
+from phigen.runtime.solver import Solver
+from phigen.symbolic.verdict import PROVED, REFUTED
+
+INERTIA = np.array([1.0, 2.0, 3.0])
+BODY = """
+coordinates: [x1, x2, x3]
+parameters: {I1: 1, I2: 2, I3: 3}
+poisson: {brackets: {x1: {x2: -x3, x3: x2}, x2: {x3: -x1}}}
+hamiltonian: (x1**2/I1 + x2**2/I2 + x3**2/I3)/2
+casimirs: {C: x1**2 + x2**2 + x3**2}
+reconstruct: quaternion
+"""
+TOP = """
+coordinates: [P1, P2, P3, G1, G2, G3]
+poisson: {lie_algebra: {name: se(3), sign: minus}}
+hamiltonian: (P1**2/1 + P2**2/2 + P3**2/3)/2 + G1/3 + G3
+casimirs: {A: G1**2 + G2**2 + G3**2, B: P1*G1 + P2*G2 + P3*G3}
+reconstruct: quaternion
+"""
+
+
+def algebra(name, sign, n, *more):
+    """A body with different moments on the dual of a Lie algebra."""
+    names = [f"x{i}" for i in range(1, n + 1)]
+    energy = " + ".join(f"{x}**2/{i + 1}" for i, x in enumerate(names, 1))
+    lines = [f"coordinates: [{', '.join(names)}]", f"poisson: {{lie_algebra: {{name: {name}, sign: {sign}}}}}"]
+    return "\n".join([*lines, f"hamiltonian: ({energy})/2", *more, ""])
+
+
+CASES = {
+    "body": BODY,
+    "body by Cayley": BODY + "birealisation: cayley\n",
+    "body along paths": BODY + "birealisation: karasev\n",
+    "body with a given gauge": BODY + "gauge: {C: 1/3}\n",
+    "body, split": BODY + "scheme: splitting\n",
+    "momenta in space": algebra("so(3)", "plus", 3, "reconstruct: quaternion"),
+    "momenta in space, split": algebra("so(3)", "plus", 3, "reconstruct: quaternion", "scheme: splitting"),
+    "top": TOP,
+    "top by Cayley": TOP + "birealisation: cayley\n",
+    "top along paths": TOP + "birealisation: karasev\n",
+    "motions, momenta in space": algebra("se(3)", "plus", 6, "reconstruct: quaternion", "scheme: series"),
+    "so(3) by matrices": algebra("so(3)", "minus", 3, "reconstruct: matrix", "scheme: series"),
+    "so(4)": algebra("so(4)", "minus", 6, "reconstruct: matrix", "scheme: series"),
+    "so(4), momenta in space, by Cayley": algebra("so(4)", "plus", 6, "reconstruct: matrix", "birealisation: cayley"),
+    "so(4), split": algebra("so(4)", "minus", 6, "reconstruct: matrix", "scheme: splitting"),
+    "sl(2)": algebra("sl(2)", "minus", 3, "reconstruct: matrix", "scheme: series"),
+    "heisenberg(1)": algebra("heisenberg(1)", "plus", 3, "reconstruct: matrix", "scheme: series"),
+    "su(2) along paths": algebra("su(2)", "minus", 3, "reconstruct: matrix", "birealisation: karasev"),
+}
+
+
+@cache
+def made(case, order=2):
+    """The compilation of a case."""
+    return compile_spec(spec_of(CASES[case]), order=order)
+
+
+def spec_of(text):
+    """A spec named by its place, with what all specs need."""
+    return specs.loads(f"phigen: 1\nname: t\n{text}")
+
+
+def compiled_text(text):
+    """The compilation of a spec without its first keys."""
+    return compile_spec(spec_of(text))
+
+
+@cache
+def solver(case, target="numpy", order=2) -> Solver:
+    """The solver of a case."""
+    return solver_of(made(case, order), target)
+
+
+def rotation(q):
+    """The matrices of quaternions (…, 4)."""
+    w, u = q[..., :1], q[..., 1:]
+    columns = [v + 2 * (w * np.cross(u, v) + np.cross(u, np.cross(u, v))) for v in np.eye(3)]
+    return np.stack(columns, axis=-1)
+
+
+def statements(compilation):
+    """What is stated of its attitude."""
+    return list(proofs.check(compilation))
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_elements_leave_the_other_momentum_as_it_is_and_turn_as_h_says(case):
+    found = statements(made(case))
+    assert found
+    if "split" in case:  # flows in sines, elements in those of half the angle: at points
+        assert all(s.holds for s in found)
+        assert [s.verdict for s in found].count(PROVED) >= 2
+    else:
+        assert [s.verdict for s in found] == [PROVED] * len(found)
+
+
+def altered(case, **changes):
+    """The compilation with another attitude."""
+    found = made(case)
+    attitude = replace(found.program.attitude, **changes)
+    return replace(found, program=replace(found.program, attitude=attitude))
+
+
+@pytest.mark.parametrize("case", ["body by Cayley", "body along paths", "so(4)", "so(3) by matrices"])
+def test_the_other_side_of_the_product_is_refuted(case):
+    group = made(case).program.attitude.group
+    wrong = statements(altered(case, group=replace(group, spatial=not group.spatial)))
+    assert REFUTED in [s.verdict for s in wrong]
+
+
+@pytest.mark.parametrize("case", ["body", "body by Cayley"])
+def test_the_wrong_sign_of_p_is_refuted(case, monkeypatch):
+    right = proofs.element
+    monkeypatch.setattr(proofs, "element", lambda p, t, **how: right([-v for v in p], t, **how))
+    assert [s.verdict for s in statements(made(case))] == [REFUTED, PROVED, PROVED]
+
+
+def test_the_wrong_realisation_is_refuted():
+    found = made("body by Cayley")
+    exponential = replace(found, realisation=made("body").realisation)
+    assert [s.verdict for s in statements(exponential)] == [PROVED, REFUTED, PROVED]
+
+
+@pytest.mark.parametrize("case", ["body", "body with a given gauge", "body, split"])
+def test_leaving_out_what_casimirs_turn_is_refuted(case):
+    assert made(case).program.attitude.rate
+    assert statements(altered(case, rate=None))[-1].verdict == REFUTED
+
+
+def test_check_shows_the_statements():
+    groups = examine(made("body").spec).groups
+    assert [s.verdict for s in groups[ATTITUDE]] == [PROVED] * 3
+
+
+def elliptic_motion(t, m0):
+    """The free body with 2H I2 < |m|², in closed form: the momentum, and the rotation that turns body into space.
+
+    The spatial momentum is along the third axis; angles are those of Euler, zxz. m0 has no second component, so that
+    the motion starts where m = a (cn, sn, dn).
+    """
+    i1, i2, i3 = INERTIA
+    total, energy = m0 @ m0, (m0**2 / INERTIA).sum()
+    a1, a3 = m0[0], m0[2]
+    speed = np.sqrt((i2 - i3) * (i1 - i3) / (i1 * i2)) * abs(a3) / i3
+    modulus = (i1 - i2) * a1**2 * i3 / ((i2 - i3) * a3**2 * i1)
+    sn, cn, dn, am = ellipj(speed * t, modulus)
+    a2 = a1 * speed / (a3 * (1 / i2 - 1 / i3))
+    m = np.stack([a1 * cn, a2 * sn, a3 * dn], axis=-1)
+    length = np.sqrt(total)
+    rest = total - a3**2
+    n = -modulus * a3**2 / rest
+    pi = np.array([float(mpmath.ellippi(n, mpmath.mpf(float(a)), modulus)) for a in am])
+    phi = length * t / i3 + length * (energy - total / i3) / rest * pi / speed
+    theta, psi = np.arccos(m[:, 2] / length), np.arctan2(m[:, 0], m[:, 1])
+    return m, about(2, phi) @ about(0, theta) @ about(2, psi)
+
+
+def about(axis, angles):
+    """Rotations about a coordinate axis."""
+    half = np.zeros((len(angles), 4))
+    half[:, 0], half[:, 1 + axis] = np.cos(angles / 2), np.sin(angles / 2)
+    return rotation(half)
+
+
+START = np.array([0.6, 0.0, 1.1])
+TIMES = np.array([0.0, 3.0])
+
+
+def test_the_closed_form_is_a_solution():
+    t = np.linspace(0, 3, 7)
+    (m, r), d = elliptic_motion(t, START), 1e-5
+    later, before = elliptic_motion(t + d, START), elliptic_motion(t - d, START)
+    assert np.abs((later[0] - before[0]) / (2 * d) - np.cross(m, m / INERTIA)).max() < 1e-9
+    spin = np.swapaxes(r, 1, 2) @ ((later[1] - before[1]) / (2 * d))
+    assert np.abs(np.stack([spin[:, 2, 1], spin[:, 0, 2], spin[:, 1, 0]], axis=-1) - m / INERTIA).max() < 1e-9
+
+
+def errors(case, order, counts, gauge=None):
+    """The errors of the attitude after so many steps, against the closed form."""
+    exact = elliptic_motion(TIMES, START)[1]
+    found = []
+    for steps in counts:
+        module = solver(case, "numpy", order).backend.module
+        _states, attitudes = module.reconstruct(START, TIMES[-1] / steps, steps, steps, gauge=gauge)
+        found.append(np.abs(exact[0] @ rotation(attitudes[-1]) - exact[1]).max())
+    return np.array(found)
+
+
+COUNTS = {2: (20, 40), 4: (12, 24), 6: (8, 16), 8: (6, 12), 12: (4, 6)}
+
+
+@pytest.mark.parametrize(("order", "gauge"), [*((k, 0.0) for k in COUNTS), (2, None), (4, None), (6, None), (8, None)])
+def test_the_attitude_has_the_order_of_the_method(order, gauge):
+    counts = COUNTS[order]
+    few, many = errors("body", order, counts, gauge)
+    assert abs(np.log(few / many) / np.log(counts[1] / counts[0]) - order) < 0.25 + 0.06 * order
+
+
+@pytest.mark.parametrize("case", ["body", "body with a given gauge"])
+def test_the_attitude_is_that_of_the_closed_form_to_round_off(case):
+    assert errors(case, 12, [60])[0] < 1e-13
+
+
+@pytest.mark.parametrize("case", ["body by Cayley", "body along paths", "body, split"])
+def test_other_elements_have_the_order_too(case):
+    few, many = errors(case, 4, [24, 48], 0.0 if "split" not in case else None)
+    assert abs(np.log2(few / many) - 4) < 0.3
+
+
+def whole_motion(x0, gradient, t):
+    """Momentum, force direction, quaternion and position of a body on se(3)*, by DOP853."""
+
+    def slope(_, u):
+        p, g, q = u[:3], u[3:6], u[6:10]
+        omega, v = gradient(u[:6])
+        turned = [-q[1:] @ omega / 2, *((q[0] * omega + np.cross(q[1:], omega)) / 2)]
+        return [*(np.cross(p, omega) + np.cross(g, v)), *np.cross(g, omega), *turned, *(rotation(q) @ v)]
+
+    first = [*x0, 1, 0, 0, 0, 0, 0, 0]
+    return solve_ivp(slope, (0, t), first, method="DOP853", rtol=1e-13, atol=1e-14).y[:, -1]
+
+
+def top_gradient(x):
+    return x[:3] / INERTIA, np.array([1 / 3, 0, 1])
+
+
+@pytest.mark.parametrize("target", ["c", "numpy"])
+def test_a_heavy_top_has_the_attitude_and_position_of_the_whole_motion(target):
+    x0 = np.array([0.3, -0.2, 1.0, 0.6, 0.0, 0.8])
+    exact = whole_motion(x0, top_gradient, 2.0)
+    found = solver("top", target, 8).integrate(x0, 0.02, 100)
+    assert found.attitude.shape == (101, 4)
+    assert found.position.shape == (101, 3)
+    assert np.abs(found.attitude[-1] - exact[6:10]).max() < 1e-11
+    assert np.abs(found.position[-1] - exact[10:]).max() < 1e-11
+
+
+def test_a_split_top_moves_as_by_the_series():
+    x0 = np.array([0.3, -0.2, 1.0, 0.6, 0.0, 0.8])
+    split = solver_of(compiled_text(TOP + "order: 8\nscheme: splitting\n"), "numpy")
+    exact = solver("top", "numpy", 8).integrate(x0, 0.02, 50)
+    found = split.integrate(x0, 0.02, 50)
+    assert np.abs(found.attitude - exact.attitude).max() < 1e-9
+    assert np.abs(found.position - exact.position).max() < 1e-9
+
+
+def conserved(case, x, g):
+    """The momenta in the other frame as matrices or vectors: of a body of so(n), by its attitudes (rows, n, n)."""
+    group = made(case).program.attitude.group
+    basis = np.array([[[float(e.value) for e in row] for row in m] for m in group.matrices])
+    norms = (basis**2).sum(axis=(1, 2))
+    momentum = np.einsum("ri,iab->rab", x / norms, basis)
+    turned = np.swapaxes(g, 1, 2)
+    return turned @ momentum @ g if group.spatial else g @ momentum @ turned
+
+
+@pytest.mark.parametrize("target", ["c", "numpy"])
+@pytest.mark.parametrize("case", ["so(4)", "so(4), momenta in space, by Cayley", "so(4), split", "so(3) by matrices"])
+def test_matrices_keep_the_other_momentum_and_stay_orthogonal(case, target):
+    x0 = np.random.default_rng(4).normal(size=made(case).system.dimension)
+    found = solver(case, target).integrate(x0, 0.05, 200, 50)
+    kept = conserved(case, found.x, found.attitude)
+    assert np.abs(kept - kept[0]).max() < 1e-14 * 5
+    assert np.abs(found.attitude @ np.swapaxes(found.attitude, 1, 2) - np.eye(len(found.attitude[0]))).max() < 1e-15 * 5
+
+
+def test_so4_has_the_attitude_of_the_whole_motion():
+    x0, case = np.random.default_rng(4).normal(size=6), "so(4)"
+    group = made(case).program.attitude.group
+    basis = np.array([[[float(e.value) for e in row] for row in m] for m in group.matrices])
+    field = solver(case, "numpy", 8).vector_field
+
+    def slope(_, u):
+        omega = np.tensordot(u[:6] / np.arange(2.0, 8.0), basis, 1)
+        return [*field(u[:6]), *(u[6:].reshape(4, 4) @ omega).ravel()]
+
+    first = [*x0, *np.eye(4).ravel()]
+    exact = solve_ivp(slope, (0, 2.0), first, method="DOP853", rtol=1e-13, atol=1e-14).y[6:, -1]
+    found = solver(case, "numpy", 8).integrate(x0, 0.02, 100)
+    assert np.abs(found.attitude[-1].ravel() - exact).max() < 1e-11
+
+
+def momenta_in_space(found):
+    return np.einsum("rij,rj->ri", rotation(found.attitude), found.x)
+
+
+@pytest.mark.parametrize("case", ["body", "body, split"])
+def test_spatial_momentum_is_constant_to_round_off_for_many_steps(case):
+    start = np.array([0.3, 1.0, 0.2])
+    found = solver(case, "c", 6).integrate(start, 0.1, 100_000, 20_000)
+    assert np.abs(momenta_in_space(found) - start).max() < 3e-14
+    assert np.abs((found.attitude**2).sum(axis=1) - 1).max() < 1e-15
+
+
+ALL = ["body", "body by Cayley", "body along paths", "body, split", "momenta in space", "top", "so(4)", "sl(2)"]
+
+
+@pytest.mark.parametrize("case", [*ALL, "heisenberg(1)", "su(2) along paths", "motions, momenta in space"])
+def test_targets_agree_to_round_off_for_strides_and_starts_and_backward(case):
+    rng, n = np.random.default_rng(7), made(case).system.dimension
+    x0, expected = rng.normal(size=n), interface_of(made(case).program)
+    first = {"attitude0": rng.normal(size=expected.attitude)}
+    if expected.position:
+        first["position0"] = rng.normal(size=3)
+    c, numpy = (solver(case, target).integrate(x0, -0.03, 40, 7, **first) for target in ("c", "numpy"))
+    assert np.abs(c.attitude - numpy.attitude).max() < 2e-14
+    if expected.attitude == (4,):
+        given = first["attitude0"] / np.linalg.norm(first["attitude0"])
+        assert np.abs(c.attitude[0] - given).max() < 1e-15
+    else:
+        assert np.array_equal(c.attitude[0], first["attitude0"])
+    if expected.position:
+        assert np.abs(c.position - numpy.position).max() < 2e-14
+        assert np.array_equal(c.position[0], first["position0"])
+    every = solver(case, "c").integrate(x0, -0.03, 40, **first)
+    assert np.abs(every.attitude[::7] - c.attitude[:-1]).max() < 5e-15
+
+
+@pytest.mark.parametrize("target", ["c", "numpy"])
+@pytest.mark.parametrize("case", ["body", "top", "so(4)"])
+def test_a_step_back_undoes_the_attitude_and_saved_sessions_go_on(case, target):
+    backend, x0 = solver(case, target).backend, np.linspace(0.5, 1.0, made(case).system.dimension)
+    session = backend.start(x0, solver(case, target).interface.parameters)
+    first = session.element()
+    session.advance(0.02, 30)
+    middle = session.element()
+    again = backend.restored(session.saved(), solver(case, target).interface.parameters)
+    twin = session.branch()
+    for other in (session, again, twin):
+        other.advance(0.02, 5)
+        other.advance(-0.02, 35)
+    assert np.array_equal(session.element(), again.element())
+    assert np.array_equal(session.element(), twin.element())
+    assert np.abs(session.element() - first).max() < 5e-15
+    assert np.abs(middle - first).max() > 0.1
+
+
+def test_members_are_turned_each_by_itself():
+    module = solver("top").backend.module
+    x0 = np.random.default_rng(2).normal(size=(5, 6))
+    states, attitudes, positions = module.reconstruct(x0, 0.05, 10, 4)
+    assert states.shape == (4, 5, 6)
+    assert attitudes.shape == (4, 5, 4)
+    assert positions.shape == (4, 5, 3)
+    alone = solver("top").integrate(x0[3], 0.05, 10, 4)
+    assert np.abs(attitudes[:, 3] - alone.attitude).max() < 1e-15 * 5
+    assert np.abs(positions[:, 3] - alone.position).max() < 1e-15 * 5
+
+
+def test_other_solvers_have_none():
+    plain = phigen.compile(compiled_text(BODY.replace("reconstruct: quaternion", "")), target="numpy")
+    assert plain.integrate([1, 0, 0.1], 0.1, 2).attitude is None
+    with pytest.raises(TypeError, match="no attitude"):
+        plain.integrate([1, 0, 0.1], 0.1, 2, attitude0=[1, 0, 0, 0])
+    with pytest.raises(TypeError, match="no position"):
+        solver("body").integrate([1, 0, 0.1], 0.1, 2, position0=[1, 0, 0])
+    with pytest.raises(ValueError, match="must not be 0"):
+        solver("body").integrate([1, 0, 0.1], 0.1, 2, attitude0=[0, 0, 0, 0])
+    with pytest.raises(ValueError, match="shape"):
+        solver("body").integrate([1, 0, 0.1], 0.1, 2, attitude0=np.eye(3))
+
+
+ASKED = "reconstruct: quaternion"
+ROUND = TOP.replace("P1**2/1", "P1**2/2").replace("quaternion", "matrix") + "scheme: splitting\n"
+REFUSED = {
+    "coordinates: [q, p]\npoisson: {canonical: {q: [q], p: [p]}}\nhamiltonian: p**2\n" + ASKED: "needs a linear π",
+    algebra("sl(2)", "plus", 3, ASKED): "three coordinates with the brackets of so(3)",
+    algebra(
+        "so(3)", "plus", 3, ASKED, "birealisation: {kind: group-map, tau: (1 + P/2)/(1 - P/2)}"
+    ): "no group element",
+    ROUND: "the part H_",
+}
+
+
+@pytest.mark.parametrize(("text", "message"), REFUSED.items(), ids=["no algebra", "no rotations", "no element", "part"])
+def test_what_has_no_attitude_is_refused_at_the_key(text, message):
+    with pytest.raises(SpecError) as caught:
+        compiled_text(text)
+    (diagnostic,) = caught.value.diagnostics
+    assert message in diagnostic.message
+    assert diagnostic.location is not None
+    assert diagnostic.hint
