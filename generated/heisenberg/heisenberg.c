@@ -20,7 +20,7 @@
  *   3. The lattice
  *   4. The solver
  *   5. What is seen at sites
- * body-sha256: 9cfee5be9dfec0b5717430741093b4e915ff5313d42a7b3e8edd252ebc9def5c
+ * body-sha256: 8738a8526a288132c2130d93e2edfe62dd1be271b3825ef9a6aca284127f8ad8
  */
 #include "heisenberg.h"
 
@@ -187,7 +187,7 @@ static inline double heisenberg_sin_lane(double u) { return heisenberg_turned_si
 /* sin(t), in the loops over sites: a polynomial, no branches. No number beyond |t| = 0.5. */
 static inline double heisenberg_sin_near(double t)
 {
-    const double z = fabs(t) <= 0.5 ? t * t : (double)NAN;
+    const double z = t * t + (fabs(t) <= 0.5 ? 0.0 : (double)NAN);
     return t + t * z * (-0.16666666666666635 + z * (0.008333333333272266 + z * (-0.0001984126964581331
         + z * (2.755710024095779e-06 + z * -2.495193626528338e-08))));
 }
@@ -195,7 +195,7 @@ static inline double heisenberg_sin_near(double t)
 /* 1 - cos(t), in the loops over sites: a polynomial, no branches. No number beyond |t| = 0.5. */
 static inline double heisenberg_versin_near(double t)
 {
-    const double z = fabs(t) <= 0.5 ? t * t : (double)NAN;
+    const double z = t * t + (fabs(t) <= 0.5 ? 0.0 : (double)NAN);
     return z * (0.5 + z * (-0.041666666666666276 + z * (0.0013888888888705687 + z *
         (-2.480158698886182e-05 + z * (2.755707789915398e-07 + z * -2.0790896078016366e-09)))));
 }
