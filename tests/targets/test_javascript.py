@@ -23,6 +23,7 @@ RUNTIME = sorted((resources.templates() / "js" / "runtime").glob("*.mjs"))
 STEPS = 20
 
 PENDULUM = "coordinates: [q, p]\npoisson: {canonical: {q: [q], p: [p]}}\nhamiltonian: p**2/2 - cos(q)\n"
+EULER = f"{PENDULUM}birealisation: canonical-euler\nruns: {{r: {{initial: [1, 0.5], step: 0.1, steps: 20}}}}\n"
 PENDULUM_RUN = "runs: {r: {initial: [1, 0.5], step: 0.1, steps: 20}}\n"
 RUN = "runs: {r: {initial: [1, 0.5, -0.25], step: 0.1, steps: 20}}\n"
 
@@ -38,6 +39,14 @@ runs: {r: {initial: [0.3, 0, 0.2], step: 0.1, steps: 20}}
 """
 LARGE_RUN = "runs: {r: {initial: [0.1, 1, 0.1], step: 1.05, steps: 20}}\n"
 
+TWO_BODIES = """coordinates: [x1, x2, x3, y1, y2, y3]
+poisson: {brackets: {x1: {x2: -x3, x3: x2}, x2: {x3: -x1}, y1: {y2: -y3, y3: y2}, y2: {y3: -y1}}}
+hamiltonian: x1**2/2 + x2**2/4 + x3**2/6 + y1**2/3 + y2**2/5 + y3**2/7 + x1*y1/2 + x2*y3
+casimirs: {C: x1**2 + x2**2 + x3**2, D: y1**2 + y2**2 + y3**2}
+order: 4
+runs: {r: {initial: [1, 0.5, -0.25, 0.3, 0.8, -0.6], step: 0.1, steps: 20}}
+"""
+
 #: What the corpus does not ask for: every kind of step, with one stage and with several, kicks, composed paths.
 VARIANTS = {
     "splitting": lambda: compiled("toda3", 4, "splitting"),
@@ -49,7 +58,9 @@ VARIANTS = {
     "newton, not symmetric": lambda: compiled("pendulum_euler", 3),
     "gauge": lambda: _gauged("fast"),
     "gauge by a formula": lambda: _gauged("small"),
-    "modified": lambda: _modified("rigid_body", 2),
+    "gauge of two Casimirs": lambda: compile_spec(spec.loads(f"phigen: 1\nname: t\n{TWO_BODIES}")),
+    "modified": lambda: _modified(spec_of("rigid_body"), 2),
+    "modified, not symmetric": lambda: _modified(spec.loads(f"phigen: 1\nname: t\n{EULER}"), 1),
     # Paths cut into pieces, one whose expansion only looks finished, and steps that need the exact matrix.
     "path, in pieces": lambda: compile_text(f"{TURNING}birealisation: karasev\norder: 2\n{TURNING_RUN}"),
     "path, with a gap": lambda: compile_text(f"{GAP}birealisation: karasev\norder: 2\n"),
@@ -81,8 +92,8 @@ def _varied(text):
     return compile_spec(spec.loads(f"phigen: 1\nname: t\n{text}"), extras=Extras(tangent=True))
 
 
-def _modified(name, order):
-    return compile_spec(spec_of(name), order=order, extras=Extras(False, 1))
+def _modified(given, order):
+    return compile_spec(given, order=order, extras=Extras(False, 1))
 
 
 @cache
@@ -161,18 +172,24 @@ def test_observables_and_facts_are_those_of_the_system(case, answers):
     }
 
 
-@pytest.mark.parametrize("case", ["gauge", "gauge by a formula"])
+@pytest.mark.parametrize("case", ["gauge", "gauge by a formula", "gauge of two Casimirs"])
 def test_the_gauge_is_chosen_as_in_numpy_or_given(case, answers, tmp_path):
     compilation = compilation_of(case)
     at = setting(compilation)
     module = solver(compilation, "numpy").backend.module
     assert answers[case]["gauge"] == pytest.approx(module.gauge(at.x, **at.parameters), rel=1e-12)
-    (given,) = node(tmp_path, [(compilation, {"x0": at.x, "gauge": [0.25]}, at.h, 3)])
-    assert apart(given["x"], module.integrate(at.x, at.h, 3, gauge=[0.25])[-1]) < 1e-14
+    multiples = [0.25, -0.5][: len(answers[case]["gauge"])]
+    jobs = [{"x0": at.x, "gauge": multiples}, {"x0": [1e200] * len(at.x)}]
+    given, far = node(tmp_path, [(compilation, options, at.h, 3) for options in jobs])
+    assert apart(given["x"], module.integrate(at.x, at.h, 3, gauge=multiples)[-1]) < 1e-14
+    if "formula" not in case:  # of states so large the leading error is infinite
+        assert not np.any(far["gauge"])
+        assert not np.any(module.gauge([1e200] * len(at.x)))
 
 
-def test_the_modified_hamiltonian_is_that_of_numpy(answers):
-    compilation, found = compilation_of("modified"), answers["modified"]
+@pytest.mark.parametrize("case", ["modified", "modified, not symmetric"])
+def test_the_modified_hamiltonian_is_that_of_numpy(case, answers):
+    compilation, found = compilation_of(case), answers[case]
     at = setting(compilation)
     module = solver(compilation, "numpy").backend.module
     assert found["modified"] == pytest.approx(module.modified_hamiltonian(at.x, at.h, **at.parameters), rel=1e-14)
