@@ -63,7 +63,7 @@ def compile_spec(
     `SpecError` (no bi-realisation applies, H does not split, …) and `LimitError` (the program would be too large).
     """
     if spec.lattice:
-        return compile_lattice(spec, order=order, scheme=scheme, extras=extras)
+        return compile_lattice(spec, order=order, scheme=scheme, extras=extras, profile=profile)
     clock = _Clock()
     _tell_of_lattice(spec)
     with bounded(spec):
@@ -86,7 +86,7 @@ def examine(
     """
     clock = _Clock()
     if spec.lattice:
-        return _examine_lattice(spec, order, scheme, extras, clock)
+        return _examine_lattice(spec, order, scheme, extras, profile, clock)
     _tell_of_lattice(spec)
     with bounded(spec), progress.stage(spec.name):
         try:
@@ -136,7 +136,12 @@ def compile_proved(
 
 
 def compile_lattice(
-    spec: Spec, *, order: int | None = None, scheme: str | None = None, extras: Extras | None = None
+    spec: Spec,
+    *,
+    order: int | None = None,
+    scheme: str | None = None,
+    extras: Extras | None = None,
+    profile: str | None = None,
 ) -> Compilation:
     """Compile a lattice, of any sizes, to sweeps over its sites. Raises `SpecError` where H does not split."""
     clock = _Clock()
@@ -154,7 +159,7 @@ def compile_lattice(
                 title=spec.title,
                 licence=spec.license,
                 spec_sha256=spec.source_sha256,
-                profile=spec.profile,
+                profile=profile or spec.profile,
                 lanes=spec.solver.lanes,
             ),
         )
@@ -189,7 +194,7 @@ def _tell_of_lattice(spec: Spec) -> None:
 
 
 def _examine_lattice(
-    spec: Spec, order: int | None, scheme: str | None, extras: Extras | None, clock: _Clock
+    spec: Spec, order: int | None, scheme: str | None, extras: Extras | None, profile: str | None, clock: _Clock
 ) -> Examination:
     """Prove what can be proved about a lattice, for all sizes at once."""
     with bounded(spec), progress.stage(spec.name):
@@ -201,7 +206,7 @@ def _examine_lattice(
         if refuted(groups):
             return Examination(spec, groups, unexamined=UNEXAMINED if len(groups) == 1 else "")
         try:
-            compilation = compile_lattice(spec, order=order, scheme=scheme, extras=extras)
+            compilation = compile_lattice(spec, order=order, scheme=scheme, extras=extras, profile=profile)
         except SpecError as error:
             return Examination(spec, groups, obstacle=located(error, spec))
         groups = groups | clock.timed("proofs", lambda: statements.sweeps(compilation))

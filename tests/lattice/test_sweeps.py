@@ -232,7 +232,7 @@ def test_large_angles_are_turned_exactly_too() -> None:
 
 def test_code_does_not_grow_with_the_lattice() -> None:
     for name in TEXTS.keys() - {"sheet"}:  # three parts of two colours with nine neighbours
-        program = replace(compiled(name).program, profile="small")
+        program = compile_spec(specs.loads(f"phigen: 1\nname: {name}\n{TEXTS[name]}\n"), profile="small").program
         lines = sum(len(text.splitlines()) for text in emit(program, "c", "phigen").values())
         assert lines < 800, (name, lines)
 
