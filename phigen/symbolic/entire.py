@@ -28,14 +28,15 @@ _HALF = Fraction(1, 2)
 class Entire:
     """A function Σ c_n s^n: its coefficients, and the closed form that is used for |s| > ``radius``.
 
-    ``closed`` takes a library of functions (math or an mpmath context) and s. ``known`` is that for s > 0, and
-    ``slopes`` is the derivative, as `phigen.symbolic.functions` has them; None where there is no derivative.
+    ``closed`` are the forms for s > 0 and for s < 0, or one for both, from a library of functions, s and √|s|: math, an
+    mpmath context, or what makes formulas to print. ``known`` is the form for s > 0, and ``slopes`` is the
+    derivative, as `phigen.symbolic.functions` has them; None where there is no derivative.
     ``meaning`` is for the comments of generated code.
     """
 
     meaning: str
     coefficient: Callable[[int], Fraction]
-    closed: Callable[[Any, Any], Any]
+    closed: tuple[Callable[[Any, Any, Any], Any], ...]
     known: Callable[..., Any]
     slopes: Callable[..., tuple[Any, ...]] | None
     radius: float
@@ -47,31 +48,6 @@ class Entire:
         return [self.coefficient(k) for k in range(n)]
 
 
-def _cosroot(library: Any, s: Any) -> Any:
-    return library.cos(library.sqrt(s)) if s > 0 else library.cosh(library.sqrt(-s))
-
-
-def _sinroot(library: Any, s: Any) -> Any:
-    root = library.sqrt(abs(s))
-    return (library.sin(root) if s > 0 else library.sinh(root)) / root
-
-
-def _sinroot1(library: Any, s: Any) -> Any:
-    return (_cosroot(library, s) - _sinroot(library, s)) / (2 * s)
-
-
-def _arcroot(library: Any, s: Any) -> Any:
-    return (1 - _sinroot(library, s)) / s
-
-
-def _exprel(library: Any, s: Any) -> Any:
-    return library.expm1(s) / s
-
-
-def _exprel1(library: Any, s: Any) -> Any:
-    return (library.exp(s) - _exprel(library, s)) / s
-
-
 def _factorial(n: int) -> Fraction:
     return Fraction(1, math.factorial(n))
 
@@ -80,7 +56,7 @@ ENTIRE: dict[str, Entire] = {
     "cosroot": Entire(
         "cos(sqrt(s)), cosh(sqrt(-s)) for negative s",
         lambda n: (-1) ** n * _factorial(2 * n),
-        _cosroot,
+        (lambda f, s, root: f.cos(root), lambda f, s, root: f.cosh(root)),
         lambda call, s: call("cos", s**_HALF),
         lambda call, f, s: (-_HALF * call("sinroot", s),),
         1.0,
@@ -88,7 +64,7 @@ ENTIRE: dict[str, Entire] = {
     "sinroot": Entire(
         "sin(sqrt(s))/sqrt(s), sinh(sqrt(-s))/sqrt(-s) for negative s",
         lambda n: (-1) ** n * _factorial(2 * n + 1),
-        _sinroot,
+        (lambda f, s, root: f.sin(root) / root, lambda f, s, root: f.sinh(root) / root),
         lambda call, s: call("sin", s**_HALF) / s**_HALF,
         lambda call, f, s: (call("sinroot1", s),),
         1.0,
@@ -96,7 +72,7 @@ ENTIRE: dict[str, Entire] = {
     "sinroot1": Entire(
         "the derivative of sin(sqrt(s))/sqrt(s)",
         lambda n: (-1) ** (n + 1) * (n + 1) * _factorial(2 * n + 3),
-        _sinroot1,
+        (lambda f, s, root: (f.cosroot(s) - f.sinroot(s)) / (2 * s),),
         lambda call, s: (call("cosroot", s) - call("sinroot", s)) / (2 * s),
         None,
         1.0,
@@ -104,7 +80,7 @@ ENTIRE: dict[str, Entire] = {
     "arcroot": Entire(
         "(sqrt(s) - sin(sqrt(s)))/sqrt(s)**3, with sinh for negative s",
         lambda n: (-1) ** n * _factorial(2 * n + 3),
-        _arcroot,
+        (lambda f, s, root: (1 - f.sinroot(s)) / s,),
         lambda call, s: (1 - call("sinroot", s)) / s,
         lambda call, f, s: ((call("sinroot", s / 4) ** 2 / 2 - 3 * f) / (2 * s),),
         1.0,
@@ -112,7 +88,7 @@ ENTIRE: dict[str, Entire] = {
     "exprel": Entire(
         "(exp(s) - 1)/s",
         lambda n: _factorial(n + 1),
-        _exprel,
+        (lambda f, s, root: f.expm1(s) / s,),
         lambda call, s: (call("exp", s) - 1) / s,
         lambda call, f, s: (call("exprel1", s),),
         0.5,
@@ -120,7 +96,7 @@ ENTIRE: dict[str, Entire] = {
     "exprel1": Entire(
         "the derivative of (exp(s) - 1)/s",
         lambda n: (n + 1) * _factorial(n + 2),
-        _exprel1,
+        (lambda f, s, root: (f.exp(s) - f.exprel(s)) / s,),
         lambda call, s: (call("exp", s) - call("exprel", s)) / s,
         None,
         0.5,
@@ -128,11 +104,27 @@ ENTIRE: dict[str, Entire] = {
 }
 
 
+class _Library:
+    """A library of functions with those of `ENTIRE`, by their closed forms."""
+
+    def __init__(self, library: Any) -> None:
+        self._library = library
+
+    def __getattr__(self, name: str) -> Any:
+        return (lambda s: by_closed_form(self._library, name, s)) if name in ENTIRE else getattr(self._library, name)
+
+
+def by_closed_form(library: Any, name: str, s: Any) -> Any:
+    """The value where s is not small, from functions of a library."""
+    forms = ENTIRE[name].closed
+    return forms[0 if s > 0 else -1](_Library(library), s, library.sqrt(abs(s)))
+
+
 def in_double(name: str, s: float) -> float:
     """The value in double precision, as the generated code computes it."""
     function = ENTIRE[name]
     if abs(s) > function.radius:
-        return float(function.closed(math, s))
+        return float(by_closed_form(math, name, s))
     value = 0.0
     for c in reversed(function.terms()):
         value = value * s + float(c)
@@ -143,7 +135,7 @@ def precisely(context: Any, name: str, s: Any) -> Any:
     """The value in an mpmath context, to its precision but for a few digits."""
     function = ENTIRE[name]
     if abs(s) > 1:
-        return function.closed(context, s)
+        return by_closed_form(context, name, s)
     value = context.zero
     for n in reversed(range(context.dps // 2 + 20)):
         c = function.coefficient(n)

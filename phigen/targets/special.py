@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
+from phigen.scheme.lowering import expand_powers
 from phigen.scheme.program import Program
 from phigen.symbolic.entire import ENTIRE
-from phigen.symbolic.expression import topological
+from phigen.symbolic.expression import Expression, call, symbol, symbols_of, topological
 from phigen.symbolic.special import MIDDLE, NEAR, POLE, SPECIAL, near_coefficients, order_of, rest_coefficients
+from phigen.targets.names import Scope
+from phigen.targets.printer import Printer
+from phigen.targets.reserved import Reserved
 
 _MEANING = (
     "(1 - w cot w)/s with w = sqrt(s)/2, coth for negative s: the function of the exponential bi-realisation.",
@@ -53,26 +57,37 @@ def closed(order: int) -> tuple[str, ...]:
     return _CLOSED[: order + 1]
 
 
-_FAR = {
-    "cosroot": "np.where(s > 0.0, np.cos(np.sqrt(np.abs(s))), np.cosh(np.sqrt(np.abs(s))))",
-    "sinroot": "np.where(s > 0.0, np.sin(np.sqrt(np.abs(s))), np.sinh(np.sqrt(np.abs(s)))) / np.sqrt(np.abs(s))",
-    "sinroot1": "(_cosroot(s) - _sinroot(s)) / (2.0 * s)",
-    "arcroot": "(1.0 - _sinroot(s)) / s",
-    "exprel": "np.expm1(s) / s",
-    "exprel1": "(np.exp(s) - _exprel(s)) / s",
-}
-#: What the closed form of a function calls.
-NEEDS = {"sinroot1": ("cosroot", "sinroot"), "arcroot": ("sinroot",), "exprel1": ("exprel",)}
+class _Calls:
+    """A library whose functions make formulas."""
+
+    def __getattr__(self, name: str) -> Callable[..., Expression]:
+        return lambda *arguments: call(name, *arguments)
+
+
+def _closed_forms(function: str) -> list[Expression]:
+    """The closed forms of a function of `ENTIRE`, for s > 0 and for s < 0, or one for both; with √|s| as ``root``."""
+    return [form(_Calls(), symbol("s"), symbol("root")) for form in ENTIRE[function].closed]
+
+
+def far(function: str, printer: Callable[[Scope], Printer], choice: str) -> dict[str, object]:
+    """The closed form of a function of `ENTIRE` in a language, and whether it has the ``root`` of |s|.
+
+    ``choice`` says {0} for s > 0 and {1} for s < 0.
+    """
+    forms = _closed_forms(function)
+    texts = [printer(Scope(Reserved()))(expand_powers([form])[0]) for form in forms]
+    return {"far": choice.format(*texts) if len(texts) > 1 else texts[0], "root": "root" in symbols_of(*forms)}
 
 
 def entire_used(program: Program) -> list[str]:
     """The functions of `ENTIRE` that the kernels call, and those that these need, in order."""
     ops = {e.op for e in topological([e for kernel in program.kernels for e in kernel.roots])}
-    ops |= {needed for f in NEEDS if f in ops for needed in NEEDS[f]}
+    for f in (f for f in ENTIRE if f in ops):
+        ops = ops | {e.op for e in topological(_closed_forms(f))}
     return [name for name in ENTIRE if name in ops]
 
 
-def entire_values(function: str) -> Mapping[str, object]:
+def entire_values(function: str, printer: Callable[[Scope], Printer]) -> Mapping[str, object]:
     """The values of the template for one function of `ENTIRE` in NumPy."""
     found = ENTIRE[function]
     last, *others = [repr(float(c)) for c in reversed(found.terms())]
@@ -82,5 +97,5 @@ def entire_values(function: str) -> Mapping[str, object]:
         "radius": repr(found.radius),
         "last": last,
         "others": others,
-        "far": _FAR[function],
+        **far(function, printer, "np.where(s > 0.0, {0}, {1})"),
     }

@@ -9,7 +9,7 @@ from support import values
 
 from phigen.errors import SpecError
 from phigen.spec import loads
-from phigen.symbolic.entire import ENTIRE, in_double
+from phigen.symbolic.entire import ENTIRE, by_closed_form, in_double
 from phigen.symbolic.expression import ZERO, call, derivative, number, symbol
 from phigen.symbolic.numeric import evaluate, evaluate_precisely
 from phigen.symbolic.verdict import PROVED, REFUTED, decide_zero
@@ -64,7 +64,7 @@ def test_series_are_long_enough_and_no_longer():
         assert last > 1e-18 * abs(float(terms[0])), name
         assert math.isclose(
             in_double(name, function.radius),
-            float(function.closed(mpmath.mp, mpmath.mpf(function.radius))),
+            float(by_closed_form(mpmath.mp, name, mpmath.mpf(function.radius))),
             rel_tol=1e-15,
         )
 

@@ -22,6 +22,7 @@ from phigen.symbolic.special import (
     rest_coefficients,
 )
 from phigen.targets import special
+from phigen.targets.c.kernels import FUNCTIONS, printer
 from phigen.targets.c.layout import WIDTH
 from phigen.targets.polynomials import estrin
 from phigen.targets.rendering import render
@@ -48,14 +49,6 @@ _SMALL = {
         _inverse_factorials(2, 2, 9, -1),
         "z * ({P})",
     ),
-}
-_FAR = {
-    "cosroot": "s > 0.0 ? cos(sqrt(s)) : cosh(sqrt(-s))",
-    "sinroot": "s > 0.0 ? sin(sqrt(s)) / sqrt(s) : sinh(sqrt(-s)) / sqrt(-s)",
-    "sinroot1": "({NAME}_cosroot(s) - {NAME}_sinroot(s)) / (2.0 * s)",
-    "arcroot": "(1.0 - {NAME}_sinroot(s)) / s",
-    "exprel": "expm1(s) / s",
-    "exprel1": "(exp(s) - {NAME}_exprel(s)) / s",
 }
 
 
@@ -147,10 +140,13 @@ def _table(name: str, numbers: Sequence[float]) -> list[str]:
 def _values(program: Program, f: str) -> dict[str, object]:
     if f in ENTIRE:
         found, t, form = ENTIRE[f], "s", "{P}"
-        meaning, radius, far = found.meaning, found.radius, _FAR[f]
+        meaning, radius = found.meaning, found.radius
+        own = {**FUNCTIONS, **{name: f"{program.name}_{name}" for name in ENTIRE}}
+        outside = special.far(f, lambda scope: printer(scope, own), "s > 0.0 ? {0} : {1}")
         lines, value = estrin(found.terms(), t)
     else:
         meaning, radius, far, variable, coefficients, form = _SMALL[f]
+        outside = {"far": far, "root": False}
         lines, value = estrin(coefficients, variable)
         t, lines = "t", [*(["const double z = t * t;"] if variable == "z" else []), *lines]
     return {
@@ -159,7 +155,7 @@ def _values(program: Program, f: str) -> dict[str, object]:
         "meaning": meaning,
         "t": t,
         "radius": repr(radius),
-        "far": far.format(NAME=program.name),
+        **outside,
         "near": False,
         "lines": lines,
         "value": form.format(P=value),

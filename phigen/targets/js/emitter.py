@@ -98,7 +98,7 @@ def _model(program: Program) -> str:
     step = program.step
     pieces = [render("js", "system.mjs", _system(program))]
     pieces += [render("js", "implicit.mjs", _inner(step))] if isinstance(step, Implicit) else []
-    pieces += definitions(special.used(program), special.entire_used(program))
+    pieces += definitions(special.used(program), special.entire_used(program), LANGUAGE.printer)
     pieces += [_function(kernel) for kernel in _kernels(program)]
     pieces += [_path(program, step.recurrences, "path")] if isinstance(step, Path) else []
     if isinstance(step, Path) and step.tangent:

@@ -2,28 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, cast
 
 from phigen.symbolic.entire import ENTIRE
 from phigen.symbolic.special import near_coefficients, order_of, rest_coefficients
 from phigen.targets import special
+from phigen.targets.names import Scope
+from phigen.targets.printer import Printer
 from phigen.targets.rendering import render
 
-#: The closed forms of functions of `ENTIRE`, away from 0.
-_FAR = {
-    "cosroot": "s > 0 ? Math.cos(Math.sqrt(s)) : Math.cosh(Math.sqrt(-s))",
-    "sinroot": "s > 0 ? Math.sin(Math.sqrt(s)) / Math.sqrt(s) : Math.sinh(Math.sqrt(-s)) / Math.sqrt(-s)",
-    "sinroot1": "(cosroot(s) - sinroot(s)) / (2 * s)",
-    "arcroot": "(1 - sinroot(s)) / s",
-    "exprel": "Math.expm1(s) / s",
-    "exprel1": "(Math.exp(s) - exprel(s)) / s",
-}
 
-
-def definitions(phis: Sequence[str], entire: Sequence[str]) -> list[str]:
+def definitions(phis: Sequence[str], entire: Sequence[str], printer: Callable[[Scope], Printer]) -> list[str]:
     """The definitions of functions of `SPECIAL` and of `ENTIRE`."""
-    found = [render("js", "phi.mjs", _phi(f)) for f in phis] + [render("js", "entire.mjs", _entire(f)) for f in entire]
+    found = [render("js", "phi.mjs", _phi(f)) for f in phis] + [
+        render("js", "entire.mjs", _entire(f, printer)) for f in entire
+    ]
     polynomial = [render("js", "polynomial.mjs", {})] if found else []
     return [text.strip("\n") for text in (*polynomial, *found)]
 
@@ -45,12 +39,12 @@ def _phi(function: str) -> dict[str, Any]:
     }
 
 
-def _entire(function: str) -> dict[str, Any]:
+def _entire(function: str, printer: Callable[[Scope], Printer]) -> dict[str, Any]:
     found = ENTIRE[function]
     return {
         "function": function,
         "meaning": found.meaning,
         "radius": repr(found.radius),
         "coefficients": _listed([float(c) for c in found.terms()]),
-        "far": _FAR[function],
+        **special.far(function, printer, "s > 0 ? {0} : {1}"),
     }

@@ -71,7 +71,7 @@ def _body(program: Program) -> str:
     seen = program.observables
     pieces = [render("numpy", part, _values(program)) for part in ("preamble.py", "parameters.py")]
     pieces += [render("numpy", "phi.py", special.values(f, f"_{f}")) for f in special.used(program)]
-    pieces += [render("numpy", "entire.py", special.entire_values(f)) for f in special.entire_used(program)]
+    pieces += [render("numpy", "entire.py", special.entire_values(f, _printer)) for f in special.entire_used(program)]
     pieces += _step(program)
     search = ("gauge_line.py", "gauge.py") if program.searches_gauge else ("gauge_formula.py",)
     templates = search if program.gauge else ("level.py",) if program.monitor else ("no_gauge.py",)

@@ -50,7 +50,7 @@ def body(program: Program, step: Sweeps, prepare: str) -> str:
     pieces = [render("numpy", f"{part}.py", values) for part in ("lattice", "lattice_sites", "lattice_steps")]
     pieces += [render("numpy", "lattice_seen.py", values), prepare]
     pieces += [render("numpy", "phi.py", special.values(f, f"_{f}")) for f in special.used(program)]
-    pieces += [render("numpy", "entire.py", special.entire_values(f)) for f in special.entire_used(program)]
+    pieces += [render("numpy", "entire.py", special.entire_values(f, _printer)) for f in special.entire_used(program)]
     pieces += _pairs(program, step)
     pieces += [_sweep(program, step, sweep) for part in step.parts for sweep in part]
     parts = ["    (" + ", ".join(f"_{sweep.kernel.name}" for sweep in part) + ",)," for part in step.parts]
