@@ -97,6 +97,7 @@ def _model(program: Program) -> str:
     """What is printed of the system: constants and kernels."""
     step = program.step
     pieces = [render("js", "system.mjs", _system(program))]
+    pieces += [render("js", "schedule.mjs", _schedule(step))] if isinstance(step, Splitting) else []
     pieces += [render("js", "implicit.mjs", _inner(step))] if isinstance(step, Implicit) else []
     pieces += definitions(special.used(program), special.entire_used(program), LANGUAGE.printer)
     pieces += [_function(kernel) for kernel in _kernels(program)]
@@ -107,8 +108,7 @@ def _model(program: Program) -> str:
 
 
 def _system(program: Program) -> Mapping[str, object]:
-    step, parameters = program.step, program.parameters
-    schedule = step.schedule if isinstance(step, Splitting) else None
+    parameters = program.parameters
     properties = [f" * @property {{number}} {p.name} {plain(p.description)}".rstrip() for p in parameters]
     return {
         "contents": [f" * {part}".rstrip() for line in _contents(program) for part in textwrap.wrap(line, 100) or [""]],
@@ -126,11 +126,18 @@ def _system(program: Program) -> Mapping[str, object]:
         "monitored": program.monitor is not None,
         "fractions": json.dumps(program.fractions),
         "table": render("js", "table.mjs", _table(program)).strip("\n"),
-        "times": json.dumps(schedule.times) if schedule else "",
-        "multiples": json.dumps(schedule.multiples) if schedule and schedule.multiples else "",
-        "schedule": json.dumps(schedule.flows) if schedule else "",
-        "flows": _numbered("flow", step.flows if isinstance(step, Splitting) else ()),
-        "tangents": _numbered("tangent", step.tangents if isinstance(step, Splitting) else ()),
+    }
+
+
+def _schedule(step: Splitting) -> Mapping[str, object]:
+    """The flows of a step, and their times."""
+    schedule = step.schedule
+    return {
+        "times": json.dumps(schedule.times),
+        "multiples": json.dumps(schedule.multiples) if schedule.multiples else "",
+        "schedule": json.dumps(schedule.flows),
+        "flows": _numbered("flow", step.flows),
+        "tangents": _numbered("tangent", step.tangents),
     }
 
 
