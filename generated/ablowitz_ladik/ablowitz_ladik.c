@@ -20,7 +20,7 @@
  *   3. The lattice
  *   4. The solver
  *   5. What is seen at sites
- * body-sha256: 450ae8803ec77a6cbc6980625dc63185c72fc089c6ad9cbae9b4275f409ed18b
+ * body-sha256: 8772521fe7fb288c30387d88bbd5172668c0cf53de691bc9cd7881f0bf7a247a
  */
 #include "ablowitz_ladik.h"
 
@@ -192,7 +192,10 @@ static inline double ablowitz_ladik_log_lane(double u)
 /* cos(sqrt(s)), cosh(sqrt(-s)) for negative s: a polynomial where s is small. */
 static inline double ablowitz_ladik_cosroot(double s)
 {
-    if (fabs(s) > 1.0) return s > 0.0 ? cos(sqrt(s)) : cosh(sqrt(-s));
+    if (fabs(s) > 1.0) {
+        const double root = sqrt(fabs(s));
+        return s > 0.0 ? cos(root) : cosh(root);
+    }
     const double s2 = s * s, s4 = s2 * s2;
     const double a = (1.0 + -0.5 * s) + s2 * (0.041666666666666664 + -0.001388888888888889 * s);
     const double b = (2.48015873015873e-05 + -2.755731922398589e-07 * s) + s2 * (2.08767569878681e-09
@@ -204,7 +207,10 @@ static inline double ablowitz_ladik_cosroot(double s)
 /* sin(sqrt(s))/sqrt(s), sinh(sqrt(-s))/sqrt(-s) for negative s: a polynomial where s is small. */
 static inline double ablowitz_ladik_sinroot(double s)
 {
-    if (fabs(s) > 1.0) return s > 0.0 ? sin(sqrt(s)) / sqrt(s) : sinh(sqrt(-s)) / sqrt(-s);
+    if (fabs(s) > 1.0) {
+        const double root = sqrt(fabs(s));
+        return s > 0.0 ? sin(root) / root : sinh(root) / root;
+    }
     const double s2 = s * s, s4 = s2 * s2;
     const double a = (1.0 + -0.16666666666666666 * s) + s2 * (0.008333333333333333 + -0.0001984126984126984
         * s);

@@ -13,7 +13,7 @@
 #
 # SPDX-License-Identifier: 0BSD
 # This file belongs to whoever generated it; phigen claims no rights in it.
-# body-sha256: a69902a13c583105dd7d3cc614f2a756aa95d2ef625b4f66f835e24e1ff35280
+# body-sha256: 2d8d1801a96e2c62652243a72ce90257cf931c27341d0cb1560b6b1aa087119c
 import numpy as np
 
 VERSION = "0.1.0"
@@ -207,7 +207,8 @@ def _cosroot(s):
     value = value * small + 0.041666666666666664
     value = value * small + -0.5
     value = value * small + 1.0
-    return np.where(near, value, np.where(s > 0.0, np.cos(np.sqrt(np.abs(s))), np.cosh(np.sqrt(np.abs(s)))))
+    root = np.sqrt(np.abs(s))
+    return np.where(near, value, np.where(s > 0.0, np.cos(root), np.cosh(root)))
 
 
 def _sinroot(s):
@@ -224,7 +225,8 @@ def _sinroot(s):
     value = value * small + 0.008333333333333333
     value = value * small + -0.16666666666666666
     value = value * small + 1.0
-    return np.where(near, value, np.where(s > 0.0, np.sin(np.sqrt(np.abs(s))), np.sinh(np.sqrt(np.abs(s)))) / np.sqrt(np.abs(s)))
+    root = np.sqrt(np.abs(s))
+    return np.where(near, value, np.where(s > 0.0, np.sin(root) / root, np.sinh(root) / root))
 
 
 def _sweep1(coef, x, sites):
