@@ -1,4 +1,7 @@
 import { FRACTIONS, elapsed, energy, monitor } from "./model.mjs";
+// #if SPLITTING
+import { TIMES, prepareRow } from "./model.mjs";
+// #endif
 
 // ---- Physical time, of steps that are equal in tau ----
 
@@ -33,3 +36,11 @@ export function pass(solver, time) {
   solver.t = sum + small;
   solver.tCarry = small - (solver.t - sum);
 }
+
+// #if SPLITTING
+/** The coefficients of all flows of a step: a row for each time. */
+export function prepare(params, gauge, h, rows) {
+  TIMES.forEach((time, k) => prepareRow(params, gauge, time * h, rows[k]));
+}
+
+// #endif

@@ -2,13 +2,10 @@ import { makeStage } from "./newton.mjs";
 // #if IMPLICIT
 import { History } from "./guess.mjs";
 // #endif
-// #if GAUGE
 import { chooseGauge } from "./gauge.mjs";
 import { GAUGE } from "./model.mjs";
-// #endif
 // #if MONITOR
-import { chooseGauge, rateAt } from "./level.mjs";
-import { GAUGE } from "./model.mjs";
+import { rateAt } from "./level.mjs"; // and chooseGauge, in place of that of gauge.mjs
 // #endif
 import { CASIMIRS, COORDINATES, DEFAULT_PARAMETERS, DIM, NAME, ORDER } from "./model.mjs";
 import { COEFFICIENTS, FRACTIONS, POSITIVE, SPEC_SHA256, VERSION } from "./model.mjs";
@@ -282,10 +279,9 @@ export class Solver {
    * @returns {Float64Array} entry i * DIM + j is the derivative of the new x[i] along the old x[j]
    */
   stepTangent(h) {
-    // #if MONITOR
-    const { t, tCarry, steps } = this;
-    // #else
     const { t, steps } = this;
+    // #if MONITOR
+    const { tCarry } = this;
     // #endif
     const before = { x: Float64Array.from(this.x), carry: Float64Array.from(this.carry) };
     const at = { x: Float64Array.from(this.x), carry: Float64Array.from(this.carry) };

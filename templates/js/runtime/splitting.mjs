@@ -5,12 +5,10 @@ import { DIM, FLOWS, MULTIPLES, SCHEDULE, TIMES, prepareRow } from "./model.mjs"
 
 // ---- The step of a splitting: flows of parts of H, one after the other ----
 
-/** The coefficients of all flows of a step: a row for each time. */
 // #if MONITOR
-export function prepare(params, gauge, h, rows) {
-  TIMES.forEach((time, k) => prepareRow(params, gauge, time * h, rows[k]));
-}
+// prepare is that of level.mjs: its flows depend on the gauge.
 // #else
+/** The coefficients of all flows of a step: a row for each time. */
 export function prepare(params, h, rows) {
   // #if KICKS
   TIMES.forEach((time, k) => prepareRow(params, time * h, [MULTIPLES[k] * (h * h)], rows[k]));
@@ -22,12 +20,8 @@ export function prepare(params, h, rows) {
 
 const at = new Float64Array(DIM);
 const moved = new Float64Array(DIM);
-// #if MONITOR
-/** Increments, the time that a flow takes, and what is no number where a logarithm has none. */
+/** Increments; for a monitor the time that a flow takes, and what is no number where a logarithm has none. */
 const change = new Float64Array(DIM + 2);
-// #else
-const change = new Float64Array(DIM);
-// #endif
 
 /** One step: a status. If it fails, the state is as before. */
 export function makeStage(solver) {
