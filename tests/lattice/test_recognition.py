@@ -65,6 +65,7 @@ def test_specs_that_people_wrote_are_recognised_with_casimirs_invariants_and_run
     [
         ("x5*x1", "2*x5*x1"),  # one bond is stronger
         ("y1: {z1: -x1}", "y1: {z1: x1}"),  # one spin turns the other way
+        ("    y3: {z3: -x3}\n", ""),  # one bracket is missing
     ],
 )
 def test_one_site_that_differs_is_no_lattice(old: str, new: str) -> None:
