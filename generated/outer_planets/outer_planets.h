@@ -1,0 +1,97 @@
+/*
+ * outer_planets.h: the declarations; outer_planets.c says how they were made.
+ * DO NOT EDIT: edits are noticed by the checksum below.
+ * SPDX-License-Identifier: 0BSD
+ * body-sha256: e421c33b65c3c9ad5bdbc4e95a9fdbab4bdf9f605e086bde53dd25db9e1ebe94
+ */
+#ifndef OUTER_PLANETS_H
+#define OUTER_PLANETS_H
+
+#include <stddef.h>
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+#define outer_planets_AXES 1
+#define outer_planets_DIM 6
+#define outer_planets_ORDER 4
+#define outer_planets_CASIMIRS 0
+#define outer_planets_PHIGEN_VERSION "0.1.0"
+#define outer_planets_SPEC_SHA256 "4872d6ba15e2cf42961dec733b70ccb6eb8874221d7c80170561b402f7c63524"
+
+/* Axes, the slowest first: i. Fields of a site: x, y, z, px, py, pz. Casimirs: none. */
+typedef struct {
+    double G;        /* default 0.000295912208286 */
+    const double *m; /* at sites: masses */
+} outer_planets_params;
+
+extern const outer_planets_params outer_planets_default_params;
+
+enum { outer_planets_ARRAYS = 7 };        /* arrays over the sites: fields, then parameters */
+enum { outer_planets_COEFFICIENTS = 28 }; /* numbers that depend on params and h only */
+
+/* How a step ends; outer_planets_status_string says it in words. */
+typedef enum {
+    outer_planets_OK = 0, outer_planets_NO_CONVERGENCE, outer_planets_SINGULAR, outer_planets_NOT_FINITE,
+        outer_planets_BAD_ARGUMENT
+} outer_planets_status;
+
+/* The solver keeps the state in memory of the caller, row by row: a row is all sites along the last axis,
+   with copies of the other end beside it. Set it up with outer_planets_init; a copy of the struct is the same
+   solver, not another one. */
+typedef struct {
+    size_t sizes[outer_planets_AXES];
+    size_t sites, rows;
+    ptrdiff_t length, width; /* sites of a row; doubles between the beginnings of two rows */
+    /* in rows, each field, then each parameter at sites: the first site of the first row */
+    double *x[outer_planets_ARRAYS];
+    ptrdiff_t *lines;                    /* of each row, where it is and where those beside it are */
+    double *gathered[outer_planets_DIM]; /* for each field, what pairs add to the force at each site */
+    double *before[outer_planets_DIM];   /* the fields before the steps that are being made */
+    size_t steps;                        /* good steps since outer_planets_init */
+    double t;                            /* time since outer_planets_init */
+    double h;                            /* the last step size */
+    outer_planets_params params;
+    double coef[outer_planets_COEFFICIENTS]; /* all that depends on params and h only */
+    int prepared; /* whether coef has been computed */
+    size_t steps_before_h; /* steps and t when h was set: t is counted from there, so no error adds up */
+    double t_before_h;
+} outer_planets_solver;
+
+/* The bytes that the solver of a lattice needs as its memory; 0 for sizes that are not allowed. */
+size_t outer_planets_work_size(const size_t sizes[outer_planets_AXES]);
+
+/* Start at x0[field][site], the last axis fastest, with outer_planets_work_size(sizes) bytes of memory, as
+   from malloc, which must stay. params may be NULL for the defaults; its arrays are copied.
+   outer_planets_BAD_ARGUMENT if sizes are not allowed, x0 or a parameter is not finite, or one that has to be
+   positive is not. */
+outer_planets_status outer_planets_init(outer_planets_solver *s, const outer_planets_params *params,
+    const size_t sizes[outer_planets_AXES], const double *x0, void *work);
+
+/* Steps of size h, of either sign. If one fails, the state is that before it, and s->steps counts the good
+   ones. Steps of one call are joined: where a step ends as the next begins, both are one flow. With OpenMP
+   rows are worked at in parallel, with the same bits for any number of threads. */
+outer_planets_status outer_planets_step(outer_planets_solver *s, double h);
+outer_planets_status outer_planets_integrate(outer_planets_solver *s, double h, size_t steps);
+
+/* The state x[field][site]. */
+void outer_planets_state(const outer_planets_solver *s, double *x);
+
+/* The Hamiltonian; its density at each site; the densities out[k][site] of the Casimirs; the right-hand side
+   out[field][site]. */
+double outer_planets_hamiltonian(const outer_planets_solver *s);
+void outer_planets_density(const outer_planets_solver *s, double *out);
+void outer_planets_casimirs(const outer_planets_solver *s, double *out);
+void outer_planets_vector_field(const outer_planets_solver *s, double *out);
+
+const char *outer_planets_status_string(outer_planets_status status);
+
+/* For bindings: the size of outer_planets_solver, and its count of good steps. */
+size_t outer_planets_solver_size(void);
+size_t outer_planets_solver_steps_done(const outer_planets_solver *s);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif /* OUTER_PLANETS_H */
