@@ -20,7 +20,7 @@
  *   4. The implicit step, by Newton's method
  *   5. The solver
  *   6. Ensembles
- * body-sha256: 8ed739befc16e19193c60f90857db2676e4b99f82fbe8cc0c47151a3e316f074
+ * body-sha256: 764aa5611578941bbed2079223654f9a1001b7cd53b99e62e2a73f9bb8229a7a
  */
 #include "duffing.h"
 
@@ -42,6 +42,24 @@ enum { duffing_MAX_ITERATIONS = 20 }; /* of an inner solve */
 static int duffing_allowed(const duffing_params *params)
 {
     return isfinite(params->A) && isfinite(params->omega) && params->omega > 0.0;
+}
+
+/* everything that depends on the time, but not on the state */
+static void duffing_at_time(const double coef[22], double t, double now[restrict 11])
+{
+    const double t1 = coef[14] * t, t2 = cos(t1), t3 = coef[16] * t2, t4 = sin(t1), t5 = coef[19] * t4;
+    const double t6 = coef[20] * t2;
+    now[0] = coef[15] * t2;
+    now[1] = (-1.0 / 80.0) * t3;
+    now[2] = 2.0 * (coef[18] + 1.0 / 80.0 * (coef[17] * (t2 * t2)));
+    now[3] = 1.0 / 20.0 * t5;
+    now[4] = 3.0 * t6;
+    now[5] = (-0.125) * t3;
+    now[6] = coef[21] * t4;
+    now[7] = (-1.0 / 40.0) * t3;
+    now[8] = 1.0 / 40.0 * t5;
+    now[9] = 6.0 * t6;
+    now[10] = (-0.5) * t3;
 }
 
 /* everything that depends on parameters and step size only */
@@ -75,24 +93,6 @@ static void duffing_prepare(const duffing_params *params, double h, double coef[
     coef[19] = t9 * t5;
     coef[20] = params->A * t2 * (-1.0 / 12.0 + t1 * (1.0 / 30.0 + t10));
     coef[21] = t9 * t2 * (1.0 / 12.0 + t1 * (-1.0 / 120.0 - t10));
-}
-
-/* everything that depends on the time, but not on the state */
-static void duffing_refresh(const double coef[22], double t, double now[restrict 11])
-{
-    const double t1 = coef[14] * t, t2 = cos(t1), t3 = coef[16] * t2, t4 = sin(t1), t5 = coef[19] * t4;
-    const double t6 = coef[20] * t2;
-    now[0] = coef[15] * t2;
-    now[1] = (-1.0 / 80.0) * t3;
-    now[2] = 2.0 * (coef[18] + 1.0 / 80.0 * (coef[17] * (t2 * t2)));
-    now[3] = 1.0 / 20.0 * t5;
-    now[4] = 3.0 * t6;
-    now[5] = (-0.125) * t3;
-    now[6] = coef[21] * t4;
-    now[7] = (-1.0 / 40.0) * t3;
-    now[8] = 1.0 / 40.0 * t5;
-    now[9] = 6.0 * t6;
-    now[10] = (-0.5) * t3;
 }
 
 /* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
@@ -364,7 +364,7 @@ static duffing_status duffing_set_step(duffing_solver *s, double h)
 /* What depends on the time of the next step. */
 static void duffing_renew(duffing_solver *s)
 {
-    duffing_refresh(s->coef, s->t + duffing_middles * s->h, s->coef + duffing_PREPARED);
+    duffing_at_time(s->coef, s->t + duffing_middles * s->h, s->coef + duffing_PREPARED);
 }
 
 /* One stage. A guess from earlier steps may have misled it: then once more without. */

@@ -20,7 +20,7 @@
  *   4. The implicit step, by Newton's method
  *   5. The solver
  *   6. Ensembles
- * body-sha256: df7f19022f982b171fb54264b6d2349bb7c8616e421019b738c635eefa7150af
+ * body-sha256: 423bd7b13a6778caa69105a9b84b03c22c38038538bb37585c9b997ae9b3b81b
  */
 #include "spin_resonance.h"
 
@@ -95,6 +95,20 @@ static double spin_resonance_phi1(double s)
     return (0.5 * s * phi0 * phi0 - 1.5 * phi0 + 0.125) / s;
 }
 
+/* everything that depends on the time, but not on the state */
+static void spin_resonance_at_time(const double coef[7], double t, double now[restrict 8])
+{
+    const double t1 = coef[1] * t, t2 = cos(t1), t3 = sin(t1), t4 = t3 * t3, t5 = t2 * t2;
+    now[0] = coef[2] * t2;
+    now[1] = (-1.0 / 12.0) * (coef[3] * t2);
+    now[2] = (-1.0 / 12.0) * (coef[4] * (t2 * t3));
+    now[3] = 1.0 / 12.0 * (coef[4] * t4);
+    now[4] = coef[2] * t3;
+    now[5] = (-1.0 / 12.0) * (coef[3] * t3);
+    now[6] = 1.0 / 12.0 * (coef[4] * t5);
+    now[7] = (-1.0 / 12.0) * (coef[5] * t5) - coef[6] - 1.0 / 12.0 * (coef[5] * t4);
+}
+
 /* everything that depends on parameters and step size only */
 static void spin_resonance_prepare(const spin_resonance_params *params, double h, double coef[restrict 7])
 {
@@ -107,20 +121,6 @@ static void spin_resonance_prepare(const spin_resonance_params *params, double h
     coef[4] = t2 * (params->D * t3);
     coef[5] = t2 * (params->omega * t3);
     coef[6] = params->b0 * h;
-}
-
-/* everything that depends on the time, but not on the state */
-static void spin_resonance_refresh(const double coef[7], double t, double now[restrict 8])
-{
-    const double t1 = coef[1] * t, t2 = cos(t1), t3 = sin(t1), t4 = t3 * t3, t5 = t2 * t2;
-    now[0] = coef[2] * t2;
-    now[1] = (-1.0 / 12.0) * (coef[3] * t2);
-    now[2] = (-1.0 / 12.0) * (coef[4] * (t2 * t3));
-    now[3] = 1.0 / 12.0 * (coef[4] * t4);
-    now[4] = coef[2] * t3;
-    now[5] = (-1.0 / 12.0) * (coef[3] * t3);
-    now[6] = 1.0 / 12.0 * (coef[4] * t5);
-    now[7] = (-1.0 / 12.0) * (coef[5] * t5) - coef[6] - 1.0 / 12.0 * (coef[5] * t4);
 }
 
 /* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
@@ -432,7 +432,7 @@ static spin_resonance_status spin_resonance_set_step(spin_resonance_solver *s, d
 /* What depends on the time of the next step. */
 static void spin_resonance_renew(spin_resonance_solver *s)
 {
-    spin_resonance_refresh(s->coef, s->t + spin_resonance_middles * s->h, s->coef + spin_resonance_PREPARED);
+    spin_resonance_at_time(s->coef, s->t + spin_resonance_middles * s->h, s->coef + spin_resonance_PREPARED);
 }
 
 /* One stage. A guess from earlier steps may have misled it: then once more without. */

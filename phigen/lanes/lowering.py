@@ -14,7 +14,7 @@ from phigen.lanes import paths
 from phigen.lanes.functions import NEAR_FUNCTIONS, library_calls, library_powers, operations, with_formulas
 from phigen.scheme.kernel import Kernel
 from phigen.scheme.program import Program
-from phigen.scheme.steps import Explicit, Factorisation, Newton, Path, PathLanes, Splitting, Sweeps
+from phigen.scheme.steps import Explicit, Factorisation, Implicit, Newton, Path, PathLanes, Splitting, Sweeps
 from phigen.symbolic.expression import topological
 
 #: Points at which a kernel for lanes is evaluated at once: what one vector of AVX-512 holds.
@@ -98,8 +98,10 @@ def in_lanes(program: Program) -> Lanes | None:
     """What is computed in lanes; None where the spec says no, or it is not possible, or would need too much room."""
     if isinstance(program.step, Sweeps):
         return _rows(program, program.step)
-    if not (program.lanes and program.offers("lanes")) or program.time:
+    if not (program.lanes and program.offers("lanes")):
         return None
+    if program.time and (program.monitor or not isinstance(program.step, Implicit)):
+        return None  # members in packs would share coefficients that differ from step to step
     match program.step:
         case Newton() as step:
             return _newton(program, step)

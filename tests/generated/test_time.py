@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import sympy
 from scipy.integrate import solve_ivp
-from support import COMMAND, compile_text, compiled, solver, tool
+from support import COMMAND, RawC, compile_text, compiled, files, solver, tool
 
 import phigen
 from phigen import spec
@@ -378,3 +378,21 @@ def test_every_flow_sees_the_time_of_its_place():
     assert (alone.flows, alone.moments) == ([(0, 0), (0, 2)], (0.0, 0.0, 1.0))
     with pytest.raises(ValueError, match="two times"):
         with_clock(schedule(STRANG, 5), 2, 5)
+
+
+@pytest.mark.parametrize("kind", ["newton, non-linear π", "newton, composed", "path"])
+def test_blocks_of_steps_see_the_time_of_each_step(kind):
+    compilation = compilation_of(kind)
+    assert "t_renew_lanes" in files(compilation, "c")["t.c"]
+    single = replace(compilation, program=replace(compilation.program, lanes=False))
+    rows = [solver(c, "c").integrate(start_of(kind), 0.05, 800, 100, t0=T0).x for c in (compilation, single)]
+    assert rows[0] == pytest.approx(rows[1], abs=1e-13)
+    assert evaluations(compilation, kind) != evaluations(single, kind)
+
+
+def evaluations(compilation, kind):
+    """How often the generating function was evaluated in 800 steps."""
+    raw = RawC(compilation)
+    assert raw.init(start_of(kind)) == 0
+    assert raw.integrate(0.05, 800) == 0
+    return int(raw.counters[1])

@@ -188,13 +188,15 @@ def _model(program: Program, lanes: Lanes | None, has: Mapping[str, bool], other
     body = functions.called(program)
     own: list[Kernel | None] = []
     if not isinstance(step, Splitting | Sweeps):
-        own = [step.prepare, step.refresh, step.main]
+        own = [step.prepare, step.main]
     if isinstance(step, Implicit) and has["UNROLLED"]:
         own.append(step.eliminate)
     own += program.choice
     own += [program.monitor.elapsed] if program.monitor else []
     own += [step.tangent] if isinstance(step, Explicit) else []
     own += [program.attitude.turn, program.attitude.rate] if program.attitude else []
+    if step.refresh and not isinstance(step, Splitting):
+        body.append(function(program, step.refresh, name="at_time"))
     body += [function(program, kernel) for kernel in own if kernel]
     body.append(function(program, seen.energy, name="hamiltonian", exported=True, returning=True))
     body += [function(program, kernel, exported=True) for kernel in (seen.casimirs, seen.vector_field)]

@@ -81,4 +81,4 @@ def switches(program: Program, lanes: Lanes | None) -> dict[str, bool]:
     for feature in FEATURES:
         asked = feature.when(program) and feature.in_lanes(lanes) and program.offers(feature.part)
         found[feature.name] = all(found[name] for name in feature.requires) and bool(asked)
-    return found | {"GROUPS": found["BLOCKS"] and found["ENSEMBLE"] and grouped(program, lanes)}
+    return found | {"GROUPS": found["BLOCKS"] and found["ENSEMBLE"] and not program.time and grouped(program, lanes)}

@@ -104,6 +104,23 @@ static void phi_refresh(const phi_solver *s, phi_table *table)
     for (int stage = 0; stage < PHI_STAGES; ++stage) phi_refresh_stage(s, stage, table);
 }
 
+#if PHI_RENEWED
+/* What depends on the times of the next steps, which differ from lane to lane. */
+static void phi_renew_lanes(const phi_solver *s, phi_table *table)
+{
+    const double done = (double)(s->steps - s->steps_before_h);
+    double now[PHI_COEFFICIENTS - PHI_PREPARED];
+    for (int stage = 0; stage < PHI_STAGES; ++stage) {
+        for (int lane = 0; lane < PHI_LANES; ++lane) {
+            const double t = s->t_before_h + (done + lane) * s->h;
+            phi_at_time(s->coef[stage], t + phi_middles[stage] * s->h, now);
+            for (int k = PHI_PREPARED; k < PHI_COEFFICIENTS; ++k)
+                table->coef[stage][k][lane] = now[k - PHI_PREPARED];
+        }
+    }
+}
+
+#endif
 /* Guesses for the next PHI_LANES values of a stage, by its recurrences. */
 static void phi_foresee(const phi_history *history, phi_lanes weight[restrict][PHI_DIM],
     phi_lanes y[restrict PHI_DIM])
@@ -149,6 +166,10 @@ static void phi_march(const phi_solver *s, phi_table *table, phi_models *models)
 {
     static const double reach[4] = { 0.5, 0.5, 1.0, 0.0 }, weight[4] = { 1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0 };
     double x[PHI_DIM], point[PHI_DIM], slope[PHI_DIM], mean[PHI_DIM];
+#if PHI_TIMED
+    static const double after[4] = { 0.0, 0.5, 0.5, 1.0 };
+    double begin = s->t;
+#endif
     memcpy(x, s->x, sizeof x);
 #if PHI_COMPOSED
     for (int k = 0; k < PHI_STAGES * PHI_LANES; ++k) {
@@ -163,7 +184,11 @@ static void phi_march(const phi_solver *s, phi_table *table, phi_models *models)
         memcpy(point, x, sizeof x);
         memset(mean, 0, sizeof mean);
         for (int part = 0; part < 4; ++part) {
+#if PHI_TIMED
+            phi_vector_field(&s->params, begin + after[part] * h, point, slope);
+#else
             phi_vector_field(&s->params, point, slope);
+#endif
 #if PHI_MONITOR
             const double rate = phi_monitor(&s->params, point);
             for (int i = 0; i < PHI_DIM; ++i) slope[i] *= rate;
@@ -177,6 +202,9 @@ static void phi_march(const phi_solver *s, phi_table *table, phi_models *models)
             at->y[i][lane] = x[i] + 0.5 * h * mean[i];
             x[i] += h * mean[i];
         }
+#if PHI_TIMED
+        begin += h;
+#endif
     }
     for (int stage = 0; stage < PHI_STAGES; ++stage) phi_from_means(table->coef[stage], &models->stage[stage]);
 }
@@ -383,6 +411,9 @@ phi_status phi_integrate(phi_solver *s, double h, size_t steps)
         if (steps >= PHI_LANES && s->blocks.single_steps == 0) phi_choose_guess(s, steps);
         if (steps >= PHI_LANES && s->blocks.single_steps == 0) {
             phi_refresh(s, &table);
+#if PHI_RENEWED
+            phi_renew_lanes(s, &table);
+#endif
             const int passes = phi_block(s, &table, (int)((double)PHI_PASSES * s->blocks.evaluations_per_stage + 0.5));
             phi_learn_from(s, passes);
             if (passes > 0) steps -= PHI_LANES;

@@ -135,11 +135,11 @@ static void phi_renew(phi_solver *s)
 #if PHI_SPLITTING
     for (int k = 0; k < PHI_ROWS_OF_FLOWS; ++k) {
         double *row = s->coef[0] + k * PHI_ROW;
-        phi_refresh(row, s->t + phi_moments[k] * s->h, row + PHI_PREPARED);
+        phi_at_time(row, s->t + phi_moments[k] * s->h, row + PHI_PREPARED);
     }
 #else
     for (int stage = 0; stage < PHI_STAGES; ++stage)
-        phi_refresh(s->coef[stage], s->t + phi_middles[stage] * s->h, s->coef[stage] + PHI_PREPARED);
+        phi_at_time(s->coef[stage], s->t + phi_middles[stage] * s->h, s->coef[stage] + PHI_PREPARED);
 #endif
 }
 
