@@ -26,7 +26,7 @@ from phigen.runtime.march import Piece, march
 from phigen.runtime.session import Session
 from phigen.runtime.solver import Solver
 from phigen.runtime.tables import Table, opened
-from phigen.runtime.trajectory import Trajectory, trajectory_columns
+from phigen.runtime.trajectory import Trajectory, element_columns, trajectory_columns
 from phigen.study.lyapunov import FrameGrowth, Spectrum
 from phigen.study.sections import function_of
 from phigen.study.sketch import POINTS, Sketch, Thinned
@@ -139,7 +139,7 @@ class Recorder:
             t = piece.passed
         energy = self.solver.energies(piece.x, t, self.experiment.parameters)
         casimirs = self.solver.backend.casimirs(piece.x, self.experiment.parameters)
-        rows = np.column_stack([t, piece.x, energy, casimirs])
+        rows = np.column_stack([t, piece.x, energy, casimirs, piece.turned])
         worked = self.watch.see(t, piece.x)
         self.sketch.see(np.column_stack([t, piece.x, energy - worked, casimirs]))
         crossings = np.array([[t, *x] for t, x in piece.crossings]).reshape(-1, 1 + piece.x.shape[1])
@@ -197,7 +197,8 @@ class Recorder:
 
     def _open(self, arrays: Mapping[str, Any]) -> None:
         names = self.solver.interface
-        columns = {"output": trajectory_columns(names.coordinates, names.casimirs),
+        turned = element_columns(names.attitude, position=names.position)
+        columns = {"output": trajectory_columns(names.coordinates, names.casimirs, turned),
                    "section": section_columns(names.coordinates)}  # fmt: skip
         for name, path in (("output", self.files.output), ("section", self.files.section)):
             if path:

@@ -134,6 +134,7 @@ def _expect_offered(cell: Cell, scheme: str, extras: Extras, locations: Mapping[
         message = "brackets between the sites of pairs are not compiled"
         problems.append(Diagnostic(message, locations.get(("poisson",))))
     asked = [name for name in ("modified_hamiltonian", "tangent") if getattr(extras, name)]
+    asked += ["reconstruct"] if ("reconstruct",) in locations else []
     problems += [Diagnostic(f"{name} is not offered for lattices", locations.get((name,))) for name in asked]
     if problems:
         raise SpecError(problems)

@@ -23,13 +23,18 @@ class Piece:
     """What a piece of an integration gave: the stored steps and their states, and crossings of the section.
 
     ``numbers`` (rows,), ``x`` (rows, DIM), ``crossings`` as pairs of time and state (DIM,). ``passed`` (rows,) is the
-    physical time of each where the solver keeps it, NaN elsewhere.
+    physical time of each where the solver keeps it, NaN elsewhere. ``turned`` (rows, numbers) are their attitudes.
     """
 
     numbers: NDArray[np.int64]
     x: Floats
     crossings: list[tuple[float, Floats]]
     passed: Floats
+    turned: Floats
+
+
+#: The physical time of a row, and the numbers of its attitude.
+Mark = tuple[float, Floats]
 
 
 def march(
@@ -50,26 +55,28 @@ def march(
     """
     size = 1
     if not begun:
-        yield Piece(np.zeros(1, dtype=np.int64), session.state()[np.newaxis], [], np.array([session.time()]))
+        begin = np.zeros(1, dtype=np.int64), session.state()[np.newaxis]
+        yield Piece(*begin, [], np.array([session.time()]), session.element()[np.newaxis])
     while session.steps < steps:
         start = time.perf_counter()
-        rows: dict[int, tuple[Floats, float]] = {}
+        rows: dict[int, tuple[Floats, Mark]] = {}
         crossings: list[tuple[float, Floats]] = []
         failure = None
         try:
-            for number, states, times, found in _states(
+            for number, states, marks, found in _states(
                 session, h, min(steps, session.steps + size), stride, finder, see_tangent
             ):
                 crossings += found
-                here = zip(states, times, strict=False)
+                here = zip(states, marks, strict=False)
                 rows |= {number + k: row for k, row in enumerate(here) if (number + k) % stride == 0}
         except BackendError as error:
             failure = error
         if session.steps == steps or (failure and session.steps):
-            rows[session.steps] = session.state(), session.time()
+            rows[session.steps] = session.state(), (session.time(), session.element())
         x = np.array([state for state, _ in rows.values()]).reshape(len(rows), len(session.state()))
-        passed = np.array([time for _, time in rows.values()])
-        yield Piece(np.array(list(rows), dtype=np.int64), x, crossings, passed)
+        passed = np.array([time for _, (time, _) in rows.values()])
+        turned = np.array([element for _, (_, element) in rows.values()]).reshape(len(rows), len(session.element()))
+        yield Piece(np.array(list(rows), dtype=np.int64), x, crossings, passed, turned)
         if failure:
             raise failure
         quick = time.perf_counter() - start < _SECONDS
@@ -83,21 +90,21 @@ def _states(
     stride: int,
     finder: CrossingFinder[Session] | None,
     see_tangent: Callable[[Floats], None] | None,
-) -> Iterator[tuple[int, Sequence[Floats] | Floats, Sequence[float], list[tuple[float, Floats]]]]:
-    """The number of a step, its state and time and those of the steps after it, and crossings; nothing is left out."""
-    times: list[float] = []
+) -> Iterator[tuple[int, Sequence[Floats] | Floats, Sequence[Mark], list[tuple[float, Floats]]]]:
+    """The number of a step, its state and mark and those of the steps after it, and crossings; nothing is left out."""
+    marks: list[Mark] = []
 
     def move() -> None:
         if see_tangent:
             see_tangent(session.advance_tangent(h))
         else:
             session.advance(h, 1)
-        times.append(session.time())
+        marks.append((session.time(), session.element()))
 
     if finder:
         for states, found in finder.follow(session, target - session.steps, move):
-            yield session.steps - len(states) + 1, states, times, found
-            times.clear()
+            yield session.steps - len(states) + 1, states, marks, found
+            marks.clear()
         return
     done = session.steps
     while done < target:
@@ -107,4 +114,4 @@ def _states(
         else:
             session.advance(h, count)
         done += count
-        yield done, [session.state()], [session.time()], []
+        yield done, [session.state()], [(session.time(), session.element())], []

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -120,11 +120,16 @@ class Trajectory:
         ``.csv``: ``t,x1,…,energy,C…``, one line per row; every float reads back as the same float. ``.npz``: the arrays
         t, x, energy, casimir_NAME, coordinates, and steps, h, parameter_NAME as scalars.
         """
-        write(path, trajectory_columns(self.coordinates, tuple(self.casimirs)), self.rows(), self.scalars())
+        shape = () if self.attitude is None else self.attitude.shape[1:]
+        turned = element_columns(shape, position=self.position is not None)
+        columns = trajectory_columns(self.coordinates, tuple(self.casimirs), turned)
+        write(path, columns, self.rows(), self.scalars())
 
     def rows(self) -> Floats:
         """All columns side by side, (rows, columns), as they are written to files."""
-        return np.column_stack([self.t, self.x, self.energy, *self.casimirs.values()])
+        turned = [] if self.attitude is None else [self.attitude.reshape(len(self), -1)]
+        turned += [] if self.position is None else [self.position]
+        return np.column_stack([self.t, self.x, self.energy, *self.casimirs.values(), *turned])
 
     def scalars(self) -> dict[str, Any]:
         """What a ``.npz`` holds beside the columns."""
@@ -141,10 +146,23 @@ def turned_into(interface: Interface, elements: Floats) -> tuple[Floats | None, 
     return attitude, elements[:, size:] if interface.position else None
 
 
-def trajectory_columns(coordinates: tuple[str, ...], casimirs: tuple[str, ...]) -> list[Column]:
+def element_columns(shape: tuple[int, ...], *, position: bool) -> list[Column]:
+    """The columns of attitudes of that shape, none for (), and of positions."""
+    if not shape:
+        return []
+    rows = range(1, shape[0] + 1)
+    letters = "wxyz" if len(shape) == 1 else [f"{i}_{j}" for i in rows for j in rows]
+    found = [Column("attitude", tuple(f"attitude_{a}" for a in letters))]
+    return found + ([Column("position", tuple(f"position_{a}" for a in "xyz"))] if position else [])
+
+
+def trajectory_columns(
+    coordinates: tuple[str, ...], casimirs: tuple[str, ...], turned: Sequence[Column] = ()
+) -> list[Column]:
     """The columns of a table of states; no two have one name, so a coordinate ``t`` is in the column ``t_``."""
-    own = Reserved(frozenset(["t", "energy"]))
+    own = Reserved(frozenset(["t", "energy", *(name for column in turned for name in column.names)]))
     named = tuple(identifiers(coordinates, own).values())
     first = [Column("t", ("t",), flat=True), Column("x", named), Column("energy", ("energy",), flat=True)]
     given = identifiers(casimirs, own | named)
-    return [*first, *(Column(f"casimir_{name}", (given[name],), flat=True) for name in casimirs)]
+    listed = [Column(f"casimir_{name}", (given[name],), flat=True) for name in casimirs]
+    return [*first, *listed, *turned]

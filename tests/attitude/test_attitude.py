@@ -12,10 +12,12 @@ from scipy.special import ellipj
 import phigen
 from phigen import spec as specs
 from phigen.api import interface_of, solver_of
-from phigen.compiler import compile_spec, examine
+from phigen.compiler import compile_spec, emit, examine
 from phigen.errors import SpecError
 from phigen.proofs import attitude as proofs
 from phigen.proofs.statements import ATTITUDE
+from phigen.runtime.crossings import CrossingFinder
+from phigen.runtime.march import march
 from phigen.runtime.solver import Solver
 from phigen.symbolic.verdict import PROVED, REFUTED
 
@@ -387,14 +389,45 @@ REFUSED = {
         "so(3)", "plus", 3, ASKED, "birealisation: {kind: group-map, tau: (1 + P/2)/(1 - P/2)}"
     ): "no group element",
     ROUND: "the part H_",
+    BODY + "damping: 1/10\n": "not offered with forces",
+    BODY + "monitor: 1 + x1**2\n": "not offered with a monitor",
 }
 
 
-@pytest.mark.parametrize(("text", "message"), REFUSED.items(), ids=["no algebra", "no rotations", "no element", "part"])
+@pytest.mark.parametrize(
+    ("text", "message"), REFUSED.items(), ids=["no algebra", "no rotations", "no element", "part", "forces", "monitor"]
+)
 def test_what_has_no_attitude_is_refused_at_the_key(text, message):
     with pytest.raises(SpecError) as caught:
         compiled_text(text)
     (diagnostic,) = caught.value.diagnostics
     assert message in diagnostic.message
     assert diagnostic.location is not None
-    assert diagnostic.hint
+
+
+def test_files_have_the_attitude_and_position(tmp_path):
+    found = solver("top").integrate(np.linspace(0.5, 1.0, 6), 0.05, 7, 3)
+    for name in ("a.csv", "a.npz"):
+        found.save(tmp_path / name)
+    head, *lines = (tmp_path / "a.csv").read_text().splitlines()
+    assert head.endswith("attitude_w,attitude_x,attitude_y,attitude_z,position_x,position_y,position_z")
+    assert np.array([line.split(",")[-7:] for line in lines], dtype=float)[:, :4].tolist() == found.attitude.tolist()
+    with np.load(tmp_path / "a.npz") as stored:
+        assert np.array_equal(stored["attitude"], found.attitude)
+        assert np.array_equal(stored["position"], found.position)
+
+
+@pytest.mark.parametrize("section", [False, True])
+def test_long_runs_give_the_attitude_of_each_row(section):
+    backend, parameters = solver("body").backend, solver("body").interface.parameters
+    start = np.array([0.3, 1.0, 0.2])
+    finder = CrossingFinder(lambda x: x[:, 0], 0.1) if section else None
+    pieces = list(march(backend.start(start, parameters), 0.1, 25, 4, finder))
+    found = solver("body").integrate(start, 0.1, 25, 4)
+    assert np.array_equal(np.concatenate([p.numbers for p in pieces]), np.array([0, 4, 8, 12, 16, 20, 24, 25]))
+    assert np.array_equal(np.concatenate([p.turned for p in pieces]), found.attitude)
+
+
+def test_javascript_refuses_what_it_would_leave_out():
+    with pytest.raises(SpecError, match="not offered in JavaScript"):
+        emit(made("body").program, "js", "phigen build t")

@@ -52,9 +52,12 @@ PATH_SYNTAX = Syntax(
 
 
 def emit(program: Program, command: str) -> dict[str, str]:
-    """The file name and its contents. Raises `SpecError` for lattices, which are not offered."""
+    """The file name and its contents. Raises `SpecError` for lattices and attitudes, which are not offered."""
     if isinstance(program.step, Sweeps):
         message = f"{program.name} is a lattice; lattices are not offered in JavaScript"
+        raise SpecError([Diagnostic(message, hint="the targets c and numpy have them")])
+    if program.attitude:
+        message = f"{program.name} reconstructs attitudes, which are not offered in JavaScript"
         raise SpecError([Diagnostic(message, hint="the targets c and numpy have them")])
     step, features = program.step, _features(program)
     chosen = {Newton: "newton", Explicit: "explicit", Path: "path", Splitting: "splitting"}[type(step)]

@@ -1,0 +1,118 @@
+/*
+ * dzhanibekov.h: the declarations; dzhanibekov.c says how they were made.
+ * DO NOT EDIT: edits are noticed by the checksum below.
+ * SPDX-License-Identifier: 0BSD
+ * body-sha256: 339ce6bab7fc9ca85d111e4791eee6968b4aa3f12ae5d13812a9c4e3f26c1df8
+ */
+#ifndef DZHANIBEKOV_H
+#define DZHANIBEKOV_H
+
+#include <stddef.h>
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+#define dzhanibekov_DIM 3
+#define dzhanibekov_ORDER 6
+#define dzhanibekov_CASIMIRS 1
+#define dzhanibekov_PHIGEN_VERSION "0.1.0"
+#define dzhanibekov_SPEC_SHA256 "8d1b03e49d35b7889e21e86194cfe6f3109fbfd42eb5a884d201f81a3ea4ca1b"
+
+/* State vectors: x1, x2, x3. Casimirs: C. */
+typedef struct {
+    double I1; /* least moment of inertia */
+    double I2; /* intermediate moment of inertia */
+    double I3; /* largest moment of inertia */
+} dzhanibekov_params;
+
+extern const dzhanibekov_params dzhanibekov_default_params;
+
+enum { dzhanibekov_COEFFICIENTS = 35 }; /* numbers that depend on params and h only */
+enum { dzhanibekov_GAUGES = 1 };        /* Casimirs whose multiples are taken from H: C */
+enum { dzhanibekov_ATTITUDE_SIZE = 4 }; /* numbers of an attitude, a quaternion */
+enum { dzhanibekov_ELEMENT = 4 };       /* numbers of an element of the group */
+enum { dzhanibekov_RATE = 3 };          /* numbers of what the Casimirs turn */
+
+/* How a step ends; dzhanibekov_status_string says it in words. */
+typedef enum {
+    dzhanibekov_OK = 0, dzhanibekov_NO_CONVERGENCE, dzhanibekov_SINGULAR, dzhanibekov_NOT_FINITE,
+        dzhanibekov_BAD_ARGUMENT
+} dzhanibekov_status;
+
+enum { dzhanibekov_DIFFERENCES = 9 }; /* those of higher order amplify rounding more than they gain */
+
+/* The last value of the unknown and its backward differences, for a guess at the next. */
+typedef struct {
+    int count; /* differences that are known */
+    int order; /* how many of them the extrapolation adds up */
+    double difference[dzhanibekov_DIFFERENCES][dzhanibekov_DIM];
+} dzhanibekov_history;
+
+/* The solver is a plain value: copy it to branch, keep one per thread. Set it up with dzhanibekov_init. */
+typedef struct {
+    double x[dzhanibekov_DIM];     /* the state; read it freely, change it only through dzhanibekov_init */
+    double carry[dzhanibekov_DIM]; /* what rounding took from x: the state proper is x + carry */
+    size_t steps;                  /* good steps since dzhanibekov_init */
+    size_t evaluations;            /* of the generating function, for statistics */
+    double t;                      /* time since dzhanibekov_init */
+    double h;                      /* the last step size; NaN before the first step */
+    dzhanibekov_params params;
+    double gauge[dzhanibekov_GAUGES];      /* multiples of Casimirs that are taken from H, in their order */
+    double coef[dzhanibekov_COEFFICIENTS]; /* all that depends on params and h only */
+    /* the quaternion (w, x, y, z) that turns body into space; see dzhanibekov_set_attitude */
+    double attitude[dzhanibekov_ATTITUDE_SIZE];
+    double first[dzhanibekov_ELEMENT]; /* where the attitude began */
+    /* the product of what steps turned it by; what rounding took */
+    double turned[dzhanibekov_ELEMENT], turned_carry[dzhanibekov_ELEMENT];
+    /* the gradient of the Casimirs that are taken from H: the body turns by them too */
+    double rate[dzhanibekov_RATE];
+    double attitude_from;  /* the time when the attitude began */
+    size_t steps_before_h; /* steps and t when h was set: t is counted from there, so no error adds up */
+    double t_before_h;
+    dzhanibekov_history history; /* for starting guesses */
+} dzhanibekov_solver;
+
+/* Start at x0. params may be NULL for the defaults. Arguments of all functions may be parts of the solver, or
+   overlap. dzhanibekov_BAD_ARGUMENT, and *s as before, if x0 or a parameter is not finite, one that has to be
+   positive is not, or what is computed from parameters alone is not finite. */
+dzhanibekov_status dzhanibekov_init(dzhanibekov_solver *s, const dzhanibekov_params *params,
+    const double x0[dzhanibekov_DIM]);
+
+/* The attitude, from now on. dzhanibekov_init begins with the identity. */
+/* Of any length but 0. dzhanibekov_BAD_ARGUMENT where it is not finite, or 0. */
+dzhanibekov_status dzhanibekov_set_attitude(dzhanibekov_solver *s,
+    const double attitude[dzhanibekov_ATTITUDE_SIZE]);
+
+/* Start at x0 with a gauge of one's own: the step is an exact Poisson map for each fixed gauge. */
+dzhanibekov_status dzhanibekov_init_gauge(dzhanibekov_solver *s, const dzhanibekov_params *params,
+    const double x0[dzhanibekov_DIM], const double gauge[dzhanibekov_GAUGES]);
+
+/* One step of size h, of either sign. On failure the state is as before. */
+dzhanibekov_status dzhanibekov_step(dzhanibekov_solver *s, double h);
+
+/* Many steps. On failure s->x is the last good state and s->steps counts the good steps. */
+dzhanibekov_status dzhanibekov_integrate(dzhanibekov_solver *s, double h, size_t steps);
+
+/* Many members, in place: x[i * members + m] is coordinate i of member m. One that fails keeps its last good
+   state. status (or NULL) receives the status of each; the first that is not OK is returned. */
+dzhanibekov_status dzhanibekov_ensemble(const dzhanibekov_params *params, double *x, size_t members, double h,
+    size_t steps, unsigned char *status);
+
+/* The Hamiltonian; the Casimirs; the right-hand side pi(x) grad H(x). params may be NULL. */
+double dzhanibekov_hamiltonian(const dzhanibekov_params *params, const double x[dzhanibekov_DIM]);
+void dzhanibekov_casimirs(const dzhanibekov_params *params, const double x[dzhanibekov_DIM], double out[]);
+void dzhanibekov_vector_field(const dzhanibekov_params *params, const double x[dzhanibekov_DIM],
+    double out[dzhanibekov_DIM]);
+
+const char *dzhanibekov_status_string(dzhanibekov_status status);
+
+/* For bindings: the size of dzhanibekov_solver, and its count of good steps. */
+size_t dzhanibekov_solver_size(void);
+size_t dzhanibekov_solver_steps_done(const dzhanibekov_solver *s);
+void dzhanibekov_attitude(const dzhanibekov_solver *s, double out[dzhanibekov_ELEMENT]);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif /* DZHANIBEKOV_H */
