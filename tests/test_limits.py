@@ -8,7 +8,11 @@ import pytest
 
 from phigen.compiler import compile_proved
 from phigen.errors import PhigenError
-from phigen.spec import loads
+from phigen.scheme.generating import graph_form
+from phigen.series.hamilton_jacobi import polynomial_series
+from phigen.spec import limits, loads
+from phigen.symbolic import budgets
+from phigen.symbolic.expression import symbol
 
 #: What a refusal may take, and the memory that stops a test.
 SECONDS, CEILING = 5, 2**31
@@ -72,6 +76,24 @@ def compiled_in_a_child(text):
     assert found, f"the child ended with {os.waitstatus_to_exitcode(status)}"
     said, megabytes = json.loads(found)
     return said, usage.ru_utime + usage.ru_stime, megabytes
+
+
+def test_the_memory_of_sums_counts_too(monkeypatch):
+    many = names(30)
+    h = loads(spec(many, "brackets: {x1: {x2: 1}}", "+".join(many))).hamiltonian  # without a product
+    (first,) = polynomial_series(h, list(map(symbol, many)), many, (), 1, symmetric=True).terms
+    assert len(first) == 30
+    monkeypatch.setattr(budgets, "TAYLOR_BYTES", 10_000)
+    with pytest.raises(OverflowError):
+        polynomial_series(h, list(map(symbol, many)), many, (), 1, symmetric=True)
+
+
+def test_a_graph_whose_hessian_is_too_large_is_given_up_before_it_is_made(monkeypatch):
+    monkeypatch.setattr(limits, "OPERATIONS", 100)
+    names_ = names(30)
+    h = loads(spec(names_, "brackets: {x1: {x2: 1}}", f"sin({'*'.join(names_)})")).hamiltonian
+    with pytest.raises(OverflowError, match="a part of the Hessian"):
+        graph_form([h], names_, [])
 
 
 @pytest.mark.parametrize(

@@ -59,7 +59,8 @@ def generating_function(system: System, series: HamiltonJacobi, terms: int) -> G
     """∇S_h and Hess S_h in the cheapest form. LimitError if every form is too large."""
     candidates = []
     if terms <= GRAPH_TERMS:
-        candidates.append(graph_form(series.graph(terms), series.coordinates, series.static, series.times))
+        with suppress(OverflowError):
+            candidates.append(graph_form(series.graph(terms), series.coordinates, series.static, series.times))
     worth = min((c.cost() for c in candidates), default=MOST_OPERATIONS)
     with suppress(OverflowError):
         collected = collected_form(series.polynomial(terms), series.coordinates, series.static, worth, series.times)

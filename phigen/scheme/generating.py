@@ -13,10 +13,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
+from phigen import progress
 from phigen.scheme.collected import collect, exceeds
 from phigen.scheme.lowering import cost
 from phigen.scheme.staging import Coefficients
 from phigen.series.hamilton_jacobi import MOST_SLOPES, PolynomialSeries
+from phigen.spec import limits
 from phigen.symbolic.expression import Expression, derivatives, gradient, symbol, total
 from phigen.symbolic.symbols import LEVEL, STEP
 
@@ -92,11 +94,20 @@ def collected_form(
 def graph_form(
     series: Sequence[Expression], coordinates: Sequence[str], static: Sequence[str], times: Sequence[str] = ()
 ) -> GeneratingFunction:
-    """Gradient by reverse, Hessian by repeated reverse differentiation of the shared graph."""
+    """Gradient by reverse, Hessian by repeated reverse differentiation of the shared graph.
+
+    Raises `OverflowError` as soon as what has been differentiated is more than one kernel may have.
+    """
     h = symbol(STEP)
     s = total(h ** (i + 1) * term for i, term in enumerate(series) if not term.is_zero)
     slope = tuple(gradient(s, coordinates))
-    rows = [gradient(slope[i], coordinates[i:]) for i in range(len(coordinates))]  # one reverse sweep a row
+    rows: list[list[Expression]] = []
+    with progress.stage("Hessian of the graph", len(coordinates)) as running:
+        for i in range(len(coordinates)):
+            if not i & (i - 1) and cost([*slope, *(e for row in rows for e in row)]) > limits.OPERATIONS:
+                raise OverflowError(f"more than {limits.OPERATIONS} operations for a part of the Hessian")
+            rows.append(gradient(slope[i], coordinates[i:]))  # one reverse sweep a row
+            running.done = i + 1
     elapsed = derivatives([s], LEVEL)[0] if LEVEL in static else None
     return GeneratingFunction(slope, _symmetric(rows), "shared graph", 0, Coefficients(static, times), elapsed)
 

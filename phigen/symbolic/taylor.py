@@ -136,14 +136,20 @@ class Taylor:
         for e in self.order:
             own = self.series[id(e)]
             own.append(self._coefficient(e, len(own), inputs))
+            if e.op in ("add", "sub", "neg"):  # sums of sums are kept too, and may be longer than all products
+                self._count(own[-1])
 
     def _product(self, a: Any, b: Any) -> Any:
         found = self.ring.product(a, b)
+        self._count(found)
+        return found
+
+    def _count(self, element: Any) -> None:
+        """Add to the memory that is used; raises `OverflowError` beyond the budget."""
         if self.ring.bytes_per_term:
-            self._bytes += len(found) * self.ring.bytes_per_term
+            self._bytes += len(element) * self.ring.bytes_per_term
             if self._bytes > budgets.TAYLOR_BYTES:
                 raise OverflowError("a series of polynomials with too many terms")
-        return found
 
     def _coefficient(self, e: Expression, i: int, inputs: dict[str, Any]) -> Any:
         if not e.args:

@@ -32,7 +32,7 @@ ROWS = {
     "OPERATIONS": "operations of one function of the generated code",
     "PRODUCT_TERMS": "terms of a product of polynomials",
     "PRODUCT_BYTES": "memory of such a product, in bytes",
-    "TAYLOR_BYTES": "memory of all products of a series, in bytes",
+    "TAYLOR_BYTES": "memory of all products and sums of a series, in bytes",
     "SERIES_TERMS": "terms of one S_i",
     "PROOF_PRODUCTS": "products of terms in the proof of a bi-realisation",
     "STEPS": "steps of a run",
