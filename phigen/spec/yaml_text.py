@@ -9,11 +9,11 @@ from fractions import Fraction
 
 from phigen.spec import limits
 from phigen.spec.model import DEFAULT_ORDER, MatrixForm, Parameter, Run, Spec, Values
-from phigen.symbolic.expression import Expression, neg, number, text, topological
+from phigen.symbolic.expression import Expression, neg, number, text
 from phigen.symbolic.readable import infix, signed_sum
 
 #: Longer expressions are given in parts, by definitions.
-_LENGTH, _NODES = limits.EXPRESSION_LENGTH * 9 // 10, limits.EXPRESSION_NODES * 3 // 4
+_LENGTH, _NODES = limits.EXPRESSION_LENGTH * 9 // 10, limits.EXPRESSION_NODES * 9 // 10
 _WIDTH = 110
 _PLAIN = re.compile(r"[A-Za-z0-9_+*/(). ^-]*")
 _WORDS = frozenset(["null", "Null", "NULL", "~", "true", "True", "TRUE", "false", "False", "FALSE", ""])
@@ -63,7 +63,7 @@ class _Writer:
 
     def short(self, name: str, expression: Expression) -> str:
         """The text of an expression, the parts of long ones by definitions."""
-        terms = [(infix(t), _size(t) + 1) for t in _terms(expression)]
+        terms = [(t, _size(t) + 1) for t in map(infix, _terms(expression))]
         groups: list[list[str]] = [[]]
         length = nodes = 0
         for term, size in terms:
@@ -111,12 +111,9 @@ class _Writer:
             yield from _indented(_wrapped(f"{name}: {{", entries, "}"), 4)
 
 
-def _size(e: Expression) -> int:
-    """Nodes as they are written out, where a shared one counts each time; at most a little over the limit."""
-    sizes: dict[int, int] = {}
-    for node in topological([e]):
-        sizes[id(node)] = min(1 + sum(sizes[id(a)] for a in node.args), 10 * _NODES)
-    return sizes[id(e)]
+def _size(written: str) -> int:
+    """How many numbers, names and operators a text has, as the grammar counts them."""
+    return len(re.findall(r"[\w.]+|\*\*|[-+*/]", written))
 
 
 def _terms(e: Expression) -> Iterator[Expression]:

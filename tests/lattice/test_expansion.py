@@ -14,6 +14,7 @@ from phigen.geometry.system import System, system_from_spec
 from phigen.lattice.building import cell_from_spec
 from phigen.lattice.cell import Cell, bond_forces, contributions, vector_field
 from phigen.lattice.expansion import Expansion, expand, run_of
+from phigen.lattice.recognition import recognised
 from phigen.lattice.states import Start, start_of
 from phigen.spec import loads
 from phigen.spec.model import Spec
@@ -150,6 +151,13 @@ def test_the_text_of_an_expansion_reads_as_the_same_spec(name: str) -> None:
         np.testing.assert_allclose(*evaluate([left, right], here), rtol=1e-13, atol=1e-15)
     assert read.runs[run.name].initial == made.runs[run.name].initial
     assert read.runs[run.name].parameters == made.runs[run.name].parameters
+
+
+def test_the_text_of_a_large_expansion_keeps_the_limits_of_expressions() -> None:
+    made = expand(prepared("fput")[1], (100,)).spec()
+    text = spec_text(made)
+    assert "H_part1" in text
+    assert recognised(loads(text), made.poisson.entries).lattice.boundary == ("periodic",)
 
 
 def test_sizes_that_do_not_fit_are_refused() -> None:
