@@ -1,4 +1,4 @@
-"""What printing a kernel takes of a language whose kernels are functions of arrays, one number at a time."""
+"""What printing takes of a language: formulas, and kernels that are functions of arrays, one number at a time."""
 
 from __future__ import annotations
 

@@ -16,13 +16,22 @@ from phigen.symbolic.symbols import TEMPORARY, WORK, Symbol, kind_of
 from phigen.targets.c.layout import comment
 from phigen.targets.code import Code, Store, lower, parts
 from phigen.targets.header import plain
+from phigen.targets.language import Language
 from phigen.targets.names import Scope, identifiers
 from phigen.targets.printer import Printer
 from phigen.targets.reserved import C_RESERVED
 
 FUNCTIONS = elementary.written_in("c")
 # Digits, since -std=c99 hides M_PI.
-CONSTANTS = {"pi": "3.141592653589793", "E": "2.718281828459045"}
+LANGUAGE = Language(
+    reserved=C_RESERVED,
+    functions=FUNCTIONS,
+    constants={"pi": "3.141592653589793", "E": "2.718281828459045"},
+    declare="const double {name} = {value};",
+    assign="{place} = {value};",
+    subscript="{array}[{index}]",
+    parameter="params->{name}",
+)
 
 #: Most assignments in one function; longer ones take quadratic time to compile.
 LONGEST_FUNCTION = 200
@@ -259,7 +268,7 @@ def _declared(assignments: Iterable[tuple[str, str]]) -> Iterator[str]:
 
 def printer(scope: Scope, functions: Mapping[str, str] = FUNCTIONS) -> Printer:
     """Prints lowered trees in C, with the names of a scope."""
-    return Printer(lambda n: scope[n], functions, CONSTANTS, "pow")
+    return replace(LANGUAGE, functions=functions).printer(scope)
 
 
 def members(program: Program) -> dict[str, str]:

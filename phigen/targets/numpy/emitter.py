@@ -21,7 +21,6 @@ from phigen.scheme.steps import (
     Splitting,
     Sweeps,
 )
-from phigen.symbolic import functions as elementary
 from phigen.symbolic.expression import Expression
 from phigen.symbolic.symbols import Symbol
 from phigen.targets import special
@@ -29,6 +28,7 @@ from phigen.targets.code import Code, lower
 from phigen.targets.header import CHECKSUM, checksum, header_lines, plain
 from phigen.targets.names import Scope
 from phigen.targets.numpy import lattice
+from phigen.targets.numpy.language import LANGUAGE
 from phigen.targets.path import Syntax, statements, tangent_program
 from phigen.targets.printer import Printer
 from phigen.targets.rendering import render
@@ -37,17 +37,8 @@ from phigen.targets.reserved import PYTHON_RESERVED
 #: Most terms of the expansion of a path, as in the C target.
 TERMS = 30
 
-#: How functions are written: those of NumPy, and those that the file defines.
-FUNCTIONS = {name: f"_{name}" for name in elementary.FUNCTIONS} | elementary.written_in("numpy")
-CONSTANTS = {"pi": "np.pi", "E": "np.e"}
-
-
-def _printer(scope: Scope) -> Printer:
-    return Printer(lambda n: scope[n], FUNCTIONS, CONSTANTS, "np.power")
-
-
 PATH_SYNTAX = Syntax(
-    printer=_printer,
+    printer=LANGUAGE.printer,
     covector="p[:, {i}]",
     fixed="f{i} = {value}",
     first="s[{i}].append({value} + 0.0)",
@@ -71,7 +62,9 @@ def _body(program: Program) -> str:
     seen = program.observables
     pieces = [render("numpy", part, _values(program)) for part in ("preamble.py", "parameters.py")]
     pieces += [render("numpy", "phi.py", special.values(f, f"_{f}")) for f in special.used(program)]
-    pieces += [render("numpy", "entire.py", special.entire_values(f, _printer)) for f in special.entire_used(program)]
+    pieces += [
+        render("numpy", "entire.py", special.entire_values(f, LANGUAGE.printer)) for f in special.entire_used(program)
+    ]
     pieces += _step(program)
     search = ("gauge_line.py", "gauge.py") if program.searches_gauge else ("gauge_formula.py",)
     templates = search if program.gauge else ("level.py",) if program.monitor else ("no_gauge.py",)
@@ -270,10 +263,10 @@ def _function(program: Program, kernel: Kernel) -> str:
     code = lower(kernel)
     arguments = ", ".join("parameters" if i == "params" else i for i in kernel.inputs)
     lines = [f"def _{kernel.name}({arguments}):", *_docstring(kernel.purpose)]
-    reserved = PYTHON_RESERVED | {*kernel.inputs, *(o.name for o in kernel.outputs), *FUNCTIONS.values()}
+    reserved = PYTHON_RESERVED | {*kernel.inputs, *(o.name for o in kernel.outputs), *LANGUAGE.functions.values()}
     scope = Scope(reserved)
     lines += _bindings(kernel, code, scope)
-    printer = _printer(scope)
+    printer = LANGUAGE.printer(scope)
     lines += [f"    {scope[a.target]} = {printer(a.value)}" for a in code.assignments]
     lines.append(_result(program, kernel, code, printer))
     return "\n".join(lines) + "\n"

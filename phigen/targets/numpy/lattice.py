@@ -7,20 +7,16 @@ from collections.abc import Iterable, Iterator, Sequence
 from phigen.scheme.kernel import Kernel
 from phigen.scheme.program import Program
 from phigen.scheme.steps import Sweep, Sweeps
-from phigen.symbolic import functions as elementary
 from phigen.symbolic.symbols import COEFFICIENT, GATHERED, Symbol
 from phigen.targets import special
 from phigen.targets.code import Code, lower
 from phigen.targets.names import Scope
-from phigen.targets.printer import Printer
+from phigen.targets.numpy.language import LANGUAGE
 from phigen.targets.rendering import render
 from phigen.targets.reserved import PYTHON_RESERVED
 
 #: How functions are written: those of NumPy, and those that the file defines.
-FUNCTIONS = {name: f"_{name}" for name in elementary.FUNCTIONS} | elementary.written_in("numpy")
-CONSTANTS = {"pi": "np.pi", "E": "np.e"}
-
-_OWN = frozenset({"coef", "x", "sites", "parameters", "h", "kick", "np", *FUNCTIONS.values()})
+_OWN = frozenset({"coef", "x", "sites", "parameters", "h", "kick", "np", *LANGUAGE.functions.values()})
 
 
 def body(program: Program, step: Sweeps, prepare: str) -> str:
@@ -50,7 +46,9 @@ def body(program: Program, step: Sweeps, prepare: str) -> str:
     pieces = [render("numpy", f"{part}.py", values) for part in ("lattice", "lattice_sites", "lattice_steps")]
     pieces += [render("numpy", "lattice_seen.py", values), prepare]
     pieces += [render("numpy", "phi.py", special.values(f, f"_{f}")) for f in special.used(program)]
-    pieces += [render("numpy", "entire.py", special.entire_values(f, _printer)) for f in special.entire_used(program)]
+    pieces += [
+        render("numpy", "entire.py", special.entire_values(f, LANGUAGE.printer)) for f in special.entire_used(program)
+    ]
     pieces += _pairs(program, step)
     pieces += [_sweep(program, step, sweep) for part in step.parts for sweep in part]
     parts = ["    (" + ", ".join(f"_{sweep.kernel.name}" for sweep in part) + ",)," for part in step.parts]
@@ -72,7 +70,7 @@ def _sweep(program: Program, step: Sweeps, sweep: Sweep) -> str:
     lines += [f"    gathered = _{sweep.gather.kernel.name}(coef, x, sites)"] if sweep.gather else []
     fields = sweep.gather.fields if sweep.gather else ()
     lines += [*_body(program, step, kernel, code, scope, fields), "    moved = x.copy()"]
-    show = _printer(scope)
+    show = LANGUAGE.printer(scope)
     for store in code.stores:
         place = f"[{sweep.moved[store.index]}]"
         new = f"x{place} + ({show(store.value)})"
@@ -91,7 +89,7 @@ def _seen(program: Program, step: Sweeps, kernel: Kernel) -> str:
         fields = pairs.forces.fields
     lines += _body(program, step, kernel, code, scope, fields)
     lines.append(f"    out = np.empty(({len(code.stores)}, *sites.sizes))")
-    show = _printer(scope)
+    show = LANGUAGE.printer(scope)
     lines += [f"    out[{s.index}] = {show(s.value)}" for s in code.stores]
     if pairs and kernel.name == "energy":
         lines.append(f"    out += 0.5 * _{pairs.energy.name}(parameters, x, sites)")
@@ -114,7 +112,7 @@ def _gather(program: Program, step: Sweeps, kernel: Kernel, first: str) -> str:
     code = lower(kernel)
     scope = Scope(PYTHON_RESERVED | _OWN | {"out", "gathered"})
     body = _body(program, step, kernel, code, scope)
-    show = _printer(scope)
+    show = LANGUAGE.printer(scope)
     values = "".join(f"_over_others({show(s.value)}, sites), " for s in code.stores)
     lines = [f"def _{kernel.name}({first}, x, sites):", '    with np.errstate(all="ignore"):']
     return "\n".join([*lines, *(f"    {line}" for line in body), f"        return np.array([{values.rstrip(', ')}])\n"])
@@ -139,7 +137,7 @@ def _body(
                 lines.append(f'    {scope[s]} = parameters["{s}"]')
             else:
                 lines.append(f"    {scope[s]} = {_read(program, step, s)}")
-    show = _printer(scope)
+    show = LANGUAGE.printer(scope)
     return lines + [f"    {scope[a.target]} = {show(a.value)}" for a in code.assignments]
 
 
@@ -152,7 +150,3 @@ def _read(program: Program, step: Sweeps, name: str) -> str:
     base, offset = step.sites.places[name]
     text = f"x[{fields.index(base)}]" if base in fields else f'sites.parameters["{base}"]'
     return f"sites.shifted({text}, {', '.join(map(str, offset))})" if any(offset) else text
-
-
-def _printer(scope: Scope) -> Printer:
-    return Printer(lambda n: scope[n], FUNCTIONS, CONSTANTS, "np.power")

@@ -1,0 +1,18 @@
+"""How NumPy writes formulas."""
+
+from __future__ import annotations
+
+from phigen.symbolic import functions as elementary
+from phigen.targets.language import Language
+from phigen.targets.reserved import PYTHON_RESERVED
+
+#: Its functions are those of NumPy, and those that a file defines; values are arrays, over members or sites.
+LANGUAGE = Language(
+    reserved=PYTHON_RESERVED,
+    functions={name: f"_{name}" for name in elementary.FUNCTIONS} | elementary.written_in("numpy"),
+    constants={"pi": "np.pi", "E": "np.e"},
+    declare="{name} = {value}",
+    assign="{place} = {value}",
+    subscript="{array}[..., {index}]",
+    parameter='parameters["{name}"]',
+)
