@@ -20,18 +20,14 @@
  *   3. The lattice
  *   4. The solver
  *   5. What is seen at sites
- * body-sha256: 8772521fe7fb288c30387d88bbd5172668c0cf53de691bc9cd7881f0bf7a247a
+ * body-sha256: b0acee5657e6727a6141348f9a0b70a11440e755d6d6e7e9ab6e905fbb2b4b95
  */
 #include "ablowitz_ladik.h"
 
 #include <float.h>
 #include <math.h>
-#include <omp.h>
 #include <stdint.h>
 #include <string.h>
-
-#ifdef _OPENMP
-#endif
 
 /* ---- The model ---- */
 const ablowitz_ladik_params ablowitz_ladik_default_params = { 0 };
@@ -368,6 +364,11 @@ static void ablowitz_ladik_sweep_rows(
 }
 
 /* ---- The lattice ---- */
+#ifdef _OPENMP
+int omp_get_num_threads(void); /* as in omp.h, which compilers without OpenMP lack */
+int omp_get_thread_num(void);
+#endif
+
 enum {
     ablowitz_ladik_STRETCH = 32, /* steps before the state is looked at: what is not finite stays so */
     ablowitz_ladik_LEAD = (ablowitz_ladik_HALO + 7) / 8 * 8,
@@ -397,7 +398,7 @@ static size_t ablowitz_ladik_shape(const size_t sizes[ablowitz_ladik_AXES], ptrd
 
 size_t ablowitz_ladik_work_size(const size_t sizes[ablowitz_ladik_AXES])
 {
-    ptrdiff_t width;
+    ptrdiff_t width = 0;
     const size_t rows = sizes == NULL ? 0 : ablowitz_ladik_shape(sizes, &width);
     const size_t row = ablowitz_ladik_RESERVED * (size_t)width * sizeof(double) + ablowitz_ladik_LINES
         * sizeof(ptrdiff_t);

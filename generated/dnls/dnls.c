@@ -20,18 +20,14 @@
  *   3. The lattice
  *   4. The solver
  *   5. What is seen at sites
- * body-sha256: 235cbd31088e928d052236d6552c9a2b96396e8b8ada1dd0d337bffc129ae2de
+ * body-sha256: b87210a509948f824bf60917bb5951c58bb18cb62535a411aa976cfec2c14f7c
  */
 #include "dnls.h"
 
 #include <float.h>
 #include <math.h>
-#include <omp.h>
 #include <stdint.h>
 #include <string.h>
-
-#ifdef _OPENMP
-#endif
 
 /* ---- The model ---- */
 const dnls_params dnls_default_params = { 1.0 };
@@ -321,6 +317,11 @@ static void dnls_sweep_rows(
 }
 
 /* ---- The lattice ---- */
+#ifdef _OPENMP
+int omp_get_num_threads(void); /* as in omp.h, which compilers without OpenMP lack */
+int omp_get_thread_num(void);
+#endif
+
 enum {
     dnls_STRETCH = 32, /* steps before the state is looked at: what is not finite stays so */
     dnls_LEAD = (dnls_HALO + 7) / 8 * 8,
@@ -349,7 +350,7 @@ static size_t dnls_shape(const size_t sizes[dnls_AXES], ptrdiff_t *width)
 
 size_t dnls_work_size(const size_t sizes[dnls_AXES])
 {
-    ptrdiff_t width;
+    ptrdiff_t width = 0;
     const size_t rows = sizes == NULL ? 0 : dnls_shape(sizes, &width);
     const size_t row = dnls_RESERVED * (size_t)width * sizeof(double) + dnls_LINES * sizeof(ptrdiff_t);
     return rows == 0 ? 0 : rows * row + 64;

@@ -20,18 +20,14 @@
  *   3. The lattice
  *   4. The solver
  *   5. What is seen at sites
- * body-sha256: 847f5917ca6d944fff0651dddd4e0abdee7ca8d43ea696ebd45560e4f2de8e3f
+ * body-sha256: a733527721d0d36d3683830b3214eb33e7175d6a0074e7ab9524622b0844e701
  */
 #include "dnls_disorder.h"
 
 #include <float.h>
 #include <math.h>
-#include <omp.h>
 #include <stdint.h>
 #include <string.h>
-
-#ifdef _OPENMP
-#endif
 
 /* ---- The model ---- */
 const dnls_disorder_params dnls_disorder_default_params = { 0.72, NULL };
@@ -371,6 +367,11 @@ static void dnls_disorder_sweep_rows(
 }
 
 /* ---- The lattice ---- */
+#ifdef _OPENMP
+int omp_get_num_threads(void); /* as in omp.h, which compilers without OpenMP lack */
+int omp_get_thread_num(void);
+#endif
+
 enum {
     dnls_disorder_STRETCH = 32, /* steps before the state is looked at: what is not finite stays so */
     dnls_disorder_LEAD = (dnls_disorder_HALO + 7) / 8 * 8,
@@ -400,7 +401,7 @@ static size_t dnls_disorder_shape(const size_t sizes[dnls_disorder_AXES], ptrdif
 
 size_t dnls_disorder_work_size(const size_t sizes[dnls_disorder_AXES])
 {
-    ptrdiff_t width;
+    ptrdiff_t width = 0;
     const size_t rows = sizes == NULL ? 0 : dnls_disorder_shape(sizes, &width);
     const size_t row = dnls_disorder_RESERVED * (size_t)width * sizeof(double) + dnls_disorder_LINES
         * sizeof(ptrdiff_t);

@@ -20,18 +20,14 @@
  *   3. The lattice
  *   4. The solver
  *   5. What is seen at sites
- * body-sha256: 238c4936c2f8dfc04277801c682c813185981f327a1b9bb6461b1d0d23cfa4fb
+ * body-sha256: a4c7f1695a585a87fb6e4b2095e2229725cf132f9aede1dc70fb0f23df526d7b
  */
 #include "fput.h"
 
 #include <float.h>
 #include <math.h>
-#include <omp.h>
 #include <stdint.h>
 #include <string.h>
-
-#ifdef _OPENMP
-#endif
 
 /* ---- The model ---- */
 const fput_params fput_default_params = { 0.25, 0.1 };
@@ -266,6 +262,11 @@ static void fput_sweep_rows(
 }
 
 /* ---- The lattice ---- */
+#ifdef _OPENMP
+int omp_get_num_threads(void); /* as in omp.h, which compilers without OpenMP lack */
+int omp_get_thread_num(void);
+#endif
+
 enum {
     fput_STRETCH = 32, /* steps before the state is looked at: what is not finite stays so */
     fput_LEAD = (fput_HALO + 7) / 8 * 8,
@@ -294,7 +295,7 @@ static size_t fput_shape(const size_t sizes[fput_AXES], ptrdiff_t *width)
 
 size_t fput_work_size(const size_t sizes[fput_AXES])
 {
-    ptrdiff_t width;
+    ptrdiff_t width = 0;
     const size_t rows = sizes == NULL ? 0 : fput_shape(sizes, &width);
     const size_t row = fput_RESERVED * (size_t)width * sizeof(double) + fput_LINES * sizeof(ptrdiff_t);
     return rows == 0 ? 0 : rows * row + 64;

@@ -20,18 +20,14 @@
  *   3. The lattice
  *   4. The solver
  *   5. What is seen at sites
- * body-sha256: 8738a8526a288132c2130d93e2edfe62dd1be271b3825ef9a6aca284127f8ad8
+ * body-sha256: 796cb1048558545de79b10a2de431693eb734867d3b8f4245502cca8edeccbfc
  */
 #include "heisenberg.h"
 
 #include <float.h>
 #include <math.h>
-#include <omp.h>
 #include <stdint.h>
 #include <string.h>
-
-#ifdef _OPENMP
-#endif
 
 /* ---- The model ---- */
 const heisenberg_params heisenberg_default_params = { 1.0, NULL };
@@ -510,6 +506,11 @@ static void heisenberg_sweep_rows(
 }
 
 /* ---- The lattice ---- */
+#ifdef _OPENMP
+int omp_get_num_threads(void); /* as in omp.h, which compilers without OpenMP lack */
+int omp_get_thread_num(void);
+#endif
+
 enum {
     heisenberg_STRETCH = 32, /* steps before the state is looked at: what is not finite stays so */
     heisenberg_LEAD = (heisenberg_HALO + 7) / 8 * 8,
@@ -539,7 +540,7 @@ static size_t heisenberg_shape(const size_t sizes[heisenberg_AXES], ptrdiff_t *w
 
 size_t heisenberg_work_size(const size_t sizes[heisenberg_AXES])
 {
-    ptrdiff_t width;
+    ptrdiff_t width = 0;
     const size_t rows = sizes == NULL ? 0 : heisenberg_shape(sizes, &width);
     const size_t row = heisenberg_RESERVED * (size_t)width * sizeof(double) + heisenberg_LINES
         * sizeof(ptrdiff_t);

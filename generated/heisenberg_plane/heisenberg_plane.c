@@ -20,18 +20,14 @@
  *   3. The lattice
  *   4. The solver
  *   5. What is seen at sites
- * body-sha256: 7d744013b50fc64e43b6d67da5c4c475bb09e78288bdfd49b872bef6ab87cf32
+ * body-sha256: 40792239a4b9da88ae4845c08a17ad8709998bb095bda6a11c4f07c5c0138ff3
  */
 #include "heisenberg_plane.h"
 
 #include <float.h>
 #include <math.h>
-#include <omp.h>
 #include <stdint.h>
 #include <string.h>
-
-#ifdef _OPENMP
-#endif
 
 /* ---- The model ---- */
 const heisenberg_plane_params heisenberg_plane_default_params = { 1.0, 0.9 };
@@ -409,6 +405,11 @@ static void heisenberg_plane_sweep_rows(
 }
 
 /* ---- The lattice ---- */
+#ifdef _OPENMP
+int omp_get_num_threads(void); /* as in omp.h, which compilers without OpenMP lack */
+int omp_get_thread_num(void);
+#endif
+
 enum {
     heisenberg_plane_STRETCH = 32, /* steps before the state is looked at: what is not finite stays so */
     heisenberg_plane_LEAD = (heisenberg_plane_HALO + 7) / 8 * 8,
@@ -439,7 +440,7 @@ static size_t heisenberg_plane_shape(const size_t sizes[heisenberg_plane_AXES], 
 
 size_t heisenberg_plane_work_size(const size_t sizes[heisenberg_plane_AXES])
 {
-    ptrdiff_t width;
+    ptrdiff_t width = 0;
     const size_t rows = sizes == NULL ? 0 : heisenberg_plane_shape(sizes, &width);
     const size_t row = heisenberg_plane_RESERVED * (size_t)width * sizeof(double) + heisenberg_plane_LINES
         * sizeof(ptrdiff_t);

@@ -20,18 +20,14 @@
  *   3. The lattice
  *   4. The solver
  *   5. What is seen at sites
- * body-sha256: a0a388d23ebdb94431a9a225e6d2f02b16bf969cb078c553c0d92ac2a0d02077
+ * body-sha256: e25dd33df82e9025874f08232a2950c712fd296161c27a1729fa14374cb46f44
  */
 #include "klein_gordon.h"
 
 #include <float.h>
 #include <math.h>
-#include <omp.h>
 #include <stdint.h>
 #include <string.h>
-
-#ifdef _OPENMP
-#endif
 
 /* ---- The model ---- */
 const klein_gordon_params klein_gordon_default_params = { 0.2 };
@@ -264,6 +260,11 @@ static void klein_gordon_sweep_rows(
 }
 
 /* ---- The lattice ---- */
+#ifdef _OPENMP
+int omp_get_num_threads(void); /* as in omp.h, which compilers without OpenMP lack */
+int omp_get_thread_num(void);
+#endif
+
 enum {
     klein_gordon_STRETCH = 32, /* steps before the state is looked at: what is not finite stays so */
     klein_gordon_LEAD = (klein_gordon_HALO + 7) / 8 * 8,
@@ -293,7 +294,7 @@ static size_t klein_gordon_shape(const size_t sizes[klein_gordon_AXES], ptrdiff_
 
 size_t klein_gordon_work_size(const size_t sizes[klein_gordon_AXES])
 {
-    ptrdiff_t width;
+    ptrdiff_t width = 0;
     const size_t rows = sizes == NULL ? 0 : klein_gordon_shape(sizes, &width);
     const size_t row = klein_gordon_RESERVED * (size_t)width * sizeof(double) + klein_gordon_LINES
         * sizeof(ptrdiff_t);

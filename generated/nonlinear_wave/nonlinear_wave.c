@@ -20,18 +20,14 @@
  *   3. The lattice
  *   4. The solver
  *   5. What is seen at sites
- * body-sha256: 8dfafb920cfb16c9c6ccbf2420484fa317b5e101b4f6209ff377121a75b7380c
+ * body-sha256: 4da6bde8cae7ed5500806f897284ad7a01b62e193c3c61fad96e95217426151c
  */
 #include "nonlinear_wave.h"
 
 #include <float.h>
 #include <math.h>
-#include <omp.h>
 #include <stdint.h>
 #include <string.h>
-
-#ifdef _OPENMP
-#endif
 
 /* ---- The model ---- */
 const nonlinear_wave_params nonlinear_wave_default_params = { 1.0, 0.1 };
@@ -271,6 +267,11 @@ static void nonlinear_wave_sweep_rows(
 }
 
 /* ---- The lattice ---- */
+#ifdef _OPENMP
+int omp_get_num_threads(void); /* as in omp.h, which compilers without OpenMP lack */
+int omp_get_thread_num(void);
+#endif
+
 enum {
     nonlinear_wave_STRETCH = 32, /* steps before the state is looked at: what is not finite stays so */
     nonlinear_wave_LEAD = (nonlinear_wave_HALO + 7) / 8 * 8,
@@ -300,7 +301,7 @@ static size_t nonlinear_wave_shape(const size_t sizes[nonlinear_wave_AXES], ptrd
 
 size_t nonlinear_wave_work_size(const size_t sizes[nonlinear_wave_AXES])
 {
-    ptrdiff_t width;
+    ptrdiff_t width = 0;
     const size_t rows = sizes == NULL ? 0 : nonlinear_wave_shape(sizes, &width);
     const size_t row = nonlinear_wave_RESERVED * (size_t)width * sizeof(double) + nonlinear_wave_LINES
         * sizeof(ptrdiff_t);

@@ -20,18 +20,14 @@
  *   3. The lattice
  *   4. The solver
  *   5. What is seen at sites
- * body-sha256: a1482352f34bfcdde0159bd4be38cad16294c38e7726fc9e4b25bd1be89d0ab6
+ * body-sha256: 92a6ca3e31aa269080c95851b6c00820fa1d265731d02d4ee17a9e86ecaefefb
  */
 #include "outer_planets.h"
 
 #include <float.h>
 #include <math.h>
-#include <omp.h>
 #include <stdint.h>
 #include <string.h>
-
-#ifdef _OPENMP
-#endif
 
 /* ---- The model ---- */
 const outer_planets_params outer_planets_default_params = { 0.000295912208286, NULL };
@@ -376,6 +372,11 @@ static void outer_planets_sweep_rows(
 }
 
 /* ---- The lattice ---- */
+#ifdef _OPENMP
+int omp_get_num_threads(void); /* as in omp.h, which compilers without OpenMP lack */
+int omp_get_thread_num(void);
+#endif
+
 enum {
     outer_planets_STRETCH = 32, /* steps before the state is looked at: what is not finite stays so */
     outer_planets_LEAD = (outer_planets_HALO + 7) / 8 * 8,
@@ -405,7 +406,7 @@ static size_t outer_planets_shape(const size_t sizes[outer_planets_AXES], ptrdif
 
 size_t outer_planets_work_size(const size_t sizes[outer_planets_AXES])
 {
-    ptrdiff_t width;
+    ptrdiff_t width = 0;
     const size_t rows = sizes == NULL ? 0 : outer_planets_shape(sizes, &width);
     const size_t row = outer_planets_RESERVED * (size_t)width * sizeof(double) + outer_planets_LINES
         * sizeof(ptrdiff_t);

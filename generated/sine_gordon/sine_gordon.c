@@ -20,18 +20,14 @@
  *   3. The lattice
  *   4. The solver
  *   5. What is seen at sites
- * body-sha256: 6281a1b7406ea952c0ea2f437a7358c608c008911ab90468857a12c4c1c80533
+ * body-sha256: b2b53d607a73da8e1113d3c6112cb00e5251982fcd9e5f4d433b7d93f5ed802d
  */
 #include "sine_gordon.h"
 
 #include <float.h>
 #include <math.h>
-#include <omp.h>
 #include <stdint.h>
 #include <string.h>
-
-#ifdef _OPENMP
-#endif
 
 /* ---- The model ---- */
 const sine_gordon_params sine_gordon_default_params = { 0.25 };
@@ -300,6 +296,11 @@ static void sine_gordon_sweep_rows(
 }
 
 /* ---- The lattice ---- */
+#ifdef _OPENMP
+int omp_get_num_threads(void); /* as in omp.h, which compilers without OpenMP lack */
+int omp_get_thread_num(void);
+#endif
+
 enum {
     sine_gordon_STRETCH = 32, /* steps before the state is looked at: what is not finite stays so */
     sine_gordon_LEAD = (sine_gordon_HALO + 7) / 8 * 8,
@@ -329,7 +330,7 @@ static size_t sine_gordon_shape(const size_t sizes[sine_gordon_AXES], ptrdiff_t 
 
 size_t sine_gordon_work_size(const size_t sizes[sine_gordon_AXES])
 {
-    ptrdiff_t width;
+    ptrdiff_t width = 0;
     const size_t rows = sizes == NULL ? 0 : sine_gordon_shape(sizes, &width);
     const size_t row = sine_gordon_RESERVED * (size_t)width * sizeof(double) + sine_gordon_LINES
         * sizeof(ptrdiff_t);

@@ -20,18 +20,14 @@
  *   3. The lattice
  *   4. The solver
  *   5. What is seen at sites
- * body-sha256: 95365f00d086226dcc191ad03b6d08ec936ac265b378ba36cda3f498a25e3b52
+ * body-sha256: ab507fc333722f4a0431a3c8ad1703e36460e41157650c41ddc57bd7097a0a22
  */
 #include "toda.h"
 
 #include <float.h>
 #include <math.h>
-#include <omp.h>
 #include <stdint.h>
 #include <string.h>
-
-#ifdef _OPENMP
-#endif
 
 /* ---- The model ---- */
 const toda_params toda_default_params = { 0 };
@@ -289,6 +285,11 @@ static void toda_sweep_rows(
 }
 
 /* ---- The lattice ---- */
+#ifdef _OPENMP
+int omp_get_num_threads(void); /* as in omp.h, which compilers without OpenMP lack */
+int omp_get_thread_num(void);
+#endif
+
 enum {
     toda_STRETCH = 32, /* steps before the state is looked at: what is not finite stays so */
     toda_LEAD = (toda_HALO + 7) / 8 * 8,
@@ -317,7 +318,7 @@ static size_t toda_shape(const size_t sizes[toda_AXES], ptrdiff_t *width)
 
 size_t toda_work_size(const size_t sizes[toda_AXES])
 {
-    ptrdiff_t width;
+    ptrdiff_t width = 0;
     const size_t rows = sizes == NULL ? 0 : toda_shape(sizes, &width);
     const size_t row = toda_RESERVED * (size_t)width * sizeof(double) + toda_LINES * sizeof(ptrdiff_t);
     return rows == 0 ? 0 : rows * row + 64;

@@ -20,18 +20,14 @@
  *   3. The lattice
  *   4. The solver
  *   5. What is seen at sites
- * body-sha256: b371ba5631cade24c4cb69f8ec06dff5f48df675937a97b726dafbc1c1825a7a
+ * body-sha256: 8c34e16a467a05ab3b1df6da185684f6d20c863b00f66c981539e44793bf0657
  */
 #include "volterra.h"
 
 #include <float.h>
 #include <math.h>
-#include <omp.h>
 #include <stdint.h>
 #include <string.h>
-
-#ifdef _OPENMP
-#endif
 
 /* ---- The model ---- */
 const volterra_params volterra_default_params = { 0 };
@@ -301,6 +297,11 @@ static void volterra_sweep_rows(
 }
 
 /* ---- The lattice ---- */
+#ifdef _OPENMP
+int omp_get_num_threads(void); /* as in omp.h, which compilers without OpenMP lack */
+int omp_get_thread_num(void);
+#endif
+
 enum {
     volterra_STRETCH = 32, /* steps before the state is looked at: what is not finite stays so */
     volterra_LEAD = (volterra_HALO + 7) / 8 * 8,
@@ -330,7 +331,7 @@ static size_t volterra_shape(const size_t sizes[volterra_AXES], ptrdiff_t *width
 
 size_t volterra_work_size(const size_t sizes[volterra_AXES])
 {
-    ptrdiff_t width;
+    ptrdiff_t width = 0;
     const size_t rows = sizes == NULL ? 0 : volterra_shape(sizes, &width);
     const size_t row = volterra_RESERVED * (size_t)width * sizeof(double) + volterra_LINES
         * sizeof(ptrdiff_t);

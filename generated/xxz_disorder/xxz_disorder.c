@@ -20,18 +20,14 @@
  *   3. The lattice
  *   4. The solver
  *   5. What is seen at sites
- * body-sha256: 30820d77dc4893a021b48ed1ecc7bff91abd718538f2c9de6db805e5af0fd8f2
+ * body-sha256: 050787d018a39612a5d1e3a08be2b683be88b33a7ecbaadd098ff575073503ad
  */
 #include "xxz_disorder.h"
 
 #include <float.h>
 #include <math.h>
-#include <omp.h>
 #include <stdint.h>
 #include <string.h>
-
-#ifdef _OPENMP
-#endif
 
 /* ---- The model ---- */
 const xxz_disorder_params xxz_disorder_default_params = { 1.0, 1.3, NULL };
@@ -369,6 +365,11 @@ static void xxz_disorder_sweep_rows(
 }
 
 /* ---- The lattice ---- */
+#ifdef _OPENMP
+int omp_get_num_threads(void); /* as in omp.h, which compilers without OpenMP lack */
+int omp_get_thread_num(void);
+#endif
+
 enum {
     xxz_disorder_STRETCH = 32, /* steps before the state is looked at: what is not finite stays so */
     xxz_disorder_LEAD = (xxz_disorder_HALO + 7) / 8 * 8,
@@ -398,7 +399,7 @@ static size_t xxz_disorder_shape(const size_t sizes[xxz_disorder_AXES], ptrdiff_
 
 size_t xxz_disorder_work_size(const size_t sizes[xxz_disorder_AXES])
 {
-    ptrdiff_t width;
+    ptrdiff_t width = 0;
     const size_t rows = sizes == NULL ? 0 : xxz_disorder_shape(sizes, &width);
     const size_t row = xxz_disorder_RESERVED * (size_t)width * sizeof(double) + xxz_disorder_LINES
         * sizeof(ptrdiff_t);

@@ -71,6 +71,20 @@ def test_pendula_of_a_lattice_by_hand_move_as_they_should(tmp_path):
     assert run([tmp_path / "main"], tmp_path) == "ok\n"
 
 
+@pytest.mark.parametrize("flags", [["-O2"], ["-O2", "-fopenmp=libgomp"]], ids=" ".join)
+def test_lattices_compile_without_a_warning_by_clang(flags, tmp_path):
+    """clang may have no omp.h."""
+    main = [*flags, "-I", CHAIN, "-I", RUNTIME, CHAIN / "main.c"]
+    run([tool("clang"), *STRICT, "-fsyntax-only", *main], tmp_path)
+
+
+def test_code_of_lattices_needs_no_library_but_that_of_c():
+    for name in ("heisenberg", "klein_gordon"):
+        text = (resources.templates().parent / "generated" / name / f"{name}.c").read_text(encoding="utf-8")
+        headers = {line for line in text.splitlines() if line.startswith("#include <")}
+        assert headers <= {"#include <float.h>", "#include <math.h>", "#include <stdint.h>", "#include <string.h>"}
+
+
 @pytest.mark.parametrize("name", ["lattice.c", "rows.c", "lane_functions.c", "status.c"])
 def test_each_file_of_lattices_compiles_by_itself(name, tmp_path):
     run([tool("gcc"), *STRICT, "-fsyntax-only", "-I", CHAIN, "-I", RUNTIME, RUNTIME / name], tmp_path)

@@ -3,9 +3,6 @@
 #include <math.h>
 #include <stdint.h>
 #include <string.h>
-#ifdef _OPENMP
-#include <omp.h>
-#endif
 
 #include "lattice.h"
 #include "model.h"
@@ -14,6 +11,11 @@
 #include "sweeps.h"
 
 /* ---- The lattice ---- */
+#ifdef _OPENMP
+int omp_get_num_threads(void); /* as in omp.h, which compilers without OpenMP lack */
+int omp_get_thread_num(void);
+#endif
+
 enum {
     PHI_STRETCH = 32,  /* steps before the state is looked at: what is not finite stays so */
     PHI_LEAD = (PHI_HALO + 7) / 8 * 8,
@@ -46,7 +48,7 @@ static size_t phi_shape(const size_t sizes[PHI_AXES], ptrdiff_t *width)
 
 size_t phi_work_size(const size_t sizes[PHI_AXES])
 {
-    ptrdiff_t width;
+    ptrdiff_t width = 0;
     const size_t rows = sizes == NULL ? 0 : phi_shape(sizes, &width);
     const size_t row = PHI_RESERVED * (size_t)width * sizeof(double) + PHI_LINES * sizeof(ptrdiff_t);
     return rows == 0 ? 0 : rows * row + 64;
