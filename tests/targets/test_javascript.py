@@ -44,7 +44,7 @@ poisson: {brackets: {x1: {x2: -x3, x3: x2}, x2: {x3: -x1}, y1: {y2: -y3, y3: y2}
 hamiltonian: x1**2/2 + x2**2/4 + x3**2/6 + y1**2/3 + y2**2/5 + y3**2/7 + x1*y1/2 + x2*y3
 casimirs: {C: x1**2 + x2**2 + x3**2, D: y1**2 + y2**2 + y3**2}
 order: 4
-runs: {r: {initial: [1, 0.5, -0.25, 0.3, 0.8, -0.6], step: 0.1, steps: 20}}
+runs: {r: {initial: [0.4, -0.2, -0.7, 0.4, 0.1, -0.4], step: 0.1, steps: 20}}
 """
 
 #: What the corpus does not ask for: every kind of step, with one stage and with several, kicks, composed paths.
