@@ -5,9 +5,10 @@ import subprocess
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 from support import files, tool
 
-from phigen import SpecError, StepError, spec
+from phigen import SpecError, StepError, resources, spec
 from phigen.api import solver_of
 from phigen.compiler import compile_spec
 from phigen.spec.model import Extras
@@ -114,3 +115,15 @@ def test_where_minus_b_is_not_positive_nothing_starts_and_a_step_fails(target):
 def test_what_does_not_apply_is_an_error_of_the_spec(change, said):
     with pytest.raises(SpecError, match=said):
         compiled_text(KEPLER.replace(*change))
+
+
+def test_the_eccentric_orbit_of_the_corpus_is_that_of_dop853():
+    found = spec.load(resources.bundled()["kepler_eccentric"])
+    run = found.runs["orbits"]
+    made, x0 = solver_of(compile_spec(found), "c"), np.array([float(v) for v in run.initial])
+    times = np.linspace(0, 12.5, 7)
+    h = float(run.step)
+    here, finer = (made.integrate(x0, step, until=times[-1], stride=50).at(times) for step in (h, h / 2))
+    np.testing.assert_allclose(here, finer, rtol=0, atol=1e-11)
+    there = solve_ivp(lambda t, x: made.vector_field(x), (0, 12.5), x0, "DOP853", times, rtol=3e-14, atol=1e-15)
+    np.testing.assert_allclose(here, there.y.T, rtol=0, atol=3e-10)  # what DOP853 loses near the planet
