@@ -8,7 +8,7 @@
  *   step: implicit, Newton iteration with the analytic matrix
  *   one Newton iteration: 135 additions, 164 multiplications, 2 functions
  *
- * spec: dzhanibekov, sha256 8d1b03e49d35b7889e21e86194cfe6f3109fbfd42eb5a884d201f81a3ea4ca1b
+ * spec: dzhanibekov, sha256 69c6aa7f443565487e48a933405a1745ed7142d940611d93ee67a5351a59ea66
  * to regenerate: phigen build dzhanibekov
  * DO NOT EDIT: change the spec and regenerate; edits are noticed by the checksum below.
  *

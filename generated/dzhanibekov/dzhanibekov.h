@@ -2,7 +2,7 @@
  * dzhanibekov.h: the declarations; dzhanibekov.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 339ce6bab7fc9ca85d111e4791eee6968b4aa3f12ae5d13812a9c4e3f26c1df8
+ * body-sha256: 8d4063e939c5694c6277ff43d92ec8d155a4dd8d94feebbe31c2f6705ff0518d
  */
 #ifndef DZHANIBEKOV_H
 #define DZHANIBEKOV_H
@@ -16,7 +16,7 @@ extern "C" {
 #define dzhanibekov_ORDER 6
 #define dzhanibekov_CASIMIRS 1
 #define dzhanibekov_PHIGEN_VERSION "0.1.0"
-#define dzhanibekov_SPEC_SHA256 "8d1b03e49d35b7889e21e86194cfe6f3109fbfd42eb5a884d201f81a3ea4ca1b"
+#define dzhanibekov_SPEC_SHA256 "69c6aa7f443565487e48a933405a1745ed7142d940611d93ee67a5351a59ea66"
 
 /* State vectors: x1, x2, x3. Casimirs: C. */
 typedef struct {

@@ -7,17 +7,17 @@
 #   step: implicit, Newton iteration with the analytic matrix
 #   one Newton iteration: 135 additions, 164 multiplications, 2 functions
 #
-# spec: dzhanibekov, sha256 8d1b03e49d35b7889e21e86194cfe6f3109fbfd42eb5a884d201f81a3ea4ca1b
+# spec: dzhanibekov, sha256 69c6aa7f443565487e48a933405a1745ed7142d940611d93ee67a5351a59ea66
 # to regenerate: phigen build dzhanibekov
 # DO NOT EDIT: change the spec and regenerate; edits are noticed by the checksum below.
 #
 # SPDX-License-Identifier: 0BSD
 # This file belongs to whoever generated it; phigen claims no rights in it.
-# body-sha256: 3c105e66b308d453518c05b0094712d0e258343b7190cb24d20e62b14f5562f9
+# body-sha256: bda6e7ba1c48455febee6e93902ecaa854800eb6d909fb20e7fd86c0b4f077a5
 import numpy as np
 
 VERSION = "0.1.0"
-SPEC_SHA256 = "8d1b03e49d35b7889e21e86194cfe6f3109fbfd42eb5a884d201f81a3ea4ca1b"
+SPEC_SHA256 = "69c6aa7f443565487e48a933405a1745ed7142d940611d93ee67a5351a59ea66"
 DIM = 3
 ORDER = 6
 COORDINATES = ("x1", "x2", "x3",)
