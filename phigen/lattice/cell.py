@@ -107,8 +107,8 @@ class Cell:
             yield density
 
     def extent(self, expression: Expression) -> tuple[tuple[int, ...], tuple[int, ...]]:
-        """The least and the largest offsets along each axis of what a term of a grid mentions."""
-        offsets = [steps(o) for _, o in self.places(expression).values()] or [steps(self.origin)]
+        """The least and the largest offsets along each axis of what a term of a grid mentions, and of its own site."""
+        offsets = [steps(self.origin), *(steps(o) for _, o in self.places(expression).values())]
         return tuple(map(min, zip(*offsets, strict=True))), tuple(map(max, zip(*offsets, strict=True)))
 
     @cached_property

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+import random
 from dataclasses import replace
 from functools import cache
 
@@ -10,10 +12,11 @@ import pytest
 from lattice.lattices import LATTICES, on_grid
 
 from phigen.geometry.checks import check
-from phigen.geometry.system import System, system_from_spec
+from phigen.geometry.system import System, hamiltonian_vector_field, system_from_spec
 from phigen.lattice.building import cell_from_spec
 from phigen.lattice.cell import Cell, bond_forces, contributions, vector_field
 from phigen.lattice.expansion import Expansion, expand, run_of
+from phigen.lattice.observing import summed
 from phigen.lattice.recognition import recognised
 from phigen.lattice.states import Start, start_of
 from phigen.spec import loads
@@ -172,3 +175,53 @@ def test_names_of_sites_do_not_clash_with_others() -> None:
     text = LATTICES["toda"].replace("{B: {value: b, at: sum}, A:", "{b_1: {value: b, at: sum}, A:")
     cell = cell_from_spec(loads(text))
     assert expand(cell, (3,)).names["b", (1,)] == "b_1_"
+
+
+def random_lattice(seed: int) -> str:
+    """A lattice with a random stencil for H, on a periodic or an open grid."""
+    draw = random.Random(seed)
+    axes = ["i", "j", "k"][: draw.choice([1, 1, 2, 3])]
+
+    def at(field: str) -> str:
+        steps = [f"{a}{draw.choice([-1, 1]):+d}" for a in axes if draw.random() < 0.5]
+        return f"{field}[{', '.join(steps)}]" if steps else field
+
+    terms = [
+        draw.choice([
+            f"{at('q')}*{at('p')}*{at('q')}", f"w*cos({at('q')} - {at('p')})", f"c*({at('q')} - {at('q')})**2*w",
+            f"exp({at('p')}/4)*{at('w')}", f"{at('p')}**2/(2 + {at('q')}**2)",
+        ])
+        for _ in range(4)
+    ]  # fmt: skip
+    bracket = draw.choice(["1", "1 + q**2 + p**2", "exp(q)", "w*q*p"])
+    boundary = ", ".join(draw.choice(["periodic", "open"]) for _ in axes)
+    return (
+        f"phigen: 1\nname: drawn\nlattice: {{axes: [{', '.join(axes)}], boundary: [{boundary}]}}\ncoordinates: [q, p]\n"
+        f"parameters: {{c: 0.7, w: {{value: 1 + i/10, at: sites}}}}\npoisson: {{brackets: {{q: {{p: {bracket}}}}}}}\n"
+        f"hamiltonian: {' + '.join(terms)}\n"
+        f"runs: {{r: {{sizes: {[3] * len(axes)}, initial: {{random: normal, seed: {seed}}}, step: 1, steps: 1}}}}\n"
+    )
+
+
+@pytest.mark.parametrize("seed", range(50))
+def test_random_lattices_move_as_their_expansions(seed: int) -> None:
+    spec = loads(random_lattice(seed))
+    cell, start = cell_from_spec(spec), start_of(spec, spec.runs["r"])
+    expansion = expand(cell, start.sizes)
+    made = expansion.spec()
+    here = expansion.numbers(start.parameters)
+    here |= dict(zip(made.coordinates, start.state.reshape(-1), strict=True))
+    slopes = gradient(made.hamiltonian, made.coordinates)
+    rates = evaluate(hamiltonian_vector_field(made.poisson.entries, slopes), here)
+    force = {f: np.zeros(start.sizes) for f in cell.fields}
+    for f, listed in contributions(cell).items():
+        for site, c in itertools.product(expansion.sites, listed):
+            box = zip(cell.boundary, site, c.low, c.high, start.sizes, strict=True)
+            if all(b == "periodic" or (s + low >= 0 and s + high < n) for b, s, low, high, n in box):
+                force[f][site] += evaluate([expansion.at(c.expression, site)], here)[0]
+    pi = on_grid(cell, start, cell.bracket["q", "p"])
+    np.testing.assert_allclose(
+        [pi * force["p"], -pi * force["q"]], np.reshape(rates, start.state.shape), rtol=1e-11, atol=1e-12
+    )
+    energy, _ = summed(cell, cell.hamiltonian, start.state, start.parameters)
+    np.testing.assert_allclose(energy, evaluate([made.hamiltonian], here)[0], rtol=1e-12)
