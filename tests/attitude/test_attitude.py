@@ -209,7 +209,17 @@ def errors(case, order, counts, gauge=None):
 COUNTS = {2: (20, 40), 4: (12, 24), 6: (8, 16), 8: (6, 12), 12: (4, 6)}
 
 
-@pytest.mark.parametrize(("order", "gauge"), [*((k, 0.0) for k in COUNTS), (2, None), (4, None), (6, None), (8, None)])
+@pytest.mark.parametrize(
+    ("order", "gauge"),
+    [
+        *((k, 0.0) for k in COUNTS if k < 12),
+        pytest.param(12, 0.0, marks=pytest.mark.slow),
+        (2, None),
+        (4, None),
+        (6, None),
+        (8, None),
+    ],
+)
 def test_the_attitude_has_the_order_of_the_method(order, gauge):
     counts = COUNTS[order]
     few, many = errors("body", order, counts, gauge)
@@ -244,7 +254,10 @@ def top_gradient(x):
     return x[:3] / INERTIA, np.array([1 / 3, 0, 1])
 
 
-@pytest.mark.parametrize("target", ["c", "numpy"])
+SLOW_C = pytest.param("c", marks=pytest.mark.slow)
+
+
+@pytest.mark.parametrize("target", [SLOW_C, "numpy"])
 def test_a_heavy_top_has_the_attitude_and_position_of_the_whole_motion(target):
     x0 = np.array([0.3, -0.2, 1.0, 0.6, 0.0, 0.8])
     exact = whole_motion(x0, top_gradient, 2.0)
@@ -255,6 +268,7 @@ def test_a_heavy_top_has_the_attitude_and_position_of_the_whole_motion(target):
     assert np.abs(found.position[-1] - exact[10:]).max() < 1e-11
 
 
+@pytest.mark.slow
 def test_a_split_top_moves_as_by_the_series():
     x0 = np.array([0.3, -0.2, 1.0, 0.6, 0.0, 0.8])
     split = solver_of(compiled_text(TOP + "order: 8\nscheme: splitting\n"), "numpy")
@@ -284,6 +298,7 @@ def test_matrices_keep_the_other_momentum_and_stay_orthogonal(case, target):
     assert np.abs(found.attitude @ np.swapaxes(found.attitude, 1, 2) - np.eye(len(found.attitude[0]))).max() < 1e-15 * 5
 
 
+@pytest.mark.slow
 def test_so4_has_the_attitude_of_the_whole_motion():
     x0, case = np.random.default_rng(4).normal(size=6), "so(4)"
     group = made(case).program.attitude.group
