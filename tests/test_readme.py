@@ -71,7 +71,10 @@ def test_commands_of_the_text_work(tmp_path):
 def test_links_lead_somewhere():
     for target in re.findall(r"\]\(([^)]+)\)", README):
         if not target.startswith("https://"):
-            assert (ROOT / target).exists(), target
+            path, _, anchor = target.partition("#")
+            assert (ROOT / path).exists(), target
+            titles = re.findall(r"^#+ (.*)$", (ROOT / path).read_text(encoding="utf-8"), re.MULTILINE) if anchor else []
+            assert not anchor or anchor in [title.lower().replace(" ", "-") for title in titles], target
 
 
 def test_map_names_every_room():
