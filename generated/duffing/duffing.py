@@ -12,7 +12,7 @@
 #
 # SPDX-License-Identifier: 0BSD
 # This file belongs to whoever generated it; phigen claims no rights in it.
-# body-sha256: 8042338a3870f4bbf011ae10603d913441caf2818ca793315c1e4650f03f7f33
+# body-sha256: ae23d02ded16b5f54501566f133e3f745b5c5e8a3d15889a0c3404acb2b1b05b
 import numpy as np
 
 VERSION = "0.1.0"
@@ -315,6 +315,21 @@ def step(x, h, t0=0.0, gauge=None, **parameters):
     return integrate(x, h, 1, t0=t0, gauge=gauge, **parameters)[-1]
 
 
+def _checked(x0, h, steps, stride, parameters):
+    """The arguments of integrate() as arrays and values. Raises ValueError for those that are not allowed."""
+    x, h = _numbers(x0), _numbers(h)
+    if x.shape[-1:] != (DIM,):
+        raise ValueError(f"x0 has shape {x.shape}, not (..., {DIM})")
+    if steps < 0 or stride < 1:
+        raise ValueError("steps must be at least 0 and stride at least 1")
+    if not (np.isfinite(x).all() and h.ndim == 0 and np.isfinite(h)):
+        raise ValueError("x0 and h must be finite")
+    values = _values(parameters)
+    if not _admissible(values):
+        raise ValueError(f"no step can be made with the parameters { {**DEFAULT_PARAMETERS, **parameters} }")
+    return x, float(h), values
+
+
 def integrate(x0, h, steps, stride=1, t0=0.0, gauge=None, **parameters):
     """States at steps 0, stride, 2*stride, ... and at the last step: shape (rows, ..., DIM).
 
@@ -322,23 +337,16 @@ def integrate(x0, h, steps, stride=1, t0=0.0, gauge=None, **parameters):
     are not allowed, and StepError as soon as a step of a member fails. t0 is the time of x0. gauge (one value for each Casimir in GAUGE)
     overrides the choice of the solver: the step is an exact Poisson map for each fixed gauge.
     """
-    x, h = _numbers(x0), _numbers(h)
-    if x.shape[-1:] != (DIM,):
-        raise ValueError(f"x0 has shape {x.shape}, not (..., {DIM})")
-    if steps < 0 or stride < 1:
-        raise ValueError("steps must be at least 0 and stride at least 1")
-    if not (np.isfinite(x).all() and h.ndim == 0 and np.isfinite(h) and np.isfinite(t0)):
-        raise ValueError("x0 and h must be finite")
-    values = _values(parameters)
-    if not _admissible(values):
-        raise ValueError(f"no step can be made with the parameters { {**DEFAULT_PARAMETERS, **parameters} }")
+    x, h, values = _checked(x0, h, steps, stride, parameters)
+    if not np.isfinite(t0):
+        raise ValueError("t0 must be finite")
     shape = x.shape
     x = x.reshape(-1, DIM)
     carry = np.zeros_like(x)
     memory = [(carry, carry)] * len(FRACTIONS)
     rows = [x]
     with np.errstate(all="ignore"):
-        stages = _coefficients(values, x, float(h), gauge)
+        stages = _coefficients(values, x, h, gauge)
         for done in range(steps):
             following = x
             for k, stage in enumerate([_renewed(s, t0 + done * h, h) for s in stages]):

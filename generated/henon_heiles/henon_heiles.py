@@ -12,7 +12,7 @@
 #
 # SPDX-License-Identifier: 0BSD
 # This file belongs to whoever generated it; phigen claims no rights in it.
-# body-sha256: 5288eebbed577932e75899768f7fe857d44c26cd2abe32537199731d9352f6a1
+# body-sha256: 24a1ef1ce5222f8a117966428540647393013f5d60aaaa44de8d62582c6b6136
 import numpy as np
 
 VERSION = "0.1.0"
@@ -322,13 +322,8 @@ def step(x, h, gauge=None, **parameters):
     return integrate(x, h, 1, gauge=gauge, **parameters)[-1]
 
 
-def integrate(x0, h, steps, stride=1, gauge=None, **parameters):
-    """States at steps 0, stride, 2*stride, ... and at the last step: shape (rows, ..., DIM).
-
-    x0 has shape (..., DIM): leading axes are members, each integrated by itself. Raises ValueError for arguments that
-    are not allowed, and StepError as soon as a step of a member fails. gauge (one value for each Casimir in GAUGE)
-    overrides the choice of the solver: the step is an exact Poisson map for each fixed gauge.
-    """
+def _checked(x0, h, steps, stride, parameters):
+    """The arguments of integrate() as arrays and values. Raises ValueError for those that are not allowed."""
     x, h = _numbers(x0), _numbers(h)
     if x.shape[-1:] != (DIM,):
         raise ValueError(f"x0 has shape {x.shape}, not (..., {DIM})")
@@ -339,13 +334,24 @@ def integrate(x0, h, steps, stride=1, gauge=None, **parameters):
     values = _values(parameters)
     if not _admissible(values):
         raise ValueError(f"no step can be made with the parameters { {**DEFAULT_PARAMETERS, **parameters} }")
+    return x, float(h), values
+
+
+def integrate(x0, h, steps, stride=1, gauge=None, **parameters):
+    """States at steps 0, stride, 2*stride, ... and at the last step: shape (rows, ..., DIM).
+
+    x0 has shape (..., DIM): leading axes are members, each integrated by itself. Raises ValueError for arguments that
+    are not allowed, and StepError as soon as a step of a member fails. gauge (one value for each Casimir in GAUGE)
+    overrides the choice of the solver: the step is an exact Poisson map for each fixed gauge.
+    """
+    x, h, values = _checked(x0, h, steps, stride, parameters)
     shape = x.shape
     x = x.reshape(-1, DIM)
     carry = np.zeros_like(x)
     memory = [(carry, carry)] * len(FRACTIONS)
     rows = [x]
     with np.errstate(all="ignore"):
-        stages = _coefficients(values, x, float(h), gauge)
+        stages = _coefficients(values, x, h, gauge)
         for done in range(steps):
             following = x
             for k, stage in enumerate(stages):

@@ -14,7 +14,7 @@
 #
 # SPDX-License-Identifier: 0BSD
 # This file belongs to whoever generated it; phigen claims no rights in it.
-# body-sha256: 9e6668f9bcc0322a001c4bb91a7932120ae5ba3b550510fb6000a96120eb4157
+# body-sha256: 2d9fa18ec7a205944f09241536b4e9cf8bc21d579287dd3ca336657a38eb615b
 import numpy as np
 
 VERSION = "0.1.0"
@@ -224,15 +224,8 @@ def step(x, h, gauge=None, **parameters):
     return integrate(x, h, 1, gauge=gauge, **parameters)[-1]
 
 
-def integrate(x0, h, steps, stride=1, gauge=None, times=False, **parameters):
-    """States at steps 0, stride, 2*stride, ... and at the last step: shape (rows, ..., DIM).
-
-    The steps are of size h in tau; with times the result is a pair of the states and their times t: (rows, ...).
-
-    x0 has shape (..., DIM): leading axes are members, each integrated by itself. Raises ValueError for arguments that
-    are not allowed, and StepError as soon as a step of a member fails. gauge overrides e = -H(x0):
-    the step is an exact Poisson map for each fixed e.
-    """
+def _checked(x0, h, steps, stride, parameters):
+    """The arguments of integrate() as arrays and values. Raises ValueError for those that are not allowed."""
     x, h = _numbers(x0), _numbers(h)
     if x.shape[-1:] != (DIM,):
         raise ValueError(f"x0 has shape {x.shape}, not (..., {DIM})")
@@ -243,6 +236,19 @@ def integrate(x0, h, steps, stride=1, gauge=None, times=False, **parameters):
     values = _values(parameters)
     if not _admissible(values):
         raise ValueError(f"no step can be made with the parameters { {**DEFAULT_PARAMETERS, **parameters} }")
+    return x, float(h), values
+
+
+def integrate(x0, h, steps, stride=1, gauge=None, times=False, **parameters):
+    """States at steps 0, stride, 2*stride, ... and at the last step: shape (rows, ..., DIM).
+
+    The steps are of size h in tau; with times the result is a pair of the states and their times t: (rows, ...).
+
+    x0 has shape (..., DIM): leading axes are members, each integrated by itself. Raises ValueError for arguments that
+    are not allowed, and StepError as soon as a step of a member fails. gauge overrides e = -H(x0): the step
+    is an exact Poisson map for each fixed e.
+    """
+    x, h, values = _checked(x0, h, steps, stride, parameters)
     shape = x.shape
     x = x.reshape(-1, DIM)
     if len(_refused(values, x)):
@@ -253,7 +259,7 @@ def integrate(x0, h, steps, stride=1, gauge=None, times=False, **parameters):
     t, rest = np.zeros((2, len(x)))
     stored = [t]
     with np.errstate(all="ignore"):
-        stages = _coefficients(values, x, float(h), gauge)
+        stages = _coefficients(values, x, h, gauge)
         for done in range(steps):
             following = x
             for k, stage in enumerate(stages):

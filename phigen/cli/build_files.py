@@ -31,7 +31,14 @@ def _text(system: str, solvers: Mapping[str, Collection[str]]) -> str:
     file, suffix = FILES[system]
     found = [(name, sorted(f for f in files if f.endswith(suffix))) for name, files in sorted(solvers.items())]
     found = [(name, sources) for name, sources in found if sources]
-    values = {"solvers": found, "names": [name for name, _ in found], "quoted": _quoted}
+    names = [name for name, _ in found]
+    values = {
+        "solvers": [(name, " ".join(sources)) for name, sources in found],
+        "quoted_solvers": [(name, _quoted(sources)) for name, sources in found],
+        "names": names,
+        "listed": ", ".join(names),
+        "quoted": _quoted(names),
+    }
     body = render("vendor", file, values)
     head = [f"Made by phigen vendor {__version__}, for the solvers beside it; made again whenever they are."]
     return "".join(f"# {line}\n" for line in [*head, f"{CHECKSUM} {checksum(body)}"]) + body

@@ -235,9 +235,7 @@ def declare(raw: Raw, reader: Reader) -> Declarations:
         c.text for c in coordinates or () if c is not None and declared.declare(c, "coordinate")
     )
     time = raw.get("time")
-    if time is not None and declared.lattice:
-        reader.error(time, "time: lattices depend on no time in this version")
-    elif time is not None and declared.declare(time, "time"):
+    if time is not None and declared.declare(time, "time"):
         declared.time = time.text
     _declare_parameters(raw, declared)
     _declare_definitions(raw.get("definitions", {}), declared)

@@ -96,10 +96,20 @@ def _parts(raw: Mapping[str, Any], declared: Declarations) -> dict[str, Any]:
 
 
 #: Keys of the Hamilton–Jacobi series, which mean nothing to a splitting, and the values that do no harm.
-SERIES_KEYS = {"terms": (), "birealisation": ("auto",), "modified_hamiltonian": (0,)}
+SERIES_KEYS: Mapping[str, tuple[object, ...]] = {"terms": (), "birealisation": ("auto",), "modified_hamiltonian": (0,)}
+
+
+#: Keys that lattices do not take yet, and the values that do no harm.
+NOT_OF_LATTICES: Mapping[str, tuple[object, ...]] = {
+    "time": (), "monitor": (), "reconstruct": (), "forces": (), "damping": (), "terms": (), "birealisation": ("auto",),
+    "gauge": ("auto", "none"), "tangent": (False,), "modified_hamiltonian": (0,),
+}  # fmt: skip
 
 
 def _expect_consistent(raw: Mapping[str, Any], problems: Problems, reader: Reader) -> None:
+    for key, harmless in NOT_OF_LATTICES.items() if raw.get("lattice") is not None else ():
+        if raw.get(key) is not None and raw[key] not in harmless:
+            problems.add(f"{key}: not for lattices in this version", reader.locations[key,])
     if raw.get("scheme") != "splitting":
         return
     for key, harmless in SERIES_KEYS.items():
@@ -134,9 +144,7 @@ def _formulas(
 def _forces(raw: Mapping[str, Any], declared: Declarations) -> SpecForces:
     """``forces`` and ``damping``; by coordinates."""
     given, damping = raw.get("forces") or {}, raw.get("damping")
-    if (given or damping) and declared.lattice:
-        place = declared.reader.locations["forces" if given else "damping",]
-        declared.reader.problems.add("forces and damping: not for lattices in this version", place)
+    if declared.lattice:
         return SpecForces()
     found: dict[str, dict[str, Expression]] = {}
     for kind in ("covector", "vector"):

@@ -60,7 +60,7 @@ def _body(program: Program) -> str:
     if isinstance(program.step, Sweeps):
         return lattice.body(program, program.step, _function(program, program.step.prepare))
     seen = program.observables
-    pieces = [render("numpy", part, _values(program)) for part in ("preamble.py", "parameters.py")]
+    pieces = [render("numpy", part, _values(program)) for part in ("preamble.py", "arrays.py", "parameters.py")]
     pieces += [render("numpy", "phi.py", special.values(f, f"_{f}")) for f in special.used(program)]
     pieces += [
         render("numpy", "entire.py", special.entire_values(f, LANGUAGE.printer)) for f in special.entire_used(program)
@@ -72,7 +72,9 @@ def _body(program: Program) -> str:
     pieces += [_function(program, kernel) for kernel in program.choice]
     pieces += _monitor(program)
     coefficients = "coefficients_in_time.py" if program.time else "coefficients.py"
-    pieces += [render("numpy", part, _values(program)) for part in (coefficients, "api.py")]
+    integrate = "integrate_monitored.py" if program.monitor else "integrate.py"
+    parts = (coefficients, "single.py", "checked.py", integrate)
+    pieces += [render("numpy", part, _values(program)) for part in parts]
     pieces += [_function(program, kernel) for kernel in (seen.energy, seen.casimirs, seen.vector_field)]
     pieces += [render("numpy", "observables.py", _values(program))]
     if program.extras.tangent:
@@ -237,7 +239,6 @@ def _values(program: Program) -> dict[str, object]:
         "t0_passed": ", t0=t0" * bool(program.time),
         "said_from_t0": ", from the time t0" * bool(program.time),
         "said_of_t0": " t0 is the time of x0." * bool(program.time),
-        "and_t0_is_finite": " and np.isfinite(t0)" * bool(program.time),
         "stages_now": "[_renewed(s, t0 + done * h, h) for s in stages]" if program.time else "stages",
         "renewed": step.renewed,
         "prepared": step.prepared,
