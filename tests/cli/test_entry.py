@@ -304,12 +304,22 @@ def test_completion_script_is_offered():
 @pytest.mark.parametrize(
     ("line", "offered"),
     [
-        ("run kep", ["plain,kepler"]),
-        ("run k", ["plain,krill.yaml", "plain,kelp/", "plain,kepler", "plain,kowalevski_top", "plain,klein_gordon"]),
-        ("vendor kep", ["plain,kepler"]),
+        ("run kep", ["plain,kepler", "plain,kepler_eccentric"]),
+        (
+            "run k",
+            [
+                "plain,krill.yaml",
+                "plain,kelp/",
+                "plain,kepler",
+                "plain,kepler_eccentric",
+                "plain,kowalevski_top",
+                "plain,klein_gordon",
+            ],
+        ),
+        ("vendor kep", ["plain,kepler", "plain,kepler_eccentric"]),
         ("run kr", ["file,kr"]),
         ("run kelp/", ["file,kelp/"]),
-        ("list --path kep", ["plain,kepler"]),
+        ("list --path kep", ["plain,kepler", "plain,kepler_eccentric"]),
         ("run kepler --run ", ["plain,eccentric", "plain,circle"]),
         ("verify kepler krill.yaml --run t", ["plain,turn"]),
         ("tune wrong.yaml --run ", []),
