@@ -76,10 +76,13 @@ def plain(given: spec.Spec) -> spec.Spec:
     return replace(given, profile="fast", gauge="none" if given.gauge == "auto" else given.gauge)
 
 
-@cache
-def compile_text(text: str, order: int | None = None, scheme: str | None = None, **more: Any) -> Compilation:
-    """The compilation of a spec given as YAML without its first two keys."""
+def compile_anew(text: str, order: int | None = None, scheme: str | None = None, **more: Any) -> Compilation:
+    """The compilation of a spec given as YAML without its first two keys, made by the phigen of this moment."""
     return compile_spec(plain(spec.loads(f"phigen: 1\nname: t\n{text}")), order=order, scheme=scheme, **more)
+
+
+#: The same, made once: for all tests but those that change phigen itself.
+compile_text = cache(compile_anew)
 
 
 def small(compilation: Compilation) -> Compilation:

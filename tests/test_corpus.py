@@ -42,6 +42,7 @@ ELSEWHERE = {"taylor_power"}
 
 
 def test_quick_systems_have_every_trait_of_the_corpus():
-    short = [name for name in NAMES if described(name)[0].profile == "small"]  # fast code has much beside
+    # Fast code has much beside; tests/attitude has systems of every kind with an attitude.
+    short = [name for name in NAMES if described(name)[0].profile == "small" and not described(name)[0].reconstruct]
     assert set().union(*map(traits, short)) - set().union(*map(traits, QUICK)) == ELSEWHERE
     assert {described(name)[2].kind for name in NAMES} == {described(name)[2].kind for name in QUICK}

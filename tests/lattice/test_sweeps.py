@@ -148,7 +148,8 @@ def test_order_is_that_of_the_method(name: str, order: int) -> None:
     x, found = start(name), solver(name, order, "c")
     parameters, span = disorder(name, x), 0.8
     far = found.integrate(x, span / 512, 512, 512, **parameters).x[-1]
-    errors = [np.abs(found.integrate(x, span / n, n, n, **parameters).x[-1] - far).max() for n in (8, 16)]
+    counts = (8, 16) if order < 8 else (4, 8)  # beyond, the error is that of rounding
+    errors = [np.abs(found.integrate(x, span / n, n, n, **parameters).x[-1] - far).max() for n in counts]
     assert np.log2(errors[0] / errors[1]) > order - 0.35
 
 

@@ -6,7 +6,7 @@ from fractions import Fraction
 
 import pytest
 import sympy
-from support import QUICK, compile_text, compiled, slow_but
+from support import QUICK, compile_anew, compile_text, compiled, slow_but
 
 from phigen.errors import LimitError
 from phigen.proofs.independent import OutOfTimeError, compare, decide, time_limit
@@ -126,8 +126,8 @@ def test_a_wrong_factor_in_the_recursion_is_refuted(monkeypatch):
     """i for i + 1."""
     monkeypatch.setattr(hamilton_jacobi, "Fraction", lambda a, b: Fraction(a, max(b - 1, 1)))
     euler = "coordinates: [q, p]\npoisson: {canonical: {q: [q], p: [p]}}\nhamiltonian: p**2/2 + sin(q)\n"
-    assert verdicts(compile_text(euler + "birealisation: canonical-euler\n"), 3)["S_2"] == REFUTED
-    found = list(compare(compile_text(BODY + "hamiltonian: x**2 + y**2/2\nbirealisation: exponential\n"), 3))
+    assert verdicts(compile_anew(euler + "birealisation: canonical-euler\n"), 3)["S_2"] == REFUTED
+    found = list(compare(compile_anew(BODY + "hamiltonian: x**2 + y**2/2\nbirealisation: exponential\n"), 3))
     assert [c.statement.verdict for c in found] == [PROVED, PROVED, REFUTED, REFUTED, PROVED]
     assert ", not " in found[2].statement.detail
     assert "x**" in found[2].statement.residual
@@ -139,7 +139,7 @@ def test_a_wrong_series_of_paths_is_refuted(monkeypatch):
     text = BODY + "hamiltonian: x**2 + y**2/2\nbirealisation: karasev\n"
     assert set(verdicts(compile_text(text), 3).values()) == {PROVED}
     monkeypatch.setattr(karasev, "factorial", lambda n: max(n - 1, 1))
-    assert verdicts(compile_text(text), 3)["S_3"] == REFUTED
+    assert verdicts(compile_anew(text), 3)["S_3"] == REFUTED
 
 
 class Misprinted:

@@ -2,7 +2,7 @@
 
 import mpmath
 import pytest
-from support import BODY, NAMES, compile_text, compiled, series_of, slow_but, values
+from support import BODY, NAMES, compile_anew, compile_text, compiled, series_of, slow_but, values
 
 from phigen.errors import LimitError
 from phigen.scheme import assemble, discretisation
@@ -104,7 +104,7 @@ def test_a_program_beyond_the_budget_is_refused_with_a_hint(monkeypatch):
     monkeypatch.setattr(discretisation, "MOST_OPERATIONS", 100)
     monkeypatch.setattr(assemble, "MOST_OPERATIONS", 100)
     with pytest.raises(LimitError) as caught:
-        compile_text(BODY + "order: 6\n")
+        compile_anew(BODY + "order: 6\n")
     assert "order" in str(caught.value)
     assert "ask for a lower order" in str(caught.value)
 
