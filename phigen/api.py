@@ -12,7 +12,7 @@ import re
 import warnings
 from collections.abc import Callable, Mapping
 from os import PathLike, fspath
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, overload
 
 from phigen import registry, resources
 from phigen import spec as specs
@@ -51,6 +51,30 @@ def load(path: str | PathLike[str]) -> System:
         raise located(error, spec) from None
 
 
+@overload
+def compile(
+    source: System,
+    target: str = "auto",
+    order: int | None = None,
+    *,
+    scheme: str | None = None,
+    tangent: bool = False,
+    profile: str | None = None,
+) -> Solver: ...
+
+
+@overload
+def compile(
+    source: Source,
+    target: str = "auto",
+    order: int | None = None,
+    *,
+    scheme: str | None = None,
+    tangent: bool = False,
+    profile: str | None = None,
+) -> Any: ...
+
+
 def compile(
     source: Source,
     target: str = "auto",
@@ -62,7 +86,7 @@ def compile(
 ) -> Any:
     """A solver of a `System` or a spec, of the path of a spec file, or of the name of a bundled one.
 
-    ``target`` is ``c``, ``numpy``, or ``auto``: C if there is a compiler, else NumPy with a `RuntimeWarning`. ``order``
+    ``target`` is ``c``, ``numpy``, or ``auto``: C if there is a compiler, else NumPy with a `PhigenWarning`. ``order``
     overrides the order of the spec, ``scheme`` (``series``, ``splitting``, ``auto``) its scheme; ``tangent`` asks for
     `Solver.step_tangent`, ``profile`` (``fast``, ``small``) overrides that of the C. Compiled C is cached by its
     content. Gives a `Solver`, of a lattice a `LatticeSolver`. Raises `SpecError`, `LimitError`, `CheckError` if the
@@ -111,8 +135,8 @@ def compilation_of(
         if order is None and scheme is None and same:
             return source
         order = order or source.order.order
-        scheme = scheme or ("splitting" if source.splitting else "series")
-        source = source.system
+        scheme = scheme or ("splitting" if source.splitting else None if source.cell else "series")
+        source = source.spec if source.cell else source.system
     wanted: dict[str, Any] = {"order": order, "scheme": scheme, "extras": extras, "profile": profile}
     if isinstance(source, System):
         return compile_proved(source.spec or _spec_of(source), system=source, **wanted)

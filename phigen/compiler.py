@@ -16,16 +16,15 @@ import warnings
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import replace
-from pathlib import Path
 from typing import Any, TypeVar
 
 from phigen import progress, registry
-from phigen import spec as specs
 from phigen.attitude.group import group_of
 from phigen.compilation import Compilation, NoSystem
 from phigen.errors import CheckError, LimitError, PhigenWarning, SpecError
 from phigen.geometry.system import System, system_from_spec
 from phigen.lattice.building import cell_from_spec
+from phigen.lattice.cell import Cell
 from phigen.lattice.sweeps import build_sweeps, plan_sweeps
 from phigen.proofs import statements
 from phigen.proofs.examination import UNEXAMINED, Examination, doubts, located, refutation, refuted
@@ -62,9 +61,11 @@ def compile_spec(
     ``system`` is its system, where the caller has built it already. Nothing is proved: see `compile_proved`. Raises
     `SpecError` (no bi-realisation applies, H does not split, …) and `LimitError` (the program would be too large).
     """
-    if spec.lattice:
-        return compile_lattice(spec, order=order, scheme=scheme, extras=extras, profile=profile)
     clock = _Clock()
+    if spec.lattice:
+        with bounded(spec):
+            cell = clock.timed("cell", lambda: cell_from_spec(spec))
+            return _swept(spec, cell, order, scheme, extras or spec.extras, profile or spec.profile, clock)
     _tell_of_lattice(spec)
     with bounded(spec):
         source = system or clock.timed("system", lambda: system_from_spec(spec))
@@ -100,8 +101,9 @@ def examine(
         if refuted(groups):
             return Examination(spec, groups, unexamined=UNEXAMINED)
         groups = groups | clock.timed("proofs", lambda: statements.integrals(source))
-        groups = groups | statements.monitor(source, spec)
-        if refuted({name: found for name, found in groups.items() if name == statements.MONITOR}):
+        monitor = statements.monitor(source, spec)
+        groups = groups | monitor
+        if refuted(monitor):
             return Examination(spec, groups, unexamined="the method")
         try:
             compilation = _compiled(spec, source, order, scheme, extras or spec.extras, profile or spec.profile, clock)
@@ -133,43 +135,6 @@ def compile_proved(
     if found.compilation is None:
         raise found.obstacle or AssertionError("an examination without compilation has an obstacle")
     return found.compilation
-
-
-def compile_lattice(
-    spec: Spec,
-    *,
-    order: int | None = None,
-    scheme: str | None = None,
-    extras: Extras | None = None,
-    profile: str | None = None,
-) -> Compilation:
-    """Compile a lattice, of any sizes, to sweeps over its sites. Raises `SpecError` where H does not split."""
-    clock = _Clock()
-    with bounded(spec):
-        cell = clock.timed("cell", lambda: cell_from_spec(spec))
-        asked: dict[str, Any] = {"scheme": scheme or spec.scheme, "composition": spec.composition}
-        asked |= {"order": order or spec.wanted_order, "extras": extras or spec.extras}
-        plan = clock.timed("splitting", lambda: plan_sweeps(cell, spec=spec, **asked))
-        program = clock.timed(
-            "program",
-            lambda: build_sweeps(
-                cell,
-                plan,
-                extras=extras or spec.extras,
-                title=spec.title,
-                licence=spec.license,
-                spec_sha256=spec.source_sha256,
-                profile=profile or spec.profile,
-                lanes=spec.solver.lanes,
-            ),
-        )
-    nothing: Any = NoSystem(spec)
-    return Compilation(spec, nothing, None, plan.choice.order, program, seconds=clock.seconds, cell=cell, sweeps=plan)
-
-
-def compile_file(path: str | Path, *, order: int | None = None) -> Compilation:
-    """`compile_spec` for a file."""
-    return compile_spec(specs.load(path), order=order)
 
 
 def emit(program: Program, target: str, command: str, *, single_file: bool = False) -> dict[str, str]:
@@ -206,7 +171,7 @@ def _examine_lattice(
         if refuted(groups):
             return Examination(spec, groups, unexamined=UNEXAMINED if len(groups) == 1 else "")
         try:
-            compilation = compile_lattice(spec, order=order, scheme=scheme, extras=extras, profile=profile)
+            compilation = _swept(spec, cell, order, scheme, extras or spec.extras, profile or spec.profile, clock)
         except SpecError as error:
             return Examination(spec, groups, obstacle=located(error, spec))
         groups = groups | clock.timed("proofs", lambda: statements.sweeps(compilation))
@@ -262,6 +227,26 @@ def _split(spec: Spec, source: System, order: int | None, described: Mapping[str
     described = {**described, "lanes": spec.solver.lanes, "monitor": monitor, "group": group}
     program = clock.timed("program", lambda: build_splitting(source, choice, gauge, **described))
     return Compilation(spec, source, None, choice.order, program, gauge, clock.seconds, choice.splitting)
+
+
+def _swept(
+    spec: Spec, cell: Cell, order: int | None, scheme: str | None, extras: Extras, profile: str, clock: _Clock
+) -> Compilation:
+    """Compile a lattice, of any sizes, to sweeps over its sites."""
+    asked: dict[str, Any] = {"scheme": scheme or spec.scheme, "composition": spec.composition}
+    asked |= {"order": order or spec.wanted_order, "extras": extras}
+    plan = clock.timed("splitting", lambda: plan_sweeps(cell, spec=spec, **asked))
+    described: dict[str, Any] = {
+        "title": spec.title,
+        "licence": spec.license,
+        "spec_sha256": spec.source_sha256,
+        "extras": extras,
+        "profile": profile,
+        "lanes": spec.solver.lanes,
+    }
+    program = clock.timed("program", lambda: build_sweeps(cell, plan, **described))
+    nothing: Any = NoSystem(spec)
+    return Compilation(spec, nothing, None, plan.choice.order, program, seconds=clock.seconds, cell=cell, sweeps=plan)
 
 
 @contextmanager

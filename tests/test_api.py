@@ -43,6 +43,13 @@ def test_compile_takes_what_one_has(source):
     assert phigen.compile(source, target="numpy", order=2).order == 2
 
 
+def test_lattices_compile_anew_to_another_order_and_are_no_system():
+    compilation = phigen.api.compilation_of("fput", order=2)
+    assert phigen.api.compilation_of(compilation, order=4).order.order == 4
+    with pytest.raises(phigen.SpecError, match=r"phigen\.compile takes it as it is"):
+        phigen.load("fput")
+
+
 def from_sympy(**more):
     (x, y), k = sympy.symbols("x y"), sympy.Symbol("k", positive=True)
     return phigen.System.from_sympy(

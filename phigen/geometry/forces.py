@@ -6,11 +6,11 @@ double bracket is ζ = λ π∇H, for which dH/dt = −λ |π∇H|². f may be a
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from phigen.spec.model import SpecForces
-from phigen.symbolic.expression import ZERO, Expression, substitute
+from phigen.symbolic.expression import ZERO, Expression
 
 
 @dataclass(frozen=True)
@@ -20,12 +20,6 @@ class Forces:
     covector: tuple[Expression, ...]
     vector: tuple[Expression, ...]
     damping: Expression = ZERO
-
-    def substituted(self, values: Mapping[str, Expression]) -> Forces:
-        """The forces with some symbols replaced."""
-        n = len(self.vector)
-        done = substitute([*self.covector, *self.vector, self.damping], values)
-        return Forces(tuple(done[:n]), tuple(done[n : 2 * n]), done[2 * n])
 
 
 def forces_of(given: SpecForces, coordinates: Sequence[str], field: Sequence[Expression]) -> Forces | None:

@@ -137,15 +137,3 @@ class _Recursion:
             key = (*m[: self.fraction], 0, *m[self.fraction + 1 :])
             collected[key] = collected[key] + c if key in collected else c
         return self.tower.context.from_dict(collected)
-
-
-def time_dependent(series: PolynomialSeries, time: str) -> Expression:
-    """∂_tS_t(y) = Σ i t^(i−1) S_i(y), which is H_t(x) of the paper's theorem at α(y, ∇S_t(y)) = x.
-
-    The steps Φ_t: x ↦ β(y, ∇S_t(y)) of all sizes t are its flow: ∂_tΦ_t(x) = DΦ_t(x) π(x) ∇H_t(x). ``time`` is the name
-    of t, a symbol of the tower; for the untruncated series H_t = H.
-    """
-    t, tower = series.tower.variable(time), series.tower
-    return tower.expression(
-        tower.combine([s * tower.constant(i) * t ** (i - 1) for i, s in enumerate(series.terms, 1)])
-    )

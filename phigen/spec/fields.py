@@ -26,7 +26,6 @@ from phigen.spec.names import (
     FAMILY_HELP,
     IDENTIFIER,
     PARTS,
-    PLANNED,
     PROFILES,
     RECONSTRUCTIONS,
     SCHEMES,
@@ -115,14 +114,14 @@ def _structure(what: str, nested: int, *more: Field) -> Record:
         instead = ("bonds",)
         along = "graphs: {x[a]: {x[b]: f}} for the bracket of the ends of a bond; alone, or beside a form"
         forms.append(Field("bonds", MapOf(NEIGHBOUR, MapOf(NEIGHBOUR, FORMULA)), along))
-    return Record(what, (*more, *forms), one=keys, exactly=True, planned=PLANNED["poisson"], instead=instead)
+    return Record(what, (*more, *forms), one=keys, exactly=True, instead=instead)
 
 
 BOUNDARY = Choice(("periodic", "open"))
 #: How deep products and pull-backs may be nested.
 NESTED = 2
 POISSON = _structure("poisson", NESTED)
-KIND = Choice(BIREALISATIONS, PLANNED["birealisation"])
+KIND = Choice(BIREALISATIONS)
 TAU = Either({Scalar: FORMULA, Sequence: MATRIX})
 SPRAY = Either({Scalar: Choice(("auto", "flat", "natural")), Sequence: ListOf(FORMULA, least=1)})
 BIREALISATION = Record(
@@ -222,7 +221,7 @@ RUN = Record(
 
 
 def _switch(key: str, *words: str) -> Kind:
-    return Choice(words, PLANNED[key])
+    return Choice(words)
 
 
 SPEC = Record(

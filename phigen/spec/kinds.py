@@ -18,8 +18,8 @@ from typing import Any
 
 from phigen.errors import Location
 from phigen.spec import limits
-from phigen.spec.names import planned
-from phigen.spec.problems import Problems, counted, did_you_mean, meant, one_of, shown
+from phigen.spec.names import MEANT
+from phigen.spec.problems import Problems, counted, did_you_mean, intended, one_of, shown
 from phigen.spec.yaml_source import Mapping as MappingNode
 from phigen.spec.yaml_source import Node, Scalar, describe, is_unprintable, kind_of
 from phigen.spec.yaml_source import Sequence as SequenceNode
@@ -127,10 +127,9 @@ class Name(Kind):
 
 @dataclass(frozen=True)
 class Choice(Kind):
-    """One of some words; ``planned`` ones are known and refused as not available yet."""
+    """One of some words."""
 
     words: tuple[str, ...]
-    planned: tuple[str, ...] = ()
 
     @property
     def expected(self) -> str:  # type: ignore[override]
@@ -141,9 +140,7 @@ class Choice(Kind):
             return self.mismatch(node, path, reader)
         if node.text in self.words:
             return node.text
-        if node.text in self.planned:
-            return reader.error(node, planned(f"{label(path)}{node.text}"), self.expected)
-        hint = did_you_mean(node.text, self.words + self.planned) or self.expected
+        hint = did_you_mean(node.text, self.words) or self.expected
         return reader.error(node, f"{label(path)}{shown(node.text)} is not known", hint)
 
     def schema(self) -> Schema:
@@ -299,14 +296,13 @@ class Record(Kind):
     """A mapping with fixed keys; reads as key → value, keys in error absent.
 
     ``one`` lists keys of which at most (``exactly``: exactly) one may be given; a key of ``instead`` does where one is
-    needed, and may stand beside it. ``planned`` keys are known and refused as not available yet.
+    needed, and may stand beside it.
     """
 
     what: str
     fields: tuple[Field, ...]
     one: tuple[str, ...] = ()
     exactly: bool = False
-    planned: tuple[str, ...] = ()
     instead: tuple[str, ...] = ()
 
     @property
@@ -319,10 +315,8 @@ class Record(Kind):
             return self.mismatch(node, path, reader, "keys: " + ", ".join(known))
         values = {}
         for name, (key, item) in node.entries.items():
-            if name in self.planned:
-                reader.error(key, planned(f"{self.what}: {name}"), one_of(known))
-            elif name not in known:
-                hint = meant(name, known) or did_you_mean(name, known) or "keys: " + ", ".join(known)
+            if name not in known:
+                hint = did_you_mean(name, known, MEANT) or "keys: " + ", ".join(known)
                 reader.error(key, f"{self.what} has no key {shown(name)}", hint)
             else:
                 inner = (*path, name)
@@ -335,17 +329,19 @@ class Record(Kind):
 
     def check_presence(self, node: MappingNode, reader: Reader) -> None:
         """Report missing keys, and keys that exclude each other."""
+        known = [f.key for f in self.fields]
+        strange = set(node.entries) - set(known)  # reported already
+        given = {*node.entries, *(intended(name, known, MEANT) for name in strange)}
         for wanted in self.fields:
-            if wanted.required and wanted.key not in node.entries:
+            if wanted.required and wanted.key not in given:
                 reader.error(
                     node, f"{self.what}: the key {wanted.key!r} is missing", f"{wanted.key}: {wanted.description}"
                 )
-        given = [name for name in node.entries if name in self.one]
-        for name in given[1:]:
-            message = f"{self.what}: {given[0]} and {name} exclude each other"
+        forms = [name for name in node.entries if name in self.one]
+        for name in forms[1:]:
+            message = f"{self.what}: {forms[0]} and {name} exclude each other"
             reader.error(node.entries[name][0], message, "give one of them")
-        strange = set(node.entries) - {f.key for f in self.fields}  # reported already
-        if self.exactly and not given and not strange and not any(name in node.entries for name in self.instead):
+        if self.exactly and not forms and not strange and not any(name in node.entries for name in self.instead):
             reader.error(node, f"{self.what}: one of {', '.join(self.one)} is needed")
 
     def schema(self) -> Schema:
@@ -384,19 +380,6 @@ class Either(Kind):
 
     def schema(self) -> Schema:
         return {"anyOf": [k.schema() for k in self.kinds.values()]}
-
-
-@dataclass(frozen=True)
-class Unavailable(Kind):
-    """A form of the design that is refused as not available yet; not in the schema."""
-
-    expected = "a mapping"
-
-    def read(self, node: Node, path: Path, reader: Reader) -> None:
-        reader.error(node, planned(f"{path[-1]} with options"))
-
-    def schema(self) -> Schema:
-        return {"not": {}}
 
 
 def place(key: Scalar, value: Node) -> Location:

@@ -53,8 +53,7 @@ MEMBERS = {"se": (2, 3), "aff": (1,)}
 FAMILY_HELP = "so(n), se(2), se(3), sl(n), gl(n), su(n), sp(2n), heisenberg(n) or aff(1)"
 FAMILY_NAME = re.compile(r"([a-z]+)\(([1-9][0-9]{0,2})\)")
 
-#: Kinds of bi-realisation, and names from the design that later versions will offer. Building one of the
-#: planned ones means moving its name to the first table.
+#: Kinds of bi-realisation.
 BIREALISATIONS = (
     "auto",
     "constant",
@@ -71,7 +70,6 @@ BIREALISATIONS = (
     "custom",
 )
 POISSON_FORMS = ("matrix", "brackets", "canonical", "log_canonical", "lie_algebra", "nambu", "product", "pullback")
-#: Compositions of the flows of the parts of a splitting, and all.
 #: How much the C does for speed.
 PROFILES = ("fast", "small")
 
@@ -82,6 +80,7 @@ LEFT_OUT = {"fast": frozenset[str](), "small": frozenset(PARTS[1:])}
 #: How attitudes are given.
 RECONSTRUCTIONS = ("quaternion", "matrix")
 
+#: Compositions of the flows of the parts of a splitting, and all.
 FLOW_COMPOSITIONS = ("blanes-moan", "blanes-moan-rkn", "nystrom", "force-gradient")
 COMPOSITIONS = (
     "auto",
@@ -96,17 +95,5 @@ COMPOSITIONS = (
 #: The monitor of a splitting in two, K = log(A + e) − log(−B).
 LOGARITHMIC = "log"
 SCHEMES = ("auto", "series", "splitting")
-PLANNED: dict[str, tuple[str, ...]] = {
-    "birealisation": (),
-    "poisson": (),
-    "composition": (),
-    "gauge": (),
-    "scheme": (),
-}
 #: Classical methods a run can be compared with.
 CLASSICAL_METHODS = ("euler", "rk2", "rk4", "implicit-midpoint", "dop853")
-
-
-def planned(what: str) -> str:
-    """The message about a name of the design that is not built yet."""
-    return f"{what} is planned and not available in this version"

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
+from types import MappingProxyType
 
 from phigen.errors import Diagnostic, LimitError, Location, SpecError
 from phigen.spec import limits
-from phigen.spec.names import MEANT
 
 
 def shown(value: object, length: int = 60) -> str:
@@ -18,23 +18,25 @@ def shown(value: object, length: int = 60) -> str:
     return repr(text)
 
 
-def meant(word: str, known: Iterable[str]) -> str:
-    """``did you mean 'damping'?`` for a word that other programs use for one of those known, else nothing."""
-    other = MEANT.get(word)
-    return f"did you mean {other!r}?" if other in set(known) else ""
+def did_you_mean(word: str, candidates: Iterable[str], others: Mapping[str, str] = MappingProxyType({})) -> str:
+    """``did you mean 'x1'?``, or nothing when no candidate is meant; see `intended`."""
+    found = intended(word, candidates, others)
+    return f"did you mean {found!r}?" if found else ""
 
 
-def did_you_mean(word: str, candidates: Iterable[str]) -> str:
-    """``did you mean 'x1'?``, or nothing when no candidate is close."""
+def intended(word: str, candidates: Iterable[str], others: Mapping[str, str] = MappingProxyType({})) -> str:
+    """The candidate that a word stands for, "" if none does: one that ``others`` gives for it, or a close one."""
     if len(word) > limits.NAME_LENGTH:
         return ""
     choices = list(candidates)
+    if others.get(word) in choices:
+        return others[word]
     close = (
         [c for c in choices if c.lower() == word.lower()]
         or _numbered(word, choices)
         or difflib.get_close_matches(word, choices, n=1)
     )
-    return f"did you mean {close[0]!r}?" if close else ""
+    return close[0] if close else ""
 
 
 def _numbered(word: str, choices: Iterable[str]) -> list[str]:

@@ -152,8 +152,3 @@ def sample_point(names: Sequence[str], positive: Collection[str], index: int) ->
             value = -value
         point[name] = value / 32 if kind_of(name) == MOMENTUM else value
     return point
-
-
-def all_hold(statements: Iterable[Statement]) -> bool:
-    """Whether no statement was refuted or left undecided."""
-    return all(s.holds for s in statements)

@@ -9,8 +9,8 @@ from phigen.scheme.lowering import expand_powers
 from phigen.scheme.path import Recurrences, Series, Term
 from phigen.scheme.program import Program
 from phigen.scheme.steps import Path
-from phigen.symbolic.expression import Expression, symbols_of
-from phigen.symbolic.symbols import COEFFICIENT, FIXED, SERIES, Symbol, coefficient, kind_of, momentum, variation
+from phigen.symbolic.expression import Expression
+from phigen.symbolic.symbols import FIXED, SERIES, Symbol, coefficient, momentum, variation
 from phigen.targets.names import Scope
 from phigen.targets.printer import Printer
 from phigen.targets.reserved import Reserved
@@ -65,12 +65,6 @@ def recurrences(program: Program) -> list[Recurrences]:
     if not isinstance(step, Path):
         return []
     return [step.recurrences, *([step.tangent.recurrences] if step.tangent else [])]
-
-
-def reads_coefficients(path: Recurrences) -> bool:
-    """Whether some statement reads the table of coefficients."""
-    roots = [*path.fixed, *(q.first for q in path.series), *(f for q in path.series for _, f in q.linear)]
-    return any(kind_of(s) == COEFFICIENT for s in symbols_of(*roots))
 
 
 def kinds(path: Recurrences) -> list[str]:

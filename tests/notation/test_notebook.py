@@ -7,14 +7,15 @@ from sympy import sympify
 
 import phigen
 from phigen import resources
-from phigen.compiler import compile_file
+from phigen.compiler import compile_spec
+from phigen.spec import load
 
 SPECS = resources.bundled_specs()
 
 
 @pytest.fixture(scope="module")
 def body():
-    return compile_file(SPECS / "rigid_body.yaml")
+    return compile_spec(load(SPECS / "rigid_body.yaml"))
 
 
 def test_latex_of_a_system_has_bracket_energy_and_casimirs(body):

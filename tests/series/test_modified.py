@@ -12,7 +12,7 @@ from support import BODY, PreciseStep, compile_text, compiled, precisely, series
 from phigen.compiler import compile_spec
 from phigen.realisations import karasev
 from phigen.scheme.discretisation import formal_alpha
-from phigen.series.modified import FRACTION, modified_series, time_dependent
+from phigen.series.modified import FRACTION, modified_series
 from phigen.symbolic.arrays import evaluate
 from phigen.symbolic.symbols import ELAPSED
 from phigen.symbolic.tower import rational
@@ -106,6 +106,18 @@ def test_constant_to_higher_order_for_each_term(name, order):
         spreads.append([np.ptp(s) / np.max(np.abs(s)) for s in sums])
     for power, coarse, fine in zip(powers, *spreads, strict=True):
         assert fine < 1e-14 or math.log2(coarse / fine) > power - 0.6, (power, coarse, fine)
+
+
+def time_dependent(series, time):
+    """∂_tS_t(y) = Σ i t^(i−1) S_i(y), which is H_t(x) of the paper's theorem at α(y, ∇S_t(y)) = x.
+
+    The steps Φ_t: x ↦ β(y, ∇S_t(y)) of all sizes t are its flow: ∂_tΦ_t(x) = DΦ_t(x) π(x) ∇H_t(x). ``time`` is the name
+    of t, a symbol of the tower; for the untruncated series H_t = H.
+    """
+    t, tower = series.tower.variable(time), series.tower
+    return tower.expression(
+        tower.combine([s * tower.constant(i) * t ** (i - 1) for i, s in enumerate(series.terms, 1)])
+    )
 
 
 @precisely

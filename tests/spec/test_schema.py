@@ -13,7 +13,7 @@ from phigen.errors import SpecError
 from phigen.spec import loads, schema, starter
 from phigen.spec.fields import SPEC
 from phigen.spec.kinds import Either, Field, Kind, ListOf, MapOf, Record
-from phigen.spec.names import PLANNED
+from phigen.spec.names import MEANT
 
 
 def conforms(text: str) -> bool:
@@ -89,12 +89,10 @@ def test_every_key_is_described_for_editors() -> None:
     assert all(f.description for f in found)
 
 
-def test_planned_is_refused_as_planned() -> None:
-    for key, words in PLANNED.items():
-        for word in words:
-            value = f"{{{word}: []}}" if key == "poisson" else word
-            with pytest.raises(SpecError, match=f"{word} is planned and not available in this version"):
-                loads(complete(f"{key}: {value}\n"))
+def test_what_words_of_other_programs_are_said_to_mean_are_keys() -> None:
+    keys = {f.key for f in fields_below(SPEC)}
+    assert {word: key for word, key in MEANT.items() if key not in keys} == {}
+    assert {word for word, key in MEANT.items() if word == key} == set()
 
 
 @pytest.mark.parametrize("name", ["a", "rigid_body", "x" * 31, "a1_", "body__2"])

@@ -9,7 +9,7 @@ from scipy.integrate import DOP853
 from support import series_of
 
 from phigen import resources, spec
-from phigen.compiler import compile_file
+from phigen.compiler import compile_spec
 from phigen.geometry.system import system_from_spec
 from phigen.realisations.catalogue import realise
 from phigen.spec.model import BirealisationChoice
@@ -75,7 +75,7 @@ def test_functions_on_arrays_agree_with_those_on_numbers(name):
 
 
 def oscillator():
-    system = compile_file(SPECS / "harmonic_oscillator.yaml").system
+    system = compile_spec(spec.load(SPECS / "harmonic_oscillator.yaml")).system
     return system, {p.name: 1.0 for p in system.parameters}
 
 
@@ -144,7 +144,7 @@ def test_energy_that_is_zero_at_the_start_is_measured_in_its_terms_whatever_cons
 
 
 def test_summary_of_a_run_that_failed_is_about_its_finite_rows():
-    system = compile_file(SPECS / "harmonic_oscillator.yaml").system
+    system = compile_spec(spec.load(SPECS / "harmonic_oscillator.yaml")).system
     x = np.array([[1.0, 0.0], [0.0, 1.0], [np.nan, np.nan]])
     parameters = {p.name: 1.0 for p in system.parameters}
     found = summary.summarise("a", system, None, parameters, np.arange(3.0), x)
@@ -154,7 +154,7 @@ def test_summary_of_a_run_that_failed_is_about_its_finite_rows():
 
 @pytest.mark.parametrize("name", ["rigid_body", "kepler", "pendulum", "predator_prey"])
 def test_printed_series_is_the_series(name):
-    compilation = compile_file(SPECS / f"{name}.yaml", order=4)
+    compilation = compile_spec(spec.load(SPECS / f"{name}.yaml"), order=4)
     series = series_of(compilation.system, compilation.realisation, 3)
     names = [*compilation.system.coordinates, *compilation.system.parameter_names]
     values = {n: 0.3 + 0.2 * i for i, n in enumerate(names)}
