@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import ctypes
+import json
+import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -10,6 +12,7 @@ from typing import Any
 import mpmath
 import numpy as np
 from many_digits import precisely
+from tools import run, tool, write
 
 from phigen.compilation import Compilation
 from phigen.compiler import emit
@@ -75,6 +78,16 @@ def _solver(compilation: Compilation, target: str) -> Solver:
     if target == "c":
         return Solver(CSolver(files(compilation, "c"), names), names)
     return Solver(NumpySolver(files(compilation, "numpy")[f"{names.name}.py"], names), names)
+
+
+def javascript(compilation: Compilation, options: str, statements: str, value: str) -> Any:
+    """What the generated JavaScript gives: ``value`` after ``statements``, of a solver ``s`` made with ``options``."""
+    (text,) = files(compilation, "js").values()
+    with tempfile.TemporaryDirectory() as folder:
+        write(Path(folder), {"solver.mjs": text})
+        code = f"import {{ Solver }} from './solver.mjs'; const s = new Solver({{ {options} }}); {statements};"
+        code += f"console.log(JSON.stringify({value}))"
+        return json.loads(run([tool("node"), "--input-type=module", "-e", code], Path(folder)))
 
 
 class RawC:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import sympy
 from scipy.integrate import solve_ivp
-from support import COMMAND, RawC, compile_text, compiled, files, solver, tool
+from support import COMMAND, RawC, compile_text, compiled, files, javascript, solver
 
 import phigen
 from phigen import spec
@@ -180,7 +180,7 @@ def test_the_time_at_an_end_of_the_step_gives_order_one_only(shift):
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_targets_agree_to_roundoff(kind, tmp_path):
+def test_targets_agree_to_roundoff(kind):
     compilation, x0 = compilation_of(kind), start_of(kind)
     expected = solver(compilation, "numpy").integrate(x0, H, STEPS, t0=T0)
     c = solver(compilation, "c").integrate(x0, H, STEPS, t0=T0)
@@ -189,15 +189,9 @@ def test_targets_agree_to_roundoff(kind, tmp_path):
     assert c.energy == pytest.approx(expected.energy, abs=1e-13)
     small = replace(compilation, program=replace(compilation.program, profile="small"))
     assert solver(small, "c").integrate(x0, H, STEPS, t0=T0).x == pytest.approx(expected.x, abs=1e-13)
-    (text,) = emit(compilation.program, "js", COMMAND).values()
-    (tmp_path / "t.mjs").write_text(text, encoding="utf-8")
-    script = (
-        f"import {{ Solver }} from './t.mjs'; const s = new Solver({{ x0: {x0.tolist()}, t0: {T0} }});"
-        f"s.integrate({H}, {STEPS}); console.log(JSON.stringify([[...s.x], s.t, s.hamiltonian(), [...s.vectorField()]]))"
-    )
-    (tmp_path / "run.mjs").write_text(script, encoding="utf-8")
-    done = subprocess.run([tool("node"), str(tmp_path / "run.mjs")], capture_output=True, text=True, check=True)
-    x, t, energy, field = json.loads(done.stdout)
+    value = "[[...s.x], s.t, s.hamiltonian(), [...s.vectorField()]]"
+    options = f"x0: {x0.tolist()}, t0: {T0}"
+    x, t, energy, field = javascript(compilation, options, f"s.integrate({H}, {STEPS})", value)
     assert x == pytest.approx(expected.x[-1], abs=1e-13)
     assert (t, energy) == pytest.approx((expected.t[-1], expected.energy[-1]), abs=1e-13)
     assert field == pytest.approx(solver(compilation, "c").vector_field(c.x[-1], c.t[-1]), abs=1e-13)

@@ -1,12 +1,9 @@
 """monitor: log, K = log(A + e) − log(−B): explicit steps equal in τ, each exactly Poisson."""
 
-import json
-import subprocess
-
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
-from support import files, tool
+from support import javascript
 
 from phigen import SpecError, StepError, resources, spec
 from phigen.api import solver_of
@@ -54,18 +51,13 @@ def test_verification_finds_the_order_in_tau_and_of_the_time_and_no_poisson_defe
     assert not found.failures
 
 
-def test_all_targets_make_the_same_steps_and_take_the_same_time(kepler, tmp_path):
+def test_all_targets_make_the_same_steps_and_take_the_same_time(kepler):
     compilation, solvers = kepler
     c, numpy = (solvers[target].integrate(START, 0.05, 100) for target in ("c", "numpy"))
     np.testing.assert_allclose(c.x, numpy.x, rtol=1e-11, atol=1e-12)
     np.testing.assert_allclose(c.t, numpy.t, rtol=1e-12)
-    (tmp_path / "k.mjs").write_text(next(iter(files(compilation, "js").values())))
-    code = f"import {{Solver}} from './k.mjs'; const s = new Solver({{x0: {START.tolist()}}}); s.integrate(0.05, 100);"
-    code += "console.log(JSON.stringify([...s.x, s.t]))"
-    ran = subprocess.run(
-        [tool("node"), "--input-type=module", "-e", code], cwd=tmp_path, capture_output=True, check=True, timeout=60
-    )
-    np.testing.assert_allclose(json.loads(ran.stdout), [*numpy.x[-1], numpy.t[-1]], rtol=1e-11, atol=1e-12)
+    js = javascript(compilation, f"x0: {START.tolist()}", "s.integrate(0.05, 100)", "[...s.x, s.t]")
+    np.testing.assert_allclose(js, [*numpy.x[-1], numpy.t[-1]], rtol=1e-11, atol=1e-12)
 
 
 def test_until_ends_at_a_time_and_the_bytes_of_a_session_go_on(kepler):
