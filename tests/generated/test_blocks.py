@@ -7,7 +7,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 from support import (
-    COMMAND, NAMES, QUICK, compile_text, compiled, run, setting, slow_but, solver, tool, write,
+    COMMAND,
+    NAMES,
+    QUICK,
+    compile_text,
+    compiled,
+    run,
+    setting,
+    slow_but,
+    solver,
+    tool,
+    write,
 )  # fmt: skip
 
 from phigen.compiler import compile_spec, emit
@@ -39,7 +49,9 @@ def test_blocks_and_groups_equal_single_steps(name, tmp_path):
     exercise(compiled(name), "-O1", tmp_path)
 
 
-@pytest.mark.parametrize("name", slow_but(["rigid_body", "volterra5"], ["rigid_body", "volterra5", "toda3", "kowalevski_top"]))
+@pytest.mark.parametrize(
+    "name", slow_but(["rigid_body", "volterra5"], ["rigid_body", "volterra5", "toda3", "kowalevski_top"])
+)
 def test_vectorised_blocks_and_groups_equal_single_steps(name, tmp_path):
     """-O1 leaves the loops over lanes as they are, -O3 makes vector instructions of them."""
     exercise(compiled(name), "-O3", tmp_path)
@@ -70,7 +82,8 @@ def test_blocks_with_sparse_factors_equal_single_steps(composition, optimisation
     )
     start = [round(1 + 0.3 * (i % 4), 2) for i in range(n)]
     compilation = compile_text(f"{text}runs: {{r: {{initial: {start}, step: 0.2, steps: 10}}}}\n")
-    assert compilation.program.step.factors and compilation.program.step.eliminate
+    assert compilation.program.step.factors
+    assert compilation.program.step.eliminate
     exercise(compilation, optimisation, tmp_path, foreseen=False, units=200)  # with the inverse: 91
 
 

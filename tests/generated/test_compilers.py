@@ -1,10 +1,23 @@
 """Generated C compiles without a warning everywhere, uses nothing but libm, and runs clean under the sanitizers."""
 
-import shutil
 from pathlib import Path
 
 import pytest
-from support import NAMES, QUICK, WARNINGS, compile_text, compiled, files, library, run, setting, single_file, slow_but, tool, write
+from support import (
+    NAMES,
+    QUICK,
+    WARNINGS,
+    compile_text,
+    compiled,
+    files,
+    library,
+    run,
+    setting,
+    single_file,
+    slow_but,
+    tool,
+    write,
+)
 
 _CPP_FLAGS = "-std=c++11 -Wall -Wextra -Wpedantic -Wconversion -Wshadow -Wold-style-cast -Werror"
 _SANITIZERS = "-std=c99 -O0 -g -fsanitize=address,undefined -fno-sanitize-recover=all -fno-omit-frame-pointer"
@@ -114,7 +127,10 @@ runs: {r: {initial: [0.5, 0.2], step: 0.05, steps: 1}}
 
 #: What few systems have, or none: splittings, whose C shares little with that of implicit steps; powers along paths.
 FURTHER = {name: lambda name=name: compiled(name, 4, "splitting") for name in ("kepler", "toda3_quadratic")}
-FURTHER |= {"kowalevski_top": lambda: compiled("kowalevski_top", 6, "splitting"), "powers": lambda: compile_text(POWERS)}
+FURTHER |= {
+    "kowalevski_top": lambda: compiled("kowalevski_top", 6, "splitting"),
+    "powers": lambda: compile_text(POWERS),
+}
 
 
 @pytest.mark.parametrize("case", slow_but(["kepler", "powers"], FURTHER))

@@ -1,13 +1,11 @@
 """Forces and damping: orders, leaves, targets, derivatives, and what is proved and claimed of them."""
 
-import json
-import subprocess
 from functools import cache
 
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
-from support import compile_text, javascript, solver
+from support import COMMAND, compile_text, javascript, solver
 
 from phigen.compiler import emit, examine
 from phigen.errors import SpecError
@@ -123,7 +121,7 @@ def test_an_ensemble_takes_the_steps_of_its_members():
 
 @pytest.mark.parametrize("kind", ["populations", "path"])
 def test_verification_asks_for_what_is_promised(kind):
-    """The derivative is that of a step though ∂(∇S + hζ) is not symmetric; energy and Poisson identity are not judged."""
+    """The derivative is that of a step though ∂(∇S + hζ) is not symmetric; energy and Poisson are not judged."""
     solvers = {target: solver(made(kind), target) for target in ("c", "numpy")}
     found = verify(made(kind), solvers, "test", SYSTEMS[kind][1], {}, 0.1, 50, quick=True)
     assert found.failures == []

@@ -5,8 +5,9 @@ from itertools import product
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
-from phigen.scheme.steps import Explicit, Newton
 from support import BODY, SPECIES, compile_text, slow_but, solver
+
+from phigen.scheme.steps import Explicit, Newton
 
 #: Below this the error is that of the reference and of rounding.
 FLOOR = 1e-13

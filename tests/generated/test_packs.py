@@ -9,8 +9,8 @@ import pytest
 from support import COMMAND, SPECIES, TARGETS, compile_text, compiled, run, setting, slow_but, solver, tool, write
 
 from phigen.compiler import emit
-from phigen.scheme.steps import Explicit, Splitting
 from phigen.errors import StepError
+from phigen.scheme.steps import Explicit, Splitting
 
 EXERCISE = Path(__file__).with_name("packs.c")
 
@@ -74,7 +74,7 @@ def test_members_of_explicit_steps_equal_single_trajectories(kind, tmp_path):
 def test_packs_compile_without_a_warning_where_loops_cannot_be_vectorised(name, compiler, tmp_path):
     """Not even by -Wpass-failed of clang, which forgets where a loop was when OpenMP moves it into another function."""
     write(tmp_path, emit(compiled(name, 4, "splitting").program, "c", COMMAND, single_file=True))
-    strict = "-std=c99 -Wall -Wextra -Wpedantic -Wconversion -Wdouble-promotion -Wshadow -Werror".split()
+    strict = ["-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Wdouble-promotion", "-Wshadow", "-Werror"]
     for flags in (["-O2", "-fopenmp"], ["-O3", "-march=native"]):
         run([tool(compiler), *strict, *flags, "-c", f"{name}.c", "-o", "packs.o"], tmp_path)
 
@@ -172,7 +172,7 @@ VECTORS = list(product(["gcc", "clang"], ["henon_heiles", "spin_chain5", "volter
 def test_steps_of_packs_become_vector_instructions(name, compiler, tmp_path):
     """All of their arithmetic, by both compilers, with no more than -O2 and the instructions of 2013."""
     write(tmp_path, emit(compiled(name, 4, "splitting").program, "c", COMMAND, single_file=True))
-    flags = "-std=c99 -O2 -march=haswell -fno-math-errno -S".split()
+    flags = ["-std=c99", "-O2", "-march=haswell", "-fno-math-errno", "-S"]
     run([tool(compiler), *flags, f"{name}.c", "-o", "packs.s"], tmp_path)
     vector, scalar, function = 0, 0, ""
     for line in (tmp_path / "packs.s").read_text().splitlines():

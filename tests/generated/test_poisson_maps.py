@@ -7,7 +7,6 @@ from pathlib import Path
 import mpmath
 import numpy as np
 import pytest
-from phigen.symbolic.symbols import ELAPSED
 from support import (
     BODY,
     NAMES,
@@ -24,6 +23,8 @@ from support import (
     tangent_by_differences,
     values,
 )
+
+from phigen.symbolic.symbols import ELAPSED
 
 REFERENCES = json.loads(Path(__file__).parents[1].joinpath("references.json").read_text(encoding="utf-8"))["references"]
 EPSILON = 2.0**-52

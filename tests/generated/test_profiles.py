@@ -74,9 +74,8 @@ def test_a_part_can_be_left_out_of_fast_code(part):
     texts = files(compilation, "c").values()
     has = {other: any(word in text for text in texts) for other, word in WORDS.items()}
     assert has == {other: other != part and (part, other) != ("recurrences", "lanes") for other in PARTS}
-    at, ends = setting(compilation), []
-    for target in ("c", "numpy"):
-        ends.append(solver(compilation, target).integrate(at.x, at.h, 200, **at.parameters).x[-1])
+    at = setting(compilation)
+    ends = [solver(compilation, t).integrate(at.x, at.h, 200, **at.parameters).x[-1] for t in ("c", "numpy")]
     np.testing.assert_allclose(ends[0], ends[1], rtol=0, atol=2e-14)
     if part == "ensemble":
         with pytest.raises(TypeError, match="compiled without ensembles"):

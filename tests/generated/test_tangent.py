@@ -9,15 +9,31 @@ import numpy as np
 import pytest
 from precise_path import PrecisePathStep
 from support import (
-    BODY, NAMES, QUICK, TARGETS, WARNINGS, PreciseStep, RawC, compiled, described, files, plain, run, setting,
-    slow_but, solver, spec_of, tool, write,
+    BODY,
+    NAMES,
+    QUICK,
+    TARGETS,
+    WARNINGS,
+    PreciseStep,
+    RawC,
+    compiled,
+    described,
+    files,
+    plain,
+    run,
+    setting,
+    slow_but,
+    solver,
+    spec_of,
+    tool,
+    write,
 )  # fmt: skip
 
-from phigen import StepError, compile, resources, spec
-from phigen.symbolic.arrays import evaluate
+from phigen import StepError, compile, spec
 from phigen.compiler import compile_spec
-from phigen.scheme.steps import Explicit, Path
+from phigen.scheme.steps import Path
 from phigen.spec.model import Extras
+from phigen.symbolic.arrays import evaluate
 
 TANGENT = Extras(tangent=True)
 #: Each driver, with one stage and with several, small systems first.
@@ -58,9 +74,7 @@ def differences(step, x, width=1e-3):
     return np.column_stack(columns)
 
 
-@pytest.mark.parametrize(
-    ("target", "name"), slow_but(product(TARGETS, QUICK), product(TARGETS, NAMES))
-)
+@pytest.mark.parametrize(("target", "name"), slow_but(product(TARGETS, QUICK), product(TARGETS, NAMES)))
 def test_step_is_a_poisson_map(name, target):
     compilation, made = with_tangent(name), solver(with_tangent(name), target)
     at = setting(compilation)

@@ -1,7 +1,5 @@
-"""Hamiltonians that depend on the time: the series, the order, the targets, beside the same with a pair typed by hand."""
+"""Hamiltonians that depend on the time: the series, the order, the targets, beside the pair typed by hand."""
 
-import json
-import subprocess
 from dataclasses import replace
 from functools import cache
 
@@ -118,7 +116,7 @@ def terms_of(text, kind, count):
 
 @pytest.mark.parametrize("kind", ["constant", "canonical-euler"])
 def test_the_series_is_that_of_the_pair_typed_by_hand(kind):
-    system, realisation, found = terms_of(PENDULUM, kind, 4)
+    _, realisation, found = terms_of(PENDULUM, kind, 4)
     both, whole, by_hand = terms_of(BY_HAND, "constant", 4)
     if kind == "canonical-euler":  # the pair keeps the midpoint
         alpha = [*realisation.alpha[:1], whole.alpha[1], *realisation.alpha[1:], whole.alpha[3]]
