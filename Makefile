@@ -14,6 +14,9 @@ BIN := $(VENV)/bin
 STAMP := $(VENV)/.phigen-installed
 WORKERS ?= auto
 
+# Tests start Python some hundred times; compiled modules halve what that takes.
+test test-all: export PYTHONDONTWRITEBYTECODE :=
+
 .PHONY: help demo test test-all lint format golden figures bench clean
 
 help:
@@ -25,7 +28,7 @@ demo: $(STAMP)
 test: lint
 	$(BIN)/python -m pytest -n $(WORKERS)
 
-# With the long tests, and C compiled with the flags users get.
+# With the long tests, and the C of the corpus compiled with the flags users get.
 test-all: lint
 	$(BIN)/python -m pytest -n $(WORKERS) --all
 

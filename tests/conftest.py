@@ -7,12 +7,14 @@ from tools import WARNINGS, not_tested
 
 from phigen.runtime import toolchain
 
-#: Rooms whose tests share what takes long to make.
-WHOLE = ("tests/report/", "tests/random/", "tests/generated/test_guesses.py", "tests/test_paper.py")
+#: Rooms whose files share what takes long to make.
+WHOLE = ("tests/report/",)
 
 
 def pytest_addoption(parser):
-    parser.addoption("--all", action="store_true", help="the long tests too, and C compiled with the flags users get")
+    parser.addoption(
+        "--all", action="store_true", help="the long tests too, and the corpus compiled with the flags users get"
+    )
 
 
 def pytest_configure(config):
@@ -34,32 +36,48 @@ def pytest_collection_modifyitems(config, items):
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_make_scheduler(config, log):
-    """One worker does all tests of one system of the corpus: what it has made of it is of use to all of them."""
+    """One worker does all tests of one system of the corpus, or all others of a file: what it has made for one of them
+    is of use to the next."""
     from xdist.scheduler import LoadScopeScheduling
 
     class BySystem(LoadScopeScheduling):
         def _split_scope(self, nodeid):
             systems = {part for part in re.split(r"[-\]\[]", nodeid) if part in NAMES}
-            return min(systems) if systems else next((room for room in WHOLE if nodeid.startswith(room)), nodeid)
+            return (
+                min(systems)
+                if systems
+                else next((room for room in WHOLE if nodeid.startswith(room)), nodeid.split("::")[0])
+            )
 
     return BySystem(config, log)
 
 
 @pytest.fixture(scope="session", autouse=True)
-def compiled_solvers(request, tmp_path_factory):
+def compiled_solvers(tmp_path_factory):
     """Compiled C is shared by all tests and workers of one session, and not left in the cache of the user.
 
-    Every solver that a test compiles must compile without a warning. Compilers take a quarter of the time with -Og.
-    Tests of what -O3 makes of loops ask for it themselves; with --all every test has it.
+    Every solver that a test compiles must compile without a warning. Compilers take a quarter of the time with -Og;
+    tests of what -O3 makes of loops ask for it themselves, those of the corpus by `as_users_compile`.
     """
     base = tmp_path_factory.getbasetemp()
     shared = (base.parent if base.name.startswith("popen-") else base) / "solvers"
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("PHIGEN_CACHE_DIR", str(shared))
-        optimisation = "-O3" if request.config.option.all else "-Og"
-        flags = (optimisation if flag == "-O3" else flag for flag in toolchain.BASE_FLAGS)
-        patch.setattr(toolchain, "BASE_FLAGS", (*flags, *WARNINGS))
+        patch.setattr(toolchain, "BASE_FLAGS", (*_optimised("-Og"), *WARNINGS))
         yield shared
+
+
+@pytest.fixture(scope="module")
+def as_users_compile(request, compiled_solvers):
+    """With --all, C is compiled with the flags users get: where the C of the whole corpus is what is tested."""
+    with pytest.MonkeyPatch.context() as patch:
+        if request.config.option.all:
+            patch.setattr(toolchain, "BASE_FLAGS", _optimised("-O3"))
+        yield
+
+
+def _optimised(how):
+    return tuple(how if flag.startswith("-O") else flag for flag in toolchain.BASE_FLAGS)
 
 
 @pytest.fixture

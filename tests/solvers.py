@@ -18,6 +18,7 @@ from phigen.compilation import Compilation
 from phigen.compiler import emit
 from phigen.registry import LOADABLE
 from phigen.runtime import cache as library_cache
+from phigen.runtime import toolchain
 from phigen.runtime.c_solver import CSolver
 from phigen.runtime.interface import Interface
 from phigen.runtime.numpy_solver import NumpySolver
@@ -70,7 +71,7 @@ def interface(compilation: Compilation) -> Interface:
 
 def solver(compilation: Compilation, target: str) -> Solver:
     """A solver of one target; compiled C comes from the cache."""
-    return _once(compilation, f"solver {target}", lambda: _solver(compilation, target))
+    return _once(compilation, f"solver {target} {toolchain.BASE_FLAGS}", lambda: _solver(compilation, target))
 
 
 def _solver(compilation: Compilation, target: str) -> Solver:

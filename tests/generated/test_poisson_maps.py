@@ -26,6 +26,8 @@ from support import (
 
 from phigen.symbolic.symbols import ELAPSED
 
+pytestmark = pytest.mark.usefixtures("as_users_compile")
+
 REFERENCES = json.loads(Path(__file__).parents[1].joinpath("references.json").read_text(encoding="utf-8"))["references"]
 EPSILON = 2.0**-52
 

@@ -8,6 +8,8 @@ from support import TARGETS, RawC, casimir_scales, relative_defect, slow_but, so
 
 from phigen.scheme.composition import COMPOSITIONS
 
+pytestmark = pytest.mark.usefixtures("as_users_compile")
+
 #: Systems of the corpus without a closed form, and some that have one.
 NAMES = (
     "ablowitz_ladik3",

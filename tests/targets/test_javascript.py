@@ -120,14 +120,23 @@ def node(folder, jobs):
     return json.loads(done.stdout)
 
 
-@pytest.fixture(scope="module")
+class Answers(dict):
+    """What the solvers of cases say of the first run of their spec, each asked when a test first wants to know."""
+
+    def __init__(self, folders, jobs):
+        self.folders, self.jobs = folders, jobs
+
+    def __missing__(self, case):
+        compilation, h, steps = self.jobs(case)
+        at = setting(compilation)
+        job = compilation, {"x0": at.x, "params": at.parameters}, h or at.h, steps
+        (self[case],) = node(self.folders.mktemp("javascript"), [job])
+        return self[case]
+
+
+@pytest.fixture(scope="session")  # of a module it would be made anew for every system
 def answers(tmp_path_factory):
-    """What the solvers of all cases say of the first run of their spec."""
-    cases, jobs = [*NAMES, *VARIANTS], []
-    for case in cases:
-        at = setting(compilation_of(case))
-        jobs.append((compilation_of(case), {"x0": at.x, "params": at.parameters}, at.h, STEPS))
-    return dict(zip(cases, node(tmp_path_factory.mktemp("javascript"), jobs), strict=True))
+    return Answers(tmp_path_factory, lambda case: (compilation_of(case), None, STEPS))
 
 
 def apart(found, expected):
@@ -237,13 +246,9 @@ def failing(name):
     return compile_text(ENDING[name]) if name in ENDING else compiled(name)
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def failures(tmp_path_factory):
-    jobs = []
-    for name, h in FAILING:
-        at = setting(failing(name))
-        jobs.append((failing(name), {"x0": at.x, "params": at.parameters}, h, 50))
-    return dict(zip([name for name, _ in FAILING], node(tmp_path_factory.mktemp("failures"), jobs), strict=True))
+    return Answers(tmp_path_factory, lambda name: (failing(name), dict(FAILING)[name], 50))
 
 
 @pytest.mark.parametrize(("name", "h"), FAILING)
