@@ -206,6 +206,8 @@ def interface_of(program: Program) -> Interface:
         periods=sites.periods,
         least=sites.least,
         required=frozenset(p.name for p in program.parameters if p.values is not None),
+        graph=bool(program.step.partners and program.step.partners.graph),
+        at_bonds=sites.at_bonds,
     )
 
 

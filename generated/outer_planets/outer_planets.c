@@ -20,7 +20,7 @@
  *   3. The lattice
  *   4. The solver
  *   5. What is seen at sites
- * body-sha256: 92a6ca3e31aa269080c95851b6c00820fa1d265731d02d4ee17a9e86ecaefefb
+ * body-sha256: b164ab2847403e0df6cf4b309d9b42f1930fc35eb464cb0e95d2b28d0bb87616
  */
 #include "outer_planets.h"
 
@@ -280,13 +280,15 @@ static inline void outer_planets_pair_forces(const outer_planets_params *params,
 
 /* the energy of a pair */
 static inline void outer_planets_pair_energy(const outer_planets_params *params, const outer_planets_row *row,
-    ptrdiff_t from, ptrdiff_t to, double *restrict out)
+    ptrdiff_t from, ptrdiff_t to)
 {
     const double G = params->G;
     const double *restrict m_row = row->x[6] + row->at[0];
     const double *restrict x_row = row->x[0] + row->at[0];
     const double *restrict y_row = row->x[1] + row->at[0];
     const double *restrict z_row = row->x[2] + row->at[0];
+    double *restrict g0 = row->gathered[0];
+    for (ptrdiff_t i = from; i < to; ++i) g0[i] = 0.0;
     for (ptrdiff_t j = 0; j < row->length; ++j) {
         const double m_b_ = m_row[j], x_b_ = x_row[j], y_b_ = y_row[j], z_b_ = z_row[j];
         outer_planets_EACH_SITE
@@ -295,8 +297,7 @@ static inline void outer_planets_pair_energy(const outer_planets_params *params,
             const double t1 = z_a_ - z_b_;
             const double t2 = x_a_ - x_b_;
             const double t3 = y_a_ - y_b_;
-            out[i - from] += i == j ? 0.0 : 0.5
-                * (-(m_b_ * (G * m_a_) / sqrt(t1 * t1 + (t2 * t2 + t3 * t3))));
+            g0[i] += i == j ? 0.0 : -(m_b_ * (G * m_a_) / sqrt(t1 * t1 + (t2 * t2 + t3 * t3)));
         }
     }
 }
@@ -306,6 +307,7 @@ static void outer_planets_energy_row(const outer_planets_params *params, const o
     ptrdiff_t from, ptrdiff_t to, double *restrict out, size_t apart)
 {
     (void)apart;
+    outer_planets_pair_energy(params, row, from, to);
     const double *restrict m_row = row->x[6] + row->at[0];
     const double *restrict px_row = row->x[3] + row->at[0];
     const double *restrict py_row = row->x[4] + row->at[0];
@@ -315,7 +317,7 @@ static void outer_planets_energy_row(const outer_planets_params *params, const o
         const double m = m_row[i], px = px_row[i], py = py_row[i], pz = pz_row[i];
         out[i - from] = 0.5 * ((pz * pz + (px * px + py * py)) / m);
     }
-    outer_planets_pair_energy(params, row, from, to, out);
+    for (ptrdiff_t i = from; i < to; ++i) out[i - from] += 0.5 * row->gathered[0][i];
 }
 
 /* the densities of the Casimirs, of the sites of a row: out[k * apart + i - from] */
@@ -381,7 +383,7 @@ enum {
     outer_planets_STRETCH = 32, /* steps before the state is looked at: what is not finite stays so */
     outer_planets_LEAD = (outer_planets_HALO + 7) / 8 * 8,
     outer_planets_BUFFER = 256,
-    outer_planets_RESERVED = outer_planets_ARRAYS + 2 * outer_planets_DIM
+    outer_planets_RESERVED = outer_planets_ARRAYS + outer_planets_DIM + outer_planets_GATHERED
 };
 
 /* Sizes as they have to be: the widths of rows and the number of rows, 0 if they are not allowed. */
@@ -502,7 +504,7 @@ outer_planets_status outer_planets_init(outer_planets_solver *s, const outer_pla
     for (size_t k = 0; k < outer_planets_ARRAYS; ++k) s->x[k] = aligned + k * block;
     for (size_t k = 0; k < outer_planets_DIM; ++k) s->before[k] = aligned + (outer_planets_ARRAYS + k)
         * block;
-    for (size_t k = 0; k < outer_planets_DIM; ++k)
+    for (size_t k = 0; k < outer_planets_GATHERED; ++k)
         s->gathered[k] = aligned + (outer_planets_ARRAYS + outer_planets_DIM + k) * block;
     for (size_t k = 0; k < outer_planets_DIM; ++k) outer_planets_put(s, s->x[k], x0 + k * sites);
     outer_planets_put_parameters(s, &own);

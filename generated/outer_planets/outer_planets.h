@@ -2,7 +2,7 @@
  * outer_planets.h: the declarations; outer_planets.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: e421c33b65c3c9ad5bdbc4e95a9fdbab4bdf9f605e086bde53dd25db9e1ebe94
+ * body-sha256: 0c2fca625b289ae2967597683cf64caa72f889c0b4948a18ee306fea7e8a7e42
  */
 #ifndef OUTER_PLANETS_H
 #define OUTER_PLANETS_H
@@ -29,6 +29,7 @@ extern const outer_planets_params outer_planets_default_params;
 
 enum { outer_planets_ARRAYS = 7 };        /* arrays over the sites: fields, then parameters */
 enum { outer_planets_COEFFICIENTS = 28 }; /* numbers that depend on params and h only */
+enum { outer_planets_GATHERED = 3 };      /* sums over other sites that are held for each site */
 
 /* How a step ends; outer_planets_status_string says it in words. */
 typedef enum {
@@ -45,12 +46,12 @@ typedef struct {
     ptrdiff_t length, width; /* sites of a row; doubles between the beginnings of two rows */
     /* in rows, each field, then each parameter at sites: the first site of the first row */
     double *x[outer_planets_ARRAYS];
-    ptrdiff_t *lines;                    /* of each row, where it is and where those beside it are */
-    double *gathered[outer_planets_DIM]; /* for each field, what pairs add to the force at each site */
-    double *before[outer_planets_DIM];   /* the fields before the steps that are being made */
-    size_t steps;                        /* good steps since outer_planets_init */
-    double t;                            /* time since outer_planets_init */
-    double h;                            /* the last step size */
+    ptrdiff_t *lines;                         /* of each row, where it is and where those beside it are */
+    double *gathered[outer_planets_GATHERED]; /* sums over other sites, for each site */
+    double *before[outer_planets_DIM];        /* the fields before the steps that are being made */
+    size_t steps;                             /* good steps since outer_planets_init */
+    double t;                                 /* time since outer_planets_init */
+    double h;                                 /* the last step size */
     outer_planets_params params;
     double coef[outer_planets_COEFFICIENTS]; /* all that depends on params and h only */
     int prepared; /* whether coef has been computed */

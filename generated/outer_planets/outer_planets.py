@@ -13,7 +13,7 @@
 #
 # SPDX-License-Identifier: 0BSD
 # This file belongs to whoever generated it; phigen claims no rights in it.
-# body-sha256: 3912a022188b97de11219c949f0184ada5d44d16e5cc8ce7dead6da3464a50cd
+# body-sha256: 883444ac05e9ba42a07a9202b9594e696ed61805a9f4ac7528bcae82f4255eb6
 import numpy as np
 
 VERSION = "0.1.0"
@@ -77,14 +77,18 @@ class _Sites:
             raise TypeError(f"unknown parameters {unknown}; known are {sorted(DEFAULT_PARAMETERS)}")
         self.parameters = {}
         for name, value in {**DEFAULT_PARAMETERS, **parameters}.items():
-            value = np.array(value, dtype=float)
-            if value.shape not in ((), self.sizes if name in AT_SITES else ()):
+            value, shape = np.array(value, dtype=float), self.shape_of(name)
+            if value.shape not in ((), shape):
                 raise ValueError(f"the parameter {name} has shape {value.shape}")
             if not np.isfinite(value).all() or (name in POSITIVE and not (value > 0.0).all()):
                 raise ValueError(f"the parameter {name} is not allowed to be {value}")
-            self.parameters[name] = np.broadcast_to(value, self.sizes) if name in AT_SITES else value[()]
+            self.parameters[name] = np.broadcast_to(value, shape)[()]
         self._positions = np.indices(self.sizes, sparse=True)
         self._known = {}
+
+    def shape_of(self, parameter):
+        """() for one number."""
+        return self.sizes if parameter in AT_SITES else ()
 
     def shifted(self, values, *offset):
         """The values of the sites that lie so far away; those beyond open ends are values of others."""
@@ -202,6 +206,7 @@ def _over_others(values, sites):
 
 
 def _gather1(coef, x, sites):
+    sums = 0.0
     with np.errstate(all="ignore"):
         m_a_ = sites.parameters["m"][:, None]
         m_b_ = sites.parameters["m"]
@@ -216,10 +221,12 @@ def _gather1(coef, x, sites):
         t3 = y_a_ - y_b_
         t4 = 1.0 / np.sqrt(t2 * t2 + (t1 * t1 + t3 * t3))
         t5 = m_b_ * (coef[1] * m_a_) * (t4 * (t4 * t4))
-        return np.array([_over_others(t1 * t5, sites), _over_others(t3 * t5, sites), _over_others(t2 * t5, sites)])
+        sums = sums + np.array([_over_others(t1 * t5, sites), _over_others(t3 * t5, sites), _over_others(t2 * t5, sites)])
+    return sums
 
 
-def _pair_energy(parameters, x, sites):
+def _energies(parameters, x, sites):
+    sums = 0.0
     with np.errstate(all="ignore"):
         G = parameters["G"]
         m_a_ = sites.parameters["m"][:, None]
@@ -233,10 +240,12 @@ def _pair_energy(parameters, x, sites):
         t1 = z_a_ - z_b_
         t2 = x_a_ - x_b_
         t3 = y_a_ - y_b_
-        return np.array([_over_others(-(m_b_ * (G * m_a_) / np.sqrt(t1 * t1 + (t2 * t2 + t3 * t3))), sites)])
+        sums = sums + np.array([_over_others(-(m_b_ * (G * m_a_) / np.sqrt(t1 * t1 + (t2 * t2 + t3 * t3))), sites)])
+    return sums
 
 
-def _pair_forces(parameters, x, sites):
+def _forces(parameters, x, sites):
+    sums = 0.0
     with np.errstate(all="ignore"):
         G = parameters["G"]
         m_a_ = sites.parameters["m"][:, None]
@@ -252,7 +261,8 @@ def _pair_forces(parameters, x, sites):
         t3 = y_a_ - y_b_
         t4 = 1.0 / np.sqrt(t2 * t2 + (t1 * t1 + t3 * t3))
         t5 = m_b_ * (G * m_a_) * (t4 * (t4 * t4))
-        return np.array([_over_others(t1 * t5, sites), _over_others(t3 * t5, sites), _over_others(t2 * t5, sites)])
+        sums = sums + np.array([_over_others(t1 * t5, sites), _over_others(t3 * t5, sites), _over_others(t2 * t5, sites)])
+    return sums
 
 
 def _sweep1(coef, x, sites):
@@ -291,7 +301,7 @@ def _energy(parameters, x, sites):
     pz = x[5]
     out = np.empty((1, *sites.sizes))
     out[0] = 0.5 * ((pz * pz + (px * px + py * py)) / m)
-    out += 0.5 * _pair_energy(parameters, x, sites)
+    out += 0.5 * _energies(parameters, x, sites)
     return out
 
 
@@ -301,7 +311,7 @@ def _casimirs(parameters, x, sites):
 
 
 def _vector_field(parameters, x, sites):
-    gathered = _pair_forces(parameters, x, sites)
+    gathered = _forces(parameters, x, sites)
     m = sites.parameters["m"]
     px = x[3]
     py = x[4]

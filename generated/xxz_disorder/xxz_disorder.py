@@ -13,7 +13,7 @@
 #
 # SPDX-License-Identifier: 0BSD
 # This file belongs to whoever generated it; phigen claims no rights in it.
-# body-sha256: 3fbfbd7b72692d8f5a922f94008b2c1e99ef02e1774e6a77c278a75f3f4e1d08
+# body-sha256: a060eaac5ca1f707fc4520ce2802e531be9bf910de2a6e6b9d712475a8009149
 import numpy as np
 
 VERSION = "0.1.0"
@@ -78,14 +78,18 @@ class _Sites:
             raise TypeError(f"unknown parameters {unknown}; known are {sorted(DEFAULT_PARAMETERS)}")
         self.parameters = {}
         for name, value in {**DEFAULT_PARAMETERS, **parameters}.items():
-            value = np.array(value, dtype=float)
-            if value.shape not in ((), self.sizes if name in AT_SITES else ()):
+            value, shape = np.array(value, dtype=float), self.shape_of(name)
+            if value.shape not in ((), shape):
                 raise ValueError(f"the parameter {name} has shape {value.shape}")
             if not np.isfinite(value).all() or (name in POSITIVE and not (value > 0.0).all()):
                 raise ValueError(f"the parameter {name} is not allowed to be {value}")
-            self.parameters[name] = np.broadcast_to(value, self.sizes) if name in AT_SITES else value[()]
+            self.parameters[name] = np.broadcast_to(value, shape)[()]
         self._positions = np.indices(self.sizes, sparse=True)
         self._known = {}
+
+    def shape_of(self, parameter):
+        """() for one number."""
+        return self.sizes if parameter in AT_SITES else ()
 
     def shifted(self, values, *offset):
         """The values of the sites that lie so far away; those beyond open ends are values of others."""

@@ -38,6 +38,7 @@ def run_lattice(
 ) -> None:
     """Integrate a run, and print what was conserved. Raises `StepError` after that if it did not come to its end."""
     from phigen.api import chosen_target, compilation_of, lattice_solver_of
+    from phigen.lattice.cell import GRAPH
     from phigen.lattice.observing import errors_of
     from phigen.lattice.states import start_of
 
@@ -47,6 +48,8 @@ def run_lattice(
     assert compilation.cell is not None
     start = start_of(spec, run)
     parameters = _parameters(start, settings)
+    if compilation.cell.relation == GRAPH:
+        parameters["bonds"] = start.bonds
     solver = lattice_solver_of(compilation, chosen_target(target, console.note))
     kept = output.with_name(output.name + ".checkpoint") if output else None
     if kept and not resume:

@@ -119,7 +119,8 @@ def _rows(program: Program, step: Sweeps) -> Rows:
     """Sites are in rows in any case; the short way near 0 is for speed."""
     swept = [sweep.kernel for part in step.parts for sweep in part]
     seen = program.observables
-    ops = operations([*swept, seen.energy, seen.casimirs, seen.vector_field])
+    looped = [kernel for kernel in step.kernels if kernel is not step.prepare]
+    ops = operations([*looped, seen.energy, seen.casimirs, seen.vector_field])
     used = operations(swept) if program.lanes and program.profile == "fast" else set()
     return Rows(with_formulas(ops), tuple(f for f in NEAR_FUNCTIONS if f in used))
 

@@ -19,7 +19,8 @@ from phigen.symbolic.tower import Tower
 
 def cell_kicks(cell: Cell, splitting: CellSplitting) -> tuple[Kick, ...]:
     """The parts that can be V, proved by degrees; none unless there are two parts without colours."""
-    if len(splitting.flows) != 2 or splitting.colouring.count > 1 or cell.bond_bracket:
+    coloured = splitting.colouring.count > 1 or any(flow.by_colour for flow in splitting.flows)
+    if len(splitting.flows) != 2 or coloured or cell.bond_bracket:
         return ()
     found = []
     for part in (0, 1):

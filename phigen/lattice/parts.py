@@ -10,11 +10,11 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from phigen.errors import Diagnostic, Location, SpecError
-from phigen.lattice.cell import GRID, PERIODIC, Cell, bond_forces
+from phigen.lattice.cell import GRID, PERIODIC, Cell
 from phigen.splitting.conflicts import Conflicts, coloured
 from phigen.splitting.flow import Flow, NoFlowError, Solved, Term, flow_of, joint_flow, solved
 from phigen.splitting.ring import KICK, TIME, Ring
@@ -75,16 +75,29 @@ class Colouring:
 
 
 @dataclass(frozen=True)
+class BondSum:
+    """What bonds or pairs add up at a site: for each symbol an expression in ``x[a]``, here, and ``x[b]``, over there.
+
+    ``end`` tells at which end of the bond, as it is written, the site is: a, b, or either. Of a part that belongs to
+    one colour, ``chosen`` tells which of the two has it: ``here``, ``there``, or none.
+    """
+
+    values: Mapping[str, Expression]
+    end: str = ""
+    chosen: str = ""
+
+
+@dataclass(frozen=True)
 class SiteMotion:
     """How sites of one colour move: increments of the fields, which read the site and neighbours that stand still.
 
-    ``gathered`` are the fields whose force is a sum over bonds or pairs, the symbols `GATHERED` of the increments.
+    ``gathered`` are the sums over bonds or pairs that the increments read as symbols `GATHERED`.
     ``solution`` are the increments with a symbol for each component of the gradient, which solve ẋ = ``rates``.
     """
 
     colour: int
     increments: Mapping[str, Expression]
-    gathered: tuple[str, ...] = ()
+    gathered: tuple[BondSum, ...] = ()
     rates: Mapping[str, Expression] = field(default_factory=dict)
     solution: Mapping[str, Expression] = field(default_factory=dict)
 
@@ -93,11 +106,13 @@ class SiteMotion:
 class CellFlow(Flow):
     """The flow of a part of H over the lattice: all ``motions`` may be made in any order, at all sites in any order.
 
-    ``summands`` are the terms of the part with the colours of the sites where they begin.
+    ``summands`` are the terms of the part with the colours of the sites where they begin. On graphs the part of one
+    colour stands for those of all, if it is ``by_colour``.
     """
 
     motions: tuple[SiteMotion, ...] = ()
     summands: tuple[tuple[Summand, tuple[int, ...]], ...] = ()
+    by_colour: bool = False
 
 
 @dataclass(frozen=True)
@@ -108,7 +123,7 @@ class CellSplitting:
     colouring: Colouring
 
 
-class _NoPartError(Exception):
+class NoPartError(Exception):
     """A term belongs to no part with a flow; the text says why."""
 
     def __init__(self, expression: Expression, reason: str) -> None:
@@ -116,16 +131,22 @@ class _NoPartError(Exception):
         self.expression, self.reason = expression, reason
 
 
-def split_cell(cell: Cell, place: Location | None = None) -> CellSplitting:
-    """H as a sum of parts with elementary flows. Raises `SpecError`, at ``place``, naming the term in the way."""
-    refused: _NoPartError | None = None
+def split_cell(
+    cell: Cell, place: Location | None = None, search: Callable[[Cell, Colouring], PartSearch] | None = None
+) -> CellSplitting:
+    """H as a sum of parts with elementary flows, by a search for each colouring.
+
+    Raises `SpecError`, at ``place``, naming the term in the way.
+    """
+    search = search or PartSearch
+    refused: NoPartError | None = None
     best: CellSplitting | None = None
     for colouring in _colourings(cell):
         if best is not None and colouring.count > best.colouring.count:
             break
         try:
-            found = PartSearch(cell, colouring).splitting()
-        except _NoPartError as error:
+            found = search(cell, colouring).splitting()
+        except NoPartError as error:
             refused = refused or error
             continue
         if best is None or len(found.flows) < len(best.flows):
@@ -171,8 +192,6 @@ class PartSearch:
     def __post_init__(self) -> None:
         for f, other in self.cell.bracket:
             self._couples.setdefault(f, []).append(self.cell.place(other))
-        for f, other in self.cell.bond_bracket:
-            self._couples.setdefault(f.partition("[")[0], []).append((other.partition("[")[0], ()))
 
     def splitting(self) -> CellSplitting:
         """All parts."""
@@ -180,14 +199,13 @@ class PartSearch:
         classes: list[tuple[Summand, int]] = []
         for term in summands_of(self.cell):
             for piece in self._pieces(term):
-                found = [(piece, c) for c in range(self.colouring.count)]
-                if all(self._commute(c, c) for c in found):
+                if found := self._classes(piece):
                     classes += found
                 elif self._is_own(piece):
                     own.append(piece)
                 else:
                     reason = "it mixes coordinates that do not commute"
-                    raise _NoPartError(piece.expression, reason)
+                    raise NoPartError(piece.expression, reason)
         neighbours = [
             {j for j, b in enumerate(classes) if j != i and not self._commute(a, b)} for i, a in enumerate(classes)
         ]
@@ -215,6 +233,11 @@ class PartSearch:
         """Whether some site of the one colour has a bracket with one of the other."""
         return any(g == b[0] and self.colouring.at(a[1], d) == b[1] for g, d in self._couples.get(a[0], ()))
 
+    def _classes(self, term: Summand) -> list[tuple[Summand, int]]:
+        """The term at sites of each colour; none if it does not commute with itself."""
+        found = [(term, c) for c in range(self.colouring.count)]
+        return found if all(self._commute(c, c) for c in found) else []
+
     def _is_own(self, term: Summand) -> bool:
         """Whether it is a function of one site, and π local."""
         places = self.cell.places(term.expression).values()
@@ -222,11 +245,10 @@ class PartSearch:
 
     def _pieces(self, term: Summand) -> list[Summand]:
         """The term, or its monomials where it mixes what does not commute at different sites."""
-        found = [(term, c) for c in range(self.colouring.count)]
-        if all(self._commute(c, c) for c in found) or self._is_own(term):
+        if self._classes(term) or self._is_own(term):
             return [term]
         names = [n for n, (f, _) in self.cell.places(term.expression).items() if f in self.cell.fields]
-        ring = _ring(names, [term.expression])
+        ring = own_ring(names, [term.expression])
         element = ring.tower.convert(term.expression)
         monomials = ring.terms(element, ring.state)
         return [replace(term, expression=ring.expression(c * ring.monomial(m))) for m, c in monomials.items()]
@@ -235,25 +257,22 @@ class PartSearch:
 
     def flow(self, part: Sequence[tuple[Summand, int]], more: Sequence[tuple[Summand, int]] = ()) -> CellFlow:
         """The flow of a sum of terms that commute; ``more`` are multiplied by `KICK`."""
-        motions = []
-        for colour in range(self.colouring.count):
-            motion = self._motion(part, more, colour)
-            if motion.increments:
-                motions.append(motion)
+        motions = [m for m in self._motions(part, more) if m.increments]
         by_term: dict[int, tuple[Summand, list[int]]] = {}
         for summand, colour in (*part, *((replace(s, expression=symbol(KICK) * s.expression), c) for s, c in more)):
             by_term.setdefault(id(summand.expression), (summand, []))[1].append(colour)
         listed = tuple((s, tuple(c)) for s, c in by_term.values())
-        added: dict[str, Expression] = {Symbol(GATHERED, f): e for f, e in self._of_bonds(part).items()}
+        # what one bond or pair adds decides what the flow costs
+        added = {n: e for m in motions for gathered in m.gathered for n, e in gathered.values.items()}
         increments = tuple(substitute([e for m in motions for e in m.increments.values()], added))
-        manner = self._manner
-        return CellFlow(total(s.expression for s, _ in listed), increments, manner, tuple(motions), listed)
+        hamiltonian = total(s.expression for s, _ in listed)
+        return CellFlow(hamiltonian, increments, self._manner, tuple(motions), listed)
 
-    def _of_bonds(self, part: Iterable[tuple[Summand, int]]) -> dict[str, Expression]:
-        """What one bond or pair adds to the forces at its site a: it decides what the flow costs."""
-        bonds = total(s.expression for s, _ in part if s.bond)
-        names = {f: self.cell.at(f, ("a",)) for f in self.cell.fields} if not bonds.is_zero else {}
-        return dict(zip(names, gradient(bonds, list(names.values())), strict=True))
+    def _motions(
+        self, part: Sequence[tuple[Summand, int]], more: Sequence[tuple[Summand, int]]
+    ) -> Iterator[SiteMotion]:
+        for colour in range(self.colouring.count):
+            yield self._motion(part, more, colour)
 
     def force(
         self, part: Iterable[tuple[Summand, int]], field: str, colour: int, shift: Offset = (), factor: Expression = ONE
@@ -282,15 +301,16 @@ class PartSearch:
         moves = {c for s in (*part, *more) for c in self._support(s)}
         rates: dict[str, list[Expression]] = {f: [] for f in cell.fields}
         forces: dict[str, Expression] = {}
-        gathered: list[str] = []
+        gathered: dict[str, Expression] = {}
         for (f, other), entry in cell.bracket.items():
             g, d = cell.place(other)
             there = self.colouring.at(colour, d)
             if (g, there) not in moves:
                 continue
             force = self.force(part, g, there, d) + self.force(more, g, there, d, symbol(KICK))
-            if any(s.bond and g in {b for b, _ in cell.places(s.expression).values()} for s, _ in part):
-                gathered.append(g)
+            slope = total(gradient(s.expression, [cell.at(g, ("a",))])[0] for s, _ in part if s.bond)
+            if not slope.is_zero:
+                gathered[Symbol(GATHERED, g)] = slope
                 force = force + symbol(Symbol(GATHERED, g))
             if force.is_zero:
                 continue
@@ -298,22 +318,33 @@ class PartSearch:
             forces[name] = force
             rates[f].append(entry * symbol(name))
         field = {f: total(r) for f, r in rates.items() if r}
-        if not field:
-            return SiteMotion(colour, {})
-        found = self._solved(field, part)
         self._expect_still(field, colour, part)
-        increments = dict(zip(cell.fields, substitute(found.increments, forces), strict=True))
+        return self._moved(field, forces, [BondSum(gathered)] if gathered else [], colour, part)
+
+    def _moved(
+        self,
+        rates: Mapping[str, Expression],
+        forces: Mapping[str, Expression],
+        gathered: Sequence[BondSum],
+        colour: int,
+        part: Sequence[tuple[Summand, int]],
+    ) -> SiteMotion:
+        """The motion with these ``rates``, in which symbols stand for the ``forces``."""
+        if not rates:
+            return SiteMotion(colour, {})
+        found = self._solved(rates, part)
+        increments = dict(zip(self.cell.fields, substitute(found.increments, forces), strict=True))
         self._manner = found.manner
         moved = {f: e for f, e in increments.items() if not e.is_zero}
-        solution = {f: e for f, e in zip(cell.fields, found.increments, strict=True) if f in moved}
-        return SiteMotion(colour, moved, tuple(dict.fromkeys(gathered)), field, solution)
+        solution = {f: e for f, e in zip(self.cell.fields, found.increments, strict=True) if f in moved}
+        return SiteMotion(colour, moved, tuple(gathered), rates, solution)
 
     def _solved(self, rates: Mapping[str, Expression], part: Sequence[tuple[Summand, int]]) -> Solved:
-        ring = _ring(self.cell.fields, rates.values())
+        ring = own_ring(self.cell.fields, rates.values())
         field = ring.tower.convert_all([rates.get(f, ZERO) for f in self.cell.fields])
         found = solved(ring, field)
         if isinstance(found, str):
-            raise _NoPartError(part[0][0].expression, found)
+            raise NoPartError(part[0][0].expression, found)
         return found
 
     def _expect_still(self, rates: Mapping[str, Expression], colour: int, part: Sequence[tuple[Summand, int]]) -> None:
@@ -321,7 +352,7 @@ class PartSearch:
         moving = {f for f, e in rates.items() if not e.is_zero}
         for f, o in self.cell.places(*rates.values()).values():
             if f in moving and any(o) and self._moves(f, self.colouring.at(colour, o), part):
-                raise _NoPartError(
+                raise NoPartError(
                     part[0][0].expression, f"the equation of a site has {f} of its neighbours, which moves"
                 )
 
@@ -344,7 +375,7 @@ class PartSearch:
                 else [flow_of(ring, group) for group in Conflicts(ring).grouped(listed)]
             )
         except NoFlowError as error:
-            raise _NoPartError(error.term.expression, error.reason) from None
+            raise NoPartError(error.term.expression, error.reason) from None
         colours = tuple(range(self.colouring.count))
         origin = cell.origin if cell.relation == GRID else ()
         steps = tuple(int(o) for o in origin)
@@ -363,17 +394,14 @@ class PartSearch:
         return found
 
 
-def field_at_site(cell: Cell) -> tuple[Expression, ...]:
-    """ẋ of all fields at a site, weighted at open ends."""
+def field_at_site(cell: Cell, gathered: Mapping[str, Expression]) -> tuple[Expression, ...]:
+    """ẋ of all fields at a site, weighted at open ends; ``gathered`` names what bonds or pairs add to a force."""
     search = PartSearch(cell, Colouring(1, (0,) * len(cell.axes)))
     every = [(s, 0) for s in summands_of(cell)]
     rates: dict[str, list[Expression]] = {f: [] for f in cell.fields}
     for (f, other), entry in cell.bracket.items():
         g, d = cell.place(other)
-        force = search.force(every, g, 0, d)
-        if cell.relation != GRID and cell.at(g, ("a",)) in bond_forces(cell):
-            force = force + symbol(Symbol(GATHERED, g))
-        rates[f].append(entry * force)
+        rates[f].append(entry * (search.force(every, g, 0, d) + gathered.get(g, ZERO)))
     return tuple(total(listed) for listed in rates.values())
 
 
@@ -393,8 +421,8 @@ def _back(offset: Offset) -> tuple[int, ...]:
     return tuple(-o for o in offset if isinstance(o, int))
 
 
-def _ring(coordinates: Sequence[str], expressions: Iterable[Expression]) -> Ring:
-    """A ring with these coordinates, in which all else is constant."""
+def own_ring(coordinates: Sequence[str], expressions: Iterable[Expression]) -> Ring:
+    """A ring with these coordinates, in which all else is constant, and no bracket."""
     roots = list(expressions)
     others = [n for n in symbols_of(*roots) if n not in coordinates and n != TIME]
     tower = Tower([*coordinates, *others, TIME], roots, coordinates)

@@ -9,30 +9,36 @@ from typing import Any
 
 from phigen.errors import Diagnostic, Location, SpecError
 from phigen.lattice.building import least_sizes
-from phigen.lattice.cell import GRAPH, PAIRS, PERIODIC, Cell, bond_forces
+from phigen.lattice.cell import GRAPH, GRID, PAIRS, PERIODIC, Cell
+from phigen.lattice.graphs import GraphSearch, energies, site_sums
 from phigen.lattice.kicks import cell_kicks
 from phigen.lattice.parts import (
+    BondSum,
     CellFlow,
     CellSplitting,
+    PartSearch,
     SiteMotion,
     field_at_site,
     present,
     split_cell,
     summands_of,
 )
+from phigen.scheme.alternation import Alternation, Schedule
+from phigen.scheme.alternation import schedule as alternating
 from phigen.scheme.choosing import Choice, planned
 from phigen.scheme.kernel import Kernel, Output
 from phigen.scheme.lowering import operation_counts
+from phigen.scheme.nystrom import Nystrom
 from phigen.scheme.program import About, Observables, Program
 from phigen.scheme.splitting import staged
 from phigen.scheme.staging import Coefficients
-from phigen.scheme.steps import Gather, Pairs, Sites, Sweep, Sweeps
+from phigen.scheme.steps import Ends, Gather, Partners, Sites, Sweep, Sweeps
 from phigen.spec.model import NO_EXTRAS, Extras, Spec
 from phigen.splitting.parts import Splitting
 from phigen.splitting.ring import KICK, TIME
-from phigen.symbolic.expression import Expression, gradient, symbols_of, total
+from phigen.symbolic.expression import ZERO, Expression, symbol, symbols_of, total
 from phigen.symbolic.neighbours import steps
-from phigen.symbolic.symbols import GATHERED, PRESENT, Symbol
+from phigen.symbolic.symbols import CHOSEN, GATHERED, PRESENT, Symbol, kind_of
 
 
 class _Nowhere:
@@ -66,7 +72,8 @@ def plan_sweeps(
     """The parts and the method. Raises `SpecError` where H does not split, and for what is not offered."""
     host = spec or _Nowhere()
     _expect_offered(cell, scheme, extras, host.locations)
-    parts = split_cell(cell, host.locations.get(("hamiltonian",)))
+    search = GraphSearch if cell.relation == GRAPH else PartSearch
+    parts = split_cell(cell, host.locations.get(("hamiltonian",)), search)
     plain = Splitting(parts.flows)
     return LatticePlan(parts, planned(host, plain, order, composition, lambda: cell_kicks(cell, parts)))
 
@@ -85,7 +92,8 @@ def build_sweeps(
     """The solver of a lattice as a program."""
     parts, choice, flows = plan.parts, plan.choice, plan.flows
     coefficients = Coefficients([*(p.name for p in cell.parameters if p.at == "all"), TIME, KICK])
-    schedule = choice.schedule()
+    by_colour = any(flow.by_colour for flow in flows)
+    schedule = _any_number(choice.method) if by_colour else choice.schedule()
     swept = tuple(
         tuple(_sweep(cell, flow, motion, k, coefficients) for motion in flow.motions) for k, flow in enumerate(flows, 1)
     )
@@ -100,12 +108,13 @@ def build_sweeps(
     kernels = [sweep.kernel for part in swept for sweep in part]
     sites = _sites(cell, parts.colouring.count, parts.colouring.weights, parts.colouring.periods(cell.boundary),
                    [*kernels, observed.energy, observed.casimirs, observed.vector_field])  # fmt: skip
-    kinds, pairs = tuple(k for _, k in cell.casimirs.values()), _pairs(cell) if cell.relation == PAIRS else None
-    if pairs:
-        gathers = [sweep.gather.kernel for part in swept for sweep in part if sweep.gather]
-        kernels = [*gathers, pairs.energy, pairs.forces.kernel]
-        sites = replace(sites, ends=_ends(cell, kernels))
-    step = Sweeps(prepare, sites, swept, schedule, choice.method.name, kinds, pairs)
+    kinds, partners = tuple(k for _, k in cell.casimirs.values()), _partners(cell)
+    if partners:
+        gathers = [*(sweep.gather for part in swept for sweep in part if sweep.gather), partners.energy, partners.field]
+        at_bonds = tuple(p.name for p in cell.parameters if p.at == "bonds")
+        sites = replace(sites, ends=_ends(cell, [k for g in gathers for k in g.kernels]), at_bonds=at_bonds)
+    marks = tuple(flow.by_colour for flow in flows) if by_colour else ()
+    step = Sweeps(prepare, sites, swept, schedule, choice.method.name, kinds, partners, marks)
     facts = [*_facts(cell, choice, parts.colouring.count), choice.order.note]
     return Program(
         name=cell.name,
@@ -122,14 +131,19 @@ def build_sweeps(
     )
 
 
+def _any_number(method: Alternation | Nystrom) -> Schedule:
+    """A method for any number of flows; see `Sweeps`."""
+    assert isinstance(method, Alternation)
+    backwards = {(1, 2): (3, 2)}
+    of_three = alternating(method, 3)
+    return replace(of_three, pattern=tuple(backwards.get(flow, flow) for flow in of_three.pattern))
+
+
 def _expect_offered(cell: Cell, scheme: str, extras: Extras, locations: Mapping[tuple[Any, ...], Location]) -> None:
     problems = []
     if scheme == "series":
         message = "scheme series is not offered for lattices: they are split"
         problems.append(Diagnostic(message, locations.get(("scheme",)), "scheme: auto"))
-    if cell.relation == GRAPH:
-        message = "lattices given as graphs are not compiled yet; phigen show --expand has an ordinary spec"
-        problems.append(Diagnostic(message, locations.get(("lattice",))))
     if cell.bond_bracket and cell.relation == PAIRS:
         message = "brackets between the sites of pairs are not compiled"
         problems.append(Diagnostic(message, locations.get(("poisson",))))
@@ -143,30 +157,41 @@ def _expect_offered(cell: Cell, scheme: str, extras: Extras, locations: Mapping[
 def _sweep(cell: Cell, flow: CellFlow, motion: SiteMotion, k: int, coefficients: Coefficients) -> Sweep:
     increments = staged(list(motion.increments.values()), coefficients)
     moved = tuple(cell.fields.index(f) for f in motion.increments)
-    suffix = f"_{motion.colour}" if len(flow.motions) > 1 else ""
+    suffix = f"_{flow.motions.index(motion)}" if len(flow.motions) > 1 else ""
     named = f"the flow of H_{k} = sum of {flow.hamiltonian}: {flow.manner}".replace(KICK, KICK.kind)
     kernel = _kernel(cell, f"sweep{k}{suffix}", named, increments, "change", coefficients)
-    return Sweep(kernel, moved, motion.colour, _gather(cell, flow, motion.gathered, k, coefficients))
-
-
-def _gather(cell: Cell, flow: CellFlow, fields: Sequence[str], k: int, coefficients: Coefficients) -> Gather | None:
-    """What pairs add to the forces of a part."""
-    if not fields:
-        return None
-    bonds = [s.expression for s, _ in flow.summands if s.bond]
-    names = [cell.at(f, ("a",)) for f in fields]
-    slopes = coefficients.hoist([total(e) for e in zip(*(gradient(b, names) for b in bonds), strict=True)])
     purpose = f"what all other sites b add to the forces of H_{k} at a site a"
-    kernel = _kernel(cell, f"gather{k}", purpose, slopes, "force", coefficients)
-    return Gather(kernel, tuple(cell.fields.index(f) for f in fields))
+    gather = _gather(cell, motion.gathered, f"gather{k}{suffix}", purpose, coefficients)
+    return Sweep(kernel, moved, motion.colour, gather)
 
 
-def _pairs(cell: Cell) -> Pairs:
-    """The energy of a pair, and all forces at a site a."""
-    forces = {f: slope for f in cell.fields if (slope := bond_forces(cell).get(cell.at(f, ("a",)))) is not None}
-    energy = _kernel(cell, "pair_energy", "the energy of a pair", [cell.pair_hamiltonian], "energy")
-    kernel = _kernel(cell, "pair_forces", "what a site b adds to the forces at a site a", [*forces.values()], "force")
-    return Pairs(energy, Gather(kernel, tuple(cell.fields.index(f) for f in forces)))
+def _gather(
+    cell: Cell, sums: Sequence[BondSum], name: str, purpose: str, coefficients: Coefficients | None = None
+) -> Gather | None:
+    """Sums over bonds or pairs, all of the same symbols, as kernels."""
+    if not sums:
+        return None
+    ends = []
+    for s in sums:
+        values = list(s.values.values())
+        values = coefficients.hoist(values) if coefficients else values
+        verb = {"a": "begin", "b": "end"}.get(s.end)
+        suffix, seen = (f"_{s.end}", f", by bonds that {verb} there") if verb else ("", "")
+        ends.append(Ends(_kernel(cell, name + suffix, purpose + seen, values, "sums", coefficients), s.end, s.chosen))
+    return Gather(tuple(ends), tuple(sums[0].values))
+
+
+def _partners(cell: Cell) -> Partners | None:
+    """Energies and forces of bonds or pairs."""
+    if cell.relation == GRID:
+        return None
+    what = "bond" if cell.relation == GRAPH else "pair"
+    empty = Gather((), ())
+    return Partners(
+        _gather(cell, energies(cell), f"{what}_energy", f"the energy of a {what}") or empty,
+        _gather(cell, site_sums(cell), f"{what}_forces", "what a site b adds to the forces at a site a") or empty,
+        cell.relation == GRAPH,
+    )
 
 
 def _kernel(
@@ -180,11 +205,13 @@ def _kernel(
     """A kernel at a site: inputs are coefficients, or parameters, then what it reads at sites, and the weights."""
     used = symbols_of(*values)
     places = cell.places(*values)
-    weights = tuple(n for n in used if isinstance(n, Symbol) and n.kind == PRESENT)
+    weights = tuple(n for n in used if kind_of(n) in (PRESENT, CHOSEN))
     plain = tuple(p.name for p in cell.parameters if p.at == "all")
     first = {"coef": coefficients.slots} if coefficients else {"params": plain}
-    gathered = tuple(n for n in used if isinstance(n, Symbol) and n.kind == GATHERED)
+    gathered = tuple(n for n in used if kind_of(n) == GATHERED)
     inputs = {**first, "site": tuple(places), "present": weights, "gathered": gathered}
+    bonds = tuple(p.name for p in cell.parameters if p.at == "bonds" and p.name in used)
+    inputs |= {"bonds": bonds} if bonds else {}
     return Kernel(name, purpose, inputs, (Output(output, tuple(values)),))
 
 
@@ -196,8 +223,17 @@ def _observables(cell: Cell) -> Observables:
     return Observables(
         _kernel(cell, "energy", "the density of the Hamiltonian", [density], "out"),
         _kernel(cell, "casimirs", "the densities of the Casimirs", casimirs, "out"),
-        _kernel(cell, "vector_field", "pi grad H", field_at_site(cell), "out"),
+        _kernel(cell, "vector_field", "pi grad H", _field(cell), "out"),
     )
+
+
+def _field(cell: Cell) -> list[Expression]:
+    """The vector field at a site, with symbols for what bonds or pairs add to forces, or to the field itself."""
+    names = {n for s in site_sums(cell) for n in s.values} if cell.relation != GRID else set()
+    added = {f: symbol(Symbol(GATHERED, f)) for f in cell.fields if Symbol(GATHERED, f) in names}
+    if not cell.bond_bracket:
+        return list(field_at_site(cell, added))
+    return [e + added.get(f, ZERO) for f, e in zip(cell.fields, field_at_site(cell, {}), strict=True)]
 
 
 def _sites(
@@ -229,19 +265,22 @@ def _ends(cell: Cell, kernels: Sequence[Kernel]) -> dict[str, tuple[str, str]]:
 
 def _facts(cell: Cell, choice: Choice, colours: int) -> list[str]:
     """What the header says of the method."""
-    count, flows, method = len(choice.splitting.flows), len(choice.schedule().flows), choice.method
+    count, method = len(choice.splitting.flows), choice.method
     boundary = ", ".join(f"{a} {b}" for a, b in zip(cell.axes, cell.boundary, strict=True))
-    lattice = f"lattice: {boundary or 'all pairs of sites'}; any size" + (
-        f", sites of {colours} colours" if colours > 1 else ""
-    )
-    if count == 1:
+    related = {GRAPH: "sites with bonds between them, given at run time", PAIRS: "all pairs of sites"}
+    lattice = f"lattice: {related.get(cell.relation, boundary)}; any size"
+    lattice += f", sites of {colours} colours" if colours > 1 else ""
+    numbered = enumerate(choice.splitting.flows, 1)
+    marked = [f"H_{k}" for k, flow in numbered if isinstance(flow, CellFlow) and flow.by_colour]
+    if count == 1 and not marked:
         return [lattice, "scheme: the exact flow of H, which is elementary", "step: explicit"]
     parts = " + ".join(f"H_{k}" for k in range(1, count + 1))
     why = f", since {choice.why}" if choice.why else ""
+    flows = f"{len(choice.schedule().flows)} flows" if not marked else f"{', '.join(marked)} for each colour of sites"
     return [
         lattice,
         f"scheme: splitting, H = {parts}, with the exact flow of each",
-        f"composition: {method.name}, {method.stages} stage{'s' * (method.stages > 1)}, {flows} flows{why}",
+        f"composition: {method.name}, {method.stages} stage{'s' * (method.stages > 1)}, {flows}{why}",
         "step: explicit",
     ]
 
@@ -249,6 +288,8 @@ def _facts(cell: Cell, choice: Choice, colours: int) -> list[str]:
 def _operations(step: Sweeps) -> dict[str, int]:
     """The operations of a step at one site."""
     times = Counter(part for part, _ in step.schedule.flows)
+    if step.by_colour:  # of each colour, but for the first and the last
+        times = Counter(dict.fromkeys(range(len(step.parts)), 2 * step.schedule.stages))
     counted: Counter[str] = Counter()
     for part, sweeps in enumerate(step.parts):
         for sweep in sweeps:

@@ -28,6 +28,12 @@ _SIGNATURES: dict[str, tuple[Any, tuple[Any, ...]]] = {
     "vector_field": (None, (_POINTER, _POINTER)),
 }
 
+#: Those of graphs, where they differ.
+_OF_GRAPHS: dict[str, tuple[Any, tuple[Any, ...]]] = {
+    "work_size": (_SIZE, (_POINTER, _SIZE)),
+    "init": (_INT, (_POINTER,) * 6),
+}
+
 #: Site updates between two calls: Python can deliver a keyboard interrupt then.
 _UPDATES_PER_CALL = 1 << 26
 
@@ -40,14 +46,15 @@ class CLatticeSession:
         self._casimirs = len(interface.casimirs)
         sizes = np.array(x0.shape[1:], dtype=np.uintp)
         self._struct = np.zeros(functions.solver_size(), dtype=np.uint8)
-        needed = functions.work_size(sizes.ctypes.data)
+        bonds = np.ascontiguousarray(parameters.get("bonds", ()), dtype=np.uintp).reshape(-1, 2)
+        given = np.array([len(bonds), bonds.ctypes.data], dtype=np.uintp)  # the struct of bonds
+        needed = functions.work_size(sizes.ctypes.data, *([len(bonds)] if interface.graph else []))
         self._work = np.zeros(max(needed, 64), dtype=np.uint8)
         self._address = self._struct.ctypes.data
         first = np.ascontiguousarray(x0, dtype=np.float64)
-        packed, kept = _packed(interface, parameters, x0.shape[1:])
-        status = functions.init(
-            self._address, packed.ctypes.data, sizes.ctypes.data, first.ctypes.data, self._work.ctypes.data
-        )
+        packed, kept = _packed(interface, parameters, x0.shape[1:], len(bonds))
+        arrays = [packed, sizes, *([given] if interface.graph else []), first, self._work]
+        status = functions.init(self._address, *(a.ctypes.data for a in arrays))
         del kept
         if status:
             raise BackendError(status_name(status), 0, first[None])
@@ -102,7 +109,7 @@ class CLattice:
         self.interface, self._files = interface, dict(files)
         self._library = cache.load(files, threads=True)
         self._c: Any = SimpleNamespace()
-        for name, (result, arguments) in _SIGNATURES.items():
+        for name, (result, arguments) in (_SIGNATURES | (_OF_GRAPHS if interface.graph else {})).items():
             function = getattr(self._library, f"{interface.name}_{name}", None)
             if function is None:
                 raise ToolchainError(
@@ -126,14 +133,15 @@ class CLattice:
 
 
 def _packed(
-    interface: LatticeInterface, parameters: Mapping[str, Any], sizes: tuple[int, ...]
+    interface: LatticeInterface, parameters: Mapping[str, Any], sizes: tuple[int, ...], bonds: int
 ) -> tuple[NDArray[np.uint64], list[Floats]]:
     """The struct of parameters, whose members all take eight bytes, and the arrays that it points to."""
     words, kept = np.zeros(max(1, len(interface.parameters)), dtype=np.uint64), list[Floats]()
     for k, name in enumerate(interface.parameters):
         value = parameters[name]
-        if name in interface.at_sites:
-            kept.append(np.ascontiguousarray(np.broadcast_to(np.asarray(value, dtype=np.float64), sizes)))
+        if name in interface.at_sites or name in interface.at_bonds:
+            shape = sizes if name in interface.at_sites else (bonds,)
+            kept.append(np.ascontiguousarray(np.broadcast_to(np.asarray(value, dtype=np.float64), shape)))
             words[k] = kept[-1].ctypes.data
         else:
             words[k : k + 1].view(np.float64)[0] = float(value)

@@ -57,7 +57,7 @@ class LatticeInterface(Interface):
 
     ``at_sites`` are the parameters with a value at each site. ``casimir_kinds`` tells of each Casimir whether it is one
     for each of the ``sites``, or a ``sum`` or ``product`` over them. Sizes are multiples of ``periods``, at least
-    ``least``.
+    ``least``. Of a `graph` parameters at ``at_bonds`` have a value at each bond.
     """
 
     axes: tuple[str, ...] = ()
@@ -65,7 +65,9 @@ class LatticeInterface(Interface):
     casimir_kinds: tuple[str, ...] = ()
     periods: tuple[int, ...] = ()
     least: tuple[int, ...] = ()
-    required: frozenset[str] = frozenset()  # parameters at sites whose defaults are not one number
+    required: frozenset[str] = frozenset()  # parameters at sites and bonds whose defaults are not one number
+    graph: bool = False
+    at_bonds: tuple[str, ...] = ()
 
 
 class BackendError(Exception):

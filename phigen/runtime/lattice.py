@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from phigen.errors import ParameterError, StepError
 from phigen.runtime import arguments, checkpoint
@@ -135,7 +135,8 @@ class LatticeSolver:
     """A compiled lattice: ``solver.integrate(x0, h=0.05, steps=1000, stride=10, J=2.0)``, x0 (coordinates, *sizes).
 
     Parameters are keyword arguments, or in ``parameters={…}``; those at sites are arrays (*sizes), or one number for
-    all. What is not given has its default of the spec. Wrong arguments raise `ValueError` or `TypeError`, a step that
+    all, those at bonds arrays (bonds,). What is not given has its default of the spec. Graphs take ``bonds`` in the
+    same way, (bonds, 2) numbers of sites from 0. Wrong arguments raise `ValueError` or `TypeError`, a step that
     cannot be made `phigen.StepError`. Safe to use from several threads.
     """
 
@@ -250,7 +251,8 @@ class LatticeSolver:
         found = {}
         for name, value in (given or {}).items():
             array = np.asarray(value)
-            many = name in self.interface.at_sites and array.ndim == 1 + len(self.interface.axes)
+            at_sites = name in self.interface.at_sites and array.ndim == 1 + len(self.interface.axes)
+            many = at_sites or (name in self.interface.at_bonds and array.ndim == 2)
             if many and len(array) != members:
                 raise ValueError(f"parameter {name!r} has {len(array)} members, not {members}")
             found[name] = array[member] if many else value
@@ -310,24 +312,31 @@ class LatticeSolver:
         return found
 
     def _values(self, given: Mapping[str, Any] | None, more: Mapping[str, Any], sizes: Sequence[int]) -> dict[str, Any]:
-        """All parameters: numbers, and arrays over the sites."""
+        """All parameters: numbers, and arrays over the sites or the bonds; of a graph the bonds too."""
         about = self.interface
-        arrays = {n: v for n, v in {**(given or {}), **more}.items() if n in about.at_sites}
-        numbers = [{n: v for n, v in part.items() if n not in about.at_sites} for part in (given or {}, more)]
+        everything = {**(given or {}), **more}
+        bonds = {"bonds": checked_bonds(everything.pop("bonds", None), sizes[0])} if about.graph else {}
+        shapes = dict.fromkeys(about.at_sites, tuple(sizes))
+        shapes |= dict.fromkeys(about.at_bonds, (len(bonds["bonds"]),) if bonds else ())
+        arrays = {n: v for n, v in everything.items() if n in shapes}
+        numbers = [
+            {n: v for n, v in part.items() if n in everything and n not in shapes} for part in (given or {}, more)
+        ]
         values: dict[str, Any] = dict(arguments.parameters(about, *numbers))
         missing = sorted(about.required - set(arrays))
         if missing:
             raise TypeError(f"parameter {missing[0]!r} has no default for all sizes; give an array, or one number")
         for name, value in arrays.items():
             array = np.asarray(value, dtype=np.float64)
-            if array.shape not in ((), tuple(sizes)):
-                raise ValueError(f"parameter {name!r} must be a number or have shape {tuple(sizes)}, not {array.shape}")
+            if array.shape not in ((), shapes[name]):
+                raise ValueError(f"parameter {name!r} must be a number or have shape {shapes[name]}, not {array.shape}")
+            where = "sites" if name in about.at_sites else "bonds"
             if not np.isfinite(array).all():
-                raise ValueError(f"parameter {name!r} must be finite at all sites")
+                raise ValueError(f"parameter {name!r} must be finite at all {where}")
             if name in about.positive and not (array > 0).all():
-                raise ValueError(f"parameter {name!r} must be positive at all sites")
+                raise ValueError(f"parameter {name!r} must be positive at all {where}")
             values[name] = array
-        return values
+        return values | bonds
 
     def _started(self, start: Floats, h: float, values: Mapping[str, Any]) -> LatticeSession:
         try:
@@ -478,6 +487,23 @@ class _Frames:
                 last.callback(self._part.unlink, missing_ok=True)
         else:
             self._part.replace(self.path)
+
+
+def checked_bonds(bonds: Any, sites: int) -> NDArray[np.int64]:
+    """Bonds as an array (bonds, 2). Raises `TypeError` and `ValueError`."""
+    if bonds is None:
+        raise TypeError("a lattice that is a graph needs its bonds=, an array (bonds, 2) of the numbers of sites")
+    array = np.asarray(bonds)
+    found = array.reshape(-1, 2) if array.size == 0 else array
+    if found.ndim != 2 or found.shape[1] != 2:
+        raise ValueError(f"bonds must have shape (bonds, 2), not {found.shape}")
+    whole = found.astype(np.int64)
+    wrong = np.flatnonzero((whole != found).any(1) | (whole < 0).any(1) | (whole >= sites).any(1))
+    wrong = np.append(wrong, np.flatnonzero(whole[:, 0] == whole[:, 1]))
+    if len(wrong):
+        a, b = found[wrong[0]].tolist()
+        raise ValueError(f"bond {wrong[0]} runs from {a} to {b}, not between two different sites from 0 to {sites - 1}")
+    return whole
 
 
 def _reduced(kind: str, densities: Floats) -> Any:

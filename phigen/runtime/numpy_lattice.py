@@ -19,7 +19,7 @@ class NumpyLatticeSession:
         self.steps = 0
         self._module, self._x = module, np.array(x0)
         try:
-            self._sites = module._Sites(x0.shape, parameters)
+            _, self._sites = module._started(x0, parameters)
             module._coefficients(self._sites, 1e-100)
         except ValueError:
             raise BackendError("BAD_ARGUMENT", 0, self._x[None]) from None

@@ -213,26 +213,44 @@ class Sites:
     weights: tuple[int, ...] = ()
     periods: tuple[int, ...] = ()
     least: tuple[int, ...] = ()
-    ends: Mapping[str, tuple[str, str]] = field(default_factory=dict)  # of pairs: what is read at a, or at b
+    ends: Mapping[str, tuple[str, str]] = field(default_factory=dict)  # of bonds, pairs: what is read at a, or at b
+    at_bonds: tuple[str, ...] = ()  # parameters at bonds
+
+
+@dataclass(frozen=True)
+class Ends:
+    """A ``kernel`` of bonds or pairs between a site, a, and another, b.
+
+    Its inputs are ``coef`` or ``params``, ``site`` and ``bonds``, the parameters at bonds. ``end`` tells of bonds at
+    which end, as they are given, the site is: a, b, or either; ``chosen`` which of the two must have the colour of the
+    sweep: ``here``, ``there``, or none.
+    """
+
+    kernel: Kernel
+    end: str = ""
+    chosen: str = ""
 
 
 @dataclass(frozen=True)
 class Gather:
-    """For each of some ``fields`` (indices) what all pairs with other sites add to the force at a site a.
+    """What all bonds, or pairs with other sites, add up at a site, a value for each of some ``names``."""
 
-    The inputs of the ``kernel`` are ``coef`` or ``params``, and ``site``.
-    """
+    ends: tuple[Ends, ...]
+    names: tuple[str, ...]
 
-    kernel: Kernel
-    fields: tuple[int, ...]
+    @property
+    def kernels(self) -> tuple[Kernel, ...]:
+        """The kernels of all ends."""
+        return tuple(e.kernel for e in self.ends)
 
 
 @dataclass(frozen=True)
-class Pairs:
-    """All pairs of sites: the energy of a pair, and the forces on all fields from the parameters."""
+class Partners:
+    """The sites of a graph or all pairs: half the energies of a site with others, and what moves it, by parameters."""
 
-    energy: Kernel
-    forces: Gather
+    energy: Gather
+    field: Gather
+    graph: bool = False
 
 
 @dataclass(frozen=True)
@@ -240,7 +258,7 @@ class Sweep:
     """Changes of the ``moved`` fields (indices) at all sites of one ``colour``, read from what stands still.
 
     The inputs of the ``kernel`` are ``coef``, ``site``, ``present``, symbols that are 1 where a term of H reaches
-    beyond no open end, else 0, and ``gathered``, what ``gather`` gives for fields.
+    beyond no open end, or where a site has the colour of the sweep, else 0, and ``gathered``, what ``gather`` adds up.
     """
 
     kernel: Kernel
@@ -251,14 +269,19 @@ class Sweep:
 
 @dataclass(frozen=True)
 class Sweeps(_Staged):
-    """A splitting of a lattice: each of the ``parts`` is a list of sweeps, which may be made in any order."""
+    """A splitting of a lattice: each of the ``parts`` is a list of sweeps, which may be made in any order.
+
+    Where some parts are ``by_colour``, the flows are those of all parts, of each colour where they are by colour, and
+    the ``schedule`` has in place of parts: 0 the first flow, 1 those in the middle, 2 the last, 3 the middle backwards.
+    """
 
     sites: Sites
     parts: tuple[tuple[Sweep, ...], ...]
     schedule: Schedule
     composition: str
     casimir_kinds: tuple[str, ...] = ()
-    pairs: Pairs | None = None
+    partners: Partners | None = None
+    by_colour: tuple[bool, ...] = ()  # of graphs: the parts that belong to one colour, and are done for each
 
     unit = "step of one site"
     manner = "explicit"
@@ -272,9 +295,9 @@ class Sweeps(_Staged):
     def kernels(self) -> tuple[Kernel, ...]:
         """All kernels, each once."""
         swept = [sweep for part in self.parts for sweep in part]
-        pairs = [sweep.gather.kernel for sweep in swept if sweep.gather]
-        pairs += [self.pairs.energy, self.pairs.forces.kernel] if self.pairs else []
-        return (self.prepare, *(sweep.kernel for sweep in swept), *pairs)
+        gathers = [sweep.gather for sweep in swept if sweep.gather]
+        gathers += [self.partners.energy, self.partners.field] if self.partners else []
+        return (self.prepare, *(sweep.kernel for sweep in swept), *(k for g in gathers for k in g.kernels))
 
 
 Step = Newton | Explicit | Path | Splitting | Sweeps

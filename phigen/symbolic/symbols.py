@@ -9,8 +9,8 @@ MOMENTUM, VARIATION, GAUGE = "p", "v", "gauge"
 COEFFICIENT, RENEWED, SERIES, FIXED = "c", "n", "s", "f"
 TEMPORARY, WORK, PART = "t", "w", "part"
 #: Of lattices: what bonds or pairs add to a component of the gradient at a site; 1 where a term reaches beyond no open
-#: end, else 0.
-GATHERED, PRESENT = "gathered", "present"
+#: end, else 0; 1 at sites of the colour that a part of a graph belongs to, else 0.
+GATHERED, PRESENT, CHOSEN = "gathered", "present", "chosen"
 
 
 class Symbol(str):

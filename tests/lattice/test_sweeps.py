@@ -53,11 +53,25 @@ TEXTS = {
     "parameters: {k: 0.5, m: {value: 1.2, at: sites, positive: true}}\n"
     "poisson: {canonical: {q: [x, y], p: [px, py]}}\nhamiltonian: {sites: (px**2 + py**2)/(2*m) + (x**2 + y**2)/2, "
     'pairs: "k/sqrt(1/4 + (x[a] - x[b])**2 + (y[a] - y[b])**2)"}',
+    # exchange, Dzyaloshinskii–Moriya, anisotropy: parts of all sites, and of those of one colour
+    "magnet": "lattice: {graph: bonds}\nparameters: {J: {value: 1.2, at: bonds}, D: 0.4, B: {value: 0.2, at: sites}}"
+    f"{SPINS}hamiltonian: {{sites: -B*z + x**2/5, "
+    'bonds: "-J*(x[a]*x[b] + y[a]*y[b] + z[a]*z[b]) + D*(x[a]*y[b] - y[a]*x[b])"}',
+    "oscillators": "lattice: {graph: bonds}\nparameters: {k: {value: 1, at: bonds, positive: true}}\n"
+    f'{CANONICAL}hamiltonian: {{sites: p**2/2 + q**4/4, bonds: "-k*cos(q[a] - q[b])"}}',
+    "web": "lattice: {graph: eats}\ncoordinates: [x]\n"
+    "parameters: {A: {value: 1, at: bonds}, k: {value: 1, at: sites}}\n"
+    'poisson: {bonds: {"x[a]": {"x[b]": "A*x[a]*x[b]"}}}\nhamiltonian: {sites: x - k*log(x)}',
+    # brackets along bonds that change nothing of what they read: no colours
+    "network": "lattice: {graph: bonds}\ncoordinates: [q, p]\nparameters: {W: {value: 1, at: bonds}}\n"
+    'poisson: {bonds: {"q[a]": {"p[b]": W}}}\nhamiltonian: {sites: p**2/2 + q**4/4}',
     "volterra": "lattice: {axes: [i], boundary: periodic}\ncoordinates: [a]\n"
     'poisson: {brackets: {a: {"a[i+1]": "a*a[i+1]"}}}\nhamiltonian: a',
 }
+#: Of graphs: a triangle with two tails, a double bond, and a site of its own.
+BONDS = np.array([[0, 1], [1, 2], [2, 0], [2, 3], [4, 3], [3, 4], [4, 5]])
 SIZES = {"sheet": (4, 5), "cube": (3, 4, 3), "volterra": (6,), "toda": (5,)}
-FEW = {"sheet": (3, 3), "cube": (2, 2, 2), "charges": (4,)}
+FEW = {"sheet": (3, 3), "cube": (2, 2, 2), "charges": (4,), "oscillators": (7,)}
 
 
 @cache
@@ -73,20 +87,27 @@ def solver(name: str, order: int = 4, target: str = "numpy", composition: str = 
 
 @cache
 def expansion(name: str, sizes: tuple[int, ...]) -> Expansion:
-    return expand(cell_from_spec(compiled(name).spec), sizes)
+    cell = cell_from_spec(compiled(name).spec)
+    return expand(cell, sizes, BONDS.tolist() if cell.relation == "graph" else ())
 
 
 def start(name: str, sizes: tuple[int, ...] | None = None, seed: int = 1) -> np.ndarray:
     sizes = sizes or SIZES.get(name, (7,))
     fields = len(compiled(name).spec.coordinates)
     x = 0.6 * np.random.default_rng(seed).normal(size=(fields, *sizes))
-    return np.abs(x) + 0.2 if name in ("volterra", "toda") else x
+    return np.abs(x) + 0.2 if name in ("volterra", "toda", "web") else x
 
 
 def disorder(name: str, x: np.ndarray) -> dict[str, Any]:
     about = solver(name).interface
     drawn = {p: np.random.default_rng(7).normal(size=x.shape[1:]) for p in about.at_sites}
-    return {p: np.abs(values) + 0.5 if p in about.positive else values for p, values in drawn.items()}
+    drawn |= {p: np.random.default_rng(8).normal(size=len(BONDS)) for p in about.at_bonds}
+    found = {p: np.abs(values) + 0.5 if p in about.positive else values for p, values in drawn.items()}
+    return found | ({"bonds": BONDS} if about.graph else {})
+
+
+def bonds_of(name: str) -> dict[str, Any]:
+    return {"bonds": BONDS} if solver(name).interface.graph else {}
 
 
 def values_of(whole: Expansion, x: np.ndarray, parameters: dict[str, Any]) -> dict[str, float]:
@@ -130,10 +151,10 @@ def test_c_makes_the_steps_of_numpy(name: str) -> None:
     np.testing.assert_allclose(by["c"].energy, by["numpy"].energy, atol=1e-13)
 
 
-@pytest.mark.parametrize("name", ["fput", "cube", "toda", "charges"])
+@pytest.mark.parametrize("name", ["fput", "cube", "toda", "charges", "oscillators"])
 def test_steps_are_those_of_the_ordinary_splitting_with_the_same_parts(name: str) -> None:
     x = start(name, FEW.get(name, (4,)))
-    lattice = solver(name, 4, "numpy", "suzuki").integrate(x, 0.1, 10)
+    lattice = solver(name, 4, "numpy", "suzuki").integrate(x, 0.1, 10, **bonds_of(name))
     whole = replace(expansion(name, x.shape[1:]).spec(), order=4, scheme="splitting", composition="suzuki")
     from phigen.api import solver_of
 
@@ -159,7 +180,7 @@ def module_of(name: str) -> Any:
 
 def jacobian(module: Any, x: np.ndarray, h: float, parameters: dict[str, Any]) -> tuple[np.ndarray, np.ndarray]:
     """The step and its derivative."""
-    sites = module._Sites(x.shape, parameters)
+    _, sites = module._started(x, parameters)
     rows = module._coefficients(sites, h)
     columns = []
     for k in range(x.size):
@@ -175,9 +196,13 @@ def _slope(curve: Any) -> np.ndarray:
         warnings.simplefilter("error", np.exceptions.ComplexWarning)
         try:
             return curve(1e-30j).imag.reshape(-1) / 1e-30
-        except np.exceptions.ComplexWarning:
+        except (np.exceptions.ComplexWarning, TypeError):
             weights = {1: 3 / 4, 2: -3 / 20, 3: 1 / 60}
             return sum(w * (curve(k * 4e-3) - curve(-k * 4e-3)) for k, w in weights.items()).reshape(-1) / 4e-3
+
+
+#: Those whose steps take no complex numbers.
+REAL_ONLY = ("ablowitz_ladik", "magnet", "oscillators", "web", "network")
 
 
 def poisson_defect(name: str, module: Any) -> float:
@@ -191,13 +216,17 @@ def poisson_defect(name: str, module: Any) -> float:
 
 @pytest.mark.parametrize("name", TEXTS)
 def test_a_step_is_a_poisson_map(name: str) -> None:
-    assert poisson_defect(name, module_of(name)) < (1e-9 if name == "ablowitz_ladik" else 1e-12)
+    assert poisson_defect(name, module_of(name)) < (1e-9 if name in REAL_ONLY else 1e-12)
 
 
-@pytest.mark.parametrize("name", ["volterra", "sheet"])
+@pytest.mark.parametrize("name", ["volterra", "sheet", "web", "magnet"])
 def test_neighbours_moved_at_once_where_brackets_couple_them_are_noticed(name: str) -> None:
     module = module_of(name)
-    module.COLOURS = 1  # every sweep moves all sites
+    if name in ("web", "magnet"):
+        coloured = module._Coloured.__init__
+        module._Coloured.__init__ = lambda sites, *of: (coloured(sites, *of), sites.colours.__imul__(0))[0]
+    else:
+        module.COLOURS = 1  # every sweep moves all sites
     assert poisson_defect(name, module) > 1e-4
 
 
@@ -232,16 +261,18 @@ def test_large_angles_are_turned_exactly_too() -> None:
 
 
 def test_code_does_not_grow_with_the_lattice() -> None:
-    for name in TEXTS.keys() - {"sheet"}:  # three parts of two colours with nine neighbours
+    for name in TEXTS.keys() - {"sheet", "magnet"}:  # three parts of two colours with nine neighbours; of five parts
         program = compile_spec(specs.loads(f"phigen: 1\nname: {name}\n{TEXTS[name]}\n"), profile="small").program
         lines = sum(len(text.splitlines()) for text in emit(program, "c", "phigen").values())
-        assert lines < 800, (name, lines)
+        assert lines < 800 + 120 * ("graph" in TEXTS[name]), (name, lines)
 
 
-def test_threads_make_the_same_bits() -> None:
+@pytest.mark.parametrize("name", ["sheet", "magnet"])
+def test_threads_make_the_same_bits(name: str) -> None:
     import ctypes
 
-    found, x = solver("sheet", 2, "c"), start("sheet", (70, 90))
+    found, x = solver(name, 2, "c"), start(name, (70, 90) if name == "sheet" else (6300,))
+    ring = {"bonds": np.stack([np.arange(6300), (np.arange(6300) * 7 + 1) % 6300], axis=1)} if name == "magnet" else {}
     try:
         library = ctypes.CDLL("libgomp.so.1")
     except OSError:
@@ -249,7 +280,7 @@ def test_threads_make_the_same_bits() -> None:
     runs = []
     for threads in (1, 2, 3):
         library.omp_set_num_threads(threads)
-        runs.append(found.integrate(x, 0.05, 5, 5).x[-1].tobytes())
+        runs.append(found.integrate(x, 0.05, 5, 5, **ring).x[-1].tobytes())
     library.omp_set_num_threads(2)
     assert runs[0] == runs[1] == runs[2]
 
@@ -289,6 +320,15 @@ def test_a_run_goes_on_from_its_checkpoint(tmp_path: Any) -> None:
     assert not (tmp_path / "state").exists()
 
 
+def test_colours_of_a_graph_part_the_ends_of_all_bonds() -> None:
+    bonds = np.random.default_rng(5).integers(0, 40, size=(150, 2))
+    bonds = bonds[bonds[:, 0] != bonds[:, 1]]
+    _, sites = module_of("web")._started(np.ones((1, 40)), {"bonds": bonds})
+    assert (sites.colours[bonds[:, 0]] != sites.colours[bonds[:, 1]]).all()
+    by = [solver("web", 2, t).step(np.linspace(0.5, 2, 40)[None], 0.02, bonds=bonds) for t in ("c", "numpy")]
+    np.testing.assert_allclose(by[0], by[1], rtol=1e-14)
+
+
 def test_an_ensemble_has_disorder_of_its_own() -> None:
     x, found = start("dnls"), solver("dnls", target="c")
     energies = np.random.default_rng(3).normal(size=(3, 7))
@@ -314,11 +354,15 @@ def test_a_failing_step_leaves_the_state_before_it() -> None:
         (np.full((3, 7), np.nan), {}, ValueError, "finite"),
         (np.zeros((3, 7)), {"B": np.zeros(6)}, ValueError, r"shape \(7,\)"),
         (np.zeros((3, 7)), {"K": 1.0}, TypeError, "unknown parameter"),
+        (np.zeros((1, 7)), {}, TypeError, "needs its bonds="),
+        (np.zeros((1, 3)), {"bonds": BONDS}, ValueError, r"bond 3 runs from 2 to 3, .* from 0 to 2"),
+        (np.zeros((1, 7)), {"bonds": [[0, 1], [2, 2]]}, ValueError, "bond 1 runs from 2 to 2"),
+        (np.zeros((1, 7)), {"bonds": BONDS, "A": np.ones(3)}, ValueError, r"shape \(7,\), not \(3,\)"),
     ],
 )
 def test_wrong_arguments_are_told(x: np.ndarray, more: dict[str, Any], error: type[Exception], said: str) -> None:
     with pytest.raises(error, match=said):
-        solver("xxz").integrate(x, 0.1, 1, **more)
+        solver("web" if len(x) == 1 else "xxz").integrate(x, 0.1, 1, **more)
 
 
 def test_odd_sizes_do_not_fit_two_colours() -> None:

@@ -8,11 +8,11 @@ from dataclasses import dataclass, replace
 from phigen.lanes.lowering import Rows
 from phigen.scheme.kernel import Kernel, Output
 from phigen.scheme.program import Program
-from phigen.scheme.steps import Gather, Sweep, Sweeps
+from phigen.scheme.steps import Ends, Gather, Partners, Sweep, Sweeps
 from phigen.spec.model import Parameter
 from phigen.symbolic import functions as elementary
 from phigen.symbolic.expression import ONE, substitute
-from phigen.symbolic.symbols import COEFFICIENT, GATHERED, Symbol, kind_of
+from phigen.symbolic.symbols import CHOSEN, COEFFICIENT, GATHERED, PRESENT, Symbol, kind_of
 from phigen.targets.c import functions
 from phigen.targets.c.kernels import function, lane_calls, members, printer
 from phigen.targets.c.layout import comment
@@ -23,7 +23,7 @@ from phigen.targets.rendering import render
 from phigen.targets.reserved import C_RESERVED
 
 #: What the loops call their own.
-_OWN = frozenset({"coef", "params", "row", "from", "to", "out", "apart", "i", "j", "part", "far"})
+_OWN = frozenset({"coef", "params", "row", "from", "to", "out", "apart", "i", "j", "k", "part", "far"})
 
 
 @dataclass(frozen=True)
@@ -47,9 +47,14 @@ class Layout:
         return next(k for k in range(1, sites.colours + 1) if k * sites.weights[-1] % sites.colours == 0)
 
     @property
-    def open_rows(self) -> bool:
-        """Whether rows have open ends, or there are others."""
-        return any(self.step.sites.open)
+    def partners(self) -> Partners:
+        """Bonds or pairs; nothing where there are none."""
+        return self.step.partners or Partners(Gather((), ()), Gather((), ()))
+
+    @property
+    def graph(self) -> bool:
+        """Whether bonds are given at run time."""
+        return self.partners.graph
 
 
 def layout_of(program: Program, step: Sweeps) -> Layout:
@@ -57,7 +62,8 @@ def layout_of(program: Program, step: Sweeps) -> Layout:
     sites = step.sites
     offsets = [offset for _, offset in sites.places.values()]
     lines = dict.fromkeys([(0,) * (len(sites.axes) - 1), *sorted({o[:-1] for o in offsets})])
-    weights = dict.fromkeys(w for kernel in _at_sites(program, step) for w in kernel.inputs["present"])
+    used = (w for kernel in _at_sites(program, step) for w in kernel.inputs["present"])
+    weights = dict.fromkeys(w for w in used if kind_of(w) == PRESENT)
     halo = max((abs(o[-1]) for o in offsets), default=0)
     return Layout(step, tuple(lines), halo, tuple(weights), (*program.coordinates, *sites.parameters))
 
@@ -75,7 +81,11 @@ def switches(program: Program, step: Sweeps, layout: Layout) -> dict[str, bool]:
         "OPEN_ROWS": step.sites.open[-1],
         "HALO": layout.halo > 0,
         "COLOURS": step.sites.colours > 1,
-        "PAIRS": step.pairs is not None,
+        "PAIRS": step.partners is not None and not layout.graph,
+        "GATHER": step.partners is not None,
+        "GRAPH": layout.graph,
+        "BY_COLOUR": bool(step.by_colour),
+        "BOND_PARAMETERS": bool(step.sites.at_bonds),
         "SITE_PARAMETERS": bool(step.sites.parameters),
     }
 
@@ -89,6 +99,12 @@ def declarations(program: Program, step: Sweeps) -> str:
         ("ARRAYS", arrays, "arrays over the sites: fields, then parameters"),
         ("COEFFICIENTS", max(1, step.row * (len(step.schedule.times) + 1)), "numbers that depend on params and h only"),
     ]
+    if step.partners:
+        swept = [sweep.gather for part in step.parts for sweep in part if sweep.gather]
+        most = max(len(g.names) for g in (*swept, step.partners.energy, step.partners.field))
+        sizes.append(("GATHERED", most, "sums over other sites that are held for each site"))
+    if step.sites.at_bonds:
+        sizes.append(("BOND_ARRAYS", len(step.sites.at_bonds), "parameters at bonds"))
     values = {
         "NAME": program.name,
         "axes": len(step.sites.axes),
@@ -109,9 +125,9 @@ def declarations(program: Program, step: Sweeps) -> str:
 def _declared(parameter: Parameter, member: str) -> tuple[str, str]:
     said = plain(parameter.description) or f"default {float(parameter.value)!r}"
     said = said if member == parameter.name else f"{parameter.name}: {said}"
-    if parameter.at == "sites":
+    if parameter.at != "all":
         default = "" if parameter.values else "; NULL for the default at all of them"
-        return f"const double *{member};", f"at sites: {said}{default}"
+        return f"const double *{member};", f"at {parameter.at}: {said}{default}"
     return f"double {member};", said
 
 
@@ -137,10 +153,10 @@ def model(program: Program, step: Sweeps) -> str:
     asked = [
         f"isfinite(params->{member[p.name]})" + f" && params->{member[p.name]} > 0.0" * p.positive for p in numbers
     ]
-    arrays = [(member[p.name], p.positive, p.values is not None) for p in program.parameters if p.at == "sites"]
+    arrays = [(member[p.name], p.positive, p.values is not None, p.at) for p in program.parameters if p.at != "all"]
     values = {
         "NAME": program.name,
-        "defaults": ", ".join("NULL" if p.at == "sites" else repr(float(p.value)) for p in program.parameters) or "0",
+        "defaults": ", ".join("NULL" if p.at != "all" else repr(float(p.value)) for p in program.parameters) or "0",
         "constants": constants,
         "least": ", ".join(map(str, sites.least)),
         "periods": ", ".join(map(str, sites.periods)),
@@ -150,7 +166,9 @@ def model(program: Program, step: Sweeps) -> str:
         "colours": ", ".join(map(str, sites.weights)) if sites.colours > 1 else "",
         "times": ", ".join(map(repr, [*schedule.times, joined])),
         "multiples": ", ".join(map(repr, multiples)) if schedule.multiples else "",
-        "parts": ", ".join(str(part + 1) for part, _ in flows),
+        "parts": ", ".join(str(part + (not step.by_colour)) for part, _ in flows),
+        "by_colour": ", ".join(str(int(c)) for c in step.by_colour),
+        "graph": layout.graph,
         "rows": ", ".join(str(row) for _, row in flows),
         "allowed": [*_allowed(asked, arrays)],
     }
@@ -158,17 +176,17 @@ def model(program: Program, step: Sweeps) -> str:
     return render("c", "lattice.c", values) + prepare
 
 
-def _allowed(asked: Sequence[str], arrays: Sequence[tuple[str, bool, bool]]) -> Iterator[str]:
+def _allowed(asked: Sequence[str], arrays: Sequence[tuple[str, bool, bool, str]]) -> Iterator[str]:
     """The statements that return 0 for parameters that are not allowed."""
     if asked:
         yield f"if (!({' && '.join(asked)})) return 0;"
-    for member, positive, required in arrays:
+    for member, positive, required, at in arrays:
         if required:
             yield f"if (params->{member} == NULL) return 0;"
         wrong = f"!isfinite(params->{member}[k])" + f" || params->{member}[k] <= 0.0" * positive
-        yield f"for (size_t k = 0; params->{member} != NULL && k < sites; ++k)"
+        yield f"for (size_t k = 0; params->{member} != NULL && k < {at}; ++k)"
         yield f"    if ({wrong}) return 0;"
-    unused = ["params"] * (not asked and not arrays) + ["sites"] * (not arrays)
+    unused = ["params"] * (not asked and not arrays) + ["sites"] * all(at != "sites" for *_, at in arrays)
     if unused:
         yield ", ".join(f"(void){u}" for u in unused) + ";"
 
@@ -194,13 +212,19 @@ def sweeps(program: Program, step: Sweeps, rows: Rows) -> str:
         two = any(rows.calls_near(sweep.kernel) for sweep in part)
         found += _part(program, layout, k, part, {"_far": calls, "_near": near} if two else {"": calls})
     seen = program.observables
-    found += _pair_functions(program, layout, step)
+    found += _partners(program, layout)
     found += [_seen(program, layout, k) for k in (seen.energy, seen.casimirs, seen.vector_field)]
     sites = [p for p in program.parameters if p.at == "sites"]
     numbers = range(1, len(step.parts) + 1)
     values = {
         "NAME": name,
         "arrays": [(member[p.name], layout.arrays.index(p.name), repr(float(p.value))) for p in sites],
+        "at_bonds": [
+            (member[p.name], step.sites.at_bonds.index(p.name), repr(float(p.value)))
+            for p in program.parameters
+            if p.at == "bonds"
+        ],
+        "by_colour": bool(step.by_colour),
         "labels": [("default" if k == len(step.parts) else f"case {k}", k) for k in numbers],
     }
     return "\n".join([*found, render("c", "sweeps.c", values)])
@@ -212,7 +236,7 @@ def _part(
     """The loops of a part of H over rows and their sites, in each form: by different functions."""
     for sweep in part:
         if sweep.gather:
-            yield _gathering(program, layout, sweep.gather, f"const double *coef, const {program.name}_row *row")
+            yield from _gathering(program, layout, sweep.gather, f"const double *coef, const {program.name}_row *row")
     for form, calls in forms.items():
         for sweep in part:
             yield from _sweep_forms(program, layout, sweep, form, calls)
@@ -230,6 +254,8 @@ def _part(
         "beside": beside,
         "low": max([0, *(-low for low, _ in last)]),
         "high": max([0, *(high for _, high in last)]),
+        "by_colour": layout.step.by_colour and layout.step.by_colour[k - 1],
+        "any_colour": bool(layout.step.by_colour),
         "moved": sorted({f for sweep in part for f in sweep.moved}) if layout.halo else [],
     }
     yield render("c", "sweep_part.c", values)
@@ -259,8 +285,8 @@ def _inside(kernel: Kernel) -> Kernel:
 
 def _calls(name: str, sweep: Sweep, form: str, beside: bool) -> Iterator[str]:
     """The calls of the loops for a piece of a row."""
-    if sweep.gather:
-        yield f"{name}_{sweep.gather.kernel.name}(coef, &at.row, at.from, at.to);"
+    for kernel in sweep.gather.kernels if sweep.gather else ():
+        yield f"{name}_{kernel.name}(coef, &at.row, at.from, at.to);"
     own = f"{name}_{sweep.kernel.name}{form}"
     if not beside or not sweep.kernel.inputs["present"]:
         yield f"{own}(coef, &at.row, at.from, at.to);"
@@ -274,7 +300,8 @@ def _sweep(program: Program, layout: Layout, sweep: Sweep, form: str, calls: Map
     """A kernel as a loop that changes some fields of the sites of a row."""
     kernel, name = sweep.kernel, program.name
     code = lower(kernel)
-    names = _Names(program, layout, kernel, code, {program.coordinates[i] for i in sweep.moved}, calls)
+    moved, sums = {program.coordinates[i] for i in sweep.moved}, sweep.gather.names if sweep.gather else ()
+    names = _Names(program, layout, kernel, code, moved, calls, sums)
     purpose = {"_far": "the same for large arguments of functions", "_end": "the same beside open ends"}
     said = next((text for key, text in purpose.items() if form.endswith(key)), kernel.purpose)
     head = [*comment(f"/* {plain(said)} */", "")]
@@ -302,28 +329,67 @@ def _added(name: str, read: bool, value: str) -> str:
     return f"= {name} + {value}" if read else f"+= {value}"
 
 
-def _pair_functions(program: Program, layout: Layout, step: Sweeps) -> Iterator[str]:
-    """The forces of all pairs from the parameters, and half of their energies at each site."""
-    if step.pairs:
-        arguments = f"const {program.name}_params *params, const {program.name}_row *row"
-        yield _gathering(program, layout, step.pairs.forces, arguments)
-        yield _half_energies(program, layout, step.pairs.energy, arguments)
+def _partners(program: Program, layout: Layout) -> Iterator[str]:
+    """What bonds or pairs add to energies, and to what moves sites, from the parameters."""
+    arguments = f"const {program.name}_params *params, const {program.name}_row *row"
+    for gather in (layout.partners.field, layout.partners.energy):
+        yield from _gathering(program, layout, gather, arguments)
 
 
-def _gathering(program: Program, layout: Layout, gather: Gather, arguments: str) -> str:
-    """What all pairs with other sites add at some sites: for each other site, a loop over these."""
-    targets = [f"g{k}" for k in range(len(gather.fields))]
-    pointers = [f"double *restrict {t} = row->gathered[{f}];" for t, f in zip(targets, gather.fields, strict=True)]
-    body = [f"{t}[i] += i == j ? 0.0 : {{{k}}};" for k, t in enumerate(targets)]
-    begin = [f"for (ptrdiff_t i = from; i < to; ++i) {' = '.join(f'{t}[i]' for t in targets)} = 0.0;"]
-    head = f"{arguments}, ptrdiff_t from, ptrdiff_t to"
-    return _over_pairs(program, layout, gather.kernel, head, [*pointers, *begin], body)
+def _gathering(program: Program, layout: Layout, gather: Gather, arguments: str) -> Iterator[str]:
+    """What all bonds, or pairs with other sites, add up at some sites."""
+    for number, ends in enumerate(gather.ends):
+        if layout.graph:
+            yield _over_bonds(program, layout, ends, arguments, first=number == 0)
+        else:
+            targets = [f"g{k}" for k in range(len(gather.names))]
+            pointers = [f"double *restrict {t} = row->gathered[{k}];" for k, t in enumerate(targets)]
+            body = [f"{t}[i] += i == j ? 0.0 : {{{k}}};" for k, t in enumerate(targets)]
+            begin = [f"for (ptrdiff_t i = from; i < to; ++i) {' = '.join(f'{t}[i]' for t in targets)} = 0.0;"]
+            head = f"{arguments}, ptrdiff_t from, ptrdiff_t to"
+            yield _over_pairs(program, layout, ends.kernel, head, [*pointers, *begin], body)
 
 
-def _half_energies(program: Program, layout: Layout, kernel: Kernel, arguments: str) -> str:
-    """Adds half the energies of all pairs of a site to its own."""
-    head = f"{arguments}, ptrdiff_t from, ptrdiff_t to, double *restrict out"
-    return _over_pairs(program, layout, kernel, head, [], ["out[i - from] += i == j ? 0.0 : 0.5 * ({0});"])
+#: The bonds of a site i, by the end that it has; and which of them are passed over.
+_BONDS = {"": "row->bonds[i]; k < row->bonds[i + 1]", "a": "row->bonds[i]; k < row->middle[i]",
+          "b": "row->middle[i]; k < row->bonds[i + 1]"}  # fmt: skip
+_PASSED = {"there": "row->colours[row->other[k]] != row->chosen"}
+
+
+def _over_bonds(program: Program, layout: Layout, ends: Ends, arguments: str, *, first: bool) -> str:
+    """A loop over sites a, in it one over the bonds that they have to sites b."""
+    name, kernel = program.name, ends.kernel
+    code = lower(kernel)
+    names = _Names(program, layout, kernel, code, set(), _functions(program))
+    other, own = names.of_pair()
+    count = len(code.stores)
+    sums = [f"double {', '.join(f'sum{k} = 0.0' for k in range(count))};"]
+    values = [f"const double {names.scope[a.target]} = {names.show(a.value)};" for a in code.assignments]
+    added = [f"sum{s.index} += {names.show(s.value)};" for s in code.stores]
+    out = [f"row->gathered[{k}][i] {'' if first else '+'}= sum{k};" for k in range(count)]
+    wanted = "row->colours[i] == row->chosen && " if ends.chosen == "here" else ""
+    bounds = _BONDS[ends.end].replace("; ", f"; {wanted}", 1)
+    coefficients = "params" if arguments.startswith(f"const {name}_params") else "coef"
+    used = any(s in code.used for s in kernel.inputs[coefficients])
+    passed = [f"if ({_PASSED[ends.chosen]}) continue;"] if ends.chosen in _PASSED else []
+    reads = [f"{'const ptrdiff_t j = row->other[k];'}"] if other else []
+    inner = [*passed, *reads, *other, *values, *added]
+    return "\n".join(
+        [
+            *comment(f"/* {plain(kernel.purpose)} */", ""),
+            f"static inline void {name}_{kernel.name}({arguments}, ptrdiff_t from, ptrdiff_t to)",
+            "{",
+            *(f"    {line}" for line in [*([] if used else [f"(void){coefficients};"]), *names.pointers()]),
+            "    for (ptrdiff_t i = from; i < to; ++i) {",
+            *(f"        {line}" for line in [*own, *sums]),
+            f"        for (ptrdiff_t k = {bounds}; ++k) {{",
+            *(f"            {line}" for line in inner),
+            "        }",
+            *(f"        {line}" for line in out),
+            "    }",
+            "}\n",
+        ]
+    )
 
 
 def _over_pairs(
@@ -357,8 +423,8 @@ def _over_pairs(
 
 def _seen(program: Program, layout: Layout, kernel: Kernel) -> str:
     """A kernel as a loop that fills arrays over the sites."""
-    name, code = program.name, lower(kernel)
-    names = _Names(program, layout, kernel, code, set(), _functions(program))
+    name, code, partners = program.name, lower(kernel), layout.partners
+    names = _Names(program, layout, kernel, code, set(), _functions(program), partners.field.names)
     head = [*comment(f"/* {plain(kernel.purpose)}, of the sites of a row: out[k * apart + i - from] */", "")]
     head.append(
         f"static void {name}_{kernel.name}_row(const {name}_params *params, const {name}_row *row, ptrdiff_t from, "
@@ -371,12 +437,12 @@ def _seen(program: Program, layout: Layout, kernel: Kernel) -> str:
             s.index, f"{s.index} * (ptrdiff_t)apart + i - from"
         )
         body.append(f"out[{place}] = {names.show(s.value)};")
-    pairs = layout.step.pairs
     early, late = list[str](), list[str]()
-    if pairs and kernel.name == "energy":
-        late = [f"    {name}_{pairs.energy.name}(params, row, from, to, out);"]
-    elif pairs and kernel.name == "vector_field":
-        early = [f"    {name}_{pairs.forces.kernel.name}(params, row, from, to);"]
+    gather = {"energy": partners.energy, "vector_field": partners.field}.get(kernel.name)
+    for own in gather.kernels if gather else ():
+        early.append(f"    {name}_{own.name}(params, row, from, to);")
+    if kernel.name == "energy" and early:
+        late = ["    for (ptrdiff_t i = from; i < to; ++i) out[i - from] += 0.5 * row->gathered[0][i];"]
     unused = [] if early or late or any(s in code.used for s in kernel.inputs["params"]) else ["params"]
     unused += [] if len(code.stores) > 1 else ["apart"]
     if not code.stores:
@@ -409,6 +475,7 @@ class _Names:
         code: Code,
         moved: set[str],
         calls: Mapping[str, str],
+        sums: Sequence[str] = (),
     ) -> None:
         self.layout, self.moved, self.code = layout, moved, code
         called = {word.strip("({") for text in calls.values() for word in text.split("(")}
@@ -427,13 +494,17 @@ class _Names:
                 self.scope.bind(s, named)
                 self._first.append(f"{named} = coef[{s.key[0]}]")
             elif isinstance(s, Symbol) and s.kind == GATHERED:
-                self.scope.bind(s, f"row->gathered[{program.coordinates.index(str(s.key[0]))}][i]")
+                self.scope.bind(s, f"row->gathered[{list(sums).index(s)}][i]")
+            elif isinstance(s, Symbol) and s.kind == CHOSEN:
+                self.scope.bind(s, "(row->colours[i] == row->chosen ? 1.0 : 0.0)")
             elif isinstance(s, Symbol):
                 self._bind_weight(s)
             elif s in layout.step.sites.ends:
                 self._bind_end(s)
             elif s in layout.step.sites.places:
                 self._bind_site(s)
+            elif s in layout.step.sites.at_bonds:
+                self._at_b.append(f"{self.scope[s]} = row->at_bonds[{layout.step.sites.at_bonds.index(s)}][k]")
             else:
                 self._first.append(f"{self.scope[s]} = params->{member[s]}")
 

@@ -6,8 +6,8 @@ from collections.abc import Iterable, Iterator, Sequence
 
 from phigen.scheme.kernel import Kernel
 from phigen.scheme.program import Program
-from phigen.scheme.steps import Sweep, Sweeps
-from phigen.symbolic.symbols import COEFFICIENT, GATHERED, Symbol
+from phigen.scheme.steps import Gather, Sweep, Sweeps
+from phigen.symbolic.symbols import CHOSEN, COEFFICIENT, GATHERED, Symbol
 from phigen.targets import special
 from phigen.targets.code import Code, lower
 from phigen.targets.names import Scope
@@ -42,17 +42,24 @@ def body(program: Program, step: Sweeps, prepare: str) -> str:
         "multiples": _tuple(map(repr, schedule.multiples)),
         "schedule": repr(tuple(schedule.flows)),
         "kicks": bool(schedule.multiples),
+        "at_bonds": _tuple(map(repr, sites.at_bonds)),
+        "by_colour": repr(step.by_colour),
     }
-    pieces = [render("numpy", f"{part}.py", values) for part in ("lattice", "lattice_sites", "lattice_steps")]
+    graph = step.partners is not None and step.partners.graph
+    values["sites"] = "_Coloured" if step.by_colour else "_Graph" if graph else "_Sites"
+    values["flow"] = "(part, sites.colour), row in sites.schedule" if step.by_colour else "part, row in SCHEDULE"
+    graphs = ["lattice_graph", *(["lattice_colours"] if step.by_colour else [])] if graph else []
+    parts = ["lattice", "lattice_sites", *graphs, "lattice_steps"]
+    pieces = [render("numpy", f"{part}.py", values) for part in parts]
     pieces += [render("numpy", "lattice_seen.py", values), prepare]
     pieces += [render("numpy", "phi.py", special.values(f, f"_{f}")) for f in special.used(program)]
     pieces += [
         render("numpy", "entire.py", special.entire_values(f, LANGUAGE.printer)) for f in special.entire_used(program)
     ]
-    pieces += _pairs(program, step)
+    pieces += _gathers(program, step)
     pieces += [_sweep(program, step, sweep) for part in step.parts for sweep in part]
-    parts = ["    (" + ", ".join(f"_{sweep.kernel.name}" for sweep in part) + ",)," for part in step.parts]
-    pieces.append("\n".join(["# The sweeps of each part of H.", "PARTS = (", *parts, ")\n"]))
+    listed = ["    (" + ", ".join(f"_{sweep.kernel.name}" for sweep in part) + ",)," for part in step.parts]
+    pieces.append("\n".join(["# The sweeps of each part of H.", "PARTS = (", *listed, ")\n"]))
     seen = program.observables
     pieces += [_seen(program, step, kernel) for kernel in (seen.energy, seen.casimirs, seen.vector_field)]
     return "\n\n".join(piece.strip("\n") + "\n" for piece in pieces)
@@ -67,9 +74,9 @@ def _sweep(program: Program, step: Sweeps, sweep: Sweep) -> str:
     kernel, code = sweep.kernel, lower(sweep.kernel)
     scope = Scope(PYTHON_RESERVED | _OWN | {"moved", "gathered"})
     lines = [f"def _{kernel.name}(coef, x, sites):"]
-    lines += [f"    gathered = _{sweep.gather.kernel.name}(coef, x, sites)"] if sweep.gather else []
-    fields = sweep.gather.fields if sweep.gather else ()
-    lines += [*_body(program, step, kernel, code, scope, fields), "    moved = x.copy()"]
+    lines += [f"    gathered = _{sweep.kernel.name.replace('sweep', 'gather')}(coef, x, sites)"] if sweep.gather else []
+    names = sweep.gather.names if sweep.gather else ()
+    lines += [*_body(program, step, kernel, code, scope, names), "    moved = x.copy()"]
     show = LANGUAGE.printer(scope)
     for store in code.stores:
         place = f"[{sweep.moved[store.index]}]"
@@ -82,44 +89,56 @@ def _seen(program: Program, step: Sweeps, kernel: Kernel) -> str:
     """A kernel as a function that fills arrays over the sites."""
     code = lower(kernel)
     scope = Scope(PYTHON_RESERVED | _OWN | {"out", "gathered"})
-    lines, pairs = [f"def _{kernel.name}(parameters, x, sites):"], step.pairs
-    fields: Sequence[int] = ()
-    if pairs and kernel.name == "vector_field":
-        lines.append(f"    gathered = _{pairs.forces.kernel.name}(parameters, x, sites)")
-        fields = pairs.forces.fields
-    lines += _body(program, step, kernel, code, scope, fields)
+    lines, partners = [f"def _{kernel.name}(parameters, x, sites):"], step.partners
+    names: Sequence[str] = ()
+    if partners and partners.field.names and kernel.name == "vector_field":
+        lines.append("    gathered = _forces(parameters, x, sites)")
+        names = partners.field.names
+    lines += _body(program, step, kernel, code, scope, names)
     lines.append(f"    out = np.empty(({len(code.stores)}, *sites.sizes))")
     show = LANGUAGE.printer(scope)
     lines += [f"    out[{s.index}] = {show(s.value)}" for s in code.stores]
-    if pairs and kernel.name == "energy":
-        lines.append(f"    out += 0.5 * _{pairs.energy.name}(parameters, x, sites)")
+    if partners and partners.energy.names and kernel.name == "energy":
+        lines.append("    out += 0.5 * _energies(parameters, x, sites)")
     return "\n".join([*lines, "    return out\n"])
 
 
-def _pairs(program: Program, step: Sweeps) -> Iterator[str]:
-    """What pairs add, as functions of the state."""
-    if step.pairs:
-        yield render("numpy", "pairs.py", {})
-        gathers = [sweep.gather.kernel for part in step.parts for sweep in part if sweep.gather]
-        for kernel in gathers:
-            yield _gather(program, step, kernel, "coef")
-        for kernel in (step.pairs.energy, step.pairs.forces.kernel):
-            yield _gather(program, step, kernel, "parameters")
+def _gathers(program: Program, step: Sweeps) -> Iterator[str]:
+    """What bonds or pairs add, as functions of the state."""
+    if step.partners:
+        if not step.partners.graph:
+            yield render("numpy", "pairs.py", {})
+        swept = [sweep for part in step.parts for sweep in part]
+        for sweep in swept:
+            if sweep.gather:
+                name = sweep.kernel.name.replace("sweep", "gather")
+                yield _gather(program, step, sweep.gather, name, "coef")
+        for name, gather in (("energies", step.partners.energy), ("forces", step.partners.field)):
+            if gather.names:
+                yield _gather(program, step, gather, name, "parameters")
 
 
-def _gather(program: Program, step: Sweeps, kernel: Kernel, first: str) -> str:
-    """A kernel of pairs, summed over the other sites."""
-    code = lower(kernel)
-    scope = Scope(PYTHON_RESERVED | _OWN | {"out", "gathered"})
-    body = _body(program, step, kernel, code, scope)
-    show = LANGUAGE.printer(scope)
-    values = "".join(f"_over_others({show(s.value)}, sites), " for s in code.stores)
-    lines = [f"def _{kernel.name}({first}, x, sites):", '    with np.errstate(all="ignore"):']
-    return "\n".join([*lines, *(f"    {line}" for line in body), f"        return np.array([{values.rstrip(', ')}])\n"])
+def _gather(program: Program, step: Sweeps, gather: Gather, name: str, first: str) -> str:
+    """Kernels of bonds or pairs, summed up at each site."""
+    lines = [f"def _{name}({first}, x, sites):", "    sums = 0.0"]
+    lines += ['    with np.errstate(all="ignore"):']
+    for ends in gather.ends:
+        code = lower(ends.kernel)
+        scope = Scope(PYTHON_RESERVED | _OWN | {"sums", "gathered", "here", "there", "bond"})
+        body = _body(program, step, ends.kernel, code, scope)
+        show = LANGUAGE.printer(scope)
+        if step.partners and step.partners.graph:
+            body = [f"    here, there, bond = sites.bonds({ends.end!r}, {ends.chosen!r})", *body]
+            added = [f"sites.summed({show(s.value)}, here)" for s in code.stores]
+        else:
+            added = [f"_over_others({show(s.value)}, sites)" for s in code.stores]
+        lines += [f"    {line}" for line in body]
+        lines.append(f"        sums = sums + np.array([{', '.join(added)}])")
+    return "\n".join([*lines, "    return sums\n"])
 
 
 def _body(
-    program: Program, step: Sweeps, kernel: Kernel, code: Code, scope: Scope, gathered: Sequence[int] = ()
+    program: Program, step: Sweeps, kernel: Kernel, code: Code, scope: Scope, gathered: Sequence[str] = ()
 ) -> list[str]:
     """What is read, and the assignments."""
     lines: list[str] = []
@@ -128,11 +147,14 @@ def _body(
             if s not in code.used:
                 continue
             if isinstance(s, Symbol) and s.kind == GATHERED:
-                place = [program.coordinates[f] for f in gathered].index(str(s.key[0]))
-                scope.bind(s, f"gathered[{place}]")
+                scope.bind(s, f"gathered[{list(gathered).index(s)}]")
+            elif isinstance(s, Symbol) and s.kind == CHOSEN:
+                scope.bind(s, "sites.chosen()")
             elif isinstance(s, Symbol):
                 bounds = ", ".join(map(str, s.key))
                 scope.bind(s, f"coef[{i}]" if s.kind == COEFFICIENT else f"sites.present({bounds})")
+            elif array == "bonds":
+                lines.append(f'    {scope[s]} = sites.parameters["{s}"][bond]')
             elif array == "params":
                 lines.append(f'    {scope[s]} = parameters["{s}"]')
             else:
@@ -146,6 +168,8 @@ def _read(program: Program, step: Sweeps, name: str) -> str:
     if name in step.sites.ends:
         base, end = step.sites.ends[name]
         text = f"x[{fields.index(base)}]" if base in fields else f'sites.parameters["{base}"]'
+        if step.partners and step.partners.graph:
+            return f"{text}[{'here' if end == 'a' else 'there'}]"
         return f"{text}[:, None]" if end == "a" else text
     base, offset = step.sites.places[name]
     text = f"x[{fields.index(base)}]" if base in fields else f'sites.parameters["{base}"]'

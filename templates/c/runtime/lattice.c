@@ -9,6 +9,7 @@
 #include "rows.c"
 #include "lane_functions.c"
 #include "sweeps.h"
+#include "graph.c"
 
 /* ---- The lattice ---- */
 #ifdef _OPENMP
@@ -20,8 +21,8 @@ enum {
     PHI_STRETCH = 32,  /* steps before the state is looked at: what is not finite stays so */
     PHI_LEAD = (PHI_HALO + 7) / 8 * 8,
     PHI_BUFFER = 256,
-#if PHI_PAIRS
-    PHI_RESERVED = PHI_ARRAYS + 2 * PHI_DIM
+#if PHI_GATHER
+    PHI_RESERVED = PHI_ARRAYS + PHI_DIM + PHI_GATHERED
 #else
     PHI_RESERVED = PHI_ARRAYS + PHI_DIM
 #endif
@@ -46,12 +47,21 @@ static size_t phi_shape(const size_t sizes[PHI_AXES], ptrdiff_t *width)
     return rows;
 }
 
+#if PHI_GRAPH
+size_t phi_work_size(const size_t sizes[PHI_AXES], size_t bonds)
+#else
 size_t phi_work_size(const size_t sizes[PHI_AXES])
+#endif
 {
     ptrdiff_t width = 0;
     const size_t rows = sizes == NULL ? 0 : phi_shape(sizes, &width);
     const size_t row = PHI_RESERVED * (size_t)width * sizeof(double) + PHI_LINES * sizeof(ptrdiff_t);
+#if PHI_GRAPH
+    if (rows == 0 || !phi_few(sizes[0], bonds)) return 0;
+    return row + phi_graph_size(sizes[0], bonds) + 128;
+#else
     return rows == 0 ? 0 : rows * row + 64;
+#endif
 }
 
 /* Values of sites, the last axis fastest, into rows. */
@@ -119,13 +129,25 @@ static int phi_finite(const double *values, size_t count)
     return zero == 0.0;
 }
 
+#if PHI_GRAPH
+phi_status phi_init(phi_solver *s, const phi_params *params, const size_t sizes[PHI_AXES], const phi_bonds *bonds,
+    const double *x0, void *work)
+#else
 phi_status phi_init(phi_solver *s, const phi_params *params, const size_t sizes[PHI_AXES], const double *x0, void *work)
+#endif
 {
     ptrdiff_t width;
     if (s == NULL || sizes == NULL || x0 == NULL || work == NULL) return PHI_BAD_ARGUMENT;
     const phi_params own = params != NULL ? *params : phi_default_params;
     const size_t rows = phi_shape(sizes, &width), length = sizes[PHI_AXES - 1], sites = rows * length;
+#if PHI_GRAPH
+    const size_t count = bonds != NULL ? bonds->count : 0;
+    if (!phi_few(sites, count) || !phi_connected(bonds, sites) || !phi_finite(x0, PHI_DIM * sites) ||
+        !phi_allowed(&own, sites, count))
+        return PHI_BAD_ARGUMENT;
+#else
     if (rows == 0 || !phi_finite(x0, PHI_DIM * sites) || !phi_allowed(&own, sites)) return PHI_BAD_ARGUMENT;
+#endif
     double coef[PHI_COEFFICIENTS];
     phi_prepare_step(&own, 1e-100, coef);
     if (!phi_finite(coef, PHI_COEFFICIENTS)) return PHI_BAD_ARGUMENT;
@@ -142,12 +164,18 @@ phi_status phi_init(phi_solver *s, const phi_params *params, const size_t sizes[
     for (size_t r = 0; r < rows; ++r) phi_find_lines(s, r, s->lines + r * PHI_LINES);
     for (size_t k = 0; k < PHI_ARRAYS; ++k) s->x[k] = aligned + k * block;
     for (size_t k = 0; k < PHI_DIM; ++k) s->before[k] = aligned + (PHI_ARRAYS + k) * block;
-#if PHI_PAIRS
-    for (size_t k = 0; k < PHI_DIM; ++k) s->gathered[k] = aligned + (PHI_ARRAYS + PHI_DIM + k) * block;
+#if PHI_GATHER
+    for (size_t k = 0; k < PHI_GATHERED; ++k) s->gathered[k] = aligned + (PHI_ARRAYS + PHI_DIM + k) * block;
 #endif
     for (size_t k = 0; k < PHI_DIM; ++k) phi_put(s, s->x[k], x0 + k * sites);
 #if PHI_SITE_PARAMETERS
     phi_put_parameters(s, &own);
+#endif
+#if PHI_GRAPH
+    phi_connect(s, bonds, (double *)(void *)(s->lines + 8)); /* there is one line, and doubles are aligned */
+#if PHI_BOND_PARAMETERS
+    phi_put_at_bonds(s, &own);
+#endif
 #endif
     return PHI_OK;
 }
@@ -165,8 +193,13 @@ static phi_status phi_set_step(phi_solver *s, double h)
     return PHI_OK;
 }
 
+#if PHI_BY_COLOUR
+/* One part of H, of one colour. */
+static void phi_sweep_flow(const phi_solver *s, int part, const double *coef, int far)
+#else
 /* One part of H. */
 static void phi_sweep(const phi_solver *s, int part, const double *coef, int far)
+#endif
 {
     const size_t units = s->rows * phi_pieces(s);
 #ifdef _OPENMP
@@ -179,6 +212,19 @@ static void phi_sweep(const phi_solver *s, int part, const double *coef, int far
 #endif
 }
 
+#if PHI_BY_COLOUR
+/* The first flow, those between it and the last, the last, or those between, backwards. */
+static void phi_sweep(const phi_solver *s, int kind, const double *coef, int far)
+{
+    const int last = s->flows - 1;
+    if (kind == 0 || kind == 2) phi_sweep_flow(s, kind == 0 ? 0 : last, coef, far);
+    if (kind == 1)
+        for (int flow = 1; flow < last; ++flow) phi_sweep_flow(s, flow, coef, far);
+    if (kind == 3)
+        for (int flow = last - 1; flow > 0; --flow) phi_sweep_flow(s, flow, coef, far);
+}
+
+#endif
 /* Some steps, joined. */
 static void phi_steps(const phi_solver *s, int steps, int far)
 {

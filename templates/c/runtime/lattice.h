@@ -11,8 +11,19 @@ typedef struct {
     ptrdiff_t length, width;  /* sites of a row; doubles between the beginnings of two rows */
     double *x[PHI_ARRAYS];    /* in rows, each field, then each parameter at sites: the first site of the first row */
     ptrdiff_t *lines;         /* of each row, where it is and where those beside it are */
-#if PHI_PAIRS
-    double *gathered[PHI_DIM]; /* for each field, what pairs add to the force at each site */
+#if PHI_GATHER
+    double *gathered[PHI_GATHERED]; /* sums over other sites, for each site */
+#endif
+#if PHI_GRAPH
+    int *bonds, *middle;      /* of each site the first of its bonds that begin there, then of those that end there */
+    int *other, *number;      /* of each of these the site at the other end, and the number of the bond */
+#if PHI_BOND_PARAMETERS
+    double *at_bonds[PHI_BOND_ARRAYS]; /* the values of each parameter at these */
+#endif
+#if PHI_BY_COLOUR
+    int *colours;             /* of each site; no bond connects two sites of one colour */
+    int colour_count, flows;  /* colours, and flows from one end of a stage to the other */
+#endif
 #endif
     double *before[PHI_DIM];  /* the fields before the steps that are being made */
     size_t steps;             /* good steps since phi_init */
@@ -25,6 +36,23 @@ typedef struct {
     double t_before_h;
 } phi_solver;
 
+#if PHI_GRAPH
+/* The bonds of a graph: number k runs from the site ends[2 * k] to another one, ends[2 * k + 1], both counted from 0. */
+typedef struct {
+    size_t count;
+    const size_t *ends;
+} phi_bonds;
+
+/* The bytes that the solver of a graph with so many sites and bonds needs as its memory; 0 if they are too many. */
+size_t phi_work_size(const size_t sizes[PHI_AXES], size_t bonds);
+
+/* Start at x0[field][site], with phi_work_size(sizes, bonds->count) bytes of memory, as from malloc, which must stay.
+   bonds may be NULL if there are none, params for the defaults; all arrays are copied. PHI_BAD_ARGUMENT if sizes are not
+   allowed, a bond does not run between two different sites, x0 or a parameter is not finite, or one that has to be
+   positive is not. */
+phi_status phi_init(phi_solver *s, const phi_params *params, const size_t sizes[PHI_AXES], const phi_bonds *bonds,
+    const double *x0, void *work);
+#else
 /* The bytes that the solver of a lattice needs as its memory; 0 for sizes that are not allowed. */
 size_t phi_work_size(const size_t sizes[PHI_AXES]);
 
@@ -32,6 +60,7 @@ size_t phi_work_size(const size_t sizes[PHI_AXES]);
    may be NULL for the defaults; its arrays are copied. PHI_BAD_ARGUMENT if sizes are not allowed, x0 or a parameter is
    not finite, or one that has to be positive is not. */
 phi_status phi_init(phi_solver *s, const phi_params *params, const size_t sizes[PHI_AXES], const double *x0, void *work);
+#endif
 
 /* Steps of size h, of either sign. If one fails, the state is that before it, and s->steps counts the good ones. Steps of
    one call are joined: where a step ends as the next begins, both are one flow. With OpenMP rows are worked at in

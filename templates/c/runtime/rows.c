@@ -11,8 +11,18 @@ typedef struct {
     double *const *x;             /* see phi_solver */
     const ptrdiff_t *at;          /* the row itself and those beside it, from the first row on */
     ptrdiff_t length;             /* sites of a row */
-#if PHI_PAIRS
+#if PHI_GATHER
     double *const *gathered;      /* see phi_solver */
+#endif
+#if PHI_GRAPH
+    const int *bonds, *middle, *other;
+#if PHI_BOND_PARAMETERS
+    double *const *at_bonds;
+#endif
+#if PHI_BY_COLOUR
+    const int *colours;
+    int chosen;                   /* the colour that a part of H belongs to */
+#endif
 #endif
 #if PHI_OPEN
     double present[PHI_WEIGHTS];  /* 1 for terms of H that are there as far as the other axes say, else 0 */
@@ -82,8 +92,20 @@ static inline void phi_locate(const phi_solver *s, size_t index, phi_row *row)
     row->x = s->x;
     row->at = s->lines + index * PHI_LINES;
     row->length = s->length;
-#if PHI_PAIRS
+#if PHI_GATHER
     row->gathered = s->gathered;
+#endif
+#if PHI_GRAPH
+    row->bonds = s->bonds;
+    row->middle = s->middle;
+    row->other = s->other;
+#if PHI_BOND_PARAMETERS
+    row->at_bonds = s->at_bonds;
+#endif
+#if PHI_BY_COLOUR
+    row->colours = s->colours;
+    row->chosen = 0;
+#endif
 #endif
 #if PHI_OPEN || PHI_COLOURS
     ptrdiff_t place[PHI_AXES];
@@ -107,7 +129,7 @@ static inline void phi_locate(const phi_solver *s, size_t index, phi_row *row)
 #endif
 }
 
-#if PHI_PAIRS
+#if PHI_GATHER
 enum { PHI_PIECE = 256 }; /* sites that are worked at in one go, with any number of threads */
 #else
 enum { PHI_PIECE = 2048 }; /* sites of a row that are worked at in one go, with any number of threads */

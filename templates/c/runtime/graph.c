@@ -1,0 +1,102 @@
+#ifndef PHI_FILE_GRAPH
+#define PHI_FILE_GRAPH
+#include "lattice.h"
+#include "model.h"
+
+#if PHI_GRAPH
+#include <limits.h>
+
+/* ---- Bonds ---- */
+/* Whether sites and bonds can be numbered. */
+static int phi_few(size_t sites, size_t bonds) { return sites > 0 && sites < INT_MAX && bonds < INT_MAX / 2; }
+
+/* The bytes for them, after the rows. */
+static size_t phi_graph_size(size_t sites, size_t bonds)
+{
+    size_t integers = 2 * sites + 1 + 4 * bonds, doubles = 0;
+#if PHI_BY_COLOUR
+    integers += 2 * sites;
+#endif
+#if PHI_BOND_PARAMETERS
+    doubles += PHI_BOND_ARRAYS * 2 * bonds;
+#endif
+    return doubles * sizeof(double) + integers * sizeof(int);
+}
+
+/* Whether all bonds run between two different sites. */
+static int phi_connected(const phi_bonds *bonds, size_t sites)
+{
+    if (bonds == NULL || bonds->count == 0) return 1;
+    if (bonds->ends == NULL) return 0;
+    for (size_t k = 0; k < bonds->count; ++k) {
+        const size_t a = bonds->ends[2 * k], b = bonds->ends[2 * k + 1];
+        if (a >= sites || b >= sites || a == b) return 0;
+    }
+    return 1;
+}
+
+#if PHI_BY_COLOUR
+/* Each site takes the first colour that none before it has at the other end of a bond. */
+static void phi_colour(phi_solver *s, int *taken)
+{
+    const int sites = (int)s->sites;
+    s->colour_count = 2;
+    for (int i = 0; i < sites; ++i) taken[i] = -1;
+    for (int i = 0; i < sites; ++i) {
+        for (int k = s->bonds[i]; k < s->bonds[i + 1]; ++k)
+            if (s->other[k] < i) taken[s->colours[s->other[k]]] = i;
+        int colour = 0;
+        while (taken[colour] == i) ++colour;
+        s->colours[i] = colour;
+        if (colour >= s->colour_count) s->colour_count = colour + 1;
+    }
+    s->flows = 0;
+    for (int part = 0; part < PHI_PARTS; ++part) s->flows += phi_by_colour[part] ? s->colour_count : 1;
+}
+
+#endif
+/* The bonds of each site, in their order: first those that begin there. */
+static void phi_connect(phi_solver *s, const phi_bonds *bonds, double *memory)
+{
+    const size_t sites = s->sites, count = bonds != NULL ? bonds->count : 0;
+#if PHI_BOND_PARAMETERS
+    for (int p = 0; p < PHI_BOND_ARRAYS; ++p) s->at_bonds[p] = memory + (size_t)p * 2 * count;
+    memory += PHI_BOND_ARRAYS * 2 * count;
+#endif
+    s->bonds = (int *)(void *)memory;
+    s->middle = s->bonds + sites + 1;
+    s->other = s->middle + sites;
+    s->number = s->other + 2 * count;
+    memset(s->bonds, 0, (2 * sites + 1) * sizeof *s->bonds);
+    for (size_t k = 0; k < count; ++k) {
+        ++s->bonds[bonds->ends[2 * k]];
+        ++s->middle[bonds->ends[2 * k + 1]];
+    }
+    int end = 0; /* of the bonds so far */
+    for (size_t i = 0; i < sites; ++i) {
+        s->bonds[i] = end += s->bonds[i];
+        s->middle[i] = end += s->middle[i];
+    }
+    s->bonds[sites] = end;
+    for (size_t k = count; k-- > 0;) { /* backwards, so that ends become beginnings */
+        const size_t a = bonds->ends[2 * k], b = bonds->ends[2 * k + 1];
+        const int begins = --s->bonds[a], ends = --s->middle[b];
+        s->other[begins] = (int)b;
+        s->other[ends] = (int)a;
+        s->number[begins] = s->number[ends] = (int)k;
+    }
+#if PHI_BY_COLOUR
+    s->colours = s->number + 2 * count;
+    phi_colour(s, s->colours + sites);
+#endif
+}
+
+#if PHI_BOND_PARAMETERS
+/* The values of a parameter at bonds, or one value for all. */
+static void phi_put_at_bond(const phi_solver *s, double *at, const double *values, double value)
+{
+    for (int k = 0; k < s->bonds[s->sites]; ++k) at[k] = values != NULL ? values[s->number[k]] : value;
+}
+#endif
+#endif
+#endif
