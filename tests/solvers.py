@@ -14,6 +14,7 @@ import numpy as np
 from many_digits import precisely
 from tools import run, tool, write
 
+from phigen.api import interface_of
 from phigen.compilation import Compilation
 from phigen.compiler import emit
 from phigen.registry import LOADABLE
@@ -57,16 +58,7 @@ def library(compilation: Compilation) -> Path:
 
 def interface(compilation: Compilation) -> Interface:
     """The names that the runtime needs."""
-    program = compilation.program
-    return Interface(
-        program.name,
-        program.coordinates,
-        program.order,
-        {p.name: float(p.value) for p in program.parameters},
-        frozenset(p.name for p in program.parameters if p.positive),
-        program.casimirs,
-        program.time,
-    )
+    return interface_of(compilation.program)
 
 
 def solver(compilation: Compilation, target: str) -> Solver:

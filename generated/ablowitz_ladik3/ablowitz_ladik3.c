@@ -19,9 +19,10 @@
  *   2. Compensated sums, linear equations
  *   3. Starting guesses
  *   4. The implicit step, along paths dm/dt = pi(m) p
- *   5. The solver
- *   6. Ensembles
- * body-sha256: bce9edd80c22ef7261b55af7db60ca083e0e7d0b0ecd728921456ce32ad5fcaf
+ *   5. Between steps
+ *   6. The solver
+ *   7. Ensembles
+ * body-sha256: fbc50e45e6c861d4c95e343a2c006b79da256a521896419c446f8b4db82e7c75
  */
 #include "ablowitz_ladik3.h"
 
@@ -541,6 +542,64 @@ static ablowitz_ladik3_status ablowitz_ladik3_attempt(ablowitz_ladik3_solver *s,
         previous = size;
     }
     return ablowitz_ladik3_NO_CONVERGENCE;
+}
+
+/* ---- Between steps ---- */
+/* how far the state may be moved, in its own size, for guesses to move with it */
+#define ablowitz_ladik3_NEAR_BY 0.125
+
+/* Guesses move with the state, by as many past values as extrapolation needs; recurrences are of the motion
+   as it was. From far away all begins anew, with the next step. */
+static void ablowitz_ladik3_move_guesses(ablowitz_ladik3_solver *s, const double to[ablowitz_ladik3_DIM])
+{
+    double distance = 0.0, size = 0.0;
+    for (int i = 0; i < ablowitz_ladik3_DIM; ++i) {
+        distance += fabs(to[i] - s->x[i]);
+        size += fabs(s->x[i]);
+    }
+    if (!(distance <= ablowitz_ladik3_NEAR_BY * size)) {
+        s->h = (double)NAN;
+        return;
+    }
+    for (int stage = 0; stage < ablowitz_ladik3_STAGES; ++stage) {
+        ablowitz_ladik3_history *history = &s->history[stage];
+        for (int i = 0; i < ablowitz_ladik3_DIM; ++i) history->difference[0][i] += to[i] - s->x[i];
+    }
+}
+
+/* Stand at x + carry from now on. */
+static ablowitz_ladik3_status ablowitz_ladik3_place(ablowitz_ladik3_solver *s,
+    const double x[ablowitz_ladik3_DIM], const double carry[ablowitz_ladik3_DIM])
+{
+    for (int i = 0; i < ablowitz_ladik3_DIM; ++i)
+        if (!isfinite(x[i])) return ablowitz_ladik3_BAD_ARGUMENT;
+    ablowitz_ladik3_move_guesses(s, x);
+    memcpy(s->x, x, sizeof s->x);
+    memcpy(s->carry, carry, sizeof s->carry);
+    return ablowitz_ladik3_OK;
+}
+
+ablowitz_ladik3_status ablowitz_ladik3_set_state(ablowitz_ladik3_solver *s,
+    const double x[ablowitz_ladik3_DIM])
+{
+    double to[ablowitz_ladik3_DIM], carry[ablowitz_ladik3_DIM] = { 0.0 };
+    if (s == NULL || x == NULL) return ablowitz_ladik3_BAD_ARGUMENT;
+    memcpy(to, x, sizeof to); /* which may be a part of *s */
+    return ablowitz_ladik3_place(s, to, carry);
+}
+
+ablowitz_ladik3_status ablowitz_ladik3_kick(ablowitz_ladik3_solver *s,
+    const double change[ablowitz_ladik3_DIM])
+{
+    double to[ablowitz_ladik3_DIM], carry[ablowitz_ladik3_DIM];
+    if (s == NULL || change == NULL) return ablowitz_ladik3_BAD_ARGUMENT;
+    for (int i = 0; i < ablowitz_ladik3_DIM; ++i) {
+        const double sum = s->x[i] + change[i], added = sum - s->x[i];
+        const double lost = ((s->x[i] - (sum - added)) + (change[i] - added)) + s->carry[i];
+        to[i] = sum + lost;
+        carry[i] = lost - (to[i] - sum);
+    }
+    return ablowitz_ladik3_place(s, to, carry);
 }
 
 /* ---- The solver ---- */

@@ -2,7 +2,7 @@
  * ablowitz_ladik3.h: the declarations; ablowitz_ladik3.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 00eb8062c74fc16b41b3803ae2b47364cc211159b134a5e52e2dcd95c595ebea
+ * body-sha256: 7e83deacf7ce5291dcaae77164e467a271c442690af5adbec3e108e78aa301f3
  */
 #ifndef ABLOWITZ_LADIK3_H
 #define ABLOWITZ_LADIK3_H
@@ -46,8 +46,7 @@ typedef struct {
 /* The solver is a plain value: copy it to branch, keep one per thread. Set it up with
    ablowitz_ladik3_init. */
 typedef struct {
-    /* the state; read it freely, change it only through ablowitz_ladik3_init */
-    double x[ablowitz_ladik3_DIM];
+    double x[ablowitz_ladik3_DIM];     /* the state; read it freely, change it only through functions */
     double carry[ablowitz_ladik3_DIM]; /* what rounding took from x: the state proper is x + carry */
     size_t steps;                      /* good steps since ablowitz_ladik3_init */
     size_t evaluations;                /* of the generating function, for statistics */
@@ -72,6 +71,13 @@ ablowitz_ladik3_status ablowitz_ladik3_step(ablowitz_ladik3_solver *s, double h)
 
 /* Many steps. On failure s->x is the last good state and s->steps counts the good steps. */
 ablowitz_ladik3_status ablowitz_ladik3_integrate(ablowitz_ladik3_solver *s, double h, size_t steps);
+
+/* Between steps: stand at x, or move by change, all else being as it was, also on
+   ablowitz_ladik3_BAD_ARGUMENT. Either may leave the leaf. */
+ablowitz_ladik3_status ablowitz_ladik3_set_state(ablowitz_ladik3_solver *s,
+    const double x[ablowitz_ladik3_DIM]);
+ablowitz_ladik3_status ablowitz_ladik3_kick(ablowitz_ladik3_solver *s,
+    const double change[ablowitz_ladik3_DIM]);
 
 /* Many members, in place: x[i * members + m] is coordinate i of member m. One that fails keeps its last good
    state. status (or NULL) receives the status of each; the first that is not OK is returned. */

@@ -18,9 +18,10 @@
  *   2. Compensated sums, linear equations
  *   3. Starting guesses
  *   4. The implicit step, along paths dm/dt = pi(m) p
- *   5. The solver
- *   6. Ensembles
- * body-sha256: ba9c553aeb77f54137d5756122466eae96854eaa0c0bb965ef4d96a9b878916a
+ *   5. Between steps
+ *   6. The solver
+ *   7. Ensembles
+ * body-sha256: cd1931d7e59723882210954335ff1823d84989861878517e1f101ba31f566f37
  */
 #include "charged_particle.h"
 
@@ -530,6 +531,62 @@ static charged_particle_status charged_particle_attempt(charged_particle_solver 
         previous = size;
     }
     return charged_particle_NO_CONVERGENCE;
+}
+
+/* ---- Between steps ---- */
+/* how far the state may be moved, in its own size, for guesses to move with it */
+#define charged_particle_NEAR_BY 0.125
+
+/* Guesses move with the state, by as many past values as extrapolation needs; recurrences are of the motion
+   as it was. From far away all begins anew, with the next step. */
+static void charged_particle_move_guesses(charged_particle_solver *s, const double to[charged_particle_DIM])
+{
+    double distance = 0.0, size = 0.0;
+    for (int i = 0; i < charged_particle_DIM; ++i) {
+        distance += fabs(to[i] - s->x[i]);
+        size += fabs(s->x[i]);
+    }
+    if (!(distance <= charged_particle_NEAR_BY * size)) {
+        s->h = (double)NAN;
+        return;
+    }
+    charged_particle_history *history = &s->history;
+    for (int i = 0; i < charged_particle_DIM; ++i) history->difference[0][i] += to[i] - s->x[i];
+}
+
+/* Stand at x + carry from now on. */
+static charged_particle_status charged_particle_place(charged_particle_solver *s,
+    const double x[charged_particle_DIM], const double carry[charged_particle_DIM])
+{
+    for (int i = 0; i < charged_particle_DIM; ++i)
+        if (!isfinite(x[i])) return charged_particle_BAD_ARGUMENT;
+    charged_particle_move_guesses(s, x);
+    memcpy(s->x, x, sizeof s->x);
+    memcpy(s->carry, carry, sizeof s->carry);
+    return charged_particle_OK;
+}
+
+charged_particle_status charged_particle_set_state(charged_particle_solver *s,
+    const double x[charged_particle_DIM])
+{
+    double to[charged_particle_DIM], carry[charged_particle_DIM] = { 0.0 };
+    if (s == NULL || x == NULL) return charged_particle_BAD_ARGUMENT;
+    memcpy(to, x, sizeof to); /* which may be a part of *s */
+    return charged_particle_place(s, to, carry);
+}
+
+charged_particle_status charged_particle_kick(charged_particle_solver *s,
+    const double change[charged_particle_DIM])
+{
+    double to[charged_particle_DIM], carry[charged_particle_DIM];
+    if (s == NULL || change == NULL) return charged_particle_BAD_ARGUMENT;
+    for (int i = 0; i < charged_particle_DIM; ++i) {
+        const double sum = s->x[i] + change[i], added = sum - s->x[i];
+        const double lost = ((s->x[i] - (sum - added)) + (change[i] - added)) + s->carry[i];
+        to[i] = sum + lost;
+        carry[i] = lost - (to[i] - sum);
+    }
+    return charged_particle_place(s, to, carry);
 }
 
 /* ---- The solver ---- */

@@ -2,7 +2,7 @@
  * charged_particle.h: the declarations; charged_particle.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: ef82c2d13769530221c63d5509cdf643b73753493038f5406d839a78a5b0e8d8
+ * body-sha256: 2c52d38262ff35e821f2985b85d592fcf0831763c531c77f4382ad0cd00eabd2
  */
 #ifndef CHARGED_PARTICLE_H
 #define CHARGED_PARTICLE_H
@@ -45,8 +45,7 @@ typedef struct {
 /* The solver is a plain value: copy it to branch, keep one per thread. Set it up with
    charged_particle_init. */
 typedef struct {
-    /* the state; read it freely, change it only through charged_particle_init */
-    double x[charged_particle_DIM];
+    double x[charged_particle_DIM];     /* the state; read it freely, change it only through functions */
     double carry[charged_particle_DIM]; /* what rounding took from x: the state proper is x + carry */
     size_t steps;                       /* good steps since charged_particle_init */
     size_t evaluations;                 /* of the generating function, for statistics */
@@ -70,6 +69,13 @@ charged_particle_status charged_particle_step(charged_particle_solver *s, double
 
 /* Many steps. On failure s->x is the last good state and s->steps counts the good steps. */
 charged_particle_status charged_particle_integrate(charged_particle_solver *s, double h, size_t steps);
+
+/* Between steps: stand at x, or move by change, all else being as it was, also on
+   charged_particle_BAD_ARGUMENT. Either may leave the leaf. */
+charged_particle_status charged_particle_set_state(charged_particle_solver *s,
+    const double x[charged_particle_DIM]);
+charged_particle_status charged_particle_kick(charged_particle_solver *s,
+    const double change[charged_particle_DIM]);
 
 /* Many members, in place: x[i * members + m] is coordinate i of member m. One that fails keeps its last good
    state. status (or NULL) receives the status of each; the first that is not OK is returned. */

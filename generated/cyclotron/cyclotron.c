@@ -18,9 +18,10 @@
  *   2. Compensated sums, linear equations
  *   3. Starting guesses
  *   4. The implicit step, by Newton's method
- *   5. The solver
- *   6. Ensembles
- * body-sha256: 1189fca892709e25bc9a1778a37a62d861f2db16c3b58064eb0d0b11198b5c76
+ *   5. Between steps
+ *   6. The solver
+ *   7. Ensembles
+ * body-sha256: c71e9be76684f97fde70bfd5fe3b13e2f84bad091e85883db2f06c768188f570
  */
 #include "cyclotron.h"
 
@@ -276,6 +277,60 @@ static cyclotron_status cyclotron_attempt(cyclotron_solver *s)
         return cyclotron_OK;
     }
     return cyclotron_NO_CONVERGENCE;
+}
+
+/* ---- Between steps ---- */
+/* how far the state may be moved, in its own size, for guesses to move with it */
+#define cyclotron_NEAR_BY 0.125
+
+/* Guesses move with the state, by as many past values as extrapolation needs; recurrences are of the motion
+   as it was. From far away all begins anew, with the next step. */
+static void cyclotron_move_guesses(cyclotron_solver *s, const double to[cyclotron_DIM])
+{
+    double distance = 0.0, size = 0.0;
+    for (int i = 0; i < cyclotron_DIM; ++i) {
+        distance += fabs(to[i] - s->x[i]);
+        size += fabs(s->x[i]);
+    }
+    if (!(distance <= cyclotron_NEAR_BY * size)) {
+        s->h = (double)NAN;
+        return;
+    }
+    cyclotron_history *history = &s->history;
+    for (int i = 0; i < cyclotron_DIM; ++i) history->difference[0][i] += to[i] - s->x[i];
+}
+
+/* Stand at x + carry from now on. */
+static cyclotron_status cyclotron_place(cyclotron_solver *s, const double x[cyclotron_DIM],
+    const double carry[cyclotron_DIM])
+{
+    for (int i = 0; i < cyclotron_DIM; ++i)
+        if (!isfinite(x[i])) return cyclotron_BAD_ARGUMENT;
+    cyclotron_move_guesses(s, x);
+    memcpy(s->x, x, sizeof s->x);
+    memcpy(s->carry, carry, sizeof s->carry);
+    return cyclotron_OK;
+}
+
+cyclotron_status cyclotron_set_state(cyclotron_solver *s, const double x[cyclotron_DIM])
+{
+    double to[cyclotron_DIM], carry[cyclotron_DIM] = { 0.0 };
+    if (s == NULL || x == NULL) return cyclotron_BAD_ARGUMENT;
+    memcpy(to, x, sizeof to); /* which may be a part of *s */
+    return cyclotron_place(s, to, carry);
+}
+
+cyclotron_status cyclotron_kick(cyclotron_solver *s, const double change[cyclotron_DIM])
+{
+    double to[cyclotron_DIM], carry[cyclotron_DIM];
+    if (s == NULL || change == NULL) return cyclotron_BAD_ARGUMENT;
+    for (int i = 0; i < cyclotron_DIM; ++i) {
+        const double sum = s->x[i] + change[i], added = sum - s->x[i];
+        const double lost = ((s->x[i] - (sum - added)) + (change[i] - added)) + s->carry[i];
+        to[i] = sum + lost;
+        carry[i] = lost - (to[i] - sum);
+    }
+    return cyclotron_place(s, to, carry);
 }
 
 /* ---- The solver ---- */

@@ -2,7 +2,7 @@
  * cyclotron.h: the declarations; cyclotron.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: b208a1fc6bebe31ef3b228ea3b4bb2da603b25bc661c82e30e9b14529e0196cc
+ * body-sha256: 2d37c17ba11e548921f18bdd922bee5b9b87219f706abdc7c691d404ed84599d
  */
 #ifndef CYCLOTRON_H
 #define CYCLOTRON_H
@@ -44,7 +44,7 @@ typedef struct {
 
 /* The solver is a plain value: copy it to branch, keep one per thread. Set it up with cyclotron_init. */
 typedef struct {
-    double x[cyclotron_DIM];     /* the state; read it freely, change it only through cyclotron_init */
+    double x[cyclotron_DIM];     /* the state; read it freely, change it only through functions */
     double carry[cyclotron_DIM]; /* what rounding took from x: the state proper is x + carry */
     size_t steps;                /* good steps since cyclotron_init */
     size_t evaluations;          /* of the generating function, for statistics */
@@ -68,6 +68,11 @@ cyclotron_status cyclotron_step(cyclotron_solver *s, double h);
 
 /* Many steps. On failure s->x is the last good state and s->steps counts the good steps. */
 cyclotron_status cyclotron_integrate(cyclotron_solver *s, double h, size_t steps);
+
+/* Between steps: stand at x, or move by change, all else being as it was, also on cyclotron_BAD_ARGUMENT.
+   Either may leave the leaf. */
+cyclotron_status cyclotron_set_state(cyclotron_solver *s, const double x[cyclotron_DIM]);
+cyclotron_status cyclotron_kick(cyclotron_solver *s, const double change[cyclotron_DIM]);
 
 /* Many members, in place: x[i * members + m] is coordinate i of member m. One that fails keeps its last good
    state. status (or NULL) receives the status of each; the first that is not OK is returned. */

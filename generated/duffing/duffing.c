@@ -18,9 +18,10 @@
  *   2. Compensated sums, linear equations
  *   3. Starting guesses
  *   4. The implicit step, by Newton's method
- *   5. The solver
- *   6. Ensembles
- * body-sha256: 764aa5611578941bbed2079223654f9a1001b7cd53b99e62e2a73f9bb8229a7a
+ *   5. Between steps
+ *   6. The solver
+ *   7. Ensembles
+ * body-sha256: 92c4f2885a518a4cdbf13be52fc7a8bec5cb5d573fd60012e7451cc47f7a2442
  */
 #include "duffing.h"
 
@@ -319,6 +320,60 @@ static duffing_status duffing_attempt(duffing_solver *s)
         return duffing_OK;
     }
     return duffing_NO_CONVERGENCE;
+}
+
+/* ---- Between steps ---- */
+/* how far the state may be moved, in its own size, for guesses to move with it */
+#define duffing_NEAR_BY 0.125
+
+/* Guesses move with the state, by as many past values as extrapolation needs; recurrences are of the motion
+   as it was. From far away all begins anew, with the next step. */
+static void duffing_move_guesses(duffing_solver *s, const double to[duffing_DIM])
+{
+    double distance = 0.0, size = 0.0;
+    for (int i = 0; i < duffing_DIM; ++i) {
+        distance += fabs(to[i] - s->x[i]);
+        size += fabs(s->x[i]);
+    }
+    if (!(distance <= duffing_NEAR_BY * size)) {
+        s->h = (double)NAN;
+        return;
+    }
+    duffing_history *history = &s->history;
+    for (int i = 0; i < duffing_DIM; ++i) history->difference[0][i] += to[i] - s->x[i];
+}
+
+/* Stand at x + carry from now on. */
+static duffing_status duffing_place(duffing_solver *s, const double x[duffing_DIM],
+    const double carry[duffing_DIM])
+{
+    for (int i = 0; i < duffing_DIM; ++i)
+        if (!isfinite(x[i])) return duffing_BAD_ARGUMENT;
+    duffing_move_guesses(s, x);
+    memcpy(s->x, x, sizeof s->x);
+    memcpy(s->carry, carry, sizeof s->carry);
+    return duffing_OK;
+}
+
+duffing_status duffing_set_state(duffing_solver *s, const double x[duffing_DIM])
+{
+    double to[duffing_DIM], carry[duffing_DIM] = { 0.0 };
+    if (s == NULL || x == NULL) return duffing_BAD_ARGUMENT;
+    memcpy(to, x, sizeof to); /* which may be a part of *s */
+    return duffing_place(s, to, carry);
+}
+
+duffing_status duffing_kick(duffing_solver *s, const double change[duffing_DIM])
+{
+    double to[duffing_DIM], carry[duffing_DIM];
+    if (s == NULL || change == NULL) return duffing_BAD_ARGUMENT;
+    for (int i = 0; i < duffing_DIM; ++i) {
+        const double sum = s->x[i] + change[i], added = sum - s->x[i];
+        const double lost = ((s->x[i] - (sum - added)) + (change[i] - added)) + s->carry[i];
+        to[i] = sum + lost;
+        carry[i] = lost - (to[i] - sum);
+    }
+    return duffing_place(s, to, carry);
 }
 
 /* ---- The solver ---- */

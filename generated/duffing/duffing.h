@@ -2,7 +2,7 @@
  * duffing.h: the declarations; duffing.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: a27a509054eeeb680e1b9eacd9d1090bfefcfa2f1de92b08728956a72e4fd9a8
+ * body-sha256: 480bda077f96c4af144a23bfaab4b558812e931f8fcb1dd709dd7b7fe0ced70d
  */
 #ifndef DUFFING_H
 #define DUFFING_H
@@ -44,7 +44,7 @@ typedef struct {
 
 /* The solver is a plain value: copy it to branch, keep one per thread. Set it up with duffing_init. */
 typedef struct {
-    double x[duffing_DIM];     /* the state; read it freely, change it only through duffing_init */
+    double x[duffing_DIM];     /* the state; read it freely, change it only through functions */
     double carry[duffing_DIM]; /* what rounding took from x: the state proper is x + carry */
     size_t steps;              /* good steps since duffing_init */
     size_t evaluations;        /* of the generating function, for statistics */
@@ -72,6 +72,11 @@ duffing_status duffing_step(duffing_solver *s, double h);
 
 /* Many steps. On failure s->x is the last good state and s->steps counts the good steps. */
 duffing_status duffing_integrate(duffing_solver *s, double h, size_t steps);
+
+/* Between steps: stand at x, or move by change, all else being as it was, also on duffing_BAD_ARGUMENT.
+   Either may leave the leaf. */
+duffing_status duffing_set_state(duffing_solver *s, const double x[duffing_DIM]);
+duffing_status duffing_kick(duffing_solver *s, const double change[duffing_DIM]);
 
 /* Many members, in place: x[i * members + m] is coordinate i of member m. One that fails keeps its last good
    state. status (or NULL) receives the status of each; the first that is not OK is returned. */

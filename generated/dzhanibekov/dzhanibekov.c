@@ -21,9 +21,10 @@
  *   4. Attitude
  *   5. The implicit step, by Newton's method
  *   6. The choice of the gauge: multiples of Casimirs taken from H
- *   7. The solver
- *   8. Ensembles
- * body-sha256: 8270d7982ccc1ff056aad9249aa8df656813bd8c24dd67498afa850632d9198a
+ *   7. Between steps
+ *   8. The solver
+ *   9. Ensembles
+ * body-sha256: 554aa7cd6f22851bc531488eac3cfa61ae5d7fd91d3e1077bca0cc6b37fb32f8
  */
 #include "dzhanibekov.h"
 
@@ -635,6 +636,63 @@ static void dzhanibekov_choose_gauge(const dzhanibekov_params *params, const dou
         const double multiple = out[1 + 2 * c] / out[2 + 2 * c];
         gauge[c] = isfinite(multiple) ? multiple : 0.0;
     }
+}
+
+/* ---- Between steps ---- */
+/* how far the state may be moved, in its own size, for guesses to move with it */
+#define dzhanibekov_NEAR_BY 0.125
+
+/* Guesses move with the state, by as many past values as extrapolation needs; recurrences are of the motion
+   as it was. From far away all begins anew, with the next step. */
+static void dzhanibekov_move_guesses(dzhanibekov_solver *s, const double to[dzhanibekov_DIM])
+{
+    double distance = 0.0, size = 0.0;
+    for (int i = 0; i < dzhanibekov_DIM; ++i) {
+        distance += fabs(to[i] - s->x[i]);
+        size += fabs(s->x[i]);
+    }
+    if (!(distance <= dzhanibekov_NEAR_BY * size)) {
+        s->h = (double)NAN;
+        return;
+    }
+    dzhanibekov_history *history = &s->history;
+    for (int i = 0; i < dzhanibekov_DIM; ++i) history->difference[0][i] += to[i] - s->x[i];
+}
+
+/* Stand at x + carry from now on. */
+static dzhanibekov_status dzhanibekov_place(dzhanibekov_solver *s, const double x[dzhanibekov_DIM],
+    const double carry[dzhanibekov_DIM])
+{
+    for (int i = 0; i < dzhanibekov_DIM; ++i)
+        if (!isfinite(x[i])) return dzhanibekov_BAD_ARGUMENT;
+    dzhanibekov_move_guesses(s, x);
+    memcpy(s->x, x, sizeof s->x);
+    memcpy(s->carry, carry, sizeof s->carry);
+    double element[dzhanibekov_ELEMENT];
+    dzhanibekov_attitude(s, element);
+    dzhanibekov_begin_attitude(s, element);
+    return dzhanibekov_OK;
+}
+
+dzhanibekov_status dzhanibekov_set_state(dzhanibekov_solver *s, const double x[dzhanibekov_DIM])
+{
+    double to[dzhanibekov_DIM], carry[dzhanibekov_DIM] = { 0.0 };
+    if (s == NULL || x == NULL) return dzhanibekov_BAD_ARGUMENT;
+    memcpy(to, x, sizeof to); /* which may be a part of *s */
+    return dzhanibekov_place(s, to, carry);
+}
+
+dzhanibekov_status dzhanibekov_kick(dzhanibekov_solver *s, const double change[dzhanibekov_DIM])
+{
+    double to[dzhanibekov_DIM], carry[dzhanibekov_DIM];
+    if (s == NULL || change == NULL) return dzhanibekov_BAD_ARGUMENT;
+    for (int i = 0; i < dzhanibekov_DIM; ++i) {
+        const double sum = s->x[i] + change[i], added = sum - s->x[i];
+        const double lost = ((s->x[i] - (sum - added)) + (change[i] - added)) + s->carry[i];
+        to[i] = sum + lost;
+        carry[i] = lost - (to[i] - sum);
+    }
+    return dzhanibekov_place(s, to, carry);
 }
 
 /* ---- The solver ---- */

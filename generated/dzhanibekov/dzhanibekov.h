@@ -2,7 +2,7 @@
  * dzhanibekov.h: the declarations; dzhanibekov.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 8d4063e939c5694c6277ff43d92ec8d155a4dd8d94feebbe31c2f6705ff0518d
+ * body-sha256: f0142ed0fc4ff415be42624f902784071212def1fc036410a22636cb261de9c7
  */
 #ifndef DZHANIBEKOV_H
 #define DZHANIBEKOV_H
@@ -50,7 +50,7 @@ typedef struct {
 
 /* The solver is a plain value: copy it to branch, keep one per thread. Set it up with dzhanibekov_init. */
 typedef struct {
-    double x[dzhanibekov_DIM];     /* the state; read it freely, change it only through dzhanibekov_init */
+    double x[dzhanibekov_DIM];     /* the state; read it freely, change it only through functions */
     double carry[dzhanibekov_DIM]; /* what rounding took from x: the state proper is x + carry */
     size_t steps;                  /* good steps since dzhanibekov_init */
     size_t evaluations;            /* of the generating function, for statistics */
@@ -92,6 +92,11 @@ dzhanibekov_status dzhanibekov_step(dzhanibekov_solver *s, double h);
 
 /* Many steps. On failure s->x is the last good state and s->steps counts the good steps. */
 dzhanibekov_status dzhanibekov_integrate(dzhanibekov_solver *s, double h, size_t steps);
+
+/* Between steps: stand at x, or move by change, all else being as it was, also on dzhanibekov_BAD_ARGUMENT.
+   Either may leave the leaf. */
+dzhanibekov_status dzhanibekov_set_state(dzhanibekov_solver *s, const double x[dzhanibekov_DIM]);
+dzhanibekov_status dzhanibekov_kick(dzhanibekov_solver *s, const double change[dzhanibekov_DIM]);
 
 /* Many members, in place: x[i * members + m] is coordinate i of member m. One that fails keeps its last good
    state. status (or NULL) receives the status of each; the first that is not OK is returned. */

@@ -18,9 +18,10 @@
  *   2. Compensated sums, linear equations
  *   3. Starting guesses
  *   4. The implicit step, by Newton's method
- *   5. The solver
- *   6. Ensembles
- * body-sha256: 0687c01179391f30a5327f3c1241ae7ed2ac7a0d5c99e7ab459bc501494293e9
+ *   5. Between steps
+ *   6. The solver
+ *   7. Ensembles
+ * body-sha256: e9ab0d917b1a52cd3bf2b43f7d0c4ca55b7fefe212b20313e13cc3c9212a5d0b
  */
 #include "engel_geodesics.h"
 
@@ -311,6 +312,62 @@ static engel_geodesics_status engel_geodesics_attempt(engel_geodesics_solver *s)
         return engel_geodesics_OK;
     }
     return engel_geodesics_NO_CONVERGENCE;
+}
+
+/* ---- Between steps ---- */
+/* how far the state may be moved, in its own size, for guesses to move with it */
+#define engel_geodesics_NEAR_BY 0.125
+
+/* Guesses move with the state, by as many past values as extrapolation needs; recurrences are of the motion
+   as it was. From far away all begins anew, with the next step. */
+static void engel_geodesics_move_guesses(engel_geodesics_solver *s, const double to[engel_geodesics_DIM])
+{
+    double distance = 0.0, size = 0.0;
+    for (int i = 0; i < engel_geodesics_DIM; ++i) {
+        distance += fabs(to[i] - s->x[i]);
+        size += fabs(s->x[i]);
+    }
+    if (!(distance <= engel_geodesics_NEAR_BY * size)) {
+        s->h = (double)NAN;
+        return;
+    }
+    engel_geodesics_history *history = &s->history;
+    for (int i = 0; i < engel_geodesics_DIM; ++i) history->difference[0][i] += to[i] - s->x[i];
+}
+
+/* Stand at x + carry from now on. */
+static engel_geodesics_status engel_geodesics_place(engel_geodesics_solver *s,
+    const double x[engel_geodesics_DIM], const double carry[engel_geodesics_DIM])
+{
+    for (int i = 0; i < engel_geodesics_DIM; ++i)
+        if (!isfinite(x[i])) return engel_geodesics_BAD_ARGUMENT;
+    engel_geodesics_move_guesses(s, x);
+    memcpy(s->x, x, sizeof s->x);
+    memcpy(s->carry, carry, sizeof s->carry);
+    return engel_geodesics_OK;
+}
+
+engel_geodesics_status engel_geodesics_set_state(engel_geodesics_solver *s,
+    const double x[engel_geodesics_DIM])
+{
+    double to[engel_geodesics_DIM], carry[engel_geodesics_DIM] = { 0.0 };
+    if (s == NULL || x == NULL) return engel_geodesics_BAD_ARGUMENT;
+    memcpy(to, x, sizeof to); /* which may be a part of *s */
+    return engel_geodesics_place(s, to, carry);
+}
+
+engel_geodesics_status engel_geodesics_kick(engel_geodesics_solver *s,
+    const double change[engel_geodesics_DIM])
+{
+    double to[engel_geodesics_DIM], carry[engel_geodesics_DIM];
+    if (s == NULL || change == NULL) return engel_geodesics_BAD_ARGUMENT;
+    for (int i = 0; i < engel_geodesics_DIM; ++i) {
+        const double sum = s->x[i] + change[i], added = sum - s->x[i];
+        const double lost = ((s->x[i] - (sum - added)) + (change[i] - added)) + s->carry[i];
+        to[i] = sum + lost;
+        carry[i] = lost - (to[i] - sum);
+    }
+    return engel_geodesics_place(s, to, carry);
 }
 
 /* ---- The solver ---- */

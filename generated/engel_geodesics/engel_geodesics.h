@@ -2,7 +2,7 @@
  * engel_geodesics.h: the declarations; engel_geodesics.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: cf97fc8605381ba8b162b318d96e2e7f109a0b9c3f0b6ef077175d8c4db90ce1
+ * body-sha256: 738843d95e45387209ec16ff9468029c89c9e69b07d8f51017718cad1410ad44
  */
 #ifndef ENGEL_GEODESICS_H
 #define ENGEL_GEODESICS_H
@@ -45,8 +45,7 @@ typedef struct {
 /* The solver is a plain value: copy it to branch, keep one per thread. Set it up with
    engel_geodesics_init. */
 typedef struct {
-    /* the state; read it freely, change it only through engel_geodesics_init */
-    double x[engel_geodesics_DIM];
+    double x[engel_geodesics_DIM];     /* the state; read it freely, change it only through functions */
     double carry[engel_geodesics_DIM]; /* what rounding took from x: the state proper is x + carry */
     size_t steps;                      /* good steps since engel_geodesics_init */
     size_t evaluations;                /* of the generating function, for statistics */
@@ -70,6 +69,13 @@ engel_geodesics_status engel_geodesics_step(engel_geodesics_solver *s, double h)
 
 /* Many steps. On failure s->x is the last good state and s->steps counts the good steps. */
 engel_geodesics_status engel_geodesics_integrate(engel_geodesics_solver *s, double h, size_t steps);
+
+/* Between steps: stand at x, or move by change, all else being as it was, also on
+   engel_geodesics_BAD_ARGUMENT. Either may leave the leaf. */
+engel_geodesics_status engel_geodesics_set_state(engel_geodesics_solver *s,
+    const double x[engel_geodesics_DIM]);
+engel_geodesics_status engel_geodesics_kick(engel_geodesics_solver *s,
+    const double change[engel_geodesics_DIM]);
 
 /* Many members, in place: x[i * members + m] is coordinate i of member m. One that fails keeps its last good
    state. status (or NULL) receives the status of each; the first that is not OK is returned. */

@@ -18,9 +18,10 @@
  *   2. Compensated sums, linear equations
  *   3. Starting guesses
  *   4. The implicit step, by Newton's method
- *   5. The solver
- *   6. Ensembles
- * body-sha256: b0b3a28fc6a25b882ea2575d78926149c80e30559231b77db4720baae98985fa
+ *   5. Between steps
+ *   6. The solver
+ *   7. Ensembles
+ * body-sha256: b3242db8ffc0a6c2f93898bea4a97cd1788c8e18dca402d67042af093f597eb1
  */
 #include "gaussian_moments.h"
 
@@ -382,6 +383,62 @@ static gaussian_moments_status gaussian_moments_attempt(gaussian_moments_solver 
         return gaussian_moments_OK;
     }
     return gaussian_moments_NO_CONVERGENCE;
+}
+
+/* ---- Between steps ---- */
+/* how far the state may be moved, in its own size, for guesses to move with it */
+#define gaussian_moments_NEAR_BY 0.125
+
+/* Guesses move with the state, by as many past values as extrapolation needs; recurrences are of the motion
+   as it was. From far away all begins anew, with the next step. */
+static void gaussian_moments_move_guesses(gaussian_moments_solver *s, const double to[gaussian_moments_DIM])
+{
+    double distance = 0.0, size = 0.0;
+    for (int i = 0; i < gaussian_moments_DIM; ++i) {
+        distance += fabs(to[i] - s->x[i]);
+        size += fabs(s->x[i]);
+    }
+    if (!(distance <= gaussian_moments_NEAR_BY * size)) {
+        s->h = (double)NAN;
+        return;
+    }
+    gaussian_moments_history *history = &s->history;
+    for (int i = 0; i < gaussian_moments_DIM; ++i) history->difference[0][i] += to[i] - s->x[i];
+}
+
+/* Stand at x + carry from now on. */
+static gaussian_moments_status gaussian_moments_place(gaussian_moments_solver *s,
+    const double x[gaussian_moments_DIM], const double carry[gaussian_moments_DIM])
+{
+    for (int i = 0; i < gaussian_moments_DIM; ++i)
+        if (!isfinite(x[i])) return gaussian_moments_BAD_ARGUMENT;
+    gaussian_moments_move_guesses(s, x);
+    memcpy(s->x, x, sizeof s->x);
+    memcpy(s->carry, carry, sizeof s->carry);
+    return gaussian_moments_OK;
+}
+
+gaussian_moments_status gaussian_moments_set_state(gaussian_moments_solver *s,
+    const double x[gaussian_moments_DIM])
+{
+    double to[gaussian_moments_DIM], carry[gaussian_moments_DIM] = { 0.0 };
+    if (s == NULL || x == NULL) return gaussian_moments_BAD_ARGUMENT;
+    memcpy(to, x, sizeof to); /* which may be a part of *s */
+    return gaussian_moments_place(s, to, carry);
+}
+
+gaussian_moments_status gaussian_moments_kick(gaussian_moments_solver *s,
+    const double change[gaussian_moments_DIM])
+{
+    double to[gaussian_moments_DIM], carry[gaussian_moments_DIM];
+    if (s == NULL || change == NULL) return gaussian_moments_BAD_ARGUMENT;
+    for (int i = 0; i < gaussian_moments_DIM; ++i) {
+        const double sum = s->x[i] + change[i], added = sum - s->x[i];
+        const double lost = ((s->x[i] - (sum - added)) + (change[i] - added)) + s->carry[i];
+        to[i] = sum + lost;
+        carry[i] = lost - (to[i] - sum);
+    }
+    return gaussian_moments_place(s, to, carry);
 }
 
 /* ---- The solver ---- */

@@ -2,7 +2,7 @@
  * gaussian_moments.h: the declarations; gaussian_moments.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 90a756105494ddd948aa690694e09f83dc42b501a8da2ebd26639a7232da6ad0
+ * body-sha256: 4602443b221e00327d54dbde17d334bffd637a593f5176b4e59f24b6f0bb3542
  */
 #ifndef GAUSSIAN_MOMENTS_H
 #define GAUSSIAN_MOMENTS_H
@@ -46,8 +46,7 @@ typedef struct {
 /* The solver is a plain value: copy it to branch, keep one per thread. Set it up with
    gaussian_moments_init. */
 typedef struct {
-    /* the state; read it freely, change it only through gaussian_moments_init */
-    double x[gaussian_moments_DIM];
+    double x[gaussian_moments_DIM];     /* the state; read it freely, change it only through functions */
     double carry[gaussian_moments_DIM]; /* what rounding took from x: the state proper is x + carry */
     size_t steps;                       /* good steps since gaussian_moments_init */
     size_t evaluations;                 /* of the generating function, for statistics */
@@ -71,6 +70,13 @@ gaussian_moments_status gaussian_moments_step(gaussian_moments_solver *s, double
 
 /* Many steps. On failure s->x is the last good state and s->steps counts the good steps. */
 gaussian_moments_status gaussian_moments_integrate(gaussian_moments_solver *s, double h, size_t steps);
+
+/* Between steps: stand at x, or move by change, all else being as it was, also on
+   gaussian_moments_BAD_ARGUMENT. Either may leave the leaf. */
+gaussian_moments_status gaussian_moments_set_state(gaussian_moments_solver *s,
+    const double x[gaussian_moments_DIM]);
+gaussian_moments_status gaussian_moments_kick(gaussian_moments_solver *s,
+    const double change[gaussian_moments_DIM]);
 
 /* Many members, in place: x[i * members + m] is coordinate i of member m. One that fails keeps its last good
    state. status (or NULL) receives the status of each; the first that is not OK is returned. */

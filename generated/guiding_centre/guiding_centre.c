@@ -19,9 +19,10 @@
  *   2. Compensated sums, linear equations
  *   3. Starting guesses
  *   4. The implicit step, along paths dm/dt = pi(m) p
- *   5. The solver
- *   6. Ensembles
- * body-sha256: bef4b80dfa1d683aded215188423336a99efe6f66c825cc091ef6c1166cd3f8f
+ *   5. Between steps
+ *   6. The solver
+ *   7. Ensembles
+ * body-sha256: 4aa0e8dd598c27cfa13d05cd8368c9d34487556b578fe8651ed86b91b1f94828
  */
 #include "guiding_centre.h"
 
@@ -617,6 +618,62 @@ static guiding_centre_status guiding_centre_attempt(guiding_centre_solver *s, in
         previous = size;
     }
     return guiding_centre_NO_CONVERGENCE;
+}
+
+/* ---- Between steps ---- */
+/* how far the state may be moved, in its own size, for guesses to move with it */
+#define guiding_centre_NEAR_BY 0.125
+
+/* Guesses move with the state, by as many past values as extrapolation needs; recurrences are of the motion
+   as it was. From far away all begins anew, with the next step. */
+static void guiding_centre_move_guesses(guiding_centre_solver *s, const double to[guiding_centre_DIM])
+{
+    double distance = 0.0, size = 0.0;
+    for (int i = 0; i < guiding_centre_DIM; ++i) {
+        distance += fabs(to[i] - s->x[i]);
+        size += fabs(s->x[i]);
+    }
+    if (!(distance <= guiding_centre_NEAR_BY * size)) {
+        s->h = (double)NAN;
+        return;
+    }
+    for (int stage = 0; stage < guiding_centre_STAGES; ++stage) {
+        guiding_centre_history *history = &s->history[stage];
+        for (int i = 0; i < guiding_centre_DIM; ++i) history->difference[0][i] += to[i] - s->x[i];
+    }
+}
+
+/* Stand at x + carry from now on. */
+static guiding_centre_status guiding_centre_place(guiding_centre_solver *s,
+    const double x[guiding_centre_DIM], const double carry[guiding_centre_DIM])
+{
+    for (int i = 0; i < guiding_centre_DIM; ++i)
+        if (!isfinite(x[i])) return guiding_centre_BAD_ARGUMENT;
+    guiding_centre_move_guesses(s, x);
+    memcpy(s->x, x, sizeof s->x);
+    memcpy(s->carry, carry, sizeof s->carry);
+    return guiding_centre_OK;
+}
+
+guiding_centre_status guiding_centre_set_state(guiding_centre_solver *s, const double x[guiding_centre_DIM])
+{
+    double to[guiding_centre_DIM], carry[guiding_centre_DIM] = { 0.0 };
+    if (s == NULL || x == NULL) return guiding_centre_BAD_ARGUMENT;
+    memcpy(to, x, sizeof to); /* which may be a part of *s */
+    return guiding_centre_place(s, to, carry);
+}
+
+guiding_centre_status guiding_centre_kick(guiding_centre_solver *s, const double change[guiding_centre_DIM])
+{
+    double to[guiding_centre_DIM], carry[guiding_centre_DIM];
+    if (s == NULL || change == NULL) return guiding_centre_BAD_ARGUMENT;
+    for (int i = 0; i < guiding_centre_DIM; ++i) {
+        const double sum = s->x[i] + change[i], added = sum - s->x[i];
+        const double lost = ((s->x[i] - (sum - added)) + (change[i] - added)) + s->carry[i];
+        to[i] = sum + lost;
+        carry[i] = lost - (to[i] - sum);
+    }
+    return guiding_centre_place(s, to, carry);
 }
 
 /* ---- The solver ---- */

@@ -2,7 +2,7 @@
  * guiding_centre.h: the declarations; guiding_centre.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: bb9284f126e74ab791a4116f07d436e5ae512ec58e88b26c8f42809018dc12e1
+ * body-sha256: adb5d65a2985f6e5e203c787615122d800a43ca2353c98868ccc0e1ae1c716d9
  */
 #ifndef GUIDING_CENTRE_H
 #define GUIDING_CENTRE_H
@@ -47,8 +47,7 @@ typedef struct {
 
 /* The solver is a plain value: copy it to branch, keep one per thread. Set it up with guiding_centre_init. */
 typedef struct {
-    /* the state; read it freely, change it only through guiding_centre_init */
-    double x[guiding_centre_DIM];
+    double x[guiding_centre_DIM];     /* the state; read it freely, change it only through functions */
     double carry[guiding_centre_DIM]; /* what rounding took from x: the state proper is x + carry */
     size_t steps;                     /* good steps since guiding_centre_init */
     size_t evaluations;               /* of the generating function, for statistics */
@@ -73,6 +72,11 @@ guiding_centre_status guiding_centre_step(guiding_centre_solver *s, double h);
 
 /* Many steps. On failure s->x is the last good state and s->steps counts the good steps. */
 guiding_centre_status guiding_centre_integrate(guiding_centre_solver *s, double h, size_t steps);
+
+/* Between steps: stand at x, or move by change, all else being as it was, also on
+   guiding_centre_BAD_ARGUMENT. Either may leave the leaf. */
+guiding_centre_status guiding_centre_set_state(guiding_centre_solver *s, const double x[guiding_centre_DIM]);
+guiding_centre_status guiding_centre_kick(guiding_centre_solver *s, const double change[guiding_centre_DIM]);
 
 /* Many members, in place: x[i * members + m] is coordinate i of member m. One that fails keeps its last good
    state. status (or NULL) receives the status of each; the first that is not OK is returned. */

@@ -18,9 +18,10 @@
  *   2. Compensated sums, linear equations
  *   3. Starting guesses
  *   4. The implicit step, by Newton's method
- *   5. The solver
- *   6. Ensembles
- * body-sha256: 14f3f7e6a74d03d9356011aded5179be12cccf4d5639877d37fe46fc5fdb22c0
+ *   5. Between steps
+ *   6. The solver
+ *   7. Ensembles
+ * body-sha256: c3533daaaf9c0cbad4f97708fa35072efd6307e4233627169f02359a68a9349d
  */
 #include "harmonic_oscillator.h"
 
@@ -285,6 +286,63 @@ static harmonic_oscillator_status harmonic_oscillator_attempt(harmonic_oscillato
         return harmonic_oscillator_OK;
     }
     return harmonic_oscillator_NO_CONVERGENCE;
+}
+
+/* ---- Between steps ---- */
+/* how far the state may be moved, in its own size, for guesses to move with it */
+#define harmonic_oscillator_NEAR_BY 0.125
+
+/* Guesses move with the state, by as many past values as extrapolation needs; recurrences are of the motion
+   as it was. From far away all begins anew, with the next step. */
+static void harmonic_oscillator_move_guesses(harmonic_oscillator_solver *s,
+    const double to[harmonic_oscillator_DIM])
+{
+    double distance = 0.0, size = 0.0;
+    for (int i = 0; i < harmonic_oscillator_DIM; ++i) {
+        distance += fabs(to[i] - s->x[i]);
+        size += fabs(s->x[i]);
+    }
+    if (!(distance <= harmonic_oscillator_NEAR_BY * size)) {
+        s->h = (double)NAN;
+        return;
+    }
+    harmonic_oscillator_history *history = &s->history;
+    for (int i = 0; i < harmonic_oscillator_DIM; ++i) history->difference[0][i] += to[i] - s->x[i];
+}
+
+/* Stand at x + carry from now on. */
+static harmonic_oscillator_status harmonic_oscillator_place(harmonic_oscillator_solver *s,
+    const double x[harmonic_oscillator_DIM], const double carry[harmonic_oscillator_DIM])
+{
+    for (int i = 0; i < harmonic_oscillator_DIM; ++i)
+        if (!isfinite(x[i])) return harmonic_oscillator_BAD_ARGUMENT;
+    harmonic_oscillator_move_guesses(s, x);
+    memcpy(s->x, x, sizeof s->x);
+    memcpy(s->carry, carry, sizeof s->carry);
+    return harmonic_oscillator_OK;
+}
+
+harmonic_oscillator_status harmonic_oscillator_set_state(harmonic_oscillator_solver *s,
+    const double x[harmonic_oscillator_DIM])
+{
+    double to[harmonic_oscillator_DIM], carry[harmonic_oscillator_DIM] = { 0.0 };
+    if (s == NULL || x == NULL) return harmonic_oscillator_BAD_ARGUMENT;
+    memcpy(to, x, sizeof to); /* which may be a part of *s */
+    return harmonic_oscillator_place(s, to, carry);
+}
+
+harmonic_oscillator_status harmonic_oscillator_kick(harmonic_oscillator_solver *s,
+    const double change[harmonic_oscillator_DIM])
+{
+    double to[harmonic_oscillator_DIM], carry[harmonic_oscillator_DIM];
+    if (s == NULL || change == NULL) return harmonic_oscillator_BAD_ARGUMENT;
+    for (int i = 0; i < harmonic_oscillator_DIM; ++i) {
+        const double sum = s->x[i] + change[i], added = sum - s->x[i];
+        const double lost = ((s->x[i] - (sum - added)) + (change[i] - added)) + s->carry[i];
+        to[i] = sum + lost;
+        carry[i] = lost - (to[i] - sum);
+    }
+    return harmonic_oscillator_place(s, to, carry);
 }
 
 /* ---- The solver ---- */

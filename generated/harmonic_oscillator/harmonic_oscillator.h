@@ -2,7 +2,7 @@
  * harmonic_oscillator.h: the declarations; harmonic_oscillator.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 58be86996182bc34ee0d3cd19e67cce889c51b655dc9fa4d7eee309e84b1dc50
+ * body-sha256: 9e8e59b392d3cd833b6c37cd07812e4f5fdf8332d5b64544fa6549cebd97af41
  */
 #ifndef HARMONIC_OSCILLATOR_H
 #define HARMONIC_OSCILLATOR_H
@@ -46,8 +46,7 @@ typedef struct {
 /* The solver is a plain value: copy it to branch, keep one per thread. Set it up with
    harmonic_oscillator_init. */
 typedef struct {
-    /* the state; read it freely, change it only through harmonic_oscillator_init */
-    double x[harmonic_oscillator_DIM];
+    double x[harmonic_oscillator_DIM];     /* the state; read it freely, change it only through functions */
     double carry[harmonic_oscillator_DIM]; /* what rounding took from x: the state proper is x + carry */
     size_t steps;                          /* good steps since harmonic_oscillator_init */
     size_t evaluations;                    /* of the generating function, for statistics */
@@ -72,6 +71,13 @@ harmonic_oscillator_status harmonic_oscillator_step(harmonic_oscillator_solver *
 /* Many steps. On failure s->x is the last good state and s->steps counts the good steps. */
 harmonic_oscillator_status harmonic_oscillator_integrate(harmonic_oscillator_solver *s, double h,
     size_t steps);
+
+/* Between steps: stand at x, or move by change, all else being as it was, also on
+   harmonic_oscillator_BAD_ARGUMENT. Either may leave the leaf. */
+harmonic_oscillator_status harmonic_oscillator_set_state(harmonic_oscillator_solver *s,
+    const double x[harmonic_oscillator_DIM]);
+harmonic_oscillator_status harmonic_oscillator_kick(harmonic_oscillator_solver *s,
+    const double change[harmonic_oscillator_DIM]);
 
 /* Many members, in place: x[i * members + m] is coordinate i of member m. One that fails keeps its last good
    state. status (or NULL) receives the status of each; the first that is not OK is returned. */

@@ -18,9 +18,10 @@
  *   2. Compensated sums, linear equations
  *   3. Starting guesses
  *   4. The implicit step, by Newton's method
- *   5. The solver
- *   6. Ensembles
- * body-sha256: 4c62d720c8cd234ce81471edc25edaf7cef2049b2da0b5d3e4e4f1cd743032d8
+ *   5. Between steps
+ *   6. The solver
+ *   7. Ensembles
+ * body-sha256: 512900b523e70912e62981e1dabdca9d5b4d9869c2998864373d3547e6753c0d
  */
 #include "henon_heiles.h"
 
@@ -334,6 +335,60 @@ static henon_heiles_status henon_heiles_attempt(henon_heiles_solver *s)
         return henon_heiles_OK;
     }
     return henon_heiles_NO_CONVERGENCE;
+}
+
+/* ---- Between steps ---- */
+/* how far the state may be moved, in its own size, for guesses to move with it */
+#define henon_heiles_NEAR_BY 0.125
+
+/* Guesses move with the state, by as many past values as extrapolation needs; recurrences are of the motion
+   as it was. From far away all begins anew, with the next step. */
+static void henon_heiles_move_guesses(henon_heiles_solver *s, const double to[henon_heiles_DIM])
+{
+    double distance = 0.0, size = 0.0;
+    for (int i = 0; i < henon_heiles_DIM; ++i) {
+        distance += fabs(to[i] - s->x[i]);
+        size += fabs(s->x[i]);
+    }
+    if (!(distance <= henon_heiles_NEAR_BY * size)) {
+        s->h = (double)NAN;
+        return;
+    }
+    henon_heiles_history *history = &s->history;
+    for (int i = 0; i < henon_heiles_DIM; ++i) history->difference[0][i] += to[i] - s->x[i];
+}
+
+/* Stand at x + carry from now on. */
+static henon_heiles_status henon_heiles_place(henon_heiles_solver *s, const double x[henon_heiles_DIM],
+    const double carry[henon_heiles_DIM])
+{
+    for (int i = 0; i < henon_heiles_DIM; ++i)
+        if (!isfinite(x[i])) return henon_heiles_BAD_ARGUMENT;
+    henon_heiles_move_guesses(s, x);
+    memcpy(s->x, x, sizeof s->x);
+    memcpy(s->carry, carry, sizeof s->carry);
+    return henon_heiles_OK;
+}
+
+henon_heiles_status henon_heiles_set_state(henon_heiles_solver *s, const double x[henon_heiles_DIM])
+{
+    double to[henon_heiles_DIM], carry[henon_heiles_DIM] = { 0.0 };
+    if (s == NULL || x == NULL) return henon_heiles_BAD_ARGUMENT;
+    memcpy(to, x, sizeof to); /* which may be a part of *s */
+    return henon_heiles_place(s, to, carry);
+}
+
+henon_heiles_status henon_heiles_kick(henon_heiles_solver *s, const double change[henon_heiles_DIM])
+{
+    double to[henon_heiles_DIM], carry[henon_heiles_DIM];
+    if (s == NULL || change == NULL) return henon_heiles_BAD_ARGUMENT;
+    for (int i = 0; i < henon_heiles_DIM; ++i) {
+        const double sum = s->x[i] + change[i], added = sum - s->x[i];
+        const double lost = ((s->x[i] - (sum - added)) + (change[i] - added)) + s->carry[i];
+        to[i] = sum + lost;
+        carry[i] = lost - (to[i] - sum);
+    }
+    return henon_heiles_place(s, to, carry);
 }
 
 /* ---- The solver ---- */

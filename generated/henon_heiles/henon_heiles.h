@@ -2,7 +2,7 @@
  * henon_heiles.h: the declarations; henon_heiles.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: b154a91340581cb6210612157091d914d728527ee7ad9a3eff691f007bec5578
+ * body-sha256: 40bb496cbb3bd7025e49bc5107cd431d955ccfa45fef8b2d9072f8791b95f5ec
  */
 #ifndef HENON_HEILES_H
 #define HENON_HEILES_H
@@ -44,7 +44,7 @@ typedef struct {
 
 /* The solver is a plain value: copy it to branch, keep one per thread. Set it up with henon_heiles_init. */
 typedef struct {
-    double x[henon_heiles_DIM];     /* the state; read it freely, change it only through henon_heiles_init */
+    double x[henon_heiles_DIM];     /* the state; read it freely, change it only through functions */
     double carry[henon_heiles_DIM]; /* what rounding took from x: the state proper is x + carry */
     size_t steps;                   /* good steps since henon_heiles_init */
     size_t evaluations;             /* of the generating function, for statistics */
@@ -68,6 +68,11 @@ henon_heiles_status henon_heiles_step(henon_heiles_solver *s, double h);
 
 /* Many steps. On failure s->x is the last good state and s->steps counts the good steps. */
 henon_heiles_status henon_heiles_integrate(henon_heiles_solver *s, double h, size_t steps);
+
+/* Between steps: stand at x, or move by change, all else being as it was, also on henon_heiles_BAD_ARGUMENT.
+   Either may leave the leaf. */
+henon_heiles_status henon_heiles_set_state(henon_heiles_solver *s, const double x[henon_heiles_DIM]);
+henon_heiles_status henon_heiles_kick(henon_heiles_solver *s, const double change[henon_heiles_DIM]);
 
 /* Many members, in place: x[i * members + m] is coordinate i of member m. One that fails keeps its last good
    state. status (or NULL) receives the status of each; the first that is not OK is returned. */

@@ -18,9 +18,10 @@
  *   2. Compensated sums, linear equations
  *   3. Starting guesses
  *   4. The implicit step, by Newton's method
- *   5. The solver
- *   6. Ensembles
- * body-sha256: 1d73101648db0eabfd78a362d144578cd3e02df88e6577dfd382aaee5af004e5
+ *   5. Between steps
+ *   6. The solver
+ *   7. Ensembles
+ * body-sha256: 261c575f1104625bd0f9339dabd8ce3b9fab2303cee37ed44bafcb8ded1dcc51
  */
 #include "kepler.h"
 
@@ -622,6 +623,60 @@ static kepler_status kepler_attempt(kepler_solver *s)
         return kepler_OK;
     }
     return kepler_NO_CONVERGENCE;
+}
+
+/* ---- Between steps ---- */
+/* how far the state may be moved, in its own size, for guesses to move with it */
+#define kepler_NEAR_BY 0.125
+
+/* Guesses move with the state, by as many past values as extrapolation needs; recurrences are of the motion
+   as it was. From far away all begins anew, with the next step. */
+static void kepler_move_guesses(kepler_solver *s, const double to[kepler_DIM])
+{
+    double distance = 0.0, size = 0.0;
+    for (int i = 0; i < kepler_DIM; ++i) {
+        distance += fabs(to[i] - s->x[i]);
+        size += fabs(s->x[i]);
+    }
+    if (!(distance <= kepler_NEAR_BY * size)) {
+        s->h = (double)NAN;
+        return;
+    }
+    kepler_history *history = &s->history;
+    for (int i = 0; i < kepler_DIM; ++i) history->difference[0][i] += to[i] - s->x[i];
+}
+
+/* Stand at x + carry from now on. */
+static kepler_status kepler_place(kepler_solver *s, const double x[kepler_DIM],
+    const double carry[kepler_DIM])
+{
+    for (int i = 0; i < kepler_DIM; ++i)
+        if (!isfinite(x[i])) return kepler_BAD_ARGUMENT;
+    kepler_move_guesses(s, x);
+    memcpy(s->x, x, sizeof s->x);
+    memcpy(s->carry, carry, sizeof s->carry);
+    return kepler_OK;
+}
+
+kepler_status kepler_set_state(kepler_solver *s, const double x[kepler_DIM])
+{
+    double to[kepler_DIM], carry[kepler_DIM] = { 0.0 };
+    if (s == NULL || x == NULL) return kepler_BAD_ARGUMENT;
+    memcpy(to, x, sizeof to); /* which may be a part of *s */
+    return kepler_place(s, to, carry);
+}
+
+kepler_status kepler_kick(kepler_solver *s, const double change[kepler_DIM])
+{
+    double to[kepler_DIM], carry[kepler_DIM];
+    if (s == NULL || change == NULL) return kepler_BAD_ARGUMENT;
+    for (int i = 0; i < kepler_DIM; ++i) {
+        const double sum = s->x[i] + change[i], added = sum - s->x[i];
+        const double lost = ((s->x[i] - (sum - added)) + (change[i] - added)) + s->carry[i];
+        to[i] = sum + lost;
+        carry[i] = lost - (to[i] - sum);
+    }
+    return kepler_place(s, to, carry);
 }
 
 /* ---- The solver ---- */

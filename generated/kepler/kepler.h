@@ -2,7 +2,7 @@
  * kepler.h: the declarations; kepler.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 870052cba4f17c65630566b55b782ac60bceff35f4dcd8d8101fe02a1c44d195
+ * body-sha256: cb6616977c716f995d0299e71b913adcb19dc996002b88333b09cb8a65334a92
  */
 #ifndef KEPLER_H
 #define KEPLER_H
@@ -43,7 +43,7 @@ typedef struct {
 
 /* The solver is a plain value: copy it to branch, keep one per thread. Set it up with kepler_init. */
 typedef struct {
-    double x[kepler_DIM];     /* the state; read it freely, change it only through kepler_init */
+    double x[kepler_DIM];     /* the state; read it freely, change it only through functions */
     double carry[kepler_DIM]; /* what rounding took from x: the state proper is x + carry */
     size_t steps;             /* good steps since kepler_init */
     size_t evaluations;       /* of the generating function, for statistics */
@@ -66,6 +66,11 @@ kepler_status kepler_step(kepler_solver *s, double h);
 
 /* Many steps. On failure s->x is the last good state and s->steps counts the good steps. */
 kepler_status kepler_integrate(kepler_solver *s, double h, size_t steps);
+
+/* Between steps: stand at x, or move by change, all else being as it was, also on kepler_BAD_ARGUMENT. Either
+   may leave the leaf. */
+kepler_status kepler_set_state(kepler_solver *s, const double x[kepler_DIM]);
+kepler_status kepler_kick(kepler_solver *s, const double change[kepler_DIM]);
 
 /* Many members, in place: x[i * members + m] is coordinate i of member m. One that fails keeps its last good
    state. status (or NULL) receives the status of each; the first that is not OK is returned. */

@@ -20,9 +20,10 @@
  *   2. Compensated sums, linear equations
  *   3. The explicit step
  *   4. What a monitored trajectory holds fixed: e = -H(x0), so that K = monitor (H + e) is 0 along it
- *   5. The solver
- *   6. Ensembles
- * body-sha256: ac46cb9d819afe2aafce828c1d88743f217d2267297beebfdd47317493ddbb32
+ *   5. Between steps
+ *   6. The solver
+ *   7. Ensembles
+ * body-sha256: 22eb3e94f3b4c12a8a8b3d7215878a891f15e62384dbaa78457aa1d6031716c0
  */
 #include "kepler_eccentric.h"
 
@@ -227,6 +228,48 @@ static void kepler_eccentric_choose_gauge(const kepler_eccentric_params *params,
     const double x[kepler_eccentric_DIM], double gauge[kepler_eccentric_GAUGES])
 {
     gauge[0] = -kepler_eccentric_hamiltonian(params, x);
+}
+
+/* ---- Between steps ---- */
+/* Stand at x + carry from now on. */
+static kepler_eccentric_status kepler_eccentric_place(kepler_eccentric_solver *s,
+    const double x[kepler_eccentric_DIM], const double carry[kepler_eccentric_DIM])
+{
+    for (int i = 0; i < kepler_eccentric_DIM; ++i)
+        if (!isfinite(x[i])) return kepler_eccentric_BAD_ARGUMENT;
+    double level[kepler_eccentric_GAUGES];
+    const double rate = kepler_eccentric_monitor(&s->params, x);
+    kepler_eccentric_choose_gauge(&s->params, x, level);
+    if (!isfinite(level[0]) || !isfinite(rate) || !(rate > 0.0)) return kepler_eccentric_BAD_ARGUMENT;
+    memcpy(s->gauge, level, sizeof level);
+    /* where s->h is NaN the next step does it again */
+        kepler_eccentric_prepare(&s->params, s->gauge, s->h, s->coef);
+    memcpy(s->x, x, sizeof s->x);
+    memcpy(s->carry, carry, sizeof s->carry);
+    return kepler_eccentric_OK;
+}
+
+kepler_eccentric_status kepler_eccentric_set_state(kepler_eccentric_solver *s,
+    const double x[kepler_eccentric_DIM])
+{
+    double to[kepler_eccentric_DIM], carry[kepler_eccentric_DIM] = { 0.0 };
+    if (s == NULL || x == NULL) return kepler_eccentric_BAD_ARGUMENT;
+    memcpy(to, x, sizeof to); /* which may be a part of *s */
+    return kepler_eccentric_place(s, to, carry);
+}
+
+kepler_eccentric_status kepler_eccentric_kick(kepler_eccentric_solver *s,
+    const double change[kepler_eccentric_DIM])
+{
+    double to[kepler_eccentric_DIM], carry[kepler_eccentric_DIM];
+    if (s == NULL || change == NULL) return kepler_eccentric_BAD_ARGUMENT;
+    for (int i = 0; i < kepler_eccentric_DIM; ++i) {
+        const double sum = s->x[i] + change[i], added = sum - s->x[i];
+        const double lost = ((s->x[i] - (sum - added)) + (change[i] - added)) + s->carry[i];
+        to[i] = sum + lost;
+        carry[i] = lost - (to[i] - sum);
+    }
+    return kepler_eccentric_place(s, to, carry);
 }
 
 /* ---- The solver ---- */

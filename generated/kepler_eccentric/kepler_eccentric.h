@@ -2,7 +2,7 @@
  * kepler_eccentric.h: the declarations; kepler_eccentric.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 8aab84320c32d6ecfeb419acc7dfca6df378109389dc47453880f49ed0c5b269
+ * body-sha256: d510d0ac5db9729ee52f04fb3dde8f9d11dfbe1467432ed73c5734415a644583
  */
 #ifndef KEPLER_ECCENTRIC_H
 #define KEPLER_ECCENTRIC_H
@@ -37,8 +37,7 @@ typedef enum {
 /* The solver is a plain value: copy it to branch, keep one per thread. Set it up with
    kepler_eccentric_init. */
 typedef struct {
-    /* the state; read it freely, change it only through kepler_eccentric_init */
-    double x[kepler_eccentric_DIM];
+    double x[kepler_eccentric_DIM];     /* the state; read it freely, change it only through functions */
     double carry[kepler_eccentric_DIM]; /* what rounding took from x: the state proper is x + carry */
     size_t steps;                       /* good steps since kepler_eccentric_init */
     size_t evaluations;                 /* of the generating function, for statistics */
@@ -68,6 +67,14 @@ kepler_eccentric_status kepler_eccentric_step(kepler_eccentric_solver *s, double
 
 /* Many steps. On failure s->x is the last good state and s->steps counts the good steps. */
 kepler_eccentric_status kepler_eccentric_integrate(kepler_eccentric_solver *s, double h, size_t steps);
+
+/* Between steps: stand at x, or move by change, all else being as it was, also on
+   kepler_eccentric_BAD_ARGUMENT. Either may leave the leaf. */
+/* But e becomes -H there, where kepler_eccentric_monitor must be positive. */
+kepler_eccentric_status kepler_eccentric_set_state(kepler_eccentric_solver *s,
+    const double x[kepler_eccentric_DIM]);
+kepler_eccentric_status kepler_eccentric_kick(kepler_eccentric_solver *s,
+    const double change[kepler_eccentric_DIM]);
 
 /* Many members, in place: x[i * members + m] is coordinate i of member m. One that fails keeps its last good
    state. status (or NULL) receives the status of each; the first that is not OK is returned. */

@@ -19,13 +19,14 @@
  *   3. Starting guesses
  *   4. Recurrences fitted to the last values
  *   5. The implicit step, by Newton's method
- *   6. Several steps or members at once
- *   7. The solver
- *   8. Newton's method in lanes
- *   9. Blocks of steps
- *   10. Groups of members
- *   11. Ensembles
- * body-sha256: 88e6cfaa4b87fb1278142227231df874ebc2e680c1e5f6f94619ce1f0ce53802
+ *   6. Between steps
+ *   7. Several steps or members at once
+ *   8. The solver
+ *   9. Newton's method in lanes
+ *   10. Blocks of steps
+ *   11. Groups of members
+ *   12. Ensembles
+ * body-sha256: 74e420fc6565ce694d62f0b63523dd2e9e26f16171ae314bae30153fe1bc9629
  */
 #include "kowalevski_top.h"
 
@@ -1391,6 +1392,65 @@ static kowalevski_top_status kowalevski_top_attempt(kowalevski_top_solver *s)
         return kowalevski_top_OK;
     }
     return kowalevski_top_NO_CONVERGENCE;
+}
+
+/* ---- Between steps ---- */
+/* how far the state may be moved, in its own size, for guesses to move with it */
+#define kowalevski_top_NEAR_BY 0.125
+
+/* Guesses move with the state, by as many past values as extrapolation needs; recurrences are of the motion
+   as it was. From far away all begins anew, with the next step. */
+static void kowalevski_top_move_guesses(kowalevski_top_solver *s, const double to[kowalevski_top_DIM])
+{
+    double distance = 0.0, size = 0.0;
+    for (int i = 0; i < kowalevski_top_DIM; ++i) {
+        distance += fabs(to[i] - s->x[i]);
+        size += fabs(s->x[i]);
+    }
+    if (!(distance <= kowalevski_top_NEAR_BY * size)) {
+        s->h = (double)NAN;
+        return;
+    }
+    kowalevski_top_history *history = &s->history;
+    const int count = history->count < kowalevski_top_HISTORY ? history->count : kowalevski_top_HISTORY;
+    memmove(history->past, history->past + history->count - count, (size_t)count * sizeof history->past[0]);
+    for (int k = 0; k < count; ++k)
+        for (int i = 0; i < kowalevski_top_DIM; ++i) history->past[k][i] += to[i] - s->x[i];
+    history->count = count;
+    history->recurrence_terms = history->use_recurrence = history->slow_steps = 0;
+}
+
+/* Stand at x + carry from now on. */
+static kowalevski_top_status kowalevski_top_place(kowalevski_top_solver *s,
+    const double x[kowalevski_top_DIM], const double carry[kowalevski_top_DIM])
+{
+    for (int i = 0; i < kowalevski_top_DIM; ++i)
+        if (!isfinite(x[i])) return kowalevski_top_BAD_ARGUMENT;
+    kowalevski_top_move_guesses(s, x);
+    memcpy(s->x, x, sizeof s->x);
+    memcpy(s->carry, carry, sizeof s->carry);
+    return kowalevski_top_OK;
+}
+
+kowalevski_top_status kowalevski_top_set_state(kowalevski_top_solver *s, const double x[kowalevski_top_DIM])
+{
+    double to[kowalevski_top_DIM], carry[kowalevski_top_DIM] = { 0.0 };
+    if (s == NULL || x == NULL) return kowalevski_top_BAD_ARGUMENT;
+    memcpy(to, x, sizeof to); /* which may be a part of *s */
+    return kowalevski_top_place(s, to, carry);
+}
+
+kowalevski_top_status kowalevski_top_kick(kowalevski_top_solver *s, const double change[kowalevski_top_DIM])
+{
+    double to[kowalevski_top_DIM], carry[kowalevski_top_DIM];
+    if (s == NULL || change == NULL) return kowalevski_top_BAD_ARGUMENT;
+    for (int i = 0; i < kowalevski_top_DIM; ++i) {
+        const double sum = s->x[i] + change[i], added = sum - s->x[i];
+        const double lost = ((s->x[i] - (sum - added)) + (change[i] - added)) + s->carry[i];
+        to[i] = sum + lost;
+        carry[i] = lost - (to[i] - sum);
+    }
+    return kowalevski_top_place(s, to, carry);
 }
 
 /* ---- Several steps or members at once ---- */

@@ -2,7 +2,7 @@
  * kowalevski_top.h: the declarations; kowalevski_top.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: a5603d0f191583be7f408597de51ce1910f715d0ac81fa8f35e8a543b271c169
+ * body-sha256: 30978b86b67c4858d0c9ffaad312f6f123ee46d70944021a072998e6686772ae
  */
 #ifndef KOWALEVSKI_TOP_H
 #define KOWALEVSKI_TOP_H
@@ -67,8 +67,7 @@ typedef struct {
 
 /* The solver is a plain value: copy it to branch, keep one per thread. Set it up with kowalevski_top_init. */
 typedef struct {
-    /* the state; read it freely, change it only through kowalevski_top_init */
-    double x[kowalevski_top_DIM];
+    double x[kowalevski_top_DIM];     /* the state; read it freely, change it only through functions */
     double carry[kowalevski_top_DIM]; /* what rounding took from x: the state proper is x + carry */
     size_t steps;                     /* good steps since kowalevski_top_init */
     size_t evaluations;               /* of the generating function, for statistics */
@@ -93,6 +92,11 @@ kowalevski_top_status kowalevski_top_step(kowalevski_top_solver *s, double h);
 
 /* Many steps. On failure s->x is the last good state and s->steps counts the good steps. */
 kowalevski_top_status kowalevski_top_integrate(kowalevski_top_solver *s, double h, size_t steps);
+
+/* Between steps: stand at x, or move by change, all else being as it was, also on
+   kowalevski_top_BAD_ARGUMENT. Either may leave the leaf. */
+kowalevski_top_status kowalevski_top_set_state(kowalevski_top_solver *s, const double x[kowalevski_top_DIM]);
+kowalevski_top_status kowalevski_top_kick(kowalevski_top_solver *s, const double change[kowalevski_top_DIM]);
 
 /* Many members, in place: x[i * members + m] is coordinate i of member m. One that fails keeps its last good
    state. status (or NULL) receives the status of each; the first that is not OK is returned. */

@@ -18,9 +18,10 @@
  *   2. Compensated sums, linear equations
  *   3. Starting guesses
  *   4. The implicit step, by Newton's method
- *   5. The solver
- *   6. Ensembles
- * body-sha256: 98b5fd8ac01886aafc3c609df75249527fcccf75ddcff226cc3f5a59a13f5036
+ *   5. Between steps
+ *   6. The solver
+ *   7. Ensembles
+ * body-sha256: b27b5a83063c9d67860252f00f681b094996c654de881bae9f9a6e4eb1974cac
  */
 #include "lagrange_top.h"
 
@@ -723,6 +724,60 @@ static lagrange_top_status lagrange_top_attempt(lagrange_top_solver *s)
         return lagrange_top_OK;
     }
     return lagrange_top_NO_CONVERGENCE;
+}
+
+/* ---- Between steps ---- */
+/* how far the state may be moved, in its own size, for guesses to move with it */
+#define lagrange_top_NEAR_BY 0.125
+
+/* Guesses move with the state, by as many past values as extrapolation needs; recurrences are of the motion
+   as it was. From far away all begins anew, with the next step. */
+static void lagrange_top_move_guesses(lagrange_top_solver *s, const double to[lagrange_top_DIM])
+{
+    double distance = 0.0, size = 0.0;
+    for (int i = 0; i < lagrange_top_DIM; ++i) {
+        distance += fabs(to[i] - s->x[i]);
+        size += fabs(s->x[i]);
+    }
+    if (!(distance <= lagrange_top_NEAR_BY * size)) {
+        s->h = (double)NAN;
+        return;
+    }
+    lagrange_top_history *history = &s->history;
+    for (int i = 0; i < lagrange_top_DIM; ++i) history->difference[0][i] += to[i] - s->x[i];
+}
+
+/* Stand at x + carry from now on. */
+static lagrange_top_status lagrange_top_place(lagrange_top_solver *s, const double x[lagrange_top_DIM],
+    const double carry[lagrange_top_DIM])
+{
+    for (int i = 0; i < lagrange_top_DIM; ++i)
+        if (!isfinite(x[i])) return lagrange_top_BAD_ARGUMENT;
+    lagrange_top_move_guesses(s, x);
+    memcpy(s->x, x, sizeof s->x);
+    memcpy(s->carry, carry, sizeof s->carry);
+    return lagrange_top_OK;
+}
+
+lagrange_top_status lagrange_top_set_state(lagrange_top_solver *s, const double x[lagrange_top_DIM])
+{
+    double to[lagrange_top_DIM], carry[lagrange_top_DIM] = { 0.0 };
+    if (s == NULL || x == NULL) return lagrange_top_BAD_ARGUMENT;
+    memcpy(to, x, sizeof to); /* which may be a part of *s */
+    return lagrange_top_place(s, to, carry);
+}
+
+lagrange_top_status lagrange_top_kick(lagrange_top_solver *s, const double change[lagrange_top_DIM])
+{
+    double to[lagrange_top_DIM], carry[lagrange_top_DIM];
+    if (s == NULL || change == NULL) return lagrange_top_BAD_ARGUMENT;
+    for (int i = 0; i < lagrange_top_DIM; ++i) {
+        const double sum = s->x[i] + change[i], added = sum - s->x[i];
+        const double lost = ((s->x[i] - (sum - added)) + (change[i] - added)) + s->carry[i];
+        to[i] = sum + lost;
+        carry[i] = lost - (to[i] - sum);
+    }
+    return lagrange_top_place(s, to, carry);
 }
 
 /* ---- The solver ---- */

@@ -2,7 +2,7 @@
  * lagrange_top.h: the declarations; lagrange_top.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 4d6cb7a67e9f536773439f81c8de93864b0bd66dc4e651202c9dc39ff1eeabaa
+ * body-sha256: 3cc2043472367ca8bd608a4ff00069975e537228745c44452d8143bbe096f4a8
  */
 #ifndef LAGRANGE_TOP_H
 #define LAGRANGE_TOP_H
@@ -46,7 +46,7 @@ typedef struct {
 
 /* The solver is a plain value: copy it to branch, keep one per thread. Set it up with lagrange_top_init. */
 typedef struct {
-    double x[lagrange_top_DIM];     /* the state; read it freely, change it only through lagrange_top_init */
+    double x[lagrange_top_DIM];     /* the state; read it freely, change it only through functions */
     double carry[lagrange_top_DIM]; /* what rounding took from x: the state proper is x + carry */
     size_t steps;                   /* good steps since lagrange_top_init */
     size_t evaluations;             /* of the generating function, for statistics */
@@ -70,6 +70,11 @@ lagrange_top_status lagrange_top_step(lagrange_top_solver *s, double h);
 
 /* Many steps. On failure s->x is the last good state and s->steps counts the good steps. */
 lagrange_top_status lagrange_top_integrate(lagrange_top_solver *s, double h, size_t steps);
+
+/* Between steps: stand at x, or move by change, all else being as it was, also on lagrange_top_BAD_ARGUMENT.
+   Either may leave the leaf. */
+lagrange_top_status lagrange_top_set_state(lagrange_top_solver *s, const double x[lagrange_top_DIM]);
+lagrange_top_status lagrange_top_kick(lagrange_top_solver *s, const double change[lagrange_top_DIM]);
 
 /* Many members, in place: x[i * members + m] is coordinate i of member m. One that fails keeps its last good
    state. status (or NULL) receives the status of each; the first that is not OK is returned. */

@@ -21,9 +21,10 @@
  *   2. Compensated sums, linear equations
  *   3. Starting guesses
  *   4. The implicit step, by Newton's method
- *   5. The solver
- *   6. Ensembles
- * body-sha256: 07955296e5b2a3557b64ef41ac7d07bf4b6f4000c1fe6742dbebd574f4fb5e06
+ *   5. Between steps
+ *   6. The solver
+ *   7. Ensembles
+ * body-sha256: 0c3fa9eb096a9ec3d449d457b30161bf2379e757437de8f0405a4e6e57ecefbe
  */
 #include "landau_lifshitz.h"
 
@@ -377,6 +378,64 @@ static landau_lifshitz_status landau_lifshitz_attempt(landau_lifshitz_solver *s,
         return landau_lifshitz_OK;
     }
     return landau_lifshitz_NO_CONVERGENCE;
+}
+
+/* ---- Between steps ---- */
+/* how far the state may be moved, in its own size, for guesses to move with it */
+#define landau_lifshitz_NEAR_BY 0.125
+
+/* Guesses move with the state, by as many past values as extrapolation needs; recurrences are of the motion
+   as it was. From far away all begins anew, with the next step. */
+static void landau_lifshitz_move_guesses(landau_lifshitz_solver *s, const double to[landau_lifshitz_DIM])
+{
+    double distance = 0.0, size = 0.0;
+    for (int i = 0; i < landau_lifshitz_DIM; ++i) {
+        distance += fabs(to[i] - s->x[i]);
+        size += fabs(s->x[i]);
+    }
+    if (!(distance <= landau_lifshitz_NEAR_BY * size)) {
+        s->h = (double)NAN;
+        return;
+    }
+    for (int stage = 0; stage < landau_lifshitz_STAGES; ++stage) {
+        landau_lifshitz_history *history = &s->history[stage];
+        for (int i = 0; i < landau_lifshitz_DIM; ++i) history->difference[0][i] += to[i] - s->x[i];
+    }
+}
+
+/* Stand at x + carry from now on. */
+static landau_lifshitz_status landau_lifshitz_place(landau_lifshitz_solver *s,
+    const double x[landau_lifshitz_DIM], const double carry[landau_lifshitz_DIM])
+{
+    for (int i = 0; i < landau_lifshitz_DIM; ++i)
+        if (!isfinite(x[i])) return landau_lifshitz_BAD_ARGUMENT;
+    landau_lifshitz_move_guesses(s, x);
+    memcpy(s->x, x, sizeof s->x);
+    memcpy(s->carry, carry, sizeof s->carry);
+    return landau_lifshitz_OK;
+}
+
+landau_lifshitz_status landau_lifshitz_set_state(landau_lifshitz_solver *s,
+    const double x[landau_lifshitz_DIM])
+{
+    double to[landau_lifshitz_DIM], carry[landau_lifshitz_DIM] = { 0.0 };
+    if (s == NULL || x == NULL) return landau_lifshitz_BAD_ARGUMENT;
+    memcpy(to, x, sizeof to); /* which may be a part of *s */
+    return landau_lifshitz_place(s, to, carry);
+}
+
+landau_lifshitz_status landau_lifshitz_kick(landau_lifshitz_solver *s,
+    const double change[landau_lifshitz_DIM])
+{
+    double to[landau_lifshitz_DIM], carry[landau_lifshitz_DIM];
+    if (s == NULL || change == NULL) return landau_lifshitz_BAD_ARGUMENT;
+    for (int i = 0; i < landau_lifshitz_DIM; ++i) {
+        const double sum = s->x[i] + change[i], added = sum - s->x[i];
+        const double lost = ((s->x[i] - (sum - added)) + (change[i] - added)) + s->carry[i];
+        to[i] = sum + lost;
+        carry[i] = lost - (to[i] - sum);
+    }
+    return landau_lifshitz_place(s, to, carry);
 }
 
 /* ---- The solver ---- */

@@ -2,7 +2,7 @@
  * landau_lifshitz.h: the declarations; landau_lifshitz.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: fa5324b049ad6075870c0cc1999d5af2cb6f7b753255b35ac61a0480d568b281
+ * body-sha256: c3e42998c46f2e2182065d35218bc1517b79193c9508f018276dc32f5300e049
  */
 #ifndef LANDAU_LIFSHITZ_H
 #define LANDAU_LIFSHITZ_H
@@ -48,8 +48,7 @@ typedef struct {
 /* The solver is a plain value: copy it to branch, keep one per thread. Set it up with
    landau_lifshitz_init. */
 typedef struct {
-    /* the state; read it freely, change it only through landau_lifshitz_init */
-    double x[landau_lifshitz_DIM];
+    double x[landau_lifshitz_DIM];     /* the state; read it freely, change it only through functions */
     double carry[landau_lifshitz_DIM]; /* what rounding took from x: the state proper is x + carry */
     size_t steps;                      /* good steps since landau_lifshitz_init */
     size_t evaluations;                /* of the generating function, for statistics */
@@ -74,6 +73,13 @@ landau_lifshitz_status landau_lifshitz_step(landau_lifshitz_solver *s, double h)
 
 /* Many steps. On failure s->x is the last good state and s->steps counts the good steps. */
 landau_lifshitz_status landau_lifshitz_integrate(landau_lifshitz_solver *s, double h, size_t steps);
+
+/* Between steps: stand at x, or move by change, all else being as it was, also on
+   landau_lifshitz_BAD_ARGUMENT. Either may leave the leaf. */
+landau_lifshitz_status landau_lifshitz_set_state(landau_lifshitz_solver *s,
+    const double x[landau_lifshitz_DIM]);
+landau_lifshitz_status landau_lifshitz_kick(landau_lifshitz_solver *s,
+    const double change[landau_lifshitz_DIM]);
 
 /* Many members, in place: x[i * members + m] is coordinate i of member m. One that fails keeps its last good
    state. status (or NULL) receives the status of each; the first that is not OK is returned. */

@@ -19,13 +19,14 @@
  *   3. Starting guesses
  *   4. Recurrences fitted to the last values
  *   5. The implicit step, by Newton's method
- *   6. Several steps or members at once
- *   7. The solver
- *   8. Newton's method in lanes
- *   9. Blocks of steps
- *   10. Groups of members
- *   11. Ensembles
- * body-sha256: 7c0e862c6327a58fbff7cec9f940007928f589d12a0e563460fd6b78a56633ad
+ *   6. Between steps
+ *   7. Several steps or members at once
+ *   8. The solver
+ *   9. Newton's method in lanes
+ *   10. Blocks of steps
+ *   11. Groups of members
+ *   12. Ensembles
+ * body-sha256: c1c7d794e29d624fb2f23f6c20dbcb6c82ffbf74341d6aaf8cd9295b0cd7a840
  */
 #include "lotka_volterra.h"
 
@@ -507,6 +508,65 @@ static lotka_volterra_status lotka_volterra_attempt(lotka_volterra_solver *s)
         return lotka_volterra_OK;
     }
     return lotka_volterra_NO_CONVERGENCE;
+}
+
+/* ---- Between steps ---- */
+/* how far the state may be moved, in its own size, for guesses to move with it */
+#define lotka_volterra_NEAR_BY 0.125
+
+/* Guesses move with the state, by as many past values as extrapolation needs; recurrences are of the motion
+   as it was. From far away all begins anew, with the next step. */
+static void lotka_volterra_move_guesses(lotka_volterra_solver *s, const double to[lotka_volterra_DIM])
+{
+    double distance = 0.0, size = 0.0;
+    for (int i = 0; i < lotka_volterra_DIM; ++i) {
+        distance = fmax(distance, fabs(to[i] / s->x[i] - 1.0));
+        size = 1.0;
+    }
+    if (!(distance <= lotka_volterra_NEAR_BY * size)) {
+        s->h = (double)NAN;
+        return;
+    }
+    lotka_volterra_history *history = &s->history;
+    const int count = history->count < lotka_volterra_HISTORY ? history->count : lotka_volterra_HISTORY;
+    memmove(history->past, history->past + history->count - count, (size_t)count * sizeof history->past[0]);
+    for (int k = 0; k < count; ++k)
+        for (int i = 0; i < lotka_volterra_DIM; ++i) history->past[k][i] += to[i] - s->x[i];
+    history->count = count;
+    history->recurrence_terms = history->use_recurrence = history->slow_steps = 0;
+}
+
+/* Stand at x + carry from now on. */
+static lotka_volterra_status lotka_volterra_place(lotka_volterra_solver *s,
+    const double x[lotka_volterra_DIM], const double carry[lotka_volterra_DIM])
+{
+    for (int i = 0; i < lotka_volterra_DIM; ++i)
+        if (!isfinite(x[i])) return lotka_volterra_BAD_ARGUMENT;
+    lotka_volterra_move_guesses(s, x);
+    memcpy(s->x, x, sizeof s->x);
+    memcpy(s->carry, carry, sizeof s->carry);
+    return lotka_volterra_OK;
+}
+
+lotka_volterra_status lotka_volterra_set_state(lotka_volterra_solver *s, const double x[lotka_volterra_DIM])
+{
+    double to[lotka_volterra_DIM], carry[lotka_volterra_DIM] = { 0.0 };
+    if (s == NULL || x == NULL) return lotka_volterra_BAD_ARGUMENT;
+    memcpy(to, x, sizeof to); /* which may be a part of *s */
+    return lotka_volterra_place(s, to, carry);
+}
+
+lotka_volterra_status lotka_volterra_kick(lotka_volterra_solver *s, const double change[lotka_volterra_DIM])
+{
+    double to[lotka_volterra_DIM], carry[lotka_volterra_DIM];
+    if (s == NULL || change == NULL) return lotka_volterra_BAD_ARGUMENT;
+    for (int i = 0; i < lotka_volterra_DIM; ++i) {
+        const double sum = s->x[i] + change[i], added = sum - s->x[i];
+        const double lost = ((s->x[i] - (sum - added)) + (change[i] - added)) + s->carry[i];
+        to[i] = sum + lost;
+        carry[i] = lost - (to[i] - sum);
+    }
+    return lotka_volterra_place(s, to, carry);
 }
 
 /* ---- Several steps or members at once ---- */

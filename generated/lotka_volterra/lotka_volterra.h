@@ -2,7 +2,7 @@
  * lotka_volterra.h: the declarations; lotka_volterra.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 75067edb9a57271f3e81ed9098b2ebbc8bad0947891ececb88dbf5cfc7d9169f
+ * body-sha256: c943a8f328b5d31ad4f2bbfc64f00e6f84b6f962defd05daab747509d527124a
  */
 #ifndef LOTKA_VOLTERRA_H
 #define LOTKA_VOLTERRA_H
@@ -67,8 +67,7 @@ typedef struct {
 
 /* The solver is a plain value: copy it to branch, keep one per thread. Set it up with lotka_volterra_init. */
 typedef struct {
-    /* the state; read it freely, change it only through lotka_volterra_init */
-    double x[lotka_volterra_DIM];
+    double x[lotka_volterra_DIM];     /* the state; read it freely, change it only through functions */
     double carry[lotka_volterra_DIM]; /* what rounding took from x: the state proper is x + carry */
     size_t steps;                     /* good steps since lotka_volterra_init */
     size_t evaluations;               /* of the generating function, for statistics */
@@ -93,6 +92,11 @@ lotka_volterra_status lotka_volterra_step(lotka_volterra_solver *s, double h);
 
 /* Many steps. On failure s->x is the last good state and s->steps counts the good steps. */
 lotka_volterra_status lotka_volterra_integrate(lotka_volterra_solver *s, double h, size_t steps);
+
+/* Between steps: stand at x, or move by change, all else being as it was, also on
+   lotka_volterra_BAD_ARGUMENT. Either may leave the leaf. */
+lotka_volterra_status lotka_volterra_set_state(lotka_volterra_solver *s, const double x[lotka_volterra_DIM]);
+lotka_volterra_status lotka_volterra_kick(lotka_volterra_solver *s, const double change[lotka_volterra_DIM]);
 
 /* Many members, in place: x[i * members + m] is coordinate i of member m. One that fails keeps its last good
    state. status (or NULL) receives the status of each; the first that is not OK is returned. */

@@ -18,9 +18,10 @@
  *   2. Compensated sums, linear equations
  *   3. Starting guesses
  *   4. The implicit step, by Newton's method
- *   5. The solver
- *   6. Ensembles
- * body-sha256: 2e762cb970922ea004181fe08b4f415b1a2989b98a4e83af8917d109be85d0a3
+ *   5. Between steps
+ *   6. The solver
+ *   7. Ensembles
+ * body-sha256: 140fbdcad02c45ff7a5e601d478e2b16dc2b7666b09cf3fa2ed428d2bcd2d5ae
  */
 #include "maxwell_bloch.h"
 
@@ -286,6 +287,60 @@ static maxwell_bloch_status maxwell_bloch_attempt(maxwell_bloch_solver *s)
         return maxwell_bloch_OK;
     }
     return maxwell_bloch_NO_CONVERGENCE;
+}
+
+/* ---- Between steps ---- */
+/* how far the state may be moved, in its own size, for guesses to move with it */
+#define maxwell_bloch_NEAR_BY 0.125
+
+/* Guesses move with the state, by as many past values as extrapolation needs; recurrences are of the motion
+   as it was. From far away all begins anew, with the next step. */
+static void maxwell_bloch_move_guesses(maxwell_bloch_solver *s, const double to[maxwell_bloch_DIM])
+{
+    double distance = 0.0, size = 0.0;
+    for (int i = 0; i < maxwell_bloch_DIM; ++i) {
+        distance += fabs(to[i] - s->x[i]);
+        size += fabs(s->x[i]);
+    }
+    if (!(distance <= maxwell_bloch_NEAR_BY * size)) {
+        s->h = (double)NAN;
+        return;
+    }
+    maxwell_bloch_history *history = &s->history;
+    for (int i = 0; i < maxwell_bloch_DIM; ++i) history->difference[0][i] += to[i] - s->x[i];
+}
+
+/* Stand at x + carry from now on. */
+static maxwell_bloch_status maxwell_bloch_place(maxwell_bloch_solver *s, const double x[maxwell_bloch_DIM],
+    const double carry[maxwell_bloch_DIM])
+{
+    for (int i = 0; i < maxwell_bloch_DIM; ++i)
+        if (!isfinite(x[i])) return maxwell_bloch_BAD_ARGUMENT;
+    maxwell_bloch_move_guesses(s, x);
+    memcpy(s->x, x, sizeof s->x);
+    memcpy(s->carry, carry, sizeof s->carry);
+    return maxwell_bloch_OK;
+}
+
+maxwell_bloch_status maxwell_bloch_set_state(maxwell_bloch_solver *s, const double x[maxwell_bloch_DIM])
+{
+    double to[maxwell_bloch_DIM], carry[maxwell_bloch_DIM] = { 0.0 };
+    if (s == NULL || x == NULL) return maxwell_bloch_BAD_ARGUMENT;
+    memcpy(to, x, sizeof to); /* which may be a part of *s */
+    return maxwell_bloch_place(s, to, carry);
+}
+
+maxwell_bloch_status maxwell_bloch_kick(maxwell_bloch_solver *s, const double change[maxwell_bloch_DIM])
+{
+    double to[maxwell_bloch_DIM], carry[maxwell_bloch_DIM];
+    if (s == NULL || change == NULL) return maxwell_bloch_BAD_ARGUMENT;
+    for (int i = 0; i < maxwell_bloch_DIM; ++i) {
+        const double sum = s->x[i] + change[i], added = sum - s->x[i];
+        const double lost = ((s->x[i] - (sum - added)) + (change[i] - added)) + s->carry[i];
+        to[i] = sum + lost;
+        carry[i] = lost - (to[i] - sum);
+    }
+    return maxwell_bloch_place(s, to, carry);
 }
 
 /* ---- The solver ---- */

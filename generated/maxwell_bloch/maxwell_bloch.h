@@ -2,7 +2,7 @@
  * maxwell_bloch.h: the declarations; maxwell_bloch.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: fae48082bd65005ea889534b88e49efad18dcba789602d135367b459b30ee61f
+ * body-sha256: c325d096ba2413ce01f7c27dc3eaee9c32aec84ac5e060038e385004e3576916
  */
 #ifndef MAXWELL_BLOCH_H
 #define MAXWELL_BLOCH_H
@@ -44,8 +44,7 @@ typedef struct {
 
 /* The solver is a plain value: copy it to branch, keep one per thread. Set it up with maxwell_bloch_init. */
 typedef struct {
-    /* the state; read it freely, change it only through maxwell_bloch_init */
-    double x[maxwell_bloch_DIM];
+    double x[maxwell_bloch_DIM];     /* the state; read it freely, change it only through functions */
     double carry[maxwell_bloch_DIM]; /* what rounding took from x: the state proper is x + carry */
     size_t steps;                    /* good steps since maxwell_bloch_init */
     size_t evaluations;              /* of the generating function, for statistics */
@@ -69,6 +68,11 @@ maxwell_bloch_status maxwell_bloch_step(maxwell_bloch_solver *s, double h);
 
 /* Many steps. On failure s->x is the last good state and s->steps counts the good steps. */
 maxwell_bloch_status maxwell_bloch_integrate(maxwell_bloch_solver *s, double h, size_t steps);
+
+/* Between steps: stand at x, or move by change, all else being as it was, also on maxwell_bloch_BAD_ARGUMENT.
+   Either may leave the leaf. */
+maxwell_bloch_status maxwell_bloch_set_state(maxwell_bloch_solver *s, const double x[maxwell_bloch_DIM]);
+maxwell_bloch_status maxwell_bloch_kick(maxwell_bloch_solver *s, const double change[maxwell_bloch_DIM]);
 
 /* Many members, in place: x[i * members + m] is coordinate i of member m. One that fails keeps its last good
    state. status (or NULL) receives the status of each; the first that is not OK is returned. */

@@ -19,14 +19,15 @@
  *   3. Starting guesses
  *   4. Recurrences fitted to the last values
  *   5. The implicit step, along paths dm/dt = pi(m) p
- *   6. Several steps or members at once
- *   7. The solver
- *   8. Newton's method in lanes
- *   9. Paths in lanes
- *   10. Blocks of steps
- *   11. Groups of members
- *   12. Ensembles
- * body-sha256: 19c0e35b765dcc0c3ed7aca175b2cfdf5c37c64a53e6049008c97b26cc39804f
+ *   6. Between steps
+ *   7. Several steps or members at once
+ *   8. The solver
+ *   9. Newton's method in lanes
+ *   10. Paths in lanes
+ *   11. Blocks of steps
+ *   12. Groups of members
+ *   13. Ensembles
+ * body-sha256: 6d7173f4e8db14c33d4ea4b4033ad3e9b1e809a8a4de661f9a98b37ee32078c1
  */
 #include "nambu_pendulum.h"
 
@@ -673,6 +674,65 @@ static nambu_pendulum_status nambu_pendulum_attempt(nambu_pendulum_solver *s)
         previous = size;
     }
     return nambu_pendulum_NO_CONVERGENCE;
+}
+
+/* ---- Between steps ---- */
+/* how far the state may be moved, in its own size, for guesses to move with it */
+#define nambu_pendulum_NEAR_BY 0.125
+
+/* Guesses move with the state, by as many past values as extrapolation needs; recurrences are of the motion
+   as it was. From far away all begins anew, with the next step. */
+static void nambu_pendulum_move_guesses(nambu_pendulum_solver *s, const double to[nambu_pendulum_DIM])
+{
+    double distance = 0.0, size = 0.0;
+    for (int i = 0; i < nambu_pendulum_DIM; ++i) {
+        distance += fabs(to[i] - s->x[i]);
+        size += fabs(s->x[i]);
+    }
+    if (!(distance <= nambu_pendulum_NEAR_BY * size)) {
+        s->h = (double)NAN;
+        return;
+    }
+    nambu_pendulum_history *history = &s->history;
+    const int count = history->count < nambu_pendulum_HISTORY ? history->count : nambu_pendulum_HISTORY;
+    memmove(history->past, history->past + history->count - count, (size_t)count * sizeof history->past[0]);
+    for (int k = 0; k < count; ++k)
+        for (int i = 0; i < nambu_pendulum_DIM; ++i) history->past[k][i] += to[i] - s->x[i];
+    history->count = count;
+    history->recurrence_terms = history->use_recurrence = history->slow_steps = 0;
+}
+
+/* Stand at x + carry from now on. */
+static nambu_pendulum_status nambu_pendulum_place(nambu_pendulum_solver *s,
+    const double x[nambu_pendulum_DIM], const double carry[nambu_pendulum_DIM])
+{
+    for (int i = 0; i < nambu_pendulum_DIM; ++i)
+        if (!isfinite(x[i])) return nambu_pendulum_BAD_ARGUMENT;
+    nambu_pendulum_move_guesses(s, x);
+    memcpy(s->x, x, sizeof s->x);
+    memcpy(s->carry, carry, sizeof s->carry);
+    return nambu_pendulum_OK;
+}
+
+nambu_pendulum_status nambu_pendulum_set_state(nambu_pendulum_solver *s, const double x[nambu_pendulum_DIM])
+{
+    double to[nambu_pendulum_DIM], carry[nambu_pendulum_DIM] = { 0.0 };
+    if (s == NULL || x == NULL) return nambu_pendulum_BAD_ARGUMENT;
+    memcpy(to, x, sizeof to); /* which may be a part of *s */
+    return nambu_pendulum_place(s, to, carry);
+}
+
+nambu_pendulum_status nambu_pendulum_kick(nambu_pendulum_solver *s, const double change[nambu_pendulum_DIM])
+{
+    double to[nambu_pendulum_DIM], carry[nambu_pendulum_DIM];
+    if (s == NULL || change == NULL) return nambu_pendulum_BAD_ARGUMENT;
+    for (int i = 0; i < nambu_pendulum_DIM; ++i) {
+        const double sum = s->x[i] + change[i], added = sum - s->x[i];
+        const double lost = ((s->x[i] - (sum - added)) + (change[i] - added)) + s->carry[i];
+        to[i] = sum + lost;
+        carry[i] = lost - (to[i] - sum);
+    }
+    return nambu_pendulum_place(s, to, carry);
 }
 
 /* ---- Several steps or members at once ---- */

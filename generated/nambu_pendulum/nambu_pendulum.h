@@ -2,7 +2,7 @@
  * nambu_pendulum.h: the declarations; nambu_pendulum.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 8ba1e460b7d0a6dc1abe17a9ec543e12810d85f80930b4c4125982e2f8d9fd5b
+ * body-sha256: bc1c43bd4e1fec1c28f703545863dcccb93ebac081c7e45271b1600c80271ecb
  */
 #ifndef NAMBU_PENDULUM_H
 #define NAMBU_PENDULUM_H
@@ -67,8 +67,7 @@ typedef struct {
 
 /* The solver is a plain value: copy it to branch, keep one per thread. Set it up with nambu_pendulum_init. */
 typedef struct {
-    /* the state; read it freely, change it only through nambu_pendulum_init */
-    double x[nambu_pendulum_DIM];
+    double x[nambu_pendulum_DIM];     /* the state; read it freely, change it only through functions */
     double carry[nambu_pendulum_DIM]; /* what rounding took from x: the state proper is x + carry */
     size_t steps;                     /* good steps since nambu_pendulum_init */
     size_t evaluations;               /* of the generating function, for statistics */
@@ -93,6 +92,11 @@ nambu_pendulum_status nambu_pendulum_step(nambu_pendulum_solver *s, double h);
 
 /* Many steps. On failure s->x is the last good state and s->steps counts the good steps. */
 nambu_pendulum_status nambu_pendulum_integrate(nambu_pendulum_solver *s, double h, size_t steps);
+
+/* Between steps: stand at x, or move by change, all else being as it was, also on
+   nambu_pendulum_BAD_ARGUMENT. Either may leave the leaf. */
+nambu_pendulum_status nambu_pendulum_set_state(nambu_pendulum_solver *s, const double x[nambu_pendulum_DIM]);
+nambu_pendulum_status nambu_pendulum_kick(nambu_pendulum_solver *s, const double change[nambu_pendulum_DIM]);
 
 /* Many members, in place: x[i * members + m] is coordinate i of member m. One that fails keeps its last good
    state. status (or NULL) receives the status of each; the first that is not OK is returned. */

@@ -18,9 +18,10 @@
  *   2. Compensated sums, linear equations
  *   3. Starting guesses
  *   4. The implicit step, by Newton's method
- *   5. The solver
- *   6. Ensembles
- * body-sha256: 737f2a8c66155e08d1a350147cec85bc8495167cf26dd3067e9e1b7d3efebce9
+ *   5. Between steps
+ *   6. The solver
+ *   7. Ensembles
+ * body-sha256: f252ea3b71218d972d6ac53a8d1245138d6644f3fae2d58857a06e86c5fa3d9f
  */
 #include "pendulum.h"
 
@@ -288,6 +289,60 @@ static pendulum_status pendulum_attempt(pendulum_solver *s)
         return pendulum_OK;
     }
     return pendulum_NO_CONVERGENCE;
+}
+
+/* ---- Between steps ---- */
+/* how far the state may be moved, in its own size, for guesses to move with it */
+#define pendulum_NEAR_BY 0.125
+
+/* Guesses move with the state, by as many past values as extrapolation needs; recurrences are of the motion
+   as it was. From far away all begins anew, with the next step. */
+static void pendulum_move_guesses(pendulum_solver *s, const double to[pendulum_DIM])
+{
+    double distance = 0.0, size = 0.0;
+    for (int i = 0; i < pendulum_DIM; ++i) {
+        distance += fabs(to[i] - s->x[i]);
+        size += fabs(s->x[i]);
+    }
+    if (!(distance <= pendulum_NEAR_BY * size)) {
+        s->h = (double)NAN;
+        return;
+    }
+    pendulum_history *history = &s->history;
+    for (int i = 0; i < pendulum_DIM; ++i) history->difference[0][i] += to[i] - s->x[i];
+}
+
+/* Stand at x + carry from now on. */
+static pendulum_status pendulum_place(pendulum_solver *s, const double x[pendulum_DIM],
+    const double carry[pendulum_DIM])
+{
+    for (int i = 0; i < pendulum_DIM; ++i)
+        if (!isfinite(x[i])) return pendulum_BAD_ARGUMENT;
+    pendulum_move_guesses(s, x);
+    memcpy(s->x, x, sizeof s->x);
+    memcpy(s->carry, carry, sizeof s->carry);
+    return pendulum_OK;
+}
+
+pendulum_status pendulum_set_state(pendulum_solver *s, const double x[pendulum_DIM])
+{
+    double to[pendulum_DIM], carry[pendulum_DIM] = { 0.0 };
+    if (s == NULL || x == NULL) return pendulum_BAD_ARGUMENT;
+    memcpy(to, x, sizeof to); /* which may be a part of *s */
+    return pendulum_place(s, to, carry);
+}
+
+pendulum_status pendulum_kick(pendulum_solver *s, const double change[pendulum_DIM])
+{
+    double to[pendulum_DIM], carry[pendulum_DIM];
+    if (s == NULL || change == NULL) return pendulum_BAD_ARGUMENT;
+    for (int i = 0; i < pendulum_DIM; ++i) {
+        const double sum = s->x[i] + change[i], added = sum - s->x[i];
+        const double lost = ((s->x[i] - (sum - added)) + (change[i] - added)) + s->carry[i];
+        to[i] = sum + lost;
+        carry[i] = lost - (to[i] - sum);
+    }
+    return pendulum_place(s, to, carry);
 }
 
 /* ---- The solver ---- */

@@ -2,7 +2,7 @@
  * pendulum.h: the declarations; pendulum.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 8237c1ad5e79c2982e4cccdd0533eb31ca93d46d5f9da9e809282bafd904034c
+ * body-sha256: 566374009b8d6f5a03b2d2e3661c5518d67188b5ff9552b16e474772a540684c
  */
 #ifndef PENDULUM_H
 #define PENDULUM_H
@@ -43,7 +43,7 @@ typedef struct {
 
 /* The solver is a plain value: copy it to branch, keep one per thread. Set it up with pendulum_init. */
 typedef struct {
-    double x[pendulum_DIM];     /* the state; read it freely, change it only through pendulum_init */
+    double x[pendulum_DIM];     /* the state; read it freely, change it only through functions */
     double carry[pendulum_DIM]; /* what rounding took from x: the state proper is x + carry */
     size_t steps;               /* good steps since pendulum_init */
     size_t evaluations;         /* of the generating function, for statistics */
@@ -67,6 +67,11 @@ pendulum_status pendulum_step(pendulum_solver *s, double h);
 
 /* Many steps. On failure s->x is the last good state and s->steps counts the good steps. */
 pendulum_status pendulum_integrate(pendulum_solver *s, double h, size_t steps);
+
+/* Between steps: stand at x, or move by change, all else being as it was, also on pendulum_BAD_ARGUMENT.
+   Either may leave the leaf. */
+pendulum_status pendulum_set_state(pendulum_solver *s, const double x[pendulum_DIM]);
+pendulum_status pendulum_kick(pendulum_solver *s, const double change[pendulum_DIM]);
 
 /* Many members, in place: x[i * members + m] is coordinate i of member m. One that fails keeps its last good
    state. status (or NULL) receives the status of each; the first that is not OK is returned. */

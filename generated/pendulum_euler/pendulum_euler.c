@@ -17,9 +17,10 @@
  *   1. The model
  *   2. Compensated sums, linear equations
  *   3. The explicit step
- *   4. The solver
- *   5. Ensembles
- * body-sha256: aab2383ce36271aa7baeabb83a73f0682fe561c53204580ff79cc73009b3a33e
+ *   4. Between steps
+ *   5. The solver
+ *   6. Ensembles
+ * body-sha256: 7a2a011f0bc90bf58ba6fc2ac6d4b0aa862f5d7d8dc603125f11db910a36518a
  */
 #include "pendulum_euler.h"
 
@@ -99,6 +100,39 @@ static pendulum_euler_status pendulum_euler_stage(pendulum_euler_solver *s)
     pendulum_euler_explicit(s->coef, s->x, increment);
     ++s->evaluations;
     return pendulum_euler_advance(s, increment, s->carry) ? pendulum_euler_OK : pendulum_euler_NOT_FINITE;
+}
+
+/* ---- Between steps ---- */
+/* Stand at x + carry from now on. */
+static pendulum_euler_status pendulum_euler_place(pendulum_euler_solver *s,
+    const double x[pendulum_euler_DIM], const double carry[pendulum_euler_DIM])
+{
+    for (int i = 0; i < pendulum_euler_DIM; ++i)
+        if (!isfinite(x[i])) return pendulum_euler_BAD_ARGUMENT;
+    memcpy(s->x, x, sizeof s->x);
+    memcpy(s->carry, carry, sizeof s->carry);
+    return pendulum_euler_OK;
+}
+
+pendulum_euler_status pendulum_euler_set_state(pendulum_euler_solver *s, const double x[pendulum_euler_DIM])
+{
+    double to[pendulum_euler_DIM], carry[pendulum_euler_DIM] = { 0.0 };
+    if (s == NULL || x == NULL) return pendulum_euler_BAD_ARGUMENT;
+    memcpy(to, x, sizeof to); /* which may be a part of *s */
+    return pendulum_euler_place(s, to, carry);
+}
+
+pendulum_euler_status pendulum_euler_kick(pendulum_euler_solver *s, const double change[pendulum_euler_DIM])
+{
+    double to[pendulum_euler_DIM], carry[pendulum_euler_DIM];
+    if (s == NULL || change == NULL) return pendulum_euler_BAD_ARGUMENT;
+    for (int i = 0; i < pendulum_euler_DIM; ++i) {
+        const double sum = s->x[i] + change[i], added = sum - s->x[i];
+        const double lost = ((s->x[i] - (sum - added)) + (change[i] - added)) + s->carry[i];
+        to[i] = sum + lost;
+        carry[i] = lost - (to[i] - sum);
+    }
+    return pendulum_euler_place(s, to, carry);
 }
 
 /* ---- The solver ---- */

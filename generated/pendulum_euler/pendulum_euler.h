@@ -2,7 +2,7 @@
  * pendulum_euler.h: the declarations; pendulum_euler.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: dd7c49602de00e1ecf662b7689e087fb5e65fd4bf5481db023c21f07e66ea07b
+ * body-sha256: 69f45b6ffdc422da557ab874fcfbd4502d88c38a3e798cabf3b8848a9e4f8289
  */
 #ifndef PENDULUM_EULER_H
 #define PENDULUM_EULER_H
@@ -35,8 +35,7 @@ typedef enum {
 
 /* The solver is a plain value: copy it to branch, keep one per thread. Set it up with pendulum_euler_init. */
 typedef struct {
-    /* the state; read it freely, change it only through pendulum_euler_init */
-    double x[pendulum_euler_DIM];
+    double x[pendulum_euler_DIM];     /* the state; read it freely, change it only through functions */
     double carry[pendulum_euler_DIM]; /* what rounding took from x: the state proper is x + carry */
     size_t steps;                     /* good steps since pendulum_euler_init */
     size_t evaluations;               /* of the generating function, for statistics */
@@ -59,6 +58,11 @@ pendulum_euler_status pendulum_euler_step(pendulum_euler_solver *s, double h);
 
 /* Many steps. On failure s->x is the last good state and s->steps counts the good steps. */
 pendulum_euler_status pendulum_euler_integrate(pendulum_euler_solver *s, double h, size_t steps);
+
+/* Between steps: stand at x, or move by change, all else being as it was, also on
+   pendulum_euler_BAD_ARGUMENT. Either may leave the leaf. */
+pendulum_euler_status pendulum_euler_set_state(pendulum_euler_solver *s, const double x[pendulum_euler_DIM]);
+pendulum_euler_status pendulum_euler_kick(pendulum_euler_solver *s, const double change[pendulum_euler_DIM]);
 
 /* Many members, in place: x[i * members + m] is coordinate i of member m. One that fails keeps its last good
    state. status (or NULL) receives the status of each; the first that is not OK is returned. */

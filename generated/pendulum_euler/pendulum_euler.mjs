@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 9c4e9c9c44e62aabfd9a418fce886c6e088761982a40e10fd801c2f04e30277f
+ * body-sha256: 16b4c9811860a1ed70c2b6880b1c55ed1a52194034a3dbc6cf014d4787964e53
  */
 /*
  * import { Solver, StepError } from './pendulum_euler.mjs';
@@ -154,7 +154,7 @@ export class Solver {
   static CASIMIRS = CASIMIRS;
   static DEFAULT_PARAMETERS = DEFAULT_PARAMETERS;
 
-  /** The state; read it freely, and make another solver to start elsewhere. */
+  /** The state; read it freely, and change it by setState and kick only. */
   x;
   /** What rounding took from x: the state proper is x + carry. */
   carry = new Float64Array(DIM);
@@ -229,6 +229,43 @@ export class Solver {
       throw new StepError("BAD_ARGUMENT", this.steps, `the number of steps is ${count}`);
     }
     for (let k = 0; k < count; k++) this.step(h);
+    return this;
+  }
+
+  /**
+   * Between steps: stand at x, with time, parameters and any gauge as they are. Throws StepError for what
+   * is not allowed; then all is as before.
+   *
+   * @param {ArrayLike<number>} x it may lie off the leaf: the Casimirs are from then on those of x
+   * @returns {this}
+   */
+  setState(x) {
+    return this.#place(finite(x, DIM, "x"), new Float64Array(DIM));
+  }
+
+  /**
+   * Between steps: move the state by a change, as an impulse does; else as setState.
+   *
+   * @param {ArrayLike<number>} change
+   * @returns {this}
+   */
+  kick(change) {
+    const to = finite(change, DIM, "the change");
+    const carry = new Float64Array(DIM);
+    to.forEach((by, i) => {
+      const sum = this.x[i] + by;
+      const added = sum - this.x[i];
+      const lost = ((this.x[i] - (sum - added)) + (by - added)) + this.carry[i];
+      to[i] = sum + lost;
+      carry[i] = lost - (to[i] - sum);
+    });
+    return this.#place(finite(to, DIM, "the state"), carry);
+  }
+
+  /** Stand at x + carry from now on. */
+  #place(x, carry) {
+    this.x.set(x);
+    this.carry.set(carry);
     return this;
   }
 

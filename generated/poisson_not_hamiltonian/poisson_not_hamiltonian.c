@@ -18,9 +18,10 @@
  *   2. Compensated sums, linear equations
  *   3. Starting guesses
  *   4. The implicit step, by Newton's method
- *   5. The solver
- *   6. Ensembles
- * body-sha256: 80e06be14d8f5399eb29b5dd5e577ad302a09ba006ea34da2bab708ec62cde09
+ *   5. Between steps
+ *   6. The solver
+ *   7. Ensembles
+ * body-sha256: 454de703ab012a4724818f0d880aae858402113d842c18cee85f981409e96b06
  */
 #include "poisson_not_hamiltonian.h"
 
@@ -354,6 +355,63 @@ static poisson_not_hamiltonian_status poisson_not_hamiltonian_attempt(poisson_no
         return poisson_not_hamiltonian_OK;
     }
     return poisson_not_hamiltonian_NO_CONVERGENCE;
+}
+
+/* ---- Between steps ---- */
+/* how far the state may be moved, in its own size, for guesses to move with it */
+#define poisson_not_hamiltonian_NEAR_BY 0.125
+
+/* Guesses move with the state, by as many past values as extrapolation needs; recurrences are of the motion
+   as it was. From far away all begins anew, with the next step. */
+static void poisson_not_hamiltonian_move_guesses(poisson_not_hamiltonian_solver *s,
+    const double to[poisson_not_hamiltonian_DIM])
+{
+    double distance = 0.0, size = 0.0;
+    for (int i = 0; i < poisson_not_hamiltonian_DIM; ++i) {
+        distance += fabs(to[i] - s->x[i]);
+        size += fabs(s->x[i]);
+    }
+    if (!(distance <= poisson_not_hamiltonian_NEAR_BY * size)) {
+        s->h = (double)NAN;
+        return;
+    }
+    poisson_not_hamiltonian_history *history = &s->history;
+    for (int i = 0; i < poisson_not_hamiltonian_DIM; ++i) history->difference[0][i] += to[i] - s->x[i];
+}
+
+/* Stand at x + carry from now on. */
+static poisson_not_hamiltonian_status poisson_not_hamiltonian_place(poisson_not_hamiltonian_solver *s,
+    const double x[poisson_not_hamiltonian_DIM], const double carry[poisson_not_hamiltonian_DIM])
+{
+    for (int i = 0; i < poisson_not_hamiltonian_DIM; ++i)
+        if (!isfinite(x[i])) return poisson_not_hamiltonian_BAD_ARGUMENT;
+    poisson_not_hamiltonian_move_guesses(s, x);
+    memcpy(s->x, x, sizeof s->x);
+    memcpy(s->carry, carry, sizeof s->carry);
+    return poisson_not_hamiltonian_OK;
+}
+
+poisson_not_hamiltonian_status poisson_not_hamiltonian_set_state(poisson_not_hamiltonian_solver *s,
+    const double x[poisson_not_hamiltonian_DIM])
+{
+    double to[poisson_not_hamiltonian_DIM], carry[poisson_not_hamiltonian_DIM] = { 0.0 };
+    if (s == NULL || x == NULL) return poisson_not_hamiltonian_BAD_ARGUMENT;
+    memcpy(to, x, sizeof to); /* which may be a part of *s */
+    return poisson_not_hamiltonian_place(s, to, carry);
+}
+
+poisson_not_hamiltonian_status poisson_not_hamiltonian_kick(poisson_not_hamiltonian_solver *s,
+    const double change[poisson_not_hamiltonian_DIM])
+{
+    double to[poisson_not_hamiltonian_DIM], carry[poisson_not_hamiltonian_DIM];
+    if (s == NULL || change == NULL) return poisson_not_hamiltonian_BAD_ARGUMENT;
+    for (int i = 0; i < poisson_not_hamiltonian_DIM; ++i) {
+        const double sum = s->x[i] + change[i], added = sum - s->x[i];
+        const double lost = ((s->x[i] - (sum - added)) + (change[i] - added)) + s->carry[i];
+        to[i] = sum + lost;
+        carry[i] = lost - (to[i] - sum);
+    }
+    return poisson_not_hamiltonian_place(s, to, carry);
 }
 
 /* ---- The solver ---- */

@@ -2,7 +2,7 @@
  * poisson_not_hamiltonian.h: the declarations; poisson_not_hamiltonian.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: eeca67daba00302c75c2c577ca12c4eac1593490cc60f131a60e587e1172ffee
+ * body-sha256: e261ced42364b06043c8bdc9e43570a84a8534bb75dfc7f5cb1c47eadab2bee2
  */
 #ifndef POISSON_NOT_HAMILTONIAN_H
 #define POISSON_NOT_HAMILTONIAN_H
@@ -46,7 +46,7 @@ typedef struct {
 /* The solver is a plain value: copy it to branch, keep one per thread. Set it up with
    poisson_not_hamiltonian_init. */
 typedef struct {
-    /* the state; read it freely, change it only through poisson_not_hamiltonian_init */
+    /* the state; read it freely, change it only through functions */
     double x[poisson_not_hamiltonian_DIM];
     double carry[poisson_not_hamiltonian_DIM]; /* what rounding took from x: the state proper is x + carry */
     size_t steps;                              /* good steps since poisson_not_hamiltonian_init */
@@ -72,6 +72,13 @@ poisson_not_hamiltonian_status poisson_not_hamiltonian_step(poisson_not_hamilton
 /* Many steps. On failure s->x is the last good state and s->steps counts the good steps. */
 poisson_not_hamiltonian_status poisson_not_hamiltonian_integrate(poisson_not_hamiltonian_solver *s, double h,
     size_t steps);
+
+/* Between steps: stand at x, or move by change, all else being as it was, also on
+   poisson_not_hamiltonian_BAD_ARGUMENT. Either may leave the leaf. */
+poisson_not_hamiltonian_status poisson_not_hamiltonian_set_state(poisson_not_hamiltonian_solver *s,
+    const double x[poisson_not_hamiltonian_DIM]);
+poisson_not_hamiltonian_status poisson_not_hamiltonian_kick(poisson_not_hamiltonian_solver *s,
+    const double change[poisson_not_hamiltonian_DIM]);
 
 /* Many members, in place: x[i * members + m] is coordinate i of member m. One that fails keeps its last good
    state. status (or NULL) receives the status of each; the first that is not OK is returned. */

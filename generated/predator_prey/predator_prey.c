@@ -18,9 +18,10 @@
  *   2. Compensated sums, linear equations
  *   3. Starting guesses
  *   4. The implicit step, by Newton's method
- *   5. The solver
- *   6. Ensembles
- * body-sha256: d89ae7c687f7a1292fcf112e9a0aa316385498669a7dcf33881e3545f92b74cf
+ *   5. Between steps
+ *   6. The solver
+ *   7. Ensembles
+ * body-sha256: 41a5be33e88467aeb073ef150362fefd2947d2948ff97ca10256fb2b5525cbe2
  */
 #include "predator_prey.h"
 
@@ -295,6 +296,60 @@ static predator_prey_status predator_prey_attempt(predator_prey_solver *s)
         return predator_prey_OK;
     }
     return predator_prey_NO_CONVERGENCE;
+}
+
+/* ---- Between steps ---- */
+/* how far the state may be moved, in its own size, for guesses to move with it */
+#define predator_prey_NEAR_BY 0.125
+
+/* Guesses move with the state, by as many past values as extrapolation needs; recurrences are of the motion
+   as it was. From far away all begins anew, with the next step. */
+static void predator_prey_move_guesses(predator_prey_solver *s, const double to[predator_prey_DIM])
+{
+    double distance = 0.0, size = 0.0;
+    for (int i = 0; i < predator_prey_DIM; ++i) {
+        distance = fmax(distance, fabs(to[i] / s->x[i] - 1.0));
+        size = 1.0;
+    }
+    if (!(distance <= predator_prey_NEAR_BY * size)) {
+        s->h = (double)NAN;
+        return;
+    }
+    predator_prey_history *history = &s->history;
+    for (int i = 0; i < predator_prey_DIM; ++i) history->difference[0][i] += to[i] - s->x[i];
+}
+
+/* Stand at x + carry from now on. */
+static predator_prey_status predator_prey_place(predator_prey_solver *s, const double x[predator_prey_DIM],
+    const double carry[predator_prey_DIM])
+{
+    for (int i = 0; i < predator_prey_DIM; ++i)
+        if (!isfinite(x[i])) return predator_prey_BAD_ARGUMENT;
+    predator_prey_move_guesses(s, x);
+    memcpy(s->x, x, sizeof s->x);
+    memcpy(s->carry, carry, sizeof s->carry);
+    return predator_prey_OK;
+}
+
+predator_prey_status predator_prey_set_state(predator_prey_solver *s, const double x[predator_prey_DIM])
+{
+    double to[predator_prey_DIM], carry[predator_prey_DIM] = { 0.0 };
+    if (s == NULL || x == NULL) return predator_prey_BAD_ARGUMENT;
+    memcpy(to, x, sizeof to); /* which may be a part of *s */
+    return predator_prey_place(s, to, carry);
+}
+
+predator_prey_status predator_prey_kick(predator_prey_solver *s, const double change[predator_prey_DIM])
+{
+    double to[predator_prey_DIM], carry[predator_prey_DIM];
+    if (s == NULL || change == NULL) return predator_prey_BAD_ARGUMENT;
+    for (int i = 0; i < predator_prey_DIM; ++i) {
+        const double sum = s->x[i] + change[i], added = sum - s->x[i];
+        const double lost = ((s->x[i] - (sum - added)) + (change[i] - added)) + s->carry[i];
+        to[i] = sum + lost;
+        carry[i] = lost - (to[i] - sum);
+    }
+    return predator_prey_place(s, to, carry);
 }
 
 /* ---- The solver ---- */

@@ -2,7 +2,7 @@
  * predator_prey.h: the declarations; predator_prey.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 9ca4ae90b63d9ee958a3ca9288f90fa378c15b75c52d557ce405cc9a93f4156e
+ * body-sha256: 4b377ce92dd3d13d9c582399ce538e0e2237937d4a18e6750f670177f66bd4f8
  */
 #ifndef PREDATOR_PREY_H
 #define PREDATOR_PREY_H
@@ -47,8 +47,7 @@ typedef struct {
 
 /* The solver is a plain value: copy it to branch, keep one per thread. Set it up with predator_prey_init. */
 typedef struct {
-    /* the state; read it freely, change it only through predator_prey_init */
-    double x[predator_prey_DIM];
+    double x[predator_prey_DIM];     /* the state; read it freely, change it only through functions */
     double carry[predator_prey_DIM]; /* what rounding took from x: the state proper is x + carry */
     size_t steps;                    /* good steps since predator_prey_init */
     size_t evaluations;              /* of the generating function, for statistics */
@@ -72,6 +71,11 @@ predator_prey_status predator_prey_step(predator_prey_solver *s, double h);
 
 /* Many steps. On failure s->x is the last good state and s->steps counts the good steps. */
 predator_prey_status predator_prey_integrate(predator_prey_solver *s, double h, size_t steps);
+
+/* Between steps: stand at x, or move by change, all else being as it was, also on predator_prey_BAD_ARGUMENT.
+   Either may leave the leaf. */
+predator_prey_status predator_prey_set_state(predator_prey_solver *s, const double x[predator_prey_DIM]);
+predator_prey_status predator_prey_kick(predator_prey_solver *s, const double change[predator_prey_DIM]);
 
 /* Many members, in place: x[i * members + m] is coordinate i of member m. One that fails keeps its last good
    state. status (or NULL) receives the status of each; the first that is not OK is returned. */

@@ -21,13 +21,14 @@
  *   4. Recurrences fitted to the last values
  *   5. The implicit step, by Newton's method
  *   6. The choice of the gauge: multiples of Casimirs taken from H
- *   7. Several steps or members at once
- *   8. The solver
- *   9. Newton's method in lanes
- *   10. Blocks of steps
- *   11. Groups of members
- *   12. Ensembles
- * body-sha256: 8c8950e58982f53352654cddfbfa83e0d583982c29cdcffc2fc53904bd7b8828
+ *   7. Between steps
+ *   8. Several steps or members at once
+ *   9. The solver
+ *   10. Newton's method in lanes
+ *   11. Blocks of steps
+ *   12. Groups of members
+ *   13. Ensembles
+ * body-sha256: f2ff4a8c2a9e5b76c08a435c80b07110a39322b6b149597f31c9fc326bd3ba1b
  */
 #include "rigid_body.h"
 
@@ -830,6 +831,65 @@ static void rigid_body_choose_gauge(const rigid_body_params *params, const doubl
     }
     if (!isfinite(rigid_body_gauge_error(params, gauge, samples)))
         memset(gauge, 0, rigid_body_GAUGES * sizeof gauge[0]);
+}
+
+/* ---- Between steps ---- */
+/* how far the state may be moved, in its own size, for guesses to move with it */
+#define rigid_body_NEAR_BY 0.125
+
+/* Guesses move with the state, by as many past values as extrapolation needs; recurrences are of the motion
+   as it was. From far away all begins anew, with the next step. */
+static void rigid_body_move_guesses(rigid_body_solver *s, const double to[rigid_body_DIM])
+{
+    double distance = 0.0, size = 0.0;
+    for (int i = 0; i < rigid_body_DIM; ++i) {
+        distance += fabs(to[i] - s->x[i]);
+        size += fabs(s->x[i]);
+    }
+    if (!(distance <= rigid_body_NEAR_BY * size)) {
+        s->h = (double)NAN;
+        return;
+    }
+    rigid_body_history *history = &s->history;
+    const int count = history->count < rigid_body_HISTORY ? history->count : rigid_body_HISTORY;
+    memmove(history->past, history->past + history->count - count, (size_t)count * sizeof history->past[0]);
+    for (int k = 0; k < count; ++k)
+        for (int i = 0; i < rigid_body_DIM; ++i) history->past[k][i] += to[i] - s->x[i];
+    history->count = count;
+    history->recurrence_terms = history->use_recurrence = history->slow_steps = 0;
+}
+
+/* Stand at x + carry from now on. */
+static rigid_body_status rigid_body_place(rigid_body_solver *s, const double x[rigid_body_DIM],
+    const double carry[rigid_body_DIM])
+{
+    for (int i = 0; i < rigid_body_DIM; ++i)
+        if (!isfinite(x[i])) return rigid_body_BAD_ARGUMENT;
+    rigid_body_move_guesses(s, x);
+    memcpy(s->x, x, sizeof s->x);
+    memcpy(s->carry, carry, sizeof s->carry);
+    return rigid_body_OK;
+}
+
+rigid_body_status rigid_body_set_state(rigid_body_solver *s, const double x[rigid_body_DIM])
+{
+    double to[rigid_body_DIM], carry[rigid_body_DIM] = { 0.0 };
+    if (s == NULL || x == NULL) return rigid_body_BAD_ARGUMENT;
+    memcpy(to, x, sizeof to); /* which may be a part of *s */
+    return rigid_body_place(s, to, carry);
+}
+
+rigid_body_status rigid_body_kick(rigid_body_solver *s, const double change[rigid_body_DIM])
+{
+    double to[rigid_body_DIM], carry[rigid_body_DIM];
+    if (s == NULL || change == NULL) return rigid_body_BAD_ARGUMENT;
+    for (int i = 0; i < rigid_body_DIM; ++i) {
+        const double sum = s->x[i] + change[i], added = sum - s->x[i];
+        const double lost = ((s->x[i] - (sum - added)) + (change[i] - added)) + s->carry[i];
+        to[i] = sum + lost;
+        carry[i] = lost - (to[i] - sum);
+    }
+    return rigid_body_place(s, to, carry);
 }
 
 /* ---- Several steps or members at once ---- */

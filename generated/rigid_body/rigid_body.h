@@ -2,7 +2,7 @@
  * rigid_body.h: the declarations; rigid_body.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: b1ee552535a6c3e5651cc9e3d77797298ee8448ab7c6785424200a5c945d1484
+ * body-sha256: c3b7ae02f8498a17f01623b5d8c75b17982200ed0b3af4b949c597c741b18462
  */
 #ifndef RIGID_BODY_H
 #define RIGID_BODY_H
@@ -70,7 +70,7 @@ typedef struct {
 
 /* The solver is a plain value: copy it to branch, keep one per thread. Set it up with rigid_body_init. */
 typedef struct {
-    double x[rigid_body_DIM];     /* the state; read it freely, change it only through rigid_body_init */
+    double x[rigid_body_DIM];     /* the state; read it freely, change it only through functions */
     double carry[rigid_body_DIM]; /* what rounding took from x: the state proper is x + carry */
     size_t steps;                 /* good steps since rigid_body_init */
     size_t evaluations;           /* of the generating function, for statistics */
@@ -100,6 +100,11 @@ rigid_body_status rigid_body_step(rigid_body_solver *s, double h);
 
 /* Many steps. On failure s->x is the last good state and s->steps counts the good steps. */
 rigid_body_status rigid_body_integrate(rigid_body_solver *s, double h, size_t steps);
+
+/* Between steps: stand at x, or move by change, all else being as it was, also on rigid_body_BAD_ARGUMENT.
+   Either may leave the leaf. */
+rigid_body_status rigid_body_set_state(rigid_body_solver *s, const double x[rigid_body_DIM]);
+rigid_body_status rigid_body_kick(rigid_body_solver *s, const double change[rigid_body_DIM]);
 
 /* Many members, in place: x[i * members + m] is coordinate i of member m. One that fails keeps its last good
    state. status (or NULL) receives the status of each; the first that is not OK is returned. */

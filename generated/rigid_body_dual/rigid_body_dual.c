@@ -20,9 +20,10 @@
  *   3. Starting guesses
  *   4. The implicit step, by Newton's method
  *   5. The choice of the gauge: multiples of Casimirs taken from H
- *   6. The solver
- *   7. Ensembles
- * body-sha256: 31d7e5fc2e672a8e1ff261b8232685eb0e56b9a60237c0949d1ed2262abe61f4
+ *   6. Between steps
+ *   7. The solver
+ *   8. Ensembles
+ * body-sha256: f3d33b0cfaeea09ddb74b8cceeeacd01bde54d33ee293ddf7256447373b27c09
  */
 #include "rigid_body_dual.h"
 
@@ -414,6 +415,62 @@ static void rigid_body_dual_choose_gauge(const rigid_body_dual_params *params,
         const double multiple = out[1 + 2 * c] / out[2 + 2 * c];
         gauge[c] = isfinite(multiple) ? multiple : 0.0;
     }
+}
+
+/* ---- Between steps ---- */
+/* how far the state may be moved, in its own size, for guesses to move with it */
+#define rigid_body_dual_NEAR_BY 0.125
+
+/* Guesses move with the state, by as many past values as extrapolation needs; recurrences are of the motion
+   as it was. From far away all begins anew, with the next step. */
+static void rigid_body_dual_move_guesses(rigid_body_dual_solver *s, const double to[rigid_body_dual_DIM])
+{
+    double distance = 0.0, size = 0.0;
+    for (int i = 0; i < rigid_body_dual_DIM; ++i) {
+        distance += fabs(to[i] - s->x[i]);
+        size += fabs(s->x[i]);
+    }
+    if (!(distance <= rigid_body_dual_NEAR_BY * size)) {
+        s->h = (double)NAN;
+        return;
+    }
+    rigid_body_dual_history *history = &s->history;
+    for (int i = 0; i < rigid_body_dual_DIM; ++i) history->difference[0][i] += to[i] - s->x[i];
+}
+
+/* Stand at x + carry from now on. */
+static rigid_body_dual_status rigid_body_dual_place(rigid_body_dual_solver *s,
+    const double x[rigid_body_dual_DIM], const double carry[rigid_body_dual_DIM])
+{
+    for (int i = 0; i < rigid_body_dual_DIM; ++i)
+        if (!isfinite(x[i])) return rigid_body_dual_BAD_ARGUMENT;
+    rigid_body_dual_move_guesses(s, x);
+    memcpy(s->x, x, sizeof s->x);
+    memcpy(s->carry, carry, sizeof s->carry);
+    return rigid_body_dual_OK;
+}
+
+rigid_body_dual_status rigid_body_dual_set_state(rigid_body_dual_solver *s,
+    const double x[rigid_body_dual_DIM])
+{
+    double to[rigid_body_dual_DIM], carry[rigid_body_dual_DIM] = { 0.0 };
+    if (s == NULL || x == NULL) return rigid_body_dual_BAD_ARGUMENT;
+    memcpy(to, x, sizeof to); /* which may be a part of *s */
+    return rigid_body_dual_place(s, to, carry);
+}
+
+rigid_body_dual_status rigid_body_dual_kick(rigid_body_dual_solver *s,
+    const double change[rigid_body_dual_DIM])
+{
+    double to[rigid_body_dual_DIM], carry[rigid_body_dual_DIM];
+    if (s == NULL || change == NULL) return rigid_body_dual_BAD_ARGUMENT;
+    for (int i = 0; i < rigid_body_dual_DIM; ++i) {
+        const double sum = s->x[i] + change[i], added = sum - s->x[i];
+        const double lost = ((s->x[i] - (sum - added)) + (change[i] - added)) + s->carry[i];
+        to[i] = sum + lost;
+        carry[i] = lost - (to[i] - sum);
+    }
+    return rigid_body_dual_place(s, to, carry);
 }
 
 /* ---- The solver ---- */

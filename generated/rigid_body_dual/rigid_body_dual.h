@@ -2,7 +2,7 @@
  * rigid_body_dual.h: the declarations; rigid_body_dual.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 8f951df0f184a1ff48d3afd5561ce3beef211b9d50838f1c33d09c7d1045ed05
+ * body-sha256: a5a424ab5f3888b28d1a15cd10b24295e2bb10091ed31a6d9dacd3a70889b232
  */
 #ifndef RIGID_BODY_DUAL_H
 #define RIGID_BODY_DUAL_H
@@ -48,8 +48,7 @@ typedef struct {
 /* The solver is a plain value: copy it to branch, keep one per thread. Set it up with
    rigid_body_dual_init. */
 typedef struct {
-    /* the state; read it freely, change it only through rigid_body_dual_init */
-    double x[rigid_body_dual_DIM];
+    double x[rigid_body_dual_DIM];     /* the state; read it freely, change it only through functions */
     double carry[rigid_body_dual_DIM]; /* what rounding took from x: the state proper is x + carry */
     size_t steps;                      /* good steps since rigid_body_dual_init */
     size_t evaluations;                /* of the generating function, for statistics */
@@ -79,6 +78,13 @@ rigid_body_dual_status rigid_body_dual_step(rigid_body_dual_solver *s, double h)
 
 /* Many steps. On failure s->x is the last good state and s->steps counts the good steps. */
 rigid_body_dual_status rigid_body_dual_integrate(rigid_body_dual_solver *s, double h, size_t steps);
+
+/* Between steps: stand at x, or move by change, all else being as it was, also on
+   rigid_body_dual_BAD_ARGUMENT. Either may leave the leaf. */
+rigid_body_dual_status rigid_body_dual_set_state(rigid_body_dual_solver *s,
+    const double x[rigid_body_dual_DIM]);
+rigid_body_dual_status rigid_body_dual_kick(rigid_body_dual_solver *s,
+    const double change[rigid_body_dual_DIM]);
 
 /* Many members, in place: x[i * members + m] is coordinate i of member m. One that fails keeps its last good
    state. status (or NULL) receives the status of each; the first that is not OK is returned. */

@@ -18,9 +18,10 @@
  *   2. Compensated sums, linear equations
  *   3. Starting guesses
  *   4. The implicit step, by Newton's method
- *   5. The solver
- *   6. Ensembles
- * body-sha256: 7ae4e0bc79a3f7ef627aa10646d683092a2f65c58d18f8a1d7676ad2c396c67f
+ *   5. Between steps
+ *   6. The solver
+ *   7. Ensembles
+ * body-sha256: 7c3db12bdb95611b609af714057cf0a3515f3b67b0226abe8601d0e28f2a21bd
  */
 #include "rigid_body_paper.h"
 
@@ -356,6 +357,62 @@ static rigid_body_paper_status rigid_body_paper_attempt(rigid_body_paper_solver 
         return rigid_body_paper_OK;
     }
     return rigid_body_paper_NO_CONVERGENCE;
+}
+
+/* ---- Between steps ---- */
+/* how far the state may be moved, in its own size, for guesses to move with it */
+#define rigid_body_paper_NEAR_BY 0.125
+
+/* Guesses move with the state, by as many past values as extrapolation needs; recurrences are of the motion
+   as it was. From far away all begins anew, with the next step. */
+static void rigid_body_paper_move_guesses(rigid_body_paper_solver *s, const double to[rigid_body_paper_DIM])
+{
+    double distance = 0.0, size = 0.0;
+    for (int i = 0; i < rigid_body_paper_DIM; ++i) {
+        distance += fabs(to[i] - s->x[i]);
+        size += fabs(s->x[i]);
+    }
+    if (!(distance <= rigid_body_paper_NEAR_BY * size)) {
+        s->h = (double)NAN;
+        return;
+    }
+    rigid_body_paper_history *history = &s->history;
+    for (int i = 0; i < rigid_body_paper_DIM; ++i) history->difference[0][i] += to[i] - s->x[i];
+}
+
+/* Stand at x + carry from now on. */
+static rigid_body_paper_status rigid_body_paper_place(rigid_body_paper_solver *s,
+    const double x[rigid_body_paper_DIM], const double carry[rigid_body_paper_DIM])
+{
+    for (int i = 0; i < rigid_body_paper_DIM; ++i)
+        if (!isfinite(x[i])) return rigid_body_paper_BAD_ARGUMENT;
+    rigid_body_paper_move_guesses(s, x);
+    memcpy(s->x, x, sizeof s->x);
+    memcpy(s->carry, carry, sizeof s->carry);
+    return rigid_body_paper_OK;
+}
+
+rigid_body_paper_status rigid_body_paper_set_state(rigid_body_paper_solver *s,
+    const double x[rigid_body_paper_DIM])
+{
+    double to[rigid_body_paper_DIM], carry[rigid_body_paper_DIM] = { 0.0 };
+    if (s == NULL || x == NULL) return rigid_body_paper_BAD_ARGUMENT;
+    memcpy(to, x, sizeof to); /* which may be a part of *s */
+    return rigid_body_paper_place(s, to, carry);
+}
+
+rigid_body_paper_status rigid_body_paper_kick(rigid_body_paper_solver *s,
+    const double change[rigid_body_paper_DIM])
+{
+    double to[rigid_body_paper_DIM], carry[rigid_body_paper_DIM];
+    if (s == NULL || change == NULL) return rigid_body_paper_BAD_ARGUMENT;
+    for (int i = 0; i < rigid_body_paper_DIM; ++i) {
+        const double sum = s->x[i] + change[i], added = sum - s->x[i];
+        const double lost = ((s->x[i] - (sum - added)) + (change[i] - added)) + s->carry[i];
+        to[i] = sum + lost;
+        carry[i] = lost - (to[i] - sum);
+    }
+    return rigid_body_paper_place(s, to, carry);
 }
 
 /* ---- The solver ---- */

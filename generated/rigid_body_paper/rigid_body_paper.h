@@ -2,7 +2,7 @@
  * rigid_body_paper.h: the declarations; rigid_body_paper.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 60d9d8a198f30c99e673cbde157ea7b8b6cb0a6902de78d976e52f5ef5474060
+ * body-sha256: 15cdace939953f5aa8b6a3ca916bf48600165632440f58be55ae8a5c6900eecd
  */
 #ifndef RIGID_BODY_PAPER_H
 #define RIGID_BODY_PAPER_H
@@ -47,8 +47,7 @@ typedef struct {
 /* The solver is a plain value: copy it to branch, keep one per thread. Set it up with
    rigid_body_paper_init. */
 typedef struct {
-    /* the state; read it freely, change it only through rigid_body_paper_init */
-    double x[rigid_body_paper_DIM];
+    double x[rigid_body_paper_DIM];     /* the state; read it freely, change it only through functions */
     double carry[rigid_body_paper_DIM]; /* what rounding took from x: the state proper is x + carry */
     size_t steps;                       /* good steps since rigid_body_paper_init */
     size_t evaluations;                 /* of the generating function, for statistics */
@@ -72,6 +71,13 @@ rigid_body_paper_status rigid_body_paper_step(rigid_body_paper_solver *s, double
 
 /* Many steps. On failure s->x is the last good state and s->steps counts the good steps. */
 rigid_body_paper_status rigid_body_paper_integrate(rigid_body_paper_solver *s, double h, size_t steps);
+
+/* Between steps: stand at x, or move by change, all else being as it was, also on
+   rigid_body_paper_BAD_ARGUMENT. Either may leave the leaf. */
+rigid_body_paper_status rigid_body_paper_set_state(rigid_body_paper_solver *s,
+    const double x[rigid_body_paper_DIM]);
+rigid_body_paper_status rigid_body_paper_kick(rigid_body_paper_solver *s,
+    const double change[rigid_body_paper_DIM]);
 
 /* Many members, in place: x[i * members + m] is coordinate i of member m. One that fails keeps its last good
    state. status (or NULL) receives the status of each; the first that is not OK is returned. */

@@ -18,9 +18,10 @@
  *   2. Compensated sums, linear equations
  *   3. Starting guesses
  *   4. The implicit step, along paths dm/dt = pi(m) p
- *   5. The solver
- *   6. Ensembles
- * body-sha256: 678646ab6df6b750512563f27a7b0900cdf2c171fd8b9889a1552aeab919fabb
+ *   5. Between steps
+ *   6. The solver
+ *   7. Ensembles
+ * body-sha256: 6a61999e1e69ab8b2cd706bb5bc76797da0f5907d2cc187b07ced03606c99590
  */
 #include "sir_epidemic.h"
 
@@ -440,6 +441,60 @@ static sir_epidemic_status sir_epidemic_attempt(sir_epidemic_solver *s)
         previous = size;
     }
     return sir_epidemic_NO_CONVERGENCE;
+}
+
+/* ---- Between steps ---- */
+/* how far the state may be moved, in its own size, for guesses to move with it */
+#define sir_epidemic_NEAR_BY 0.125
+
+/* Guesses move with the state, by as many past values as extrapolation needs; recurrences are of the motion
+   as it was. From far away all begins anew, with the next step. */
+static void sir_epidemic_move_guesses(sir_epidemic_solver *s, const double to[sir_epidemic_DIM])
+{
+    double distance = 0.0, size = 0.0;
+    for (int i = 0; i < sir_epidemic_DIM; ++i) {
+        distance += fabs(to[i] - s->x[i]);
+        size += fabs(s->x[i]);
+    }
+    if (!(distance <= sir_epidemic_NEAR_BY * size)) {
+        s->h = (double)NAN;
+        return;
+    }
+    sir_epidemic_history *history = &s->history;
+    for (int i = 0; i < sir_epidemic_DIM; ++i) history->difference[0][i] += to[i] - s->x[i];
+}
+
+/* Stand at x + carry from now on. */
+static sir_epidemic_status sir_epidemic_place(sir_epidemic_solver *s, const double x[sir_epidemic_DIM],
+    const double carry[sir_epidemic_DIM])
+{
+    for (int i = 0; i < sir_epidemic_DIM; ++i)
+        if (!isfinite(x[i])) return sir_epidemic_BAD_ARGUMENT;
+    sir_epidemic_move_guesses(s, x);
+    memcpy(s->x, x, sizeof s->x);
+    memcpy(s->carry, carry, sizeof s->carry);
+    return sir_epidemic_OK;
+}
+
+sir_epidemic_status sir_epidemic_set_state(sir_epidemic_solver *s, const double x[sir_epidemic_DIM])
+{
+    double to[sir_epidemic_DIM], carry[sir_epidemic_DIM] = { 0.0 };
+    if (s == NULL || x == NULL) return sir_epidemic_BAD_ARGUMENT;
+    memcpy(to, x, sizeof to); /* which may be a part of *s */
+    return sir_epidemic_place(s, to, carry);
+}
+
+sir_epidemic_status sir_epidemic_kick(sir_epidemic_solver *s, const double change[sir_epidemic_DIM])
+{
+    double to[sir_epidemic_DIM], carry[sir_epidemic_DIM];
+    if (s == NULL || change == NULL) return sir_epidemic_BAD_ARGUMENT;
+    for (int i = 0; i < sir_epidemic_DIM; ++i) {
+        const double sum = s->x[i] + change[i], added = sum - s->x[i];
+        const double lost = ((s->x[i] - (sum - added)) + (change[i] - added)) + s->carry[i];
+        to[i] = sum + lost;
+        carry[i] = lost - (to[i] - sum);
+    }
+    return sir_epidemic_place(s, to, carry);
 }
 
 /* ---- The solver ---- */

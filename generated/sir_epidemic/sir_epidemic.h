@@ -2,7 +2,7 @@
  * sir_epidemic.h: the declarations; sir_epidemic.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 8fe0aa09415b362ed2e7e8df559992a36ea3cc8c6bca5a7ac19c9e6def415456
+ * body-sha256: bb6370e7bd6b96450cbc746f8e3798fb5e456220c09cfd8b4531d1182d0bba3f
  */
 #ifndef SIR_EPIDEMIC_H
 #define SIR_EPIDEMIC_H
@@ -45,7 +45,7 @@ typedef struct {
 
 /* The solver is a plain value: copy it to branch, keep one per thread. Set it up with sir_epidemic_init. */
 typedef struct {
-    double x[sir_epidemic_DIM];     /* the state; read it freely, change it only through sir_epidemic_init */
+    double x[sir_epidemic_DIM];     /* the state; read it freely, change it only through functions */
     double carry[sir_epidemic_DIM]; /* what rounding took from x: the state proper is x + carry */
     size_t steps;                   /* good steps since sir_epidemic_init */
     size_t evaluations;             /* of the generating function, for statistics */
@@ -69,6 +69,11 @@ sir_epidemic_status sir_epidemic_step(sir_epidemic_solver *s, double h);
 
 /* Many steps. On failure s->x is the last good state and s->steps counts the good steps. */
 sir_epidemic_status sir_epidemic_integrate(sir_epidemic_solver *s, double h, size_t steps);
+
+/* Between steps: stand at x, or move by change, all else being as it was, also on sir_epidemic_BAD_ARGUMENT.
+   Either may leave the leaf. */
+sir_epidemic_status sir_epidemic_set_state(sir_epidemic_solver *s, const double x[sir_epidemic_DIM]);
+sir_epidemic_status sir_epidemic_kick(sir_epidemic_solver *s, const double change[sir_epidemic_DIM]);
 
 /* Many members, in place: x[i * members + m] is coordinate i of member m. One that fails keeps its last good
    state. status (or NULL) receives the status of each; the first that is not OK is returned. */

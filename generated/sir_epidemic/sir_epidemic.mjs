@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 8acdf9159c2e1894835048a598fd17e3ed4761b501509a190eeb34a796916455
+ * body-sha256: d8f02e9db6c0180861f64b688eb4d137409b5acc07eb565d1342de6f2ccf7433
  */
 /*
  * import { Solver, StepError } from './sir_epidemic.mjs';
@@ -235,7 +235,7 @@ export class Solver {
   static CASIMIRS = CASIMIRS;
   static DEFAULT_PARAMETERS = DEFAULT_PARAMETERS;
 
-  /** The state; read it freely, and make another solver to start elsewhere. */
+  /** The state; read it freely, and change it by setState and kick only. */
   x;
   /** What rounding took from x: the state proper is x + carry. */
   carry = new Float64Array(DIM);
@@ -313,6 +313,44 @@ export class Solver {
       throw new StepError("BAD_ARGUMENT", this.steps, `the number of steps is ${count}`);
     }
     for (let k = 0; k < count; k++) this.step(h);
+    return this;
+  }
+
+  /**
+   * Between steps: stand at x, with time, parameters and any gauge as they are. Throws StepError for what
+   * is not allowed; then all is as before.
+   *
+   * @param {ArrayLike<number>} x it may lie off the leaf: the Casimirs are from then on those of x
+   * @returns {this}
+   */
+  setState(x) {
+    return this.#place(finite(x, DIM, "x"), new Float64Array(DIM));
+  }
+
+  /**
+   * Between steps: move the state by a change, as an impulse does; else as setState.
+   *
+   * @param {ArrayLike<number>} change
+   * @returns {this}
+   */
+  kick(change) {
+    const to = finite(change, DIM, "the change");
+    const carry = new Float64Array(DIM);
+    to.forEach((by, i) => {
+      const sum = this.x[i] + by;
+      const added = sum - this.x[i];
+      const lost = ((this.x[i] - (sum - added)) + (by - added)) + this.carry[i];
+      to[i] = sum + lost;
+      carry[i] = lost - (to[i] - sum);
+    });
+    return this.#place(finite(to, DIM, "the state"), carry);
+  }
+
+  /** Stand at x + carry from now on. */
+  #place(x, carry) {
+    for (const history of this.history) history.move(this.x, x);
+    this.x.set(x);
+    this.carry.set(carry);
     return this;
   }
 
@@ -557,6 +595,9 @@ const DIFFERENCES = 9;
 /** How far from the last value a guess may be, in sizes of that value. */
 const REACH = 4;
 
+/** How far the state may be moved between steps, in its own size, for guesses to move with it. */
+const NEAR_BY = 0.125;
+
 /**
  * The last value of the unknown and its backward differences, which the next is extrapolated by. For
  * speed only.
@@ -572,6 +613,24 @@ class History {
   clear() {
     this.count = this.order = 0;
     for (const row of this.#difference) row.fill(0);
+  }
+
+  /**
+   * The state has been moved: the last value moves with it, and its differences stay; nothing is kept from
+   * far away.
+   *
+   * @param {Float64Array} from
+   * @param {Float64Array} to
+   */
+  move(from, to) {
+    let distance = 0;
+    let size = 0;
+    for (let i = 0; i < DIM; i++) {
+      distance += Math.abs(to[i] - from[i]);
+      size += Math.abs(from[i]);
+    }
+    if (!(distance <= NEAR_BY * size)) this.clear();
+    else for (let i = 0; i < DIM; i++) this.#difference[0][i] += to[i] - from[i];
   }
 
   /**

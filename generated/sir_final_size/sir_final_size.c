@@ -17,9 +17,10 @@
  *   2. Compensated sums, linear equations
  *   3. Starting guesses
  *   4. The implicit step, along paths dm/dt = pi(m) p
- *   5. The solver
- *   6. Ensembles
- * body-sha256: fbc53e8d9d8cc7e2ca33caab1a94d09d31059e8260d5bc507f5511dbd30f1a88
+ *   5. Between steps
+ *   6. The solver
+ *   7. Ensembles
+ * body-sha256: 384edc9317fb361cb7ee7f99f3cb06f7b4f47596b4513221eaf6e03467f98d0a
  */
 #include "sir_final_size.h"
 
@@ -453,6 +454,60 @@ static sir_final_size_status sir_final_size_attempt(sir_final_size_solver *s)
         previous = size;
     }
     return sir_final_size_NO_CONVERGENCE;
+}
+
+/* ---- Between steps ---- */
+/* how far the state may be moved, in its own size, for guesses to move with it */
+#define sir_final_size_NEAR_BY 0.125
+
+/* Guesses move with the state, by as many past values as extrapolation needs; recurrences are of the motion
+   as it was. From far away all begins anew, with the next step. */
+static void sir_final_size_move_guesses(sir_final_size_solver *s, const double to[sir_final_size_DIM])
+{
+    double distance = 0.0, size = 0.0;
+    for (int i = 0; i < sir_final_size_DIM; ++i) {
+        distance += fabs(to[i] - s->x[i]);
+        size += fabs(s->x[i]);
+    }
+    if (!(distance <= sir_final_size_NEAR_BY * size)) {
+        s->h = (double)NAN;
+        return;
+    }
+    sir_final_size_history *history = &s->history;
+    for (int i = 0; i < sir_final_size_DIM; ++i) history->difference[0][i] += to[i] - s->x[i];
+}
+
+/* Stand at x + carry from now on. */
+static sir_final_size_status sir_final_size_place(sir_final_size_solver *s,
+    const double x[sir_final_size_DIM], const double carry[sir_final_size_DIM])
+{
+    for (int i = 0; i < sir_final_size_DIM; ++i)
+        if (!isfinite(x[i])) return sir_final_size_BAD_ARGUMENT;
+    sir_final_size_move_guesses(s, x);
+    memcpy(s->x, x, sizeof s->x);
+    memcpy(s->carry, carry, sizeof s->carry);
+    return sir_final_size_OK;
+}
+
+sir_final_size_status sir_final_size_set_state(sir_final_size_solver *s, const double x[sir_final_size_DIM])
+{
+    double to[sir_final_size_DIM], carry[sir_final_size_DIM] = { 0.0 };
+    if (s == NULL || x == NULL) return sir_final_size_BAD_ARGUMENT;
+    memcpy(to, x, sizeof to); /* which may be a part of *s */
+    return sir_final_size_place(s, to, carry);
+}
+
+sir_final_size_status sir_final_size_kick(sir_final_size_solver *s, const double change[sir_final_size_DIM])
+{
+    double to[sir_final_size_DIM], carry[sir_final_size_DIM];
+    if (s == NULL || change == NULL) return sir_final_size_BAD_ARGUMENT;
+    for (int i = 0; i < sir_final_size_DIM; ++i) {
+        const double sum = s->x[i] + change[i], added = sum - s->x[i];
+        const double lost = ((s->x[i] - (sum - added)) + (change[i] - added)) + s->carry[i];
+        to[i] = sum + lost;
+        carry[i] = lost - (to[i] - sum);
+    }
+    return sir_final_size_place(s, to, carry);
 }
 
 /* ---- The solver ---- */

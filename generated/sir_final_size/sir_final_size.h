@@ -2,7 +2,7 @@
  * sir_final_size.h: the declarations; sir_final_size.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 487b46266055dfceead9f2b921a5fabe3cbcec67becffffb664658d93adcb72a
+ * body-sha256: 24c3f5e71ab7e697d99045a690b0328b69b7f20f4751ae54409d8cbfd2d9065c
  */
 #ifndef SIR_FINAL_SIZE_H
 #define SIR_FINAL_SIZE_H
@@ -45,8 +45,7 @@ typedef struct {
 
 /* The solver is a plain value: copy it to branch, keep one per thread. Set it up with sir_final_size_init. */
 typedef struct {
-    /* the state; read it freely, change it only through sir_final_size_init */
-    double x[sir_final_size_DIM];
+    double x[sir_final_size_DIM];     /* the state; read it freely, change it only through functions */
     double carry[sir_final_size_DIM]; /* what rounding took from x: the state proper is x + carry */
     size_t steps;                     /* good steps since sir_final_size_init */
     size_t evaluations;               /* of the generating function, for statistics */
@@ -70,6 +69,11 @@ sir_final_size_status sir_final_size_step(sir_final_size_solver *s, double h);
 
 /* Many steps. On failure s->x is the last good state and s->steps counts the good steps. */
 sir_final_size_status sir_final_size_integrate(sir_final_size_solver *s, double h, size_t steps);
+
+/* Between steps: stand at x, or move by change, all else being as it was, also on
+   sir_final_size_BAD_ARGUMENT. Either may leave the leaf. */
+sir_final_size_status sir_final_size_set_state(sir_final_size_solver *s, const double x[sir_final_size_DIM]);
+sir_final_size_status sir_final_size_kick(sir_final_size_solver *s, const double change[sir_final_size_DIM]);
 
 /* Many members, in place: x[i * members + m] is coordinate i of member m. One that fails keeps its last good
    state. status (or NULL) receives the status of each; the first that is not OK is returned. */

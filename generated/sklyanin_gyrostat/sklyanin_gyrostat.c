@@ -20,9 +20,10 @@
  *   3. Starting guesses
  *   4. The implicit step, along paths dm/dt = pi(m) p
  *   5. The choice of the gauge: multiples of Casimirs taken from H
- *   6. The solver
- *   7. Ensembles
- * body-sha256: 6cab2fb13e012cf1691c1cd34b9e256201a8cfc0b79b8a296c9d5e80f7cfb5bb
+ *   6. Between steps
+ *   7. The solver
+ *   8. Ensembles
+ * body-sha256: f1687fc94745b26e34bf3ec82aca26e03277888379a9e56c4b4aba584a5d2ab0
  */
 #include "sklyanin_gyrostat.h"
 
@@ -631,6 +632,63 @@ static void sklyanin_gyrostat_choose_gauge(const sklyanin_gyrostat_params *param
         const double multiple = out[1 + 2 * c] / out[2 + 2 * c];
         gauge[c] = isfinite(multiple) ? multiple : 0.0;
     }
+}
+
+/* ---- Between steps ---- */
+/* how far the state may be moved, in its own size, for guesses to move with it */
+#define sklyanin_gyrostat_NEAR_BY 0.125
+
+/* Guesses move with the state, by as many past values as extrapolation needs; recurrences are of the motion
+   as it was. From far away all begins anew, with the next step. */
+static void sklyanin_gyrostat_move_guesses(sklyanin_gyrostat_solver *s,
+    const double to[sklyanin_gyrostat_DIM])
+{
+    double distance = 0.0, size = 0.0;
+    for (int i = 0; i < sklyanin_gyrostat_DIM; ++i) {
+        distance += fabs(to[i] - s->x[i]);
+        size += fabs(s->x[i]);
+    }
+    if (!(distance <= sklyanin_gyrostat_NEAR_BY * size)) {
+        s->h = (double)NAN;
+        return;
+    }
+    sklyanin_gyrostat_history *history = &s->history;
+    for (int i = 0; i < sklyanin_gyrostat_DIM; ++i) history->difference[0][i] += to[i] - s->x[i];
+}
+
+/* Stand at x + carry from now on. */
+static sklyanin_gyrostat_status sklyanin_gyrostat_place(sklyanin_gyrostat_solver *s,
+    const double x[sklyanin_gyrostat_DIM], const double carry[sklyanin_gyrostat_DIM])
+{
+    for (int i = 0; i < sklyanin_gyrostat_DIM; ++i)
+        if (!isfinite(x[i])) return sklyanin_gyrostat_BAD_ARGUMENT;
+    sklyanin_gyrostat_move_guesses(s, x);
+    memcpy(s->x, x, sizeof s->x);
+    memcpy(s->carry, carry, sizeof s->carry);
+    return sklyanin_gyrostat_OK;
+}
+
+sklyanin_gyrostat_status sklyanin_gyrostat_set_state(sklyanin_gyrostat_solver *s,
+    const double x[sklyanin_gyrostat_DIM])
+{
+    double to[sklyanin_gyrostat_DIM], carry[sklyanin_gyrostat_DIM] = { 0.0 };
+    if (s == NULL || x == NULL) return sklyanin_gyrostat_BAD_ARGUMENT;
+    memcpy(to, x, sizeof to); /* which may be a part of *s */
+    return sklyanin_gyrostat_place(s, to, carry);
+}
+
+sklyanin_gyrostat_status sklyanin_gyrostat_kick(sklyanin_gyrostat_solver *s,
+    const double change[sklyanin_gyrostat_DIM])
+{
+    double to[sklyanin_gyrostat_DIM], carry[sklyanin_gyrostat_DIM];
+    if (s == NULL || change == NULL) return sklyanin_gyrostat_BAD_ARGUMENT;
+    for (int i = 0; i < sklyanin_gyrostat_DIM; ++i) {
+        const double sum = s->x[i] + change[i], added = sum - s->x[i];
+        const double lost = ((s->x[i] - (sum - added)) + (change[i] - added)) + s->carry[i];
+        to[i] = sum + lost;
+        carry[i] = lost - (to[i] - sum);
+    }
+    return sklyanin_gyrostat_place(s, to, carry);
 }
 
 /* ---- The solver ---- */

@@ -2,7 +2,7 @@
  * sklyanin_gyrostat.h: the declarations; sklyanin_gyrostat.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 6eb51195be6d6648127941b70b3268bb6ea48b371c47065600b2a789c1c99ed2
+ * body-sha256: 005b965583ac9bd3a8733fd8bc61a36053095aeb1064629c06e4b0a7a9f6af4e
  */
 #ifndef SKLYANIN_GYROSTAT_H
 #define SKLYANIN_GYROSTAT_H
@@ -46,8 +46,7 @@ typedef struct {
 /* The solver is a plain value: copy it to branch, keep one per thread. Set it up with
    sklyanin_gyrostat_init. */
 typedef struct {
-    /* the state; read it freely, change it only through sklyanin_gyrostat_init */
-    double x[sklyanin_gyrostat_DIM];
+    double x[sklyanin_gyrostat_DIM];     /* the state; read it freely, change it only through functions */
     double carry[sklyanin_gyrostat_DIM]; /* what rounding took from x: the state proper is x + carry */
     size_t steps;                        /* good steps since sklyanin_gyrostat_init */
     size_t evaluations;                  /* of the generating function, for statistics */
@@ -77,6 +76,13 @@ sklyanin_gyrostat_status sklyanin_gyrostat_step(sklyanin_gyrostat_solver *s, dou
 
 /* Many steps. On failure s->x is the last good state and s->steps counts the good steps. */
 sklyanin_gyrostat_status sklyanin_gyrostat_integrate(sklyanin_gyrostat_solver *s, double h, size_t steps);
+
+/* Between steps: stand at x, or move by change, all else being as it was, also on
+   sklyanin_gyrostat_BAD_ARGUMENT. Either may leave the leaf. */
+sklyanin_gyrostat_status sklyanin_gyrostat_set_state(sklyanin_gyrostat_solver *s,
+    const double x[sklyanin_gyrostat_DIM]);
+sklyanin_gyrostat_status sklyanin_gyrostat_kick(sklyanin_gyrostat_solver *s,
+    const double change[sklyanin_gyrostat_DIM]);
 
 /* Many members, in place: x[i * members + m] is coordinate i of member m. One that fails keeps its last good
    state. status (or NULL) receives the status of each; the first that is not OK is returned. */

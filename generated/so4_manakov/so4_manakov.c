@@ -20,9 +20,10 @@
  *   3. Starting guesses
  *   4. The implicit step, by Newton's method
  *   5. The choice of the gauge: multiples of Casimirs taken from H
- *   6. The solver
- *   7. Ensembles
- * body-sha256: 7724e40c618fd8bfa3a633c5524774ba7d6b0299c2ff81a4212c3c7156c12f6d
+ *   6. Between steps
+ *   7. The solver
+ *   8. Ensembles
+ * body-sha256: 69983b33d5527d9d9d0e0e50c2812efae44735d639b51dda5b52e35d16b2d736
  */
 #include "so4_manakov.h"
 
@@ -807,6 +808,60 @@ static void so4_manakov_choose_gauge(const so4_manakov_params *params, const dou
         const double multiple = out[1 + 2 * c] / out[2 + 2 * c];
         gauge[c] = isfinite(multiple) ? multiple : 0.0;
     }
+}
+
+/* ---- Between steps ---- */
+/* how far the state may be moved, in its own size, for guesses to move with it */
+#define so4_manakov_NEAR_BY 0.125
+
+/* Guesses move with the state, by as many past values as extrapolation needs; recurrences are of the motion
+   as it was. From far away all begins anew, with the next step. */
+static void so4_manakov_move_guesses(so4_manakov_solver *s, const double to[so4_manakov_DIM])
+{
+    double distance = 0.0, size = 0.0;
+    for (int i = 0; i < so4_manakov_DIM; ++i) {
+        distance += fabs(to[i] - s->x[i]);
+        size += fabs(s->x[i]);
+    }
+    if (!(distance <= so4_manakov_NEAR_BY * size)) {
+        s->h = (double)NAN;
+        return;
+    }
+    so4_manakov_history *history = &s->history;
+    for (int i = 0; i < so4_manakov_DIM; ++i) history->difference[0][i] += to[i] - s->x[i];
+}
+
+/* Stand at x + carry from now on. */
+static so4_manakov_status so4_manakov_place(so4_manakov_solver *s, const double x[so4_manakov_DIM],
+    const double carry[so4_manakov_DIM])
+{
+    for (int i = 0; i < so4_manakov_DIM; ++i)
+        if (!isfinite(x[i])) return so4_manakov_BAD_ARGUMENT;
+    so4_manakov_move_guesses(s, x);
+    memcpy(s->x, x, sizeof s->x);
+    memcpy(s->carry, carry, sizeof s->carry);
+    return so4_manakov_OK;
+}
+
+so4_manakov_status so4_manakov_set_state(so4_manakov_solver *s, const double x[so4_manakov_DIM])
+{
+    double to[so4_manakov_DIM], carry[so4_manakov_DIM] = { 0.0 };
+    if (s == NULL || x == NULL) return so4_manakov_BAD_ARGUMENT;
+    memcpy(to, x, sizeof to); /* which may be a part of *s */
+    return so4_manakov_place(s, to, carry);
+}
+
+so4_manakov_status so4_manakov_kick(so4_manakov_solver *s, const double change[so4_manakov_DIM])
+{
+    double to[so4_manakov_DIM], carry[so4_manakov_DIM];
+    if (s == NULL || change == NULL) return so4_manakov_BAD_ARGUMENT;
+    for (int i = 0; i < so4_manakov_DIM; ++i) {
+        const double sum = s->x[i] + change[i], added = sum - s->x[i];
+        const double lost = ((s->x[i] - (sum - added)) + (change[i] - added)) + s->carry[i];
+        to[i] = sum + lost;
+        carry[i] = lost - (to[i] - sum);
+    }
+    return so4_manakov_place(s, to, carry);
 }
 
 /* ---- The solver ---- */

@@ -2,7 +2,7 @@
  * so4_manakov.h: the declarations; so4_manakov.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 7ab1034297401eeb58b1ce8040f5630ba0f4a81c38c3a5df2083b0df7a54106c
+ * body-sha256: d37c1333950e7e0deea578cb1be2098e9a14bda37497cc42a5ec126e899b0e44
  */
 #ifndef SO4_MANAKOV_H
 #define SO4_MANAKOV_H
@@ -45,7 +45,7 @@ typedef struct {
 
 /* The solver is a plain value: copy it to branch, keep one per thread. Set it up with so4_manakov_init. */
 typedef struct {
-    double x[so4_manakov_DIM];     /* the state; read it freely, change it only through so4_manakov_init */
+    double x[so4_manakov_DIM];     /* the state; read it freely, change it only through functions */
     double carry[so4_manakov_DIM]; /* what rounding took from x: the state proper is x + carry */
     size_t steps;                  /* good steps since so4_manakov_init */
     size_t evaluations;            /* of the generating function, for statistics */
@@ -74,6 +74,11 @@ so4_manakov_status so4_manakov_step(so4_manakov_solver *s, double h);
 
 /* Many steps. On failure s->x is the last good state and s->steps counts the good steps. */
 so4_manakov_status so4_manakov_integrate(so4_manakov_solver *s, double h, size_t steps);
+
+/* Between steps: stand at x, or move by change, all else being as it was, also on so4_manakov_BAD_ARGUMENT.
+   Either may leave the leaf. */
+so4_manakov_status so4_manakov_set_state(so4_manakov_solver *s, const double x[so4_manakov_DIM]);
+so4_manakov_status so4_manakov_kick(so4_manakov_solver *s, const double change[so4_manakov_DIM]);
 
 /* Many members, in place: x[i * members + m] is coordinate i of member m. One that fails keeps its last good
    state. status (or NULL) receives the status of each; the first that is not OK is returned. */

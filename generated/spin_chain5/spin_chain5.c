@@ -20,9 +20,10 @@
  *   3. Starting guesses
  *   4. The implicit step, by Newton's method
  *   5. The choice of the gauge: multiples of Casimirs taken from H
- *   6. The solver
- *   7. Ensembles
- * body-sha256: 013eb5bac5feb0760a5fecef744d61cb28deda248ab84a9b28b74b6000b742ff
+ *   6. Between steps
+ *   7. The solver
+ *   8. Ensembles
+ * body-sha256: 0de253f69090354dbb6b7b73dc50f0a9a3da874fdfdfd83e69f17b5ca357e039
  */
 #include "spin_chain5.h"
 
@@ -1718,6 +1719,60 @@ static void spin_chain5_choose_gauge(const spin_chain5_params *params, const dou
         const double multiple = out[1 + 2 * c] / out[2 + 2 * c];
         gauge[c] = isfinite(multiple) ? multiple : 0.0;
     }
+}
+
+/* ---- Between steps ---- */
+/* how far the state may be moved, in its own size, for guesses to move with it */
+#define spin_chain5_NEAR_BY 0.125
+
+/* Guesses move with the state, by as many past values as extrapolation needs; recurrences are of the motion
+   as it was. From far away all begins anew, with the next step. */
+static void spin_chain5_move_guesses(spin_chain5_solver *s, const double to[spin_chain5_DIM])
+{
+    double distance = 0.0, size = 0.0;
+    for (int i = 0; i < spin_chain5_DIM; ++i) {
+        distance += fabs(to[i] - s->x[i]);
+        size += fabs(s->x[i]);
+    }
+    if (!(distance <= spin_chain5_NEAR_BY * size)) {
+        s->h = (double)NAN;
+        return;
+    }
+    spin_chain5_history *history = &s->history;
+    for (int i = 0; i < spin_chain5_DIM; ++i) history->difference[0][i] += to[i] - s->x[i];
+}
+
+/* Stand at x + carry from now on. */
+static spin_chain5_status spin_chain5_place(spin_chain5_solver *s, const double x[spin_chain5_DIM],
+    const double carry[spin_chain5_DIM])
+{
+    for (int i = 0; i < spin_chain5_DIM; ++i)
+        if (!isfinite(x[i])) return spin_chain5_BAD_ARGUMENT;
+    spin_chain5_move_guesses(s, x);
+    memcpy(s->x, x, sizeof s->x);
+    memcpy(s->carry, carry, sizeof s->carry);
+    return spin_chain5_OK;
+}
+
+spin_chain5_status spin_chain5_set_state(spin_chain5_solver *s, const double x[spin_chain5_DIM])
+{
+    double to[spin_chain5_DIM], carry[spin_chain5_DIM] = { 0.0 };
+    if (s == NULL || x == NULL) return spin_chain5_BAD_ARGUMENT;
+    memcpy(to, x, sizeof to); /* which may be a part of *s */
+    return spin_chain5_place(s, to, carry);
+}
+
+spin_chain5_status spin_chain5_kick(spin_chain5_solver *s, const double change[spin_chain5_DIM])
+{
+    double to[spin_chain5_DIM], carry[spin_chain5_DIM];
+    if (s == NULL || change == NULL) return spin_chain5_BAD_ARGUMENT;
+    for (int i = 0; i < spin_chain5_DIM; ++i) {
+        const double sum = s->x[i] + change[i], added = sum - s->x[i];
+        const double lost = ((s->x[i] - (sum - added)) + (change[i] - added)) + s->carry[i];
+        to[i] = sum + lost;
+        carry[i] = lost - (to[i] - sum);
+    }
+    return spin_chain5_place(s, to, carry);
 }
 
 /* ---- The solver ---- */

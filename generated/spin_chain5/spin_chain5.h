@@ -2,7 +2,7 @@
  * spin_chain5.h: the declarations; spin_chain5.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: ecc99dacee8c7af429ee870f46e7538f8551a5930de7c37ef76eec95d4014fe1
+ * body-sha256: 40fe099238202b13d083ec069525d0881d205a8271f67beb60927c1eb54b011d
  */
 #ifndef SPIN_CHAIN5_H
 #define SPIN_CHAIN5_H
@@ -45,7 +45,7 @@ typedef struct {
 
 /* The solver is a plain value: copy it to branch, keep one per thread. Set it up with spin_chain5_init. */
 typedef struct {
-    double x[spin_chain5_DIM];     /* the state; read it freely, change it only through spin_chain5_init */
+    double x[spin_chain5_DIM];     /* the state; read it freely, change it only through functions */
     double carry[spin_chain5_DIM]; /* what rounding took from x: the state proper is x + carry */
     size_t steps;                  /* good steps since spin_chain5_init */
     size_t evaluations;            /* of the generating function, for statistics */
@@ -74,6 +74,11 @@ spin_chain5_status spin_chain5_step(spin_chain5_solver *s, double h);
 
 /* Many steps. On failure s->x is the last good state and s->steps counts the good steps. */
 spin_chain5_status spin_chain5_integrate(spin_chain5_solver *s, double h, size_t steps);
+
+/* Between steps: stand at x, or move by change, all else being as it was, also on spin_chain5_BAD_ARGUMENT.
+   Either may leave the leaf. */
+spin_chain5_status spin_chain5_set_state(spin_chain5_solver *s, const double x[spin_chain5_DIM]);
+spin_chain5_status spin_chain5_kick(spin_chain5_solver *s, const double change[spin_chain5_DIM]);
 
 /* Many members, in place: x[i * members + m] is coordinate i of member m. One that fails keeps its last good
    state. status (or NULL) receives the status of each; the first that is not OK is returned. */

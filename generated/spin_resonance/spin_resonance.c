@@ -18,9 +18,10 @@
  *   2. Compensated sums, linear equations
  *   3. Starting guesses
  *   4. The implicit step, by Newton's method
- *   5. The solver
- *   6. Ensembles
- * body-sha256: 423bd7b13a6778caa69105a9b84b03c22c38038538bb37585c9b997ae9b3b81b
+ *   5. Between steps
+ *   6. The solver
+ *   7. Ensembles
+ * body-sha256: 74b39dcf5b8e76ac859f4401095c2923f68de2b2c590847a1e52af83b4943886
  */
 #include "spin_resonance.h"
 
@@ -386,6 +387,60 @@ static spin_resonance_status spin_resonance_attempt(spin_resonance_solver *s)
         return spin_resonance_OK;
     }
     return spin_resonance_NO_CONVERGENCE;
+}
+
+/* ---- Between steps ---- */
+/* how far the state may be moved, in its own size, for guesses to move with it */
+#define spin_resonance_NEAR_BY 0.125
+
+/* Guesses move with the state, by as many past values as extrapolation needs; recurrences are of the motion
+   as it was. From far away all begins anew, with the next step. */
+static void spin_resonance_move_guesses(spin_resonance_solver *s, const double to[spin_resonance_DIM])
+{
+    double distance = 0.0, size = 0.0;
+    for (int i = 0; i < spin_resonance_DIM; ++i) {
+        distance += fabs(to[i] - s->x[i]);
+        size += fabs(s->x[i]);
+    }
+    if (!(distance <= spin_resonance_NEAR_BY * size)) {
+        s->h = (double)NAN;
+        return;
+    }
+    spin_resonance_history *history = &s->history;
+    for (int i = 0; i < spin_resonance_DIM; ++i) history->difference[0][i] += to[i] - s->x[i];
+}
+
+/* Stand at x + carry from now on. */
+static spin_resonance_status spin_resonance_place(spin_resonance_solver *s,
+    const double x[spin_resonance_DIM], const double carry[spin_resonance_DIM])
+{
+    for (int i = 0; i < spin_resonance_DIM; ++i)
+        if (!isfinite(x[i])) return spin_resonance_BAD_ARGUMENT;
+    spin_resonance_move_guesses(s, x);
+    memcpy(s->x, x, sizeof s->x);
+    memcpy(s->carry, carry, sizeof s->carry);
+    return spin_resonance_OK;
+}
+
+spin_resonance_status spin_resonance_set_state(spin_resonance_solver *s, const double x[spin_resonance_DIM])
+{
+    double to[spin_resonance_DIM], carry[spin_resonance_DIM] = { 0.0 };
+    if (s == NULL || x == NULL) return spin_resonance_BAD_ARGUMENT;
+    memcpy(to, x, sizeof to); /* which may be a part of *s */
+    return spin_resonance_place(s, to, carry);
+}
+
+spin_resonance_status spin_resonance_kick(spin_resonance_solver *s, const double change[spin_resonance_DIM])
+{
+    double to[spin_resonance_DIM], carry[spin_resonance_DIM];
+    if (s == NULL || change == NULL) return spin_resonance_BAD_ARGUMENT;
+    for (int i = 0; i < spin_resonance_DIM; ++i) {
+        const double sum = s->x[i] + change[i], added = sum - s->x[i];
+        const double lost = ((s->x[i] - (sum - added)) + (change[i] - added)) + s->carry[i];
+        to[i] = sum + lost;
+        carry[i] = lost - (to[i] - sum);
+    }
+    return spin_resonance_place(s, to, carry);
 }
 
 /* ---- The solver ---- */

@@ -2,7 +2,7 @@
  * spin_resonance.h: the declarations; spin_resonance.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 1298ec76532d39f532167747ee28a70a55f0987ce87ad1f3da500fd0a973395e
+ * body-sha256: 6468efbdb0a0e9b0a37ea5596c42aad4bcd0674cda48aad504cf27fd49219767
  */
 #ifndef SPIN_RESONANCE_H
 #define SPIN_RESONANCE_H
@@ -47,8 +47,7 @@ typedef struct {
 
 /* The solver is a plain value: copy it to branch, keep one per thread. Set it up with spin_resonance_init. */
 typedef struct {
-    /* the state; read it freely, change it only through spin_resonance_init */
-    double x[spin_resonance_DIM];
+    double x[spin_resonance_DIM];     /* the state; read it freely, change it only through functions */
     double carry[spin_resonance_DIM]; /* what rounding took from x: the state proper is x + carry */
     size_t steps;                     /* good steps since spin_resonance_init */
     size_t evaluations;               /* of the generating function, for statistics */
@@ -77,6 +76,11 @@ spin_resonance_status spin_resonance_step(spin_resonance_solver *s, double h);
 
 /* Many steps. On failure s->x is the last good state and s->steps counts the good steps. */
 spin_resonance_status spin_resonance_integrate(spin_resonance_solver *s, double h, size_t steps);
+
+/* Between steps: stand at x, or move by change, all else being as it was, also on
+   spin_resonance_BAD_ARGUMENT. Either may leave the leaf. */
+spin_resonance_status spin_resonance_set_state(spin_resonance_solver *s, const double x[spin_resonance_DIM]);
+spin_resonance_status spin_resonance_kick(spin_resonance_solver *s, const double change[spin_resonance_DIM]);
 
 /* Many members, in place: x[i * members + m] is coordinate i of member m. One that fails keeps its last good
    state. status (or NULL) receives the status of each; the first that is not OK is returned. */

@@ -21,9 +21,10 @@
  *   2. Compensated sums, linear equations
  *   3. Starting guesses
  *   4. The implicit step, by Newton's method
- *   5. The solver
- *   6. Ensembles
- * body-sha256: 342f28b7a60bb369d35777b43552caa73181e61976f7ab9ea4048f462a2c3dfc
+ *   5. Between steps
+ *   6. The solver
+ *   7. Ensembles
+ * body-sha256: 4416f0788e5b9951d1150af9fa1ec699f715c8ddc60979741446e5df9297a2e0
  */
 #include "thruster_body.h"
 
@@ -365,6 +366,62 @@ static thruster_body_status thruster_body_attempt(thruster_body_solver *s, int s
         return thruster_body_OK;
     }
     return thruster_body_NO_CONVERGENCE;
+}
+
+/* ---- Between steps ---- */
+/* how far the state may be moved, in its own size, for guesses to move with it */
+#define thruster_body_NEAR_BY 0.125
+
+/* Guesses move with the state, by as many past values as extrapolation needs; recurrences are of the motion
+   as it was. From far away all begins anew, with the next step. */
+static void thruster_body_move_guesses(thruster_body_solver *s, const double to[thruster_body_DIM])
+{
+    double distance = 0.0, size = 0.0;
+    for (int i = 0; i < thruster_body_DIM; ++i) {
+        distance += fabs(to[i] - s->x[i]);
+        size += fabs(s->x[i]);
+    }
+    if (!(distance <= thruster_body_NEAR_BY * size)) {
+        s->h = (double)NAN;
+        return;
+    }
+    for (int stage = 0; stage < thruster_body_STAGES; ++stage) {
+        thruster_body_history *history = &s->history[stage];
+        for (int i = 0; i < thruster_body_DIM; ++i) history->difference[0][i] += to[i] - s->x[i];
+    }
+}
+
+/* Stand at x + carry from now on. */
+static thruster_body_status thruster_body_place(thruster_body_solver *s, const double x[thruster_body_DIM],
+    const double carry[thruster_body_DIM])
+{
+    for (int i = 0; i < thruster_body_DIM; ++i)
+        if (!isfinite(x[i])) return thruster_body_BAD_ARGUMENT;
+    thruster_body_move_guesses(s, x);
+    memcpy(s->x, x, sizeof s->x);
+    memcpy(s->carry, carry, sizeof s->carry);
+    return thruster_body_OK;
+}
+
+thruster_body_status thruster_body_set_state(thruster_body_solver *s, const double x[thruster_body_DIM])
+{
+    double to[thruster_body_DIM], carry[thruster_body_DIM] = { 0.0 };
+    if (s == NULL || x == NULL) return thruster_body_BAD_ARGUMENT;
+    memcpy(to, x, sizeof to); /* which may be a part of *s */
+    return thruster_body_place(s, to, carry);
+}
+
+thruster_body_status thruster_body_kick(thruster_body_solver *s, const double change[thruster_body_DIM])
+{
+    double to[thruster_body_DIM], carry[thruster_body_DIM];
+    if (s == NULL || change == NULL) return thruster_body_BAD_ARGUMENT;
+    for (int i = 0; i < thruster_body_DIM; ++i) {
+        const double sum = s->x[i] + change[i], added = sum - s->x[i];
+        const double lost = ((s->x[i] - (sum - added)) + (change[i] - added)) + s->carry[i];
+        to[i] = sum + lost;
+        carry[i] = lost - (to[i] - sum);
+    }
+    return thruster_body_place(s, to, carry);
 }
 
 /* ---- The solver ---- */

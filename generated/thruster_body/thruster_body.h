@@ -2,7 +2,7 @@
  * thruster_body.h: the declarations; thruster_body.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: ae3c75d31f4dd33acb652d1a3454c92856602057c06dfd06714b1401b08a3f9c
+ * body-sha256: f902f2d99cc776e3dd7f6ca44c8f75fb42eba9094884559b4783e2a6ed95108b
  */
 #ifndef THRUSTER_BODY_H
 #define THRUSTER_BODY_H
@@ -49,8 +49,7 @@ typedef struct {
 
 /* The solver is a plain value: copy it to branch, keep one per thread. Set it up with thruster_body_init. */
 typedef struct {
-    /* the state; read it freely, change it only through thruster_body_init */
-    double x[thruster_body_DIM];
+    double x[thruster_body_DIM];     /* the state; read it freely, change it only through functions */
     double carry[thruster_body_DIM]; /* what rounding took from x: the state proper is x + carry */
     size_t steps;                    /* good steps since thruster_body_init */
     size_t evaluations;              /* of the generating function, for statistics */
@@ -74,6 +73,11 @@ thruster_body_status thruster_body_step(thruster_body_solver *s, double h);
 
 /* Many steps. On failure s->x is the last good state and s->steps counts the good steps. */
 thruster_body_status thruster_body_integrate(thruster_body_solver *s, double h, size_t steps);
+
+/* Between steps: stand at x, or move by change, all else being as it was, also on thruster_body_BAD_ARGUMENT.
+   Either may leave the leaf. */
+thruster_body_status thruster_body_set_state(thruster_body_solver *s, const double x[thruster_body_DIM]);
+thruster_body_status thruster_body_kick(thruster_body_solver *s, const double change[thruster_body_DIM]);
 
 /* Many members, in place: x[i * members + m] is coordinate i of member m. One that fails keeps its last good
    state. status (or NULL) receives the status of each; the first that is not OK is returned. */

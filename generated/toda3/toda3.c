@@ -18,9 +18,10 @@
  *   2. Compensated sums, linear equations
  *   3. Starting guesses
  *   4. The implicit step, by Newton's method
- *   5. The solver
- *   6. Ensembles
- * body-sha256: 22269bb086c6c9320b87b454ca416196b54c82f55fcfd37fcfbea86bd71c8931
+ *   5. Between steps
+ *   6. The solver
+ *   7. Ensembles
+ * body-sha256: 213958a755056d86235a49094a8f356a2d7f0ae6a297c86d8362320a3586bd4b
  */
 #include "toda3.h"
 
@@ -399,6 +400,58 @@ static toda3_status toda3_attempt(toda3_solver *s)
         return toda3_OK;
     }
     return toda3_NO_CONVERGENCE;
+}
+
+/* ---- Between steps ---- */
+#define toda3_NEAR_BY 0.125 /* how far the state may be moved, in its own size, for guesses to move with it */
+
+/* Guesses move with the state, by as many past values as extrapolation needs; recurrences are of the motion
+   as it was. From far away all begins anew, with the next step. */
+static void toda3_move_guesses(toda3_solver *s, const double to[toda3_DIM])
+{
+    double distance = 0.0, size = 0.0;
+    for (int i = 0; i < toda3_DIM; ++i) {
+        distance += fabs(to[i] - s->x[i]);
+        size += fabs(s->x[i]);
+    }
+    if (!(distance <= toda3_NEAR_BY * size)) {
+        s->h = (double)NAN;
+        return;
+    }
+    toda3_history *history = &s->history;
+    for (int i = 0; i < toda3_DIM; ++i) history->difference[0][i] += to[i] - s->x[i];
+}
+
+/* Stand at x + carry from now on. */
+static toda3_status toda3_place(toda3_solver *s, const double x[toda3_DIM], const double carry[toda3_DIM])
+{
+    for (int i = 0; i < toda3_DIM; ++i)
+        if (!isfinite(x[i])) return toda3_BAD_ARGUMENT;
+    toda3_move_guesses(s, x);
+    memcpy(s->x, x, sizeof s->x);
+    memcpy(s->carry, carry, sizeof s->carry);
+    return toda3_OK;
+}
+
+toda3_status toda3_set_state(toda3_solver *s, const double x[toda3_DIM])
+{
+    double to[toda3_DIM], carry[toda3_DIM] = { 0.0 };
+    if (s == NULL || x == NULL) return toda3_BAD_ARGUMENT;
+    memcpy(to, x, sizeof to); /* which may be a part of *s */
+    return toda3_place(s, to, carry);
+}
+
+toda3_status toda3_kick(toda3_solver *s, const double change[toda3_DIM])
+{
+    double to[toda3_DIM], carry[toda3_DIM];
+    if (s == NULL || change == NULL) return toda3_BAD_ARGUMENT;
+    for (int i = 0; i < toda3_DIM; ++i) {
+        const double sum = s->x[i] + change[i], added = sum - s->x[i];
+        const double lost = ((s->x[i] - (sum - added)) + (change[i] - added)) + s->carry[i];
+        to[i] = sum + lost;
+        carry[i] = lost - (to[i] - sum);
+    }
+    return toda3_place(s, to, carry);
 }
 
 /* ---- The solver ---- */

@@ -2,7 +2,7 @@
  * toda3.h: the declarations; toda3.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 2cf7876a03a449c9f83dac00b16bc85ab862042af89a4ef257aee8f5960a56af
+ * body-sha256: a677b2aba78ec1da234a6c49dfb04a738598862dcbafd0d39d6478fcbb29cf4b
  */
 #ifndef TODA3_H
 #define TODA3_H
@@ -43,7 +43,7 @@ typedef struct {
 
 /* The solver is a plain value: copy it to branch, keep one per thread. Set it up with toda3_init. */
 typedef struct {
-    double x[toda3_DIM];     /* the state; read it freely, change it only through toda3_init */
+    double x[toda3_DIM];     /* the state; read it freely, change it only through functions */
     double carry[toda3_DIM]; /* what rounding took from x: the state proper is x + carry */
     size_t steps;            /* good steps since toda3_init */
     size_t evaluations;      /* of the generating function, for statistics */
@@ -66,6 +66,11 @@ toda3_status toda3_step(toda3_solver *s, double h);
 
 /* Many steps. On failure s->x is the last good state and s->steps counts the good steps. */
 toda3_status toda3_integrate(toda3_solver *s, double h, size_t steps);
+
+/* Between steps: stand at x, or move by change, all else being as it was, also on toda3_BAD_ARGUMENT. Either
+   may leave the leaf. */
+toda3_status toda3_set_state(toda3_solver *s, const double x[toda3_DIM]);
+toda3_status toda3_kick(toda3_solver *s, const double change[toda3_DIM]);
 
 /* Many members, in place: x[i * members + m] is coordinate i of member m. One that fails keeps its last good
    state. status (or NULL) receives the status of each; the first that is not OK is returned. */

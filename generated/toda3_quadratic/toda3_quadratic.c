@@ -18,9 +18,10 @@
  *   3. Starting guesses
  *   4. Recurrences fitted to the last values
  *   5. The implicit step, along paths dm/dt = pi(m) p
- *   6. The solver
- *   7. Ensembles
- * body-sha256: d44955b43dedac71ae5ea3f22c8d296291121b91d95cbb3f8aa4bf14ddd0e9c7
+ *   6. Between steps
+ *   7. The solver
+ *   8. Ensembles
+ * body-sha256: d84270926e1beb3a01348029ff48fb789f6ebfb2edc0a39efc5d8d8d19d44817
  */
 #include "toda3_quadratic.h"
 
@@ -728,6 +729,67 @@ static toda3_quadratic_status toda3_quadratic_attempt(toda3_quadratic_solver *s)
         previous = size;
     }
     return toda3_quadratic_NO_CONVERGENCE;
+}
+
+/* ---- Between steps ---- */
+/* how far the state may be moved, in its own size, for guesses to move with it */
+#define toda3_quadratic_NEAR_BY 0.125
+
+/* Guesses move with the state, by as many past values as extrapolation needs; recurrences are of the motion
+   as it was. From far away all begins anew, with the next step. */
+static void toda3_quadratic_move_guesses(toda3_quadratic_solver *s, const double to[toda3_quadratic_DIM])
+{
+    double distance = 0.0, size = 0.0;
+    for (int i = 0; i < toda3_quadratic_DIM; ++i) {
+        distance += fabs(to[i] - s->x[i]);
+        size += fabs(s->x[i]);
+    }
+    if (!(distance <= toda3_quadratic_NEAR_BY * size)) {
+        s->h = (double)NAN;
+        return;
+    }
+    toda3_quadratic_history *history = &s->history;
+    const int count = history->count < toda3_quadratic_HISTORY ? history->count : toda3_quadratic_HISTORY;
+    memmove(history->past, history->past + history->count - count, (size_t)count * sizeof history->past[0]);
+    for (int k = 0; k < count; ++k)
+        for (int i = 0; i < toda3_quadratic_DIM; ++i) history->past[k][i] += to[i] - s->x[i];
+    history->count = count;
+    history->recurrence_terms = history->use_recurrence = history->slow_steps = 0;
+}
+
+/* Stand at x + carry from now on. */
+static toda3_quadratic_status toda3_quadratic_place(toda3_quadratic_solver *s,
+    const double x[toda3_quadratic_DIM], const double carry[toda3_quadratic_DIM])
+{
+    for (int i = 0; i < toda3_quadratic_DIM; ++i)
+        if (!isfinite(x[i])) return toda3_quadratic_BAD_ARGUMENT;
+    toda3_quadratic_move_guesses(s, x);
+    memcpy(s->x, x, sizeof s->x);
+    memcpy(s->carry, carry, sizeof s->carry);
+    return toda3_quadratic_OK;
+}
+
+toda3_quadratic_status toda3_quadratic_set_state(toda3_quadratic_solver *s,
+    const double x[toda3_quadratic_DIM])
+{
+    double to[toda3_quadratic_DIM], carry[toda3_quadratic_DIM] = { 0.0 };
+    if (s == NULL || x == NULL) return toda3_quadratic_BAD_ARGUMENT;
+    memcpy(to, x, sizeof to); /* which may be a part of *s */
+    return toda3_quadratic_place(s, to, carry);
+}
+
+toda3_quadratic_status toda3_quadratic_kick(toda3_quadratic_solver *s,
+    const double change[toda3_quadratic_DIM])
+{
+    double to[toda3_quadratic_DIM], carry[toda3_quadratic_DIM];
+    if (s == NULL || change == NULL) return toda3_quadratic_BAD_ARGUMENT;
+    for (int i = 0; i < toda3_quadratic_DIM; ++i) {
+        const double sum = s->x[i] + change[i], added = sum - s->x[i];
+        const double lost = ((s->x[i] - (sum - added)) + (change[i] - added)) + s->carry[i];
+        to[i] = sum + lost;
+        carry[i] = lost - (to[i] - sum);
+    }
+    return toda3_quadratic_place(s, to, carry);
 }
 
 /* ---- The solver ---- */

@@ -2,7 +2,7 @@
  * toda3_quadratic.h: the declarations; toda3_quadratic.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 43134a96bb1a016874bb5f23ea60e61edc67dfb1b757b76baff78b6d805ded7f
+ * body-sha256: e91b324b551f90293a232211e402c594a6deabbbc8868e25312c3a07f39e4cd3
  */
 #ifndef TODA3_QUADRATIC_H
 #define TODA3_QUADRATIC_H
@@ -56,8 +56,7 @@ typedef struct {
 /* The solver is a plain value: copy it to branch, keep one per thread. Set it up with
    toda3_quadratic_init. */
 typedef struct {
-    /* the state; read it freely, change it only through toda3_quadratic_init */
-    double x[toda3_quadratic_DIM];
+    double x[toda3_quadratic_DIM];     /* the state; read it freely, change it only through functions */
     double carry[toda3_quadratic_DIM]; /* what rounding took from x: the state proper is x + carry */
     size_t steps;                      /* good steps since toda3_quadratic_init */
     size_t evaluations;                /* of the generating function, for statistics */
@@ -81,6 +80,13 @@ toda3_quadratic_status toda3_quadratic_step(toda3_quadratic_solver *s, double h)
 
 /* Many steps. On failure s->x is the last good state and s->steps counts the good steps. */
 toda3_quadratic_status toda3_quadratic_integrate(toda3_quadratic_solver *s, double h, size_t steps);
+
+/* Between steps: stand at x, or move by change, all else being as it was, also on
+   toda3_quadratic_BAD_ARGUMENT. Either may leave the leaf. */
+toda3_quadratic_status toda3_quadratic_set_state(toda3_quadratic_solver *s,
+    const double x[toda3_quadratic_DIM]);
+toda3_quadratic_status toda3_quadratic_kick(toda3_quadratic_solver *s,
+    const double change[toda3_quadratic_DIM]);
 
 /* Many members, in place: x[i * members + m] is coordinate i of member m. One that fails keeps its last good
    state. status (or NULL) receives the status of each; the first that is not OK is returned. */

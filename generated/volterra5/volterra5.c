@@ -18,9 +18,10 @@
  *   2. Compensated sums, linear equations
  *   3. Starting guesses
  *   4. The implicit step, by Newton's method
- *   5. The solver
- *   6. Ensembles
- * body-sha256: cc14e5836a4ba7c808648cb2c817c28f3dd3dd8f7ef5bf255f71b5b66cb2d9a3
+ *   5. Between steps
+ *   6. The solver
+ *   7. Ensembles
+ * body-sha256: 097407699441601eb654717ee617129b572913e095ef16a25a2bd74f0de937e6
  */
 #include "volterra5.h"
 
@@ -354,6 +355,60 @@ static volterra5_status volterra5_attempt(volterra5_solver *s)
         return volterra5_OK;
     }
     return volterra5_NO_CONVERGENCE;
+}
+
+/* ---- Between steps ---- */
+/* how far the state may be moved, in its own size, for guesses to move with it */
+#define volterra5_NEAR_BY 0.125
+
+/* Guesses move with the state, by as many past values as extrapolation needs; recurrences are of the motion
+   as it was. From far away all begins anew, with the next step. */
+static void volterra5_move_guesses(volterra5_solver *s, const double to[volterra5_DIM])
+{
+    double distance = 0.0, size = 0.0;
+    for (int i = 0; i < volterra5_DIM; ++i) {
+        distance = fmax(distance, fabs(to[i] / s->x[i] - 1.0));
+        size = 1.0;
+    }
+    if (!(distance <= volterra5_NEAR_BY * size)) {
+        s->h = (double)NAN;
+        return;
+    }
+    volterra5_history *history = &s->history;
+    for (int i = 0; i < volterra5_DIM; ++i) history->difference[0][i] += to[i] - s->x[i];
+}
+
+/* Stand at x + carry from now on. */
+static volterra5_status volterra5_place(volterra5_solver *s, const double x[volterra5_DIM],
+    const double carry[volterra5_DIM])
+{
+    for (int i = 0; i < volterra5_DIM; ++i)
+        if (!isfinite(x[i])) return volterra5_BAD_ARGUMENT;
+    volterra5_move_guesses(s, x);
+    memcpy(s->x, x, sizeof s->x);
+    memcpy(s->carry, carry, sizeof s->carry);
+    return volterra5_OK;
+}
+
+volterra5_status volterra5_set_state(volterra5_solver *s, const double x[volterra5_DIM])
+{
+    double to[volterra5_DIM], carry[volterra5_DIM] = { 0.0 };
+    if (s == NULL || x == NULL) return volterra5_BAD_ARGUMENT;
+    memcpy(to, x, sizeof to); /* which may be a part of *s */
+    return volterra5_place(s, to, carry);
+}
+
+volterra5_status volterra5_kick(volterra5_solver *s, const double change[volterra5_DIM])
+{
+    double to[volterra5_DIM], carry[volterra5_DIM];
+    if (s == NULL || change == NULL) return volterra5_BAD_ARGUMENT;
+    for (int i = 0; i < volterra5_DIM; ++i) {
+        const double sum = s->x[i] + change[i], added = sum - s->x[i];
+        const double lost = ((s->x[i] - (sum - added)) + (change[i] - added)) + s->carry[i];
+        to[i] = sum + lost;
+        carry[i] = lost - (to[i] - sum);
+    }
+    return volterra5_place(s, to, carry);
 }
 
 /* ---- The solver ---- */

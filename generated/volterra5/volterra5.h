@@ -2,7 +2,7 @@
  * volterra5.h: the declarations; volterra5.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 9f8fb4eb19acc7ea31fa2c61171bd3ea04bd30a567e37730abd07b66bf6aef58
+ * body-sha256: b1b067186bc98ec4339f75c9a69e66cd01bbfe01543a53b3fb34ebc2eed36652
  */
 #ifndef VOLTERRA5_H
 #define VOLTERRA5_H
@@ -44,7 +44,7 @@ typedef struct {
 
 /* The solver is a plain value: copy it to branch, keep one per thread. Set it up with volterra5_init. */
 typedef struct {
-    double x[volterra5_DIM];     /* the state; read it freely, change it only through volterra5_init */
+    double x[volterra5_DIM];     /* the state; read it freely, change it only through functions */
     double carry[volterra5_DIM]; /* what rounding took from x: the state proper is x + carry */
     size_t steps;                /* good steps since volterra5_init */
     size_t evaluations;          /* of the generating function, for statistics */
@@ -68,6 +68,11 @@ volterra5_status volterra5_step(volterra5_solver *s, double h);
 
 /* Many steps. On failure s->x is the last good state and s->steps counts the good steps. */
 volterra5_status volterra5_integrate(volterra5_solver *s, double h, size_t steps);
+
+/* Between steps: stand at x, or move by change, all else being as it was, also on volterra5_BAD_ARGUMENT.
+   Either may leave the leaf. */
+volterra5_status volterra5_set_state(volterra5_solver *s, const double x[volterra5_DIM]);
+volterra5_status volterra5_kick(volterra5_solver *s, const double change[volterra5_DIM]);
 
 /* Many members, in place: x[i * members + m] is coordinate i of member m. One that fails keeps its last good
    state. status (or NULL) receives the status of each; the first that is not OK is returned. */

@@ -18,9 +18,10 @@
  *   2. Compensated sums, linear equations
  *   3. Starting guesses
  *   4. The implicit step, by Newton's method
- *   5. The solver
- *   6. Ensembles
- * body-sha256: 4b870477d9f5c474bc40c026cfc5088c5f40c1539eae42a4840a5a306aa88387
+ *   5. Between steps
+ *   6. The solver
+ *   7. Ensembles
+ * body-sha256: 072d3c2ff298b071b134f7d825ce5293ca46e89246dcfec5844581627d16c4dd
  */
 #include "vortices3.h"
 
@@ -913,6 +914,60 @@ static vortices3_status vortices3_attempt(vortices3_solver *s)
         return vortices3_OK;
     }
     return vortices3_NO_CONVERGENCE;
+}
+
+/* ---- Between steps ---- */
+/* how far the state may be moved, in its own size, for guesses to move with it */
+#define vortices3_NEAR_BY 0.125
+
+/* Guesses move with the state, by as many past values as extrapolation needs; recurrences are of the motion
+   as it was. From far away all begins anew, with the next step. */
+static void vortices3_move_guesses(vortices3_solver *s, const double to[vortices3_DIM])
+{
+    double distance = 0.0, size = 0.0;
+    for (int i = 0; i < vortices3_DIM; ++i) {
+        distance += fabs(to[i] - s->x[i]);
+        size += fabs(s->x[i]);
+    }
+    if (!(distance <= vortices3_NEAR_BY * size)) {
+        s->h = (double)NAN;
+        return;
+    }
+    vortices3_history *history = &s->history;
+    for (int i = 0; i < vortices3_DIM; ++i) history->difference[0][i] += to[i] - s->x[i];
+}
+
+/* Stand at x + carry from now on. */
+static vortices3_status vortices3_place(vortices3_solver *s, const double x[vortices3_DIM],
+    const double carry[vortices3_DIM])
+{
+    for (int i = 0; i < vortices3_DIM; ++i)
+        if (!isfinite(x[i])) return vortices3_BAD_ARGUMENT;
+    vortices3_move_guesses(s, x);
+    memcpy(s->x, x, sizeof s->x);
+    memcpy(s->carry, carry, sizeof s->carry);
+    return vortices3_OK;
+}
+
+vortices3_status vortices3_set_state(vortices3_solver *s, const double x[vortices3_DIM])
+{
+    double to[vortices3_DIM], carry[vortices3_DIM] = { 0.0 };
+    if (s == NULL || x == NULL) return vortices3_BAD_ARGUMENT;
+    memcpy(to, x, sizeof to); /* which may be a part of *s */
+    return vortices3_place(s, to, carry);
+}
+
+vortices3_status vortices3_kick(vortices3_solver *s, const double change[vortices3_DIM])
+{
+    double to[vortices3_DIM], carry[vortices3_DIM];
+    if (s == NULL || change == NULL) return vortices3_BAD_ARGUMENT;
+    for (int i = 0; i < vortices3_DIM; ++i) {
+        const double sum = s->x[i] + change[i], added = sum - s->x[i];
+        const double lost = ((s->x[i] - (sum - added)) + (change[i] - added)) + s->carry[i];
+        to[i] = sum + lost;
+        carry[i] = lost - (to[i] - sum);
+    }
+    return vortices3_place(s, to, carry);
 }
 
 /* ---- The solver ---- */

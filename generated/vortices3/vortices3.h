@@ -2,7 +2,7 @@
  * vortices3.h: the declarations; vortices3.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 1fbed7a7a79d0e7bd4e1681750b9713559505eff9d8c3e09b87fa6aae66e6d35
+ * body-sha256: f8e3c0eea88edb4319144066c047ba89a5d7eaff5560b14451de54522b068661
  */
 #ifndef VORTICES3_H
 #define VORTICES3_H
@@ -44,7 +44,7 @@ typedef struct {
 
 /* The solver is a plain value: copy it to branch, keep one per thread. Set it up with vortices3_init. */
 typedef struct {
-    double x[vortices3_DIM];     /* the state; read it freely, change it only through vortices3_init */
+    double x[vortices3_DIM];     /* the state; read it freely, change it only through functions */
     double carry[vortices3_DIM]; /* what rounding took from x: the state proper is x + carry */
     size_t steps;                /* good steps since vortices3_init */
     size_t evaluations;          /* of the generating function, for statistics */
@@ -68,6 +68,11 @@ vortices3_status vortices3_step(vortices3_solver *s, double h);
 
 /* Many steps. On failure s->x is the last good state and s->steps counts the good steps. */
 vortices3_status vortices3_integrate(vortices3_solver *s, double h, size_t steps);
+
+/* Between steps: stand at x, or move by change, all else being as it was, also on vortices3_BAD_ARGUMENT.
+   Either may leave the leaf. */
+vortices3_status vortices3_set_state(vortices3_solver *s, const double x[vortices3_DIM]);
+vortices3_status vortices3_kick(vortices3_solver *s, const double change[vortices3_DIM]);
 
 /* Many members, in place: x[i * members + m] is coordinate i of member m. One that fails keeps its last good
    state. status (or NULL) receives the status of each; the first that is not OK is returned. */

@@ -60,6 +60,8 @@ _EXTRAS = {
     "ensemble": (_INT, (_POINTER, _POINTER, _SIZE, _DOUBLE, _SIZE, _POINTER)),
     "step_tangent": (_INT, (_POINTER, _DOUBLE, _POINTER)),
     "init_gauge": (_INT, (_POINTER, _POINTER, _POINTER, _POINTER)),
+    "set_state": (_INT, (_POINTER, _POINTER)),
+    "kick": (_INT, (_POINTER, _POINTER)),
     "solver_time": (_DOUBLE, (_POINTER,)),
     "monitor": (_DOUBLE, (_POINTER, _POINTER)),
     "attitude": (None, (_POINTER, _POINTER)),
@@ -123,6 +125,22 @@ class CSession:
         copy = self.branch()
         copy._x[:] = x
         return copy
+
+    def place(self, x: Floats) -> None:
+        """See `Session`."""
+        self._moved("set_state", x)
+
+    def kick(self, change: Floats) -> None:
+        """See `Session`."""
+        self._moved("kick", change)
+
+    def _moved(self, function: str, by: Floats) -> None:
+        if not hasattr(self._c, function):
+            raise TypeError("the solver was compiled without kicks: its spec leaves them out")
+        given = np.ascontiguousarray(by, dtype=np.float64)
+        status = getattr(self._c, function)(self.address, given.ctypes.data)
+        if status:
+            raise BackendError(status_name(status), self.steps, self._x.reshape(1, -1).copy())
 
     def saved(self) -> bytes:
         """See `Session`."""

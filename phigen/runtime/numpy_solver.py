@@ -85,6 +85,31 @@ class NumpySession:
         copy._x = x[np.newaxis].copy()
         return copy
 
+    def place(self, x: Floats) -> None:
+        """See `Session`."""
+        self._stand(x[np.newaxis].copy(), np.zeros((1, len(x))))
+
+    def kick(self, change: Floats) -> None:
+        """See `Session`."""
+        self._stand(*self._module._sum(self._x, self._carry, change[np.newaxis]))
+
+    def _stand(self, x: Floats, carry: Floats) -> None:
+        """Guesses, which are offsets from the state, move with it."""
+        monitored = hasattr(self._module, "_refused")
+        if not np.isfinite(x).all() or (monitored and len(self._module._refused(self._values(), x))):
+            raise BackendError("BAD_ARGUMENT", self.steps, self._x.copy())
+        element = None if self._turned is None else self.element()
+        self._x, self._carry = x, carry
+        if monitored:  # e = -H
+            self._gauge = self._module.gauge(x[0], **self._parameters)
+            if np.isfinite(self._h):
+                self._stages = self._made_stages()
+        if element is not None:
+            self.turn_from(element)
+
+    def _values(self) -> Any:
+        return self._module._values(dict(self._parameters))
+
     def element(self) -> Floats:
         """See `Session`."""
         if self._turned is None:
@@ -95,7 +120,7 @@ class NumpySession:
 
     def turn_from(self, first: Floats | None) -> None:
         """Follow the attitude, from an element at the present state; None for the identity."""
-        values, still = self._module._values(dict(self._parameters)), self._module._identity(1)
+        values, still = self._values(), self._module._identity(1)
         gauge = None if self._gauge is None else np.broadcast_to(self._gauge, (1, len(self._module.GAUGE)))
         rate = self._module._rates(values, self._x, gauge)
         begun = still if first is None else first[np.newaxis]
@@ -166,11 +191,14 @@ class NumpySession:
     def _prepare(self, h: float) -> None:
         if h != self._h:
             self._t, self._counted = self._now(), self.steps
-            values = self._module._values(dict(self._parameters))
-            with np.errstate(all="ignore"):
-                self._stages = self._module._coefficients(values, self._x, h, self._gauge)
-            self._memory = [(np.zeros_like(self._x),) * 2] * len(self._stages)
             self._h = h
+            self._stages = self._made_stages()
+            self._memory = [(np.zeros_like(self._x),) * 2] * len(self._stages)
+
+    def _made_stages(self) -> list[Stage]:
+        with np.errstate(all="ignore"):
+            stages: list[Stage] = self._module._coefficients(self._values(), self._x, self._h, self._gauge)
+            return stages
 
     def _tried(self) -> tuple[Floats, Floats, list[Pair], list[Made]]:
         """State, carry and memory after one step, and of each stage: itself, its start and what it solved for."""

@@ -55,6 +55,14 @@ class Session(Course, Protocol):
         """A copy of a session that stands at its start, moved to ``x`` (DIM,): what it holds fixed stays."""
         ...
 
+    def place(self, x: Floats) -> None:
+        """Stand at ``x`` (DIM,), with all else as it is; raises `BackendError` where that is not allowed."""
+        ...
+
+    def kick(self, change: Floats) -> None:
+        """Move the state by ``change`` (DIM,), else as `place`."""
+        ...
+
     def element(self) -> Floats:
         """A copy of the numbers of the attitude, and of the position; none if they are not followed."""
         ...

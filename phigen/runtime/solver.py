@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
@@ -13,6 +14,7 @@ from phigen.runtime import arguments
 from phigen.runtime.backend import Backend
 from phigen.runtime.crossings import CrossingFinder, Function, Section
 from phigen.runtime.interface import BackendError, Floats, Interface, MissingExtraError, Progress, row_steps
+from phigen.runtime.live import LiveSession
 from phigen.runtime.retrying import Retrying
 from phigen.runtime.session import Session, rows_along
 from phigen.runtime.timed import along_until, states_at
@@ -144,6 +146,26 @@ class Solver:
         except BackendError as error:
             raise self.failure(error, h, made(), values) from error
         return made()
+
+    def session(
+        self,
+        x0: ArrayLike,
+        *,
+        t0: float | None = None,
+        attitude0: ArrayLike | None = None,
+        position0: ArrayLike | None = None,
+        parameters: Mapping[str, float] | None = None,
+        **more: float,
+    ) -> LiveSession:
+        """A trajectory from ``x0`` (DIM,) in the hands of the caller: ``.step(h)``, ``.kick(dx)``, ``.x``.
+
+        The other arguments are those of `integrate`.
+        """
+        begin = arguments.start_time(t0, self.interface, more)
+        values = self._values(parameters, more)
+        start = arguments.state(x0, "x0", self.interface)
+        first = arguments.first(attitude0, position0, self.interface)
+        return LiveSession(self, self._started(start, math.nan, values, begin, first), values, begin)
 
     def states_at(self, trajectory: Trajectory, times: Floats) -> Floats:
         """The states (times, DIM) of a trajectory of this solver at given times; see `Trajectory.at`."""

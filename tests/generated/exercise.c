@@ -131,6 +131,13 @@ static void aliases(void)
     EXPECT(F(integrate)(&s, STEP, 3) == F(OK));
     EXPECT(F(ensemble)(&b.params, b.x, 1, STEP, 3, NULL) == F(OK));
     same(b.x, s.x);
+    b = s;
+    EXPECT(F(set_state)(&b, b.x) == F(OK));
+    same(b.x, s.x);
+    for (int i = 0; i < DIM; ++i) b.x[i] = b.carry[i] = 0x1p-40 * s.x[i];
+    EXPECT(F(kick)(&b, b.carry) == F(OK)); /* x + change + carry */
+    for (int i = 0; i < DIM; ++i) EXPECT(fabs(b.x[i] - 3.0 * 0x1p-40 * s.x[i]) <= 1e-15 * fabs(b.x[i]));
+    b = s;
     F(vector_field)(&b.params, b.x, b.x);
     F(vector_field)(&s.params, s.x, field);
     same(b.x, field);

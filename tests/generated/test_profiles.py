@@ -50,7 +50,8 @@ def test_small_code_makes_the_steps_of_fast_code(name, scheme):
 def test_small_code_is_short(name, order, lines, solver_bytes):
     """With a gauge that is chosen, which most tests do without."""
     given = spec.load(resources.bundled_specs() / f"{name}.yaml")
-    compilation = compile_spec(replace(given, profile="small"), order=order)
+    without = Extras(without=frozenset(["kicks"]))
+    compilation = compile_spec(replace(given, profile="small"), order=order, extras=without)
     texts = files(compilation, "c").values()
     assert sum(text.count("\n") for text in texts) <= lines
     assert RawC(compilation).memory.size <= solver_bytes
@@ -58,7 +59,13 @@ def test_small_code_is_short(name, order, lines, solver_bytes):
 
 
 #: Of each part that can be left out, a word in code that has it.
-WORDS = {"ensemble": "_ensemble(", "gauge-search": "_guide(", "lanes": "_LANES", "recurrences": "_RIDGE"}
+WORDS = {
+    "ensemble": "_ensemble(",
+    "gauge-search": "_guide(",
+    "kicks": "_kick(",
+    "lanes": "_LANES",
+    "recurrences": "_RIDGE",
+}
 
 
 def described(name, profile, without=()):
@@ -80,12 +87,15 @@ def test_a_part_can_be_left_out_of_fast_code(part):
     if part == "ensemble":
         with pytest.raises(TypeError, match="compiled without ensembles"):
             solver(compilation, "c").ensemble([at.x], at.h, 1)
+    if part == "kicks":
+        with pytest.raises(TypeError, match="compiled without kicks"):
+            solver(compilation, "c").session(at.x).kick(at.x)
 
 
 def test_small_code_has_no_part_that_serves_speed_and_carries_nothing_for_one():
     texts = files(described("rigid_body", "small"), "c").values()
     assert {part: any(word in text for text in texts) for part, word in WORDS.items()} == {
-        part: part == "ensemble" for part in PARTS
+        part: part in ("ensemble", "kicks") for part in PARTS
     }
     paths = [described("nambu_pendulum", profile).program.step for profile in ("fast", "small")]
     assert paths[0].lanes

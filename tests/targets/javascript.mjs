@@ -27,6 +27,17 @@ function many(Solver, job, start) {
   return { x: x.map((end) => [...end]), status };
 }
 
+/** Kicked, and set to where it was; then the same as a solver that starts there, to rounding. */
+function moved(Solver, job, monitored) {
+  const solver = new Solver(job.options);
+  const small = solver.x.map((x) => 1e-3 * x);
+  solver.step(job.h).kick(small).step(job.h).setState(solver.x).kick(small);
+  const gauge = monitored ? {} : { gauge: solver.gauge };
+  const fresh = new Solver({ ...job.options, ...gauge, x0: solver.x, t0: solver.t });
+  const failure = attempted(() => solver.kick(small.map(() => NaN)));
+  return { x: [...solver.step(job.h).x], fresh: [...fresh.step(job.h).x], failure, steps: solver.steps };
+}
+
 async function answer(job) {
   const { Solver, StepError } = await import(job.module);
   const made = attempted(() => new Solver(job.options));
@@ -52,6 +63,7 @@ async function answer(job) {
     exports: typeof StepError,
     tangent: varied(Solver, job),
     many: many(Solver, job, start),
+    moved: attempted(() => moved(Solver, job, "tCarry" in solver)).value,
   };
 }
 

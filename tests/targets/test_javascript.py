@@ -156,6 +156,13 @@ def test_steps_are_those_of_numpy_to_roundoff(case, answers):
     assert np.any(found["carry"]) or case == "path, in pieces"  # of changes larger than the state all sums are exact
 
 
+@pytest.mark.parametrize("case", [*NAMES, *VARIANTS])
+def test_kicked_solvers_go_on_as_ones_that_start_there(case, answers):
+    found = answers[case]["moved"]
+    assert apart(found["x"], found["fresh"]) < 1e-13
+    assert (found["failure"]["status"], found["steps"]) == ("BAD_ARGUMENT", 3)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("case", [*NAMES, *VARIANTS])
 def test_steps_are_those_of_c_to_roundoff(case, answers):

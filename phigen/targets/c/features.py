@@ -62,6 +62,7 @@ FEATURES = (
     Feature("MODIFIED", lambda p: p.modified),
     Feature("ADVANCE", lambda p: not isinstance(p.step, Splitting) or p.extras.tangent),
     Feature("UNROLLED", lambda p: isinstance(p.step, Implicit) and _fast(p) and p.step.eliminate),
+    Feature("KICKED", part="kicks"),
     Feature("ENSEMBLE", part="ensemble"),
     Feature("GAUGE_SEARCH", requires=("GAUGE",), part="gauge-search"),
     Feature("RECURRENCES", requires=("IMPLICIT",), part="recurrences"),

@@ -91,6 +91,7 @@ def _features(program: Program) -> dict[str, bool]:
         "RENEWED": step.refresh is not None,
         "MODIFIED": program.modified is not None,
         "TANGENT": program.extras.tangent,
+        "KICKED": program.offers("kicks"),
         "ENSEMBLE": program.offers("ensemble"),
         **{f"TAYLOR_{kind.upper()}": kind in sums for kind in ("product", "chain", "power")},
     }

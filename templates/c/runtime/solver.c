@@ -19,6 +19,9 @@
 #elif PHI_GAUGE
 #include "gauge.c"
 #endif
+#if PHI_KICKED
+#include "placing.c"
+#endif
 #if PHI_BLOCKS
 #include <limits.h>
 

@@ -47,7 +47,7 @@ typedef struct {
 #endif
 /* The solver is a plain value: copy it to branch, keep one per thread. Set it up with phi_init. */
 typedef struct {
-    double x[PHI_DIM];     /* the state; read it freely, change it only through phi_init */
+    double x[PHI_DIM];     /* the state; read it freely, change it only through functions */
     double carry[PHI_DIM]; /* what rounding took from x: the state proper is x + carry */
     size_t steps;          /* good steps since phi_init */
     size_t evaluations;    /* of the generating function, for statistics */
@@ -147,6 +147,16 @@ phi_status phi_step(phi_solver *s, double h);
 /* Many steps. On failure s->x is the last good state and s->steps counts the good steps. */
 phi_status phi_integrate(phi_solver *s, double h, size_t steps);
 
+#if PHI_KICKED
+/* Between steps: stand at x, or move by change, all else being as it was, also on PHI_BAD_ARGUMENT. Either may leave the
+   leaf. */
+#if PHI_MONITOR
+/* But e becomes -H there, where phi_monitor must be positive. */
+#endif
+phi_status phi_set_state(phi_solver *s, const double x[PHI_DIM]);
+phi_status phi_kick(phi_solver *s, const double change[PHI_DIM]);
+
+#endif
 #if PHI_ENSEMBLE
 /* Many members, in place: x[i * members + m] is coordinate i of member m. One that fails keeps its last good state.
    status (or NULL) receives the status of each; the first that is not OK is returned. */

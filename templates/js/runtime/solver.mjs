@@ -101,7 +101,7 @@ export class Solver {
   static CASIMIRS = CASIMIRS;
   static DEFAULT_PARAMETERS = DEFAULT_PARAMETERS;
 
-  /** The state; read it freely, and make another solver to start elsewhere. */
+  /** The state; read it freely, and change it by setState and kick only. */
   x;
   /** What rounding took from x: the state proper is x + carry. */
   carry = new Float64Array(DIM);
@@ -270,6 +270,60 @@ export class Solver {
     return this;
   }
 
+  // #if KICKED
+  /**
+   * Between steps: stand at x, with time, parameters and any gauge as they are. Throws StepError for what
+   * is not allowed; then all is as before.
+   *
+   * @param {ArrayLike<number>} x it may lie off the leaf: the Casimirs are from then on those of x
+   * @returns {this}
+   */
+  setState(x) {
+    return this.#place(finite(x, DIM, "x"), new Float64Array(DIM));
+  }
+
+  /**
+   * Between steps: move the state by a change, as an impulse does; else as setState.
+   *
+   * @param {ArrayLike<number>} change
+   * @returns {this}
+   */
+  kick(change) {
+    const to = finite(change, DIM, "the change");
+    const carry = new Float64Array(DIM);
+    to.forEach((by, i) => {
+      const sum = this.x[i] + by;
+      const added = sum - this.x[i];
+      const lost = ((this.x[i] - (sum - added)) + (by - added)) + this.carry[i];
+      to[i] = sum + lost;
+      carry[i] = lost - (to[i] - sum);
+    });
+    return this.#place(finite(to, DIM, "the state"), carry);
+  }
+
+  /** Stand at x + carry from now on. */
+  #place(x, carry) {
+    // #if MONITOR
+    const [rate, level] = [rateAt(this.params, x), chooseGauge(this.params, x)];
+    if (!(Number.isFinite(rate) && rate > 0 && Number.isFinite(level[0]))) {
+      throw new StepError("BAD_ARGUMENT", this.steps, `the monitor is ${rate} there`);
+    }
+    this.gauge = level;
+    if (Number.isFinite(this.h)) {
+      FRACTIONS.forEach((fraction, stage) => {
+        prepare(this.params, level, fraction * this.h, this.coef[stage]);
+      });
+    }
+    // #endif
+    // #if IMPLICIT
+    for (const history of this.history) history.move(this.x, x);
+    // #endif
+    this.x.set(x);
+    this.carry.set(carry);
+    return this;
+  }
+
+  // #endif
   // #if TANGENT
   /**
    * One step as `step` makes it, and its derivative, to round-off, with any gauge held fixed. Throws

@@ -48,6 +48,7 @@
 #define PHI_GAUGE 0
 #endif
 #define PHI_GAUGE_SEARCH (PHI_GAUGE && PHI_FAST)
+#define PHI_KICKED 1
 #define PHI_ENSEMBLE 1
 #define PHI_RELATIVE 0
 #define PHI_MODIFIED 0

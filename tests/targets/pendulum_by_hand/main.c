@@ -55,6 +55,34 @@ static void keeps_energy(void)
     }
 }
 
+/* A kick there and back, and a state set to what it is, leave a trajectory that differs by rounding only; time, gauge and
+   steps go on. Guesses move along, so that a small kick costs no more evaluations than two steps do. */
+static void is_moved_from_outside(void)
+{
+    const double there[2] = { 0.01, -0.02 }, back[2] = { -0.01, 0.02 }, nowhere[2] = { 0.0, (double)NAN };
+    phi_solver s, kicked;
+    EXPECT(phi_init(&s, NULL, start) == PHI_OK);
+    EXPECT(phi_integrate(&s, H, 400) == PHI_OK);
+    kicked = s;
+    EXPECT(phi_kick(&kicked, there) == PHI_OK && fabs(kicked.x[0] - (s.x[0] + 0.01)) <= 1e-15);
+    EXPECT(phi_kick(&kicked, back) == PHI_OK && apart(kicked.x, s.x) <= 1e-15);
+    EXPECT(phi_set_state(&kicked, kicked.x) == PHI_OK);
+    const size_t before = kicked.evaluations;
+    EXPECT(phi_step(&kicked, H) == PHI_OK && phi_step(&s, H) == PHI_OK);
+    EXPECT(kicked.evaluations - before <= 2 * PHI_STAGES);
+    EXPECT(phi_integrate(&kicked, H, 300) == PHI_OK && phi_integrate(&s, H, 300) == PHI_OK);
+    EXPECT(apart(kicked.x, s.x) < 1e-12 && kicked.steps == s.steps && fabs(kicked.t - s.t) <= 0.0);
+    EXPECT(phi_kick(&kicked, start) == PHI_OK && phi_integrate(&kicked, H, 100) == PHI_OK);
+    EXPECT(phi_init(&s, NULL, kicked.x) == PHI_OK && phi_set_state(&kicked, start) == PHI_OK);
+    EXPECT(phi_set_state(&kicked, s.x) == PHI_OK);
+    EXPECT(phi_integrate(&kicked, H, 100) == PHI_OK && phi_integrate(&s, H, 100) == PHI_OK);
+    EXPECT(apart(kicked.x, s.x) < 1e-12);
+    s = kicked;
+    EXPECT(phi_kick(&kicked, nowhere) == PHI_BAD_ARGUMENT && phi_set_state(&kicked, nowhere) == PHI_BAD_ARGUMENT);
+    EXPECT(phi_kick(NULL, there) == PHI_BAD_ARGUMENT && phi_set_state(&kicked, NULL) == PHI_BAD_ARGUMENT);
+    EXPECT(memcmp(&s, &kicked, sizeof s) == 0);
+}
+
 /* Blocks, groups and packs are single steps; all kinds of the midpoint rule are one method, whose values are known. */
 static void many_are_one(void)
 {
@@ -135,6 +163,7 @@ int main(void)
     refuses_what_is_not_allowed();
     counts_time();
     keeps_energy();
+    is_moved_from_outside();
     many_are_one();
     failures_change_nothing();
 #if PHI_GAUGE

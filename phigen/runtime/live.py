@@ -1,0 +1,133 @@
+"""A trajectory in the hands of its user: he makes the steps, and may move the state between them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from phigen.errors import StepError
+from phigen.runtime import arguments
+from phigen.runtime.interface import BackendError, Floats
+from phigen.runtime.session import Session
+from phigen.runtime.trajectory import turned_into
+
+if TYPE_CHECKING:
+    from phigen.runtime.solver import Solver
+
+
+class LiveSession:
+    """A trajectory that stands somewhere; `Solver.session` makes one.
+
+    ``x`` (DIM,), ``t``, ``steps``, ``energy``, ``casimirs`` (by name), ``attitude`` and ``position`` (None without
+    ``reconstruct``) are those of the state; `step` goes on, `kick` and setting ``x`` move it. What the solver learnt
+    on the way, and a gauge, stay; with a monitor e becomes −H of the new state. ``copy()`` branches; sessions can be
+    pickled, and go on to the last bit.
+    """
+
+    def __init__(self, solver: Solver, session: Session, parameters: Mapping[str, float], t0: float) -> None:
+        self.solver = solver
+        self.parameters = dict(parameters)
+        self._session = session
+        # The time and the steps when the size of the step was set: without adding up.
+        self._h, self._t, self._counted = 0.0, t0, 0
+        self._put = session.state()
+
+    def __repr__(self) -> str:
+        return f"<LiveSession of {self.solver.interface.name}: t = {self.t!r}, {self.steps} steps>"
+
+    @property
+    def x(self) -> Floats:
+        """The state (DIM,), a copy; setting it moves the session there, onto the leaf of that state."""
+        return self._session.state()
+
+    @x.setter
+    def x(self, value: ArrayLike) -> None:
+        self._move(self._session.place, arguments.state(value, "x", self.solver.interface))
+
+    def kick(self, change: ArrayLike) -> LiveSession:
+        """Move the state by ``change`` (DIM,), as an impulse does. Where that leaves the leaf, ``leaf`` follows."""
+        self._move(self._session.kick, arguments.state(change, "change", self.solver.interface))
+        return self
+
+    def step(self, h: float, steps: int = 1) -> LiveSession:
+        """Make steps of size ``h``, in τ with a monitor. Raises `StepError`, and stands before the step that failed."""
+        h, steps = arguments.step_size(h), arguments.count(steps, "steps", 0)
+        if h != self._h:
+            self._h, self._t, self._counted = h, self._counted_time(), self.steps
+        try:
+            self._session.advance(h, steps)
+        except BackendError as error:
+            raise self.solver.failure(error, h, None, self.parameters) from error
+        return self
+
+    @property
+    def steps(self) -> int:
+        """Steps made since the start."""
+        return self._session.steps
+
+    @property
+    def t(self) -> float:
+        """The physical time."""
+        return self._t + self._session.time() if self.solver.interface.monitored else self._counted_time()
+
+    @property
+    def energy(self) -> float:
+        """H of the state."""
+        row = self.x[np.newaxis]
+        return float(self.solver.energies(row, np.array([self.t]), self.parameters)[0])
+
+    @property
+    def casimirs(self) -> dict[str, float]:
+        """The Casimirs of the state, by name."""
+        return self._casimirs_of(self.x)
+
+    @property
+    def leaf(self) -> dict[str, float]:
+        """The Casimirs of the leaf that the session was last put on: at the start, by setting x, or by a kick."""
+        return self._casimirs_of(self._put)
+
+    @property
+    def attitude(self) -> Floats | None:
+        """A quaternion (4,) or a matrix (n, n); None without ``reconstruct``."""
+        return None if (found := self._element()[0]) is None else found[0]
+
+    @property
+    def position(self) -> Floats | None:
+        """The position (3,); None without one."""
+        return None if (found := self._element()[1]) is None else found[0]
+
+    def copy(self) -> LiveSession:
+        """An independent copy."""
+        twin = object.__new__(LiveSession)
+        twin.__dict__.update(self.__dict__)
+        twin.parameters, twin._session = dict(self.parameters), self._session.branch()
+        return twin
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {**self.__dict__, "_session": self._session.saved()}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state)
+        self._session = self.solver.backend.restored(state["_session"], self.parameters)
+
+    def _casimirs_of(self, x: Floats) -> dict[str, float]:
+        found = self.solver.casimirs(x, parameters=self.parameters)
+        return {name: float(value) for name, value in found.items()}
+
+    def _counted_time(self) -> float:
+        return self._t + (self.steps - self._counted) * self._h if not self.solver.interface.monitored else self._t
+
+    def _element(self) -> tuple[Floats | None, Floats | None]:
+        return turned_into(self.solver.interface, self._session.element()[np.newaxis])
+
+    def _move(self, by: Any, given: Floats) -> None:
+        try:
+            by(given)
+        except BackendError as error:
+            said = "or the monitor not positive there" if self.solver.interface.monitored else "too large"
+            name = self.solver.interface.name
+            raise StepError(f"{name}: the state is not finite, {said}", step=self.steps, status=error.status) from error
+        self._put = self.x

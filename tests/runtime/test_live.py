@@ -1,0 +1,118 @@
+"""Sessions in the hands of their users: steps, kicks, states that are set."""
+
+import pickle
+
+import numpy as np
+import pytest
+from support import compiled, setting, solver
+
+from phigen.errors import StepError
+
+TARGETS = ["c", "numpy"]
+#: A gauge that is found; with an attitude; a time; a splitting with a monitor; paths, relative sizes.
+SYSTEMS = ["rigid_body", "dzhanibekov", "duffing", "kepler_eccentric", "sir_epidemic"]
+
+
+def session_of(name, target):
+    at = setting(compiled(name))
+    return solver(compiled(name), target).session(at.x, parameters=at.parameters), at
+
+
+@pytest.mark.parametrize("name", SYSTEMS)
+def test_kicked_sessions_of_c_and_numpy_are_one_trajectory(name):
+    found = []
+    for target in TARGETS:
+        session, at = session_of(name, target)
+        kick = 1e-2 * np.array(at.x)
+        session.step(at.h, 20).kick(kick).step(at.h).kick(-0.9 * kick).step(0.5 * at.h, 10)
+        session.x = 0.7 * session.x
+        session.step(at.h, 3)
+        found.append([*session.x, session.t, session.energy, *session.casimirs.values()])
+        found[-1] += [] if session.attitude is None else session.attitude.tolist()
+        assert session.steps == 34
+    assert np.allclose(found[0], found[1], rtol=1e-11, atol=1e-12)
+
+
+@pytest.mark.parametrize("target", TARGETS)
+@pytest.mark.parametrize("name", SYSTEMS[:2])
+def test_a_kick_moves_to_another_leaf_and_energy_which_are_kept_from_then_on(name, target):
+    session, at = session_of(name, target)
+    before = session.step(at.h, 10).leaf
+    session.kick(0.05 * np.array(at.x))
+    energy, leaf = session.energy, session.leaf
+    assert all(abs(leaf[n] - before[n]) > 1e-3 for n in leaf)
+    session.step(at.h, 500)
+    assert session.casimirs == pytest.approx(leaf, rel=1e-13)
+    assert session.energy == pytest.approx(energy, rel=1e-4)
+
+
+@pytest.mark.parametrize("target", TARGETS)
+def test_orbits_of_a_monitor_are_those_of_the_energy_after_the_kick(target):
+    """Were e that of before, K would not vanish, and the orbit be another, with another excentricity."""
+    at = setting(compiled("kepler_eccentric"))
+    session = solver(compiled("kepler_eccentric"), target).session(at.x, oblateness=0)
+    session.step(at.h, 7)
+    q1, q2, p1, p2 = session.x
+    session.kick([0, 0, -0.1 * p1, -0.1 * p2])
+    excentricity = []
+    for _ in range(2):
+        q1, q2, p1, p2 = session.x
+        spin = q1 * p2 - q2 * p1
+        excentricity.append([p2 * spin - q1 / np.hypot(q1, q2), -p1 * spin - q2 / np.hypot(q1, q2)])
+        session.step(at.h, 300)
+    assert excentricity[0] == pytest.approx(excentricity[1], abs=1e-11)
+
+
+@pytest.mark.parametrize("target", TARGETS)
+def test_the_momentum_in_space_is_constant_after_an_impulse_too(target):
+    """What the Casimirs of a gauge turn the body by is another rate on another leaf."""
+    session, at = session_of("dzhanibekov", target)
+    session.step(at.h, 40)
+    attitude = session.attitude
+    session.kick([0.3, -0.1, 0.2])
+    assert session.attitude == pytest.approx(attitude, abs=1e-14)
+    spatial = turned(session.attitude, session.x)
+    session.step(at.h, 200)
+    assert turned(session.attitude, session.x) == pytest.approx(spatial, abs=1e-12)
+
+
+def turned(q, v):
+    """A vector of the body in space."""
+    t = 2 * np.cross(q[1:], v)
+    return v + q[0] * t + np.cross(q[1:], t)
+
+
+@pytest.mark.parametrize("target", TARGETS)
+def test_sessions_make_the_steps_of_integrate_and_branch_and_are_stored(target):
+    session, at = session_of("rigid_body", target)
+    whole = session.solver.integrate(at.x, at.h, 30, parameters=at.parameters)
+    session.step(at.h, 10)
+    copy, stored = session.copy(), pickle.dumps(session)
+    session.kick([1, 2, 3]).step(at.h, 5)
+    for other in (copy, pickle.loads(stored)):
+        other.step(at.h, 20)
+        assert other.x.tolist() == whole.x[-1].tolist()
+        assert (other.t, other.steps) == (whole.t[-1], 30)
+
+
+@pytest.mark.parametrize("target", TARGETS)
+def test_time_is_counted_through_changes_of_the_step(target):
+    session, at = session_of("duffing", target)
+    later = session.solver.session(at.x, t0=2.0)
+    later.step(0.1, 1000).step(0.05, 10).kick([0.1, 0]).step(0.1, 1000)
+    assert later.t == pytest.approx(202.5, rel=1e-15)
+
+
+@pytest.mark.parametrize("target", TARGETS)
+def test_what_is_not_allowed_leaves_all_as_it_was(target):
+    session, at = session_of("kepler_eccentric", target)
+    before = session.step(at.h, 3).x
+    with pytest.raises(StepError, match="not finite, or the monitor not positive there"):
+        session.kick(-before)
+    with pytest.raises(ValueError, match="must be finite"):
+        session.kick([np.nan, 0, 0, 0])
+    with pytest.raises(ValueError, match="shape"):
+        session.x = np.zeros((2, 4))
+    with pytest.raises(StepError):
+        session.step(1e300)
+    assert (session.x.tolist(), session.steps) == (before.tolist(), 3)
