@@ -38,7 +38,6 @@ def run_lattice(
 ) -> None:
     """Integrate a run, and print what was conserved. Raises `StepError` after that if it did not come to its end."""
     from phigen.api import chosen_target, compilation_of, lattice_solver_of
-    from phigen.lattice.cell import GRAPH
     from phigen.lattice.observing import errors_of
     from phigen.lattice.states import start_of
 
@@ -48,8 +47,6 @@ def run_lattice(
     assert compilation.cell is not None
     start = start_of(spec, run)
     parameters = _parameters(start, settings)
-    if compilation.cell.relation == GRAPH:
-        parameters["bonds"] = start.bonds
     solver = lattice_solver_of(compilation, chosen_target(target, console.note))
     kept = output.with_name(output.name + ".checkpoint") if output else None
     if kept and not resume:
@@ -59,7 +56,7 @@ def run_lattice(
         try:
             made = solver.integrate(
                 start.state, float(run.step), run.steps, run.stride,
-                output=output, checkpoints=kept, progress=progress, parameters=parameters,
+                output=output, checkpoints=kept, progress=progress, parameters=start.arguments | parameters,
             )  # fmt: skip
         except StepError as error:
             failure, made = error, error.trajectory

@@ -65,10 +65,12 @@ def command(
             raise click.BadParameter(f"one spec is drawn, not {len(specs)}", param_hint="--plot")
     for spec in specs:
         with collector.collecting():
-            expect_system(spec)
-            extras = with_tangent(spec)
+            if plot:
+                expect_system(spec)
+            extras = with_tangent(spec) if not spec.lattice else None
             compilation = compile_proved(spec, order=order, scheme=scheme, extras=extras)
-            verification = verified(compilation, name, quick, console)
+            judged = verified_lattice if spec.lattice else verified
+            verification = judged(compilation, name, quick, console)
             found.append(verification)
             if not as_json:
                 print_table(verification)
@@ -138,6 +140,23 @@ def verified(
     )  # fmt: skip
 
 
+def verified_lattice(
+    compilation: Compilation, name: str | None, quick: bool, console: Console, targets: Sequence[str] = ()
+) -> Verification:
+    """The same for a lattice, which has no tangent map."""
+    from phigen.api import chosen_target, lattice_solver_of
+    from phigen.cli.experiment import run_of
+    from phigen.lattice.states import start_of
+    from phigen.study.lattices import verify_lattice
+
+    spec = compilation.spec
+    run = run_of(spec, name)
+    chosen = loadable(targets or spec.targets) or (chosen_target("auto"),)
+    solvers = {target: lattice_solver_of(compilation, target) for target in chosen}
+    console.detail(f"{spec.name}: built {', '.join(solvers)}")
+    return verify_lattice(compilation, solvers, run.name, start_of(spec, run), float(run.step), run.steps, quick=quick)
+
+
 def fallen_short(verification: Verification) -> CheckError:
     """The error that names what fell short."""
     lines = [f"{verification.name}: verification failed", *(f"  {f}" for f in verification.failures)]
@@ -154,7 +173,7 @@ def print_table(v: Verification) -> None:
     rows += [_row(check, v.compared) for check in v.checks]
     for line in table(rows, right=[1, *range(4, 4 + len(v.compared))]):
         out(f"  {line}")
-    out(f"  {stated(v.units)}\n")
+    out(f"  {v.said or stated(v.units)}\n")
 
 
 def _row(check: Check, compared: Sequence[str]) -> list[str]:

@@ -23,13 +23,20 @@ class Start:
     """A run before its first step.
 
     ``sizes`` are those of the axes, of graphs and pairs the number of sites. ``state`` has the shape (fields, *sizes).
-    ``parameters`` are numbers, and arrays over sites or bonds. ``bonds`` has the shape (bonds, 2).
+    ``parameters`` are numbers, and arrays over sites or bonds. ``bonds`` has the shape (bonds, 2), ``graph`` tells
+    whether there are any.
     """
 
     sizes: tuple[int, ...]
     state: Floats
     parameters: Mapping[str, float | Floats]
     bonds: Bonds
+    graph: bool = False
+
+    @property
+    def arguments(self) -> dict[str, Any]:
+        """The parameters of a solver, with the bonds of a graph."""
+        return {**self.parameters, **({"bonds": self.bonds} if self.graph else {})}
 
 
 def start_of(spec: Spec, run: Run) -> Start:
@@ -67,7 +74,7 @@ class _Reader:
                 if p.positive and np.any(np.asarray(parameters[p.name]) <= 0):
                     message = f"the parameter {p.name!r} is positive by declaration, but not all its values are"
                     raise self._error("parameters", message)
-        return Start(sizes, self._state(sizes), parameters, bonds)
+        return Start(sizes, self._state(sizes), parameters, bonds, bool(self.lattice.graph))
 
     def _error(self, key: str, message: str, hint: str = "") -> SpecError:
         return SpecError([self.spec.diagnostic(("runs", self.run.name, key), message, hint)])

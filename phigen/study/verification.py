@@ -59,7 +59,10 @@ class Check:
 
 @dataclass(frozen=True)
 class Verification:
-    """All checks of one spec on one run; ``label`` says what the solver claims to be, ``units`` what errors are in."""
+    """All checks of one spec on one run; ``label`` says what the solver claims to be, ``units`` what errors are in.
+
+    Of a lattice ``said`` does that in words.
+    """
 
     name: str
     run: str
@@ -70,6 +73,7 @@ class Verification:
     compared: tuple[str, ...]
     checks: tuple[Check, ...]
     units: Mapping[str, Unit]
+    said: str = ""
 
     @property
     def failures(self) -> list[str]:

@@ -47,7 +47,44 @@ def test_a_run_is_drawn_over_space_and_time(phigen, chain, tmp_path):
     assert "<svg" in (tmp_path / "wave.svg").read_text(encoding="utf-8")
 
 
-@pytest.mark.parametrize("command", [["verify"], ["tune"], ["report"], ["build", "-t", "js"], ["run", "--lyapunov"]])
+def test_what_a_lattice_promises_is_measured(phigen, chain):
+    chain.write_text(CHAIN.replace("runs:", "targets: [numpy]\nruns:"), encoding="utf-8")
+    (found,) = json.loads(phigen("verify", chain, "--json", "--quick").stdout)
+    checks = {check["name"]: check["value"] for check in found["checks"]}
+    assert found["passed"]
+    assert checks["observed order"] == pytest.approx(4, abs=0.1)
+    assert checks["Poisson identity on 3 sites"] < 1e-11
+    assert checks["reversibility"] < 1e-14
+
+
+@pytest.mark.parametrize(
+    ("wrong", "said"),
+    [
+        (lambda x, h: x * (1 + 1e-6 * h), "Poisson identity on 3 sites"),
+        (lambda x, h: x + 1e-3 * h**2 * x[::-1], "observed order"),
+        (lambda x, h: x + 1e-12, "reversibility"),
+    ],
+)
+def test_a_lattice_that_falls_short_is_told(phigen, chain, monkeypatch, wrong, said):
+    from phigen.runtime.numpy_lattice import NumpyLatticeSession
+
+    chain.write_text(CHAIN.replace("runs:", "targets: [numpy]\nruns:"), encoding="utf-8")
+    good = NumpyLatticeSession.advance
+
+    def advance(session, h, steps):
+        for _ in range(steps):
+            good(session, h, 1)
+            session._x = wrong(session._x, h)
+
+    monkeypatch.setattr(NumpyLatticeSession, "advance", advance)
+    done = phigen("verify", chain, "--quick")
+    assert done.exit_code == 5
+    assert said in done.stderr
+
+
+@pytest.mark.parametrize(
+    "command", [["verify", "--plot", "a.svg"], ["tune"], ["report"], ["build", "-t", "js"], ["run", "--lyapunov"]]
+)
 def test_what_lattices_do_not_have_is_refused(phigen, chain, tmp_path, command):
     done = phigen(*command, chain, *(["-o", tmp_path] if command[0] == "build" else []))
     assert done.exit_code in (1, 2)

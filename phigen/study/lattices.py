@@ -1,0 +1,232 @@
+"""Verification of lattices: what their solvers must show, measured on a run and on small lattices.
+
+The Poisson identity is that of a lattice of a few sites: the statement about any size is proved, and this would show a
+sweep that is printed wrongly. Its sites start as some of the run.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from phigen import progress
+from phigen.compilation import Compilation
+from phigen.errors import StepError
+from phigen.lattice.cell import Cell
+from phigen.lattice.expansion import Expansion, expand, ring
+from phigen.lattice.observing import errors_of
+from phigen.lattice.states import Start
+from phigen.runtime.lattice import LatticeSolver, LatticeTrajectory
+from phigen.scheme.steps import Sweeps
+from phigen.study.conservation import rounding
+from phigen.study.verification import ONE_STEP, ORDER_SLACK, Check, Verification
+from phigen.symbolic.arrays import Floats, evaluate
+
+#: Steps times sites that a run is shortened to, and with ``quick``; frames of it.
+MOST_UPDATES, FEW_UPDATES, FRAMES = 200_000_000, 20_000_000, 100
+#: The largest error of energy in the last quarter of a run may be this many times that before.
+GROWTH = 4.0
+#: The Poisson identity, by differences of order 6 on a small lattice.
+DIFFERENCES = 1e-9
+#: What errors are relative to.
+SAID = (
+    "Errors of energy are relative to the sum of the magnitudes of the energies of the sites, those of sums to that of "
+    "their terms; Casimirs of sites are looked at where they changed most."
+)
+
+
+@dataclass(frozen=True)
+class _Subject:
+    """What is examined."""
+
+    compilation: Compilation
+    solvers: Mapping[str, LatticeSolver]
+    start: Start
+    h: float
+
+    @property
+    def solver(self) -> LatticeSolver:
+        """The target that is measured where one suffices: C, if it is there."""
+        return next(iter(self.solvers.values()))
+
+    def stepped(self, x: Floats, h: float, steps: int = 1) -> Floats:
+        """The state after some steps."""
+        found: Floats = self.solver.integrate(x, h, steps, max(1, steps), parameters=self.start.arguments).x[-1]
+        return found
+
+
+def verify_lattice(
+    compilation: Compilation,
+    solvers: Mapping[str, LatticeSolver],
+    run: str,
+    start: Start,
+    h: float,
+    steps: int,
+    *,
+    quick: bool = False,
+) -> Verification:
+    """Measure and judge the solvers of a lattice, by target, on the numbers of a run, which is shortened if it is long.
+
+    Raises `StepError` where a step of the run fails.
+    """
+    assert compilation.cell is not None
+    subject = _Subject(compilation, solvers, start, h)
+    steps = min(steps, max(20, (FEW_UPDATES if quick else MOST_UPDATES) // int(np.prod(start.sizes))))
+    name = compilation.spec.name
+    with progress.stage(f"{name}: {steps} steps"):
+        made = subject.solver.integrate(start.state, h, steps, max(1, steps // FRAMES), parameters=start.arguments)
+    checks = [_order(subject)]
+    checks += _conserved(compilation.cell, made)
+    with progress.stage(f"{name}: single steps"):
+        checks += [_reversal(subject, made), *_agreement(subject, made), _identity(compilation.cell, subject, made)]
+    label = f"{compilation.label}, order {compilation.order.order}"
+    return Verification(name, run, label, h, steps, tuple(solvers), (), tuple(checks), {}, SAID)
+
+
+def _order(subject: _Subject) -> Check:
+    """How errors fall with the step, from the pair of steps where it shows best: the least errors above rounding."""
+    step = subject.compilation.program.step
+    if isinstance(step, Sweeps) and len(step.parts) == 1 and not step.by_colour:
+        return Check("observed order", math.inf)
+    order, x, size = subject.compilation.order.order, subject.start.state, _size(subject.start.state)
+    span, found = 4 * abs(subject.h), dict[float, float]()
+    for _ in range(5):
+        try:
+            far = subject.stepped(x, span / 256, 256)
+            errors = [np.abs(subject.stepped(x, span / n, n) - far).max() / size for n in (4, 8, 16)]
+        except StepError:
+            break
+        found |= {b: math.log2(a / b) for a, b in pairwise(errors) if 1e-11 < b < a < 0.1}
+        span *= 2
+    measured = found[min(found)] if found else math.nan
+    passed = measured >= order - ORDER_SLACK
+    return Check("observed order", measured, f"≥ {order - ORDER_SLACK:g}", passed, f"{measured:.2f} instead of {order}")
+
+
+def _conserved(cell: Cell, made: LatticeTrajectory) -> Iterator[Check]:
+    """Energy, Casimirs and invariants along the run."""
+    errors = errors_of(cell, made)
+    energy, least = errors["energy"], rounding(made.steps)
+    quarter = max(1, 3 * len(energy) // 4)
+    before, after = float(energy[:quarter].max()), float(energy[quarter:].max())
+    yield Check("energy: largest error", float(energy.max()))
+    grown = after / before if before > 10 * least else math.nan
+    passed = not grown > GROWTH
+    yield Check("energy: last quarter / before", grown, f"≤ {GROWTH:g}", passed, f"grows by a factor of {grown:.1f}")
+    for name, (_, kind) in cell.casimirs.items():
+        value = float(np.max(np.abs(made.casimirs[name][0])))
+        # the worst of many sites; a sum of their logarithms
+        limit = {"sites": 8.0, "sum": 1.0, "product": max(1.0, math.sqrt(made.x[0][0].size))}[kind] * least
+        error = float(errors[name].max()) / (value if kind == "product" and value else max(1.0, value))
+        yield Check(f"Casimir {name}", error, f"≤ {limit:.0e}", error <= limit, f"changes by {error:.1e}")
+        if kind == "sites":
+            spread = float(np.std(made.casimirs[name][-1] - made.casimirs[name][0]))
+            yield Check(f"Casimir {name}: spread over the sites", spread)
+    for name in cell.invariants:
+        yield Check(f"invariant {name}: largest error", float(errors[name].max()))
+
+
+def _reversal(subject: _Subject, made: LatticeTrajectory) -> Check:
+    worst = 0.0
+    for x in (made.x[0], made.x[-1]):
+        back = subject.stepped(subject.stepped(x, subject.h), -subject.h)
+        worst = max(worst, float(np.abs(back - x).max()) / _size(x))
+    return Check("reversibility", worst, f"≤ {ONE_STEP:.0e}", worst <= ONE_STEP, f"differs by {worst:.1e}")
+
+
+def _agreement(subject: _Subject, made: LatticeTrajectory) -> Iterator[Check]:
+    """How far one step of the other targets is from that of the first."""
+    first, *others = subject.solvers.items()
+    for target, solver in others:
+        worst = 0.0
+        for x in (made.x[0], made.x[-1]):
+            a, b = (s.step(x, subject.h, parameters=subject.start.arguments) for s in (first[1], solver))
+            worst = max(worst, float(np.abs(a - b).max()) / _size(x))
+        name = f"{target} against {first[0]}"
+        yield Check(name, worst, f"≤ {ONE_STEP:.0e}", worst <= ONE_STEP, f"differs by {worst:.1e}")
+
+
+# --- a lattice of a few sites
+
+
+def _identity(cell: Cell, subject: _Subject, made: LatticeTrajectory) -> Check:
+    """The largest entry of DΦ π DΦᵀ − π∘Φ, by differences of the step."""
+    about = subject.solver.interface
+    sizes = [
+        -(-max(least, 3 if len(about.axes) < 3 else 2) // p) * p
+        for least, p in zip(about.least, about.periods, strict=True)
+    ]
+    whole = expand(cell, sizes, ring(sizes[0]) if about.graph else ())
+    sites = int(np.prod(subject.start.sizes))
+    wanted = int(np.prod(sizes))
+    picked = np.random.default_rng(1).choice(sites, wanted, replace=sites < wanted).reshape(sizes)
+    x = subject.start.state.reshape(len(cell.fields), -1)[:, picked]
+    parameters = _few(cell, subject.start, picked, whole)
+    # what is usual at each site, and for each field: differences are taken in both units, and with two distances; the
+    # better, the less their own errors say
+    usual = np.abs(made.x).max(axis=0).reshape(len(x), -1)
+    each = np.maximum(usual[:, picked.reshape(-1)], 1e-9 * usual.max(axis=1, keepdims=True)).reshape(-1)
+    fields = usual.max(axis=1).repeat(wanted)
+    tried = [(np.where(units > 0, units, 1.0), apart) for units in (each, fields) for apart in (3e-3, 3e-4)]
+    defect = min(_defect(whole, subject, parameters, x, units, apart) for units, apart in tried)
+    where = f"Poisson identity on {'×'.join(map(str, sizes))} sites"
+    return Check(where, defect, f"≤ {DIFFERENCES:.0e}", defect <= DIFFERENCES, f"is off by {defect:.1e}")
+
+
+def _defect(
+    whole: Expansion, subject: _Subject, parameters: Mapping[str, Any], x: Floats, units: Floats, apart: float
+) -> float:
+    """The largest entry of DΦ π DΦᵀ − π∘Φ over that of π, where states are in some units."""
+
+    def step(y: Floats) -> Floats:
+        there = subject.solver.step((y * units).reshape(x.shape), subject.h, parameters=parameters)
+        return np.asarray(there.reshape(-1) / units)
+
+    def poisson(y: Floats) -> Floats:
+        return np.asarray(_poisson(whole, y * units, parameters) / units / units[:, None])
+
+    y = x.reshape(-1) / units
+    slopes, after = _slopes(step, y, apart), poisson(step(y))
+    return float(np.abs(slopes @ poisson(y) @ slopes.T - after).max() / np.abs(after).max())
+
+
+def _slopes(function: Callable[[Floats], Floats], y: Floats, apart: float) -> Floats:
+    """The derivative, by differences of order 6."""
+    weights = {1: 3 / 4, 2: -3 / 20, 3: 1 / 60}
+    columns = []
+    for k in range(len(y)):
+        moved = apart * np.eye(len(y))[k]
+        columns.append(sum(w * (function(y + m * moved) - function(y - m * moved)) for m, w in weights.items()))
+    return np.array(columns).T / apart
+
+
+def _few(cell: Cell, start: Start, picked: Any, whole: Expansion) -> dict[str, Any]:
+    """The parameters of the small lattice: those of the sites that were picked."""
+    found: dict[str, Any] = {}
+    for p in cell.parameters:
+        value = np.asarray(start.parameters[p.name])
+        if p.at == "sites":
+            found[p.name] = value.reshape(-1)[picked]
+        elif p.at == "bonds":
+            found[p.name] = np.resize(value, len(whole.bonds))
+        else:
+            found[p.name] = float(value)
+    return found | ({"bonds": np.array(whole.bonds)} if start.graph else {})
+
+
+def _poisson(whole: Expansion, x: Floats, parameters: Mapping[str, Any]) -> Floats:
+    entries, index = whole.poisson(), {c: k for k, c in enumerate(whole.coordinates)}
+    values = dict(zip(whole.coordinates, x.reshape(-1).tolist(), strict=True)) | whole.numbers(parameters)
+    matrix = np.zeros((len(index), len(index)))
+    for (a, b), value in zip(entries, evaluate(list(entries.values()), values), strict=True):
+        matrix[index[a], index[b]] = float(value)
+    return matrix
+
+
+def _size(x: Floats) -> float:
+    return float(np.abs(x).max()) or 1.0
