@@ -1,4 +1,4 @@
-"""docs/python.md followed to the letter."""
+"""Pages on Python followed to the letter."""
 
 from pathlib import Path
 
@@ -9,5 +9,6 @@ pytest.importorskip("pandas")
 pytest.importorskip("xarray")
 
 
-def test_the_page_can_be_followed(tmp_path):
-    assert follow(Path(__file__).resolve().parent.parent / "docs" / "python.md", tmp_path) == 1
+@pytest.mark.parametrize("page", ["python", "ensembles"])
+def test_the_page_can_be_followed(page, tmp_path):
+    assert follow(Path(__file__).resolve().parent.parent / "docs" / f"{page}.md", tmp_path) == 1

@@ -12,7 +12,7 @@
 #
 # SPDX-License-Identifier: 0BSD
 # This file belongs to whoever generated it; phigen claims no rights in it.
-# body-sha256: 26d75c8f8961aed1f37f8133d05dd9f33306ea82d646cbece60d99c88e5ba555
+# body-sha256: 04d53c1a7b81859d4f346b926b783d1dd5a739f01b7c572f4469280b46d29a0b
 import numpy as np
 
 VERSION = "0.1.0"
@@ -52,8 +52,21 @@ class StepError(ArithmeticError):
 
 
 def _at(coef, members):
-    """The coefficients of some members; without a gauge all members share them."""
+    """The coefficients of some members; where these have nothing of their own, all share them."""
     return coef if coef.shape[1] == 1 else coef[:, members]
+
+
+def _stage_at(stage, members):
+    """What some members have of a stage."""
+    coef, parameters, *times = stage
+    own = {name: value[members] if np.ndim(value) else value for name, value in parameters.items()}
+    return (_at(coef, members), own, *(time[members] if np.ndim(time) else time for time in times))
+
+
+def _table(rows):
+    """Rows of numbers, or of one for each member, as an array (rows, members), or (rows, 1)."""
+    zeros = np.zeros(max((np.size(row) for row in rows), default=1))
+    return np.array([row + zeros for row in rows]).reshape(len(rows), len(zeros))
 
 
 def _filled(like, values):
@@ -94,7 +107,9 @@ def _admissible(values):
     They have to be finite, positive where the spec says so, and to give finite coefficients for a step so short that
     it has no part in it.
     """
-    if not np.isfinite(list(values.values())).all() or not all(values[name] > 0.0 for name in POSITIVE):
+    if not all(np.isfinite(value).all() for value in values.values()):
+        return False
+    if not all(np.all(values[name] > 0.0) for name in POSITIVE):
         return False
     with np.errstate(all="ignore"):
         return all(np.isfinite(c).all() for c in _prepare(values, 1e-100))
@@ -147,7 +162,7 @@ def _plausible(stage, x, end):
     near = moved <= 1.5 * size
     if near.all():
         return near
-    size = size + np.abs(h * _vector_field(parameters, x)).sum(axis=-1)
+    size = size + np.abs(np.reshape(h, (-1, 1)) * _vector_field(parameters, x)).sum(axis=-1)
     before, middle, after = (_energy(parameters, at)[:, 0] for at in (x, 0.5 * (x + end), end))
     kept = np.abs(after - before) <= 0.5 * (np.abs(before) + np.abs(middle) + np.abs(after))
     return (moved <= 1.5 * size) | kept
@@ -208,7 +223,7 @@ def _advance(stage, x, carry, memory):
     failed = np.flatnonzero(status != "")
     if len(failed) and memory[0].any():
         # A guess from earlier steps may mislead: once more from y = x.
-        again = _solved((_at(stage[0], failed), *stage[1:]), x[failed], carry[failed], x[failed])
+        again = _solved(_stage_at(stage, failed), x[failed], carry[failed], x[failed])
         following[failed], rest[failed], y[failed], status[failed] = again
     return following, rest, (y - x, memory[0] if memory[0].any() else y - x), status
 
@@ -225,12 +240,9 @@ def _coefficients(parameters, x, h, gauge):
     """
     stages = [fraction * h for fraction in FRACTIONS]
     if not GAUGE:
-        return [(np.array(_prepare(parameters, step)).reshape(-1, 1), parameters, step) for step in stages]
+        return [(_table(_prepare(parameters, step)), parameters, step) for step in stages]
     chosen = _choose_gauge(parameters, x) if gauge is None else np.broadcast_to(gauge, (len(x), len(GAUGE)))
-    return [
-        (np.array([c + np.zeros(len(x)) for c in _prepare(parameters, chosen.T, step)]), parameters, step)
-        for step in stages
-    ]
+    return [(_table(_prepare(parameters, chosen.T, step)), parameters, step) for step in stages]
 
 
 def gauge(x, **parameters):
@@ -245,25 +257,31 @@ def step(x, h, gauge=None, **parameters):
     return integrate(x, h, 1, gauge=gauge, **parameters)[-1]
 
 
+def _of_members(value, x):
+    """A number, or one for each member. Raises ValueError where these are not as many as the states x."""
+    return value if np.ndim(value) == 0 else np.broadcast_to(value, x.shape[:-1]).reshape(-1)
+
+
 def _checked(x0, h, steps, stride, parameters):
     """The arguments of integrate() as arrays and values. Raises ValueError for those that are not allowed."""
-    x, h = _numbers(x0), _numbers(h)
+    x, h = _numbers(x0), _numbers(h)[()]
     if x.shape[-1:] != (DIM,):
         raise ValueError(f"x0 has shape {x.shape}, not (..., {DIM})")
     if steps < 0 or stride < 1:
         raise ValueError("steps must be at least 0 and stride at least 1")
-    if not (np.isfinite(x).all() and h.ndim == 0 and np.isfinite(h)):
+    if not (np.isfinite(x).all() and np.isfinite(h).all()):
         raise ValueError("x0 and h must be finite")
-    values = _values(parameters)
+    values = {name: _of_members(value, x) for name, value in _values(parameters).items()}
     if not _admissible(values):
         raise ValueError(f"no step can be made with the parameters { {**DEFAULT_PARAMETERS, **parameters} }")
-    return x, float(h), values
+    return x, _of_members(h, x), values
 
 
 def integrate(x0, h, steps, stride=1, gauge=None, **parameters):
     """States at steps 0, stride, 2*stride, ... and at the last step: shape (rows, ..., DIM).
 
-    x0 has shape (..., DIM): leading axes are members, each integrated by itself. Raises ValueError for arguments that
+    x0 has shape (..., DIM): leading axes are members, each integrated by itself. h and parameters may be
+    arrays with one number for each of them. Raises ValueError for arguments that
     are not allowed, and StepError as soon as a step of a member fails. gauge (one value for each Casimir in GAUGE)
     overrides the choice of the solver: the step is an exact Poisson map for each fixed gauge.
     """

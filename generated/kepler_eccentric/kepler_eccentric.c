@@ -23,7 +23,7 @@
  *   5. Between steps
  *   6. The solver
  *   7. Ensembles
- * body-sha256: 22eb3e94f3b4c12a8a8b3d7215878a891f15e62384dbaa78457aa1d6031716c0
+ * body-sha256: 728bf23a6afc8da7bb370ec492b7a61bc0cbe810cd10e4e6b317d6be00e2df39
  */
 #include "kepler_eccentric.h"
 
@@ -187,7 +187,7 @@ static inline void kepler_eccentric_flows(const double *coef, double x[6], doubl
     coef += kepler_eccentric_ROW;
     for (int k = 0; k < 17; ++k) {
         kepler_eccentric_flow2(coef, x, moved, start);
-        kepler_eccentric_flow1(coef + 1 * kepler_eccentric_ROW, x, moved, start);
+        kepler_eccentric_flow1(coef + kepler_eccentric_ROW, x, moved, start);
         coef += 2 * kepler_eccentric_ROW;
     }
 }

@@ -24,9 +24,10 @@
  *   8. The solver
  *   9. Newton's method in lanes
  *   10. Blocks of steps
- *   11. Groups of members
- *   12. Ensembles
- * body-sha256: 74e420fc6565ce694d62f0b63523dd2e9e26f16171ae314bae30153fe1bc9629
+ *   11. Members of an ensemble
+ *   12. Groups of members
+ *   13. Ensembles
+ * body-sha256: 761ec3d46955a05bcb8f0d6d9681cd0c1b8144dfb9420c3103f3a9d898cee89d
  */
 #include "kowalevski_top.h"
 
@@ -3070,6 +3071,66 @@ kowalevski_top_status kowalevski_top_integrate(kowalevski_top_solver *s, double 
     return status;
 }
 
+/* ---- Members of an ensemble ---- */
+/* What an ensemble was asked for. Where own is 1, member m has the parameters params[m] and the step h[m];
+   where it is 0, all have the first. */
+typedef struct {
+    double *x;
+    size_t members, steps, own;
+    const kowalevski_top_params *params; /* NULL for the defaults */
+    const double *h;
+    size_t stride;
+    double *frames;        /* NULL for none */
+    unsigned char *status; /* NULL for none */
+} kowalevski_top_members;
+
+/* Start a member at a state, with what is its own. */
+static kowalevski_top_status kowalevski_top_begin_member(const kowalevski_top_members *all, size_t m,
+    const double x[kowalevski_top_DIM], kowalevski_top_solver *s)
+{
+    const kowalevski_top_params *params = all->params != NULL ? all->params + m * all->own : NULL;
+    const kowalevski_top_status status = kowalevski_top_init(s, params, x);
+    return status == kowalevski_top_OK ? kowalevski_top_set_step(s, all->h[m * all->own]) : status;
+}
+
+/* How many steps there are to the next frame, or to the end. */
+static size_t kowalevski_top_to_frame(const kowalevski_top_members *all, size_t done)
+{
+    const size_t left = all->steps - done;
+    return all->frames != NULL && all->stride - done % all->stride < left ? all->stride - done % all->stride
+        : left;
+}
+
+/* The frame of a member after so many steps, if there is one: x, or what is no number for NULL. */
+static void kowalevski_top_put_frame(const kowalevski_top_members *all, size_t m, size_t done,
+    const double *x)
+{
+    for (size_t i = 0; i < kowalevski_top_DIM && all->frames != NULL && done % all->stride == 0; ++i)
+        all->frames[((done / all->stride - 1) * kowalevski_top_DIM + i) * all->members + m] = x != NULL ? x[i]
+            : (double)NAN;
+}
+
+/* The steps of a member after so many, by itself. */
+static kowalevski_top_status kowalevski_top_end_member(const kowalevski_top_members *all, size_t m,
+    size_t done, kowalevski_top_solver *s, kowalevski_top_status status)
+{
+    while (done < all->steps) {
+        const size_t steps = kowalevski_top_to_frame(all, done);
+        if (status == kowalevski_top_OK) status = kowalevski_top_integrate(s, s->h, steps);
+        done += steps;
+        kowalevski_top_put_frame(all, m, done, status == kowalevski_top_OK ? s->x : NULL);
+    }
+    return status;
+}
+
+/* Where a member ends. */
+static void kowalevski_top_put_member(const kowalevski_top_members *all, size_t m,
+    const double x[kowalevski_top_DIM], kowalevski_top_status status)
+{
+    for (size_t i = 0; i < kowalevski_top_DIM; ++i) all->x[i * all->members + m] = x[i];
+    if (all->status != NULL) all->status[m] = (unsigned char)status;
+}
+
 /* ---- Groups of members ---- */
 enum {
     kowalevski_top_GROUP = kowalevski_top_LANES, /* members, one in each lane */
@@ -3367,75 +3428,85 @@ static int kowalevski_top_group_step(kowalevski_top_group *group, size_t remaini
 
 /* Put a member into a lane: its state, and its coefficients. */
 static kowalevski_top_status kowalevski_top_group_join(kowalevski_top_group *group, int lane,
-    const kowalevski_top_params *params, const double x0[kowalevski_top_DIM], double h)
+    const kowalevski_top_members *all, size_t m)
 {
     kowalevski_top_solver s;
-    kowalevski_top_status status = kowalevski_top_init(&s, params, x0);
-    if (status == kowalevski_top_OK) status = kowalevski_top_set_step(&s, h);
+    double x[kowalevski_top_DIM];
+    for (size_t i = 0; i < kowalevski_top_DIM; ++i) x[i] = all->x[i * all->members + m];
+    const kowalevski_top_status status = kowalevski_top_begin_member(all, m, x, &s);
+    for (int i = 0; i < kowalevski_top_DIM; ++i) group->x[i][lane] = x[i];
     if (status != kowalevski_top_OK) return status;
-    for (int i = 0; i < kowalevski_top_DIM; ++i) group->x[i][lane] = s.x[i];
     for (int k = 0; k < kowalevski_top_COEFFICIENTS; ++k) group->coef[k][lane] = s.coef[k];
     group->active[lane] = 1;
     return status;
 }
 
-/* The steps that a member has still to make after it left the group, by itself. */
-static kowalevski_top_status kowalevski_top_group_finish(const kowalevski_top_group *group, int lane,
-    const kowalevski_top_params *params, double x[kowalevski_top_DIM], double h)
+/* The frames after so many steps, of the members that are active. */
+static void kowalevski_top_group_frame(const kowalevski_top_group *group, const kowalevski_top_members *all,
+    size_t first, size_t done)
+{
+    double x[kowalevski_top_DIM];
+    for (int lane = 0; lane < kowalevski_top_LANES; ++lane) {
+        for (int i = 0; i < kowalevski_top_DIM; ++i) x[i] = group->x[i][lane];
+        if (group->active[lane]) kowalevski_top_put_frame(all, first + (size_t)lane, done, x);
+    }
+}
+
+/* The end of a member; the steps that the group did not make with it, it makes by itself. */
+static kowalevski_top_status kowalevski_top_group_end(const kowalevski_top_group *group, int lane,
+    const kowalevski_top_members *all, size_t m, kowalevski_top_status status)
 {
     kowalevski_top_solver s;
-    kowalevski_top_status status = kowalevski_top_init(&s, params, x);
-    if (status != kowalevski_top_OK) return status;
-    for (int i = 0; i < kowalevski_top_DIM; ++i) s.carry[i] = group->carry[i][lane];
-    status = kowalevski_top_integrate(&s, h, group->steps_left[lane]);
-    memcpy(x, s.x, sizeof s.x);
+    double x[kowalevski_top_DIM];
+    for (int i = 0; i < kowalevski_top_DIM; ++i) x[i] = group->x[i][lane];
+    if (status != kowalevski_top_OK) {
+        kowalevski_top_end_member(all, m, 0, NULL, status);
+    } else if (group->steps_left[lane] > 0) {
+        const kowalevski_top_status begun = kowalevski_top_begin_member(all, m, x, &s);
+        for (int i = 0; i < kowalevski_top_DIM && begun == kowalevski_top_OK; ++i)
+            s.carry[i] = group->carry[i][lane];
+        status = kowalevski_top_end_member(all, m, all->steps - group->steps_left[lane], &s, begun);
+        if (begun == kowalevski_top_OK) memcpy(x, s.x, sizeof x);
+    }
+    kowalevski_top_put_member(all, m, x, status);
     return status;
 }
 
 /* The members from first on, as many as there are lanes. The first status that is not OK. */
-static kowalevski_top_status kowalevski_top_group_run(const kowalevski_top_params *params, double *x,
-    size_t members, size_t first, double h, size_t steps, unsigned char *status)
+static kowalevski_top_status kowalevski_top_group_run(const kowalevski_top_members *all, size_t first)
 {
     kowalevski_top_group group;
     kowalevski_top_status worst = kowalevski_top_OK, member[kowalevski_top_LANES];
-    const int count = members - first < kowalevski_top_LANES ? (int)(members - first) : kowalevski_top_LANES;
-    double state[kowalevski_top_DIM];
-    size_t left = steps;
+    const int count = all->members - first < kowalevski_top_LANES ? (int)(all->members - first)
+        : kowalevski_top_LANES;
+    size_t left = all->steps;
     memset(&group, 0, sizeof group);
-    for (int lane = 0; lane < count; ++lane) {
-        for (size_t i = 0; i < kowalevski_top_DIM; ++i) state[i] = x[i * members + first + (size_t)lane];
-        member[lane] = kowalevski_top_group_join(&group, lane, params, state, h);
+    for (int lane = 0; lane < count; ++lane)
+        member[lane] = kowalevski_top_group_join(&group, lane, all, first + (size_t)lane);
+    for (int active = count; left > 0 && active >= kowalevski_top_FEWEST;) {
+        active = kowalevski_top_group_step(&group, left--);
+        if (all->frames != NULL) kowalevski_top_group_frame(&group, all, first, all->steps - left);
     }
-    for (int active = count; left > 0 && active >= kowalevski_top_FEWEST; --left)
-        active = kowalevski_top_group_step(&group, left);
     for (int lane = 0; lane < count; ++lane) {
         if (group.active[lane]) group.steps_left[lane] = left;
-        for (int i = 0; i < kowalevski_top_DIM; ++i) state[i] = group.x[i][lane];
-        if (member[lane] == kowalevski_top_OK) {
-            if (group.steps_left[lane] > 0)
-                member[lane] = kowalevski_top_group_finish(&group, lane, params, state, h);
-            for (size_t i = 0; i < kowalevski_top_DIM; ++i) x[i * members + first + (size_t)lane] = state[i];
-        }
-        if (status != NULL) status[first + (size_t)lane] = (unsigned char)member[lane];
-        if (worst == kowalevski_top_OK) worst = member[lane];
+        const kowalevski_top_status status = kowalevski_top_group_end(&group, lane, all, first + (size_t)lane,
+            member[lane]);
+        if (worst == kowalevski_top_OK) worst = status;
     }
     return worst;
 }
 
 /* ---- Ensembles ---- */
-kowalevski_top_status kowalevski_top_ensemble(const kowalevski_top_params *params, double *x, size_t members,
-    double h, size_t steps, unsigned char *status)
+/* All members. The first status that is not OK. */
+static kowalevski_top_status kowalevski_top_run(const kowalevski_top_members *all)
 {
-    kowalevski_top_status worst = isfinite(h) ? kowalevski_top_OK : kowalevski_top_BAD_ARGUMENT;
-    const kowalevski_top_params own = params != NULL ? *params : kowalevski_top_default_params;
-    size_t earliest = members;
-    if (x == NULL && members > 0) return kowalevski_top_BAD_ARGUMENT;
+    kowalevski_top_status worst = kowalevski_top_OK;
+    size_t earliest = all->members;
 #ifdef _OPENMP
 #pragma omp parallel for schedule(dynamic)
 #endif
-    for (size_t first = 0; first < members; first += kowalevski_top_GROUP) {
-        const kowalevski_top_status group = kowalevski_top_group_run(&own, x, members, first, h, steps,
-            status);
+    for (size_t first = 0; first < all->members; first += kowalevski_top_GROUP) {
+        const kowalevski_top_status group = kowalevski_top_group_run(all, first);
         if (group == kowalevski_top_OK) continue;
 #ifdef _OPENMP
 #pragma omp critical
@@ -3446,6 +3517,30 @@ kowalevski_top_status kowalevski_top_ensemble(const kowalevski_top_params *param
         }
     }
     return worst;
+}
+
+kowalevski_top_status kowalevski_top_ensemble(const kowalevski_top_params *params, double *x, size_t members,
+    double h, size_t steps, unsigned char *status)
+{
+    const kowalevski_top_params shared = params != NULL ? *params : kowalevski_top_default_params;
+    kowalevski_top_members all = { .x = x, .members = members, .steps = steps, .params = &shared, .h = &h,
+        .status = status };
+    if (x == NULL && members > 0) return kowalevski_top_BAD_ARGUMENT;
+    const kowalevski_top_status worst = kowalevski_top_run(&all);
+    return isfinite(h) ? worst : kowalevski_top_BAD_ARGUMENT;
+}
+
+kowalevski_top_status kowalevski_top_ensemble_each(const kowalevski_top_params *params, double *x,
+    size_t members, const double *h, size_t steps, size_t stride, double *frames, unsigned char *status)
+{
+    kowalevski_top_members all = { .x = x, .members = members, .steps = steps, .own = 1, .params = params,
+        .h = h };
+    if (members > 0 && (x == NULL || h == NULL)) return kowalevski_top_BAD_ARGUMENT;
+    if (frames != NULL && stride == 0) return kowalevski_top_BAD_ARGUMENT;
+    all.stride = stride;
+    all.frames = frames;
+    all.status = status;
+    return kowalevski_top_run(&all);
 }
 
 #if defined(__clang__)

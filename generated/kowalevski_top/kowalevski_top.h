@@ -2,7 +2,7 @@
  * kowalevski_top.h: the declarations; kowalevski_top.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 30978b86b67c4858d0c9ffaad312f6f123ee46d70944021a072998e6686772ae
+ * body-sha256: a2612a0a963ac19de45079deb31ecee53d1911180a09c19c091dee3fdd25da56
  */
 #ifndef KOWALEVSKI_TOP_H
 #define KOWALEVSKI_TOP_H
@@ -103,6 +103,13 @@ kowalevski_top_status kowalevski_top_kick(kowalevski_top_solver *s, const double
 /* Members are integrated side by side in groups; with OpenMP, groups in parallel. */
 kowalevski_top_status kowalevski_top_ensemble(const kowalevski_top_params *params, double *x, size_t members,
     double h, size_t steps, unsigned char *status);
+
+/* The same where each member has its own parameters params[m] and step h[m]; params may be NULL. */
+/* frames (or NULL) receives the states after every stride-th step: frames[(k * kowalevski_top_DIM + i) *
+   members + m] is coordinate i of member m after (k + 1) * stride steps, NaN if it failed before. Arrays must
+   not overlap. */
+kowalevski_top_status kowalevski_top_ensemble_each(const kowalevski_top_params *params, double *x,
+    size_t members, const double *h, size_t steps, size_t stride, double *frames, unsigned char *status);
 
 /* The Hamiltonian; the Casimirs; the right-hand side pi(x) grad H(x). params may be NULL. */
 double kowalevski_top_hamiltonian(const kowalevski_top_params *params, const double x[kowalevski_top_DIM]);

@@ -24,9 +24,10 @@
  *   8. The solver
  *   9. Newton's method in lanes
  *   10. Blocks of steps
- *   11. Groups of members
- *   12. Ensembles
- * body-sha256: c1c7d794e29d624fb2f23f6c20dbcb6c82ffbf74341d6aaf8cd9295b0cd7a840
+ *   11. Members of an ensemble
+ *   12. Groups of members
+ *   13. Ensembles
+ * body-sha256: 013860ba1534af21257189237c96892da03d5d9ef8fcd0fa11c1e4c6d190da7a
  */
 #include "lotka_volterra.h"
 
@@ -1215,6 +1216,66 @@ lotka_volterra_status lotka_volterra_integrate(lotka_volterra_solver *s, double 
     return status;
 }
 
+/* ---- Members of an ensemble ---- */
+/* What an ensemble was asked for. Where own is 1, member m has the parameters params[m] and the step h[m];
+   where it is 0, all have the first. */
+typedef struct {
+    double *x;
+    size_t members, steps, own;
+    const lotka_volterra_params *params; /* NULL for the defaults */
+    const double *h;
+    size_t stride;
+    double *frames;        /* NULL for none */
+    unsigned char *status; /* NULL for none */
+} lotka_volterra_members;
+
+/* Start a member at a state, with what is its own. */
+static lotka_volterra_status lotka_volterra_begin_member(const lotka_volterra_members *all, size_t m,
+    const double x[lotka_volterra_DIM], lotka_volterra_solver *s)
+{
+    const lotka_volterra_params *params = all->params != NULL ? all->params + m * all->own : NULL;
+    const lotka_volterra_status status = lotka_volterra_init(s, params, x);
+    return status == lotka_volterra_OK ? lotka_volterra_set_step(s, all->h[m * all->own]) : status;
+}
+
+/* How many steps there are to the next frame, or to the end. */
+static size_t lotka_volterra_to_frame(const lotka_volterra_members *all, size_t done)
+{
+    const size_t left = all->steps - done;
+    return all->frames != NULL && all->stride - done % all->stride < left ? all->stride - done % all->stride
+        : left;
+}
+
+/* The frame of a member after so many steps, if there is one: x, or what is no number for NULL. */
+static void lotka_volterra_put_frame(const lotka_volterra_members *all, size_t m, size_t done,
+    const double *x)
+{
+    for (size_t i = 0; i < lotka_volterra_DIM && all->frames != NULL && done % all->stride == 0; ++i)
+        all->frames[((done / all->stride - 1) * lotka_volterra_DIM + i) * all->members + m] = x != NULL ? x[i]
+            : (double)NAN;
+}
+
+/* The steps of a member after so many, by itself. */
+static lotka_volterra_status lotka_volterra_end_member(const lotka_volterra_members *all, size_t m,
+    size_t done, lotka_volterra_solver *s, lotka_volterra_status status)
+{
+    while (done < all->steps) {
+        const size_t steps = lotka_volterra_to_frame(all, done);
+        if (status == lotka_volterra_OK) status = lotka_volterra_integrate(s, s->h, steps);
+        done += steps;
+        lotka_volterra_put_frame(all, m, done, status == lotka_volterra_OK ? s->x : NULL);
+    }
+    return status;
+}
+
+/* Where a member ends. */
+static void lotka_volterra_put_member(const lotka_volterra_members *all, size_t m,
+    const double x[lotka_volterra_DIM], lotka_volterra_status status)
+{
+    for (size_t i = 0; i < lotka_volterra_DIM; ++i) all->x[i * all->members + m] = x[i];
+    if (all->status != NULL) all->status[m] = (unsigned char)status;
+}
+
 /* ---- Groups of members ---- */
 enum {
     lotka_volterra_GROUP = lotka_volterra_LANES, /* members, one in each lane */
@@ -1512,75 +1573,85 @@ static int lotka_volterra_group_step(lotka_volterra_group *group, size_t remaini
 
 /* Put a member into a lane: its state, and its coefficients. */
 static lotka_volterra_status lotka_volterra_group_join(lotka_volterra_group *group, int lane,
-    const lotka_volterra_params *params, const double x0[lotka_volterra_DIM], double h)
+    const lotka_volterra_members *all, size_t m)
 {
     lotka_volterra_solver s;
-    lotka_volterra_status status = lotka_volterra_init(&s, params, x0);
-    if (status == lotka_volterra_OK) status = lotka_volterra_set_step(&s, h);
+    double x[lotka_volterra_DIM];
+    for (size_t i = 0; i < lotka_volterra_DIM; ++i) x[i] = all->x[i * all->members + m];
+    const lotka_volterra_status status = lotka_volterra_begin_member(all, m, x, &s);
+    for (int i = 0; i < lotka_volterra_DIM; ++i) group->x[i][lane] = x[i];
     if (status != lotka_volterra_OK) return status;
-    for (int i = 0; i < lotka_volterra_DIM; ++i) group->x[i][lane] = s.x[i];
     for (int k = 0; k < lotka_volterra_COEFFICIENTS; ++k) group->coef[k][lane] = s.coef[k];
     group->active[lane] = 1;
     return status;
 }
 
-/* The steps that a member has still to make after it left the group, by itself. */
-static lotka_volterra_status lotka_volterra_group_finish(const lotka_volterra_group *group, int lane,
-    const lotka_volterra_params *params, double x[lotka_volterra_DIM], double h)
+/* The frames after so many steps, of the members that are active. */
+static void lotka_volterra_group_frame(const lotka_volterra_group *group, const lotka_volterra_members *all,
+    size_t first, size_t done)
+{
+    double x[lotka_volterra_DIM];
+    for (int lane = 0; lane < lotka_volterra_LANES; ++lane) {
+        for (int i = 0; i < lotka_volterra_DIM; ++i) x[i] = group->x[i][lane];
+        if (group->active[lane]) lotka_volterra_put_frame(all, first + (size_t)lane, done, x);
+    }
+}
+
+/* The end of a member; the steps that the group did not make with it, it makes by itself. */
+static lotka_volterra_status lotka_volterra_group_end(const lotka_volterra_group *group, int lane,
+    const lotka_volterra_members *all, size_t m, lotka_volterra_status status)
 {
     lotka_volterra_solver s;
-    lotka_volterra_status status = lotka_volterra_init(&s, params, x);
-    if (status != lotka_volterra_OK) return status;
-    for (int i = 0; i < lotka_volterra_DIM; ++i) s.carry[i] = group->carry[i][lane];
-    status = lotka_volterra_integrate(&s, h, group->steps_left[lane]);
-    memcpy(x, s.x, sizeof s.x);
+    double x[lotka_volterra_DIM];
+    for (int i = 0; i < lotka_volterra_DIM; ++i) x[i] = group->x[i][lane];
+    if (status != lotka_volterra_OK) {
+        lotka_volterra_end_member(all, m, 0, NULL, status);
+    } else if (group->steps_left[lane] > 0) {
+        const lotka_volterra_status begun = lotka_volterra_begin_member(all, m, x, &s);
+        for (int i = 0; i < lotka_volterra_DIM && begun == lotka_volterra_OK; ++i)
+            s.carry[i] = group->carry[i][lane];
+        status = lotka_volterra_end_member(all, m, all->steps - group->steps_left[lane], &s, begun);
+        if (begun == lotka_volterra_OK) memcpy(x, s.x, sizeof x);
+    }
+    lotka_volterra_put_member(all, m, x, status);
     return status;
 }
 
 /* The members from first on, as many as there are lanes. The first status that is not OK. */
-static lotka_volterra_status lotka_volterra_group_run(const lotka_volterra_params *params, double *x,
-    size_t members, size_t first, double h, size_t steps, unsigned char *status)
+static lotka_volterra_status lotka_volterra_group_run(const lotka_volterra_members *all, size_t first)
 {
     lotka_volterra_group group;
     lotka_volterra_status worst = lotka_volterra_OK, member[lotka_volterra_LANES];
-    const int count = members - first < lotka_volterra_LANES ? (int)(members - first) : lotka_volterra_LANES;
-    double state[lotka_volterra_DIM];
-    size_t left = steps;
+    const int count = all->members - first < lotka_volterra_LANES ? (int)(all->members - first)
+        : lotka_volterra_LANES;
+    size_t left = all->steps;
     memset(&group, 0, sizeof group);
-    for (int lane = 0; lane < count; ++lane) {
-        for (size_t i = 0; i < lotka_volterra_DIM; ++i) state[i] = x[i * members + first + (size_t)lane];
-        member[lane] = lotka_volterra_group_join(&group, lane, params, state, h);
+    for (int lane = 0; lane < count; ++lane)
+        member[lane] = lotka_volterra_group_join(&group, lane, all, first + (size_t)lane);
+    for (int active = count; left > 0 && active >= lotka_volterra_FEWEST;) {
+        active = lotka_volterra_group_step(&group, left--);
+        if (all->frames != NULL) lotka_volterra_group_frame(&group, all, first, all->steps - left);
     }
-    for (int active = count; left > 0 && active >= lotka_volterra_FEWEST; --left)
-        active = lotka_volterra_group_step(&group, left);
     for (int lane = 0; lane < count; ++lane) {
         if (group.active[lane]) group.steps_left[lane] = left;
-        for (int i = 0; i < lotka_volterra_DIM; ++i) state[i] = group.x[i][lane];
-        if (member[lane] == lotka_volterra_OK) {
-            if (group.steps_left[lane] > 0)
-                member[lane] = lotka_volterra_group_finish(&group, lane, params, state, h);
-            for (size_t i = 0; i < lotka_volterra_DIM; ++i) x[i * members + first + (size_t)lane] = state[i];
-        }
-        if (status != NULL) status[first + (size_t)lane] = (unsigned char)member[lane];
-        if (worst == lotka_volterra_OK) worst = member[lane];
+        const lotka_volterra_status status = lotka_volterra_group_end(&group, lane, all, first + (size_t)lane,
+            member[lane]);
+        if (worst == lotka_volterra_OK) worst = status;
     }
     return worst;
 }
 
 /* ---- Ensembles ---- */
-lotka_volterra_status lotka_volterra_ensemble(const lotka_volterra_params *params, double *x, size_t members,
-    double h, size_t steps, unsigned char *status)
+/* All members. The first status that is not OK. */
+static lotka_volterra_status lotka_volterra_run(const lotka_volterra_members *all)
 {
-    lotka_volterra_status worst = isfinite(h) ? lotka_volterra_OK : lotka_volterra_BAD_ARGUMENT;
-    const lotka_volterra_params own = params != NULL ? *params : lotka_volterra_default_params;
-    size_t earliest = members;
-    if (x == NULL && members > 0) return lotka_volterra_BAD_ARGUMENT;
+    lotka_volterra_status worst = lotka_volterra_OK;
+    size_t earliest = all->members;
 #ifdef _OPENMP
 #pragma omp parallel for schedule(dynamic)
 #endif
-    for (size_t first = 0; first < members; first += lotka_volterra_GROUP) {
-        const lotka_volterra_status group = lotka_volterra_group_run(&own, x, members, first, h, steps,
-            status);
+    for (size_t first = 0; first < all->members; first += lotka_volterra_GROUP) {
+        const lotka_volterra_status group = lotka_volterra_group_run(all, first);
         if (group == lotka_volterra_OK) continue;
 #ifdef _OPENMP
 #pragma omp critical
@@ -1591,6 +1662,30 @@ lotka_volterra_status lotka_volterra_ensemble(const lotka_volterra_params *param
         }
     }
     return worst;
+}
+
+lotka_volterra_status lotka_volterra_ensemble(const lotka_volterra_params *params, double *x, size_t members,
+    double h, size_t steps, unsigned char *status)
+{
+    const lotka_volterra_params shared = params != NULL ? *params : lotka_volterra_default_params;
+    lotka_volterra_members all = { .x = x, .members = members, .steps = steps, .params = &shared, .h = &h,
+        .status = status };
+    if (x == NULL && members > 0) return lotka_volterra_BAD_ARGUMENT;
+    const lotka_volterra_status worst = lotka_volterra_run(&all);
+    return isfinite(h) ? worst : lotka_volterra_BAD_ARGUMENT;
+}
+
+lotka_volterra_status lotka_volterra_ensemble_each(const lotka_volterra_params *params, double *x,
+    size_t members, const double *h, size_t steps, size_t stride, double *frames, unsigned char *status)
+{
+    lotka_volterra_members all = { .x = x, .members = members, .steps = steps, .own = 1, .params = params,
+        .h = h };
+    if (members > 0 && (x == NULL || h == NULL)) return lotka_volterra_BAD_ARGUMENT;
+    if (frames != NULL && stride == 0) return lotka_volterra_BAD_ARGUMENT;
+    all.stride = stride;
+    all.frames = frames;
+    all.status = status;
+    return lotka_volterra_run(&all);
 }
 
 #if defined(__clang__)

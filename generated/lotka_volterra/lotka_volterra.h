@@ -2,7 +2,7 @@
  * lotka_volterra.h: the declarations; lotka_volterra.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: c943a8f328b5d31ad4f2bbfc64f00e6f84b6f962defd05daab747509d527124a
+ * body-sha256: c7bdc9c11812e553df3f04f2b621a2de6d7da518ddcd508784bf71f8b1276a2c
  */
 #ifndef LOTKA_VOLTERRA_H
 #define LOTKA_VOLTERRA_H
@@ -103,6 +103,13 @@ lotka_volterra_status lotka_volterra_kick(lotka_volterra_solver *s, const double
 /* Members are integrated side by side in groups; with OpenMP, groups in parallel. */
 lotka_volterra_status lotka_volterra_ensemble(const lotka_volterra_params *params, double *x, size_t members,
     double h, size_t steps, unsigned char *status);
+
+/* The same where each member has its own parameters params[m] and step h[m]; params may be NULL. */
+/* frames (or NULL) receives the states after every stride-th step: frames[(k * lotka_volterra_DIM + i) *
+   members + m] is coordinate i of member m after (k + 1) * stride steps, NaN if it failed before. Arrays must
+   not overlap. */
+lotka_volterra_status lotka_volterra_ensemble_each(const lotka_volterra_params *params, double *x,
+    size_t members, const double *h, size_t steps, size_t stride, double *frames, unsigned char *status);
 
 /* The Hamiltonian; the Casimirs; the right-hand side pi(x) grad H(x). params may be NULL. */
 double lotka_volterra_hamiltonian(const lotka_volterra_params *params, const double x[lotka_volterra_DIM]);

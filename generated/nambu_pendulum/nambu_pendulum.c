@@ -25,9 +25,10 @@
  *   9. Newton's method in lanes
  *   10. Paths in lanes
  *   11. Blocks of steps
- *   12. Groups of members
- *   13. Ensembles
- * body-sha256: 6d7173f4e8db14c33d4ea4b4033ad3e9b1e809a8a4de661f9a98b37ee32078c1
+ *   12. Members of an ensemble
+ *   13. Groups of members
+ *   14. Ensembles
+ * body-sha256: d8c7ed9dcf8af0c1f8a9c200245cc47390b21faf38b9a5ad36ceac27178092f5
  */
 #include "nambu_pendulum.h"
 
@@ -1952,6 +1953,66 @@ nambu_pendulum_status nambu_pendulum_integrate(nambu_pendulum_solver *s, double 
     return status;
 }
 
+/* ---- Members of an ensemble ---- */
+/* What an ensemble was asked for. Where own is 1, member m has the parameters params[m] and the step h[m];
+   where it is 0, all have the first. */
+typedef struct {
+    double *x;
+    size_t members, steps, own;
+    const nambu_pendulum_params *params; /* NULL for the defaults */
+    const double *h;
+    size_t stride;
+    double *frames;        /* NULL for none */
+    unsigned char *status; /* NULL for none */
+} nambu_pendulum_members;
+
+/* Start a member at a state, with what is its own. */
+static nambu_pendulum_status nambu_pendulum_begin_member(const nambu_pendulum_members *all, size_t m,
+    const double x[nambu_pendulum_DIM], nambu_pendulum_solver *s)
+{
+    const nambu_pendulum_params *params = all->params != NULL ? all->params + m * all->own : NULL;
+    const nambu_pendulum_status status = nambu_pendulum_init(s, params, x);
+    return status == nambu_pendulum_OK ? nambu_pendulum_set_step(s, all->h[m * all->own]) : status;
+}
+
+/* How many steps there are to the next frame, or to the end. */
+static size_t nambu_pendulum_to_frame(const nambu_pendulum_members *all, size_t done)
+{
+    const size_t left = all->steps - done;
+    return all->frames != NULL && all->stride - done % all->stride < left ? all->stride - done % all->stride
+        : left;
+}
+
+/* The frame of a member after so many steps, if there is one: x, or what is no number for NULL. */
+static void nambu_pendulum_put_frame(const nambu_pendulum_members *all, size_t m, size_t done,
+    const double *x)
+{
+    for (size_t i = 0; i < nambu_pendulum_DIM && all->frames != NULL && done % all->stride == 0; ++i)
+        all->frames[((done / all->stride - 1) * nambu_pendulum_DIM + i) * all->members + m] = x != NULL ? x[i]
+            : (double)NAN;
+}
+
+/* The steps of a member after so many, by itself. */
+static nambu_pendulum_status nambu_pendulum_end_member(const nambu_pendulum_members *all, size_t m,
+    size_t done, nambu_pendulum_solver *s, nambu_pendulum_status status)
+{
+    while (done < all->steps) {
+        const size_t steps = nambu_pendulum_to_frame(all, done);
+        if (status == nambu_pendulum_OK) status = nambu_pendulum_integrate(s, s->h, steps);
+        done += steps;
+        nambu_pendulum_put_frame(all, m, done, status == nambu_pendulum_OK ? s->x : NULL);
+    }
+    return status;
+}
+
+/* Where a member ends. */
+static void nambu_pendulum_put_member(const nambu_pendulum_members *all, size_t m,
+    const double x[nambu_pendulum_DIM], nambu_pendulum_status status)
+{
+    for (size_t i = 0; i < nambu_pendulum_DIM; ++i) all->x[i * all->members + m] = x[i];
+    if (all->status != NULL) all->status[m] = (unsigned char)status;
+}
+
 /* ---- Groups of members ---- */
 enum {
     nambu_pendulum_GROUP = nambu_pendulum_LANES, /* members, one in each lane */
@@ -2249,75 +2310,85 @@ static int nambu_pendulum_group_step(nambu_pendulum_group *group, size_t remaini
 
 /* Put a member into a lane: its state, and its coefficients. */
 static nambu_pendulum_status nambu_pendulum_group_join(nambu_pendulum_group *group, int lane,
-    const nambu_pendulum_params *params, const double x0[nambu_pendulum_DIM], double h)
+    const nambu_pendulum_members *all, size_t m)
 {
     nambu_pendulum_solver s;
-    nambu_pendulum_status status = nambu_pendulum_init(&s, params, x0);
-    if (status == nambu_pendulum_OK) status = nambu_pendulum_set_step(&s, h);
+    double x[nambu_pendulum_DIM];
+    for (size_t i = 0; i < nambu_pendulum_DIM; ++i) x[i] = all->x[i * all->members + m];
+    const nambu_pendulum_status status = nambu_pendulum_begin_member(all, m, x, &s);
+    for (int i = 0; i < nambu_pendulum_DIM; ++i) group->x[i][lane] = x[i];
     if (status != nambu_pendulum_OK) return status;
-    for (int i = 0; i < nambu_pendulum_DIM; ++i) group->x[i][lane] = s.x[i];
     for (int k = 0; k < nambu_pendulum_COEFFICIENTS; ++k) group->coef[k][lane] = s.coef[k];
     group->active[lane] = 1;
     return status;
 }
 
-/* The steps that a member has still to make after it left the group, by itself. */
-static nambu_pendulum_status nambu_pendulum_group_finish(const nambu_pendulum_group *group, int lane,
-    const nambu_pendulum_params *params, double x[nambu_pendulum_DIM], double h)
+/* The frames after so many steps, of the members that are active. */
+static void nambu_pendulum_group_frame(const nambu_pendulum_group *group, const nambu_pendulum_members *all,
+    size_t first, size_t done)
+{
+    double x[nambu_pendulum_DIM];
+    for (int lane = 0; lane < nambu_pendulum_LANES; ++lane) {
+        for (int i = 0; i < nambu_pendulum_DIM; ++i) x[i] = group->x[i][lane];
+        if (group->active[lane]) nambu_pendulum_put_frame(all, first + (size_t)lane, done, x);
+    }
+}
+
+/* The end of a member; the steps that the group did not make with it, it makes by itself. */
+static nambu_pendulum_status nambu_pendulum_group_end(const nambu_pendulum_group *group, int lane,
+    const nambu_pendulum_members *all, size_t m, nambu_pendulum_status status)
 {
     nambu_pendulum_solver s;
-    nambu_pendulum_status status = nambu_pendulum_init(&s, params, x);
-    if (status != nambu_pendulum_OK) return status;
-    for (int i = 0; i < nambu_pendulum_DIM; ++i) s.carry[i] = group->carry[i][lane];
-    status = nambu_pendulum_integrate(&s, h, group->steps_left[lane]);
-    memcpy(x, s.x, sizeof s.x);
+    double x[nambu_pendulum_DIM];
+    for (int i = 0; i < nambu_pendulum_DIM; ++i) x[i] = group->x[i][lane];
+    if (status != nambu_pendulum_OK) {
+        nambu_pendulum_end_member(all, m, 0, NULL, status);
+    } else if (group->steps_left[lane] > 0) {
+        const nambu_pendulum_status begun = nambu_pendulum_begin_member(all, m, x, &s);
+        for (int i = 0; i < nambu_pendulum_DIM && begun == nambu_pendulum_OK; ++i)
+            s.carry[i] = group->carry[i][lane];
+        status = nambu_pendulum_end_member(all, m, all->steps - group->steps_left[lane], &s, begun);
+        if (begun == nambu_pendulum_OK) memcpy(x, s.x, sizeof x);
+    }
+    nambu_pendulum_put_member(all, m, x, status);
     return status;
 }
 
 /* The members from first on, as many as there are lanes. The first status that is not OK. */
-static nambu_pendulum_status nambu_pendulum_group_run(const nambu_pendulum_params *params, double *x,
-    size_t members, size_t first, double h, size_t steps, unsigned char *status)
+static nambu_pendulum_status nambu_pendulum_group_run(const nambu_pendulum_members *all, size_t first)
 {
     nambu_pendulum_group group;
     nambu_pendulum_status worst = nambu_pendulum_OK, member[nambu_pendulum_LANES];
-    const int count = members - first < nambu_pendulum_LANES ? (int)(members - first) : nambu_pendulum_LANES;
-    double state[nambu_pendulum_DIM];
-    size_t left = steps;
+    const int count = all->members - first < nambu_pendulum_LANES ? (int)(all->members - first)
+        : nambu_pendulum_LANES;
+    size_t left = all->steps;
     memset(&group, 0, sizeof group);
-    for (int lane = 0; lane < count; ++lane) {
-        for (size_t i = 0; i < nambu_pendulum_DIM; ++i) state[i] = x[i * members + first + (size_t)lane];
-        member[lane] = nambu_pendulum_group_join(&group, lane, params, state, h);
+    for (int lane = 0; lane < count; ++lane)
+        member[lane] = nambu_pendulum_group_join(&group, lane, all, first + (size_t)lane);
+    for (int active = count; left > 0 && active >= nambu_pendulum_FEWEST;) {
+        active = nambu_pendulum_group_step(&group, left--);
+        if (all->frames != NULL) nambu_pendulum_group_frame(&group, all, first, all->steps - left);
     }
-    for (int active = count; left > 0 && active >= nambu_pendulum_FEWEST; --left)
-        active = nambu_pendulum_group_step(&group, left);
     for (int lane = 0; lane < count; ++lane) {
         if (group.active[lane]) group.steps_left[lane] = left;
-        for (int i = 0; i < nambu_pendulum_DIM; ++i) state[i] = group.x[i][lane];
-        if (member[lane] == nambu_pendulum_OK) {
-            if (group.steps_left[lane] > 0)
-                member[lane] = nambu_pendulum_group_finish(&group, lane, params, state, h);
-            for (size_t i = 0; i < nambu_pendulum_DIM; ++i) x[i * members + first + (size_t)lane] = state[i];
-        }
-        if (status != NULL) status[first + (size_t)lane] = (unsigned char)member[lane];
-        if (worst == nambu_pendulum_OK) worst = member[lane];
+        const nambu_pendulum_status status = nambu_pendulum_group_end(&group, lane, all, first + (size_t)lane,
+            member[lane]);
+        if (worst == nambu_pendulum_OK) worst = status;
     }
     return worst;
 }
 
 /* ---- Ensembles ---- */
-nambu_pendulum_status nambu_pendulum_ensemble(const nambu_pendulum_params *params, double *x, size_t members,
-    double h, size_t steps, unsigned char *status)
+/* All members. The first status that is not OK. */
+static nambu_pendulum_status nambu_pendulum_run(const nambu_pendulum_members *all)
 {
-    nambu_pendulum_status worst = isfinite(h) ? nambu_pendulum_OK : nambu_pendulum_BAD_ARGUMENT;
-    const nambu_pendulum_params own = params != NULL ? *params : nambu_pendulum_default_params;
-    size_t earliest = members;
-    if (x == NULL && members > 0) return nambu_pendulum_BAD_ARGUMENT;
+    nambu_pendulum_status worst = nambu_pendulum_OK;
+    size_t earliest = all->members;
 #ifdef _OPENMP
 #pragma omp parallel for schedule(dynamic)
 #endif
-    for (size_t first = 0; first < members; first += nambu_pendulum_GROUP) {
-        const nambu_pendulum_status group = nambu_pendulum_group_run(&own, x, members, first, h, steps,
-            status);
+    for (size_t first = 0; first < all->members; first += nambu_pendulum_GROUP) {
+        const nambu_pendulum_status group = nambu_pendulum_group_run(all, first);
         if (group == nambu_pendulum_OK) continue;
 #ifdef _OPENMP
 #pragma omp critical
@@ -2328,6 +2399,30 @@ nambu_pendulum_status nambu_pendulum_ensemble(const nambu_pendulum_params *param
         }
     }
     return worst;
+}
+
+nambu_pendulum_status nambu_pendulum_ensemble(const nambu_pendulum_params *params, double *x, size_t members,
+    double h, size_t steps, unsigned char *status)
+{
+    const nambu_pendulum_params shared = params != NULL ? *params : nambu_pendulum_default_params;
+    nambu_pendulum_members all = { .x = x, .members = members, .steps = steps, .params = &shared, .h = &h,
+        .status = status };
+    if (x == NULL && members > 0) return nambu_pendulum_BAD_ARGUMENT;
+    const nambu_pendulum_status worst = nambu_pendulum_run(&all);
+    return isfinite(h) ? worst : nambu_pendulum_BAD_ARGUMENT;
+}
+
+nambu_pendulum_status nambu_pendulum_ensemble_each(const nambu_pendulum_params *params, double *x,
+    size_t members, const double *h, size_t steps, size_t stride, double *frames, unsigned char *status)
+{
+    nambu_pendulum_members all = { .x = x, .members = members, .steps = steps, .own = 1, .params = params,
+        .h = h };
+    if (members > 0 && (x == NULL || h == NULL)) return nambu_pendulum_BAD_ARGUMENT;
+    if (frames != NULL && stride == 0) return nambu_pendulum_BAD_ARGUMENT;
+    all.stride = stride;
+    all.frames = frames;
+    all.status = status;
+    return nambu_pendulum_run(&all);
 }
 
 #if defined(__clang__)

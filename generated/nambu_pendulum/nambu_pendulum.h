@@ -2,7 +2,7 @@
  * nambu_pendulum.h: the declarations; nambu_pendulum.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: bc1c43bd4e1fec1c28f703545863dcccb93ebac081c7e45271b1600c80271ecb
+ * body-sha256: e354a01b66467a18c731abaad1395182454da7ae3a80d0c9b26ed06122a0f9f1
  */
 #ifndef NAMBU_PENDULUM_H
 #define NAMBU_PENDULUM_H
@@ -103,6 +103,13 @@ nambu_pendulum_status nambu_pendulum_kick(nambu_pendulum_solver *s, const double
 /* Members are integrated side by side in groups; with OpenMP, groups in parallel. */
 nambu_pendulum_status nambu_pendulum_ensemble(const nambu_pendulum_params *params, double *x, size_t members,
     double h, size_t steps, unsigned char *status);
+
+/* The same where each member has its own parameters params[m] and step h[m]; params may be NULL. */
+/* frames (or NULL) receives the states after every stride-th step: frames[(k * nambu_pendulum_DIM + i) *
+   members + m] is coordinate i of member m after (k + 1) * stride steps, NaN if it failed before. Arrays must
+   not overlap. */
+nambu_pendulum_status nambu_pendulum_ensemble_each(const nambu_pendulum_params *params, double *x,
+    size_t members, const double *h, size_t steps, size_t stride, double *frames, unsigned char *status);
 
 /* The Hamiltonian; the Casimirs; the right-hand side pi(x) grad H(x). params may be NULL. */
 double nambu_pendulum_hamiltonian(const nambu_pendulum_params *params, const double x[nambu_pendulum_DIM]);

@@ -26,9 +26,10 @@
  *   9. The solver
  *   10. Newton's method in lanes
  *   11. Blocks of steps
- *   12. Groups of members
- *   13. Ensembles
- * body-sha256: f2ff4a8c2a9e5b76c08a435c80b07110a39322b6b149597f31c9fc326bd3ba1b
+ *   12. Members of an ensemble
+ *   13. Groups of members
+ *   14. Ensembles
+ * body-sha256: e64beaa252fbc3a2ab9792411cf51311f41432bf91a85e120111794a9e7f1004
  */
 #include "rigid_body.h"
 
@@ -1588,6 +1589,66 @@ rigid_body_status rigid_body_integrate(rigid_body_solver *s, double h, size_t st
     return status;
 }
 
+/* ---- Members of an ensemble ---- */
+/* What an ensemble was asked for. Where own is 1, member m has the parameters params[m] and the step h[m];
+   where it is 0, all have the first. */
+typedef struct {
+    double *x;
+    size_t members, steps, own;
+    const rigid_body_params *params; /* NULL for the defaults */
+    const double *h;
+    const double *gauge; /* NULL to choose it */
+    size_t stride;
+    double *frames;        /* NULL for none */
+    unsigned char *status; /* NULL for none */
+} rigid_body_members;
+
+/* Start a member at a state, with what is its own. */
+static rigid_body_status rigid_body_begin_member(const rigid_body_members *all, size_t m,
+    const double x[rigid_body_DIM], const double *gauge, rigid_body_solver *s)
+{
+    const rigid_body_params *params = all->params != NULL ? all->params + m * all->own : NULL;
+    const rigid_body_status status = rigid_body_init_gauge(s, params, x, gauge);
+    return status == rigid_body_OK ? rigid_body_set_step(s, all->h[m * all->own]) : status;
+}
+
+/* How many steps there are to the next frame, or to the end. */
+static size_t rigid_body_to_frame(const rigid_body_members *all, size_t done)
+{
+    const size_t left = all->steps - done;
+    return all->frames != NULL && all->stride - done % all->stride < left ? all->stride - done % all->stride
+        : left;
+}
+
+/* The frame of a member after so many steps, if there is one: x, or what is no number for NULL. */
+static void rigid_body_put_frame(const rigid_body_members *all, size_t m, size_t done, const double *x)
+{
+    for (size_t i = 0; i < rigid_body_DIM && all->frames != NULL && done % all->stride == 0; ++i)
+        all->frames[((done / all->stride - 1) * rigid_body_DIM + i) * all->members + m] = x != NULL ? x[i]
+            : (double)NAN;
+}
+
+/* The steps of a member after so many, by itself. */
+static rigid_body_status rigid_body_end_member(const rigid_body_members *all, size_t m, size_t done,
+    rigid_body_solver *s, rigid_body_status status)
+{
+    while (done < all->steps) {
+        const size_t steps = rigid_body_to_frame(all, done);
+        if (status == rigid_body_OK) status = rigid_body_integrate(s, s->h, steps);
+        done += steps;
+        rigid_body_put_frame(all, m, done, status == rigid_body_OK ? s->x : NULL);
+    }
+    return status;
+}
+
+/* Where a member ends. */
+static void rigid_body_put_member(const rigid_body_members *all, size_t m, const double x[rigid_body_DIM],
+    rigid_body_status status)
+{
+    for (size_t i = 0; i < rigid_body_DIM; ++i) all->x[i * all->members + m] = x[i];
+    if (all->status != NULL) all->status[m] = (unsigned char)status;
+}
+
 /* ---- Groups of members ---- */
 enum {
     rigid_body_GROUP = rigid_body_LANES, /* members, one in each lane */
@@ -1877,75 +1938,86 @@ static int rigid_body_group_step(rigid_body_group *group, size_t remaining)
 
 /* Put a member into a lane: its state, and its coefficients. */
 static rigid_body_status rigid_body_group_join(rigid_body_group *group, int lane,
-    const rigid_body_params *params, const double x0[rigid_body_DIM], double h)
+    const rigid_body_members *all, size_t m)
 {
     rigid_body_solver s;
-    rigid_body_status status = rigid_body_init(&s, params, x0);
-    if (status == rigid_body_OK) status = rigid_body_set_step(&s, h);
+    double x[rigid_body_DIM];
+    for (size_t i = 0; i < rigid_body_DIM; ++i) x[i] = all->x[i * all->members + m];
+    const double *gauge = all->gauge != NULL ? all->gauge + m * rigid_body_GAUGES : NULL;
+    const rigid_body_status status = rigid_body_begin_member(all, m, x, gauge, &s);
+    for (int i = 0; i < rigid_body_DIM; ++i) group->x[i][lane] = x[i];
     if (status != rigid_body_OK) return status;
-    for (int i = 0; i < rigid_body_DIM; ++i) group->x[i][lane] = s.x[i];
     for (int k = 0; k < rigid_body_COEFFICIENTS; ++k) group->coef[k][lane] = s.coef[k];
     memcpy(group->gauge[lane], s.gauge, sizeof s.gauge);
     group->active[lane] = 1;
     return status;
 }
 
-/* The steps that a member has still to make after it left the group, by itself. */
-static rigid_body_status rigid_body_group_finish(const rigid_body_group *group, int lane,
-    const rigid_body_params *params, double x[rigid_body_DIM], double h)
+/* The frames after so many steps, of the members that are active. */
+static void rigid_body_group_frame(const rigid_body_group *group, const rigid_body_members *all, size_t first,
+    size_t done)
+{
+    double x[rigid_body_DIM];
+    for (int lane = 0; lane < rigid_body_LANES; ++lane) {
+        for (int i = 0; i < rigid_body_DIM; ++i) x[i] = group->x[i][lane];
+        if (group->active[lane]) rigid_body_put_frame(all, first + (size_t)lane, done, x);
+    }
+}
+
+/* The end of a member; the steps that the group did not make with it, it makes by itself. */
+static rigid_body_status rigid_body_group_end(const rigid_body_group *group, int lane,
+    const rigid_body_members *all, size_t m, rigid_body_status status)
 {
     rigid_body_solver s;
-    rigid_body_status status = rigid_body_init_gauge(&s, params, x, group->gauge[lane]);
-    if (status != rigid_body_OK) return status;
-    for (int i = 0; i < rigid_body_DIM; ++i) s.carry[i] = group->carry[i][lane];
-    status = rigid_body_integrate(&s, h, group->steps_left[lane]);
-    memcpy(x, s.x, sizeof s.x);
+    double x[rigid_body_DIM];
+    for (int i = 0; i < rigid_body_DIM; ++i) x[i] = group->x[i][lane];
+    if (status != rigid_body_OK) {
+        rigid_body_end_member(all, m, 0, NULL, status);
+    } else if (group->steps_left[lane] > 0) {
+        const rigid_body_status begun = rigid_body_begin_member(all, m, x, group->gauge[lane], &s);
+        for (int i = 0; i < rigid_body_DIM && begun == rigid_body_OK; ++i) s.carry[i] = group->carry[i][lane];
+        status = rigid_body_end_member(all, m, all->steps - group->steps_left[lane], &s, begun);
+        if (begun == rigid_body_OK) memcpy(x, s.x, sizeof x);
+    }
+    rigid_body_put_member(all, m, x, status);
     return status;
 }
 
 /* The members from first on, as many as there are lanes. The first status that is not OK. */
-static rigid_body_status rigid_body_group_run(const rigid_body_params *params, double *x, size_t members,
-    size_t first, double h, size_t steps, unsigned char *status)
+static rigid_body_status rigid_body_group_run(const rigid_body_members *all, size_t first)
 {
     rigid_body_group group;
     rigid_body_status worst = rigid_body_OK, member[rigid_body_LANES];
-    const int count = members - first < rigid_body_LANES ? (int)(members - first) : rigid_body_LANES;
-    double state[rigid_body_DIM];
-    size_t left = steps;
+    const int count = all->members - first < rigid_body_LANES ? (int)(all->members - first)
+        : rigid_body_LANES;
+    size_t left = all->steps;
     memset(&group, 0, sizeof group);
-    for (int lane = 0; lane < count; ++lane) {
-        for (size_t i = 0; i < rigid_body_DIM; ++i) state[i] = x[i * members + first + (size_t)lane];
-        member[lane] = rigid_body_group_join(&group, lane, params, state, h);
+    for (int lane = 0; lane < count; ++lane)
+        member[lane] = rigid_body_group_join(&group, lane, all, first + (size_t)lane);
+    for (int active = count; left > 0 && active >= rigid_body_FEWEST;) {
+        active = rigid_body_group_step(&group, left--);
+        if (all->frames != NULL) rigid_body_group_frame(&group, all, first, all->steps - left);
     }
-    for (int active = count; left > 0 && active >= rigid_body_FEWEST; --left)
-        active = rigid_body_group_step(&group, left);
     for (int lane = 0; lane < count; ++lane) {
         if (group.active[lane]) group.steps_left[lane] = left;
-        for (int i = 0; i < rigid_body_DIM; ++i) state[i] = group.x[i][lane];
-        if (member[lane] == rigid_body_OK) {
-            if (group.steps_left[lane] > 0)
-                member[lane] = rigid_body_group_finish(&group, lane, params, state, h);
-            for (size_t i = 0; i < rigid_body_DIM; ++i) x[i * members + first + (size_t)lane] = state[i];
-        }
-        if (status != NULL) status[first + (size_t)lane] = (unsigned char)member[lane];
-        if (worst == rigid_body_OK) worst = member[lane];
+        const rigid_body_status status = rigid_body_group_end(&group, lane, all, first + (size_t)lane,
+            member[lane]);
+        if (worst == rigid_body_OK) worst = status;
     }
     return worst;
 }
 
 /* ---- Ensembles ---- */
-rigid_body_status rigid_body_ensemble(const rigid_body_params *params, double *x, size_t members, double h,
-    size_t steps, unsigned char *status)
+/* All members. The first status that is not OK. */
+static rigid_body_status rigid_body_run(const rigid_body_members *all)
 {
-    rigid_body_status worst = isfinite(h) ? rigid_body_OK : rigid_body_BAD_ARGUMENT;
-    const rigid_body_params own = params != NULL ? *params : rigid_body_default_params;
-    size_t earliest = members;
-    if (x == NULL && members > 0) return rigid_body_BAD_ARGUMENT;
+    rigid_body_status worst = rigid_body_OK;
+    size_t earliest = all->members;
 #ifdef _OPENMP
 #pragma omp parallel for schedule(dynamic)
 #endif
-    for (size_t first = 0; first < members; first += rigid_body_GROUP) {
-        const rigid_body_status group = rigid_body_group_run(&own, x, members, first, h, steps, status);
+    for (size_t first = 0; first < all->members; first += rigid_body_GROUP) {
+        const rigid_body_status group = rigid_body_group_run(all, first);
         if (group == rigid_body_OK) continue;
 #ifdef _OPENMP
 #pragma omp critical
@@ -1956,6 +2028,31 @@ rigid_body_status rigid_body_ensemble(const rigid_body_params *params, double *x
         }
     }
     return worst;
+}
+
+rigid_body_status rigid_body_ensemble(const rigid_body_params *params, double *x, size_t members, double h,
+    size_t steps, unsigned char *status)
+{
+    const rigid_body_params shared = params != NULL ? *params : rigid_body_default_params;
+    rigid_body_members all = { .x = x, .members = members, .steps = steps, .params = &shared, .h = &h,
+        .status = status };
+    if (x == NULL && members > 0) return rigid_body_BAD_ARGUMENT;
+    const rigid_body_status worst = rigid_body_run(&all);
+    return isfinite(h) ? worst : rigid_body_BAD_ARGUMENT;
+}
+
+rigid_body_status rigid_body_ensemble_each(const rigid_body_params *params, double *x, size_t members,
+    const double *gauge, const double *h, size_t steps, size_t stride, double *frames, unsigned char *status)
+{
+    rigid_body_members all = { .x = x, .members = members, .steps = steps, .own = 1, .params = params, .h =
+        h };
+    if (members > 0 && (x == NULL || h == NULL)) return rigid_body_BAD_ARGUMENT;
+    if (frames != NULL && stride == 0) return rigid_body_BAD_ARGUMENT;
+    all.gauge = gauge;
+    all.stride = stride;
+    all.frames = frames;
+    all.status = status;
+    return rigid_body_run(&all);
 }
 
 #if defined(__clang__)

@@ -2,7 +2,7 @@
  * rigid_body.h: the declarations; rigid_body.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: c3b7ae02f8498a17f01623b5d8c75b17982200ed0b3af4b949c597c741b18462
+ * body-sha256: e03da01fd8105f473806e3c88c12792a659a076893bdc58257b008b4dc75ab4a
  */
 #ifndef RIGID_BODY_H
 #define RIGID_BODY_H
@@ -111,6 +111,14 @@ rigid_body_status rigid_body_kick(rigid_body_solver *s, const double change[rigi
 /* Members are integrated side by side in groups; with OpenMP, groups in parallel. */
 rigid_body_status rigid_body_ensemble(const rigid_body_params *params, double *x, size_t members, double h,
     size_t steps, unsigned char *status);
+
+/* The same where each member has its own parameters params[m], gauge &gauge[m * rigid_body_GAUGES] and step
+   h[m]; params and gauge may be NULL. */
+/* frames (or NULL) receives the states after every stride-th step: frames[(k * rigid_body_DIM + i) * members
+   + m] is coordinate i of member m after (k + 1) * stride steps, NaN if it failed before. Arrays must not
+   overlap. */
+rigid_body_status rigid_body_ensemble_each(const rigid_body_params *params, double *x, size_t members,
+    const double *gauge, const double *h, size_t steps, size_t stride, double *frames, unsigned char *status);
 
 /* The Hamiltonian; the Casimirs; the right-hand side pi(x) grad H(x). params may be NULL. */
 double rigid_body_hamiltonian(const rigid_body_params *params, const double x[rigid_body_DIM]);

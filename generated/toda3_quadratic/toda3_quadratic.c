@@ -20,8 +20,9 @@
  *   5. The implicit step, along paths dm/dt = pi(m) p
  *   6. Between steps
  *   7. The solver
- *   8. Ensembles
- * body-sha256: d84270926e1beb3a01348029ff48fb789f6ebfb2edc0a39efc5d8d8d19d44817
+ *   8. Members of an ensemble
+ *   9. Ensembles
+ * body-sha256: 9c063acdd58786f4900105b51fb095ce94f265a49802d708649dbafb1c5f1d21
  */
 #include "toda3_quadratic.h"
 
@@ -860,24 +861,103 @@ const char *toda3_quadratic_status_string(toda3_quadratic_status status)
 size_t toda3_quadratic_solver_size(void) { return sizeof(toda3_quadratic_solver); }
 size_t toda3_quadratic_solver_steps_done(const toda3_quadratic_solver *s) { return s->steps; }
 
+/* ---- Members of an ensemble ---- */
+/* What an ensemble was asked for. Where own is 1, member m has the parameters params[m] and the step h[m];
+   where it is 0, all have the first. */
+typedef struct {
+    double *x;
+    size_t members, steps, own;
+    const toda3_quadratic_params *params; /* NULL for the defaults */
+    const double *h;
+    size_t stride;
+    double *frames;        /* NULL for none */
+    unsigned char *status; /* NULL for none */
+} toda3_quadratic_members;
+
+/* Start a member at a state, with what is its own. */
+static toda3_quadratic_status toda3_quadratic_begin_member(const toda3_quadratic_members *all, size_t m,
+    const double x[toda3_quadratic_DIM], toda3_quadratic_solver *s)
+{
+    const toda3_quadratic_params *params = all->params != NULL ? all->params + m * all->own : NULL;
+    const toda3_quadratic_status status = toda3_quadratic_init(s, params, x);
+    return status == toda3_quadratic_OK ? toda3_quadratic_set_step(s, all->h[m * all->own]) : status;
+}
+
+/* How many steps there are to the next frame, or to the end. */
+static size_t toda3_quadratic_to_frame(const toda3_quadratic_members *all, size_t done)
+{
+    const size_t left = all->steps - done;
+    return all->frames != NULL && all->stride - done % all->stride < left ? all->stride - done % all->stride
+        : left;
+}
+
+/* The frame of a member after so many steps, if there is one: x, or what is no number for NULL. */
+static void toda3_quadratic_put_frame(const toda3_quadratic_members *all, size_t m, size_t done,
+    const double *x)
+{
+    for (size_t i = 0; i < toda3_quadratic_DIM && all->frames != NULL && done % all->stride == 0; ++i)
+        all->frames[((done / all->stride - 1) * toda3_quadratic_DIM + i) * all->members + m] = x != NULL
+            ? x[i] : (double)NAN;
+}
+
+/* The steps of a member after so many, by itself. */
+static toda3_quadratic_status toda3_quadratic_end_member(const toda3_quadratic_members *all, size_t m,
+    size_t done, toda3_quadratic_solver *s, toda3_quadratic_status status)
+{
+    while (done < all->steps) {
+        const size_t steps = toda3_quadratic_to_frame(all, done);
+        if (status == toda3_quadratic_OK) status = toda3_quadratic_integrate(s, s->h, steps);
+        done += steps;
+        toda3_quadratic_put_frame(all, m, done, status == toda3_quadratic_OK ? s->x : NULL);
+    }
+    return status;
+}
+
+/* Where a member ends. */
+static void toda3_quadratic_put_member(const toda3_quadratic_members *all, size_t m,
+    const double x[toda3_quadratic_DIM], toda3_quadratic_status status)
+{
+    for (size_t i = 0; i < toda3_quadratic_DIM; ++i) all->x[i * all->members + m] = x[i];
+    if (all->status != NULL) all->status[m] = (unsigned char)status;
+}
+
 /* ---- Ensembles ---- */
+/* All members. The first status that is not OK. */
+static toda3_quadratic_status toda3_quadratic_run(const toda3_quadratic_members *all)
+{
+    toda3_quadratic_status worst = toda3_quadratic_OK;
+    for (size_t m = 0; m < all->members; ++m) {
+        toda3_quadratic_solver s;
+        double x[toda3_quadratic_DIM];
+        for (size_t i = 0; i < toda3_quadratic_DIM; ++i) x[i] = all->x[i * all->members + m];
+        const toda3_quadratic_status begun = toda3_quadratic_begin_member(all, m, x, &s);
+        const toda3_quadratic_status status = toda3_quadratic_end_member(all, m, 0, &s, begun);
+        toda3_quadratic_put_member(all, m, begun == toda3_quadratic_OK ? s.x : x, status);
+        if (worst == toda3_quadratic_OK) worst = status;
+    }
+    return worst;
+}
+
 toda3_quadratic_status toda3_quadratic_ensemble(const toda3_quadratic_params *params, double *x,
     size_t members, double h, size_t steps, unsigned char *status)
 {
-    toda3_quadratic_status worst = isfinite(h) ? toda3_quadratic_OK : toda3_quadratic_BAD_ARGUMENT;
-    const toda3_quadratic_params own = params != NULL ? *params : toda3_quadratic_default_params;
+    const toda3_quadratic_params shared = params != NULL ? *params : toda3_quadratic_default_params;
+    toda3_quadratic_members all = { .x = x, .members = members, .steps = steps, .params = &shared, .h = &h,
+        .status = status };
     if (x == NULL && members > 0) return toda3_quadratic_BAD_ARGUMENT;
-    for (size_t m = 0; m < members; ++m) {
-        toda3_quadratic_solver s;
-        double x0[toda3_quadratic_DIM];
-        for (size_t i = 0; i < toda3_quadratic_DIM; ++i) x0[i] = x[i * members + m];
-        toda3_quadratic_status member = toda3_quadratic_init(&s, &own, x0);
-        if (member == toda3_quadratic_OK) {
-            member = toda3_quadratic_integrate(&s, h, steps);
-            for (size_t i = 0; i < toda3_quadratic_DIM; ++i) x[i * members + m] = s.x[i];
-        }
-        if (status != NULL) status[m] = (unsigned char)member;
-        if (worst == toda3_quadratic_OK) worst = member;
-    }
-    return worst;
+    const toda3_quadratic_status worst = toda3_quadratic_run(&all);
+    return isfinite(h) ? worst : toda3_quadratic_BAD_ARGUMENT;
+}
+
+toda3_quadratic_status toda3_quadratic_ensemble_each(const toda3_quadratic_params *params, double *x,
+    size_t members, const double *h, size_t steps, size_t stride, double *frames, unsigned char *status)
+{
+    toda3_quadratic_members all = { .x = x, .members = members, .steps = steps, .own = 1, .params = params,
+        .h = h };
+    if (members > 0 && (x == NULL || h == NULL)) return toda3_quadratic_BAD_ARGUMENT;
+    if (frames != NULL && stride == 0) return toda3_quadratic_BAD_ARGUMENT;
+    all.stride = stride;
+    all.frames = frames;
+    all.status = status;
+    return toda3_quadratic_run(&all);
 }

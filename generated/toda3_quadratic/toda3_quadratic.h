@@ -2,7 +2,7 @@
  * toda3_quadratic.h: the declarations; toda3_quadratic.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: e91b324b551f90293a232211e402c594a6deabbbc8868e25312c3a07f39e4cd3
+ * body-sha256: 296cbc8f9e54004b31fb0b9a70ccd6b812ba7e92d57812090da80e687ade850d
  */
 #ifndef TODA3_QUADRATIC_H
 #define TODA3_QUADRATIC_H
@@ -92,6 +92,13 @@ toda3_quadratic_status toda3_quadratic_kick(toda3_quadratic_solver *s,
    state. status (or NULL) receives the status of each; the first that is not OK is returned. */
 toda3_quadratic_status toda3_quadratic_ensemble(const toda3_quadratic_params *params, double *x,
     size_t members, double h, size_t steps, unsigned char *status);
+
+/* The same where each member has its own parameters params[m] and step h[m]; params may be NULL. */
+/* frames (or NULL) receives the states after every stride-th step: frames[(k * toda3_quadratic_DIM + i) *
+   members + m] is coordinate i of member m after (k + 1) * stride steps, NaN if it failed before. Arrays must
+   not overlap. */
+toda3_quadratic_status toda3_quadratic_ensemble_each(const toda3_quadratic_params *params, double *x,
+    size_t members, const double *h, size_t steps, size_t stride, double *frames, unsigned char *status);
 
 /* The Hamiltonian; the Casimirs; the right-hand side pi(x) grad H(x). params may be NULL. */
 double toda3_quadratic_hamiltonian(const toda3_quadratic_params *params, const double x[toda3_quadratic_DIM]);

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from phigen.runtime.interface import Floats, Interface
+from phigen.runtime.members import Members
 
 #: What counts of steps have to fit into.
 _MOST = np.iinfo(np.int64).max
@@ -103,6 +104,47 @@ def members(x: ArrayLike, what: str, interface: Interface) -> Floats:
     if found.ndim != 2:
         raise ValueError(f"{what} must have shape (members, {interface.dimension}), not {found.shape}")
     return found
+
+
+def ensemble(
+    X0: ArrayLike,
+    h: ArrayLike,
+    steps: int,
+    stride: int | None,
+    t0: ArrayLike | None,
+    given: Mapping[str, ArrayLike] | None,
+    more: Mapping[str, ArrayLike],
+    interface: Interface,
+) -> Members:
+    """The members of an ensemble, by what `Solver.ensemble` is given."""
+    own: dict[str, Any] = {name: v for name, v in {**(given or {}), **more}.items() if np.ndim(v) > 0}
+    if t0 is not None and np.ndim(t0) > 0 and not interface.time:
+        own["t0"] = t0  # then it is the name of a parameter, or of nothing
+    several: list[Any] = [v for v in (h, t0, *own.values()) if v is not None and np.ndim(v) > 0]
+    if np.ndim(X0) == 1 and several:
+        start = np.tile(state(X0, "X0", interface), (len(several[0]), 1))
+    else:
+        start = members(X0, "X0", interface)
+    shape = (len(start),)
+    # Names are checked with a number in place of each array.
+    plain: list[dict[str, Any]] = [
+        {n: 1.0 if n in own else v for n, v in (part or {}).items()} for part in (given, more)
+    ]
+    alone: Any = 1.0 if t0 is not None and np.ndim(t0) > 0 else t0
+    begin: Floats = np.asarray(start_time(alone, interface, plain[1]))
+    values = {name: np.asarray(value) for name, value in parameters(interface, *plain).items()}
+    for name in own.keys() & values.keys():
+        values[name] = _array(own[name], f"parameter {name!r}", shape)
+        if name in interface.positive and not (values[name] > 0).all():
+            m = int(np.argmin(values[name] > 0))
+            raise ValueError(f"parameter {name!r} must be positive, not {float(values[name][m])}, as of member {m}")
+    if alone is not t0 and interface.time:
+        begin = _array(t0, "the times t0", shape)  # type: ignore[arg-type]
+    size = _array(h, "the step size h", shape) if np.ndim(h) > 0 else np.asarray(step_size(h))  # type: ignore[arg-type]
+    if not size.all():
+        raise ValueError("the step size h must not be 0")
+    stride = 0 if stride is None else count(stride, "stride", 1)
+    return Members(start, size, count(steps, "steps", 0), values, begin, stride)
 
 
 def states(x: ArrayLike, what: str, interface: Interface) -> Floats:

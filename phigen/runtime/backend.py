@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import Protocol
 
 from phigen.runtime.interface import Floats
+from phigen.runtime.members import Members
 from phigen.runtime.session import Session
 
 
@@ -38,8 +39,8 @@ class Backend(Protocol):
         """A back end whose trajectories all have the given gauge, one value for each Casimir of the gauge."""
         ...
 
-    def ensemble(self, x0: Floats, h: float, steps: int, parameters: Mapping[str, float], t0: float = 0.0) -> Floats:
-        """Final states (members, DIM) of initial states (members, DIM)."""
+    def ensemble(self, members: Members, threads: int | None = None) -> Floats:
+        """Final states (members, DIM), or frames (rows, members, DIM); in so many threads, None for all cores."""
         ...
 
     def hamiltonian(self, x: Floats, parameters: Mapping[str, float], t: Floats | None = None) -> Floats:

@@ -27,12 +27,12 @@ from phigen.runtime.interface import (
     MissingExtraError,
     status_name,
 )
+from phigen.runtime.members import Members, one_by_one, shared_out
 
 Bytes = NDArray[np.uint8]
 
 # Between two calls Python can deliver a keyboard interrupt.
 _STEPS_PER_CALL = 1 << 16
-_MEMBERS_PER_CALL = 1024  # a multiple of every vector width: members meet the same neighbours in each split
 _ALIGNMENT = 64  # what the widest vector registers ask for
 
 _POINTER, _DOUBLE, _SIZE, _INT = ctypes.c_void_p, ctypes.c_double, ctypes.c_size_t, ctypes.c_int
@@ -58,6 +58,7 @@ _TIMED = {
 # What is there only if it was asked for, or not left out.
 _EXTRAS = {
     "ensemble": (_INT, (_POINTER, _POINTER, _SIZE, _DOUBLE, _SIZE, _POINTER)),
+    "ensemble_each": (_INT, (_POINTER, _POINTER, _SIZE, _POINTER, _SIZE, _SIZE, _POINTER, _POINTER)),
     "step_tangent": (_INT, (_POINTER, _DOUBLE, _POINTER)),
     "init_gauge": (_INT, (_POINTER, _POINTER, _POINTER, _POINTER)),
     "set_state": (_INT, (_POINTER, _POINTER)),
@@ -159,6 +160,9 @@ class CSolver:
         self._c: Any = SimpleNamespace()
         offered = {name: s for name, s in _EXTRAS.items() if hasattr(self._library, f"{interface.name}_{name}")}
         timed = _TIMED if interface.time else {}
+        if interface.time or "init_gauge" in offered:  # times, or a gauge of each
+            _, each = _EXTRAS["ensemble_each"]
+            offered |= {"ensemble_each": (_INT, (*each[:3], _POINTER, *each[3:]))} if "ensemble_each" in offered else {}
         for name, (result, arguments) in {**_SIGNATURES, **timed, **offered}.items():
             function = getattr(self._library, f"{interface.name}_{name}", None)
             if function is None:
@@ -210,29 +214,60 @@ class CSolver:
         struct, interface = _aligned_copy(np.frombuffer(saved, dtype=np.uint8)), self.interface
         return CSession(self._c, struct, interface.dimension, interface.element)
 
-    def ensemble(self, x0: Floats, h: float, steps: int, parameters: Mapping[str, float], t0: float = 0.0) -> Floats:
+    def ensemble(self, members: Members, threads: int | None = None) -> Floats:
         """See `phigen.runtime.backend.Backend`."""
         if not hasattr(self._c, "ensemble"):
             raise TypeError(f"{self.interface.name} was compiled without ensembles: its spec leaves them out")
-        packed = self._packed(parameters)
-        final, status = np.empty_like(x0, order="C"), np.zeros(len(x0), dtype=np.uint8)
-        overall = 0
-        chunk = max(_MEMBERS_PER_CALL, _STEPS_PER_CALL // max(steps, 1) // _MEMBERS_PER_CALL * _MEMBERS_PER_CALL)
-        for start in range(0, len(x0), chunk):
-            part = slice(start, start + chunk)
-            x = np.array(x0[part].T, order="C")  # x[DIM][members]
-            members, rest = (packed.ctypes.data, x.ctypes.data, x.shape[1]), (h, steps, status[part].ctypes.data)
-            if self.interface.time:
-                failure = self._c.ensemble_at(*members, t0, *rest)
+        alike = members.alike and not members.stride and self._gauge is None
+        if not (alike or hasattr(self._c, "ensemble_each")):
+            return one_by_one(self, members)
+        final, status = np.empty_like(members.x0, order="C"), np.zeros(len(members), dtype=np.uint8)
+        frames = members.frames() if members.stride else None
+
+        def make(part: slice) -> None:
+            x = np.array(members.x0[part].T, order="C")  # x[DIM][members]
+            if alike:
+                self._alike(members, x, status[part])
             else:
-                failure = self._c.ensemble(*members, *rest)
-            overall = overall or failure
+                rows = None if frames is None else frames[1:, part]
+                self._each(members.part(part), x, status[part], rows)
             final[part] = x.T
-        if overall or status.any():
-            failed = tuple(np.flatnonzero(status).tolist())
-            first = int(status[failed[0]]) if failed else overall
-            raise BackendError(status_name(first), -1, final, failed)
-        return final
+
+        shared_out(members, threads, make)
+        failures = {int(m): status_name(int(status[m])) for m in np.flatnonzero(status)}
+        if frames is not None and members.steps % members.stride:
+            frames[-1] = np.where(status[:, np.newaxis] == 0, final, np.nan)
+        return members.told(final if frames is None else frames, failures)
+
+    def _alike(self, members: Members, x: Floats, status: Bytes) -> None:
+        """Integrate some members (DIM, members), in place, that differ in their states only."""
+        h, parameters, t0 = members.numbers(0)
+        packed = self._packed(parameters)
+        given, rest = (packed.ctypes.data, x.ctypes.data, x.shape[1]), (h, members.steps, status.ctypes.data)
+        if self.interface.time:
+            self._c.ensemble_at(*given, t0, *rest)
+        else:
+            self._c.ensemble(*given, *rest)
+
+    def _each(self, members: Members, x: Floats, status: Bytes, rows: Floats | None) -> None:
+        """The same where each has numbers of its own; ``rows`` (frames, members, DIM) are to be filled."""
+        count, width = len(members), max(1, len(members.parameters))
+        packed = np.empty((count, width))
+        for k, value in enumerate(members.parameters.values()):
+            packed[:, k] = value
+        own = [packed.ctypes.data if members.parameters else None, x.ctypes.data, count]
+        h, t0 = (np.array(np.broadcast_to(value, count)) for value in (members.h, members.t0))
+        gauge = None if self._gauge is None else np.array(np.broadcast_to(self._gauge, (count, self._gauge.shape[-1])))
+        if self.interface.time:
+            own.append(t0.ctypes.data)
+        elif hasattr(self._c, "init_gauge"):
+            own.append(None if gauge is None else gauge.ctypes.data)
+        stride = members.stride or 1
+        frames = None if rows is None else np.empty((members.steps // stride, *x.shape))
+        at = None if frames is None else frames.ctypes.data
+        self._c.ensemble_each(*own, h.ctypes.data, members.steps, stride, at, status.ctypes.data)
+        if rows is not None and frames is not None:
+            rows[: len(frames)] = frames.transpose(0, 2, 1)
 
     def hamiltonian(self, x: Floats, parameters: Mapping[str, float], t: Floats | None = None) -> Floats:
         """See `phigen.runtime.backend.Backend`."""

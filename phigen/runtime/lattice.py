@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from phigen.errors import ParameterError, StepError
-from phigen.runtime import arguments, checkpoint
+from phigen.runtime import arguments, checkpoint, lattice_ensemble
 from phigen.runtime.checkpoint import Checkpoint
 from phigen.runtime.interface import BackendError, Floats, LatticeInterface, Progress, row_steps
 from phigen.writing import replacing
@@ -185,9 +185,9 @@ class LatticeSolver:
         the end. ``progress`` is called after each frame with the number of steps done. Raises `StepError`, whose
         ``trajectory`` ends with the state before the failing step.
         """
-        start, h = self._state(x0, "x0"), arguments.step_size(h)
+        start, h = self.state(x0, "x0"), arguments.step_size(h)
         steps, stride = arguments.count(steps, "steps", 0), arguments.count(stride, "stride", 1)
-        values = self._values(parameters, more, start.shape[1:])
+        values = self.values(parameters, more, start.shape[1:])
         marks = row_steps(steps, stride)
         frames = _Frames(_stream_path(output) if output else None, (len(marks), *start.shape))
         run = _Run(self, start, h, marks, values, frames, Path(checkpoints) if checkpoints else None)
@@ -208,8 +208,8 @@ class LatticeSolver:
 
     def step(self, x: ArrayLike, h: float, *, parameters: Mapping[str, Any] | None = None, **more: Any) -> Floats:
         """The state one step of size ``h`` after ``x`` (coordinates, *sizes); raises `StepError`."""
-        start, h = self._state(x, "x"), arguments.step_size(h)
-        values = self._values(parameters, more, start.shape[1:])
+        start, h = self.state(x, "x"), arguments.step_size(h)
+        values = self.values(parameters, more, start.shape[1:])
         session = self._started(start, h, values)
         try:
             session.advance(h, 1)
@@ -218,45 +218,28 @@ class LatticeSolver:
         return session.state()
 
     def ensemble(
-        self, X0: ArrayLike, h: float, steps: int, *, parameters: Mapping[str, Any] | None = None, **more: Any
+        self,
+        X0: ArrayLike,
+        h: ArrayLike,
+        steps: int,
+        stride: int | None = None,
+        *,
+        threads: int | None = None,
+        parameters: Mapping[str, Any] | None = None,
+        **more: Any,
     ) -> Floats:
-        """Final states (members, coordinates, *sizes) of several lattices of one size.
+        """Final states (members, coordinates, *sizes) of several lattices of one size, or of one that all start from.
 
-        Parameters at sites may have a first axis of members: disorder. Raises `StepError` with the ``members`` that
-        failed and the states as far as each came.
+        ``h`` and parameters may have a first axis of members, those at sites in front of their sizes: disorder. With a
+        ``stride`` the result has a first axis of rows: the states at steps 0, stride, 2·stride, … and at the last.
+        Small lattices are shared out between ``threads``, by default one on each core; large ones one by one, with
+        threads of their own. Raises `StepError` with the ``members`` that failed and the states as far as each came,
+        with NaN in the rows after that.
         """
-        states = np.array(X0, dtype=np.float64)
-        if states.ndim != 2 + len(self.interface.axes):
-            raise ValueError(f"X0 must have shape (members, {self._shape_text()}), not {states.shape}")
-        checked = [self._state(x, "X0") for x in states]
-        h, steps = arguments.step_size(h), arguments.count(steps, "steps", 0)
-        failed: list[int] = []
-        last: BackendError | None = None
-        for m, start in enumerate(checked):
-            values = self._values(self._of_member(parameters, m, len(checked)), self._of_member(more, m, len(checked)),
-                                  start.shape[1:])  # fmt: skip
-            session = self._started(start, h, values)
-            try:
-                session.advance(h, steps)
-            except BackendError as error:
-                failed.append(m)
-                last = error
-            states[m] = session.state()
-        if last is not None:
-            told = BackendError(last.status, -1, states, tuple(failed))
-            raise self._failure(told, h, states, {}) from last
-        return states
-
-    def _of_member(self, given: Mapping[str, Any] | None, member: int, members: int) -> dict[str, Any]:
-        found = {}
-        for name, value in (given or {}).items():
-            array = np.asarray(value)
-            at_sites = name in self.interface.at_sites and array.ndim == 1 + len(self.interface.axes)
-            many = at_sites or (name in self.interface.at_bonds and array.ndim == 2)
-            if many and len(array) != members:
-                raise ValueError(f"parameter {name!r} has {len(array)} members, not {members}")
-            found[name] = array[member] if many else value
-        return found
+        both = sorted(set(parameters or {}) & set(more))
+        if both:
+            raise TypeError(f"parameter {both[0]!r} is given twice")
+        return lattice_ensemble.ensemble(self, X0, h, steps, stride, threads, {**(parameters or {}), **more})
 
     # --- what is seen
 
@@ -279,15 +262,16 @@ class LatticeSolver:
         return self._seen(x, parameters, more).vector_field()
 
     def _seen(self, x: ArrayLike, parameters: Mapping[str, Any] | None, more: Mapping[str, Any]) -> LatticeSession:
-        state = self._state(x, "x")
-        return self._started(state, 1.0, self._values(parameters, more, state.shape[1:]))
+        state = self.state(x, "x")
+        return self._started(state, 1.0, self.values(parameters, more, state.shape[1:]))
 
     # --- arguments
 
-    def _shape_text(self) -> str:
+    def shape_text(self) -> str:
+        """The shape of a state, in a message."""
         return ", ".join([str(len(self.coordinates)), *(f"N_{axis}" for axis in self.interface.axes)])
 
-    def _state(self, x: ArrayLike, what: str) -> Floats:
+    def state(self, x: ArrayLike, what: str) -> Floats:
         """A state, a copy, checked with its sizes."""
         about = self.interface
         if np.iscomplexobj(x):
@@ -297,7 +281,7 @@ class LatticeSolver:
         except (TypeError, ValueError, OverflowError) as error:
             raise TypeError(f"{what} must be an array of numbers: {error}") from None
         if found.ndim != 1 + len(about.axes) or found.shape[0] != len(about.coordinates):
-            raise ValueError(f"{what} must have shape ({self._shape_text()}), not {found.shape}")
+            raise ValueError(f"{what} must have shape ({self.shape_text()}), not {found.shape}")
         for axis, size, least, period in zip(about.axes, found.shape[1:], about.least, about.periods, strict=True):
             if size < least:
                 raise ValueError(f"{what} has {size} sites along {axis}; neighbours and brackets need {least} or more")
@@ -311,7 +295,7 @@ class LatticeSolver:
             raise ValueError(f"{what} must be finite, but {about.coordinates[place[0]]} at ({where}) is not")
         return found
 
-    def _values(self, given: Mapping[str, Any] | None, more: Mapping[str, Any], sizes: Sequence[int]) -> dict[str, Any]:
+    def values(self, given: Mapping[str, Any] | None, more: Mapping[str, Any], sizes: Sequence[int]) -> dict[str, Any]:
         """All parameters: numbers, and arrays over the sites or the bonds; of a graph the bonds too."""
         about = self.interface
         everything = {**(given or {}), **more}

@@ -13,7 +13,15 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from phigen.runtime.interface import BackendError, Floats, Interface, LatticeInterface, MissingExtraError
+from phigen.runtime.interface import (
+    BackendError,
+    Floats,
+    Interface,
+    LatticeInterface,
+    MissingExtraError,
+    row_steps,
+)
+from phigen.runtime.members import Members
 from phigen.runtime.modules import load_module
 from phigen.runtime.numpy_lattice import NumpyLattice
 
@@ -270,38 +278,40 @@ class NumpySolver:
         """See `phigen.runtime.backend.Backend`."""
         return NumpySession.from_bytes(self.module, parameters, saved)
 
-    def ensemble(self, x0: Floats, h: float, steps: int, parameters: Mapping[str, float], t0: float = 0.0) -> Floats:
-        """See `phigen.runtime.backend.Backend`. Where members fail, the others go on without them."""
-        self._expect_admissible(x0, parameters)
-        x, remaining, gauge = x0.copy(), np.arange(len(x0)), self._gauges(x0, parameters)
-        failures: dict[int, str] = {}
-        done, first = 0, -1
+    def ensemble(self, members: Members, threads: int | None = None) -> Floats:
+        """See `phigen.runtime.backend.Backend`. Where members fail, the others go on without them; in one thread."""
+        self._expect_admissible(members.x0, members.parameters)
+        x, remaining, gauge = members.x0.copy(), np.arange(len(members)), self._gauges(members.x0, members.parameters)
+        steps, stride = members.steps, members.stride or max(members.steps, 1)
+        frames = members.frames() if members.stride else np.empty((2, *x.shape))
+        frames[1:] = np.nan
+        failures, done, first = dict[int, str](), 0, -1
         while done < steps and remaining.size:
+            ahead = steps - done if done % stride == 0 else min(stride - done % stride, steps - done)
+            some = members.part(remaining)
             options: dict[str, Any] = {} if gauge is None else {"gauge": gauge[remaining]}
-            options |= {"t0": t0 + done * h} if self.interface.time else {}
+            options |= {"t0": some.t0 + done * some.h} if self.interface.time else {}
+            good, lost = ahead, ()
             try:
-                x[remaining] = self.module.integrate(
-                    x[remaining], h, steps - done, stride=steps - done, **options, **parameters
-                )[-1]
-                done = steps
+                made = self.module.integrate(x[remaining], some.h, ahead, stride=stride, **options, **some.parameters)
             except self.module.StepError as error:
-                x[remaining] = np.asarray(error.states)[-1]
+                made, good, lost = np.asarray(error.states), int(error.step), error.members
                 failures |= {int(remaining[m]): str(error.status) for m in error.members}
-                done += int(error.step)
-                first = done if first < 0 else first
-                remaining = np.delete(remaining, error.members)
-        if failures:
-            members = tuple(sorted(failures))
-            raise BackendError(failures[members[0]], first, x, members)
-        return x
+                first = done + good if first < 0 else first
+            for mark, row in zip((done + row_steps(good, stride)).tolist(), made, strict=False):
+                if mark % stride == 0 or mark == steps:
+                    frames[-(-mark // stride), remaining] = row
+            x[remaining], done = made[-1], done + good
+            remaining = np.delete(remaining, lost)
+        return members.told(frames if members.stride else x, failures, first)
 
-    def _expect_admissible(self, x0: Floats, parameters: Mapping[str, float]) -> None:
+    def _expect_admissible(self, x0: Floats, parameters: Mapping[str, Any]) -> None:
         values = self.module._values(parameters)
         refused = self.module._refused(values, x0) if hasattr(self.module, "_refused") else ()
         if len(refused) or not self.module._admissible(values):
             raise BackendError("BAD_ARGUMENT", 0, x0, tuple(refused) or tuple(range(len(x0))))
 
-    def _gauges(self, x0: Floats, parameters: Mapping[str, float]) -> Floats | None:
+    def _gauges(self, x0: Floats, parameters: Mapping[str, Any]) -> Floats | None:
         """The gauge of each member, None where there is no gauge."""
         if not self.module.GAUGE:
             return None

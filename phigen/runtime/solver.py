@@ -283,25 +283,29 @@ class Solver:
     def ensemble(
         self,
         X0: ArrayLike,
-        h: float,
+        h: ArrayLike,
         steps: int,
+        stride: int | None = None,
         *,
-        t0: float | None = None,
-        parameters: Mapping[str, float] | None = None,
-        **more: float,
+        t0: ArrayLike | None = None,
+        threads: int | None = None,
+        parameters: Mapping[str, ArrayLike] | None = None,
+        **more: ArrayLike,
     ) -> Floats:
-        """Final states (members, DIM) of the initial states ``X0`` (members, DIM), all at the time ``t0``.
+        """Final states (members, DIM) of the initial states ``X0`` (members, DIM), or of one (DIM,) for all.
 
-        Raises `StepError` if any member fails: its ``members`` are those that did, its ``trajectory`` the array of
-        states (members, DIM) as far as each came.
+        Parameters, ``h`` and the time ``t0`` of the start are numbers, or arrays (members,) with one for each. With a
+        ``stride`` the result is (rows, members, DIM): the states at steps 0, stride, 2·stride, … and at the last.
+        Members are shared out between ``threads``, by default one on each core; their number changes no bit. Raises
+        `StepError` if any member fails: its ``members`` are those that did, its ``trajectory`` the array of states as
+        far as each came, with NaN in the rows after that.
         """
-        begin = arguments.start_time(t0, self.interface, more)
-        values = self._values(parameters, more)
-        start, h = arguments.members(X0, "X0", self.interface), arguments.step_size(h)
-        steps = arguments.count(steps, "steps", 0)
+        asked = arguments.ensemble(X0, h, steps, stride, t0, parameters, more, self.interface)
+        threads = threads if threads is None else arguments.count(threads, "threads", 1)
         try:
-            return self.backend.ensemble(start, h, steps, values, begin)
+            return self.backend.ensemble(asked, threads)
         except BackendError as error:
+            h, values, _ = asked.numbers(error.members[0] if error.members else 0)
             raise self.failure(error, h, error.states, values) from error
 
     def hamiltonian(

@@ -73,9 +73,10 @@ POISSON_FORMS = ("matrix", "brackets", "canonical", "log_canonical", "lie_algebr
 #: How much the C does for speed.
 PROFILES = ("fast", "small")
 
-#: What can be left out of the code one by one; the profile small leaves out what serves speed.
-PARTS = ("ensemble", "gauge-search", "kicks", "lanes", "recurrences")
-LEFT_OUT = {"fast": frozenset[str](), "small": frozenset(["gauge-search", "lanes", "recurrences"])}
+#: What can be left out of the code one by one; the profile small leaves out what serves speed, and
+#: members with parameters of their own.
+PARTS = ("ensemble", "gauge-search", "kicks", "lanes", "members", "recurrences")
+LEFT_OUT = {"fast": frozenset[str](), "small": frozenset(["gauge-search", "lanes", "members", "recurrences"])}
 
 #: How attitudes are given.
 RECONSTRUCTIONS = ("quaternion", "matrix")

@@ -1,6 +1,7 @@
 /* Blocks of steps and groups of members against single steps, from inside the generated file.
    Compile with -DNAME=… -DSOURCE="…" -DSTEP=…, -DULPS=…, -DFORESEEN=0 or 1 (whether recurrences foresee the motion),
-   -DSTAGES=…, -DGROUPS=0 or 1 (whether there are groups), -DSTATE="…" (initial values separated by commas). */
+   -DSTAGES=…, -DGROUPS=0 or 1 (whether there are groups), -DTIMED and -DGAUGED (whether
+   there is a time, and a gauge), -DSTATE="…" (initial values separated by commas). */
 #include <stdio.h>
 #include <stdlib.h>
 
@@ -18,6 +19,14 @@
 #define STAGE(stage) , stage
 #endif
 #define MEMBERS 11
+#if TIMED
+static const double now[MEMBERS];
+#define EACH(params, x, members, ...) F(ensemble_each)(params, x, members, now, __VA_ARGS__)
+#elif GAUGED
+#define EACH(params, x, members, ...) F(ensemble_each)(params, x, members, NULL, __VA_ARGS__)
+#else
+#define EACH F(ensemble_each)
+#endif
 
 #define EXPECT(condition) \
     do { \
@@ -27,7 +36,7 @@
         } \
     } while (0)
 
-static const double start[DIM] = { STATE };
+static double start[DIM] = { STATE };
 
 static int close_to(const double *a, const double *b, double tolerance)
 {
@@ -100,7 +109,26 @@ static void integrate_equals_steps(int steps)
     EXPECT(apart <= ULPS * 0.5 * DBL_EPSILON * size);
 }
 
+/* Member m has parameters and a step of its own. */
+static void own(int m, F(params) *params, double *h)
+{
+    double values[sizeof *params / sizeof(double) + 1];
+    *params = F(default_params);
+    memcpy(values, params, sizeof *params);
+    for (int k = 0; k < (int)(sizeof *params / sizeof(double)); ++k) values[k] *= 1.0 + 1e-3 * m;
+    memcpy(params, values, sizeof *params);
+    *h = STEP * (1.0 - 1e-2 * m);
+}
+
 #if GROUPS
+static const double step_of_all = STEP;
+
+static int join(F(group) *group, int lane, double x[DIM])
+{
+    const F(members) all = { .x = x, .members = 1, .h = &step_of_all };
+    return F(group_join)(group, lane, &all, 0) == F(OK);
+}
+
 /* Members of one group, with extrapolated guesses and then with fitted ones, and one lane empty. */
 static void group_equals_steps(int steps)
 {
@@ -110,7 +138,7 @@ static void group_equals_steps(int steps)
     memset(&group, 0, sizeof group);
     for (int lane = 0; lane < F(LANES); ++lane) {
         for (int i = 0; i < DIM; ++i) x[i] = start[i] * (1.0 + 1e-3 * lane);
-        if (lane != 3) EXPECT(F(group_join)(&group, lane, NULL, x, STEP) == F(OK));
+        if (lane != 3) EXPECT(join(&group, lane, x));
     }
     for (int k = 0; k < steps; ++k) EXPECT(F(group_step)(&group, 1) == F(LANES) - 1);
     for (int lane = 0; lane < F(LANES); ++lane) {
@@ -132,7 +160,7 @@ static void group_fits(void)
     F(lanes) guess[DIM], rough[DIM], last[DIM];
     double apart = 0.0, moved = 0.0, a[DIM], b[DIM];
     memset(&group, 0, sizeof group);
-    for (int lane = 0; lane < F(LANES); ++lane) EXPECT(F(group_join)(&group, lane, NULL, start, STEP) == F(OK));
+    for (int lane = 0; lane < F(LANES); ++lane) EXPECT(join(&group, lane, start));
     for (int k = 0; k < ROWS; ++k) F(group_step)(&group, 1);
     F(group_fit)(&group);
     EXPECT((OF(group.recurrence_terms, 0) > 0) == FORESEEN);
@@ -159,7 +187,7 @@ static void increments_are_corrected(void)
     F(lanes) size, x[2][DIM], carry[DIM];
     double a[DIM], b[DIM];
     memset(&group, 0, sizeof group);
-    for (int lane = 0; lane < F(LANES); ++lane) EXPECT(F(group_join)(&group, lane, NULL, start, STEP) == F(OK));
+    for (int lane = 0; lane < F(LANES); ++lane) EXPECT(join(&group, lane, start));
     F(group_solve)(&group STAGE(0), &model);
     for (int off = 0; off < 2; ++off) {
         for (int i = 0; i < DIM; ++i)
@@ -190,7 +218,7 @@ static void far_guesses_are_not_used(void)
     double value[DIM];
     begin(&s, 30);
     memset(&group, 0, sizeof group);
-    for (int lane = 0; lane < F(LANES); ++lane) EXPECT(F(group_join)(&group, lane, NULL, start, STEP) == F(OK));
+    for (int lane = 0; lane < F(LANES); ++lane) EXPECT(join(&group, lane, start));
     EXPECT(F(group_step)(&group, 1) == F(LANES));
     for (int stage = 0; stage < STAGES; ++stage) {
         for (int i = 0; i < DIM; ++i) {
@@ -232,6 +260,37 @@ static void ensemble_equals_steps(int steps)
     }
 }
 
+/* The same where each has parameters and a step of its own: its frames are on its own way. */
+static void members_have_their_own(int steps, int stride)
+{
+    static F(solver) singles;
+    static double x[DIM * MEMBERS], frames[4 * DIM * MEMBERS];
+    F(params) params[MEMBERS];
+    double x0[DIM], end[DIM], h[MEMBERS];
+    unsigned char status[MEMBERS];
+    for (int m = 0; m < MEMBERS; ++m) {
+        own(m, &params[m], &h[m]);
+        for (int i = 0; i < DIM; ++i) x[i * MEMBERS + m] = start[i];
+    }
+    x[5] = nan("");
+    EXPECT(EACH(params, x, MEMBERS, h, (size_t)steps, (size_t)stride, frames, status) == F(BAD_ARGUMENT));
+    for (int m = 0; m < MEMBERS; ++m) {
+        EXPECT(status[m] == (m == 5 ? F(BAD_ARGUMENT) : F(OK)));
+        EXPECT(isnan(frames[m]) == (m == 5));
+        if (m == 5) continue;
+        for (int i = 0; i < DIM; ++i) x0[i] = start[i];
+        EXPECT(F(init)(&singles, &params[m], x0) == F(OK));
+        for (int k = 1; k <= steps; ++k) {
+            EXPECT(F(step)(&singles, h[m]) == F(OK));
+            if (k % stride != 0) continue;
+            for (int i = 0; i < DIM; ++i) end[i] = frames[((k / stride - 1) * DIM + i) * MEMBERS + m];
+            EXPECT(close_to(end, singles.x, 1e-13));
+        }
+        for (int i = 0; i < DIM; ++i) end[i] = x[i * MEMBERS + m];
+        EXPECT(close_to(end, singles.x, 1e-13));
+    }
+}
+
 int main(void)
 {
     block_equals_steps(1, 0);
@@ -247,5 +306,6 @@ int main(void)
     far_guesses_are_not_used();
 #endif
     ensemble_equals_steps(40);
+    members_have_their_own(40, 13);
     return 0;
 }

@@ -41,15 +41,21 @@ static void fill(int members)
 }
 
 /* Member m is where steps from x0 lead, as far as they do, up to units of the last place of its largest coordinate. */
-static void expect_steps(int members, int m, const double x0[DIM], double h, int steps, double ulps)
+static void expect_own_steps(
+    int members, int m, const F(params) *params, const double x0[DIM], double h, int steps, double ulps)
 {
     F(solver) s;
     double size = 0.0;
-    F(status) expected = F(init)(&s, NULL, x0);
+    F(status) expected = F(init)(&s, params, x0);
     for (int k = 0; k < steps && expected == F(OK); ++k) expected = F(step)(&s, h);
     EXPECT(status[m] == expected);
     for (int i = 0; i < DIM; ++i) size = fmax(size, fabs(s.x[i]));
     for (int i = 0; i < DIM; ++i) EXPECT(fabs(s.x[i] - x[i * members + m]) <= ulps * DBL_EPSILON * size);
+}
+
+static void expect_steps(int members, int m, const double x0[DIM], double h, int steps, double ulps)
+{
+    expect_own_steps(members, m, NULL, x0, h, steps, ulps);
 }
 
 static void members_equal_steps(int members, double h, int steps, double ulps)
@@ -83,21 +89,45 @@ static void failures_stay_alone(int members, int steps)
     }
 }
 
+/* Members with parameters and steps of their own, bit by bit on their own ways; one of them has no step. */
+static void members_have_their_own(int members, int steps, int stride, double ulps)
+{
+    static F(params) params[MOST];
+    static double frames[DIM * MOST], h[MOST];
+    const int bad = members - 1;
+    double x0[DIM], values[sizeof *params / sizeof(double) + 1];
+    fill(members);
+    for (int m = 0; m < members; ++m) {
+        params[m] = F(default_params);
+        memcpy(values, &params[m], sizeof *params);
+        for (int k = 0; k < (int)(sizeof *params / sizeof(double)); ++k) values[k] *= 1.0 + 1e-3 * m;
+        memcpy(&params[m], values, sizeof *params);
+        h[m] = m == bad ? (double)NAN : STEP * (1.0 - 1e-3 * m);
+    }
+    const F(status) worst = F(ensemble_each)(params, x, (size_t)members, h, (size_t)steps, (size_t)stride, frames, status);
+    EXPECT(worst == F(BAD_ARGUMENT) && status[bad] == worst && isnan(frames[bad]));
+    for (int m = 0; m < members - 1; ++m) {
+        member(m, x0);
+        expect_own_steps(members, m, &params[m], x0, h[m], steps, ulps);
+        x[m] = frames[m];
+        for (int i = 1; i < DIM; ++i) x[i * members + m] = frames[i * members + m];
+        expect_own_steps(members, m, &params[m], x0, h[m], stride, ulps);
+    }
+}
+
 static F(group) group;
+static F(members) all;
 
 static void begin(double h, size_t steps)
 {
-    double x0[DIM];
+    static double step;
+    step = h;
+    fill(F(GROUP));
+    all = (F(members)){ .x = x, .members = F(GROUP), .steps = steps, .h = &step, .status = status };
     memset(&group, 0, sizeof group);
     group.packs = F(PACK_COUNT);
-    for (int m = 0; m < F(GROUP); ++m) {
-        member(m, x0);
-        EXPECT(F(init)(&group.s, NULL, x0) == F(OK));
-        for (int i = 0; i < DIM; ++i) group.pack[m / F(LANES)].x[i][m % F(LANES)] = x0[i];
-        group.active[m] = 1;
-        group.steps_left[m] = steps;
-    }
-    EXPECT(F(set_step)(&group.s, h) == F(OK));
+    F(group_share)(&group, 0);
+    for (int m = 0; m < F(GROUP); ++m) EXPECT(F(group_join)(&group, m, &all, 0) == F(OK));
 }
 
 /* The packs go through all steps: what ends well is not done by single steps. Members that do not fit the polynomials
@@ -121,9 +151,9 @@ static void those_who_leave_go_on(void)
     begin(STEP, 70);
     EXPECT(F(group_steps)(&group, 40) == F(GROUP));
     EXPECT(group.steps_left[m] == 30);
-    status[0] = F(group_end)(&group, m, STEP, x);
+    EXPECT(F(group_end)(&group, m, &all, 0, F(OK)) == F(OK));
     member(m, x0);
-    expect_steps(1, 0, x0, STEP, 70, ULPS);
+    expect_steps(F(GROUP), m, x0, STEP, 70, ULPS);
 }
 
 int main(void)
@@ -134,6 +164,7 @@ int main(void)
     members_equal_steps(19, FAR * STEP, 1, 100);
     members_equal_steps(9, STEP, 0, 0.0);
     failures_stay_alone(MOST, 40);
+    members_have_their_own(MOST, 70, 41, ULPS);
     groups_make_all_steps(STEP);
     groups_make_all_steps(FAR * STEP);
     those_who_leave_go_on();

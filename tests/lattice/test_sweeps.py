@@ -337,6 +337,29 @@ def test_an_ensemble_has_disorder_of_its_own() -> None:
         assert np.array_equal(final[member], found.integrate(x, 0.1, 20, 20, e=energies[member]).x[-1])
 
 
+@pytest.mark.parametrize("target", ["c", "numpy"])
+def test_members_of_a_lattice_have_numbers_and_steps_of_their_own(target: str) -> None:
+    """All start from one state; frames are those of `integrate`."""
+    x, found = start("fput"), solver("fput", target=target)
+    h, name = np.array([0.1, 0.05, 0.02]), "a"
+    strengths = np.array([0.5, 1.0, 2.0])
+    frames = found.ensemble(x, h, 10, 4, threads=2, **{name: strengths})
+    for member in range(3):
+        alone = found.integrate(x, h[member], 10, 4, **{name: strengths[member]})
+        assert np.array_equal(frames[:, member], alone.x)
+    with pytest.raises(ValueError, match="has 2 members, not 3"):
+        found.ensemble(np.stack([x] * 3), 0.1, 10, **{name: strengths[:2]})
+
+
+def test_members_of_a_lattice_fail_by_themselves() -> None:
+    x = np.array([[0.0, 9.0, 0.0, -9.0, 3.0]] * 2)
+    with pytest.raises(StepError, match="1 member") as failure:
+        solver("fput", target="c").ensemble(x, [0.5, 1e-4], 100, 50)
+    assert failure.value.members == (0,)
+    assert np.isnan(failure.value.trajectory[-1, 0]).all()
+    assert np.isfinite(failure.value.trajectory[:, 1]).all()
+
+
 def test_a_failing_step_leaves_the_state_before_it() -> None:
     x = np.array([[0.0, 9.0, 0.0, -9.0, 3.0]] * 2)
     with pytest.raises(StepError, match="NOT_FINITE") as failure:

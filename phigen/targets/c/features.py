@@ -64,6 +64,7 @@ FEATURES = (
     Feature("UNROLLED", lambda p: isinstance(p.step, Implicit) and _fast(p) and p.step.eliminate),
     Feature("KICKED", part="kicks"),
     Feature("ENSEMBLE", part="ensemble"),
+    Feature("EACH", requires=("ENSEMBLE",), part="members"),
     Feature("GAUGE_SEARCH", requires=("GAUGE",), part="gauge-search"),
     Feature("RECURRENCES", requires=("IMPLICIT",), part="recurrences"),
     Feature("BLOCKS", requires=("RECURRENCES",), in_lanes=lambda lanes: isinstance(lanes, Blocks), part="lanes"),

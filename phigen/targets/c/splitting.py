@@ -46,9 +46,9 @@ def in_lanes(program: Program, step: Splitting, form: str, functions: Mapping[st
     for k, flow in enumerate(step.flows, 1):
         kernel, values = _flow(program, flow, k)
         kernel = replace(kernel, name=kernel.name + form)
-        found.append(function(program, kernel, lanes=True, shared=["coef"], functions=functions))
+        found.append(function(program, kernel, lanes=True, functions=functions))
         found.append(render("c", "flow.c", {**values, "form": f"{form}_lanes"}))
-    arguments = f"const double *coef, {program.name}_pack *pack, int packs"
+    arguments = f"int row, {program.name}_pack *pack, int packs"
     return [*found, _steps(program, step, f"{form}_lanes", "", arguments, "pack, packs")]
 
 
@@ -87,7 +87,14 @@ def _flow(program: Program, kernel: Kernel, k: int) -> tuple[Kernel, dict[str, o
 
 
 def _steps(program: Program, step: Splitting, form: str, linkage: str, arguments: str, passed: str) -> str:
-    row, schedule = f"{program.name}_ROW", step.schedule
-    pattern = [(part + 1, f"coef + {at} * {row}" if at else "coef") for part, at in schedule.pattern]
+    """The schedule; flows are told their coefficients by an address, and those in lanes by the number of the row."""
+    schedule = step.schedule
+    first, row = ("row", "") if form else ("coef", f"{program.name}_ROW")
+
+    def further(rows: int) -> str:
+        return f"{rows} * {row}" if row and rows > 1 else row or str(rows)
+
+    pattern = [(part + 1, f"{first} + {further(at)}" if at else first) for part, at in schedule.pattern]
     own = {"form": form, "linkage": linkage, "arguments": arguments, "passed": passed, "pattern": pattern}
-    return render("c", "flows.c", {"NAME": program.name, "stages": schedule.stages, "rows": schedule.rows, **own})
+    own |= {"start": first, "next": f"{first} += {further(1)}", "further": f"{first} += {further(schedule.rows)}"}
+    return render("c", "flows.c", {"NAME": program.name, "stages": schedule.stages, **own})

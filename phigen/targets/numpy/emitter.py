@@ -239,6 +239,7 @@ def _values(program: Program) -> dict[str, object]:
         "t0_passed": ", t0=t0" * bool(program.time),
         "said_from_t0": ", from the time t0" * bool(program.time),
         "said_of_t0": " t0 is the time of x0." * bool(program.time),
+        "said_of_each": "h, t0 and parameters" if program.time else "h and parameters",
         "stages_now": "[_renewed(s, t0 + done * h, h) for s in stages]" if program.time else "stages",
         "renewed": step.renewed,
         "prepared": step.prepared,

@@ -7,24 +7,24 @@
 #include "groups.c"
 #elif PHI_PACKS
 #include "packs.c"
+#elif PHI_EACH
+#include "members.c"
 #else
 #include "solver.c"
 #endif
 
 /* ---- Ensembles ---- */
 #if PHI_GROUPS || PHI_PACKS
-phi_status phi_ensemble(const phi_params *params, double *x, size_t members, double h, size_t steps,
-    unsigned char *status)
+/* All members. The first status that is not OK. */
+static phi_status phi_run(const phi_members *all)
 {
-    phi_status worst = isfinite(h) ? PHI_OK : PHI_BAD_ARGUMENT;
-    const phi_params own = params != NULL ? *params : phi_default_params;
-    size_t earliest = members;
-    if (x == NULL && members > 0) return PHI_BAD_ARGUMENT;
+    phi_status worst = PHI_OK;
+    size_t earliest = all->members;
 #ifdef _OPENMP
 #pragma omp parallel for schedule(dynamic)
 #endif
-    for (size_t first = 0; first < members; first += PHI_GROUP) {
-        const phi_status group = phi_group_run(&own, x, members, first, h, steps, status);
+    for (size_t first = 0; first < all->members; first += PHI_GROUP) {
+        const phi_status group = phi_group_run(all, first);
         if (group == PHI_OK) continue;
 #ifdef _OPENMP
 #pragma omp critical
@@ -35,6 +35,48 @@ phi_status phi_ensemble(const phi_params *params, double *x, size_t members, dou
         }
     }
     return worst;
+}
+
+#elif PHI_EACH
+/* All members. The first status that is not OK. */
+static phi_status phi_run(const phi_members *all)
+{
+    phi_status worst = PHI_OK;
+    for (size_t m = 0; m < all->members; ++m) {
+        phi_solver s;
+        double x[PHI_DIM];
+        for (size_t i = 0; i < PHI_DIM; ++i) x[i] = all->x[i * all->members + m];
+#if PHI_GAUGE
+        const double *gauge = all->gauge != NULL ? all->gauge + m * PHI_GAUGES : NULL;
+        const phi_status begun = phi_begin_member(all, m, x, gauge, &s);
+#else
+        const phi_status begun = phi_begin_member(all, m, x, &s);
+#endif
+        const phi_status status = phi_end_member(all, m, 0, &s, begun);
+        phi_put_member(all, m, begun == PHI_OK ? s.x : x, status);
+        if (worst == PHI_OK) worst = status;
+    }
+    return worst;
+}
+
+#endif
+#if PHI_EACH || PHI_GROUPS || PHI_PACKS
+#if PHI_TIMED
+phi_status phi_ensemble_at(const phi_params *params, double *x, size_t members, double t0, double h, size_t steps,
+    unsigned char *status)
+#else
+phi_status phi_ensemble(const phi_params *params, double *x, size_t members, double h, size_t steps,
+    unsigned char *status)
+#endif
+{
+    const phi_params shared = params != NULL ? *params : phi_default_params;
+    phi_members all = { .x = x, .members = members, .steps = steps, .params = &shared, .h = &h, .status = status };
+    if (x == NULL && members > 0) return PHI_BAD_ARGUMENT;
+#if PHI_TIMED
+    all.t0 = &t0;
+#endif
+    const phi_status worst = phi_run(&all);
+    return isfinite(h) ? worst : PHI_BAD_ARGUMENT;
 }
 
 #else
@@ -74,6 +116,35 @@ phi_status phi_ensemble(const phi_params *params, double *x, size_t members, dou
     unsigned char *status)
 {
     return phi_ensemble_at(params, x, members, 0.0, h, steps, status);
+}
+#endif
+#if PHI_EACH
+
+#if PHI_TIMED
+phi_status phi_ensemble_each(const phi_params *params, double *x, size_t members, const double *t0, const double *h,
+    size_t steps, size_t stride, double *frames, unsigned char *status)
+#elif PHI_GAUGE
+phi_status phi_ensemble_each(const phi_params *params, double *x, size_t members, const double *gauge,
+    const double *h, size_t steps, size_t stride, double *frames, unsigned char *status)
+#else
+phi_status phi_ensemble_each(const phi_params *params, double *x, size_t members, const double *h, size_t steps,
+    size_t stride, double *frames, unsigned char *status)
+#endif
+{
+    phi_members all = { .x = x, .members = members, .steps = steps, .own = 1, .params = params, .h = h };
+    if (members > 0 && (x == NULL || h == NULL)) return PHI_BAD_ARGUMENT;
+    if (frames != NULL && stride == 0) return PHI_BAD_ARGUMENT;
+#if PHI_TIMED
+    if (members > 0 && t0 == NULL) return PHI_BAD_ARGUMENT;
+    all.t0 = t0;
+#endif
+#if PHI_GAUGE
+    all.gauge = gauge;
+#endif
+    all.stride = stride;
+    all.frames = frames;
+    all.status = status;
+    return phi_run(&all);
 }
 #endif
 #endif

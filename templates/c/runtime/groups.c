@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "blocks.c"
+#include "members.c"
 #include "model.h"
 
 /* ---- Groups of members ---- */
@@ -293,14 +294,19 @@ static int phi_group_step(phi_group *group, size_t remaining)
 }
 
 /* Put a member into a lane: its state, and its coefficients. */
-static phi_status phi_group_join(phi_group *group, int lane, const phi_params *params,
-    const double x0[PHI_DIM], double h)
+static phi_status phi_group_join(phi_group *group, int lane, const phi_members *all, size_t m)
 {
     phi_solver s;
-    phi_status status = phi_init(&s, params, x0);
-    if (status == PHI_OK) status = phi_set_step(&s, h);
+    double x[PHI_DIM];
+    for (size_t i = 0; i < PHI_DIM; ++i) x[i] = all->x[i * all->members + m];
+#if PHI_GAUGE
+    const double *gauge = all->gauge != NULL ? all->gauge + m * PHI_GAUGES : NULL;
+    const phi_status status = phi_begin_member(all, m, x, gauge, &s);
+#else
+    const phi_status status = phi_begin_member(all, m, x, &s);
+#endif
+    for (int i = 0; i < PHI_DIM; ++i) group->x[i][lane] = x[i];
     if (status != PHI_OK) return status;
-    for (int i = 0; i < PHI_DIM; ++i) group->x[i][lane] = s.x[i];
     for (int stage = 0; stage < PHI_STAGES; ++stage)
         for (int k = 0; k < PHI_COEFFICIENTS; ++k) group->coef[stage][k][lane] = s.coef[stage][k];
 #if PHI_GAUGE
@@ -310,47 +316,56 @@ static phi_status phi_group_join(phi_group *group, int lane, const phi_params *p
     return status;
 }
 
-/* The steps that a member has still to make after it left the group, by itself. */
-static phi_status phi_group_finish(const phi_group *group, int lane, const phi_params *params,
-    double x[PHI_DIM], double h)
+/* The frames after so many steps, of the members that are active. */
+static void phi_group_frame(const phi_group *group, const phi_members *all, size_t first, size_t done)
+{
+    double x[PHI_DIM];
+    for (int lane = 0; lane < PHI_LANES; ++lane) {
+        for (int i = 0; i < PHI_DIM; ++i) x[i] = group->x[i][lane];
+        if (group->active[lane]) phi_put_frame(all, first + (size_t)lane, done, x);
+    }
+}
+
+/* The end of a member; the steps that the group did not make with it, it makes by itself. */
+static phi_status phi_group_end(const phi_group *group, int lane, const phi_members *all, size_t m,
+    phi_status status)
 {
     phi_solver s;
+    double x[PHI_DIM];
+    for (int i = 0; i < PHI_DIM; ++i) x[i] = group->x[i][lane];
+    if (status != PHI_OK) {
+        phi_end_member(all, m, 0, NULL, status);
+    } else if (group->steps_left[lane] > 0) {
 #if PHI_GAUGE
-    phi_status status = phi_init_gauge(&s, params, x, group->gauge[lane]);
+        const phi_status begun = phi_begin_member(all, m, x, group->gauge[lane], &s);
 #else
-    phi_status status = phi_init(&s, params, x);
+        const phi_status begun = phi_begin_member(all, m, x, &s);
 #endif
-    if (status != PHI_OK) return status;
-    for (int i = 0; i < PHI_DIM; ++i) s.carry[i] = group->carry[i][lane];
-    status = phi_integrate(&s, h, group->steps_left[lane]);
-    memcpy(x, s.x, sizeof s.x);
+        for (int i = 0; i < PHI_DIM && begun == PHI_OK; ++i) s.carry[i] = group->carry[i][lane];
+        status = phi_end_member(all, m, all->steps - group->steps_left[lane], &s, begun);
+        if (begun == PHI_OK) memcpy(x, s.x, sizeof x);
+    }
+    phi_put_member(all, m, x, status);
     return status;
 }
 
 /* The members from first on, as many as there are lanes. The first status that is not OK. */
-static phi_status phi_group_run(const phi_params *params, double *x, size_t members, size_t first,
-    double h, size_t steps, unsigned char *status)
+static phi_status phi_group_run(const phi_members *all, size_t first)
 {
     phi_group group;
     phi_status worst = PHI_OK, member[PHI_LANES];
-    const int count = members - first < PHI_LANES ? (int)(members - first) : PHI_LANES;
-    double state[PHI_DIM];
-    size_t left = steps;
+    const int count = all->members - first < PHI_LANES ? (int)(all->members - first) : PHI_LANES;
+    size_t left = all->steps;
     memset(&group, 0, sizeof group);
-    for (int lane = 0; lane < count; ++lane) {
-        for (size_t i = 0; i < PHI_DIM; ++i) state[i] = x[i * members + first + (size_t)lane];
-        member[lane] = phi_group_join(&group, lane, params, state, h);
+    for (int lane = 0; lane < count; ++lane) member[lane] = phi_group_join(&group, lane, all, first + (size_t)lane);
+    for (int active = count; left > 0 && active >= PHI_FEWEST;) {
+        active = phi_group_step(&group, left--);
+        if (all->frames != NULL) phi_group_frame(&group, all, first, all->steps - left);
     }
-    for (int active = count; left > 0 && active >= PHI_FEWEST; --left) active = phi_group_step(&group, left);
     for (int lane = 0; lane < count; ++lane) {
         if (group.active[lane]) group.steps_left[lane] = left;
-        for (int i = 0; i < PHI_DIM; ++i) state[i] = group.x[i][lane];
-        if (member[lane] == PHI_OK) {
-            if (group.steps_left[lane] > 0) member[lane] = phi_group_finish(&group, lane, params, state, h);
-            for (size_t i = 0; i < PHI_DIM; ++i) x[i * members + first + (size_t)lane] = state[i];
-        }
-        if (status != NULL) status[first + (size_t)lane] = (unsigned char)member[lane];
-        if (worst == PHI_OK) worst = member[lane];
+        const phi_status status = phi_group_end(&group, lane, all, first + (size_t)lane, member[lane]);
+        if (worst == PHI_OK) worst = status;
     }
     return worst;
 }

@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "lanes.c"
+#include "members.c"
 #include "model.h"
 #include "solver.c"
 
@@ -17,6 +18,7 @@ enum {
 /* Members of an ensemble, one in each lane. */
 typedef struct {
     phi_lanes x[PHI_DIM], carry[PHI_DIM];
+    phi_lanes *coef[PHI_STAGES]; /* of the members, or of all packs */
 #if PHI_SPLITTING
     phi_lanes start[PHI_DIM]; /* x where a step began; in it, carry is moved */
 #endif
@@ -51,7 +53,7 @@ static inline void phi_settle_lanes(double x[restrict PHI_LANES], double carry[r
 
 #if PHI_EXPLICIT
 /* phi_stage for the members of a pack; the sums are those of phi_advance. */
-static inline void phi_stage_lanes(const double *coef, phi_pack *pack)
+static inline void phi_stage_lanes(phi_lanes *coef, phi_pack *pack)
 {
     phi_lanes increment[PHI_DIM];
     phi_explicit_lanes(coef, pack->x, increment);
@@ -68,20 +70,20 @@ static inline void phi_stage_lanes(const double *coef, phi_pack *pack)
 }
 
 /* Steps of some packs: each stage for all of them. */
-static void phi_steps_lanes(const phi_solver *s, phi_pack *pack, int packs, int steps)
+static void phi_steps_lanes(phi_pack *pack, int packs, int steps)
 {
     for (int step = 0; step < steps; ++step)
         for (int stage = 0; stage < PHI_STAGES; ++stage)
-            for (int k = 0; k < packs; ++k) phi_stage_lanes(s->coef[stage], &pack[k]);
+            for (int k = 0; k < packs; ++k) phi_stage_lanes(pack[k].coef[stage], &pack[k]);
 }
 
 #else
 /* Steps of some packs: as in phi_stages, each flow for all of them. */
-static void phi_steps_lanes(const phi_solver *s, phi_pack *pack, int packs, int steps)
+static void phi_steps_lanes(phi_pack *pack, int packs, int steps)
 {
     for (int step = 0; step < steps; ++step) {
         for (int k = 0; k < packs; ++k) memcpy(pack[k].start, pack[k].x, sizeof pack[k].x);
-        phi_flows_lanes(s->coef[0], pack, packs);
+        phi_flows_lanes(0, pack, packs);
         for (int k = 0; k < packs; ++k)
             for (int i = 0; i < PHI_DIM; ++i) phi_settle_lanes(pack[k].x[i], pack[k].carry[i], pack[k].start[i]);
     }
@@ -90,11 +92,11 @@ static void phi_steps_lanes(const phi_solver *s, phi_pack *pack, int packs, int 
 #endif
 #if PHI_FAR
 /* The same where arguments of functions are too large for polynomials. */
-static void phi_steps_far_lanes(const phi_solver *s, phi_pack *pack, int packs, int steps)
+static void phi_steps_far_lanes(phi_pack *pack, int packs, int steps)
 {
     for (int step = 0; step < steps; ++step) {
         for (int k = 0; k < packs; ++k) memcpy(pack[k].start, pack[k].x, sizeof pack[k].x);
-        phi_flows_far_lanes(s->coef[0], pack, packs);
+        phi_flows_far_lanes(0, pack, packs);
         for (int k = 0; k < packs; ++k)
             for (int i = 0; i < PHI_DIM; ++i) phi_settle_lanes(pack[k].x[i], pack[k].carry[i], pack[k].start[i]);
     }
@@ -103,8 +105,8 @@ static void phi_steps_far_lanes(const phi_solver *s, phi_pack *pack, int packs, 
 #endif
 /* Members of an ensemble, in packs. */
 typedef struct {
-    phi_solver s; /* parameters and coefficients, the same for all */
     phi_pack pack[PHI_PACK_COUNT];
+    phi_lanes coef[PHI_PACK_COUNT][PHI_STAGES][PHI_COEFFICIENTS]; /* only the first is used where all have the same */
     int packs; /* in use */
 #if PHI_FAR
     int far; /* whether arguments of functions are too large for polynomials */
@@ -142,14 +144,14 @@ static int phi_group_steps(phi_group *group, int steps)
     int lost[PHI_GROUP], active = 0;
     memcpy(before, group->pack, sizeof before);
 #if PHI_FAR
-    if (!group->far) phi_steps_lanes(&group->s, group->pack, group->packs, steps);
+    if (!group->far) phi_steps_lanes(group->pack, group->packs, steps);
     if (group->far || phi_group_lost(group, lost) > 0) {
         memcpy(group->pack, before, sizeof before);
-        phi_steps_far_lanes(&group->s, group->pack, group->packs, steps);
+        phi_steps_far_lanes(group->pack, group->packs, steps);
         group->far = phi_group_lost(group, lost) == 0;
     }
 #else
-    phi_steps_lanes(&group->s, group->pack, group->packs, steps);
+    phi_steps_lanes(group->pack, group->packs, steps);
     phi_group_lost(group, lost);
 #endif
     for (int m = 0; m < PHI_GROUP; ++m) {
@@ -162,52 +164,84 @@ static int phi_group_steps(phi_group *group, int steps)
     return active;
 }
 
-/* The end of a member: if it left the group, by its remaining steps, one by one. */
-static phi_status phi_group_end(const phi_group *group, int m, double h, double x[PHI_DIM])
+/* Where packs have their coefficients: each its own, or all those of the first. */
+static void phi_group_share(phi_group *group, size_t own)
+{
+    for (int k = 0; k < PHI_PACK_COUNT; ++k)
+        for (int stage = 0; stage < PHI_STAGES; ++stage) group->pack[k].coef[stage] = group->coef[own ? k : 0][stage];
+}
+
+/* Put a member into its lane, and its coefficients there or, if all have the same, into all lanes. */
+static phi_status phi_group_join(phi_group *group, int m, const phi_members *all, size_t first)
+{
+    phi_solver s;
+    double x[PHI_DIM];
+    phi_pack *pack = &group->pack[m / PHI_LANES];
+    const int lane = m % PHI_LANES, from = all->own ? lane : 0, to = all->own ? lane + 1 : PHI_LANES;
+    for (size_t i = 0; i < PHI_DIM; ++i) x[i] = all->x[i * all->members + first + (size_t)m];
+    for (int i = 0; i < PHI_DIM; ++i) pack->x[i][lane] = x[i];
+    group->steps_left[m] = all->steps;
+    const phi_status status = phi_begin_member(all, first + (size_t)m, x, &s);
+    if (status != PHI_OK) return status;
+    for (int stage = 0; stage < PHI_STAGES; ++stage)
+        for (int k = 0; k < PHI_COEFFICIENTS; ++k)
+            for (int j = from; j < to; ++j) pack->coef[stage][k][j] = s.coef[stage][k];
+    group->active[m] = 1;
+    return status;
+}
+
+/* The frames after so many steps, of the members that are active. */
+static void phi_group_frame(const phi_group *group, const phi_members *all, size_t first, size_t done)
+{
+    double x[PHI_DIM];
+    for (int m = 0; m < PHI_GROUP; ++m) {
+        for (int i = 0; i < PHI_DIM; ++i) x[i] = group->pack[m / PHI_LANES].x[i][m % PHI_LANES];
+        if (group->active[m]) phi_put_frame(all, first + (size_t)m, done, x);
+    }
+}
+
+/* The end of a member; the steps that the group did not make with it, it makes by itself. */
+static phi_status phi_group_end(const phi_group *group, int m, const phi_members *all, size_t first,
+    phi_status status)
 {
     const phi_pack *pack = &group->pack[m / PHI_LANES];
-    phi_solver s = group->s;
-    for (int i = 0; i < PHI_DIM; ++i) {
-        s.x[i] = pack->x[i][m % PHI_LANES];
-        s.carry[i] = pack->carry[i][m % PHI_LANES];
+    const size_t done = all->steps - group->steps_left[m];
+    phi_solver s;
+    double x[PHI_DIM];
+    for (int i = 0; i < PHI_DIM; ++i) x[i] = pack->x[i][m % PHI_LANES];
+    if (status != PHI_OK) {
+        phi_end_member(all, first + (size_t)m, done, NULL, status);
+    } else if (done < all->steps) {
+        const phi_status begun = phi_begin_member(all, first + (size_t)m, x, &s);
+        for (int i = 0; i < PHI_DIM && begun == PHI_OK; ++i) s.carry[i] = pack->carry[i][m % PHI_LANES];
+        status = phi_end_member(all, first + (size_t)m, done, &s, begun);
+        if (begun == PHI_OK) memcpy(x, s.x, sizeof x);
     }
-    const phi_status status = phi_integrate(&s, h, group->steps_left[m]);
-    memcpy(x, s.x, sizeof s.x);
+    phi_put_member(all, first + (size_t)m, x, status);
     return status;
 }
 
 /* The members from first on, as many as a group holds. The first status that is not OK. */
-PHI_APART static phi_status phi_group_run(
-    const phi_params *params, double *x, size_t members, size_t first, double h, size_t steps,
-    unsigned char *status)
+PHI_APART static phi_status phi_group_run(const phi_members *all, size_t first)
 {
     phi_group group;
     phi_status worst = PHI_OK, member[PHI_GROUP];
-    const int count = members - first < PHI_GROUP ? (int)(members - first) : PHI_GROUP;
-    double state[PHI_DIM];
+    const int count = all->members - first < PHI_GROUP ? (int)(all->members - first) : PHI_GROUP;
     memset(&group, 0, sizeof group);
     group.packs = (count + PHI_LANES - 1) / PHI_LANES;
-    for (int m = 0; m < count; ++m) {
-        for (size_t i = 0; i < PHI_DIM; ++i) state[i] = x[i * members + first + (size_t)m];
-        for (int i = 0; i < PHI_DIM; ++i) group.pack[m / PHI_LANES].x[i][m % PHI_LANES] = state[i];
-        member[m] = phi_init(&group.s, params, state);
-        group.active[m] = member[m] == PHI_OK;
-        group.steps_left[m] = steps;
-    }
-    int active = phi_set_step(&group.s, h) == PHI_OK;
-    if (count == 1) active = 0; /* one alone is quicker without lanes */
-    for (size_t left = steps; left > 0 && active > 0;) {
-        const int stretch = left < PHI_STRETCH ? (int)left : PHI_STRETCH;
+    phi_group_share(&group, all->own);
+    for (int m = 0; m < count; ++m) member[m] = phi_group_join(&group, m, all, first);
+    int active = count > 1; /* one alone is quicker without lanes */
+    for (size_t done = 0; done < all->steps && active > 0;) {
+        const size_t next = phi_to_frame(all, done);
+        const int stretch = next < PHI_STRETCH ? (int)next : PHI_STRETCH;
         active = phi_group_steps(&group, stretch);
-        left -= (size_t)stretch;
+        done += (size_t)stretch;
+        if (all->frames != NULL) phi_group_frame(&group, all, first, done);
     }
     for (int m = 0; m < count; ++m) {
-        if (member[m] == PHI_OK) {
-            member[m] = phi_group_end(&group, m, h, state);
-            for (size_t i = 0; i < PHI_DIM; ++i) x[i * members + first + (size_t)m] = state[i];
-        }
-        if (status != NULL) status[first + (size_t)m] = (unsigned char)member[m];
-        if (worst == PHI_OK) worst = member[m];
+        const phi_status status = phi_group_end(&group, m, all, first, member[m]);
+        if (worst == PHI_OK) worst = status;
     }
     return worst;
 }

@@ -172,6 +172,32 @@ phi_status phi_ensemble_at(const phi_params *params, double *x, size_t members, 
     unsigned char *status);
 
 #endif
+#if PHI_EACH
+#if PHI_TIMED
+/* The same where each member has its own parameters params[m], time t0[m] and step h[m]; params may be NULL. */
+#elif PHI_MONITOR
+/* The same where each member has its own parameters params[m], e = gauge[m] and step h[m]; params and gauge may be
+   NULL. */
+#elif PHI_GAUGE
+/* The same where each member has its own parameters params[m], gauge &gauge[m * PHI_GAUGES] and step h[m]; params and
+   gauge may be NULL. */
+#else
+/* The same where each member has its own parameters params[m] and step h[m]; params may be NULL. */
+#endif
+/* frames (or NULL) receives the states after every stride-th step: frames[(k * PHI_DIM + i) * members + m] is coordinate
+   i of member m after (k + 1) * stride steps, NaN if it failed before. Arrays must not overlap. */
+#if PHI_TIMED
+phi_status phi_ensemble_each(const phi_params *params, double *x, size_t members, const double *t0, const double *h,
+    size_t steps, size_t stride, double *frames, unsigned char *status);
+#elif PHI_GAUGE
+phi_status phi_ensemble_each(const phi_params *params, double *x, size_t members, const double *gauge,
+    const double *h, size_t steps, size_t stride, double *frames, unsigned char *status);
+#else
+phi_status phi_ensemble_each(const phi_params *params, double *x, size_t members, const double *h, size_t steps,
+    size_t stride, double *frames, unsigned char *status);
+#endif
+
+#endif
 
 #endif
 #if PHI_TANGENT

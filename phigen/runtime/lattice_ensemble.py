@@ -1,0 +1,92 @@
+"""Ensembles of lattices: initial states, steps and parameters of each, as many at once as there are cores."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from phigen.errors import StepError
+from phigen.runtime import arguments
+from phigen.runtime.interface import BackendError, Floats, LatticeInterface, row_steps
+from phigen.runtime.members import cores, in_threads
+
+if TYPE_CHECKING:
+    from phigen.runtime.lattice import LatticeSolver
+
+#: Sites from which on a lattice has threads of its own, as in the runtime in C.
+_LARGE = 4096
+
+
+def ensemble(
+    solver: LatticeSolver,
+    X0: ArrayLike,
+    h: ArrayLike,
+    steps: int,
+    stride: int | None,
+    threads: int | None,
+    given: Mapping[str, Any],
+) -> Floats:
+    """See `LatticeSolver.ensemble`."""
+    own = {name: np.asarray(value) for name, value in given.items() if _has_members(solver.interface, name, value)}
+    own |= {"the step size h": np.asarray(h)} if np.ndim(h) else {}
+    start = _states(solver, X0, own)
+    count, steps = len(start), arguments.count(steps, "steps", 0)
+    marks = row_steps(steps, max(steps, 1) if stride is None else arguments.count(stride, "stride", 1))
+    sizes = [arguments.step_size(size) for size in np.broadcast_to(h, count)]
+    values = [
+        solver.values({n: own[n][m] if n in own else v for n, v in given.items()}, {}, start.shape[2:])
+        for m in range(count)
+    ]
+    frames, failures = np.full((len(marks), *start.shape), np.nan), dict[int, str]()
+    frames[0] = final = start.copy()
+
+    def make(m: int) -> None:
+        try:
+            session = solver.backend.start(start[m], values[m])
+            for row, ahead in enumerate(np.diff(marks), 1):
+                session.advance(sizes[m], int(ahead))
+                final[m] = frames[row, m] = session.state()
+        except BackendError as error:
+            failures[m] = error.status
+            final[m] = error.states[-1]
+
+    most = cores() if threads is None else arguments.count(threads, "threads", 1)
+    in_threads(
+        1 if start[0:1].size >= _LARGE * len(solver.coordinates) else max(1, min(most, count)), make, range(count)
+    )
+    found = final if stride is None else frames
+    if failures:
+        failed = tuple(sorted(failures))
+        shown = ", ".join(map(str, failed[:5])) + (", …" if len(failed) > 5 else "")
+        status = failures[failed[0]]
+        message = (
+            f"{solver.interface.name}: a step failed for {len(failed)} member(s) of the ensemble ({shown}): {status}"
+        )
+        raise StepError(message, step=-1, status=status, trajectory=found, members=failed)
+    return found
+
+
+def _has_members(interface: LatticeInterface, name: str, value: Any) -> bool:
+    """Whether a parameter has an axis of members in front of its own."""
+    if interface.graph and name == "bonds":
+        return False
+    own = len(interface.axes) if name in interface.at_sites else 1 if name in interface.at_bonds else 0
+    return bool(np.ndim(value) == 1 + own)
+
+
+def _states(solver: LatticeSolver, X0: ArrayLike, own: Mapping[str, Any]) -> Floats:
+    """The initial states (members, coordinates, *sizes), checked."""
+    axes = 1 + len(solver.interface.axes)
+    if np.ndim(X0) == axes and own:
+        start = np.stack([solver.state(X0, "X0")] * len(next(iter(own.values()))))
+    elif np.ndim(X0) == 1 + axes:
+        start = np.array([solver.state(x, "X0") for x in np.asarray(X0)], dtype=np.float64).reshape(np.shape(X0))
+    else:
+        raise ValueError(f"X0 must have shape (members, {solver.shape_text()}), not {np.shape(X0)}")
+    for name, value in own.items():
+        if len(value) != len(start):
+            raise ValueError(f"{name} has {len(value)} members, not {len(start)}")
+    return start

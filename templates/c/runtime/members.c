@@ -1,0 +1,83 @@
+#ifndef PHI_FILE_MEMBERS
+#define PHI_FILE_MEMBERS
+#include <math.h>
+
+#include "solver.h"
+#include "model.h"
+#if PHI_BLOCKS
+#include "blocks.c"
+#else
+#include "solver.c"
+#endif
+
+/* ---- Members of an ensemble ---- */
+/* What an ensemble was asked for. Where own is 1, member m has the parameters params[m] and the step h[m]; where it is 0,
+   all have the first. */
+typedef struct {
+    double *x;
+    size_t members, steps, own;
+    const phi_params *params; /* NULL for the defaults */
+    const double *h;
+#if PHI_TIMED
+    const double *t0;
+#endif
+#if PHI_GAUGE
+    const double *gauge; /* NULL to choose it */
+#endif
+    size_t stride;
+    double *frames; /* NULL for none */
+    unsigned char *status; /* NULL for none */
+} phi_members;
+
+/* Start a member at a state, with what is its own. */
+#if PHI_GAUGE
+static phi_status phi_begin_member(const phi_members *all, size_t m, const double x[PHI_DIM], const double *gauge,
+    phi_solver *s)
+#else
+static phi_status phi_begin_member(const phi_members *all, size_t m, const double x[PHI_DIM], phi_solver *s)
+#endif
+{
+    const phi_params *params = all->params != NULL ? all->params + m * all->own : NULL;
+#if PHI_GAUGE
+    const phi_status status = phi_init_gauge(s, params, x, gauge);
+#elif PHI_TIMED
+    const phi_status status = phi_init_at(s, params, x, all->t0[m * all->own]);
+#else
+    const phi_status status = phi_init(s, params, x);
+#endif
+    return status == PHI_OK ? phi_set_step(s, all->h[m * all->own]) : status;
+}
+
+/* How many steps there are to the next frame, or to the end. */
+static size_t phi_to_frame(const phi_members *all, size_t done)
+{
+    const size_t left = all->steps - done;
+    return all->frames != NULL && all->stride - done % all->stride < left ? all->stride - done % all->stride : left;
+}
+
+/* The frame of a member after so many steps, if there is one: x, or what is no number for NULL. */
+static void phi_put_frame(const phi_members *all, size_t m, size_t done, const double *x)
+{
+    for (size_t i = 0; i < PHI_DIM && all->frames != NULL && done % all->stride == 0; ++i)
+        all->frames[((done / all->stride - 1) * PHI_DIM + i) * all->members + m] = x != NULL ? x[i] : (double)NAN;
+}
+
+/* The steps of a member after so many, by itself. */
+static phi_status phi_end_member(const phi_members *all, size_t m, size_t done, phi_solver *s, phi_status status)
+{
+    while (done < all->steps) {
+        const size_t steps = phi_to_frame(all, done);
+        if (status == PHI_OK) status = phi_integrate(s, s->h, steps);
+        done += steps;
+        phi_put_frame(all, m, done, status == PHI_OK ? s->x : NULL);
+    }
+    return status;
+}
+
+/* Where a member ends. */
+static void phi_put_member(const phi_members *all, size_t m, const double x[PHI_DIM], phi_status status)
+{
+    for (size_t i = 0; i < PHI_DIM; ++i) all->x[i * all->members + m] = x[i];
+    if (all->status != NULL) all->status[m] = (unsigned char)status;
+}
+#endif

@@ -1,0 +1,124 @@
+"""Ensembles whose members have parameters, steps and times of their own: each is a trajectory of its own."""
+
+from itertools import product
+
+import numpy as np
+import pytest
+from support import NAMES, SPECIES, TARGETS, compile_text, compiled, setting, slow_but, solver
+
+from phigen.errors import StepError
+from phigen.runtime import members as sharing
+
+#: Every kind of step: implicit with a gauge, paths, explicit, with a time, with a monitor, and code without lanes.
+KINDS = ["rigid_body", "nambu_pendulum", "pendulum_euler", "spin_resonance", "kepler_eccentric", "toda3"]
+
+
+def own(compilation, count):
+    """States, steps, and what else each of so many members has of its own, by the names of the arguments."""
+    at, k = setting(compilation), np.arange(count)
+    given = {name: value * (1 + 0.003 * k) for name, value in at.parameters.items()}
+    if compilation.program.time:
+        given["t0"] = 0.1 * k
+    return np.outer(1 + 0.002 * k, at.x), at.h * (1 - 0.01 * k), given
+
+
+@pytest.mark.parametrize(("target", "name"), slow_but(product(TARGETS, KINDS), product(TARGETS, NAMES)))
+def test_members_with_numbers_of_their_own_are_trajectories(name, target):
+    """To round-off; eleven are a full group of eight and one that is not. Frames are on the same ways."""
+    compilation = compiled(name)
+    solve, (start, h, given) = solver(compilation, target), own(compilation, 11)
+    frames = solve.ensemble(start, h, 10, 4, **given)
+    assert frames.shape == (4, *start.shape)
+    assert (solve.ensemble(start, h, 10, **given) == frames[-1]).all()
+    for m in range(0, 11, 5):
+        alone = solve.integrate(start[m], h[m], 10, 4, **{key: value[m] for key, value in given.items()}).x
+        np.testing.assert_allclose(frames[:, m], alone, rtol=0, atol=1e-15 * np.max(np.abs(alone)))
+
+
+@pytest.mark.parametrize(("name", "scheme"), [("rigid_body", None), ("lagrange_top", "splitting")])
+def test_numbers_of_all_are_those_of_each_and_neighbours_do_not_matter(name, scheme):
+    """Bit by bit where steps are explicit; implicit ones are iterated until the slowest of a group is solved."""
+    compilation = compiled(name, 4, scheme)
+    solve, at = solver(compilation, "c"), setting(compilation)
+    start = np.outer(1 + 0.002 * np.arange(40), at.x)
+    same = {key: np.full(40, value) for key, value in at.parameters.items()}
+    shared = solve.ensemble(start, at.h, 50, **at.parameters)
+    assert (solve.ensemble(start, at.h, 50, **same) == shared).all()
+    others = same | {key: np.where(np.arange(40) == 21, same[key], 1.2 * same[key]) for key in same}
+    among_others = solve.ensemble(start, at.h, 50, **others)[21]
+    np.testing.assert_allclose(among_others, shared[21], rtol=0, atol=0 if scheme else 2e-15)
+
+
+def test_the_number_of_threads_changes_no_bit():
+    """More members than one call integrates; as if all were made by one."""
+    solve, (start, h, given) = solver(compiled("rigid_body"), "c"), own(compiled("rigid_body"), 11)
+    start, h = np.tile(start, (300, 1)) * (1 + 1e-5 * np.arange(3300))[:, np.newaxis], np.tile(h, 300)
+    given = {key: np.tile(value, 300) for key, value in given.items()}
+    ends = [solve.ensemble(start, h, 40, 20, threads=threads, **given) for threads in (1, 2, 5)]
+    assert all((end == ends[0]).all() for end in ends)
+
+
+def test_parts_of_ensembles_end_where_groups_do(monkeypatch):
+    monkeypatch.setattr(sharing, "cores", lambda: 3)
+    asked = sharing.Members(np.zeros((1000, 2)), np.float64(1), 1000, {}, np.float64(0))
+    made = []
+    sharing.shared_out(asked, None, made.append)
+    made.sort(key=lambda part: part.start)
+    assert [part.start for part in made] == list(range(0, 1000, made[0].stop))
+    assert made[0].stop % sharing.LEAST == 0
+    assert made[-1].stop == 1000
+    assert len(made) > 3
+
+
+@pytest.mark.parametrize(("target", "profile"), [*product(TARGETS, ["fast"]), ("c", "small")])
+@pytest.mark.parametrize("scheme", ["series", "splitting"])
+def test_a_member_that_fails_has_no_frames_from_then_on(target, profile, scheme):
+    """Of four, the second runs into its singularity after 239 steps; the numbers of the last are refused."""
+    solve = solver(compile_text(f"{SPECIES}order: 4\nprofile: {profile}\n", scheme=scheme), target)
+    start = np.array([[0.3, 0.9, 0.6], [-3.0, 5.0, 0.001], [0.5, 0.2, 0.1]])
+    h = np.array([1e-3, 1e-3, 2e-3])
+    with pytest.raises(StepError) as many:
+        solve.ensemble(start, h, 390, 50)
+    assert many.value.members == (1,)
+    frames = many.value.trajectory
+    assert frames.shape == (9, 3, 3)
+    with pytest.raises(StepError) as single:
+        solve.integrate(start[1], 1e-3, 390, 50)
+    last = single.value.step // 50
+    assert 2 <= last <= 6
+    np.testing.assert_allclose(frames[: last + 1, 1], single.value.trajectory.x[: last + 1], rtol=1e-9)
+    assert np.isnan(frames[last + 1 :, 1]).all()
+    for m in (0, 2):
+        np.testing.assert_allclose(frames[:, m], solve.integrate(start[m], h[m], 390, 50).x, rtol=1e-13)
+
+
+@pytest.mark.parametrize("target", TARGETS)
+def test_what_is_not_given_to_each_is_that_of_all(target):
+    solve = solver(compiled("rigid_body"), target)
+    state = [0.1, 1.0, 0.2]
+    ends = solve.ensemble(state, 0.1, 10, I2=[2.0, 2.5])
+    assert ends.shape == (2, 3)
+    assert ends.tolist() == solve.ensemble([state, state], [0.1, 0.1], 10, I2=[2.0, 2.5]).tolist()
+    assert not (ends[0] == ends[1]).any()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "error", "said"),
+    [
+        ({"I2": [1.0, 2.0]}, ValueError, "'I2' must have shape"),
+        ({"h": [0.1, 0.0, 0.1]}, ValueError, "must not be 0"),
+        ({"h": [0.1, np.nan, 0.1]}, ValueError, "step size h must be finite"),
+        ({"I9": [1.0, 2.0, 3.0]}, TypeError, "unknown parameter 'I9'"),
+        ({"I1": [1.0, 2.0, 3.0], "parameters": {"I1": 1}}, TypeError, "given twice"),
+        ({"I1": [1.0, 0.0, 3.0]}, ValueError, "'I1' must be positive, not 0.0, as of member 1"),
+        ({"t0": [1.0, 0.0, 3.0]}, TypeError, "does not depend on the time"),
+        ({"stride": 0}, ValueError, "stride must be at least 1"),
+        ({"threads": 0}, ValueError, "threads must be at least 1"),
+        ({"X0": [1.0, 0.0, 0.0]}, ValueError, "X0 must have shape"),
+    ],
+)
+def test_wrong_arguments_of_members_are_errors(arguments, error, said):
+    solve = solver(compiled("rigid_body"), "c")
+    given = {"X0": np.ones((3, 3)), "h": 0.1, "steps": 1, **arguments}
+    with pytest.raises(error, match=said):
+        solve.ensemble(**given)
