@@ -20,6 +20,7 @@ from phigen.drawing import (
     section_plane,
     tuning_curves,
 )
+from phigen.drawing.lettering import move_apart
 from phigen.drawing.palette import PALETTE, SUFFIXES, save, styled, svg
 from phigen.runtime.trajectory import Trajectory
 from phigen.study.backward import Constancy
@@ -53,6 +54,7 @@ def trajectory_figure(trajectory: Trajectory, casimirs: Mapping[str, Expression]
     _, columns = phase_space.grid(trajectory.coordinates)
     figure = _figure(phase_space.height(trajectory.coordinates), WIDTH if columns > 1 else NARROW)
     phase_space.draw_trajectory(figure, trajectory, casimirs)
+    move_apart(figure)
     return figure
 
 
@@ -161,6 +163,7 @@ def run_figure(
             place.subfigures(1, len(parts), width_ratios=[1.1, 1][: len(parts)], squeeze=False)[0], parts, strict=True
         ):
             draw(part)
+    move_apart(figure)
     return figure
 
 

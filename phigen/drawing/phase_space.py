@@ -11,6 +11,7 @@ import numpy as np
 from phigen.drawing.dots import draw_dots
 from phigen.drawing.groups import Group, groups, is_orbit
 from phigen.drawing.leaf import Leaf, around, leaf_of, net
+from phigen.drawing.lettering import letter
 from phigen.drawing.palette import PALETTE, SERIES
 from phigen.runtime.trajectory import Trajectory
 from phigen.symbolic.arrays import Floats
@@ -28,6 +29,9 @@ TURN, FINE_TURN = math.radians(40), math.radians(15)
 LONG = 60.0
 #: The views of a panel in space, in degrees, the usual one first; and the bands of distance that fade to the back.
 ELEVATION, AZIMUTHS, BANDS = 22.0, (-52.0, -22.0, 8.0, 38.0, -82.0, -112.0), 4
+
+#: How much of a small panel a box in space fills.
+SMALL = 0.76
 
 
 def grid(coordinates: tuple[str, ...]) -> tuple[int, int]:
@@ -51,7 +55,7 @@ def draw_trajectory(figure: FigureBase, trajectory: Trajectory, casimirs: Mappin
         _draw_image(figure, names, t, x)
         return
     rows, columns = grid(names)
-    zoom = 0.9 if columns < 3 else 0.8  # the labels around the box are as large in small panels
+    zoom = 0.9 if columns < 3 else SMALL  # the labels around the box are as large in small panels
     start = dict(zip(names, x[0].tolist(), strict=True))
     for index, group in enumerate(groups(names), start=1):
         points = x[:, [names.index(name) for name in group]]
@@ -69,7 +73,8 @@ def draw_trajectory(figure: FigureBase, trajectory: Trajectory, casimirs: Mappin
 
 def draw_in_plane(axes: Any, names: Group, points: Floats) -> None:
     """A curve (rows, 2), and where it starts."""
-    _label(axes, names)
+    axes.set_xlabel(names[0], labelpad=2)
+    axes.set_ylabel(names[1], labelpad=2)
     axes.grid(True)
     _draw_curve(axes, points, SERIES[0], 1.0, 2.0, _width(points), joins(points))
     axes.plot(*points[0], "o", color=PALETTE["ink"], markersize=4, zorder=3)
@@ -85,12 +90,10 @@ def draw_in_space(axes: Any, names: Group, points: Floats, leaf: Leaf | None, zo
     azimuth = _azimuth((points - points.mean(axis=0)) / size)
     axes.view_init(ELEVATION, azimuth)
     axes.set(xlim=box[:, 0], ylim=box[:, 1], zlim=box[:, 2])
-    _label(axes, names)
+    letter(axes, names, box, 4 if zoom > SMALL else 3)
     for axis in (axes.xaxis, axes.yaxis, axes.zaxis):
         axis.pane.set_visible(False)
         axis._axinfo["grid"].update(color=PALETTE["grid"], linewidth=0.4)
-        axis.set_major_locator(_few_ticks())
-    axes.tick_params(pad=-1, labelsize=7)
     towards = _directions(azimuth)[2]
     if leaf:
         lines = [part for line in net(leaf, box) for part in (line, np.full((1, 3), np.nan))]
@@ -196,17 +199,6 @@ def box_of(points: Floats) -> Floats:
     half[half == 0] = 0.2 * size.max() or 0.5
     middle = (low + high) / 2
     return np.stack([middle - half, middle + half])
-
-
-def _few_ticks() -> Any:
-    from matplotlib.ticker import MaxNLocator
-
-    return MaxNLocator(4)
-
-
-def _label(axes: Any, names: Group) -> None:
-    for axis, name, pad in zip("xyz"[: len(names)], names, (-6, -6, -2) if len(names) == 3 else (2, 2), strict=True):
-        getattr(axes, f"set_{axis}label")(name, labelpad=pad)
 
 
 def _length(points: Floats) -> float:

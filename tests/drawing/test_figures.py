@@ -2,6 +2,7 @@ import os
 import re
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -44,6 +45,29 @@ def test_trajectories_of_every_dimension_are_drawn(dimension):
     figure = trajectory_figure(spiral(names=[f"x{i + 1}" for i in range(dimension)]), CASIMIR)
     assert figure.axes
     assert svg(figure).startswith("<?xml")
+
+
+def lettered(axes):
+    """All names and ticks of axes in space, as boxes."""
+    every = (axes.xaxis, axes.yaxis, axes.zaxis)
+    texts = [axis.label for axis in every] + [tick.label1 for axis in every for tick in axis.get_major_ticks()]
+    return [(text.get_text(), text.get_window_extent()) for text in texts]
+
+
+@pytest.mark.parametrize(("dimension", "size"), [(3, [1, 1, 1]), (6, [1e-2, 1e-2, 1e-4]), (9, [0.3, 1, 0.05])])
+def test_names_and_ticks_in_space_do_not_meet_and_are_in_the_figure(dimension, size):
+    curve = spiral(names=[f"speed{i}" for i in range(1, dimension + 1)])
+    curve = replace(curve, x=np.tile(size, dimension // 3) * curve.x + [3.0, *[0.0] * (dimension - 1)])
+    figure = trajectory_figure(curve, {})
+    figure.draw_without_rendering()
+    for axes in figure.axes:
+        texts = lettered(axes)
+        assert len(texts) >= 8
+        for k, (text, box) in enumerate(texts):
+            assert [other for other, place in texts[:k] if box.overlaps(place)] == [], text
+            assert box.x0 >= 0, text
+            assert box.x1 <= figure.bbox.x1, text
+    assert ("speed5 / 10⁻³" in [name for name, _ in texts]) == (dimension == 6)
 
 
 def test_a_run_is_drawn_on_one_page():

@@ -1,0 +1,75 @@
+"""Ticks and names of axes in space, which matplotlib places by guesses: moved apart by what they measure."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any, cast
+
+from phigen.symbolic.arrays import Floats
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+#: There is no tick in this part of an axis at both ends, where two axes meet.
+CORNER = 0.08
+#: Letters of ticks that fit beside the upright axis, and what more of them take, in points each.
+LETTERS, WIDTH = 4, 2.2
+#: How far a name is moved at a time, in points, and how often at most; between texts there is so much of a pixel.
+PAD, MOST_MOVES, GAP = 3.0, 20, 1.5
+_SUPERSCRIPTS = str.maketrans("−-0123456789", "⁻⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+
+
+def letter(axes: Any, names: tuple[str, ...], box: Floats, most: int) -> None:
+    """Names of axes in space over a box (2, 3), and some ``most`` ticks; the power of ten of ticks goes to the name."""
+    for axis, name, (low, high) in zip(_axes(axes), names, box.T.tolist(), strict=True):
+        ticks = _ticks(low, high, most)
+        axis.set_ticks(ticks)
+        formatter = axis.get_major_formatter()
+        formatter.set_locs(ticks)
+        power = formatter.get_offset().partition("e")[2]
+        axis.offsetText.set_visible(False)
+        axis.set_label_text(f"{name} / 10{power.translate(_SUPERSCRIPTS)}" if power else name)
+        axis.labelpad = -6.0
+    longest = max(map(len, axes.zaxis.get_major_formatter().format_ticks(axes.zaxis.get_ticklocs())), default=0)
+    axes.tick_params(pad=-1, labelsize=7)
+    axes.zaxis.set_tick_params(pad=-1 + WIDTH * max(0, longest - LETTERS))
+
+
+def _ticks(low: float, high: float, most: int) -> list[float]:
+    from matplotlib.ticker import MaxNLocator
+
+    corner = CORNER * (high - low)
+    found = [float(v) for v in MaxNLocator(most).tick_values(low, high)]
+    return [v for v in found if low + corner <= v <= high - corner]
+
+
+def move_apart(figure: Figure) -> None:
+    """Move the names of axes in space outwards until they meet no other text of their axes, all within the figure."""
+    spaces, layout = figure.findobj(lambda artist: hasattr(artist, "zaxis")), cast(Any, figure.get_layout_engine())
+    left = right = 0.0
+    for _ in range(MOST_MOVES if spaces else 0):
+        figure.draw_without_rendering()
+        names = [axis.label.get_window_extent() for axes in spaces for axis in _axes(axes)]
+        meeting = [axis for axes in spaces for axis in _meeting(axes)]
+        # Layouts leave room for ticks, not for names.
+        outside = min(name.x0 for name in names), max(name.x1 for name in names) - figure.bbox.x1
+        left, right = max(left, left - outside[0]), max(right, right + outside[1])
+        if not meeting and outside[0] >= 0 and outside[1] <= 0:
+            return
+        for axis in meeting:
+            axis.labelpad += PAD
+        width = figure.bbox.width
+        layout.set(rect=(left / width, 0, 1 - (left + right) / width, 1))
+
+
+def _axes(axes: Any) -> tuple[Any, Any, Any]:
+    return axes.xaxis, axes.yaxis, axes.zaxis
+
+
+def _meeting(axes: Any) -> Iterator[Any]:
+    """The axes whose names meet another text."""
+    ticks = [tick.label1.get_window_extent() for axis in _axes(axes) for tick in axis.get_major_ticks()]
+    names = [axis.label.get_window_extent().padded(GAP) for axis in _axes(axes)]
+    for k, (axis, name) in enumerate(zip(_axes(axes), names, strict=True)):
+        if name.count_overlaps([*ticks, *names[:k]]):
+            yield axis
