@@ -29,7 +29,7 @@
  *   12. Members of an ensemble
  *   13. Groups of members
  *   14. Ensembles
- * body-sha256: e64beaa252fbc3a2ab9792411cf51311f41432bf91a85e120111794a9e7f1004
+ * body-sha256: ab41dd757482d2aa560d4c2764bce61b009b47faf459ee930ebe1a6c6037239c
  */
 #include "rigid_body.h"
 
@@ -734,24 +734,32 @@ enum {
 /* errors, in sizes of all on a line, that are as good: rounding does not decide */
 #define rigid_body_CLOSE_CALL 1e-12
 
-/* A short piece of the trajectory from x, by a Runge-Kutta method with steps of a fixed change. */
+/* The direction of the motion at a point, of size 1; 0 where there is none. */
+static void rigid_body_direction(const rigid_body_params *params, const double at[rigid_body_DIM],
+    double direction[rigid_body_DIM])
+{
+    double speed = DBL_MIN;
+    rigid_body_vector_field(params, at, direction);
+    for (int i = 0; i < rigid_body_DIM; ++i) speed += fabs(direction[i]);
+    for (int i = 0; i < rigid_body_DIM; ++i) direction[i] /= speed;
+}
+
+/* A short piece of the trajectory from x, by a Runge-Kutta method with steps of one length: steps of one time
+   would leave the neighbourhood of a state that hardly moves by far too much. */
 static void rigid_body_sample(const rigid_body_params *params, const double x[rigid_body_DIM],
     double samples[][rigid_body_DIM])
 {
-    double slope[rigid_body_DIM], middle[rigid_body_DIM], size = 0.0, speed = DBL_MIN;
-    rigid_body_vector_field(params, x, slope);
+    double direction[rigid_body_DIM], middle[rigid_body_DIM], length = 0.0;
     for (int i = 0; i < rigid_body_DIM; ++i) {
         samples[0][i] = x[i];
-        size += fabs(x[i]);
-        speed += fabs(slope[i]);
+        length += 0.25 * fabs(x[i]);
     }
-    const double h = 0.25 * size / speed;
     for (int k = 1; k < rigid_body_SAMPLES; ++k) {
         const double *y = samples[k - 1];
-        rigid_body_vector_field(params, y, slope);
-        for (int i = 0; i < rigid_body_DIM; ++i) middle[i] = y[i] + 0.5 * h * slope[i];
-        rigid_body_vector_field(params, middle, slope);
-        for (int i = 0; i < rigid_body_DIM; ++i) samples[k][i] = y[i] + h * slope[i];
+        rigid_body_direction(params, y, direction);
+        for (int i = 0; i < rigid_body_DIM; ++i) middle[i] = y[i] + 0.5 * length * direction[i];
+        rigid_body_direction(params, middle, direction);
+        for (int i = 0; i < rigid_body_DIM; ++i) samples[k][i] = y[i] + length * direction[i];
     }
 }
 

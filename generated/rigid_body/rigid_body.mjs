@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: f7572b53c69334bf1b6d1073a25ee17b4fa72d383b61c641cc1b191593b88229
+ * body-sha256: 6741b0f4953260d95dcc477661866b79414d158ca3cef1d1608a8aad1ccaa4d9
  */
 /*
  * import { Solver, StepError } from './rigid_body.mjs';
@@ -941,18 +941,30 @@ const DEGREE = 6;
 /** Most rounds over the multiples. */
 const SWEEPS = 4;
 
-/** A short piece of the trajectory from x, by a Runge-Kutta method with steps of a fixed change. */
+/** The direction of the motion at a point, of size 1; 0 where there is none. */
+function direction(params, at) {
+  const slope = new Float64Array(DIM);
+  vectorField(params, at, slope);
+  const speed = total(slope) + TINY;
+  return slope.map((value) => value / speed);
+}
+
+function total(values) {
+  return values.reduce((sum, value) => sum + Math.abs(value), 0);
+}
+
+/**
+ * A short piece of the trajectory from x, by a Runge-Kutta method with steps of one length: steps of one
+ * time would leave the neighbourhood of a state that hardly moves by far too much.
+ */
 function sampled(params, x) {
   const states = [Float64Array.from(x)];
-  const slope = new Float64Array(DIM);
-  vectorField(params, x, slope);
-  const total = (values) => values.reduce((sum, value) => sum + Math.abs(value), 0);
-  const h = (0.25 * total(states[0])) / (total(slope) + TINY);
+  const length = 0.25 * total(states[0]);
   while (states.length < SAMPLES) {
     const y = states[states.length - 1];
-    vectorField(params, y, slope);
-    vectorField(params, y.map((value, i) => value + 0.5 * h * slope[i]), slope);
-    states.push(y.map((value, i) => value + h * slope[i]));
+    const first = direction(params, y);
+    const middle = direction(params, y.map((value, i) => value + 0.5 * length * first[i]));
+    states.push(y.map((value, i) => value + length * middle[i]));
   }
   return states;
 }

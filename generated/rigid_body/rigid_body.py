@@ -13,7 +13,7 @@
 #
 # SPDX-License-Identifier: 0BSD
 # This file belongs to whoever generated it; phigen claims no rights in it.
-# body-sha256: 562eb6f73123eece1f762df5a65adf47b84ba1033e93f2b8959c7618915f7fe2
+# body-sha256: 405045db35faf04f2edeeee3be719cf45c6a67e7d6e6a9e5f51efc4c2e03dff8
 import numpy as np
 
 VERSION = "0.1.0"
@@ -568,15 +568,20 @@ def _least_on_line(difference, size):
     return best
 
 
+def _direction(parameters, y):
+    """The direction of the motion, of size 1; 0 where there is none."""
+    slope = _vector_field(parameters, y)
+    return slope / (np.abs(slope).sum(axis=-1, keepdims=True) + np.finfo(float).tiny)
+
+
 def _samples(parameters, x, count=32):
-    """A short piece of each trajectory, by a Runge-Kutta method with steps of a fixed change."""
-    speed = np.abs(_vector_field(parameters, x)).sum(axis=-1) + np.finfo(float).tiny
-    h = (0.25 * np.abs(x).sum(axis=-1) / speed)[:, np.newaxis]
+    """A short piece of each trajectory, by a Runge-Kutta method with steps of one length."""
+    length = 0.25 * np.abs(x).sum(axis=-1, keepdims=True)
     points = [x]
     for _ in range(count - 1):
         y = points[-1]
-        middle = y + 0.5 * h * _vector_field(parameters, y)
-        points.append(y + h * _vector_field(parameters, middle))
+        middle = y + 0.5 * length * _direction(parameters, y)
+        points.append(y + length * _direction(parameters, middle))
     return np.array(points)
 
 

@@ -15,23 +15,30 @@ enum {
 };
 #define PHI_CLOSE_CALL 1e-12 /* errors, in sizes of all on a line, that are as good: rounding does not decide */
 
-/* A short piece of the trajectory from x, by a Runge-Kutta method with steps of a fixed change. */
+/* The direction of the motion at a point, of size 1; 0 where there is none. */
+static void phi_direction(const phi_params *params, const double at[PHI_DIM], double direction[PHI_DIM])
+{
+    double speed = DBL_MIN;
+    phi_vector_field(params, at, direction);
+    for (int i = 0; i < PHI_DIM; ++i) speed += fabs(direction[i]);
+    for (int i = 0; i < PHI_DIM; ++i) direction[i] /= speed;
+}
+
+/* A short piece of the trajectory from x, by a Runge-Kutta method with steps of one length: steps of one time would
+   leave the neighbourhood of a state that hardly moves by far too much. */
 static void phi_sample(const phi_params *params, const double x[PHI_DIM], double samples[][PHI_DIM])
 {
-    double slope[PHI_DIM], middle[PHI_DIM], size = 0.0, speed = DBL_MIN;
-    phi_vector_field(params, x, slope);
+    double direction[PHI_DIM], middle[PHI_DIM], length = 0.0;
     for (int i = 0; i < PHI_DIM; ++i) {
         samples[0][i] = x[i];
-        size += fabs(x[i]);
-        speed += fabs(slope[i]);
+        length += 0.25 * fabs(x[i]);
     }
-    const double h = 0.25 * size / speed;
     for (int k = 1; k < PHI_SAMPLES; ++k) {
         const double *y = samples[k - 1];
-        phi_vector_field(params, y, slope);
-        for (int i = 0; i < PHI_DIM; ++i) middle[i] = y[i] + 0.5 * h * slope[i];
-        phi_vector_field(params, middle, slope);
-        for (int i = 0; i < PHI_DIM; ++i) samples[k][i] = y[i] + h * slope[i];
+        phi_direction(params, y, direction);
+        for (int i = 0; i < PHI_DIM; ++i) middle[i] = y[i] + 0.5 * length * direction[i];
+        phi_direction(params, middle, direction);
+        for (int i = 0; i < PHI_DIM; ++i) samples[k][i] = y[i] + length * direction[i];
     }
 }
 

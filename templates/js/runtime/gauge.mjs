@@ -12,18 +12,30 @@ const DEGREE = 6;
 /** Most rounds over the multiples. */
 const SWEEPS = 4;
 
-/** A short piece of the trajectory from x, by a Runge-Kutta method with steps of a fixed change. */
+/** The direction of the motion at a point, of size 1; 0 where there is none. */
+function direction(params, at) {
+  const slope = new Float64Array(DIM);
+  vectorField(params, at, slope);
+  const speed = total(slope) + TINY;
+  return slope.map((value) => value / speed);
+}
+
+function total(values) {
+  return values.reduce((sum, value) => sum + Math.abs(value), 0);
+}
+
+/**
+ * A short piece of the trajectory from x, by a Runge-Kutta method with steps of one length: steps of one
+ * time would leave the neighbourhood of a state that hardly moves by far too much.
+ */
 function sampled(params, x) {
   const states = [Float64Array.from(x)];
-  const slope = new Float64Array(DIM);
-  vectorField(params, x, slope);
-  const total = (values) => values.reduce((sum, value) => sum + Math.abs(value), 0);
-  const h = (0.25 * total(states[0])) / (total(slope) + TINY);
+  const length = 0.25 * total(states[0]);
   while (states.length < SAMPLES) {
     const y = states[states.length - 1];
-    vectorField(params, y, slope);
-    vectorField(params, y.map((value, i) => value + 0.5 * h * slope[i]), slope);
-    states.push(y.map((value, i) => value + h * slope[i]));
+    const first = direction(params, y);
+    const middle = direction(params, y.map((value, i) => value + 0.5 * length * first[i]));
+    states.push(y.map((value, i) => value + length * middle[i]));
   }
   return states;
 }
