@@ -64,6 +64,13 @@ poisson: {brackets: {x1: {x2: -x3, x3: x2}, x2: {x3: -x1}}}
 hamiltonian: x1**2/2 + x2**2/4 + x3**2/6
 """
 
+#: Its reversals have solutions far away, at other energies.
+RATTLEBACK = """coordinates: [pitch, roll, spin]
+poisson: {brackets: {pitch: {spin: 4*pitch}, roll: {spin: -roll}}}
+hamiltonian: (pitch**2 + roll**2 + spin**2)/2
+order: 6
+"""
+
 SPECIES = """coordinates: [x1, x2, x3]
 poisson: {log_canonical: [[0, 1, 1], [-1, 0, 1], [-1, -1, 0]]}
 hamiltonian: x1 + x2 + x3

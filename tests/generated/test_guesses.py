@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from support import compile_text
+from support import RATTLEBACK, compile_text
 
 from phigen import api, resources
 from phigen.api import solver_of
@@ -27,14 +27,6 @@ def test_guesses_near_a_saddle_lead_members_of_ensembles_nowhere_else(body):
     ends = body.ensemble(start, h=0.6, steps=20000)
     energies = [[body.hamiltonian(x) for x in states] for states in (start, ends)]
     np.testing.assert_allclose(energies[1], energies[0], rtol=1e-8)
-
-
-RATTLEBACK = """
-coordinates: [pitch, roll, spin]
-poisson: {brackets: {pitch: {spin: 4*pitch}, roll: {spin: -roll}}}
-hamiltonian: (pitch**2 + roll**2 + spin**2)/2
-order: 6
-"""
 
 
 @pytest.mark.parametrize("stride", [1, 8, 40])

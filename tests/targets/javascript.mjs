@@ -19,6 +19,24 @@ function varied(Solver, job) {
   return { derivative: [...solver.stepTangent(job.h)], x: [...solver.x], t: solver.t, failure, untouched };
 }
 
+/** How many values the guess of a step of another size rests on, once that is made. */
+function remembered(Solver, job) {
+  const solver = new Solver(job.options).integrate(job.h, 3).step(job.h / 2);
+  return (solver.history ?? []).map(({ count }) => count);
+}
+
+/** How far a step from x with a carry ends from one that begins at their sum, in sizes of the carry. */
+function carried(Solver, job) {
+  const whole = new Solver(job.options);
+  const carry = 1e-6 * Math.max(...whole.x.map(Math.abs));
+  const parted = new Solver(job.options);
+  parted.carry.fill(carry);
+  const { gauge } = whole;
+  const summed = new Solver({ ...job.options, gauge, x0: whole.x.map((x) => x + carry) }).step(job.h);
+  parted.step(job.h);
+  return Math.max(...summed.x.map((x, i) => Math.abs(x - parted.x[i]))) / carry;
+}
+
 /** Two members, and one that is refused. */
 function many(Solver, job, start) {
   const { params, t0 } = job.options;
@@ -61,6 +79,9 @@ async function answer(job) {
     modified: solver.modifiedHamiltonian?.(job.h, start),
     facts: { NAME, VERSION, SPEC_SHA256, DIM, ORDER, COORDINATES, CASIMIRS, DEFAULT_PARAMETERS },
     exports: typeof StepError,
+    remembered: attempted(() => remembered(Solver, job)).value,
+    carried: attempted(() => carried(Solver, job)).value,
+    growth: Math.abs(solver.hamiltonian() / solver.hamiltonian(start)),
     tangent: varied(Solver, job),
     many: many(Solver, job, start),
     moved: attempted(() => moved(Solver, job, "tCarry" in solver)).value,
