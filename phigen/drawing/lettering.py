@@ -14,8 +14,8 @@ if TYPE_CHECKING:
 CORNER = 0.08
 #: Letters of ticks that fit beside the upright axis, and what more of them take, in points each.
 LETTERS, WIDTH = 4, 2.2
-#: How far a name is moved at a time, in points, and how often at most; between texts there is so much of a pixel.
-PAD, MOST_MOVES, GAP = 3.0, 20, 1.5
+#: How far a name is moved at a time, in points, and how often at most; between texts there is so many pixels.
+PAD, MOST_MOVES, GAP = 3.0, 20, 3.5
 _SUPERSCRIPTS = str.maketrans("−-0123456789", "⁻⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
