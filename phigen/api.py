@@ -82,16 +82,17 @@ def compile(
     *,
     scheme: str | None = None,
     tangent: bool = False,
+    adjoint: bool = False,
     profile: str | None = None,
 ) -> Any:
     """A solver of a `System` or a spec, of the path of a spec file, or of the name of a bundled one.
 
     ``target`` is ``c``, ``numpy``, or ``auto``: C if there is a compiler, else NumPy with a `PhigenWarning`. ``order``
     overrides the order of the spec, ``scheme`` (``series``, ``splitting``, ``auto``) its scheme; ``tangent`` asks for
-    `Solver.step_tangent`, ``profile`` (``fast``, ``small``) overrides that of the C. Compiled C is cached by its
-    content. Gives a `Solver`, of a lattice a `LatticeSolver`. Raises `SpecError`, `LimitError`, `CheckError` if the
-    mathematics is refuted, e.g. since π is not Poisson, and `ToolchainError` if C was asked for in vain, or by naming a
-    compiler in CC that does not work.
+    `Solver.step_tangent`, ``adjoint`` for `Solver.pullback` and `Solver.jacobian`, ``profile`` (``fast``, ``small``)
+    overrides that of the C. Compiled C is cached by its content. Gives a `Solver`, of a lattice a `LatticeSolver`.
+    Raises `SpecError`, `LimitError`, `CheckError` if the mathematics is refuted, e.g. since π is not Poisson, and
+    `ToolchainError` if C was asked for in vain, or by naming a compiler in CC that does not work.
     """
     if target != "auto" and not registry.find(target).loader:
         runnable = ", ".join(registry.LOADABLE)
@@ -100,7 +101,8 @@ def compile(
         raise ValueError(f"unknown scheme {scheme!r}; there are {', '.join(SCHEMES)}")
     if profile is not None and profile not in PROFILES:
         raise ValueError(f"unknown profile {profile!r}; there are {', '.join(PROFILES)}")
-    compilation = compilation_of(source, order, Extras(tangent=True) if tangent else None, scheme, profile)
+    extras = Extras(tangent=tangent, adjoint=adjoint) if tangent or adjoint else None
+    compilation = compilation_of(source, order, extras, scheme, profile)
     return lattice_solver_of(compilation, target) if compilation.cell else solver_of(compilation, target)
 
 

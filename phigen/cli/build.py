@@ -51,6 +51,7 @@ def command(
     without: tuple[str, ...],
     single_file: bool,
     tangent: bool,
+    adjoint: bool,
     modified: int | None,
     compiling: bool,
     certify: bool,
@@ -67,7 +68,16 @@ def command(
     if (checking or diff) and (compiling or certify):
         raise click.UsageError("--compile and --certify write files; --check and --diff write nothing")
     options = Options(
-        Path(output), tuple(dict.fromkeys(targets)), order, single_file, tangent, modified, scheme, profile, without
+        Path(output),
+        tuple(dict.fromkeys(targets)),
+        order,
+        single_file,
+        tangent,
+        modified,
+        scheme,
+        profile,
+        without,
+        adjoint,
     )
     compilations = _compile_all(console, spec_files, options)
     planned = _plan(console, compilations, options)

@@ -37,6 +37,7 @@ class Options:
     scheme: str | None = None
     profile: str | None = None
     without: tuple[str, ...] = ()
+    adjoint: bool = False
 
     def extras_of(self, spec: Spec) -> Extras:
         """What the code offers beyond the solver: what the spec asks for, and the command line."""
@@ -44,7 +45,8 @@ class Options:
 
         given = spec.extras
         modified = given.modified_hamiltonian if self.modified is None else self.modified
-        return Extras(self.tangent or given.tangent, modified, given.without | {*self.without})
+        without, adjoint = given.without | {*self.without}, self.adjoint or given.adjoint
+        return Extras(self.tangent or given.tangent, modified, without, adjoint)
 
     def compiled(self, spec: Spec) -> Compilation:
         """The compilation of a spec with these options, proved; see `phigen.compiler.compile_proved`."""
@@ -74,6 +76,7 @@ class Options:
         words += [word for part in self.without for word in ("--without", part)]
         words += ["--single-file"] if self.single_file else []
         words += ["--tangent"] if self.tangent else []
+        words += ["--adjoint"] if self.adjoint else []
         words += ["--modified", str(self.modified)] if self.modified is not None else []
         return words
 
@@ -84,6 +87,7 @@ def output_options(command: F) -> F:
         click.option(
             "--modified", type=CORRECTIONS, metavar="N", help="Generate modified_hamiltonian, N corrections, too."
         ),
+        click.option("--adjoint", is_flag=True, help="Generate step_adjoint and pullback, gradients of runs, too."),
         click.option("--tangent", is_flag=True, help="Generate step_tangent, the derivative of a step, too."),
         click.option(
             "--profile", type=click.Choice(PROFILES), help="How much the code does for speed, instead of the spec's."
@@ -120,6 +124,7 @@ def generate(compilation: Compilation, target: str, options: Options) -> dict[st
     words += [f"--without {part}" for part in options.without if part not in spec.extras.without]
     words += ["--single-file"] if single else []
     words += ["--tangent"] if options.tangent and not spec.extras.tangent else []
+    words += ["--adjoint"] if options.adjoint and not spec.extras.adjoint else []
     words += ["--modified", str(options.modified)] if options.modified is not None else []
     return emit(compilation.program, target, " ".join(words), single_file=single)
 

@@ -154,7 +154,7 @@ def _options(name: str, given: dict[str, Any]) -> Options:
         or options.scheme not in (None, *SCHEMES)
         or options.profile not in (None, *PROFILES)
         or "directory" in given
-        or not all(isinstance(flag, bool) for flag in (options.single_file, options.tangent))
+        or not all(isinstance(flag, bool) for flag in (options.single_file, options.tangent, options.adjoint))
     ):
         raise ValueError(f"{name}: options that do not exist: {given}")
     return options

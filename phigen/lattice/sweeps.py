@@ -147,7 +147,7 @@ def _expect_offered(cell: Cell, scheme: str, extras: Extras, locations: Mapping[
     if cell.bond_bracket and cell.relation == PAIRS:
         message = "brackets between the sites of pairs are not compiled"
         problems.append(Diagnostic(message, locations.get(("poisson",))))
-    asked = [name for name in ("modified_hamiltonian", "tangent") if getattr(extras, name)]
+    asked = [name for name in ("modified_hamiltonian", "tangent", "adjoint") if getattr(extras, name)]
     asked += ["reconstruct"] if ("reconstruct",) in locations else []
     problems += [Diagnostic(f"{name} is not offered for lattices", locations.get((name,))) for name in asked]
     if problems:

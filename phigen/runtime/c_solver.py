@@ -9,9 +9,9 @@ from __future__ import annotations
 
 import ctypes
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from phigen.errors import ToolchainError
 from phigen.runtime import cache
 from phigen.runtime.c_lattice import CLattice
+from phigen.runtime.gradients import KEPT, Segment, segments
 from phigen.runtime.interface import (
     BackendError,
     Floats,
@@ -60,6 +61,9 @@ _EXTRAS = {
     "ensemble": (_INT, (_POINTER, _POINTER, _SIZE, _DOUBLE, _SIZE, _POINTER)),
     "ensemble_each": (_INT, (_POINTER, _POINTER, _SIZE, _POINTER, _SIZE, _SIZE, _POINTER, _POINTER)),
     "step_tangent": (_INT, (_POINTER, _DOUBLE, _POINTER)),
+    "pullback": (_INT, (_POINTER, _DOUBLE, _SIZE, _SIZE, _POINTER, _POINTER, _POINTER, _POINTER, _POINTER)),
+    "trail_size": (_SIZE, ()),
+    "level_bar": (None, (_POINTER, _POINTER, _DOUBLE, _POINTER, _POINTER)),
     "init_gauge": (_INT, (_POINTER, _POINTER, _POINTER, _POINTER)),
     "set_state": (_INT, (_POINTER, _POINTER)),
     "kick": (_INT, (_POINTER, _POINTER)),
@@ -68,6 +72,14 @@ _EXTRAS = {
     "attitude": (None, (_POINTER, _POINTER)),
     "set_attitude": (_INT, (_POINTER, _POINTER, _POINTER)),
 }
+
+
+class Cotangents(NamedTuple):
+    """What is pulled back along a run: cotangents of the state, of the parameters, and of e."""
+
+    state: Floats
+    parameters: Floats
+    level: Floats
 
 
 class CSession:
@@ -109,6 +121,16 @@ class CSession:
         if status:
             raise BackendError(status_name(status), self.steps, self._x.reshape(1, -1).copy())
         return tangent
+
+    def pull_back(self, h: float, segment: Segment, trail: Floats, bars: Floats, found: Cotangents) -> Floats:
+        """The rows (rows, DIM) of a segment whose start this is; ``found`` are the cotangents after it, then before."""
+        rows, level = np.empty_like(bars), (found.level.ctypes.data,) * hasattr(self._c, "level_bar")
+        out = (rows.ctypes.data, bars.ctypes.data, found.state.ctypes.data, found.parameters.ctypes.data)
+        counts = (segment.count, segment.stride)
+        status = self._c.pullback(self.address, h, *counts, *out, *level, trail.ctypes.data)
+        if status:
+            raise BackendError(status_name(status), segment.first, self._x.reshape(1, -1).copy())
+        return rows
 
     def branch(self) -> CSession:
         """See `Session`."""
@@ -163,7 +185,8 @@ class CSolver:
         if interface.time or "init_gauge" in offered:  # times, or a gauge of each
             _, each = _EXTRAS["ensemble_each"]
             offered |= {"ensemble_each": (_INT, (*each[:3], _POINTER, *each[3:]))} if "ensemble_each" in offered else {}
-        for name, (result, arguments) in {**_SIGNATURES, **timed, **offered}.items():
+        monitored = {"pullback": (_INT, (*_EXTRAS["pullback"][1], _POINTER))} if "level_bar" in offered else {}
+        for name, (result, arguments) in {**_SIGNATURES, **timed, **offered, **monitored}.items():
             function = getattr(self._library, f"{interface.name}_{name}", None)
             if function is None:
                 raise ToolchainError(
@@ -268,6 +291,64 @@ class CSolver:
         self._c.ensemble_each(*own, h.ctypes.data, members.steps, stride, at, status.ctypes.data)
         if rows is not None and frames is not None:
             rows[: len(frames)] = frames.transpose(0, 2, 1)
+
+    def pullback(
+        self,
+        x0: Floats,
+        h: float,
+        steps: int,
+        stride: int,
+        bars: Floats,
+        parameters: Mapping[str, float],
+        t0: float = 0.0,
+    ) -> tuple[Floats, Floats, Floats]:
+        """See `phigen.runtime.backend.Backend`."""
+        if not hasattr(self._c, "pullback"):
+            raise MissingExtraError("pullback")
+        of_step = int(self._c.trail_size())
+        pieces = segments(steps, stride, max(1, KEPT // of_step))
+        trail = np.empty(of_step * max((s.count for s in pieces), default=1))
+        rows, x0_bar, found = np.empty_like(bars), np.empty_like(x0), np.empty((len(parameters), len(x0)))
+        for m, start in enumerate(x0):
+            try:
+                own = bars[:, m]
+                rows[:, m], x0_bar[m], found[:, m] = self._pulled(start, h, pieces, trail, own, parameters, t0)
+            except BackendError as error:
+                raise BackendError(error.status, error.step, error.states, (m,)) from error
+        return rows, x0_bar, found
+
+    def _pulled(
+        self,
+        x0: Floats,
+        h: float,
+        pieces: Sequence[Segment],
+        trail: Floats,
+        bars: Floats,
+        parameters: Mapping[str, float],
+        t0: float,
+    ) -> tuple[Floats, Floats, Floats]:
+        """`pullback` of one member."""
+        at, begun, rows = self.start(x0, parameters, t0), list[CSession](), np.empty_like(bars)
+        for segment in pieces:
+            begun.append(at)
+            if segment is not pieces[-1]:
+                at = at.branch()
+                at.advance(h, segment.count)
+        found = Cotangents(np.zeros_like(x0), np.zeros(max(1, len(parameters))), np.zeros(1))
+        for segment, session in zip(reversed(pieces), reversed(begun), strict=True):
+            own = bars[segment.rows.start : segment.rows.stop] if segment.rows else np.zeros((1, len(x0)))
+            own = np.ascontiguousarray(own)
+            own[-1] += found.state
+            made = session.branch().pull_back(h, segment, trail, own, found)
+            if segment.rows:
+                rows[segment.rows.start : segment.rows.stop] = made
+        rows[0] = x0
+        found.state[:] += bars[0]
+        if hasattr(self._c, "level_bar") and self._gauge is None:
+            packed, start = self._packed(parameters), np.ascontiguousarray(x0)
+            more = (found.level[0], found.state.ctypes.data, found.parameters.ctypes.data)
+            self._c.level_bar(packed.ctypes.data, start.ctypes.data, *more)
+        return rows, found.state, found.parameters[: len(parameters)]
 
     def hamiltonian(self, x: Floats, parameters: Mapping[str, float], t: Floats | None = None) -> Floats:
         """See `phigen.runtime.backend.Backend`."""

@@ -5,14 +5,16 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from phigen.errors import ParameterError, StepError
-from phigen.runtime import arguments
+from phigen.runtime import arguments, gradients
 from phigen.runtime.backend import Backend
 from phigen.runtime.crossings import CrossingFinder, Function, Section
+from phigen.runtime.gradients import Jacobian, Pullback
 from phigen.runtime.interface import BackendError, Floats, Interface, MissingExtraError, Progress, row_steps
 from phigen.runtime.live import LiveSession
 from phigen.runtime.retrying import Retrying
@@ -100,7 +102,7 @@ class Solver:
         Raises `StepError`, whose ``trajectory`` ends with the state before the failing step.
         """
         begin = arguments.start_time(t0, self.interface, more)
-        values = self._values(parameters, more)
+        values = self.values(parameters, more)
         start, h = arguments.state(x0, "x0", self.interface), arguments.step_size(h)
         stride, retry = arguments.count(stride, "stride", 1), arguments.count(retry, "retry", 0)
         first = arguments.first(attitude0, position0, self.interface)
@@ -162,7 +164,7 @@ class Solver:
         The other arguments are those of `integrate`.
         """
         begin = arguments.start_time(t0, self.interface, more)
-        values = self._values(parameters, more)
+        values = self.values(parameters, more)
         start = arguments.state(x0, "x0", self.interface)
         first = arguments.first(attitude0, position0, self.interface)
         return LiveSession(self, self._started(start, math.nan, values, begin, first), values, begin)
@@ -193,7 +195,7 @@ class Solver:
     ) -> Floats:
         """The state (DIM,) one step of size ``h`` after ``x`` (DIM,), whose time is ``t0``; raises `StepError`."""
         begin = arguments.start_time(t0, self.interface, more)
-        values = self._values(parameters, more)
+        values = self.values(parameters, more)
         start, h = arguments.state(x, "x", self.interface), arguments.step_size(h)
         session = self._started(start, h, values, begin)
         try:
@@ -217,7 +219,7 @@ class Solver:
         `TypeError` if the solver was compiled without ``tangent=True``.
         """
         begin = arguments.start_time(t0, self.interface, more)
-        values = self._values(parameters, more)
+        values = self.values(parameters, more)
         start, h = arguments.state(x, "x", self.interface), arguments.step_size(h)
         session = self._started(start, h, values, begin)
         tangent = self._with_tangent(session, h, values)
@@ -238,7 +240,7 @@ class Solver:
         The steps are those of `integrate`. Raises what `step_tangent` does.
         """
         begin = arguments.start_time(t0, self.interface, more)
-        values = self._values(parameters, more)
+        values = self.values(parameters, more)
         start, h = arguments.state(x0, "x0", self.interface), arguments.step_size(h)
         steps = arguments.count(steps, "steps", 0)
         session = self._started(start, h, values, begin)
@@ -265,7 +267,7 @@ class Solver:
         rises from there. Raises `StepError`, whose ``trajectory`` is the `Section` so far.
         """
         begin = arguments.start_time(t0, self.interface, more)
-        values = self._values(parameters, more)
+        values = self.values(parameters, more)
         start, h = arguments.state(x0, "x0", self.interface), arguments.step_size(h)
         steps = arguments.count(steps, "steps", 0)
         found: list[tuple[float, Floats]] = []
@@ -308,6 +310,59 @@ class Solver:
             h, values, _ = asked.numbers(error.members[0] if error.members else 0)
             raise self.failure(error, h, error.states, values) from error
 
+    def pullback(
+        self,
+        x0: ArrayLike,
+        h: float,
+        steps: int,
+        cotangent: ArrayLike,
+        stride: int | None = None,
+        *,
+        t0: float | None = None,
+        parameters: Mapping[str, ArrayLike] | None = None,
+        **more: ArrayLike,
+    ) -> Pullback:
+        """The state after ``steps`` steps, and the derivatives of its product with a ``cotangent``: (x1, x0_bar,
+        parameters_bar), x0_bar along ``x0``, parameters_bar by name along the parameters.
+
+        ``x0`` is (DIM,) or (members, DIM), x1 and the cotangent have its shape. With a ``stride``, x1 are all rows of
+        `integrate`, (rows, …), and so is the cotangent. Parameters are numbers, or (members,); of a number that all
+        members share, the derivative is the sum over members. All is exact to round-off for the steps as they are made:
+        the choice of a gauge is held fixed, that of e = −H(x0) with a monitor is not; times and attitudes have no part.
+        Raises `StepError`, and `TypeError` if the solver was compiled without ``adjoint=True``.
+        """
+        rest: dict[str, Any] = dict(more)
+        begin = arguments.start_time(t0, self.interface, rest)
+        both = sorted(set(parameters or {}) & set(rest))
+        if both:
+            raise TypeError(f"parameter {both[0]!r} is given twice")
+        return gradients.pullback(self, x0, h, steps, cotangent, stride, begin, {**(parameters or {}), **rest})
+
+    def jacobian(
+        self,
+        x0: ArrayLike,
+        h: float,
+        steps: int = 1,
+        *,
+        t0: float | None = None,
+        parameters: Mapping[str, float] | None = None,
+        **more: float,
+    ) -> Jacobian:
+        """The state (DIM,) after ``steps`` steps from ``x0`` (DIM,), and its derivatives along x0 and the parameters.
+
+        These are (DIM, DIM), row i of x_i, and (DIM,) for each parameter, by name. One `pullback` for each coordinate,
+        with what is said there. Raises the same.
+        """
+        start = arguments.state(x0, "x0", self.interface)
+        given: dict[str, Any] = {"t0": t0, "parameters": parameters, **more}
+        rows = [self.pullback(start, h, steps, side, **given) for side in np.eye(len(start))]
+        names = rows[0].parameters_bar
+        return Jacobian(
+            rows[0].x1,
+            np.array([row.x0_bar for row in rows]),
+            {name: np.array([row.parameters_bar[name] for row in rows]) for name in names},
+        )
+
     def hamiltonian(
         self,
         x: ArrayLike,
@@ -323,7 +378,7 @@ class Solver:
         states = arguments.states(x, "x", self.interface)
         rows = states.reshape(-1, self.interface.dimension)
         when = arguments.times(t, self.interface, states.shape[:-1], more)
-        return self.backend.hamiltonian(rows, self._values(parameters, more), when).reshape(states.shape[:-1])
+        return self.backend.hamiltonian(rows, self.values(parameters, more), when).reshape(states.shape[:-1])
 
     def casimirs(
         self, x: ArrayLike, *, parameters: Mapping[str, float] | None = None, **more: float
@@ -331,7 +386,7 @@ class Solver:
         """The Casimirs of the states ``x`` (…, DIM), by name, each of shape (…)."""
         states = arguments.states(x, "x", self.interface)
         rows = states.reshape(-1, self.interface.dimension)
-        values = self.backend.casimirs(rows, self._values(parameters, more))
+        values = self.backend.casimirs(rows, self.values(parameters, more))
         return {name: values[:, i].reshape(states.shape[:-1]) for i, name in enumerate(self.interface.casimirs)}
 
     def vector_field(
@@ -346,7 +401,7 @@ class Solver:
         states = arguments.states(x, "x", self.interface)
         rows = states.reshape(-1, self.interface.dimension)
         when = arguments.times(t, self.interface, states.shape[:-1], more)
-        return self.backend.vector_field(rows, self._values(parameters, more), when).reshape(states.shape)
+        return self.backend.vector_field(rows, self.values(parameters, more), when).reshape(states.shape)
 
     def energies(self, x: Floats, t: Floats, parameters: Mapping[str, float]) -> Floats:
         """H along a trajectory: of the states (rows, DIM) at the times (rows,)."""
@@ -418,5 +473,6 @@ class Solver:
         message = f"{where}: {error.status}" + (f", {_ADVICE[error.status]}" if error.status in _ADVICE else "")
         return StepError(message, step=error.step, status=error.status, trajectory=trajectory, members=error.members)
 
-    def _values(self, given: Mapping[str, float] | None, more: Mapping[str, float]) -> dict[str, float]:
+    def values(self, given: Mapping[str, float] | None, more: Mapping[str, float]) -> dict[str, float]:
+        """The values of all parameters. Raises `TypeError` and `ValueError`."""
         return arguments.parameters(self.interface, given, more)

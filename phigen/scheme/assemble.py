@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 from phigen.attitude.group import Group
 from phigen.geometry.shapes import LogCanonical
 from phigen.geometry.system import System
 from phigen.realisations.protocol import BiRealisation
+from phigen.scheme.adjoint import adjoint_path, completed, explicit_adjoint, level_adjoint, newton_adjoint
 from phigen.scheme.attitude import expect_element, stage_attitude
 from phigen.scheme.discretisation import MOST_OPERATIONS, Discretisation, too_large
 from phigen.scheme.gauge import Gauge, Gauged, free_gauge
@@ -66,6 +68,7 @@ def build_program(
     elapsed = elapsed_kernel(system, scheme.generating)
     step = _step(system, realisation, scheme.generating, gauge, solver, extras, lanes=lanes)
     attitude = scheme.generating.coefficients.settled(attitude)
+    level = level_adjoint(system) if gauge.monitor and extras.adjoint else None
     modified, count = None, extras.modified_hamiltonian
     if count:
         modified = modified_of(system, realisation, order, gauge, count, len(scheme.fractions))
@@ -90,7 +93,7 @@ def build_program(
         observables=observables(system),
         fractions=scheme.fractions,
         gauge=free_gauge(system, gauged),
-        monitor=Monitor(rate_kernel(system, gauge.monitor), elapsed) if gauge.monitor else None,
+        monitor=Monitor(rate_kernel(system, gauge.monitor), elapsed, level) if gauge.monitor else None,
         modified=modified,
         attitude=attitude,
         extras=extras,
@@ -115,7 +118,7 @@ def _step(
         isinstance(system.shape, LogCanonical),
     )
     if realisation.path:
-        return _path(system, generating, gauge, inner, lanes=lanes, tangent=extras.tangent)
+        return _path(system, generating, gauge, inner, extras, lanes=lanes)
     coefficients = generating.coefficients
     # A monitored step keeps its y, by which it tells the time.
     increment = None if gauge.monitor else explicit_kernel(system, realisation, generating, coefficients)
@@ -124,29 +127,39 @@ def _step(
         solvers = newton_solvers(linearise)
         refresh, prepare = coefficients.refresh(t=system.times), _prepare(system, gauge, coefficients)
         newton = Newton(prepare, linearise, inner, solvers.eliminate, solvers.invert, solvers.factors, refresh=refresh)
+        if extras.adjoint:
+            transposed = newton_adjoint(linearise, coefficients)
+            newton = replace(newton, adjoint=completed(coefficients, [transposed], prepare, refresh))
         return coefficients.settled(newton)
     tangent = explicit_jacobian(increment, system.coordinates, coefficients) if extras.tangent else None
     refresh, prepare = coefficients.refresh(t=system.times), _prepare(system, gauge, coefficients)
-    return coefficients.settled(Explicit(prepare, increment, tangent, refresh=refresh))
+    explicit = Explicit(prepare, increment, tangent, refresh=refresh)
+    if extras.adjoint:
+        transposed = explicit_adjoint(increment, coefficients)
+        explicit = replace(explicit, adjoint=completed(coefficients, [transposed], prepare, refresh))
+    return coefficients.settled(explicit)
 
 
 def _path(
-    system: System, generating: GeneratingFunction, gauge: Gauge, inner: InnerSolve, *, lanes: bool, tangent: bool
+    system: System, generating: GeneratingFunction, gauge: Gauge, inner: InnerSolve, extras: Extras, *, lanes: bool
 ) -> Path:
     n, coefficients = system.dimension, generating.coefficients
     recurrences = build_path(system, coefficients)
     generate = generate_kernel(system, generating, coefficients)
-    several, varied = None, None
+    several, varied, adjoint = None, None, None
     if lanes and n <= MOST_IN_LANES:
         slopes = build_slopes(system, coefficients)
         several = PathLanes(slopes, curvature(system, generating, coefficients), along_mean(n), inverse(n))
-    if tangent:
+    if extras.tangent or extras.adjoint:
         kernel = several.curvature if several else curvature(system, generating, coefficients)
+    if extras.tangent:
         varied = PathTangent(tangent_path(system, coefficients), kernel)
     refresh, prepare = coefficients.refresh(t=system.times), _prepare(system, gauge, coefficients)
-    return coefficients.settled(
-        Path(prepare, recurrences, generate, inner, path_elimination(n), several, varied, refresh=refresh)
-    )
+    if extras.adjoint:
+        adjoint = completed(coefficients, [], prepare, refresh, adjoint_path(system, coefficients, kernel))
+    solver = path_elimination(n)
+    path = Path(prepare, recurrences, generate, inner, solver, several, varied, refresh=refresh, adjoint=adjoint)
+    return coefficients.settled(path)
 
 
 def _prepare(system: System, gauge: Gauge, coefficients: Coefficients) -> Kernel:

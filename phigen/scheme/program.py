@@ -52,11 +52,13 @@ class FreeGauge:
 class Monitor:
     """Steps of equal size in τ: ``rate`` is dt/dτ at a state, ``elapsed`` the time that a step takes (at its point y).
 
-    In a splitting the flows themselves say what time they take, and ``elapsed`` is None.
+    In a splitting the flows themselves say what time they take, and ``elapsed`` is None. ``level`` is the gradient of
+    H, on which e depends, if the transpose of steps was asked for.
     """
 
     rate: Kernel
     elapsed: Kernel | None
+    level: Kernel | None = None
 
 
 @dataclass(frozen=True)
@@ -165,7 +167,7 @@ class Program:
         """All kernels, each once."""
         seen = self.observables
         modified = (self.modified.kernel,) if self.modified else ()
-        timed = [k for k in (self.monitor.elapsed, self.monitor.rate) if k] if self.monitor else []
+        timed = [k for k in (self.monitor.elapsed, self.monitor.rate, self.monitor.level) if k] if self.monitor else []
         turned = self.attitude.kernels if self.attitude else ()
         observed = (seen.energy, seen.casimirs, seen.vector_field)
         return (*self.step.kernels, *turned, *timed, *modified, *observed, *self.choice)

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
+from dataclasses import replace
 
 from phigen.attitude.group import Group
 from phigen.errors import Diagnostic, SpecError
 from phigen.geometry.system import System
+from phigen.scheme.adjoint import completed, explicit_adjoint, level_adjoint
 from phigen.scheme.attitude import flow_attitude
 from phigen.scheme.choosing import Choice
 from phigen.scheme.discretisation import MOST_OPERATIONS, too_large
@@ -66,12 +68,19 @@ def build_splitting(
         },
         (Output("coef", tuple(coefficients.values)),),
     )
-    step = coefficients.settled(Splitting(prepare, flows, steps, choice.method.name, tangents, refresh=refresh))
+    adjoint = None
+    if extras.adjoint:
+        own = [trimmed(flow, system.dimension) for flow in flows]
+        back = [explicit_adjoint(flow, coefficients, f"flow{k}_adjoint") for k, flow in enumerate(own, 1)]
+        adjoint = completed(coefficients, back, prepare, refresh)
+    settled = Splitting(prepare, flows, steps, choice.method.name, tangents, refresh=refresh, adjoint=adjoint)
+    step = coefficients.settled(settled)
     for kernel in step.kernels:
         operations = cost(kernel.roots)
         if operations > MOST_OPERATIONS:
             reason = f"{kernel.name} would take {operations} operations, more than {MOST_OPERATIONS}"
             raise too_large(system, reason, other="")
+    level = level_adjoint(system) if monitor and extras.adjoint else None
     monitored = [monitor.fact] if monitor else []
     said = (*monitored, *gauge.facts, *facts(choice, step), _clock(choice), choice.order.note)
     return Program(
@@ -88,7 +97,7 @@ def build_splitting(
         extras=extras,
         lanes=lanes,
         profile=profile,
-        monitor=monitor.monitor(system) if monitor else None,
+        monitor=replace(monitor.monitor(system), level=level) if monitor else None,
     )
 
 

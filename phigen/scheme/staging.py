@@ -41,6 +41,11 @@ class Coefficients:
         """The symbols of all coefficients of ``prepare`` so far."""
         return tuple(coefficient(k) for k in range(len(self.values)))
 
+    @property
+    def table(self) -> tuple[str, ...]:
+        """The symbols of all coefficients so far, those that are renewed in each step last."""
+        return (*self.slots, *(Symbol(RENEWED, k) for k in range(len(self.renewed))))
+
     def empty(self) -> Coefficients:
         """A table with the same symbols and no values."""
         return Coefficients(self._static, self._inputs)

@@ -24,11 +24,45 @@ LONGEST_PATH, MOST_PIECES = 128, 512
 
 
 @dataclass(frozen=True)
+class PathAdjoint:
+    """The path traced back with cotangents (`phigen.scheme.adjoint`): their ``recurrences``, those of the ``used``
+    coefficients last; ∇S_h and its Hessian at the mean, and the transpose of ∇S_h along coefficients."""
+
+    recurrences: Recurrences
+    used: tuple[int, ...]
+    curvature: Kernel
+    slope: Kernel
+
+
+@dataclass(frozen=True)
+class Adjoint:
+    """The transpose of a step: of the kernels of the ``steps`` (one, or one for each flow), of ``prepare`` and of
+    ``refresh``; if the step follows a path, that of the ``path``."""
+
+    steps: tuple[Kernel, ...]
+    prepare: Kernel
+    refresh: Kernel | None = None
+    path: PathAdjoint | None = None
+
+    @property
+    def kernels(self) -> tuple[Kernel, ...]:
+        """All kernels, each once, but for the curvature of a path."""
+        slope = self.path.slope if self.path else None
+        return _present((*self.steps, slope, self.prepare, self.refresh))
+
+
+@dataclass(frozen=True)
 class _Staged:
-    """Any step."""
+    """Any step; ``adjoint`` is there if it was asked for."""
 
     prepare: Kernel
     refresh: Kernel | None = field(default=None, kw_only=True)
+    adjoint: Adjoint | None = field(default=None, kw_only=True)
+
+    @property
+    def transposed(self) -> tuple[Kernel, ...]:
+        """The kernels of the transpose."""
+        return self.adjoint.kernels if self.adjoint else ()
 
     @property
     def prepared(self) -> int:
@@ -100,7 +134,8 @@ class Newton(_Staged):
     def kernels(self) -> tuple[Kernel, ...]:
         """All kernels, each once."""
         factors = (self.factors.factorise, self.factors.substitute) if self.factors else ()
-        return _present((self.prepare, self.refresh, self.linearise, self.eliminate, self.invert, *factors))
+        own = (self.prepare, self.refresh, self.linearise, self.eliminate, self.invert)
+        return _present((*own, *factors, *self.transposed))
 
 
 @dataclass(frozen=True)
@@ -121,7 +156,7 @@ class Explicit(_Staged):
     @property
     def kernels(self) -> tuple[Kernel, ...]:
         """All kernels, each once."""
-        return _present((self.prepare, self.refresh, self.increment, self.tangent))
+        return _present((self.prepare, self.refresh, self.increment, self.tangent, *self.transposed))
 
 
 @dataclass(frozen=True)
@@ -165,8 +200,16 @@ class Path(_Staged):
     def kernels(self) -> tuple[Kernel, ...]:
         """All kernels, each once."""
         lanes = (self.lanes.curvature, self.lanes.along_mean, self.lanes.invert) if self.lanes else ()
-        varied = (self.tangent.curvature,) if self.tangent and not self.lanes else ()
-        return _present((self.prepare, self.refresh, self.generate, self.eliminate, *lanes, *varied))
+        varied = (self.curvature,) if not self.lanes else ()
+        own = (self.prepare, self.refresh, self.generate, self.eliminate)
+        return _present((*own, *lanes, *varied, *self.transposed))
+
+    @property
+    def curvature(self) -> Kernel | None:
+        """∇S_h and its Hessian, where derivatives of a step were asked for."""
+        if self.tangent:
+            return self.tangent.curvature
+        return self.adjoint.path.curvature if self.adjoint and self.adjoint.path else None
 
 
 @dataclass(frozen=True)
@@ -193,7 +236,7 @@ class Splitting(_Staged):
     @property
     def kernels(self) -> tuple[Kernel, ...]:
         """All kernels, each once."""
-        return _present((self.prepare, self.refresh, *self.flows, *self.tangents))
+        return _present((self.prepare, self.refresh, *self.flows, *self.tangents, *self.transposed))
 
 
 @dataclass(frozen=True)

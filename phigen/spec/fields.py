@@ -277,6 +277,9 @@ SPEC = Record(
         Field("solver", SOLVER, "the inner solve of a step"),
         Field("tangent", Boolean(), "also generate step_tangent, the derivative of a step", default=False),
         Field(
+            "adjoint", Boolean(), "also generate step_adjoint and pullback: gradients of steps and runs", default=False
+        ),
+        Field(
             "modified_hamiltonian",
             Integer(0, limits.CORRECTIONS, limit=True),
             "also generate the modified Hamiltonian, with so many correction terms",

@@ -158,12 +158,14 @@ class Extras:
     """What the generated code offers beyond the solver: ``tangent`` adds ``step_tangent``, the derivative of a step.
 
     ``modified_hamiltonian`` adds the function of that name, with so many correction terms; 0 for none. ``without`` are
-    parts to leave out (`phigen.spec.names.PARTS`).
+    parts to leave out (`phigen.spec.names.PARTS`). ``adjoint`` adds the transpose of a step and of a run, along state
+    and parameters.
     """
 
     tangent: bool = False
     modified_hamiltonian: int = 0
     without: frozenset[str] = frozenset()
+    adjoint: bool = False
 
     def offers(self, part: str, profile: str) -> bool:
         """Whether the code of a profile has a part, where it applies."""

@@ -14,7 +14,7 @@ SPEC_NAME = r"[a-z][a-z0-9_]{0,30}"
 IDENTIFIER = r"[A-Za-z_][A-Za-z0-9_]*"
 
 #: Parameters are passed by keyword beside these arguments of the generated functions.
-ARGUMENTS = frozenset(["x", "x0", "X0", "h", "steps", "stride", "gauge", "attitude0", "position0"])
+ARGUMENTS = frozenset(["x", "x0", "X0", "h", "steps", "stride", "gauge", "cotangent", "attitude0", "position0"])
 #: The same, where there is a time.
 TIMED_ARGUMENTS = ARGUMENTS | {"t", "t0"}
 ARGUMENT_HINT = "it is the name of an argument of the generated functions"

@@ -84,6 +84,7 @@ def _parts(raw: Mapping[str, Any], declared: Declarations) -> dict[str, Any]:
             raw.get("tangent", False),
             raw.get("modified_hamiltonian", 0),
             frozenset(without_repetition(raw.get("without", ()), ("without",), declared)),
+            raw.get("adjoint", False),
         ),
         "reconstruct": raw.get("reconstruct", ""),
         "runs": {n: run(n, r, declared) for n, (_, r) in raw.get("runs", {}).items() if r is not None},
@@ -102,7 +103,7 @@ SERIES_KEYS: Mapping[str, tuple[object, ...]] = {"terms": (), "birealisation": (
 #: Keys that lattices do not take yet, and the values that do no harm.
 NOT_OF_LATTICES: Mapping[str, tuple[object, ...]] = {
     "time": (), "monitor": (), "reconstruct": (), "forces": (), "damping": (), "terms": (), "birealisation": ("auto",),
-    "gauge": ("auto", "none"), "tangent": (False,), "modified_hamiltonian": (0,),
+    "gauge": ("auto", "none"), "tangent": (False,), "adjoint": (False,), "modified_hamiltonian": (0,),
 }  # fmt: skip
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 #: Kinds that several modules tell apart. A kind without keys has one symbol only, such as the step size.
-MOMENTUM, VARIATION, GAUGE = "p", "v", "gauge"
+MOMENTUM, VARIATION, COTANGENT, GAUGE = "p", "v", "bar", "gauge"
 COEFFICIENT, RENEWED, SERIES, FIXED = "c", "n", "s", "f"
 TEMPORARY, WORK, PART = "t", "w", "part"
 #: Of lattices: what bonds or pairs add to a component of the gradient at a site; 1 where a term reaches beyond no open
@@ -54,6 +54,11 @@ def initial(name: str) -> Symbol:
 def variation(name: str) -> Symbol:
     """The symbol of the variation of a coordinate."""
     return Symbol(VARIATION, name)
+
+
+def cotangent(name: str) -> Symbol:
+    """The symbol of the derivative of what comes later along a value."""
+    return Symbol(COTANGENT, name)
 
 
 def coefficient(k: int) -> Symbol:

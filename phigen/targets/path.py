@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 from phigen.scheme.lowering import expand_powers
 from phigen.scheme.path import Recurrences, Series, Term
 from phigen.scheme.program import Program
-from phigen.scheme.steps import Path
+from phigen.scheme.steps import Path, PathAdjoint
 from phigen.symbolic.expression import Expression
-from phigen.symbolic.symbols import FIXED, SERIES, Symbol, coefficient, momentum, variation
+from phigen.symbolic.symbols import FIXED, SERIES, Symbol, coefficient, cotangent, momentum, variation
 from phigen.targets.names import Scope
 from phigen.targets.printer import Printer
 from phigen.targets.reserved import Reserved
@@ -59,12 +59,25 @@ def tangent_program(program: Program) -> Program:
     return replace(program, coordinates=(*program.coordinates, *map(variation, program.coordinates)))
 
 
+def adjoint_program(program: Program, path: PathAdjoint) -> Program:
+    """The program with the coordinates of the path that is traced back: the state, then all cotangents."""
+    names = program.coordinates
+    bars = [
+        *map(cotangent, names),
+        *(cotangent(momentum(c)) for c in names),
+        *(cotangent(coefficient(k)) for k in path.used),
+    ]
+    return replace(program, coordinates=(*names, *bars))
+
+
 def recurrences(program: Program) -> list[Recurrences]:
-    """Those of the path, and of the path with its variation; none for other steps."""
+    """Those of the path, of the path with its variation, and of the path traced back; none for other steps."""
     step = program.step
     if not isinstance(step, Path):
         return []
-    return [step.recurrences, *([step.tangent.recurrences] if step.tangent else [])]
+    varied = [step.tangent.recurrences] if step.tangent else []
+    back = [step.adjoint.path.recurrences] if step.adjoint and step.adjoint.path else []
+    return [step.recurrences, *varied, *back]
 
 
 def kinds(path: Recurrences) -> list[str]:

@@ -24,10 +24,12 @@ IMPLICIT = [
     ("NEWTON", "TANGENT"),
     ("NEWTON", "COMPOSED"),
     ("NEWTON", "COMPOSED", "FAST"),
+    ("NEWTON", "COMPOSED", "ADJOINT", "TANGENT"),
+    ("NEWTON", "FAST", "ADJOINT"),
 ]
 IMPLICIT += [("PATH", *more) for _, *more in IMPLICIT]
-IMPLICIT += [("NEWTON", "GAUGE"), ("NEWTON", "GAUGE", "FAST")]
-EXPLICIT = [(kind, *more) for kind in ("EXPLICIT", "SPLITTING") for more in ((), ("FAST",), ("TANGENT",))]
+IMPLICIT += [("NEWTON", "GAUGE"), ("NEWTON", "GAUGE", "FAST", "ADJOINT")]
+EXPLICIT = [(kind, *more) for kind in ("EXPLICIT", "SPLITTING") for more in ((), ("FAST",), ("TANGENT",), ("ADJOINT",))]
 
 
 def defined(switches):
@@ -98,7 +100,7 @@ def test_each_file_of_the_runtime_compiles_by_itself(path, tmp_path):
     kinds = {"packs.c": "SPLITTING", "explicit.c": "EXPLICIT", "path.c": "PATH", "path_lanes.c": "PATH"}
     own = {"gauge.c": ["GAUGE"], "level.c": ["GAUGE"], "attitude.c": ["ATTITUDE"]}
     kind = kinds.get(path.name, "NEWTON")
-    switches = defined((kind, "FAST", "TANGENT", *own.get(path.name, ())))
+    switches = defined((kind, "FAST", "TANGENT", "ADJOINT", *own.get(path.name, ())))
     run([tool("gcc"), *STRICT, "-fsyntax-only", *switches, *INCLUDED, path], tmp_path)
 
 

@@ -14,7 +14,8 @@ from dataclasses import dataclass, field
 from phigen import resources
 
 #: Loops over stages, arrays with a place for each, and arguments that say which: what a solver with one stage lacks.
-_OVER_STAGES = re.compile(r"^( *)for \(int stage = 0; stage < PHI_STAGES; \+\+stage\)(?: (.*))?$")
+_FORTH, _BACK = r"0; stage < PHI_STAGES; \+\+stage", "PHI_STAGES - 1; stage >= 0; --stage"
+_OVER_STAGES = re.compile(rf"^( *)for \(int stage = (?:{_FORTH}|{_BACK})\)(?: (.*))?$")
 _ONE_STAGE = (
     (re.compile(r"phi_fractions\[stage\] \* |PHI_STAGES \* "), ""),
     (re.compile(r"\[(?:stage|PHI_STAGES)\]"), ""),

@@ -13,7 +13,7 @@ from phigen.lanes.lowering import Blocks, Lanes, Rows, in_lanes
 from phigen.scheme.kernel import Kernel
 from phigen.scheme.path import Recurrences
 from phigen.scheme.program import Attitude, Program
-from phigen.scheme.steps import Explicit, Implicit, Path, Splitting, Sweeps
+from phigen.scheme.steps import Adjoint, Explicit, Implicit, Path, PathAdjoint, Splitting, Sweeps
 from phigen.spec.model import Parameter
 from phigen.targets.c import functions, paths, splitting, sweeps
 from phigen.targets.c.amalgamation import Amalgam
@@ -23,7 +23,7 @@ from phigen.targets.c.lanes import printed as kernels_in_lanes
 from phigen.targets.c.lanes import remembered
 from phigen.targets.c.layout import fitted
 from phigen.targets.header import CHECKSUM, checksum, header_lines, plain
-from phigen.targets.path import Syntax, statements, tangent_program
+from phigen.targets.path import Syntax, adjoint_program, statements, tangent_program
 from phigen.targets.rendering import render
 
 #: Most terms of the expansion of a path; a path that needs more is cut into pieces.
@@ -95,12 +95,16 @@ def printed(program: Program, lanes: Lanes | None, has: Mapping[str, bool]) -> d
         found["path_model.h"] = _path(program, step.recurrences, "path")
         if step.tangent:
             varied = _path(tangent_program(program), step.tangent.recurrences, "tangent")
-            found["tangent_model.h"] = function(program, step.tangent.curvature) + "\n" + varied
+            found["tangent_model.h"] = "" if step.adjoint else function(program, step.tangent.curvature) + "\n"
+            found["tangent_model.h"] += varied
+        if step.adjoint and step.adjoint.path:
+            found["adjoint_path.h"] = _adjoint_path(program, step.adjoint.path)
         if step.lanes and has["BLOCKS"]:
             found["path_model_lanes.h"] = paths.printed(program, step, step.lanes)
     if isinstance(step, Splitting):
         found["flows.h"] = splitting.printed(program, step)
         found["tangent_flows.h"] = splitting.tangent(program, step) if has["TANGENT"] else ""
+        found["adjoint_flows.h"] = splitting.adjoint(program, step, step.adjoint) if step.adjoint else ""
     if lanes and (has["BLOCKS"] or has["PACKS"]):
         found["model_lanes.h"] = "\n".join(kernels_in_lanes(program, lanes))
     declarations = render("c", "declarations.h", _declarations(program, lanes, has))
@@ -116,6 +120,9 @@ def _declarations(program: Program, lanes: Lanes | None, has: Mapping[str, bool]
         whose = f"Casimirs whose multiples are taken from H: {', '.join(program.held)}"
         sizes.append(("GAUGES", len(program.held), "that a trajectory holds fixed: e" if program.monitor else whose))
     sizes += _of_attitude(program.attitude) if program.attitude else []
+    if has["ADJOINT"]:
+        kept = program.dimension * len(program.fractions) * (2 if has["PATH"] else 1)
+        sizes.append(("TRAIL", kept, "numbers of a step that its transpose needs"))
     if has["RECURRENCES"]:
         memory = remembered(program, lanes)
         sizes.append(("REMEMBERED", memory["REMEMBERED"], "values that a recurrence is fitted to"))
@@ -170,6 +177,16 @@ def _constants(program: Program, lanes: Lanes | None, has: Mapping[str, bool]) -
             varied = step.tangent.recurrences
             sizes.append(("TANGENT_SERIES", len(varied.series), "of a path with its variation"))
             sizes.append(("TANGENT_FIXED", max(1, len(varied.fixed)), "values that are constant along it"))
+        if step.adjoint and step.adjoint.path:
+            back, n = step.adjoint.path, program.dimension
+            sizes.append(("BACK", 3 * n + len(back.used), "numbers of a path traced back, with cotangents"))
+            sizes.append(("BACK_SERIES", len(back.recurrences.series), "of such a path"))
+            sizes.append(("BACK_FIXED", max(1, len(back.recurrences.fixed)), "values that are constant along it"))
+    if has["ADJOINT"]:
+        sizes.append(("PARTS_OF_TRAIL", 2 if has["PATH"] else 1, "vectors that the transpose of a stage needs"))
+        sizes += [("RENEWED_OF_ROW", step.renewed, "coefficients of a row that depend on the time")] * bool(
+            step.refresh
+        )
     if has["RECURRENCES"]:
         checks = remembered(program, lanes)["CHECKS"]
         sizes.append(("CHECKS", checks, "values that a recurrence is not fitted to, but has to foresee"))
@@ -197,6 +214,11 @@ def _model(program: Program, lanes: Lanes | None, has: Mapping[str, bool], other
     own += [program.attitude.turn, program.attitude.rate] if program.attitude else []
     if step.refresh and not isinstance(step, Splitting):
         body.append(function(program, step.refresh, name="at_time"))
+    if step.adjoint:
+        own += [] if isinstance(step, Splitting) else step.adjoint.steps
+        own += _of_adjoint(program, step.adjoint)
+        if step.adjoint.refresh:
+            body.append(function(program, step.adjoint.refresh, name="at_time_adjoint"))
     body += [function(program, kernel) for kernel in own if kernel]
     body.append(function(program, seen.energy, name="hamiltonian", exported=True, returning=True))
     body += [function(program, kernel, exported=True) for kernel in (seen.casimirs, seen.vector_field)]
@@ -230,6 +252,20 @@ def _model(program: Program, lanes: Lanes | None, has: Mapping[str, bool], other
     values["moments"] = ", ".join(map(repr, schedule.moments)) if schedule else ""
     values["middles"] = render("c", "middles.c", values) if step.refresh else ""
     return render("c", "constants.c", values) + text
+
+
+def _of_adjoint(program: Program, adjoint: Adjoint) -> list[Kernel]:
+    """What the transpose of any step needs."""
+    path = [adjoint.path.curvature, adjoint.path.slope] if adjoint.path else []
+    found = [*path, *([adjoint.prepare] if program.parameters or program.monitor else [])]
+    return [*found, program.monitor.level] if program.monitor and program.monitor.level else found
+
+
+def _adjoint_path(program: Program, path: PathAdjoint) -> str:
+    """The recurrences of a path that is traced back, and which coefficients it depends on."""
+    own = {"NAME": program.name, "count": len(path.used), "used": ", ".join(map(str, path.used))}
+    extended = adjoint_program(program, path)
+    return render("c", "adjoint_path.c", own) + "\n" + _path(extended, path.recurrences, "back")
 
 
 def _path(program: Program, path: Recurrences, kind: str) -> str:

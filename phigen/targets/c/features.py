@@ -59,6 +59,7 @@ FEATURES = (
     Feature("SPATIAL", lambda p: p.attitude and p.attitude.group.spatial),
     Feature("RATE_OF_GAUGE", lambda p: p.attitude and p.attitude.rate),
     Feature("TANGENT", lambda p: p.extras.tangent),
+    Feature("ADJOINT", lambda p: p.step.adjoint),
     Feature("MODIFIED", lambda p: p.modified),
     Feature("ADVANCE", lambda p: not isinstance(p.step, Splitting) or p.extras.tangent),
     Feature("UNROLLED", lambda p: isinstance(p.step, Implicit) and _fast(p) and p.step.eliminate),

@@ -56,7 +56,9 @@ def called(program: Program) -> list[str]:
     """The functions of phigen's own that kernels call: φ and its derivatives, those of `ENTIRE`, and for a splitting
     those that its flows call."""
     step = program.step
-    flows = (*step.flows, *step.tangents) if isinstance(step, Splitting) else ()  # loops over sites have their own
+    flows = (
+        (*step.flows, *step.tangents, *step.transposed) if isinstance(step, Splitting) else ()
+    )  # loops over sites have their own
     used = {e.op for e in topological([e for kernel in flows for e in kernel.roots])}
     small = [*entire_used(program), *(f for f in FLOW_FUNCTIONS if f in used)]
     phis = [render("c", "phi.c", _phi(program, f)) for f in special.used(program)]

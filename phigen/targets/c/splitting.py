@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from phigen.scheme.kernel import Kernel, Output
 from phigen.scheme.program import Program
-from phigen.scheme.steps import Splitting
+from phigen.scheme.steps import Adjoint, Splitting
 from phigen.targets.c.functions import FLOW_FUNCTIONS
 from phigen.targets.c.kernels import FUNCTIONS, function
 from phigen.targets.rendering import render
@@ -17,7 +17,7 @@ def sizes(step: Splitting) -> list[tuple[str, int, str]]:
     """The constants of a splitting."""
     found = [("ROWS_OF_FLOWS", len(step.schedule.times), "times of flows in a step, each with its coefficients")]
     found.append(("ROW", max(1, step.row), "coefficients for one of them"))
-    return found + ([("FLOWS", len(step.schedule.flows), "in a step")] if step.tangents else [])
+    return found + ([("FLOWS", len(step.schedule.flows), "in a step")] if step.tangents or step.adjoint else [])
 
 
 def printed(program: Program, step: Splitting) -> str:
@@ -68,6 +68,25 @@ def tangent(program: Program, step: Splitting) -> str:
     return "\n".join([*found, render("c", "tangent_flows.c", own)])
 
 
+def adjoint(program: Program, step: Splitting, adjoint: Adjoint) -> str:
+    """The transposes of the flows."""
+    flows = step.schedule.flows
+    moved = [_moved(flow) for flow in step.flows]
+    kept = [[(place, i) for place, i in enumerate(own) if i < program.dimension] for own in moved]
+    labels = [*(f"case {k}" for k in range(1, len(kept))), "default"]
+    own = {
+        "NAME": program.name,
+        "n": program.dimension,
+        "along": _along(program),
+        "row": max(1, step.row),
+        "parts": list(zip(labels, range(1, len(kept) + 1), kept, strict=True)),
+        "part_of": ", ".join(str(part + 1) for part, _ in flows),
+        "row_of": ", ".join(str(row) for _, row in flows),
+    }
+    found = [function(program, kernel, functions=_functions(program)) for kernel in adjoint.steps]
+    return "\n".join([*found, render("c", "adjoint_flows.c", own)])
+
+
 def _along(program: Program) -> int:
     """What flows move: the coordinates; with a monitor also the time, and a sum that is no number out of the domain."""
     return program.dimension + (2 if program.monitor else 0)
@@ -80,10 +99,15 @@ def _functions(program: Program) -> dict[str, str]:
 
 def _flow(program: Program, kernel: Kernel, k: int) -> tuple[Kernel, dict[str, object]]:
     """The kernel of a flow without the zero increments, and what the template of the flow reads."""
-    moved = [i for i, e in enumerate(kernel.roots) if not e.is_zero]
+    moved = _moved(kernel)
     output = Output("change", tuple(kernel.roots[i] for i in moved))
     values = {"NAME": program.name, "n": _along(program), "k": k, "moved": list(enumerate(moved)), "form": ""}
     return replace(kernel, name=f"change{k}", outputs=(output,)), values | {"count": max(1, len(moved))}
+
+
+def _moved(kernel: Kernel) -> list[int]:
+    """The values that a flow changes."""
+    return [i for i, e in enumerate(kernel.roots) if not e.is_zero]
 
 
 def _steps(program: Program, step: Splitting, form: str, linkage: str, arguments: str, passed: str) -> str:

@@ -52,10 +52,13 @@ PATH_SYNTAX = Syntax(
 
 
 def emit(program: Program, command: str) -> dict[str, str]:
-    """The file name and its contents. Raises `SpecError` for lattices and attitudes, which are not offered."""
+    """The file name and its contents. Raises `SpecError` for what is not offered: lattices, attitudes, adjoints."""
     if isinstance(program.step, Sweeps):
         message = f"{program.name} is a lattice; lattices are not offered in JavaScript"
         raise SpecError([Diagnostic(message, hint="the targets c and numpy have them")])
+    if program.step.adjoint:
+        message = f"{program.name} asks for the transpose of steps, adjoint, which is not offered in JavaScript"
+        raise SpecError([Diagnostic(message, hint="the targets c and numpy have it")])
     if program.attitude:
         message = f"{program.name} reconstructs attitudes, which are not offered in JavaScript"
         raise SpecError([Diagnostic(message, hint="the targets c and numpy have them")])

@@ -6,19 +6,21 @@ import textwrap
 from collections.abc import Sequence
 from dataclasses import replace
 
-from phigen.scheme.kernel import SCALARS, Kernel
+from phigen.scheme.kernel import SCALARS, Kernel, Output
 from phigen.scheme.program import Attitude, Program
-from phigen.scheme.staging import NOW, TABLE
+from phigen.scheme.staging import TABLE
 from phigen.scheme.steps import (
     LONGEST_PATH,
     MOST_PIECES,
     PLAUSIBLE,
+    Adjoint,
     Explicit,
     Implicit,
     InnerSolve,
     Newton,
     Path,
     Splitting,
+    Step,
     Sweeps,
 )
 from phigen.symbolic.expression import Expression
@@ -29,7 +31,7 @@ from phigen.targets.header import CHECKSUM, checksum, header_lines, plain
 from phigen.targets.names import Scope
 from phigen.targets.numpy import lattice
 from phigen.targets.numpy.language import LANGUAGE
-from phigen.targets.path import Syntax, statements, tangent_program
+from phigen.targets.path import Syntax, adjoint_program, statements, tangent_program
 from phigen.targets.printer import Printer
 from phigen.targets.rendering import render
 from phigen.targets.reserved import PYTHON_RESERVED
@@ -79,6 +81,8 @@ def _body(program: Program) -> str:
     pieces += [render("numpy", "observables.py", _values(program))]
     if program.extras.tangent:
         pieces += _tangent(program)
+    if program.step.adjoint:
+        pieces += _adjoint(program, program.step.adjoint)
     if program.attitude:
         pieces += _attitude(program, program.attitude)
     if program.modified:
@@ -160,6 +164,53 @@ def _tangent(program: Program) -> list[str]:
     pieces = [_function(program, kernel) for kernel in kernels]
     pieces += [render("numpy", f"tangent_{part}.py", values) for part in parts]
     return [*pieces, render("numpy", "tangent.py", values)]
+
+
+def _adjoint(program: Program, adjoint: Adjoint) -> list[str]:
+    """The transpose of steps, with what it needs."""
+    step, values, parts = program.step, _values(program), ["newton"]
+    kernels = [_with_level(k) if k is adjoint.prepare else k for k in adjoint.kernels]
+    if isinstance(step, Explicit):
+        parts = ["explicit"]
+    if isinstance(step, Splitting):
+        values |= _splitting_values(step) | {"kicks": bool(step.schedule.multiples)}
+        values["adjoints"] = ", ".join(f"_{kernel.name}" for kernel in adjoint.steps)
+        parts = ["splitting"]
+    if adjoint.path:
+        extended, path = adjoint_program(program, adjoint.path), adjoint.path
+        n, count = program.dimension, extended.dimension
+        values |= statements(extended, path.recurrences, PATH_SYNTAX)
+        values |= {"series": len(path.recurrences.series), "n_back": count, "used": repr(list(path.used))}
+        values["groups"] = repr([min(i // n, 3) for i in range(count)])
+        kernels += [] if program.extras.tangent else [path.curvature]
+        parts = ["holds", "piece", "path"]
+    kernels += [program.monitor.level] if program.monitor and program.monitor.level else []
+    values |= _of_pullback(program, step)
+    parts = [*parts, *(["early"] if step.refresh else []), "run", "parameters"]
+    pieces = [_function(program, kernel) for kernel in kernels]
+    pieces += [render("numpy", f"adjoint_{part}.py", values) for part in parts]
+    return [*pieces, render("numpy", "pullback.py", values)]
+
+
+def _with_level(prepare: Kernel) -> Kernel:
+    """The transpose of ``prepare`` with a second result, which is empty where no e is held."""
+    return replace(prepare, outputs=(*prepare.outputs, Output("gauge_bar", ()))[:2])
+
+
+def _of_pullback(program: Program, step: Step) -> dict[str, object]:
+    """What the templates of whole runs read."""
+    rows = len(step.schedule.times) if isinstance(step, Splitting) else 1
+    moment = ", t0 + done * h, h" if isinstance(step, Splitting) else ""
+    said = "the e of a trajectory follows x0\n    and the parameters, unless a gauge is given."
+    return {
+        "parameters": len(program.parameters),
+        "levels": int(program.monitor is not None),
+        "early": step.prepared * rows,
+        "gauge_passed": "gauge.T, " * bool(program.held),
+        "t0_too": ", t0" * bool(program.time),
+        "found": f"_early(stage, found{moment})" if step.refresh else "found",
+        "said_of_level": said if program.monitor else "a gauge is held fixed.",
+    }
 
 
 def _attitude(program: Program, attitude: Attitude) -> list[str]:
@@ -301,10 +352,10 @@ def _result(program: Program, kernel: Kernel, code: Code, printer: Printer) -> s
     values: dict[str, list[Expression]] = {o.name: [] for o in kernel.outputs}
     for s in code.stores:
         values[s.array].append(s.value)
-    table = kernel.outputs[0].name
-    if table in (TABLE, NOW):
-        return "    return " + _list([printer(v) for v in values[table]])
-    state = next(a for a in kernel.inputs if a not in (TABLE, "params", "gauge", *SCALARS))
+    state = _state(kernel)
+    if not state:
+        lists = [_list([printer(v) for v in entries]) for entries in values.values()]
+        return "    return " + ", ".join(lists)
     n = program.dimension
     arrays = []
     for name, entries in values.items():
@@ -313,6 +364,12 @@ def _result(program: Program, kernel: Kernel, code: Code, printer: Printer) -> s
     if len(arrays) == 1:
         return f"    return {arrays[0]}"
     return "    return (\n" + "".join(f"        {a},\n" for a in arrays) + "    )"
+
+
+def _state(kernel: Kernel) -> str:
+    """The argument that holds states (..., DIM), which arrays are shaped by; empty where there is none."""
+    others = [a for a in kernel.inputs if a not in (TABLE, "params", "gauge", *SCALARS)]
+    return next((a for a in others if not isinstance(kernel.inputs[a][0], Symbol)), "")
 
 
 def _list(items: Sequence[str]) -> str:

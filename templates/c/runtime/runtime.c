@@ -7,6 +7,9 @@
 #if PHI_BLOCKS
 #include "blocks.c"
 #endif
+#if PHI_ADJOINT
+#include "adjoint.c"
+#endif
 #if PHI_ENSEMBLE
 #include "ensemble.c"
 #endif

@@ -211,6 +211,29 @@ phi_status phi_ensemble_each(const phi_params *params, double *x, size_t members
 phi_status phi_step_tangent(phi_solver *s, double h, double tangent[PHI_DIM * PHI_DIM]);
 
 #endif
+#if PHI_ADJOINT
+/* One step as phi_step makes it, and the transpose of its derivative: of sum x1_bar[i] * x[i], with the new x, x0_bar gets
+   the derivatives along the old x, and *params_bar gains those along the parameters; it may be NULL. Both are exact to
+   round-off; what a trajectory holds fixed is held fixed. x0_bar may be x1_bar. On failure all is as before. */
+phi_status phi_step_adjoint(phi_solver *s, double h, const double x1_bar[PHI_DIM], double x0_bar[PHI_DIM],
+    phi_params *params_bar);
+
+/* Many steps as phi_integrate makes them, and the transpose: rows[r * PHI_DIM + i], if not NULL, gets x_i after stride,
+   2 * stride, ... steps and at the end, rows_bar are their cotangents; x0_bar and params_bar as above. With stride =
+   steps there is one row. trail is room for PHI_TRAIL numbers for each step, which tell the way back. */
+#if PHI_MONITOR
+/* *e_bar, if not NULL, gains the derivative along e, which phi_level_bar pulls back to the start of the trajectory: where
+   phi_init has set e = -H(x0), x0_bar and *params_bar gain what that adds. */
+phi_status phi_pullback(phi_solver *s, double h, size_t steps, size_t stride, double *rows, const double *rows_bar,
+    double x0_bar[PHI_DIM], phi_params *params_bar, double *e_bar, double *trail);
+void phi_level_bar(const phi_params *params, const double x0[PHI_DIM], double e_bar, double x0_bar[PHI_DIM],
+    phi_params *params_bar);
+#else
+phi_status phi_pullback(phi_solver *s, double h, size_t steps, size_t stride, double *rows, const double *rows_bar,
+    double x0_bar[PHI_DIM], phi_params *params_bar, double *trail);
+#endif
+
+#endif
 #if PHI_TIMED
 /* The Hamiltonian at the time t; the Casimirs; the right-hand side pi(x) grad H(t, x). params may be NULL. */
 double phi_hamiltonian(const phi_params *params, double t, const double x[PHI_DIM]);
@@ -246,6 +269,9 @@ const char *phi_status_string(phi_status status);
 /* For bindings: the size of phi_solver, and its count of good steps. */
 size_t phi_solver_size(void);
 size_t phi_solver_steps_done(const phi_solver *s);
+#if PHI_ADJOINT
+size_t phi_trail_size(void);
+#endif
 #if PHI_ATTITUDE
 #if PHI_POSITION
 /* The attitude, then the position. */

@@ -28,6 +28,9 @@
 #ifndef PHI_TANGENT
 #define PHI_TANGENT 0
 #endif
+#ifndef PHI_ADJOINT
+#define PHI_ADJOINT 0
+#endif
 #ifndef PHI_ATTITUDE
 #define PHI_ATTITUDE 0
 #endif
@@ -82,7 +85,7 @@ enum { PHI_STAGES = 3 };
 #else
 enum { PHI_STAGES = 1 };
 #endif
-enum { PHI_COEFFICIENTS = PHI_SPLITTING ? 4 : 2 };
+enum { PHI_COEFFICIENTS = PHI_SPLITTING ? 4 : 2, PHI_TRAIL = PHI_STAGES * PHI_DIM * (PHI_PATH ? 2 : 1) };
 #if PHI_GAUGE
 enum { PHI_GAUGES = 2 };
 #endif

@@ -158,6 +158,57 @@ static void tangent_is_the_derivative(void)
 }
 
 #endif
+#if PHI_ADJOINT
+enum { RUN = 25, STRIDE = 10 }; /* rows after 10, 20 and 25 steps */
+static const double weight[6] = { 0.3, -1.2, 0.7, 0.4, -0.2, 1.1 };
+
+/* The weighted sum of rows. */
+static double weighed(const double x0[2], double g)
+{
+    const phi_params params = { g };
+    double sum = 0.0;
+    phi_solver s;
+    EXPECT(phi_init(&s, &params, x0) == PHI_OK);
+    for (int k = 1, row = 0; k <= RUN; ++k) {
+        EXPECT(phi_step(&s, H) == PHI_OK);
+        if (k % STRIDE != 0 && k != RUN) continue;
+        sum += weight[2 * row] * s.x[0] + weight[2 * row + 1] * s.x[1];
+        ++row;
+    }
+    return sum;
+}
+
+/* The pull-back of a run, along state and parameters, is that of differences; one step is a run of one. */
+static void pullback_is_the_gradient(void)
+{
+    double rows[6], x0_bar[2], trail[RUN * PHI_TRAIL], bar[2] = { 0.5, -2.0 }, same[2], slope;
+    phi_params params_bar = { 0.0 }, own = { 0.0 }, other = { 0.0 };
+    phi_solver s, t;
+    EXPECT(phi_init(&s, NULL, start) == PHI_OK);
+    t = s;
+    EXPECT(phi_pullback(&s, H, RUN, STRIDE, rows, weight, x0_bar, &params_bar, trail) == PHI_OK);
+    EXPECT(phi_integrate(&t, H, RUN) == PHI_OK && fabs(rows[4] - t.x[0]) < 1e-14 && rows[5] == s.x[1]);
+    EXPECT(s.steps == RUN && fabs(s.t - RUN * H) < 1e-14);
+    for (int j = 0; j < 3; ++j) {
+        double x[2] = { start[0], start[1] }, g = phi_default_params.g, ends[2];
+        for (int side = 0; side < 2; ++side) {
+            const double by = side ? 1e-6 : -1e-6;
+            ends[side] = j < 2 ? weighed((double[2]){ x[0] + (j == 0 ? by : 0.0), x[1] + (j == 1 ? by : 0.0) }, g) : weighed(x, g + by);
+        }
+        slope = (ends[1] - ends[0]) / 2e-6;
+        EXPECT(fabs((j < 2 ? x0_bar[j] : params_bar.g) - slope) < 1e-8);
+    }
+    t = s;
+    EXPECT(phi_pullback(&t, H, 1, 1, NULL, bar, same, &own, trail) == PHI_OK);
+    EXPECT(phi_step_adjoint(&s, H, bar, bar, &other) == PHI_OK && bar[0] == same[0] && bar[1] == same[1]);
+    EXPECT(own.g == other.g && s.x[0] == t.x[0] && s.steps == RUN + 1);
+    const phi_solver before = s;
+    EXPECT(phi_step_adjoint(&s, (double)NAN, bar, bar, &other) == PHI_BAD_ARGUMENT);
+    EXPECT(memcmp(&s, &before, sizeof s) == 0 && bar[0] == same[0] && own.g == other.g);
+    EXPECT(phi_step_adjoint(&s, H, bar, NULL, NULL) == PHI_BAD_ARGUMENT);
+}
+
+#endif
 int main(void)
 {
     refuses_what_is_not_allowed();
@@ -171,6 +222,9 @@ int main(void)
 #endif
 #if PHI_TANGENT
     tangent_is_the_derivative();
+#endif
+#if PHI_ADJOINT
+    pullback_is_the_gradient();
 #endif
     return 0;
 }

@@ -8,6 +8,7 @@
 
 enum { PHI_MAX_ITERATIONS = 20, PHI_CHECKS = 8, PHI_PASSES = 2, PHI_ROWS_OF_FLOWS = 2, PHI_ROW = 2, PHI_FLOWS = 3 };
 enum { PHI_TERMS = 30, PHI_SERIES = 4, PHI_FIXED = 1, PHI_TANGENT_SERIES = 8, PHI_TANGENT_FIXED = 1 };
+enum { PHI_PARTS_OF_TRAIL = PHI_PATH ? 2 : 1, PHI_BACK = 6, PHI_BACK_SERIES = 12, PHI_BACK_FIXED = 1 };
 #define PHI_TOLERANCE 1e-20
 #define PHI_APART
 
@@ -79,6 +80,22 @@ static void phi_prepare(const phi_params *params, double h, double *coef)
 }
 
 #endif
+#if PHI_ADJOINT && PHI_GAUGE
+static void phi_prepare_adjoint(const phi_params *params, const double gauge[PHI_GAUGES], double h,
+    const double coef_bar[2], double params_bar[1])
+{
+    (void)params, (void)gauge;
+    params_bar[0] = h * coef_bar[1];
+}
+
+#elif PHI_ADJOINT
+static void phi_prepare_adjoint(const phi_params *params, double h, const double coef_bar[2], double params_bar[1])
+{
+    (void)params;
+    params_bar[0] = h * coef_bar[1];
+}
+
+#endif
 #if PHI_ATTITUDE
 /* A pendulum has no attitude: these show what the runtime asks for. */
 static void phi_turn(const double *coef, const double y[2], double turn[PHI_ELEMENT])
@@ -111,6 +128,16 @@ static void phi_linearise(const double *coef, const double y[2], double displace
     }
 }
 
+#if PHI_ADJOINT
+static void phi_linearise_adjoint(const double *coef, const double y[2], const double displacement_bar[2],
+    const double increment_bar[2], double coef_bar[2])
+{
+    (void)coef;
+    coef_bar[0] = (increment_bar[0] - 0.5 * displacement_bar[0]) * y[1];
+    coef_bar[1] = -(increment_bar[1] - 0.5 * displacement_bar[1]) * sin(y[0]);
+}
+
+#endif
 #endif
 #if PHI_PATH
 static void phi_generate(const double *coef, const double y[2], double slope[2], double jacobian[4])
@@ -133,6 +160,16 @@ static void phi_curvature(const double *coef, const double y[2], double slope[2]
 
 static const int phi_path_slopes[2] = { 2, 3 };
 
+#if PHI_ADJOINT
+static void phi_slope_adjoint(const double *coef, const double y[2], const double slope_bar[2], double coef_bar[2])
+{
+    (void)coef;
+    coef_bar[0] = y[1] * slope_bar[1];
+    coef_bar[1] = sin(y[0]) * slope_bar[0];
+}
+
+#endif
+
 #endif
 #if PHI_EXPLICIT
 /* The symplectic Euler method. */
@@ -151,5 +188,17 @@ static void phi_explicit_tangent(const double *coef, const double state[2], doub
     slope[3] = 0.0;
 }
 
+#if PHI_ADJOINT
+static void phi_explicit_adjoint(const double *coef, const double state[2], const double increment_bar[2],
+    double state_bar[2], double coef_bar[2])
+{
+    const double kicked = -(increment_bar[1] + coef[0] * increment_bar[0]), kick = coef[1] * sin(state[0]);
+    state_bar[0] = coef[1] * cos(state[0]) * kicked;
+    state_bar[1] = coef[0] * increment_bar[0];
+    coef_bar[0] = (state[1] - kick) * increment_bar[0];
+    coef_bar[1] = sin(state[0]) * kicked;
+}
+
+#endif
 #endif
 #endif

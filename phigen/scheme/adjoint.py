@@ -1,0 +1,136 @@
+"""The transpose of a step: kernels that pull cotangents back, by reverse accumulation on the kernels of the step.
+
+A cotangent of x' gives that of x and of the coefficients of the step; those of all steps of a run are added up, and
+``prepare`` is pulled back once. *newton*: with a(y) + y = x, x' = x + d(y), J = 1 + a', M = d' and the cotangent λ of
+x', μ = J⁻ᵀ Mᵀ λ gives λ + μ as that of x, and the derivative of λ·d − μ·a along the coefficients as theirs; J and M
+are those of ``linearise``. *explicit* and flows: one reverse sweep. *path*: see `adjoint_path`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+from phigen.geometry.system import System, hamiltonian_vector_field
+from phigen.scheme.kernel import Kernel, Output
+from phigen.scheme.path import path_of
+from phigen.scheme.staging import TABLE, Coefficients
+from phigen.scheme.steps import Adjoint, PathAdjoint
+from phigen.symbolic.expression import Expression, gradient, neg, symbol, symbols_of, total
+from phigen.symbolic.symbols import LEVEL, Symbol, cotangent, momentum
+
+
+def pulled_back(
+    kernel: Kernel,
+    name: str,
+    seeds: Mapping[str, Sequence[Expression]],
+    along: Mapping[str, Sequence[str]],
+    purpose: str,
+) -> Kernel:
+    """The derivatives of Σ cotangent · value, for the values that have ``seeds``, along some inputs of a kernel.
+
+    A seed ``bar`` adds an input of that name, the cotangents of its values; an array x in ``along`` gives ``x_bar``.
+    """
+    value = total(
+        symbol(Symbol(seed, i)) * e for seed, values in seeds.items() for i, e in enumerate(values) if not e.is_zero
+    )
+    slopes = iter(gradient(value, [s for symbols in along.values() for s in symbols]))
+    outputs = tuple(Output(f"{array}_bar", tuple(next(slopes) for _ in symbols)) for array, symbols in along.items())
+    inputs = {**kernel.inputs, **{seed: tuple(Symbol(seed, i) for i in range(len(v))) for seed, v in seeds.items()}}
+    return Kernel(name, purpose, inputs, outputs)
+
+
+def newton_adjoint(linearise: Kernel, coefficients: Coefficients) -> Kernel:
+    """The cotangents of coefficients, from λ (``increment_bar``) and −μ (``displacement_bar``)."""
+    displacement, increment, *_ = linearise.outputs
+    kernel = replace(linearise, inputs={**linearise.inputs, TABLE: coefficients.table})
+    return pulled_back(
+        kernel,
+        "linearise_adjoint",
+        {"displacement_bar": displacement.values, "increment_bar": increment.values},
+        {TABLE: coefficients.table},
+        "at the point y: cotangents of the coefficients, from those of displacement and increment",
+    )
+
+
+def explicit_adjoint(explicit: Kernel, coefficients: Coefficients, name: str = "explicit_adjoint") -> Kernel:
+    """The cotangents of state and coefficients, from that of the increment of a step or a flow."""
+    kernel = replace(explicit, inputs={**explicit.inputs, TABLE: coefficients.table})
+    return pulled_back(
+        kernel,
+        name,
+        {"increment_bar": explicit.outputs[0].values},
+        {"state": kernel.inputs["state"], TABLE: coefficients.table},
+        "cotangents of the state and of the coefficients, from that of the increment",
+    )
+
+
+def completed(
+    coefficients: Coefficients,
+    steps: Sequence[Kernel],
+    prepare: Kernel,
+    refresh: Kernel | None,
+    path: PathAdjoint | None = None,
+) -> Adjoint:
+    """The transpose of a step, when its table is full and ``prepare`` and ``refresh`` are made."""
+    held = {"params": prepare.inputs["params"]}
+    if prepare.inputs.get("gauge") == (LEVEL,):
+        held["gauge"] = (LEVEL,)
+    early = pulled_back(
+        prepare,
+        "prepare_adjoint",
+        {"coef_bar": prepare.outputs[0].values},
+        held,
+        "cotangents of the parameters, from those of the coefficients",
+    )
+    late = refresh and pulled_back(
+        refresh,
+        "refresh_adjoint",
+        {"now_bar": refresh.outputs[0].values},
+        {TABLE: coefficients.slots},
+        "cotangents of the coefficients that do not depend on the time, from those of the others",
+    )
+    return Adjoint(tuple(steps), early, late, path)
+
+
+def level_adjoint(system: System) -> Kernel:
+    """The gradient of H along state and parameters: e = −H(x0) depends on both."""
+    along = [*system.coordinates, *system.parameter_names]
+    slopes = gradient(system.hamiltonian, along)
+    n = system.dimension
+    return Kernel(
+        "level_adjoint",
+        "the gradient of the Hamiltonian along the state, and along the parameters",
+        {"params": system.parameter_names, "x": system.coordinates},
+        (Output("x_bar", tuple(slopes[:n])), Output("params_bar", tuple(slopes[n:]))),
+    )
+
+
+def adjoint_path(system: System, coefficients: Coefficients, curvature: Kernel) -> PathAdjoint:
+    """The path traced back from its end with cotangents, see below, and that of the slope along coefficients.
+
+    For x' = m(1) and y = ∫ m dt with the cotangents λ and ν, along the path backwards: ȧ = ∂(π(m)p)/∂mᵀ a + ν from
+    a = λ gives that of x in the end, and ∫ π(m)ᵀ a dt that of p, ∫ ∂(a·π(m)p)/∂c dt that of a coefficient c. With
+    p = ∇S_h(y), ν = Hess S_hᵀ ω for the cotangent ω of p, and so ω solves a linear equation.
+    """
+    coordinates = system.coordinates
+    p = [symbol(momentum(c)) for c in coordinates]
+    a = [symbol(cotangent(c)) for c in coordinates]
+    nu = [symbol(momentum(cotangent(c))) for c in coordinates]
+    flow = coefficients.hoist(hamiltonian_vector_field(system.poisson, p))
+    power = total(e * f for e, f in zip(a, flow, strict=True))
+    used = [s for s in coefficients.slots if s in set(symbols_of(*flow))]
+    sources = gradient(power, [*coordinates, *map(momentum, coordinates), *used])
+    n = system.dimension
+    rates = [*map(neg, flow), *(s + v for s, v in zip(sources[:n], nu, strict=True)), *sources[n:]]
+    names = [*coordinates, *map(cotangent, coordinates), *(cotangent(momentum(c)) for c in coordinates)]
+    recurrences = path_of([*names, *map(cotangent, used)], rates)
+    kernel = replace(curvature, inputs={**curvature.inputs, TABLE: coefficients.table})
+    slope = pulled_back(
+        kernel,
+        "slope_adjoint",
+        {"slope_bar": curvature.outputs[0].values},
+        {TABLE: coefficients.table},
+        "cotangents of the coefficients, from that of p = grad S_h(y)",
+    )
+    return PathAdjoint(recurrences, tuple(coefficients.slots.index(s) for s in used), curvature, slope)

@@ -1,0 +1,275 @@
+"""The transpose of generated steps and runs: against the tangent map, many digits, and differences."""
+
+import ctypes
+from functools import cache
+
+import mpmath
+import numpy as np
+import pytest
+from precise_path import PrecisePathStep
+from support import TARGETS, PreciseStep, RawC, files, precisely, solver
+
+from phigen import SpecError, StepError, compile, spec
+from phigen.compiler import compile_spec, emit
+from phigen.runtime import c_solver
+from phigen.runtime.gradients import segments
+from phigen.scheme.lowering import cost
+from phigen.scheme.steps import Explicit, Newton, Path, Splitting
+from phigen.spec.model import Extras
+
+TOP = """coordinates: [x1, x2, x3]
+parameters: {I1: 1, I2: 2, I3: 3, c: 1.1}
+poisson: {brackets: {x1: {x2: -c*x3, x3: c*x2}, x2: {x3: -c*x1}}}
+hamiltonian: (x1**2/I1 + x2**2/I2 + x3**2/I3)/2
+"""
+SWING = """coordinates: [q, p]
+parameters: {g: 1.5, m: 0.7, w: 1.3}
+poisson: {canonical: {q: [q], p: [p]}}
+hamiltonian: p**2/(2*m) - g*cos(q)
+"""
+DRIVEN = "time: t\n" + SWING.replace("g*cos(q)", "g*cos(q)*(1 + cos(w*t)/5)")
+FALLING = SWING.replace("g: 1.5", "g: {value: 1.5, positive: true}").replace("cos", "exp")
+SHORT = "profile: small\n"
+
+#: Every kind of step, with times, forces and monitors; those that are as fast as can be do blocks of steps.
+KINDS = {
+    "newton": (TOP + "order: 4\ngauge: none\n", Newton),
+    "newton, composed": (TOP + "order: 6\ncomposition: kahan-li\ngauge: none\n" + SHORT, Newton),
+    "newton, gauge": (TOP + "casimirs: {C: x1**2 + x2**2 + x3**2}\n" + SHORT, Newton),
+    "newton, time": (DRIVEN + "order: 4\n", Newton),
+    "newton, force": (TOP + "order: 2\nforces: {covector: {x1: -x2*I1/9}, vector: {x3: -x3*I2/9}}\n" + SHORT, Newton),
+    "newton, monitor": (SWING + "monitor: 1/(1 + g*q**2)\norder: 4\n" + SHORT, Newton),
+    "explicit, time": (DRIVEN + "birealisation: {kind: canonical-euler, side: q}\norder: 1\n" + SHORT, Explicit),
+    "path": (TOP + "birealisation: karasev\ngauge: none\norder: 4\n", Path),
+    "path, time, composed": (DRIVEN + "birealisation: karasev\norder: 4\ncomposition: suzuki\n" + SHORT, Path),
+    "splitting": (TOP + "scheme: splitting\norder: 4\n" + SHORT, Splitting),
+    "kicks, time": (DRIVEN + "scheme: splitting\norder: 4\n" + SHORT, Splitting),
+    "splitting, monitor": (FALLING + "monitor: log\norder: 4\n" + SHORT, Splitting),
+}
+H, STEPS = 0.11, 5
+
+
+@cache
+def compilation(kind):
+    text, step = KINDS[kind]
+    found = compile_spec(
+        spec.loads(f"phigen: 1\nname: t\n{text}"),
+        scheme="splitting" if step is Splitting else None,
+        extras=Extras(tangent=True, adjoint=True),
+    )
+    assert isinstance(found.program.step, step)
+    return found
+
+
+def start(kind):
+    return np.array([0.4, 0.9, 0.3] if compilation(kind).program.dimension == 3 else [0.4, 0.3])
+
+
+def weights(shape):
+    return np.random.default_rng(7).normal(size=shape)
+
+
+def difference(f, width=1e-3):
+    """The derivative at 0, by central differences of order 6."""
+    return sum(w * (f(k * width) - f(-k * width)) for k, w in ((1, 3 / 4), (2, -3 / 20), (3, 1 / 60))) / width
+
+
+def given(made):
+    """The parameters that tests of all kinds use: other than the defaults."""
+    return {name: 1.07 * value for name, value in made.interface.parameters.items()}
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_pullback_is_the_gradient_of_the_run(kind):
+    """All rows have a cotangent; what is held fixed by a gauge is held fixed here too, e of a monitor follows."""
+    made, numpy, x = *(solver(compilation(kind), target) for target in ("c", "numpy")), start(kind)
+    if compilation(kind).program.gauge:
+        gauge = numpy.backend.module.gauge(x, **given(made))
+        made, numpy = (type(s)(s.backend.with_gauge(gauge), s.interface) for s in (made, numpy))
+    parameters, stride = given(made), 2
+    bar = weights((4, len(x)))
+    rows, x0_bar, found = made.pullback(x, H, STEPS, bar, stride, parameters=parameters)
+    trajectory = made.integrate(x, H, STEPS, stride, parameters=parameters)
+    assert rows == pytest.approx(trajectory.x, abs=1e-14)
+
+    def weighed(x, **changed):
+        return np.sum(bar * made.integrate(x, H, STEPS, stride, parameters={**parameters, **changed}).x)
+
+    for j, unit in enumerate(np.eye(len(x))):
+        assert x0_bar[j] == pytest.approx(difference(lambda e, u=unit: weighed(x + e * u)), abs=1e-10)
+    for name, value in parameters.items():
+        slope = difference(lambda e, n=name, v=value: weighed(x, **{n: v + e}))
+        assert found[name] == pytest.approx(slope, abs=3e-10), name
+    again = numpy.pullback(x, H, STEPS, bar, stride, parameters=parameters)
+    assert again.x1 == pytest.approx(rows, abs=1e-14)
+    assert again.x0_bar == pytest.approx(x0_bar, rel=1e-13)
+    assert [again.parameters_bar[name] for name in found] == pytest.approx(list(found.values()), rel=1e-12)
+
+
+@pytest.mark.parametrize("target", TARGETS)
+@pytest.mark.parametrize("kind", [k for k in KINDS if "monitor" not in k])
+def test_pullback_is_the_transpose_of_the_tangent_map(kind, target):
+    made, x = solver(compilation(kind), target), start(kind)
+    bar, product = weights(len(x)), np.eye(len(x))
+    for _, tangent in made.tangents(x, H, STEPS):
+        product = tangent @ product
+    x0_bar = made.pullback(x, H, STEPS, bar).x0_bar
+    assert np.max(np.abs(x0_bar - bar @ product)) <= 3e-15 * np.max(np.abs(x0_bar))
+
+
+@precisely
+def exact_gradient(kind, parameters, x, bar, steps):
+    """Of the product of the last state with ``bar``, along state and parameters, by the scheme in many digits."""
+    step_of = PrecisePathStep if isinstance(compilation(kind).program.step, Path) else PreciseStep
+
+    def end(x, **changed):
+        step, state = step_of(compilation(kind), {**parameters, **changed}, H), [mpmath.mpf(v) for v in x]
+        for _ in range(steps):
+            state = step(state)
+        return mpmath.fdot(bar, state)
+
+    def slope(f):
+        width = mpmath.mpf(10) ** -10
+        return (f(width) - f(-width)) / (2 * width)
+
+    units = np.eye(len(x), dtype=int).tolist()
+    moved = [lambda e, u=u: end([mpmath.mpf(v) + e * k for v, k in zip(x, u, strict=True)]) for u in units]
+    by = {name: slope(lambda e, n=name: end(x, **{n: mpmath.mpf(parameters[n]) + e})) for name in parameters}
+    return [slope(f) for f in moved], by
+
+
+@pytest.mark.parametrize("kind", ["newton", "newton, composed", "path"])
+def test_gradient_agrees_with_many_digits(kind):
+    x, steps = start(kind), 3 if kind == "newton" else 1
+    bar = weights(len(x))
+    made = solver(compilation(kind), "c")
+    parameters = given(made)
+    expected, by = exact_gradient(kind, parameters, x, bar, steps)
+    for target in TARGETS:
+        _, x0_bar, found = solver(compilation(kind), target).pullback(x, H, steps, bar, parameters=parameters)
+        size = max(map(abs, expected))
+        assert max(abs(a - b) for a, b in zip(x0_bar, expected, strict=True)) <= 1e-14 * size
+        assert max(abs(found[name] - by[name]) for name in by) <= 1e-14 * max(map(abs, by.values()))
+
+
+@pytest.mark.parametrize("target", TARGETS)
+def test_long_runs_are_pulled_back_in_segments(target, monkeypatch):
+    made = solver(compilation("newton"), target)
+    x, bar = start("newton"), weights((11, 3))
+    whole = made.pullback(x, H, 150, bar[:6], 30)
+    monkeypatch.setattr(c_solver, "KEPT", 3 * 47)  # 47 steps
+    if target == "numpy":
+        monkeypatch.setattr(made.backend.module, "KEPT", 3 * 3 * 47)
+    for stride in (30, 100):
+        rows = bar[:6] if stride == 30 else bar[:3]
+        part = made.pullback(x, H, 150, rows, stride)
+        assert part.x1[-1] == pytest.approx(whole.x1[-1], abs=1e-12)
+        if stride == 30:
+            assert np.max(np.abs(part.x0_bar - whole.x0_bar)) <= 1e-12 * np.max(np.abs(whole.x0_bar))
+            for name, value in whole.parameters_bar.items():
+                assert part.parameters_bar[name] == pytest.approx(value, rel=1e-11)
+        else:
+            monkeypatch.undo()
+            again = made.pullback(x, H, 150, rows, stride)
+            assert np.max(np.abs(part.x0_bar - again.x0_bar)) <= 1e-12 * np.max(np.abs(again.x0_bar))
+
+
+@pytest.mark.parametrize(("steps", "stride", "most"), [(10, 3, 7), (10, 10, 4), (10, 3, 100), (7, 5, 2), (0, 1, 5)])
+def test_segments_cover_a_run_and_its_rows(steps, stride, most):
+    found = segments(steps, stride, most)
+    assert [k for s in found for k in range(s.first, s.first + s.count)] == list(range(steps))
+    assert [r for s in found for r in s.rows] == list(range(1, 1 + -(-steps // stride)))
+    assert all(s.count <= most and len(s.rows) in (0, -(-s.count // s.stride)) for s in found)
+    for s in found:
+        ends = [min((r) * stride, steps) for r in s.rows]
+        assert ends == [min(s.first + (k + 1) * s.stride, s.first + s.count) for k in range(len(s.rows))]
+
+
+@pytest.mark.parametrize("target", TARGETS)
+def test_members_and_their_parameters_have_cotangents(target):
+    made, x = solver(compilation("newton"), target), start("newton")
+    many, bar = x + 0.1 * weights((3, 3)), weights((3, 3))
+    masses = np.array([1.5, 2.0, 2.5])
+    x1, x0_bar, found = made.pullback(many, H, STEPS, bar, I2=masses, I3=2.0)
+    each = [made.pullback(many[m], H, STEPS, bar[m], I2=masses[m], I3=2.0) for m in range(3)]
+    assert x1 == pytest.approx(np.array([e.x1 for e in each]), abs=1e-15)
+    assert x0_bar == pytest.approx(np.array([e.x0_bar for e in each]), abs=1e-14)
+    assert found["I2"] == pytest.approx(np.array([e.parameters_bar["I2"] for e in each]), abs=1e-14)
+    assert found["I3"] == pytest.approx(sum(e.parameters_bar["I3"] for e in each), abs=1e-14)
+    together = made.pullback(many, H, STEPS, bar, I2=2.0)
+    apart = [made.pullback(many[m], H, STEPS, bar[m], I2=2.0) for m in range(3)]
+    assert together.x0_bar == pytest.approx(np.array([e.x0_bar for e in apart]), abs=1e-14)
+    assert together.parameters_bar["I2"] == pytest.approx(sum(e.parameters_bar["I2"] for e in apart), abs=1e-14)
+
+
+def test_jacobian_has_columns_for_state_and_parameters():
+    made, x = solver(compilation("newton"), "c"), start("newton")
+    x1, by_x0, by = made.jacobian(x, H, I2=1.9)
+    after, tangent = made.step_tangent(x, H, I2=1.9)
+    assert np.array_equal(x1, after)
+    assert np.max(np.abs(by_x0 - tangent)) <= 1e-15
+    assert by["I2"] == pytest.approx(difference(lambda e: made.step(x, H, I2=1.9 + e)), abs=1e-11)
+
+
+@pytest.mark.parametrize("target", TARGETS)
+def test_a_run_of_no_steps_gives_its_cotangent_back(target):
+    made, x = solver(compilation("newton"), target), start("newton")
+    x1, x0_bar, found = made.pullback(x, H, 0, [1, 2, 3])
+    assert (x1.tolist(), x0_bar.tolist(), set(found.values())) == (x.tolist(), [1, 2, 3], {0.0})
+
+
+@pytest.mark.parametrize("kind", ["newton", "path", "splitting"])
+def test_transposed_kernels_are_of_the_size_of_the_kernel(kind):
+    step = compilation(kind).program.step
+    kernels = step.flows if kind == "splitting" else [step.linearise] if kind == "newton" else [step.generate]
+    pairs = zip(kernels, step.adjoint.steps or [step.adjoint.path.slope], strict=True)
+    assert all(cost(back.roots) <= 4 * cost(kernel.roots) for kernel, back in pairs)
+    assert cost(step.adjoint.prepare.roots) <= 4 * cost(step.prepare.roots)
+
+
+@pytest.mark.parametrize("target", TARGETS)
+def test_what_cannot_be_pulled_back_is_told(target):
+    made, x = solver(compilation("newton"), target), start("newton")
+    with pytest.raises(StepError) as failed:
+        made.pullback(1e3 * x, 50.0, 10, x)
+    assert failed.value.step == 0
+    with pytest.raises(StepError) as failed:
+        made.pullback(np.array([x, 1e3 * x]), 0.5, 10, np.array([x, x]))
+    assert failed.value.members == (1,)
+    for shape in ((2,), (3, 3)):
+        with pytest.raises(ValueError, match=r"cotangent must have shape \(3,\)"):
+            made.pullback(x, H, 2, np.ones(shape))
+    with pytest.raises(ValueError, match="finite"):
+        made.pullback(x, H, 2, [1, np.nan, 1])
+    with pytest.raises(ValueError, match="'I2' has 2 values"):
+        made.pullback([x], H, 2, [x], I2=[1, 2])
+    with pytest.raises(TypeError, match="unknown parameter"):
+        made.pullback(x, H, 2, x, I4=1)
+    with pytest.raises(TypeError, match="adjoint=True"):
+        compile("rigid_body", target=target).pullback(x, H, 2, x)
+
+
+def test_c_failure_leaves_state_and_cotangents():
+    raw = RawC(compilation("newton"))
+    raw.init(start("newton"))
+    bar, more, before = np.array([1.0, 2.0, 3.0]), np.full(4, 7.0), bytes(raw.memory)
+    here, into = ctypes.c_void_p(bar.ctypes.data), ctypes.c_void_p(more.ctypes.data)
+    assert raw.call("step_adjoint", ctypes.c_int, raw.here, ctypes.c_double(5e3), here, here, into) != 0
+    assert (bytes(raw.memory), bar.tolist(), more.tolist()) == (before, [1, 2, 3], [7] * 4)
+    assert raw.call("step_adjoint", ctypes.c_int, raw.here, ctypes.c_double(0.1), here, None, into) == 4
+    assert raw.call("step_adjoint", ctypes.c_int, raw.here, ctypes.c_double(0.1), here, here, into) == 0
+    own = bar.copy()
+    raw.init(start("newton"))
+    bar[:] = [1, 2, 3]
+    assert raw.call("step_adjoint", ctypes.c_int, raw.here, ctypes.c_double(0.1), here, here, None) == 0
+    assert np.array_equal(bar, own)
+    assert (more != 7.0).all()
+
+
+def test_adjoint_is_refused_where_it_is_not_offered():
+    with pytest.raises(SpecError, match="not offered in JavaScript"):
+        emit(compilation("newton").program, "js", "phigen build")
+    with pytest.raises(SpecError, match="adjoint is not offered for lattices"):
+        compile("heisenberg", adjoint=True)
+    plain = compile_spec(compilation("newton").spec)
+    assert all("adjoint" not in text for target in TARGETS for text in files(plain, target).values())
