@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import shlex
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
@@ -13,9 +12,6 @@ from phigen.cli.experiment import expect_system, prepared
 from phigen.cli.sources import ORDER, expect_writable, load_one, one_spec, run_option, scheme_option
 from phigen.errors import CheckError
 from phigen.writing import write
-
-if TYPE_CHECKING:
-    from phigen.report.material import Material
 
 
 @click.command("report")
@@ -45,16 +41,22 @@ def command(
     needs no network. Nothing is written if the mathematics of the spec is refuted. Exit code 5 if the solver falls
     short of what it promises: the page says where.
     """
+    from phigen.cli.report_lattice import report_lattice
     from phigen.cli.report_material import gathered
     from phigen.cli.verify import with_tangent
     from phigen.compiler import examine
     from phigen.proofs.examination import refutation
+    from phigen.report.document import document
 
     spec = load_one(spec_file)
     target = output if output and output != "-" else f"{spec.name}.html"
     if output != "-":
         expect_writable(Path(target), "--output")
-    expect_system(spec)
+    if spec.lattice:
+        if lyapunov:
+            expect_system(spec)
+        report_lattice(console, spec, spec_file, output, target, name, order, scheme, quick)
+        return
     experiment = prepared(spec, name) if spec.runs or name or lyapunov else None
     if experiment is None:
         console.warn(f"{spec.file}: the spec has no runs, so the page has no measurements and no figures")
@@ -64,22 +66,28 @@ def command(
     if found.compilation is None:
         raise found.obstacle or AssertionError("an examination without compilation has an obstacle")
     console.note(f"{spec.name}: {len(found.statements)} statements examined, none refuted")
-    given = {"run": name, "order": order, "scheme": scheme}
-    options = [part for key, value in given.items() if value for part in (f"--{key}", str(value))]
-    options += ["--lyapunov"] * lyapunov + ["--quick"] * quick
-    written = shlex.join(["phigen", "report", Path(spec_file).name, *options, "-o", Path(target).name])
+    written = command_of(spec_file, target, name, order, scheme, lyapunov, quick)
     material, failures = gathered(found, found.compilation, experiment, written, lyapunov, quick, console)
-    _write(material, output, target, console)
+    write_page(document(material), bool(material.methods), output, target, console)
     if failures:
         raise failures[0]
 
 
-def _write(material: Material, output: str | None, target: str, console: Console) -> None:
-    from phigen.report.document import document
+def command_of(
+    spec_file: str, target: str, name: str | None, order: int | None, scheme: str | None, lyapunov: bool, quick: bool
+) -> str:
+    """The command that makes the page again."""
+    given = {"run": name, "order": order, "scheme": scheme}
+    options = [part for key, value in given.items() if value for part in (f"--{key}", str(value))]
+    options += ["--lyapunov"] * lyapunov + ["--quick"] * quick
+    return shlex.join(["phigen", "report", Path(spec_file).name, *options, "-o", Path(target).name])
+
+
+def write_page(text: str, figures: bool, output: str | None, target: str, console: Console) -> None:
+    """Write the page, or print it; a note where there ought to be figures, and are none."""
     from phigen.report.drawable import NO_FIGURES, drawable
 
-    text = document(material)
-    if material.methods and not drawable():
+    if figures and not drawable():
         console.warn(NO_FIGURES)
     if output == "-":
         out_document(text)

@@ -25,7 +25,8 @@ def lattice_figure(run: LatticeTrajectory, errors: Mapping[str, Floats], title: 
 
     names = run.coordinates[:MOST_PANELS]
     figure = Figure(figsize=(8.2, 2.2 * len(names) + 2.4), layout="constrained")
-    figure.suptitle(title, fontsize=10)
+    if title:
+        figure.suptitle(title, fontsize=10)
     heights = [2.2] * len(names) + [1.8]
     parts: Any = figure.subfigures(len(heights), 1, height_ratios=heights)
     for part, name in zip(parts, names, strict=False):
@@ -35,6 +36,32 @@ def lattice_figure(run: LatticeTrajectory, errors: Mapping[str, Floats], title: 
         else:
             _draw_snapshots(part, name, run, values)
     _draw_errors(parts[-1].add_subplot(), run, errors)
+    return figure
+
+
+@styled
+def sites_figure(run: LatticeTrajectory, energies: Floats) -> Figure:
+    """The ``energies`` (frames, *sizes) of the sites, and how far the Casimirs of the sites went."""
+    from matplotlib.figure import Figure
+
+    local = {name: values for name, values in run.casimirs.items() if values.ndim > 1}
+    figure = Figure(figsize=(8.2, 2.6 + 2.0 * bool(local)), layout="constrained")
+    heights = [2.4, 2.0] if local else [2.4]
+    parts: Any = figure.subfigures(len(heights), 1, squeeze=False, height_ratios=heights)[:, 0]
+    draw = _draw_diagram if energies.ndim == 2 else _draw_snapshots
+    draw(parts[0], "energy", run, energies)
+    if local:
+        axes = parts[1].add_subplot()
+        for (name, values), colour in zip(local.items(), [*SERIES] * len(local), strict=False):
+            change = np.abs(values - values[0]).reshape(len(run), -1)
+            for said, errors, style in (("farthest", change.max(axis=1), "-"), ("spread", change.std(axis=1), "--")):
+                shown = np.where(errors > 0, errors, np.nan)
+                axes.plot(run.t, shown, style, color=colour, label=f"{name}, {said}", linewidth=1.0)
+        axes.set_yscale("log")
+        axes.set_xlabel("t")
+        axes.set_ylabel("change at the sites")
+        axes.grid(True)
+        axes.legend(loc="lower right", ncols=2)
     return figure
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 from phigen.lattice.cell import GRID, Cell, bond_forces, forces, vector_field
 from phigen.notation import mathml
@@ -74,8 +74,15 @@ def rates(cell: Cell) -> list[tuple[str, Expression]]:
 
 def document(cell: Cell) -> str:
     """The formulas as LaTeX, with all indices: {x_i, y_{i+1}}."""
-    left = [(_bracket(cell, name), e) for name, e in brackets(cell)]
-    blocks = [aligned(_equations(cell, left))] if left else []
+    blocks = [aligned(equations) for _, equations in formulas(cell)]
+    head = f"% {cell.name}, {described(cell)}; needs amsmath"
+    return "\n".join([head, "\\begingroup\\allowdisplaybreaks", *blocks, "\\endgroup"])
+
+
+def formulas(cell: Cell) -> Iterator[tuple[str, list[Equation]]]:
+    """Titles with equations, in MathML with all indices: {x_i, y_{i+1}}."""
+    if left := [(_bracket(cell, name), e) for name, e in brackets(cell)]:
+        yield "Poisson tensor", _equations(cell, left)
     sums = {"sites": cell.axes or ("i",), "bonds": ("a", "b"), "pairs": ("a", "b")}
     each = {"sites": cell.hamiltonian, "bonds": cell.bond_hamiltonian, "pairs": cell.pair_hamiltonian}
     pieces: list[str] = []
@@ -83,16 +90,14 @@ def document(cell: Cell) -> str:
         if not density.is_zero:
             written = mathml.grouped(_indexed(cell, density)) if what == "sites" else mathml.grouped(density)
             pieces.append(("<mo>+</mo>" if pieces else "") + _sum("∑", sums[what], what) + written)
-    blocks.append(aligned([("<mi>H</mi>", pieces or ["<mn>0</mn>"])]))
+    yield "Hamiltonian", [("<mi>H</mi>", pieces or ["<mn>0</mn>"])]
     integrals = [(n, e, kind) for n, (e, kind) in cell.casimirs.items()]
     integrals += [(n, e, "sum") for n, e in cell.invariants.items()]
     if integrals:
-        blocks.append(aligned([_integral(cell, *listed) for listed in integrals]))
+        yield "Casimirs and invariants", [_integral(cell, *listed) for listed in integrals]
     if cell.relation == GRID:
         field = [(mathml.dotted(_site(cell, f, cell.origin)), e) for f, e in vector_field(cell).items()]
-        blocks.append(aligned(_equations(cell, field)))
-    head = f"% {cell.name}, {described(cell)}; needs amsmath"
-    return "\n".join([head, "\\begingroup\\allowdisplaybreaks", *blocks, "\\endgroup"])
+        yield "Equations of motion", _equations(cell, field)
 
 
 def _integral(cell: Cell, name: str, density: Expression, kind: str) -> Equation:

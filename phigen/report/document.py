@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 from markupsafe import Markup
 
+from phigen.compilation import Compilation
 from phigen.notation.mathml import math, name
 from phigen.report import evidence, page
 from phigen.report.drawable import NO_FIGURES, drawable
@@ -24,15 +25,19 @@ SOURCE = 100_000
 def document(material: Material) -> str:
     """The HTML of the page. Everything but measured times depends on its arguments alone."""
     spec = material.compilation.spec
-    title = spec.title or spec.name
-    lead = page.block(
+    return page.page(f"{spec.title or spec.name} – phigen", lead(material.compilation), list(_sections(material)))
+
+
+def lead(compilation: Compilation) -> Markup:
+    """What stands at the top."""
+    spec = compilation.spec
+    return page.block(
         "lead",
-        kind=f"Poisson system {spec.name}, solver of order {material.compilation.order.order} by phigen",
-        title=title,
+        kind=f"Poisson system {spec.name}, solver of order {compilation.order.order} by phigen",
+        title=spec.title or spec.name,
         paragraphs=[p for p in spec.description.split("\n") if p.strip()],
         references=spec.references,
     )
-    return page.page(f"{title} – phigen", lead, list(_sections(material)))
 
 
 def _sections(material: Material) -> Iterator[tuple[str, str, Markup]]:
@@ -48,7 +53,7 @@ def _sections(material: Material) -> Iterator[tuple[str, str, Markup]]:
         yield "run", "A run", page.joined(_run(material))
     if material.study:
         yield "precision", "Precision and time", precision_section(material.study)
-    yield "provenance", "Where this page comes from", page.joined(_provenance(material))
+    yield "provenance", "Where this page comes from", page.joined(provenance(material))
 
 
 def _run(material: Material) -> Iterator[Markup]:
@@ -90,7 +95,8 @@ def _values(values: Mapping[str, float]) -> Markup:
     return Markup(", ").join(written)
 
 
-def _provenance(material: Material) -> Iterator[Markup]:
+def provenance(material: Material) -> Iterator[Markup]:
+    """What the page was made of."""
     spec = material.compilation.spec
     pairs = [
         ("phigen", material.compilation.program.version),

@@ -83,10 +83,11 @@ def measured_section(v: Verification) -> Markup:
     targets = " and ".join(TARGETS[t].title for t in v.targets)
     said = f"Run {v.run}: {v.steps} steps of {v.step:.9g}, generated for {targets}. Solver: {v.label}."
     meanings = dict.fromkeys(meaning_of(check.name) for check in v.checks)
+    title = "What the solver shows" + ", and classical methods beside it" * bool(v.compared)
     rows_explained = page.facts((m.row, page.typeset(_meaning(m))) for m in meanings)
     return page.joined(
-        [page.paragraph(said), page.table("What the solver shows, and classical methods beside it", columns, rows),
-         page.paragraph(page.typeset(stated(v.units)), "note"),
+        [page.paragraph(said), page.table(title, columns, rows),
+         page.paragraph(page.typeset(v.said or stated(v.units)), "note"),
          page.fold("What the rows mean", rows_explained)]
     )  # fmt: skip
 

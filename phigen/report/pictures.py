@@ -34,7 +34,7 @@ def trajectory_picture(compilation: Compilation, trajectory: Trajectory) -> Mark
     caption = f"The trajectory of {names}, from the dot at t = 0 to t = {trajectory.t[-1]:.9g}."
     # Three coordinates are what the viewer shows, but on paper and without scripts.
     instead = "instead" if len(trajectory.coordinates) == 3 else ""
-    return _picture("trajectory", figure, "Trajectory in phase space", caption, caption, instead)
+    return picture("trajectory", figure, "Trajectory in phase space", caption, caption, instead)
 
 
 def error_picture(material: Material) -> Markup:
@@ -49,7 +49,7 @@ def error_picture(material: Material) -> Markup:
         caption += f" {left_out} more Casimirs are in the table above only."
     worst = "; ".join(_described(s) for s in material.summaries)
     figure = figures.error_figure(methods, material.summaries[0].units, balance=material.summaries[0].is_balance)
-    return _picture("errors", figure, "Errors of energy and Casimirs over time", f"Largest errors: {worst}.", caption)
+    return picture("errors", figure, "Errors of energy and Casimirs over time", f"Largest errors: {worst}.", caption)
 
 
 def section_picture(names: Sequence[str], function: str, points: Floats, count: int) -> Markup:
@@ -58,7 +58,7 @@ def section_picture(names: Sequence[str], function: str, points: Floats, count: 
     caption = f"Poincaré section: {count} points where {function} rises through zero"
     caption += f"; {len(shown)} of them are drawn." if len(shown) < count else "."
     figure = figures.section_figure({f"{function} = 0": shown}, names)
-    return _picture("section", figure, "Poincaré section", caption, caption)
+    return picture("section", figure, "Poincaré section", caption, caption)
 
 
 def constancy_picture(found: Constancy) -> Markup:
@@ -67,14 +67,14 @@ def constancy_picture(found: Constancy) -> Markup:
     caption = "Changes of H and of H̃ with one and two corrections, relative to the energy. Thin lines have the slopes "
     caption += "that they should have. The dotted line is one unit in the last place of a double."
     figure, said = figures.constancy_figure(found), f"Largest changes at steps of {found.step:.4g}: {largest}."
-    return _picture("constancy", figure, "Constancy of the modified Hamiltonian", said, caption)
+    return picture("constancy", figure, "Constancy of the modified Hamiltonian", said, caption)
 
 
 def lyapunov_picture(spectrum: Spectrum) -> Markup:
     """How the Lyapunov exponents converged."""
     caption = f"How the Lyapunov exponents converge, up to t = {spectrum.t:.9g}."
     found = ", ".join(page.scientific(v) for v in spectrum.exponents.tolist())
-    return _picture(
+    return picture(
         "lyapunov", figures.lyapunov_figure(spectrum), "Lyapunov exponents", f"At the end: {found}.", caption
     )
 
@@ -83,7 +83,7 @@ def convergence_picture(study: Study) -> Markup:
     """Error against step size."""
     slopes = page.listed({f"{c.label} (order {c.order})": c.slope for c in study.curves})
     caption = f"Error at t = {study.time:.4g} against the step. The thin line has the slope of the stated order."
-    return _picture(
+    return picture(
         "convergence", figures.convergence_figure(study), "Convergence", f"Observed orders: {slopes}.", caption
     )
 
@@ -93,10 +93,11 @@ def work_picture(study: Study) -> Markup:
     figure = figures.work_precision_figure(study)
     words = "; ".join(_fastest(study, tolerance) for tolerance in (1e-3, 1e-6, 1e-9))
     caption = f"Error at t = {study.time:.4g} against the time of the run (measured)."
-    return _picture("work", figure, "Work and precision", f"Seconds needed: {words}.", caption)
+    return picture("work", figure, "Work and precision", f"Seconds needed: {words}.", caption)
 
 
-def _picture(identifier: str, figure: Figure, title: str, description: str, caption: str, instead: str = "") -> Markup:
+def picture(identifier: str, figure: Figure, title: str, description: str, caption: str, instead: str = "") -> Markup:
+    """A figure with its title, a description for those who cannot see it, and a caption."""
     image = inlined(figures.svg(figure), identifier, title, description)
     wide = figure.get_figwidth() > figures.NARROW
     kind = " ".join(filter(None, ["wide" if wide else "", instead]))

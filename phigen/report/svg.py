@@ -71,3 +71,6 @@ def _identified(element: ElementTree.Element, prefix: str) -> None:
         elif name in ("href", _LINK) and value.startswith("#"):
             element.attrib.pop(name)
             element.set("href", f"#{prefix}{value[1:]}")
+        elif name == _LINK:  # of an image, whose data are its address
+            element.attrib.pop(name)
+            element.set("href", value)

@@ -117,13 +117,15 @@ def _conserved(cell: Cell, made: LatticeTrajectory) -> Iterator[Check]:
     yield Check("energy: largest error", float(energy.max()))
     grown = after / before if before > 10 * least else math.nan
     passed = not grown > GROWTH
-    yield Check("energy: last quarter / before", grown, f"≤ {GROWTH:g}", passed, f"grows by a factor of {grown:.1f}")
+    yield Check("energy: last quarter/before", grown, f"≤ {GROWTH:g}", passed, f"grows by a factor of {grown:.1f}")
     for name, (_, kind) in cell.casimirs.items():
         value = float(np.max(np.abs(made.casimirs[name][0])))
         # the worst of many sites; a sum of their logarithms
         limit = {"sites": 8.0, "sum": 1.0, "product": max(1.0, math.sqrt(made.x[0][0].size))}[kind] * least
         error = float(errors[name].max()) / (value if kind == "product" and value else max(1.0, value))
-        yield Check(f"Casimir {name}", error, f"≤ {limit:.0e}", error <= limit, f"changes by {error:.1e}")
+        yield Check(
+            f"Casimir {name}: largest error", error, f"≤ {limit:.0e}", error <= limit, f"changes by {error:.1e}"
+        )
         if kind == "sites":
             spread = float(np.std(made.casimirs[name][-1] - made.casimirs[name][0]))
             yield Check(f"Casimir {name}: spread over the sites", spread)
@@ -147,7 +149,7 @@ def _agreement(subject: _Subject, made: LatticeTrajectory) -> Iterator[Check]:
         for x in (made.x[0], made.x[-1]):
             a, b = (s.step(x, subject.h, parameters=subject.start.arguments) for s in (first[1], solver))
             worst = max(worst, float(np.abs(a - b).max()) / _size(x))
-        name = f"{target} against {first[0]}"
+        name = f"agreement of {target} with {first[0]}"
         yield Check(name, worst, f"≤ {ONE_STEP:.0e}", worst <= ONE_STEP, f"differs by {worst:.1e}")
 
 

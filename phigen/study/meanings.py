@@ -33,6 +33,11 @@ MEANINGS = (
         "or where the first tenth has not seen every coordinate turn back and forth",
     ),
     Meaning(
+        "Casimir: spread over the sites",
+        "of the changes of a Casimir that every site has, from the first frame to the last: their standard deviation",
+    ),
+    Meaning("invariant: largest error", "how far a sum over the sites went, relative to the magnitudes of its terms"),
+    Meaning(
         "energy: largest error",
         "how far H went from its value at the start, relative to that; it depends on the step",
     ),
@@ -45,6 +50,18 @@ MEANINGS = (
         "the same quotient for the energy: about 1 if it oscillates, 10 if it drifts. It is judged if the orbit stays "
         "where it was in the first half",
         "the solver does not follow the flow of any Hamiltonian near H, or the step is so large that H̃ says nothing",
+    ),
+    Meaning(
+        "energy: last quarter/before",
+        "the largest error of the energy in the last quarter of a run of a lattice over that before: about 1 without "
+        "drift; nothing where errors are of rounding",
+        "the solver does not follow the flow of any Hamiltonian near H, or the step is so large that H̃ says nothing",
+    ),
+    Meaning(
+        "Poisson identity",
+        "the largest entry of DΦ π DΦᵀ − π∘Φ over that of π, on a lattice of a few sites that are as some of the "
+        "run; DΦ by differences of order six",
+        "the step is not a Poisson map",
     ),
     Meaning(
         "energy balance: last/first window",
@@ -91,5 +108,6 @@ MEANINGS = (
 def meaning_of(check: str) -> Meaning:
     """The meaning of the check of that name."""
     kind, colon, rest = check.partition(": ")
-    name = f"Casimir: {rest}" if colon and kind.startswith("Casimir ") else check
+    noun = kind.partition(" ")[0]
+    name = f"{noun}: {rest}" if colon and noun in ("Casimir", "invariant") else check
     return next(m for m in MEANINGS if name.startswith(m.row))

@@ -6,6 +6,7 @@ import json
 
 import numpy as np
 import pytest
+from html_check import Page
 
 CHAIN = """phigen: 1
 name: chain
@@ -57,6 +58,24 @@ def test_what_a_lattice_promises_is_measured(phigen, chain):
     assert checks["reversibility"] < 1e-14
 
 
+def test_a_page_shows_the_cell_and_a_run_over_space_and_time(phigen, chain, tmp_path):
+    pytest.importorskip("matplotlib")
+    text = CHAIN.replace("runs:", "targets: [numpy]\ncasimirs: {}\nruns:").replace(
+        "name: chain", "name: chain\ntitle: <b>"
+    )
+    chain.write_text(text, encoding="utf-8")
+    assert phigen("report", chain, "--quick", "-o", tmp_path / "chain.html").exit_code == 0
+    found = Page((tmp_path / "chain.html").read_text(encoding="utf-8"))
+    assert found.errors == []
+    assert [given["id"] for given in found.all("section")] == [
+        "brief", "system", "choices", "proofs", "measured", "run", "provenance",
+    ]  # fmt: skip
+    assert {given["id"] for given in found.all("figure")} == {"figure-fields", "figure-sites"}
+    images = [given["href"] for given in found.all("image")]
+    assert len(images) >= 3
+    assert all(image.startswith("data:image/png;base64,") for image in images)
+
+
 @pytest.mark.parametrize(
     ("wrong", "said"),
     [
@@ -83,7 +102,8 @@ def test_a_lattice_that_falls_short_is_told(phigen, chain, monkeypatch, wrong, s
 
 
 @pytest.mark.parametrize(
-    "command", [["verify", "--plot", "a.svg"], ["tune"], ["report"], ["build", "-t", "js"], ["run", "--lyapunov"]]
+    "command",
+    [["verify", "--plot", "a.svg"], ["tune"], ["report", "--lyapunov"], ["build", "-t", "js"], ["run", "--lyapunov"]],
 )
 def test_what_lattices_do_not_have_is_refused(phigen, chain, tmp_path, command):
     done = phigen(*command, chain, *(["-o", tmp_path] if command[0] == "build" else []))

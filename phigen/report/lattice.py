@@ -1,0 +1,119 @@
+"""The page of a lattice: its cell, what was proved for all sizes, and one run over space and time."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from markupsafe import Markup
+
+from phigen.compilation import Compilation
+from phigen.drawing.lattices import lattice_figure, sites_figure
+from phigen.lattice.cell import Cell
+from phigen.notation import mathml
+from phigen.notation.lattices import described, formulas
+from phigen.proofs.examination import Examination
+from phigen.report import evidence, page
+from phigen.report.document import lead, provenance
+from phigen.report.drawable import NO_FIGURES, drawable
+from phigen.report.material import Material
+from phigen.runtime.lattice import LatticeTrajectory
+from phigen.spec.model import Run
+from phigen.study.verification import Verification
+from phigen.symbolic.arrays import Floats
+
+
+@dataclass(frozen=True)
+class LatticeMaterial:
+    """What the page of a lattice is made of; without a run there is neither a trajectory nor a verification.
+
+    ``errors`` (frames,) are those of what is conserved, by name; ``energies`` (frames, *sizes) those of the sites.
+    ``failure`` says why the run came to no end.
+    """
+
+    examination: Examination
+    compilation: Compilation
+    command: str
+    run: Run | None = None
+    trajectory: LatticeTrajectory | None = None
+    errors: Mapping[str, Floats] = field(default_factory=dict)
+    energies: Floats | None = None
+    verification: Verification | None = None
+    failure: str = ""
+
+
+def lattice_document(material: LatticeMaterial) -> str:
+    """The HTML of the page."""
+    spec = material.compilation.spec
+    return page.page(f"{spec.title or spec.name} – phigen", lead(material.compilation), list(_sections(material)))
+
+
+def _sections(material: LatticeMaterial) -> Iterator[tuple[str, str, Markup]]:
+    compilation, verification = material.compilation, material.verification
+    assert compilation.cell is not None
+    notes = (material.failure,) if material.failure else ()
+    whole = Material(material.examination, compilation, material.command, verification=verification, notes=notes)
+    yield "brief", "In brief", evidence.brief_section(whole)
+    yield "system", "The cell", page.joined(_cell(compilation.cell))
+    yield "choices", "What the compiler chose", page.joined(_method(compilation))
+    yield "proofs", "What was proved", evidence.proofs_section(whole)
+    if verification:
+        yield "measured", "What was measured", evidence.measured_section(verification)
+    if material.trajectory is not None:
+        yield "run", "A run", page.joined(_run(material, material.trajectory))
+    yield "provenance", "Where this page comes from", page.joined(provenance(whole))
+
+
+def _cell(cell: Cell) -> Iterator[Markup]:
+    said = described(cell)
+    yield page.paragraph(f"{said[0].upper()}{said[1:]}. Fields of a site: {', '.join(cell.fields)}.", "note")
+    for title, equations in formulas(cell):
+        yield page.heading(title)
+        yield page.equations(
+            [[mathml.math(f"{left}<mo>=</mo>{first}"), *map(mathml.math, rest)] for left, (first, *rest) in equations]
+        )
+    if cell.parameters:
+        where = {"all": "", "sites": "at every site", "bonds": "at every bond"}
+        rows = [
+            (Markup(mathml.math(mathml.name(p.name))),
+             [("number", "" if p.values else f"{float(p.value):.9g}"), ("", where[p.at]), ("", p.description)])
+            for p in cell.parameters
+        ]  # fmt: skip
+        yield page.table("Parameters", [("", "name"), ("number", "default"), ("", ""), ("", "meaning")], rows)
+
+
+def _method(compilation: Compilation) -> Iterator[Markup]:
+    facts = [fact.partition(": ") for fact in compilation.program.about.facts]
+    yield page.facts((name if colon else "note", page.typeset(text or name)) for name, colon, text in facts)
+    if compilation.sweeps:
+        rows = [(page.typeset(f"H_{k}"), [("", flow.manner)]) for k, flow in enumerate(compilation.sweeps.flows, 1)]
+        yield page.table("The parts of H, and how their flows move a site", [("", "part"), ("", "flow")], rows)
+
+
+def _run(material: LatticeMaterial, made: LatticeTrajectory) -> Iterator[Markup]:
+    run = material.run
+    assert run is not None
+    pairs = [("run", run.name)] + ([("description", run.description)] if run.description else [])
+    pairs.append(("sites", " × ".join(map(str, made.x.shape[2:]))))
+    pairs.append(("steps", f"{made.steps} of {made.h:.9g}, {len(made)} frames to t = {made.t[-1]:.9g}"))
+    yield page.facts(pairs)
+    rows = [(name, [("number", page.scientific(float(e.max())))]) for name, e in material.errors.items()]
+    yield page.table("Largest errors along the run", [("", "quantity"), ("number", "error")], rows)
+    if not drawable():
+        yield page.paragraph(NO_FIGURES, "note")
+        return
+    from phigen.report.pictures import picture
+
+    flat = made.x.ndim == 3
+    caption = "The fields over space, upwards, and time" if flat else "The fields at some times"
+    caption += ", and errors of what is conserved, on a logarithmic scale."
+    worst = ", ".join(f"{name} {page.scientific(float(e.max()))}" for name, e in material.errors.items())
+    title = "The fields over space and time"
+    yield picture("fields", lattice_figure(made, material.errors, ""), title, f"Largest errors: {worst}.", caption)
+    energies = material.energies
+    if energies is not None:
+        mean = float(np.mean(energies[-1]))
+        said = f"Energy per site at the end: {mean:.6g} in the mean, {np.std(energies[-1]):.2g} its spread."
+        caption = f"{said} Below, how far the Casimirs of the sites went: the farthest, and the spread."
+        yield picture("sites", sites_figure(made, energies), "Energies and Casimirs of the sites", said, caption)
