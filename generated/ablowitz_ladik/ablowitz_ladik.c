@@ -20,7 +20,7 @@
  *   3. The lattice
  *   4. The solver
  *   5. What is seen at sites
- * body-sha256: b0acee5657e6727a6141348f9a0b70a11440e755d6d6e7e9ab6e905fbb2b4b95
+ * body-sha256: 20d87a6cf222049572b8af3d487e17410aa645e89debc128289fe4cd5e74b73b
  */
 #include "ablowitz_ladik.h"
 
@@ -508,7 +508,9 @@ static void ablowitz_ladik_sweep(const ablowitz_ladik_solver *s, int part, const
     ablowitz_ladik_sweep_rows(s, part, coef, far, units / threads * own + (own < units % threads ? own
         : units % threads), units / threads * (own + 1) + (own + 1 < units % threads ? own + 1
         : units % threads));
+    if (threads > 1) { /* of one thread, too, a barrier may ask the operating system to wake the others */
 #pragma omp barrier
+    }
 #else
     ablowitz_ladik_sweep_rows(s, part, coef, far, 0, units);
 #endif

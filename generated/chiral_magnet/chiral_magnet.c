@@ -21,7 +21,7 @@
  *   4. The lattice
  *   5. The solver
  *   6. What is seen at sites
- * body-sha256: 1080cae7bcb3905edcaa50a6cc6009ae159f06706f9a682f04f8290ba121fc72
+ * body-sha256: 3dc13f40457345d84f8adcf4a274e11abdd6a65ee8c7123c911cbfd0c7c6b1fc
  */
 #include "chiral_magnet.h"
 
@@ -1127,7 +1127,9 @@ static void chiral_magnet_sweep_flow(const chiral_magnet_solver *s, int part, co
     chiral_magnet_sweep_rows(s, part, coef, far, units / threads * own + (own < units % threads ? own
         : units % threads), units / threads * (own + 1) + (own + 1 < units % threads ? own + 1
         : units % threads));
+    if (threads > 1) { /* of one thread, too, a barrier may ask the operating system to wake the others */
 #pragma omp barrier
+    }
 #else
     chiral_magnet_sweep_rows(s, part, coef, far, 0, units);
 #endif

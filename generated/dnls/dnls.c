@@ -20,7 +20,7 @@
  *   3. The lattice
  *   4. The solver
  *   5. What is seen at sites
- * body-sha256: b87210a509948f824bf60917bb5951c58bb18cb62535a411aa976cfec2c14f7c
+ * body-sha256: da199c49cd692d06cea171ad5f1f3bb613b257819401e1309f2457a0b208010c
  */
 #include "dnls.h"
 
@@ -455,7 +455,9 @@ static void dnls_sweep(const dnls_solver *s, int part, const double *coef, int f
     dnls_sweep_rows(s, part, coef, far, units / threads * own + (own < units % threads ? own
         : units % threads), units / threads * (own + 1) + (own + 1 < units % threads ? own + 1
         : units % threads));
+    if (threads > 1) { /* of one thread, too, a barrier may ask the operating system to wake the others */
 #pragma omp barrier
+    }
 #else
     dnls_sweep_rows(s, part, coef, far, 0, units);
 #endif

@@ -20,7 +20,7 @@
  *   3. The lattice
  *   4. The solver
  *   5. What is seen at sites
- * body-sha256: a733527721d0d36d3683830b3214eb33e7175d6a0074e7ab9524622b0844e701
+ * body-sha256: ac87d4fa6600eaf63f21f027f8dca853decb795cdab6b3516cc6fa2d6f710194
  */
 #include "dnls_disorder.h"
 
@@ -524,7 +524,9 @@ static void dnls_disorder_sweep(const dnls_disorder_solver *s, int part, const d
     dnls_disorder_sweep_rows(s, part, coef, far, units / threads * own + (own < units % threads ? own
         : units % threads), units / threads * (own + 1) + (own + 1 < units % threads ? own + 1
         : units % threads));
+    if (threads > 1) { /* of one thread, too, a barrier may ask the operating system to wake the others */
 #pragma omp barrier
+    }
 #else
     dnls_disorder_sweep_rows(s, part, coef, far, 0, units);
 #endif

@@ -21,7 +21,7 @@
  *   4. The lattice
  *   5. The solver
  *   6. What is seen at sites
- * body-sha256: ffbd36190b2f74a3288bd18f63c62ae453a3a3098a67d684f592c5f7d420cceb
+ * body-sha256: 843ba9a75699a78ac7a8667f8ecc13a70bbf3933d46b9e42063f32d442fcec7c
  */
 #include "food_web.h"
 
@@ -648,7 +648,9 @@ static void food_web_sweep_flow(const food_web_solver *s, int part, const double
     food_web_sweep_rows(s, part, coef, far, units / threads * own + (own < units % threads ? own
         : units % threads), units / threads * (own + 1) + (own + 1 < units % threads ? own + 1
         : units % threads));
+    if (threads > 1) { /* of one thread, too, a barrier may ask the operating system to wake the others */
 #pragma omp barrier
+    }
 #else
     food_web_sweep_rows(s, part, coef, far, 0, units);
 #endif

@@ -20,7 +20,7 @@
  *   3. The lattice
  *   4. The solver
  *   5. What is seen at sites
- * body-sha256: a4c7f1695a585a87fb6e4b2095e2229725cf132f9aede1dc70fb0f23df526d7b
+ * body-sha256: 160aba01b91eb536fb8fa83cb4f3160b86bb548538ad83112ab25b1c188d9d8d
  */
 #include "fput.h"
 
@@ -400,7 +400,9 @@ static void fput_sweep(const fput_solver *s, int part, const double *coef, int f
     fput_sweep_rows(s, part, coef, far, units / threads * own + (own < units % threads ? own
         : units % threads), units / threads * (own + 1) + (own + 1 < units % threads ? own + 1
         : units % threads));
+    if (threads > 1) { /* of one thread, too, a barrier may ask the operating system to wake the others */
 #pragma omp barrier
+    }
 #else
     fput_sweep_rows(s, part, coef, far, 0, units);
 #endif

@@ -20,7 +20,7 @@
  *   3. The lattice
  *   4. The solver
  *   5. What is seen at sites
- * body-sha256: 796cb1048558545de79b10a2de431693eb734867d3b8f4245502cca8edeccbfc
+ * body-sha256: ed824c9162f6d51c2f4d9ac73aec6b8743281a86101cb5d74a54021d54b8f03b
  */
 #include "heisenberg.h"
 
@@ -660,7 +660,9 @@ static void heisenberg_sweep(const heisenberg_solver *s, int part, const double 
     heisenberg_sweep_rows(s, part, coef, far, units / threads * own + (own < units % threads ? own
         : units % threads), units / threads * (own + 1) + (own + 1 < units % threads ? own + 1
         : units % threads));
+    if (threads > 1) { /* of one thread, too, a barrier may ask the operating system to wake the others */
 #pragma omp barrier
+    }
 #else
     heisenberg_sweep_rows(s, part, coef, far, 0, units);
 #endif

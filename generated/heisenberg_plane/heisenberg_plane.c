@@ -20,7 +20,7 @@
  *   3. The lattice
  *   4. The solver
  *   5. What is seen at sites
- * body-sha256: 40792239a4b9da88ae4845c08a17ad8709998bb095bda6a11c4f07c5c0138ff3
+ * body-sha256: 442c137f42ce90226ec7019e678de3434716064bbcafdacec7937d2546a8648e
  */
 #include "heisenberg_plane.h"
 
@@ -552,7 +552,9 @@ static void heisenberg_plane_sweep(const heisenberg_plane_solver *s, int part, c
     heisenberg_plane_sweep_rows(s, part, coef, far, units / threads * own + (own < units % threads ? own
         : units % threads), units / threads * (own + 1) + (own + 1 < units % threads ? own + 1
         : units % threads));
+    if (threads > 1) { /* of one thread, too, a barrier may ask the operating system to wake the others */
 #pragma omp barrier
+    }
 #else
     heisenberg_plane_sweep_rows(s, part, coef, far, 0, units);
 #endif

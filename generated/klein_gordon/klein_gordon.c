@@ -20,7 +20,7 @@
  *   3. The lattice
  *   4. The solver
  *   5. What is seen at sites
- * body-sha256: e25dd33df82e9025874f08232a2950c712fd296161c27a1729fa14374cb46f44
+ * body-sha256: f5c0a72786e2bf559e9799c3ea2ae58ddc76a0b30f900ffc22548120b3b71aff
  */
 #include "klein_gordon.h"
 
@@ -402,7 +402,9 @@ static void klein_gordon_sweep(const klein_gordon_solver *s, int part, const dou
     klein_gordon_sweep_rows(s, part, coef, far, units / threads * own + (own < units % threads ? own
         : units % threads), units / threads * (own + 1) + (own + 1 < units % threads ? own + 1
         : units % threads));
+    if (threads > 1) { /* of one thread, too, a barrier may ask the operating system to wake the others */
 #pragma omp barrier
+    }
 #else
     klein_gordon_sweep_rows(s, part, coef, far, 0, units);
 #endif

@@ -20,7 +20,7 @@
  *   3. The lattice
  *   4. The solver
  *   5. What is seen at sites
- * body-sha256: 4da6bde8cae7ed5500806f897284ad7a01b62e193c3c61fad96e95217426151c
+ * body-sha256: 713a66ff8d6f9a1cf20ef8677ad40aa338dfe36bc84f87b5acd4779a015b9cba
  */
 #include "nonlinear_wave.h"
 
@@ -411,7 +411,9 @@ static void nonlinear_wave_sweep(const nonlinear_wave_solver *s, int part, const
     nonlinear_wave_sweep_rows(s, part, coef, far, units / threads * own + (own < units % threads ? own
         : units % threads), units / threads * (own + 1) + (own + 1 < units % threads ? own + 1
         : units % threads));
+    if (threads > 1) { /* of one thread, too, a barrier may ask the operating system to wake the others */
 #pragma omp barrier
+    }
 #else
     nonlinear_wave_sweep_rows(s, part, coef, far, 0, units);
 #endif

@@ -20,7 +20,7 @@
  *   3. The lattice
  *   4. The solver
  *   5. What is seen at sites
- * body-sha256: b164ab2847403e0df6cf4b309d9b42f1930fc35eb464cb0e95d2b28d0bb87616
+ * body-sha256: 1d6eaa9b2fec140338d4b47f5c26ed35abc974bc99c3997e3c63398268120e5d
  */
 #include "outer_planets.h"
 
@@ -533,7 +533,9 @@ static void outer_planets_sweep(const outer_planets_solver *s, int part, const d
     outer_planets_sweep_rows(s, part, coef, far, units / threads * own + (own < units % threads ? own
         : units % threads), units / threads * (own + 1) + (own + 1 < units % threads ? own + 1
         : units % threads));
+    if (threads > 1) { /* of one thread, too, a barrier may ask the operating system to wake the others */
 #pragma omp barrier
+    }
 #else
     outer_planets_sweep_rows(s, part, coef, far, 0, units);
 #endif

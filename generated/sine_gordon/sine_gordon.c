@@ -20,7 +20,7 @@
  *   3. The lattice
  *   4. The solver
  *   5. What is seen at sites
- * body-sha256: b2b53d607a73da8e1113d3c6112cb00e5251982fcd9e5f4d433b7d93f5ed802d
+ * body-sha256: 7d7938f960aa92568a32f39f04779be8b69c3ba04debd116984d0f4daa86cddb
  */
 #include "sine_gordon.h"
 
@@ -437,7 +437,9 @@ static void sine_gordon_sweep(const sine_gordon_solver *s, int part, const doubl
     sine_gordon_sweep_rows(s, part, coef, far, units / threads * own + (own < units % threads ? own
         : units % threads), units / threads * (own + 1) + (own + 1 < units % threads ? own + 1
         : units % threads));
+    if (threads > 1) { /* of one thread, too, a barrier may ask the operating system to wake the others */
 #pragma omp barrier
+    }
 #else
     sine_gordon_sweep_rows(s, part, coef, far, 0, units);
 #endif

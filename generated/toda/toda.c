@@ -20,7 +20,7 @@
  *   3. The lattice
  *   4. The solver
  *   5. What is seen at sites
- * body-sha256: ab507fc333722f4a0431a3c8ad1703e36460e41157650c41ddc57bd7097a0a22
+ * body-sha256: 2ba339047a7f320384125c4539fbc214f090ed3c4e76393dc6fc03d9493783ba
  */
 #include "toda.h"
 
@@ -423,7 +423,9 @@ static void toda_sweep(const toda_solver *s, int part, const double *coef, int f
     toda_sweep_rows(s, part, coef, far, units / threads * own + (own < units % threads ? own
         : units % threads), units / threads * (own + 1) + (own + 1 < units % threads ? own + 1
         : units % threads));
+    if (threads > 1) { /* of one thread, too, a barrier may ask the operating system to wake the others */
 #pragma omp barrier
+    }
 #else
     toda_sweep_rows(s, part, coef, far, 0, units);
 #endif

@@ -20,7 +20,7 @@
  *   3. The lattice
  *   4. The solver
  *   5. What is seen at sites
- * body-sha256: 8c34e16a467a05ab3b1df6da185684f6d20c863b00f66c981539e44793bf0657
+ * body-sha256: 323fc5c5e65a23320f77d715fea778dff15b8a5b56d2e879253c4edd21c956a9
  */
 #include "volterra.h"
 
@@ -438,7 +438,9 @@ static void volterra_sweep(const volterra_solver *s, int part, const double *coe
     volterra_sweep_rows(s, part, coef, far, units / threads * own + (own < units % threads ? own
         : units % threads), units / threads * (own + 1) + (own + 1 < units % threads ? own + 1
         : units % threads));
+    if (threads > 1) { /* of one thread, too, a barrier may ask the operating system to wake the others */
 #pragma omp barrier
+    }
 #else
     volterra_sweep_rows(s, part, coef, far, 0, units);
 #endif

@@ -20,7 +20,7 @@
  *   3. The lattice
  *   4. The solver
  *   5. What is seen at sites
- * body-sha256: 050787d018a39612a5d1e3a08be2b683be88b33a7ecbaadd098ff575073503ad
+ * body-sha256: 0e4ceef56904b70b44e455f19af52211b1683f11e7e2b2365d0ddc58a3abfbde
  */
 #include "xxz_disorder.h"
 
@@ -520,7 +520,9 @@ static void xxz_disorder_sweep(const xxz_disorder_solver *s, int part, const dou
     xxz_disorder_sweep_rows(s, part, coef, far, units / threads * own + (own < units % threads ? own
         : units % threads), units / threads * (own + 1) + (own + 1 < units % threads ? own + 1
         : units % threads));
+    if (threads > 1) { /* of one thread, too, a barrier may ask the operating system to wake the others */
 #pragma omp barrier
+    }
 #else
     xxz_disorder_sweep_rows(s, part, coef, far, 0, units);
 #endif

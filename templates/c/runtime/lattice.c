@@ -206,7 +206,9 @@ static void phi_sweep(const phi_solver *s, int part, const double *coef, int far
     const size_t threads = (size_t)omp_get_num_threads(), own = (size_t)omp_get_thread_num();
     phi_sweep_rows(s, part, coef, far, units / threads * own + (own < units % threads ? own : units % threads),
         units / threads * (own + 1) + (own + 1 < units % threads ? own + 1 : units % threads));
+    if (threads > 1) { /* of one thread, too, a barrier may ask the operating system to wake the others */
 #pragma omp barrier
+    }
 #else
     phi_sweep_rows(s, part, coef, far, 0, units);
 #endif
