@@ -8,14 +8,14 @@ import time
 from dataclasses import asdict
 from pathlib import Path
 
-from benchmarks import plots, studies, tables
+from benchmarks import lattices, plots, studies, tables
 from benchmarks.problems import PROBLEMS
 
 ROOT = Path(__file__).resolve().parent.parent
 DOCUMENT = ROOT / "docs" / "benchmarks.md"
 FIGURES = DOCUMENT.parent / "figures"
 BEGIN, END = "<!-- results: begin -->", "<!-- results: end -->"
-QUESTIONS = ("work", "steps", "ensembles", "growth", "build")
+QUESTIONS = ("work", "steps", "ensembles", "growth", "build", "lattices")
 
 
 def main() -> None:
@@ -58,6 +58,11 @@ def main() -> None:
             rows = study()
             data[name] = rows
             parts.append(f"## {title}\n\n" + getattr(tables, "build_times" if name == "build" else name)(rows))
+    if "lattices" in options.only:
+        say("lattices")
+        measured = {"kernels": lattices.kernels(options.quick), "rings": lattices.rings(options.quick)}
+        data["lattices"] = measured
+        parts.append(f"## Lattices\n\n{lattices.shown(measured)}")
     text = "\n".join(parts)
     options.output.mkdir(parents=True, exist_ok=True)
     (options.output / "results.md").write_text(text, encoding="utf-8")

@@ -89,7 +89,7 @@ def build_phigen(text: str) -> Built:
         '#include "common.h"\n#pragma GCC visibility push(hidden)\n#include "bench.h"\n#pragma GCC visibility pop\n'
         '#include "run_phigen.h"\n'
     )
-    library = cache.load({"main.c": main, "bench.h": source, **_texts("common.h", "run_phigen.h")})
+    library = cache.load({"main.c": main, "bench.h": source, **texts("common.h", "run_phigen.h")})
     summary = "; ".join(line[2:].strip() for line in source.splitlines()[3:8] if ":" in line)
     return Built(library, middle - start, time.perf_counter() - middle, summary)
 
@@ -120,13 +120,13 @@ def peer_names(problem: Problem) -> dict[str, tuple[str, int]]:
 
 def c_peers(problem: Problem) -> list[Method]:
     names = peer_names(problem)
-    library = cache.load({"main.c": _peer_source(problem, list(names)), **_texts()})
+    library = cache.load({"main.c": _peer_source(problem, list(names)), **texts()})
     return [Method(title, _runner(library, i), order) for i, (title, order) in enumerate(names.values())]
 
 
 def reference(problem: Problem, horizon: float, chunks: int) -> tuple[np.ndarray, float]:
     """States at the ends of the chunks by Gauss' method of order 16 in long double, and their uncertainty."""
-    library = cache.load({"main.c": _reference_source(problem), **_texts()})
+    library = cache.load({"main.c": _reference_source(problem), **texts()})
     run = _runner(library, 0)
     chunk = math.ceil(horizon / chunks / problem.typical)
     coarse, fine = (
@@ -143,11 +143,11 @@ def vector_rk4(problem: Problem, width: int = 8) -> ctypes.CDLL:
             f"typedef double lanes __attribute__((vector_size({8 * width})));\n#define REAL lanes",
             '#include "common.h"',
             _field_source(problem, jacobian=False),
-            _tables(("rk4", "dop853")),
+            tables(("rk4", "dop853")),
             '#include "runge_kutta.h"\n#include "run_ensemble.h"\n',
         ]
     )
-    return cache.load({"main.c": main, **_texts()})
+    return cache.load({"main.c": main, **texts()})
 
 
 def _peer_source(problem: Problem, names: Sequence[str]) -> str:
@@ -155,8 +155,8 @@ def _peer_source(problem: Problem, names: Sequence[str]) -> str:
         "#define _POSIX_C_SOURCE 199309L\n#define ROUNDING 1.5e-16",
         '#include "common.h"',
         _field_source(problem, jacobian=problem.quadratic),
-        _tables(("rk4", "dop853", "gauss1", "gauss3")),
-        _array("kahan_li8", KAHAN_LI),
+        tables(("rk4", "dop853", "gauss1", "gauss3")),
+        array("kahan_li8", KAHAN_LI),
         '#include "runge_kutta.h"\n#include "gauss.h"\n#include "compose.h"\nGAUSS(gauss1, 1)\nGAUSS(gauss3, 3)',
     ]
     if problem.quadratic:
@@ -177,7 +177,7 @@ def _reference_source(problem: Problem) -> str:
             "#define _POSIX_C_SOURCE 199309L\n#include <tgmath.h>\n#define REAL long double\n#define ROUNDING 1e-19L",
             '#include "common.h"',
             _field_source(problem, jacobian=False),
-            _tables(("gauss8",)),
+            tables(("gauss8",)),
             '#include "gauss.h"\nGAUSS(gauss8, 8)',
             "static void (*const methods[])(real *, double, long) = { gauss8 };",
             '#include "run_peers.h"\n',
@@ -205,13 +205,13 @@ def _assignments(expressions: Sequence[sympy.Expr], targets: Sequence[str]) -> l
     return [*code, *(f"    {t} = {sympy.ccode(e) if e != 0 else zero};" for t, e in zip(targets, left, strict=True))]
 
 
-def _tables(names: Sequence[str]) -> str:
+def tables(names: Sequence[str]) -> str:
     tables = {"rk4": _rk4, "dop853": _dop853}
     lines = ["#define MOST_STAGES 16"]
     for name in names:
         if name in tables:
             a, b = tables[name]()
-            lines += [_array(f"{name}_a", a.ravel()), _array(f"{name}_b", b)]
+            lines += [array(f"{name}_a", a.ravel()), array(f"{name}_b", b)]
         else:
             for part, values in _gauss(int(name.removeprefix("gauss"))).items():
                 lines.append(f"static const real {name}_{part}[] = {{ {', '.join(values)} }};")
@@ -253,11 +253,11 @@ def _gauss(stages: int) -> dict[str, list[str]]:
         return {name: [mpmath.nstr(v, 25, strip_zeros=False) + "L" for v in part] for name, part in parts.items()}
 
 
-def _array(name: str, values: Sequence[float] | np.ndarray) -> str:
+def array(name: str, values: Sequence[float] | np.ndarray) -> str:
     return f"static const double {name}[] = {{ {', '.join(repr(float(v)) for v in values)} }};"
 
 
-def _texts(*names: str) -> dict[str, str]:
+def texts(*names: str) -> dict[str, str]:
     files = [C_FILES / n for n in names] or sorted(C_FILES.glob("*.h"))
     return {f.name: f.read_text(encoding="utf-8") for f in files}
 

@@ -9,7 +9,7 @@ from systems import slow_but
 
 pytest.importorskip("scipy")
 
-from benchmarks import tables
+from benchmarks import lattices, tables
 from benchmarks.measure import Cell, Judge, Study, run
 from benchmarks.problems import PROBLEMS
 from benchmarks.solvers import Method, build_phigen, c_peers, phigen_method, reference
@@ -59,3 +59,19 @@ def test_a_tiny_case_runs_through_to_its_table():
     text = tables.work_precision(Study("P1", BODY.title, 100.0, [c.result for c in cells], cells, []))
     assert "best peer / phigen" in text
     assert build_phigen(BODY.spec(4)).generating > 0
+
+
+def test_kernels_of_lattices_by_hand_make_the_steps_of_the_generated_ones():
+    """Another order of the parts, a wrong sign or angle: the comparison would mean nothing."""
+    for sites, size in ((lattices.XXZ, 16), (lattices.CUBE, 4)):
+        by_hand = lattices.Kernel(sites, size, True).method(0)
+        lattices.expect_same(lattices.ours(sites.solver(2)), by_hand, sites.start(size))
+
+
+@pytest.mark.parametrize("sites", [lattices.XXZ, lattices.FPUT, lattices.DNLS], ids=lambda s: s.name)
+def test_peers_of_lattices_have_their_orders(sites):
+    x, kernel = sites.start(16), lattices.Kernel(sites, 16, False)
+    exact = lattices.ours(sites.solver(8))(x, 0.01, 100)[0]
+    for index, order, h in ((0, 4, 0.05), (1, 8, 0.25)):
+        coarse, fine = (np.abs(kernel.method(index)(x, h / k, round(k / h))[0] - exact).max() for k in (1, 2))
+        assert math.log2(coarse / fine) > order - 0.7
