@@ -1,4 +1,4 @@
-"""Compiling: phigen's solvers and the C peers become shared libraries with one function `bench_run` each."""
+"""Compiling: phigen's solvers and the C peers become shared libraries with one function `measure_run` each."""
 
 from __future__ import annotations
 
@@ -263,7 +263,7 @@ def texts(*names: str) -> dict[str, str]:
 
 
 def _runner(library: ctypes.CDLL, index: int) -> Runner:
-    function = library.bench_run
+    function = library.measure_run
     function.restype = ctypes.c_int
     double, pointer, long = ctypes.c_double, ctypes.c_void_p, ctypes.c_long
     function.argtypes = (ctypes.c_int, pointer, double, long, long, double, pointer, pointer, pointer)

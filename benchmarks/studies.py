@@ -148,7 +148,7 @@ def ensembles(effort: Effort) -> list[dict[str, Any]]:
         for name, (library, steps) in libraries.items():
             for h in steps:
                 x, seconds = x0.copy(), np.zeros(1)
-                function = library.bench_many
+                function = library.measure_many
                 function.argtypes = (ctypes.c_void_p, ctypes.c_long, ctypes.c_double, ctypes.c_long, ctypes.c_void_p)
                 status = function(x.ctypes.data, members, h, round(horizon / h), seconds.ctypes.data)
                 row = rows.setdefault((name, h), {"method": name, "h": h, "status": status, "times": []})

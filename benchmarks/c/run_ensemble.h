@@ -1,5 +1,5 @@
 /* Members side by side in vectors of WIDTH: x[i * members + m]; members is a multiple of WIDTH. */
-int bench_many(double *x, long members, double h, long steps, double *seconds)
+int measure_many(double *x, long members, double h, long steps, double *seconds)
 {
     const double began = cpu_time();
     for (long m = 0; m < members; m += WIDTH) {

@@ -1,6 +1,6 @@
 /* Integrate by one of `methods`: chunks times chunk steps, the state after each chunk to out. Gives up after `limit`
    seconds. `seconds` is the CPU time; a solver's start-up is part of it. */
-int bench_run(int method, const double *start, double h, long chunk, long chunks, double limit, double *out,
+int measure_run(int method, const double *start, double h, long chunk, long chunks, double limit, double *out,
               double *seconds, double *evaluations)
 {
     real x[DIM];

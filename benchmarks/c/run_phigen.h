@@ -1,5 +1,5 @@
 /* The same for phigen's solver, named `bench`. */
-int bench_run(int method, const double *start, double h, long chunk, long chunks, double limit, double *out,
+int measure_run(int method, const double *start, double h, long chunk, long chunks, double limit, double *out,
               double *seconds, double *evaluations)
 {
     static bench_solver solver;
@@ -17,7 +17,7 @@ int bench_run(int method, const double *start, double h, long chunk, long chunks
 }
 
 /* The ensemble function of the solver, timed. */
-int bench_many(double *x, long members, double h, long steps, double *seconds)
+int measure_many(double *x, long members, double h, long steps, double *seconds)
 {
     const double began = cpu_time();
     const int status = bench_ensemble(NULL, x, (size_t)members, h, (size_t)steps, NULL);
