@@ -8,6 +8,7 @@ from typing import Any
 
 from phigen.geometry.system import System, system_of_lattice
 from phigen.lattice.cell import Cell
+from phigen.lattice.series import SeriesPlan
 from phigen.lattice.sweeps import LatticePlan
 from phigen.realisations.protocol import BiRealisation
 from phigen.scheme.discretisation import Discretisation
@@ -65,7 +66,11 @@ class Compilation:
     @property
     def label(self) -> str:
         """The kind of the method, for every place that names it to the user."""
-        return self.realisation.label if self.realisation else "splitting of a lattice" if self.cell else "splitting"
+        if self.realisation:
+            return self.realisation.label
+        if isinstance(self.sweeps, SeriesPlan):
+            return f"{self.sweeps.realisation.kind}, on a lattice"
+        return "splitting of a lattice" if self.cell else "splitting"
 
     @property
     def exact(self) -> bool:

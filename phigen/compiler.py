@@ -235,7 +235,7 @@ def _swept(
     """Compile a lattice, of any sizes, to sweeps over its sites."""
     asked: dict[str, Any] = {"scheme": scheme or spec.scheme, "composition": spec.composition}
     asked |= {"order": order or spec.wanted_order, "extras": extras}
-    plan = clock.timed("splitting", lambda: plan_sweeps(cell, spec=spec, **asked))
+    plan = clock.timed("plan", lambda: plan_sweeps(cell, spec=spec, **asked))
     described: dict[str, Any] = {
         "title": spec.title,
         "licence": spec.license,
@@ -246,7 +246,7 @@ def _swept(
     }
     program = clock.timed("program", lambda: build_sweeps(cell, plan, **described))
     nothing: Any = NoSystem(spec)
-    return Compilation(spec, nothing, None, plan.choice.order, program, seconds=clock.seconds, cell=cell, sweeps=plan)
+    return Compilation(spec, nothing, None, plan.order, program, seconds=clock.seconds, cell=cell, sweeps=plan)
 
 
 @contextmanager

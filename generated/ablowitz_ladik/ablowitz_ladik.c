@@ -19,8 +19,9 @@
  *   2. Rows of sites
  *   3. The lattice
  *   4. The solver
- *   5. What is seen at sites
- * body-sha256: 20d87a6cf222049572b8af3d487e17410aa645e89debc128289fe4cd5e74b73b
+ *   5. The flows
+ *   6. What is seen at sites
+ * body-sha256: ef30aab01ddc2878f18075ef8c6ce4a2b3dc4cb211063f2b23a87d3c9f6c4eb5
  */
 #include "ablowitz_ladik.h"
 
@@ -32,13 +33,13 @@
 /* ---- The model ---- */
 const ablowitz_ladik_params ablowitz_ladik_default_params = { 0 };
 
-enum { ablowitz_ladik_HALO = 1 };   /* sites that are copied beside a row */
-enum { ablowitz_ladik_LINES = 1 };  /* rows that kernels read: the row itself and those beside it */
-enum { ablowitz_ladik_ROW = 4 };    /* coefficients of one flow */
-enum { ablowitz_ladik_FLOWS = 25 }; /* in a step */
+enum { ablowitz_ladik_HALO = 1 };           /* sites that are copied beside a row */
+enum { ablowitz_ladik_LINES = 1 };          /* rows that kernels read: the row itself and those beside it */
+enum { ablowitz_ladik_ROW = 4 };            /* coefficients of one flow */
+enum { ablowitz_ladik_ROWS_OF_FLOWS = 26 }; /* rows of coefficients */
+enum { ablowitz_ladik_FLOWS = 25 };         /* in a step */
 /* the row of the last flow of a step and the first of the next together */
 enum { ablowitz_ladik_JOINED = 25 };
-enum { ablowitz_ladik_ROWS_OF_FLOWS = 26 }; /* rows of coefficients */
 
 /* Along each axis: the smallest size, what sizes are multiples of, whether the ends are open. */
 static const size_t ablowitz_ladik_least[ablowitz_ladik_AXES] = { 2 };
@@ -236,7 +237,7 @@ static inline void ablowitz_ladik_sweep1(const double *coef, const ablowitz_ladi
     }
 }
 
-/* The flow of H_1 for the pieces of rows from first on, before end. */
+/* The flow of H_1, for the pieces of rows from first on, before end. */
 static void ablowitz_ladik_part1(
     const ablowitz_ladik_solver *s, const double *coef, int far, size_t first, size_t end)
 {
@@ -265,7 +266,7 @@ static inline void ablowitz_ladik_sweep2(const double *coef, const ablowitz_ladi
     }
 }
 
-/* The flow of H_2 for the pieces of rows from first on, before end. */
+/* The flow of H_2, for the pieces of rows from first on, before end. */
 static void ablowitz_ladik_part2(
     const ablowitz_ladik_solver *s, const double *coef, int far, size_t first, size_t end)
 {
@@ -298,7 +299,7 @@ static inline void ablowitz_ladik_sweep3(const double *coef, const ablowitz_ladi
     }
 }
 
-/* The flow of H_3 for the pieces of rows from first on, before end. */
+/* The flow of H_3, for the pieces of rows from first on, before end. */
 static void ablowitz_ladik_part3(
     const ablowitz_ladik_solver *s, const double *coef, int far, size_t first, size_t end)
 {
@@ -499,6 +500,24 @@ static ablowitz_ladik_status ablowitz_ladik_set_step(ablowitz_ladik_solver *s, d
     return ablowitz_ladik_OK;
 }
 
+/* Whether all values at sites are finite. */
+static int ablowitz_ladik_holds(const ablowitz_ladik_solver *s)
+{
+    for (size_t k = 0; k < ablowitz_ladik_DIM; ++k)
+        for (size_t r = 0; r < s->rows; ++r)
+            if (!ablowitz_ladik_finite(s->x[k] + (ptrdiff_t)r * s->width, (size_t)s->length)) return 0;
+    return 1;
+}
+
+static void ablowitz_ladik_copy(double *const to[ablowitz_ladik_DIM], double *const from[ablowitz_ladik_DIM],
+    const ablowitz_ladik_solver *s)
+{
+    const size_t block = s->rows * (size_t)s->width * sizeof **from;
+    for (size_t k = 0; k < ablowitz_ladik_DIM; ++k)
+        memcpy(to[k] - ablowitz_ladik_LEAD, from[k] - ablowitz_ladik_LEAD, block);
+}
+
+/* ---- The flows ---- */
 /* One part of H. */
 static void ablowitz_ladik_sweep(const ablowitz_ladik_solver *s, int part, const double *coef, int far)
 {
@@ -539,31 +558,14 @@ static void ablowitz_ladik_steps(const ablowitz_ladik_solver *s, int steps, int 
     }
 }
 
-/* Whether all values at sites are finite. */
-static int ablowitz_ladik_holds(const ablowitz_ladik_solver *s)
-{
-    for (size_t k = 0; k < ablowitz_ladik_DIM; ++k)
-        for (size_t r = 0; r < s->rows; ++r)
-            if (!ablowitz_ladik_finite(s->x[k] + (ptrdiff_t)r * s->width, (size_t)s->length)) return 0;
-    return 1;
-}
-
-static void ablowitz_ladik_copy(double *const to[ablowitz_ladik_DIM], double *const from[ablowitz_ladik_DIM],
-    const ablowitz_ladik_solver *s)
-{
-    const size_t block = s->rows * (size_t)s->width * sizeof **from;
-    for (size_t k = 0; k < ablowitz_ladik_DIM; ++k)
-        memcpy(to[k] - ablowitz_ladik_LEAD, from[k] - ablowitz_ladik_LEAD, block);
-}
-
 /* Some steps; if they lead to what is not finite, none. */
-static int ablowitz_ladik_try(ablowitz_ladik_solver *s, int steps)
+static ablowitz_ladik_status ablowitz_ladik_try(ablowitz_ladik_solver *s, int steps)
 {
     ablowitz_ladik_copy(s->before, s->x, s);
     ablowitz_ladik_steps(s, steps, 1);
-    if (ablowitz_ladik_holds(s)) return 1;
+    if (ablowitz_ladik_holds(s)) return ablowitz_ladik_OK;
     ablowitz_ladik_copy(s->x, s->before, s);
-    return 0;
+    return ablowitz_ladik_NOT_FINITE;
 }
 
 ablowitz_ladik_status ablowitz_ladik_integrate(ablowitz_ladik_solver *s, double h, size_t steps)
@@ -572,12 +574,13 @@ ablowitz_ladik_status ablowitz_ladik_integrate(ablowitz_ladik_solver *s, double 
     if (status != ablowitz_ladik_OK) return status;
     for (size_t stretch = ablowitz_ladik_STRETCH; steps > 0;) {
         const size_t now = steps < stretch ? steps : stretch;
-        if (ablowitz_ladik_try(s, (int)now)) {
+        const ablowitz_ladik_status tried = ablowitz_ladik_try(s, (int)now);
+        if (tried == ablowitz_ladik_OK) {
             steps -= now;
             s->steps += now;
             s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
         } else if (now == 1) {
-            return ablowitz_ladik_NOT_FINITE;
+            return tried;
         } else {
             stretch = 1;
         }

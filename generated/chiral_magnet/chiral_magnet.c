@@ -20,8 +20,9 @@
  *   3. Bonds
  *   4. The lattice
  *   5. The solver
- *   6. What is seen at sites
- * body-sha256: 3dc13f40457345d84f8adcf4a274e11abdd6a65ee8c7123c911cbfd0c7c6b1fc
+ *   6. The flows
+ *   7. What is seen at sites
+ * body-sha256: 65c7b6bd3233d841aea8f19d750e81733b7904817e25e0448035913d27f01c1d
  */
 #include "chiral_magnet.h"
 
@@ -37,9 +38,9 @@ const chiral_magnet_params chiral_magnet_default_params = { 1.0, 0.5, NULL, NULL
 enum { chiral_magnet_HALO = 0 }; /* sites that are copied beside a row */
 enum { chiral_magnet_LINES = 1 }; /* rows that kernels read: the row itself and those beside it */
 enum { chiral_magnet_ROW = 5 }; /* coefficients of one flow */
+enum { chiral_magnet_ROWS_OF_FLOWS = 6 }; /* rows of coefficients */
 enum { chiral_magnet_FLOWS = 5 }; /* in a step */
 enum { chiral_magnet_JOINED = 5 }; /* the row of the last flow of a step and the first of the next together */
-enum { chiral_magnet_ROWS_OF_FLOWS = 6 }; /* rows of coefficients */
 
 /* Along each axis: the smallest size, what sizes are multiples of, whether the ends are open. */
 static const size_t chiral_magnet_least[chiral_magnet_AXES] = { 1 };
@@ -275,7 +276,7 @@ static inline void chiral_magnet_sweep1_1(const double *coef, const chiral_magne
     }
 }
 
-/* The flow of H_1 for the pieces of rows from first on, before end. */
+/* The flow of H_1, for the pieces of rows from first on, before end. */
 static void chiral_magnet_part1(
     const chiral_magnet_solver *s, const double *coef, int far, int colour, size_t first, size_t end)
 {
@@ -327,7 +328,7 @@ static inline void chiral_magnet_sweep2(const double *coef, const chiral_magnet_
     }
 }
 
-/* The flow of H_2 for the pieces of rows from first on, before end. */
+/* The flow of H_2, for the pieces of rows from first on, before end. */
 static void chiral_magnet_part2(
     const chiral_magnet_solver *s, const double *coef, int far, int colour, size_t first, size_t end)
 {
@@ -377,7 +378,7 @@ static inline void chiral_magnet_sweep3(const double *coef, const chiral_magnet_
     }
 }
 
-/* The flow of H_3 for the pieces of rows from first on, before end. */
+/* The flow of H_3, for the pieces of rows from first on, before end. */
 static void chiral_magnet_part3(
     const chiral_magnet_solver *s, const double *coef, int far, int colour, size_t first, size_t end)
 {
@@ -428,7 +429,7 @@ static inline void chiral_magnet_sweep4(const double *coef, const chiral_magnet_
     }
 }
 
-/* The flow of H_4 for the pieces of rows from first on, before end. */
+/* The flow of H_4, for the pieces of rows from first on, before end. */
 static void chiral_magnet_part4(
     const chiral_magnet_solver *s, const double *coef, int far, int colour, size_t first, size_t end)
 {
@@ -516,7 +517,7 @@ static inline void chiral_magnet_sweep5_1(const double *coef, const chiral_magne
     }
 }
 
-/* The flow of H_5 for the pieces of rows from first on, before end. */
+/* The flow of H_5, for the pieces of rows from first on, before end. */
 static void chiral_magnet_part5(
     const chiral_magnet_solver *s, const double *coef, int far, int colour, size_t first, size_t end)
 {
@@ -606,7 +607,7 @@ static inline void chiral_magnet_sweep6_1(const double *coef, const chiral_magne
     }
 }
 
-/* The flow of H_6 for the pieces of rows from first on, before end. */
+/* The flow of H_6, for the pieces of rows from first on, before end. */
 static void chiral_magnet_part6(
     const chiral_magnet_solver *s, const double *coef, int far, int colour, size_t first, size_t end)
 {
@@ -696,7 +697,7 @@ static inline void chiral_magnet_sweep7_1(const double *coef, const chiral_magne
     }
 }
 
-/* The flow of H_7 for the pieces of rows from first on, before end. */
+/* The flow of H_7, for the pieces of rows from first on, before end. */
 static void chiral_magnet_part7(
     const chiral_magnet_solver *s, const double *coef, int far, int colour, size_t first, size_t end)
 {
@@ -984,7 +985,8 @@ enum {
     chiral_magnet_STRETCH = 32, /* steps before the state is looked at: what is not finite stays so */
     chiral_magnet_LEAD = (chiral_magnet_HALO + 7) / 8 * 8,
     chiral_magnet_BUFFER = 256,
-    chiral_magnet_RESERVED = chiral_magnet_ARRAYS + chiral_magnet_DIM + chiral_magnet_GATHERED
+    chiral_magnet_RESERVED = chiral_magnet_ARRAYS + chiral_magnet_DIM
+        + chiral_magnet_GATHERED
 };
 
 /* Sizes as they have to be: the widths of rows and the number of rows, 0 if they are not allowed. */
@@ -1118,6 +1120,24 @@ static chiral_magnet_status chiral_magnet_set_step(chiral_magnet_solver *s, doub
     return chiral_magnet_OK;
 }
 
+/* Whether all values at sites are finite. */
+static int chiral_magnet_holds(const chiral_magnet_solver *s)
+{
+    for (size_t k = 0; k < chiral_magnet_DIM; ++k)
+        for (size_t r = 0; r < s->rows; ++r)
+            if (!chiral_magnet_finite(s->x[k] + (ptrdiff_t)r * s->width, (size_t)s->length)) return 0;
+    return 1;
+}
+
+static void chiral_magnet_copy(double *const to[chiral_magnet_DIM], double *const from[chiral_magnet_DIM],
+    const chiral_magnet_solver *s)
+{
+    const size_t block = s->rows * (size_t)s->width * sizeof **from;
+    for (size_t k = 0; k < chiral_magnet_DIM; ++k)
+        memcpy(to[k] - chiral_magnet_LEAD, from[k] - chiral_magnet_LEAD, block);
+}
+
+/* ---- The flows ---- */
 /* One part of H, of one colour. */
 static void chiral_magnet_sweep_flow(const chiral_magnet_solver *s, int part, const double *coef, int far)
 {
@@ -1169,31 +1189,14 @@ static void chiral_magnet_steps(const chiral_magnet_solver *s, int steps, int fa
     }
 }
 
-/* Whether all values at sites are finite. */
-static int chiral_magnet_holds(const chiral_magnet_solver *s)
-{
-    for (size_t k = 0; k < chiral_magnet_DIM; ++k)
-        for (size_t r = 0; r < s->rows; ++r)
-            if (!chiral_magnet_finite(s->x[k] + (ptrdiff_t)r * s->width, (size_t)s->length)) return 0;
-    return 1;
-}
-
-static void chiral_magnet_copy(double *const to[chiral_magnet_DIM], double *const from[chiral_magnet_DIM],
-    const chiral_magnet_solver *s)
-{
-    const size_t block = s->rows * (size_t)s->width * sizeof **from;
-    for (size_t k = 0; k < chiral_magnet_DIM; ++k)
-        memcpy(to[k] - chiral_magnet_LEAD, from[k] - chiral_magnet_LEAD, block);
-}
-
 /* Some steps; if they lead to what is not finite, none. */
-static int chiral_magnet_try(chiral_magnet_solver *s, int steps)
+static chiral_magnet_status chiral_magnet_try(chiral_magnet_solver *s, int steps)
 {
     chiral_magnet_copy(s->before, s->x, s);
     chiral_magnet_steps(s, steps, 1);
-    if (chiral_magnet_holds(s)) return 1;
+    if (chiral_magnet_holds(s)) return chiral_magnet_OK;
     chiral_magnet_copy(s->x, s->before, s);
-    return 0;
+    return chiral_magnet_NOT_FINITE;
 }
 
 chiral_magnet_status chiral_magnet_integrate(chiral_magnet_solver *s, double h, size_t steps)
@@ -1202,12 +1205,13 @@ chiral_magnet_status chiral_magnet_integrate(chiral_magnet_solver *s, double h, 
     if (status != chiral_magnet_OK) return status;
     for (size_t stretch = chiral_magnet_STRETCH; steps > 0;) {
         const size_t now = steps < stretch ? steps : stretch;
-        if (chiral_magnet_try(s, (int)now)) {
+        const chiral_magnet_status tried = chiral_magnet_try(s, (int)now);
+        if (tried == chiral_magnet_OK) {
             steps -= now;
             s->steps += now;
             s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
         } else if (now == 1) {
-            return chiral_magnet_NOT_FINITE;
+            return tried;
         } else {
             stretch = 1;
         }

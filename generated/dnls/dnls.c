@@ -19,8 +19,9 @@
  *   2. Rows of sites
  *   3. The lattice
  *   4. The solver
- *   5. What is seen at sites
- * body-sha256: da199c49cd692d06cea171ad5f1f3bb613b257819401e1309f2457a0b208010c
+ *   5. The flows
+ *   6. What is seen at sites
+ * body-sha256: 14c6b794368f87188be8da4334cefbf7e2b18c24270a148d92af8159eedf8345
  */
 #include "dnls.h"
 
@@ -35,9 +36,9 @@ const dnls_params dnls_default_params = { 1.0 };
 enum { dnls_HALO = 1 };           /* sites that are copied beside a row */
 enum { dnls_LINES = 1 };          /* rows that kernels read: the row itself and those beside it */
 enum { dnls_ROW = 2 };            /* coefficients of one flow */
+enum { dnls_ROWS_OF_FLOWS = 26 }; /* rows of coefficients */
 enum { dnls_FLOWS = 25 };         /* in a step */
 enum { dnls_JOINED = 25 };        /* the row of the last flow of a step and the first of the next together */
-enum { dnls_ROWS_OF_FLOWS = 26 }; /* rows of coefficients */
 
 /* Along each axis: the smallest size, what sizes are multiples of, whether the ends are open. */
 static const size_t dnls_least[dnls_AXES] = { 2 };
@@ -194,7 +195,7 @@ static inline void dnls_sweep1(const double *coef, const dnls_row *row, ptrdiff_
     }
 }
 
-/* The flow of H_1 for the pieces of rows from first on, before end. */
+/* The flow of H_1, for the pieces of rows from first on, before end. */
 static void dnls_part1(
     const dnls_solver *s, const double *coef, int far, size_t first, size_t end)
 {
@@ -218,7 +219,7 @@ static inline void dnls_sweep2(const double *coef, const dnls_row *row, ptrdiff_
     }
 }
 
-/* The flow of H_2 for the pieces of rows from first on, before end. */
+/* The flow of H_2, for the pieces of rows from first on, before end. */
 static void dnls_part2(
     const dnls_solver *s, const double *coef, int far, size_t first, size_t end)
 {
@@ -249,7 +250,7 @@ static inline void dnls_sweep3(const double *coef, const dnls_row *row, ptrdiff_
     }
 }
 
-/* The flow of H_3 for the pieces of rows from first on, before end. */
+/* The flow of H_3, for the pieces of rows from first on, before end. */
 static void dnls_part3(
     const dnls_solver *s, const double *coef, int far, size_t first, size_t end)
 {
@@ -446,6 +447,22 @@ static dnls_status dnls_set_step(dnls_solver *s, double h)
     return dnls_OK;
 }
 
+/* Whether all values at sites are finite. */
+static int dnls_holds(const dnls_solver *s)
+{
+    for (size_t k = 0; k < dnls_DIM; ++k)
+        for (size_t r = 0; r < s->rows; ++r)
+            if (!dnls_finite(s->x[k] + (ptrdiff_t)r * s->width, (size_t)s->length)) return 0;
+    return 1;
+}
+
+static void dnls_copy(double *const to[dnls_DIM], double *const from[dnls_DIM], const dnls_solver *s)
+{
+    const size_t block = s->rows * (size_t)s->width * sizeof **from;
+    for (size_t k = 0; k < dnls_DIM; ++k) memcpy(to[k] - dnls_LEAD, from[k] - dnls_LEAD, block);
+}
+
+/* ---- The flows ---- */
 /* One part of H. */
 static void dnls_sweep(const dnls_solver *s, int part, const double *coef, int far)
 {
@@ -482,29 +499,14 @@ static void dnls_steps(const dnls_solver *s, int steps, int far)
     }
 }
 
-/* Whether all values at sites are finite. */
-static int dnls_holds(const dnls_solver *s)
-{
-    for (size_t k = 0; k < dnls_DIM; ++k)
-        for (size_t r = 0; r < s->rows; ++r)
-            if (!dnls_finite(s->x[k] + (ptrdiff_t)r * s->width, (size_t)s->length)) return 0;
-    return 1;
-}
-
-static void dnls_copy(double *const to[dnls_DIM], double *const from[dnls_DIM], const dnls_solver *s)
-{
-    const size_t block = s->rows * (size_t)s->width * sizeof **from;
-    for (size_t k = 0; k < dnls_DIM; ++k) memcpy(to[k] - dnls_LEAD, from[k] - dnls_LEAD, block);
-}
-
 /* Some steps; if they lead to what is not finite, none. */
-static int dnls_try(dnls_solver *s, int steps)
+static dnls_status dnls_try(dnls_solver *s, int steps)
 {
     dnls_copy(s->before, s->x, s);
     dnls_steps(s, steps, 1);
-    if (dnls_holds(s)) return 1;
+    if (dnls_holds(s)) return dnls_OK;
     dnls_copy(s->x, s->before, s);
-    return 0;
+    return dnls_NOT_FINITE;
 }
 
 dnls_status dnls_integrate(dnls_solver *s, double h, size_t steps)
@@ -513,12 +515,13 @@ dnls_status dnls_integrate(dnls_solver *s, double h, size_t steps)
     if (status != dnls_OK) return status;
     for (size_t stretch = dnls_STRETCH; steps > 0;) {
         const size_t now = steps < stretch ? steps : stretch;
-        if (dnls_try(s, (int)now)) {
+        const dnls_status tried = dnls_try(s, (int)now);
+        if (tried == dnls_OK) {
             steps -= now;
             s->steps += now;
             s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
         } else if (now == 1) {
-            return dnls_NOT_FINITE;
+            return tried;
         } else {
             stretch = 1;
         }

@@ -19,8 +19,9 @@
  *   2. Rows of sites
  *   3. The lattice
  *   4. The solver
- *   5. What is seen at sites
- * body-sha256: ac87d4fa6600eaf63f21f027f8dca853decb795cdab6b3516cc6fa2d6f710194
+ *   5. The flows
+ *   6. What is seen at sites
+ * body-sha256: 672444833cb1edc1217728814d103068a6638057f83847ba544777ead3c5e684
  */
 #include "dnls_disorder.h"
 
@@ -32,14 +33,14 @@
 /* ---- The model ---- */
 const dnls_disorder_params dnls_disorder_default_params = { 0.72, NULL };
 
-enum { dnls_disorder_HALO = 1 };   /* sites that are copied beside a row */
-enum { dnls_disorder_LINES = 1 };  /* rows that kernels read: the row itself and those beside it */
-enum { dnls_disorder_ROW = 2 };    /* coefficients of one flow */
-enum { dnls_disorder_FLOWS = 25 }; /* in a step */
+enum { dnls_disorder_HALO = 1 };           /* sites that are copied beside a row */
+enum { dnls_disorder_LINES = 1 };          /* rows that kernels read: the row itself and those beside it */
+enum { dnls_disorder_ROW = 2 };            /* coefficients of one flow */
+enum { dnls_disorder_ROWS_OF_FLOWS = 26 }; /* rows of coefficients */
+enum { dnls_disorder_FLOWS = 25 };         /* in a step */
 /* the row of the last flow of a step and the first of the next together */
 enum { dnls_disorder_JOINED = 25 };
-enum { dnls_disorder_ROWS_OF_FLOWS = 26 }; /* rows of coefficients */
-enum { dnls_disorder_WEIGHTS = 2 };        /* kinds of terms that open ends take away */
+enum { dnls_disorder_WEIGHTS = 2 }; /* kinds of terms that open ends take away */
 
 /* Along each axis: the smallest size, what sizes are multiples of, whether the ends are open. */
 static const size_t dnls_disorder_least[dnls_disorder_AXES] = { 2 };
@@ -223,7 +224,7 @@ static inline void dnls_disorder_sweep1(const double *coef, const dnls_disorder_
     }
 }
 
-/* The flow of H_1 for the pieces of rows from first on, before end. */
+/* The flow of H_1, for the pieces of rows from first on, before end. */
 static void dnls_disorder_part1(
     const dnls_disorder_solver *s, const double *coef, int far, size_t first, size_t end)
 {
@@ -250,7 +251,7 @@ static inline void dnls_disorder_sweep2(const double *coef, const dnls_disorder_
     }
 }
 
-/* The flow of H_2 for the pieces of rows from first on, before end. */
+/* The flow of H_2, for the pieces of rows from first on, before end. */
 static void dnls_disorder_part2(
     const dnls_disorder_solver *s, const double *coef, int far, size_t first, size_t end)
 {
@@ -283,7 +284,7 @@ static inline void dnls_disorder_sweep3(const double *coef, const dnls_disorder_
     }
 }
 
-/* The flow of H_3 for the pieces of rows from first on, before end. */
+/* The flow of H_3, for the pieces of rows from first on, before end. */
 static void dnls_disorder_part3(
     const dnls_disorder_solver *s, const double *coef, int far, size_t first, size_t end)
 {
@@ -515,6 +516,24 @@ static dnls_disorder_status dnls_disorder_set_step(dnls_disorder_solver *s, doub
     return dnls_disorder_OK;
 }
 
+/* Whether all values at sites are finite. */
+static int dnls_disorder_holds(const dnls_disorder_solver *s)
+{
+    for (size_t k = 0; k < dnls_disorder_DIM; ++k)
+        for (size_t r = 0; r < s->rows; ++r)
+            if (!dnls_disorder_finite(s->x[k] + (ptrdiff_t)r * s->width, (size_t)s->length)) return 0;
+    return 1;
+}
+
+static void dnls_disorder_copy(double *const to[dnls_disorder_DIM], double *const from[dnls_disorder_DIM],
+    const dnls_disorder_solver *s)
+{
+    const size_t block = s->rows * (size_t)s->width * sizeof **from;
+    for (size_t k = 0; k < dnls_disorder_DIM; ++k)
+        memcpy(to[k] - dnls_disorder_LEAD, from[k] - dnls_disorder_LEAD, block);
+}
+
+/* ---- The flows ---- */
 /* One part of H. */
 static void dnls_disorder_sweep(const dnls_disorder_solver *s, int part, const double *coef, int far)
 {
@@ -555,31 +574,14 @@ static void dnls_disorder_steps(const dnls_disorder_solver *s, int steps, int fa
     }
 }
 
-/* Whether all values at sites are finite. */
-static int dnls_disorder_holds(const dnls_disorder_solver *s)
-{
-    for (size_t k = 0; k < dnls_disorder_DIM; ++k)
-        for (size_t r = 0; r < s->rows; ++r)
-            if (!dnls_disorder_finite(s->x[k] + (ptrdiff_t)r * s->width, (size_t)s->length)) return 0;
-    return 1;
-}
-
-static void dnls_disorder_copy(double *const to[dnls_disorder_DIM], double *const from[dnls_disorder_DIM],
-    const dnls_disorder_solver *s)
-{
-    const size_t block = s->rows * (size_t)s->width * sizeof **from;
-    for (size_t k = 0; k < dnls_disorder_DIM; ++k)
-        memcpy(to[k] - dnls_disorder_LEAD, from[k] - dnls_disorder_LEAD, block);
-}
-
 /* Some steps; if they lead to what is not finite, none. */
-static int dnls_disorder_try(dnls_disorder_solver *s, int steps)
+static dnls_disorder_status dnls_disorder_try(dnls_disorder_solver *s, int steps)
 {
     dnls_disorder_copy(s->before, s->x, s);
     dnls_disorder_steps(s, steps, 1);
-    if (dnls_disorder_holds(s)) return 1;
+    if (dnls_disorder_holds(s)) return dnls_disorder_OK;
     dnls_disorder_copy(s->x, s->before, s);
-    return 0;
+    return dnls_disorder_NOT_FINITE;
 }
 
 dnls_disorder_status dnls_disorder_integrate(dnls_disorder_solver *s, double h, size_t steps)
@@ -588,12 +590,13 @@ dnls_disorder_status dnls_disorder_integrate(dnls_disorder_solver *s, double h, 
     if (status != dnls_disorder_OK) return status;
     for (size_t stretch = dnls_disorder_STRETCH; steps > 0;) {
         const size_t now = steps < stretch ? steps : stretch;
-        if (dnls_disorder_try(s, (int)now)) {
+        const dnls_disorder_status tried = dnls_disorder_try(s, (int)now);
+        if (tried == dnls_disorder_OK) {
             steps -= now;
             s->steps += now;
             s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
         } else if (now == 1) {
-            return dnls_disorder_NOT_FINITE;
+            return tried;
         } else {
             stretch = 1;
         }

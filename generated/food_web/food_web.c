@@ -20,8 +20,9 @@
  *   3. Bonds
  *   4. The lattice
  *   5. The solver
- *   6. What is seen at sites
- * body-sha256: 843ba9a75699a78ac7a8667f8ecc13a70bbf3933d46b9e42063f32d442fcec7c
+ *   6. The flows
+ *   7. What is seen at sites
+ * body-sha256: 2fec9ae814c897141e295070b31abc4fdca5cd7abcf6b287e8516af73247abf1
  */
 #include "food_web.h"
 
@@ -37,9 +38,9 @@ const food_web_params food_web_default_params = { NULL, NULL };
 enum { food_web_HALO = 0 }; /* sites that are copied beside a row */
 enum { food_web_LINES = 1 }; /* rows that kernels read: the row itself and those beside it */
 enum { food_web_ROW = 1 }; /* coefficients of one flow */
+enum { food_web_ROWS_OF_FLOWS = 26 }; /* rows of coefficients */
 enum { food_web_FLOWS = 25 }; /* in a step */
 enum { food_web_JOINED = 25 }; /* the row of the last flow of a step and the first of the next together */
-enum { food_web_ROWS_OF_FLOWS = 26 }; /* rows of coefficients */
 
 /* Along each axis: the smallest size, what sizes are multiples of, whether the ends are open. */
 static const size_t food_web_least[food_web_AXES] = { 1 };
@@ -283,7 +284,7 @@ static inline void food_web_sweep1(const double *coef, const food_web_row *row, 
     }
 }
 
-/* The flow of H_1 for the pieces of rows from first on, before end. */
+/* The flow of H_1, for the pieces of rows from first on, before end. */
 static void food_web_part1(
     const food_web_solver *s, const double *coef, int far, int colour, size_t first, size_t end)
 {
@@ -496,7 +497,8 @@ enum {
     food_web_STRETCH = 32, /* steps before the state is looked at: what is not finite stays so */
     food_web_LEAD = (food_web_HALO + 7) / 8 * 8,
     food_web_BUFFER = 256,
-    food_web_RESERVED = food_web_ARRAYS + food_web_DIM + food_web_GATHERED
+    food_web_RESERVED = food_web_ARRAYS + food_web_DIM
+        + food_web_GATHERED
 };
 
 /* Sizes as they have to be: the widths of rows and the number of rows, 0 if they are not allowed. */
@@ -639,6 +641,23 @@ static food_web_status food_web_set_step(food_web_solver *s, double h)
     return food_web_OK;
 }
 
+/* Whether all values at sites are finite. */
+static int food_web_holds(const food_web_solver *s)
+{
+    for (size_t k = 0; k < food_web_DIM; ++k)
+        for (size_t r = 0; r < s->rows; ++r)
+            if (!food_web_finite(s->x[k] + (ptrdiff_t)r * s->width, (size_t)s->length)) return 0;
+    return 1;
+}
+
+static void food_web_copy(double *const to[food_web_DIM], double *const from[food_web_DIM],
+    const food_web_solver *s)
+{
+    const size_t block = s->rows * (size_t)s->width * sizeof **from;
+    for (size_t k = 0; k < food_web_DIM; ++k) memcpy(to[k] - food_web_LEAD, from[k] - food_web_LEAD, block);
+}
+
+/* ---- The flows ---- */
 /* One part of H, of one colour. */
 static void food_web_sweep_flow(const food_web_solver *s, int part, const double *coef, int far)
 {
@@ -687,30 +706,14 @@ static void food_web_steps(const food_web_solver *s, int steps, int far)
     }
 }
 
-/* Whether all values at sites are finite. */
-static int food_web_holds(const food_web_solver *s)
-{
-    for (size_t k = 0; k < food_web_DIM; ++k)
-        for (size_t r = 0; r < s->rows; ++r)
-            if (!food_web_finite(s->x[k] + (ptrdiff_t)r * s->width, (size_t)s->length)) return 0;
-    return 1;
-}
-
-static void food_web_copy(double *const to[food_web_DIM], double *const from[food_web_DIM],
-    const food_web_solver *s)
-{
-    const size_t block = s->rows * (size_t)s->width * sizeof **from;
-    for (size_t k = 0; k < food_web_DIM; ++k) memcpy(to[k] - food_web_LEAD, from[k] - food_web_LEAD, block);
-}
-
 /* Some steps; if they lead to what is not finite, none. */
-static int food_web_try(food_web_solver *s, int steps)
+static food_web_status food_web_try(food_web_solver *s, int steps)
 {
     food_web_copy(s->before, s->x, s);
     food_web_steps(s, steps, 1);
-    if (food_web_holds(s)) return 1;
+    if (food_web_holds(s)) return food_web_OK;
     food_web_copy(s->x, s->before, s);
-    return 0;
+    return food_web_NOT_FINITE;
 }
 
 food_web_status food_web_integrate(food_web_solver *s, double h, size_t steps)
@@ -719,12 +722,13 @@ food_web_status food_web_integrate(food_web_solver *s, double h, size_t steps)
     if (status != food_web_OK) return status;
     for (size_t stretch = food_web_STRETCH; steps > 0;) {
         const size_t now = steps < stretch ? steps : stretch;
-        if (food_web_try(s, (int)now)) {
+        const food_web_status tried = food_web_try(s, (int)now);
+        if (tried == food_web_OK) {
             steps -= now;
             s->steps += now;
             s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
         } else if (now == 1) {
-            return food_web_NOT_FINITE;
+            return tried;
         } else {
             stretch = 1;
         }

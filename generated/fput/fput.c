@@ -19,8 +19,9 @@
  *   2. Rows of sites
  *   3. The lattice
  *   4. The solver
- *   5. What is seen at sites
- * body-sha256: 160aba01b91eb536fb8fa83cb4f3160b86bb548538ad83112ab25b1c188d9d8d
+ *   5. The flows
+ *   6. What is seen at sites
+ * body-sha256: 5c8486b5508295d01d8edc72aa9d8475c2f674b2b0c3d060bf5a81a476405071
  */
 #include "fput.h"
 
@@ -35,9 +36,9 @@ const fput_params fput_default_params = { 0.25, 0.1 };
 enum { fput_HALO = 1 };           /* sites that are copied beside a row */
 enum { fput_LINES = 1 };          /* rows that kernels read: the row itself and those beside it */
 enum { fput_ROW = 4 };            /* coefficients of one flow */
+enum { fput_ROWS_OF_FLOWS = 14 }; /* rows of coefficients */
 enum { fput_FLOWS = 13 };         /* in a step */
 enum { fput_JOINED = 13 };        /* the row of the last flow of a step and the first of the next together */
-enum { fput_ROWS_OF_FLOWS = 14 }; /* rows of coefficients */
 
 /* Along each axis: the smallest size, what sizes are multiples of, whether the ends are open. */
 static const size_t fput_least[fput_AXES] = { 2 };
@@ -165,7 +166,7 @@ static inline void fput_sweep1(const double *coef, const fput_row *row, ptrdiff_
     }
 }
 
-/* The flow of H_1 for the pieces of rows from first on, before end. */
+/* The flow of H_1, for the pieces of rows from first on, before end. */
 static void fput_part1(
     const fput_solver *s, const double *coef, int far, size_t first, size_t end)
 {
@@ -190,7 +191,7 @@ static inline void fput_sweep2(const double *coef, const fput_row *row, ptrdiff_
     }
 }
 
-/* The flow of H_2 for the pieces of rows from first on, before end. */
+/* The flow of H_2, for the pieces of rows from first on, before end. */
 static void fput_part2(
     const fput_solver *s, const double *coef, int far, size_t first, size_t end)
 {
@@ -391,6 +392,22 @@ static fput_status fput_set_step(fput_solver *s, double h)
     return fput_OK;
 }
 
+/* Whether all values at sites are finite. */
+static int fput_holds(const fput_solver *s)
+{
+    for (size_t k = 0; k < fput_DIM; ++k)
+        for (size_t r = 0; r < s->rows; ++r)
+            if (!fput_finite(s->x[k] + (ptrdiff_t)r * s->width, (size_t)s->length)) return 0;
+    return 1;
+}
+
+static void fput_copy(double *const to[fput_DIM], double *const from[fput_DIM], const fput_solver *s)
+{
+    const size_t block = s->rows * (size_t)s->width * sizeof **from;
+    for (size_t k = 0; k < fput_DIM; ++k) memcpy(to[k] - fput_LEAD, from[k] - fput_LEAD, block);
+}
+
+/* ---- The flows ---- */
 /* One part of H. */
 static void fput_sweep(const fput_solver *s, int part, const double *coef, int far)
 {
@@ -427,29 +444,14 @@ static void fput_steps(const fput_solver *s, int steps, int far)
     }
 }
 
-/* Whether all values at sites are finite. */
-static int fput_holds(const fput_solver *s)
-{
-    for (size_t k = 0; k < fput_DIM; ++k)
-        for (size_t r = 0; r < s->rows; ++r)
-            if (!fput_finite(s->x[k] + (ptrdiff_t)r * s->width, (size_t)s->length)) return 0;
-    return 1;
-}
-
-static void fput_copy(double *const to[fput_DIM], double *const from[fput_DIM], const fput_solver *s)
-{
-    const size_t block = s->rows * (size_t)s->width * sizeof **from;
-    for (size_t k = 0; k < fput_DIM; ++k) memcpy(to[k] - fput_LEAD, from[k] - fput_LEAD, block);
-}
-
 /* Some steps; if they lead to what is not finite, none. */
-static int fput_try(fput_solver *s, int steps)
+static fput_status fput_try(fput_solver *s, int steps)
 {
     fput_copy(s->before, s->x, s);
     fput_steps(s, steps, 1);
-    if (fput_holds(s)) return 1;
+    if (fput_holds(s)) return fput_OK;
     fput_copy(s->x, s->before, s);
-    return 0;
+    return fput_NOT_FINITE;
 }
 
 fput_status fput_integrate(fput_solver *s, double h, size_t steps)
@@ -458,12 +460,13 @@ fput_status fput_integrate(fput_solver *s, double h, size_t steps)
     if (status != fput_OK) return status;
     for (size_t stretch = fput_STRETCH; steps > 0;) {
         const size_t now = steps < stretch ? steps : stretch;
-        if (fput_try(s, (int)now)) {
+        const fput_status tried = fput_try(s, (int)now);
+        if (tried == fput_OK) {
             steps -= now;
             s->steps += now;
             s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
         } else if (now == 1) {
-            return fput_NOT_FINITE;
+            return tried;
         } else {
             stretch = 1;
         }

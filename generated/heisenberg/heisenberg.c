@@ -19,8 +19,9 @@
  *   2. Rows of sites
  *   3. The lattice
  *   4. The solver
- *   5. What is seen at sites
- * body-sha256: ed824c9162f6d51c2f4d9ac73aec6b8743281a86101cb5d74a54021d54b8f03b
+ *   5. The flows
+ *   6. What is seen at sites
+ * body-sha256: 28b3afe7e20e295ba647e990ae08695543cb75f76b6817c061bfd0e0f07e98ee
  */
 #include "heisenberg.h"
 
@@ -35,9 +36,9 @@ const heisenberg_params heisenberg_default_params = { 1.0, NULL };
 enum { heisenberg_HALO = 1 }; /* sites that are copied beside a row */
 enum { heisenberg_LINES = 5 }; /* rows that kernels read: the row itself and those beside it */
 enum { heisenberg_ROW = 3 }; /* coefficients of one flow */
+enum { heisenberg_ROWS_OF_FLOWS = 6 }; /* rows of coefficients */
 enum { heisenberg_FLOWS = 5 }; /* in a step */
 enum { heisenberg_JOINED = 5 }; /* the row of the last flow of a step and the first of the next together */
-enum { heisenberg_ROWS_OF_FLOWS = 6 }; /* rows of coefficients */
 
 /* Along each axis: the smallest size, what sizes are multiples of, whether the ends are open. */
 static const size_t heisenberg_least[heisenberg_AXES] = { 2, 2, 2 };
@@ -248,7 +249,7 @@ static inline void heisenberg_sweep1_near(const double *coef, const heisenberg_r
     }
 }
 
-/* The flow of H_1 for the pieces of rows from first on, before end. */
+/* The flow of H_1, for the pieces of rows from first on, before end. */
 static void heisenberg_part1(
     const heisenberg_solver *s, const double *coef, int far, size_t first, size_t end)
 {
@@ -318,7 +319,7 @@ static inline void heisenberg_sweep2_near(const double *coef, const heisenberg_r
     }
 }
 
-/* The flow of H_2 for the pieces of rows from first on, before end. */
+/* The flow of H_2, for the pieces of rows from first on, before end. */
 static void heisenberg_part2(
     const heisenberg_solver *s, const double *coef, int far, size_t first, size_t end)
 {
@@ -390,7 +391,7 @@ static inline void heisenberg_sweep3_near(const double *coef, const heisenberg_r
     }
 }
 
-/* The flow of H_3 for the pieces of rows from first on, before end. */
+/* The flow of H_3, for the pieces of rows from first on, before end. */
 static void heisenberg_part3(
     const heisenberg_solver *s, const double *coef, int far, size_t first, size_t end)
 {
@@ -651,6 +652,24 @@ static heisenberg_status heisenberg_set_step(heisenberg_solver *s, double h)
     return heisenberg_OK;
 }
 
+/* Whether all values at sites are finite. */
+static int heisenberg_holds(const heisenberg_solver *s)
+{
+    for (size_t k = 0; k < heisenberg_DIM; ++k)
+        for (size_t r = 0; r < s->rows; ++r)
+            if (!heisenberg_finite(s->x[k] + (ptrdiff_t)r * s->width, (size_t)s->length)) return 0;
+    return 1;
+}
+
+static void heisenberg_copy(double *const to[heisenberg_DIM], double *const from[heisenberg_DIM],
+    const heisenberg_solver *s)
+{
+    const size_t block = s->rows * (size_t)s->width * sizeof **from;
+    for (size_t k = 0; k < heisenberg_DIM; ++k)
+        memcpy(to[k] - heisenberg_LEAD, from[k] - heisenberg_LEAD, block);
+}
+
+/* ---- The flows ---- */
 /* One part of H. */
 static void heisenberg_sweep(const heisenberg_solver *s, int part, const double *coef, int far)
 {
@@ -691,34 +710,17 @@ static void heisenberg_steps(const heisenberg_solver *s, int steps, int far)
     }
 }
 
-/* Whether all values at sites are finite. */
-static int heisenberg_holds(const heisenberg_solver *s)
-{
-    for (size_t k = 0; k < heisenberg_DIM; ++k)
-        for (size_t r = 0; r < s->rows; ++r)
-            if (!heisenberg_finite(s->x[k] + (ptrdiff_t)r * s->width, (size_t)s->length)) return 0;
-    return 1;
-}
-
-static void heisenberg_copy(double *const to[heisenberg_DIM], double *const from[heisenberg_DIM],
-    const heisenberg_solver *s)
-{
-    const size_t block = s->rows * (size_t)s->width * sizeof **from;
-    for (size_t k = 0; k < heisenberg_DIM; ++k)
-        memcpy(to[k] - heisenberg_LEAD, from[k] - heisenberg_LEAD, block);
-}
-
 /* Some steps; if they lead to what is not finite, none. */
-static int heisenberg_try(heisenberg_solver *s, int steps)
+static heisenberg_status heisenberg_try(heisenberg_solver *s, int steps)
 {
     heisenberg_copy(s->before, s->x, s);
     heisenberg_steps(s, steps, 0);
-    if (heisenberg_holds(s)) return 1;
+    if (heisenberg_holds(s)) return heisenberg_OK;
     heisenberg_copy(s->x, s->before, s);
     heisenberg_steps(s, steps, 1);
-    if (heisenberg_holds(s)) return 1;
+    if (heisenberg_holds(s)) return heisenberg_OK;
     heisenberg_copy(s->x, s->before, s);
-    return 0;
+    return heisenberg_NOT_FINITE;
 }
 
 heisenberg_status heisenberg_integrate(heisenberg_solver *s, double h, size_t steps)
@@ -727,12 +729,13 @@ heisenberg_status heisenberg_integrate(heisenberg_solver *s, double h, size_t st
     if (status != heisenberg_OK) return status;
     for (size_t stretch = heisenberg_STRETCH; steps > 0;) {
         const size_t now = steps < stretch ? steps : stretch;
-        if (heisenberg_try(s, (int)now)) {
+        const heisenberg_status tried = heisenberg_try(s, (int)now);
+        if (tried == heisenberg_OK) {
             steps -= now;
             s->steps += now;
             s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
         } else if (now == 1) {
-            return heisenberg_NOT_FINITE;
+            return tried;
         } else {
             stretch = 1;
         }

@@ -19,8 +19,9 @@
  *   2. Rows of sites
  *   3. The lattice
  *   4. The solver
- *   5. What is seen at sites
- * body-sha256: 442c137f42ce90226ec7019e678de3434716064bbcafdacec7937d2546a8648e
+ *   5. The flows
+ *   6. What is seen at sites
+ * body-sha256: 5e61f68c42a1691f70b17fc509595abfbeb26a504cf304202aa148a9fe0a167f
  */
 #include "heisenberg_plane.h"
 
@@ -32,14 +33,14 @@
 /* ---- The model ---- */
 const heisenberg_plane_params heisenberg_plane_default_params = { 1.0, 0.9 };
 
-enum { heisenberg_plane_HALO = 1 };   /* sites that are copied beside a row */
-enum { heisenberg_plane_LINES = 3 };  /* rows that kernels read: the row itself and those beside it */
-enum { heisenberg_plane_ROW = 2 };    /* coefficients of one flow */
-enum { heisenberg_plane_FLOWS = 25 }; /* in a step */
+enum { heisenberg_plane_HALO = 1 };           /* sites that are copied beside a row */
+enum { heisenberg_plane_LINES = 3 };          /* rows that kernels read: the row itself and those beside it */
+enum { heisenberg_plane_ROW = 2 };            /* coefficients of one flow */
+enum { heisenberg_plane_ROWS_OF_FLOWS = 26 }; /* rows of coefficients */
+enum { heisenberg_plane_FLOWS = 25 };         /* in a step */
 /* the row of the last flow of a step and the first of the next together */
 enum { heisenberg_plane_JOINED = 25 };
-enum { heisenberg_plane_ROWS_OF_FLOWS = 26 }; /* rows of coefficients */
-enum { heisenberg_plane_WEIGHTS = 4 };        /* kinds of terms that open ends take away */
+enum { heisenberg_plane_WEIGHTS = 4 }; /* kinds of terms that open ends take away */
 
 /* Along each axis: the smallest size, what sizes are multiples of, whether the ends are open. */
 static const size_t heisenberg_plane_least[heisenberg_plane_AXES] = { 2, 2 };
@@ -234,7 +235,7 @@ static inline void heisenberg_plane_sweep1(const double *coef, const heisenberg_
     }
 }
 
-/* The flow of H_1 for the pieces of rows from first on, before end. */
+/* The flow of H_1, for the pieces of rows from first on, before end. */
 static void heisenberg_plane_part1(
     const heisenberg_plane_solver *s, const double *coef, int far, size_t first, size_t end)
 {
@@ -273,7 +274,7 @@ static inline void heisenberg_plane_sweep2(const double *coef, const heisenberg_
     }
 }
 
-/* The flow of H_2 for the pieces of rows from first on, before end. */
+/* The flow of H_2, for the pieces of rows from first on, before end. */
 static void heisenberg_plane_part2(
     const heisenberg_plane_solver *s, const double *coef, int far, size_t first, size_t end)
 {
@@ -312,7 +313,7 @@ static inline void heisenberg_plane_sweep3(const double *coef, const heisenberg_
     }
 }
 
-/* The flow of H_3 for the pieces of rows from first on, before end. */
+/* The flow of H_3, for the pieces of rows from first on, before end. */
 static void heisenberg_plane_part3(
     const heisenberg_plane_solver *s, const double *coef, int far, size_t first, size_t end)
 {
@@ -543,6 +544,24 @@ static heisenberg_plane_status heisenberg_plane_set_step(heisenberg_plane_solver
     return heisenberg_plane_OK;
 }
 
+/* Whether all values at sites are finite. */
+static int heisenberg_plane_holds(const heisenberg_plane_solver *s)
+{
+    for (size_t k = 0; k < heisenberg_plane_DIM; ++k)
+        for (size_t r = 0; r < s->rows; ++r)
+            if (!heisenberg_plane_finite(s->x[k] + (ptrdiff_t)r * s->width, (size_t)s->length)) return 0;
+    return 1;
+}
+
+static void heisenberg_plane_copy(double *const to[heisenberg_plane_DIM],
+    double *const from[heisenberg_plane_DIM], const heisenberg_plane_solver *s)
+{
+    const size_t block = s->rows * (size_t)s->width * sizeof **from;
+    for (size_t k = 0; k < heisenberg_plane_DIM; ++k)
+        memcpy(to[k] - heisenberg_plane_LEAD, from[k] - heisenberg_plane_LEAD, block);
+}
+
+/* ---- The flows ---- */
 /* One part of H. */
 static void heisenberg_plane_sweep(const heisenberg_plane_solver *s, int part, const double *coef, int far)
 {
@@ -583,31 +602,14 @@ static void heisenberg_plane_steps(const heisenberg_plane_solver *s, int steps, 
     }
 }
 
-/* Whether all values at sites are finite. */
-static int heisenberg_plane_holds(const heisenberg_plane_solver *s)
-{
-    for (size_t k = 0; k < heisenberg_plane_DIM; ++k)
-        for (size_t r = 0; r < s->rows; ++r)
-            if (!heisenberg_plane_finite(s->x[k] + (ptrdiff_t)r * s->width, (size_t)s->length)) return 0;
-    return 1;
-}
-
-static void heisenberg_plane_copy(double *const to[heisenberg_plane_DIM],
-    double *const from[heisenberg_plane_DIM], const heisenberg_plane_solver *s)
-{
-    const size_t block = s->rows * (size_t)s->width * sizeof **from;
-    for (size_t k = 0; k < heisenberg_plane_DIM; ++k)
-        memcpy(to[k] - heisenberg_plane_LEAD, from[k] - heisenberg_plane_LEAD, block);
-}
-
 /* Some steps; if they lead to what is not finite, none. */
-static int heisenberg_plane_try(heisenberg_plane_solver *s, int steps)
+static heisenberg_plane_status heisenberg_plane_try(heisenberg_plane_solver *s, int steps)
 {
     heisenberg_plane_copy(s->before, s->x, s);
     heisenberg_plane_steps(s, steps, 1);
-    if (heisenberg_plane_holds(s)) return 1;
+    if (heisenberg_plane_holds(s)) return heisenberg_plane_OK;
     heisenberg_plane_copy(s->x, s->before, s);
-    return 0;
+    return heisenberg_plane_NOT_FINITE;
 }
 
 heisenberg_plane_status heisenberg_plane_integrate(heisenberg_plane_solver *s, double h, size_t steps)
@@ -616,12 +618,13 @@ heisenberg_plane_status heisenberg_plane_integrate(heisenberg_plane_solver *s, d
     if (status != heisenberg_plane_OK) return status;
     for (size_t stretch = heisenberg_plane_STRETCH; steps > 0;) {
         const size_t now = steps < stretch ? steps : stretch;
-        if (heisenberg_plane_try(s, (int)now)) {
+        const heisenberg_plane_status tried = heisenberg_plane_try(s, (int)now);
+        if (tried == heisenberg_plane_OK) {
             steps -= now;
             s->steps += now;
             s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
         } else if (now == 1) {
-            return heisenberg_plane_NOT_FINITE;
+            return tried;
         } else {
             stretch = 1;
         }

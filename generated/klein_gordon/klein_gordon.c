@@ -19,8 +19,9 @@
  *   2. Rows of sites
  *   3. The lattice
  *   4. The solver
- *   5. What is seen at sites
- * body-sha256: f5c0a72786e2bf559e9799c3ea2ae58ddc76a0b30f900ffc22548120b3b71aff
+ *   5. The flows
+ *   6. What is seen at sites
+ * body-sha256: 2d98abc96bf3fb49ac9f9af55f81b0a9b80ef9ce2e1a5fc536c9dec8f6464d4a
  */
 #include "klein_gordon.h"
 
@@ -35,9 +36,9 @@ const klein_gordon_params klein_gordon_default_params = { 0.2 };
 enum { klein_gordon_HALO = 1 }; /* sites that are copied beside a row */
 enum { klein_gordon_LINES = 1 }; /* rows that kernels read: the row itself and those beside it */
 enum { klein_gordon_ROW = 2 }; /* coefficients of one flow */
+enum { klein_gordon_ROWS_OF_FLOWS = 14 }; /* rows of coefficients */
 enum { klein_gordon_FLOWS = 13 }; /* in a step */
 enum { klein_gordon_JOINED = 13 }; /* the row of the last flow of a step and the first of the next together */
-enum { klein_gordon_ROWS_OF_FLOWS = 14 }; /* rows of coefficients */
 
 /* Along each axis: the smallest size, what sizes are multiples of, whether the ends are open. */
 static const size_t klein_gordon_least[klein_gordon_AXES] = { 2 };
@@ -164,7 +165,7 @@ static inline void klein_gordon_sweep1(const double *coef, const klein_gordon_ro
     }
 }
 
-/* The flow of H_1 for the pieces of rows from first on, before end. */
+/* The flow of H_1, for the pieces of rows from first on, before end. */
 static void klein_gordon_part1(
     const klein_gordon_solver *s, const double *coef, int far, size_t first, size_t end)
 {
@@ -190,7 +191,7 @@ static inline void klein_gordon_sweep2(const double *coef, const klein_gordon_ro
     }
 }
 
-/* The flow of H_2 for the pieces of rows from first on, before end. */
+/* The flow of H_2, for the pieces of rows from first on, before end. */
 static void klein_gordon_part2(
     const klein_gordon_solver *s, const double *coef, int far, size_t first, size_t end)
 {
@@ -393,6 +394,24 @@ static klein_gordon_status klein_gordon_set_step(klein_gordon_solver *s, double 
     return klein_gordon_OK;
 }
 
+/* Whether all values at sites are finite. */
+static int klein_gordon_holds(const klein_gordon_solver *s)
+{
+    for (size_t k = 0; k < klein_gordon_DIM; ++k)
+        for (size_t r = 0; r < s->rows; ++r)
+            if (!klein_gordon_finite(s->x[k] + (ptrdiff_t)r * s->width, (size_t)s->length)) return 0;
+    return 1;
+}
+
+static void klein_gordon_copy(double *const to[klein_gordon_DIM], double *const from[klein_gordon_DIM],
+    const klein_gordon_solver *s)
+{
+    const size_t block = s->rows * (size_t)s->width * sizeof **from;
+    for (size_t k = 0; k < klein_gordon_DIM; ++k)
+        memcpy(to[k] - klein_gordon_LEAD, from[k] - klein_gordon_LEAD, block);
+}
+
+/* ---- The flows ---- */
 /* One part of H. */
 static void klein_gordon_sweep(const klein_gordon_solver *s, int part, const double *coef, int far)
 {
@@ -433,31 +452,14 @@ static void klein_gordon_steps(const klein_gordon_solver *s, int steps, int far)
     }
 }
 
-/* Whether all values at sites are finite. */
-static int klein_gordon_holds(const klein_gordon_solver *s)
-{
-    for (size_t k = 0; k < klein_gordon_DIM; ++k)
-        for (size_t r = 0; r < s->rows; ++r)
-            if (!klein_gordon_finite(s->x[k] + (ptrdiff_t)r * s->width, (size_t)s->length)) return 0;
-    return 1;
-}
-
-static void klein_gordon_copy(double *const to[klein_gordon_DIM], double *const from[klein_gordon_DIM],
-    const klein_gordon_solver *s)
-{
-    const size_t block = s->rows * (size_t)s->width * sizeof **from;
-    for (size_t k = 0; k < klein_gordon_DIM; ++k)
-        memcpy(to[k] - klein_gordon_LEAD, from[k] - klein_gordon_LEAD, block);
-}
-
 /* Some steps; if they lead to what is not finite, none. */
-static int klein_gordon_try(klein_gordon_solver *s, int steps)
+static klein_gordon_status klein_gordon_try(klein_gordon_solver *s, int steps)
 {
     klein_gordon_copy(s->before, s->x, s);
     klein_gordon_steps(s, steps, 1);
-    if (klein_gordon_holds(s)) return 1;
+    if (klein_gordon_holds(s)) return klein_gordon_OK;
     klein_gordon_copy(s->x, s->before, s);
-    return 0;
+    return klein_gordon_NOT_FINITE;
 }
 
 klein_gordon_status klein_gordon_integrate(klein_gordon_solver *s, double h, size_t steps)
@@ -466,12 +468,13 @@ klein_gordon_status klein_gordon_integrate(klein_gordon_solver *s, double h, siz
     if (status != klein_gordon_OK) return status;
     for (size_t stretch = klein_gordon_STRETCH; steps > 0;) {
         const size_t now = steps < stretch ? steps : stretch;
-        if (klein_gordon_try(s, (int)now)) {
+        const klein_gordon_status tried = klein_gordon_try(s, (int)now);
+        if (tried == klein_gordon_OK) {
             steps -= now;
             s->steps += now;
             s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
         } else if (now == 1) {
-            return klein_gordon_NOT_FINITE;
+            return tried;
         } else {
             stretch = 1;
         }

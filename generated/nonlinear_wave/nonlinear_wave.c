@@ -19,8 +19,9 @@
  *   2. Rows of sites
  *   3. The lattice
  *   4. The solver
- *   5. What is seen at sites
- * body-sha256: 713a66ff8d6f9a1cf20ef8677ad40aa338dfe36bc84f87b5acd4779a015b9cba
+ *   5. The flows
+ *   6. What is seen at sites
+ * body-sha256: 8750a12cc2b40544fc916563c5a34bc855787c46068c4259548326ad396b6c4c
  */
 #include "nonlinear_wave.h"
 
@@ -32,13 +33,13 @@
 /* ---- The model ---- */
 const nonlinear_wave_params nonlinear_wave_default_params = { 1.0, 0.1 };
 
-enum { nonlinear_wave_HALO = 1 };   /* sites that are copied beside a row */
-enum { nonlinear_wave_LINES = 1 };  /* rows that kernels read: the row itself and those beside it */
-enum { nonlinear_wave_ROW = 4 };    /* coefficients of one flow */
-enum { nonlinear_wave_FLOWS = 13 }; /* in a step */
+enum { nonlinear_wave_HALO = 1 };           /* sites that are copied beside a row */
+enum { nonlinear_wave_LINES = 1 };          /* rows that kernels read: the row itself and those beside it */
+enum { nonlinear_wave_ROW = 4 };            /* coefficients of one flow */
+enum { nonlinear_wave_ROWS_OF_FLOWS = 14 }; /* rows of coefficients */
+enum { nonlinear_wave_FLOWS = 13 };         /* in a step */
 /* the row of the last flow of a step and the first of the next together */
 enum { nonlinear_wave_JOINED = 13 };
-enum { nonlinear_wave_ROWS_OF_FLOWS = 14 }; /* rows of coefficients */
 
 /* Along each axis: the smallest size, what sizes are multiples of, whether the ends are open. */
 static const size_t nonlinear_wave_least[nonlinear_wave_AXES] = { 2 };
@@ -169,7 +170,7 @@ static inline void nonlinear_wave_sweep1(const double *coef, const nonlinear_wav
     }
 }
 
-/* The flow of H_1 for the pieces of rows from first on, before end. */
+/* The flow of H_1, for the pieces of rows from first on, before end. */
 static void nonlinear_wave_part1(
     const nonlinear_wave_solver *s, const double *coef, int far, size_t first, size_t end)
 {
@@ -195,7 +196,7 @@ static inline void nonlinear_wave_sweep2(const double *coef, const nonlinear_wav
     }
 }
 
-/* The flow of H_2 for the pieces of rows from first on, before end. */
+/* The flow of H_2, for the pieces of rows from first on, before end. */
 static void nonlinear_wave_part2(
     const nonlinear_wave_solver *s, const double *coef, int far, size_t first, size_t end)
 {
@@ -402,6 +403,24 @@ static nonlinear_wave_status nonlinear_wave_set_step(nonlinear_wave_solver *s, d
     return nonlinear_wave_OK;
 }
 
+/* Whether all values at sites are finite. */
+static int nonlinear_wave_holds(const nonlinear_wave_solver *s)
+{
+    for (size_t k = 0; k < nonlinear_wave_DIM; ++k)
+        for (size_t r = 0; r < s->rows; ++r)
+            if (!nonlinear_wave_finite(s->x[k] + (ptrdiff_t)r * s->width, (size_t)s->length)) return 0;
+    return 1;
+}
+
+static void nonlinear_wave_copy(double *const to[nonlinear_wave_DIM], double *const from[nonlinear_wave_DIM],
+    const nonlinear_wave_solver *s)
+{
+    const size_t block = s->rows * (size_t)s->width * sizeof **from;
+    for (size_t k = 0; k < nonlinear_wave_DIM; ++k)
+        memcpy(to[k] - nonlinear_wave_LEAD, from[k] - nonlinear_wave_LEAD, block);
+}
+
+/* ---- The flows ---- */
 /* One part of H. */
 static void nonlinear_wave_sweep(const nonlinear_wave_solver *s, int part, const double *coef, int far)
 {
@@ -442,31 +461,14 @@ static void nonlinear_wave_steps(const nonlinear_wave_solver *s, int steps, int 
     }
 }
 
-/* Whether all values at sites are finite. */
-static int nonlinear_wave_holds(const nonlinear_wave_solver *s)
-{
-    for (size_t k = 0; k < nonlinear_wave_DIM; ++k)
-        for (size_t r = 0; r < s->rows; ++r)
-            if (!nonlinear_wave_finite(s->x[k] + (ptrdiff_t)r * s->width, (size_t)s->length)) return 0;
-    return 1;
-}
-
-static void nonlinear_wave_copy(double *const to[nonlinear_wave_DIM], double *const from[nonlinear_wave_DIM],
-    const nonlinear_wave_solver *s)
-{
-    const size_t block = s->rows * (size_t)s->width * sizeof **from;
-    for (size_t k = 0; k < nonlinear_wave_DIM; ++k)
-        memcpy(to[k] - nonlinear_wave_LEAD, from[k] - nonlinear_wave_LEAD, block);
-}
-
 /* Some steps; if they lead to what is not finite, none. */
-static int nonlinear_wave_try(nonlinear_wave_solver *s, int steps)
+static nonlinear_wave_status nonlinear_wave_try(nonlinear_wave_solver *s, int steps)
 {
     nonlinear_wave_copy(s->before, s->x, s);
     nonlinear_wave_steps(s, steps, 1);
-    if (nonlinear_wave_holds(s)) return 1;
+    if (nonlinear_wave_holds(s)) return nonlinear_wave_OK;
     nonlinear_wave_copy(s->x, s->before, s);
-    return 0;
+    return nonlinear_wave_NOT_FINITE;
 }
 
 nonlinear_wave_status nonlinear_wave_integrate(nonlinear_wave_solver *s, double h, size_t steps)
@@ -475,12 +477,13 @@ nonlinear_wave_status nonlinear_wave_integrate(nonlinear_wave_solver *s, double 
     if (status != nonlinear_wave_OK) return status;
     for (size_t stretch = nonlinear_wave_STRETCH; steps > 0;) {
         const size_t now = steps < stretch ? steps : stretch;
-        if (nonlinear_wave_try(s, (int)now)) {
+        const nonlinear_wave_status tried = nonlinear_wave_try(s, (int)now);
+        if (tried == nonlinear_wave_OK) {
             steps -= now;
             s->steps += now;
             s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
         } else if (now == 1) {
-            return nonlinear_wave_NOT_FINITE;
+            return tried;
         } else {
             stretch = 1;
         }

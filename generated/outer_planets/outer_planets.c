@@ -19,8 +19,9 @@
  *   2. Rows of sites
  *   3. The lattice
  *   4. The solver
- *   5. What is seen at sites
- * body-sha256: 1d6eaa9b2fec140338d4b47f5c26ed35abc974bc99c3997e3c63398268120e5d
+ *   5. The flows
+ *   6. What is seen at sites
+ * body-sha256: 896800d0022e3e641c27936838177540a80c55d2676e34ee426750b79a174cd6
  */
 #include "outer_planets.h"
 
@@ -32,13 +33,13 @@
 /* ---- The model ---- */
 const outer_planets_params outer_planets_default_params = { 0.000295912208286, NULL };
 
-enum { outer_planets_HALO = 0 };   /* sites that are copied beside a row */
-enum { outer_planets_LINES = 1 };  /* rows that kernels read: the row itself and those beside it */
-enum { outer_planets_ROW = 2 };    /* coefficients of one flow */
-enum { outer_planets_FLOWS = 13 }; /* in a step */
+enum { outer_planets_HALO = 0 };           /* sites that are copied beside a row */
+enum { outer_planets_LINES = 1 };          /* rows that kernels read: the row itself and those beside it */
+enum { outer_planets_ROW = 2 };            /* coefficients of one flow */
+enum { outer_planets_ROWS_OF_FLOWS = 14 }; /* rows of coefficients */
+enum { outer_planets_FLOWS = 13 };         /* in a step */
 /* the row of the last flow of a step and the first of the next together */
 enum { outer_planets_JOINED = 13 };
-enum { outer_planets_ROWS_OF_FLOWS = 14 }; /* rows of coefficients */
 
 /* Along each axis: the smallest size, what sizes are multiples of, whether the ends are open. */
 static const size_t outer_planets_least[outer_planets_AXES] = { 1 };
@@ -200,7 +201,7 @@ static inline void outer_planets_sweep1(const double *coef, const outer_planets_
     }
 }
 
-/* The flow of H_1 for the pieces of rows from first on, before end. */
+/* The flow of H_1, for the pieces of rows from first on, before end. */
 static void outer_planets_part1(
     const outer_planets_solver *s, const double *coef, int far, size_t first, size_t end)
 {
@@ -237,7 +238,7 @@ static inline void outer_planets_sweep2(const double *coef, const outer_planets_
     }
 }
 
-/* The flow of H_2 for the pieces of rows from first on, before end. */
+/* The flow of H_2, for the pieces of rows from first on, before end. */
 static void outer_planets_part2(
     const outer_planets_solver *s, const double *coef, int far, size_t first, size_t end)
 {
@@ -383,7 +384,8 @@ enum {
     outer_planets_STRETCH = 32, /* steps before the state is looked at: what is not finite stays so */
     outer_planets_LEAD = (outer_planets_HALO + 7) / 8 * 8,
     outer_planets_BUFFER = 256,
-    outer_planets_RESERVED = outer_planets_ARRAYS + outer_planets_DIM + outer_planets_GATHERED
+    outer_planets_RESERVED = outer_planets_ARRAYS + outer_planets_DIM
+        + outer_planets_GATHERED
 };
 
 /* Sizes as they have to be: the widths of rows and the number of rows, 0 if they are not allowed. */
@@ -524,6 +526,24 @@ static outer_planets_status outer_planets_set_step(outer_planets_solver *s, doub
     return outer_planets_OK;
 }
 
+/* Whether all values at sites are finite. */
+static int outer_planets_holds(const outer_planets_solver *s)
+{
+    for (size_t k = 0; k < outer_planets_DIM; ++k)
+        for (size_t r = 0; r < s->rows; ++r)
+            if (!outer_planets_finite(s->x[k] + (ptrdiff_t)r * s->width, (size_t)s->length)) return 0;
+    return 1;
+}
+
+static void outer_planets_copy(double *const to[outer_planets_DIM], double *const from[outer_planets_DIM],
+    const outer_planets_solver *s)
+{
+    const size_t block = s->rows * (size_t)s->width * sizeof **from;
+    for (size_t k = 0; k < outer_planets_DIM; ++k)
+        memcpy(to[k] - outer_planets_LEAD, from[k] - outer_planets_LEAD, block);
+}
+
+/* ---- The flows ---- */
 /* One part of H. */
 static void outer_planets_sweep(const outer_planets_solver *s, int part, const double *coef, int far)
 {
@@ -564,31 +584,14 @@ static void outer_planets_steps(const outer_planets_solver *s, int steps, int fa
     }
 }
 
-/* Whether all values at sites are finite. */
-static int outer_planets_holds(const outer_planets_solver *s)
-{
-    for (size_t k = 0; k < outer_planets_DIM; ++k)
-        for (size_t r = 0; r < s->rows; ++r)
-            if (!outer_planets_finite(s->x[k] + (ptrdiff_t)r * s->width, (size_t)s->length)) return 0;
-    return 1;
-}
-
-static void outer_planets_copy(double *const to[outer_planets_DIM], double *const from[outer_planets_DIM],
-    const outer_planets_solver *s)
-{
-    const size_t block = s->rows * (size_t)s->width * sizeof **from;
-    for (size_t k = 0; k < outer_planets_DIM; ++k)
-        memcpy(to[k] - outer_planets_LEAD, from[k] - outer_planets_LEAD, block);
-}
-
 /* Some steps; if they lead to what is not finite, none. */
-static int outer_planets_try(outer_planets_solver *s, int steps)
+static outer_planets_status outer_planets_try(outer_planets_solver *s, int steps)
 {
     outer_planets_copy(s->before, s->x, s);
     outer_planets_steps(s, steps, 1);
-    if (outer_planets_holds(s)) return 1;
+    if (outer_planets_holds(s)) return outer_planets_OK;
     outer_planets_copy(s->x, s->before, s);
-    return 0;
+    return outer_planets_NOT_FINITE;
 }
 
 outer_planets_status outer_planets_integrate(outer_planets_solver *s, double h, size_t steps)
@@ -597,12 +600,13 @@ outer_planets_status outer_planets_integrate(outer_planets_solver *s, double h, 
     if (status != outer_planets_OK) return status;
     for (size_t stretch = outer_planets_STRETCH; steps > 0;) {
         const size_t now = steps < stretch ? steps : stretch;
-        if (outer_planets_try(s, (int)now)) {
+        const outer_planets_status tried = outer_planets_try(s, (int)now);
+        if (tried == outer_planets_OK) {
             steps -= now;
             s->steps += now;
             s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
         } else if (now == 1) {
-            return outer_planets_NOT_FINITE;
+            return tried;
         } else {
             stretch = 1;
         }

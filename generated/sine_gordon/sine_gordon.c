@@ -19,8 +19,9 @@
  *   2. Rows of sites
  *   3. The lattice
  *   4. The solver
- *   5. What is seen at sites
- * body-sha256: 7d7938f960aa92568a32f39f04779be8b69c3ba04debd116984d0f4daa86cddb
+ *   5. The flows
+ *   6. What is seen at sites
+ * body-sha256: a12ef074b41adcc399d7ecbd793693393be7ea0edefb07cc2243ccad5da6d3c3
  */
 #include "sine_gordon.h"
 
@@ -35,9 +36,9 @@ const sine_gordon_params sine_gordon_default_params = { 0.25 };
 enum { sine_gordon_HALO = 1 }; /* sites that are copied beside a row */
 enum { sine_gordon_LINES = 1 }; /* rows that kernels read: the row itself and those beside it */
 enum { sine_gordon_ROW = 3 }; /* coefficients of one flow */
+enum { sine_gordon_ROWS_OF_FLOWS = 14 }; /* rows of coefficients */
 enum { sine_gordon_FLOWS = 13 }; /* in a step */
 enum { sine_gordon_JOINED = 13 }; /* the row of the last flow of a step and the first of the next together */
-enum { sine_gordon_ROWS_OF_FLOWS = 14 }; /* rows of coefficients */
 
 /* Along each axis: the smallest size, what sizes are multiples of, whether the ends are open. */
 static const size_t sine_gordon_least[sine_gordon_AXES] = { 2 };
@@ -201,7 +202,7 @@ static inline void sine_gordon_sweep1(const double *coef, const sine_gordon_row 
     }
 }
 
-/* The flow of H_1 for the pieces of rows from first on, before end. */
+/* The flow of H_1, for the pieces of rows from first on, before end. */
 static void sine_gordon_part1(
     const sine_gordon_solver *s, const double *coef, int far, size_t first, size_t end)
 {
@@ -227,7 +228,7 @@ static inline void sine_gordon_sweep2(const double *coef, const sine_gordon_row 
     }
 }
 
-/* The flow of H_2 for the pieces of rows from first on, before end. */
+/* The flow of H_2, for the pieces of rows from first on, before end. */
 static void sine_gordon_part2(
     const sine_gordon_solver *s, const double *coef, int far, size_t first, size_t end)
 {
@@ -428,6 +429,24 @@ static sine_gordon_status sine_gordon_set_step(sine_gordon_solver *s, double h)
     return sine_gordon_OK;
 }
 
+/* Whether all values at sites are finite. */
+static int sine_gordon_holds(const sine_gordon_solver *s)
+{
+    for (size_t k = 0; k < sine_gordon_DIM; ++k)
+        for (size_t r = 0; r < s->rows; ++r)
+            if (!sine_gordon_finite(s->x[k] + (ptrdiff_t)r * s->width, (size_t)s->length)) return 0;
+    return 1;
+}
+
+static void sine_gordon_copy(double *const to[sine_gordon_DIM], double *const from[sine_gordon_DIM],
+    const sine_gordon_solver *s)
+{
+    const size_t block = s->rows * (size_t)s->width * sizeof **from;
+    for (size_t k = 0; k < sine_gordon_DIM; ++k)
+        memcpy(to[k] - sine_gordon_LEAD, from[k] - sine_gordon_LEAD, block);
+}
+
+/* ---- The flows ---- */
 /* One part of H. */
 static void sine_gordon_sweep(const sine_gordon_solver *s, int part, const double *coef, int far)
 {
@@ -468,31 +487,14 @@ static void sine_gordon_steps(const sine_gordon_solver *s, int steps, int far)
     }
 }
 
-/* Whether all values at sites are finite. */
-static int sine_gordon_holds(const sine_gordon_solver *s)
-{
-    for (size_t k = 0; k < sine_gordon_DIM; ++k)
-        for (size_t r = 0; r < s->rows; ++r)
-            if (!sine_gordon_finite(s->x[k] + (ptrdiff_t)r * s->width, (size_t)s->length)) return 0;
-    return 1;
-}
-
-static void sine_gordon_copy(double *const to[sine_gordon_DIM], double *const from[sine_gordon_DIM],
-    const sine_gordon_solver *s)
-{
-    const size_t block = s->rows * (size_t)s->width * sizeof **from;
-    for (size_t k = 0; k < sine_gordon_DIM; ++k)
-        memcpy(to[k] - sine_gordon_LEAD, from[k] - sine_gordon_LEAD, block);
-}
-
 /* Some steps; if they lead to what is not finite, none. */
-static int sine_gordon_try(sine_gordon_solver *s, int steps)
+static sine_gordon_status sine_gordon_try(sine_gordon_solver *s, int steps)
 {
     sine_gordon_copy(s->before, s->x, s);
     sine_gordon_steps(s, steps, 1);
-    if (sine_gordon_holds(s)) return 1;
+    if (sine_gordon_holds(s)) return sine_gordon_OK;
     sine_gordon_copy(s->x, s->before, s);
-    return 0;
+    return sine_gordon_NOT_FINITE;
 }
 
 sine_gordon_status sine_gordon_integrate(sine_gordon_solver *s, double h, size_t steps)
@@ -501,12 +503,13 @@ sine_gordon_status sine_gordon_integrate(sine_gordon_solver *s, double h, size_t
     if (status != sine_gordon_OK) return status;
     for (size_t stretch = sine_gordon_STRETCH; steps > 0;) {
         const size_t now = steps < stretch ? steps : stretch;
-        if (sine_gordon_try(s, (int)now)) {
+        const sine_gordon_status tried = sine_gordon_try(s, (int)now);
+        if (tried == sine_gordon_OK) {
             steps -= now;
             s->steps += now;
             s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
         } else if (now == 1) {
-            return sine_gordon_NOT_FINITE;
+            return tried;
         } else {
             stretch = 1;
         }

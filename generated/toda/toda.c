@@ -19,8 +19,9 @@
  *   2. Rows of sites
  *   3. The lattice
  *   4. The solver
- *   5. What is seen at sites
- * body-sha256: 2ba339047a7f320384125c4539fbc214f090ed3c4e76393dc6fc03d9493783ba
+ *   5. The flows
+ *   6. What is seen at sites
+ * body-sha256: 3bf70719e317e491a36848644c07cf079f0fcfe5d14e3ae27285797d9c56324e
  */
 #include "toda.h"
 
@@ -35,9 +36,9 @@ const toda_params toda_default_params = { 0 };
 enum { toda_HALO = 1 };           /* sites that are copied beside a row */
 enum { toda_LINES = 1 };          /* rows that kernels read: the row itself and those beside it */
 enum { toda_ROW = 2 };            /* coefficients of one flow */
+enum { toda_ROWS_OF_FLOWS = 14 }; /* rows of coefficients */
 enum { toda_FLOWS = 13 };         /* in a step */
 enum { toda_JOINED = 13 };        /* the row of the last flow of a step and the first of the next together */
-enum { toda_ROWS_OF_FLOWS = 14 }; /* rows of coefficients */
 
 /* Along each axis: the smallest size, what sizes are multiples of, whether the ends are open. */
 static const size_t toda_least[toda_AXES] = { 2 };
@@ -194,7 +195,7 @@ static inline void toda_sweep1(const double *coef, const toda_row *row, ptrdiff_
     }
 }
 
-/* The flow of H_1 for the pieces of rows from first on, before end. */
+/* The flow of H_1, for the pieces of rows from first on, before end. */
 static void toda_part1(
     const toda_solver *s, const double *coef, int far, size_t first, size_t end)
 {
@@ -219,7 +220,7 @@ static inline void toda_sweep2(const double *coef, const toda_row *row, ptrdiff_
     }
 }
 
-/* The flow of H_2 for the pieces of rows from first on, before end. */
+/* The flow of H_2, for the pieces of rows from first on, before end. */
 static void toda_part2(
     const toda_solver *s, const double *coef, int far, size_t first, size_t end)
 {
@@ -414,6 +415,22 @@ static toda_status toda_set_step(toda_solver *s, double h)
     return toda_OK;
 }
 
+/* Whether all values at sites are finite. */
+static int toda_holds(const toda_solver *s)
+{
+    for (size_t k = 0; k < toda_DIM; ++k)
+        for (size_t r = 0; r < s->rows; ++r)
+            if (!toda_finite(s->x[k] + (ptrdiff_t)r * s->width, (size_t)s->length)) return 0;
+    return 1;
+}
+
+static void toda_copy(double *const to[toda_DIM], double *const from[toda_DIM], const toda_solver *s)
+{
+    const size_t block = s->rows * (size_t)s->width * sizeof **from;
+    for (size_t k = 0; k < toda_DIM; ++k) memcpy(to[k] - toda_LEAD, from[k] - toda_LEAD, block);
+}
+
+/* ---- The flows ---- */
 /* One part of H. */
 static void toda_sweep(const toda_solver *s, int part, const double *coef, int far)
 {
@@ -450,29 +467,14 @@ static void toda_steps(const toda_solver *s, int steps, int far)
     }
 }
 
-/* Whether all values at sites are finite. */
-static int toda_holds(const toda_solver *s)
-{
-    for (size_t k = 0; k < toda_DIM; ++k)
-        for (size_t r = 0; r < s->rows; ++r)
-            if (!toda_finite(s->x[k] + (ptrdiff_t)r * s->width, (size_t)s->length)) return 0;
-    return 1;
-}
-
-static void toda_copy(double *const to[toda_DIM], double *const from[toda_DIM], const toda_solver *s)
-{
-    const size_t block = s->rows * (size_t)s->width * sizeof **from;
-    for (size_t k = 0; k < toda_DIM; ++k) memcpy(to[k] - toda_LEAD, from[k] - toda_LEAD, block);
-}
-
 /* Some steps; if they lead to what is not finite, none. */
-static int toda_try(toda_solver *s, int steps)
+static toda_status toda_try(toda_solver *s, int steps)
 {
     toda_copy(s->before, s->x, s);
     toda_steps(s, steps, 1);
-    if (toda_holds(s)) return 1;
+    if (toda_holds(s)) return toda_OK;
     toda_copy(s->x, s->before, s);
-    return 0;
+    return toda_NOT_FINITE;
 }
 
 toda_status toda_integrate(toda_solver *s, double h, size_t steps)
@@ -481,12 +483,13 @@ toda_status toda_integrate(toda_solver *s, double h, size_t steps)
     if (status != toda_OK) return status;
     for (size_t stretch = toda_STRETCH; steps > 0;) {
         const size_t now = steps < stretch ? steps : stretch;
-        if (toda_try(s, (int)now)) {
+        const toda_status tried = toda_try(s, (int)now);
+        if (tried == toda_OK) {
             steps -= now;
             s->steps += now;
             s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
         } else if (now == 1) {
-            return toda_NOT_FINITE;
+            return tried;
         } else {
             stretch = 1;
         }

@@ -19,8 +19,9 @@
  *   2. Rows of sites
  *   3. The lattice
  *   4. The solver
- *   5. What is seen at sites
- * body-sha256: 323fc5c5e65a23320f77d715fea778dff15b8a5b56d2e879253c4edd21c956a9
+ *   5. The flows
+ *   6. What is seen at sites
+ * body-sha256: cb28cbeb4a8eed6cfcf4e1c8a32189e3a832ff15f28b4a56d4f5753a2b2dc12b
  */
 #include "volterra.h"
 
@@ -35,9 +36,9 @@ const volterra_params volterra_default_params = { 0 };
 enum { volterra_HALO = 1 }; /* sites that are copied beside a row */
 enum { volterra_LINES = 1 }; /* rows that kernels read: the row itself and those beside it */
 enum { volterra_ROW = 1 }; /* coefficients of one flow */
+enum { volterra_ROWS_OF_FLOWS = 14 }; /* rows of coefficients */
 enum { volterra_FLOWS = 13 }; /* in a step */
 enum { volterra_JOINED = 13 }; /* the row of the last flow of a step and the first of the next together */
-enum { volterra_ROWS_OF_FLOWS = 14 }; /* rows of coefficients */
 enum { volterra_COLOUR_COUNT = 2 }; /* colours of sites */
 enum { volterra_COLOUR_STRIDE = 1 }; /* what a step along a row adds to the colour */
 
@@ -212,7 +213,7 @@ static inline void volterra_sweep1(const double *coef, const volterra_row *row, 
     }
 }
 
-/* The flow of H_1 for the pieces of rows from first on, before end. */
+/* The flow of H_1, for the pieces of rows from first on, before end. */
 static void volterra_part1(
     const volterra_solver *s, const double *coef, int far, size_t first, size_t end)
 {
@@ -236,7 +237,7 @@ static inline void volterra_sweep2(const double *coef, const volterra_row *row, 
     }
 }
 
-/* The flow of H_2 for the pieces of rows from first on, before end. */
+/* The flow of H_2, for the pieces of rows from first on, before end. */
 static void volterra_part2(
     const volterra_solver *s, const double *coef, int far, size_t first, size_t end)
 {
@@ -429,6 +430,23 @@ static volterra_status volterra_set_step(volterra_solver *s, double h)
     return volterra_OK;
 }
 
+/* Whether all values at sites are finite. */
+static int volterra_holds(const volterra_solver *s)
+{
+    for (size_t k = 0; k < volterra_DIM; ++k)
+        for (size_t r = 0; r < s->rows; ++r)
+            if (!volterra_finite(s->x[k] + (ptrdiff_t)r * s->width, (size_t)s->length)) return 0;
+    return 1;
+}
+
+static void volterra_copy(double *const to[volterra_DIM], double *const from[volterra_DIM],
+    const volterra_solver *s)
+{
+    const size_t block = s->rows * (size_t)s->width * sizeof **from;
+    for (size_t k = 0; k < volterra_DIM; ++k) memcpy(to[k] - volterra_LEAD, from[k] - volterra_LEAD, block);
+}
+
+/* ---- The flows ---- */
 /* One part of H. */
 static void volterra_sweep(const volterra_solver *s, int part, const double *coef, int far)
 {
@@ -466,30 +484,14 @@ static void volterra_steps(const volterra_solver *s, int steps, int far)
     }
 }
 
-/* Whether all values at sites are finite. */
-static int volterra_holds(const volterra_solver *s)
-{
-    for (size_t k = 0; k < volterra_DIM; ++k)
-        for (size_t r = 0; r < s->rows; ++r)
-            if (!volterra_finite(s->x[k] + (ptrdiff_t)r * s->width, (size_t)s->length)) return 0;
-    return 1;
-}
-
-static void volterra_copy(double *const to[volterra_DIM], double *const from[volterra_DIM],
-    const volterra_solver *s)
-{
-    const size_t block = s->rows * (size_t)s->width * sizeof **from;
-    for (size_t k = 0; k < volterra_DIM; ++k) memcpy(to[k] - volterra_LEAD, from[k] - volterra_LEAD, block);
-}
-
 /* Some steps; if they lead to what is not finite, none. */
-static int volterra_try(volterra_solver *s, int steps)
+static volterra_status volterra_try(volterra_solver *s, int steps)
 {
     volterra_copy(s->before, s->x, s);
     volterra_steps(s, steps, 1);
-    if (volterra_holds(s)) return 1;
+    if (volterra_holds(s)) return volterra_OK;
     volterra_copy(s->x, s->before, s);
-    return 0;
+    return volterra_NOT_FINITE;
 }
 
 volterra_status volterra_integrate(volterra_solver *s, double h, size_t steps)
@@ -498,12 +500,13 @@ volterra_status volterra_integrate(volterra_solver *s, double h, size_t steps)
     if (status != volterra_OK) return status;
     for (size_t stretch = volterra_STRETCH; steps > 0;) {
         const size_t now = steps < stretch ? steps : stretch;
-        if (volterra_try(s, (int)now)) {
+        const volterra_status tried = volterra_try(s, (int)now);
+        if (tried == volterra_OK) {
             steps -= now;
             s->steps += now;
             s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
         } else if (now == 1) {
-            return volterra_NOT_FINITE;
+            return tried;
         } else {
             stretch = 1;
         }

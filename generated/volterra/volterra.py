@@ -13,7 +13,7 @@
 #
 # SPDX-License-Identifier: 0BSD
 # This file belongs to whoever generated it; phigen claims no rights in it.
-# body-sha256: 9ed82212e43a8e8bf2325ecacc664af5a49cdff9b74109eb760c832a14d871ac
+# body-sha256: 3cc6e44b045bb1609da03d69725dc33f5e377b7b3208a39bf5b003a818ed6ff4
 import numpy as np
 
 VERSION = "0.1.0"
@@ -49,7 +49,7 @@ SCHEDULE = ((0, 0), (1, 1), (0, 2), (1, 3), (0, 4), (1, 5), (0, 6), (1, 7), (0, 
 class StepError(ArithmeticError):
     """A step could not be made; the state before it stands.
 
-    step: number of the failing step, from 0; status: NOT_FINITE; states: the frames so far.
+    step: number of the failing step, from 0; status: NO_CONVERGENCE, NOT_FINITE; states: the frames so far.
     """
 
     def __init__(self, step, status, states):
@@ -58,6 +58,17 @@ class StepError(ArithmeticError):
 
     def __reduce__(self):
         return type(self), (self.step, self.status, self.states)
+
+
+class FailedError(ArithmeticError):
+    """Why a step cannot be made."""
+
+
+def _finite(values):
+    """The values, or FailedError."""
+    if not np.isfinite(values).all():
+        raise FailedError("NOT_FINITE")
+    return values
 
 
 class _Sites:
@@ -118,6 +129,14 @@ class _Sites:
         return np.where(self._known[colour], new, old)
 
 
+def _advance(sites, rows, x, past):
+    """One step; raises FailedError. Nothing of the past is remembered."""
+    for part, row in SCHEDULE:
+        for sweep in PARTS[part]:
+            x = sweep(rows[row], x, sites)
+    return _finite(x)
+
+
 def _coefficients(sites, h):
     """The coefficients of all flows of a step."""
     with np.errstate(all="ignore"):
@@ -125,14 +144,6 @@ def _coefficients(sites, h):
     if not all(np.isfinite(c).all() for row in rows for c in row):
         raise ValueError("no step can be made with these parameters")
     return rows
-
-
-def _advance(sites, rows, x):
-    """One step."""
-    for part, row in SCHEDULE:
-        for sweep in PARTS[part]:
-            x = sweep(rows[row], x, sites)
-    return x
 
 
 def _started(x, parameters):
@@ -155,13 +166,13 @@ def integrate(x0, h, steps, stride=1, **parameters):
     x, sites = _started(x0, parameters)
     if steps < 0 or stride < 1 or not np.isfinite(h):
         raise ValueError("steps must be at least 0, stride at least 1, and h finite")
-    rows, frames = _coefficients(sites, float(h)), [x]
+    rows, frames, past = _coefficients(sites, float(h)), [x], {}
     with np.errstate(all="ignore"):
         for done in range(steps):
-            following = _advance(sites, rows, x)
-            if not np.isfinite(following).all():
-                raise StepError(done, "NOT_FINITE", np.array(frames))
-            x = following
+            try:
+                x = _advance(sites, rows, x, past)
+            except FailedError as failed:
+                raise StepError(done, str(failed), np.array(frames)) from None
             if (done + 1) % stride == 0 or done + 1 == steps:
                 frames.append(x)
     return np.array(frames)

@@ -19,8 +19,9 @@
  *   2. Rows of sites
  *   3. The lattice
  *   4. The solver
- *   5. What is seen at sites
- * body-sha256: 0e4ceef56904b70b44e455f19af52211b1683f11e7e2b2365d0ddc58a3abfbde
+ *   5. The flows
+ *   6. What is seen at sites
+ * body-sha256: a1e90b4264b3d8dc4f46fd610682eb518193d33c4063ed76e3a00df3a69e43ec
  */
 #include "xxz_disorder.h"
 
@@ -35,9 +36,9 @@ const xxz_disorder_params xxz_disorder_default_params = { 1.0, 1.3, NULL };
 enum { xxz_disorder_HALO = 1 }; /* sites that are copied beside a row */
 enum { xxz_disorder_LINES = 1 }; /* rows that kernels read: the row itself and those beside it */
 enum { xxz_disorder_ROW = 3 }; /* coefficients of one flow */
+enum { xxz_disorder_ROWS_OF_FLOWS = 26 }; /* rows of coefficients */
 enum { xxz_disorder_FLOWS = 25 }; /* in a step */
 enum { xxz_disorder_JOINED = 25 }; /* the row of the last flow of a step and the first of the next together */
-enum { xxz_disorder_ROWS_OF_FLOWS = 26 }; /* rows of coefficients */
 
 /* Along each axis: the smallest size, what sizes are multiples of, whether the ends are open. */
 static const size_t xxz_disorder_least[xxz_disorder_AXES] = { 2 };
@@ -208,7 +209,7 @@ static inline void xxz_disorder_sweep1(const double *coef, const xxz_disorder_ro
     }
 }
 
-/* The flow of H_1 for the pieces of rows from first on, before end. */
+/* The flow of H_1, for the pieces of rows from first on, before end. */
 static void xxz_disorder_part1(
     const xxz_disorder_solver *s, const double *coef, int far, size_t first, size_t end)
 {
@@ -242,7 +243,7 @@ static inline void xxz_disorder_sweep2(const double *coef, const xxz_disorder_ro
     }
 }
 
-/* The flow of H_2 for the pieces of rows from first on, before end. */
+/* The flow of H_2, for the pieces of rows from first on, before end. */
 static void xxz_disorder_part2(
     const xxz_disorder_solver *s, const double *coef, int far, size_t first, size_t end)
 {
@@ -277,7 +278,7 @@ static inline void xxz_disorder_sweep3(const double *coef, const xxz_disorder_ro
     }
 }
 
-/* The flow of H_3 for the pieces of rows from first on, before end. */
+/* The flow of H_3, for the pieces of rows from first on, before end. */
 static void xxz_disorder_part3(
     const xxz_disorder_solver *s, const double *coef, int far, size_t first, size_t end)
 {
@@ -511,6 +512,24 @@ static xxz_disorder_status xxz_disorder_set_step(xxz_disorder_solver *s, double 
     return xxz_disorder_OK;
 }
 
+/* Whether all values at sites are finite. */
+static int xxz_disorder_holds(const xxz_disorder_solver *s)
+{
+    for (size_t k = 0; k < xxz_disorder_DIM; ++k)
+        for (size_t r = 0; r < s->rows; ++r)
+            if (!xxz_disorder_finite(s->x[k] + (ptrdiff_t)r * s->width, (size_t)s->length)) return 0;
+    return 1;
+}
+
+static void xxz_disorder_copy(double *const to[xxz_disorder_DIM], double *const from[xxz_disorder_DIM],
+    const xxz_disorder_solver *s)
+{
+    const size_t block = s->rows * (size_t)s->width * sizeof **from;
+    for (size_t k = 0; k < xxz_disorder_DIM; ++k)
+        memcpy(to[k] - xxz_disorder_LEAD, from[k] - xxz_disorder_LEAD, block);
+}
+
+/* ---- The flows ---- */
 /* One part of H. */
 static void xxz_disorder_sweep(const xxz_disorder_solver *s, int part, const double *coef, int far)
 {
@@ -551,31 +570,14 @@ static void xxz_disorder_steps(const xxz_disorder_solver *s, int steps, int far)
     }
 }
 
-/* Whether all values at sites are finite. */
-static int xxz_disorder_holds(const xxz_disorder_solver *s)
-{
-    for (size_t k = 0; k < xxz_disorder_DIM; ++k)
-        for (size_t r = 0; r < s->rows; ++r)
-            if (!xxz_disorder_finite(s->x[k] + (ptrdiff_t)r * s->width, (size_t)s->length)) return 0;
-    return 1;
-}
-
-static void xxz_disorder_copy(double *const to[xxz_disorder_DIM], double *const from[xxz_disorder_DIM],
-    const xxz_disorder_solver *s)
-{
-    const size_t block = s->rows * (size_t)s->width * sizeof **from;
-    for (size_t k = 0; k < xxz_disorder_DIM; ++k)
-        memcpy(to[k] - xxz_disorder_LEAD, from[k] - xxz_disorder_LEAD, block);
-}
-
 /* Some steps; if they lead to what is not finite, none. */
-static int xxz_disorder_try(xxz_disorder_solver *s, int steps)
+static xxz_disorder_status xxz_disorder_try(xxz_disorder_solver *s, int steps)
 {
     xxz_disorder_copy(s->before, s->x, s);
     xxz_disorder_steps(s, steps, 1);
-    if (xxz_disorder_holds(s)) return 1;
+    if (xxz_disorder_holds(s)) return xxz_disorder_OK;
     xxz_disorder_copy(s->x, s->before, s);
-    return 0;
+    return xxz_disorder_NOT_FINITE;
 }
 
 xxz_disorder_status xxz_disorder_integrate(xxz_disorder_solver *s, double h, size_t steps)
@@ -584,12 +586,13 @@ xxz_disorder_status xxz_disorder_integrate(xxz_disorder_solver *s, double h, siz
     if (status != xxz_disorder_OK) return status;
     for (size_t stretch = xxz_disorder_STRETCH; steps > 0;) {
         const size_t now = steps < stretch ? steps : stretch;
-        if (xxz_disorder_try(s, (int)now)) {
+        const xxz_disorder_status tried = xxz_disorder_try(s, (int)now);
+        if (tried == xxz_disorder_OK) {
             steps -= now;
             s->steps += now;
             s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
         } else if (now == 1) {
-            return xxz_disorder_NOT_FINITE;
+            return tried;
         } else {
             stretch = 1;
         }

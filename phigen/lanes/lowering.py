@@ -16,6 +16,7 @@ from phigen.scheme.kernel import Kernel
 from phigen.scheme.program import Program
 from phigen.scheme.steps import Explicit, Factorisation, Implicit, Newton, Path, PathLanes, Splitting, Sweeps
 from phigen.symbolic.expression import topological
+from phigen.symbolic.special import SPECIAL
 
 #: Points at which a kernel for lanes is evaluated at once: what one vector of AVX-512 holds.
 LANES = 8
@@ -118,11 +119,12 @@ def in_lanes(program: Program) -> Lanes | None:
 def _rows(program: Program, step: Sweeps) -> Rows:
     """Sites are in rows in any case; the short way near 0 is for speed."""
     swept = [sweep.kernel for part in step.parts for sweep in part]
+    swept += [step.equation.relax, step.equation.advance] if step.equation else []
     seen = program.observables
     looped = [kernel for kernel in step.kernels if kernel is not step.prepare]
     ops = operations([*looped, seen.energy, seen.casimirs, seen.vector_field])
     used = operations(swept) if program.lanes and program.profile == "fast" else set()
-    return Rows(with_formulas(ops), tuple(f for f in NEAR_FUNCTIONS if f in used))
+    return Rows(with_formulas(ops), tuple(f for f in (*NEAR_FUNCTIONS, *SPECIAL) if f in used))
 
 
 def _newton(program: Program, step: Newton) -> Blocks | None:

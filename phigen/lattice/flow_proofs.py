@@ -10,14 +10,14 @@ from collections.abc import Iterator
 
 from phigen.lattice.cell import Cell
 from phigen.lattice.parts import SiteMotion, summands_of
-from phigen.lattice.sweeps import LatticePlan
+from phigen.lattice.sweeps import SplittingPlan
 from phigen.splitting.ring import KICK, TIME
 from phigen.splitting.statements import angles_added
 from phigen.symbolic.expression import ZERO, Expression, derivatives, number, substitute, symbol, symbols_of, total
 from phigen.symbolic.verdict import Statement, decide_zero
 
 
-def check(cell: Cell, plan: LatticePlan) -> Iterator[Statement]:
+def check(cell: Cell, plan: SplittingPlan) -> Iterator[Statement]:
     """The statements, those on flows in the order of the parts."""
     count, flows = plan.parts.colouring.count, plan.flows
     positive = tuple(p.name for p in cell.parameters if p.positive)

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 
-from phigen.lattice.cell import PAIRS, Cell
+from phigen.lattice.cell import GRID, PAIRS, Cell
 from phigen.lattice.parts import (
     FORCE,
     BondSum,
@@ -20,6 +20,7 @@ from phigen.lattice.parts import (
     PartSearch,
     SiteMotion,
     Summand,
+    field_at_site,
     own_ring,
     summands_of,
 )
@@ -181,6 +182,20 @@ def site_sums(cell: Cell) -> tuple[BondSum, ...]:
     for f, end, rate in bond_rates(cell, cell.hamiltonian):
         values[end][_gathered(f)] = values[end].get(_gathered(f), ZERO) + rate
     return alike([BondSum(v, end) for end, v in values.items()])
+
+
+def sums_by_field(cell: Cell) -> dict[str, Expression]:
+    """The symbols of what bonds or pairs add to the force on a field or, where brackets run along them, to its rate."""
+    names = {n for s in site_sums(cell) for n in s.values} if cell.relation != GRID else set()
+    return {f: symbol(_gathered(f)) for f in cell.fields if _gathered(f) in names}
+
+
+def field_with_sums(cell: Cell) -> list[Expression]:
+    """The vector field at a site, with symbols for what bonds or pairs add to forces, or to the field itself."""
+    added = sums_by_field(cell)
+    if not cell.bond_bracket:
+        return list(field_at_site(cell, added))
+    return [e + added.get(f, ZERO) for f, e in zip(cell.fields, field_at_site(cell, {}), strict=True)]
 
 
 def seen_from(cell: Cell, e: Expression, end: str) -> Expression:

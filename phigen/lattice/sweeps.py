@@ -10,25 +10,28 @@ from typing import Any
 from phigen.errors import Diagnostic, Location, SpecError
 from phigen.lattice.building import least_sizes
 from phigen.lattice.cell import GRAPH, GRID, PAIRS, PERIODIC, Cell
-from phigen.lattice.graphs import GraphSearch, energies, site_sums
+from phigen.lattice.graphs import GraphSearch, energies, field_with_sums, site_sums
+from phigen.lattice.kernels import site_kernel
 from phigen.lattice.kicks import cell_kicks
 from phigen.lattice.parts import (
     BondSum,
     CellFlow,
     CellSplitting,
+    Colouring,
     PartSearch,
     SiteMotion,
-    field_at_site,
     present,
     split_cell,
     summands_of,
 )
+from phigen.lattice.series import SeriesPlan, equation, plan_series
 from phigen.scheme.alternation import Alternation, Schedule
 from phigen.scheme.alternation import schedule as alternating
 from phigen.scheme.choosing import Choice, planned
 from phigen.scheme.kernel import Kernel, Output
 from phigen.scheme.lowering import operation_counts
 from phigen.scheme.nystrom import Nystrom
+from phigen.scheme.order import Order
 from phigen.scheme.program import About, Observables, Program
 from phigen.scheme.splitting import staged
 from phigen.scheme.staging import Coefficients
@@ -36,9 +39,8 @@ from phigen.scheme.steps import Ends, Gather, Partners, Sites, Sweep, Sweeps
 from phigen.spec.model import NO_EXTRAS, Extras, Spec
 from phigen.splitting.parts import Splitting
 from phigen.splitting.ring import KICK, TIME
-from phigen.symbolic.expression import ZERO, Expression, symbol, symbols_of, total
+from phigen.symbolic.expression import total
 from phigen.symbolic.neighbours import steps
-from phigen.symbolic.symbols import CHOSEN, GATHERED, PRESENT, Symbol, kind_of
 
 
 class _Nowhere:
@@ -48,16 +50,44 @@ class _Nowhere:
 
 
 @dataclass(frozen=True)
-class LatticePlan:
+class SplittingPlan:
     """The parts of H of a lattice, and the method with the flows in the order of its steps."""
 
     parts: CellSplitting
     choice: Choice
 
     @property
+    def order(self) -> Order:
+        """The order of the method."""
+        return self.choice.order
+
+    @property
+    def composition(self) -> str:
+        """The name of the method."""
+        return self.choice.method.name
+
+    @property
+    def colouring(self) -> Colouring:
+        """The colours of the sites."""
+        return self.parts.colouring
+
+    @property
     def flows(self) -> tuple[CellFlow, ...]:
         """The flows in the order of a step."""
         return tuple(flow for flow in self.choice.splitting.flows if isinstance(flow, CellFlow))
+
+    @property
+    def by_colour(self) -> tuple[bool, ...]:
+        """Of each flow whether it is that of one colour of a graph; nothing where none is."""
+        return tuple(flow.by_colour for flow in self.flows) if any(flow.by_colour for flow in self.flows) else ()
+
+    def schedule(self) -> Schedule:
+        """The flows of a step, part by part."""
+        return _any_number(self.choice.method) if self.by_colour else self.choice.schedule()
+
+
+#: How a step of a lattice is made.
+LatticePlan = SplittingPlan | SeriesPlan
 
 
 def plan_sweeps(
@@ -69,13 +99,26 @@ def plan_sweeps(
     extras: Extras = NO_EXTRAS,
     spec: Spec | None = None,
 ) -> LatticePlan:
-    """The parts and the method. Raises `SpecError` where H does not split, and for what is not offered."""
+    """The parts and the method; by the series where that was asked for, or where H does not split.
+
+    Raises `SpecError` where neither is possible, and for what is not offered.
+    """
     host = spec or _Nowhere()
-    _expect_offered(cell, scheme, extras, host.locations)
+    _expect_offered(cell, extras, host.locations)
+    if scheme == "series" or (scheme == "auto" and spec and spec.birealisation.kind != "auto"):
+        return plan_series(cell, host, order, composition, spec)
     search = GraphSearch if cell.relation == GRAPH else PartSearch
-    parts = split_cell(cell, host.locations.get(("hamiltonian",)), search)
+    try:
+        parts = split_cell(cell, host.locations.get(("hamiltonian",)), search)
+    except SpecError as unsplit:
+        if scheme == "splitting":
+            raise
+        try:
+            return plan_series(cell, host, order, composition, spec)
+        except SpecError as error:
+            raise SpecError([*unsplit.diagnostics, *error.diagnostics]) from None
     plain = Splitting(parts.flows)
-    return LatticePlan(parts, planned(host, plain, order, composition, lambda: cell_kicks(cell, parts)))
+    return SplittingPlan(parts, planned(host, plain, order, composition, lambda: cell_kicks(cell, parts)))
 
 
 def build_sweeps(
@@ -90,41 +133,42 @@ def build_sweeps(
     lanes: bool = True,
 ) -> Program:
     """The solver of a lattice as a program."""
-    parts, choice, flows = plan.parts, plan.choice, plan.flows
     coefficients = Coefficients([*(p.name for p in cell.parameters if p.at == "all"), TIME, KICK])
-    by_colour = any(flow.by_colour for flow in flows)
-    schedule = _any_number(choice.method) if by_colour else choice.schedule()
-    swept = tuple(
-        tuple(_sweep(cell, flow, motion, k, coefficients) for motion in flow.motions) for k, flow in enumerate(flows, 1)
-    )
+    schedule, swept, solved = plan.schedule(), tuple[tuple[Sweep, ...], ...](), None
+    if isinstance(plan, SeriesPlan):
+        solved = equation(cell, plan, coefficients)
+    else:
+        swept = tuple(
+            tuple(_sweep(cell, flow, motion, k, coefficients) for motion in flow.motions)
+            for k, flow in enumerate(plan.flows, 1)
+        )
     plain_names = tuple(p.name for p in cell.parameters if p.at == "all")
     prepare = Kernel(
         "prepare",
-        "everything that depends on parameters and the time of a flow only",
+        f"everything that depends on parameters and the time of a {'stage' if solved else 'flow'} only",
         {"params": plain_names, "h": (TIME,), **({"kick": (KICK,)} if schedule.multiples else {})},
         (Output("coef", tuple(coefficients.values)),),
     )
     observed = _observables(cell)
-    kernels = [sweep.kernel for part in swept for sweep in part]
-    sites = _sites(cell, parts.colouring.count, parts.colouring.weights, parts.colouring.periods(cell.boundary),
-                   [*kernels, observed.energy, observed.casimirs, observed.vector_field])  # fmt: skip
+    kernels = [*(sweep.kernel for part in swept for sweep in part), *((solved.relax, solved.advance) if solved else ())]
+    sites = _sites(cell, plan.colouring, [*kernels, observed.energy, observed.casimirs, observed.vector_field])
     kinds, partners = tuple(k for _, k in cell.casimirs.values()), _partners(cell)
     if partners:
         gathers = [*(sweep.gather for part in swept for sweep in part if sweep.gather), partners.energy, partners.field]
         at_bonds = tuple(p.name for p in cell.parameters if p.at == "bonds")
         sites = replace(sites, ends=_ends(cell, [k for g in gathers for k in g.kernels]), at_bonds=at_bonds)
-    marks = tuple(flow.by_colour for flow in flows) if by_colour else ()
-    step = Sweeps(prepare, sites, swept, schedule, choice.method.name, kinds, partners, marks)
-    facts = [*_facts(cell, choice, parts.colouring.count), choice.order.note]
+    step = Sweeps(prepare, sites, swept, schedule, plan.composition, kinds, partners, plan.by_colour, solved)
+    facts = [_lattice_fact(cell, plan.colouring.count), *_facts(plan), plan.order.note]
     return Program(
         name=cell.name,
         about=About(title, licence, spec_sha256, tuple(f for f in facts if f), _operations(step)),
         coordinates=cell.fields,
         parameters=cell.parameters,
         casimirs=tuple(cell.casimirs),
-        order=choice.order.order,
+        order=plan.order.order,
         step=step,
         observables=observed,
+        fractions=plan.fractions if isinstance(plan, SeriesPlan) else (1.0,),
         extras=extras,
         lanes=lanes,
         profile=profile,
@@ -139,11 +183,8 @@ def _any_number(method: Alternation | Nystrom) -> Schedule:
     return replace(of_three, pattern=tuple(backwards.get(flow, flow) for flow in of_three.pattern))
 
 
-def _expect_offered(cell: Cell, scheme: str, extras: Extras, locations: Mapping[tuple[Any, ...], Location]) -> None:
+def _expect_offered(cell: Cell, extras: Extras, locations: Mapping[tuple[Any, ...], Location]) -> None:
     problems = []
-    if scheme == "series":
-        message = "scheme series is not offered for lattices: they are split"
-        problems.append(Diagnostic(message, locations.get(("scheme",)), "scheme: auto"))
     if cell.bond_bracket and cell.relation == PAIRS:
         message = "brackets between the sites of pairs are not compiled"
         problems.append(Diagnostic(message, locations.get(("poisson",))))
@@ -159,7 +200,7 @@ def _sweep(cell: Cell, flow: CellFlow, motion: SiteMotion, k: int, coefficients:
     moved = tuple(cell.fields.index(f) for f in motion.increments)
     suffix = f"_{flow.motions.index(motion)}" if len(flow.motions) > 1 else ""
     named = f"the flow of H_{k} = sum of {flow.hamiltonian}: {flow.manner}".replace(KICK, KICK.kind)
-    kernel = _kernel(cell, f"sweep{k}{suffix}", named, increments, "change", coefficients)
+    kernel = site_kernel(cell, f"sweep{k}{suffix}", named, increments, "change", coefficients)
     purpose = f"what all other sites b add to the forces of H_{k} at a site a"
     gather = _gather(cell, motion.gathered, f"gather{k}{suffix}", purpose, coefficients)
     return Sweep(kernel, moved, motion.colour, gather)
@@ -177,7 +218,9 @@ def _gather(
         values = coefficients.hoist(values) if coefficients else values
         verb = {"a": "begin", "b": "end"}.get(s.end)
         suffix, seen = (f"_{s.end}", f", by bonds that {verb} there") if verb else ("", "")
-        ends.append(Ends(_kernel(cell, name + suffix, purpose + seen, values, "sums", coefficients), s.end, s.chosen))
+        ends.append(
+            Ends(site_kernel(cell, name + suffix, purpose + seen, values, "sums", coefficients), s.end, s.chosen)
+        )
     return Gather(tuple(ends), tuple(sums[0].values))
 
 
@@ -194,51 +237,19 @@ def _partners(cell: Cell) -> Partners | None:
     )
 
 
-def _kernel(
-    cell: Cell,
-    name: str,
-    purpose: str,
-    values: Sequence[Expression],
-    output: str,
-    coefficients: Coefficients | None = None,
-) -> Kernel:
-    """A kernel at a site: inputs are coefficients, or parameters, then what it reads at sites, and the weights."""
-    used = symbols_of(*values)
-    places = cell.places(*values)
-    weights = tuple(n for n in used if kind_of(n) in (PRESENT, CHOSEN))
-    plain = tuple(p.name for p in cell.parameters if p.at == "all")
-    first = {"coef": coefficients.slots} if coefficients else {"params": plain}
-    gathered = tuple(n for n in used if kind_of(n) == GATHERED)
-    inputs = {**first, "site": tuple(places), "present": weights, "gathered": gathered}
-    bonds = tuple(p.name for p in cell.parameters if p.at == "bonds" and p.name in used)
-    inputs |= {"bonds": bonds} if bonds else {}
-    return Kernel(name, purpose, inputs, (Output(output, tuple(values)),))
-
-
 def _observables(cell: Cell) -> Observables:
     """The densities of the Hamiltonian and of the Casimirs, and the vector field at a site."""
     origin = [0] * len(cell.axes)
     density = total(present(cell, s.low, s.high, origin) * s.expression for s in summands_of(cell) if not s.bond)
     casimirs = [density for density, _ in cell.casimirs.values()]
     return Observables(
-        _kernel(cell, "energy", "the density of the Hamiltonian", [density], "out"),
-        _kernel(cell, "casimirs", "the densities of the Casimirs", casimirs, "out"),
-        _kernel(cell, "vector_field", "pi grad H", _field(cell), "out"),
+        site_kernel(cell, "energy", "the density of the Hamiltonian", [density], "out"),
+        site_kernel(cell, "casimirs", "the densities of the Casimirs", casimirs, "out"),
+        site_kernel(cell, "vector_field", "pi grad H", field_with_sums(cell), "out"),
     )
 
 
-def _field(cell: Cell) -> list[Expression]:
-    """The vector field at a site, with symbols for what bonds or pairs add to forces, or to the field itself."""
-    names = {n for s in site_sums(cell) for n in s.values} if cell.relation != GRID else set()
-    added = {f: symbol(Symbol(GATHERED, f)) for f in cell.fields if Symbol(GATHERED, f) in names}
-    if not cell.bond_bracket:
-        return list(field_at_site(cell, added))
-    return [e + added.get(f, ZERO) for f, e in zip(cell.fields, field_at_site(cell, {}), strict=True)]
-
-
-def _sites(
-    cell: Cell, colours: int, weights: Sequence[int], periods: Sequence[int], kernels: Sequence[Kernel]
-) -> Sites:
+def _sites(cell: Cell, colouring: Colouring, kernels: Sequence[Kernel]) -> Sites:
     places = {
         n: (f, steps(offset) or (0,)) for kernel in kernels for n, (f, offset) in cell.places(*kernel.roots).items()
     }
@@ -250,9 +261,9 @@ def _sites(
         tuple(b != PERIODIC for b in boundary),
         tuple(p.name for p in cell.parameters if p.at == "sites"),
         places,
-        colours,
-        tuple(weights) or (0,),
-        tuple(periods) or (1,),
+        colouring.count,
+        tuple(colouring.weights) or (0,),
+        tuple(colouring.periods(cell.boundary)) or (1,),
         tuple(least),
     )
 
@@ -263,22 +274,27 @@ def _ends(cell: Cell, kernels: Sequence[Kernel]) -> dict[str, tuple[str, str]]:
     return {name: (f, str(offset[0])) for name, (f, offset) in places}
 
 
-def _facts(cell: Cell, choice: Choice, colours: int) -> list[str]:
-    """What the header says of the method."""
-    count, method = len(choice.splitting.flows), choice.method
+def _lattice_fact(cell: Cell, colours: int) -> str:
     boundary = ", ".join(f"{a} {b}" for a, b in zip(cell.axes, cell.boundary, strict=True))
     related = {GRAPH: "sites with bonds between them, given at run time", PAIRS: "all pairs of sites"}
-    lattice = f"lattice: {related.get(cell.relation, boundary)}; any size"
-    lattice += f", sites of {colours} colours" if colours > 1 else ""
-    numbered = enumerate(choice.splitting.flows, 1)
-    marked = [f"H_{k}" for k, flow in numbered if isinstance(flow, CellFlow) and flow.by_colour]
+    return f"lattice: {related.get(cell.relation, boundary)}; any size" + (
+        f", sites of {colours} colours" if colours > 1 else ""
+    )
+
+
+def _facts(plan: LatticePlan) -> Sequence[str]:
+    """What the header says of the method."""
+    if isinstance(plan, SeriesPlan):
+        return plan.facts
+    choice = plan.choice
+    count, method = len(choice.splitting.flows), choice.method
+    marked = [f"H_{k}" for k, flow in enumerate(plan.flows, 1) if flow.by_colour]
     if count == 1 and not marked:
-        return [lattice, "scheme: the exact flow of H, which is elementary", "step: explicit"]
+        return ["scheme: the exact flow of H, which is elementary", "step: explicit"]
     parts = " + ".join(f"H_{k}" for k in range(1, count + 1))
     why = f", since {choice.why}" if choice.why else ""
     flows = f"{len(choice.schedule().flows)} flows" if not marked else f"{', '.join(marked)} for each colour of sites"
     return [
-        lattice,
         f"scheme: splitting, H = {parts}, with the exact flow of each",
         f"composition: {method.name}, {method.stages} stage{'s' * (method.stages > 1)}, {flows}{why}",
         "step: explicit",
@@ -295,4 +311,6 @@ def _operations(step: Sweeps) -> dict[str, int]:
         for sweep in sweeps:
             for what, number in operation_counts(sweep.kernel.roots).items():
                 counted[what] += number * times[part]
+    for kernel in (step.equation.relax, step.equation.advance) if step.equation else ():
+        counted.update(operation_counts(kernel.roots))
     return dict(counted)

@@ -11,9 +11,10 @@ from phigen.geometry.definedness import undefined_parts
 from phigen.geometry.jacobi import jacobi_identity
 from phigen.geometry.positivity import positivity
 from phigen.geometry.system import System
-from phigen.lattice import flow_proofs
+from phigen.lattice import flow_proofs, series_proofs
 from phigen.lattice import proofs as of_lattices
 from phigen.lattice.cell import Cell
+from phigen.lattice.series import SeriesPlan
 from phigen.proofs import attitude
 from phigen.realisations import axioms
 from phigen.series.hamilton_jacobi import residual
@@ -81,9 +82,13 @@ def lattice(cell: Cell) -> dict[str, tuple[Statement, ...]]:
 
 
 def sweeps(compilation: Compilation) -> dict[str, tuple[Statement, ...]]:
-    """The parts of H of a lattice and their flows."""
+    """The parts of H of a lattice and their flows, or its bi-realisation and the equation of a stage."""
     cell, plan = compilation.cell, compilation.sweeps
-    return {SPLITTING: tuple(flow_proofs.check(cell, plan))} if cell and plan else {}
+    if cell is None or plan is None:
+        return {}
+    if isinstance(plan, SeriesPlan):
+        return {f"{METHOD} ({plan.realisation.kind})": tuple(series_proofs.check(cell, plan))}
+    return {SPLITTING: tuple(flow_proofs.check(cell, plan))}
 
 
 def method(compilation: Compilation) -> dict[str, tuple[Statement, ...]]:

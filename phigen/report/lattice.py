@@ -11,6 +11,7 @@ from markupsafe import Markup
 from phigen.compilation import Compilation
 from phigen.drawing.lattices import lattice_figure, sites_figure
 from phigen.lattice.cell import Cell
+from phigen.lattice.sweeps import SplittingPlan
 from phigen.notation import mathml
 from phigen.notation.lattices import described, formulas
 from phigen.proofs.examination import Examination
@@ -86,7 +87,7 @@ def _cell(cell: Cell) -> Iterator[Markup]:
 def _method(compilation: Compilation) -> Iterator[Markup]:
     facts = [fact.partition(": ") for fact in compilation.program.about.facts]
     yield page.facts((name if colon else "note", page.typeset(text or name)) for name, colon, text in facts)
-    if compilation.sweeps:
+    if isinstance(compilation.sweeps, SplittingPlan):
         rows = [(page.typeset(f"H_{k}"), [("", flow.manner)]) for k, flow in enumerate(compilation.sweeps.flows, 1)]
         yield page.table("The parts of H, and how their flows move a site", [("", "part"), ("", "flow")], rows)
 

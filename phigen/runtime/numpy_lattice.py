@@ -34,12 +34,13 @@ class NumpyLatticeSession:
         """Make so many steps."""
         if h != self._h:
             self._h, self._rows = h, self._module._coefficients(self._sites, h)
+        past: dict[Any, Any] = {}
         with np.errstate(all="ignore"):
             for _ in range(steps):
-                following = self._module._advance(self._sites, self._rows, self._x)
-                if not np.isfinite(following).all():
-                    raise BackendError("NOT_FINITE", self.steps, self._x[None].copy())
-                self._x = following
+                try:
+                    self._x = self._module._advance(self._sites, self._rows, self._x, past)
+                except self._module.FailedError as failed:
+                    raise BackendError(str(failed), self.steps, self._x[None].copy()) from None
                 self.steps += 1
 
     def hamiltonian(self) -> float:

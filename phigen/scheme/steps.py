@@ -311,11 +311,26 @@ class Sweep:
 
 
 @dataclass(frozen=True)
-class Sweeps(_Staged):
-    """A splitting of a lattice: each of the ``parts`` is a list of sweeps, which may be made in any order.
+class Equation:
+    """y = x − (α − x)(y, h∇H(y)) at all sites of a lattice, solved for y; then x moves by (β − α)(y, h∇H(y)).
 
-    Where some parts are ``by_colour``, the flows are those of all parts, of each colour where they are by colour, and
-    the ``schedule`` has in place of parts: 0 the first flow, 1 those in the middle, 2 the last, 3 the middle backwards.
+    The inputs of the kernels are those of sweeps, where ``site`` are values of y, and of ``relax``, the right-hand
+    side at a site, also ``start``: x there. ``advance`` is what x moves by.
+    """
+
+    relax: Kernel
+    advance: Kernel
+    most_sweeps: int = 200
+
+
+@dataclass(frozen=True)
+class Sweeps(_Staged):
+    """A step of a lattice, by sweeps over its sites.
+
+    Of a splitting each of the ``parts`` is a list of sweeps, which may be made in any order, and the ``schedule`` is
+    that of the parts. Where some are ``by_colour``, the flows are those of all parts, of each colour where they are so,
+    and the ``schedule`` has in place of parts: 0 the first flow, 1 those in the middle, 2 the last, 3 the middle
+    backwards. Of the series there is an ``equation`` in place of parts, and the schedule has its stages.
     """
 
     sites: Sites
@@ -325,6 +340,7 @@ class Sweeps(_Staged):
     casimir_kinds: tuple[str, ...] = ()
     partners: Partners | None = None
     by_colour: tuple[bool, ...] = ()  # of graphs: the parts that belong to one colour, and are done for each
+    equation: Equation | None = None
 
     unit = "step of one site"
     manner = "explicit"
@@ -338,9 +354,11 @@ class Sweeps(_Staged):
     def kernels(self) -> tuple[Kernel, ...]:
         """All kernels, each once."""
         swept = [sweep for part in self.parts for sweep in part]
+        swept_kernels = [sweep.kernel for sweep in swept]
+        swept_kernels += [self.equation.relax, self.equation.advance] if self.equation else []
         gathers = [sweep.gather for sweep in swept if sweep.gather]
         gathers += [self.partners.energy, self.partners.field] if self.partners else []
-        return (self.prepare, *(sweep.kernel for sweep in swept), *(k for g in gathers for k in g.kernels))
+        return (self.prepare, *swept_kernels, *(k for g in gathers for k in g.kernels))
 
 
 Step = Newton | Explicit | Path | Splitting | Sweeps

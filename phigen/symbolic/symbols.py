@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 #: Kinds that several modules tell apart. A kind without keys has one symbol only, such as the step size.
-MOMENTUM, VARIATION, COTANGENT, GAUGE = "p", "v", "bar", "gauge"
+MOMENTUM, VARIATION, COTANGENT, INITIAL, GAUGE = "p", "v", "bar", "x0", "gauge"
 COEFFICIENT, RENEWED, SERIES, FIXED = "c", "n", "s", "f"
 TEMPORARY, WORK, PART = "t", "w", "part"
 #: Of lattices: what bonds or pairs add to a component of the gradient at a site; 1 where a term reaches beyond no open
@@ -48,7 +48,7 @@ def momentum(name: str) -> Symbol:
 
 def initial(name: str) -> Symbol:
     """The symbol of the value of a coordinate at the start."""
-    return Symbol("x0", name)
+    return Symbol(INITIAL, name)
 
 
 def variation(name: str) -> Symbol:

@@ -21,6 +21,7 @@ from phigen.lattice.expansion import Expansion, expand
 from phigen.proofs import statements
 from phigen.runtime.lattice import LatticeSolver
 from phigen.runtime.modules import load_module
+from phigen.spec.model import BirealisationChoice
 from phigen.symbolic.arrays import evaluate
 from phigen.symbolic.verdict import PROVED, REFUTED
 
@@ -67,11 +68,36 @@ TEXTS = {
     'poisson: {bonds: {"q[a]": {"p[b]": W}}}\nhamiltonian: {sites: p**2/2 + q**4/4}',
     "volterra": "lattice: {axes: [i], boundary: periodic}\ncoordinates: [a]\n"
     'poisson: {brackets: {a: {"a[i+1]": "a*a[i+1]"}}}\nhamiltonian: a',
+    # What does not split.
+    "twisted": "lattice: {axes: [i], boundary: open}\nbirealisation: cayley\nparameters: {B: {value: 0.2, at: sites}}"
+    f'{SPINS}hamiltonian: "-(x*x[i+1] + y*y[i+1] + z*z[i+1]) + B*x*y[i+1]*z[i+2]"',
+    "dragged": "lattice: {axes: [i, j], boundary: [periodic, open]}\nparameters: {g: 0.3}\n"
+    f'{CANONICAL}hamiltonian: "(1 + g*q**2)*p**2/2 + p*p[j+1]/4 - cos(q[i+1] - q) - q*cos(q[j+1])"',
+    "pond": "lattice: {axes: [i], boundary: periodic}\nparameters: {k: 0.7, c: {value: 1.0, at: sites}}\n"
+    'coordinates: [a]\npoisson: {brackets: {a: {"a[i+1]": "c*c[i+1]*a*a[i+1]"}}}\n'
+    'hamiltonian: "a - k*log(a) + a*a[i+1]/4"',
+    "stretched": "lattice: {axes: [i], boundary: open}\nscheme: series\ncoordinates: [a, b]\n"
+    'poisson: {brackets: {a: {b: a/2, "b[i+1]": -a/2}}}\nhamiltonian: b**2/2 + 2*a**2 + a**2*b*b[i+1]/5',
+    "tangle": "lattice: {graph: bonds}\nscheme: series\nparameters: {J: {value: 1.2, at: bonds}, D: 0.4, B: 0.3}"
+    f'{SPINS}hamiltonian: {{sites: D*z**2 - B*x, bonds: "-J*(x[a]*x[b] + y[a]*y[b]) + D*x[a]*z[b]"}}',
+    "vortices": "lattice: {pairs: all}\ncoordinates: [x, y]\nparameters: {G: {value: 1, at: sites, positive: true}}\n"
+    "poisson: {brackets: {x: {y: 1/G}}}\nhamiltonian: {sites: G*(x**2 + 2*y**2), "
+    'pairs: "-G[a]*G[b]*log(1 + (x[a] - x[b])**2 + (y[a] - y[b])**2)/2"}',
 }
+#: What is integrated by the series.
+SERIES = ("twisted", "dragged", "pond", "stretched", "tangle", "vortices")
 #: Of graphs: a triangle with two tails, a double bond, and a site of its own.
 BONDS = np.array([[0, 1], [1, 2], [2, 0], [2, 3], [4, 3], [3, 4], [4, 5]])
-SIZES = {"sheet": (4, 5), "cube": (3, 4, 3), "volterra": (6,), "toda": (5,)}
-FEW = {"sheet": (3, 3), "cube": (2, 2, 2), "charges": (4,), "oscillators": (7,)}
+SIZES = {"sheet": (4, 5), "cube": (3, 4, 3), "volterra": (6,), "toda": (5,), "dragged": (4, 5), "stretched": (5,)}
+FEW = {
+    "sheet": (3, 3),
+    "cube": (2, 2, 2),
+    "charges": (4,),
+    "oscillators": (7,),
+    "dragged": (3, 3),
+    "vortices": (4,),
+    "tangle": (7,),
+}
 
 
 @cache
@@ -95,7 +121,7 @@ def start(name: str, sizes: tuple[int, ...] | None = None, seed: int = 1) -> np.
     sizes = sizes or SIZES.get(name, (7,))
     fields = len(compiled(name).spec.coordinates)
     x = 0.6 * np.random.default_rng(seed).normal(size=(fields, *sizes))
-    return np.abs(x) + 0.2 if name in ("volterra", "toda", "web") else x
+    return np.abs(x) + 0.2 if name in ("volterra", "toda", "web", "pond", "stretched") else x
 
 
 def disorder(name: str, x: np.ndarray) -> dict[str, Any]:
@@ -162,8 +188,33 @@ def test_steps_are_those_of_the_ordinary_splitting_with_the_same_parts(name: str
     np.testing.assert_allclose(lattice.x.reshape(len(lattice), -1), ordinary.x, rtol=0, atol=1e-13)
 
 
+@pytest.mark.parametrize("name", sorted({*SERIES} - {"stretched"}))  # whose π ordinary systems follow paths for
+def test_steps_of_the_series_are_those_of_the_ordinary_system(name: str) -> None:
+    x = start(name, FEW.get(name, (5,)))
+    found, parameters = solver(name, 4, "numpy"), disorder(name, x)
+    lattice = found.integrate(x, 0.1, 10, **parameters)
+    numbers = {p: parameters.get(p, v) for p, v in found.interface.parameters.items()}
+    whole = expansion(name, x.shape[1:])
+    choice = BirealisationChoice("product", of="cayley") if name == "twisted" else BirealisationChoice()
+    from phigen.api import solver_of
+
+    spec = replace(whole.spec(), order=4, birealisation=choice, composition="suzuki", gauge="none")
+    ordinary = solver_of(compile_spec(spec), "numpy").integrate(x.reshape(-1), 0.1, 10, **whole.numbers(numbers))
+    np.testing.assert_allclose(lattice.x.reshape(len(lattice), -1), ordinary.x, rtol=0, atol=1e-13)
+
+
 @pytest.mark.parametrize(
-    ("name", "order"), [*((name, 4) for name in TEXTS), ("xxz", 2), ("fput", 6), ("ablowitz_ladik", 2), ("dnls", 8)]
+    ("name", "order"),
+    [
+        *((name, 4) for name in TEXTS),
+        ("xxz", 2),
+        ("fput", 6),
+        ("ablowitz_ladik", 2),
+        ("dnls", 8),
+        *((name, 2) for name in SERIES),
+        ("twisted", 6),
+        ("dragged", 8),
+    ],
 )
 def test_order_is_that_of_the_method(name: str, order: int) -> None:
     x, found = start(name), solver(name, order, "c")
@@ -186,8 +237,8 @@ def jacobian(module: Any, x: np.ndarray, h: float, parameters: dict[str, Any]) -
     for k in range(x.size):
         unit = np.zeros(x.shape)
         unit.reshape(-1)[k] = 1.0
-        columns.append(_slope(lambda t, unit=unit: module._advance(sites, rows, x + t * unit)))
-    return module._advance(sites, rows, x).real, np.array(columns).T
+        columns.append(_slope(lambda t, unit=unit: module._advance(sites, rows, x + t * unit, {})))
+    return module._advance(sites, rows, x, {}).real, np.array(columns).T
 
 
 def _slope(curve: Any) -> np.ndarray:
@@ -233,7 +284,7 @@ def test_neighbours_moved_at_once_where_brackets_couple_them_are_noticed(name: s
 def test_the_midpoint_rule_is_noticed() -> None:
     module = module_of("xxz")
 
-    def midpoint(sites: Any, rows: Any, x: np.ndarray) -> np.ndarray:
+    def midpoint(sites: Any, rows: Any, x: np.ndarray, past: Any) -> np.ndarray:
         def field(y: np.ndarray) -> np.ndarray:
             real, imaginary = (
                 module._vector_field(sites.parameters, part, sites) for part in (y.real, y.real + 1e20 * y.imag)
@@ -246,12 +297,31 @@ def test_the_midpoint_rule_is_noticed() -> None:
     assert poisson_defect("xxz", module) > 1e-4
 
 
-def test_spins_keep_their_lengths() -> None:
-    x = start("xxz", (16,))
-    run = solver("xxz", 2, "c").integrate(x / np.sqrt((x**2).sum(axis=0)), 0.05, 20_000, 20_000)
+@pytest.mark.parametrize("name", ["xxz", "twisted"])
+def test_spins_keep_their_lengths(name: str) -> None:
+    x = start(name, (16,))
+    run = solver(name, 2, "c").integrate(x / np.sqrt((x**2).sum(axis=0)), 0.05, 20_000, 20_000)
     lengths = run.casimirs["C"]
     assert lengths.shape == (2, 16)
     assert np.abs(lengths[-1] - lengths[0]).max() < 5e-14
+
+
+@pytest.mark.parametrize("name", SERIES)
+@pytest.mark.parametrize("target", ["numpy", "c"])
+def test_steps_of_the_series_are_undone_by_steps_back(name: str, target: str) -> None:
+    x, found = start(name), solver(name, 4, target)
+    there = found.integrate(x, 0.1, 5, 5, **disorder(name, x)).x[-1]
+    back = found.integrate(there, -0.1, 5, 5, **disorder(name, x)).x[-1]
+    assert np.abs(there - x).max() > 0.05
+    np.testing.assert_allclose(back, x, rtol=0, atol=5e-14)
+
+
+@pytest.mark.parametrize("target", ["numpy", "c"])
+def test_equations_that_sweeps_do_not_solve_are_told(target: str) -> None:
+    x, found = 4 * start("twisted"), solver("twisted", 2, target)
+    with pytest.raises(StepError, match="NO_CONVERGENCE") as failure:
+        found.integrate(x, 3.0, 5, 1, **disorder("twisted", x))
+    assert np.array_equal(failure.value.trajectory.x[-1], x)
 
 
 def test_large_angles_are_turned_exactly_too() -> None:
@@ -264,14 +334,14 @@ def test_code_does_not_grow_with_the_lattice() -> None:
     for name in TEXTS.keys() - {"sheet", "magnet"}:  # three parts of two colours with nine neighbours; of five parts
         program = compile_spec(specs.loads(f"phigen: 1\nname: {name}\n{TEXTS[name]}\n"), profile="small").program
         lines = sum(len(text.splitlines()) for text in emit(program, "c", "phigen").values())
-        assert lines < 800 + 120 * ("graph" in TEXTS[name]), (name, lines)
+        assert lines < 800 + 120 * ("graph" in TEXTS[name]) + 100 * (name in SERIES), (name, lines)
 
 
-@pytest.mark.parametrize("name", ["sheet", "magnet"])
+@pytest.mark.parametrize("name", ["sheet", "magnet", "dragged"])
 def test_threads_make_the_same_bits(name: str) -> None:
     import ctypes
 
-    found, x = solver(name, 2, "c"), start(name, (70, 90) if name == "sheet" else (6300,))
+    found, x = solver(name, 2, "c"), start(name, (70, 90) if name != "magnet" else (6300,))
     ring = {"bonds": np.stack([np.arange(6300), (np.arange(6300) * 7 + 1) % 6300], axis=1)} if name == "magnet" else {}
     try:
         library = ctypes.CDLL("libgomp.so.1")
@@ -396,15 +466,19 @@ def test_odd_sizes_do_not_fit_two_colours() -> None:
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ("lattice: {axes: [i], boundary: periodic}\ncoordinates: [q, p]\n"
-         'poisson: {canonical: {q: [q], p: [p]}}\nhamiltonian: "exp(q*p[i+1] + p)"', "do not commute"),
-        ("lattice: {axes: [i], boundary: periodic}\ncoordinates: [q, p]\nscheme: series\n"
-         'poisson: {canonical: {q: [q], p: [p]}}\nhamiltonian: "p**2/2 + q*q[i+1]"', "not offered for lattices"),
+        ('scheme: splitting\ncoordinates: [q, p]\npoisson: {canonical: {q: [q], p: [p]}}\n'
+         'hamiltonian: "exp(q*p[i+1] + p)"', "do not commute"),
+        ('coordinates: [q, p]\npoisson: {brackets: {q: {p: 1 + q**2*p**2}}}\n'
+         'hamiltonian: "exp(q*p[i+1] + p)"', "(?s)do not commute.*karasev follows paths"),
+        ('coordinates: [a, b]\npoisson: {brackets: {a: {"b[i+1]": "a + b[i+1]"}}}\nscheme: series\n'
+         'hamiltonian: "a*b[i+1]"', "which couple neighbours"),
+        ('coordinates: [q, p]\npoisson: {canonical: {q: [q], p: [p]}}\nscheme: series\norder: 12\n'
+         'hamiltonian: "p**2/2 + q*q[i+1]"', "the orders 2, 4, 4, 6, 6, 8, 8, 10, not 12"),
     ],
 )  # fmt: skip
-def test_what_cannot_be_split_is_refused(text: str, said: str) -> None:
+def test_what_has_no_step_is_refused(text: str, said: str) -> None:
     with pytest.raises(SpecError, match=said):
-        compile_text(text)
+        compile_text(f"lattice: {{axes: [i], boundary: periodic}}\n{text}")
 
 
 def test_disorder_by_a_formula_has_to_be_given() -> None:
@@ -415,10 +489,14 @@ def test_disorder_by_a_formula_has_to_be_given() -> None:
 
 
 @pytest.mark.parametrize("name", TEXTS)
-def test_parts_and_flows_are_proved(name: str) -> None:
+def test_methods_are_proved(name: str) -> None:
     compilation = compiled(name)
-    found = statements.sweeps(compilation)[statements.SPLITTING]
-    assert len(found) == 1 + len(compilation.program.step.parts)
+    ((group, found),) = statements.sweeps(compilation).items()
+    if name in SERIES:
+        assert len(found) == 7
+    else:
+        assert group == statements.SPLITTING
+        assert len(found) == 1 + len(compilation.program.step.parts)
     assert {s.verdict for s in found} == {PROVED}
 
 

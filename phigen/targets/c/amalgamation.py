@@ -17,7 +17,7 @@ from phigen import resources
 _FORTH, _BACK = r"0; stage < PHI_STAGES; \+\+stage", "PHI_STAGES - 1; stage >= 0; --stage"
 _OVER_STAGES = re.compile(rf"^( *)for \(int stage = (?:{_FORTH}|{_BACK})\)(?: (.*))?$")
 _ONE_STAGE = (
-    (re.compile(r"phi_fractions\[stage\] \* |PHI_STAGES \* "), ""),
+    (re.compile(r"phi_fractions\[stage\] \* |PHI_STAGES \* | \+ stage \* PHI_ROW"), ""),
     (re.compile(r"\[(?:stage|PHI_STAGES)\]"), ""),
     (re.compile(r"((?:->|\.)(?:coef|history|stage|use_recurrences))\[0\]"), r"\1"),
     (re.compile(r", (?:int )?stage(?=[,)])"), ""),

@@ -12,7 +12,8 @@ from phigen.scheme.steps import Ends, Gather, Partners, Sweep, Sweeps
 from phigen.spec.model import Parameter
 from phigen.symbolic import functions as elementary
 from phigen.symbolic.expression import ONE, substitute
-from phigen.symbolic.symbols import CHOSEN, COEFFICIENT, GATHERED, PRESENT, Symbol, kind_of
+from phigen.symbolic.special import SPECIAL
+from phigen.symbolic.symbols import CHOSEN, COEFFICIENT, GATHERED, INITIAL, PRESENT, Symbol, kind_of
 from phigen.targets.c import functions
 from phigen.targets.c.kernels import function, lane_calls, members, printer
 from phigen.targets.c.layout import comment
@@ -23,7 +24,10 @@ from phigen.targets.rendering import render
 from phigen.targets.reserved import C_RESERVED
 
 #: What the loops call their own.
-_OWN = frozenset({"coef", "params", "row", "from", "to", "out", "apart", "i", "j", "k", "part", "far"})
+_OWN = frozenset({"coef", "params", "row", "from", "to", "out", "apart", "i", "j", "k", "part", "far", "now"})
+
+#: Differences that guesses are extrapolated from, of one stage and of all: more gain little and are arrays over sites.
+MOST_DIFFERENCES, MOST_REMEMBERED = 4, 14
 
 
 @dataclass(frozen=True)
@@ -71,6 +75,7 @@ def layout_of(program: Program, step: Sweeps) -> Layout:
 def _at_sites(program: Program, step: Sweeps) -> list[Kernel]:
     seen = program.observables
     own = [sweep.kernel for part in step.parts for sweep in part]
+    own += [step.equation.relax, step.equation.advance] if step.equation else []
     return [*own, seen.energy, seen.casimirs, seen.vector_field]
 
 
@@ -87,6 +92,8 @@ def switches(program: Program, step: Sweeps, layout: Layout) -> dict[str, bool]:
         "BY_COLOUR": bool(step.by_colour),
         "BOND_PARAMETERS": bool(step.sites.at_bonds),
         "SITE_PARAMETERS": bool(step.sites.parameters),
+        "SERIES": step.equation is not None,
+        "GUESSES": step.equation is not None and program.offers("recurrences"),
     }
 
 
@@ -97,8 +104,14 @@ def declarations(program: Program, step: Sweeps) -> str:
     arrays = len(layout.arrays)
     sizes = [
         ("ARRAYS", arrays, "arrays over the sites: fields, then parameters"),
-        ("COEFFICIENTS", max(1, step.row * (len(step.schedule.times) + 1)), "numbers that depend on params and h only"),
+        ("COEFFICIENTS", max(1, step.row * _rows(step)), "numbers that depend on params and h only"),
     ]
+    if step.equation:
+        stages = len(program.fractions)
+        sizes += [("STAGES", stages, "of a step")] if stages > 1 else []
+        kept = max(1, min(MOST_DIFFERENCES, MOST_REMEMBERED // stages))
+        guesses = switches(program, step, layout)["GUESSES"]
+        sizes += [("DIFFERENCES", kept, "that a guess is extrapolated from")] if guesses else []
     if step.partners:
         swept = [sweep.gather for part in step.parts for sweep in part if sweep.gather]
         most = max(len(g.names) for g in (*swept, step.partners.energy, step.partners.field))
@@ -122,6 +135,11 @@ def declarations(program: Program, step: Sweeps) -> str:
     return render("c", "lattice.h", values)
 
 
+def _rows(step: Sweeps) -> int:
+    """Rows of coefficients: of a splitting one more, for the last flow of a step and the first of the next together."""
+    return len(step.schedule.times) + (0 if step.equation else 1)
+
+
 def _declared(parameter: Parameter, member: str) -> tuple[str, str]:
     said = plain(parameter.description) or f"default {float(parameter.value)!r}"
     said = said if member == parameter.name else f"{parameter.name}: {said}"
@@ -141,10 +159,15 @@ def model(program: Program, step: Sweeps) -> str:
         ("HALO", layout.halo, "sites that are copied beside a row"),
         ("LINES", len(layout.lines), "rows that kernels read: the row itself and those beside it"),
         ("ROW", max(1, step.row), "coefficients of one flow"),
-        ("FLOWS", len(flows), "in a step"),
-        ("JOINED", len(schedule.times), "the row of the last flow of a step and the first of the next together"),
-        ("ROWS_OF_FLOWS", len(schedule.times) + 1, "rows of coefficients"),
+        ("ROWS_OF_FLOWS", _rows(step), "rows of coefficients"),
     ]
+    if step.equation:
+        constants += [("MOST_SWEEPS", step.equation.most_sweeps, "that a stage may take")]
+    else:
+        constants += [
+            ("FLOWS", len(flows), "in a step"),
+            ("JOINED", len(schedule.times), "the row of the last flow of a step and the first of the next together"),
+        ]
     constants += [("WEIGHTS", len(layout.weights), "kinds of terms that open ends take away")] * bool(layout.weights)
     if sites.colours > 1:
         constants += [("COLOUR_COUNT", sites.colours, "colours of sites")]
@@ -164,7 +187,8 @@ def model(program: Program, step: Sweeps) -> str:
         "lines": ", ".join(_braced([*line, 0]) for line in layout.lines),
         "weights": ", ".join(_braced([_braced(pair) for pair in _bounds(w)]) for w in layout.weights),
         "colours": ", ".join(map(str, sites.weights)) if sites.colours > 1 else "",
-        "times": ", ".join(map(repr, [*schedule.times, joined])),
+        "times": ", ".join(map(repr, [*schedule.times, joined][: _rows(step)])),
+        "split": step.equation is None,
         "multiples": ", ".join(map(repr, multiples)) if schedule.multiples else "",
         "parts": ", ".join(str(part + (not step.by_colour)) for part, _ in flows),
         "by_colour": ", ".join(str(int(c)) for c in step.by_colour),
@@ -205,14 +229,17 @@ def _bounds(weight: str) -> list[tuple[int, int]]:
 def sweeps(program: Program, step: Sweeps, rows: Rows) -> str:
     """All kernels as loops over sites, and which of them make which part of H."""
     layout, name, member, calls = layout_of(program, step), program.name, members(program), _functions(program)
-    found = [*functions.called(program), *functions.phi_lanes(program, rows.calls)]
-    found += functions.near_rows(program, rows.near)
-    near = {**calls, **{f: f"{name}_{f}_near" for f in rows.near}}
+    found = [*functions.called(program), *functions.phi_lanes(program, set(rows.near))]
+    found += functions.near_rows(program, [f for f in rows.near if f not in SPECIAL])
+    near = {**calls, **{f: f"{name}_{f}_{'lane' if f in SPECIAL else 'near'}" for f in rows.near}}
     for k, part in enumerate(step.parts, 1):
         two = any(rows.calls_near(sweep.kernel) for sweep in part)
         found += _part(program, layout, k, part, {"_far": calls, "_near": near} if two else {"": calls})
     seen = program.observables
     found += _partners(program, layout)
+    for kernel in (step.equation.relax, step.equation.advance) if step.equation else ():
+        forms = {"_far": calls, "_near": near} if rows.calls_near(kernel) else {"": calls}
+        found += _of_equation(program, layout, kernel, forms)
     found += [_seen(program, layout, k) for k in (seen.energy, seen.casimirs, seen.vector_field)]
     sites = [p for p in program.parameters if p.at == "sites"]
     numbers = range(1, len(step.parts) + 1)
@@ -239,56 +266,104 @@ def _part(
             yield from _gathering(program, layout, sweep.gather, f"const double *coef, const {program.name}_row *row")
     for form, calls in forms.items():
         for sweep in part:
-            yield from _sweep_forms(program, layout, sweep, form, calls)
-    beside = program.profile == "fast" and any(sweep.kernel.inputs["present"] for sweep in part)
-    conditions = ("if (far) ", "else ") if len(forms) > 1 else ("",)
-    last = [_bounds(w)[-1] for w in layout.weights]
-    values = {
-        "NAME": program.name,
-        "k": k,
-        "alone": len(forms) == 1,
-        "loops": [
-            (condition, [line for sweep in part for line in _calls(program.name, sweep, form, beside)])
-            for form, condition in zip(forms, conditions, strict=True)
-        ],
-        "beside": beside,
-        "low": max([0, *(-low for low, _ in last)]),
-        "high": max([0, *(high for _, high in last)]),
-        "by_colour": layout.step.by_colour and layout.step.by_colour[k - 1],
-        "any_colour": bool(layout.step.by_colour),
-        "moved": sorted({f for sweep in part for f in sweep.moved}) if layout.halo else [],
+            for kernel, more in _forms(program, sweep.kernel):
+                yield _sweep(program, layout, replace(sweep, kernel=kernel), form + more, calls)
+    beside = _is_split(program, [sweep.kernel for sweep in part])
+    loops = {form: [line for sweep in part for line in _calls(program.name, sweep, form, beside)] for form in forms}
+    coloured = layout.step.by_colour
+    values = _pieces(program, layout, loops, beside=beside) | {
+        "title": f"The flow of H_{k}",
+        "head": f"part{k}",
+        "more": ", int colour" * bool(coloured),
+        "setup": ["at.row.chosen = colour;"] if coloured and coloured[k - 1] else [],
+        "moved": [f"s->x[{f}]" for f in sorted({f for sweep in part for f in sweep.moved})] if layout.halo else [],
+    }
+    values["unused"] = ["colour"] * bool(coloured and not coloured[k - 1]) + ["far"] * (len(forms) == 1)
+    yield render("c", "sweep_part.c", values)
+
+
+def _of_equation(
+    program: Program, layout: Layout, kernel: Kernel, forms: Mapping[str, Mapping[str, str]]
+) -> Iterator[str]:
+    """The loops of a kernel of the equation of a stage over rows and their sites, in each form."""
+    name, relaxing = program.name, "start" in kernel.inputs
+    for form, calls in forms.items():
+        for one, more in _forms(program, kernel):
+            yield _at_middle(program, layout, one, form + more, calls, "=" if relaxing else "+=")
+    beside = _is_split(program, [kernel])
+    gathers = layout.partners.field.kernels if kernel.inputs["gathered"] else ()
+    gathered = [f"{name}_{own.name}(&s->params, &at.row, at.from, at.to);" for own in gathers]
+    loops = {form: [*gathered, *_kernel_calls(f"{name}_{kernel.name}{form}", kernel, beside=beside)] for form in forms}
+    out = "s->y[1 - now]" if relaxing else "s->x"
+    setup = ["at.row.x = s->y[now];", "at.row.start = s->x;", f"at.row.out = {out};"]
+    values = _pieces(program, layout, loops, beside=beside) | {
+        "title": "A sweep, from s->y[now] to the other" if relaxing else "The end of a stage",
+        "head": f"{kernel.name}_rows",
+        "more": ", int now" + f", {name}_extent *extent" * relaxing,
+        "setup": setup if relaxing else [setup[0], setup[2]],
+        "moved": [f"{out}[{f}]" for f in range(program.dimension)] if layout.halo else [],
+        "after": [f"{name}_measure(s, &at, now, extent);"] if relaxing else [],
+        "unused": ["far"] * (len(forms) == 1),
     }
     yield render("c", "sweep_part.c", values)
 
 
+def _is_split(program: Program, kernels: Sequence[Kernel]) -> bool:
+    """Whether sites beside open ends have loops of their own."""
+    return program.profile == "fast" and any(_weights(kernel) for kernel in kernels)
+
+
+def _weights(kernel: Kernel) -> list[str]:
+    """The symbols of terms that open ends take away."""
+    return [s for s in kernel.inputs["present"] if kind_of(s) == PRESENT]
+
+
+def _pieces(program: Program, layout: Layout, loops: Mapping[str, list[str]], *, beside: bool) -> dict[str, object]:
+    """What the template of loops over pieces of rows wants, for the calls of each form."""
+    conditions = ("if (far) ", "else ") if len(loops) > 1 else ("",)
+    last = [_bounds(w)[-1] for w in layout.weights]
+    return {
+        "NAME": program.name,
+        "loops": list(zip(conditions, loops.values(), strict=True)),
+        "beside": beside,
+        "low": max([0, *(-low for low, _ in last)]),
+        "high": max([0, *(high for _, high in last)]),
+        "after": [],
+    }
+
+
 def _functions(program: Program) -> dict[str, str]:
-    """What the loops call: versions for lanes where there are such, else phigen's own or the library's."""
-    return {f: f"{program.name}_{f}" for f in elementary.FUNCTIONS} | dict(lane_calls(program))
+    """What the loops call for any argument: versions for lanes where there are such, else phigen's own or libm's."""
+    own = {f: f"{program.name}_{f}" for f in elementary.FUNCTIONS}
+    return own | dict(lane_calls(program)) | {f: own[f] for f in SPECIAL}
 
 
-def _sweep_forms(program: Program, layout: Layout, sweep: Sweep, form: str, calls: Mapping[str, str]) -> Iterator[str]:
-    """The loop, and that beside open ends; short code has one for both."""
-    kernel = sweep.kernel
-    if kernel.inputs["present"] and program.profile == "fast":
-        yield _sweep(program, layout, replace(sweep, kernel=_inside(kernel)), form, calls)
-        yield _sweep(program, layout, sweep, f"{form}_end", calls)
+def _forms(program: Program, kernel: Kernel) -> Iterator[tuple[Kernel, str]]:
+    """The kernel for the loop, and for that beside open ends; short code has one for both."""
+    if _is_split(program, [kernel]):
+        yield _inside(kernel), ""
+        yield kernel, "_end"
     else:
-        yield _sweep(program, layout, sweep, form, calls)
+        yield kernel, ""
 
 
 def _inside(kernel: Kernel) -> Kernel:
     """The kernel away from open ends."""
-    values = substitute(kernel.roots, dict.fromkeys(kernel.inputs["present"], ONE))
-    output = kernel.outputs[0].name
-    return replace(kernel, inputs={**kernel.inputs, "present": ()}, outputs=(Output(output, tuple(values)),))
+    weights = _weights(kernel)
+    values = substitute(kernel.roots, dict.fromkeys(weights, ONE))
+    output, others = kernel.outputs[0].name, tuple(s for s in kernel.inputs["present"] if s not in weights)
+    return replace(kernel, inputs={**kernel.inputs, "present": others}, outputs=(Output(output, tuple(values)),))
 
 
 def _calls(name: str, sweep: Sweep, form: str, beside: bool) -> Iterator[str]:
     """The calls of the loops for a piece of a row."""
     for kernel in sweep.gather.kernels if sweep.gather else ():
         yield f"{name}_{kernel.name}(coef, &at.row, at.from, at.to);"
-    own = f"{name}_{sweep.kernel.name}{form}"
-    if not beside or not sweep.kernel.inputs["present"]:
+    yield from _kernel_calls(f"{name}_{sweep.kernel.name}{form}", sweep.kernel, beside=beside)
+
+
+def _kernel_calls(own: str, kernel: Kernel, *, beside: bool) -> Iterator[str]:
+    if not beside or not _weights(kernel):
         yield f"{own}(coef, &at.row, at.from, at.to);"
         return
     yield f"{own}_end(coef, &at.row, at.from, second);"
@@ -302,13 +377,7 @@ def _sweep(program: Program, layout: Layout, sweep: Sweep, form: str, calls: Map
     code = lower(kernel)
     moved, sums = {program.coordinates[i] for i in sweep.moved}, sweep.gather.names if sweep.gather else ()
     names = _Names(program, layout, kernel, code, moved, calls, sums)
-    purpose = {"_far": "the same for large arguments of functions", "_end": "the same beside open ends"}
-    said = next((text for key, text in purpose.items() if form.endswith(key)), kernel.purpose)
-    head = [*comment(f"/* {plain(said)} */", "")]
-    head.append(
-        f"static inline void {name}_{kernel.name}{form}("
-        f"const double *coef, const {name}_row *row, ptrdiff_t from, ptrdiff_t to)\n{{"
-    )
+    head = _head(program, kernel, code, form)
     body = names.loaded()
     body += [f"const double {names.scope[a.target]} = {names.show(a.value)};" for a in code.assignments]
     stores = [(program.coordinates[sweep.moved[s.index]], names.show(s.value)) for s in code.stores]
@@ -317,11 +386,38 @@ def _sweep(program: Program, layout: Layout, sweep: Sweep, form: str, calls: Map
         body += changes
         stores = [(f, f"change{k}") for k, (f, _) in enumerate(stores)]
     body += [f"{names.pointer(f, 0)}[i] {_added(names.scope[f], f in code.used, value)};" for f, value in stores]
-    unused = [] if any(kind_of(s) == COEFFICIENT for s in code.used) else ["    (void)coef;"]
     colours = layout.step.sites.colours
     start = f"{name}_first(row, {sweep.colour}, from)" if colours > 1 else "from"
     onward = f"i += {layout.colour_step}" if colours > 1 else "++i"
-    return _looped([*head, *unused], names, body, name, f"ptrdiff_t i = {start}; i < to; {onward}")
+    return _looped(head, names, body, name, f"ptrdiff_t i = {start}; i < to; {onward}")
+
+
+def _head(program: Program, kernel: Kernel, code: Code, form: str) -> list[str]:
+    """The beginning of a loop over sites."""
+    name = program.name
+    purpose = {"_far": "the same for large arguments of functions", "_end": "the same beside open ends"}
+    said = next((text for key, text in purpose.items() if form.endswith(key)), kernel.purpose)
+    head = [*comment(f"/* {plain(said)} */", "")]
+    head.append(
+        f"static inline void {name}_{kernel.name}{form}("
+        f"const double *coef, const {name}_row *row, ptrdiff_t from, ptrdiff_t to)\n{{"
+    )
+    return head if any(kind_of(s) == COEFFICIENT for s in code.used) else [*head, "    (void)coef;"]
+
+
+def _at_middle(
+    program: Program, layout: Layout, kernel: Kernel, form: str, calls: Mapping[str, str], assign: str
+) -> str:
+    """A kernel as a loop from y, of which rows are told, into or onto what they call out."""
+    code = lower(kernel)
+    names = _Names(program, layout, kernel, code, set(), calls, layout.partners.field.names)
+    pointers = [names.scope[Symbol("out", f)] for f in program.coordinates]
+    head = _head(program, kernel, code, form)
+    head += [f"    double *restrict {p} = row->out[{k}] + row->at[0];" for k, p in enumerate(pointers)]
+    body = names.loaded()
+    body += [f"const double {names.scope[a.target]} = {names.show(a.value)};" for a in code.assignments]
+    body += [f"{pointers[s.index]}[i] {assign} {names.show(s.value)};" for s in code.stores]
+    return _looped(head, names, body, program.name, "ptrdiff_t i = from; i < to; ++i")
 
 
 def _added(name: str, read: bool, value: str) -> str:
@@ -487,6 +583,7 @@ class _Names:
         self._at_a: list[str] = []
         self._at_b: list[str] = []
         self._first: list[str] = []
+        self._starts: list[str] = []
         member = members(program)
         for s in (s for symbols in kernel.inputs.values() for s in symbols if s in code.used):
             if isinstance(s, Symbol) and s.kind == COEFFICIENT:
@@ -497,6 +594,10 @@ class _Names:
                 self.scope.bind(s, f"row->gathered[{list(sums).index(s)}][i]")
             elif isinstance(s, Symbol) and s.kind == CHOSEN:
                 self.scope.bind(s, "(row->colours[i] == row->chosen ? 1.0 : 0.0)")
+            elif isinstance(s, Symbol) and s.kind == INITIAL:
+                pointer, field = self.scope[Symbol("start", str(s.key[0]))], program.coordinates.index(str(s.key[0]))
+                self._starts.append(f"const double *restrict {pointer} = row->start[{field}] + row->at[0];")
+                self.scope.bind(s, f"{pointer}[i]")
             elif isinstance(s, Symbol):
                 self._bind_weight(s)
             elif s in layout.step.sites.ends:
@@ -552,7 +653,7 @@ class _Names:
 
     def pointers(self) -> list[str]:
         """What is read before the loop."""
-        lines = _together(self._first)
+        lines = [*_together(self._first), *self._starts]
         for f in sorted(self.moved):
             self.pointer(f, 0)
         for (base, line), named in self._pointers.items():

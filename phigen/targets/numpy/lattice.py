@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from phigen.scheme.kernel import Kernel
 from phigen.scheme.program import Program
 from phigen.scheme.steps import Gather, Sweep, Sweeps
-from phigen.symbolic.symbols import CHOSEN, COEFFICIENT, GATHERED, Symbol
+from phigen.symbolic.symbols import CHOSEN, COEFFICIENT, GATHERED, INITIAL, Symbol
 from phigen.targets import special
 from phigen.targets.code import Code, lower
 from phigen.targets.names import Scope
@@ -44,12 +44,14 @@ def body(program: Program, step: Sweeps, prepare: str) -> str:
         "kicks": bool(schedule.multiples),
         "at_bonds": _tuple(map(repr, sites.at_bonds)),
         "by_colour": repr(step.by_colour),
+        "most_sweeps": step.equation.most_sweeps if step.equation else 0,
     }
     graph = step.partners is not None and step.partners.graph
     values["sites"] = "_Coloured" if step.by_colour else "_Graph" if graph else "_Sites"
     values["flow"] = "(part, sites.colour), row in sites.schedule" if step.by_colour else "part, row in SCHEDULE"
     graphs = ["lattice_graph", *(["lattice_colours"] if step.by_colour else [])] if graph else []
-    parts = ["lattice", "lattice_sites", *graphs, "lattice_steps"]
+    parts = ["lattice", "lattice_sites", *graphs, "lattice_series" if step.equation else "lattice_splitting"]
+    parts.append("lattice_steps")
     pieces = [render("numpy", f"{part}.py", values) for part in parts]
     pieces += [render("numpy", "lattice_seen.py", values), prepare]
     pieces += [render("numpy", "phi.py", special.values(f, f"_{f}")) for f in special.used(program)]
@@ -58,8 +60,11 @@ def body(program: Program, step: Sweeps, prepare: str) -> str:
     ]
     pieces += _gathers(program, step)
     pieces += [_sweep(program, step, sweep) for part in step.parts for sweep in part]
-    listed = ["    (" + ", ".join(f"_{sweep.kernel.name}" for sweep in part) + ",)," for part in step.parts]
-    pieces.append("\n".join(["# The sweeps of each part of H.", "PARTS = (", *listed, ")\n"]))
+    if step.equation:
+        pieces += [_at_middle(program, step, kernel) for kernel in (step.equation.relax, step.equation.advance)]
+    else:
+        listed = ["    (" + ", ".join(f"_{sweep.kernel.name}" for sweep in part) + ",)," for part in step.parts]
+        pieces.append("\n".join(["# The sweeps of each part of H.", "PARTS = (", *listed, ")\n"]))
     seen = program.observables
     pieces += [_seen(program, step, kernel) for kernel in (seen.energy, seen.casimirs, seen.vector_field)]
     return "\n\n".join(piece.strip("\n") + "\n" for piece in pieces)
@@ -83,6 +88,18 @@ def _sweep(program: Program, step: Sweeps, sweep: Sweep) -> str:
         new = f"x{place} + ({show(store.value)})"
         lines.append(f"    moved{place} = sites.coloured({sweep.colour}, {new}, x{place})")
     return "\n".join([*lines, "    return moved\n"])
+
+
+def _at_middle(program: Program, step: Sweeps, kernel: Kernel) -> str:
+    """A kernel of the equation of a stage as a function of y, which is its x, and of x, where the stage starts."""
+    code = lower(kernel)
+    scope = Scope(PYTHON_RESERVED | _OWN | {"start", "gathered"})
+    lines, gathers = [f"def _{kernel.name}(coef, start, x, sites):"], kernel.inputs["gathered"]
+    lines += ["    gathered = _forces(sites.parameters, x, sites)"] if gathers else []
+    lines += _body(program, step, kernel, code, scope, step.partners.field.names if step.partners else ())
+    show = LANGUAGE.printer(scope)
+    values = ", ".join(f"np.broadcast_to({show(s.value)}, sites.sizes)" for s in code.stores)
+    return "\n".join([*lines, f"    return np.array([{values}])\n"])
 
 
 def _seen(program: Program, step: Sweeps, kernel: Kernel) -> str:
@@ -150,6 +167,8 @@ def _body(
                 scope.bind(s, f"gathered[{list(gathered).index(s)}]")
             elif isinstance(s, Symbol) and s.kind == CHOSEN:
                 scope.bind(s, "sites.chosen()")
+            elif isinstance(s, Symbol) and s.kind == INITIAL:
+                scope.bind(s, f"start[{program.coordinates.index(str(s.key[0]))}]")
             elif isinstance(s, Symbol):
                 bounds = ", ".join(map(str, s.key))
                 scope.bind(s, f"coef[{i}]" if s.kind == COEFFICIENT else f"sites.present({bounds})")

@@ -18,13 +18,24 @@ int omp_get_thread_num(void);
 #endif
 
 enum {
+#if PHI_SERIES
+    PHI_STRETCH = 1,   /* steps before the state is looked at */
+#else
     PHI_STRETCH = 32,  /* steps before the state is looked at: what is not finite stays so */
+#endif
     PHI_LEAD = (PHI_HALO + 7) / 8 * 8,
     PHI_BUFFER = 256,
-#if PHI_GATHER
-    PHI_RESERVED = PHI_ARRAYS + PHI_DIM + PHI_GATHERED
-#else
+#if PHI_GUESSES
+    PHI_IMPLICIT = (2 + PHI_STAGES * PHI_DIFFERENCES) * PHI_DIM, /* arrays for y and its guesses */
+#elif PHI_SERIES
+    PHI_IMPLICIT = 2 * PHI_DIM, /* arrays for y */
+#endif
     PHI_RESERVED = PHI_ARRAYS + PHI_DIM
+#if PHI_GATHER
+        + PHI_GATHERED
+#endif
+#if PHI_SERIES
+        + PHI_IMPLICIT
 #endif
 };
 
@@ -110,6 +121,22 @@ static void phi_find_lines(const phi_solver *s, size_t index, ptrdiff_t at[PHI_L
 }
 
 /* ---- The solver ---- */
+#if PHI_SERIES
+/* Where y and what guesses need are, in blocks of memory. */
+static void phi_place_middle(phi_solver *s, double *memory, size_t block)
+{
+    for (int k = 0; k < PHI_ARRAYS; ++k)
+        for (int side = 0; side < 2; ++side)
+            s->y[side][k] = k < PHI_DIM ? memory + (size_t)(2 * k + side) * block : s->x[k];
+#if PHI_GUESSES
+    memory += 2 * PHI_DIM * block;
+    for (int stage = 0; stage < PHI_STAGES; ++stage)
+        for (int d = 0; d < PHI_DIFFERENCES; ++d)
+            for (int k = 0; k < PHI_DIM; ++k, memory += block) s->guess[stage].difference[d][k] = memory;
+#endif
+}
+
+#endif
 static void phi_prepare_step(const phi_params *params, double h, double *coef)
 {
     for (int k = 0; k < PHI_ROWS_OF_FLOWS; ++k) {
@@ -167,6 +194,9 @@ phi_status phi_init(phi_solver *s, const phi_params *params, const size_t sizes[
 #if PHI_GATHER
     for (size_t k = 0; k < PHI_GATHERED; ++k) s->gathered[k] = aligned + (PHI_ARRAYS + PHI_DIM + k) * block;
 #endif
+#if PHI_SERIES
+    phi_place_middle(s, aligned + (PHI_RESERVED - PHI_IMPLICIT) * block, block);
+#endif
     for (size_t k = 0; k < PHI_DIM; ++k) phi_put(s, s->x[k], x0 + k * sites);
 #if PHI_SITE_PARAMETERS
     phi_put_parameters(s, &own);
@@ -193,62 +223,6 @@ static phi_status phi_set_step(phi_solver *s, double h)
     return PHI_OK;
 }
 
-#if PHI_BY_COLOUR
-/* One part of H, of one colour. */
-static void phi_sweep_flow(const phi_solver *s, int part, const double *coef, int far)
-#else
-/* One part of H. */
-static void phi_sweep(const phi_solver *s, int part, const double *coef, int far)
-#endif
-{
-    const size_t units = s->rows * phi_pieces(s);
-#ifdef _OPENMP
-    const size_t threads = (size_t)omp_get_num_threads(), own = (size_t)omp_get_thread_num();
-    phi_sweep_rows(s, part, coef, far, units / threads * own + (own < units % threads ? own : units % threads),
-        units / threads * (own + 1) + (own + 1 < units % threads ? own + 1 : units % threads));
-    if (threads > 1) { /* of one thread, too, a barrier may ask the operating system to wake the others */
-#pragma omp barrier
-    }
-#else
-    phi_sweep_rows(s, part, coef, far, 0, units);
-#endif
-}
-
-#if PHI_BY_COLOUR
-/* The first flow, those between it and the last, the last, or those between, backwards. */
-static void phi_sweep(const phi_solver *s, int kind, const double *coef, int far)
-{
-    const int last = s->flows - 1;
-    if (kind == 0 || kind == 2) phi_sweep_flow(s, kind == 0 ? 0 : last, coef, far);
-    if (kind == 1)
-        for (int flow = 1; flow < last; ++flow) phi_sweep_flow(s, flow, coef, far);
-    if (kind == 3)
-        for (int flow = last - 1; flow > 0; --flow) phi_sweep_flow(s, flow, coef, far);
-}
-
-#endif
-/* Some steps, joined. */
-static void phi_steps(const phi_solver *s, int steps, int far)
-{
-#ifdef _OPENMP
-#if PHI_PAIRS
-#pragma omp parallel if (s->sites > 512)
-#else
-#pragma omp parallel if (s->sites > 4096)
-#endif
-#endif
-    for (int step = 0; step < steps; ++step) {
-        const int last = step == steps - 1;
-        if (step == 0) phi_sweep(s, phi_flow_parts[0], s->coef + phi_flow_rows[0] * PHI_ROW, far);
-        for (int k = 1; k < PHI_FLOWS - 1; ++k)
-            phi_sweep(s, phi_flow_parts[k], s->coef + phi_flow_rows[k] * PHI_ROW, far);
-        if (PHI_FLOWS > 1)
-            phi_sweep(s, phi_flow_parts[0], s->coef + (last ? phi_flow_rows[PHI_FLOWS - 1] : PHI_JOINED) * PHI_ROW, far);
-        else if (!last)
-            phi_sweep(s, phi_flow_parts[0], s->coef, far);
-    }
-}
-
 /* Whether all values at sites are finite. */
 static int phi_holds(const phi_solver *s)
 {
@@ -264,33 +238,28 @@ static void phi_copy(double *const to[PHI_DIM], double *const from[PHI_DIM], con
     for (size_t k = 0; k < PHI_DIM; ++k) memcpy(to[k] - PHI_LEAD, from[k] - PHI_LEAD, block);
 }
 
-/* Some steps; if they lead to what is not finite, none. */
-static int phi_try(phi_solver *s, int steps)
-{
-    phi_copy(s->before, s->x, s);
-#if PHI_NEAR
-    phi_steps(s, steps, 0);
-    if (phi_holds(s)) return 1;
-    phi_copy(s->x, s->before, s);
+#if PHI_SERIES
+#include "lattice_stages.c"
+#else
+#include "lattice_flows.c"
 #endif
-    phi_steps(s, steps, 1);
-    if (phi_holds(s)) return 1;
-    phi_copy(s->x, s->before, s);
-    return 0;
-}
 
 phi_status phi_integrate(phi_solver *s, double h, size_t steps)
 {
     const phi_status status = phi_set_step(s, h);
     if (status != PHI_OK) return status;
+#if PHI_GUESSES
+    phi_forget(s);
+#endif
     for (size_t stretch = PHI_STRETCH; steps > 0;) {
         const size_t now = steps < stretch ? steps : stretch;
-        if (phi_try(s, (int)now)) {
+        const phi_status tried = phi_try(s, (int)now);
+        if (tried == PHI_OK) {
             steps -= now;
             s->steps += now;
             s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
         } else if (now == 1) {
-            return PHI_NOT_FINITE;
+            return tried;
         } else {
             stretch = 1;
         }

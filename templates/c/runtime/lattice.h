@@ -3,6 +3,14 @@
 #include "declarations.h"
 #include "status.h"
 
+#if PHI_GUESSES
+/* What guesses for the y of a stage are extrapolated from: differences of the last values of y - x. */
+typedef struct {
+    int count, order; /* differences that there are, and that the next guess takes */
+    double *difference[PHI_DIFFERENCES][PHI_DIM];
+} phi_guess;
+
+#endif
 /* The solver keeps the state in memory of the caller, row by row: a row is all sites along the last axis, with copies
    of the other end beside it. Set it up with phi_init; a copy of the struct is the same solver, not another one. */
 typedef struct {
@@ -26,6 +34,13 @@ typedef struct {
 #endif
 #endif
     double *before[PHI_DIM];  /* the fields before the steps that are being made */
+#if PHI_SERIES
+    double *y[2][PHI_ARRAYS]; /* the middle of a stage, before and after a sweep, with the parameters at sites */
+#if PHI_GUESSES
+    phi_guess guess[PHI_STAGES];
+#endif
+    size_t sweeps;            /* that stages took since phi_init */
+#endif
     size_t steps;             /* good steps since phi_init */
     double t;                 /* time since phi_init */
     double h;                 /* the last step size */
@@ -62,9 +77,13 @@ size_t phi_work_size(const size_t sizes[PHI_AXES]);
 phi_status phi_init(phi_solver *s, const phi_params *params, const size_t sizes[PHI_AXES], const double *x0, void *work);
 #endif
 
-/* Steps of size h, of either sign. If one fails, the state is that before it, and s->steps counts the good ones. Steps of
-   one call are joined: where a step ends as the next begins, both are one flow. With OpenMP rows are worked at in
-   parallel, with the same bits for any number of threads. */
+/* Steps of size h, of either sign. If one fails, the state is that before it, and s->steps counts the good ones.
+#if PHI_GUESSES
+   Guesses are extrapolated from the former steps of one call.
+#elif !PHI_SERIES
+   Steps of one call are joined: where a step ends as the next begins, both are one flow.
+#endif
+   With OpenMP rows are worked at in parallel, with the same bits for any number of threads. */
 phi_status phi_step(phi_solver *s, double h);
 phi_status phi_integrate(phi_solver *s, double h, size_t steps);
 

@@ -11,6 +11,9 @@ typedef struct {
     double *const *x;             /* see phi_solver */
     const ptrdiff_t *at;          /* the row itself and those beside it, from the first row on */
     ptrdiff_t length;             /* sites of a row */
+#if PHI_SERIES
+    double *const *start, *const *out; /* where a stage starts, and where what is computed goes; x is y there */
+#endif
 #if PHI_GATHER
     double *const *gathered;      /* see phi_solver */
 #endif
@@ -92,6 +95,9 @@ static inline void phi_locate(const phi_solver *s, size_t index, phi_row *row)
     row->x = s->x;
     row->at = s->lines + index * PHI_LINES;
     row->length = s->length;
+#if PHI_SERIES
+    row->start = row->out = s->x;
+#endif
 #if PHI_GATHER
     row->gathered = s->gathered;
 #endif
@@ -156,4 +162,36 @@ static inline phi_piece phi_piece_of(const phi_solver *s, size_t unit)
     piece.to = part == pieces - 1 ? s->length : piece.from + PHI_PIECE;
     return piece;
 }
+
+#if PHI_SERIES
+/* The largest change of y and the largest y, of each field; a NaN where something is not finite. */
+typedef struct {
+    double change[PHI_DIM], size[PHI_DIM];
+} phi_extent;
+
+enum { PHI_WIDTH = 8 }; /* largest values that are kept apart, so that loops vectorise */
+
+/* Takes in what a sweep from s->y[now] to the other has made of a piece. */
+static inline void phi_measure(const phi_solver *s, const phi_piece *at, int now, phi_extent *extent)
+{
+    for (int k = 0; k < PHI_DIM; ++k) {
+        const double *restrict before = s->y[now][k] + at->row.at[0], *restrict after = s->y[1 - now][k] + at->row.at[0];
+        double change[PHI_WIDTH] = { 0.0 }, size[PHI_WIDTH] = { 0.0 }, zero[PHI_WIDTH] = { 0.0 };
+        for (ptrdiff_t i = at->from; i < at->to; i += PHI_WIDTH) {
+            const int count = at->to - i < PHI_WIDTH ? (int)(at->to - i) : PHI_WIDTH;
+            for (int l = 0; l < count; ++l) {
+                const double value = fabs(after[i + l]), moved = fabs(after[i + l] - before[i + l]);
+                change[l] = moved > change[l] ? moved : change[l];
+                size[l] = value > size[l] ? value : size[l];
+                zero[l] += moved - moved;
+            }
+        }
+        for (int l = 0; l < PHI_WIDTH; ++l) {
+            extent->change[k] = change[l] > extent->change[k] ? change[l] : extent->change[k];
+            extent->change[k] += zero[l];
+            extent->size[k] = size[l] > extent->size[k] ? size[l] : extent->size[k];
+        }
+    }
+}
+#endif
 #endif

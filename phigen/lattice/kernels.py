@@ -1,0 +1,35 @@
+"""Kernels that are evaluated at every site of a lattice."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from phigen.lattice.cell import Cell
+from phigen.scheme.kernel import Kernel, Output
+from phigen.scheme.staging import Coefficients
+from phigen.symbolic.expression import Expression, symbols_of
+from phigen.symbolic.symbols import CHOSEN, GATHERED, INITIAL, PRESENT, kind_of
+
+
+def site_kernel(
+    cell: Cell,
+    name: str,
+    purpose: str,
+    values: Sequence[Expression],
+    output: str,
+    coefficients: Coefficients | None = None,
+) -> Kernel:
+    """A kernel at a site: inputs are coefficients, or parameters, then what it reads at sites, and the weights."""
+    used = symbols_of(*values)
+    places = cell.places(*values)
+
+    def of_kind(*kinds: str) -> tuple[str, ...]:
+        return tuple(n for n in used if kind_of(n) in kinds)
+
+    plain = tuple(p.name for p in cell.parameters if p.at == "all")
+    first = {"coef": coefficients.slots} if coefficients else {"params": plain}
+    inputs = {**first, "site": tuple(places), "present": of_kind(PRESENT, CHOSEN), "gathered": of_kind(GATHERED)}
+    bonds = tuple(p.name for p in cell.parameters if p.at == "bonds" and p.name in used)
+    inputs |= {"bonds": bonds} if bonds else {}
+    inputs |= {"start": of_kind(INITIAL)} if of_kind(INITIAL) else {}
+    return Kernel(name, purpose, inputs, (Output(output, tuple(values)),))

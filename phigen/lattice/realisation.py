@@ -1,0 +1,141 @@
+"""Bi-realisations on a lattice: α and β move each site by covectors p on its neighbourhood.
+
+Where π is that of each site, so are α and β: any bi-realisation in closed form of the system of one site serves. Where
+π couples neighbours, it has to be constant in coordinates φ(f) of each field f, where φ is f or log f. With p' the
+covector in those coordinates and D = π' p', which is a stencil, α = φ⁻¹(φ − ½D) and β = φ⁻¹(φ + ½D): constant π,
+log-canonical π, and those of Toda, all at once.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import cached_property
+
+from phigen.geometry.shapes import coordinate_terms
+from phigen.geometry.system import System, build_system
+from phigen.lattice.cell import Cell
+from phigen.realisations.catalogue import realise
+from phigen.realisations.protocol import BiRealisation, refuse
+from phigen.scheme.elimination import elimination
+from phigen.spec.model import BirealisationChoice, MatrixForm, PoissonForm
+from phigen.symbolic.expression import (
+    ONE,
+    ZERO,
+    Expression,
+    call,
+    gradient,
+    number,
+    substitute,
+    symbol,
+    symbols_of,
+    total,
+)
+from phigen.symbolic.symbols import Symbol, initial, momentum
+
+#: Of brackets that couple neighbours.
+KIND = "constant in logarithms"
+
+
+@dataclass(frozen=True)
+class CellRealisation:
+    """α and β at a site, symmetric and exact.
+
+    ``displacement`` is α − x and ``increment`` β − α, for each field, in the symbols of the fields at offsets and of
+    their covectors (``momentum`` of those symbols). ``site`` is the system of one site and its bi-realisation, where π
+    is local, and ``logarithmic`` has the fields f with φ = log f where it is not.
+    """
+
+    kind: str
+    displacement: Mapping[str, Expression]
+    increment: Mapping[str, Expression]
+    explanation: str
+    site: tuple[System, BiRealisation] | None = None
+    logarithmic: frozenset[str] = frozenset()
+
+    @cached_property
+    def middle(self) -> dict[str, Expression]:
+        """y of α(y, p) = x at a site, from x there (`initial`): without y on the right where α is linear in y."""
+        fields, values = list(self.displacement), list(self.displacement.values())
+        slopes = [gradient(e, fields) for e in values]
+        start = [symbol(initial(f)) for f in fields]
+        affine = not any(n in fields for n in symbols_of(*(d for row in slopes for d in row)))
+        if not self.site or not affine or all(d.is_zero for row in slopes for d in row):
+            return {f: x - e for f, x, e in zip(fields, start, values, strict=True)}
+        constant = substitute(values, dict.fromkeys(fields, ZERO))
+        solution, _ = elimination([[not d.is_zero for d in row] for row in slopes])
+        known: dict[str, Expression] = {Symbol("r", i): start[i] - c for i, c in enumerate(constant)}
+        for i, row in enumerate(slopes):
+            known |= {Symbol("J", i, j): d + 1 if i == j else d for j, d in enumerate(row)}
+        return dict(zip(fields, substitute(solution, known), strict=True))
+
+
+def realise_cell(cell: Cell, form: PoissonForm | None, choice: BirealisationChoice) -> CellRealisation:
+    """The bi-realisation of a grid or of pairs. Raises `SpecError` where none in closed form is known."""
+    return _of_site(cell, form, choice) if cell.is_local else _of_neighbours(cell, choice)
+
+
+def _of_site(cell: Cell, form: PoissonForm | None, choice: BirealisationChoice) -> CellRealisation:
+    rows = tuple(tuple(cell.bracket.get((f, g), ZERO) for g in cell.fields) for f in cell.fields)
+    energy = total(symbol(f) for f in cell.fields)  # α and β do not depend on H
+    system = build_system(cell.name, cell.fields, cell.parameters, form or MatrixForm(rows), energy)
+    found = realise(system, choice)
+    if found.path or not found.exact:
+        what = "follows paths numerically" if found.path else "is approximate"
+        raise refuse(f"scheme series: on lattices α and β are in closed form; {found.kind} {what}")
+    if not found.symmetric:
+        raise refuse(f"scheme series: on lattices the bi-realisation is symmetric; {found.kind} is not")
+    displacement, increment = (
+        dict(zip(cell.fields, values, strict=True)) for values in (found.displacement, found.increment)
+    )
+    return CellRealisation(found.kind, displacement, increment, found.explanation, (system, found))
+
+
+def _of_neighbours(cell: Cell, choice: BirealisationChoice) -> CellRealisation:
+    if choice.kind not in ("auto", "constant", "log-canonical"):
+        raise refuse(f"birealisation {choice.kind} is not for brackets that couple neighbours", "birealisation: auto")
+    found = _logarithms(cell)
+    if found is None:
+        hint = "brackets that are constant, or become so for log f in place of some fields f"
+        raise refuse("scheme series: no bi-realisation is known for these brackets, which couple neighbours", hint)
+    logarithmic, constants = found
+    half, displacement, increment = number(Fraction(1, 2)), {}, {}
+    for f in cell.fields:
+        terms = [
+            constant * (symbol(other) if cell.place(other)[0] in logarithmic else ONE) * symbol(momentum(other))
+            for (g, other), constant in constants.items()
+            if g == f
+        ]
+        moved = total(terms)
+        if f in logarithmic:
+            growth = call("expm1", -(half * moved))
+            displacement[f] = symbol(f) * growth
+            increment[f] = -(symbol(f) * (growth * (1 + 1 / (1 + growth))))
+        else:
+            displacement[f], increment[f] = -(half * moved), moved
+    named = ", ".join(f"log {f}" if f in logarithmic else f for f in cell.fields)
+    kind = KIND if logarithmic else "constant"
+    return CellRealisation(kind, displacement, increment, f"π is constant in {named}", None, logarithmic)
+
+
+def _logarithms(cell: Cell) -> tuple[frozenset[str], dict[tuple[str, str], Expression]] | None:
+    """The fewest fields whose logarithms make π constant, and π in these coordinates; None if there are none."""
+    for count in range(len(cell.fields) + 1):
+        for chosen in itertools.combinations(cell.fields, count):
+            constants = {pair: _constant(cell, *pair, chosen) for pair in cell.bracket}
+            known = {pair: c for pair, c in constants.items() if c is not None}
+            if len(known) == len(constants):
+                return frozenset(chosen), known
+    return None
+
+
+def _constant(cell: Cell, f: str, other: str, logarithmic: Sequence[str]) -> Expression | None:
+    """The bracket of two fields in coordinates, some of which are logarithms; None if it is not constant."""
+    entry = cell.bracket[f, other]
+    fields = [n for n, (base, _) in cell.places(entry, symbol(f), symbol(other)).items() if base in cell.fields]
+    terms = coordinate_terms(fields, [entry])
+    factors = {n for n in (f, other) if cell.place(n)[0] in logarithmic}
+    wanted = tuple(int(n in factors) for n in fields)
+    return terms[0][wanted] if terms and set(terms[0]) == {wanted} else None

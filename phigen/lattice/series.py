@@ -1,0 +1,125 @@
+"""The series on a lattice: S_h = hH, so a stage is the implicit step of order 2 of a bi-realisation, and composed.
+
+A stage solves y = x − (α − x)(y, h∇H(y)) for y on the whole lattice; then x moves by (β − α)(y, h∇H(y)). With the
+covectors written out, both are formulas of a site and its neighbourhood, whatever H and π couple.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from phigen.errors import Diagnostic, SpecError
+from phigen.lattice.cell import Cell
+from phigen.lattice.graphs import sums_by_field
+from phigen.lattice.kernels import site_kernel
+from phigen.lattice.parts import Colouring, PartSearch, summands_of
+from phigen.lattice.realisation import CellRealisation, realise_cell
+from phigen.scheme.alternation import Schedule
+from phigen.scheme.choosing import Host
+from phigen.scheme.composition import find, orders
+from phigen.scheme.order import Order
+from phigen.scheme.staging import Coefficients
+from phigen.scheme.steps import Equation
+from phigen.spec.model import BirealisationChoice, Spec
+from phigen.splitting.ring import TIME
+from phigen.symbolic.expression import Expression, substitute, symbol, symbols_of
+from phigen.symbolic.symbols import MOMENTUM, Symbol
+
+
+@dataclass(frozen=True)
+class SeriesPlan:
+    """The bi-realisation, and the stages of order 2 that a step is composed of, as ``fractions`` of it.
+
+    ``middle`` is y at a site as a formula of y around and of x there (`initial`), ``increment`` what x moves by: for
+    each field, with the stage's step as `TIME`.
+    """
+
+    realisation: CellRealisation
+    order: Order
+    composition: str
+    fractions: tuple[float, ...]
+    middle: Mapping[str, Expression]
+    increment: Mapping[str, Expression]
+
+    @property
+    def colouring(self) -> Colouring:
+        """All sites are alike."""
+        return Colouring()
+
+    @property
+    def by_colour(self) -> tuple[bool, ...]:
+        """No flow is that of one colour."""
+        return ()
+
+    @property
+    def facts(self) -> list[str]:
+        """What the header says of the method."""
+        count = len(self.fractions)
+        composed = [f"composition: {self.composition}, {count} stages of order 2"] if count > 1 else []
+        step = "step: implicit, by sweeps over the sites until they change nothing"
+        return [f"bi-realisation: {self.realisation.kind}, symmetric", "generating function: S_1", step, *composed]
+
+    def schedule(self) -> Schedule:
+        """The stages of a step, as flows of one part."""
+        return Schedule(self.fractions, len(self.fractions) - 1, ((0, 0),))
+
+
+def plan_series(cell: Cell, host: Host, order: int, composition: str, spec: Spec | None) -> SeriesPlan:
+    """The plan for any H. Raises `SpecError` where no bi-realisation is known, and for orders that are not offered."""
+    stages = _stages(host, order, composition)
+    if cell.bond_bracket:
+        message = "scheme series: brackets along bonds are not offered"
+        raise SpecError([Diagnostic(message, host.locations.get(("poisson",)))])
+    form = spec.poisson if spec and cell.is_local else None
+    try:
+        found = realise_cell(cell, form, spec.birealisation if spec else BirealisationChoice())
+    except SpecError as error:
+        place = host.locations.get(("birealisation",)) or host.locations.get(("poisson",))
+        raise SpecError([Diagnostic(d.message, d.location or place, d.hint) for d in error.diagnostics]) from None
+    return SeriesPlan(found, *stages, *(_at_covectors(cell, maps) for maps in (found.middle, found.increment)))
+
+
+def equation(cell: Cell, plan: SeriesPlan, coefficients: Coefficients) -> Equation:
+    """The kernels of a stage."""
+    size = len(plan.middle)
+    values = coefficients.hoist([*plan.middle.values(), *plan.increment.values()])
+    relax = site_kernel(cell, "relax", "y at a site from x there and y around it", values[:size], "y", coefficients)
+    purpose = "what a stage adds to x at a site, from y around it"
+    advance = site_kernel(cell, "increment", purpose, values[size:], "change", coefficients)
+    return Equation(relax, advance)
+
+
+def _at_covectors(cell: Cell, maps: Mapping[str, Expression]) -> dict[str, Expression]:
+    """The maps with p = h∇H(y) at all sites that they mention."""
+    search = PartSearch(cell, Colouring(1, (0,) * len(cell.axes)))
+    every = [(s, 0) for s in summands_of(cell)]
+    summed = sums_by_field(cell)
+    slopes: dict[str, Expression] = {}
+    for name in symbols_of(*maps.values()):
+        if isinstance(name, Symbol) and name.kind == MOMENTUM:
+            field, offset = cell.place(str(name.key[0]))
+            slope = search.force(every, field, 0, offset)
+            if field in summed:
+                slope = slope + summed[field]
+            slopes[name] = symbol(TIME) * slope
+    return dict(zip(maps, substitute(list(maps.values()), slopes), strict=True))
+
+
+def _stages(host: Host, order: int, composition: str) -> tuple[Order, str, tuple[float, ...]]:
+    """The composition of steps of order 2 that gives an order; odd orders round up."""
+    even = order + order % 2
+    note = "" if even == order else f"order {order} was asked for; a symmetric method has even order"
+    if even == 2 and composition in ("auto", "none"):
+        return Order(2, 1, note), "none", (1.0,)
+    found = find(composition, even)
+    if found is None:
+        place = host.locations.get(("composition",)) or host.locations.get(("order",))
+        known = orders(composition) if composition != "none" else []
+        listed = ", ".join(map(str, [2, *known] if composition in ("auto", "none") else known)) or "none"
+        who = (
+            "the series on lattices offers" if composition in ("auto", "none") else f"composition {composition} offers"
+        )
+        message = f"scheme series: {who} the orders {listed}, not {even}"
+        raise SpecError([Diagnostic(message, place, "composition: auto" * (composition != "auto"))])
+    return Order(even, 1, note), found.name, found.fractions

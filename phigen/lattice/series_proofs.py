@@ -1,0 +1,82 @@
+"""What makes the series on a lattice right, proved for each build.
+
+The axioms of the bi-realisation: at one site where π is local, else on a periodic box so large that the sites that α
+mentions at two sites that meet do not wrap, which is every box by translation. Then the equation of a stage: y at a
+site, as it is written, solves α(y, p) = x for any p; and with p = h∇H the increment is hπ∇H up to O(h²), so a stage,
+being symmetric, has order 2.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+from phigen.geometry.system import System, build_system
+from phigen.lattice.cell import PERIODIC, Cell
+from phigen.lattice.expansion import Expansion, Site, expand
+from phigen.lattice.graphs import field_with_sums
+from phigen.lattice.realisation import CellRealisation
+from phigen.lattice.series import SeriesPlan
+from phigen.realisations import axioms
+from phigen.realisations.protocol import BiRealisation, is_symmetric
+from phigen.splitting.ring import TIME
+from phigen.symbolic.expression import ZERO, Expression, derivatives, substitute, symbol, symbols_of, total
+from phigen.symbolic.symbols import MOMENTUM, Symbol, initial, momentum
+from phigen.symbolic.verdict import Statement, decide_zero
+
+
+def check(cell: Cell, plan: SeriesPlan) -> Iterator[Statement]:
+    """The statements on the bi-realisation, then those on a stage."""
+    system, realisation = plan.realisation.site or _on_a_box(cell, plan.realisation)
+    where = (
+        "" if plan.realisation.site else f"on {system.dimension // len(cell.fields)} sites, as on all by translation"
+    )
+    for statement in axioms.check(system, realisation):
+        detail = "; ".join(filter(None, [statement.detail, where]))
+        yield replace(statement, name=statement.name.removeprefix("bi-realisation: "), detail=detail)
+    yield from _stage(cell, plan)
+
+
+def _stage(cell: Cell, plan: SeriesPlan) -> Iterator[Statement]:
+    """The equation of a stage and its order."""
+    found, positive = plan.realisation, tuple(p.name for p in cell.parameters if p.positive)
+    alpha: dict[str, Expression] = {initial(f): symbol(f) + e for f, e in found.displacement.items()}
+    written = substitute([found.middle[f] for f in cell.fields], alpha)
+    residuals = [(f, w - symbol(f)) for f, w in zip(cell.fields, written, strict=True)]
+    yield decide_zero("y, as it is written, solves α(y, p) = x", residuals, positive)
+    rates = derivatives(list(plan.increment.values()), TIME)
+    slopes = substitute(rates, {TIME: ZERO})
+    residuals = [(f, a - b) for f, a, b in zip(cell.fields, slopes, field_with_sums(cell), strict=True)]
+    order = f"hence the order 2 of {'a step' if plan.order.order == 2 else 'each stage'}, which is symmetric"
+    yield decide_zero("(β − α)(y, h∇H(y)) = hπ∇H(y) + O(h²)", residuals, positive, order)
+
+
+def _on_a_box(cell: Cell, found: CellRealisation) -> tuple[System, BiRealisation]:
+    """The realisation on a small periodic lattice."""
+    periodic = replace(cell, boundary=(PERIODIC,) * len(cell.axes))
+    box = expand(periodic, [4 * r + 1 for r in cell.poisson_reach])
+    coordinates, places = box.coordinates, [(f, site) for f in cell.fields for site in box.sites]
+    displacement = tuple(_at(box, found.displacement[f], site) for f, site in places)
+    increment = tuple(_at(box, found.increment[f], site) for f, site in places)
+    energy = total(symbol(c) for c in coordinates)
+    system = build_system(cell.name, coordinates, box.spec().parameters, box.matrix(), energy)
+    alpha = tuple(symbol(c) + d for c, d in zip(coordinates, displacement, strict=True))
+    beta = tuple(a + d for a, d in zip(alpha, increment, strict=True))
+    symmetric = is_symmetric(alpha, beta, coordinates)
+    return system, BiRealisation(found.kind, coordinates, alpha, beta, displacement, increment, symmetric)
+
+
+def _at(box: Expansion, e: Expression, site: Site) -> Expression:
+    """An expression in fields and covectors around a site."""
+    values: dict[str, Expression] = {}
+    for name in symbols_of(e):
+        covector = isinstance(name, Symbol) and name.kind == MOMENTUM
+        try:
+            base, offset = box.cell.place(str(name.key[0]) if isinstance(name, Symbol) and covector else name)
+        except KeyError:
+            continue
+        there = box.neighbour(site, offset)
+        assert there is not None  # the box is periodic
+        known = box.names[base, there]
+        values[name] = symbol(momentum(known) if covector else known)
+    return substitute([e], values)[0]

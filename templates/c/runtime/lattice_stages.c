@@ -1,0 +1,190 @@
+#ifndef PHI_FILE_LATTICE_STAGES
+#define PHI_FILE_LATTICE_STAGES
+#include <math.h>
+
+#include "lattice.h"
+#include "model.h"
+#include "rows.c"
+#include "sweeps.h"
+
+/* ---- The stages ---- */
+#ifdef _OPENMP
+#if PHI_PAIRS
+#define PHI_PARALLEL _Pragma("omp parallel if (s->sites > 512)")
+#else
+#define PHI_PARALLEL _Pragma("omp parallel if (s->sites > 4096)")
+#endif
+#define PHI_ONE_BY_ONE _Pragma("omp critical")
+#else
+#define PHI_PARALLEL
+#define PHI_ONE_BY_ONE
+#endif
+
+/* The part of so many units that a thread works at, from *first on; returns its end. */
+static size_t phi_share(size_t units, size_t *first)
+{
+#ifdef _OPENMP
+    const size_t threads = (size_t)omp_get_num_threads(), own = (size_t)omp_get_thread_num();
+    const size_t each = units / threads, more = units % threads;
+    *first = each * own + (own < more ? own : more);
+    return *first + each + (own < more);
+#else
+    *first = 0;
+    return units;
+#endif
+}
+
+static double phi_larger(double a, double b) { return isnan(a) || a > b ? a : b; }
+
+/* A sweep from s->y[now] to the other: how far y moves, in sizes of each field. Not finite if y is not. */
+static double phi_relaxed(const phi_solver *s, const double *coef, int far, int now)
+{
+    const size_t units = s->rows * phi_pieces(s);
+    phi_extent whole = { { 0.0 }, { 0.0 } };
+    PHI_PARALLEL
+    {
+        phi_extent own = { { 0.0 }, { 0.0 } };
+        size_t first, end = phi_share(units, &first);
+        phi_relax_rows(s, coef, far, now, &own, first, end);
+        PHI_ONE_BY_ONE
+        for (int k = 0; k < PHI_DIM; ++k) {
+            whole.change[k] = phi_larger(whole.change[k], own.change[k]);
+            whole.size[k] = phi_larger(whole.size[k], own.size[k]);
+        }
+    }
+    double largest = 0.0, moved = 0.0;
+    for (int k = 0; k < PHI_DIM; ++k) largest = phi_larger(largest, whole.size[k]);
+    for (int k = 0; k < PHI_DIM; ++k)
+        moved = phi_larger(moved, whole.change[k] / (whole.size[k] + 1e-3 * largest + 1e-300));
+    return moved;
+}
+
+#define PHI_SETTLED 0x1p-55   /* what further sweeps may still change, in sizes of y */
+#define PHI_ROUNDING 0x1p-40  /* changes below this may be rounding */
+
+/* y in the middle of a stage, by sweeps from the guess in s->y[0] until only rounding would change; it is in s->y[*now]. */
+static phi_status phi_middle(phi_solver *s, const double *coef, int far, int *now)
+{
+    double before = 0.0;
+    for (int sweep = 0; sweep < PHI_MOST_SWEEPS; ++sweep) {
+        const double change = phi_relaxed(s, coef, far, *now), shrunk = before - change;
+        ++s->sweeps;
+        *now = 1 - *now;
+        if (!isfinite(change)) return PHI_NOT_FINITE;
+        /* what further sweeps would change, with the rate change / before; or changes shrink no more */
+        if (change * change <= shrunk * PHI_SETTLED || (shrunk <= 0.0 && change <= PHI_ROUNDING && sweep > 0))
+            return PHI_OK;
+        before = change;
+    }
+    return PHI_NO_CONVERGENCE;
+}
+
+#if PHI_GUESSES
+/* x and the extrapolated y - x into s->y[0], with the copied ends. */
+static void phi_predict(const phi_solver *s, int stage)
+{
+    PHI_PARALLEL
+    {
+        size_t row, rows = phi_share(s->rows, &row);
+        for (int k = 0; k < PHI_DIM; ++k)
+            for (size_t r = row; r < rows; ++r) {
+                const ptrdiff_t first = (ptrdiff_t)r * s->width - PHI_HALO, end = first + s->length + 2 * PHI_HALO;
+                for (ptrdiff_t i = first; i < end; ++i) s->y[0][k][i] = s->x[k][i];
+                for (int d = 0; d < s->guess[stage].order; ++d) {
+                    const double *difference = s->guess[stage].difference[d][k];
+                    for (ptrdiff_t i = first; i < end; ++i) s->y[0][k][i] += difference[i];
+                }
+            }
+    }
+}
+
+/* Take in the y of a stage. The guess of order d missed it by its d-th difference: the next is of the best order. */
+static void phi_remember(phi_solver *s, int stage, int now)
+{
+    phi_guess *guess = &s->guess[stage];
+    double size[PHI_DIFFERENCES] = { 0.0 }, least = HUGE_VAL;
+    PHI_PARALLEL
+    {
+        size_t row, rows = phi_share(s->rows, &row);
+        double own[PHI_DIFFERENCES] = { 0.0 };
+        for (int k = 0; k < PHI_DIM; ++k)
+            for (size_t r = row; r < rows; ++r) {
+                const ptrdiff_t first = (ptrdiff_t)r * s->width - PHI_HALO, end = first + s->length + 2 * PHI_HALO;
+                const double *restrict y = s->y[now][k], *restrict x = s->x[k];
+                for (ptrdiff_t i = first; i < end; ++i) {
+                    double next = y[i] - x[i];
+                    for (int d = 0; d < guess->count; ++d) {
+                        const double last = guess->difference[d][k][i];
+                        guess->difference[d][k][i] = next;
+                        next -= last;
+                        own[d] = fabs(next) > own[d] ? fabs(next) : own[d];
+                    }
+                    if (guess->count < PHI_DIFFERENCES) guess->difference[guess->count][k][i] = next;
+                }
+            }
+        PHI_ONE_BY_ONE
+        for (int d = 0; d < PHI_DIFFERENCES; ++d) size[d] = phi_larger(size[d], own[d]);
+    }
+    guess->order = 1;
+    for (int d = 0; d < guess->count; ++d)
+        if (size[d] < least) {
+            least = size[d];
+            guess->order = d + 1;
+        }
+    if (guess->count < PHI_DIFFERENCES) ++guess->count;
+}
+
+/* Begin without guesses. */
+static void phi_forget(phi_solver *s)
+{
+    for (int stage = 0; stage < PHI_STAGES; ++stage) s->guess[stage].count = s->guess[stage].order = 0;
+}
+
+#endif
+/* The stages of a step. */
+static phi_status phi_stages(phi_solver *s, int far)
+{
+    const size_t units = s->rows * phi_pieces(s);
+    for (int stage = 0; stage < PHI_STAGES; ++stage) {
+        const double *coef = s->coef + stage * PHI_ROW;
+        int now = 0;
+#if PHI_GUESSES
+        phi_predict(s, stage);
+#else
+        phi_copy(s->y[0], s->x, s);
+#endif
+        const phi_status status = phi_middle(s, coef, far, &now);
+        if (status != PHI_OK) return status;
+#if PHI_GUESSES
+        phi_remember(s, stage, now);
+#endif
+        PHI_PARALLEL
+        {
+            size_t first, end = phi_share(units, &first);
+            phi_increment_rows(s, coef, far, now, first, end);
+        }
+    }
+    return phi_holds(s) ? PHI_OK : PHI_NOT_FINITE;
+}
+
+/* One step; if it cannot be made, none. */
+static phi_status phi_try(phi_solver *s, int steps)
+{
+    (void)steps;
+    phi_copy(s->before, s->x, s);
+#if PHI_NEAR
+    if (phi_stages(s, 0) == PHI_OK) return PHI_OK;
+    phi_copy(s->x, s->before, s);
+#if PHI_GUESSES
+    phi_forget(s);
+#endif
+#endif
+    const phi_status status = phi_stages(s, 1);
+    if (status == PHI_OK) return status;
+    phi_copy(s->x, s->before, s);
+#if PHI_GUESSES
+    phi_forget(s);
+#endif
+    return status;
+}
+#endif
