@@ -1,5 +1,6 @@
 import subprocess
 import sys
+from importlib import import_module
 
 import pytest
 
@@ -23,3 +24,11 @@ def test_public_names_are_found():
 
 def test_bundled_specs_are_found():
     assert (resources.bundled_specs() / "rigid_body.yaml").is_file()
+
+
+@pytest.mark.parametrize("name", ["jax", "torch"])
+def test_propagators_say_what_they_need(name, monkeypatch):
+    monkeypatch.setitem(sys.modules, name, None)
+    monkeypatch.delitem(sys.modules, f"phigen.{name}", raising=False)
+    with pytest.raises(phigen.MissingPackageError, match=f"pip install {name}"):
+        import_module(f"phigen.{name}")

@@ -1,0 +1,64 @@
+"""Runs of solvers as functions of PyTorch, with gradients. Needs the extra ``phigen[torch]``.
+
+The solver runs on the CPU, in double precision. Derivatives are those of `Solver.pullback`; second ones are not
+offered.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from phigen.errors import MissingPackageError
+from phigen.runtime.propagation import Propagation
+from phigen.runtime.solver import Solver
+
+try:
+    import torch
+except ImportError as error:
+    raise MissingPackageError("phigen.torch needs torch\n  hint: pip install torch") from error
+
+
+def propagator(
+    solver: Solver, *, h: float, steps: int, stride: int | None = None, t0: float | None = None
+) -> Callable[..., Any]:
+    """The run of a solver as ``f(x0, parameters={})``: the last state, of the shape (…, DIM) of the tensor ``x0``.
+
+    With a ``stride`` all rows of `Solver.integrate`, (…, rows, DIM). ``parameters`` are tensors by name, of shapes that
+    broadcast to (…); what is not given has its default. Results have the precision and the device of x0. Gradients are
+    exact to round-off, and ask for a solver compiled with ``adjoint=True``. Raises `StepError`.
+    """
+    made = Propagation(solver, h, steps, stride, t0)
+
+    def propagate(x0: Any, parameters: Mapping[str, Any] | None = None) -> Any:
+        given = {name: torch.as_tensor(v, dtype=x0.dtype, device=x0.device) for name, v in (parameters or {}).items()}
+        return _Run.apply(made, tuple(given), x0, *given.values())
+
+    return propagate
+
+
+class _Run(torch.autograd.Function):  # type: ignore[misc]
+    """The run, and its transpose."""
+
+    @staticmethod
+    def forward(made: Propagation, names: tuple[str, ...], x0: Any, *values: Any) -> Any:
+        parameters = dict(zip(names, map(_numbers, values), strict=True))
+        return torch.as_tensor(made.run(_numbers(x0), parameters), dtype=x0.dtype, device=x0.device)
+
+    @staticmethod
+    def setup_context(ctx: Any, inputs: tuple[Any, ...], output: Any) -> None:
+        ctx.made, ctx.names, *given = inputs
+        ctx.save_for_backward(*given)
+
+    @staticmethod
+    @torch.autograd.function.once_differentiable  # type: ignore[untyped-decorator]
+    def backward(ctx: Any, cotangent: Any) -> tuple[Any, ...]:
+        x0, *values = ctx.saved_tensors
+        parameters = dict(zip(ctx.names, map(_numbers, values), strict=True))
+        x0_bar, bars = ctx.made.transposed(_numbers(x0), parameters, _numbers(cotangent))
+        own = [torch.as_tensor(bars[name], dtype=x0.dtype, device=x0.device) for name in ctx.names]
+        return None, None, torch.as_tensor(x0_bar, dtype=x0.dtype, device=x0.device), *own
+
+
+def _numbers(tensor: Any) -> Any:
+    return tensor.detach().cpu().numpy()

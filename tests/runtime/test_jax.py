@@ -1,0 +1,108 @@
+"""Runs of solvers as functions of JAX: values, derivatives both ways, under jit and vmap."""
+
+import numpy as np
+import pytest
+
+import phigen
+
+jax = pytest.importorskip("jax")
+jnp = jax.numpy
+
+SYSTEM = """phigen: 1
+name: t
+coordinates: [x1, x2, x3]
+parameters: {I1: 1, I2: 2, I3: 3}
+poisson: {brackets: {x1: {x2: -x3, x3: x2}, x2: {x3: -x1}}}
+hamiltonian: (x1**2/I1 + x2**2/I2 + x3**2/I3)/2
+gauge: none
+profile: small
+order: 2
+"""
+H, STEPS = 0.1, 7
+X = np.array([[1.0, 0.5, 0.3], [0.9, -0.2, 0.4]])
+
+
+@pytest.fixture(scope="module")
+def solver():
+    return phigen.compile(phigen.spec.loads(SYSTEM), target="numpy", adjoint=True)
+
+
+@pytest.fixture(autouse=True)
+def in_double_precision():
+    with jax.enable_x64(True):
+        yield
+
+
+def propagator(solver, **options):
+    from phigen.jax import propagator as make
+
+    return make(solver, h=H, steps=STEPS, **options)
+
+
+def close(found, expected):
+    return np.allclose(np.asarray(found), np.asarray(expected), rtol=1e-13, atol=0)
+
+
+def cubes(f):
+    """A number from a run, of a state and I2."""
+    return lambda x, i2: jnp.sum(f(x, {"I2": i2}) ** 3)
+
+
+def test_values_are_those_of_the_solver(solver):
+    made, rows = propagator(solver), propagator(solver, stride=3)
+    assert np.array_equal(made(X[0]), solver.integrate(X[0], H, STEPS).x[-1])
+    assert np.array_equal(made(X), solver.ensemble(X, H, STEPS))
+    assert np.array_equal(rows(X, {"I2": 1.5})[1], solver.integrate(X[1], H, STEPS, 3, I2=1.5).x)
+    assert made(X[0].astype(np.float32)).dtype == np.float32
+
+
+def test_gradient_is_that_of_the_pull_back(solver):
+    made = cubes(propagator(solver))
+    gradient = jax.jit(jax.value_and_grad(made, argnums=(0, 1)))
+    value, (by_x, by_i2) = gradient(X[0], 2.2)
+    x1 = solver.integrate(X[0], H, STEPS, I2=2.2).x[-1]
+    _, x0_bar, found = solver.pullback(X[0], H, STEPS, 3 * x1**2, I2=2.2)
+    assert close(value, np.sum(x1**3))
+    assert close(by_x, x0_bar)
+    assert close(by_i2, found["I2"])
+
+
+@pytest.mark.parametrize("axes", [(0, None), (None, 0), (0, 0)])
+def test_vmap_is_a_loop(solver, axes):
+    made = cubes(propagator(solver))
+    arguments = (X if axes[0] == 0 else X[0], np.array([1.8, 2.3]) if axes[1] == 0 else 2.2)
+    values, slopes = jax.vmap(jax.value_and_grad(made, argnums=(0, 1)), in_axes=axes)(*arguments)
+    for m in range(2):
+        own = [a[m] if axis == 0 else a for a, axis in zip(arguments, axes, strict=True)]
+        value, (by_x, by_i2) = jax.value_and_grad(made, argnums=(0, 1))(*own)
+        assert close(values[m], value)
+        assert close(slopes[0][m], by_x)
+        assert close(slopes[1][m], by_i2)
+
+
+def test_members_share_a_parameter_in_any_way(solver):
+    """As leading axes, by vmap inside the derivative, by vmap outside, and with an axis of vmap before their own."""
+    made = propagator(solver)
+    expected = sum(jax.grad(cubes(made), argnums=1)(x, 2.2) for x in X)
+    assert close(jax.grad(cubes(made), argnums=1)(X, 2.2), expected)
+    inside = lambda i2: jnp.sum(jax.vmap(made, in_axes=(0, None))(X, {"I2": i2}) ** 3)  # noqa: E731
+    assert close(jax.grad(inside)(2.2), expected)
+    both = jax.vmap(jax.grad(cubes(made), argnums=1), in_axes=(None, 0))(X, jnp.array([2.2, 1.5]))
+    assert close(both[0], expected)
+
+
+@pytest.mark.parametrize("stride", [None, 3])
+def test_derivatives_both_ways_agree(solver, stride):
+    back, forth = (propagator(solver, stride=stride, forward=forward) for forward in (False, True))
+    at, along = (X, 2.2), (jnp.array(0.1 * X[::-1]), 0.7)
+    by_x, by_i2 = jax.grad(cubes(back), argnums=(0, 1))(*at)
+    _, slope = jax.jvp(cubes(forth), at, along)
+    assert close(slope, np.sum(by_x * along[0]) + by_i2 * along[1])
+    assert close(jax.jit(jax.grad(cubes(forth)))(*at), by_x)
+
+
+def test_failing_steps_raise(solver):
+    with pytest.raises(Exception, match=r"NO_CONVERGENCE|NOT_FINITE"):
+        propagator(solver)(1e6 * X[0])
+    with pytest.raises(ValueError, match="stride"):
+        propagator(solver, stride=0)
