@@ -15,18 +15,29 @@ from phigen.cli.console import Console
 from phigen.errors import Diagnostic, SpecError
 
 if TYPE_CHECKING:
+    from phigen.cli.past import Past
     from phigen.compilation import Compilation
+    from phigen.runtime.ending import End
+    from phigen.runtime.interface import Floats
     from phigen.runtime.solver import Solver
     from phigen.spec.model import Run, Spec
 
 
 @dataclass(frozen=True)
 class Experiment:
-    """A run with the values of the command line put in."""
+    """A run with the values of the command line put in.
+
+    ``end`` is where it ends between two steps, ``times`` those of the states that are stored in place of a stride.
+    ``past`` is a finished run that it goes on with, ``first`` an attitude at its start.
+    """
 
     run: Run
     initial: tuple[float, ...]
     parameters: dict[str, float]
+    end: End | None = None
+    times: tuple[float, ...] = ()
+    past: Past | None = None
+    first: Floats | None = None
 
     @property
     def h(self) -> float:
@@ -39,9 +50,28 @@ class Experiment:
         return float(self.run.start)
 
     @property
+    def begin(self) -> float:
+        """The time where its steps begin: at the start, or where the past ends."""
+        return self.past.t if self.past else self.t0
+
+    @property
+    def spans(self) -> tuple[float, ...]:
+        """The times of states that are stored, from where steps begin."""
+        return tuple(time - self.begin for time in self.times)
+
+    @property
+    def until(self) -> float:
+        """The time where it ends, of steps that are equal in time or with an end in time."""
+        return self.begin + (self.end.span if self.end else self.h * self.run.steps)
+
+    @property
     def rows(self) -> int:
-        """How many states are stored: those of every stride-th step, and the last."""
-        return self.run.steps // self.run.stride + 1 + (self.run.steps % self.run.stride > 0)
+        """How many states are stored: those of every stride-th step or at given times, and the last."""
+        begun = len(self.past.rows) if self.past else 1
+        if self.times:
+            return begun + len(self.times) + (abs(self.until - self.times[-1]) > 1e-9 * abs(self.until - self.begin))
+        part = bool(self.end and self.end.part)
+        return begun + self.run.steps // self.run.stride + (self.run.steps % self.run.stride > 0) + part
 
 
 def expect_system(spec: Spec) -> None:
@@ -64,7 +94,12 @@ def run_of(spec: Spec, name: str | None) -> Run:
 
 
 def prepared(
-    spec: Spec, name: str | None, step: float | None = None, steps: int | None = None, settings: Iterable[str] = ()
+    spec: Spec,
+    name: str | None,
+    step: float | None = None,
+    steps: int | None = None,
+    settings: Iterable[str] = (),
+    until: float | None = None,
 ) -> Experiment:
     """The run of that name, the first by default, with changes of the command line; not of a lattice."""
     expect_system(spec)
@@ -74,7 +109,13 @@ def prepared(
             raise click.BadParameter("the step must be a finite number, and not 0", param_hint="--step")
         run = replace(run, step=Fraction(step))
     if steps is not None:
-        run = replace(run, steps=steps, stride=min(run.stride, steps))
+        run = replace(run, steps=steps, stride=min(run.stride, steps), until=None)
+    if until is not None:
+        if not math.isfinite(until) or (until - run.start) / run.step <= 0:
+            raise click.BadParameter(
+                f"{until!r} is never reached by steps of {float(run.step)!r}", param_hint="--until"
+            )
+        run = replace(run, until=Fraction(until))
     initial = dict(zip(spec.coordinates, map(float, run.initial), strict=True))
     parameters = spec.parameters_of(run)
     for setting in settings:

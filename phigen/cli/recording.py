@@ -16,17 +16,18 @@ from phigen._version import __version__
 from phigen.cli.console import Console
 from phigen.cli.experiment import Experiment
 from phigen.cli.interruption import interruptible
+from phigen.cli.past import begun, columns_of
 from phigen.compilation import Compilation
 from phigen.errors import FileError, StepError
 from phigen.runtime import checkpoint
 from phigen.runtime.checkpoint import Checkpoint, MismatchError
 from phigen.runtime.crossings import CrossingFinder, section_columns
-from phigen.runtime.interface import BackendError
-from phigen.runtime.march import Piece, march
+from phigen.runtime.interface import BackendError, Floats
+from phigen.runtime.march import Piece, march, march_at, standing
 from phigen.runtime.session import Session
 from phigen.runtime.solver import Solver
 from phigen.runtime.tables import Table, opened
-from phigen.runtime.trajectory import Trajectory, element_columns, trajectory_columns
+from phigen.runtime.trajectory import Trajectory
 from phigen.study.lyapunov import FrameGrowth, Spectrum
 from phigen.study.sections import function_of
 from phigen.study.sketch import POINTS, Sketch, Thinned
@@ -35,6 +36,8 @@ from phigen.symbolic.readable import readable
 
 #: Seconds between two checkpoints.
 CHECKPOINT_SECONDS = 2.0
+#: Rows of a finished run that are taken in at a time.
+_ROWS = 1 << 14
 
 
 @dataclass(frozen=True)
@@ -64,7 +67,8 @@ class Recorder:
         self.finder = None
         if run.section is not None:
             section = function_of(run.section, names.coordinates, parameters, names.time)
-            self.finder = CrossingFinder[Session](section, experiment.h, experiment.t0, timed=bool(names.time))
+            clock: dict[str, Any] = {"timed": bool(names.time), "direction": run.direction}
+            self.finder = CrossingFinder[Session](section, experiment.h, experiment.t0, **clock)
         self.identity = {
             "phigen": __version__,
             "spec": compilation.spec.source_sha256,
@@ -75,6 +79,9 @@ class Recorder:
             "step": experiment.h,
             "steps": run.steps,
             "stride": run.stride,
+            "times": [*experiment.times[-1:], len(experiment.times)],
+            "end": experiment.end.span if experiment.end else None,
+            "past": len(experiment.past.rows) if experiment.past else 0,
             "initial": list(experiment.initial),
             **({"start": experiment.t0} if names.time else {}),
             "parameters": parameters,
@@ -83,6 +90,8 @@ class Recorder:
             "solver": solver.backend.identity,
         }
         self.session: Session
+        self.number = 0.0  # of the last row, in steps from where these begin
+        self._whole: int | None = None  # steps, where the session has made a part of one at the end
         self._tables: dict[str, Table] = {}
         self._saved = time.monotonic()
 
@@ -94,8 +103,14 @@ class Recorder:
     @property
     def time(self) -> float:
         """The physical time of the state."""
-        monitored = self.solver.interface.monitored
-        return self.session.time() if monitored else self.experiment.t0 + self.experiment.h * self.session.steps
+        monitored, about = self.solver.interface.monitored, self.experiment
+        made = about.h * (self.number if self._whole is not None else self.session.steps)
+        return about.begin + (self.session.time() if monitored else made)
+
+    @property
+    def steps(self) -> int:
+        """Whole steps."""
+        return self._whole if self._whole is not None else self.session.steps
 
     @property
     def section_text(self) -> str:
@@ -110,12 +125,10 @@ class Recorder:
 
     def start(self) -> None:
         """Stand at the initial state, with new files."""
-        initial = np.array(self.experiment.initial)
-        try:
-            self.session = self.solver.backend.start(initial, self.experiment.parameters, self.experiment.t0)
-        except BackendError as error:
-            raise self.solver.failure(error, self.experiment.h, None, self.experiment.parameters) from error
+        self.session = begun(self.solver, self.experiment)
         self._open({})
+        if self.experiment.past:
+            self._take_in(self.experiment.past.rows)
 
     def resume(self, path: Path) -> None:
         """Stand where the checkpoint stands, with the files as they were then. Raises `MismatchError`."""
@@ -124,6 +137,7 @@ class Recorder:
             part.state = {name: arrays[f"{prefix}.{name}"] for name in part.state}
         backend, parameters = self.solver.backend, self.experiment.parameters
         self.session = backend.restored(arrays["session"].tobytes(), parameters)
+        self.number = float(arrays["number"])
         if self.finder:
             self.finder.values = arrays["values"].tolist()
             self.finder.past = [backend.restored(past.tobytes(), parameters) for past in arrays["past"]]
@@ -134,12 +148,15 @@ class Recorder:
 
     def see(self, piece: Piece) -> None:
         """Take in what a piece of the integration gave."""
-        t = self.experiment.t0 + self.experiment.h * piece.numbers.astype(np.float64)
-        if self.solver.interface.monitored:
-            t = piece.passed
+        about, monitored = self.experiment, self.solver.interface.monitored
+        if len(piece.numbers):
+            self.number = float(piece.numbers[-1])
+        t = about.begin + (piece.passed if monitored else about.h * piece.numbers)
         energy = self.solver.energies(piece.x, t, self.experiment.parameters)
         casimirs = self.solver.backend.casimirs(piece.x, self.experiment.parameters)
-        rows = np.column_stack([t, piece.x, energy, casimirs, piece.turned])
+        tau = about.past.last(["tau"])[0] if monitored and about.past else 0.0
+        times = [t, tau + about.h * piece.numbers] if monitored else [t]
+        rows = np.column_stack([*times, piece.x, energy, casimirs, piece.turned])
         worked = self.watch.see(t, piece.x)
         self.sketch.see(np.column_stack([t, piece.x, energy - worked, casimirs]))
         crossings = np.array([[t, *x] for t, x in piece.crossings]).reshape(-1, 1 + piece.x.shape[1])
@@ -148,6 +165,37 @@ class Recorder:
             if name in self._tables:
                 self._tables[name].append(found)
 
+    def complete(self) -> None:
+        """Make the part of a step at the end; the last row is the last state, whatever rows are stored."""
+        end, number = self.experiment.end, float(self.session.steps)
+        if end is not None:
+            self._whole = self.session.steps
+            self.session, number = end.finish(self.session)
+        if number > self.number + 1e-9 * (1 + number):
+            self.see(standing(self.session, number))
+        self.number = number
+
+    def _take_in(self, rows: Floats) -> None:
+        """The rows of a finished run, which the file goes on with."""
+        names = self.solver.interface
+        times = 1 + names.monitored
+        state, seen = (
+            slice(times, times + names.dimension),
+            slice(times, times + names.dimension + 1 + len(names.casimirs)),
+        )
+        for start in range(0, len(rows), _ROWS):
+            part = rows[start : start + _ROWS]
+            worked = self.watch.see(part[:, 0], part[:, state])
+            told = np.column_stack([part[:, 0], part[:, seen]])
+            told[:, 1 + names.dimension] -= worked
+            self.sketch.see(told)
+            if self.files.output and not self._goes_on(self.files.output):
+                self._tables["output"].append(part)
+
+    def _goes_on(self, path: Path) -> bool:
+        """Whether the rows of a finished run stay in the file; a ``.npz`` is made anew when it is complete."""
+        return path.suffix.lower() == ".csv"
+
     def save(self, seconds: float = 0.0) -> None:
         """Hand all files over to the disk with a checkpoint, if the last one is so many seconds old."""
         path = self.files.checkpoint
@@ -155,6 +203,7 @@ class Recorder:
             return
         arrays: dict[str, Any] = {f"size.{name}": table.flush() for name, table in self._tables.items()}
         arrays["session"] = np.frombuffer(self.session.saved(), dtype=np.uint8)
+        arrays["number"] = np.asarray(self.number)
         for prefix, part in self._parts().items():
             arrays |= {f"{prefix}.{name}": value for name, value in part.state.items()}
         if self.finder:
@@ -165,7 +214,11 @@ class Recorder:
 
     def finish(self, keep: bool) -> None:
         """Complete the files; ``keep`` what is needed to go on."""
-        steps, h, names = self.session.steps, self.experiment.h, np.array(self.solver.coordinates)
+        run, names = self.experiment, np.array(self.solver.coordinates)
+        before = 0.0
+        if run.past:
+            before = run.past.last(["tau"])[0] if self.solver.interface.monitored else run.past.t - run.t0
+        steps, h = round(before / run.h) + self.steps, run.h
         parameters = {f"parameter_{name}": value for name, value in self.experiment.parameters.items()}
         about = {"coordinates": names}
         scalars: dict[str, dict[str, Any]] = {
@@ -197,12 +250,12 @@ class Recorder:
 
     def _open(self, arrays: Mapping[str, Any]) -> None:
         names = self.solver.interface
-        turned = element_columns(names.attitude, position=names.position)
-        columns = {"output": trajectory_columns(names.coordinates, names.casimirs, turned),
-                   "section": section_columns(names.coordinates)}  # fmt: skip
+        columns = {"output": columns_of(names), "section": section_columns(names.coordinates)}
         for name, path in (("output", self.files.output), ("section", self.files.section)):
             if path:
                 size = int(arrays[f"size.{name}"]) if arrays else None
+                if self.experiment.past and self._goes_on(path) and not arrays:
+                    size = path.stat().st_size
                 self._tables[name] = opened(path, columns[name], size)
 
 
@@ -223,7 +276,7 @@ def opened_recorder(recorder: Recorder, resume: bool, console: Console) -> Recor
             recorder.resume(path)
         except MismatchError as error:
             raise click.UsageError(str(error)) from None
-        console.note(f"going on after {recorder.session.steps} of {recorder.experiment.run.steps} steps")
+        console.note(f"going on after {recorder.steps} of {recorder.experiment.run.steps} steps")
         return recorder
     if resume and output.exists():
         raise click.UsageError(
@@ -233,7 +286,8 @@ def opened_recorder(recorder: Recorder, resume: bool, console: Console) -> Recor
         recorder.start()
         recorder.save()
     except OSError:
-        recorder.discard()
+        if recorder.experiment.past is None:
+            recorder.discard()
         raise
     return recorder
 
@@ -257,8 +311,12 @@ def record(recorder: Recorder, console: Console) -> tuple[StepError | None, bool
     label = f"{recorder.solver.interface.name}, order {recorder.solver.order}"
     with _kept(recorder), interruptible() as stop, console.progress(label, run.steps) as progress:
         see_tangent = growth.see if growth else None
-        begun = recorder.watch.begun
-        pieces = march(session, experiment.h, run.steps, run.stride, recorder.finder, see_tangent, begun=begun)
+        pieces = march(
+            session, experiment.h, run.steps, run.stride, recorder.finder, see_tangent, begun=recorder.watch.begun
+        )
+        if experiment.times:
+            pieces = _at_times(recorder, session)
+        done = False
         try:
             for piece in pieces:
                 recorder.see(piece)
@@ -267,16 +325,30 @@ def record(recorder: Recorder, console: Console) -> tuple[StepError | None, bool
                 if stop.requested:
                     break
                 recorder.save(CHECKPOINT_SECONDS)
+            else:
+                done = True
+            done = done or (session.steps == run.steps and not experiment.times)
+            if done:
+                recorder.complete()
         except BackendError as error:
             trajectory = recorder.trajectory(False)
             failure = recorder.solver.failure(error, experiment.h, trajectory, experiment.parameters)
             failure.__cause__ = error
-        interrupted = stop.requested and failure is None and session.steps < run.steps
+        interrupted = stop.requested and failure is None and not done
         if interrupted:
             recorder.save()
         recorder.finish(keep=interrupted)
     console.detail(f"integrated in {time.perf_counter() - start:.3f} s")
     return failure, interrupted
+
+
+def _at_times(recorder: Recorder, session: Session) -> Iterator[Piece]:
+    """What is stored at given times, from where a session stands."""
+    about = recorder.experiment
+    if not recorder.watch.begun:
+        yield standing(session, 0.0)
+    seen = recorder.watch.good - (len(about.past.rows) if about.past else 1)
+    yield from march_at(session, about.h, about.run.steps, about.spans[seen:])
 
 
 def compared(

@@ -31,6 +31,14 @@ _TABLES = (".csv", ".npz")
 @scheme_option
 @click.option("--step", metavar="H", type=float, help="Step size, instead of the run's.")
 @click.option("--steps", metavar="N", type=click.IntRange(min=1), help="Number of steps, instead of the run's.")
+@click.option("--until", metavar="T", type=float, help="The time where the run ends, by a part of a step if need be.")
+@click.option(
+    "--every", metavar="DT", type=float, help="Store states at times so far apart, instead of every stride-th."
+)
+@click.option("--at", metavar="T,…", help="Store states at these times, or at those in a file.")
+@click.option("--from", "source", metavar="FILE", type=click.Path(exists=True, dir_okay=False, path_type=Path),
+              help="Start at the last state of another run: FILE.csv or FILE.npz.")  # fmt: skip
+@click.option("--extend", is_flag=True, help="Go on beyond the end of the finished run in the file of --output.")
 @click.option("--set", "settings", metavar="NAME=VALUE", multiple=True, help="A parameter, or an initial coordinate.")
 @click.option(
     "-o", "--output", metavar="FILE", callback=file_ending(*_TABLES), help="Store the trajectory: FILE.csv or FILE.npz."
@@ -54,6 +62,11 @@ def command(
     scheme: str | None,
     step: float | None,
     steps: int | None,
+    until: float | None,
+    every: float | None,
+    at: str | None,
+    source: Path | None,
+    extend: bool,
     settings: tuple[str, ...],
     output: Path | None,
     section: Path | None,
@@ -68,6 +81,7 @@ def command(
     written while the run goes on; one that is interrupted keeps what it has, and goes on with --resume.
     """
     from phigen.api import compilation_of
+    from phigen.cli.past import ended, extended, past_of, started_from, timed
     from phigen.cli.recording import Files, Recorder, compared, opened_recorder, record
     from phigen.cli.verify import with_tangent
 
@@ -77,16 +91,28 @@ def command(
         require_matplotlib()
     spec = load_one(spec_file)
     if spec.lattice:
-        expect_no(section=section, lyapunov=lyapunov)
+        expect_no(section=section, lyapunov=lyapunov, until=until, every=every, at=at, extend=extend)
+        expect_no(**{"from": source})
         chosen = changed(run_of(spec, name), step, steps)
         given: Any = {"target": target, "order": order, "scheme": scheme, "settings": settings, "output": output}
         run_lattice(console, spec, chosen, **given, plot=plot, resume=resume, as_json=as_json)
         return
-    experiment = prepared(spec, name, step, steps, settings)
+    _expect_together(
+        {"--until": until, "--every": every, "--at": at, "--extend": extend},
+        {"--steps": steps, "--from": source, "--section": section, "--lyapunov": lyapunov},
+    )
+    experiment = prepared(spec, name, step, steps, settings, until)
     if section and experiment.run.section is None:
         raise click.BadParameter(f"the run {experiment.run.name} has no section: in the spec", param_hint="--section")
     compilation = compilation_of(spec, order, with_tangent(spec) if lyapunov else None, scheme=scheme)
     solver = loaded(compilation, target, console)
+    if source:
+        experiment = started_from(experiment, past_of(source, solver.interface, "--from"), solver)
+    if extend:
+        if output is None or not output.exists():
+            raise click.UsageError("--extend goes on with a finished run: name its file by --output")
+        experiment = extended(experiment, output, solver)
+    experiment = timed(ended(experiment, solver, console), solver, every, at)
     recorder = Recorder(compilation, solver, experiment, Files(output, section), lyapunov)
     recorder = opened_recorder(recorder, resume, console)
     failure, interrupted = record(recorder, console)
@@ -94,7 +120,8 @@ def command(
         if file:
             console.note(f"wrote {file}" + (", as far as the run came" if failure or interrupted else ""))
     summaries, drawn = [recorder.watch.summary()], {recorder.label: recorder.trajectory(failure is not None)}
-    for method in experiment.run.compare if not (failure or interrupted) else ():
+    comparable = not (failure or interrupted or extend) and experiment.run.steps
+    for method in experiment.run.compare if comparable else ():
         watch, drawn[method] = compared(compilation, solver, experiment, method, console, recorder.time)
         summaries.append(watch.summary())
     if as_json:
@@ -110,8 +137,21 @@ def command(
         raise InterruptedRunError(_told(recorder))
 
 
+#: Options that say different things of one matter, or that nothing is made for.
+_APART = [("--until", "--steps"), ("--every", "--at"), ("--extend", "--from")]
+_APART += [(a, b) for a in ("--every", "--at", "--extend") for b in ("--section", "--lyapunov")]
+
+
+def _expect_together(*options: dict[str, object]) -> None:
+    """Refuse options that do not go together."""
+    given = {name for part in options for name, value in part.items() if value}
+    for first, second in _APART:
+        if {first, second} <= given:
+            raise click.UsageError(f"{first} and {second} do not go together")
+
+
 def _told(recorder: Recorder) -> str:
-    done = f"interrupted after {recorder.session.steps} of {recorder.experiment.run.steps} steps"
+    done = f"interrupted after {recorder.steps} of {recorder.experiment.run.steps} steps"
     return f"{done}; the same command with --resume goes on" if recorder.files.checkpoint else done
 
 

@@ -19,12 +19,14 @@ def print_summary(compilation: Compilation, recorder: Recorder, summaries: Seque
     """The table of a run: one column for each method; then crossings and exponents, if asked for."""
     from phigen.study.conservation import stated
 
-    run, solver, steps = recorder.experiment.run, recorder.solver, recorder.session.steps
+    run, solver, steps = recorder.experiment.run, recorder.solver, recorder.steps
     out(heading(f"{compilation.spec.name}, run {run.name}") + (f": {run.description}" if run.description else ""))
     chosen = f"{compilation.label}, order {solver.order}, target {solver.target}"
     unit = " in τ" if solver.interface.monitored else ""
     times = f"{recorder.experiment.t0:.9g} … {recorder.time:.9g}"
-    out(f"  {steps} steps of {float(run.step):.9g}{unit}, t = {times}; {chosen}")
+    part = " and a part of one" if recorder.number > steps else ""
+    past = " beyond what there was" if recorder.experiment.past else ""
+    out(f"  {steps} steps of {float(run.step):.9g}{unit}{part}{past}, t = {times}; {chosen}")
     state = recorder.session.state().tolist()
     final = ", ".join(f"{c} = {v:.9g}" for c, v in zip(solver.coordinates, state, strict=True))
     out(f"  final state: {final}\n")
@@ -35,7 +37,8 @@ def print_summary(compilation: Compilation, recorder: Recorder, summaries: Seque
         power = "∂H/∂t" if not compilation.system.forces else "(∂H/∂t + the power of the forces)"
         out(f"  The energy balance is H − ∫ {power} dt, integrated along the stored states by a rule of order 8.")
     if recorder.finder:
-        count = counted(recorder.points.seen, "rising crossing")
+        kind = "crossing" if run.direction == "both" else f"{run.direction} crossing"
+        count = counted(recorder.points.seen, kind)
         out(f"\n  {count} of the section {recorder.section_text} = 0")
     if spectrum := recorder.spectrum:
         changed = f"the second half changed them by {spectrum.uncertainty:.1g}"
@@ -83,7 +86,7 @@ def described_run(compilation: Compilation, recorder: Recorder, summaries: Seque
         "scheme": "splitting" if compilation.splitting else "series",
         "exact": compilation.exact,
         "step": experiment.h,
-        "steps": session.steps,
+        "steps": recorder.steps,
         "time": recorder.time - experiment.t0,
         **({"start": experiment.t0} if solver.interface.time else {}),
         "parameters": experiment.parameters,

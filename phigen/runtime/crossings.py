@@ -1,4 +1,4 @@
-"""Poincaré sections: where a function g of the state rises through zero, found by the integrator itself.
+"""Poincaré sections: where a function g of the state passes through zero, found by the integrator itself.
 
 Between two steps of size h the solution is followed by single steps of size θh, 0 < θ < 1, from the state before: the
 crossing is the θ for which g vanishes there, to round-off. So the points lie on the leaf, and nothing is interpolated.
@@ -32,6 +32,8 @@ SUBSTEPS = (1, 2, 4, 8)
 #: Fractions of a step closer than this give the same state.
 _RESOLUTION = 1e-18
 _ITERATIONS = 100
+#: The signs that g changes with, by the direction in which it passes through zero.
+SIGNS = {"rising": (1.0,), "falling": (-1.0,), "both": (1.0, -1.0)}
 _GOLDEN = (math.sqrt(5) - 1) / 2
 
 
@@ -62,13 +64,14 @@ def section_columns(coordinates: tuple[str, ...]) -> list[Column]:
 
 @dataclass
 class CrossingFinder(Generic[C]):
-    """Follows a session in steps of size h and finds where g rises through zero as time increases.
+    """Follows a session in steps of size h and finds where g passes through zero as time increases, in a ``direction``.
 
     An interval between two steps has one crossing at most. Where g has an extremum near a step and one sign around it,
-    it is looked up whether the sign changes twice there. A start on the section counts if g rises from it.
+    it is looked up whether the sign changes twice there. A start on the section counts if g leaves it in the direction.
 
     ``past`` holds solvers that stand at the last steps but the latest; ``values`` is g there and at the latest, and
     ``first`` the number of the first of them. ``t0`` is the time of step 0; g is told times if it is ``timed``.
+    ``places`` are the solvers at the crossings of the latest block, and how many steps these are from the start.
     """
 
     g: Function
@@ -78,6 +81,9 @@ class CrossingFinder(Generic[C]):
     past: list[C] = field(default_factory=list)
     values: list[float] = field(default_factory=list)
     first: int = 0
+    direction: str = "rising"
+    places: list[tuple[float, C]] = field(default_factory=list)
+    _sign: float = 1.0  # of g where a crossing is looked for: those that fall are the rising ones of -g
 
     def follow(
         self, session: C, steps: int, move: Callable[[], object]
@@ -124,18 +130,27 @@ class CrossingFinder(Generic[C]):
 
     def _crossings(self, known: int) -> Iterator[tuple[float, Floats]]:
         """The crossings of this block, whose first ``known`` intervals are those of an earlier one."""
-        v = self.values
+        self.places = []
+        for sign in SIGNS[self.direction]:
+            self._sign = sign
+            self.places += self._rising(known)
+        self.places.sort(key=lambda place: place[0])
+        for at, there in self.places:
+            yield self._clock(there, self._time(at - self.first)), there.state()
+
+    def _rising(self, known: int) -> Iterator[tuple[float, C]]:
+        v = [self._sign * value for value in self.values]
         if known == 0 and v[0] == 0 < v[1]:
-            yield self._clock(self.past[0], self._time(0)), self.past[0].state()
+            yield self.first, self.past[0]
         for i in range(len(v) - 1):
-            if i >= 1 and (found := self._hidden(i)):
+            if i >= 1 and (found := self._hidden(v, i)):
                 yield self._located(*found)
             if i >= known and v[i] < 0 <= v[i + 1]:
                 yield self._located(i, 0.0, v[i], 1.0, v[i + 1])
 
-    def _hidden(self, i: int) -> tuple[int, float, float, float, float] | None:
+    def _hidden(self, v: list[float], i: int) -> tuple[int, float, float, float, float] | None:
         """An interval before or after step i, and a bracket in it, where an extremum near step i changes the sign."""
-        a, b, c = self.values[i - 1 : i + 2]
+        a, b, c = v[i - 1 : i + 2]
         peak = a < b >= c and b < 0
         if not (peak or (a > b <= c and b >= 0 and a >= 0)):
             return None
@@ -146,20 +161,20 @@ class CrossingFinder(Generic[C]):
         if not abs(b) <= 2 * gain + 0.1 * abs(curvature):
             return None
         j = i - 1 if offset < 0 else i
-        at = self._extremum(j, -1.0 if peak else 1.0)
+        at = self._extremum(v, j, -1.0 if peak else 1.0)
         value = self._at(j, at)
         if (value < 0) == (b < 0):
             return None
-        return (j, 0.0, self.values[j], at, value) if peak else (j, at, value, 1.0, self.values[j + 1])
+        return (j, 0.0, v[j], at, value) if peak else (j, at, value, 1.0, v[j + 1])
 
-    def _extremum(self, j: int, sign: float) -> float:
+    def _extremum(self, v: list[float], j: int, sign: float) -> float:
         """Where sign·g is smallest in interval j, or where it is negative enough to have changed its sign."""
         low, high = 0.0, 1.0
         left, right = 1 - _GOLDEN, _GOLDEN
         at_left, at_right = self._at(j, left), self._at(j, right)
         while high - low > 1e-9:
             for at, value in ((left, at_left), (right, at_right)):
-                if (value < 0) != (self.values[j] < 0):
+                if (value < 0) != (v[j] < 0):
                     return at
             if sign * at_left < sign * at_right:
                 high, right, at_right = right, left, at_left
@@ -172,7 +187,7 @@ class CrossingFinder(Generic[C]):
         return left if sign * at_left < sign * at_right else right
 
     def _at(self, j: int, fraction: float, substeps: Sequence[int] = SUBSTEPS) -> float:
-        return self._value(self._moved(j, fraction, substeps), j, fraction)
+        return self._sign * self._value(self._moved(j, fraction, substeps), j, fraction)
 
     def _moved(self, j: int, fraction: float, substeps: Sequence[int]) -> C:
         """A solver that went a fraction of step j, in the first number of equal steps that works."""
@@ -187,8 +202,8 @@ class CrossingFinder(Generic[C]):
                 break
         return session
 
-    def _located(self, j: int, low: float, at_low: float, high: float, at_high: float) -> tuple[float, Floats]:
-        """Time and state of the crossing in interval j between two fractions of the step."""
+    def _located(self, j: int, low: float, at_low: float, high: float, at_high: float) -> tuple[float, C]:
+        """The crossing in interval j between two fractions of the step: its number of steps, and a solver there."""
         for count in SUBSTEPS:
             # The same number for all fractions: g is a smooth function of the fraction then.
             try:
@@ -199,7 +214,7 @@ class CrossingFinder(Generic[C]):
                     raise
             else:
                 break
-        return self._clock(there, self._time(j, fraction)), there.state()
+        return self.first + j + fraction, there
 
     def _clock(self, session: C, counted: float) -> float:
         """The time of a session: its own where steps are equal in τ, else what was counted."""

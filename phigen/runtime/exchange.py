@@ -6,7 +6,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from phigen.errors import MissingPackageError
-from phigen.runtime.trajectory import Trajectory, element_columns, trajectory_columns
+from phigen.runtime.trajectory import Trajectory
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -21,6 +21,7 @@ def to_xarray(trajectory: Trajectory) -> xr.Dataset:
             "x": (("t", "coordinate"), trajectory.x),
             "energy": ("t", trajectory.energy),
             **{f"casimir_{name}": ("t", values) for name, values in trajectory.casimirs.items()},
+            **({"tau": ("t", trajectory.tau)} if trajectory.monitored else {}),
         },
         coords={"t": trajectory.t, "coordinate": list(trajectory.coordinates)},
         attrs={"h": trajectory.h, "steps": trajectory.steps, **_parameters(trajectory)},
@@ -31,10 +32,7 @@ def to_xarray(trajectory: Trajectory) -> xr.Dataset:
 def to_pandas(trajectory: Trajectory) -> pd.DataFrame:
     """A DataFrame with the columns of a ``.csv``, indexed by t; step and parameters are in its ``attrs``."""
     pandas = _imported("pandas")
-    shape = () if trajectory.attitude is None else trajectory.attitude.shape[1:]
-    turned = element_columns(shape, position=trajectory.position is not None)
-    columns = trajectory_columns(trajectory.coordinates, tuple(trajectory.casimirs), turned)
-    names = [name for column in columns for name in column.names]
+    names = [name for column in trajectory.columns() for name in column.names]
     frame: pd.DataFrame = pandas.DataFrame(trajectory.rows(), columns=names).set_index(names[0])
     frame.attrs.update({"h": trajectory.h, "steps": trajectory.steps, **_parameters(trajectory)})
     return frame

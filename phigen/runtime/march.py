@@ -7,11 +7,11 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from phigen.runtime.crossings import CrossingFinder
 from phigen.runtime.interface import BackendError, Floats
 from phigen.runtime.session import Session
+from phigen.runtime.timed import EQUAL, reached, steps_until
 
 #: Seconds, steps and rows that a piece has at most, about.
 _SECONDS = 0.2
@@ -22,11 +22,12 @@ _MOST_STEPS, _MOST_ROWS = 1 << 20, 1 << 12
 class Piece:
     """What a piece of an integration gave: the stored steps and their states, and crossings of the section.
 
-    ``numbers`` (rows,), ``x`` (rows, DIM), ``crossings`` as pairs of time and state (DIM,). ``passed`` (rows,) is the
-    physical time of each where the solver keeps it, NaN elsewhere. ``turned`` (rows, numbers) are their attitudes.
+    ``numbers`` (rows,), of steps, with a fraction between two; ``x`` (rows, DIM), ``crossings`` as pairs of time and
+    state (DIM,). ``passed`` (rows,) is the physical time of each where the solver keeps it, NaN elsewhere. ``turned``
+    (rows, numbers) are their attitudes.
     """
 
-    numbers: NDArray[np.int64]
+    numbers: Floats
     x: Floats
     crossings: list[tuple[float, Floats]]
     passed: Floats
@@ -55,8 +56,7 @@ def march(
     """
     size = 1
     if not begun:
-        begin = np.zeros(1, dtype=np.int64), session.state()[np.newaxis]
-        yield Piece(*begin, [], np.array([session.time()]), session.element()[np.newaxis])
+        yield standing(session, 0.0)
     while session.steps < steps:
         start = time.perf_counter()
         rows: dict[int, tuple[Floats, Mark]] = {}
@@ -76,11 +76,62 @@ def march(
         x = np.array([state for state, _ in rows.values()]).reshape(len(rows), len(session.state()))
         passed = np.array([time for _, (time, _) in rows.values()])
         turned = np.array([element for _, (_, element) in rows.values()]).reshape(len(rows), len(session.element()))
-        yield Piece(np.array(list(rows), dtype=np.int64), x, crossings, passed, turned)
+        yield Piece(np.array(list(rows), dtype=np.float64), x, crossings, passed, turned)
         if failure:
             raise failure
         quick = time.perf_counter() - start < _SECONDS
         size = min(2 * size, _MOST_STEPS, _MOST_ROWS * stride) if quick else max(1, size // 2)
+
+
+def standing(session: Session, number: float) -> Piece:
+    """A piece of one row, where a session stands, so many steps from the start."""
+    return _piece([(session, number)], len(session.state()), len(session.element()))
+
+
+def _piece(rows: Sequence[tuple[Session, float]], width: int, element: int) -> Piece:
+    x = np.array([here.state() for here, _ in rows]).reshape(-1, width)
+    turned = np.array([here.element() for here, _ in rows]).reshape(len(rows), element)
+    return Piece(np.array([n for _, n in rows]), x, [], np.array([here.time() for here, _ in rows]), turned)
+
+
+def march_at(session: Session, h: float, steps: int, spans: Sequence[float]) -> Iterator[Piece]:
+    """Go on with a session, storing the states at given times after the start in place of every ``stride``-th.
+
+    Each is one further step, part of a whole one, from the session, which makes whole steps only. ``spans`` are those
+    still to come; whole steps beyond the last are made without a row. Raises `BackendError` after a piece.
+    """
+    sizes = len(session.state()), len(session.element())
+    rows: list[tuple[Session, float]] = []
+    begun, failure = time.perf_counter(), None
+    for span in spans:
+        try:
+            here, number = _there(session, h, steps, span)
+        except BackendError as error:
+            failure = error
+            break
+        rows.append((here.branch(), number))
+        if time.perf_counter() - begun > _SECONDS or len(rows) == _MOST_ROWS:
+            yield _piece(rows, *sizes)
+            begun, rows = time.perf_counter(), []
+    yield _piece(rows, *sizes)
+    if failure:
+        raise failure
+    while session.steps < steps:
+        session.advance(h, min(_MOST_STEPS, steps - session.steps))
+        yield _piece([], *sizes)
+
+
+def _there(session: Session, h: float, steps: int, span: float) -> tuple[Session, float]:
+    """A session at a time after the start, and how many steps that is; the given one makes the whole steps before."""
+    own = session.time()
+    passed = session.steps * h if np.isnan(own) else own
+    count, _ = steps_until(session, h, span - passed)
+    session.advance(h, min(count, steps - session.steps))
+    left = span - (session.steps * h if np.isnan(own) else session.time())
+    if abs(left) <= EQUAL * abs(span):
+        return session, float(session.steps)
+    there, size = reached(session, h, left)
+    return there, session.steps + size / h
 
 
 def _states(

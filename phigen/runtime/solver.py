@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from phigen.errors import ParameterError, StepError
 from phigen.runtime import arguments, gradients
 from phigen.runtime.backend import Backend
-from phigen.runtime.crossings import CrossingFinder, Function, Section
+from phigen.runtime.crossings import SIGNS, CrossingFinder, Function, Section
 from phigen.runtime.gradients import Jacobian, Pullback
 from phigen.runtime.interface import BackendError, Floats, Interface, MissingExtraError, Progress, row_steps
 from phigen.runtime.live import LiveSession
@@ -255,23 +255,27 @@ class Solver:
         steps: int,
         g: Function,
         *,
+        direction: str = "rising",
         t0: float | None = None,
         progress: Progress | None = None,
         parameters: Mapping[str, float] | None = None,
         **more: float,
     ) -> Section:
-        """Where ``g`` rises through zero along the trajectory of ``steps`` steps of size ``h`` from ``x0`` (DIM,).
+        """Where ``g`` passes through zero along the trajectory of ``steps`` steps of size ``h`` from ``x0`` (DIM,).
 
         ``g`` takes states (rows, DIM), and their times (rows,) where there is a time, and gives (rows,). Each crossing
-        is found to round-off by steps of the solver itself, from the state before it. A start with g = 0 counts if g
-        rises from there. Raises `StepError`, whose ``trajectory`` is the `Section` so far.
+        is found to round-off by steps of the solver itself, from the state before it. ``direction`` is ``rising``,
+        ``falling`` or ``both``. A start with g = 0 counts if g leaves it in that direction. Raises `StepError`, whose
+        ``trajectory`` is the `Section` so far.
         """
         begin = arguments.start_time(t0, self.interface, more)
         values = self.values(parameters, more)
         start, h = arguments.state(x0, "x0", self.interface), arguments.step_size(h)
         steps = arguments.count(steps, "steps", 0)
         found: list[tuple[float, Floats]] = []
-        finder = CrossingFinder[Session](g, h, begin, timed=bool(self.interface.time))
+        if direction not in SIGNS:
+            raise ValueError(f"direction must be {', '.join(SIGNS)}, not {direction!r}")
+        finder = CrossingFinder[Session](g, h, begin, timed=bool(self.interface.time), direction=direction)
         try:
             session = self.backend.start(start, values, begin)
             for _, crossings in finder.follow(session, steps, lambda: session.advance(h, 1)):

@@ -30,6 +30,8 @@ C = TypeVar("C", bound=Clocked)
 
 #: Most secants; they converge in four to seven.
 MOST = 30
+#: Times that differ by less, in their own size, are one.
+EQUAL = float(8 * np.finfo(float).eps)
 
 
 def reached(session: C, h: float, span: float) -> tuple[C, float]:
@@ -62,13 +64,37 @@ def reached(session: C, h: float, span: float) -> tuple[C, float]:
         except BackendError:
             break
         ahead = found.time() - target
-        if abs(ahead) >= abs(missed) and abs(missed) <= 8 * np.finfo(float).eps * max(abs(begin), abs(span)):
+        if abs(ahead) >= abs(missed) and abs(missed) <= EQUAL * max(abs(begin), abs(span)):
             break
         before, missed_before = size, missed
         size, missed, copy = following, ahead, found
     if abs(missed) > 1e-9 * max(abs(begin), abs(span)):
         raise BackendError("NO_CONVERGENCE", session.steps, session.state()[np.newaxis])
     return copy, size
+
+
+def steps_until(session: Clocked, h: float, span: float) -> tuple[int, float]:
+    """How many whole steps fit into a span of time, and what they leave; where one fails before, that one as well."""
+    if not np.isfinite(session.time()):
+        whole = _whole_steps(h, span)
+        return whole, span - whole * h
+    target, done, chunk, growing, here = session.time() + span, 0, 1, True, session
+    while chunk:
+        copy = here.branch()
+        try:
+            copy.advance(h, chunk)
+        except BackendError:
+            if chunk == 1:
+                return done + 1, 0.0
+            beyond = True
+        else:
+            beyond = (target - copy.time()) * np.sign(span) < 0
+        if beyond:
+            chunk, growing = chunk // 2, False
+        else:
+            here, done = copy, done + chunk
+            chunk = 2 * chunk if growing else chunk
+    return done, target - here.time()
 
 
 def along_until(session: C, h: float, span: float, stride: int, see: Callable[[C, float], object]) -> None:
@@ -101,7 +127,7 @@ def along_until(session: C, h: float, span: float, stride: int, see: Callable[[C
             if done % stride == 0:
                 see(session, done * h)
         left = span - session.time()
-    if abs(left) <= 8 * np.finfo(float).eps * abs(span):
+    if abs(left) <= EQUAL * abs(span):
         if done % stride:
             see(session, done * h)
         return
@@ -131,7 +157,7 @@ def _from(session: Session, h: float, span: float) -> Session:
         whole = _whole_steps(step, span)
         session.advance(step, whole)
         left = span - whole * step
-        return reached(session, step, left)[0] if abs(left) > 8 * np.finfo(float).eps * abs(span) else session
+        return reached(session, step, left)[0] if abs(left) > EQUAL * abs(span) else session
     while True:
         copy = session.branch()
         try:

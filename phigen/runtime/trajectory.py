@@ -118,18 +118,28 @@ class Trajectory:
         """Write a file by the suffix of the path; raises `ValueError` for any other.
 
         ``.csv``: ``t,x1,…,energy,C…``, one line per row; every float reads back as the same float. ``.npz``: the arrays
-        t, x, energy, casimir_NAME, coordinates, and steps, h, parameter_NAME as scalars.
+        t, x, energy, casimir_NAME, coordinates, and steps, h, parameter_NAME as scalars. With a monitor tau comes
+        after t.
         """
+        write(path, self.columns(), self.rows(), self.scalars())
+
+    @property
+    def monitored(self) -> bool:
+        """Whether steps are equal in τ, not in t."""
+        return self.tau is not self.t
+
+    def columns(self) -> list[Column]:
+        """What `rows` has side by side."""
         shape = () if self.attitude is None else self.attitude.shape[1:]
         turned = element_columns(shape, position=self.position is not None)
-        columns = trajectory_columns(self.coordinates, tuple(self.casimirs), turned)
-        write(path, columns, self.rows(), self.scalars())
+        return trajectory_columns(self.coordinates, tuple(self.casimirs), turned, monitored=self.monitored)
 
     def rows(self) -> Floats:
         """All columns side by side, (rows, columns), as they are written to files."""
         turned = [] if self.attitude is None else [self.attitude.reshape(len(self), -1)]
         turned += [] if self.position is None else [self.position]
-        return np.column_stack([self.t, self.x, self.energy, *self.casimirs.values(), *turned])
+        times = [self.t, self.tau] if self.monitored else [self.t]
+        return np.column_stack([*times, self.x, self.energy, *self.casimirs.values(), *turned])
 
     def scalars(self) -> dict[str, Any]:
         """What a ``.npz`` holds beside the columns."""
@@ -157,12 +167,14 @@ def element_columns(shape: tuple[int, ...], *, position: bool) -> list[Column]:
 
 
 def trajectory_columns(
-    coordinates: tuple[str, ...], casimirs: tuple[str, ...], turned: Sequence[Column] = ()
+    coordinates: tuple[str, ...], casimirs: tuple[str, ...], turned: Sequence[Column] = (), *, monitored: bool = False
 ) -> list[Column]:
     """The columns of a table of states; no two have one name, so a coordinate ``t`` is in the column ``t_``."""
-    own = Reserved(frozenset(["t", "energy", *(name for column in turned for name in column.names)]))
+    times = [Column(name, (name,), flat=True) for name in (["t", "tau"] if monitored else ["t"])]
+    taken = [name for column in [*times, *turned] for name in column.names]
+    own = Reserved(frozenset(["energy", *taken]))
     named = tuple(identifiers(coordinates, own).values())
-    first = [Column("t", ("t",), flat=True), Column("x", named), Column("energy", ("energy",), flat=True)]
+    first = [*times, Column("x", named), Column("energy", ("energy",), flat=True)]
     given = identifiers(casimirs, own | named)
     listed = [Column(f"casimir_{name}", (given[name],), flat=True) for name in casimirs]
     return [*first, *listed, *turned]

@@ -189,6 +189,10 @@ class Run:
     exact: Mapping[str, Expression] = field(default_factory=dict)  # in ELAPSED, the time, initial(NAME), parameters
     compare: tuple[str, ...] = ()
     section: Expression | None = None
+    direction: str = "rising"  # in which the section is crossed
+    until: Fraction | None = None  # the physical time where it ends, by a part of a step
+    every: Fraction | None = None  # of physical time between rows that are stored, in place of the stride
+    stop: Expression | None = None  # it ends where this passes through 0
     description: str = ""
     lattice: LatticeRun | None = None
 

@@ -78,6 +78,9 @@ PROFILES = ("fast", "small")
 PARTS = ("ensemble", "gauge-search", "kicks", "lanes", "members", "recurrences")
 LEFT_OUT = {"fast": frozenset[str](), "small": frozenset(["gauge-search", "lanes", "members", "recurrences"])}
 
+#: How a section is crossed.
+DIRECTIONS = ("rising", "falling", "both")
+
 #: How attitudes are given.
 RECONSTRUCTIONS = ("quaternion", "matrix")
 

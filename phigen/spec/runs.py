@@ -29,9 +29,17 @@ def run(name: str, raw: Mapping[str, Any], declared: Declarations) -> Run:
     if step == 0:
         _fail(name, "step", "the step is 0", declared)
         step = None
-    steps = _steps(name, raw, step, declared)
+    start = _start(name, raw.get("start"), declared)
+    until = declared.number(raw.get("until"), numbers)
+    steps = _steps_until(name, raw, until - start, step, declared) if until is not None else None
+    steps = steps if until is not None else _steps(name, raw, step, declared)
+    every = declared.number(raw.get("every"), numbers)
+    if every is not None and (every <= 0 or "stride" in raw):
+        _fail(name, "every", "every must be positive, and there is no stride beside it", declared)
+    if "direction" in raw and "section" not in raw:
+        _fail(name, "direction", "direction: there is no section", declared)
     stride = raw.get("stride", 1)
-    if steps is not None and stride > steps:
+    if steps is not None and stride > max(steps, 1):
         _fail(name, "stride", f"the stride {stride} is longer than the run of {steps} steps", declared)
     section = raw.get("section")
     lattice = run_of_lattice(name, raw, declared)
@@ -43,10 +51,14 @@ def run(name: str, raw: Mapping[str, Any], declared: Declarations) -> Run:
         steps=steps or 1,
         stride=stride,
         parameters=numbers_of,
-        start=_start(name, raw.get("start"), declared),
+        start=start,
         exact=_exact(raw.get("exact", {}), declared),
         compare=without_repetition(raw.get("compare", ()), ("runs", name, "compare"), declared),
         section=declared.formula(section, declared.dated_scope()),
+        direction=raw.get("direction") or "rising",
+        until=until,
+        every=every,
+        stop=declared.formula(raw.get("stop"), declared.dated_scope()),
         description=raw.get("description", ""),
         lattice=replace(lattice, arrays=arrays) if lattice else None,
     )
@@ -84,6 +96,24 @@ def _steps(name: str, raw: Mapping[str, Any], step: Fraction | None, declared: D
         declared.reader.problems.add(message, location, limit=True)
     else:
         return steps
+    return None
+
+
+def _steps_until(
+    name: str, raw: Mapping[str, Any], span: Fraction, step: Fraction | None, declared: Declarations
+) -> int | None:
+    """The whole steps before that time; with a monitor, whose steps differ, a number of the right size."""
+    if step is None:
+        return None
+    ratio = span / step
+    if ratio <= 0:
+        _fail(name, "until", f"until: {raw['until'].text} is never reached by steps of {raw['step'].text}", declared)
+    elif ratio > limits.STEPS:
+        location = declared.reader.locations["runs", name, "until"]
+        message = f"until: {float(ratio):.9g} steps, more than the limit of {limits.STEPS}"
+        declared.reader.problems.add(message, location, limit=True)
+    else:
+        return max(1, int(ratio))
     return None
 
 

@@ -164,7 +164,7 @@ def _run(run: Run) -> Iterator[str]:
     if changed:
         yield from _indented(_wrapped("parameters: {", changed, "}"))
     yield f"  step: {_number(run.step)}"
-    yield f"  steps: {run.steps}"
+    yield f"  steps: {run.steps}" if run.until is None else f"  until: {_number(run.until)}"
     if run.stride != 1:
         yield f"  stride: {run.stride}"
 

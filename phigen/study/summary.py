@@ -119,6 +119,11 @@ class Watch:
         """Whether the initial state has been seen."""
         return bool(self.state["good"])
 
+    @property
+    def good(self) -> int:
+        """How many rows have been seen, all finite."""
+        return int(self.state["good"])
+
     def see(self, t: Floats, x: Floats) -> Floats:
         """Take in the next rows, times (rows,) and states (rows, DIM); those after one not finite do not count.
 

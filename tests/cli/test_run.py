@@ -1,6 +1,5 @@
 """``phigen run``: files that grow while it runs, interruptions, going on, sections, exponents, figures."""
 
-import itertools
 import json
 import os
 import re
@@ -9,14 +8,13 @@ import subprocess
 import sys
 import time
 import tracemalloc
-from contextlib import contextmanager, nullcontext
 from pathlib import Path
 
 import numpy as np
 import pytest
+from interrupting import interrupted
 
 from phigen import resources
-from phigen.cli.interruption import Stop
 
 SPECS = resources.bundled_specs()
 #: A run with everything: a section, exponents, a gauge.
@@ -35,26 +33,6 @@ def no_comparison(monkeypatch):
         return experiment.replace(found, run=experiment.replace(found.run, compare=()))
 
     monkeypatch.setattr("phigen.cli.run.prepared", alone)
-
-
-@contextmanager
-def interrupted(pieces, steps=16):
-    """Runs are interrupted after so many pieces of work, of so many steps at most."""
-    asked = itertools.count()
-
-    class Later(Stop):
-        @property
-        def requested(self):
-            return next(asked) >= pieces
-
-        @requested.setter
-        def requested(self, value):
-            pass
-
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("phigen.runtime.march._MOST_STEPS", steps)
-        patch.setattr("phigen.cli.recording.interruptible", lambda: nullcontext(Later()))
-        yield
 
 
 def files(*names):

@@ -1,0 +1,166 @@
+"""``phigen run``: ends in time and where an expression vanishes, states at given times, runs that go on from files."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from interrupting import interrupted
+
+SWING = """phigen: 1
+name: swing
+coordinates: [q, p]
+poisson: {canonical: {q: [q], p: [p]}}
+hamiltonian: (p**2 + q**2)/2
+order: 8
+targets: [numpy]
+runs:
+  steps: {initial: [1, 0], step: 0.1, steps: 60}
+  until: {initial: [1, 0], step: 0.1, until: 6.05, stride: 10}
+  stopped: {initial: [1, 0], step: 0.1, steps: 100, stop: q - 1/2, every: 0.3}
+  back: {initial: [0, 1], step: -0.1, steps: 100, stop: q}
+  never: {initial: [1, 0], step: 0.1, steps: 20, stop: q - 2}
+  falling: {initial: [1, 0], step: 0.1, steps: 140, section: p, direction: falling}
+  both: {initial: [1, 0], step: 0.1, steps: 140, section: q, direction: both}
+"""
+#: A body that turns by τ, with its time in a closed form nowhere.
+BODY = """phigen: 1
+name: slowed
+coordinates: [x1, x2, x3]
+poisson: {brackets: {x1: {x2: -x3, x3: x2}, x2: {x3: -x1}}}
+hamiltonian: (x1**2 + x2**2/2 + x3**2/3)/2
+casimirs: {C: x1**2 + x2**2 + x3**2}
+monitor: 1/(1 + x1**2)
+order: 2
+targets: [numpy]
+runs:
+  tumbling: {initial: [0.5, 1, 0.2], step: 0.05, until: 5, stride: 5}
+"""
+TURNING = BODY.replace("monitor: 1/(1 + x1**2)", "reconstruct: quaternion")
+
+
+def ran(phigen, *args):
+    done = phigen("run", *args, "-t", "numpy", "-q")
+    assert done.exit_code == 0, done.stderr
+    return done
+
+
+def table(path):
+    return np.loadtxt(path, delimiter=",", skiprows=1)
+
+
+@pytest.fixture
+def swing(write):
+    return write("swing.yaml", SWING)
+
+
+def test_a_run_ends_at_its_time_by_a_part_of_a_step(phigen, swing):
+    told = ran(phigen, swing, "--run", "until", "-o", "a.csv", "--json").stdout
+    rows = table("a.csv")
+    assert rows[:, 0] == pytest.approx([0, 1, 2, 3, 4, 5, 6, 6.05], rel=1e-15)
+    assert rows[:, 1] == pytest.approx(np.cos(rows[:, 0]), abs=1e-11)
+    assert json.loads(told)["steps"] == 60
+    ran(phigen, swing, "--run", "steps", "--until", 0.03, "-o", "b.csv")
+    assert table("b.csv")[-1, :2] == pytest.approx([0.03, np.cos(0.03)], abs=1e-13)
+
+
+def test_a_run_ends_where_an_expression_vanishes_first_to_roundoff(phigen, swing):
+    ran(phigen, swing, "--run", "stopped", "-o", "a.csv")
+    rows = table("a.csv")
+    assert rows[:, 0] == pytest.approx([0, 0.3, 0.6, 0.9, np.pi / 3], abs=1e-11)
+    assert rows[-1, 1] == pytest.approx(0.5, abs=2e-16)
+    ran(phigen, swing, "--run", "back", "-o", "b.csv")  # which begins where it vanishes
+    assert table("b.csv")[-1, 0] == pytest.approx(-np.pi, abs=1e-11)
+    never = phigen("run", swing, "--run", "never", "-t", "numpy", "-o", "c.csv")
+    assert "stop: is not met" in never.stderr
+    assert len(table("c.csv")) == 21
+
+
+def test_of_an_end_in_time_and_a_stop_the_first_counts(phigen, swing):
+    for until, end in ((1.04, 1.04), (1.049, np.pi / 3), (7, np.pi / 3)):
+        ran(phigen, swing, "--run", "stopped", "--until", until, "-o", "a.csv")
+        assert table("a.csv")[-1, 0] == pytest.approx(end, abs=1e-11)
+
+
+@pytest.mark.parametrize(("name", "expected"), [("falling", [2, 4]), ("both", [0.5, 1.5, 2.5, 3.5])])
+def test_sections_have_a_direction(phigen, swing, name, expected):
+    told = ran(phigen, swing, "--run", name, "--section", "s.csv")
+    found = table("s.csv")[:, 0]
+    assert found[found > 0] == pytest.approx(np.pi * np.array([e for e in expected if e * np.pi < 14]), abs=1e-9)
+    assert ("crossings" if name == "both" else "falling crossings") in told.stdout
+
+
+def test_states_at_given_times(phigen, swing):
+    Path("times.txt").write_text("2\n0.25, 0\n 6\n")
+    for given, times in (("1.234", [1.234, 6]), ("times.txt", [0.25, 2, 6])):
+        ran(phigen, swing, "--run", "steps", "--at", given, "-o", "a.csv")
+        rows = table("a.csv")
+        assert rows[:, 0] == pytest.approx([0, *times], rel=1e-15)
+        assert rows[:, 1] == pytest.approx(np.cos(rows[:, 0]), abs=1e-11)
+
+
+@pytest.mark.parametrize(
+    ("text", "suffix"), [(SWING, "csv"), (SWING, "npz"), (BODY, "npz"), (TURNING, "csv")],
+    ids=["csv", "npz", "monitor", "attitude"],
+)  # fmt: skip
+def test_a_finished_run_is_extended_as_if_it_had_not_ended(phigen, write, text, suffix):
+    """With the gauge, or the e, of its start; and the errors of the whole are told."""
+    spec = write("spec.yaml", text)
+    whole = ran(phigen, spec, "--until", 3, "-o", f"a.{suffix}", "--json")
+    ran(phigen, spec, "--until", 2, "-o", f"b.{suffix}")
+    told = ran(phigen, spec, "--until", 3, "--extend", "-o", f"b.{suffix}", "--json")
+    if suffix == "csv":
+        assert np.array_equal(*(np.array(Path(f"{n}.csv").read_text().splitlines()[0]) for n in "ab"))
+        a, b = table("a.csv"), table("b.csv")
+    else:
+        with np.load("a.npz") as one, np.load("b.npz") as other:
+            a, b = (np.column_stack([found["t"], found["x"]]) for found in (one, other))
+            assert "monitor" not in text or one["tau"].shape == one["t"].shape
+    apart = np.abs(b[:, None, :] - a[None]).max(axis=2).min(axis=0)  # rows of b beside each of a
+    assert np.sum(apart < 1e-12) >= 0.4 * len(a)  # with a monitor the part of a step shifts all after it
+    assert text == BODY or (apart < 1e-12).all()
+    assert b[-1] == pytest.approx(a[-1], abs=1e-4 if text == BODY else 1e-12)
+    errors = [json.loads(done.stdout)["methods"][0]["energy"]["error"] for done in (whole, told)]
+    assert errors[1] == pytest.approx(errors[0], rel=0.3, abs=1e-14)
+
+
+def test_a_run_starts_where_another_ended(phigen, write):
+    spec = write("spec.yaml", TURNING)
+    ran(phigen, spec, "--until", 2, "-o", "a.npz")
+    ran(phigen, spec, "--until", 1, "--from", "a.npz", "-o", "b.csv")
+    with np.load("a.npz") as first:
+        second = table("b.csv")[0]
+        assert second[1:4].tolist() == first["x"][-1].tolist()
+        assert second[-4:] == pytest.approx(first["attitude"][-1], abs=1e-15)
+
+
+def test_an_interrupted_run_with_given_times_goes_on_to_the_same_bytes(phigen, swing):
+    run = ("run", swing, "--run", "steps", "-t", "numpy", "--every", 0.07, "--until", 5.03, "-q")
+    assert phigen(*run, "-o", "a.csv").exit_code == 0
+    with interrupted(2), pytest.MonkeyPatch.context() as patch:
+        patch.setattr("phigen.runtime.march._MOST_ROWS", 9)
+        assert phigen(*run, "-o", "b.csv").exit_code == 130
+    assert 2 < len(table("b.csv")) < 60
+    assert phigen(*run, "-o", "b.csv", "--resume").exit_code == 0
+    assert Path("a.csv").read_bytes() == Path("b.csv").read_bytes()
+
+
+def test_what_does_not_fit_is_told(phigen, write):
+    swing, body = write("swing.yaml", SWING), write("body.yaml", BODY)
+    ran(phigen, swing, "-o", "a.csv")
+    Path("words.csv").write_text("some,words\n1,2\n")
+    for args, said in (
+        ((swing, "--until", 3, "--steps", 5), "--until and --steps do not go together"),
+        ((swing, "--every", 1, "--lyapunov"), "--every and --lyapunov"),
+        ((swing, "--until", -3), "never reached"),
+        ((swing, "--at", "7"), "not between 0.0 and 6.0"),
+        ((swing, "--at", "soon"), "times are numbers"),
+        ((swing, "--every", "-1"), "must be positive"),
+        ((swing, "--extend"), "name its file by --output"),
+        ((swing, "--extend", "-o", "a.csv", "--set", "q=2"), "of another run"),
+        ((swing, "--extend", "-o", "a.csv", "--until", 5), "never reached from 6.0"),
+        ((swing, "--from", "words.csv"), "no file of a run of swing"),
+        ((body, "--every", 0.5, "--steps", 10), "say where the run ends in time"),
+    ):
+        done = phigen("run", *args, "-t", "numpy")
+        assert (done.exit_code, said in done.stderr) == (2, True), (args, done.stderr)
