@@ -5,18 +5,23 @@ from __future__ import annotations
 import json
 import math
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from phigen import resources, spec
-from phigen.api import compilation_of, solver_of
+from phigen.api import compilation_of, lattice_solver_of, solver_of
 from phigen.cli.list import kind_of_structure
 from phigen.cli.show import readable_one
 from phigen.drawing import figures
 from phigen.drawing.groups import groups
+from phigen.drawing.lattices import lattice_figure
 from phigen.drawing.phase_space import joins
+from phigen.lattice.observing import errors_of
+from phigen.lattice.states import start_of as start_of_lattice
+from phigen.notation.lattices import described, sections
 from phigen.paper.runge_kutta import started
 from phigen.runtime.interface import BackendError
 from phigen.runtime.session import rows_along
@@ -34,6 +39,8 @@ PAGE, FACTS, FIGURES = DOCS / "gallery.md", DOCS / "figures" / "gallery.json", D
 DRAWN, CROSSINGS = 1500, 1500
 #: Of a curve that winds too fast for its steps less is drawn, down to so many.
 SHORTEST = 100
+#: Times of a diagram of a lattice, and of its errors.
+SMALL, FRAMES = 80, 200
 #: The longest formula that is shown.
 LONGEST = 160
 HEAD = """# Gallery
@@ -46,11 +53,24 @@ formulas. How errors grow or do not grow is on the page that `phigen report` mak
 
 This page is made by `python docs/make_gallery.py`.
 """
+LATTICES = """
+
+# Lattices
+
+Systems of many like sites, of any size ([lattices.md](lattices.md)): one run of each, its fields over space and time,
+or at some times, and what it conserved. Errors of energy are relative to the magnitudes of the energies of all sites,
+those of Casimirs at sites are at the worst site.
+"""
 
 
 def names() -> list[str]:
-    """The corpus, in the order of `phigen list`, without lattices: docs/lattices.md is about these."""
+    """The corpus, in the order of `phigen list`, without lattices, which come after it."""
     return [name for name, path in resources.bundled().items() if path.parent == resources.bundled_specs()]
+
+
+def lattices() -> list[str]:
+    """The lattices of the corpus."""
+    return [name for name, path in resources.bundled().items() if path.parent != resources.bundled_specs()]
 
 
 def source(name: str) -> Spec:
@@ -144,11 +164,57 @@ def _sections(found: Spec, solver: Solver) -> dict[str, Any]:
     return sections
 
 
+def lattice_facts(name: str) -> dict[str, Any]:
+    """What is measured of a lattice, whose figure is drawn."""
+    found = source(name)
+    compilation = compilation_of(found)
+    assert compilation.cell is not None
+    solver, run = lattice_solver_of(compilation), longest_run(found)
+    start = start_of_lattice(found, run)
+    made = solver.integrate(start.state, float(run.step), run.steps, run.stride, parameters=start.arguments)
+    errors = errors_of(compilation.cell, made)
+    thin = max(1, len(made) // FRAMES)
+    few = replace(made, t=made.t[::thin], x=made.x[::thin], energy=made.energy[::thin])
+    drawn = lattice_figure(few, {quantity: e[::thin] for quantity, e in errors.items()}, "", dots=SMALL)
+    figures.save(drawn, FIGURES / f"{name}.svg")
+    return {
+        "sha256": found.source_sha256,
+        "structure": described(compilation.cell),
+        "method": compilation.label,
+        "order": solver.order,
+        "formulas": [
+            f"{left} = {right}" for _, lines in sections(compilation.cell, None)[1:-1] for left, right in lines
+        ],
+        "run": run.name,
+        "sites": list(start.sizes),
+        "errors": {"phigen": {quantity: float(e.max()) for quantity, e in errors.items()}},
+    }
+
+
 def page(known: dict[str, dict[str, Any]]) -> str:
     """The page, from the specs and the facts."""
+    listed = [f"| [{name}](#{name}) | {known[name]['structure']} | {source(name).title} |" for name in lattices()]
+    more = "\n".join([LATTICES, "| spec | sites | system |", "|---|---|---|", *listed])
+    entries = [_lattice_entry(source(name), known[name]) for name in lattices()]
+    return "\n".join([_systems(known), more, *entries])
+
+
+def _systems(known: dict[str, dict[str, Any]]) -> str:
     rows = [f"| [{name}](#{name}) | {len(source(name).coordinates)} | {source(name).title} |" for name in names()]
     contents = "\n".join(["| spec | dimension | system |", "|---|---|---|", *rows])
     return "\n".join([HEAD, contents, *(_entry(source(name), known[name]) for name in names())])
+
+
+def _lattice_entry(found: Spec, fact: dict[str, Any]) -> str:
+    run = longest_run(found)
+    image = f"![{found.title}: a run over space and time](figures/gallery/{found.name}.svg)"
+    about = f"Sites: {fact['structure']}. Method: {fact['method']}, order {fact['order']}."
+    length = f"Run `{run.name}`: {' × '.join(map(str, fact['sites']))} sites, {run.steps} steps of {float(run.step):g}."
+    shown = [line if len(line) <= LONGEST else line.split(" = ")[0] + " = …" for line in fact["formulas"]]
+    return "\n\n".join(
+        ["", f"## {found.name}", f"**{found.title}.** {found.description}", image,
+         "```text\n" + "\n".join(shown) + "\n```", f"{about} {length}", _table(fact["errors"])]
+    )  # fmt: skip
 
 
 def _entry(found: Spec, fact: dict[str, Any]) -> str:
@@ -185,11 +251,14 @@ def main(chosen: list[str]) -> None:
         if not chosen:
             stray.unlink()
     known = json.loads(FACTS.read_text(encoding="utf-8")) if FACTS.exists() else {}
-    for name in chosen or names():
+    for name in chosen or [*names(), *lattices()]:
         print(name, file=sys.stderr)
-        known[name] = facts(name)
-        draw(name)
-    known = {name: known[name] for name in names()}
+        if name in lattices():
+            known[name] = lattice_facts(name)
+        else:
+            known[name] = facts(name)
+            draw(name)
+    known = {name: known[name] for name in [*names(), *lattices()]}
     FACTS.write_text(json.dumps(known, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
     PAGE.write_text(page(known), encoding="utf-8")
 

@@ -16,11 +16,16 @@ if TYPE_CHECKING:
 
 #: Most panels of coordinates, times in a diagram, and snapshots in a row.
 MOST_PANELS, MOST_TIMES, SNAPSHOTS = 4, 800, 4
+#: Colours of diagrams, and of snapshots.
+LEVELS = 48
 
 
 @styled
-def lattice_figure(run: LatticeTrajectory, errors: Mapping[str, Floats], title: str) -> Figure:
-    """The coordinates over space and time, and the ``errors`` (frames,) of what is conserved, by name."""
+def lattice_figure(run: LatticeTrajectory, errors: Mapping[str, Floats], title: str, dots: int = MOST_TIMES) -> Figure:
+    """The coordinates over space and time, and the ``errors`` (frames,) of what is conserved, by name.
+
+    A diagram has so many ``dots`` at most along the time.
+    """
     from matplotlib.figure import Figure
 
     names = run.coordinates[:MOST_PANELS]
@@ -32,7 +37,7 @@ def lattice_figure(run: LatticeTrajectory, errors: Mapping[str, Floats], title: 
     for part, name in zip(parts, names, strict=False):
         values = run.column(name)
         if values.ndim == 2:
-            _draw_diagram(part, name, run, values)
+            _draw_diagram(part, name, run, values, dots)
         else:
             _draw_snapshots(part, name, run, values)
     _draw_errors(parts[-1].add_subplot(), run, errors)
@@ -65,12 +70,12 @@ def sites_figure(run: LatticeTrajectory, energies: Floats) -> Figure:
     return figure
 
 
-def _draw_diagram(part: Any, name: str, run: LatticeTrajectory, values: Floats) -> None:
+def _draw_diagram(part: Any, name: str, run: LatticeTrajectory, values: Floats, dots: int = MOST_TIMES) -> None:
     """One coordinate of a chain: sites upwards, time to the right."""
     axes, most = part.add_subplot(), _largest(values)
-    times = np.linspace(0, len(run) - 1, min(len(run), MOST_TIMES)).astype(int)
+    times = np.linspace(0, len(run) - 1, min(len(run), dots)).astype(int)
     shown = axes.imshow(
-        values[times].T, aspect="auto", origin="lower", cmap="RdBu_r", vmin=-most, vmax=most, interpolation="nearest",
+        values[times].T, aspect="auto", origin="lower", cmap=_colours(), vmin=-most, vmax=most, interpolation="none",
         extent=(run.t[0], run.t[-1], -0.5, values.shape[1] - 0.5),
     )  # fmt: skip
     axes.set_xlabel("t")
@@ -86,12 +91,19 @@ def _draw_snapshots(part: Any, name: str, run: LatticeTrajectory, values: Floats
     panels = np.atleast_1d(part.subplots(1, len(frames)))
     for axes, k in zip(panels, frames.tolist(), strict=True):
         shown = axes.imshow(
-            planes[k].T, origin="lower", cmap="RdBu_r", vmin=-most, vmax=most, interpolation="nearest", aspect="equal"
+            planes[k].T, origin="lower", cmap=_colours(), vmin=-most, vmax=most, interpolation="none", aspect="equal"
         )
         axes.set_title(f"t = {run.t[k]:.4g}")
         axes.set_xlabel(run.axes[-2])
     panels[0].set_ylabel(run.axes[-1])
     part.colorbar(shown, ax=list(panels), pad=0.02, label=name)
+
+
+def _colours() -> Any:
+    """Few enough that files stay small."""
+    from matplotlib import colormaps
+
+    return colormaps["RdBu_r"].resampled(LEVELS)
 
 
 def _draw_errors(axes: Any, run: LatticeTrajectory, errors: Mapping[str, Floats]) -> None:
