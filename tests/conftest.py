@@ -2,7 +2,7 @@ import gc
 import re
 
 import pytest
-from systems import NAMES
+from systems import NAMES, QUICK
 from tools import WARNINGS, not_tested
 
 from phigen.runtime import toolchain
@@ -23,15 +23,23 @@ def pytest_configure(config):
     if not toolchain.available():
         raise pytest.UsageError("the tests need a C compiler; on Debian: apt-get install gcc libc6-dev")
     config.addinivalue_line("markers", "slow: long; left out unless --all or -m is given, or the test is named by `::`")
+    config.addinivalue_line("markers", "corpus: of the systems of the corpus, those beside `systems.QUICK` are slow")
 
 
 def pytest_collection_modifyitems(config, items):
     named = any("::" in argument for argument in config.args)
     if config.option.all or config.option.markexpr or named:
         return
-    slow = [item for item in items if item.get_closest_marker("slow")]
+    slow = [item for item in items if _is_slow(item)]
     config.hook.pytest_deselected(items=slow)
-    items[:] = [item for item in items if not item.get_closest_marker("slow")]
+    items[:] = [item for item in items if not _is_slow(item)]
+
+
+def _is_slow(item):
+    if item.get_closest_marker("corpus") and hasattr(item, "callspec"):
+        systems = {value for value in item.callspec.params.values() if isinstance(value, str) and value in NAMES}
+        return item.get_closest_marker("slow") or systems - {*QUICK}
+    return item.get_closest_marker("slow")
 
 
 @pytest.hookimpl(optionalhook=True)

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 import sympy
+from systems import slow_but
 
 import phigen
 from phigen import resources, spec
@@ -12,7 +13,7 @@ from phigen.spec import json_schema
 RIGID_BODY = resources.bundled_specs() / "rigid_body.yaml"
 
 
-@pytest.mark.parametrize("target", ["c", "numpy"])
+@pytest.mark.parametrize("target", slow_but(["c"], ["c", "numpy"]))
 def test_example_of_the_documentation(target):
     system = phigen.load(RIGID_BODY)
     solver = phigen.compile(system, target=target, order=4)

@@ -70,6 +70,7 @@ def test_output_depends_neither_on_hash_seed_nor_locale_nor_folder(tmp_path):
     assert built(tmp_path, environment, elsewhere, specs=copies) == golden()
 
 
+@pytest.mark.slow
 def test_wheel_builds_the_same_bytes_and_carries_its_data(tmp_path):
     pytest.importorskip("build")
     dist = tmp_path / "dist"

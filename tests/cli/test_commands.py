@@ -8,6 +8,7 @@ import jsonschema
 import numpy as np
 import pytest
 from cli_specs import NOT_POISSON
+from systems import slow_but
 
 from phigen import resources, spec
 
@@ -306,7 +307,7 @@ def test_list_shows_every_bundled_spec(phigen):
     assert "did you mean 'kepler'" in phigen("list", "--path", "keplr").stderr
 
 
-@pytest.mark.parametrize("target", ["c", "numpy"])
+@pytest.mark.parametrize("target", slow_but(["c"], ["c", "numpy"]))
 def test_demo_keeps_the_casimir_at_roundoff_up_to_the_singularity(phigen, target):
     done = phigen("demo", "-t", target)
     assert done.exit_code == 0

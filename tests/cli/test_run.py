@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from interrupting import interrupted
+from systems import slow_but
 
 from phigen import resources
 
@@ -105,7 +106,10 @@ main()
 """
 
 
-@pytest.mark.parametrize(("number", "code"), [(signal.SIGKILL, -9), (signal.SIGINT, 130)])
+KILLS = [(signal.SIGKILL, -9), (signal.SIGINT, 130)]
+
+
+@pytest.mark.parametrize(("number", "code"), slow_but(KILLS[:1], KILLS))
 def test_a_killed_run_goes_on_to_the_same_bytes(phigen, in_tmp, number, code):
     run = ["run", SPECS / "pendulum_euler.yaml", "--steps", 60_000, "-t", "numpy", "-o", "a.csv"]
     command = [sys.executable, "-c", KILLED, *map(str, run)]
@@ -181,6 +185,7 @@ def test_resume_without_an_interrupted_run(phigen, write):
     assert "its run is complete" in phigen("run", path, "-o", "a.csv", "--resume").stderr
 
 
+@pytest.mark.slow
 def test_memory_does_not_grow_with_the_length_of_a_run(phigen, in_tmp, monkeypatch):
     monkeypatch.setattr("phigen.runtime.march._MOST_ROWS", 256)  # pieces are as large as time allows
 

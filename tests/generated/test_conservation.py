@@ -9,7 +9,7 @@ from support import NAMES, QUICK, RUNS, TARGETS, compile_text, compiled, describ
 from phigen.scheme.steps import Path
 from phigen.symbolic.expression import gradient
 
-pytestmark = pytest.mark.usefixtures("as_users_compile")
+pytestmark = [pytest.mark.usefixtures("as_users_compile"), pytest.mark.corpus]
 
 #: With --all; five times fewer without.
 STEPS = 100_000

@@ -31,7 +31,7 @@ from phigen.errors import ParameterError, StepError
 from phigen.scheme.steps import LONGEST_PATH, MOST_PIECES, Explicit, Newton, Path, Splitting
 from phigen.spec.model import Extras
 
-pytestmark = pytest.mark.usefixtures("as_users_compile")
+pytestmark = [pytest.mark.usefixtures("as_users_compile"), pytest.mark.corpus]
 
 STATUSES = {"OK": 0, "NO_CONVERGENCE": 1, "SINGULAR": 2, "NOT_FINITE": 3, "BAD_ARGUMENT": 4}
 PAIR = "coordinates: [q, p]\npoisson: {canonical: {q: [q], p: [p]}}\norder: 2\n"

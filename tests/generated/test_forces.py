@@ -5,7 +5,7 @@ from functools import cache
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
-from support import COMMAND, compile_text, javascript, solver
+from support import COMMAND, compile_text, javascript, slow_but, solver
 
 from phigen.compiler import emit, examine
 from phigen.errors import SpecError
@@ -119,7 +119,7 @@ def test_an_ensemble_takes_the_steps_of_its_members():
     assert found == pytest.approx(np.array(single), abs=1e-13)
 
 
-@pytest.mark.parametrize("kind", ["populations", "path"])
+@pytest.mark.parametrize("kind", slow_but(["populations"], ["populations", "path"]))
 def test_verification_asks_for_what_is_promised(kind):
     """The derivative is that of a step though ∂(∇S + hζ) is not symmetric; energy and Poisson are not judged."""
     solvers = {target: solver(made(kind), target) for target in ("c", "numpy")}

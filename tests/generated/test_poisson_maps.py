@@ -26,7 +26,7 @@ from support import (
 
 from phigen.symbolic.symbols import ELAPSED
 
-pytestmark = pytest.mark.usefixtures("as_users_compile")
+pytestmark = [pytest.mark.usefixtures("as_users_compile"), pytest.mark.corpus]
 
 REFERENCES = json.loads(Path(__file__).parents[1].joinpath("references.json").read_text(encoding="utf-8"))["references"]
 EPSILON = 2.0**-52

@@ -4,7 +4,7 @@ import mpmath
 import numpy as np
 import pytest
 from precise_path import PATH_DIGITS, PrecisePathStep, PreciseSystem, by_paths, compile_paths
-from support import BODY, TARGETS, RawC, gradient, solver, values
+from support import BODY, TARGETS, RawC, gradient, slow_but, solver, values
 
 from phigen import StepError
 
@@ -39,7 +39,7 @@ def test_long_path_is_followed_in_pieces(coordinates, form, hamiltonian, start, 
     assert np.max(np.abs(solve.step(end, h=-h) - start)) < 2000 * EPS * max(1, *np.abs(end))
 
 
-@pytest.mark.parametrize("target", TARGETS)
+@pytest.mark.parametrize("target", slow_but(["c"], TARGETS))
 def test_mean_of_a_path_in_pieces_enters_the_equation(target):
     text = LONG_TEXT.format(hamiltonian="3*x - y + 2*z + (x**2 + y*z)/40")
     compilation, start, h = compile_paths(text, 2), (0.3, -0.8, 0.5), 1.0
@@ -139,7 +139,7 @@ def test_steps_too_large_for_the_equation_fail_cleanly():
     assert len(statuses) > 1
 
 
-@pytest.mark.parametrize("target", TARGETS)
+@pytest.mark.parametrize("target", slow_but(["c"], TARGETS))
 def test_steps_where_the_approximate_matrix_gains_little_are_solved_in_time(target):
     """It is right up to O(h²): at these h an iteration with it gains less than a digit."""
     solve = solver(by_paths("rigid_body", 4), target)

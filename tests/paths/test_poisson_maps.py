@@ -34,7 +34,7 @@ def steady(name):
     return numbers(compilation, "long" if "long" in compilation.spec.runs else "reference")
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", slow_but({*NAMES} - {"ablowitz_ladik3", "guiding_centre"}, NAMES))
 def test_step_is_a_poisson_map_and_the_generated_one(name):
     # Order 2, one stage, where order 4 is a composition.
     compilation, at = by_paths(name, 2 if name in ("ablowitz_ladik3", "guiding_centre") else 4), steady(name)

@@ -45,6 +45,7 @@ def test_the_orbit_of_a_kepler_motion_is_exact_however_eccentric(order):
     assert found.t[-1] > 100
 
 
+@pytest.mark.slow
 def test_verification_finds_the_order_in_tau_and_of_the_time_and_no_poisson_defect(kepler):
     compilation, solvers = kepler
     found = verification.verify(compilation, solvers, "comet", np.array([0.5, 0, 0, 1.7]), {}, 0.1, 60, (), quick=True)

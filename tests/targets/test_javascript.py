@@ -21,6 +21,8 @@ from phigen.spec.model import BirealisationChoice, Extras
 from phigen.targets.header import is_edited
 from phigen.targets.js.runtime import resolved
 
+pytestmark = pytest.mark.corpus
+
 RUNTIME = sorted((resources.templates() / "js" / "runtime").glob("*.mjs"))
 STEPS = 20
 

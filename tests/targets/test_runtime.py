@@ -37,7 +37,14 @@ def defined(switches):
     return [f"-DPHI_{switch}=1" for switch in switches]
 
 
-@pytest.mark.parametrize("switches", [*IMPLICIT, *EXPLICIT], ids=" ".join)
+#: Those of fast code take two seconds each.
+FEW = [switches for switches in [*IMPLICIT, *EXPLICIT] if "FAST" not in switches or len(switches) == 2]
+
+
+@pytest.mark.parametrize(
+    "switches",
+    [pytest.param(s, marks=() if s in FEW else pytest.mark.slow, id=" ".join(s)) for s in [*IMPLICIT, *EXPLICIT]],
+)
 def test_pendulum_by_hand_moves_as_it_should(switches, tmp_path):
     """With the sanitisers: energy, time, reversibility, many as one, failures, the tangent map (see main.c)."""
     flags = ["-O0", "-fsanitize=address,undefined", "-fno-sanitize-recover"]  # -O1 takes four times as long
