@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
+from phigen.scheme.lowering import COST
 from phigen.symbolic.expression import ZERO, Expression, symbol, total
 from phigen.symbolic.symbols import Symbol
 
@@ -19,19 +20,30 @@ Pattern = Sequence[Sequence[bool]]
 
 def pivot_order(pattern: Pattern) -> list[int]:
     """The pivots, each the one whose row and column meet the fewest others; ties go to the first."""
+    return [k for k, _ in _pivots(pattern)]
+
+
+def operations(pattern: Pattern) -> int:
+    """The cost (see `phigen.scheme.lowering.cost`) of `factorise` and `Factors.solved`, without making them."""
+    return sum(price for _, price in _pivots(pattern))
+
+
+def _pivots(pattern: Pattern) -> Iterator[tuple[int, int]]:
+    """The pivots in their order, and what each costs."""
     n = len(pattern)
     rows = [{j for j in range(n) if pattern[i][j] and j != i} for i in range(n)]
     columns = [{i for i in range(n) if pattern[i][j] and j != i} for j in range(n)]
-    left, order = set(range(n)), []
+    left = set(range(n))
     while left:
         k = min(left, key=lambda k: (len(rows[k]) * len(columns[k]), k))
-        order.append(k)
         left.remove(k)
+        below, right = len(columns[k]), len(rows[k])
+        new = sum(len(rows[k] - rows[i] - {i}) for i in columns[k])  # where there was 0, a product and no difference
+        yield k, COST["reciprocal"] + below * (1 + 2 * right) - new + 2 * (below + right) + 1
         for i in columns[k]:
             rows[i] = (rows[i] | rows[k]) - {i, k}
         for j in rows[k]:
             columns[j] = (columns[j] | columns[k]) - {j, k}
-    return order
 
 
 @dataclass(frozen=True)

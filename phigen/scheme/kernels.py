@@ -9,10 +9,9 @@ from fractions import Fraction
 
 from phigen.geometry.system import System
 from phigen.realisations.protocol import BiRealisation
-from phigen.scheme.elimination import Factors, Pattern, elimination, factorise, inversion
+from phigen.scheme.elimination import Factors, Pattern, elimination, factorise, inversion, operations
 from phigen.scheme.generating import GeneratingFunction
 from phigen.scheme.kernel import Kernel, Output
-from phigen.scheme.lowering import cost
 from phigen.scheme.program import Observables
 from phigen.scheme.staging import Coefficients
 from phigen.scheme.step import at_momenta, explicit_increment, explicit_order, linearise
@@ -99,10 +98,9 @@ def newton_solvers(linearised: Kernel) -> Solvers:
     n = len(jacobian)
     if n <= UNROLLED:
         return Solvers(_elimination_kernel(jacobian), inverse(n))
-    factors = factorise(jacobian)
-    if cost(factors.solved([symbol(Symbol("r", i)) for i in range(n)])) > SPARSE * n**3:
+    if operations(jacobian) > SPARSE * n**3:
         return Solvers()
-    return Solvers(_elimination_kernel(jacobian), factors=_factorisation(factors, slope))
+    return Solvers(_elimination_kernel(jacobian), factors=_factorisation(factorise(jacobian), slope))
 
 
 def _pattern(entries: Sequence[Expression]) -> Pattern:

@@ -4,7 +4,8 @@ import mpmath
 import pytest
 from support import values
 
-from phigen.scheme.elimination import elimination, factorise, pivot_order
+from phigen.scheme.elimination import elimination, factorise, operations, pivot_order
+from phigen.scheme.lowering import cost
 from phigen.symbolic.expression import symbol
 from phigen.symbolic.numeric import evaluate
 from phigen.symbolic.symbols import Symbol
@@ -63,6 +64,12 @@ def test_factors_solve_as_elimination_does(name):
     assert evaluate(factors.named("f").solved(side), at | kept) == pytest.approx(
         evaluate(elimination(PATTERNS[name])[0], at), rel=1e-13
     )
+
+
+@pytest.mark.parametrize("name", PATTERNS)
+def test_operations_are_counted_before_they_are_made(name):
+    solved = factorise(PATTERNS[name]).solved([symbol(Symbol("r", i)) for i in range(len(PATTERNS[name]))])
+    assert operations(PATTERNS[name]) == cost(solved)
 
 
 def test_the_centre_of_a_star_is_the_last_pivot_and_nothing_fills_in():

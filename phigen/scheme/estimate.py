@@ -1,0 +1,77 @@
+"""What products of matrices of expressions cost, counted before they are made.
+
+A matrix a' = ∂_xα + ∂_pα · Hess S_h of a large system is nearly all of its step, and a node of an expression takes some
+fifty times as long to make as to count. Here a node is its number: the same for equal operations on equal operands.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+
+from phigen.symbolic.expression import Expression, fold
+
+#: A row of a matrix, without zeros.
+SparseRow = Mapping[int, Expression]
+
+
+class TooManyError(Exception):
+    """There are more operations than were asked for."""
+
+
+class OperationCount:
+    """The operations of products of matrices whose sums are those of `total_at`.
+
+    What depends on ``fixed`` symbols only costs nothing: it is computed elsewhere. Raises `TooManyError` as soon as
+    there are more than ``most``.
+    """
+
+    def __init__(self, most: int, fixed: Callable[[str], bool]) -> None:
+        self.operations, self._most, self._is_fixed = 0, most, fixed
+        self._nodes: dict[tuple[int, int, int], int] = {}
+        self._fixed: set[int] = set()
+        self._leaves: dict[int, int] = {}
+
+    def matrix(self, left: Sequence[SparseRow], right: Sequence[SparseRow]) -> int:
+        """The operations of left · right beyond those that were counted before."""
+        before = self.operations
+        self._know([e for row in (*left, *right) for e in row.values()])
+        columns = [{j: self._leaves[id(e)] for j, e in row.items()} for row in right]
+        for row in left:
+            sums: dict[int, dict[int, int]] = {}
+            for k, e in row.items():
+                unit, factor = e.is_number and abs(e.value) == 1, self._leaves[id(e)]
+                for j, other in columns[k].items():
+                    sums.setdefault(j, {})[k] = other if unit else self._node(0, factor, other)
+            for terms in sums.values():
+                self._total(terms)
+        return self.operations - before
+
+    def _know(self, leaves: Sequence[Expression]) -> None:
+        def visit(node: Expression, args: list[bool]) -> bool:
+            return self._is_fixed(node.value) if node.op == "symbol" else all(args)
+
+        for e, fixed in zip(leaves, fold(leaves, visit), strict=True):
+            number = self._leaves.setdefault(id(e), -len(self._leaves) - 1)
+            if fixed:
+                self._fixed.add(number)
+
+    def _total(self, terms: dict[int, int]) -> None:
+        while len(terms) > 1:
+            sums: dict[int, int] = {}
+            for place, node in terms.items():
+                half = place // 2
+                sums[half] = self._node(1, sums[half], node) if half in sums else node
+            terms = sums
+
+    def _node(self, kind: int, a: int, b: int) -> int:
+        key = (kind, a, b) if a < b else (kind, b, a)
+        found = self._nodes.get(key)
+        if found is None:
+            found = self._nodes[key] = len(self._nodes) + 1
+            if a in self._fixed and b in self._fixed:
+                self._fixed.add(found)
+            else:
+                self.operations += 1
+                if self.operations > self._most:
+                    raise TooManyError
+        return found
