@@ -22,10 +22,7 @@ from phigen.symbolic.arrays import evaluate
 from phigen.symbolic.expression import total
 from phigen.symbolic.verdict import PROVED
 
-#: Those that are shipped, and those that wait for their solvers.
-FILES = sorted(
-    [*(resources.bundled_specs() / "lattices").glob("*.yaml"), *Path(__file__).with_name("corpus").glob("*.yaml")]
-)
+FILES = sorted((resources.bundled_specs() / "lattices").glob("*.yaml"))
 PERIODIC = [f for f in FILES if "axes" in f.read_text(encoding="utf-8") and "open" not in f.read_text(encoding="utf-8")]
 
 

@@ -1,0 +1,105 @@
+/*
+ * kdv.h: the declarations; kdv.c says how they were made.
+ * DO NOT EDIT: edits are noticed by the checksum below.
+ * SPDX-License-Identifier: 0BSD
+ * body-sha256: b03fece749f1034f0b860c61977c41efd965c1b44c4cf06bf569b0ff50778ee5
+ */
+#ifndef KDV_H
+#define KDV_H
+
+#include <stddef.h>
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+#define kdv_AXES 1
+#define kdv_DIM 1
+#define kdv_ORDER 2
+#define kdv_CASIMIRS 1
+#define kdv_PHIGEN_VERSION "0.1.0"
+#define kdv_SPEC_SHA256 "32cf81a7dcc830b212362da02129fd35222f755f500facee761ebba58d437add"
+
+/* Axes, the slowest first: i. Fields of a site: u. Casimirs: mass. */
+typedef struct {
+    double delta; /* default 0.022 */
+    double d;     /* spacing */
+} kdv_params;
+
+extern const kdv_params kdv_default_params;
+
+enum { kdv_ARRAYS = 1 };       /* arrays over the sites: fields, then parameters */
+enum { kdv_COEFFICIENTS = 4 }; /* numbers that depend on params and h only */
+enum { kdv_DIFFERENCES = 4 };  /* that a guess is extrapolated from */
+
+/* How a step ends; kdv_status_string says it in words. */
+typedef enum {
+    kdv_OK = 0, kdv_NO_CONVERGENCE, kdv_SINGULAR, kdv_NOT_FINITE, kdv_BAD_ARGUMENT
+} kdv_status;
+
+/* What guesses for the y of a stage are extrapolated from: differences of the last values of y - x. */
+typedef struct {
+    int count, order; /* differences that there are, and that the next guess takes */
+    double *difference[kdv_DIFFERENCES][kdv_DIM];
+} kdv_guess;
+
+/* The solver keeps the state in memory of the caller, row by row: a row is all sites along the last axis,
+   with copies of the other end beside it. Set it up with kdv_init; a copy of the struct is the same solver,
+   not another one. */
+typedef struct {
+    size_t sizes[kdv_AXES];
+    size_t sites, rows;
+    ptrdiff_t length, width; /* sites of a row; doubles between the beginnings of two rows */
+    /* in rows, each field, then each parameter at sites: the first site of the first row */
+    double *x[kdv_ARRAYS];
+    ptrdiff_t *lines;        /* of each row, where it is and where those beside it are */
+    double *before[kdv_DIM]; /* the fields before the steps that are being made */
+    /* the middle of a stage, before and after a sweep, with the parameters at sites */
+    double *y[2][kdv_ARRAYS];
+    kdv_guess guess;
+    size_t sweeps; /* that stages took since kdv_init */
+    size_t steps;  /* good steps since kdv_init */
+    double t;      /* time since kdv_init */
+    double h;      /* the last step size */
+    kdv_params params;
+    double coef[kdv_COEFFICIENTS]; /* all that depends on params and h only */
+    int prepared; /* whether coef has been computed */
+    size_t steps_before_h; /* steps and t when h was set: t is counted from there, so no error adds up */
+    double t_before_h;
+} kdv_solver;
+
+/* The bytes that the solver of a lattice needs as its memory; 0 for sizes that are not allowed. */
+size_t kdv_work_size(const size_t sizes[kdv_AXES]);
+
+/* Start at x0[field][site], the last axis fastest, with kdv_work_size(sizes) bytes of memory, as from malloc,
+   which must stay. params may be NULL for the defaults; its arrays are copied. kdv_BAD_ARGUMENT if sizes are
+   not allowed, x0 or a parameter is not finite, or one that has to be positive is not. */
+kdv_status kdv_init(kdv_solver *s, const kdv_params *params, const size_t sizes[kdv_AXES], const double *x0,
+    void *work);
+
+/* Steps of size h, of either sign. If one fails, the state is that before it, and s->steps counts the good
+   ones. Guesses are extrapolated from the former steps of one call. With OpenMP rows are worked at in
+   parallel, with the same bits for any number of threads. */
+kdv_status kdv_step(kdv_solver *s, double h);
+kdv_status kdv_integrate(kdv_solver *s, double h, size_t steps);
+
+/* The state x[field][site]. */
+void kdv_state(const kdv_solver *s, double *x);
+
+/* The Hamiltonian; its density at each site; the densities out[k][site] of the Casimirs; the right-hand side
+   out[field][site]. */
+double kdv_hamiltonian(const kdv_solver *s);
+void kdv_density(const kdv_solver *s, double *out);
+void kdv_casimirs(const kdv_solver *s, double *out);
+void kdv_vector_field(const kdv_solver *s, double *out);
+
+const char *kdv_status_string(kdv_status status);
+
+/* For bindings: the size of kdv_solver, and its count of good steps. */
+size_t kdv_solver_size(void);
+size_t kdv_solver_steps_done(const kdv_solver *s);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif /* KDV_H */
