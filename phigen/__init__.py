@@ -24,6 +24,7 @@ if TYPE_CHECKING:
         ToolchainError,
     )
     from phigen.geometry.system import System
+    from phigen.runtime.habits import solve_ivp
     from phigen.runtime.solver import Solver
     from phigen.runtime.trajectory import Trajectory
 
@@ -33,6 +34,7 @@ _HOMES = {
     "formulas": "phigen.api",
     "System": "phigen.geometry.system",
     "Solver": "phigen.runtime.solver",
+    "solve_ivp": "phigen.runtime.habits",
     "Trajectory": "phigen.runtime.trajectory",
     "CheckError": "phigen.errors",
     "LimitError": "phigen.errors",
@@ -60,6 +62,7 @@ __all__ = [
     "compile",
     "formulas",
     "load",
+    "solve_ivp",
 ]
 
 

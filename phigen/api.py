@@ -193,6 +193,7 @@ def interface_of(program: Program) -> Interface:
         positive=frozenset(p.name for p in program.parameters if p.positive),
         casimirs=program.casimirs,
         time=program.time,
+        moving=frozenset(["energy", *program.pushed] if program.time or program.forced else ()),
         monitored=program.monitor is not None,
         attitude=program.attitude.shape if program.attitude else (),
         position=bool(program.attitude and program.attitude.group.translation),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -60,7 +61,8 @@ def draw_errors(
 ) -> None:
     """One panel for the energy and each Casimir, one curve for each method; the first method lies on top.
 
-    Errors are in the ``units``; without them relative to the value at the start, unless that is 0. ``balance``
+    Errors are in the ``units``; without them relative to the value at the start, unless that is 0, and what time or
+    forces change is said to be a change. ``balance``
     says that the energy is its balance.
     """
     first = next(iter(methods.values()))
@@ -72,6 +74,8 @@ def draw_errors(
         shared = shared or axes
         values = {label: t.energy if index == 1 else t.casimirs[name] for label, t in methods.items()}
         unit = (units or {}).get(name) or unit_of(float(next(iter(values.values()))[0]), 0.0)
+        if units is None:
+            unit = replace(unit, moves=name in first.moving)
         curves = {
             label: windowed_maxima(methods[label].t, unit.errors(column, float(column[0])))
             for label, column in values.items()

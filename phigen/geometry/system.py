@@ -116,6 +116,11 @@ class System:
         slopes = gradient(casimir, self.coordinates)
         return total(s * f for s, f in zip(slopes, self.forces.vector, strict=True) if not s.is_zero)
 
+    @property
+    def pushed(self) -> tuple[str, ...]:
+        """The names of the Casimirs that forces change."""
+        return tuple(name for name, c in self.casimirs.items() if not self.forced_rate_of_casimir(c).is_zero)
+
     @classmethod
     def from_sympy(
         cls,

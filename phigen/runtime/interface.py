@@ -36,6 +36,7 @@ class Interface:
     positive: frozenset[str] = frozenset()  # the parameters that must be positive
     casimirs: tuple[str, ...] = ()
     time: str = ""  # its name, where the Hamiltonian depends on it
+    moving: frozenset[str] = frozenset()  # of energy and Casimirs, those that time or forces change
     monitored: bool = False  # whether steps are equal in τ, not in t
     attitude: tuple[int, ...] = ()  # the shape of an attitude, if there is one
     position: bool = False  # whether there is a position too

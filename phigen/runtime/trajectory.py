@@ -128,6 +128,11 @@ class Trajectory:
         """Whether steps are equal in τ, not in t."""
         return self.tau is not self.t
 
+    @property
+    def moving(self) -> frozenset[str]:
+        """Of energy and Casimirs, those that time or forces change: what they differ by is no error."""
+        return self.solver.interface.moving if self.solver else frozenset()
+
     def columns(self) -> list[Column]:
         """What `rows` has side by side."""
         shape = () if self.attitude is None else self.attitude.shape[1:]

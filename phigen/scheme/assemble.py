@@ -86,6 +86,7 @@ def build_program(
         coordinates=system.coordinates,
         time=system.time,
         forced=system.forces is not None,
+        pushed=system.pushed,
         parameters=system.parameters,
         casimirs=tuple(system.casimirs),
         order=order.order,

@@ -103,8 +103,9 @@ class Program:
     """A solver, ready to be printed.
 
     A step of size h is the composition of one ``step`` of each of the ``fractions`` of h. ``time`` is the name of t,
-    where H depends on it. ``extras`` are what was asked for beside it, ``lanes`` asks for C that does several steps or
-    members at once, ``profile`` (``fast``, ``small``) says how much it does for speed.
+    where H depends on it, ``pushed`` the Casimirs that forces change. ``extras`` are what was asked for beside it,
+    ``lanes`` asks for C that does several steps or members at once, ``profile`` (``fast``, ``small``) says how much
+    it does for speed.
     """
 
     name: str
@@ -118,6 +119,7 @@ class Program:
     fractions: tuple[float, ...] = (1.0,)
     time: str = ""
     forced: bool = False
+    pushed: tuple[str, ...] = ()
     gauge: FreeGauge | None = None
     monitor: Monitor | None = None
     modified: Modified | None = None

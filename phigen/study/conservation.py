@@ -79,8 +79,7 @@ def units_of(system: System, parameters: Mapping[str, float], start: Floats) -> 
 
 def moving(system: System) -> list[str]:
     """The names of energy and Casimirs that time or forces change."""
-    pushed = [name for name, c in system.casimirs.items() if not system.forced_rate_of_casimir(c).is_zero]
-    return [ENERGY, *pushed] if system.driven else []
+    return [ENERGY, *system.pushed] if system.driven else []
 
 
 def unit_of(value: float, terms: float) -> Unit:

@@ -78,3 +78,12 @@ def test_plot_draws_the_orbit_and_what_was_conserved(trajectory):
     labels = [axes.get_title() for axes in trajectory.plot().axes]
     assert any("energy" in label for label in labels)
     assert any("Casimir C" in label for label in labels)
+
+
+@pytest.mark.parametrize(("name", "said"), [("pendulum", "error of the energy"), ("duffing", "change of the energy")])
+def test_what_the_time_changes_is_drawn_as_a_change(name, said):
+    pytest.importorskip("matplotlib")
+    from phigen import api
+
+    figure = api.compile(name, target="numpy").integrate([1.0, 0.2], 0.1, 20).plot()
+    assert any(said in axes.get_title() for axes in figure.get_axes())
