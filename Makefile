@@ -17,7 +17,7 @@ WORKERS ?= auto
 # Tests start Python some hundred times; compiled modules halve what that takes.
 test test-all: export PYTHONDONTWRITEBYTECODE :=
 
-.PHONY: help demo test test-all lint format golden figures bench clean
+.PHONY: help demo test test-all lint format golden figures docs bench clean
 
 help:
 	@sed -n '/^#/!q; s/^# \{0,1\}//p' Makefile
@@ -49,6 +49,11 @@ golden: $(STAMP)
 figures: $(STAMP)
 	$(BIN)/python docs/make_gallery.py
 	$(BIN)/python docs/make_paper.py
+
+# The site of the documentation, in build/site.
+docs: $(STAMP)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[docs]'
+	$(BIN)/mkdocs build --quiet
 
 # Beside the methods that people would otherwise use; see docs/benchmarks.md. About ten minutes on a quiet machine.
 bench: $(STAMP)

@@ -19,12 +19,14 @@ if TYPE_CHECKING:
         MissingPackageError,
         ParameterError,
         PhigenError,
+        PhigenWarning,
         SpecError,
         StepError,
         ToolchainError,
     )
     from phigen.geometry.system import System
     from phigen.runtime.habits import solve_ivp
+    from phigen.runtime.lattice import LatticeSolver, LatticeTrajectory
     from phigen.runtime.solver import Solver
     from phigen.runtime.trajectory import Trajectory
 
@@ -33,6 +35,8 @@ _HOMES = {
     "compile": "phigen.api",
     "formulas": "phigen.api",
     "System": "phigen.geometry.system",
+    "LatticeSolver": "phigen.runtime.lattice",
+    "LatticeTrajectory": "phigen.runtime.lattice",
     "Solver": "phigen.runtime.solver",
     "solve_ivp": "phigen.runtime.habits",
     "Trajectory": "phigen.runtime.trajectory",
@@ -41,6 +45,7 @@ _HOMES = {
     "MissingPackageError": "phigen.errors",
     "ParameterError": "phigen.errors",
     "PhigenError": "phigen.errors",
+    "PhigenWarning": "phigen.errors",
     "SpecError": "phigen.errors",
     "StepError": "phigen.errors",
     "ToolchainError": "phigen.errors",
@@ -48,10 +53,13 @@ _HOMES = {
 
 __all__ = [
     "CheckError",
+    "LatticeSolver",
+    "LatticeTrajectory",
     "LimitError",
     "MissingPackageError",
     "ParameterError",
     "PhigenError",
+    "PhigenWarning",
     "Solver",
     "SpecError",
     "StepError",
