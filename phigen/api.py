@@ -197,6 +197,8 @@ def interface_of(program: Program) -> Interface:
         monitored=program.monitor is not None,
         attitude=program.attitude.shape if program.attitude else (),
         position=bool(program.attitude and program.attitude.group.translation),
+        noise=program.noise.sources if program.noise else (),
+        draws=program.noise.draws if program.noise else 0,
     )
     if not isinstance(program.step, Sweeps):
         return about

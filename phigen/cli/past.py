@@ -14,7 +14,7 @@ import numpy as np
 from phigen.cli.console import Console
 from phigen.cli.experiment import Experiment
 from phigen.runtime.ending import End, at_time, where_zero
-from phigen.runtime.interface import BackendError, Floats, Interface
+from phigen.runtime.interface import BackendError, Draws, Floats, Interface
 from phigen.runtime.session import Session
 from phigen.runtime.solver import Solver
 from phigen.runtime.tables import Column
@@ -90,12 +90,13 @@ def begun(solver: Solver, experiment: Experiment) -> Session:
     One that goes on with a finished run holds the gauge of its start, or its e.
     """
     backend, past, names = solver.backend, experiment.past, solver.interface
-    initial = np.array(experiment.initial)
+    initial, made = np.array(experiment.initial), round((past.t - experiment.t0) / experiment.h) if past else 0
+    draws = Draws(experiment.run.seed, step=made if names.noise else 0)
     try:
         if past is None:
-            return backend.start(initial, experiment.parameters, experiment.t0, experiment.first)
+            return backend.start(initial, experiment.parameters, experiment.t0, experiment.first, draws)
         here = started_from(experiment, past, solver)
-        session = backend.start(initial, experiment.parameters, past.t if names.time else 0.0, here.first)
+        session = backend.start(initial, experiment.parameters, past.t if names.time else 0.0, here.first, draws)
         if names.monitored:
             return session.placed(np.array(here.initial))
         session.place(np.array(here.initial))

@@ -84,6 +84,7 @@ class Recorder:
             "past": len(experiment.past.rows) if experiment.past else 0,
             "initial": list(experiment.initial),
             **({"start": experiment.t0} if names.time else {}),
+            **({"seed": run.seed} if names.noise else {}),
             "parameters": parameters,
             "files": [path.name if path else None for path in (files.output, files.section)],
             "lyapunov": lyapunov,
@@ -211,6 +212,22 @@ class Recorder:
             arrays["past"] = np.array([np.frombuffer(s.saved(), dtype=np.uint8) for s in self.finder.past])
         Checkpoint(self.identity, arrays).save(path)
         self._saved = time.monotonic()
+
+    def means(self) -> dict[str, tuple[float, float]]:
+        """The means of coordinates and energy over all members after the steps made, with their statistical errors.
+
+        The first member is the trajectory of the session itself. Raises `StepError`.
+        """
+        run, parameters, names = self.experiment.run, self.experiment.parameters, self.solver.interface
+        t0 = self.experiment.t0 if names.time else None
+        starts = np.tile(np.array(self.experiment.initial), (run.members, 1))
+        steps = self.session.steps
+        x = self.solver.ensemble(starts, self.experiment.h, steps, t0=t0, seed=run.seed, parameters=parameters)
+        energy = self.solver.energies(x, np.full(len(x), self.time), parameters)
+        columns = np.column_stack([x, energy])
+        errors = columns.std(axis=0, ddof=1) / np.sqrt(len(x))
+        pairs = zip(columns.mean(axis=0).tolist(), errors.tolist(), strict=True)
+        return dict(zip([*names.coordinates, "energy"], pairs, strict=True))
 
     def finish(self, keep: bool) -> None:
         """Complete the files; ``keep`` what is needed to go on."""

@@ -66,7 +66,8 @@ def _integrated(
     recorder = Recorder(compilation, solver, experiment, Files(), lyapunov)
     failure = _recorded(recorder, console)
     methods, summaries = {recorder.label: recorder.trajectory(failure is not None)}, [recorder.watch.summary()]
-    for method in (run.compare or COMPARED) if failure is None else ():
+    beside = () if compilation.system.noise else run.compare or COMPARED
+    for method in beside if failure is None else ():
         watch, methods[method] = compared(compilation, solver, experiment, method, console, recorder.time)
         summaries.append(watch.summary())
     opening = _opening(compilation, solver, experiment, list(methods)[1:2], console) if failure is None else {}

@@ -34,6 +34,8 @@ def studied(
     from phigen.runtime import toolchain
     from phigen.study import precision, race
 
+    if compilation.system.noise:
+        return None, "Errors against step and time are not measured with noise; the strong order is above."
     run, x0 = experiment.run, np.array(experiment.initial)
     methods = list(dict.fromkeys([*(run.compare or COMPARED), "dop853"]))
     console.note(f"{compilation.spec.name}: measuring errors and times")

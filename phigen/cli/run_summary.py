@@ -30,12 +30,14 @@ def print_summary(compilation: Compilation, recorder: Recorder, summaries: Seque
     state = recorder.session.state().tolist()
     final = ", ".join(f"{c} = {v:.9g}" for c, v in zip(solver.coordinates, state, strict=True))
     out(f"  final state: {final}\n")
-    for line in table(_rows(summaries, driven=compilation.system.driven), right=range(1, len(summaries) + 1)):
+    for line in table(_rows(summaries), right=range(1, len(summaries) + 1)):
         out(f"  {line}")
     out(f"  {stated(summaries[0].units)}")
-    if compilation.system.driven:
+    if summaries[0].is_balance:
         power = "∂H/∂t" if not compilation.system.forces else "(∂H/∂t + the power of the forces)"
         out(f"  The energy balance is H − ∫ {power} dt, integrated along the stored states by a rule of order 8.")
+    if recorder.experiment.run.members > 1:
+        _print_means(recorder)
     if recorder.finder:
         kind = "crossing" if run.direction == "both" else f"{run.direction} crossing"
         count = counted(recorder.points.seen, kind)
@@ -46,15 +48,17 @@ def print_summary(compilation: Compilation, recorder: Recorder, summaries: Seque
         out(f"  {', '.join(f'{value:.4g}' for value in spectrum.exponents.tolist())};  sum {spectrum.total:.1g}")
 
 
-def _rows(summaries: Sequence[Summary], *, driven: bool) -> list[list[str]]:
+def _rows(summaries: Sequence[Summary]) -> list[list[str]]:
     first = summaries[0]
+    driven = first.is_balance
     rows = [["largest error", *(s.method for s in summaries), ""]]
-    energy = "energy balance" if driven else "energy"
+    noisy = first.energy.unit.moves and not driven
+    energy = "energy balance" if driven else "change of the energy" if noisy else "energy"
     rows.append([energy, *(_shown(s.energy) for s in summaries), first.energy.unit.kind])
     if driven:
         rows.append(["  the integral, work done", *(f"{s.work:.4g}" for s in summaries), ""])
         rows.append(["  its integral may be off by", *(f"{s.off:.1e}" for s in summaries), ""])
-    if any(math.isfinite(s.energy.growth) for s in summaries):
+    if any(math.isfinite(s.energy.growth) for s in summaries) and not noisy:
         growth = [f"{s.energy.growth:.3g}" if math.isfinite(s.energy.growth) else "–" for s in summaries]
         rows.append(["  last tenth/first", *growth, "1 is no drift"])
     for kind, noun in (("casimirs", "Casimir"), ("invariants", "invariant")):
@@ -66,6 +70,14 @@ def _rows(summaries: Sequence[Summary], *, driven: bool) -> list[list[str]]:
     if any(s.good < s.rows for s in summaries):
         rows.append(["finite rows", *(f"{s.good} of {s.rows}" for s in summaries), ""])
     return rows
+
+
+def _print_means(recorder: Recorder) -> None:
+    """The means over all members where the run ended, with their statistical errors."""
+    run, found = recorder.experiment.run, recorder.means()
+    out(f"\n  means over {run.members} members at t = {recorder.time:.9g}")
+    for line in table([[name, f"{mean:.6g}", f"± {error:.1g}"] for name, (mean, error) in found.items()], right=[1]):
+        out(f"  {line}")
 
 
 def _shown(drift: Drift) -> str:
@@ -94,6 +106,10 @@ def described_run(compilation: Compilation, recorder: Recorder, summaries: Seque
         "final": dict(zip(solver.coordinates, session.state().tolist(), strict=True)),
         "methods": [asdict(s) for s in summaries],
     }
+    if solver.interface.noise:
+        told |= {"seed": experiment.run.seed, "members": experiment.run.members}
+        if experiment.run.members > 1:
+            told["means"] = {name: {"mean": m, "error": e} for name, (m, e) in recorder.means().items()}
     if recorder.finder:
         told["section"] = {"expression": recorder.section_text, "crossings": recorder.points.seen}
     if spectrum := recorder.spectrum:

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from phigen.compilation import Compilation
     from phigen.geometry.system import System
     from phigen.spec.model import Spec
+    from phigen.symbolic.expression import Expression
 
 
 @click.command("show")
@@ -107,6 +108,8 @@ def _print(compilation: Compilation, modified: int, most: int | None) -> None:
     section("Hamiltonian", assignments([("H", readable_one(system.hamiltonian, most))]))
     if system.forces:
         section("Forces: ẋ = π(∇H + ζ) + f", assignments(_forces(system, most)))
+    if system.noise:
+        section("Noise: dx = … + Σ σ π∇g ∘ dW", assignments(_noise(system, most)))
     if system.casimirs:
         section("Casimirs", assignments(_named(system.casimirs, most)))
     if system.invariants:
@@ -118,6 +121,14 @@ def _print(compilation: Compilation, modified: int, most: int | None) -> None:
     if corrected:
         section("Modified Hamiltonian", assignments(corrected))
     section("Generated code", _code(compilation))
+
+
+def _noise(system: System, most: int | None) -> list[tuple[str, str]]:
+    """σ and g of each source."""
+    listed: dict[str, Expression] = {}
+    for source in system.noise:
+        listed |= {f"σ_{source.name}": source.amplitude, f"g_{source.name}": source.hamiltonian}
+    return _named(listed, most)
 
 
 def _forces(system: System, most: int | None) -> list[tuple[str, str]]:

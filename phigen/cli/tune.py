@@ -68,6 +68,9 @@ def command(
 
         require_matplotlib()
     spec = load_one(spec_file)
+    if spec.noise:
+        message = "phigen tune does not compare settings where there is noise"
+        raise SpecError([spec.diagnostic(("noise",), message, "phigen verify and phigen run measure what is chosen")])
     if spec.time:
         message = "phigen tune does not compare settings where H depends on the time"
         raise SpecError([spec.diagnostic(("time",), message, "phigen verify and phigen run measure what is chosen")])

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 from phigen.geometry.jacobi import jacobi_identity
 from phigen.geometry.rank import ATTEMPTS, POINTS, generic_ranks
 from phigen.geometry.system import System, hamiltonian_vector_field
-from phigen.symbolic.expression import gradient, total
+from phigen.symbolic.expression import Expression, gradient, number, substitute, symbols_of, total
 from phigen.symbolic.readable import shortened
-from phigen.symbolic.verdict import CHECKED, PROVED, UNDECIDED, Statement, decide_zero
+from phigen.symbolic.tower import Tower
+from phigen.symbolic.verdict import CHECKED, PROVED, REFUTED, UNDECIDED, Statement, decide_zero, sample_point
 
 
 def check(system: System) -> list[Statement]:
@@ -67,6 +68,75 @@ def force_statements(system: System) -> Iterator[Statement]:
         bracket = hamiltonian_vector_field(system.poisson, flow)
         work = total(s * b for s, b in zip(slope, bracket, strict=True)) + total(f * f for f in flow)
         yield decide_zero("the damping changes H at the rate -λ |π∇H|²", [("", work)], system.positive)
+
+
+def noise_statements(system: System) -> Iterator[Statement]:
+    """Whether the sources of noise commute, which decides the strong order; what density is stationary."""
+    if not system.noise:
+        return
+    commute = _commutation(system)
+    unlike = "the sources of noise do not commute, hence strong order 1/2"
+    yield commute if commute.verdict != REFUTED else Statement(unlike, PROVED)
+    fields = [hamiltonian_vector_field(system.poisson, s.impulse(system.coordinates)) for s in system.noise]
+    if system.forces is None or system.time:
+        return
+    slope = gradient(system.hamiltonian, system.coordinates)
+    rates = [total(a * b for a, b in zip(slope, field, strict=True)) for field in fields]
+    spread = [total(r * e for r, e in zip(rates, entries, strict=True)) for entries in zip(*fields, strict=True)]
+    tangent = hamiltonian_vector_field(system.poisson, system.forces.covector)
+    drawn = [a + b for a, b in zip(tangent, system.forces.vector, strict=True)]
+    temperature = _temperature(system, slope, drawn, spread)
+    if temperature is None:
+        return
+    residuals = [(c, 2 * temperature * a + b) for c, a, b in zip(system.coordinates, drawn, spread, strict=True)]
+    name = f"the density exp(−H/θ) on the leaves is stationary, with θ = {shortened(temperature)}"
+    balanced = decide_zero(name, residuals, system.positive)
+    if balanced.holds:
+        yield balanced
+
+
+def commuting(system: System) -> bool:
+    """Whether the flows of all sources of noise commute, as far as phigen can tell."""
+    return _commutation(system).holds
+
+
+def _commutation(system: System) -> Statement:
+    count = len(system.noise)
+    brackets = [_noise_bracket(system, i, j) for i in range(count) for j in range(i)]
+    return decide_zero("the sources of noise commute, hence strong order 1", brackets, system.positive)
+
+
+def _noise_bracket(system: System, i: int, j: int) -> tuple[str, Expression]:
+    """Where the flows of two sources do not commute: π∇{g_i, g_j}, as the sum of the squares of its components."""
+    first, second = system.noise[i], system.noise[j]
+    field = hamiltonian_vector_field(system.poisson, second.impulse(system.coordinates))
+    bracket = total(a * b for a, b in zip(first.impulse(system.coordinates), field, strict=True))
+    moved = hamiltonian_vector_field(system.poisson, gradient(bracket, system.coordinates))
+    return f"{{{first.name}, {second.name}}}", total(m * m for m in moved)
+
+
+def _temperature(
+    system: System, slope: Sequence[Expression], drawn: Sequence[Expression], spread: Sequence[Expression]
+) -> Expression | None:
+    """The T for which 2T (πζ + f) + Σ σ² (XH) X has no part along ∇H at some point; None if there is none."""
+    lost = total(a * b for a, b in zip(slope, drawn, strict=True))
+    gained = total(a * b for a, b in zip(slope, spread, strict=True))
+    for k in range(ATTEMPTS):
+        point = {c: number(v) for c, v in sample_point(system.coordinates, (), k).items()}
+        down, up = substitute([lost, gained], point)
+        if not (down.is_zero or up.is_zero):
+            return _ratio(-up, 2 * down)
+    return None
+
+
+def _ratio(above: Expression, below: Expression) -> Expression:
+    """A quotient with common factors cancelled."""
+    for _ in range(2):  # squares of roots are seen for what they are in the second ring
+        tower = Tower(symbols_of(above, below), [above, below])
+        a, b = (tower.simplified(e) for e in tower.convert_all([above, below]))
+        common = a.gcd(b)
+        above, below = tower.expression(a / common), tower.expression(b / common)
+    return above / below
 
 
 def rank_statement(system: System) -> Statement:

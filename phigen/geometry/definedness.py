@@ -30,6 +30,7 @@ def undefined_parts(system: System, starts: Sequence[Point]) -> Iterator[Stateme
     parts: dict[str, Sequence[Expression]] = {"H": [system.hamiltonian]}
     if system.forces:
         parts["the force"] = [*system.forces.covector, *system.forces.vector]
+    parts |= {f"the noise {s.name}": [s.hamiltonian, s.amplitude] for s in system.noise}
     parts["π"] = [e for row in system.poisson for e in row]
     parts |= {name: [e] for name, e in (*system.casimirs.items(), *system.invariants.items())}
     for name, roots in parts.items():

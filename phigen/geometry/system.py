@@ -12,9 +12,11 @@ from phigen.geometry.casimirs import found_casimirs
 from phigen.geometry.forces import Forces, forces_of
 from phigen.geometry.forms import structure
 from phigen.geometry.lie_algebra import LieAlgebra
+from phigen.geometry.noise import Source, sources_of
 from phigen.geometry.shapes import LiePoisson, Matrix, Shape
-from phigen.spec.model import Parameter, PoissonForm, Spec, SpecForces
+from phigen.spec.model import Parameter, PoissonForm, Spec, SpecForces, SpecNoise
 from phigen.symbolic.expression import ZERO, Expression, gradient, text, total
+from phigen.symbolic.symbols import increment
 
 if TYPE_CHECKING:
     from phigen.geometry.sympy_bridge import SympySystem
@@ -25,7 +27,7 @@ _SHOWN = 60
 
 @dataclass(frozen=True, repr=False)
 class System:
-    """ẋ = π(x)∇H(x), or ẋ = π(x)∇H(t, x), or with ``forces`` beside that.
+    """ẋ = π(x)∇H(x), or ẋ = π(x)∇H(t, x), or with ``forces`` and sources of ``noise`` beside that.
 
     ``poisson`` is the n×n matrix π_ij = {x_i, x_j}; expressions use the coordinates and parameters as
     symbols. ``casimirs`` holds the declared ones first, in the order of the spec, then the found ones
@@ -46,6 +48,7 @@ class System:
     form: PoissonForm
     time: str = ""
     forces: Forces | None = None
+    noise: tuple[Source, ...] = ()
     declared: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
     locations: Mapping[tuple[Any, ...], Location] = field(default_factory=dict)
@@ -72,9 +75,14 @@ class System:
         return (self.time,) if self.time else ()
 
     @property
+    def increments(self) -> tuple[str, ...]:
+        """The symbols of the increments of the noise in a step, one for each source."""
+        return tuple(increment(k) for k in range(len(self.noise)))
+
+    @property
     def driven(self) -> bool:
-        """Whether H is no invariant: it depends on the time, or forces do work."""
-        return bool(self.time) or self.forces is not None
+        """Whether H is no invariant: it depends on the time, or forces or noise do work."""
+        return bool(self.time) or self.forces is not None or bool(self.noise)
 
     @property
     def frozen(self) -> System:
@@ -184,6 +192,7 @@ def system_from_spec(spec: Spec) -> System:
         locations=spec.locations,
         time=spec.time,
         forces=spec.forces,
+        noise=spec.noise,
     )
     return replace(system, spec=spec)
 
@@ -207,6 +216,7 @@ def build_system(
     locations: Mapping[tuple[Any, ...], Location] | None = None,
     time: str = "",
     forces: SpecForces | None = None,
+    noise: Mapping[str, SpecNoise] | None = None,
 ) -> System:
     """A `System` from its parts; see `system_from_spec`."""
     locations = locations or {}
@@ -232,6 +242,7 @@ def build_system(
         form,
         time,
         acting,
+        sources_of(noise or {}),
         tuple(declared),
         notes,
         locations,

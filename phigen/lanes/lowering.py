@@ -101,6 +101,8 @@ def in_lanes(program: Program) -> Lanes | None:
         return _rows(program, program.step)
     if not (program.lanes and program.offers("lanes")):
         return None
+    if program.noise:
+        return None  # every step has coefficients of its own, and guesses from earlier steps miss it
     if program.time and (program.monitor or not isinstance(program.step, Implicit)):
         return None  # members in packs would share coefficients that differ from step to step
     match program.step:

@@ -15,8 +15,9 @@ def method(compilation: Compilation) -> str:
     """``order 6 from S_1 … S_5, symmetric: the even terms vanish``."""
     plan, stage = compilation.order, compilation.stage
     terms = "S_1" if stage.terms == 1 else f"S_1 … S_{stage.terms}"
-    if compilation.system.forces:
-        terms += " with p = ∇S_h + hζ"
+    system = compilation.system
+    pushes = [" + hζ"] * (system.forces is not None) + [" + Σ ΔW σ∇g"] * bool(system.noise)
+    terms += f" with p = ∇S_h{''.join(pushes)}" if pushes else ""
     if stage is not plan:
         return f"order {plan.order}, composed of {len(compilation.program.fractions)} stages of order 2 from {terms}"
     why = "symmetric, so the terms of even index vanish" if compilation.symmetric else "not symmetric"
@@ -30,7 +31,8 @@ def series_formulas(compilation: Compilation, most: int | None) -> tuple[list[tu
     The map of step h is the flow of H − h^p S_{p+1} + …, where p is the order and S the untruncated series.
     """
     plan = compilation.stage
-    more = compilation.system.forces is None and plan is compilation.order and plan.order <= _MODIFIED_UP_TO
+    pushed = compilation.system.forces or compilation.system.noise
+    more = not pushed and plan is compilation.order and plan.order <= _MODIFIED_UP_TO
     series = compilation.series.polynomial(plan.order + 1 if more else plan.terms)
     listed = [(i, of_polynomial(series.tower, s, most)) for i, s in enumerate(series.terms[: plan.terms], 1) if s != 0]
     return listed, of_polynomial(series.tower, -series.terms[plan.order], most) if more else None

@@ -26,7 +26,7 @@ from phigen.series.reference import Source, closed_form, generating_function
 from phigen.series.reference_axioms import defects
 from phigen.series.reference_functions import Functions, Sign, derivative
 from phigen.series.reference_paths import source_of_paths
-from phigen.symbolic.expression import Expression
+from phigen.symbolic.expression import Expression, symbol
 from phigen.symbolic.verdict import CHECKED, POINTS, PROVED, REFUTED, UNDECIDED, Statement, sample_point
 
 #: The time that the second derivation of one spec may take, unless the user says otherwise.
@@ -204,11 +204,23 @@ class _Derivation:
         start = time.perf_counter()
         slope = scheme.generating.coefficients.written_out(scheme.generating.slope)
         pairs: list[Pair] = []
+        pushes = self._pushes()
         for c, theirs in zip(self._dictionary.coordinates, slope, strict=True):
             terms = (h**i * derivative(s, c) for i, s in enumerate(self._found[: scheme.terms], 1))
-            pairs.append((f"along {c}", self._dictionary.expression(theirs), sum(terms)))
+            pairs.append((f"along {c}", self._dictionary.expression(theirs), sum(terms) + pushes[c]))
         statement = decide(GRADIENT, pairs, self._positive, f"as the program has it: {scheme.generating.form}")
         return Comparison(statement, None, time.perf_counter() - start)
+
+    def _pushes(self) -> dict[Any, Any]:
+        """What p is beside ∇S_h, by coordinate: hζ of forces, ΔW σ∇g of noise."""
+        system, own = self._compilation.system, self._dictionary
+        pushes = dict.fromkeys(own.coordinates, sympy.Integer(0))
+        for c, zeta in zip(own.coordinates, system.forces.covector if system.forces else (), strict=False):
+            pushes[c] += own.step * own.expression(zeta)
+        for source, name in zip(system.noise, system.increments, strict=True):
+            g, dw = own.expression(source.hamiltonian), own.expression(symbol(name) * source.amplitude)
+            pushes = {c: push + dw * derivative(g, c) for c, push in pushes.items()}
+        return pushes
 
     def _are_ends(self) -> bool:
         chart, choice = self._compilation.chart, self._compilation.spec.birealisation

@@ -27,6 +27,7 @@ Groups = Mapping[str, tuple[Statement, ...]]
 
 PREFIX = "bi-realisation: "
 DEFINEDNESS, CASIMIRS, FORCES, INVARIANTS = "Definedness", "Casimirs", "Forces", "Invariants"
+NOISE = "Noise"
 MONITOR = "Monitor"
 METHOD, SPLITTING, ATTITUDE = "Bi-realisation", "Splitting", "Attitude"
 
@@ -64,7 +65,8 @@ def integrals(system: System) -> dict[str, tuple[Statement, ...]]:
     casimirs = (*checks.casimir_statements(system), checks.rank_statement(system))
     invariants = tuple(checks.invariant_statements(system))
     forces = tuple(checks.force_statements(system))
-    found = {CASIMIRS: casimirs} | ({FORCES: forces} if forces else {})
+    noise = tuple(checks.noise_statements(system))
+    found = {CASIMIRS: casimirs} | ({FORCES: forces} if forces else {}) | ({NOISE: noise} if noise else {})
     return found | ({INVARIANTS: invariants} if invariants else {})
 
 

@@ -12,11 +12,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from phigen.runtime.interface import Floats, Interface
+from phigen.runtime.interface import FIRST_DRAWS, Draws, Floats, Interface
 from phigen.runtime.members import Members
 
 #: What counts of steps have to fit into.
-_MOST = np.iinfo(np.int64).max
+_MOST = int(np.iinfo(np.int64).max)
+
+#: The same of what chooses random numbers.
+_LARGEST = {"seed": 2**64 - 1, "member": 2**32 - 1, "step0": _MOST}
 
 
 def step_size(h: float) -> float:
@@ -35,16 +38,16 @@ def end(until: float, begin: float, h: float) -> float:
     return span
 
 
-def count(value: int, what: str, minimum: int) -> int:
-    """An integer from ``minimum`` on."""
+def count(value: int, what: str, minimum: int, most: int = _MOST) -> int:
+    """An integer from ``minimum`` to ``most``."""
     try:
         number = operator.index(value)
     except TypeError:
         raise TypeError(f"{what} must be an integer, not {_shown(value)}") from None
     if number < minimum:
         raise ValueError(f"{what} must be at least {minimum}, not {_shown(number)}")
-    if number > _MOST:
-        raise ValueError(f"{what} must be at most {_MOST}, not {_shown(number)}")
+    if number > most:
+        raise ValueError(f"{what} must be at most {most}, not {_shown(number)}")
     return number
 
 
@@ -56,6 +59,40 @@ def start_time(t0: float | None, interface: Interface, more: dict[str, float]) -
         raise TypeError(f"t0 was given, but the Hamiltonian of {interface.name} does not depend on the time")
     more["t0"] = t0
     return 0.0
+
+
+def draws(
+    interface: Interface, more: dict[str, Any], *, seed: int | None, member: int | None = None, step0: int | None = None
+) -> Draws:
+    """The random numbers of the noise; without noise these names may be those of parameters, which join ``more``."""
+    named = {"seed": seed, "member": member, "step0": step0}
+    given = {name: value for name, value in named.items() if value is not None}
+    if interface.noise:
+        numbers = {name: count(value, name, 0, _LARGEST[name]) for name, value in given.items()}
+        return Draws(numbers.get("seed", 0), numbers.get("member", 0), numbers.get("step0", 0))
+    for name in given:
+        if name not in interface.parameters:
+            raise TypeError(f"{name} was given, but {interface.name} has no noise")
+    more |= given
+    return Draws()
+
+
+def increments(given: ArrayLike, interface: Interface) -> Floats:
+    """The increments of the noise in some steps (steps, draws)."""
+    if not interface.noise:
+        raise TypeError(f"increments were given, but {interface.name} has no noise")
+    found = np.array(given, dtype=np.float64)
+    if found.ndim != 2 or found.shape[1] != interface.draws:
+        raise ValueError(f"increments must have shape (steps, {interface.draws}), not {found.shape}")
+    if not np.isfinite(found).all():
+        raise ValueError("increments must be finite")
+    return found
+
+
+def expect_no_noise(what: str, interface: Interface) -> None:
+    """`TypeError` for what makes steps in parts, which have other random numbers than the whole."""
+    if interface.noise:
+        raise TypeError(f"{what} is not offered with noise: parts of a step are not on the same path")
 
 
 def times(t: ArrayLike | None, interface: Interface, shape: tuple[int, ...], more: dict[str, Any]) -> Floats | None:
@@ -115,6 +152,7 @@ def ensemble(
     given: Mapping[str, ArrayLike] | None,
     more: Mapping[str, ArrayLike],
     interface: Interface,
+    draws: Draws = FIRST_DRAWS,
 ) -> Members:
     """The members of an ensemble, by what `Solver.ensemble` is given."""
     own: dict[str, Any] = {name: v for name, v in {**(given or {}), **more}.items() if np.ndim(v) > 0}
@@ -144,7 +182,10 @@ def ensemble(
     if not size.all():
         raise ValueError("the step size h must not be 0")
     stride = 0 if stride is None else count(stride, "stride", 1)
-    return Members(start, size, count(steps, "steps", 0), values, begin, stride)
+    paths = draws.member + np.arange(len(start))
+    if len(paths) and paths[-1] > _LARGEST["member"]:
+        raise ValueError(f"member must be at most {_LARGEST['member'] + 1 - len(paths)} for {len(paths)} members")
+    return Members(start, size, count(steps, "steps", 0), values, begin, stride, draws, paths)
 
 
 def states(x: ArrayLike, what: str, interface: Interface) -> Floats:

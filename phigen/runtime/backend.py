@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Protocol
 
-from phigen.runtime.interface import Floats
+from phigen.runtime.interface import FIRST_DRAWS, Draws, Floats
 from phigen.runtime.members import Members
 from phigen.runtime.session import Session
 
@@ -26,9 +26,17 @@ class Backend(Protocol):
         ...
 
     def start(
-        self, x0: Floats, parameters: Mapping[str, float], t0: float = 0.0, first: Floats | None = None
+        self,
+        x0: Floats,
+        parameters: Mapping[str, float],
+        t0: float = 0.0,
+        first: Floats | None = None,
+        draws: Draws = FIRST_DRAWS,
     ) -> Session:
-        """A session at x0 (DIM,), with an attitude and position ``first`` (numbers,); None for the identity."""
+        """A session at x0 (DIM,), with an attitude and position ``first`` (numbers,); None for the identity.
+
+        ``draws`` are the random numbers of its noise.
+        """
         ...
 
     def restored(self, saved: bytes, parameters: Mapping[str, float]) -> Session:
@@ -69,6 +77,10 @@ class Backend(Protocol):
 
     def vector_field(self, x: Floats, parameters: Mapping[str, float], t: Floats | None = None) -> Floats:
         """π∇H at the states (rows, DIM), the same shape."""
+        ...
+
+    def noise_fields(self, x: Floats, parameters: Mapping[str, float], t: Floats | None = None) -> Floats:
+        """σπ∇g of each source of noise at the states (rows, DIM), shape (rows, sources, DIM)."""
         ...
 
     def rate(self, x: Floats, parameters: Mapping[str, float]) -> Floats:

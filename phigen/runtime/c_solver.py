@@ -21,7 +21,9 @@ from phigen.runtime import cache
 from phigen.runtime.c_lattice import CLattice
 from phigen.runtime.gradients import KEPT, Segment, segments
 from phigen.runtime.interface import (
+    FIRST_DRAWS,
     BackendError,
+    Draws,
     Floats,
     Interface,
     LatticeInterface,
@@ -56,6 +58,13 @@ _TIMED = {
     "vector_field": (None, (_POINTER, _DOUBLE, _POINTER, _POINTER)),
 }
 
+# Where there is noise.
+_WORD, _LONG = ctypes.c_uint32, ctypes.c_uint64
+_NOISY = {
+    "set_noise": (_INT, (_POINTER, _LONG, _WORD, _LONG)),
+    "integrate_along": (_INT, (_POINTER, _DOUBLE, _SIZE, _POINTER)),
+}
+
 # What is there only if it was asked for, or not left out.
 _EXTRAS = {
     "ensemble": (_INT, (_POINTER, _POINTER, _SIZE, _DOUBLE, _SIZE, _POINTER)),
@@ -70,6 +79,8 @@ _EXTRAS = {
     "solver_time": (_DOUBLE, (_POINTER,)),
     "monitor": (_DOUBLE, (_POINTER, _POINTER)),
     "attitude": (None, (_POINTER, _POINTER)),
+    "noise_fields": (None, (_POINTER, _POINTER, _POINTER)),
+    "ensemble_of": (_INT, (_POINTER, _POINTER, _SIZE, _DOUBLE, _SIZE, _LONG, _WORD, _LONG, _POINTER)),
     "set_attitude": (_INT, (_POINTER, _POINTER, _POINTER)),
 }
 
@@ -111,6 +122,13 @@ class CSession:
             if status:
                 raise BackendError(status_name(status), self.steps, self._x.reshape(1, -1).copy())
             steps -= chunk
+
+    def advance_along(self, h: float, increments: Floats) -> None:
+        """See `Session`."""
+        given = np.ascontiguousarray(increments, dtype=np.float64)
+        status = self._c.integrate_along(self.address, h, len(given), given.ctypes.data)
+        if status:
+            raise BackendError(status_name(status), self.steps, self._x.reshape(1, -1).copy())
 
     def advance_tangent(self, h: float) -> Floats:
         """See `Session`."""
@@ -181,12 +199,13 @@ class CSolver:
         self._files, self._library, self._gauge = dict(files), cache.load(files), gauge
         self._c: Any = SimpleNamespace()
         offered = {name: s for name, s in _EXTRAS.items() if hasattr(self._library, f"{interface.name}_{name}")}
+        own = _dated(offered, interface) | (_NOISY if interface.noise else {})
         timed = _TIMED if interface.time else {}
         if interface.time or "init_gauge" in offered:  # times, or a gauge of each
             _, each = _EXTRAS["ensemble_each"]
             offered |= {"ensemble_each": (_INT, (*each[:3], _POINTER, *each[3:]))} if "ensemble_each" in offered else {}
         monitored = {"pullback": (_INT, (*_EXTRAS["pullback"][1], _POINTER))} if "level_bar" in offered else {}
-        for name, (result, arguments) in {**_SIGNATURES, **timed, **offered, **monitored}.items():
+        for name, (result, arguments) in {**_SIGNATURES, **offered, **timed, **monitored, **own}.items():
             function = getattr(self._library, f"{interface.name}_{name}", None)
             if function is None:
                 raise ToolchainError(
@@ -209,7 +228,12 @@ class CSolver:
         return cache.key_of(self._library)
 
     def start(
-        self, x0: Floats, parameters: Mapping[str, float], t0: float = 0.0, first: Floats | None = None
+        self,
+        x0: Floats,
+        parameters: Mapping[str, float],
+        t0: float = 0.0,
+        first: Floats | None = None,
+        draws: Draws = FIRST_DRAWS,
     ) -> CSession:
         """See `phigen.runtime.backend.Backend`."""
         interface = self.interface
@@ -226,6 +250,8 @@ class CSolver:
             given = np.ascontiguousarray(first, dtype=np.float64)
             place = given[math.prod(interface.attitude) :].ctypes.data if interface.position else None
             status = self._c.set_attitude(session.address, given.ctypes.data, place)
+        if status == 0 and interface.noise:
+            status = self._c.set_noise(session.address, draws.seed, draws.member, draws.step)
         if status:
             raise BackendError(status_name(status), 0, start.reshape(1, -1))
         return session
@@ -250,7 +276,7 @@ class CSolver:
         def make(part: slice) -> None:
             x = np.array(members.x0[part].T, order="C")  # x[DIM][members]
             if alike:
-                self._alike(members, x, status[part])
+                self._alike(members.part(part), x, status[part])
             else:
                 rows = None if frames is None else frames[1:, part]
                 self._each(members.part(part), x, status[part], rows)
@@ -267,7 +293,11 @@ class CSolver:
         h, parameters, t0 = members.numbers(0)
         packed = self._packed(parameters)
         given, rest = (packed.ctypes.data, x.ctypes.data, x.shape[1]), (h, members.steps, status.ctypes.data)
-        if self.interface.time:
+        begin = (t0,) if self.interface.time else ()
+        if self.interface.noise:
+            draws = members.draws.seed, int(members.paths[0]), members.draws.step
+            self._c.ensemble_of(*given, *begin, *rest[:2], *draws, rest[2])
+        elif begin:
             self._c.ensemble_at(*given, t0, *rest)
         else:
             self._c.ensemble(*given, *rest)
@@ -365,6 +395,11 @@ class CSolver:
         """See `phigen.runtime.backend.Backend`."""
         return self._fill(self._c.vector_field, x, np.empty_like(x, order="C"), parameters, t)
 
+    def noise_fields(self, x: Floats, parameters: Mapping[str, float], t: Floats | None = None) -> Floats:
+        """See `phigen.runtime.backend.Backend`."""
+        out = np.empty((len(x), len(self.interface.noise), x.shape[1]))
+        return self._fill(self._c.noise_fields, x, out, parameters, t)
+
     def rate(self, x: Floats, parameters: Mapping[str, float]) -> Floats:
         """See `phigen.runtime.backend.Backend`."""
         packed, x = self._packed(parameters), np.ascontiguousarray(x)
@@ -383,6 +418,13 @@ class CSolver:
         return np.array(list(parameters.values()) or [0.0], dtype=np.float64)
 
 
+def _dated(offered: Mapping[str, Any], interface: Interface) -> dict[str, tuple[Any, tuple[Any, ...]]]:
+    """The signatures of noise with the time among their arguments, where there is one."""
+    places = {"noise_fields": 1, "ensemble_of": 3} if interface.time else {}
+    found = {name: (offered[name], at) for name, at in places.items() if name in offered}
+    return {name: (result, (*a[:at], _DOUBLE, *a[at:])) for name, ((result, a), at) in found.items()}
+
+
 def _times(t: Floats | None) -> list[list[float]]:
     """The times of rows, as the first of their arguments; none where there is no time."""
     return [] if t is None else [t.tolist()]
@@ -390,7 +432,7 @@ def _times(t: Floats | None) -> list[list[float]]:
 
 def _addresses(x: Floats) -> range:
     """The addresses of the rows of a contiguous array."""
-    start, width = x.ctypes.data, x.shape[1] * x.itemsize
+    start, width = x.ctypes.data, math.prod(x.shape[1:]) * x.itemsize
     return range(start, start + len(x) * width, width)
 
 

@@ -26,6 +26,19 @@ def status_name(value: int) -> str:
 
 
 @dataclass(frozen=True)
+class Draws:
+    """Which random numbers a trajectory takes: those of a ``seed`` and a ``member``, from those of a ``step`` on."""
+
+    seed: int = 0
+    member: int = 0
+    step: int = 0
+
+
+#: Where nothing else is asked for.
+FIRST_DRAWS = Draws()
+
+
+@dataclass(frozen=True)
 class Interface:
     """The names a generated solver speaks of, all in the order of declaration."""
 
@@ -40,6 +53,8 @@ class Interface:
     monitored: bool = False  # whether steps are equal in τ, not in t
     attitude: tuple[int, ...] = ()  # the shape of an attitude, if there is one
     position: bool = False  # whether there is a position too
+    noise: tuple[str, ...] = ()  # the sources
+    draws: int = 0  # the increments of the noise in a step
 
     @property
     def dimension(self) -> int:

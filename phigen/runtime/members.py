@@ -5,13 +5,13 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, TypeVar
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from phigen.runtime.interface import BackendError, Floats, row_steps
+from phigen.runtime.interface import FIRST_DRAWS, BackendError, Draws, Floats, row_steps
 
 if TYPE_CHECKING:
     from phigen.runtime.backend import Backend
@@ -33,7 +33,8 @@ _MOST, _STEPS = 1024, 1 << 16
 class Members:
     """An ensemble: initial states (members, DIM), and numbers of shape (), the same for all, or (members,).
 
-    With a ``stride`` the states after every so many steps are asked for, else the final ones.
+    ``paths`` are the members whose random numbers they take (members,), with the seed and the step of ``draws``. With a
+    ``stride`` the states after every so many steps are asked for, else the final ones.
     """
 
     x0: Floats
@@ -42,6 +43,8 @@ class Members:
     parameters: Mapping[str, Floats]
     t0: Floats
     stride: int = 0
+    draws: Draws = FIRST_DRAWS
+    paths: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
 
     def __len__(self) -> int:
         return len(self.x0)
@@ -58,7 +61,13 @@ class Members:
             return value[chosen] if np.ndim(value) else value
 
         parameters = {name: own(value) for name, value in self.parameters.items()}
-        return replace(self, x0=self.x0[chosen], h=own(self.h), parameters=parameters, t0=own(self.t0))
+        numbers: dict[str, Any] = {
+            "h": own(self.h),
+            "parameters": parameters,
+            "t0": own(self.t0),
+            "paths": self.paths[chosen],
+        }
+        return replace(self, x0=self.x0[chosen], **numbers)
 
     def numbers(self, m: int) -> tuple[float, dict[str, float], float]:
         """The step, the parameters and the time of the start of one member."""
@@ -130,7 +139,8 @@ def one_by_one(backend: Backend, members: Members) -> Floats:
         if frames is not None:
             frames[1:, m] = np.nan
         try:
-            session = backend.start(x, parameters, t0)
+            draws = replace(members.draws, member=int(members.paths[m])) if len(members.paths) else members.draws
+            session = backend.start(x, parameters, t0, draws=draws)
             for row, steps in enumerate(np.diff(marks), 1):
                 session.advance(h, int(steps))
                 if frames is not None:

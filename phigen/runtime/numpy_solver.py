@@ -14,7 +14,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from phigen.runtime.interface import (
+    FIRST_DRAWS,
     BackendError,
+    Draws,
     Floats,
     Interface,
     LatticeInterface,
@@ -66,12 +68,13 @@ class NumpySession:
         carry: Floats,
         gauge: Floats | None,
         t0: float = 0.0,
+        draws: Draws = FIRST_DRAWS,
     ) -> None:
-        self.steps = 0
+        self.steps, self._draws = 0, draws
         # The time and the steps when the size of the step was set: the time is counted from there, without adding up.
         self._t, self._counted = t0, 0
         self._module, self._parameters, self._gauge = module, parameters, gauge
-        self._timed = hasattr(module, "_renewed")
+        self._renewed = hasattr(module, "_renewed")
         self._x, self._carry = x, carry
         self._passed = (np.zeros(len(x)),) * 2  # physical time, where steps are equal in tau, and its carry
         self._h = np.nan
@@ -141,6 +144,13 @@ class NumpySession:
             for _ in range(steps):
                 self._commit(*self._tried())
 
+    def advance_along(self, h: float, increments: Floats) -> None:
+        """See `Session`."""
+        self._prepare(h)
+        with np.errstate(all="ignore"):
+            for row in increments:
+                self._commit(*self._tried(row))
+
     def advance_tangent(self, h: float) -> Floats:
         """See `Session`."""
         if not hasattr(self._module, "_tangent_stage"):
@@ -159,7 +169,8 @@ class NumpySession:
 
     def branch(self) -> NumpySession:
         """See `Session`."""
-        twin = NumpySession(self._module, self._parameters, self._x, self._carry, self._gauge, self._t)
+        own = self._module, self._parameters, self._x, self._carry, self._gauge, self._t, self._draws
+        twin = NumpySession(*own)
         twin._counted, twin._passed = self._counted, self._passed
         twin.steps, twin._h, twin._stages, twin._memory = self.steps, self._h, self._stages, list(self._memory)
         twin._turned = self._turned
@@ -171,6 +182,7 @@ class NumpySession:
         gauge = np.empty(0) if self._gauge is None else self._gauge
         memory = np.array(self._memory)
         clock: dict[str, Any] = {"t": self._t, "counted": self._counted, "h": self._h, "steps": self.steps}
+        clock["draws"] = np.array([self._draws.seed, self._draws.member, self._draws.step], dtype=np.uint64)
         clock["passed"] = np.array(self._passed)
         turned = {} if self._turned is None else self._turned.arrays()
         arrays = {"x": self._x, "carry": self._carry, "memory": memory, "gauge": gauge, **turned}
@@ -182,7 +194,8 @@ class NumpySession:
         """The session whose `saved` bytes these are."""
         with np.load(io.BytesIO(saved)) as stored:
             gauge = stored["gauge"] if stored["gauge"].size else None
-            session = cls(module, parameters, stored["x"], stored["carry"], gauge)
+            draws = Draws(*stored["draws"].tolist())
+            session = cls(module, parameters, stored["x"], stored["carry"], gauge, draws=draws)
             session.steps = int(stored["steps"])
             session._turned = Turned.from_arrays(stored) if "first" in stored else None
             if np.isfinite(stored["h"]):
@@ -208,11 +221,20 @@ class NumpySession:
             stages: list[Stage] = self._module._coefficients(self._values(), self._x, self._h, self._gauge)
             return stages
 
-    def _tried(self) -> tuple[Floats, Floats, list[Pair], list[Made]]:
+    def _of_step(self, increments: Floats | None) -> tuple[Any, ...]:
+        """What stages of the next step depend on: its time, its size, and the noise, random or that given."""
+        if not hasattr(self._module, "_drawing"):
+            return self._now(), self._h
+        draws, given = self._draws, None if increments is None else increments[np.newaxis]
+        drawn = self._module._drawing(self._h, 1, draws.seed, draws.member, draws.step, given)
+        return self._now(), self._h, drawn(0 if increments is not None else self.steps)
+
+    def _tried(self, increments: Floats | None = None) -> tuple[Floats, Floats, list[Pair], list[Made]]:
         """State, carry and memory after one step, and of each stage: itself, its start and what it solved for."""
         x, carry, memory, stages = self._x, self._carry, list(self._memory), []
+        own = self._of_step(increments) if self._renewed else ()
         for k, prepared in enumerate(self._stages):
-            stage = self._module._renewed(prepared, self._now(), self._h) if self._timed else prepared
+            stage = self._module._renewed(prepared, *own) if own else prepared
             before = stage, x, carry
             x, carry, memory[k], status = self._module._advance(stage, x, carry, memory[k])
             if status[0] != "":
@@ -261,7 +283,12 @@ class NumpySolver:
         return str(self.module.__file__)
 
     def start(
-        self, x0: Floats, parameters: Mapping[str, float], t0: float = 0.0, first: Floats | None = None
+        self,
+        x0: Floats,
+        parameters: Mapping[str, float],
+        t0: float = 0.0,
+        first: Floats | None = None,
+        draws: Draws = FIRST_DRAWS,
     ) -> NumpySession:
         """See `phigen.runtime.backend.Backend`."""
         x = x0[np.newaxis].copy()
@@ -269,7 +296,7 @@ class NumpySolver:
         gauge = self._gauge
         if gauge is None and self.module.GAUGE:
             gauge = self.module.gauge(x0, **parameters)
-        session = NumpySession(self.module, parameters, x, np.zeros_like(x), gauge, t0)
+        session = NumpySession(self.module, parameters, x, np.zeros_like(x), gauge, t0, draws)
         if self.interface.attitude:
             session.turn_from(first)
         return session
@@ -292,6 +319,9 @@ class NumpySolver:
             options: dict[str, Any] = {} if gauge is None else {"gauge": gauge[remaining]}
             options |= {"t0": some.t0 + done * some.h} if self.interface.time else {}
             good, lost = ahead, ()
+            if self.interface.noise:
+                draws = members.draws
+                options |= {"seed": draws.seed, "member": some.paths, "step0": draws.step + done}
             try:
                 made = self.module.integrate(x[remaining], some.h, ahead, stride=stride, **options, **some.parameters)
             except self.module.StepError as error:
@@ -356,6 +386,11 @@ class NumpySolver:
         """See `phigen.runtime.backend.Backend`."""
         when = () if t is None else (t,)
         return np.asarray(self.module.vector_field(x, *when, **parameters), dtype=np.float64)
+
+    def noise_fields(self, x: Floats, parameters: Mapping[str, float], t: Floats | None = None) -> Floats:
+        """See `phigen.runtime.backend.Backend`."""
+        when = () if t is None else (t,)
+        return np.asarray(self.module.noise_fields(x, *when, **parameters), dtype=np.float64)
 
     def rate(self, x: Floats, parameters: Mapping[str, float]) -> Floats:
         """See `phigen.runtime.backend.Backend`."""

@@ -47,6 +47,10 @@ class Session(Course, Protocol):
         """The physical time since the start, where steps are equal in τ and the solver keeps it; NaN elsewhere."""
         ...
 
+    def advance_along(self, h: float, increments: Floats) -> None:
+        """Make a step with each row of increments of the noise (steps, draws), in place of random ones."""
+        ...
+
     def advance_tangent(self, h: float) -> Floats:
         """Make one step; its derivative (DIM, DIM). Raises `MissingExtraError` without the extra ``tangent``."""
         ...

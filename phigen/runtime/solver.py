@@ -14,8 +14,18 @@ from phigen.errors import ParameterError, StepError
 from phigen.runtime import arguments, gradients
 from phigen.runtime.backend import Backend
 from phigen.runtime.crossings import SIGNS, CrossingFinder, Function, Section
+from phigen.runtime.given import Given
 from phigen.runtime.gradients import Jacobian, Pullback
-from phigen.runtime.interface import BackendError, Floats, Interface, MissingExtraError, Progress, row_steps
+from phigen.runtime.interface import (
+    FIRST_DRAWS,
+    BackendError,
+    Draws,
+    Floats,
+    Interface,
+    MissingExtraError,
+    Progress,
+    row_steps,
+)
 from phigen.runtime.live import LiveSession
 from phigen.runtime.retrying import Retrying
 from phigen.runtime.session import Session, rows_along
@@ -88,6 +98,10 @@ class Solver:
         t0: float | None = None,
         attitude0: ArrayLike | None = None,
         position0: ArrayLike | None = None,
+        seed: int | None = None,
+        member: int | None = None,
+        step0: int | None = None,
+        increments: ArrayLike | None = None,
         progress: Progress | None = None,
         parameters: Mapping[str, float] | None = None,
         **more: float,
@@ -98,15 +112,26 @@ class Solver:
         the time. With ``until`` in place of ``steps``, the last step is the part of one that ends at that time. A step
         that fails is made in 2, 4, …, 2**retry equal parts; then it is another map than the others, as Poisson as they
         are, on the same leaf. ``attitude0`` and ``position0`` are those at the start, the identity and the origin by
-        default, for systems that reconstruct them. ``progress`` is called now and then with the number of steps done.
+        default, for systems that reconstruct them. With noise, the random numbers are a function of ``seed``,
+        ``member`` and the number of the step, which begins with ``step0``, all 0 by default; ``increments`` (steps,
+        draws) takes their place. ``progress`` is called now and then with the number of steps done.
         Raises `StepError`, whose ``trajectory`` ends with the state before the failing step.
         """
         begin = arguments.start_time(t0, self.interface, more)
+        draws = arguments.draws(self.interface, more, seed=seed, member=member, step0=step0)
         values = self.values(parameters, more)
         start, h = arguments.state(x0, "x0", self.interface), arguments.step_size(h)
         stride, retry = arguments.count(stride, "stride", 1), arguments.count(retry, "retry", 0)
         first = arguments.first(attitude0, position0, self.interface)
-        course = Retrying(self._started(start, h, values, begin, first), retry)
+        if retry:
+            arguments.expect_no_noise("retry", self.interface)
+        session = self._started(start, h, values, begin, first, draws)
+        if increments is not None:
+            given = arguments.increments(increments, self.interface)
+            session, steps = Given(session, given), len(given) if steps is None else steps
+            if steps > len(given) or until is not None:
+                raise ValueError(f"increments are those of {len(given)} steps")
+        course = Retrying(session, retry)
         passed, elements = dict[int, float](), dict[int, Floats]()
 
         def see(row: int) -> None:
@@ -156,6 +181,9 @@ class Solver:
         t0: float | None = None,
         attitude0: ArrayLike | None = None,
         position0: ArrayLike | None = None,
+        seed: int | None = None,
+        member: int | None = None,
+        step0: int | None = None,
         parameters: Mapping[str, float] | None = None,
         **more: float,
     ) -> LiveSession:
@@ -164,13 +192,15 @@ class Solver:
         The other arguments are those of `integrate`.
         """
         begin = arguments.start_time(t0, self.interface, more)
+        draws = arguments.draws(self.interface, more, seed=seed, member=member, step0=step0)
         values = self.values(parameters, more)
         start = arguments.state(x0, "x0", self.interface)
         first = arguments.first(attitude0, position0, self.interface)
-        return LiveSession(self, self._started(start, math.nan, values, begin, first), values, begin)
+        return LiveSession(self, self._started(start, math.nan, values, begin, first, draws), values, begin)
 
     def states_at(self, trajectory: Trajectory, times: Floats) -> Floats:
         """The states (times, DIM) of a trajectory of this solver at given times; see `Trajectory.at`."""
+        arguments.expect_no_noise("Trajectory.at", self.interface)
         values, h = dict(trajectory.parameters), trajectory.h
         first = self._started(trajectory.x[0], h, values, float(trajectory.t[0]) if self.interface.time else 0.0)
 
@@ -190,14 +220,17 @@ class Solver:
         h: float,
         *,
         t0: float | None = None,
+        seed: int | None = None,
+        step0: int | None = None,
         parameters: Mapping[str, float] | None = None,
         **more: float,
     ) -> Floats:
         """The state (DIM,) one step of size ``h`` after ``x`` (DIM,), whose time is ``t0``; raises `StepError`."""
         begin = arguments.start_time(t0, self.interface, more)
+        draws = arguments.draws(self.interface, more, seed=seed, step0=step0)
         values = self.values(parameters, more)
         start, h = arguments.state(x, "x", self.interface), arguments.step_size(h)
-        session = self._started(start, h, values, begin)
+        session = self._started(start, h, values, begin, None, draws)
         try:
             session.advance(h, 1)
         except BackendError as error:
@@ -210,6 +243,8 @@ class Solver:
         h: float,
         *,
         t0: float | None = None,
+        seed: int | None = None,
+        step0: int | None = None,
         parameters: Mapping[str, float] | None = None,
         **more: float,
     ) -> tuple[Floats, Floats]:
@@ -219,9 +254,10 @@ class Solver:
         `TypeError` if the solver was compiled without ``tangent=True``.
         """
         begin = arguments.start_time(t0, self.interface, more)
+        draws = arguments.draws(self.interface, more, seed=seed, step0=step0)
         values = self.values(parameters, more)
         start, h = arguments.state(x, "x", self.interface), arguments.step_size(h)
-        session = self._started(start, h, values, begin)
+        session = self._started(start, h, values, begin, None, draws)
         tangent = self._with_tangent(session, h, values)
         return session.state(), tangent
 
@@ -232,6 +268,8 @@ class Solver:
         steps: int,
         *,
         t0: float | None = None,
+        seed: int | None = None,
+        step0: int | None = None,
         parameters: Mapping[str, float] | None = None,
         **more: float,
     ) -> Iterator[tuple[Floats, Floats]]:
@@ -240,10 +278,11 @@ class Solver:
         The steps are those of `integrate`. Raises what `step_tangent` does.
         """
         begin = arguments.start_time(t0, self.interface, more)
+        draws = arguments.draws(self.interface, more, seed=seed, step0=step0)
         values = self.values(parameters, more)
         start, h = arguments.state(x0, "x0", self.interface), arguments.step_size(h)
         steps = arguments.count(steps, "steps", 0)
-        session = self._started(start, h, values, begin)
+        session = self._started(start, h, values, begin, None, draws)
         for _ in range(steps):
             tangent = self._with_tangent(session, h, values)
             yield session.state(), tangent
@@ -268,6 +307,7 @@ class Solver:
         ``falling`` or ``both``. A start with g = 0 counts if g leaves it in that direction. Raises `StepError`, whose
         ``trajectory`` is the `Section` so far.
         """
+        arguments.expect_no_noise("section", self.interface)
         begin = arguments.start_time(t0, self.interface, more)
         values = self.values(parameters, more)
         start, h = arguments.state(x0, "x0", self.interface), arguments.step_size(h)
@@ -294,6 +334,9 @@ class Solver:
         stride: int | None = None,
         *,
         t0: ArrayLike | None = None,
+        seed: int | None = None,
+        member: int | None = None,
+        step0: int | None = None,
         threads: int | None = None,
         parameters: Mapping[str, ArrayLike] | None = None,
         **more: ArrayLike,
@@ -302,11 +345,15 @@ class Solver:
 
         Parameters, ``h`` and the time ``t0`` of the start are numbers, or arrays (members,) with one for each. With a
         ``stride`` the result is (rows, members, DIM): the states at steps 0, stride, 2·stride, … and at the last.
+        With noise, the first takes the random numbers of ``member``, the next those of the next, all from those of
+        ``step0`` on, as in `integrate`: to go on with an ensemble, give the number of steps that it has made.
         Members are shared out between ``threads``, by default one on each core; their number changes no bit. Raises
         `StepError` if any member fails: its ``members`` are those that did, its ``trajectory`` the array of states as
         far as each came, with NaN in the rows after that.
         """
-        asked = arguments.ensemble(X0, h, steps, stride, t0, parameters, more, self.interface)
+        own: dict[str, Any] = dict(more)
+        draws = arguments.draws(self.interface, own, seed=seed, member=member, step0=step0)
+        asked = arguments.ensemble(X0, h, steps, stride, t0, parameters, own, self.interface, draws)
         threads = threads if threads is None else arguments.count(threads, "threads", 1)
         try:
             return self.backend.ensemble(asked, threads)
@@ -407,6 +454,21 @@ class Solver:
         when = arguments.times(t, self.interface, states.shape[:-1], more)
         return self.backend.vector_field(rows, self.values(parameters, more), when).reshape(states.shape)
 
+    def noise_fields(
+        self,
+        x: ArrayLike,
+        t: ArrayLike | None = None,
+        *,
+        parameters: Mapping[str, float] | None = None,
+        **more: float,
+    ) -> Floats:
+        """σπ∇g of each source of noise at the states ``x`` (…, DIM), shape (…, sources, DIM)."""
+        states = arguments.states(x, "x", self.interface)
+        rows = states.reshape(-1, self.interface.dimension)
+        when = arguments.times(t, self.interface, states.shape[:-1], more)
+        found = self.backend.noise_fields(rows, self.values(parameters, more), when)
+        return found.reshape(*states.shape[:-1], len(self.interface.noise), self.interface.dimension)
+
     def energies(self, x: Floats, t: Floats, parameters: Mapping[str, float]) -> Floats:
         """H along a trajectory: of the states (rows, DIM) at the times (rows,)."""
         return self.backend.hamiltonian(x, parameters, t if self.interface.time else None)
@@ -432,10 +494,16 @@ class Solver:
         )
 
     def _started(
-        self, start: Floats, h: float, values: Mapping[str, float], t0: float, first: Floats | None = None
+        self,
+        start: Floats,
+        h: float,
+        values: Mapping[str, float],
+        t0: float,
+        first: Floats | None = None,
+        draws: Draws = FIRST_DRAWS,
     ) -> Session:
         try:
-            return self.backend.start(start, values, t0, first)
+            return self.backend.start(start, values, t0, first, draws)
         except BackendError as error:
             raise self.failure(error, h, None, values) from error
 

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 from phigen.attitude.group import Group
+from phigen.errors import Diagnostic, SpecError
 from phigen.geometry.shapes import LogCanonical
 from phigen.geometry.system import System
 from phigen.realisations.protocol import BiRealisation
@@ -21,8 +22,10 @@ from phigen.scheme.kernels import (
     inverse,
     linearise_kernel,
     newton_solvers,
+    noise_fields,
     observables,
     path_elimination,
+    step_inputs,
 )
 from phigen.scheme.lowering import cost, operation_counts
 from phigen.scheme.mean import along_mean
@@ -30,7 +33,7 @@ from phigen.scheme.modified import modified_of
 from phigen.scheme.monitor import elapsed_kernel, monitor_facts, rate_kernel
 from phigen.scheme.order import Order
 from phigen.scheme.path import build_path, build_slopes
-from phigen.scheme.program import About, Monitor, Program
+from phigen.scheme.program import About, Monitor, Noise, Program
 from phigen.scheme.staging import Coefficients
 from phigen.scheme.steps import Explicit, InnerSolve, Newton, Path, PathLanes, PathTangent, Step
 from phigen.scheme.tangent import curvature, explicit_jacobian, tangent_path
@@ -59,6 +62,9 @@ def build_program(
     profile: str = "fast",
 ) -> Program:
     """The solver of a system as a program. LimitError if a kernel exceeds `MOST_OPERATIONS`."""
+    if system.noise and extras.adjoint:
+        reason = "adjoint is not offered with noise"
+        raise SpecError([Diagnostic(reason, system.locations.get(("noise",)))])
     solver = solver or SolverOptions()
     gauge, attitude = gauged.gauge, None
     if group:
@@ -87,6 +93,7 @@ def build_program(
         time=system.time,
         forced=system.forces is not None,
         pushed=system.pushed,
+        noise=Noise(tuple(s.name for s in system.noise), 1, noise_fields(system)) if system.noise else None,
         parameters=system.parameters,
         casimirs=tuple(system.casimirs),
         order=order.order,
@@ -126,14 +133,14 @@ def _step(
     if increment is None:
         linearise = linearise_kernel(system, realisation, generating, coefficients)
         solvers = newton_solvers(linearise)
-        refresh, prepare = coefficients.refresh(t=system.times), _prepare(system, gauge, coefficients)
+        refresh, prepare = coefficients.refresh(**step_inputs(system)), _prepare(system, gauge, coefficients)
         newton = Newton(prepare, linearise, inner, solvers.eliminate, solvers.invert, solvers.factors, refresh=refresh)
         if extras.adjoint:
             transposed = newton_adjoint(linearise, coefficients)
             newton = replace(newton, adjoint=completed(coefficients, [transposed], prepare, refresh))
         return coefficients.settled(newton)
     tangent = explicit_jacobian(increment, system.coordinates, coefficients) if extras.tangent else None
-    refresh, prepare = coefficients.refresh(t=system.times), _prepare(system, gauge, coefficients)
+    refresh, prepare = coefficients.refresh(**step_inputs(system)), _prepare(system, gauge, coefficients)
     explicit = Explicit(prepare, increment, tangent, refresh=refresh)
     if extras.adjoint:
         transposed = explicit_adjoint(increment, coefficients)
@@ -155,7 +162,7 @@ def _path(
         kernel = several.curvature if several else curvature(system, generating, coefficients)
     if extras.tangent:
         varied = PathTangent(tangent_path(system, coefficients), kernel)
-    refresh, prepare = coefficients.refresh(t=system.times), _prepare(system, gauge, coefficients)
+    refresh, prepare = coefficients.refresh(**step_inputs(system)), _prepare(system, gauge, coefficients)
     if extras.adjoint:
         adjoint = completed(coefficients, [], prepare, refresh, adjoint_path(system, coefficients, kernel))
     solver = path_elimination(n)
@@ -186,6 +193,7 @@ def _facts(
     yield from monitor_facts(gauge.monitor)
     yield from gauge.facts
     yield from _forces(system)
+    yield from noise_facts(system)
     yield f"step: {step.manner}"
     yield scheme.note
     yield order.note
@@ -199,6 +207,15 @@ def _forces(system: System) -> Iterator[str]:
     changed = [name for name, c in system.casimirs.items() if not system.forced_rate_of_casimir(c).is_zero]
     kept = f"they change {', '.join(changed)}" if changed else "they keep all Casimirs"
     yield f"with forces a step is no Poisson map; {kept}"
+
+
+def noise_facts(system: System) -> Iterator[str]:
+    """What is said of noise."""
+    if not system.noise:
+        return
+    names = ", ".join(s.name for s in system.noise)
+    yield f"noise: {names}; in the sense of Stratonovich, along Hamiltonian fields, so it keeps all Casimirs"
+    yield "each path of the noise has its step; strong order 1 if sources commute, else 1/2; weak order 1"
 
 
 def _acts(force: Sequence[Expression]) -> bool:

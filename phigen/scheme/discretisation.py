@@ -16,7 +16,7 @@ from phigen.scheme.order import Order
 from phigen.series.hamilton_jacobi import HamiltonJacobi
 from phigen.spec import limits
 from phigen.spec.names import FLOW_COMPOSITIONS
-from phigen.symbolic.expression import Expression
+from phigen.symbolic.expression import Expression, symbol, total
 from phigen.symbolic.symbols import STEP
 
 #: Most operations in one kernel.
@@ -57,18 +57,27 @@ def hamilton_jacobi(
 
 def generating_function(system: System, series: HamiltonJacobi, terms: int) -> GeneratingFunction:
     """∇S_h and Hess S_h in the cheapest form. LimitError if every form is too large."""
-    candidates = []
+    candidates, inputs = [], (*series.times, *system.increments)
     if terms <= GRAPH_TERMS:
         with suppress(OverflowError):
-            candidates.append(graph_form(series.graph(terms), series.coordinates, series.static, series.times))
+            candidates.append(graph_form(series.graph(terms), series.coordinates, series.static, inputs))
     worth = min((c.cost() for c in candidates), default=MOST_OPERATIONS)
     with suppress(OverflowError):
-        collected = collected_form(series.polynomial(terms), series.coordinates, series.static, worth, series.times)
+        beside = series.times, system.increments
+        collected = collected_form(series.polynomial(terms), series.coordinates, series.static, worth, *beside)
         candidates = [*collected, *candidates]
     if not candidates or min(c.cost() for c in candidates) > MOST_OPERATIONS:
         raise too_large(system, f"S_1 … S_{terms} take more than {MOST_OPERATIONS} operations")
     best = min(candidates, key=GeneratingFunction.cost)
-    return best.forced(system.forces.covector, system.coordinates) if system.forces else best
+    return best.pushed(push(system), system.coordinates) if system.forces or system.noise else best
+
+
+def push(system: System) -> list[Expression]:
+    """What p is beside ∇S_h: hζ of the forces, and Σ ΔW_k σ_k∇g_k of the noise."""
+    parts = [[symbol(STEP) * z for z in system.forces.covector]] if system.forces else []
+    for source, name in zip(system.noise, system.increments, strict=True):
+        parts.append([symbol(name) * g for g in source.impulse(system.coordinates)])
+    return [total(entries) for entries in zip(*parts, strict=True)]
 
 
 @dataclass(frozen=True)
@@ -93,12 +102,15 @@ def discretise(
     ``auto`` composes only if the direct series is beyond the budget or costs more than `DIRECT_WORTH` times
     the stages of a composition, since its error constant is much smaller.
     """
+    if system.noise:
+        expect_noise(system, realisation, order, composition)
     if system.forces:
         return _forced(system, realisation, series, order, composition)
     series.reach(order.order)  # S_{k+1} = 0 is what makes a symmetric method of order k + 1: it will be proved
     if composition not in ("auto", "none"):
         return _composed(system, realisation, series, order, composition)
     possible = composition == "auto" and series.symmetric and find("auto", order.order) is not None
+    possible = possible and not system.noise
     try:
         direct = Discretisation(generating_function(system, series, order.terms), order.terms)
     except LimitError:
@@ -110,6 +122,21 @@ def discretise(
     composed = _composed(system, realisation, series, order, "auto")
     price = DIRECT_WORTH * len(composed.fractions) * (composed.generating.cost() + system.dimension**2)
     return composed if direct.generating.cost() > price else direct
+
+
+def expect_noise(system: System, realisation: BiRealisation, order: Order, composition: str) -> None:
+    """Raise `SpecError` where the increments of a step would have to be divided, or Stratonovich's sense is lost."""
+    found, hint = "", ""
+    if not realisation.symmetric:
+        found = f"noise needs a symmetric bi-realisation; {realisation.kind} is not"
+        hint = "birealisation: auto; in the middle of a step is where Stratonovich's integral takes its values"
+    elif composition not in ("auto", "none"):
+        found, hint = "noise: a step is not composed of others, among which some go back", "composition: none"
+    elif system.forces and order.order > 2:
+        found, hint = f"with forces and noise a step has order 2, not {order.order}", "order: 2"
+    if found:
+        place = system.locations.get(("noise",))
+        raise SpecError([Diagnostic(found, place, hint)])
 
 
 def _forced(

@@ -98,13 +98,14 @@ def choose(
     """The system in the gauge of a setting: ``none``, ``auto``, or a value for some Casimirs.
 
     ``auto`` frees a Casimir if S_3 depends on its λ (in log-canonical structures it never does) and has hardly
-    more terms with it (on tops it has many more, for little); none where H depends on the time, or with a monitor.
+    more terms with it (on tops it has many more, for little); none where H depends on the time, forces act or there
+    is noise, or with a monitor.
     """
     if not isinstance(setting, str):
         return _gauged(system, realisation, replace(given(system, setting), monitor=monitor))
     chosen = plain = _gauged(system, realisation, Gauge(monitor=monitor))
     open_ = setting != "none" and realisation.exact and realisation.symmetric
-    if not open_ or system.time or system.forces or monitor:
+    if not open_ or system.driven or monitor:
         return plain
     for name in system.casimirs:
         candidate = _gauged(system, realisation, Gauge((*chosen.gauge.free, name)))

@@ -38,9 +38,8 @@ class GeneratingFunction:
     coefficients: Coefficients
     elapsed: Expression | None = None
 
-    def forced(self, covector: Sequence[Expression], coordinates: Sequence[str]) -> GeneratingFunction:
-        """With p = ∇S_h + hζ in place of p = ∇S_h, for a covector field ζ; then the Hessian need not be symmetric."""
-        push = [symbol(STEP) * z for z in covector]
+    def pushed(self, push: Sequence[Expression], coordinates: Sequence[str]) -> GeneratingFunction:
+        """With p = ∇S_h + a covector field in place of p = ∇S_h; then the Hessian need not be symmetric."""
         columns = [derivatives(push, c) for c in coordinates]
         slope = tuple(s + z for s, z in zip(self.slope, push, strict=True))
         rows = [[e + columns[j][i] for j, e in enumerate(row)] for i, row in enumerate(self.hessian)]
@@ -57,9 +56,16 @@ class GeneratingFunction:
 
 
 def collected_form(
-    series: PolynomialSeries, coordinates: Sequence[str], static: Sequence[str], worth: int, times: Sequence[str] = ()
+    series: PolynomialSeries,
+    coordinates: Sequence[str],
+    static: Sequence[str],
+    worth: int,
+    times: Sequence[str] = (),
+    increments: Sequence[str] = (),
 ) -> list[GeneratingFunction]:
     """The collected gradient, with the Hessian collected entry by entry, and with the Hessian by differentiation.
+
+    ``increments`` are inputs of a step beside the time, which the series does not know.
 
     Empty if even a gradient of one operation per term would cost more than ``worth``. Raises `OverflowError` if it
     is too large to be counted.
@@ -78,7 +84,7 @@ def collected_form(
     first = [ring.derivative(terms, j) for j in range(n)]
     found = []
     for entrywise in (True, False):
-        table = Coefficients(static, times)
+        table = Coefficients(static, [*times, *increments])
         slope = tuple(ring.expression(g, table) for g in first)
         if entrywise:
             hessian = _symmetric(
@@ -92,9 +98,11 @@ def collected_form(
 
 
 def graph_form(
-    series: Sequence[Expression], coordinates: Sequence[str], static: Sequence[str], times: Sequence[str] = ()
+    series: Sequence[Expression], coordinates: Sequence[str], static: Sequence[str], inputs: Sequence[str] = ()
 ) -> GeneratingFunction:
     """Gradient by reverse, Hessian by repeated reverse differentiation of the shared graph.
+
+    ``inputs`` are those of a step, such as the time.
 
     Raises `OverflowError` as soon as what has been differentiated is more than one kernel may have.
     """
@@ -109,7 +117,7 @@ def graph_form(
             rows.append(gradient(slope[i], coordinates[i:]))  # one reverse sweep a row
             running.done = i + 1
     elapsed = derivatives([s], LEVEL)[0] if LEVEL in static else None
-    return GeneratingFunction(slope, _symmetric(rows), "shared graph", 0, Coefficients(static, times), elapsed)
+    return GeneratingFunction(slope, _symmetric(rows), "shared graph", 0, Coefficients(static, inputs), elapsed)
 
 
 def _differentiated(slope: Sequence[Expression], coordinates: Sequence[str]) -> tuple[tuple[Expression, ...], ...]:

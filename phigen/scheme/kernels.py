@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
-from phigen.geometry.system import System
+from phigen.geometry.system import System, hamiltonian_vector_field
 from phigen.realisations.protocol import BiRealisation
 from phigen.scheme.elimination import Factors, Pattern, elimination, factorise, inversion, operations
 from phigen.scheme.generating import GeneratingFunction
@@ -195,6 +195,20 @@ def system_inputs(system: System) -> dict[str, tuple[str, ...]]:
     """The arguments of a function on phase space: parameters, the time if there is one, coordinates."""
     time = {"t": system.times} if system.time else {}
     return {"params": system.parameter_names, **time, "x": system.coordinates}
+
+
+def step_inputs(system: System) -> dict[str, tuple[str, ...]]:
+    """What a step is told beside its size: the time and the increments of the noise, where there are such."""
+    inputs = {"t": system.times, "dw": system.increments}
+    return {name: symbols for name, symbols in inputs.items() if symbols}
+
+
+def noise_fields(system: System) -> Kernel:
+    """σπ∇g for each source of noise."""
+    fields = [hamiltonian_vector_field(system.poisson, s.impulse(system.coordinates)) for s in system.noise]
+    values = tuple(e for field in fields for e in field)
+    purpose = "sigma pi(x) grad g(x) of each source of noise"
+    return Kernel("noise_fields", purpose, system_inputs(system), (Output("out", values),))
 
 
 def observables(system: System) -> Observables:

@@ -61,6 +61,28 @@ class Monitor:
     level: Kernel | None = None
 
 
+#: Normal variates are cut off where they are larger, so that no rare one makes a step impossible: one pair in 7e7 is,
+#: which takes 1.5e-8 from the variance.
+BOUND = 6.0
+
+
+@dataclass(frozen=True)
+class Noise:
+    """Sources of noise by their names; each has ``parts`` increments in a step, independent and equal in law.
+
+    ``fields`` are σπ∇g of each source, one after the other.
+    """
+
+    sources: tuple[str, ...]
+    parts: int
+    fields: Kernel
+
+    @property
+    def draws(self) -> int:
+        """The increments of a step."""
+        return self.parts * len(self.sources)
+
+
 @dataclass(frozen=True)
 class Modified:
     """The modified Hamiltonian as a kernel, and the first power of h that it leaves out."""
@@ -120,6 +142,7 @@ class Program:
     time: str = ""
     forced: bool = False
     pushed: tuple[str, ...] = ()
+    noise: Noise | None = None
     gauge: FreeGauge | None = None
     monitor: Monitor | None = None
     modified: Modified | None = None
@@ -171,5 +194,6 @@ class Program:
         modified = (self.modified.kernel,) if self.modified else ()
         timed = [k for k in (self.monitor.elapsed, self.monitor.rate, self.monitor.level) if k] if self.monitor else []
         turned = self.attitude.kernels if self.attitude else ()
+        noisy = (self.noise.fields,) if self.noise else ()
         observed = (seen.energy, seen.casimirs, seen.vector_field)
-        return (*self.step.kernels, *turned, *timed, *modified, *observed, *self.choice)
+        return (*self.step.kernels, *turned, *timed, *modified, *observed, *noisy, *self.choice)

@@ -19,6 +19,9 @@ from phigen.symbolic.symbols import COEFFICIENT, RENEWED, Symbol, coefficient, k
 
 T = TypeVar("T")
 
+#: What the inputs of a step are.
+INPUTS = {"t": "the time", "dw": "the increments of the noise"}
+
 #: The argument of kernels that is the table of coefficients, and the output of ``refresh``, its last part.
 TABLE, NOW = "coef", "now"
 
@@ -98,10 +101,12 @@ class Coefficients:
         """
         if not self.renewed:
             return None
+        if not self.values:  # the first part of the table must not be empty, for the second to lie elsewhere
+            self.slot(symbol(min(self._static)))
         values = tuple(self._hoisted(self.renewed, self._is_fixed))
         return Kernel(
             "refresh",
-            "everything that depends on the time, but not on the state",
+            f"everything that depends on {' and '.join(INPUTS[name] for name in inputs)}, but not on the state",
             {TABLE: self.slots, **{name: tuple(symbols) for name, symbols in inputs.items()}},
             (Output(NOW, values),),
         )

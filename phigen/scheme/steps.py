@@ -3,7 +3,7 @@
 Kernels of a step are of three stages. ``prepare`` computes, from parameters and step size, every value that does not
 depend on the state, nor on inputs of the single step: the coefficients ``c:0``, ``c:1``, … Where H depends on the time,
 ``refresh`` computes from these, and from the time in the middle of a stage, those that come after them, once in each
-stage. All others read the coefficients and the state only.
+stage; so it does with the increments of noise. All others read the coefficients and the state only.
 """
 
 from __future__ import annotations

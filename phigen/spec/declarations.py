@@ -16,7 +16,7 @@ from phigen.spec.grammar import CONSTANTS, Scope, constant, names_in, parse
 from phigen.spec.indices import Indices
 from phigen.spec.kinds import Reader
 from phigen.spec.model import Lattice, Parameter
-from phigen.spec.names import ARGUMENT_HINT, ARGUMENTS, SPEC_FUNCTIONS, TIMED_ARGUMENTS
+from phigen.spec.names import ARGUMENT_HINT, ARGUMENTS, NOISY_ARGUMENTS, SPEC_FUNCTIONS, TIMED_ARGUMENTS
 from phigen.spec.problems import counted, did_you_mean, shown
 from phigen.spec.values import values
 from phigen.spec.yaml_source import Node, Scalar
@@ -43,6 +43,7 @@ class Declarations:
     varying: set[str] = field(default_factory=set)  # definitions that depend on coordinates
     time: str = ""  # the name of the time, if there is one
     dated: set[str] = field(default_factory=set)  # definitions that depend on it
+    noisy: bool = False
     incomplete: bool = False
     nodes: dict[str, Scalar] = field(default_factory=dict)  # where each name is declared
     within: tuple[Any, ...] = ("poisson",)  # the path of keys to the Poisson structure that is being read
@@ -154,6 +155,14 @@ class Declarations:
         refused |= {n: (f"{what} must not depend on coordinates, as {n!r} does", "") for n in self.varying} | bonds
         return Scope(names | dict(extra or {}), refused | self.refused, open=self.incomplete)
 
+    def dated_constants(self, what: str) -> Scope:
+        """The same and the time."""
+        scope = self.constants(what)
+        dated = {n: self.definitions[n] for n in self.dated - self.varying}
+        dated |= {self.time: symbol(self.time)} if self.time else {}
+        refused = {n: why for n, why in scope.refused.items() if n not in dated}
+        return replace(scope, names={**scope.names, **dated}, refused=refused)
+
     def numbers(self) -> Scope:
         """No declared name at all: for defaults and initial values."""
         declared = (*self.coordinates, *self.parameters, *self.definitions, *filter(None, [self.time]))
@@ -206,6 +215,11 @@ class Declarations:
 
     # --- declaring
 
+    @property
+    def arguments(self) -> frozenset[str]:
+        """The names of arguments of the generated functions."""
+        return (TIMED_ARGUMENTS if self.time else ARGUMENTS) | (NOISY_ARGUMENTS if self.noisy else frozenset())
+
     def declare(self, node: Scalar, what: str) -> bool:
         """Whether a name is free; an error is reported if not."""
         name, first = node.text, self.nodes.get(node.text)
@@ -214,7 +228,7 @@ class Declarations:
         elif first is not None:
             where = f"line {first.location.line}, column {first.location.column}"
             self.reader.error(node, f"the name {name!r} is declared twice; the first is in {where}")
-        elif what == "parameter" and name in (TIMED_ARGUMENTS if self.time else ARGUMENTS):
+        elif what == "parameter" and name in self.arguments:
             self.reader.error(node, f"a parameter cannot be called {name!r}", ARGUMENT_HINT)
         elif self.lattice and name in (*self.lattice.indices, *(f"N_{i}" for i in self.lattice.indices)):
             self.reader.error(node, f"the {what} {name!r} has the name of an index or size of the lattice", RENAME)
@@ -228,7 +242,7 @@ class Declarations:
 
 def declare(raw: Raw, reader: Reader) -> Declarations:
     """Read ``coordinates``, ``time``, ``parameters`` and ``definitions``."""
-    declared = Declarations(reader, lattice=_lattice(raw.get("lattice"), reader))
+    declared = Declarations(reader, lattice=_lattice(raw.get("lattice"), reader), noisy="noise" in raw)
     coordinates = raw.get("coordinates")
     declared.incomplete = coordinates is None or None in coordinates
     declared.coordinates = tuple(

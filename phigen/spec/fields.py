@@ -187,6 +187,13 @@ FORCES = Record(
         Field("vector", FORMULAS, "by coordinate: torques, thrust, growth; changes Casimirs"),
     ),
 )
+SOURCE = Record(
+    "a source of noise",
+    (
+        Field("hamiltonian", FORMULA, "g of σ π∇g ∘ dW, a function of the coordinates", required=True),
+        Field("amplitude", FORMULA, "σ, which may depend on parameters and the time", default="1"),
+    ),
+)
 
 RUN = Record(
     "a run",
@@ -211,6 +218,8 @@ RUN = Record(
         Field("until", CONSTANT, "the time where it ends, by a part of a step, instead of the number of steps"),
         Field("stop", FORMULA, "it ends where this expression passes through 0"),
         Field("start", CONSTANT, "the time at the start, 0 if not given; for systems with a time"),
+        Field("seed", Integer(0, limits.SEED), "noise: which random numbers are taken", default=0),
+        Field("members", Integer(1, limits.MEMBERS), "noise: so many paths from the same start", default=1),
         Field("stride", Integer(1, limits.STEPS, limit=True), "every how many steps are stored", default=1),
         Field("every", CONSTANT, "the time between states that are stored, instead of the stride"),
         Field("parameters", MapOf(NAME, VALUES), "values that differ from the defaults"),
@@ -261,6 +270,7 @@ SPEC = Record(
         ),
         Field("forces", FORCES, "what acts beside H: ẋ = π(∇H + covector) + vector"),
         Field("damping", FORMULA, "λ ≥ 0 of the damping −λ π πᵀ∇H, which keeps the leaves: dH/dt = −λ |π∇H|²"),
+        Field("noise", MapOf(NAME, SOURCE, least=1), "sources of noise by name: ẋ = … + σ π∇g ∘ dW, Stratonovich"),
         Field("casimirs", MapOf(NAME, Either({Scalar: FORMULA, Mapping: CASIMIR})), "Casimirs by name; checked"),
         Field("invariants", FORMULAS, "further first integrals by name; checked"),
         Field(

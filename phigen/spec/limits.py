@@ -54,6 +54,10 @@ OPERATIONS = 100_000
 SERIES_TERMS = 50_000
 #: Products of terms in the proof of a bi-realisation, by estimate: ten seconds. Beyond, it is checked at points.
 PROOF_PRODUCTS = 20_000_000
+#: Seeds of noise have 64 bits, members of an ensemble 32.
+SEED, MEMBERS = 2**64 - 1, 2**32
+#: Sources of noise.
+SOURCES = 64
 #: Steps of a run.
 STEPS = 10**12
 #: Errors listed in one run; a file with more is rarely improved by the rest.

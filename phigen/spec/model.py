@@ -20,6 +20,9 @@ from phigen.symbolic.expression import ZERO, Expression
 #: The order of a method that nobody asked an order of.
 DEFAULT_ORDER = 4
 
+#: The same where there is noise, which limits the order.
+NOISY_ORDER = 2
+
 Matrix = tuple[tuple[Expression, ...], ...]
 
 
@@ -185,6 +188,8 @@ class Run:
     steps: int
     stride: int = 1
     start: Fraction = Fraction(0)  # the time at the start
+    seed: int = 0  # of the noise
+    members: int = 1  # paths of the noise from the same start
     parameters: Mapping[str, Fraction] = field(default_factory=dict)
     exact: Mapping[str, Expression] = field(default_factory=dict)  # in ELAPSED, the time, initial(NAME), parameters
     compare: tuple[str, ...] = ()
@@ -255,6 +260,14 @@ class SpecForces:
 
 
 @dataclass(frozen=True)
+class SpecNoise:
+    """A source of noise, one of those of ``noise:``: + σ π∇g ∘ dW, with the Hamiltonian g and the amplitude σ."""
+
+    hamiltonian: Expression
+    amplitude: Expression
+
+
+@dataclass(frozen=True)
 class Spec:
     """A spec file, about a cell where there is a ``lattice``.
 
@@ -267,6 +280,7 @@ class Spec:
     hamiltonian: Expression
     time: str = ""  # the name of the time, where functions may depend on it
     forces: SpecForces = SpecForces()
+    noise: Mapping[str, SpecNoise] = field(default_factory=dict)
     parameters: tuple[Parameter, ...] = ()
     casimirs: Mapping[str, Expression] = field(default_factory=dict)
     invariants: Mapping[str, Expression] = field(default_factory=dict)

@@ -17,6 +17,8 @@ IDENTIFIER = r"[A-Za-z_][A-Za-z0-9_]*"
 ARGUMENTS = frozenset(["x", "x0", "X0", "h", "steps", "stride", "gauge", "cotangent", "attitude0", "position0"])
 #: The same, where there is a time.
 TIMED_ARGUMENTS = ARGUMENTS | {"t", "t0"}
+#: What these are called where there is noise, beside the others.
+NOISY_ARGUMENTS = frozenset(["seed", "member", "step0", "increments"])
 ARGUMENT_HINT = "it is the name of an argument of the generated functions"
 
 #: What other programs call it, and users type here.
@@ -25,7 +27,10 @@ MEANT = {
     "forcing": "forces", "drive": "forces", "energy": "hamiltonian", "H": "hamiltonian", "pi": "poisson",
     "variables": "coordinates", "state": "coordinates", "constants": "parameters", "t": "time", "times": "time",
     "dt": "step", "h": "step", "x0": "initial", "t_end": "duration", "tol": "tolerance", "algebra": "lie_algebra",
-    "conserved": "invariants", "precision": "order", "method": "scheme", "integrator": "scheme",
+    "conserved": "invariants", "temperature": "noise", "thermal": "noise", "langevin": "noise", "diffusion": "noise",
+    "stochastic": "noise", "noises": "noise", "sigma": "amplitude", "g": "hamiltonian", "random_seed": "seed",
+    "realisations": "members", "paths": "members", "samples": "members",
+    "precision": "order", "method": "scheme", "integrator": "scheme",
 }  # fmt: skip
 
 _LICENSES = """0BSD AFL-3.0 AGPL-3.0-only AGPL-3.0-or-later Apache-2.0 Artistic-2.0 BSD-1-Clause BSD-2-Clause

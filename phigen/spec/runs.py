@@ -51,6 +51,8 @@ def run(name: str, raw: Mapping[str, Any], declared: Declarations) -> Run:
         steps=steps or 1,
         stride=stride,
         parameters=numbers_of,
+        seed=raw.get("seed", 0),
+        members=raw.get("members", 1),
         start=start,
         exact=_exact(raw.get("exact", {}), declared),
         compare=without_repetition(raw.get("compare", ()), ("runs", name, "compare"), declared),

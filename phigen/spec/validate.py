@@ -8,20 +8,31 @@ from fractions import Fraction
 from typing import Any
 
 from phigen.registry import DEFAULT
+from phigen.spec import limits
 from phigen.spec.declarations import Declarations, declare
 from phigen.spec.fields import SPEC
 from phigen.spec.grammar import Scope
 from phigen.spec.kinds import Reader
 from phigen.spec.lattice import casimirs as read_casimirs
 from phigen.spec.lattice import densities, with_kinds
-from phigen.spec.model import DEFAULT_ORDER, BirealisationChoice, Extras, MatrixForm, SolverOptions, Spec, SpecForces
+from phigen.spec.model import (
+    DEFAULT_ORDER,
+    NOISY_ORDER,
+    BirealisationChoice,
+    Extras,
+    MatrixForm,
+    SolverOptions,
+    Spec,
+    SpecForces,
+    SpecNoise,
+)
 from phigen.spec.names import LICENSE_REFERENCE, LICENSES, LOGARITHMIC
 from phigen.spec.poisson import brackets_of_sites, poisson_form
 from phigen.spec.problems import Problems, counted, did_you_mean, shown
 from phigen.spec.runs import run, without_repetition
 from phigen.spec.taken import objection
 from phigen.spec.yaml_source import Scalar, decode, read
-from phigen.symbolic.expression import ZERO, Expression, symbol, symbols_of
+from phigen.symbolic.expression import ONE, ZERO, Expression, symbol, symbols_of
 from phigen.symbolic.symbols import MATRIX, momentum
 
 #: Options of bi-realisations and the kind that each belongs to.
@@ -67,11 +78,12 @@ def _parts(raw: Mapping[str, Any], declared: Declarations) -> dict[str, Any]:
         "hamiltonian": hamiltonian,
         "time": declared.time,
         "forces": _forces(raw, declared),
+        "noise": _noise(raw.get("noise") or {}, declared),
         "parameters": tuple(declared.parameters.values()),
         "casimirs": casimirs,
         "invariants": _formulas(raw.get("invariants", {}), declared, declared.dated_scope()),
         "birealisation": _birealisation(raw.get("birealisation", "auto"), declared),
-        "order": raw.get("order", None if "terms" in raw else DEFAULT_ORDER),
+        "order": raw.get("order", None if "terms" in raw else NOISY_ORDER if "noise" in raw else DEFAULT_ORDER),
         "terms": raw.get("terms"),
         "composition": raw.get("composition", "auto"),
         "gauge": _gauge(raw.get("gauge", "auto"), declared),
@@ -102,12 +114,23 @@ SERIES_KEYS: Mapping[str, tuple[object, ...]] = {"terms": (), "birealisation": (
 
 #: Keys that lattices do not take yet, and the values that do no harm.
 NOT_OF_LATTICES: Mapping[str, tuple[object, ...]] = {
-    "time": (), "monitor": (), "reconstruct": (), "forces": (), "damping": (), "terms": (),
+    "time": (), "monitor": (), "reconstruct": (), "forces": (), "damping": (), "noise": (), "terms": (),
     "gauge": ("auto", "none"), "tangent": (False,), "adjoint": (False,), "modified_hamiltonian": (0,),
 }  # fmt: skip
 
 
+#: Keys that noise excludes, and the values that do no harm: where steps would have to be made in parts, or of another
+#: size than those whose increments were drawn.
+NOT_WITH_NOISE: Mapping[str, tuple[object, ...]] = {
+    "monitor": (), "reconstruct": (), "modified_hamiltonian": (0,), "terms": (), "adjoint": (False,),
+    "composition": ("auto", "none"),
+}  # fmt: skip
+#: Keys of runs that it excludes, and those that mean nothing without it.
+NOT_IN_NOISY_RUNS, IN_NOISY_RUNS = ("exact", "compare", "section", "stop", "every"), ("seed", "members")
+
+
 def _expect_consistent(raw: Mapping[str, Any], problems: Problems, reader: Reader) -> None:
+    _expect_consistent_with_noise(raw, problems, reader)
     for key, harmless in NOT_OF_LATTICES.items() if raw.get("lattice") is not None else ():
         if raw.get(key) is not None and raw[key] not in harmless:
             problems.add(f"{key}: not for lattices in this version", reader.locations[key,])
@@ -117,6 +140,20 @@ def _expect_consistent(raw: Mapping[str, Any], problems: Problems, reader: Reade
         if key in raw and raw[key] is not None and raw[key] not in harmless:
             message = f"{key} belongs to scheme: series; scheme: splitting follows exact flows of parts of H"
             problems.add(message, reader.locations[key,], f"remove {key}, or the scheme")
+
+
+def _expect_consistent_with_noise(raw: Mapping[str, Any], problems: Problems, reader: Reader) -> None:
+    noisy = "noise" in raw
+    if noisy and raw.get("lattice") is None:
+        for key, harmless in NOT_WITH_NOISE.items():
+            if raw.get(key) is not None and raw[key] not in harmless:
+                problems.add(f"{key}: not with noise in this version", reader.locations[key,])
+    for name, (_, run_) in raw.get("runs", {}).items():
+        for key in NOT_IN_NOISY_RUNS if noisy else IN_NOISY_RUNS:
+            if run_ and key in run_:
+                message = f"{key}: not of systems with noise" if noisy else f"{key}: this system has no noise"
+                hint = "" if noisy else "noise: {NAME: {hamiltonian: g, amplitude: sigma}} declares it"
+                problems.add(message, reader.locations["runs", name, key], hint)
 
 
 def _no_brackets(declared: Declarations) -> MatrixForm:
@@ -156,6 +193,23 @@ def _forces(raw: Mapping[str, Any], declared: Declarations) -> SpecForces:
                 declared.reader.error(key, f"forces: {name!r} is not a coordinate", hint)
         found[kind] = _formulas(entries, declared, declared.dated_scope())
     return SpecForces(found["covector"], found["vector"], declared.formula(damping, declared.dated_scope()))
+
+
+def _noise(given: Mapping[str, tuple[Scalar, Any]], declared: Declarations) -> dict[str, SpecNoise]:
+    """The sources of ``noise``; amplitudes are the same everywhere, for σ∇g to be the gradient of a function."""
+    if declared.lattice:
+        return {}
+    scope, found = declared.dated_constants("an amplitude"), {}
+    if len(given) > limits.SOURCES:
+        message = f"noise: {len(given)} sources, the limit is {limits.SOURCES}"
+        declared.reader.problems.add(message, declared.reader.locations["noise",], limit=True)
+    for name, (_, source) in given.items():
+        node = (source or {}).get("amplitude")
+        hamiltonian = declared.formula((source or {}).get("hamiltonian"), declared.dated_scope())
+        amplitude = ONE if node is None else declared.formula(node, scope)
+        if hamiltonian is not None and amplitude is not None:
+            found[name] = SpecNoise(hamiltonian, amplitude)
+    return found
 
 
 def _gauge(

@@ -77,6 +77,8 @@ def modified(compilation: Compilation, parameters: Mapping[str, float], gauge: F
         raise NotOfferedError("it depends on the time, and is not constant")
     if not compilation.exact:
         raise NotOfferedError("the bi-realisation is an approximate one")
+    if system.noise:
+        raise NotOfferedError("with noise a step is not the flow of a Hamiltonian")
     if system.forces:
         raise NotOfferedError("with forces a step is not the flow of a Hamiltonian")
     if order.order > MOST_ORDER:

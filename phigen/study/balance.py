@@ -19,8 +19,8 @@ FINE, COARSE = (1 / 2, 3 / 28, 1 / 84, 1 / 1680), (1 / 2, 1 / 10, 1 / 120, 0.0)
 
 
 def powers(system: System) -> list[Expression]:
-    """P and its derivatives along the motion; empty where H is an invariant."""
-    if not system.driven:
+    """P and its derivatives along the motion; empty where H is an invariant, or noise works on it too."""
+    if not system.driven or system.noise:
         return []
     found, field = [], [*system.vector_field(), *(ONE for _ in system.times)]
     power = total([*gradient(system.hamiltonian, system.times), system.forced_rate(system.hamiltonian)])

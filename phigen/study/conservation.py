@@ -38,7 +38,7 @@ class Unit:
     """What errors of a quantity are divided by: ``size``, of the ``kind`` `RELATIVE`, `TERMS` or `ABSOLUTE`.
 
     ``terms`` are those of the quantity at the start, which rounding is in proportion to, in this unit. ``moves`` tells
-    that the quantity is no invariant, since time or forces change it: what it differs by is no error.
+    that the quantity is no invariant, since time, forces or noise change it: what it differs by is no error.
     """
 
     size: float = 1.0
@@ -78,7 +78,7 @@ def units_of(system: System, parameters: Mapping[str, float], start: Floats) -> 
 
 
 def moving(system: System) -> list[str]:
-    """The names of energy and Casimirs that time or forces change."""
+    """The names of energy and Casimirs that time, forces or noise change."""
     return [ENERGY, *system.pushed] if system.driven else []
 
 

@@ -22,6 +22,22 @@ MEANINGS = (
         "S_1 … S_k or the composition are not those of the stated order",
     ),
     Meaning(
+        "strong order",
+        "how the error along one path of the noise shrinks with the step, as a mean over 48 paths. The increments of "
+        "a coarse step are sums of those of finer ones; the solution is that of the fields along the path joined by "
+        "lines",
+        "the noise is not that of the spec, or not in the sense of Stratonovich, or sources are taken twice",
+    ),
+    Meaning(
+        "steps that fail",
+        "steps from four states with increments of the noise that are all as large as they can be",
+        "the run may fail some day, where a rare increment makes a step impossible: make the step smaller",
+    ),
+    Meaning(
+        "energy: largest change",
+        "how far H went from its value at the start where there is noise; it is no error",
+    ),
+    Meaning(
         "Casimir: largest error",
         "how far a Casimir went from its value at the start, relative to that, over all steps",
         "the step leaves the symplectic leaf, or rounding adds up to a drift; the bound is a random walk of rounding "

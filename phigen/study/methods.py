@@ -49,6 +49,17 @@ def of_solver(solver: Solver, parameters: Mapping[str, float], gauge: Floats | N
     )
 
 
+def without_noise(solver: Solver, parameters: Mapping[str, float], t0: float = 0.0) -> Method:
+    """A generated solver whose increments of the noise are all 0."""
+    begin, draws = t0 if solver.interface.time else None, solver.interface.draws
+
+    def rows(x: Floats, h: float, steps: int, stride: int) -> Floats:
+        still = np.zeros((steps, draws))
+        return solver.integrate(x, h, steps, stride, t0=begin, increments=still, parameters=parameters).x
+
+    return Method(solver.target, lambda x, h: rows(x, h, 1, 1)[-1], rows)
+
+
 def field_of(solver: Solver, parameters: Mapping[str, float]) -> Callable[[Floats], Floats]:
     """The vector field of a solver at one state (DIM,), without the checks that the public method makes each time.
 

@@ -112,6 +112,7 @@ class Watch:
         self._powers = powers(system)
         if self._powers:  # the last time with the powers there; the work since the start, and how far that may be off
             self.state |= {"instant": np.full(1 + len(self._powers), np.nan), "work": np.zeros(2)}
+        if system.driven:
             self.state["since"] = np.zeros(())
 
     @property
@@ -137,6 +138,8 @@ class Watch:
         if count == 0:
             return done
         t, x = t[:count], x[:count]
+        if "since" in state and not self.begun:
+            state["since"] = np.asarray(t[0])
         columns = {c: x[:, i] for i, c in enumerate(self._system.coordinates)} | dict.fromkeys(self._system.times, t)
         known = {**self._parameters, **columns}
         values = [np.broadcast_to(a, t.shape) for a in evaluate(self._formulas, known)]
@@ -160,7 +163,7 @@ class Watch:
         """∫ ∂_tH dt up to each of the times, which follow those seen before, from the powers there."""
         state = self.state
         if not self.begun:
-            state |= {"instant": np.array([t[0], *(f[0] for f in found)]), "since": np.asarray(t[0])}
+            state["instant"] = np.array([t[0], *(f[0] for f in found)])
         rows = np.concatenate([state["instant"][:, np.newaxis], np.array([t, *found])], axis=1)
         parts, off = works(rows[0], rows[1:])
         sums: Floats = state["work"][0] + np.cumsum(parts)

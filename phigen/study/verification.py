@@ -17,17 +17,21 @@ import numpy as np
 from phigen import progress
 from phigen.compilation import Compilation
 from phigen.errors import StepError
+from phigen.geometry.checks import commuting
 from phigen.runtime.solver import Solver
 from phigen.study import backward, measures
 from phigen.study.conservation import Unit, largest_terms, rounding, units_of
-from phigen.study.methods import Method, field_of, of_classical, of_solver
+from phigen.study.methods import Method, field_of, of_classical, of_solver, without_noise
 from phigen.study.monitored import field_in_tau, with_time
+from phigen.study.stochastic import failures, strong_order
 from phigen.study.summary import Drift, Summary, summarise
 from phigen.symbolic.arrays import Floats
 from phigen.symbolic.expression import Expression
 
 #: Observed orders may fall short of the stated one by this much.
 ORDER_SLACK = 0.3
+#: The same of strong orders, which are measured on few paths.
+STRONG_SLACK = 0.2
 #: The power of the modified Hamiltonian may fall short by this part of what the last correction adds to it.
 MODIFIED_SLACK = 0.6
 #: One-step identities: the Poisson defect, reversibility, agreement of targets, each relative to its terms.
@@ -131,11 +135,14 @@ def verify(
     own = {target: of_solver(solver, parameters, gauge, t0) for target, solver in solvers.items()}
     solver = next(iter(solvers.values()))
     field = field_in_tau(solver, parameters) if compilation.program.monitor else field_of(solver, parameters)
-    others = {name: of_classical(name, solver, parameters, t0, field) for name in compare}
+    noisy = bool(compilation.system.noise)
+    others = {name: of_classical(name, solver, parameters, t0, field) for name in (() if noisy else compare)}
     made = min(steps, FEW_STEPS if quick else MOST_STEPS)
     subject = Subject(compilation, solver, own, others, parameters, x, h, made, t0, field)
     rows = subject.main.rows(x, h, made, 1)
-    states = [rows[i] for i in np.linspace(0, made, STATES, dtype=int)] if made >= STATES else [x]
+    # With noise, trajectories may well start where single steps have no scale: at rest, at the origin.
+    first = made // STATES if noisy else 0
+    states = [rows[i] for i in np.linspace(first, made, STATES, dtype=int)] if made >= STATES else [x]
     order, symmetry = compilation.order.order, "symmetric" if compilation.symmetric else "not symmetric"
     return Verification(
         compilation.spec.name,
@@ -148,8 +155,9 @@ def verify(
         _measured(
             compilation.spec.name,
             {
-                "order": lambda: [order_check(subject, quick=quick)],
+                "order": lambda: [order_check(subject, states[-1], quick=quick)],
                 "time": lambda: time_checks(subject, gauge, quick=quick),
+                "noise": lambda: noise_checks(subject, states),
                 "conservation": lambda: conservation_checks(subject, rows),
                 "single steps": lambda: one_step_checks(subject, states),
                 "agreement": lambda: [agreement_check(subject, states)],
@@ -182,9 +190,28 @@ def gauge_at(compilation: Compilation, x: Floats, parameters: Mapping[str, float
     return chosen
 
 
-def order_check(subject: Subject, *, quick: bool = False) -> Check:
-    """The observed order against the stated one."""
-    return _order_check("observed order", subject, quick=quick)
+def order_check(subject: Subject, state: Floats, *, quick: bool = False) -> Check:
+    """The observed order against the stated one; with noise, that without it, from a state along the run."""
+    if not subject.compilation.system.noise:
+        return _order_check("observed order", subject, quick=quick)
+    still = without_noise(subject.solver, subject.parameters, subject.t0)
+    quiet = replace(subject, own={still.name: still}, others={}, start=state)
+    return _order_check("observed order, without the noise", quiet, quick=quick)
+
+
+def noise_checks(subject: Subject, states: Sequence[Floats]) -> Iterator[Check]:
+    """The strong order along given paths, and that the largest increments of all sources leave steps possible."""
+    system = subject.compilation.system
+    if not system.noise:
+        return
+    stated = 1.0 if commuting(system) else 0.5
+    about = subject.solver, subject.start, subject.parameters, subject.t0
+    found = strong_order(*about, subject.h, min(subject.steps, 8))
+    reason, limit = f"{found:.2f} instead of {stated:g}", f"at least {stated - STRONG_SLACK:.1f}, stated {stated:g}"
+    yield Check("strong order, along common paths", found, limit, found >= stated - STRONG_SLACK, reason)
+    failed = failures(subject.solver, states, subject.parameters, subject.t0, subject.h)
+    name, reason = "steps that fail, of increments as large as can be", f"{failed} fail; a smaller step helps"
+    yield Check(name, failed, "none", failed == 0, reason)
 
 
 def time_checks(subject: Subject, gauge: Floats | None, *, quick: bool = False) -> Iterator[Check]:
@@ -262,6 +289,9 @@ def conservation_checks(subject: Subject, rows: Floats) -> Iterator[Check]:
         yield Check(f"Casimir {name}: largest error", drift.error, limit, passed, reason, _errors(drifts))
         yield Check(f"Casimir {name}: last/first window", drift.growth, others=_growths(drifts))
     energy, drifts = own.energy, {m: s.energy if s else None for m, s in others.items()}
+    if system.noise:
+        yield Check("energy: largest change", energy.error)
+        return
     what = "energy balance" if system.driven else "energy"
     yield Check(f"{what}: largest error", energy.error, others=_errors(drifts))
     judged = math.isfinite(energy.growth) and subject.compilation.poisson and _recurrent(rows)

@@ -37,6 +37,9 @@ class Symbol(str):
 #: The size of a step, or the time of a flow; the time of an exact solution; a matrix Σ p_i E_i.
 STEP, ELAPSED, MATRIX = Symbol("h"), Symbol("time"), Symbol("P")
 
+#: Increments of the Wiener processes in a step, by the number of the source.
+INCREMENT = "dw"
+
 #: e = −H(x₀), which a monitored step holds fixed.
 LEVEL = Symbol("e")
 
@@ -44,6 +47,11 @@ LEVEL = Symbol("e")
 def momentum(name: str) -> Symbol:
     """The symbol of the covector component that belongs to a coordinate."""
     return Symbol(MOMENTUM, name)
+
+
+def increment(k: int) -> Symbol:
+    """The symbol of the increment of a source of noise in a step."""
+    return Symbol(INCREMENT, k)
 
 
 def initial(name: str) -> Symbol:

@@ -35,6 +35,9 @@ ROWS = {
     "TAYLOR_BYTES": "memory of all products and sums of a series, in bytes",
     "SERIES_TERMS": "terms of one S_i",
     "PROOF_PRODUCTS": "products of terms in the proof of a bi-realisation",
+    "SEED": "seed of noise",
+    "MEMBERS": "members of a run",
+    "SOURCES": "sources of noise",
     "STEPS": "steps of a run",
     "ERRORS": "errors that are listed",
 }

@@ -12,7 +12,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from phigen.lanes.lowering import Blocks, Lanes, Rows, in_lanes
 from phigen.scheme.kernel import Kernel
 from phigen.scheme.path import Recurrences
-from phigen.scheme.program import Attitude, Program
+from phigen.scheme.program import BOUND, Attitude, Noise, Program
 from phigen.scheme.steps import Adjoint, Explicit, Implicit, Path, PathAdjoint, Splitting, Sweeps
 from phigen.spec.model import Parameter
 from phigen.targets.c import functions, paths, splitting, sweeps
@@ -114,8 +114,9 @@ def printed(program: Program, lanes: Lanes | None, has: Mapping[str, bool]) -> d
 def _declarations(program: Program, lanes: Lanes | None, has: Mapping[str, bool]) -> dict[str, object]:
     member = members(program)
     sizes: Sizes = [("STAGES", len(program.fractions), "of a step")] if has["COMPOSED"] else []
-    only = ", and on the time" if program.step.refresh else " only"
+    only = f", and on {_renewing(program)}" if program.step.refresh else " only"
     sizes.append(("COEFFICIENTS", max(1, program.step.coefficients), f"numbers that depend on params and h{only}"))
+    sizes += _of_noise(program.noise) if program.noise else []
     if program.held:
         whose = f"Casimirs whose multiples are taken from H: {', '.join(program.held)}"
         sizes.append(("GAUGES", len(program.held), "that a trajectory holds fixed: e" if program.monitor else whose))
@@ -130,6 +131,7 @@ def _declarations(program: Program, lanes: Lanes | None, has: Mapping[str, bool]
         sizes.append(("AHEAD", memory["AHEAD"], "values that it foresees"))
     return {
         "NAME": program.name,
+        "noise": program.noise is not None,
         "n": program.dimension,
         "order": program.order,
         "casimir_count": len(program.casimirs),
@@ -143,6 +145,21 @@ def _declarations(program: Program, lanes: Lanes | None, has: Mapping[str, bool]
         or [("char unused;", "this system has no parameters")],
         "sizes": sizes,
     }
+
+
+def _renewing(program: Program) -> str:
+    """What `refresh` computes from."""
+    given = {"the time": program.time, "the noise": program.noise}
+    return " and ".join(name for name, there in given.items() if there)
+
+
+def _of_noise(noise: Noise) -> Sizes:
+    names = ", ".join(noise.sources)
+    return [
+        ("SOURCES", len(noise.sources), f"of noise: {names}"),
+        ("DRAWS", noise.draws, "increments of the noise in a step"),
+        ("PARTS", noise.parts, "increments of one source in a step, each of a part of it"),
+    ]
 
 
 def _of_attitude(attitude: Attitude) -> Sizes:
@@ -213,7 +230,7 @@ def _model(program: Program, lanes: Lanes | None, has: Mapping[str, bool], other
     own += [step.tangent] if isinstance(step, Explicit) else []
     own += [program.attitude.turn, program.attitude.rate] if program.attitude else []
     if step.refresh and not isinstance(step, Splitting):
-        body.append(function(program, step.refresh, name="at_time"))
+        body.append(function(program, step.refresh, name="at_step" if program.noise else "at_time"))
     if step.adjoint:
         own += [] if isinstance(step, Splitting) else step.adjoint.steps
         own += _of_adjoint(program, step.adjoint)
@@ -222,6 +239,8 @@ def _model(program: Program, lanes: Lanes | None, has: Mapping[str, bool], other
     body += [function(program, kernel) for kernel in own if kernel]
     body.append(function(program, seen.energy, name="hamiltonian", exported=True, returning=True))
     body += [function(program, kernel, exported=True) for kernel in (seen.casimirs, seen.vector_field)]
+    if program.noise:
+        body.append(function(program, program.noise.fields, exported=True))
     if program.monitor:
         body.append(function(program, program.monitor.rate, exported=True, returning=True))
     if program.modified:
@@ -250,7 +269,8 @@ def _model(program: Program, lanes: Lanes | None, has: Mapping[str, bool], other
     }
     values["middles"] = ", ".join(map(repr, program.midpoints))
     values["moments"] = ", ".join(map(repr, schedule.moments)) if schedule else ""
-    values["middles"] = render("c", "middles.c", values) if step.refresh else ""
+    values["middles"] = render("c", "middles.c", values) if step.refresh and program.time else ""
+    values["bound"] = repr(BOUND) if program.noise else ""
     return render("c", "constants.c", values) + text
 
 

@@ -10,7 +10,7 @@ from dataclasses import replace
 from phigen.errors import Diagnostic, SpecError
 from phigen.scheme.kernel import Kernel
 from phigen.scheme.path import Recurrences
-from phigen.scheme.program import Program
+from phigen.scheme.program import BOUND, Program
 from phigen.scheme.steps import LONGEST_PATH, MOST_PIECES, Explicit, Implicit, Newton, Path, Splitting, Sweeps
 from phigen.symbolic.functions import FUNCTIONS, written_in
 from phigen.targets import special
@@ -66,6 +66,7 @@ def emit(program: Program, command: str) -> dict[str, str]:
     chosen = {Newton: "newton", Explicit: "explicit", Path: "path", Splitting: "splitting"}[type(step)]
     modules = ["solver", chosen]
     modules += ["taylor"] if isinstance(step, Path) else []
+    modules += ["noise"] if program.noise else []
     modules += ["guess"] if features["IMPLICIT"] else []
     modules += ["gauge" if program.searches_gauge else "gauge_formula"] if program.gauge else []
     modules += ["level"] if program.monitor else []
@@ -91,6 +92,7 @@ def _features(program: Program) -> dict[str, bool]:
         "SPLITTING": isinstance(step, Splitting),
         "KICKS": isinstance(step, Splitting) and bool(step.schedule.multiples),
         "TIMED": bool(program.time),
+        "NOISE": program.noise is not None,
         "RENEWED": step.refresh is not None,
         "MODIFIED": program.modified is not None,
         "TANGENT": program.extras.tangent,
@@ -131,6 +133,10 @@ def _system(program: Program) -> Mapping[str, object]:
         "positive": json.dumps([p.name for p in parameters if p.positive]),
         "gauge": json.dumps(program.held) if program.held else "",
         "monitored": program.monitor is not None,
+        "sources": json.dumps(program.noise.sources) if program.noise else "",
+        "parts": program.noise.parts if program.noise else 0,
+        "draws": program.noise.draws if program.noise else 0,
+        "bound": json.dumps(BOUND),
         "fractions": json.dumps(program.fractions),
         "table": render("js", "table.mjs", _table(program)).strip("\n"),
     }
@@ -158,6 +164,7 @@ def _table(program: Program) -> Mapping[str, object]:
     return {
         "middles": json.dumps(program.midpoints) if step.refresh else "",
         "prepared": step.prepared,
+        "renewing": "the step" if program.noise else "the time",
         "coefficients": step.row,
         "moments": json.dumps(step.schedule.moments) if isinstance(step, Splitting) and step.refresh else "",
         "times": isinstance(step, Splitting),
@@ -211,7 +218,8 @@ def _kernels(program: Program) -> list[Kernel]:
     modified = [program.modified.kernel] if program.modified else []
     refresh = [step.refresh] if step.refresh else []
     timed = [k for k in (program.monitor.elapsed, program.monitor.rate) if k] if program.monitor else []
-    others = [*program.choice, *timed, *modified, seen.energy, seen.casimirs, seen.vector_field]
+    noisy = [program.noise.fields] if program.noise else []
+    others = [*program.choice, *timed, *noisy, *modified, seen.energy, seen.casimirs, seen.vector_field]
     if isinstance(step, Splitting):
         return [replace(step.prepare, name="prepare_row"), *refresh, *step.flows, *step.tangents, *others]
     assert not isinstance(step, Sweeps)

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from phigen.scheme.kernel import SCALARS, Kernel, Output
-from phigen.scheme.program import Attitude, Program
+from phigen.scheme.program import BOUND, Attitude, Program
 from phigen.scheme.staging import TABLE
 from phigen.scheme.steps import (
     LONGEST_PATH,
@@ -38,6 +38,10 @@ from phigen.targets.reserved import PYTHON_RESERVED
 
 #: Most terms of the expansion of a path, as in the C target.
 TERMS = 30
+
+_NOISE_ARGUMENTS = """ The random
+    numbers are a function of seed, member (that of the first, or one for each) and the number of the step, from step0
+    on; increments (steps, increments) for all members, or (steps, members, increments), take their place."""
 
 PATH_SYNTAX = Syntax(
     printer=LANGUAGE.printer,
@@ -74,10 +78,12 @@ def _body(program: Program) -> str:
     pieces += [_function(program, kernel) for kernel in program.choice]
     pieces += _monitor(program)
     coefficients = "coefficients_in_time.py" if program.time else "coefficients.py"
+    coefficients = "noise.py" if program.noise else coefficients
     integrate = "integrate_monitored.py" if program.monitor else "integrate.py"
     parts = (coefficients, "single.py", "checked.py", integrate)
     pieces += [render("numpy", part, _values(program)) for part in parts]
     pieces += [_function(program, kernel) for kernel in (seen.energy, seen.casimirs, seen.vector_field)]
+    pieces += [_function(program, program.noise.fields)] if program.noise else []
     pieces += [render("numpy", "observables.py", _values(program))]
     if program.extras.tangent:
         pieces += _tangent(program)
@@ -106,6 +112,7 @@ def _step(program: Program) -> list[str]:
     refresh, prepare = program.step.refresh, program.step.prepare
     renewing = [_function(program, refresh)] if refresh else []
     early = [_function(program, prepare), *renewing]
+    guess = "anew" if program.noise else "guess"
     match program.step:
         case Splitting(flows=flows, schedule=schedule) as step:
             values |= _splitting_values(step)
@@ -116,10 +123,10 @@ def _step(program: Program) -> list[str]:
             return [*early, _function(program, increment), *rendered("explicit")]
         case Path(recurrences=path, generate=generate):
             values |= statements(program, path, PATH_SYNTAX)
-            parts = rendered("holds", "piece", "path", "residual", "solve", "plausible", "path_step")
+            parts = rendered("holds", "piece", "path", "residual", "solve", "plausible", "path_step", f"path_{guess}")
             return [*early, _function(program, generate), *parts]
         case Newton(linearise=linearise):
-            parts = rendered("solve", "plausible", "newton")
+            parts = rendered("solve", "plausible", "newton", f"newton_{guess}")
             return [*early, _function(program, linearise), *parts]
         case Sweeps():
             raise AssertionError("lattices have a module of their own")
@@ -284,6 +291,7 @@ def _values(program: Program) -> dict[str, object]:
         "plausible": repr(PLAUSIBLE),
         "path_pieces": repr(tuple(1 << k for k in range(LONGEST_PATH.bit_length()))),
         "most_pieces": MOST_PIECES,
+        **_noise_values(program),
         "time": bool(program.time),
         "at_t": "t, " * bool(program.time),
         "t0_given": ", t0=0.0" * bool(program.time),
@@ -291,7 +299,6 @@ def _values(program: Program) -> dict[str, object]:
         "said_from_t0": ", from the time t0" * bool(program.time),
         "said_of_t0": " t0 is the time of x0." * bool(program.time),
         "said_of_each": "h, t0 and parameters" if program.time else "h and parameters",
-        "stages_now": "[_renewed(s, t0 + done * h, h) for s in stages]" if program.time else "stages",
         "renewed": step.renewed,
         "prepared": step.prepared,
         "moments": "(" + "".join(f"{m!r}, " for m in step.schedule.moments).rstrip() + ")"
@@ -305,6 +312,28 @@ def _values(program: Program) -> dict[str, object]:
         "tolerance": repr(inner.tolerance),
         # The floor of the scale of a component: see _size.
         "floor": "0.0" if inner.relative else "1e-6",
+    }
+
+
+def _noise_values(program: Program) -> dict[str, object]:
+    """What depends on whether coefficients are those of a single step, with its time or its noise."""
+    noise = program.noise
+    renewed, drawn = bool(program.time or noise), ["drawn(done)"] if noise else []
+    now = ", ".join(["s", "t0 + done * h" if program.time else "done * h", "h", *drawn])
+    first = ["float(t0)" if program.time else "0.0", "float(h)"]
+    first += ["_drawing(float(h), len(x), seed, member, step0, increments)(0)"] if noise else []
+    named = ("seed", "member", "step0", "increments")
+    return {
+        "noise": noise is not None,
+        "sources": _strings(noise.sources) if noise else "",
+        "noise_parts": noise.parts if noise else 0,
+        "bound": repr(BOUND),
+        "noise_given": ", seed=0, member=0, step0=0, increments=None" * bool(noise),
+        "noise_passed": "".join(f", {name}={name}" for name in named) * bool(noise),
+        "said_of_noise": _NOISE_ARGUMENTS * bool(noise),
+        "of_stage": ", ".join(["_, parameters, h", *(["t"] if program.time else []), *(["dw"] if noise else [])]),
+        "stages_now": f"[_renewed({now}) for s in stages]" if renewed else "stages",
+        "renewed_stage": f"            stage = _renewed({', '.join(['stage', *first])})\n" if renewed else "",
     }
 
 

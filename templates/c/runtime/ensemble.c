@@ -80,7 +80,13 @@ phi_status phi_ensemble(const phi_params *params, double *x, size_t members, dou
 }
 
 #else
-#if PHI_TIMED
+#if PHI_NOISE && PHI_TIMED
+phi_status phi_ensemble_of(const phi_params *params, double *x, size_t members, double t0, double h, size_t steps,
+    uint64_t seed, uint32_t first_member, uint64_t first_step, unsigned char *status)
+#elif PHI_NOISE
+phi_status phi_ensemble_of(const phi_params *params, double *x, size_t members, double h, size_t steps,
+    uint64_t seed, uint32_t first_member, uint64_t first_step, unsigned char *status)
+#elif PHI_TIMED
 phi_status phi_ensemble_at(const phi_params *params, double *x, size_t members, double t0, double h, size_t steps,
     unsigned char *status)
 #else
@@ -90,7 +96,15 @@ phi_status phi_ensemble(const phi_params *params, double *x, size_t members, dou
 {
     phi_status worst = isfinite(h) ? PHI_OK : PHI_BAD_ARGUMENT;
     const phi_params own = params != NULL ? *params : phi_default_params;
+#if PHI_NOISE
+    size_t earliest = members;
+#endif
     if (x == NULL && members > 0) return PHI_BAD_ARGUMENT;
+#if PHI_NOISE
+#ifdef _OPENMP
+#pragma omp parallel for schedule(dynamic, 16)
+#endif
+#endif
     for (size_t m = 0; m < members; ++m) {
         phi_solver s;
         double x0[PHI_DIM];
@@ -101,13 +115,42 @@ phi_status phi_ensemble(const phi_params *params, double *x, size_t members, dou
         phi_status member = phi_init(&s, &own, x0);
 #endif
         if (member == PHI_OK) {
+#if PHI_NOISE
+            phi_set_noise(&s, seed, first_member + (uint32_t)m, first_step);
+#endif
             member = phi_integrate(&s, h, steps);
             for (size_t i = 0; i < PHI_DIM; ++i) x[i * members + m] = s.x[i];
         }
         if (status != NULL) status[m] = (unsigned char)member;
+#if PHI_NOISE
+        if (member == PHI_OK) continue;
+#ifdef _OPENMP
+#pragma omp critical
+#endif
+        if (m < earliest) {
+            earliest = m;
+            worst = member;
+        }
+#else
         if (worst == PHI_OK) worst = member;
+#endif
     }
     return worst;
+}
+#endif
+#if PHI_NOISE && PHI_TIMED
+
+phi_status phi_ensemble_at(const phi_params *params, double *x, size_t members, double t0, double h, size_t steps,
+    unsigned char *status)
+{
+    return phi_ensemble_of(params, x, members, t0, h, steps, 0, 0, 0, status);
+}
+#elif PHI_NOISE
+
+phi_status phi_ensemble(const phi_params *params, double *x, size_t members, double h, size_t steps,
+    unsigned char *status)
+{
+    return phi_ensemble_of(params, x, members, h, steps, 0, 0, 0, status);
 }
 #endif
 #if PHI_TIMED

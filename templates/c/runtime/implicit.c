@@ -5,6 +5,7 @@
 
 #include "model.h"
 
+#if PHI_GUESSED
 /* ---- Starting guesses ---- */
 #if PHI_RECURRENCES
 #include "recurrence.c"
@@ -158,6 +159,7 @@ static void phi_remember(phi_history *history, const double value[PHI_DIM])
 }
 
 #endif
+#endif
 #define PHI_PLAUSIBLE 1.5 /* how far any step may lead, in sizes of the state and of its motion */
 #define PHI_LOST 0.5      /* part of the energy that one which leads farther must not lose */
 
@@ -183,6 +185,15 @@ static int phi_plausible(const phi_solver *s, int stage, const double increment[
     for (int i = 0; i < PHI_DIM; ++i) size += fabs(phi_fractions[stage] * s->h * rate * field[i]);
 #else
     for (int i = 0; i < PHI_DIM; ++i) size += fabs(phi_fractions[stage] * s->h * field[i]);
+#endif
+#if PHI_NOISE
+    double fields[PHI_SOURCES * PHI_DIM];
+#if PHI_TIMED
+    phi_noise_fields(&s->params, s->t, s->x, fields);
+#else
+    phi_noise_fields(&s->params, s->x, fields);
+#endif
+    for (int k = 0; k < PHI_SOURCES * PHI_DIM; ++k) size += fabs(s->dw[k / PHI_DIM] * fields[k]);
 #endif
     if (moved <= PHI_PLAUSIBLE * size) return 1;
 #if PHI_TIMED

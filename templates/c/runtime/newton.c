@@ -53,7 +53,11 @@ static phi_status phi_attempt(phi_solver *s, int stage)
     double y[PHI_DIM], delta[PHI_DIM], displacement[PHI_DIM], increment[PHI_DIM];
     double jacobian[PHI_DIM * PHI_DIM], increment_jacobian[PHI_DIM * PHI_DIM];
     double previous = HUGE_VAL;
+#if PHI_GUESSED
     if (!phi_predict(&s->history[stage], y)) memcpy(y, s->x, sizeof y);
+#else
+    memcpy(y, s->x, sizeof y);
+#endif
     for (int iteration = 1; iteration <= PHI_MAX_ITERATIONS; ++iteration) {
         phi_linearise(s->coef[stage], y, displacement, increment, jacobian, increment_jacobian);
         ++s->evaluations;
@@ -85,7 +89,7 @@ static phi_status phi_attempt(phi_solver *s, int stage)
 #endif
 #if PHI_RECURRENCES
         phi_remember(&s->history[stage], y, iteration);
-#else
+#elif PHI_GUESSED
         phi_remember(&s->history[stage], y);
 #endif
 #if PHI_ATTITUDE

@@ -134,7 +134,11 @@ static phi_status phi_attempt(phi_solver *s, int stage)
 {
     const double *coef = s->coef[stage];
     double p[PHI_DIM], y[PHI_DIM], residual[PHI_DIM], change[PHI_DIM], jacobian[PHI_DIM * PHI_DIM], previous = HUGE_VAL;
+#if PHI_GUESSED
     if (!phi_predict(&s->history[stage], y)) memcpy(y, s->x, sizeof y);
+#else
+    memcpy(y, s->x, sizeof y);
+#endif
     phi_generate(coef, y, p, jacobian);
     for (int iteration = 0, made = 0; iteration < PHI_MAX_ITERATIONS && made <= PHI_MOST_PIECES; ++iteration) {
         if (!phi_residual(s, coef, p, y, residual, change, jacobian, &made)) return PHI_NO_CONVERGENCE;
@@ -159,7 +163,7 @@ static phi_status phi_attempt(phi_solver *s, int stage)
 #endif
 #if PHI_RECURRENCES
             phi_remember(&s->history[stage], y, iteration);
-#else
+#elif PHI_GUESSED
             phi_remember(&s->history[stage], y);
 #endif
 #if PHI_ATTITUDE

@@ -4,7 +4,7 @@
 #include <string.h>
 
 #include "model.h"
-#if PHI_IMPLICIT
+#if PHI_GUESSED
 #include "implicit.c"
 #endif
 #if PHI_MONITOR
@@ -14,7 +14,7 @@
 #include "attitude.c"
 #endif
 /* ---- Between steps ---- */
-#if PHI_IMPLICIT
+#if PHI_GUESSED
 #define PHI_NEAR_BY 0.125 /* how far the state may be moved, in its own size, for guesses to move with it */
 
 /* Guesses move with the state, by as many past values as extrapolation needs; recurrences are of the motion as it was. From
@@ -65,7 +65,7 @@ static phi_status phi_place(phi_solver *s, const double x[PHI_DIM], const double
     for (int stage = 0; stage < PHI_STAGES; ++stage) /* where s->h is NaN the next step does it again */
         phi_prepare(&s->params, s->gauge, phi_fractions[stage] * s->h, s->coef[stage]);
 #endif
-#if PHI_IMPLICIT
+#if PHI_GUESSED
     phi_move_guesses(s, x);
 #endif
     memcpy(s->x, x, sizeof s->x);

@@ -28,6 +28,10 @@
 #include "lanes.c"
 #endif
 
+#if PHI_NOISE
+#include "noise.c"
+#endif
+
 /* ---- The solver ---- */
 #if PHI_PARAMETERS
 #define PHI_SHORT_STEP 1e-100 /* so short that it has no part in whether coefficients are finite */
@@ -112,7 +116,7 @@ static phi_status phi_set_step(phi_solver *s, double h)
 #else
         phi_prepare(&s->params, phi_fractions[stage] * h, s->coef[stage]);
 #endif
-#if PHI_IMPLICIT
+#if PHI_GUESSED
     memset(&s->history, 0, sizeof s->history);
 #endif
 #if PHI_RECURRENCES
@@ -132,7 +136,11 @@ static phi_status phi_set_step(phi_solver *s, double h)
 }
 
 #if PHI_RENEWED
+#if PHI_NOISE
+/* What depends on the increments of the next step. */
+#else
 /* What depends on the time of the next step. */
+#endif
 static void phi_renew(phi_solver *s)
 {
 #if PHI_SPLITTING
@@ -142,7 +150,13 @@ static void phi_renew(phi_solver *s)
     }
 #else
     for (int stage = 0; stage < PHI_STAGES; ++stage)
+#if PHI_NOISE && PHI_TIMED
+        phi_at_step(s->coef[stage], s->t + phi_middles[stage] * s->h, s->dw, s->coef[stage] + PHI_PREPARED);
+#elif PHI_NOISE
+        phi_at_step(s->coef[stage], s->dw, s->coef[stage] + PHI_PREPARED);
+#else
         phi_at_time(s->coef[stage], s->t + phi_middles[stage] * s->h, s->coef[stage] + PHI_PREPARED);
+#endif
 #endif
 }
 
@@ -158,7 +172,7 @@ static void phi_count(phi_solver *s, size_t steps)
 }
 
 #endif
-#if PHI_IMPLICIT
+#if PHI_GUESSED
 /* One stage. A guess from earlier steps may have misled it: then once more without. */
 static phi_status phi_stage(phi_solver *s, int stage)
 {
@@ -167,6 +181,10 @@ static phi_status phi_stage(phi_solver *s, int stage)
     memset(&s->history[stage], 0, sizeof s->history[stage]);
     return phi_attempt(s, stage);
 }
+
+#elif PHI_IMPLICIT
+/* One stage. */
+static phi_status phi_stage(phi_solver *s, int stage) { return phi_attempt(s, stage); }
 
 #endif
 #if PHI_COMPOSED
@@ -234,10 +252,18 @@ phi_status phi_step(phi_solver *s, double h)
 
 #endif
 #else
+#if PHI_NOISE
+phi_status phi_integrate_along(phi_solver *s, double h, size_t steps, const double *dw)
+#else
 phi_status phi_integrate(phi_solver *s, double h, size_t steps)
+#endif
 {
     phi_status status = phi_set_step(s, h);
     for (; steps > 0 && status == PHI_OK; --steps) {
+#if PHI_NOISE
+        if (!phi_draw(s, dw)) return PHI_BAD_ARGUMENT;
+        if (dw != NULL) dw += PHI_DRAWS;
+#endif
 #if PHI_RENEWED
         phi_renew(s);
 #endif
@@ -260,6 +286,10 @@ phi_status phi_integrate(phi_solver *s, double h, size_t steps)
     return status;
 }
 
+#if PHI_NOISE
+phi_status phi_integrate(phi_solver *s, double h, size_t steps) { return phi_integrate_along(s, h, steps, NULL); }
+
+#endif
 phi_status phi_step(phi_solver *s, double h) { return phi_integrate(s, h, 1); }
 
 #endif

@@ -3,7 +3,7 @@
 #include "declarations.h"
 #include "status.h"
 
-#if PHI_IMPLICIT && !PHI_RECURRENCES
+#if PHI_GUESSED && !PHI_RECURRENCES
 enum { PHI_DIFFERENCES = 9 }; /* those of higher order amplify rounding more than they gain */
 
 /* The last value of the unknown and its backward differences, for a guess at the next. */
@@ -58,6 +58,11 @@ typedef struct {
 #else
     double t;              /* time since phi_init */
 #endif
+#if PHI_NOISE
+    uint64_t seed, first_step; /* which random numbers are taken, see phi_set_noise */
+    uint32_t member;
+    double dw[PHI_DRAWS];  /* the increments of the noise in the last step */
+#endif
     double h;              /* the last step size; NaN before the first step */
     phi_params params;
 #if PHI_MONITOR
@@ -65,7 +70,9 @@ typedef struct {
 #elif PHI_GAUGE
     double gauge[PHI_GAUGES]; /* multiples of Casimirs that are taken from H, in their order */
 #endif
-#if PHI_RENEWED
+#if PHI_NOISE
+    double coef[PHI_STAGES][PHI_COEFFICIENTS]; /* what depends on params and h only, then on dw and the time as well */
+#elif PHI_RENEWED
     double coef[PHI_STAGES][PHI_COEFFICIENTS]; /* what depends on params and h only, then on the time of the step as well */
 #else
     double coef[PHI_STAGES][PHI_COEFFICIENTS]; /* all that depends on params and h only */
@@ -90,7 +97,7 @@ typedef struct {
     size_t steps_before_h; /* steps and t when h was set: t is counted from there, so no error adds up */
     double t_before_h;
 #endif
-#if PHI_IMPLICIT
+#if PHI_GUESSED
     phi_history history[PHI_STAGES]; /* for starting guesses */
 #endif
 #if PHI_BLOCKS
@@ -109,6 +116,13 @@ phi_status phi_init(phi_solver *s, const phi_params *params, const double x0[PHI
 #if PHI_TIMED
 /* The same at the time t0, which phi_init takes to be 0. */
 phi_status phi_init_at(phi_solver *s, const phi_params *params, const double x0[PHI_DIM], double t0);
+
+#endif
+#if PHI_NOISE
+/* Which random numbers the next steps take: they are a function of the seed, the member and the number of the step,
+   and of nothing else. phi_init begins with 0, 0, 0. Each increment of the noise is normal with variance |h|, cut off at
+   PHI_BOUND sqrt(|h|). */
+phi_status phi_set_noise(phi_solver *s, uint64_t seed, uint32_t member, uint64_t step);
 
 #endif
 #if PHI_ATTITUDE
@@ -157,6 +171,11 @@ phi_status phi_set_state(phi_solver *s, const double x[PHI_DIM]);
 phi_status phi_kick(phi_solver *s, const double change[PHI_DIM]);
 
 #endif
+#if PHI_NOISE
+/* The same with increments of one's own, dw[k * PHI_DRAWS + i] that of source i in step k; NULL for random ones. */
+phi_status phi_integrate_along(phi_solver *s, double h, size_t steps, const double *dw);
+
+#endif
 #if PHI_ENSEMBLE
 /* Many members, in place: x[i * members + m] is coordinate i of member m. One that fails keeps its last good state.
    status (or NULL) receives the status of each; the first that is not OK is returned. */
@@ -166,6 +185,18 @@ phi_status phi_kick(phi_solver *s, const double change[PHI_DIM]);
 phi_status phi_ensemble(const phi_params *params, double *x, size_t members, double h, size_t steps,
     unsigned char *status);
 
+#if PHI_NOISE
+/* The same where member m takes the random numbers of first_member + m, from those of first_step on; these and the seed
+   are 0 for phi_ensemble. With OpenMP, members in parallel: the results do not depend on threads. */
+#if PHI_TIMED
+phi_status phi_ensemble_of(const phi_params *params, double *x, size_t members, double t0, double h, size_t steps,
+    uint64_t seed, uint32_t first_member, uint64_t first_step, unsigned char *status);
+#else
+phi_status phi_ensemble_of(const phi_params *params, double *x, size_t members, double h, size_t steps,
+    uint64_t seed, uint32_t first_member, uint64_t first_step, unsigned char *status);
+#endif
+
+#endif
 #if PHI_TIMED
 /* The same from the time t0 of all members on, which phi_ensemble takes to be 0. */
 phi_status phi_ensemble_at(const phi_params *params, double *x, size_t members, double t0, double h, size_t steps,
@@ -246,6 +277,15 @@ void phi_casimirs(const phi_params *params, const double x[PHI_DIM], double out[
 void phi_vector_field(const phi_params *params, const double x[PHI_DIM], double out[PHI_DIM]);
 #endif
 
+#if PHI_NOISE
+/* sigma pi(x) grad g(x) of each source of noise, one after the other; params may be NULL. */
+#if PHI_TIMED
+void phi_noise_fields(const phi_params *params, double t, const double x[PHI_DIM], double out[PHI_SOURCES * PHI_DIM]);
+#else
+void phi_noise_fields(const phi_params *params, const double x[PHI_DIM], double out[PHI_SOURCES * PHI_DIM]);
+#endif
+
+#endif
 #if PHI_MONITOR
 /* dt/dtau at x; params may be NULL. */
 double phi_monitor(const phi_params *params, const double x[PHI_DIM]);

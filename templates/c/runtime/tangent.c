@@ -258,7 +258,7 @@ static phi_status phi_tangent_of(const phi_solver *s, int stage, phi_solver *at,
 #if PHI_RECURRENCES
     const phi_history *history = &s->history[stage];
     const double *value = history->past[history->count - 1];
-#elif PHI_IMPLICIT
+#elif PHI_GUESSED
     const double *value = s->history[stage].difference[0];
 #else
     const double *value = at->x;

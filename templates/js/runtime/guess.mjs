@@ -1,4 +1,7 @@
 import { DIM, FRACTIONS, energy, vectorField } from "./model.mjs";
+// #if NOISE
+import { SOURCES, noiseFields } from "./model.mjs";
+// #endif
 // #if MONITOR
 import { rateAt } from "./level.mjs";
 // #endif
@@ -119,6 +122,9 @@ const LOST = 0.5;
 
 const speed = new Float64Array(DIM);
 const point = new Float64Array(DIM);
+// #if NOISE
+const fields = new Float64Array(SOURCES.length * DIM);
+// #endif
 
 /**
  * Whether an increment is that of the motion. Where the step is too large, the equation may have been
@@ -148,6 +154,16 @@ export function plausible(solver, stage, increment) {
   for (let i = 0; i < DIM; i++) size += Math.abs(FRACTIONS[stage] * solver.h * rate * speed[i]);
   // #else
   for (let i = 0; i < DIM; i++) size += Math.abs(FRACTIONS[stage] * solver.h * speed[i]);
+  // #endif
+  // #if NOISE
+  // #if TIMED
+  noiseFields(params, solver.t, x, fields);
+  // #else
+  noiseFields(params, x, fields);
+  // #endif
+  fields.forEach((field, k) => {
+    size += Math.abs(solver.dw[Math.floor(k / DIM)] * field);
+  });
   // #endif
   if (moved <= PLAUSIBLE * size) return true;
   const [before, middle, after] = [0, 0.5, 1].map((part) => {

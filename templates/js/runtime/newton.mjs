@@ -45,7 +45,11 @@ function attempt(solver, stage) {
   const { x, carry } = solver;
   const history = solver.history[stage];
   let previous = Infinity;
+  // #if NOISE
+  y.set(x); // earlier steps say nothing of the noise of this one
+  // #else
   if (!history.predict(y)) y.set(x);
+  // #endif
   for (let iteration = 1; iteration <= MAX_ITERATIONS; iteration++) {
     linearise(solver.coef[stage], y, displacement, increment, jacobian, incrementJacobian);
     solver.evaluations++;

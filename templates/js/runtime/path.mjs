@@ -146,7 +146,11 @@ function attempt(solver, stage) {
   const history = solver.history[stage];
   let previous = Infinity;
   let made = 0;
+  // #if NOISE
+  y.set(solver.x); // earlier steps say nothing of the noise of this one
+  // #else
   if (!history.predict(y)) y.set(solver.x);
+  // #endif
   generate(coef, y, p, jacobian);
   for (let iteration = 0; iteration < MAX_ITERATIONS && made <= MOST_PIECES; iteration++) {
     const path = findResidual(solver, coef, p, y, residual, change, jacobian);

@@ -16,6 +16,10 @@ import { TIMES } from "./model.mjs";
 // #if RENEWED
 import { MIDDLES, MOMENTS, PREPARED, refresh } from "./model.mjs";
 // #endif
+// #if NOISE
+import { DRAWS, SOURCES, noiseFields } from "./model.mjs";
+import { draw } from "./noise.mjs";
+// #endif
 // #if MODIFIED
 import { modified } from "./model.mjs";
 // #endif
@@ -116,6 +120,14 @@ export class Solver {
   /** Time since the start. */
   t = 0;
   // #endif
+  // #if NOISE
+  /** The random numbers of a step are a function of these, and of how many steps were made before. */
+  seed = 0;
+  member = 0;
+  step0 = 0;
+  /** The increments of the noise in the last step. */
+  dw = new Float64Array(DRAWS);
+  // #endif
   /** Good steps since the start. */
   steps = 0;
   /** Evaluations of the generating function, for statistics. */
@@ -154,6 +166,11 @@ export class Solver {
    * @param {object} options
    * @param {ArrayLike<number>} options.x0 the coordinates, in the order of COORDINATES
    * @param {Partial<Parameters>} [options.params] the defaults for those that are left out
+   * #if NOISE
+   * @param {number | bigint} [options.seed] which random numbers are taken, of 64 bits, 0 by default
+   * @param {number} [options.member] the same, of 32 bits, 0 by default
+   * @param {number} [options.step0] how many steps were made before x0, 0 by default
+   * #endif
    * #if TIMED
    * @param {number} [options.t0] the time of x0, 0 by default
    * #endif
@@ -170,6 +187,15 @@ export class Solver {
     this.params = admitted(options.params ?? {});
     // #if TIMED
     [this.t] = finite([options.t0 ?? 0], 1, "t0");
+    // #endif
+    // #if NOISE
+    const { seed = 0, member = 0, step0 = 0 } = options;
+    for (const [name, value] of Object.entries({ seed, member, step0 })) {
+      if (!((Number.isInteger(value) || typeof value === "bigint") && value >= 0)) {
+        throw new StepError("BAD_ARGUMENT", 0, `${name} is ${value}`);
+      }
+    }
+    Object.assign(this, { seed, member, step0 });
     // #endif
     // #if HELD
     const { gauge } = options;
@@ -205,13 +231,25 @@ export class Solver {
   }
 
   // #if RENEWED
+  // #if NOISE
+  /** What depends on the increments of the next step. */
+  // #else
   /** What depends on the time of the next step. */
+  // #endif
   #renew() {
     // #if SPLITTING
     this.coef[0].forEach((row, k) => refresh(row, this.t + MOMENTS[k] * this.h, row.subarray(PREPARED)));
     // #else
     this.coef.forEach((coef, stage) => {
+      // #if NOISE
+      // #if TIMED
+      refresh(coef, this.t + MIDDLES[stage] * this.h, this.dw, coef.subarray(PREPARED));
+      // #else
+      refresh(coef, this.dw, coef.subarray(PREPARED));
+      // #endif
+      // #else
       refresh(coef, this.t + MIDDLES[stage] * this.h, coef.subarray(PREPARED));
+      // #endif
     });
     // #endif
   }
@@ -221,10 +259,19 @@ export class Solver {
    * One step of size h, of either sign. Throws StepError; then the state is as before.
    *
    * @param {number} h
+   * #if NOISE
+   * @param {ArrayLike<number>} [dw] increments of the noise, in place of random ones
+   * #endif
    * @returns {this}
    */
+  // #if NOISE
+  step(h, dw) {
+    this.#setStep(h);
+    if (!draw(this, dw)) throw new StepError("BAD_ARGUMENT", this.steps, `the increments are ${dw}`);
+    // #else
   step(h) {
     this.#setStep(h);
+    // #endif
     // #if RENEWED
     this.#renew();
     // #endif
@@ -364,13 +411,23 @@ export class Solver {
    * #else
    * @param {{params?: Partial<Parameters>}} [options] as of the constructor
    * #endif
+   * #if NOISE
+   * also seed, step0, and member, that of the first of the members
+   * #endif
    * @returns {{x: Float64Array[], status: string[]}} where each ends, and how: "OK" or a status
    */
   static ensemble(members, h, count, options = {}) {
+    // #if NOISE
+    let member = options.member ?? 0;
+    // #endif
     const ends = Array.from(members, (x0) => {
       let end = Float64Array.from(x0);
       try {
+        // #if NOISE
+        const solver = new Solver({ ...options, x0, member: member++ });
+        // #else
         const solver = new Solver({ ...options, x0 });
+        // #endif
         end = solver.x;
         solver.integrate(h, count);
         return { end, status: "OK" };
@@ -423,6 +480,23 @@ export class Solver {
     return out;
   }
 
+  // #if NOISE
+  /** sigma pi(x) grad g(x) of each source of noise, one after the other. */
+  // #if TIMED
+  noiseFields(x = this.x, t = this.t) {
+    const out = new Float64Array(SOURCES.length * DIM);
+    noiseFields(this.params, t, x, out);
+    return out;
+  }
+  // #else
+  noiseFields(x = this.x) {
+    const out = new Float64Array(SOURCES.length * DIM);
+    noiseFields(this.params, x, out);
+    return out;
+  }
+  // #endif
+
+  // #endif
   // #if TIMED
   /** The right-hand side pi(x) grad H(t, x). */
   vectorField(x = this.x, t = this.t) {

@@ -1,0 +1,34 @@
+"""Noise through Hamiltonians: dx = … + Σ σ_k π∇g_k ∘ dW_k, in the sense of Stratonovich.
+
+Each source moves along a Hamiltonian vector field, so it keeps all Casimirs and the volume of the leaves, and without
+forces the flow of each path of the noise is a Poisson map. The amplitudes σ_k depend on parameters and the time only.
+
+With forces πζ, a density exp(−H/T) on every leaf is stationary where πζ = −(1/2T) Σ σ_k² (X_k H) X_k with X_k = π∇g_k:
+fluctuation and dissipation.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from phigen.spec.model import SpecNoise
+from phigen.symbolic.expression import Expression, gradient
+
+
+@dataclass(frozen=True)
+class Source:
+    """A source of noise: the Hamiltonian g and the amplitude σ of σ π∇g ∘ dW."""
+
+    name: str
+    hamiltonian: Expression
+    amplitude: Expression
+
+    def impulse(self, coordinates: Sequence[str]) -> tuple[Expression, ...]:
+        """σ∇g, the covector that an increment of the noise is a multiple of."""
+        return tuple(self.amplitude * g for g in gradient(self.hamiltonian, coordinates))
+
+
+def sources_of(given: Mapping[str, SpecNoise]) -> tuple[Source, ...]:
+    """The sources of a spec, in its order."""
+    return tuple(Source(name, s.hamiltonian, s.amplitude) for name, s in given.items())

@@ -1,0 +1,77 @@
+"""What noise makes of steps: strong orders along common paths, and steps with the largest increments."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from phigen.errors import StepError
+from phigen.runtime.solver import Solver
+from phigen.scheme.program import BOUND
+from phigen.symbolic.arrays import Floats
+
+#: Paths that are followed, the halvings of the step, how many more the reference has, and the seed of all paths.
+PATHS, LEVELS, BEYOND, SEED = 48, 5, 2, 1
+#: Choices of signs for the largest increments at one state.
+SIGNS = 8
+
+
+def strong_order(
+    solver: Solver, x0: Floats, parameters: Mapping[str, float], t0: float, h: float, steps: int, paths: int = PATHS
+) -> float:
+    """The strong order: the slope of the errors of steps of h, h/2, h/4, … along the same paths.
+
+    The increments of a coarse step are the sums of those of the fine ones in it. Errors are against the motion along
+    the same path joined by straight lines, which knows the vector fields only: it converges to Stratonovich's sense.
+    """
+    draws, finest = solver.interface.draws, steps << (LEVELS + BEYOND)
+    begin = t0 if solver.interface.time else None
+    random = np.random.default_rng(SEED)
+    fine = random.normal(size=(paths, finest, draws)) * np.sqrt(abs(h) * steps / finest)
+    ends = _along_lines(solver, np.tile(x0, (paths, 1)), parameters, t0, h * steps / finest, fine)
+    errors = np.zeros(LEVELS)
+    for level in range(LEVELS):
+        many = steps << level
+        for path, end in zip(fine, ends, strict=True):
+            coarse = path.reshape(many, -1, draws).sum(axis=1)
+            about: dict[str, Any] = {"t0": begin, "increments": coarse, "parameters": parameters}
+            errors[level] += np.sum((solver.integrate(x0, h / 2**level, many, many, **about).x[-1] - end) ** 2)
+    return float(-np.polyfit(np.arange(LEVELS), np.log2(errors) / 2, 1)[0]) if errors.all() else np.inf
+
+
+def _along_lines(
+    solver: Solver, x: Floats, parameters: Mapping[str, float], t0: float, h: float, increments: Floats
+) -> Floats:
+    """The ends of paths (paths, steps, sources) from x (paths, DIM), by a step of RK4 along each piece."""
+    backend, timed = solver.backend, bool(solver.interface.time)
+    sources = len(solver.interface.noise)
+
+    def push(at: Floats, dw: Floats, t: float) -> Floats:
+        when = np.full(len(at), t) if timed else None
+        spread = np.einsum("ps,psd->pd", dw, backend.noise_fields(at, parameters, when))
+        moved: Floats = h * backend.vector_field(at, parameters, when) + spread
+        return moved
+
+    for k in range(increments.shape[1]):
+        dw, t = increments[:, k].reshape(len(x), -1, sources).sum(axis=1), t0 + k * h
+        first = push(x, dw, t)
+        second = push(x + first / 2, dw, t + h / 2)
+        third = push(x + second / 2, dw, t + h / 2)
+        x = x + (first + 2 * second + 2 * third + push(x + third, dw, t + h)) / 6
+    return x
+
+
+def failures(solver: Solver, states: Sequence[Floats], parameters: Mapping[str, float], t0: float, h: float) -> int:
+    """How many steps from these states fail of those whose increments are all as large as they can be."""
+    draws, begin = solver.interface.draws, t0 if solver.interface.time else None
+    random, failed = np.random.default_rng(SEED), 0
+    for x in states:
+        for _ in range(SIGNS):
+            largest = BOUND * np.sqrt(abs(h)) * random.choice([-1.0, 1.0], size=(1, draws))
+            try:
+                solver.integrate(x, h, 1, t0=begin, increments=largest, parameters=parameters)
+            except StepError:
+                failed += 1
+    return failed
