@@ -14,6 +14,8 @@ from typing import Any
 FLAGS = ["--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-sync",
          "--disable-background-networking", "--disable-component-update", "--remote-debugging-pipe"]  # fmt: skip
 _SECONDS = 60.0
+#: Numbers of keys that do something by themselves.
+_KEYS = {"ArrowRight": 39, "Tab": 9}
 
 
 class Browser:
@@ -65,12 +67,13 @@ class Browser:
                     raise RuntimeError(f"{method}: {message['error']}")
                 return dict(message["result"])
 
-    def load(self, page: Path) -> None:
-        """Show a file, and wait until it is there."""
-        self._events.clear()
-        self.call("Page.navigate", url=page.as_uri())
-        while not any(e["method"] == "Page.loadEventFired" for e in self._events):
-            self._receive()
+    def load(self, page: Path, fragment: str = "") -> None:
+        """Show a file, at a place of it, and wait until it is there."""
+        for url in ("about:blank", page.as_uri() + fragment):  # another fragment of the same page would load nothing
+            self._events.clear()
+            self.call("Page.navigate", url=url)
+            while not any(e["method"] == "Page.loadEventFired" for e in self._events):
+                self._receive()
 
     def value(self, script: str) -> Any:
         """The value of an expression of JavaScript in the page."""
@@ -90,8 +93,9 @@ class Browser:
 
     def key(self, name: str) -> None:
         """Press a key."""
-        for kind in ("keyDown", "keyUp"):
-            self.call("Input.dispatchKeyEvent", type=kind, key=name, code=name)
+        codes = {"windowsVirtualKeyCode": _KEYS[name]} if name in _KEYS else {}
+        for kind in ("rawKeyDown", "keyUp"):
+            self.call("Input.dispatchKeyEvent", type=kind, key=name, code=name, **codes)
 
     def drag(self, x: float, y: float, dx: float, dy: float) -> None:
         """Press the mouse button at a point, move, and let go."""

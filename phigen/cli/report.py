@@ -36,10 +36,10 @@ def command(
 ) -> None:
     """Write one self-contained HTML page about a spec, to be read by anyone.
 
-    Formulas; what the compiler chose and why; what was proved, as `phigen check` does; what was measured, as
-    `phigen verify` does; figures of a run; errors against step and time, with classical methods beside them. The page
-    needs no network. Nothing is written if the mathematics of the spec is refuted. Exit code 5 if the solver falls
-    short of what it promises: the page says where.
+    The solver, running in the page beside RK4; formulas; what the compiler chose and why; what was proved, as
+    `phigen check` does; what was measured, as `phigen verify` does; figures of a run; errors against step and time,
+    with classical methods beside them. The page needs no network. Nothing is written if the mathematics of the spec is
+    refuted. Exit code 5 if the solver falls short of what it promises: the page says where.
     """
     from phigen.cli.report_lattice import report_lattice
     from phigen.cli.report_material import gathered
@@ -67,7 +67,7 @@ def command(
         raise found.obstacle or AssertionError("an examination without compilation has an obstacle")
     console.note(f"{spec.name}: {len(found.statements)} statements examined, none refuted")
     written = command_of(spec_file, target, name, order, scheme, lyapunov, quick)
-    material, failures = gathered(found, found.compilation, experiment, written, lyapunov, quick, console)
+    material, failures = gathered(found, found.compilation, experiment, written, scheme, lyapunov, quick, console)
     write_page(document(material), bool(material.methods), output, target, console)
     if failures:
         raise failures[0]

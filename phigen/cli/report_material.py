@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from fractions import Fraction
 from typing import TYPE_CHECKING
 
 from phigen.cli.console import Console
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
     from phigen.cli.recording import Recorder
     from phigen.compilation import Compilation
     from phigen.proofs.examination import Examination
+    from phigen.report.live import Live
     from phigen.runtime.solver import Solver
     from phigen.runtime.trajectory import Trajectory
     from phigen.study.verification import Verification
@@ -30,6 +32,7 @@ def gathered(
     compilation: Compilation,
     experiment: Experiment | None,
     written: str,
+    scheme: str | None,
     lyapunov: bool,
     quick: bool,
     console: Console,
@@ -39,6 +42,7 @@ def gathered(
     if experiment is None:
         note = "The spec has no runs: nothing was measured. Add one under runs: with initial, step and steps."
         return replace(material, notes=(note,)), []
+    material = replace(material, live=_live(compilation, experiment, scheme, console))
     material, failures = _integrated(material, experiment, lyapunov, console)
     if failures:
         return material, failures
@@ -52,6 +56,15 @@ def gathered(
     notes = (*material.notes, note) if note else material.notes
     where = environment() if study else {}
     return replace(material, verification=verification, study=study, notes=notes, environment=where), failures
+
+
+def _live(compilation: Compilation, experiment: Experiment, scheme: str | None, console: Console) -> Live:
+    """What runs in the page."""
+    from phigen.report import live
+
+    console.note(f"{compilation.spec.name}: compiling for the page")
+    run = replace(experiment.run, initial=tuple(map(Fraction, experiment.initial)))
+    return live.gathered(compilation, scheme, run, experiment.parameters)
 
 
 def _integrated(

@@ -11,6 +11,7 @@ from phigen.compilation import Compilation
 from phigen.notation.mathml import math, name
 from phigen.report import evidence, page
 from phigen.report.drawable import NO_FIGURES, drawable
+from phigen.report.live import live_section, script
 from phigen.report.material import Material
 from phigen.report.method import method_section
 from phigen.report.modified import modified_section
@@ -25,7 +26,10 @@ SOURCE = 100_000
 def document(material: Material) -> str:
     """The HTML of the page. Everything but measured times depends on its arguments alone."""
     spec = material.compilation.spec
-    return page.page(f"{spec.title or spec.name} – phigen", lead(material.compilation), list(_sections(material)))
+    solvers = script(material.live) if material.live and material.live.solvers else ""
+    return page.page(
+        f"{spec.title or spec.name} – phigen", lead(material.compilation), list(_sections(material)), solvers
+    )
 
 
 def lead(compilation: Compilation) -> Markup:
@@ -41,6 +45,8 @@ def lead(compilation: Compilation) -> Markup:
 
 
 def _sections(material: Material) -> Iterator[tuple[str, str, Markup]]:
+    if material.live:
+        yield "live", "Live", live_section(material.compilation, material.live)
     yield "brief", "In brief", evidence.brief_section(material)
     yield "system", "The system", system_section(material.compilation.system)
     yield "choices", "What the compiler chose", evidence.choices_section(material.compilation)

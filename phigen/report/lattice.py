@@ -24,6 +24,8 @@ from phigen.spec.model import Run
 from phigen.study.verification import Verification
 from phigen.symbolic.arrays import Floats
 
+NO_PANEL = "There is no live panel on this page, since JavaScript does not offer lattices."
+
 
 @dataclass(frozen=True)
 class LatticeMaterial:
@@ -53,7 +55,7 @@ def lattice_document(material: LatticeMaterial) -> str:
 def _sections(material: LatticeMaterial) -> Iterator[tuple[str, str, Markup]]:
     compilation, verification = material.compilation, material.verification
     assert compilation.cell is not None
-    notes = (material.failure,) if material.failure else ()
+    notes = ((material.failure,) if material.failure else ()) + (NO_PANEL,)
     whole = Material(material.examination, compilation, material.command, verification=verification, notes=notes)
     yield "brief", "In brief", evidence.brief_section(whole)
     yield "system", "The cell", page.joined(_cell(compilation.cell))

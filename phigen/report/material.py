@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 from phigen.compilation import Compilation
 from phigen.proofs.examination import Examination
+from phigen.report.live import Live
 from phigen.runtime.trajectory import Trajectory
 from phigen.spec.model import Run
 from phigen.study.backward import Constancy
@@ -41,5 +42,6 @@ class Material:
     constancy: Constancy | None = None
     no_constancy: str = ""
     study: Study | None = None
+    live: Live | None = None
     environment: Mapping[str, str] = field(default_factory=dict)
     notes: tuple[str, ...] = ()

@@ -27,7 +27,9 @@ Cell = tuple[str, str]
 #: More equations than this stand in columns if none has more characters of markup than that.
 MANY, SHORT = 6, 420
 
-_STYLES, _SCRIPTS = ("report.css",), ("theme.js", "viewer.js")
+_STYLES, _SCRIPTS = ("report.css",), ("theme.js", "space.js", "viewer.js")
+#: The scripts of the live panel, after its solvers.
+_LIVE = ("race.js", "live.js")
 
 
 @cache
@@ -95,9 +97,11 @@ def _compact(value: Any, **_: Any) -> str:
     return json.dumps(value, separators=(",", ":"), ensure_ascii=True)
 
 
-def page(title: str, lead: Markup, sections: Sequence[tuple[str, str, Markup]]) -> str:
-    """The whole page from sections (id, title, body)."""
-    css, scripts = "\n".join(map(_asset, _STYLES)), "\n".join(map(_asset, _SCRIPTS))
+def page(title: str, lead: Markup, sections: Sequence[tuple[str, str, Markup]], solvers: str = "") -> str:
+    """The whole page from sections (id, title, body); ``solvers`` is the JavaScript of its live panel."""
+    css = "\n".join(map(_asset, _STYLES))
+    live = [solvers, *map(_asset, _LIVE)] if solvers else []
+    scripts = "\n".join([*map(_asset, _SCRIPTS), *live])
     return _environment().get_template("page.html.jinja").render(
         title=title,
         lead=lead,

@@ -24,7 +24,7 @@ parameters:
 poisson:
   brackets: {{x1: {{x2: -alert, alert: x2}}, x2: {{alert: -x1}}}}
 hamiltonian: x1**2/I1/2 + x2**2/4 + alert**2/6
-order: 2
+order: 4
 runs:
   constructor:
     description: {QUOTED}

@@ -1,8 +1,14 @@
 """The page in a browser: formulas are drawn, the viewer turns, both themes and paper work, and nothing complains."""
 
+import json
+
+import numpy as np
 import pytest
 from chromium import Browser
 from support import tool
+
+import phigen
+from phigen.study.classical import rk4
 
 
 @pytest.fixture(scope="module")
@@ -80,6 +86,101 @@ def test_slider_moves_along_the_trajectory(browser):
         "{const s = document.getElementById('viewer-time'); s.value = s.max; s.dispatchEvent(new Event('input'))}"
     )
     assert "t = 4.00" in browser.value(state)
+
+
+# -- the live panel
+
+SET = "#live&h=0.3&order=2&p.I1=1.5&x.x1=0.25"
+
+
+def settled(browser, made, fragment=""):
+    """The page of one who asks for less motion: nothing moves by itself."""
+    browser.media(prefers_reduced_motion="reduce")
+    browser.load(made, fragment)
+
+
+def click(browser, name, times=1):
+    browser.value(f"for (let k = 0; k < {times}; k++) document.getElementById('live-{name}').click()")
+
+
+def told(browser, what):
+    return json.loads(browser.value(f"document.getElementById('live-panel').dataset.{what}"))
+
+
+def test_panel_makes_the_steps_of_the_solver_and_of_rk4(browser, made):
+    settled(browser, made, SET)
+    click(browser, "step", 5)
+    solver = phigen.compile(made.parent / "attack.yaml", target="numpy", order=2)
+    start = np.array([0.25, 1, 0.2])
+    ours, theirs, x = told(browser, "ours"), told(browser, "theirs"), start
+    for _ in range(5):
+        x = rk4(lambda y: solver.vector_field(y, I1=1.5), x, 0.3)
+    assert (ours["steps"], theirs["steps"]) == (5, 5)
+    assert ours["x"] == pytest.approx(solver.integrate(start, 0.3, 5, I1=1.5).x[-1], rel=1e-13)
+    assert theirs["x"] == pytest.approx(x, rel=1e-13)
+    assert [ours["t"], theirs["t"]] == pytest.approx([1.5, 1.5])
+    assert browser.complaints == []
+    error = abs(solver.hamiltonian(x, I1=1.5) / solver.hamiltonian(start, I1=1.5) - 1)
+    mantissa, power = f"{error:.0e}".split("e-")
+    shown = browser.value("document.querySelector('#live-theirs-scores strong').textContent")
+    assert shown == f"{mantissa}·10⁻{'⁰¹²³⁴⁵⁶⁷⁸⁹'[int(power)]}"
+
+
+def test_link_of_the_panel_holds_its_settings(browser, made):
+    settled(browser, made)
+    sliders = "document.querySelectorAll('#live-panel input[type=range]')"
+    browser.value(f"{sliders}.forEach(s => {{ s.value = Number(s.min) + 1; s.dispatchEvent(new Event('input')); }})")
+    chosen, link = told(browser, "settings"), browser.value("document.getElementById('live-link').hash")
+    assert chosen["order"] == 4
+    assert chosen["params"]["I1"] < 0.2
+    assert len(set(chosen["start"])) == 3
+    settled(browser, made, link)
+    assert told(browser, "settings") == chosen
+
+
+def test_panel_moves_by_itself_unless_less_motion_is_asked_for(browser, made):
+    waited = "new Promise(done => setTimeout(() => done(document.getElementById('live-steps').textContent), 400))"
+    settled(browser, made)
+    assert browser.value(waited) == "0 steps"
+    click(browser, "play")
+    assert browser.value(waited) == "100 steps"
+    browser.media()
+    browser.load(made)
+    browser.value("document.getElementById('live-ours').scrollIntoView()")  # out of sight it rests
+    moving = "document.getElementById('live-steps').textContent !== '0 steps'"
+    assert browser.value(f"new Promise(d => {{ const wait = () => {moving} ? d(1) : setTimeout(wait, 20); wait(); }})")
+    click(browser, "play")
+    resting = browser.value(waited)
+    assert browser.value(waited) == resting
+    assert "After" in browser.value("document.getElementById('live-told').textContent")
+
+
+def test_panel_is_used_by_keys(browser, made):
+    settled(browser, made)
+    before = told(browser, "settings")["h"]
+    browser.value("document.querySelector('[data-kind=h]').focus()")
+    browser.key("ArrowRight")
+    assert told(browser, "settings")["h"] > before
+    browser.key("Tab")
+    assert browser.value("document.activeElement.dataset.kind") == "order"
+    turned = "document.getElementById('live-ours').toDataURL()"
+    picture = browser.value(turned)
+    browser.value("document.getElementById('live-theirs').focus()")
+    browser.key("ArrowLeft")
+    assert browser.value(turned) != picture
+
+
+def test_panel_fits_a_telephone(browser, made):
+    browser.size(375, 800)
+    settled(browser, made)
+    assert browser.value("document.documentElement.scrollWidth <= innerWidth")
+    assert browser.value("[...document.querySelectorAll('#live-panel canvas')].every(c => c.clientWidth > 140)")
+    browser.size(1100, 900)
+    browser.media()
+    browser.load(made)
+
+
+# -- the page as a whole
 
 
 def test_turning_by_itself_respects_reduced_motion(browser):

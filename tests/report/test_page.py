@@ -17,7 +17,7 @@ from phigen.compiler import compile_spec
 from phigen.drawing.palette import PALETTE
 from phigen.proofs.examination import Examination
 from phigen.report import document as pages
-from phigen.report import page, pictures
+from phigen.report import live, page, pictures
 from phigen.report.material import Material
 from phigen.report.svg import inlined
 from phigen.report.viewer import MOST_NUMBERS, viewer
@@ -53,8 +53,8 @@ def test_page_is_sound_html_that_loads_nothing(html):
 
 def test_page_has_all_its_sections(html):
     found = [given["id"] for given in Page(html).all("section")]
-    assert found == ["brief", "system", "choices", "method", "proofs", "measured", "modified", "run", "precision",
-                     "provenance"]  # fmt: skip
+    assert found == ["live", "brief", "system", "choices", "method", "proofs", "measured", "modified", "run",
+                     "precision", "provenance"]  # fmt: skip
     figures = {given["id"] for given in Page(html).all("figure")}
     assert figures == {
         f"figure-{n}" for n in ("constancy", "trajectory", "errors", "section", "lyapunov", "convergence", "work")
@@ -260,6 +260,43 @@ def test_viewer_ends_where_a_method_broke_down():
     assert "&lt;rk4&gt;" in viewer({"phigen": trajectory(x), "<rk4>": trajectory(broken)}, {}, {})
 
 
+def panel_of(name, **more):
+    compilation = replace(compiled(name), **more)
+    run = next(iter(compilation.spec.runs.values()))
+    return compilation, live.gathered(compilation, None, run, compilation.spec.parameters_of(run))
+
+
+def test_panel_has_the_order_of_the_page_and_lower_ones():
+    compilation, panel = panel_of("rigid_body")
+    assert list(panel.solvers) == [2, 4, 6]
+    assert "/*" not in live.script(panel)
+    assert "never leaves the surface drawn here" in live.live_section(compilation, panel)
+
+
+def test_panel_runs_a_system_without_its_attitude():
+    assert panel_of("dzhanibekov")[1].solvers
+
+
+def test_panel_counts_errors_only_in_what_is_conserved():
+    said = {name: str(live.live_section(*panel_of(name))) for name in ("thruster_body", "landau_lifshitz", "pendulum")}
+    assert "nothing is conserved" in said["thruster_body"]
+    assert "off its energy" not in said["landau_lifshitz"]
+    assert "off its surface (Casimir length)" in said["landau_lifshitz"]
+    assert "the curve drawn here" in said["pendulum"]
+
+
+def test_page_says_why_it_has_no_panel(monkeypatch):
+    monkeypatch.setattr(live, "MOST", 10)
+    compilation, panel = panel_of("pendulum")
+    assert "There is no live panel: its JavaScript would take more than" in live.live_section(compilation, panel)
+    assert live.script(panel) not in bare(compilation, live=panel)
+
+
+def test_modules_become_functions_that_cannot_leave_their_element():
+    text = live.enclosed('/**\n * @a\n */\n// b\nexport class Solver {\n  x = "</script><!--";\n}\n')
+    assert text.splitlines()[1:4] == ["class Solver {", 'x = "<\\/script><\\!--";', "}"]
+
+
 def test_no_name_ends_the_data_of_the_viewer():
     text = str(page.data("d", ["</script><script>", "\u2028", "<!--"]))
     assert text.count("<") == 2
@@ -291,7 +328,7 @@ def test_page_has_a_variable_for_every_colour_of_the_figures():
     assert set(PALETTE) <= set(colours())
 
 
-@pytest.mark.parametrize("name", ["report.css", "theme.js", "viewer.js"])
+@pytest.mark.parametrize("name", ["report.css", "theme.js", "space.js", "viewer.js", "race.js", "live.js"])
 def test_assets_cannot_leave_their_elements(name):
     text = (ASSETS / name).read_text(encoding="utf-8")
     assert "</" not in text

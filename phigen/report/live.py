@@ -1,0 +1,206 @@
+"""The live panel of a page: the generated JavaScript runs in it, beside RK4, with sliders for all that can be set."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+from markupsafe import Markup
+
+from phigen.compilation import Compilation
+from phigen.compiler import compile_spec
+from phigen.drawing.groups import Group, groups
+from phigen.errors import PhigenError
+from phigen.geometry.system import System
+from phigen.report import page
+from phigen.spec.model import Extras, Parameter, Run
+from phigen.study.conservation import ENERGY, moving
+from phigen.symbolic.expression import symbols_of
+from phigen.targets.js.emitter import emit
+
+#: Orders that are offered beside that of the page, where they are less; the most characters of all solvers together.
+ORDERS, MOST = (2, 4), 200_000
+#: So many sliders are shown unfolded; coordinates that have one; the factors that step, speed and parameters go up to.
+FEW, COORDINATES = 4, 15
+STEP, SPEED, PARAMETER = 16, 20, 8
+
+HELP = """Drag a picture of space, or use the arrow keys, to turn both; + and − zoom; 0 resets. Between steps the curves
+are interpolated. It begins with a step that is large for RK4, if there is one that phigen takes well; with smaller
+ones both come closer to the truth."""
+
+_COMMENT = re.compile(r"^[ \t]*(/\*.*?\*/|//[^\n]*)[ \t]*\n", re.MULTILINE | re.DOTALL)
+_PRIVATE = Extras(without=frozenset({"ensemble"}))
+
+
+@dataclass(frozen=True)
+class Live:
+    """The solvers of a panel, JavaScript by order, and where it starts; without solvers, ``why_not``."""
+
+    solvers: Mapping[int, str]
+    run: Run | None = None
+    parameters: Mapping[str, float] | None = None
+    why_not: str = ""
+
+
+@dataclass(frozen=True)
+class Slider:
+    """A slider: which setting of the panel it moves, and how far its ends are from the usual value."""
+
+    label: Markup | str
+    kind: str
+    name: str | int = ""
+    scale: str = "log"
+    reach: float = 1.0
+    low: int = -100
+    high: int = 100
+
+
+def gathered(compilation: Compilation, scheme: str | None, run: Run, parameters: Mapping[str, float]) -> Live:
+    """The panel for a run: the solver in JavaScript, of the order of the page and of lower ones."""
+    own = compilation.order.order
+    spec = replace(compilation.spec, reconstruct="")
+    found: dict[int, str] = {}
+    for order in (own, *(o for o in ORDERS if o < own)):
+        try:
+            made = compile_spec(spec, order=order, scheme=scheme, system=compilation.system, extras=_PRIVATE)
+            (text,) = emit(made.program, "").values()
+        except PhigenError as error:
+            if order == own:
+                return Live({}, why_not=str(error).splitlines()[0])
+            continue
+        found[order] = enclosed(text)
+        if sum(map(len, found.values())) > MOST:
+            del found[order]
+    why_not = "" if found else f"its JavaScript would take more than {MOST // 1000} kB of this page"
+    return Live(dict(sorted(found.items())), run, parameters, why_not)
+
+
+def enclosed(module: str) -> str:
+    """A generated module as a function that returns what the panel takes of it, without comments."""
+    code = _COMMENT.sub("", module).replace("export class", "class")
+    lines = (line.strip() for line in code.splitlines())
+    body = "\n".join(line for line in lines if line)
+    rate = "typeof rateAt === 'undefined' ? null : rateAt"
+    return f"() => {{\n{body}\nreturn {{ Solver, rateAt: {rate} }};\n}}".replace("</", "<\\/").replace("<!--", "<\\!--")
+
+
+def script(live: Live) -> str:
+    """The solvers for the script of the page."""
+    return f"const liveSolvers = {{ {', '.join(f'{order}: {text}' for order, text in live.solvers.items())} }};"
+
+
+def live_section(compilation: Compilation, live: Live) -> Markup:
+    """The panel, or why there is none."""
+    run, system = live.run, compilation.system
+    if not live.solvers or run is None:
+        return page.paragraph(f"There is no live panel: {live.why_not}.", "note")
+    parameters = live.parameters or {}
+    quantities, shown = _quantities(system), _groups(system)
+    start, leaves = [float(v) for v in run.initial], [_leaf(system, group) for group in shown]
+    given = {
+        "coordinates": list(system.coordinates),
+        "start": start,
+        "t0": float(run.start),
+        "step": float(run.step),
+        "order": compilation.order.order,
+        "orders": list(live.solvers),
+        "parameters": [
+            {"name": p.name, "value": parameters[p.name], "positive": p.positive} for p in system.parameters
+        ],
+        "groups": [
+            {"axes": [system.coordinates.index(n) for n in group], "leaf": leaf}
+            for group, leaf in zip(shown, leaves, strict=True)
+        ],
+        "quantities": quantities,
+    }
+    return page.block(
+        "live",
+        say=_say(system, quantities, any(leaf is not None for leaf in leaves)),
+        sides=[
+            ("ours", "phigen", f"order {compilation.order.order}"),
+            ("theirs", "RK4", "the classical method of Runge and Kutta"),
+        ],
+        label=f"The motion of {', '.join(shown[0])}",
+        quantities=[q["name"] for q in quantities],
+        sliders=_general(live),
+        groups=list(enumerate(", ".join(g) for g in shown)),
+        folds=_folds(system, start, parameters),
+        help=HELP,
+        data=page.data("live-data", given),
+    )
+
+
+def _quantities(system: System) -> list[dict[str, object]]:
+    """What the flow conserves: the energy, and all its Casimirs as one."""
+    moved = moving(system)
+    found: list[dict[str, object]] = [] if ENERGY in moved else [{"name": "its energy", "casimirs": None}]
+    kept = {name: i for i, name in enumerate(system.casimirs) if name not in moved}
+    if kept:
+        found.append({"name": _named(system, kept), "casimirs": [*kept.values()]})
+    return found
+
+
+def _named(system: System, kept: Mapping[str, int]) -> str:
+    """Casimirs, by their numbers, as what a motion may be off."""
+    names = ", ".join(kept)
+    if len(kept) > 1:
+        return f"its Casimirs {names}" if len(kept) <= 3 else f"its {len(kept)} Casimirs"
+    drawn = any(_leaf(system, group) == kept[names] for group in _groups(system))
+    return f"its surface (Casimir {names})" if drawn else f"its Casimir {names}"
+
+
+def _groups(system: System) -> list[Group]:
+    """Coordinates that are drawn together, the largest groups first."""
+    found = [group for group in groups(system.coordinates) if len(group) > 1]
+    return sorted(found or [(system.coordinates[0],) * 2], key=len, reverse=True)
+
+
+def _leaf(system: System, group: Group) -> int | None:
+    """The Casimir of these three coordinates alone, by its number; −1 is the energy in the plane."""
+    if len(group) == 2:
+        return -1 if system.dimension == 2 and ENERGY not in moving(system) else None
+    coordinates = set(system.coordinates)
+    moved, used = moving(system), [set(symbols_of(c)) & coordinates for c in system.casimirs.values()]
+    kept = zip(system.casimirs, used, strict=True)
+    return next(
+        (i for i, (name, names) in enumerate(kept) if name not in moved and names and names <= set(group)), None
+    )
+
+
+def _say(system: System, conserved: Sequence[Mapping[str, object]], drawn: bool) -> str:
+    """What there is to see, in a few words."""
+    said = "Two solvers take the same steps from the same start, in your browser, now. "
+    kept = ["keeps its energy"] if any(not q["casimirs"] for q in conserved) else []
+    if drawn:
+        kept.append(f"never leaves the {'curve' if system.dimension == 2 else 'surface'} drawn here")
+    elif len(conserved) > len(kept):
+        kept.append("keeps its Casimirs")
+    if not kept:
+        return f"{said}Time or forces act on this system, so nothing is conserved that errors could be counted in."
+    return f"{said}The true motion {' and '.join(kept)}. Watch which of the two does."
+
+
+def _general(live: Live) -> Iterable[Slider]:
+    yield Slider("Step", "h", reach=STEP)
+    if len(live.solvers) > 1:
+        yield Slider("Order", "order", low=0, high=len(live.solvers) - 1)
+    yield Slider("Steps per second", "speed", reach=SPEED)
+
+
+def _folds(
+    system: System, start: list[float], parameters: Mapping[str, float]
+) -> Iterable[tuple[str, bool, list[Slider]]]:
+    """Groups of sliders: what they are, whether they are unfolded, and the sliders."""
+    listed = [_of_parameter(p, parameters[p.name]) for p in system.parameters]
+    if listed:
+        yield "Parameters", len(listed) <= FEW, listed
+    reach = max(map(abs, start)) or 1.0
+    coordinates = [Slider(name, "start", i, "linear", reach) for i, name in enumerate(system.coordinates)][:COORDINATES]
+    yield "Start", len(coordinates) <= FEW, coordinates
+
+
+def _of_parameter(p: Parameter, value: float) -> Slider:
+    if p.positive and value > 0:
+        return Slider(p.name, "params", p.name, reach=PARAMETER)
+    return Slider(p.name, "params", p.name, "linear", 2 * abs(value) or 1.0)
