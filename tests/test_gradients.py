@@ -1,0 +1,44 @@
+"""The tasks of docs/gradients.md are solved by their scripts."""
+
+import sys
+from importlib.util import module_from_spec, spec_from_file_location
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+pytest.importorskip("scipy")
+
+FOLDER = Path(__file__).parent.parent / "docs/gradients"
+
+
+def task(name):
+    """The script as a module."""
+    found = spec_from_file_location(name, FOLDER / f"{name}.py")
+    module = module_from_spec(found)
+    sys.modules[name] = module
+    found.loader.exec_module(module)
+    return module
+
+
+def test_moments_of_inertia_are_found_to_their_errors():
+    module = task("moments_of_inertia")
+    unknown, errors = module.main()
+    assert np.all(np.abs(unknown - module.TRUE) < 3 * errors)
+    assert np.all(errors[:2] < 0.02)
+
+
+def test_orbit_closes_and_its_multipliers_are_those_of_a_symplectic_map():
+    start, period, multipliers, history = task("periodic_orbit").main()
+    assert history[-1] < 1e-13
+    assert 5 < period < 8
+    assert np.abs(start).max() < 1
+    assert np.prod(multipliers) == pytest.approx(1, abs=1e-9)
+    assert np.sort(np.abs(multipliers - 1))[:2].max() < 1e-4  # double, so to half the digits
+
+
+def test_hamiltonian_is_learned_to_the_noise():
+    module = task("learned_hamiltonian")
+    coefficients, losses = module.main()
+    assert np.abs(coefficients - module.TRUE).max() < 0.005
+    assert losses[-1] < module.NOISE**2
