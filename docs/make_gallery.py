@@ -89,6 +89,11 @@ def start_of(found: Spec, run: Run) -> float | None:
     return float(run.start) if found.time else None
 
 
+def seed_of(found: Spec, run: Run) -> int | None:
+    """The seed of the noise of a run, None without noise."""
+    return run.seed if found.noise else None
+
+
 def facts(name: str) -> dict[str, Any]:
     """What is measured of a spec."""
     found = source(name)
@@ -96,7 +101,8 @@ def facts(name: str) -> dict[str, Any]:
     solver, run = solver_of(compilation), longest_run(found)
     parameters = found.parameters_of(run)
     x0, h = np.array([float(v) for v in run.initial]), float(run.step)
-    own = solver.integrate(x0, h, run.steps, run.stride, t0=start_of(found, run), parameters=parameters)
+    about: dict[str, Any] = {"t0": start_of(found, run), "seed": seed_of(found, run), "parameters": parameters}
+    own = solver.integrate(x0, h, run.steps, run.stride, **about)
     summaries = [summarise("phigen", compilation.system, run, parameters, own.t, own.x)]
     for method in [m for m in run.compare if m in TABLEAUX]:
         try:
@@ -120,7 +126,8 @@ def facts(name: str) -> dict[str, Any]:
 
 
 def _errors(summary: Summary) -> dict[str, float]:
-    energy = "H" if math.isnan(summary.off) else "H, balance"
+    energy = "H, change" if summary.energy.unit.moves else "H"
+    energy = energy if math.isnan(summary.off) else "H, balance"
     drifts = {energy: summary.energy, **summary.casimirs, **summary.invariants}
     if summary.exact:
         drifts["solution"] = summary.exact
@@ -136,12 +143,10 @@ def draw(name: str) -> None:
     # Many panels would make a large file: fewer steps there, and of very many no leaves.
     steps = min(run.steps, DRAWN if found.dimension <= 4 else DRAWN // 2)
     casimirs = compilation.system.casimirs if found.dimension <= 9 else {}
-    begin = start_of(found, run)
-    trajectory = solver.integrate(run.initial, float(run.step), steps, t0=begin, parameters=parameters)
+    about: dict[str, Any] = {"t0": start_of(found, run), "seed": seed_of(found, run), "parameters": parameters}
+    trajectory = solver.integrate(run.initial, float(run.step), steps, **about)
     while len(trajectory) > SHORTEST and not _is_curve(trajectory):
-        trajectory = solver.integrate(
-            run.initial, float(run.step), trajectory.steps // 2, t0=begin, parameters=parameters
-        )
+        trajectory = solver.integrate(run.initial, float(run.step), trajectory.steps // 2, **about)
     figures.save(figures.trajectory_figure(trajectory, casimirs), FIGURES / f"{name}.svg")
     if sections := _sections(found, solver):
         figures.save(figures.section_figure(sections, solver.coordinates), FIGURES / f"{name}_section.svg")

@@ -26,9 +26,11 @@ from phigen.symbolic.symbols import momentum
 TIMED = ("duffing", "spin_resonance")
 #: Those with forces: tests/generated/test_forces.py.
 FORCED = ("landau_lifshitz", "thruster_body")
+#: Those with noise: tests/generated/test_noise.py.
+NOISY = ("double_well", "thermal_chain", "thermal_spin")
 #: Those with a monitor: tests/scheme/test_monitor.py and tests/splitting/test_logarithmic.py.
 MONITORED = ("kepler_eccentric",)
-NAMES = sorted({path.stem for path in resources.bundled_specs().glob("*.yaml")} - {*TIMED, *FORCED, *MONITORED})
+NAMES = sorted({path.stem for path in resources.bundled_specs().glob("*.yaml")} - {*TIMED, *FORCED, *NOISY, *MONITORED})
 
 
 #: The lattices of the corpus: tests/lattice/test_corpus.py is about these.

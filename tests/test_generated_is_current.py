@@ -23,7 +23,7 @@ BUILD = "from phigen.cli import main; main()"
 
 
 @pytest.mark.parametrize(
-    "name", [*systems.NAMES, *systems.TIMED, *systems.FORCED, *systems.MONITORED, *systems.LATTICES]
+    "name", [*systems.NAMES, *systems.TIMED, *systems.FORCED, *systems.NOISY, *systems.MONITORED, *systems.LATTICES]
 )
 def test_generated_is_what_is_made_of_the_spec(name):
     compilation = systems.as_given(name)
@@ -41,7 +41,7 @@ def test_generated_is_what_phigen_build_writes(monkeypatch):
 
 def test_nothing_else_is_generated():
     found = {str(p.relative_to(GENERATED)) for p in GENERATED.rglob("*") if p.is_file()}
-    names = (*systems.NAMES, *systems.TIMED, *systems.FORCED, *systems.MONITORED, *systems.LATTICES)
+    names = (*systems.NAMES, *systems.TIMED, *systems.FORCED, *systems.NOISY, *systems.MONITORED, *systems.LATTICES)
     targets = [(name, target) for name in names for target in systems.spec_of(name).targets]
     assert found == {f"{name}/{name}.{suffix}" for name, target in targets for suffix in SUFFIXES[target]}
 
