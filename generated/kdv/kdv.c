@@ -20,8 +20,9 @@
  *   3. The lattice
  *   4. The solver
  *   5. The stages
- *   6. What is seen at sites
- * body-sha256: f8b5e5fcc97031d699b0520c729e260ee486437b895cd77a5c9373af642c2f02
+ *   6. Newton's method where sweeps fail
+ *   7. What is seen at sites
+ * body-sha256: b8c47ed660b677a08923b4e9f0226545998732af99a236f62d174ebc3b07056a
  */
 #include "kdv.h"
 
@@ -35,9 +36,11 @@ const kdv_params kdv_default_params = { 0.022, 0.015625 };
 
 enum { kdv_HALO = 2 };          /* sites that are copied beside a row */
 enum { kdv_LINES = 1 };         /* rows that kernels read: the row itself and those beside it */
-enum { kdv_ROW = 4 };           /* coefficients of one flow */
+enum { kdv_ROW = 7 };           /* coefficients of one flow */
 enum { kdv_ROWS_OF_FLOWS = 1 }; /* rows of coefficients */
 enum { kdv_MOST_SWEEPS = 200 }; /* that a stage may take */
+enum { kdv_REACH = 2 };         /* sites that y at a site depends on, to each side */
+enum { kdv_BAND = 2 };          /* diagonals beside that of the matrix of Newton's method */
 
 /* Along each axis: the smallest size, what sizes are multiples of, whether the ends are open. */
 static const size_t kdv_least[kdv_AXES] = { 2 };
@@ -59,13 +62,17 @@ static int kdv_allowed(const kdv_params *params, size_t sites)
 }
 
 /* everything that depends on parameters and the time of a stage only */
-static void kdv_prepare(const kdv_params *params, double h, double coef[restrict 4])
+static void kdv_prepare(const kdv_params *params, double h, double coef[restrict 7])
 {
-    const double t1 = 1.0 / params->d;
-    coef[0] = t1 * (params->delta * params->delta);
+    const double t1 = 1.0 / params->d, t2 = t1 * (params->delta * params->delta), t3 = t1 * t1;
+    const double t4 = h * t3, t5 = t4 * t2;
+    coef[0] = t2;
     coef[1] = params->d;
     coef[2] = h;
-    coef[3] = t1 * t1;
+    coef[3] = t3;
+    coef[4] = t5;
+    coef[5] = params->d * t4;
+    coef[6] = 0.25 * t5;
 }
 
 /* ---- Rows of sites ---- */
@@ -76,6 +83,7 @@ typedef struct {
     ptrdiff_t length;    /* sites of a row */
     /* where a stage starts, and where what is computed goes; x is y there */
     double *const *start, *const *out;
+    double *const *varied; /* a variation of y */
 } kdv_row;
 
 /* Before a loop over sites: tells compilers that they are independent. */
@@ -116,6 +124,7 @@ static inline void kdv_locate(const kdv_solver *s, size_t index, kdv_row *row)
     row->at = s->lines + index * kdv_LINES;
     row->length = s->length;
     row->start = row->out = s->x;
+    row->varied = s->v;
 }
 
 enum { kdv_PIECE = 2048 }; /* sites of a row that are worked at in one go, with any number of threads */
@@ -172,6 +181,36 @@ static inline void kdv_measure(const kdv_solver *s, const kdv_piece *at, int now
             extent->size[k] = size[l] > extent->size[k] ? size[l] : extent->size[k];
         }
     }
+}
+
+/* Unknowns are numbered site by site. The matrix 1 - (what a sweep does to a variation of y) has a band; what
+   couples the two ends of a ring lies outside. So the last sites are a border, all of them where there are
+   few: of the blocks (A B; C D), A is a band, factorised with pivoting, B becomes A^-1 B, and D becomes D - C
+   A^-1 B, factorised too. */
+enum { kdv_FEW = 6 * kdv_REACH + 6, kdv_TALL = 3 * kdv_BAND + 1 };
+
+typedef struct {
+    ptrdiff_t inner, border; /* unknowns */
+    double *a, *b, *c, *d;   /* by columns; a is banded: entry (i, j) is in row 2 kdv_BAND + i - j */
+    double *side;            /* a right-hand side, in both */
+    double *pivots;          /* of A, then of D: the rows that were swapped */
+} kdv_matrix;
+
+/* Where the parts are, and the doubles that they take. */
+static size_t kdv_matrix_of(size_t sites, double *memory, kdv_matrix *m)
+{
+    const size_t few = sites <= kdv_FEW ? sites : kdv_open[0] ? 0 : kdv_REACH;
+    const size_t border = few * kdv_DIM, inner = sites * kdv_DIM - border;
+    const size_t sizes[] = { kdv_TALL * inner, inner * border, inner * border, border * border, inner
+        + border };
+    double **const parts[] = { &m->a, &m->b, &m->c, &m->d, &m->side };
+    size_t total = 0;
+    for (int k = 0; k < 5; total += sizes[k++])
+        if (memory != NULL) *parts[k] = memory + total;
+    if (memory != NULL) m->pivots = memory + total;
+    m->inner = (ptrdiff_t)inner;
+    m->border = (ptrdiff_t)border;
+    return total + inner + border;
 }
 
 /* y at a site from x there and y around it */
@@ -239,6 +278,37 @@ static void kdv_increment_rows(
     }
 }
 
+/* how y at a site follows y around it */
+static inline void kdv_slope(const double *coef, const kdv_row *row, ptrdiff_t from, ptrdiff_t to)
+{
+    double *restrict out_u = row->out[0] + row->at[0];
+    const double c4 = coef[4], c5 = coef[5], c6 = coef[6];
+    const double *restrict varied_u_0 = row->varied[0] + row->at[0];
+    const double *restrict u_row = row->x[0] + row->at[0];
+    kdv_EACH_SITE
+    for (ptrdiff_t i = from; i < to; ++i) {
+        const double t1 = varied_u_0[i + 1] * (c6 + (c6 - 0.25 * (c5 * u_row[i + 1]))) - 0.25
+            * (c4 * varied_u_0[i + 2]) + (0.25 * (c4 * varied_u_0[i - 2]) + varied_u_0[i - 1]
+            * (0.25 * (c5 * u_row[i - 1]) - c6 - c6));
+        out_u[i] = t1;
+    }
+}
+
+/* How a sweep follows s->y[now] along s->v, to the other, for the pieces of rows from first on, before
+   end. */
+static void kdv_slope_rows(
+    const kdv_solver *s, const double *coef, int far, int now, size_t first, size_t end)
+{
+    (void)far;
+    for (size_t unit = first; unit < end; ++unit) {
+        kdv_piece at = kdv_piece_of(s, unit);
+        at.row.x = s->y[now];
+        at.row.varied = s->v;
+        at.row.out = s->y[1 - now];
+        kdv_slope(coef, &at.row, at.from, at.to);
+    }
+}
+
 /* the density of the Hamiltonian, of the sites of a row: out[k * apart + i - from] */
 static void kdv_energy_row(const kdv_params *params, const kdv_row *row, ptrdiff_t from, ptrdiff_t to,
     double *restrict out, size_t apart)
@@ -298,7 +368,7 @@ enum {
     kdv_STRETCH = 1, /* steps before the state is looked at */
     kdv_LEAD = (kdv_HALO + 7) / 8 * 8,
     kdv_BUFFER = 256,
-    kdv_IMPLICIT = (2 + kdv_DIFFERENCES) * kdv_DIM, /* arrays for y and its guesses */
+    kdv_IMPLICIT = (3 + kdv_DIFFERENCES) * kdv_DIM, /* arrays for y, its guesses and its variation */
     kdv_RESERVED = kdv_ARRAYS + kdv_DIM
         + kdv_IMPLICIT
 };
@@ -327,7 +397,9 @@ size_t kdv_work_size(const size_t sizes[kdv_AXES])
     ptrdiff_t width = 0;
     const size_t rows = sizes == NULL ? 0 : kdv_shape(sizes, &width);
     const size_t row = kdv_RESERVED * (size_t)width * sizeof(double) + kdv_LINES * sizeof(ptrdiff_t);
-    return rows == 0 ? 0 : rows * row + 64;
+    kdv_matrix matrix;
+    const size_t more = rows == 0 ? 0 : kdv_matrix_of(sizes[0], NULL, &matrix) * sizeof(double);
+    return rows == 0 ? 0 : rows * row + more + 64;
 }
 
 /* Values of sites, the last axis fastest, into rows. */
@@ -373,6 +445,7 @@ static void kdv_place_middle(kdv_solver *s, double *memory, size_t block)
     memory += 2 * kdv_DIM * block;
     for (int d = 0; d < kdv_DIFFERENCES; ++d)
         for (int k = 0; k < kdv_DIM; ++k, memory += block) s->guess.difference[d][k] = memory;
+    for (int k = 0; k < kdv_DIM; ++k, memory += block) s->v[k] = memory;
 }
 
 static void kdv_prepare_step(const kdv_params *params, double h, double *coef)
@@ -411,6 +484,7 @@ kdv_status kdv_init(kdv_solver *s, const kdv_params *params, const size_t sizes[
     const size_t block = rows * (size_t)width;
     s->lines = (ptrdiff_t *)(void *)(aligned - kdv_LEAD + kdv_RESERVED * block);
     for (size_t r = 0; r < rows; ++r) kdv_find_lines(s, r, s->lines + r * kdv_LINES);
+    s->matrix = (double *)(void *)(s->lines + kdv_LINES);
     for (size_t k = 0; k < kdv_ARRAYS; ++k) s->x[k] = aligned + k * block;
     for (size_t k = 0; k < kdv_DIM; ++k) s->before[k] = aligned + (kdv_ARRAYS + k) * block;
     kdv_place_middle(s, aligned + (kdv_RESERVED - kdv_IMPLICIT) * block, block);
@@ -497,6 +571,8 @@ static double kdv_relaxed(const kdv_solver *s, const double *coef, int far, int 
 #define kdv_SETTLED 0x1p-55  /* what further sweeps may still change, in sizes of y */
 #define kdv_ROUNDING 0x1p-40 /* changes below this may be rounding */
 
+#define kdv_SLOW 0.6        /* changes that shrink by less are left to Newton's method, ... */
+enum { kdv_PATIENCE = 10 }; /* ... after so many sweeps */
 /* y in the middle of a stage, by sweeps from the guess in s->y[0] until only rounding would change; it is in
    s->y[*now]. */
 static kdv_status kdv_middle(kdv_solver *s, const double *coef, int far, int *now)
@@ -506,10 +582,11 @@ static kdv_status kdv_middle(kdv_solver *s, const double *coef, int far, int *no
         const double change = kdv_relaxed(s, coef, far, *now), shrunk = before - change;
         ++s->sweeps;
         *now = 1 - *now;
-        if (!isfinite(change)) return kdv_NOT_FINITE;
+        if (!isfinite(change)) return sweep == 0 ? kdv_NOT_FINITE : kdv_NO_CONVERGENCE;
         /* what further sweeps would change, with the rate change / before; or changes shrink no more */
         if (change * change <= shrunk * kdv_SETTLED || (shrunk <= 0.0 && change <= kdv_ROUNDING && sweep > 0))
             return kdv_OK;
+        if (sweep >= kdv_PATIENCE && change > kdv_SLOW * before && change > 0x1p-30) break;
         before = change;
     }
     return kdv_NO_CONVERGENCE;
@@ -532,6 +609,197 @@ static void kdv_predict(const kdv_solver *s)
                 }
             }
     }
+}
+
+/* ---- Newton's method where sweeps fail ---- */
+static void kdv_swap(double *a, double *b)
+{
+    const double held = *a;
+    *a = *b;
+    *b = held;
+}
+
+/* The row of the largest of some entries. */
+static ptrdiff_t kdv_largest(const double *entries, ptrdiff_t count)
+{
+    ptrdiff_t found = 0;
+    for (ptrdiff_t k = 1; k < count; ++k)
+        if (fabs(entries[k]) > fabs(entries[found])) found = k;
+    return found;
+}
+
+/* LU of a matrix of so many columns, which are so far apart, with entry (i, j) at column[j][i - low[j]]: the
+   band's A, or D. Entries beside the diagonal are below rows, above rows far. */
+static int kdv_decompose(double *a, ptrdiff_t n, ptrdiff_t tall, ptrdiff_t middle, ptrdiff_t below,
+    double *pivots)
+{
+    ptrdiff_t last = 0;
+    /* entry (i, j) is a[j * tall + middle + i - j], or, of D, a[j * tall + i] */
+    for (ptrdiff_t j = 0; j < n; ++j) {
+        const ptrdiff_t under = n - 1 - j < below ? n - 1 - j : below, step = middle < 0 ? tall : tall - 1;
+        double *diagonal = a + j * tall + (middle < 0 ? j : middle);
+        const ptrdiff_t p = kdv_largest(diagonal, under + 1);
+        pivots[j] = (double)p;
+        if (!(fabs(diagonal[p]) > 0.0)) return 0;
+        const ptrdiff_t reach = middle < 0 ? n - 1 : j + p + below < n - 1 ? j + p + below : n - 1;
+        last = reach > last ? reach : last;
+        for (ptrdiff_t k = j; p != 0 && k <= last; ++k)
+            kdv_swap(diagonal + (k - j) * step, diagonal + p + (k - j) * step);
+        for (ptrdiff_t i = 1; i <= under; ++i) diagonal[i] /= *diagonal;
+        for (ptrdiff_t k = j + 1; k <= last; ++k) {
+            double *entry = diagonal + (k - j) * step;
+            for (ptrdiff_t i = 1; i <= under; ++i) entry[i] -= diagonal[i] * *entry;
+        }
+    }
+    return 1;
+}
+
+/* Solve with it, in place. */
+static void kdv_substitute( const double *a, ptrdiff_t n, ptrdiff_t tall, ptrdiff_t middle, ptrdiff_t below,
+    const double *pivots, double *x)
+{
+    for (ptrdiff_t j = 0; j < n; ++j) {
+        const ptrdiff_t under = n - 1 - j < below ? n - 1 - j : below;
+        const double *diagonal = a + j * tall + (middle < 0 ? j : middle);
+        if (pivots[j] > 0.0) kdv_swap(x + j, x + j + (ptrdiff_t)pivots[j]);
+        for (ptrdiff_t i = 1; i <= under; ++i) x[j + i] -= diagonal[i] * x[j];
+    }
+    for (ptrdiff_t j = n - 1; j >= 0; --j) {
+        const ptrdiff_t over = middle < 0 || j < middle ? j : middle;
+        const double *diagonal = a + j * tall + (middle < 0 ? j : middle);
+        x[j] /= *diagonal;
+        for (ptrdiff_t i = 1; i <= over; ++i) x[j - i] -= diagonal[-i] * x[j];
+    }
+}
+
+static void kdv_put_entry(const kdv_matrix *m, ptrdiff_t i, ptrdiff_t j, double value)
+{
+    if (i < m->inner && j < m->inner)
+        m->a[j * kdv_TALL + 2 * kdv_BAND + i - j] = value;
+    else if (i < m->inner)
+        m->b[(j - m->inner) * m->inner + i] = value;
+    else if (j < m->inner)
+        m->c[j * m->border + i - m->inner] = value;
+    else
+        m->d[(j - m->inner) * m->border + i - m->inner] = value;
+}
+
+/* The columns of one field at every kdv_APART-th site, or at one that is left over, from what a sweep does to
+   them. */
+static void kdv_probe(kdv_solver *s, const kdv_matrix *m, const double *coef, int now, ptrdiff_t first,
+    ptrdiff_t count, int f)
+{
+    const ptrdiff_t sites = s->length, apart = 2 * kdv_REACH + 1;
+    const ptrdiff_t reach = sites < apart ? sites / 2 : kdv_REACH;
+    for (int k = 0; k < kdv_DIM; ++k) {
+        for (ptrdiff_t i = -kdv_HALO; i < sites + kdv_HALO; ++i) s->v[k][i] = 0.0;
+        for (ptrdiff_t i = 0; k == f && i < count; ++i) s->v[k][first + i * apart] = 1.0;
+        kdv_ends(s->v[k], sites, 0, sites);
+    }
+    kdv_slope_rows(s, coef, 1, now, 0, kdv_pieces(s));
+    for (ptrdiff_t column = 0; column < count; ++column)
+        for (ptrdiff_t o = -reach; o <= reach; ++o) {
+            const ptrdiff_t j = first + column * apart;
+            ptrdiff_t i = j + o;
+            if (kdv_open[0] && (i < 0 || i >= sites)) continue;
+            i += (i < 0 ? sites : 0) - (i >= sites ? sites : 0);
+            for (int k = 0; k < kdv_DIM; ++k)
+                kdv_put_entry(m, i * kdv_DIM + k, j * kdv_DIM + f, (i == j && k == f ? 1.0 : 0.0)
+                    - s->y[1 - now][k][i]);
+        }
+}
+
+/* The matrix at s->y[now], factorised; 0 if it is singular. */
+static int kdv_factorise(kdv_solver *s, const double *coef, int now)
+{
+    kdv_matrix m;
+    const size_t entries = kdv_matrix_of(s->sites, s->matrix, &m);
+    const ptrdiff_t sites = s->length, apart = 2 * kdv_REACH + 1, whole = sites / apart, inner = m.inner,
+        border = m.border;
+    memset(s->matrix, 0, entries * sizeof *s->matrix);
+    for (int f = 0; f < kdv_DIM; ++f) {
+        for (ptrdiff_t first = 0; whole > 0 && first < apart; ++first)
+            kdv_probe(s, &m, coef, now, first, whole, f);
+        for (ptrdiff_t i = whole * apart; i < sites; ++i) kdv_probe(s, &m, coef, now, i, 1, f);
+    }
+    if (!kdv_decompose(m.a, inner, kdv_TALL, 2 * kdv_BAND, kdv_BAND, m.pivots)) return 0;
+    for (ptrdiff_t j = 0; j < border; ++j) {
+        double *b = m.b + j * inner, *d = m.d + j * border;
+        kdv_substitute(m.a, inner, kdv_TALL, 2 * kdv_BAND, kdv_BAND, m.pivots, b);
+        for (ptrdiff_t k = 0; k < inner; ++k)
+            for (ptrdiff_t i = 0; i < border; ++i) d[i] -= m.c[k * border + i] * b[k];
+    }
+    return kdv_decompose(m.d, border, border, -1, border, m.pivots + inner);
+}
+
+/* The correction of s->y[now], added to it: its size, in sizes of y. */
+static double kdv_correct(kdv_solver *s, int now)
+{
+    kdv_matrix m;
+    kdv_matrix_of(s->sites, s->matrix, &m);
+    const ptrdiff_t sites = s->length, inner = m.inner, border = m.border;
+    double *lower = m.side + inner, size[kdv_DIM] = { 0.0 }, change[kdv_DIM] = { 0.0 }, largest = 0.0, moved =
+        0.0;
+    for (ptrdiff_t i = 0; i < sites; ++i)
+        for (int k = 0; k < kdv_DIM; ++k) m.side[i * kdv_DIM + k] = s->y[1 - now][k][i] - s->y[now][k][i];
+    kdv_substitute(m.a, inner, kdv_TALL, 2 * kdv_BAND, kdv_BAND, m.pivots, m.side);
+    for (ptrdiff_t k = 0; k < inner; ++k)
+        for (ptrdiff_t i = 0; i < border; ++i) lower[i] -= m.c[k * border + i] * m.side[k];
+    kdv_substitute(m.d, border, border, -1, border, m.pivots + inner, lower);
+    for (ptrdiff_t j = 0; j < border; ++j)
+        for (ptrdiff_t i = 0; i < inner; ++i) m.side[i] -= m.b[j * inner + i] * lower[j];
+    for (ptrdiff_t i = 0; i < sites; ++i)
+        for (int k = 0; k < kdv_DIM; ++k) {
+            const double by = m.side[i * kdv_DIM + k];
+            s->y[now][k][i] += by;
+            change[k] = kdv_larger(change[k], fabs(by));
+            size[k] = kdv_larger(size[k], fabs(s->y[now][k][i]));
+        }
+    for (int k = 0; k < kdv_DIM; ++k) kdv_ends(s->y[now][k], sites, 0, sites);
+    for (int k = 0; k < kdv_DIM; ++k) largest = kdv_larger(largest, size[k]);
+    for (int k = 0; k < kdv_DIM; ++k)
+        moved = kdv_larger(moved, change[k] / (size[k] + 1e-3 * largest + 1e-300));
+    return moved;
+}
+
+/* how far from x a solution is one of the motion, in sizes of x and of what the field says */
+#define kdv_PLAUSIBLE 1.5
+enum { kdv_MOST_ITERATIONS = 60 };
+
+/* The sum of the distances of y from x; with x added that of the sizes of x. */
+static double kdv_distance(const kdv_solver *s, int side, double added)
+{
+    double sum = 0.0;
+    for (int k = 0; k < kdv_DIM; ++k)
+        for (ptrdiff_t i = 0; i < s->length; ++i)
+            sum += fabs(s->y[side][k][i] - s->x[k][i]) + added * fabs(s->x[k][i]);
+    return sum;
+}
+
+/* y in the middle of a stage, in s->y[0]. The matrix is kept while it serves. */
+static kdv_status kdv_newton(kdv_solver *s, const double *coef)
+{
+    double before = 0.0;
+    kdv_copy(s->y[0], s->x, s);
+    kdv_relaxed(s, coef, 1, 0);
+    const double far = kdv_PLAUSIBLE * kdv_distance(s, 1, 1.0);
+    kdv_predict(s);
+    for (int iteration = 0; iteration < kdv_MOST_ITERATIONS; ++iteration) {
+        if (s->factored != coef) {
+            if (!kdv_factorise(s, coef, 0)) return kdv_SINGULAR;
+            s->factored = coef;
+        }
+        if (!isfinite(kdv_relaxed(s, coef, 1, 0))) return kdv_NO_CONVERGENCE;
+        ++s->sweeps;
+        const double change = kdv_correct(s, 0), shrunk = before - change;
+        if (!isfinite(change)) return kdv_NO_CONVERGENCE;
+        if (change * change <= shrunk * kdv_SETTLED || (shrunk <= 0.0 && change <= kdv_ROUNDING && iteration
+            > 0))
+            return kdv_distance(s, 0, 0.0) <= far ? kdv_OK : kdv_NO_CONVERGENCE;
+        if (iteration > 0 && change > 0.25 * before && change > kdv_ROUNDING) s->factored = NULL;
+        before = change;
+    }
+    return kdv_NO_CONVERGENCE;
 }
 
 /* Take in the y of a stage. The guess of order d missed it by its d-th difference: the next is of the best
@@ -575,6 +843,8 @@ static void kdv_remember(kdv_solver *s, int now)
 /* Begin without guesses. */
 static void kdv_forget(kdv_solver *s)
 {
+    s->stiff = 0;
+    s->factored = NULL;
     s->guess.count = s->guess.order = 0;
 }
 
@@ -585,7 +855,12 @@ static kdv_status kdv_stages(kdv_solver *s, int far)
     const double *coef = s->coef;
     int now = 0;
     kdv_predict(s);
-    const kdv_status status = kdv_middle(s, coef, far, &now);
+    kdv_status status = s->stiff ? kdv_NO_CONVERGENCE : kdv_middle(s, coef, far, &now);
+    if (status != kdv_OK) {
+        s->stiff = 1;
+        now = 0;
+        status = kdv_newton(s, coef);
+    }
     if (status != kdv_OK) return status;
     kdv_remember(s, now);
     kdv_PARALLEL

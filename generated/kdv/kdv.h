@@ -2,7 +2,7 @@
  * kdv.h: the declarations; kdv.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: b03fece749f1034f0b860c61977c41efd965c1b44c4cf06bf569b0ff50778ee5
+ * body-sha256: ee98b8190117585d8b59f70b3f93da5b3ce550e581ede4e758496ff4cf8a8ee4
  */
 #ifndef KDV_H
 #define KDV_H
@@ -28,7 +28,7 @@ typedef struct {
 extern const kdv_params kdv_default_params;
 
 enum { kdv_ARRAYS = 1 };       /* arrays over the sites: fields, then parameters */
-enum { kdv_COEFFICIENTS = 4 }; /* numbers that depend on params and h only */
+enum { kdv_COEFFICIENTS = 7 }; /* numbers that depend on params and h only */
 enum { kdv_DIFFERENCES = 4 };  /* that a guess is extrapolated from */
 
 /* How a step ends; kdv_status_string says it in words. */
@@ -56,10 +56,14 @@ typedef struct {
     /* the middle of a stage, before and after a sweep, with the parameters at sites */
     double *y[2][kdv_ARRAYS];
     kdv_guess guess;
-    size_t sweeps; /* that stages took since kdv_init */
-    size_t steps;  /* good steps since kdv_init */
-    double t;      /* time since kdv_init */
-    double h;      /* the last step size */
+    size_t sweeps;          /* that stages took since kdv_init */
+    int stiff;              /* whether sweeps have failed */
+    const double *factored; /* the coefficients that the matrix is of, or NULL */
+    double *v[kdv_DIM];     /* a variation of y */
+    double *matrix;         /* see kdv_factorise */
+    size_t steps;           /* good steps since kdv_init */
+    double t;               /* time since kdv_init */
+    double h;               /* the last step size */
     kdv_params params;
     double coef[kdv_COEFFICIENTS]; /* all that depends on params and h only */
     int prepared; /* whether coef has been computed */

@@ -13,7 +13,7 @@
 #
 # SPDX-License-Identifier: 0BSD
 # This file belongs to whoever generated it; phigen claims no rights in it.
-# body-sha256: 6163f4d8314879fa384a8ea214436d0b5310735eff83a75c8a59998840918ae7
+# body-sha256: 64201ff4e80bd42d8df54c12078f5fba45c31bf55e6f8171813533fc23e5ad0e
 import numpy as np
 
 VERSION = "0.1.0"
@@ -134,6 +134,10 @@ class _Sites:
 # Sweeps that a stage may take; values that guesses are extrapolated from; a change by this part of y may be rounding.
 MOST_SWEEPS = 200
 DIFFERENCES = 4
+
+# After so many sweeps, changes that still shrink by less than this factor are left to Newton's method.
+PATIENCE = 10
+SLOW = 0.6
 ROUNDING = 2.0**-40
 
 
@@ -144,16 +148,21 @@ def _size(change, y):
     return (changes / (sizes + 1e-3 * sizes.max() + 1e-300)).max()
 
 
-def _middle(coef, x, y, sites):
-    """y at the middle of a stage, by sweeps from a guess until only rounding would change, and the number of sweeps."""
+def _by_sweeps(coef, x, y, sites):
+    """y at the middle of a stage, by sweeps from a guess until only rounding would change."""
     before = 0.0
     for sweeps in range(1, MOST_SWEEPS + 1):
-        following = _finite(_relax(coef, x, y, sites))
+        following = _relax(coef, x, y, sites)
+        if sweeps > 1 and not np.isfinite(following).all():
+            break
+        _finite(following)
         change = _size(following - y, following)
         y, shrunk = following, before - change
         # What further sweeps would change, with the rate change / before, or that changes shrink no more.
         if change * change <= shrunk * 2.0**-55 or (shrunk <= 0.0 and change <= ROUNDING and sweeps > 1):
-            return y, sweeps
+            return y
+        if sweeps > PATIENCE and change > max(SLOW * before, 2.0**-30):
+            break
         before = change
     raise FailedError("NO_CONVERGENCE")
 
@@ -176,11 +185,69 @@ def _advance(sites, rows, x, past):
     """One step; raises FailedError. The past has, of each stage, the order of guesses and differences of y - x."""
     for stage, (_, row) in enumerate(SCHEDULE):
         order, differences = past.get(stage, (0, []))
-        y, sweeps = _middle(rows[row], x, x + sum(differences[:order]), sites)
+        guess = x + sum(differences[:order])
+        y = _middle(rows[row], x, guess, sites, past)
         past[stage] = _remember(differences, y - x), differences
-        past["sweeps"] = sweeps
         x = _finite(x + _increment(rows[row], x, y, sites))
     return x
+
+
+# Newton's iterations; directions of a Krylov space, and how well it solves; how far from x a solution is one of the motion,
+# in sizes of x and of what the field says.
+MOST_ITERATIONS = 40
+DIRECTIONS = 400
+SOLVED = 1e-6
+PLAUSIBLE = 1.5
+
+
+def _middle(coef, x, guess, sites, past):
+    """y at the middle of a stage: by sweeps until they fail to solve one, then by Newton's method."""
+    if "stiff" not in past:
+        try:
+            return _by_sweeps(coef, x, guess, sites)
+        except FailedError:
+            past["stiff"] = True
+    return _newton(coef, x, guess, sites)
+
+
+def _newton(coef, x, y, sites):
+    """y at the middle of a stage by Newton's method; raises FailedError."""
+    before, far = 0.0, PLAUSIBLE * (np.abs(x) + np.abs(_relax(coef, x, x, sites) - x)).sum()
+    for iteration in range(MOST_ITERATIONS):
+        change = _krylov(lambda v: v - _slope(coef, x, y, v, sites), _finite(_relax(coef, x, y, sites)) - y)
+        y = _finite(y + change)
+        size = _size(change, y)
+        shrunk = before - size
+        if size * size <= shrunk * 2.0**-55 or (shrunk <= 0.0 and size <= ROUNDING and iteration > 0):
+            if np.abs(y - x).sum() <= far:
+                return y
+            break
+        before = size
+    raise FailedError("NO_CONVERGENCE")
+
+
+def _krylov(matrix, side):
+    """The solution of matrix(v) = side, to some digits, by GMRES."""
+    length = np.sqrt((side * side).sum())
+    if length == 0.0:
+        return side
+    directions, columns = [side / length], []
+    for count in range(1, min(DIRECTIONS, side.size) + 1):
+        new = _finite(matrix(directions[-1]))
+        column = np.zeros(DIRECTIONS + 1)
+        for k, direction in enumerate(directions):
+            column[k] = (direction * new).sum()
+            new = new - column[k] * direction
+        column[count] = np.sqrt((new * new).sum())
+        columns.append(column)
+        small = np.array(columns).T[: count + 1]
+        target = np.zeros(count + 1)
+        target[0] = length
+        weights = np.linalg.lstsq(small, target, rcond=None)[0]
+        if np.linalg.norm(small @ weights - target) <= SOLVED * length or column[count] <= 1e-14 * length:
+            break
+        directions.append(new / column[count])
+    return sum(w * direction for w, direction in zip(weights, directions))
 
 
 def _coefficients(sites, h):
@@ -252,7 +319,11 @@ def _prepare(parameters, h):
     delta = parameters["delta"]
     d = parameters["d"]
     t1 = 1.0 / d
-    return [t1 * (delta * delta), d, h, t1 * t1]
+    t2 = t1 * (delta * delta)
+    t3 = t1 * t1
+    t4 = h * t3
+    t5 = t4 * t2
+    return [t2, d, h, t3, t5, d * t4, 0.25 * t5]
 
 
 def _relax(coef, start, x, sites):
@@ -272,6 +343,17 @@ def _increment(coef, start, x, sites):
     u_i_1__ = sites.shifted(x[0], -1)
     u_i_2__ = sites.shifted(x[0], -2)
     t1 = 0.5 * (coef[3] * (coef[2] * (coef[0] * (u_i_1_ - u) - coef[0] * (u_i_2_ - u_i_1_) - 0.5 * (coef[1] * (u_i_1_ * u_i_1_))))) - 0.5 * (coef[3] * (coef[2] * (coef[0] * (u_i_1__ - u_i_2__) - coef[0] * (u - u_i_1__) - 0.5 * (coef[1] * (u_i_1__ * u_i_1__)))))
+    return np.array([np.broadcast_to(t1, sites.sizes)])
+
+
+def _slope(coef, start, x, v, sites):
+    u_i_1_ = sites.shifted(x[0], 1)
+    u_i_1__ = sites.shifted(x[0], -1)
+    v_u_i_1_ = sites.shifted(v[0], 1)
+    v_u_i_2_ = sites.shifted(v[0], 2)
+    v_u_i_1__ = sites.shifted(v[0], -1)
+    v_u_i_2__ = sites.shifted(v[0], -2)
+    t1 = v_u_i_1_ * (coef[6] + (coef[6] - 0.25 * (coef[5] * u_i_1_))) - 0.25 * (coef[4] * v_u_i_2_) + (0.25 * (coef[4] * v_u_i_2__) + v_u_i_1__ * (0.25 * (coef[5] * u_i_1__) - coef[6] - coef[6]))
     return np.array([np.broadcast_to(t1, sites.sizes)])
 
 

@@ -22,7 +22,7 @@
  *   4. The solver
  *   5. The stages
  *   6. What is seen at sites
- * body-sha256: 4f92e163817a24961816da26f909e054d02cafab743acf804cc056b463ce6655
+ * body-sha256: cd68e898e85cc251a1f56c9ed5ba604ea6b2a8bdd930b3c83ad9ea344f4f64b5
  */
 #include "point_vortices.h"
 
@@ -618,7 +618,7 @@ static point_vortices_status point_vortices_middle(point_vortices_solver *s, con
         const double change = point_vortices_relaxed(s, coef, far, *now), shrunk = before - change;
         ++s->sweeps;
         *now = 1 - *now;
-        if (!isfinite(change)) return point_vortices_NOT_FINITE;
+        if (!isfinite(change)) return sweep == 0 ? point_vortices_NOT_FINITE : point_vortices_NO_CONVERGENCE;
         /* what further sweeps would change, with the rate change / before; or changes shrink no more */
         if (change * change <= shrunk * point_vortices_SETTLED || (shrunk <= 0.0 && change <=
             point_vortices_ROUNDING && sweep > 0))

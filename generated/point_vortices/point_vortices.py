@@ -14,7 +14,7 @@
 #
 # SPDX-License-Identifier: 0BSD
 # This file belongs to whoever generated it; phigen claims no rights in it.
-# body-sha256: a8439fd0d7ec91c268d237640d4ce779f32d2588883addd19700220718e0af38
+# body-sha256: 0f81adb2def6615a16b63f7276752ed6855040646a51623912c11954192b776d
 import numpy as np
 
 VERSION = "0.1.0"
@@ -144,16 +144,19 @@ def _size(change, y):
     return (changes / (sizes + 1e-3 * sizes.max() + 1e-300)).max()
 
 
-def _middle(coef, x, y, sites):
-    """y at the middle of a stage, by sweeps from a guess until only rounding would change, and the number of sweeps."""
+def _by_sweeps(coef, x, y, sites):
+    """y at the middle of a stage, by sweeps from a guess until only rounding would change."""
     before = 0.0
     for sweeps in range(1, MOST_SWEEPS + 1):
-        following = _finite(_relax(coef, x, y, sites))
+        following = _relax(coef, x, y, sites)
+        if sweeps > 1 and not np.isfinite(following).all():
+            break
+        _finite(following)
         change = _size(following - y, following)
         y, shrunk = following, before - change
         # What further sweeps would change, with the rate change / before, or that changes shrink no more.
         if change * change <= shrunk * 2.0**-55 or (shrunk <= 0.0 and change <= ROUNDING and sweeps > 1):
-            return y, sweeps
+            return y
         before = change
     raise FailedError("NO_CONVERGENCE")
 
@@ -176,9 +179,9 @@ def _advance(sites, rows, x, past):
     """One step; raises FailedError. The past has, of each stage, the order of guesses and differences of y - x."""
     for stage, (_, row) in enumerate(SCHEDULE):
         order, differences = past.get(stage, (0, []))
-        y, sweeps = _middle(rows[row], x, x + sum(differences[:order]), sites)
+        guess = x + sum(differences[:order])
+        y = _by_sweeps(rows[row], x, guess, sites)
         past[stage] = _remember(differences, y - x), differences
-        past["sweeps"] = sweeps
         x = _finite(x + _increment(rows[row], x, y, sites))
     return x
 

@@ -121,7 +121,7 @@ def in_lanes(program: Program) -> Lanes | None:
 def _rows(program: Program, step: Sweeps) -> Rows:
     """Sites are in rows in any case; the short way near 0 is for speed."""
     swept = [sweep.kernel for part in step.parts for sweep in part]
-    swept += [step.equation.relax, step.equation.advance] if step.equation else []
+    swept += step.equation.kernels if step.equation else ()
     seen = program.observables
     looped = [kernel for kernel in step.kernels if kernel is not step.prepare]
     ops = operations([*looped, seen.energy, seen.casimirs, seen.vector_field])

@@ -8,7 +8,7 @@ from phigen.lattice.cell import Cell
 from phigen.scheme.kernel import Kernel, Output
 from phigen.scheme.staging import Coefficients
 from phigen.symbolic.expression import Expression, symbols_of
-from phigen.symbolic.symbols import CHOSEN, GATHERED, INITIAL, PRESENT, kind_of
+from phigen.symbolic.symbols import CHOSEN, GATHERED, INITIAL, PRESENT, VARIATION, kind_of
 
 
 def site_kernel(
@@ -31,5 +31,6 @@ def site_kernel(
     inputs = {**first, "site": tuple(places), "present": of_kind(PRESENT, CHOSEN), "gathered": of_kind(GATHERED)}
     bonds = tuple(p.name for p in cell.parameters if p.at == "bonds" and p.name in used)
     inputs |= {"bonds": bonds} if bonds else {}
+    inputs |= {"varied": of_kind(VARIATION)} if of_kind(VARIATION) else {}
     inputs |= {"start": of_kind(INITIAL)} if of_kind(INITIAL) else {}
     return Kernel(name, purpose, inputs, (Output(output, tuple(values)),))

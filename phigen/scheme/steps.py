@@ -315,12 +315,19 @@ class Equation:
     """y = x − (α − x)(y, h∇H(y)) at all sites of a lattice, solved for y; then x moves by (β − α)(y, h∇H(y)).
 
     The inputs of the kernels are those of sweeps, where ``site`` are values of y, and of ``relax``, the right-hand
-    side at a site, also ``start``: x there. ``advance`` is what x moves by.
+    side at a site, also ``start``: x there. ``advance`` is what x moves by. ``slope`` is the derivative of ``relax``
+    along a variation of y, for Newton's method; None on graphs and for pairs.
     """
 
     relax: Kernel
     advance: Kernel
+    slope: Kernel | None = None
     most_sweeps: int = 200
+
+    @property
+    def kernels(self) -> tuple[Kernel, ...]:
+        """All kernels, each once."""
+        return _present((self.relax, self.advance, self.slope))
 
 
 @dataclass(frozen=True)
@@ -355,7 +362,7 @@ class Sweeps(_Staged):
         """All kernels, each once."""
         swept = [sweep for part in self.parts for sweep in part]
         swept_kernels = [sweep.kernel for sweep in swept]
-        swept_kernels += [self.equation.relax, self.equation.advance] if self.equation else []
+        swept_kernels += self.equation.kernels if self.equation else ()
         gathers = [sweep.gather for sweep in swept if sweep.gather]
         gathers += [self.partners.energy, self.partners.field] if self.partners else []
         return (self.prepare, *swept_kernels, *(k for g in gathers for k in g.kernels))

@@ -13,7 +13,7 @@ from phigen.spec.model import Parameter
 from phigen.symbolic import functions as elementary
 from phigen.symbolic.expression import ONE, substitute
 from phigen.symbolic.special import SPECIAL
-from phigen.symbolic.symbols import CHOSEN, COEFFICIENT, GATHERED, INITIAL, PRESENT, Symbol, kind_of
+from phigen.symbolic.symbols import CHOSEN, COEFFICIENT, GATHERED, INITIAL, PRESENT, VARIATION, Symbol, kind_of
 from phigen.targets.c import functions
 from phigen.targets.c.kernels import function, lane_calls, members, printer
 from phigen.targets.c.layout import comment
@@ -28,6 +28,9 @@ _OWN = frozenset({"coef", "params", "row", "from", "to", "out", "apart", "i", "j
 
 #: Differences that guesses are extrapolated from, of one stage and of all: more gain little and are arrays over sites.
 MOST_DIFFERENCES, MOST_REMEMBERED = 4, 14
+
+#: Diagonals of a matrix beside its own that elimination is for.
+MOST_BAND = 64
 
 
 @dataclass(frozen=True)
@@ -49,6 +52,22 @@ class Layout:
         """The distance in a row from a site to the next of its colour."""
         sites = self.step.sites
         return next(k for k in range(1, sites.colours + 1) if k * sites.weights[-1] % sites.colours == 0)
+
+    @property
+    def reach(self) -> int:
+        """How far the equation of a stage reaches, of a lattice with one axis."""
+        relax = self.step.equation.relax if self.step.equation else None
+        places = [self.step.sites.places[s] for s in relax.inputs["site"]] if relax else []
+        return max((abs(offset[-1]) for f, offset in places if f not in self.step.sites.parameters), default=0)
+
+    @property
+    def band(self) -> int:
+        """Diagonals beside that of its matrix, site by site; 0 where it is not solved by elimination."""
+        equation, sites = self.step.equation, self.step.sites
+        if not equation or not equation.slope or len(sites.axes) > 1:
+            return 0
+        band = (self.reach + 1) * len(equation.relax.roots) - 1
+        return band if band <= MOST_BAND else 0
 
     @property
     def partners(self) -> Partners:
@@ -75,7 +94,7 @@ def layout_of(program: Program, step: Sweeps) -> Layout:
 def _at_sites(program: Program, step: Sweeps) -> list[Kernel]:
     seen = program.observables
     own = [sweep.kernel for part in step.parts for sweep in part]
-    own += [step.equation.relax, step.equation.advance] if step.equation else []
+    own += step.equation.kernels if step.equation else ()
     return [*own, seen.energy, seen.casimirs, seen.vector_field]
 
 
@@ -93,6 +112,7 @@ def switches(program: Program, step: Sweeps, layout: Layout) -> dict[str, bool]:
         "BOND_PARAMETERS": bool(step.sites.at_bonds),
         "SITE_PARAMETERS": bool(step.sites.parameters),
         "SERIES": step.equation is not None,
+        "STIFF": step.equation is not None and layout.band > 0 and program.offers("recurrences"),
         "GUESSES": step.equation is not None and program.offers("recurrences"),
     }
 
@@ -163,6 +183,9 @@ def model(program: Program, step: Sweeps) -> str:
     ]
     if step.equation:
         constants += [("MOST_SWEEPS", step.equation.most_sweeps, "that a stage may take")]
+        if switches(program, step, layout)["STIFF"]:
+            constants += [("REACH", layout.reach, "sites that y at a site depends on, to each side")]
+            constants += [("BAND", layout.band, "diagonals beside that of the matrix of Newton's method")]
     else:
         constants += [
             ("FLOWS", len(flows), "in a step"),
@@ -240,6 +263,8 @@ def sweeps(program: Program, step: Sweeps, rows: Rows) -> str:
     for kernel in (step.equation.relax, step.equation.advance) if step.equation else ():
         forms = {"_far": calls, "_near": near} if rows.calls_near(kernel) else {"": calls}
         found += _of_equation(program, layout, kernel, forms)
+    if step.equation and step.equation.slope and switches(program, step, layout)["STIFF"]:
+        found += _of_equation(program, layout, step.equation.slope, {"": calls})
     found += [_seen(program, layout, k) for k in (seen.energy, seen.casimirs, seen.vector_field)]
     sites = [p for p in program.parameters if p.at == "sites"]
     numbers = range(1, len(step.parts) + 1)
@@ -286,22 +311,26 @@ def _of_equation(
     program: Program, layout: Layout, kernel: Kernel, forms: Mapping[str, Mapping[str, str]]
 ) -> Iterator[str]:
     """The loops of a kernel of the equation of a stage over rows and their sites, in each form."""
-    name, relaxing = program.name, "start" in kernel.inputs
+    name, relaxing, moves = program.name, kernel.name == "relax", kernel.name == "increment"
     for form, calls in forms.items():
         for one, more in _forms(program, kernel):
-            yield _at_middle(program, layout, one, form + more, calls, "=" if relaxing else "+=")
+            yield _at_middle(program, layout, one, form + more, calls, "+=" if moves else "=")
     beside = _is_split(program, [kernel])
     gathers = layout.partners.field.kernels if kernel.inputs["gathered"] else ()
     gathered = [f"{name}_{own.name}(&s->params, &at.row, at.from, at.to);" for own in gathers]
     loops = {form: [*gathered, *_kernel_calls(f"{name}_{kernel.name}{form}", kernel, beside=beside)] for form in forms}
-    out = "s->y[1 - now]" if relaxing else "s->x"
-    setup = ["at.row.x = s->y[now];", "at.row.start = s->x;", f"at.row.out = {out};"]
+    out = "s->x" if moves else "s->y[1 - now]"
+    reads = ["at.row.start = s->x;"] * ("start" in kernel.inputs) + ["at.row.varied = s->v;"] * (
+        "varied" in kernel.inputs
+    )
+    setup = ["at.row.x = s->y[now];", *reads, f"at.row.out = {out};"]
+    titles = {"relax": "A sweep, from s->y[now] to the other", "increment": "The end of a stage"}
     values = _pieces(program, layout, loops, beside=beside) | {
-        "title": "A sweep, from s->y[now] to the other" if relaxing else "The end of a stage",
+        "title": titles.get(kernel.name, "How a sweep follows s->y[now] along s->v, to the other"),
         "head": f"{kernel.name}_rows",
         "more": ", int now" + f", {name}_extent *extent" * relaxing,
-        "setup": setup if relaxing else [setup[0], setup[2]],
-        "moved": [f"{out}[{f}]" for f in range(program.dimension)] if layout.halo else [],
+        "setup": setup,
+        "moved": [f"{out}[{f}]" for f in range(program.dimension)] if layout.halo and (relaxing or moves) else [],
         "after": [f"{name}_measure(s, &at, now, extent);"] if relaxing else [],
         "unused": ["far"] * (len(forms) == 1),
     }
@@ -555,6 +584,11 @@ def _looped(head: list[str], names: _Names, body: list[str], name: str, loop: st
     return "\n".join(lines) + "\n"
 
 
+def _beside(pointer: str, offset: int) -> str:
+    """A value of a row at an offset from the site i."""
+    return f"{pointer}[i{offset:+d}]".replace("+", " + ").replace("-", " - ").replace(" + 0", "")
+
+
 def _together(values: Sequence[str]) -> list[str]:
     """One declaration of several constants."""
     return [f"const double {', '.join(values)};"] if values else []
@@ -594,9 +628,15 @@ class _Names:
                 self.scope.bind(s, f"row->gathered[{list(sums).index(s)}][i]")
             elif isinstance(s, Symbol) and s.kind == CHOSEN:
                 self.scope.bind(s, "(row->colours[i] == row->chosen ? 1.0 : 0.0)")
+            elif isinstance(s, Symbol) and s.kind == VARIATION:
+                field, offset = layout.step.sites.places[str(s.key[0])]
+                line, number = layout.line(offset), program.coordinates.index(field)
+                pointer = self.scope[Symbol("varied", field, line)]
+                self._starts.append(f"const double *restrict {pointer} = row->varied[{number}] + row->at[{line}];")
+                self.scope.bind(s, _beside(pointer, offset[-1]))
             elif isinstance(s, Symbol) and s.kind == INITIAL:
-                pointer, field = self.scope[Symbol("start", str(s.key[0]))], program.coordinates.index(str(s.key[0]))
-                self._starts.append(f"const double *restrict {pointer} = row->start[{field}] + row->at[0];")
+                pointer, number = self.scope[Symbol("start", str(s.key[0]))], program.coordinates.index(str(s.key[0]))
+                self._starts.append(f"const double *restrict {pointer} = row->start[{number}] + row->at[0];")
                 self.scope.bind(s, f"{pointer}[i]")
             elif isinstance(s, Symbol):
                 self._bind_weight(s)
@@ -636,9 +676,7 @@ class _Names:
         if offset[-1] == 0 and not any(offset):
             self._loaded.append(f"{self.scope[s]} = {pointer}[i]")
         else:
-            self.scope.bind(
-                s, f"{pointer}[i{offset[-1]:+d}]".replace("+", " + ").replace("-", " - ").replace(" + 0", "")
-            )
+            self.scope.bind(s, _beside(pointer, offset[-1]))
 
     def pointer(self, base: str, line: int) -> str:
         """The name of the row of an array at a line."""
@@ -653,7 +691,7 @@ class _Names:
 
     def pointers(self) -> list[str]:
         """What is read before the loop."""
-        lines = [*_together(self._first), *self._starts]
+        lines = [*_together(self._first), *dict.fromkeys(self._starts)]
         for f in sorted(self.moved):
             self.pointer(f, 0)
         for (base, line), named in self._pointers.items():

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from phigen.scheme.kernel import Kernel
 from phigen.scheme.program import Program
 from phigen.scheme.steps import Gather, Sweep, Sweeps
-from phigen.symbolic.symbols import CHOSEN, COEFFICIENT, GATHERED, INITIAL, Symbol
+from phigen.symbolic.symbols import CHOSEN, COEFFICIENT, GATHERED, INITIAL, VARIATION, Symbol
 from phigen.targets import special
 from phigen.targets.code import Code, lower
 from phigen.targets.names import Scope
@@ -44,13 +44,18 @@ def body(program: Program, step: Sweeps, prepare: str) -> str:
         "kicks": bool(schedule.multiples),
         "at_bonds": _tuple(map(repr, sites.at_bonds)),
         "by_colour": repr(step.by_colour),
+        "newton": step.equation is not None and step.equation.slope is not None,
+        "middle": "_by_sweeps(rows[row], x, guess, sites)",
         "most_sweeps": step.equation.most_sweeps if step.equation else 0,
     }
+    if values["newton"]:
+        values["middle"] = "_middle(rows[row], x, guess, sites, past)"
     graph = step.partners is not None and step.partners.graph
     values["sites"] = "_Coloured" if step.by_colour else "_Graph" if graph else "_Sites"
     values["flow"] = "(part, sites.colour), row in sites.schedule" if step.by_colour else "part, row in SCHEDULE"
     graphs = ["lattice_graph", *(["lattice_colours"] if step.by_colour else [])] if graph else []
     parts = ["lattice", "lattice_sites", *graphs, "lattice_series" if step.equation else "lattice_splitting"]
+    parts += ["lattice_newton"] if step.equation and step.equation.slope else []
     parts.append("lattice_steps")
     pieces = [render("numpy", f"{part}.py", values) for part in parts]
     pieces += [render("numpy", "lattice_seen.py", values), prepare]
@@ -61,7 +66,7 @@ def body(program: Program, step: Sweeps, prepare: str) -> str:
     pieces += _gathers(program, step)
     pieces += [_sweep(program, step, sweep) for part in step.parts for sweep in part]
     if step.equation:
-        pieces += [_at_middle(program, step, kernel) for kernel in (step.equation.relax, step.equation.advance)]
+        pieces += [_at_middle(program, step, kernel) for kernel in step.equation.kernels]
     else:
         listed = ["    (" + ", ".join(f"_{sweep.kernel.name}" for sweep in part) + ",)," for part in step.parts]
         pieces.append("\n".join(["# The sweeps of each part of H.", "PARTS = (", *listed, ")\n"]))
@@ -93,8 +98,9 @@ def _sweep(program: Program, step: Sweeps, sweep: Sweep) -> str:
 def _at_middle(program: Program, step: Sweeps, kernel: Kernel) -> str:
     """A kernel of the equation of a stage as a function of y, which is its x, and of x, where the stage starts."""
     code = lower(kernel)
-    scope = Scope(PYTHON_RESERVED | _OWN | {"start", "gathered"})
-    lines, gathers = [f"def _{kernel.name}(coef, start, x, sites):"], kernel.inputs["gathered"]
+    scope = Scope(PYTHON_RESERVED | _OWN | {"start", "gathered", "v"})
+    varied = ", v" if "varied" in kernel.inputs else ""
+    lines, gathers = [f"def _{kernel.name}(coef, start, x{varied}, sites):"], kernel.inputs["gathered"]
     lines += ["    gathered = _forces(sites.parameters, x, sites)"] if gathers else []
     lines += _body(program, step, kernel, code, scope, step.partners.field.names if step.partners else ())
     show = LANGUAGE.printer(scope)
@@ -169,6 +175,9 @@ def _body(
                 scope.bind(s, "sites.chosen()")
             elif isinstance(s, Symbol) and s.kind == INITIAL:
                 scope.bind(s, f"start[{program.coordinates.index(str(s.key[0]))}]")
+            elif isinstance(s, Symbol) and s.kind == VARIATION:
+                field, offset = step.sites.places[str(s.key[0])]
+                lines.append(f"    {scope[s]} = {_shifted(f'v[{program.coordinates.index(field)}]', offset)}")
             elif isinstance(s, Symbol):
                 bounds = ", ".join(map(str, s.key))
                 scope.bind(s, f"coef[{i}]" if s.kind == COEFFICIENT else f"sites.present({bounds})")
@@ -192,4 +201,8 @@ def _read(program: Program, step: Sweeps, name: str) -> str:
         return f"{text}[:, None]" if end == "a" else text
     base, offset = step.sites.places[name]
     text = f"x[{fields.index(base)}]" if base in fields else f'sites.parameters["{base}"]'
+    return _shifted(text, offset)
+
+
+def _shifted(text: str, offset: Sequence[int]) -> str:
     return f"sites.shifted({text}, {', '.join(map(str, offset))})" if any(offset) else text

@@ -25,7 +25,9 @@ enum {
 #endif
     PHI_LEAD = (PHI_HALO + 7) / 8 * 8,
     PHI_BUFFER = 256,
-#if PHI_GUESSES
+#if PHI_STIFF
+    PHI_IMPLICIT = (3 + PHI_STAGES * PHI_DIFFERENCES) * PHI_DIM, /* arrays for y, its guesses and its variation */
+#elif PHI_GUESSES
     PHI_IMPLICIT = (2 + PHI_STAGES * PHI_DIFFERENCES) * PHI_DIM, /* arrays for y and its guesses */
 #elif PHI_SERIES
     PHI_IMPLICIT = 2 * PHI_DIM, /* arrays for y */
@@ -71,7 +73,13 @@ size_t phi_work_size(const size_t sizes[PHI_AXES])
     if (rows == 0 || !phi_few(sizes[0], bonds)) return 0;
     return row + phi_graph_size(sizes[0], bonds) + 128;
 #else
+#if PHI_STIFF
+    phi_matrix matrix;
+    const size_t more = rows == 0 ? 0 : phi_matrix_of(sizes[0], NULL, &matrix) * sizeof(double);
+    return rows == 0 ? 0 : rows * row + more + 64;
+#else
     return rows == 0 ? 0 : rows * row + 64;
+#endif
 #endif
 }
 
@@ -134,6 +142,9 @@ static void phi_place_middle(phi_solver *s, double *memory, size_t block)
         for (int d = 0; d < PHI_DIFFERENCES; ++d)
             for (int k = 0; k < PHI_DIM; ++k, memory += block) s->guess[stage].difference[d][k] = memory;
 #endif
+#if PHI_STIFF
+    for (int k = 0; k < PHI_DIM; ++k, memory += block) s->v[k] = memory;
+#endif
 }
 
 #endif
@@ -189,6 +200,9 @@ phi_status phi_init(phi_solver *s, const phi_params *params, const size_t sizes[
     const size_t block = rows * (size_t)width;
     s->lines = (ptrdiff_t *)(void *)(aligned - PHI_LEAD + PHI_RESERVED * block);
     for (size_t r = 0; r < rows; ++r) phi_find_lines(s, r, s->lines + r * PHI_LINES);
+#if PHI_STIFF
+    s->matrix = (double *)(void *)(s->lines + PHI_LINES);
+#endif
     for (size_t k = 0; k < PHI_ARRAYS; ++k) s->x[k] = aligned + k * block;
     for (size_t k = 0; k < PHI_DIM; ++k) s->before[k] = aligned + (PHI_ARRAYS + k) * block;
 #if PHI_GATHER

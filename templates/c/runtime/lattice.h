@@ -40,6 +40,12 @@ typedef struct {
     phi_guess guess[PHI_STAGES];
 #endif
     size_t sweeps;            /* that stages took since phi_init */
+#if PHI_STIFF
+    int stiff;                /* whether sweeps have failed */
+    const double *factored;   /* the coefficients that the matrix is of, or NULL */
+    double *v[PHI_DIM];       /* a variation of y */
+    double *matrix;           /* see phi_factorise */
+#endif
 #endif
     size_t steps;             /* good steps since phi_init */
     double t;                 /* time since phi_init */

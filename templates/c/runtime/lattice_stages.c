@@ -62,6 +62,10 @@ static double phi_relaxed(const phi_solver *s, const double *coef, int far, int 
 #define PHI_SETTLED 0x1p-55   /* what further sweeps may still change, in sizes of y */
 #define PHI_ROUNDING 0x1p-40  /* changes below this may be rounding */
 
+#if PHI_STIFF
+#define PHI_SLOW 0.6 /* changes that shrink by less are left to Newton's method, ... */
+enum { PHI_PATIENCE = 10 }; /* ... after so many sweeps */
+#endif
 /* y in the middle of a stage, by sweeps from the guess in s->y[0] until only rounding would change; it is in s->y[*now]. */
 static phi_status phi_middle(phi_solver *s, const double *coef, int far, int *now)
 {
@@ -70,10 +74,13 @@ static phi_status phi_middle(phi_solver *s, const double *coef, int far, int *no
         const double change = phi_relaxed(s, coef, far, *now), shrunk = before - change;
         ++s->sweeps;
         *now = 1 - *now;
-        if (!isfinite(change)) return PHI_NOT_FINITE;
+        if (!isfinite(change)) return sweep == 0 ? PHI_NOT_FINITE : PHI_NO_CONVERGENCE;
         /* what further sweeps would change, with the rate change / before; or changes shrink no more */
         if (change * change <= shrunk * PHI_SETTLED || (shrunk <= 0.0 && change <= PHI_ROUNDING && sweep > 0))
             return PHI_OK;
+#if PHI_STIFF
+        if (sweep >= PHI_PATIENCE && change > PHI_SLOW * before && change > 0x1p-30) break;
+#endif
         before = change;
     }
     return PHI_NO_CONVERGENCE;
@@ -98,6 +105,10 @@ static void phi_predict(const phi_solver *s, int stage)
     }
 }
 
+#if PHI_STIFF
+#include "lattice_newton.c"
+
+#endif
 /* Take in the y of a stage. The guess of order d missed it by its d-th difference: the next is of the best order. */
 static void phi_remember(phi_solver *s, int stage, int now)
 {
@@ -137,6 +148,10 @@ static void phi_remember(phi_solver *s, int stage, int now)
 /* Begin without guesses. */
 static void phi_forget(phi_solver *s)
 {
+#if PHI_STIFF
+    s->stiff = 0;
+    s->factored = NULL;
+#endif
     for (int stage = 0; stage < PHI_STAGES; ++stage) s->guess[stage].count = s->guess[stage].order = 0;
 }
 
@@ -153,7 +168,16 @@ static phi_status phi_stages(phi_solver *s, int far)
 #else
         phi_copy(s->y[0], s->x, s);
 #endif
+#if PHI_STIFF
+        phi_status status = s->stiff ? PHI_NO_CONVERGENCE : phi_middle(s, coef, far, &now);
+        if (status != PHI_OK) {
+            s->stiff = 1;
+            now = 0;
+            status = phi_newton(s, coef, stage);
+        }
+#else
         const phi_status status = phi_middle(s, coef, far, &now);
+#endif
         if (status != PHI_OK) return status;
 #if PHI_GUESSES
         phi_remember(s, stage, now);
