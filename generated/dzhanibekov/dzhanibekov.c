@@ -24,7 +24,7 @@
  *   7. Between steps
  *   8. The solver
  *   9. Ensembles
- * body-sha256: 554aa7cd6f22851bc531488eac3cfa61ae5d7fd91d3e1077bca0cc6b37fb32f8
+ * body-sha256: 8047c02b0dfec9041925018e8620898887d537626eecb9754052562c2c91164f
  */
 #include "dzhanibekov.h"
 
@@ -668,9 +668,7 @@ static dzhanibekov_status dzhanibekov_place(dzhanibekov_solver *s, const double 
     dzhanibekov_move_guesses(s, x);
     memcpy(s->x, x, sizeof s->x);
     memcpy(s->carry, carry, sizeof s->carry);
-    double element[dzhanibekov_ELEMENT];
-    dzhanibekov_attitude(s, element);
-    dzhanibekov_begin_attitude(s, element);
+    dzhanibekov_set_attitude(s, s->attitude); /* the gauge turns the body at another rate from here on */
     return dzhanibekov_OK;
 }
 

@@ -116,6 +116,8 @@ class NumpySession:
             if np.isfinite(self._h):
                 self._stages = self._made_stages()
         if element is not None:
+            if hasattr(self._module, "_quaternions"):
+                element[:4] /= np.sqrt(element[:4] @ element[:4])
             self.turn_from(element)
 
     def _values(self) -> Any:

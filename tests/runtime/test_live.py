@@ -74,6 +74,9 @@ def test_the_momentum_in_space_is_constant_after_an_impulse_too(target):
     spatial = turned(session.attitude, session.x)
     session.step(at.h, 200)
     assert turned(session.attitude, session.x) == pytest.approx(spatial, abs=1e-12)
+    for _ in range(300):  # the length of a quaternion does not walk away
+        session.kick([1e-3, 0, 0])
+    assert session.attitude @ session.attitude == pytest.approx(1, abs=1e-15)
 
 
 def turned(q, v):

@@ -71,9 +71,11 @@ static phi_status phi_place(phi_solver *s, const double x[PHI_DIM], const double
     memcpy(s->x, x, sizeof s->x);
     memcpy(s->carry, carry, sizeof s->carry);
 #if PHI_RATE_OF_GAUGE
-    double element[PHI_ELEMENT];
-    phi_attitude(s, element);
-    phi_begin_attitude(s, element);
+#if PHI_POSITION
+    phi_set_attitude(s, s->attitude, s->position); /* the gauge turns the body at another rate from here on */
+#else
+    phi_set_attitude(s, s->attitude); /* the gauge turns the body at another rate from here on */
+#endif
 #endif
     return PHI_OK;
 }
