@@ -23,7 +23,7 @@ from phigen.symbolic.numeric import evaluate_with_scale
 from phigen.symbolic.symbols import momentum
 
 #: The corpus, without the systems that depend on the time: tests/generated/test_time.py is about these.
-TIMED = ("duffing", "spin_resonance")
+TIMED = ("duffing", "seasonal_predator_prey", "spin_resonance")
 #: Those with forces: tests/generated/test_forces.py.
 FORCED = ("landau_lifshitz", "thruster_body")
 #: Those with noise: tests/generated/test_noise.py.

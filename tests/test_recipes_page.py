@@ -1,0 +1,13 @@
+"""docs/recipes.md followed to the letter."""
+
+from pathlib import Path
+
+import pytest
+from walkthrough import follow
+
+from phigen.runtime.toolchain import available
+
+
+@pytest.mark.skipif(not available(), reason="no C compiler")
+def test_the_page_can_be_followed(tmp_path):
+    assert follow(Path(__file__).resolve().parent.parent / "docs" / "recipes.md", tmp_path) == 14
