@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 2e3dc9115caece73a377e254307586a9b20b7081c1bf033748d1815d6be0b6c1
+ * body-sha256: 91600a57f1392e7e1721fe86ea89d74068f63e976d58c6fbb912945044ce1e56
  */
 /*
  * import { Solver, StepError } from './duffing.mjs';
@@ -379,21 +379,25 @@ export class Solver {
   }
 
   /**
-   * Many steps of many states, each of which has its own gauge. One that fails keeps its last good state.
+   * Many steps of many states, each of which has its own gauge. One that fails keeps its last good state. h and what is
+   * in options may be arrays in place of numbers, with one for each member.
    *
    * @param {Iterable<ArrayLike<number>>} members
-   * @param {number} h
+   * @param {number | ArrayLike<number>} h
    * @param {number} count
-   * @param {{params?: Partial<Parameters>, t0?: number}} [options] as of the constructor
+   * @param {{params?: object, t0?: number | ArrayLike<number>}} [options] as of the constructor
    * @returns {{x: Float64Array[], status: string[]}} where each ends, and how: "OK" or a status
    */
   static ensemble(members, h, count, options = {}) {
-    const ends = Array.from(members, (x0) => {
+    const ends = Array.from(members, (x0, m) => {
+      const own = (value) => (typeof value === "object" && value !== null ? value[m] : value);
+      const given = Object.entries(options.params ?? {}).map(([name, value]) => [name, own(value)]);
+      const chosen = { ...options, params: Object.fromEntries(given), t0: own(options.t0), x0 };
       let end = Float64Array.from(x0);
       try {
-        const solver = new Solver({ ...options, x0 });
+        const solver = new Solver(chosen);
         end = solver.x;
-        solver.integrate(h, count);
+        solver.integrate(own(h), count);
         return { end, status: "OK" };
       } catch (error) {
         if (!(error instanceof StepError)) throw error;

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 16b4c9811860a1ed70c2b6880b1c55ed1a52194034a3dbc6cf014d4787964e53
+ * body-sha256: f464d797134863d53006fe540cc8e72e00d01bf82bc3c14d4452c11657345eac
  */
 /*
  * import { Solver, StepError } from './pendulum_euler.mjs';
@@ -270,21 +270,25 @@ export class Solver {
   }
 
   /**
-   * Many steps of many states, each of which has its own gauge. One that fails keeps its last good state.
+   * Many steps of many states, each of which has its own gauge. One that fails keeps its last good state. h and what is
+   * in options may be arrays in place of numbers, with one for each member.
    *
    * @param {Iterable<ArrayLike<number>>} members
-   * @param {number} h
+   * @param {number | ArrayLike<number>} h
    * @param {number} count
-   * @param {{params?: Partial<Parameters>}} [options] as of the constructor
+   * @param {{params?: object}} [options] as of the constructor
    * @returns {{x: Float64Array[], status: string[]}} where each ends, and how: "OK" or a status
    */
   static ensemble(members, h, count, options = {}) {
-    const ends = Array.from(members, (x0) => {
+    const ends = Array.from(members, (x0, m) => {
+      const own = (value) => (typeof value === "object" && value !== null ? value[m] : value);
+      const given = Object.entries(options.params ?? {}).map(([name, value]) => [name, own(value)]);
+      const chosen = { ...options, params: Object.fromEntries(given), t0: own(options.t0), x0 };
       let end = Float64Array.from(x0);
       try {
-        const solver = new Solver({ ...options, x0 });
+        const solver = new Solver(chosen);
         end = solver.x;
-        solver.integrate(h, count);
+        solver.integrate(own(h), count);
         return { end, status: "OK" };
       } catch (error) {
         if (!(error instanceof StepError)) throw error;

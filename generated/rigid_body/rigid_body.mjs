@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 6741b0f4953260d95dcc477661866b79414d158ca3cef1d1608a8aad1ccaa4d9
+ * body-sha256: 8b0ee0968d681e49dfb6bbaee2bd1e5a573a8a16d8058808b77c5fd5b6784711
  */
 /*
  * import { Solver, StepError } from './rigid_body.mjs';
@@ -656,21 +656,25 @@ export class Solver {
   }
 
   /**
-   * Many steps of many states, each of which has its own gauge. One that fails keeps its last good state.
+   * Many steps of many states, each of which has its own gauge. One that fails keeps its last good state. h and what is
+   * in options may be arrays in place of numbers, with one for each member.
    *
    * @param {Iterable<ArrayLike<number>>} members
-   * @param {number} h
+   * @param {number | ArrayLike<number>} h
    * @param {number} count
-   * @param {{params?: Partial<Parameters>}} [options] as of the constructor
+   * @param {{params?: object}} [options] as of the constructor
    * @returns {{x: Float64Array[], status: string[]}} where each ends, and how: "OK" or a status
    */
   static ensemble(members, h, count, options = {}) {
-    const ends = Array.from(members, (x0) => {
+    const ends = Array.from(members, (x0, m) => {
+      const own = (value) => (typeof value === "object" && value !== null ? value[m] : value);
+      const given = Object.entries(options.params ?? {}).map(([name, value]) => [name, own(value)]);
+      const chosen = { ...options, params: Object.fromEntries(given), t0: own(options.t0), x0 };
       let end = Float64Array.from(x0);
       try {
-        const solver = new Solver({ ...options, x0 });
+        const solver = new Solver(chosen);
         end = solver.x;
-        solver.integrate(h, count);
+        solver.integrate(own(h), count);
         return { end, status: "OK" };
       } catch (error) {
         if (!(error instanceof StepError)) throw error;

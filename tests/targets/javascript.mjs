@@ -37,6 +37,17 @@ function carried(Solver, job) {
   return Math.max(...summed.x.map((x, i) => Math.abs(x - parted.x[i]))) / carry;
 }
 
+/** Three members with parameters, steps and times of their own. */
+function each(Solver, job, start) {
+  const factors = [1, 1.01, 1.02];
+  const given = Object.entries(Solver.DEFAULT_PARAMETERS).map(([name, value]) => [name, factors.map((f) => f * value)]);
+  const h = Float64Array.from(factors, (f) => job.h / f);
+  const t0 = factors.map((f) => f - 1);
+  const options = { params: Object.fromEntries(given), t0 };
+  const { x, status } = Solver.ensemble(factors.map(() => start), h, 5, options);
+  return { x: x.map((end) => [...end]), status };
+}
+
 /** Two members, and one that is refused. */
 function many(Solver, job, start) {
   const { params, t0 } = job.options;
@@ -84,6 +95,7 @@ async function answer(job) {
     growth: Math.abs(solver.hamiltonian() / solver.hamiltonian(start)),
     tangent: varied(Solver, job),
     many: many(Solver, job, start),
+    each: each(Solver, job, start),
     moved: attempted(() => moved(Solver, job, "tCarry" in solver)).value,
   };
 }

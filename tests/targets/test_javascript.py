@@ -266,6 +266,17 @@ def test_an_ensemble_is_its_members_one_by_one(case, answers):
     assert apart(found["x"][:2], expected) < 1e-13
 
 
+@pytest.mark.parametrize("case", NAMES)
+def test_members_may_have_parameters_steps_and_times_of_their_own(case, answers):
+    compilation, found = compilation_of(case), answers[case]["each"]
+    at, factors = setting(compilation), np.array([1, 1.01, 1.02])
+    defaults = {p.name: float(p.value) * factors for p in compilation.spec.parameters}
+    more = {"t0": factors - 1} if compilation.program.time else {}
+    assert found["status"] == ["OK"] * 3
+    expected = solver(compilation, "numpy").ensemble([at.x] * 3, at.h / factors, 5, **defaults, **more)
+    assert apart(found["x"], expected) < 1e-13
+
+
 #: Systems and steps that end in an error: far too large ones for each kind of step, and what leads to another energy.
 FAILING = [("rigid_body", 40.0), ("sir_epidemic", 300.0), ("pendulum_euler", 1e200), ("toda3", 1e3), ("kepler", 30.0)]
 FAILING += [("a splitting that runs to infinity", 0.5), ("a composition, too large", 5.0)]

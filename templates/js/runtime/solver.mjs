@@ -401,15 +401,16 @@ export class Solver {
   // #endif
   // #if ENSEMBLE
   /**
-   * Many steps of many states, each of which has its own gauge. One that fails keeps its last good state.
+   * Many steps of many states, each of which has its own gauge. One that fails keeps its last good state. h and what is
+   * in options may be arrays in place of numbers, with one for each member.
    *
    * @param {Iterable<ArrayLike<number>>} members
-   * @param {number} h
+   * @param {number | ArrayLike<number>} h
    * @param {number} count
    * #if TIMED
-   * @param {{params?: Partial<Parameters>, t0?: number}} [options] as of the constructor
+   * @param {{params?: object, t0?: number | ArrayLike<number>}} [options] as of the constructor
    * #else
-   * @param {{params?: Partial<Parameters>}} [options] as of the constructor
+   * @param {{params?: object}} [options] as of the constructor
    * #endif
    * #if NOISE
    * also seed, step0, and member, that of the first of the members
@@ -417,19 +418,18 @@ export class Solver {
    * @returns {{x: Float64Array[], status: string[]}} where each ends, and how: "OK" or a status
    */
   static ensemble(members, h, count, options = {}) {
-    // #if NOISE
-    let member = options.member ?? 0;
-    // #endif
-    const ends = Array.from(members, (x0) => {
+    const ends = Array.from(members, (x0, m) => {
+      const own = (value) => (typeof value === "object" && value !== null ? value[m] : value);
+      const given = Object.entries(options.params ?? {}).map(([name, value]) => [name, own(value)]);
+      const chosen = { ...options, params: Object.fromEntries(given), t0: own(options.t0), x0 };
+      // #if NOISE
+      chosen.member = (options.member ?? 0) + m;
+      // #endif
       let end = Float64Array.from(x0);
       try {
-        // #if NOISE
-        const solver = new Solver({ ...options, x0, member: member++ });
-        // #else
-        const solver = new Solver({ ...options, x0 });
-        // #endif
+        const solver = new Solver(chosen);
         end = solver.x;
-        solver.integrate(h, count);
+        solver.integrate(own(h), count);
         return { end, status: "OK" };
       } catch (error) {
         if (!(error instanceof StepError)) throw error;
