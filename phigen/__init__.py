@@ -34,6 +34,7 @@ _HOMES = {
     "load": "phigen.api",
     "compile": "phigen.api",
     "formulas": "phigen.api",
+    "sweep": "phigen.sweeping.api",
     "System": "phigen.geometry.system",
     "LatticeSolver": "phigen.runtime.lattice",
     "LatticeTrajectory": "phigen.runtime.lattice",
@@ -71,6 +72,7 @@ __all__ = [
     "formulas",
     "load",
     "solve_ivp",
+    "sweep",
 ]
 
 

@@ -25,6 +25,7 @@ COMMANDS = {
     "check": ("phigen.cli.check", "Prove the mathematics of a spec, or refute it."),
     "build": ("phigen.cli.build", "Write the solvers of specs."),
     "run": ("phigen.cli.run", "Integrate an experiment of a spec and sum up what was conserved."),
+    "sweep": ("phigen.cli.sweep", "Make a run for many parameters and initial values."),
     "vendor": ("phigen.cli.vendor", "Copy solvers into another project, and check them there."),
     "tune": ("phigen.cli.tune", "Find the cheapest setting and step for an accuracy."),
     "verify": ("phigen.cli.verify", "Build every target and measure what the solvers promise."),

@@ -90,12 +90,20 @@ class BackendError(Exception):
     """A step failed inside a back end; `phigen.runtime.solver` turns it into the user's `StepError`.
 
     ``states`` holds the rows so far with the last good state as its last row (an ensemble: its members as far as they
-    came), ``step`` the number of good steps, −1 where the back end cannot tell.
+    came), ``step`` the number of good steps, −1 where the back end cannot tell, ``failures`` the status of each member.
     """
 
-    def __init__(self, status: str, step: int, states: Floats, members: tuple[int, ...] = ()) -> None:
+    def __init__(
+        self,
+        status: str,
+        step: int,
+        states: Floats,
+        members: tuple[int, ...] = (),
+        failures: Mapping[int, str] | None = None,
+    ) -> None:
         super().__init__(status)
         self.status, self.step, self.states, self.members = status, step, states, members
+        self.failures = failures if failures is not None else dict.fromkeys(members, status)
 
 
 class MissingExtraError(Exception):

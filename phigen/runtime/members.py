@@ -88,7 +88,7 @@ class Members:
         if not failures:
             return states
         failed = tuple(sorted(failures))
-        raise BackendError(failures[failed[0]], step, states, failed)
+        raise BackendError(failures[failed[0]], step, states, failed, failures)
 
 
 def cores() -> int:

@@ -26,6 +26,7 @@ from phigen.spec.names import (
     DIRECTIONS,
     FAMILY_HELP,
     IDENTIFIER,
+    KEPT,
     PARTS,
     PROFILES,
     RECONSTRUCTIONS,
@@ -233,6 +234,31 @@ RUN = Record(
     exactly=True,
 )
 
+AXIS = Record(
+    "a range",
+    (
+        Field("from", CONSTANT, "the first value, or the least that is drawn"),
+        Field("to", CONSTANT, "the last value, or the largest that is drawn"),
+        Field("count", Integer(1, limits.SWEPT, limit=True), "how many values; without it they are drawn"),
+        Field("scale", Choice(("linear", "log")), "how values are spaced, or drawn", default="linear"),
+    ),
+)
+SWEEP = Record(
+    "a sweep",
+    (
+        Field("run", RUN_NAME, "which run is made many times; the first if not given"),
+        Field(
+            "over",
+            MapOf(NAME, Either({Scalar: CONSTANT, Sequence: ListOf(CONSTANT, least=1), Mapping: AXIS}), least=1),
+            "values of parameters, initial coordinates, step, start: a grid; random: N and seed, or file: members.csv",
+            required=True,
+        ),
+        Field("keep", ListOf(Choice(KEPT), least=1), "what is stored of each member"),
+        Field("frames", Integer(1, limits.STEPS, limit=True), "also the states of every so many steps"),
+        Field("description", PROSE, "what the sweep shows"),
+    ),
+)
+
 
 def _switch(key: str, *words: str) -> Kind:
     return Choice(words)
@@ -307,6 +333,7 @@ SPEC = Record(
         ),
         Field("targets", ListOf(Choice(tuple(TARGETS)), least=1), "languages of the generated code"),
         Field("runs", MapOf(RUN_NAME, RUN), "named experiments"),
+        Field("sweeps", MapOf(RUN_NAME, SWEEP), "runs over ranges of parameters and initial values, for phigen sweep"),
     ),
     one=("order", "terms"),
 )

@@ -58,6 +58,8 @@ PROOF_PRODUCTS = 20_000_000
 SEED, MEMBERS = 2**64 - 1, 2**32
 #: Sources of noise.
 SOURCES = 64
+#: Members of a sweep.
+SWEPT = 10**11
 #: Steps of a run.
 STEPS = 10**12
 #: Errors listed in one run; a file with more is rarely improved by the rest.

@@ -218,6 +218,43 @@ class LatticeRun:
 
 
 @dataclass(frozen=True)
+class Axis:
+    """The values of a parameter, of an initial coordinate, of ``step`` or ``start``, or numbers of draws (``seed``).
+
+    They are ``values``, or ``count`` of them from one of the ``ends`` to the other; drawn between these if count is 0.
+    """
+
+    name: str
+    values: tuple[float, ...] = ()
+    ends: tuple[float, float] = (0.0, 0.0)
+    count: int = 0
+    scale: str = "linear"
+
+    @property
+    def size(self) -> int:
+        """How many values there are, 0 if they are drawn."""
+        return len(self.values) or self.count
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """A run for many values: a grid of axes, or so many ``random`` members, or those in a ``file``.
+
+    ``keep`` (`phigen.spec.names.KEPT`) says what is stored of each, and ``frames`` that every so many steps is.
+    """
+
+    name: str
+    run: str
+    over: tuple[Axis, ...] = ()
+    random: int = 0
+    seed: int = 0
+    file: str = ""
+    keep: tuple[str, ...] = ("final",)
+    frames: int = 0
+    description: str = ""
+
+
+@dataclass(frozen=True)
 class Lattice:
     """That the coordinates of a spec are those of every site of a lattice, and how sites are related.
 
@@ -297,6 +334,7 @@ class Spec:
     reconstruct: str = ""  # quaternion, matrix: the attitude beside the state
     targets: tuple[str, ...] = DEFAULT
     runs: Mapping[str, Run] = field(default_factory=dict)
+    sweeps: Mapping[str, Sweep] = field(default_factory=dict)
     lattice: Lattice | None = None
     title: str = ""
     description: str = ""

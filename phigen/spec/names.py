@@ -86,6 +86,10 @@ LEFT_OUT = {"fast": frozenset[str](), "small": frozenset(["gauge-search", "lanes
 #: How a section is crossed.
 DIRECTIONS = ("rising", "falling", "both")
 
+#: What a sweep may vary besides parameters and initial values, and what it may keep.
+SWEEP_NAMES = ("step", "start", "seed")
+KEPT = ("final", "energy_error", "casimir_error", "lyapunov", "crossings")
+
 #: How attitudes are given.
 RECONSTRUCTIONS = ("quaternion", "matrix")
 

@@ -30,6 +30,7 @@ from phigen.spec.names import LICENSE_REFERENCE, LICENSES, LOGARITHMIC
 from phigen.spec.poisson import brackets_of_sites, poisson_form
 from phigen.spec.problems import Problems, counted, did_you_mean, shown
 from phigen.spec.runs import run, without_repetition
+from phigen.spec.sweeps import sweep
 from phigen.spec.taken import objection
 from phigen.spec.yaml_source import Scalar, decode, read
 from phigen.symbolic.expression import ONE, ZERO, Expression, symbol, symbols_of
@@ -70,6 +71,7 @@ def _parts(raw: Mapping[str, Any], declared: Declarations) -> dict[str, Any]:
     hamiltonian, coupling = densities(raw.get("hamiltonian"), declared)
     casimirs, kinds = read_casimirs(raw.get("casimirs", {}), declared)
     brackets = brackets_of_sites(poisson, declared)
+    runs = {n: run(n, r, declared) for n, (_, r) in raw.get("runs", {}).items() if r is not None}
     lattice = declared.lattice and with_kinds(declared.lattice, casimirs, kinds, bonds=coupling, brackets=brackets)
     return {
         "name": _name(raw.get("name"), declared),
@@ -99,7 +101,8 @@ def _parts(raw: Mapping[str, Any], declared: Declarations) -> dict[str, Any]:
             raw.get("adjoint", False),
         ),
         "reconstruct": raw.get("reconstruct", ""),
-        "runs": {n: run(n, r, declared) for n, (_, r) in raw.get("runs", {}).items() if r is not None},
+        "runs": runs,
+        "sweeps": {n: sweep(n, s, runs, declared) for n, (_, s) in raw.get("sweeps", {}).items() if s is not None},
         "lattice": lattice,
         "title": raw.get("title", ""),
         "description": raw.get("description", ""),

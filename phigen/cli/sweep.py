@@ -1,0 +1,104 @@
+"""``phigen sweep``: a run for many parameters and initial values, on all processes of a machine or a cluster."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from phigen.cli.console import Console, out_json, pass_console, verbosity
+from phigen.cli.experiment import expect_system
+from phigen.cli.sources import FIGURES, ORDER, file_ending, load_one, one_spec, scheme_option
+from phigen.registry import LOADABLE
+
+if TYPE_CHECKING:
+    from phigen.spec.model import Spec, Sweep
+
+
+@click.command("sweep")
+@one_spec
+@click.option("--sweep", "name", metavar="NAME", help="Which sweep of the spec.  [default: the first]")
+@click.option(
+    "-o", "--output", metavar="FOLDER", type=click.Path(path_type=Path), help="The Zarr store.  [default: NAME.zarr]"
+)
+@click.option("--scheduler", metavar="ADDRESS", help="A Dask cluster, tcp://…, in place of processes of this machine.")
+@click.option(
+    "--workers", metavar="N", type=click.IntRange(min=1), help="So many processes.  [default: one on each core]"
+)
+@click.option("-t", "--target", type=click.Choice(["auto", *LOADABLE]), default="auto", show_default=True)
+@click.option("--order", metavar="K", type=ORDER, help="Order of the method, instead of the spec's.")
+@scheme_option
+@click.option(
+    "--plot", metavar="FILE", callback=file_ending(*FIGURES), help="Draw the map: FILE.png, FILE.svg or FILE.pdf."
+)
+@click.option("--show", "shown", metavar="VARIABLE", help="What is drawn.  [default: the first number that is kept]")
+@click.option("--json", "as_json", is_flag=True, help="The summary for machines.")
+@verbosity
+@pass_console
+def command(
+    console: Console,
+    spec_file: str,
+    name: str | None,
+    output: Path | None,
+    scheduler: str | None,
+    workers: int | None,
+    target: str,
+    order: int | None,
+    scheme: str | None,
+    plot: Path | None,
+    shown: str | None,
+    as_json: bool,
+) -> None:
+    """Make a run for many parameters, initial values or steps, and store what is kept of each as a Zarr store.
+
+    A store that is there already is gone on with: what it lacks is made. xarray opens it (xarray.open_zarr).
+    """
+    from phigen.progress import stage
+    from phigen.sweeping.sweep import Setting, made
+
+    if scheduler and workers:
+        raise click.UsageError("--workers is about processes of this machine; a cluster has its own")
+    if plot:
+        from phigen.drawing.palette import require_matplotlib
+
+        require_matplotlib()
+    spec = load_one(spec_file)
+    expect_system(spec)
+    sweep = _sweep_of(spec, name)
+    setting = Setting(output or Path(f"{sweep.name}.zarr"), scheduler, workers, target, order, scheme)
+    with console.watching(), stage(f"sweep {sweep.name}") as progress:
+
+        def started(members: int) -> None:
+            progress.total = members
+
+        def tell(members: int, failed: int) -> None:
+            progress.done += members
+
+        outcome = made(spec, sweep, spec.runs[sweep.run], setting, started, tell)
+    sizes = " × ".join(f"{dim} {size}" for dim, size in outcome.dims.items())
+    if as_json:
+        out_json({"output": str(setting.output), "members": outcome.size, "made": outcome.members,
+                  "failed": outcome.failed, "dims": dict(outcome.dims)})  # fmt: skip
+    else:
+        failed = f", of which {outcome.failed} failed (see status)" if outcome.failed else ""
+        click.echo(f"{setting.output}: {outcome.size} members ({sizes}), {outcome.members} made now{failed}")
+    if plot:
+        from phigen.drawing.sweep_map import draw
+
+        draw(setting.output, plot, shown)
+        console.note(f"wrote {plot}")
+
+
+def _sweep_of(spec: Spec, name: str | None) -> Sweep:
+    """The sweep of that name, the first by default."""
+    from phigen.errors import Diagnostic, SpecError
+
+    if not spec.sweeps:
+        hint = "add one under sweeps:, with over and keep; docs/sweeps.md has examples"
+        raise SpecError([Diagnostic(f"{spec.file}: the spec has no sweeps", hint=hint)])
+    found = spec.sweeps.get(name) if name else next(iter(spec.sweeps.values()))
+    if found is None:
+        known = ", ".join(spec.sweeps)
+        raise click.BadParameter(f"there is no sweep {name!r}; the spec has {known}", param_hint="--sweep")
+    return found

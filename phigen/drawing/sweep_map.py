@@ -1,0 +1,93 @@
+"""Maps of sweeps: what was kept of each member, over two of the dimensions."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from phigen.drawing.palette import SERIES, save, styled
+from phigen.errors import PhigenError
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+#: Numbers that are kept, the first of them that is there is drawn.
+_FIRST = ("lyapunov", "crossings", "energy_error", "casimir_error", "final")
+
+#: Values that differ by more than this factor are drawn by their logarithms.
+_WIDE = 1e3
+
+_PANELS = 6
+
+
+def draw(store: Path, path: Path, shown: str | None = None) -> None:
+    """Draw a variable of a store into a file. Raises `PhigenError` where there is none of that name."""
+    import xarray
+
+    with xarray.open_zarr(str(store), decode_cf=False) as data:
+        known = [name for name in _FIRST if name in data]
+        chosen = shown or next(iter(known), "")
+        if chosen not in known:
+            raise PhigenError(f"there is no {chosen!r} to draw; there are {', '.join(known) or 'none'}")
+        save(_figure(data, chosen), path)
+
+
+@styled
+def _figure(data: Any, name: str) -> Figure:
+    from matplotlib.figure import Figure
+
+    values = data[name]
+    panels = [values]
+    if "coordinate" in values.dims:
+        panels = [values.isel(coordinate=k) for k in range(min(values.sizes["coordinate"], _PANELS))]
+    titles = [str(c) for c in data["coordinate"].values] if len(panels) > 1 else [name]
+    figure = Figure(figsize=(4.6 * len(panels), 3.8), layout="constrained")
+    for axes, panel, title in zip(np.ravel(figure.subplots(1, len(panels))), panels, titles, strict=False):
+        if panel.dims == ("member",):
+            _scatter(figure, axes, data, panel)
+        else:
+            _over_grid(figure, axes, panel)
+        axes.set_title(title if title == name else f"{name}: {title}")
+    return figure
+
+
+def _over_grid(figure: Any, axes: Any, panel: Any) -> None:
+    """Over one dimension a curve, over two a map; over further ones, draws first, the median is taken."""
+    dims = [d for d in panel.dims if d != "seed"] or [*panel.dims]
+    more = [d for d in panel.dims if d not in dims[:2]]
+    panel = panel.median(dim=more, skipna=True) if more else panel
+    if len(dims) == 1:
+        axes.plot(panel[dims[0]], panel, color=SERIES[0], linewidth=1.2)
+        axes.set(xlabel=dims[0])
+        axes.grid(True)
+        return
+    y, x = dims[:2]
+    image = axes.pcolormesh(
+        panel[x], panel[y], panel.transpose(y, x), shading="nearest", rasterized=True, **_colours(panel)
+    )
+    axes.set(xlabel=x, ylabel=y)
+    figure.colorbar(image, ax=axes)
+
+
+def _scatter(figure: Any, axes: Any, data: Any, panel: Any) -> None:
+    """Members of their own, over the first two numbers that they differ in."""
+    names = [n for n in data.data_vars if data[n].dims == ("member",) and n not in (*_FIRST, "status")][:2]
+    if len(names) < 2:
+        axes.scatter(data[names[0]] if names else np.arange(panel.size), panel, s=4, color=SERIES[0])
+        axes.set(xlabel=names[0] if names else "member")
+        return
+    dots = axes.scatter(data[names[0]], data[names[1]], c=panel, s=6, **_colours(panel))
+    axes.set(xlabel=names[0], ylabel=names[1])
+    figure.colorbar(dots, ax=axes)
+
+
+def _colours(panel: Any) -> dict[str, Any]:
+    """The scale: logarithmic where values are positive and far apart. What is no number is left out."""
+    from matplotlib.colors import LogNorm
+
+    values = np.asarray(panel)
+    good = values[np.isfinite(values) & (values != 0)]
+    wide = good.size > 0 and good.min() > 0 and good.max() > _WIDE * good.min()
+    return {"cmap": "viridis"} | ({"norm": LogNorm(good.min(), good.max())} if wide else {})

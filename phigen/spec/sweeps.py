@@ -1,0 +1,125 @@
+"""The named sweeps of a spec: runs over ranges of parameters and initial values."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from math import prod
+from typing import Any
+
+from phigen.spec import limits
+from phigen.spec.declarations import Declarations
+from phigen.spec.model import Axis, Run, Sweep
+from phigen.spec.names import SWEEP_NAMES
+from phigen.spec.problems import did_you_mean, shown
+from phigen.spec.runs import without_repetition
+from phigen.spec.yaml_source import Scalar
+
+#: What ``over`` may hold besides ranges, each a word or a number.
+_WORDS = ("random", "seed", "file")
+
+
+def sweep(name: str, raw: Mapping[str, Any], runs: Mapping[str, Run], declared: Declarations) -> Sweep:
+    """The sweep of that name. After errors, which are reported, some of its values are stand-ins."""
+    place = ("sweeps", name)
+    if declared.lattice:
+        _fail(place, "sweeps: not for lattices in this version", declared)
+    run = raw["run"].text if raw.get("run") else next(iter(runs), "")
+    if run not in runs:
+        hint = did_you_mean(run, runs) or "runs: holds the experiments of a spec"
+        _fail((*place, "run"), f"there is no run {shown(run)}" if run else "the spec has no runs", declared, hint)
+    words: dict[str, str] = {}
+    axes: list[Axis] = []
+    for key, (node, value) in (raw.get("over") or {}).items():
+        if isinstance(value, Scalar) and key in _WORDS and key not in declared.parameters:
+            words[key] = value.text
+        elif value is not None:
+            axes += _axis(node, value, declared)
+    found = Sweep(
+        name=name,
+        run=run,
+        over=tuple(axes),
+        random=_integer((*place, "over", "random"), words, limits.SWEPT, declared),
+        seed=_integer((*place, "over", "seed"), words, 2**63 - 1, declared),
+        file=words.get("file", ""),
+        keep=without_repetition(raw.get("keep", ("final",)), (*place, "keep"), declared),
+        frames=raw.get("frames", 0),
+        description=raw.get("description", ""),
+    )
+    incomplete = len(axes) + len(words) < len(raw.get("over") or {}) or (found.random == 0 and "random" in words)
+    _expect_sense(found, runs.get(run), place, declared, incomplete=incomplete)
+    return found
+
+
+def _fail(place: tuple[Any, ...], message: str, declared: Declarations, hint: str = "", *, limit: bool = False) -> None:
+    locations = declared.reader.locations
+    while place not in locations and len(place) > 1:
+        place = place[:-1]
+    declared.reader.problems.add(message, locations[place], hint, limit=limit)
+
+
+def _integer(place: tuple[Any, ...], words: Mapping[str, str], most: int, declared: Declarations) -> int:
+    text = words.get(place[-1])
+    if text is None:
+        return 0
+    if not text.isdecimal():
+        _fail(place, f"{place[-1]}: expected an integer, found {shown(text)}", declared)
+        return 0
+    value = int(text[:40])
+    if value > most:
+        _fail(place, f"{place[-1]}: {shown(text)} is more than the limit of {most}", declared, limit=True)
+    return min(value, most)
+
+
+def _axis(key: Scalar, value: Any, declared: Declarations) -> list[Axis]:
+    """The values of one name: a list, or a range; none where there are errors."""
+    name, numbers = key.text, declared.numbers()
+    known = [*declared.parameters, *declared.coordinates, *SWEEP_NAMES]
+    if name not in known and not declared.incomplete:
+        declared.reader.error(key, f"over: {shown(name)} is not a parameter or a coordinate", did_you_mean(name, known))
+        return []
+    if isinstance(value, Scalar):
+        declared.reader.error(
+            value, f"over: {name} has one value", "give a range, {from: 1, to: 3, count: 100}, or a list"
+        )
+        return []
+    if isinstance(value, list):
+        values = [declared.number(node, numbers) for node in value]
+        found = Axis(name, tuple(float(v) for v in values if v is not None))
+    else:
+        ends = [declared.number(value.get(end), numbers) for end in ("from", "to")]
+        if name != "seed" and None in ends:
+            declared.reader.error(key, f"over: {name} needs from and to", "{from: 1, to: 3, count: 100}")
+            return []
+        first, last = (float(end or 0) for end in ends)
+        found = Axis(name, (), (first, last), value.get("count", 0), value.get("scale", "linear"))
+    lowest = min(found.values or found.ends)
+    if found.scale == "log" and lowest <= 0:
+        declared.reader.error(key, f"over: {name} on a logarithmic scale reaches {lowest:g}")
+    parameter = declared.parameters.get(name)
+    if parameter is not None and parameter.positive and lowest <= 0:
+        declared.reader.error(key, f"over: the parameter {name!r} is positive by declaration, but reaches {lowest:g}")
+    return [found]
+
+
+def _expect_sense(
+    found: Sweep, run: Run | None, place: tuple[Any, ...], declared: Declarations, *, incomplete: bool
+) -> None:
+    grid = [axis for axis in found.over if axis.size]
+    drawn = [axis for axis in found.over if not axis.size]
+    over = (*place, "over")
+    if found.file and (found.over or found.random):
+        _fail(over, "over: a file has all values; it stands alone", declared)
+    if found.random and grid:
+        _fail(over, f"over: {grid[0].name} has a count, but random members are drawn", declared, "leave out the count")
+    if drawn and not (found.random or any(axis.name == "seed" for axis in grid)):
+        hint = "add a count, or seed: {count: 10} for so many draws"
+        _fail((*over, drawn[0].name), f"over: {drawn[0].name} has no count", declared, hint)
+    if not (found.over or found.file or incomplete):
+        _fail(over, "over: there is nothing to vary", declared)
+    members = found.random or prod(axis.size for axis in grid)
+    if members > limits.SWEPT:
+        _fail(over, f"{members} members, the limit is {limits.SWEPT}", declared, limit=True)
+    if "crossings" in found.keep and run is not None and run.section is None:
+        _fail((*place, "keep"), f"crossings: the run {run.name} has no section", declared)
+    if "energy_error" in found.keep and declared.time:
+        _fail((*place, "keep"), "energy_error: H depends on the time, so energy is not conserved", declared)

@@ -1,0 +1,167 @@
+"""``phigen.sweep``: a sweep from Python, as an xarray Dataset."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from fractions import Fraction
+from math import prod
+from os import PathLike, fspath
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from phigen import resources
+from phigen import spec as specs
+from phigen.api import _spec_of, load
+from phigen.geometry.system import System
+from phigen.spec.model import Axis, Run, Spec, Sweep
+from phigen.spec.names import KEPT, SWEEP_NAMES
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+
+def sweep(
+    source: str | PathLike[str] | Spec | System,
+    name: str | None = None,
+    *,
+    over: Mapping[str, Any] | None = None,
+    initial: Sequence[float] | None = None,
+    h: float | None = None,
+    steps: int | None = None,
+    run: str | None = None,
+    parameters: Mapping[str, float] | None = None,
+    keep: Sequence[str] | None = None,
+    frames: int | None = None,
+    output: str | PathLike[str] | None = None,
+    scheduler: str | None = None,
+    workers: int | None = None,
+    target: str = "auto",
+    order: int | None = None,
+    scheme: str | None = None,
+    progress: Callable[[int, int], Any] | None = None,
+) -> xr.Dataset:
+    """Make a run for many parameters, initial values or steps; what is kept of each, with the dimensions of ``over``.
+
+    The sweep is that of the spec with this ``name``, the first by default, changed by what is given; without sweeps in
+    the spec ``over`` is needed, and without runs ``initial``, ``h`` and ``steps``. ``over`` maps names of parameters,
+    coordinates, ``step`` or ``start`` to arrays, or to ``{"from": a, "to": b, "count": n, "scale": "log"}``; without a
+    count they are drawn, with ``random: n`` and ``seed: k`` beside them. The result lies in the Zarr store ``output``,
+    from which it is read as it is needed; an existing one of the same sweep is gone on with. Without ``output`` it is
+    in memory. ``scheduler`` is the address of a Dask cluster; the default are ``workers`` processes of this machine,
+    one for each core. ``progress`` is told the members made and those of them that failed, chunk by chunk. Scripts that
+    call this need the guard ``if __name__ == "__main__":``, as all that start processes do. Raises `SpecError`,
+    `MissingPackageError` without the extra ``phigen[sweep]``, ``phigen.errors.FileError`` and `PhigenError`.
+    """
+    from phigen.sweeping.store import imported
+    from phigen.sweeping.sweep import Setting, made
+
+    xarray = imported("xarray")
+    spec = _spec(source)
+    base = _run_of(spec, run, name, initial, h, steps, parameters)
+    chosen = _sweep_of(spec, name, base, over, keep, frames)
+
+    def make(path: Path) -> None:
+        setting = Setting(path, scheduler, workers, target, order, scheme)
+        made(spec, chosen, base, setting, lambda members: None, progress or (lambda members, failed: None))
+
+    if output is not None:
+        make(Path(output))
+        return xarray.open_zarr(str(output))
+    with tempfile.TemporaryDirectory(prefix="phigen-sweep-") as folder:
+        make(Path(folder) / "sweep.zarr")
+        with xarray.open_zarr(f"{folder}/sweep.zarr") as data:
+            return data.load()
+
+
+def _spec(source: str | PathLike[str] | Spec | System) -> Spec:
+    if isinstance(source, System):
+        return source.spec or _spec_of(source)
+    spec = source if isinstance(source, Spec) else specs.load(resources.file_of(fspath(source)))
+    if spec.lattice:
+        load(spec.file)  # raises what there is to say of lattices
+    return spec
+
+
+def _run_of(
+    spec: Spec,
+    run: str | None,
+    name: str | None,
+    initial: Sequence[float] | None,
+    h: float | None,
+    steps: int | None,
+    parameters: Mapping[str, float] | None,
+) -> Run:
+    """The run that is made many times, with what is given in place of what the spec says."""
+    sweep = spec.sweeps.get(name) if name else next(iter(spec.sweeps.values()), None)
+    run = run or (sweep.run if sweep else next(iter(spec.runs), None))
+    if run is not None and run not in spec.runs:
+        raise ValueError(f"there is no run {run!r}; the spec has {', '.join(spec.runs) or 'none'}")
+    found = spec.runs[run] if run else None
+    if found is None and (initial is None or h is None or steps is None):
+        raise TypeError("the spec has no runs: initial, h and steps are needed")
+    found = found or Run("run", (), Fraction(1), 1)
+    given: dict[str, Any] = {} if initial is None else {"initial": tuple(Fraction(float(v)) for v in initial)}
+    given |= {} if h is None else {"step": Fraction(float(h))}
+    given |= {} if steps is None else {"steps": steps}
+    if parameters:
+        given["parameters"] = {**found.parameters, **{n: Fraction(float(v)) for n, v in parameters.items()}}
+    found = replace(found, **given)
+    if len(found.initial) != len(spec.coordinates):
+        raise ValueError(f"initial has {len(found.initial)} values for {len(spec.coordinates)} coordinates")
+    return found
+
+
+def _sweep_of(
+    spec: Spec,
+    name: str | None,
+    run: Run,
+    over: Mapping[str, Any] | None,
+    keep: Sequence[str] | None,
+    frames: int | None,
+) -> Sweep:
+    if name is not None and name not in spec.sweeps:
+        raise ValueError(f"there is no sweep {name!r}; the spec has {', '.join(spec.sweeps) or 'none'}")
+    found = spec.sweeps[name] if name else next(iter(spec.sweeps.values()), None)
+    if found is None and over is None:
+        raise TypeError("the spec has no sweeps: over is needed")
+    found = found or Sweep("sweep", run.name)
+    given: dict[str, Any] = {"run": run.name}
+    if over is not None:
+        words = {key: over[key] for key in ("random", "seed", "file") if isinstance(over.get(key), int | str)}
+        axes = tuple(_axis(key, value, spec) for key, value in over.items() if key not in words)
+        given |= {"over": axes, "random": 0, "seed": 0, "file": "", **words}
+    given |= {} if keep is None else {"keep": tuple(keep)}
+    given |= {} if frames is None else {"frames": frames}
+    found = replace(found, **given)
+    strange = [what for what in found.keep if what not in KEPT]
+    if strange:
+        raise ValueError(f"cannot keep {strange[0]!r}; there are {', '.join(KEPT)}")
+    if "crossings" in found.keep and run.section is None:
+        raise ValueError(f"crossings: the run {run.name} has no section")
+    if "energy_error" in found.keep and spec.time:
+        raise ValueError("energy_error: H depends on the time, so energy is not conserved")
+    drawn = [axis.name for axis in found.over if not axis.size]
+    if drawn and not found.random and not any(axis.name == "seed" for axis in found.over):
+        raise ValueError(f"over: {drawn[0]} has no count, and there is neither random nor seed")
+    if found.random and len(drawn) < len(found.over):
+        raise ValueError("over: random members are drawn, so there are no counts and no lists")
+    if not (found.random or found.file or prod(axis.size or 1 for axis in found.over)):
+        raise ValueError("over: there is nothing to vary")
+    return found
+
+
+def _axis(name: str, value: Any, spec: Spec) -> Axis:
+    known = [*(p.name for p in spec.parameters), *spec.coordinates, *SWEEP_NAMES]
+    if name not in known:
+        raise ValueError(f"over: {name!r} is not a parameter or a coordinate; there are {', '.join(known)}")
+    if isinstance(value, Mapping):
+        ends = (float(value.get("from", 0)), float(value.get("to", 0)))
+        return Axis(name, (), ends, int(value.get("count", 0)), str(value.get("scale", "linear")))
+    values = np.asarray(value, dtype=np.float64)
+    if values.ndim != 1 or not values.size or not np.isfinite(values).all():
+        raise ValueError(f"over: {name} must be a range, or a list of finite numbers")
+    return Axis(name, tuple(values.tolist()))

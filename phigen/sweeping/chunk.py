@@ -1,0 +1,164 @@
+"""One chunk of a sweep, as a worker makes it: integrate the members, measure, store.
+
+A worker is told the path of the store and the number of a chunk; solver and plan lie in the store.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from functools import lru_cache
+from math import prod
+from typing import Any
+
+import numpy as np
+
+from phigen.runtime import cache
+from phigen.runtime.interface import STATUSES, BackendError, Draws, Floats
+from phigen.runtime.members import Members
+from phigen.runtime.solver import Solver
+from phigen.sweeping.store import Job, open_job
+
+#: Bytes of states that are held to count crossings.
+_MOST_BYTES = 64 * 2**20
+
+#: Members with which nothing was done: their numbers are refused.
+_REFUSED = STATUSES.index("BAD_ARGUMENT")
+
+
+def make(store: str, digest: str, number: int) -> tuple[int, int]:
+    """Make a chunk. Returns how many members it has, and how many of them failed."""
+    job, solver = _ready(store, digest)
+    plan = job.plan
+    region = plan.region(number)
+    varied = plan.varied(region, {name: job.root[name][region] for name in plan.listed})
+    count = prod(part.stop - part.start for part in region)
+    found = _measured(job, solver, varied, plan.first(region) + np.arange(count))
+    found |= {axis.name: varied[axis.name] for axis in plan.drawn}
+    sizes = tuple(part.stop - part.start for part in region)
+    for name, values in found.items():
+        if name != "status":
+            job.root[name][region] = values.reshape(sizes + values.shape[1:])
+    job.root["status"][region] = found["status"].reshape(sizes)  # the last: what has a status is complete
+    return count, int(np.count_nonzero(found["status"]))
+
+
+@lru_cache(maxsize=4)
+def _ready(store: str, digest: str) -> tuple[Job, Solver]:
+    """The job and its solver, once for each process; one process of a machine compiles, and the others wait for it."""
+    job = open_job(store)
+    with _alone(job.interface.name):
+        return job, Solver(job.backend(), job.interface)
+
+
+@contextlib.contextmanager
+def _alone(name: str) -> Iterator[None]:
+    """While it lasts, no other process of this machine is here."""
+    try:
+        import fcntl
+    except ImportError:  # Windows: then several may compile
+        yield
+        return
+    folder = cache.directory()
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        lock = os.open(folder / f"sweep-{name}.lock", os.O_CREAT | os.O_RDWR, 0o600)
+    except OSError:
+        yield
+        return
+    try:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        yield
+    finally:
+        os.close(lock)
+
+
+def _measured(job: Job, solver: Solver, varied: Mapping[str, Floats], numbers: Any) -> dict[str, Floats]:
+    """What is kept of the members of these numbers, and their statuses. Where there is noise, each has its own."""
+    plan, count = job.plan, len(numbers)
+    parameters = {name: varied.get(name, np.full(count, value)) for name, value in plan.parameters.items()}
+    x0 = np.stack([varied.get(c, np.full(count, v)) for c, v in zip(plan.coordinates, plan.initial, strict=True)], 1)
+    h, t0 = varied.get("step", np.full(count, plan.h)), varied.get("start", np.full(count, plan.t0))
+    good = np.isfinite(x0).all(axis=1) & np.isfinite(h) & (h != 0) & np.isfinite(t0)
+    for name, values in parameters.items():
+        good &= np.isfinite(values) & ((values > 0) | (name not in solver.interface.positive))
+    allowed = np.flatnonzero(good)
+    asked = Members(x0, h, plan.steps, parameters, t0, plan.frames, Draws(plan.seed), numbers).part(allowed)
+    states, failures = _integrated(solver, asked)
+    status = np.full(count, _REFUSED, dtype=np.uint8)
+    status[allowed] = 0
+    for m, what in failures.items():
+        status[allowed[m]] = STATUSES.index(what)
+        states[-1, m] = np.nan
+    found: dict[str, Any] = {"status": status}
+    rows = np.concatenate([asked.x0[np.newaxis], states]) if not plan.frames else states
+    if "final" in plan.keep:
+        found["final"] = _spread(states[-1], allowed, count)
+    if plan.frames:
+        found["frames"] = _spread(np.moveaxis(states[: len(plan.rows)], 0, 1), allowed, count)
+    if "energy_error" in plan.keep:
+        energy = job.module.hamiltonian(rows, **asked.parameters)
+        found["energy_error"] = _spread(np.abs(energy - energy[0]).max(axis=0), allowed, count)
+    if "casimir_error" in plan.keep:
+        casimirs = job.module.casimirs(rows, **asked.parameters)
+        found["casimir_error"] = _spread(np.abs(casimirs - casimirs[0]).max(axis=(0, -1), initial=0.0), allowed, count)
+    if "crossings" in plan.keep:
+        found["crossings"] = _spread(_crossings(job, solver, asked), allowed, count)
+    if "lyapunov" in plan.keep:
+        found["lyapunov"] = _spread(_lyapunov(solver, asked, failures), allowed, count)
+    for name, values in found.items():
+        if name not in ("status", "final", "frames"):
+            values[status != 0] = np.nan
+    return found
+
+
+def _spread(values: Floats, allowed: Any, count: int) -> Floats:
+    """Values of the members that are allowed among all; no numbers elsewhere."""
+    found = np.full((count, *values.shape[1:]), np.nan)
+    found[allowed] = values
+    return found
+
+
+def _integrated(solver: Solver, members: Members) -> tuple[Floats, dict[int, str]]:
+    """States (rows, members, DIM), the last the final ones, and which members failed, and why."""
+    failures: dict[int, str] = {}
+    try:
+        states = solver.backend.ensemble(members, 1)
+    except BackendError as error:
+        states, failures = error.states, dict(error.failures)
+    return states if members.stride else states[np.newaxis], failures
+
+
+def _crossings(job: Job, solver: Solver, members: Members) -> Floats:
+    """How often the section is crossed in the direction of the run, as seen at the steps."""
+    section, time, signs = job.section()
+    room = max(1, _MOST_BYTES // (8 * members.x0.shape[1] * (members.steps + 1)))
+    found = np.zeros(len(members))
+    for first in range(0, len(members), room):
+        part = slice(first, first + room)
+        some = replace(members.part(part), stride=1)
+        states, _ = _integrated(solver, some)
+        steps = np.arange(len(states))[:, np.newaxis]
+        values = section(states, {**some.parameters, time: some.t0 + steps * some.h} if time else some.parameters)
+        for sign in signs:
+            along = sign * np.sign(some.h) * values
+            found[part] += ((along[:-1] < 0) & (along[1:] >= 0)).sum(axis=0)
+    return found
+
+
+def _lyapunov(solver: Solver, members: Members, failures: Mapping[int, str]) -> Floats:
+    """The largest exponent of each member, by the derivatives of its steps, one after the other."""
+    from phigen.errors import StepError
+    from phigen.study.lyapunov import spectrum
+
+    found = np.full(len(members), np.nan)
+    for m in range(len(members)):
+        if m in failures:
+            continue
+        h, parameters, t0 = members.numbers(m)
+        start = t0 if solver.interface.time else None
+        with contextlib.suppress(StepError):
+            found[m] = spectrum(solver, members.x0[m], h, members.steps, parameters, start).largest
+    return found

@@ -1,0 +1,89 @@
+"""Chunks made by the workers of a Dask cluster: processes of this machine, or any cluster by its address."""
+
+from __future__ import annotations
+
+import contextlib
+import logging
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any
+
+from phigen.errors import PhigenError
+from phigen.runtime.members import cores
+from phigen.sweeping.chunk import make
+from phigen.sweeping.store import imported
+
+#: How often a chunk is tried whose worker died with it.
+TRIES = 4
+
+#: Chunks that are submitted at a time for each thread of the workers.
+_AHEAD = 4
+
+#: Told how many members were made, and how many of these failed.
+Tell = Callable[[int, int], None]
+
+
+class SweepError(PhigenError):
+    """A sweep stopped; what was made is in its store, and the same call goes on from there."""
+
+    exit_code = 2
+
+
+@contextlib.contextmanager
+def connected(scheduler: str | None, workers: int | None) -> Iterator[tuple[Any, int]]:
+    """A client of the cluster at an address, or of processes of this machine; and how many chunks fit at a time."""
+    distributed, dask = imported("distributed"), imported("dask")
+    if scheduler is not None:
+        try:
+            client = distributed.Client(scheduler, timeout="10s")
+        except (OSError, ValueError, TimeoutError) as error:
+            raise SweepError(f"no scheduler answers at {scheduler}: {error}") from None
+        with contextlib.closing(client):
+            yield client, max(1, sum(client.nthreads().values()))
+        return
+    count = workers or cores()
+    with (
+        # A worker may be killed with any chunk; which one is to blame, TRIES decides.
+        dask.config.set({"distributed.scheduler.allowed-failures": TRIES}),
+        distributed.LocalCluster(
+            n_workers=count, threads_per_worker=1, processes=True, dashboard_address=None, silence_logs=logging.ERROR
+        ) as cluster,
+        distributed.Client(cluster) as client,
+    ):
+        yield client, count
+
+
+def make_all(client: Any, slots: int, store: str, digest: str, chunks: Sequence[int], tell: Tell) -> None:
+    """Make the chunks of these numbers. Raises `SweepError`, and what a chunk raises unless its worker died."""
+    distributed = imported("distributed")
+    tries = dict.fromkeys(chunks, 0)
+    left = iter(chunks)
+    numbers: dict[str, int] = {}
+
+    def submit(number: int) -> Any:
+        tries[number] += 1
+        key = f"phigen-{digest}-{number}-{tries[number]}-{id(numbers):x}"
+        numbers[key] = number
+        return client.submit(make, store, digest, number, key=key, pure=False)
+
+    def following() -> list[Any]:
+        number = next(left, None)
+        return [] if number is None else [submit(number)]
+
+    going = distributed.as_completed([future for _ in range(_AHEAD * slots) for future in following()])
+    for future in going:
+        number = numbers.pop(future.key)
+        try:
+            tell(*future.result())
+            again = following()
+        except distributed.scheduler.KilledWorker as error:
+            if tries[number] >= TRIES:
+                raise SweepError(f"chunk {number}: {tries[number]} workers died with it; {error}") from None
+            again = [submit(number)]
+        except (distributed.client.FuturesCancelledError, distributed.CancelledError, distributed.comm.CommClosedError):
+            raise SweepError("the scheduler went away\n  hint: the same command goes on where it stopped") from None
+        except OSError as error:
+            hint = "the same command goes on where it stopped"
+            raise SweepError(f"chunk {number} cannot be stored: {error}\n  hint: {hint}") from error
+        future.release()
+        for more in again:
+            going.add(more)

@@ -1,0 +1,162 @@
+"""The store of a sweep: a Zarr group that xarray opens, with plan and solver beside it.
+
+The group has an array for each thing that is kept, in the chunks of the sweep, and the values along its dimensions. The
+array ``status`` is written last: a chunk whose members have a status is complete. The subgroup ``made_by`` has the plan
+and the source of the solver in its attributes.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass, fields
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from phigen.errors import FileError, MissingPackageError
+from phigen.runtime.crossings import SIGNS
+from phigen.runtime.interface import STATUSES, Floats, Interface
+from phigen.sweeping.plan import Plan, values_of
+
+#: The status of a member that was not made yet.
+WAITING = 255
+
+_BESIDE = "made_by"
+
+
+def imported(name: str) -> Any:
+    """A package of the extra ``phigen[sweep]``. Raises `MissingPackageError`."""
+    from importlib import import_module
+
+    try:
+        return import_module(name)
+    except ImportError:
+        message = f"sweeps need {name.partition('.')[0]}\n  hint: pip install 'phigen[sweep]'"
+        raise MissingPackageError(message) from None
+
+
+@dataclass(frozen=True)
+class Job:
+    """An opened store: plan, interface, and sources of the solver and of the functions of states in NumPy."""
+
+    root: Any
+    plan: Plan
+    interface: Interface
+    files: Mapping[str, str]
+    functions: str
+    spec: str
+
+    def backend(self) -> Any:
+        """The loaded solver. Raises `ToolchainError`."""
+        from phigen import registry
+
+        return registry.target_of(self.files, self.interface.name).load(self.files, self.interface)
+
+    @cached_property
+    def module(self) -> Any:
+        """The NumPy module with the functions of states."""
+        from phigen.runtime.modules import load_module
+
+        return load_module(self.functions, self.interface.name)
+
+    def section(self) -> tuple[Callable[[Floats, Mapping[str, Floats]], Floats], str, tuple[float, ...]]:
+        """The section of the run, as a function of states (…, DIM) and what else has a name; the name of the time; the
+        signs that it changes with."""
+        from phigen import spec as specs
+        from phigen.symbolic.arrays import evaluate
+
+        spec = specs.loads(self.spec)
+        run = spec.runs[self.plan.about["run"]]
+        expression = run.section
+        assert expression is not None
+
+        def g(x: Floats, more: Mapping[str, Floats]) -> Floats:
+            values = {**more, **{c: x[..., i] for i, c in enumerate(spec.coordinates)}}
+            return np.asarray(np.broadcast_to(evaluate([expression], values)[0], x.shape[:-1]))
+
+        return g, spec.time, SIGNS[run.direction]
+
+
+def digest_of(plan: Plan, made_by: Mapping[str, Any]) -> str:
+    """A hash of all that decides the numbers; how they are cut into chunks is left out."""
+    facts = {**plan.as_json(), "chunk": None}
+    return hashlib.sha256(json.dumps([facts, made_by], sort_keys=True).encode()).hexdigest()[:16]
+
+
+def made_by(interface: Interface, files: Mapping[str, str], functions: str, spec: str) -> dict[str, Any]:
+    """What is stored beside the plan."""
+    about = {key: sorted(v) if isinstance(v, frozenset) else v for key, v in asdict(interface).items()}
+    return json.loads(json.dumps({"interface": about, "files": dict(files), "functions": functions, "spec": spec}))  # type: ignore[no-any-return]
+
+
+def create(path: Path, plan: Plan, beside: Mapping[str, Any], listed: Mapping[str, Floats]) -> None:
+    """A new store without members. Raises `OSError`."""
+    zarr = imported("zarr")
+    root = zarr.open_group(str(path), mode="w-", zarr_format=2)
+
+    def array(name: str, dims: tuple[str, ...], kind: str, fill: Any, more: tuple[int, ...] = (), **about: Any) -> None:
+        root.create_array(
+            name, shape=plan.shape + more, chunks=plan.chunk + more, dtype=kind, fill_value=fill,
+            attributes={"_ARRAY_DIMENSIONS": [*plan.dims, *dims], **about},
+        )  # fmt: skip
+
+    def along(name: str, values: Any) -> None:
+        root.create_array(name, data=np.asarray(values), attributes={"_ARRAY_DIMENSIONS": [name]})
+
+    for axis in plan.grid if not plan.members else ():
+        values = values_of(axis)
+        along(axis.name, values.astype(np.int64) if axis.name == "seed" else values)
+    for name, values in listed.items():
+        root.create_array(name, data=values, chunks=plan.chunk, attributes={"_ARRAY_DIMENSIONS": ["member"]})
+    for axis in plan.drawn:
+        array(axis.name, (), "<f8", np.nan)
+    for name in plan.keep:
+        if name != "final":
+            array(name, (), "<f8", np.nan)
+    n = len(plan.coordinates)
+    if "final" in plan.keep or plan.frames:
+        along("coordinate", plan.coordinates)
+    if "final" in plan.keep:
+        array("final", ("coordinate",), "<f8", np.nan, (n,))
+    if plan.frames:
+        along("frame", np.array(plan.rows))
+        array("frames", ("frame", "coordinate"), "<f8", np.nan, (len(plan.rows), n))
+    meanings = " ".join([*STATUSES, "WAITING"])
+    flags = [*range(len(STATUSES)), WAITING]
+    array("status", (), "u1", WAITING, flag_values=flags, flag_meanings=meanings)
+    root.attrs.update({"system": beside["interface"]["name"], "steps": plan.steps, "h": plan.h, **plan.about})
+    root.create_group(_BESIDE).attrs.update({"plan": plan.as_json(), **beside})
+
+
+def open_job(path: str) -> Job:
+    """The job in a store. Raises `FileError` where there is none."""
+    zarr = imported("zarr")
+    try:
+        root = zarr.open_group(path, mode="r+")
+        kept = dict(root[_BESIDE].attrs)
+        plan = Plan.from_json(kept.pop("plan"))
+    except (KeyError, ValueError, OSError, TypeError) as error:
+        raise FileError(f"{path} is no sweep of phigen: {error}") from None
+    return Job(root, plan, interface_of(kept.pop("interface")), **kept)
+
+
+def interface_of(about: Mapping[str, Any]) -> Interface:
+    """An interface from plain data."""
+    kinds = {f.name: str(f.type) for f in fields(Interface)}
+    makers: dict[str, Callable[[Any], Any]] = {"tuple": tuple, "frozenset": frozenset}
+    return Interface(**{k: makers.get(kinds[k].partition("[")[0], lambda v: v)(value) for k, value in about.items()})
+
+
+def waiting(job: Job) -> list[int]:
+    """The numbers of the chunks that are still to be made."""
+    status, plan = job.root["status"], job.plan
+    found = []
+    for number in range(int(np.prod(plan.boxes))):
+        region = plan.region(number)
+        if status[tuple(slice(part.start, part.start + 1) for part in region)].item() == WAITING:
+            found.append(number)
+    return found

@@ -1,0 +1,181 @@
+"""From a spec and a sweep of it to a store that holds the result."""
+
+from __future__ import annotations
+
+import csv
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from phigen import __version__
+from phigen.api import chosen_target, compilation_of, interface_of
+from phigen.compilation import Compilation
+from phigen.compiler import emit
+from phigen.errors import FileError
+from phigen.runtime.interface import BackendError, Draws, Floats
+from phigen.runtime.members import Members
+from phigen.spec.model import Extras, Run, Spec, Sweep
+from phigen.spec.names import SWEEP_NAMES
+from phigen.sweeping import cluster, store
+from phigen.sweeping.plan import Plan, chunk_of
+
+#: Seconds that a chunk should take: long beside what scheduling and storing cost, short beside a coffee.
+_SECONDS = 2.0
+
+#: Seconds of a step with its derivative, and what is done with that in Python.
+_TANGENT = 40e-6
+
+#: Members of a chunk, at least and at most.
+_LEAST, _MOST = 32, 1 << 17
+
+
+@dataclass(frozen=True)
+class Setting:
+    """How a sweep is made: where, by whom, with which solver."""
+
+    output: Path
+    scheduler: str | None = None
+    workers: int | None = None
+    target: str = "auto"
+    order: int | None = None
+    scheme: str | None = None
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What was made: members and how many of them failed in this call, and how many there are in all."""
+
+    members: int
+    failed: int
+    size: int
+    dims: Mapping[str, int]
+
+
+def made(
+    spec: Spec, sweep: Sweep, run: Run, setting: Setting, started: Callable[[int], None], tell: cluster.Tell
+) -> Outcome:
+    """Make what the store lacks of a sweep; ``started`` is told how many members that is.
+
+    Raises `SpecError`, `FileError` where the store holds something else, and `SweepError`.
+    """
+    store.imported("zarr")
+    extras = replace(spec.extras, tangent=True) if "lyapunov" in sweep.keep else spec.extras
+    compilation = compilation_of(spec, setting.order, _wanted(extras), setting.scheme)
+    listed = _listed(sweep, spec) if sweep.file else {}
+    target = chosen_target(setting.target)
+    plan = _plan(spec, sweep, run, {name: len(values) for name, values in listed.items()}, target)
+    beside = _beside(compilation, target, spec)
+    counts = np.zeros(2, dtype=np.int64)
+
+    def count(members: int, failed: int) -> None:
+        counts[:] += members, failed
+        tell(members, failed)
+
+    job = _gone_on_with(setting.output, plan, beside) if setting.output.exists() else None
+    if job is None or store.waiting(job):
+        with cluster.connected(setting.scheduler, setting.workers) as (client, slots):
+            job = job or _created(setting.output, plan, beside, listed, slots)
+            chunks = store.waiting(job)
+            started(sum(_members_of(job.plan, number) for number in chunks))
+            place = str(setting.output.resolve()), store.digest_of(job.plan, beside)
+            cluster.make_all(client, slots, *place, chunks, count)
+        store.imported("zarr").consolidate_metadata(str(setting.output))
+    return Outcome(int(counts[0]), int(counts[1]), plan.size, dict(zip(plan.dims, plan.shape, strict=True)))
+
+
+def _wanted(extras: Extras) -> Extras:
+    """Ensembles are needed, whatever the spec leaves out."""
+    return replace(extras, without=extras.without - {"ensemble", "members"})
+
+
+def _members_of(plan: Plan, number: int) -> int:
+    return int(np.prod([part.stop - part.start for part in plan.region(number)]))
+
+
+def _plan(spec: Spec, sweep: Sweep, run: Run, columns: Mapping[str, int], target: str) -> Plan:
+    """The sweep in numbers, without chunks."""
+    return Plan(
+        name=sweep.name,
+        coordinates=spec.coordinates,
+        initial=tuple(float(v) for v in run.initial),
+        h=float(run.step),
+        t0=float(run.start),
+        parameters=spec.parameters_of(run),
+        steps=run.steps,
+        axes=sweep.over,
+        seed=sweep.seed,
+        members=sweep.random or next(iter(columns.values()), 0),
+        listed=tuple(columns),
+        keep=sweep.keep,
+        frames=sweep.frames,
+        about={"sweep": sweep.name, "run": run.name, "target": target, "phigen": __version__},
+    )
+
+
+def _beside(compilation: Compilation, target: str, spec: Spec) -> dict[str, Any]:
+    """The solver as source, and what else workers need."""
+    program, command = compilation.program, f"phigen build {compilation.program.name}.yaml"
+    (functions,) = emit(program, "numpy", command).values()
+    return store.made_by(interface_of(program), emit(program, target, command), functions, spec.source)
+
+
+def _gone_on_with(output: Path, plan: Plan, beside: Mapping[str, Any]) -> store.Job:
+    """The store of an earlier call, if it is one of this sweep. Raises `FileError`."""
+    job = store.open_job(str(output))
+    found = store.made_by(job.interface, job.files, job.functions, job.spec)
+    if store.digest_of(job.plan, found) != store.digest_of(plan, beside):
+        message = f"{output} holds another sweep, or one by another version"
+        raise FileError(f"{message}\n  hint: give another name by -o, or remove it")
+    return job
+
+
+def _created(
+    output: Path, plan: Plan, beside: Mapping[str, Any], listed: Mapping[str, Floats], slots: int
+) -> store.Job:
+    """A new store, in chunks that keep all workers busy."""
+    job = store.Job(
+        None, plan, store.interface_of(beside["interface"]), beside["files"], beside["functions"], beside["spec"]
+    )
+    seconds = _seconds_of_a_member(job)
+    members = int(min(max(_SECONDS / seconds, _LEAST), _MOST, max(_LEAST, plan.size // (4 * slots))))
+    store.create(output, replace(plan, chunk=chunk_of(plan, members)), beside, listed)
+    return store.open_job(str(output))
+
+
+def _seconds_of_a_member(job: store.Job) -> float:
+    """By a trial of a few members and steps; the first call compiles the solver, for all processes of this machine."""
+    plan, steps = job.plan, min(job.plan.steps, 2000)
+    values = {name: np.asarray(value) for name, value in plan.parameters.items()}
+    x0 = np.array([plan.initial] * 64)
+    h, t0 = np.asarray(plan.h), np.asarray(plan.t0)
+    trial = Members(x0, h, steps, values, t0, draws=Draws(plan.seed), paths=np.arange(len(x0)))
+    backend = job.backend()
+    began = time.perf_counter()
+    try:
+        backend.ensemble(trial, 1)
+    except BackendError:
+        return _SECONDS / 4096  # nothing is known
+    seconds = (time.perf_counter() - began) / len(x0) * (plan.steps / steps) + 1e-7
+    return seconds * (1 + ("crossings" in plan.keep)) + ("lyapunov" in plan.keep) * _TANGENT * plan.steps
+
+
+def _listed(sweep: Sweep, spec: Spec) -> dict[str, Floats]:
+    """The columns of a file of members, by their names. Raises `FileError`."""
+    path = Path(spec.file).parent / sweep.file
+    try:
+        with path.open(newline="", encoding="utf-8") as file:
+            names, *rows = [row for row in csv.reader(file) if row]
+        values = np.array(rows, dtype=np.float64).reshape(len(rows), len(names))
+    except (OSError, ValueError) as error:
+        raise FileError(f"{path}: expected a line of names, and lines of numbers: {error}") from None
+    names = [name.strip() for name in names]
+    known = {*spec.coordinates, *(p.name for p in spec.parameters), *SWEEP_NAMES[:2]}
+    strange = [name for name in names if name not in known]
+    if strange or len(set(names)) < len(names) or not len(rows):
+        why = f"{strange[0]!r} is not a parameter or a coordinate" if strange else "no members, or a name twice"
+        raise FileError(f"{path}: {why}")
+    return {name: np.ascontiguousarray(values[:, k]) for k, name in enumerate(names)}

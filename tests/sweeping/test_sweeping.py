@@ -1,0 +1,244 @@
+"""Sweeps: every member is what a single run is, whatever happens to those who make it. One cluster serves all tests."""
+
+import os
+import resource
+import signal
+import threading
+import time
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+import phigen
+from phigen import spec as specs
+from phigen.api import compilation_of
+from phigen.errors import FileError
+from phigen.spec.model import Axis
+from phigen.sweeping.plan import Plan, chunk_of, values_of
+
+xarray = pytest.importorskip("xarray")
+dask = pytest.importorskip("dask")
+distributed = pytest.importorskip("distributed")
+pytest.importorskip("zarr")
+
+from phigen.sweeping import cluster as clusters  # noqa: E402
+from phigen.sweeping import sweep as sweeping  # noqa: E402
+
+BODY = """\
+phigen: 1
+name: swept
+coordinates: [x1, x2, x3]
+parameters: {I1: 1, I2: 2, I3: 3}
+poisson: {brackets: {x1: {x2: -x3, x3: x2}, x2: {x3: -x1}}}
+hamiltonian: (x1**2/I1 + x2**2/I2 + x3**2/I3)/2
+casimirs: {C: x1**2 + x2**2 + x3**2}
+order: 2
+runs: {flip: {initial: [0.01, 1, 0.01], step: 0.1, steps: 60, section: x2}}
+"""
+MADE = {}
+OVER = {"I2": {"from": 1.5, "to": 2.5, "count": 12}, "x1": np.linspace(-0.2, 0.2, 40)}
+
+
+@pytest.fixture(scope="module")
+def spec():
+    return specs.loads(BODY)
+
+
+@pytest.fixture(scope="module")
+def cluster():
+    with distributed.LocalCluster(
+        n_workers=2, threads_per_worker=1, processes=True, dashboard_address=":0", silence_logs=50
+    ) as made:
+        made.scheduler.allowed_failures = clusters.TRIES
+        yield made
+
+
+@pytest.fixture(autouse=True)
+def compiled_once(monkeypatch):
+    """What is compiled is not what is tested here."""
+
+    def once(spec, order, extras, scheme):
+        key = spec.source.partition("sweeps:")[0], extras.tangent
+        if key not in MADE:
+            MADE[key] = compilation_of(spec, order, extras, scheme)
+        return MADE[key]
+
+    monkeypatch.setattr(sweeping, "compilation_of", once)
+
+
+@pytest.fixture
+def small_chunks(monkeypatch):
+    """As if members took so long that 40 of them fill a chunk."""
+    monkeypatch.setattr(sweeping, "_seconds_of_a_member", lambda job: sweeping._SECONDS / 40)
+
+
+def grid(shape=(5, 6, 7), **more):
+    axes = tuple(Axis(f"a{k}", (), (0.0, 1.0), size) for k, size in enumerate(shape))
+    plan = Plan("p", ("x",), (0.0,), 0.1, 0.0, {"a0": 0.0, "a1": 0.0, "a2": 0.0}, 10, axes=axes, **more)
+    return plan
+
+
+@pytest.mark.parametrize("members", [1, 4, 7, 20, 100, 1000])
+def test_chunks_hold_every_member_once_in_order(members):
+    plan = grid()
+    plan = replace(plan, chunk=chunk_of(plan, members))
+    assert Plan.from_json(plan.as_json()) == plan
+    made = [plan.varied(plan.region(k), {}) for k in range(int(np.prod(plan.boxes)))]
+    assert max(len(chunk["a0"]) for chunk in made) <= members
+    found = np.array([np.concatenate([chunk[f"a{k}"] for chunk in made]) for k in range(3)])
+    expected = np.meshgrid(*(values_of(axis) for axis in plan.axes), indexing="ij")
+    assert sorted(map(tuple, found.T)) == sorted(zip(*map(np.ravel, expected), strict=True))
+
+
+@pytest.mark.parametrize("members", [3, 10, 64, 1000])
+def test_draws_do_not_depend_on_chunks(members):
+    plan = Plan("p", ("x",), (0.0,), 0.1, 0.0, {"a": 0.0, "b": 1.0}, 10, members=257, seed=5,
+                axes=(Axis("a", (), (1.0, 2.0)), Axis("b", (), (1.0, 1e4), 0, "log")))  # fmt: skip
+    whole = plan.varied((slice(0, 257),), {})
+    plan = replace(plan, chunk=chunk_of(plan, members))
+    parts = [plan.varied(plan.region(k), {}) for k in range(plan.boxes[0])]
+    for name in ("a", "b"):
+        assert (np.concatenate([part[name] for part in parts]) == whole[name]).all()
+    assert 1.4 < whole["a"].mean() < 1.6
+    assert 30 < np.median(whole["b"]) < 300
+    assert abs(np.corrcoef(whole["a"], np.log(whole["b"]))[0, 1]) < 0.2
+
+
+def test_what_is_kept_of_members_is_that_of_single_runs(spec, cluster, tmp_path, small_chunks):
+    """The state, the largest errors, how often the section was crossed, the exponent, frames; and by the shell."""
+    (tmp_path / "s.yaml").write_text(BODY + "sweeps: {one: {over: {I2: [1.5, 2.5], x1: [0.1, 0.2, 0.3]}, frames: 25, "
+        "keep: [final, energy_error, casimir_error, lyapunov, crossings]}}\n")  # fmt: skip
+    from phigen.cli import group
+
+    store = tmp_path / "s.zarr"
+    arguments = ["sweep", str(tmp_path / "s.yaml"), "-o", str(store), "--scheduler", cluster.scheduler_address]
+    done = CliRunner().invoke(group, [*arguments, "--plot", str(tmp_path / "map.svg")])
+    assert done.exit_code == 0, done.output
+    assert "6 members (I2 2 × x1 3), 6 made now" in done.output
+    assert "<svg" in (tmp_path / "map.svg").read_text()
+    data = xarray.open_zarr(store).load()
+    assert data.sizes == {"I2": 2, "x1": 3, "coordinate": 3, "frame": 3}
+    solver = phigen.compile(spec, tangent=True)
+    from phigen.study.lyapunov import spectrum
+
+    for i, I2 in enumerate(data.I2.values):
+        for j, x1 in enumerate(data.x1.values):
+            start, member = [x1, 1, 0.01], data.isel(I2=i, x1=j)
+            alone = solver.integrate(start, 0.1, 60, I2=I2)
+            np.testing.assert_allclose(member.final, alone.x[-1], rtol=0, atol=1e-13)
+            np.testing.assert_allclose(member.frames, alone.x[[0, 25, 50]], rtol=0, atol=1e-13)
+            seen = alone.energy[[0, 25, 50, 60]]
+            np.testing.assert_allclose(member.energy_error, np.abs(seen - seen[0]).max(), rtol=0, atol=1e-14)
+            assert member.casimir_error < 1e-14
+            assert member.crossings == len(solver.section(start, 0.1, 60, lambda x: x[:, 1], I2=I2).t)
+            assert member.lyapunov == pytest.approx(spectrum(solver, start, 0.1, 60, {"I2": I2}).largest, abs=1e-9)
+    assert (data.status == 0).all()
+
+
+def test_a_member_that_fails_costs_itself_and_says_why(spec, cluster, tmp_path):
+    data = phigen.sweep(spec, over={"I2": [2.0, -1.0, 2.5], "step": [0.1, 1e3, 0.0]}, keep=["final", "energy_error"],
+                        output=tmp_path / "s.zarr", scheduler=cluster.scheduler_address)  # fmt: skip
+    names = data.status.attrs["flag_meanings"].split()
+    found = [[names[int(v)] for v in row] for row in data.status.values]
+    assert [row[0] for row in found] == ["OK"] * 3
+    assert found[0][1] in ("NO_CONVERGENCE", "NOT_FINITE", "SINGULAR")
+    assert found[2][2] == "BAD_ARGUMENT"
+    for name in ("final", "energy_error"):
+        failed = np.isnan(data[name].values.reshape(9, -1)).any(axis=1)
+        assert (failed == (data.status.values.ravel() != 0)).all()
+
+
+def test_killed_workers_cost_no_member(spec, cluster, tmp_path, small_chunks):
+    """Workers are killed at random while they are at work; the result is that of one ensemble."""
+    stop, killed, random = threading.Event(), [], np.random.default_rng(1)
+
+    def kill():
+        while not stop.wait(0.3) and len(killed) < 3:
+            processes = [w.process.pid for w in cluster.workers.values() if w.process and w.process.pid]
+            if processes:
+                killed.append(int(random.choice(processes)))
+                os.kill(killed[-1], signal.SIGKILL)
+
+    thread = threading.Thread(target=kill)
+
+    def told(members, failed):
+        if not thread.ident:
+            thread.start()
+        time.sleep(0.15)
+
+    data = phigen.sweep(spec, over=OVER, output=tmp_path / "s.zarr", scheduler=cluster.scheduler_address, progress=told)
+    stop.set()
+    thread.join()
+    assert killed
+    I2, x1 = (v.ravel() for v in np.meshgrid(values_of(Axis("I2", (), (1.5, 2.5), 12)), OVER["x1"], indexing="ij"))
+    start = np.column_stack([x1, np.ones(480), np.full(480, 0.01)])
+    expected = phigen.compile(spec).ensemble(start, 0.1, 60, I2=I2)
+    np.testing.assert_allclose(data.final.values.reshape(480, 3), expected, rtol=0, atol=1e-13)
+
+
+def test_an_interrupted_sweep_goes_on_where_it_stopped_and_another_is_refused(spec, cluster, tmp_path, small_chunks):
+    given = {"over": OVER, "output": tmp_path / "s.zarr", "scheduler": cluster.scheduler_address}
+    first, second = [], []
+
+    def interrupt(members, failed):
+        first.append(members)
+        if len(first) == 4:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        phigen.sweep(spec, **given, progress=interrupt)
+    data = phigen.sweep(spec, **given, progress=lambda members, failed: second.append(members))
+    assert sum(second) <= 480 - sum(first)
+    assert (data.status == 0).all()
+    with pytest.raises(FileError, match="holds another sweep"):
+        phigen.sweep(spec, **given, steps=61)
+    with pytest.raises(FileError, match="no sweep of phigen"):
+        phigen.sweep(spec, over=OVER, output=tmp_path)
+
+
+def test_a_full_disk_is_told_and_nothing_is_lost(spec, cluster, tmp_path, small_chunks):
+    """Files of workers cannot grow, after the second chunk."""
+    given = {"over": OVER, "output": tmp_path / "s.zarr", "scheduler": cluster.scheduler_address}
+    made = []
+    with distributed.Client(cluster) as client:
+
+        def full(members, failed):
+            made.append(members)
+            if len(made) == 2:
+                client.run(resource.setrlimit, resource.RLIMIT_FSIZE, (64, resource.RLIM_INFINITY))
+
+        try:
+            with pytest.raises(clusters.SweepError, match="File too large"):
+                phigen.sweep(spec, **given, progress=full)
+        finally:
+            client.run(resource.setrlimit, resource.RLIMIT_FSIZE, (resource.RLIM_INFINITY, resource.RLIM_INFINITY))
+    rest = []
+    data = phigen.sweep(spec, **given, progress=lambda members, failed: rest.append(members))
+    assert (data.status == 0).all()
+    assert sum(rest) < 480
+
+
+def test_a_scheduler_that_goes_away_is_told(spec, tmp_path, small_chunks):
+    patience = dask.config.set({"distributed.comm.timeouts.connect": "500ms", "distributed.scheduler.worker-ttl": None})
+    local = distributed.LocalCluster(n_workers=1, threads_per_worker=1, processes=False, dashboard_address=":0")
+    with patience, local as own:
+
+        def leave(members, failed):
+            own.sync(own.scheduler.close)
+
+        with pytest.raises(clusters.SweepError, match="scheduler went away"):
+            phigen.sweep(spec, over=OVER, output=tmp_path / "s.zarr", scheduler=own.scheduler_address, progress=leave)
+    with pytest.raises(clusters.SweepError, match="no scheduler answers"):
+        phigen.sweep(spec, over=OVER, output=tmp_path / "s.zarr", scheduler="tcp://127.0.0.1:1")
+
+
+def test_members_of_a_file_are_made_in_its_order(cluster, tmp_path):
+    (tmp_path / "members.csv").write_text("x1, I3\n0.1, 3\n0.2, 4\n0.3, 5\n")
+    (tmp_path / "s.yaml").write_text(BODY + "sweeps: {listed: {over: {file: members.csv}}}\n")
+    data = phigen.sweep(tmp_path / "s.yaml", output=tmp_path / "s.zarr", scheduler=cluster.scheduler_address)
+    solver = phigen.compile(tmp_path / "s.yaml")
+    start = [[x1, 1, 0.01] for x1 in (0.1, 0.2, 0.3)]
+    np.testing.assert_allclose(data.final, solver.ensemble(start, 0.1, 60, I3=[3, 4, 5]), rtol=0, atol=1e-13)
+    assert data.I3.values.tolist() == [3, 4, 5]
