@@ -18,7 +18,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 716547f35c7156c592373b597b588c2f53cc587865a7445adc62ac5c17024a0b
+ * body-sha256: 98fd7363ef2fd065babed2ed454e6551cfcaa71e03da98804821bbb691c2d513
  */
 /*
  * import { Solver, StepError } from './thermal_spin.mjs';
@@ -489,23 +489,27 @@ export class Solver {
   }
 
   /**
-   * Many steps of many states, each of which has its own gauge. One that fails keeps its last good state.
+   * Many steps of many states, each of which has its own gauge. One that fails keeps its last good state. h and what is
+   * in options may be arrays in place of numbers, with one for each member.
    *
    * @param {Iterable<ArrayLike<number>>} members
-   * @param {number} h
+   * @param {number | ArrayLike<number>} h
    * @param {number} count
-   * @param {{params?: Partial<Parameters>}} [options] as of the constructor
+   * @param {{params?: object}} [options] as of the constructor
    * also seed, step0, and member, that of the first of the members
    * @returns {{x: Float64Array[], status: string[]}} where each ends, and how: "OK" or a status
    */
   static ensemble(members, h, count, options = {}) {
-    let member = options.member ?? 0;
-    const ends = Array.from(members, (x0) => {
+    const ends = Array.from(members, (x0, m) => {
+      const own = (value) => (typeof value === "object" && value !== null ? value[m] : value);
+      const given = Object.entries(options.params ?? {}).map(([name, value]) => [name, own(value)]);
+      const chosen = { ...options, params: Object.fromEntries(given), t0: own(options.t0), x0 };
+      chosen.member = (options.member ?? 0) + m;
       let end = Float64Array.from(x0);
       try {
-        const solver = new Solver({ ...options, x0, member: member++ });
+        const solver = new Solver(chosen);
         end = solver.x;
-        solver.integrate(h, count);
+        solver.integrate(own(h), count);
         return { end, status: "OK" };
       } catch (error) {
         if (!(error instanceof StepError)) throw error;
