@@ -211,9 +211,6 @@ def _split(spec: Spec, source: System, order: int | None, described: Mapping[str
     if source.forces:
         reason = "scheme: splitting takes no forces and no damping"
         raise SpecError([spec.diagnostic(("scheme",), reason, "scheme: series takes them")])
-    if source.noise:
-        reason = "scheme: splitting takes no noise yet"
-        raise SpecError([spec.diagnostic(("scheme",), reason, "scheme: series takes it")])
     gauge = Gauge() if isinstance(spec.gauge, str) else given(source, spec.gauge)
     discretised = gauge.applied(source)
     parts = clock.timed("splitting", lambda: split(discretised.frozen))

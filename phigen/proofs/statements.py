@@ -17,6 +17,7 @@ from phigen.lattice.cell import Cell
 from phigen.lattice.series import SeriesPlan
 from phigen.proofs import attitude
 from phigen.realisations import axioms
+from phigen.scheme.noise import noise_flows
 from phigen.series.hamilton_jacobi import residual
 from phigen.spec.model import Spec
 from phigen.splitting.statements import check as check_splitting
@@ -98,7 +99,8 @@ def method(compilation: Compilation) -> dict[str, tuple[Statement, ...]]:
     turned = tuple(attitude.check(compilation))
     last = {ATTITUDE: turned} if turned else {}
     if compilation.splitting:
-        return {SPLITTING: tuple(check_splitting(compilation.discretised, compilation.splitting))} | last
+        flows = zip((s.name for s in compilation.system.noise), noise_flows(compilation.system), strict=True)
+        return {SPLITTING: tuple(check_splitting(compilation.discretised, compilation.splitting, list(flows)))} | last
     found = axioms.check(compilation.system, compilation.chart)
     stripped = [replace(s, name=s.name.removeprefix(PREFIX)) for s in found]
     label = f"{METHOD} ({compilation.chart.kind})"

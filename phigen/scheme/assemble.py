@@ -6,7 +6,6 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 from phigen.attitude.group import Group
-from phigen.errors import Diagnostic, SpecError
 from phigen.geometry.shapes import LogCanonical
 from phigen.geometry.system import System
 from phigen.realisations.protocol import BiRealisation
@@ -31,6 +30,7 @@ from phigen.scheme.lowering import cost, operation_counts
 from phigen.scheme.mean import along_mean
 from phigen.scheme.modified import modified_of
 from phigen.scheme.monitor import elapsed_kernel, monitor_facts, rate_kernel
+from phigen.scheme.noise import expect_no_adjoint, noise_facts
 from phigen.scheme.order import Order
 from phigen.scheme.path import build_path, build_slopes
 from phigen.scheme.program import About, Monitor, Noise, Program
@@ -62,9 +62,7 @@ def build_program(
     profile: str = "fast",
 ) -> Program:
     """The solver of a system as a program. LimitError if a kernel exceeds `MOST_OPERATIONS`."""
-    if system.noise and extras.adjoint:
-        reason = "adjoint is not offered with noise"
-        raise SpecError([Diagnostic(reason, system.locations.get(("noise",)))])
+    expect_no_adjoint(system, extras.adjoint)
     solver = solver or SolverOptions()
     gauge, attitude = gauged.gauge, None
     if group:
@@ -193,7 +191,7 @@ def _facts(
     yield from monitor_facts(gauge.monitor)
     yield from gauge.facts
     yield from _forces(system)
-    yield from noise_facts(system)
+    yield from noise_facts(system, weak=1)
     yield f"step: {step.manner}"
     yield scheme.note
     yield order.note
@@ -207,15 +205,6 @@ def _forces(system: System) -> Iterator[str]:
     changed = [name for name, c in system.casimirs.items() if not system.forced_rate_of_casimir(c).is_zero]
     kept = f"they change {', '.join(changed)}" if changed else "they keep all Casimirs"
     yield f"with forces a step is no Poisson map; {kept}"
-
-
-def noise_facts(system: System) -> Iterator[str]:
-    """What is said of noise."""
-    if not system.noise:
-        return
-    names = ", ".join(s.name for s in system.noise)
-    yield f"noise: {names}; in the sense of Stratonovich, along Hamiltonian fields, so it keeps all Casimirs"
-    yield "each path of the noise has its step; strong order 1 if sources commute, else 1/2; weak order 1"
 
 
 def _acts(force: Sequence[Expression]) -> bool:

@@ -16,10 +16,11 @@ from phigen.scheme.discretisation import MOST_OPERATIONS, too_large
 from phigen.scheme.gathering import gather
 from phigen.scheme.gauge import Gauge
 from phigen.scheme.kernel import Kernel, Output
-from phigen.scheme.kernels import observables
+from phigen.scheme.kernels import noise_fields, observables
 from phigen.scheme.logarithmic import Logarithmic, trimmed
 from phigen.scheme.lowering import cost, operation_counts
-from phigen.scheme.program import About, Program
+from phigen.scheme.noise import driven, expect_no_adjoint, noise_facts, noise_flows, with_noise
+from phigen.scheme.program import About, Noise, Program
 from phigen.scheme.staging import Coefficients
 from phigen.scheme.steps import Splitting
 from phigen.scheme.tangent import explicit_jacobian
@@ -47,16 +48,22 @@ def build_splitting(
     """The explicit solver as a program. LimitError if a kernel exceeds `MOST_OPERATIONS`."""
     _expect_no_modified(system, extras)
     splitting, steps = choice.splitting, choice.schedule()
+    sources = [driven(flow, s) for flow, s in zip(noise_flows(system), system.noise, strict=True)]
+    if sources:
+        expect_no_adjoint(system, extras.adjoint)
+        steps = with_noise(steps, len(sources))
+    every = [*sources, *splitting.flows]
     held = (LEVEL,) if monitor else ()
-    coefficients = Coefficients([*system.parameter_names, *held, TIME, KICK], system.times)
-    flows = tuple(_flow_kernel(system, flow, k, coefficients, monitor) for k, flow in enumerate(splitting.flows, 1))
+    coefficients = Coefficients([*system.parameter_names, *held, TIME, KICK], [*system.times, *system.increments[:1]])
+    flows = tuple(_flow_kernel(system, flow, k, coefficients, monitor) for k, flow in enumerate(every, 1))
     tangents = tuple(
         explicit_jacobian(trimmed(flow, system.dimension), system.coordinates, coefficients, f"tangent{k}")
         for k, flow in enumerate(flows, 1)
         if extras.tangent
     )
     attitude = flow_attitude(system, group, splitting.flows, gauge, coefficients) if group else None
-    refresh = coefficients.refresh(t=system.times)
+    inputs = {"t": system.times, "dw": system.increments[:1]}
+    refresh = coefficients.refresh(**{name: symbols for name, symbols in inputs.items() if symbols})
     prepare = Kernel(
         "prepare",
         "everything that depends on parameters and the time of a flow only",
@@ -82,7 +89,14 @@ def build_splitting(
             raise too_large(system, reason, other="")
     level = level_adjoint(system) if monitor and extras.adjoint else None
     monitored = [monitor.fact] if monitor else []
-    said = (*monitored, *gauge.facts, *facts(choice, step), _clock(choice), choice.order.note)
+    said = (
+        *monitored,
+        *gauge.facts,
+        *facts(choice, step, len(sources)),
+        *noise_facts(system, weak=2),
+        _clock(choice),
+        choice.order.note,
+    )
     return Program(
         name=system.name,
         about=About(title, licence, spec_sha256, tuple(fact for fact in said if fact), _operations(step)),
@@ -93,6 +107,7 @@ def build_splitting(
         order=choice.order.order,
         step=step,
         observables=observables(system),
+        noise=Noise(tuple(s.name for s in system.noise), 2, noise_fields(system)) if sources else None,
         attitude=attitude,
         extras=extras,
         lanes=lanes,
@@ -101,9 +116,9 @@ def build_splitting(
     )
 
 
-def facts(choice: Choice, step: Splitting) -> list[str]:
-    """What the header says of the method."""
-    count, flows, method = len(step.flows), len(step.schedule.flows), choice.method
+def facts(choice: Choice, step: Splitting, sources: int = 0) -> list[str]:
+    """What the header says of the method; the first parts are ``sources`` of noise."""
+    count, flows, method = len(step.flows) - sources, len(step.schedule.flows) - 2 * sources, choice.method
     if count == 1 and choice.carrier is None:
         return ["scheme: the exact flow of H, which is elementary", f"step: {step.manner}"]
     parts = " + ".join(f"H_{k}" for k in range(1, count + 1))
@@ -124,11 +139,19 @@ def _clock(choice: Choice) -> str:
     return f"time: advances {how}, and stands still in {'all other' if with_part else 'all'} flows"
 
 
+def _named(system: System, flow: Flow, k: int) -> str:
+    """What a flow is that of; those of the noise come first, and their time is σ ΔW."""
+    sources = system.noise
+    if k <= len(sources):
+        return f"{flow.hamiltonian}, for the noise {sources[k - 1].name}"
+    return f"H_{k - len(sources)} = {flow.hamiltonian}"
+
+
 def _flow_kernel(system: System, flow: Flow, k: int, coefficients: Coefficients, monitor: Logarithmic | None) -> Kernel:
     increment = staged(monitor.outputs(flow) if monitor else flow.increment, coefficients)
     return Kernel(
         f"flow{k}",
-        f"the flow of H_{k} = {flow.hamiltonian}: {flow.manner}".replace(KICK, KICK.kind),
+        f"the flow of {_named(system, flow, k)}: {flow.manner}".replace(KICK, KICK.kind),
         {"coef": coefficients.slots, "state": system.coordinates},
         (Output("increment", tuple(increment)),),
     )

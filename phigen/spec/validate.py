@@ -26,7 +26,7 @@ from phigen.spec.model import (
     SpecForces,
     SpecNoise,
 )
-from phigen.spec.names import LICENSE_REFERENCE, LICENSES, LOGARITHMIC
+from phigen.spec.names import COMPOSITIONS, LICENSE_REFERENCE, LICENSES, LOGARITHMIC
 from phigen.spec.poisson import brackets_of_sites, poisson_form
 from phigen.spec.problems import Problems, counted, did_you_mean, shown
 from phigen.spec.runs import run, without_repetition
@@ -149,6 +149,7 @@ def _expect_consistent_with_noise(raw: Mapping[str, Any], problems: Problems, re
     noisy = "noise" in raw
     if noisy and raw.get("lattice") is None:
         for key, harmless in NOT_WITH_NOISE.items():
+            harmless = COMPOSITIONS if key == "composition" and raw.get("scheme") == "splitting" else harmless
             if raw.get(key) is not None and raw[key] not in harmless:
                 problems.add(f"{key}: not with noise in this version", reader.locations[key,])
     for name, (_, run_) in raw.get("runs", {}).items():

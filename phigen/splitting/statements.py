@@ -7,6 +7,7 @@ order of the composition, whatever the parts are.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 from phigen.geometry.system import System, hamiltonian_vector_field
 from phigen.splitting.flow import Flow
@@ -27,8 +28,11 @@ from phigen.symbolic.expression import (
 from phigen.symbolic.verdict import Statement, decide_zero
 
 
-def check(system: System, splitting: Splitting) -> Iterator[Statement]:
-    """The statements, those on flows in the order of the parts; H is that of the system, any gauge applied."""
+def check(system: System, splitting: Splitting, noise: Sequence[tuple[str, Flow]] = ()) -> Iterator[Statement]:
+    """The statements, those on flows in the order of the parts; H is that of the system, any gauge applied.
+
+    ``noise`` are flows of sources by their names.
+    """
     flows = splitting.flows
     plain = substitute([f.hamiltonian for f in flows], {KICK: ZERO})
     modified = plain != [f.hamiltonian for f in flows]
@@ -36,6 +40,8 @@ def check(system: System, splitting: Splitting) -> Iterator[Statement]:
     yield decide_zero(name, [("", system.hamiltonian - total(plain))], system.positive)
     for k, flow in enumerate(flows, 1):
         yield _flow_statement(system, flow, k)
+    for source, flow in noise:
+        yield replace(_flow_statement(system, flow, 0), name=f"the flow of g of the noise {source}")
     if splitting.kick is not None:
         yield from _kick_statements(system, splitting, plain)
         for time in system.times:

@@ -29,13 +29,14 @@ def strong_order(
     draws, finest = solver.interface.draws, steps << (LEVELS + BEYOND)
     begin = t0 if solver.interface.time else None
     random = np.random.default_rng(SEED)
-    fine = random.normal(size=(paths, finest, draws)) * np.sqrt(abs(h) * steps / finest)
+    sources = len(solver.interface.noise)
+    fine = random.normal(size=(paths, finest, draws)) * np.sqrt(abs(h) * steps / finest * sources / draws)
     ends = _along_lines(solver, np.tile(x0, (paths, 1)), parameters, t0, h * steps / finest, fine)
     errors = np.zeros(LEVELS)
     for level in range(LEVELS):
         many = steps << level
         for path, end in zip(fine, ends, strict=True):
-            coarse = path.reshape(many, -1, draws).sum(axis=1)
+            coarse = path.reshape(many, draws // sources, -1, sources).sum(axis=2).reshape(many, draws)
             about: dict[str, Any] = {"t0": begin, "increments": coarse, "parameters": parameters}
             errors[level] += np.sum((solver.integrate(x0, h / 2**level, many, many, **about).x[-1] - end) ** 2)
     return float(-np.polyfit(np.arange(LEVELS), np.log2(errors) / 2, 1)[0]) if errors.all() else np.inf
@@ -69,7 +70,8 @@ def failures(solver: Solver, states: Sequence[Floats], parameters: Mapping[str, 
     random, failed = np.random.default_rng(SEED), 0
     for x in states:
         for _ in range(SIGNS):
-            largest = BOUND * np.sqrt(abs(h)) * random.choice([-1.0, 1.0], size=(1, draws))
+            size = np.sqrt(abs(h) * len(solver.interface.noise) / draws)
+            largest = BOUND * size * random.choice([-1.0, 1.0], size=(1, draws))
             try:
                 solver.integrate(x, h, 1, t0=begin, increments=largest, parameters=parameters)
             except StepError:

@@ -46,6 +46,12 @@ tangent: true
         [0.6, 1.5],
         0.5,
     ),
+    "split": (
+        SPIN.replace("-B*z", "-B*z + 0.2*x**2") + "time: t\nscheme: splitting\ntangent: true\n"
+        "noise: {a: {hamiltonian: x, amplitude: 0.4}, b: {hamiltonian: y*cos(t), amplitude: 0.5}}\n",
+        [0, 0.6, 0.8],
+        0.5,
+    ),
     "path": (
         """coordinates: [x, y, z]
 poisson: {nambu: [x**2/2 + y**2/2 + z**4/4]}
@@ -173,7 +179,7 @@ def test_targets_agree_to_roundoff(kind):
     assert x == pytest.approx(c.x[-1], abs=1e-13)
 
 
-@pytest.mark.parametrize("kind", ["thermal", "dated", "path"])
+@pytest.mark.parametrize("kind", ["thermal", "dated", "split", "path"])
 def test_casimirs_are_kept_at_any_temperature(kind):
     found = solver(made(kind), "c").integrate(SYSTEMS[kind][1], 0.1, 50_000, 100)
     assert np.ptp(found.x[:, 0]) > 0.5
@@ -302,6 +308,13 @@ noise: {k: {hamiltonian: (q**2 + p**2)/2, amplitude: 0.5}, l: {hamiltonian: q**2
     "spin": SPIN + HEAT,
 }
 
+SPLIT = (
+    SPIN
+    + """scheme: splitting
+noise: {x: {hamiltonian: x, amplitude: 0.7}, y: {hamiltonian: y, amplitude: 0.9}}
+"""
+)
+
 
 def generator(compilation):
     """A + ½ Σ B², the matrix of dE[x]/dt, of linear motion."""
@@ -310,12 +323,13 @@ def generator(compilation):
     return found.vector_field(eye).T + sum(b.T @ b.T for b in fields) / 2
 
 
-@pytest.mark.parametrize("kind", LINEAR)
-def test_the_weak_order_is_one(kind):
-    compilation = compile_text(LINEAR[kind])
+@pytest.mark.parametrize(("text", "order"), [*((text, 1) for text in LINEAR.values()), (SPLIT, 2)])
+def test_the_weak_order_is_reached(text, order):
+    """Were both halves of a step of a splitting of one increment, sources that do not commute had order 1 only."""
+    compilation = compile_text(text)
     exact = expm(generator(compilation))
     coarse, fine = (np.abs(np.linalg.matrix_power(mean_map(compilation, 1 / n), n) - exact).max() for n in (8, 16))
-    assert np.log2(coarse / fine) == pytest.approx(1, abs=0.2)
+    assert np.log2(coarse / fine) == pytest.approx(order, abs=0.2)
 
 
 # --- equilibria
@@ -346,6 +360,7 @@ def test_what_is_proved_of_noise():
             "the density exp(−H/θ) on the leaves is stationary, with θ = T",
         ],
         "dated": ["the sources of noise commute, hence strong order 1"],
+        "split": ["the sources of noise do not commute, hence strong order 1/2"],
         "populations": ["the sources of noise do not commute, hence strong order 1/2"],
         "path": ["the sources of noise commute, hence strong order 1"],
     }
@@ -373,7 +388,13 @@ def test_the_temperature_is_found_where_there_is_one(more, temperature):
     assert found == ([expected] if temperature else [])
 
 
-@pytest.mark.parametrize("kind", ["dated", "thermal"])
+def test_a_source_without_a_flow_in_closed_form_is_named():
+    text = SPIN + "scheme: splitting\nnoise: {odd: {hamiltonian: exp(x*y) + z}}\n"
+    with pytest.raises(SpecError, match="needs the flow of the noise odd in closed form"):
+        compile_text(text)
+
+
+@pytest.mark.parametrize("kind", ["dated", "thermal", "split"])
 def test_verification_asks_for_what_is_promised(kind):
     solvers = {target: solver(made(kind), target) for target in ("c", "numpy")}
     found = verify(
@@ -394,9 +415,7 @@ def test_verification_asks_for_what_is_promised(kind):
         "tangent map against differences",
         "steps that fail, of increments as large as can be",
     } <= required
-    assert ("Poisson defect, exact tangent" in required) == (
-        kind == "dated"
-    )  # without forces each path is one of Poisson maps
+    assert ("Poisson defect, exact tangent" in required) == (kind != "thermal")  # there forces act
 
 
 def test_the_code_says_what_noise_leaves_of_it():
@@ -410,6 +429,7 @@ def test_the_code_says_what_noise_leaves_of_it():
     [
         ("damping: lam\norder: 4", "with forces and noise a step has order 2, not 4"),
         ("scheme: splitting\ndamping: lam", "takes no forces"),
+        ("adjoint: true", "adjoint: not with noise"),
     ],
 )
 def test_what_cannot_be_done_is_refused(more, message):

@@ -23,7 +23,7 @@ def sizes(step: Splitting) -> list[tuple[str, int, str]]:
 def printed(program: Program, step: Splitting) -> str:
     """The flows, and one step."""
     found = [function(program, replace(step.prepare, name="prepare_row"))]
-    found += [function(program, step.refresh, name="at_time")] if step.refresh else []
+    found += [function(program, step.refresh, name="at_step" if program.noise else "at_time")] if step.refresh else []
     more = f", double element[{program.name}_ELEMENT], double lost[{program.name}_ELEMENT]" if program.attitude else ""
     for k, flow in enumerate(step.flows, 1):
         kernel, values = _flow(program, flow, k)

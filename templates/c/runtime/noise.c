@@ -50,6 +50,13 @@ static int phi_draw(phi_solver *s, const double *given)
         phi_normals(s->seed, s->member, s->first_step + s->steps, s->dw);
         const double size = copysign(sqrt(fabs(s->h) / PHI_PARTS), s->h); /* so that a step of -h undoes one of h */
         for (int k = 0; k < PHI_DRAWS; ++k) s->dw[k] *= size;
+#if PHI_SPLITTING
+        for (int k = 0; k < PHI_SOURCES && s->h < 0.0; ++k) { /* what was last in the step of h comes first */
+            const double late = s->dw[PHI_SOURCES + k];
+            s->dw[PHI_SOURCES + k] = s->dw[k];
+            s->dw[k] = late;
+        }
+#endif
     }
     for (int k = 0; k < PHI_DRAWS; ++k)
         if (!isfinite(s->dw[k])) return 0;

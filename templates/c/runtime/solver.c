@@ -146,7 +146,17 @@ static void phi_renew(phi_solver *s)
 #if PHI_SPLITTING
     for (int k = 0; k < PHI_ROWS_OF_FLOWS; ++k) {
         double *row = s->coef[0] + k * PHI_ROW;
+#if PHI_NOISE
+        const int late = k - (PHI_ROWS_OF_FLOWS - PHI_DRAWS); /* in the half after the flows of H */
+        const double dw[1] = { k < PHI_SOURCES ? s->dw[k] : late >= PHI_SOURCES ? s->dw[late] : 0.0 };
+#endif
+#if PHI_NOISE && PHI_TIMED
+        phi_at_step(row, s->t + phi_moments[k] * s->h, dw, row + PHI_PREPARED);
+#elif PHI_NOISE
+        phi_at_step(row, dw, row + PHI_PREPARED);
+#else
         phi_at_time(row, s->t + phi_moments[k] * s->h, row + PHI_PREPARED);
+#endif
     }
 #else
     for (int stage = 0; stage < PHI_STAGES; ++stage)

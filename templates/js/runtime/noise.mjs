@@ -64,6 +64,9 @@ export function draw(solver, given) {
     normals(seed, member, BigInt(step0) + BigInt(steps), dw);
     const size = Math.sign(h) * Math.sqrt(Math.abs(h) / PARTS); // so that a step of -h undoes one of h
     for (let k = 0; k < DRAWS; k++) dw[k] *= size;
+    // #if SPLITTING
+    if (h < 0) dw.set([...dw.subarray(DRAWS / 2), ...dw.subarray(0, DRAWS / 2)]); // the last come first
+    // #endif
   }
   return dw.every(Number.isFinite);
 }

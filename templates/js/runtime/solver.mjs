@@ -238,7 +238,19 @@ export class Solver {
   // #endif
   #renew() {
     // #if SPLITTING
+    // #if NOISE
+    this.coef[0].forEach((row, k, rows) => {
+      const late = k - (rows.length - DRAWS); // in the half after the flows of H
+      const dw = [k < SOURCES.length ? this.dw[k] : late >= SOURCES.length ? this.dw[late] : 0];
+      // #if TIMED
+      refresh(row, this.t + MOMENTS[k] * this.h, dw, row.subarray(PREPARED));
+      // #else
+      refresh(row, dw, row.subarray(PREPARED));
+      // #endif
+    });
+    // #else
     this.coef[0].forEach((row, k) => refresh(row, this.t + MOMENTS[k] * this.h, row.subarray(PREPARED)));
+    // #endif
     // #else
     this.coef.forEach((coef, stage) => {
       // #if NOISE
