@@ -82,6 +82,8 @@ class Tower(Arithmetic[Poly]):
             if not _is_arithmetic(e):
                 self._absorb(e)
         self._close()
+        if self._room > len(self.names):
+            self._set_context()
 
     # -- the ring ---------------------------------------------------------------------------------
 
@@ -90,9 +92,17 @@ class Tower(Arithmetic[Poly]):
         """Names of the ring's variables: the symbols, then the generators."""
         return self.symbols + tuple(g.name for g in self.generators)
 
-    def _set_context(self) -> None:
-        self.context = fmpq_mpoly_ctx.get([f"v{i}" for i in range(len(self.names))] or ["v0"], Ordering.degrevlex)
+    def _set_context(self, spare: int = 0) -> None:
+        """Make the ring of all names, and of so many to come, and take the generators into it."""
+        self._room = max(len(self.names) + spare, 1)
+        self.context = fmpq_mpoly_ctx.get([f"v{i}" for i in range(self._room)], Ordering.degrevlex)
         self.gens = self.context.gens()
+        for g in self.generators:
+            g.arguments = [self._lift(a) for a in g.arguments]
+            g.derivative = {v: self._lift(d) for v, d in g.derivative.items()}
+        self._name_variables()
+
+    def _name_variables(self) -> None:
         self._index = {n: i for i, n in enumerate(self.names)}
         self._pairs: list[tuple[int, int]] | None = None
         self._meanings: list[Expression] | None = None
@@ -133,13 +143,13 @@ class Tower(Arithmetic[Poly]):
                 missing.inverse,
             )
         )
-        self._set_context()
-        for g in self.generators:
-            g.arguments = [self._lift(a) for a in g.arguments]
-            g.derivative = {v: self._lift(d) for v, d in g.derivative.items()}
+        if len(self.names) > self._room:
+            self._set_context(spare=len(self.generators))
+        else:
+            self._name_variables()
 
     def _lift(self, element: Poly) -> Poly:
-        size = len(self.symbols) + len(self.generators)
+        size = self._room
         return self.context.from_dict(
             {m + (0,) * (size - len(m)) if len(m) < size else m[:size]: c for m, c in element.to_dict().items()}
         )
