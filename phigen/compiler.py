@@ -66,8 +66,8 @@ def compile_spec(
         with bounded(spec):
             cell = clock.timed("cell", lambda: cell_from_spec(spec))
             return _swept(spec, cell, order, scheme, extras or spec.extras, profile or spec.profile, clock)
-    _tell_of_lattice(spec)
     with bounded(spec):
+        _tell_of_lattice(spec)
         source = system or clock.timed("system", lambda: system_from_spec(spec))
         return _compiled(spec, source, order, scheme, extras or spec.extras, profile or spec.profile, clock)
 
@@ -88,8 +88,8 @@ def examine(
     clock = _Clock()
     if spec.lattice:
         return _examine_lattice(spec, order, scheme, extras, profile, clock)
-    _tell_of_lattice(spec)
     with bounded(spec), progress.stage(spec.name):
+        _tell_of_lattice(spec)
         try:
             source = system or clock.timed("system", lambda: system_from_spec(spec))
         except SpecError as error:
