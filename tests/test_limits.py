@@ -3,12 +3,15 @@
 import json
 import os
 import resource
+from dataclasses import replace
 
 import pytest
 
-from phigen.compiler import compile_proved
-from phigen.errors import PhigenError
+from phigen.compiler import compile_proved, compile_spec
+from phigen.errors import LimitError, PhigenError
+from phigen.scheme import discretisation
 from phigen.scheme.generating import graph_form
+from phigen.scheme.lowering import cost
 from phigen.series.hamilton_jacobi import polynomial_series
 from phigen.spec import limits, loads
 from phigen.symbolic import budgets
@@ -42,6 +45,25 @@ def fput(masses):
     springs = [f"(q{i % masses + 1} - q{i})" for i in range(1, masses + 1)]
     terms = [*(f"{c}**2/2" for c in p), *(f"{s}**2/2 + {s}**3/12 + {s}**4/40" for s in springs)]
     return spec([*q, *p], f"canonical: {{q: [{', '.join(q)}], p: [{', '.join(p)}]}}", " + ".join(terms))
+
+
+def log_canonical(n):
+    rows = [[(j > i) - (j < i) for j in range(n)] for i in range(n)]
+    return spec(
+        names(n),
+        f"log_canonical: {[[e * (i * j % 3 + 1) for j, e in enumerate(r)] for i, r in enumerate(rows)]}",
+        "+".join(names(n)),
+    )
+
+
+def triangular(n):
+    """Canonical brackets after a change of coordinates whose inverse has very many terms."""
+    x, u = names(n), [f"u{i}" for i in range(1, n + 1)]
+    moved = ", ".join(
+        f"{v}: {a} + ({'+'.join(x[i + 1 :] or ['0'])})**3" for i, (v, a) in enumerate(zip(u, x, strict=True))
+    )
+    of = f"canonical: {{q: [{', '.join(u[: n // 2])}], p: [{', '.join(u[n // 2 :])}]}}"
+    return spec(x, f"pullback: {{map: {{{moved}}}, of: {{{of}}}}}", "x1**2")
 
 
 def nambu(n):
@@ -96,6 +118,24 @@ def test_a_graph_whose_hessian_is_too_large_is_given_up_before_it_is_made(monkey
         graph_form([h], names_, [])
 
 
+def test_a_step_whose_matrices_are_too_large_is_composed_or_refused_before_they_are_made(monkeypatch):
+    """The estimate is between 0.6 of the truth and the truth; steps of order 2 take less."""
+    text = loads(log_canonical(10))
+    direct = compile_spec(text).program
+    true = cost(direct.step.linearise.roots)
+    few = 4 * 10**3 - 1  # below which systems of this size are looked at
+    assert few > 0.6 * true
+    for most, stages in ((true, 1), (few, 5)):
+        monkeypatch.setattr(discretisation, "MOST_OPERATIONS", most)
+        assert len(compile_spec(text).program.fractions) == stages
+    with pytest.raises(LimitError, match=f"the matrices of a step would take more than {most} operations"):
+        compile_spec(replace(text, composition="none"))
+    dense = "*".join(f"cos({x})" for x in names(10))
+    monkeypatch.setattr(discretisation, "generating_function", None)  # of this it is known before any S_i is computed
+    with pytest.raises(LimitError, match="the matrices of a step"):
+        compile_spec(loads(log_canonical(10).replace("hamiltonian: ", f"hamiltonian: {dense} + ")))
+
+
 @pytest.mark.parametrize(
     ("text", "said", "most"),
     [
@@ -122,6 +162,7 @@ def test_a_graph_whose_hessian_is_too_large_is_given_up_before_it_is_made(monkey
         pytest.param(algebra("so(8)", 28), "compiled", 200, id="an algebra whose adjoint traces mislead"),
         pytest.param(fput(32) + "scheme: splitting\n", "compiled", 50, id="a lattice, by splitting"),
         pytest.param(algebra("so(7)", 21), "compiled", 50, id="Casimirs with very many terms"),
+        pytest.param(triangular(10), "3: ", 100, id="an inverse with very many terms"),
     ],
 )
 def test_every_stage_estimates_before_it_works(text, said, most):

@@ -11,12 +11,13 @@ from phigen.geometry.system import System
 from phigen.realisations import karasev
 from phigen.realisations.protocol import BiRealisation
 from phigen.scheme.composition import find, orders
+from phigen.scheme.estimate import newton_operations
 from phigen.scheme.generating import GeneratingFunction, collected_form, graph_form
 from phigen.scheme.order import Order
 from phigen.series.hamilton_jacobi import HamiltonJacobi
 from phigen.spec import limits
 from phigen.spec.names import FLOW_COMPOSITIONS
-from phigen.symbolic.expression import Expression, symbol, total
+from phigen.symbolic.expression import Expression, sparse_derivatives, symbol, total
 from phigen.symbolic.symbols import STEP
 
 #: Most operations in one kernel.
@@ -106,13 +107,14 @@ def discretise(
         expect_noise(system, realisation, order, composition)
     if system.forces:
         return _forced(system, realisation, series, order, composition)
+    _expect_affordable(system, realisation)
     series.reach(order.order)  # S_{k+1} = 0 is what makes a symmetric method of order k + 1: it will be proved
     if composition not in ("auto", "none"):
         return _composed(system, realisation, series, order, composition)
     possible = composition == "auto" and series.symmetric and find("auto", order.order) is not None
     possible = possible and not system.noise
     try:
-        direct = Discretisation(generating_function(system, series, order.terms), order.terms)
+        direct = Discretisation(_afforded(system, realisation, series, order.terms), order.terms)
     except LimitError:
         if not possible:
             raise
@@ -173,7 +175,30 @@ def _composed(
         place = system.locations.get(("composition",)) or system.locations.get(("order",))
         raise SpecError([Diagnostic(reason, place, "composition: none takes the series directly")])
     note = f"composition: {found.name}, {len(found.fractions)} stages of order 2"
-    return Discretisation(generating_function(system, series, 1), 1, found.fractions, note)
+    return Discretisation(_afforded(system, realisation, series, 1), 1, found.fractions, note)
+
+
+def _expect_affordable(system: System, realisation: BiRealisation) -> None:
+    """LimitError if already S_1 = H takes too much, before any other is computed."""
+    index = {c: i for i, c in enumerate(system.coordinates)}
+    (slopes,) = sparse_derivatives([system.hamiltonian], system.coordinates)
+    rows = dict(zip(slopes, sparse_derivatives(list(slopes.values()), system.coordinates), strict=True))
+    hessian = [{index[d]: e for d, e in rows.get(c, {}).items()} for c in system.coordinates]
+    _expect(system, newton_operations(realisation, {c for c in index if c not in slopes}, hessian, MOST_OPERATIONS))
+
+
+def _afforded(system: System, realisation: BiRealisation, series: HamiltonJacobi, terms: int) -> GeneratingFunction:
+    """`generating_function`, LimitError if the Newton step is too large with it."""
+    found = generating_function(system, series, terms)
+    absent = {c for c, slope in zip(system.coordinates, found.slope, strict=True) if slope.is_zero}
+    hessian = [{j: e for j, e in enumerate(row) if not e.is_zero} for row in found.hessian]
+    _expect(system, newton_operations(realisation, absent, hessian, MOST_OPERATIONS))
+    return found
+
+
+def _expect(system: System, operations: int) -> None:
+    if operations > MOST_OPERATIONS:
+        raise too_large(system, f"the matrices of a step would take more than {MOST_OPERATIONS} operations")
 
 
 def too_large(system: System, reason: str, other: str = "for scheme: splitting, ") -> LimitError:

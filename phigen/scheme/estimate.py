@@ -6,12 +6,39 @@ fifty times as long to make as to count. Here a node is its number: the same for
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 
-from phigen.symbolic.expression import Expression, fold
+from phigen.realisations.protocol import BiRealisation
+from phigen.scheme.lowering import cost
+from phigen.symbolic.expression import ZERO, Expression, fold, sparse_derivatives, substitute
+from phigen.symbolic.symbols import momentum
 
 #: A row of a matrix, without zeros.
 SparseRow = Mapping[int, Expression]
+
+
+def newton_operations(
+    realisation: BiRealisation, absent: Collection[str], hessian: Sequence[SparseRow], most: int
+) -> int:
+    """Operations of the matrices of a Newton step, see `phigen.scheme.step`; ``most`` + 1 if there are more.
+
+    ``absent`` are the coordinates on which S_h does not depend, so that their momenta are 0. It is an estimate, from
+    above 0.6 of the truth to the truth. Small systems, whose matrices cannot have so many, are not looked at.
+    """
+    names, momenta = realisation.coordinates, realisation.covector
+    if realisation.path or 4 * len(names) ** 3 <= most:
+        return 0
+    both = [*realisation.displacement, *realisation.increment]
+    rows = sparse_derivatives(substitute(both, {momentum(c): ZERO for c in absent}), momenta)
+    index = {name: k for k, name in enumerate(momenta)}
+    left = [{index[p]: e for p, e in row.items()} for row in rows]
+    state = {*names, *momenta}
+    count = OperationCount(most, lambda name: name not in state)
+    try:
+        count.matrix(left, hessian)
+    except TooManyError:
+        return most + 1
+    return count.operations + cost([e for row in left for e in row.values()])
 
 
 class TooManyError(Exception):
