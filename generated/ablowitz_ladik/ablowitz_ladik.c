@@ -21,7 +21,7 @@
  *   4. The solver
  *   5. The flows
  *   6. What is seen at sites
- * body-sha256: ef30aab01ddc2878f18075ef8c6ce4a2b3dc4cb211063f2b23a87d3c9f6c4eb5
+ * body-sha256: 7ddda1d72138c7562bb1f44c92e4fe2e30f223915850cfc673388d72b2334a1d
  */
 #include "ablowitz_ladik.h"
 
@@ -492,6 +492,7 @@ static ablowitz_ladik_status ablowitz_ladik_set_step(ablowitz_ladik_solver *s, d
 {
     if (s == NULL || !isfinite(h)) return ablowitz_ladik_BAD_ARGUMENT;
     if (s->prepared && memcmp(&h, &s->h, sizeof h) == 0) return ablowitz_ladik_OK;
+    s->open = 0;
     ablowitz_ladik_prepare_step(&s->params, h, s->coef);
     s->h = h;
     s->t_before_h = s->t;
@@ -500,8 +501,7 @@ static ablowitz_ladik_status ablowitz_ladik_set_step(ablowitz_ladik_solver *s, d
     return ablowitz_ladik_OK;
 }
 
-/* Whether all values at sites are finite. */
-static int ablowitz_ladik_holds(const ablowitz_ladik_solver *s)
+static int ablowitz_ladik_all_hold(const ablowitz_ladik_solver *s)
 {
     for (size_t k = 0; k < ablowitz_ladik_DIM; ++k)
         for (size_t r = 0; r < s->rows; ++r)
@@ -519,7 +519,7 @@ static void ablowitz_ladik_copy(double *const to[ablowitz_ladik_DIM], double *co
 
 /* ---- The flows ---- */
 /* One part of H. */
-static void ablowitz_ladik_sweep(const ablowitz_ladik_solver *s, int part, const double *coef, int far)
+static void ablowitz_ladik_sweep_part(const ablowitz_ladik_solver *s, int part, const double *coef, int far)
 {
     const size_t units = s->rows * ablowitz_ladik_pieces(s);
 #ifdef _OPENMP
@@ -535,68 +535,98 @@ static void ablowitz_ladik_sweep(const ablowitz_ladik_solver *s, int part, const
 #endif
 }
 
-/* Some steps, joined. */
-static void ablowitz_ladik_steps(const ablowitz_ladik_solver *s, int steps, int far)
+/* The flow of that number in a step; after those of a step the last and the first together. */
+static void ablowitz_ladik_flow(const ablowitz_ladik_solver *s, int flow)
+{
+    const int joined = flow == ablowitz_ladik_FLOWS, row = joined ? ablowitz_ladik_JOINED
+        : ablowitz_ladik_flow_rows[flow];
+    ablowitz_ladik_sweep_part(s, ablowitz_ladik_flow_parts[joined ? 0 : flow], s->coef + row
+        * ablowitz_ladik_ROW, s->far > 0);
+}
+
+/* Some steps, joined, without the last flow; no steps are that flow alone. */
+static void ablowitz_ladik_steps(const ablowitz_ladik_solver *s, int steps)
 {
 #ifdef _OPENMP
 #pragma omp parallel if (s->sites > 4096)
 #endif
-    for (int step = 0; step < steps; ++step) {
-        const int last = step == steps - 1;
-        if (step == 0)
-            ablowitz_ladik_sweep(s, ablowitz_ladik_flow_parts[0], s->coef + ablowitz_ladik_flow_rows[0]
-            * ablowitz_ladik_ROW, far);
-        for (int k = 1; k < ablowitz_ladik_FLOWS - 1; ++k)
-            ablowitz_ladik_sweep(s, ablowitz_ladik_flow_parts[k], s->coef + ablowitz_ladik_flow_rows[k]
-                * ablowitz_ladik_ROW, far);
-        if (ablowitz_ladik_FLOWS > 1)
-            ablowitz_ladik_sweep(s, ablowitz_ladik_flow_parts[0], s->coef
-                + (last ? ablowitz_ladik_flow_rows[ablowitz_ladik_FLOWS - 1] : ablowitz_ladik_JOINED)
-                * ablowitz_ladik_ROW, far);
-        else if (!last)
-            ablowitz_ladik_sweep(s, ablowitz_ladik_flow_parts[0], s->coef, far);
+    {
+        if (steps == 0) ablowitz_ladik_flow(s, ablowitz_ladik_FLOWS - 1);
+        for (int step = 0; step < steps; ++step) {
+            ablowitz_ladik_flow(s, ablowitz_ladik_FLOWS > 1 && (step > 0 || s->open) ? ablowitz_ladik_FLOWS
+                : 0);
+            for (int flow = 1; flow < ablowitz_ladik_FLOWS - 1; ++flow) ablowitz_ladik_flow(s, flow);
+        }
     }
 }
 
-/* Some steps; if they lead to what is not finite, none. */
-static ablowitz_ladik_status ablowitz_ladik_try(ablowitz_ladik_solver *s, int steps)
+/* Some steps from the state in s->before; if they lead to what is not finite, none. */
+static int ablowitz_ladik_try(ablowitz_ladik_solver *s, int steps)
 {
-    ablowitz_ladik_copy(s->before, s->x, s);
-    ablowitz_ladik_steps(s, steps, 1);
-    if (ablowitz_ladik_holds(s)) return ablowitz_ladik_OK;
+    ablowitz_ladik_steps(s, steps);
+    if (ablowitz_ladik_all_hold(s)) return 1;
     ablowitz_ladik_copy(s->x, s->before, s);
-    return ablowitz_ladik_NOT_FINITE;
+    return 0;
 }
 
 ablowitz_ladik_status ablowitz_ladik_integrate(ablowitz_ladik_solver *s, double h, size_t steps)
 {
-    const ablowitz_ladik_status status = ablowitz_ladik_set_step(s, h);
-    if (status != ablowitz_ladik_OK) return status;
-    for (size_t stretch = ablowitz_ladik_STRETCH; steps > 0;) {
-        const size_t now = steps < stretch ? steps : stretch;
-        const ablowitz_ladik_status tried = ablowitz_ladik_try(s, (int)now);
-        if (tried == ablowitz_ladik_OK) {
-            steps -= now;
+    ablowitz_ladik_status status = ablowitz_ladik_set_step(s, h);
+    if (status != ablowitz_ladik_OK || steps == 0) return status;
+    ablowitz_ladik_copy(s->open ? s->x : s->before, s->open ? s->before : s->x, s);
+    const size_t end = s->steps + steps;
+    for (size_t stretch = ablowitz_ladik_STRETCH; s->steps < end && status == ablowitz_ladik_OK;) {
+        size_t now = end - s->steps < stretch ? end - s->steps : stretch;
+        if (ablowitz_ladik_try(s, (int)now)) {
+            ablowitz_ladik_copy(s->before, s->x, s);
             s->steps += now;
-            s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
-        } else if (now == 1) {
-            return tried;
-        } else {
+            s->open = ablowitz_ladik_FLOWS > 1;
+        } else if (now > 1) {
             stretch = 1;
+        } else {
+            status = ablowitz_ladik_NOT_FINITE;
         }
     }
-    return ablowitz_ladik_OK;
+    if (s->open && !ablowitz_ladik_try(s, 0)) { /* the last flow of the last step, before which steps go on */
+        status = ablowitz_ladik_NOT_FINITE;
+        s->open = 0;
+        --s->steps;
+    }
+    s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
+    return status;
 }
 
 ablowitz_ladik_status ablowitz_ladik_step(ablowitz_ladik_solver *s,
     double h) { return ablowitz_ladik_integrate(s, h, 1); }
 
-void ablowitz_ladik_state(const ablowitz_ladik_solver *s, double *x)
+/* The sites of fields, without what is beside their rows. */
+static void ablowitz_ladik_take(const ablowitz_ladik_solver *s, double *const fields[ablowitz_ladik_DIM],
+    double *x)
 {
     for (size_t k = 0; k < ablowitz_ladik_DIM; ++k)
         for (size_t r = 0; r < s->rows; ++r)
-            memcpy(x + k * s->sites + r * (size_t)s->length, s->x[k] + (ptrdiff_t)r * s->width,
+            memcpy(x + k * s->sites + r * (size_t)s->length, fields[k] + (ptrdiff_t)r * s->width,
                 (size_t)s->length * sizeof *x);
+}
+
+void ablowitz_ladik_state(const ablowitz_ladik_solver *s, double *x) { ablowitz_ladik_take(s, s->x, x); }
+
+int ablowitz_ladik_saved(const ablowitz_ladik_solver *s, double *x, size_t *far)
+{
+    if (s->open) ablowitz_ladik_take(s, s->before, x);
+    *far = s->far;
+    return s->open;
+}
+
+ablowitz_ladik_status ablowitz_ladik_resume(ablowitz_ladik_solver *s, double h, const double *x, size_t far)
+{
+    const ablowitz_ladik_status status = ablowitz_ladik_set_step(s, h);
+    if (status != ablowitz_ladik_OK || !ablowitz_ladik_finite(x, ablowitz_ladik_DIM * s->sites))
+        return ablowitz_ladik_BAD_ARGUMENT;
+    for (size_t k = 0; k < ablowitz_ladik_DIM; ++k) ablowitz_ladik_put(s, s->before[k], x + k * s->sites);
+    s->open = 1;
+    s->far = far;
+    return ablowitz_ladik_OK;
 }
 
 /* ---- What is seen at sites ---- */

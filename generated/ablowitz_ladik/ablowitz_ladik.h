@@ -2,7 +2,7 @@
  * ablowitz_ladik.h: the declarations; ablowitz_ladik.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 4edaa3f7bc5ceac0b1df02916a69174c16806f336c89cdc91c00dc8c28b0d58d
+ * body-sha256: e9ba61749753b55afcbbafb23945e6e15514c7f0f7f06b80f6ce8c8102766db3
  */
 #ifndef ABLOWITZ_LADIK_H
 #define ABLOWITZ_LADIK_H
@@ -44,11 +44,13 @@ typedef struct {
     ptrdiff_t length, width; /* sites of a row; doubles between the beginnings of two rows */
     /* in rows, each field, then each parameter at sites: the first site of the first row */
     double *x[ablowitz_ladik_ARRAYS];
-    ptrdiff_t *lines;                   /* of each row, where it is and where those beside it are */
+    ptrdiff_t *lines; /* of each row, where it is and where those beside it are */
     double *before[ablowitz_ladik_DIM]; /* the fields before the steps that are being made */
-    size_t steps;                       /* good steps since ablowitz_ladik_init */
-    double t;                           /* time since ablowitz_ladik_init */
-    double h;                           /* the last step size */
+    int open; /* whether these lack the last flow of a step, which between calls x has made */
+    size_t far; /* steps to be made by functions for large arguments, where there are others */
+    size_t steps; /* good steps since ablowitz_ladik_init */
+    double t; /* time since ablowitz_ladik_init */
+    double h; /* the last step size */
     ablowitz_ladik_params params;
     double coef[ablowitz_ladik_COEFFICIENTS]; /* all that depends on params and h only */
     int prepared; /* whether coef has been computed */
@@ -67,13 +69,18 @@ ablowitz_ladik_status ablowitz_ladik_init(ablowitz_ladik_solver *s, const ablowi
     const size_t sizes[ablowitz_ladik_AXES], const double *x0, void *work);
 
 /* Steps of size h, of either sign. If one fails, the state is that before it, and s->steps counts the good
-   ones. Steps of one call are joined: where a step ends as the next begins, both are one flow. With OpenMP
-   rows are worked at in parallel, with the same bits for any number of threads. */
+   ones. Steps are joined, also those of several calls: where one ends as the next begins, both are one flow.
+   With OpenMP rows are worked at in parallel, with the same bits for any number of threads. */
 ablowitz_ladik_status ablowitz_ladik_step(ablowitz_ladik_solver *s, double h);
 ablowitz_ladik_status ablowitz_ladik_integrate(ablowitz_ladik_solver *s, double h, size_t steps);
 
 /* The state x[field][site]. */
 void ablowitz_ladik_state(const ablowitz_ladik_solver *s, double *x);
+
+/* To go on elsewhere with the same bits: if ablowitz_ladik_saved is 1, x is what the next step begins with,
+   for ablowitz_ladik_resume after ablowitz_ladik_init at the state. */
+int ablowitz_ladik_saved(const ablowitz_ladik_solver *s, double *x, size_t *far);
+ablowitz_ladik_status ablowitz_ladik_resume(ablowitz_ladik_solver *s, double h, const double *x, size_t far);
 
 /* The Hamiltonian; its density at each site; the densities out[k][site] of the Casimirs; the right-hand side
    out[field][site]. */

@@ -22,7 +22,7 @@
  *   5. The solver
  *   6. The flows
  *   7. What is seen at sites
- * body-sha256: 65c7b6bd3233d841aea8f19d750e81733b7904817e25e0448035913d27f01c1d
+ * body-sha256: 3365f5db152f87560f70e6f6a216d5827bbe7319d1244090d49a2af70b3b9ac3
  */
 #include "chiral_magnet.h"
 
@@ -1112,6 +1112,7 @@ static chiral_magnet_status chiral_magnet_set_step(chiral_magnet_solver *s, doub
 {
     if (s == NULL || !isfinite(h)) return chiral_magnet_BAD_ARGUMENT;
     if (s->prepared && memcmp(&h, &s->h, sizeof h) == 0) return chiral_magnet_OK;
+    s->open = 0;
     chiral_magnet_prepare_step(&s->params, h, s->coef);
     s->h = h;
     s->t_before_h = s->t;
@@ -1120,8 +1121,7 @@ static chiral_magnet_status chiral_magnet_set_step(chiral_magnet_solver *s, doub
     return chiral_magnet_OK;
 }
 
-/* Whether all values at sites are finite. */
-static int chiral_magnet_holds(const chiral_magnet_solver *s)
+static int chiral_magnet_all_hold(const chiral_magnet_solver *s)
 {
     for (size_t k = 0; k < chiral_magnet_DIM; ++k)
         for (size_t r = 0; r < s->rows; ++r)
@@ -1139,7 +1139,7 @@ static void chiral_magnet_copy(double *const to[chiral_magnet_DIM], double *cons
 
 /* ---- The flows ---- */
 /* One part of H, of one colour. */
-static void chiral_magnet_sweep_flow(const chiral_magnet_solver *s, int part, const double *coef, int far)
+static void chiral_magnet_sweep_colour(const chiral_magnet_solver *s, int part, const double *coef, int far)
 {
     const size_t units = s->rows * chiral_magnet_pieces(s);
 #ifdef _OPENMP
@@ -1156,78 +1156,107 @@ static void chiral_magnet_sweep_flow(const chiral_magnet_solver *s, int part, co
 }
 
 /* The first flow, those between it and the last, the last, or those between, backwards. */
-static void chiral_magnet_sweep(const chiral_magnet_solver *s, int kind, const double *coef, int far)
+static void chiral_magnet_sweep_part(const chiral_magnet_solver *s, int kind, const double *coef, int far)
 {
     const int last = s->flows - 1;
-    if (kind == 0 || kind == 2) chiral_magnet_sweep_flow(s, kind == 0 ? 0 : last, coef, far);
+    if (kind == 0 || kind == 2) chiral_magnet_sweep_colour(s, kind == 0 ? 0 : last, coef, far);
     if (kind == 1)
-        for (int flow = 1; flow < last; ++flow) chiral_magnet_sweep_flow(s, flow, coef, far);
+        for (int flow = 1; flow < last; ++flow) chiral_magnet_sweep_colour(s, flow, coef, far);
     if (kind == 3)
-        for (int flow = last - 1; flow > 0; --flow) chiral_magnet_sweep_flow(s, flow, coef, far);
+        for (int flow = last - 1; flow > 0; --flow) chiral_magnet_sweep_colour(s, flow, coef, far);
 }
 
-/* Some steps, joined. */
-static void chiral_magnet_steps(const chiral_magnet_solver *s, int steps, int far)
+/* The flow of that number in a step; after those of a step the last and the first together. */
+static void chiral_magnet_flow(const chiral_magnet_solver *s, int flow)
+{
+    const int joined = flow == chiral_magnet_FLOWS, row = joined ? chiral_magnet_JOINED
+        : chiral_magnet_flow_rows[flow];
+    chiral_magnet_sweep_part(s, chiral_magnet_flow_parts[joined ? 0 : flow], s->coef + row
+        * chiral_magnet_ROW, s->far > 0);
+}
+
+/* Some steps, joined, without the last flow; no steps are that flow alone. */
+static void chiral_magnet_steps(const chiral_magnet_solver *s, int steps)
 {
 #ifdef _OPENMP
 #pragma omp parallel if (s->sites > 4096)
 #endif
-    for (int step = 0; step < steps; ++step) {
-        const int last = step == steps - 1;
-        if (step == 0)
-            chiral_magnet_sweep(s, chiral_magnet_flow_parts[0], s->coef + chiral_magnet_flow_rows[0]
-            * chiral_magnet_ROW, far);
-        for (int k = 1; k < chiral_magnet_FLOWS - 1; ++k)
-            chiral_magnet_sweep(s, chiral_magnet_flow_parts[k], s->coef + chiral_magnet_flow_rows[k]
-                * chiral_magnet_ROW, far);
-        if (chiral_magnet_FLOWS > 1)
-            chiral_magnet_sweep(s, chiral_magnet_flow_parts[0], s->coef
-                + (last ? chiral_magnet_flow_rows[chiral_magnet_FLOWS - 1] : chiral_magnet_JOINED)
-                * chiral_magnet_ROW, far);
-        else if (!last)
-            chiral_magnet_sweep(s, chiral_magnet_flow_parts[0], s->coef, far);
+    {
+        if (steps == 0) chiral_magnet_flow(s, chiral_magnet_FLOWS - 1);
+        for (int step = 0; step < steps; ++step) {
+            chiral_magnet_flow(s, chiral_magnet_FLOWS > 1 && (step > 0 || s->open) ? chiral_magnet_FLOWS : 0);
+            for (int flow = 1; flow < chiral_magnet_FLOWS - 1; ++flow) chiral_magnet_flow(s, flow);
+        }
     }
 }
 
-/* Some steps; if they lead to what is not finite, none. */
-static chiral_magnet_status chiral_magnet_try(chiral_magnet_solver *s, int steps)
+/* Some steps from the state in s->before; if they lead to what is not finite, none. */
+static int chiral_magnet_try(chiral_magnet_solver *s, int steps)
 {
-    chiral_magnet_copy(s->before, s->x, s);
-    chiral_magnet_steps(s, steps, 1);
-    if (chiral_magnet_holds(s)) return chiral_magnet_OK;
+    chiral_magnet_steps(s, steps);
+    if (chiral_magnet_all_hold(s)) return 1;
     chiral_magnet_copy(s->x, s->before, s);
-    return chiral_magnet_NOT_FINITE;
+    return 0;
 }
 
 chiral_magnet_status chiral_magnet_integrate(chiral_magnet_solver *s, double h, size_t steps)
 {
-    const chiral_magnet_status status = chiral_magnet_set_step(s, h);
-    if (status != chiral_magnet_OK) return status;
-    for (size_t stretch = chiral_magnet_STRETCH; steps > 0;) {
-        const size_t now = steps < stretch ? steps : stretch;
-        const chiral_magnet_status tried = chiral_magnet_try(s, (int)now);
-        if (tried == chiral_magnet_OK) {
-            steps -= now;
+    chiral_magnet_status status = chiral_magnet_set_step(s, h);
+    if (status != chiral_magnet_OK || steps == 0) return status;
+    chiral_magnet_copy(s->open ? s->x : s->before, s->open ? s->before : s->x, s);
+    const size_t end = s->steps + steps;
+    for (size_t stretch = chiral_magnet_STRETCH; s->steps < end && status == chiral_magnet_OK;) {
+        size_t now = end - s->steps < stretch ? end - s->steps : stretch;
+        if (chiral_magnet_try(s, (int)now)) {
+            chiral_magnet_copy(s->before, s->x, s);
             s->steps += now;
-            s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
-        } else if (now == 1) {
-            return tried;
-        } else {
+            s->open = chiral_magnet_FLOWS > 1;
+        } else if (now > 1) {
             stretch = 1;
+        } else {
+            status = chiral_magnet_NOT_FINITE;
         }
     }
-    return chiral_magnet_OK;
+    if (s->open && !chiral_magnet_try(s, 0)) { /* the last flow of the last step, before which steps go on */
+        status = chiral_magnet_NOT_FINITE;
+        s->open = 0;
+        --s->steps;
+    }
+    s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
+    return status;
 }
 
 chiral_magnet_status chiral_magnet_step(chiral_magnet_solver *s, double h) { return chiral_magnet_integrate(s,
     h, 1); }
 
-void chiral_magnet_state(const chiral_magnet_solver *s, double *x)
+/* The sites of fields, without what is beside their rows. */
+static void chiral_magnet_take(const chiral_magnet_solver *s, double *const fields[chiral_magnet_DIM],
+    double *x)
 {
     for (size_t k = 0; k < chiral_magnet_DIM; ++k)
         for (size_t r = 0; r < s->rows; ++r)
-            memcpy(x + k * s->sites + r * (size_t)s->length, s->x[k] + (ptrdiff_t)r * s->width,
+            memcpy(x + k * s->sites + r * (size_t)s->length, fields[k] + (ptrdiff_t)r * s->width,
                 (size_t)s->length * sizeof *x);
+}
+
+void chiral_magnet_state(const chiral_magnet_solver *s, double *x) { chiral_magnet_take(s, s->x, x); }
+
+int chiral_magnet_saved(const chiral_magnet_solver *s, double *x, size_t *far)
+{
+    if (s->open) chiral_magnet_take(s, s->before, x);
+    *far = s->far;
+    return s->open;
+}
+
+chiral_magnet_status chiral_magnet_resume(chiral_magnet_solver *s, double h, const double *x, size_t far)
+{
+    const chiral_magnet_status status = chiral_magnet_set_step(s, h);
+    if (status != chiral_magnet_OK || !chiral_magnet_finite(x, chiral_magnet_DIM * s->sites))
+        return chiral_magnet_BAD_ARGUMENT;
+    for (size_t k = 0; k < chiral_magnet_DIM; ++k) chiral_magnet_put(s, s->before[k], x + k * s->sites);
+    s->open = 1;
+    s->far = far;
+    return chiral_magnet_OK;
 }
 
 /* ---- What is seen at sites ---- */

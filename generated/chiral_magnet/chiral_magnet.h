@@ -2,7 +2,7 @@
  * chiral_magnet.h: the declarations; chiral_magnet.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: b74892738bdef32b9cfa2d9f6fa5886fa92849fc867dc4014ceb6302783777b4
+ * body-sha256: f1aad23d5f0c9315646e02f9352d96dd3234da081ec3e3aeb324de99d0be9c1f
  */
 #ifndef CHIRAL_MAGNET_H
 #define CHIRAL_MAGNET_H
@@ -60,6 +60,8 @@ typedef struct {
     int *colours; /* of each site; no bond connects two sites of one colour */
     int colour_count, flows; /* colours, and flows from one end of a stage to the other */
     double *before[chiral_magnet_DIM]; /* the fields before the steps that are being made */
+    int open; /* whether these lack the last flow of a step, which between calls x has made */
+    size_t far; /* steps to be made by functions for large arguments, where there are others */
     size_t steps; /* good steps since chiral_magnet_init */
     double t; /* time since chiral_magnet_init */
     double h; /* the last step size */
@@ -89,13 +91,18 @@ chiral_magnet_status chiral_magnet_init(chiral_magnet_solver *s, const chiral_ma
     const size_t sizes[chiral_magnet_AXES], const chiral_magnet_bonds *bonds, const double *x0, void *work);
 
 /* Steps of size h, of either sign. If one fails, the state is that before it, and s->steps counts the good
-   ones. Steps of one call are joined: where a step ends as the next begins, both are one flow. With OpenMP
-   rows are worked at in parallel, with the same bits for any number of threads. */
+   ones. Steps are joined, also those of several calls: where one ends as the next begins, both are one flow.
+   With OpenMP rows are worked at in parallel, with the same bits for any number of threads. */
 chiral_magnet_status chiral_magnet_step(chiral_magnet_solver *s, double h);
 chiral_magnet_status chiral_magnet_integrate(chiral_magnet_solver *s, double h, size_t steps);
 
 /* The state x[field][site]. */
 void chiral_magnet_state(const chiral_magnet_solver *s, double *x);
+
+/* To go on elsewhere with the same bits: if chiral_magnet_saved is 1, x is what the next step begins with,
+   for chiral_magnet_resume after chiral_magnet_init at the state. */
+int chiral_magnet_saved(const chiral_magnet_solver *s, double *x, size_t *far);
+chiral_magnet_status chiral_magnet_resume(chiral_magnet_solver *s, double h, const double *x, size_t far);
 
 /* The Hamiltonian; its density at each site; the densities out[k][site] of the Casimirs; the right-hand side
    out[field][site]. */

@@ -21,7 +21,7 @@
  *   4. The solver
  *   5. The flows
  *   6. What is seen at sites
- * body-sha256: 14c6b794368f87188be8da4334cefbf7e2b18c24270a148d92af8159eedf8345
+ * body-sha256: 786e8c64416ec1a89d006cec0001e06d28718c109927a63babd60f7d8de2653f
  */
 #include "dnls.h"
 
@@ -439,6 +439,7 @@ static dnls_status dnls_set_step(dnls_solver *s, double h)
 {
     if (s == NULL || !isfinite(h)) return dnls_BAD_ARGUMENT;
     if (s->prepared && memcmp(&h, &s->h, sizeof h) == 0) return dnls_OK;
+    s->open = 0;
     dnls_prepare_step(&s->params, h, s->coef);
     s->h = h;
     s->t_before_h = s->t;
@@ -447,8 +448,7 @@ static dnls_status dnls_set_step(dnls_solver *s, double h)
     return dnls_OK;
 }
 
-/* Whether all values at sites are finite. */
-static int dnls_holds(const dnls_solver *s)
+static int dnls_all_hold(const dnls_solver *s)
 {
     for (size_t k = 0; k < dnls_DIM; ++k)
         for (size_t r = 0; r < s->rows; ++r)
@@ -464,7 +464,7 @@ static void dnls_copy(double *const to[dnls_DIM], double *const from[dnls_DIM], 
 
 /* ---- The flows ---- */
 /* One part of H. */
-static void dnls_sweep(const dnls_solver *s, int part, const double *coef, int far)
+static void dnls_sweep_part(const dnls_solver *s, int part, const double *coef, int far)
 {
     const size_t units = s->rows * dnls_pieces(s);
 #ifdef _OPENMP
@@ -480,63 +480,92 @@ static void dnls_sweep(const dnls_solver *s, int part, const double *coef, int f
 #endif
 }
 
-/* Some steps, joined. */
-static void dnls_steps(const dnls_solver *s, int steps, int far)
+/* The flow of that number in a step; after those of a step the last and the first together. */
+static void dnls_flow(const dnls_solver *s, int flow)
+{
+    const int joined = flow == dnls_FLOWS, row = joined ? dnls_JOINED : dnls_flow_rows[flow];
+    dnls_sweep_part(s, dnls_flow_parts[joined ? 0 : flow], s->coef + row * dnls_ROW, s->far > 0);
+}
+
+/* Some steps, joined, without the last flow; no steps are that flow alone. */
+static void dnls_steps(const dnls_solver *s, int steps)
 {
 #ifdef _OPENMP
 #pragma omp parallel if (s->sites > 4096)
 #endif
-    for (int step = 0; step < steps; ++step) {
-        const int last = step == steps - 1;
-        if (step == 0) dnls_sweep(s, dnls_flow_parts[0], s->coef + dnls_flow_rows[0] * dnls_ROW, far);
-        for (int k = 1; k < dnls_FLOWS - 1; ++k)
-            dnls_sweep(s, dnls_flow_parts[k], s->coef + dnls_flow_rows[k] * dnls_ROW, far);
-        if (dnls_FLOWS > 1)
-            dnls_sweep(s, dnls_flow_parts[0], s->coef + (last ? dnls_flow_rows[dnls_FLOWS - 1] : dnls_JOINED)
-                * dnls_ROW, far);
-        else if (!last)
-            dnls_sweep(s, dnls_flow_parts[0], s->coef, far);
+    {
+        if (steps == 0) dnls_flow(s, dnls_FLOWS - 1);
+        for (int step = 0; step < steps; ++step) {
+            dnls_flow(s, dnls_FLOWS > 1 && (step > 0 || s->open) ? dnls_FLOWS : 0);
+            for (int flow = 1; flow < dnls_FLOWS - 1; ++flow) dnls_flow(s, flow);
+        }
     }
 }
 
-/* Some steps; if they lead to what is not finite, none. */
-static dnls_status dnls_try(dnls_solver *s, int steps)
+/* Some steps from the state in s->before; if they lead to what is not finite, none. */
+static int dnls_try(dnls_solver *s, int steps)
 {
-    dnls_copy(s->before, s->x, s);
-    dnls_steps(s, steps, 1);
-    if (dnls_holds(s)) return dnls_OK;
+    dnls_steps(s, steps);
+    if (dnls_all_hold(s)) return 1;
     dnls_copy(s->x, s->before, s);
-    return dnls_NOT_FINITE;
+    return 0;
 }
 
 dnls_status dnls_integrate(dnls_solver *s, double h, size_t steps)
 {
-    const dnls_status status = dnls_set_step(s, h);
-    if (status != dnls_OK) return status;
-    for (size_t stretch = dnls_STRETCH; steps > 0;) {
-        const size_t now = steps < stretch ? steps : stretch;
-        const dnls_status tried = dnls_try(s, (int)now);
-        if (tried == dnls_OK) {
-            steps -= now;
+    dnls_status status = dnls_set_step(s, h);
+    if (status != dnls_OK || steps == 0) return status;
+    dnls_copy(s->open ? s->x : s->before, s->open ? s->before : s->x, s);
+    const size_t end = s->steps + steps;
+    for (size_t stretch = dnls_STRETCH; s->steps < end && status == dnls_OK;) {
+        size_t now = end - s->steps < stretch ? end - s->steps : stretch;
+        if (dnls_try(s, (int)now)) {
+            dnls_copy(s->before, s->x, s);
             s->steps += now;
-            s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
-        } else if (now == 1) {
-            return tried;
-        } else {
+            s->open = dnls_FLOWS > 1;
+        } else if (now > 1) {
             stretch = 1;
+        } else {
+            status = dnls_NOT_FINITE;
         }
     }
-    return dnls_OK;
+    if (s->open && !dnls_try(s, 0)) { /* the last flow of the last step, before which steps go on */
+        status = dnls_NOT_FINITE;
+        s->open = 0;
+        --s->steps;
+    }
+    s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
+    return status;
 }
 
 dnls_status dnls_step(dnls_solver *s, double h) { return dnls_integrate(s, h, 1); }
 
-void dnls_state(const dnls_solver *s, double *x)
+/* The sites of fields, without what is beside their rows. */
+static void dnls_take(const dnls_solver *s, double *const fields[dnls_DIM], double *x)
 {
     for (size_t k = 0; k < dnls_DIM; ++k)
         for (size_t r = 0; r < s->rows; ++r)
-            memcpy(x + k * s->sites + r * (size_t)s->length, s->x[k] + (ptrdiff_t)r * s->width,
+            memcpy(x + k * s->sites + r * (size_t)s->length, fields[k] + (ptrdiff_t)r * s->width,
                 (size_t)s->length * sizeof *x);
+}
+
+void dnls_state(const dnls_solver *s, double *x) { dnls_take(s, s->x, x); }
+
+int dnls_saved(const dnls_solver *s, double *x, size_t *far)
+{
+    if (s->open) dnls_take(s, s->before, x);
+    *far = s->far;
+    return s->open;
+}
+
+dnls_status dnls_resume(dnls_solver *s, double h, const double *x, size_t far)
+{
+    const dnls_status status = dnls_set_step(s, h);
+    if (status != dnls_OK || !dnls_finite(x, dnls_DIM * s->sites)) return dnls_BAD_ARGUMENT;
+    for (size_t k = 0; k < dnls_DIM; ++k) dnls_put(s, s->before[k], x + k * s->sites);
+    s->open = 1;
+    s->far = far;
+    return dnls_OK;
 }
 
 /* ---- What is seen at sites ---- */

@@ -2,7 +2,7 @@
  * dnls.h: the declarations; dnls.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: dc9785a2d6f9607c8345412ccb409b2094a40a8a656673eddc78006bc926c03f
+ * body-sha256: eb9a422330c2a25a4173c11b2958bec8d22b5429ca9239944281170e839a81cd
  */
 #ifndef DNLS_H
 #define DNLS_H
@@ -45,6 +45,8 @@ typedef struct {
     double *x[dnls_ARRAYS];
     ptrdiff_t *lines;         /* of each row, where it is and where those beside it are */
     double *before[dnls_DIM]; /* the fields before the steps that are being made */
+    int open;                 /* whether these lack the last flow of a step, which between calls x has made */
+    size_t far;               /* steps to be made by functions for large arguments, where there are others */
     size_t steps;             /* good steps since dnls_init */
     double t;                 /* time since dnls_init */
     double h;                 /* the last step size */
@@ -65,13 +67,18 @@ dnls_status dnls_init(dnls_solver *s, const dnls_params *params, const size_t si
     const double *x0, void *work);
 
 /* Steps of size h, of either sign. If one fails, the state is that before it, and s->steps counts the good
-   ones. Steps of one call are joined: where a step ends as the next begins, both are one flow. With OpenMP
-   rows are worked at in parallel, with the same bits for any number of threads. */
+   ones. Steps are joined, also those of several calls: where one ends as the next begins, both are one flow.
+   With OpenMP rows are worked at in parallel, with the same bits for any number of threads. */
 dnls_status dnls_step(dnls_solver *s, double h);
 dnls_status dnls_integrate(dnls_solver *s, double h, size_t steps);
 
 /* The state x[field][site]. */
 void dnls_state(const dnls_solver *s, double *x);
+
+/* To go on elsewhere with the same bits: if dnls_saved is 1, x is what the next step begins with, for
+   dnls_resume after dnls_init at the state. */
+int dnls_saved(const dnls_solver *s, double *x, size_t *far);
+dnls_status dnls_resume(dnls_solver *s, double h, const double *x, size_t far);
 
 /* The Hamiltonian; its density at each site; the densities out[k][site] of the Casimirs; the right-hand side
    out[field][site]. */

@@ -21,7 +21,7 @@
  *   4. The solver
  *   5. The flows
  *   6. What is seen at sites
- * body-sha256: 672444833cb1edc1217728814d103068a6638057f83847ba544777ead3c5e684
+ * body-sha256: ec9b75f76c6cd0408f910cf4344caa56e810a46a2e425bb92d559c832925eff5
  */
 #include "dnls_disorder.h"
 
@@ -508,6 +508,7 @@ static dnls_disorder_status dnls_disorder_set_step(dnls_disorder_solver *s, doub
 {
     if (s == NULL || !isfinite(h)) return dnls_disorder_BAD_ARGUMENT;
     if (s->prepared && memcmp(&h, &s->h, sizeof h) == 0) return dnls_disorder_OK;
+    s->open = 0;
     dnls_disorder_prepare_step(&s->params, h, s->coef);
     s->h = h;
     s->t_before_h = s->t;
@@ -516,8 +517,7 @@ static dnls_disorder_status dnls_disorder_set_step(dnls_disorder_solver *s, doub
     return dnls_disorder_OK;
 }
 
-/* Whether all values at sites are finite. */
-static int dnls_disorder_holds(const dnls_disorder_solver *s)
+static int dnls_disorder_all_hold(const dnls_disorder_solver *s)
 {
     for (size_t k = 0; k < dnls_disorder_DIM; ++k)
         for (size_t r = 0; r < s->rows; ++r)
@@ -535,7 +535,7 @@ static void dnls_disorder_copy(double *const to[dnls_disorder_DIM], double *cons
 
 /* ---- The flows ---- */
 /* One part of H. */
-static void dnls_disorder_sweep(const dnls_disorder_solver *s, int part, const double *coef, int far)
+static void dnls_disorder_sweep_part(const dnls_disorder_solver *s, int part, const double *coef, int far)
 {
     const size_t units = s->rows * dnls_disorder_pieces(s);
 #ifdef _OPENMP
@@ -551,68 +551,97 @@ static void dnls_disorder_sweep(const dnls_disorder_solver *s, int part, const d
 #endif
 }
 
-/* Some steps, joined. */
-static void dnls_disorder_steps(const dnls_disorder_solver *s, int steps, int far)
+/* The flow of that number in a step; after those of a step the last and the first together. */
+static void dnls_disorder_flow(const dnls_disorder_solver *s, int flow)
+{
+    const int joined = flow == dnls_disorder_FLOWS, row = joined ? dnls_disorder_JOINED
+        : dnls_disorder_flow_rows[flow];
+    dnls_disorder_sweep_part(s, dnls_disorder_flow_parts[joined ? 0 : flow], s->coef + row
+        * dnls_disorder_ROW, s->far > 0);
+}
+
+/* Some steps, joined, without the last flow; no steps are that flow alone. */
+static void dnls_disorder_steps(const dnls_disorder_solver *s, int steps)
 {
 #ifdef _OPENMP
 #pragma omp parallel if (s->sites > 4096)
 #endif
-    for (int step = 0; step < steps; ++step) {
-        const int last = step == steps - 1;
-        if (step == 0)
-            dnls_disorder_sweep(s, dnls_disorder_flow_parts[0], s->coef + dnls_disorder_flow_rows[0]
-            * dnls_disorder_ROW, far);
-        for (int k = 1; k < dnls_disorder_FLOWS - 1; ++k)
-            dnls_disorder_sweep(s, dnls_disorder_flow_parts[k], s->coef + dnls_disorder_flow_rows[k]
-                * dnls_disorder_ROW, far);
-        if (dnls_disorder_FLOWS > 1)
-            dnls_disorder_sweep(s, dnls_disorder_flow_parts[0], s->coef
-                + (last ? dnls_disorder_flow_rows[dnls_disorder_FLOWS - 1] : dnls_disorder_JOINED)
-                * dnls_disorder_ROW, far);
-        else if (!last)
-            dnls_disorder_sweep(s, dnls_disorder_flow_parts[0], s->coef, far);
+    {
+        if (steps == 0) dnls_disorder_flow(s, dnls_disorder_FLOWS - 1);
+        for (int step = 0; step < steps; ++step) {
+            dnls_disorder_flow(s, dnls_disorder_FLOWS > 1 && (step > 0 || s->open) ? dnls_disorder_FLOWS : 0);
+            for (int flow = 1; flow < dnls_disorder_FLOWS - 1; ++flow) dnls_disorder_flow(s, flow);
+        }
     }
 }
 
-/* Some steps; if they lead to what is not finite, none. */
-static dnls_disorder_status dnls_disorder_try(dnls_disorder_solver *s, int steps)
+/* Some steps from the state in s->before; if they lead to what is not finite, none. */
+static int dnls_disorder_try(dnls_disorder_solver *s, int steps)
 {
-    dnls_disorder_copy(s->before, s->x, s);
-    dnls_disorder_steps(s, steps, 1);
-    if (dnls_disorder_holds(s)) return dnls_disorder_OK;
+    dnls_disorder_steps(s, steps);
+    if (dnls_disorder_all_hold(s)) return 1;
     dnls_disorder_copy(s->x, s->before, s);
-    return dnls_disorder_NOT_FINITE;
+    return 0;
 }
 
 dnls_disorder_status dnls_disorder_integrate(dnls_disorder_solver *s, double h, size_t steps)
 {
-    const dnls_disorder_status status = dnls_disorder_set_step(s, h);
-    if (status != dnls_disorder_OK) return status;
-    for (size_t stretch = dnls_disorder_STRETCH; steps > 0;) {
-        const size_t now = steps < stretch ? steps : stretch;
-        const dnls_disorder_status tried = dnls_disorder_try(s, (int)now);
-        if (tried == dnls_disorder_OK) {
-            steps -= now;
+    dnls_disorder_status status = dnls_disorder_set_step(s, h);
+    if (status != dnls_disorder_OK || steps == 0) return status;
+    dnls_disorder_copy(s->open ? s->x : s->before, s->open ? s->before : s->x, s);
+    const size_t end = s->steps + steps;
+    for (size_t stretch = dnls_disorder_STRETCH; s->steps < end && status == dnls_disorder_OK;) {
+        size_t now = end - s->steps < stretch ? end - s->steps : stretch;
+        if (dnls_disorder_try(s, (int)now)) {
+            dnls_disorder_copy(s->before, s->x, s);
             s->steps += now;
-            s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
-        } else if (now == 1) {
-            return tried;
-        } else {
+            s->open = dnls_disorder_FLOWS > 1;
+        } else if (now > 1) {
             stretch = 1;
+        } else {
+            status = dnls_disorder_NOT_FINITE;
         }
     }
-    return dnls_disorder_OK;
+    if (s->open && !dnls_disorder_try(s, 0)) { /* the last flow of the last step, before which steps go on */
+        status = dnls_disorder_NOT_FINITE;
+        s->open = 0;
+        --s->steps;
+    }
+    s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
+    return status;
 }
 
 dnls_disorder_status dnls_disorder_step(dnls_disorder_solver *s, double h) { return dnls_disorder_integrate(s,
     h, 1); }
 
-void dnls_disorder_state(const dnls_disorder_solver *s, double *x)
+/* The sites of fields, without what is beside their rows. */
+static void dnls_disorder_take(const dnls_disorder_solver *s, double *const fields[dnls_disorder_DIM],
+    double *x)
 {
     for (size_t k = 0; k < dnls_disorder_DIM; ++k)
         for (size_t r = 0; r < s->rows; ++r)
-            memcpy(x + k * s->sites + r * (size_t)s->length, s->x[k] + (ptrdiff_t)r * s->width,
+            memcpy(x + k * s->sites + r * (size_t)s->length, fields[k] + (ptrdiff_t)r * s->width,
                 (size_t)s->length * sizeof *x);
+}
+
+void dnls_disorder_state(const dnls_disorder_solver *s, double *x) { dnls_disorder_take(s, s->x, x); }
+
+int dnls_disorder_saved(const dnls_disorder_solver *s, double *x, size_t *far)
+{
+    if (s->open) dnls_disorder_take(s, s->before, x);
+    *far = s->far;
+    return s->open;
+}
+
+dnls_disorder_status dnls_disorder_resume(dnls_disorder_solver *s, double h, const double *x, size_t far)
+{
+    const dnls_disorder_status status = dnls_disorder_set_step(s, h);
+    if (status != dnls_disorder_OK || !dnls_disorder_finite(x, dnls_disorder_DIM * s->sites))
+        return dnls_disorder_BAD_ARGUMENT;
+    for (size_t k = 0; k < dnls_disorder_DIM; ++k) dnls_disorder_put(s, s->before[k], x + k * s->sites);
+    s->open = 1;
+    s->far = far;
+    return dnls_disorder_OK;
 }
 
 /* ---- What is seen at sites ---- */

@@ -2,7 +2,7 @@
  * dnls_disorder.h: the declarations; dnls_disorder.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 5b8a8da954fc31643ad2e62f4bce6e5a407d6b668e182822833b510b496b86b6
+ * body-sha256: eaed40e032f579125d3b050f83d7cf06432981cd059af0d34d898f0c48a68747
  */
 #ifndef DNLS_DISORDER_H
 #define DNLS_DISORDER_H
@@ -45,11 +45,13 @@ typedef struct {
     ptrdiff_t length, width; /* sites of a row; doubles between the beginnings of two rows */
     /* in rows, each field, then each parameter at sites: the first site of the first row */
     double *x[dnls_disorder_ARRAYS];
-    ptrdiff_t *lines;                  /* of each row, where it is and where those beside it are */
+    ptrdiff_t *lines; /* of each row, where it is and where those beside it are */
     double *before[dnls_disorder_DIM]; /* the fields before the steps that are being made */
-    size_t steps;                      /* good steps since dnls_disorder_init */
-    double t;                          /* time since dnls_disorder_init */
-    double h;                          /* the last step size */
+    int open; /* whether these lack the last flow of a step, which between calls x has made */
+    size_t far; /* steps to be made by functions for large arguments, where there are others */
+    size_t steps; /* good steps since dnls_disorder_init */
+    double t; /* time since dnls_disorder_init */
+    double h; /* the last step size */
     dnls_disorder_params params;
     double coef[dnls_disorder_COEFFICIENTS]; /* all that depends on params and h only */
     int prepared; /* whether coef has been computed */
@@ -68,13 +70,18 @@ dnls_disorder_status dnls_disorder_init(dnls_disorder_solver *s, const dnls_diso
     const size_t sizes[dnls_disorder_AXES], const double *x0, void *work);
 
 /* Steps of size h, of either sign. If one fails, the state is that before it, and s->steps counts the good
-   ones. Steps of one call are joined: where a step ends as the next begins, both are one flow. With OpenMP
-   rows are worked at in parallel, with the same bits for any number of threads. */
+   ones. Steps are joined, also those of several calls: where one ends as the next begins, both are one flow.
+   With OpenMP rows are worked at in parallel, with the same bits for any number of threads. */
 dnls_disorder_status dnls_disorder_step(dnls_disorder_solver *s, double h);
 dnls_disorder_status dnls_disorder_integrate(dnls_disorder_solver *s, double h, size_t steps);
 
 /* The state x[field][site]. */
 void dnls_disorder_state(const dnls_disorder_solver *s, double *x);
+
+/* To go on elsewhere with the same bits: if dnls_disorder_saved is 1, x is what the next step begins with,
+   for dnls_disorder_resume after dnls_disorder_init at the state. */
+int dnls_disorder_saved(const dnls_disorder_solver *s, double *x, size_t *far);
+dnls_disorder_status dnls_disorder_resume(dnls_disorder_solver *s, double h, const double *x, size_t far);
 
 /* The Hamiltonian; its density at each site; the densities out[k][site] of the Casimirs; the right-hand side
    out[field][site]. */

@@ -22,7 +22,7 @@
  *   5. The solver
  *   6. The flows
  *   7. What is seen at sites
- * body-sha256: 2fec9ae814c897141e295070b31abc4fdca5cd7abcf6b287e8516af73247abf1
+ * body-sha256: 8606b2b3d82aa488eca7761fbce7a25343e0c1f9e7b0cb6d8d250ded4e4efadb
  */
 #include "food_web.h"
 
@@ -633,6 +633,7 @@ static food_web_status food_web_set_step(food_web_solver *s, double h)
 {
     if (s == NULL || !isfinite(h)) return food_web_BAD_ARGUMENT;
     if (s->prepared && memcmp(&h, &s->h, sizeof h) == 0) return food_web_OK;
+    s->open = 0;
     food_web_prepare_step(&s->params, h, s->coef);
     s->h = h;
     s->t_before_h = s->t;
@@ -641,8 +642,7 @@ static food_web_status food_web_set_step(food_web_solver *s, double h)
     return food_web_OK;
 }
 
-/* Whether all values at sites are finite. */
-static int food_web_holds(const food_web_solver *s)
+static int food_web_all_hold(const food_web_solver *s)
 {
     for (size_t k = 0; k < food_web_DIM; ++k)
         for (size_t r = 0; r < s->rows; ++r)
@@ -659,7 +659,7 @@ static void food_web_copy(double *const to[food_web_DIM], double *const from[foo
 
 /* ---- The flows ---- */
 /* One part of H, of one colour. */
-static void food_web_sweep_flow(const food_web_solver *s, int part, const double *coef, int far)
+static void food_web_sweep_colour(const food_web_solver *s, int part, const double *coef, int far)
 {
     const size_t units = s->rows * food_web_pieces(s);
 #ifdef _OPENMP
@@ -676,74 +676,102 @@ static void food_web_sweep_flow(const food_web_solver *s, int part, const double
 }
 
 /* The first flow, those between it and the last, the last, or those between, backwards. */
-static void food_web_sweep(const food_web_solver *s, int kind, const double *coef, int far)
+static void food_web_sweep_part(const food_web_solver *s, int kind, const double *coef, int far)
 {
     const int last = s->flows - 1;
-    if (kind == 0 || kind == 2) food_web_sweep_flow(s, kind == 0 ? 0 : last, coef, far);
+    if (kind == 0 || kind == 2) food_web_sweep_colour(s, kind == 0 ? 0 : last, coef, far);
     if (kind == 1)
-        for (int flow = 1; flow < last; ++flow) food_web_sweep_flow(s, flow, coef, far);
+        for (int flow = 1; flow < last; ++flow) food_web_sweep_colour(s, flow, coef, far);
     if (kind == 3)
-        for (int flow = last - 1; flow > 0; --flow) food_web_sweep_flow(s, flow, coef, far);
+        for (int flow = last - 1; flow > 0; --flow) food_web_sweep_colour(s, flow, coef, far);
 }
 
-/* Some steps, joined. */
-static void food_web_steps(const food_web_solver *s, int steps, int far)
+/* The flow of that number in a step; after those of a step the last and the first together. */
+static void food_web_flow(const food_web_solver *s, int flow)
+{
+    const int joined = flow == food_web_FLOWS, row = joined ? food_web_JOINED : food_web_flow_rows[flow];
+    food_web_sweep_part(s, food_web_flow_parts[joined ? 0 : flow], s->coef + row * food_web_ROW, s->far > 0);
+}
+
+/* Some steps, joined, without the last flow; no steps are that flow alone. */
+static void food_web_steps(const food_web_solver *s, int steps)
 {
 #ifdef _OPENMP
 #pragma omp parallel if (s->sites > 4096)
 #endif
-    for (int step = 0; step < steps; ++step) {
-        const int last = step == steps - 1;
-        if (step == 0)
-            food_web_sweep(s, food_web_flow_parts[0], s->coef + food_web_flow_rows[0] * food_web_ROW, far);
-        for (int k = 1; k < food_web_FLOWS - 1; ++k)
-            food_web_sweep(s, food_web_flow_parts[k], s->coef + food_web_flow_rows[k] * food_web_ROW, far);
-        if (food_web_FLOWS > 1)
-            food_web_sweep(s, food_web_flow_parts[0], s->coef + (last ? food_web_flow_rows[food_web_FLOWS - 1]
-                : food_web_JOINED) * food_web_ROW, far);
-        else if (!last)
-            food_web_sweep(s, food_web_flow_parts[0], s->coef, far);
+    {
+        if (steps == 0) food_web_flow(s, food_web_FLOWS - 1);
+        for (int step = 0; step < steps; ++step) {
+            food_web_flow(s, food_web_FLOWS > 1 && (step > 0 || s->open) ? food_web_FLOWS : 0);
+            for (int flow = 1; flow < food_web_FLOWS - 1; ++flow) food_web_flow(s, flow);
+        }
     }
 }
 
-/* Some steps; if they lead to what is not finite, none. */
-static food_web_status food_web_try(food_web_solver *s, int steps)
+/* Some steps from the state in s->before; if they lead to what is not finite, none. */
+static int food_web_try(food_web_solver *s, int steps)
 {
-    food_web_copy(s->before, s->x, s);
-    food_web_steps(s, steps, 1);
-    if (food_web_holds(s)) return food_web_OK;
+    food_web_steps(s, steps);
+    if (food_web_all_hold(s)) return 1;
     food_web_copy(s->x, s->before, s);
-    return food_web_NOT_FINITE;
+    return 0;
 }
 
 food_web_status food_web_integrate(food_web_solver *s, double h, size_t steps)
 {
-    const food_web_status status = food_web_set_step(s, h);
-    if (status != food_web_OK) return status;
-    for (size_t stretch = food_web_STRETCH; steps > 0;) {
-        const size_t now = steps < stretch ? steps : stretch;
-        const food_web_status tried = food_web_try(s, (int)now);
-        if (tried == food_web_OK) {
-            steps -= now;
+    food_web_status status = food_web_set_step(s, h);
+    if (status != food_web_OK || steps == 0) return status;
+    food_web_copy(s->open ? s->x : s->before, s->open ? s->before : s->x, s);
+    const size_t end = s->steps + steps;
+    for (size_t stretch = food_web_STRETCH; s->steps < end && status == food_web_OK;) {
+        size_t now = end - s->steps < stretch ? end - s->steps : stretch;
+        if (food_web_try(s, (int)now)) {
+            food_web_copy(s->before, s->x, s);
             s->steps += now;
-            s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
-        } else if (now == 1) {
-            return tried;
-        } else {
+            s->open = food_web_FLOWS > 1;
+        } else if (now > 1) {
             stretch = 1;
+        } else {
+            status = food_web_NOT_FINITE;
         }
     }
-    return food_web_OK;
+    if (s->open && !food_web_try(s, 0)) { /* the last flow of the last step, before which steps go on */
+        status = food_web_NOT_FINITE;
+        s->open = 0;
+        --s->steps;
+    }
+    s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
+    return status;
 }
 
 food_web_status food_web_step(food_web_solver *s, double h) { return food_web_integrate(s, h, 1); }
 
-void food_web_state(const food_web_solver *s, double *x)
+/* The sites of fields, without what is beside their rows. */
+static void food_web_take(const food_web_solver *s, double *const fields[food_web_DIM], double *x)
 {
     for (size_t k = 0; k < food_web_DIM; ++k)
         for (size_t r = 0; r < s->rows; ++r)
-            memcpy(x + k * s->sites + r * (size_t)s->length, s->x[k] + (ptrdiff_t)r * s->width,
+            memcpy(x + k * s->sites + r * (size_t)s->length, fields[k] + (ptrdiff_t)r * s->width,
                 (size_t)s->length * sizeof *x);
+}
+
+void food_web_state(const food_web_solver *s, double *x) { food_web_take(s, s->x, x); }
+
+int food_web_saved(const food_web_solver *s, double *x, size_t *far)
+{
+    if (s->open) food_web_take(s, s->before, x);
+    *far = s->far;
+    return s->open;
+}
+
+food_web_status food_web_resume(food_web_solver *s, double h, const double *x, size_t far)
+{
+    const food_web_status status = food_web_set_step(s, h);
+    if (status != food_web_OK || !food_web_finite(x, food_web_DIM * s->sites)) return food_web_BAD_ARGUMENT;
+    for (size_t k = 0; k < food_web_DIM; ++k) food_web_put(s, s->before[k], x + k * s->sites);
+    s->open = 1;
+    s->far = far;
+    return food_web_OK;
 }
 
 /* ---- What is seen at sites ---- */

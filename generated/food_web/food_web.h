@@ -2,7 +2,7 @@
  * food_web.h: the declarations; food_web.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 93a42880c43a291976ee903d133579180eeed2afacd93d61079350c80c3e4251
+ * body-sha256: 5d227a55aa5fe676ee2dab7c9369269a7f4f65a57ec47de1eb6c1479a045dc2a
  */
 #ifndef FOOD_WEB_H
 #define FOOD_WEB_H
@@ -55,6 +55,8 @@ typedef struct {
     int *colours; /* of each site; no bond connects two sites of one colour */
     int colour_count, flows; /* colours, and flows from one end of a stage to the other */
     double *before[food_web_DIM]; /* the fields before the steps that are being made */
+    int open; /* whether these lack the last flow of a step, which between calls x has made */
+    size_t far; /* steps to be made by functions for large arguments, where there are others */
     size_t steps; /* good steps since food_web_init */
     double t; /* time since food_web_init */
     double h; /* the last step size */
@@ -84,13 +86,18 @@ food_web_status food_web_init(food_web_solver *s, const food_web_params *params,
     const size_t sizes[food_web_AXES], const food_web_bonds *bonds, const double *x0, void *work);
 
 /* Steps of size h, of either sign. If one fails, the state is that before it, and s->steps counts the good
-   ones. Steps of one call are joined: where a step ends as the next begins, both are one flow. With OpenMP
-   rows are worked at in parallel, with the same bits for any number of threads. */
+   ones. Steps are joined, also those of several calls: where one ends as the next begins, both are one flow.
+   With OpenMP rows are worked at in parallel, with the same bits for any number of threads. */
 food_web_status food_web_step(food_web_solver *s, double h);
 food_web_status food_web_integrate(food_web_solver *s, double h, size_t steps);
 
 /* The state x[field][site]. */
 void food_web_state(const food_web_solver *s, double *x);
+
+/* To go on elsewhere with the same bits: if food_web_saved is 1, x is what the next step begins with, for
+   food_web_resume after food_web_init at the state. */
+int food_web_saved(const food_web_solver *s, double *x, size_t *far);
+food_web_status food_web_resume(food_web_solver *s, double h, const double *x, size_t far);
 
 /* The Hamiltonian; its density at each site; the densities out[k][site] of the Casimirs; the right-hand side
    out[field][site]. */

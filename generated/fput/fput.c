@@ -21,7 +21,8 @@
  *   4. The solver
  *   5. The flows
  *   6. What is seen at sites
- * body-sha256: 5c8486b5508295d01d8edc72aa9d8475c2f674b2b0c3d060bf5a81a476405071
+ *   7. Steps by hand
+ * body-sha256: d1585dc196ba282e6f9542aa9d7f41ba10ab464bb17c0d3c5a6be2d2c76f0a6b
  */
 #include "fput.h"
 
@@ -58,6 +59,10 @@ static const double fput_times[fput_ROWS_OF_FLOWS] = { 0.08298440641740498, 0.24
 /* The flows of one step: the part of H of each, and its row of coefficients. */
 static const unsigned char fput_flow_parts[fput_FLOWS] = { 1, 2, 1, 2, 1, 2, 1, 2, 1, 2, 1, 2, 1 };
 static const unsigned char fput_flow_rows[fput_FLOWS] = { 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12 };
+
+/* Of each part of H the planes behind and ahead that are read, the fields that are read there, and those
+   changed. */
+static const fput_stage fput_stages_of[] = { { 1, 1, 1, 2 }, { 0, 0, 0, 1 } };
 
 /* Whether all parameters are finite, and positive where they have to be. */
 static int fput_allowed(const fput_params *params, size_t sites)
@@ -145,6 +150,8 @@ static inline fput_piece fput_piece_of(const fput_solver *s, size_t unit)
     fput_locate(s, index, &piece.row);
     piece.from = (ptrdiff_t)part * fput_PIECE;
     piece.to = part == pieces - 1 ? s->length : piece.from + fput_PIECE;
+    if (piece.from < s->from) piece.from = s->from;
+    if (piece.to > s->to) piece.to = s->to;
     return piece;
 }
 
@@ -173,6 +180,7 @@ static void fput_part1(
     (void)far;
     for (size_t unit = first; unit < end; ++unit) {
         const fput_piece at = fput_piece_of(s, unit);
+        if (at.from >= at.to) continue;
         fput_sweep1(coef, &at.row, at.from, at.to);
         fput_ends(s->x[1] + at.row.at[0], s->length, at.from, at.to);
     }
@@ -198,6 +206,7 @@ static void fput_part2(
     (void)far;
     for (size_t unit = first; unit < end; ++unit) {
         const fput_piece at = fput_piece_of(s, unit);
+        if (at.from >= at.to) continue;
         fput_sweep2(coef, &at.row, at.from, at.to);
         fput_ends(s->x[0] + at.row.at[0], s->length, at.from, at.to);
     }
@@ -367,6 +376,7 @@ fput_status fput_init(fput_solver *s, const fput_params *params, const size_t si
     s->sites = sites;
     s->rows = rows;
     s->length = (ptrdiff_t)length;
+    s->to = s->length;
     s->width = width;
     s->params = own;
     double *aligned = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64) + fput_LEAD;
@@ -384,6 +394,7 @@ static fput_status fput_set_step(fput_solver *s, double h)
 {
     if (s == NULL || !isfinite(h)) return fput_BAD_ARGUMENT;
     if (s->prepared && memcmp(&h, &s->h, sizeof h) == 0) return fput_OK;
+    s->open = 0;
     fput_prepare_step(&s->params, h, s->coef);
     s->h = h;
     s->t_before_h = s->t;
@@ -392,8 +403,7 @@ static fput_status fput_set_step(fput_solver *s, double h)
     return fput_OK;
 }
 
-/* Whether all values at sites are finite. */
-static int fput_holds(const fput_solver *s)
+static int fput_all_hold(const fput_solver *s)
 {
     for (size_t k = 0; k < fput_DIM; ++k)
         for (size_t r = 0; r < s->rows; ++r)
@@ -409,7 +419,7 @@ static void fput_copy(double *const to[fput_DIM], double *const from[fput_DIM], 
 
 /* ---- The flows ---- */
 /* One part of H. */
-static void fput_sweep(const fput_solver *s, int part, const double *coef, int far)
+static void fput_sweep_part(const fput_solver *s, int part, const double *coef, int far)
 {
     const size_t units = s->rows * fput_pieces(s);
 #ifdef _OPENMP
@@ -425,63 +435,92 @@ static void fput_sweep(const fput_solver *s, int part, const double *coef, int f
 #endif
 }
 
-/* Some steps, joined. */
-static void fput_steps(const fput_solver *s, int steps, int far)
+/* The flow of that number in a step; after those of a step the last and the first together. */
+static void fput_flow(const fput_solver *s, int flow)
+{
+    const int joined = flow == fput_FLOWS, row = joined ? fput_JOINED : fput_flow_rows[flow];
+    fput_sweep_part(s, fput_flow_parts[joined ? 0 : flow], s->coef + row * fput_ROW, s->far > 0);
+}
+
+/* Some steps, joined, without the last flow; no steps are that flow alone. */
+static void fput_steps(const fput_solver *s, int steps)
 {
 #ifdef _OPENMP
 #pragma omp parallel if (s->sites > 4096)
 #endif
-    for (int step = 0; step < steps; ++step) {
-        const int last = step == steps - 1;
-        if (step == 0) fput_sweep(s, fput_flow_parts[0], s->coef + fput_flow_rows[0] * fput_ROW, far);
-        for (int k = 1; k < fput_FLOWS - 1; ++k)
-            fput_sweep(s, fput_flow_parts[k], s->coef + fput_flow_rows[k] * fput_ROW, far);
-        if (fput_FLOWS > 1)
-            fput_sweep(s, fput_flow_parts[0], s->coef + (last ? fput_flow_rows[fput_FLOWS - 1] : fput_JOINED)
-                * fput_ROW, far);
-        else if (!last)
-            fput_sweep(s, fput_flow_parts[0], s->coef, far);
+    {
+        if (steps == 0) fput_flow(s, fput_FLOWS - 1);
+        for (int step = 0; step < steps; ++step) {
+            fput_flow(s, fput_FLOWS > 1 && (step > 0 || s->open) ? fput_FLOWS : 0);
+            for (int flow = 1; flow < fput_FLOWS - 1; ++flow) fput_flow(s, flow);
+        }
     }
 }
 
-/* Some steps; if they lead to what is not finite, none. */
-static fput_status fput_try(fput_solver *s, int steps)
+/* Some steps from the state in s->before; if they lead to what is not finite, none. */
+static int fput_try(fput_solver *s, int steps)
 {
-    fput_copy(s->before, s->x, s);
-    fput_steps(s, steps, 1);
-    if (fput_holds(s)) return fput_OK;
+    fput_steps(s, steps);
+    if (fput_all_hold(s)) return 1;
     fput_copy(s->x, s->before, s);
-    return fput_NOT_FINITE;
+    return 0;
 }
 
 fput_status fput_integrate(fput_solver *s, double h, size_t steps)
 {
-    const fput_status status = fput_set_step(s, h);
-    if (status != fput_OK) return status;
-    for (size_t stretch = fput_STRETCH; steps > 0;) {
-        const size_t now = steps < stretch ? steps : stretch;
-        const fput_status tried = fput_try(s, (int)now);
-        if (tried == fput_OK) {
-            steps -= now;
+    fput_status status = fput_set_step(s, h);
+    if (status != fput_OK || steps == 0) return status;
+    fput_copy(s->open ? s->x : s->before, s->open ? s->before : s->x, s);
+    const size_t end = s->steps + steps;
+    for (size_t stretch = fput_STRETCH; s->steps < end && status == fput_OK;) {
+        size_t now = end - s->steps < stretch ? end - s->steps : stretch;
+        if (fput_try(s, (int)now)) {
+            fput_copy(s->before, s->x, s);
             s->steps += now;
-            s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
-        } else if (now == 1) {
-            return tried;
-        } else {
+            s->open = fput_FLOWS > 1;
+        } else if (now > 1) {
             stretch = 1;
+        } else {
+            status = fput_NOT_FINITE;
         }
     }
-    return fput_OK;
+    if (s->open && !fput_try(s, 0)) { /* the last flow of the last step, before which steps go on */
+        status = fput_NOT_FINITE;
+        s->open = 0;
+        --s->steps;
+    }
+    s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
+    return status;
 }
 
 fput_status fput_step(fput_solver *s, double h) { return fput_integrate(s, h, 1); }
 
-void fput_state(const fput_solver *s, double *x)
+/* The sites of fields, without what is beside their rows. */
+static void fput_take(const fput_solver *s, double *const fields[fput_DIM], double *x)
 {
     for (size_t k = 0; k < fput_DIM; ++k)
         for (size_t r = 0; r < s->rows; ++r)
-            memcpy(x + k * s->sites + r * (size_t)s->length, s->x[k] + (ptrdiff_t)r * s->width,
+            memcpy(x + k * s->sites + r * (size_t)s->length, fields[k] + (ptrdiff_t)r * s->width,
                 (size_t)s->length * sizeof *x);
+}
+
+void fput_state(const fput_solver *s, double *x) { fput_take(s, s->x, x); }
+
+int fput_saved(const fput_solver *s, double *x, size_t *far)
+{
+    if (s->open) fput_take(s, s->before, x);
+    *far = s->far;
+    return s->open;
+}
+
+fput_status fput_resume(fput_solver *s, double h, const double *x, size_t far)
+{
+    const fput_status status = fput_set_step(s, h);
+    if (status != fput_OK || !fput_finite(x, fput_DIM * s->sites)) return fput_BAD_ARGUMENT;
+    for (size_t k = 0; k < fput_DIM; ++k) fput_put(s, s->before[k], x + k * s->sites);
+    s->open = 1;
+    s->far = far;
+    return fput_OK;
 }
 
 /* ---- What is seen at sites ---- */
@@ -521,6 +560,81 @@ static void fput_fill(const fput_solver *s, fput_kernel *kernel, double *out)
 void fput_density(const fput_solver *s, double *out) { fput_fill(s, fput_energy_row, out); }
 void fput_casimirs(const fput_solver *s, double *out) { fput_fill(s, fput_casimirs_row, out); }
 void fput_vector_field(const fput_solver *s, double *out) { fput_fill(s, fput_vector_field_row, out); }
+
+/* ---- Steps by hand ---- */
+size_t fput_stages(void) { return fput_FLOWS; }
+
+fput_status fput_describe(size_t number, fput_stage *about)
+{
+    if (number > fput_FLOWS || about == NULL) return fput_BAD_ARGUMENT;
+    *about = fput_stages_of[fput_flow_parts[number == fput_FLOWS ? 0 : number] - 1];
+    return fput_OK;
+}
+
+fput_status fput_begin(fput_solver *s, double h) { return fput_set_step(s, h); }
+
+/* The rows of a plane. */
+static size_t fput_rows_of_plane(const fput_solver *s) { return s->rows / (fput_AXES > 1 ? s->sizes[0] : 1); }
+
+fput_status fput_sweep(fput_solver *s, size_t number, int far, size_t from, size_t to)
+{
+    if (s == NULL || !s->prepared || number > fput_FLOWS || from > to || to > s->sizes[0])
+        return fput_BAD_ARGUMENT;
+    const int joined = number == fput_FLOWS, part = fput_flow_parts[joined ? 0 : number];
+    const double *coef = s->coef + (joined ? fput_JOINED : fput_flow_rows[number]) * fput_ROW;
+    const size_t units = fput_rows_of_plane(s) * fput_pieces(s);
+    s->open = 0;
+    s->from = (ptrdiff_t)from;
+    s->to = (ptrdiff_t)to;
+    fput_sweep_rows(s, part, coef, far, 0, units);
+    s->from = 0;
+    s->to = s->length;
+    for (size_t k = 0; k < fput_DIM; ++k) fput_ends(s->x[k], s->length, 0, s->length);
+    return fput_OK;
+}
+
+/* A plane of a field: the first of its values, and how many rows it has, of so many values. */
+static double *fput_plane(const fput_solver *s, size_t field, size_t plane, size_t *rows, size_t *length)
+{
+    *rows = fput_rows_of_plane(s);
+    *length = fput_AXES > 1 ? (size_t)s->length : 1;
+    return s->x[field] + (fput_AXES > 1 ? (ptrdiff_t)(plane * *rows) * s->width : (ptrdiff_t)plane);
+}
+
+fput_status fput_planes(const fput_solver *s, size_t field, size_t from, size_t to, double *x)
+{
+    if (s == NULL || field >= fput_DIM || from > to || to > s->sizes[0]) return fput_BAD_ARGUMENT;
+    for (size_t plane = from; plane < to; ++plane) {
+        size_t rows, length;
+        const double *at = fput_plane(s, field, plane, &rows, &length);
+        for (size_t r = 0; r < rows; ++r, x += length)
+            memcpy(x, at + (ptrdiff_t)r * s->width, length * sizeof *x);
+    }
+    return fput_OK;
+}
+
+fput_status fput_put_planes(fput_solver *s, size_t field, size_t from, size_t to, const double *x)
+{
+    if (s == NULL || field >= fput_DIM || from > to || to > s->sizes[0]) return fput_BAD_ARGUMENT;
+    s->open = 0;
+    for (size_t plane = from; plane < to; ++plane) {
+        size_t rows, length;
+        double *at = fput_plane(s, field, plane, &rows, &length);
+        for (size_t r = 0; r < rows; ++r, x += length) {
+            memcpy(at + (ptrdiff_t)r * s->width, x, length * sizeof *x);
+        }
+    }
+    fput_ends(s->x[field], s->length, 0, s->length);
+    return fput_OK;
+}
+
+int fput_holds(const fput_solver *s, size_t from, size_t to)
+{
+    if (s == NULL || from > to || to > s->sizes[0]) return 0;
+    for (size_t k = 0; k < fput_DIM; ++k)
+        if (!fput_finite(s->x[k] + from, to - from)) return 0;
+    return 1;
+}
 
 const char *fput_status_string(fput_status status)
 {

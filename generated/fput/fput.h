@@ -2,7 +2,7 @@
  * fput.h: the declarations; fput.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 32c0ad799a2b385fc60c377e42be4951543fcd1938744b36cb4d8a159aafc043
+ * body-sha256: 933f1f0a759aa15005ea1735bdd81f151fb088572b0ce016dc50dc114159072d
  */
 #ifndef FPUT_H
 #define FPUT_H
@@ -46,6 +46,9 @@ typedef struct {
     double *x[fput_ARRAYS];
     ptrdiff_t *lines;         /* of each row, where it is and where those beside it are */
     double *before[fput_DIM]; /* the fields before the steps that are being made */
+    int open;                 /* whether these lack the last flow of a step, which between calls x has made */
+    size_t far;               /* steps to be made by functions for large arguments, where there are others */
+    ptrdiff_t from, to;       /* the sites that are swept */
     size_t steps;             /* good steps since fput_init */
     double t;                 /* time since fput_init */
     double h;                 /* the last step size */
@@ -66,13 +69,18 @@ fput_status fput_init(fput_solver *s, const fput_params *params, const size_t si
     const double *x0, void *work);
 
 /* Steps of size h, of either sign. If one fails, the state is that before it, and s->steps counts the good
-   ones. Steps of one call are joined: where a step ends as the next begins, both are one flow. With OpenMP
-   rows are worked at in parallel, with the same bits for any number of threads. */
+   ones. Steps are joined, also those of several calls: where one ends as the next begins, both are one flow.
+   With OpenMP rows are worked at in parallel, with the same bits for any number of threads. */
 fput_status fput_step(fput_solver *s, double h);
 fput_status fput_integrate(fput_solver *s, double h, size_t steps);
 
 /* The state x[field][site]. */
 void fput_state(const fput_solver *s, double *x);
+
+/* To go on elsewhere with the same bits: if fput_saved is 1, x is what the next step begins with, for
+   fput_resume after fput_init at the state. */
+int fput_saved(const fput_solver *s, double *x, size_t *far);
+fput_status fput_resume(fput_solver *s, double h, const double *x, size_t far);
 
 /* The Hamiltonian; its density at each site; the densities out[k][site] of the Casimirs; the right-hand side
    out[field][site]. */
@@ -80,6 +88,33 @@ double fput_hamiltonian(const fput_solver *s);
 void fput_density(const fput_solver *s, double *out);
 void fput_casimirs(const fput_solver *s, double *out);
 void fput_vector_field(const fput_solver *s, double *out);
+
+/* Steps by hand, for lattices that are distributed over several memories. A step is the stages 0, 1, … before
+   fput_stages(), each a sweep over all planes: the sites of one place along the first axis. Number
+   fput_stages() is the last stage of a step and the first of the next together, as fput_integrate does them.
+   A stage may be made in any number of pieces, in any order, with the bits of fput_step; before that, the
+   planes beside a piece that it reads must have made the stages before. */
+typedef struct {
+    /* planes before the first one swept, and after the last one, that are read */
+    size_t behind, ahead;
+    /* fields that are read there, and those that are changed; bit k is field k */
+    unsigned long read, changed;
+} fput_stage;
+
+size_t fput_stages(void);
+fput_status fput_describe(size_t number, fput_stage *about);
+
+/* What depends on the step size, before the first stage; and a stage for the planes from..to, to not among
+   them. far: whether by functions for arguments of any size; without it, values that are not finite say that
+   these were needed. */
+fput_status fput_begin(fput_solver *s, double h);
+fput_status fput_sweep(fput_solver *s, size_t number, int far, size_t from, size_t to);
+
+/* Values x[plane of those from..to][sites of it] of a field, which is 0 for the first; putting them takes the
+   place of what was there. fput_holds tells whether those of all fields there are finite. */
+fput_status fput_planes(const fput_solver *s, size_t field, size_t from, size_t to, double *x);
+fput_status fput_put_planes(fput_solver *s, size_t field, size_t from, size_t to, const double *x);
+int fput_holds(const fput_solver *s, size_t from, size_t to);
 
 const char *fput_status_string(fput_status status);
 

@@ -21,7 +21,8 @@
  *   4. The solver
  *   5. The flows
  *   6. What is seen at sites
- * body-sha256: 28b3afe7e20e295ba647e990ae08695543cb75f76b6817c061bfd0e0f07e98ee
+ *   7. Steps by hand
+ * body-sha256: 178b8e0d4afbfc5311a90a02cab35d5f92d15d68999936839cba1e7a462a9bf8
  */
 #include "heisenberg.h"
 
@@ -56,6 +57,10 @@ static const double heisenberg_times[heisenberg_ROWS_OF_FLOWS] = { 0.5, 0.5, 1.0
 /* The flows of one step: the part of H of each, and its row of coefficients. */
 static const unsigned char heisenberg_flow_parts[heisenberg_FLOWS] = { 1, 2, 3, 2, 1 };
 static const unsigned char heisenberg_flow_rows[heisenberg_FLOWS] = { 0, 1, 2, 3, 4 };
+
+/* Of each part of H the planes behind and ahead that are read, the fields that are read there, and those
+   changed. */
+static const heisenberg_stage heisenberg_stages_of[] = { { 1, 1, 1, 6 }, { 1, 1, 2, 5 }, { 1, 1, 4, 3 } };
 
 /* Whether all parameters are finite, and positive where they have to be. */
 static int heisenberg_allowed(const heisenberg_params *params, size_t sites)
@@ -513,7 +518,8 @@ int omp_get_thread_num(void);
 #endif
 
 enum {
-    heisenberg_STRETCH = 32, /* steps before the state is looked at: what is not finite stays so */
+    heisenberg_STRETCH = 32,   /* steps before the state is looked at: what is not finite stays so */
+    heisenberg_FAR_STEPS = 64, /* steps by functions for large arguments, after one that needed them */
     heisenberg_LEAD = (heisenberg_HALO + 7) / 8 * 8,
     heisenberg_BUFFER = 256,
     heisenberg_RESERVED = heisenberg_ARRAYS + heisenberg_DIM
@@ -644,6 +650,7 @@ static heisenberg_status heisenberg_set_step(heisenberg_solver *s, double h)
 {
     if (s == NULL || !isfinite(h)) return heisenberg_BAD_ARGUMENT;
     if (s->prepared && memcmp(&h, &s->h, sizeof h) == 0) return heisenberg_OK;
+    s->open = 0;
     heisenberg_prepare_step(&s->params, h, s->coef);
     s->h = h;
     s->t_before_h = s->t;
@@ -652,8 +659,7 @@ static heisenberg_status heisenberg_set_step(heisenberg_solver *s, double h)
     return heisenberg_OK;
 }
 
-/* Whether all values at sites are finite. */
-static int heisenberg_holds(const heisenberg_solver *s)
+static int heisenberg_all_hold(const heisenberg_solver *s)
 {
     for (size_t k = 0; k < heisenberg_DIM; ++k)
         for (size_t r = 0; r < s->rows; ++r)
@@ -671,7 +677,7 @@ static void heisenberg_copy(double *const to[heisenberg_DIM], double *const from
 
 /* ---- The flows ---- */
 /* One part of H. */
-static void heisenberg_sweep(const heisenberg_solver *s, int part, const double *coef, int far)
+static void heisenberg_sweep_part(const heisenberg_solver *s, int part, const double *coef, int far)
 {
     const size_t units = s->rows * heisenberg_pieces(s);
 #ifdef _OPENMP
@@ -687,70 +693,111 @@ static void heisenberg_sweep(const heisenberg_solver *s, int part, const double 
 #endif
 }
 
-/* Some steps, joined. */
-static void heisenberg_steps(const heisenberg_solver *s, int steps, int far)
+/* The flow of that number in a step; after those of a step the last and the first together. */
+static void heisenberg_flow(const heisenberg_solver *s, int flow)
+{
+    const int joined = flow == heisenberg_FLOWS, row = joined ? heisenberg_JOINED
+        : heisenberg_flow_rows[flow];
+    heisenberg_sweep_part(s, heisenberg_flow_parts[joined ? 0 : flow], s->coef + row * heisenberg_ROW, s->far
+        > 0);
+}
+
+/* Some steps, joined, without the last flow; no steps are that flow alone. */
+static void heisenberg_steps(const heisenberg_solver *s, int steps)
 {
 #ifdef _OPENMP
 #pragma omp parallel if (s->sites > 4096)
 #endif
-    for (int step = 0; step < steps; ++step) {
-        const int last = step == steps - 1;
-        if (step == 0)
-            heisenberg_sweep(s, heisenberg_flow_parts[0], s->coef + heisenberg_flow_rows[0] * heisenberg_ROW,
-            far);
-        for (int k = 1; k < heisenberg_FLOWS - 1; ++k)
-            heisenberg_sweep(s, heisenberg_flow_parts[k], s->coef + heisenberg_flow_rows[k] * heisenberg_ROW,
-                far);
-        if (heisenberg_FLOWS > 1)
-            heisenberg_sweep(s, heisenberg_flow_parts[0], s->coef
-                + (last ? heisenberg_flow_rows[heisenberg_FLOWS - 1] : heisenberg_JOINED) * heisenberg_ROW,
-                far);
-        else if (!last)
-            heisenberg_sweep(s, heisenberg_flow_parts[0], s->coef, far);
+    {
+        if (steps == 0) heisenberg_flow(s, heisenberg_FLOWS - 1);
+        for (int step = 0; step < steps; ++step) {
+            heisenberg_flow(s, heisenberg_FLOWS > 1 && (step > 0 || s->open) ? heisenberg_FLOWS : 0);
+            for (int flow = 1; flow < heisenberg_FLOWS - 1; ++flow) heisenberg_flow(s, flow);
+        }
     }
 }
 
-/* Some steps; if they lead to what is not finite, none. */
-static heisenberg_status heisenberg_try(heisenberg_solver *s, int steps)
+/* Some steps from the state in s->before; if they lead to what is not finite, none. */
+static int heisenberg_try(heisenberg_solver *s, int steps)
 {
-    heisenberg_copy(s->before, s->x, s);
-    heisenberg_steps(s, steps, 0);
-    if (heisenberg_holds(s)) return heisenberg_OK;
+    heisenberg_steps(s, steps);
+    if (heisenberg_all_hold(s)) return 1;
     heisenberg_copy(s->x, s->before, s);
-    heisenberg_steps(s, steps, 1);
-    if (heisenberg_holds(s)) return heisenberg_OK;
-    heisenberg_copy(s->x, s->before, s);
-    return heisenberg_NOT_FINITE;
+    return 0;
+}
+
+/* The last flow of a step, by functions for large arguments if need be; whether it leads to finite values. */
+static int heisenberg_close(heisenberg_solver *s)
+{
+    if (heisenberg_try(s, 0)) return 1;
+    const size_t far = s->far;
+    s->far = 1;
+    const int done = heisenberg_try(s, 0);
+    s->far = far;
+    return done;
 }
 
 heisenberg_status heisenberg_integrate(heisenberg_solver *s, double h, size_t steps)
 {
-    const heisenberg_status status = heisenberg_set_step(s, h);
-    if (status != heisenberg_OK) return status;
-    for (size_t stretch = heisenberg_STRETCH; steps > 0;) {
-        const size_t now = steps < stretch ? steps : stretch;
-        const heisenberg_status tried = heisenberg_try(s, (int)now);
-        if (tried == heisenberg_OK) {
-            steps -= now;
+    heisenberg_status status = heisenberg_set_step(s, h);
+    if (status != heisenberg_OK || steps == 0) return status;
+    heisenberg_copy(s->open ? s->x : s->before, s->open ? s->before : s->x, s);
+    const size_t end = s->steps + steps;
+    for (size_t stretch = heisenberg_STRETCH; s->steps < end && status == heisenberg_OK;) {
+        size_t now = end - s->steps < stretch ? end - s->steps : stretch;
+        if (s->far > 0 && s->far < now) now = s->far;
+        if (heisenberg_try(s, (int)now)) {
+            heisenberg_copy(s->before, s->x, s);
             s->steps += now;
-            s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
-        } else if (now == 1) {
-            return tried;
-        } else {
+            s->open = heisenberg_FLOWS > 1;
+            s->far -= s->far > 0 ? now : 0;
+        } else if (now > 1) {
             stretch = 1;
+        } else if (s->far == 0) {
+            s->far = heisenberg_FAR_STEPS;
+            stretch = heisenberg_STRETCH;
+        } else {
+            status = heisenberg_NOT_FINITE;
         }
     }
-    return heisenberg_OK;
+    if (s->open && !heisenberg_close(s)) { /* the last flow of the last step, before which steps go on */
+        status = heisenberg_NOT_FINITE;
+        s->open = 0;
+        --s->steps;
+    }
+    s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
+    return status;
 }
 
 heisenberg_status heisenberg_step(heisenberg_solver *s, double h) { return heisenberg_integrate(s, h, 1); }
 
-void heisenberg_state(const heisenberg_solver *s, double *x)
+/* The sites of fields, without what is beside their rows. */
+static void heisenberg_take(const heisenberg_solver *s, double *const fields[heisenberg_DIM], double *x)
 {
     for (size_t k = 0; k < heisenberg_DIM; ++k)
         for (size_t r = 0; r < s->rows; ++r)
-            memcpy(x + k * s->sites + r * (size_t)s->length, s->x[k] + (ptrdiff_t)r * s->width,
+            memcpy(x + k * s->sites + r * (size_t)s->length, fields[k] + (ptrdiff_t)r * s->width,
                 (size_t)s->length * sizeof *x);
+}
+
+void heisenberg_state(const heisenberg_solver *s, double *x) { heisenberg_take(s, s->x, x); }
+
+int heisenberg_saved(const heisenberg_solver *s, double *x, size_t *far)
+{
+    if (s->open) heisenberg_take(s, s->before, x);
+    *far = s->far;
+    return s->open;
+}
+
+heisenberg_status heisenberg_resume(heisenberg_solver *s, double h, const double *x, size_t far)
+{
+    const heisenberg_status status = heisenberg_set_step(s, h);
+    if (status != heisenberg_OK || !heisenberg_finite(x, heisenberg_DIM * s->sites))
+        return heisenberg_BAD_ARGUMENT;
+    for (size_t k = 0; k < heisenberg_DIM; ++k) heisenberg_put(s, s->before[k], x + k * s->sites);
+    s->open = 1;
+    s->far = far;
+    return heisenberg_OK;
 }
 
 /* ---- What is seen at sites ---- */
@@ -793,6 +840,82 @@ void heisenberg_casimirs(const heisenberg_solver *s, double *out) { heisenberg_f
     heisenberg_casimirs_row, out); }
 void heisenberg_vector_field(const heisenberg_solver *s, double *out) { heisenberg_fill(s,
     heisenberg_vector_field_row, out); }
+
+/* ---- Steps by hand ---- */
+size_t heisenberg_stages(void) { return heisenberg_FLOWS; }
+
+heisenberg_status heisenberg_describe(size_t number, heisenberg_stage *about)
+{
+    if (number > heisenberg_FLOWS || about == NULL) return heisenberg_BAD_ARGUMENT;
+    *about = heisenberg_stages_of[heisenberg_flow_parts[number == heisenberg_FLOWS ? 0 : number] - 1];
+    return heisenberg_OK;
+}
+
+heisenberg_status heisenberg_begin(heisenberg_solver *s, double h) { return heisenberg_set_step(s, h); }
+
+/* The rows of a plane. */
+static size_t heisenberg_rows_of_plane(const heisenberg_solver *s) { return s->rows / (heisenberg_AXES > 1
+    ? s->sizes[0] : 1); }
+
+heisenberg_status heisenberg_sweep(heisenberg_solver *s, size_t number, int far, size_t from, size_t to)
+{
+    if (s == NULL || !s->prepared || number > heisenberg_FLOWS || from > to || to > s->sizes[0])
+        return heisenberg_BAD_ARGUMENT;
+    const int joined = number == heisenberg_FLOWS, part = heisenberg_flow_parts[joined ? 0 : number];
+    const double *coef = s->coef + (joined ? heisenberg_JOINED : heisenberg_flow_rows[number])
+        * heisenberg_ROW;
+    const size_t units = heisenberg_rows_of_plane(s) * heisenberg_pieces(s);
+    s->open = 0;
+    heisenberg_sweep_rows(s, part, coef, far, from * units, to * units);
+    return heisenberg_OK;
+}
+
+/* A plane of a field: the first of its values, and how many rows it has, of so many values. */
+static double *heisenberg_plane(const heisenberg_solver *s, size_t field, size_t plane, size_t *rows,
+    size_t *length)
+{
+    *rows = heisenberg_rows_of_plane(s);
+    *length = heisenberg_AXES > 1 ? (size_t)s->length : 1;
+    return s->x[field] + (heisenberg_AXES > 1 ? (ptrdiff_t)(plane * *rows) * s->width : (ptrdiff_t)plane);
+}
+
+heisenberg_status heisenberg_planes(const heisenberg_solver *s, size_t field, size_t from, size_t to,
+    double *x)
+{
+    if (s == NULL || field >= heisenberg_DIM || from > to || to > s->sizes[0]) return heisenberg_BAD_ARGUMENT;
+    for (size_t plane = from; plane < to; ++plane) {
+        size_t rows, length;
+        const double *at = heisenberg_plane(s, field, plane, &rows, &length);
+        for (size_t r = 0; r < rows; ++r, x += length)
+            memcpy(x, at + (ptrdiff_t)r * s->width, length * sizeof *x);
+    }
+    return heisenberg_OK;
+}
+
+heisenberg_status heisenberg_put_planes(heisenberg_solver *s, size_t field, size_t from, size_t to,
+    const double *x)
+{
+    if (s == NULL || field >= heisenberg_DIM || from > to || to > s->sizes[0]) return heisenberg_BAD_ARGUMENT;
+    s->open = 0;
+    for (size_t plane = from; plane < to; ++plane) {
+        size_t rows, length;
+        double *at = heisenberg_plane(s, field, plane, &rows, &length);
+        for (size_t r = 0; r < rows; ++r, x += length) {
+            memcpy(at + (ptrdiff_t)r * s->width, x, length * sizeof *x);
+            heisenberg_ends(at + (ptrdiff_t)r * s->width, s->length, 0, s->length);
+        }
+    }
+    return heisenberg_OK;
+}
+
+int heisenberg_holds(const heisenberg_solver *s, size_t from, size_t to)
+{
+    if (s == NULL || from > to || to > s->sizes[0]) return 0;
+    for (size_t k = 0; k < heisenberg_DIM; ++k)
+        for (size_t r = from * heisenberg_rows_of_plane(s); r < to * heisenberg_rows_of_plane(s); ++r)
+            if (!heisenberg_finite(s->x[k] + (ptrdiff_t)r * s->width, (size_t)s->length)) return 0;
+    return 1;
+}
 
 const char *heisenberg_status_string(heisenberg_status status)
 {

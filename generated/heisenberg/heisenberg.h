@@ -2,7 +2,7 @@
  * heisenberg.h: the declarations; heisenberg.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 226f8b4dddc92c43b1fd86abd57ddc9e5e55b931c644a765f0bfc704255f69e7
+ * body-sha256: 106b84bc12249bb13d12cf6d5ca9863c24bcf5387d9f6adcccb1986e6ea313cb
  */
 #ifndef HEISENBERG_H
 #define HEISENBERG_H
@@ -45,11 +45,13 @@ typedef struct {
     ptrdiff_t length, width; /* sites of a row; doubles between the beginnings of two rows */
     /* in rows, each field, then each parameter at sites: the first site of the first row */
     double *x[heisenberg_ARRAYS];
-    ptrdiff_t *lines;               /* of each row, where it is and where those beside it are */
+    ptrdiff_t *lines; /* of each row, where it is and where those beside it are */
     double *before[heisenberg_DIM]; /* the fields before the steps that are being made */
-    size_t steps;                   /* good steps since heisenberg_init */
-    double t;                       /* time since heisenberg_init */
-    double h;                       /* the last step size */
+    int open; /* whether these lack the last flow of a step, which between calls x has made */
+    size_t far; /* steps to be made by functions for large arguments, where there are others */
+    size_t steps; /* good steps since heisenberg_init */
+    double t; /* time since heisenberg_init */
+    double h; /* the last step size */
     heisenberg_params params;
     double coef[heisenberg_COEFFICIENTS]; /* all that depends on params and h only */
     int prepared; /* whether coef has been computed */
@@ -68,13 +70,18 @@ heisenberg_status heisenberg_init(heisenberg_solver *s, const heisenberg_params 
     const size_t sizes[heisenberg_AXES], const double *x0, void *work);
 
 /* Steps of size h, of either sign. If one fails, the state is that before it, and s->steps counts the good
-   ones. Steps of one call are joined: where a step ends as the next begins, both are one flow. With OpenMP
-   rows are worked at in parallel, with the same bits for any number of threads. */
+   ones. Steps are joined, also those of several calls: where one ends as the next begins, both are one flow.
+   With OpenMP rows are worked at in parallel, with the same bits for any number of threads. */
 heisenberg_status heisenberg_step(heisenberg_solver *s, double h);
 heisenberg_status heisenberg_integrate(heisenberg_solver *s, double h, size_t steps);
 
 /* The state x[field][site]. */
 void heisenberg_state(const heisenberg_solver *s, double *x);
+
+/* To go on elsewhere with the same bits: if heisenberg_saved is 1, x is what the next step begins with, for
+   heisenberg_resume after heisenberg_init at the state. */
+int heisenberg_saved(const heisenberg_solver *s, double *x, size_t *far);
+heisenberg_status heisenberg_resume(heisenberg_solver *s, double h, const double *x, size_t far);
 
 /* The Hamiltonian; its density at each site; the densities out[k][site] of the Casimirs; the right-hand side
    out[field][site]. */
@@ -82,6 +89,35 @@ double heisenberg_hamiltonian(const heisenberg_solver *s);
 void heisenberg_density(const heisenberg_solver *s, double *out);
 void heisenberg_casimirs(const heisenberg_solver *s, double *out);
 void heisenberg_vector_field(const heisenberg_solver *s, double *out);
+
+/* Steps by hand, for lattices that are distributed over several memories. A step is the stages 0, 1, … before
+   heisenberg_stages(), each a sweep over all planes: the sites of one place along the first axis. Number
+   heisenberg_stages() is the last stage of a step and the first of the next together, as heisenberg_integrate
+   does them. A stage may be made in any number of pieces, in any order, with the bits of heisenberg_step;
+   before that, the planes beside a piece that it reads must have made the stages before. */
+typedef struct {
+    /* planes before the first one swept, and after the last one, that are read */
+    size_t behind, ahead;
+    /* fields that are read there, and those that are changed; bit k is field k */
+    unsigned long read, changed;
+} heisenberg_stage;
+
+size_t heisenberg_stages(void);
+heisenberg_status heisenberg_describe(size_t number, heisenberg_stage *about);
+
+/* What depends on the step size, before the first stage; and a stage for the planes from..to, to not among
+   them. far: whether by functions for arguments of any size; without it, values that are not finite say that
+   these were needed. */
+heisenberg_status heisenberg_begin(heisenberg_solver *s, double h);
+heisenberg_status heisenberg_sweep(heisenberg_solver *s, size_t number, int far, size_t from, size_t to);
+
+/* Values x[plane of those from..to][sites of it] of a field, which is 0 for the first; putting them takes the
+   place of what was there. heisenberg_holds tells whether those of all fields there are finite. */
+heisenberg_status heisenberg_planes(const heisenberg_solver *s, size_t field, size_t from, size_t to,
+    double *x);
+heisenberg_status heisenberg_put_planes(heisenberg_solver *s, size_t field, size_t from, size_t to,
+    const double *x);
+int heisenberg_holds(const heisenberg_solver *s, size_t from, size_t to);
 
 const char *heisenberg_status_string(heisenberg_status status);
 

@@ -21,7 +21,7 @@
  *   4. The solver
  *   5. The flows
  *   6. What is seen at sites
- * body-sha256: 5e61f68c42a1691f70b17fc509595abfbeb26a504cf304202aa148a9fe0a167f
+ * body-sha256: cab0dfcedd38ae9e4a65b3c3a4634659abaff438f6b27b9150bec3f95ccefb40
  */
 #include "heisenberg_plane.h"
 
@@ -536,6 +536,7 @@ static heisenberg_plane_status heisenberg_plane_set_step(heisenberg_plane_solver
 {
     if (s == NULL || !isfinite(h)) return heisenberg_plane_BAD_ARGUMENT;
     if (s->prepared && memcmp(&h, &s->h, sizeof h) == 0) return heisenberg_plane_OK;
+    s->open = 0;
     heisenberg_plane_prepare_step(&s->params, h, s->coef);
     s->h = h;
     s->t_before_h = s->t;
@@ -544,8 +545,7 @@ static heisenberg_plane_status heisenberg_plane_set_step(heisenberg_plane_solver
     return heisenberg_plane_OK;
 }
 
-/* Whether all values at sites are finite. */
-static int heisenberg_plane_holds(const heisenberg_plane_solver *s)
+static int heisenberg_plane_all_hold(const heisenberg_plane_solver *s)
 {
     for (size_t k = 0; k < heisenberg_plane_DIM; ++k)
         for (size_t r = 0; r < s->rows; ++r)
@@ -563,7 +563,8 @@ static void heisenberg_plane_copy(double *const to[heisenberg_plane_DIM],
 
 /* ---- The flows ---- */
 /* One part of H. */
-static void heisenberg_plane_sweep(const heisenberg_plane_solver *s, int part, const double *coef, int far)
+static void heisenberg_plane_sweep_part(const heisenberg_plane_solver *s, int part, const double *coef,
+    int far)
 {
     const size_t units = s->rows * heisenberg_plane_pieces(s);
 #ifdef _OPENMP
@@ -579,68 +580,101 @@ static void heisenberg_plane_sweep(const heisenberg_plane_solver *s, int part, c
 #endif
 }
 
-/* Some steps, joined. */
-static void heisenberg_plane_steps(const heisenberg_plane_solver *s, int steps, int far)
+/* The flow of that number in a step; after those of a step the last and the first together. */
+static void heisenberg_plane_flow(const heisenberg_plane_solver *s, int flow)
+{
+    const int joined = flow == heisenberg_plane_FLOWS, row = joined ? heisenberg_plane_JOINED
+        : heisenberg_plane_flow_rows[flow];
+    heisenberg_plane_sweep_part(s, heisenberg_plane_flow_parts[joined ? 0 : flow], s->coef + row
+        * heisenberg_plane_ROW, s->far > 0);
+}
+
+/* Some steps, joined, without the last flow; no steps are that flow alone. */
+static void heisenberg_plane_steps(const heisenberg_plane_solver *s, int steps)
 {
 #ifdef _OPENMP
 #pragma omp parallel if (s->sites > 4096)
 #endif
-    for (int step = 0; step < steps; ++step) {
-        const int last = step == steps - 1;
-        if (step == 0)
-            heisenberg_plane_sweep(s, heisenberg_plane_flow_parts[0], s->coef + heisenberg_plane_flow_rows[0]
-            * heisenberg_plane_ROW, far);
-        for (int k = 1; k < heisenberg_plane_FLOWS - 1; ++k)
-            heisenberg_plane_sweep(s, heisenberg_plane_flow_parts[k], s->coef + heisenberg_plane_flow_rows[k]
-                * heisenberg_plane_ROW, far);
-        if (heisenberg_plane_FLOWS > 1)
-            heisenberg_plane_sweep(s, heisenberg_plane_flow_parts[0], s->coef
-                + (last ? heisenberg_plane_flow_rows[heisenberg_plane_FLOWS - 1] : heisenberg_plane_JOINED)
-                * heisenberg_plane_ROW, far);
-        else if (!last)
-            heisenberg_plane_sweep(s, heisenberg_plane_flow_parts[0], s->coef, far);
+    {
+        if (steps == 0) heisenberg_plane_flow(s, heisenberg_plane_FLOWS - 1);
+        for (int step = 0; step < steps; ++step) {
+            heisenberg_plane_flow(s, heisenberg_plane_FLOWS > 1 && (step > 0 || s->open)
+                ? heisenberg_plane_FLOWS : 0);
+            for (int flow = 1; flow < heisenberg_plane_FLOWS - 1; ++flow) heisenberg_plane_flow(s, flow);
+        }
     }
 }
 
-/* Some steps; if they lead to what is not finite, none. */
-static heisenberg_plane_status heisenberg_plane_try(heisenberg_plane_solver *s, int steps)
+/* Some steps from the state in s->before; if they lead to what is not finite, none. */
+static int heisenberg_plane_try(heisenberg_plane_solver *s, int steps)
 {
-    heisenberg_plane_copy(s->before, s->x, s);
-    heisenberg_plane_steps(s, steps, 1);
-    if (heisenberg_plane_holds(s)) return heisenberg_plane_OK;
+    heisenberg_plane_steps(s, steps);
+    if (heisenberg_plane_all_hold(s)) return 1;
     heisenberg_plane_copy(s->x, s->before, s);
-    return heisenberg_plane_NOT_FINITE;
+    return 0;
 }
 
 heisenberg_plane_status heisenberg_plane_integrate(heisenberg_plane_solver *s, double h, size_t steps)
 {
-    const heisenberg_plane_status status = heisenberg_plane_set_step(s, h);
-    if (status != heisenberg_plane_OK) return status;
-    for (size_t stretch = heisenberg_plane_STRETCH; steps > 0;) {
-        const size_t now = steps < stretch ? steps : stretch;
-        const heisenberg_plane_status tried = heisenberg_plane_try(s, (int)now);
-        if (tried == heisenberg_plane_OK) {
-            steps -= now;
+    heisenberg_plane_status status = heisenberg_plane_set_step(s, h);
+    if (status != heisenberg_plane_OK || steps == 0) return status;
+    heisenberg_plane_copy(s->open ? s->x : s->before, s->open ? s->before : s->x, s);
+    const size_t end = s->steps + steps;
+    for (size_t stretch = heisenberg_plane_STRETCH; s->steps < end && status == heisenberg_plane_OK;) {
+        size_t now = end - s->steps < stretch ? end - s->steps : stretch;
+        if (heisenberg_plane_try(s, (int)now)) {
+            heisenberg_plane_copy(s->before, s->x, s);
             s->steps += now;
-            s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
-        } else if (now == 1) {
-            return tried;
-        } else {
+            s->open = heisenberg_plane_FLOWS > 1;
+        } else if (now > 1) {
             stretch = 1;
+        } else {
+            status = heisenberg_plane_NOT_FINITE;
         }
     }
-    return heisenberg_plane_OK;
+    /* the last flow of the last step, before which steps go on */
+    if (s->open && !heisenberg_plane_try(s, 0)) {
+        status = heisenberg_plane_NOT_FINITE;
+        s->open = 0;
+        --s->steps;
+    }
+    s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
+    return status;
 }
 
 heisenberg_plane_status heisenberg_plane_step(heisenberg_plane_solver *s,
     double h) { return heisenberg_plane_integrate(s, h, 1); }
 
-void heisenberg_plane_state(const heisenberg_plane_solver *s, double *x)
+/* The sites of fields, without what is beside their rows. */
+static void heisenberg_plane_take(const heisenberg_plane_solver *s,
+    double *const fields[heisenberg_plane_DIM], double *x)
 {
     for (size_t k = 0; k < heisenberg_plane_DIM; ++k)
         for (size_t r = 0; r < s->rows; ++r)
-            memcpy(x + k * s->sites + r * (size_t)s->length, s->x[k] + (ptrdiff_t)r * s->width,
+            memcpy(x + k * s->sites + r * (size_t)s->length, fields[k] + (ptrdiff_t)r * s->width,
                 (size_t)s->length * sizeof *x);
+}
+
+void heisenberg_plane_state(const heisenberg_plane_solver *s, double *x) { heisenberg_plane_take(s, s->x, x);
+    }
+
+int heisenberg_plane_saved(const heisenberg_plane_solver *s, double *x, size_t *far)
+{
+    if (s->open) heisenberg_plane_take(s, s->before, x);
+    *far = s->far;
+    return s->open;
+}
+
+heisenberg_plane_status heisenberg_plane_resume(heisenberg_plane_solver *s, double h, const double *x,
+    size_t far)
+{
+    const heisenberg_plane_status status = heisenberg_plane_set_step(s, h);
+    if (status != heisenberg_plane_OK || !heisenberg_plane_finite(x, heisenberg_plane_DIM * s->sites))
+        return heisenberg_plane_BAD_ARGUMENT;
+    for (size_t k = 0; k < heisenberg_plane_DIM; ++k) heisenberg_plane_put(s, s->before[k], x + k * s->sites);
+    s->open = 1;
+    s->far = far;
+    return heisenberg_plane_OK;
 }
 
 /* ---- What is seen at sites ---- */

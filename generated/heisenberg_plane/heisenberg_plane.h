@@ -2,7 +2,7 @@
  * heisenberg_plane.h: the declarations; heisenberg_plane.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 13bbef9f050211e071fcaecd1d62c8fa4588648d6d7151076b0773e6caedf505
+ * body-sha256: eba683ae5855188ec645d175544b4ae42a5bc7ff368b48eae2aa6ca65c448f39
  */
 #ifndef HEISENBERG_PLANE_H
 #define HEISENBERG_PLANE_H
@@ -45,11 +45,13 @@ typedef struct {
     ptrdiff_t length, width; /* sites of a row; doubles between the beginnings of two rows */
     /* in rows, each field, then each parameter at sites: the first site of the first row */
     double *x[heisenberg_plane_ARRAYS];
-    ptrdiff_t *lines;                     /* of each row, where it is and where those beside it are */
+    ptrdiff_t *lines; /* of each row, where it is and where those beside it are */
     double *before[heisenberg_plane_DIM]; /* the fields before the steps that are being made */
-    size_t steps;                         /* good steps since heisenberg_plane_init */
-    double t;                             /* time since heisenberg_plane_init */
-    double h;                             /* the last step size */
+    int open; /* whether these lack the last flow of a step, which between calls x has made */
+    size_t far; /* steps to be made by functions for large arguments, where there are others */
+    size_t steps; /* good steps since heisenberg_plane_init */
+    double t; /* time since heisenberg_plane_init */
+    double h; /* the last step size */
     heisenberg_plane_params params;
     double coef[heisenberg_plane_COEFFICIENTS]; /* all that depends on params and h only */
     int prepared; /* whether coef has been computed */
@@ -69,13 +71,19 @@ heisenberg_plane_status heisenberg_plane_init(heisenberg_plane_solver *s,
     void *work);
 
 /* Steps of size h, of either sign. If one fails, the state is that before it, and s->steps counts the good
-   ones. Steps of one call are joined: where a step ends as the next begins, both are one flow. With OpenMP
-   rows are worked at in parallel, with the same bits for any number of threads. */
+   ones. Steps are joined, also those of several calls: where one ends as the next begins, both are one flow.
+   With OpenMP rows are worked at in parallel, with the same bits for any number of threads. */
 heisenberg_plane_status heisenberg_plane_step(heisenberg_plane_solver *s, double h);
 heisenberg_plane_status heisenberg_plane_integrate(heisenberg_plane_solver *s, double h, size_t steps);
 
 /* The state x[field][site]. */
 void heisenberg_plane_state(const heisenberg_plane_solver *s, double *x);
+
+/* To go on elsewhere with the same bits: if heisenberg_plane_saved is 1, x is what the next step begins with,
+   for heisenberg_plane_resume after heisenberg_plane_init at the state. */
+int heisenberg_plane_saved(const heisenberg_plane_solver *s, double *x, size_t *far);
+heisenberg_plane_status heisenberg_plane_resume(heisenberg_plane_solver *s, double h, const double *x,
+    size_t far);
 
 /* The Hamiltonian; its density at each site; the densities out[k][site] of the Casimirs; the right-hand side
    out[field][site]. */

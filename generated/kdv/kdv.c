@@ -22,7 +22,7 @@
  *   5. The stages
  *   6. Newton's method where sweeps fail
  *   7. What is seen at sites
- * body-sha256: b8c47ed660b677a08923b4e9f0226545998732af99a236f62d174ebc3b07056a
+ * body-sha256: db52eac68d702419207b9fa35ad54d5b4d2f16fbb05b13d801cc84540bb83dac
  */
 #include "kdv.h"
 
@@ -505,8 +505,7 @@ static kdv_status kdv_set_step(kdv_solver *s, double h)
     return kdv_OK;
 }
 
-/* Whether all values at sites are finite. */
-static int kdv_holds(const kdv_solver *s)
+static int kdv_all_hold(const kdv_solver *s)
 {
     for (size_t k = 0; k < kdv_DIM; ++k)
         for (size_t r = 0; r < s->rows; ++r)
@@ -868,7 +867,7 @@ static kdv_status kdv_stages(kdv_solver *s, int far)
         size_t first, end = kdv_share(units, &first);
         kdv_increment_rows(s, coef, far, now, first, end);
     }
-    return kdv_holds(s) ? kdv_OK : kdv_NOT_FINITE;
+    return kdv_all_hold(s) ? kdv_OK : kdv_NOT_FINITE;
 }
 
 /* One step; if it cannot be made, none. */
@@ -906,13 +905,16 @@ kdv_status kdv_integrate(kdv_solver *s, double h, size_t steps)
 
 kdv_status kdv_step(kdv_solver *s, double h) { return kdv_integrate(s, h, 1); }
 
-void kdv_state(const kdv_solver *s, double *x)
+/* The sites of fields, without what is beside their rows. */
+static void kdv_take(const kdv_solver *s, double *const fields[kdv_DIM], double *x)
 {
     for (size_t k = 0; k < kdv_DIM; ++k)
         for (size_t r = 0; r < s->rows; ++r)
-            memcpy(x + k * s->sites + r * (size_t)s->length, s->x[k] + (ptrdiff_t)r * s->width,
+            memcpy(x + k * s->sites + r * (size_t)s->length, fields[k] + (ptrdiff_t)r * s->width,
                 (size_t)s->length * sizeof *x);
 }
+
+void kdv_state(const kdv_solver *s, double *x) { kdv_take(s, s->x, x); }
 
 /* ---- What is seen at sites ---- */
 double kdv_hamiltonian(const kdv_solver *s)

@@ -21,7 +21,7 @@
  *   4. The solver
  *   5. The flows
  *   6. What is seen at sites
- * body-sha256: 2d98abc96bf3fb49ac9f9af55f81b0a9b80ef9ce2e1a5fc536c9dec8f6464d4a
+ * body-sha256: d6421e80532c03915b1afa7fab0fd468dffb6cbe99136ba77aab1fcd07243fc2
  */
 #include "klein_gordon.h"
 
@@ -386,6 +386,7 @@ static klein_gordon_status klein_gordon_set_step(klein_gordon_solver *s, double 
 {
     if (s == NULL || !isfinite(h)) return klein_gordon_BAD_ARGUMENT;
     if (s->prepared && memcmp(&h, &s->h, sizeof h) == 0) return klein_gordon_OK;
+    s->open = 0;
     klein_gordon_prepare_step(&s->params, h, s->coef);
     s->h = h;
     s->t_before_h = s->t;
@@ -394,8 +395,7 @@ static klein_gordon_status klein_gordon_set_step(klein_gordon_solver *s, double 
     return klein_gordon_OK;
 }
 
-/* Whether all values at sites are finite. */
-static int klein_gordon_holds(const klein_gordon_solver *s)
+static int klein_gordon_all_hold(const klein_gordon_solver *s)
 {
     for (size_t k = 0; k < klein_gordon_DIM; ++k)
         for (size_t r = 0; r < s->rows; ++r)
@@ -413,7 +413,7 @@ static void klein_gordon_copy(double *const to[klein_gordon_DIM], double *const 
 
 /* ---- The flows ---- */
 /* One part of H. */
-static void klein_gordon_sweep(const klein_gordon_solver *s, int part, const double *coef, int far)
+static void klein_gordon_sweep_part(const klein_gordon_solver *s, int part, const double *coef, int far)
 {
     const size_t units = s->rows * klein_gordon_pieces(s);
 #ifdef _OPENMP
@@ -429,68 +429,96 @@ static void klein_gordon_sweep(const klein_gordon_solver *s, int part, const dou
 #endif
 }
 
-/* Some steps, joined. */
-static void klein_gordon_steps(const klein_gordon_solver *s, int steps, int far)
+/* The flow of that number in a step; after those of a step the last and the first together. */
+static void klein_gordon_flow(const klein_gordon_solver *s, int flow)
+{
+    const int joined = flow == klein_gordon_FLOWS, row = joined ? klein_gordon_JOINED
+        : klein_gordon_flow_rows[flow];
+    klein_gordon_sweep_part(s, klein_gordon_flow_parts[joined ? 0 : flow], s->coef + row * klein_gordon_ROW,
+        s->far > 0);
+}
+
+/* Some steps, joined, without the last flow; no steps are that flow alone. */
+static void klein_gordon_steps(const klein_gordon_solver *s, int steps)
 {
 #ifdef _OPENMP
 #pragma omp parallel if (s->sites > 4096)
 #endif
-    for (int step = 0; step < steps; ++step) {
-        const int last = step == steps - 1;
-        if (step == 0)
-            klein_gordon_sweep(s, klein_gordon_flow_parts[0], s->coef + klein_gordon_flow_rows[0]
-            * klein_gordon_ROW, far);
-        for (int k = 1; k < klein_gordon_FLOWS - 1; ++k)
-            klein_gordon_sweep(s, klein_gordon_flow_parts[k], s->coef + klein_gordon_flow_rows[k]
-                * klein_gordon_ROW, far);
-        if (klein_gordon_FLOWS > 1)
-            klein_gordon_sweep(s, klein_gordon_flow_parts[0], s->coef
-                + (last ? klein_gordon_flow_rows[klein_gordon_FLOWS - 1] : klein_gordon_JOINED)
-                * klein_gordon_ROW, far);
-        else if (!last)
-            klein_gordon_sweep(s, klein_gordon_flow_parts[0], s->coef, far);
+    {
+        if (steps == 0) klein_gordon_flow(s, klein_gordon_FLOWS - 1);
+        for (int step = 0; step < steps; ++step) {
+            klein_gordon_flow(s, klein_gordon_FLOWS > 1 && (step > 0 || s->open) ? klein_gordon_FLOWS : 0);
+            for (int flow = 1; flow < klein_gordon_FLOWS - 1; ++flow) klein_gordon_flow(s, flow);
+        }
     }
 }
 
-/* Some steps; if they lead to what is not finite, none. */
-static klein_gordon_status klein_gordon_try(klein_gordon_solver *s, int steps)
+/* Some steps from the state in s->before; if they lead to what is not finite, none. */
+static int klein_gordon_try(klein_gordon_solver *s, int steps)
 {
-    klein_gordon_copy(s->before, s->x, s);
-    klein_gordon_steps(s, steps, 1);
-    if (klein_gordon_holds(s)) return klein_gordon_OK;
+    klein_gordon_steps(s, steps);
+    if (klein_gordon_all_hold(s)) return 1;
     klein_gordon_copy(s->x, s->before, s);
-    return klein_gordon_NOT_FINITE;
+    return 0;
 }
 
 klein_gordon_status klein_gordon_integrate(klein_gordon_solver *s, double h, size_t steps)
 {
-    const klein_gordon_status status = klein_gordon_set_step(s, h);
-    if (status != klein_gordon_OK) return status;
-    for (size_t stretch = klein_gordon_STRETCH; steps > 0;) {
-        const size_t now = steps < stretch ? steps : stretch;
-        const klein_gordon_status tried = klein_gordon_try(s, (int)now);
-        if (tried == klein_gordon_OK) {
-            steps -= now;
+    klein_gordon_status status = klein_gordon_set_step(s, h);
+    if (status != klein_gordon_OK || steps == 0) return status;
+    klein_gordon_copy(s->open ? s->x : s->before, s->open ? s->before : s->x, s);
+    const size_t end = s->steps + steps;
+    for (size_t stretch = klein_gordon_STRETCH; s->steps < end && status == klein_gordon_OK;) {
+        size_t now = end - s->steps < stretch ? end - s->steps : stretch;
+        if (klein_gordon_try(s, (int)now)) {
+            klein_gordon_copy(s->before, s->x, s);
             s->steps += now;
-            s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
-        } else if (now == 1) {
-            return tried;
-        } else {
+            s->open = klein_gordon_FLOWS > 1;
+        } else if (now > 1) {
             stretch = 1;
+        } else {
+            status = klein_gordon_NOT_FINITE;
         }
     }
-    return klein_gordon_OK;
+    if (s->open && !klein_gordon_try(s, 0)) { /* the last flow of the last step, before which steps go on */
+        status = klein_gordon_NOT_FINITE;
+        s->open = 0;
+        --s->steps;
+    }
+    s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
+    return status;
 }
 
 klein_gordon_status klein_gordon_step(klein_gordon_solver *s, double h) { return klein_gordon_integrate(s, h,
     1); }
 
-void klein_gordon_state(const klein_gordon_solver *s, double *x)
+/* The sites of fields, without what is beside their rows. */
+static void klein_gordon_take(const klein_gordon_solver *s, double *const fields[klein_gordon_DIM], double *x)
 {
     for (size_t k = 0; k < klein_gordon_DIM; ++k)
         for (size_t r = 0; r < s->rows; ++r)
-            memcpy(x + k * s->sites + r * (size_t)s->length, s->x[k] + (ptrdiff_t)r * s->width,
+            memcpy(x + k * s->sites + r * (size_t)s->length, fields[k] + (ptrdiff_t)r * s->width,
                 (size_t)s->length * sizeof *x);
+}
+
+void klein_gordon_state(const klein_gordon_solver *s, double *x) { klein_gordon_take(s, s->x, x); }
+
+int klein_gordon_saved(const klein_gordon_solver *s, double *x, size_t *far)
+{
+    if (s->open) klein_gordon_take(s, s->before, x);
+    *far = s->far;
+    return s->open;
+}
+
+klein_gordon_status klein_gordon_resume(klein_gordon_solver *s, double h, const double *x, size_t far)
+{
+    const klein_gordon_status status = klein_gordon_set_step(s, h);
+    if (status != klein_gordon_OK || !klein_gordon_finite(x, klein_gordon_DIM * s->sites))
+        return klein_gordon_BAD_ARGUMENT;
+    for (size_t k = 0; k < klein_gordon_DIM; ++k) klein_gordon_put(s, s->before[k], x + k * s->sites);
+    s->open = 1;
+    s->far = far;
+    return klein_gordon_OK;
 }
 
 /* ---- What is seen at sites ---- */

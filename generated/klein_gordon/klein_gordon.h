@@ -2,7 +2,7 @@
  * klein_gordon.h: the declarations; klein_gordon.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 831561f8bed5d88420d2be16142f4d397dc4a6a758f56a3abd920c9607a7c6f0
+ * body-sha256: fe34795af607e35f74fd22bd015f64fb510787f4779b2c29a03fa2077cc2ca64
  */
 #ifndef KLEIN_GORDON_H
 #define KLEIN_GORDON_H
@@ -44,11 +44,13 @@ typedef struct {
     ptrdiff_t length, width; /* sites of a row; doubles between the beginnings of two rows */
     /* in rows, each field, then each parameter at sites: the first site of the first row */
     double *x[klein_gordon_ARRAYS];
-    ptrdiff_t *lines;                 /* of each row, where it is and where those beside it are */
+    ptrdiff_t *lines; /* of each row, where it is and where those beside it are */
     double *before[klein_gordon_DIM]; /* the fields before the steps that are being made */
-    size_t steps;                     /* good steps since klein_gordon_init */
-    double t;                         /* time since klein_gordon_init */
-    double h;                         /* the last step size */
+    int open; /* whether these lack the last flow of a step, which between calls x has made */
+    size_t far; /* steps to be made by functions for large arguments, where there are others */
+    size_t steps; /* good steps since klein_gordon_init */
+    double t; /* time since klein_gordon_init */
+    double h; /* the last step size */
     klein_gordon_params params;
     double coef[klein_gordon_COEFFICIENTS]; /* all that depends on params and h only */
     int prepared; /* whether coef has been computed */
@@ -67,13 +69,18 @@ klein_gordon_status klein_gordon_init(klein_gordon_solver *s, const klein_gordon
     const size_t sizes[klein_gordon_AXES], const double *x0, void *work);
 
 /* Steps of size h, of either sign. If one fails, the state is that before it, and s->steps counts the good
-   ones. Steps of one call are joined: where a step ends as the next begins, both are one flow. With OpenMP
-   rows are worked at in parallel, with the same bits for any number of threads. */
+   ones. Steps are joined, also those of several calls: where one ends as the next begins, both are one flow.
+   With OpenMP rows are worked at in parallel, with the same bits for any number of threads. */
 klein_gordon_status klein_gordon_step(klein_gordon_solver *s, double h);
 klein_gordon_status klein_gordon_integrate(klein_gordon_solver *s, double h, size_t steps);
 
 /* The state x[field][site]. */
 void klein_gordon_state(const klein_gordon_solver *s, double *x);
+
+/* To go on elsewhere with the same bits: if klein_gordon_saved is 1, x is what the next step begins with, for
+   klein_gordon_resume after klein_gordon_init at the state. */
+int klein_gordon_saved(const klein_gordon_solver *s, double *x, size_t *far);
+klein_gordon_status klein_gordon_resume(klein_gordon_solver *s, double h, const double *x, size_t far);
 
 /* The Hamiltonian; its density at each site; the densities out[k][site] of the Casimirs; the right-hand side
    out[field][site]. */

@@ -21,7 +21,7 @@
  *   4. The solver
  *   5. The flows
  *   6. What is seen at sites
- * body-sha256: 8750a12cc2b40544fc916563c5a34bc855787c46068c4259548326ad396b6c4c
+ * body-sha256: 0433bf9cad713e12b9c9cee0a2ec2e0fc238a0e88b9d72d26ef094b2b10b33b7
  */
 #include "nonlinear_wave.h"
 
@@ -395,6 +395,7 @@ static nonlinear_wave_status nonlinear_wave_set_step(nonlinear_wave_solver *s, d
 {
     if (s == NULL || !isfinite(h)) return nonlinear_wave_BAD_ARGUMENT;
     if (s->prepared && memcmp(&h, &s->h, sizeof h) == 0) return nonlinear_wave_OK;
+    s->open = 0;
     nonlinear_wave_prepare_step(&s->params, h, s->coef);
     s->h = h;
     s->t_before_h = s->t;
@@ -403,8 +404,7 @@ static nonlinear_wave_status nonlinear_wave_set_step(nonlinear_wave_solver *s, d
     return nonlinear_wave_OK;
 }
 
-/* Whether all values at sites are finite. */
-static int nonlinear_wave_holds(const nonlinear_wave_solver *s)
+static int nonlinear_wave_all_hold(const nonlinear_wave_solver *s)
 {
     for (size_t k = 0; k < nonlinear_wave_DIM; ++k)
         for (size_t r = 0; r < s->rows; ++r)
@@ -422,7 +422,7 @@ static void nonlinear_wave_copy(double *const to[nonlinear_wave_DIM], double *co
 
 /* ---- The flows ---- */
 /* One part of H. */
-static void nonlinear_wave_sweep(const nonlinear_wave_solver *s, int part, const double *coef, int far)
+static void nonlinear_wave_sweep_part(const nonlinear_wave_solver *s, int part, const double *coef, int far)
 {
     const size_t units = s->rows * nonlinear_wave_pieces(s);
 #ifdef _OPENMP
@@ -438,68 +438,98 @@ static void nonlinear_wave_sweep(const nonlinear_wave_solver *s, int part, const
 #endif
 }
 
-/* Some steps, joined. */
-static void nonlinear_wave_steps(const nonlinear_wave_solver *s, int steps, int far)
+/* The flow of that number in a step; after those of a step the last and the first together. */
+static void nonlinear_wave_flow(const nonlinear_wave_solver *s, int flow)
+{
+    const int joined = flow == nonlinear_wave_FLOWS, row = joined ? nonlinear_wave_JOINED
+        : nonlinear_wave_flow_rows[flow];
+    nonlinear_wave_sweep_part(s, nonlinear_wave_flow_parts[joined ? 0 : flow], s->coef + row
+        * nonlinear_wave_ROW, s->far > 0);
+}
+
+/* Some steps, joined, without the last flow; no steps are that flow alone. */
+static void nonlinear_wave_steps(const nonlinear_wave_solver *s, int steps)
 {
 #ifdef _OPENMP
 #pragma omp parallel if (s->sites > 4096)
 #endif
-    for (int step = 0; step < steps; ++step) {
-        const int last = step == steps - 1;
-        if (step == 0)
-            nonlinear_wave_sweep(s, nonlinear_wave_flow_parts[0], s->coef + nonlinear_wave_flow_rows[0]
-            * nonlinear_wave_ROW, far);
-        for (int k = 1; k < nonlinear_wave_FLOWS - 1; ++k)
-            nonlinear_wave_sweep(s, nonlinear_wave_flow_parts[k], s->coef + nonlinear_wave_flow_rows[k]
-                * nonlinear_wave_ROW, far);
-        if (nonlinear_wave_FLOWS > 1)
-            nonlinear_wave_sweep(s, nonlinear_wave_flow_parts[0], s->coef
-                + (last ? nonlinear_wave_flow_rows[nonlinear_wave_FLOWS - 1] : nonlinear_wave_JOINED)
-                * nonlinear_wave_ROW, far);
-        else if (!last)
-            nonlinear_wave_sweep(s, nonlinear_wave_flow_parts[0], s->coef, far);
+    {
+        if (steps == 0) nonlinear_wave_flow(s, nonlinear_wave_FLOWS - 1);
+        for (int step = 0; step < steps; ++step) {
+            nonlinear_wave_flow(s, nonlinear_wave_FLOWS > 1 && (step > 0 || s->open) ? nonlinear_wave_FLOWS
+                : 0);
+            for (int flow = 1; flow < nonlinear_wave_FLOWS - 1; ++flow) nonlinear_wave_flow(s, flow);
+        }
     }
 }
 
-/* Some steps; if they lead to what is not finite, none. */
-static nonlinear_wave_status nonlinear_wave_try(nonlinear_wave_solver *s, int steps)
+/* Some steps from the state in s->before; if they lead to what is not finite, none. */
+static int nonlinear_wave_try(nonlinear_wave_solver *s, int steps)
 {
-    nonlinear_wave_copy(s->before, s->x, s);
-    nonlinear_wave_steps(s, steps, 1);
-    if (nonlinear_wave_holds(s)) return nonlinear_wave_OK;
+    nonlinear_wave_steps(s, steps);
+    if (nonlinear_wave_all_hold(s)) return 1;
     nonlinear_wave_copy(s->x, s->before, s);
-    return nonlinear_wave_NOT_FINITE;
+    return 0;
 }
 
 nonlinear_wave_status nonlinear_wave_integrate(nonlinear_wave_solver *s, double h, size_t steps)
 {
-    const nonlinear_wave_status status = nonlinear_wave_set_step(s, h);
-    if (status != nonlinear_wave_OK) return status;
-    for (size_t stretch = nonlinear_wave_STRETCH; steps > 0;) {
-        const size_t now = steps < stretch ? steps : stretch;
-        const nonlinear_wave_status tried = nonlinear_wave_try(s, (int)now);
-        if (tried == nonlinear_wave_OK) {
-            steps -= now;
+    nonlinear_wave_status status = nonlinear_wave_set_step(s, h);
+    if (status != nonlinear_wave_OK || steps == 0) return status;
+    nonlinear_wave_copy(s->open ? s->x : s->before, s->open ? s->before : s->x, s);
+    const size_t end = s->steps + steps;
+    for (size_t stretch = nonlinear_wave_STRETCH; s->steps < end && status == nonlinear_wave_OK;) {
+        size_t now = end - s->steps < stretch ? end - s->steps : stretch;
+        if (nonlinear_wave_try(s, (int)now)) {
+            nonlinear_wave_copy(s->before, s->x, s);
             s->steps += now;
-            s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
-        } else if (now == 1) {
-            return tried;
-        } else {
+            s->open = nonlinear_wave_FLOWS > 1;
+        } else if (now > 1) {
             stretch = 1;
+        } else {
+            status = nonlinear_wave_NOT_FINITE;
         }
     }
-    return nonlinear_wave_OK;
+    if (s->open && !nonlinear_wave_try(s, 0)) { /* the last flow of the last step, before which steps go on */
+        status = nonlinear_wave_NOT_FINITE;
+        s->open = 0;
+        --s->steps;
+    }
+    s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
+    return status;
 }
 
 nonlinear_wave_status nonlinear_wave_step(nonlinear_wave_solver *s,
     double h) { return nonlinear_wave_integrate(s, h, 1); }
 
-void nonlinear_wave_state(const nonlinear_wave_solver *s, double *x)
+/* The sites of fields, without what is beside their rows. */
+static void nonlinear_wave_take(const nonlinear_wave_solver *s, double *const fields[nonlinear_wave_DIM],
+    double *x)
 {
     for (size_t k = 0; k < nonlinear_wave_DIM; ++k)
         for (size_t r = 0; r < s->rows; ++r)
-            memcpy(x + k * s->sites + r * (size_t)s->length, s->x[k] + (ptrdiff_t)r * s->width,
+            memcpy(x + k * s->sites + r * (size_t)s->length, fields[k] + (ptrdiff_t)r * s->width,
                 (size_t)s->length * sizeof *x);
+}
+
+void nonlinear_wave_state(const nonlinear_wave_solver *s, double *x) { nonlinear_wave_take(s, s->x, x); }
+
+int nonlinear_wave_saved(const nonlinear_wave_solver *s, double *x, size_t *far)
+{
+    if (s->open) nonlinear_wave_take(s, s->before, x);
+    *far = s->far;
+    return s->open;
+}
+
+nonlinear_wave_status nonlinear_wave_resume(nonlinear_wave_solver *s, double h, const double *x, size_t far)
+{
+    const nonlinear_wave_status status = nonlinear_wave_set_step(s, h);
+    if (status != nonlinear_wave_OK || !nonlinear_wave_finite(x, nonlinear_wave_DIM * s->sites))
+        return nonlinear_wave_BAD_ARGUMENT;
+    for (size_t k = 0; k < nonlinear_wave_DIM; ++k) nonlinear_wave_put(s, s->before[k], x + k * s->sites);
+    s->open = 1;
+    s->far = far;
+    return nonlinear_wave_OK;
 }
 
 /* ---- What is seen at sites ---- */

@@ -2,7 +2,7 @@
  * nonlinear_wave.h: the declarations; nonlinear_wave.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 41d54765032a467cb678ff88865275732cbc3d8419152e1fc819970351c590a0
+ * body-sha256: 10fd484965f9dc30a35c4b55f21c58e06ea7fac263bbdba712e97f5c994c84ba
  */
 #ifndef NONLINEAR_WAVE_H
 #define NONLINEAR_WAVE_H
@@ -45,11 +45,13 @@ typedef struct {
     ptrdiff_t length, width; /* sites of a row; doubles between the beginnings of two rows */
     /* in rows, each field, then each parameter at sites: the first site of the first row */
     double *x[nonlinear_wave_ARRAYS];
-    ptrdiff_t *lines;                   /* of each row, where it is and where those beside it are */
+    ptrdiff_t *lines; /* of each row, where it is and where those beside it are */
     double *before[nonlinear_wave_DIM]; /* the fields before the steps that are being made */
-    size_t steps;                       /* good steps since nonlinear_wave_init */
-    double t;                           /* time since nonlinear_wave_init */
-    double h;                           /* the last step size */
+    int open; /* whether these lack the last flow of a step, which between calls x has made */
+    size_t far; /* steps to be made by functions for large arguments, where there are others */
+    size_t steps; /* good steps since nonlinear_wave_init */
+    double t; /* time since nonlinear_wave_init */
+    double h; /* the last step size */
     nonlinear_wave_params params;
     double coef[nonlinear_wave_COEFFICIENTS]; /* all that depends on params and h only */
     int prepared; /* whether coef has been computed */
@@ -68,13 +70,18 @@ nonlinear_wave_status nonlinear_wave_init(nonlinear_wave_solver *s, const nonlin
     const size_t sizes[nonlinear_wave_AXES], const double *x0, void *work);
 
 /* Steps of size h, of either sign. If one fails, the state is that before it, and s->steps counts the good
-   ones. Steps of one call are joined: where a step ends as the next begins, both are one flow. With OpenMP
-   rows are worked at in parallel, with the same bits for any number of threads. */
+   ones. Steps are joined, also those of several calls: where one ends as the next begins, both are one flow.
+   With OpenMP rows are worked at in parallel, with the same bits for any number of threads. */
 nonlinear_wave_status nonlinear_wave_step(nonlinear_wave_solver *s, double h);
 nonlinear_wave_status nonlinear_wave_integrate(nonlinear_wave_solver *s, double h, size_t steps);
 
 /* The state x[field][site]. */
 void nonlinear_wave_state(const nonlinear_wave_solver *s, double *x);
+
+/* To go on elsewhere with the same bits: if nonlinear_wave_saved is 1, x is what the next step begins with,
+   for nonlinear_wave_resume after nonlinear_wave_init at the state. */
+int nonlinear_wave_saved(const nonlinear_wave_solver *s, double *x, size_t *far);
+nonlinear_wave_status nonlinear_wave_resume(nonlinear_wave_solver *s, double h, const double *x, size_t far);
 
 /* The Hamiltonian; its density at each site; the densities out[k][site] of the Casimirs; the right-hand side
    out[field][site]. */

@@ -21,7 +21,7 @@
  *   4. The solver
  *   5. The flows
  *   6. What is seen at sites
- * body-sha256: 896800d0022e3e641c27936838177540a80c55d2676e34ee426750b79a174cd6
+ * body-sha256: 3381ac155aff5b6746b781575717ec85e4b47fc235794f567c04fe711f91c694
  */
 #include "outer_planets.h"
 
@@ -518,6 +518,7 @@ static outer_planets_status outer_planets_set_step(outer_planets_solver *s, doub
 {
     if (s == NULL || !isfinite(h)) return outer_planets_BAD_ARGUMENT;
     if (s->prepared && memcmp(&h, &s->h, sizeof h) == 0) return outer_planets_OK;
+    s->open = 0;
     outer_planets_prepare_step(&s->params, h, s->coef);
     s->h = h;
     s->t_before_h = s->t;
@@ -526,8 +527,7 @@ static outer_planets_status outer_planets_set_step(outer_planets_solver *s, doub
     return outer_planets_OK;
 }
 
-/* Whether all values at sites are finite. */
-static int outer_planets_holds(const outer_planets_solver *s)
+static int outer_planets_all_hold(const outer_planets_solver *s)
 {
     for (size_t k = 0; k < outer_planets_DIM; ++k)
         for (size_t r = 0; r < s->rows; ++r)
@@ -545,7 +545,7 @@ static void outer_planets_copy(double *const to[outer_planets_DIM], double *cons
 
 /* ---- The flows ---- */
 /* One part of H. */
-static void outer_planets_sweep(const outer_planets_solver *s, int part, const double *coef, int far)
+static void outer_planets_sweep_part(const outer_planets_solver *s, int part, const double *coef, int far)
 {
     const size_t units = s->rows * outer_planets_pieces(s);
 #ifdef _OPENMP
@@ -561,68 +561,97 @@ static void outer_planets_sweep(const outer_planets_solver *s, int part, const d
 #endif
 }
 
-/* Some steps, joined. */
-static void outer_planets_steps(const outer_planets_solver *s, int steps, int far)
+/* The flow of that number in a step; after those of a step the last and the first together. */
+static void outer_planets_flow(const outer_planets_solver *s, int flow)
+{
+    const int joined = flow == outer_planets_FLOWS, row = joined ? outer_planets_JOINED
+        : outer_planets_flow_rows[flow];
+    outer_planets_sweep_part(s, outer_planets_flow_parts[joined ? 0 : flow], s->coef + row
+        * outer_planets_ROW, s->far > 0);
+}
+
+/* Some steps, joined, without the last flow; no steps are that flow alone. */
+static void outer_planets_steps(const outer_planets_solver *s, int steps)
 {
 #ifdef _OPENMP
 #pragma omp parallel if (s->sites > 512)
 #endif
-    for (int step = 0; step < steps; ++step) {
-        const int last = step == steps - 1;
-        if (step == 0)
-            outer_planets_sweep(s, outer_planets_flow_parts[0], s->coef + outer_planets_flow_rows[0]
-            * outer_planets_ROW, far);
-        for (int k = 1; k < outer_planets_FLOWS - 1; ++k)
-            outer_planets_sweep(s, outer_planets_flow_parts[k], s->coef + outer_planets_flow_rows[k]
-                * outer_planets_ROW, far);
-        if (outer_planets_FLOWS > 1)
-            outer_planets_sweep(s, outer_planets_flow_parts[0], s->coef
-                + (last ? outer_planets_flow_rows[outer_planets_FLOWS - 1] : outer_planets_JOINED)
-                * outer_planets_ROW, far);
-        else if (!last)
-            outer_planets_sweep(s, outer_planets_flow_parts[0], s->coef, far);
+    {
+        if (steps == 0) outer_planets_flow(s, outer_planets_FLOWS - 1);
+        for (int step = 0; step < steps; ++step) {
+            outer_planets_flow(s, outer_planets_FLOWS > 1 && (step > 0 || s->open) ? outer_planets_FLOWS : 0);
+            for (int flow = 1; flow < outer_planets_FLOWS - 1; ++flow) outer_planets_flow(s, flow);
+        }
     }
 }
 
-/* Some steps; if they lead to what is not finite, none. */
-static outer_planets_status outer_planets_try(outer_planets_solver *s, int steps)
+/* Some steps from the state in s->before; if they lead to what is not finite, none. */
+static int outer_planets_try(outer_planets_solver *s, int steps)
 {
-    outer_planets_copy(s->before, s->x, s);
-    outer_planets_steps(s, steps, 1);
-    if (outer_planets_holds(s)) return outer_planets_OK;
+    outer_planets_steps(s, steps);
+    if (outer_planets_all_hold(s)) return 1;
     outer_planets_copy(s->x, s->before, s);
-    return outer_planets_NOT_FINITE;
+    return 0;
 }
 
 outer_planets_status outer_planets_integrate(outer_planets_solver *s, double h, size_t steps)
 {
-    const outer_planets_status status = outer_planets_set_step(s, h);
-    if (status != outer_planets_OK) return status;
-    for (size_t stretch = outer_planets_STRETCH; steps > 0;) {
-        const size_t now = steps < stretch ? steps : stretch;
-        const outer_planets_status tried = outer_planets_try(s, (int)now);
-        if (tried == outer_planets_OK) {
-            steps -= now;
+    outer_planets_status status = outer_planets_set_step(s, h);
+    if (status != outer_planets_OK || steps == 0) return status;
+    outer_planets_copy(s->open ? s->x : s->before, s->open ? s->before : s->x, s);
+    const size_t end = s->steps + steps;
+    for (size_t stretch = outer_planets_STRETCH; s->steps < end && status == outer_planets_OK;) {
+        size_t now = end - s->steps < stretch ? end - s->steps : stretch;
+        if (outer_planets_try(s, (int)now)) {
+            outer_planets_copy(s->before, s->x, s);
             s->steps += now;
-            s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
-        } else if (now == 1) {
-            return tried;
-        } else {
+            s->open = outer_planets_FLOWS > 1;
+        } else if (now > 1) {
             stretch = 1;
+        } else {
+            status = outer_planets_NOT_FINITE;
         }
     }
-    return outer_planets_OK;
+    if (s->open && !outer_planets_try(s, 0)) { /* the last flow of the last step, before which steps go on */
+        status = outer_planets_NOT_FINITE;
+        s->open = 0;
+        --s->steps;
+    }
+    s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
+    return status;
 }
 
 outer_planets_status outer_planets_step(outer_planets_solver *s, double h) { return outer_planets_integrate(s,
     h, 1); }
 
-void outer_planets_state(const outer_planets_solver *s, double *x)
+/* The sites of fields, without what is beside their rows. */
+static void outer_planets_take(const outer_planets_solver *s, double *const fields[outer_planets_DIM],
+    double *x)
 {
     for (size_t k = 0; k < outer_planets_DIM; ++k)
         for (size_t r = 0; r < s->rows; ++r)
-            memcpy(x + k * s->sites + r * (size_t)s->length, s->x[k] + (ptrdiff_t)r * s->width,
+            memcpy(x + k * s->sites + r * (size_t)s->length, fields[k] + (ptrdiff_t)r * s->width,
                 (size_t)s->length * sizeof *x);
+}
+
+void outer_planets_state(const outer_planets_solver *s, double *x) { outer_planets_take(s, s->x, x); }
+
+int outer_planets_saved(const outer_planets_solver *s, double *x, size_t *far)
+{
+    if (s->open) outer_planets_take(s, s->before, x);
+    *far = s->far;
+    return s->open;
+}
+
+outer_planets_status outer_planets_resume(outer_planets_solver *s, double h, const double *x, size_t far)
+{
+    const outer_planets_status status = outer_planets_set_step(s, h);
+    if (status != outer_planets_OK || !outer_planets_finite(x, outer_planets_DIM * s->sites))
+        return outer_planets_BAD_ARGUMENT;
+    for (size_t k = 0; k < outer_planets_DIM; ++k) outer_planets_put(s, s->before[k], x + k * s->sites);
+    s->open = 1;
+    s->far = far;
+    return outer_planets_OK;
 }
 
 /* ---- What is seen at sites ---- */

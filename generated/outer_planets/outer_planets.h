@@ -2,7 +2,7 @@
  * outer_planets.h: the declarations; outer_planets.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 0c2fca625b289ae2967597683cf64caa72f889c0b4948a18ee306fea7e8a7e42
+ * body-sha256: bc70969e5e671e80b117a162b7ff7749576767a8b5878a002b1b8a2d5b040ecd
  */
 #ifndef OUTER_PLANETS_H
 #define OUTER_PLANETS_H
@@ -46,12 +46,14 @@ typedef struct {
     ptrdiff_t length, width; /* sites of a row; doubles between the beginnings of two rows */
     /* in rows, each field, then each parameter at sites: the first site of the first row */
     double *x[outer_planets_ARRAYS];
-    ptrdiff_t *lines;                         /* of each row, where it is and where those beside it are */
+    ptrdiff_t *lines; /* of each row, where it is and where those beside it are */
     double *gathered[outer_planets_GATHERED]; /* sums over other sites, for each site */
-    double *before[outer_planets_DIM];        /* the fields before the steps that are being made */
-    size_t steps;                             /* good steps since outer_planets_init */
-    double t;                                 /* time since outer_planets_init */
-    double h;                                 /* the last step size */
+    double *before[outer_planets_DIM]; /* the fields before the steps that are being made */
+    int open; /* whether these lack the last flow of a step, which between calls x has made */
+    size_t far; /* steps to be made by functions for large arguments, where there are others */
+    size_t steps; /* good steps since outer_planets_init */
+    double t; /* time since outer_planets_init */
+    double h; /* the last step size */
     outer_planets_params params;
     double coef[outer_planets_COEFFICIENTS]; /* all that depends on params and h only */
     int prepared; /* whether coef has been computed */
@@ -70,13 +72,18 @@ outer_planets_status outer_planets_init(outer_planets_solver *s, const outer_pla
     const size_t sizes[outer_planets_AXES], const double *x0, void *work);
 
 /* Steps of size h, of either sign. If one fails, the state is that before it, and s->steps counts the good
-   ones. Steps of one call are joined: where a step ends as the next begins, both are one flow. With OpenMP
-   rows are worked at in parallel, with the same bits for any number of threads. */
+   ones. Steps are joined, also those of several calls: where one ends as the next begins, both are one flow.
+   With OpenMP rows are worked at in parallel, with the same bits for any number of threads. */
 outer_planets_status outer_planets_step(outer_planets_solver *s, double h);
 outer_planets_status outer_planets_integrate(outer_planets_solver *s, double h, size_t steps);
 
 /* The state x[field][site]. */
 void outer_planets_state(const outer_planets_solver *s, double *x);
+
+/* To go on elsewhere with the same bits: if outer_planets_saved is 1, x is what the next step begins with,
+   for outer_planets_resume after outer_planets_init at the state. */
+int outer_planets_saved(const outer_planets_solver *s, double *x, size_t *far);
+outer_planets_status outer_planets_resume(outer_planets_solver *s, double h, const double *x, size_t far);
 
 /* The Hamiltonian; its density at each site; the densities out[k][site] of the Casimirs; the right-hand side
    out[field][site]. */

@@ -22,7 +22,7 @@
  *   4. The solver
  *   5. The stages
  *   6. What is seen at sites
- * body-sha256: cd68e898e85cc251a1f56c9ed5ba604ea6b2a8bdd930b3c83ad9ea344f4f64b5
+ * body-sha256: f35027511d76f2e1252d6cb03a4fb7b767feb3ee3f83e27d5563a67bb7f16ce6
  */
 #include "point_vortices.h"
 
@@ -540,8 +540,7 @@ static point_vortices_status point_vortices_set_step(point_vortices_solver *s, d
     return point_vortices_OK;
 }
 
-/* Whether all values at sites are finite. */
-static int point_vortices_holds(const point_vortices_solver *s)
+static int point_vortices_all_hold(const point_vortices_solver *s)
 {
     for (size_t k = 0; k < point_vortices_DIM; ++k)
         for (size_t r = 0; r < s->rows; ++r)
@@ -710,7 +709,7 @@ static point_vortices_status point_vortices_stages(point_vortices_solver *s, int
             point_vortices_increment_rows(s, coef, far, now, first, end);
         }
     }
-    return point_vortices_holds(s) ? point_vortices_OK : point_vortices_NOT_FINITE;
+    return point_vortices_all_hold(s) ? point_vortices_OK : point_vortices_NOT_FINITE;
 }
 
 /* One step; if it cannot be made, none. */
@@ -749,13 +748,17 @@ point_vortices_status point_vortices_integrate(point_vortices_solver *s, double 
 point_vortices_status point_vortices_step(point_vortices_solver *s,
     double h) { return point_vortices_integrate(s, h, 1); }
 
-void point_vortices_state(const point_vortices_solver *s, double *x)
+/* The sites of fields, without what is beside their rows. */
+static void point_vortices_take(const point_vortices_solver *s, double *const fields[point_vortices_DIM],
+    double *x)
 {
     for (size_t k = 0; k < point_vortices_DIM; ++k)
         for (size_t r = 0; r < s->rows; ++r)
-            memcpy(x + k * s->sites + r * (size_t)s->length, s->x[k] + (ptrdiff_t)r * s->width,
+            memcpy(x + k * s->sites + r * (size_t)s->length, fields[k] + (ptrdiff_t)r * s->width,
                 (size_t)s->length * sizeof *x);
 }
+
+void point_vortices_state(const point_vortices_solver *s, double *x) { point_vortices_take(s, s->x, x); }
 
 /* ---- What is seen at sites ---- */
 double point_vortices_hamiltonian(const point_vortices_solver *s)

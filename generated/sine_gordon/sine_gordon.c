@@ -21,7 +21,7 @@
  *   4. The solver
  *   5. The flows
  *   6. What is seen at sites
- * body-sha256: a12ef074b41adcc399d7ecbd793693393be7ea0edefb07cc2243ccad5da6d3c3
+ * body-sha256: 7d86ec0980420045c9081e85c8090f1a8f6ee2230eafd1955847d1bdf4736b02
  */
 #include "sine_gordon.h"
 
@@ -421,6 +421,7 @@ static sine_gordon_status sine_gordon_set_step(sine_gordon_solver *s, double h)
 {
     if (s == NULL || !isfinite(h)) return sine_gordon_BAD_ARGUMENT;
     if (s->prepared && memcmp(&h, &s->h, sizeof h) == 0) return sine_gordon_OK;
+    s->open = 0;
     sine_gordon_prepare_step(&s->params, h, s->coef);
     s->h = h;
     s->t_before_h = s->t;
@@ -429,8 +430,7 @@ static sine_gordon_status sine_gordon_set_step(sine_gordon_solver *s, double h)
     return sine_gordon_OK;
 }
 
-/* Whether all values at sites are finite. */
-static int sine_gordon_holds(const sine_gordon_solver *s)
+static int sine_gordon_all_hold(const sine_gordon_solver *s)
 {
     for (size_t k = 0; k < sine_gordon_DIM; ++k)
         for (size_t r = 0; r < s->rows; ++r)
@@ -448,7 +448,7 @@ static void sine_gordon_copy(double *const to[sine_gordon_DIM], double *const fr
 
 /* ---- The flows ---- */
 /* One part of H. */
-static void sine_gordon_sweep(const sine_gordon_solver *s, int part, const double *coef, int far)
+static void sine_gordon_sweep_part(const sine_gordon_solver *s, int part, const double *coef, int far)
 {
     const size_t units = s->rows * sine_gordon_pieces(s);
 #ifdef _OPENMP
@@ -464,68 +464,96 @@ static void sine_gordon_sweep(const sine_gordon_solver *s, int part, const doubl
 #endif
 }
 
-/* Some steps, joined. */
-static void sine_gordon_steps(const sine_gordon_solver *s, int steps, int far)
+/* The flow of that number in a step; after those of a step the last and the first together. */
+static void sine_gordon_flow(const sine_gordon_solver *s, int flow)
+{
+    const int joined = flow == sine_gordon_FLOWS, row = joined ? sine_gordon_JOINED
+        : sine_gordon_flow_rows[flow];
+    sine_gordon_sweep_part(s, sine_gordon_flow_parts[joined ? 0 : flow], s->coef + row * sine_gordon_ROW,
+        s->far > 0);
+}
+
+/* Some steps, joined, without the last flow; no steps are that flow alone. */
+static void sine_gordon_steps(const sine_gordon_solver *s, int steps)
 {
 #ifdef _OPENMP
 #pragma omp parallel if (s->sites > 4096)
 #endif
-    for (int step = 0; step < steps; ++step) {
-        const int last = step == steps - 1;
-        if (step == 0)
-            sine_gordon_sweep(s, sine_gordon_flow_parts[0], s->coef + sine_gordon_flow_rows[0]
-            * sine_gordon_ROW, far);
-        for (int k = 1; k < sine_gordon_FLOWS - 1; ++k)
-            sine_gordon_sweep(s, sine_gordon_flow_parts[k], s->coef + sine_gordon_flow_rows[k]
-                * sine_gordon_ROW, far);
-        if (sine_gordon_FLOWS > 1)
-            sine_gordon_sweep(s, sine_gordon_flow_parts[0], s->coef
-                + (last ? sine_gordon_flow_rows[sine_gordon_FLOWS - 1] : sine_gordon_JOINED)
-                * sine_gordon_ROW, far);
-        else if (!last)
-            sine_gordon_sweep(s, sine_gordon_flow_parts[0], s->coef, far);
+    {
+        if (steps == 0) sine_gordon_flow(s, sine_gordon_FLOWS - 1);
+        for (int step = 0; step < steps; ++step) {
+            sine_gordon_flow(s, sine_gordon_FLOWS > 1 && (step > 0 || s->open) ? sine_gordon_FLOWS : 0);
+            for (int flow = 1; flow < sine_gordon_FLOWS - 1; ++flow) sine_gordon_flow(s, flow);
+        }
     }
 }
 
-/* Some steps; if they lead to what is not finite, none. */
-static sine_gordon_status sine_gordon_try(sine_gordon_solver *s, int steps)
+/* Some steps from the state in s->before; if they lead to what is not finite, none. */
+static int sine_gordon_try(sine_gordon_solver *s, int steps)
 {
-    sine_gordon_copy(s->before, s->x, s);
-    sine_gordon_steps(s, steps, 1);
-    if (sine_gordon_holds(s)) return sine_gordon_OK;
+    sine_gordon_steps(s, steps);
+    if (sine_gordon_all_hold(s)) return 1;
     sine_gordon_copy(s->x, s->before, s);
-    return sine_gordon_NOT_FINITE;
+    return 0;
 }
 
 sine_gordon_status sine_gordon_integrate(sine_gordon_solver *s, double h, size_t steps)
 {
-    const sine_gordon_status status = sine_gordon_set_step(s, h);
-    if (status != sine_gordon_OK) return status;
-    for (size_t stretch = sine_gordon_STRETCH; steps > 0;) {
-        const size_t now = steps < stretch ? steps : stretch;
-        const sine_gordon_status tried = sine_gordon_try(s, (int)now);
-        if (tried == sine_gordon_OK) {
-            steps -= now;
+    sine_gordon_status status = sine_gordon_set_step(s, h);
+    if (status != sine_gordon_OK || steps == 0) return status;
+    sine_gordon_copy(s->open ? s->x : s->before, s->open ? s->before : s->x, s);
+    const size_t end = s->steps + steps;
+    for (size_t stretch = sine_gordon_STRETCH; s->steps < end && status == sine_gordon_OK;) {
+        size_t now = end - s->steps < stretch ? end - s->steps : stretch;
+        if (sine_gordon_try(s, (int)now)) {
+            sine_gordon_copy(s->before, s->x, s);
             s->steps += now;
-            s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
-        } else if (now == 1) {
-            return tried;
-        } else {
+            s->open = sine_gordon_FLOWS > 1;
+        } else if (now > 1) {
             stretch = 1;
+        } else {
+            status = sine_gordon_NOT_FINITE;
         }
     }
-    return sine_gordon_OK;
+    if (s->open && !sine_gordon_try(s, 0)) { /* the last flow of the last step, before which steps go on */
+        status = sine_gordon_NOT_FINITE;
+        s->open = 0;
+        --s->steps;
+    }
+    s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
+    return status;
 }
 
 sine_gordon_status sine_gordon_step(sine_gordon_solver *s, double h) { return sine_gordon_integrate(s, h, 1);
     }
 
-void sine_gordon_state(const sine_gordon_solver *s, double *x)
+/* The sites of fields, without what is beside their rows. */
+static void sine_gordon_take(const sine_gordon_solver *s, double *const fields[sine_gordon_DIM], double *x)
 {
     for (size_t k = 0; k < sine_gordon_DIM; ++k)
         for (size_t r = 0; r < s->rows; ++r)
-            memcpy(x + k * s->sites + r * (size_t)s->length, s->x[k] + (ptrdiff_t)r * s->width,
+            memcpy(x + k * s->sites + r * (size_t)s->length, fields[k] + (ptrdiff_t)r * s->width,
                 (size_t)s->length * sizeof *x);
+}
+
+void sine_gordon_state(const sine_gordon_solver *s, double *x) { sine_gordon_take(s, s->x, x); }
+
+int sine_gordon_saved(const sine_gordon_solver *s, double *x, size_t *far)
+{
+    if (s->open) sine_gordon_take(s, s->before, x);
+    *far = s->far;
+    return s->open;
+}
+
+sine_gordon_status sine_gordon_resume(sine_gordon_solver *s, double h, const double *x, size_t far)
+{
+    const sine_gordon_status status = sine_gordon_set_step(s, h);
+    if (status != sine_gordon_OK || !sine_gordon_finite(x, sine_gordon_DIM * s->sites))
+        return sine_gordon_BAD_ARGUMENT;
+    for (size_t k = 0; k < sine_gordon_DIM; ++k) sine_gordon_put(s, s->before[k], x + k * s->sites);
+    s->open = 1;
+    s->far = far;
+    return sine_gordon_OK;
 }
 
 /* ---- What is seen at sites ---- */

@@ -2,7 +2,7 @@
  * sine_gordon.h: the declarations; sine_gordon.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 0bbd80b009f1e519a9d2aa93bf9f02952ed3b4f975c8324259013e806aa126c4
+ * body-sha256: 2ec4b1ddf767aca64a303cf2e43bab4f4f3a9c5cc59aa58fa37e9a17940de55d
  */
 #ifndef SINE_GORDON_H
 #define SINE_GORDON_H
@@ -44,11 +44,13 @@ typedef struct {
     ptrdiff_t length, width; /* sites of a row; doubles between the beginnings of two rows */
     /* in rows, each field, then each parameter at sites: the first site of the first row */
     double *x[sine_gordon_ARRAYS];
-    ptrdiff_t *lines;                /* of each row, where it is and where those beside it are */
+    ptrdiff_t *lines; /* of each row, where it is and where those beside it are */
     double *before[sine_gordon_DIM]; /* the fields before the steps that are being made */
-    size_t steps;                    /* good steps since sine_gordon_init */
-    double t;                        /* time since sine_gordon_init */
-    double h;                        /* the last step size */
+    int open; /* whether these lack the last flow of a step, which between calls x has made */
+    size_t far; /* steps to be made by functions for large arguments, where there are others */
+    size_t steps; /* good steps since sine_gordon_init */
+    double t; /* time since sine_gordon_init */
+    double h; /* the last step size */
     sine_gordon_params params;
     double coef[sine_gordon_COEFFICIENTS]; /* all that depends on params and h only */
     int prepared; /* whether coef has been computed */
@@ -67,13 +69,18 @@ sine_gordon_status sine_gordon_init(sine_gordon_solver *s, const sine_gordon_par
     const size_t sizes[sine_gordon_AXES], const double *x0, void *work);
 
 /* Steps of size h, of either sign. If one fails, the state is that before it, and s->steps counts the good
-   ones. Steps of one call are joined: where a step ends as the next begins, both are one flow. With OpenMP
-   rows are worked at in parallel, with the same bits for any number of threads. */
+   ones. Steps are joined, also those of several calls: where one ends as the next begins, both are one flow.
+   With OpenMP rows are worked at in parallel, with the same bits for any number of threads. */
 sine_gordon_status sine_gordon_step(sine_gordon_solver *s, double h);
 sine_gordon_status sine_gordon_integrate(sine_gordon_solver *s, double h, size_t steps);
 
 /* The state x[field][site]. */
 void sine_gordon_state(const sine_gordon_solver *s, double *x);
+
+/* To go on elsewhere with the same bits: if sine_gordon_saved is 1, x is what the next step begins with, for
+   sine_gordon_resume after sine_gordon_init at the state. */
+int sine_gordon_saved(const sine_gordon_solver *s, double *x, size_t *far);
+sine_gordon_status sine_gordon_resume(sine_gordon_solver *s, double h, const double *x, size_t far);
 
 /* The Hamiltonian; its density at each site; the densities out[k][site] of the Casimirs; the right-hand side
    out[field][site]. */

@@ -21,7 +21,7 @@
  *   4. The solver
  *   5. The flows
  *   6. What is seen at sites
- * body-sha256: 3bf70719e317e491a36848644c07cf079f0fcfe5d14e3ae27285797d9c56324e
+ * body-sha256: 12b23d894b2347507f4e73c304a50b2ea08d474290cc5b368111345e28fa8bb7
  */
 #include "toda.h"
 
@@ -407,6 +407,7 @@ static toda_status toda_set_step(toda_solver *s, double h)
 {
     if (s == NULL || !isfinite(h)) return toda_BAD_ARGUMENT;
     if (s->prepared && memcmp(&h, &s->h, sizeof h) == 0) return toda_OK;
+    s->open = 0;
     toda_prepare_step(&s->params, h, s->coef);
     s->h = h;
     s->t_before_h = s->t;
@@ -415,8 +416,7 @@ static toda_status toda_set_step(toda_solver *s, double h)
     return toda_OK;
 }
 
-/* Whether all values at sites are finite. */
-static int toda_holds(const toda_solver *s)
+static int toda_all_hold(const toda_solver *s)
 {
     for (size_t k = 0; k < toda_DIM; ++k)
         for (size_t r = 0; r < s->rows; ++r)
@@ -432,7 +432,7 @@ static void toda_copy(double *const to[toda_DIM], double *const from[toda_DIM], 
 
 /* ---- The flows ---- */
 /* One part of H. */
-static void toda_sweep(const toda_solver *s, int part, const double *coef, int far)
+static void toda_sweep_part(const toda_solver *s, int part, const double *coef, int far)
 {
     const size_t units = s->rows * toda_pieces(s);
 #ifdef _OPENMP
@@ -448,63 +448,92 @@ static void toda_sweep(const toda_solver *s, int part, const double *coef, int f
 #endif
 }
 
-/* Some steps, joined. */
-static void toda_steps(const toda_solver *s, int steps, int far)
+/* The flow of that number in a step; after those of a step the last and the first together. */
+static void toda_flow(const toda_solver *s, int flow)
+{
+    const int joined = flow == toda_FLOWS, row = joined ? toda_JOINED : toda_flow_rows[flow];
+    toda_sweep_part(s, toda_flow_parts[joined ? 0 : flow], s->coef + row * toda_ROW, s->far > 0);
+}
+
+/* Some steps, joined, without the last flow; no steps are that flow alone. */
+static void toda_steps(const toda_solver *s, int steps)
 {
 #ifdef _OPENMP
 #pragma omp parallel if (s->sites > 4096)
 #endif
-    for (int step = 0; step < steps; ++step) {
-        const int last = step == steps - 1;
-        if (step == 0) toda_sweep(s, toda_flow_parts[0], s->coef + toda_flow_rows[0] * toda_ROW, far);
-        for (int k = 1; k < toda_FLOWS - 1; ++k)
-            toda_sweep(s, toda_flow_parts[k], s->coef + toda_flow_rows[k] * toda_ROW, far);
-        if (toda_FLOWS > 1)
-            toda_sweep(s, toda_flow_parts[0], s->coef + (last ? toda_flow_rows[toda_FLOWS - 1] : toda_JOINED)
-                * toda_ROW, far);
-        else if (!last)
-            toda_sweep(s, toda_flow_parts[0], s->coef, far);
+    {
+        if (steps == 0) toda_flow(s, toda_FLOWS - 1);
+        for (int step = 0; step < steps; ++step) {
+            toda_flow(s, toda_FLOWS > 1 && (step > 0 || s->open) ? toda_FLOWS : 0);
+            for (int flow = 1; flow < toda_FLOWS - 1; ++flow) toda_flow(s, flow);
+        }
     }
 }
 
-/* Some steps; if they lead to what is not finite, none. */
-static toda_status toda_try(toda_solver *s, int steps)
+/* Some steps from the state in s->before; if they lead to what is not finite, none. */
+static int toda_try(toda_solver *s, int steps)
 {
-    toda_copy(s->before, s->x, s);
-    toda_steps(s, steps, 1);
-    if (toda_holds(s)) return toda_OK;
+    toda_steps(s, steps);
+    if (toda_all_hold(s)) return 1;
     toda_copy(s->x, s->before, s);
-    return toda_NOT_FINITE;
+    return 0;
 }
 
 toda_status toda_integrate(toda_solver *s, double h, size_t steps)
 {
-    const toda_status status = toda_set_step(s, h);
-    if (status != toda_OK) return status;
-    for (size_t stretch = toda_STRETCH; steps > 0;) {
-        const size_t now = steps < stretch ? steps : stretch;
-        const toda_status tried = toda_try(s, (int)now);
-        if (tried == toda_OK) {
-            steps -= now;
+    toda_status status = toda_set_step(s, h);
+    if (status != toda_OK || steps == 0) return status;
+    toda_copy(s->open ? s->x : s->before, s->open ? s->before : s->x, s);
+    const size_t end = s->steps + steps;
+    for (size_t stretch = toda_STRETCH; s->steps < end && status == toda_OK;) {
+        size_t now = end - s->steps < stretch ? end - s->steps : stretch;
+        if (toda_try(s, (int)now)) {
+            toda_copy(s->before, s->x, s);
             s->steps += now;
-            s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
-        } else if (now == 1) {
-            return tried;
-        } else {
+            s->open = toda_FLOWS > 1;
+        } else if (now > 1) {
             stretch = 1;
+        } else {
+            status = toda_NOT_FINITE;
         }
     }
-    return toda_OK;
+    if (s->open && !toda_try(s, 0)) { /* the last flow of the last step, before which steps go on */
+        status = toda_NOT_FINITE;
+        s->open = 0;
+        --s->steps;
+    }
+    s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
+    return status;
 }
 
 toda_status toda_step(toda_solver *s, double h) { return toda_integrate(s, h, 1); }
 
-void toda_state(const toda_solver *s, double *x)
+/* The sites of fields, without what is beside their rows. */
+static void toda_take(const toda_solver *s, double *const fields[toda_DIM], double *x)
 {
     for (size_t k = 0; k < toda_DIM; ++k)
         for (size_t r = 0; r < s->rows; ++r)
-            memcpy(x + k * s->sites + r * (size_t)s->length, s->x[k] + (ptrdiff_t)r * s->width,
+            memcpy(x + k * s->sites + r * (size_t)s->length, fields[k] + (ptrdiff_t)r * s->width,
                 (size_t)s->length * sizeof *x);
+}
+
+void toda_state(const toda_solver *s, double *x) { toda_take(s, s->x, x); }
+
+int toda_saved(const toda_solver *s, double *x, size_t *far)
+{
+    if (s->open) toda_take(s, s->before, x);
+    *far = s->far;
+    return s->open;
+}
+
+toda_status toda_resume(toda_solver *s, double h, const double *x, size_t far)
+{
+    const toda_status status = toda_set_step(s, h);
+    if (status != toda_OK || !toda_finite(x, toda_DIM * s->sites)) return toda_BAD_ARGUMENT;
+    for (size_t k = 0; k < toda_DIM; ++k) toda_put(s, s->before[k], x + k * s->sites);
+    s->open = 1;
+    s->far = far;
+    return toda_OK;
 }
 
 /* ---- What is seen at sites ---- */

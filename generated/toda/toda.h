@@ -2,7 +2,7 @@
  * toda.h: the declarations; toda.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 961aeb3f55edcefdc8dfe7b21684a15169502ffe0c9af074eba136acc217345e
+ * body-sha256: 90aa06523cf42dc48c638ff1be3cf2b55dcb40b2da06e9ea1727838e2d41a38f
  */
 #ifndef TODA_H
 #define TODA_H
@@ -45,6 +45,8 @@ typedef struct {
     double *x[toda_ARRAYS];
     ptrdiff_t *lines;         /* of each row, where it is and where those beside it are */
     double *before[toda_DIM]; /* the fields before the steps that are being made */
+    int open;                 /* whether these lack the last flow of a step, which between calls x has made */
+    size_t far;               /* steps to be made by functions for large arguments, where there are others */
     size_t steps;             /* good steps since toda_init */
     double t;                 /* time since toda_init */
     double h;                 /* the last step size */
@@ -65,13 +67,18 @@ toda_status toda_init(toda_solver *s, const toda_params *params, const size_t si
     const double *x0, void *work);
 
 /* Steps of size h, of either sign. If one fails, the state is that before it, and s->steps counts the good
-   ones. Steps of one call are joined: where a step ends as the next begins, both are one flow. With OpenMP
-   rows are worked at in parallel, with the same bits for any number of threads. */
+   ones. Steps are joined, also those of several calls: where one ends as the next begins, both are one flow.
+   With OpenMP rows are worked at in parallel, with the same bits for any number of threads. */
 toda_status toda_step(toda_solver *s, double h);
 toda_status toda_integrate(toda_solver *s, double h, size_t steps);
 
 /* The state x[field][site]. */
 void toda_state(const toda_solver *s, double *x);
+
+/* To go on elsewhere with the same bits: if toda_saved is 1, x is what the next step begins with, for
+   toda_resume after toda_init at the state. */
+int toda_saved(const toda_solver *s, double *x, size_t *far);
+toda_status toda_resume(toda_solver *s, double h, const double *x, size_t far);
 
 /* The Hamiltonian; its density at each site; the densities out[k][site] of the Casimirs; the right-hand side
    out[field][site]. */

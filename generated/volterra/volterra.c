@@ -21,7 +21,7 @@
  *   4. The solver
  *   5. The flows
  *   6. What is seen at sites
- * body-sha256: cb28cbeb4a8eed6cfcf4e1c8a32189e3a832ff15f28b4a56d4f5753a2b2dc12b
+ * body-sha256: afab726302dc2dff8031c1bcb6f550246add4b03b494687e18acd12a58bdac10
  */
 #include "volterra.h"
 
@@ -422,6 +422,7 @@ static volterra_status volterra_set_step(volterra_solver *s, double h)
 {
     if (s == NULL || !isfinite(h)) return volterra_BAD_ARGUMENT;
     if (s->prepared && memcmp(&h, &s->h, sizeof h) == 0) return volterra_OK;
+    s->open = 0;
     volterra_prepare_step(&s->params, h, s->coef);
     s->h = h;
     s->t_before_h = s->t;
@@ -430,8 +431,7 @@ static volterra_status volterra_set_step(volterra_solver *s, double h)
     return volterra_OK;
 }
 
-/* Whether all values at sites are finite. */
-static int volterra_holds(const volterra_solver *s)
+static int volterra_all_hold(const volterra_solver *s)
 {
     for (size_t k = 0; k < volterra_DIM; ++k)
         for (size_t r = 0; r < s->rows; ++r)
@@ -448,7 +448,7 @@ static void volterra_copy(double *const to[volterra_DIM], double *const from[vol
 
 /* ---- The flows ---- */
 /* One part of H. */
-static void volterra_sweep(const volterra_solver *s, int part, const double *coef, int far)
+static void volterra_sweep_part(const volterra_solver *s, int part, const double *coef, int far)
 {
     const size_t units = s->rows * volterra_pieces(s);
 #ifdef _OPENMP
@@ -464,64 +464,92 @@ static void volterra_sweep(const volterra_solver *s, int part, const double *coe
 #endif
 }
 
-/* Some steps, joined. */
-static void volterra_steps(const volterra_solver *s, int steps, int far)
+/* The flow of that number in a step; after those of a step the last and the first together. */
+static void volterra_flow(const volterra_solver *s, int flow)
+{
+    const int joined = flow == volterra_FLOWS, row = joined ? volterra_JOINED : volterra_flow_rows[flow];
+    volterra_sweep_part(s, volterra_flow_parts[joined ? 0 : flow], s->coef + row * volterra_ROW, s->far > 0);
+}
+
+/* Some steps, joined, without the last flow; no steps are that flow alone. */
+static void volterra_steps(const volterra_solver *s, int steps)
 {
 #ifdef _OPENMP
 #pragma omp parallel if (s->sites > 4096)
 #endif
-    for (int step = 0; step < steps; ++step) {
-        const int last = step == steps - 1;
-        if (step == 0)
-            volterra_sweep(s, volterra_flow_parts[0], s->coef + volterra_flow_rows[0] * volterra_ROW, far);
-        for (int k = 1; k < volterra_FLOWS - 1; ++k)
-            volterra_sweep(s, volterra_flow_parts[k], s->coef + volterra_flow_rows[k] * volterra_ROW, far);
-        if (volterra_FLOWS > 1)
-            volterra_sweep(s, volterra_flow_parts[0], s->coef + (last ? volterra_flow_rows[volterra_FLOWS - 1]
-                : volterra_JOINED) * volterra_ROW, far);
-        else if (!last)
-            volterra_sweep(s, volterra_flow_parts[0], s->coef, far);
+    {
+        if (steps == 0) volterra_flow(s, volterra_FLOWS - 1);
+        for (int step = 0; step < steps; ++step) {
+            volterra_flow(s, volterra_FLOWS > 1 && (step > 0 || s->open) ? volterra_FLOWS : 0);
+            for (int flow = 1; flow < volterra_FLOWS - 1; ++flow) volterra_flow(s, flow);
+        }
     }
 }
 
-/* Some steps; if they lead to what is not finite, none. */
-static volterra_status volterra_try(volterra_solver *s, int steps)
+/* Some steps from the state in s->before; if they lead to what is not finite, none. */
+static int volterra_try(volterra_solver *s, int steps)
 {
-    volterra_copy(s->before, s->x, s);
-    volterra_steps(s, steps, 1);
-    if (volterra_holds(s)) return volterra_OK;
+    volterra_steps(s, steps);
+    if (volterra_all_hold(s)) return 1;
     volterra_copy(s->x, s->before, s);
-    return volterra_NOT_FINITE;
+    return 0;
 }
 
 volterra_status volterra_integrate(volterra_solver *s, double h, size_t steps)
 {
-    const volterra_status status = volterra_set_step(s, h);
-    if (status != volterra_OK) return status;
-    for (size_t stretch = volterra_STRETCH; steps > 0;) {
-        const size_t now = steps < stretch ? steps : stretch;
-        const volterra_status tried = volterra_try(s, (int)now);
-        if (tried == volterra_OK) {
-            steps -= now;
+    volterra_status status = volterra_set_step(s, h);
+    if (status != volterra_OK || steps == 0) return status;
+    volterra_copy(s->open ? s->x : s->before, s->open ? s->before : s->x, s);
+    const size_t end = s->steps + steps;
+    for (size_t stretch = volterra_STRETCH; s->steps < end && status == volterra_OK;) {
+        size_t now = end - s->steps < stretch ? end - s->steps : stretch;
+        if (volterra_try(s, (int)now)) {
+            volterra_copy(s->before, s->x, s);
             s->steps += now;
-            s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
-        } else if (now == 1) {
-            return tried;
-        } else {
+            s->open = volterra_FLOWS > 1;
+        } else if (now > 1) {
             stretch = 1;
+        } else {
+            status = volterra_NOT_FINITE;
         }
     }
-    return volterra_OK;
+    if (s->open && !volterra_try(s, 0)) { /* the last flow of the last step, before which steps go on */
+        status = volterra_NOT_FINITE;
+        s->open = 0;
+        --s->steps;
+    }
+    s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
+    return status;
 }
 
 volterra_status volterra_step(volterra_solver *s, double h) { return volterra_integrate(s, h, 1); }
 
-void volterra_state(const volterra_solver *s, double *x)
+/* The sites of fields, without what is beside their rows. */
+static void volterra_take(const volterra_solver *s, double *const fields[volterra_DIM], double *x)
 {
     for (size_t k = 0; k < volterra_DIM; ++k)
         for (size_t r = 0; r < s->rows; ++r)
-            memcpy(x + k * s->sites + r * (size_t)s->length, s->x[k] + (ptrdiff_t)r * s->width,
+            memcpy(x + k * s->sites + r * (size_t)s->length, fields[k] + (ptrdiff_t)r * s->width,
                 (size_t)s->length * sizeof *x);
+}
+
+void volterra_state(const volterra_solver *s, double *x) { volterra_take(s, s->x, x); }
+
+int volterra_saved(const volterra_solver *s, double *x, size_t *far)
+{
+    if (s->open) volterra_take(s, s->before, x);
+    *far = s->far;
+    return s->open;
+}
+
+volterra_status volterra_resume(volterra_solver *s, double h, const double *x, size_t far)
+{
+    const volterra_status status = volterra_set_step(s, h);
+    if (status != volterra_OK || !volterra_finite(x, volterra_DIM * s->sites)) return volterra_BAD_ARGUMENT;
+    for (size_t k = 0; k < volterra_DIM; ++k) volterra_put(s, s->before[k], x + k * s->sites);
+    s->open = 1;
+    s->far = far;
+    return volterra_OK;
 }
 
 /* ---- What is seen at sites ---- */

@@ -2,7 +2,7 @@
  * volterra.h: the declarations; volterra.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 1f558ee08de2be73ac88b981f562f4a9dd3ed319c168bb0276a742f621c69748
+ * body-sha256: cf31f29c7c22b6b2a1248ac3881ad49eaf01618656f1e09f66f16afd579300ff
  */
 #ifndef VOLTERRA_H
 #define VOLTERRA_H
@@ -43,11 +43,13 @@ typedef struct {
     ptrdiff_t length, width; /* sites of a row; doubles between the beginnings of two rows */
     /* in rows, each field, then each parameter at sites: the first site of the first row */
     double *x[volterra_ARRAYS];
-    ptrdiff_t *lines;             /* of each row, where it is and where those beside it are */
+    ptrdiff_t *lines; /* of each row, where it is and where those beside it are */
     double *before[volterra_DIM]; /* the fields before the steps that are being made */
-    size_t steps;                 /* good steps since volterra_init */
-    double t;                     /* time since volterra_init */
-    double h;                     /* the last step size */
+    int open; /* whether these lack the last flow of a step, which between calls x has made */
+    size_t far; /* steps to be made by functions for large arguments, where there are others */
+    size_t steps; /* good steps since volterra_init */
+    double t; /* time since volterra_init */
+    double h; /* the last step size */
     volterra_params params;
     double coef[volterra_COEFFICIENTS]; /* all that depends on params and h only */
     int prepared; /* whether coef has been computed */
@@ -65,13 +67,18 @@ volterra_status volterra_init(volterra_solver *s, const volterra_params *params,
     const size_t sizes[volterra_AXES], const double *x0, void *work);
 
 /* Steps of size h, of either sign. If one fails, the state is that before it, and s->steps counts the good
-   ones. Steps of one call are joined: where a step ends as the next begins, both are one flow. With OpenMP
-   rows are worked at in parallel, with the same bits for any number of threads. */
+   ones. Steps are joined, also those of several calls: where one ends as the next begins, both are one flow.
+   With OpenMP rows are worked at in parallel, with the same bits for any number of threads. */
 volterra_status volterra_step(volterra_solver *s, double h);
 volterra_status volterra_integrate(volterra_solver *s, double h, size_t steps);
 
 /* The state x[field][site]. */
 void volterra_state(const volterra_solver *s, double *x);
+
+/* To go on elsewhere with the same bits: if volterra_saved is 1, x is what the next step begins with, for
+   volterra_resume after volterra_init at the state. */
+int volterra_saved(const volterra_solver *s, double *x, size_t *far);
+volterra_status volterra_resume(volterra_solver *s, double h, const double *x, size_t far);
 
 /* The Hamiltonian; its density at each site; the densities out[k][site] of the Casimirs; the right-hand side
    out[field][site]. */

@@ -21,7 +21,7 @@
  *   4. The solver
  *   5. The flows
  *   6. What is seen at sites
- * body-sha256: a1e90b4264b3d8dc4f46fd610682eb518193d33c4063ed76e3a00df3a69e43ec
+ * body-sha256: 2775009bf04e3410cf4db4777db6774268bcbea52d4f4c26b3d1f8008155ed39
  */
 #include "xxz_disorder.h"
 
@@ -504,6 +504,7 @@ static xxz_disorder_status xxz_disorder_set_step(xxz_disorder_solver *s, double 
 {
     if (s == NULL || !isfinite(h)) return xxz_disorder_BAD_ARGUMENT;
     if (s->prepared && memcmp(&h, &s->h, sizeof h) == 0) return xxz_disorder_OK;
+    s->open = 0;
     xxz_disorder_prepare_step(&s->params, h, s->coef);
     s->h = h;
     s->t_before_h = s->t;
@@ -512,8 +513,7 @@ static xxz_disorder_status xxz_disorder_set_step(xxz_disorder_solver *s, double 
     return xxz_disorder_OK;
 }
 
-/* Whether all values at sites are finite. */
-static int xxz_disorder_holds(const xxz_disorder_solver *s)
+static int xxz_disorder_all_hold(const xxz_disorder_solver *s)
 {
     for (size_t k = 0; k < xxz_disorder_DIM; ++k)
         for (size_t r = 0; r < s->rows; ++r)
@@ -531,7 +531,7 @@ static void xxz_disorder_copy(double *const to[xxz_disorder_DIM], double *const 
 
 /* ---- The flows ---- */
 /* One part of H. */
-static void xxz_disorder_sweep(const xxz_disorder_solver *s, int part, const double *coef, int far)
+static void xxz_disorder_sweep_part(const xxz_disorder_solver *s, int part, const double *coef, int far)
 {
     const size_t units = s->rows * xxz_disorder_pieces(s);
 #ifdef _OPENMP
@@ -547,68 +547,96 @@ static void xxz_disorder_sweep(const xxz_disorder_solver *s, int part, const dou
 #endif
 }
 
-/* Some steps, joined. */
-static void xxz_disorder_steps(const xxz_disorder_solver *s, int steps, int far)
+/* The flow of that number in a step; after those of a step the last and the first together. */
+static void xxz_disorder_flow(const xxz_disorder_solver *s, int flow)
+{
+    const int joined = flow == xxz_disorder_FLOWS, row = joined ? xxz_disorder_JOINED
+        : xxz_disorder_flow_rows[flow];
+    xxz_disorder_sweep_part(s, xxz_disorder_flow_parts[joined ? 0 : flow], s->coef + row * xxz_disorder_ROW,
+        s->far > 0);
+}
+
+/* Some steps, joined, without the last flow; no steps are that flow alone. */
+static void xxz_disorder_steps(const xxz_disorder_solver *s, int steps)
 {
 #ifdef _OPENMP
 #pragma omp parallel if (s->sites > 4096)
 #endif
-    for (int step = 0; step < steps; ++step) {
-        const int last = step == steps - 1;
-        if (step == 0)
-            xxz_disorder_sweep(s, xxz_disorder_flow_parts[0], s->coef + xxz_disorder_flow_rows[0]
-            * xxz_disorder_ROW, far);
-        for (int k = 1; k < xxz_disorder_FLOWS - 1; ++k)
-            xxz_disorder_sweep(s, xxz_disorder_flow_parts[k], s->coef + xxz_disorder_flow_rows[k]
-                * xxz_disorder_ROW, far);
-        if (xxz_disorder_FLOWS > 1)
-            xxz_disorder_sweep(s, xxz_disorder_flow_parts[0], s->coef
-                + (last ? xxz_disorder_flow_rows[xxz_disorder_FLOWS - 1] : xxz_disorder_JOINED)
-                * xxz_disorder_ROW, far);
-        else if (!last)
-            xxz_disorder_sweep(s, xxz_disorder_flow_parts[0], s->coef, far);
+    {
+        if (steps == 0) xxz_disorder_flow(s, xxz_disorder_FLOWS - 1);
+        for (int step = 0; step < steps; ++step) {
+            xxz_disorder_flow(s, xxz_disorder_FLOWS > 1 && (step > 0 || s->open) ? xxz_disorder_FLOWS : 0);
+            for (int flow = 1; flow < xxz_disorder_FLOWS - 1; ++flow) xxz_disorder_flow(s, flow);
+        }
     }
 }
 
-/* Some steps; if they lead to what is not finite, none. */
-static xxz_disorder_status xxz_disorder_try(xxz_disorder_solver *s, int steps)
+/* Some steps from the state in s->before; if they lead to what is not finite, none. */
+static int xxz_disorder_try(xxz_disorder_solver *s, int steps)
 {
-    xxz_disorder_copy(s->before, s->x, s);
-    xxz_disorder_steps(s, steps, 1);
-    if (xxz_disorder_holds(s)) return xxz_disorder_OK;
+    xxz_disorder_steps(s, steps);
+    if (xxz_disorder_all_hold(s)) return 1;
     xxz_disorder_copy(s->x, s->before, s);
-    return xxz_disorder_NOT_FINITE;
+    return 0;
 }
 
 xxz_disorder_status xxz_disorder_integrate(xxz_disorder_solver *s, double h, size_t steps)
 {
-    const xxz_disorder_status status = xxz_disorder_set_step(s, h);
-    if (status != xxz_disorder_OK) return status;
-    for (size_t stretch = xxz_disorder_STRETCH; steps > 0;) {
-        const size_t now = steps < stretch ? steps : stretch;
-        const xxz_disorder_status tried = xxz_disorder_try(s, (int)now);
-        if (tried == xxz_disorder_OK) {
-            steps -= now;
+    xxz_disorder_status status = xxz_disorder_set_step(s, h);
+    if (status != xxz_disorder_OK || steps == 0) return status;
+    xxz_disorder_copy(s->open ? s->x : s->before, s->open ? s->before : s->x, s);
+    const size_t end = s->steps + steps;
+    for (size_t stretch = xxz_disorder_STRETCH; s->steps < end && status == xxz_disorder_OK;) {
+        size_t now = end - s->steps < stretch ? end - s->steps : stretch;
+        if (xxz_disorder_try(s, (int)now)) {
+            xxz_disorder_copy(s->before, s->x, s);
             s->steps += now;
-            s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
-        } else if (now == 1) {
-            return tried;
-        } else {
+            s->open = xxz_disorder_FLOWS > 1;
+        } else if (now > 1) {
             stretch = 1;
+        } else {
+            status = xxz_disorder_NOT_FINITE;
         }
     }
-    return xxz_disorder_OK;
+    if (s->open && !xxz_disorder_try(s, 0)) { /* the last flow of the last step, before which steps go on */
+        status = xxz_disorder_NOT_FINITE;
+        s->open = 0;
+        --s->steps;
+    }
+    s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
+    return status;
 }
 
 xxz_disorder_status xxz_disorder_step(xxz_disorder_solver *s, double h) { return xxz_disorder_integrate(s, h,
     1); }
 
-void xxz_disorder_state(const xxz_disorder_solver *s, double *x)
+/* The sites of fields, without what is beside their rows. */
+static void xxz_disorder_take(const xxz_disorder_solver *s, double *const fields[xxz_disorder_DIM], double *x)
 {
     for (size_t k = 0; k < xxz_disorder_DIM; ++k)
         for (size_t r = 0; r < s->rows; ++r)
-            memcpy(x + k * s->sites + r * (size_t)s->length, s->x[k] + (ptrdiff_t)r * s->width,
+            memcpy(x + k * s->sites + r * (size_t)s->length, fields[k] + (ptrdiff_t)r * s->width,
                 (size_t)s->length * sizeof *x);
+}
+
+void xxz_disorder_state(const xxz_disorder_solver *s, double *x) { xxz_disorder_take(s, s->x, x); }
+
+int xxz_disorder_saved(const xxz_disorder_solver *s, double *x, size_t *far)
+{
+    if (s->open) xxz_disorder_take(s, s->before, x);
+    *far = s->far;
+    return s->open;
+}
+
+xxz_disorder_status xxz_disorder_resume(xxz_disorder_solver *s, double h, const double *x, size_t far)
+{
+    const xxz_disorder_status status = xxz_disorder_set_step(s, h);
+    if (status != xxz_disorder_OK || !xxz_disorder_finite(x, xxz_disorder_DIM * s->sites))
+        return xxz_disorder_BAD_ARGUMENT;
+    for (size_t k = 0; k < xxz_disorder_DIM; ++k) xxz_disorder_put(s, s->before[k], x + k * s->sites);
+    s->open = 1;
+    s->far = far;
+    return xxz_disorder_OK;
 }
 
 /* ---- What is seen at sites ---- */

@@ -2,7 +2,7 @@
  * xxz_disorder.h: the declarations; xxz_disorder.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 2873919d076b912d6edb94686b73b61d1e4b6f282a6e5b3ee3fa617fe32ac6a8
+ * body-sha256: a0f33b9e05f0413d997fda8092ec8a44ecab0e5240ec8a0ccb57711362788b36
  */
 #ifndef XXZ_DISORDER_H
 #define XXZ_DISORDER_H
@@ -46,11 +46,13 @@ typedef struct {
     ptrdiff_t length, width; /* sites of a row; doubles between the beginnings of two rows */
     /* in rows, each field, then each parameter at sites: the first site of the first row */
     double *x[xxz_disorder_ARRAYS];
-    ptrdiff_t *lines;                 /* of each row, where it is and where those beside it are */
+    ptrdiff_t *lines; /* of each row, where it is and where those beside it are */
     double *before[xxz_disorder_DIM]; /* the fields before the steps that are being made */
-    size_t steps;                     /* good steps since xxz_disorder_init */
-    double t;                         /* time since xxz_disorder_init */
-    double h;                         /* the last step size */
+    int open; /* whether these lack the last flow of a step, which between calls x has made */
+    size_t far; /* steps to be made by functions for large arguments, where there are others */
+    size_t steps; /* good steps since xxz_disorder_init */
+    double t; /* time since xxz_disorder_init */
+    double h; /* the last step size */
     xxz_disorder_params params;
     double coef[xxz_disorder_COEFFICIENTS]; /* all that depends on params and h only */
     int prepared; /* whether coef has been computed */
@@ -69,13 +71,18 @@ xxz_disorder_status xxz_disorder_init(xxz_disorder_solver *s, const xxz_disorder
     const size_t sizes[xxz_disorder_AXES], const double *x0, void *work);
 
 /* Steps of size h, of either sign. If one fails, the state is that before it, and s->steps counts the good
-   ones. Steps of one call are joined: where a step ends as the next begins, both are one flow. With OpenMP
-   rows are worked at in parallel, with the same bits for any number of threads. */
+   ones. Steps are joined, also those of several calls: where one ends as the next begins, both are one flow.
+   With OpenMP rows are worked at in parallel, with the same bits for any number of threads. */
 xxz_disorder_status xxz_disorder_step(xxz_disorder_solver *s, double h);
 xxz_disorder_status xxz_disorder_integrate(xxz_disorder_solver *s, double h, size_t steps);
 
 /* The state x[field][site]. */
 void xxz_disorder_state(const xxz_disorder_solver *s, double *x);
+
+/* To go on elsewhere with the same bits: if xxz_disorder_saved is 1, x is what the next step begins with, for
+   xxz_disorder_resume after xxz_disorder_init at the state. */
+int xxz_disorder_saved(const xxz_disorder_solver *s, double *x, size_t *far);
+xxz_disorder_status xxz_disorder_resume(xxz_disorder_solver *s, double h, const double *x, size_t far);
 
 /* The Hamiltonian; its density at each site; the densities out[k][site] of the Casimirs; the right-hand side
    out[field][site]. */

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Mapping
-from types import SimpleNamespace
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from phigen.errors import ToolchainError
 from phigen.runtime import cache
+from phigen.runtime.binding import bound
 from phigen.runtime.interface import BackendError, Floats, LatticeInterface, status_name
 
 _POINTER, _DOUBLE, _SIZE, _INT = ctypes.c_void_p, ctypes.c_double, ctypes.c_size_t, ctypes.c_int
@@ -34,8 +33,36 @@ _OF_GRAPHS: dict[str, tuple[Any, tuple[Any, ...]]] = {
     "init": (_INT, (_POINTER,) * 6),
 }
 
+#: What splittings have, and steps by hand where they are offered.
+_OFFERED: dict[str, tuple[Any, tuple[Any, ...]]] = {
+    "saved": (_INT, (_POINTER, _POINTER, _POINTER)),
+    "resume": (_INT, (_POINTER, _DOUBLE, _POINTER, _SIZE)),
+    "stages": (_SIZE, ()),
+    "describe": (_INT, (_SIZE, _POINTER)),
+    "begin": (_INT, (_POINTER, _DOUBLE)),
+    "sweep": (_INT, (_POINTER, _SIZE, _INT, _SIZE, _SIZE)),
+    "planes": (_INT, (_POINTER, _SIZE, _SIZE, _SIZE, _POINTER)),
+    "put_planes": (_INT, (_POINTER, _SIZE, _SIZE, _SIZE, _POINTER)),
+    "holds": (_INT, (_POINTER, _SIZE, _SIZE)),
+}
+
 #: Site updates between two calls: Python can deliver a keyboard interrupt then.
 _UPDATES_PER_CALL = 1 << 26
+
+
+class Stage(ctypes.Structure):
+    """What one sweep of a step reads and changes: planes beside those swept, and fields as bits."""
+
+    _fields_: ClassVar = [
+        ("behind", ctypes.c_size_t),
+        ("ahead", ctypes.c_size_t),
+        ("read", ctypes.c_ulong),
+        ("changed", ctypes.c_ulong),
+    ]
+    behind: int
+    ahead: int
+    read: int
+    changed: int
 
 
 class CLatticeSession:
@@ -94,6 +121,49 @@ class CLatticeSession:
         """π∇H (coordinates, *sizes)."""
         return self._filled(self._c.vector_field, self._shape)
 
+    def saved(self) -> dict[str, Any]:
+        """What `resume` goes on from with the same bits, beside the state."""
+        if not hasattr(self._c, "saved"):
+            return {}
+        x, far = np.empty(self._shape), np.zeros(1, dtype=np.uintp)
+        is_open = self._c.saved(self._address, x.ctypes.data, far.ctypes.data)
+        return {"before": x, "far": far} if is_open else {}
+
+    def resume(self, h: float, kept: Mapping[str, Any]) -> None:
+        """Go on from what was saved."""
+        if "before" in kept:
+            x = np.ascontiguousarray(kept["before"], dtype=np.float64)
+            self._expect_done(self._c.resume(self._address, h, x.ctypes.data, int(kept["far"][0])))
+
+    # --- steps by hand: see NAME.h
+
+    def begin(self, h: float) -> None:
+        """Set the step size."""
+        self._expect_done(self._c.begin(self._address, h))
+
+    def sweep(self, stage: int, far: int, first: int, end: int) -> None:
+        """One sweep over the planes from ``first``, before ``end``."""
+        self._expect_done(self._c.sweep(self._address, stage, far, first, end))
+
+    def planes(self, field: int, first: int, end: int) -> Floats:
+        """A copy of some planes of a field."""
+        out = np.empty((end - first, *self._shape[2:]))
+        self._expect_done(self._c.planes(self._address, field, first, end, out.ctypes.data))
+        return out
+
+    def put_planes(self, field: int, first: int, end: int, values: Floats) -> None:
+        """Put other values of a field in place of those of some planes."""
+        self._expect_done(self._c.put_planes(self._address, field, first, end, values.ctypes.data))
+
+    def holds(self, first: int, end: int) -> bool:
+        """Whether all values of some planes are finite."""
+        return bool(self._c.holds(self._address, first, end))
+
+    @staticmethod
+    def _expect_done(status: int) -> None:
+        if status:
+            raise ValueError(f"no such stage, planes or step: {status_name(status)}")
+
     def _filled(self, function: Any, shape: tuple[int, ...]) -> Floats:
         out = np.empty(shape)
         function(self._address, out.ctypes.data)
@@ -108,16 +178,19 @@ class CLattice:
     def __init__(self, files: Mapping[str, str], interface: LatticeInterface) -> None:
         self.interface, self._files = interface, dict(files)
         self._library = cache.load(files, threads=True)
-        self._c: Any = SimpleNamespace()
-        for name, (result, arguments) in (_SIGNATURES | (_OF_GRAPHS if interface.graph else {})).items():
-            function = getattr(self._library, f"{interface.name}_{name}", None)
-            if function is None:
-                raise ToolchainError(
-                    f"the compiled solver has no function {interface.name}_{name}\n"
-                    "  hint: whatever CC names did not compile what it was given; try gcc or clang"
-                )
-            function.restype, function.argtypes = result, arguments
-            setattr(self._c, name, function)
+        wanted = _SIGNATURES | (_OF_GRAPHS if interface.graph else {})
+        self._c = bound(self._library, interface.name, wanted, _OFFERED)
+
+    def stages(self) -> list[Stage]:
+        """The sweeps of a step in order, then the last and the first together. Raises `ValueError` if not offered."""
+        if not hasattr(self._c, "stages"):
+            raise ValueError(
+                f"{self.interface.name} has no steps by hand: it is no grid that is split, or profile small"
+            )
+        found = [Stage() for _ in range(self._c.stages() + 1)]
+        for k, stage in enumerate(found):
+            self._c.describe(k, ctypes.addressof(stage))
+        return found
 
     def __reduce__(self) -> tuple[type[CLattice], tuple[Any, ...]]:
         return CLattice, (self._files, self.interface)

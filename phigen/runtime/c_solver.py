@@ -10,14 +10,13 @@ from __future__ import annotations
 import ctypes
 import math
 from collections.abc import Mapping, Sequence
-from types import SimpleNamespace
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from phigen.errors import ToolchainError
 from phigen.runtime import cache
+from phigen.runtime.binding import bound
 from phigen.runtime.c_lattice import CLattice
 from phigen.runtime.gradients import KEPT, Segment, segments
 from phigen.runtime.interface import (
@@ -197,7 +196,6 @@ class CSolver:
     def __init__(self, files: Mapping[str, str], interface: Interface, gauge: Floats | None = None) -> None:
         self.interface = interface
         self._files, self._library, self._gauge = dict(files), cache.load(files), gauge
-        self._c: Any = SimpleNamespace()
         offered = {name: s for name, s in _EXTRAS.items() if hasattr(self._library, f"{interface.name}_{name}")}
         own = _dated(offered, interface) | (_NOISY if interface.noise else {})
         timed = _TIMED if interface.time else {}
@@ -205,15 +203,7 @@ class CSolver:
             _, each = _EXTRAS["ensemble_each"]
             offered |= {"ensemble_each": (_INT, (*each[:3], _POINTER, *each[3:]))} if "ensemble_each" in offered else {}
         monitored = {"pullback": (_INT, (*_EXTRAS["pullback"][1], _POINTER))} if "level_bar" in offered else {}
-        for name, (result, arguments) in {**_SIGNATURES, **offered, **timed, **monitored, **own}.items():
-            function = getattr(self._library, f"{interface.name}_{name}", None)
-            if function is None:
-                raise ToolchainError(
-                    f"the compiled solver has no function {interface.name}_{name}\n"
-                    "  hint: whatever CC names did not compile what it was given; try gcc or clang"
-                )
-            function.restype, function.argtypes = result, arguments
-            setattr(self._c, name, function)
+        self._c = bound(self._library, interface.name, {**_SIGNATURES, **offered, **timed, **monitored, **own})
 
     def __reduce__(self) -> tuple[type[CSolver], tuple[Any, ...]]:
         return CSolver, (self._files, self.interface, self._gauge)

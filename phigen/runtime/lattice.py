@@ -39,6 +39,14 @@ class LatticeSession(Protocol):
         """Make so many steps."""
         ...
 
+    def saved(self) -> dict[str, Any]:
+        """Arrays that `resume` goes on from, beside the state, with the same bits."""
+        ...
+
+    def resume(self, h: float, kept: Mapping[str, Any]) -> None:
+        """Go on from what was saved, in a session that began at the state."""
+        ...
+
     def hamiltonian(self) -> float:
         """H of the state."""
         ...
@@ -322,6 +330,11 @@ class LatticeSolver:
             values[name] = array
         return values | bonds
 
+    def session(self, x0: ArrayLike, h: float, parameters: Mapping[str, Any]) -> LatticeSession:
+        """A lattice at x0, to be driven by hand. Raises as `integrate`."""
+        start = self.state(x0, "x0")
+        return self._started(start, h, self.values(parameters, {}, start.shape[1:]))
+
     def _started(self, start: Floats, h: float, values: Mapping[str, Any]) -> LatticeSession:
         try:
             return self.backend.start(start, values)
@@ -361,11 +374,13 @@ class _Run:
     energy: list[float] = field(default_factory=list)
     count: int = 0
     session: Any = None
+    saved: Mapping[str, Any] = field(default_factory=dict)  # what a session of a checkpoint goes on from
 
     def made(self, progress: Progress | None) -> int:
         """All frames that are left."""
         first = self._resumed()
         self.session = self.solver._started(first, self.h, self.values)
+        self.session.resume(self.h, self.saved)
         before = int(self.marks[self.count - 1]) if self.count else 0
         if not self.count:
             self._store(first)
@@ -399,6 +414,7 @@ class _Run:
         if self.checkpoints:
             self.frames.flush()
             arrays = {"state": self.session.state(), "count": np.array(self.count), "energy": np.array(self.energy)}
+            arrays |= self.session.saved()
             if self.frames.path is None:
                 arrays["frames"] = self.frames.array[: self.count]
             Checkpoint(self._identity(), arrays).save(self.checkpoints)
@@ -410,6 +426,7 @@ class _Run:
         arrays = checkpoint.load(self.checkpoints, self._identity())
         self.count, self.energy = int(arrays["count"]), arrays["energy"].tolist()
         self.frames.restore(arrays.get("frames"), self.count)
+        self.saved = arrays
         return np.asarray(arrays["state"])
 
 

@@ -43,6 +43,13 @@ class NumpyLatticeSession:
                     raise BackendError(str(failed), self.steps, self._x[None].copy()) from None
                 self.steps += 1
 
+    def saved(self) -> dict[str, Any]:
+        """Nothing: steps go on from the state."""
+        return {}
+
+    def resume(self, h: float, kept: Mapping[str, Any]) -> None:
+        """Go on from what was saved."""
+
     def hamiltonian(self) -> float:
         """H of the state."""
         return float(self.density().sum())

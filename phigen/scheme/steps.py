@@ -8,7 +8,7 @@ stage; so it does with the increments of noise. All others read the coefficients
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from phigen.scheme.alternation import Schedule
@@ -356,6 +356,22 @@ class Sweeps(_Staged):
     def coefficients(self) -> int:
         """Coefficients of one step, in all rows."""
         return self.row * len(self.schedule.times)
+
+    @property
+    def is_by_hand(self) -> bool:
+        """Whether the sweeps of a step can be driven one by one over planes: those of a grid that is split."""
+        return self.partners is None and self.equation is None
+
+    def stage(self, part: int, fields: Sequence[str]) -> tuple[int, int, int, int]:
+        """Of a part on a grid: how far behind and ahead it reads along the first axis, and as bits of a number the
+        fields that it reads there, and those that it changes."""
+        places = [self.sites.places[s] for sweep in self.parts[part] for s in sweep.kernel.inputs["site"]]
+        far = [(f, offset[0]) for f, offset in places if offset[0]]
+        read = {f for f, _ in far if f in fields}
+        changed = {fields[i] for sweep in self.parts[part] for i in sweep.moved}
+        behind, ahead = max([0, *(-o for _, o in far)]), max([0, *(o for _, o in far)])
+        bits = [sum(1 << k for k, f in enumerate(fields) if f in names) for names in (read, changed)]
+        return behind, ahead, bits[0], bits[1]
 
     @property
     def kernels(self) -> tuple[Kernel, ...]:

@@ -80,8 +80,11 @@ PROFILES = ("fast", "small")
 
 #: What can be left out of the code one by one; the profile small leaves out what serves speed, and
 #: members with parameters of their own.
-PARTS = ("ensemble", "gauge-search", "kicks", "lanes", "members", "recurrences")
-LEFT_OUT = {"fast": frozenset[str](), "small": frozenset(["gauge-search", "lanes", "members", "recurrences"])}
+PARTS = ("by-hand", "ensemble", "gauge-search", "kicks", "lanes", "members", "recurrences")
+LEFT_OUT = {
+    "fast": frozenset[str](),
+    "small": frozenset(["by-hand", "gauge-search", "lanes", "members", "recurrences"]),
+}
 
 #: How a section is crossed.
 DIRECTIONS = ("rising", "falling", "both")

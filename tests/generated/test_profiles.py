@@ -11,7 +11,6 @@ from support import RawC, compiled, files, setting, small, solver
 from phigen import resources, spec
 from phigen.compiler import compile_spec
 from phigen.spec.model import Extras
-from phigen.spec.names import PARTS
 
 GENERATED = Path(__file__).resolve().parents[2] / "generated"
 
@@ -58,7 +57,7 @@ def test_small_code_is_short(name, order, lines, solver_bytes):
     assert not any(word in text for word in ("_LANES", "_block", "_group", "recurrence") for text in texts)
 
 
-#: Of each part that can be left out, a word in code that has it.
+#: Of each part that can be left out, a word in code that has it; what only lattices have is in tests/lattice.
 WORDS = {
     "ensemble": "_ensemble(",
     "gauge-search": "_guide(",
@@ -75,14 +74,14 @@ def described(name, profile, without=()):
     return compile_spec(given, order=4, profile=profile, extras=Extras(without=frozenset(without)))
 
 
-@pytest.mark.parametrize("part", PARTS)
+@pytest.mark.parametrize("part", WORDS)
 def test_a_part_can_be_left_out_of_fast_code(part):
     """The steps are those of NumPy, which leaves it out too where it has it."""
     compilation = described("rigid_body", "fast", [part])
     texts = files(compilation, "c").values()
     has = {other: any(word in text for text in texts) for other, word in WORDS.items()}
     needed = [("recurrences", "lanes"), ("ensemble", "members")]
-    assert has == {other: other != part and (part, other) not in needed for other in PARTS}
+    assert has == {other: other != part and (part, other) not in needed for other in WORDS}
     at = setting(compilation)
     ends = [solver(compilation, t).integrate(at.x, at.h, 200, **at.parameters).x[-1] for t in ("c", "numpy")]
     np.testing.assert_allclose(ends[0], ends[1], rtol=0, atol=2e-14)
@@ -97,7 +96,7 @@ def test_a_part_can_be_left_out_of_fast_code(part):
 def test_small_code_has_no_part_that_serves_speed_and_carries_nothing_for_one():
     texts = files(described("rigid_body", "small"), "c").values()
     assert {part: any(word in text for text in texts) for part, word in WORDS.items()} == {
-        part: part in ("ensemble", "kicks") for part in PARTS
+        part: part in ("ensemble", "kicks") for part in WORDS
     }
     paths = [described("nambu_pendulum", profile).program.step for profile in ("fast", "small")]
     assert paths[0].lanes

@@ -334,7 +334,7 @@ def test_code_does_not_grow_with_the_lattice() -> None:
     for name in TEXTS.keys() - {"sheet", "magnet"}:  # three parts of two colours with nine neighbours; of five parts
         program = compile_spec(specs.loads(f"phigen: 1\nname: {name}\n{TEXTS[name]}\n"), profile="small").program
         lines = sum(len(text.splitlines()) for text in emit(program, "c", "phigen").values())
-        assert lines < 800 + 120 * ("graph" in TEXTS[name]) + 100 * (name in SERIES), (name, lines)
+        assert lines < 825 + 120 * ("graph" in TEXTS[name]) + 100 * (name in SERIES), (name, lines)
 
 
 @pytest.mark.parametrize("name", ["sheet", "magnet", "dragged"])

@@ -15,7 +15,7 @@ CHAIN = Path(__file__).with_name("chain_by_hand")
 RUNTIME = resources.templates() / "c/runtime"
 INCLUDED = [f"-I{BY_HAND}", f"-I{RUNTIME}"]
 WARNINGS = ("all", "extra", "pedantic", "conversion", "double-promotion", "shadow", "no-unused-function", "error")
-OF_LATTICES = ("lattice.c", "rows.c", "graph.c")
+OF_LATTICES = ("lattice.c", "lattice_by_hand.c", "rows.c", "graph.c")
 STRICT = ["-std=c99", *(f"-W{warning}" for warning in WARNINGS)]
 
 IMPLICIT = [

@@ -113,6 +113,8 @@ def switches(program: Program, step: Sweeps, layout: Layout) -> dict[str, bool]:
         "SITE_PARAMETERS": bool(step.sites.parameters),
         "SERIES": step.equation is not None,
         "STIFF": step.equation is not None and layout.band > 0 and program.offers("recurrences"),
+        "BY_HAND": step.is_by_hand and program.offers("by-hand"),
+        "ONE_ROW": len(step.sites.axes) == 1,
         "GUESSES": step.equation is not None and program.offers("recurrences"),
     }
 
@@ -218,6 +220,9 @@ def model(program: Program, step: Sweeps) -> str:
         "graph": layout.graph,
         "rows": ", ".join(str(row) for _, row in flows),
         "allowed": [*_allowed(asked, arrays)],
+        "stages": ", ".join(_braced(step.stage(k, program.coordinates)) for k in range(len(step.parts)))
+        if switches(program, step, layout)["BY_HAND"]
+        else "",
     }
     prepare = function(program, step.prepare)
     return render("c", "lattice.c", values) + prepare
@@ -357,6 +362,7 @@ def _pieces(program: Program, layout: Layout, loops: Mapping[str, list[str]], *,
         "beside": beside,
         "low": max([0, *(-low for low, _ in last)]),
         "high": max([0, *(high for _, high in last)]),
+        "skipping": switches(program, layout.step, layout)["BY_HAND"] and len(layout.step.sites.axes) == 1,
         "after": [],
     }
 

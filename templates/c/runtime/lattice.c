@@ -22,6 +22,9 @@ enum {
     PHI_STRETCH = 1,   /* steps before the state is looked at */
 #else
     PHI_STRETCH = 32,  /* steps before the state is looked at: what is not finite stays so */
+#if PHI_NEAR
+    PHI_FAR_STEPS = 64, /* steps by functions for large arguments, after one that needed them */
+#endif
 #endif
     PHI_LEAD = (PHI_HALO + 7) / 8 * 8,
     PHI_BUFFER = 256,
@@ -194,6 +197,9 @@ phi_status phi_init(phi_solver *s, const phi_params *params, const size_t sizes[
     s->sites = sites;
     s->rows = rows;
     s->length = (ptrdiff_t)length;
+#if PHI_BY_HAND && PHI_ONE_ROW
+    s->to = s->length;
+#endif
     s->width = width;
     s->params = own;
     double *aligned = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64) + PHI_LEAD;
@@ -229,6 +235,9 @@ static phi_status phi_set_step(phi_solver *s, double h)
 {
     if (s == NULL || !isfinite(h)) return PHI_BAD_ARGUMENT;
     if (s->prepared && memcmp(&h, &s->h, sizeof h) == 0) return PHI_OK;
+#if !PHI_SERIES
+    s->open = 0;
+#endif
     phi_prepare_step(&s->params, h, s->coef);
     s->h = h;
     s->t_before_h = s->t;
@@ -237,8 +246,7 @@ static phi_status phi_set_step(phi_solver *s, double h)
     return PHI_OK;
 }
 
-/* Whether all values at sites are finite. */
-static int phi_holds(const phi_solver *s)
+static int phi_all_hold(const phi_solver *s)
 {
     for (size_t k = 0; k < PHI_DIM; ++k)
         for (size_t r = 0; r < s->rows; ++r)
@@ -258,39 +266,38 @@ static void phi_copy(double *const to[PHI_DIM], double *const from[PHI_DIM], con
 #include "lattice_flows.c"
 #endif
 
-phi_status phi_integrate(phi_solver *s, double h, size_t steps)
-{
-    const phi_status status = phi_set_step(s, h);
-    if (status != PHI_OK) return status;
-#if PHI_GUESSES
-    phi_forget(s);
-#endif
-    for (size_t stretch = PHI_STRETCH; steps > 0;) {
-        const size_t now = steps < stretch ? steps : stretch;
-        const phi_status tried = phi_try(s, (int)now);
-        if (tried == PHI_OK) {
-            steps -= now;
-            s->steps += now;
-            s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
-        } else if (now == 1) {
-            return tried;
-        } else {
-            stretch = 1;
-        }
-    }
-    return PHI_OK;
-}
-
 phi_status phi_step(phi_solver *s, double h) { return phi_integrate(s, h, 1); }
 
-void phi_state(const phi_solver *s, double *x)
+/* The sites of fields, without what is beside their rows. */
+static void phi_take(const phi_solver *s, double *const fields[PHI_DIM], double *x)
 {
     for (size_t k = 0; k < PHI_DIM; ++k)
         for (size_t r = 0; r < s->rows; ++r)
-            memcpy(x + k * s->sites + r * (size_t)s->length, s->x[k] + (ptrdiff_t)r * s->width,
+            memcpy(x + k * s->sites + r * (size_t)s->length, fields[k] + (ptrdiff_t)r * s->width,
                 (size_t)s->length * sizeof *x);
 }
 
+void phi_state(const phi_solver *s, double *x) { phi_take(s, s->x, x); }
+
+#if !PHI_SERIES
+int phi_saved(const phi_solver *s, double *x, size_t *far)
+{
+    if (s->open) phi_take(s, s->before, x);
+    *far = s->far;
+    return s->open;
+}
+
+phi_status phi_resume(phi_solver *s, double h, const double *x, size_t far)
+{
+    const phi_status status = phi_set_step(s, h);
+    if (status != PHI_OK || !phi_finite(x, PHI_DIM * s->sites)) return PHI_BAD_ARGUMENT;
+    for (size_t k = 0; k < PHI_DIM; ++k) phi_put(s, s->before[k], x + k * s->sites);
+    s->open = 1;
+    s->far = far;
+    return PHI_OK;
+}
+
+#endif
 /* ---- What is seen at sites ---- */
 double phi_hamiltonian(const phi_solver *s)
 {
@@ -327,6 +334,9 @@ void phi_density(const phi_solver *s, double *out) { phi_fill(s, phi_energy_row,
 void phi_casimirs(const phi_solver *s, double *out) { phi_fill(s, phi_casimirs_row, out); }
 void phi_vector_field(const phi_solver *s, double *out) { phi_fill(s, phi_vector_field_row, out); }
 
+#if PHI_BY_HAND
+#include "lattice_by_hand.c"
+#endif
 #include "status.c"
 
 size_t phi_solver_size(void) { return sizeof(phi_solver); }

@@ -33,7 +33,16 @@ typedef struct {
     int colour_count, flows;  /* colours, and flows from one end of a stage to the other */
 #endif
 #endif
+#if PHI_SERIES
     double *before[PHI_DIM];  /* the fields before the steps that are being made */
+#else
+    double *before[PHI_DIM];  /* the fields before the steps that are being made */
+    int open;                 /* whether these lack the last flow of a step, which between calls x has made */
+    size_t far;               /* steps to be made by functions for large arguments, where there are others */
+#if PHI_BY_HAND && PHI_ONE_ROW
+    ptrdiff_t from, to;       /* the sites that are swept */
+#endif
+#endif
 #if PHI_SERIES
     double *y[2][PHI_ARRAYS]; /* the middle of a stage, before and after a sweep, with the parameters at sites */
 #if PHI_GUESSES
@@ -87,7 +96,7 @@ phi_status phi_init(phi_solver *s, const phi_params *params, const size_t sizes[
 #if PHI_GUESSES
    Guesses are extrapolated from the former steps of one call.
 #elif !PHI_SERIES
-   Steps of one call are joined: where a step ends as the next begins, both are one flow.
+   Steps are joined, also those of several calls: where one ends as the next begins, both are one flow.
 #endif
    With OpenMP rows are worked at in parallel, with the same bits for any number of threads. */
 phi_status phi_step(phi_solver *s, double h);
@@ -95,6 +104,13 @@ phi_status phi_integrate(phi_solver *s, double h, size_t steps);
 
 /* The state x[field][site]. */
 void phi_state(const phi_solver *s, double *x);
+#if !PHI_SERIES
+
+/* To go on elsewhere with the same bits: if phi_saved is 1, x is what the next step begins with, for phi_resume after
+   phi_init at the state. */
+int phi_saved(const phi_solver *s, double *x, size_t *far);
+phi_status phi_resume(phi_solver *s, double h, const double *x, size_t far);
+#endif
 
 /* The Hamiltonian; its density at each site; the densities out[k][site] of the Casimirs; the right-hand side
    out[field][site]. */
@@ -103,6 +119,32 @@ void phi_density(const phi_solver *s, double *out);
 void phi_casimirs(const phi_solver *s, double *out);
 void phi_vector_field(const phi_solver *s, double *out);
 
+#if PHI_BY_HAND
+/* Steps by hand, for lattices that are distributed over several memories. A step is the stages 0, 1, … before
+   phi_stages(), each a sweep over all planes: the sites of one place along the first axis. Number phi_stages() is the
+   last stage of a step and the first of the next together, as phi_integrate does them. A stage may be made in any number
+   of pieces, in any order, with the bits of phi_step; before that, the planes beside a piece that it reads must have
+   made the stages before. */
+typedef struct {
+    size_t behind, ahead;        /* planes before the first one swept, and after the last one, that are read */
+    unsigned long read, changed; /* fields that are read there, and those that are changed; bit k is field k */
+} phi_stage;
+
+size_t phi_stages(void);
+phi_status phi_describe(size_t number, phi_stage *about);
+
+/* What depends on the step size, before the first stage; and a stage for the planes from..to, to not among them. far:
+   whether by functions for arguments of any size; without it, values that are not finite say that these were needed. */
+phi_status phi_begin(phi_solver *s, double h);
+phi_status phi_sweep(phi_solver *s, size_t number, int far, size_t from, size_t to);
+
+/* Values x[plane of those from..to][sites of it] of a field, which is 0 for the first; putting them takes the place of what was
+   there. phi_holds tells whether those of all fields there are finite. */
+phi_status phi_planes(const phi_solver *s, size_t field, size_t from, size_t to, double *x);
+phi_status phi_put_planes(phi_solver *s, size_t field, size_t from, size_t to, const double *x);
+int phi_holds(const phi_solver *s, size_t from, size_t to);
+
+#endif
 const char *phi_status_string(phi_status status);
 
 /* For bindings: the size of phi_solver, and its count of good steps. */

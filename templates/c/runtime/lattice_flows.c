@@ -8,10 +8,10 @@
 /* ---- The flows ---- */
 #if PHI_BY_COLOUR
 /* One part of H, of one colour. */
-static void phi_sweep_flow(const phi_solver *s, int part, const double *coef, int far)
+static void phi_sweep_colour(const phi_solver *s, int part, const double *coef, int far)
 #else
 /* One part of H. */
-static void phi_sweep(const phi_solver *s, int part, const double *coef, int far)
+static void phi_sweep_part(const phi_solver *s, int part, const double *coef, int far)
 #endif
 {
     const size_t units = s->rows * phi_pieces(s);
@@ -29,19 +29,26 @@ static void phi_sweep(const phi_solver *s, int part, const double *coef, int far
 
 #if PHI_BY_COLOUR
 /* The first flow, those between it and the last, the last, or those between, backwards. */
-static void phi_sweep(const phi_solver *s, int kind, const double *coef, int far)
+static void phi_sweep_part(const phi_solver *s, int kind, const double *coef, int far)
 {
     const int last = s->flows - 1;
-    if (kind == 0 || kind == 2) phi_sweep_flow(s, kind == 0 ? 0 : last, coef, far);
+    if (kind == 0 || kind == 2) phi_sweep_colour(s, kind == 0 ? 0 : last, coef, far);
     if (kind == 1)
-        for (int flow = 1; flow < last; ++flow) phi_sweep_flow(s, flow, coef, far);
+        for (int flow = 1; flow < last; ++flow) phi_sweep_colour(s, flow, coef, far);
     if (kind == 3)
-        for (int flow = last - 1; flow > 0; --flow) phi_sweep_flow(s, flow, coef, far);
+        for (int flow = last - 1; flow > 0; --flow) phi_sweep_colour(s, flow, coef, far);
 }
 
 #endif
-/* Some steps, joined. */
-static void phi_steps(const phi_solver *s, int steps, int far)
+/* The flow of that number in a step; after those of a step the last and the first together. */
+static void phi_flow(const phi_solver *s, int flow)
+{
+    const int joined = flow == PHI_FLOWS, row = joined ? PHI_JOINED : phi_flow_rows[flow];
+    phi_sweep_part(s, phi_flow_parts[joined ? 0 : flow], s->coef + row * PHI_ROW, s->far > 0);
+}
+
+/* Some steps, joined, without the last flow; no steps are that flow alone. */
+static void phi_steps(const phi_solver *s, int steps)
 {
 #ifdef _OPENMP
 #if PHI_PAIRS
@@ -50,30 +57,76 @@ static void phi_steps(const phi_solver *s, int steps, int far)
 #pragma omp parallel if (s->sites > 4096)
 #endif
 #endif
-    for (int step = 0; step < steps; ++step) {
-        const int last = step == steps - 1;
-        if (step == 0) phi_sweep(s, phi_flow_parts[0], s->coef + phi_flow_rows[0] * PHI_ROW, far);
-        for (int k = 1; k < PHI_FLOWS - 1; ++k)
-            phi_sweep(s, phi_flow_parts[k], s->coef + phi_flow_rows[k] * PHI_ROW, far);
-        if (PHI_FLOWS > 1)
-            phi_sweep(s, phi_flow_parts[0], s->coef + (last ? phi_flow_rows[PHI_FLOWS - 1] : PHI_JOINED) * PHI_ROW, far);
-        else if (!last)
-            phi_sweep(s, phi_flow_parts[0], s->coef, far);
+    {
+        if (steps == 0) phi_flow(s, PHI_FLOWS - 1);
+        for (int step = 0; step < steps; ++step) {
+            phi_flow(s, PHI_FLOWS > 1 && (step > 0 || s->open) ? PHI_FLOWS : 0);
+            for (int flow = 1; flow < PHI_FLOWS - 1; ++flow) phi_flow(s, flow);
+        }
     }
 }
 
-/* Some steps; if they lead to what is not finite, none. */
-static phi_status phi_try(phi_solver *s, int steps)
+/* Some steps from the state in s->before; if they lead to what is not finite, none. */
+static int phi_try(phi_solver *s, int steps)
 {
-    phi_copy(s->before, s->x, s);
+    phi_steps(s, steps);
+    if (phi_all_hold(s)) return 1;
+    phi_copy(s->x, s->before, s);
+    return 0;
+}
+
 #if PHI_NEAR
-    phi_steps(s, steps, 0);
-    if (phi_holds(s)) return PHI_OK;
-    phi_copy(s->x, s->before, s);
+/* The last flow of a step, by functions for large arguments if need be; whether it leads to finite values. */
+static int phi_close(phi_solver *s)
+{
+    if (phi_try(s, 0)) return 1;
+    const size_t far = s->far;
+    s->far = 1;
+    const int done = phi_try(s, 0);
+    s->far = far;
+    return done;
+}
+
 #endif
-    phi_steps(s, steps, 1);
-    if (phi_holds(s)) return PHI_OK;
-    phi_copy(s->x, s->before, s);
-    return PHI_NOT_FINITE;
+phi_status phi_integrate(phi_solver *s, double h, size_t steps)
+{
+    phi_status status = phi_set_step(s, h);
+    if (status != PHI_OK || steps == 0) return status;
+    phi_copy(s->open ? s->x : s->before, s->open ? s->before : s->x, s);
+    const size_t end = s->steps + steps;
+    for (size_t stretch = PHI_STRETCH; s->steps < end && status == PHI_OK;) {
+        size_t now = end - s->steps < stretch ? end - s->steps : stretch;
+#if PHI_NEAR
+        if (s->far > 0 && s->far < now) now = s->far;
+#endif
+        if (phi_try(s, (int)now)) {
+            phi_copy(s->before, s->x, s);
+            s->steps += now;
+            s->open = PHI_FLOWS > 1;
+#if PHI_NEAR
+            s->far -= s->far > 0 ? now : 0;
+#endif
+        } else if (now > 1) {
+            stretch = 1;
+#if PHI_NEAR
+        } else if (s->far == 0) {
+            s->far = PHI_FAR_STEPS;
+            stretch = PHI_STRETCH;
+#endif
+        } else {
+            status = PHI_NOT_FINITE;
+        }
+    }
+#if PHI_NEAR
+    if (s->open && !phi_close(s)) { /* the last flow of the last step, before which steps go on */
+#else
+    if (s->open && !phi_try(s, 0)) { /* the last flow of the last step, before which steps go on */
+#endif
+        status = PHI_NOT_FINITE;
+        s->open = 0;
+        --s->steps;
+    }
+    s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
+    return status;
 }
 #endif

@@ -188,7 +188,7 @@ static phi_status phi_stages(phi_solver *s, int far)
             phi_increment_rows(s, coef, far, now, first, end);
         }
     }
-    return phi_holds(s) ? PHI_OK : PHI_NOT_FINITE;
+    return phi_all_hold(s) ? PHI_OK : PHI_NOT_FINITE;
 }
 
 /* One step; if it cannot be made, none. */
@@ -211,4 +211,28 @@ static phi_status phi_try(phi_solver *s, int steps)
 #endif
     return status;
 }
+
+phi_status phi_integrate(phi_solver *s, double h, size_t steps)
+{
+    const phi_status status = phi_set_step(s, h);
+    if (status != PHI_OK) return status;
+#if PHI_GUESSES
+    phi_forget(s);
+#endif
+    for (size_t stretch = PHI_STRETCH; steps > 0;) {
+        const size_t now = steps < stretch ? steps : stretch;
+        const phi_status tried = phi_try(s, (int)now);
+        if (tried == PHI_OK) {
+            steps -= now;
+            s->steps += now;
+            s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
+        } else if (now == 1) {
+            return tried;
+        } else {
+            stretch = 1;
+        }
+    }
+    return PHI_OK;
+}
+
 #endif

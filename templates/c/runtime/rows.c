@@ -166,6 +166,10 @@ static inline phi_piece phi_piece_of(const phi_solver *s, size_t unit)
     phi_locate(s, index, &piece.row);
     piece.from = (ptrdiff_t)part * PHI_PIECE;
     piece.to = part == pieces - 1 ? s->length : piece.from + PHI_PIECE;
+#if PHI_BY_HAND && PHI_ONE_ROW
+    if (piece.from < s->from) piece.from = s->from;
+    if (piece.to > s->to) piece.to = s->to;
+#endif
     return piece;
 }
 

@@ -1,0 +1,95 @@
+#ifndef PHI_FILE_BY_HAND
+#define PHI_FILE_BY_HAND
+#include "lattice.h"
+#include "model.h"
+#include "rows.c"
+#include "sweeps.h"
+
+/* ---- Steps by hand ---- */
+size_t phi_stages(void) { return PHI_FLOWS; }
+
+phi_status phi_describe(size_t number, phi_stage *about)
+{
+    if (number > PHI_FLOWS || about == NULL) return PHI_BAD_ARGUMENT;
+    *about = phi_stages_of[phi_flow_parts[number == PHI_FLOWS ? 0 : number] - 1];
+    return PHI_OK;
+}
+
+phi_status phi_begin(phi_solver *s, double h) { return phi_set_step(s, h); }
+
+/* The rows of a plane. */
+static size_t phi_rows_of_plane(const phi_solver *s) { return s->rows / (PHI_AXES > 1 ? s->sizes[0] : 1); }
+
+phi_status phi_sweep(phi_solver *s, size_t number, int far, size_t from, size_t to)
+{
+    if (s == NULL || !s->prepared || number > PHI_FLOWS || from > to || to > s->sizes[0]) return PHI_BAD_ARGUMENT;
+    const int joined = number == PHI_FLOWS, part = phi_flow_parts[joined ? 0 : number];
+    const double *coef = s->coef + (joined ? PHI_JOINED : phi_flow_rows[number]) * PHI_ROW;
+    const size_t units = phi_rows_of_plane(s) * phi_pieces(s);
+    s->open = 0;
+#if PHI_ONE_ROW
+    s->from = (ptrdiff_t)from;
+    s->to = (ptrdiff_t)to;
+    phi_sweep_rows(s, part, coef, far, 0, units);
+    s->from = 0;
+    s->to = s->length;
+    for (size_t k = 0; k < PHI_DIM; ++k) phi_ends(s->x[k], s->length, 0, s->length);
+#else
+    phi_sweep_rows(s, part, coef, far, from * units, to * units);
+#endif
+    return PHI_OK;
+}
+
+/* A plane of a field: the first of its values, and how many rows it has, of so many values. */
+static double *phi_plane(const phi_solver *s, size_t field, size_t plane, size_t *rows, size_t *length)
+{
+    *rows = phi_rows_of_plane(s);
+    *length = PHI_AXES > 1 ? (size_t)s->length : 1;
+    return s->x[field] + (PHI_AXES > 1 ? (ptrdiff_t)(plane * *rows) * s->width : (ptrdiff_t)plane);
+}
+
+phi_status phi_planes(const phi_solver *s, size_t field, size_t from, size_t to, double *x)
+{
+    if (s == NULL || field >= PHI_DIM || from > to || to > s->sizes[0]) return PHI_BAD_ARGUMENT;
+    for (size_t plane = from; plane < to; ++plane) {
+        size_t rows, length;
+        const double *at = phi_plane(s, field, plane, &rows, &length);
+        for (size_t r = 0; r < rows; ++r, x += length) memcpy(x, at + (ptrdiff_t)r * s->width, length * sizeof *x);
+    }
+    return PHI_OK;
+}
+
+phi_status phi_put_planes(phi_solver *s, size_t field, size_t from, size_t to, const double *x)
+{
+    if (s == NULL || field >= PHI_DIM || from > to || to > s->sizes[0]) return PHI_BAD_ARGUMENT;
+    s->open = 0;
+    for (size_t plane = from; plane < to; ++plane) {
+        size_t rows, length;
+        double *at = phi_plane(s, field, plane, &rows, &length);
+        for (size_t r = 0; r < rows; ++r, x += length) {
+            memcpy(at + (ptrdiff_t)r * s->width, x, length * sizeof *x);
+#if !PHI_ONE_ROW
+            phi_ends(at + (ptrdiff_t)r * s->width, s->length, 0, s->length);
+#endif
+        }
+    }
+#if PHI_ONE_ROW
+    phi_ends(s->x[field], s->length, 0, s->length);
+#endif
+    return PHI_OK;
+}
+
+int phi_holds(const phi_solver *s, size_t from, size_t to)
+{
+    if (s == NULL || from > to || to > s->sizes[0]) return 0;
+#if PHI_ONE_ROW
+    for (size_t k = 0; k < PHI_DIM; ++k)
+        if (!phi_finite(s->x[k] + from, to - from)) return 0;
+#else
+    for (size_t k = 0; k < PHI_DIM; ++k)
+        for (size_t r = from * phi_rows_of_plane(s); r < to * phi_rows_of_plane(s); ++r)
+            if (!phi_finite(s->x[k] + (ptrdiff_t)r * s->width, (size_t)s->length)) return 0;
+#endif
+    return 1;
+}
+#endif

@@ -1,0 +1,91 @@
+"""Sweeps of lattices one by one over pieces of them, as processes make them that share a lattice."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from lattice.test_sweeps import compiled, disorder, solver, start
+
+from phigen.compiler import compile_spec, emit
+from phigen.spec.model import Extras
+
+#: Chains with open and periodic ends, with colours and with functions; planes, with both kinds of ends, and a box.
+NAMES = ["xxz", "xxz_open", "fput", "volterra", "sheet", "cube"]
+SIZES = {"sheet": (9, 5), "cube": (7, 3, 3), "volterra": (30,)}
+
+
+def by_hand(name: str, x: np.ndarray, h: float, steps: int, seed: int) -> np.ndarray:
+    """Steps stage by stage, each in pieces that are cut at random and made in any order."""
+    found = solver(name, 4, "c")
+    stages = found.backend.stages()
+    session = found.session(x, h, disorder(name, x))
+    session.begin(h)
+    random = np.random.default_rng(seed)
+    flows = [0, *range(1, len(stages) - 2)]
+    for step in range(steps):
+        for stage in [len(stages) - 1 if step else 0, *flows[1:], *([len(stages) - 2] if step == steps - 1 else [])]:
+            cuts = np.unique([0, *random.integers(0, x.shape[1], 3), x.shape[1]])
+            for k in random.permutation(len(cuts) - 1):
+                session.sweep(stage, 0, int(cuts[k]), int(cuts[k + 1]))
+    return session.state()
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_sweeps_by_hand_in_pieces_have_the_bits_of_steps(name: str) -> None:
+    x = start(name, SIZES.get(name, (40,)))
+    whole = solver(name, 4, "c").integrate(x, 0.03, 3, 3, **disorder(name, x)).x[-1]
+    assert whole.tobytes() == by_hand(name, x, 0.03, 3, seed=2).tobytes()
+
+
+@pytest.mark.parametrize("name", [*NAMES, "charges", "magnet"])
+def test_bits_do_not_depend_on_the_frames(name: str) -> None:
+    """With steps so large that loops for small arguments do not do for all."""
+    x = start(name, SIZES.get(name))
+    runs = [solver(name, 4, "c").integrate(x, 0.15, 120, n, **disorder(name, x)).x[-1].tobytes() for n in (1, 7, 60)]
+    assert runs[0] == runs[1] == runs[2]
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_stage_reads_no_further_than_it_says(name: str) -> None:
+    """What lies beyond its halo, and fields that it does not read there, may be anything."""
+    x = start(name, SIZES.get(name, (40,)))
+    found = solver(name, 4, "c")
+    first, end = 3, 5
+    for number, stage in enumerate(found.backend.stages()):
+        seen = []
+        for wrong in (False, True):
+            session = found.session(x, 0.03, disorder(name, x))
+            session.begin(0.03)
+            for field in range(len(x) if wrong else 0):
+                beside = stage.read >> field & 1
+                values = session.planes(field, 0, x.shape[1])
+                values[: first - stage.behind * beside] = 1e3
+                values[end + stage.ahead * beside :] = 1e3
+                session.put_planes(field, 0, x.shape[1], values)
+            before = session.state()
+            session.sweep(number, 1, first, end)
+            after = session.state()
+            seen.append(after[:, first:end].tobytes())
+            changed = {f for f in range(len(x)) if after[f].tobytes() != before[f].tobytes()}
+            assert all(stage.changed >> f & 1 for f in changed)
+        assert seen[0] == seen[1]
+
+
+def test_planes_and_stages_that_there_are_not_are_refused() -> None:
+    x = start("sheet", (9, 5))
+    session = solver("sheet", 4, "c").session(x, 0.1, disorder("sheet", x))
+    with pytest.raises(ValueError, match="BAD_ARGUMENT"):
+        session.sweep(0, 1, 0, 9)  # before the step size is known
+    session.begin(0.1)
+    for stage, first, end in ((99, 0, 9), (0, 4, 3), (0, 0, 10)):
+        with pytest.raises(ValueError, match="BAD_ARGUMENT"):
+            session.sweep(stage, 1, first, end)
+    with pytest.raises(ValueError, match="no steps by hand"):
+        solver("charges", 4, "c").backend.stages()
+
+
+@pytest.mark.parametrize(("profile", "without"), [("small", ()), ("fast", ("by-hand",))])
+def test_steps_by_hand_can_be_left_out(profile: str, without: tuple[str, ...]) -> None:
+    extras = Extras(without=frozenset(without))
+    program = compile_spec(compiled("fput").spec, profile=profile, extras=extras).program
+    assert not any("put_planes" in text for text in emit(program, "c", "phigen").values())
