@@ -8,6 +8,7 @@ trajectory = solver.integrate([1, 1, 1], h=0.05, steps=20_000, stride=10, I2=2.5
 
 from __future__ import annotations
 
+import math
 import re
 import warnings
 from collections.abc import Callable, Mapping
@@ -211,6 +212,8 @@ def interface_of(program: Program) -> Interface:
         periods=sites.periods,
         least=sites.least,
         required=frozenset(p.name for p in program.parameters if p.values is not None),
+        first_open=sites.open[0],
+        colour_period=sites.colours // math.gcd(sites.colours, sites.weights[0]),
         graph=bool(program.step.partners and program.step.partners.graph),
         at_bonds=sites.at_bonds,
     )

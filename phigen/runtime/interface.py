@@ -82,6 +82,8 @@ class LatticeInterface(Interface):
     periods: tuple[int, ...] = ()
     least: tuple[int, ...] = ()
     required: frozenset[str] = frozenset()  # parameters at sites and bonds whose defaults are not one number
+    first_open: bool = False  # whether the first axis has open ends
+    colour_period: int = 1  # the first axis: after so many planes colours of sites are as before
     graph: bool = False
     at_bonds: tuple[str, ...] = ()
 

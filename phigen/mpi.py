@@ -1,0 +1,455 @@
+"""Lattices on several processes: domains of planes along the slowest axis, and what they exchange, by mpi4py.
+
+    from phigen.mpi import DistributedLattice
+
+    lattice = DistributedLattice("heisenberg.yaml")
+    run = lattice.integrate(start, h=0.05, steps=1000, stride=10, sizes=(1000, 1000, 1000), output="frames.npy")
+
+    mpirun -n 8 python script.py
+
+A plane is all sites of one place along the first axis. Each process has the C solver of its planes and of copies of
+those beside them, which it gets from its neighbours when a sweep is to read them, while it works at the inner planes.
+States have the bits of `LatticeSolver` for any number of processes. Needs the extra ``mpi``.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from phigen.errors import MissingPackageError, StepError
+from phigen.runtime import arguments
+from phigen.runtime.c_lattice import CLattice, CLatticeSession, Stage
+from phigen.runtime.interface import Floats, row_steps
+from phigen.runtime.lattice import LatticeSolver
+from phigen.writing import replacing
+
+#: As in the C, whose bits these are: see templates/c/runtime/lattice.c.
+STRETCH, FAR_STEPS = 32, 64
+
+#: An array over the whole lattice, or a function that gives the planes from one to another, that not among them.
+Given = Any
+
+
+@dataclass(frozen=True, eq=False)
+class DistributedRun:
+    """Frames of one process: ``t`` and ``energy`` (frames,) of the whole, ``x`` (frames, coordinates, planes, …) of its
+    ``planes``, from the first to the one after the last; None where frames went to a file. ``waiting`` are the seconds
+    that this process waited for planes of others."""
+
+    t: Floats
+    energy: Floats
+    x: Floats | None
+    planes: tuple[int, int]
+    steps: int
+    waiting: float
+
+
+class DistributedLattice:
+    """The solver of a lattice on all processes of a communicator, by default on all there are.
+
+    ``source`` is what `phigen.compile` takes, a grid whose H is split, or a `LatticeSolver` of such a one for C, of
+    profile fast. Raises `ValueError` for other lattices.
+    """
+
+    def __init__(self, source: Any, comm: Any = None, order: int | None = None) -> None:
+        self.comm = comm if comm is not None else _mpi().COMM_WORLD
+        self.solver = source if isinstance(source, LatticeSolver) else self._compiled(source, order)
+        backend = self.solver.backend
+        if not isinstance(backend, CLattice):
+            raise ValueError(f"processes share lattices that are compiled to C, not {self.solver!r}")
+        self.stages = backend.stages()
+        self.period = self.solver.interface.colour_period
+
+    def _compiled(self, source: Any, order: int | None) -> LatticeSolver:
+        from phigen.api import compilation_of, lattice_solver_of
+
+        compilation = compilation_of(source, order, profile="fast")
+        if self.comm.rank == 0:
+            lattice_solver_of(compilation, "c")  # fills the cache
+        self.comm.barrier()
+        return lattice_solver_of(compilation, "c")
+
+    def integrate(
+        self,
+        x0: Given,
+        h: float,
+        steps: int,
+        stride: int = 1,
+        *,
+        sizes: Sequence[int] | None = None,
+        output: str | Path | None = None,
+        checkpoints: str | Path | None = None,
+        progress: Callable[[int], Any] | None = None,
+        parameters: Mapping[str, Any] | None = None,
+        **more: Any,
+    ) -> DistributedRun:
+        """`LatticeSolver.integrate` on all processes together, which all call it with the same arguments.
+
+        ``x0`` is an array (coordinates, *sizes), or a function that gives its planes, x0(from, to) of shape
+        (coordinates, to - from, …), and then needs ``sizes``; parameters at sites likewise. Frames go to ``output``, a
+        ``.npy`` file that all processes write to. With ``checkpoints``, a path, the state is kept at every frame; the
+        same call goes on from it, on any number of processes. Raises `StepError` on all processes.
+        """
+        if checkpoints and not output:
+            raise ValueError("checkpoints= needs output=, where the frames are of a run that was interrupted")
+        whole = tuple(sizes) if sizes is not None else np.shape(x0)[1:]
+        h, steps, stride = (
+            arguments.step_size(h),
+            arguments.count(steps, "steps", 0),
+            arguments.count(stride, "stride", 1),
+        )
+        domain = _Domain(self, whole, x0, h, {**(parameters or {}), **more})
+        marks = row_steps(steps, stride)
+        shape = (len(marks), len(self.solver.coordinates), *whole)
+        kept = _Kept(domain, Path(checkpoints), [h, steps, stride]) if checkpoints else None
+        energy = kept.restored() if kept else []
+        frames = _Frames(domain, Path(output) if output else None, shape, new=not energy)
+        try:
+            for k in range(len(energy), len(marks)):
+                domain.advance(int(marks[k]) - domain.steps)
+                frames.put(k)
+                energy.append(domain.energy())
+                if kept and k:
+                    kept.save(energy)
+                if progress:
+                    progress(int(marks[k]))
+        finally:
+            frames.close()
+        frames.finish()
+        if kept:
+            kept.remove()
+        t = np.asarray(h * marks, dtype=np.float64)
+        return DistributedRun(t, np.array(energy), frames.array, domain.planes, steps, domain.waiting)
+
+
+class _Domain:
+    """The planes of one process, with the copies beside them; a state that is open lacks the last flow of its step."""
+
+    def __init__(
+        self, lattice: DistributedLattice, sizes: tuple[int, ...], x0: Given, h: float, parameters: Mapping[str, Any]
+    ) -> None:
+        self.lattice, self.comm, self.sizes, self.h = lattice, lattice.comm, sizes, h
+        self.stages: list[Stage] = lattice.stages
+        self.joined = len(self.stages) - 1
+        self.last = max(1, self.joined - 1)
+        reach = [max(s.behind for s in self.stages), max(s.ahead for s in self.stages)]
+        self.planes = self._share(sizes[0], max(reach))
+        self.beside = self._neighbours()
+        period = lattice.period
+        ghosts = [-(-r // period) * period if b is not None else 0 for r, b in zip(reach, self.beside, strict=True)]
+        self.reach = reach
+        self.own = (ghosts[0], ghosts[0] + self.planes[1] - self.planes[0])
+        self.total = self.own[1] + ghosts[1]
+        around = (self.planes[0] - ghosts[0], self.planes[1] + ghosts[1])
+        self.values = {name: self._local(value, *around, name) for name, value in parameters.items()}
+        start = self._cut(x0, *around, axis=1)
+        session = lattice.solver.session(start, h, self.values)
+        assert isinstance(session, CLatticeSession)
+        self.session = session
+        self.session.begin(h)
+        self.fields = len(lattice.solver.coordinates)
+        self.dirty = 0
+        self.steps, self.far, self.open = 0, 0, False
+        self.saved = self._all()
+        self.waiting = 0.0
+
+    # --- who has what
+
+    def _share(self, planes: int, reach: int) -> tuple[int, int]:
+        """The planes of this process, as even as periods of colours let them be."""
+        period, count, rank = self.lattice.period, self.comm.size, self.comm.rank
+        if planes < count * max(reach, period):
+            most = planes // max(reach, period)
+            raise ValueError(f"{planes} planes are too few for {count} processes; {most} would do")
+        units = -(-planes // period)
+        first, end = (min(planes, units * r // count * period) for r in (rank, rank + 1))
+        return first, end
+
+    def _neighbours(self) -> list[int | None]:
+        """The processes behind and ahead; none beyond open ends."""
+        rank, count, is_open = self.comm.rank, self.comm.size, self.lattice.solver.interface.first_open
+        behind = None if is_open and rank == 0 else (rank - 1) % count
+        ahead = None if is_open and rank == count - 1 else (rank + 1) % count
+        return [behind, ahead]
+
+    def _cut(self, given: Given, first: int, end: int, axis: int) -> Floats:
+        """The planes first..end of an array, or of a function of planes; periodic beyond the ends."""
+        size = self.sizes[0]
+        if not callable(given):
+            return np.take(np.asarray(given, dtype=np.float64), np.arange(first, end) % size, axis)
+        pieces = [given(max(first, 0), min(end, size))]
+        if first < 0:
+            pieces.insert(0, given(size + first, size))
+        if end > size:
+            pieces.append(given(0, end - size))
+        return np.concatenate([np.asarray(piece, dtype=np.float64) for piece in pieces], axis)
+
+    def _local(self, value: Any, first: int, end: int, name: str) -> Any:
+        if name in self.lattice.solver.interface.at_sites and (callable(value) or np.ndim(value)):
+            return self._cut(value, first, end, axis=0)
+        return value
+
+    # --- steps
+
+    def advance(self, steps: int) -> None:
+        """Make so many steps; the state is closed after that. Raises `StepError`."""
+        if steps:
+            self._put_all(self.saved)
+        end, stretch = self.steps + steps, STRETCH
+        while self.steps < end:
+            now = min(end - self.steps, stretch, self.far or STRETCH)
+            if self._tried(now):
+                continue
+            if now > 1:
+                stretch = 1
+            elif self.far == 0:
+                self.far, stretch = FAR_STEPS, STRETCH
+            else:
+                self._close()
+                said = f"{self.lattice.solver.interface.name}: step {self.steps} of size {self.h!r} failed: NOT_FINITE"
+                raise StepError(said, step=self.steps, status="NOT_FINITE")
+        self._close()
+
+    def _tried(self, steps: int) -> bool:
+        """Some steps; if they lead to what is not finite, none."""
+        for step in range(steps):
+            self._stage(self.joined if self.last > 1 and (self.open or step) else 0)
+            for stage in range(1, self.last):
+                self._stage(stage)
+        if not self._holds():
+            self._put_all(self.saved)
+            return False
+        self.open = self.joined > 1
+        self.steps += steps
+        self.far = max(0, self.far - steps)
+        self.saved = self._all()
+        return True
+
+    def _close(self) -> None:
+        """The last flow of a step; the state before it is saved."""
+        if not self.open:
+            return
+        self._stage(self.joined - 1)
+        if not self._holds() and self.far == 0:
+            self._put_all(self.saved)
+            self._stage(self.joined - 1, far=True)
+
+    def _stage(self, number: int, far: bool = False) -> None:
+        """One sweep over all own planes: the inner ones while those beside are on their way."""
+        stage, (first, end) = self.stages[number], self.own
+        way = 1 if far or self.far else 0
+        wanted = stage.read & self.dirty
+        if wanted:
+            on_their_way = self._asked(wanted)
+            inner = first + stage.behind, end - stage.ahead
+            if inner[0] < inner[1]:
+                self.session.sweep(number, way, *inner)
+            self._received(on_their_way)
+            outer = [(first, inner[0]), (inner[1], end)] if inner[0] < inner[1] else [(first, end)]
+            for piece in outer:
+                self.session.sweep(number, way, *piece)
+        else:
+            self.session.sweep(number, way, first, end)
+        self.dirty = (self.dirty & ~wanted) | stage.changed
+
+    def _asked(self, fields: int) -> list[tuple[Any, int, tuple[int, int], Floats]]:
+        """Send what the neighbours read of some fields, and ask for theirs."""
+        (behind, ahead), (first, end), (back, on) = self.beside, self.own, self.reach
+        asked, sent = [], []
+        for field in (k for k in range(self.fields) if fields >> k & 1):
+            for other, tag, mine, theirs in (
+                (behind, 0, (first, first + on), (first - back, first)),
+                (ahead, 1, (end - back, end), (end, end + on)),
+            ):
+                if other is None:
+                    continue
+                if mine[0] < mine[1]:
+                    sent.append(self.comm.Isend(self.session.planes(field, *mine), other, 2 * field + tag))
+                if theirs[0] < theirs[1]:
+                    buffer = np.empty((theirs[1] - theirs[0], *self.sizes[1:]))
+                    # what a neighbour ahead sends backwards has the tag of that
+                    asked.append((self.comm.Irecv(buffer, other, 2 * field + 1 - tag), field, theirs, buffer))
+        self._sent = sent
+        return asked
+
+    def _received(self, asked: Sequence[tuple[Any, int, tuple[int, int], Floats]]) -> None:
+        begin = time.perf_counter()
+        _mpi().Request.Waitall([request for request, *_ in asked])
+        self.waiting += time.perf_counter() - begin
+        for _, field, planes, buffer in asked:
+            self.session.put_planes(field, *planes, buffer)
+        _mpi().Request.Waitall(self._sent)
+
+    # --- the state
+
+    def _holds(self) -> bool:
+        return bool(self.comm.allreduce(int(self.session.holds(*self.own)), op=_mpi().MIN))
+
+    def _all(self) -> list[Floats]:
+        return [self.session.planes(field, 0, self.total) for field in range(self.fields)]
+
+    def _put_all(self, saved: Sequence[Floats]) -> None:
+        for field, values in enumerate(saved):
+            self.session.put_planes(field, 0, self.total, values)
+        self.dirty = (1 << self.fields) - 1
+
+    def state(self) -> Floats:
+        """The own planes (coordinates, planes, …)."""
+        return np.array([self.session.planes(field, *self.own) for field in range(self.fields)])
+
+    def energy(self) -> float:
+        """H of the whole lattice, on all processes: the sum over planes, rounded once."""
+        self._received(self._asked(self.dirty))
+        self.dirty = 0
+        density = self.session.density()[self.own[0] : self.own[1]]
+        sums = density.reshape(len(density), -1).sum(axis=1)
+        return math.fsum(value for part in self.comm.allgather(sums) for value in part.tolist())
+
+    def restore(self, x: Floats, steps: int, far: int, is_open: bool) -> None:
+        """Go on from the own planes of a state."""
+        for field in range(self.fields):
+            self.session.put_planes(field, *self.own, x[field])
+        self.dirty = (1 << self.fields) - 1
+        self.saved = self._all()
+        self.steps, self.far, self.open = steps, far, is_open
+
+    def saved_state(self) -> Floats:
+        """The own planes of the state that steps go on from."""
+        return np.array([values[self.own[0] : self.own[1]] for values in self.saved])
+
+
+class _Shared:
+    """A ``.npy`` file of arrays (…, coordinates, *sizes) that all processes write and read their planes of."""
+
+    def __init__(self, domain: _Domain, path: Path, shape: tuple[int, ...], *, new: bool) -> None:
+        self.domain = domain
+        if new and domain.comm.rank == 0:
+            with path.open("wb") as file:
+                np.lib.format.write_array_header_2_0(file, {"descr": "<f8", "fortran_order": False, "shape": shape})
+        domain.comm.barrier()
+        with path.open("rb") as file:
+            np.lib.format.read_magic(file)
+            np.lib.format.read_array_header_2_0(file)
+            self.start = file.tell()
+        mpi = _mpi()
+        self.file = mpi.File.Open(domain.comm, str(path), mpi.MODE_RDWR)
+
+    def _place(self, block: int) -> int:
+        planes = self.domain.sizes[0]
+        plane = 8 * math.prod(self.domain.sizes[1:])
+        return self.start + (block * planes + self.domain.planes[0]) * plane
+
+    def write(self, k: int, x: Floats) -> None:
+        """The own planes of array k."""
+        for field, values in enumerate(x):
+            self.file.Write_at_all(self._place(k * len(x) + field), np.ascontiguousarray(values))
+
+    def read(self) -> Floats:
+        """The own planes of the first array."""
+        first, end = self.domain.planes
+        x = np.empty((self.domain.fields, end - first, *self.domain.sizes[1:]))
+        for field in range(len(x)):
+            self.file.Read_at_all(self._place(field), x[field])
+        return x
+
+    def close(self) -> None:
+        self.file.Close()
+
+
+class _Frames:
+    """Where frames go: an array of each process, or one file."""
+
+    def __init__(self, domain: _Domain, path: Path | None, shape: tuple[int, ...], *, new: bool) -> None:
+        self.domain, self.path, self.array = domain, path, None
+        first, end = domain.planes
+        if path is None:
+            self.array = np.empty((shape[0], shape[1], end - first, *shape[3:]))
+            return
+        if path.suffix != ".npy":
+            raise ValueError(f"frames of processes go to files that end in .npy, not {str(path)!r}")
+        self.part = path.with_name(path.name + ".part")
+        self.file = _Shared(domain, self.part, shape, new=new)
+
+    def put(self, k: int) -> None:
+        x = self.domain.state()
+        if self.array is not None:
+            self.array[k] = x
+        else:
+            self.file.write(k, x)
+
+    def close(self) -> None:
+        if self.path:
+            self.file.close()
+
+    def finish(self) -> None:
+        """Give the file its name."""
+        self.domain.comm.barrier()
+        if self.path and self.domain.comm.rank == 0:
+            self.part.replace(self.path)
+        self.domain.comm.barrier()
+
+
+class _Kept:
+    """A state to go on from, in a file beside its description: two of them in turn, so that one is always whole."""
+
+    def __init__(self, domain: _Domain, path: Path, run: Sequence[float]) -> None:
+        self.domain, self.path = domain, path
+        numbers = {name: float(v) for name, v in domain.values.items() if not callable(v) and np.ndim(v) == 0}
+        about = {"sizes": list(domain.sizes), "run": list(run), "parameters": numbers}
+        self.identity = {"solver": domain.lattice.solver.backend.identity, **about}
+
+    def _file(self, count: int) -> Path:
+        return self.path.with_name(f"{self.path.name}.{count % 2}.npy")
+
+    def save(self, energy: Sequence[float]) -> None:
+        """Keep the state after so many frames, then say so."""
+        domain, count = self.domain, len(energy)
+        shared = _Shared(domain, self._file(count), (domain.fields, *domain.sizes), new=True)
+        shared.write(0, domain.saved_state())
+        shared.close()
+        domain.comm.barrier()
+        if domain.comm.rank == 0:
+            here = {"steps": domain.steps, "far": domain.far, "open": domain.open, "energy": list(energy)}
+            with replacing(self.path) as file:
+                file.write(json.dumps({"identity": self.identity, **here}).encode())
+
+    def restored(self) -> list[float]:
+        """Go on from what was kept; the energies of the frames before. Raises `ValueError` for that of another run."""
+        domain = self.domain
+        text = domain.comm.bcast(self._text() if domain.comm.rank == 0 else None)
+        if not text:
+            return []
+        found = json.loads(text)
+        if found["identity"] != self.identity:
+            raise ValueError(f"{self.path} was kept by another run; remove it to begin anew")
+        energy = [float(e) for e in found["energy"]]
+        shared = _Shared(domain, self._file(len(energy)), (domain.fields, *domain.sizes), new=False)
+        domain.restore(shared.read(), found["steps"], found["far"], found["open"])
+        shared.close()
+        return energy
+
+    def _text(self) -> str:
+        return self.path.read_text(encoding="utf-8") if self.path.exists() else ""
+
+    def remove(self) -> None:
+        """At the end of the run."""
+        if self.domain.comm.rank == 0:
+            for path in (self.path, self._file(0), self._file(1)):
+                path.unlink(missing_ok=True)
+        self.domain.comm.barrier()
+
+
+def _mpi() -> Any:
+    try:
+        from mpi4py import MPI
+    except ImportError:
+        raise MissingPackageError("this needs mpi4py: pip install 'phigen[mpi]'") from None
+    return MPI

@@ -1,0 +1,55 @@
+"""Lattices on several processes of Open MPI: the bits of one."""
+
+from __future__ import annotations
+
+import json
+import os
+import pickle
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from lattice.test_sweeps import disorder, solver, start
+
+from phigen.runtime import toolchain
+
+pytest.importorskip("mpi4py")
+MPIRUN = shutil.which("mpirun", path=f"{Path(sys.executable).parent}{os.pathsep}{os.environ.get('PATH', '')}")
+SCRIPT = Path(__file__).with_name("on_processes.py")
+#: Chains, one with colours, which is interrupted and gone on with; a box with open ends, given by its planes.
+SIZES = {"xxz": (37,), "volterra": (34,), "cube": (9, 3, 4)}
+
+
+@pytest.fixture(scope="module")
+def given(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Solvers, states and parameters for the script, and the frames of one process without MPI."""
+    folder = tmp_path_factory.mktemp("mpi")
+    (folder / "flags.json").write_text(json.dumps(toolchain.BASE_FLAGS))
+    for name, sizes in SIZES.items():
+        x, found = start(name, sizes), solver(name, 4, "c")
+        values = disorder(name, x)
+        with (folder / f"{name}.pickle").open("wb") as file:
+            pickle.dump((found, x, values), file)
+        # steps so large that some need the functions for large arguments
+        run = found.integrate(x, 0.2, 50, 20, **values)
+        np.savez(folder / f"{name}_alone.npz", x=run.x, energy=run.energy)
+    return folder
+
+
+@pytest.mark.parametrize("processes", [2, pytest.param(4, marks=pytest.mark.slow)])
+def test_any_number_of_processes_makes_the_bits_of_one(given: Path, processes: int) -> None:
+    assert MPIRUN, "mpi4py is there, but no mpirun"
+    allowed = {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1", "OMP_NUM_THREADS": "1"}
+    command = [MPIRUN, "--oversubscribe", "-n", str(processes), sys.executable, str(SCRIPT), str(given), *SIZES]
+    environment = {**os.environ, **allowed}
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=240, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+    for name in SIZES:
+        with np.load(given / f"{name}_alone.npz") as alone:
+            assert np.load(given / f"{name}_{processes}.npy").tobytes() == alone["x"].tobytes(), name
+            energy = np.load(given / f"{name}_{processes}_energy.npy")
+            np.testing.assert_allclose(energy, alone["energy"], rtol=1e-13, atol=1e-13)
+    assert not list(given.glob("*.part")) + list(given.glob("*state*"))
