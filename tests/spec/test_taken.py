@@ -56,7 +56,7 @@ def declared():
     """The symbols of all bundled solvers, and of one with everything that can be asked for."""
     asked = compile_text(
         "coordinates: [q, p]\npoisson: {canonical: {q: [q], p: [p]}}\nhamiltonian: q**2 + p**2\norder: 1\n"
-        "tangent: true\nmodified_hamiltonian: 1\n"
+        "tangent: true\nadjoint: true\nmodified_hamiltonian: 1\n"
     )
     found = symbols("t", files(asked, "c")["t.h"])
     for header in (resources.bundled_specs().parent / "generated").glob("*/*.h"):
