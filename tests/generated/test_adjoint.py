@@ -7,7 +7,7 @@ import mpmath
 import numpy as np
 import pytest
 from precise_path import PrecisePathStep
-from support import TARGETS, PreciseStep, RawC, files, precisely, solver
+from support import RATTLEBACK, TARGETS, PreciseStep, RawC, files, precisely, solver
 
 from phigen import SpecError, StepError, compile, spec
 from phigen.compiler import compile_spec, emit
@@ -277,3 +277,14 @@ def test_adjoint_is_refused_where_it_is_not_offered():
         compile("heisenberg", adjoint=True)
     plain = compile_spec(compilation("newton").spec)
     assert all("adjoint" not in text for target in TARGETS for text in files(plain, target).values())
+
+
+def test_steps_that_forget_what_was_before_are_pulled_back_too():
+    """Where a guess misleads, a step is made again without: then the solver remembers fewer steps than it has made."""
+    both = Extras(tangent=True, adjoint=True)
+    made = solver(compile_spec(spec.loads(f"phigen: 1\nname: t\n{RATTLEBACK}"), extras=both), "c")
+    x, steps, bar, product = np.array([0.01, 0.5, -1]), 20, weights(3), np.eye(3)
+    for _, tangent in made.tangents(x, 0.4, steps):
+        product = tangent @ product
+    x0_bar = made.pullback(x, 0.4, steps, bar).x0_bar
+    assert np.max(np.abs(x0_bar - bar @ product)) <= 1e-12 * np.max(np.abs(x0_bar))
