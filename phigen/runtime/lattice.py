@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import hashlib
 import zipfile
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import ExitStack
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Protocol
@@ -14,13 +12,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from phigen.errors import ParameterError, StepError
-from phigen.runtime import arguments, checkpoint, lattice_ensemble
-from phigen.runtime.checkpoint import Checkpoint
+from phigen.runtime import arguments, lattice_ensemble
 from phigen.runtime.interface import BackendError, Floats, LatticeInterface, Progress, row_steps
+from phigen.runtime.lattice_frames import Frames, LatticeRun, add_member, stream_path
+from phigen.runtime.named import Named
 from phigen.writing import replacing
-
-#: Where frames can be streamed to.
-STREAMS = (".npy", ".npz")
 
 
 class LatticeSession(Protocol):
@@ -123,15 +119,15 @@ class LatticeTrajectory:
 
     def save(self, path: str | Path) -> None:
         """Write ``.npz`` (t, x, energy, coordinates, axes, steps, h and parameter_NAME) or the frames as ``.npy``."""
-        target = _stream_path(path)
+        target = stream_path(path)
         if target.suffix == ".npy":
             with replacing(target) as file:
                 np.lib.format.write_array(file, np.asarray(self.x), allow_pickle=False)
             return
         with replacing(target) as file, zipfile.ZipFile(file, "w", zipfile.ZIP_STORED) as archive:
-            _add(archive, "x", self.x)
+            add_member(archive, "x", self.x)
             for name, value in self._further().items():
-                _add(archive, name, value)
+                add_member(archive, name, value)
 
     def _further(self) -> dict[str, Any]:
         about = {"t": self.t, "energy": self.energy, "steps": self.steps, "h": self.h}
@@ -139,7 +135,7 @@ class LatticeTrajectory:
         return {**about, **named, **{f"parameter_{name}": value for name, value in self.parameters.items()}}
 
 
-class LatticeSolver:
+class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
     """A compiled lattice: ``solver.integrate(x0, h=0.05, steps=1000, stride=10, J=2.0)``, x0 (coordinates, *sizes).
 
     Parameters are keyword arguments, or in ``parameters={…}``; those at sites are arrays (*sizes), or one number for
@@ -155,21 +151,6 @@ class LatticeSolver:
         about = self.interface
         fields = ", ".join(about.coordinates)
         return f"<LatticeSolver {about.name}: order {about.order}, target {self.target}, ({fields})>"
-
-    @property
-    def target(self) -> str:
-        """``c`` or ``numpy``."""
-        return self.backend.target
-
-    @property
-    def order(self) -> int:
-        """The order of the method."""
-        return self.interface.order
-
-    @property
-    def coordinates(self) -> tuple[str, ...]:
-        """Names of the coordinates of a site."""
-        return self.interface.coordinates
 
     # --- runs
 
@@ -197,8 +178,8 @@ class LatticeSolver:
         steps, stride = arguments.count(steps, "steps", 0), arguments.count(stride, "stride", 1)
         values = self.values(parameters, more, start.shape[1:])
         marks = row_steps(steps, stride)
-        frames = _Frames(_stream_path(output) if output else None, (len(marks), *start.shape))
-        run = _Run(self, start, h, marks, values, frames, Path(checkpoints) if checkpoints else None)
+        frames = Frames(stream_path(output) if output else None, (len(marks), *start.shape))
+        run = LatticeRun(self, start, h, marks, values, frames, Path(checkpoints) if checkpoints else None)
         try:
             count = run.made(progress)
         except BackendError as error:
@@ -218,7 +199,7 @@ class LatticeSolver:
         """The state one step of size ``h`` after ``x`` (coordinates, *sizes); raises `StepError`."""
         start, h = self.state(x, "x"), arguments.step_size(h)
         values = self.values(parameters, more, start.shape[1:])
-        session = self._started(start, h, values)
+        session = self.started(start, h, values)
         try:
             session.advance(h, 1)
         except BackendError as error:
@@ -271,7 +252,7 @@ class LatticeSolver:
 
     def _seen(self, x: ArrayLike, parameters: Mapping[str, Any] | None, more: Mapping[str, Any]) -> LatticeSession:
         state = self.state(x, "x")
-        return self._started(state, 1.0, self.values(parameters, more, state.shape[1:]))
+        return self.started(state, 1.0, self.values(parameters, more, state.shape[1:]))
 
     # --- arguments
 
@@ -333,9 +314,10 @@ class LatticeSolver:
     def session(self, x0: ArrayLike, h: float, parameters: Mapping[str, Any]) -> LatticeSession:
         """A lattice at x0, to be driven by hand. Raises as `integrate`."""
         start = self.state(x0, "x0")
-        return self._started(start, h, self.values(parameters, {}, start.shape[1:]))
+        return self.started(start, h, self.values(parameters, {}, start.shape[1:]))
 
-    def _started(self, start: Floats, h: float, values: Mapping[str, Any]) -> LatticeSession:
+    def started(self, start: Floats, h: float, values: Mapping[str, Any]) -> LatticeSession:
+        """A session at a state and with values that have been checked."""
         try:
             return self.backend.start(start, values)
         except BackendError as error:
@@ -360,136 +342,6 @@ class LatticeSolver:
         return LatticeTrajectory(t, x, energy, steps, h, values, self.coordinates, self.interface.axes, self)
 
 
-@dataclass
-class _Run:
-    """One call of `LatticeSolver.integrate`: ``count`` frames have been made."""
-
-    solver: LatticeSolver
-    start: Floats
-    h: float
-    marks: Any
-    values: Mapping[str, Any]
-    frames: _Frames
-    checkpoints: Path | None
-    energy: list[float] = field(default_factory=list)
-    count: int = 0
-    session: Any = None
-    saved: Mapping[str, Any] = field(default_factory=dict)  # what a session of a checkpoint goes on from
-
-    def made(self, progress: Progress | None) -> int:
-        """All frames that are left."""
-        first = self._resumed()
-        self.session = self.solver._started(first, self.h, self.values)
-        self.session.resume(self.h, self.saved)
-        before = int(self.marks[self.count - 1]) if self.count else 0
-        if not self.count:
-            self._store(first)
-        for mark in self.marks[self.count :].tolist():
-            try:
-                self.session.advance(self.h, mark - before - self.session.steps)
-            except BackendError as error:
-                raise BackendError(error.status, before + self.session.steps, error.states) from error
-            self._store(self.session.state())
-            self._save(mark)
-            if progress:
-                progress(mark)
-        if self.checkpoints:
-            self.checkpoints.unlink(missing_ok=True)
-        return self.count
-
-    def _store(self, state: Floats) -> None:
-        self.frames.put(self.count, state)
-        self.energy.append(self.session.hamiltonian())
-        self.count += 1
-
-    def _identity(self) -> dict[str, Any]:
-        arrays = {name: np.asarray(value) for name, value in self.values.items() if np.ndim(value)}
-        numbers = {name: float(value) for name, value in self.values.items() if not np.ndim(value)}
-        hashes = {name: hashlib.sha256(a.tobytes()).hexdigest() for name, a in {**arrays, "": self.start}.items()}
-        marks = [len(self.marks), int(self.marks[-1]), int(self.marks[min(1, len(self.marks) - 1)])]
-        about = {"solver": self.solver.backend.identity, "h": self.h, "sizes": list(self.start.shape), "steps": marks}
-        return {**about, "parameters": numbers, "arrays": hashes}
-
-    def _save(self, mark: int) -> None:
-        if self.checkpoints:
-            self.frames.flush()
-            arrays = {"state": self.session.state(), "count": np.array(self.count), "energy": np.array(self.energy)}
-            arrays |= self.session.saved()
-            if self.frames.path is None:
-                arrays["frames"] = self.frames.array[: self.count]
-            Checkpoint(self._identity(), arrays).save(self.checkpoints)
-
-    def _resumed(self) -> Floats:
-        """The state to go on from."""
-        if self.checkpoints is None or not self.checkpoints.exists():
-            return self.start
-        arrays = checkpoint.load(self.checkpoints, self._identity())
-        self.count, self.energy = int(arrays["count"]), arrays["energy"].tolist()
-        self.frames.restore(arrays.get("frames"), self.count)
-        self.saved = arrays
-        return np.asarray(arrays["state"])
-
-
-class _Frames:
-    """Where frames go: an array in memory, or a file."""
-
-    def __init__(self, path: Path | None, shape: tuple[int, ...]) -> None:
-        self.path = path
-        self._part = path.with_name(path.name + ".part.npy") if path else None
-        self._shape = shape
-        self._array: Floats | None = None
-
-    @property
-    def array(self) -> Floats:
-        """All frames."""
-        if self._array is None:
-            if self._part is None:
-                self._array = np.empty(self._shape)
-            else:
-                self._array = np.lib.format.open_memmap(self._part, "w+", np.float64, self._shape)
-        return self._array
-
-    def put(self, k: int, state: Floats) -> None:
-        """Store frame k."""
-        self.array[k] = state
-
-    def kept(self, count: int) -> Iterator[Floats]:
-        """The first frames, still there after `discard`."""
-        return iter(self.array[:count])
-
-    def flush(self) -> None:
-        """Hand over to the disk what is not there yet."""
-        if isinstance(self._array, np.memmap):
-            self._array.flush()
-
-    def restore(self, frames: Floats | None, count: int) -> None:
-        """Go on after the first frames."""
-        if frames is not None:
-            self.array[:count] = frames
-        elif self._part is not None and self._part.exists():
-            self._array = np.lib.format.open_memmap(self._part, "r+")
-            if self._array.shape != self._shape:
-                raise ValueError(f"{self._part} does not hold the frames of this run")
-
-    def discard(self) -> None:
-        """Remove the file of a run that failed; what was mapped from it stays readable."""
-        if self._part is not None and self._array is not None:
-            self._array = np.array(self._array)
-            self._part.unlink(missing_ok=True)
-
-    def finish(self, found: LatticeTrajectory) -> None:
-        """Give the file its name, and what else belongs into it."""
-        if self.path is None or self._part is None:
-            return
-        self.flush()
-        if self.path.suffix == ".npz":
-            found.save(self.path)
-            with ExitStack() as last:
-                last.callback(self._part.unlink, missing_ok=True)
-        else:
-            self._part.replace(self.path)
-
-
 def checked_bonds(bonds: Any, sites: int) -> NDArray[np.int64]:
     """Bonds as an array (bonds, 2). Raises `TypeError` and `ValueError`."""
     if bonds is None:
@@ -512,15 +364,3 @@ def _reduced(kind: str, densities: Floats) -> Any:
     if kind == "sites":
         return densities
     return float(densities.sum() if kind == "sum" else densities.prod())
-
-
-def _stream_path(path: str | Path) -> Path:
-    found = Path(path)
-    if found.suffix not in STREAMS:
-        raise ValueError(f"frames go to files that end in {' or '.join(STREAMS)}, not {str(path)!r}")
-    return found
-
-
-def _add(archive: zipfile.ZipFile, name: str, value: Any) -> None:
-    with archive.open(f"{name}.npy", "w", force_zip64=True) as member:
-        np.lib.format.write_array(member, np.asarray(value), allow_pickle=False)

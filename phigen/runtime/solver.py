@@ -27,6 +27,7 @@ from phigen.runtime.interface import (
     row_steps,
 )
 from phigen.runtime.live import LiveSession
+from phigen.runtime.named import Named
 from phigen.runtime.retrying import Retrying
 from phigen.runtime.session import Session, rows_along
 from phigen.runtime.timed import along_until, states_at
@@ -53,7 +54,7 @@ class Marks:
     retried: tuple[int, ...] = ()
 
 
-class Solver:
+class Solver(Named[Backend, Interface]):
     """A compiled system: ``solver.integrate(x0, h=0.05, steps=1000, stride=10, mass=2)``.
 
     Parameters of the system are keyword arguments; where a name clashes with an argument, or to pass many, give
@@ -70,21 +71,6 @@ class Solver:
     def __repr__(self) -> str:
         about = self.interface
         return f"<Solver {about.name}: order {about.order}, target {self.target}, ({', '.join(about.coordinates)})>"
-
-    @property
-    def target(self) -> str:
-        """``c`` or ``numpy``."""
-        return self.backend.target
-
-    @property
-    def order(self) -> int:
-        """The order of the method."""
-        return self.interface.order
-
-    @property
-    def coordinates(self) -> tuple[str, ...]:
-        """Names of the coordinates."""
-        return self.interface.coordinates
 
     def integrate(
         self,

@@ -213,7 +213,18 @@ class Path(_Staged):
 
 
 @dataclass(frozen=True)
-class Splitting(_Staged):
+class _Scheduled(_Staged):
+    """A step whose coefficients are rows, one for each of the times of its schedule."""
+
+    @property
+    def coefficients(self) -> int:
+        """Coefficients of one step, in all rows."""
+        schedule: Schedule = self.schedule  # type: ignore[attr-defined]
+        return self.row * len(schedule.times)
+
+
+@dataclass(frozen=True)
+class Splitting(_Scheduled):
     """The exact flows of the parts of H, one after another as the ``schedule`` lists them.
 
     ``prepare`` computes a row of coefficients for each row of the schedule. ``composition`` is the name of the method;
@@ -227,11 +238,6 @@ class Splitting(_Staged):
 
     unit = "step"
     manner = "explicit"
-
-    @property
-    def coefficients(self) -> int:
-        """Coefficients of one step, in all rows."""
-        return self.row * len(self.schedule.times)
 
     @property
     def kernels(self) -> tuple[Kernel, ...]:
@@ -331,7 +337,7 @@ class Equation:
 
 
 @dataclass(frozen=True)
-class Sweeps(_Staged):
+class Sweeps(_Scheduled):
     """A step of a lattice, by sweeps over its sites.
 
     Of a splitting each of the ``parts`` is a list of sweeps, which may be made in any order, and the ``schedule`` is
@@ -351,11 +357,6 @@ class Sweeps(_Staged):
 
     unit = "step of one site"
     manner = "explicit"
-
-    @property
-    def coefficients(self) -> int:
-        """Coefficients of one step, in all rows."""
-        return self.row * len(self.schedule.times)
 
     @property
     def is_by_hand(self) -> bool:

@@ -1,0 +1,167 @@
+"""Frames of lattices, in memory or streamed to disk, and runs that make them, from checkpoints on."""
+
+from __future__ import annotations
+
+import hashlib
+import zipfile
+from collections.abc import Iterator, Mapping
+from contextlib import ExitStack
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from phigen.runtime import checkpoint
+from phigen.runtime.checkpoint import Checkpoint
+from phigen.runtime.interface import BackendError, Floats, Progress
+
+if TYPE_CHECKING:
+    from phigen.runtime.lattice import LatticeSolver, LatticeTrajectory
+
+#: Where frames can be streamed to.
+STREAMS = (".npy", ".npz")
+
+
+@dataclass
+class LatticeRun:
+    """One call of `LatticeSolver.integrate`: ``count`` frames have been made."""
+
+    solver: LatticeSolver
+    start: Floats
+    h: float
+    marks: Any
+    values: Mapping[str, Any]
+    frames: Frames
+    checkpoints: Path | None
+    energy: list[float] = field(default_factory=list)
+    count: int = 0
+    session: Any = None
+    saved: Mapping[str, Any] = field(default_factory=dict)  # what a session of a checkpoint goes on from
+
+    def made(self, progress: Progress | None) -> int:
+        """All frames that are left."""
+        first = self._resumed()
+        self.session = self.solver.started(first, self.h, self.values)
+        self.session.resume(self.h, self.saved)
+        before = int(self.marks[self.count - 1]) if self.count else 0
+        if not self.count:
+            self._store(first)
+        for mark in self.marks[self.count :].tolist():
+            try:
+                self.session.advance(self.h, mark - before - self.session.steps)
+            except BackendError as error:
+                raise BackendError(error.status, before + self.session.steps, error.states) from error
+            self._store(self.session.state())
+            self._save(mark)
+            if progress:
+                progress(mark)
+        if self.checkpoints:
+            self.checkpoints.unlink(missing_ok=True)
+        return self.count
+
+    def _store(self, state: Floats) -> None:
+        self.frames.put(self.count, state)
+        self.energy.append(self.session.hamiltonian())
+        self.count += 1
+
+    def _identity(self) -> dict[str, Any]:
+        arrays = {name: np.asarray(value) for name, value in self.values.items() if np.ndim(value)}
+        numbers = {name: float(value) for name, value in self.values.items() if not np.ndim(value)}
+        hashes = {name: hashlib.sha256(a.tobytes()).hexdigest() for name, a in {**arrays, "": self.start}.items()}
+        marks = [len(self.marks), int(self.marks[-1]), int(self.marks[min(1, len(self.marks) - 1)])]
+        about = {"solver": self.solver.backend.identity, "h": self.h, "sizes": list(self.start.shape), "steps": marks}
+        return {**about, "parameters": numbers, "arrays": hashes}
+
+    def _save(self, mark: int) -> None:
+        if self.checkpoints:
+            self.frames.flush()
+            arrays = {"state": self.session.state(), "count": np.array(self.count), "energy": np.array(self.energy)}
+            arrays |= self.session.saved()
+            if self.frames.path is None:
+                arrays["frames"] = self.frames.array[: self.count]
+            Checkpoint(self._identity(), arrays).save(self.checkpoints)
+
+    def _resumed(self) -> Floats:
+        """The state to go on from."""
+        if self.checkpoints is None or not self.checkpoints.exists():
+            return self.start
+        arrays = checkpoint.load(self.checkpoints, self._identity())
+        self.count, self.energy = int(arrays["count"]), arrays["energy"].tolist()
+        self.frames.restore(arrays.get("frames"), self.count)
+        self.saved = arrays
+        return np.asarray(arrays["state"])
+
+
+class Frames:
+    """Where frames go: an array in memory, or a file."""
+
+    def __init__(self, path: Path | None, shape: tuple[int, ...]) -> None:
+        self.path = path
+        self._part = path.with_name(path.name + ".part.npy") if path else None
+        self._shape = shape
+        self._array: Floats | None = None
+
+    @property
+    def array(self) -> Floats:
+        """All frames."""
+        if self._array is None:
+            if self._part is None:
+                self._array = np.empty(self._shape)
+            else:
+                self._array = np.lib.format.open_memmap(self._part, "w+", np.float64, self._shape)
+        return self._array
+
+    def put(self, k: int, state: Floats) -> None:
+        """Store frame k."""
+        self.array[k] = state
+
+    def kept(self, count: int) -> Iterator[Floats]:
+        """The first frames, still there after `discard`."""
+        return iter(self.array[:count])
+
+    def flush(self) -> None:
+        """Hand over to the disk what is not there yet."""
+        if isinstance(self._array, np.memmap):
+            self._array.flush()
+
+    def restore(self, frames: Floats | None, count: int) -> None:
+        """Go on after the first frames."""
+        if frames is not None:
+            self.array[:count] = frames
+        elif self._part is not None and self._part.exists():
+            self._array = np.lib.format.open_memmap(self._part, "r+")
+            if self._array.shape != self._shape:
+                raise ValueError(f"{self._part} does not hold the frames of this run")
+
+    def discard(self) -> None:
+        """Remove the file of a run that failed; what was mapped from it stays readable."""
+        if self._part is not None and self._array is not None:
+            self._array = np.array(self._array)
+            self._part.unlink(missing_ok=True)
+
+    def finish(self, found: LatticeTrajectory) -> None:
+        """Give the file its name, and what else belongs into it."""
+        if self.path is None or self._part is None:
+            return
+        self.flush()
+        if self.path.suffix == ".npz":
+            found.save(self.path)
+            with ExitStack() as last:
+                last.callback(self._part.unlink, missing_ok=True)
+        else:
+            self._part.replace(self.path)
+
+
+def stream_path(path: str | Path) -> Path:
+    """The path of a file that frames can go to. Raises `ValueError` for any other."""
+    found = Path(path)
+    if found.suffix not in STREAMS:
+        raise ValueError(f"frames go to files that end in {' or '.join(STREAMS)}, not {str(path)!r}")
+    return found
+
+
+def add_member(archive: zipfile.ZipFile, name: str, value: Any) -> None:
+    """Add an array to a .npz file."""
+    with archive.open(f"{name}.npy", "w", force_zip64=True) as member:
+        np.lib.format.write_array(member, np.asarray(value), allow_pickle=False)
