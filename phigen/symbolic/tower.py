@@ -78,10 +78,13 @@ class Tower(Arithmetic[Poly]):
         self.variables = tuple(variables)
         self.generators: list[Generator] = []
         self._set_context()
-        for e in topological(list(expressions)):
-            if not _is_arithmetic(e):
+        wanted = [e for e in topological(list(expressions)) if not _is_arithmetic(e)]
+        self._renamed = True
+        while self._renamed:
+            self._renamed = False
+            for e in wanted:
                 self._absorb(e)
-        self._close()
+            self._close()
         if self._room > len(self.names):
             self._set_context()
 
@@ -131,6 +134,9 @@ class Tower(Arithmetic[Poly]):
                 self._grow(missing)
 
     def _grow(self, missing: _MissingError) -> None:
+        # The root of q, found after 1/q, stands for 1/q from now on: what contained that is to be looked at again.
+        late = missing.kind == "root" and missing.inverse
+        self._renamed |= late and any(g.kind == "reciprocal" for g in self.generators)
         name = Symbol("g", len(self.generators))
         arguments = [self.expression(a) for a in missing.arguments]
         self.generators.append(

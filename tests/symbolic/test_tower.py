@@ -1,8 +1,11 @@
 """The differential ring: what it refuses to multiply, and how it cancels."""
 
+from fractions import Fraction
+
 import pytest
 
 from phigen.symbolic.expression import call, power, symbol, total
+from phigen.symbolic.numeric import evaluate
 from phigen.symbolic.tower import Tower
 
 NAMES = [f"x{i}" for i in range(10)]
@@ -27,3 +30,13 @@ def test_a_variable_and_its_reciprocal_cancel(up, down, left):
     v, w = ring.convert(x), ring.convert(1 / x)
     rest = ring.convert(call("exp", x))
     assert ring.cancelled(v**up * w**down * rest + w) == ring.convert(power(x, left)) * rest + w
+
+
+def test_a_root_found_after_the_reciprocal_of_its_square_stands_for_it():
+    """Where that is in another reciprocal, the ring needs one more."""
+    x, y = symbol("x"), symbol("y")
+    q = 1 + x**2
+    e = 1 / (power(q, Fraction(1, 2)) + 2 * (y / q)) * (1 + y * (power(q, Fraction(-3, 2)) * (x * (1 + q))))
+    tower = Tower(["x", "y"], [e])
+    found, expected = (float(v) for v in evaluate([tower.expression(tower.convert(e)), e], {"x": 0.3, "y": 0.7}))
+    assert found == pytest.approx(expected, rel=1e-14)
