@@ -92,7 +92,7 @@ if (document.getElementById("live-panel")) {
   function pace(given) {
     const { trial, low, high } = tried(given, 60, 100), { axes } = data.groups[0];
     const chords = trial.ours.trail.slice(1).map(({ x }, k) => {
-      return Math.max(...axes.map((a) => Math.abs(x[a] - trial.ours.trail[k].x[a]) / (high[a] - low[a] || 1)));
+      return Math.hypot(...axes.map((a) => (x[a] - trial.ours.trail[k].x[a]) / (high[a] - low[a] || 1))) / Math.sqrt(axes.length);
     });
     const chord = chords.reduce((sum, c) => sum + c, 0) / Math.max(1, chords.length);
     return { longest: Math.max(...chords), speed: shortened(Math.max(15, Math.min(120, 3 / (chord || 1)))) };
@@ -109,7 +109,7 @@ if (document.getElementById("live-panel")) {
       if (ours > 0.03 || longest > 0.8) break;
       const gain = Math.min(theirs, 0.3) / Math.max(ours, 3e-3);
       if (gain > 1.2 * best.gain) best = { h: given.h, speed, gain };
-      if (theirs > 0.3) break;
+      if (theirs > 0.2) break;
     }
     return best;
   }
