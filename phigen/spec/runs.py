@@ -18,6 +18,8 @@ from phigen.spec.yaml_source import Scalar
 from phigen.symbolic.expression import Expression, substitute, symbol
 from phigen.symbolic.symbols import ELAPSED, initial
 
+#: What the step of an adaptive method is called.
+_ADAPTING = ("auto", "adaptive", "variable")
 #: A duration counts as a multiple of the step up to this relative error: decimals of users are rounded.
 NEAR_INTEGER = Fraction(1, 10**9)
 
@@ -25,7 +27,12 @@ NEAR_INTEGER = Fraction(1, 10**9)
 def run(name: str, raw: Mapping[str, Any], declared: Declarations) -> Run:
     """The run of that name. After errors, which are reported, some of its values are stand-ins."""
     numbers = declared.numbers()
-    step = declared.number(raw.get("step"), numbers)
+    given = raw.get("step")
+    if given is not None and given.text in _ADAPTING and given.text not in numbers.names:
+        hint = "steps have one size; monitor: makes them equal in another time, which adapts them to the motion"
+        _fail(name, "step", f"step: {given.text} is no number", declared, hint)
+        given = None
+    step = declared.number(given, numbers)
     if step == 0:
         _fail(name, "step", "the step is 0", declared)
         step = None
