@@ -21,7 +21,7 @@
  *   4. The solver
  *   5. The flows
  *   6. What is seen at sites
- * body-sha256: 7ddda1d72138c7562bb1f44c92e4fe2e30f223915850cfc673388d72b2334a1d
+ * body-sha256: 06615706172e77e7e5b90ad6533d4979a43109a797db364430e01569657c974b
  */
 #include "ablowitz_ladik.h"
 
@@ -501,11 +501,11 @@ static ablowitz_ladik_status ablowitz_ladik_set_step(ablowitz_ladik_solver *s, d
     return ablowitz_ladik_OK;
 }
 
-static int ablowitz_ladik_all_hold(const ablowitz_ladik_solver *s)
+static int ablowitz_ladik_all_hold(const ablowitz_ladik_solver *s, double *const x[ablowitz_ladik_DIM])
 {
     for (size_t k = 0; k < ablowitz_ladik_DIM; ++k)
         for (size_t r = 0; r < s->rows; ++r)
-            if (!ablowitz_ladik_finite(s->x[k] + (ptrdiff_t)r * s->width, (size_t)s->length)) return 0;
+            if (!ablowitz_ladik_finite(x[k] + (ptrdiff_t)r * s->width, (size_t)s->length)) return 0;
     return 1;
 }
 
@@ -564,7 +564,7 @@ static void ablowitz_ladik_steps(const ablowitz_ladik_solver *s, int steps)
 static int ablowitz_ladik_try(ablowitz_ladik_solver *s, int steps)
 {
     ablowitz_ladik_steps(s, steps);
-    if (ablowitz_ladik_all_hold(s)) return 1;
+    if (ablowitz_ladik_all_hold(s, s->x)) return 1;
     ablowitz_ladik_copy(s->x, s->before, s);
     return 0;
 }

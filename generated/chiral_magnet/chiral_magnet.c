@@ -22,7 +22,7 @@
  *   5. The solver
  *   6. The flows
  *   7. What is seen at sites
- * body-sha256: 3365f5db152f87560f70e6f6a216d5827bbe7319d1244090d49a2af70b3b9ac3
+ * body-sha256: 0dbe65e42b3e56dbeafa733bcf67446477249b30f0c41f5113d06070801cd046
  */
 #include "chiral_magnet.h"
 
@@ -1121,11 +1121,11 @@ static chiral_magnet_status chiral_magnet_set_step(chiral_magnet_solver *s, doub
     return chiral_magnet_OK;
 }
 
-static int chiral_magnet_all_hold(const chiral_magnet_solver *s)
+static int chiral_magnet_all_hold(const chiral_magnet_solver *s, double *const x[chiral_magnet_DIM])
 {
     for (size_t k = 0; k < chiral_magnet_DIM; ++k)
         for (size_t r = 0; r < s->rows; ++r)
-            if (!chiral_magnet_finite(s->x[k] + (ptrdiff_t)r * s->width, (size_t)s->length)) return 0;
+            if (!chiral_magnet_finite(x[k] + (ptrdiff_t)r * s->width, (size_t)s->length)) return 0;
     return 1;
 }
 
@@ -1194,7 +1194,7 @@ static void chiral_magnet_steps(const chiral_magnet_solver *s, int steps)
 static int chiral_magnet_try(chiral_magnet_solver *s, int steps)
 {
     chiral_magnet_steps(s, steps);
-    if (chiral_magnet_all_hold(s)) return 1;
+    if (chiral_magnet_all_hold(s, s->x)) return 1;
     chiral_magnet_copy(s->x, s->before, s);
     return 0;
 }

@@ -21,7 +21,7 @@
  *   4. The solver
  *   5. The flows
  *   6. What is seen at sites
- * body-sha256: 786e8c64416ec1a89d006cec0001e06d28718c109927a63babd60f7d8de2653f
+ * body-sha256: 475f623a3b90eb7ed7b8d9a596750249669cc42a31437a959d9c384777b6c2d7
  */
 #include "dnls.h"
 
@@ -448,11 +448,11 @@ static dnls_status dnls_set_step(dnls_solver *s, double h)
     return dnls_OK;
 }
 
-static int dnls_all_hold(const dnls_solver *s)
+static int dnls_all_hold(const dnls_solver *s, double *const x[dnls_DIM])
 {
     for (size_t k = 0; k < dnls_DIM; ++k)
         for (size_t r = 0; r < s->rows; ++r)
-            if (!dnls_finite(s->x[k] + (ptrdiff_t)r * s->width, (size_t)s->length)) return 0;
+            if (!dnls_finite(x[k] + (ptrdiff_t)r * s->width, (size_t)s->length)) return 0;
     return 1;
 }
 
@@ -506,7 +506,7 @@ static void dnls_steps(const dnls_solver *s, int steps)
 static int dnls_try(dnls_solver *s, int steps)
 {
     dnls_steps(s, steps);
-    if (dnls_all_hold(s)) return 1;
+    if (dnls_all_hold(s, s->x)) return 1;
     dnls_copy(s->x, s->before, s);
     return 0;
 }

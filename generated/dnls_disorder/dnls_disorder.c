@@ -21,7 +21,7 @@
  *   4. The solver
  *   5. The flows
  *   6. What is seen at sites
- * body-sha256: ec9b75f76c6cd0408f910cf4344caa56e810a46a2e425bb92d559c832925eff5
+ * body-sha256: a3ac85784863bc3e211a14b163c48a105938b1e87175c0ee76d6ae051e3c7f10
  */
 #include "dnls_disorder.h"
 
@@ -517,11 +517,11 @@ static dnls_disorder_status dnls_disorder_set_step(dnls_disorder_solver *s, doub
     return dnls_disorder_OK;
 }
 
-static int dnls_disorder_all_hold(const dnls_disorder_solver *s)
+static int dnls_disorder_all_hold(const dnls_disorder_solver *s, double *const x[dnls_disorder_DIM])
 {
     for (size_t k = 0; k < dnls_disorder_DIM; ++k)
         for (size_t r = 0; r < s->rows; ++r)
-            if (!dnls_disorder_finite(s->x[k] + (ptrdiff_t)r * s->width, (size_t)s->length)) return 0;
+            if (!dnls_disorder_finite(x[k] + (ptrdiff_t)r * s->width, (size_t)s->length)) return 0;
     return 1;
 }
 
@@ -579,7 +579,7 @@ static void dnls_disorder_steps(const dnls_disorder_solver *s, int steps)
 static int dnls_disorder_try(dnls_disorder_solver *s, int steps)
 {
     dnls_disorder_steps(s, steps);
-    if (dnls_disorder_all_hold(s)) return 1;
+    if (dnls_disorder_all_hold(s, s->x)) return 1;
     dnls_disorder_copy(s->x, s->before, s);
     return 0;
 }

@@ -22,7 +22,7 @@
  *   5. The solver
  *   6. The flows
  *   7. What is seen at sites
- * body-sha256: 8606b2b3d82aa488eca7761fbce7a25343e0c1f9e7b0cb6d8d250ded4e4efadb
+ * body-sha256: 419baee1f42d671fdfd371a60bd33d3cc39227d046e97fcee9c8d8d46288b360
  */
 #include "food_web.h"
 
@@ -642,11 +642,11 @@ static food_web_status food_web_set_step(food_web_solver *s, double h)
     return food_web_OK;
 }
 
-static int food_web_all_hold(const food_web_solver *s)
+static int food_web_all_hold(const food_web_solver *s, double *const x[food_web_DIM])
 {
     for (size_t k = 0; k < food_web_DIM; ++k)
         for (size_t r = 0; r < s->rows; ++r)
-            if (!food_web_finite(s->x[k] + (ptrdiff_t)r * s->width, (size_t)s->length)) return 0;
+            if (!food_web_finite(x[k] + (ptrdiff_t)r * s->width, (size_t)s->length)) return 0;
     return 1;
 }
 
@@ -712,7 +712,7 @@ static void food_web_steps(const food_web_solver *s, int steps)
 static int food_web_try(food_web_solver *s, int steps)
 {
     food_web_steps(s, steps);
-    if (food_web_all_hold(s)) return 1;
+    if (food_web_all_hold(s, s->x)) return 1;
     food_web_copy(s->x, s->before, s);
     return 0;
 }

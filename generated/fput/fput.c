@@ -22,7 +22,7 @@
  *   5. The flows
  *   6. What is seen at sites
  *   7. Steps by hand
- * body-sha256: d1585dc196ba282e6f9542aa9d7f41ba10ab464bb17c0d3c5a6be2d2c76f0a6b
+ * body-sha256: e73a21b3780d34e0cc2d4c7a79cf27c19c233fc917a02d9524a229f7c6968b9b
  */
 #include "fput.h"
 
@@ -403,11 +403,11 @@ static fput_status fput_set_step(fput_solver *s, double h)
     return fput_OK;
 }
 
-static int fput_all_hold(const fput_solver *s)
+static int fput_all_hold(const fput_solver *s, double *const x[fput_DIM])
 {
     for (size_t k = 0; k < fput_DIM; ++k)
         for (size_t r = 0; r < s->rows; ++r)
-            if (!fput_finite(s->x[k] + (ptrdiff_t)r * s->width, (size_t)s->length)) return 0;
+            if (!fput_finite(x[k] + (ptrdiff_t)r * s->width, (size_t)s->length)) return 0;
     return 1;
 }
 
@@ -461,7 +461,7 @@ static void fput_steps(const fput_solver *s, int steps)
 static int fput_try(fput_solver *s, int steps)
 {
     fput_steps(s, steps);
-    if (fput_all_hold(s)) return 1;
+    if (fput_all_hold(s, s->x)) return 1;
     fput_copy(s->x, s->before, s);
     return 0;
 }

@@ -22,7 +22,7 @@
  *   5. The flows
  *   6. What is seen at sites
  *   7. Steps by hand
- * body-sha256: 178b8e0d4afbfc5311a90a02cab35d5f92d15d68999936839cba1e7a462a9bf8
+ * body-sha256: 6053ab0135714d787119a9cd59029d5217336c3fc2a9b13128cd527feb0ce874
  */
 #include "heisenberg.h"
 
@@ -659,11 +659,11 @@ static heisenberg_status heisenberg_set_step(heisenberg_solver *s, double h)
     return heisenberg_OK;
 }
 
-static int heisenberg_all_hold(const heisenberg_solver *s)
+static int heisenberg_all_hold(const heisenberg_solver *s, double *const x[heisenberg_DIM])
 {
     for (size_t k = 0; k < heisenberg_DIM; ++k)
         for (size_t r = 0; r < s->rows; ++r)
-            if (!heisenberg_finite(s->x[k] + (ptrdiff_t)r * s->width, (size_t)s->length)) return 0;
+            if (!heisenberg_finite(x[k] + (ptrdiff_t)r * s->width, (size_t)s->length)) return 0;
     return 1;
 }
 
@@ -721,7 +721,7 @@ static void heisenberg_steps(const heisenberg_solver *s, int steps)
 static int heisenberg_try(heisenberg_solver *s, int steps)
 {
     heisenberg_steps(s, steps);
-    if (heisenberg_all_hold(s)) return 1;
+    if (heisenberg_all_hold(s, s->x)) return 1;
     heisenberg_copy(s->x, s->before, s);
     return 0;
 }

@@ -21,7 +21,7 @@
  *   4. The solver
  *   5. The flows
  *   6. What is seen at sites
- * body-sha256: cab0dfcedd38ae9e4a65b3c3a4634659abaff438f6b27b9150bec3f95ccefb40
+ * body-sha256: f0c34fa0ee0e0a57be360bebc18af8cb165ef57cdee65787c5a1f66e5231c3c3
  */
 #include "heisenberg_plane.h"
 
@@ -545,11 +545,11 @@ static heisenberg_plane_status heisenberg_plane_set_step(heisenberg_plane_solver
     return heisenberg_plane_OK;
 }
 
-static int heisenberg_plane_all_hold(const heisenberg_plane_solver *s)
+static int heisenberg_plane_all_hold(const heisenberg_plane_solver *s, double *const x[heisenberg_plane_DIM])
 {
     for (size_t k = 0; k < heisenberg_plane_DIM; ++k)
         for (size_t r = 0; r < s->rows; ++r)
-            if (!heisenberg_plane_finite(s->x[k] + (ptrdiff_t)r * s->width, (size_t)s->length)) return 0;
+            if (!heisenberg_plane_finite(x[k] + (ptrdiff_t)r * s->width, (size_t)s->length)) return 0;
     return 1;
 }
 
@@ -609,7 +609,7 @@ static void heisenberg_plane_steps(const heisenberg_plane_solver *s, int steps)
 static int heisenberg_plane_try(heisenberg_plane_solver *s, int steps)
 {
     heisenberg_plane_steps(s, steps);
-    if (heisenberg_plane_all_hold(s)) return 1;
+    if (heisenberg_plane_all_hold(s, s->x)) return 1;
     heisenberg_plane_copy(s->x, s->before, s);
     return 0;
 }

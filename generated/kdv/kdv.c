@@ -22,7 +22,7 @@
  *   5. The stages
  *   6. Newton's method where sweeps fail
  *   7. What is seen at sites
- * body-sha256: db52eac68d702419207b9fa35ad54d5b4d2f16fbb05b13d801cc84540bb83dac
+ * body-sha256: ba9662be8b47a9eca26bf672ea48a5eebdac8b34844e1ff9ed3b9ce3b590fc1d
  */
 #include "kdv.h"
 
@@ -152,12 +152,12 @@ static inline kdv_piece kdv_piece_of(const kdv_solver *s, size_t unit)
     return piece;
 }
 
-/* The largest change of y and the largest y, of each field; a NaN where something is not finite. */
+/* The largest change of y and the largest y, of each field; what is no number is left out. */
 typedef struct {
     double change[kdv_DIM], size[kdv_DIM];
 } kdv_extent;
 
-enum { kdv_WIDTH = 8 }; /* largest values that are kept apart, so that loops vectorise */
+enum { kdv_WIDTH = 32 }; /* largest values that are kept apart, so that loops vectorise */
 
 /* Takes in what a sweep from s->y[now] to the other has made of a piece. */
 static inline void kdv_measure(const kdv_solver *s, const kdv_piece *at, int now, kdv_extent *extent)
@@ -165,19 +165,21 @@ static inline void kdv_measure(const kdv_solver *s, const kdv_piece *at, int now
     for (int k = 0; k < kdv_DIM; ++k) {
         const double *restrict before = s->y[now][k] + at->row.at[0], *restrict after = s->y[1 - now][k]
             + at->row.at[0];
-        double change[kdv_WIDTH] = { 0.0 }, size[kdv_WIDTH] = { 0.0 }, zero[kdv_WIDTH] = { 0.0 };
-        for (ptrdiff_t i = at->from; i < at->to; i += kdv_WIDTH) {
-            const int count = at->to - i < kdv_WIDTH ? (int)(at->to - i) : kdv_WIDTH;
-            for (int l = 0; l < count; ++l) {
+        double change[kdv_WIDTH] = { 0.0 }, size[kdv_WIDTH] = { 0.0 };
+        const ptrdiff_t whole = at->to - (at->to - at->from) % kdv_WIDTH;
+        for (ptrdiff_t i = at->from; i < whole; i += kdv_WIDTH)
+            for (int l = 0; l < kdv_WIDTH; ++l) {
                 const double value = fabs(after[i + l]), moved = fabs(after[i + l] - before[i + l]);
                 change[l] = moved > change[l] ? moved : change[l];
                 size[l] = value > size[l] ? value : size[l];
-                zero[l] += moved - moved;
             }
+        for (ptrdiff_t i = whole; i < at->to; ++i) {
+            const double value = fabs(after[i]), moved = fabs(after[i] - before[i]);
+            change[0] = moved > change[0] ? moved : change[0];
+            size[0] = value > size[0] ? value : size[0];
         }
         for (int l = 0; l < kdv_WIDTH; ++l) {
             extent->change[k] = change[l] > extent->change[k] ? change[l] : extent->change[k];
-            extent->change[k] += zero[l];
             extent->size[k] = size[l] > extent->size[k] ? size[l] : extent->size[k];
         }
     }
@@ -505,11 +507,11 @@ static kdv_status kdv_set_step(kdv_solver *s, double h)
     return kdv_OK;
 }
 
-static int kdv_all_hold(const kdv_solver *s)
+static int kdv_all_hold(const kdv_solver *s, double *const x[kdv_DIM])
 {
     for (size_t k = 0; k < kdv_DIM; ++k)
         for (size_t r = 0; r < s->rows; ++r)
-            if (!kdv_finite(s->x[k] + (ptrdiff_t)r * s->width, (size_t)s->length)) return 0;
+            if (!kdv_finite(x[k] + (ptrdiff_t)r * s->width, (size_t)s->length)) return 0;
     return 1;
 }
 
@@ -584,7 +586,10 @@ static kdv_status kdv_middle(kdv_solver *s, const double *coef, int far, int *no
         if (!isfinite(change)) return sweep == 0 ? kdv_NOT_FINITE : kdv_NO_CONVERGENCE;
         /* what further sweeps would change, with the rate change / before; or changes shrink no more */
         if (change * change <= shrunk * kdv_SETTLED || (shrunk <= 0.0 && change <= kdv_ROUNDING && sweep > 0))
-            return kdv_OK;
+            {
+            if (kdv_all_hold(s, s->y[*now])) return kdv_OK;
+            return sweep == 0 ? kdv_NOT_FINITE : kdv_NO_CONVERGENCE;
+        }
         if (sweep >= kdv_PATIENCE && change > kdv_SLOW * before && change > 0x1p-30) break;
         before = change;
     }
@@ -855,7 +860,7 @@ static kdv_status kdv_stages(kdv_solver *s, int far)
     int now = 0;
     kdv_predict(s);
     kdv_status status = s->stiff ? kdv_NO_CONVERGENCE : kdv_middle(s, coef, far, &now);
-    if (status != kdv_OK) {
+    if (status != kdv_OK && (far || status != kdv_NOT_FINITE)) {
         s->stiff = 1;
         now = 0;
         status = kdv_newton(s, coef);
@@ -867,7 +872,7 @@ static kdv_status kdv_stages(kdv_solver *s, int far)
         size_t first, end = kdv_share(units, &first);
         kdv_increment_rows(s, coef, far, now, first, end);
     }
-    return kdv_all_hold(s) ? kdv_OK : kdv_NOT_FINITE;
+    return kdv_all_hold(s, s->x) ? kdv_OK : kdv_NOT_FINITE;
 }
 
 /* One step; if it cannot be made, none. */

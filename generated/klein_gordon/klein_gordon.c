@@ -21,7 +21,7 @@
  *   4. The solver
  *   5. The flows
  *   6. What is seen at sites
- * body-sha256: d6421e80532c03915b1afa7fab0fd468dffb6cbe99136ba77aab1fcd07243fc2
+ * body-sha256: 9c6318524afa2e700503e9f28744ec81118706394bdce34995469dcde8045b35
  */
 #include "klein_gordon.h"
 
@@ -395,11 +395,11 @@ static klein_gordon_status klein_gordon_set_step(klein_gordon_solver *s, double 
     return klein_gordon_OK;
 }
 
-static int klein_gordon_all_hold(const klein_gordon_solver *s)
+static int klein_gordon_all_hold(const klein_gordon_solver *s, double *const x[klein_gordon_DIM])
 {
     for (size_t k = 0; k < klein_gordon_DIM; ++k)
         for (size_t r = 0; r < s->rows; ++r)
-            if (!klein_gordon_finite(s->x[k] + (ptrdiff_t)r * s->width, (size_t)s->length)) return 0;
+            if (!klein_gordon_finite(x[k] + (ptrdiff_t)r * s->width, (size_t)s->length)) return 0;
     return 1;
 }
 
@@ -457,7 +457,7 @@ static void klein_gordon_steps(const klein_gordon_solver *s, int steps)
 static int klein_gordon_try(klein_gordon_solver *s, int steps)
 {
     klein_gordon_steps(s, steps);
-    if (klein_gordon_all_hold(s)) return 1;
+    if (klein_gordon_all_hold(s, s->x)) return 1;
     klein_gordon_copy(s->x, s->before, s);
     return 0;
 }

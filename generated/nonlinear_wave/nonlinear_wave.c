@@ -21,7 +21,7 @@
  *   4. The solver
  *   5. The flows
  *   6. What is seen at sites
- * body-sha256: 0433bf9cad713e12b9c9cee0a2ec2e0fc238a0e88b9d72d26ef094b2b10b33b7
+ * body-sha256: c0dc942e5dbb992ea56976ce073b5a6bbaf4033a734e6bb60503f116afd633ab
  */
 #include "nonlinear_wave.h"
 
@@ -404,11 +404,11 @@ static nonlinear_wave_status nonlinear_wave_set_step(nonlinear_wave_solver *s, d
     return nonlinear_wave_OK;
 }
 
-static int nonlinear_wave_all_hold(const nonlinear_wave_solver *s)
+static int nonlinear_wave_all_hold(const nonlinear_wave_solver *s, double *const x[nonlinear_wave_DIM])
 {
     for (size_t k = 0; k < nonlinear_wave_DIM; ++k)
         for (size_t r = 0; r < s->rows; ++r)
-            if (!nonlinear_wave_finite(s->x[k] + (ptrdiff_t)r * s->width, (size_t)s->length)) return 0;
+            if (!nonlinear_wave_finite(x[k] + (ptrdiff_t)r * s->width, (size_t)s->length)) return 0;
     return 1;
 }
 
@@ -467,7 +467,7 @@ static void nonlinear_wave_steps(const nonlinear_wave_solver *s, int steps)
 static int nonlinear_wave_try(nonlinear_wave_solver *s, int steps)
 {
     nonlinear_wave_steps(s, steps);
-    if (nonlinear_wave_all_hold(s)) return 1;
+    if (nonlinear_wave_all_hold(s, s->x)) return 1;
     nonlinear_wave_copy(s->x, s->before, s);
     return 0;
 }

@@ -21,7 +21,7 @@
  *   4. The solver
  *   5. The flows
  *   6. What is seen at sites
- * body-sha256: 3381ac155aff5b6746b781575717ec85e4b47fc235794f567c04fe711f91c694
+ * body-sha256: b90f7bb6f9563a69e282faae18c958e9bdc961b022f9fe198290c549af65843d
  */
 #include "outer_planets.h"
 
@@ -527,11 +527,11 @@ static outer_planets_status outer_planets_set_step(outer_planets_solver *s, doub
     return outer_planets_OK;
 }
 
-static int outer_planets_all_hold(const outer_planets_solver *s)
+static int outer_planets_all_hold(const outer_planets_solver *s, double *const x[outer_planets_DIM])
 {
     for (size_t k = 0; k < outer_planets_DIM; ++k)
         for (size_t r = 0; r < s->rows; ++r)
-            if (!outer_planets_finite(s->x[k] + (ptrdiff_t)r * s->width, (size_t)s->length)) return 0;
+            if (!outer_planets_finite(x[k] + (ptrdiff_t)r * s->width, (size_t)s->length)) return 0;
     return 1;
 }
 
@@ -589,7 +589,7 @@ static void outer_planets_steps(const outer_planets_solver *s, int steps)
 static int outer_planets_try(outer_planets_solver *s, int steps)
 {
     outer_planets_steps(s, steps);
-    if (outer_planets_all_hold(s)) return 1;
+    if (outer_planets_all_hold(s, s->x)) return 1;
     outer_planets_copy(s->x, s->before, s);
     return 0;
 }

@@ -22,7 +22,7 @@
  *   4. The solver
  *   5. The stages
  *   6. What is seen at sites
- * body-sha256: f35027511d76f2e1252d6cb03a4fb7b767feb3ee3f83e27d5563a67bb7f16ce6
+ * body-sha256: ef1be2007c8d4d2cab19453f0828a2b69ff1630a9af94400a95630002691e04a
  */
 #include "point_vortices.h"
 
@@ -144,12 +144,12 @@ static inline point_vortices_piece point_vortices_piece_of(const point_vortices_
     return piece;
 }
 
-/* The largest change of y and the largest y, of each field; a NaN where something is not finite. */
+/* The largest change of y and the largest y, of each field; what is no number is left out. */
 typedef struct {
     double change[point_vortices_DIM], size[point_vortices_DIM];
 } point_vortices_extent;
 
-enum { point_vortices_WIDTH = 8 }; /* largest values that are kept apart, so that loops vectorise */
+enum { point_vortices_WIDTH = 32 }; /* largest values that are kept apart, so that loops vectorise */
 
 /* Takes in what a sweep from s->y[now] to the other has made of a piece. */
 static inline void point_vortices_measure(const point_vortices_solver *s, const point_vortices_piece *at,
@@ -158,20 +158,21 @@ static inline void point_vortices_measure(const point_vortices_solver *s, const 
     for (int k = 0; k < point_vortices_DIM; ++k) {
         const double *restrict before = s->y[now][k] + at->row.at[0], *restrict after = s->y[1 - now][k]
             + at->row.at[0];
-        double change[point_vortices_WIDTH] = { 0.0 }, size[point_vortices_WIDTH] = { 0.0 },
-            zero[point_vortices_WIDTH] = { 0.0 };
-        for (ptrdiff_t i = at->from; i < at->to; i += point_vortices_WIDTH) {
-            const int count = at->to - i < point_vortices_WIDTH ? (int)(at->to - i) : point_vortices_WIDTH;
-            for (int l = 0; l < count; ++l) {
+        double change[point_vortices_WIDTH] = { 0.0 }, size[point_vortices_WIDTH] = { 0.0 };
+        const ptrdiff_t whole = at->to - (at->to - at->from) % point_vortices_WIDTH;
+        for (ptrdiff_t i = at->from; i < whole; i += point_vortices_WIDTH)
+            for (int l = 0; l < point_vortices_WIDTH; ++l) {
                 const double value = fabs(after[i + l]), moved = fabs(after[i + l] - before[i + l]);
                 change[l] = moved > change[l] ? moved : change[l];
                 size[l] = value > size[l] ? value : size[l];
-                zero[l] += moved - moved;
             }
+        for (ptrdiff_t i = whole; i < at->to; ++i) {
+            const double value = fabs(after[i]), moved = fabs(after[i] - before[i]);
+            change[0] = moved > change[0] ? moved : change[0];
+            size[0] = value > size[0] ? value : size[0];
         }
         for (int l = 0; l < point_vortices_WIDTH; ++l) {
             extent->change[k] = change[l] > extent->change[k] ? change[l] : extent->change[k];
-            extent->change[k] += zero[l];
             extent->size[k] = size[l] > extent->size[k] ? size[l] : extent->size[k];
         }
     }
@@ -540,11 +541,11 @@ static point_vortices_status point_vortices_set_step(point_vortices_solver *s, d
     return point_vortices_OK;
 }
 
-static int point_vortices_all_hold(const point_vortices_solver *s)
+static int point_vortices_all_hold(const point_vortices_solver *s, double *const x[point_vortices_DIM])
 {
     for (size_t k = 0; k < point_vortices_DIM; ++k)
         for (size_t r = 0; r < s->rows; ++r)
-            if (!point_vortices_finite(s->x[k] + (ptrdiff_t)r * s->width, (size_t)s->length)) return 0;
+            if (!point_vortices_finite(x[k] + (ptrdiff_t)r * s->width, (size_t)s->length)) return 0;
     return 1;
 }
 
@@ -620,8 +621,10 @@ static point_vortices_status point_vortices_middle(point_vortices_solver *s, con
         if (!isfinite(change)) return sweep == 0 ? point_vortices_NOT_FINITE : point_vortices_NO_CONVERGENCE;
         /* what further sweeps would change, with the rate change / before; or changes shrink no more */
         if (change * change <= shrunk * point_vortices_SETTLED || (shrunk <= 0.0 && change <=
-            point_vortices_ROUNDING && sweep > 0))
-            return point_vortices_OK;
+            point_vortices_ROUNDING && sweep > 0)) {
+            if (point_vortices_all_hold(s, s->y[*now])) return point_vortices_OK;
+            return sweep == 0 ? point_vortices_NOT_FINITE : point_vortices_NO_CONVERGENCE;
+        }
         before = change;
     }
     return point_vortices_NO_CONVERGENCE;
@@ -709,7 +712,7 @@ static point_vortices_status point_vortices_stages(point_vortices_solver *s, int
             point_vortices_increment_rows(s, coef, far, now, first, end);
         }
     }
-    return point_vortices_all_hold(s) ? point_vortices_OK : point_vortices_NOT_FINITE;
+    return point_vortices_all_hold(s, s->x) ? point_vortices_OK : point_vortices_NOT_FINITE;
 }
 
 /* One step; if it cannot be made, none. */

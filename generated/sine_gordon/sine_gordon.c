@@ -21,7 +21,7 @@
  *   4. The solver
  *   5. The flows
  *   6. What is seen at sites
- * body-sha256: 7d86ec0980420045c9081e85c8090f1a8f6ee2230eafd1955847d1bdf4736b02
+ * body-sha256: fa107853a4e34b783bfa4cb08ada818fd255b16cb39f50f16e8b22b1bc7cdb3f
  */
 #include "sine_gordon.h"
 
@@ -430,11 +430,11 @@ static sine_gordon_status sine_gordon_set_step(sine_gordon_solver *s, double h)
     return sine_gordon_OK;
 }
 
-static int sine_gordon_all_hold(const sine_gordon_solver *s)
+static int sine_gordon_all_hold(const sine_gordon_solver *s, double *const x[sine_gordon_DIM])
 {
     for (size_t k = 0; k < sine_gordon_DIM; ++k)
         for (size_t r = 0; r < s->rows; ++r)
-            if (!sine_gordon_finite(s->x[k] + (ptrdiff_t)r * s->width, (size_t)s->length)) return 0;
+            if (!sine_gordon_finite(x[k] + (ptrdiff_t)r * s->width, (size_t)s->length)) return 0;
     return 1;
 }
 
@@ -492,7 +492,7 @@ static void sine_gordon_steps(const sine_gordon_solver *s, int steps)
 static int sine_gordon_try(sine_gordon_solver *s, int steps)
 {
     sine_gordon_steps(s, steps);
-    if (sine_gordon_all_hold(s)) return 1;
+    if (sine_gordon_all_hold(s, s->x)) return 1;
     sine_gordon_copy(s->x, s->before, s);
     return 0;
 }

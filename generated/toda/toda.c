@@ -21,7 +21,7 @@
  *   4. The solver
  *   5. The flows
  *   6. What is seen at sites
- * body-sha256: 12b23d894b2347507f4e73c304a50b2ea08d474290cc5b368111345e28fa8bb7
+ * body-sha256: 774c5d080ebc4f403c98f43c5ebc078de6ba73786db041f992152d6c148e0d3f
  */
 #include "toda.h"
 
@@ -416,11 +416,11 @@ static toda_status toda_set_step(toda_solver *s, double h)
     return toda_OK;
 }
 
-static int toda_all_hold(const toda_solver *s)
+static int toda_all_hold(const toda_solver *s, double *const x[toda_DIM])
 {
     for (size_t k = 0; k < toda_DIM; ++k)
         for (size_t r = 0; r < s->rows; ++r)
-            if (!toda_finite(s->x[k] + (ptrdiff_t)r * s->width, (size_t)s->length)) return 0;
+            if (!toda_finite(x[k] + (ptrdiff_t)r * s->width, (size_t)s->length)) return 0;
     return 1;
 }
 
@@ -474,7 +474,7 @@ static void toda_steps(const toda_solver *s, int steps)
 static int toda_try(toda_solver *s, int steps)
 {
     toda_steps(s, steps);
-    if (toda_all_hold(s)) return 1;
+    if (toda_all_hold(s, s->x)) return 1;
     toda_copy(s->x, s->before, s);
     return 0;
 }

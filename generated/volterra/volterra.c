@@ -21,7 +21,7 @@
  *   4. The solver
  *   5. The flows
  *   6. What is seen at sites
- * body-sha256: afab726302dc2dff8031c1bcb6f550246add4b03b494687e18acd12a58bdac10
+ * body-sha256: d67a88de5ecbd345a88c72233d4e35ee19fe64ea4d5ce0009d36afcadb133971
  */
 #include "volterra.h"
 
@@ -431,11 +431,11 @@ static volterra_status volterra_set_step(volterra_solver *s, double h)
     return volterra_OK;
 }
 
-static int volterra_all_hold(const volterra_solver *s)
+static int volterra_all_hold(const volterra_solver *s, double *const x[volterra_DIM])
 {
     for (size_t k = 0; k < volterra_DIM; ++k)
         for (size_t r = 0; r < s->rows; ++r)
-            if (!volterra_finite(s->x[k] + (ptrdiff_t)r * s->width, (size_t)s->length)) return 0;
+            if (!volterra_finite(x[k] + (ptrdiff_t)r * s->width, (size_t)s->length)) return 0;
     return 1;
 }
 
@@ -490,7 +490,7 @@ static void volterra_steps(const volterra_solver *s, int steps)
 static int volterra_try(volterra_solver *s, int steps)
 {
     volterra_steps(s, steps);
-    if (volterra_all_hold(s)) return 1;
+    if (volterra_all_hold(s, s->x)) return 1;
     volterra_copy(s->x, s->before, s);
     return 0;
 }

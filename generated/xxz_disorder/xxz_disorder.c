@@ -21,7 +21,7 @@
  *   4. The solver
  *   5. The flows
  *   6. What is seen at sites
- * body-sha256: 2775009bf04e3410cf4db4777db6774268bcbea52d4f4c26b3d1f8008155ed39
+ * body-sha256: e263e4b49d950e70e6d53a3bdb8fa3c2e233c12bc045e630a8c7ee13124ca153
  */
 #include "xxz_disorder.h"
 
@@ -513,11 +513,11 @@ static xxz_disorder_status xxz_disorder_set_step(xxz_disorder_solver *s, double 
     return xxz_disorder_OK;
 }
 
-static int xxz_disorder_all_hold(const xxz_disorder_solver *s)
+static int xxz_disorder_all_hold(const xxz_disorder_solver *s, double *const x[xxz_disorder_DIM])
 {
     for (size_t k = 0; k < xxz_disorder_DIM; ++k)
         for (size_t r = 0; r < s->rows; ++r)
-            if (!xxz_disorder_finite(s->x[k] + (ptrdiff_t)r * s->width, (size_t)s->length)) return 0;
+            if (!xxz_disorder_finite(x[k] + (ptrdiff_t)r * s->width, (size_t)s->length)) return 0;
     return 1;
 }
 
@@ -575,7 +575,7 @@ static void xxz_disorder_steps(const xxz_disorder_solver *s, int steps)
 static int xxz_disorder_try(xxz_disorder_solver *s, int steps)
 {
     xxz_disorder_steps(s, steps);
-    if (xxz_disorder_all_hold(s)) return 1;
+    if (xxz_disorder_all_hold(s, s->x)) return 1;
     xxz_disorder_copy(s->x, s->before, s);
     return 0;
 }

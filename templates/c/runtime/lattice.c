@@ -246,11 +246,11 @@ static phi_status phi_set_step(phi_solver *s, double h)
     return PHI_OK;
 }
 
-static int phi_all_hold(const phi_solver *s)
+static int phi_all_hold(const phi_solver *s, double *const x[PHI_DIM])
 {
     for (size_t k = 0; k < PHI_DIM; ++k)
         for (size_t r = 0; r < s->rows; ++r)
-            if (!phi_finite(s->x[k] + (ptrdiff_t)r * s->width, (size_t)s->length)) return 0;
+            if (!phi_finite(x[k] + (ptrdiff_t)r * s->width, (size_t)s->length)) return 0;
     return 1;
 }
 

@@ -70,7 +70,7 @@ static void phi_steps(const phi_solver *s, int steps)
 static int phi_try(phi_solver *s, int steps)
 {
     phi_steps(s, steps);
-    if (phi_all_hold(s)) return 1;
+    if (phi_all_hold(s, s->x)) return 1;
     phi_copy(s->x, s->before, s);
     return 0;
 }

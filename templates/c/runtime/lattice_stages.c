@@ -76,8 +76,10 @@ static phi_status phi_middle(phi_solver *s, const double *coef, int far, int *no
         *now = 1 - *now;
         if (!isfinite(change)) return sweep == 0 ? PHI_NOT_FINITE : PHI_NO_CONVERGENCE;
         /* what further sweeps would change, with the rate change / before; or changes shrink no more */
-        if (change * change <= shrunk * PHI_SETTLED || (shrunk <= 0.0 && change <= PHI_ROUNDING && sweep > 0))
-            return PHI_OK;
+        if (change * change <= shrunk * PHI_SETTLED || (shrunk <= 0.0 && change <= PHI_ROUNDING && sweep > 0)) {
+            if (phi_all_hold(s, s->y[*now])) return PHI_OK;
+            return sweep == 0 ? PHI_NOT_FINITE : PHI_NO_CONVERGENCE;
+        }
 #if PHI_STIFF
         if (sweep >= PHI_PATIENCE && change > PHI_SLOW * before && change > 0x1p-30) break;
 #endif
@@ -170,7 +172,7 @@ static phi_status phi_stages(phi_solver *s, int far)
 #endif
 #if PHI_STIFF
         phi_status status = s->stiff ? PHI_NO_CONVERGENCE : phi_middle(s, coef, far, &now);
-        if (status != PHI_OK) {
+        if (status != PHI_OK && (far || status != PHI_NOT_FINITE)) {
             s->stiff = 1;
             now = 0;
             status = phi_newton(s, coef, stage);
@@ -188,7 +190,7 @@ static phi_status phi_stages(phi_solver *s, int far)
             phi_increment_rows(s, coef, far, now, first, end);
         }
     }
-    return phi_all_hold(s) ? PHI_OK : PHI_NOT_FINITE;
+    return phi_all_hold(s, s->x) ? PHI_OK : PHI_NOT_FINITE;
 }
 
 /* One step; if it cannot be made, none. */

@@ -174,31 +174,33 @@ static inline phi_piece phi_piece_of(const phi_solver *s, size_t unit)
 }
 
 #if PHI_SERIES
-/* The largest change of y and the largest y, of each field; a NaN where something is not finite. */
+/* The largest change of y and the largest y, of each field; what is no number is left out. */
 typedef struct {
     double change[PHI_DIM], size[PHI_DIM];
 } phi_extent;
 
-enum { PHI_WIDTH = 8 }; /* largest values that are kept apart, so that loops vectorise */
+enum { PHI_WIDTH = 32 }; /* largest values that are kept apart, so that loops vectorise */
 
 /* Takes in what a sweep from s->y[now] to the other has made of a piece. */
 static inline void phi_measure(const phi_solver *s, const phi_piece *at, int now, phi_extent *extent)
 {
     for (int k = 0; k < PHI_DIM; ++k) {
         const double *restrict before = s->y[now][k] + at->row.at[0], *restrict after = s->y[1 - now][k] + at->row.at[0];
-        double change[PHI_WIDTH] = { 0.0 }, size[PHI_WIDTH] = { 0.0 }, zero[PHI_WIDTH] = { 0.0 };
-        for (ptrdiff_t i = at->from; i < at->to; i += PHI_WIDTH) {
-            const int count = at->to - i < PHI_WIDTH ? (int)(at->to - i) : PHI_WIDTH;
-            for (int l = 0; l < count; ++l) {
+        double change[PHI_WIDTH] = { 0.0 }, size[PHI_WIDTH] = { 0.0 };
+        const ptrdiff_t whole = at->to - (at->to - at->from) % PHI_WIDTH;
+        for (ptrdiff_t i = at->from; i < whole; i += PHI_WIDTH)
+            for (int l = 0; l < PHI_WIDTH; ++l) {
                 const double value = fabs(after[i + l]), moved = fabs(after[i + l] - before[i + l]);
                 change[l] = moved > change[l] ? moved : change[l];
                 size[l] = value > size[l] ? value : size[l];
-                zero[l] += moved - moved;
             }
+        for (ptrdiff_t i = whole; i < at->to; ++i) {
+            const double value = fabs(after[i]), moved = fabs(after[i] - before[i]);
+            change[0] = moved > change[0] ? moved : change[0];
+            size[0] = value > size[0] ? value : size[0];
         }
         for (int l = 0; l < PHI_WIDTH; ++l) {
             extent->change[k] = change[l] > extent->change[k] ? change[l] : extent->change[k];
-            extent->change[k] += zero[l];
             extent->size[k] = size[l] > extent->size[k] ? size[l] : extent->size[k];
         }
     }
