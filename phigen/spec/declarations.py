@@ -232,7 +232,7 @@ class Declarations:
             self.reader.error(node, f"a parameter cannot be called {name!r}", ARGUMENT_HINT)
         elif self.lattice and name in (*self.lattice.indices, *(f"N_{i}" for i in self.lattice.indices)):
             self.reader.error(node, f"the {what} {name!r} has the name of an index or size of the lattice", RENAME)
-        elif self.lattice and name == self.lattice.graph:
+        elif self.lattice and self.lattice.graph and name in (self.lattice.graph, "bonds"):  # an argument of solvers
             self.reader.error(node, f"the {what} {name!r} has the name of the bonds of the lattice", RENAME)
         else:
             self.nodes[name] = node

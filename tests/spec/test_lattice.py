@@ -124,3 +124,9 @@ def test_a_lattice_is_no_ordinary_system() -> None:
 )
 def test_quotes_are_put_about_what_has_an_index(line: str, expected: str) -> None:
     assert quoted(line) == expected
+
+
+@pytest.mark.parametrize("name", ["eats", "bonds"])
+def test_nothing_else_is_called_as_the_bonds_of_a_graph(name: str) -> None:
+    with pytest.raises(SpecError, match=f"'{name}' has the name of the bonds"):
+        loads(FOOD.replace("parameters: {", f"parameters: {{{name}: 1, "))
