@@ -257,6 +257,8 @@ class CSolver:
         """See `phigen.runtime.backend.Backend`."""
         if not hasattr(self._c, "ensemble"):
             raise TypeError(f"{self.interface.name} was compiled without ensembles: its spec leaves them out")
+        if not len(members) and members.alike:
+            self._expect_parameters(members)
         alike = members.alike and not members.stride and self._gauge is None
         if not (alike or hasattr(self._c, "ensemble_each")):
             return one_by_one(self, members)
@@ -277,6 +279,23 @@ class CSolver:
         if frames is not None and members.steps % members.stride:
             frames[-1] = np.where(status[:, np.newaxis] == 0, final, np.nan)
         return members.told(final if frames is None else frames, failures)
+
+    def _expect_parameters(self, members: Members) -> None:
+        """Where no member asks, whether steps can be made with the parameters: of a monitored system nobody can tell,
+        since its start depends on the state too."""
+        if hasattr(self._c, "monitor"):
+            return
+        _, parameters, t0 = members.numbers(0)
+        packed, zeros = self._packed(parameters), np.zeros(self.interface.dimension)
+        struct = _aligned(self._c.solver_size())
+        numbers = [struct.ctypes.data, packed.ctypes.data, zeros.ctypes.data]
+        if hasattr(self._c, "init_gauge"):
+            gauge = np.zeros(len(self.interface.casimirs))
+            status = self._c.init_gauge(*numbers, gauge.ctypes.data)
+        else:
+            status = self._c.init_at(*numbers, t0) if self.interface.time else self._c.init(*numbers)
+        if status:
+            raise BackendError(status_name(status), 0, members.x0)
 
     def _alike(self, members: Members, x: Floats, status: Bytes) -> None:
         """Integrate some members (DIM, members), in place, that differ in their states only."""

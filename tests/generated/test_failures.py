@@ -211,6 +211,7 @@ def test_parameters_that_give_no_steps_are_told_in_python(name, target):
         lambda **p: solve.step(x0, 0.1, **p),
         lambda **p: solve.step_tangent(x0, 0.1, **p),
         lambda **p: solve.ensemble([x0] * 9, 0.1, 3, **p),
+        lambda **p: solve.ensemble(np.empty((0, len(x0))), 0.1, 3, **p),
     ]
     for call in calls:
         with pytest.raises(ParameterError, match=r"m = 0\.0, .* what is computed from parameters alone is not finite"):
