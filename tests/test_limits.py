@@ -10,12 +10,13 @@ import pytest
 from phigen.compiler import compile_proved, compile_spec
 from phigen.errors import LimitError, PhigenError
 from phigen.scheme import discretisation
+from phigen.scheme.estimate import OperationCount, TooManyError
 from phigen.scheme.generating import graph_form
 from phigen.scheme.lowering import cost
 from phigen.series.hamilton_jacobi import polynomial_series
 from phigen.spec import limits, loads
 from phigen.symbolic import budgets
-from phigen.symbolic.expression import symbol
+from phigen.symbolic.expression import ONE, symbol, total_at
 
 #: What a refusal may take, and the memory that stops a test.
 SECONDS, CEILING = 5, 2**31
@@ -118,8 +119,20 @@ def test_a_graph_whose_hessian_is_too_large_is_given_up_before_it_is_made(monkey
         graph_form([h], names_, [])
 
 
+def test_products_of_matrices_are_counted_as_they_would_be_made():
+    a, b, c, d, fixed = (symbol(name) for name in ("a", "b", "c", "d", "fixed"))
+    left = [{0: a, 1: b, 2: c}, {1: ONE, 2: a}, {0: fixed}]
+    right = [{0: c, 1: c, 2: fixed}, {0: d, 1: d}, {0: b, 1: b, 2: a}]
+    rows = [{j: {k: e * right[k][j] for k, e in row.items() if j in right[k]} for j in range(3)} for row in left]
+    made = [total_at(terms) for row in rows for terms in row.values()]
+    true = cost([e for e in made if e is not fixed * fixed])
+    assert OperationCount(true, lambda name: name == "fixed").matrix(left, right) == true
+    with pytest.raises(TooManyError):
+        OperationCount(true - 1, lambda name: name == "fixed").matrix(left, right)
+
+
 def test_a_step_whose_matrices_are_too_large_is_composed_or_refused_before_they_are_made(monkeypatch):
-    """The estimate is between 0.6 of the truth and the truth; steps of order 2 take less."""
+    """The estimate is more than 0.6 of the truth; steps of order 2 take less."""
     text = loads(log_canonical(10))
     direct = compile_spec(text).program
     true = cost(direct.step.linearise.roots)
