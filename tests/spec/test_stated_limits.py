@@ -39,6 +39,7 @@ ROWS = {
     "MEMBERS": "members of a run",
     "SOURCES": "sources of noise",
     "STEPS": "steps of a run",
+    "SWEPT": "members of a sweep",
     "ERRORS": "errors that are listed",
 }
 NAMES = [name for name in vars(limits) if name.isupper()]
