@@ -58,6 +58,8 @@ class Slider:
 
 def gathered(compilation: Compilation, scheme: str | None, run: Run, parameters: Mapping[str, float]) -> Live:
     """The panel for a run: the solver in JavaScript, of the order of the page and of lower ones."""
+    if compilation.system.noise:
+        return Live({}, why_not="RK4, which it has beside the solver, takes no noise")
     own = compilation.order.order
     spec = replace(compilation.spec, reconstruct="")
     found: dict[int, str] = {}

@@ -11,6 +11,7 @@ from support import COMMAND, compile_text, javascript, run, solver, tool, write
 
 from phigen.compiler import emit, examine
 from phigen.errors import SpecError
+from phigen.report.live import gathered
 from phigen.scheme.program import BOUND
 from phigen.study.stochastic import strong_order
 from phigen.study.verification import verify
@@ -416,6 +417,10 @@ def test_verification_asks_for_what_is_promised(kind):
         "steps that fail, of increments as large as can be",
     } <= required
     assert ("Poisson defect, exact tangent" in required) == (kind != "thermal")  # there forces act
+
+
+def test_no_panel_of_a_report_sets_noise_beside_a_method_that_takes_none():
+    assert not gathered(made("thermal"), None, None, {}).solvers
 
 
 def test_the_code_says_what_noise_leaves_of_it():
