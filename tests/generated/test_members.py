@@ -122,3 +122,15 @@ def test_wrong_arguments_of_members_are_errors(arguments, error, said):
     given = {"X0": np.ones((3, 3)), "h": 0.1, "steps": 1, **arguments}
     with pytest.raises(error, match=said):
         solve.ensemble(**given)
+
+
+@pytest.mark.parametrize("target", TARGETS)
+def test_a_step_too_large_for_one_member_is_that_of_no_other(target):
+    """A step that fails is tried again, with the parameters and the step of the member that it is of."""
+    solve, start = solver(compiled("rigid_body"), target), [0.1, 1.0, 0.2]
+    with pytest.raises(StepError) as many:
+        solve.ensemble(start, [0.1, 1e3, 0.05], 10, I2=[0.9, 1.1, 1.2])
+    assert many.value.members == (1,)
+    for m, (h, I2) in {0: (0.1, 0.9), 2: (0.05, 1.2)}.items():
+        alone = solve.integrate(start, h, 10, I2=I2).x[-1]
+        np.testing.assert_allclose(many.value.trajectory[m], alone, rtol=0, atol=1e-15)
