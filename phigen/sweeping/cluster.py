@@ -43,7 +43,7 @@ def connected(scheduler: str | None, workers: int | None) -> Iterator[tuple[Any,
     count = workers or cores()
     with (
         # A worker may be killed with any chunk; which one is to blame, TRIES decides.
-        dask.config.set({"distributed.scheduler.allowed-failures": TRIES}),
+        dask.config.set({"distributed.scheduler.allowed-failures": TRIES, "distributed.worker.profile.enabled": False}),
         distributed.LocalCluster(
             n_workers=count, threads_per_worker=1, processes=True, dashboard_address=None, silence_logs=logging.ERROR
         ) as cluster,

@@ -24,7 +24,7 @@ from phigen.sweeping import cluster, store
 from phigen.sweeping.plan import Plan, chunk_of
 
 #: Seconds that a chunk should take: long beside what scheduling and storing cost, short beside a coffee.
-_SECONDS = 2.0
+_SECONDS = 4.0
 
 #: Seconds of a step with its derivative, and what is done with that in Python.
 _TANGENT = 40e-6
@@ -154,12 +154,12 @@ def _seconds_of_a_member(job: store.Job) -> float:
     h, t0 = np.asarray(plan.h), np.asarray(plan.t0)
     trial = Members(x0, h, steps, values, t0, draws=Draws(plan.seed), paths=np.arange(len(x0)))
     backend = job.backend()
-    began = time.perf_counter()
+    began = time.process_time()  # of a machine that is busy with other things, no less should be asked at a time
     try:
         backend.ensemble(trial, 1)
     except BackendError:
         return _SECONDS / 4096  # nothing is known
-    seconds = (time.perf_counter() - began) / len(x0) * (plan.steps / steps) + 1e-7
+    seconds = (time.process_time() - began) / len(x0) * (plan.steps / steps) + 1e-7
     return seconds * (1 + ("crossings" in plan.keep)) + ("lyapunov" in plan.keep) * _TANGENT * plan.steps
 
 
