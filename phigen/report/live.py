@@ -120,17 +120,22 @@ def live_section(compilation: Compilation, live: Live) -> Markup:
         "live",
         say=_say(system, quantities, any(leaf is not None for leaf in leaves)),
         sides=[
-            ("ours", "phigen", f"order {compilation.order.order}"),
-            ("theirs", "RK4", "the classical method of Runge and Kutta"),
+            (1, "ours", "phigen", "id=live-order", f"order {compilation.order.order}"),
+            (2, "theirs", "RK4", "class=about", "the classical method of Runge and Kutta"),
         ],
         label=f"The motion of {', '.join(shown[0])}",
         quantities=[q["name"] for q in quantities],
-        sliders=_general(live),
+        sliders=map(_slid, _general(live)),
+        choice=len(shown) > 1,
         groups=list(enumerate(", ".join(g) for g in shown)),
-        folds=_folds(system, start, parameters),
+        folds=[(title, unfolded, map(_slid, listed)) for title, unfolded, listed in _folds(system, start, parameters)],
         help=HELP,
         data=page.data("live-data", given),
     )
+
+
+def _slid(slider: Slider) -> Markup:
+    return page.block("slider", **vars(slider))
 
 
 def _quantities(system: System) -> list[dict[str, object]]:

@@ -48,7 +48,12 @@ _LIBRARY = re.compile(r"pthread_\w+|posix_\w+|inet6_\w+|argp_err_exit|acc|atomic
 
 #: Symbols of one spec that are also those of another, which has a longer name: NAME_default_params is the default of
 #: NAME, and would be the type of the parameters of NAME_default.
-CLASHING_ENDS = {"default": "default_params", "modified": "modified_hamiltonian", "set": "set_attitude"}
+CLASHING_ENDS = {
+    "default": "default_params",
+    "modified": "modified_hamiltonian",
+    "put": "put_planes",
+    "set": "set_attitude",
+}
 
 _HIDES = "would hide {} of that name from what is compiled or imported beside the solver"
 _REASONS: tuple[tuple[Callable[[str], object], str], ...] = (

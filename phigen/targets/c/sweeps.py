@@ -217,6 +217,7 @@ def model(program: Program, step: Sweeps) -> str:
         "multiples": ", ".join(map(repr, multiples)) if schedule.multiples else "",
         "parts": ", ".join(str(part + (not step.by_colour)) for part, _ in flows),
         "by_colour": ", ".join(str(int(c)) for c in step.by_colour),
+        "part_count": len(step.by_colour),
         "graph": layout.graph,
         "rows": ", ".join(str(row) for _, row in flows),
         "allowed": [*_allowed(asked, arrays)],
@@ -225,7 +226,7 @@ def model(program: Program, step: Sweeps) -> str:
         else "",
     }
     prepare = function(program, step.prepare)
-    return render("c", "lattice.c", values) + prepare
+    return render("c", "lattice.c", values) + render("c", "lattice_allowed.c", values) + prepare
 
 
 def _allowed(asked: Sequence[str], arrays: Sequence[tuple[str, bool, bool, str]]) -> Iterator[str]:
@@ -282,6 +283,7 @@ def sweeps(program: Program, step: Sweeps, rows: Rows) -> str:
             if p.at == "bonds"
         ],
         "by_colour": bool(step.by_colour),
+        "what": "flow" if step.by_colour else "part",
         "labels": [("default" if k == len(step.parts) else f"case {k}", k) for k in numbers],
     }
     return "\n".join([*found, render("c", "sweeps.c", values)])

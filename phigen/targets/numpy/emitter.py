@@ -77,10 +77,11 @@ def _body(program: Program) -> str:
     pieces += [render("numpy", template, _values(program)) for template in templates]
     pieces += [_function(program, kernel) for kernel in program.choice]
     pieces += _monitor(program)
-    coefficients = "coefficients_in_time.py" if program.time else "coefficients.py"
-    coefficients = "noise.py" if program.noise else coefficients
+    coefficients = ["coefficients_in_time.py" if program.time else "coefficients.py"]
+    if program.noise:
+        coefficients = ["noise.py", "philox.py", "drawing.py", "renewed.py"]
     integrate = "integrate_monitored.py" if program.monitor else "integrate.py"
-    parts = (coefficients, "single.py", "checked.py", integrate)
+    parts = (*coefficients, "single.py", "checked.py", integrate)
     pieces += [render("numpy", part, _values(program)) for part in parts]
     pieces += [_function(program, kernel) for kernel in (seen.energy, seen.casimirs, seen.vector_field)]
     pieces += [_function(program, program.noise.fields)] if program.noise else []

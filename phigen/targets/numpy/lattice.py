@@ -19,6 +19,10 @@ from phigen.targets.reserved import PYTHON_RESERVED
 _OWN = frozenset({"coef", "x", "sites", "parameters", "h", "kick", "np", *LANGUAGE.functions.values()})
 
 
+#: The templates of implicit steps.
+_SERIES = ("lattice_series", "lattice_guesses")
+
+
 def body(program: Program, step: Sweeps, prepare: str) -> str:
     """The text of the module; ``prepare`` is the function that computes coefficients."""
     sites, schedule = step.sites, step.schedule
@@ -54,7 +58,7 @@ def body(program: Program, step: Sweeps, prepare: str) -> str:
     values["sites"] = "_Coloured" if step.by_colour else "_Graph" if graph else "_Sites"
     values["flow"] = "(part, sites.colour), row in sites.schedule" if step.by_colour else "part, row in SCHEDULE"
     graphs = ["lattice_graph", *(["lattice_colours"] if step.by_colour else [])] if graph else []
-    parts = ["lattice", "lattice_sites", *graphs, "lattice_series" if step.equation else "lattice_splitting"]
+    parts = ["lattice", "lattice_sites", *graphs, *(_SERIES if step.equation else ("lattice_splitting",))]
     parts += ["lattice_newton"] if step.equation and step.equation.slope else []
     parts.append("lattice_steps")
     pieces = [render("numpy", f"{part}.py", values) for part in parts]
