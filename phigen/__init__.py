@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from phigen.runtime.lattice import LatticeSolver, LatticeTrajectory
     from phigen.runtime.solver import Solver
     from phigen.runtime.trajectory import Trajectory
+    from phigen.sweeping.api import sweep
 
 _HOMES = {
     "load": "phigen.api",

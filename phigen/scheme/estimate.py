@@ -22,8 +22,9 @@ def newton_operations(
 ) -> int:
     """Operations of the matrices of a Newton step, see `phigen.scheme.step`; ``most`` + 1 if there are more.
 
-    ``absent`` are the coordinates on which S_h does not depend, so that their momenta are 0. It is an estimate, from
-    above 0.6 of the truth to the truth. Small systems, whose matrices cannot have so many, are not looked at.
+    ``absent`` are the coordinates on which S_h does not depend, so that their momenta are 0. It is an estimate from
+    below: the making of the Hessian is left out, which is little where H is a polynomial of low degree. Small systems,
+    whose matrices cannot have so many, are not looked at.
     """
     names, momenta = realisation.coordinates, realisation.covector
     if realisation.path or 4 * len(names) ** 3 <= most:
