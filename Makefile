@@ -11,6 +11,7 @@ SHELL := /bin/bash
 
 VENV := .venv
 BIN := $(VENV)/bin
+RUNS := $(VENV)/.phigen-runs
 STAMP := $(VENV)/.phigen-installed
 WORKERS ?= auto
 
@@ -22,7 +23,7 @@ test test-all: export PYTHONDONTWRITEBYTECODE :=
 help:
 	@sed -n '/^#/!q; s/^# \{0,1\}//p' Makefile
 
-demo: $(STAMP)
+demo: $(RUNS)
 	$(BIN)/phigen demo
 
 test: lint
@@ -52,7 +53,7 @@ figures: $(STAMP)
 
 # The site of the documentation, in build/site.
 docs: $(STAMP)
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[docs]'
+	$(BIN)/python -m pip install --quiet --no-compile --disable-pip-version-check --editable '.[docs]'
 	$(BIN)/mkdocs build --quiet
 
 # Beside the methods that people would otherwise use; see docs/benchmarks.md. About ten minutes on a quiet machine.
@@ -63,7 +64,7 @@ clean:
 	rm -rf $(VENV) build dist
 
 # Installed anew when the dependencies change; an environment that is already there is kept.
-$(STAMP): pyproject.toml
+$(RUNS): pyproject.toml
 	@if ! [ -x $(BIN)/python ]; then \
 	  for candidate in $(PYTHON) python3 python3.13 python3.12 python3.11 python; do \
 	    if "$$candidate" -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null; then \
@@ -81,5 +82,10 @@ $(STAMP): pyproject.toml
 	    exit 1; \
 	  fi; \
 	fi
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[dev,plot]'
+	$(BIN)/python -m pip install --quiet --no-compile --disable-pip-version-check --editable '.[plot]'
+	@touch $@
+
+# What tests need beside it.
+$(STAMP): $(RUNS)
+	$(BIN)/python -m pip install --quiet --no-compile --disable-pip-version-check --editable '.[dev,plot]'
 	@touch $@

@@ -1,14 +1,14 @@
 """Specs that could exhaust the compiler are compiled or refused in seconds and in little memory."""
 
 import json
-import os
-import resource
+import subprocess
+import sys
 from dataclasses import replace
 
 import pytest
 
-from phigen.compiler import compile_proved, compile_spec
-from phigen.errors import LimitError, PhigenError
+from phigen.compiler import compile_spec
+from phigen.errors import LimitError
 from phigen.scheme import discretisation
 from phigen.scheme.estimate import OperationCount, TooManyError
 from phigen.scheme.generating import graph_form
@@ -76,29 +76,33 @@ SPACE = (names(10), "canonical: {q: [x1, x2, x3, x4, x5], p: [x6, x7, x8, x9, x1
 PLANE = (["x", "y"], "canonical: {q: [x], p: [y]}")
 
 
+#: A process of its own: a fork of one with threads may wait for ever for what one of them holds.
+CHILD = """
+import json, resource, sys
+from phigen.compiler import compile_proved
+from phigen.errors import PhigenError
+from phigen.spec import loads
+seconds, ceiling = map(int, sys.argv[1:])
+resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds))
+resource.setrlimit(resource.RLIMIT_AS, (ceiling, ceiling))
+began = resource.getrusage(resource.RUSAGE_SELF)
+try:
+    compile_proved(loads(sys.stdin.read()))
+    said = "compiled"
+except PhigenError as error:
+    said = f"{error.exit_code}: {error}"
+ended = resource.getrusage(resource.RUSAGE_SELF)
+spent = ended.ru_utime + ended.ru_stime - began.ru_utime - began.ru_stime
+print(json.dumps([said, spent, (ended.ru_maxrss - began.ru_maxrss) / 1024]))
+"""
+
+
 def compiled_in_a_child(text):
     """What compiling says, and the seconds of processor time and megabytes it took."""
-    receiver, sender = os.pipe()
-    child = os.fork()
-    if not child:
-        resource.setrlimit(resource.RLIMIT_CPU, (4 * SECONDS, 4 * SECONDS))
-        resource.setrlimit(resource.RLIMIT_AS, (CEILING, CEILING))
-        before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-        try:
-            compile_proved(loads(text))
-            said = "compiled"
-        except PhigenError as error:
-            said = f"{error.exit_code}: {error}"
-        more = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before
-        os.write(sender, json.dumps([said, more / 1024]).encode())
-        os._exit(0)
-    os.close(sender)
-    with os.fdopen(receiver) as report:
-        found = report.read()
-    _, status, usage = os.wait4(child, 0)
-    assert found, f"the child ended with {os.waitstatus_to_exitcode(status)}"
-    said, megabytes = json.loads(found)
-    return said, usage.ru_utime + usage.ru_stime, megabytes
+    command = [sys.executable, "-c", CHILD, str(4 * SECONDS), str(CEILING)]
+    done = subprocess.run(command, input=text, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, f"the child ended with {done.returncode}: {done.stderr[-2000:]}"
+    return json.loads(done.stdout)
 
 
 def test_the_memory_of_sums_counts_too(monkeypatch):

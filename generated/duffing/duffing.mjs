@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 91600a57f1392e7e1721fe86ea89d74068f63e976d58c6fbb912945044ce1e56
+ * body-sha256: 3b1e39c8e7499da9dfd9df45695d69731e4dfbd69df0fb83dcdda2ad63695fba
  */
 /*
  * import { Solver, StepError } from './duffing.mjs';
@@ -379,8 +379,8 @@ export class Solver {
   }
 
   /**
-   * Many steps of many states, each of which has its own gauge. One that fails keeps its last good state. h and what is
-   * in options may be arrays in place of numbers, with one for each member.
+   * Many steps of many states, each of which has its own gauge. One that fails keeps its last good state. h
+   * and what is in options may be arrays in place of numbers, with one for each member.
    *
    * @param {Iterable<ArrayLike<number>>} members
    * @param {number | ArrayLike<number>} h

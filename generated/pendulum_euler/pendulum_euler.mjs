@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: f464d797134863d53006fe540cc8e72e00d01bf82bc3c14d4452c11657345eac
+ * body-sha256: e986204362af57a92b3c877957276d80095583860bd859e1e84955f9fdb09a19
  */
 /*
  * import { Solver, StepError } from './pendulum_euler.mjs';
@@ -270,8 +270,8 @@ export class Solver {
   }
 
   /**
-   * Many steps of many states, each of which has its own gauge. One that fails keeps its last good state. h and what is
-   * in options may be arrays in place of numbers, with one for each member.
+   * Many steps of many states, each of which has its own gauge. One that fails keeps its last good state. h
+   * and what is in options may be arrays in place of numbers, with one for each member.
    *
    * @param {Iterable<ArrayLike<number>>} members
    * @param {number | ArrayLike<number>} h

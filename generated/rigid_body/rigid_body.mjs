@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 8b0ee0968d681e49dfb6bbaee2bd1e5a573a8a16d8058808b77c5fd5b6784711
+ * body-sha256: 46947e588c1ab69b36d624b54c93956e6216cc763108fe929ea25098405e1be2
  */
 /*
  * import { Solver, StepError } from './rigid_body.mjs';
@@ -656,8 +656,8 @@ export class Solver {
   }
 
   /**
-   * Many steps of many states, each of which has its own gauge. One that fails keeps its last good state. h and what is
-   * in options may be arrays in place of numbers, with one for each member.
+   * Many steps of many states, each of which has its own gauge. One that fails keeps its last good state. h
+   * and what is in options may be arrays in place of numbers, with one for each member.
    *
    * @param {Iterable<ArrayLike<number>>} members
    * @param {number | ArrayLike<number>} h

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 9c6055ab1b51129bbd06c3a3fdff8a544c5f1a55550852ffa6c78bcc37dae21c
+ * body-sha256: dc29e236a68ad5ddbd3855573b6045257211bf85d185134dd32fad452c9f88de
  */
 /*
  * import { Solver, StepError } from './sir_epidemic.mjs';
@@ -355,8 +355,8 @@ export class Solver {
   }
 
   /**
-   * Many steps of many states, each of which has its own gauge. One that fails keeps its last good state. h and what is
-   * in options may be arrays in place of numbers, with one for each member.
+   * Many steps of many states, each of which has its own gauge. One that fails keeps its last good state. h
+   * and what is in options may be arrays in place of numbers, with one for each member.
    *
    * @param {Iterable<ArrayLike<number>>} members
    * @param {number | ArrayLike<number>} h

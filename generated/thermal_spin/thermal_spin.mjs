@@ -18,7 +18,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 98fd7363ef2fd065babed2ed454e6551cfcaa71e03da98804821bbb691c2d513
+ * body-sha256: a635ce3b4e287bb3189a9f9aa89f970ec1d81b4c454609b1987200fda8935597
  */
 /*
  * import { Solver, StepError } from './thermal_spin.mjs';
@@ -420,8 +420,9 @@ export class Solver {
    * @param {ArrayLike<number>} [dw] increments of the noise, in place of random ones
    * @returns {this}
    */
-  step(h, dw) {
+  step(h) {
     this.#setStep(h);
+    const [, dw] = arguments;
     if (!draw(this, dw)) throw new StepError("BAD_ARGUMENT", this.steps, `the increments are ${dw}`);
     this.#renew();
     for (let stage = 0; stage < FRACTIONS.length; stage++) {
@@ -489,8 +490,8 @@ export class Solver {
   }
 
   /**
-   * Many steps of many states, each of which has its own gauge. One that fails keeps its last good state. h and what is
-   * in options may be arrays in place of numbers, with one for each member.
+   * Many steps of many states, each of which has its own gauge. One that fails keeps its last good state. h
+   * and what is in options may be arrays in place of numbers, with one for each member.
    *
    * @param {Iterable<ArrayLike<number>>} members
    * @param {number | ArrayLike<number>} h

@@ -313,6 +313,7 @@ def test_completion_script_is_offered():
                 "plain,kepler",
                 "plain,kepler_eccentric",
                 "plain,kowalevski_top",
+                "plain,kdv",
                 "plain,klein_gordon",
             ],
         ),

@@ -86,6 +86,8 @@ def size_of_casimir(compilation, trajectory, casimir, *, growing=False):
     if growing:
         return conditioning(compilation, trajectory.x, trajectory.parameters, casimir)
     terms = conditioning(compilation, trajectory.x[:1], trajectory.parameters, casimir)
+    if terms == 0:  # all products in it vanish at the start
+        terms = conditioning(compilation, trajectory.x, trajectory.parameters, casimir)
     return value if value > 1e-3 * terms else terms
 
 

@@ -143,10 +143,10 @@ def test_refuted_flows_are_not_compiled(monkeypatch):
     genuine = statements.check_splitting
     found = compiled("rigid_body", 4, "splitting")
 
-    def planted(system, splitting):
+    def planted(system, splitting, noise):
         flow = splitting.flows[1]
         wrong = replace(flow, increment=tuple(-e for e in flow.increment))
-        return genuine(system, replace(splitting, flows=(splitting.flows[0], wrong, *splitting.flows[2:])))
+        return genuine(system, replace(splitting, flows=(splitting.flows[0], wrong, *splitting.flows[2:])), noise)
 
     monkeypatch.setattr(statements, "check_splitting", planted)
     assert [s.name[:19] for s in examine(found.spec, scheme="splitting").refuted] == ["the flow Φ of H_2: "]

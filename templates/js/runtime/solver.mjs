@@ -276,13 +276,11 @@ export class Solver {
    * #endif
    * @returns {this}
    */
-  // #if NOISE
-  step(h, dw) {
-    this.#setStep(h);
-    if (!draw(this, dw)) throw new StepError("BAD_ARGUMENT", this.steps, `the increments are ${dw}`);
-    // #else
   step(h) {
     this.#setStep(h);
+    // #if NOISE
+    const [, dw] = arguments;
+    if (!draw(this, dw)) throw new StepError("BAD_ARGUMENT", this.steps, `the increments are ${dw}`);
     // #endif
     // #if RENEWED
     this.#renew();
@@ -413,8 +411,8 @@ export class Solver {
   // #endif
   // #if ENSEMBLE
   /**
-   * Many steps of many states, each of which has its own gauge. One that fails keeps its last good state. h and what is
-   * in options may be arrays in place of numbers, with one for each member.
+   * Many steps of many states, each of which has its own gauge. One that fails keeps its last good state. h
+   * and what is in options may be arrays in place of numbers, with one for each member.
    *
    * @param {Iterable<ArrayLike<number>>} members
    * @param {number | ArrayLike<number>} h
