@@ -32,8 +32,7 @@ class Console:
         self._display = Display(lambda: not self.quiet and sys.stderr.isatty(), self.detail)
 
     def _say(self, message: str) -> None:
-        self._display.erase()
-        with suppress(OSError):  # nobody can be told that nobody can be told
+        with self._display.room(), suppress(OSError):  # nobody can be told that nobody can be told
             click.echo(message, err=True, color=_colour())
 
     def error(self, message: str) -> None:

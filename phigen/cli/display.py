@@ -37,12 +37,19 @@ class Display:
             self.erase()
 
     def erase(self) -> None:
-        """Make room for a message."""
+        """Leave no line."""
+        with self.room():
+            pass
+
+    @contextmanager
+    def room(self) -> Iterator[None]:
+        """Room for a message: no line, and none is drawn while it lasts."""
         with self._lock:
             if self._visible:
                 sys.stderr.write("\r\x1b[K")
                 sys.stderr.flush()
                 self._visible = False
+            yield
 
     def _told(self, stages: tuple[Stage, ...]) -> None:
         begins, self._stages = len(stages) > len(self._stages), stages
