@@ -15,12 +15,15 @@ from phigen.scheme.path import Recurrences
 from phigen.scheme.program import BOUND, Attitude, Noise, Program
 from phigen.scheme.steps import Adjoint, Explicit, Implicit, Path, PathAdjoint, Splitting, Sweeps
 from phigen.spec.model import Parameter
-from phigen.targets.c import functions, paths, splitting, sweeps
+from phigen.targets.c import functions, paths, splitting
 from phigen.targets.c.amalgamation import Amalgam
 from phigen.targets.c.features import switches
 from phigen.targets.c.kernels import function, members, printer
 from phigen.targets.c.lanes import printed as kernels_in_lanes
 from phigen.targets.c.lanes import remembered
+from phigen.targets.c.lattice import layout as lattice_layout
+from phigen.targets.c.lattice import model as lattice_model
+from phigen.targets.c.lattice.parts import sweeps
 from phigen.targets.c.layout import fitted
 from phigen.targets.header import CHECKSUM, checksum, header_lines, plain
 from phigen.targets.path import Syntax, adjoint_program, statements, tangent_program
@@ -61,11 +64,11 @@ def _amalgam(program: Program) -> tuple[Amalgam, str, str]:
         return Amalgam(program.name, has, printed(program, lanes, has)), "solver.h", "runtime.c"
     assert isinstance(lanes, Rows)
     step = program.step
-    has |= sweeps.switches(program, step, sweeps.layout_of(program, step)) | {"NEAR": bool(lanes.near)}
+    has |= lattice_layout.switches(program, step, lattice_layout.layout_of(program, step)) | {"NEAR": bool(lanes.near)}
     texts = {
-        "declarations.h": sweeps.declarations(program, step),
-        "model.h": sweeps.model(program, step),
-        "sweeps.h": sweeps.sweeps(program, step, lanes),
+        "declarations.h": lattice_model.declarations(program, step),
+        "model.h": lattice_model.model(program, step),
+        "sweeps.h": sweeps(program, step, lanes),
     }
     return Amalgam(program.name, has, texts), "lattice.h", "lattice.c"
 

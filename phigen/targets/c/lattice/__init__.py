@@ -1,0 +1,1 @@
+"""Lattices in C: loops over the sites of rows."""

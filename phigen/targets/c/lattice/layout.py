@@ -1,0 +1,110 @@
+"""Where the values of a lattice are in memory, and what of the runtime it needs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from phigen.scheme.kernel import Kernel
+from phigen.scheme.program import Program
+from phigen.scheme.steps import Gather, Partners, Sweeps
+from phigen.symbolic.symbols import PRESENT, Symbol, kind_of
+
+#: Differences that guesses are extrapolated from, of one stage and of all: more gain little and are arrays over sites.
+MOST_DIFFERENCES, MOST_REMEMBERED = 4, 14
+
+#: Diagonals of a matrix beside its own that elimination is for.
+MOST_BAND = 64
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Where things are: lines are rows beside a row, by their offsets; halo the sites that are copied beside it."""
+
+    step: Sweeps
+    lines: tuple[tuple[int, ...], ...]
+    halo: int
+    weights: tuple[str, ...]
+    arrays: tuple[str, ...]
+
+    def line(self, offset: Sequence[int]) -> int:
+        """The line of a neighbour."""
+        return self.lines.index(tuple(offset[:-1]))
+
+    @property
+    def colour_step(self) -> int:
+        """The distance in a row from a site to the next of its colour."""
+        sites = self.step.sites
+        return next(k for k in range(1, sites.colours + 1) if k * sites.weights[-1] % sites.colours == 0)
+
+    @property
+    def reach(self) -> int:
+        """How far the equation of a stage reaches, of a lattice with one axis."""
+        relax = self.step.equation.relax if self.step.equation else None
+        places = [self.step.sites.places[s] for s in relax.inputs["site"]] if relax else []
+        return max((abs(offset[-1]) for f, offset in places if f not in self.step.sites.parameters), default=0)
+
+    @property
+    def band(self) -> int:
+        """Diagonals beside that of its matrix, site by site; 0 where it is not solved by elimination."""
+        equation, sites = self.step.equation, self.step.sites
+        if not equation or not equation.slope or len(sites.axes) > 1:
+            return 0
+        band = (self.reach + 1) * len(equation.relax.roots) - 1
+        return band if band <= MOST_BAND else 0
+
+    @property
+    def partners(self) -> Partners:
+        """Bonds or pairs; nothing where there are none."""
+        return self.step.partners or Partners(Gather((), ()), Gather((), ()))
+
+    @property
+    def graph(self) -> bool:
+        """Whether bonds are given at run time."""
+        return self.partners.graph
+
+
+def layout_of(program: Program, step: Sweeps) -> Layout:
+    """The layout of a lattice."""
+    sites = step.sites
+    offsets = [offset for _, offset in sites.places.values()]
+    lines = dict.fromkeys([(0,) * (len(sites.axes) - 1), *sorted({o[:-1] for o in offsets})])
+    used = (w for kernel in _at_sites(program, step) for w in kernel.inputs["present"])
+    weights = dict.fromkeys(w for w in used if kind_of(w) == PRESENT)
+    halo = max((abs(o[-1]) for o in offsets), default=0)
+    return Layout(step, tuple(lines), halo, tuple(weights), (*program.coordinates, *sites.parameters))
+
+
+def _at_sites(program: Program, step: Sweeps) -> list[Kernel]:
+    seen = program.observables
+    own = [sweep.kernel for part in step.parts for sweep in part]
+    own += step.equation.kernels if step.equation else ()
+    return [*own, seen.energy, seen.casimirs, seen.vector_field]
+
+
+def switches(program: Program, step: Sweeps, layout: Layout) -> dict[str, bool]:
+    """The switches of the runtime for lattices."""
+    return {
+        "OPEN": bool(layout.weights),
+        "OPEN_ROWS": step.sites.open[-1],
+        "HALO": layout.halo > 0,
+        "COLOURS": step.sites.colours > 1,
+        "PAIRS": step.partners is not None and not layout.graph,
+        "GATHER": step.partners is not None,
+        "GRAPH": layout.graph,
+        "BY_COLOUR": bool(step.by_colour),
+        "BOND_PARAMETERS": bool(step.sites.at_bonds),
+        "SITE_PARAMETERS": bool(step.sites.parameters),
+        "SERIES": step.equation is not None,
+        "STIFF": step.equation is not None and layout.band > 0 and program.offers("recurrences"),
+        "BY_HAND": step.is_by_hand and program.offers("by-hand"),
+        "ONE_ROW": len(step.sites.axes) == 1,
+        "GUESSES": step.equation is not None and program.offers("recurrences"),
+    }
+
+
+def bounds(weight: str) -> list[tuple[int, int]]:
+    """The least and the largest offset of a term along each axis."""
+    assert isinstance(weight, Symbol)
+    bounds = [int(k) for k in weight.key]
+    return list(zip(bounds[::2], bounds[1::2], strict=True))

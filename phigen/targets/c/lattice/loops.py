@@ -1,0 +1,145 @@
+"""Kernels of lattices in C, as loops over the sites of a row."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+
+from phigen.scheme.kernel import Kernel, Output
+from phigen.scheme.program import Program
+from phigen.scheme.steps import Sweep
+from phigen.symbolic import functions as elementary
+from phigen.symbolic.expression import ONE, substitute
+from phigen.symbolic.special import SPECIAL
+from phigen.symbolic.symbols import COEFFICIENT, PRESENT, Symbol, kind_of
+from phigen.targets.c.kernels import lane_calls
+from phigen.targets.c.lattice.layout import Layout
+from phigen.targets.c.lattice.names import SiteNames
+from phigen.targets.c.layout import comment
+from phigen.targets.code import Code, lower
+from phigen.targets.header import plain
+
+
+def has_ends(program: Program, kernels: Sequence[Kernel]) -> bool:
+    """Whether sites beside open ends have loops of their own."""
+    return program.profile == "fast" and any(weights_of(kernel) for kernel in kernels)
+
+
+def weights_of(kernel: Kernel) -> list[str]:
+    """The symbols of terms that open ends take away."""
+    return [s for s in kernel.inputs["present"] if kind_of(s) == PRESENT]
+
+
+def in_loops(program: Program) -> dict[str, str]:
+    """What the loops call for any argument: versions for lanes where there are such, else phigen's own or libm's."""
+    own = {f: f"{program.name}_{f}" for f in elementary.FUNCTIONS}
+    return own | dict(lane_calls(program)) | {f: own[f] for f in SPECIAL}
+
+
+def forms_of(program: Program, kernel: Kernel) -> Iterator[tuple[Kernel, str]]:
+    """The kernel for the loop, and for that beside open ends; short code has one for both."""
+    if has_ends(program, [kernel]):
+        yield _inside(kernel), ""
+        yield kernel, "_end"
+    else:
+        yield kernel, ""
+
+
+def _inside(kernel: Kernel) -> Kernel:
+    """The kernel away from open ends."""
+    weights = weights_of(kernel)
+    values = substitute(kernel.roots, dict.fromkeys(weights, ONE))
+    output, others = kernel.outputs[0].name, tuple(s for s in kernel.inputs["present"] if s not in weights)
+    return replace(kernel, inputs={**kernel.inputs, "present": others}, outputs=(Output(output, tuple(values)),))
+
+
+def sweep_loop(program: Program, layout: Layout, sweep: Sweep, form: str, calls: Mapping[str, str]) -> str:
+    """A kernel as a loop that changes some fields of the sites of a row."""
+    kernel, name = sweep.kernel, program.name
+    code = lower(kernel)
+    moved, sums = {program.coordinates[i] for i in sweep.moved}, sweep.gather.names if sweep.gather else ()
+    names = SiteNames(program, layout, kernel, code, moved, calls, sums)
+    head = _head(program, kernel, code, form)
+    body = names.loaded()
+    body += [f"const double {names.scope[a.target]} = {names.show(a.value)};" for a in code.assignments]
+    stores = [(program.coordinates[sweep.moved[s.index]], names.show(s.value)) for s in code.stores]
+    changes = [f"const double change{k} = {value};" for k, (_, value) in enumerate(stores)]
+    if len(stores) > 1:
+        body += changes
+        stores = [(f, f"change{k}") for k, (f, _) in enumerate(stores)]
+    body += [f"{names.pointer(f, 0)}[i] {_added(names.scope[f], f in code.used, value)};" for f, value in stores]
+    colours = layout.step.sites.colours
+    start = f"{name}_first(row, {sweep.colour}, from)" if colours > 1 else "from"
+    onward = f"i += {layout.colour_step}" if colours > 1 else "++i"
+    return _looped(head, names, body, name, f"ptrdiff_t i = {start}; i < to; {onward}")
+
+
+def _head(program: Program, kernel: Kernel, code: Code, form: str) -> list[str]:
+    """The beginning of a loop over sites."""
+    name = program.name
+    purpose = {"_far": "the same for large arguments of functions", "_end": "the same beside open ends"}
+    said = next((text for key, text in purpose.items() if form.endswith(key)), kernel.purpose)
+    head = [*comment(f"/* {plain(said)} */", "")]
+    head.append(
+        f"static inline void {name}_{kernel.name}{form}("
+        f"const double *coef, const {name}_row *row, ptrdiff_t from, ptrdiff_t to)\n{{"
+    )
+    return head if any(kind_of(s) == COEFFICIENT for s in code.used) else [*head, "    (void)coef;"]
+
+
+def middle_loop(
+    program: Program, layout: Layout, kernel: Kernel, form: str, calls: Mapping[str, str], assign: str
+) -> str:
+    """A kernel as a loop from y, of which rows are told, into or onto what they call out."""
+    code = lower(kernel)
+    names = SiteNames(program, layout, kernel, code, set(), calls, layout.partners.field.names)
+    pointers = [names.scope[Symbol("out", f)] for f in program.coordinates]
+    head = _head(program, kernel, code, form)
+    head += [f"    double *restrict {p} = row->out[{k}] + row->at[0];" for k, p in enumerate(pointers)]
+    body = names.loaded()
+    body += [f"const double {names.scope[a.target]} = {names.show(a.value)};" for a in code.assignments]
+    body += [f"{pointers[s.index]}[i] {assign} {names.show(s.value)};" for s in code.stores]
+    return _looped(head, names, body, program.name, "ptrdiff_t i = from; i < to; ++i")
+
+
+def _added(name: str, read: bool, value: str) -> str:
+    """What is added to a field, which may have been read before."""
+    return f"= {name} + {value}" if read else f"+= {value}"
+
+
+def seen_loop(program: Program, layout: Layout, kernel: Kernel) -> str:
+    """A kernel as a loop that fills arrays over the sites."""
+    name, code, partners = program.name, lower(kernel), layout.partners
+    names = SiteNames(program, layout, kernel, code, set(), in_loops(program), partners.field.names)
+    head = [*comment(f"/* {plain(kernel.purpose)}, of the sites of a row: out[k * apart + i - from] */", "")]
+    head.append(
+        f"static void {name}_{kernel.name}_row(const {name}_params *params, const {name}_row *row, ptrdiff_t from, "
+        f"ptrdiff_t to, double *restrict out, size_t apart)\n{{"
+    )
+    body = names.loaded()
+    body += [f"const double {names.scope[a.target]} = {names.show(a.value)};" for a in code.assignments]
+    for s in code.stores:
+        place = {0: "i - from", 1: "(ptrdiff_t)apart + i - from"}.get(
+            s.index, f"{s.index} * (ptrdiff_t)apart + i - from"
+        )
+        body.append(f"out[{place}] = {names.show(s.value)};")
+    early, late = list[str](), list[str]()
+    gather = {"energy": partners.energy, "vector_field": partners.field}.get(kernel.name)
+    for own in gather.kernels if gather else ():
+        early.append(f"    {name}_{own.name}(params, row, from, to);")
+    if kernel.name == "energy" and early:
+        late = ["    for (ptrdiff_t i = from; i < to; ++i) out[i - from] += 0.5 * row->gathered[0][i];"]
+    unused = [] if early or late or any(s in code.used for s in kernel.inputs["params"]) else ["params"]
+    unused += [] if len(code.stores) > 1 else ["apart"]
+    if not code.stores:
+        unused += ["row", "from", "to", "out"]
+        return "\n".join([*head, *(f"    (void){u};" for u in unused), "}"]) + "\n"
+    head += ["    " + ", ".join(f"(void){u}" for u in unused) + ";"] if unused else []
+    text = _looped([*head, *early], names, body, name, "ptrdiff_t i = from; i < to; ++i")
+    return text.removesuffix("}\n") + "\n".join([*late, "}\n"])
+
+
+def _looped(head: list[str], names: SiteNames, body: list[str], name: str, loop: str) -> str:
+    lines = [*head, *(f"    {line}" for line in names.pointers())]
+    lines += [f"    {name}_EACH_SITE", f"    for ({loop}) {{", *(f"        {line}" for line in body), "    }", "}"]
+    return "\n".join(lines) + "\n"

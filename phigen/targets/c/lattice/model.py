@@ -1,0 +1,142 @@
+"""Lattices in C: what users see, and the tables that the runtime goes by."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+from phigen.scheme.program import Program
+from phigen.scheme.steps import Sweeps
+from phigen.spec.model import Parameter
+from phigen.targets.c.kernels import function, members
+from phigen.targets.c.lattice.layout import MOST_DIFFERENCES, MOST_REMEMBERED, bounds, layout_of, switches
+from phigen.targets.header import plain
+from phigen.targets.rendering import render
+
+
+def declarations(program: Program, step: Sweeps) -> str:
+    """What users see: sizes and parameters."""
+    member, layout = members(program), layout_of(program, step)
+    listed = [_declared(p, member[p.name]) for p in program.parameters]
+    arrays = len(layout.arrays)
+    sizes = [
+        ("ARRAYS", arrays, "arrays over the sites: fields, then parameters"),
+        ("COEFFICIENTS", max(1, step.row * rows_of(step)), "numbers that depend on params and h only"),
+    ]
+    if step.equation:
+        stages = len(program.fractions)
+        sizes += [("STAGES", stages, "of a step")] if stages > 1 else []
+        kept = max(1, min(MOST_DIFFERENCES, MOST_REMEMBERED // stages))
+        guesses = switches(program, step, layout)["GUESSES"]
+        sizes += [("DIFFERENCES", kept, "that a guess is extrapolated from")] if guesses else []
+    if step.partners:
+        swept = [sweep.gather for part in step.parts for sweep in part if sweep.gather]
+        most = max(len(g.names) for g in (*swept, step.partners.energy, step.partners.field))
+        sizes.append(("GATHERED", most, "sums over other sites that are held for each site"))
+    if step.sites.at_bonds:
+        sizes.append(("BOND_ARRAYS", len(step.sites.at_bonds), "parameters at bonds"))
+    values = {
+        "NAME": program.name,
+        "axes": len(step.sites.axes),
+        "axis_names": ", ".join(step.sites.axes),
+        "n": program.dimension,
+        "order": program.order,
+        "casimir_count": len(program.casimirs),
+        "version": program.version,
+        "sha256": program.about.spec_sha256,
+        "coordinates": ", ".join(program.coordinates),
+        "casimirs": ", ".join(program.casimirs) or "none",
+        "members": listed or [("char unused;", "this system has no parameters")],
+        "sizes": sizes,
+    }
+    return render("c", "lattice.h", values)
+
+
+def rows_of(step: Sweeps) -> int:
+    """Rows of coefficients: of a splitting one more, for the last flow of a step and the first of the next together."""
+    return len(step.schedule.times) + (0 if step.equation else 1)
+
+
+def _declared(parameter: Parameter, member: str) -> tuple[str, str]:
+    said = plain(parameter.description) or f"default {float(parameter.value)!r}"
+    said = said if member == parameter.name else f"{parameter.name}: {said}"
+    if parameter.at != "all":
+        default = "" if parameter.values else "; NULL for the default at all of them"
+        return f"const double *{member};", f"at {parameter.at}: {said}{default}"
+    return f"double {member};", said
+
+
+def model(program: Program, step: Sweeps) -> str:
+    """Tables, and what is computed before the steps."""
+    member, layout, schedule, sites = members(program), layout_of(program, step), step.schedule, step.sites
+    flows = schedule.flows
+    joined = schedule.times[flows[0][1]] + schedule.times[flows[-1][1]]
+    multiples = [*schedule.multiples, *schedule.multiples[:1]]
+    constants = [
+        ("HALO", layout.halo, "sites that are copied beside a row"),
+        ("LINES", len(layout.lines), "rows that kernels read: the row itself and those beside it"),
+        ("ROW", max(1, step.row), "coefficients of one flow"),
+        ("ROWS_OF_FLOWS", rows_of(step), "rows of coefficients"),
+    ]
+    if step.equation:
+        constants += [("MOST_SWEEPS", step.equation.most_sweeps, "that a stage may take")]
+        if switches(program, step, layout)["STIFF"]:
+            constants += [("REACH", layout.reach, "sites that y at a site depends on, to each side")]
+            constants += [("BAND", layout.band, "diagonals beside that of the matrix of Newton's method")]
+    else:
+        constants += [
+            ("FLOWS", len(flows), "in a step"),
+            ("JOINED", len(schedule.times), "the row of the last flow of a step and the first of the next together"),
+        ]
+    constants += [("WEIGHTS", len(layout.weights), "kinds of terms that open ends take away")] * bool(layout.weights)
+    if sites.colours > 1:
+        constants += [("COLOUR_COUNT", sites.colours, "colours of sites")]
+        constants += [("COLOUR_STRIDE", sites.weights[-1], "what a step along a row adds to the colour")]
+    numbers = [p for p in program.parameters if p.at == "all"]
+    asked = [
+        f"isfinite(params->{member[p.name]})" + f" && params->{member[p.name]} > 0.0" * p.positive for p in numbers
+    ]
+    arrays = [(member[p.name], p.positive, p.values is not None, p.at) for p in program.parameters if p.at != "all"]
+    values = {
+        "NAME": program.name,
+        "defaults": ", ".join("NULL" if p.at != "all" else repr(float(p.value)) for p in program.parameters) or "0",
+        "constants": constants,
+        "least": ", ".join(map(str, sites.least)),
+        "periods": ", ".join(map(str, sites.periods)),
+        "open": ", ".join(str(int(o)) for o in sites.open),
+        "lines": ", ".join(_braced([*line, 0]) for line in layout.lines),
+        "weights": ", ".join(_braced([_braced(pair) for pair in bounds(w)]) for w in layout.weights),
+        "colours": ", ".join(map(str, sites.weights)) if sites.colours > 1 else "",
+        "times": ", ".join(map(repr, [*schedule.times, joined][: rows_of(step)])),
+        "split": step.equation is None,
+        "multiples": ", ".join(map(repr, multiples)) if schedule.multiples else "",
+        "parts": ", ".join(str(part + (not step.by_colour)) for part, _ in flows),
+        "by_colour": ", ".join(str(int(c)) for c in step.by_colour),
+        "part_count": len(step.by_colour),
+        "graph": layout.graph,
+        "rows": ", ".join(str(row) for _, row in flows),
+        "allowed": [*_allowed(asked, arrays)],
+        "stages": ", ".join(_braced(step.stage(k, program.coordinates)) for k in range(len(step.parts)))
+        if switches(program, step, layout)["BY_HAND"]
+        else "",
+    }
+    prepare = function(program, step.prepare)
+    return render("c", "lattice.c", values) + render("c", "lattice_allowed.c", values) + prepare
+
+
+def _allowed(asked: Sequence[str], arrays: Sequence[tuple[str, bool, bool, str]]) -> Iterator[str]:
+    """The statements that return 0 for parameters that are not allowed."""
+    if asked:
+        yield f"if (!({' && '.join(asked)})) return 0;"
+    for member, positive, required, at in arrays:
+        if required:
+            yield f"if (params->{member} == NULL) return 0;"
+        wrong = f"!isfinite(params->{member}[k])" + f" || params->{member}[k] <= 0.0" * positive
+        yield f"for (size_t k = 0; params->{member} != NULL && k < {at}; ++k)"
+        yield f"    if ({wrong}) return 0;"
+    unused = ["params"] * (not asked and not arrays) + ["sites"] * all(at != "sites" for *_, at in arrays)
+    if unused:
+        yield ", ".join(f"(void){u}" for u in unused) + ";"
+
+
+def _braced(items: Sequence[object]) -> str:
+    return "{ " + ", ".join(map(str, items)) + " }"

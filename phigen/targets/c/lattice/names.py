@@ -1,0 +1,136 @@
+"""What the values that a loop over sites reads and changes are called in it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from phigen.scheme.kernel import Kernel
+from phigen.scheme.program import Program
+from phigen.symbolic.symbols import CHOSEN, COEFFICIENT, GATHERED, INITIAL, VARIATION, Symbol
+from phigen.targets.c.kernels import members, printer
+from phigen.targets.c.lattice.layout import Layout, bounds
+from phigen.targets.code import Code
+from phigen.targets.names import Scope
+from phigen.targets.reserved import C_RESERVED
+
+#: What the loops call their own.
+_OWN = frozenset({"coef", "params", "row", "from", "to", "out", "apart", "i", "j", "k", "part", "far", "now"})
+
+
+class SiteNames:
+    """What the symbols of a kernel are called in a loop over sites."""
+
+    def __init__(
+        self,
+        program: Program,
+        layout: Layout,
+        kernel: Kernel,
+        code: Code,
+        moved: set[str],
+        calls: Mapping[str, str],
+        sums: Sequence[str] = (),
+    ) -> None:
+        self.layout, self.moved, self.code = layout, moved, code
+        called = {word.strip("({") for text in calls.values() for word in text.split("(")}
+        self.scope = Scope(C_RESERVED | _OWN | called | {"change0", "change1", "change2"})
+        self.show = printer(self.scope, calls)
+        self._pointers: dict[tuple[str, int], str] = {}
+        self._loaded: list[str] = []
+        self._weights: list[str] = []
+        self._at_a: list[str] = []
+        self._at_b: list[str] = []
+        self._first: list[str] = []
+        self._starts: list[str] = []
+        member = members(program)
+        for s in (s for symbols in kernel.inputs.values() for s in symbols if s in code.used):
+            if isinstance(s, Symbol) and s.kind == COEFFICIENT:
+                named = f"c{s.key[0]}"
+                self.scope.bind(s, named)
+                self._first.append(f"{named} = coef[{s.key[0]}]")
+            elif isinstance(s, Symbol) and s.kind == GATHERED:
+                self.scope.bind(s, f"row->gathered[{list(sums).index(s)}][i]")
+            elif isinstance(s, Symbol) and s.kind == CHOSEN:
+                self.scope.bind(s, "(row->colours[i] == row->chosen ? 1.0 : 0.0)")
+            elif isinstance(s, Symbol) and s.kind == VARIATION:
+                field, offset = layout.step.sites.places[str(s.key[0])]
+                line, number = layout.line(offset), program.coordinates.index(field)
+                pointer = self.scope[Symbol("varied", field, line)]
+                self._starts.append(f"const double *restrict {pointer} = row->varied[{number}] + row->at[{line}];")
+                self.scope.bind(s, beside(pointer, offset[-1]))
+            elif isinstance(s, Symbol) and s.kind == INITIAL:
+                pointer, number = self.scope[Symbol("start", str(s.key[0]))], program.coordinates.index(str(s.key[0]))
+                self._starts.append(f"const double *restrict {pointer} = row->start[{number}] + row->at[0];")
+                self.scope.bind(s, f"{pointer}[i]")
+            elif isinstance(s, Symbol):
+                self._bind_weight(s)
+            elif s in layout.step.sites.ends:
+                self._bind_end(s)
+            elif s in layout.step.sites.places:
+                self._bind_site(s)
+            elif s in layout.step.sites.at_bonds:
+                self._at_b.append(f"{self.scope[s]} = row->at_bonds[{layout.step.sites.at_bonds.index(s)}][k]")
+            else:
+                self._first.append(f"{self.scope[s]} = params->{member[s]}")
+
+    def _bind_end(self, s: str) -> None:
+        base, end = self.layout.step.sites.ends[s]
+        pointer = self.pointer(base, 0)
+        named = self.scope[s]
+        (self._at_a if end == "a" else self._at_b).append(f"{named} = {pointer}[{'i' if end == 'a' else 'j'}]")
+
+    def of_pair(self) -> tuple[list[str], list[str]]:
+        """What is read at a site b, and at a site a."""
+        return together(self._at_b), together(self._at_a)
+
+    def _bind_weight(self, s: Symbol) -> None:
+        k = self.layout.weights.index(s)
+        named = f"w{k}"
+        self.scope.bind(s, named)
+        low, high = bounds(s)[-1]
+        tests = [f"i + {-low * -1} >= 0".replace("+ -", "- ")] * (low < 0) + [f"i + {high} < row->length"] * (high > 0)
+        if tests:
+            self._weights.append(f"const double {named} = {' && '.join(tests)} ? row->present[{k}] : 0.0;")
+        else:
+            self._first.append(f"{named} = row->present[{k}]")
+
+    def _bind_site(self, s: str) -> None:
+        base, offset = self.layout.step.sites.places[s]
+        pointer = self.pointer(base, self.layout.line(offset))
+        if offset[-1] == 0 and not any(offset):
+            self._loaded.append(f"{self.scope[s]} = {pointer}[i]")
+        else:
+            self.scope.bind(s, beside(pointer, offset[-1]))
+
+    def pointer(self, base: str, line: int) -> str:
+        """The name of the row of an array at a line."""
+        key = (base, line)
+        if key not in self._pointers:
+            self._pointers[key] = self.scope[f"{base}_row{line or ''}"]
+        return self._pointers[key]
+
+    def loaded(self) -> list[str]:
+        """What is read at the beginning of the loop."""
+        return [*together(self._loaded), *self._weights]
+
+    def pointers(self) -> list[str]:
+        """What is read before the loop."""
+        lines = [*together(self._first), *dict.fromkeys(self._starts)]
+        for f in sorted(self.moved):
+            self.pointer(f, 0)
+        for (base, line), named in self._pointers.items():
+            mine = base in self.moved and line == 0
+            constant = "" if mine else "const "
+            alone = "" if base in self.moved else "restrict "
+            place = self.layout.arrays.index(base)
+            lines.append(f"{constant}double *{alone}{named} = row->x[{place}] + row->at[{line}];")
+        return lines
+
+
+def beside(pointer: str, offset: int) -> str:
+    """A value of a row at an offset from the site i."""
+    return f"{pointer}[i{offset:+d}]".replace("+", " + ").replace("-", " - ").replace(" + 0", "")
+
+
+def together(values: Sequence[str]) -> list[str]:
+    """One declaration of several constants."""
+    return [f"const double {', '.join(values)};"] if values else []

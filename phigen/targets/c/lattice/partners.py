@@ -1,0 +1,107 @@
+"""What bonds, or pairs of sites, add up at a site, as loops in C."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+from phigen.scheme.kernel import Kernel
+from phigen.scheme.program import Program
+from phigen.scheme.steps import Ends, Gather
+from phigen.targets.c.lattice.layout import Layout
+from phigen.targets.c.lattice.loops import in_loops
+from phigen.targets.c.lattice.names import SiteNames
+from phigen.targets.c.layout import comment
+from phigen.targets.code import lower
+from phigen.targets.header import plain
+
+
+def partners(program: Program, layout: Layout) -> Iterator[str]:
+    """What bonds or pairs add to energies, and to what moves sites, from the parameters."""
+    arguments = f"const {program.name}_params *params, const {program.name}_row *row"
+    for gather in (layout.partners.field, layout.partners.energy):
+        yield from gathering(program, layout, gather, arguments)
+
+
+def gathering(program: Program, layout: Layout, gather: Gather, arguments: str) -> Iterator[str]:
+    """What all bonds, or pairs with other sites, add up at some sites."""
+    for number, ends in enumerate(gather.ends):
+        if layout.graph:
+            yield _over_bonds(program, layout, ends, arguments, first=number == 0)
+        else:
+            targets = [f"g{k}" for k in range(len(gather.names))]
+            pointers = [f"double *restrict {t} = row->gathered[{k}];" for k, t in enumerate(targets)]
+            body = [f"{t}[i] += i == j ? 0.0 : {{{k}}};" for k, t in enumerate(targets)]
+            begin = [f"for (ptrdiff_t i = from; i < to; ++i) {' = '.join(f'{t}[i]' for t in targets)} = 0.0;"]
+            head = f"{arguments}, ptrdiff_t from, ptrdiff_t to"
+            yield _over_pairs(program, layout, ends.kernel, head, [*pointers, *begin], body)
+
+
+#: The bonds of a site i, by the end that it has; and which of them are passed over.
+_BONDS = {"": "row->bonds[i]; k < row->bonds[i + 1]", "a": "row->bonds[i]; k < row->middle[i]",
+          "b": "row->middle[i]; k < row->bonds[i + 1]"}  # fmt: skip
+_PASSED = {"there": "row->colours[row->other[k]] != row->chosen"}
+
+
+def _over_bonds(program: Program, layout: Layout, ends: Ends, arguments: str, *, first: bool) -> str:
+    """A loop over sites a, in it one over the bonds that they have to sites b."""
+    name, kernel = program.name, ends.kernel
+    code = lower(kernel)
+    names = SiteNames(program, layout, kernel, code, set(), in_loops(program))
+    other, own = names.of_pair()
+    count = len(code.stores)
+    sums = [f"double {', '.join(f'sum{k} = 0.0' for k in range(count))};"]
+    values = [f"const double {names.scope[a.target]} = {names.show(a.value)};" for a in code.assignments]
+    added = [f"sum{s.index} += {names.show(s.value)};" for s in code.stores]
+    out = [f"row->gathered[{k}][i] {'' if first else '+'}= sum{k};" for k in range(count)]
+    wanted = "row->colours[i] == row->chosen && " if ends.chosen == "here" else ""
+    bounds = _BONDS[ends.end].replace("; ", f"; {wanted}", 1)
+    coefficients = "params" if arguments.startswith(f"const {name}_params") else "coef"
+    used = any(s in code.used for s in kernel.inputs[coefficients])
+    passed = [f"if ({_PASSED[ends.chosen]}) continue;"] if ends.chosen in _PASSED else []
+    reads = [f"{'const ptrdiff_t j = row->other[k];'}"] if other else []
+    inner = [*passed, *reads, *other, *values, *added]
+    return "\n".join(
+        [
+            *comment(f"/* {plain(kernel.purpose)} */", ""),
+            f"static inline void {name}_{kernel.name}({arguments}, ptrdiff_t from, ptrdiff_t to)",
+            "{",
+            *(f"    {line}" for line in [*([] if used else [f"(void){coefficients};"]), *names.pointers()]),
+            "    for (ptrdiff_t i = from; i < to; ++i) {",
+            *(f"        {line}" for line in [*own, *sums]),
+            f"        for (ptrdiff_t k = {bounds}; ++k) {{",
+            *(f"            {line}" for line in inner),
+            "        }",
+            *(f"        {line}" for line in out),
+            "    }",
+            "}\n",
+        ]
+    )
+
+
+def _over_pairs(
+    program: Program, layout: Layout, kernel: Kernel, arguments: str, begin: Sequence[str], body: Sequence[str]
+) -> str:
+    """A loop over all sites b, in it one over the sites a of a piece; statements with the values of the kernel."""
+    name, code = program.name, lower(kernel)
+    names = SiteNames(program, layout, kernel, code, set(), in_loops(program))
+    other, own = names.of_pair()
+    lines = [*own, *(f"const double {names.scope[a.target]} = {names.show(a.value)};" for a in code.assignments)]
+    lines += [text.format(*(names.show(s.value) for s in code.stores)) for text in body]
+    first = "params" if arguments.startswith(f"const {name}_params") else "coef"
+    used = any(s in code.used for s in kernel.inputs[first])
+    return "\n".join(
+        [
+            *comment(f"/* {plain(kernel.purpose)} */", ""),
+            f"static inline void {name}_{kernel.name}({arguments})",
+            "{",
+            *(f"    {line}" for line in [*([] if used else [f"(void){first};"]), *names.pointers(), *begin]),
+            "    for (ptrdiff_t j = 0; j < row->length; ++j) {",
+            *(f"        {line}" for line in other),
+            f"        {name}_EACH_SITE",
+            "        for (ptrdiff_t i = from; i < to; ++i) {",
+            *(f"            {line}" for line in lines),
+            "        }",
+            "    }",
+            "}\n",
+        ]
+    )
