@@ -63,6 +63,7 @@ CANONICAL = Record(
         Field("q", ListOf(NAME, least=1), "positions q_1, …, q_m among the coordinates", required=True),
         Field("p", ListOf(NAME, least=1), "their momenta p_1, …, p_m; {q_i, p_i} = 1", required=True),
     ),
+    example="{q: [x, y], p: [px, py]}",
 )
 LIE_ALGEBRA = Record(
     "lie_algebra",
@@ -78,6 +79,7 @@ LIE_ALGEBRA = Record(
     ),
     one=("name", "matrices", "structure_constants"),
     exactly=True,
+    example="{name: so(3)}",
 )
 _FORMS: dict[str, tuple[Kind, str]] = {
     "matrix": (MATRIX, "π as an n×n matrix of brackets {x_i, x_j}"),
@@ -116,7 +118,8 @@ def _structure(what: str, nested: int, *more: Field) -> Record:
         instead = ("bonds",)
         along = "graphs: {x[a]: {x[b]: f}} for the bracket of the ends of a bond; alone, or beside a form"
         forms.append(Field("bonds", MapOf(NEIGHBOUR, MapOf(NEIGHBOUR, FORMULA)), along))
-    return Record(what, (*more, *forms), one=keys, exactly=True, instead=instead)
+    example = "{lie_algebra: {name: so(3)}}"
+    return Record(what, (*more, *forms), one=keys, exactly=True, instead=instead, example="" if more else example)
 
 
 BOUNDARY = Choice(("periodic", "open"))

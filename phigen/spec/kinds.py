@@ -296,7 +296,7 @@ class Record(Kind):
     """A mapping with fixed keys; reads as key → value, keys in error absent.
 
     ``one`` lists keys of which at most (``exactly``: exactly) one may be given; a key of ``instead`` does where one is
-    needed, and may stand beside it.
+    needed, and may stand beside it. ``example`` is shown to who writes something else than a mapping.
     """
 
     what: str
@@ -304,15 +304,16 @@ class Record(Kind):
     one: tuple[str, ...] = ()
     exactly: bool = False
     instead: tuple[str, ...] = ()
+    example: str = ""
 
     @property
     def expected(self) -> str:  # type: ignore[override]
-        return f"a mapping ({self.what})"
+        return f"a mapping ({self.what})" if " " in self.what else "a mapping"
 
     def read(self, node: Node, path: Path, reader: Reader) -> dict[str, Any] | None:
         known = {f.key: f for f in self.fields}
         if not isinstance(node, MappingNode):
-            return self.mismatch(node, path, reader, "keys: " + ", ".join(known))
+            return self.mismatch(node, path, reader, self.instructions(node))
         values = {}
         for name, (key, item) in node.entries.items():
             if name not in known:
@@ -326,6 +327,14 @@ class Record(Kind):
                     values[name] = value
         self.check_presence(node, reader)
         return values
+
+    def instructions(self, node: Node) -> str:
+        """How the mapping is written, for who wrote something else: where that is the name of a key, with this key."""
+        named = next((f for f in self.fields if isinstance(node, Scalar) and f.key == node.text), None)
+        if named is not None and isinstance(named.kind, Record) and named.kind.example:
+            return f"write {{{named.key}: {named.kind.example}}}"
+        example = f"for example {self.example}; " if self.example else ""
+        return f"{example}keys: " + ", ".join(f.key for f in self.fields)
 
     def check_presence(self, node: MappingNode, reader: Reader) -> None:
         """Report missing keys, and keys that exclude each other."""

@@ -27,7 +27,10 @@ def values(given: Any, declared: Declarations, *, whole: bool = False) -> Values
     if isinstance(given, Scalar):
         if given.text.endswith(FILES):
             return Values(file=given.text)
-        formula = declared.formula(given, declared.site_numbers())
+        scope = declared.site_numbers()
+        if given.text in DISTRIBUTIONS and scope.lookup(given.text) is None:
+            return declared.reader.error(given, f"{given.text!r} is no value", f"{{random: {given.text}, seed: 1}}")
+        formula = declared.formula(given, scope)
         return None if formula is None else Values(formula=formula)
     if isinstance(given, list):
         numbers = [declared.number(node, declared.numbers()) for node in given]
