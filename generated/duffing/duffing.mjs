@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 3b1e39c8e7499da9dfd9df45695d69731e4dfbd69df0fb83dcdda2ad63695fba
+ * body-sha256: e89d964dcb6e9e4f7f3c2af67820664680fcd1fad7f637e58afce56d95747499
  */
 /*
  * import { Solver, StepError } from './duffing.mjs';
@@ -95,7 +95,7 @@ function prepare(params, h, coef) {
   coef[13] = 3 / 80 * t5;
   coef[14] = params.omega;
   coef[15] = params.A * h * (-1 + t1 * (1 / 12 - 1 / 120 * t1 + t8 * (1 / 24 + t1 * (-1 / 480 - 1 / 1920 *
-    t8))));
+      t8))));
   coef[16] = params.A * t5;
   coef[17] = params.A * params.A * t5;
   coef[18] = h * (-0.5 + t1 * (1 / 24 - t7));
@@ -139,12 +139,12 @@ function linearise(coef, y, displacement, increment, jacobian, incrementJacobian
   const p_p = coef[28] + coef[30] * t1 + p * (coef[5] + coef[6] * t2 + t4);
   const t5 = coef[24] + p * (coef[25] + coef[0] * p);
   const p_q = coef[22] + coef[23] * t2 + q * (t5 + q * (coef[26] + q * (coef[1] + coef[2] * t2 + q * (coef[27]
-    + q * (coef[3] + t3)))));
+      + q * (coef[3] + t3)))));
   const t6 = coef[29] * p + q * (coef[25] + p * (coef[11] + coef[12] * t1));
   const t7 = 0.5 * t6;
   const t8 = coef[5] + coef[13] * t2 + t4;
   const t9 = t5 + q * (coef[31] + q * (coef[7] + coef[8] * t2 + q * (coef[32] + q * (coef[9] + coef[10] *
-    t1))));
+      t1))));
   displacement[0] = (-0.5) * p_p;
   displacement[1] = 0.5 * p_q;
   increment[0] = p_p;
@@ -179,7 +179,7 @@ function vectorField(params, t, x, out) {
   out[1] = q + params.A * Math.cos(params.omega * t) - q * (q * q);
 }
 
-// ---- The solver ----
+// ---- Errors ----
 
 /** What statuses mean. */
 const STATUS = {
@@ -204,14 +204,16 @@ export class StepError extends Error {
   }
 }
 
-const number = new Float64Array(1);
-
 /** Numbers as many as wanted, all finite; StepError otherwise. */
 function finite(values, length, what) {
   const copy = Float64Array.from(values ?? []);
   if (copy.length === length && copy.every(Number.isFinite)) return copy;
   throw new StepError("BAD_ARGUMENT", 0, `${what} must be ${length} finite numbers`);
 }
+
+// ---- The solver ----
+
+const number = new Float64Array(1);
 
 /** A table of coefficients for each stage. */
 function emptyTables() {

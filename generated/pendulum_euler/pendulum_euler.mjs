@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: e986204362af57a92b3c877957276d80095583860bd859e1e84955f9fdb09a19
+ * body-sha256: 366cc617505915c8f480e7947f3d51e803fb32eca435887e6482f89b77dc9e9c
  */
 /*
  * import { Solver, StepError } from './pendulum_euler.mjs';
@@ -84,7 +84,7 @@ function vectorField(params, x, out) {
   out[1] = -(params.g * Math.sin(q));
 }
 
-// ---- The solver ----
+// ---- Errors ----
 
 /** What statuses mean. */
 const STATUS = {
@@ -109,14 +109,16 @@ export class StepError extends Error {
   }
 }
 
-const number = new Float64Array(1);
-
 /** Numbers as many as wanted, all finite; StepError otherwise. */
 function finite(values, length, what) {
   const copy = Float64Array.from(values ?? []);
   if (copy.length === length && copy.every(Number.isFinite)) return copy;
   throw new StepError("BAD_ARGUMENT", 0, `${what} must be ${length} finite numbers`);
 }
+
+// ---- The solver ----
+
+const number = new Float64Array(1);
 
 /** A table of coefficients for each stage. */
 function emptyTables() {

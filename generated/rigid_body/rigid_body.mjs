@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 46947e588c1ab69b36d624b54c93956e6216cc763108fe929ea25098405e1be2
+ * body-sha256: 7882601a367dacb1e45a09c011c5a220bdaca4ee6a0dfd14bb6596b01f349313
  */
 /*
  * import { Solver, StepError } from './rigid_body.mjs';
@@ -166,9 +166,9 @@ function prepare(params, gauge, h, coef) {
   const t37 = 1 / 1440 * t8;
   const t38 = 1 / 1440 * t4;
   const t39 = t8 * (t5 * (t27 - t28) + gauge[0] * (t29 + t32)) - t33 + t1 * (gauge[0] * (t35 + ((-1 / 24) * t5
-    - t36)) + (t8 * (t37 - t28 - t25) + (t38 + t5 * (t36 + t24))));
+      - t36)) + (t8 * (t37 - t28 - t25) + (t38 + t5 * (t36 + t24))));
   const t40 = t4 * (1 / 240 * (t15 * t1) + gauge[0] * (t18 - t19)) + t8 * (t1 * (t22 + t1 * (t5 * (t23 - t24 -
-    t25) - t26)) + t8 * t39);
+      t25) - t26)) + t8 * t39);
   const t41 = t14 * t40;
   const t42 = 1 / 12 * t5;
   const t43 = t3 * (t4 * (t9 - t7) + t5 * (t8 * (t6 - t10) + gauge[0] * (t11 - t42)));
@@ -178,14 +178,14 @@ function prepare(params, gauge, h, coef) {
   const t47 = 1 / 30 * t5;
   const t48 = 1 / 30 * t1;
   const t49 = gauge[0] * t4 * (1 / 36 * t1 - t44) + t5 * (gauge[0] * t5 * (1 / 36 * t5 - t44) + t1 * (t5 *
-    (t45 - t29) - t46 + gauge[0] * (t44 - t47 - t48)));
+      (t45 - t29) - t46 + gauge[0] * (t44 - t47 - t48)));
   const t50 = t44 - 1 / 30 * t8;
   const t51 = 1 / 72 * t8;
   const t52 = 7 / 360 * t1;
   const t53 = gauge[0] * (7 / 60 * t1 - t47 + t50) + (t8 * (17 / 360 * t5 - t51 - t52) + (t5 * ((-1 / 72) * t5
-    - t52) - 7 / 360 * t4));
+      - t52) - 7 / 360 * t4));
   const t54 = t8 * (t5 * t53 + (gauge[0] * t8 * (1 / 36 * t8 - t44) + t1 * (t8 * (t45 - t51) - t46 + gauge[0]
-    * (t50 - t48))));
+      * (t50 - t48))));
   const t55 = 1 / 360 * t1;
   const t56 = t4 * t8;
   const t57 = (-1 / 360) * t8;
@@ -194,7 +194,7 @@ function prepare(params, gauge, h, coef) {
   const t60 = 1 / 144 * t1;
   const t61 = 1 / 80 * t8;
   const t62 = t56 * (t57 - t55) + t5 * (t58 * (t57 - 1 / 360 * t5) + t1 * (t59 + t5 * (t24 - t60) + t8 * (t61
-    - 1 / 144 * t5 - t60)));
+      - 1 / 144 * t5 - t60)));
   const t63 = t14 * (gauge[0] * (t49 + t54) + (t15 * t4 * ((-1 / 360) * t5 - t55) + t8 * t62));
   const t64 = t8 * t8;
   const t65 = 1 / 72 * (t1 * t8);
@@ -206,9 +206,9 @@ function prepare(params, gauge, h, coef) {
   const t71 = 1 / 1440 * t5;
   const t72 = t38 + t5 * (t71 - t25);
   const t73 = t5 * (t8 * (t67 - t31) + gauge[0] * (t68 - t28)) - t33 + t1 * (gauge[0] * (t69 - t36 + t70) +
-    (t8 * (t36 + (t61 - t28)) + t72));
+      (t8 * (t36 + (t61 - t28)) + t72));
   const t74 = t4 * (1 / 240 * (t1 * t64) + gauge[0] * (t18 - t65)) + t5 * (t1 * (t22 + t1 * (t8 * (t66 - t25)
-    - t26)) + t5 * t73);
+      - t26)) + t5 * t73);
   const t75 = t14 * t74;
   const t76 = gauge[0] * t68;
   const t77 = 1 / 72 * t58;
@@ -217,29 +217,29 @@ function prepare(params, gauge, h, coef) {
   const t80 = 1 / 120 * t1;
   const t81 = t34 - t31;
   const t82 = t1 * (t5 * (t25 - t28) + gauge[0] * (t79 - t36)) - t33 + t8 * (gauge[0] * (t80 - t6 + t81) +
-    (t38 + t5 * (t24 - t36) + t8 * (t28 + t37 - t25)));
+      (t38 + t5 * (t24 - t36) + t8 * (t28 + t37 - t25)));
   const t83 = t64 * (1 / 240 * (t15 * t8) + gauge[0] * (t76 - t77)) + t1 * (t8 * (t22 + t8 * (t5 * (t78 - t24)
-    - t26)) + t1 * t82);
+      - t26)) + t1 * t82);
   const t84 = t14 * t83;
   const t85 = gauge[0] * t79;
   const t86 = t5 * (gauge[0] * (t70 + (t80 - t28)) + (t8 * (t28 + t61 - t36) + t72)) + (t1 * (t8 * (t25 - t31)
-    + gauge[0] * (t68 - t36)) - t33);
+      + gauge[0] * (t68 - t36)) - t33);
   const t87 = t15 * (1 / 240 * (t5 * t64) + gauge[0] * (t85 - t77)) + t1 * (t5 * (t22 + t5 * (t8 * (t66 - t67)
-    - t26)) + t1 * t86);
+      - t26)) + t1 * t86);
   const t88 = t14 * t87;
   const t89 = 1 / 24 * t1;
   const t90 = t3 * (t15 * (t89 - t7) + t8 * (t1 * (t9 - t42) + gauge[0] * (1 / 6 * t5 - t12)));
   const t91 = 1 / 80 * t1;
   const t92 = t37 - t67;
   const t93 = t8 * (t1 * (t27 - t36) + gauge[0] * (t16 + t32)) - t33 + t5 * (gauge[0] * (t35 + ((-1 / 240) *
-    t5 - t89)) + (t8 * (t92 - t36) + (t59 + t5 * (t36 + t71))));
+      t5 - t89)) + (t8 * (t92 - t36) + (t59 + t5 * (t36 + t71))));
   const t94 = t15 * (1 / 240 * (t4 * t5) + gauge[0] * (t85 - t19)) + t8 * (t5 * (t22 + t5 * (t1 * (t23 - t67 -
-    t91) - t26)) + t8 * t93);
+      t91) - t26)) + t8 * t93);
   const t95 = t14 * t94;
   const t96 = t5 * (t1 * (t67 - t36) + gauge[0] * (t16 + (t30 - t28))) - t33 + t8 * (gauge[0] * (t69 - t89 +
-    t81) + (t8 * (t36 + t92) + (t59 + t5 * (t71 - t36))));
+      t81) + (t8 * (t36 + t92) + (t59 + t5 * (t71 - t36))));
   const t97 = t64 * (1 / 240 * t56 + gauge[0] * (t76 - t65)) + t5 * (t8 * (t22 + t8 * (t1 * (t78 - t91) -
-    t26)) + t5 * t96);
+      t26)) + t5 * t96);
   const t98 = t14 * t97;
   coef[0] = 2 * (h * (0.5 * t1 - gauge[0]));
   coef[1] = 2 * t13;
@@ -401,17 +401,18 @@ function guide(params, gauge, x, error) {
   const t16 = 1 / 6 * t2;
   const t17 = 1 / 3 * t2;
   const t18 = t1 * (t5 + t6 * (t1 * t9)) - t10 + t11 * (t6 * (gauge[0] * (t12 - t13) + t2 * (t14 - t15)) + t4
-    * (t1 * (t14 - t16) + gauge[0] * (t17 - t13)));
+      * (t1 * (t14 - t16) + gauge[0] * (t17 - t13)));
   const t19 = x3 * t18;
   const t20 = x3 * x3;
   const t21 = 1 / 12 * t1;
   const t22 = 1 / 3 * t11;
   const t23 = t11 * (t5 + t20 * (t11 * t9)) - t10 + t1 * (t4 * (gauge[0] * (t17 - t15) + t11 * (t21 - t16)) +
-    t20 * (t2 * (t21 - t13) + gauge[0] * (t22 - t15)));
+      t20 * (t2 * (t21 - t13) + gauge[0] * (t22 - t15)));
   const t24 = x2 * t23;
   const t25 = t1 * t1;
   const t26 = t2 * (t6 * (gauge[0] * (t12 - t16) + t11 * (t7 - t15)) + t20 * (gauge[0] * (t22 - t16) + t1 *
-    (t7 - t13))) + (t11 * (1 / 12 * (t6 * t25) + t20 * (t11 * (t21 - t8))) - 1 / 6 * (t25 * (gauge[0] * t6)));
+      (t7 - t13))) + (t11 * (1 / 12 * (t6 * t25) + t20 * (t11 * (t21 - t8))) - 1 / 6 * (t25 * (gauge[0] *
+      t6)));
   const t27 = x1 * t26;
   error[0] = x2 * t19 - x3 * t24;
   error[1] = x3 * t27 - x1 * t19;
@@ -460,7 +461,7 @@ function vectorField(params, x, out) {
   out[2] = x1 * t2 - x2 * t3;
 }
 
-// ---- The solver ----
+// ---- Errors ----
 
 /** What statuses mean. */
 const STATUS = {
@@ -485,14 +486,16 @@ export class StepError extends Error {
   }
 }
 
-const number = new Float64Array(1);
-
 /** Numbers as many as wanted, all finite; StepError otherwise. */
 function finite(values, length, what) {
   const copy = Float64Array.from(values ?? []);
   if (copy.length === length && copy.every(Number.isFinite)) return copy;
   throw new StepError("BAD_ARGUMENT", 0, `${what} must be ${length} finite numbers`);
 }
+
+// ---- The solver ----
+
+const number = new Float64Array(1);
 
 /** A table of coefficients for each stage. */
 function emptyTables() {

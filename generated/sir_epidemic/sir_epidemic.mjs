@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: dc29e236a68ad5ddbd3855573b6045257211bf85d185134dd32fad452c9f88de
+ * body-sha256: 7ed0bbebce66777fd68d5466372a1d10eb5ba5c366846dc88f0b287a62ca8240
  */
 /*
  * import { Solver, StepError } from './sir_epidemic.mjs';
@@ -165,7 +165,7 @@ function pathField(coef, p, f, m, field) {
   field[2] = e[9];
 }
 
-// ---- The solver ----
+// ---- Errors ----
 
 /** What statuses mean. */
 const STATUS = {
@@ -190,14 +190,16 @@ export class StepError extends Error {
   }
 }
 
-const number = new Float64Array(1);
-
 /** Numbers as many as wanted, all finite; StepError otherwise. */
 function finite(values, length, what) {
   const copy = Float64Array.from(values ?? []);
   if (copy.length === length && copy.every(Number.isFinite)) return copy;
   throw new StepError("BAD_ARGUMENT", 0, `${what} must be ${length} finite numbers`);
 }
+
+// ---- The solver ----
+
+const number = new Float64Array(1);
 
 /** A table of coefficients for each stage. */
 function emptyTables() {

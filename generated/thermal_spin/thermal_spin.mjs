@@ -18,7 +18,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: a635ce3b4e287bb3189a9f9aa89f970ec1d81b4c454609b1987200fda8935597
+ * body-sha256: 16e0ae0b732d20829c21ade1b56d8acbe70a5e462f849f186a063a3eb8ee2661
  */
 /*
  * import { Solver, StepError } from './thermal_spin.mjs';
@@ -273,7 +273,7 @@ function vectorField(params, x, out) {
   out[2] = y * t4 + x_ * t3;
 }
 
-// ---- The solver ----
+// ---- Errors ----
 
 /** What statuses mean. */
 const STATUS = {
@@ -298,14 +298,16 @@ export class StepError extends Error {
   }
 }
 
-const number = new Float64Array(1);
-
 /** Numbers as many as wanted, all finite; StepError otherwise. */
 function finite(values, length, what) {
   const copy = Float64Array.from(values ?? []);
   if (copy.length === length && copy.every(Number.isFinite)) return copy;
   throw new StepError("BAD_ARGUMENT", 0, `${what} must be ${length} finite numbers`);
 }
+
+// ---- The solver ----
+
+const number = new Float64Array(1);
 
 /** A table of coefficients for each stage. */
 function emptyTables() {

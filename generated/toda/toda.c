@@ -8,7 +8,7 @@
  *   step: explicit
  *   one step of one site: 13 additions, 33 multiplications, 6 functions
  *
- * spec: toda, sha256 e8b1b1a8a2df5498b64dfff7953dc581866d2bc60eefa70a7577f344a727b4dc
+ * spec: toda, sha256 f26949756f578199f03099c1eb735187896f28e684aa7a5623cea3cfe88fe402
  * to regenerate: phigen build toda
  * DO NOT EDIT: change the spec and regenerate; edits are noticed by the checksum below.
  *

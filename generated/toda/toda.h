@@ -2,7 +2,7 @@
  * toda.h: the declarations; toda.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 90aa06523cf42dc48c638ff1be3cf2b55dcb40b2da06e9ea1727838e2d41a38f
+ * body-sha256: ac19d4bd45ff5cdbf191c76f9130285005a98512af08d65bbb5d069e27ee865e
  */
 #ifndef TODA_H
 #define TODA_H
@@ -17,7 +17,7 @@ extern "C" {
 #define toda_ORDER 4
 #define toda_CASIMIRS 2
 #define toda_PHIGEN_VERSION "0.1.0"
-#define toda_SPEC_SHA256 "e8b1b1a8a2df5498b64dfff7953dc581866d2bc60eefa70a7577f344a727b4dc"
+#define toda_SPEC_SHA256 "f26949756f578199f03099c1eb735187896f28e684aa7a5623cea3cfe88fe402"
 
 /* Axes, the slowest first: i. Fields of a site: a, b. Casimirs: momentum, length. */
 typedef struct {

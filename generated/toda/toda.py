@@ -7,17 +7,17 @@
 #   step: explicit
 #   one step of one site: 13 additions, 33 multiplications, 6 functions
 #
-# spec: toda, sha256 e8b1b1a8a2df5498b64dfff7953dc581866d2bc60eefa70a7577f344a727b4dc
+# spec: toda, sha256 f26949756f578199f03099c1eb735187896f28e684aa7a5623cea3cfe88fe402
 # to regenerate: phigen build toda
 # DO NOT EDIT: change the spec and regenerate; edits are noticed by the checksum below.
 #
 # SPDX-License-Identifier: 0BSD
 # This file belongs to whoever generated it; phigen claims no rights in it.
-# body-sha256: 88f7455396158901113756e491db57ddddf3e1d1f91f310c51b8d061e6fa1b1e
+# body-sha256: 3778d4997da47f44f16cda424894c6c46f57244995d3d098254ab4153a29deba
 import numpy as np
 
 VERSION = "0.1.0"
-SPEC_SHA256 = "e8b1b1a8a2df5498b64dfff7953dc581866d2bc60eefa70a7577f344a727b4dc"
+SPEC_SHA256 = "f26949756f578199f03099c1eb735187896f28e684aa7a5623cea3cfe88fe402"
 DIM = 2
 ORDER = 4
 AXES = ('i',)

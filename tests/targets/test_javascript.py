@@ -362,8 +362,9 @@ def test_modules_that_meet_declare_no_name_twice():
         path.stem: set(re.findall(r"^(?:export )?(?:const|function|class) (\w+)", path.read_text(), re.MULTILINE))
         for path in RUNTIME
     }
-    for step in ("newton", "path", "explicit", "splitting"):
-        met = [step, f"tangent_{step}", "tangent", "solver", "gauge", "guess", "algebra", "taylor"]
+    lattices = [["errors", "lattice", "sites", *step] for step in (["flows"], ["sweeps", "krylov"])]
+    others = ["tangent", "errors", "solver", "gauge", "guess", "algebra", "taylor"]
+    for met in [*lattices, *([s, f"tangent_{s}", *others] for s in ("newton", "path", "explicit", "splitting"))]:
         every = [name for module in met for name in declared[module]]
         assert len(every) == len(set(every)), sorted(n for n in set(every) if every.count(n) > 1)
 
@@ -384,11 +385,13 @@ def test_edits_are_noticed():
     assert is_edited(text.replace("const DIM = 3", "const DIM = 4"))
 
 
-def test_the_example_of_the_documentation_prints_what_it_says(tmp_path):
+@pytest.mark.parametrize(("example", "name"), [(0, "rigid_body"), (1, "toda")])
+def test_an_example_of_the_documentation_prints_what_it_says(example, name, tmp_path):
     root = resources.bundled_specs().parent
     text = (root / "docs" / "javascript.md").read_text(encoding="utf-8")
-    code, printed = (re.search(rf"```{kind}\n(.*?)```", text, re.DOTALL)[1] for kind in ("js", "text"))
-    (tmp_path / "turn.mjs").write_text(code, encoding="utf-8")
-    copy(root / "generated" / "rigid_body" / "rigid_body.mjs", tmp_path)
-    done = subprocess.run([tool("node"), "turn.mjs"], cwd=tmp_path, capture_output=True, text=True, check=True)
+    found = (re.findall(rf"```{kind}\n(.*?)```", text, re.DOTALL) for kind in ("js", "text"))
+    code, printed = (blocks[example] for blocks in found)
+    (tmp_path / "example.mjs").write_text(code, encoding="utf-8")
+    copy(root / "generated" / name / f"{name}.mjs", tmp_path)
+    done = subprocess.run([tool("node"), "example.mjs"], cwd=tmp_path, capture_output=True, text=True, check=True)
     assert done.stdout == printed

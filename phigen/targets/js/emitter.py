@@ -12,32 +12,17 @@ from phigen.scheme.kernel import Kernel
 from phigen.scheme.path import Recurrences
 from phigen.scheme.program import BOUND, Program
 from phigen.scheme.steps import LONGEST_PATH, MOST_PIECES, Explicit, Implicit, Newton, Path, Splitting, Sweeps
-from phigen.symbolic.functions import FUNCTIONS, written_in
 from phigen.targets import special
-from phigen.targets.header import CHECKSUM, checksum, header_lines, plain
+from phigen.targets.header import CHECKSUM, checksum, header_lines
+from phigen.targets.js import lattice
 from phigen.targets.js.functions import definitions
+from phigen.targets.js.printing import LANGUAGE, camel, comment, key, properties, wrapped
 from phigen.targets.js.runtime import assembled
-from phigen.targets.language import Language
 from phigen.targets.path import Syntax, kinds, recurrences, statements, tangent_program
 from phigen.targets.rendering import render
-from phigen.targets.reserved import JAVASCRIPT_RESERVED
 
 #: Most terms of the expansion of a path, as in the C target.
 TERMS = 30
-
-#: The widest line.
-WIDTH = 110
-
-LANGUAGE = Language(
-    reserved=JAVASCRIPT_RESERVED,
-    functions={name: name for name in FUNCTIONS} | written_in("js"),
-    constants={"pi": "Math.PI", "E": "Math.E"},
-    declare="const {name} = {value};",
-    assign="{place} = {value};",
-    subscript="{array}[{index}]",
-    parameter="params.{name}",
-    point="",
-)
 
 PATH_SYNTAX = Syntax(
     printer=LANGUAGE.printer,
@@ -52,19 +37,31 @@ PATH_SYNTAX = Syntax(
 
 
 def emit(program: Program, command: str) -> dict[str, str]:
-    """The file name and its contents. Raises `SpecError` for what is not offered: lattices, attitudes, adjoints."""
-    if isinstance(program.step, Sweeps):
-        message = f"{program.name} is a lattice; lattices are not offered in JavaScript"
-        raise SpecError([Diagnostic(message, hint="the targets c and numpy have them")])
+    """The file name and its contents. Raises `SpecError` for what is not offered: attitudes, adjoints."""
     if program.step.adjoint:
         message = f"{program.name} asks for the transpose of steps, adjoint, which is not offered in JavaScript"
         raise SpecError([Diagnostic(message, hint="the targets c and numpy have it")])
     if program.attitude:
         message = f"{program.name} reconstructs attitudes, which are not offered in JavaScript"
         raise SpecError([Diagnostic(message, hint="the targets c and numpy have them")])
+    body = _lattice(program, program.step) if isinstance(program.step, Sweeps) else _system_of_coordinates(program)
+    head = "\n".join(f" * {line}".rstrip() for line in header_lines(program, command))
+    return {f"{program.name}.mjs": f"/*\n{head}\n * {CHECKSUM} {checksum(body)}\n */\n{body}"}
+
+
+def _lattice(program: Program, step: Sweeps) -> str:
+    """The body of the module of a lattice."""
+    pieces = [lattice.tables(program, step), _function(step.prepare), *_functions(program)]
+    model = "\n\n".join(piece.strip("\n") for piece in (*pieces, *lattice.kernels(program, step)))
+    return f"{model}\n\n{assembled(lattice.modules(step), lattice.switches(step))}\n"
+
+
+def _system_of_coordinates(program: Program) -> str:
+    """The body of any other module."""
     step, features = program.step, _features(program)
+    assert not isinstance(step, Sweeps)
     chosen = {Newton: "newton", Explicit: "explicit", Path: "path", Splitting: "splitting"}[type(step)]
-    modules = ["solver", chosen]
+    modules = ["errors", "solver", chosen]
     modules += ["taylor"] if isinstance(step, Path) else []
     modules += ["noise"] if program.noise else []
     modules += ["guess"] if features["IMPLICIT"] else []
@@ -73,9 +70,12 @@ def emit(program: Program, command: str) -> dict[str, str]:
     modules += ["tangent", f"tangent_{chosen}"] if program.extras.tangent else []
     algebra = not isinstance(step, Splitting) or program.searches_gauge or program.extras.tangent
     modules += ["algebra"] if algebra else []
-    body = f"{_model(program)}\n\n{assembled(modules, features)}\n"
-    comment = "\n".join(f" * {line}".rstrip() for line in header_lines(program, command))
-    return {f"{program.name}.mjs": f"/*\n{comment}\n * {CHECKSUM} {checksum(body)}\n */\n{body}"}
+    return f"{_model(program)}\n\n{assembled(modules, features)}\n"
+
+
+def _functions(program: Program) -> list[str]:
+    """Functions that the file defines itself."""
+    return definitions(special.used(program), special.entire_used(program), LANGUAGE.printer)
 
 
 def _features(program: Program) -> dict[str, bool]:
@@ -108,7 +108,7 @@ def _model(program: Program) -> str:
     pieces = [render("js", "system.mjs", _system(program))]
     pieces += [render("js", "schedule.mjs", _schedule(step))] if isinstance(step, Splitting) else []
     pieces += [render("js", "implicit.mjs", _inner(step))] if isinstance(step, Implicit) else []
-    pieces += definitions(special.used(program), special.entire_used(program), LANGUAGE.printer)
+    pieces += _functions(program)
     pieces += [_function(kernel) for kernel in _kernels(program)]
     pieces += [_path(program, step.recurrences, "path")] if isinstance(step, Path) else []
     if isinstance(step, Path) and step.tangent:
@@ -118,7 +118,6 @@ def _model(program: Program) -> str:
 
 def _system(program: Program) -> Mapping[str, object]:
     parameters = program.parameters
-    properties = [f" * @property {{number}} {p.name} {plain(p.description)}".rstrip() for p in parameters]
     return {
         "contents": [f" * {part}".rstrip() for line in _contents(program) for part in textwrap.wrap(line, 100) or [""]],
         "name": program.name,
@@ -128,8 +127,8 @@ def _system(program: Program) -> Mapping[str, object]:
         "order": program.order,
         "coordinates": json.dumps(program.coordinates),
         "casimirs": json.dumps(program.casimirs),
-        "properties": properties,
-        "defaults": [f"{_key(p.name)}: {float(p.value)!r}" for p in parameters],
+        "properties": properties(parameters),
+        "defaults": [f"{key(p.name)}: {float(p.value)!r}" for p in parameters],
         "positive": json.dumps([p.name for p in parameters if p.positive]),
         "gauge": json.dumps(program.held) if program.held else "",
         "monitored": program.monitor is not None,
@@ -207,11 +206,6 @@ def _contents(program: Program) -> list[str]:
     return lines
 
 
-def _key(name: str) -> str:
-    """A parameter as a key of an object; this one would be taken for its prototype."""
-    return f'["{name}"]' if name == "__proto__" else name
-
-
 def _kernels(program: Program) -> list[Kernel]:
     """The kernels that the runtime calls."""
     step, seen = program.step, program.observables
@@ -230,29 +224,12 @@ def _kernels(program: Program) -> list[Kernel]:
 
 def _function(kernel: Kernel) -> str:
     """A kernel as a function that fills arrays."""
-    arrays = {argument: _camel(argument) for argument in (*kernel.inputs, *(o.name for o in kernel.outputs))}
-    head = f"function {_camel(kernel.name)}({', '.join(arrays.values())}) {{"
-    lines = [part for line in LANGUAGE.statements(kernel, arrays) for part in _wrapped(line)]
-    return "\n".join([*_comment(kernel.purpose), head, *lines, "}"])
+    arrays = {argument: camel(argument) for argument in (*kernel.inputs, *(o.name for o in kernel.outputs))}
+    head = f"function {camel(kernel.name)}({', '.join(arrays.values())}) {{"
+    lines = [part for line in LANGUAGE.statements(kernel, arrays) for part in wrapped(line)]
+    return "\n".join([*comment(kernel.purpose), head, *lines, "}"])
 
 
 def _path(program: Program, path: Recurrences, kind: str) -> str:
     """The recurrences of a path, or of one with its variation."""
     return render("js", "path.mjs", {**statements(program, path, PATH_SYNTAX), "kind": kind})
-
-
-def _wrapped(statement: str) -> list[str]:
-    """A statement of a kernel in lines that are not too wide; it has no strings, so any space will do."""
-    return textwrap.wrap(statement, WIDTH, initial_indent="  ", subsequent_indent="    ", break_long_words=False)
-
-
-def _camel(name: str) -> str:
-    first, *rest = name.split("_")
-    return first + "".join(word.capitalize() for word in rest)
-
-
-def _comment(text: str) -> list[str]:
-    said = f"{text[:1].upper()}{text[1:]}."
-    if len(said) <= WIDTH - 8:
-        return [f"/** {plain(said)} */"]
-    return ["/**", *textwrap.wrap(plain(said), WIDTH, initial_indent=" * ", subsequent_indent=" * "), " */"]

@@ -13,8 +13,8 @@ from phigen import resources
 
 _DIRECTIVE = re.compile(r"\s*(?://|\*) #(if|else|endif)(?: (\w+))?")
 
-#: The module whose exports are those of the result.
-PUBLIC = "solver"
+#: The modules whose classes are exported by the result.
+PUBLIC = ("errors", "solver", "lattice")
 
 
 def assembled(modules: list[str], features: Mapping[str, bool]) -> str:
@@ -26,7 +26,8 @@ def _module(name: str, features: Mapping[str, bool]) -> str:
     path = resources.templates() / "js" / "runtime" / f"{name}.mjs"
     lines = resolved(path.read_text(encoding="utf-8"), features)
     kept = [line for line in lines if not line.startswith("import ")]
-    text = "\n".join(kept if name == PUBLIC else [line.removeprefix("export ") for line in kept])
+    public = "export class" if name in PUBLIC else "\n"
+    text = "\n".join(line if line.startswith(public) else line.removeprefix("export ") for line in kept)
     return re.sub(r"\n{3,}", "\n\n", text).strip("\n")
 
 

@@ -1,3 +1,4 @@
+import { StepError, finite } from "./errors.mjs";
 import { makeStage } from "./newton.mjs";
 // #if IMPLICIT
 import { History } from "./guess.mjs";
@@ -29,37 +30,7 @@ import { tangentOf } from "./tangent.mjs";
 
 // ---- The solver ----
 
-/** What statuses mean. */
-const STATUS = {
-  NO_CONVERGENCE: "no convergence: the step is too large",
-  SINGULAR: "singular Newton matrix: the step is too large",
-  NOT_FINITE: "not finite: overflow, or outside the domain",
-  BAD_ARGUMENT: "bad argument",
-};
-
-/** Why a step could not be made, or no solver; the state before it stands. */
-export class StepError extends Error {
-  /**
-   * @param {"NO_CONVERGENCE" | "SINGULAR" | "NOT_FINITE" | "BAD_ARGUMENT"} status
-   * @param {number} steps good steps until then
-   * @param {string} [detail]
-   */
-  constructor(status, steps, detail = "") {
-    super(`step ${steps}: ${STATUS[status]}${detail && `: ${detail}`}`);
-    this.name = "StepError";
-    this.status = status;
-    this.steps = steps;
-  }
-}
-
 const number = new Float64Array(1);
-
-/** Numbers as many as wanted, all finite; StepError otherwise. */
-function finite(values, length, what) {
-  const copy = Float64Array.from(values ?? []);
-  if (copy.length === length && copy.every(Number.isFinite)) return copy;
-  throw new StepError("BAD_ARGUMENT", 0, `${what} must be ${length} finite numbers`);
-}
 
 /** A table of coefficients for each stage. */
 function emptyTables() {

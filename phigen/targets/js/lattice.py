@@ -1,0 +1,350 @@
+"""Lattices in JavaScript: kernels as loops over the sites, and the tables that the runtime goes by."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Iterator, Sequence
+
+from phigen.scheme.kernel import Kernel
+from phigen.scheme.program import Program
+from phigen.scheme.steps import Ends, Gather, Partners, Sweep, Sweeps
+from phigen.symbolic.symbols import CHOSEN, COEFFICIENT, GATHERED, INITIAL, PRESENT, VARIATION, Symbol, kind_of
+from phigen.targets.code import lower
+from phigen.targets.js.printing import LANGUAGE, camel, comment, key, properties, wrapped
+from phigen.targets.names import Scope
+from phigen.targets.rendering import render
+
+#: What the loops call their own.
+_OWN = frozenset({"coef", "params", "start", "x", "v", "sites", "count", "near", "present", "sums", "out"})
+_OWN |= {"i", "j", "k", "bond", "here", "there", "colour", "colours", "chosen"}
+
+#: A space at which no line is broken.
+_FIXED = "\N{NO-BREAK SPACE}"
+
+#: The runtime of lattices; after it what makes a step.
+MODULES = ("errors", "lattice", "sites")
+
+
+def modules(step: Sweeps) -> list[str]:
+    """The modules of the runtime."""
+    if step.equation is None:
+        return [*MODULES, "flows"]
+    return [*MODULES, "sweeps", *(["krylov"] if step.equation.slope else [])]
+
+
+def switches(step: Sweeps) -> dict[str, bool]:
+    """The switches of the runtime."""
+    return {
+        "KICKS": bool(step.schedule.multiples),
+        "COLOURS": step.sites.colours > 1,
+        "GATHER": step.partners is not None,
+        "GRAPH": _partners(step).graph,
+        "SPLIT": step.equation is None,
+        "BY_COLOUR": bool(step.by_colour),
+        "STIFF": step.equation is not None and step.equation.slope is not None,
+    }
+
+
+def tables(program: Program, step: Sweeps) -> str:
+    """What is printed of the system beside its kernels."""
+    listed = [
+        render("js", "lattice.mjs", _facts(program, step)),
+        render("js", "lattice_tables.mjs", _tables(program, step)),
+    ]
+    lines = "\n".join(listed).splitlines()
+    broken = [wrapped(line, "") if line.startswith("const") else [line] for line in lines]
+    return "\n".join(part for parts in broken for part in parts).replace(_FIXED, " ")
+
+
+def _facts(program: Program, step: Sweeps) -> dict[str, object]:
+    """What users see."""
+    return {
+        "contents": [f" * {line}".rstrip() for line in _contents(program, step)],
+        "name": program.name,
+        "version": program.version,
+        "sha256": program.about.spec_sha256,
+        "dimension": program.dimension,
+        "order": program.order,
+        "axes": json.dumps(step.sites.axes),
+        "coordinates": json.dumps(program.coordinates),
+        "casimirs": json.dumps(program.casimirs),
+        "kinds": json.dumps(step.casimir_kinds),
+        "properties": properties(program.parameters),
+        "defaults": [f"{key(p.name)}: {float(p.value)!r}" for p in program.parameters],
+        "positive": json.dumps([p.name for p in program.parameters if p.positive]),
+        "at_sites": json.dumps(step.sites.parameters),
+        "at_bonds": json.dumps(step.sites.at_bonds),
+        "graph": _partners(step).graph,
+    }
+
+
+def _tables(program: Program, step: Sweeps) -> dict[str, object]:
+    """What the runtime goes by."""
+    sites, schedule, partners = step.sites, step.schedule, _partners(step)
+    swept = [sweep.gather for part in step.parts for sweep in part if sweep.gather]
+    return {
+        "open": json.dumps(sites.open),
+        "least": json.dumps(sites.least),
+        "periods": json.dumps(sites.periods),
+        "near": json.dumps(_near(step)),
+        "bounds": json.dumps([_pairs(w) for w in _bounds(step, program)]),
+        "colours": sites.colours if sites.colours > 1 else "",
+        "weights": json.dumps(sites.weights),
+        "gathered": max(len(g.names) for g in (*swept, partners.energy, partners.field)) if step.partners else 0,
+        "coefficients": step.row,
+        "times": json.dumps(schedule.times),
+        "unit": "stages" if step.equation else "flows",
+        "multiples": json.dumps(schedule.multiples) if schedule.multiples else "",
+        "by_colour": json.dumps(step.by_colour) if step.by_colour else "",
+        "schedule": f"[{', '.join(f'[{part},{_FIXED}{row}]' for part, row in schedule.flows)}]",
+        "split": step.equation is None,
+        "flows": f"[{', '.join(map(_listed, step.parts))}]",
+        "most_sweeps": step.equation.most_sweeps if step.equation else 0,
+    }
+
+
+def kernels(program: Program, step: Sweeps) -> Iterator[str]:
+    """All kernels as loops over sites."""
+    printed = _Printed(program, step)
+    for sweep in (sweep for part in step.parts for sweep in part):
+        if sweep.gather:
+            yield from (printed.gathering(ends, "coef") for ends in sweep.gather.ends)
+        yield printed.sweep(sweep)
+    if step.partners:
+        for gather in (step.partners.energy, step.partners.field):
+            yield from (printed.gathering(ends, "params") for ends in gather.ends)
+    if step.equation:
+        for kernel in step.equation.kernels:
+            yield printed.of_equation(kernel)
+    seen = program.observables
+    yield from (printed.seen(kernel) for kernel in (seen.energy, seen.casimirs, seen.vector_field))
+
+
+def _partners(step: Sweeps) -> Partners:
+    """Bonds or pairs; nothing where there are none."""
+    return step.partners or Partners(Gather((), ()), Gather((), ()))
+
+
+def _near(step: Sweeps) -> list[tuple[int, ...]]:
+    """The offsets of all neighbours."""
+    return sorted({offset for _, offset in step.sites.places.values() if any(offset)})
+
+
+def _bounds(step: Sweeps, program: Program) -> list[Symbol]:
+    """The weights that open ends ask for."""
+    every = (w for k in (*step.kernels, *_observed(program)) for w in k.inputs.get("present", ()))
+    return [w for w in dict.fromkeys(every) if isinstance(w, Symbol) and kind_of(w) == PRESENT]
+
+
+def _observed(program: Program) -> tuple[Kernel, ...]:
+    seen = program.observables
+    return seen.energy, seen.casimirs, seen.vector_field
+
+
+def _pairs(weight: Symbol) -> list[tuple[int, int]]:
+    bounds = [int(k) for k in weight.key]
+    return list(zip(bounds[::2], bounds[1::2], strict=True))
+
+
+def _contents(program: Program, step: Sweeps) -> list[str]:
+    sizes = ", ".join(f"N_{axis}" for axis in step.sites.axes)
+    given = ["x0: [...]", f"sizes: [{sizes}]", *(["bonds: [...]"] if _partners(step).graph else []), "params: { ... }"]
+    how = "stages, each solved by sweeps over the sites" if step.equation else "flows of parts of H"
+    return [
+        f"import {{ Solver, StepError }} from './{program.name}.mjs';",
+        f"const solver = new Solver({{ {', '.join(given)} }});",
+        "solver.integrate(h, steps); then solver.x, .field(name), .t, .hamiltonian(), .density(), .casimirs()",
+        "",
+        f"Contents: the system, with its kernels; the class Solver; the sites; the step, by {how}.",
+    ]
+
+
+def _listed(part: Sequence[Sweep]) -> str:
+    return f"[{', '.join(camel(sweep.kernel.name) for sweep in part)}]"
+
+
+class _Printed:
+    """Kernels of one program as functions."""
+
+    def __init__(self, program: Program, step: Sweeps) -> None:
+        self.program, self.step = program, step
+        self.graph = _partners(step).graph
+        self.names = {camel(kernel.name) for kernel in step.kernels}
+        self.near, self.weights = _near(step), _bounds(step, program)
+
+    def sweep(self, sweep: Sweep) -> str:
+        """A sweep: it changes x in place, since it reads elsewhere only what stands still."""
+        body = _Body(self, sweep.kernel, sweep.gather.names if sweep.gather else ())
+        stores = [(self._entry("x", sweep.moved[s.index]), body.show(s.value)) for s in body.code.stores]
+        if len(stores) > 1:
+            body.lines += [f"const change{k} = {value};" for k, (_, value) in enumerate(stores)]
+            stores = [(place, f"change{k}") for k, (place, _) in enumerate(stores)]
+        body.lines += [f"{place} += {value};" for place, value in stores]
+        by_colour = ["colour"] if self.step.by_colour else []
+        before = [f"{camel(e.kernel.name)}(coef, x, sites{', colour' * bool(by_colour)});" for e in _ends(sweep.gather)]
+        clear = ["sites.sums.fill(0);"] if before else []
+        loop = "for (let i = 0; i < count; i++) {"
+        if self.step.sites.colours > 1:
+            body.lines.insert(0, "const i = chosen[k];")
+            body.first.insert(0, f"const chosen = sites.coloured[{sweep.colour}];")
+            loop = "for (let k = 0; k < chosen.length; k++) {"
+        return self._function(sweep.kernel, ["coef", "x", "sites", *by_colour], [*clear, *before], body, [loop])
+
+    def of_equation(self, kernel: Kernel) -> str:
+        """A kernel of the equation of a stage, at the y that is its x."""
+        own = [name for name, array in (("start", "start"), ("v", "varied")) if array in kernel.inputs]
+        arguments = ["coef", *own[:1], "x", *own[1:]] if own[:1] == ["start"] else ["coef", "x", *own]
+        body = _Body(self, kernel, _partners(self.step).field.names)
+        body.lines += [f"{self._entry('out', s.index)} = {body.show(s.value)};" for s in body.code.stores]
+        before = self._forces("sites.params") if kernel.inputs["gathered"] else []
+        return self._function(kernel, [*arguments, "sites", "out"], before, body)
+
+    def seen(self, kernel: Kernel) -> str:
+        """A kernel that fills arrays over the sites."""
+        partners = _partners(self.step)
+        body = _Body(self, kernel, partners.field.names)
+        body.lines += [f"{self._entry('out', s.index)} = {body.show(s.value)};" for s in body.code.stores]
+        before: list[str] = []
+        if kernel.name == "vector_field" and partners.field.names:
+            before = self._forces("params")
+        if kernel.name == "energy" and partners.energy.names:
+            before = ["sites.sums.fill(0);"]
+            before += [f"{camel(e.kernel.name)}(params, x, sites);" for e in partners.energy.ends]
+            body.lines.append("out[i] += 0.5 * sites.sums[i];")
+        return self._function(kernel, ["params", "x", "sites", "out"], before, body)
+
+    def gathering(self, ends: Ends, first: str) -> str:
+        """What bonds or pairs add up at each site."""
+        body = _Body(self, ends.kernel, (), "sites.params" if first == "coef" else "params")
+        body.lines += [f"{self._entry('sums', s.index)} += {body.show(s.value)};" for s in body.code.stores]
+        by_colour = ["colour"] if first == "coef" and self.step.by_colour else []
+        body.first.append("const { sums } = sites;")
+        if self.graph:
+            chosen = json.dumps(ends.chosen) + (", colour" if ends.chosen else "")
+            body.first.append(f"const {{ here, there, bond }} = sites.bonds({json.dumps(ends.end)}, {chosen});")
+            body.lines[:0] = ["const i = here[k];", "const j = there[k];"]
+            loops = ["for (let k = 0; k < here.length; k++) {"]
+        else:
+            body.lines.insert(0, "if (j === i) continue;")
+            loops = ["for (let i = 0; i < count; i++) {", "  for (let j = 0; j < count; j++) {"]
+        return self._function(ends.kernel, [first, "x", "sites", *by_colour], [], body, loops)
+
+    def _forces(self, params: str) -> list[str]:
+        called = [f"{camel(e.kernel.name)}({params}, x, sites);" for e in _partners(self.step).field.ends]
+        return ["sites.sums.fill(0);", *called]
+
+    def _entry(self, array: str, field: int) -> str:
+        return f"{array}[{at_field('i', field)}]"
+
+    def _function(
+        self,
+        kernel: Kernel,
+        arguments: Sequence[str],
+        before: Sequence[str],
+        body: _Body,
+        loops: Sequence[str] = ("for (let i = 0; i < count; i++) {",),
+    ) -> str:
+        deep = "  " * len(loops)
+        lines = [*comment(kernel.purpose), f"function {camel(kernel.name)}({', '.join(arguments)}) {{"]
+        if not body.code.stores:
+            return "\n".join([lines[0], *lines[1:-1], lines[-1].removesuffix("{") + "{}"])
+        text = "\n".join([*loops, *body.lines])
+        declared = ["const { count } = sites;"] if re.search(r"\bcount\b", text) else []
+        for statement in (*before, *declared, *body.first):
+            lines += wrapped(statement, "  ")
+        lines += [f"  {loop}" for loop in loops]
+        for statement in body.lines:
+            lines += wrapped(statement, f"  {deep}")
+        lines += [f"  {'  ' * k}}}" for k in reversed(range(len(loops)))]
+        return "\n".join([*lines, "}"])
+
+
+def _ends(gather: Gather | None) -> tuple[Ends, ...]:
+    return gather.ends if gather else ()
+
+
+def at_field(site: str, field: int) -> str:
+    """The place of a field at a site in an array of all fields."""
+    return site if field == 0 else f"{site} + count" if field == 1 else f"{site} + {field} * count"
+
+
+class _Body:
+    """The statements of a kernel at a site i, and at another, j: those before the loop are ``first``."""
+
+    def __init__(self, printed: _Printed, kernel: Kernel, sums: Sequence[str] = (), params: str = "") -> None:
+        self.printed, self.code = printed, lower(kernel)
+        self.params = params or ("params" if "params" in kernel.inputs else "sites.params")
+        own = _OWN | printed.names | set(LANGUAGE.functions.values()) | {f"change{k}" for k in range(9)}
+        self.scope = Scope(LANGUAGE.reserved | own)
+        self.show = LANGUAGE.printer(self.scope)
+        self.first: list[str] = []
+        self.lines: list[str] = []
+        self._bound: dict[str, str] = {}
+        used = (s for symbols in kernel.inputs.values() for s in symbols if s in self.code.used)
+        for s in used:
+            if isinstance(s, Symbol):
+                self._bind(s, list(sums))
+            else:
+                self._read(s)
+        show = self.show
+        self.lines += [f"const {self.scope[a.target]} = {show(a.value)};" for a in self.code.assignments]
+
+    def _bind(self, s: Symbol, sums: Sequence[str]) -> None:
+        fields = self.printed.program.coordinates
+        if s.kind == COEFFICIENT:
+            self.first.append(f"const {self.scope[s]} = coef[{s.key[0]}];")
+        elif s.kind == GATHERED:
+            self.scope.bind(s, f"sites.sums[{at_field('i', sums.index(s))}]")
+        elif s.kind == CHOSEN:
+            self.scope.bind(s, "(sites.colours[i] === colour ? 1 : 0)")
+        elif s.kind == INITIAL:
+            self.scope.bind(s, f"start[{at_field('i', fields.index(str(s.key[0])))}]")
+        elif s.kind == VARIATION:
+            field, offset = self.printed.step.sites.places[str(s.key[0])]
+            self.scope.bind(s, f"v[{at_field(self._site(offset), fields.index(field))}]")
+        else:
+            number = self.printed.weights.index(s)
+            table = self._array(f"sites.present[{number}]", Symbol(PRESENT, number))
+            self.scope.bind(s, f"{table}[i]")
+
+    def _read(self, s: str) -> None:
+        sites = self.printed.step.sites
+        if s in sites.at_bonds:
+            self.lines.append(f"const {self.scope[s]} = {self._at(s)}[bond[k]];")
+        elif s in sites.ends:
+            base, end = sites.ends[s]
+            self.lines.append(f"const {self.scope[s]} = {self._value(base, 'i' if end == 'a' else 'j')};")
+        elif s in sites.places:
+            base, offset = sites.places[s]
+            self.lines.append(f"const {self.scope[s]} = {self._value(base, self._site(offset))};")
+        else:
+            self.first.append(f"const {self.scope[s]} = {self.params}.{s};")
+
+    def _value(self, base: str, site: str) -> str:
+        fields = self.printed.program.coordinates
+        if base in fields:
+            return f"x[{at_field(site, fields.index(base))}]"
+        return f"{self._at(base)}[{site}]"
+
+    def _at(self, parameter: str) -> str:
+        """The array of a parameter at sites or at bonds."""
+        return self._array(f"{self.params}.{parameter}", Symbol("at", parameter))
+
+    def _array(self, place: str, name: Symbol) -> str:
+        """The name of an array that is got before the loop."""
+        if place not in self._bound:
+            self._bound[place] = self.scope[name]
+            self.first.append(f"const {self._bound[place]} = {place};")
+        return self._bound[place]
+
+    def _site(self, offset: tuple[int, ...]) -> str:
+        """The neighbour of the site i."""
+        if not any(offset):
+            return "i"
+        number = self.printed.near.index(offset)
+        if f"j{number}" not in self._bound:
+            table = self._array(f"sites.near[{number}]", Symbol("near", number))
+            self._bound[f"j{number}"] = self.scope[Symbol("beside", number)]
+            self.lines.append(f"const {self._bound[f'j{number}']} = {table}[i];")
+        return self._bound[f"j{number}"]

@@ -1,0 +1,57 @@
+"""What printing JavaScript takes: the language, lines that are not too wide, comments."""
+
+from __future__ import annotations
+
+import re
+import textwrap
+from collections.abc import Sequence
+
+from phigen.spec.model import Parameter
+from phigen.symbolic.functions import FUNCTIONS, written_in
+from phigen.targets.header import plain
+from phigen.targets.language import Language
+from phigen.targets.reserved import JAVASCRIPT_RESERVED
+
+#: The widest line.
+WIDTH = 110
+
+LANGUAGE = Language(
+    reserved=JAVASCRIPT_RESERVED,
+    functions={name: name for name in FUNCTIONS} | written_in("js"),
+    constants={"pi": "Math.PI", "E": "Math.E"},
+    declare="const {name} = {value};",
+    assign="{place} = {value};",
+    subscript="{array}[{index}]",
+    parameter="params.{name}",
+    point="",
+)
+
+
+def wrapped(statement: str, indent: str = "  ") -> list[str]:
+    """A statement in lines that are not too wide; it has no strings, so any space will do."""
+    deeper = f"{indent}  " if not indent else f"{indent}    "
+    return textwrap.wrap(statement, WIDTH, initial_indent=indent, subsequent_indent=deeper, break_long_words=False)
+
+
+def camel(name: str) -> str:
+    """The name of a kernel as that of a function."""
+    return re.sub(r"_([a-z])", lambda found: found[1].upper(), name)
+
+
+def comment(text: str) -> list[str]:
+    """A sentence before a function."""
+    said = f"{text[:1].upper()}{text[1:]}."
+    if len(said) <= WIDTH - 8:
+        return [f"/** {plain(said)} */"]
+    return ["/**", *textwrap.wrap(plain(said), WIDTH, initial_indent=" * ", subsequent_indent=" * "), " */"]
+
+
+def properties(parameters: Sequence[Parameter]) -> list[str]:
+    """Parameters as a comment lists them."""
+    kinds = [("number" if p.at == "all" else "Float64Array", p) for p in parameters]
+    return [f" * @property {{{kind}}} {p.name} {plain(p.description)}".rstrip() for kind, p in kinds]
+
+
+def key(name: str) -> str:
+    """A parameter as a key of an object; this one would be taken for its prototype."""
+    return f'["{name}"]' if name == "__proto__" else name

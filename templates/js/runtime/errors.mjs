@@ -1,0 +1,31 @@
+// ---- Errors ----
+
+/** What statuses mean. */
+const STATUS = {
+  NO_CONVERGENCE: "no convergence: the step is too large",
+  SINGULAR: "singular Newton matrix: the step is too large",
+  NOT_FINITE: "not finite: overflow, or outside the domain",
+  BAD_ARGUMENT: "bad argument",
+};
+
+/** Why a step could not be made, or no solver; the state before it stands. */
+export class StepError extends Error {
+  /**
+   * @param {"NO_CONVERGENCE" | "SINGULAR" | "NOT_FINITE" | "BAD_ARGUMENT"} status
+   * @param {number} steps good steps until then
+   * @param {string} [detail]
+   */
+  constructor(status, steps, detail = "") {
+    super(`step ${steps}: ${STATUS[status]}${detail && `: ${detail}`}`);
+    this.name = "StepError";
+    this.status = status;
+    this.steps = steps;
+  }
+}
+
+/** Numbers as many as wanted, all finite; StepError otherwise. */
+export function finite(values, length, what) {
+  const copy = Float64Array.from(values ?? []);
+  if (copy.length === length && copy.every(Number.isFinite)) return copy;
+  throw new StepError("BAD_ARGUMENT", 0, `${what} must be ${length} finite numbers`);
+}

@@ -1,0 +1,175 @@
+import { StepError, finite } from "./errors.mjs";
+import { CASIMIRS, CASIMIR_KINDS, COORDINATES, DEFAULT_PARAMETERS, DIM, NAME, ORDER } from "./model.mjs";
+import { AXES, COEFFICIENTS, SPEC_SHA256, TIMES, VERSION } from "./model.mjs";
+import { casimirs, energy, prepare, vectorField } from "./model.mjs";
+// #if KICKS
+import { MULTIPLES } from "./model.mjs";
+// #endif
+import { Sites } from "./sites.mjs";
+import { makeStep } from "./flows.mjs";
+
+// ---- The solver ----
+
+/** The coefficients of all flows or stages of a step: a row for each time. */
+function prepareStep(params, h, rows) {
+  // #if KICKS
+  TIMES.forEach((time, k) => prepare(params, time * h, [MULTIPLES[k] * (h * h)], rows[k]));
+  // #else
+  TIMES.forEach((time, k) => prepare(params, time * h, rows[k]));
+  // #endif
+  return rows;
+}
+
+/** A lattice on its way, and what makes its steps. */
+export class Solver {
+  static NAME = NAME;
+  static VERSION = VERSION;
+  static SPEC_SHA256 = SPEC_SHA256;
+  static DIM = DIM;
+  static ORDER = ORDER;
+  static AXES = AXES;
+  static COORDINATES = COORDINATES;
+  static CASIMIRS = CASIMIRS;
+  static CASIMIR_KINDS = CASIMIR_KINDS;
+  static DEFAULT_PARAMETERS = DEFAULT_PARAMETERS;
+
+  /** The state, one field after the other, in each the sites, the last axis fastest; to be read only. */
+  x;
+  /** Time since the start. */
+  t = 0;
+  /** Good steps since the start. */
+  steps = 0;
+  /** The last step size. */
+  h = NaN;
+  /** Sizes, parameters, and which sites are neighbours. */
+  sites;
+  /** What depends on parameters and step size only, a row for each time. */
+  rows = TIMES.map(() => new Float64Array(COEFFICIENTS));
+  /** The state before a step. */
+  before;
+  /** What the steps of one size learn, for those after them. */
+  past = {};
+  /** Steps and time when h was set: time is counted from there, so that no error adds up. */
+  #stepsBefore = 0;
+  #timeBefore = 0;
+
+  /**
+   * Start at x0. Throws StepError for arguments that are not allowed.
+   *
+   * @param {object} options
+   * @param {ArrayLike<number>} options.x0 one field after the other, in the order of COORDINATES
+   * @param {number[]} [options.sizes] sites along each axis; with one axis those of x0 by default
+   * @param {object} [options.params] those at sites and at bonds are arrays, or one number for all
+   * #if GRAPH
+   * @param {ArrayLike<number>} options.bonds the ends of all bonds, counted from 0: a, b of the first, …
+   * #endif
+   */
+  constructor(options) {
+    const { x0 } = options;
+    const sizes = options.sizes ?? (AXES.length === 1 && x0 ? [x0.length / DIM] : []);
+    this.sites = new Sites(sizes, options);
+    this.x = finite(x0, DIM * this.sites.count, "x0");
+    this.before = Float64Array.from(this.x);
+    const rows = prepareStep(this.sites.params, 1e-100, this.rows);
+    if (!rows.every((row) => row.every(Number.isFinite))) {
+      throw new StepError("BAD_ARGUMENT", 0, "no step can be made with these parameters");
+    }
+  }
+
+  /** All parameters, those at sites and at bonds as arrays. */
+  get params() {
+    return this.sites.params;
+  }
+
+  /** Sites along each axis. */
+  get sizes() {
+    return this.sites.sizes;
+  }
+
+  /** The values of a field at all sites, as a part of x; to be read only. */
+  field(name) {
+    const k = COORDINATES.indexOf(name);
+    if (k < 0) throw new StepError("BAD_ARGUMENT", this.steps, `there is no field ${name}`);
+    return this.x.subarray(k * this.sites.count, (k + 1) * this.sites.count);
+  }
+
+  /** What depends on the step size; nothing where that is as before. */
+  #setStep(h) {
+    if (!Number.isFinite(h)) throw new StepError("BAD_ARGUMENT", this.steps, `the step is ${h}`);
+    if (Object.is(h, this.h)) return;
+    prepareStep(this.params, h, this.rows);
+    this.past = {};
+    this.h = h;
+    this.#timeBefore = this.t;
+    this.#stepsBefore = this.steps;
+  }
+
+  /**
+   * One step of size h, of either sign. Throws StepError; then the state is as before.
+   *
+   * @param {number} h
+   * @returns {this}
+   */
+  step(h) {
+    this.#setStep(h);
+    this.before.set(this.x);
+    const status = makeStep(this);
+    if (status !== "OK") {
+      this.x.set(this.before);
+      throw new StepError(status, this.steps);
+    }
+    this.steps++;
+    this.t = this.#timeBefore + (this.steps - this.#stepsBefore) * h;
+    return this;
+  }
+
+  /**
+   * Many steps. Throws StepError; then x is the last good state, and steps counts the good ones.
+   *
+   * @param {number} h
+   * @param {number} count
+   * @returns {this}
+   */
+  integrate(h, count) {
+    this.#setStep(h);
+    if (!(Number.isInteger(count) && count >= 0)) {
+      throw new StepError("BAD_ARGUMENT", this.steps, `the number of steps is ${count}`);
+    }
+    for (let k = 0; k < count; k++) this.step(h);
+    return this;
+  }
+
+  /** The density of the Hamiltonian at each site, of x or of another state. */
+  density(x = this.x) {
+    const out = new Float64Array(this.sites.count);
+    energy(this.params, x, this.sites, out);
+    return out;
+  }
+
+  /** The Hamiltonian, of x or of another state. */
+  hamiltonian(x = this.x) {
+    let sum = 0, rest = 0;
+    for (const value of this.density(x)) { // compensated, after A. Neumaier
+      const total = sum + value;
+      rest += Math.abs(sum) >= Math.abs(value) ? (sum - total) + value : (value - total) + sum;
+      sum = total;
+    }
+    return sum + rest;
+  }
+
+  /**
+   * The Casimirs at each site, one after the other in the order of CASIMIRS. CASIMIR_KINDS says what is
+   * constant: each value ("sites"), their sum, or their product.
+   */
+  casimirs(x = this.x) {
+    const out = new Float64Array(CASIMIRS.length * this.sites.count);
+    casimirs(this.params, x, this.sites, out);
+    return out;
+  }
+
+  /** The right-hand side pi(x) grad H(x), laid out as x, into an array if one is given. */
+  vectorField(x = this.x, out = new Float64Array(x.length)) {
+    vectorField(this.params, x, this.sites, out);
+    return out;
+  }
+}

@@ -1,0 +1,175 @@
+import { StepError, finite } from "./errors.mjs";
+import { AT_SITES, AXES, BOUNDS, DEFAULT_PARAMETERS, LEAST, NEAR } from "./model.mjs";
+import { OPEN, PERIODS, POSITIVE } from "./model.mjs";
+// #if COLOURS
+import { COLOURS, COLOUR_WEIGHTS } from "./model.mjs";
+// #endif
+// #if GATHER
+import { GATHERED } from "./model.mjs";
+// #endif
+// #if GRAPH
+import { AT_BONDS } from "./model.mjs";
+// #endif
+// #if SPLIT
+import { SCHEDULE } from "./model.mjs";
+// #endif
+// #if BY_COLOUR
+import { BY_COLOUR } from "./model.mjs";
+// #endif
+
+// ---- The sites ----
+
+/** The sites of a lattice: their parameters, and tables of those that kernels read beside a site. */
+export class Sites {
+  /** From the options of a solver, with the sizes; StepError for what is not allowed. */
+  constructor(sizes, options) {
+    const fits = (n, axis) => Number.isInteger(n) && n >= LEAST[axis] && n % PERIODS[axis] === 0;
+    if (sizes.length !== AXES.length || !sizes.every(fits)) {
+      const asked = AXES.map((axis, k) => `${axis} of ${LEAST[k]} or more, a multiple of ${PERIODS[k]}`);
+      throw new StepError("BAD_ARGUMENT", 0, `sizes [${sizes}]: needed is ${asked.join("; ")}`);
+    }
+    this.sizes = Object.freeze([...sizes]);
+    this.count = sizes.reduce((product, n) => product * n, 1);
+    // #if GRAPH
+    this.#connect(options.bonds ?? []);
+    // #endif
+    this.params = this.#admitted(options.params ?? {});
+    const every = (Kind, value) => Kind.from({ length: this.count }, (_, i) => value(i));
+    /** The neighbours of each site, and whether terms of H are there, for each kind of them. */
+    this.near = NEAR.map((offset) => every(Int32Array, (i) => this.#beside(i, offset)));
+    this.present = BOUNDS.map((bounds) => every(Float64Array, (i) => this.#holds(i, bounds)));
+    // #if COLOURS
+    const colours = every(Array, (i) => {
+      return this.#place(i).reduce((sum, at, axis) => sum + COLOUR_WEIGHTS[axis] * at, 0) % COLOURS;
+    });
+    /** The sites of each colour. */
+    this.coloured = Array.from({ length: COLOURS }, (_, colour) => {
+      return Int32Array.from(colours.flatMap((own, i) => (own === colour ? [i] : [])));
+    });
+    // #endif
+    // #if GATHER
+    /** What bonds or pairs add up at each site. */
+    this.sums = new Float64Array(GATHERED * this.count);
+    // #endif
+    // #if SPLIT
+    // #if BY_COLOUR
+    const flows = BY_COLOUR.flatMap((many, part) => {
+      return Array.from({ length: many ? this.colourCount : 1 }, (_, colour) => [part, colour]);
+    });
+    const kinds = [flows.slice(0, 1), flows.slice(1, -1), flows.slice(-1), flows.slice(1, -1).reverse()];
+    /** The flows of a step: a part of H, a row of coefficients, a colour. */
+    this.flows = SCHEDULE.flatMap(([kind, row]) => kinds[kind].map(([part, colour]) => [part, row, colour]));
+    // #else
+    /** The flows of a step: a part of H, a row of coefficients. */
+    this.flows = SCHEDULE;
+    // #endif
+    // #endif
+  }
+
+  /**
+   * All parameters: those given, and defaults. StepError unless they are known and finite, and positive
+   * where they have to be.
+   */
+  #admitted(given) {
+    const unknown = Object.keys(given).filter((name) => !Object.hasOwn(DEFAULT_PARAMETERS, name));
+    if (unknown.length) throw new StepError("BAD_ARGUMENT", 0, `there is no parameter ${unknown[0]}`);
+    const params = Object.create(null);
+    for (const [name, value] of Object.entries({ ...DEFAULT_PARAMETERS, ...given })) {
+      let length = AT_SITES.includes(name) ? this.count : 0;
+      // #if GRAPH
+      if (AT_BONDS.includes(name)) length = this.bondCount;
+      // #endif
+      const values = typeof value === "object" && length ? finite(value, length, name) : [value];
+      if (!values.every((v) => Number.isFinite(v) && (v > 0 || !POSITIVE.includes(name)))) {
+        throw new StepError("BAD_ARGUMENT", 0, `the parameter ${name} is ${value}`);
+      }
+      const whole = () => (values.length === length ? values : new Float64Array(length).fill(value));
+      params[name] = length ? whole() : value;
+    }
+    return Object.freeze(params);
+  }
+
+  /** Where a site is along each axis. */
+  #place(site) {
+    const place = [];
+    for (let axis = AXES.length - 1; axis >= 0; axis--) {
+      place.unshift(site % this.sizes[axis]);
+      site = Math.floor(site / this.sizes[axis]);
+    }
+    return place;
+  }
+
+  /** The site that lies so far away; beyond open ends another, where kernels take it times 0. */
+  #beside(site, offset) {
+    return this.#place(site).reduce((sum, from, axis) => {
+      const size = this.sizes[axis];
+      const to = from + offset[axis];
+      if (!OPEN[axis]) return sum * size + ((to % size) + size) % size;
+      const mirrored = Math.abs(to) > size - 1 ? 2 * (size - 1) - Math.abs(to) : Math.abs(to);
+      return sum * size + Math.min(size - 1, Math.max(0, mirrored));
+    }, 0);
+  }
+
+  /** 1 where all from low to high is on the lattice, along each axis that is open, else 0. */
+  #holds(site, bounds) {
+    const place = this.#place(site);
+    const inside = ([low, high], axis) => place[axis] + low >= 0 && place[axis] + high < this.sizes[axis];
+    return bounds.every(inside) ? 1 : 0;
+  }
+  // #if GRAPH
+
+  /** The bonds, from a site a to a site b each. */
+  #connect(bonds) {
+    const known = bonds.length % 2 === 0 && Array.from(bonds).every((end, k) => {
+      return Number.isInteger(end) && end >= 0 && end < this.count && end !== bonds[k ^ 1];
+    });
+    if (!known) throw new StepError("BAD_ARGUMENT", 0, "bonds are pairs of different sites, counted from 0");
+    this.bondCount = bonds.length / 2;
+    const ends = (side) => Int32Array.from({ length: this.bondCount }, (_, k) => bonds[2 * k + side]);
+    this.ends = { a: ends(0), b: ends(1) };
+    this.listed = {};
+    // #if BY_COLOUR
+    const before = Array.from({ length: this.count }, () => []);
+    this.ends.a.forEach((a, k) => before[Math.max(a, this.ends.b[k])].push(Math.min(a, this.ends.b[k])));
+    /** The colour of each site: the first that no neighbour before it has. */
+    this.colours = new Int32Array(this.count);
+    before.forEach((others, site) => {
+      const taken = new Set(others.map((other) => this.colours[other]));
+      while (taken.has(this.colours[site])) this.colours[site]++;
+    });
+    this.colourCount = Math.max(2, 1 + Math.max(...this.colours));
+    // #endif
+  }
+
+  /**
+   * The bonds of all sites that are their end a, or b, or either: the site here, that there, the number of
+   * the bond. Of a colour only those whose site is of it, here or there, as `chosen` says.
+   */
+  bonds(end, chosen, colour) {
+    const key = `${end} ${chosen} ${chosen && colour}`;
+    if (this.listed[key]) return this.listed[key];
+    const found = { here: [], there: [], bond: [] };
+    for (const side of end || "ab") {
+      const [here, there] = [this.ends[side], this.ends[side === "a" ? "b" : "a"]];
+      here.forEach((site, k) => {
+        // #if BY_COLOUR
+        if (chosen && this.colours[{ here: site, there: there[k] }[chosen]] !== colour) return;
+        // #endif
+        found.here.push(site);
+        found.there.push(there[k]);
+        found.bond.push(k);
+      });
+    }
+    const typed = Object.entries(found).map(([name, list]) => [name, Int32Array.from(list)]);
+    this.listed[key] = Object.fromEntries(typed);
+    return this.listed[key];
+  }
+  // #endif
+}
+
+/** Whether all of these are finite. */
+export function allFinite(values) {
+  let zero = 0;
+  for (let k = 0; k < values.length; k++) zero += 0 * values[k];
+  return zero === 0;
+}

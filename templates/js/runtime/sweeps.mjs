@@ -1,0 +1,107 @@
+import { DIM, MOST_SWEEPS, SCHEDULE, increment, relax } from "./model.mjs";
+import { allFinite } from "./sites.mjs";
+// #if STIFF
+import { byNewton } from "./krylov.mjs";
+// #endif
+
+// ---- The step of the series: stages, of which each solves an equation on the whole lattice ----
+
+/** Values that guesses are extrapolated from; a change by this part of y may be rounding. */
+const DIFFERENCES = 4;
+const ROUNDING = 2 ** -40;
+// #if STIFF
+/** After so many sweeps, changes that still shrink by less than this factor are left to Newton's method. */
+const PATIENCE = 10;
+const SLOW = 0.6;
+// #endif
+
+/** The largest magnitude among some values. */
+function most(values, from, to) {
+  let largest = 0;
+  for (let k = from; k < to; k++) {
+    const size = Math.abs(values[k]);
+    if (!(size <= largest)) largest = size;
+  }
+  return largest;
+}
+
+/** How large a change of y is, field by field. */
+export function sizeOf(change, y) {
+  const count = y.length / DIM;
+  const whole = most(y, 0, y.length);
+  let largest = 0;
+  for (let k = 0; k < DIM; k++) {
+    const own = most(y, k * count, (k + 1) * count) + 1e-3 * whole + 1e-300;
+    const size = most(change, k * count, (k + 1) * count) / own;
+    if (!(size <= largest)) largest = size;
+  }
+  return largest;
+}
+
+/** Whether further sweeps would change y by less than rounding does, or their changes shrink no more. */
+export function solved(change, before, first) {
+  if (change * change <= (before - change) * 2 ** -55) return true;
+  return change >= before && change <= ROUNDING && !first;
+}
+
+/** y at the middle of a stage, by sweeps from a guess; null where they fail. */
+function bySweeps(coef, x, guess, sites) {
+  let y = guess;
+  let before = 0;
+  for (let sweeps = 1; sweeps <= MOST_SWEEPS; sweeps++) {
+    const next = new Float64Array(y.length);
+    relax(coef, x, y, sites, next);
+    if (!allFinite(next)) return null;
+    const change = sizeOf(next.map((v, k) => v - y[k]), next);
+    y = next;
+    if (solved(change, before, sweeps === 1)) return y;
+    // #if STIFF
+    if (sweeps > PATIENCE && change > Math.max(SLOW * before, 2 ** -30)) return null;
+    // #endif
+    before = change;
+  }
+  return null;
+}
+
+/** Add a value to a list of backward differences; the order of the guess that would have been best. */
+function remember(differences, value) {
+  let order = 1;
+  let least = Infinity;
+  let following = value;
+  for (let k = 0; k < Math.min(differences.length, DIFFERENCES); k++) {
+    const last = differences[k];
+    differences[k] = following;
+    following = following.map((v, i) => v - last[i]);
+    const size = most(following, 0, following.length);
+    if (size < least) [order, least] = [k + 1, size];
+  }
+  if (differences.length < DIFFERENCES) differences.push(following);
+  return order;
+}
+
+/** One step: a status. If it fails, the state is of no use. */
+export function makeStep(solver) {
+  const { x, rows, sites, past } = solver;
+  past.stages ??= SCHEDULE.map(() => ({ order: 0, differences: [] }));
+  const change = new Float64Array(x.length);
+  for (const [stage, [, row]] of SCHEDULE.entries()) {
+    const [coef, own] = [rows[row], past.stages[stage]];
+    const guess = Float64Array.from(x);
+    for (const difference of own.differences.slice(0, own.order)) {
+      for (let k = 0; k < guess.length; k++) guess[k] += difference[k];
+    }
+    let y = past.stiff ? null : bySweeps(coef, x, guess, sites);
+    // #if STIFF
+    if (y === null) { // from here on it is Newton's
+      past.stiff = true;
+      y = byNewton(coef, x, guess, sites);
+    }
+    // #endif
+    if (y === null) return "NO_CONVERGENCE";
+    own.order = remember(own.differences, y.map((v, k) => v - x[k]));
+    increment(coef, y, sites, change);
+    for (let k = 0; k < x.length; k++) x[k] += change[k];
+    if (!allFinite(x)) return "NOT_FINITE";
+  }
+  return "OK";
+}

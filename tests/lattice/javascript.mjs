@@ -1,0 +1,37 @@
+// What solvers of lattices say: reads jobs from the file named first, writes one answer for each to stdout, as JSON.
+
+import { readFileSync } from "node:fs";
+
+function attempted(work) {
+  try {
+    return { value: work() };
+  } catch (error) {
+    return { status: error.status ?? "none", steps: error.steps, name: error.name, message: error.message };
+  }
+}
+
+async function answer({ module, options, h, steps }) {
+  const { Solver } = await import(module);
+  const made = attempted(() => new Solver(options));
+  if (!made.value) return made;
+  const solver = made.value;
+  const done = attempted(() => solver.integrate(h, steps).steps);
+  const { NAME, AXES, COORDINATES, CASIMIRS, CASIMIR_KINDS, DEFAULT_PARAMETERS } = Solver;
+  const seen = { energy: solver.hamiltonian(), density: [...solver.density()], casimirs: [...solver.casimirs()] };
+  Object.assign(seen, { t: solver.t, field: [...solver.vectorField()], first: [...solver.field(COORDINATES[0])] });
+  const x = [...solver.x];
+  const failure = attempted(() => solver.step(1e300));
+  return {
+    ...seen,
+    done,
+    x,
+    stiff: Boolean(solver.past.stiff),
+    failure,
+    kept: solver.x.every((v, k) => Object.is(v, x[k])),
+    facts: { NAME, AXES, COORDINATES, CASIMIRS, CASIMIR_KINDS, DEFAULT_PARAMETERS },
+  };
+}
+
+const answers = [];
+for (const job of JSON.parse(readFileSync(process.argv[2], "utf8"))) answers.push(await answer(job));
+process.stdout.write(JSON.stringify(answers, (_, value) => (Number.isNaN(value) ? "NaN" : value)));

@@ -1,0 +1,165 @@
+"""Lattices in JavaScript, run by Node: equal to NumPy to round-off, on the whole corpus; and what is refused."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+from collections.abc import Callable
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from lattice.lattices import LATTICES
+from tools import tool
+
+from phigen import resources
+from phigen import spec as specs
+from phigen.compilation import Compilation
+from phigen.compiler import compile_spec, emit
+from phigen.lattice.states import start_of
+from phigen.runtime.modules import load_module
+from phigen.spec.model import Spec
+
+CORPUS = {f.stem: f for f in sorted((resources.bundled_specs() / "lattices").glob("*.yaml"))}
+
+STIFF = """\
+phigen: 1
+name: stiff
+lattice: {axes: [i, j], boundary: [open, periodic]}
+coordinates: [q, p]
+poisson: {canonical: {q: [q], p: [p]}}
+scheme: series
+order: 4
+hamiltonian: p**2/2 + 200*((q[i+1]-q)**2 + (q[j+1]-q)**2) + q**4/4
+runs: {r: {sizes: [3, 4], initial: {random: normal, seed: 3, scale: 0.1}, step: 0.2, steps: 8}}
+"""
+#: Names that JavaScript, or the printed loops, have for themselves.
+NAMES = """\
+phigen: 1
+name: names
+lattice: {axes: [i, j], boundary: periodic}
+coordinates: [near_0, count]
+parameters: {delete: 1.5, sites: {value: i - j, at: sites}, sweep1: 0.3, coef: 1}
+poisson: {canonical: {q: [near_0], p: [count]}}
+hamiltonian: delete*count**2/2 + sites*cos(near_0[i+1] - near_0[j-1]) + sweep1*near_0**4 + coef*near_0
+runs: {r: {sizes: [3, 3], initial: {random: normal, seed: 3}, step: 0.1, steps: 8}}
+"""
+#: What the corpus does not have: open ends, other schemes and orders, kicks with a modified potential, stiff steps.
+VARIANTS: dict[str, Callable[[], Spec]] = {
+    **{name: lambda text=text: specs.loads(text) for name, text in LATTICES.items()},  # type: ignore[misc]
+    "stiff": lambda: specs.loads(STIFF),
+    "names": lambda: specs.loads(NAMES),
+    "spins by the series": lambda: replace(specs.loads(LATTICES["spins_2"]), scheme="series"),
+    "a graph by the series": lambda: replace(specs.loads(LATTICES["spin_graph"]), scheme="series"),
+    "kicks": lambda: replace(specs.loads(LATTICES["fput_open"]), composition="force-gradient"),
+    "colours": lambda: replace(specs.loads(LATTICES["volterra"].replace("[5]", "[6]")), order=6),
+}
+CASES = [*CORPUS, *VARIANTS]
+STEPS = 8
+
+
+@cache
+def compiled(case: str) -> Compilation:
+    return compile_spec(specs.load(CORPUS[case]) if case in CORPUS else VARIANTS[case]())
+
+
+def job(folder: Path, case: str, **more: Any) -> dict[str, Any]:
+    """The first run of a case, in JavaScript."""
+    compilation = compiled(case)
+    run = next(iter(compilation.spec.runs.values()))
+    start = start_of(compilation.spec, run)
+    (text,) = emit(compilation.program, "js", "phigen").values()
+    path = folder / f"{case.replace(' ', '_')}.mjs"
+    path.write_text(text, encoding="utf-8")
+    params = {name: np.ravel(v).tolist() if np.ndim(v) else v for name, v in start.parameters.items()}
+    options = {"x0": start.state.ravel().tolist(), "sizes": start.sizes, "params": params}
+    options |= {"bonds": start.bonds.ravel().tolist()} if start.graph else {}
+    return {"module": path.as_uri(), "options": {**options, **more}, "h": float(run.step), "steps": STEPS}
+
+
+def node(folder: Path, jobs: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """The answers of one process."""
+    (folder / "jobs.json").write_text(json.dumps(jobs), encoding="utf-8")
+    command = [tool("node"), str(Path(__file__).with_name("javascript.mjs")), str(folder / "jobs.json")]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=300, check=False)
+    assert done.returncode == 0, done.stderr
+    return list(json.loads(done.stdout))
+
+
+@pytest.fixture(scope="module")
+def answers(tmp_path_factory: pytest.TempPathFactory) -> dict[str, dict[str, Any]]:
+    folder = tmp_path_factory.mktemp("javascript")
+    return dict(zip(CASES, node(folder, [job(folder, case) for case in CASES]), strict=True))
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_steps_and_what_is_seen_are_those_of_numpy_to_roundoff(case: str, answers: dict[str, dict[str, Any]]) -> None:
+    compilation, found = compiled(case), answers[case]
+    name = compilation.program.name
+    run = next(iter(compilation.spec.runs.values()))
+    start = start_of(compilation.spec, run)
+    module = load_module(emit(compilation.program, "numpy", "phigen")[f"{name}.py"], name)
+    x = module.integrate(start.state, float(run.step), STEPS, stride=STEPS, **start.arguments)[-1]
+    size = np.abs(x).max()
+
+    def agrees(mine: list[float], theirs: np.ndarray, part: float = 1e-13) -> None:
+        np.testing.assert_allclose(np.reshape(mine, theirs.shape), theirs, rtol=part, atol=part * np.abs(theirs).max())
+
+    assert found["done"] == {"value": STEPS}
+    assert found["t"] == pytest.approx(STEPS * float(run.step), rel=1e-14)
+    np.testing.assert_allclose(np.reshape(found["x"], x.shape), x, rtol=0, atol=1e-13 * size)
+    assert found["energy"] == pytest.approx(module.hamiltonian(x, **start.arguments), rel=1e-12)
+    agrees(found["density"], module.density(x, **start.arguments), 1e-11)
+    agrees(found["field"], module.vector_field(x, **start.arguments), 1e-11)
+    if compilation.program.casimirs:
+        agrees(found["casimirs"], module.casimirs(x, **start.arguments))
+    assert found["first"] == found["x"][: len(found["first"])]
+
+
+def test_sweeps_of_every_kind_are_among_them(answers: dict[str, dict[str, Any]]) -> None:
+    steps = [compiled(case).program.step for case in CASES]
+    assert {s.equation is not None for s in steps} == {True, False}  # type: ignore[union-attr]
+    assert {s.sites.colours for s in steps} == {1, 2}  # type: ignore[union-attr]
+    assert any(s.by_colour for s in steps)  # type: ignore[union-attr]
+    assert any(s.schedule.multiples for s in steps)  # type: ignore[union-attr]
+    assert {"stiff": True, "point_vortices": False}.items() <= {c: answers[c]["stiff"] for c in CASES}.items()
+
+
+@pytest.mark.parametrize("case", ["toda", "kdv", "stiff", "food_web"])
+def test_a_step_that_cannot_be_made_leaves_the_state(case: str, answers: dict[str, dict[str, Any]]) -> None:
+    failure = answers[case]["failure"]
+    assert failure["name"] == "StepError"
+    assert failure["status"] in ("NOT_FINITE", "NO_CONVERGENCE")
+    assert failure["steps"] == STEPS
+    assert answers[case]["kept"]
+
+
+REFUSED = {
+    "sizes": ("volterra", {"sizes": [5]}, "i of 2 or more, a multiple of 2"),
+    "small": ("heisenberg", {"sizes": [1, 2, 2]}, "i of 2 or more"),
+    "dimension": ("heisenberg", {"sizes": [4]}, "sizes [4]"),
+    "state": ("toda", {"x0": [1, 2, 3]}, "x0 must be 128 finite numbers"),
+    "not finite": ("toda", {"sizes": [2], "x0": ["NaN", 1, 1, 1]}, "x0 must be 4 finite numbers"),
+    "unknown": ("dnls", {"params": {"gamma": 1}}, "there is no parameter gamma"),
+    "positive": ("kdv", {"params": {"d": 0}}, "the parameter d is 0"),
+    "one site": ("food_web", {"params": {"k": [1, 1, 1, 0, 1, 1, 1, 1, 1, 1]}}, "the parameter k is"),
+    "bonds": ("food_web", {"bonds": [0, 10]}, "bonds are pairs of different sites"),
+    "itself": ("food_web", {"bonds": [1, 1]}, "bonds are pairs of different sites"),
+    "strengths": ("food_web", {"bonds": [0, 1, 1, 2]}, "A must be 2 finite numbers"),
+}
+
+
+@pytest.fixture(scope="module")
+def refusals(tmp_path_factory: pytest.TempPathFactory) -> dict[str, dict[str, Any]]:
+    folder = tmp_path_factory.mktemp("refused")
+    listed = [job(folder, case, **more) for case, more, _ in REFUSED.values()]
+    return dict(zip(REFUSED, node(folder, listed), strict=True))
+
+
+@pytest.mark.parametrize("what", REFUSED)
+def test_what_is_not_allowed_is_told(what: str, refusals: dict[str, dict[str, Any]]) -> None:
+    assert refusals[what]["status"] == "BAD_ARGUMENT"
+    assert REFUSED[what][2] in refusals[what]["message"]
