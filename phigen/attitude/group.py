@@ -75,10 +75,7 @@ class Group:
 
 def group_of(system: System, wanted: str, kind: str) -> Group:
     """The group of a Lie–Poisson π; ``kind`` is that of the bi-realisation. Raises `SpecError` where there is none."""
-    algebra, spec = system.lie_algebra, system.spec
-    if system.forces or (spec is not None and spec.monitor is not None):
-        what = "forces, which change the momentum in the other frame" if system.forces else "a monitor"
-        raise refused(system, f"reconstruct is not offered with {what}")
+    algebra = system.lie_algebra
     if algebra is None:
         hint = "attitudes belong to Lie–Poisson structures, as those of rigid bodies and tops"
         raise refused(system, f"reconstruct: {wanted} needs a linear π, the dual of a Lie algebra; this π is "

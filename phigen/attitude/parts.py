@@ -3,13 +3,14 @@
 A part is written as c C + Q + R with a Casimir C, Q = ½c′|m|² for the angular momentum m, and R, such that the
 gradients of Q and of R are constant along the flows of both. Then the flow of the part is, in the group,
 exp(t∇Q) exp(t∇R) and what C turns: x does not feel that, and over a step all its times add up to h, so it is put back
-once for all.
+once for all. Where that would be no uniform motion, with forces, a monitor, the time in H, and for noise, C has an
+element in each flow, as Q and R have.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from phigen.attitude.elements import dot, product, rotated, rotation_by
 from phigen.attitude.group import Group, refused
@@ -23,30 +24,38 @@ from phigen.symbolic.verdict import PROVED, Statement, decide_zero
 
 @dataclass(frozen=True)
 class Turning:
-    """A part as ``casimir`` + ``round`` + ``rest``; the first and the second may be 0."""
+    """A part as ``casimir`` + ``round`` + ``rest``; the first two may be 0. ``put_back`` says whether the first is."""
 
     casimir: Expression
     round: Expression
     rest: Expression
+    put_back: bool = True
 
     @property
     def factors(self) -> list[Expression]:
         """What has an element of its own."""
-        return [e for e in (self.round, self.rest) if not e.is_zero]
+        own = (self.round, self.rest) if self.put_back else (self.casimir, self.round, self.rest)
+        return [e for e in own if not e.is_zero]
+
+    @property
+    def left(self) -> Expression:
+        """What has none."""
+        return self.casimir if self.put_back else ZERO
 
 
-def turnings(system: System, group: Group, flows: Sequence[Flow]) -> list[Turning]:
+def turnings(system: System, group: Group, flows: Sequence[Flow], *, put_back: bool) -> list[Turning]:
     """Each part in this form. Raises `SpecError` that names the first that has none."""
-    return [_turning(system, group, flow, k) for k, flow in enumerate(flows, 1)]
+    return [turning_of(system, group, f.hamiltonian, f"H_{k}", put_back=put_back) for k, f in enumerate(flows, 1)]
 
 
-def _turning(system: System, group: Group, flow: Flow, k: int) -> Turning:
-    for candidate in _candidates(system, group, flow.hamiltonian):
+def turning_of(system: System, group: Group, h: Expression, name: str, *, put_back: bool) -> Turning:
+    """A function in this form. Raises `SpecError` that names it if there is none."""
+    for candidate in _candidates(system, group, h):
         if constancy(system, candidate, "").verdict == PROVED:
-            return candidate
+            return replace(candidate, put_back=put_back)
     raise refused(
         system,
-        f"reconstruct: the part H_{k} = {shortened(flow.hamiltonian)} of the splitting turns about an axis that moves "
+        f"reconstruct: the part {name} = {shortened(h)} of the splitting turns about an axis that moves "
         "along its own flow, and phigen does not know by what element",
         "scheme: series takes every H",
     )
@@ -86,9 +95,11 @@ def constancy(system: System, turning: Turning, name: str) -> Statement:
     return decide_zero(name, residuals, system.positive)
 
 
-def factor_elements(system: System, group: Group, turning: Turning) -> list[list[Expression]]:
-    """The elements of the factors for the time of the flow, at the state before it; generators for matrices."""
-    t, found = symbol(TIME), []
+def factor_elements(
+    system: System, group: Group, turning: Turning, t: Expression | None = None
+) -> list[list[Expression]]:
+    """The elements of the factors for the time ``t``, at the state before the flow; generators for matrices."""
+    t, found = t or symbol(TIME), []
     for factor in turning.factors:
         p = [t * slope for slope in gradient(factor, system.coordinates)]
         if group.matrices:

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from fractions import Fraction
-from itertools import combinations
+from itertools import combinations, islice
 
 from phigen.attitude.elements import cross, direction, dot, element, product, rotated, with_phi
 from phigen.attitude.group import Group
@@ -20,11 +20,12 @@ from phigen.geometry.lie_algebra import LieAlgebra, Representation
 from phigen.geometry.system import System, hamiltonian_vector_field
 from phigen.realisations.cayley import trilinear
 from phigen.realisations.protocol import BiRealisation, covector_names, covector_symbols
+from phigen.scheme.attitude import uniform
 from phigen.scheme.program import Attitude
 from phigen.splitting.ring import KICK
 from phigen.symbolic.expression import ONE, ZERO, Expression, fold, gradient, number, rebuild, substitute, symbol, total
 from phigen.symbolic.special import SPECIAL
-from phigen.symbolic.symbols import Symbol
+from phigen.symbolic.symbols import LEVEL, Symbol
 from phigen.symbolic.verdict import Statement, decide_zero
 
 Vector = Sequence[Expression]
@@ -39,32 +40,44 @@ def check(compilation: Compilation) -> Iterator[Statement]:
     if attitude is None:
         return
     group = attitude.group
+    # A covector is in the p that moves x, and not in that of the element.
+    pushed = system.forces is not None and any(not z.is_zero for z in system.forces.covector)
     if compilation.splitting:
         yield from _splitting_statements(compilation, group)
     elif group.matrices:
         yield from _matrix_statements(system, compilation.chart, attitude)
     elif compilation.chart.path:
-        yield path_statement(system, group)
+        if not pushed:
+            yield path_statement(system, group)
     else:
         chart, p = compilation.chart, covector_symbols(system.coordinates)
         made = element([p[i] for i in group.rotation], [p[i] for i in group.translation], cayley=attitude.cayley)
-        yield from element_statements(
+        stated = element_statements(
             group, made, p, chart.alpha, chart.beta, cayley=attitude.cayley, positive=system.positive
         )
+        yield from islice(stated, 1 if pushed else None)
     if not compilation.splitting:
         first = compilation.series.polynomial(1)
-        yield rate_statement(system, attitude, gradient(first.tower.expression(first.terms[0]), system.coordinates))
+        slope = gradient(first.tower.expression(first.terms[0]), system.coordinates)
+        yield rate_statement(system, attitude, slope, compilation.monitor)
 
 
-def rate_statement(system: System, attitude: Attitude, slope: Vector) -> Statement:
-    """∇S_1, ``slope``, and what is put back for Casimirs, are ∇H together: in the components that turn."""
-    group, wanted = attitude.group, gradient(system.hamiltonian, system.coordinates)
+def rate_statement(system: System, attitude: Attitude, slope: Vector, monitor: Expression | None = None) -> Statement:
+    """∇S_1, ``slope``, and what is put back for Casimirs, are ∇H together: in the components that turn.
+
+    With a ``monitor`` g they are g∇H where K = 0.
+    """
+    group, wanted = attitude.group, list(gradient(system.hamiltonian, system.coordinates))
+    if monitor:
+        wanted = [monitor * w for w in wanted]
+        slope = substitute(list(slope), {LEVEL: -system.hamiltonian})
     whole = [w - s for w, s in zip(wanted, slope, strict=True)]
     shown = group.generator(whole) if group.matrices else [whole[i] for i in (*group.rotation, *group.translation)]
     put_back = attitude.rate.roots if attitude.rate else [ZERO] * len(shown)
     where = "∇S_1" + " + ∇(λC)" * bool(attitude.rate)
     residuals = [("", a - b) for a, b in zip(shown, put_back, strict=True)]
-    return decide_zero(f"ġ is that of H: {where} = ∇H", residuals, system.positive, "the attitude has the order of x")
+    named = f"ġ is that of H: {where} = " + ("g∇H where K = 0" if monitor else "∇H")
+    return decide_zero(named, residuals, system.positive, "the attitude has the order of x")
 
 
 def path_statement(system: System, group: Group) -> Statement:
@@ -88,10 +101,10 @@ def _splitting_statements(compilation: Compilation, group: Group) -> Iterator[St
     """Of each part, that its gradient is constant along its flow; that all of them together with Casimirs are H."""
     system, splitting = compilation.system, compilation.splitting
     assert splitting is not None
-    turned = turnings(compilation.discretised, group, splitting.flows)
+    turned = turnings(compilation.discretised, group, splitting.flows, put_back=uniform(system))
     order = "exp(t∇H_{k}) g₀" if group.spatial else "g₀ exp(t∇H_{k})"
     for k, (turning, flow) in enumerate(zip(turned, splitting.flows, strict=True), 1):
-        parts = [e for e in (turning.casimir, *turning.factors) if not e.is_zero]
+        parts = [e for e in (turning.left, *turning.factors) if not e.is_zero]
         name = f"∇H_{k} is constant along the flow of H_{k}, hence g₁ = {order.format(k=k)}"
         if len(parts) > 1:
             name = (
@@ -101,14 +114,14 @@ def _splitting_statements(compilation: Compilation, group: Group) -> Iterator[St
         stated = constancy(system, turning, name)
         whole = decide_zero(name, residuals, system.positive)
         yield stated if whole.holds else whole
-        if turning.casimir.is_zero and not group.matrices and len(turning.factors) == 1:
+        if turning.left.is_zero and not group.matrices and len(turning.factors) == 1:
             made = joined(group, factor_elements(system, group, turning))
             start = [symbol(c) for c in system.coordinates]
             end = [a + b for a, b in zip(start, flow.increment, strict=True)]
             name = f"Ad*_g₁ x₁ = Ad*_g₀ x₀ for the flow of H_{k}"
             listed = _residuals(group, [ONE + made[0], *made[1:4]], made[4:], start, end)
             yield decide_zero(name, listed, system.positive, "any g₀")
-    put_back = [turning.casimir for turning in turned if not turning.casimir.is_zero]
+    put_back = [turning.left for turning in turned if not turning.left.is_zero]
     attitude = compilation.program.attitude
     assert attitude is not None
     plain = substitute([f.hamiltonian for f in splitting.flows], {KICK: ZERO})

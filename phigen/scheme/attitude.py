@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 from phigen.attitude.elements import element
 from phigen.attitude.group import Group, refused
-from phigen.attitude.parts import factor_elements, joined, turnings
+from phigen.attitude.parts import factor_elements, joined, turning_of, turnings
 from phigen.geometry.system import System
 from phigen.realisations.protocol import BiRealisation
 from phigen.scheme.gauge import Gauge
 from phigen.scheme.generating import GeneratingFunction
 from phigen.scheme.kernel import Kernel, Output
+from phigen.scheme.noise import driving_times
 from phigen.scheme.program import Attitude
 from phigen.scheme.staging import Coefficients
 from phigen.splitting.flow import Flow
+from phigen.splitting.ring import TIME
 from phigen.symbolic.expression import ZERO, Expression, gradient, symbol, total
 
 #: Bi-realisations whose group element is known: the exponential, and the Cayley transform.
@@ -33,12 +35,12 @@ def stage_attitude(
 ) -> Attitude:
     """The attitude of an implicit step; the coefficients of ``generating`` grow by what it needs."""
     coefficients, cayley = generating.coefficients, realisation.kind == "cayley"
-    p = list(generating.slope)
+    p, slope = list(generating.turning), "grad S_h(y), without the forces," if generating.free else "p = grad S_h(y)"
     values = coefficients.hoist(group.generator(p) if group.matrices else _element(group, p, cayley))
-    about = "the matrix of p = grad S_h(y)" if group.matrices else "what p = grad S_h(y) turns by, a quaternion less 1"
+    about = f"the matrix of {slope}" if group.matrices else f"what {slope} turns by, a quaternion less 1"
     about += ", and what it translates by" * bool(group.translation)
     turn = _kernel("turn", about, coefficients, system, values)
-    along = _along(group, system) if realisation.path else None
+    along = _along(group, system) if realisation.path and not generating.free else None
     return Attitude(group, cayley, turn, along, rate=rate_kernel(system, group, gauge))
 
 
@@ -59,30 +61,52 @@ def _element(group: Group, p: list[Expression], cayley: bool) -> tuple[Expressio
 
 
 def flow_attitude(
-    system: System, group: Group, flows: Sequence[Flow], gauge: Gauge, coefficients: Coefficients
+    system: System,
+    group: Group,
+    flows: Sequence[Flow],
+    gauge: Gauge,
+    coefficients: Coefficients,
+    time_of: Callable[[Flow], Expression] | None = None,
 ) -> Attitude:
-    """The attitude of a splitting; the coefficients grow by what it needs. `SpecError` as `turnings`."""
-    if system.time:
-        message = "reconstruct: splittings of a Hamiltonian that depends on the time have no attitude yet"
-        raise refused(system, message, "scheme: series has one")
-    turned = turnings(system, group, flows)
+    """The attitude of a splitting; the coefficients grow by what it needs. `SpecError` as `turnings`.
+
+    The sources of noise come before the ``flows``. With a monitor, ``time_of`` tells the time that a flow takes.
+    """
+    turned = turnings(system, group, flows, put_back=uniform(system))
+    shaken = [turning_of(system, group, s.hamiltonian, s.name, put_back=False) for s in system.noise]
+    times = [time_of(flow) if time_of else symbol(TIME) for flow in flows]
+    named = [f"the noise {s.name}" for s in system.noise] + [f"H_{k}" for k in range(1, len(flows) + 1)]
     found = []
-    for k, turning in enumerate(turned, 1):
-        factors = factor_elements(system, group, turning)
+    for k, (turning, time) in enumerate(zip([*shaken, *turned], [*driving_times(system), *times], strict=True), 1):
+        factors = factor_elements(system, group, turning, time)
         values = coefficients.hoist(joined(group, factors) if factors else [ZERO] * group.size)
         inputs = {"coef": coefficients.slots, "state": system.coordinates}
-        found.append(Kernel(f"turn{k}", f"what H_{k} turns by", inputs, (Output("turn", tuple(values)),)))
-    put_back = [turning.casimir for turning in turned]
-    return Attitude(group, False, turns=tuple(found), rate=rate_kernel(system, group, gauge, put_back))
+        found.append(Kernel(f"turn{k}", f"what {named[k - 1]} turns by", inputs, (Output("turn", tuple(values)),)))
+    left = [turning.left for turning in turned]
+    return Attitude(group, False, turns=tuple(found), rate=rate_kernel(system, group, gauge, left))
+
+
+def uniform(system: System) -> bool:
+    """Whether Casimirs turn a body uniformly, in the frame where momenta are constant."""
+    monitored = system.spec is not None and system.spec.monitor is not None
+    return not (system.forces or system.time or monitored)
 
 
 def rate_kernel(system: System, group: Group, gauge: Gauge, more: Sequence[Expression] = ()) -> Kernel | None:
-    """The gradient of the Casimirs that the gauge takes from H, and of ``more``; None without any."""
+    """The gradient of the Casimirs that the gauge takes from H, and of ``more``; None without any.
+
+    With a monitor or forces there must be none: what they turn would not be a uniform motion.
+    """
     taken = [e for e in more if not e.is_zero]
-    taken += [symbol(s) * system.casimirs[c] for s, c in zip(gauge.symbols, gauge.free, strict=True)]
+    taken += [symbol(s) * system.casimirs[c] for s, c in zip(gauge.multiples, gauge.free, strict=True)]
     taken += [value * system.casimirs[c] for c, value in gauge.fixed.items()]
     if not taken:
         return None
+    others = {"a monitor": gauge.monitor, "forces": system.forces}
+    for what, there in others.items():
+        if there:
+            message = f"reconstruct: with {what} no multiple of a Casimir is taken from H, since it turns the body"
+            raise refused(system, message, "gauge: none")
     slope = gradient(total(taken), system.coordinates)
     turning = (*group.rotation, *group.translation)
     values = group.generator(slope) if group.matrices else [slope[i] for i in turning]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from phigen.errors import Diagnostic, LimitError, SpecError
 from phigen.geometry.system import System
@@ -17,7 +17,7 @@ from phigen.scheme.order import Order
 from phigen.series.hamilton_jacobi import HamiltonJacobi
 from phigen.spec import limits
 from phigen.spec.names import FLOW_COMPOSITIONS
-from phigen.symbolic.expression import Expression, sparse_derivatives, symbol, total
+from phigen.symbolic.expression import ZERO, Expression, sparse_derivatives, symbol, total
 from phigen.symbolic.symbols import STEP
 
 #: Most operations in one kernel.
@@ -70,15 +70,24 @@ def generating_function(system: System, series: HamiltonJacobi, terms: int) -> G
     if not candidates or min(c.cost() for c in candidates) > MOST_OPERATIONS:
         raise too_large(system, f"S_1 … S_{terms} take more than {MOST_OPERATIONS} operations")
     best = min(candidates, key=GeneratingFunction.cost)
-    return best.pushed(push(system), system.coordinates) if system.forces or system.noise else best
+    if not (system.forces or system.noise):
+        return best
+    pushed = best.pushed(push(system), system.coordinates)
+    return replace(pushed, free=best.pushed(_noise(system), system.coordinates).slope) if system.forces else pushed
 
 
 def push(system: System) -> list[Expression]:
     """What p is beside ∇S_h: hζ of the forces, and Σ ΔW_k σ_k∇g_k of the noise."""
-    parts = [[symbol(STEP) * z for z in system.forces.covector]] if system.forces else []
-    for source, name in zip(system.noise, system.increments, strict=True):
-        parts.append([symbol(name) * g for g in source.impulse(system.coordinates)])
-    return [total(entries) for entries in zip(*parts, strict=True)]
+    covector = system.forces.covector if system.forces else [ZERO] * system.dimension
+    return [symbol(STEP) * z + e for z, e in zip(covector, _noise(system), strict=True)]
+
+
+def _noise(system: System) -> list[Expression]:
+    parts = [
+        [symbol(name) * g for g in source.impulse(system.coordinates)]
+        for source, name in zip(system.noise, system.increments, strict=True)
+    ]
+    return [total(entries) for entries in zip(*parts, strict=True)] or [ZERO] * system.dimension
 
 
 @dataclass(frozen=True)

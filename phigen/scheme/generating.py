@@ -28,7 +28,7 @@ class GeneratingFunction:
     """∇S_h (``slope``) and Hess S_h (``hessian``, full n×n) as expressions, and how they were written.
 
     ``coefficients`` is the table that their symbols ``c:k`` refer to, those that are renewed in every step included.
-    Of a monitored system, ``elapsed`` is ∂S_h/∂e, the time that a step takes.
+    Of a monitored system, ``elapsed`` is ∂S_h/∂e, the time that a step takes. With forces, ``free`` is p without them.
     """
 
     slope: tuple[Expression, ...]
@@ -37,6 +37,12 @@ class GeneratingFunction:
     terms: int
     coefficients: Coefficients
     elapsed: Expression | None = None
+    free: tuple[Expression, ...] = ()
+
+    @property
+    def turning(self) -> tuple[Expression, ...]:
+        """What turns a body: p without the forces, which change its momentum only."""
+        return self.free or self.slope
 
     def pushed(self, push: Sequence[Expression], coordinates: Sequence[str]) -> GeneratingFunction:
         """With p = ∇S_h + a covector field in place of p = ∇S_h; then the Hessian need not be symmetric."""

@@ -35,10 +35,16 @@ class Logarithmic:
 
     def outputs(self, flow: Flow) -> tuple[Expression, ...]:
         """The increments of a flow of K, the physical time that it takes, and what is no number out of the domain."""
-        other = -flow.hamiltonian if self._is_negative(flow) else flow.hamiltonian + symbol(LEVEL)
-        time = symbol(TIME) * power(other, -1)
+        other, time = self._argument(flow), self.time(flow)
         increments = substitute(flow.increment, {TIME: time})
         return (*increments, ZERO if self._is_negative(flow) else time, power(other, Fraction(1, 2)))
+
+    def time(self, flow: Flow) -> Expression:
+        """The time of the flow of a part of H that its flow in τ is."""
+        return symbol(TIME) * power(self._argument(flow), -1)
+
+    def _argument(self, flow: Flow) -> Expression:
+        return -flow.hamiltonian if self._is_negative(flow) else flow.hamiltonian + symbol(LEVEL)
 
     def monitor(self, system: System) -> Monitor:
         """dt/dτ = 1/(−B)."""

@@ -16,7 +16,7 @@ from phigen.scheme.alternation import Schedule
 from phigen.splitting.flow import Flow
 from phigen.splitting.parts import split
 from phigen.splitting.ring import TIME
-from phigen.symbolic.expression import substitute, symbol
+from phigen.symbolic.expression import Expression, substitute, symbol
 from phigen.symbolic.symbols import increment
 
 
@@ -54,10 +54,15 @@ def _flow(system: System, source: Source) -> Flow:
     return found[0]
 
 
-def driven(flow: Flow, source: Source) -> Flow:
-    """The flow for the time σ ΔW, with the increment of any row of coefficients in place of ΔW."""
-    time = source.amplitude * symbol(increment(0))
-    return replace(flow, increment=tuple(substitute(flow.increment, {TIME: time})))
+def driving_times(system: System) -> list[Expression]:
+    """The times σ ΔW of the flows of the sources, with the increment of any row of coefficients in place of ΔW."""
+    return [source.amplitude * symbol(increment(0)) for source in system.noise]
+
+
+def driven(system: System) -> list[Flow]:
+    """The flows of the sources for these times. `SpecError` for one whose flow is not elementary."""
+    found = zip(noise_flows(system), driving_times(system), strict=True)
+    return [replace(flow, increment=tuple(substitute(flow.increment, {TIME: time}))) for flow, time in found]
 
 
 def with_noise(schedule: Schedule, sources: int) -> Schedule:

@@ -19,7 +19,7 @@ from phigen.scheme.kernel import Kernel, Output
 from phigen.scheme.kernels import noise_fields, observables
 from phigen.scheme.logarithmic import Logarithmic, trimmed
 from phigen.scheme.lowering import cost, operation_counts
-from phigen.scheme.noise import driven, expect_no_adjoint, noise_facts, noise_flows, with_noise
+from phigen.scheme.noise import driven, expect_no_adjoint, noise_facts, with_noise
 from phigen.scheme.program import About, Noise, Program
 from phigen.scheme.staging import Coefficients
 from phigen.scheme.steps import Splitting
@@ -48,7 +48,7 @@ def build_splitting(
     """The explicit solver as a program. LimitError if a kernel exceeds `MOST_OPERATIONS`."""
     _expect_no_modified(system, extras)
     splitting, steps = choice.splitting, choice.schedule()
-    sources = [driven(flow, s) for flow, s in zip(noise_flows(system), system.noise, strict=True)]
+    sources = driven(system)
     if sources:
         expect_no_adjoint(system, extras.adjoint)
         steps = with_noise(steps, len(sources))
@@ -61,7 +61,9 @@ def build_splitting(
         for k, flow in enumerate(flows, 1)
         if extras.tangent
     )
-    attitude = flow_attitude(system, group, splitting.flows, gauge, coefficients) if group else None
+    attitude, time_of = None, monitor.time if monitor else None
+    if group:
+        attitude = flow_attitude(system, group, splitting.flows, gauge, coefficients, time_of)
     inputs = {"t": system.times, "dw": system.increments[:1]}
     refresh = coefficients.refresh(**{name: symbols for name, symbols in inputs.items() if symbols})
     prepare = Kernel(
@@ -108,7 +110,7 @@ def build_splitting(
         step=step,
         observables=observables(system),
         noise=Noise(tuple(s.name for s in system.noise), 2, noise_fields(system)) if sources else None,
-        attitude=attitude,
+        attitude=coefficients.settled(attitude),
         extras=extras,
         lanes=lanes,
         profile=profile,

@@ -125,8 +125,7 @@ NOT_OF_LATTICES: Mapping[str, tuple[object, ...]] = {
 #: Keys that noise excludes, and the values that do no harm: where steps would have to be made in parts, or of another
 #: size than those whose increments were drawn.
 NOT_WITH_NOISE: Mapping[str, tuple[object, ...]] = {
-    "monitor": (), "reconstruct": (), "modified_hamiltonian": (0,), "terms": (), "adjoint": (False,),
-    "composition": ("auto", "none"),
+    "monitor": (), "modified_hamiltonian": (0,), "terms": (), "adjoint": (False,), "composition": ("auto", "none"),
 }  # fmt: skip
 #: Keys of runs that it excludes, and those that mean nothing without it.
 NOT_IN_NOISY_RUNS, IN_NOISY_RUNS = ("exact", "compare", "section", "stop", "every"), ("seed", "members")

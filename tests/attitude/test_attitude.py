@@ -405,8 +405,8 @@ REFUSED = {
         "so(3)", "plus", 3, ASKED, "birealisation: {kind: group-map, tau: (1 + P/2)/(1 - P/2)}"
     ): "no group element",
     ROUND: "the part H_",
-    BODY + "damping: 1/10\n": "not offered with forces",
-    BODY + "monitor: 1 + x1**2\n": "not offered with a monitor",
+    BODY + "damping: 1/10\ngauge: {C: 1}\n": "with forces no multiple of a Casimir",
+    BODY + "monitor: 1 + x1**2\ngauge: {C: 1}\n": "with a monitor no multiple of a Casimir",
 }
 
 

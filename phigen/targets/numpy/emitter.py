@@ -225,6 +225,7 @@ def _attitude(program: Program, attitude: Attitude) -> list[str]:
     """Attitudes: the kernels, and their use."""
     group, step = attitude.group, program.step
     rows = len(group.matrices[0]) if group.matrices else 0
+    solved = "_path(stage[0], x, solved)[1]" if isinstance(step, Path) else "solved"
     shown = f"Attitudes have shape (rows, ..., {rows}, {rows})" if rows else "Attitudes have shape (rows, ..., 4)"
     values = {
         **_values(program),
@@ -236,7 +237,7 @@ def _attitude(program: Program, attitude: Attitude) -> list[str]:
         "normalise": group.orthogonal,
         "splitting": isinstance(step, Splitting),
         "rates": f"_rate(parameters, {'gauge.T, ' * bool(program.gauge)}x)" if attitude.rate else "None",
-        "turn_of_stage": "_along(solved)" if isinstance(step, Path) else "_turn(stage[0], x + solved)",
+        "turn_of_stage": "_along(solved)" if attitude.along else f"_turn(stage[0], x + {solved})",
         "shaped": _shaped(rows, bool(group.translation)),
         **_ordered(group.spatial),
         "shapes": shown + ", positions (rows, ..., 3)" * bool(group.translation),
