@@ -21,7 +21,7 @@
  *   4. The solver
  *   5. The flows
  *   6. What is seen at sites
- * body-sha256: 06615706172e77e7e5b90ad6533d4979a43109a797db364430e01569657c974b
+ * body-sha256: 7ba0a2bf0299c63a597d7358ac7a6f4edc84940682c3791a7f61fa1d881b1848
  */
 #include "ablowitz_ladik.h"
 
@@ -237,18 +237,6 @@ static inline void ablowitz_ladik_sweep1(const double *coef, const ablowitz_ladi
     }
 }
 
-/* The flow of H_1, for the pieces of rows from first on, before end. */
-static void ablowitz_ladik_part1(
-    const ablowitz_ladik_solver *s, const double *coef, int far, size_t first, size_t end)
-{
-    (void)far;
-    for (size_t unit = first; unit < end; ++unit) {
-        const ablowitz_ladik_piece at = ablowitz_ladik_piece_of(s, unit);
-        ablowitz_ladik_sweep1(coef, &at.row, at.from, at.to);
-        ablowitz_ladik_ends(s->x[1] + at.row.at[0], s->length, at.from, at.to);
-    }
-}
-
 /* the flow of H_2 = sum of -log(y**2 + (1 + x**2)): x, y turned */
 static inline void ablowitz_ladik_sweep2(const double *coef, const ablowitz_ladik_row *row, ptrdiff_t from,
     ptrdiff_t to)
@@ -263,19 +251,6 @@ static inline void ablowitz_ladik_sweep2(const double *coef, const ablowitz_ladi
         const double change1 = c3 * x - c2 * y;
         x_row[i] = x + change0;
         y_row[i] = y + change1;
-    }
-}
-
-/* The flow of H_2, for the pieces of rows from first on, before end. */
-static void ablowitz_ladik_part2(
-    const ablowitz_ladik_solver *s, const double *coef, int far, size_t first, size_t end)
-{
-    (void)far;
-    for (size_t unit = first; unit < end; ++unit) {
-        const ablowitz_ladik_piece at = ablowitz_ladik_piece_of(s, unit);
-        ablowitz_ladik_sweep2(coef, &at.row, at.from, at.to);
-        ablowitz_ladik_ends(s->x[0] + at.row.at[0], s->length, at.from, at.to);
-        ablowitz_ladik_ends(s->x[1] + at.row.at[0], s->length, at.from, at.to);
     }
 }
 
@@ -299,15 +274,34 @@ static inline void ablowitz_ladik_sweep3(const double *coef, const ablowitz_ladi
     }
 }
 
-/* The flow of H_3, for the pieces of rows from first on, before end. */
-static void ablowitz_ladik_part3(
-    const ablowitz_ladik_solver *s, const double *coef, int far, size_t first, size_t end)
+/* The flow of a part of H, for the pieces of rows from first on, before end. */
+static void ablowitz_ladik_sweep_rows(const ablowitz_ladik_solver *s, int part, const double *coef, int far,
+    size_t first, size_t end)
 {
     (void)far;
-    for (size_t unit = first; unit < end; ++unit) {
-        const ablowitz_ladik_piece at = ablowitz_ladik_piece_of(s, unit);
-        ablowitz_ladik_sweep3(coef, &at.row, at.from, at.to);
-        ablowitz_ladik_ends(s->x[0] + at.row.at[0], s->length, at.from, at.to);
+    switch (part) {
+    case 1: /* H_1 */
+        for (size_t unit = first; unit < end; ++unit) {
+            const ablowitz_ladik_piece at = ablowitz_ladik_piece_of(s, unit);
+            ablowitz_ladik_sweep1(coef, &at.row, at.from, at.to);
+            ablowitz_ladik_ends(s->x[1] + at.row.at[0], s->length, at.from, at.to);
+        }
+        break;
+    case 2: /* H_2 */
+        for (size_t unit = first; unit < end; ++unit) {
+            const ablowitz_ladik_piece at = ablowitz_ladik_piece_of(s, unit);
+            ablowitz_ladik_sweep2(coef, &at.row, at.from, at.to);
+            ablowitz_ladik_ends(s->x[0] + at.row.at[0], s->length, at.from, at.to);
+            ablowitz_ladik_ends(s->x[1] + at.row.at[0], s->length, at.from, at.to);
+        }
+        break;
+    default: /* H_3 */
+        for (size_t unit = first; unit < end; ++unit) {
+            const ablowitz_ladik_piece at = ablowitz_ladik_piece_of(s, unit);
+            ablowitz_ladik_sweep3(coef, &at.row, at.from, at.to);
+            ablowitz_ladik_ends(s->x[0] + at.row.at[0], s->length, at.from, at.to);
+        }
+        break;
     }
 }
 
@@ -351,16 +345,6 @@ static void ablowitz_ladik_vector_field_row(const ablowitz_ladik_params *params,
         const double t2 = 1.0 / t1;
         out[i - from] = t1 * (y_row[i + 1] + y_row[i - 1] - 2.0 * (y * t2));
         out[(ptrdiff_t)apart + i - from] = -(t1 * (x_row[i + 1] + x_row[i - 1] - 2.0 * (x * t2)));
-    }
-}
-
-static void ablowitz_ladik_sweep_rows(
-    const ablowitz_ladik_solver *s, int part, const double *coef, int far, size_t first, size_t end)
-{
-    switch (part) {
-    case 1: ablowitz_ladik_part1(s, coef, far, first, end); break;
-    case 2: ablowitz_ladik_part2(s, coef, far, first, end); break;
-    default: ablowitz_ladik_part3(s, coef, far, first, end); break;
     }
 }
 

@@ -22,7 +22,7 @@
  *   5. The solver
  *   6. The flows
  *   7. What is seen at sites
- * body-sha256: 0dbe65e42b3e56dbeafa733bcf67446477249b30f0c41f5113d06070801cd046
+ * body-sha256: d1ab1a85cc2ac2f884f43dcbecc60262d9ee4fa03f16c373ef5ffe8b069fa42e
  */
 #include "chiral_magnet.h"
 
@@ -218,26 +218,11 @@ static inline void chiral_magnet_gather1_0_a(const double *coef, const chiral_ma
     }
 }
 
-/* what all other sites b add to the forces of H_1 at a site a, by bonds that end there */
-static inline void chiral_magnet_gather1_1_b(const double *coef, const chiral_magnet_row *row, ptrdiff_t from,
-    ptrdiff_t to)
-{
-    const double c1 = coef[1];
-    const double *restrict z_row = row->x[2] + row->at[0];
-    for (ptrdiff_t i = from; i < to; ++i) {
-        double sum0 = 0.0;
-        for (ptrdiff_t k = row->middle[i]; k < row->bonds[i + 1]; ++k) {
-            if (row->colours[row->other[k]] != row->chosen) continue;
-            const ptrdiff_t j = row->other[k];
-            const double z_b_ = z_row[j], Dy = row->at_bonds[1][k];
-            sum0 += z_b_ * (Dy * c1);
-        }
-        row->gathered[0][i] = sum0;
-    }
-}
-
-/* the flow of H_1 = sum of D*(Dy*(x[b]*z[a])): y, z turned */
-static inline void chiral_magnet_sweep1_0(const double *coef, const chiral_magnet_row *row, ptrdiff_t from,
+/* the flow of H_1 = sum of D*(Dy*(x[b]*z[a])): x, y turned
+   the flow of H_5 = sum of D*(Dx*(y[a]*z[b])): x, y turned
+   the flow of H_6 = sum of -D*(Dx*(y[b]*z[a])): x, y turned
+   the flow of H_7 = sum of -D*(Dy*(x[a]*z[b])): x, y turned */
+static inline void chiral_magnet_sweep_x_y(const double *coef, const chiral_magnet_row *row, ptrdiff_t from,
     ptrdiff_t to)
 {
     const double c0 = coef[0];
@@ -256,8 +241,28 @@ static inline void chiral_magnet_sweep1_0(const double *coef, const chiral_magne
     }
 }
 
-/* the flow of H_1 = sum of D*(Dy*(x[b]*z[a])): y, z turned */
-static inline void chiral_magnet_sweep1_1(const double *coef, const chiral_magnet_row *row, ptrdiff_t from,
+/* what all other sites b add to the forces of H_1 at a site a, by bonds that end there */
+static inline void chiral_magnet_gather1_1_b(const double *coef, const chiral_magnet_row *row, ptrdiff_t from,
+    ptrdiff_t to)
+{
+    const double c1 = coef[1];
+    const double *restrict z_row = row->x[2] + row->at[0];
+    for (ptrdiff_t i = from; i < to; ++i) {
+        double sum0 = 0.0;
+        for (ptrdiff_t k = row->middle[i]; k < row->bonds[i + 1]; ++k) {
+            if (row->colours[row->other[k]] != row->chosen) continue;
+            const ptrdiff_t j = row->other[k];
+            const double z_b_ = z_row[j], Dy = row->at_bonds[1][k];
+            sum0 += z_b_ * (Dy * c1);
+        }
+        row->gathered[0][i] = sum0;
+    }
+}
+
+/* the flow of H_1 = sum of D*(Dy*(x[b]*z[a])): y, z turned
+   the flow of H_2 = sum of -J*(x[a]*x[b]): y, z turned
+   the flow of H_7 = sum of -D*(Dy*(x[a]*z[b])): y, z turned */
+static inline void chiral_magnet_sweep_y_z(const double *coef, const chiral_magnet_row *row, ptrdiff_t from,
     ptrdiff_t to)
 {
     const double c0 = coef[0];
@@ -273,21 +278,6 @@ static inline void chiral_magnet_sweep1_1(const double *coef, const chiral_magne
         const double change1 = y * t2 - z * t3;
         y_row[i] = y + change0;
         z_row[i] = z + change1;
-    }
-}
-
-/* The flow of H_1, for the pieces of rows from first on, before end. */
-static void chiral_magnet_part1(
-    const chiral_magnet_solver *s, const double *coef, int far, int colour, size_t first, size_t end)
-{
-    (void)far;
-    for (size_t unit = first; unit < end; ++unit) {
-        chiral_magnet_piece at = chiral_magnet_piece_of(s, unit);
-        at.row.chosen = colour;
-        chiral_magnet_gather1_0_a(coef, &at.row, at.from, at.to);
-        chiral_magnet_sweep1_0(coef, &at.row, at.from, at.to);
-        chiral_magnet_gather1_1_b(coef, &at.row, at.from, at.to);
-        chiral_magnet_sweep1_1(coef, &at.row, at.from, at.to);
     }
 }
 
@@ -308,39 +298,6 @@ static inline void chiral_magnet_gather2(const double *coef, const chiral_magnet
     }
 }
 
-/* the flow of H_2 = sum of -J*(x[a]*x[b]): y, z turned */
-static inline void chiral_magnet_sweep2(const double *coef, const chiral_magnet_row *row, ptrdiff_t from,
-    ptrdiff_t to)
-{
-    const double c0 = coef[0];
-    double *y_row = row->x[1] + row->at[0];
-    double *z_row = row->x[2] + row->at[0];
-    chiral_magnet_EACH_SITE
-    for (ptrdiff_t i = from; i < to; ++i) {
-        const double y = y_row[i], z = z_row[i];
-        const double t1 = c0 * row->gathered[0][i];
-        const double t2 = chiral_magnet_sin_lane(t1);
-        const double t3 = (2.0 * chiral_magnet_sin_lane(0.5 * (t1)) * chiral_magnet_sin_lane(0.5 * (t1)));
-        const double change0 = -(z * t2 + y * t3);
-        const double change1 = y * t2 - z * t3;
-        y_row[i] = y + change0;
-        z_row[i] = z + change1;
-    }
-}
-
-/* The flow of H_2, for the pieces of rows from first on, before end. */
-static void chiral_magnet_part2(
-    const chiral_magnet_solver *s, const double *coef, int far, int colour, size_t first, size_t end)
-{
-    (void)colour;
-    (void)far;
-    for (size_t unit = first; unit < end; ++unit) {
-        const chiral_magnet_piece at = chiral_magnet_piece_of(s, unit);
-        chiral_magnet_gather2(coef, &at.row, at.from, at.to);
-        chiral_magnet_sweep2(coef, &at.row, at.from, at.to);
-    }
-}
-
 /* what all other sites b add to the forces of H_3 at a site a */
 static inline void chiral_magnet_gather3(const double *coef, const chiral_magnet_row *row, ptrdiff_t from,
     ptrdiff_t to)
@@ -358,8 +315,10 @@ static inline void chiral_magnet_gather3(const double *coef, const chiral_magnet
     }
 }
 
-/* the flow of H_3 = sum of -J*(y[a]*y[b]): x, z turned */
-static inline void chiral_magnet_sweep3(const double *coef, const chiral_magnet_row *row, ptrdiff_t from,
+/* the flow of H_3 = sum of -J*(y[a]*y[b]): x, z turned
+   the flow of H_5 = sum of D*(Dx*(y[a]*z[b])): x, z turned
+   the flow of H_6 = sum of -D*(Dx*(y[b]*z[a])): x, z turned */
+static inline void chiral_magnet_sweep_x_z(const double *coef, const chiral_magnet_row *row, ptrdiff_t from,
     ptrdiff_t to)
 {
     const double c0 = coef[0];
@@ -375,19 +334,6 @@ static inline void chiral_magnet_sweep3(const double *coef, const chiral_magnet_
         const double change1 = -(z * t3 + x * t2);
         x_row[i] = x + change0;
         z_row[i] = z + change1;
-    }
-}
-
-/* The flow of H_3, for the pieces of rows from first on, before end. */
-static void chiral_magnet_part3(
-    const chiral_magnet_solver *s, const double *coef, int far, int colour, size_t first, size_t end)
-{
-    (void)colour;
-    (void)far;
-    for (size_t unit = first; unit < end; ++unit) {
-        const chiral_magnet_piece at = chiral_magnet_piece_of(s, unit);
-        chiral_magnet_gather3(coef, &at.row, at.from, at.to);
-        chiral_magnet_sweep3(coef, &at.row, at.from, at.to);
     }
 }
 
@@ -429,19 +375,6 @@ static inline void chiral_magnet_sweep4(const double *coef, const chiral_magnet_
     }
 }
 
-/* The flow of H_4, for the pieces of rows from first on, before end. */
-static void chiral_magnet_part4(
-    const chiral_magnet_solver *s, const double *coef, int far, int colour, size_t first, size_t end)
-{
-    (void)colour;
-    (void)far;
-    for (size_t unit = first; unit < end; ++unit) {
-        const chiral_magnet_piece at = chiral_magnet_piece_of(s, unit);
-        chiral_magnet_gather4(coef, &at.row, at.from, at.to);
-        chiral_magnet_sweep4(coef, &at.row, at.from, at.to);
-    }
-}
-
 /* what all other sites b add to the forces of H_5 at a site a, by bonds that begin there */
 static inline void chiral_magnet_gather5_0_a(const double *coef, const chiral_magnet_row *row, ptrdiff_t from,
     ptrdiff_t to)
@@ -474,61 +407,6 @@ static inline void chiral_magnet_gather5_1_b(const double *coef, const chiral_ma
             sum0 += y_b_ * (Dx * c1);
         }
         row->gathered[0][i] = sum0;
-    }
-}
-
-/* the flow of H_5 = sum of D*(Dx*(y[a]*z[b])): x, y turned */
-static inline void chiral_magnet_sweep5_0(const double *coef, const chiral_magnet_row *row, ptrdiff_t from,
-    ptrdiff_t to)
-{
-    const double c0 = coef[0];
-    double *x_row = row->x[0] + row->at[0];
-    double *z_row = row->x[2] + row->at[0];
-    chiral_magnet_EACH_SITE
-    for (ptrdiff_t i = from; i < to; ++i) {
-        const double x = x_row[i], z = z_row[i];
-        const double t1 = c0 * row->gathered[0][i];
-        const double t2 = chiral_magnet_sin_lane(t1);
-        const double t3 = (2.0 * chiral_magnet_sin_lane(0.5 * (t1)) * chiral_magnet_sin_lane(0.5 * (t1)));
-        const double change0 = z * t2 - x * t3;
-        const double change1 = -(z * t3 + x * t2);
-        x_row[i] = x + change0;
-        z_row[i] = z + change1;
-    }
-}
-
-/* the flow of H_5 = sum of D*(Dx*(y[a]*z[b])): x, y turned */
-static inline void chiral_magnet_sweep5_1(const double *coef, const chiral_magnet_row *row, ptrdiff_t from,
-    ptrdiff_t to)
-{
-    const double c0 = coef[0];
-    double *x_row = row->x[0] + row->at[0];
-    double *y_row = row->x[1] + row->at[0];
-    chiral_magnet_EACH_SITE
-    for (ptrdiff_t i = from; i < to; ++i) {
-        const double x = x_row[i], y = y_row[i];
-        const double t1 = c0 * row->gathered[0][i];
-        const double t2 = (2.0 * chiral_magnet_sin_lane(0.5 * (t1)) * chiral_magnet_sin_lane(0.5 * (t1)));
-        const double t3 = chiral_magnet_sin_lane(t1);
-        const double change0 = -(x * t2 + y * t3);
-        const double change1 = x * t3 - y * t2;
-        x_row[i] = x + change0;
-        y_row[i] = y + change1;
-    }
-}
-
-/* The flow of H_5, for the pieces of rows from first on, before end. */
-static void chiral_magnet_part5(
-    const chiral_magnet_solver *s, const double *coef, int far, int colour, size_t first, size_t end)
-{
-    (void)far;
-    for (size_t unit = first; unit < end; ++unit) {
-        chiral_magnet_piece at = chiral_magnet_piece_of(s, unit);
-        at.row.chosen = colour;
-        chiral_magnet_gather5_0_a(coef, &at.row, at.from, at.to);
-        chiral_magnet_sweep5_0(coef, &at.row, at.from, at.to);
-        chiral_magnet_gather5_1_b(coef, &at.row, at.from, at.to);
-        chiral_magnet_sweep5_1(coef, &at.row, at.from, at.to);
     }
 }
 
@@ -567,61 +445,6 @@ static inline void chiral_magnet_gather6_1_b(const double *coef, const chiral_ma
     }
 }
 
-/* the flow of H_6 = sum of -D*(Dx*(y[b]*z[a])): x, z turned */
-static inline void chiral_magnet_sweep6_0(const double *coef, const chiral_magnet_row *row, ptrdiff_t from,
-    ptrdiff_t to)
-{
-    const double c0 = coef[0];
-    double *x_row = row->x[0] + row->at[0];
-    double *y_row = row->x[1] + row->at[0];
-    chiral_magnet_EACH_SITE
-    for (ptrdiff_t i = from; i < to; ++i) {
-        const double x = x_row[i], y = y_row[i];
-        const double t1 = c0 * row->gathered[0][i];
-        const double t2 = (2.0 * chiral_magnet_sin_lane(0.5 * (t1)) * chiral_magnet_sin_lane(0.5 * (t1)));
-        const double t3 = chiral_magnet_sin_lane(t1);
-        const double change0 = -(x * t2 + y * t3);
-        const double change1 = x * t3 - y * t2;
-        x_row[i] = x + change0;
-        y_row[i] = y + change1;
-    }
-}
-
-/* the flow of H_6 = sum of -D*(Dx*(y[b]*z[a])): x, z turned */
-static inline void chiral_magnet_sweep6_1(const double *coef, const chiral_magnet_row *row, ptrdiff_t from,
-    ptrdiff_t to)
-{
-    const double c0 = coef[0];
-    double *x_row = row->x[0] + row->at[0];
-    double *z_row = row->x[2] + row->at[0];
-    chiral_magnet_EACH_SITE
-    for (ptrdiff_t i = from; i < to; ++i) {
-        const double x = x_row[i], z = z_row[i];
-        const double t1 = c0 * row->gathered[0][i];
-        const double t2 = chiral_magnet_sin_lane(t1);
-        const double t3 = (2.0 * chiral_magnet_sin_lane(0.5 * (t1)) * chiral_magnet_sin_lane(0.5 * (t1)));
-        const double change0 = z * t2 - x * t3;
-        const double change1 = -(z * t3 + x * t2);
-        x_row[i] = x + change0;
-        z_row[i] = z + change1;
-    }
-}
-
-/* The flow of H_6, for the pieces of rows from first on, before end. */
-static void chiral_magnet_part6(
-    const chiral_magnet_solver *s, const double *coef, int far, int colour, size_t first, size_t end)
-{
-    (void)far;
-    for (size_t unit = first; unit < end; ++unit) {
-        chiral_magnet_piece at = chiral_magnet_piece_of(s, unit);
-        at.row.chosen = colour;
-        chiral_magnet_gather6_0_a(coef, &at.row, at.from, at.to);
-        chiral_magnet_sweep6_0(coef, &at.row, at.from, at.to);
-        chiral_magnet_gather6_1_b(coef, &at.row, at.from, at.to);
-        chiral_magnet_sweep6_1(coef, &at.row, at.from, at.to);
-    }
-}
-
 /* what all other sites b add to the forces of H_7 at a site a, by bonds that begin there */
 static inline void chiral_magnet_gather7_0_a(const double *coef, const chiral_magnet_row *row, ptrdiff_t from,
     ptrdiff_t to)
@@ -657,58 +480,76 @@ static inline void chiral_magnet_gather7_1_b(const double *coef, const chiral_ma
     }
 }
 
-/* the flow of H_7 = sum of -D*(Dy*(x[a]*z[b])): x, y turned */
-static inline void chiral_magnet_sweep7_0(const double *coef, const chiral_magnet_row *row, ptrdiff_t from,
-    ptrdiff_t to)
-{
-    const double c0 = coef[0];
-    double *y_row = row->x[1] + row->at[0];
-    double *z_row = row->x[2] + row->at[0];
-    chiral_magnet_EACH_SITE
-    for (ptrdiff_t i = from; i < to; ++i) {
-        const double y = y_row[i], z = z_row[i];
-        const double t1 = c0 * row->gathered[0][i];
-        const double t2 = chiral_magnet_sin_lane(t1);
-        const double t3 = (2.0 * chiral_magnet_sin_lane(0.5 * (t1)) * chiral_magnet_sin_lane(0.5 * (t1)));
-        const double change0 = -(z * t2 + y * t3);
-        const double change1 = y * t2 - z * t3;
-        y_row[i] = y + change0;
-        z_row[i] = z + change1;
-    }
-}
-
-/* the flow of H_7 = sum of -D*(Dy*(x[a]*z[b])): x, y turned */
-static inline void chiral_magnet_sweep7_1(const double *coef, const chiral_magnet_row *row, ptrdiff_t from,
-    ptrdiff_t to)
-{
-    const double c0 = coef[0];
-    double *x_row = row->x[0] + row->at[0];
-    double *y_row = row->x[1] + row->at[0];
-    chiral_magnet_EACH_SITE
-    for (ptrdiff_t i = from; i < to; ++i) {
-        const double x = x_row[i], y = y_row[i];
-        const double t1 = c0 * row->gathered[0][i];
-        const double t2 = (2.0 * chiral_magnet_sin_lane(0.5 * (t1)) * chiral_magnet_sin_lane(0.5 * (t1)));
-        const double t3 = chiral_magnet_sin_lane(t1);
-        const double change0 = -(x * t2 + y * t3);
-        const double change1 = x * t3 - y * t2;
-        x_row[i] = x + change0;
-        y_row[i] = y + change1;
-    }
-}
-
-/* The flow of H_7, for the pieces of rows from first on, before end. */
-static void chiral_magnet_part7(
-    const chiral_magnet_solver *s, const double *coef, int far, int colour, size_t first, size_t end)
+/* A flow, for the pieces of rows from first on, before end. */
+static void chiral_magnet_sweep_rows(const chiral_magnet_solver *s, int flow, const double *coef, int far,
+    size_t first, size_t end)
 {
     (void)far;
-    for (size_t unit = first; unit < end; ++unit) {
-        chiral_magnet_piece at = chiral_magnet_piece_of(s, unit);
-        at.row.chosen = colour;
-        chiral_magnet_gather7_0_a(coef, &at.row, at.from, at.to);
-        chiral_magnet_sweep7_0(coef, &at.row, at.from, at.to);
-        chiral_magnet_gather7_1_b(coef, &at.row, at.from, at.to);
-        chiral_magnet_sweep7_1(coef, &at.row, at.from, at.to);
+    int part = 1, colour = flow;
+    for (int own; colour >= (own = chiral_magnet_by_colour[part - 1] ? s->colour_count : 1); ++part)
+        colour -= own;
+    switch (part) {
+    case 1: /* H_1 */
+        for (size_t unit = first; unit < end; ++unit) {
+            chiral_magnet_piece at = chiral_magnet_piece_of(s, unit);
+            at.row.chosen = colour;
+            chiral_magnet_gather1_0_a(coef, &at.row, at.from, at.to);
+            chiral_magnet_sweep_x_y(coef, &at.row, at.from, at.to);
+            chiral_magnet_gather1_1_b(coef, &at.row, at.from, at.to);
+            chiral_magnet_sweep_y_z(coef, &at.row, at.from, at.to);
+        }
+        break;
+    case 2: /* H_2 */
+        for (size_t unit = first; unit < end; ++unit) {
+            const chiral_magnet_piece at = chiral_magnet_piece_of(s, unit);
+            chiral_magnet_gather2(coef, &at.row, at.from, at.to);
+            chiral_magnet_sweep_y_z(coef, &at.row, at.from, at.to);
+        }
+        break;
+    case 3: /* H_3 */
+        for (size_t unit = first; unit < end; ++unit) {
+            const chiral_magnet_piece at = chiral_magnet_piece_of(s, unit);
+            chiral_magnet_gather3(coef, &at.row, at.from, at.to);
+            chiral_magnet_sweep_x_z(coef, &at.row, at.from, at.to);
+        }
+        break;
+    case 4: /* H_4 */
+        for (size_t unit = first; unit < end; ++unit) {
+            const chiral_magnet_piece at = chiral_magnet_piece_of(s, unit);
+            chiral_magnet_gather4(coef, &at.row, at.from, at.to);
+            chiral_magnet_sweep4(coef, &at.row, at.from, at.to);
+        }
+        break;
+    case 5: /* H_5 */
+        for (size_t unit = first; unit < end; ++unit) {
+            chiral_magnet_piece at = chiral_magnet_piece_of(s, unit);
+            at.row.chosen = colour;
+            chiral_magnet_gather5_0_a(coef, &at.row, at.from, at.to);
+            chiral_magnet_sweep_x_z(coef, &at.row, at.from, at.to);
+            chiral_magnet_gather5_1_b(coef, &at.row, at.from, at.to);
+            chiral_magnet_sweep_x_y(coef, &at.row, at.from, at.to);
+        }
+        break;
+    case 6: /* H_6 */
+        for (size_t unit = first; unit < end; ++unit) {
+            chiral_magnet_piece at = chiral_magnet_piece_of(s, unit);
+            at.row.chosen = colour;
+            chiral_magnet_gather6_0_a(coef, &at.row, at.from, at.to);
+            chiral_magnet_sweep_x_y(coef, &at.row, at.from, at.to);
+            chiral_magnet_gather6_1_b(coef, &at.row, at.from, at.to);
+            chiral_magnet_sweep_x_z(coef, &at.row, at.from, at.to);
+        }
+        break;
+    default: /* H_7 */
+        for (size_t unit = first; unit < end; ++unit) {
+            chiral_magnet_piece at = chiral_magnet_piece_of(s, unit);
+            at.row.chosen = colour;
+            chiral_magnet_gather7_0_a(coef, &at.row, at.from, at.to);
+            chiral_magnet_sweep_y_z(coef, &at.row, at.from, at.to);
+            chiral_magnet_gather7_1_b(coef, &at.row, at.from, at.to);
+            chiral_magnet_sweep_x_y(coef, &at.row, at.from, at.to);
+        }
+        break;
     }
 }
 
@@ -872,23 +713,6 @@ static void chiral_magnet_put_at_bonds(chiral_magnet_solver *s, const chiral_mag
     s->params.Dx = NULL;
     chiral_magnet_put_at_bond(s, s->at_bonds[1], params->Dy, 1.0);
     s->params.Dy = NULL;
-}
-
-static void chiral_magnet_sweep_rows(
-    const chiral_magnet_solver *s, int flow, const double *coef, int far, size_t first, size_t end)
-{
-    int part = 1, colour = flow;
-    for (int own; colour >= (own = chiral_magnet_by_colour[part - 1] ? s->colour_count : 1); ++part)
-        colour -= own;
-    switch (part) {
-    case 1: chiral_magnet_part1(s, coef, far, colour, first, end); break;
-    case 2: chiral_magnet_part2(s, coef, far, colour, first, end); break;
-    case 3: chiral_magnet_part3(s, coef, far, colour, first, end); break;
-    case 4: chiral_magnet_part4(s, coef, far, colour, first, end); break;
-    case 5: chiral_magnet_part5(s, coef, far, colour, first, end); break;
-    case 6: chiral_magnet_part6(s, coef, far, colour, first, end); break;
-    default: chiral_magnet_part7(s, coef, far, colour, first, end); break;
-    }
 }
 
 /* ---- Bonds ---- */

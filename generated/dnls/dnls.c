@@ -21,7 +21,7 @@
  *   4. The solver
  *   5. The flows
  *   6. What is seen at sites
- * body-sha256: 475f623a3b90eb7ed7b8d9a596750249669cc42a31437a959d9c384777b6c2d7
+ * body-sha256: 2de3ee49000b42729491e1054be8e0f22d7d33c70e95dcc6d01891492dcf3141
  */
 #include "dnls.h"
 
@@ -195,18 +195,6 @@ static inline void dnls_sweep1(const double *coef, const dnls_row *row, ptrdiff_
     }
 }
 
-/* The flow of H_1, for the pieces of rows from first on, before end. */
-static void dnls_part1(
-    const dnls_solver *s, const double *coef, int far, size_t first, size_t end)
-{
-    (void)far;
-    for (size_t unit = first; unit < end; ++unit) {
-        const dnls_piece at = dnls_piece_of(s, unit);
-        dnls_sweep1(coef, &at.row, at.from, at.to);
-        dnls_ends(s->x[0] + at.row.at[0], s->length, at.from, at.to);
-    }
-}
-
 /* the flow of H_2 = sum of -q*q[i+1]: p shifted */
 static inline void dnls_sweep2(const double *coef, const dnls_row *row, ptrdiff_t from, ptrdiff_t to)
 {
@@ -216,18 +204,6 @@ static inline void dnls_sweep2(const double *coef, const dnls_row *row, ptrdiff_
     dnls_EACH_SITE
     for (ptrdiff_t i = from; i < to; ++i) {
         p_row[i] += c0 * (q_row[i + 1] + q_row[i - 1]);
-    }
-}
-
-/* The flow of H_2, for the pieces of rows from first on, before end. */
-static void dnls_part2(
-    const dnls_solver *s, const double *coef, int far, size_t first, size_t end)
-{
-    (void)far;
-    for (size_t unit = first; unit < end; ++unit) {
-        const dnls_piece at = dnls_piece_of(s, unit);
-        dnls_sweep2(coef, &at.row, at.from, at.to);
-        dnls_ends(s->x[1] + at.row.at[0], s->length, at.from, at.to);
     }
 }
 
@@ -250,16 +226,34 @@ static inline void dnls_sweep3(const double *coef, const dnls_row *row, ptrdiff_
     }
 }
 
-/* The flow of H_3, for the pieces of rows from first on, before end. */
-static void dnls_part3(
-    const dnls_solver *s, const double *coef, int far, size_t first, size_t end)
+/* The flow of a part of H, for the pieces of rows from first on, before end. */
+static void dnls_sweep_rows(const dnls_solver *s, int part, const double *coef, int far, size_t first,
+    size_t end)
 {
     (void)far;
-    for (size_t unit = first; unit < end; ++unit) {
-        const dnls_piece at = dnls_piece_of(s, unit);
-        dnls_sweep3(coef, &at.row, at.from, at.to);
-        dnls_ends(s->x[0] + at.row.at[0], s->length, at.from, at.to);
-        dnls_ends(s->x[1] + at.row.at[0], s->length, at.from, at.to);
+    switch (part) {
+    case 1: /* H_1 */
+        for (size_t unit = first; unit < end; ++unit) {
+            const dnls_piece at = dnls_piece_of(s, unit);
+            dnls_sweep1(coef, &at.row, at.from, at.to);
+            dnls_ends(s->x[0] + at.row.at[0], s->length, at.from, at.to);
+        }
+        break;
+    case 2: /* H_2 */
+        for (size_t unit = first; unit < end; ++unit) {
+            const dnls_piece at = dnls_piece_of(s, unit);
+            dnls_sweep2(coef, &at.row, at.from, at.to);
+            dnls_ends(s->x[1] + at.row.at[0], s->length, at.from, at.to);
+        }
+        break;
+    default: /* H_3 */
+        for (size_t unit = first; unit < end; ++unit) {
+            const dnls_piece at = dnls_piece_of(s, unit);
+            dnls_sweep3(coef, &at.row, at.from, at.to);
+            dnls_ends(s->x[0] + at.row.at[0], s->length, at.from, at.to);
+            dnls_ends(s->x[1] + at.row.at[0], s->length, at.from, at.to);
+        }
+        break;
     }
 }
 
@@ -304,16 +298,6 @@ static void dnls_vector_field_row(const dnls_params *params, const dnls_row *row
         const double t1 = beta * (p * p + q * q);
         out[i - from] = 0.5 * (p * t1) - p_row[i + 1] - p_row[i - 1];
         out[(ptrdiff_t)apart + i - from] = q_row[i - 1] - (0.5 * (q * t1) - q_row[i + 1]);
-    }
-}
-
-static void dnls_sweep_rows(
-    const dnls_solver *s, int part, const double *coef, int far, size_t first, size_t end)
-{
-    switch (part) {
-    case 1: dnls_part1(s, coef, far, first, end); break;
-    case 2: dnls_part2(s, coef, far, first, end); break;
-    default: dnls_part3(s, coef, far, first, end); break;
     }
 }
 

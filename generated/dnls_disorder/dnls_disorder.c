@@ -21,7 +21,7 @@
  *   4. The solver
  *   5. The flows
  *   6. What is seen at sites
- * body-sha256: a3ac85784863bc3e211a14b163c48a105938b1e87175c0ee76d6ae051e3c7f10
+ * body-sha256: 0f8a5faaf6934495a403b837f0879597fcb24cdce0d83ec9e8bce080482d44ae
  */
 #include "dnls_disorder.h"
 
@@ -224,18 +224,6 @@ static inline void dnls_disorder_sweep1(const double *coef, const dnls_disorder_
     }
 }
 
-/* The flow of H_1, for the pieces of rows from first on, before end. */
-static void dnls_disorder_part1(
-    const dnls_disorder_solver *s, const double *coef, int far, size_t first, size_t end)
-{
-    (void)far;
-    for (size_t unit = first; unit < end; ++unit) {
-        const dnls_disorder_piece at = dnls_disorder_piece_of(s, unit);
-        dnls_disorder_sweep1(coef, &at.row, at.from, at.to);
-        dnls_disorder_ends(s->x[0] + at.row.at[0], s->length, at.from, at.to);
-    }
-}
-
 /* the flow of H_2 = sum of -q*q[i+1]: p shifted */
 static inline void dnls_disorder_sweep2(const double *coef, const dnls_disorder_row *row, ptrdiff_t from,
     ptrdiff_t to)
@@ -248,18 +236,6 @@ static inline void dnls_disorder_sweep2(const double *coef, const dnls_disorder_
         const double w0 = i + 1 < row->length ? row->present[0] : 0.0;
         const double w1 = i - 1 >= 0 ? row->present[1] : 0.0;
         p_row[i] += c0 * (w0 * q_row[i + 1] + w1 * q_row[i - 1]);
-    }
-}
-
-/* The flow of H_2, for the pieces of rows from first on, before end. */
-static void dnls_disorder_part2(
-    const dnls_disorder_solver *s, const double *coef, int far, size_t first, size_t end)
-{
-    (void)far;
-    for (size_t unit = first; unit < end; ++unit) {
-        const dnls_disorder_piece at = dnls_disorder_piece_of(s, unit);
-        dnls_disorder_sweep2(coef, &at.row, at.from, at.to);
-        dnls_disorder_ends(s->x[1] + at.row.at[0], s->length, at.from, at.to);
     }
 }
 
@@ -284,16 +260,34 @@ static inline void dnls_disorder_sweep3(const double *coef, const dnls_disorder_
     }
 }
 
-/* The flow of H_3, for the pieces of rows from first on, before end. */
-static void dnls_disorder_part3(
-    const dnls_disorder_solver *s, const double *coef, int far, size_t first, size_t end)
+/* The flow of a part of H, for the pieces of rows from first on, before end. */
+static void dnls_disorder_sweep_rows(const dnls_disorder_solver *s, int part, const double *coef, int far,
+    size_t first, size_t end)
 {
     (void)far;
-    for (size_t unit = first; unit < end; ++unit) {
-        const dnls_disorder_piece at = dnls_disorder_piece_of(s, unit);
-        dnls_disorder_sweep3(coef, &at.row, at.from, at.to);
-        dnls_disorder_ends(s->x[0] + at.row.at[0], s->length, at.from, at.to);
-        dnls_disorder_ends(s->x[1] + at.row.at[0], s->length, at.from, at.to);
+    switch (part) {
+    case 1: /* H_1 */
+        for (size_t unit = first; unit < end; ++unit) {
+            const dnls_disorder_piece at = dnls_disorder_piece_of(s, unit);
+            dnls_disorder_sweep1(coef, &at.row, at.from, at.to);
+            dnls_disorder_ends(s->x[0] + at.row.at[0], s->length, at.from, at.to);
+        }
+        break;
+    case 2: /* H_2 */
+        for (size_t unit = first; unit < end; ++unit) {
+            const dnls_disorder_piece at = dnls_disorder_piece_of(s, unit);
+            dnls_disorder_sweep2(coef, &at.row, at.from, at.to);
+            dnls_disorder_ends(s->x[1] + at.row.at[0], s->length, at.from, at.to);
+        }
+        break;
+    default: /* H_3 */
+        for (size_t unit = first; unit < end; ++unit) {
+            const dnls_disorder_piece at = dnls_disorder_piece_of(s, unit);
+            dnls_disorder_sweep3(coef, &at.row, at.from, at.to);
+            dnls_disorder_ends(s->x[0] + at.row.at[0], s->length, at.from, at.to);
+            dnls_disorder_ends(s->x[1] + at.row.at[0], s->length, at.from, at.to);
+        }
+        break;
     }
 }
 
@@ -355,16 +349,6 @@ static void dnls_disorder_put_parameters(dnls_disorder_solver *s, const dnls_dis
 {
     dnls_disorder_put_parameter(s, s->x[2], params->e, 1.0);
     s->params.e = NULL;
-}
-
-static void dnls_disorder_sweep_rows(
-    const dnls_disorder_solver *s, int part, const double *coef, int far, size_t first, size_t end)
-{
-    switch (part) {
-    case 1: dnls_disorder_part1(s, coef, far, first, end); break;
-    case 2: dnls_disorder_part2(s, coef, far, first, end); break;
-    default: dnls_disorder_part3(s, coef, far, first, end); break;
-    }
 }
 
 /* ---- The lattice ---- */

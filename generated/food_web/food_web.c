@@ -22,7 +22,7 @@
  *   5. The solver
  *   6. The flows
  *   7. What is seen at sites
- * body-sha256: 419baee1f42d671fdfd371a60bd33d3cc39227d046e97fcee9c8d8d46288b360
+ * body-sha256: 2adc532fb58c44af49782d3ffc6233742f352cb4ea87a3c41b98a071aa1b5170
  */
 #include "food_web.h"
 
@@ -284,11 +284,13 @@ static inline void food_web_sweep1(const double *coef, const food_web_row *row, 
     }
 }
 
-/* The flow of H_1, for the pieces of rows from first on, before end. */
-static void food_web_part1(
-    const food_web_solver *s, const double *coef, int far, int colour, size_t first, size_t end)
+/* A flow, for the pieces of rows from first on, before end. */
+static void food_web_sweep_rows(const food_web_solver *s, int flow, const double *coef, int far, size_t first,
+    size_t end)
 {
     (void)far;
+    int part = 1, colour = flow;
+    for (int own; colour >= (own = food_web_by_colour[part - 1] ? s->colour_count : 1); ++part) colour -= own;
     for (size_t unit = first; unit < end; ++unit) {
         food_web_piece at = food_web_piece_of(s, unit);
         at.row.chosen = colour;
@@ -392,16 +394,6 @@ static void food_web_put_at_bonds(food_web_solver *s, const food_web_params *par
 {
     food_web_put_at_bond(s, s->at_bonds[0], params->A, 1.0);
     s->params.A = NULL;
-}
-
-static void food_web_sweep_rows(
-    const food_web_solver *s, int flow, const double *coef, int far, size_t first, size_t end)
-{
-    int part = 1, colour = flow;
-    for (int own; colour >= (own = food_web_by_colour[part - 1] ? s->colour_count : 1); ++part) colour -= own;
-    switch (part) {
-    default: food_web_part1(s, coef, far, colour, first, end); break;
-    }
 }
 
 /* ---- Bonds ---- */

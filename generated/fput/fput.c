@@ -22,7 +22,7 @@
  *   5. The flows
  *   6. What is seen at sites
  *   7. Steps by hand
- * body-sha256: e73a21b3780d34e0cc2d4c7a79cf27c19c233fc917a02d9524a229f7c6968b9b
+ * body-sha256: 8ab8279f37952ea1b5b7d0d27cbef494746b4aeb1753270c4f9c999890ac31ae
  */
 #include "fput.h"
 
@@ -156,7 +156,7 @@ static inline fput_piece fput_piece_of(const fput_solver *s, size_t unit)
 }
 
 /* the flow of H_1 = sum of 1/3*(alpha*(q[i+1] - q)**3) + (1/2*(q[i+1] - q)**2 + 1/4*(beta*(q[i+1] - q)**4)):
-   p shifted */
+      p shifted */
 static inline void fput_sweep1(const double *coef, const fput_row *row, ptrdiff_t from, ptrdiff_t to)
 {
     const double c0 = coef[0], c1 = coef[1], c2 = coef[2];
@@ -173,19 +173,6 @@ static inline void fput_sweep1(const double *coef, const fput_row *row, ptrdiff_
     }
 }
 
-/* The flow of H_1, for the pieces of rows from first on, before end. */
-static void fput_part1(
-    const fput_solver *s, const double *coef, int far, size_t first, size_t end)
-{
-    (void)far;
-    for (size_t unit = first; unit < end; ++unit) {
-        const fput_piece at = fput_piece_of(s, unit);
-        if (at.from >= at.to) continue;
-        fput_sweep1(coef, &at.row, at.from, at.to);
-        fput_ends(s->x[1] + at.row.at[0], s->length, at.from, at.to);
-    }
-}
-
 /* the flow of H_2 = sum of 1/2*p**2: q shifted */
 static inline void fput_sweep2(const double *coef, const fput_row *row, ptrdiff_t from, ptrdiff_t to)
 {
@@ -199,16 +186,28 @@ static inline void fput_sweep2(const double *coef, const fput_row *row, ptrdiff_
     }
 }
 
-/* The flow of H_2, for the pieces of rows from first on, before end. */
-static void fput_part2(
-    const fput_solver *s, const double *coef, int far, size_t first, size_t end)
+/* The flow of a part of H, for the pieces of rows from first on, before end. */
+static void fput_sweep_rows(const fput_solver *s, int part, const double *coef, int far, size_t first,
+    size_t end)
 {
     (void)far;
-    for (size_t unit = first; unit < end; ++unit) {
-        const fput_piece at = fput_piece_of(s, unit);
-        if (at.from >= at.to) continue;
-        fput_sweep2(coef, &at.row, at.from, at.to);
-        fput_ends(s->x[0] + at.row.at[0], s->length, at.from, at.to);
+    switch (part) {
+    case 1: /* H_1 */
+        for (size_t unit = first; unit < end; ++unit) {
+            const fput_piece at = fput_piece_of(s, unit);
+            if (at.from >= at.to) continue;
+            fput_sweep1(coef, &at.row, at.from, at.to);
+            fput_ends(s->x[1] + at.row.at[0], s->length, at.from, at.to);
+        }
+        break;
+    default: /* H_2 */
+        for (size_t unit = first; unit < end; ++unit) {
+            const fput_piece at = fput_piece_of(s, unit);
+            if (at.from >= at.to) continue;
+            fput_sweep2(coef, &at.row, at.from, at.to);
+            fput_ends(s->x[0] + at.row.at[0], s->length, at.from, at.to);
+        }
+        break;
     }
 }
 
@@ -259,15 +258,6 @@ static void fput_vector_field_row(const fput_params *params, const fput_row *row
         out[i - from] = p;
         out[(ptrdiff_t)apart + i - from] = -(alpha * t2 - alpha * t4 + (t1 + (q - q_row[i + 1])
             + (beta * (t1 * t2) - beta * (t3 * t4))));
-    }
-}
-
-static void fput_sweep_rows(
-    const fput_solver *s, int part, const double *coef, int far, size_t first, size_t end)
-{
-    switch (part) {
-    case 1: fput_part1(s, coef, far, first, end); break;
-    default: fput_part2(s, coef, far, first, end); break;
     }
 }
 

@@ -22,7 +22,7 @@
  *   5. The flows
  *   6. What is seen at sites
  *   7. Steps by hand
- * body-sha256: 6053ab0135714d787119a9cd59029d5217336c3fc2a9b13128cd527feb0ce874
+ * body-sha256: c33cf8da8e8c1cb412e882b449d0f898597010bf195087f6d9ccbf6da1737be1
  */
 #include "heisenberg.h"
 
@@ -202,32 +202,6 @@ static inline double heisenberg_versin_near(double t)
         (-2.480158698886182e-05 + z * (2.755707789915398e-07 + z * -2.0790896078016366e-09)))));
 }
 
-/* the same for large arguments of functions */
-static inline void heisenberg_sweep1_far(const double *coef, const heisenberg_row *row, ptrdiff_t from,
-    ptrdiff_t to)
-{
-    const double c0 = coef[0];
-    const double *restrict x_row4 = row->x[0] + row->at[4];
-    const double *restrict x_row1 = row->x[0] + row->at[1];
-    const double *restrict x_row3 = row->x[0] + row->at[3];
-    const double *restrict x_row2 = row->x[0] + row->at[2];
-    const double *restrict x_row = row->x[0] + row->at[0];
-    double *y_row = row->x[1] + row->at[0];
-    double *z_row = row->x[2] + row->at[0];
-    heisenberg_EACH_SITE
-    for (ptrdiff_t i = from; i < to; ++i) {
-        const double y = y_row[i], z = z_row[i];
-        const double t1 = c0 * (x_row4[i] + x_row1[i] + (x_row3[i] + x_row2[i] + (x_row[i + 1]
-            + x_row[i - 1])));
-        const double t2 = (2.0 * heisenberg_sin_lane(0.5 * (t1)) * heisenberg_sin_lane(0.5 * (t1)));
-        const double t3 = heisenberg_sin_lane(t1);
-        const double change0 = -(y * t2 + z * t3);
-        const double change1 = y * t3 - z * t2;
-        y_row[i] = y + change0;
-        z_row[i] = z + change1;
-    }
-}
-
 /* the flow of H_1 = sum of -(J*(x*x[i+1]) + (J*(x*x[k+1]) + J*(x*x[j+1]))): y, z turned */
 static inline void heisenberg_sweep1_near(const double *coef, const heisenberg_row *row, ptrdiff_t from,
     ptrdiff_t to)
@@ -254,46 +228,28 @@ static inline void heisenberg_sweep1_near(const double *coef, const heisenberg_r
     }
 }
 
-/* The flow of H_1, for the pieces of rows from first on, before end. */
-static void heisenberg_part1(
-    const heisenberg_solver *s, const double *coef, int far, size_t first, size_t end)
-{
-    if (far) for (size_t unit = first; unit < end; ++unit) {
-        const heisenberg_piece at = heisenberg_piece_of(s, unit);
-        heisenberg_sweep1_far(coef, &at.row, at.from, at.to);
-        heisenberg_ends(s->x[1] + at.row.at[0], s->length, at.from, at.to);
-        heisenberg_ends(s->x[2] + at.row.at[0], s->length, at.from, at.to);
-    }
-    else for (size_t unit = first; unit < end; ++unit) {
-        const heisenberg_piece at = heisenberg_piece_of(s, unit);
-        heisenberg_sweep1_near(coef, &at.row, at.from, at.to);
-        heisenberg_ends(s->x[1] + at.row.at[0], s->length, at.from, at.to);
-        heisenberg_ends(s->x[2] + at.row.at[0], s->length, at.from, at.to);
-    }
-}
-
 /* the same for large arguments of functions */
-static inline void heisenberg_sweep2_far(const double *coef, const heisenberg_row *row, ptrdiff_t from,
+static inline void heisenberg_sweep1_far(const double *coef, const heisenberg_row *row, ptrdiff_t from,
     ptrdiff_t to)
 {
     const double c0 = coef[0];
-    double *x_row = row->x[0] + row->at[0];
-    const double *restrict y_row4 = row->x[1] + row->at[4];
-    const double *restrict y_row1 = row->x[1] + row->at[1];
-    const double *restrict y_row3 = row->x[1] + row->at[3];
-    const double *restrict y_row2 = row->x[1] + row->at[2];
-    const double *restrict y_row = row->x[1] + row->at[0];
+    const double *restrict x_row4 = row->x[0] + row->at[4];
+    const double *restrict x_row1 = row->x[0] + row->at[1];
+    const double *restrict x_row3 = row->x[0] + row->at[3];
+    const double *restrict x_row2 = row->x[0] + row->at[2];
+    const double *restrict x_row = row->x[0] + row->at[0];
+    double *y_row = row->x[1] + row->at[0];
     double *z_row = row->x[2] + row->at[0];
     heisenberg_EACH_SITE
     for (ptrdiff_t i = from; i < to; ++i) {
-        const double x = x_row[i], z = z_row[i];
-        const double t1 = c0 * (y_row4[i] + y_row1[i] + (y_row3[i] + y_row2[i] + (y_row[i + 1]
-            + y_row[i - 1])));
-        const double t2 = heisenberg_sin_lane(t1);
-        const double t3 = (2.0 * heisenberg_sin_lane(0.5 * (t1)) * heisenberg_sin_lane(0.5 * (t1)));
-        const double change0 = z * t2 - x * t3;
-        const double change1 = -(z * t3 + x * t2);
-        x_row[i] = x + change0;
+        const double y = y_row[i], z = z_row[i];
+        const double t1 = c0 * (x_row4[i] + x_row1[i] + (x_row3[i] + x_row2[i] + (x_row[i + 1]
+            + x_row[i - 1])));
+        const double t2 = (2.0 * heisenberg_sin_lane(0.5 * (t1)) * heisenberg_sin_lane(0.5 * (t1)));
+        const double t3 = heisenberg_sin_lane(t1);
+        const double change0 = -(y * t2 + z * t3);
+        const double change1 = y * t3 - z * t2;
+        y_row[i] = y + change0;
         z_row[i] = z + change1;
     }
 }
@@ -324,48 +280,29 @@ static inline void heisenberg_sweep2_near(const double *coef, const heisenberg_r
     }
 }
 
-/* The flow of H_2, for the pieces of rows from first on, before end. */
-static void heisenberg_part2(
-    const heisenberg_solver *s, const double *coef, int far, size_t first, size_t end)
-{
-    if (far) for (size_t unit = first; unit < end; ++unit) {
-        const heisenberg_piece at = heisenberg_piece_of(s, unit);
-        heisenberg_sweep2_far(coef, &at.row, at.from, at.to);
-        heisenberg_ends(s->x[0] + at.row.at[0], s->length, at.from, at.to);
-        heisenberg_ends(s->x[2] + at.row.at[0], s->length, at.from, at.to);
-    }
-    else for (size_t unit = first; unit < end; ++unit) {
-        const heisenberg_piece at = heisenberg_piece_of(s, unit);
-        heisenberg_sweep2_near(coef, &at.row, at.from, at.to);
-        heisenberg_ends(s->x[0] + at.row.at[0], s->length, at.from, at.to);
-        heisenberg_ends(s->x[2] + at.row.at[0], s->length, at.from, at.to);
-    }
-}
-
 /* the same for large arguments of functions */
-static inline void heisenberg_sweep3_far(const double *coef, const heisenberg_row *row, ptrdiff_t from,
+static inline void heisenberg_sweep2_far(const double *coef, const heisenberg_row *row, ptrdiff_t from,
     ptrdiff_t to)
 {
-    const double c1 = coef[1], c2 = coef[2];
-    const double *restrict B_row = row->x[3] + row->at[0];
+    const double c0 = coef[0];
     double *x_row = row->x[0] + row->at[0];
-    double *y_row = row->x[1] + row->at[0];
-    const double *restrict z_row4 = row->x[2] + row->at[4];
-    const double *restrict z_row1 = row->x[2] + row->at[1];
-    const double *restrict z_row3 = row->x[2] + row->at[3];
-    const double *restrict z_row2 = row->x[2] + row->at[2];
-    const double *restrict z_row = row->x[2] + row->at[0];
+    const double *restrict y_row4 = row->x[1] + row->at[4];
+    const double *restrict y_row1 = row->x[1] + row->at[1];
+    const double *restrict y_row3 = row->x[1] + row->at[3];
+    const double *restrict y_row2 = row->x[1] + row->at[2];
+    const double *restrict y_row = row->x[1] + row->at[0];
+    double *z_row = row->x[2] + row->at[0];
     heisenberg_EACH_SITE
     for (ptrdiff_t i = from; i < to; ++i) {
-        const double B = B_row[i], x = x_row[i], y = y_row[i];
-        const double t1 = c2 * (c1 * (z_row1[i] + (z_row4[i] + z_row2[i])) + (B + c1 * z_row[i + 1] + c1
-            * (z_row3[i] + z_row[i - 1])));
-        const double t2 = (2.0 * heisenberg_sin_lane(0.5 * (t1)) * heisenberg_sin_lane(0.5 * (t1)));
-        const double t3 = heisenberg_sin_lane(t1);
-        const double change0 = -(x * t2 + y * t3);
-        const double change1 = x * t3 - y * t2;
+        const double x = x_row[i], z = z_row[i];
+        const double t1 = c0 * (y_row4[i] + y_row1[i] + (y_row3[i] + y_row2[i] + (y_row[i + 1]
+            + y_row[i - 1])));
+        const double t2 = heisenberg_sin_lane(t1);
+        const double t3 = (2.0 * heisenberg_sin_lane(0.5 * (t1)) * heisenberg_sin_lane(0.5 * (t1)));
+        const double change0 = z * t2 - x * t3;
+        const double change1 = -(z * t3 + x * t2);
         x_row[i] = x + change0;
-        y_row[i] = y + change1;
+        z_row[i] = z + change1;
     }
 }
 
@@ -396,21 +333,65 @@ static inline void heisenberg_sweep3_near(const double *coef, const heisenberg_r
     }
 }
 
-/* The flow of H_3, for the pieces of rows from first on, before end. */
-static void heisenberg_part3(
-    const heisenberg_solver *s, const double *coef, int far, size_t first, size_t end)
+/* the same for large arguments of functions */
+static inline void heisenberg_sweep3_far(const double *coef, const heisenberg_row *row, ptrdiff_t from,
+    ptrdiff_t to)
 {
-    if (far) for (size_t unit = first; unit < end; ++unit) {
-        const heisenberg_piece at = heisenberg_piece_of(s, unit);
-        heisenberg_sweep3_far(coef, &at.row, at.from, at.to);
-        heisenberg_ends(s->x[0] + at.row.at[0], s->length, at.from, at.to);
-        heisenberg_ends(s->x[1] + at.row.at[0], s->length, at.from, at.to);
+    const double c1 = coef[1], c2 = coef[2];
+    const double *restrict B_row = row->x[3] + row->at[0];
+    double *x_row = row->x[0] + row->at[0];
+    double *y_row = row->x[1] + row->at[0];
+    const double *restrict z_row4 = row->x[2] + row->at[4];
+    const double *restrict z_row1 = row->x[2] + row->at[1];
+    const double *restrict z_row3 = row->x[2] + row->at[3];
+    const double *restrict z_row2 = row->x[2] + row->at[2];
+    const double *restrict z_row = row->x[2] + row->at[0];
+    heisenberg_EACH_SITE
+    for (ptrdiff_t i = from; i < to; ++i) {
+        const double B = B_row[i], x = x_row[i], y = y_row[i];
+        const double t1 = c2 * (c1 * (z_row1[i] + (z_row4[i] + z_row2[i])) + (B + c1 * z_row[i + 1] + c1
+            * (z_row3[i] + z_row[i - 1])));
+        const double t2 = (2.0 * heisenberg_sin_lane(0.5 * (t1)) * heisenberg_sin_lane(0.5 * (t1)));
+        const double t3 = heisenberg_sin_lane(t1);
+        const double change0 = -(x * t2 + y * t3);
+        const double change1 = x * t3 - y * t2;
+        x_row[i] = x + change0;
+        y_row[i] = y + change1;
     }
-    else for (size_t unit = first; unit < end; ++unit) {
-        const heisenberg_piece at = heisenberg_piece_of(s, unit);
-        heisenberg_sweep3_near(coef, &at.row, at.from, at.to);
-        heisenberg_ends(s->x[0] + at.row.at[0], s->length, at.from, at.to);
-        heisenberg_ends(s->x[1] + at.row.at[0], s->length, at.from, at.to);
+}
+
+/* The flow of a part of H, for the pieces of rows from first on, before end. */
+static void heisenberg_sweep_rows(const heisenberg_solver *s, int part, const double *coef, int far,
+    size_t first, size_t end)
+{
+    switch (part) {
+    case 1: /* H_1 */
+        for (size_t unit = first; unit < end; ++unit) {
+            const heisenberg_piece at = heisenberg_piece_of(s, unit);
+            if (far) heisenberg_sweep1_far(coef, &at.row, at.from, at.to);
+            else heisenberg_sweep1_near(coef, &at.row, at.from, at.to);
+            heisenberg_ends(s->x[1] + at.row.at[0], s->length, at.from, at.to);
+            heisenberg_ends(s->x[2] + at.row.at[0], s->length, at.from, at.to);
+        }
+        break;
+    case 2: /* H_2 */
+        for (size_t unit = first; unit < end; ++unit) {
+            const heisenberg_piece at = heisenberg_piece_of(s, unit);
+            if (far) heisenberg_sweep2_far(coef, &at.row, at.from, at.to);
+            else heisenberg_sweep2_near(coef, &at.row, at.from, at.to);
+            heisenberg_ends(s->x[0] + at.row.at[0], s->length, at.from, at.to);
+            heisenberg_ends(s->x[2] + at.row.at[0], s->length, at.from, at.to);
+        }
+        break;
+    default: /* H_3 */
+        for (size_t unit = first; unit < end; ++unit) {
+            const heisenberg_piece at = heisenberg_piece_of(s, unit);
+            if (far) heisenberg_sweep3_far(coef, &at.row, at.from, at.to);
+            else heisenberg_sweep3_near(coef, &at.row, at.from, at.to);
+            heisenberg_ends(s->x[0] + at.row.at[0], s->length, at.from, at.to);
+            heisenberg_ends(s->x[1] + at.row.at[0], s->length, at.from, at.to);
+        }
+        break;
     }
 }
 
@@ -499,16 +480,6 @@ static void heisenberg_put_parameters(heisenberg_solver *s, const heisenberg_par
 {
     heisenberg_put_parameter(s, s->x[3], params->B, 0.2);
     s->params.B = NULL;
-}
-
-static void heisenberg_sweep_rows(
-    const heisenberg_solver *s, int part, const double *coef, int far, size_t first, size_t end)
-{
-    switch (part) {
-    case 1: heisenberg_part1(s, coef, far, first, end); break;
-    case 2: heisenberg_part2(s, coef, far, first, end); break;
-    default: heisenberg_part3(s, coef, far, first, end); break;
-    }
 }
 
 /* ---- The lattice ---- */

@@ -21,7 +21,7 @@
  *   4. The solver
  *   5. The flows
  *   6. What is seen at sites
- * body-sha256: f0c34fa0ee0e0a57be360bebc18af8cb165ef57cdee65787c5a1f66e5231c3c3
+ * body-sha256: b8ffb1f66f476d3f35a2ee6855b2d7ce54af043567e0acd90e5c60701256cb30
  */
 #include "heisenberg_plane.h"
 
@@ -235,19 +235,6 @@ static inline void heisenberg_plane_sweep1(const double *coef, const heisenberg_
     }
 }
 
-/* The flow of H_1, for the pieces of rows from first on, before end. */
-static void heisenberg_plane_part1(
-    const heisenberg_plane_solver *s, const double *coef, int far, size_t first, size_t end)
-{
-    (void)far;
-    for (size_t unit = first; unit < end; ++unit) {
-        const heisenberg_plane_piece at = heisenberg_plane_piece_of(s, unit);
-        heisenberg_plane_sweep1(coef, &at.row, at.from, at.to);
-        heisenberg_plane_ends(s->x[1] + at.row.at[0], s->length, at.from, at.to);
-        heisenberg_plane_ends(s->x[2] + at.row.at[0], s->length, at.from, at.to);
-    }
-}
-
 /* the flow of H_2 = sum of -(J*(y*y[i+1]) + J*(y*y[j+1])): x, z turned */
 static inline void heisenberg_plane_sweep2(const double *coef, const heisenberg_plane_row *row,
     ptrdiff_t from, ptrdiff_t to)
@@ -271,19 +258,6 @@ static inline void heisenberg_plane_sweep2(const double *coef, const heisenberg_
         const double change1 = -(x * t2 + z * t3);
         x_row[i] = x + change0;
         z_row[i] = z + change1;
-    }
-}
-
-/* The flow of H_2, for the pieces of rows from first on, before end. */
-static void heisenberg_plane_part2(
-    const heisenberg_plane_solver *s, const double *coef, int far, size_t first, size_t end)
-{
-    (void)far;
-    for (size_t unit = first; unit < end; ++unit) {
-        const heisenberg_plane_piece at = heisenberg_plane_piece_of(s, unit);
-        heisenberg_plane_sweep2(coef, &at.row, at.from, at.to);
-        heisenberg_plane_ends(s->x[0] + at.row.at[0], s->length, at.from, at.to);
-        heisenberg_plane_ends(s->x[2] + at.row.at[0], s->length, at.from, at.to);
     }
 }
 
@@ -313,16 +287,36 @@ static inline void heisenberg_plane_sweep3(const double *coef, const heisenberg_
     }
 }
 
-/* The flow of H_3, for the pieces of rows from first on, before end. */
-static void heisenberg_plane_part3(
-    const heisenberg_plane_solver *s, const double *coef, int far, size_t first, size_t end)
+/* The flow of a part of H, for the pieces of rows from first on, before end. */
+static void heisenberg_plane_sweep_rows(const heisenberg_plane_solver *s, int part, const double *coef,
+    int far, size_t first, size_t end)
 {
     (void)far;
-    for (size_t unit = first; unit < end; ++unit) {
-        const heisenberg_plane_piece at = heisenberg_plane_piece_of(s, unit);
-        heisenberg_plane_sweep3(coef, &at.row, at.from, at.to);
-        heisenberg_plane_ends(s->x[0] + at.row.at[0], s->length, at.from, at.to);
-        heisenberg_plane_ends(s->x[1] + at.row.at[0], s->length, at.from, at.to);
+    switch (part) {
+    case 1: /* H_1 */
+        for (size_t unit = first; unit < end; ++unit) {
+            const heisenberg_plane_piece at = heisenberg_plane_piece_of(s, unit);
+            heisenberg_plane_sweep1(coef, &at.row, at.from, at.to);
+            heisenberg_plane_ends(s->x[1] + at.row.at[0], s->length, at.from, at.to);
+            heisenberg_plane_ends(s->x[2] + at.row.at[0], s->length, at.from, at.to);
+        }
+        break;
+    case 2: /* H_2 */
+        for (size_t unit = first; unit < end; ++unit) {
+            const heisenberg_plane_piece at = heisenberg_plane_piece_of(s, unit);
+            heisenberg_plane_sweep2(coef, &at.row, at.from, at.to);
+            heisenberg_plane_ends(s->x[0] + at.row.at[0], s->length, at.from, at.to);
+            heisenberg_plane_ends(s->x[2] + at.row.at[0], s->length, at.from, at.to);
+        }
+        break;
+    default: /* H_3 */
+        for (size_t unit = first; unit < end; ++unit) {
+            const heisenberg_plane_piece at = heisenberg_plane_piece_of(s, unit);
+            heisenberg_plane_sweep3(coef, &at.row, at.from, at.to);
+            heisenberg_plane_ends(s->x[0] + at.row.at[0], s->length, at.from, at.to);
+            heisenberg_plane_ends(s->x[1] + at.row.at[0], s->length, at.from, at.to);
+        }
+        break;
     }
 }
 
@@ -392,16 +386,6 @@ static void heisenberg_plane_vector_field_row(const heisenberg_plane_params *par
         out[i - from] = y * t1 - z * t2;
         out[(ptrdiff_t)apart + i - from] = z * t3 - x * t1;
         out[2 * (ptrdiff_t)apart + i - from] = x * t2 - y * t3;
-    }
-}
-
-static void heisenberg_plane_sweep_rows(
-    const heisenberg_plane_solver *s, int part, const double *coef, int far, size_t first, size_t end)
-{
-    switch (part) {
-    case 1: heisenberg_plane_part1(s, coef, far, first, end); break;
-    case 2: heisenberg_plane_part2(s, coef, far, first, end); break;
-    default: heisenberg_plane_part3(s, coef, far, first, end); break;
     }
 }
 

@@ -22,7 +22,7 @@
  *   5. The stages
  *   6. Newton's method where sweeps fail
  *   7. What is seen at sites
- * body-sha256: ba9662be8b47a9eca26bf672ea48a5eebdac8b34844e1ff9ed3b9ce3b590fc1d
+ * body-sha256: 54a1b4b430fa890bcb5e644a3a80fa99b44c698dc4f8f79e74d6dab140d5978f
  */
 #include "kdv.h"
 
@@ -234,8 +234,8 @@ static inline void kdv_relax(const double *coef, const kdv_row *row, ptrdiff_t f
 }
 
 /* A sweep, from s->y[now] to the other, for the pieces of rows from first on, before end. */
-static void kdv_relax_rows(
-    const kdv_solver *s, const double *coef, int far, int now, kdv_extent *extent, size_t first, size_t end)
+static void kdv_relax_rows(const kdv_solver *s, const double *coef, int far, int now, kdv_extent *extent,
+    size_t first, size_t end)
 {
     (void)far;
     for (size_t unit = first; unit < end; ++unit) {
@@ -267,8 +267,8 @@ static inline void kdv_increment(const double *coef, const kdv_row *row, ptrdiff
 }
 
 /* The end of a stage, for the pieces of rows from first on, before end. */
-static void kdv_increment_rows(
-    const kdv_solver *s, const double *coef, int far, int now, size_t first, size_t end)
+static void kdv_increment_rows(const kdv_solver *s, const double *coef, int far, int now, size_t first,
+    size_t end)
 {
     (void)far;
     for (size_t unit = first; unit < end; ++unit) {
@@ -298,8 +298,8 @@ static inline void kdv_slope(const double *coef, const kdv_row *row, ptrdiff_t f
 
 /* How a sweep follows s->y[now] along s->v, to the other, for the pieces of rows from first on, before
    end. */
-static void kdv_slope_rows(
-    const kdv_solver *s, const double *coef, int far, int now, size_t first, size_t end)
+static void kdv_slope_rows(const kdv_solver *s, const double *coef, int far, int now, size_t first,
+    size_t end)
 {
     (void)far;
     for (size_t unit = first; unit < end; ++unit) {

@@ -21,7 +21,7 @@
  *   4. The solver
  *   5. The flows
  *   6. What is seen at sites
- * body-sha256: 9c6318524afa2e700503e9f28744ec81118706394bdce34995469dcde8045b35
+ * body-sha256: 22f4d43a11a34acfd833265e3b2a6eea2cf695375df41883f82f06ee5ede33f3
  */
 #include "klein_gordon.h"
 
@@ -165,18 +165,6 @@ static inline void klein_gordon_sweep1(const double *coef, const klein_gordon_ro
     }
 }
 
-/* The flow of H_1, for the pieces of rows from first on, before end. */
-static void klein_gordon_part1(
-    const klein_gordon_solver *s, const double *coef, int far, size_t first, size_t end)
-{
-    (void)far;
-    for (size_t unit = first; unit < end; ++unit) {
-        const klein_gordon_piece at = klein_gordon_piece_of(s, unit);
-        klein_gordon_sweep1(coef, &at.row, at.from, at.to);
-        klein_gordon_ends(s->x[1] + at.row.at[0], s->length, at.from, at.to);
-    }
-}
-
 /* the flow of H_2 = sum of 1/2*p**2: q shifted */
 static inline void klein_gordon_sweep2(const double *coef, const klein_gordon_row *row, ptrdiff_t from,
     ptrdiff_t to)
@@ -191,15 +179,26 @@ static inline void klein_gordon_sweep2(const double *coef, const klein_gordon_ro
     }
 }
 
-/* The flow of H_2, for the pieces of rows from first on, before end. */
-static void klein_gordon_part2(
-    const klein_gordon_solver *s, const double *coef, int far, size_t first, size_t end)
+/* The flow of a part of H, for the pieces of rows from first on, before end. */
+static void klein_gordon_sweep_rows(const klein_gordon_solver *s, int part, const double *coef, int far,
+    size_t first, size_t end)
 {
     (void)far;
-    for (size_t unit = first; unit < end; ++unit) {
-        const klein_gordon_piece at = klein_gordon_piece_of(s, unit);
-        klein_gordon_sweep2(coef, &at.row, at.from, at.to);
-        klein_gordon_ends(s->x[0] + at.row.at[0], s->length, at.from, at.to);
+    switch (part) {
+    case 1: /* H_1 */
+        for (size_t unit = first; unit < end; ++unit) {
+            const klein_gordon_piece at = klein_gordon_piece_of(s, unit);
+            klein_gordon_sweep1(coef, &at.row, at.from, at.to);
+            klein_gordon_ends(s->x[1] + at.row.at[0], s->length, at.from, at.to);
+        }
+        break;
+    default: /* H_2 */
+        for (size_t unit = first; unit < end; ++unit) {
+            const klein_gordon_piece at = klein_gordon_piece_of(s, unit);
+            klein_gordon_sweep2(coef, &at.row, at.from, at.to);
+            klein_gordon_ends(s->x[0] + at.row.at[0], s->length, at.from, at.to);
+        }
+        break;
     }
 }
 
@@ -248,15 +247,6 @@ static void klein_gordon_vector_field_row(const klein_gordon_params *params, con
         out[i - from] = p;
         out[(ptrdiff_t)apart + i - from] = -((q - q_row[i - 1]) * t2 + (q * (q * q - 1.0) - (q_row[i + 1] - q)
             * t2));
-    }
-}
-
-static void klein_gordon_sweep_rows(
-    const klein_gordon_solver *s, int part, const double *coef, int far, size_t first, size_t end)
-{
-    switch (part) {
-    case 1: klein_gordon_part1(s, coef, far, first, end); break;
-    default: klein_gordon_part2(s, coef, far, first, end); break;
     }
 }
 

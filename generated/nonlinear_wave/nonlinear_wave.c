@@ -21,7 +21,7 @@
  *   4. The solver
  *   5. The flows
  *   6. What is seen at sites
- * body-sha256: c0dc942e5dbb992ea56976ce073b5a6bbaf4033a734e6bb60503f116afd633ab
+ * body-sha256: d4532768327cbc6b4d2fc7d70ba71ce785d5fc722d59ec69bdf7e1ad775f8954
  */
 #include "nonlinear_wave.h"
 
@@ -170,18 +170,6 @@ static inline void nonlinear_wave_sweep1(const double *coef, const nonlinear_wav
     }
 }
 
-/* The flow of H_1, for the pieces of rows from first on, before end. */
-static void nonlinear_wave_part1(
-    const nonlinear_wave_solver *s, const double *coef, int far, size_t first, size_t end)
-{
-    (void)far;
-    for (size_t unit = first; unit < end; ++unit) {
-        const nonlinear_wave_piece at = nonlinear_wave_piece_of(s, unit);
-        nonlinear_wave_sweep1(coef, &at.row, at.from, at.to);
-        nonlinear_wave_ends(s->x[1] + at.row.at[0], s->length, at.from, at.to);
-    }
-}
-
 /* the flow of H_2 = sum of 1/2*(d*v**2): u shifted */
 static inline void nonlinear_wave_sweep2(const double *coef, const nonlinear_wave_row *row, ptrdiff_t from,
     ptrdiff_t to)
@@ -196,15 +184,26 @@ static inline void nonlinear_wave_sweep2(const double *coef, const nonlinear_wav
     }
 }
 
-/* The flow of H_2, for the pieces of rows from first on, before end. */
-static void nonlinear_wave_part2(
-    const nonlinear_wave_solver *s, const double *coef, int far, size_t first, size_t end)
+/* The flow of a part of H, for the pieces of rows from first on, before end. */
+static void nonlinear_wave_sweep_rows(const nonlinear_wave_solver *s, int part, const double *coef, int far,
+    size_t first, size_t end)
 {
     (void)far;
-    for (size_t unit = first; unit < end; ++unit) {
-        const nonlinear_wave_piece at = nonlinear_wave_piece_of(s, unit);
-        nonlinear_wave_sweep2(coef, &at.row, at.from, at.to);
-        nonlinear_wave_ends(s->x[0] + at.row.at[0], s->length, at.from, at.to);
+    switch (part) {
+    case 1: /* H_1 */
+        for (size_t unit = first; unit < end; ++unit) {
+            const nonlinear_wave_piece at = nonlinear_wave_piece_of(s, unit);
+            nonlinear_wave_sweep1(coef, &at.row, at.from, at.to);
+            nonlinear_wave_ends(s->x[1] + at.row.at[0], s->length, at.from, at.to);
+        }
+        break;
+    default: /* H_2 */
+        for (size_t unit = first; unit < end; ++unit) {
+            const nonlinear_wave_piece at = nonlinear_wave_piece_of(s, unit);
+            nonlinear_wave_sweep2(coef, &at.row, at.from, at.to);
+            nonlinear_wave_ends(s->x[0] + at.row.at[0], s->length, at.from, at.to);
+        }
+        break;
     }
 }
 
@@ -255,15 +254,6 @@ static void nonlinear_wave_vector_field_row(const nonlinear_wave_params *params,
         out[i - from] = t2 * (d * v_row[i + 1]) - t2 * (d * v);
         out[(ptrdiff_t)apart + i - from] = t2 * (d * u + t3 * (u * (u * u))) - t2 * (d * u_row[i - 1] + t3
             * (u_row[i - 1] * (u_row[i - 1] * u_row[i - 1])));
-    }
-}
-
-static void nonlinear_wave_sweep_rows(
-    const nonlinear_wave_solver *s, int part, const double *coef, int far, size_t first, size_t end)
-{
-    switch (part) {
-    case 1: nonlinear_wave_part1(s, coef, far, first, end); break;
-    default: nonlinear_wave_part2(s, coef, far, first, end); break;
     }
 }
 

@@ -21,7 +21,7 @@
  *   4. The solver
  *   5. The flows
  *   6. What is seen at sites
- * body-sha256: b90f7bb6f9563a69e282faae18c958e9bdc961b022f9fe198290c549af65843d
+ * body-sha256: c2e0698c6609d55046ab9763b5db02419b6eeac5cc3f346612a33b249acbaf0b
  */
 #include "outer_planets.h"
 
@@ -182,7 +182,7 @@ static inline void outer_planets_gather1(const double *coef, const outer_planets
 }
 
 /* the flow of H_1 = sum of -m[b]*(G*m[a])*((z[a] - z[b])**2 + ((x[a] - x[b])**2 + (y[a] - y[b])**2))**(-1/2):
-   px, py, pz shifted */
+      px, py, pz shifted */
 static inline void outer_planets_sweep1(const double *coef, const outer_planets_row *row, ptrdiff_t from,
     ptrdiff_t to)
 {
@@ -198,18 +198,6 @@ static inline void outer_planets_sweep1(const double *coef, const outer_planets_
         px_row[i] += change0;
         py_row[i] += change1;
         pz_row[i] += change2;
-    }
-}
-
-/* The flow of H_1, for the pieces of rows from first on, before end. */
-static void outer_planets_part1(
-    const outer_planets_solver *s, const double *coef, int far, size_t first, size_t end)
-{
-    (void)far;
-    for (size_t unit = first; unit < end; ++unit) {
-        const outer_planets_piece at = outer_planets_piece_of(s, unit);
-        outer_planets_gather1(coef, &at.row, at.from, at.to);
-        outer_planets_sweep1(coef, &at.row, at.from, at.to);
     }
 }
 
@@ -238,14 +226,25 @@ static inline void outer_planets_sweep2(const double *coef, const outer_planets_
     }
 }
 
-/* The flow of H_2, for the pieces of rows from first on, before end. */
-static void outer_planets_part2(
-    const outer_planets_solver *s, const double *coef, int far, size_t first, size_t end)
+/* The flow of a part of H, for the pieces of rows from first on, before end. */
+static void outer_planets_sweep_rows(const outer_planets_solver *s, int part, const double *coef, int far,
+    size_t first, size_t end)
 {
     (void)far;
-    for (size_t unit = first; unit < end; ++unit) {
-        const outer_planets_piece at = outer_planets_piece_of(s, unit);
-        outer_planets_sweep2(coef, &at.row, at.from, at.to);
+    switch (part) {
+    case 1: /* H_1 */
+        for (size_t unit = first; unit < end; ++unit) {
+            const outer_planets_piece at = outer_planets_piece_of(s, unit);
+            outer_planets_gather1(coef, &at.row, at.from, at.to);
+            outer_planets_sweep1(coef, &at.row, at.from, at.to);
+        }
+        break;
+    default: /* H_2 */
+        for (size_t unit = first; unit < end; ++unit) {
+            const outer_planets_piece at = outer_planets_piece_of(s, unit);
+            outer_planets_sweep2(coef, &at.row, at.from, at.to);
+        }
+        break;
     }
 }
 
@@ -363,15 +362,6 @@ static void outer_planets_put_parameters(outer_planets_solver *s, const outer_pl
 {
     outer_planets_put_parameter(s, s->x[6], params->m, 1.0);
     s->params.m = NULL;
-}
-
-static void outer_planets_sweep_rows(
-    const outer_planets_solver *s, int part, const double *coef, int far, size_t first, size_t end)
-{
-    switch (part) {
-    case 1: outer_planets_part1(s, coef, far, first, end); break;
-    default: outer_planets_part2(s, coef, far, first, end); break;
-    }
 }
 
 /* ---- The lattice ---- */

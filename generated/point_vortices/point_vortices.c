@@ -22,7 +22,7 @@
  *   4. The solver
  *   5. The stages
  *   6. What is seen at sites
- * body-sha256: ef1be2007c8d4d2cab19453f0828a2b69ff1630a9af94400a95630002691e04a
+ * body-sha256: 085f99d817ce8172bc0e9e03a372ed9af6f0b4c2661884f05701bccfd1fa8598
  */
 #include "point_vortices.h"
 
@@ -211,10 +211,10 @@ static inline double point_vortices_log_lane(double u)
 static inline void point_vortices_pair_forces(const point_vortices_params *params,
     const point_vortices_row *row, ptrdiff_t from, ptrdiff_t to)
 {
-    (void)params;
     const double *restrict G_row = row->x[2] + row->at[0];
     const double *restrict x_row = row->x[0] + row->at[0];
     const double *restrict y_row = row->x[1] + row->at[0];
+    (void)params;
     double *restrict g0 = row->gathered[0];
     double *restrict g1 = row->gathered[1];
     for (ptrdiff_t i = from; i < to; ++i) g0[i] = g1[i] = 0.0;
@@ -236,10 +236,10 @@ static inline void point_vortices_pair_forces(const point_vortices_params *param
 static inline void point_vortices_pair_energy(const point_vortices_params *params,
     const point_vortices_row *row, ptrdiff_t from, ptrdiff_t to)
 {
-    (void)params;
     const double *restrict G_row = row->x[2] + row->at[0];
     const double *restrict x_row = row->x[0] + row->at[0];
     const double *restrict y_row = row->x[1] + row->at[0];
+    (void)params;
     double *restrict g0 = row->gathered[0];
     for (ptrdiff_t i = from; i < to; ++i) g0[i] = 0.0;
     for (ptrdiff_t j = 0; j < row->length; ++j) {
@@ -275,7 +275,7 @@ static inline void point_vortices_relax(const double *coef, const point_vortices
 }
 
 /* A sweep, from s->y[now] to the other, for the pieces of rows from first on, before end. */
-static void point_vortices_relax_rows( const point_vortices_solver *s, const double *coef, int far, int now,
+static void point_vortices_relax_rows(const point_vortices_solver *s, const double *coef, int far, int now,
     point_vortices_extent *extent, size_t first, size_t end)
 {
     (void)far;
@@ -308,8 +308,8 @@ static inline void point_vortices_increment(const double *coef, const point_vort
 }
 
 /* The end of a stage, for the pieces of rows from first on, before end. */
-static void point_vortices_increment_rows(
-    const point_vortices_solver *s, const double *coef, int far, int now, size_t first, size_t end)
+static void point_vortices_increment_rows(const point_vortices_solver *s, const double *coef, int far,
+    int now, size_t first, size_t end)
 {
     (void)far;
     for (size_t unit = first; unit < end; ++unit) {

@@ -21,7 +21,7 @@
  *   4. The solver
  *   5. The flows
  *   6. What is seen at sites
- * body-sha256: fa107853a4e34b783bfa4cb08ada818fd255b16cb39f50f16e8b22b1bc7cdb3f
+ * body-sha256: c53da09f87f8072d1e2b9f0006a4520c2f234e1395dac5d7dd9627af542439e3
  */
 #include "sine_gordon.h"
 
@@ -202,18 +202,6 @@ static inline void sine_gordon_sweep1(const double *coef, const sine_gordon_row 
     }
 }
 
-/* The flow of H_1, for the pieces of rows from first on, before end. */
-static void sine_gordon_part1(
-    const sine_gordon_solver *s, const double *coef, int far, size_t first, size_t end)
-{
-    (void)far;
-    for (size_t unit = first; unit < end; ++unit) {
-        const sine_gordon_piece at = sine_gordon_piece_of(s, unit);
-        sine_gordon_sweep1(coef, &at.row, at.from, at.to);
-        sine_gordon_ends(s->x[1] + at.row.at[0], s->length, at.from, at.to);
-    }
-}
-
 /* the flow of H_2 = sum of 1 + 1/2*p**2: q shifted */
 static inline void sine_gordon_sweep2(const double *coef, const sine_gordon_row *row, ptrdiff_t from,
     ptrdiff_t to)
@@ -228,15 +216,26 @@ static inline void sine_gordon_sweep2(const double *coef, const sine_gordon_row 
     }
 }
 
-/* The flow of H_2, for the pieces of rows from first on, before end. */
-static void sine_gordon_part2(
-    const sine_gordon_solver *s, const double *coef, int far, size_t first, size_t end)
+/* The flow of a part of H, for the pieces of rows from first on, before end. */
+static void sine_gordon_sweep_rows(const sine_gordon_solver *s, int part, const double *coef, int far,
+    size_t first, size_t end)
 {
     (void)far;
-    for (size_t unit = first; unit < end; ++unit) {
-        const sine_gordon_piece at = sine_gordon_piece_of(s, unit);
-        sine_gordon_sweep2(coef, &at.row, at.from, at.to);
-        sine_gordon_ends(s->x[0] + at.row.at[0], s->length, at.from, at.to);
+    switch (part) {
+    case 1: /* H_1 */
+        for (size_t unit = first; unit < end; ++unit) {
+            const sine_gordon_piece at = sine_gordon_piece_of(s, unit);
+            sine_gordon_sweep1(coef, &at.row, at.from, at.to);
+            sine_gordon_ends(s->x[1] + at.row.at[0], s->length, at.from, at.to);
+        }
+        break;
+    default: /* H_2 */
+        for (size_t unit = first; unit < end; ++unit) {
+            const sine_gordon_piece at = sine_gordon_piece_of(s, unit);
+            sine_gordon_sweep2(coef, &at.row, at.from, at.to);
+            sine_gordon_ends(s->x[0] + at.row.at[0], s->length, at.from, at.to);
+        }
+        break;
     }
 }
 
@@ -284,15 +283,6 @@ static void sine_gordon_vector_field_row(const sine_gordon_params *params, const
         out[i - from] = p;
         out[(ptrdiff_t)apart + i - from] = -(sine_gordon_sin_lane(q) + ((q - q_row[i - 1]) * t2
             - (q_row[i + 1] - q) * t2));
-    }
-}
-
-static void sine_gordon_sweep_rows(
-    const sine_gordon_solver *s, int part, const double *coef, int far, size_t first, size_t end)
-{
-    switch (part) {
-    case 1: sine_gordon_part1(s, coef, far, first, end); break;
-    default: sine_gordon_part2(s, coef, far, first, end); break;
     }
 }
 

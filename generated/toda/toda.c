@@ -21,7 +21,7 @@
  *   4. The solver
  *   5. The flows
  *   6. What is seen at sites
- * body-sha256: 774c5d080ebc4f403c98f43c5ebc078de6ba73786db041f992152d6c148e0d3f
+ * body-sha256: e615aac474f623b6a16f2a19a34313b8187f6d77cec20f2edfb5b37f06198df3
  */
 #include "toda.h"
 
@@ -195,18 +195,6 @@ static inline void toda_sweep1(const double *coef, const toda_row *row, ptrdiff_
     }
 }
 
-/* The flow of H_1, for the pieces of rows from first on, before end. */
-static void toda_part1(
-    const toda_solver *s, const double *coef, int far, size_t first, size_t end)
-{
-    (void)far;
-    for (size_t unit = first; unit < end; ++unit) {
-        const toda_piece at = toda_piece_of(s, unit);
-        toda_sweep1(coef, &at.row, at.from, at.to);
-        toda_ends(s->x[1] + at.row.at[0], s->length, at.from, at.to);
-    }
-}
-
 /* the flow of H_2 = sum of 1/2*b**2: a scaled */
 static inline void toda_sweep2(const double *coef, const toda_row *row, ptrdiff_t from, ptrdiff_t to)
 {
@@ -220,15 +208,26 @@ static inline void toda_sweep2(const double *coef, const toda_row *row, ptrdiff_
     }
 }
 
-/* The flow of H_2, for the pieces of rows from first on, before end. */
-static void toda_part2(
-    const toda_solver *s, const double *coef, int far, size_t first, size_t end)
+/* The flow of a part of H, for the pieces of rows from first on, before end. */
+static void toda_sweep_rows(const toda_solver *s, int part, const double *coef, int far, size_t first,
+    size_t end)
 {
     (void)far;
-    for (size_t unit = first; unit < end; ++unit) {
-        const toda_piece at = toda_piece_of(s, unit);
-        toda_sweep2(coef, &at.row, at.from, at.to);
-        toda_ends(s->x[0] + at.row.at[0], s->length, at.from, at.to);
+    switch (part) {
+    case 1: /* H_1 */
+        for (size_t unit = first; unit < end; ++unit) {
+            const toda_piece at = toda_piece_of(s, unit);
+            toda_sweep1(coef, &at.row, at.from, at.to);
+            toda_ends(s->x[1] + at.row.at[0], s->length, at.from, at.to);
+        }
+        break;
+    default: /* H_2 */
+        for (size_t unit = first; unit < end; ++unit) {
+            const toda_piece at = toda_piece_of(s, unit);
+            toda_sweep2(coef, &at.row, at.from, at.to);
+            toda_ends(s->x[0] + at.row.at[0], s->length, at.from, at.to);
+        }
+        break;
     }
 }
 
@@ -273,15 +272,6 @@ static void toda_vector_field_row(const toda_params *params, const toda_row *row
         const double a = a_row[i], b = b_row[i];
         out[i - from] = a * b_row[i + 1] - a * b;
         out[(ptrdiff_t)apart + i - from] = 2.0 * (a * a) - 2.0 * (a_row[i - 1] * a_row[i - 1]);
-    }
-}
-
-static void toda_sweep_rows(
-    const toda_solver *s, int part, const double *coef, int far, size_t first, size_t end)
-{
-    switch (part) {
-    case 1: toda_part1(s, coef, far, first, end); break;
-    default: toda_part2(s, coef, far, first, end); break;
     }
 }
 

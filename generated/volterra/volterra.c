@@ -21,7 +21,7 @@
  *   4. The solver
  *   5. The flows
  *   6. What is seen at sites
- * body-sha256: d67a88de5ecbd345a88c72233d4e35ee19fe64ea4d5ce0009d36afcadb133971
+ * body-sha256: db04c7c4888b5af2a9dd91cd7f7c33c2fe3bc76fd5fbc55c27a30b246f07fb6b
  */
 #include "volterra.h"
 
@@ -213,18 +213,6 @@ static inline void volterra_sweep1(const double *coef, const volterra_row *row, 
     }
 }
 
-/* The flow of H_1, for the pieces of rows from first on, before end. */
-static void volterra_part1(
-    const volterra_solver *s, const double *coef, int far, size_t first, size_t end)
-{
-    (void)far;
-    for (size_t unit = first; unit < end; ++unit) {
-        const volterra_piece at = volterra_piece_of(s, unit);
-        volterra_sweep1(coef, &at.row, at.from, at.to);
-        volterra_ends(s->x[0] + at.row.at[0], s->length, at.from, at.to);
-    }
-}
-
 /* the flow of H_2 = sum of a: a scaled */
 static inline void volterra_sweep2(const double *coef, const volterra_row *row, ptrdiff_t from, ptrdiff_t to)
 {
@@ -237,15 +225,26 @@ static inline void volterra_sweep2(const double *coef, const volterra_row *row, 
     }
 }
 
-/* The flow of H_2, for the pieces of rows from first on, before end. */
-static void volterra_part2(
-    const volterra_solver *s, const double *coef, int far, size_t first, size_t end)
+/* The flow of a part of H, for the pieces of rows from first on, before end. */
+static void volterra_sweep_rows(const volterra_solver *s, int part, const double *coef, int far, size_t first,
+    size_t end)
 {
     (void)far;
-    for (size_t unit = first; unit < end; ++unit) {
-        const volterra_piece at = volterra_piece_of(s, unit);
-        volterra_sweep2(coef, &at.row, at.from, at.to);
-        volterra_ends(s->x[0] + at.row.at[0], s->length, at.from, at.to);
+    switch (part) {
+    case 1: /* H_1 */
+        for (size_t unit = first; unit < end; ++unit) {
+            const volterra_piece at = volterra_piece_of(s, unit);
+            volterra_sweep1(coef, &at.row, at.from, at.to);
+            volterra_ends(s->x[0] + at.row.at[0], s->length, at.from, at.to);
+        }
+        break;
+    default: /* H_2 */
+        for (size_t unit = first; unit < end; ++unit) {
+            const volterra_piece at = volterra_piece_of(s, unit);
+            volterra_sweep2(coef, &at.row, at.from, at.to);
+            volterra_ends(s->x[0] + at.row.at[0], s->length, at.from, at.to);
+        }
+        break;
     }
 }
 
@@ -285,15 +284,6 @@ static void volterra_vector_field_row(const volterra_params *params, const volte
     for (ptrdiff_t i = from; i < to; ++i) {
         const double a = a_row[i];
         out[i - from] = a * a_row[i + 1] - a * a_row[i - 1];
-    }
-}
-
-static void volterra_sweep_rows(
-    const volterra_solver *s, int part, const double *coef, int far, size_t first, size_t end)
-{
-    switch (part) {
-    case 1: volterra_part1(s, coef, far, first, end); break;
-    default: volterra_part2(s, coef, far, first, end); break;
     }
 }
 

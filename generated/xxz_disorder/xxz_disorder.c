@@ -21,7 +21,7 @@
  *   4. The solver
  *   5. The flows
  *   6. What is seen at sites
- * body-sha256: e263e4b49d950e70e6d53a3bdb8fa3c2e233c12bc045e630a8c7ee13124ca153
+ * body-sha256: 18d6aeb03383a8de344245b0b37530222ef24d56e0db4510821276ced16c2a58
  */
 #include "xxz_disorder.h"
 
@@ -209,19 +209,6 @@ static inline void xxz_disorder_sweep1(const double *coef, const xxz_disorder_ro
     }
 }
 
-/* The flow of H_1, for the pieces of rows from first on, before end. */
-static void xxz_disorder_part1(
-    const xxz_disorder_solver *s, const double *coef, int far, size_t first, size_t end)
-{
-    (void)far;
-    for (size_t unit = first; unit < end; ++unit) {
-        const xxz_disorder_piece at = xxz_disorder_piece_of(s, unit);
-        xxz_disorder_sweep1(coef, &at.row, at.from, at.to);
-        xxz_disorder_ends(s->x[0] + at.row.at[0], s->length, at.from, at.to);
-        xxz_disorder_ends(s->x[2] + at.row.at[0], s->length, at.from, at.to);
-    }
-}
-
 /* the flow of H_2 = sum of J*(x*x[i+1]): y, z turned */
 static inline void xxz_disorder_sweep2(const double *coef, const xxz_disorder_row *row, ptrdiff_t from,
     ptrdiff_t to)
@@ -240,19 +227,6 @@ static inline void xxz_disorder_sweep2(const double *coef, const xxz_disorder_ro
         const double change1 = y * t3 - z * t2;
         y_row[i] = y + change0;
         z_row[i] = z + change1;
-    }
-}
-
-/* The flow of H_2, for the pieces of rows from first on, before end. */
-static void xxz_disorder_part2(
-    const xxz_disorder_solver *s, const double *coef, int far, size_t first, size_t end)
-{
-    (void)far;
-    for (size_t unit = first; unit < end; ++unit) {
-        const xxz_disorder_piece at = xxz_disorder_piece_of(s, unit);
-        xxz_disorder_sweep2(coef, &at.row, at.from, at.to);
-        xxz_disorder_ends(s->x[1] + at.row.at[0], s->length, at.from, at.to);
-        xxz_disorder_ends(s->x[2] + at.row.at[0], s->length, at.from, at.to);
     }
 }
 
@@ -278,16 +252,36 @@ static inline void xxz_disorder_sweep3(const double *coef, const xxz_disorder_ro
     }
 }
 
-/* The flow of H_3, for the pieces of rows from first on, before end. */
-static void xxz_disorder_part3(
-    const xxz_disorder_solver *s, const double *coef, int far, size_t first, size_t end)
+/* The flow of a part of H, for the pieces of rows from first on, before end. */
+static void xxz_disorder_sweep_rows(const xxz_disorder_solver *s, int part, const double *coef, int far,
+    size_t first, size_t end)
 {
     (void)far;
-    for (size_t unit = first; unit < end; ++unit) {
-        const xxz_disorder_piece at = xxz_disorder_piece_of(s, unit);
-        xxz_disorder_sweep3(coef, &at.row, at.from, at.to);
-        xxz_disorder_ends(s->x[0] + at.row.at[0], s->length, at.from, at.to);
-        xxz_disorder_ends(s->x[1] + at.row.at[0], s->length, at.from, at.to);
+    switch (part) {
+    case 1: /* H_1 */
+        for (size_t unit = first; unit < end; ++unit) {
+            const xxz_disorder_piece at = xxz_disorder_piece_of(s, unit);
+            xxz_disorder_sweep1(coef, &at.row, at.from, at.to);
+            xxz_disorder_ends(s->x[0] + at.row.at[0], s->length, at.from, at.to);
+            xxz_disorder_ends(s->x[2] + at.row.at[0], s->length, at.from, at.to);
+        }
+        break;
+    case 2: /* H_2 */
+        for (size_t unit = first; unit < end; ++unit) {
+            const xxz_disorder_piece at = xxz_disorder_piece_of(s, unit);
+            xxz_disorder_sweep2(coef, &at.row, at.from, at.to);
+            xxz_disorder_ends(s->x[1] + at.row.at[0], s->length, at.from, at.to);
+            xxz_disorder_ends(s->x[2] + at.row.at[0], s->length, at.from, at.to);
+        }
+        break;
+    default: /* H_3 */
+        for (size_t unit = first; unit < end; ++unit) {
+            const xxz_disorder_piece at = xxz_disorder_piece_of(s, unit);
+            xxz_disorder_sweep3(coef, &at.row, at.from, at.to);
+            xxz_disorder_ends(s->x[0] + at.row.at[0], s->length, at.from, at.to);
+            xxz_disorder_ends(s->x[1] + at.row.at[0], s->length, at.from, at.to);
+        }
+        break;
     }
 }
 
@@ -353,16 +347,6 @@ static void xxz_disorder_put_parameters(xxz_disorder_solver *s, const xxz_disord
 {
     xxz_disorder_put_parameter(s, s->x[3], params->B, 1.0);
     s->params.B = NULL;
-}
-
-static void xxz_disorder_sweep_rows(
-    const xxz_disorder_solver *s, int part, const double *coef, int far, size_t first, size_t end)
-{
-    switch (part) {
-    case 1: xxz_disorder_part1(s, coef, far, first, end); break;
-    case 2: xxz_disorder_part2(s, coef, far, first, end); break;
-    default: xxz_disorder_part3(s, coef, far, first, end); break;
-    }
 }
 
 /* ---- The lattice ---- */

@@ -92,7 +92,8 @@ class SiteMotion:
     """How sites of one colour move: increments of the fields, which read the site and neighbours that stand still.
 
     ``gathered`` are the sums over bonds or pairs that the increments read as symbols `GATHERED`.
-    ``solution`` are the increments with a symbol for each component of the gradient, which solve ẋ = ``rates``.
+    ``solution`` are the increments with a symbol for each component of the gradient, which solve ẋ = ``rates``;
+    ``manner`` says how the fields move.
     """
 
     colour: int
@@ -100,6 +101,7 @@ class SiteMotion:
     gathered: tuple[BondSum, ...] = ()
     rates: Mapping[str, Expression] = field(default_factory=dict)
     solution: Mapping[str, Expression] = field(default_factory=dict)
+    manner: str = ""
 
 
 @dataclass(frozen=True)
@@ -187,7 +189,6 @@ class PartSearch:
     cell: Cell
     colouring: Colouring
     _couples: dict[str, list[tuple[str, Offset]]] = field(default_factory=dict)
-    _manner: str = ""
 
     def __post_init__(self) -> None:
         for f, other in self.cell.bracket:
@@ -266,7 +267,8 @@ class PartSearch:
         added = {n: e for m in motions for gathered in m.gathered for n, e in gathered.values.items()}
         increments = tuple(substitute([e for m in motions for e in m.increments.values()], added))
         hamiltonian = total(s.expression for s, _ in listed)
-        return CellFlow(hamiltonian, increments, self._manner, tuple(motions), listed)
+        manner = "; ".join(dict.fromkeys(m.manner for m in motions))
+        return CellFlow(hamiltonian, increments, manner, tuple(motions), listed)
 
     def _motions(
         self, part: Sequence[tuple[Summand, int]], more: Sequence[tuple[Summand, int]]
@@ -334,10 +336,9 @@ class PartSearch:
             return SiteMotion(colour, {})
         found = self._solved(rates, part)
         increments = dict(zip(self.cell.fields, substitute(found.increments, forces), strict=True))
-        self._manner = found.manner
         moved = {f: e for f, e in increments.items() if not e.is_zero}
         solution = {f: e for f, e in zip(self.cell.fields, found.increments, strict=True) if f in moved}
-        return SiteMotion(colour, moved, tuple(gathered), rates, solution)
+        return SiteMotion(colour, moved, tuple(gathered), rates, solution, found.manner)
 
     def _solved(self, rates: Mapping[str, Expression], part: Sequence[tuple[Summand, int]]) -> Solved:
         ring = own_ring(self.cell.fields, rates.values())
@@ -388,7 +389,7 @@ class PartSearch:
                 if f in moved:
                     rates[f].append(entry * slopes[g])
             field = {f: total(listed) for f, listed in rates.items()}
-            motions = tuple(SiteMotion(c, moved, (), field, moved) for c in colours) if moved else ()
+            motions = tuple(SiteMotion(c, moved, (), field, moved, flow.manner) for c in colours) if moved else ()
             own = ((Summand(flow.hamiltonian, steps, steps), colours),)
             found.append(CellFlow(flow.hamiltonian, flow.increment, flow.manner, motions, own))
         return found

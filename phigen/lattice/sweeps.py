@@ -199,7 +199,7 @@ def _sweep(cell: Cell, flow: CellFlow, motion: SiteMotion, k: int, coefficients:
     increments = staged(list(motion.increments.values()), coefficients)
     moved = tuple(cell.fields.index(f) for f in motion.increments)
     suffix = f"_{flow.motions.index(motion)}" if len(flow.motions) > 1 else ""
-    named = f"the flow of H_{k} = sum of {flow.hamiltonian}: {flow.manner}".replace(KICK, KICK.kind)
+    named = f"the flow of H_{k} = sum of {flow.hamiltonian}: {motion.manner}".replace(KICK, KICK.kind)
     kernel = site_kernel(cell, f"sweep{k}{suffix}", named, increments, "change", coefficients)
     purpose = f"what all other sites b add to the forces of H_{k} at a site a"
     gather = _gather(cell, motion.gathered, f"gather{k}{suffix}", purpose, coefficients)

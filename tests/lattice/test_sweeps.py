@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import warnings
 from dataclasses import replace
 from functools import cache
@@ -335,6 +336,18 @@ def test_code_does_not_grow_with_the_lattice() -> None:
         program = compile_spec(specs.loads(f"phigen: 1\nname: {name}\n{TEXTS[name]}\n"), profile="small").program
         lines = sum(len(text.splitlines()) for text in emit(program, "c", "phigen").values())
         assert lines < 825 + 120 * ("graph" in TEXTS[name]) + 100 * (name in SERIES), (name, lines)
+
+
+def test_each_sweep_says_what_it_moves_and_those_of_equal_code_are_one() -> None:
+    text = emit(compiled("magnet").program, "c", "phigen")["magnet.c"]
+    found = re.findall(
+        r"/\* (the flow of [^/]*) \*/\nstatic inline void magnet_(sweep\w+)\([^{]*\{(.*?)\n\}", text, re.S
+    )
+    for said, name, body in found:
+        moved = re.findall(r"^ *(\w)_row\[i\] =", body, re.M)
+        assert all(line.endswith(f"{', '.join(moved)} turned") for line in said.split("\n")), (name, said)
+    bodies = [body for *_, body in found]
+    assert len(bodies) == len(set(bodies)) < sum(said.count("the flow of") for said, *_ in found)
 
 
 @pytest.mark.parametrize("name", ["sheet", "magnet", "dragged"])

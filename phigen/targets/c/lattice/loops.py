@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 from phigen.scheme.kernel import Kernel, Output
 from phigen.scheme.program import Program
@@ -18,6 +18,30 @@ from phigen.targets.c.lattice.names import SiteNames
 from phigen.targets.c.layout import comment
 from phigen.targets.code import Code, lower
 from phigen.targets.header import plain
+
+
+@dataclass(frozen=True)
+class Loop:
+    """A function that goes over the sites of a row, or of a piece of it; ``shared`` is its name where several parts of
+    H have the same."""
+
+    name: str
+    purpose: str
+    arguments: str
+    body: str
+    shared: str = ""
+
+    @property
+    def code(self) -> str:
+        """What loops that do the same have in common."""
+        return self.arguments + self.body
+
+    def text(self, program: Program, purposes: Iterable[str] = ()) -> str:
+        """The function, below what it is for."""
+        said = [line for one in dict.fromkeys(purposes or (self.purpose,)) for line in comment(plain(one), "   ")]
+        said[0] = f"/* {said[0].strip()}"
+        head = f"static inline void {program.name}_{self.name}({self.arguments})"
+        return "\n".join([*said[:-1], f"{said[-1]} */", head, "{", self.body + "}\n"])
 
 
 def has_ends(program: Program, kernels: Sequence[Kernel]) -> bool:
@@ -53,13 +77,12 @@ def _inside(kernel: Kernel) -> Kernel:
     return replace(kernel, inputs={**kernel.inputs, "present": others}, outputs=(Output(output, tuple(values)),))
 
 
-def sweep_loop(program: Program, layout: Layout, sweep: Sweep, form: str, calls: Mapping[str, str]) -> str:
+def sweep_loop(program: Program, layout: Layout, sweep: Sweep, form: str, calls: Mapping[str, str]) -> Loop:
     """A kernel as a loop that changes some fields of the sites of a row."""
     kernel, name = sweep.kernel, program.name
     code = lower(kernel)
     moved, sums = {program.coordinates[i] for i in sweep.moved}, sweep.gather.names if sweep.gather else ()
     names = SiteNames(program, layout, kernel, code, moved, calls, sums)
-    head = _head(program, kernel, code, form)
     body = names.loaded()
     body += [f"const double {names.scope[a.target]} = {names.show(a.value)};" for a in code.assignments]
     stores = [(program.coordinates[sweep.moved[s.index]], names.show(s.value)) for s in code.stores]
@@ -71,35 +94,38 @@ def sweep_loop(program: Program, layout: Layout, sweep: Sweep, form: str, calls:
     colours = layout.step.sites.colours
     start = f"{name}_first(row, {sweep.colour}, from)" if colours > 1 else "from"
     onward = f"i += {layout.colour_step}" if colours > 1 else "++i"
-    return _looped(head, names, body, name, f"ptrdiff_t i = {start}; i < to; {onward}")
+    text = _looped(_unused(code), names, body, name, f"ptrdiff_t i = {start}; i < to; {onward}")
+    shared = "_".join(["sweep", *(program.coordinates[i] for i in sweep.moved)]) + form
+    return Loop(kernel.name + form, _purpose(kernel, form), _arguments(program), text, shared)
 
 
-def _head(program: Program, kernel: Kernel, code: Code, form: str) -> list[str]:
-    """The beginning of a loop over sites."""
-    name = program.name
-    purpose = {"_far": "the same for large arguments of functions", "_end": "the same beside open ends"}
-    said = next((text for key, text in purpose.items() if form.endswith(key)), kernel.purpose)
-    head = [*comment(f"/* {plain(said)} */", "")]
-    head.append(
-        f"static inline void {name}_{kernel.name}{form}("
-        f"const double *coef, const {name}_row *row, ptrdiff_t from, ptrdiff_t to)\n{{"
-    )
-    return head if any(kind_of(s) == COEFFICIENT for s in code.used) else [*head, "    (void)coef;"]
+def _purpose(kernel: Kernel, form: str) -> str:
+    other = {"_far": "the same for large arguments of functions", "_end": "the same beside open ends"}
+    return next((text for key, text in other.items() if form.endswith(key)), kernel.purpose)
+
+
+def _arguments(program: Program) -> str:
+    return f"const double *coef, const {program.name}_row *row, ptrdiff_t from, ptrdiff_t to"
+
+
+def _unused(code: Code) -> list[str]:
+    return [] if any(kind_of(s) == COEFFICIENT for s in code.used) else ["    (void)coef;"]
 
 
 def middle_loop(
     program: Program, layout: Layout, kernel: Kernel, form: str, calls: Mapping[str, str], assign: str
-) -> str:
+) -> Loop:
     """A kernel as a loop from y, of which rows are told, into or onto what they call out."""
     code = lower(kernel)
     names = SiteNames(program, layout, kernel, code, set(), calls, layout.partners.field.names)
     pointers = [names.scope[Symbol("out", f)] for f in program.coordinates]
-    head = _head(program, kernel, code, form)
+    head = _unused(code)
     head += [f"    double *restrict {p} = row->out[{k}] + row->at[0];" for k, p in enumerate(pointers)]
     body = names.loaded()
     body += [f"const double {names.scope[a.target]} = {names.show(a.value)};" for a in code.assignments]
     body += [f"{pointers[s.index]}[i] {assign} {names.show(s.value)};" for s in code.stores]
-    return _looped(head, names, body, program.name, "ptrdiff_t i = from; i < to; ++i")
+    text = _looped(head, names, body, program.name, "ptrdiff_t i = from; i < to; ++i")
+    return Loop(kernel.name + form, _purpose(kernel, form), _arguments(program), text)
 
 
 def _added(name: str, read: bool, value: str) -> str:
@@ -136,10 +162,10 @@ def seen_loop(program: Program, layout: Layout, kernel: Kernel) -> str:
         return "\n".join([*head, *(f"    (void){u};" for u in unused), "}"]) + "\n"
     head += ["    " + ", ".join(f"(void){u}" for u in unused) + ";"] if unused else []
     text = _looped([*head, *early], names, body, name, "ptrdiff_t i = from; i < to; ++i")
-    return text.removesuffix("}\n") + "\n".join([*late, "}\n"])
+    return text + "\n".join([*late, "}\n"])
 
 
 def _looped(head: list[str], names: SiteNames, body: list[str], name: str, loop: str) -> str:
     lines = [*head, *(f"    {line}" for line in names.pointers())]
-    lines += [f"    {name}_EACH_SITE", f"    for ({loop}) {{", *(f"        {line}" for line in body), "    }", "}"]
+    lines += [f"    {name}_EACH_SITE", f"    for ({loop}) {{", *(f"        {line}" for line in body), "    }"]
     return "\n".join(lines) + "\n"

@@ -8,32 +8,32 @@ from phigen.scheme.kernel import Kernel
 from phigen.scheme.program import Program
 from phigen.scheme.steps import Ends, Gather
 from phigen.targets.c.lattice.layout import Layout
-from phigen.targets.c.lattice.loops import in_loops
+from phigen.targets.c.lattice.loops import Loop, in_loops
 from phigen.targets.c.lattice.names import SiteNames
-from phigen.targets.c.layout import comment
 from phigen.targets.code import lower
-from phigen.targets.header import plain
 
 
 def partners(program: Program, layout: Layout) -> Iterator[str]:
     """What bonds or pairs add to energies, and to what moves sites, from the parameters."""
-    arguments = f"const {program.name}_params *params, const {program.name}_row *row"
     for gather in (layout.partners.field, layout.partners.energy):
-        yield from gathering(program, layout, gather, arguments)
+        yield from (loop.text(program) for loop in gathering(program, layout, gather, "params"))
 
 
-def gathering(program: Program, layout: Layout, gather: Gather, arguments: str) -> Iterator[str]:
-    """What all bonds, or pairs with other sites, add up at some sites."""
+def gathering(program: Program, layout: Layout, gather: Gather, source: str) -> Iterator[Loop]:
+    """What all bonds, or pairs with other sites, add up at some sites, from ``coef`` or ``params``."""
+    kind = "double" if source == "coef" else f"{program.name}_params"
+    arguments = f"const {kind} *{source}, const {program.name}_row *row, ptrdiff_t from, ptrdiff_t to"
     for number, ends in enumerate(gather.ends):
+        unused = [] if set(ends.kernel.inputs[source]) & lower(ends.kernel).used else [f"(void){source};"]
         if layout.graph:
-            yield _over_bonds(program, layout, ends, arguments, first=number == 0)
+            text = _over_bonds(program, layout, ends, unused, first=number == 0)
         else:
             targets = [f"g{k}" for k in range(len(gather.names))]
             pointers = [f"double *restrict {t} = row->gathered[{k}];" for k, t in enumerate(targets)]
             body = [f"{t}[i] += i == j ? 0.0 : {{{k}}};" for k, t in enumerate(targets)]
             begin = [f"for (ptrdiff_t i = from; i < to; ++i) {' = '.join(f'{t}[i]' for t in targets)} = 0.0;"]
-            head = f"{arguments}, ptrdiff_t from, ptrdiff_t to"
-            yield _over_pairs(program, layout, ends.kernel, head, [*pointers, *begin], body)
+            text = _over_pairs(program, layout, ends.kernel, [*unused, *pointers, *begin], body)
+        yield Loop(ends.kernel.name, ends.kernel.purpose, arguments, text)
 
 
 #: The bonds of a site i, by the end that it has; and which of them are passed over.
@@ -42,9 +42,9 @@ _BONDS = {"": "row->bonds[i]; k < row->bonds[i + 1]", "a": "row->bonds[i]; k < r
 _PASSED = {"there": "row->colours[row->other[k]] != row->chosen"}
 
 
-def _over_bonds(program: Program, layout: Layout, ends: Ends, arguments: str, *, first: bool) -> str:
+def _over_bonds(program: Program, layout: Layout, ends: Ends, begin: Sequence[str], *, first: bool) -> str:
     """A loop over sites a, in it one over the bonds that they have to sites b."""
-    name, kernel = program.name, ends.kernel
+    kernel = ends.kernel
     code = lower(kernel)
     names = SiteNames(program, layout, kernel, code, set(), in_loops(program))
     other, own = names.of_pair()
@@ -55,53 +55,39 @@ def _over_bonds(program: Program, layout: Layout, ends: Ends, arguments: str, *,
     out = [f"row->gathered[{k}][i] {'' if first else '+'}= sum{k};" for k in range(count)]
     wanted = "row->colours[i] == row->chosen && " if ends.chosen == "here" else ""
     bounds = _BONDS[ends.end].replace("; ", f"; {wanted}", 1)
-    coefficients = "params" if arguments.startswith(f"const {name}_params") else "coef"
-    used = any(s in code.used for s in kernel.inputs[coefficients])
     passed = [f"if ({_PASSED[ends.chosen]}) continue;"] if ends.chosen in _PASSED else []
     reads = [f"{'const ptrdiff_t j = row->other[k];'}"] if other else []
     inner = [*passed, *reads, *other, *values, *added]
     return "\n".join(
         [
-            *comment(f"/* {plain(kernel.purpose)} */", ""),
-            f"static inline void {name}_{kernel.name}({arguments}, ptrdiff_t from, ptrdiff_t to)",
-            "{",
-            *(f"    {line}" for line in [*([] if used else [f"(void){coefficients};"]), *names.pointers()]),
+            *(f"    {line}" for line in [*begin, *names.pointers()]),
             "    for (ptrdiff_t i = from; i < to; ++i) {",
             *(f"        {line}" for line in [*own, *sums]),
             f"        for (ptrdiff_t k = {bounds}; ++k) {{",
             *(f"            {line}" for line in inner),
             "        }",
             *(f"        {line}" for line in out),
-            "    }",
-            "}\n",
+            "    }\n",
         ]
     )
 
 
-def _over_pairs(
-    program: Program, layout: Layout, kernel: Kernel, arguments: str, begin: Sequence[str], body: Sequence[str]
-) -> str:
+def _over_pairs(program: Program, layout: Layout, kernel: Kernel, begin: Sequence[str], body: Sequence[str]) -> str:
     """A loop over all sites b, in it one over the sites a of a piece; statements with the values of the kernel."""
     name, code = program.name, lower(kernel)
     names = SiteNames(program, layout, kernel, code, set(), in_loops(program))
     other, own = names.of_pair()
     lines = [*own, *(f"const double {names.scope[a.target]} = {names.show(a.value)};" for a in code.assignments)]
     lines += [text.format(*(names.show(s.value) for s in code.stores)) for text in body]
-    first = "params" if arguments.startswith(f"const {name}_params") else "coef"
-    used = any(s in code.used for s in kernel.inputs[first])
     return "\n".join(
         [
-            *comment(f"/* {plain(kernel.purpose)} */", ""),
-            f"static inline void {name}_{kernel.name}({arguments})",
-            "{",
-            *(f"    {line}" for line in [*([] if used else [f"(void){first};"]), *names.pointers(), *begin]),
+            *(f"    {line}" for line in [*names.pointers(), *begin]),
             "    for (ptrdiff_t j = 0; j < row->length; ++j) {",
             *(f"        {line}" for line in other),
             f"        {name}_EACH_SITE",
             "        for (ptrdiff_t i = from; i < to; ++i) {",
             *(f"            {line}" for line in lines),
             "        }",
-            "    }",
-            "}\n",
+            "    }\n",
         ]
     )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 from phigen.lanes.lowering import Rows
 from phigen.scheme.kernel import Kernel
@@ -13,30 +13,34 @@ from phigen.symbolic.special import SPECIAL
 from phigen.targets.c import functions
 from phigen.targets.c.kernels import members
 from phigen.targets.c.lattice.layout import Layout, bounds, layout_of, switches
-from phigen.targets.c.lattice.loops import forms_of, has_ends, in_loops, middle_loop, seen_loop, sweep_loop, weights_of
+from phigen.targets.c.lattice.loops import (
+    Loop,
+    forms_of,
+    has_ends,
+    in_loops,
+    middle_loop,
+    seen_loop,
+    sweep_loop,
+)
 from phigen.targets.c.lattice.partners import gathering, partners
 from phigen.targets.rendering import render
 
 
 def sweeps(program: Program, step: Sweeps, rows: Rows) -> str:
     """All kernels as loops over sites, and which of them make which part of H."""
-    layout, name, member, calls = layout_of(program, step), program.name, members(program), in_loops(program)
+    layout, name, member = layout_of(program, step), program.name, members(program)
     found = [*functions.called(program), *functions.phi_lanes(program, set(rows.near))]
     found += functions.near_rows(program, [f for f in rows.near if f not in SPECIAL])
-    near = {**calls, **{f: f"{name}_{f}_{'lane' if f in SPECIAL else 'near'}" for f in rows.near}}
-    for k, part in enumerate(step.parts, 1):
-        two = any(rows.calls_near(sweep.kernel) for sweep in part)
-        found += _part(program, layout, k, part, {"_far": calls, "_near": near} if two else {"": calls})
+    if step.parts:
+        found += _parts(program, layout, rows)
     seen = program.observables
     found += partners(program, layout)
     for kernel in (step.equation.relax, step.equation.advance) if step.equation else ():
-        forms = {"_far": calls, "_near": near} if rows.calls_near(kernel) else {"": calls}
-        found += _of_equation(program, layout, kernel, forms)
+        found += _of_equation(program, layout, kernel, _forms(program, rows, [kernel]))
     if step.equation and step.equation.slope and switches(program, step, layout)["STIFF"]:
-        found += _of_equation(program, layout, step.equation.slope, {"": calls})
+        found += _of_equation(program, layout, step.equation.slope, {"": in_loops(program)})
     found += [seen_loop(program, layout, k) for k in (seen.energy, seen.casimirs, seen.vector_field)]
     sites = [p for p in program.parameters if p.at == "sites"]
-    numbers = range(1, len(step.parts) + 1)
     values = {
         "NAME": name,
         "arrays": [(member[p.name], layout.arrays.index(p.name), repr(float(p.value))) for p in sites],
@@ -45,36 +49,118 @@ def sweeps(program: Program, step: Sweeps, rows: Rows) -> str:
             for p in program.parameters
             if p.at == "bonds"
         ],
-        "by_colour": bool(step.by_colour),
-        "what": "flow" if step.by_colour else "part",
-        "labels": [("default" if k == len(step.parts) else f"case {k}", k) for k in numbers],
     }
-    return "\n".join([*found, render("c", "sweeps.c", values)])
+    return "\n".join([*found, render("c", "lattice_parameters.c", values)])
 
 
-def _part(
-    program: Program, layout: Layout, k: int, part: Sequence[Sweep], forms: Mapping[str, Mapping[str, str]]
-) -> Iterator[str]:
-    """The loops of a part of H over rows and their sites, in each form: by different functions."""
-    for sweep in part:
-        if sweep.gather:
-            yield from gathering(program, layout, sweep.gather, f"const double *coef, const {program.name}_row *row")
-    for form, calls in forms.items():
-        for sweep in part:
-            for kernel, more in forms_of(program, sweep.kernel):
-                yield sweep_loop(program, layout, replace(sweep, kernel=kernel), form + more, calls)
-    beside = has_ends(program, [sweep.kernel for sweep in part])
-    loops = {form: [line for sweep in part for line in _calls(program.name, sweep, form, beside)] for form in forms}
-    coloured = layout.step.by_colour
-    values = _pieces(program, layout, loops, beside=beside) | {
-        "title": f"The flow of H_{k}",
-        "head": f"part{k}",
-        "more": ", int colour" * bool(coloured),
-        "setup": ["at.row.chosen = colour;"] if coloured and coloured[k - 1] else [],
-        "moved": [f"s->x[{f}]" for f in sorted({f for sweep in part for f in sweep.moved})] if layout.halo else [],
+def _forms(program: Program, rows: Rows, kernels: Sequence[Kernel]) -> dict[str, Mapping[str, str]]:
+    """The forms in which kernels are needed, each with what its functions are called."""
+    calls = in_loops(program)
+    if not any(rows.calls_near(kernel) for kernel in kernels):
+        return {"": calls}
+    lanes = {f: f"{program.name}_{f}_{'lane' if f in SPECIAL else 'near'}" for f in rows.near}
+    return {"_near": {**calls, **lanes}, "_far": calls}
+
+
+def _parts(program: Program, layout: Layout, rows: Rows) -> Iterator[str]:
+    """The loops of all parts of H, and which of them make which. Those of equal code are one, whoever needs it."""
+    step = layout.step
+    made = [_forms_of_part(program, layout, rows, part) for part in step.parts]
+    alike: dict[str, list[Loop]] = {}
+    for call in (call for forms in made for called in forms.values() for call in called):
+        known = alike.setdefault(call.loop.code, [])
+        known += [call.loop] if call.loop not in known else []
+    names: dict[str, str] = {}
+    for code, same in alike.items():
+        shared = same[0].shared if len(same) > 1 and same[0].shared not in names.values() else ""
+        names[code] = shared or same[0].name
+        yield replace(same[0], name=names[code]).text(program, [loop.purpose for loop in same])
+    cases = [_case(program, layout, k, forms, names) for k, forms in enumerate(made)]
+    coloured, unused = bool(step.by_colour), ["far"] * all(len(forms) == 1 for forms in made)
+    yield _rows(
+        program,
+        layout,
+        cases,
+        title="A flow" if coloured else "The flow of a part of H",
+        head="sweep_rows",
+        arguments=f"int {'flow' if coloured else 'part'}, const double *coef, int far",
+        coloured=coloured,
+        unused=["part"] * (len(cases) == 1 and not coloured) + unused,
+    )
+
+
+def _forms_of_part(program: Program, layout: Layout, rows: Rows, part: Sequence[Sweep]) -> dict[str, list[_Call]]:
+    """What is called for a piece of a row to make a part of H, in each form."""
+    forms = _forms(program, rows, [sweep.kernel for sweep in part])
+    return {f: [c for sweep in part for c in _calls(program, layout, sweep, f, calls)] for f, calls in forms.items()}
+
+
+def _case(
+    program: Program, layout: Layout, k: int, forms: Mapping[str, Sequence[_Call]], names: Mapping[str, str]
+) -> _Case:
+    """The statements of a part of H, where the loops have ``names`` by their code."""
+    part, coloured = layout.step.parts[k], layout.step.by_colour
+    lines = {
+        form: [f"{program.name}_{names[call.loop.code]}(coef, &at.row, {call.sites});" for call in called]
+        for form, called in forms.items()
     }
-    values["unused"] = ["colour"] * bool(coloured and not coloured[k - 1]) + ["far"] * (len(forms) == 1)
-    yield render("c", "sweep_part.c", values)
+    moved = sorted({f for sweep in part for f in sweep.moved})
+    statements = [*_either(lines), *_copied_ends(program, layout, moved, "s->x")]
+    setup = ["at.row.chosen = colour;"] if coloured and coloured[k] else []
+    return _Case(statements, setup, has_ends(program, [sweep.kernel for sweep in part]))
+
+
+@dataclass(frozen=True)
+class _Case:
+    """What is called for a piece of a row ``at``, after its ``setup``; whether there are sites beside open ends."""
+
+    calls: Sequence[str]
+    setup: Sequence[str]
+    beside: bool
+
+
+@dataclass(frozen=True)
+class _Call:
+    """A loop for some sites of a piece: the text of the last two arguments."""
+
+    loop: Loop
+    sites: str = "at.from, at.to"
+
+
+def _calls(program: Program, layout: Layout, sweep: Sweep, form: str, calls: Mapping[str, str]) -> Iterator[_Call]:
+    """The loops of a sweep, in the order in which they are called for a piece of a row."""
+    for loop in gathering(program, layout, sweep.gather, "coef") if sweep.gather else ():
+        yield _Call(loop)
+    loops = [
+        sweep_loop(program, layout, replace(sweep, kernel=kernel), form + more, calls)
+        for kernel, more in forms_of(program, sweep.kernel)
+    ]
+    yield from _over_sites(loops)
+
+
+def _over_sites(loops: Sequence[Loop]) -> Iterator[_Call]:
+    """One loop for all sites, or two: for those away from open ends, and for those beside them."""
+    if len(loops) == 1:
+        yield _Call(loops[0])
+        return
+    inside, end = loops
+    yield from (_Call(end, "at.from, second"), _Call(inside, "second, third"), _Call(end, "third, at.to"))
+
+
+def _either(lines: Mapping[str, Sequence[str]]) -> list[str]:
+    """The calls of each form, for those arguments that it is for."""
+    if len(lines) == 1:
+        return [line for calls in lines.values() for line in calls]
+    if all(len(calls) == 1 for calls in lines.values()):
+        return [f"if (far) {lines['_far'][0]}", f"else {lines['_near'][0]}"]
+    indented = {form: [f"    {line}" for line in calls] for form, calls in lines.items()}
+    return ["if (far) {", *indented["_far"], "} else {", *indented["_near"], "}"]
+
+
+def _copied_ends(program: Program, layout: Layout, fields: Sequence[int], where: str) -> list[str]:
+    """What copies the ends of a row of some fields that were changed."""
+    found = [f"{program.name}_ends({where}[{f}] + at.row.at[0], s->length, at.from, at.to);" for f in fields]
+    return found if layout.halo else []
 
 
 def _of_equation(
@@ -82,57 +168,51 @@ def _of_equation(
 ) -> Iterator[str]:
     """The loops of a kernel of the equation of a stage over rows and their sites, in each form."""
     name, relaxing, moves = program.name, kernel.name == "relax", kernel.name == "increment"
-    for form, calls in forms.items():
-        for one, more in forms_of(program, kernel):
-            yield middle_loop(program, layout, one, form + more, calls, "+=" if moves else "=")
-    beside = has_ends(program, [kernel])
     gathers = layout.partners.field.kernels if kernel.inputs["gathered"] else ()
     gathered = [f"{name}_{own.name}(&s->params, &at.row, at.from, at.to);" for own in gathers]
-    loops = {form: [*gathered, *_kernel_calls(f"{name}_{kernel.name}{form}", kernel, beside=beside)] for form in forms}
+    lines = {}
+    for form, calls in forms.items():
+        loops = [
+            middle_loop(program, layout, one, form + more, calls, "+=" if moves else "=")
+            for one, more in forms_of(program, kernel)
+        ]
+        yield from (loop.text(program) for loop in loops)
+        lines[form] = [f"{name}_{call.loop.name}(coef, &at.row, {call.sites});" for call in _over_sites(loops)]
     out = "s->x" if moves else "s->y[1 - now]"
     reads = ["at.row.start = s->x;"] * ("start" in kernel.inputs) + ["at.row.varied = s->v;"] * (
         "varied" in kernel.inputs
     )
-    setup = ["at.row.x = s->y[now];", *reads, f"at.row.out = {out};"]
     titles = {"relax": "A sweep, from s->y[now] to the other", "increment": "The end of a stage"}
-    values = _pieces(program, layout, loops, beside=beside) | {
-        "title": titles.get(kernel.name, "How a sweep follows s->y[now] along s->v, to the other"),
-        "head": f"{kernel.name}_rows",
-        "more": ", int now" + f", {name}_extent *extent" * relaxing,
-        "setup": setup,
-        "moved": [f"{out}[{f}]" for f in range(program.dimension)] if layout.halo and (relaxing or moves) else [],
-        "after": [f"{name}_measure(s, &at, now, extent);"] if relaxing else [],
-        "unused": ["far"] * (len(forms) == 1),
-    }
-    yield render("c", "sweep_part.c", values)
+    ends = _copied_ends(program, layout, range(program.dimension), out) if relaxing or moves else []
+    measured = [f"{name}_measure(s, &at, now, extent);"] if relaxing else []
+    setup = ["at.row.x = s->y[now];", *reads, f"at.row.out = {out};"]
+    yield _rows(
+        program,
+        layout,
+        [_Case([*gathered, *_either(lines), *ends, *measured], setup, has_ends(program, [kernel]))],
+        title=titles.get(kernel.name, "How a sweep follows s->y[now] along s->v, to the other"),
+        head=f"{kernel.name}_rows",
+        arguments="const double *coef, int far, int now" + f", {name}_extent *extent" * relaxing,
+        unused=["far"] * (len(forms) == 1),
+    )
 
 
-def _pieces(program: Program, layout: Layout, loops: Mapping[str, list[str]], *, beside: bool) -> dict[str, object]:
-    """What the template of loops over pieces of rows wants, for the calls of each form."""
-    conditions = ("if (far) ", "else ") if len(loops) > 1 else ("",)
+def _rows(program: Program, layout: Layout, cases: Sequence[_Case], **more: object) -> str:
+    """A function that goes over pieces of rows; what it does to each is one of some ``cases``."""
     last = [bounds(w)[-1] for w in layout.weights]
-    return {
+    values = {
         "NAME": program.name,
-        "loops": list(zip(conditions, loops.values(), strict=True)),
-        "beside": beside,
         "low": max([0, *(-low for low, _ in last)]),
         "high": max([0, *(high for _, high in last)]),
         "skipping": switches(program, layout.step, layout)["BY_HAND"] and len(layout.step.sites.axes) == 1,
-        "after": [],
     }
+    loops = [render("c", "each_piece.c", {**values, **vars(case)}).splitlines() for case in cases]
+    body = loops[0] if len(loops) == 1 else ["switch (part) {", *_cases(loops), "}"]
+    return render("c", "sweep_rows.c", {**values, "coloured": False, "body": body, **more})
 
 
-def _calls(name: str, sweep: Sweep, form: str, beside: bool) -> Iterator[str]:
-    """The calls of the loops for a piece of a row."""
-    for kernel in sweep.gather.kernels if sweep.gather else ():
-        yield f"{name}_{kernel.name}(coef, &at.row, at.from, at.to);"
-    yield from _kernel_calls(f"{name}_{sweep.kernel.name}{form}", sweep.kernel, beside=beside)
-
-
-def _kernel_calls(own: str, kernel: Kernel, *, beside: bool) -> Iterator[str]:
-    if not beside or not weights_of(kernel):
-        yield f"{own}(coef, &at.row, at.from, at.to);"
-        return
-    yield f"{own}_end(coef, &at.row, at.from, second);"
-    yield f"{own}(coef, &at.row, second, third);"
-    yield f"{own}_end(coef, &at.row, third, at.to);"
+def _cases(loops: Sequence[Sequence[str]]) -> Iterator[str]:
+    """The cases of a switch over parts of H, with their statements."""
+    for k, lines in enumerate(loops, 1):
+        yield f"{'default' if k == len(loops) else f'case {k}'}: /* H_{k} */"
+        yield from (f"    {line}" for line in (*lines, "break;"))
