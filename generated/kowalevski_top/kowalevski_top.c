@@ -27,7 +27,7 @@
  *   11. Members of an ensemble
  *   12. Groups of members
  *   13. Ensembles
- * body-sha256: 761ec3d46955a05bcb8f0d6d9681cd0c1b8144dfb9420c3103f3a9d898cee89d
+ * body-sha256: d30ab2c3025e423a19d9313fb2cedcfa2c0b345860d16f9691d956c919e4e04b
  */
 #include "kowalevski_top.h"
 
@@ -2669,7 +2669,6 @@ static double kowalevski_top_largest(const kowalevski_top_lanes size)
     memcpy(&largest, &most, sizeof largest);
     return isfinite(largest) ? largest : HUGE_VAL;
 }
-
 /* Correct y by the residuals, with the inverse in the table, and measure the corrections. */
 static void kowalevski_top_correct(kowalevski_top_model *model, kowalevski_top_lanes size)
 {

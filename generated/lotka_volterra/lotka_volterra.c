@@ -27,7 +27,7 @@
  *   11. Members of an ensemble
  *   12. Groups of members
  *   13. Ensembles
- * body-sha256: 013860ba1534af21257189237c96892da03d5d9ef8fcd0fa11c1e4c6d190da7a
+ * body-sha256: 60862d9d6a2c3acf5689c898fef1723695f25d5d1690ce7245191f7b5ed6193d
  */
 #include "lotka_volterra.h"
 
@@ -850,7 +850,6 @@ static double lotka_volterra_largest(const lotka_volterra_lanes size)
     memcpy(&largest, &most, sizeof largest);
     return isfinite(largest) ? largest : HUGE_VAL;
 }
-
 /* Correct y by the residuals, with the inverse in the table, and measure the corrections. */
 static void lotka_volterra_correct(lotka_volterra_model *model, lotka_volterra_lanes size)
 {

@@ -24,11 +24,12 @@
  *   8. The solver
  *   9. Newton's method in lanes
  *   10. Paths in lanes
- *   11. Blocks of steps
- *   12. Members of an ensemble
- *   13. Groups of members
- *   14. Ensembles
- * body-sha256: d8c7ed9dcf8af0c1f8a9c200245cc47390b21faf38b9a5ad36ceac27178092f5
+ *   11. Blocks along paths
+ *   12. Blocks of steps
+ *   13. Members of an ensemble
+ *   14. Groups of members
+ *   15. Ensembles
+ * body-sha256: de072555b484ae81defabebc339107f264f8b1cc3e41ac18390765ec9bdf24f0
  */
 #include "nambu_pendulum.h"
 
@@ -1166,7 +1167,6 @@ static double nambu_pendulum_largest(const nambu_pendulum_lanes size)
     memcpy(&largest, &most, sizeof largest);
     return isfinite(largest) ? largest : HUGE_VAL;
 }
-
 /* Correct y by the residuals, with the inverse in the table, and measure the corrections. */
 static void nambu_pendulum_correct(nambu_pendulum_model *model, nambu_pendulum_lanes size)
 {
@@ -1198,11 +1198,8 @@ enum {
     nambu_pendulum_ROUNDS = 12          /* of the iteration for the middle, which gains some digits in each */
 };
 
-#define nambu_pendulum_SLOPE_ACCURACY 1e-7 /* of the derivatives of paths */
-#define nambu_pendulum_SETTLED 1e-9        /* accuracy of middles: what is left, the passes mend */
 /* what a round leaves of the error at best: so long an expansion it gets */
 #define nambu_pendulum_GAIN_OF_ROUND 1e-4
-#define nambu_pendulum_GUESS_ACCURACY 1e-6 /* of expansions for guesses, which are no better */
 
 /* The paths of all lanes as Taylor series about their middle, with half of p: they take the time from -1 to
    1, and need fewer terms than from their start. s[i][k] is coefficient k of series i, the coordinates first;
@@ -1219,7 +1216,7 @@ typedef struct {
     nambu_pendulum_lanes v_even[2 * nambu_pendulum_DIM * nambu_pendulum_DIM], v_odd[2 * nambu_pendulum_DIM
         * nambu_pendulum_DIM], v_mean[2 * nambu_pendulum_DIM * nambu_pendulum_DIM];
     nambu_pendulum_lanes unit[nambu_pendulum_DIM]; /* what terms are multiplied by to be measured */
-    int terms;                                     /* orders that are known */
+    int terms, varied; /* orders that are known, of the paths and of their derivatives */
 } nambu_pendulum_expansion;
 
 /* The largest of the lanes; what is not finite does not count: that lane has failed. */
@@ -1286,20 +1283,20 @@ static void nambu_pendulum_vary_by(nambu_pendulum_expansion *e, int j, int k)
     const double share = 1.0 / (k + 1);
     nambu_pendulum_EACH_LANE
     for (int lane = 0; lane < nambu_pendulum_LANES; ++lane) {
-        const double a10 = share * e->slope[1][j][lane];
-        const double a20 = share * e->slope[2][j][lane];
-        to[6][lane] += a10 * from[0][lane];
-        to[7][lane] += a10 * from[1][lane];
-        to[8][lane] += a10 * from[2][lane];
-        to[9][lane] += a10 * from[3][lane];
-        to[10][lane] += a10 * from[4][lane];
-        to[11][lane] += a10 * from[5][lane];
-        to[12][lane] += a20 * from[0][lane];
-        to[13][lane] += a20 * from[1][lane];
-        to[14][lane] += a20 * from[2][lane];
-        to[15][lane] += a20 * from[3][lane];
-        to[16][lane] += a20 * from[4][lane];
-        to[17][lane] += a20 * from[5][lane];
+        const double a1_0 = share * e->slope[1][j][lane];
+        const double a2_0 = share * e->slope[2][j][lane];
+        to[6][lane] += a1_0 * from[0][lane];
+        to[7][lane] += a1_0 * from[1][lane];
+        to[8][lane] += a1_0 * from[2][lane];
+        to[9][lane] += a1_0 * from[3][lane];
+        to[10][lane] += a1_0 * from[4][lane];
+        to[11][lane] += a1_0 * from[5][lane];
+        to[12][lane] += a2_0 * from[0][lane];
+        to[13][lane] += a2_0 * from[1][lane];
+        to[14][lane] += a2_0 * from[2][lane];
+        to[15][lane] += a2_0 * from[3][lane];
+        to[16][lane] += a2_0 * from[4][lane];
+        to[17][lane] += a2_0 * from[5][lane];
     }
 }
 
@@ -1438,41 +1435,42 @@ static void nambu_pendulum_check_ends(nambu_pendulum_lanes coef[restrict], nambu
 }
 
 /* Begin to expand the paths with mean y, from their middles as far as these are known. */
-static void nambu_pendulum_begin_at(nambu_pendulum_lanes coef[restrict], const nambu_pendulum_model *model,
-    nambu_pendulum_expansion *e)
+static void nambu_pendulum_begin_at(nambu_pendulum_lanes coef[restrict],
+    nambu_pendulum_lanes y[restrict nambu_pendulum_DIM],
+    nambu_pendulum_lanes middle[restrict nambu_pendulum_DIM], nambu_pendulum_expansion *e)
 {
     nambu_pendulum_lanes m[nambu_pendulum_DIM];
     for (int i = 0; i < nambu_pendulum_DIM; ++i) {
         nambu_pendulum_EACH_LANE
-        for (int lane = 0; lane < nambu_pendulum_LANES; ++lane)
-            m[i][lane] = model->y[i][lane] + model->middle[i][lane];
+        for (int lane = 0; lane < nambu_pendulum_LANES; ++lane) m[i][lane] = y[i][lane] + middle[i][lane];
     }
     nambu_pendulum_begin(coef, e, m);
 }
 
-/* Find the middles by iteration, which gains some digits each time, with expansions as short as that allows;
-   the last can be gone on with. Infinite where that does not converge. */
-static void nambu_pendulum_settle(nambu_pendulum_lanes coef[restrict], nambu_pendulum_model *model,
-    nambu_pendulum_expansion *e)
+/* Find the middles of the paths with mean y by iteration, which gains some digits each time, with expansions
+   as short as that allows; the last can be gone on with. Infinite where that does not converge to the
+   accuracy. */
+static void nambu_pendulum_settle(nambu_pendulum_lanes coef[restrict],
+    nambu_pendulum_lanes y[restrict nambu_pendulum_DIM],
+    nambu_pendulum_lanes middle[restrict nambu_pendulum_DIM], nambu_pendulum_expansion *e, double accuracy)
 {
     nambu_pendulum_lanes size, norm;
     double left = 1.0;
-    memset(model->middle, 0, sizeof model->middle);
-    for (int round = 0; left > nambu_pendulum_SETTLED && round < nambu_pendulum_ROUNDS; ++round) {
+    memset(middle, 0, nambu_pendulum_DIM * sizeof middle[0]);
+    for (int round = 0; left > accuracy && round < nambu_pendulum_ROUNDS; ++round) {
         for (int i = 0; i < nambu_pendulum_DIM && round > 0; ++i) {
             nambu_pendulum_EACH_LANE
-            for (int lane = 0; lane < nambu_pendulum_LANES; ++lane)
-                model->middle[i][lane] = -e->mean[i][lane];
+            for (int lane = 0; lane < nambu_pendulum_LANES; ++lane) middle[i][lane] = -e->mean[i][lane];
         }
-        nambu_pendulum_begin_at(coef, model, e);
+        nambu_pendulum_begin_at(coef, y, middle, e);
         nambu_pendulum_extend(coef, e, nambu_pendulum_GAIN_OF_ROUND * left);
         memset(size, 0, sizeof size);
         memset(norm, 0, sizeof norm);
         for (int i = 0; i < nambu_pendulum_DIM; ++i) {
             nambu_pendulum_EACH_LANE
             for (int lane = 0; lane < nambu_pendulum_LANES; ++lane) {
-                size[lane] += fabs(model->middle[i][lane] + e->mean[i][lane]);
-                norm[lane] += fabs(model->y[i][lane]);
+                size[lane] += fabs(middle[i][lane] + e->mean[i][lane]);
+                norm[lane] += fabs(y[i][lane]);
             }
         }
         nambu_pendulum_EACH_LANE
@@ -1480,8 +1478,8 @@ static void nambu_pendulum_settle(nambu_pendulum_lanes coef[restrict], nambu_pen
         left = nambu_pendulum_largest_finite(size);
         if (left > 1.0) left = 1.0;
     }
-    for (int lane = 0; lane < nambu_pendulum_LANES && left > nambu_pendulum_SETTLED; ++lane)
-        if (size[lane] > nambu_pendulum_SETTLED) model->middle[0][lane] = HUGE_VAL;
+    for (int lane = 0; lane < nambu_pendulum_LANES && left > accuracy; ++lane)
+        if (!(size[lane] <= accuracy)) middle[0][lane] = HUGE_VAL;
 }
 
 /* Half of p: paths take the time from -1 to 1. */
@@ -1490,26 +1488,6 @@ static void nambu_pendulum_halve(nambu_pendulum_lanes p[restrict nambu_pendulum_
     for (int i = 0; i < nambu_pendulum_DIM; ++i) {
         nambu_pendulum_EACH_LANE
         for (int lane = 0; lane < nambu_pendulum_LANES; ++lane) p[i][lane] *= 0.5;
-    }
-}
-
-/* alpha - y and beta - alpha to leading order, from one short expansion. */
-static void nambu_pendulum_evaluate_lanes(nambu_pendulum_lanes coef[restrict],
-    nambu_pendulum_lanes y[restrict nambu_pendulum_DIM],
-    nambu_pendulum_lanes displacement[restrict nambu_pendulum_DIM],
-    nambu_pendulum_lanes increment[restrict nambu_pendulum_DIM])
-{
-    nambu_pendulum_expansion e;
-    nambu_pendulum_momentum_lanes(coef, y, e.p);
-    nambu_pendulum_halve(e.p);
-    nambu_pendulum_begin(coef, &e, y);
-    nambu_pendulum_extend(coef, &e, nambu_pendulum_GUESS_ACCURACY);
-    for (int i = 0; i < nambu_pendulum_DIM; ++i) {
-        nambu_pendulum_EACH_LANE
-        for (int lane = 0; lane < nambu_pendulum_LANES; ++lane) {
-            displacement[i][lane] = (e.even[i][lane] - e.odd[i][lane]) - e.mean[i][lane];
-            increment[i][lane] = 2.0 * e.odd[i][lane];
-        }
     }
 }
 
@@ -1544,9 +1522,10 @@ static void nambu_pendulum_add_slopes(nambu_pendulum_expansion *e, int k, nambu_
         size[lane] = parts[0][lane] + parts[1][lane] / (first[lane] + DBL_MIN);
 }
 
-/* The derivatives of the paths along their middles and p, to seven digits: what that leaves of a correction
-   is below rounding when it is accepted. Infinite where nambu_pendulum_SLOPE_TERMS terms do not suffice. */
-static void nambu_pendulum_vary(nambu_pendulum_lanes coef[restrict], nambu_pendulum_expansion *e)
+/* The derivatives of the paths along their middles and p. Infinite where nambu_pendulum_SLOPE_TERMS terms do
+   not suffice. */
+static void nambu_pendulum_vary(nambu_pendulum_lanes coef[restrict], nambu_pendulum_expansion *e,
+    double accuracy)
 {
     nambu_pendulum_lanes slope[nambu_pendulum_SLOPE_SERIES], size;
     double largest = 1.0, next = 1.0; /* the last two orders, and what is to be expected of the next */
@@ -1561,7 +1540,8 @@ static void nambu_pendulum_vary(nambu_pendulum_lanes coef[restrict], nambu_pendu
             e->v_even[i * 2 * nambu_pendulum_DIM + i][lane] = e->v_mean[i * 2 * nambu_pendulum_DIM
                 + i][lane] = 1.0;
     }
-    for (int k = 0; k < nambu_pendulum_SLOPE_TERMS && next > nambu_pendulum_SLOPE_ACCURACY; ++k) {
+    for (e->varied = 0; e->varied < nambu_pendulum_SLOPE_TERMS && next > accuracy; ++e->varied) {
+        const int k = e->varied;
         if (k >= e->terms) nambu_pendulum_next_order(coef, e, k);
         if (k > 0) nambu_pendulum_follow_slopes(coef, e, k);
         nambu_pendulum_vary_order(e, k);
@@ -1571,8 +1551,33 @@ static void nambu_pendulum_vary(nambu_pendulum_lanes coef[restrict], nambu_pendu
         largest = nambu_pendulum_largest_finite(size);
         next = largest * (largest / previous);
     }
-    for (int lane = 0; lane < nambu_pendulum_LANES && next > nambu_pendulum_SLOPE_ACCURACY; ++lane)
-        if (size[lane] > nambu_pendulum_SLOPE_ACCURACY) e->v_mean[0][lane] = HUGE_VAL;
+    for (int lane = 0; lane < nambu_pendulum_LANES && next > accuracy; ++lane)
+        if (!(size[lane] <= accuracy)) e->v_mean[0][lane] = HUGE_VAL;
+}
+
+/* ---- Blocks along paths ---- */
+#define nambu_pendulum_SLOPE_ACCURACY 1e-7 /* of the derivatives of paths */
+#define nambu_pendulum_SETTLED 1e-9        /* accuracy of middles: what is left, the passes mend */
+#define nambu_pendulum_GUESS_ACCURACY 1e-6 /* of expansions for guesses, which are no better */
+
+/* alpha - y and beta - alpha to leading order, from one short expansion. */
+static void nambu_pendulum_evaluate_lanes(nambu_pendulum_lanes coef[restrict],
+    nambu_pendulum_lanes y[restrict nambu_pendulum_DIM],
+    nambu_pendulum_lanes displacement[restrict nambu_pendulum_DIM],
+    nambu_pendulum_lanes increment[restrict nambu_pendulum_DIM])
+{
+    nambu_pendulum_expansion e;
+    nambu_pendulum_momentum_lanes(coef, y, e.p);
+    nambu_pendulum_halve(e.p);
+    nambu_pendulum_begin(coef, &e, y);
+    nambu_pendulum_extend(coef, &e, nambu_pendulum_GUESS_ACCURACY);
+    for (int i = 0; i < nambu_pendulum_DIM; ++i) {
+        nambu_pendulum_EACH_LANE
+        for (int lane = 0; lane < nambu_pendulum_LANES; ++lane) {
+            displacement[i][lane] = (e.even[i][lane] - e.odd[i][lane]) - e.mean[i][lane];
+            increment[i][lane] = 2.0 * e.odd[i][lane];
+        }
+    }
 }
 
 /* alpha - y and beta - alpha from an expansion whose mean misses y by little, to first order in that. */
@@ -1602,14 +1607,15 @@ static void nambu_pendulum_read_ends(nambu_pendulum_model *model, nambu_pendulum
         }
 }
 
-/* The matrices of a stage, from the derivatives of the paths and the Hessian of S_h. */
+/* The matrices of a stage, from the derivatives of the paths and the Hessian of S_h. They are known to seven
+   digits: what that leaves of a correction is below rounding when it is accepted. */
 static void nambu_pendulum_linearise_paths(nambu_pendulum_lanes coef[restrict], nambu_pendulum_model *model,
     nambu_pendulum_expansion *e, nambu_pendulum_lanes hessian[restrict nambu_pendulum_DIM
     * nambu_pendulum_DIM])
 {
     nambu_pendulum_lanes jacobian[nambu_pendulum_DIM * nambu_pendulum_DIM],
         reciprocal[2 * nambu_pendulum_DIM];
-    nambu_pendulum_vary(coef, e);
+    nambu_pendulum_vary(coef, e, nambu_pendulum_SLOPE_ACCURACY);
     nambu_pendulum_along_mean_lanes(e->v_even, e->v_odd, e->v_mean, hessian, model->alpha_y,
         model->increment_y, jacobian, model->slope, reciprocal);
     nambu_pendulum_invert_lanes(jacobian, model->slope, model->inverse, model->gain, reciprocal
@@ -1631,8 +1637,8 @@ static void nambu_pendulum_update(nambu_pendulum_lanes coef[restrict], nambu_pen
     if (matrices) nambu_pendulum_curvature_lanes(coef, model->y, e.p, hessian);
     else nambu_pendulum_momentum_lanes(coef, model->y, e.p);
     nambu_pendulum_halve(e.p);
-    if (matrices) nambu_pendulum_settle(coef, model, &e);
-    else nambu_pendulum_begin_at(coef, model, &e);
+    if (matrices) nambu_pendulum_settle(coef, model->y, model->middle, &e, nambu_pendulum_SETTLED);
+    else nambu_pendulum_begin_at(coef, model->y, model->middle, &e);
     nambu_pendulum_extend(coef, &e, nambu_pendulum_NEGLIGIBLE);
     nambu_pendulum_check_ends(coef, &e, wrong);
     if (matrices) nambu_pendulum_linearise_paths(coef, model, &e, hessian);

@@ -29,7 +29,7 @@
  *   12. Members of an ensemble
  *   13. Groups of members
  *   14. Ensembles
- * body-sha256: ab41dd757482d2aa560d4c2764bce61b009b47faf459ee930ebe1a6c6037239c
+ * body-sha256: 5939f684257bcd0efaec3c22d2c96ef0cbbebbf1dcc7796d384d62ed0b45eb9a
  */
 #include "rigid_body.h"
 
@@ -1244,7 +1244,6 @@ static double rigid_body_largest(const rigid_body_lanes size)
     memcpy(&largest, &most, sizeof largest);
     return isfinite(largest) ? largest : HUGE_VAL;
 }
-
 /* Correct y by the residuals, with the inverse in the table, and measure the corrections. */
 static void rigid_body_correct(rigid_body_model *model, rigid_body_lanes size)
 {

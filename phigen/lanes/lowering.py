@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 from phigen.lanes import paths
 from phigen.lanes.functions import NEAR_FUNCTIONS, library_calls, library_powers, operations, with_formulas
 from phigen.scheme.kernel import Kernel
+from phigen.scheme.path import PathSlopes
 from phigen.scheme.program import Program
 from phigen.scheme.steps import Explicit, Factorisation, Implicit, Newton, Path, PathLanes, Splitting, Sweeps
 from phigen.symbolic.expression import topological
@@ -59,7 +60,7 @@ class Blocks:
     vectorised: bool
     room: int
     factors: Factorisation | None = None
-    path: PathLanes | None = None
+    path: PathSlopes | None = None
     slope_terms: int = 0
 
     def grouped(self, remembered: int) -> bool:
@@ -92,15 +93,32 @@ class Rows:
         return not operations([kernel]).isdisjoint(self.near)
 
 
-Lanes = Blocks | Packs | Rows
+@dataclass(frozen=True)
+class Traces:
+    """Paths that are followed backwards in lanes, of steps that are made one at a time; see `Blocks`. Where all lanes
+    would need too much room, there are half as many (``narrow``)."""
+
+    kernels: tuple[LaneKernel, ...]
+    calls: frozenset[str]
+    path: PathSlopes
+    slope_terms: int
+    narrow: bool
+
+
+Lanes = Blocks | Packs | Rows | Traces
 
 
 def in_lanes(program: Program) -> Lanes | None:
     """What is computed in lanes; None where the spec says no, or it is not possible, or would need too much room."""
     if isinstance(program.step, Sweeps):
         return _rows(program, program.step)
-    if not (program.lanes and program.offers("lanes")):
+    if not program.lanes:
         return None
+    found = _of_steps(program) if program.offers("lanes") else None
+    return found or (_traces(program, program.step) if isinstance(program.step, Path) else None)
+
+
+def _of_steps(program: Program) -> Blocks | Packs | None:
     if program.noise:
         return None  # every step has coefficients of its own, and guesses from earlier steps miss it
     if program.time and (program.monitor or not isinstance(program.step, Implicit)):
@@ -108,7 +126,7 @@ def in_lanes(program: Program) -> Lanes | None:
     match program.step:
         case Newton() as step:
             return _newton(program, step)
-        case Path() as step if step.lanes:
+        case Path() as step if step.lanes and (program.offers("recurrences") or not step.adjoint):
             return _paths(program, step, step.lanes)
         case Explicit() as step:
             return _packs(program, (step.increment,), ())
@@ -147,15 +165,31 @@ def _newton(program: Program, step: Newton) -> Blocks | None:
 
 
 def _paths(program: Program, step: Path, lanes: PathLanes) -> Blocks | None:
-    room = {k: paths.stack(step, lanes, program.dimension, k) for k in paths.SLOPE_TERMS}
+    most = paths.SLOPE_TERMS_BACK if step.adjoint else paths.SLOPE_TERMS
+    room = {k: paths.stack(step, lanes.slopes, program.dimension, k) for k in most}
     terms = next((k for k, more in room.items() if _block(program, *more) <= MOST_STACK), None)
     if terms is None:
         return None
     kernels = [*paths.kernels(step, lanes, program.coordinates), *(k.kernel for k in _turns(program))]
+    kernels += paths.back(step.back) if step.back else []
     ops = operations(kernels)
     needed = _group(program) + sum(room[terms])
     found = (*(LaneKernel(kernel) for kernel in kernels), *_elapsed(program))
-    return Blocks(found, with_formulas(ops), not library_calls(ops), needed, path=lanes, slope_terms=terms)
+    return Blocks(found, with_formulas(ops), not library_calls(ops), needed, path=lanes.slopes, slope_terms=terms)
+
+
+def _traces(program: Program, step: Path) -> Traces | None:
+    if not step.back:
+        return None
+    path, n = step.back, program.dimension
+    _, once = paths.stack(step, path.slopes, n, paths.TERMS)
+    room = _DOUBLE * LANES * (2 * step.coefficients + 6 * n * n + once)
+    if room > 2 * MOST_STACK:
+        return None
+    kernels = [*paths.traced(step, path.slopes, path.curvature, program.coordinates), *paths.back(path)]
+    return Traces(
+        tuple(map(LaneKernel, kernels)), with_formulas(operations(kernels)), path.slopes, paths.TERMS, room > MOST_STACK
+    )
 
 
 def _elapsed(program: Program) -> list[LaneKernel]:

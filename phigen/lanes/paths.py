@@ -5,36 +5,52 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from phigen.scheme.kernel import Kernel, Output
-from phigen.scheme.path import Series
-from phigen.scheme.steps import Path, PathLanes
+from phigen.scheme.path import PathSlopes, Series
+from phigen.scheme.steps import Path, PathAdjoint, PathLanes
 from phigen.symbolic.expression import Expression, substitute, symbol
 from phigen.symbolic.symbols import FIXED, SERIES, Symbol, momentum
 
 #: Most terms of the expansion of a path from its middle, as in the runtime.
 TERMS = 16
 
-#: Most terms of the expansion of its derivatives, fewer where the stack is too small.
+#: Most terms of the expansion of its derivatives, fewer where the stack is too small. Transposed steps need them all.
 SLOPE_TERMS = (12, 8)
+SLOPE_TERMS_BACK = (TERMS, 12, 8)
 
 
-def stack(step: Path, lanes: PathLanes, dimension: int, slope_terms: int) -> tuple[int, int]:
+def stack(step: Path, slopes: PathSlopes, dimension: int, slope_terms: int) -> tuple[int, int]:
     """Values in each lane on the stack: of a model, beside those of any step, and of an expansion."""
-    n, path, slopes = dimension, step.recurrences, lanes.slopes
+    n, path, used = (
+        dimension,
+        step.recurrences,
+        len(step.back.used) if step.back else 0,
+    )
     series = len(path.series) * (TERMS + 3) + len(slopes.series) * (slope_terms + 2)
     fixed = len(path.fixed) + len(slopes.fixed)
-    return n + 2 * n * n, series + fixed + 2 * n * n * (slope_terms + 4) + 2 * n * n + 8 * n
+    return n + 2 * n * n, series + fixed + n * (2 * n + used) * (slope_terms + 4) + 2 * n * n + 8 * n
 
 
 def kernels(step: Path, lanes: PathLanes, coordinates: Sequence[str]) -> list[Kernel]:
-    """The kernels at one point: p = ∇S_h with its derivative, and without; first coefficients of all series."""
-    path, slopes, curvature = step.recurrences, lanes.slopes, lanes.curvature
+    """The kernels of blocks at one point."""
+    momentum = Kernel("momentum", "p = grad S_h(y)", lanes.curvature.inputs, lanes.curvature.outputs[:1])
+    curvature, *further = traced(step, lanes.slopes, lanes.curvature, coordinates)
+    return [curvature, momentum, *further, lanes.along_mean, lanes.invert]
+
+
+def back(path: PathAdjoint) -> list[Kernel]:
+    """What transposed steps need besides, at one point."""
+    return [path.slope]
+
+
+def traced(step: Path, slopes: PathSlopes, curvature: Kernel, coordinates: Sequence[str]) -> list[Kernel]:
+    """The kernels of expansions at one point: p = ∇S_h with its derivative, and first coefficients of all series."""
+    path = step.recurrences
     coef, covector = curvature.inputs["coef"], tuple(momentum(c) for c in coordinates)
     values = _resolved(path.series, path.fixed, {})
     base = [*_symbols(SERIES, path.series), *_symbols(FIXED, path.fixed)]
     further = _resolved(slopes.series, slopes.fixed, {s: symbol(s) for s in base}, len(path.series), len(path.fixed))
     return [
         curvature,
-        Kernel("momentum", "p = grad S_h(y)", curvature.inputs, curvature.outputs[:1]),
         Kernel(
             "values",
             "the values of all series at one point",
@@ -52,8 +68,6 @@ def kernels(step: Path, lanes: PathLanes, coordinates: Sequence[str]) -> list[Ke
             },
             (Output("slope", further[0]), Output("slope_fixed", further[1])),
         ),
-        lanes.along_mean,
-        lanes.invert,
     ]
 
 

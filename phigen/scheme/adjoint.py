@@ -13,10 +13,10 @@ from dataclasses import replace
 
 from phigen.geometry.system import System, hamiltonian_vector_field
 from phigen.scheme.kernel import Kernel, Output
-from phigen.scheme.path import path_of
+from phigen.scheme.path import PathSlopes, path_of, used_by_path
 from phigen.scheme.staging import TABLE, Coefficients
 from phigen.scheme.steps import Adjoint, PathAdjoint
-from phigen.symbolic.expression import Expression, gradient, neg, symbol, symbols_of, total
+from phigen.symbolic.expression import Expression, gradient, neg, symbol, total
 from phigen.symbolic.symbols import LEVEL, Symbol, cotangent, momentum
 
 
@@ -106,7 +106,7 @@ def level_adjoint(system: System) -> Kernel:
     )
 
 
-def adjoint_path(system: System, coefficients: Coefficients, curvature: Kernel) -> PathAdjoint:
+def adjoint_path(system: System, coefficients: Coefficients, curvature: Kernel, slopes: PathSlopes) -> PathAdjoint:
     """The path traced back from its end with cotangents, see below, and that of the slope along coefficients.
 
     For x' = m(1) and y = ∫ m dt with the cotangents λ and ν, along the path backwards: ȧ = ∂(π(m)p)/∂mᵀ a + ν from
@@ -119,7 +119,7 @@ def adjoint_path(system: System, coefficients: Coefficients, curvature: Kernel) 
     nu = [symbol(momentum(cotangent(c))) for c in coordinates]
     flow = coefficients.hoist(hamiltonian_vector_field(system.poisson, p))
     power = total(e * f for e, f in zip(a, flow, strict=True))
-    used = [s for s in coefficients.slots if s in set(symbols_of(*flow))]
+    used = used_by_path(system, coefficients)
     sources = gradient(power, [*coordinates, *map(momentum, coordinates), *used])
     n = system.dimension
     rates = [*map(neg, flow), *(s + v for s, v in zip(sources[:n], nu, strict=True)), *sources[n:]]
@@ -133,4 +133,4 @@ def adjoint_path(system: System, coefficients: Coefficients, curvature: Kernel) 
         {TABLE: coefficients.table},
         "cotangents of the coefficients, from that of p = grad S_h(y)",
     )
-    return PathAdjoint(recurrences, tuple(coefficients.slots.index(s) for s in used), curvature, slope)
+    return PathAdjoint(recurrences, tuple(coefficients.slots.index(s) for s in used), curvature, slope, slopes)

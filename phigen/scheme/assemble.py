@@ -32,7 +32,7 @@ from phigen.scheme.modified import modified_of
 from phigen.scheme.monitor import elapsed_kernel, monitor_facts, rate_kernel
 from phigen.scheme.noise import expect_no_adjoint, noise_facts
 from phigen.scheme.order import Order
-from phigen.scheme.path import build_path, build_slopes
+from phigen.scheme.path import build_path, build_slopes, used_by_path
 from phigen.scheme.program import About, Monitor, Noise, Program
 from phigen.scheme.staging import Coefficients
 from phigen.scheme.steps import Explicit, InnerSolve, Newton, Path, PathLanes, PathTangent, Step
@@ -153,8 +153,11 @@ def _path(
     recurrences = build_path(system, coefficients)
     generate = generate_kernel(system, generating, coefficients)
     several, varied, adjoint = None, None, None
-    if lanes and n <= MOST_IN_LANES:
+    if extras.adjoint:
+        slopes = build_slopes(system, coefficients, used_by_path(system, coefficients))
+    elif lanes and n <= MOST_IN_LANES:
         slopes = build_slopes(system, coefficients)
+    if lanes and n <= MOST_IN_LANES:
         several = PathLanes(slopes, curvature(system, generating, coefficients), along_mean(n), inverse(n))
     if extras.tangent or extras.adjoint:
         kernel = several.curvature if several else curvature(system, generating, coefficients)
@@ -162,7 +165,7 @@ def _path(
         varied = PathTangent(tangent_path(system, coefficients), kernel)
     refresh, prepare = coefficients.refresh(**step_inputs(system)), _prepare(system, gauge, coefficients)
     if extras.adjoint:
-        adjoint = completed(coefficients, [], prepare, refresh, adjoint_path(system, coefficients, kernel))
+        adjoint = completed(coefficients, [], prepare, refresh, adjoint_path(system, coefficients, kernel, slopes))
     solver = path_elimination(n)
     path = Path(prepare, recurrences, generate, inner, solver, several, varied, refresh=refresh, adjoint=adjoint)
     return coefficients.settled(path)

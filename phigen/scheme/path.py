@@ -14,7 +14,7 @@ from fractions import Fraction
 from phigen.geometry.system import System, hamiltonian_vector_field
 from phigen.scheme.lowering import expand_powers
 from phigen.scheme.staging import Coefficients
-from phigen.symbolic.expression import Expression, derivatives, fold, partials, raw, symbol
+from phigen.symbolic.expression import Expression, derivatives, fold, partials, raw, symbol, symbols_of
 from phigen.symbolic.symbols import FIXED, SERIES, Symbol, momentum
 from phigen.symbolic.taylor import closure
 
@@ -73,13 +73,15 @@ class Entry:
 class PathSlopes:
     """What the derivatives of a path along its start and along p follow from: V̇ = J V + (0, π), for V = (∂m, ∂_p m).
 
-    ``series`` and ``fixed`` go on from those of the path. ``jacobian`` is J = ∂(π(m)p)/∂m, ``tensor`` is π(m).
+    ``series`` and ``fixed`` go on from those of the path. ``jacobian`` is J = ∂(π(m)p)/∂m, ``tensor`` is π(m), and
+    ``along`` is ∂(π(m)p)/∂c, a column for each coefficient c that derivatives are asked for: Ẇ = J W + ∂(π(m)p)/∂c.
     """
 
     series: tuple[Series, ...]
     fixed: tuple[Expression, ...]
     jacobian: tuple[Entry, ...]
     tensor: tuple[Entry, ...]
+    along: tuple[Entry, ...] = ()
 
 
 def build_path(system: System, coefficients: Coefficients) -> Recurrences:
@@ -87,22 +89,26 @@ def build_path(system: System, coefficients: Coefficients) -> Recurrences:
     return path_of(system.coordinates, _flow(system, coefficients))
 
 
-def build_slopes(system: System, coefficients: Coefficients) -> PathSlopes:
-    """The further recurrences for the derivatives of the path of `build_path`."""
+def build_slopes(system: System, coefficients: Coefficients, along: Sequence[str] = ()) -> PathSlopes:
+    """The further recurrences for the derivatives of the path of `build_path`, also along some coefficients."""
     n, flow = system.dimension, _flow(system, coefficients)
     columns = [derivatives(flow, c) for c in system.coordinates]
     jacobian = [columns[j][i] for i in range(n) for j in range(n)]
     tensor = coefficients.hoist([e for row in system.poisson for e in row])
-    return _Builder(system.coordinates).slopes(*_apart(_chains([*flow, *jacobian, *tensor]), n))
+    moved = [derivatives(flow, c) for c in along]
+    sources = [moved[u][i] for i in range(n) for u in range(len(along))]
+    return _Builder(system.coordinates).slopes(_chains([*flow, *jacobian, *tensor, *sources]))
+
+
+def used_by_path(system: System, coefficients: Coefficients) -> list[str]:
+    """The coefficients that π(m)p depends on."""
+    present = set(symbols_of(*_flow(system, coefficients)))
+    return [s for s in coefficients.slots if s in present]
 
 
 def _flow(system: System, coefficients: Coefficients) -> list[Expression]:
     covector = [symbol(momentum(c)) for c in system.coordinates]
     return coefficients.hoist(hamiltonian_vector_field(system.poisson, covector))
-
-
-def _apart(roots: Sequence[Expression], n: int) -> tuple[Sequence[Expression], ...]:
-    return roots[:n], roots[n : n + n * n], roots[n + n * n :]
 
 
 def path_of(coordinates: Sequence[str], flow: Sequence[Expression]) -> Recurrences:
@@ -138,17 +144,17 @@ class _Builder:
         slopes = tuple(self._as_series(f) for f in flow)  # may add series
         return Recurrences(tuple(self.series), slopes, tuple(self.fixed))
 
-    def slopes(
-        self, flow: Sequence[Expression], jacobian: Sequence[Expression], tensor: Sequence[Expression]
-    ) -> PathSlopes:
-        path = self.path(flow)
-        self._include([*jacobian, *tensor])
-        entries = self._entries(jacobian), self._entries(tensor)
+    def slopes(self, roots: Sequence[Expression]) -> PathSlopes:
+        n = len(self.coordinates)
+        path = self.path(roots[:n])
+        self._include(roots[n:])
+        matrices = roots[n : n + n * n], roots[n + n * n : n + 2 * n * n], roots[n + 2 * n * n :]
+        entries = [self._entries(matrix) for matrix in matrices]
         return PathSlopes(tuple(self.series[len(path.series) :]), tuple(self.fixed[len(path.fixed) :]), *entries)
 
     def _entries(self, matrix: Sequence[Expression]) -> tuple[Entry, ...]:
-        n = len(self.coordinates)
-        return tuple(Entry(*divmod(k, n), self._as_series(e)) for k, e in enumerate(matrix) if not e.is_zero)
+        width = max(1, len(matrix) // len(self.coordinates))
+        return tuple(Entry(*divmod(k, width), self._as_series(e)) for k, e in enumerate(matrix) if not e.is_zero)
 
     def _include(self, roots: Sequence[Expression]) -> None:
         order = closure(roots)

@@ -26,12 +26,14 @@ LONGEST_PATH, MOST_PIECES = 128, 512
 @dataclass(frozen=True)
 class PathAdjoint:
     """The path traced back with cotangents (`phigen.scheme.adjoint`): their ``recurrences``, those of the ``used``
-    coefficients last; ∇S_h and its Hessian at the mean, and the transpose of ∇S_h along coefficients."""
+    coefficients last; ∇S_h and its Hessian at the mean, and the transpose of ∇S_h along coefficients; ``slopes``, from
+    which the derivatives of many paths at once follow."""
 
     recurrences: Recurrences
     used: tuple[int, ...]
     curvature: Kernel
     slope: Kernel
+    slopes: PathSlopes
 
 
 @dataclass(frozen=True)
@@ -205,11 +207,16 @@ class Path(_Staged):
         return _present((*own, *lanes, *varied, *self.transposed))
 
     @property
+    def back(self) -> PathAdjoint | None:
+        """What going back along the path needs, if that was asked for."""
+        return self.adjoint.path if self.adjoint else None
+
+    @property
     def curvature(self) -> Kernel | None:
         """∇S_h and its Hessian, where derivatives of a step were asked for."""
         if self.tangent:
             return self.tangent.curvature
-        return self.adjoint.path.curvature if self.adjoint and self.adjoint.path else None
+        return self.back.curvature if self.back else None
 
 
 @dataclass(frozen=True)

@@ -76,7 +76,7 @@ def recurrences(program: Program) -> list[Recurrences]:
     if not isinstance(step, Path):
         return []
     varied = [step.tangent.recurrences] if step.tangent else []
-    back = [step.adjoint.path.recurrences] if step.adjoint and step.adjoint.path else []
+    back = [step.back.recurrences] if step.back else []
     return [step.recurrences, *varied, *back]
 
 

@@ -45,6 +45,7 @@ KINDS = {
     "newton, monitor": (SWING + "monitor: 1/(1 + g*q**2)\norder: 4\n" + SHORT, Newton),
     "explicit, time": (DRIVEN + "birealisation: {kind: canonical-euler, side: q}\norder: 1\n" + SHORT, Explicit),
     "path": (TOP + "birealisation: karasev\ngauge: none\norder: 4\n", Path),
+    "path, long": (TOP.replace("/2\n", "*8\n") + "birealisation: karasev\ngauge: none\norder: 2\n" + SHORT, Path),
     "path, time, composed": (DRIVEN + "birealisation: karasev\norder: 4\ncomposition: suzuki\n" + SHORT, Path),
     "splitting, time": (SHAKEN + "scheme: splitting\norder: 4\n" + SHORT, Splitting),
     "kicks, time": (DRIVEN + "scheme: splitting\norder: 4\n" + SHORT, Splitting),

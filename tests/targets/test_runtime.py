@@ -106,7 +106,8 @@ def test_each_file_of_lattices_compiles_by_itself(name, tmp_path):
     ids=lambda p: p.name,
 )
 def test_each_file_of_the_runtime_compiles_by_itself(path, tmp_path):
-    kinds = {"packs.c": "SPLITTING", "explicit.c": "EXPLICIT", "path.c": "PATH", "path_lanes.c": "PATH"}
+    kinds = {"packs.c": "SPLITTING", "explicit.c": "EXPLICIT", "path.c": "PATH"}
+    kinds |= dict.fromkeys(("path_lanes.c", "expansion_lanes.c", "adjoint_lanes.c"), "PATH")
     own = {"gauge.c": ["GAUGE"], "level.c": ["GAUGE"], "attitude.c": ["ATTITUDE"], "noise.c": ["NOISE"]}
     kind = kinds.get(path.name, "NEWTON")
     switches = defined((kind, "FAST", "TANGENT", "ADJOINT", *own.get(path.name, ())))

@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Mapping, Sequence
 
-from phigen.lanes.lowering import Blocks, Lanes, Rows, in_lanes
+from phigen.lanes.lowering import Blocks, Lanes, Rows, Traces, in_lanes
 from phigen.scheme.kernel import Kernel
 from phigen.scheme.path import Recurrences
 from phigen.scheme.program import BOUND, Attitude, Noise, Program
@@ -100,15 +100,15 @@ def printed(program: Program, lanes: Lanes | None, has: Mapping[str, bool]) -> d
             varied = _path(tangent_program(program), step.tangent.recurrences, "tangent")
             found["tangent_model.h"] = "" if step.adjoint else function(program, step.tangent.curvature) + "\n"
             found["tangent_model.h"] += varied
-        if step.adjoint and step.adjoint.path:
-            found["adjoint_path.h"] = _adjoint_path(program, step.adjoint.path)
-        if step.lanes and has["BLOCKS"]:
-            found["path_model_lanes.h"] = paths.printed(program, step, step.lanes)
+        if step.back:
+            found["adjoint_path.h"] = _adjoint_path(program, step.back)
+        if isinstance(lanes, Blocks | Traces) and lanes.path and (has["BLOCKS"] or has["TRACED"]):
+            found["path_model_lanes.h"] = paths.printed(program, step, lanes.path)
     if isinstance(step, Splitting):
         found["flows.h"] = splitting.printed(program, step)
         found["tangent_flows.h"] = splitting.tangent(program, step) if has["TANGENT"] else ""
         found["adjoint_flows.h"] = splitting.adjoint(program, step, step.adjoint) if step.adjoint else ""
-    if lanes and (has["BLOCKS"] or has["PACKS"]):
+    if lanes and (has["BLOCKS"] or has["PACKS"] or has["TRACED"]):
         found["model_lanes.h"] = "\n".join(kernels_in_lanes(program, lanes))
     declarations = render("c", "declarations.h", _declarations(program, lanes, has))
     return {"declarations.h": declarations, "model.h": _model(program, lanes, has, found.values()), **found}
@@ -125,7 +125,7 @@ def _declarations(program: Program, lanes: Lanes | None, has: Mapping[str, bool]
         sizes.append(("GAUGES", len(program.held), "that a trajectory holds fixed: e" if program.monitor else whose))
     sizes += _of_attitude(program.attitude) if program.attitude else []
     if has["ADJOINT"]:
-        kept = program.dimension * len(program.fractions) * (2 if has["PATH"] else 1)
+        kept = program.dimension * len(program.fractions)
         sizes.append(("TRAIL", kept, "numbers of a step that its transpose needs"))
     if has["RECURRENCES"]:
         memory = remembered(program, lanes)
@@ -197,13 +197,12 @@ def _constants(program: Program, lanes: Lanes | None, has: Mapping[str, bool]) -
             varied = step.tangent.recurrences
             sizes.append(("TANGENT_SERIES", len(varied.series), "of a path with its variation"))
             sizes.append(("TANGENT_FIXED", max(1, len(varied.fixed)), "values that are constant along it"))
-        if step.adjoint and step.adjoint.path:
-            back, n = step.adjoint.path, program.dimension
+        if step.back:
+            back, n = step.back, program.dimension
             sizes.append(("BACK", 3 * n + len(back.used), "numbers of a path traced back, with cotangents"))
             sizes.append(("BACK_SERIES", len(back.recurrences.series), "of such a path"))
             sizes.append(("BACK_FIXED", max(1, len(back.recurrences.fixed)), "values that are constant along it"))
     if has["ADJOINT"]:
-        sizes.append(("PARTS_OF_TRAIL", 2 if has["PATH"] else 1, "vectors that the transpose of a stage needs"))
         sizes += [("RENEWED_OF_ROW", step.renewed, "coefficients of a row that depend on the time")] * bool(
             step.refresh
         )
@@ -213,10 +212,13 @@ def _constants(program: Program, lanes: Lanes | None, has: Mapping[str, bool]) -
     if has["BLOCKS"] and isinstance(lanes, Blocks):
         passes = PASSES if lanes.vectorised and not has["PATH"] else PASSES_OF_CALLS
         sizes.append(("PASSES", passes, "over a block, that cost per step what an evaluation costs"))
-        sizes += paths.sizes(lanes.path, lanes.slope_terms) if lanes.path else []
         if lanes.factors:
             entries = len(lanes.factors.factorise.roots)
             sizes.append(("FACTORS", entries, "entries of the factors of a Newton matrix"))
+    if isinstance(lanes, Blocks | Traces) and lanes.path and (has["BLOCKS"] or has["TRACED"]):
+        sizes += paths.sizes(lanes.path, lanes.slope_terms)
+    if has["ALONG"] and isinstance(step, Path) and step.back:
+        sizes.append(("USED", len(step.back.used), "coefficients that the slope of a path depends on"))
     return sizes + (splitting.sizes(step) if isinstance(step, Splitting) else [])
 
 
@@ -267,7 +269,9 @@ def _model(program: Program, lanes: Lanes | None, has: Mapping[str, bool], other
         "fractions": ", ".join(map(repr, program.fractions)) if has["COMPOSED"] else "",
         "times": ", ".join(map(repr, schedule.times)) if schedule else "",
         "multiples": ", ".join(map(repr, schedule.multiples)) if schedule else "",
-        "path_slopes": ", ".join(map(str, step.recurrences.slopes)) if isinstance(step, Path) and has["BLOCKS"] else "",
+        "path_slopes": ", ".join(map(str, step.recurrences.slopes))
+        if isinstance(step, Path) and (has["BLOCKS"] or has["TRACED"])
+        else "",
         "apart": has["PACKS"] or any("_APART" in part for part in [text, *others]),
     }
     values["middles"] = ", ".join(map(repr, program.midpoints))

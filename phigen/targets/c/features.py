@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from phigen.lanes.lowering import Blocks, Lanes, Packs
+from phigen.lanes.lowering import Blocks, Lanes, Packs, Traces
 from phigen.scheme.program import Program
 from phigen.scheme.steps import Explicit, Implicit, Newton, Path, Splitting, Sweeps
 from phigen.targets.c.lanes import grouped
@@ -71,6 +71,9 @@ FEATURES = (
     Feature("GAUGE_SEARCH", requires=("GAUGE",), part="gauge-search"),
     Feature("RECURRENCES", requires=("GUESSED",), part="recurrences"),
     Feature("BLOCKS", requires=("RECURRENCES",), in_lanes=lambda lanes: isinstance(lanes, Blocks), part="lanes"),
+    Feature("TRACED", requires=("PATH", "ADJOINT"), in_lanes=lambda lanes: isinstance(lanes, Blocks | Traces)),
+    Feature("NARROW", requires=("TRACED",), in_lanes=lambda lanes: isinstance(lanes, Traces) and lanes.narrow),
+    Feature("ALONG", lambda p: isinstance(p.step, Path) and p.step.back and p.step.back.used, ("TRACED",)),
     Feature("PACKS", requires=("ENSEMBLE",), in_lanes=lambda lanes: isinstance(lanes, Packs), part="lanes"),
     Feature("FAR", requires=("PACKS",), in_lanes=lambda lanes: isinstance(lanes, Packs) and lanes.near),
     Feature("SPARSE", requires=("BLOCKS",), in_lanes=lambda lanes: isinstance(lanes, Blocks) and lanes.factors),

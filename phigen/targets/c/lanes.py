@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from phigen.lanes.functions import NEAR_FUNCTIONS
-from phigen.lanes.lowering import LANES, Blocks, Lanes, Packs
+from phigen.lanes.lowering import LANES, Blocks, Lanes, Packs, Traces
 from phigen.scheme.program import Program
 from phigen.scheme.steps import Splitting
 from phigen.targets.c import functions, splitting
@@ -41,7 +41,7 @@ def grouped(program: Program, lanes: Lanes | None) -> bool:
 def printed(program: Program, lanes: Lanes) -> list[str]:
     """The kernels in lanes."""
     found = functions.phi_lanes(program, lanes.calls)
-    if isinstance(lanes, Blocks):
+    if isinstance(lanes, Blocks | Traces):
         return found + [
             function(program, k.kernel, lanes=True, single=k.single, sparse=k.sparse, shared=k.shared)
             for k in lanes.kernels

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from phigen.scheme.lowering import expand_powers
 from phigen.scheme.path import Entry, PathSlopes, Recurrences, Series, Term
 from phigen.scheme.program import Program
-from phigen.scheme.steps import Path, PathLanes
+from phigen.scheme.steps import Path
 from phigen.symbolic.expression import Expression
 from phigen.symbolic.symbols import FIXED, SERIES, Symbol, coefficient, momentum
 from phigen.targets.c.kernels import FUNCTIONS, printer
@@ -19,32 +19,39 @@ from phigen.targets.reserved import Reserved
 LONGEST_LOOP = 60
 
 
-def sizes(lanes: PathLanes, slope_terms: int) -> list[tuple[str, int, str]]:
+def sizes(slopes: PathSlopes, slope_terms: int) -> list[tuple[str, int, str]]:
     """The constants of paths in lanes."""
     return [
         ("SLOPE_TERMS", slope_terms, "most of the expansion of the derivatives of a path"),
-        ("SLOPE_SERIES", max(1, len(lanes.slopes.series)), "further series that these need"),
-        ("SLOPE_FIXED", max(1, len(lanes.slopes.fixed)), "further values that are constant along a path"),
+        ("SLOPE_SERIES", max(1, len(slopes.series)), "further series that these need"),
+        ("SLOPE_FIXED", max(1, len(slopes.fixed)), "further values that are constant along a path"),
     ]
 
 
-def printed(program: Program, step: Path, lanes: PathLanes) -> str:
+def printed(program: Program, step: Path, slopes: PathSlopes) -> str:
     """The recurrences of all series in lanes."""
-    path, slopes, n = step.recurrences, lanes.slopes, program.dimension
+    path, n = step.recurrences, program.dimension
     show = _Show(program, path, slopes)
     every, base = [*path.series, *slopes.series], len(path.series)
     follow, further = (
         _rules(program, show, every, range(n, base)),
         _rules(program, show, every, range(base, len(every))),
     )
+    used = step.back.used if step.back else ()
     own = {
         "NAME": program.name,
         "follow": [
             ("follow", "the series that follow from those of the coordinates", *follow),
             ("follow_slopes", "the further series", *further),
         ],
-        "vary": _variation(show, slopes.jacobian),
+        "vary": _variation(show, slopes.jacobian, 2 * n),
         "source": _source(show, slopes),
+        "count": len(used),
+        "vary_along": _variation(show, slopes.jacobian, len(used)),
+        "source_along": [
+            f"to[{e.row * len(used) + e.column}][lane] += share * {show.series(e.series)}[k][lane];"
+            for e in slopes.along
+        ],
     }
     return render("c", "path_lanes.c", own)
 
@@ -138,15 +145,15 @@ def _linear(show: _Show, q: Series) -> str:
     return text
 
 
-def _variation(show: _Show, jacobian: Sequence[Entry]) -> list[str]:
-    """The product of ∂(π p)/∂m and the derivatives so far, to be added."""
+def _variation(show: _Show, jacobian: Sequence[Entry], width: int) -> list[str]:
+    """The product of ∂(π p)/∂m and the derivatives so far, rows of this width, to be added."""
     n = show.dimension
-    lines = [f"const double a{e.row}{e.column} = share * {show.series(e.series)}[j][lane];" for e in jacobian]
+    lines = [f"const double a{e.row}_{e.column} = share * {show.series(e.series)}[j][lane];" for e in jacobian]
     for row in range(n):
         columns = [e.column for e in jacobian if e.row == row]
-        for k in range(2 * n if columns else 0):
-            products = " + ".join(f"a{row}{c} * from[{c * 2 * n + k}][lane]" for c in columns)
-            lines.append(f"to[{row * 2 * n + k}][lane] += {products};")
+        for k in range(width if columns else 0):
+            products = " + ".join(f"a{row}_{c} * from[{c * width + k}][lane]" for c in columns)
+            lines.append(f"to[{row * width + k}][lane] += {products};")
     return lines or ["(void)from, (void)to, (void)share;"]
 
 

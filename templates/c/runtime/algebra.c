@@ -56,7 +56,7 @@ static void phi_settle(double x[PHI_DIM], double carry[PHI_DIM], const double mo
 
 #endif
 #if PHI_IMPLICIT
-#if PHI_UNROLLED || PHI_BLOCKS
+#if PHI_UNROLLED || PHI_BLOCKS || PHI_TRACED
 #define PHI_LARGEST_RECIPROCAL 1e3 /* Newton matrices are I + O(h): a pivot with a larger one is far from 1 */
 
 #endif

@@ -5,10 +5,18 @@
 /* ---- Several steps or members at once ---- */
 /* Below, the formulas of a step are evaluated for several steps of a trajectory, or members of an ensemble, at once.
    Compilers make vector instructions of the loops over lanes. */
+#if PHI_NARROW
+enum { PHI_LANES = 4 }; /* more would need too much room on the stack */
+#else
 enum { PHI_LANES = 8 }; /* what one vector of AVX-512 holds */
+#endif
 
 #if defined(__GNUC__)
+#if PHI_NARROW
+typedef double phi_lanes[PHI_LANES] __attribute__((aligned(32))); /* a value in each lane */
+#else
 typedef double phi_lanes[PHI_LANES] __attribute__((aligned(64))); /* a value in each lane */
+#endif
 #else
 typedef double phi_lanes[PHI_LANES];
 #endif

@@ -2,7 +2,6 @@
 #define PHI_FILE_NEWTON_LANES
 #include <float.h>
 #include <math.h>
-#include <stdint.h>
 #include <string.h>
 
 #include "algebra.c"
@@ -50,18 +49,7 @@ static void phi_sizes(phi_lanes y[restrict PHI_DIM], phi_lanes delta[restrict PH
     }
 }
 
-/* The largest of the lanes, none of which is negative; infinite if one is not finite. As integers, the bits of such
-   numbers have their order, and those of what is no number are larger. */
-static double phi_largest(const phi_lanes size)
-{
-    uint64_t bits[PHI_LANES], most = 0;
-    double largest;
-    memcpy(bits, size, sizeof bits);
-    for (int lane = 0; lane < PHI_LANES; ++lane) most = bits[lane] > most ? bits[lane] : most;
-    memcpy(&largest, &most, sizeof largest);
-    return isfinite(largest) ? largest : HUGE_VAL;
-}
-
+#include "largest.c"
 #if PHI_SPARSE
 /* Correct y by the residuals, with the factors in the table, and measure the corrections; also find what they take from
    the increments. */

@@ -13,7 +13,7 @@
 #if PHI_ENSEMBLE
 #include "ensemble.c"
 #endif
-#if PHI_BLOCKS || PHI_PACKS
+#if PHI_BLOCKS || PHI_PACKS || PHI_TRACED
 
 #if defined(__clang__)
 #pragma clang diagnostic pop

@@ -4,7 +4,7 @@
 #include "lanes.c"
 #include "model.h"
 
-enum { PHI_SLOPE_TERMS = 8, PHI_SLOPE_SERIES = 2, PHI_SLOPE_FIXED = 1, PHI_FACTORS = 1 };
+enum { PHI_SLOPE_TERMS = PHI_ADJOINT ? 16 : 8, PHI_SLOPE_SERIES = 2, PHI_SLOPE_FIXED = 1, PHI_FACTORS = 1 };
 
 #if PHI_ATTITUDE
 static void phi_turn_lanes(phi_lanes coef[], phi_lanes y[2], phi_lanes turn[PHI_ELEMENT])
@@ -75,6 +75,19 @@ static void phi_slope_values_lanes(phi_lanes coef[], phi_lanes p[2], phi_lanes v
     }
 }
 
+#if PHI_ADJOINT
+static void phi_slope_adjoint_lanes(phi_lanes coef[], phi_lanes y[2], phi_lanes slope_bar[2], phi_lanes coef_bar[2])
+{
+    for (int lane = 0; lane < PHI_LANES; ++lane) {
+        const double c[2] = { coef[0][lane], coef[1][lane] }, point[2] = { y[0][lane], y[1][lane] };
+        const double bar[2] = { slope_bar[0][lane], slope_bar[1][lane] };
+        double found[2];
+        phi_slope_adjoint(c, point, bar, found);
+        for (int i = 0; i < 2; ++i) coef_bar[i][lane] = found[i];
+    }
+}
+
+#endif
 /* alpha and beta are y -+ pi p / 2: their derivatives do not need those of the path, which is straight. */
 static void phi_along_mean_lanes(phi_lanes even[8], phi_lanes odd[8], phi_lanes mean[8], phi_lanes hessian[4],
     phi_lanes alpha_y[4], phi_lanes increment_y[4], phi_lanes jacobian[4], phi_lanes slope[4], phi_lanes reciprocal[4])

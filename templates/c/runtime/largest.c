@@ -1,0 +1,20 @@
+#ifndef PHI_FILE_LARGEST
+#define PHI_FILE_LARGEST
+#include <math.h>
+#include <stdint.h>
+#include <string.h>
+
+#include "lanes.c"
+
+/* The largest of the lanes, none of which is negative; infinite if one is not finite. As integers, the bits of such
+   numbers have their order, and those of what is no number are larger. */
+static double phi_largest(const phi_lanes size)
+{
+    uint64_t bits[PHI_LANES], most = 0;
+    double largest;
+    memcpy(bits, size, sizeof bits);
+    for (int lane = 0; lane < PHI_LANES; ++lane) most = bits[lane] > most ? bits[lane] : most;
+    memcpy(&largest, &most, sizeof largest);
+    return isfinite(largest) ? largest : HUGE_VAL;
+}
+#endif
