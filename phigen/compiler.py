@@ -40,6 +40,7 @@ from phigen.scheme.order import plan_order
 from phigen.scheme.program import Program
 from phigen.scheme.splitting import build_splitting
 from phigen.spec.model import Extras, Spec
+from phigen.splitting.forces import force_flows
 from phigen.splitting.parts import split
 
 T = TypeVar("T")
@@ -208,12 +209,11 @@ def _compiled(
 
 def _split(spec: Spec, source: System, order: int | None, described: Mapping[str, Any], clock: _Clock) -> Compilation:
     """Compile to a splitting."""
-    if source.forces:
-        reason = "scheme: splitting takes no forces and no damping"
-        raise SpecError([spec.diagnostic(("scheme",), reason, "scheme: series takes them")])
     gauge = Gauge() if isinstance(spec.gauge, str) else given(source, spec.gauge)
     discretised = gauge.applied(source)
     parts = clock.timed("splitting", lambda: split(discretised.frozen))
+    pushing = clock.timed("splitting", lambda: force_flows(source.frozen))
+    parts = replace(parts, flows=(*parts.flows, *pushing))
     monitor, wanted = logarithmic_of(spec, source, parts.flows), order or spec.wanted_order
     choice = clock.timed(
         "composition",

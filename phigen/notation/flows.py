@@ -28,13 +28,22 @@ def images(flow: Flow, coordinates: Sequence[str]) -> dict[str, Expression]:
     return {c: symbol(c) + e for c, e in zip(coordinates, flow.increment, strict=True) if not e.is_zero}
 
 
+def definitions(flow: Flow, coordinates: Sequence[str]) -> list[tuple[str, Expression]]:
+    """What it is the flow of: the Hamiltonian, or the components of a force that are not 0, by coordinates."""
+    if not flow.force:
+        return [("", flow.hamiltonian)]
+    return [(c, f) for c, f in zip(coordinates, flow.force, strict=True) if not f.is_zero]
+
+
 def formulas(compilation: Compilation, most: int | None) -> list[tuple[str, str]]:
     """The parts of H, and where the flow of each takes the coordinates, as pairs of a name and a text."""
-    listed = []
+    listed: list[tuple[str, str]] = []
     for k, flow in enumerate(flows_of(compilation), 1):
         moved = images(flow, compilation.system.coordinates)
-        part, *texts = readable([flow.hamiltonian, *moved.values()], most)
-        listed += [(f"H_{k}", part), *((f"Φ_{k}: {c}", t) for c, t in zip(moved, texts, strict=True))]
+        named = [f"{flow.letter}_{k}{': ' * bool(c)}{c}" for c, _ in definitions(flow, compilation.system.coordinates)]
+        named += [f"Φ_{k}: {c}" for c in moved]
+        formulas = [*(e for _, e in definitions(flow, compilation.system.coordinates)), *moved.values()]
+        listed += zip(named, readable(formulas, most), strict=True)
     return listed
 
 
@@ -50,7 +59,10 @@ def described(compilation: Compilation) -> dict[str, object]:
     parts = []
     for flow in flows_of(compilation):
         moved = images(flow, compilation.system.coordinates)
-        part, *texts = readable([flow.hamiltonian, *moved.values()], None)
-        parts.append({"hamiltonian": part, "flow": dict(zip(moved, texts, strict=True)), "manner": flow.manner})
+        own = definitions(flow, compilation.system.coordinates)
+        texts = readable([*(e for _, e in own), *moved.values()], None)
+        force = {c: t for (c, _), t in zip(own, texts, strict=False)}
+        part: dict[str, object] = {"force": force} if flow.force else {"hamiltonian": texts[0]}
+        parts.append(part | {"flow": dict(zip(moved, texts[len(own) :], strict=True)), "manner": flow.manner})
     steps = [[part + 1, time] for part, time in schedule(compilation.program.step)]
     return {"scheme": "splitting", "parts": parts, "flows": steps}

@@ -73,8 +73,9 @@ def _flow(compilation: Compilation, k: int) -> str:
     flow = flows.flows_of(compilation)[k - 1]
     moved = flows.images(flow, compilation.system.coordinates)
     pulled = f"<msubsup><mi>Φ</mi><mn>{k}</mn><mi>∗</mi></msubsup>{_TIMES}"
-    left = [_indexed("H", k), *(pulled + mathml.name(c) for c in moved)]
-    return aligned(_equations(left, [flow.hamiltonian, *moved.values()]))
+    own = flows.definitions(flow, compilation.system.coordinates)
+    left = [*(mathml.component(flow.letter, k, c) for c, _ in own), *(pulled + mathml.name(c) for c in moved)]
+    return aligned(_equations(left, [*(e for _, e in own), *moved.values()]))
 
 
 def _maps(compilation: Compilation) -> Iterator[str]:

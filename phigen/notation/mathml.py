@@ -187,6 +187,13 @@ def indexed(letter: str, index: str) -> str:
     return f"<msub><mi>{escape(letter)}</mi>{name(index)}</msub>"
 
 
+def component(letter: str, k: int, c: str) -> str:
+    """The k-th of several, and of a vector field its component along a coordinate: H_2, F_3^{x}."""
+    if not c:
+        return f"<msub><mi>{escape(letter)}</mi><mn>{k}</mn></msub>"
+    return f"<msubsup><mi>{escape(letter)}</mi><mn>{k}</mn>{name(c)}</msubsup>"
+
+
 def bracket(a: str, b: str) -> str:
     """The Poisson bracket of two coordinates, {a, b}."""
     return _row(f'<mo stretchy="false">{{</mo>{name(a)}<mo>,</mo>{name(b)}<mo stretchy="false">}}</mo>')

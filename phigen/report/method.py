@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from markupsafe import Markup
 
 from phigen.compilation import Compilation
@@ -72,26 +74,27 @@ def _generating_function(compilation: Compilation) -> list[Markup]:
 
 def _splitting(compilation: Compilation) -> list[Markup]:
     parts = flows.flows_of(compilation)
-    sum_of_parts = "<mo>+</mo>".join(_indexed("H", k) for k in range(1, len(parts) + 1))
+    sum_of_parts = "<mo>+</mo>".join(_indexed("H", k) for k, flow in enumerate(parts, 1) if not flow.force)
     blocks = [page.heading("Parts of H and their flows over a time h")]
     blocks.append(page.equations([[mathml.math(f"<mi>H</mi><mo>=</mo>{sum_of_parts}")]]))
     for k, flow in enumerate(parts, 1):
         blocks += _flow(compilation, k, flow)
-    return [*blocks, _schedule(compilation.program.step)]
+    return [*blocks, _schedule(compilation.program.step, [flow.letter for flow in parts])]
 
 
 def _flow(compilation: Compilation, k: int, flow: Flow) -> list[Markup]:
     moved = flows.images(flow, compilation.system.coordinates)
     left = [mathml.name(c) for c in moved]
-    part = page.equations([equation(_indexed("H", k), flow.hamiltonian)])
-    images = group(left, list(moved.values()), f"The flow of H_{k}", "↦")
+    own = flows.definitions(flow, compilation.system.coordinates)
+    part = page.equations([equation(mathml.component(flow.letter, k, c), e) for c, e in own])
+    images = group(left, list(moved.values()), f"The flow of {flow.letter}_{k}", "↦")
     return [part, images, page.paragraph(f"This flow: {flow.manner}.", "note")] if moved else [part]
 
 
-def _schedule(step: Step) -> Markup:
+def _schedule(step: Step, letters: Sequence[str]) -> Markup:
     """The flows of one step, in their order."""
     rows = [
-        (str(i), [("", page.typeset(f"H_{part + 1}")), ("number", f"{time:.16g}".replace("-", "−"))])
+        (str(i), [("", page.typeset(f"{letters[part]}_{part + 1}")), ("number", f"{time:.16g}".replace("-", "−"))])
         for i, (part, time) in enumerate(flows.schedule(step), 1)
     ]
     table = page.table("One step", [("", ""), ("", "flow of"), ("number", "over this part of h")], rows)

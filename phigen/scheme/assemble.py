@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import replace
 
 from phigen.attitude.group import Group
@@ -12,6 +12,7 @@ from phigen.realisations.protocol import BiRealisation
 from phigen.scheme.adjoint import adjoint_path, completed, explicit_adjoint, level_adjoint, newton_adjoint
 from phigen.scheme.attitude import expect_element, stage_attitude
 from phigen.scheme.discretisation import MOST_OPERATIONS, Discretisation, too_large
+from phigen.scheme.forces import acts, force_facts
 from phigen.scheme.gauge import Gauge, Gauged, free_gauge
 from phigen.scheme.generating import GeneratingFunction
 from phigen.scheme.kernel import Kernel, Output
@@ -38,7 +39,6 @@ from phigen.scheme.staging import Coefficients
 from phigen.scheme.steps import Explicit, InnerSolve, Newton, Path, PathLanes, PathTangent, Step
 from phigen.scheme.tangent import curvature, explicit_jacobian, tangent_path
 from phigen.spec.model import NO_EXTRAS, Extras, SolverOptions
-from phigen.symbolic.expression import Expression
 from phigen.symbolic.symbols import STEP
 
 #: Largest dimension in which paths are followed in lanes. In five and six their derivatives cost what lanes save:
@@ -193,25 +193,12 @@ def _facts(
     yield f"generating function: {series} ({generating.form}{terms})"
     yield from monitor_facts(gauge.monitor)
     yield from gauge.facts
-    yield from _forces(system)
+    halves = ", impulse h f by halves before and after" if system.forces and acts(system.forces.vector) else ""
+    yield from force_facts(system, f"p = h (grad H + zeta){halves}")
     yield from noise_facts(system, weak=1)
     yield f"step: {step.manner}"
     yield scheme.note
     yield order.note
-
-
-def _forces(system: System) -> Iterator[str]:
-    """What is said of forces: with them a step is no Poisson map."""
-    if system.forces is None:
-        return
-    yield "forces: p = h (grad H + zeta)" + ", impulse h f by halves before and after" * _acts(system.forces.vector)
-    changed = [name for name, c in system.casimirs.items() if not system.forced_rate_of_casimir(c).is_zero]
-    kept = f"they change {', '.join(changed)}" if changed else "they keep all Casimirs"
-    yield f"with forces a step is no Poisson map; {kept}"
-
-
-def _acts(force: Sequence[Expression]) -> bool:
-    return any(not f.is_zero for f in force)
 
 
 def approximation(realisation: BiRealisation) -> list[str]:

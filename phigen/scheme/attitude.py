@@ -75,7 +75,7 @@ def flow_attitude(
     turned = turnings(system, group, flows, put_back=uniform(system))
     shaken = [turning_of(system, group, s.hamiltonian, s.name, put_back=False) for s in system.noise]
     times = [time_of(flow) if time_of else symbol(TIME) for flow in flows]
-    named = [f"the noise {s.name}" for s in system.noise] + [f"H_{k}" for k in range(1, len(flows) + 1)]
+    named = [f"the noise {s.name}" for s in system.noise] + [f"{flow.letter}_{k}" for k, flow in enumerate(flows, 1)]
     found = []
     for k, (turning, time) in enumerate(zip([*shaken, *turned], [*driving_times(system), *times], strict=True), 1):
         factors = factor_elements(system, group, turning, time)

@@ -69,6 +69,9 @@ def plan(system: System, splitting: Splitting, wanted: int, composition: str) ->
 
     Raises `SpecError` for orders that the composition lacks, and for parts that it does not apply to.
     """
+    if system.forces:  # a force is no part that kicks
+        choice = planned(system, splitting, wanted, composition, lambda: ())
+        return _with_carrier(system, choice) if system.time else choice
     if not system.time:
         return planned(system, splitting, wanted, composition, lambda: kicks(system, splitting))
     choice = planned(system, splitting, wanted, composition, lambda: _kicks_in_time(system, splitting))
@@ -105,7 +108,7 @@ def _with_carrier(system: System, choice: Choice) -> Choice:
 
 def _is_dated(system: System, flow: Flow) -> bool:
     """Whether a flow depends on the time."""
-    return system.time in symbols_of(flow.hamiltonian)
+    return system.time in symbols_of(flow.hamiltonian, *flow.force)
 
 
 def planned(

@@ -13,6 +13,7 @@ from phigen.scheme.adjoint import completed, explicit_adjoint, level_adjoint
 from phigen.scheme.attitude import flow_attitude
 from phigen.scheme.choosing import Choice
 from phigen.scheme.discretisation import MOST_OPERATIONS, too_large
+from phigen.scheme.forces import force_facts
 from phigen.scheme.gathering import gather
 from phigen.scheme.gauge import Gauge
 from phigen.scheme.kernel import Kernel, Output
@@ -95,6 +96,7 @@ def build_splitting(
         *monitored,
         *gauge.facts,
         *facts(choice, step, len(sources)),
+        *force_facts(system, ""),
         *noise_facts(system, weak=2),
         _clock(choice),
         choice.order.note,
@@ -104,6 +106,8 @@ def build_splitting(
         about=About(title, licence, spec_sha256, tuple(fact for fact in said if fact), _operations(step)),
         coordinates=system.coordinates,
         time=system.time,
+        forced=system.forces is not None,
+        pushed=system.pushed,
         parameters=system.parameters,
         casimirs=tuple(system.casimirs),
         order=choice.order.order,
@@ -123,10 +127,11 @@ def facts(choice: Choice, step: Splitting, sources: int = 0) -> list[str]:
     count, flows, method = len(step.flows) - sources, len(step.schedule.flows) - 2 * sources, choice.method
     if count == 1 and choice.carrier is None:
         return ["scheme: the exact flow of H, which is elementary", f"step: {step.manner}"]
-    parts = " + ".join(f"H_{k}" for k in range(1, count + 1))
+    names = [(f"{flow.letter}_{k}", flow.force) for k, flow in enumerate(choice.splitting.flows, 1)]
+    parts, forces = (" + ".join(n for n, force in names if bool(force) == acting) for acting in (False, True))
     why = f", since {choice.why}" if choice.why else ""
     return [
-        f"scheme: splitting, H = {parts}, with the exact flow of each",
+        f"scheme: splitting, H = {parts}" + f", forces {forces}" * bool(forces) + ", with the exact flow of each",
         f"composition: {method.name}, {method.stages} stage{'s' * (method.stages > 1)}, {flows} flows{why}",
         f"step: {step.manner}",
     ]
@@ -136,8 +141,9 @@ def _clock(choice: Choice) -> str:
     """How the time advances, empty without a time."""
     if choice.carrier is None:
         return ""
-    with_part = choice.carrier < len(choice.splitting.flows)
-    how = f"with H_{choice.carrier + 1}" if with_part else "between the flows"
+    flows = choice.splitting.flows
+    with_part = choice.carrier < len(flows)
+    how = f"with {flows[choice.carrier].letter}_{choice.carrier + 1}" if with_part else "between the flows"
     return f"time: advances {how}, and stands still in {'all other' if with_part else 'all'} flows"
 
 
@@ -146,6 +152,8 @@ def _named(system: System, flow: Flow, k: int) -> str:
     sources = system.noise
     if k <= len(sources):
         return f"{flow.hamiltonian}, for the noise {sources[k - 1].name}"
+    if flow.force:
+        return f"F_{k - len(sources)}, a force"
     return f"H_{k - len(sources)} = {flow.hamiltonian}"
 
 

@@ -7,11 +7,11 @@ flow; otherwise it is the composition of the flows of the terms, in any order, s
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import reduce
 
 from phigen import progress
-from phigen.geometry.system import hamiltonian_vector_field
+from phigen.geometry.system import System, hamiltonian_vector_field
 from phigen.splitting import exponential, scalar
 from phigen.splitting.closure import motion_of
 from phigen.splitting.exponential import NoClosedFormError
@@ -32,11 +32,24 @@ class Term:
 
 @dataclass(frozen=True)
 class Flow:
-    """The flow of ``hamiltonian`` for the time `TIME`: x + ``increment``; ``manner`` says how the coordinates move."""
+    """The flow of ``hamiltonian`` for the time `TIME`: x + ``increment``; ``manner`` says how the coordinates move.
+
+    Or that of a ``force``, a vector field; then the Hamiltonian is 0.
+    """
 
     hamiltonian: Expression
     increment: tuple[Expression, ...]
     manner: str
+    force: tuple[Expression, ...] = field(default=(), kw_only=True)
+
+    @property
+    def letter(self) -> str:
+        """What it is called in formulas: H, or F."""
+        return "F" if self.force else "H"
+
+    def vector_field(self, system: System) -> tuple[Expression, ...]:
+        """The vector field that it is the flow of."""
+        return self.force or hamiltonian_vector_field(system.poisson, gradient(self.hamiltonian, system.coordinates))
 
     @property
     def moving(self) -> int:

@@ -36,8 +36,11 @@ def check(system: System, splitting: Splitting, noise: Sequence[tuple[str, Flow]
     flows = splitting.flows
     plain = substitute([f.hamiltonian for f in flows], {KICK: ZERO})
     modified = plain != [f.hamiltonian for f in flows]
-    name = "H = " + " + ".join(f"H_{k}" for k in range(1, len(flows) + 1)) + " at κ = 0" * modified
+    numbered = [(f"{flow.letter}_{k}", flow) for k, flow in enumerate(flows, 1)]
+    name = "H = " + " + ".join(n for n, flow in numbered if not flow.force) + " at κ = 0" * modified
     yield decide_zero(name, [("", system.hamiltonian - total(plain))], system.positive)
+    if any(flow.force for flow in flows):
+        yield _force_statement(system, numbered)
     for k, flow in enumerate(flows, 1):
         yield _flow_statement(system, flow, k)
     for source, flow in noise:
@@ -48,6 +51,18 @@ def check(system: System, splitting: Splitting, noise: Sequence[tuple[str, Flow]
             v, name = plain[splitting.kick], f"H_{1 + splitting.kick}"
             rate = bracket(system, v, gradient(v, [time])[0])
             yield decide_zero(f"{{{name}, ∂{name}/∂{time}}} = 0", [("", rate)], system.positive)
+
+
+def _force_statement(system: System, numbered: Sequence[tuple[str, Flow]]) -> Statement:
+    """The force parts are πζ + f together."""
+    slope = gradient(system.hamiltonian, system.coordinates)
+    pushed = [
+        a - b for a, b in zip(system.vector_field(), hamiltonian_vector_field(system.poisson, slope), strict=True)
+    ]
+    parts = [(name, flow.force) for name, flow in numbered if flow.force]
+    sums = [total(entries) for entries in zip(*(force for _, force in parts), strict=True)]
+    residuals = [(c, a - b) for c, a, b in zip(system.coordinates, pushed, sums, strict=True)]
+    return decide_zero("πζ + f = " + " + ".join(name for name, _ in parts), residuals, system.positive)
 
 
 def _kick_statements(system: System, splitting: Splitting, plain: Sequence[Expression]) -> Iterator[Statement]:
@@ -87,14 +102,15 @@ def angles_added(e: Expression) -> Expression:
 
 
 def _flow_statement(system: System, flow: Flow, k: int) -> Statement:
-    """Φ_0 = 1 and dΦ_t/dt = (π∇H_k)∘Φ_t."""
+    """Φ_0 = 1 and dΦ_t/dt = (π∇H_k)∘Φ_t; or with a force for π∇H_k."""
     names = system.coordinates
     start = substitute(flow.increment, {TIME: ZERO})
     rates = derivatives(flow.increment, TIME)
-    field = hamiltonian_vector_field(system.poisson, gradient(flow.hamiltonian, names))
+    field = flow.vector_field(system)
     point = {c: symbol(c) + e for c, e in zip(names, flow.increment, strict=True) if not e.is_zero}
     required = substitute(field, point)
     residuals = [(f"{c} at t = 0", e) for c, e in zip(names, start, strict=True)]
     residuals += [(f"rate of {c}", a - angles_added(b)) for c, a, b in zip(names, rates, required, strict=True)]
-    name = f"the flow Φ of H_{k}: Φ_0 = 1, dΦ_t/dt = π∇H_{k}∘Φ_t"
+    part, rate = f"{flow.letter}_{k}", f"F_{k}" if flow.force else f"π∇H_{k}"
+    name = f"the flow Φ of {part}: Φ_0 = 1, dΦ_t/dt = {rate}∘Φ_t"
     return decide_zero(name, residuals, system.positive, flow.manner)

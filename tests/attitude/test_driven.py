@@ -28,6 +28,7 @@ CASES = {
     "monitored by log": SPLIT + "monitor: log\nruns: {r: {initial: [0.5, 0.8, -0.4], step: 0.1, steps: 1}}\n",
     "split in time": SPLIT.replace("y**2/4 + z**2/6 - 2", "y**2/2*cos(t) + z**2/2*cos(t)") + "time: t\n",
     "split and shaken": SPLIT + NOISE,
+    "split and pushed": SPLIT + "forces: {vector: {z: 0.4 - 0.2*z, y: -0.1*y}}\n",
     "shaken": BODY + NOISE,
 }
 #: Those of which order 4 is measured too.
@@ -49,7 +50,7 @@ def product(a, b):
 def slope(case, t, x):
     if "time" in case:
         return np.array([x[0], x[1] * np.cos(t), x[2] * np.cos(t)])
-    if case in ("monitored by log", "split and shaken"):
+    if case in ("monitored by log", "split and shaken", "split and pushed"):
         return x / [1, 2, 3]
     return np.array([x[0] + 0.1 * x[2], x[1] / 2, x[2] / 3 + 0.1 * x[0]])
 

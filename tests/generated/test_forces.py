@@ -38,6 +38,24 @@ tangent: true
 """,
         [0.6, 1.5],
     ),
+    "split": (
+        """time: t
+coordinates: [q, p]
+parameters: {g: 0.4}
+poisson: {canonical: {q: [q], p: [p]}}
+hamiltonian: p**2/2 - cos(q)
+forces: {covector: {q: g*p}, vector: {p: 0.5*sin(t) - g*p**2, q: 0.1*p}}
+scheme: splitting
+tangent: true
+""",
+        [0.6, 0.9],
+    ),
+    "split on leaves": (
+        SPIN.replace("damping: lam\n", "forces: {covector: {x: g*x*(x**2 + y**2 + z**2), y: g*y}}\n").replace(
+            "time: t\n", "scheme: splitting\n"
+        ),
+        [0.8, 0.1, 0.5],
+    ),
     "path": (
         """coordinates: [x, y, z]
 poisson: {nambu: [x**2/2 + y**2/2 + z**4/4]}
@@ -86,7 +104,7 @@ def test_targets_agree_to_roundoff(kind):
     assert x == pytest.approx(expected, abs=1e-13)
 
 
-@pytest.mark.parametrize("kind", ["damped", "covector", "path"])
+@pytest.mark.parametrize("kind", ["damped", "covector", "path", "split on leaves"])
 def test_covectors_keep_casimirs(kind):
     """A force put beside the leaves, such as f for πζ, changes them at the order of the step."""
     found = solver(made(kind), "c").integrate(SYSTEMS[kind][1], 0.1, 20_000, 100)
@@ -151,7 +169,7 @@ def test_the_code_does_not_claim_a_poisson_map():
 @pytest.mark.parametrize(
     ("more", "message"),
     [
-        ("scheme: splitting", "takes no forces and no damping"),
+        ("scheme: splitting", "the force ζ_x = .* has no elementary flow"),
         ("order: 4\ncomposition: none", "has order 2 without a composition"),
         ("birealisation: karasev\nforces: {vector: {x: 1}}", "a vector needs a bi-realisation in closed form"),
         ("order: 2\nmodified_hamiltonian: 1", "not offered for a system with forces"),

@@ -309,6 +309,9 @@ noise: {k: {hamiltonian: (q**2 + p**2)/2, amplitude: 0.5}, l: {hamiltonian: q**2
     "spin": SPIN + HEAT,
 }
 
+#: Friction is a part of the splitting, beside H.
+LANGEVIN = LINEAR["oscillator"] + "forces: {vector: {p: -0.3*p}}\nscheme: splitting\n"
+
 SPLIT = (
     SPIN
     + """scheme: splitting
@@ -324,7 +327,7 @@ def generator(compilation):
     return found.vector_field(eye).T + sum(b.T @ b.T for b in fields) / 2
 
 
-@pytest.mark.parametrize(("text", "order"), [*((text, 1) for text in LINEAR.values()), (SPLIT, 2)])
+@pytest.mark.parametrize(("text", "order"), [*((text, 1) for text in LINEAR.values()), (SPLIT, 2), (LANGEVIN, 2)])
 def test_the_weak_order_is_reached(text, order):
     """Were both halves of a step of a splitting of one increment, sources that do not commute had order 1 only."""
     compilation = compile_text(text)
@@ -433,7 +436,7 @@ def test_the_code_says_what_noise_leaves_of_it():
     ("more", "message"),
     [
         ("damping: lam\norder: 4", "with forces and noise a step has order 2, not 4"),
-        ("scheme: splitting\ndamping: lam", "takes no forces"),
+        ("scheme: splitting\ndamping: lam", "the force ζ_x = .* has no elementary flow"),
         ("adjoint: true", "adjoint: not with noise"),
     ],
 )
