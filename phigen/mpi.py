@@ -84,6 +84,7 @@ class DistributedLattice:
         steps: int,
         stride: int = 1,
         *,
+        t0: float | None = None,
         sizes: Sequence[int] | None = None,
         output: str | Path | None = None,
         checkpoints: str | Path | None = None,
@@ -106,10 +107,11 @@ class DistributedLattice:
             arguments.count(steps, "steps", 0),
             arguments.count(stride, "stride", 1),
         )
-        domain = _Domain(self, whole, x0, h, {**(parameters or {}), **more})
+        begin = arguments.start_time(t0, self.solver.interface, more)
+        domain = _Domain(self, whole, x0, h, {**(parameters or {}), **more}, begin)
         marks = row_steps(steps, stride)
         shape = (len(marks), len(self.solver.coordinates), *whole)
-        kept = _Kept(domain, Path(checkpoints), [h, steps, stride]) if checkpoints else None
+        kept = _Kept(domain, Path(checkpoints), [h, steps, stride, begin]) if checkpoints else None
         energy = kept.restored() if kept else []
         frames = _Frames(domain, Path(output) if output else None, shape, new=not energy)
         try:
@@ -126,7 +128,7 @@ class DistributedLattice:
         frames.finish()
         if kept:
             kept.remove()
-        t = np.asarray(h * marks, dtype=np.float64)
+        t = np.asarray(begin + h * marks, dtype=np.float64)
         return DistributedRun(t, np.array(energy), frames.array, domain.planes, steps, domain.waiting)
 
 
@@ -134,7 +136,13 @@ class _Domain:
     """The planes of one process, with the copies beside them; a state that is open lacks the last flow of its step."""
 
     def __init__(
-        self, lattice: DistributedLattice, sizes: tuple[int, ...], x0: Given, h: float, parameters: Mapping[str, Any]
+        self,
+        lattice: DistributedLattice,
+        sizes: tuple[int, ...],
+        x0: Given,
+        h: float,
+        parameters: Mapping[str, Any],
+        t0: float,
     ) -> None:
         self.lattice, self.comm, self.sizes, self.h = lattice, lattice.comm, sizes, h
         self.stages: list[Stage] = lattice.stages
@@ -151,7 +159,8 @@ class _Domain:
         around = (self.planes[0] - ghosts[0], self.planes[1] + ghosts[1])
         self.values = {name: self._local(value, *around, name) for name, value in parameters.items()}
         start = self._cut(x0, *around, axis=1)
-        session = lattice.solver.session(start, h, self.values)
+        checked = lattice.solver.state(start, "x0")
+        session = lattice.solver.started(checked, h, lattice.solver.values(self.values, {}, checked.shape[1:]), t0)
         assert isinstance(session, CLatticeSession)
         self.session = session
         self.session.begin(h)
@@ -217,10 +226,16 @@ class _Domain:
                 said = f"{self.lattice.solver.interface.name}: step {self.steps} of size {self.h!r} failed: NOT_FINITE"
                 raise StepError(said, step=self.steps, status="NOT_FINITE")
         self._close()
+        self._tell_time(self.steps)
+
+    def _tell_time(self, steps: int) -> None:
+        if self.lattice.solver.interface.time:
+            self.session.passed(self.h, steps)
 
     def _tried(self, steps: int) -> bool:
         """Some steps; if they lead to what is not finite, none."""
         for step in range(steps):
+            self._tell_time(self.steps + step)
             self._stage(self.joined if self.last > 1 and (self.open or step) else 0)
             for stage in range(1, self.last):
                 self._stage(stage)
@@ -237,6 +252,7 @@ class _Domain:
         """The last flow of a step; the state before it is saved."""
         if not self.open:
             return
+        self._tell_time(self.steps - 1)
         self._stage(self.joined - 1)
         if not self._holds() and self.far == 0:
             self._put_all(self.saved)
@@ -320,6 +336,7 @@ class _Domain:
         self.dirty = (1 << self.fields) - 1
         self.saved = self._all()
         self.steps, self.far, self.open = steps, far, is_open
+        self._tell_time(steps)
 
     def saved_state(self) -> Floats:
         """The own planes of the state that steps go on from."""

@@ -22,7 +22,7 @@
  *   5. The flows
  *   6. What is seen at sites
  *   7. Steps by hand
- * body-sha256: 8ab8279f37952ea1b5b7d0d27cbef494746b4aeb1753270c4f9c999890ac31ae
+ * body-sha256: 4f52d48973a2adddbad0877e7c1e59ccc084864ecb8bf15e286ca186135cba0e
  */
 #include "fput.h"
 
@@ -571,7 +571,8 @@ fput_status fput_sweep(fput_solver *s, size_t number, int far, size_t from, size
     if (s == NULL || !s->prepared || number > fput_FLOWS || from > to || to > s->sizes[0])
         return fput_BAD_ARGUMENT;
     const int joined = number == fput_FLOWS, part = fput_flow_parts[joined ? 0 : number];
-    const double *coef = s->coef + (joined ? fput_JOINED : fput_flow_rows[number]) * fput_ROW;
+    const int row = joined ? fput_JOINED : fput_flow_rows[number];
+    const double *coef = s->coef + row * fput_ROW;
     const size_t units = fput_rows_of_plane(s) * fput_pieces(s);
     s->open = 0;
     s->from = (ptrdiff_t)from;

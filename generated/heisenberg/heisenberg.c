@@ -22,7 +22,7 @@
  *   5. The flows
  *   6. What is seen at sites
  *   7. Steps by hand
- * body-sha256: c33cf8da8e8c1cb412e882b449d0f898597010bf195087f6d9ccbf6da1737be1
+ * body-sha256: 60ef1ebc5823c569990b76c40a5f128dc1fba8455aab9774a045d9f7fa68a13f
  */
 #include "heisenberg.h"
 
@@ -833,8 +833,8 @@ heisenberg_status heisenberg_sweep(heisenberg_solver *s, size_t number, int far,
     if (s == NULL || !s->prepared || number > heisenberg_FLOWS || from > to || to > s->sizes[0])
         return heisenberg_BAD_ARGUMENT;
     const int joined = number == heisenberg_FLOWS, part = heisenberg_flow_parts[joined ? 0 : number];
-    const double *coef = s->coef + (joined ? heisenberg_JOINED : heisenberg_flow_rows[number])
-        * heisenberg_ROW;
+    const int row = joined ? heisenberg_JOINED : heisenberg_flow_rows[number];
+    const double *coef = s->coef + row * heisenberg_ROW;
     const size_t units = heisenberg_rows_of_plane(s) * heisenberg_pieces(s);
     s->open = 0;
     heisenberg_sweep_rows(s, part, coef, far, from * units, to * units);

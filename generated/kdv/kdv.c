@@ -22,7 +22,7 @@
  *   5. The stages
  *   6. Newton's method where sweeps fail
  *   7. What is seen at sites
- * body-sha256: 54a1b4b430fa890bcb5e644a3a80fa99b44c698dc4f8f79e74d6dab140d5978f
+ * body-sha256: 19595cd31ab5d3e304eec5d61333bac4d28a535a8e78b7b97187de677564b654
  */
 #include "kdv.h"
 
@@ -367,7 +367,6 @@ int omp_get_thread_num(void);
 #endif
 
 enum {
-    kdv_STRETCH = 1, /* steps before the state is looked at */
     kdv_LEAD = (kdv_HALO + 7) / 8 * 8,
     kdv_BUFFER = 256,
     kdv_IMPLICIT = (3 + kdv_DIFFERENCES) * kdv_DIM, /* arrays for y, its guesses and its variation */
@@ -876,9 +875,8 @@ static kdv_status kdv_stages(kdv_solver *s, int far)
 }
 
 /* One step; if it cannot be made, none. */
-static kdv_status kdv_try(kdv_solver *s, int steps)
+static kdv_status kdv_try(kdv_solver *s)
 {
-    (void)steps;
     kdv_copy(s->before, s->x, s);
     const kdv_status status = kdv_stages(s, 1);
     if (status == kdv_OK) return status;
@@ -889,23 +887,15 @@ static kdv_status kdv_try(kdv_solver *s, int steps)
 
 kdv_status kdv_integrate(kdv_solver *s, double h, size_t steps)
 {
-    const kdv_status status = kdv_set_step(s, h);
+    kdv_status status = kdv_set_step(s, h);
     if (status != kdv_OK) return status;
     kdv_forget(s);
-    for (size_t stretch = kdv_STRETCH; steps > 0;) {
-        const size_t now = steps < stretch ? steps : stretch;
-        const kdv_status tried = kdv_try(s, (int)now);
-        if (tried == kdv_OK) {
-            steps -= now;
-            s->steps += now;
-            s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
-        } else if (now == 1) {
-            return tried;
-        } else {
-            stretch = 1;
-        }
+    for (; steps > 0 && status == kdv_OK; --steps) {
+        status = kdv_try(s);
+        s->steps += status == kdv_OK;
     }
-    return kdv_OK;
+    s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
+    return status;
 }
 
 kdv_status kdv_step(kdv_solver *s, double h) { return kdv_integrate(s, h, 1); }

@@ -22,7 +22,7 @@
  *   4. The solver
  *   5. The stages
  *   6. What is seen at sites
- * body-sha256: 085f99d817ce8172bc0e9e03a372ed9af6f0b4c2661884f05701bccfd1fa8598
+ * body-sha256: fd2d027882414be9ac69f908e9e68300515c6e5ead2241a53b9bc3530205594d
  */
 #include "point_vortices.h"
 
@@ -378,7 +378,6 @@ int omp_get_thread_num(void);
 #endif
 
 enum {
-    point_vortices_STRETCH = 1, /* steps before the state is looked at */
     point_vortices_LEAD = (point_vortices_HALO + 7) / 8 * 8,
     point_vortices_BUFFER = 256,
     /* arrays for y and its guesses */
@@ -716,9 +715,8 @@ static point_vortices_status point_vortices_stages(point_vortices_solver *s, int
 }
 
 /* One step; if it cannot be made, none. */
-static point_vortices_status point_vortices_try(point_vortices_solver *s, int steps)
+static point_vortices_status point_vortices_try(point_vortices_solver *s)
 {
-    (void)steps;
     point_vortices_copy(s->before, s->x, s);
     const point_vortices_status status = point_vortices_stages(s, 1);
     if (status == point_vortices_OK) return status;
@@ -729,23 +727,15 @@ static point_vortices_status point_vortices_try(point_vortices_solver *s, int st
 
 point_vortices_status point_vortices_integrate(point_vortices_solver *s, double h, size_t steps)
 {
-    const point_vortices_status status = point_vortices_set_step(s, h);
+    point_vortices_status status = point_vortices_set_step(s, h);
     if (status != point_vortices_OK) return status;
     point_vortices_forget(s);
-    for (size_t stretch = point_vortices_STRETCH; steps > 0;) {
-        const size_t now = steps < stretch ? steps : stretch;
-        const point_vortices_status tried = point_vortices_try(s, (int)now);
-        if (tried == point_vortices_OK) {
-            steps -= now;
-            s->steps += now;
-            s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
-        } else if (now == 1) {
-            return tried;
-        } else {
-            stretch = 1;
-        }
+    for (; steps > 0 && status == point_vortices_OK; --steps) {
+        status = point_vortices_try(s);
+        s->steps += status == point_vortices_OK;
     }
-    return point_vortices_OK;
+    s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
+    return status;
 }
 
 point_vortices_status point_vortices_step(point_vortices_solver *s,

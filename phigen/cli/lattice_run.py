@@ -56,7 +56,8 @@ def run_lattice(
         try:
             made = solver.integrate(
                 start.state, float(run.step), run.steps, run.stride,
-                output=output, checkpoints=kept, progress=progress, parameters=start.arguments | parameters,
+                t0=float(run.start) if spec.time else None, output=output, checkpoints=kept, progress=progress,
+                parameters=start.arguments | parameters,
             )  # fmt: skip
         except StepError as error:
             failure, made = error, error.trajectory
@@ -110,10 +111,16 @@ def _parameters(start: Start, settings: Iterable[str]) -> dict[str, Any]:
 
 def _print(spec: Spec, run: Run, start: Start, method: str, made: Any, errors: dict[str, float]) -> None:
     out(heading(f"{spec.name}, run {run.name}") + (f": {run.description}" if run.description else ""))
+    from phigen.lattice.observing import BALANCE, CHANGE, ENERGY
+
     sizes = " × ".join(map(str, start.sizes))
     out(f"  {sizes} sites; {made.steps} steps of {made.h:.9g}, t = {made.t[0]:.9g} … {made.t[-1]:.9g}; {method}\n")
-    kinds = {"energy": "relative to the energies of the sites"} | dict.fromkeys(spec.casimirs, "at the worst site")
+    kinds = dict.fromkeys((ENERGY, BALANCE, CHANGE), "relative to the energies of the sites") | dict.fromkeys(
+        spec.casimirs, "at the worst site"
+    )
     rows = [["largest error", "", ""]]
     rows += [[name, f"{error:.1e}" if error else "0", kinds.get(name, "relative")] for name, error in errors.items()]
     for line in table(rows, right=[1]):
         out(f"  {line}")
+    if BALANCE in errors:
+        out("  The energy balance is H − ∫ dH/dt dt, integrated over all steps by a rule of order 8.")

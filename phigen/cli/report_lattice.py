@@ -69,12 +69,20 @@ def _measured(
     solver = lattice_solver_of(compilation, chosen_target("auto", console.note))
     console.note(f"{spec.name}: run {run.name}, {run.steps} steps")
     failure: PhigenError | None = None
+    begin = float(run.start) if spec.time else None
     try:
-        made = solver.integrate(start.state, float(run.step), run.steps, run.stride, parameters=start.arguments)
+        made = solver.integrate(
+            start.state, float(run.step), run.steps, run.stride, t0=begin, parameters=start.arguments
+        )
     except StepError as error:
         failure, made = error, error.trajectory
     assert compilation.cell is not None
-    energies = np.array([solver.density(x, parameters=start.arguments) for x in made.x])
+    energies = np.array(
+        [
+            solver.density(x, t if spec.time else None, parameters=start.arguments)
+            for x, t in zip(made.x, made.t, strict=True)
+        ]
+    )
     material = replace(
         material, run=run, trajectory=made, errors=errors_of(compilation.cell, made), energies=energies,
         failure=f"The run could not be completed: {failure}." if failure else "",

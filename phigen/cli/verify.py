@@ -154,7 +154,9 @@ def verified_lattice(
     chosen = loadable(targets or spec.targets) or (chosen_target("auto"),)
     solvers = {target: lattice_solver_of(compilation, target) for target in chosen}
     console.detail(f"{spec.name}: built {', '.join(solvers)}")
-    return verify_lattice(compilation, solvers, run.name, start_of(spec, run), float(run.step), run.steps, quick=quick)
+    begin = float(run.start) if spec.time else None
+    start = start_of(spec, run)
+    return verify_lattice(compilation, solvers, run.name, start, float(run.step), run.steps, t0=begin, quick=quick)
 
 
 def fallen_short(verification: Verification) -> CheckError:

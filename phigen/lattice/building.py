@@ -32,6 +32,7 @@ def cell_from_spec(spec: Spec) -> Cell:
         {} if lattice.axes else brackets,
         {name: (density, lattice.kinds[name]) for name, density in spec.casimirs.items()},
         spec.invariants,
+        spec.time,
     )
     small = [d for run in spec.runs.values() for d in _too_small(spec, cell, run)]
     if small:

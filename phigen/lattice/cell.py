@@ -30,7 +30,7 @@ class Cell:
     bond from a to b and of a pair; ``bond_bracket`` maps ("f[a]", "g[b]") and ("g[b]", "f[a]") to their bracket along
     a bond. H is the sum of the densities; at open ends without those of their `terms` that reach beyond.
     ``casimirs`` maps names to a density and ``sites`` (one for each site), ``sum`` or ``product``; ``invariants`` are
-    sums over sites.
+    sums over sites. ``time`` is the symbol of t, which H and the invariants may contain; empty if there is none.
     """
 
     name: str
@@ -46,8 +46,19 @@ class Cell:
     bond_bracket: Mapping[tuple[str, str], Expression] = field(default_factory=dict)
     casimirs: Mapping[str, tuple[Expression, str]] = field(default_factory=dict)
     invariants: Mapping[str, Expression] = field(default_factory=dict)
+    time: str = ""
+
+    @property
+    def driven(self) -> bool:
+        """Whether H is no invariant: it depends on the time."""
+        return bool(self.time)
 
     # --- symbols
+
+    @property
+    def times(self) -> tuple[str, ...]:
+        """The symbol of the time, if there is one."""
+        return (self.time,) if self.time else ()
 
     @cached_property
     def neighbours(self) -> Neighbours:

@@ -113,7 +113,8 @@ class Expansion:
     def casimirs(self) -> dict[str, Expression]:
         """Casimirs by name: one for each site, a sum or a product."""
         found: dict[str, Expression] = {}
-        taken = {*self.names.values(), *self.bond_names.values(), *(p.name for p in self.cell.parameters)}
+        own = (*(p.name for p in self.cell.parameters), *self.cell.times)
+        taken = {*self.names.values(), *self.bond_names.values(), *own}
         for name, (density, kind) in self.cell.casimirs.items():
             if kind == "sum":
                 found[name] = total(self.summed(density))
@@ -149,6 +150,7 @@ class Expansion:
             parameters=tuple(many),
             casimirs=self.casimirs(),
             invariants={name: total(self.summed(d)) for name, d in cell.invariants.items()},
+            time=cell.time,
         )
 
     def numbers(self, parameters: Mapping[str, Any]) -> dict[str, float]:
@@ -176,7 +178,7 @@ def expand(cell: Cell, sizes: Sequence[int], bonds: Sequence[Sequence[int]] = ()
     ends = tuple((int(a), int(b)) for a, b in bonds)
     if any(not (0 <= n < sizes[0]) for pair in ends for n in pair) or any(a == b for a, b in ends):
         raise ValueError(f"bonds are pairs of different sites between 0 and {sizes[0] - 1}")
-    taken = {p.name for p in cell.parameters if p.at == "all"} | {*cell.casimirs, *cell.invariants}
+    taken = {p.name for p in cell.parameters if p.at == "all"} | {*cell.casimirs, *cell.invariants, *cell.times}
     sites = list(product(*map(range, sizes)))
     names = {(n, s): _free(n, s, taken) for n in cell.neighbours.names for s in sites}
     own = [p.name for p in cell.parameters if p.at == "bonds"]

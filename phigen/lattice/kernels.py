@@ -28,6 +28,7 @@ def site_kernel(
 
     plain = tuple(p.name for p in cell.parameters if p.at == "all")
     first = {"coef": coefficients.slots} if coefficients else {"params": plain}
+    first |= {"t": cell.times} if cell.time in used else {}
     inputs = {**first, "site": tuple(places), "present": of_kind(PRESENT, CHOSEN), "gathered": of_kind(GATHERED)}
     bonds = tuple(p.name for p in cell.parameters if p.at == "bonds" and p.name in used)
     inputs |= {"bonds": bonds} if bonds else {}

@@ -80,9 +80,10 @@ def invariants(cell: Cell) -> Iterator[Statement]:
             yield _worst(title, f"for every {_any(cell)}", _invariant_of_graphs(cell, name))
             continue
         rate = rate_of(cell, density)
-        labelled = [(f"δ{{{name}, H}}/δ{n}", e) for n, e in euler(cell, rate).items()]
-        labelled.append((f"{{{name}, H}} where all sites are alike", _uniform(cell, rate)))
-        statement = _decided(cell, title, labelled, f"{{{name}, H}} telescopes, for all sizes")
+        label = f"{{{name}, H}}" + f" + ∂{name}/∂{cell.time}" * (cell.time in symbols_of(density))
+        labelled = [(f"δ({label})/δ{n}" if "+" in label else f"δ{label}/δ{n}", e) for n, e in euler(cell, rate).items()]
+        labelled.append((f"{label} where all sites are alike", _uniform(cell, rate)))
+        statement = _decided(cell, title, labelled, f"{label} telescopes, for all sizes")
         if statement.verdict != REFUTED and OPEN in cell.boundary:
             ends = _at_ends(cell, title, partial(_invariant_of_box, name))
             statement = ends if ends.verdict != PROVED else statement
@@ -107,7 +108,8 @@ def euler(cell: Cell, density: Expression) -> dict[str, Expression]:
 def rate_of(cell: Cell, density: Expression) -> Expression:
     """A density of the time derivative of the sum of a density."""
     slopes, rates = euler(cell, density), vector_field(cell)
-    return total(slopes[f] * rates[f] for f in cell.fields if not (slopes[f].is_zero or rates[f].is_zero))
+    moved = total(slopes[f] * rates[f] for f in cell.fields if not (slopes[f].is_zero or rates[f].is_zero))
+    return moved + total(gradient(density, cell.times))
 
 
 def _uniform(cell: Cell, density: Expression) -> Expression:
@@ -260,6 +262,7 @@ def _casimirs_of_box(name: str, system: System) -> Statement:
 def _invariant_of_box(name: str, system: System) -> Statement:
     slopes = gradient(system.invariants[name], system.coordinates)
     rate = total(s * v for s, v in zip(slopes, system.vector_field(), strict=True) if not s.is_zero)
+    rate += total(gradient(system.invariants[name], system.times))
     return decide_zero(f"{name} is invariant", [(f"{{{name}, H}}", rate)], system.positive)
 
 

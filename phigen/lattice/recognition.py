@@ -67,7 +67,9 @@ def written_out(spec: Spec, least: int = SITES) -> Spec | None:
 
 
 def recognised(spec: Spec, poisson: Matrix) -> Spec | None:
-    """The lattice that an ordinary spec with this π is, for any number of sites; None if it is none."""
+    """The lattice that an ordinary spec with this π is, for any number of sites; None if it is none, or driven."""
+    if spec.time or spec.forces or spec.noise:
+        return None
     for names in _readings(spec.coordinates):
         for boundary in product(("periodic", "open"), repeat=len(_sizes(names))):
             try:

@@ -25,9 +25,9 @@ from phigen.lattice.parts import (
     summands_of,
 )
 from phigen.lattice.series import SeriesPlan, equation, plan_series
-from phigen.scheme.alternation import Alternation, Schedule
+from phigen.scheme.alternation import Alternation, Schedule, with_clock
 from phigen.scheme.alternation import schedule as alternating
-from phigen.scheme.choosing import Choice, planned
+from phigen.scheme.choosing import Choice, is_dated, planned, with_carrier
 from phigen.scheme.kernel import Kernel, Output
 from phigen.scheme.lowering import operation_counts
 from phigen.scheme.nystrom import Nystrom
@@ -37,6 +37,7 @@ from phigen.scheme.splitting import staged
 from phigen.scheme.staging import Coefficients
 from phigen.scheme.steps import Ends, Gather, Partners, Sites, Sweep, Sweeps
 from phigen.spec.model import NO_EXTRAS, Extras, Spec
+from phigen.splitting.kicks import Kick
 from phigen.splitting.parts import Splitting
 from phigen.splitting.ring import KICK, TIME
 from phigen.symbolic.expression import total
@@ -83,7 +84,8 @@ class SplittingPlan:
 
     def schedule(self) -> Schedule:
         """The flows of a step, part by part."""
-        return _any_number(self.choice.method) if self.by_colour else self.choice.schedule()
+        dated = self.choice.carrier is not None
+        return _any_number(self.choice.method, dated=dated) if self.by_colour else self.choice.schedule()
 
 
 #: How a step of a lattice is made.
@@ -117,8 +119,16 @@ def plan_sweeps(
             return plan_series(cell, host, order, composition, spec)
         except SpecError as error:
             raise SpecError([*unsplit.diagnostics, *error.diagnostics]) from None
-    plain = Splitting(parts.flows)
-    return SplittingPlan(parts, planned(host, plain, order, composition, lambda: cell_kicks(cell, parts)))
+    choice = planned(host, Splitting(parts.flows), order, composition, lambda: _kicks(cell, parts))
+    if cell.time:  # the flows of colours follow each other in the order of the parts
+        coloured = any(flow.by_colour for flow in parts.flows)
+        choice = replace(choice, carrier=len(parts.flows)) if coloured else with_carrier(choice, cell.time)
+    return SplittingPlan(parts, choice)
+
+
+def _kicks(cell: Cell, parts: CellSplitting) -> list[Kick]:
+    """The parts that can be V beside T + e, if there is a time: T does not depend on it; V and ∂V/∂t commute."""
+    return [k for k in cell_kicks(cell, parts) if not (cell.time and is_dated(parts.flows[1 - k.part], cell.time))]
 
 
 def build_sweeps(
@@ -133,7 +143,7 @@ def build_sweeps(
     lanes: bool = True,
 ) -> Program:
     """The solver of a lattice as a program."""
-    coefficients = Coefficients([*(p.name for p in cell.parameters if p.at == "all"), TIME, KICK])
+    coefficients = Coefficients([*(p.name for p in cell.parameters if p.at == "all"), TIME, KICK], cell.times)
     schedule, swept, solved = plan.schedule(), tuple[tuple[Sweep, ...], ...](), None
     if isinstance(plan, SeriesPlan):
         solved = equation(cell, plan, coefficients)
@@ -143,6 +153,7 @@ def build_sweeps(
             for k, flow in enumerate(plan.flows, 1)
         )
     plain_names = tuple(p.name for p in cell.parameters if p.at == "all")
+    refresh = coefficients.refresh(t=cell.times)
     prepare = Kernel(
         "prepare",
         f"everything that depends on parameters and the time of a {'stage' if solved else 'flow'} only",
@@ -157,12 +168,16 @@ def build_sweeps(
         gathers = [*(sweep.gather for part in swept for sweep in part if sweep.gather), partners.energy, partners.field]
         at_bonds = tuple(p.name for p in cell.parameters if p.at == "bonds")
         sites = replace(sites, ends=_ends(cell, [k for g in gathers for k in g.kernels]), at_bonds=at_bonds)
-    step = Sweeps(prepare, sites, swept, schedule, plan.composition, kinds, partners, plan.by_colour, solved)
+    settled = Sweeps(
+        prepare, sites, swept, schedule, plan.composition, kinds, partners, plan.by_colour, solved, refresh=refresh
+    )
+    step = coefficients.settled(settled)
     facts = [_lattice_fact(cell, plan.colouring.count), *_facts(plan), plan.order.note]
     return Program(
         name=cell.name,
         about=About(title, licence, spec_sha256, tuple(f for f in facts if f), _operations(step)),
         coordinates=cell.fields,
+        time=cell.time,
         parameters=cell.parameters,
         casimirs=tuple(cell.casimirs),
         order=plan.order.order,
@@ -175,11 +190,13 @@ def build_sweeps(
     )
 
 
-def _any_number(method: Alternation | Nystrom) -> Schedule:
-    """A method for any number of flows; see `Sweeps`."""
+def _any_number(method: Alternation | Nystrom, *, dated: bool) -> Schedule:
+    """A method for any number of flows; see `Sweeps`. If H is ``dated``, the time advances in place of a last flow."""
     assert isinstance(method, Alternation)
     backwards = {(1, 2): (3, 2)}
     of_three = alternating(method, 3)
+    if dated:
+        of_three = with_clock(of_three, 2, 2)
     return replace(of_three, pattern=tuple(backwards.get(flow, flow) for flow in of_three.pattern))
 
 

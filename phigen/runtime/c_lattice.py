@@ -33,6 +33,13 @@ _OF_GRAPHS: dict[str, tuple[Any, tuple[Any, ...]]] = {
     "init": (_INT, (_POINTER,) * 6),
 }
 
+#: Those that know the time: of grids and pairs, and of graphs.
+_IN_TIME: dict[str, tuple[Any, tuple[Any, ...]]] = {
+    "init_at": (_INT, (_POINTER, _POINTER, _POINTER, _POINTER, _DOUBLE, _POINTER)),
+    "passed": (_INT, (_POINTER, _DOUBLE, _SIZE)),
+}
+_GRAPH_IN_TIME = {**_IN_TIME, "init_at": (_INT, (_POINTER,) * 5 + (_DOUBLE, _POINTER))}
+
 #: What splittings have, and steps by hand where they are offered.
 _OFFERED: dict[str, tuple[Any, tuple[Any, ...]]] = {
     "saved": (_INT, (_POINTER, _POINTER, _POINTER)),
@@ -68,8 +75,10 @@ class Stage(ctypes.Structure):
 class CLatticeSession:
     """A lattice on its way, in memory of its own. See `phigen.runtime.lattice.LatticeSession`."""
 
-    def __init__(self, functions: Any, interface: LatticeInterface, x0: Floats, parameters: Mapping[str, Any]) -> None:
-        self._c, self._shape = functions, x0.shape
+    def __init__(
+        self, functions: Any, interface: LatticeInterface, x0: Floats, parameters: Mapping[str, Any], t0: float
+    ) -> None:
+        self._c, self._shape, self._before = functions, x0.shape, 0
         self._casimirs = len(interface.casimirs)
         sizes = np.array(x0.shape[1:], dtype=np.uintp)
         self._struct = np.zeros(functions.solver_size(), dtype=np.uint8)
@@ -80,8 +89,9 @@ class CLatticeSession:
         self._address = self._struct.ctypes.data
         first = np.ascontiguousarray(x0, dtype=np.float64)
         packed, kept = _packed(interface, parameters, x0.shape[1:], len(bonds))
-        arrays = [packed, sizes, *([given] if interface.graph else []), first, self._work]
-        status = functions.init(self._address, *(a.ctypes.data for a in arrays))
+        arrays = [a.ctypes.data for a in (packed, sizes, *([given] if interface.graph else []), first)]
+        begin, last = (functions.init_at, (t0,)) if interface.time else (functions.init, ())
+        status = begin(self._address, *arrays, *last, self._work.ctypes.data)
         del kept
         if status:
             raise BackendError(status_name(status), 0, first[None])
@@ -89,7 +99,7 @@ class CLatticeSession:
     @property
     def steps(self) -> int:
         """Good steps since the start."""
-        return int(self._c.solver_steps_done(self._address))
+        return self._before + int(self._c.solver_steps_done(self._address))
 
     def state(self) -> Floats:
         """A copy of the state (coordinates, *sizes)."""
@@ -129,11 +139,19 @@ class CLatticeSession:
         is_open = self._c.saved(self._address, x.ctypes.data, far.ctypes.data)
         return {"before": x, "far": far} if is_open else {}
 
-    def resume(self, h: float, kept: Mapping[str, Any]) -> None:
+    def resume(self, h: float, steps: int, kept: Mapping[str, Any]) -> None:
         """Go on from what was saved."""
+        if hasattr(self._c, "passed"):
+            self.passed(h, steps)
+        else:
+            self._before = steps
         if "before" in kept:
             x = np.ascontiguousarray(kept["before"], dtype=np.float64)
             self._expect_done(self._c.resume(self._address, h, x.ctypes.data, int(kept["far"][0])))
+
+    def passed(self, h: float, steps: int) -> None:
+        """Count so many steps of size h as made; of lattices with a time."""
+        self._expect_done(self._c.passed(self._address, h, steps))
 
     # --- steps by hand: see NAME.h
 
@@ -179,6 +197,7 @@ class CLattice:
         self.interface, self._files = interface, dict(files)
         self._library = cache.load(files, threads=True)
         wanted = _SIGNATURES | (_OF_GRAPHS if interface.graph else {})
+        wanted |= (_GRAPH_IN_TIME if interface.graph else _IN_TIME) if interface.time else {}
         self._c = bound(self._library, interface.name, wanted, _OFFERED)
 
     def stages(self) -> list[Stage]:
@@ -200,9 +219,9 @@ class CLattice:
         """A hash of all that decides the results."""
         return cache.key_of(self._library)
 
-    def start(self, x0: Floats, parameters: Mapping[str, Any]) -> CLatticeSession:
-        """A session at x0 (coordinates, *sizes)."""
-        return CLatticeSession(self._c, self.interface, x0, parameters)
+    def start(self, x0: Floats, parameters: Mapping[str, Any], t0: float = 0.0) -> CLatticeSession:
+        """A session at x0 (coordinates, *sizes), at the time t0."""
+        return CLatticeSession(self._c, self.interface, x0, parameters, t0)
 
 
 def _packed(

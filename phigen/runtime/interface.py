@@ -88,6 +88,24 @@ class LatticeInterface(Interface):
     at_bonds: tuple[str, ...] = ()
 
 
+@dataclass
+class Clock:
+    """The time after so many steps: counted from where the size of the step was set, so no error adds up."""
+
+    t: float = 0.0
+    h: float = 0.0
+    counted: int = 0
+
+    def after(self, steps: int) -> float:
+        """The time then."""
+        return self.t + (steps - self.counted) * self.h
+
+    def set_step(self, h: float, steps: int) -> None:
+        """Steps have the size h from now on."""
+        if h != self.h:
+            self.t, self.h, self.counted = self.after(steps), h, steps
+
+
 class BackendError(Exception):
     """A step failed inside a back end; `phigen.runtime.solver` turns it into the user's `StepError`.
 

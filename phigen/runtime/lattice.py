@@ -39,8 +39,8 @@ class LatticeSession(Protocol):
         """Arrays that `resume` goes on from, beside the state, with the same bits."""
         ...
 
-    def resume(self, h: float, kept: Mapping[str, Any]) -> None:
-        """Go on from what was saved, in a session that began at the state."""
+    def resume(self, h: float, steps: int, kept: Mapping[str, Any]) -> None:
+        """Go on from what was saved after so many steps of size h, in a session that began at the state."""
         ...
 
     def hamiltonian(self) -> float:
@@ -70,8 +70,8 @@ class LatticeBackend(Protocol):
         """A hash of all that decides the results."""
         ...
 
-    def start(self, x0: Floats, parameters: Mapping[str, Any]) -> LatticeSession:
-        """A session at x0 (coordinates, *sizes)."""
+    def start(self, x0: Floats, parameters: Mapping[str, Any], t0: float = 0.0) -> LatticeSession:
+        """A session at x0 (coordinates, *sizes), at the time t0."""
         ...
 
 
@@ -103,7 +103,8 @@ class LatticeTrajectory:
     @property
     def energy_scale(self) -> float:
         """The sum of the magnitudes of the energies of all sites at the start: the unit of errors of energy."""
-        return float(np.abs(self.solver.density(self.x[0], parameters=self.parameters)).sum())
+        when = float(self.t[0]) if self.solver.interface.time else None
+        return float(np.abs(self.solver.density(self.x[0], when, parameters=self.parameters)).sum())
 
     @property
     def casimirs(self) -> dict[str, Floats]:
@@ -161,6 +162,7 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
         steps: int,
         stride: int = 1,
         *,
+        t0: float | None = None,
         output: str | Path | None = None,
         checkpoints: str | Path | None = None,
         progress: Progress | None = None,
@@ -169,37 +171,53 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
     ) -> LatticeTrajectory:
         """Make ``steps`` steps of size ``h`` from ``x0`` (coordinates, *sizes), framed every ``stride`` and at the end.
 
+        ``t0`` is the time of ``x0``, 0 by default, where H depends on the time.
         With ``output``, a path that ends in .npy or .npz, frames go to that file one by one. With ``checkpoints``, a
         path, the state is kept there at every frame; a call with the same arguments goes on from it, and removes it at
         the end. ``progress`` is called after each frame with the number of steps done. Raises `StepError`, whose
         ``trajectory`` ends with the state before the failing step.
         """
+        begin = arguments.start_time(t0, self.interface, more)
         start, h = self.state(x0, "x0"), arguments.step_size(h)
         steps, stride = arguments.count(steps, "steps", 0), arguments.count(stride, "stride", 1)
         values = self.values(parameters, more, start.shape[1:])
         marks = row_steps(steps, stride)
         frames = Frames(stream_path(output) if output else None, (len(marks), *start.shape))
-        run = LatticeRun(self, start, h, marks, values, frames, Path(checkpoints) if checkpoints else None)
+        run = LatticeRun(self, start, h, marks, values, frames, Path(checkpoints) if checkpoints else None, begin)
         try:
             count = run.made(progress)
         except BackendError as error:
             frames.discard()
             run.energy.append(run.session.hamiltonian())
             kept = np.array([*frames.kept(run.count), error.states[-1]])
-            t = np.array([h * mark for mark in [*marks[: run.count], error.step]], dtype=np.float64)
+            t = np.array([begin + h * mark for mark in [*marks[: run.count], error.step]], dtype=np.float64)
             found = self._trajectory(t, kept, np.array(run.energy), error.step, h, values)
             raise self._failure(error, h, found, values) from error
         found = self._trajectory(
-            np.asarray(h * marks[:count], dtype=np.float64), frames.array, np.array(run.energy), steps, h, values
+            np.asarray(begin + h * marks[:count], dtype=np.float64),
+            frames.array,
+            np.array(run.energy),
+            steps,
+            h,
+            values,
         )
         frames.finish(found)
         return found
 
-    def step(self, x: ArrayLike, h: float, *, parameters: Mapping[str, Any] | None = None, **more: Any) -> Floats:
-        """The state one step of size ``h`` after ``x`` (coordinates, *sizes); raises `StepError`."""
+    def step(
+        self,
+        x: ArrayLike,
+        h: float,
+        *,
+        t0: float | None = None,
+        parameters: Mapping[str, Any] | None = None,
+        **more: Any,
+    ) -> Floats:
+        """The state one step of size ``h`` after ``x`` (coordinates, *sizes), at ``t0``; raises `StepError`."""
+        begin = arguments.start_time(t0, self.interface, more)
         start, h = self.state(x, "x"), arguments.step_size(h)
         values = self.values(parameters, more, start.shape[1:])
-        session = self.started(start, h, values)
+        session = self.started(start, h, values, begin)
         try:
             session.advance(h, 1)
         except BackendError as error:
@@ -213,14 +231,15 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
         steps: int,
         stride: int | None = None,
         *,
+        t0: ArrayLike | None = None,
         threads: int | None = None,
         parameters: Mapping[str, Any] | None = None,
         **more: Any,
     ) -> Floats:
         """Final states (members, coordinates, *sizes) of several lattices of one size, or of one that all start from.
 
-        ``h`` and parameters may have a first axis of members, those at sites in front of their sizes: disorder. With a
-        ``stride`` the result has a first axis of rows: the states at steps 0, stride, 2·stride, … and at the last.
+        ``h``, ``t0`` and parameters may have a first axis of members, those at sites in front of their sizes: disorder.
+        With a ``stride`` the result has a first axis of rows: states at steps 0, stride, 2·stride, … and at the last.
         Small lattices are shared out between ``threads``, by default one on each core; large ones one by one, with
         threads of their own. Raises `StepError` with the ``members`` that failed and the states as far as each came,
         with NaN in the rows after that.
@@ -228,31 +247,46 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
         both = sorted(set(parameters or {}) & set(more))
         if both:
             raise TypeError(f"parameter {both[0]!r} is given twice")
-        return lattice_ensemble.ensemble(self, X0, h, steps, stride, threads, {**(parameters or {}), **more})
+        begin = t0 if np.ndim(t0 if t0 is not None else 0) and self.interface.time else None
+        alone: Any = t0 if begin is None else 0.0
+        first = arguments.start_time(alone, self.interface, more)
+        times = np.asarray(first if begin is None else begin, dtype=np.float64)
+        return lattice_ensemble.ensemble(self, X0, h, steps, stride, threads, {**(parameters or {}), **more}, times)
 
     # --- what is seen
 
-    def hamiltonian(self, x: ArrayLike, *, parameters: Mapping[str, Any] | None = None, **more: Any) -> float:
-        """H of a state (coordinates, *sizes)."""
-        return self._seen(x, parameters, more).hamiltonian()
+    def hamiltonian(
+        self, x: ArrayLike, t: float | None = None, *, parameters: Mapping[str, Any] | None = None, **more: Any
+    ) -> float:
+        """H of a state (coordinates, *sizes), at the time ``t`` where it depends on that."""
+        return self._seen(x, parameters, more, t).hamiltonian()
 
-    def density(self, x: ArrayLike, *, parameters: Mapping[str, Any] | None = None, **more: Any) -> Floats:
+    def density(
+        self, x: ArrayLike, t: float | None = None, *, parameters: Mapping[str, Any] | None = None, **more: Any
+    ) -> Floats:
         """The density of H at the sites (*sizes), whose sum is H."""
-        return self._seen(x, parameters, more).density()
+        return self._seen(x, parameters, more, t).density()
 
     def casimirs(self, x: ArrayLike, *, parameters: Mapping[str, Any] | None = None, **more: Any) -> dict[str, Any]:
         """The Casimirs of a state, by name: (*sizes) for those of sites, numbers for sums and products."""
-        about, found = self.interface, self._seen(x, parameters, more).casimirs()
+        about = self.interface
+        found = self._seen(x, parameters, more, 0.0 if self.interface.time else None).casimirs()
         kinds = zip(about.casimirs, about.casimir_kinds, found, strict=True)
         return {name: _reduced(kind, values) for name, kind, values in kinds}
 
-    def vector_field(self, x: ArrayLike, *, parameters: Mapping[str, Any] | None = None, **more: Any) -> Floats:
+    def vector_field(
+        self, x: ArrayLike, t: float | None = None, *, parameters: Mapping[str, Any] | None = None, **more: Any
+    ) -> Floats:
         """π∇H of a state (coordinates, *sizes), the same shape."""
-        return self._seen(x, parameters, more).vector_field()
+        return self._seen(x, parameters, more, t).vector_field()
 
-    def _seen(self, x: ArrayLike, parameters: Mapping[str, Any] | None, more: Mapping[str, Any]) -> LatticeSession:
+    def _seen(
+        self, x: ArrayLike, parameters: Mapping[str, Any] | None, more: dict[str, Any], t: float | None = None
+    ) -> LatticeSession:
         state = self.state(x, "x")
-        return self.started(state, 1.0, self.values(parameters, more, state.shape[1:]))
+        found = arguments.times(t, self.interface, (), more)
+        values = self.values(parameters, more, state.shape[1:])
+        return self.started(state, 1.0, values, 0.0 if found is None else float(found[0]))
 
     # --- arguments
 
@@ -311,15 +345,10 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
             values[name] = array
         return values | bonds
 
-    def session(self, x0: ArrayLike, h: float, parameters: Mapping[str, Any]) -> LatticeSession:
-        """A lattice at x0, to be driven by hand. Raises as `integrate`."""
-        start = self.state(x0, "x0")
-        return self.started(start, h, self.values(parameters, {}, start.shape[1:]))
-
-    def started(self, start: Floats, h: float, values: Mapping[str, Any]) -> LatticeSession:
+    def started(self, start: Floats, h: float, values: Mapping[str, Any], t0: float = 0.0) -> LatticeSession:
         """A session at a state and with values that have been checked."""
         try:
-            return self.backend.start(start, values)
+            return self.backend.start(start, values, t0)
         except BackendError as error:
             raise self._failure(error, h, None, values) from error
 

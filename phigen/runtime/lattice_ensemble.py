@@ -28,13 +28,15 @@ def ensemble(
     stride: int | None,
     threads: int | None,
     given: Mapping[str, Any],
+    t0: Floats,
 ) -> Floats:
     """See `LatticeSolver.ensemble`."""
     own = {name: np.asarray(value) for name, value in given.items() if _has_members(solver.interface, name, value)}
-    own |= {"the step size h": np.asarray(h)} if np.ndim(h) else {}
+    own |= {what: np.asarray(v) for what, v in (("the step size h", h), ("the times t0", t0)) if np.ndim(v)}
     start = _states(solver, X0, own)
     count, steps = len(start), arguments.count(steps, "steps", 0)
     marks = row_steps(steps, max(steps, 1) if stride is None else arguments.count(stride, "stride", 1))
+    begin = np.broadcast_to(t0, count).tolist()
     sizes = [arguments.step_size(size) for size in np.broadcast_to(h, count)]
     values = [
         solver.values({n: own[n][m] if n in own else v for n, v in given.items()}, {}, start.shape[2:])
@@ -45,7 +47,7 @@ def ensemble(
 
     def make(m: int) -> None:
         try:
-            session = solver.backend.start(start[m], values[m])
+            session = solver.backend.start(start[m], values[m], begin[m])
             for row, ahead in enumerate(np.diff(marks), 1):
                 session.advance(sizes[m], int(ahead))
                 final[m] = frames[row, m] = session.state()

@@ -14,7 +14,7 @@ import numpy as np
 
 from phigen.runtime import checkpoint
 from phigen.runtime.checkpoint import Checkpoint
-from phigen.runtime.interface import BackendError, Floats, Progress
+from phigen.runtime.interface import Floats, Progress
 
 if TYPE_CHECKING:
     from phigen.runtime.lattice import LatticeSolver, LatticeTrajectory
@@ -34,6 +34,7 @@ class LatticeRun:
     values: Mapping[str, Any]
     frames: Frames
     checkpoints: Path | None
+    t0: float = 0.0
     energy: list[float] = field(default_factory=list)
     count: int = 0
     session: Any = None
@@ -42,16 +43,13 @@ class LatticeRun:
     def made(self, progress: Progress | None) -> int:
         """All frames that are left."""
         first = self._resumed()
-        self.session = self.solver.started(first, self.h, self.values)
-        self.session.resume(self.h, self.saved)
-        before = int(self.marks[self.count - 1]) if self.count else 0
-        if not self.count:
+        self.session = self.solver.started(first, self.h, self.values, self.t0)
+        if self.count:
+            self.session.resume(self.h, int(self.marks[self.count - 1]), self.saved)
+        else:
             self._store(first)
         for mark in self.marks[self.count :].tolist():
-            try:
-                self.session.advance(self.h, mark - before - self.session.steps)
-            except BackendError as error:
-                raise BackendError(error.status, before + self.session.steps, error.states) from error
+            self.session.advance(self.h, mark - self.session.steps)
             self._store(self.session.state())
             self._save(mark)
             if progress:
@@ -70,6 +68,7 @@ class LatticeRun:
         numbers = {name: float(value) for name, value in self.values.items() if not np.ndim(value)}
         hashes = {name: hashlib.sha256(a.tobytes()).hexdigest() for name, a in {**arrays, "": self.start}.items()}
         marks = [len(self.marks), int(self.marks[-1]), int(self.marks[min(1, len(self.marks) - 1)])]
+        hashes |= {"t0": self.t0.hex()} if self.t0 else {}
         about = {"solver": self.solver.backend.identity, "h": self.h, "sizes": list(self.start.shape), "steps": marks}
         return {**about, "parameters": numbers, "arrays": hashes}
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -10,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from phigen.errors import StepError
 from phigen.runtime import arguments
-from phigen.runtime.interface import BackendError, Floats
+from phigen.runtime.interface import BackendError, Clock, Floats
 from phigen.runtime.session import Session
 from phigen.runtime.trajectory import turned_into
 
@@ -31,8 +32,7 @@ class LiveSession:
         self.solver = solver
         self.parameters = dict(parameters)
         self._session = session
-        # The time and the steps when the size of the step was set: without adding up.
-        self._h, self._t, self._counted = 0.0, t0, 0
+        self._clock = Clock(t0)
         self._put = session.state()
 
     def __repr__(self) -> str:
@@ -55,8 +55,8 @@ class LiveSession:
     def step(self, h: float, steps: int = 1) -> LiveSession:
         """Make steps of size ``h``, in τ with a monitor. Raises `StepError`, and stands before the step that failed."""
         h, steps = arguments.step_size(h), arguments.count(steps, "steps", 0)
-        if h != self._h:
-            self._h, self._t, self._counted = h, self._counted_time(), self.steps
+        if not self.solver.interface.monitored:
+            self._clock.set_step(h, self.steps)
         try:
             self._session.advance(h, steps)
         except BackendError as error:
@@ -71,7 +71,9 @@ class LiveSession:
     @property
     def t(self) -> float:
         """The physical time."""
-        return self._t + self._session.time() if self.solver.interface.monitored else self._counted_time()
+        if self.solver.interface.monitored:
+            return self._clock.t + self._session.time()
+        return self._clock.after(self.steps)
 
     @property
     def energy(self) -> float:
@@ -104,6 +106,7 @@ class LiveSession:
         twin = object.__new__(LiveSession)
         twin.__dict__.update(self.__dict__)
         twin.parameters, twin._session = dict(self.parameters), self._session.branch()
+        twin._clock = replace(self._clock)
         return twin
 
     def __getstate__(self) -> dict[str, Any]:
@@ -116,9 +119,6 @@ class LiveSession:
     def _casimirs_of(self, x: Floats) -> dict[str, float]:
         found = self.solver.casimirs(x, parameters=self.parameters)
         return {name: float(value) for name, value in found.items()}
-
-    def _counted_time(self) -> float:
-        return self._t + (self.steps - self._counted) * self._h if not self.solver.interface.monitored else self._t
 
     def _element(self) -> tuple[Floats | None, Floats | None]:
         return turned_into(self.solver.interface, self._session.element()[np.newaxis])

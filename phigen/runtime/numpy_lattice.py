@@ -8,18 +8,19 @@ from typing import Any
 
 import numpy as np
 
-from phigen.runtime.interface import BackendError, Floats, LatticeInterface
+from phigen.runtime.interface import BackendError, Clock, Floats, LatticeInterface
 from phigen.runtime.modules import load_module
 
 
 class NumpyLatticeSession:
     """What the loop of the module's ``integrate`` holds."""
 
-    def __init__(self, module: Any, x0: Floats, parameters: Mapping[str, Any]) -> None:
+    def __init__(self, module: Any, x0: Floats, parameters: Mapping[str, Any], t0: float, *, timed: bool) -> None:
         self.steps = 0
-        self._module, self._x = module, np.array(x0)
+        self._module, self._x, self._timed = module, np.array(x0), timed
+        self._clock = Clock(t0)
         try:
-            _, self._sites = module._started(x0, parameters)
+            _, self._sites = module._started(x0, parameters, *([t0] if timed else []))
             module._coefficients(self._sites, 1e-100)
         except ValueError:
             raise BackendError("BAD_ARGUMENT", 0, self._x[None]) from None
@@ -32,8 +33,7 @@ class NumpyLatticeSession:
 
     def advance(self, h: float, steps: int) -> None:
         """Make so many steps."""
-        if h != self._h:
-            self._h, self._rows = h, self._module._coefficients(self._sites, h)
+        self._set_step(h)
         past: dict[Any, Any] = {}
         with np.errstate(all="ignore"):
             for _ in range(steps):
@@ -41,14 +41,29 @@ class NumpyLatticeSession:
                     self._x = self._module._advance(self._sites, self._rows, self._x, past)
                 except self._module.FailedError as failed:
                     raise BackendError(str(failed), self.steps, self._x[None].copy()) from None
+                finally:
+                    self._tell_time()
                 self.steps += 1
+                self._tell_time()
+
+    def _set_step(self, h: float) -> None:
+        if h != self._h:
+            self._h, self._rows = h, self._module._coefficients(self._sites, h)
+            self._clock.set_step(h, self.steps)
+
+    def _tell_time(self) -> None:
+        if self._timed:
+            self._sites.t = self._clock.after(self.steps)
 
     def saved(self) -> dict[str, Any]:
         """Nothing: steps go on from the state."""
         return {}
 
-    def resume(self, h: float, kept: Mapping[str, Any]) -> None:
+    def resume(self, h: float, steps: int, kept: Mapping[str, Any]) -> None:
         """Go on from what was saved."""
+        self._set_step(h)
+        self.steps = steps
+        self._tell_time()
 
     def hamiltonian(self) -> float:
         """H of the state."""
@@ -85,6 +100,6 @@ class NumpyLattice:
         """A hash of all that decides the results."""
         return hashlib.sha256(f"{np.__version__}\n{self._text}".encode()).hexdigest()[:40]
 
-    def start(self, x0: Floats, parameters: Mapping[str, Any]) -> NumpyLatticeSession:
-        """A session at x0 (coordinates, *sizes)."""
-        return NumpyLatticeSession(self._module, x0, parameters)
+    def start(self, x0: Floats, parameters: Mapping[str, Any], t0: float = 0.0) -> NumpyLatticeSession:
+        """A session at x0 (coordinates, *sizes), at the time t0."""
+        return NumpyLatticeSession(self._module, x0, parameters, t0, timed=bool(self.interface.time))

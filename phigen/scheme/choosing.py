@@ -71,11 +71,11 @@ def plan(system: System, splitting: Splitting, wanted: int, composition: str) ->
     """
     if system.forces:  # a force is no part that kicks
         choice = planned(system, splitting, wanted, composition, lambda: ())
-        return _with_carrier(system, choice) if system.time else choice
+        return with_carrier(choice, system.time) if system.time else choice
     if not system.time:
         return planned(system, splitting, wanted, composition, lambda: kicks(system, splitting))
     choice = planned(system, splitting, wanted, composition, lambda: _kicks_in_time(system, splitting))
-    return _with_carrier(system, choice)
+    return with_carrier(choice, system.time)
 
 
 def _kicks_in_time(system: System, splitting: Splitting) -> list[Kick]:
@@ -84,12 +84,12 @@ def _kicks_in_time(system: System, splitting: Splitting) -> list[Kick]:
     for kick in kicks(system.frozen, splitting):
         drift, v = splitting.flows[1 - kick.part], splitting.flows[kick.part].hamiltonian
         rate = bracket(system, v, gradient(v, system.times)[0])
-        if not _is_dated(system, drift) and decide_zero("", [("", rate)]).verdict == PROVED:
+        if not is_dated(drift, system.time) and decide_zero("", [("", rate)]).verdict == PROVED:
             found.append(kick)
     return found
 
 
-def _with_carrier(system: System, choice: Choice) -> Choice:
+def with_carrier(choice: Choice, time: str) -> Choice:
     """The choice with a flow that the time advances with, the first or the last, which does not depend on it.
 
     Else the time advances by itself, in the place of a last part.
@@ -97,18 +97,18 @@ def _with_carrier(system: System, choice: Choice) -> Choice:
     flows = choice.splitting.flows
     if isinstance(choice.method, Nystrom):
         return replace(choice, carrier=1 - (choice.splitting.kick or 0))
-    if not _is_dated(system, flows[-1]):
+    if not is_dated(flows[-1], time):
         return replace(choice, carrier=len(flows) - 1)
-    free = [flow for flow in flows if not _is_dated(system, flow)]
+    free = [flow for flow in flows if not is_dated(flow, time)]
     if not free:
         return replace(choice, carrier=len(flows))
     ordered = (free[0], *(flow for flow in flows if flow is not free[0]))
     return replace(choice, splitting=Splitting(ordered), carrier=0)
 
 
-def _is_dated(system: System, flow: Flow) -> bool:
+def is_dated(flow: Flow, time: str) -> bool:
     """Whether a flow depends on the time."""
-    return system.time in symbols_of(flow.hamiltonian, *flow.force)
+    return time in symbols_of(flow.hamiltonian, *flow.force)
 
 
 def planned(

@@ -350,7 +350,8 @@ class Sweeps(_Scheduled):
     Of a splitting each of the ``parts`` is a list of sweeps, which may be made in any order, and the ``schedule`` is
     that of the parts. Where some are ``by_colour``, the flows are those of all parts, of each colour where they are so,
     and the ``schedule`` has in place of parts: 0 the first flow, 1 those in the middle, 2 the last, 3 the middle
-    backwards. Of the series there is an ``equation`` in place of parts, and the schedule has its stages.
+    backwards; where H depends on the time, which advances in place of the last, that one is in the middle too. Of the
+    series there is an ``equation`` in place of parts, and the schedule has its stages.
     """
 
     sites: Sites
@@ -389,7 +390,7 @@ class Sweeps(_Scheduled):
         swept_kernels += self.equation.kernels if self.equation else ()
         gathers = [sweep.gather for sweep in swept if sweep.gather]
         gathers += [self.partners.energy, self.partners.field] if self.partners else []
-        return (self.prepare, *swept_kernels, *(k for g in gathers for k in g.kernels))
+        return _present((self.prepare, self.refresh, *swept_kernels, *(k for g in gathers for k in g.kernels)))
 
 
 Step = Newton | Explicit | Path | Splitting | Sweeps

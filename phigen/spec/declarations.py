@@ -88,16 +88,18 @@ class Declarations:
         at_bonds = {n: bonds.get(n, why) for n, why in self._at_bonds(names).items()}
         return Indices(found, varying, {**same, **at_bonds}, ends)
 
-    def bond_scope(self) -> Scope:
-        """For densities of bonds and pairs, and brackets along bonds: sites are the ends a and b."""
-        names = self.scope().names
+    def bond_scope(self, *, dated: bool = False) -> Scope:
+        """For brackets along bonds and, ``dated``, densities of bonds and pairs: sites are the ends a and b."""
+        scope = self.dated_scope() if dated else self.scope()
+        names = scope.names
         indices = self.indices(names, ENDS)
         local = indices.names if indices else {}
         what = "a pair" if self.relation == "pairs" else "a bond"
         ends = {n: (f"{n!r} is at which end of {what}?", f"write {n}[a] or {n}[b]") for n in local}
         others = {n: e for n, e in names.items() if n not in local}
         others |= {n: symbol(n) for n, p in self.parameters.items() if p.at == "bonds"}
-        return Scope(others, self.refused | self._counters() | ends, open=self.incomplete, indices=indices)
+        refused = self.refused | self._counters() | ends | ({} if dated else self._timeless())
+        return Scope(others, refused, open=self.incomplete, indices=indices)
 
     def site_numbers(self) -> Scope:
         """For values at sites: the indices, counted from 0, and the sizes."""
@@ -135,8 +137,11 @@ class Declarations:
         """Everything declared: for functions on phase space that may depend on the time."""
         scope = self.scope()
         dated = {n: self.definitions[n] for n in self.dated} | ({self.time: symbol(self.time)} if self.time else {})
-        refused = {n: why for n, why in scope.refused.items() if n not in dated}
-        return replace(scope, names={**scope.names, **dated}, refused=refused)
+        bonds = self._at_bonds(dated)
+        dated = {n: e for n, e in dated.items() if n not in bonds}
+        refused = {n: why for n, why in scope.refused.items() if n not in dated} | bonds
+        names = {**scope.names, **dated}
+        return replace(scope, names=names, refused=refused, indices=self.indices(names))
 
     def _timeless(self) -> dict[str, tuple[str, str]]:
         """The refusal of the time where nothing may depend on it."""

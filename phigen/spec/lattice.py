@@ -27,7 +27,7 @@ def densities(given: Any, declared: Declarations) -> tuple[Expression, Expressio
     """H of a site, and of a bond or pair, from ``hamiltonian:``, an expression or a mapping."""
     if not isinstance(given, dict):
         return declared.formula(given, declared.dated_scope()) or ZERO, ZERO
-    sites, coupling = declared.formula(given.get("sites"), declared.scope()), ZERO
+    sites, coupling = declared.formula(given.get("sites"), declared.dated_scope()), ZERO
     for key, needed in COUPLINGS.items():
         node = given.get(key)
         if node is None:
@@ -35,7 +35,7 @@ def densities(given: Any, declared: Declarations) -> tuple[Expression, Expressio
         if declared.relation != needed:
             declared.reader.error(node, f"hamiltonian: {key} needs {_WANTED[needed]}", "x[i+1] couples sites of a grid")
         else:
-            coupling = declared.formula(node, declared.bond_scope()) or ZERO
+            coupling = declared.formula(node, declared.bond_scope(dated=True)) or ZERO
     if declared.lattice is None:
         place = declared.reader.locations["hamiltonian",]
         declared.reader.problems.add("hamiltonian: sites, bonds and pairs are for specs with lattice:", place)

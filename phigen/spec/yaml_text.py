@@ -29,7 +29,7 @@ class _Writer:
         self.spec = spec
         self.definitions: dict[str, str] = {}
         casimirs, invariants = [*spec.casimirs], [*spec.invariants]
-        self.taken = {*spec.coordinates, *(p.name for p in spec.parameters), *casimirs, *invariants}
+        self.taken = {*spec.coordinates, spec.time, *(p.name for p in spec.parameters), *casimirs, *invariants}
 
     def lines(self) -> Iterator[str]:
         spec = self.spec
@@ -37,6 +37,7 @@ class _Writer:
             *_folded("hamiltonian", self.short("H", spec.hamiltonian)),
             *self._named("casimirs", spec.casimirs, spec.lattice.kinds if spec.lattice else {}),
             *self._named("invariants", spec.invariants, {}),
+            *self._driving(),
         ]
         yield from ["phigen: 1", f"name: {spec.name}"]
         if spec.title:
@@ -44,6 +45,8 @@ class _Writer:
         if spec.lattice:
             boundary = ", ".join(spec.lattice.boundary)
             yield f"lattice: {{axes: [{', '.join(spec.lattice.axes)}], boundary: [{boundary}]}}"
+        if spec.time:
+            yield f"time: {spec.time}"
         yield from _wrapped("coordinates: [", spec.coordinates, "]")
         if spec.parameters:
             yield "parameters:"
@@ -94,6 +97,23 @@ class _Writer:
                 yield f"  {name}: {{value: {_quoted(written)}, at: {kinds[name]}}}"
             else:
                 yield from _indented(_folded(name, written))
+
+    def _driving(self) -> Iterator[str]:
+        """Damping, forces and noise."""
+        spec = self.spec
+        if spec.forces.damping is not None:
+            yield from _folded("damping", self.short("damping", spec.forces.damping))
+        acting = {"covector": spec.forces.covector, "vector": spec.forces.vector}
+        if any(acting.values()):
+            yield "forces:"
+            for kind, entries in acting.items():
+                yield from _indented(self._named(kind, entries, {}))
+        if spec.noise:
+            yield "noise:"
+            for name, source in spec.noise.items():
+                yield f"  {name}:"
+                yield from _indented(_folded("hamiltonian", self.short(name, source.hamiltonian)), 4)
+                yield from _indented(_folded("amplitude", self.short(name, source.amplitude)), 4)
 
     def _poisson(self) -> Iterator[str]:
         form, names = self.spec.poisson, self.spec.coordinates
@@ -167,6 +187,10 @@ def _run(run: Run) -> Iterator[str]:
     yield f"  steps: {run.steps}" if run.until is None else f"  until: {_number(run.until)}"
     if run.stride != 1:
         yield f"  stride: {run.stride}"
+    if run.start:
+        yield f"  start: {_number(run.start)}"
+    if run.seed:
+        yield f"  seed: {run.seed}"
 
 
 def _number(value: Fraction) -> str:

@@ -19,7 +19,7 @@ from phigen.compilation import Compilation
 from phigen.errors import StepError
 from phigen.lattice.cell import Cell
 from phigen.lattice.expansion import Expansion, expand, ring
-from phigen.lattice.observing import errors_of
+from phigen.lattice.observing import BALANCE, CHANGE, ENERGY, MOST_BALANCED, errors_of, works
 from phigen.lattice.states import Start
 from phigen.runtime.lattice import LatticeSolver, LatticeTrajectory
 from phigen.scheme.steps import Sweeps
@@ -48,15 +48,22 @@ class _Subject:
     solvers: Mapping[str, LatticeSolver]
     start: Start
     h: float
+    t0: float | None = None
 
     @property
     def solver(self) -> LatticeSolver:
         """The target that is measured where one suffices: C, if it is there."""
         return next(iter(self.solvers.values()))
 
-    def stepped(self, x: Floats, h: float, steps: int = 1) -> Floats:
-        """The state after some steps."""
-        found: Floats = self.solver.integrate(x, h, steps, max(1, steps), parameters=self.start.arguments).x[-1]
+    def time(self, made: LatticeTrajectory, frame: int) -> float | None:
+        """The time of a frame, None where there is none."""
+        return None if self.t0 is None else float(made.t[frame])
+
+    def stepped(self, x: Floats, h: float, steps: int = 1, t0: float | None = None) -> Floats:
+        """The state after some steps, from the time t0 on, or that of the run."""
+        t0 = self.t0 if t0 is None else t0
+        made = self.solver.integrate(x, h, steps, max(1, steps), t0=t0, parameters=self.start.arguments)
+        found: Floats = made.x[-1]
         return found
 
 
@@ -68,18 +75,23 @@ def verify_lattice(
     h: float,
     steps: int,
     *,
+    t0: float | None = None,
     quick: bool = False,
 ) -> Verification:
     """Measure and judge the solvers of a lattice, by target, on the numbers of a run, which is shortened if it is long.
 
+    ``t0`` is the time of its start, None where there is no time.
     Raises `StepError` where a step of the run fails.
     """
     assert compilation.cell is not None
-    subject = _Subject(compilation, solvers, start, h)
-    steps = min(steps, max(20, (FEW_UPDATES if quick else MOST_UPDATES) // int(np.prod(start.sizes))))
+    subject = _Subject(compilation, solvers, start, h, t0)
+    most = MOST_BALANCED if compilation.cell.driven else MOST_UPDATES
+    steps = min(steps, max(20, (min(most, FEW_UPDATES) if quick else most) // int(np.prod(start.sizes))))
     name = compilation.spec.name
     with progress.stage(f"{name}: {steps} steps"):
-        made = subject.solver.integrate(start.state, h, steps, max(1, steps // FRAMES), parameters=start.arguments)
+        made = subject.solver.integrate(
+            start.state, h, steps, max(1, steps // FRAMES), t0=t0, parameters=start.arguments
+        )
     checks = [_order(subject)]
     checks += _conserved(compilation.cell, made)
     with progress.stage(f"{name}: single steps"):
@@ -111,13 +123,8 @@ def _order(subject: _Subject) -> Check:
 def _conserved(cell: Cell, made: LatticeTrajectory) -> Iterator[Check]:
     """Energy, Casimirs and invariants along the run."""
     errors = errors_of(cell, made)
-    energy, least = errors["energy"], rounding(made.steps)
-    quarter = max(1, 3 * len(energy) // 4)
-    before, after = float(energy[:quarter].max()), float(energy[quarter:].max())
-    yield Check("energy: largest error", float(energy.max()))
-    grown = after / before if before > 10 * least else math.nan
-    passed = not grown > GROWTH
-    yield Check("energy: last quarter/before", grown, f"≤ {GROWTH:g}", passed, f"grows by a factor of {grown:.1f}")
+    least = rounding(made.steps)
+    yield from _energy(cell, made, errors, least)
     for name, (_, kind) in cell.casimirs.items():
         value = float(np.max(np.abs(made.casimirs[name][0])))
         # the worst of many sites; a sum of their logarithms
@@ -133,10 +140,28 @@ def _conserved(cell: Cell, made: LatticeTrajectory) -> Iterator[Check]:
         yield Check(f"invariant {name}: largest error", float(errors[name].max()))
 
 
+def _energy(cell: Cell, made: LatticeTrajectory, errors: Mapping[str, Floats], least: float) -> Iterator[Check]:
+    """Energy without drift, or its balance."""
+    what = next(name for name in (ENERGY, BALANCE, CHANGE) if name in errors)
+    energy = errors[what]
+    if what == CHANGE:
+        yield Check("energy: largest change", float(energy.max()))
+        return
+    yield Check(f"{what}: largest error", float(energy.max()))
+    least = max(least, works(cell, made)[1] / (made.energy_scale or 1.0)) if what == BALANCE else least
+    quarter = max(1, 3 * len(energy) // 4)
+    before, after = float(energy[:quarter].max()), float(energy[quarter:].max())
+    grown = after / before if before > 10 * least else math.nan
+    passed = not grown > GROWTH
+    yield Check(f"{what}: last quarter/before", grown, f"≤ {GROWTH:g}", passed, f"grows by a factor of {grown:.1f}")
+
+
 def _reversal(subject: _Subject, made: LatticeTrajectory) -> Check:
     worst = 0.0
-    for x in (made.x[0], made.x[-1]):
-        back = subject.stepped(subject.stepped(x, subject.h), -subject.h)
+    for k in (0, -1):
+        x, t0 = made.x[k], subject.time(made, k)
+        after = None if t0 is None else t0 + subject.h
+        back = subject.stepped(subject.stepped(x, subject.h, 1, t0), -subject.h, 1, after)
         worst = max(worst, float(np.abs(back - x).max()) / _size(x))
     return Check("reversibility", worst, f"≤ {ONE_STEP:.0e}", worst <= ONE_STEP, f"differs by {worst:.1e}")
 
@@ -146,8 +171,9 @@ def _agreement(subject: _Subject, made: LatticeTrajectory) -> Iterator[Check]:
     first, *others = subject.solvers.items()
     for target, solver in others:
         worst = 0.0
-        for x in (made.x[0], made.x[-1]):
-            a, b = (s.step(x, subject.h, parameters=subject.start.arguments) for s in (first[1], solver))
+        for k in (0, -1):
+            x, t0 = made.x[k], subject.time(made, k)
+            a, b = (s.step(x, subject.h, t0=t0, parameters=subject.start.arguments) for s in (first[1], solver))
             worst = max(worst, float(np.abs(a - b).max()) / _size(x))
         name = f"agreement of {target} with {first[0]}"
         yield Check(name, worst, f"≤ {ONE_STEP:.0e}", worst <= ONE_STEP, f"differs by {worst:.1e}")
@@ -186,7 +212,7 @@ def _defect(
     """The largest entry of DΦ π DΦᵀ − π∘Φ over that of π, where states are in some units."""
 
     def step(y: Floats) -> Floats:
-        there = subject.solver.step((y * units).reshape(x.shape), subject.h, parameters=parameters)
+        there = subject.solver.step((y * units).reshape(x.shape), subject.h, t0=subject.t0, parameters=parameters)
         return np.asarray(there.reshape(-1) / units)
 
     def poisson(y: Floats) -> Floats:

@@ -74,6 +74,10 @@ MEANINGS = (
         "the solver does not follow the flow of any Hamiltonian near H, or the step is so large that H̃ says nothing",
     ),
     Meaning(
+        "energy balance: last quarter/before",
+        "the same of H less the work that was done on a lattice that is driven",
+    ),
+    Meaning(
         "Poisson identity",
         "the largest entry of DΦ π DΦᵀ − π∘Φ over that of π, on a lattice of a few sites that are as some of the "
         "run; DΦ by differences of order six",

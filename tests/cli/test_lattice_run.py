@@ -103,7 +103,7 @@ def test_a_lattice_that_falls_short_is_told(phigen, chain, monkeypatch, wrong, s
 
 @pytest.mark.parametrize(
     "command",
-    [["verify", "--plot", "a.svg"], ["tune"], ["report", "--lyapunov"], ["build", "-t", "js"], ["run", "--lyapunov"]],
+    [["verify", "--plot", "a.svg"], ["tune"], ["report", "--lyapunov"], ["run", "--lyapunov"]],
 )
 def test_what_lattices_do_not_have_is_refused(phigen, chain, tmp_path, command):
     done = phigen(*command, chain, *(["-o", tmp_path] if command[0] == "build" else []))

@@ -37,13 +37,17 @@ PATH_SYNTAX = Syntax(
 
 
 def emit(program: Program, command: str) -> dict[str, str]:
-    """The file name and its contents. Raises `SpecError` for what is not offered: attitudes, adjoints."""
+    """The file name and its contents. Raises `SpecError` for attitudes, adjoints, lattices that are driven."""
     if program.step.adjoint:
         message = f"{program.name} asks for the transpose of steps, adjoint, which is not offered in JavaScript"
         raise SpecError([Diagnostic(message, hint="the targets c and numpy have it")])
     if program.attitude:
         message = f"{program.name} reconstructs attitudes, which are not offered in JavaScript"
         raise SpecError([Diagnostic(message, hint="the targets c and numpy have them")])
+    if isinstance(program.step, Sweeps) and (program.time or program.noise):
+        what = "depends on the time" if program.time else "has noise"
+        message = f"{program.name} is a lattice that {what}, which is not offered in JavaScript"
+        raise SpecError([Diagnostic(message, hint="the targets c and numpy have it")])
     body = _lattice(program, program.step) if isinstance(program.step, Sweeps) else _system_of_coordinates(program)
     head = "\n".join(f" * {line}".rstrip() for line in header_lines(program, command))
     return {f"{program.name}.mjs": f"/*\n{head}\n * {CHECKSUM} {checksum(body)}\n */\n{body}"}

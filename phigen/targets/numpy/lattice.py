@@ -24,7 +24,7 @@ _SERIES = ("lattice_series", "lattice_guesses")
 
 
 def body(program: Program, step: Sweeps, prepare: str) -> str:
-    """The text of the module; ``prepare`` is the function that computes coefficients."""
+    """The text of the module; ``prepare`` are the functions that compute coefficients."""
     sites, schedule = step.sites, step.schedule
     values = {
         "version": program.version,
@@ -45,6 +45,9 @@ def body(program: Program, step: Sweeps, prepare: str) -> str:
         "times": _tuple(map(repr, schedule.times)),
         "multiples": _tuple(map(repr, schedule.multiples)),
         "schedule": repr(tuple(schedule.flows)),
+        "time": program.time,
+        "renewed": step.refresh is not None,
+        "moments": _tuple(map(repr, program.midpoints if step.equation else schedule.moments)),
         "kicks": bool(schedule.multiples),
         "at_bonds": _tuple(map(repr, sites.at_bonds)),
         "by_colour": repr(step.by_colour),
@@ -187,6 +190,8 @@ def _body(
                 scope.bind(s, f"coef[{i}]" if s.kind == COEFFICIENT else f"sites.present({bounds})")
             elif array == "bonds":
                 lines.append(f'    {scope[s]} = sites.parameters["{s}"][bond]')
+            elif array == "t":
+                scope.bind(s, "sites.t")
             elif array == "params":
                 lines.append(f'    {scope[s]} = parameters["{s}"]')
             else:

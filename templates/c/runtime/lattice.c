@@ -18,9 +18,7 @@ int omp_get_thread_num(void);
 #endif
 
 enum {
-#if PHI_SERIES
-    PHI_STRETCH = 1,   /* steps before the state is looked at */
-#else
+#if !PHI_SERIES
     PHI_STRETCH = 32,  /* steps before the state is looked at: what is not finite stays so */
 #if PHI_NEAR
     PHI_FAR_STEPS = 64, /* steps by functions for large arguments, after one that needed them */
@@ -171,14 +169,38 @@ static int phi_finite(const double *values, size_t count)
 }
 
 #if PHI_GRAPH
+#if PHI_TIMED
 phi_status phi_init(phi_solver *s, const phi_params *params, const size_t sizes[PHI_AXES], const phi_bonds *bonds,
     const double *x0, void *work)
+{
+    return phi_init_at(s, params, sizes, bonds, x0, 0.0, work);
+}
+
+phi_status phi_init_at(phi_solver *s, const phi_params *params, const size_t sizes[PHI_AXES], const phi_bonds *bonds,
+    const double *x0, double t0, void *work)
+#else
+phi_status phi_init(phi_solver *s, const phi_params *params, const size_t sizes[PHI_AXES], const phi_bonds *bonds,
+    const double *x0, void *work)
+#endif
+#else
+#if PHI_TIMED
+phi_status phi_init(phi_solver *s, const phi_params *params, const size_t sizes[PHI_AXES], const double *x0, void *work)
+{
+    return phi_init_at(s, params, sizes, x0, 0.0, work);
+}
+
+phi_status phi_init_at(
+    phi_solver *s, const phi_params *params, const size_t sizes[PHI_AXES], const double *x0, double t0, void *work)
 #else
 phi_status phi_init(phi_solver *s, const phi_params *params, const size_t sizes[PHI_AXES], const double *x0, void *work)
+#endif
 #endif
 {
     ptrdiff_t width;
     if (s == NULL || sizes == NULL || x0 == NULL || work == NULL) return PHI_BAD_ARGUMENT;
+#if PHI_TIMED
+    if (!isfinite(t0)) return PHI_BAD_ARGUMENT;
+#endif
     const phi_params own = params != NULL ? *params : phi_default_params;
     const size_t rows = phi_shape(sizes, &width), length = sizes[PHI_AXES - 1], sites = rows * length;
 #if PHI_GRAPH
@@ -189,7 +211,11 @@ phi_status phi_init(phi_solver *s, const phi_params *params, const size_t sizes[
 #else
     if (rows == 0 || !phi_finite(x0, PHI_DIM * sites) || !phi_allowed(&own, sites)) return PHI_BAD_ARGUMENT;
 #endif
+#if PHI_RENEWED
+    double coef[PHI_COEFFICIENTS] = { 0.0 };
+#else
     double coef[PHI_COEFFICIENTS];
+#endif
     phi_prepare_step(&own, 1e-100, coef);
     if (!phi_finite(coef, PHI_COEFFICIENTS)) return PHI_BAD_ARGUMENT;
     memset(s, 0, sizeof *s);
@@ -201,6 +227,9 @@ phi_status phi_init(phi_solver *s, const phi_params *params, const size_t sizes[
     s->to = s->length;
 #endif
     s->width = width;
+#if PHI_TIMED
+    s->t = s->now = t0;
+#endif
     s->params = own;
     double *aligned = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64) + PHI_LEAD;
     const size_t block = rows * (size_t)width;
@@ -245,6 +274,32 @@ static phi_status phi_set_step(phi_solver *s, double h)
     s->prepared = 1;
     return PHI_OK;
 }
+#if PHI_TIMED
+
+/* The time after so many steps. */
+static double phi_time_after(const phi_solver *s, size_t steps)
+{
+    return s->t_before_h + (double)(steps - s->steps_before_h) * s->h;
+}
+
+phi_status phi_passed(phi_solver *s, double h, size_t steps)
+{
+    const phi_status status = phi_set_step(s, h);
+    if (status != PHI_OK || steps < s->steps_before_h) return PHI_BAD_ARGUMENT;
+    s->steps = steps;
+    s->t = s->now = phi_time_after(s, steps);
+    return PHI_OK;
+}
+#endif
+#if PHI_RENEWED && !PHI_SERIES
+
+/* A row of coefficients in the step after so many others. */
+static void phi_renew(const phi_solver *s, int row, size_t steps, double coef[PHI_ROW])
+{
+    memcpy(coef, s->coef + row * PHI_ROW, PHI_PREPARED * sizeof *coef);
+    phi_refresh(coef, phi_time_after(s, steps) + phi_moments[row] * s->h, coef + PHI_PREPARED);
+}
+#endif
 
 static int phi_all_hold(const phi_solver *s, double *const x[PHI_DIM])
 {

@@ -57,7 +57,12 @@ typedef struct {
 #endif
 #endif
     size_t steps;             /* good steps since phi_init */
+#if PHI_TIMED
+    double t;                 /* the time of the state */
+    double now;               /* the time that kernels see: t, but for the middle of a stage */
+#else
     double t;                 /* time since phi_init */
+#endif
     double h;                 /* the last step size */
     phi_params params;
     double coef[PHI_COEFFICIENTS]; /* all that depends on params and h only */
@@ -82,6 +87,12 @@ size_t phi_work_size(const size_t sizes[PHI_AXES], size_t bonds);
    positive is not. */
 phi_status phi_init(phi_solver *s, const phi_params *params, const size_t sizes[PHI_AXES], const phi_bonds *bonds,
     const double *x0, void *work);
+#if PHI_TIMED
+
+/* The same at the time t0, which for phi_init is 0. */
+phi_status phi_init_at(phi_solver *s, const phi_params *params, const size_t sizes[PHI_AXES], const phi_bonds *bonds,
+    const double *x0, double t0, void *work);
+#endif
 #else
 /* The bytes that the solver of a lattice needs as its memory; 0 for sizes that are not allowed. */
 size_t phi_work_size(const size_t sizes[PHI_AXES]);
@@ -90,6 +101,18 @@ size_t phi_work_size(const size_t sizes[PHI_AXES]);
    may be NULL for the defaults; its arrays are copied. PHI_BAD_ARGUMENT if sizes are not allowed, x0 or a parameter is
    not finite, or one that has to be positive is not. */
 phi_status phi_init(phi_solver *s, const phi_params *params, const size_t sizes[PHI_AXES], const double *x0, void *work);
+#if PHI_TIMED
+
+/* The same at the time t0, which for phi_init is 0. */
+phi_status phi_init_at(
+    phi_solver *s, const phi_params *params, const size_t sizes[PHI_AXES], const double *x0, double t0, void *work);
+#endif
+#endif
+#if PHI_TIMED
+
+/* Say that so many steps of size h have led to the state since phi_init: to go on elsewhere with the same bits, and before each
+   step that is made by hand. */
+phi_status phi_passed(phi_solver *s, double h, size_t steps);
 #endif
 
 /* Steps of size h, of either sign. If one fails, the state is that before it, and s->steps counts the good ones.

@@ -24,7 +24,13 @@ phi_status phi_sweep(phi_solver *s, size_t number, int far, size_t from, size_t 
 {
     if (s == NULL || !s->prepared || number > PHI_FLOWS || from > to || to > s->sizes[0]) return PHI_BAD_ARGUMENT;
     const int joined = number == PHI_FLOWS, part = phi_flow_parts[joined ? 0 : number];
-    const double *coef = s->coef + (joined ? PHI_JOINED : phi_flow_rows[number]) * PHI_ROW;
+    const int row = joined ? PHI_JOINED : phi_flow_rows[number];
+#if PHI_RENEWED
+    double coef[PHI_ROW];
+    phi_renew(s, row, s->steps, coef);
+#else
+    const double *coef = s->coef + row * PHI_ROW;
+#endif
     const size_t units = phi_rows_of_plane(s) * phi_pieces(s);
     s->open = 0;
 #if PHI_ONE_ROW

@@ -31,7 +31,11 @@ static void phi_sweep_part(const phi_solver *s, int part, const double *coef, in
 /* The first flow, those between it and the last, the last, or those between, backwards. */
 static void phi_sweep_part(const phi_solver *s, int kind, const double *coef, int far)
 {
+#if PHI_TIMED
+    const int last = s->flows; /* the time advances after all of them */
+#else
     const int last = s->flows - 1;
+#endif
     if (kind == 0 || kind == 2) phi_sweep_colour(s, kind == 0 ? 0 : last, coef, far);
     if (kind == 1)
         for (int flow = 1; flow < last; ++flow) phi_sweep_colour(s, flow, coef, far);
@@ -40,12 +44,24 @@ static void phi_sweep_part(const phi_solver *s, int kind, const double *coef, in
 }
 
 #endif
+#if PHI_RENEWED
+/* The flow of that number in a step after so many; after those of a step the last and the first together. */
+static void phi_flow(const phi_solver *s, size_t steps, int flow)
+{
+    const int joined = flow == PHI_FLOWS;
+    double coef[PHI_ROW];
+    phi_renew(s, joined ? PHI_JOINED : phi_flow_rows[flow], steps, coef);
+    phi_sweep_part(s, phi_flow_parts[joined ? 0 : flow], coef, s->far > 0);
+}
+
+#else
 /* The flow of that number in a step; after those of a step the last and the first together. */
 static void phi_flow(const phi_solver *s, int flow)
 {
     const int joined = flow == PHI_FLOWS, row = joined ? PHI_JOINED : phi_flow_rows[flow];
     phi_sweep_part(s, phi_flow_parts[joined ? 0 : flow], s->coef + row * PHI_ROW, s->far > 0);
 }
+#endif
 
 /* Some steps, joined, without the last flow; no steps are that flow alone. */
 static void phi_steps(const phi_solver *s, int steps)
@@ -58,11 +74,19 @@ static void phi_steps(const phi_solver *s, int steps)
 #endif
 #endif
     {
+#if PHI_RENEWED
+        if (steps == 0) phi_flow(s, s->steps - 1, PHI_FLOWS - 1);
+        for (size_t step = s->steps; step < s->steps + (size_t)steps; ++step) {
+            phi_flow(s, step, PHI_FLOWS > 1 && (step > s->steps || s->open) ? PHI_FLOWS : 0);
+            for (int flow = 1; flow < PHI_FLOWS - 1; ++flow) phi_flow(s, step, flow);
+        }
+#else
         if (steps == 0) phi_flow(s, PHI_FLOWS - 1);
         for (int step = 0; step < steps; ++step) {
             phi_flow(s, PHI_FLOWS > 1 && (step > 0 || s->open) ? PHI_FLOWS : 0);
             for (int flow = 1; flow < PHI_FLOWS - 1; ++flow) phi_flow(s, flow);
         }
+#endif
     }
 }
 
@@ -126,7 +150,11 @@ phi_status phi_integrate(phi_solver *s, double h, size_t steps)
         s->open = 0;
         --s->steps;
     }
+#if PHI_TIMED
+    s->t = s->now = phi_time_after(s, s->steps);
+#else
     s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
+#endif
     return status;
 }
 #endif

@@ -163,7 +163,17 @@ static phi_status phi_stages(phi_solver *s, int far)
 {
     const size_t units = s->rows * phi_pieces(s);
     for (int stage = 0; stage < PHI_STAGES; ++stage) {
+#if PHI_RENEWED
+        double *coef = s->coef + stage * PHI_ROW;
+#else
         const double *coef = s->coef + stage * PHI_ROW;
+#endif
+#if PHI_TIMED
+        s->now = s->t + phi_middles[stage] * s->h;
+#endif
+#if PHI_RENEWED
+        phi_refresh(coef, s->now, coef + PHI_PREPARED);
+#endif
         int now = 0;
 #if PHI_GUESSES
         phi_predict(s, stage);
@@ -194,9 +204,8 @@ static phi_status phi_stages(phi_solver *s, int far)
 }
 
 /* One step; if it cannot be made, none. */
-static phi_status phi_try(phi_solver *s, int steps)
+static phi_status phi_try(phi_solver *s)
 {
-    (void)steps;
     phi_copy(s->before, s->x, s);
 #if PHI_NEAR
     if (phi_stages(s, 0) == PHI_OK) return PHI_OK;
@@ -216,25 +225,22 @@ static phi_status phi_try(phi_solver *s, int steps)
 
 phi_status phi_integrate(phi_solver *s, double h, size_t steps)
 {
-    const phi_status status = phi_set_step(s, h);
+    phi_status status = phi_set_step(s, h);
     if (status != PHI_OK) return status;
 #if PHI_GUESSES
     phi_forget(s);
 #endif
-    for (size_t stretch = PHI_STRETCH; steps > 0;) {
-        const size_t now = steps < stretch ? steps : stretch;
-        const phi_status tried = phi_try(s, (int)now);
-        if (tried == PHI_OK) {
-            steps -= now;
-            s->steps += now;
-            s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
-        } else if (now == 1) {
-            return tried;
-        } else {
-            stretch = 1;
-        }
+    for (; steps > 0 && status == PHI_OK; --steps) {
+        status = phi_try(s);
+        s->steps += status == PHI_OK;
+#if PHI_TIMED
+        s->t = s->now = phi_time_after(s, s->steps);
     }
-    return PHI_OK;
+#else
+    }
+    s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
+#endif
+    return status;
 }
 
 #endif

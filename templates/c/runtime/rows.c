@@ -11,6 +11,9 @@ typedef struct {
     double *const *x;             /* see phi_solver */
     const ptrdiff_t *at;          /* the row itself and those beside it, from the first row on */
     ptrdiff_t length;             /* sites of a row */
+#if PHI_TIMED
+    double t;                     /* the time */
+#endif
 #if PHI_SERIES
     double *const *start, *const *out; /* where a stage starts, and where what is computed goes; x is y there */
 #if PHI_STIFF
@@ -98,6 +101,9 @@ static inline void phi_locate(const phi_solver *s, size_t index, phi_row *row)
     row->x = s->x;
     row->at = s->lines + index * PHI_LINES;
     row->length = s->length;
+#if PHI_TIMED
+    row->t = s->now;
+#endif
 #if PHI_SERIES
     row->start = row->out = s->x;
 #if PHI_STIFF

@@ -77,6 +77,7 @@ def model(program: Program, step: Sweeps) -> str:
         ("ROW", max(1, step.row), "coefficients of one flow"),
         ("ROWS_OF_FLOWS", rows_of(step), "rows of coefficients"),
     ]
+    constants += [("PREPARED", step.prepared, "of a row, before those that depend on the time")] * bool(step.refresh)
     if step.equation:
         constants += [("MOST_SWEEPS", step.equation.most_sweeps, "that a stage may take")]
         if switches(program, step, layout)["STIFF"]:
@@ -109,6 +110,9 @@ def model(program: Program, step: Sweeps) -> str:
         "times": ", ".join(map(repr, [*schedule.times, joined][: rows_of(step)])),
         "split": step.equation is None,
         "multiples": ", ".join(map(repr, multiples)) if schedule.multiples else "",
+        "moments": ", ".join(map(repr, _moments(step))) if step.refresh and not step.equation else "",
+        "middles": ", ".join(map(repr, program.midpoints)),
+        "fractions": len(program.fractions) > 1,
         "parts": ", ".join(str(part + (not step.by_colour)) for part, _ in flows),
         "by_colour": ", ".join(str(int(c)) for c in step.by_colour),
         "part_count": len(step.by_colour),
@@ -119,8 +123,16 @@ def model(program: Program, step: Sweeps) -> str:
         if switches(program, step, layout)["BY_HAND"]
         else "",
     }
-    prepare = function(program, step.prepare)
+    timed = step.refresh or (program.time and step.equation)
+    prepare = render("c", "middles.c", values) if timed else ""
+    prepare += function(program, step.prepare)
+    prepare += "\n" + function(program, step.refresh) if step.refresh else ""
     return render("c", "lattice.c", values) + render("c", "lattice_allowed.c", values) + prepare
+
+
+def _moments(step: Sweeps) -> list[float]:
+    """Where the time stands still, as a fraction of the step: for each row of coefficients, last for joined flows."""
+    return [*step.schedule.moments, 0.0]
 
 
 def _allowed(asked: Sequence[str], arrays: Sequence[tuple[str, bool, bool, str]]) -> Iterator[str]:

@@ -63,6 +63,8 @@ class SiteNames:
                 self.scope.bind(s, f"{pointer}[i]")
             elif isinstance(s, Symbol):
                 self._bind_weight(s)
+            elif s == program.time:
+                self.scope.bind(s, "row->t")
             elif s in layout.step.sites.ends:
                 self._bind_end(s)
             elif s in layout.step.sites.places:
