@@ -39,7 +39,7 @@ def report_lattice(
     written = command_of(spec_file, target, name, order, scheme, False, quick)
     material, failure = LatticeMaterial(found, found.compilation, written), None
     if spec.runs or name:
-        material, failure = _measured(material, found.compilation, name, quick, console)
+        material, failure = _measured(material, found.compilation, name, scheme, quick, console)
     else:
         console.warn(f"{spec.file}: the spec has no runs, so the page has no measurements and no figures")
     write_page(lattice_document(material), material.trajectory is not None, output, target, console)
@@ -48,7 +48,12 @@ def report_lattice(
 
 
 def _measured(
-    material: LatticeMaterial, compilation: Compilation, name: str | None, quick: bool, console: Console
+    material: LatticeMaterial,
+    compilation: Compilation,
+    name: str | None,
+    scheme: str | None,
+    quick: bool,
+    console: Console,
 ) -> tuple[LatticeMaterial, PhigenError | None]:
     """With a run and what was verified on it, and what failed."""
     from dataclasses import replace
@@ -61,6 +66,7 @@ def _measured(
     from phigen.cli.verify import fallen_short, verified_lattice
     from phigen.lattice.observing import errors_of
     from phigen.lattice.states import start_of
+    from phigen.report.live_lattice import gathered_lattice
     from phigen.runtime import toolchain
 
     spec = compilation.spec
@@ -86,6 +92,7 @@ def _measured(
     material = replace(
         material, run=run, trajectory=made, errors=errors_of(compilation.cell, made), energies=energies,
         failure=f"The run could not be completed: {failure}." if failure else "",
+        live=gathered_lattice(compilation, scheme, run, start),
     )  # fmt: skip
     if failure:
         return material, failure

@@ -18,13 +18,12 @@ from phigen.proofs.examination import Examination
 from phigen.report import evidence, page
 from phigen.report.document import lead, provenance
 from phigen.report.drawable import NO_FIGURES, drawable
+from phigen.report.live_lattice import LatticeLive, lattice_live_section, lattice_script
 from phigen.report.material import Material
 from phigen.runtime.lattice import LatticeTrajectory
 from phigen.spec.model import Run
 from phigen.study.verification import Verification
 from phigen.symbolic.arrays import Floats
-
-NO_PANEL = "There is no live panel on this page, since JavaScript does not offer lattices."
 
 
 @dataclass(frozen=True)
@@ -32,7 +31,7 @@ class LatticeMaterial:
     """What the page of a lattice is made of; without a run there is neither a trajectory nor a verification.
 
     ``errors`` (frames,) are those of what is conserved, by name; ``energies`` (frames, *sizes) those of the sites.
-    ``failure`` says why the run came to no end.
+    ``failure`` says why the run came to no end. ``live`` is the panel.
     """
 
     examination: Examination
@@ -44,19 +43,24 @@ class LatticeMaterial:
     energies: Floats | None = None
     verification: Verification | None = None
     failure: str = ""
+    live: LatticeLive | None = None
 
 
 def lattice_document(material: LatticeMaterial) -> str:
     """The HTML of the page."""
     spec = material.compilation.spec
-    return page.page(f"{spec.title or spec.name} – phigen", lead(material.compilation), list(_sections(material)))
+    solvers = lattice_script(material.live) if material.live and material.live.solvers else ""
+    title = f"{spec.title or spec.name} – phigen"
+    return page.page(title, lead(material.compilation), list(_sections(material)), solvers, page.FIELDS)
 
 
 def _sections(material: LatticeMaterial) -> Iterator[tuple[str, str, Markup]]:
     compilation, verification = material.compilation, material.verification
     assert compilation.cell is not None
-    notes = ((material.failure,) if material.failure else ()) + (NO_PANEL,)
+    notes = (material.failure,) if material.failure else ()
     whole = Material(material.examination, compilation, material.command, verification=verification, notes=notes)
+    if material.live:
+        yield "live", "Live", lattice_live_section(compilation, material.live)
     yield "brief", "In brief", evidence.brief_section(whole)
     yield "system", "The cell", page.joined(_cell(compilation.cell))
     yield "choices", "What the compiler chose", page.joined(_method(compilation))

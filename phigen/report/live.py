@@ -60,22 +60,29 @@ def gathered(compilation: Compilation, scheme: str | None, run: Run, parameters:
     """The panel for a run: the solver in JavaScript, of the order of the page and of lower ones."""
     if compilation.system.noise:
         return Live({}, why_not="RK4, which it has beside the solver, takes no noise")
+    found, why_not = solvers(compilation, scheme)
+    return Live(found, run, parameters, why_not)
+
+
+def solvers(compilation: Compilation, scheme: str | None) -> tuple[dict[int, str], str]:
+    """JavaScript by order: of the order of the page and of lower ones, of lattices 2 and 4; or why there is none."""
     own = compilation.order.order
     spec = replace(compilation.spec, reconstruct="")
+    system = None if spec.lattice else compilation.system
     found: dict[int, str] = {}
-    for order in (own, *(o for o in ORDERS if o < own)):
+    for order in (own, *(o for o in ORDERS if o < own or (spec.lattice and o > own))):
         try:
-            made = compile_spec(spec, order=order, scheme=scheme, system=compilation.system, extras=_PRIVATE)
+            made = compile_spec(spec, order=order, scheme=scheme, system=system, extras=_PRIVATE)
             (text,) = emit(made.program, "").values()
         except PhigenError as error:
             if order == own:
-                return Live({}, why_not=str(error).splitlines()[0])
+                return {}, str(error).splitlines()[0]
             continue
         found[order] = enclosed(text)
         if sum(map(len, found.values())) > MOST:
             del found[order]
     why_not = "" if found else f"its JavaScript would take more than {MOST // 1000} kB of this page"
-    return Live(dict(sorted(found.items())), run, parameters, why_not)
+    return dict(sorted(found.items())), why_not
 
 
 def enclosed(module: str) -> str:
@@ -119,23 +126,30 @@ def live_section(compilation: Compilation, live: Live) -> Markup:
     return page.block(
         "live",
         say=_say(system, quantities, any(leaf is not None for leaf in leaves)),
-        sides=[
-            (1, "ours", "phigen", "id=live-order", f"order {compilation.order.order}"),
-            (2, "theirs", "RK4", "class=about", "the classical method of Runge and Kutta"),
-        ],
+        sides=sides(compilation),
+        kind="",
         label=f"The motion of {', '.join(shown[0])}",
         quantities=[q["name"] for q in quantities],
-        sliders=map(_slid, _general(live)),
+        sliders=map(slid, general(live)),
         choice=len(shown) > 1,
         groups=list(enumerate(", ".join(g) for g in shown)),
-        folds=[(title, unfolded, map(_slid, listed)) for title, unfolded, listed in _folds(system, start, parameters)],
+        folds=[(title, unfolded, map(slid, listed)) for title, unfolded, listed in _folds(system, start, parameters)],
         help=HELP,
         data=page.data("live-data", given),
     )
 
 
-def _slid(slider: Slider) -> Markup:
+def slid(slider: Slider) -> Markup:
+    """The slider as HTML."""
     return page.block("slider", **vars(slider))
+
+
+def sides(compilation: Compilation) -> list[tuple[int, str, str, str, str]]:
+    """The two methods."""
+    return [
+        (1, "ours", "phigen", "id=live-order", f"order {compilation.order.order}"),
+        (2, "theirs", "RK4", "class=about", "the classical method of Runge and Kutta"),
+    ]
 
 
 def _quantities(system: System) -> list[dict[str, object]]:
@@ -188,7 +202,8 @@ def _say(system: System, conserved: Sequence[Mapping[str, object]], drawn: bool)
     return f"{said}The true motion {' and '.join(kept)}. Watch which of the two does."
 
 
-def _general(live: Live) -> Iterable[Slider]:
+def general(live: Live) -> Iterable[Slider]:
+    """The sliders of every panel."""
     yield Slider("Step", "h", reach=STEP)
     if len(live.solvers) > 1:
         yield Slider("Order", "order", low=0, high=len(live.solvers) - 1)
@@ -199,7 +214,7 @@ def _folds(
     system: System, start: list[float], parameters: Mapping[str, float]
 ) -> Iterable[tuple[str, bool, list[Slider]]]:
     """Groups of sliders: what they are, whether they are unfolded, and the sliders."""
-    listed = [_of_parameter(p, parameters[p.name]) for p in system.parameters]
+    listed = [slider_of(p, parameters[p.name]) for p in system.parameters]
     if listed:
         yield "Parameters", len(listed) <= FEW, listed
     reach = max(map(abs, start)) or 1.0
@@ -207,7 +222,8 @@ def _folds(
     yield "Start", len(coordinates) <= FEW, coordinates
 
 
-def _of_parameter(p: Parameter, value: float) -> Slider:
+def slider_of(p: Parameter, value: float) -> Slider:
+    """The slider of a parameter."""
     if p.positive and value > 0:
         return Slider(p.name, "params", p.name, reach=PARAMETER)
     return Slider(p.name, "params", p.name, "linear", 2 * abs(value) or 1.0)

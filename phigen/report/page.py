@@ -28,8 +28,8 @@ Cell = tuple[str, str]
 MANY, SHORT = 6, 420
 
 _STYLES, _SCRIPTS = ("report.css",), ("theme.js", "space.js", "viewer.js")
-#: The scripts of the live panel, after its solvers.
-_LIVE = ("race.js", "live.js")
+#: The scripts of the live panel, after its solvers; what it draws is in one of its own.
+CURVES, FIELDS = ("race.js", "curves.js", "live.js"), ("race.js", "fields.js", "live.js")
 
 
 @cache
@@ -97,21 +97,40 @@ def _compact(value: Any, **_: Any) -> str:
     return json.dumps(value, separators=(",", ":"), ensure_ascii=True)
 
 
-def page(title: str, lead: Markup, sections: Sequence[tuple[str, str, Markup]], solvers: str = "") -> str:
-    """The whole page from sections (id, title, body); ``solvers`` is the JavaScript of its live panel."""
-    css = "\n".join(map(_asset, _STYLES))
-    live = [solvers, *map(_asset, _LIVE)] if solvers else []
-    scripts = "\n".join([*map(_asset, _SCRIPTS), *live])
-    return _environment().get_template("page.html.jinja").render(
+def page(
+    title: str,
+    lead: Markup,
+    sections: Sequence[tuple[str, str, Markup]],
+    solvers: str = "",
+    panel: Sequence[str] = CURVES,
+) -> str:
+    """The whole page from sections (id, title, body); ``solvers`` is the JavaScript of its live ``panel``."""
+    live = [solvers, *map(_asset, panel)] if solvers else []
+    return _complete(
+        "page",
+        [*map(_asset, _SCRIPTS), *live],
         title=title,
         lead=lead,
         sections=sections,
         contents=[(identifier, name) for identifier, name, _ in sections],
-        policy=f"default-src 'none'; img-src data:; style-src {_hash(css)}; script-src {_hash(scripts)}; "
+    )
+
+
+def alone(title: str, body: Markup, solvers: str, panel: Sequence[str]) -> str:
+    """A page with a live panel and nothing else."""
+    return _complete("alone", [_asset("space.js"), solvers, *map(_asset, panel)], title=title, body=body)
+
+
+def _complete(template: str, scripts: Sequence[str], **values: object) -> str:
+    """A page with its style sheet and scripts, and the policy that allows these only."""
+    css, code = "\n".join(map(_asset, _STYLES)), "\n".join(scripts)
+    return _environment().get_template(f"{template}.html.jinja").render(
+        policy=f"default-src 'none'; img-src data:; style-src {_hash(css)}; script-src {_hash(code)}; "
         "base-uri 'none'; form-action 'none'",
         css=Markup(css),
-        scripts=Markup(scripts),
+        scripts=Markup(code),
         version=__version__,
+        **values,
     )  # fmt: skip
 
 

@@ -36,30 +36,17 @@ function rk4(field, x, t, h) {
   return { x: x.map((v, i) => v + h * mean(i)), t: t + (h * (a.t + 2 * b.t + 2 * c.t + d.t)) / 6 };
 }
 
-// What an error of a quantity is divided by: its value, or its terms where that is nearly 0.
-function unitOf(quantity, x) {
-  const value = Math.abs(quantity(x));
-  let terms = 0;
-  x.forEach((v, i) => {
-    const moved = [1e-6, -1e-6].map((part) => quantity(x.map((w, j) => (i === j ? w * (1 + part) : w))));
-    const term = Math.abs(moved[0] - moved[1]) / 2e-6;
-    if (Number.isFinite(term)) terms += term;
-  });
-  return value > 1e-3 * terms ? value : terms || 1;
-}
-
-// One method on its way: where it is, where it has been, its errors, and why it ended if it did.
+// One method on its way: where it is, its errors, and why it ended if it did.
 class Runner {
   failed = "";
   steps = 0;
-  trail = [];
   // For each group of quantities the largest error.
   histories;
 
   constructor(race, advance) {
     Object.assign(this, { race, advance, x: race.start, t: race.t0 });
     this.histories = race.groups.map(() => new History());
-    this.#remember();
+    race.remember(this);
   }
 
   step() {
@@ -74,66 +61,24 @@ class Runner {
     }
     this.steps++;
     this.race.groups.forEach((group, k) => this.histories[k].add(group.error(this.x, this.t)));
-    this.#remember();
-  }
-
-  #remember() {
-    const slope = this.race.field(this.x, this.t).x.map((v) => v * this.race.h);
-    this.trail.push({ x: this.x, slope });
-    if (this.trail.length > MOST) this.trail.shift();
+    this.race.remember(this);
   }
 }
 
-// A point between two steps, by the cubic with their slopes.
-function between(a, b, s, i) {
-  const r = 1 - s;
-  return r * r * (1 + 2 * s) * a.x[i] + r * r * s * a.slope[i] + s * s * (3 - 2 * s) * b.x[i] - s * s * r * b.slope[i];
-}
-
-// Both methods; throws what the solver throws of a start or of parameters that it does not take.
+// Both methods, from where a solver is. Of both the errors of groups {name, error(x, t)} are kept, and remember(runner)
+// is called at the start and after each step.
 class Race {
-  constructor({ Solver, rateAt }, { h, start, t0, params }, quantities) {
-    const solver = new Solver({ x0: start, t0, params });
-    Object.assign(this, { solver, h, start: Float64Array.from(start), t0: solver.t });
-    this.field = (x, t) => {
-      const rate = rateAt ? rateAt(solver.params, x) : 1;
-      return { x: solver.vectorField(x, t).map((v) => v * rate), t: rate };
-    };
-    this.groups = quantities.map(({ name, casimirs }) => {
-      const parts = casimirs ? casimirs.map((c) => (x) => solver.casimirs(x)[c]) : [(x) => solver.hamiltonian(x)];
-      const [values, units] = [parts.map((part) => part(this.start)), parts.map((part) => unitOf(part, this.start))];
-      return { name, error: (x) => Math.max(...parts.map((part, k) => Math.abs(part(x) - values[k]) / units[k])) };
-    });
+  constructor(solver, { h, field, groups, remember }) {
+    Object.assign(this, { solver, h, field, groups, remember, start: Float64Array.from(solver.x), t0: solver.t });
     this.ours = new Runner(this, (runner) => {
       solver.step(h);
       Object.assign(runner, { x: Float64Array.from(solver.x), t: solver.t });
     });
-    this.theirs = new Runner(this, (runner) => Object.assign(runner, rk4(this.field, runner.x, runner.t, h)));
+    this.theirs = new Runner(this, (runner) => Object.assign(runner, rk4(field, runner.x, runner.t, h)));
   }
 
   step() {
     this.ours.step();
     this.theirs.step();
   }
-}
-
-// Lines of f = 0 over a grid in a plane, as ends [u, v, u, v]; not those along which f only changes its sign at a pole.
-function contour(f, [u0, u1], [v0, v1], count) {
-  const u = (i) => u0 + ((u1 - u0) * i) / count, v = (j) => v0 + ((v1 - v0) * j) / count;
-  const values = Array.from({ length: count + 1 }, (_, i) => Array.from({ length: count + 1 }, (_, j) => f(u(i), v(j))));
-  const lines = [];
-  for (let i = 0; i < count; i++) {
-    for (let j = 0; j < count; j++) {
-      const corners = [[i, j], [i + 1, j], [i + 1, j + 1], [i, j + 1]];
-      const ends = [];
-      corners.forEach(([a, b], k) => {
-        const [c, d] = corners[(k + 1) % 4], [p, q] = [values[a][b], values[c][d]];
-        if (!(p < 0 !== q < 0 && Number.isFinite(p) && Number.isFinite(q))) return;
-        const s = p / (p - q), at = [u(a) + s * (u(c) - u(a)), v(b) + s * (v(d) - v(b))];
-        if (Math.abs(f(...at)) <= Math.max(Math.abs(p), Math.abs(q))) ends.push(at);
-      });
-      for (let k = 0; k + 1 < ends.length; k += 2) lines.push([...ends[k], ...ends[k + 1]]);
-    }
-  }
-  return lines;
 }

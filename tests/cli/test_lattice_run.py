@@ -68,9 +68,10 @@ def test_a_page_shows_the_cell_and_a_run_over_space_and_time(phigen, chain, tmp_
     found = Page((tmp_path / "chain.html").read_text(encoding="utf-8"))
     assert found.errors == []
     assert [given["id"] for given in found.all("section")] == [
-        "brief", "system", "choices", "proofs", "measured", "run", "provenance",
+        "live", "brief", "system", "choices", "proofs", "measured", "run", "provenance",
     ]  # fmt: skip
     assert {given["id"] for given in found.all("figure")} == {"figure-fields", "figure-sites"}
+    assert {given["id"] for given in found.all("canvas")} == {"live-ours", "live-theirs", "live-errors"}
     images = [given["href"] for given in found.all("image")]
     assert len(images) >= 3
     assert all(image.startswith("data:image/png;base64,") for image in images)
@@ -105,7 +106,7 @@ def test_a_lattice_that_falls_short_is_told(phigen, chain, monkeypatch, wrong, s
     "command",
     [["verify", "--plot", "a.svg"], ["tune"], ["report", "--lyapunov"], ["run", "--lyapunov"]],
 )
-def test_what_lattices_do_not_have_is_refused(phigen, chain, tmp_path, command):
-    done = phigen(*command, chain, *(["-o", tmp_path] if command[0] == "build" else []))
+def test_what_lattices_do_not_have_is_refused(phigen, chain, command):
+    done = phigen(*command, chain)
     assert done.exit_code in (1, 2)
     assert "lattice" in done.stderr

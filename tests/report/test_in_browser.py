@@ -5,9 +5,14 @@ import json
 import numpy as np
 import pytest
 from chromium import Browser
+from lattice.lattices import LATTICES
 from support import tool
 
 import phigen
+from phigen import spec
+from phigen.compiler import compile_spec
+from phigen.lattice.states import start_of
+from phigen.report.panel import panel_page
 from phigen.study.classical import rk4
 
 
@@ -175,6 +180,79 @@ def test_panel_fits_a_telephone(browser, made):
     settled(browser, made)
     assert browser.value("document.documentElement.scrollWidth <= innerWidth")
     assert browser.value("[...document.querySelectorAll('#live-panel canvas')].every(c => c.clientWidth > 140)")
+    browser.size(1100, 900)
+    browser.media()
+    browser.load(made)
+
+
+# -- the live panel of lattices
+
+#: A chain whose start is a formula, a plane with open ends, a cube, a graph with lists, vortices of both signs.
+LATTICE_PANELS = ["fput", "spins_2", "spins_3", "food_web", "vortices"]
+COLOURS = (
+    "{const c = document.getElementById('live-ours'), pen = c.getContext('2d');"
+    "new Set(new Uint32Array(pen.getImageData(0, 0, c.width, c.height).data.buffer)).size}"
+)
+
+
+@pytest.fixture(scope="module")
+def panels(tmp_path_factory):
+    """Panels alone, by the name of the lattice."""
+    folder, made = tmp_path_factory.mktemp("panels"), {}
+    for name in LATTICE_PANELS:
+        compilation = compile_spec(spec.loads(LATTICES[name]))
+        made[name] = folder / f"{name}.html"
+        text = panel_page(compilation, next(iter(compilation.spec.runs.values())))
+        made[name].write_text(text, encoding="utf-8")
+    return made
+
+
+@pytest.mark.parametrize("name", LATTICE_PANELS)
+def test_fields_move_by_the_steps_of_the_solver_and_of_rk4(browser, panels, name):
+    settled(browser, panels[name], "#live&h=0.05")
+    given = spec.loads(LATTICES[name])
+    start = start_of(given, next(iter(given.runs.values())))
+    solver = phigen.compile(given, target="numpy")
+    begin = np.reshape(told(browser, "ours")["x"], start.state.shape)
+    if "spins" in name:  # they start at random
+        assert np.linalg.norm(begin, axis=0) == pytest.approx(np.ones(start.sizes))
+    else:
+        assert begin[0] == pytest.approx(start.state[0], rel=1e-14, abs=1e-15)
+    click(browser, "step", 4)
+    x = begin
+    for _ in range(4):
+        x = rk4(lambda y: solver.vector_field(y, **start.arguments), x, 0.05)
+    expected = solver.integrate(begin, 0.05, 4, **start.arguments).x[-1]
+    assert told(browser, "ours")["x"] == pytest.approx(expected.ravel(), rel=1e-12, abs=1e-14)
+    assert told(browser, "theirs")["x"] == pytest.approx(x.ravel(), rel=1e-12, abs=1e-14)
+    assert browser.value(COLOURS) > 8
+    assert browser.complaints == []
+
+
+def test_settings_of_a_lattice_are_in_its_link_and_make_it_larger(browser, panels):
+    settled(browser, panels["fput"])
+    assert len(told(browser, "ours")["x"]) == 10
+    settled(browser, panels["spins_3"])
+    browser.value(
+        "document.querySelectorAll('#live-panel input[type=range]').forEach("
+        "s => { s.value = s.max; s.dispatchEvent(new Event('input')); })"
+    )
+    browser.value(
+        "{const g = document.getElementById('live-group'); g.value = 4; g.dispatchEvent(new Event('change'))}"
+    )
+    chosen, link = told(browser, "settings"), browser.value("document.getElementById('live-link').hash")
+    click(browser, "step", 2)
+    assert (chosen["group"], len(told(browser, "ours")["x"])) == (4, 3 * 16**3)
+    settled(browser, panels["spins_3"], link)
+    assert told(browser, "settings") == chosen
+    assert browser.complaints == []
+
+
+def test_lattices_fit_a_telephone(browser, made, panels):
+    browser.size(375, 800)
+    settled(browser, panels["spins_2"])
+    assert browser.value("document.documentElement.scrollWidth <= innerWidth")
+    assert browser.value("[...document.querySelectorAll('.race canvas')].every(c => c.clientWidth > 140)")
     browser.size(1100, 900)
     browser.media()
     browser.load(made)

@@ -1,0 +1,248 @@
+"""The live panel of a lattice: its fields move, by the generated JavaScript and by RK4."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from markupsafe import Markup
+
+from phigen.compilation import Compilation
+from phigen.lattice.cell import PAIRS
+from phigen.lattice.states import Start
+from phigen.report import page
+from phigen.report.live import FEW, Live, Slider, general, script, sides, slid, slider_of, solvers
+from phigen.scheme.kernel import Kernel, Output
+from phigen.spec.model import LieAlgebraForm, Parameter, Run, Spec, Values
+from phigen.symbolic.expression import Expression, symbols_of
+from phigen.targets.code import lower
+from phigen.targets.js.printing import LANGUAGE
+from phigen.targets.names import Scope
+
+#: The sizes of a run are halved down to so many along an axis, and doubled up to these numbers of sites.
+FEWEST, MOST_PAIRS, MOST_IN_CHAIN, MOST_SITES = 8, 160, 1024, 10_000
+#: Numbers of lists that a page holds.
+MOST_NUMBERS = 20_000
+
+HELP = {
+    "diagram": "Sites go upwards, the time to the right; when the picture is full, every second moment goes.",
+    "plane": "Each square is a site; of three axes the plane in the middle of the first is drawn.",
+    "moving": "Each point is a site, with the way behind it.",
+}
+_DRAWN = " The random start is drawn in the page, from the seed of the spec."
+_DIRECTION = " The hue is the direction in the plane of {}, {}; the lighter, the larger {}."
+
+
+@dataclass(frozen=True)
+class LatticeLive(Live):
+    """The panel of a run from a ``start``, with ``formulas`` in JavaScript for starts of any size."""
+
+    start: Start | None = None
+    formulas: str = ""
+
+
+def gathered_lattice(compilation: Compilation, scheme: str | None, run: Run, start: Start) -> LatticeLive:
+    """The panel for a run of a lattice."""
+    if _numbers(compilation.spec, run, start) > MOST_NUMBERS:
+        return LatticeLive({}, why_not="the lists of its start are too long for a page")
+    found, why_not = solvers(compilation, scheme)
+    return LatticeLive(found, run, None, why_not, start, _formulas(compilation.spec, run))
+
+
+def lattice_script(live: LatticeLive) -> str:
+    """The solvers and the formulas of starts for the script of the page."""
+    return f"{script(live)}\nconst liveValues = {{ {live.formulas} }};"
+
+
+def lattice_live_section(compilation: Compilation, live: LatticeLive) -> Markup:
+    """The panel, or why there is none."""
+    run, start, cell = live.run, live.start, compilation.cell
+    if not live.solvers or run is None or start is None or cell is None:
+        return page.paragraph(f"There is no live panel: {live.why_not}.", "note")
+    spec, picture = compilation.spec, _picture(compilation)
+    sizes, shown = _sizes(compilation, run, start), _groups(compilation, picture)
+    moved = [p for p in spec.parameters if isinstance(_values(spec, run, start, p.name), float)]
+    given = {
+        "picture": picture,
+        "axes": list(cell.axes),
+        "coordinates": list(spec.coordinates),
+        "start": [],
+        "t0": 0,
+        "step": float(run.step),
+        "order": compilation.order.order,
+        "orders": list(live.solvers),
+        "sizes": sizes,
+        "site": sizes.index(list(start.sizes)),
+        "bonds": start.bonds.reshape(-1).tolist(),
+        "parameters": [
+            {"name": p.name, "value": _values(spec, run, start, p.name), "positive": p.positive} for p in moved
+        ],
+        "arrays": {p.name: _array(spec, run, start, p) for p in spec.parameters if p not in moved},
+        "initial": {name: _given(v, start, name, spec) for name, v in _initial(spec, run).items()},
+        "groups": [{"kind": kind, "fields": fields} for _, kind, fields in shown],
+        "quantities": _quantities(compilation),
+        "sign": _sign(spec, start),
+    }
+    about = _DIRECTION.format(*spec.coordinates) if shown[0][1] == "direction" else ""
+    about += _DRAWN if any(v.random for v in _initial(spec, run).values()) else ""
+    return page.block(
+        "live",
+        kind="fields",
+        say=_say(compilation),
+        sides=sides(compilation),
+        label=f"{shown[0][0]} at the sites",
+        quantities=[q["name"] for q in _quantities(compilation)],
+        sliders=map(slid, _general(live, sizes)),
+        choice=len(shown) > 1,
+        groups=[(k, name) for k, (name, _, _) in enumerate(shown)],
+        folds=[("Parameters", len(moved) <= FEW, map(slid, _parameters(spec, run, start, moved)))] if moved else [],
+        help=HELP[picture] + about,
+        data=page.data("live-data", given),
+    )
+
+
+def _picture(compilation: Compilation) -> str:
+    """How a lattice is drawn: see fields.js."""
+    cell = compilation.cell
+    if cell and cell.relation == PAIRS and len(cell.fields) > 1:
+        return "moving"
+    return "plane" if cell and len(cell.axes) > 1 else "diagram"
+
+
+def _groups(compilation: Compilation, picture: str) -> list[tuple[str, str, list[int]]]:
+    """What can be drawn: its name, its kind, and the numbers of its fields."""
+    fields = compilation.spec.coordinates
+    if picture == "moving":
+        return [(f"{fields[0]}, {fields[1]}", "field", [0, 1])]
+    found = [(name, "field", [k]) for k, name in enumerate(fields)]
+    form = compilation.spec.poisson
+    if isinstance(form, LieAlgebraForm) and (form.family, form.size) == ("so", 3):
+        found.insert(0, ("directions of the spins", "direction", [0, 1, 2]))
+    return [*found, ("energy of each site", "energy", [])]
+
+
+def _sizes(compilation: Compilation, run: Run, start: Start) -> list[list[int]]:
+    """The sizes that a panel offers; those of the run alone where its start is a list."""
+    found, cell = [list(start.sizes)], compilation.cell
+    assert cell is not None
+    arrays = (*_initial(compilation.spec, run).values(), *(_source(run, p) for p in compilation.spec.parameters))
+    if start.graph or any(v and (v.listed or v.file) for v in arrays):
+        return found
+    step = compilation.program.step
+    periods = step.sites.periods  # type: ignore[union-attr]
+    most = MOST_PAIRS if cell.relation == PAIRS else MOST_IN_CHAIN if len(cell.axes) == 1 else MOST_SITES
+    while all(n % (2 * p) == 0 and n >= 2 * FEWEST for n, p in zip(found[0], periods, strict=True)):
+        found.insert(0, [n // 2 for n in found[0]])
+    while math.prod(2 * n for n in found[-1]) <= most:
+        found.append([2 * n for n in found[-1]])
+    return found
+
+
+def _general(live: Live, sizes: Sequence[Sequence[int]]) -> Iterator[Slider]:
+    yield from general(live)
+    if len(sizes) > 1:
+        yield Slider("Sites", "sites", low=0, high=len(sizes) - 1)
+
+
+def _parameters(spec: Spec, run: Run, start: Start, moved: Sequence[Parameter]) -> Iterator[Slider]:
+    for p in moved:
+        value = _values(spec, run, start, p.name)
+        assert isinstance(value, float)
+        yield slider_of(p, value)
+
+
+# -- what a run starts from
+
+
+def _initial(spec: Spec, run: Run) -> Mapping[str, Values]:
+    return run.lattice.state if run.lattice else {}
+
+
+def _source(run: Run, p: Parameter) -> Values | None:
+    return run.lattice.arrays.get(p.name, p.values) if run.lattice else p.values
+
+
+def _values(spec: Spec, run: Run, start: Start, name: str) -> float | None:
+    """The value of a parameter that is one number; None of others."""
+    array = np.asarray(start.parameters[name])
+    p = next(p for p in spec.parameters if p.name == name)
+    if array.ndim == 0 or (_source(run, p) is None and array.size and np.all(array == array.flat[0])):
+        return float(array.flat[0])
+    return None
+
+
+def _array(spec: Spec, run: Run, start: Start, p: Parameter) -> dict[str, Any]:
+    """A parameter at sites or bonds for the page."""
+    source = _source(run, p)
+    if source is None:  # a column of the file of bonds
+        return {"at": p.at, "listed": _listed(start.parameters[p.name])}
+    return {"at": p.at, **_given(source, start, p.name, spec)}
+
+
+def _given(values: Values, start: Start, name: str, spec: Spec) -> dict[str, Any]:
+    if values.random:
+        return {"random": values.random, "seed": values.seed, "scale": float(values.scale)}
+    if values.formula is not None:
+        return {"formula": True}
+    if name in start.parameters:
+        return {"listed": _listed(start.parameters[name])}
+    return {"listed": _listed(start.state[spec.coordinates.index(name)] if name else start.state)}
+
+
+def _listed(array: Any) -> list[float]:
+    return [float(v) for v in np.asarray(array, dtype=float).reshape(-1)]
+
+
+def _numbers(spec: Spec, run: Run, start: Start) -> int:
+    """Numbers that the page would list."""
+    given = [_given(v, start, name, spec) for name, v in _initial(spec, run).items()]
+    given += [_array(spec, run, start, p) for p in spec.parameters if _values(spec, run, start, p.name) is None]
+    return sum(len(g.get("listed", ())) for g in given) + start.bonds.size
+
+
+def _formulas(spec: Spec, run: Run) -> str:
+    """Functions of the indices of a site and the sizes, for each array that is given so."""
+    arrays = {**{p.name: _source(run, p) for p in spec.parameters}, **_initial(spec, run)}
+    assert spec.lattice is not None
+    indices = spec.lattice.indices
+    listed = {n: v.formula for n, v in arrays.items() if v is not None and v.formula is not None}
+    return ", ".join(f"{json.dumps(name)}: {_function(formula, indices)}" for name, formula in listed.items())
+
+
+def _function(formula: Expression, indices: Sequence[str]) -> str:
+    code = lower(Kernel("start", "", {"site": tuple(symbols_of(formula))}, (Output("out", (formula,)),)))
+    scope = Scope(LANGUAGE.reserved | set(LANGUAGE.functions.values()))
+    arguments = [scope[name] for name in (*indices, *(f"N_{i}" for i in indices))]
+    show = LANGUAGE.printer(scope)
+    lines = [f"const {scope[a.target]} = {show(a.value)};" for a in code.assignments]
+    return f"({', '.join(arguments)}) => {{ {' '.join(lines)} return {show(code.stores[0].value)}; }}"
+
+
+def _sign(spec: Spec, start: Start) -> str:
+    """A parameter at sites that has both signs."""
+    arrays = {p.name: np.asarray(start.parameters[p.name]) for p in spec.parameters if p.at == "sites"}
+    return next((name for name, a in arrays.items() if a.size and a.min() < 0 < a.max()), "")
+
+
+# -- what is said
+
+
+def _quantities(compilation: Compilation) -> list[dict[str, Any]]:
+    found: list[dict[str, Any]] = [{"name": "its energy", "casimirs": None}]
+    names = list(compilation.cell.casimirs) if compilation.cell else []
+    if names:
+        said = f"its Casimir{'s' * (len(names) > 1)} {', '.join(names)}"
+        found.append({"name": said, "casimirs": list(range(len(names)))})
+    return found
+
+
+def _say(compilation: Compilation) -> str:
+    kept = "keeps its energy" + (" and its Casimirs" if len(_quantities(compilation)) > 1 else "")
+    return (
+        f"Two solvers take the same steps from the same start, in your browser, now. The true motion {kept}. "
+        "Watch which of the two does."
+    )
