@@ -21,7 +21,7 @@
  *   4. The solver
  *   5. The flows
  *   6. What is seen at sites
- * body-sha256: 7ba0a2bf0299c63a597d7358ac7a6f4edc84940682c3791a7f61fa1d881b1848
+ * body-sha256: ba1fee91edc6490825bb80769ad4f270073a288959906c8fcba7d2400df9ab63
  */
 #include "ablowitz_ladik.h"
 
@@ -364,7 +364,7 @@ enum {
 /* Sizes as they have to be: the widths of rows and the number of rows, 0 if they are not allowed. */
 static size_t ablowitz_ladik_shape(const size_t sizes[ablowitz_ladik_AXES], ptrdiff_t *width)
 {
-    const size_t most = SIZE_MAX / 64 / ablowitz_ladik_ARRAYS;
+    const size_t most = SIZE_MAX / 64 / ablowitz_ladik_RESERVED;
     size_t rows = 1;
     for (int a = 0; a < ablowitz_ladik_AXES; ++a) {
         if (sizes[a] < ablowitz_ladik_least[a] || sizes[a] % ablowitz_ladik_periods[a] != 0 || sizes[a] > most
@@ -385,8 +385,8 @@ size_t ablowitz_ladik_work_size(const size_t sizes[ablowitz_ladik_AXES])
 {
     ptrdiff_t width = 0;
     const size_t rows = sizes == NULL ? 0 : ablowitz_ladik_shape(sizes, &width);
-    const size_t row = ablowitz_ladik_RESERVED * (size_t)width * sizeof(double) + ablowitz_ladik_LINES
-        * sizeof(ptrdiff_t);
+    const size_t doubles = ablowitz_ladik_RESERVED * (size_t)width;
+    const size_t row = doubles * sizeof(double) + ablowitz_ladik_LINES * sizeof(ptrdiff_t);
     return rows == 0 ? 0 : rows * row + 64;
 }
 
@@ -462,7 +462,8 @@ ablowitz_ladik_status ablowitz_ladik_init(ablowitz_ladik_solver *s, const ablowi
     double *aligned = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64)
         + ablowitz_ladik_LEAD;
     const size_t block = rows * (size_t)width;
-    s->lines = (ptrdiff_t *)(void *)(aligned - ablowitz_ladik_LEAD + ablowitz_ladik_RESERVED * block);
+    double *end = aligned - ablowitz_ladik_LEAD + ablowitz_ladik_RESERVED * block;
+    s->lines = (ptrdiff_t *)(void *)end;
     for (size_t r = 0; r < rows; ++r) ablowitz_ladik_find_lines(s, r, s->lines + r * ablowitz_ladik_LINES);
     for (size_t k = 0; k < ablowitz_ladik_ARRAYS; ++k) s->x[k] = aligned + k * block;
     for (size_t k = 0; k < ablowitz_ladik_DIM; ++k) s->before[k] = aligned + (ablowitz_ladik_ARRAYS + k)

@@ -22,7 +22,7 @@
  *   5. The solver
  *   6. The flows
  *   7. What is seen at sites
- * body-sha256: d1ab1a85cc2ac2f884f43dcbecc60262d9ee4fa03f16c373ef5ffe8b069fa42e
+ * body-sha256: fc11bf8708e00ecd355ea7f3cf9ee541d40a83f0a97ade7bae4f7b37e10af6ec
  */
 #include "chiral_magnet.h"
 
@@ -816,7 +816,7 @@ enum {
 /* Sizes as they have to be: the widths of rows and the number of rows, 0 if they are not allowed. */
 static size_t chiral_magnet_shape(const size_t sizes[chiral_magnet_AXES], ptrdiff_t *width)
 {
-    const size_t most = SIZE_MAX / 64 / chiral_magnet_ARRAYS;
+    const size_t most = SIZE_MAX / 64 / chiral_magnet_RESERVED;
     size_t rows = 1;
     for (int a = 0; a < chiral_magnet_AXES; ++a) {
         if (sizes[a] < chiral_magnet_least[a] || sizes[a] % chiral_magnet_periods[a] != 0 || sizes[a] > most
@@ -837,8 +837,8 @@ size_t chiral_magnet_work_size(const size_t sizes[chiral_magnet_AXES], size_t bo
 {
     ptrdiff_t width = 0;
     const size_t rows = sizes == NULL ? 0 : chiral_magnet_shape(sizes, &width);
-    const size_t row = chiral_magnet_RESERVED * (size_t)width * sizeof(double) + chiral_magnet_LINES
-        * sizeof(ptrdiff_t);
+    const size_t doubles = chiral_magnet_RESERVED * (size_t)width;
+    const size_t row = doubles * sizeof(double) + chiral_magnet_LINES * sizeof(ptrdiff_t);
     if (rows == 0 || !chiral_magnet_few(sizes[0], bonds)) return 0;
     return row + chiral_magnet_graph_size(sizes[0], bonds) + 128;
 }
@@ -917,7 +917,8 @@ chiral_magnet_status chiral_magnet_init(chiral_magnet_solver *s, const chiral_ma
     double *aligned = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64)
         + chiral_magnet_LEAD;
     const size_t block = rows * (size_t)width;
-    s->lines = (ptrdiff_t *)(void *)(aligned - chiral_magnet_LEAD + chiral_magnet_RESERVED * block);
+    double *end = aligned - chiral_magnet_LEAD + chiral_magnet_RESERVED * block;
+    s->lines = (ptrdiff_t *)(void *)end;
     for (size_t r = 0; r < rows; ++r) chiral_magnet_find_lines(s, r, s->lines + r * chiral_magnet_LINES);
     for (size_t k = 0; k < chiral_magnet_ARRAYS; ++k) s->x[k] = aligned + k * block;
     for (size_t k = 0; k < chiral_magnet_DIM; ++k) s->before[k] = aligned + (chiral_magnet_ARRAYS + k)

@@ -21,7 +21,7 @@
  *   4. The solver
  *   5. The flows
  *   6. What is seen at sites
- * body-sha256: 2de3ee49000b42729491e1054be8e0f22d7d33c70e95dcc6d01891492dcf3141
+ * body-sha256: 75550e0f635cdf6a21faf55c309b06fcb6220849a33ab5e8ec96072449ac5574
  */
 #include "dnls.h"
 
@@ -317,7 +317,7 @@ enum {
 /* Sizes as they have to be: the widths of rows and the number of rows, 0 if they are not allowed. */
 static size_t dnls_shape(const size_t sizes[dnls_AXES], ptrdiff_t *width)
 {
-    const size_t most = SIZE_MAX / 64 / dnls_ARRAYS;
+    const size_t most = SIZE_MAX / 64 / dnls_RESERVED;
     size_t rows = 1;
     for (int a = 0; a < dnls_AXES; ++a) {
         if (sizes[a] < dnls_least[a] || sizes[a] % dnls_periods[a] != 0 || sizes[a] > most / 2) return 0;
@@ -337,7 +337,8 @@ size_t dnls_work_size(const size_t sizes[dnls_AXES])
 {
     ptrdiff_t width = 0;
     const size_t rows = sizes == NULL ? 0 : dnls_shape(sizes, &width);
-    const size_t row = dnls_RESERVED * (size_t)width * sizeof(double) + dnls_LINES * sizeof(ptrdiff_t);
+    const size_t doubles = dnls_RESERVED * (size_t)width;
+    const size_t row = doubles * sizeof(double) + dnls_LINES * sizeof(ptrdiff_t);
     return rows == 0 ? 0 : rows * row + 64;
 }
 
@@ -410,7 +411,8 @@ dnls_status dnls_init(dnls_solver *s, const dnls_params *params, const size_t si
     s->params = own;
     double *aligned = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64) + dnls_LEAD;
     const size_t block = rows * (size_t)width;
-    s->lines = (ptrdiff_t *)(void *)(aligned - dnls_LEAD + dnls_RESERVED * block);
+    double *end = aligned - dnls_LEAD + dnls_RESERVED * block;
+    s->lines = (ptrdiff_t *)(void *)end;
     for (size_t r = 0; r < rows; ++r) dnls_find_lines(s, r, s->lines + r * dnls_LINES);
     for (size_t k = 0; k < dnls_ARRAYS; ++k) s->x[k] = aligned + k * block;
     for (size_t k = 0; k < dnls_DIM; ++k) s->before[k] = aligned + (dnls_ARRAYS + k) * block;

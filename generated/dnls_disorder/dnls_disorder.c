@@ -21,7 +21,7 @@
  *   4. The solver
  *   5. The flows
  *   6. What is seen at sites
- * body-sha256: 0f8a5faaf6934495a403b837f0879597fcb24cdce0d83ec9e8bce080482d44ae
+ * body-sha256: 80cba4bb1ddbc78caad0a0715eca7ca17b3e089682536abedb8d13e0e70eedbd
  */
 #include "dnls_disorder.h"
 
@@ -367,7 +367,7 @@ enum {
 /* Sizes as they have to be: the widths of rows and the number of rows, 0 if they are not allowed. */
 static size_t dnls_disorder_shape(const size_t sizes[dnls_disorder_AXES], ptrdiff_t *width)
 {
-    const size_t most = SIZE_MAX / 64 / dnls_disorder_ARRAYS;
+    const size_t most = SIZE_MAX / 64 / dnls_disorder_RESERVED;
     size_t rows = 1;
     for (int a = 0; a < dnls_disorder_AXES; ++a) {
         if (sizes[a] < dnls_disorder_least[a] || sizes[a] % dnls_disorder_periods[a] != 0 || sizes[a] > most
@@ -388,8 +388,8 @@ size_t dnls_disorder_work_size(const size_t sizes[dnls_disorder_AXES])
 {
     ptrdiff_t width = 0;
     const size_t rows = sizes == NULL ? 0 : dnls_disorder_shape(sizes, &width);
-    const size_t row = dnls_disorder_RESERVED * (size_t)width * sizeof(double) + dnls_disorder_LINES
-        * sizeof(ptrdiff_t);
+    const size_t doubles = dnls_disorder_RESERVED * (size_t)width;
+    const size_t row = doubles * sizeof(double) + dnls_disorder_LINES * sizeof(ptrdiff_t);
     return rows == 0 ? 0 : rows * row + 64;
 }
 
@@ -477,7 +477,8 @@ dnls_disorder_status dnls_disorder_init(dnls_disorder_solver *s, const dnls_diso
     double *aligned = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64)
         + dnls_disorder_LEAD;
     const size_t block = rows * (size_t)width;
-    s->lines = (ptrdiff_t *)(void *)(aligned - dnls_disorder_LEAD + dnls_disorder_RESERVED * block);
+    double *end = aligned - dnls_disorder_LEAD + dnls_disorder_RESERVED * block;
+    s->lines = (ptrdiff_t *)(void *)end;
     for (size_t r = 0; r < rows; ++r) dnls_disorder_find_lines(s, r, s->lines + r * dnls_disorder_LINES);
     for (size_t k = 0; k < dnls_disorder_ARRAYS; ++k) s->x[k] = aligned + k * block;
     for (size_t k = 0; k < dnls_disorder_DIM; ++k) s->before[k] = aligned + (dnls_disorder_ARRAYS + k)

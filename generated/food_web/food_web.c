@@ -22,7 +22,7 @@
  *   5. The solver
  *   6. The flows
  *   7. What is seen at sites
- * body-sha256: 2adc532fb58c44af49782d3ffc6233742f352cb4ea87a3c41b98a071aa1b5170
+ * body-sha256: 2ac96c1ec109dc1e2d62f0150308748e3da118cfad71d4b6dda143cc8c1a0a44
  */
 #include "food_web.h"
 
@@ -496,7 +496,7 @@ enum {
 /* Sizes as they have to be: the widths of rows and the number of rows, 0 if they are not allowed. */
 static size_t food_web_shape(const size_t sizes[food_web_AXES], ptrdiff_t *width)
 {
-    const size_t most = SIZE_MAX / 64 / food_web_ARRAYS;
+    const size_t most = SIZE_MAX / 64 / food_web_RESERVED;
     size_t rows = 1;
     for (int a = 0; a < food_web_AXES; ++a) {
         if (sizes[a] < food_web_least[a] || sizes[a] % food_web_periods[a] != 0 || sizes[a] > most / 2)
@@ -517,8 +517,8 @@ size_t food_web_work_size(const size_t sizes[food_web_AXES], size_t bonds)
 {
     ptrdiff_t width = 0;
     const size_t rows = sizes == NULL ? 0 : food_web_shape(sizes, &width);
-    const size_t row = food_web_RESERVED * (size_t)width * sizeof(double) + food_web_LINES
-        * sizeof(ptrdiff_t);
+    const size_t doubles = food_web_RESERVED * (size_t)width;
+    const size_t row = doubles * sizeof(double) + food_web_LINES * sizeof(ptrdiff_t);
     if (rows == 0 || !food_web_few(sizes[0], bonds)) return 0;
     return row + food_web_graph_size(sizes[0], bonds) + 128;
 }
@@ -606,7 +606,8 @@ food_web_status food_web_init(food_web_solver *s, const food_web_params *params,
     s->params = own;
     double *aligned = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64) + food_web_LEAD;
     const size_t block = rows * (size_t)width;
-    s->lines = (ptrdiff_t *)(void *)(aligned - food_web_LEAD + food_web_RESERVED * block);
+    double *end = aligned - food_web_LEAD + food_web_RESERVED * block;
+    s->lines = (ptrdiff_t *)(void *)end;
     for (size_t r = 0; r < rows; ++r) food_web_find_lines(s, r, s->lines + r * food_web_LINES);
     for (size_t k = 0; k < food_web_ARRAYS; ++k) s->x[k] = aligned + k * block;
     for (size_t k = 0; k < food_web_DIM; ++k) s->before[k] = aligned + (food_web_ARRAYS + k) * block;

@@ -22,7 +22,7 @@
  *   5. The flows
  *   6. What is seen at sites
  *   7. Steps by hand
- * body-sha256: 4f52d48973a2adddbad0877e7c1e59ccc084864ecb8bf15e286ca186135cba0e
+ * body-sha256: eb746526cadaed91196d35f3416494777e1073f6b13efc66f5821bd55eeae7d5
  */
 #include "fput.h"
 
@@ -277,7 +277,7 @@ enum {
 /* Sizes as they have to be: the widths of rows and the number of rows, 0 if they are not allowed. */
 static size_t fput_shape(const size_t sizes[fput_AXES], ptrdiff_t *width)
 {
-    const size_t most = SIZE_MAX / 64 / fput_ARRAYS;
+    const size_t most = SIZE_MAX / 64 / fput_RESERVED;
     size_t rows = 1;
     for (int a = 0; a < fput_AXES; ++a) {
         if (sizes[a] < fput_least[a] || sizes[a] % fput_periods[a] != 0 || sizes[a] > most / 2) return 0;
@@ -297,7 +297,8 @@ size_t fput_work_size(const size_t sizes[fput_AXES])
 {
     ptrdiff_t width = 0;
     const size_t rows = sizes == NULL ? 0 : fput_shape(sizes, &width);
-    const size_t row = fput_RESERVED * (size_t)width * sizeof(double) + fput_LINES * sizeof(ptrdiff_t);
+    const size_t doubles = fput_RESERVED * (size_t)width;
+    const size_t row = doubles * sizeof(double) + fput_LINES * sizeof(ptrdiff_t);
     return rows == 0 ? 0 : rows * row + 64;
 }
 
@@ -371,7 +372,8 @@ fput_status fput_init(fput_solver *s, const fput_params *params, const size_t si
     s->params = own;
     double *aligned = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64) + fput_LEAD;
     const size_t block = rows * (size_t)width;
-    s->lines = (ptrdiff_t *)(void *)(aligned - fput_LEAD + fput_RESERVED * block);
+    double *end = aligned - fput_LEAD + fput_RESERVED * block;
+    s->lines = (ptrdiff_t *)(void *)end;
     for (size_t r = 0; r < rows; ++r) fput_find_lines(s, r, s->lines + r * fput_LINES);
     for (size_t k = 0; k < fput_ARRAYS; ++k) s->x[k] = aligned + k * block;
     for (size_t k = 0; k < fput_DIM; ++k) s->before[k] = aligned + (fput_ARRAYS + k) * block;

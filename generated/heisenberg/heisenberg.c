@@ -22,7 +22,7 @@
  *   5. The flows
  *   6. What is seen at sites
  *   7. Steps by hand
- * body-sha256: 60ef1ebc5823c569990b76c40a5f128dc1fba8455aab9774a045d9f7fa68a13f
+ * body-sha256: ad673d1ac62f688e9a804863753754e1dceceab7d7a3b4e6535d5c09e6c503ee
  */
 #include "heisenberg.h"
 
@@ -499,7 +499,7 @@ enum {
 /* Sizes as they have to be: the widths of rows and the number of rows, 0 if they are not allowed. */
 static size_t heisenberg_shape(const size_t sizes[heisenberg_AXES], ptrdiff_t *width)
 {
-    const size_t most = SIZE_MAX / 64 / heisenberg_ARRAYS;
+    const size_t most = SIZE_MAX / 64 / heisenberg_RESERVED;
     size_t rows = 1;
     for (int a = 0; a < heisenberg_AXES; ++a) {
         if (sizes[a] < heisenberg_least[a] || sizes[a] % heisenberg_periods[a] != 0 || sizes[a] > most / 2)
@@ -520,8 +520,8 @@ size_t heisenberg_work_size(const size_t sizes[heisenberg_AXES])
 {
     ptrdiff_t width = 0;
     const size_t rows = sizes == NULL ? 0 : heisenberg_shape(sizes, &width);
-    const size_t row = heisenberg_RESERVED * (size_t)width * sizeof(double) + heisenberg_LINES
-        * sizeof(ptrdiff_t);
+    const size_t doubles = heisenberg_RESERVED * (size_t)width;
+    const size_t row = doubles * sizeof(double) + heisenberg_LINES * sizeof(ptrdiff_t);
     return rows == 0 ? 0 : rows * row + 64;
 }
 
@@ -607,7 +607,8 @@ heisenberg_status heisenberg_init(heisenberg_solver *s, const heisenberg_params 
     s->params = own;
     double *aligned = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64) + heisenberg_LEAD;
     const size_t block = rows * (size_t)width;
-    s->lines = (ptrdiff_t *)(void *)(aligned - heisenberg_LEAD + heisenberg_RESERVED * block);
+    double *end = aligned - heisenberg_LEAD + heisenberg_RESERVED * block;
+    s->lines = (ptrdiff_t *)(void *)end;
     for (size_t r = 0; r < rows; ++r) heisenberg_find_lines(s, r, s->lines + r * heisenberg_LINES);
     for (size_t k = 0; k < heisenberg_ARRAYS; ++k) s->x[k] = aligned + k * block;
     for (size_t k = 0; k < heisenberg_DIM; ++k) s->before[k] = aligned + (heisenberg_ARRAYS + k) * block;

@@ -21,7 +21,7 @@
  *   4. The solver
  *   5. The flows
  *   6. What is seen at sites
- * body-sha256: b8ffb1f66f476d3f35a2ee6855b2d7ce54af043567e0acd90e5c60701256cb30
+ * body-sha256: d1affdde0b24446d9a6e976227af436bbc6f40111835f2fee3923aa470b90d73
  */
 #include "heisenberg_plane.h"
 
@@ -405,7 +405,7 @@ enum {
 /* Sizes as they have to be: the widths of rows and the number of rows, 0 if they are not allowed. */
 static size_t heisenberg_plane_shape(const size_t sizes[heisenberg_plane_AXES], ptrdiff_t *width)
 {
-    const size_t most = SIZE_MAX / 64 / heisenberg_plane_ARRAYS;
+    const size_t most = SIZE_MAX / 64 / heisenberg_plane_RESERVED;
     size_t rows = 1;
     for (int a = 0; a < heisenberg_plane_AXES; ++a) {
         if (sizes[a] < heisenberg_plane_least[a] || sizes[a] % heisenberg_plane_periods[a] != 0 || sizes[a]
@@ -427,8 +427,8 @@ size_t heisenberg_plane_work_size(const size_t sizes[heisenberg_plane_AXES])
 {
     ptrdiff_t width = 0;
     const size_t rows = sizes == NULL ? 0 : heisenberg_plane_shape(sizes, &width);
-    const size_t row = heisenberg_plane_RESERVED * (size_t)width * sizeof(double) + heisenberg_plane_LINES
-        * sizeof(ptrdiff_t);
+    const size_t doubles = heisenberg_plane_RESERVED * (size_t)width;
+    const size_t row = doubles * sizeof(double) + heisenberg_plane_LINES * sizeof(ptrdiff_t);
     return rows == 0 ? 0 : rows * row + 64;
 }
 
@@ -505,7 +505,8 @@ heisenberg_plane_status heisenberg_plane_init(heisenberg_plane_solver *s,
     double *aligned = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64)
         + heisenberg_plane_LEAD;
     const size_t block = rows * (size_t)width;
-    s->lines = (ptrdiff_t *)(void *)(aligned - heisenberg_plane_LEAD + heisenberg_plane_RESERVED * block);
+    double *end = aligned - heisenberg_plane_LEAD + heisenberg_plane_RESERVED * block;
+    s->lines = (ptrdiff_t *)(void *)end;
     for (size_t r = 0; r < rows; ++r)
         heisenberg_plane_find_lines(s, r, s->lines + r * heisenberg_plane_LINES);
     for (size_t k = 0; k < heisenberg_plane_ARRAYS; ++k) s->x[k] = aligned + k * block;

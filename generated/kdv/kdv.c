@@ -20,9 +20,10 @@
  *   3. The lattice
  *   4. The solver
  *   5. The stages
- *   6. Newton's method where sweeps fail
- *   7. What is seen at sites
- * body-sha256: 19595cd31ab5d3e304eec5d61333bac4d28a535a8e78b7b97187de677564b654
+ *   6. Elimination in a band
+ *   7. Newton's method where sweeps fail
+ *   8. What is seen at sites
+ * body-sha256: 4e6a7f42040fde34ac60bf3aff6c63343b2d6b0c43eaa76d0be458efafd07fd3
  */
 #include "kdv.h"
 
@@ -124,7 +125,6 @@ static inline void kdv_locate(const kdv_solver *s, size_t index, kdv_row *row)
     row->at = s->lines + index * kdv_LINES;
     row->length = s->length;
     row->start = row->out = s->x;
-    row->varied = s->v;
 }
 
 enum { kdv_PIECE = 2048 }; /* sites of a row that are worked at in one go, with any number of threads */
@@ -159,12 +159,11 @@ typedef struct {
 
 enum { kdv_WIDTH = 32 }; /* largest values that are kept apart, so that loops vectorise */
 
-/* Takes in what a sweep from s->y[now] to the other has made of a piece. */
-static inline void kdv_measure(const kdv_solver *s, const kdv_piece *at, int now, kdv_extent *extent)
+/* Takes in what fields were and are in a piece. */
+static inline void kdv_measure(double *const *was, double *const *is, const kdv_piece *at, kdv_extent *extent)
 {
     for (int k = 0; k < kdv_DIM; ++k) {
-        const double *restrict before = s->y[now][k] + at->row.at[0], *restrict after = s->y[1 - now][k]
-            + at->row.at[0];
+        const double *restrict before = was[k] + at->row.at[0], *restrict after = is[k] + at->row.at[0];
         double change[kdv_WIDTH] = { 0.0 }, size[kdv_WIDTH] = { 0.0 };
         const ptrdiff_t whole = at->to - (at->to - at->from) % kdv_WIDTH;
         for (ptrdiff_t i = at->from; i < whole; i += kdv_WIDTH)
@@ -245,7 +244,7 @@ static void kdv_relax_rows(const kdv_solver *s, const double *coef, int far, int
         at.row.out = s->y[1 - now];
         kdv_relax(coef, &at.row, at.from, at.to);
         kdv_ends(s->y[1 - now][0] + at.row.at[0], s->length, at.from, at.to);
-        kdv_measure(s, &at, now, extent);
+        kdv_measure(s->y[now], s->y[1 - now], &at, extent);
     }
 }
 
@@ -296,16 +295,15 @@ static inline void kdv_slope(const double *coef, const kdv_row *row, ptrdiff_t f
     }
 }
 
-/* How a sweep follows s->y[now] along s->v, to the other, for the pieces of rows from first on, before
-   end. */
-static void kdv_slope_rows(const kdv_solver *s, const double *coef, int far, int now, size_t first,
-    size_t end)
+/* How a sweep follows s->y[now] along v, to the other, for the pieces of rows from first on, before end. */
+static void kdv_slope_rows(const kdv_solver *s, const double *coef, int far, int now, double *const *v,
+    size_t first, size_t end)
 {
     (void)far;
     for (size_t unit = first; unit < end; ++unit) {
         kdv_piece at = kdv_piece_of(s, unit);
         at.row.x = s->y[now];
-        at.row.varied = s->v;
+        at.row.varied = v;
         at.row.out = s->y[1 - now];
         kdv_slope(coef, &at.row, at.from, at.to);
     }
@@ -369,7 +367,10 @@ int omp_get_thread_num(void);
 enum {
     kdv_LEAD = (kdv_HALO + 7) / 8 * 8,
     kdv_BUFFER = 256,
-    kdv_IMPLICIT = (3 + kdv_DIFFERENCES) * kdv_DIM, /* arrays for y, its guesses and its variation */
+    kdv_IMPLICIT = (2 /* arrays for y, its guesses and its variations */
+        + kdv_DIFFERENCES
+        + 1
+        ) * kdv_DIM,
     kdv_RESERVED = kdv_ARRAYS + kdv_DIM
         + kdv_IMPLICIT
 };
@@ -377,7 +378,7 @@ enum {
 /* Sizes as they have to be: the widths of rows and the number of rows, 0 if they are not allowed. */
 static size_t kdv_shape(const size_t sizes[kdv_AXES], ptrdiff_t *width)
 {
-    const size_t most = SIZE_MAX / 64 / kdv_ARRAYS;
+    const size_t most = SIZE_MAX / 64 / (kdv_RESERVED + 8 * kdv_BAND * kdv_DIM);
     size_t rows = 1;
     for (int a = 0; a < kdv_AXES; ++a) {
         if (sizes[a] < kdv_least[a] || sizes[a] % kdv_periods[a] != 0 || sizes[a] > most / 2) return 0;
@@ -397,7 +398,8 @@ size_t kdv_work_size(const size_t sizes[kdv_AXES])
 {
     ptrdiff_t width = 0;
     const size_t rows = sizes == NULL ? 0 : kdv_shape(sizes, &width);
-    const size_t row = kdv_RESERVED * (size_t)width * sizeof(double) + kdv_LINES * sizeof(ptrdiff_t);
+    const size_t doubles = kdv_RESERVED * (size_t)width;
+    const size_t row = doubles * sizeof(double) + kdv_LINES * sizeof(ptrdiff_t);
     kdv_matrix matrix;
     const size_t more = rows == 0 ? 0 : kdv_matrix_of(sizes[0], NULL, &matrix) * sizeof(double);
     return rows == 0 ? 0 : rows * row + more + 64;
@@ -483,7 +485,8 @@ kdv_status kdv_init(kdv_solver *s, const kdv_params *params, const size_t sizes[
     s->params = own;
     double *aligned = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64) + kdv_LEAD;
     const size_t block = rows * (size_t)width;
-    s->lines = (ptrdiff_t *)(void *)(aligned - kdv_LEAD + kdv_RESERVED * block);
+    double *end = aligned - kdv_LEAD + kdv_RESERVED * block;
+    s->lines = (ptrdiff_t *)(void *)end;
     for (size_t r = 0; r < rows; ++r) kdv_find_lines(s, r, s->lines + r * kdv_LINES);
     s->matrix = (double *)(void *)(s->lines + kdv_LINES);
     for (size_t k = 0; k < kdv_ARRAYS; ++k) s->x[k] = aligned + k * block;
@@ -545,8 +548,9 @@ static size_t kdv_share(size_t units, size_t *first)
 
 static double kdv_larger(double a, double b) { return isnan(a) || a > b ? a : b; }
 
-/* A sweep from s->y[now] to the other: how far y moves, in sizes of each field. Not finite if y is not. */
-static double kdv_relaxed(const kdv_solver *s, const double *coef, int far, int now)
+/* How far y moves from s->y[now] to the other, by a sweep, or without coefficients as it is. Not finite if y
+   is not. */
+static double kdv_relaxed(kdv_solver *s, const double *coef, int far, int now)
 {
     const size_t units = s->rows * kdv_pieces(s);
     kdv_extent whole = { { 0.0 }, { 0.0 } };
@@ -554,7 +558,11 @@ static double kdv_relaxed(const kdv_solver *s, const double *coef, int far, int 
     {
         kdv_extent own = { { 0.0 }, { 0.0 } };
         size_t first, end = kdv_share(units, &first);
-        kdv_relax_rows(s, coef, far, now, &own, first, end);
+        if (coef != NULL) kdv_relax_rows(s, coef, far, now, &own, first, end);
+        for (size_t unit = first; coef == NULL && unit < end; ++unit) {
+            const kdv_piece at = kdv_piece_of(s, unit);
+            kdv_measure(s->y[now], s->y[1 - now], &at, &own);
+        }
         kdv_ONE_BY_ONE
         for (int k = 0; k < kdv_DIM; ++k) {
             whole.change[k] = kdv_larger(whole.change[k], own.change[k]);
@@ -563,8 +571,10 @@ static double kdv_relaxed(const kdv_solver *s, const double *coef, int far, int 
     }
     double largest = 0.0, moved = 0.0;
     for (int k = 0; k < kdv_DIM; ++k) largest = kdv_larger(largest, whole.size[k]);
-    for (int k = 0; k < kdv_DIM; ++k)
-        moved = kdv_larger(moved, whole.change[k] / (whole.size[k] + 1e-3 * largest + 1e-300));
+    for (int k = 0; k < kdv_DIM; ++k) {
+        s->usual[k] = whole.size[k] + 1e-3 * largest + 1e-300;
+        moved = kdv_larger(moved, whole.change[k] / s->usual[k]);
+    }
     return moved;
 }
 
@@ -573,6 +583,7 @@ static double kdv_relaxed(const kdv_solver *s, const double *coef, int far, int 
 
 #define kdv_SLOW 0.6        /* changes that shrink by less are left to Newton's method, ... */
 enum { kdv_PATIENCE = 10 }; /* ... after so many sweeps */
+
 /* y in the middle of a stage, by sweeps from the guess in s->y[0] until only rounding would change; it is in
    s->y[*now]. */
 static kdv_status kdv_middle(kdv_solver *s, const double *coef, int far, int *now)
@@ -614,7 +625,53 @@ static void kdv_predict(const kdv_solver *s)
     }
 }
 
-/* ---- Newton's method where sweeps fail ---- */
+/* Take in the y of a stage. The guess of order d missed it by its d-th difference: the next is of the best
+   order. */
+static void kdv_remember(kdv_solver *s, int now)
+{
+    kdv_guess *guess = &s->guess;
+    double size[kdv_DIFFERENCES] = { 0.0 }, least = HUGE_VAL;
+    kdv_PARALLEL
+    {
+        size_t row, rows = kdv_share(s->rows, &row);
+        double own[kdv_DIFFERENCES] = { 0.0 };
+        for (int k = 0; k < kdv_DIM; ++k)
+            for (size_t r = row; r < rows; ++r) {
+                const ptrdiff_t first = (ptrdiff_t)r * s->width - kdv_HALO, end = first + s->length + 2
+                    * kdv_HALO;
+                const double *restrict y = s->y[now][k], *restrict x = s->x[k];
+                for (ptrdiff_t i = first; i < end; ++i) {
+                    double next = y[i] - x[i];
+                    for (int d = 0; d < guess->count; ++d) {
+                        const double last = guess->difference[d][k][i];
+                        guess->difference[d][k][i] = next;
+                        next -= last;
+                        own[d] = fabs(next) > own[d] ? fabs(next) : own[d];
+                    }
+                    if (guess->count < kdv_DIFFERENCES) guess->difference[guess->count][k][i] = next;
+                }
+            }
+        kdv_ONE_BY_ONE
+        for (int d = 0; d < kdv_DIFFERENCES; ++d) size[d] = kdv_larger(size[d], own[d]);
+    }
+    guess->order = 1;
+    for (int d = 0; d < guess->count; ++d)
+        if (size[d] < least) {
+            least = size[d];
+            guess->order = d + 1;
+        }
+    if (guess->count < kdv_DIFFERENCES) ++guess->count;
+}
+
+/* Begin without guesses, and with sweeps. */
+static void kdv_forget(kdv_solver *s)
+{
+    s->stiff = 0;
+    s->factored = NULL;
+    s->guess.count = s->guess.order = 0;
+}
+
+/* ---- Elimination in a band ---- */
 static void kdv_swap(double *a, double *b)
 {
     const double held = *a;
@@ -699,7 +756,7 @@ static void kdv_probe(kdv_solver *s, const kdv_matrix *m, const double *coef, in
         for (ptrdiff_t i = 0; k == f && i < count; ++i) s->v[k][first + i * apart] = 1.0;
         kdv_ends(s->v[k], sites, 0, sites);
     }
-    kdv_slope_rows(s, coef, 1, now, 0, kdv_pieces(s));
+    kdv_slope_rows(s, coef, 1, now, s->v, 0, kdv_pieces(s));
     for (ptrdiff_t column = 0; column < count; ++column)
         for (ptrdiff_t o = -reach; o <= reach; ++o) {
             const ptrdiff_t j = first + column * apart;
@@ -735,14 +792,13 @@ static int kdv_factorise(kdv_solver *s, const double *coef, int now)
     return kdv_decompose(m.d, border, border, -1, border, m.pivots + inner);
 }
 
-/* The correction of s->y[now], added to it: its size, in sizes of y. */
-static double kdv_correct(kdv_solver *s, int now)
+/* s->y[now] with the correction by a sweep to the other, in place of what the sweep has made. */
+static void kdv_eliminate(kdv_solver *s, int now)
 {
     kdv_matrix m;
     kdv_matrix_of(s->sites, s->matrix, &m);
     const ptrdiff_t sites = s->length, inner = m.inner, border = m.border;
-    double *lower = m.side + inner, size[kdv_DIM] = { 0.0 }, change[kdv_DIM] = { 0.0 }, largest = 0.0, moved =
-        0.0;
+    double *lower = m.side + inner;
     for (ptrdiff_t i = 0; i < sites; ++i)
         for (int k = 0; k < kdv_DIM; ++k) m.side[i * kdv_DIM + k] = s->y[1 - now][k][i] - s->y[now][k][i];
     kdv_substitute(m.a, inner, kdv_TALL, 2 * kdv_BAND, kdv_BAND, m.pivots, m.side);
@@ -751,104 +807,63 @@ static double kdv_correct(kdv_solver *s, int now)
     kdv_substitute(m.d, border, border, -1, border, m.pivots + inner, lower);
     for (ptrdiff_t j = 0; j < border; ++j)
         for (ptrdiff_t i = 0; i < inner; ++i) m.side[i] -= m.b[j * inner + i] * lower[j];
-    for (ptrdiff_t i = 0; i < sites; ++i)
-        for (int k = 0; k < kdv_DIM; ++k) {
-            const double by = m.side[i * kdv_DIM + k];
-            s->y[now][k][i] += by;
-            change[k] = kdv_larger(change[k], fabs(by));
-            size[k] = kdv_larger(size[k], fabs(s->y[now][k][i]));
-        }
-    for (int k = 0; k < kdv_DIM; ++k) kdv_ends(s->y[now][k], sites, 0, sites);
-    for (int k = 0; k < kdv_DIM; ++k) largest = kdv_larger(largest, size[k]);
-    for (int k = 0; k < kdv_DIM; ++k)
-        moved = kdv_larger(moved, change[k] / (size[k] + 1e-3 * largest + 1e-300));
-    return moved;
+    for (int k = 0; k < kdv_DIM; ++k) {
+        for (ptrdiff_t i = 0; i < sites; ++i) s->y[1 - now][k][i] = s->y[now][k][i] + m.side[i * kdv_DIM + k];
+        kdv_ends(s->y[1 - now][k], sites, 0, sites);
+    }
 }
 
-/* how far from x a solution is one of the motion, in sizes of x and of what the field says */
-#define kdv_PLAUSIBLE 1.5
-enum { kdv_MOST_ITERATIONS = 60 };
+/* ---- Newton's method where sweeps fail ---- */
+#define kdv_PLAUSIBLE 1.5 /* in sizes of x and of what the field says */
+enum { kdv_MOST_ITERATIONS = 200 };
 
 /* The sum of the distances of y from x; with x added that of the sizes of x. */
 static double kdv_distance(const kdv_solver *s, int side, double added)
 {
     double sum = 0.0;
     for (int k = 0; k < kdv_DIM; ++k)
-        for (ptrdiff_t i = 0; i < s->length; ++i)
-            sum += fabs(s->y[side][k][i] - s->x[k][i]) + added * fabs(s->x[k][i]);
+        for (size_t r = 0; r < s->rows; ++r) {
+            const double *y = s->y[side][k] + (ptrdiff_t)r * s->width, *x = s->x[k] + (ptrdiff_t)r * s->width;
+            for (ptrdiff_t i = 0; i < s->length; ++i) sum += fabs(y[i] - x[i]) + added * fabs(x[i]);
+        }
     return sum;
 }
 
-/* y in the middle of a stage, in s->y[0]. The matrix is kept while it serves. */
-static kdv_status kdv_newton(kdv_solver *s, const double *coef)
+/* The correction of s->y[now] by the matrix, which is kept while it serves, or as well as a Krylov space
+   allows, to the other: how far y moves, in sizes of each field. Not a number if it cannot be made. */
+static double kdv_corrected(kdv_solver *s, const double *coef, int now)
 {
-    double before = 0.0;
+    if (s->factored != coef && !kdv_factorise(s, coef, now)) return HUGE_VAL;
+    s->factored = coef;
+    if (!isfinite(kdv_relaxed(s, coef, 1, now))) return HUGE_VAL;
+    kdv_eliminate(s, now);
+    ++s->sweeps;
+    return kdv_relaxed(s, NULL, 1, now);
+}
+
+/* How far from x a solution is one of the motion. */
+static double kdv_range(kdv_solver *s, const double *coef)
+{
     kdv_copy(s->y[0], s->x, s);
     kdv_relaxed(s, coef, 1, 0);
-    const double far = kdv_PLAUSIBLE * kdv_distance(s, 1, 1.0);
-    kdv_predict(s);
+    return kdv_PLAUSIBLE * kdv_distance(s, 1, 1.0);
+}
+
+/* y in the middle of a stage, from the guess in s->y[0]; it is in s->y[*now]. */
+static kdv_status kdv_newton(kdv_solver *s, const double *coef, double range, int *now)
+{
+    double before = 0.0;
     for (int iteration = 0; iteration < kdv_MOST_ITERATIONS; ++iteration) {
-        if (s->factored != coef) {
-            if (!kdv_factorise(s, coef, 0)) return kdv_SINGULAR;
-            s->factored = coef;
-        }
-        if (!isfinite(kdv_relaxed(s, coef, 1, 0))) return kdv_NO_CONVERGENCE;
-        ++s->sweeps;
-        const double change = kdv_correct(s, 0), shrunk = before - change;
+        const double change = kdv_corrected(s, coef, *now), shrunk = before - change;
+        *now = 1 - *now;
         if (!isfinite(change)) return kdv_NO_CONVERGENCE;
         if (change * change <= shrunk * kdv_SETTLED || (shrunk <= 0.0 && change <= kdv_ROUNDING && iteration
             > 0))
-            return kdv_distance(s, 0, 0.0) <= far ? kdv_OK : kdv_NO_CONVERGENCE;
+            return kdv_distance(s, *now, 0.0) <= range ? kdv_OK : kdv_NO_CONVERGENCE;
         if (iteration > 0 && change > 0.25 * before && change > kdv_ROUNDING) s->factored = NULL;
         before = change;
     }
     return kdv_NO_CONVERGENCE;
-}
-
-/* Take in the y of a stage. The guess of order d missed it by its d-th difference: the next is of the best
-   order. */
-static void kdv_remember(kdv_solver *s, int now)
-{
-    kdv_guess *guess = &s->guess;
-    double size[kdv_DIFFERENCES] = { 0.0 }, least = HUGE_VAL;
-    kdv_PARALLEL
-    {
-        size_t row, rows = kdv_share(s->rows, &row);
-        double own[kdv_DIFFERENCES] = { 0.0 };
-        for (int k = 0; k < kdv_DIM; ++k)
-            for (size_t r = row; r < rows; ++r) {
-                const ptrdiff_t first = (ptrdiff_t)r * s->width - kdv_HALO, end = first + s->length + 2
-                    * kdv_HALO;
-                const double *restrict y = s->y[now][k], *restrict x = s->x[k];
-                for (ptrdiff_t i = first; i < end; ++i) {
-                    double next = y[i] - x[i];
-                    for (int d = 0; d < guess->count; ++d) {
-                        const double last = guess->difference[d][k][i];
-                        guess->difference[d][k][i] = next;
-                        next -= last;
-                        own[d] = fabs(next) > own[d] ? fabs(next) : own[d];
-                    }
-                    if (guess->count < kdv_DIFFERENCES) guess->difference[guess->count][k][i] = next;
-                }
-            }
-        kdv_ONE_BY_ONE
-        for (int d = 0; d < kdv_DIFFERENCES; ++d) size[d] = kdv_larger(size[d], own[d]);
-    }
-    guess->order = 1;
-    for (int d = 0; d < guess->count; ++d)
-        if (size[d] < least) {
-            least = size[d];
-            guess->order = d + 1;
-        }
-    if (guess->count < kdv_DIFFERENCES) ++guess->count;
-}
-
-/* Begin without guesses. */
-static void kdv_forget(kdv_solver *s)
-{
-    s->stiff = 0;
-    s->factored = NULL;
-    s->guess.count = s->guess.order = 0;
 }
 
 /* The stages of a step. */
@@ -862,7 +877,9 @@ static kdv_status kdv_stages(kdv_solver *s, int far)
     if (status != kdv_OK && (far || status != kdv_NOT_FINITE)) {
         s->stiff = 1;
         now = 0;
-        status = kdv_newton(s, coef);
+        const double range = kdv_range(s, coef);
+        kdv_predict(s);
+        status = kdv_newton(s, coef, range, &now);
     }
     if (status != kdv_OK) return status;
     kdv_remember(s, now);

@@ -2,7 +2,7 @@
  * kdv.h: the declarations; kdv.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: ee98b8190117585d8b59f70b3f93da5b3ce550e581ede4e758496ff4cf8a8ee4
+ * body-sha256: 88f5cd1d9f60da4f4140126489cdb614e416784652061d5ac6d6ca45271eeea9
  */
 #ifndef KDV_H
 #define KDV_H
@@ -58,6 +58,7 @@ typedef struct {
     kdv_guess guess;
     size_t sweeps;          /* that stages took since kdv_init */
     int stiff;              /* whether sweeps have failed */
+    double usual[kdv_DIM];  /* the sizes of the fields of y */
     const double *factored; /* the coefficients that the matrix is of, or NULL */
     double *v[kdv_DIM];     /* a variation of y */
     double *matrix;         /* see kdv_factorise */

@@ -13,7 +13,7 @@
 #
 # SPDX-License-Identifier: 0BSD
 # This file belongs to whoever generated it; phigen claims no rights in it.
-# body-sha256: 64201ff4e80bd42d8df54c12078f5fba45c31bf55e6f8171813533fc23e5ad0e
+# body-sha256: 88e375bdd81fd96e67729537a71a492614406558fe662f35dd842dae4f51c949
 import numpy as np
 
 VERSION = "0.1.0"
@@ -141,11 +141,15 @@ SLOW = 0.6
 ROUNDING = 2.0**-40
 
 
+def _usual(y):
+    """The sizes of fields, none much less than the largest."""
+    sizes = np.abs(y).max(tuple(range(1, y.ndim)))
+    return sizes + 1e-3 * sizes.max() + 1e-300
+
+
 def _size(change, y):
     """How large a change of y is, field by field."""
-    axes = tuple(range(1, y.ndim))
-    sizes, changes = np.abs(y).max(axes), np.abs(change).max(axes)
-    return (changes / (sizes + 1e-3 * sizes.max() + 1e-300)).max()
+    return (np.abs(change).max(tuple(range(1, y.ndim))) / _usual(y)).max()
 
 
 def _by_sweeps(coef, x, y, sites):
@@ -192,11 +196,13 @@ def _advance(sites, rows, x, past):
     return x
 
 
-# Newton's iterations; directions of a Krylov space, and how well it solves; how far from x a solution is one of the motion,
-# in sizes of x and of what the field says.
-MOST_ITERATIONS = 40
-DIRECTIONS = 400
+# Newton's corrections of a stage; directions of the Krylov space that each is taken from, how well it solves the equation
+# for it, if the space allows, and how well it has to; how far from x a solution is one of the motion, in sizes of x and
+# of what the field says.
+MOST_CORRECTIONS = 200
+DIRECTIONS = 24
 SOLVED = 1e-6
+USEFUL = 0.9
 PLAUSIBLE = 1.5
 
 
@@ -207,46 +213,54 @@ def _middle(coef, x, guess, sites, past):
             return _by_sweeps(coef, x, guess, sites)
         except FailedError:
             past["stiff"] = True
-    return _newton(coef, x, guess, sites)
+    try:
+        return _newton(coef, x, guess, sites)
+    except FailedError:
+        raise FailedError("NO_CONVERGENCE") from None
 
 
 def _newton(coef, x, y, sites):
     """y at the middle of a stage by Newton's method; raises FailedError."""
     before, far = 0.0, PLAUSIBLE * (np.abs(x) + np.abs(_relax(coef, x, x, sites) - x)).sum()
-    for iteration in range(MOST_ITERATIONS):
-        change = _krylov(lambda v: v - _slope(coef, x, y, v, sites), _finite(_relax(coef, x, y, sites)) - y)
+    for correction in range(MOST_CORRECTIONS):
+        swept = _finite(_relax(coef, x, y, sites))
+        change = _krylov(lambda v: v - _slope(coef, x, y, v, sites), swept - y, _usual(swept))
         y = _finite(y + change)
         size = _size(change, y)
         shrunk = before - size
-        if size * size <= shrunk * 2.0**-55 or (shrunk <= 0.0 and size <= ROUNDING and iteration > 0):
+        if size * size <= shrunk * 2.0**-55 or (shrunk <= 0.0 and size <= ROUNDING and correction > 0):
             if np.abs(y - x).sum() <= far:
                 return y
             break
         before = size
-    raise FailedError("NO_CONVERGENCE")
+    raise FailedError("no solution")
 
 
-def _krylov(matrix, side):
-    """The solution of matrix(v) = side, to some digits, by GMRES."""
-    length = np.sqrt((side * side).sum())
+def _krylov(matrix, side, usual):
+    """A solution of matrix(v) = side, as well as it can be by GMRES without a restart, for fields of usual sizes."""
+    usual = usual.reshape(-1, *(1,) * (side.ndim - 1))
+    length = np.sqrt(((side / usual) ** 2).sum())
     if length == 0.0:
         return side
     directions, columns = [side / length], []
-    for count in range(1, min(DIRECTIONS, side.size) + 1):
+    for count in range(1, DIRECTIONS + 1):
         new = _finite(matrix(directions[-1]))
         column = np.zeros(DIRECTIONS + 1)
         for k, direction in enumerate(directions):
-            column[k] = (direction * new).sum()
+            column[k] = (direction / usual * (new / usual)).sum()
             new = new - column[k] * direction
-        column[count] = np.sqrt((new * new).sum())
+        column[count] = np.sqrt(((new / usual) ** 2).sum())
         columns.append(column)
         small = np.array(columns).T[: count + 1]
         target = np.zeros(count + 1)
         target[0] = length
         weights = np.linalg.lstsq(small, target, rcond=None)[0]
-        if np.linalg.norm(small @ weights - target) <= SOLVED * length or column[count] <= 1e-14 * length:
+        left = np.linalg.norm(small @ weights - target)
+        if left <= SOLVED * length or column[count] == 0.0:
             break
         directions.append(new / column[count])
+    if left > USEFUL * length:
+        raise FailedError("no direction is of use")
     return sum(w * direction for w, direction in zip(weights, directions))
 
 

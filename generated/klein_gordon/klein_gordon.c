@@ -21,7 +21,7 @@
  *   4. The solver
  *   5. The flows
  *   6. What is seen at sites
- * body-sha256: 22f4d43a11a34acfd833265e3b2a6eea2cf695375df41883f82f06ee5ede33f3
+ * body-sha256: 3e9a89d5d2592ad86c4b99e9343a9bc0624ed650bc18049407b791ede221d0c4
  */
 #include "klein_gordon.h"
 
@@ -266,7 +266,7 @@ enum {
 /* Sizes as they have to be: the widths of rows and the number of rows, 0 if they are not allowed. */
 static size_t klein_gordon_shape(const size_t sizes[klein_gordon_AXES], ptrdiff_t *width)
 {
-    const size_t most = SIZE_MAX / 64 / klein_gordon_ARRAYS;
+    const size_t most = SIZE_MAX / 64 / klein_gordon_RESERVED;
     size_t rows = 1;
     for (int a = 0; a < klein_gordon_AXES; ++a) {
         if (sizes[a] < klein_gordon_least[a] || sizes[a] % klein_gordon_periods[a] != 0 || sizes[a] > most
@@ -287,8 +287,8 @@ size_t klein_gordon_work_size(const size_t sizes[klein_gordon_AXES])
 {
     ptrdiff_t width = 0;
     const size_t rows = sizes == NULL ? 0 : klein_gordon_shape(sizes, &width);
-    const size_t row = klein_gordon_RESERVED * (size_t)width * sizeof(double) + klein_gordon_LINES
-        * sizeof(ptrdiff_t);
+    const size_t doubles = klein_gordon_RESERVED * (size_t)width;
+    const size_t row = doubles * sizeof(double) + klein_gordon_LINES * sizeof(ptrdiff_t);
     return rows == 0 ? 0 : rows * row + 64;
 }
 
@@ -363,7 +363,8 @@ klein_gordon_status klein_gordon_init(klein_gordon_solver *s, const klein_gordon
     s->params = own;
     double *aligned = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64) + klein_gordon_LEAD;
     const size_t block = rows * (size_t)width;
-    s->lines = (ptrdiff_t *)(void *)(aligned - klein_gordon_LEAD + klein_gordon_RESERVED * block);
+    double *end = aligned - klein_gordon_LEAD + klein_gordon_RESERVED * block;
+    s->lines = (ptrdiff_t *)(void *)end;
     for (size_t r = 0; r < rows; ++r) klein_gordon_find_lines(s, r, s->lines + r * klein_gordon_LINES);
     for (size_t k = 0; k < klein_gordon_ARRAYS; ++k) s->x[k] = aligned + k * block;
     for (size_t k = 0; k < klein_gordon_DIM; ++k) s->before[k] = aligned + (klein_gordon_ARRAYS + k) * block;

@@ -21,7 +21,7 @@
  *   4. The solver
  *   5. The flows
  *   6. What is seen at sites
- * body-sha256: d4532768327cbc6b4d2fc7d70ba71ce785d5fc722d59ec69bdf7e1ad775f8954
+ * body-sha256: 22f37a29b9015c3aee34f8e1c64a54e6356169481b9e2aeebb251945da13e531
  */
 #include "nonlinear_wave.h"
 
@@ -273,7 +273,7 @@ enum {
 /* Sizes as they have to be: the widths of rows and the number of rows, 0 if they are not allowed. */
 static size_t nonlinear_wave_shape(const size_t sizes[nonlinear_wave_AXES], ptrdiff_t *width)
 {
-    const size_t most = SIZE_MAX / 64 / nonlinear_wave_ARRAYS;
+    const size_t most = SIZE_MAX / 64 / nonlinear_wave_RESERVED;
     size_t rows = 1;
     for (int a = 0; a < nonlinear_wave_AXES; ++a) {
         if (sizes[a] < nonlinear_wave_least[a] || sizes[a] % nonlinear_wave_periods[a] != 0 || sizes[a] > most
@@ -294,8 +294,8 @@ size_t nonlinear_wave_work_size(const size_t sizes[nonlinear_wave_AXES])
 {
     ptrdiff_t width = 0;
     const size_t rows = sizes == NULL ? 0 : nonlinear_wave_shape(sizes, &width);
-    const size_t row = nonlinear_wave_RESERVED * (size_t)width * sizeof(double) + nonlinear_wave_LINES
-        * sizeof(ptrdiff_t);
+    const size_t doubles = nonlinear_wave_RESERVED * (size_t)width;
+    const size_t row = doubles * sizeof(double) + nonlinear_wave_LINES * sizeof(ptrdiff_t);
     return rows == 0 ? 0 : rows * row + 64;
 }
 
@@ -371,7 +371,8 @@ nonlinear_wave_status nonlinear_wave_init(nonlinear_wave_solver *s, const nonlin
     double *aligned = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64)
         + nonlinear_wave_LEAD;
     const size_t block = rows * (size_t)width;
-    s->lines = (ptrdiff_t *)(void *)(aligned - nonlinear_wave_LEAD + nonlinear_wave_RESERVED * block);
+    double *end = aligned - nonlinear_wave_LEAD + nonlinear_wave_RESERVED * block;
+    s->lines = (ptrdiff_t *)(void *)end;
     for (size_t r = 0; r < rows; ++r) nonlinear_wave_find_lines(s, r, s->lines + r * nonlinear_wave_LINES);
     for (size_t k = 0; k < nonlinear_wave_ARRAYS; ++k) s->x[k] = aligned + k * block;
     for (size_t k = 0; k < nonlinear_wave_DIM; ++k) s->before[k] = aligned + (nonlinear_wave_ARRAYS + k)

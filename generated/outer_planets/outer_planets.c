@@ -21,7 +21,7 @@
  *   4. The solver
  *   5. The flows
  *   6. What is seen at sites
- * body-sha256: c2e0698c6609d55046ab9763b5db02419b6eeac5cc3f346612a33b249acbaf0b
+ * body-sha256: 53ab905a6ff74cbd341c3ba51d27e228d55ff38072df8511e8f6dd87dc4f4e14
  */
 #include "outer_planets.h"
 
@@ -381,7 +381,7 @@ enum {
 /* Sizes as they have to be: the widths of rows and the number of rows, 0 if they are not allowed. */
 static size_t outer_planets_shape(const size_t sizes[outer_planets_AXES], ptrdiff_t *width)
 {
-    const size_t most = SIZE_MAX / 64 / outer_planets_ARRAYS;
+    const size_t most = SIZE_MAX / 64 / outer_planets_RESERVED;
     size_t rows = 1;
     for (int a = 0; a < outer_planets_AXES; ++a) {
         if (sizes[a] < outer_planets_least[a] || sizes[a] % outer_planets_periods[a] != 0 || sizes[a] > most
@@ -402,8 +402,8 @@ size_t outer_planets_work_size(const size_t sizes[outer_planets_AXES])
 {
     ptrdiff_t width = 0;
     const size_t rows = sizes == NULL ? 0 : outer_planets_shape(sizes, &width);
-    const size_t row = outer_planets_RESERVED * (size_t)width * sizeof(double) + outer_planets_LINES
-        * sizeof(ptrdiff_t);
+    const size_t doubles = outer_planets_RESERVED * (size_t)width;
+    const size_t row = doubles * sizeof(double) + outer_planets_LINES * sizeof(ptrdiff_t);
     return rows == 0 ? 0 : rows * row + 64;
 }
 
@@ -491,7 +491,8 @@ outer_planets_status outer_planets_init(outer_planets_solver *s, const outer_pla
     double *aligned = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64)
         + outer_planets_LEAD;
     const size_t block = rows * (size_t)width;
-    s->lines = (ptrdiff_t *)(void *)(aligned - outer_planets_LEAD + outer_planets_RESERVED * block);
+    double *end = aligned - outer_planets_LEAD + outer_planets_RESERVED * block;
+    s->lines = (ptrdiff_t *)(void *)end;
     for (size_t r = 0; r < rows; ++r) outer_planets_find_lines(s, r, s->lines + r * outer_planets_LINES);
     for (size_t k = 0; k < outer_planets_ARRAYS; ++k) s->x[k] = aligned + k * block;
     for (size_t k = 0; k < outer_planets_DIM; ++k) s->before[k] = aligned + (outer_planets_ARRAYS + k)

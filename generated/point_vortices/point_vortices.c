@@ -21,8 +21,10 @@
  *   3. The lattice
  *   4. The solver
  *   5. The stages
- *   6. What is seen at sites
- * body-sha256: fd2d027882414be9ac69f908e9e68300515c6e5ead2241a53b9bc3530205594d
+ *   6. Krylov spaces
+ *   7. Newton's method where sweeps fail
+ *   8. What is seen at sites
+ * body-sha256: c66c48d16446f4c2840473a071a1d4cb7506311fa8a24770a0cc22e7f4664b97
  */
 #include "point_vortices.h"
 
@@ -76,6 +78,7 @@ typedef struct {
     ptrdiff_t length;    /* sites of a row */
     /* where a stage starts, and where what is computed goes; x is y there */
     double *const *start, *const *out;
+    double *const *varied;   /* a variation of y */
     double *const *gathered; /* see point_vortices_solver */
 } point_vortices_row;
 
@@ -151,13 +154,12 @@ typedef struct {
 
 enum { point_vortices_WIDTH = 32 }; /* largest values that are kept apart, so that loops vectorise */
 
-/* Takes in what a sweep from s->y[now] to the other has made of a piece. */
-static inline void point_vortices_measure(const point_vortices_solver *s, const point_vortices_piece *at,
-    int now, point_vortices_extent *extent)
+/* Takes in what fields were and are in a piece. */
+static inline void point_vortices_measure(double *const *was, double *const *is,
+    const point_vortices_piece *at, point_vortices_extent *extent)
 {
     for (int k = 0; k < point_vortices_DIM; ++k) {
-        const double *restrict before = s->y[now][k] + at->row.at[0], *restrict after = s->y[1 - now][k]
-            + at->row.at[0];
+        const double *restrict before = was[k] + at->row.at[0], *restrict after = is[k] + at->row.at[0];
         double change[point_vortices_WIDTH] = { 0.0 }, size[point_vortices_WIDTH] = { 0.0 };
         const ptrdiff_t whole = at->to - (at->to - at->from) % point_vortices_WIDTH;
         for (ptrdiff_t i = at->from; i < whole; i += point_vortices_WIDTH)
@@ -255,6 +257,49 @@ static inline void point_vortices_pair_energy(const point_vortices_params *param
     }
 }
 
+/* what a site b adds to the forces at a site a, and to their variations */
+static inline void point_vortices_pair_slopes(const point_vortices_params *params,
+    const point_vortices_row *row, ptrdiff_t from, ptrdiff_t to)
+{
+    const double *restrict varied_x_0 = row->varied[0] + row->at[0];
+    const double *restrict varied_y_0 = row->varied[1] + row->at[0];
+    const double *restrict G_row = row->x[2] + row->at[0];
+    const double *restrict x_row = row->x[0] + row->at[0];
+    const double *restrict y_row = row->x[1] + row->at[0];
+    (void)params;
+    double *restrict g0 = row->gathered[0];
+    double *restrict g1 = row->gathered[1];
+    double *restrict g2 = row->gathered[2];
+    double *restrict g3 = row->gathered[3];
+    for (ptrdiff_t i = from; i < to; ++i) g0[i] = g1[i] = g2[i] = g3[i] = 0.0;
+    for (ptrdiff_t j = 0; j < row->length; ++j) {
+        const double G_b_ = G_row[j], x_b_ = x_row[j], y_b_ = y_row[j], v_x_b_ = varied_x_0[j], v_y_b_ =
+            varied_y_0[j];
+        point_vortices_EACH_SITE
+        for (ptrdiff_t i = from; i < to; ++i) {
+            const double G_a_ = G_row[i], x_a_ = x_row[i], y_a_ = y_row[i], v_x_a_ = varied_x_0[i], v_y_a_ =
+                varied_y_0[i];
+            const double t1 = x_a_ - x_b_;
+            const double t2 = G_a_ * G_b_ / 3.141592653589793;
+            const double t3 = y_a_ - y_b_;
+            const double t4 = 1.0 / (t1 * t1 + t3 * t3);
+            const double t5 = t2 * t4;
+            const double t6 = t4 * t4;
+            const double t7 = t1 * t2 * t6;
+            const double t8 = t3 * t7;
+            const double t9 = 0.5 * t5;
+            const double t10 = t1 * t7;
+            const double t11 = t3 * t2 * t6;
+            const double t12 = t1 * t11;
+            const double t13 = t3 * t11;
+            g0[i] += i == j ? 0.0 : (-0.5) * (t1 * t5);
+            g1[i] += i == j ? 0.0 : (-0.5) * (t3 * t5);
+            g2[i] += i == j ? 0.0 : v_y_a_ * t8 - v_y_b_ * t8 + (v_x_b_ * (t9 - t10) + v_x_a_ * (t10 - t9));
+            g3[i] += i == j ? 0.0 : v_x_a_ * t12 - v_x_b_ * t12 + (v_y_a_ * (t13 - t9) + v_y_b_ * (t9 - t13));
+        }
+    }
+}
+
 /* y at a site from x there and y around it */
 static inline void point_vortices_relax(const double *coef, const point_vortices_row *row, ptrdiff_t from,
     ptrdiff_t to)
@@ -286,7 +331,7 @@ static void point_vortices_relax_rows(const point_vortices_solver *s, const doub
         at.row.out = s->y[1 - now];
         point_vortices_pair_forces(&s->params, &at.row, at.from, at.to);
         point_vortices_relax(coef, &at.row, at.from, at.to);
-        point_vortices_measure(s, &at, now, extent);
+        point_vortices_measure(s->y[now], s->y[1 - now], &at, extent);
     }
 }
 
@@ -318,6 +363,38 @@ static void point_vortices_increment_rows(const point_vortices_solver *s, const 
         at.row.out = s->x;
         point_vortices_pair_forces(&s->params, &at.row, at.from, at.to);
         point_vortices_increment(coef, &at.row, at.from, at.to);
+    }
+}
+
+/* how y at a site follows y around it */
+static inline void point_vortices_slope(const double *coef, const point_vortices_row *row, ptrdiff_t from,
+    ptrdiff_t to)
+{
+    double *restrict out_x = row->out[0] + row->at[0];
+    double *restrict out_y = row->out[1] + row->at[0];
+    const double c0 = coef[0];
+    const double *restrict G_row = row->x[2] + row->at[0];
+    point_vortices_EACH_SITE
+    for (ptrdiff_t i = from; i < to; ++i) {
+        const double G = G_row[i];
+        const double t1 = c0 / G;
+        out_x[i] = 0.5 * (row->gathered[3][i] * t1);
+        out_y[i] = (-0.5) * (row->gathered[2][i] * t1);
+    }
+}
+
+/* How a sweep follows s->y[now] along v, to the other, for the pieces of rows from first on, before end. */
+static void point_vortices_slope_rows(const point_vortices_solver *s, const double *coef, int far, int now,
+    double *const *v, size_t first, size_t end)
+{
+    (void)far;
+    for (size_t unit = first; unit < end; ++unit) {
+        point_vortices_piece at = point_vortices_piece_of(s, unit);
+        at.row.x = s->y[now];
+        at.row.varied = v;
+        at.row.out = s->y[1 - now];
+        point_vortices_pair_slopes(&s->params, &at.row, at.from, at.to);
+        point_vortices_slope(coef, &at.row, at.from, at.to);
     }
 }
 
@@ -380,17 +457,23 @@ int omp_get_thread_num(void);
 enum {
     point_vortices_LEAD = (point_vortices_HALO + 7) / 8 * 8,
     point_vortices_BUFFER = 256,
-    /* arrays for y and its guesses */
-    point_vortices_IMPLICIT = (2 + point_vortices_STAGES * point_vortices_DIFFERENCES) * point_vortices_DIM,
+    point_vortices_IMPLICIT = (2 /* arrays for y, its guesses and its variations */
+        + point_vortices_STAGES * point_vortices_DIFFERENCES
+        + point_vortices_DIRECTIONS + 1
+        ) * point_vortices_DIM,
     point_vortices_RESERVED = point_vortices_ARRAYS + point_vortices_DIM
         + point_vortices_GATHERED
         + point_vortices_IMPLICIT
 };
 
+/* The doubles of each row for sums over its pieces. */
+static size_t point_vortices_row_sums(size_t length) { return (length / point_vortices_PIECE + 1)
+    * (point_vortices_DIRECTIONS + 1); }
+
 /* Sizes as they have to be: the widths of rows and the number of rows, 0 if they are not allowed. */
 static size_t point_vortices_shape(const size_t sizes[point_vortices_AXES], ptrdiff_t *width)
 {
-    const size_t most = SIZE_MAX / 64 / point_vortices_ARRAYS;
+    const size_t most = SIZE_MAX / 64 / point_vortices_RESERVED;
     size_t rows = 1;
     for (int a = 0; a < point_vortices_AXES; ++a) {
         if (sizes[a] < point_vortices_least[a] || sizes[a] % point_vortices_periods[a] != 0 || sizes[a] > most
@@ -411,8 +494,9 @@ size_t point_vortices_work_size(const size_t sizes[point_vortices_AXES])
 {
     ptrdiff_t width = 0;
     const size_t rows = sizes == NULL ? 0 : point_vortices_shape(sizes, &width);
-    const size_t row = point_vortices_RESERVED * (size_t)width * sizeof(double) + point_vortices_LINES
-        * sizeof(ptrdiff_t);
+    const size_t doubles = rows == 0 ? 0 : point_vortices_RESERVED * (size_t)width
+        + point_vortices_row_sums(sizes[point_vortices_AXES - 1]);
+    const size_t row = doubles * sizeof(double) + point_vortices_LINES * sizeof(ptrdiff_t);
     return rows == 0 ? 0 : rows * row + 64;
 }
 
@@ -474,6 +558,8 @@ static void point_vortices_place_middle(point_vortices_solver *s, double *memory
         for (int d = 0; d < point_vortices_DIFFERENCES; ++d)
             for (int k = 0; k < point_vortices_DIM; ++k, memory += block)
                 s->guess[stage].difference[d][k] = memory;
+    for (int d = 0; d <= point_vortices_DIRECTIONS; ++d)
+        for (int k = 0; k < point_vortices_DIM; ++k, memory += block) s->space[d][k] = memory;
 }
 
 static void point_vortices_prepare_step(const point_vortices_params *params, double h, double *coef)
@@ -513,7 +599,10 @@ point_vortices_status point_vortices_init(point_vortices_solver *s, const point_
     double *aligned = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64)
         + point_vortices_LEAD;
     const size_t block = rows * (size_t)width;
-    s->lines = (ptrdiff_t *)(void *)(aligned - point_vortices_LEAD + point_vortices_RESERVED * block);
+    double *end = aligned - point_vortices_LEAD + point_vortices_RESERVED * block;
+    s->sums = end;
+    end += rows * point_vortices_row_sums(length);
+    s->lines = (ptrdiff_t *)(void *)end;
     for (size_t r = 0; r < rows; ++r) point_vortices_find_lines(s, r, s->lines + r * point_vortices_LINES);
     for (size_t k = 0; k < point_vortices_ARRAYS; ++k) s->x[k] = aligned + k * block;
     for (size_t k = 0; k < point_vortices_DIM; ++k) s->before[k] = aligned + (point_vortices_ARRAYS + k)
@@ -581,8 +670,9 @@ static size_t point_vortices_share(size_t units, size_t *first)
 
 static double point_vortices_larger(double a, double b) { return isnan(a) || a > b ? a : b; }
 
-/* A sweep from s->y[now] to the other: how far y moves, in sizes of each field. Not finite if y is not. */
-static double point_vortices_relaxed(const point_vortices_solver *s, const double *coef, int far, int now)
+/* How far y moves from s->y[now] to the other, by a sweep, or without coefficients as it is. Not finite if y
+   is not. */
+static double point_vortices_relaxed(point_vortices_solver *s, const double *coef, int far, int now)
 {
     const size_t units = s->rows * point_vortices_pieces(s);
     point_vortices_extent whole = { { 0.0 }, { 0.0 } };
@@ -590,7 +680,11 @@ static double point_vortices_relaxed(const point_vortices_solver *s, const doubl
     {
         point_vortices_extent own = { { 0.0 }, { 0.0 } };
         size_t first, end = point_vortices_share(units, &first);
-        point_vortices_relax_rows(s, coef, far, now, &own, first, end);
+        if (coef != NULL) point_vortices_relax_rows(s, coef, far, now, &own, first, end);
+        for (size_t unit = first; coef == NULL && unit < end; ++unit) {
+            const point_vortices_piece at = point_vortices_piece_of(s, unit);
+            point_vortices_measure(s->y[now], s->y[1 - now], &at, &own);
+        }
         point_vortices_ONE_BY_ONE
         for (int k = 0; k < point_vortices_DIM; ++k) {
             whole.change[k] = point_vortices_larger(whole.change[k], own.change[k]);
@@ -599,13 +693,18 @@ static double point_vortices_relaxed(const point_vortices_solver *s, const doubl
     }
     double largest = 0.0, moved = 0.0;
     for (int k = 0; k < point_vortices_DIM; ++k) largest = point_vortices_larger(largest, whole.size[k]);
-    for (int k = 0; k < point_vortices_DIM; ++k)
-        moved = point_vortices_larger(moved, whole.change[k] / (whole.size[k] + 1e-3 * largest + 1e-300));
+    for (int k = 0; k < point_vortices_DIM; ++k) {
+        s->usual[k] = whole.size[k] + 1e-3 * largest + 1e-300;
+        moved = point_vortices_larger(moved, whole.change[k] / s->usual[k]);
+    }
     return moved;
 }
 
 #define point_vortices_SETTLED 0x1p-55  /* what further sweeps may still change, in sizes of y */
 #define point_vortices_ROUNDING 0x1p-40 /* changes below this may be rounding */
+
+#define point_vortices_SLOW 0.6        /* changes that shrink by less are left to Newton's method, ... */
+enum { point_vortices_PATIENCE = 10 }; /* ... after so many sweeps */
 
 /* y in the middle of a stage, by sweeps from the guess in s->y[0] until only rounding would change; it is in
    s->y[*now]. */
@@ -624,6 +723,8 @@ static point_vortices_status point_vortices_middle(point_vortices_solver *s, con
             if (point_vortices_all_hold(s, s->y[*now])) return point_vortices_OK;
             return sweep == 0 ? point_vortices_NOT_FINITE : point_vortices_NO_CONVERGENCE;
         }
+        if (sweep >= point_vortices_PATIENCE && change > point_vortices_SLOW * before && change > 0x1p-30)
+            break;
         before = change;
     }
     return point_vortices_NO_CONVERGENCE;
@@ -687,11 +788,206 @@ static void point_vortices_remember(point_vortices_solver *s, int stage, int now
     if (guess->count < point_vortices_DIFFERENCES) ++guess->count;
 }
 
-/* Begin without guesses. */
+/* Begin without guesses, and with sweeps. */
 static void point_vortices_forget(point_vortices_solver *s)
 {
+    s->stiff = 0;
     for (int stage = 0; stage < point_vortices_STAGES; ++stage)
         s->guess[stage].count = s->guess[stage].order = 0;
+}
+
+/* ---- Krylov spaces ---- */
+/* how well a correction solves the equation for it, if the space allows, */
+#define point_vortices_SOLVED 1e-6
+#define point_vortices_USEFUL 0.9 /* and how well it has to */
+
+/* The sum over some sites of a b. */
+static double point_vortices_product(const double *restrict a, const double *restrict b, ptrdiff_t from,
+    ptrdiff_t to)
+{
+    double lanes[point_vortices_WIDTH] = { 0.0 }, sum = 0.0;
+    const ptrdiff_t whole = to - (to - from) % point_vortices_WIDTH;
+    for (ptrdiff_t i = from; i < whole; i += point_vortices_WIDTH)
+        for (int l = 0; l < point_vortices_WIDTH; ++l) lanes[l] += a[i + l] * b[i + l];
+    for (ptrdiff_t i = whole; i < to; ++i) sum += a[i] * b[i];
+    for (int l = 0; l < point_vortices_WIDTH; ++l) sum += lanes[l];
+    return sum;
+}
+
+/* The products of some directions from the first on with v, over all sites and fields, in usual sizes. Those
+   of pieces are added in their order: the bits do not depend on threads. */
+static void point_vortices_products(const point_vortices_solver *s, int first, int count, double *const *v,
+    double *products)
+{
+    const size_t units = s->rows * point_vortices_pieces(s);
+    point_vortices_PARALLEL
+    {
+        size_t unit, end = point_vortices_share(units, &unit);
+        for (; unit < end; ++unit) {
+            const point_vortices_piece at = point_vortices_piece_of(s, unit);
+            for (int d = 0; d < count; ++d) {
+                double sum = 0.0;
+                for (int k = 0; k < point_vortices_DIM; ++k)
+                    sum += point_vortices_product(s->space[first + d][k] + at.row.at[0], v[k] + at.row.at[0],
+                        at.from, at.to) /
+                        s->usual[k] / s->usual[k];
+                s->sums[unit * (point_vortices_DIRECTIONS + 1) + (size_t)d] = sum;
+            }
+        }
+    }
+    for (int d = 0; d < count; ++d) products[d] = 0.0;
+    for (size_t unit = 0; unit < units; ++unit)
+        for (int d = 0; d < count; ++d)
+            products[d] += s->sums[unit * (point_vortices_DIRECTIONS + 1) + (size_t)d];
+}
+
+/* to = own from + some of the first directions by their weights, with the copied ends. */
+static void point_vortices_combine(const point_vortices_solver *s, double *const *to, double own,
+    double *const *from, int count, const double *weights)
+{
+    point_vortices_PARALLEL
+    {
+        size_t unit, end = point_vortices_share(s->rows * point_vortices_pieces(s), &unit);
+        for (; unit < end; ++unit) {
+            const point_vortices_piece at = point_vortices_piece_of(s, unit);
+            for (int k = 0; k < point_vortices_DIM; ++k) {
+                const double *start = from[k] + at.row.at[0];
+                double *sum = to[k] + at.row.at[0];
+                point_vortices_EACH_SITE
+                for (ptrdiff_t i = at.from; i < at.to; ++i) sum[i] = own * start[i];
+                for (int d = 0; d < count; ++d) {
+                    const double *restrict direction = s->space[d][k] + at.row.at[0], by = weights[d];
+                    point_vortices_EACH_SITE
+                    for (ptrdiff_t i = at.from; i < at.to; ++i) sum[i] += by * direction[i];
+                }
+                point_vortices_ends(sum, s->length, at.from, at.to);
+            }
+        }
+    }
+}
+
+/* to = a - s->y[1 - now]; with coefficients that is first made what a sweep does to a. */
+static void point_vortices_subtract(point_vortices_solver *s, const double *coef, int now, double *const *a,
+    double *const *to)
+{
+    point_vortices_PARALLEL
+    {
+        size_t first, end = point_vortices_share(s->rows * point_vortices_pieces(s), &first);
+        if (coef != NULL) point_vortices_slope_rows(s, coef, 1, now, a, first, end);
+        for (size_t unit = first; unit < end; ++unit) {
+            const point_vortices_piece at = point_vortices_piece_of(s, unit);
+            for (int k = 0; k < point_vortices_DIM; ++k) {
+                const double *one = a[k] + at.row.at[0], *other = s->y[1 - now][k] + at.row.at[0];
+                double *restrict left = to[k] + at.row.at[0];
+                for (ptrdiff_t i = at.from; i < at.to; ++i) left[i] = one[i] - other[i];
+            }
+        }
+    }
+}
+
+/* to = from - what solves matrix(v) = s->space[0], as well as a space of so many directions allows: GMRES,
+   after Y. Saad and M. H. Schultz, without a restart. The matrix is 1 - (what a sweep does to a variation of
+   s->y[now]). s->y[1 - now] is used, and may be where it goes. 0 if it is of no use. */
+static int point_vortices_krylov(point_vortices_solver *s, const double *coef, int now, double *const *from,
+    double *const *to)
+{
+    double matrix[point_vortices_DIRECTIONS][point_vortices_DIRECTIONS], again[point_vortices_DIRECTIONS],
+        cosine[point_vortices_DIRECTIONS], sine[point_vortices_DIRECTIONS];
+    double side[point_vortices_DIRECTIONS + 1], length;
+    int count = 0;
+    point_vortices_products(s, 0, 1, s->space[0], &length);
+    side[0] = length = sqrt(length);
+    if (length > 0.0) point_vortices_combine(s, s->space[0], 1.0 / length, s->space[0], 0, side);
+    while (count < point_vortices_DIRECTIONS && fabs(side[count]) > point_vortices_SOLVED * length) {
+        double *column = matrix[count], *const *next = s->space[count + 1], left;
+        point_vortices_subtract(s, coef, now, s->space[count], next);
+        point_vortices_products(s, 0, count + 1, next, column);
+        for (int k = 0; k <= count; ++k) again[k] = -column[k];
+        point_vortices_combine(s, next, 1.0, next, count + 1, again);
+        point_vortices_products(s, 0, count + 1, next, again); /* twice is enough */
+        for (int k = 0; k <= count; ++k) {
+            column[k] += again[k];
+            again[k] = -again[k];
+        }
+        point_vortices_combine(s, next, 1.0, next, count + 1, again);
+        point_vortices_products(s, count + 1, 1, next, &left);
+        left = sqrt(left);
+        if (left > 0.0) point_vortices_combine(s, next, 1.0 / left, next, 0, again);
+        for (int k = 0; k < count; ++k) {
+            const double above = column[k];
+            column[k] = cosine[k] * above + sine[k] * column[k + 1];
+            column[k + 1] = cosine[k] * column[k + 1] - sine[k] * above;
+        }
+        const double size = hypot(column[count], left);
+        cosine[count] = column[count] / size;
+        sine[count] = left / size;
+        column[count] = size;
+        side[count + 1] = -sine[count] * side[count];
+        side[count] *= cosine[count];
+        ++count;
+    }
+    if (!isfinite(length) || (length > 0.0 && !(fabs(side[count]) <= point_vortices_USEFUL * length)))
+        return 0;
+    for (int k = count - 1; k >= 0; --k) {
+        for (int j = k + 1; j < count; ++j) side[k] -= matrix[j][k] * side[j];
+        side[k] /= matrix[k][k];
+    }
+    for (int k = 0; k < count; ++k) side[k] = -side[k];
+    point_vortices_combine(s, to, 1.0, from, count, side);
+    return 1;
+}
+
+/* ---- Newton's method where sweeps fail ---- */
+#define point_vortices_PLAUSIBLE 1.5 /* in sizes of x and of what the field says */
+enum { point_vortices_MOST_ITERATIONS = 200 };
+
+/* The sum of the distances of y from x; with x added that of the sizes of x. */
+static double point_vortices_distance(const point_vortices_solver *s, int side, double added)
+{
+    double sum = 0.0;
+    for (int k = 0; k < point_vortices_DIM; ++k)
+        for (size_t r = 0; r < s->rows; ++r) {
+            const double *y = s->y[side][k] + (ptrdiff_t)r * s->width, *x = s->x[k] + (ptrdiff_t)r * s->width;
+            for (ptrdiff_t i = 0; i < s->length; ++i) sum += fabs(y[i] - x[i]) + added * fabs(x[i]);
+        }
+    return sum;
+}
+
+/* The correction of s->y[now] by the matrix, which is kept while it serves, or as well as a Krylov space
+   allows, to the other: how far y moves, in sizes of each field. Not a number if it cannot be made. */
+static double point_vortices_corrected(point_vortices_solver *s, const double *coef, int now)
+{
+    if (!isfinite(point_vortices_relaxed(s, coef, 1, now))) return HUGE_VAL;
+    point_vortices_subtract(s, NULL, now, s->y[now], s->space[0]);
+    if (!point_vortices_krylov(s, coef, now, s->y[now], s->y[1 - now])) return HUGE_VAL;
+    ++s->sweeps;
+    return point_vortices_relaxed(s, NULL, 1, now);
+}
+
+/* How far from x a solution is one of the motion. */
+static double point_vortices_range(point_vortices_solver *s, const double *coef)
+{
+    point_vortices_copy(s->y[0], s->x, s);
+    point_vortices_relaxed(s, coef, 1, 0);
+    return point_vortices_PLAUSIBLE * point_vortices_distance(s, 1, 1.0);
+}
+
+/* y in the middle of a stage, from the guess in s->y[0]; it is in s->y[*now]. */
+static point_vortices_status point_vortices_newton(point_vortices_solver *s, const double *coef, double range,
+    int *now)
+{
+    double before = 0.0;
+    for (int iteration = 0; iteration < point_vortices_MOST_ITERATIONS; ++iteration) {
+        const double change = point_vortices_corrected(s, coef, *now), shrunk = before - change;
+        *now = 1 - *now;
+        if (!isfinite(change)) return point_vortices_NO_CONVERGENCE;
+        if (change * change <= shrunk * point_vortices_SETTLED || (shrunk <= 0.0 && change <=
+            point_vortices_ROUNDING && iteration > 0))
+            return point_vortices_distance(s, *now, 0.0) <= range ? point_vortices_OK
+                : point_vortices_NO_CONVERGENCE;
+        before = change;
+    }
+    return point_vortices_NO_CONVERGENCE;
 }
 
 /* The stages of a step. */
@@ -702,7 +998,15 @@ static point_vortices_status point_vortices_stages(point_vortices_solver *s, int
         const double *coef = s->coef + stage * point_vortices_ROW;
         int now = 0;
         point_vortices_predict(s, stage);
-        const point_vortices_status status = point_vortices_middle(s, coef, far, &now);
+        point_vortices_status status = s->stiff ? point_vortices_NO_CONVERGENCE : point_vortices_middle(s,
+            coef, far, &now);
+        if (status != point_vortices_OK && (far || status != point_vortices_NOT_FINITE)) {
+            s->stiff = 1;
+            now = 0;
+            const double range = point_vortices_range(s, coef);
+            point_vortices_predict(s, stage);
+            status = point_vortices_newton(s, coef, range, &now);
+        }
         if (status != point_vortices_OK) return status;
         point_vortices_remember(s, stage, now);
         point_vortices_PARALLEL

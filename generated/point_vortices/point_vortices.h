@@ -2,7 +2,7 @@
  * point_vortices.h: the declarations; point_vortices.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 59c29130ec803575280e5f7bd34348f4e98a96f89d8819239fceff168dec5c04
+ * body-sha256: 76ea86f33f2c91d078e090bcedd9878bf4073a6626083336e67de38fa4ce9358
  */
 #ifndef POINT_VORTICES_H
 #define POINT_VORTICES_H
@@ -29,8 +29,9 @@ extern const point_vortices_params point_vortices_default_params;
 enum { point_vortices_ARRAYS = 3 };       /* arrays over the sites: fields, then parameters */
 enum { point_vortices_COEFFICIENTS = 5 }; /* numbers that depend on params and h only */
 enum { point_vortices_STAGES = 5 };       /* of a step */
+enum { point_vortices_DIRECTIONS = 24 };  /* of a Krylov space */
 enum { point_vortices_DIFFERENCES = 2 };  /* that a guess is extrapolated from */
-enum { point_vortices_GATHERED = 2 };     /* sums over other sites that are held for each site */
+enum { point_vortices_GATHERED = 4 };     /* sums over other sites that are held for each site */
 
 /* How a step ends; point_vortices_status_string says it in words. */
 typedef enum {
@@ -59,10 +60,14 @@ typedef struct {
     /* the middle of a stage, before and after a sweep, with the parameters at sites */
     double *y[2][point_vortices_ARRAYS];
     point_vortices_guess guess[point_vortices_STAGES];
-    size_t sweeps; /* that stages took since point_vortices_init */
-    size_t steps;  /* good steps since point_vortices_init */
-    double t;      /* time since point_vortices_init */
-    double h;      /* the last step size */
+    size_t sweeps;                    /* that stages took since point_vortices_init */
+    int stiff;                        /* whether sweeps have failed */
+    double usual[point_vortices_DIM]; /* the sizes of the fields of y */
+    /* variations of y, sums over pieces: see point_vortices_krylov */
+    double *space[point_vortices_DIRECTIONS + 1][point_vortices_DIM], *sums;
+    size_t steps; /* good steps since point_vortices_init */
+    double t;     /* time since point_vortices_init */
+    double h;     /* the last step size */
     point_vortices_params params;
     double coef[point_vortices_COEFFICIENTS]; /* all that depends on params and h only */
     int prepared; /* whether coef has been computed */

@@ -14,7 +14,7 @@
 #
 # SPDX-License-Identifier: 0BSD
 # This file belongs to whoever generated it; phigen claims no rights in it.
-# body-sha256: 0f81adb2def6615a16b63f7276752ed6855040646a51623912c11954192b776d
+# body-sha256: 480ebb7ba9d1e25e99980e0489adb5b048f8b45ac55a46fdc62f28a3a0c43b01
 import numpy as np
 
 VERSION = "0.1.0"
@@ -134,14 +134,22 @@ class _Sites:
 # Sweeps that a stage may take; values that guesses are extrapolated from; a change by this part of y may be rounding.
 MOST_SWEEPS = 200
 DIFFERENCES = 4
+
+# After so many sweeps, changes that still shrink by less than this factor are left to Newton's method.
+PATIENCE = 10
+SLOW = 0.6
 ROUNDING = 2.0**-40
+
+
+def _usual(y):
+    """The sizes of fields, none much less than the largest."""
+    sizes = np.abs(y).max(tuple(range(1, y.ndim)))
+    return sizes + 1e-3 * sizes.max() + 1e-300
 
 
 def _size(change, y):
     """How large a change of y is, field by field."""
-    axes = tuple(range(1, y.ndim))
-    sizes, changes = np.abs(y).max(axes), np.abs(change).max(axes)
-    return (changes / (sizes + 1e-3 * sizes.max() + 1e-300)).max()
+    return (np.abs(change).max(tuple(range(1, y.ndim))) / _usual(y)).max()
 
 
 def _by_sweeps(coef, x, y, sites):
@@ -157,6 +165,8 @@ def _by_sweeps(coef, x, y, sites):
         # What further sweeps would change, with the rate change / before, or that changes shrink no more.
         if change * change <= shrunk * 2.0**-55 or (shrunk <= 0.0 and change <= ROUNDING and sweeps > 1):
             return y
+        if sweeps > PATIENCE and change > max(SLOW * before, 2.0**-30):
+            break
         before = change
     raise FailedError("NO_CONVERGENCE")
 
@@ -180,10 +190,78 @@ def _advance(sites, rows, x, past):
     for stage, (_, row) in enumerate(SCHEDULE):
         order, differences = past.get(stage, (0, []))
         guess = x + sum(differences[:order])
-        y = _by_sweeps(rows[row], x, guess, sites)
+        y = _middle(rows[row], x, guess, sites, past)
         past[stage] = _remember(differences, y - x), differences
         x = _finite(x + _increment(rows[row], x, y, sites))
     return x
+
+
+# Newton's corrections of a stage; directions of the Krylov space that each is taken from, how well it solves the equation
+# for it, if the space allows, and how well it has to; how far from x a solution is one of the motion, in sizes of x and
+# of what the field says.
+MOST_CORRECTIONS = 200
+DIRECTIONS = 24
+SOLVED = 1e-6
+USEFUL = 0.9
+PLAUSIBLE = 1.5
+
+
+def _middle(coef, x, guess, sites, past):
+    """y at the middle of a stage: by sweeps until they fail to solve one, then by Newton's method."""
+    if "stiff" not in past:
+        try:
+            return _by_sweeps(coef, x, guess, sites)
+        except FailedError:
+            past["stiff"] = True
+    try:
+        return _newton(coef, x, guess, sites)
+    except FailedError:
+        raise FailedError("NO_CONVERGENCE") from None
+
+
+def _newton(coef, x, y, sites):
+    """y at the middle of a stage by Newton's method; raises FailedError."""
+    before, far = 0.0, PLAUSIBLE * (np.abs(x) + np.abs(_relax(coef, x, x, sites) - x)).sum()
+    for correction in range(MOST_CORRECTIONS):
+        swept = _finite(_relax(coef, x, y, sites))
+        change = _krylov(lambda v: v - _slope(coef, x, y, v, sites), swept - y, _usual(swept))
+        y = _finite(y + change)
+        size = _size(change, y)
+        shrunk = before - size
+        if size * size <= shrunk * 2.0**-55 or (shrunk <= 0.0 and size <= ROUNDING and correction > 0):
+            if np.abs(y - x).sum() <= far:
+                return y
+            break
+        before = size
+    raise FailedError("no solution")
+
+
+def _krylov(matrix, side, usual):
+    """A solution of matrix(v) = side, as well as it can be by GMRES without a restart, for fields of usual sizes."""
+    usual = usual.reshape(-1, *(1,) * (side.ndim - 1))
+    length = np.sqrt(((side / usual) ** 2).sum())
+    if length == 0.0:
+        return side
+    directions, columns = [side / length], []
+    for count in range(1, DIRECTIONS + 1):
+        new = _finite(matrix(directions[-1]))
+        column = np.zeros(DIRECTIONS + 1)
+        for k, direction in enumerate(directions):
+            column[k] = (direction / usual * (new / usual)).sum()
+            new = new - column[k] * direction
+        column[count] = np.sqrt(((new / usual) ** 2).sum())
+        columns.append(column)
+        small = np.array(columns).T[: count + 1]
+        target = np.zeros(count + 1)
+        target[0] = length
+        weights = np.linalg.lstsq(small, target, rcond=None)[0]
+        left = np.linalg.norm(small @ weights - target)
+        if left <= SOLVED * length or column[count] == 0.0:
+            break
+        directions.append(new / column[count])
+    if left > USEFUL * length:
+        raise FailedError("no direction is of use")
+    return sum(w * direction for w, direction in zip(weights, directions))
 
 
 def _coefficients(sites, h):
@@ -293,6 +371,36 @@ def _forces(parameters, x, sites):
     return sums
 
 
+def _slopes(parameters, x, v, sites):
+    sums = 0.0
+    with np.errstate(all="ignore"):
+        G_a_ = sites.parameters["G"][:, None]
+        G_b_ = sites.parameters["G"]
+        x_a_ = x[0][:, None]
+        x_b_ = x[0]
+        y_a_ = x[1][:, None]
+        y_b_ = x[1]
+        v_x_a_ = v[0][:, None]
+        v_x_b_ = v[0]
+        v_y_a_ = v[1][:, None]
+        v_y_b_ = v[1]
+        t1 = x_a_ - x_b_
+        t2 = G_a_ * G_b_ / np.pi
+        t3 = y_a_ - y_b_
+        t4 = 1.0 / (t1 * t1 + t3 * t3)
+        t5 = t2 * t4
+        t6 = t4 * t4
+        t7 = t1 * t2 * t6
+        t8 = t3 * t7
+        t9 = 0.5 * t5
+        t10 = t1 * t7
+        t11 = t3 * t2 * t6
+        t12 = t1 * t11
+        t13 = t3 * t11
+        sums = sums + np.array([_over_others((-0.5) * (t1 * t5), sites), _over_others((-0.5) * (t3 * t5), sites), _over_others(v_y_a_ * t8 - v_y_b_ * t8 + (v_x_b_ * (t9 - t10) + v_x_a_ * (t10 - t9)), sites), _over_others(v_x_a_ * t12 - v_x_b_ * t12 + (v_y_a_ * (t13 - t9) + v_y_b_ * (t9 - t13)), sites)])
+    return sums
+
+
 def _relax(coef, start, x, sites):
     gathered = _forces(sites.parameters, x, sites)
     G = sites.parameters["G"]
@@ -305,6 +413,13 @@ def _increment(coef, start, x, sites):
     G = sites.parameters["G"]
     t1 = 1.0 / G
     return np.array([np.broadcast_to(t1 * (coef[0] * gathered[1]), sites.sizes), np.broadcast_to(-(t1 * (coef[0] * gathered[0])), sites.sizes)])
+
+
+def _slope(coef, start, x, v, sites):
+    gathered = _slopes(sites.parameters, x, v, sites)
+    G = sites.parameters["G"]
+    t1 = coef[0] / G
+    return np.array([np.broadcast_to(0.5 * (gathered[3] * t1), sites.sizes), np.broadcast_to((-0.5) * (gathered[2] * t1), sites.sizes)])
 
 
 def _energy(parameters, x, sites):

@@ -21,7 +21,7 @@
  *   4. The solver
  *   5. The flows
  *   6. What is seen at sites
- * body-sha256: c53da09f87f8072d1e2b9f0006a4520c2f234e1395dac5d7dd9627af542439e3
+ * body-sha256: c467cc170b13c256357cc796f319087a0894c72d4a53a800aa6dd93b31a1453e
  */
 #include "sine_gordon.h"
 
@@ -302,7 +302,7 @@ enum {
 /* Sizes as they have to be: the widths of rows and the number of rows, 0 if they are not allowed. */
 static size_t sine_gordon_shape(const size_t sizes[sine_gordon_AXES], ptrdiff_t *width)
 {
-    const size_t most = SIZE_MAX / 64 / sine_gordon_ARRAYS;
+    const size_t most = SIZE_MAX / 64 / sine_gordon_RESERVED;
     size_t rows = 1;
     for (int a = 0; a < sine_gordon_AXES; ++a) {
         if (sizes[a] < sine_gordon_least[a] || sizes[a] % sine_gordon_periods[a] != 0 || sizes[a] > most / 2)
@@ -323,8 +323,8 @@ size_t sine_gordon_work_size(const size_t sizes[sine_gordon_AXES])
 {
     ptrdiff_t width = 0;
     const size_t rows = sizes == NULL ? 0 : sine_gordon_shape(sizes, &width);
-    const size_t row = sine_gordon_RESERVED * (size_t)width * sizeof(double) + sine_gordon_LINES
-        * sizeof(ptrdiff_t);
+    const size_t doubles = sine_gordon_RESERVED * (size_t)width;
+    const size_t row = doubles * sizeof(double) + sine_gordon_LINES * sizeof(ptrdiff_t);
     return rows == 0 ? 0 : rows * row + 64;
 }
 
@@ -398,7 +398,8 @@ sine_gordon_status sine_gordon_init(sine_gordon_solver *s, const sine_gordon_par
     s->params = own;
     double *aligned = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64) + sine_gordon_LEAD;
     const size_t block = rows * (size_t)width;
-    s->lines = (ptrdiff_t *)(void *)(aligned - sine_gordon_LEAD + sine_gordon_RESERVED * block);
+    double *end = aligned - sine_gordon_LEAD + sine_gordon_RESERVED * block;
+    s->lines = (ptrdiff_t *)(void *)end;
     for (size_t r = 0; r < rows; ++r) sine_gordon_find_lines(s, r, s->lines + r * sine_gordon_LINES);
     for (size_t k = 0; k < sine_gordon_ARRAYS; ++k) s->x[k] = aligned + k * block;
     for (size_t k = 0; k < sine_gordon_DIM; ++k) s->before[k] = aligned + (sine_gordon_ARRAYS + k) * block;

@@ -21,7 +21,7 @@
  *   4. The solver
  *   5. The flows
  *   6. What is seen at sites
- * body-sha256: e615aac474f623b6a16f2a19a34313b8187f6d77cec20f2edfb5b37f06198df3
+ * body-sha256: 475211cd0b577a91b797a8d75fffc336724d52d1af82e7ee0646e1334f0f39cf
  */
 #include "toda.h"
 
@@ -291,7 +291,7 @@ enum {
 /* Sizes as they have to be: the widths of rows and the number of rows, 0 if they are not allowed. */
 static size_t toda_shape(const size_t sizes[toda_AXES], ptrdiff_t *width)
 {
-    const size_t most = SIZE_MAX / 64 / toda_ARRAYS;
+    const size_t most = SIZE_MAX / 64 / toda_RESERVED;
     size_t rows = 1;
     for (int a = 0; a < toda_AXES; ++a) {
         if (sizes[a] < toda_least[a] || sizes[a] % toda_periods[a] != 0 || sizes[a] > most / 2) return 0;
@@ -311,7 +311,8 @@ size_t toda_work_size(const size_t sizes[toda_AXES])
 {
     ptrdiff_t width = 0;
     const size_t rows = sizes == NULL ? 0 : toda_shape(sizes, &width);
-    const size_t row = toda_RESERVED * (size_t)width * sizeof(double) + toda_LINES * sizeof(ptrdiff_t);
+    const size_t doubles = toda_RESERVED * (size_t)width;
+    const size_t row = doubles * sizeof(double) + toda_LINES * sizeof(ptrdiff_t);
     return rows == 0 ? 0 : rows * row + 64;
 }
 
@@ -384,7 +385,8 @@ toda_status toda_init(toda_solver *s, const toda_params *params, const size_t si
     s->params = own;
     double *aligned = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64) + toda_LEAD;
     const size_t block = rows * (size_t)width;
-    s->lines = (ptrdiff_t *)(void *)(aligned - toda_LEAD + toda_RESERVED * block);
+    double *end = aligned - toda_LEAD + toda_RESERVED * block;
+    s->lines = (ptrdiff_t *)(void *)end;
     for (size_t r = 0; r < rows; ++r) toda_find_lines(s, r, s->lines + r * toda_LINES);
     for (size_t k = 0; k < toda_ARRAYS; ++k) s->x[k] = aligned + k * block;
     for (size_t k = 0; k < toda_DIM; ++k) s->before[k] = aligned + (toda_ARRAYS + k) * block;

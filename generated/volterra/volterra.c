@@ -21,7 +21,7 @@
  *   4. The solver
  *   5. The flows
  *   6. What is seen at sites
- * body-sha256: db04c7c4888b5af2a9dd91cd7f7c33c2fe3bc76fd5fbc55c27a30b246f07fb6b
+ * body-sha256: 501ffa9bc4861bc8fd61a0f021ca8359e64de126873af354a8321d234bbafd39
  */
 #include "volterra.h"
 
@@ -303,7 +303,7 @@ enum {
 /* Sizes as they have to be: the widths of rows and the number of rows, 0 if they are not allowed. */
 static size_t volterra_shape(const size_t sizes[volterra_AXES], ptrdiff_t *width)
 {
-    const size_t most = SIZE_MAX / 64 / volterra_ARRAYS;
+    const size_t most = SIZE_MAX / 64 / volterra_RESERVED;
     size_t rows = 1;
     for (int a = 0; a < volterra_AXES; ++a) {
         if (sizes[a] < volterra_least[a] || sizes[a] % volterra_periods[a] != 0 || sizes[a] > most / 2)
@@ -324,8 +324,8 @@ size_t volterra_work_size(const size_t sizes[volterra_AXES])
 {
     ptrdiff_t width = 0;
     const size_t rows = sizes == NULL ? 0 : volterra_shape(sizes, &width);
-    const size_t row = volterra_RESERVED * (size_t)width * sizeof(double) + volterra_LINES
-        * sizeof(ptrdiff_t);
+    const size_t doubles = volterra_RESERVED * (size_t)width;
+    const size_t row = doubles * sizeof(double) + volterra_LINES * sizeof(ptrdiff_t);
     return rows == 0 ? 0 : rows * row + 64;
 }
 
@@ -399,7 +399,8 @@ volterra_status volterra_init(volterra_solver *s, const volterra_params *params,
     s->params = own;
     double *aligned = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64) + volterra_LEAD;
     const size_t block = rows * (size_t)width;
-    s->lines = (ptrdiff_t *)(void *)(aligned - volterra_LEAD + volterra_RESERVED * block);
+    double *end = aligned - volterra_LEAD + volterra_RESERVED * block;
+    s->lines = (ptrdiff_t *)(void *)end;
     for (size_t r = 0; r < rows; ++r) volterra_find_lines(s, r, s->lines + r * volterra_LINES);
     for (size_t k = 0; k < volterra_ARRAYS; ++k) s->x[k] = aligned + k * block;
     for (size_t k = 0; k < volterra_DIM; ++k) s->before[k] = aligned + (volterra_ARRAYS + k) * block;

@@ -21,7 +21,7 @@
  *   4. The solver
  *   5. The flows
  *   6. What is seen at sites
- * body-sha256: 18d6aeb03383a8de344245b0b37530222ef24d56e0db4510821276ced16c2a58
+ * body-sha256: 7a6d9d8d957278dc81463622ba7a4d5872821b92c46a07a188c7d0c85edd4570
  */
 #include "xxz_disorder.h"
 
@@ -365,7 +365,7 @@ enum {
 /* Sizes as they have to be: the widths of rows and the number of rows, 0 if they are not allowed. */
 static size_t xxz_disorder_shape(const size_t sizes[xxz_disorder_AXES], ptrdiff_t *width)
 {
-    const size_t most = SIZE_MAX / 64 / xxz_disorder_ARRAYS;
+    const size_t most = SIZE_MAX / 64 / xxz_disorder_RESERVED;
     size_t rows = 1;
     for (int a = 0; a < xxz_disorder_AXES; ++a) {
         if (sizes[a] < xxz_disorder_least[a] || sizes[a] % xxz_disorder_periods[a] != 0 || sizes[a] > most
@@ -386,8 +386,8 @@ size_t xxz_disorder_work_size(const size_t sizes[xxz_disorder_AXES])
 {
     ptrdiff_t width = 0;
     const size_t rows = sizes == NULL ? 0 : xxz_disorder_shape(sizes, &width);
-    const size_t row = xxz_disorder_RESERVED * (size_t)width * sizeof(double) + xxz_disorder_LINES
-        * sizeof(ptrdiff_t);
+    const size_t doubles = xxz_disorder_RESERVED * (size_t)width;
+    const size_t row = doubles * sizeof(double) + xxz_disorder_LINES * sizeof(ptrdiff_t);
     return rows == 0 ? 0 : rows * row + 64;
 }
 
@@ -474,7 +474,8 @@ xxz_disorder_status xxz_disorder_init(xxz_disorder_solver *s, const xxz_disorder
     s->params = own;
     double *aligned = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64) + xxz_disorder_LEAD;
     const size_t block = rows * (size_t)width;
-    s->lines = (ptrdiff_t *)(void *)(aligned - xxz_disorder_LEAD + xxz_disorder_RESERVED * block);
+    double *end = aligned - xxz_disorder_LEAD + xxz_disorder_RESERVED * block;
+    s->lines = (ptrdiff_t *)(void *)end;
     for (size_t r = 0; r < rows; ++r) xxz_disorder_find_lines(s, r, s->lines + r * xxz_disorder_LINES);
     for (size_t k = 0; k < xxz_disorder_ARRAYS; ++k) s->x[k] = aligned + k * block;
     for (size_t k = 0; k < xxz_disorder_DIM; ++k) s->before[k] = aligned + (xxz_disorder_ARRAYS + k) * block;

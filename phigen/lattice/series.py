@@ -6,26 +6,26 @@ covectors written out, both are formulas of a site and its neighbourhood, whatev
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from phigen.errors import Diagnostic, SpecError
-from phigen.lattice.cell import GRID, Cell
+from phigen.lattice.cell import Cell
 from phigen.lattice.graphs import sums_by_field
 from phigen.lattice.kernels import site_kernel
 from phigen.lattice.parts import Colouring, PartSearch, summands_of
 from phigen.lattice.realisation import CellRealisation, realise_cell
+from phigen.lattice.variations import along
 from phigen.scheme.alternation import Schedule
 from phigen.scheme.choosing import Host
 from phigen.scheme.composition import find, orders
-from phigen.scheme.kernel import Kernel
 from phigen.scheme.order import Order
 from phigen.scheme.staging import Coefficients
 from phigen.scheme.steps import Equation
 from phigen.spec.model import BirealisationChoice, Spec
 from phigen.splitting.ring import TIME
-from phigen.symbolic.expression import Expression, gradient, substitute, symbol, symbols_of, total
-from phigen.symbolic.symbols import MOMENTUM, Symbol, variation
+from phigen.symbolic.expression import Expression, substitute, symbol, symbols_of
+from phigen.symbolic.symbols import MOMENTUM, Symbol
 
 
 @dataclass(frozen=True)
@@ -88,18 +88,9 @@ def equation(cell: Cell, plan: SeriesPlan, coefficients: Coefficients) -> Equati
     relax = site_kernel(cell, "relax", "y at a site from x there and y around it", values[:size], "y", coefficients)
     purpose = "what a stage adds to x at a site, from y around it"
     advance = site_kernel(cell, "increment", purpose, values[size:], "change", coefficients)
-    return Equation(relax, advance, _slope(cell, values[:size], coefficients) if cell.relation == GRID else None)
-
-
-def _slope(cell: Cell, values: Sequence[Expression], coefficients: Coefficients) -> Kernel:
-    """The derivative of y as a function of y around, along a variation."""
-    names = [n for n, (f, _) in cell.places(*values).items() if f in cell.fields]
-    slopes = [
-        total(d * symbol(variation(n)) for n, d in zip(names, gradient(e, names), strict=True) if not d.is_zero)
-        for e in values
-    ]
-    purpose = "how y at a site follows y around it"
-    return site_kernel(cell, "slope", purpose, coefficients.hoist(slopes), "v", coefficients)
+    slopes = coefficients.hoist(along(cell, values[:size]))
+    slope = site_kernel(cell, "slope", "how y at a site follows y around it", slopes, "v", coefficients)
+    return Equation(relax, advance, slope)
 
 
 def _at_covectors(cell: Cell, maps: Mapping[str, Expression]) -> dict[str, Expression]:

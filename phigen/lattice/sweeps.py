@@ -25,6 +25,7 @@ from phigen.lattice.parts import (
     summands_of,
 )
 from phigen.lattice.series import SeriesPlan, equation, plan_series
+from phigen.lattice.variations import with_variations
 from phigen.scheme.alternation import Alternation, Schedule, with_clock
 from phigen.scheme.alternation import schedule as alternating
 from phigen.scheme.choosing import Choice, is_dated, planned, with_carrier
@@ -163,9 +164,10 @@ def build_sweeps(
     observed = _observables(cell)
     kernels = [*(sweep.kernel for part in swept for sweep in part), *((solved.relax, solved.advance) if solved else ())]
     sites = _sites(cell, plan.colouring, [*kernels, observed.energy, observed.casimirs, observed.vector_field])
-    kinds, partners = tuple(k for _, k in cell.casimirs.values()), _partners(cell)
+    kinds, partners = tuple(k for _, k in cell.casimirs.values()), _partners(cell, varied=solved is not None)
     if partners:
-        gathers = [*(sweep.gather for part in swept for sweep in part if sweep.gather), partners.energy, partners.field]
+        own = (partners.energy, partners.field, partners.varied)
+        gathers = [*(sweep.gather for part in swept for sweep in part if sweep.gather), *own]
         at_bonds = tuple(p.name for p in cell.parameters if p.at == "bonds")
         sites = replace(sites, ends=_ends(cell, [k for g in gathers for k in g.kernels]), at_bonds=at_bonds)
     settled = Sweeps(
@@ -241,16 +243,18 @@ def _gather(
     return Gather(tuple(ends), tuple(sums[0].values))
 
 
-def _partners(cell: Cell) -> Partners | None:
-    """Energies and forces of bonds or pairs."""
+def _partners(cell: Cell, *, varied: bool) -> Partners | None:
+    """Energies and forces of bonds or pairs; if so asked, with how the forces follow variations."""
     if cell.relation == GRID:
         return None
     what = "bond" if cell.relation == GRAPH else "pair"
-    empty = Gather((), ())
+    empty, purpose, sums = Gather((), ()), "what a site b adds to the forces at a site a", site_sums(cell)
+    follow = [replace(s, values=with_variations(cell, s.values)) for s in sums] if varied else []
     return Partners(
         _gather(cell, energies(cell), f"{what}_energy", f"the energy of a {what}") or empty,
-        _gather(cell, site_sums(cell), f"{what}_forces", "what a site b adds to the forces at a site a") or empty,
+        _gather(cell, sums, f"{what}_forces", purpose) or empty,
         cell.relation == GRAPH,
+        _gather(cell, follow, f"{what}_slopes", f"{purpose}, and to their variations") or empty,
     )
 
 

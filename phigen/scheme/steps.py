@@ -302,11 +302,15 @@ class Gather:
 
 @dataclass(frozen=True)
 class Partners:
-    """The sites of a graph or all pairs: half the energies of a site with others, and what moves it, by parameters."""
+    """The sites of a graph or all pairs: half the energies of a site with others, and what moves it, by parameters.
+
+    ``varied`` is the latter with its derivative along variations of the fields, where a step solves an `Equation`.
+    """
 
     energy: Gather
     field: Gather
     graph: bool = False
+    varied: Gather = Gather((), ())
 
 
 @dataclass(frozen=True)
@@ -329,18 +333,18 @@ class Equation:
 
     The inputs of the kernels are those of sweeps, where ``site`` are values of y, and of ``relax``, the right-hand
     side at a site, also ``start``: x there. ``advance`` is what x moves by. ``slope`` is the derivative of ``relax``
-    along a variation of y, for Newton's method; None on graphs and for pairs.
+    along a variation of y, for Newton's method.
     """
 
     relax: Kernel
     advance: Kernel
-    slope: Kernel | None = None
+    slope: Kernel
     most_sweeps: int = 200
 
     @property
     def kernels(self) -> tuple[Kernel, ...]:
         """All kernels, each once."""
-        return _present((self.relax, self.advance, self.slope))
+        return self.relax, self.advance, self.slope
 
 
 @dataclass(frozen=True)
@@ -389,7 +393,7 @@ class Sweeps(_Scheduled):
         swept_kernels = [sweep.kernel for sweep in swept]
         swept_kernels += self.equation.kernels if self.equation else ()
         gathers = [sweep.gather for sweep in swept if sweep.gather]
-        gathers += [self.partners.energy, self.partners.field] if self.partners else []
+        gathers += [self.partners.energy, self.partners.field, self.partners.varied] if self.partners else []
         return _present((self.prepare, self.refresh, *swept_kernels, *(k for g in gathers for k in g.kernels)))
 
 

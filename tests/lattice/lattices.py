@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import ctypes
+from collections.abc import Callable, Iterator
+
 import numpy as np
+import pytest
 
 from phigen.lattice.cell import Cell
 from phigen.lattice.states import Start
@@ -154,3 +158,15 @@ def on_grid(cell: Cell, start: Start, expression: Expression) -> np.ndarray:
         array = fields[base] if base in fields else start.parameters[base]
         found[symbol] = np.roll(array, [-o for o in offset], axis=tuple(range(len(offset))))
     return np.broadcast_to(evaluate([expression], found)[0], start.sizes)
+
+
+def with_threads(made: Callable[[], np.ndarray]) -> Iterator[np.ndarray]:
+    """What is made with one thread of OpenMP and with several, more than cores: those wait for one another asleep."""
+    try:
+        library = ctypes.CDLL("libgomp.so.1")
+    except OSError:
+        pytest.skip("no OpenMP")
+    for threads in (1, 3, 4):
+        library.omp_set_num_threads(threads)
+        yield made()
+    library.omp_set_num_threads(2)

@@ -36,6 +36,16 @@ order: 4
 hamiltonian: p**2/2 + 200*((q[i+1]-q)**2 + (q[j+1]-q)**2) + q**4/4
 runs: {r: {sizes: [3, 4], initial: {random: normal, seed: 3, scale: 0.1}, step: 0.2, steps: 8}}
 """
+STIFF_GRAPH = """\
+phigen: 1
+name: stiff_graph
+lattice: {graph: bonds}
+coordinates: [q, p]
+poisson: {canonical: {q: [q], p: [p]}}
+scheme: series
+hamiltonian: {sites: p**2/2 + q**4/4, bonds: "200*(q[a] - q[b])**2 + q[a]*p[b]**2/9"}
+runs: {r: {bonds: [[0, 1], [1, 2], [2, 3], [3, 0], [0, 2]], initial: {random: normal, scale: 0.1}, step: 0.2, steps: 8}}
+"""
 #: Names that JavaScript, or the printed loops, have for themselves.
 NAMES = """\
 phigen: 1
@@ -51,6 +61,7 @@ runs: {r: {sizes: [3, 3], initial: {random: normal, seed: 3}, step: 0.1, steps: 
 VARIANTS: dict[str, Callable[[], Spec]] = {
     **{name: lambda text=text: specs.loads(text) for name, text in LATTICES.items()},  # type: ignore[misc]
     "stiff": lambda: specs.loads(STIFF),
+    "stiff graph": lambda: specs.loads(STIFF_GRAPH),
     "names": lambda: specs.loads(NAMES),
     "spins by the series": lambda: replace(specs.loads(LATTICES["spins_2"]), scheme="series"),
     "a graph by the series": lambda: replace(specs.loads(LATTICES["spin_graph"]), scheme="series"),

@@ -1,17 +1,21 @@
-"""Steps so large that sweeps do not contract: Newton's method, by elimination in C, by Krylov spaces in NumPy."""
+"""Steps so large that sweeps do not contract: Newton's method, by elimination in C for chains, by Krylov spaces."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 import pytest
+from lattice.lattices import with_threads
+from tools import run, write
 
 from phigen import spec as specs
 from phigen.api import lattice_solver_of, solver_of
 from phigen.compilation import Compilation
 from phigen.compiler import compile_spec, emit
+from phigen.errors import StepError
 from phigen.lattice.building import cell_from_spec
 from phigen.lattice.expansion import expand
 from phigen.runtime.modules import load_module
@@ -25,9 +29,43 @@ TEXTS = {
     'poisson: {brackets: {u: {"u[i+1]": 30}}}\nhamiltonian: (u[i+1] - u)**2/2 - u**3/6',
     "sheet": f"order: 2\nlattice: {{axes: [i, j], boundary: [open, periodic]}}\n{CANONICAL}"
     "hamiltonian: p**2/2 + 200*((q[i+1]-q)**2 + (q[j+1]-q)**2) + q**4/4",
+    "net": f"order: 4\nlattice: {{graph: bonds}}\nparameters: {{k: {{value: 200, at: bonds}}}}\n{CANONICAL}"
+    'hamiltonian: {sites: p**2/2 + q**4/4, bonds: "k*(q[a]-q[b])**2 + q[a]*p[b]**2/9"}',
+    "swarm": f"order: 2\nlattice: {{pairs: all}}\nparameters: {{m: {{value: 1, at: sites}}}}\n{CANONICAL}"
+    'hamiltonian: {sites: p**2/(2*m), pairs: "100*m[a]*m[b]*(q[a]-q[b])**2/(1 + (q[a]-q[b])**2)"}',
 }
+#: Waves that do not interact: one correction solves a stage as well as it can, and a second one finds no more.
+LINEAR = f"order: 2\nlattice: {{axes: [i]}}\n{CANONICAL}hamiltonian: p**2/2 + 200*(q[i+1]-q)**2 + q*q[i+2] + p*p[i+1]/3"
+DRIVER = r"""
+#include <stdio.h>
+#include <stdlib.h>
+#include "linear.c"
+int main(void)
+{
+    const size_t sizes[1] = { 40 };
+    double x[80];
+    for (int k = 0; k < 80; ++k) x[k] = sin(k * k);
+    linear_solver s;
+    if (linear_init(&s, NULL, sizes, x, malloc(linear_work_size(sizes))) != linear_OK) return 1;
+    linear_set_step(&s, STEP);
+    linear_range(&s, s.coef);
+    linear_copy(s.y[0], s.x, &s);
+    const double first = linear_corrected(&s, s.coef, 0), second = linear_corrected(&s, s.coef, 1);
+    printf("%g %g", first, second);
+    return 0;
+}
+"""
+#: An equation without a solution where h is large: y = a + h²/4 exp(y).
+BURSTING = f"order: 2\nlattice: {{axes: [i, j]}}\n{CANONICAL}hamiltonian: p**2/2 - exp(q) + q*q[i+1]*q[j+1]/9"
 #: Few sites, whose matrix is a full one, and many.
-SIZES = {"ring": [(5,), (31,)], "chain": [(4,), (23,)], "waves": [(6,), (40,)], "sheet": [(3, 4)]}
+SIZES = {
+    "ring": [(5,), (31,)],
+    "chain": [(4,), (23,)],
+    "waves": [(6,), (40,)],
+    "sheet": [(3, 4), (9, 8)],
+    "net": [(6,), (30,)],
+    "swarm": [(5,)],
+}
 CASES = [(name, sizes) for name, listed in SIZES.items() for sizes in listed]
 
 
@@ -36,24 +74,68 @@ def compiled(name: str) -> Compilation:
     return compile_spec(specs.loads(f"phigen: 1\nname: stiff_{name}\n{TEXTS[name]}\n"))
 
 
+def bonds(name: str, sites: int) -> dict[str, np.ndarray]:
+    """A ring with chords."""
+    if name != "net":
+        return {}
+    ring = np.arange(sites)
+    return {"bonds": np.stack([ring, (ring * 7 + 3) % sites], axis=1)[(ring * 6 + 3) % sites != 0]}
+
+
 def start(name: str, sizes: tuple[int, ...]) -> np.ndarray:
     return 0.1 * np.random.default_rng(3).normal(size=(len(compiled(name).spec.coordinates), *sizes))
 
 
 @pytest.mark.parametrize(("name", "sizes"), CASES)
 def test_steps_that_sweeps_cannot_make_are_those_of_the_ordinary_system(name: str, sizes: tuple[int, ...]) -> None:
-    x, compilation = start(name, sizes), compiled(name)
+    x, compilation, more = start(name, sizes), compiled(name), bonds(name, sizes[0])
     module = load_module(emit(compilation.program, "numpy", "phigen")[f"stiff_{name}.py"], f"stiff_{name}")
-    rows, sites = module._coefficients(module._Sites(x.shape, {}), 0.2), module._Sites(x.shape, {})
+    _, sites = module._started(x, more)
+    rows = module._coefficients(sites, 0.2)
     with np.errstate(all="ignore"), pytest.raises(module.FailedError):
         module._by_sweeps(rows[0], x, x, sites)
-    whole = expand(cell_from_spec(compilation.spec), sizes).spec()
-    ordinary = replace(whole, order=compilation.order.order, composition="auto" if name != "ring" else "suzuki")
     if x.size < 20:
-        expected = solver_of(compile_spec(replace(ordinary, gauge="none", scheme="series")), "numpy")
-        reference = expected.integrate(x.reshape(-1), 0.2, 5).x[-1].reshape(x.shape)
+        whole = expand(cell_from_spec(compilation.spec), sizes, more["bonds"].tolist() if more else ())
+        order = compilation.order.order
+        spec = replace(whole.spec(), order=order, composition="suzuki" if order > 2 else "auto", gauge="none")
+        ordinary = solver_of(compile_spec(replace(spec, scheme="series")), "numpy")
+        reference = ordinary.integrate(x.reshape(-1), 0.2, 5).x[-1].reshape(x.shape)
     else:
-        reference = module.integrate(x, 0.2, 5)[-1]
-    for target in ("numpy", "c") if name != "sheet" else ("numpy",):
-        found = lattice_solver_of(compilation, target).integrate(x, 0.2, 5, 5).x[-1]
+        reference = module.integrate(x, 0.2, 5, **more)[-1]
+    for target in ("numpy", "c"):
+        found = lattice_solver_of(compilation, target).integrate(x, 0.2, 5, 5, **more).x[-1]
         np.testing.assert_allclose(found, reference, rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize("target", ["numpy", "c"])
+@pytest.mark.parametrize("profile", ["fast", "small"])
+def test_equations_without_a_solution_are_told(target: str, profile: str) -> None:
+    spec = specs.loads(f"phigen: 1\nname: bursting\n{BURSTING}\n")
+    found, x = lattice_solver_of(compile_spec(spec, profile=profile), target), np.zeros((2, 3, 4))
+    with pytest.raises(StepError, match="NO_CONVERGENCE") as failure:  # the matrix at x is singular
+        found.integrate(x, 2.0, 5, 1)
+    assert np.array_equal(failure.value.trajectory.x[-1], x)
+
+
+@pytest.mark.parametrize(("profile", "h", "left"), [("fast", 0.2, 1e-13), ("small", 0.05, 1e-5)])
+def test_one_correction_solves_a_linear_stage(profile: str, h: float, left: float, tmp_path: Path) -> None:
+    """On a ring, by elimination, and by a Krylov space. A wrong matrix would solve stages too, by more corrections."""
+    program = compile_spec(specs.loads(f"phigen: 1\nname: linear\n{LINEAR}\n"), profile=profile).program
+    write(tmp_path, {**emit(program, "c", "phigen"), "driver.c": DRIVER})
+    run(["cc", "-std=c99", f"-DSTEP={h}", "-o", "driver", "driver.c", "-lm"], tmp_path)
+    first, second = map(float, run(["./driver"], tmp_path).split())
+    assert first > 0.1
+    assert second < left * first
+
+
+@pytest.mark.parametrize("name", ["ring", "net"])
+def test_short_code_makes_the_same_steps(name: str) -> None:
+    x, more = start(name, (30,)), bonds(name, 30)
+    short = compile_spec(compiled(name).spec, profile="small")
+    by = [lattice_solver_of(c, "c").integrate(x, 0.2, 5, 5, **more).x[-1] for c in (short, compiled(name))]
+    np.testing.assert_allclose(*by, rtol=0, atol=1e-12)
+
+
+def test_threads_make_the_same_bits() -> None:
+    x, found = start("sheet", (50, 90)), lattice_solver_of(compiled("sheet"), "c")
+    assert len({run.tobytes() for run in with_threads(lambda: found.step(x, 0.1))}) == 1

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from lattice.lattices import with_threads
 from systems import compile_text
 
 from phigen import spec as specs
@@ -317,14 +318,6 @@ def test_steps_of_the_series_are_undone_by_steps_back(name: str, target: str) ->
     np.testing.assert_allclose(back, x, rtol=0, atol=5e-14)
 
 
-@pytest.mark.parametrize("target", ["numpy", "c"])
-def test_equations_that_sweeps_do_not_solve_are_told(target: str) -> None:
-    x, found = 4 * start("twisted"), solver("twisted", 2, target)
-    with pytest.raises(StepError, match="NO_CONVERGENCE") as failure:
-        found.integrate(x, 100.0, 5, 1, **disorder("twisted", x))
-    assert np.array_equal(failure.value.trajectory.x[-1], x)
-
-
 def test_large_angles_are_turned_exactly_too() -> None:
     x = start("xxz", (9,))
     by = [solver("xxz", 2, t).step(x, 3.0, J=4.0) for t in ("c", "numpy")]
@@ -335,7 +328,8 @@ def test_code_does_not_grow_with_the_lattice() -> None:
     for name in TEXTS.keys() - {"sheet", "magnet"}:  # three parts of two colours with nine neighbours; of five parts
         program = compile_spec(specs.loads(f"phigen: 1\nname: {name}\n{TEXTS[name]}\n"), profile="small").program
         lines = sum(len(text.splitlines()) for text in emit(program, "c", "phigen").values())
-        assert lines < 825 + 120 * ("graph" in TEXTS[name]) + 100 * (name in SERIES), (name, lines)
+        graph, series = "graph" in TEXTS[name], name in SERIES  # whose derivatives Newton's method needs
+        assert lines < 825 + 120 * graph + (425 + 110 * graph) * series, (name, lines)
 
 
 def test_each_sweep_says_what_it_moves_and_those_of_equal_code_are_one() -> None:
@@ -352,20 +346,9 @@ def test_each_sweep_says_what_it_moves_and_those_of_equal_code_are_one() -> None
 
 @pytest.mark.parametrize("name", ["sheet", "magnet", "dragged"])
 def test_threads_make_the_same_bits(name: str) -> None:
-    import ctypes
-
     found, x = solver(name, 2, "c"), start(name, (70, 90) if name != "magnet" else (6300,))
     ring = {"bonds": np.stack([np.arange(6300), (np.arange(6300) * 7 + 1) % 6300], axis=1)} if name == "magnet" else {}
-    try:
-        library = ctypes.CDLL("libgomp.so.1")
-    except OSError:
-        pytest.skip("no OpenMP")
-    runs = []
-    for threads in (1, 2, 3):
-        library.omp_set_num_threads(threads)
-        runs.append(found.integrate(x, 0.05, 5, 5, **ring).x[-1].tobytes())
-    library.omp_set_num_threads(2)
-    assert runs[0] == runs[1] == runs[2]
+    assert len({run.tobytes() for run in with_threads(lambda: found.integrate(x, 0.05, 5, 5, **ring).x[-1])}) == 1
 
 
 def test_long_rows_in_pieces_make_the_same_steps() -> None:

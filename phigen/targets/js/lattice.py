@@ -22,6 +22,9 @@ _OWN |= {"i", "j", "k", "bond", "here", "there", "colour", "colours", "chosen"}
 #: A space at which no line is broken.
 _FIXED = "\N{NO-BREAK SPACE}"
 
+#: Of the sites a and b of a bond or a pair.
+_INDEX = {"a": "i", "b": "j"}
+
 #: The runtime of lattices; after it what makes a step.
 MODULES = ("errors", "lattice", "sites")
 
@@ -30,7 +33,7 @@ def modules(step: Sweeps) -> list[str]:
     """The modules of the runtime."""
     if step.equation is None:
         return [*MODULES, "flows"]
-    return [*MODULES, "sweeps", *(["krylov"] if step.equation.slope else [])]
+    return [*MODULES, "sweeps", "krylov"]
 
 
 def switches(step: Sweeps) -> dict[str, bool]:
@@ -42,7 +45,6 @@ def switches(step: Sweeps) -> dict[str, bool]:
         "GRAPH": _partners(step).graph,
         "SPLIT": step.equation is None,
         "BY_COLOUR": bool(step.by_colour),
-        "STIFF": step.equation is not None and step.equation.slope is not None,
     }
 
 
@@ -81,8 +83,7 @@ def _facts(program: Program, step: Sweeps) -> dict[str, object]:
 
 def _tables(program: Program, step: Sweeps) -> dict[str, object]:
     """What the runtime goes by."""
-    sites, schedule, partners = step.sites, step.schedule, _partners(step)
-    swept = [sweep.gather for part in step.parts for sweep in part if sweep.gather]
+    sites, schedule = step.sites, step.schedule
     return {
         "open": json.dumps(sites.open),
         "least": json.dumps(sites.least),
@@ -91,7 +92,7 @@ def _tables(program: Program, step: Sweeps) -> dict[str, object]:
         "bounds": json.dumps([_pairs(w) for w in _bounds(step, program)]),
         "colours": sites.colours if sites.colours > 1 else "",
         "weights": json.dumps(sites.weights),
-        "gathered": max(len(g.names) for g in (*swept, partners.energy, partners.field)) if step.partners else 0,
+        "gathered": _most_sums(step),
         "coefficients": step.row,
         "times": json.dumps(schedule.times),
         "unit": "stages" if step.equation else "flows",
@@ -112,7 +113,7 @@ def kernels(program: Program, step: Sweeps) -> Iterator[str]:
             yield from (printed.gathering(ends, "coef") for ends in sweep.gather.ends)
         yield printed.sweep(sweep)
     if step.partners:
-        for gather in (step.partners.energy, step.partners.field):
+        for gather in (step.partners.energy, step.partners.field, step.partners.varied):
             yield from (printed.gathering(ends, "params") for ends in gather.ends)
     if step.equation:
         for kernel in step.equation.kernels:
@@ -160,6 +161,13 @@ def _contents(program: Program, step: Sweeps) -> list[str]:
     ]
 
 
+def _most_sums(step: Sweeps) -> int:
+    """The most sums over other sites that are held for each."""
+    swept = [sweep.gather for part in step.parts for sweep in part if sweep.gather]
+    partners = _partners(step)
+    return max(len(g.names) for g in (*swept, partners.energy, partners.field, partners.varied))
+
+
 def _listed(part: Sequence[Sweep]) -> str:
     return f"[{', '.join(camel(sweep.kernel.name) for sweep in part)}]"
 
@@ -193,11 +201,12 @@ class _Printed:
 
     def of_equation(self, kernel: Kernel) -> str:
         """A kernel of the equation of a stage, at the y that is its x."""
-        own = [name for name, array in (("start", "start"), ("v", "varied")) if array in kernel.inputs]
-        arguments = ["coef", *own[:1], "x", *own[1:]] if own[:1] == ["start"] else ["coef", "x", *own]
-        body = _Body(self, kernel, _partners(self.step).field.names)
+        starts, varied = "start" in kernel.inputs, kernel.name == "slope"
+        arguments = ["coef", *["start"] * starts, "x", *["v"] * varied]
+        gather = _partners(self.step).varied if varied else _partners(self.step).field
+        body = _Body(self, kernel, gather.names)
         body.lines += [f"{self._entry('out', s.index)} = {body.show(s.value)};" for s in body.code.stores]
-        before = self._forces("sites.params") if kernel.inputs["gathered"] else []
+        before = self._forces("sites.params", gather, ", v" * varied) if kernel.inputs["gathered"] else []
         return self._function(kernel, [*arguments, "sites", "out"], before, body)
 
     def seen(self, kernel: Kernel) -> str:
@@ -207,7 +216,7 @@ class _Printed:
         body.lines += [f"{self._entry('out', s.index)} = {body.show(s.value)};" for s in body.code.stores]
         before: list[str] = []
         if kernel.name == "vector_field" and partners.field.names:
-            before = self._forces("params")
+            before = self._forces("params", partners.field)
         if kernel.name == "energy" and partners.energy.names:
             before = ["sites.sums.fill(0);"]
             before += [f"{camel(e.kernel.name)}(params, x, sites);" for e in partners.energy.ends]
@@ -228,10 +237,11 @@ class _Printed:
         else:
             body.lines.insert(0, "if (j === i) continue;")
             loops = ["for (let i = 0; i < count; i++) {", "  for (let j = 0; j < count; j++) {"]
-        return self._function(ends.kernel, [first, "x", "sites", *by_colour], [], body, loops)
+        varied = ["v"] if ends in _partners(self.step).varied.ends else []
+        return self._function(ends.kernel, [first, "x", *varied, "sites", *by_colour], [], body, loops)
 
-    def _forces(self, params: str) -> list[str]:
-        called = [f"{camel(e.kernel.name)}({params}, x, sites);" for e in _partners(self.step).field.ends]
+    def _forces(self, params: str, gather: Gather, more: str = "") -> list[str]:
+        called = [f"{camel(e.kernel.name)}({params}, x{more}, sites);" for e in gather.ends]
         return ["sites.sums.fill(0);", *called]
 
     def _entry(self, array: str, field: int) -> str:
@@ -301,8 +311,14 @@ class _Body:
         elif s.kind == INITIAL:
             self.scope.bind(s, f"start[{at_field('i', fields.index(str(s.key[0])))}]")
         elif s.kind == VARIATION:
-            field, offset = self.printed.step.sites.places[str(s.key[0])]
-            self.scope.bind(s, f"v[{at_field(self._site(offset), fields.index(field))}]")
+            sites, place = self.printed.step.sites, str(s.key[0])
+            if place in sites.ends:
+                field, end = sites.ends[place]
+                site = _INDEX[end]
+            else:
+                field, offset = sites.places[place]
+                site = self._site(offset)
+            self.scope.bind(s, f"v[{at_field(site, fields.index(field))}]")
         else:
             number = self.printed.weights.index(s)
             table = self._array(f"sites.present[{number}]", Symbol(PRESENT, number))
@@ -314,7 +330,7 @@ class _Body:
             self.lines.append(f"const {self.scope[s]} = {self._at(s)}[bond[k]];")
         elif s in sites.ends:
             base, end = sites.ends[s]
-            self.lines.append(f"const {self.scope[s]} = {self._value(base, 'i' if end == 'a' else 'j')};")
+            self.lines.append(f"const {self.scope[s]} = {self._value(base, _INDEX[end])};")
         elif s in sites.places:
             base, offset = sites.places[s]
             self.lines.append(f"const {self.scope[s]} = {self._value(base, self._site(offset))};")

@@ -20,7 +20,7 @@ _OWN = frozenset({"coef", "x", "sites", "parameters", "h", "kick", "np", *LANGUA
 
 
 #: The templates of implicit steps.
-_SERIES = ("lattice_series", "lattice_guesses")
+_SERIES = ("lattice_series", "lattice_guesses", "lattice_newton")
 
 
 def body(program: Program, step: Sweeps, prepare: str) -> str:
@@ -51,18 +51,13 @@ def body(program: Program, step: Sweeps, prepare: str) -> str:
         "kicks": bool(schedule.multiples),
         "at_bonds": _tuple(map(repr, sites.at_bonds)),
         "by_colour": repr(step.by_colour),
-        "newton": step.equation is not None and step.equation.slope is not None,
-        "middle": "_by_sweeps(rows[row], x, guess, sites)",
         "most_sweeps": step.equation.most_sweeps if step.equation else 0,
     }
-    if values["newton"]:
-        values["middle"] = "_middle(rows[row], x, guess, sites, past)"
     graph = step.partners is not None and step.partners.graph
     values["sites"] = "_Coloured" if step.by_colour else "_Graph" if graph else "_Sites"
     values["flow"] = "(part, sites.colour), row in sites.schedule" if step.by_colour else "part, row in SCHEDULE"
     graphs = ["lattice_graph", *(["lattice_colours"] if step.by_colour else [])] if graph else []
     parts = ["lattice", "lattice_sites", *graphs, *(_SERIES if step.equation else ("lattice_splitting",))]
-    parts += ["lattice_newton"] if step.equation and step.equation.slope else []
     parts.append("lattice_steps")
     pieces = [render("numpy", f"{part}.py", values) for part in parts]
     pieces += [render("numpy", "lattice_seen.py", values), prepare]
@@ -106,10 +101,14 @@ def _at_middle(program: Program, step: Sweeps, kernel: Kernel) -> str:
     """A kernel of the equation of a stage as a function of y, which is its x, and of x, where the stage starts."""
     code = lower(kernel)
     scope = Scope(PYTHON_RESERVED | _OWN | {"start", "gathered", "v"})
-    varied = ", v" if "varied" in kernel.inputs else ""
+    varied = ", v" if kernel.name == "slope" else ""
     lines, gathers = [f"def _{kernel.name}(coef, start, x{varied}, sites):"], kernel.inputs["gathered"]
-    lines += ["    gathered = _forces(sites.parameters, x, sites)"] if gathers else []
-    lines += _body(program, step, kernel, code, scope, step.partners.field.names if step.partners else ())
+    names: Sequence[str] = ()
+    if gathers and step.partners:
+        gather = step.partners.varied if varied else step.partners.field
+        names = gather.names
+        lines.append(f"    gathered = _{'slopes' if varied else 'forces'}(sites.parameters, x{varied}, sites)")
+    lines += _body(program, step, kernel, code, scope, names)
     show = LANGUAGE.printer(scope)
     values = ", ".join(f"np.broadcast_to({show(s.value)}, sites.sizes)" for s in code.stores)
     return "\n".join([*lines, f"    return np.array([{values}])\n"])
@@ -143,18 +142,20 @@ def _gathers(program: Program, step: Sweeps) -> Iterator[str]:
             if sweep.gather:
                 name = sweep.kernel.name.replace("sweep", "gather")
                 yield _gather(program, step, sweep.gather, name, "coef")
-        for name, gather in (("energies", step.partners.energy), ("forces", step.partners.field)):
+        partners = {"energies": step.partners.energy, "forces": step.partners.field, "slopes": step.partners.varied}
+        for name, gather in partners.items():
             if gather.names:
                 yield _gather(program, step, gather, name, "parameters")
 
 
 def _gather(program: Program, step: Sweeps, gather: Gather, name: str, first: str) -> str:
     """Kernels of bonds or pairs, summed up at each site."""
-    lines = [f"def _{name}({first}, x, sites):", "    sums = 0.0"]
+    varied = ", v" if name == "slopes" else ""
+    lines = [f"def _{name}({first}, x{varied}, sites):", "    sums = 0.0"]
     lines += ['    with np.errstate(all="ignore"):']
     for ends in gather.ends:
         code = lower(ends.kernel)
-        scope = Scope(PYTHON_RESERVED | _OWN | {"sums", "gathered", "here", "there", "bond"})
+        scope = Scope(PYTHON_RESERVED | _OWN | {"v", "sums", "gathered", "here", "there", "bond"})
         body = _body(program, step, ends.kernel, code, scope)
         show = LANGUAGE.printer(scope)
         if step.partners and step.partners.graph:
@@ -183,8 +184,7 @@ def _body(
             elif isinstance(s, Symbol) and s.kind == INITIAL:
                 scope.bind(s, f"start[{program.coordinates.index(str(s.key[0]))}]")
             elif isinstance(s, Symbol) and s.kind == VARIATION:
-                field, offset = step.sites.places[str(s.key[0])]
-                lines.append(f"    {scope[s]} = {_shifted(f'v[{program.coordinates.index(field)}]', offset)}")
+                lines.append(f"    {scope[s]} = {_read(program, step, str(s.key[0]), 'v')}")
             elif isinstance(s, Symbol):
                 bounds = ", ".join(map(str, s.key))
                 scope.bind(s, f"coef[{i}]" if s.kind == COEFFICIENT else f"sites.present({bounds})")
@@ -200,16 +200,16 @@ def _body(
     return lines + [f"    {scope[a.target]} = {show(a.value)}" for a in code.assignments]
 
 
-def _read(program: Program, step: Sweeps, name: str) -> str:
+def _read(program: Program, step: Sweeps, name: str, array: str = "x") -> str:
     fields: Sequence[str] = program.coordinates
     if name in step.sites.ends:
         base, end = step.sites.ends[name]
-        text = f"x[{fields.index(base)}]" if base in fields else f'sites.parameters["{base}"]'
+        text = f"{array}[{fields.index(base)}]" if base in fields else f'sites.parameters["{base}"]'
         if step.partners and step.partners.graph:
             return f"{text}[{'here' if end == 'a' else 'there'}]"
         return f"{text}[:, None]" if end == "a" else text
     base, offset = step.sites.places[name]
-    text = f"x[{fields.index(base)}]" if base in fields else f'sites.parameters["{base}"]'
+    text = f"{array}[{fields.index(base)}]" if base in fields else f'sites.parameters["{base}"]'
     return _shifted(text, offset)
 
 

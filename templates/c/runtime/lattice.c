@@ -26,12 +26,18 @@ enum {
 #endif
     PHI_LEAD = (PHI_HALO + 7) / 8 * 8,
     PHI_BUFFER = 256,
-#if PHI_STIFF
-    PHI_IMPLICIT = (3 + PHI_STAGES * PHI_DIFFERENCES) * PHI_DIM, /* arrays for y, its guesses and its variation */
-#elif PHI_GUESSES
-    PHI_IMPLICIT = (2 + PHI_STAGES * PHI_DIFFERENCES) * PHI_DIM, /* arrays for y and its guesses */
-#elif PHI_SERIES
-    PHI_IMPLICIT = 2 * PHI_DIM, /* arrays for y */
+#if PHI_SERIES
+    PHI_IMPLICIT = (2 /* arrays for y, its guesses and its variations */
+#if PHI_GUESSES
+        + PHI_STAGES * PHI_DIFFERENCES
+#endif
+#if PHI_BANDED
+        + 1
+#endif
+#if PHI_KRYLOV
+        + PHI_DIRECTIONS + 1
+#endif
+        ) * PHI_DIM,
 #endif
     PHI_RESERVED = PHI_ARRAYS + PHI_DIM
 #if PHI_GATHER
@@ -42,10 +48,19 @@ enum {
 #endif
 };
 
+#if PHI_KRYLOV
+/* The doubles of each row for sums over its pieces. */
+static size_t phi_row_sums(size_t length) { return (length / PHI_PIECE + 1) * (PHI_DIRECTIONS + 1); }
+
+#endif
 /* Sizes as they have to be: the widths of rows and the number of rows, 0 if they are not allowed. */
 static size_t phi_shape(const size_t sizes[PHI_AXES], ptrdiff_t *width)
 {
-    const size_t most = SIZE_MAX / 64 / PHI_ARRAYS;
+#if PHI_BANDED
+    const size_t most = SIZE_MAX / 64 / (PHI_RESERVED + 8 * PHI_BAND * PHI_DIM);
+#else
+    const size_t most = SIZE_MAX / 64 / PHI_RESERVED;
+#endif
     size_t rows = 1;
     for (int a = 0; a < PHI_AXES; ++a) {
         if (sizes[a] < phi_least[a] || sizes[a] % phi_periods[a] != 0 || sizes[a] > most / 2) return 0;
@@ -69,12 +84,17 @@ size_t phi_work_size(const size_t sizes[PHI_AXES])
 {
     ptrdiff_t width = 0;
     const size_t rows = sizes == NULL ? 0 : phi_shape(sizes, &width);
-    const size_t row = PHI_RESERVED * (size_t)width * sizeof(double) + PHI_LINES * sizeof(ptrdiff_t);
+#if PHI_KRYLOV
+    const size_t doubles = rows == 0 ? 0 : PHI_RESERVED * (size_t)width + phi_row_sums(sizes[PHI_AXES - 1]);
+#else
+    const size_t doubles = PHI_RESERVED * (size_t)width;
+#endif
+    const size_t row = doubles * sizeof(double) + PHI_LINES * sizeof(ptrdiff_t);
 #if PHI_GRAPH
     if (rows == 0 || !phi_few(sizes[0], bonds)) return 0;
     return row + phi_graph_size(sizes[0], bonds) + 128;
 #else
-#if PHI_STIFF
+#if PHI_BANDED
     phi_matrix matrix;
     const size_t more = rows == 0 ? 0 : phi_matrix_of(sizes[0], NULL, &matrix) * sizeof(double);
     return rows == 0 ? 0 : rows * row + more + 64;
@@ -137,14 +157,18 @@ static void phi_place_middle(phi_solver *s, double *memory, size_t block)
     for (int k = 0; k < PHI_ARRAYS; ++k)
         for (int side = 0; side < 2; ++side)
             s->y[side][k] = k < PHI_DIM ? memory + (size_t)(2 * k + side) * block : s->x[k];
-#if PHI_GUESSES
     memory += 2 * PHI_DIM * block;
+#if PHI_GUESSES
     for (int stage = 0; stage < PHI_STAGES; ++stage)
         for (int d = 0; d < PHI_DIFFERENCES; ++d)
             for (int k = 0; k < PHI_DIM; ++k, memory += block) s->guess[stage].difference[d][k] = memory;
 #endif
-#if PHI_STIFF
+#if PHI_BANDED
     for (int k = 0; k < PHI_DIM; ++k, memory += block) s->v[k] = memory;
+#endif
+#if PHI_KRYLOV
+    for (int d = 0; d <= PHI_DIRECTIONS; ++d)
+        for (int k = 0; k < PHI_DIM; ++k, memory += block) s->space[d][k] = memory;
 #endif
 }
 
@@ -233,9 +257,14 @@ phi_status phi_init(phi_solver *s, const phi_params *params, const size_t sizes[
     s->params = own;
     double *aligned = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64) + PHI_LEAD;
     const size_t block = rows * (size_t)width;
-    s->lines = (ptrdiff_t *)(void *)(aligned - PHI_LEAD + PHI_RESERVED * block);
+    double *end = aligned - PHI_LEAD + PHI_RESERVED * block;
+#if PHI_KRYLOV
+    s->sums = end;
+    end += rows * phi_row_sums(length);
+#endif
+    s->lines = (ptrdiff_t *)(void *)end;
     for (size_t r = 0; r < rows; ++r) phi_find_lines(s, r, s->lines + r * PHI_LINES);
-#if PHI_STIFF
+#if PHI_BANDED
     s->matrix = (double *)(void *)(s->lines + PHI_LINES);
 #endif
     for (size_t k = 0; k < PHI_ARRAYS; ++k) s->x[k] = aligned + k * block;

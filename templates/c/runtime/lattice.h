@@ -49,11 +49,15 @@ typedef struct {
     phi_guess guess[PHI_STAGES];
 #endif
     size_t sweeps;            /* that stages took since phi_init */
-#if PHI_STIFF
     int stiff;                /* whether sweeps have failed */
+    double usual[PHI_DIM];    /* the sizes of the fields of y */
+#if PHI_BANDED
     const double *factored;   /* the coefficients that the matrix is of, or NULL */
     double *v[PHI_DIM];       /* a variation of y */
     double *matrix;           /* see phi_factorise */
+#endif
+#if PHI_KRYLOV
+    double *space[PHI_DIRECTIONS + 1][PHI_DIM], *sums; /* variations of y, sums over pieces: see phi_krylov */
 #endif
 #endif
     size_t steps;             /* good steps since phi_init */

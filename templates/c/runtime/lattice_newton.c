@@ -1,187 +1,73 @@
 #ifndef PHI_FILE_LATTICE_NEWTON
 #define PHI_FILE_LATTICE_NEWTON
 #include <math.h>
-#include <string.h>
 
 #include "lattice.h"
 #include "model.h"
 #include "rows.c"
 #include "sweeps.h"
 
+#if PHI_BANDED
+#include "lattice_band.c"
+#else
+#include "lattice_krylov.c"
+#endif
+
 /* ---- Newton's method where sweeps fail ---- */
-static void phi_swap(double *a, double *b)
-{
-    const double held = *a;
-    *a = *b;
-    *b = held;
-}
-
-/* The row of the largest of some entries. */
-static ptrdiff_t phi_largest(const double *entries, ptrdiff_t count)
-{
-    ptrdiff_t found = 0;
-    for (ptrdiff_t k = 1; k < count; ++k)
-        if (fabs(entries[k]) > fabs(entries[found])) found = k;
-    return found;
-}
-
-/* LU of a matrix of so many columns, which are so far apart, with entry (i, j) at column[j][i - low[j]]: the band's A, or D.
-   Entries beside the diagonal are below rows, above rows far. */
-static int phi_decompose(double *a, ptrdiff_t n, ptrdiff_t tall, ptrdiff_t middle, ptrdiff_t below, double *pivots)
-{
-    ptrdiff_t last = 0;
-    for (ptrdiff_t j = 0; j < n; ++j) { /* entry (i, j) is a[j * tall + middle + i - j], or, of D, a[j * tall + i] */
-        const ptrdiff_t under = n - 1 - j < below ? n - 1 - j : below, step = middle < 0 ? tall : tall - 1;
-        double *diagonal = a + j * tall + (middle < 0 ? j : middle);
-        const ptrdiff_t p = phi_largest(diagonal, under + 1);
-        pivots[j] = (double)p;
-        if (!(fabs(diagonal[p]) > 0.0)) return 0;
-        const ptrdiff_t reach = middle < 0 ? n - 1 : j + p + below < n - 1 ? j + p + below : n - 1;
-        last = reach > last ? reach : last;
-        for (ptrdiff_t k = j; p != 0 && k <= last; ++k) phi_swap(diagonal + (k - j) * step, diagonal + p + (k - j) * step);
-        for (ptrdiff_t i = 1; i <= under; ++i) diagonal[i] /= *diagonal;
-        for (ptrdiff_t k = j + 1; k <= last; ++k) {
-            double *entry = diagonal + (k - j) * step;
-            for (ptrdiff_t i = 1; i <= under; ++i) entry[i] -= diagonal[i] * *entry;
-        }
-    }
-    return 1;
-}
-
-/* Solve with it, in place. */
-static void phi_substitute(
-    const double *a, ptrdiff_t n, ptrdiff_t tall, ptrdiff_t middle, ptrdiff_t below, const double *pivots, double *x)
-{
-    for (ptrdiff_t j = 0; j < n; ++j) {
-        const ptrdiff_t under = n - 1 - j < below ? n - 1 - j : below;
-        const double *diagonal = a + j * tall + (middle < 0 ? j : middle);
-        if (pivots[j] > 0.0) phi_swap(x + j, x + j + (ptrdiff_t)pivots[j]);
-        for (ptrdiff_t i = 1; i <= under; ++i) x[j + i] -= diagonal[i] * x[j];
-    }
-    for (ptrdiff_t j = n - 1; j >= 0; --j) {
-        const ptrdiff_t over = middle < 0 || j < middle ? j : middle;
-        const double *diagonal = a + j * tall + (middle < 0 ? j : middle);
-        x[j] /= *diagonal;
-        for (ptrdiff_t i = 1; i <= over; ++i) x[j - i] -= diagonal[-i] * x[j];
-    }
-}
-
-static void phi_put_entry(const phi_matrix *m, ptrdiff_t i, ptrdiff_t j, double value)
-{
-    if (i < m->inner && j < m->inner)
-        m->a[j * PHI_TALL + 2 * PHI_BAND + i - j] = value;
-    else if (i < m->inner)
-        m->b[(j - m->inner) * m->inner + i] = value;
-    else if (j < m->inner)
-        m->c[j * m->border + i - m->inner] = value;
-    else
-        m->d[(j - m->inner) * m->border + i - m->inner] = value;
-}
-
-/* The columns of one field at every PHI_APART-th site, or at one that is left over, from what a sweep does to them. */
-static void phi_probe(phi_solver *s, const phi_matrix *m, const double *coef, int now, ptrdiff_t first, ptrdiff_t count, int f)
-{
-    const ptrdiff_t sites = s->length, apart = 2 * PHI_REACH + 1;
-    const ptrdiff_t reach = sites < apart ? sites / 2 : PHI_REACH;
-    for (int k = 0; k < PHI_DIM; ++k) {
-        for (ptrdiff_t i = -PHI_HALO; i < sites + PHI_HALO; ++i) s->v[k][i] = 0.0;
-        for (ptrdiff_t i = 0; k == f && i < count; ++i) s->v[k][first + i * apart] = 1.0;
-        phi_ends(s->v[k], sites, 0, sites);
-    }
-    phi_slope_rows(s, coef, 1, now, 0, phi_pieces(s));
-    for (ptrdiff_t column = 0; column < count; ++column)
-        for (ptrdiff_t o = -reach; o <= reach; ++o) {
-            const ptrdiff_t j = first + column * apart;
-            ptrdiff_t i = j + o;
-            if (phi_open[0] && (i < 0 || i >= sites)) continue;
-            i += (i < 0 ? sites : 0) - (i >= sites ? sites : 0);
-            for (int k = 0; k < PHI_DIM; ++k)
-                phi_put_entry(m, i * PHI_DIM + k, j * PHI_DIM + f, (i == j && k == f ? 1.0 : 0.0) - s->y[1 - now][k][i]);
-        }
-}
-
-/* The matrix at s->y[now], factorised; 0 if it is singular. */
-static int phi_factorise(phi_solver *s, const double *coef, int now)
-{
-    phi_matrix m;
-    const size_t entries = phi_matrix_of(s->sites, s->matrix, &m);
-    const ptrdiff_t sites = s->length, apart = 2 * PHI_REACH + 1, whole = sites / apart, inner = m.inner, border = m.border;
-    memset(s->matrix, 0, entries * sizeof *s->matrix);
-    for (int f = 0; f < PHI_DIM; ++f) {
-        for (ptrdiff_t first = 0; whole > 0 && first < apart; ++first) phi_probe(s, &m, coef, now, first, whole, f);
-        for (ptrdiff_t i = whole * apart; i < sites; ++i) phi_probe(s, &m, coef, now, i, 1, f);
-    }
-    if (!phi_decompose(m.a, inner, PHI_TALL, 2 * PHI_BAND, PHI_BAND, m.pivots)) return 0;
-    for (ptrdiff_t j = 0; j < border; ++j) {
-        double *b = m.b + j * inner, *d = m.d + j * border;
-        phi_substitute(m.a, inner, PHI_TALL, 2 * PHI_BAND, PHI_BAND, m.pivots, b);
-        for (ptrdiff_t k = 0; k < inner; ++k)
-            for (ptrdiff_t i = 0; i < border; ++i) d[i] -= m.c[k * border + i] * b[k];
-    }
-    return phi_decompose(m.d, border, border, -1, border, m.pivots + inner);
-}
-
-/* The correction of s->y[now], added to it: its size, in sizes of y. */
-static double phi_correct(phi_solver *s, int now)
-{
-    phi_matrix m;
-    phi_matrix_of(s->sites, s->matrix, &m);
-    const ptrdiff_t sites = s->length, inner = m.inner, border = m.border;
-    double *lower = m.side + inner, size[PHI_DIM] = { 0.0 }, change[PHI_DIM] = { 0.0 }, largest = 0.0, moved = 0.0;
-    for (ptrdiff_t i = 0; i < sites; ++i)
-        for (int k = 0; k < PHI_DIM; ++k) m.side[i * PHI_DIM + k] = s->y[1 - now][k][i] - s->y[now][k][i];
-    phi_substitute(m.a, inner, PHI_TALL, 2 * PHI_BAND, PHI_BAND, m.pivots, m.side);
-    for (ptrdiff_t k = 0; k < inner; ++k)
-        for (ptrdiff_t i = 0; i < border; ++i) lower[i] -= m.c[k * border + i] * m.side[k];
-    phi_substitute(m.d, border, border, -1, border, m.pivots + inner, lower);
-    for (ptrdiff_t j = 0; j < border; ++j)
-        for (ptrdiff_t i = 0; i < inner; ++i) m.side[i] -= m.b[j * inner + i] * lower[j];
-    for (ptrdiff_t i = 0; i < sites; ++i)
-        for (int k = 0; k < PHI_DIM; ++k) {
-            const double by = m.side[i * PHI_DIM + k];
-            s->y[now][k][i] += by;
-            change[k] = phi_larger(change[k], fabs(by));
-            size[k] = phi_larger(size[k], fabs(s->y[now][k][i]));
-        }
-    for (int k = 0; k < PHI_DIM; ++k) phi_ends(s->y[now][k], sites, 0, sites);
-    for (int k = 0; k < PHI_DIM; ++k) largest = phi_larger(largest, size[k]);
-    for (int k = 0; k < PHI_DIM; ++k) moved = phi_larger(moved, change[k] / (size[k] + 1e-3 * largest + 1e-300));
-    return moved;
-}
-
-#define PHI_PLAUSIBLE 1.5 /* how far from x a solution is one of the motion, in sizes of x and of what the field says */
-enum { PHI_MOST_ITERATIONS = 60 };
+#define PHI_PLAUSIBLE 1.5 /* in sizes of x and of what the field says */
+enum { PHI_MOST_ITERATIONS = 200 };
 
 /* The sum of the distances of y from x; with x added that of the sizes of x. */
 static double phi_distance(const phi_solver *s, int side, double added)
 {
     double sum = 0.0;
     for (int k = 0; k < PHI_DIM; ++k)
-        for (ptrdiff_t i = 0; i < s->length; ++i)
-            sum += fabs(s->y[side][k][i] - s->x[k][i]) + added * fabs(s->x[k][i]);
+        for (size_t r = 0; r < s->rows; ++r) {
+            const double *y = s->y[side][k] + (ptrdiff_t)r * s->width, *x = s->x[k] + (ptrdiff_t)r * s->width;
+            for (ptrdiff_t i = 0; i < s->length; ++i) sum += fabs(y[i] - x[i]) + added * fabs(x[i]);
+        }
     return sum;
 }
 
-/* y in the middle of a stage, in s->y[0]. The matrix is kept while it serves. */
-static phi_status phi_newton(phi_solver *s, const double *coef, int stage)
+/* The correction of s->y[now] by the matrix, which is kept while it serves, or as well as a Krylov space allows, to the other: how far
+   y moves, in sizes of each field. Not a number if it cannot be made. */
+static double phi_corrected(phi_solver *s, const double *coef, int now)
 {
-    double before = 0.0;
+#if PHI_BANDED
+    if (s->factored != coef && !phi_factorise(s, coef, now)) return HUGE_VAL;
+    s->factored = coef;
+    if (!isfinite(phi_relaxed(s, coef, 1, now))) return HUGE_VAL;
+    phi_eliminate(s, now);
+#else
+    if (!isfinite(phi_relaxed(s, coef, 1, now))) return HUGE_VAL;
+    phi_subtract(s, NULL, now, s->y[now], s->space[0]);
+    if (!phi_krylov(s, coef, now, s->y[now], s->y[1 - now])) return HUGE_VAL;
+#endif
+    ++s->sweeps;
+    return phi_relaxed(s, NULL, 1, now);
+}
+
+/* How far from x a solution is one of the motion. */
+static double phi_range(phi_solver *s, const double *coef)
+{
     phi_copy(s->y[0], s->x, s);
     phi_relaxed(s, coef, 1, 0);
-    const double far = PHI_PLAUSIBLE * phi_distance(s, 1, 1.0);
-    phi_predict(s, stage);
+    return PHI_PLAUSIBLE * phi_distance(s, 1, 1.0);
+}
+
+/* y in the middle of a stage, from the guess in s->y[0]; it is in s->y[*now]. */
+static phi_status phi_newton(phi_solver *s, const double *coef, double range, int *now)
+{
+    double before = 0.0;
     for (int iteration = 0; iteration < PHI_MOST_ITERATIONS; ++iteration) {
-        if (s->factored != coef) {
-            if (!phi_factorise(s, coef, 0)) return PHI_SINGULAR;
-            s->factored = coef;
-        }
-        if (!isfinite(phi_relaxed(s, coef, 1, 0))) return PHI_NO_CONVERGENCE;
-        ++s->sweeps;
-        const double change = phi_correct(s, 0), shrunk = before - change;
+        const double change = phi_corrected(s, coef, *now), shrunk = before - change;
+        *now = 1 - *now;
         if (!isfinite(change)) return PHI_NO_CONVERGENCE;
         if (change * change <= shrunk * PHI_SETTLED || (shrunk <= 0.0 && change <= PHI_ROUNDING && iteration > 0))
-            return phi_distance(s, 0, 0.0) <= far ? PHI_OK : PHI_NO_CONVERGENCE;
+            return phi_distance(s, *now, 0.0) <= range ? PHI_OK : PHI_NO_CONVERGENCE;
+#if PHI_BANDED
         if (iteration > 0 && change > 0.25 * before && change > PHI_ROUNDING) s->factored = NULL;
+#endif
         before = change;
     }
     return PHI_NO_CONVERGENCE;

@@ -36,8 +36,8 @@ static size_t phi_share(size_t units, size_t *first)
 
 static double phi_larger(double a, double b) { return isnan(a) || a > b ? a : b; }
 
-/* A sweep from s->y[now] to the other: how far y moves, in sizes of each field. Not finite if y is not. */
-static double phi_relaxed(const phi_solver *s, const double *coef, int far, int now)
+/* How far y moves from s->y[now] to the other, by a sweep, or without coefficients as it is. Not finite if y is not. */
+static double phi_relaxed(phi_solver *s, const double *coef, int far, int now)
 {
     const size_t units = s->rows * phi_pieces(s);
     phi_extent whole = { { 0.0 }, { 0.0 } };
@@ -45,7 +45,11 @@ static double phi_relaxed(const phi_solver *s, const double *coef, int far, int 
     {
         phi_extent own = { { 0.0 }, { 0.0 } };
         size_t first, end = phi_share(units, &first);
-        phi_relax_rows(s, coef, far, now, &own, first, end);
+        if (coef != NULL) phi_relax_rows(s, coef, far, now, &own, first, end);
+        for (size_t unit = first; coef == NULL && unit < end; ++unit) {
+            const phi_piece at = phi_piece_of(s, unit);
+            phi_measure(s->y[now], s->y[1 - now], &at, &own);
+        }
         PHI_ONE_BY_ONE
         for (int k = 0; k < PHI_DIM; ++k) {
             whole.change[k] = phi_larger(whole.change[k], own.change[k]);
@@ -54,18 +58,19 @@ static double phi_relaxed(const phi_solver *s, const double *coef, int far, int 
     }
     double largest = 0.0, moved = 0.0;
     for (int k = 0; k < PHI_DIM; ++k) largest = phi_larger(largest, whole.size[k]);
-    for (int k = 0; k < PHI_DIM; ++k)
-        moved = phi_larger(moved, whole.change[k] / (whole.size[k] + 1e-3 * largest + 1e-300));
+    for (int k = 0; k < PHI_DIM; ++k) {
+        s->usual[k] = whole.size[k] + 1e-3 * largest + 1e-300;
+        moved = phi_larger(moved, whole.change[k] / s->usual[k]);
+    }
     return moved;
 }
 
 #define PHI_SETTLED 0x1p-55   /* what further sweeps may still change, in sizes of y */
 #define PHI_ROUNDING 0x1p-40  /* changes below this may be rounding */
 
-#if PHI_STIFF
-#define PHI_SLOW 0.6 /* changes that shrink by less are left to Newton's method, ... */
-enum { PHI_PATIENCE = 10 }; /* ... after so many sweeps */
-#endif
+#define PHI_SLOW 0.6          /* changes that shrink by less are left to Newton's method, ... */
+enum { PHI_PATIENCE = 10 };   /* ... after so many sweeps */
+
 /* y in the middle of a stage, by sweeps from the guess in s->y[0] until only rounding would change; it is in s->y[*now]. */
 static phi_status phi_middle(phi_solver *s, const double *coef, int far, int *now)
 {
@@ -80,15 +85,17 @@ static phi_status phi_middle(phi_solver *s, const double *coef, int far, int *no
             if (phi_all_hold(s, s->y[*now])) return PHI_OK;
             return sweep == 0 ? PHI_NOT_FINITE : PHI_NO_CONVERGENCE;
         }
-#if PHI_STIFF
         if (sweep >= PHI_PATIENCE && change > PHI_SLOW * before && change > 0x1p-30) break;
-#endif
         before = change;
     }
     return PHI_NO_CONVERGENCE;
 }
 
-#if PHI_GUESSES
+#if !PHI_GUESSES
+#define phi_predict(s, stage) phi_copy((s)->y[0], (s)->x, s)
+#define phi_forget(s) ((s)->stiff = 0)
+
+#else
 /* x and the extrapolated y - x into s->y[0], with the copied ends. */
 static void phi_predict(const phi_solver *s, int stage)
 {
@@ -107,10 +114,6 @@ static void phi_predict(const phi_solver *s, int stage)
     }
 }
 
-#if PHI_STIFF
-#include "lattice_newton.c"
-
-#endif
 /* Take in the y of a stage. The guess of order d missed it by its d-th difference: the next is of the best order. */
 static void phi_remember(phi_solver *s, int stage, int now)
 {
@@ -147,17 +150,19 @@ static void phi_remember(phi_solver *s, int stage, int now)
     if (guess->count < PHI_DIFFERENCES) ++guess->count;
 }
 
-/* Begin without guesses. */
+/* Begin without guesses, and with sweeps. */
 static void phi_forget(phi_solver *s)
 {
-#if PHI_STIFF
     s->stiff = 0;
+#if PHI_BANDED
     s->factored = NULL;
 #endif
     for (int stage = 0; stage < PHI_STAGES; ++stage) s->guess[stage].count = s->guess[stage].order = 0;
 }
 
 #endif
+#include "lattice_newton.c"
+
 /* The stages of a step. */
 static phi_status phi_stages(phi_solver *s, int far)
 {
@@ -175,21 +180,15 @@ static phi_status phi_stages(phi_solver *s, int far)
         phi_refresh(coef, s->now, coef + PHI_PREPARED);
 #endif
         int now = 0;
-#if PHI_GUESSES
         phi_predict(s, stage);
-#else
-        phi_copy(s->y[0], s->x, s);
-#endif
-#if PHI_STIFF
         phi_status status = s->stiff ? PHI_NO_CONVERGENCE : phi_middle(s, coef, far, &now);
         if (status != PHI_OK && (far || status != PHI_NOT_FINITE)) {
             s->stiff = 1;
             now = 0;
-            status = phi_newton(s, coef, stage);
+            const double range = phi_range(s, coef);
+            phi_predict(s, stage);
+            status = phi_newton(s, coef, range, &now);
         }
-#else
-        const phi_status status = phi_middle(s, coef, far, &now);
-#endif
         if (status != PHI_OK) return status;
 #if PHI_GUESSES
         phi_remember(s, stage, now);
@@ -210,16 +209,12 @@ static phi_status phi_try(phi_solver *s)
 #if PHI_NEAR
     if (phi_stages(s, 0) == PHI_OK) return PHI_OK;
     phi_copy(s->x, s->before, s);
-#if PHI_GUESSES
     phi_forget(s);
-#endif
 #endif
     const phi_status status = phi_stages(s, 1);
     if (status == PHI_OK) return status;
     phi_copy(s->x, s->before, s);
-#if PHI_GUESSES
     phi_forget(s);
-#endif
     return status;
 }
 
@@ -227,9 +222,7 @@ phi_status phi_integrate(phi_solver *s, double h, size_t steps)
 {
     phi_status status = phi_set_step(s, h);
     if (status != PHI_OK) return status;
-#if PHI_GUESSES
     phi_forget(s);
-#endif
     for (; steps > 0 && status == PHI_OK; --steps) {
         status = phi_try(s);
         s->steps += status == PHI_OK;

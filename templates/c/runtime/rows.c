@@ -16,9 +16,7 @@ typedef struct {
 #endif
 #if PHI_SERIES
     double *const *start, *const *out; /* where a stage starts, and where what is computed goes; x is y there */
-#if PHI_STIFF
     double *const *varied;        /* a variation of y */
-#endif
 #endif
 #if PHI_GATHER
     double *const *gathered;      /* see phi_solver */
@@ -106,9 +104,6 @@ static inline void phi_locate(const phi_solver *s, size_t index, phi_row *row)
 #endif
 #if PHI_SERIES
     row->start = row->out = s->x;
-#if PHI_STIFF
-    row->varied = s->v;
-#endif
 #endif
 #if PHI_GATHER
     row->gathered = s->gathered;
@@ -187,11 +182,11 @@ typedef struct {
 
 enum { PHI_WIDTH = 32 }; /* largest values that are kept apart, so that loops vectorise */
 
-/* Takes in what a sweep from s->y[now] to the other has made of a piece. */
-static inline void phi_measure(const phi_solver *s, const phi_piece *at, int now, phi_extent *extent)
+/* Takes in what fields were and are in a piece. */
+static inline void phi_measure(double *const *was, double *const *is, const phi_piece *at, phi_extent *extent)
 {
     for (int k = 0; k < PHI_DIM; ++k) {
-        const double *restrict before = s->y[now][k] + at->row.at[0], *restrict after = s->y[1 - now][k] + at->row.at[0];
+        const double *restrict before = was[k] + at->row.at[0], *restrict after = is[k] + at->row.at[0];
         double change[PHI_WIDTH] = { 0.0 }, size[PHI_WIDTH] = { 0.0 };
         const ptrdiff_t whole = at->to - (at->to - at->from) % PHI_WIDTH;
         for (ptrdiff_t i = at->from; i < whole; i += PHI_WIDTH)
@@ -212,7 +207,7 @@ static inline void phi_measure(const phi_solver *s, const phi_piece *at, int now
     }
 }
 #endif
-#if PHI_STIFF
+#if PHI_BANDED
 
 /* Unknowns are numbered site by site. The matrix 1 - (what a sweep does to a variation of y) has a band; what couples the
    two ends of a ring lies outside. So the last sites are a border, all of them where there are few: of the blocks

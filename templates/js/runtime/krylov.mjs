@@ -1,13 +1,14 @@
 import { relax, slope } from "./model.mjs";
 import { allFinite } from "./sites.mjs";
-import { sizeOf, solved } from "./sweeps.mjs";
+import { sizeOf, solved, usual } from "./sweeps.mjs";
 
 // ---- Newton's method for a stage that sweeps do not solve, its linear equations in Krylov spaces ----
 
-/** Newton's iterations; directions of a Krylov space, and how well it solves. */
-const MOST_ITERATIONS = 40;
-const DIRECTIONS = 400;
+/** Newton's corrections; directions of the Krylov space that each is taken from; how well it solves, and has to. */
+const MOST_CORRECTIONS = 200;
+const DIRECTIONS = 24;
 const SOLVED = 1e-6;
+const USEFUL = 0.9;
 /** How far from x a solution is one of the motion, in sizes of x and of what the field says. */
 const PLAUSIBLE = 1.5;
 
@@ -20,14 +21,14 @@ function add(a, factor, b) {
   for (let k = 0; k < a.length; k++) a[k] += factor * b[k];
 }
 
-/** The solution of matrix(v) = side, to some digits, by GMRES; null where it leads to what is not finite. */
+/** A solution of matrix(v) = side, as well as it can be by GMRES without a restart; null where that is of no use. */
 function krylov(matrix, side) {
   const length = norm(side);
   const solution = new Float64Array(side.length);
   if (length === 0) return solution;
   const directions = [side.map((v) => v / length)];
   const [columns, turns, target] = [[], [], [length]];
-  for (let count = 0; count < Math.min(DIRECTIONS, side.length); count++) {
+  for (let count = 0; count < DIRECTIONS; count++) {
     const next = matrix(directions[count]);
     if (!allFinite(next)) return null;
     const column = directions.map((direction) => {
@@ -46,9 +47,10 @@ function krylov(matrix, side) {
     turns.push([c, s]);
     target.push(-s * target[count]);
     target[count] *= c;
-    if (Math.abs(target[count + 1]) <= SOLVED * length || rest <= 1e-14 * length) break;
+    if (Math.abs(target[count + 1]) <= SOLVED * length || rest === 0) break;
     directions.push(next.map((v) => v / rest));
   }
+  if (!(Math.abs(target[columns.length]) <= USEFUL * length)) return null;
   const weights = [];
   for (let k = columns.length - 1; k >= 0; k--) {
     const known = columns.slice(k + 1).reduce((sum, column, j) => sum + column[k] * weights[k + 1 + j], 0);
@@ -65,19 +67,24 @@ export function byNewton(coef, x, guess, sites) {
   relax(coef, x, x, sites, image);
   const far = PLAUSIBLE * (total(x) + total(image.map((v, k) => v - x[k])));
   let before = 0;
-  for (let iteration = 0; iteration < MOST_ITERATIONS; iteration++) {
+  for (let correction = 0; correction < MOST_CORRECTIONS; correction++) {
     relax(coef, x, y, sites, image);
-    const matrix = (v) => {
-      const out = new Float64Array(v.length);
-      slope(coef, y, v, sites, out);
-      return out.map((moved, k) => v[k] - moved);
+    if (!allFinite(image)) return null;
+    const sizes = usual(image);
+    const count = y.length / sizes.length;
+    const unit = (k) => sizes[Math.floor(k / count)];
+    const matrix = (scaled) => {
+      const out = new Float64Array(scaled.length);
+      slope(coef, y, scaled.map((v, k) => v * unit(k)), sites, out);
+      return out.map((moved, k) => scaled[k] - moved / unit(k));
     };
-    const change = allFinite(image) ? krylov(matrix, image.map((v, k) => v - y[k])) : null;
-    if (change === null) return null;
+    const scaled = krylov(matrix, image.map((v, k) => (v - y[k]) / unit(k)));
+    if (scaled === null) return null;
+    const change = scaled.map((v, k) => v * unit(k));
     add(y, 1, change);
     if (!allFinite(y)) return null;
     const size = sizeOf(change, y);
-    if (solved(size, before, iteration === 0)) return total(y.map((v, k) => v - x[k])) <= far ? y : null;
+    if (solved(size, before, correction === 0)) return total(y.map((v, k) => v - x[k])) <= far ? y : null;
     before = size;
   }
   return null;

@@ -1,19 +1,15 @@
 import { DIM, MOST_SWEEPS, SCHEDULE, increment, relax } from "./model.mjs";
 import { allFinite } from "./sites.mjs";
-// #if STIFF
 import { byNewton } from "./krylov.mjs";
-// #endif
 
 // ---- The step of the series: stages, of which each solves an equation on the whole lattice ----
 
 /** Values that guesses are extrapolated from; a change by this part of y may be rounding. */
 const DIFFERENCES = 4;
 const ROUNDING = 2 ** -40;
-// #if STIFF
 /** After so many sweeps, changes that still shrink by less than this factor are left to Newton's method. */
 const PATIENCE = 10;
 const SLOW = 0.6;
-// #endif
 
 /** The largest magnitude among some values. */
 function most(values, from, to) {
@@ -25,17 +21,20 @@ function most(values, from, to) {
   return largest;
 }
 
+/** The sizes of the fields of y, none much less than the largest. */
+export function usual(y) {
+  const count = y.length / DIM;
+  const whole = most(y, 0, y.length);
+  return Float64Array.from({ length: DIM }, (_, k) => most(y, k * count, (k + 1) * count) + 1e-3 * whole + 1e-300);
+}
+
 /** How large a change of y is, field by field. */
 export function sizeOf(change, y) {
   const count = y.length / DIM;
-  const whole = most(y, 0, y.length);
-  let largest = 0;
-  for (let k = 0; k < DIM; k++) {
-    const own = most(y, k * count, (k + 1) * count) + 1e-3 * whole + 1e-300;
+  return usual(y).reduce((largest, own, k) => {
     const size = most(change, k * count, (k + 1) * count) / own;
-    if (!(size <= largest)) largest = size;
-  }
-  return largest;
+    return size <= largest ? largest : size;
+  }, 0);
 }
 
 /** Whether further sweeps would change y by less than rounding does, or their changes shrink no more. */
@@ -55,9 +54,7 @@ function bySweeps(coef, x, guess, sites) {
     const change = sizeOf(next.map((v, k) => v - y[k]), next);
     y = next;
     if (solved(change, before, sweeps === 1)) return y;
-    // #if STIFF
     if (sweeps > PATIENCE && change > Math.max(SLOW * before, 2 ** -30)) return null;
-    // #endif
     before = change;
   }
   return null;
@@ -91,12 +88,10 @@ export function makeStep(solver) {
       for (let k = 0; k < guess.length; k++) guess[k] += difference[k];
     }
     let y = past.stiff ? null : bySweeps(coef, x, guess, sites);
-    // #if STIFF
     if (y === null) { // from here on it is Newton's
       past.stiff = true;
       y = byNewton(coef, x, guess, sites);
     }
-    // #endif
     if (y === null) return "NO_CONVERGENCE";
     own.order = remember(own.differences, y.map((v, k) => v - x[k]));
     increment(coef, y, sites, change);

@@ -13,6 +13,9 @@ from phigen.symbolic.symbols import PRESENT, Symbol, kind_of
 #: Differences that guesses are extrapolated from, of one stage and of all: more gain little and are arrays over sites.
 MOST_DIFFERENCES, MOST_REMEMBERED = 4, 14
 
+#: Directions of a Krylov space, which are arrays over sites.
+DIRECTIONS = 24
+
 #: Diagonals of a matrix beside its own that elimination is for.
 MOST_BAND = 64
 
@@ -48,7 +51,7 @@ class Layout:
     def band(self) -> int:
         """Diagonals beside that of its matrix, site by site; 0 where it is not solved by elimination."""
         equation, sites = self.step.equation, self.step.sites
-        if not equation or not equation.slope or len(sites.axes) > 1:
+        if not equation or self.step.partners or len(sites.axes) > 1:
             return 0
         band = (self.reach + 1) * len(equation.relax.roots) - 1
         return band if band <= MOST_BAND else 0
@@ -57,6 +60,10 @@ class Layout:
     def partners(self) -> Partners:
         """Bonds or pairs; nothing where there are none."""
         return self.step.partners or Partners(Gather((), ()), Gather((), ()))
+
+    def gathered(self, kernel: Kernel) -> Gather:
+        """What a kernel of the equation of a stage reads of bonds or pairs."""
+        return self.partners.varied if kernel.name == "slope" else self.partners.field
 
     @property
     def graph(self) -> bool:
@@ -84,6 +91,7 @@ def _at_sites(program: Program, step: Sweeps) -> list[Kernel]:
 
 def switches(program: Program, step: Sweeps, layout: Layout) -> dict[str, bool]:
     """The switches of the runtime for lattices."""
+    banded = layout.band > 0 and program.offers("recurrences")
     return {
         "OPEN": bool(layout.weights),
         "OPEN_ROWS": step.sites.open[-1],
@@ -96,7 +104,8 @@ def switches(program: Program, step: Sweeps, layout: Layout) -> dict[str, bool]:
         "BOND_PARAMETERS": bool(step.sites.at_bonds),
         "SITE_PARAMETERS": bool(step.sites.parameters),
         "SERIES": step.equation is not None,
-        "STIFF": step.equation is not None and layout.band > 0 and program.offers("recurrences"),
+        "BANDED": banded,
+        "KRYLOV": step.equation is not None and not banded,
         "BY_HAND": step.is_by_hand and program.offers("by-hand"),
         "ONE_ROW": len(step.sites.axes) == 1,
         "GUESSES": step.equation is not None and program.offers("recurrences"),

@@ -117,7 +117,7 @@ def middle_loop(
 ) -> Loop:
     """A kernel as a loop from y, of which rows are told, into or onto what they call out."""
     code = lower(kernel)
-    names = SiteNames(program, layout, kernel, code, set(), calls, layout.partners.field.names)
+    names = SiteNames(program, layout, kernel, code, set(), calls, layout.gathered(kernel).names)
     pointers = [names.scope[Symbol("out", f)] for f in program.coordinates]
     head = _unused(code)
     head += [f"    double *restrict {p} = row->out[{k}] + row->at[0];" for k, p in enumerate(pointers)]

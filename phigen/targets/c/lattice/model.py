@@ -8,7 +8,7 @@ from phigen.scheme.program import Program
 from phigen.scheme.steps import Sweeps
 from phigen.spec.model import Parameter
 from phigen.targets.c.kernels import function, members
-from phigen.targets.c.lattice.layout import MOST_DIFFERENCES, MOST_REMEMBERED, bounds, layout_of, switches
+from phigen.targets.c.lattice.layout import DIRECTIONS, MOST_DIFFERENCES, MOST_REMEMBERED, bounds, layout_of, switches
 from phigen.targets.header import plain
 from phigen.targets.rendering import render
 
@@ -26,11 +26,13 @@ def declarations(program: Program, step: Sweeps) -> str:
         stages = len(program.fractions)
         sizes += [("STAGES", stages, "of a step")] if stages > 1 else []
         kept = max(1, min(MOST_DIFFERENCES, MOST_REMEMBERED // stages))
+        sizes += [("DIRECTIONS", DIRECTIONS, "of a Krylov space")] if switches(program, step, layout)["KRYLOV"] else []
         guesses = switches(program, step, layout)["GUESSES"]
         sizes += [("DIFFERENCES", kept, "that a guess is extrapolated from")] if guesses else []
     if step.partners:
         swept = [sweep.gather for part in step.parts for sweep in part if sweep.gather]
-        most = max(len(g.names) for g in (*swept, step.partners.energy, step.partners.field))
+        own = (step.partners.energy, step.partners.field, step.partners.varied)
+        most = max(len(g.names) for g in (*swept, *own))
         sizes.append(("GATHERED", most, "sums over other sites that are held for each site"))
     if step.sites.at_bonds:
         sizes.append(("BOND_ARRAYS", len(step.sites.at_bonds), "parameters at bonds"))
@@ -80,7 +82,7 @@ def model(program: Program, step: Sweeps) -> str:
     constants += [("PREPARED", step.prepared, "of a row, before those that depend on the time")] * bool(step.refresh)
     if step.equation:
         constants += [("MOST_SWEEPS", step.equation.most_sweeps, "that a stage may take")]
-        if switches(program, step, layout)["STIFF"]:
+        if switches(program, step, layout)["BANDED"]:
             constants += [("REACH", layout.reach, "sites that y at a site depends on, to each side")]
             constants += [("BAND", layout.band, "diagonals beside that of the matrix of Newton's method")]
     else:

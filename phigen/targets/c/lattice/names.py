@@ -16,6 +16,9 @@ from phigen.targets.reserved import C_RESERVED
 #: What the loops call their own.
 _OWN = frozenset({"coef", "params", "row", "from", "to", "out", "apart", "i", "j", "k", "part", "far", "now"})
 
+#: Of the sites a and b of a bond or a pair.
+_INDEX = {"a": "i", "b": "j"}
+
 
 class SiteNames:
     """What the symbols of a kernel are called in a loop over sites."""
@@ -30,7 +33,7 @@ class SiteNames:
         calls: Mapping[str, str],
         sums: Sequence[str] = (),
     ) -> None:
-        self.layout, self.moved, self.code = layout, moved, code
+        self.layout, self.moved, self.code, self._fields = layout, moved, code, program.coordinates
         called = {word.strip("({") for text in calls.values() for word in text.split("(")}
         self.scope = Scope(C_RESERVED | _OWN | called | {"change0", "change1", "change2"})
         self.show = printer(self.scope, calls)
@@ -52,11 +55,7 @@ class SiteNames:
             elif isinstance(s, Symbol) and s.kind == CHOSEN:
                 self.scope.bind(s, "(row->colours[i] == row->chosen ? 1.0 : 0.0)")
             elif isinstance(s, Symbol) and s.kind == VARIATION:
-                field, offset = layout.step.sites.places[str(s.key[0])]
-                line, number = layout.line(offset), program.coordinates.index(field)
-                pointer = self.scope[Symbol("varied", field, line)]
-                self._starts.append(f"const double *restrict {pointer} = row->varied[{number}] + row->at[{line}];")
-                self.scope.bind(s, beside(pointer, offset[-1]))
+                self._bind_variation(s, str(s.key[0]))
             elif isinstance(s, Symbol) and s.kind == INITIAL:
                 pointer, number = self.scope[Symbol("start", str(s.key[0]))], program.coordinates.index(str(s.key[0]))
                 self._starts.append(f"const double *restrict {pointer} = row->start[{number}] + row->at[0];")
@@ -78,7 +77,21 @@ class SiteNames:
         base, end = self.layout.step.sites.ends[s]
         pointer = self.pointer(base, 0)
         named = self.scope[s]
-        (self._at_a if end == "a" else self._at_b).append(f"{named} = {pointer}[{'i' if end == 'a' else 'j'}]")
+        (self._at_a if end == "a" else self._at_b).append(f"{named} = {pointer}[{_INDEX[end]}]")
+
+    def _bind_variation(self, s: Symbol, place: str) -> None:
+        """The variation of a field at a site, a neighbour, or an end of a bond or a pair."""
+        sites = self.layout.step.sites
+        field, end = sites.ends.get(place, (sites.places[place][0] if place in sites.places else "", ""))
+        offset = (0,) * len(sites.axes) if end else sites.places[place][1]
+        line = self.layout.line(offset)
+        pointer = self.scope[Symbol("varied", field, line)]
+        array = f"row->varied[{self._fields.index(field)}]"
+        self._starts.append(f"const double *restrict {pointer} = {array} + row->at[{line}];")
+        if end:
+            (self._at_a if end == "a" else self._at_b).append(f"{self.scope[s]} = {pointer}[{_INDEX[end]}]")
+        else:
+            self.scope.bind(s, beside(pointer, offset[-1]))
 
     def of_pair(self) -> tuple[list[str], list[str]]:
         """What is read at a site b, and at a site a."""

@@ -15,7 +15,7 @@ from phigen.targets.code import lower
 
 def partners(program: Program, layout: Layout) -> Iterator[str]:
     """What bonds or pairs add to energies, and to what moves sites, from the parameters."""
-    for gather in (layout.partners.field, layout.partners.energy):
+    for gather in (layout.partners.field, layout.partners.energy, layout.partners.varied):
         yield from (loop.text(program) for loop in gathering(program, layout, gather, "params"))
 
 

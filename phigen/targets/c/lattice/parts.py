@@ -37,7 +37,7 @@ def sweeps(program: Program, step: Sweeps, rows: Rows) -> str:
     found += partners(program, layout)
     for kernel in (step.equation.relax, step.equation.advance) if step.equation else ():
         found += _of_equation(program, layout, kernel, _forms(program, rows, [kernel]))
-    if step.equation and step.equation.slope and switches(program, step, layout)["STIFF"]:
+    if step.equation:
         found += _of_equation(program, layout, step.equation.slope, {"": in_loops(program)})
     found += [seen_loop(program, layout, k) for k in (seen.energy, seen.casimirs, seen.vector_field)]
     sites = [p for p in program.parameters if p.at == "sites"]
@@ -168,7 +168,8 @@ def _of_equation(
 ) -> Iterator[str]:
     """The loops of a kernel of the equation of a stage over rows and their sites, in each form."""
     name, relaxing, moves = program.name, kernel.name == "relax", kernel.name == "increment"
-    gathers = layout.partners.field.kernels if kernel.inputs["gathered"] else ()
+    varied = kernel.name == "slope"
+    gathers = layout.gathered(kernel).kernels if kernel.inputs["gathered"] else ()
     gathered = [f"{name}_{own.name}(&s->params, &at.row, at.from, at.to);" for own in gathers]
     lines = {}
     for form, calls in forms.items():
@@ -179,20 +180,20 @@ def _of_equation(
         yield from (loop.text(program) for loop in loops)
         lines[form] = [f"{name}_{call.loop.name}(coef, &at.row, {call.sites});" for call in _over_sites(loops)]
     out = "s->x" if moves else "s->y[1 - now]"
-    reads = ["at.row.start = s->x;"] * ("start" in kernel.inputs) + ["at.row.varied = s->v;"] * (
-        "varied" in kernel.inputs
-    )
+    reads = ["at.row.start = s->x;"] * ("start" in kernel.inputs) + ["at.row.varied = v;"] * varied
     titles = {"relax": "A sweep, from s->y[now] to the other", "increment": "The end of a stage"}
     ends = _copied_ends(program, layout, range(program.dimension), out) if relaxing or moves else []
-    measured = [f"{name}_measure(s, &at, now, extent);"] if relaxing else []
+    measured = [f"{name}_measure(s->y[now], s->y[1 - now], &at, extent);"] if relaxing else []
     setup = ["at.row.x = s->y[now];", *reads, f"at.row.out = {out};"]
     yield _rows(
         program,
         layout,
         [_Case([*gathered, *_either(lines), *ends, *measured], setup, has_ends(program, [kernel]))],
-        title=titles.get(kernel.name, "How a sweep follows s->y[now] along s->v, to the other"),
+        title=titles.get(kernel.name, "How a sweep follows s->y[now] along v, to the other"),
         head=f"{kernel.name}_rows",
-        arguments="const double *coef, int far, int now" + f", {name}_extent *extent" * relaxing,
+        arguments="const double *coef, int far, int now"
+        + f", {name}_extent *extent" * relaxing
+        + ", double *const *v" * varied,
         unused=["far"] * (len(forms) == 1),
     )
 
