@@ -20,6 +20,7 @@ from typing import Any, TypeVar
 
 from phigen import progress, registry
 from phigen.attitude.group import group_of
+from phigen.attitude.parts import by_angles
 from phigen.compilation import Compilation, NoSystem
 from phigen.errors import CheckError, LimitError, PhigenWarning, SpecError
 from phigen.geometry.system import System, system_from_spec
@@ -30,6 +31,7 @@ from phigen.proofs import statements
 from phigen.proofs.examination import UNEXAMINED, Examination, doubts, located, refutation, refuted
 from phigen.realisations.catalogue import realise
 from phigen.scheme.assemble import build_program
+from phigen.scheme.attitude import uniform
 from phigen.scheme.choosing import plan as plan_splitting
 from phigen.scheme.choosing import planned as plan_without_kicks
 from phigen.scheme.discretisation import discretise
@@ -224,6 +226,9 @@ def _split(spec: Spec, source: System, order: int | None, described: Mapping[str
         ),
     )
     group = group_of(source, spec.reconstruct, "exponential") if spec.reconstruct else None
+    if group:
+        flows = by_angles(discretised, group, choice.splitting.flows, put_back=uniform(source))
+        choice = replace(choice, splitting=replace(choice.splitting, flows=flows))
     described = {**described, "lanes": spec.solver.lanes, "monitor": monitor, "group": group}
     program = clock.timed("program", lambda: build_splitting(source, choice, gauge, **described))
     return Compilation(spec, source, None, choice.order, program, gauge, clock.seconds, choice.splitting)

@@ -24,7 +24,7 @@
  *   7. Between steps
  *   8. The solver
  *   9. Ensembles
- * body-sha256: 8047c02b0dfec9041925018e8620898887d537626eecb9754052562c2c91164f
+ * body-sha256: 366f320b33fb1ea18369d979d7c5bc0c832011eed4064e0cd112d8024df171c9
  */
 #include "dzhanibekov.h"
 
@@ -494,26 +494,26 @@ static void dzhanibekov_normalise(const double q[4], double carry[4])
     for (int i = 0; i < 4; ++i) carry[i] -= excess * q[i];
 }
 
-/* Multiply an element by that of a stage, or of a flow, in compensated arithmetic. */
-static inline void dzhanibekov_turned(double element[dzhanibekov_ELEMENT], double carry[dzhanibekov_ELEMENT],
-    const double turn[dzhanibekov_ELEMENT])
+/* Multiply the element by a factor, given less 1, in compensated arithmetic. */
+static void dzhanibekov_turn_by(dzhanibekov_solver *s, const double factor[dzhanibekov_ELEMENT])
 {
     double change[dzhanibekov_ELEMENT];
-    dzhanibekov_added(element, turn, change);
+    dzhanibekov_added(s->turned, factor, change);
     for (int i = 0; i < dzhanibekov_ELEMENT; ++i) {
-        const double moved = change[i] + carry[i], sum = element[i] + moved, added = sum - element[i];
-        carry[i] = (element[i] - (sum - added)) + (moved - added);
-        element[i] = sum;
+        const double moved = change[i] + s->turned_carry[i], sum = s->turned[i] + moved, added = sum
+            - s->turned[i];
+        s->turned_carry[i] = (s->turned[i] - (sum - added)) + (moved - added);
+        s->turned[i] = sum;
     }
+    dzhanibekov_normalise(s->turned, s->turned_carry);
 }
 
 /* The element of a stage that was solved by y. */
 static inline void dzhanibekov_turn_stage(dzhanibekov_solver *s, const double y[dzhanibekov_DIM])
 {
-    double turn[dzhanibekov_ELEMENT];
-    dzhanibekov_turn(s->coef, y, turn);
-    dzhanibekov_turned(s->turned, s->turned_carry, turn);
-    dzhanibekov_normalise(s->turned, s->turned_carry);
+    double factor[dzhanibekov_ELEMENT];
+    dzhanibekov_turn(s->coef, y, factor);
+    dzhanibekov_turn_by(s, factor);
 }
 
 /* The attitude proper: the first, then what the Casimirs that were taken from H have turned it by, which in

@@ -23,7 +23,7 @@
  *   6. Between steps
  *   7. The solver
  *   8. Ensembles
- * body-sha256: 9b7e317a3bdf622d8c99f434f661722028cc23603d32cba48cfc3d93f2efa222
+ * body-sha256: 227ee777c43abcbe5fc12998ba7068ab79c26341550cc987868d71f6f1ca3881
  */
 #include "satellite.h"
 
@@ -1067,26 +1067,26 @@ static void satellite_normalise(const double q[4], double carry[4])
     for (int i = 0; i < 4; ++i) carry[i] -= excess * q[i];
 }
 
-/* Multiply an element by that of a stage, or of a flow, in compensated arithmetic. */
-static inline void satellite_turned(double element[satellite_ELEMENT], double carry[satellite_ELEMENT],
-    const double turn[satellite_ELEMENT])
+/* Multiply the element by a factor, given less 1, in compensated arithmetic. */
+static void satellite_turn_by(satellite_solver *s, const double factor[satellite_ELEMENT])
 {
     double change[satellite_ELEMENT];
-    satellite_added(element, turn, change);
+    satellite_added(s->turned, factor, change);
     for (int i = 0; i < satellite_ELEMENT; ++i) {
-        const double moved = change[i] + carry[i], sum = element[i] + moved, added = sum - element[i];
-        carry[i] = (element[i] - (sum - added)) + (moved - added);
-        element[i] = sum;
+        const double moved = change[i] + s->turned_carry[i], sum = s->turned[i] + moved, added = sum
+            - s->turned[i];
+        s->turned_carry[i] = (s->turned[i] - (sum - added)) + (moved - added);
+        s->turned[i] = sum;
     }
+    satellite_normalise(s->turned, s->turned_carry);
 }
 
 /* The element of a stage that was solved by y. */
 static inline void satellite_turn_stage(satellite_solver *s, int stage, const double y[satellite_DIM])
 {
-    double turn[satellite_ELEMENT];
-    satellite_turn(s->coef[stage], y, turn);
-    satellite_turned(s->turned, s->turned_carry, turn);
-    satellite_normalise(s->turned, s->turned_carry);
+    double factor[satellite_ELEMENT];
+    satellite_turn(s->coef[stage], y, factor);
+    satellite_turn_by(s, factor);
 }
 
 /* The attitude proper: the first, then what the Casimirs that were taken from H have turned it by, which in

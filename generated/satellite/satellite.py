@@ -13,7 +13,7 @@
 #
 # SPDX-License-Identifier: 0BSD
 # This file belongs to whoever generated it; phigen claims no rights in it.
-# body-sha256: 2c7b0d2d6e1d7158be15c5e56ed6cede4513b9757e76889c873e13e70c91a726
+# body-sha256: bb814fda25be2ce07ee5f30dce8186a7b2fb43886f5955e2fe959b74e2827265
 import numpy as np
 
 VERSION = "0.1.0"
@@ -1211,16 +1211,6 @@ def _product(a, b):
     """The products of elements."""
     a, b = np.broadcast_arrays(a, b)
     turned = _quaternions(a[..., :4], b[..., :4])
-    return turned
-
-
-def _uniform(rate, t):
-    """The elements of motions with constant rates, for some time."""
-    speed = np.sqrt((rate[..., :3] ** 2).sum(axis=-1, keepdims=True))
-    angle = t * speed
-    per = 1.0 / np.where(speed > 0.0, speed, np.inf)
-    scale = np.sin(0.5 * angle) * per
-    turned = np.concatenate([np.cos(0.5 * angle), scale * rate[..., :3]], axis=-1)
     return turned
 
 

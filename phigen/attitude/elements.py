@@ -78,10 +78,17 @@ def element(p: Vector, t: Vector, *, cayley: bool) -> tuple[Expression, ...]:
 
 
 def rotation_by(r: Vector, t: Vector) -> tuple[Expression, ...]:
-    """exp(r), or exp(r, t), in the same form, for rotations by any angle."""
-    s = dot(r, r)
-    sine, cosine = call("sinroot", s / 16), call("cosroot", s / 16)
-    rotation = (-(s / 8) * sine**2, *(_HALF * (sine * cosine) * ri for ri in r))
+    """exp(r), or exp(r, t), in the same form, for rotations by any angle.
+
+    About a coordinate axis it has sin and 1 − cos of half the angle, as the flow in `phigen.attitude.parts.by_angles`.
+    """
+    s, turning = dot(r, r), [ri for ri in r if not ri.is_zero]
+    if len(turning) == 1:
+        half = turning[0] / 2
+        rotation = (-ONE * call("versin", half), *(ri if ri.is_zero else call("sin", half) for ri in r))
+    else:
+        sine, cosine = call("sinroot", s / 16), call("cosroot", s / 16)
+        rotation = (-(s / 8) * sine**2, *(_HALF * (sine * cosine) * ri for ri in r))
     if not t:
         return rotation
     once = cross(r, t)

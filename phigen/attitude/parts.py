@@ -14,10 +14,24 @@ from dataclasses import dataclass, replace
 
 from phigen.attitude.elements import dot, product, rotated, rotation_by
 from phigen.attitude.group import Group, refused
+from phigen.attitude.matrices import flow_exponential, product_less_1
 from phigen.geometry.system import System, hamiltonian_vector_field
 from phigen.splitting.flow import Flow
 from phigen.splitting.ring import TIME
-from phigen.symbolic.expression import ONE, ZERO, Expression, derivative, gradient, symbol, symbols_of, total
+from phigen.symbolic.expression import (
+    ONE,
+    ZERO,
+    Expression,
+    call,
+    derivative,
+    fold,
+    gradient,
+    rebuild,
+    symbol,
+    symbols_of,
+    topological,
+    total,
+)
 from phigen.symbolic.readable import shortened
 from phigen.symbolic.verdict import PROVED, Statement, decide_zero
 
@@ -41,6 +55,37 @@ class Turning:
     def left(self) -> Expression:
         """What has none."""
         return self.casimir if self.put_back else ZERO
+
+
+def by_angles(system: System, group: Group, flows: Sequence[Flow], *, put_back: bool) -> tuple[Flow, ...]:
+    """The same flows by the sines that their elements need in any case: for quaternions those of half the angles."""
+    turned = turnings(system, group, flows, put_back=put_back)
+    return tuple(_by_angles(system, group, flow, turning) for flow, turning in zip(flows, turned, strict=True))
+
+
+def _by_angles(system: System, group: Group, flow: Flow, turning: Turning) -> Flow:
+    entries = [e for factor in factor_elements(system, group, turning) for e in factor]
+    angles = {e.args[0] for e in topological(entries) if e.op == "sin"}
+
+    def visit(e: Expression, args: list[Expression]) -> Expression:
+        if e.op not in ("sin", "cos", "versin"):
+            return rebuild(e, args)
+        for angle in angles:
+            for sign in (ONE, -ONE):
+                same = [("", args[0] - sign * (angle if group.matrices else 2 * angle))]
+                if decide_zero("", same, system.positive).verdict == PROVED:
+                    return _of_angle(e.op, sign, angle, double=not group.matrices)
+        return rebuild(e, args)
+
+    return replace(flow, increment=tuple(fold(flow.increment, visit)))
+
+
+def _of_angle(function: str, sign: Expression, angle: Expression, *, double: bool) -> Expression:
+    """A function of an angle, or of its double, by the sine of the angle and 1 less its cosine."""
+    sine, versine = call("sin", angle), call("versin", angle)
+    if double:
+        sine, versine = 2 * (sine * (ONE - versine)), 2 * sine**2
+    return sign * sine if function == "sin" else versine if function == "versin" else ONE - versine
 
 
 def turnings(system: System, group: Group, flows: Sequence[Flow], *, put_back: bool) -> list[Turning]:
@@ -98,12 +143,19 @@ def constancy(system: System, turning: Turning, name: str) -> Statement:
 def factor_elements(
     system: System, group: Group, turning: Turning, t: Expression | None = None
 ) -> list[list[Expression]]:
-    """The elements of the factors for the time ``t``, at the state before the flow; generators for matrices."""
+    """The elements of the factors, less 1, for the time ``t``, at the state before the flow.
+
+    `SpecError` for matrices whose exponential has no closed form.
+    """
     t, found = t or symbol(TIME), []
     for factor in turning.factors:
         p = [t * slope for slope in gradient(factor, system.coordinates)]
         if group.matrices:
-            found.append(group.generator(p))
+            made = flow_exponential(group, p, system.positive)
+            if made is None:
+                what = f"reconstruct: exp(t∇H) has no closed form that phigen knows for the part {shortened(factor)}"
+                raise refused(system, what, "scheme: series takes every H")
+            found.append(made)
         else:
             r, shift = [p[i] for i in group.rotation], [p[i] for i in group.translation]
             trivial = all(e.is_zero for e in r)
@@ -112,11 +164,14 @@ def factor_elements(
 
 
 def joined(group: Group, elements: Sequence[Sequence[Expression]]) -> list[Expression]:
-    """The element of the factors, one after the other."""
+    """The element of the factors, one after the other, less 1 as they are."""
     made, *others = elements
     result = list(made)
     for later in others:
         first, second = (later, result) if group.spatial else (result, later)
+        if group.matrices:
+            result = product_less_1(first, second)
+            continue
         q = [ONE + first[0], *first[1:4]]
         turn = [a + b + c for a, b, c in zip(first[:4], second[:4], product(first[:4], second[:4]), strict=True)]
         result = [*turn, *(a + b for a, b in zip(first[4:], rotated(q, second[4:]) if second[4:] else [], strict=True))]

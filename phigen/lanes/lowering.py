@@ -198,8 +198,12 @@ def _elapsed(program: Program) -> list[LaneKernel]:
 
 
 def _turns(program: Program) -> list[LaneKernel]:
-    """The kernel of the elements that attitudes are products of."""
-    return [LaneKernel(program.attitude.turn)] if program.attitude and program.attitude.turn else []
+    """The kernels of the elements that attitudes are products of."""
+    attitude = program.attitude
+    if attitude is None or attitude.turn is None:
+        return []
+    by_covector = () if attitude.cayley or attitude.exponential is None else (attitude.exponential,)
+    return [LaneKernel(kernel) for kernel in (*by_covector, attitude.turn)]
 
 
 def _packs(program: Program, kernels: Sequence[Kernel], near: tuple[str, ...]) -> Packs | None:

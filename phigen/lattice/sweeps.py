@@ -29,12 +29,12 @@ from phigen.lattice.variations import with_variations
 from phigen.scheme.alternation import Alternation, Schedule, with_clock
 from phigen.scheme.alternation import schedule as alternating
 from phigen.scheme.choosing import Choice, is_dated, planned, with_carrier
+from phigen.scheme.gathering import staged
 from phigen.scheme.kernel import Kernel, Output
 from phigen.scheme.lowering import operation_counts
 from phigen.scheme.nystrom import Nystrom
 from phigen.scheme.order import Order
 from phigen.scheme.program import About, Observables, Program
-from phigen.scheme.splitting import staged
 from phigen.scheme.staging import Coefficients
 from phigen.scheme.steps import Ends, Gather, Partners, Sites, Sweep, Sweeps
 from phigen.spec.model import NO_EXTRAS, Extras, Spec

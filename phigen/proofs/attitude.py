@@ -14,7 +14,8 @@ from itertools import combinations, islice
 
 from phigen.attitude.elements import cross, direction, dot, element, product, rotated, with_phi
 from phigen.attitude.group import Group
-from phigen.attitude.parts import constancy, factor_elements, joined, turnings
+from phigen.attitude.matrices import multiplied
+from phigen.attitude.parts import Turning, constancy, factor_elements, joined, turnings
 from phigen.compilation import Compilation
 from phigen.geometry.lie_algebra import LieAlgebra, Representation
 from phigen.geometry.system import System, hamiltonian_vector_field
@@ -22,8 +23,20 @@ from phigen.realisations.cayley import trilinear
 from phigen.realisations.protocol import BiRealisation, covector_names, covector_symbols
 from phigen.scheme.attitude import uniform
 from phigen.scheme.program import Attitude
-from phigen.splitting.ring import KICK
-from phigen.symbolic.expression import ONE, ZERO, Expression, fold, gradient, number, rebuild, substitute, symbol, total
+from phigen.splitting.ring import KICK, TIME
+from phigen.symbolic.expression import (
+    ONE,
+    ZERO,
+    Expression,
+    derivative,
+    fold,
+    gradient,
+    number,
+    rebuild,
+    substitute,
+    symbol,
+    total,
+)
 from phigen.symbolic.special import SPECIAL
 from phigen.symbolic.symbols import LEVEL, Symbol
 from phigen.symbolic.verdict import Statement, decide_zero
@@ -72,8 +85,8 @@ def rate_statement(system: System, attitude: Attitude, slope: Vector, monitor: E
         wanted = [monitor * w for w in wanted]
         slope = substitute(list(slope), {LEVEL: -system.hamiltonian})
     whole = [w - s for w, s in zip(wanted, slope, strict=True)]
-    shown = group.generator(whole) if group.matrices else [whole[i] for i in (*group.rotation, *group.translation)]
-    put_back = attitude.rate.roots if attitude.rate else [ZERO] * len(shown)
+    shown = whole if group.matrices else [whole[i] for i in (*group.rotation, *group.translation)]
+    put_back = attitude.rate.roots[: len(shown)] if attitude.rate else [ZERO] * len(shown)
     where = "∇S_1" + " + ∇(λC)" * bool(attitude.rate)
     residuals = [("", a - b) for a, b in zip(shown, put_back, strict=True)]
     named = f"ġ is that of H: {where} = " + ("g∇H where K = 0" if monitor else "∇H")
@@ -114,7 +127,9 @@ def _splitting_statements(compilation: Compilation, group: Group) -> Iterator[St
         stated = constancy(system, turning, name)
         whole = decide_zero(name, residuals, system.positive)
         yield stated if whole.holds else whole
-        if turning.left.is_zero and not group.matrices and len(turning.factors) == 1:
+        if group.matrices and turning.factors:
+            yield exponential_statement(system, group, turning, f"the matrix of the flow of H_{k} is exp(t∇H_{k})")
+        elif turning.left.is_zero and len(turning.factors) == 1:
             made = joined(group, factor_elements(system, group, turning))
             start = [symbol(c) for c in system.coordinates]
             end = [a + b for a, b in zip(start, flow.increment, strict=True)]
@@ -127,6 +142,17 @@ def _splitting_statements(compilation: Compilation, group: Group) -> Iterator[St
     plain = substitute([f.hamiltonian for f in splitting.flows], {KICK: ZERO})
     slope = gradient(total(plain) - total(put_back), system.coordinates)
     yield rate_statement(system, attitude, slope)
+
+
+def exponential_statement(system: System, group: Group, turning: Turning, name: str) -> Statement:
+    """dE/dt = (1 + E)P for each factor, with P the matrix of its gradient, and E = 0 at t = 0."""
+    residuals = []
+    for factor, made in zip(turning.factors, factor_elements(system, group, turning), strict=True):
+        rate = group.generator(gradient(factor, system.coordinates))
+        wanted = [a + b for a, b in zip(rate, multiplied(made, rate), strict=True)]
+        residuals += [("", derivative(e, TIME) - w) for e, w in zip(made, wanted, strict=True)]
+        residuals += [("at t = 0", e) for e in substitute(made, {TIME: ZERO})]
+    return decide_zero(name, residuals, system.positive)
 
 
 def _matrix_statements(system: System, chart: BiRealisation, attitude: Attitude) -> Iterator[Statement]:

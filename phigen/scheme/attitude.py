@@ -6,9 +6,12 @@ from collections.abc import Callable, Sequence
 
 from phigen.attitude.elements import element
 from phigen.attitude.group import Group, refused
-from phigen.attitude.parts import factor_elements, joined, turning_of, turnings
+from phigen.attitude.matrices import cayley as cayley_transform
+from phigen.attitude.matrices import exponential, size_of
+from phigen.attitude.parts import Turning, factor_elements, joined, turning_of, turnings
 from phigen.geometry.system import System
 from phigen.realisations.protocol import BiRealisation
+from phigen.scheme.gathering import staged
 from phigen.scheme.gauge import Gauge
 from phigen.scheme.generating import GeneratingFunction
 from phigen.scheme.kernel import Kernel, Output
@@ -17,7 +20,11 @@ from phigen.scheme.program import Attitude
 from phigen.scheme.staging import Coefficients
 from phigen.splitting.flow import Flow
 from phigen.splitting.ring import TIME
-from phigen.symbolic.expression import ZERO, Expression, gradient, symbol, total
+from phigen.symbolic.expression import Expression, gradient, symbol, total
+from phigen.symbolic.symbols import Symbol
+
+#: What is said of the last number of a covector of a matrix.
+SIZE_OF_COVECTOR = "a bound for the square of its size"
 
 #: Bi-realisations whose group element is known: the exponential, and the Cayley transform.
 KINDS = ("exponential", "karasev", "cayley")
@@ -36,54 +43,79 @@ def stage_attitude(
     """The attitude of an implicit step; the coefficients of ``generating`` grow by what it needs."""
     coefficients, cayley = generating.coefficients, realisation.kind == "cayley"
     p, slope = list(generating.turning), "grad S_h(y), without the forces," if generating.free else "p = grad S_h(y)"
-    values = coefficients.hoist(group.generator(p) if group.matrices else _element(group, p, cayley))
-    about = f"the matrix of {slope}" if group.matrices else f"what {slope} turns by, a quaternion less 1"
+    values = coefficients.hoist(_turned(group, p, cayley))
+    about = f"what {slope} turns by, a {'matrix' if group.matrices else 'quaternion'} less 1"
     about += ", and what it translates by" * bool(group.translation)
-    turn = _kernel("turn", about, coefficients, system, values)
+    if group.matrices and not cayley:
+        about = f"{slope.rstrip(',')}, and {SIZE_OF_COVECTOR}"
+    inputs = {"coef": coefficients.slots, "y": system.coordinates}
+    turn = Kernel("turn", about, inputs, (Output("turn", tuple(values)),))
     along = _along(group, system) if realisation.path and not generating.free else None
-    return Attitude(group, cayley, turn, along, rate=rate_kernel(system, group, gauge))
+    rate = rate_kernel(system, group, gauge)
+    needed = group.matrices and (rate or not cayley)
+    return Attitude(group, cayley, turn, along, rate=rate, exponential=_exponential(group) if needed else None)
 
 
 def _along(group: Group, system: System) -> Kernel:
     """The element of a path, whose p is known where y is not."""
     p = [symbol(c) for c in system.coordinates]  # under these names, as nothing here depends on x
-    values = group.generator(p) if group.matrices else list(_element(group, p, False))
-    return Kernel("along", "what p turns by", {"p": system.coordinates}, (Output("turn", tuple(values)),))
+    inputs = {"p": system.coordinates}
+    return Kernel("along", "what p turns by", inputs, (Output("turn", tuple(_turned(group, p, False))),))
 
 
-def _kernel(name: str, purpose: str, coefficients: Coefficients, system: System, values: list[Expression]) -> Kernel:
-    inputs = {"coef": coefficients.slots, "y": system.coordinates}
-    return Kernel(name, purpose, inputs, (Output("turn", tuple(values)),))
+def _turned(group: Group, p: list[Expression], cayley: bool) -> list[Expression]:
+    """The element of p less 1; for exponentials of matrices p itself, and a bound for the square of its size."""
+    if not group.matrices:
+        return [*element([p[i] for i in group.rotation], [p[i] for i in group.translation], cayley=cayley)]
+    return cayley_transform(group, p) if cayley else [*p, size_of(group, p)]
 
 
-def _element(group: Group, p: list[Expression], cayley: bool) -> tuple[Expression, ...]:
-    return element([p[i] for i in group.rotation], [p[i] for i in group.translation], cayley=cayley)
+def _exponential(group: Group) -> Kernel:
+    names = tuple(f"p{i}" for i in range(1, len(group.matrices) + 1))
+    values = exponential(group, [symbol(n) for n in names])
+    return Kernel("exponential", "exp(P) - 1 for a P that is small", {"p": names}, (Output("element", tuple(values)),))
 
 
 def flow_attitude(
     system: System,
     group: Group,
     flows: Sequence[Flow],
+    moved: Sequence[Sequence[Expression]],
     gauge: Gauge,
     coefficients: Coefficients,
     time_of: Callable[[Flow], Expression] | None = None,
 ) -> Attitude:
     """The attitude of a splitting; the coefficients grow by what it needs. `SpecError` as `turnings`.
 
-    The sources of noise come before the ``flows``. With a monitor, ``time_of`` tells the time that a flow takes.
+    ``moved`` are increments: those of the sources of noise come before those of the ``flows``. With a monitor,
+    ``time_of`` tells the time that a flow takes.
     """
     turned = turnings(system, group, flows, put_back=uniform(system))
     shaken = [turning_of(system, group, s.hamiltonian, s.name, put_back=False) for s in system.noise]
     times = [time_of(flow) if time_of else symbol(TIME) for flow in flows]
     named = [f"the noise {s.name}" for s in system.noise] + [f"{flow.letter}_{k}" for k, flow in enumerate(flows, 1)]
     found = []
-    for k, (turning, time) in enumerate(zip([*shaken, *turned], [*driving_times(system), *times], strict=True), 1):
-        factors = factor_elements(system, group, turning, time)
-        values = coefficients.hoist(joined(group, factors) if factors else [ZERO] * group.size)
-        inputs = {"coef": coefficients.slots, "state": system.coordinates}
-        found.append(Kernel(f"turn{k}", f"what {named[k - 1]} turns by", inputs, (Output("turn", tuple(values)),)))
-    left = [turning.left for turning in turned]
-    return Attitude(group, False, turns=tuple(found), rate=rate_kernel(system, group, gauge, left))
+    listed = zip(moved, [*shaken, *turned], [*driving_times(system), *times], strict=True)
+    for k, (increment, turning, time) in enumerate(listed, 1):
+        values = staged([*increment, *_carried(system, group, turning, time)], coefficients)
+        parts = tuple(values[: len(increment)]), tuple(values[len(increment) :])
+        inputs = {"coef": coefficients.slots, "state": system.coordinates, "element": _carrier(group)}
+        about = f"the flow of {named[k - 1]}, and the element of a step with what it turns by"
+        found.append(Kernel(f"turn{k}", about, inputs, (Output("increment", parts[0]), Output("turned", parts[1]))))
+    rate = rate_kernel(system, group, gauge, [turning.left for turning in turned])
+    needed = _exponential(group) if rate and group.matrices else None
+    return Attitude(group, False, turns=tuple(found), rate=rate, exponential=needed)
+
+
+def _carrier(group: Group) -> tuple[Symbol, ...]:
+    """The element, less 1, of the flows of a step so far."""
+    return tuple(Symbol("element", i) for i in range(group.size))
+
+
+def _carried(system: System, group: Group, turning: Turning, time: Expression) -> list[Expression]:
+    """That of one flow more."""
+    before, factors = [symbol(s) for s in _carrier(group)], factor_elements(system, group, turning, time)
+    return joined(group, [before, joined(group, factors)]) if factors else before
 
 
 def uniform(system: System) -> bool:
@@ -109,7 +141,7 @@ def rate_kernel(system: System, group: Group, gauge: Gauge, more: Sequence[Expre
             raise refused(system, message, "gauge: none")
     slope = gradient(total(taken), system.coordinates)
     turning = (*group.rotation, *group.translation)
-    values = group.generator(slope) if group.matrices else [slope[i] for i in turning]
+    values = [*slope, size_of(group, slope)] if group.matrices else [slope[i] for i in turning]
     inputs = {"params": system.parameter_names, **gauge.inputs, "x": system.coordinates}
-    purpose = "the gradient of the Casimirs that are taken from H"
+    purpose = "the gradient of the Casimirs that are taken from H" + f", and {SIZE_OF_COVECTOR}" * bool(group.matrices)
     return Kernel("rate", purpose, inputs, (Output("rate", tuple(values)),))

@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 
+from phigen.scheme.lowering import cost
 from phigen.scheme.staging import Coefficients
 from phigen.symbolic.expression import ONE, Expression, add, fold, neg, number, power, rebuild, sub
 
@@ -58,3 +59,9 @@ def gather(coefficients: Coefficients, roots: Sequence[Expression]) -> list[Expr
         return _Value(Fraction(1), ONE, rebuild(e, [whole(a) for a in args]))
 
     return [whole(v) for v in fold(roots, visit)]
+
+
+def staged(increment: Sequence[Expression], coefficients: Coefficients) -> list[Expression]:
+    """The increments with coefficients for what does not depend on the state, in the cheaper of two ways."""
+    hoisted, gathered = (cost(way(coefficients.empty(), increment)) for way in (Coefficients.hoist, gather))
+    return gather(coefficients, increment) if gathered < hoisted else coefficients.hoist(increment)

@@ -95,9 +95,10 @@ class Modified:
 class Attitude:
     """The group element that each stage, or each flow, is the action of.
 
-    ``turn`` is that of an implicit stage as a function of the solved y, ``along`` as one of p, ``turns`` are those of
-    the flows of a splitting. For quaternions an element is what `phigen.attitude.elements` has; for matrices the
-    generator P, of which the element is exp(P), or its Cayley transform. ``rate`` is the gradient of the Casimirs that
+    ``turn`` is that of an implicit stage as a function of the solved y, ``along`` as one of p. Elements are less 1; in
+    place of exp(P) for a matrix P they give the covector p of which it is made, and a bound for the square of its size:
+    ``exponential`` is exp(P) − 1 for a size of 1/2 at most. ``turns`` are the flows of a splitting, each with the
+    product of the elements of the flows before it in a step and its own. ``rate`` is the gradient of the Casimirs that
     were taken from H: the body turns by them too, without moving x.
     """
 
@@ -107,6 +108,7 @@ class Attitude:
     along: Kernel | None = None
     turns: tuple[Kernel, ...] = ()
     rate: Kernel | None = None
+    exponential: Kernel | None = None
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -117,7 +119,7 @@ class Attitude:
     @property
     def kernels(self) -> tuple[Kernel, ...]:
         """All kernels, each once."""
-        return tuple(k for k in (self.turn, self.along, *self.turns, self.rate) if k is not None)
+        return tuple(k for k in (self.turn, self.along, *self.turns, self.rate, self.exponential) if k is not None)
 
 
 @dataclass(frozen=True)

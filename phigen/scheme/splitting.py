@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
 from dataclasses import replace
 
 from phigen.attitude.group import Group
@@ -14,7 +13,7 @@ from phigen.scheme.attitude import flow_attitude
 from phigen.scheme.choosing import Choice
 from phigen.scheme.discretisation import MOST_OPERATIONS, too_large
 from phigen.scheme.forces import force_facts
-from phigen.scheme.gathering import gather
+from phigen.scheme.gathering import staged
 from phigen.scheme.gauge import Gauge
 from phigen.scheme.kernel import Kernel, Output
 from phigen.scheme.kernels import noise_fields, observables
@@ -28,7 +27,6 @@ from phigen.scheme.tangent import explicit_jacobian
 from phigen.spec.model import NO_EXTRAS, Extras
 from phigen.splitting.flow import Flow
 from phigen.splitting.ring import KICK, TIME
-from phigen.symbolic.expression import Expression
 from phigen.symbolic.symbols import LEVEL
 
 
@@ -64,7 +62,8 @@ def build_splitting(
     )
     attitude, time_of = None, monitor.time if monitor else None
     if group:
-        attitude = flow_attitude(system, group, splitting.flows, gauge, coefficients, time_of)
+        moved = [monitor.outputs(flow) if monitor else flow.increment for flow in every]
+        attitude = flow_attitude(system, group, splitting.flows, moved, gauge, coefficients, time_of)
     inputs = {"t": system.times, "dw": system.increments[:1]}
     refresh = coefficients.refresh(**{name: symbols for name, symbols in inputs.items() if symbols})
     prepare = Kernel(
@@ -165,12 +164,6 @@ def _flow_kernel(system: System, flow: Flow, k: int, coefficients: Coefficients,
         {"coef": coefficients.slots, "state": system.coordinates},
         (Output("increment", tuple(increment)),),
     )
-
-
-def staged(increment: Sequence[Expression], coefficients: Coefficients) -> list[Expression]:
-    """The increments with coefficients for what does not depend on the state, in the cheaper of two ways."""
-    hoisted, gathered = (cost(way(coefficients.empty(), increment)) for way in (Coefficients.hoist, gather))
-    return gather(coefficients, increment) if gathered < hoisted else coefficients.hoist(increment)
 
 
 def _operations(step: Splitting) -> dict[str, int]:

@@ -299,6 +299,27 @@ def test_matrices_keep_the_other_momentum_and_stay_orthogonal(case, target):
     assert np.abs(found.attitude @ np.swapaxes(found.attitude, 1, 2) - np.eye(len(found.attitude[0]))).max() < 1e-15 * 5
 
 
+@pytest.mark.parametrize("case", ["so(4)", "sl(2)", "heisenberg(1)", "so(3) by matrices"])
+@pytest.mark.parametrize("size", [1e-3, 0.3, 20.0])
+def test_matrices_are_exponentials_of_covectors_of_any_size(case, size):
+    group = made(case).program.attitude.group
+    p = size * np.random.default_rng(5).normal(size=(3, len(group.matrices)))
+    basis = np.array([[[float(e.value) for e in row] for row in m] for m in group.matrices])
+    generators = np.einsum("ri,iab->rab", p, basis)
+    squares = (generators**2).sum(axis=(1, 2))[:, np.newaxis]
+    found = solver(case).backend.module._of_covector(np.concatenate([p, squares], axis=1))
+    exact = [np.array(mpmath.expm(mpmath.matrix(m.tolist())).tolist(), float) - np.eye(len(m)) for m in generators]
+    assert np.abs(found.reshape(generators.shape) - exact).max() < 1e-15 * (1 + size * np.abs(exact).max())
+
+
+@pytest.mark.parametrize("case", ["so(4)", "so(3) by matrices"])
+def test_long_steps_of_matrices_are_the_same_in_blocks_and_one_by_one(case):
+    x0 = np.linspace(0.5, 1.5, made(case).system.dimension)
+    numpy, c = (solver(case, target).integrate(x0, 0.45, 48) for target in ("numpy", "c"))
+    assert np.abs(numpy.attitude - c.attitude).max() < 1e-13
+    assert np.abs(c.attitude[-1] - solver(case, "c").integrate(x0, 0.45, 48, 48).attitude[-1]).max() < 1e-13
+
+
 @pytest.mark.slow
 def test_so4_has_the_attitude_of_the_whole_motion():
     x0, case = np.random.default_rng(4).normal(size=6), "so(4)"

@@ -10,6 +10,7 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 
 from phigen.lanes.lowering import Blocks, Lanes, Rows, Traces, in_lanes
+from phigen.scheme.attitude import SIZE_OF_COVECTOR
 from phigen.scheme.kernel import Kernel
 from phigen.scheme.path import Recurrences
 from phigen.scheme.program import BOUND, Attitude, Noise, Program
@@ -173,6 +174,8 @@ def _of_attitude(attitude: Attitude) -> Sizes:
     position = ", with the position" * bool(group.translation)
     sizes.append(("ELEMENT", group.size, f"numbers of an element of the group{position}"))
     sizes += [("ROWS_OF_ATTITUDE", rows, "of a matrix")] if rows else []
+    covector = f"numbers of a covector, and {SIZE_OF_COVECTOR}"
+    sizes += [("COVECTOR", len(group.matrices) + 1, covector)] if attitude.exponential else []
     return sizes + ([("RATE", len(rate.roots), "numbers of what the Casimirs turn")] if rate else [])
 
 
@@ -233,7 +236,8 @@ def _model(program: Program, lanes: Lanes | None, has: Mapping[str, bool], other
     own += program.choice
     own += [program.monitor.elapsed] if program.monitor else []
     own += [step.tangent] if isinstance(step, Explicit) else []
-    own += [program.attitude.turn, program.attitude.rate] if program.attitude else []
+    turned = program.attitude
+    own += [turned.exponential, turned.turn, turned.rate] if turned else []
     if step.refresh and not isinstance(step, Splitting):
         body.append(function(program, step.refresh, name="at_step" if program.noise else "at_time"))
     if step.adjoint:

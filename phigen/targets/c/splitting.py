@@ -24,18 +24,14 @@ def printed(program: Program, step: Splitting) -> str:
     """The flows, and one step."""
     found = [function(program, replace(step.prepare, name="prepare_row"))]
     found += [function(program, step.refresh, name="at_step" if program.noise else "at_time")] if step.refresh else []
-    more = f", double element[{program.name}_ELEMENT], double lost[{program.name}_ELEMENT]" if program.attitude else ""
-    for k, flow in enumerate(step.flows, 1):
+    more = f", double element[{program.name}_ELEMENT]" if program.attitude else ""
+    for k, flow in enumerate(program.attitude.turns if program.attitude else step.flows, 1):
         kernel, values = _flow(program, flow, k)
         found.append(function(program, kernel, functions=_functions(program)))
-        turn = program.attitude.turns[k - 1] if program.attitude else None
-        turned = turn is not None and any(not e.is_zero for e in turn.roots)
-        found += [function(program, turn, functions=_functions(program))] if turn and turned else []
-        values |= {"turned": turned, "more": more, "still": turn is not None and not turned}
-        found.append(render("c", "flow.c", values))
+        found.append(render("c", "flow.c", {**values, "more": more}))
     along = _along(program)
     arguments = f"const double *coef, double x[{along}], double moved[{along}], const double start[{along}]"
-    passed = "x, moved, start" + ", element, lost" * bool(program.attitude)
+    passed = "x, moved, start" + ", element" * bool(program.attitude)
     found.append(_steps(program, step, "", "inline ", arguments + more, passed))
     return "\n".join(found)
 
@@ -99,15 +95,16 @@ def _functions(program: Program) -> dict[str, str]:
 
 def _flow(program: Program, kernel: Kernel, k: int) -> tuple[Kernel, dict[str, object]]:
     """The kernel of a flow without the zero increments, and what the template of the flow reads."""
-    moved = _moved(kernel)
-    output = Output("change", tuple(kernel.roots[i] for i in moved))
+    moved, increment = _moved(kernel), kernel.outputs[0].values
+    output = Output("change", tuple(increment[i] for i in moved))
     values = {"NAME": program.name, "n": _along(program), "k": k, "moved": list(enumerate(moved)), "form": ""}
-    return replace(kernel, name=f"change{k}", outputs=(output,)), values | {"count": max(1, len(moved))}
+    made = replace(kernel, name=f"change{k}", outputs=(output, *kernel.outputs[1:]))
+    return made, values | {"count": max(1, len(moved))}
 
 
 def _moved(kernel: Kernel) -> list[int]:
     """The values that a flow changes."""
-    return [i for i, e in enumerate(kernel.roots) if not e.is_zero]
+    return [i for i, e in enumerate(kernel.outputs[0].values) if not e.is_zero]
 
 
 def _steps(program: Program, step: Splitting, form: str, linkage: str, arguments: str, passed: str) -> str:

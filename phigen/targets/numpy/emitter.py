@@ -234,11 +234,12 @@ def _attitude(program: Program, attitude: Attitude) -> list[str]:
         "what": f"matrix of {rows} rows" if rows else "quaternion" + " and a position" * bool(group.translation),
         "rows": rows,
         "position": bool(group.translation),
-        "cayley": attitude.cayley,
+        "exponential": attitude.exponential is not None,
+        "uniform": attitude.rate is not None,
         "normalise": group.orthogonal,
         "splitting": isinstance(step, Splitting),
         "rates": f"_rate(parameters, {'gauge.T, ' * bool(program.gauge)}x)" if attitude.rate else "None",
-        "turn_of_stage": "_along(solved)" if attitude.along else f"_turn(stage[0], x + {solved})",
+        "turn_of_stage": _turn_of_stage(attitude, solved),
         "shaped": _shaped(rows, bool(group.translation)),
         **_ordered(group.spatial),
         "shapes": shown + ", positions (rows, ..., 3)" * bool(group.translation),
@@ -250,6 +251,12 @@ def _attitude(program: Program, attitude: Attitude) -> list[str]:
     own = ("matrices", "matrix_start") if rows else ("quaternions", "rotations", "start")
     parts = [*(f"attitude_{part}" for part in own), "attitude", "reconstruct"]
     return [*pieces, *(render("numpy", f"{part}.py", values) for part in parts)]
+
+
+def _turn_of_stage(attitude: Attitude, solved: str) -> str:
+    """The factors of a stage, less 1."""
+    turn = "_along(solved)" if attitude.along else f"_turn(stage[0], x + {solved})"
+    return f"_of_covector({turn})" if attitude.group.matrices and not attitude.cayley else turn
 
 
 def _shaped(rows: int, position: bool) -> str:

@@ -20,67 +20,32 @@ static void phi_matrix_product(const double a[PHI_ELEMENT], const double b[PHI_E
         }
 }
 
-#if !PHI_CAYLEY || PHI_RATE_OF_GAUGE
-/* exp(P) - 1 by its Taylor series at P/2^k, doubled k times. */
-static void phi_matrix_exponential(const double p[PHI_ELEMENT], double element[PHI_ELEMENT])
+#if PHI_EXPONENTIAL
+enum { PHI_SIZE = PHI_COVECTOR - 1 }; /* where a covector tells a bound for the square of its size */
+
+/* By how many halvings P becomes so small that its exponential is a short sum. */
+static int phi_doublings(double square)
 {
-    double small[PHI_ELEMENT], term[PHI_ELEMENT], next[PHI_ELEMENT], size = 0.0, left = 1.0;
     int doublings = 0;
-    for (int i = 0; i < PHI_ELEMENT; ++i) size += fabs(p[i]);
-    while (isfinite(size) && ldexp(size, -doublings) > 0.5) ++doublings;
-    for (int i = 0; i < PHI_ELEMENT; ++i) element[i] = term[i] = small[i] = ldexp(p[i], -doublings);
-    for (int k = 2; k < 20 && left > 1e-18; ++k) {
-        phi_matrix_product(term, small, next);
-        left = 0.0;
-        for (int i = 0; i < PHI_ELEMENT; ++i) {
-            term[i] = next[i] / k;
-            element[i] += term[i];
-            left += fabs(term[i]);
-        }
+    for (; isfinite(square) && square > 0.25; square *= 0.25) ++doublings;
+    return doublings;
+}
+
+/* exp(P) - 1: that of P/2^k, doubled k times. */
+static void phi_matrix_exponential(const double p[PHI_COVECTOR], double element[PHI_ELEMENT])
+{
+    double small[PHI_COVECTOR], square[PHI_ELEMENT];
+    int doublings = phi_doublings(p[PHI_SIZE]);
+    if (doublings == 0) {
+        phi_exponential(p, element);
+        return;
     }
+    for (int i = 0; i < PHI_COVECTOR; ++i) small[i] = ldexp(p[i], -doublings);
+    phi_exponential(small, element);
     for (; doublings > 0; --doublings) {
-        phi_matrix_product(element, element, next);
-        for (int i = 0; i < PHI_ELEMENT; ++i) element[i] = 2.0 * element[i] + next[i];
+        phi_matrix_product(element, element, square);
+        for (int i = 0; i < PHI_ELEMENT; ++i) element[i] = 2.0 * element[i] + square[i];
     }
-}
-
-#endif
-#if PHI_CAYLEY
-/* (1 - P/2)^-1 (1 + P/2) - 1 = (1 - P/2)^-1 P, by elimination with pivoting. */
-static void phi_matrix_element(const double p[PHI_ELEMENT], double element[PHI_ELEMENT])
-{
-    enum { N = PHI_ROWS_OF_ATTITUDE };
-    double matrix[PHI_ELEMENT];
-    for (int i = 0; i < PHI_ELEMENT; ++i) {
-        matrix[i] = (i % (N + 1) == 0 ? 1.0 : 0.0) - 0.5 * p[i];
-        element[i] = p[i];
-    }
-    for (int k = 0; k < N; ++k) {
-        int best = k;
-        for (int i = k + 1; i < N; ++i)
-            if (fabs(matrix[i * N + k]) > fabs(matrix[best * N + k])) best = i;
-        for (int j = 0; j < N; ++j) {
-            const double a = matrix[k * N + j], b = element[k * N + j];
-            matrix[k * N + j] = matrix[best * N + j];
-            element[k * N + j] = element[best * N + j];
-            matrix[best * N + j] = a;
-            element[best * N + j] = b;
-        }
-        for (int i = 0; i < N; ++i) {
-            const double factor = i == k ? 0.0 : matrix[i * N + k] / matrix[k * N + k];
-            for (int j = 0; j < N; ++j) {
-                matrix[i * N + j] -= factor * matrix[k * N + j];
-                element[i * N + j] -= factor * element[k * N + j];
-            }
-        }
-    }
-    for (int i = 0; i < PHI_ELEMENT; ++i) element[i] /= matrix[i / N * (N + 1)];
-}
-
-#else
-static void phi_matrix_element(const double p[PHI_ELEMENT], double element[PHI_ELEMENT])
-{
-    phi_matrix_exponential(p, element);
 }
 
 #endif
@@ -94,8 +59,9 @@ static void phi_product(const double a[PHI_ELEMENT], const double b[PHI_ELEMENT]
 /* The element of the motion with a constant rate, for some time. */
 static void phi_uniform(const double rate[PHI_RATE], double t, double element[PHI_ELEMENT])
 {
-    double p[PHI_ELEMENT];
-    for (int i = 0; i < PHI_ELEMENT; ++i) p[i] = t * rate[i];
+    double p[PHI_RATE];
+    for (int i = 0; i < PHI_SIZE; ++i) p[i] = t * rate[i];
+    p[PHI_SIZE] = t * t * rate[PHI_SIZE];
     phi_matrix_exponential(p, element);
     for (int i = 0; i < PHI_ELEMENT; i += PHI_ROWS_OF_ATTITUDE + 1) element[i] += 1.0;
 }
@@ -119,15 +85,13 @@ static void phi_normalise(const double g[PHI_ELEMENT], double carry[PHI_ELEMENT]
 }
 
 #endif
-/* What a factor, P in turn, adds to an element. */
+/* What a factor, given less 1, adds to an element. */
 static void phi_added(const double element[PHI_ELEMENT], const double turn[PHI_ELEMENT], double change[PHI_ELEMENT])
 {
-    double factor[PHI_ELEMENT];
-    phi_matrix_element(turn, factor);
 #if PHI_SPATIAL
-    phi_matrix_product(factor, element, change);
+    phi_matrix_product(turn, element, change);
 #else
-    phi_matrix_product(element, factor, change);
+    phi_matrix_product(element, turn, change);
 #endif
 }
 
@@ -207,38 +171,45 @@ static void phi_normalise(const double q[4], double carry[4])
 }
 
 #endif
-/* Multiply an element by that of a stage, or of a flow, in compensated arithmetic. */
-static inline void phi_turned(double element[PHI_ELEMENT], double carry[PHI_ELEMENT], const double turn[PHI_ELEMENT])
+/* Multiply the element by a factor, given less 1, in compensated arithmetic. */
+static void phi_turn_by(phi_solver *s, const double factor[PHI_ELEMENT])
 {
     double change[PHI_ELEMENT];
-    phi_added(element, turn, change);
+    phi_added(s->turned, factor, change);
     for (int i = 0; i < PHI_ELEMENT; ++i) {
-        const double moved = change[i] + carry[i], sum = element[i] + moved, added = sum - element[i];
-        carry[i] = (element[i] - (sum - added)) + (moved - added);
-        element[i] = sum;
+        const double moved = change[i] + s->turned_carry[i], sum = s->turned[i] + moved, added = sum - s->turned[i];
+        s->turned_carry[i] = (s->turned[i] - (sum - added)) + (moved - added);
+        s->turned[i] = sum;
     }
+#if PHI_NORMALISE
+    phi_normalise(s->turned, s->turned_carry);
+#endif
 }
 
 #if PHI_IMPLICIT
 /* The element of a stage that was solved by y. */
 static inline void phi_turn_stage(phi_solver *s, int stage, const double y[PHI_DIM])
 {
-    double turn[PHI_ELEMENT];
-    phi_turn(s->coef[stage], y, turn);
-    phi_turned(s->turned, s->turned_carry, turn);
-#if PHI_NORMALISE
-    phi_normalise(s->turned, s->turned_carry);
+    double factor[PHI_ELEMENT];
+#if PHI_TURNED_BY_COVECTOR
+    double p[PHI_COVECTOR];
+    phi_turn(s->coef[stage], y, p);
+    phi_matrix_exponential(p, factor);
+#else
+    phi_turn(s->coef[stage], y, factor);
 #endif
+    phi_turn_by(s, factor);
 }
 
 #endif
 #if PHI_BLOCKS
-#if !PHI_MATRICES
-/* Two factors as one, in place of the first; both less 1. */
+/* Two factors as one, in place of the first; all less 1. */
 static void phi_joined(const double first[PHI_ELEMENT], const double second[PHI_ELEMENT], double both[PHI_ELEMENT])
 {
     double change[PHI_ELEMENT];
-#if PHI_SPATIAL
+#if PHI_MATRICES
+    phi_added(first, second, change);
+#elif PHI_SPATIAL
     phi_quaternion_product(second, first, change);
 #else
     phi_quaternion_product(first, second, change);
@@ -253,18 +224,12 @@ static void phi_joined(const double first[PHI_ELEMENT], const double second[PHI_
     for (int i = 0; i < PHI_ELEMENT; ++i) both[i] = (first[i] + second[i]) + change[i];
 }
 
-#endif
 /* Multiply by the elements of many stages in turn. */
 static void phi_turn_sequence(phi_solver *s, double sequence[][PHI_ELEMENT], int count)
 {
-#if !PHI_MATRICES
     for (; count % 2 == 0; count /= 2) /* neighbours first: their products do not wait for one another */
         for (int k = 0; k < count / 2; ++k) phi_joined(sequence[2 * k], sequence[2 * k + 1], sequence[k]);
-#endif
-    for (int k = 0; k < count; ++k) phi_turned(s->turned, s->turned_carry, sequence[k]);
-#if PHI_NORMALISE
-    phi_normalise(s->turned, s->turned_carry);
-#endif
+    for (int k = 0; k < count; ++k) phi_turn_by(s, sequence[k]);
 }
 
 #endif

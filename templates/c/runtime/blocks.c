@@ -260,13 +260,37 @@ static void phi_take_stage(phi_lanes turns[PHI_ELEMENT], int stage, double seque
 #endif
 }
 
+#if PHI_TURNED_BY_COVECTOR
+/* phi_matrix_exponential in all lanes. */
+static void phi_matrix_exponential_lanes(phi_lanes p[PHI_COVECTOR], phi_lanes element[PHI_ELEMENT])
+{
+    const int doublings = phi_doublings(phi_largest(p[PHI_SIZE]));
+    if (doublings == 0) {
+        phi_exponential_lanes(p, element);
+        return;
+    }
+    for (int lane = 0; lane < PHI_LANES; ++lane) {
+        double one[PHI_COVECTOR], made[PHI_ELEMENT];
+        for (int i = 0; i < PHI_COVECTOR; ++i) one[i] = p[i][lane];
+        phi_matrix_exponential(one, made);
+        for (int i = 0; i < PHI_ELEMENT; ++i) element[i][lane] = made[i];
+    }
+}
+
+#endif
 /* The elements of a block that was solved, one after the other. */
 static void phi_turn_block(phi_solver *s, phi_table *table, phi_models *models)
 {
     phi_lanes turns[PHI_ELEMENT];
     double sequence[PHI_STAGES * PHI_LANES][PHI_ELEMENT];
     for (int stage = 0; stage < PHI_STAGES; ++stage) {
+#if PHI_TURNED_BY_COVECTOR
+        phi_lanes p[PHI_COVECTOR];
+        phi_turn_lanes(table->coef[stage], models->stage[stage].y, p);
+        phi_matrix_exponential_lanes(p, turns);
+#else
         phi_turn_lanes(table->coef[stage], models->stage[stage].y, turns);
+#endif
         phi_take_stage(turns, stage, sequence);
     }
     phi_turn_sequence(s, sequence, PHI_STAGES * PHI_LANES);

@@ -23,18 +23,6 @@ static phi_status phi_stage(phi_solver *s, int stage)
 #endif
 #include "flows.h"
 
-#if PHI_ATTITUDE
-/* The product of all elements, and what rounding took of it, after a step. */
-static void phi_turn_to(phi_solver *s, double turned[PHI_ELEMENT], double lost[PHI_ELEMENT])
-{
-#if PHI_NORMALISE
-    phi_normalise(turned, lost);
-#endif
-    memcpy(s->turned, turned, PHI_ELEMENT * sizeof turned[0]);
-    memcpy(s->turned_carry, lost, PHI_ELEMENT * sizeof lost[0]);
-}
-
-#endif
 /* The coefficients of all flows of a step: a row for each time. */
 #if PHI_MONITOR
 static void phi_prepare(const phi_params *params, const double gauge[PHI_GAUGES], double h, double *coef)
@@ -66,10 +54,8 @@ static phi_status phi_stages(phi_solver *s)
     memcpy(start, s->x, sizeof s->x);
     memcpy(moved, s->carry, sizeof s->carry);
 #if PHI_ATTITUDE
-    double turned[PHI_ELEMENT], lost[PHI_ELEMENT];
-    memcpy(turned, s->turned, sizeof turned);
-    memcpy(lost, s->turned_carry, sizeof lost);
-    phi_flows(s->coef[0], x, moved, start, turned, lost);
+    double element[PHI_ELEMENT] = { 0.0 };
+    phi_flows(s->coef[0], x, moved, start, element);
 #else
     phi_flows(s->coef[0], x, moved, start);
 #endif
@@ -80,7 +66,7 @@ static phi_status phi_stages(phi_solver *s)
     phi_settle(s->x, s->carry, moved);
     phi_pass(s, moved[PHI_TIME]);
 #if PHI_ATTITUDE
-    phi_turn_to(s, turned, lost);
+    phi_turn_by(s, element);
 #endif
     return PHI_OK;
 }
@@ -93,10 +79,8 @@ static phi_status phi_stages(phi_solver *s)
     memcpy(x, s->x, sizeof x);
     memcpy(moved, s->carry, sizeof moved);
 #if PHI_ATTITUDE
-    double turned[PHI_ELEMENT], lost[PHI_ELEMENT];
-    memcpy(turned, s->turned, sizeof turned);
-    memcpy(lost, s->turned_carry, sizeof lost);
-    phi_flows(s->coef[0], x, moved, s->x, turned, lost);
+    double element[PHI_ELEMENT] = { 0.0 };
+    phi_flows(s->coef[0], x, moved, s->x, element);
 #else
     phi_flows(s->coef[0], x, moved, s->x);
 #endif
@@ -105,7 +89,7 @@ static phi_status phi_stages(phi_solver *s)
         if (!isfinite(x[i])) return PHI_NOT_FINITE;
     phi_settle(s->x, s->carry, moved);
 #if PHI_ATTITUDE
-    phi_turn_to(s, turned, lost);
+    phi_turn_by(s, element);
 #endif
     return PHI_OK;
 }

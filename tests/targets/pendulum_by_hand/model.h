@@ -98,11 +98,21 @@ static void phi_prepare_adjoint(const phi_params *params, double h, const double
 #endif
 #if PHI_ATTITUDE
 /* A pendulum has no attitude: these show what the runtime asks for. */
-static void phi_turn(const double *coef, const double y[2], double turn[PHI_ELEMENT])
+enum { PHI_TURN = PHI_MATRICES ? PHI_RATE : PHI_ELEMENT };
+
+static void phi_turn(const double *coef, const double y[2], double turn[PHI_TURN])
 {
     (void)coef;
-    for (int i = 0; i < PHI_ELEMENT; ++i) turn[i] = 0.0 * y[0];
+    for (int i = 0; i < PHI_TURN; ++i) turn[i] = 0.0 * y[0];
 }
+
+#if PHI_MATRICES
+static void phi_exponential(const double *p, double element[PHI_ELEMENT])
+{
+    for (int i = 0; i < PHI_ELEMENT; ++i) element[i] = 0.0 * p[0];
+}
+
+#endif
 
 static void phi_rate(const phi_params *params, const double x[2], double rate[PHI_RATE])
 {

@@ -7,11 +7,20 @@
 enum { PHI_SLOPE_TERMS = PHI_ADJOINT ? 16 : 8, PHI_SLOPE_SERIES = 2, PHI_SLOPE_FIXED = 1, PHI_FACTORS = 1 };
 
 #if PHI_ATTITUDE
-static void phi_turn_lanes(phi_lanes coef[], phi_lanes y[2], phi_lanes turn[PHI_ELEMENT])
+static void phi_turn_lanes(phi_lanes coef[], phi_lanes y[2], phi_lanes turn[PHI_TURN])
 {
-    for (int i = 0; i < PHI_ELEMENT; ++i)
+    for (int i = 0; i < PHI_TURN; ++i)
         for (int lane = 0; lane < PHI_LANES; ++lane) turn[i][lane] = 0.0 * coef[0][lane] * y[0][lane];
 }
+
+#if PHI_MATRICES
+static void phi_exponential_lanes(phi_lanes p[], phi_lanes element[PHI_ELEMENT])
+{
+    for (int i = 0; i < PHI_ELEMENT; ++i)
+        for (int lane = 0; lane < PHI_LANES; ++lane) element[i][lane] = 0.0 * p[0][lane];
+}
+
+#endif
 
 #endif
 #if PHI_NEWTON

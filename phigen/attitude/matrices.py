@@ -1,0 +1,176 @@
+"""Group elements that are matrices: exp(P) and the Cayley transform of P = Σ p_i E_i, less 1, as straight formulas.
+
+By the theorem of Cayley and Hamilton, Pᴺ = Σ_{j<N} q_j Pʲ for a matrix of N rows. So all powers, and with them the
+series of exp, are combinations of 1, P, …, P^{N−1}, whose factors follow from one another by numbers: N − 2 products of
+matrices in all. The q_j are, up to signs, the elementary symmetric functions of the eigenvalues, which by Newton's
+identities follow from the traces of powers.
+
+In flows of a splitting most P turn in planes, or shift: P³ = −sP with a number s, where exp(P) is
+1 + sin(√s)/√s P + (1 − cos √s)/s P², for any s.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from fractions import Fraction
+from itertools import combinations
+from math import factorial, isqrt
+
+from phigen.attitude.group import Dense, Group
+from phigen.symbolic.expression import ONE, ZERO, Expression, call, number, total
+from phigen.symbolic.verdict import PROVED, decide_zero
+
+#: Terms of the series of exp that are enough where the largest eigenvalue is no larger than 1/2.
+TERMS = 14
+
+_HALF = number(Fraction(1, 2))
+
+Flat = list[Expression]
+
+
+def size_of(group: Group, p: Sequence[Expression]) -> Expression:
+    """A bound for the square of the largest eigenvalue of P: the sum of the squares of all entries, half for skew P."""
+    squares = total(e**2 for e in group.generator(p))
+    return _HALF * squares if group.orthogonal else squares
+
+
+def exponential(group: Group, p: Sequence[Expression]) -> Flat:
+    """The entries of exp(P) − 1, by as many terms as are enough for `size_of` up to 1/4."""
+    powers, (first, *recurrence) = _powers(group, p), [*_symmetric(group, p)]
+    assert first is ONE
+    rows = len(powers) + 1
+    last = [e if (rows - j) % 2 else -ONE * e for j, e in enumerate(reversed(recurrence))]  # P^rows = Σ last_j P^j
+    factors = [number(Fraction(1, factorial(j))) if j else ZERO for j in range(rows)]
+    power = [ZERO] * (rows - 1) + [ONE]
+    for k in range(rows, TERMS + 1):
+        power = [a + power[-1] * b for a, b in zip([ZERO, *power[:-1]], last, strict=True)]
+        factors = [f + number(Fraction(1, factorial(k))) * a for f, a in zip(factors, power, strict=True)]
+    return _combined(factors, powers)
+
+
+def cayley(group: Group, p: Sequence[Expression]) -> Flat:
+    """The entries of (1 − P/2)⁻¹(1 + P/2) − 1 = (1 − P/2)⁻¹P.
+
+    With A = P/2 and its symmetric functions e_i, (1 − A)⁻¹ Σ(−1)ⁱe_i = Σ_k A^k Σ_{i < N−k} (−1)ⁱe_i.
+    """
+    half = [_HALF * e for e in p]
+    powers, symmetric = _powers(group, half), [*_symmetric(group, half)]
+    rows = len(powers) + 1
+    signed = [e if i % 2 == 0 else -ONE * e for i, e in enumerate(symmetric)]
+    per = ONE / total(signed)
+    # 2(1 − A)⁻¹A = 2((1 − A)⁻¹ − 1): the factor of 1 is the difference, −(−1)ᴺe_N.
+    sums = [-ONE * signed[rows], *(total(signed[: rows - k]) for k in range(1, rows))]
+    return [2 * per * e for e in _combined(sums, powers)]
+
+
+def _powers(group: Group, p: Sequence[Expression]) -> list[Flat]:
+    """P, …, P^{N−1}."""
+    rows = len(group.matrices[0])
+    found = [group.generator(p)]
+    while len(found) < rows - 1:
+        found.append(multiplied(found[-1], found[0]))
+    return found
+
+
+def _symmetric(group: Group, p: Sequence[Expression]) -> Iterator[Expression]:
+    """The elementary symmetric functions of the eigenvalues, from 1 to the determinant; odd ones of skew P are 0."""
+    powers = _powers(group, p)
+    rows = len(powers) + 1
+    traces = [ZERO, *(_trace(m, rows) for m in powers), _trace_of_product(powers[-1], powers[0], rows)]
+    found = [ONE]
+    for k in range(1, rows + 1):
+        if group.orthogonal and k % 2:
+            found.append(ZERO)
+            continue
+        signed = [(found[k - i] * traces[i], i) for i in range(1, k + 1) if not (group.orthogonal and i % 2)]
+        found.append(total(a if i % 2 else -ONE * a for a, i in signed) / k)
+    yield from found
+
+
+def _trace(matrix: Flat, rows: int) -> Expression:
+    return total(matrix[:: rows + 1])
+
+
+def _trace_of_product(a: Flat, b: Flat, rows: int) -> Expression:
+    return total(a[i * rows + j] * b[j * rows + i] for i in range(rows) for j in range(rows))
+
+
+def _combined(factors: Sequence[Expression], powers: Sequence[Flat]) -> Flat:
+    """A number, and multiples of powers."""
+    rows = len(powers) + 1
+    return [
+        total([factors[0]] * (i % (rows + 1) == 0) + [f * m[i] for f, m in zip(factors[1:], powers, strict=True)])
+        for i in range(rows**2)
+    ]
+
+
+def multiplied(a: Sequence[Expression], b: Sequence[Expression]) -> Flat:
+    """The product of two square matrices, row by row."""
+    n = isqrt(len(a))
+    return [total(a[i * n + k] * b[k * n + j] for k in range(n)) for i in range(n) for j in range(n)]
+
+
+def flow_exponential(group: Group, p: Sequence[Expression], positive: Sequence[str]) -> Flat | None:
+    """The entries of exp(P) − 1 for a P that is a sum of commuting ones with P³ = −sP; None for others."""
+    basis = [(pi, m) for pi, m in zip(p, group.matrices, strict=True) if not pi.is_zero]
+    ratios = [_ratio(m) for _, m in basis]
+    if all(r is not None for r in ratios) and all(_commute(a, b) for (_, a), (_, b) in combinations(basis, 2)):
+        made = [_of_constant(pi, m, r) for (pi, m), r in zip(basis, ratios, strict=True) if r is not None]
+    else:
+        whole = _of_plane(group.generator(p), positive)
+        made = [] if whole is None else [whole]
+    result: Flat | None = None
+    for e in made:
+        result = e if result is None else product_less_1(result, e)
+    return result
+
+
+def product_less_1(a: Sequence[Expression], b: Sequence[Expression]) -> Flat:
+    """(1 + A)(1 + B) − 1."""
+    return [x + y + z for x, y, z in zip(a, b, multiplied(a, b), strict=True)]
+
+
+def _ratio(matrix: Dense) -> Fraction | None:
+    """s with E³ = −sE, if there is one, for a matrix of numbers."""
+    e = [x for row in matrix for x in row]
+    cube = multiplied(multiplied(e, e), e)
+    if not all(x.is_number for x in (*e, *cube)):
+        return None
+    values = [(Fraction(x.value), Fraction(c.value)) for x, c in zip(e, cube, strict=True)]
+    s = next(-c / x for x, c in values if x)
+    return s if all(c == -s * x for x, c in values) else None
+
+
+def _commute(a: Dense, b: Dense) -> bool:
+    first, second = ([x for row in m for x in row] for m in (a, b))
+    return all((x - y).is_zero for x, y in zip(multiplied(first, second), multiplied(second, first), strict=True))
+
+
+def _of_constant(p: Expression, matrix: Dense, s: Fraction) -> Flat:
+    """exp(pE) − 1; with sin and cos of a multiple of p itself, where s is a square."""
+    e = [x for row in matrix for x in row]
+    root = Fraction(isqrt(s.numerator), isqrt(s.denominator)) if s > 0 else Fraction(0)
+    if s > 0 and root**2 == s:
+        angle = number(root) * p
+        along, across = call("sin", angle) / number(root), call("versin", angle) / number(s)
+    else:
+        along, across = _along_and_across(number(s) * p**2)
+        along, across = along * p, across * p**2
+    return [along * a + across * b for a, b in zip(e, multiplied(e, e), strict=True)]
+
+
+def _of_plane(generator: Flat, positive: Sequence[str]) -> Flat | None:
+    """exp(P) − 1 if P³ = −sP, for s the half of the sum of squares of its eigenvalues, all of it, or 0."""
+    square = multiplied(generator, generator)
+    cube, trace = multiplied(square, generator), _trace(square, isqrt(len(square)))
+    for s in (-_HALF * trace, -ONE * trace, ZERO):
+        residuals = [("", a + s * b) for a, b in zip(cube, generator, strict=True)]
+        if decide_zero("", residuals, positive).verdict == PROVED:
+            along, across = _along_and_across(s)
+            return [along * a + across * b for a, b in zip(generator, square, strict=True)]
+    return None
+
+
+def _along_and_across(s: Expression) -> tuple[Expression, Expression]:
+    """sin(√s)/√s and (1 − cos √s)/s."""
+    return call("sinroot", s), _HALF * call("sinroot", s / 4) ** 2
