@@ -199,7 +199,8 @@ def _compiled(
     plan = plan_order(order or spec.order, None if order else spec.terms, symmetric=realisation.symmetric)
     gauged = clock.timed("gauge", lambda: choose(source, realisation, spec.gauge, monitor_of(spec)))
     reached = clock.timed(
-        "generating function", lambda: discretise(gauged.system, realisation, gauged.series, plan, spec.composition)
+        "generating function",
+        lambda: discretise(gauged.system, realisation, gauged.series, plan, spec.composition, gauged.gauge.monitor),
     )
     group = group_of(source, spec.reconstruct, realisation.kind) if spec.reconstruct else None
     described |= {"solver": spec.solver, "group": group}

@@ -17,7 +17,8 @@ def method(compilation: Compilation) -> str:
     terms = "S_1" if stage.terms == 1 else f"S_1 … S_{stage.terms}"
     system = compilation.system
     pushes = [" + hζ"] * (system.forces is not None) + [" + Σ ΔW σ∇g"] * bool(system.noise)
-    terms += f" with p = ∇S_h{''.join(pushes)}" if pushes else ""
+    p = "g (∇S_h + hζ)" if compilation.monitor and system.forces else f"∇S_h{''.join(pushes)}"
+    terms += f" with p = {p}" if pushes else ""
     if stage is not plan:
         return f"order {plan.order}, composed of {len(compilation.program.fractions)} stages of order 2 from {terms}"
     why = "symmetric, so the terms of even index vanish" if compilation.symmetric else "not symmetric"

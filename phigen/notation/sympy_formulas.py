@@ -45,8 +45,10 @@ class Dictionary:
         self.coordinates = tuple(known[c] for c in system.coordinates)
         self.times = tuple(known[t] for t in system.times)
         self.covector = tuple(free_symbols([f"p_{c}" for c in system.coordinates], known))
-        self.step, *free = free_symbols(["h", *(f"lambda_{c}" for c in gauge.free)], [*known, *self.covector])
-        self.gauge = dict(zip(gauge.free, free, strict=True))
+        level = ["e"] * (gauge.monitor is not None)
+        wanted = ["h", *(f"lambda_{c}" for c in gauge.free), *level]
+        self.step, *free = free_symbols(wanted, [*known, *self.covector])
+        self.gauge = dict(zip((*gauge.free, *level), free, strict=True))
         momenta = dict(zip(map(momentum, system.coordinates), self.covector, strict=True))
         self._symbols = {**known, **momenta, **dict(zip(gauge.symbols, free, strict=True)), STEP: self.step}
 

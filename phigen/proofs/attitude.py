@@ -72,7 +72,7 @@ def check(compilation: Compilation) -> Iterator[Statement]:
     if not compilation.splitting:
         first = compilation.series.polynomial(1)
         slope = gradient(first.tower.expression(first.terms[0]), system.coordinates)
-        yield rate_statement(system, attitude, slope, compilation.monitor)
+        yield rate_statement(system, attitude, slope, None if system.forces else compilation.monitor)
 
 
 def rate_statement(system: System, attitude: Attitude, slope: Vector, monitor: Expression | None = None) -> Statement:

@@ -204,10 +204,12 @@ class _Derivation:
         start = time.perf_counter()
         slope = scheme.generating.coefficients.written_out(scheme.generating.slope)
         pairs: list[Pair] = []
-        pushes = self._pushes()
+        pushes, monitor = self._pushes(), self._compilation.monitor
+        # With forces the series is that of H, and g a factor of all.
+        factor = self._dictionary.expression(monitor) if monitor and self._compilation.system.forces else 1
         for c, theirs in zip(self._dictionary.coordinates, slope, strict=True):
             terms = (h**i * derivative(s, c) for i, s in enumerate(self._found[: scheme.terms], 1))
-            pairs.append((f"along {c}", self._dictionary.expression(theirs), sum(terms) + pushes[c]))
+            pairs.append((f"along {c}", self._dictionary.expression(theirs), factor * (sum(terms) + pushes[c])))
         statement = decide(GRADIENT, pairs, self._positive, f"as the program has it: {scheme.generating.form}")
         return Comparison(statement, None, time.perf_counter() - start)
 

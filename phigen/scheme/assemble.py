@@ -70,7 +70,8 @@ def build_program(
         attitude = stage_attitude(system, group, realisation, scheme.generating, gauge)
     lanes = solver.lanes and extras.offers("lanes", profile)
     elapsed = elapsed_kernel(system, scheme.generating)
-    step = _step(system, realisation, scheme.generating, gauge, solver, extras, lanes=lanes)
+    moved = replace(system, forces=gauged.system.forces)  # with a monitor these are those in τ
+    step = _step(moved, realisation, scheme.generating, gauge, solver, extras, lanes=lanes)
     attitude = scheme.generating.coefficients.settled(attitude)
     level = level_adjoint(system) if gauge.monitor and extras.adjoint else None
     modified, count = None, extras.modified_hamiltonian
@@ -191,10 +192,11 @@ def _facts(
     yield f"bi-realisation: {realisation.kind}, {'symmetric' if realisation.symmetric else 'not symmetric'}"
     yield from approximation(realisation)
     yield f"generating function: {series} ({generating.form}{terms})"
-    yield from monitor_facts(gauge.monitor)
+    yield from monitor_facts(gauge.monitor, forced=system.forces is not None)
     yield from gauge.facts
-    halves = ", impulse h f by halves before and after" if system.forces and acts(system.forces.vector) else ""
-    yield from force_facts(system, f"p = h (grad H + zeta){halves}")
+    g = "g " * bool(gauge.monitor)
+    halves = f", impulse h {g}f by halves before and after" if system.forces and acts(system.forces.vector) else ""
+    yield from force_facts(system, f"p = h {g}(grad H + zeta){halves}")
     yield from noise_facts(system, weak=1)
     yield f"step: {step.manner}"
     yield scheme.note

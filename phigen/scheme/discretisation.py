@@ -12,7 +12,7 @@ from phigen.realisations import karasev
 from phigen.realisations.protocol import BiRealisation
 from phigen.scheme.composition import find, orders
 from phigen.scheme.estimate import newton_operations
-from phigen.scheme.generating import GeneratingFunction, collected_form, graph_form
+from phigen.scheme.generating import GeneratingFunction, collected_form, forced_form, graph_form
 from phigen.scheme.order import Order
 from phigen.series.hamilton_jacobi import HamiltonJacobi
 from phigen.spec import limits
@@ -56,8 +56,15 @@ def hamilton_jacobi(
     )
 
 
-def generating_function(system: System, series: HamiltonJacobi, terms: int) -> GeneratingFunction:
-    """∇S_h and Hess S_h in the cheapest form. LimitError if every form is too large."""
+def generating_function(
+    system: System, series: HamiltonJacobi, terms: int, monitor: Expression | None = None
+) -> GeneratingFunction:
+    """∇S_h and Hess S_h in the cheapest form. LimitError if every form is too large.
+
+    The series is that of K if there is a ``monitor``, but with forces that of H.
+    """
+    if monitor and system.forces:
+        return forced_form(system, monitor, series.static)
     candidates, inputs = [], (*series.times, *system.increments)
     if terms <= GRAPH_TERMS:
         with suppress(OverflowError):
@@ -106,6 +113,7 @@ def discretise(
     series: HamiltonJacobi,
     order: Order,
     composition: str,
+    monitor: Expression | None = None,
 ) -> Discretisation:
     """The direct series, or a symmetric composition of the method of order 2 where that was asked for or is cheaper.
 
@@ -115,7 +123,7 @@ def discretise(
     if system.noise:
         expect_noise(system, realisation, order, composition)
     if system.forces:
-        return _forced(system, realisation, series, order, composition)
+        return _forced(system, realisation, series, order, composition, monitor)
     _expect_affordable(system, realisation)
     series.reach(order.order)  # S_{k+1} = 0 is what makes a symmetric method of order k + 1: it will be proved
     if composition not in ("auto", "none"):
@@ -151,7 +159,12 @@ def expect_noise(system: System, realisation: BiRealisation, order: Order, compo
 
 
 def _forced(
-    system: System, realisation: BiRealisation, series: HamiltonJacobi, order: Order, composition: str
+    system: System,
+    realisation: BiRealisation,
+    series: HamiltonJacobi,
+    order: Order,
+    composition: str,
+    monitor: Expression | None,
 ) -> Discretisation:
     """With forces p = h(∇H + ζ), of order 2 by symmetry; higher orders are compositions."""
     if realisation.path and system.forces and any(not f.is_zero for f in system.forces.vector):
@@ -165,12 +178,17 @@ def _forced(
         hint = f"order: {lowest}" + ("" if not series.symmetric else ", or composition: auto")
         raise SpecError([Diagnostic(reason, place, hint)])
     if order.order <= lowest:
-        return Discretisation(generating_function(system, series, 1), 1)
-    return _composed(system, realisation, series, order, composition)
+        return Discretisation(generating_function(system, series, 1, monitor), 1)
+    return _composed(system, realisation, series, order, composition, monitor)
 
 
 def _composed(
-    system: System, realisation: BiRealisation, series: HamiltonJacobi, order: Order, name: str
+    system: System,
+    realisation: BiRealisation,
+    series: HamiltonJacobi,
+    order: Order,
+    name: str,
+    monitor: Expression | None = None,
 ) -> Discretisation:
     found = find(name, order.order)
     if found is None or not series.symmetric:
@@ -184,7 +202,7 @@ def _composed(
         place = system.locations.get(("composition",)) or system.locations.get(("order",))
         raise SpecError([Diagnostic(reason, place, "composition: none takes the series directly")])
     note = f"composition: {found.name}, {len(found.fractions)} stages of order 2"
-    return Discretisation(_afforded(system, realisation, series, 1), 1, found.fractions, note)
+    return Discretisation(_afforded(system, realisation, series, 1, monitor), 1, found.fractions, note)
 
 
 def _expect_affordable(system: System, realisation: BiRealisation) -> None:
@@ -196,9 +214,11 @@ def _expect_affordable(system: System, realisation: BiRealisation) -> None:
     _expect(system, newton_operations(realisation, {c for c in index if c not in slopes}, hessian, MOST_OPERATIONS))
 
 
-def _afforded(system: System, realisation: BiRealisation, series: HamiltonJacobi, terms: int) -> GeneratingFunction:
+def _afforded(
+    system: System, realisation: BiRealisation, series: HamiltonJacobi, terms: int, monitor: Expression | None = None
+) -> GeneratingFunction:
     """`generating_function`, LimitError if the Newton step is too large with it."""
-    found = generating_function(system, series, terms)
+    found = generating_function(system, series, terms, monitor)
     absent = {c for c, slope in zip(system.coordinates, found.slope, strict=True) if slope.is_zero}
     hessian = [{j: e for j, e in enumerate(row) if not e.is_zero} for row in found.hessian]
     _expect(system, newton_operations(realisation, absent, hessian, MOST_OPERATIONS))

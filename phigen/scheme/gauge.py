@@ -72,7 +72,13 @@ class Gauge:
         return self.monitor * (hamiltonian + symbol(LEVEL)) if self.monitor else hamiltonian
 
     def applied(self, system: System) -> System:
-        """The system with H − Σ λ_c C_c, or K − Σ λ_c C_c, for H, to be discretised."""
+        """The system with H − Σ λ_c C_c, or K − Σ λ_c C_c, for H, to be discretised.
+
+        With forces there is no K: H stays, and p = τg(∇H + ζ) is made of it; the impulse of a vector f is τgf.
+        """
+        if self.monitor and system.forces:
+            vector = tuple(self.monitor * f for f in system.forces.vector)
+            return replace(system, forces=replace(system.forces, vector=vector))
         parts = [symbol(s) * system.casimirs[c] for s, c in zip(self.multiples, self.free, strict=True)]
         parts += [value * system.casimirs[c] for c, value in self.fixed.items()]
         if not parts and not self.monitor:

@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 from phigen import progress
+from phigen.geometry.system import System
 from phigen.scheme.collected import collect, exceeds
 from phigen.scheme.lowering import cost
 from phigen.scheme.staging import Coefficients
@@ -124,6 +125,20 @@ def graph_form(
             running.done = i + 1
     elapsed = derivatives([s], LEVEL)[0] if LEVEL in static else None
     return GeneratingFunction(slope, _symmetric(rows), "shared graph", 0, Coefficients(static, inputs), elapsed)
+
+
+def forced_form(
+    system: System, monitor: Expression, static: Sequence[str], inputs: Sequence[str] = ()
+) -> GeneratingFunction:
+    """p = τg(∇H + ζ) of a monitored system with forces; no function has it for gradient, and e has no part in it."""
+    assert system.forces is not None
+    rate = symbol(STEP) * monitor
+    slope = gradient(system.hamiltonian, system.coordinates)
+    pushed = tuple(rate * (s + z) for s, z in zip(slope, system.forces.covector, strict=True))
+    columns = [derivatives(pushed, c) for c in system.coordinates]
+    hessian = tuple(zip(*columns, strict=True))
+    form, table = "its gradient times g", Coefficients(static, inputs)
+    return GeneratingFunction(pushed, hessian, form, 0, table, rate, tuple(rate * s for s in slope))
 
 
 def _differentiated(slope: Sequence[Expression], coordinates: Sequence[str]) -> tuple[tuple[Expression, ...], ...]:

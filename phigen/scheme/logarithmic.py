@@ -68,6 +68,8 @@ def logarithmic_of(spec: Spec, system: System, flows: Sequence[Flow]) -> Logarit
         message = "monitor: an expression makes K = g(H + e), which does not split; scheme: splitting takes log"
     elif spec.time:
         message = "monitor: not together with time: e = -H(x0) would not be constant"
+    elif system.forces:
+        message = "monitor: log takes no forces, with which e = -H(x0) would not be constant"
     elif len(flows) != 2:
         message = f"monitor: log needs H = A + B of two parts with elementary flows; here there are {len(flows)}"
     elif not isinstance(spec.gauge, str):

@@ -4,6 +4,9 @@ With a canonical pair (t, e) beside the coordinates, K = g(x)(H(x) + e) has the 
 e = −H(x₀), and along them dt/dτ = ∂K/∂e = g. K does not depend on t; so e is constant, to the solver a parameter that
 each trajectory has a value of. In the midpoint realisation of the pair the step is that of the series S_τ(x; e) of K in
 x alone, and t₁ − t₀ = ∂S_τ/∂e at its point y: to the order of the method, since (t, x) is one step of one method.
+
+With forces −H(x) is not constant. They leave no Poisson map anyway, and so there is no K: p = τg(∇H + ζ) and the
+impulse τgf at y, with t₁ − t₀ = τg(y), make a symmetric step of order 2, of (t, x) too.
 """
 
 from __future__ import annotations
@@ -41,9 +44,11 @@ def rate_kernel(system: System, monitor: Expression) -> Kernel:
     )
 
 
-def monitor_facts(monitor: Expression | None) -> Iterator[str]:
+def monitor_facts(monitor: Expression | None, *, forced: bool) -> Iterator[str]:
     """What the header says."""
-    if monitor:
+    if monitor and forced:
+        yield f"monitor: dt = g dtau with g = {monitor}, steps are equal in tau; e has no part in them"
+    elif monitor:
         yield f"monitor: dt = g dtau with g = {monitor}, steps are equal in tau; the step is that of K = g (H + e)"
 
 
@@ -51,11 +56,14 @@ def monitor_of(spec: Spec) -> Expression | None:
     """g of a spec whose step is that of a series. Raises `SpecError` for what does not go with it."""
     if spec.monitor is None:
         return None
-    others = {"time:": spec.time, "lattice:": spec.lattice, "forces:": spec.forces}
+    others = {"time:": spec.time, "lattice:": spec.lattice}
     for key, given in others.items():
         if given:
             message = f"monitor: not together with {key} e = -H(x0) would not be constant, or nothing would adapt"
             raise SpecError([spec.diagnostic(("monitor",), message)])
+    if spec.forces and not isinstance(spec.gauge, str):
+        message = "monitor: with forces no Casimirs are taken from K, as there is none"
+        raise SpecError([spec.diagnostic(("gauge",), message, "gauge: none")])
     if isinstance(spec.monitor, str):
         hint = "scheme: splitting, or dt/dtau as an expression in the coordinates"
         raise SpecError([spec.diagnostic(("monitor",), "monitor: log needs H = A + B split in two", hint)])

@@ -277,8 +277,13 @@ def _reference(subject: Subject) -> Callable[[float], tuple[Floats, float]]:
 def conservation_checks(subject: Subject, rows: Floats) -> Iterator[Check]:
     """Casimirs constant to round-off; energy without drift."""
     system, steps = subject.compilation.system, subject.steps
-    own = _summary(subject, subject.main.name, rows)
-    others = {name: _summary_of(subject, m) for name, m in subject.others.items()}
+    compared = subject.others
+    times: Floats = subject.t0 + subject.h * np.arange(len(rows), dtype=np.float64)
+    if system.forces and subject.compilation.monitor:  # work is done in the time that passes, which others do not tell
+        made = subject.solver.integrate(subject.start, subject.h, len(rows) - 1, 1, parameters=subject.parameters)
+        times, compared = made.t, {}
+    own = _summary(subject, subject.main.name, rows, times)
+    others = {name: _summary_of(subject, m, times) for name, m in compared.items()}
     for name, drift in own.casimirs.items():
         bound = rounding(steps) * _terms(subject, system.casimirs[name], rows) / drift.unit.size
         judged = subject.exact and system.forced_rate_of_casimir(system.casimirs[name]).is_zero
@@ -314,15 +319,14 @@ def _terms(subject: Subject, quantity: Expression, rows: Floats) -> float:
     return largest_terms(quantity, list(columns), {**subject.parameters, **columns})
 
 
-def _summary(subject: Subject, name: str, rows: Floats) -> Summary:
-    times: Floats = subject.t0 + subject.h * np.arange(len(rows), dtype=np.float64)
+def _summary(subject: Subject, name: str, rows: Floats, times: Floats) -> Summary:
     return summarise(name, subject.compilation.system, None, subject.parameters, times, rows)
 
 
-def _summary_of(subject: Subject, method: Method) -> Summary | None:
+def _summary_of(subject: Subject, method: Method, times: Floats) -> Summary | None:
     """What another method conserves; None where a step of it cannot be made."""
     try:
-        return _summary(subject, method.name, method.rows(subject.start, subject.h, subject.steps, 1))
+        return _summary(subject, method.name, method.rows(subject.start, subject.h, subject.steps, 1), times)
     except StepError:
         return None
 

@@ -22,6 +22,7 @@ NOISE = "noise: {a: {hamiltonian: x, amplitude: 0.3}, b: {hamiltonian: y**2, amp
 SPLIT = BODY.replace("x**2/2 + y**2/4 + z**2/6 + 0.1*x*z", "x**2/2 + y**2/4 + z**2/6 - 2") + "scheme: splitting\n"
 CASES = {
     "pushed": BODY + PUSHED,
+    "pushed and monitored": BODY + PUSHED + "monitor: 1/(1 + y**2)\n",
     "damped, along paths": BODY + "damping: 0.2\nbirealisation: karasev\n",
     "momenta in space": BODY.replace("minus", "plus") + PUSHED,
     "monitored": BODY + "monitor: 1/(1 + y**2)\n",
@@ -32,7 +33,7 @@ CASES = {
     "shaken": BODY + NOISE,
 }
 #: Those of which order 4 is measured too.
-HIGHER = ("pushed", "monitored", "monitored by log", "split in time")
+HIGHER = ("pushed", "pushed and monitored", "monitored", "monitored by log", "split in time")
 START, SPAN = [0.5, 0.8, -0.4], 2.0
 DRAWN = np.random.default_rng(3).normal(size=(8, 2)) * np.sqrt(SPAN / 8)
 

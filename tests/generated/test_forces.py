@@ -29,6 +29,10 @@ SYSTEMS = {
     "damped": (SPIN, [0.8, 0.1, 0.5]),
     "covector": (SPIN + "forces: {covector: {x: g*y*z, y: sin(t)*x}}\n", [0.8, 0.1, 0.5]),
     "vector": (SPIN + "forces: {covector: {x: g*y*z}, vector: {z: 0.5*sin(t)*x, y: -g*y}}\n", [0.8, 0.1, 0.5]),
+    "monitored": (
+        SPIN.replace("time: t\n", "") + "forces: {covector: {x: g*y*z}, vector: {y: -g*y}}\nmonitor: 1/(1 + x**2)\n",
+        [0.8, 0.1, 0.5],
+    ),
     "populations": (
         """coordinates: [x, y]
 poisson: {log_canonical: [[0, 1], [-1, 0]]}
@@ -84,7 +88,8 @@ def reference(kind):
     found, timed = solver(made(kind), "numpy"), bool(made(kind).program.time)
 
     def field(t, x):
-        return found.vector_field(x, t) if timed else found.vector_field(x)
+        rate = 1 / (1 + x[0] ** 2) if kind == "monitored" else 1
+        return rate * (found.vector_field(x, t) if timed else found.vector_field(x))
 
     return solve_ivp(field, (0, SPAN), SYSTEMS[kind][1], method="DOP853", rtol=1e-13, atol=1e-15).y[:, -1]
 

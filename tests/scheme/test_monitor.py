@@ -10,6 +10,7 @@ from phigen.api import solver_of
 from phigen.compiler import compile_proved, compile_spec, emit, examine
 from phigen.errors import CheckError
 from phigen.proofs import statements
+from phigen.proofs.independent import GRADIENT, compare
 from phigen.spec.model import Extras
 from phigen.study import measures, verification
 from phigen.study.methods import Method
@@ -235,3 +236,11 @@ def test_without_a_monitor_nothing_is_said_of_it():
     for target in ("c", "numpy", "js"):
         for source in emit(compile_spec(spec.loads(text)).program, target, "phigen build").values():
             assert "elapsed" not in source
+
+
+@pytest.mark.parametrize("forces", ["", "forces: {covector: {x1: x2}, vector: {x3: x1}}\n"])
+def test_sympy_derives_the_same_with_a_monitor(forces):
+    """K has e among its symbols; with forces p is g(∇H + ζ), and no gradient."""
+    found = list(compare(compile_spec(spec.loads(BODY + forces), order=2)))
+    assert all(c.statement.holds for c in found if c.term is None)
+    assert any(c.statement.name == GRADIENT for c in found)
