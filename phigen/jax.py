@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from phigen.errors import MissingPackageError
+from phigen.runtime.lattice import LatticeSolver
 from phigen.runtime.propagation import Propagation
 from phigen.runtime.solver import Solver
 
@@ -24,13 +25,14 @@ except ImportError as error:
 
 
 def propagator(
-    solver: Solver,
+    solver: Solver | LatticeSolver,
     *,
     h: float,
     steps: int,
     stride: int | None = None,
     t0: float | None = None,
     forward: bool = False,
+    **shared: Any,
 ) -> Callable[..., Any]:
     """The run of a solver as ``f(x0, parameters={})``: the last state, of the shape (…, DIM) of ``x0``.
 
@@ -39,17 +41,18 @@ def propagator(
     ``jax_enable_x64`` is set. Under `vmap` members are those of one ensemble. A step that fails raises where the result
     is asked for. Derivatives are exact to round-off, and ask for a solver compiled with ``adjoint=True``: those of
     `jax.grad` and `jax.vjp` take one run back. With ``forward`` they are of the tangent map, for `jax.jvp` and
-    `jax.jacfwd` too, one run back for each number of a result.
+    `jax.jacfwd` too, one run back for each number of a result. Of a lattice DIM is (coordinates, *sizes), parameters at
+    sites have axes of theirs, and further arguments, such as ``bonds=``, are those of all its runs.
     """
-    made = Propagation(solver, h, steps, stride, t0)
+    made = Propagation(solver, h, steps, stride, t0, shared)
     shaped = partial(jax.pure_callback, vmap_method="broadcast_all")
 
     def called(x0: Any, parameters: Any) -> Any:
-        own, result = _Own(x0, parameters), jax.ShapeDtypeStruct(made.shape(x0.shape), x0.dtype)
+        own, result = _Own(made, x0, parameters), jax.ShapeDtypeStruct(made.shape(x0.shape), x0.dtype)
         return shaped(lambda x, p: made.run(x, own.aligned(p)).astype(x.dtype), result, x0, parameters)
 
     def pulled(at: Any, cotangent: Any) -> Any:
-        own = _Own(*at)
+        own = _Own(made, *at)
 
         def transposed(x0: Any, parameters: Any, bar: Any) -> Any:
             x0_bar, bars = made.transposed(x0, own.aligned(parameters), bar)
@@ -60,7 +63,7 @@ def propagator(
         return shaped(transposed, result, *at, cotangent)
 
     def moved(at: Any, directions: Any) -> Any:
-        own, (x0, parameters), (along, changes) = _Own(*at), at, directions
+        own, (x0, parameters), (along, changes) = _Own(made, *at), at, directions
         states = made.shape(x0.shape)
 
         def jacobian(x: Any, p: Any) -> Any:
@@ -93,9 +96,10 @@ def propagator(
 class _Own:
     """What arguments of a function are, to tell the axes that `vmap` puts before theirs."""
 
-    def __init__(self, x0: Any, parameters: Mapping[str, Any]) -> None:
-        self._leading = x0.ndim - 1
+    def __init__(self, made: Propagation, x0: Any, parameters: Mapping[str, Any]) -> None:
+        self._leading = x0.ndim - made.axes
         self._axes = {name: value.ndim for name, value in parameters.items()}
+        self._sites = {name: made.axes_of(name) for name in parameters}
 
     def aligned(self, parameters: Mapping[str, Any]) -> dict[str, Any]:
         """The parameters with axes of length 1 where states have more of their own."""
@@ -103,5 +107,6 @@ class _Own:
         for name, value in parameters.items():
             array, own = np.asarray(value), self._axes[name]
             before = array.ndim - own
-            found[name] = array.reshape(array.shape[:before] + (1,) * (self._leading - own) + array.shape[before:])
+            missing = self._leading + self._sites[name] - own
+            found[name] = array.reshape(array.shape[:before] + (1,) * missing + array.shape[before:])
         return found

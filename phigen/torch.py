@@ -10,6 +10,7 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from phigen.errors import MissingPackageError
+from phigen.runtime.lattice import LatticeSolver
 from phigen.runtime.propagation import Propagation
 from phigen.runtime.solver import Solver
 
@@ -20,15 +21,22 @@ except ImportError as error:
 
 
 def propagator(
-    solver: Solver, *, h: float, steps: int, stride: int | None = None, t0: float | None = None
+    solver: Solver | LatticeSolver,
+    *,
+    h: float,
+    steps: int,
+    stride: int | None = None,
+    t0: float | None = None,
+    **shared: Any,
 ) -> Callable[..., Any]:
     """The run of a solver as ``f(x0, parameters={})``: the last state, of the shape (…, DIM) of the tensor ``x0``.
 
     With a ``stride`` all rows of `Solver.integrate`, (…, rows, DIM). ``parameters`` are tensors by name, of shapes that
     broadcast to (…); what is not given has its default. Results have the precision and the device of x0. Gradients are
-    exact to round-off, and ask for a solver compiled with ``adjoint=True``. Raises `StepError`.
+    exact to round-off, and ask for a solver compiled with ``adjoint=True``. Of a lattice DIM is (coordinates, *sizes);
+    further arguments, such as ``bonds=``, are those of all its runs. Raises `StepError`.
     """
-    made = Propagation(solver, h, steps, stride, t0)
+    made = Propagation(solver, h, steps, stride, t0, shared)
 
     def propagate(x0: Any, parameters: Mapping[str, Any] | None = None) -> Any:
         given = {name: torch.as_tensor(v, dtype=x0.dtype, device=x0.device) for name, v in (parameters or {}).items()}

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from phigen.errors import Diagnostic, Location, SpecError
+from phigen.lattice.adjoint import transposed
 from phigen.lattice.building import least_sizes
 from phigen.lattice.cell import GRAPH, GRID, PAIRS, PERIODIC, Cell
 from phigen.lattice.graphs import GraphSearch, energies, field_with_sums, site_sums
@@ -153,6 +154,8 @@ def build_sweeps(
             tuple(_sweep(cell, flow, motion, k, coefficients) for motion in flow.motions)
             for k, flow in enumerate(plan.flows, 1)
         )
+    if extras.adjoint:
+        _expect_transposed(cell, splits=solved is None)
     plain_names = tuple(p.name for p in cell.parameters if p.at == "all")
     refresh = coefficients.refresh(t=cell.times)
     prepare = Kernel(
@@ -170,8 +173,19 @@ def build_sweeps(
         gathers = [*(sweep.gather for part in swept for sweep in part if sweep.gather), *own]
         at_bonds = tuple(p.name for p in cell.parameters if p.at == "bonds")
         sites = replace(sites, ends=_ends(cell, [k for g in gathers for k in g.kernels]), at_bonds=at_bonds)
+    adjoint = transposed(swept, solved, prepare, coefficients) if extras.adjoint else None
     settled = Sweeps(
-        prepare, sites, swept, schedule, plan.composition, kinds, partners, plan.by_colour, solved, refresh=refresh
+        prepare,
+        sites,
+        swept,
+        schedule,
+        plan.composition,
+        kinds,
+        partners,
+        plan.by_colour,
+        solved,
+        refresh=refresh,
+        adjoint=adjoint,
     )
     step = coefficients.settled(settled)
     facts = [_lattice_fact(cell, plan.colouring.count), *_facts(plan), plan.order.note]
@@ -207,11 +221,19 @@ def _expect_offered(cell: Cell, extras: Extras, locations: Mapping[tuple[Any, ..
     if cell.bond_bracket and cell.relation == PAIRS:
         message = "brackets between the sites of pairs are not compiled"
         problems.append(Diagnostic(message, locations.get(("poisson",))))
-    asked = [name for name in ("modified_hamiltonian", "tangent", "adjoint") if getattr(extras, name)]
+    asked = [name for name in ("modified_hamiltonian", "tangent") if getattr(extras, name)]
     asked += ["reconstruct"] if ("reconstruct",) in locations else []
     problems += [Diagnostic(f"{name} is not offered for lattices", locations.get((name,))) for name in asked]
     if problems:
         raise SpecError(problems)
+
+
+def _expect_transposed(cell: Cell, *, splits: bool) -> None:
+    if not splits and cell.relation != GRID:
+        message = "adjoint is not offered for the series on graphs and pairs"
+        raise SpecError([Diagnostic(message, hint="scheme: splitting has it, where H splits")])
+    if cell.time:
+        raise SpecError([Diagnostic("adjoint is not offered for lattices whose H depends on the time")])
 
 
 def _sweep(cell: Cell, flow: CellFlow, motion: SiteMotion, k: int, coefficients: Coefficients) -> Sweep:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from phigen.runtime import cache
 from phigen.runtime.binding import bound
-from phigen.runtime.interface import BackendError, Floats, LatticeInterface, status_name
+from phigen.runtime.interface import BackendError, Floats, LatticeInterface, MissingExtraError, status_name
 
 _POINTER, _DOUBLE, _SIZE, _INT = ctypes.c_void_p, ctypes.c_double, ctypes.c_size_t, ctypes.c_int
 _SIGNATURES: dict[str, tuple[Any, tuple[Any, ...]]] = {
@@ -222,6 +222,12 @@ class CLattice:
     def start(self, x0: Floats, parameters: Mapping[str, Any], t0: float = 0.0) -> CLatticeSession:
         """A session at x0 (coordinates, *sizes), at the time t0."""
         return CLatticeSession(self._c, self.interface, x0, parameters, t0)
+
+    def pullback(
+        self, x0: Floats, h: float, steps: int, stride: int, bars: Floats, parameters: Mapping[str, Any]
+    ) -> tuple[Floats, Floats, dict[str, Floats]]:
+        """See `phigen.runtime.lattice.LatticeBackend`."""
+        raise MissingExtraError("pullback")
 
 
 def _packed(

@@ -87,7 +87,7 @@ def pullback(
     steps, members = arguments.count(steps, "steps", 0), start.reshape(-1, interface.dimension)
     width = max(1, steps) if stride is None else arguments.count(stride, "stride", 1)
     rows = len(row_steps(steps, width))
-    bars = _cotangents(cotangent, start.shape if stride is None else (rows, *start.shape)).reshape(-1, *members.shape)
+    bars = cotangents(cotangent, start.shape if stride is None else (rows, *start.shape)).reshape(-1, *members.shape)
     if stride is None:
         bars = np.concatenate([np.zeros((rows - 1, *members.shape)), bars])
 
@@ -139,7 +139,7 @@ def _of_members(
     return rows, x0_bar, {name: found[k] if name in own else found[k].sum() for k, name in enumerate(names)}
 
 
-def _cotangents(cotangent: ArrayLike, shape: tuple[int, ...]) -> Floats:
+def cotangents(cotangent: ArrayLike, shape: tuple[int, ...]) -> Floats:
     """Cotangents as an array of a shape. Raises `ValueError` for other shapes, and what is not finite."""
     bars = np.array(cotangent, dtype=np.float64)
     if bars.shape != shape:

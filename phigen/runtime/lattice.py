@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from phigen.errors import ParameterError, StepError
-from phigen.runtime import arguments, lattice_ensemble
+from phigen.runtime import arguments, lattice_ensemble, lattice_gradients
+from phigen.runtime.gradients import Pullback
 from phigen.runtime.interface import BackendError, Floats, LatticeInterface, Progress, row_steps
 from phigen.runtime.lattice_frames import Frames, LatticeRun, add_member, stream_path
 from phigen.runtime.named import Named
@@ -72,6 +73,16 @@ class LatticeBackend(Protocol):
 
     def start(self, x0: Floats, parameters: Mapping[str, Any], t0: float = 0.0) -> LatticeSession:
         """A session at x0 (coordinates, *sizes), at the time t0."""
+        ...
+
+    def pullback(
+        self, x0: Floats, h: float, steps: int, stride: int, bars: Floats, parameters: Mapping[str, Any]
+    ) -> tuple[Floats, Floats, dict[str, Floats]]:
+        """The rows of a run (rows, coordinates, *sizes), and the cotangents of x0 and, by name, of the parameters.
+
+        These have the shapes of what they belong to; ``bars`` are those of the rows. Raises `MissingExtraError` without
+        the extra ``adjoint``.
+        """
         ...
 
 
@@ -192,7 +203,7 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
             kept = np.array([*frames.kept(run.count), error.states[-1]])
             t = np.array([begin + h * mark for mark in [*marks[: run.count], error.step]], dtype=np.float64)
             found = self._trajectory(t, kept, np.array(run.energy), error.step, h, values)
-            raise self._failure(error, h, found, values) from error
+            raise self.failure(error, h, found, values) from error
         found = self._trajectory(
             np.asarray(begin + h * marks[:count], dtype=np.float64),
             frames.array,
@@ -221,7 +232,7 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
         try:
             session.advance(h, 1)
         except BackendError as error:
-            raise self._failure(error, h, None, values) from error
+            raise self.failure(error, h, None, values) from error
         return session.state()
 
     def ensemble(
@@ -252,6 +263,31 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
         first = arguments.start_time(alone, self.interface, more)
         times = np.asarray(first if begin is None else begin, dtype=np.float64)
         return lattice_ensemble.ensemble(self, X0, h, steps, stride, threads, {**(parameters or {}), **more}, times)
+
+    def pullback(
+        self,
+        x0: ArrayLike,
+        h: float,
+        steps: int,
+        cotangent: ArrayLike,
+        stride: int | None = None,
+        *,
+        parameters: Mapping[str, Any] | None = None,
+        **more: Any,
+    ) -> Pullback:
+        """The state after ``steps`` steps, and the derivatives of its product with a ``cotangent``: (x1, x0_bar,
+        parameters_bar), x0_bar along ``x0``, parameters_bar by name along the parameters, of the shapes of these.
+
+        ``x0`` is (coordinates, *sizes), or has a first axis of members, as parameters may; x1 and the cotangent have
+        its shape. Of what members share the derivative is the sum over them. With a ``stride``, x1 are all frames of
+        `integrate`, with a first axis of rows, and so is the cotangent. All is exact to round-off. Raises `StepError`,
+        and `TypeError` if the solver was compiled without ``adjoint=True``.
+        """
+        both = sorted(set(parameters or {}) & set(more))
+        if both:
+            raise TypeError(f"parameter {both[0]!r} is given twice")
+        given = {**(parameters or {}), **more}
+        return lattice_gradients.pullback(self, x0, h, steps, cotangent, stride, given)
 
     # --- what is seen
 
@@ -350,9 +386,9 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
         try:
             return self.backend.start(start, values, t0)
         except BackendError as error:
-            raise self._failure(error, h, None, values) from error
+            raise self.failure(error, h, None, values) from error
 
-    def _failure(self, error: BackendError, h: float, so_far: Any, values: Mapping[str, Any]) -> StepError:
+    def failure(self, error: BackendError, h: float, so_far: Any, values: Mapping[str, Any]) -> StepError:
         name = self.interface.name
         told = {"step": error.step, "status": error.status, "trajectory": so_far, "members": error.members}
         if error.status == "BAD_ARGUMENT":

@@ -31,9 +31,9 @@ def ensemble(
     t0: Floats,
 ) -> Floats:
     """See `LatticeSolver.ensemble`."""
-    own = {name: np.asarray(value) for name, value in given.items() if _has_members(solver.interface, name, value)}
+    own = {name: np.asarray(value) for name, value in given.items() if has_members(solver.interface, name, value)}
     own |= {what: np.asarray(v) for what, v in (("the step size h", h), ("the times t0", t0)) if np.ndim(v)}
-    start = _states(solver, X0, own)
+    start = states(solver, X0, own)
     count, steps = len(start), arguments.count(steps, "steps", 0)
     marks = row_steps(steps, max(steps, 1) if stride is None else arguments.count(stride, "stride", 1))
     begin = np.broadcast_to(t0, count).tolist()
@@ -71,7 +71,7 @@ def ensemble(
     return found
 
 
-def _has_members(interface: LatticeInterface, name: str, value: Any) -> bool:
+def has_members(interface: LatticeInterface, name: str, value: Any) -> bool:
     """Whether a parameter has an axis of members in front of its own."""
     if interface.graph and name == "bonds":
         return False
@@ -79,15 +79,15 @@ def _has_members(interface: LatticeInterface, name: str, value: Any) -> bool:
     return bool(np.ndim(value) == 1 + own)
 
 
-def _states(solver: LatticeSolver, X0: ArrayLike, own: Mapping[str, Any]) -> Floats:
+def states(solver: LatticeSolver, X0: ArrayLike, own: Mapping[str, Any], what: str = "X0") -> Floats:
     """The initial states (members, coordinates, *sizes), checked."""
     axes = 1 + len(solver.interface.axes)
     if np.ndim(X0) == axes and own:
-        start = np.stack([solver.state(X0, "X0")] * len(next(iter(own.values()))))
+        start = np.stack([solver.state(X0, what)] * len(next(iter(own.values()))))
     elif np.ndim(X0) == 1 + axes:
-        start = np.array([solver.state(x, "X0") for x in np.asarray(X0)], dtype=np.float64).reshape(np.shape(X0))
+        start = np.array([solver.state(x, what) for x in np.asarray(X0)], dtype=np.float64).reshape(np.shape(X0))
     else:
-        raise ValueError(f"X0 must have shape (members, {solver.shape_text()}), not {np.shape(X0)}")
+        raise ValueError(f"{what} must have shape (members, {solver.shape_text()}), not {np.shape(X0)}")
     for name, value in own.items():
         if len(value) != len(start):
             raise ValueError(f"{name} has {len(value)} members, not {len(start)}")

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from phigen.runtime.interface import BackendError, Clock, Floats, LatticeInterface
+from phigen.runtime.interface import BackendError, Clock, Floats, LatticeInterface, MissingExtraError
 from phigen.runtime.modules import load_module
 
 
@@ -103,3 +103,18 @@ class NumpyLattice:
     def start(self, x0: Floats, parameters: Mapping[str, Any], t0: float = 0.0) -> NumpyLatticeSession:
         """A session at x0 (coordinates, *sizes), at the time t0."""
         return NumpyLatticeSession(self._module, x0, parameters, t0, timed=bool(self.interface.time))
+
+    def pullback(
+        self, x0: Floats, h: float, steps: int, stride: int, bars: Floats, parameters: Mapping[str, Any]
+    ) -> tuple[Floats, Floats, dict[str, Floats]]:
+        """See `phigen.runtime.lattice.LatticeBackend`."""
+        if not hasattr(self._module, "pullback"):
+            raise MissingExtraError("pullback")
+        try:
+            found: tuple[Floats, Floats, dict[str, Floats]]
+            found = self._module.pullback(x0, h, steps, bars, stride, **parameters)
+        except self._module.StepError as error:
+            raise BackendError(error.status, error.step, error.states) from None
+        except ValueError:
+            raise BackendError("BAD_ARGUMENT", 0, x0[None]) from None
+        return found

@@ -7,13 +7,15 @@ the leading axes.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from phigen.runtime import arguments
 from phigen.runtime.interface import Floats, row_steps
+from phigen.runtime.lattice import LatticeSolver
 from phigen.runtime.solver import Solver
 
 Values = Mapping[str, ArrayLike]
@@ -23,14 +25,17 @@ Values = Mapping[str, ArrayLike]
 class Propagation:
     """``steps`` steps of size ``h`` from the time ``t0`` on; with a ``stride`` all rows of `Solver.integrate`.
 
-    States have the shape (…, DIM), rows (…, rows, DIM), parameters one that broadcasts to (…).
+    States have the shape (…, DIM), rows (…, rows, DIM), parameters one that broadcasts to (…). Of a lattice DIM is
+    (coordinates, *sizes), and parameters at sites or bonds have axes of their own after those. ``shared`` is what all
+    members have, such as the bonds of a graph.
     """
 
-    solver: Solver
+    solver: Solver | LatticeSolver
     h: float
     steps: int
     stride: int | None = None
     t0: float | None = None
+    shared: Mapping[str, ArrayLike] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         arguments.step_size(self.h)
@@ -43,37 +48,52 @@ class Propagation:
         """How many rows there are, with a stride."""
         return len(row_steps(self.steps, self.stride or max(1, self.steps)))
 
+    @property
+    def axes(self) -> int:
+        """Axes of a state."""
+        return 1 + len(self.solver.interface.axes) if isinstance(self.solver, LatticeSolver) else 1
+
+    def axes_of(self, parameter: str) -> int:
+        """Axes of a parameter of one member."""
+        if not isinstance(self.solver, LatticeSolver):
+            return 0
+        about = self.solver.interface
+        return len(about.axes) if parameter in about.at_sites else int(parameter in about.at_bonds)
+
     def shape(self, start: tuple[int, ...]) -> tuple[int, ...]:
         """The shape of the result, by that of the start."""
-        return start if self.stride is None else (*start[:-1], self.rows, start[-1])
+        return start if self.stride is None else (*start[: -self.axes], self.rows, *start[-self.axes :])
 
     def run(self, x0: ArrayLike, parameters: Values) -> Floats:
         """The states."""
         start, members, own = self._members(x0, parameters)
-        states = self.solver.ensemble(members, self.h, self.steps, self.stride, t0=self.t0, parameters=own)
-        return self._back(states, start)
+        states = self.solver.ensemble(members, self.h, self.steps, self.stride, **self._from, parameters=own)
+        if self.stride is not None:
+            states = np.moveaxis(states, 0, 1)
+        return states.reshape(self.shape(start))
 
     def transposed(self, x0: ArrayLike, parameters: Values, cotangent: ArrayLike) -> tuple[Floats, dict[str, Floats]]:
         """Cotangents of x0 and of the parameters, of the shapes that these have, from one of the states."""
         start, members, own = self._members(x0, parameters)
-        bars = np.asarray(cotangent, dtype=np.float64).reshape(
-            -1, *(() if self.stride is None else (self.rows,)), start[-1]
-        )
+        rows = () if self.stride is None else (self.rows,)
+        bars = np.asarray(cotangent, dtype=np.float64).reshape(-1, *rows, *start[-self.axes :])
         if self.stride is not None:
-            bars = bars.transpose(1, 0, 2)
+            bars = np.moveaxis(bars, 1, 0)
         h, steps, stride = self.h, self.steps, self.stride
-        found = self.solver.pullback(members, h, steps, bars, stride, t0=self.t0, parameters=own)
-        given = {name: np.shape(value) for name, value in parameters.items()}
-        of_parameters = {
-            name: _summed(found.parameters_bar[name].reshape(start[:-1]), given[name]) for name in parameters
-        }
+        found = self.solver.pullback(members, h, steps, bars, stride, **self._from, parameters=own)
+        of_parameters = {}
+        for name, value in parameters.items():
+            bar = found.parameters_bar[name]
+            of_parameters[name] = _summed(bar.reshape(start[: -self.axes] + bar.shape[1:]), np.shape(value))
         return found.x0_bar.reshape(start), of_parameters
 
     def jacobian(self, x0: ArrayLike, parameters: Values) -> tuple[Floats, dict[str, Floats]]:
         """The derivatives of the states along x0, of one axis (DIM,) more, and along each parameter, of their shape.
 
-        One run back for each number of a member's result.
+        One run back for each number of a member's result. Not for lattices.
         """
+        if self.axes > 1:
+            raise TypeError("of lattices there are no whole Jacobians; take what goes backwards, forward=False")
         start, members, own = self._members(x0, parameters)
         shape = self.shape((len(members), start[-1]))
         by_x0, by = np.empty((*shape, start[-1])), {name: np.empty(shape) for name in parameters}
@@ -87,19 +107,26 @@ class Propagation:
         return by_x0.reshape(*whole, start[-1]), {name: slopes.reshape(whole) for name, slopes in by.items()}
 
     def _members(self, x0: ArrayLike, parameters: Values) -> tuple[tuple[int, ...], Floats, dict[str, Floats]]:
-        """The shape of the start, members (members, DIM), and their parameters (members,)."""
-        x = np.asarray(x0, dtype=np.float64)
-        own = {
-            name: np.array(np.broadcast_to(np.asarray(value, dtype=np.float64), x.shape[:-1])).reshape(-1)
-            for name, value in parameters.items()
-        }
-        return x.shape, x.reshape(-1, x.shape[-1]), own
+        """The shape of the start, members (members, DIM), and their parameters (members, …)."""
+        x, own = np.asarray(x0, dtype=np.float64), dict[str, Any](self.shared)
+        for name, value in parameters.items():
+            array = np.asarray(value, dtype=np.float64)
+            tail = self._own_shape(name, x.shape)
+            own[name] = np.array(np.broadcast_to(array, x.shape[: -self.axes] + tail)).reshape(-1, *tail)
+        return x.shape, x.reshape(-1, *x.shape[-self.axes :]), own
 
-    def _back(self, states: Floats, start: tuple[int, ...]) -> Floats:
-        """States (members, DIM), or rows (rows, members, DIM), in the shape of the result."""
-        if self.stride is not None:
-            states = states.transpose(1, 0, 2)
-        return states.reshape(self.shape(start))
+    def _own_shape(self, parameter: str, state: tuple[int, ...]) -> tuple[int, ...]:
+        """The shape of a parameter of one member."""
+        if not self.axes_of(parameter) or not isinstance(self.solver, LatticeSolver):
+            return ()
+        if parameter in self.solver.interface.at_sites:
+            return state[1 - self.axes :]
+        return (len(np.asarray(self.shared["bonds"])),)
+
+    @property
+    def _from(self) -> dict[str, Any]:
+        """When runs begin."""
+        return {} if isinstance(self.solver, LatticeSolver) else {"t0": self.t0}
 
 
 def _summed(values: Floats, shape: tuple[int, ...]) -> Floats:

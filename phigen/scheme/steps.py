@@ -394,7 +394,8 @@ class Sweeps(_Scheduled):
         swept_kernels += self.equation.kernels if self.equation else ()
         gathers = [sweep.gather for sweep in swept if sweep.gather]
         gathers += [self.partners.energy, self.partners.field, self.partners.varied] if self.partners else []
-        return _present((self.prepare, self.refresh, *swept_kernels, *(k for g in gathers for k in g.kernels)))
+        own = (*swept_kernels, *(k for g in gathers for k in g.kernels))
+        return _present((self.prepare, self.refresh, *own, *self.transposed))
 
 
 Step = Newton | Explicit | Path | Splitting | Sweeps

@@ -105,3 +105,28 @@ def test_failing_steps_raise(solver):
         propagator(solver)(1e6 * X[0])
     with pytest.raises(ValueError, match="stride"):
         propagator(solver, stride=0)
+
+
+@pytest.mark.parametrize("stride", [None, 3])
+def test_lattices_have_gradients_along_disorder(stride):
+    """Members by `vmap`, each with fields of its own at the sites; J is shared."""
+    chain, rng = phigen.compile("xxz_disorder", target="numpy", adjoint=True), np.random.default_rng(1)
+    many, fields = rng.normal(size=(2, 3, 5)), rng.normal(size=(2, 5))
+    made = propagator(chain, stride=stride)
+
+    def loss(x, field, j):
+        return jnp.sum(made(x, {"B": field, "J": j}) ** 3)
+
+    gradient = jax.jit(jax.vmap(jax.grad(loss, argnums=(0, 1, 2)), in_axes=(0, 0, None)))
+    x_bar, field_bar, j_bar = gradient(many, fields, 0.9)
+    for m in range(2):
+        frames = chain.integrate(many[m], H, STEPS, stride or STEPS, B=fields[m], J=0.9).x
+        bar = 3 * (frames if stride else frames[-1]) ** 2
+        own = chain.pullback(many[m], H, STEPS, bar, stride, B=fields[m], J=0.9)
+        assert close(x_bar[m], own.x0_bar)
+        assert close(field_bar[m], own.parameters_bar["B"])
+        assert close(j_bar[m], own.parameters_bar["J"])
+    one = chain.pullback(
+        many, H, STEPS, np.ones(made(many, {"B": 0.5}).swapaxes(0, 1 if stride else 0).shape), stride, B=0.5
+    )
+    assert close(jax.grad(lambda b: jnp.sum(made(many, {"B": b})))(0.5), one.parameters_bar["B"])

@@ -9,6 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Mapping, Sequence
 
+from phigen.errors import Diagnostic, SpecError
 from phigen.lanes.lowering import Blocks, Lanes, Rows, Traces, in_lanes
 from phigen.scheme.attitude import SIZE_OF_COVECTOR
 from phigen.scheme.kernel import Kernel
@@ -42,8 +43,14 @@ Sizes = list[tuple[str, int, str]]
 
 
 def emit(program: Program, command: str, *, single_file: bool = False) -> dict[str, str]:
-    """File names and their contents; with ``single_file`` only `NAME.c`, which then needs no header."""
+    """File names and their contents; with ``single_file`` only `NAME.c`, which then needs no header.
+
+    Raises `SpecError` for what is not offered: adjoints of lattices.
+    """
     name, lines = program.name, header_lines(program, command)
+    if isinstance(program.step, Sweeps) and program.step.adjoint:
+        message = f"{name} asks for the transpose of steps of a lattice, adjoint, which is not offered in C"
+        raise SpecError([Diagnostic(message, hint="the target numpy has it")])
     amalgam, header, code = _amalgam(program)
     declared = amalgam.text(header) + "\n#ifdef __cplusplus\n}\n#endif\n"
     defined = amalgam.text(code)

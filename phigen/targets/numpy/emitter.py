@@ -64,8 +64,14 @@ def emit(program: Program, command: str) -> dict[str, str]:
 def _body(program: Program) -> str:
     """The module without its header."""
     if isinstance(program.step, Sweeps):
-        early = [kernel for kernel in (program.step.prepare, program.step.refresh) if kernel]
-        return lattice.body(program, program.step, "\n\n".join(_function(program, kernel) for kernel in early))
+        early = [
+            program.step.prepare,
+            program.step.refresh,
+            *([program.step.adjoint.prepare] if program.step.adjoint else []),
+        ]
+        return lattice.body(
+            program, program.step, "\n\n".join(_function(program, kernel) for kernel in early if kernel)
+        )
     seen = program.observables
     pieces = [render("numpy", part, _values(program)) for part in ("preamble.py", "arrays.py", "parameters.py")]
     pieces += [render("numpy", "phi.py", special.values(f, f"_{f}")) for f in special.used(program)]

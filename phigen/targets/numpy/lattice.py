@@ -11,6 +11,7 @@ from phigen.symbolic.symbols import CHOSEN, COEFFICIENT, GATHERED, INITIAL, VARI
 from phigen.targets import special
 from phigen.targets.code import Code, lower
 from phigen.targets.names import Scope
+from phigen.targets.numpy import lattice_adjoint
 from phigen.targets.numpy.language import LANGUAGE
 from phigen.targets.rendering import render
 from phigen.targets.reserved import PYTHON_RESERVED
@@ -54,12 +55,18 @@ def body(program: Program, step: Sweeps, prepare: str) -> str:
         "most_sweeps": step.equation.most_sweeps if step.equation else 0,
     }
     graph = step.partners is not None and step.partners.graph
+    values |= {"equation": step.equation is not None, "coloured": bool(step.by_colour)}
+    values["adjoint"] = step.adjoint is not None
+    flows = "(part, _), _ in sites.schedule" if step.by_colour else "part, _ in SCHEDULE"
+    values["kept"] = "2 * len(SCHEDULE)" if step.equation else f"sum(len(PARTS[part]) for {flows})"
+    values["pairs"] = step.partners is not None and not graph
     values["sites"] = "_Coloured" if step.by_colour else "_Graph" if graph else "_Sites"
     values["flow"] = "(part, sites.colour), row in sites.schedule" if step.by_colour else "part, row in SCHEDULE"
     graphs = ["lattice_graph", *(["lattice_colours"] if step.by_colour else [])] if graph else []
     parts = ["lattice", "lattice_sites", *graphs, *(_SERIES if step.equation else ("lattice_splitting",))]
     parts.append("lattice_steps")
     pieces = [render("numpy", f"{part}.py", values) for part in parts]
+    pieces += [render("numpy", "lattice_adjoint.py", values)] if step.adjoint else []
     pieces += [render("numpy", "lattice_seen.py", values), prepare]
     pieces += [render("numpy", "phi.py", special.values(f, f"_{f}")) for f in special.used(program)]
     pieces += [
@@ -72,6 +79,7 @@ def body(program: Program, step: Sweeps, prepare: str) -> str:
     else:
         listed = ["    (" + ", ".join(f"_{sweep.kernel.name}" for sweep in part) + ",)," for part in step.parts]
         pieces.append("\n".join(["# The sweeps of each part of H.", "PARTS = (", *listed, ")\n"]))
+    pieces += lattice_adjoint.functions(program, step, _body) if step.adjoint else []
     seen = program.observables
     pieces += [_seen(program, step, kernel) for kernel in (seen.energy, seen.casimirs, seen.vector_field)]
     return "\n\n".join(piece.strip("\n") + "\n" for piece in pieces)
@@ -185,6 +193,8 @@ def _body(
                 scope.bind(s, f"start[{program.coordinates.index(str(s.key[0]))}]")
             elif isinstance(s, Symbol) and s.kind == VARIATION:
                 lines.append(f"    {scope[s]} = {_read(program, step, str(s.key[0]), 'v')}")
+            elif isinstance(s, Symbol) and s.kind.endswith("_bar"):
+                scope.bind(s, f"{s.kind}[{s.key[0]}]")
             elif isinstance(s, Symbol):
                 bounds = ", ".join(map(str, s.key))
                 scope.bind(s, f"coef[{i}]" if s.kind == COEFFICIENT else f"sites.present({bounds})")

@@ -1,0 +1,46 @@
+"""The transpose of a step of a lattice: kernels at a site that pull cotangents back.
+
+A sweep adds to some fields of a site what it reads around: from the cotangents of those a kernel finds, at each site,
+what they give to every value that was read, and targets hand that over to where the value came from. Of the series,
+x' = x + a(y) with y = r(x, y): μ = (∂r/∂y)ᵀμ + (∂a/∂y)ᵀλ and x̄ = λ + (∂a/∂x)ᵀλ + (∂r/∂x)ᵀμ, by the kernels of r and a.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from phigen.scheme.adjoint import completed, pulled_back
+from phigen.scheme.kernel import Kernel
+from phigen.scheme.staging import TABLE, Coefficients
+from phigen.scheme.steps import Adjoint, Equation, Sweep
+
+#: What is called after a kernel that it is the transpose of.
+BACK = "_back"
+
+#: What kernels at sites read, of which cotangents are found.
+_READ = ("site", "start", "gathered", "bonds")
+
+
+def transposed(
+    swept: Sequence[Sequence[Sweep]], solved: Equation | None, prepare: Kernel, coefficients: Coefficients
+) -> Adjoint:
+    """The transposes of all kernels of a step, each called as its kernel with `BACK`."""
+    kernels: list[Kernel] = []
+    for sweep in (sweep for part in swept for sweep in part):
+        kernels += [sweep.kernel, *(sweep.gather.kernels if sweep.gather else ())]
+    kernels += [solved.relax, solved.advance] if solved else []
+    return completed(coefficients, [_back(kernel, coefficients) for kernel in kernels], prepare, None)
+
+
+def _back(kernel: Kernel, coefficients: Coefficients) -> Kernel:
+    full = replace(kernel, inputs={**kernel.inputs, TABLE: coefficients.slots})
+    (output,) = kernel.outputs
+    along = {array: kernel.inputs[array] for array in _READ if kernel.inputs.get(array)}
+    return pulled_back(
+        full,
+        kernel.name + BACK,
+        {f"{output.name}_bar": output.values},
+        {**along, TABLE: coefficients.slots},
+        "cotangents of all that is read, from those of what is found",
+    )

@@ -1,0 +1,128 @@
+"""The transpose of a step of a lattice as NumPy functions on whole arrays over the sites."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+
+from phigen.lattice.adjoint import BACK
+from phigen.scheme.kernel import Kernel
+from phigen.scheme.program import Program
+from phigen.scheme.steps import Gather, Sweep, Sweeps
+from phigen.symbolic.expression import Expression
+from phigen.targets.code import Code, lower
+from phigen.targets.names import Scope
+from phigen.targets.numpy.language import LANGUAGE
+from phigen.targets.reserved import PYTHON_RESERVED
+
+#: The statements that read what a kernel needs, and its temporaries.
+Body = Callable[[Program, Sweeps, Kernel, Code, Scope, tuple[str, ...]], list[str]]
+
+_OWN = {"coef", "x", "sites", "parameters", "h", "kick", "np", "gathered", "start", "bar", "own", "coef_bar"}
+_OWN |= {"here", "there", "bond", *LANGUAGE.functions.values()}
+
+
+def functions(program: Program, step: Sweeps, body: Body) -> Iterator[str]:
+    """The transposes of all sweeps, or of the kernels of an equation, and the list of those of each part."""
+    kernels = {kernel.name: kernel for kernel in step.adjoint.steps} if step.adjoint else {}
+    for sweep in (sweep for part in step.parts for sweep in part):
+        yield _sweep(program, step, sweep, kernels[sweep.kernel.name + BACK], body)
+        if sweep.gather:
+            yield _gather(program, step, sweep.gather, kernels, body)
+    for kernel in (step.equation.relax, step.equation.advance) if step.equation else ():
+        yield _at_middle(program, step, kernels[kernel.name + BACK], body)
+    if not step.equation:
+        listed = ["    (" + ", ".join(f"_{sweep.kernel.name}{BACK}" for sweep in part) + ",)," for part in step.parts]
+        yield "\n".join(["# Their transposes.", "PARTS_BACK = (", *listed, ")\n"])
+
+
+def _sweep(program: Program, step: Sweeps, sweep: Sweep, kernel: Kernel, body: Body) -> str:
+    """The cotangent before a sweep from that after it, x being the state before."""
+    code, scope = lower(kernel), Scope(PYTHON_RESERVED | _OWN | {"change_bar"})
+    names = sweep.gather.names if sweep.gather else ()
+    seeds = ", ".join(f"sites.coloured({sweep.colour}, bar[{f}], 0.0)" for f in sweep.moved)
+    lines = [f"def _{kernel.name}(coef, x, bar, sites, coef_bar, own):", f"    change_bar = [{seeds}]"]
+    gather = sweep.gather.kernels[0].name.removesuffix("_a").removesuffix("_b") if sweep.gather else ""
+    lines += [f"    gathered = _{gather}(coef, x, sites)"] if gather else []
+    lines += [*body(program, step, kernel, code, scope, names), "    bar = bar.copy()"]
+    lines += _stored(program, step, kernel, code, LANGUAGE.printer(scope))
+    if gather:
+        show, values = LANGUAGE.printer(scope), {s.index: s.value for s in code.stores if s.array == "gathered_bar"}
+        order = [kernel.inputs["gathered"].index(n) if n in kernel.inputs["gathered"] else -1 for n in names]
+        listed = ", ".join(f"sites.filled({show(values[k])})" if k in values else "sites.filled(0.0)" for k in order)
+        lines.append(f"    bar = _{gather}{BACK}(coef, x, [{listed}], bar, sites, coef_bar, own)")
+    return "\n".join([*lines, "    return bar\n"])
+
+
+def _at_middle(program: Program, step: Sweeps, kernel: Kernel, body: Body) -> str:
+    """What a cotangent of y, or of the change of x, gives to those of y, called x here, and of the start."""
+    seed = next(array for array in kernel.inputs if array.endswith("_bar"))
+    code, scope = lower(kernel), Scope(PYTHON_RESERVED | _OWN | {seed, "start_bar"})
+    lines = [f"def _{kernel.name}(coef, start, x, {seed}, sites, coef_bar, own):"]
+    lines += body(program, step, kernel, code, scope, ())
+    lines.append("    bar, start_bar = np.zeros_like(x), np.zeros_like(x)")
+    lines += _stored(program, step, kernel, code, LANGUAGE.printer(scope))
+    return "\n".join([*lines, "    return bar, start_bar\n"])
+
+
+def _stored(
+    program: Program, step: Sweeps, kernel: Kernel, code: Code, show: Callable[[Expression], str]
+) -> Iterator[str]:
+    """Each cotangent added to where its value was read."""
+    fields = program.coordinates
+    for store in code.stores:
+        if store.value.is_zero:
+            continue
+        value = show(store.value)
+        match store.array:
+            case "coef_bar":
+                yield f"    coef_bar[{store.index}] += sites.filled({value}).sum()"
+            case "start_bar":
+                name = kernel.inputs["start"][store.index]
+                yield f"    start_bar[{fields.index(str(name.key[0]))}] += {value}"  # type: ignore[attr-defined]
+            case "site_bar":
+                base, offset = step.sites.places[kernel.inputs["site"][store.index]]
+                into = f"bar[{fields.index(base)}]" if base in fields else f'own["{base}"]'
+                back = f"sites.returned({value}, {', '.join(map(str, offset))})" if any(offset) else value
+                yield f"    {into} += {back}"
+
+
+def _gather(program: Program, step: Sweeps, gather: Gather, kernels: dict[str, Kernel], body: Body) -> str:
+    """The cotangents of what bonds or pairs read, from those of their sums at sites."""
+    assert step.partners
+    graph, name = step.partners.graph, gather.kernels[0].name.removesuffix("_a").removesuffix("_b")
+    lines = [f"def _{name}{BACK}(coef, x, gathered_bar, bar, sites, coef_bar, own):"]
+    for ends in gather.ends:
+        kernel = kernels[ends.kernel.name + BACK]
+        code, scope = lower(kernel), Scope(PYTHON_RESERVED | _OWN | {"gathered_bar", "sums_bar"})
+        show = LANGUAGE.printer(scope)
+        if graph:
+            lines.append(f"    here, there, bond = sites.bonds({ends.end!r}, {ends.chosen!r})")
+            lines.append("    sums_bar = [g[here] for g in gathered_bar]")
+        else:
+            lines.append("    sums_bar = [g[:, None] for g in gathered_bar]")
+        lines += body(program, step, kernel, code, scope, ())
+        lines += _of_ends(program, step, kernel, code, show, graph=graph)
+    return "\n".join([*lines, "    return bar\n"])
+
+
+def _of_ends(
+    program: Program, step: Sweeps, kernel: Kernel, code: Code, show: Callable[[Expression], str], *, graph: bool
+) -> Iterator[str]:
+    fields = program.coordinates
+    for store in code.stores:
+        if store.value.is_zero:
+            continue
+        value = show(store.value)
+        match store.array:
+            case "coef_bar":
+                every = f"np.broadcast_to({value}, here.shape)" if graph else f"_apart({value}, sites)"
+                yield f"    coef_bar[{store.index}] += {every}.sum()"
+            case "bonds_bar":
+                yield f'    np.add.at(own["{kernel.inputs["bonds"][store.index]}"], bond, {value})'
+            case "site_bar":
+                base, end = step.sites.ends[kernel.inputs["site"][store.index]]
+                into = f"bar[{fields.index(base)}]" if base in fields else f'own["{base}"]'
+                if graph:
+                    yield f"    {into} += sites.summed({value}, {'here' if end == 'a' else 'there'})"
+                else:
+                    yield f"    {into} += _apart({value}, sites).sum(axis={1 if end == 'a' else 0})"

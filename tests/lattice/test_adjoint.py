@@ -1,0 +1,171 @@
+"""Runs of lattices pulled back: against differences, many digits, and one another."""
+
+from functools import cache
+
+import mpmath
+import numpy as np
+import pytest
+from support import precisely
+
+import phigen
+from phigen import SpecError, StepError
+
+H, STEPS, SITES = 0.05, 4, 6
+RING = {"bonds": np.array([[i, (i + 1) % SITES] for i in range(SITES)] + [[0, 2]])}
+
+#: Kicks, open ends with parameters at sites, several sweeps of one part, colours, graphs, pairs; the series.
+LATTICES = {
+    "fput": {},
+    "xxz_disorder": {"B": 0.5 + np.arange(SITES) / 7},
+    "kdv": {"d": 1.3},
+    "food_web": RING | {"A": 0.4 + np.arange(7) / 9, "k": 0.3 + np.arange(SITES) / 8},
+    "chiral_magnet": RING | {"D": 0.6},
+    "outer_planets": {"G": 1.0, "m": 0.1 + np.arange(SITES) / 20},
+    "xxz_disorder series": {"B": 0.5 + np.arange(SITES) / 7},
+}
+
+
+SHAKEN = """phigen: 1
+name: t
+time: t
+adjoint: true
+lattice: {axes: [i], boundary: periodic}
+coordinates: [q, p]
+poisson: {canonical: {q: [q], p: [p]}}
+hamiltonian: p**2/2 + (1 + cos(t))*(q[i+1] - q)**2/2
+"""
+
+
+@cache
+def made(name, target="numpy"):
+    lattice, *series = name.split()
+    more = {"scheme": "series", "order": 2} if series else {}
+    return phigen.compile(lattice, target=target, adjoint=True, **more)
+
+
+def beginning(solver):
+    """Sites that are all different; planets far from one another."""
+    x = 0.3 + 0.5 * np.random.default_rng(3).random((len(solver.interface.coordinates), SITES))
+    x[0] += 3 * np.arange(SITES) * (solver.interface.name == "outer_planets")
+    return x
+
+
+def difference(f, width=1e-3):
+    """The derivative at 0, by central differences of order 6."""
+    return sum(w * (f(k * width) - f(-k * width)) for k, w in ((1, 3 / 4), (2, -3 / 20), (3, 1 / 60))) / width
+
+
+def numbers(solver, given):
+    """All parameters but bonds, as arrays of what was given or of defaults."""
+    return {name: np.asarray(given.get(name, value)) for name, value in solver.interface.parameters.items()}
+
+
+@pytest.mark.parametrize("name", LATTICES)
+def test_pullback_is_the_gradient_of_the_run(name):
+    """Along random directions of the state, and of each parameter, with a cotangent of every frame."""
+    solver, given, random = made(name), LATTICES[name], np.random.default_rng(5)
+    x = beginning(solver)
+    bar = random.normal(size=(3, *x.shape))
+    frames, x0_bar, found = solver.pullback(x, H, STEPS, bar, 2, parameters=given)
+    assert np.array_equal(frames, solver.integrate(x, H, STEPS, 2, parameters=given).x)
+
+    def weighed(x, **changed):
+        return np.sum(bar * solver.integrate(x, H, STEPS, 2, parameters={**given, **changed}).x)
+
+    along = random.normal(size=x.shape)
+    slope = difference(lambda e: weighed(x + e * along))
+    assert np.sum(x0_bar * along) == pytest.approx(slope, rel=1e-8)
+    for parameter, value in numbers(solver, given).items():
+        along = random.normal(size=value.shape)
+        width = 1e-3 * min(1.0, float(np.min(np.abs(value))) or 1.0)
+        slope = difference(lambda e, n=parameter, v=value, a=along: weighed(x, **{n: v + e * a}), width)
+        assert found[parameter].shape == value.shape
+        assert np.sum(found[parameter] * along) == pytest.approx(slope, rel=1e-7, abs=1e-9), parameter
+
+
+@precisely
+def precise_end(x, alpha, beta, bar, module):
+    """The product of the last state of an FPUT ring with ``bar``, by drifts and kicks in many digits."""
+    q, p = [list(row) for row in x]
+    for _ in range(STEPS):
+        for part, row in module.SCHEDULE:
+            t = mpmath.mpf(module.TIMES[row]) * mpmath.mpf(H)
+            if module.PARTS[part][0].__name__ == module.DRIFT:
+                q = [a + t * b for a, b in zip(q, p, strict=True)]
+                continue
+            r = [q[(i + 1) % SITES] - q[i] for i in range(SITES)]
+            force = [s + alpha * s**2 + beta * s**3 for s in r]
+            p = [b + t * (force[i] - force[i - 1]) for i, b in enumerate(p)]
+    return mpmath.fdot([*bar[0], *bar[1]], [*q, *p])
+
+
+@precisely
+def test_gradient_agrees_with_many_digits():
+    solver = phigen.compile("fput", target="numpy", adjoint=True, order=2)
+    module, x = solver.backend._module, beginning(solver)
+    assert not any(module.MULTIPLES)
+    ones = np.ones((2, SITES))
+    moved = module.PARTS[0][0]([0.1] * 9, ones, module._Sites(ones.shape, {}))
+    module.DRIFT = module.PARTS[int(moved[0, 0] == 1.0)][0].__name__
+    bar = np.random.default_rng(7).normal(size=x.shape)
+    _, x0_bar, found = solver.pullback(x, H, STEPS, bar, alpha=0.3, beta=0.8)
+    width = mpmath.mpf(10) ** -12
+
+    def slope(f):
+        return (f(width) - f(-width)) / (2 * width)
+
+    start = [[mpmath.mpf(v) for v in row] for row in x]
+
+    def at(place, e):
+        return [[v + e * (place == (k, i)) for i, v in enumerate(row)] for k, row in enumerate(start)]
+
+    for place in np.ndindex(x.shape):
+        exact = slope(lambda e, p=place: precise_end(at(p, e), mpmath.mpf(0.3), mpmath.mpf(0.8), bar, module))
+        assert abs(x0_bar[place] - exact) <= 1e-14 * np.abs(x0_bar).max()
+    exact = slope(lambda e: precise_end(start, 0.3 + e, mpmath.mpf(0.8), bar, module))
+    assert abs(found["alpha"] - exact) <= 1e-14 * abs(exact)
+    exact = slope(lambda e: precise_end(start, mpmath.mpf(0.3), 0.8 + e, bar, module))
+    assert abs(found["beta"] - exact) <= 1e-14 * abs(exact)
+
+
+def test_long_runs_are_pulled_back_in_segments(monkeypatch):
+    solver, x = made("fput"), beginning(made("fput"))
+    bar = np.random.default_rng(8).normal(size=(4, *x.shape))
+    whole = solver.pullback(x, H, 23, bar, 9)
+    monkeypatch.setattr(solver.backend._module, "KEPT", 5 * x.size)
+    part = solver.pullback(x, H, 23, bar, 9)
+    assert all(np.array_equal(a, b) for a, b in zip(whole[:2], part[:2], strict=True))
+    assert whole.parameters_bar == part.parameters_bar
+
+
+def test_members_and_their_disorder_have_cotangents():
+    solver = made("xxz_disorder")
+    x, random = beginning(solver), np.random.default_rng(9)
+    many, disorder = x + 0.1 * random.random((3, *x.shape)), random.random((3, SITES))
+    bar, strengths = random.normal(size=many.shape), np.array([0.8, 1.0, 1.2])
+    x1, x0_bar, found = solver.pullback(many, H, STEPS, bar, B=disorder, J=strengths, delta=0.7)
+    each = [solver.pullback(many[m], H, STEPS, bar[m], B=disorder[m], J=strengths[m], delta=0.7) for m in range(3)]
+    assert np.array_equal(x1, [e.x1 for e in each])
+    assert np.array_equal(x0_bar, [e.x0_bar for e in each])
+    assert np.array_equal(found["B"], [e.parameters_bar["B"] for e in each])
+    assert np.array_equal(found["J"], [e.parameters_bar["J"] for e in each])
+    assert found["delta"] == pytest.approx(sum(e.parameters_bar["delta"] for e in each), rel=1e-14)
+    assert solver.pullback(x, H, 0, bar[0], B=0.5).parameters_bar["B"] == 0.0
+
+
+def test_what_cannot_be_pulled_back_is_told():
+    solver = made("fput")
+    x = beginning(solver)
+    with pytest.raises(StepError) as failed:
+        solver.pullback(1e90 * x, H, 9, x)
+    assert failed.value.status == "NOT_FINITE"
+    with pytest.raises(ValueError, match="cotangent must have shape"):
+        solver.pullback(x, H, STEPS, x[0])
+    with pytest.raises(TypeError, match="adjoint=True"):
+        phigen.compile("fput", target="numpy").pullback(x, H, STEPS, x)
+    with pytest.raises(SpecError, match="adjoint is not offered for the series on graphs and pairs"):
+        made("point_vortices")
+    with pytest.raises(SpecError, match="adjoint is not offered for lattices whose H depends on the time"):
+        phigen.compile(phigen.spec.loads(SHAKEN), target="numpy")
+    with pytest.raises(SpecError, match="not offered in C"):
+        made("fput", "c")
