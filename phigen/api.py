@@ -200,6 +200,7 @@ def interface_of(program: Program) -> Interface:
         position=bool(program.attitude and program.attitude.group.translation),
         noise=program.noise.sources if program.noise else (),
         draws=program.noise.draws if program.noise else 0,
+        single=program.single,
     )
     if not isinstance(program.step, Sweeps):
         return about

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from phigen.geometry.system import System, system_of_lattice
@@ -55,6 +55,12 @@ class Compilation:
 
     def __repr__(self) -> str:
         return f"<Compilation of {self.spec.name}: order {self.order.order}, {self.label}>"
+
+    @property
+    def in_double(self) -> Compilation:
+        """The same in double precision."""
+        program = self.program
+        return replace(self, program=replace(program, extras=replace(program.extras, real="double")))
 
     @property
     def chart(self) -> BiRealisation:

@@ -68,11 +68,11 @@ def compile_spec(
     if spec.lattice:
         with bounded(spec):
             cell = clock.timed("cell", lambda: cell_from_spec(spec))
-            return _swept(spec, cell, order, scheme, extras or spec.extras, profile or spec.profile, clock)
+            return _swept(spec, cell, order, scheme, *spec.asked(extras, profile), clock)
     with bounded(spec):
         _tell_of_lattice(spec)
         source = system or clock.timed("system", lambda: system_from_spec(spec))
-        return _compiled(spec, source, order, scheme, extras or spec.extras, profile or spec.profile, clock)
+        return _compiled(spec, source, order, scheme, *spec.asked(extras, profile), clock)
 
 
 def examine(
@@ -109,7 +109,7 @@ def examine(
         if refuted(monitor):
             return Examination(spec, groups, unexamined="the method")
         try:
-            compilation = _compiled(spec, source, order, scheme, extras or spec.extras, profile or spec.profile, clock)
+            compilation = _compiled(spec, source, order, scheme, *spec.asked(extras, profile), clock)
         except SpecError as error:
             return Examination(spec, groups, obstacle=located(error, spec))
         groups = groups | clock.timed("proofs", lambda: statements.method(compilation))
@@ -174,7 +174,7 @@ def _examine_lattice(
         if refuted(groups):
             return Examination(spec, groups, unexamined=UNEXAMINED if len(groups) == 1 else "")
         try:
-            compilation = _swept(spec, cell, order, scheme, extras or spec.extras, profile or spec.profile, clock)
+            compilation = _swept(spec, cell, order, scheme, *spec.asked(extras, profile), clock)
         except SpecError as error:
             return Examination(spec, groups, obstacle=located(error, spec))
         groups = groups | clock.timed("proofs", lambda: statements.sweeps(compilation))

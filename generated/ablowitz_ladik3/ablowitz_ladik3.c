@@ -22,7 +22,7 @@
  *   5. Between steps
  *   6. The solver
  *   7. Ensembles
- * body-sha256: fbc50e45e6c861d4c95e343a2c006b79da256a521896419c446f8b4db82e7c75
+ * body-sha256: 284c1606efd411ceac03b3f359842494cd211796575eea0bbdcbf644b0d2c17e
  */
 #include "ablowitz_ladik3.h"
 
@@ -329,12 +329,12 @@ static void ablowitz_ladik3_path_order(const double *coef, const double p[6],
         s[25][k] = s[22][k] - s[21][k];
         s[26][k] = p[4] * s[25][k];
     }
-    s[0][k + 1] = s[10][k] / (k + 1);
-    s[1][k + 1] = s[12][k] / (k + 1);
-    s[2][k + 1] = s[17][k] / (k + 1);
-    s[3][k + 1] = s[19][k] / (k + 1);
-    s[4][k + 1] = s[24][k] / (k + 1);
-    s[5][k + 1] = s[26][k] / (k + 1);
+    s[0][k + 1] = s[10][k] / (double)(k + 1);
+    s[1][k + 1] = s[12][k] / (double)(k + 1);
+    s[2][k + 1] = s[17][k] / (double)(k + 1);
+    s[3][k + 1] = s[19][k] / (double)(k + 1);
+    s[4][k + 1] = s[24][k] / (double)(k + 1);
+    s[5][k + 1] = s[26][k] / (double)(k + 1);
 }
 
 /* The slope of the path at a point m. */
@@ -430,8 +430,8 @@ static int ablowitz_ladik3_piece(const double *coef, const double p[ablowitz_lad
         for (int i = 0; i < ablowitz_ladik3_DIM; ++i) {
             const double term = series[i][k + 1];
             change[i] += term;
-            mean[i] += term / (k + 2);
-            slope[i] += (k + 1) * term;
+            mean[i] += term / (double)(k + 2);
+            slope[i] += (double)(k + 1) * term;
             end[i] = start[i] + change[i];
             const double measure = fabs(start[i]) + fabs(change[i]) + ablowitz_ladik3_LEAST_SHARE * norm;
             if (!(fabs(term) <= ablowitz_ladik3_NEGLIGIBLE * measure)) negligible = 0;
@@ -454,7 +454,7 @@ static int ablowitz_ladik3_path(const double *coef, const double x[ablowitz_ladi
             local[ablowitz_ladik3_DIM];
         int good = 1;
         for (int i = 0; i < ablowitz_ladik3_DIM; ++i) {
-            q[i] = p[i] / pieces;
+            q[i] = p[i] / (double)pieces;
             change[i] = mean[i] = 0.0;
         }
         for (int piece = 0; piece < pieces && good; ++piece) {
@@ -462,7 +462,7 @@ static int ablowitz_ladik3_path(const double *coef, const double x[ablowitz_ladi
             good = ablowitz_ladik3_piece(coef, q, point, shift, local);
             ++*made;
             for (int i = 0; i < ablowitz_ladik3_DIM; ++i) {
-                mean[i] += (change[i] + local[i]) / pieces;
+                mean[i] += (change[i] + local[i]) / (double)pieces;
                 change[i] += shift[i];
             }
         }

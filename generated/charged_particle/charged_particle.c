@@ -21,7 +21,7 @@
  *   5. Between steps
  *   6. The solver
  *   7. Ensembles
- * body-sha256: cd1931d7e59723882210954335ff1823d84989861878517e1f101ba31f566f37
+ * body-sha256: 25fa5eec85258738f35cc7f1198e62e3e7e1de735081b8fcf63ca8546546b0df
  */
 #include "charged_particle.h"
 
@@ -322,12 +322,12 @@ static void charged_particle_path_order(const double *coef, const double p[6],
         s[17][k] = 0.0;
         s[18][k] = 0.0;
     }
-    s[0][k + 1] = s[15][k] / (k + 1);
-    s[1][k + 1] = s[16][k] / (k + 1);
-    s[2][k + 1] = s[17][k] / (k + 1);
-    s[3][k + 1] = s[11][k] / (k + 1);
-    s[4][k + 1] = s[14][k] / (k + 1);
-    s[5][k + 1] = s[18][k] / (k + 1);
+    s[0][k + 1] = s[15][k] / (double)(k + 1);
+    s[1][k + 1] = s[16][k] / (double)(k + 1);
+    s[2][k + 1] = s[17][k] / (double)(k + 1);
+    s[3][k + 1] = s[11][k] / (double)(k + 1);
+    s[4][k + 1] = s[14][k] / (double)(k + 1);
+    s[5][k + 1] = s[18][k] / (double)(k + 1);
 }
 
 /* The slope of the path at a point m. */
@@ -417,8 +417,8 @@ static int charged_particle_piece(const double *coef, const double p[charged_par
         for (int i = 0; i < charged_particle_DIM; ++i) {
             const double term = series[i][k + 1];
             change[i] += term;
-            mean[i] += term / (k + 2);
-            slope[i] += (k + 1) * term;
+            mean[i] += term / (double)(k + 2);
+            slope[i] += (double)(k + 1) * term;
             end[i] = start[i] + change[i];
             const double measure = fabs(start[i]) + fabs(change[i]) + charged_particle_LEAST_SHARE * norm;
             if (!(fabs(term) <= charged_particle_NEGLIGIBLE * measure)) negligible = 0;
@@ -441,7 +441,7 @@ static int charged_particle_path(const double *coef, const double x[charged_part
             local[charged_particle_DIM];
         int good = 1;
         for (int i = 0; i < charged_particle_DIM; ++i) {
-            q[i] = p[i] / pieces;
+            q[i] = p[i] / (double)pieces;
             change[i] = mean[i] = 0.0;
         }
         for (int piece = 0; piece < pieces && good; ++piece) {
@@ -449,7 +449,7 @@ static int charged_particle_path(const double *coef, const double x[charged_part
             good = charged_particle_piece(coef, q, point, shift, local);
             ++*made;
             for (int i = 0; i < charged_particle_DIM; ++i) {
-                mean[i] += (change[i] + local[i]) / pieces;
+                mean[i] += (change[i] + local[i]) / (double)pieces;
                 change[i] += shift[i];
             }
         }

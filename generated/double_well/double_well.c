@@ -25,7 +25,7 @@
  *   5. Noise
  *   6. The solver
  *   7. Ensembles
- * body-sha256: 95b6ff8d606d9227cf333e0eb63537c12025c3b8f9583b921463f3cd6addf8ef
+ * body-sha256: fb5c09ff730b51cb847d944d265720431a7afc5868d9c20d1c9d0a453309fb71
  */
 #include "double_well.h"
 
@@ -314,8 +314,6 @@ static void double_well_philox(uint32_t counter[4], uint32_t key0, uint32_t key1
     }
 }
 
-#define double_well_UNIT 1.1102230246251565e-16 /* 2^-53 */
-
 /* 53 of the bits of two words, as a number from 0 up to, but not including, 2^53. */
 static double double_well_bits(uint32_t high, uint32_t low) { return (double)(high >> 5) * 67108864.0
     + (double)(low >> 6); }
@@ -327,9 +325,9 @@ static void double_well_normals(uint64_t seed, uint32_t member, uint64_t step,
     for (int k = 0; k < double_well_DRAWS; k += 2) {
         uint32_t c[4] = { (uint32_t)step, (uint32_t)(step >> 32), member, (uint32_t)(k / 2) };
         double_well_philox(c, (uint32_t)seed, (uint32_t)(seed >> 32));
-        const double radius = fmin(sqrt(-2.0 * log((double_well_bits(c[0], c[1]) + 0.5) * double_well_UNIT)),
+        const double radius = fmin(sqrt(-2.0 * log((double_well_bits(c[0], c[1]) + 0.5) * 0x1p-53)),
             double_well_BOUND);
-        const double angle = 6.283185307179586 * (double_well_bits(c[2], c[3]) * double_well_UNIT);
+        const double angle = 6.283185307179586 * (double_well_bits(c[2], c[3]) * 0x1p-53);
         normals[k] = radius * cos(angle);
         if (k + 1 < double_well_DRAWS) normals[k + 1] = radius * sin(angle);
     }

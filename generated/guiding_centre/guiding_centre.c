@@ -22,7 +22,7 @@
  *   5. Between steps
  *   6. The solver
  *   7. Ensembles
- * body-sha256: 4aa0e8dd598c27cfa13d05cd8368c9d34487556b578fe8651ed86b91b1f94828
+ * body-sha256: eeda3e1593bf115e869976c14a2a26ed9f208cb5be55334406dccb097cd796d5
  */
 #include "guiding_centre.h"
 
@@ -261,8 +261,8 @@ static double guiding_centre_taylor_product(const double *a, const double *b, in
 static double guiding_centre_taylor_power(const double *a, const double *b, double r, int k)
 {
     double sum = 0.0;
-    for (int j = 1; j <= k; ++j) sum += ((r + 1.0) * j - k) * a[j] * b[k - j];
-    return sum / k;
+    for (int j = 1; j <= k; ++j) sum += ((r + 1.0) * (double)j - (double)k) * a[j] * b[k - j];
+    return sum / (double)k;
 }
 
 /* The first coefficients of the series of a path, those of the coordinates given. */
@@ -381,10 +381,10 @@ static void guiding_centre_path_order(const double *coef, const double p[4],
         s[53][k] = p[2] * s[44][k];
         s[54][k] = s[52][k] - s[53][k];
     }
-    s[0][k + 1] = s[30][k] / (k + 1);
-    s[1][k + 1] = s[38][k] / (k + 1);
-    s[2][k + 1] = s[49][k] / (k + 1);
-    s[3][k + 1] = s[54][k] / (k + 1);
+    s[0][k + 1] = s[30][k] / (double)(k + 1);
+    s[1][k + 1] = s[38][k] / (double)(k + 1);
+    s[2][k + 1] = s[49][k] / (double)(k + 1);
+    s[3][k + 1] = s[54][k] / (double)(k + 1);
 }
 
 /* The slope of the path at a point m. */
@@ -507,8 +507,8 @@ static int guiding_centre_piece(const double *coef, const double p[guiding_centr
         for (int i = 0; i < guiding_centre_DIM; ++i) {
             const double term = series[i][k + 1];
             change[i] += term;
-            mean[i] += term / (k + 2);
-            slope[i] += (k + 1) * term;
+            mean[i] += term / (double)(k + 2);
+            slope[i] += (double)(k + 1) * term;
             end[i] = start[i] + change[i];
             const double measure = fabs(start[i]) + fabs(change[i]) + guiding_centre_LEAST_SHARE * norm;
             if (!(fabs(term) <= guiding_centre_NEGLIGIBLE * measure)) negligible = 0;
@@ -531,7 +531,7 @@ static int guiding_centre_path(const double *coef, const double x[guiding_centre
             local[guiding_centre_DIM];
         int good = 1;
         for (int i = 0; i < guiding_centre_DIM; ++i) {
-            q[i] = p[i] / pieces;
+            q[i] = p[i] / (double)pieces;
             change[i] = mean[i] = 0.0;
         }
         for (int piece = 0; piece < pieces && good; ++piece) {
@@ -539,7 +539,7 @@ static int guiding_centre_path(const double *coef, const double x[guiding_centre
             good = guiding_centre_piece(coef, q, point, shift, local);
             ++*made;
             for (int i = 0; i < guiding_centre_DIM; ++i) {
-                mean[i] += (change[i] + local[i]) / pieces;
+                mean[i] += (change[i] + local[i]) / (double)pieces;
                 change[i] += shift[i];
             }
         }

@@ -29,7 +29,7 @@
  *   13. Members of an ensemble
  *   14. Groups of members
  *   15. Ensembles
- * body-sha256: de072555b484ae81defabebc339107f264f8b1cc3e41ac18390765ec9bdf24f0
+ * body-sha256: c0fdeca62f08646a59385b9c2e8a4d2a7e1014ce458d237f6e530bfbf82d9ce0
  */
 #include "nambu_pendulum.h"
 
@@ -447,8 +447,8 @@ static int nambu_pendulum_plausible(const nambu_pendulum_solver *s,
 static double nambu_pendulum_taylor_chain(const double *a, const double *d, int k)
 {
     double sum = 0.0;
-    for (int j = 1; j <= k; ++j) sum += j * a[j] * d[k - j];
-    return sum / k;
+    for (int j = 1; j <= k; ++j) sum += (double)j * a[j] * d[k - j];
+    return sum / (double)k;
 }
 
 /* The first coefficients of the series of a path, those of the coordinates given. */
@@ -483,9 +483,9 @@ static void nambu_pendulum_path_order(const double *coef, const double p[3],
         s[9][k] = -s[3][k];
         s[10][k] = 0.0;
     }
-    s[0][k + 1] = s[10][k] / (k + 1);
-    s[1][k + 1] = s[6][k] / (k + 1);
-    s[2][k + 1] = s[7][k] / (k + 1);
+    s[0][k + 1] = s[10][k] / (double)(k + 1);
+    s[1][k + 1] = s[6][k] / (double)(k + 1);
+    s[2][k + 1] = s[7][k] / (double)(k + 1);
 }
 
 /* The slope of the path at a point m. */
@@ -565,8 +565,8 @@ static int nambu_pendulum_piece(const double *coef, const double p[nambu_pendulu
         for (int i = 0; i < nambu_pendulum_DIM; ++i) {
             const double term = series[i][k + 1];
             change[i] += term;
-            mean[i] += term / (k + 2);
-            slope[i] += (k + 1) * term;
+            mean[i] += term / (double)(k + 2);
+            slope[i] += (double)(k + 1) * term;
             end[i] = start[i] + change[i];
             const double measure = fabs(start[i]) + fabs(change[i]) + nambu_pendulum_LEAST_SHARE * norm;
             if (!(fabs(term) <= nambu_pendulum_NEGLIGIBLE * measure)) negligible = 0;
@@ -589,7 +589,7 @@ static int nambu_pendulum_path(const double *coef, const double x[nambu_pendulum
             local[nambu_pendulum_DIM];
         int good = 1;
         for (int i = 0; i < nambu_pendulum_DIM; ++i) {
-            q[i] = p[i] / pieces;
+            q[i] = p[i] / (double)pieces;
             change[i] = mean[i] = 0.0;
         }
         for (int piece = 0; piece < pieces && good; ++piece) {
@@ -597,7 +597,7 @@ static int nambu_pendulum_path(const double *coef, const double x[nambu_pendulum
             good = nambu_pendulum_piece(coef, q, point, shift, local);
             ++*made;
             for (int i = 0; i < nambu_pendulum_DIM; ++i) {
-                mean[i] += (change[i] + local[i]) / pieces;
+                mean[i] += (change[i] + local[i]) / (double)pieces;
                 change[i] += shift[i];
             }
         }
@@ -1233,15 +1233,15 @@ static double nambu_pendulum_largest_finite(const nambu_pendulum_lanes size)
    and k, then what else there is. */
 static void nambu_pendulum_follow(nambu_pendulum_lanes coef[restrict], nambu_pendulum_expansion *e, int k)
 {
-    const double share = 1.0 / k;
+    const double share = 1.0 / (double)k;
     (void)coef;
     nambu_pendulum_lanes sum[2];
     memset(sum, 0, sizeof sum);
     for (int j = 1; j < k; ++j) {
         nambu_pendulum_EACH_LANE
         for (int lane = 0; lane < nambu_pendulum_LANES; ++lane) {
-            sum[0][lane] += j * e->s[0][j][lane] * e->s[8][k - j][lane];
-            sum[1][lane] += j * e->s[0][j][lane] * e->s[9][k - j][lane];
+            sum[0][lane] += (double)j * e->s[0][j][lane] * e->s[8][k - j][lane];
+            sum[1][lane] += (double)j * e->s[0][j][lane] * e->s[9][k - j][lane];
         }
     }
     nambu_pendulum_EACH_LANE
@@ -1280,7 +1280,7 @@ static void nambu_pendulum_follow_slopes(nambu_pendulum_lanes coef[restrict], na
 static void nambu_pendulum_vary_by(nambu_pendulum_expansion *e, int j, int k)
 {
     nambu_pendulum_lanes *from = e->v[k - j], *to = e->v[k + 1];
-    const double share = 1.0 / (k + 1);
+    const double share = 1.0 / (double)(k + 1);
     nambu_pendulum_EACH_LANE
     for (int lane = 0; lane < nambu_pendulum_LANES; ++lane) {
         const double a1_0 = share * e->slope[1][j][lane];
@@ -1304,7 +1304,7 @@ static void nambu_pendulum_vary_by(nambu_pendulum_expansion *e, int j, int k)
 static void nambu_pendulum_vary_source(nambu_pendulum_expansion *e, int k)
 {
     nambu_pendulum_lanes *to = e->v[k + 1];
-    const double share = 1.0 / (k + 1);
+    const double share = 1.0 / (double)(k + 1);
     nambu_pendulum_EACH_LANE
     for (int lane = 0; lane < nambu_pendulum_LANES; ++lane) {
         to[6][lane] += share * e->slope[1][k][lane];
@@ -1321,7 +1321,7 @@ static void nambu_pendulum_next_order(nambu_pendulum_lanes coef[restrict], nambu
 {
     if (k > 0) nambu_pendulum_follow(coef, e, k);
     for (int i = 0; i < nambu_pendulum_DIM; ++i) {
-        const double share = 1.0 / (k + 1);
+        const double share = 1.0 / (double)(k + 1);
         nambu_pendulum_EACH_LANE
         for (int lane = 0; lane < nambu_pendulum_LANES; ++lane)
             e->s[i][k + 1][lane] = share * e->s[nambu_pendulum_path_slopes[i]][k][lane];
@@ -1358,7 +1358,7 @@ static void nambu_pendulum_begin(nambu_pendulum_lanes coef[restrict], nambu_pend
 static double nambu_pendulum_add_terms(nambu_pendulum_expansion *e, int k)
 {
     nambu_pendulum_lanes size = { 0.0 };
-    const double share = 1.0 / (k + 2);
+    const double share = 1.0 / (double)(k + 2);
     for (int i = 0; i < nambu_pendulum_DIM; ++i) {
         nambu_pendulum_EACH_LANE
         for (int lane = 0; lane < nambu_pendulum_LANES; ++lane) {
@@ -1418,8 +1418,8 @@ static void nambu_pendulum_check_ends(nambu_pendulum_lanes coef[restrict], nambu
         for (int k = 1; k < e->terms; k += 2) {
             nambu_pendulum_EACH_LANE
             for (int lane = 0; lane < nambu_pendulum_LANES; ++lane) {
-                odd[lane] += k * e->s[i][k][lane];
-                even[lane] += (k + 1) * e->s[i][k + 1][lane];
+                odd[lane] += (double)k * e->s[i][k][lane];
+                even[lane] += (double)(k + 1) * e->s[i][k + 1][lane];
             }
         }
         nambu_pendulum_EACH_LANE
@@ -1504,7 +1504,7 @@ static void nambu_pendulum_vary_order(nambu_pendulum_expansion *e, int k)
 static void nambu_pendulum_add_slopes(nambu_pendulum_expansion *e, int k, nambu_pendulum_lanes size)
 {
     nambu_pendulum_lanes parts[2] = { { 0.0 } }, first = { 0.0 };
-    const double share = 1.0 / (k + 2);
+    const double share = 1.0 / (double)(k + 2);
     for (int i = 0; i < 2 * nambu_pendulum_DIM * nambu_pendulum_DIM; ++i) {
         const int part = i % (2 * nambu_pendulum_DIM) / nambu_pendulum_DIM;
         nambu_pendulum_EACH_LANE

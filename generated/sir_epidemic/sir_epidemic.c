@@ -21,7 +21,7 @@
  *   5. Between steps
  *   6. The solver
  *   7. Ensembles
- * body-sha256: 6a61999e1e69ab8b2cd706bb5bc76797da0f5907d2cc187b07ced03606c99590
+ * body-sha256: b734dbfa0bcae94eb8de5ca4bab9890a75243b6f30656606cfd58b80192f5372
  */
 #include "sir_epidemic.h"
 
@@ -254,9 +254,9 @@ static void sir_epidemic_path_order(const double *coef, const double p[3],
         s[8][k] = s[5][k] - s[7][k];
         s[9][k] = s[7][k] - s[4][k];
     }
-    s[0][k + 1] = s[6][k] / (k + 1);
-    s[1][k + 1] = s[8][k] / (k + 1);
-    s[2][k + 1] = s[9][k] / (k + 1);
+    s[0][k + 1] = s[6][k] / (double)(k + 1);
+    s[1][k + 1] = s[8][k] / (double)(k + 1);
+    s[2][k + 1] = s[9][k] / (double)(k + 1);
 }
 
 /* The slope of the path at a point m. */
@@ -333,8 +333,8 @@ static int sir_epidemic_piece(const double *coef, const double p[sir_epidemic_DI
         for (int i = 0; i < sir_epidemic_DIM; ++i) {
             const double term = series[i][k + 1];
             change[i] += term;
-            mean[i] += term / (k + 2);
-            slope[i] += (k + 1) * term;
+            mean[i] += term / (double)(k + 2);
+            slope[i] += (double)(k + 1) * term;
             end[i] = start[i] + change[i];
             const double measure = fabs(start[i]) + fabs(change[i]) + sir_epidemic_LEAST_SHARE * norm;
             if (!(fabs(term) <= sir_epidemic_NEGLIGIBLE * measure)) negligible = 0;
@@ -356,7 +356,7 @@ static int sir_epidemic_path(const double *coef, const double x[sir_epidemic_DIM
         double q[sir_epidemic_DIM], point[sir_epidemic_DIM], shift[sir_epidemic_DIM], local[sir_epidemic_DIM];
         int good = 1;
         for (int i = 0; i < sir_epidemic_DIM; ++i) {
-            q[i] = p[i] / pieces;
+            q[i] = p[i] / (double)pieces;
             change[i] = mean[i] = 0.0;
         }
         for (int piece = 0; piece < pieces && good; ++piece) {
@@ -364,7 +364,7 @@ static int sir_epidemic_path(const double *coef, const double x[sir_epidemic_DIM
             good = sir_epidemic_piece(coef, q, point, shift, local);
             ++*made;
             for (int i = 0; i < sir_epidemic_DIM; ++i) {
-                mean[i] += (change[i] + local[i]) / pieces;
+                mean[i] += (change[i] + local[i]) / (double)pieces;
                 change[i] += shift[i];
             }
         }

@@ -20,7 +20,7 @@
  *   5. Between steps
  *   6. The solver
  *   7. Ensembles
- * body-sha256: 384edc9317fb361cb7ee7f99f3cb06f7b4f47596b4513221eaf6e03467f98d0a
+ * body-sha256: 3c1ad9f2d145430f755088c9fdb2c7994f00def0eb542e911df6836af3029965
  */
 #include "sir_final_size.h"
 
@@ -259,9 +259,9 @@ static void sir_final_size_path_order(const double *coef, const double p[3],
         s[12][k] = p[1] * s[11][k];
         s[13][k] = s[10][k] + s[12][k];
     }
-    s[0][k + 1] = s[6][k] / (k + 1);
-    s[1][k + 1] = s[9][k] / (k + 1);
-    s[2][k + 1] = s[13][k] / (k + 1);
+    s[0][k + 1] = s[6][k] / (double)(k + 1);
+    s[1][k + 1] = s[9][k] / (double)(k + 1);
+    s[2][k + 1] = s[13][k] / (double)(k + 1);
 }
 
 /* The slope of the path at a point m. */
@@ -343,8 +343,8 @@ static int sir_final_size_piece(const double *coef, const double p[sir_final_siz
         for (int i = 0; i < sir_final_size_DIM; ++i) {
             const double term = series[i][k + 1];
             change[i] += term;
-            mean[i] += term / (k + 2);
-            slope[i] += (k + 1) * term;
+            mean[i] += term / (double)(k + 2);
+            slope[i] += (double)(k + 1) * term;
             end[i] = start[i] + change[i];
             const double measure = fabs(start[i]) + fabs(change[i]) + sir_final_size_LEAST_SHARE * norm;
             if (!(fabs(term) <= sir_final_size_NEGLIGIBLE * measure)) negligible = 0;
@@ -367,7 +367,7 @@ static int sir_final_size_path(const double *coef, const double x[sir_final_size
             local[sir_final_size_DIM];
         int good = 1;
         for (int i = 0; i < sir_final_size_DIM; ++i) {
-            q[i] = p[i] / pieces;
+            q[i] = p[i] / (double)pieces;
             change[i] = mean[i] = 0.0;
         }
         for (int piece = 0; piece < pieces && good; ++piece) {
@@ -375,7 +375,7 @@ static int sir_final_size_path(const double *coef, const double x[sir_final_size
             good = sir_final_size_piece(coef, q, point, shift, local);
             ++*made;
             for (int i = 0; i < sir_final_size_DIM; ++i) {
-                mean[i] += (change[i] + local[i]) / pieces;
+                mean[i] += (change[i] + local[i]) / (double)pieces;
                 change[i] += shift[i];
             }
         }

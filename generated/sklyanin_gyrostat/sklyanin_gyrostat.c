@@ -23,7 +23,7 @@
  *   6. Between steps
  *   7. The solver
  *   8. Ensembles
- * body-sha256: f1687fc94745b26e34bf3ec82aca26e03277888379a9e56c4b4aba584a5d2ab0
+ * body-sha256: 5fecd7b357404a223d27fcc820c7c399df9e31a2cf56fbe8a7ddbac780d0cb5d
  */
 #include "sklyanin_gyrostat.h"
 
@@ -392,10 +392,10 @@ static void sklyanin_gyrostat_path_order(const double *coef, const double p[4],
         s[38][k] = 2.0 * s[37][k];
         s[39][k] = s[36][k] - s[38][k];
     }
-    s[0][k + 1] = s[13][k] / (k + 1);
-    s[1][k + 1] = s[23][k] / (k + 1);
-    s[2][k + 1] = s[32][k] / (k + 1);
-    s[3][k + 1] = s[39][k] / (k + 1);
+    s[0][k + 1] = s[13][k] / (double)(k + 1);
+    s[1][k + 1] = s[23][k] / (double)(k + 1);
+    s[2][k + 1] = s[32][k] / (double)(k + 1);
+    s[3][k + 1] = s[39][k] / (double)(k + 1);
 }
 
 /* The slope of the path at a point m. */
@@ -504,8 +504,8 @@ static int sklyanin_gyrostat_piece(const double *coef, const double p[sklyanin_g
         for (int i = 0; i < sklyanin_gyrostat_DIM; ++i) {
             const double term = series[i][k + 1];
             change[i] += term;
-            mean[i] += term / (k + 2);
-            slope[i] += (k + 1) * term;
+            mean[i] += term / (double)(k + 2);
+            slope[i] += (double)(k + 1) * term;
             end[i] = start[i] + change[i];
             const double measure = fabs(start[i]) + fabs(change[i]) + sklyanin_gyrostat_LEAST_SHARE * norm;
             if (!(fabs(term) <= sklyanin_gyrostat_NEGLIGIBLE * measure)) negligible = 0;
@@ -528,7 +528,7 @@ static int sklyanin_gyrostat_path(const double *coef, const double x[sklyanin_gy
             local[sklyanin_gyrostat_DIM];
         int good = 1;
         for (int i = 0; i < sklyanin_gyrostat_DIM; ++i) {
-            q[i] = p[i] / pieces;
+            q[i] = p[i] / (double)pieces;
             change[i] = mean[i] = 0.0;
         }
         for (int piece = 0; piece < pieces && good; ++piece) {
@@ -536,7 +536,7 @@ static int sklyanin_gyrostat_path(const double *coef, const double x[sklyanin_gy
             good = sklyanin_gyrostat_piece(coef, q, point, shift, local);
             ++*made;
             for (int i = 0; i < sklyanin_gyrostat_DIM; ++i) {
-                mean[i] += (change[i] + local[i]) / pieces;
+                mean[i] += (change[i] + local[i]) / (double)pieces;
                 change[i] += shift[i];
             }
         }

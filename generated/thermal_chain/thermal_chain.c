@@ -27,7 +27,7 @@
  *   5. Noise
  *   6. The solver
  *   7. Ensembles
- * body-sha256: db3a68526eca5c07ddedd30d47baf18d025eeadde17f2d5e529bfa7e09eda384
+ * body-sha256: fa21895eb753d7f12d6285c0eea7a0d68e770c23fdb77e2e8d7361a5649d1117
  */
 #include "thermal_chain.h"
 
@@ -1132,8 +1132,6 @@ static void thermal_chain_philox(uint32_t counter[4], uint32_t key0, uint32_t ke
     }
 }
 
-#define thermal_chain_UNIT 1.1102230246251565e-16 /* 2^-53 */
-
 /* 53 of the bits of two words, as a number from 0 up to, but not including, 2^53. */
 static double thermal_chain_bits(uint32_t high, uint32_t low) { return (double)(high >> 5) * 67108864.0
     + (double)(low >> 6); }
@@ -1145,9 +1143,9 @@ static void thermal_chain_normals(uint64_t seed, uint32_t member, uint64_t step,
     for (int k = 0; k < thermal_chain_DRAWS; k += 2) {
         uint32_t c[4] = { (uint32_t)step, (uint32_t)(step >> 32), member, (uint32_t)(k / 2) };
         thermal_chain_philox(c, (uint32_t)seed, (uint32_t)(seed >> 32));
-        const double radius = fmin(sqrt(-2.0 * log((thermal_chain_bits(c[0], c[1]) + 0.5)
-            * thermal_chain_UNIT)), thermal_chain_BOUND);
-        const double angle = 6.283185307179586 * (thermal_chain_bits(c[2], c[3]) * thermal_chain_UNIT);
+        const double radius = fmin(sqrt(-2.0 * log((thermal_chain_bits(c[0], c[1]) + 0.5) * 0x1p-53)),
+            thermal_chain_BOUND);
+        const double angle = 6.283185307179586 * (thermal_chain_bits(c[2], c[3]) * 0x1p-53);
         normals[k] = radius * cos(angle);
         if (k + 1 < thermal_chain_DRAWS) normals[k + 1] = radius * sin(angle);
     }

@@ -26,7 +26,7 @@
  *   5. Noise
  *   6. The solver
  *   7. Ensembles
- * body-sha256: 5609ce5e296898a66c0f16baeed0ea51f970a8b9f940a540c8ddde7c823a2a29
+ * body-sha256: fd58d97c1891cca6a6035deb3ab9768478197f874c9a37bdc52d306b34471cca
  */
 #include "thermal_spin.h"
 
@@ -401,8 +401,6 @@ static void thermal_spin_philox(uint32_t counter[4], uint32_t key0, uint32_t key
     }
 }
 
-#define thermal_spin_UNIT 1.1102230246251565e-16 /* 2^-53 */
-
 /* 53 of the bits of two words, as a number from 0 up to, but not including, 2^53. */
 static double thermal_spin_bits(uint32_t high, uint32_t low) { return (double)(high >> 5) * 67108864.0
     + (double)(low >> 6); }
@@ -414,9 +412,9 @@ static void thermal_spin_normals(uint64_t seed, uint32_t member, uint64_t step,
     for (int k = 0; k < thermal_spin_DRAWS; k += 2) {
         uint32_t c[4] = { (uint32_t)step, (uint32_t)(step >> 32), member, (uint32_t)(k / 2) };
         thermal_spin_philox(c, (uint32_t)seed, (uint32_t)(seed >> 32));
-        const double radius = fmin(sqrt(-2.0 * log((thermal_spin_bits(c[0], c[1]) + 0.5)
-            * thermal_spin_UNIT)), thermal_spin_BOUND);
-        const double angle = 6.283185307179586 * (thermal_spin_bits(c[2], c[3]) * thermal_spin_UNIT);
+        const double radius = fmin(sqrt(-2.0 * log((thermal_spin_bits(c[0], c[1]) + 0.5) * 0x1p-53)),
+            thermal_spin_BOUND);
+        const double angle = 6.283185307179586 * (thermal_spin_bits(c[2], c[3]) * 0x1p-53);
         normals[k] = radius * cos(angle);
         if (k + 1 < thermal_spin_DRAWS) normals[k + 1] = radius * sin(angle);
     }

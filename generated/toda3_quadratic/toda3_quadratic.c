@@ -22,7 +22,7 @@
  *   7. The solver
  *   8. Members of an ensemble
  *   9. Ensembles
- * body-sha256: 9c063acdd58786f4900105b51fb095ce94f265a49802d708649dbafb1c5f1d21
+ * body-sha256: 68e283b0a56a50e58280deb8e57acebed5201d8102af39009e2fee67c76045c8
  */
 #include "toda3_quadratic.h"
 
@@ -504,11 +504,11 @@ static void toda3_quadratic_path_order(const double *coef, const double p[5],
         s[39][k] = p[1] * s[14][k];
         s[40][k] = s[38][k] - s[39][k];
     }
-    s[0][k + 1] = s[13][k] / (k + 1);
-    s[1][k + 1] = s[21][k] / (k + 1);
-    s[2][k + 1] = s[26][k] / (k + 1);
-    s[3][k + 1] = s[36][k] / (k + 1);
-    s[4][k + 1] = s[40][k] / (k + 1);
+    s[0][k + 1] = s[13][k] / (double)(k + 1);
+    s[1][k + 1] = s[21][k] / (double)(k + 1);
+    s[2][k + 1] = s[26][k] / (double)(k + 1);
+    s[3][k + 1] = s[36][k] / (double)(k + 1);
+    s[4][k + 1] = s[40][k] / (double)(k + 1);
 }
 
 /* The slope of the path at a point m. */
@@ -618,8 +618,8 @@ static int toda3_quadratic_piece(const double *coef, const double p[toda3_quadra
         for (int i = 0; i < toda3_quadratic_DIM; ++i) {
             const double term = series[i][k + 1];
             change[i] += term;
-            mean[i] += term / (k + 2);
-            slope[i] += (k + 1) * term;
+            mean[i] += term / (double)(k + 2);
+            slope[i] += (double)(k + 1) * term;
             end[i] = start[i] + change[i];
             const double measure = fabs(start[i]) + fabs(change[i]) + toda3_quadratic_LEAST_SHARE * norm;
             if (!(fabs(term) <= toda3_quadratic_NEGLIGIBLE * measure)) negligible = 0;
@@ -642,7 +642,7 @@ static int toda3_quadratic_path(const double *coef, const double x[toda3_quadrat
             local[toda3_quadratic_DIM];
         int good = 1;
         for (int i = 0; i < toda3_quadratic_DIM; ++i) {
-            q[i] = p[i] / pieces;
+            q[i] = p[i] / (double)pieces;
             change[i] = mean[i] = 0.0;
         }
         for (int piece = 0; piece < pieces && good; ++piece) {
@@ -650,7 +650,7 @@ static int toda3_quadratic_path(const double *coef, const double x[toda3_quadrat
             good = toda3_quadratic_piece(coef, q, point, shift, local);
             ++*made;
             for (int i = 0; i < toda3_quadratic_DIM; ++i) {
-                mean[i] += (change[i] + local[i]) / pieces;
+                mean[i] += (change[i] + local[i]) / (double)pieces;
                 change[i] += shift[i];
             }
         }

@@ -53,6 +53,7 @@ def command(
     tangent: bool,
     adjoint: bool,
     modified: int | None,
+    real: str | None,
     compiling: bool,
     certify: bool,
     checking: bool,
@@ -78,6 +79,7 @@ def command(
         profile,
         without,
         adjoint,
+        real,
     )
     compilations = _compile_all(console, spec_files, options)
     planned = _plan(console, compilations, options)

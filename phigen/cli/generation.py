@@ -13,7 +13,7 @@ import click
 from phigen import resources
 from phigen.cli.sources import CORRECTIONS, ORDER, scheme_option
 from phigen.registry import TARGETS
-from phigen.spec.names import PARTS, PROFILES
+from phigen.spec.names import PARTS, PROFILES, REALS
 
 if TYPE_CHECKING:
     from phigen.compilation import Compilation
@@ -38,6 +38,11 @@ class Options:
     profile: str | None = None
     without: tuple[str, ...] = ()
     adjoint: bool = False
+    real: str | None = None
+
+    def __post_init__(self) -> None:
+        if self.real == "float" and self.profile == "fast":
+            raise click.UsageError("single precision has the profile small only: leave out --profile fast")
 
     def extras_of(self, spec: Spec) -> Extras:
         """What the code offers beyond the solver: what the spec asks for, and the command line."""
@@ -46,7 +51,7 @@ class Options:
         given = spec.extras
         modified = given.modified_hamiltonian if self.modified is None else self.modified
         without, adjoint = given.without | {*self.without}, self.adjoint or given.adjoint
-        return Extras(self.tangent or given.tangent, modified, without, adjoint)
+        return Extras(self.tangent or given.tangent, modified, without, adjoint, self.real or given.real)
 
     def compiled(self, spec: Spec) -> Compilation:
         """The compilation of a spec with these options, proved; see `phigen.compiler.compile_proved`."""
@@ -73,6 +78,7 @@ class Options:
         words += ["--order", str(self.order)] if self.order else []
         words += ["--scheme", self.scheme] if self.scheme else []
         words += ["--profile", self.profile] if self.profile else []
+        words += ["--real", self.real] if self.real else []
         words += [word for part in self.without for word in ("--without", part)]
         words += ["--single-file"] if self.single_file else []
         words += ["--tangent"] if self.tangent else []
@@ -92,6 +98,7 @@ def output_options(command: F) -> F:
         click.option(
             "--profile", type=click.Choice(PROFILES), help="How much the code does for speed, instead of the spec's."
         ),
+        click.option("--real", type=click.Choice(REALS), help="The numbers of the C, instead of the spec's."),
         click.option(
             "--without", multiple=True, type=click.Choice(PARTS), help="Leave out a part of the code; may be repeated."
         ),
@@ -121,6 +128,7 @@ def generate(compilation: Compilation, target: str, options: Options) -> dict[st
     words += ["--order", str(options.order)] if options.order not in (None, spec.order) else []
     words += ["--scheme", options.scheme] if options.scheme not in (None, spec.scheme) else []
     words += ["--profile", options.profile] if options.profile not in (None, spec.profile) else []
+    words += ["--real", options.real] if options.real not in (None, spec.extras.real) else []
     words += [f"--without {part}" for part in options.without if part not in spec.extras.without]
     words += ["--single-file"] if single else []
     words += ["--tangent"] if options.tangent and not spec.extras.tangent else []

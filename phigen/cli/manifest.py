@@ -22,7 +22,7 @@ from phigen.cli.generation import Options
 from phigen.errors import CheckError
 from phigen.registry import TARGETS, suffixes
 from phigen.spec import limits
-from phigen.spec.names import PARTS, PROFILES, SCHEMES, SPEC_NAME
+from phigen.spec.names import PARTS, PROFILES, REALS, SCHEMES, SPEC_NAME
 
 FILE = "phigen-vendor.json"
 FORMAT = 1
@@ -153,6 +153,7 @@ def _options(name: str, given: dict[str, Any]) -> Options:
         or not (modified is None or (type(modified) is int and 0 <= modified <= limits.CORRECTIONS))
         or options.scheme not in (None, *SCHEMES)
         or options.profile not in (None, *PROFILES)
+        or options.real not in (None, *REALS)
         or "directory" in given
         or not all(isinstance(flag, bool) for flag in (options.single_file, options.tangent, options.adjoint))
     ):

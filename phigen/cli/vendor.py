@@ -81,6 +81,7 @@ def command(
     tangent: bool,
     adjoint: bool,
     modified: int | None,
+    real: str | None,
     cmake: bool,
     meson: bool,
     python: bool,
@@ -108,6 +109,7 @@ def command(
         scheme=scheme,
         profile=profile,
         without=without,
+        real=real,
     )
     if options.words and not spec_files:
         raise click.UsageError("options that change what is generated need the SPEC; without it, the manifest decides")

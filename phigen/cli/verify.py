@@ -132,11 +132,13 @@ def verified(
     experiment = prepared(spec, name)
     run = experiment.run
     chosen = loadable(targets or spec.targets) or (chosen_target("auto"),)
+    single = solver_of(compilation, "c") if compilation.program.single and "c" in chosen else None
+    compilation = compilation.in_double
     solvers = {target: solver_of(compilation, target) for target in chosen}
     console.detail(f"{spec.name}: built {', '.join(solvers)}")
     return verify(
         compilation, solvers, run.name, experiment.initial, experiment.parameters, float(run.step), run.steps,
-        run.compare or ("rk4",), t0=float(run.start), quick=quick,
+        run.compare or ("rk4",), t0=float(run.start), quick=quick, single=single,
     )  # fmt: skip
 
 
@@ -152,11 +154,13 @@ def verified_lattice(
     spec = compilation.spec
     run = run_of(spec, name)
     chosen = loadable(targets or spec.targets) or (chosen_target("auto"),)
+    single = lattice_solver_of(compilation, "c") if compilation.program.single and "c" in chosen else None
+    compilation = compilation.in_double
     solvers = {target: lattice_solver_of(compilation, target) for target in chosen}
     console.detail(f"{spec.name}: built {', '.join(solvers)}")
     begin = float(run.start) if spec.time else None
-    start = start_of(spec, run)
-    return verify_lattice(compilation, solvers, run.name, start, float(run.step), run.steps, t0=begin, quick=quick)
+    numbers = start_of(spec, run), float(run.step), run.steps
+    return verify_lattice(compilation, solvers, run.name, *numbers, t0=begin, quick=quick, single=single)
 
 
 def fallen_short(verification: Verification) -> CheckError:

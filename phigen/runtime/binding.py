@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 from collections.abc import Mapping
 from types import SimpleNamespace
 from typing import Any
@@ -12,11 +13,15 @@ from phigen.errors import ToolchainError
 Signatures = Mapping[str, tuple[Any, tuple[Any, ...]]]
 
 
-def bound(library: Any, prefix: str, wanted: Signatures, offered: Signatures | None = None) -> Any:
-    """A namespace of the functions ``PREFIX_NAME``; those that are only ``offered`` may be absent.
+def bound(
+    library: Any, prefix: str, wanted: Signatures, offered: Signatures | None = None, *, single: bool = False
+) -> Any:
+    """A namespace of the functions ``PREFIX_NAME``; those that are only ``offered`` may be absent. Doubles are floats
+    where the precision is ``single``.
 
-    Raises `ToolchainError` where one that is wanted is.
+    Raises `ToolchainError` where one that is wanted is absent.
     """
+    numbers = {ctypes.c_double: ctypes.c_float} if single else {}
     found = SimpleNamespace()
     for name, (result, arguments) in {**(offered or {}), **wanted}.items():
         function = getattr(library, f"{prefix}_{name}", None)
@@ -26,6 +31,7 @@ def bound(library: Any, prefix: str, wanted: Signatures, offered: Signatures | N
                 "  hint: whatever CC names did not compile what it was given; try gcc or clang"
             )
         if function is not None:
-            function.restype, function.argtypes = result, arguments
+            function.restype = numbers.get(result, result)
+            function.argtypes = [numbers.get(argument, argument) for argument in arguments]
             setattr(found, name, function)
     return found

@@ -79,6 +79,7 @@ class CLatticeSession:
         self, functions: Any, interface: LatticeInterface, x0: Floats, parameters: Mapping[str, Any], t0: float
     ) -> None:
         self._c, self._shape, self._before = functions, x0.shape, 0
+        self._real: Any = np.float32 if interface.single else np.float64
         self._casimirs = len(interface.casimirs)
         sizes = np.array(x0.shape[1:], dtype=np.uintp)
         self._struct = np.zeros(functions.solver_size(), dtype=np.uint8)
@@ -87,14 +88,14 @@ class CLatticeSession:
         needed = functions.work_size(sizes.ctypes.data, *([len(bonds)] if interface.graph else []))
         self._work = np.zeros(max(needed, 64), dtype=np.uint8)
         self._address = self._struct.ctypes.data
-        first = np.ascontiguousarray(x0, dtype=np.float64)
+        first = np.ascontiguousarray(x0, dtype=self._real)
         packed, kept = _packed(interface, parameters, x0.shape[1:], len(bonds))
         arrays = [a.ctypes.data for a in (packed, sizes, *([given] if interface.graph else []), first)]
         begin, last = (functions.init_at, (t0,)) if interface.time else (functions.init, ())
         status = begin(self._address, *arrays, *last, self._work.ctypes.data)
         del kept
         if status:
-            raise BackendError(status_name(status), 0, first[None])
+            raise BackendError(status_name(status), 0, x0[None])
 
     @property
     def steps(self) -> int:
@@ -135,7 +136,7 @@ class CLatticeSession:
         """What `resume` goes on from with the same bits, beside the state."""
         if not hasattr(self._c, "saved"):
             return {}
-        x, far = np.empty(self._shape), np.zeros(1, dtype=np.uintp)
+        x, far = np.empty(self._shape, self._real), np.zeros(1, dtype=np.uintp)
         is_open = self._c.saved(self._address, x.ctypes.data, far.ctypes.data)
         return {"before": x, "far": far} if is_open else {}
 
@@ -146,7 +147,7 @@ class CLatticeSession:
         else:
             self._before = steps
         if "before" in kept:
-            x = np.ascontiguousarray(kept["before"], dtype=np.float64)
+            x = np.ascontiguousarray(kept["before"], dtype=self._real)
             self._expect_done(self._c.resume(self._address, h, x.ctypes.data, int(kept["far"][0])))
 
     def passed(self, h: float, steps: int) -> None:
@@ -165,12 +166,13 @@ class CLatticeSession:
 
     def planes(self, field: int, first: int, end: int) -> Floats:
         """A copy of some planes of a field."""
-        out = np.empty((end - first, *self._shape[2:]))
+        out = np.empty((end - first, *self._shape[2:]), self._real)
         self._expect_done(self._c.planes(self._address, field, first, end, out.ctypes.data))
         return out
 
     def put_planes(self, field: int, first: int, end: int, values: Floats) -> None:
         """Put other values of a field in place of those of some planes."""
+        values = np.ascontiguousarray(values, dtype=self._real)
         self._expect_done(self._c.put_planes(self._address, field, first, end, values.ctypes.data))
 
     def holds(self, first: int, end: int) -> bool:
@@ -183,9 +185,9 @@ class CLatticeSession:
             raise ValueError(f"no such stage, planes or step: {status_name(status)}")
 
     def _filled(self, function: Any, shape: tuple[int, ...]) -> Floats:
-        out = np.empty(shape)
+        out = np.empty(shape, self._real)
         function(self._address, out.ctypes.data)
-        return out
+        return out.astype(np.float64, copy=False)
 
 
 class CLattice:
@@ -198,7 +200,7 @@ class CLattice:
         self._library = cache.load(files, threads=True)
         wanted = _SIGNATURES | (_OF_GRAPHS if interface.graph else {})
         wanted |= (_GRAPH_IN_TIME if interface.graph else _IN_TIME) if interface.time else {}
-        self._c = bound(self._library, interface.name, wanted, _OFFERED)
+        self._c = bound(self._library, interface.name, wanted, _OFFERED, single=interface.single)
 
     def stages(self) -> list[Stage]:
         """The sweeps of a step in order, then the last and the first together. Raises `ValueError` if not offered."""
@@ -232,15 +234,17 @@ class CLattice:
 
 def _packed(
     interface: LatticeInterface, parameters: Mapping[str, Any], sizes: tuple[int, ...], bonds: int
-) -> tuple[NDArray[np.uint64], list[Floats]]:
-    """The struct of parameters, whose members all take eight bytes, and the arrays that it points to."""
-    words, kept = np.zeros(max(1, len(interface.parameters)), dtype=np.uint64), list[Floats]()
-    for k, name in enumerate(interface.parameters):
+) -> tuple[NDArray[Any], list[NDArray[Any]]]:
+    """The struct of parameters, and the arrays that it points to."""
+    real: Any = np.float32 if interface.single else np.float64
+    arrays = {*interface.at_sites, *interface.at_bonds}
+    members = [(name, np.uintp if name in arrays else real) for name in interface.parameters] or [("unused", np.int8)]
+    struct, kept = np.zeros(1, dtype=np.dtype(members, align=True)), list[NDArray[Any]]()
+    for name in interface.parameters:
         value = parameters[name]
-        if name in interface.at_sites or name in interface.at_bonds:
+        if name in arrays:
             shape = sizes if name in interface.at_sites else (bonds,)
-            kept.append(np.ascontiguousarray(np.broadcast_to(np.asarray(value, dtype=np.float64), shape)))
-            words[k] = kept[-1].ctypes.data
-        else:
-            words[k : k + 1].view(np.float64)[0] = float(value)
-    return words, kept
+            kept.append(np.ascontiguousarray(np.broadcast_to(np.asarray(value, dtype=real), shape)))
+            value = kept[-1].ctypes.data
+        struct[name] = value
+    return struct, kept

@@ -32,6 +32,7 @@ from phigen.runtime.interface import (
 from phigen.runtime.members import Members, one_by_one, shared_out
 
 Bytes = NDArray[np.uint8]
+Real = Any  # np.float64, or np.float32 where the C computes in single precision
 
 # Between two calls Python can deliver a keyboard interrupt.
 _STEPS_PER_CALL = 1 << 16
@@ -95,10 +96,12 @@ class Cotangents(NamedTuple):
 class CSession:
     """A struct NAME_solver; being a plain value, its bytes are all there is to know. See `Session`."""
 
-    def __init__(self, functions: Any, struct: Bytes, dimension: int, element: int = 0) -> None:
-        self._c, self._struct, self._element = functions, struct, element
+    def __init__(
+        self, functions: Any, struct: Bytes, dimension: int, element: int = 0, real: Real = np.float64
+    ) -> None:
+        self._c, self._struct, self._element, self._real = functions, struct, element, real
         self.address = ctypes.c_void_p(struct.ctypes.data)
-        self._x = struct[: 8 * dimension].view(np.float64)
+        self._x = struct[: real().itemsize * dimension].view(real)
 
     @property
     def steps(self) -> int:
@@ -107,7 +110,7 @@ class CSession:
 
     def state(self) -> Floats:
         """See `Session`."""
-        return self._x.copy()
+        return self._x.astype(np.float64)
 
     def time(self) -> float:
         """See `Session`."""
@@ -119,25 +122,25 @@ class CSession:
             chunk = min(steps, _STEPS_PER_CALL)
             status = self._c.integrate(self.address, h, chunk)
             if status:
-                raise BackendError(status_name(status), self.steps, self._x.reshape(1, -1).copy())
+                raise BackendError(status_name(status), self.steps, self._x.reshape(1, -1).astype(np.float64))
             steps -= chunk
 
     def advance_along(self, h: float, increments: Floats) -> None:
         """See `Session`."""
-        given = np.ascontiguousarray(increments, dtype=np.float64)
+        given = np.ascontiguousarray(increments, dtype=self._real)
         status = self._c.integrate_along(self.address, h, len(given), given.ctypes.data)
         if status:
-            raise BackendError(status_name(status), self.steps, self._x.reshape(1, -1).copy())
+            raise BackendError(status_name(status), self.steps, self._x.reshape(1, -1).astype(np.float64))
 
     def advance_tangent(self, h: float) -> Floats:
         """See `Session`."""
         if not hasattr(self._c, "step_tangent"):
             raise MissingExtraError("step_tangent")
-        tangent = np.empty((len(self._x), len(self._x)))
+        tangent = np.empty((len(self._x), len(self._x)), dtype=self._real)
         status = self._c.step_tangent(self.address, h, tangent.ctypes.data)
         if status:
-            raise BackendError(status_name(status), self.steps, self._x.reshape(1, -1).copy())
-        return tangent
+            raise BackendError(status_name(status), self.steps, self._x.reshape(1, -1).astype(np.float64))
+        return tangent.astype(np.float64, copy=False)
 
     def pull_back(self, h: float, segment: Segment, trail: Floats, bars: Floats, found: Cotangents) -> Floats:
         """The rows (rows, DIM) of a segment whose start this is; ``found`` are the cotangents after it, then before."""
@@ -146,19 +149,19 @@ class CSession:
         counts = (segment.count, segment.stride)
         status = self._c.pullback(self.address, h, *counts, *out, *level, trail.ctypes.data)
         if status:
-            raise BackendError(status_name(status), segment.first, self._x.reshape(1, -1).copy())
+            raise BackendError(status_name(status), segment.first, self._x.reshape(1, -1).astype(np.float64))
         return rows
 
     def branch(self) -> CSession:
         """See `Session`."""
-        return CSession(self._c, _aligned_copy(self._struct), len(self._x), self._element)
+        return CSession(self._c, _aligned_copy(self._struct), len(self._x), self._element, self._real)
 
     def element(self) -> Floats:
         """See `Session`."""
-        found = np.empty(self._element)
+        found = np.empty(self._element, dtype=self._real)
         if self._element:
             self._c.attitude(self.address, found.ctypes.data)
-        return found
+        return found.astype(np.float64, copy=False)
 
     def placed(self, x: Floats) -> CSession:
         """See `Session`."""
@@ -177,10 +180,10 @@ class CSession:
     def _moved(self, function: str, by: Floats) -> None:
         if not hasattr(self._c, function):
             raise TypeError("the solver was compiled without kicks: its spec leaves them out")
-        given = np.ascontiguousarray(by, dtype=np.float64)
+        given = np.ascontiguousarray(by, dtype=self._real)
         status = getattr(self._c, function)(self.address, given.ctypes.data)
         if status:
-            raise BackendError(status_name(status), self.steps, self._x.reshape(1, -1).copy())
+            raise BackendError(status_name(status), self.steps, self._x.reshape(1, -1).astype(np.float64))
 
     def saved(self) -> bytes:
         """See `Session`."""
@@ -195,6 +198,7 @@ class CSolver:
 
     def __init__(self, files: Mapping[str, str], interface: Interface, gauge: Floats | None = None) -> None:
         self.interface = interface
+        self._real: Real = np.float32 if interface.single else np.float64
         self._files, self._library, self._gauge = dict(files), cache.load(files), gauge
         offered = {name: s for name, s in _EXTRAS.items() if hasattr(self._library, f"{interface.name}_{name}")}
         own = _dated(offered, interface) | (_NOISY if interface.noise else {})
@@ -203,14 +207,19 @@ class CSolver:
             _, each = _EXTRAS["ensemble_each"]
             offered |= {"ensemble_each": (_INT, (*each[:3], _POINTER, *each[3:]))} if "ensemble_each" in offered else {}
         monitored = {"pullback": (_INT, (*_EXTRAS["pullback"][1], _POINTER))} if "level_bar" in offered else {}
-        self._c = bound(self._library, interface.name, {**_SIGNATURES, **offered, **timed, **monitored, **own})
+        self._c = bound(
+            self._library,
+            interface.name,
+            {**_SIGNATURES, **offered, **timed, **monitored, **own},
+            single=interface.single,
+        )
 
     def __reduce__(self) -> tuple[type[CSolver], tuple[Any, ...]]:
         return CSolver, (self._files, self.interface, self._gauge)
 
     def with_gauge(self, gauge: Floats) -> CSolver:
         """See `phigen.runtime.backend.Backend`."""
-        return CSolver(self._files, self.interface, np.ascontiguousarray(gauge, dtype=np.float64))
+        return CSolver(self._files, self.interface, np.ascontiguousarray(gauge, dtype=self._real))
 
     @property
     def identity(self) -> str:
@@ -227,8 +236,8 @@ class CSolver:
     ) -> CSession:
         """See `phigen.runtime.backend.Backend`."""
         interface = self.interface
-        session = CSession(self._c, _aligned(self._c.solver_size()), interface.dimension, interface.element)
-        packed, start = self._packed(parameters), np.ascontiguousarray(x0, dtype=np.float64)
+        session = CSession(self._c, _aligned(self._c.solver_size()), interface.dimension, interface.element, self._real)
+        packed, start = self._packed(parameters), self._own(x0)
         if interface.time:
             status = self._c.init_at(session.address, packed.ctypes.data, start.ctypes.data, t0)
         elif self._gauge is None:
@@ -237,7 +246,7 @@ class CSolver:
             gauge = self._gauge.ctypes.data
             status = self._c.init_gauge(session.address, packed.ctypes.data, start.ctypes.data, gauge)
         if status == 0 and first is not None:
-            given = np.ascontiguousarray(first, dtype=np.float64)
+            given = self._own(first)
             place = given[math.prod(interface.attitude) :].ctypes.data if interface.position else None
             status = self._c.set_attitude(session.address, given.ctypes.data, place)
         if status == 0 and interface.noise:
@@ -251,7 +260,7 @@ class CSolver:
         if len(saved) != self._c.solver_size():
             raise ValueError(f"{len(saved)} bytes are no {self.interface.name}_solver of this library")
         struct, interface = _aligned_copy(np.frombuffer(saved, dtype=np.uint8)), self.interface
-        return CSession(self._c, struct, interface.dimension, interface.element)
+        return CSession(self._c, struct, interface.dimension, interface.element, self._real)
 
     def ensemble(self, members: Members, threads: int | None = None) -> Floats:
         """See `phigen.runtime.backend.Backend`."""
@@ -266,7 +275,7 @@ class CSolver:
         frames = members.frames() if members.stride else None
 
         def make(part: slice) -> None:
-            x = np.array(members.x0[part].T, order="C")  # x[DIM][members]
+            x = np.array(members.x0[part].T, dtype=self._real, order="C")  # x[DIM][members]
             if alike:
                 self._alike(members.part(part), x, status[part])
             else:
@@ -286,11 +295,11 @@ class CSolver:
         if hasattr(self._c, "monitor"):
             return
         _, parameters, t0 = members.numbers(0)
-        packed, zeros = self._packed(parameters), np.zeros(self.interface.dimension)
+        packed, zeros = self._packed(parameters), np.zeros(self.interface.dimension, self._real)
         struct = _aligned(self._c.solver_size())
         numbers = [struct.ctypes.data, packed.ctypes.data, zeros.ctypes.data]
         if hasattr(self._c, "init_gauge"):
-            gauge = np.zeros(len(self.interface.casimirs))
+            gauge = np.zeros(len(self.interface.casimirs), self._real)
             status = self._c.init_gauge(*numbers, gauge.ctypes.data)
         else:
             status = self._c.init_at(*numbers, t0) if self.interface.time else self._c.init(*numbers)
@@ -314,18 +323,18 @@ class CSolver:
     def _each(self, members: Members, x: Floats, status: Bytes, rows: Floats | None) -> None:
         """The same where each has numbers of its own; ``rows`` (frames, members, DIM) are to be filled."""
         count, width = len(members), max(1, len(members.parameters))
-        packed = np.empty((count, width))
+        packed = np.empty((count, width), self._real)
         for k, value in enumerate(members.parameters.values()):
             packed[:, k] = value
         own = [packed.ctypes.data if members.parameters else None, x.ctypes.data, count]
-        h, t0 = (np.array(np.broadcast_to(value, count)) for value in (members.h, members.t0))
+        h, t0 = (np.array(np.broadcast_to(value, count), self._real) for value in (members.h, members.t0))
         gauge = None if self._gauge is None else np.array(np.broadcast_to(self._gauge, (count, self._gauge.shape[-1])))
         if self.interface.time:
             own.append(t0.ctypes.data)
         elif hasattr(self._c, "init_gauge"):
             own.append(None if gauge is None else gauge.ctypes.data)
         stride = members.stride or 1
-        frames = None if rows is None else np.empty((members.steps // stride, *x.shape))
+        frames = None if rows is None else np.empty((members.steps // stride, *x.shape), self._real)
         at = None if frames is None else frames.ctypes.data
         self._c.ensemble_each(*own, h.ctypes.data, members.steps, stride, at, status.ctypes.data)
         if rows is not None and frames is not None:
@@ -346,7 +355,7 @@ class CSolver:
             raise MissingExtraError("pullback")
         of_step = int(self._c.trail_size())
         pieces = segments(steps, stride, max(1, KEPT // of_step))
-        trail = np.empty(of_step * max((s.count for s in pieces), default=1))
+        trail = np.empty(of_step * max((s.count for s in pieces), default=1), self._real)
         rows, x0_bar, found = np.empty_like(bars), np.empty_like(x0), np.empty((len(parameters), len(x0)))
         for m, start in enumerate(x0):
             try:
@@ -373,10 +382,10 @@ class CSolver:
             if segment is not pieces[-1]:
                 at = at.branch()
                 at.advance(h, segment.count)
-        found = Cotangents(np.zeros_like(x0), np.zeros(max(1, len(parameters))), np.zeros(1))
+        found = Cotangents(*(np.zeros(n, self._real) for n in (len(x0), max(1, len(parameters)), 1)))
         for segment, session in zip(reversed(pieces), reversed(begun), strict=True):
             own = bars[segment.rows.start : segment.rows.stop] if segment.rows else np.zeros((1, len(x0)))
-            own = np.ascontiguousarray(own)
+            own = np.array(own, dtype=self._real)
             own[-1] += found.state
             made = session.branch().pull_back(h, segment, trail, own, found)
             if segment.rows:
@@ -384,47 +393,51 @@ class CSolver:
         rows[0] = x0
         found.state[:] += bars[0]
         if hasattr(self._c, "level_bar") and self._gauge is None:
-            packed, start = self._packed(parameters), np.ascontiguousarray(x0)
+            packed, start = self._packed(parameters), self._own(x0)
             more = (found.level[0], found.state.ctypes.data, found.parameters.ctypes.data)
             self._c.level_bar(packed.ctypes.data, start.ctypes.data, *more)
         return rows, found.state, found.parameters[: len(parameters)]
 
     def hamiltonian(self, x: Floats, parameters: Mapping[str, float], t: Floats | None = None) -> Floats:
         """See `phigen.runtime.backend.Backend`."""
-        packed, x = self._packed(parameters), np.ascontiguousarray(x)
+        packed, x = self._packed(parameters), self._own(x)
         rows = zip(*_times(t), _addresses(x), strict=True)
         return np.array([self._c.hamiltonian(packed.ctypes.data, *row) for row in rows], dtype=np.float64)
 
     def casimirs(self, x: Floats, parameters: Mapping[str, float]) -> Floats:
         """See `phigen.runtime.backend.Backend`."""
-        out = np.empty((len(x), len(self.interface.casimirs)))
+        out = np.empty((len(x), len(self.interface.casimirs)), self._real)
         return self._fill(self._c.casimirs, x, out, parameters) if self.interface.casimirs else out
 
     def vector_field(self, x: Floats, parameters: Mapping[str, float], t: Floats | None = None) -> Floats:
         """See `phigen.runtime.backend.Backend`."""
-        return self._fill(self._c.vector_field, x, np.empty_like(x, order="C"), parameters, t)
+        return self._fill(self._c.vector_field, x, np.empty(x.shape, self._real), parameters, t)
 
     def noise_fields(self, x: Floats, parameters: Mapping[str, float], t: Floats | None = None) -> Floats:
         """See `phigen.runtime.backend.Backend`."""
-        out = np.empty((len(x), len(self.interface.noise), x.shape[1]))
+        out = np.empty((len(x), len(self.interface.noise), x.shape[1]), self._real)
         return self._fill(self._c.noise_fields, x, out, parameters, t)
 
     def rate(self, x: Floats, parameters: Mapping[str, float]) -> Floats:
         """See `phigen.runtime.backend.Backend`."""
-        packed, x = self._packed(parameters), np.ascontiguousarray(x)
+        packed, x = self._packed(parameters), self._own(x)
         return np.array([self._c.monitor(packed.ctypes.data, row) for row in _addresses(x)], dtype=np.float64)
 
     def _fill(
         self, function: Any, x: Floats, out: Floats, parameters: Mapping[str, float], t: Floats | None = None
     ) -> Floats:
-        packed, x = self._packed(parameters), np.ascontiguousarray(x)
+        packed, x = self._packed(parameters), self._own(x)
         for row in zip(*_times(t), _addresses(x), _addresses(out), strict=True):
             function(packed.ctypes.data, *row)
-        return out
+        return out.astype(np.float64, copy=False)
 
     def _packed(self, parameters: Mapping[str, float]) -> Floats:
         # A struct without parameters has one unused char, which the zero covers.
-        return np.array(list(parameters.values()) or [0.0], dtype=np.float64)
+        return np.array(list(parameters.values()) or [0.0], dtype=self._real)
+
+    def _own(self, values: Floats) -> NDArray[Any]:
+        """In the numbers of the code."""
+        return np.ascontiguousarray(values, dtype=self._real)
 
 
 def _dated(offered: Mapping[str, Any], interface: Interface) -> dict[str, tuple[Any, tuple[Any, ...]]]:

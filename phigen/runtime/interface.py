@@ -55,6 +55,7 @@ class Interface:
     position: bool = False  # whether there is a position too
     noise: tuple[str, ...] = ()  # the sources
     draws: int = 0  # the increments of the noise in a step
+    single: bool = False  # whether the C computes in single precision
 
     @property
     def dimension(self) -> int:

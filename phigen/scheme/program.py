@@ -168,6 +168,11 @@ class Program:
         return self.extras.offers(part, self.profile)
 
     @property
+    def single(self) -> bool:
+        """Whether the C computes in single precision."""
+        return self.extras.real == "float"
+
+    @property
     def searches_gauge(self) -> bool:
         """Whether the gauge of a trajectory is searched for, and not given by a formula."""
         return self.gauge is not None and self.offers("gauge-search")

@@ -8,7 +8,7 @@ symbol ``momentum(NAME)``. Decimals are exact rationals.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from typing import Any
 
@@ -158,17 +158,18 @@ class SolverOptions:
 
 @dataclass(frozen=True)
 class Extras:
-    """What the generated code offers beyond the solver: ``tangent`` adds ``step_tangent``, the derivative of a step.
+    """What is asked of the code beside the solver: ``tangent`` adds ``step_tangent``, the derivative of a step.
 
     ``modified_hamiltonian`` adds the function of that name, with so many correction terms; 0 for none. ``without`` are
     parts to leave out (`phigen.spec.names.PARTS`). ``adjoint`` adds the transpose of a step and of a run, along state
-    and parameters.
+    and parameters. ``real`` are the numbers of the C, double or float; "" stands for those of the spec.
     """
 
     tangent: bool = False
     modified_hamiltonian: int = 0
     without: frozenset[str] = frozenset()
     adjoint: bool = False
+    real: str = ""
 
     def offers(self, part: str, profile: str) -> bool:
         """Whether the code of a profile has a part, where it applies."""
@@ -354,6 +355,12 @@ class Spec:
     def wanted_order(self) -> int:
         """The order that is asked for; where it is terms, that of a symmetric method with so many."""
         return self.order or (self.terms or DEFAULT_ORDER) + (self.terms or 0) % 2
+
+    def asked(self, extras: Extras | None, profile: str | None) -> tuple[Extras, str]:
+        """What is asked for in place of what the spec asks for. Single precision has the profile small only."""
+        extras = extras or self.extras
+        extras = replace(extras, real=extras.real or self.extras.real or "double")
+        return extras, "small" if extras.real == "float" else profile or self.profile
 
     def parameters_of(self, run: Run) -> dict[str, float]:
         """The values of all parameters in a run: its own, else the defaults."""

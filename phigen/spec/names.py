@@ -81,6 +81,9 @@ POISSON_FORMS = ("matrix", "brackets", "canonical", "log_canonical", "lie_algebr
 #: How much the C does for speed.
 PROFILES = ("fast", "small")
 
+#: The numbers of the C.
+REALS = ("double", "float")
+
 #: What can be left out of the code one by one; the profile small leaves out what serves speed, and
 #: members with parameters of their own.
 PARTS = ("by-hand", "ensemble", "gauge-search", "kicks", "lanes", "members", "recurrences")

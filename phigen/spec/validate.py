@@ -91,7 +91,7 @@ def _parts(raw: Mapping[str, Any], declared: Declarations) -> dict[str, Any]:
         "gauge": _gauge(raw.get("gauge", "auto"), declared),
         "monitor": _monitor(raw.get("monitor"), declared),
         "scheme": raw.get("scheme", "auto"),
-        "profile": raw.get("profile", "fast"),
+        "profile": raw.get("profile", "small" if raw.get("real") == "float" else "fast"),
         "solver": _solver(raw.get("solver", {}), declared),
         "targets": without_repetition(raw.get("targets", DEFAULT), ("targets",), declared),
         "extras": Extras(
@@ -99,6 +99,7 @@ def _parts(raw: Mapping[str, Any], declared: Declarations) -> dict[str, Any]:
             raw.get("modified_hamiltonian", 0),
             frozenset(without_repetition(raw.get("without", ()), ("without",), declared)),
             raw.get("adjoint", False),
+            raw.get("real", ""),
         ),
         "reconstruct": raw.get("reconstruct", ""),
         "runs": runs,
@@ -136,6 +137,8 @@ def _expect_consistent(raw: Mapping[str, Any], problems: Problems, reader: Reade
     for key, harmless in NOT_OF_LATTICES.items() if raw.get("lattice") is not None else ():
         if raw.get(key) is not None and raw[key] not in harmless:
             problems.add(f"{key}: not for lattices in this version", reader.locations[key,])
+    if raw.get("real") == "float" and raw.get("profile") == "fast":
+        problems.add("profile: real: float goes with the profile small", reader.locations["profile",], "remove profile")
     if raw.get("scheme") != "splitting":
         return
     for key, harmless in SERIES_KEYS.items():

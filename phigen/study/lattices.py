@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any
 
@@ -23,6 +23,7 @@ from phigen.lattice.observing import BALANCE, CHANGE, ENERGY, MOST_BALANCED, err
 from phigen.lattice.states import Start
 from phigen.runtime.lattice import LatticeSolver, LatticeTrajectory
 from phigen.scheme.steps import Sweeps
+from phigen.study import single_precision
 from phigen.study.conservation import rounding
 from phigen.study.verification import ONE_STEP, ORDER_SLACK, Check, Verification
 from phigen.symbolic.arrays import Floats, evaluate
@@ -77,10 +78,12 @@ def verify_lattice(
     *,
     t0: float | None = None,
     quick: bool = False,
+    single: LatticeSolver | None = None,
 ) -> Verification:
     """Measure and judge the solvers of a lattice, by target, on the numbers of a run, which is shortened if it is long.
 
-    ``t0`` is the time of its start, None where there is no time.
+    ``t0`` is the time of its start, None where there is no time. ``single`` is the same solver in single precision, if
+    there is one: it is measured against the others.
     Raises `StepError` where a step of the run fails.
     """
     assert compilation.cell is not None
@@ -96,6 +99,7 @@ def verify_lattice(
     checks += _conserved(compilation.cell, made)
     with progress.stage(f"{name}: single steps"):
         checks += [_reversal(subject, made), *_agreement(subject, made), _identity(compilation.cell, subject, made)]
+        checks += _single(compilation.cell, subject, single, made) if single else []
     label = f"{compilation.label}, order {compilation.order.order}"
     return Verification(name, run, label, h, steps, tuple(solvers), (), tuple(checks), {}, SAID)
 
@@ -120,10 +124,10 @@ def _order(subject: _Subject) -> Check:
     return Check("observed order", measured, f"≥ {order - ORDER_SLACK:g}", passed, f"{measured:.2f} instead of {order}")
 
 
-def _conserved(cell: Cell, made: LatticeTrajectory) -> Iterator[Check]:
-    """Energy, Casimirs and invariants along the run."""
+def _conserved(cell: Cell, made: LatticeTrajectory, coarser: float = 1.0) -> Iterator[Check]:
+    """Energy, Casimirs and invariants along the run; numbers have units of the last place so much ``coarser``."""
     errors = errors_of(cell, made)
-    least = rounding(made.steps)
+    least = coarser * rounding(made.steps)
     yield from _energy(cell, made, errors, least)
     for name, (_, kind) in cell.casimirs.items():
         value = float(np.max(np.abs(made.casimirs[name][0])))
@@ -177,6 +181,24 @@ def _agreement(subject: _Subject, made: LatticeTrajectory) -> Iterator[Check]:
             worst = max(worst, float(np.abs(a - b).max()) / _size(x))
         name = f"agreement of {target} with {first[0]}"
         yield Check(name, worst, f"≤ {ONE_STEP:.0e}", worst <= ONE_STEP, f"differs by {worst:.1e}")
+
+
+def _single(cell: Cell, subject: _Subject, solver: LatticeSolver, made: LatticeTrajectory) -> Iterator[Check]:
+    """What single precision makes of a step, and of the Casimirs along a run."""
+    found = replace(subject, solvers={"c": solver})
+    worst = 0.0
+    for x in (made.x[0], made.x[-1]):
+        kept = x.astype(np.float32).astype(np.float64)
+        image = subject.stepped(kept, subject.h)
+        worst = max(worst, float(np.abs(found.stepped(kept, subject.h) - image).max()) / _size(image))
+    limit = single_precision.ONE_STEP
+    name, reason = "single precision: a step, beside double", f"{worst:.1e} is no rounding"
+    yield Check(name, worst, f"≤ {limit:.0e}", worst <= limit, reason)
+    stride, arguments = max(1, made.steps // FRAMES), subject.start.arguments
+    run = solver.integrate(subject.start.state, subject.h, made.steps, stride, t0=subject.t0, parameters=arguments)
+    for check in _conserved(cell, run, single_precision.COARSER):
+        if check.limit and check.name.startswith("Casimir"):
+            yield replace(check, name=f"single precision: {check.name}")
 
 
 # --- a lattice of a few sites

@@ -19,7 +19,7 @@ from phigen.compilation import Compilation
 from phigen.errors import StepError
 from phigen.geometry.checks import commuting
 from phigen.runtime.solver import Solver
-from phigen.study import backward, measures
+from phigen.study import backward, measures, single_precision
 from phigen.study.conservation import Unit, largest_terms, rounding, units_of
 from phigen.study.methods import Method, field_of, of_classical, of_solver, without_noise
 from phigen.study.monitored import field_in_tau, with_time
@@ -123,10 +123,12 @@ def verify(
     *,
     t0: float = 0.0,
     quick: bool = False,
+    single: Solver | None = None,
 ) -> Verification:
     """Measure and judge the solvers of a compilation (by target, with their tangent maps) on the numbers of a run.
 
-    All begins at the time ``t0``, single steps from states along the run too.
+    All begins at the time ``t0``, single steps from states along the run too. ``single`` is the same solver in single
+    precision, if there is one: it is measured against the others.
 
     Raises `StepError` if the run itself cannot be made.
     """
@@ -163,6 +165,7 @@ def verify(
                 "agreement": lambda: [agreement_check(subject, states)],
                 "largest step": lambda: [step_check(subject, states)],
                 "modified Hamiltonian": lambda: modified_checks(subject, gauge),
+                "single precision": lambda: single_checks(subject, single, gauge, states),
             },
         ),
         units_of(compilation.system, {**parameters, **dict.fromkeys(compilation.system.times, t0)}, x),
@@ -407,6 +410,20 @@ def agreement_check(subject: Subject, states: Sequence[Floats]) -> Check:
         difference = max(difference, *(float(np.max(np.abs(i - images[0]))) / size for i in images[1:]))
     passed = difference <= ONE_STEP
     return Check(name, difference, f"at most {ONE_STEP:g}", passed, f"they differ by {difference:.1e} after one step")
+
+
+def single_checks(
+    subject: Subject, solver: Solver | None, gauge: Floats | None, states: Sequence[Floats]
+) -> Iterator[Check]:
+    """What is left of all this in single precision, where that is asked for."""
+    if solver is None:
+        return
+    method = of_solver(solver, subject.parameters, gauge, subject.t0)
+    numbers = subject.start, subject.h, subject.steps, subject.parameters, subject.t0
+    for name, value, most in single_precision.measured(
+        subject.compilation.system, method, subject.main, states, *numbers
+    ):
+        yield Check(name, value, f"at most {most:.1e}", value <= most, f"{value:.1e} is no rounding")
 
 
 def modified_checks(subject: Subject, gauge: Floats | None) -> Iterator[Check]:

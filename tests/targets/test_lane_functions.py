@@ -9,45 +9,45 @@ from phigen.targets.c.amalgamation import Amalgam
 
 #: Largest argument, and units of the last place; sums of exponentials lose one or two.
 RANGES = {"log": (1e308, 2), "exp": (600.0, 2), "expm1": (600.0, 3), "sin": (1e6, 2), "cos": (1e6, 2)}
+SINGLE = {"log": (3e38, 2), "exp": (80.0, 2), "expm1": (80.0, 2), "sin": (8192.0, 2), "cos": (8192.0, 2)}
 
 #: Where functions are compared, for −1 ≤ t ≤ 1.
-ARGUMENTS = {"log": "exp(700.0 * t), 1.0 + 0.5 * t * t * t", "others": "REACH * t, 3.0 * t * t * t"}
+ARGUMENTS = {"log": "exp(LARGE * t), 1.0 + 0.5 * t * t * t", "others": "REACH * t, 3.0 * t * t * t"}
 
 MAIN = """
 #include <stdio.h>
 #define REACH {reach}
+#define LARGE {large}
 int main(void)
 {{
     double worst = 0.0;
     for (int k = -200000; k <= 200000; ++k) {{
-        const double t = k / 200000.0, u[2] = {{ {arguments} }};
+        const double t = k / 200000.0;
+        const {real} u[2] = {{ {arguments} }};
         for (int i = 0; i < 2; ++i) {{
-            const double found = t_{name}_lane(u[i]), right = {name}(u[i]);
-            worst = fmax(worst, fabs(found - right) / (fabs(right) * DBL_EPSILON + 1e-300));
+            const double found = t_{name}_lane(u[i]), right = {name}((double)u[i]);
+            worst = fmax(worst, fabs(found - right) / (fabs(right) * {epsilon} + 1e-300));
         }}
     }}
     printf("%.2f", worst);
-    return !isnan(t_{name}_lane(2.0 * REACH)) || !isnan(t_{name}_lane(-2.0 * REACH));
+    return !isnan(t_{name}_lane(({real})(2.0 * REACH))) || !isnan(t_{name}_lane(({real})(-2.0 * REACH)));
 }}
 """
 
 
 @pytest.mark.parametrize("flags", ["-O0", "-O3 -march=native -ffp-contract=fast"])
 @pytest.mark.parametrize("name", RANGES)
-def test_lane_functions_agree_with_the_library(name, flags, tmp_path):
+@pytest.mark.parametrize("real", ["double", "float"])
+def test_lane_functions_agree_with_the_library(real, name, flags, tmp_path):
     """Over the whole range and, closer together, near 0; no number beyond it, so that steps there are made singly."""
-    reach, units = RANGES[name]
-    switches = {f"CALLS_{f.upper()}": f == name for f in RANGES} | {"PACKS": True, "COMPOSED": True}
-    code = Amalgam("t", switches, {"model.h": ""}).text("lanes.c")
+    single = real == "float"
+    reach, units = (SINGLE if single else RANGES)[name]
+    switches = {f"CALLS_{f.upper()}": f == name for f in RANGES} | {"COMPOSED": True}
+    code = Amalgam("t", switches, {}).text(f"lane_functions{'_single' * single}.c")
     head = "#include <float.h>\n#include <math.h>\n#include <stdint.h>\n#include <string.h>\n"
-    write(
-        tmp_path,
-        {
-            "main.c": head
-            + code
-            + MAIN.format(name=name, reach=reach, arguments=ARGUMENTS["log" if name == "log" else "others"])
-        },
-    )
+    arguments = ARGUMENTS["log" if name == "log" else "others"]
+    numbers = {"real": real, "epsilon": "FLT_EPSILON" if single else "DBL_EPSILON", "large": 87.0 if single else 700.0}
+    write(tmp_path, {"main.c": head + code + MAIN.format(name=name, reach=reach, arguments=arguments, **numbers)})
     run([tool("gcc"), "-std=c99", *flags.split(), "main.c", "-o", "main", "-lm"], tmp_path)
     assert float(run([tmp_path / "main"], tmp_path)) <= units
 

@@ -27,6 +27,7 @@ from phigen.targets.c.lattice import layout as lattice_layout
 from phigen.targets.c.lattice import model as lattice_model
 from phigen.targets.c.lattice.parts import sweeps
 from phigen.targets.c.layout import fitted
+from phigen.targets.c.single import single
 from phigen.targets.header import CHECKSUM, checksum, header_lines, plain
 from phigen.targets.path import Syntax, adjoint_program, statements, tangent_program
 from phigen.targets.rendering import render
@@ -52,8 +53,9 @@ def emit(program: Program, command: str, *, single_file: bool = False) -> dict[s
         message = f"{name} asks for the transpose of steps of a lattice, adjoint, which is not offered in C"
         raise SpecError([Diagnostic(message, hint="the target numpy has it")])
     amalgam, header, code = _amalgam(program)
-    declared = amalgam.text(header) + "\n#ifdef __cplusplus\n}\n#endif\n"
-    defined = amalgam.text(code)
+    written = single if program.single else str
+    declared = written(amalgam.text(header)) + "\n#ifdef __cplusplus\n}\n#endif\n"
+    defined = written(amalgam.text(code))
     headers = "\n".join(sorted(amalgam.headers))
     if single_file:
         body = fitted(f"{headers}\n{declared}\n{defined}")
@@ -314,7 +316,7 @@ def _path(program: Program, path: Recurrences, kind: str) -> str:
         fixed="f[{i}] = {value};",
         first="s[{i}][0] = {value};",
         following="s[{i}][k] = {value};",
-        slope="s[{i}][k + 1] = s[{slope}][k] / (k + 1);",
+        slope="s[{i}][k + 1] = s[{slope}][k] / (double)(k + 1);",
         sums=f"{program.name}_taylor_{{kind}}",
         held="f[{i}]",
     )

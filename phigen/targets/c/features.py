@@ -44,6 +44,7 @@ FEATURES = (
     Feature("SPLITTING", lambda p: isinstance(p.step, Splitting)),
     Feature("IMPLICIT", lambda p: isinstance(p.step, Implicit)),
     Feature("GUESSED", lambda p: isinstance(p.step, Implicit) and not p.noise),
+    Feature("SINGLE", lambda p: p.single),
     Feature("PARAMETERS", lambda p: p.parameters),
     Feature("COMPOSED", lambda p: len(p.fractions) > 1),
     Feature("KICKS", lambda p: isinstance(p.step, Splitting | Sweeps) and p.step.schedule.multiples),

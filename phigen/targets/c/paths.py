@@ -102,7 +102,7 @@ def _rules(
             value = f"({value}) / {show.series(q.divisor)}[0][lane]"
         ends.append(f"{show.series(i)}[k][lane] = {value};")
     text = "\n".join([*between, *ends])
-    head = ["const double share = 1.0 / k;"] if "share" in text else []
+    head = ["const double share = 1.0 / (double)k;"] if "share" in text else []
     head += [f"(void){name};" for name, use in (("coef", "coef["), ("e", "e->")) if use not in text]
     return head, max(1, len(between)), _loops(program, between), _loops(program, ends)
 
@@ -128,9 +128,9 @@ def _orders(show: _Show, t: Term) -> tuple[str, str, str]:
         case "product":
             return "", "", f"{a}[0][lane] * {b}[k][lane] + {last}"
         case "chain":
-            return "j * ", "share * ", last
+            return "(double)j * ", "share * ", last
     r = f"{t.exponent.numerator}.0 / {t.exponent.denominator}.0"
-    return f"(({r} + 1.0) * j - k) * ", "share * ", f"{r} * {last}"
+    return f"(({r} + 1.0) * (double)j - (double)k) * ", "share * ", f"{r} * {last}"
 
 
 def _linear(show: _Show, q: Series) -> str:

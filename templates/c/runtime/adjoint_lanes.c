@@ -71,7 +71,7 @@ static void phi_vary_coefficients(phi_expansion *e)
     memset(e->w_odd, 0, sizeof e->w_odd);
     memset(e->w_mean, 0, sizeof e->w_mean);
     for (int k = 0; k < e->varied; ++k) {
-        const double share = 1.0 / (k + 2);
+        const double share = 1.0 / (double)(k + 2);
         memset(e->w[k + 1], 0, sizeof e->w[k + 1]);
         phi_vary_along_source(e, k);
         for (int j = 0; j < k; ++j) phi_vary_along_by(e, j, k);

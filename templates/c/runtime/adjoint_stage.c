@@ -72,7 +72,7 @@ static int phi_back_piece(const double *coef, const double p[PHI_BACK], const do
         for (int i = 0; i < PHI_BACK; ++i) {
             const double term = series[i][k + 1];
             change[i] += term;
-            slope[i] += (k + 1) * term;
+            slope[i] += (double)(k + 1) * term;
             end[i] = start[i] + change[i];
         }
         int negligible = 1;
@@ -98,14 +98,14 @@ static int phi_traced_back(const double *coef, const double end[PHI_DIM], const 
         int good = 1;
         for (int i = 0; i < PHI_BACK; ++i) found[i] = 0.0;
         for (int i = 0; i < PHI_DIM; ++i) {
-            given[i] = p[i] / pieces;
-            given[PHI_DIM + i] = mean_bar[i] / pieces;
+            given[i] = p[i] / (double)pieces;
+            given[PHI_DIM + i] = mean_bar[i] / (double)pieces;
             found[i] = end[i];
             found[PHI_DIM + i] = bar[i];
         }
         for (int piece = 0; piece < pieces && good; ++piece) {
             good = phi_back_piece(coef, given, found, change);
-            for (int i = 0; i < PHI_BACK; ++i) found[i] += i / PHI_DIM == 2 ? change[i] / pieces : change[i];
+            for (int i = 0; i < PHI_BACK; ++i) found[i] += i / PHI_DIM == 2 ? change[i] / (double)pieces : change[i];
         }
         if (good) return 1;
     }

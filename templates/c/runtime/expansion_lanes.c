@@ -51,7 +51,7 @@ static void phi_next_order(phi_lanes coef[restrict], phi_expansion *e, int k)
 {
     if (k > 0) phi_follow(coef, e, k);
     for (int i = 0; i < PHI_DIM; ++i) {
-        const double share = 1.0 / (k + 1);
+        const double share = 1.0 / (double)(k + 1);
         PHI_EACH_LANE
         for (int lane = 0; lane < PHI_LANES; ++lane) e->s[i][k + 1][lane] = share * e->s[phi_path_slopes[i]][k][lane];
     }
@@ -85,7 +85,7 @@ static void phi_begin(phi_lanes coef[restrict], phi_expansion *e, phi_lanes m[re
 static double phi_add_terms(phi_expansion *e, int k)
 {
     phi_lanes size = { 0.0 };
-    const double share = 1.0 / (k + 2);
+    const double share = 1.0 / (double)(k + 2);
     for (int i = 0; i < PHI_DIM; ++i) {
         PHI_EACH_LANE
         for (int lane = 0; lane < PHI_LANES; ++lane) {
@@ -140,8 +140,8 @@ static void phi_check_ends(phi_lanes coef[restrict], phi_expansion *e, phi_lanes
         for (int k = 1; k < e->terms; k += 2) {
             PHI_EACH_LANE
             for (int lane = 0; lane < PHI_LANES; ++lane) {
-                odd[lane] += k * e->s[i][k][lane];
-                even[lane] += (k + 1) * e->s[i][k + 1][lane];
+                odd[lane] += (double)k * e->s[i][k][lane];
+                even[lane] += (double)(k + 1) * e->s[i][k + 1][lane];
             }
         }
         PHI_EACH_LANE
@@ -223,7 +223,7 @@ static void phi_vary_order(phi_expansion *e, int k)
 static void phi_add_slopes(phi_expansion *e, int k, phi_lanes size)
 {
     phi_lanes parts[2] = { { 0.0 } }, first = { 0.0 };
-    const double share = 1.0 / (k + 2);
+    const double share = 1.0 / (double)(k + 2);
     for (int i = 0; i < 2 * PHI_DIM * PHI_DIM; ++i) {
         const int part = i % (2 * PHI_DIM) / PHI_DIM;
         PHI_EACH_LANE

@@ -23,8 +23,6 @@ static void phi_philox(uint32_t counter[4], uint32_t key0, uint32_t key1)
     }
 }
 
-#define PHI_UNIT 1.1102230246251565e-16 /* 2^-53 */
-
 /* 53 of the bits of two words, as a number from 0 up to, but not including, 2^53. */
 static double phi_bits(uint32_t high, uint32_t low) { return (double)(high >> 5) * 67108864.0 + (double)(low >> 6); }
 
@@ -34,8 +32,8 @@ static void phi_normals(uint64_t seed, uint32_t member, uint64_t step, double no
     for (int k = 0; k < PHI_DRAWS; k += 2) {
         uint32_t c[4] = { (uint32_t)step, (uint32_t)(step >> 32), member, (uint32_t)(k / 2) };
         phi_philox(c, (uint32_t)seed, (uint32_t)(seed >> 32));
-        const double radius = fmin(sqrt(-2.0 * log((phi_bits(c[0], c[1]) + 0.5) * PHI_UNIT)), PHI_BOUND);
-        const double angle = 6.283185307179586 * (phi_bits(c[2], c[3]) * PHI_UNIT);
+        const double radius = fmin(sqrt(-2.0 * log((phi_bits(c[0], c[1]) + 0.5) * 0x1p-53)), PHI_BOUND);
+        const double angle = 6.283185307179586 * (phi_bits(c[2], c[3]) * 0x1p-53);
         normals[k] = radius * cos(angle);
         if (k + 1 < PHI_DRAWS) normals[k + 1] = radius * sin(angle);
     }

@@ -61,8 +61,8 @@ static int phi_piece(const double *coef, const double p[PHI_DIM], const double s
         for (int i = 0; i < PHI_DIM; ++i) {
             const double term = series[i][k + 1];
             change[i] += term;
-            mean[i] += term / (k + 2);
-            slope[i] += (k + 1) * term;
+            mean[i] += term / (double)(k + 2);
+            slope[i] += (double)(k + 1) * term;
             end[i] = start[i] + change[i];
             const double measure = fabs(start[i]) + fabs(change[i]) + PHI_LEAST_SHARE * norm;
             if (!(fabs(term) <= PHI_NEGLIGIBLE * measure)) negligible = 0;
@@ -82,7 +82,7 @@ static int phi_path(const double *coef, const double x[PHI_DIM], const double p[
         double q[PHI_DIM], point[PHI_DIM], shift[PHI_DIM], local[PHI_DIM];
         int good = 1;
         for (int i = 0; i < PHI_DIM; ++i) {
-            q[i] = p[i] / pieces;
+            q[i] = p[i] / (double)pieces;
             change[i] = mean[i] = 0.0;
         }
         for (int piece = 0; piece < pieces && good; ++piece) {
@@ -90,7 +90,7 @@ static int phi_path(const double *coef, const double x[PHI_DIM], const double p[
             good = phi_piece(coef, q, point, shift, local);
             ++*made;
             for (int i = 0; i < PHI_DIM; ++i) {
-                mean[i] += (change[i] + local[i]) / pieces;
+                mean[i] += (change[i] + local[i]) / (double)pieces;
                 change[i] += shift[i];
             }
         }

@@ -133,8 +133,8 @@ static int phi_tangent_piece(const double *coef, const double p[2 * PHI_DIM], co
         for (int i = 0; i < 2 * PHI_DIM; ++i) {
             const double term = series[i][k + 1];
             change[i] += term;
-            mean[i] += term / (k + 2);
-            slope[i] += (k + 1) * term;
+            mean[i] += term / (double)(k + 2);
+            slope[i] += (double)(k + 1) * term;
             end[i] = start[i] + change[i];
             if (!(fabs(term) <= PHI_TANGENT_NEGLIGIBLE * (norm[i / PHI_DIM] + fabs(change[i])))) negligible = 0;
         }
@@ -153,8 +153,8 @@ static int phi_tangent_seed(const double *coef, const double x[PHI_DIM], const d
         double q[2 * PHI_DIM], start[2 * PHI_DIM], point[2 * PHI_DIM], shift[2 * PHI_DIM], local[2 * PHI_DIM];
         int good = 1;
         for (int i = 0; i < PHI_DIM; ++i) {
-            q[i] = p[i] / pieces;
-            q[PHI_DIM + i] = seed == PHI_DIM + i ? 1.0 / pieces : 0.0;
+            q[i] = p[i] / (double)pieces;
+            q[PHI_DIM + i] = seed == PHI_DIM + i ? 1.0 / (double)pieces : 0.0;
             start[i] = x[i];
             start[PHI_DIM + i] = seed == i ? 1.0 : 0.0;
         }
@@ -163,7 +163,7 @@ static int phi_tangent_seed(const double *coef, const double x[PHI_DIM], const d
             for (int i = 0; i < 2 * PHI_DIM; ++i) point[i] = start[i] + change[i];
             good = phi_tangent_piece(coef, q, point, shift, local);
             for (int i = 0; i < 2 * PHI_DIM; ++i) {
-                mean[i] += (change[i] + local[i]) / pieces;
+                mean[i] += (change[i] + local[i]) / (double)pieces;
                 change[i] += shift[i];
             }
         }

@@ -17,8 +17,8 @@ static double phi_taylor_product(const double *a, const double *b, int k)
 static double phi_taylor_chain(const double *a, const double *d, int k)
 {
     double sum = 0.0;
-    for (int j = 1; j <= k; ++j) sum += j * a[j] * d[k - j];
-    return sum / k;
+    for (int j = 1; j <= k; ++j) sum += (double)j * a[j] * d[k - j];
+    return sum / (double)k;
 }
 
 #endif
@@ -27,8 +27,8 @@ static double phi_taylor_chain(const double *a, const double *d, int k)
 static double phi_taylor_power(const double *a, const double *b, double r, int k)
 {
     double sum = 0.0;
-    for (int j = 1; j <= k; ++j) sum += ((r + 1.0) * j - k) * a[j] * b[k - j];
-    return sum / k;
+    for (int j = 1; j <= k; ++j) sum += ((r + 1.0) * (double)j - (double)k) * a[j] * b[k - j];
+    return sum / (double)k;
 }
 #endif
 #endif

@@ -1,0 +1,54 @@
+"""What single precision makes of a method that is examined in double precision."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+
+import numpy as np
+
+from phigen.geometry.system import System
+from phigen.study.conservation import largest_terms, rounding
+from phigen.study.methods import Method
+from phigen.study.summary import summarise
+from phigen.symbolic.arrays import Floats
+
+#: A unit of the last place, of 24 binary digits, in those of double precision, of 53.
+COARSER = 2.0**29
+#: What a step in single precision may differ by from that in double precision, in sizes of the state.
+ONE_STEP = 2.0**-19
+
+#: Name, value, and the largest value allowed.
+Measured = tuple[str, float, float]
+
+
+def measured(
+    system: System,
+    single: Method,
+    double: Method,
+    states: Sequence[Floats],
+    start: Floats,
+    h: float,
+    steps: int,
+    parameters: Mapping[str, float],
+    t0: float,
+) -> Iterator[Measured]:
+    """How far single steps are from those in double precision, and how Casimirs change along a run."""
+    yield "single precision: a step, beside double", farthest(single, double, states, h), ONE_STEP
+    rows, times = single.rows(start, h, steps, 1), t0 + h * np.arange(steps + 1.0)
+    columns = dict(zip(system.coordinates, rows.T, strict=True))
+    found = summarise(single.name, system, None, parameters, times, rows)
+    for name, drift in found.casimirs.items():
+        casimir = system.casimirs[name]
+        if system.forced_rate_of_casimir(casimir).is_zero:
+            terms = largest_terms(casimir, list(columns), {**parameters, **columns})
+            yield f"single precision: Casimir {name}", drift.error, COARSER * rounding(steps) * terms / drift.unit.size
+
+
+def farthest(single: Method, double: Method, states: Sequence[Floats], h: float) -> float:
+    """The largest difference of single steps from the same states, which single precision has, in sizes of these."""
+    worst = 0.0
+    for x in states:
+        kept = x.astype(np.float32).astype(np.float64)
+        image = double.step(kept, h)
+        worst = max(worst, float(np.max(np.abs(single.step(kept, h) - image)) / np.max(np.abs(image))))
+    return worst

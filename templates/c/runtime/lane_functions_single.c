@@ -1,0 +1,108 @@
+#ifndef PHI_FILE_LANE_FUNCTIONS_SINGLE
+#define PHI_FILE_LANE_FUNCTIONS_SINGLE
+#include <float.h>
+#include <math.h>
+#include <stdint.h>
+#include <string.h>
+
+#if PHI_CALLS_EXP || PHI_CALLS_EXPM1 || PHI_CALLS_SIN || PHI_CALLS_COS
+#define PHI_ROUNDER 12582912.0f /* 1.5 2^23: a number added to it and taken off again is rounded to an integer */
+
+#endif
+#if PHI_CALLS_EXP || PHI_CALLS_EXPM1
+/* exp(u) - 2^k, and 2^k, where u = k log 2 + r: no branches. */
+static inline float phi_exp_parts(float u, float *power)
+{
+    const float shifted = u * 1.442695f + PHI_ROUNDER, k = shifted - PHI_ROUNDER;
+    const float r = (u - k * 0.693359375f) + k * 2.1219444e-4f, rr = r * r;
+    uint32_t bits; /* the last bits of shifted are k */
+    float sum = 0.0013888889f, other = 1.9841270e-4f;
+    memcpy(&bits, &shifted, sizeof bits);
+    bits = (bits + 127) << 23;
+    memcpy(power, &bits, sizeof *power);
+    sum = sum * rr + 0.041666668f;
+    other = other * rr + 0.0083333334f;
+    other = other * rr + 0.16666667f;
+    sum = (sum * r + other) * r + 0.5f;
+    sum = sum * rr + r;
+    return *power * sum;
+}
+
+#endif
+#if PHI_CALLS_EXP
+/* exp(u) for the loops over lanes. No number beyond |u| = 87. */
+static inline float phi_exp_lane(float u)
+{
+    float power;
+    const float rest = phi_exp_parts(u, &power);
+    return rest + power + (fabsf(u) <= 87.0f ? 0.0f : (float)NAN);
+}
+
+#endif
+#if PHI_CALLS_EXPM1
+/* exp(u) - 1 for the loops over lanes. No number beyond |u| = 87. */
+static inline float phi_expm1_lane(float u)
+{
+    float power;
+    const float rest = phi_exp_parts(u, &power);
+    return rest + (power - 1.0f) + (fabsf(u) <= 87.0f ? 0.0f : (float)NAN);
+}
+
+#endif
+#if PHI_CALLS_LOG
+/* log u for the loops over lanes: u = 2^k m with m between sqrt 1/2 and sqrt 2, no branches. No number where u is not
+   positive, or not normal. */
+static inline float phi_log_lane(float u)
+{
+    uint32_t bits, exponent, digits;
+    float m, k, sum = 0.14285715f, other = 0.11111111f;
+    memcpy(&bits, &u, sizeof bits);
+    exponent = (bits - 0x3f3504f3U + 0x3f800000U) >> 23; /* k + 127 */
+    digits = bits - ((exponent - 127) << 23);
+    memcpy(&m, &digits, sizeof m);
+    exponent |= 0x4b000000U; /* 2^23 + k + 127, as a float */
+    memcpy(&k, &exponent, sizeof k);
+    k -= 8388735.0f;
+    const float f = (m - 1.0f) / (m + 1.0f), q = f * f;
+    sum = (other * q + sum) * q + 0.2f;
+    sum = sum * q + 0.33333334f;
+    /* m - 1 is exact: f (m - 1) and what follows it are small beside it */
+    const float small = q * sum * 2.0f * f - k * 2.1219444e-4f;
+    const float rest = (m - 1.0f) - f * (m - 1.0f) + small + k * 0.693359375f;
+    return rest + (u >= FLT_MIN && u <= FLT_MAX ? 0.0f : (float)NAN);
+}
+
+#endif
+#if PHI_CALLS_SIN || PHI_CALLS_COS
+/* sin(u + offset pi) for offset 0 or 0.5: u = (k - offset) pi + r with |r| <= pi/2, no branches. No number beyond
+   |u| = 8192. */
+static inline float phi_turned_sin(float u, float offset)
+{
+    const float shifted = (u * 0.31830987f + offset) + PHI_ROUNDER, k = (shifted - PHI_ROUNDER) - offset;
+    const float near = (u - k * 3.140625f) - k * 9.67502594e-4f;
+    const float r = (near - k * 1.50990672e-7f) - k * 5.1266883e-12f, q = r * r, qq = q * q;
+    uint32_t parity, bits; /* the last bit of shifted is the parity of k + offset */
+    float value, sum = -2.5052108e-8f, other = 1.6059044e-10f;
+    sum = sum * qq + -1.9841270e-4f;
+    other = other * qq + 2.7557319e-6f;
+    other = other * qq + 0.0083333334f;
+    sum = (sum * qq + -0.16666667f) + other * q;
+    value = r + r * q * sum;
+    memcpy(&parity, &shifted, sizeof parity);
+    memcpy(&bits, &value, sizeof bits);
+    bits ^= parity << 31;
+    memcpy(&value, &bits, sizeof bits);
+    return value + (fabsf(u) <= 8192.0f ? 0.0f : (float)NAN);
+}
+
+#endif
+#if PHI_CALLS_SIN
+/* sin u for the loops over lanes. */
+static inline float phi_sin_lane(float u) { return phi_turned_sin(u, 0.0f); }
+
+#endif
+#if PHI_CALLS_COS
+/* cos u for the loops over lanes. */
+static inline float phi_cos_lane(float u) { return phi_turned_sin(u, 0.5f); }
+#endif
+#endif

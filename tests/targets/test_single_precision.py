@@ -1,0 +1,135 @@
+"""C in single precision: what is written, what it computes, and what is refused."""
+
+import re
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+from support import as_given, first_run, run, setting, small, solver, spec_of, tool, write
+
+from phigen.api import lattice_solver_of
+from phigen.compiler import compile_spec, emit
+from phigen.lattice.states import start_of
+from phigen.spec.model import Extras
+from phigen.study.single_precision import COARSER, ONE_STEP
+from phigen.targets.c.single import single
+
+WRITTEN = {
+    "types, literals, functions, limits": (
+        "static double f(double x) { return 0.1 * sin(x) + fmax(DBL_MIN, 2.0 * a.sin) - HUGE_VAL; }",
+        "static float f(float x) { return 0.1f * sinf(x) + fmaxf(FLT_MIN, 2.0f * a.sin) - HUGE_VALF; }",
+    ),
+    "whole numbers, and names with digits": ("(double)(0x41e5U + 3) / k_1e5", "(float)(0x41e5U + 3) / k_1e5"),
+    "comments and texts": ('/* a double, 1.0 */ "sin(1.0)"', '/* a double, 1.0 */ "sin(1.0)"'),
+    "what is single already": ("float a = 0.5f, b = sqrtf(2.0f);", "float a = 0.5f, b = sqrtf(2.0f);"),
+    "beyond the range": ("x + 1e-300 + 0x1p-1000 + 1e200", "x + 1.1754944e-38f + 1.1754944e-38f + 3.4028235e+38f"),
+    "thresholds": (
+        "#define A 1e-17 /* a */\n#define B 0.25\nx < 1e-17",
+        "#define A 2e-08f /* a */\n#define B 0.25f\nx < 1e-17f",
+    ),
+}
+
+#: Newton steps with a gauge, along paths, composed splittings, a monitor, noise; lattices that call functions in rows,
+#: are stiff, or a graph.
+SYSTEMS = ("rigid_body", "nambu_pendulum", "henon_heiles", "kepler_eccentric", "thermal_spin")
+LATTICES = ("sine_gordon", "toda", "kdv", "food_web")
+
+#: Functions of the library that compute in double precision.
+DOUBLE = re.compile(
+    r"^ +U (sin|cos|tan|exp|expm1|log|log1p|pow|sqrt|fabs|fmin|fmax|floor|copysign|cbrt|sinh|cosh)$", re.M
+)
+
+
+@pytest.mark.parametrize("case", WRITTEN)
+def test_what_is_written(case):
+    given, wanted = WRITTEN[case]
+    assert single(given) == wanted
+
+
+@cache
+def in_single(name, **extras):
+    """The compilation of a system of the corpus in single precision, and in double with the same short code."""
+    found = (
+        small(as_given(name)) if not extras else compile_spec(spec_of(name), extras=Extras(**extras), profile="small")
+    )
+    program = replace(found.program, extras=replace(found.program.extras, real="float"))
+    return replace(found, program=program), found
+
+
+@pytest.mark.parametrize("name", [*SYSTEMS, *LATTICES])
+def test_there_is_no_double_in_it(name, tmp_path):
+    """No promotion, no conversion back, no function of the library that takes doubles."""
+    write(tmp_path, emit(in_single(name)[0].program, "c", ""))
+    flags = ["-std=c99", "-O0", "-Wall", "-Wextra", "-Werror", "-Wdouble-promotion", "-Wfloat-conversion"]
+    run([tool("gcc"), *flags, "-Wno-unknown-pragmas", "-c", f"{name}.c"], tmp_path)
+    assert not DOUBLE.search(run([tool("nm"), "-u", f"{name}.o"], tmp_path))
+    assert not re.search(r"\bdouble\b", re.sub(r"/\*.*?\*/", "", (tmp_path / f"{name}.c").read_text(), flags=re.S))
+
+
+def numbers(compilation):
+    run_ = first_run(compilation)
+    more = {"t0": float(run_.start)} if compilation.spec.time else {}
+    return setting(compilation), {**setting(compilation).parameters, **more}
+
+
+@pytest.mark.parametrize("name", SYSTEMS)
+def test_steps_are_those_of_double_precision_to_its_digits(name):
+    """Over a hundred steps, Casimirs by themselves; at most as near as numbers of 24 digits can be."""
+    (made, other), (at, given) = in_single(name), numbers(in_single(name)[0])
+    start = np.array(at.x, dtype=np.float32).astype(float)
+    found, right = (solver(c, "c").integrate(start, at.h, 100, **given) for c in (made, other))
+    difference = np.abs(found.x - right.x).max() / np.abs(right.x).max()
+    assert 1e-9 < difference < 100 * ONE_STEP
+    for name, values in found.casimirs.items():
+        assert np.ptp(values) <= COARSER * 1e-14 * max(1.0, np.abs(right.casimirs[name]).max())
+
+
+@pytest.mark.parametrize("name", LATTICES)
+def test_lattices_move_as_in_double_precision(name):
+    (made, other), run_ = in_single(name), first_run(in_single(name)[0])
+    start = start_of(made.spec, run_)
+    found, right = (
+        lattice_solver_of(c, "c").integrate(start.state, float(run_.step), 50, parameters=start.arguments)
+        for c in (made, other)
+    )
+    assert 1e-9 < np.abs(found.x - right.x).max() / np.abs(right.x).max() < 50 * ONE_STEP
+
+
+def test_derivatives_are_those_of_double_precision():
+    """The tangent map of a step, and gradients of a run."""
+    (made, other), (at, given) = (
+        in_single("rigid_body", tangent=True, adjoint=True),
+        numbers(in_single("rigid_body")[0]),
+    )
+    (_, tangent), (_, right) = (solver(c, "c").step_tangent(at.x, at.h, **given) for c in (made, other))
+    assert 1e-9 < np.abs(tangent - right).max() < ONE_STEP
+    bars = [
+        solver(c, "c").pullback(at.x, h=at.h, steps=20, cotangent=[1.0, 2.0, -1.0], **given)[1:] for c in (made, other)
+    ]
+    (x_bar, of), (x_right, of_right) = bars
+    assert np.abs(x_bar - x_right).max() < 20 * ONE_STEP * np.abs(x_right).max()
+    assert all(abs(of[p] - of_right[p]) < 20 * ONE_STEP * max(1.0, abs(of_right[p])) for p in of_right)
+
+
+def test_a_session_and_an_ensemble():
+    (made, other), (at, given) = in_single("rigid_body"), numbers(in_single("rigid_body")[0])
+    states = np.array([at.x, at.x[::-1]])
+    found, right = (solver(c, "c").ensemble(states, at.h, 30, **given) for c in (made, other))
+    assert np.abs(found - right).max() < 30 * ONE_STEP
+    moved = []
+    for compilation in (made, other):
+        session = solver(compilation, "c").session(at.x, **given)
+        session.step(at.h)
+        session.kick([0.1, 0.0, -0.1])
+        session.step(at.h)
+        moved.append(session.x)
+    assert np.abs(moved[0] - moved[1]).max() < 10 * ONE_STEP
+
+
+def test_it_stays_on_the_leaf_for_a_million_steps():
+    """As in double precision: rounding does not add up."""
+    made, _ = in_single("rigid_body")
+    at, given = numbers(made)
+    found = solver(made, "c").integrate(at.x, at.h, 1_000_000, stride=10_000, **given)
+    assert np.ptp(found.casimirs["C"]) / np.abs(found.casimirs["C"]).max() < 1e-6
