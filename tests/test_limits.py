@@ -1,9 +1,11 @@
 """Specs that could exhaust the compiler are compiled or refused in seconds and in little memory."""
 
 import json
+import resource
 import subprocess
 import sys
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 
@@ -11,12 +13,14 @@ from phigen.compiler import compile_spec
 from phigen.errors import LimitError
 from phigen.scheme import discretisation
 from phigen.scheme.estimate import OperationCount, TooManyError
-from phigen.scheme.generating import graph_form
+from phigen.scheme.generating import collected_form, graph_form
 from phigen.scheme.lowering import cost
-from phigen.series.hamilton_jacobi import polynomial_series
+from phigen.series.hamilton_jacobi import PolynomialSeries, polynomial_series
 from phigen.spec import limits, loads
 from phigen.symbolic import budgets
 from phigen.symbolic.expression import ONE, symbol, total_at
+from phigen.symbolic.symbols import STEP
+from phigen.symbolic.tower import Tower
 
 #: What a refusal may take, and the memory that stops a test.
 SECONDS, CEILING = 5, 2**31
@@ -113,6 +117,54 @@ def test_the_memory_of_sums_counts_too(monkeypatch):
     monkeypatch.setattr(budgets, "TAYLOR_BYTES", 10_000)
     with pytest.raises(OverflowError):
         polynomial_series(h, list(map(symbol, many)), many, (), 1, symmetric=True)
+
+
+def nested(depth):
+    definitions = ["d0: x + y", *(f"d{i}: sin(d{i - 1}) + x" for i in range(1, depth))]
+    return spec(*PLANE, f"d{depth - 1}") + "definitions:\n" + "".join(f"  {d}\n" for d in definitions)
+
+
+def test_derivatives_keep_no_room_for_terms_that_they_do_not_have():
+    """flint's have as much as what they are derivatives of: here 550 MB in place of 5."""
+    many = names(255)
+    tower = Tower(many)
+    square = tower.integer_power(tower.combine(map(tower.variable, many)), 2)
+    before = pages()
+    slopes = tower.gradient(square, many[:64])
+    assert sum(map(len, slopes)) == 64 * 255
+    assert (pages() - before) * resource.getpagesize() < 50 * 2**20
+
+
+def pages():
+    """Pages of memory that this process has asked for, used or not."""
+    return int(Path("/proc/self/statm").read_text().split()[0])
+
+
+def test_functions_inside_functions_are_each_looked_at_once(monkeypatch):
+    seen = []
+    visit = Tower.visit
+    monkeypatch.setattr(Tower, "visit", lambda self, node, args: seen.append(node) or visit(self, node, args))
+    work = []
+    for depth in (20, 40):
+        Tower(PLANE[0], [loads(nested(depth)).hamiltonian])
+        work.append(len(seen))
+        seen.clear()
+    assert work[1] < 2.5 * work[0]
+
+
+def test_rings_and_collected_polynomials_of_nested_functions_are_given_up_where_they_are_too_large(monkeypatch):
+    text = loads(nested(12))
+    with monkeypatch.context() as few:
+        few.setattr(budgets, "PRODUCT_BYTES", 10_000)
+        with pytest.raises(OverflowError, match="functions inside functions"):
+            Tower(PLANE[0], [text.hamiltonian], PLANE[0])
+    tower = Tower([*PLANE[0], STEP], [text.hamiltonian], PLANE[0])
+    series = PolynomialSeries(tower, (tower.convert(text.hamiltonian),))
+    made = [len(collected_form(series, PLANE[0], [STEP], 10**6))]
+    for most in (10_000, 2_000):  # the entries of the Hessian, then the polynomials themselves
+        monkeypatch.setattr(limits, "CELLS", most)
+        made.append(len(collected_form(series, PLANE[0], [STEP], 10**6)))
+    assert made == [2, 1, 0]
 
 
 def test_a_graph_whose_hessian_is_too_large_is_given_up_before_it_is_made(monkeypatch):

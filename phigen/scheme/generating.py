@@ -15,7 +15,7 @@ from functools import cached_property
 
 from phigen import progress
 from phigen.geometry.system import System
-from phigen.scheme.collected import collect, exceeds
+from phigen.scheme.collected import cells, collect, exceeds
 from phigen.scheme.lowering import cost
 from phigen.scheme.staging import Coefficients
 from phigen.series.hamilton_jacobi import MOST_SLOPES, PolynomialSeries
@@ -74,8 +74,8 @@ def collected_form(
 
     ``increments`` are inputs of a step beside the time, which the series does not know.
 
-    Empty if even a gradient of one operation per term would cost more than ``worth``. Raises `OverflowError` if it
-    is too large to be counted.
+    Empty if even a gradient of one operation per term would cost more than ``worth``, or if the monomials would take
+    more than `limits.CELLS`. Raises `OverflowError` if it is too large to be counted.
     """
     tower, n = series.tower, len(coordinates)
     h = tower.variable(STEP)
@@ -83,14 +83,14 @@ def collected_form(
     worth = max(worth, 200)
     if len(s) > 10 * worth:  # many terms may share a monomial in the coordinates, but not that many
         return []
-    slopes = [tower.derivative(s, c) for c in coordinates]
-    if exceeds(tower, slopes, coordinates, min(worth, MOST_SLOPES)):
+    slopes = tower.gradient(s, coordinates)
+    if cells(tower, [s, *slopes]) > limits.CELLS or exceeds(tower, slopes, coordinates, min(worth, MOST_SLOPES)):
         return []
     monitored = [tower.partial(s, LEVEL)] if LEVEL in static else []
     ring, (terms, *elapsed) = collect(tower, [s, *monitored], coordinates, times)
     first = [ring.derivative(terms, j) for j in range(n)]
-    found = []
-    for entrywise in (True, False):
+    found, several = [], sum(ring.cells(first[i], j) for j in range(n) for i in range(j + 1)) <= limits.CELLS
+    for entrywise in (True, False) if several else (False,):
         table = Coefficients(static, [*times, *increments])
         slope = tuple(ring.expression(g, table) for g in first)
         if entrywise:

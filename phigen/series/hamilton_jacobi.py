@@ -160,9 +160,7 @@ def _polynomial_recursion(
 ) -> _Recursion:
     target = composed(hamiltonian, coordinates, alpha)
     tower = series_tower(target, coordinates, parameters, times)
-    return _Recursion(
-        target, tower, coordinates, times, symmetric, lambda s, names: [tower.derivative(s, c) for c in names]
-    )
+    return _Recursion(target, tower, coordinates, times, symmetric, tower.gradient)
 
 
 def _graph_recursion(

@@ -52,6 +52,8 @@ CORRECTIONS = 8
 OPERATIONS = 100_000
 #: Terms of an S_i: the next would take minutes.
 SERIES_TERMS = 50_000
+#: Exponents of all monomials of a collected polynomial and of its derivatives: 80 MB, and some seconds.
+CELLS = 8_000_000
 #: Products of terms in the proof of a bi-realisation, by estimate: ten seconds. Beyond, it is checked at points.
 PROOF_PRODUCTS = 20_000_000
 #: Seeds of noise have 64 bits, members of an ensemble 32.

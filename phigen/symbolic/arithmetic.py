@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from fractions import Fraction
+from types import MappingProxyType
 from typing import Any, Generic, TypeVar
 
 from phigen.symbolic.expression import Expression, topological
 
 T = TypeVar("T")
+
+#: No value is known.
+NOTHING: Mapping[int, Any] = MappingProxyType({})
 
 
 class Arithmetic(Generic[T]):
@@ -54,12 +58,15 @@ class Arithmetic(Generic[T]):
                 return self.power(args[0], node.value)
         return self.function(node.op, args)
 
-    def values(self, roots: Sequence[Expression]) -> list[T]:
-        """The values of expressions; what they share is computed once, and kept for as long as it is needed."""
-        order = topological(roots)
+    def values(self, roots: Sequence[Expression], known: Mapping[int, T] = NOTHING) -> list[T]:
+        """The values of expressions; what they share is computed once, and kept for as long as it is needed.
+
+        ``known`` are those of some nodes, by their ``id``: nothing below them is looked at.
+        """
+        order = topological(roots, known)
         uses = Counter(id(a) for node in order for a in node.args)
         uses.update(map(id, roots))
-        values: dict[int, T] = {}
+        values = {i: known[i] for i in uses if i in known} if known else {}
         for node in order:
             values[id(node)] = self.visit(node, [values[id(a)] for a in node.args])
             for a in node.args:

@@ -28,7 +28,7 @@ a colon (``p:x1``, ``h:``), which no name in a spec can; they never clash with n
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Container, Iterable, Mapping, Sequence
 from fractions import Fraction
 from functools import reduce
 from hashlib import blake2b
@@ -340,15 +340,18 @@ def _balanced(
     return items[0]
 
 
-def topological(roots: Iterable[Expression]) -> list[Expression]:
-    """All nodes below the roots, arguments before what uses them; the order depends on the content only."""
+def topological(roots: Iterable[Expression], known: Container[int] = ()) -> list[Expression]:
+    """All nodes below the roots, arguments before what uses them; the order depends on the content only.
+
+    ``known`` has the ``id`` of nodes that are left out, with what is below them.
+    """
     order: list[Expression] = []
     done: set[int] = set()
     for root in roots:
         stack = [(root, False)]
         while stack:
             node, expanded = stack.pop()
-            if id(node) in done:
+            if id(node) in done or (known and id(node) in known):
                 continue
             if expanded:
                 done.add(id(node))

@@ -69,6 +69,8 @@ class Tower(Arithmetic[Poly]):
 
     ``symbols`` are the polynomial variables, ``expressions`` what must be representable, and
     ``variables`` the symbols with respect to which the ring is closed under differentiation.
+
+    Raises `OverflowError` if that takes polynomials that may be larger than memory.
     """
 
     def __init__(
@@ -77,15 +79,17 @@ class Tower(Arithmetic[Poly]):
         self.symbols = tuple(symbols)
         self.variables = tuple(variables)
         self.generators: list[Generator] = []
-        self._set_context()
+        self._index = {n: i for i, n in enumerate(self.symbols)}
+        self._meanings = [*map(symbol, self.symbols)]
         wanted = [e for e in topological(list(expressions)) if not _is_arithmetic(e)]
+        self._set_context(spare=len(wanted))
         self._renamed = True
         while self._renamed:
             self._renamed = False
             for e in wanted:
                 self._absorb(e)
             self._close()
-        if self._room > len(self.names):
+        if self._room > len(self._index):
             self._set_context()
 
     # -- the ring ---------------------------------------------------------------------------------
@@ -93,22 +97,24 @@ class Tower(Arithmetic[Poly]):
     @property
     def names(self) -> tuple[str, ...]:
         """Names of the ring's variables: the symbols, then the generators."""
-        return self.symbols + tuple(g.name for g in self.generators)
+        return tuple(self._index)
 
     def _set_context(self, spare: int = 0) -> None:
         """Make the ring of all names, and of so many to come, and take the generators into it."""
-        self._room = max(len(self.names) + spare, 1)
+        self._room = max(len(self._index) + spare, 1)
         self.context = fmpq_mpoly_ctx.get([f"v{i}" for i in range(self._room)], Ordering.degrevlex)
         self.gens = self.context.gens()
         for g in self.generators:
             g.arguments = [self._lift(a) for a in g.arguments]
             g.derivative = {v: self._lift(d) for v, d in g.derivative.items()}
-        self._name_variables()
+        self._forget()
 
-    def _name_variables(self) -> None:
-        self._index = {n: i for i, n in enumerate(self.names)}
+    def _forget(self) -> None:
+        """Forget what rests on the generators so far."""
         self._pairs: list[tuple[int, int]] | None = None
-        self._meanings: list[Expression] | None = None
+        self._below: dict[str, frozenset[str]] = {}
+        self._known: dict[int, Poly] = {}  # of functions in what is absorbed, which `_kept` keeps alive
+        self._kept: list[Expression] = []
 
     def constant(self, value: int | Fraction) -> Poly:
         """The rational number as an element."""
@@ -127,16 +133,23 @@ class Tower(Arithmetic[Poly]):
     # -- growing ----------------------------------------------------------------------------------
 
     def _absorb(self, e: Expression) -> Poly:
+        """The value of an expression, for which the ring grows; what is known of functions inside is not found anew."""
         while True:
             try:
-                return self._convert(e)
+                for node in topological([e], self._known):
+                    if not _is_arithmetic(node):
+                        self._known[id(node)] = self.values([node], self._known)[0]
+                        self._kept.append(node)
+                return self.values([e], self._known)[0]
             except _MissingError as missing:
                 self._grow(missing)
 
     def _grow(self, missing: _MissingError) -> None:
         # The root of q, found after 1/q, stands for 1/q from now on: what contained that is to be looked at again.
         late = missing.kind == "root" and missing.inverse
-        self._renamed |= late and any(g.kind == "reciprocal" for g in self.generators)
+        if late and any(g.kind == "reciprocal" for g in self.generators):
+            self._renamed = True
+            self._forget()
         name = Symbol("g", len(self.generators))
         arguments = [self.expression(a) for a in missing.arguments]
         self.generators.append(
@@ -149,10 +162,11 @@ class Tower(Arithmetic[Poly]):
                 missing.inverse,
             )
         )
-        if len(self.names) > self._room:
+        self._index[name] = len(self._index)
+        self._meanings.append(self.generators[-1].expression)
+        self._pairs = None
+        if len(self._index) > self._room:
             self._set_context(spare=len(self.generators))
-        else:
-            self._name_variables()
 
     def _lift(self, element: Poly) -> Poly:
         size = self._room
@@ -162,13 +176,16 @@ class Tower(Arithmetic[Poly]):
 
     def _close(self) -> None:
         """Add generators until the derivative of each is in the ring."""
-        done = 0
+        done = size = 0
         while done < len(self.generators):
             (rules,) = sparse_derivatives([self.generators[done].expression], self.variables)
             for v in self.variables:
                 if v in rules:
                     value = self._absorb(rules[v])  # which may replace the generators by larger ones
                     self.generators[done].derivative[v] = value
+                    size += len(value) * self.bytes_per_term
+                    if size > budgets.PRODUCT_BYTES:
+                        raise OverflowError("derivatives with too many terms, of functions inside functions")
             done += 1
 
     # -- conversion -------------------------------------------------------------------------------
@@ -183,9 +200,6 @@ class Tower(Arithmetic[Poly]):
             return self.values(expressions)
         except _MissingError as missing:
             raise ValueError(f"the ring has no generator for {missing.kind}") from None
-
-    def _convert(self, e: Expression) -> Poly:
-        return self.values([e])[0]
 
     def function(self, name: str, args: list[Poly]) -> Poly:
         """A function of elements, where the tower has it (used for constant terms of series)."""
@@ -251,7 +265,7 @@ class Tower(Arithmetic[Poly]):
     @property
     def bytes_per_term(self) -> int:
         """Memory of one term of an element, measured while products are made and added."""
-        return 60 + 3 * len(self.names)
+        return 60 + 3 * len(self._index)
 
     def product(self, a: Poly, b: Poly) -> Poly:
         """a·b. Raises `OverflowError` rather than make one that may be larger than memory."""
@@ -325,8 +339,6 @@ class Tower(Arithmetic[Poly]):
 
     def expression_in(self, element: Poly, values: Mapping[str, Expression]) -> Expression:
         """`expression` with some of the ring's variables replaced."""
-        if self._meanings is None:
-            self._meanings = [*map(symbol, self.symbols), *(g.expression for g in self.generators)]
         variables = self._meanings
         if values:
             variables = [values.get(n, meaning) for n, meaning in zip(self.names, variables, strict=True)]
@@ -337,7 +349,7 @@ class Tower(Arithmetic[Poly]):
 
     def derivative(self, element: Poly, name: str) -> Poly:
         """Total derivative with respect to one of `variables`, through the generators."""
-        result = element.derivative(self._index[name])
+        result = element.derivative(self._index[name]) + 0  # a copy, without the room for as many terms as before
         degrees = element.degrees()
         for g in self.generators:
             k = self._index[g.name]
@@ -345,6 +357,16 @@ class Tower(Arithmetic[Poly]):
             if chain is not None and chain != 0:
                 result += self.product(element.derivative(k), chain)
         return self.cancelled(result)
+
+    def gradient(self, element: Poly, names: Iterable[str]) -> list[Poly]:
+        """The derivatives along some of `variables`. Raises `OverflowError` if together they are larger than memory."""
+        found, size = [], 0
+        for name in names:
+            found.append(self.derivative(element, name))
+            size += len(found[-1]) * self.bytes_per_term
+            if size > budgets.PRODUCT_BYTES:
+                raise OverflowError("a gradient with too many terms")
+        return found
 
     def partial(self, element: Poly, name: str) -> Poly:
         """Derivative along a symbol that no generator contains."""
@@ -365,9 +387,14 @@ class Tower(Arithmetic[Poly]):
             if degree and i < len(self.symbols):
                 found.add(self.symbols[i])
             elif degree:
-                g = self.generators[i - len(self.symbols)]
-                found |= {g.name}.union(*(self.names_in(a) for a in g.arguments))
+                found |= self._names_below(self.generators[i - len(self.symbols)])
         return found
+
+    def _names_below(self, g: Generator) -> frozenset[str]:
+        """A generator and what its arguments depend on."""
+        if g.name not in self._below:
+            self._below[g.name] = frozenset({g.name}.union(*map(self.names_in, g.arguments)))
+        return self._below[g.name]
 
     # -- deciding ---------------------------------------------------------------------------------
 
