@@ -42,8 +42,8 @@ def test_lane_functions_agree_with_the_library(real, name, flags, tmp_path):
     """Over the whole range and, closer together, near 0; no number beyond it, so that steps there are made singly."""
     single = real == "float"
     reach, units = (SINGLE if single else RANGES)[name]
-    switches = {f"CALLS_{f.upper()}": f == name for f in RANGES} | {"COMPOSED": True}
-    code = Amalgam("t", switches, {}).text(f"lane_functions{'_single' * single}.c")
+    switches = {f"CALLS_{f.upper()}": f == name for f in RANGES} | {"COMPOSED": True, "SINGLE": single}
+    code = Amalgam("t", switches, {}).text("lane_functions.c")
     head = "#include <float.h>\n#include <math.h>\n#include <stdint.h>\n#include <string.h>\n"
     arguments = ARGUMENTS["log" if name == "log" else "others"]
     numbers = {"real": real, "epsilon": "FLT_EPSILON" if single else "DBL_EPSILON", "large": 87.0 if single else 700.0}

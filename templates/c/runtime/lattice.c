@@ -7,11 +7,7 @@
 #include "lattice.h"
 #include "model.h"
 #include "rows.c"
-#if PHI_SINGLE
-#include "lane_functions_single.c"
-#else
 #include "lane_functions.c"
-#endif
 #include "sweeps.h"
 #include "graph.c"
 
