@@ -14,7 +14,7 @@
 #
 # SPDX-License-Identifier: 0BSD
 # This file belongs to whoever generated it; phigen claims no rights in it.
-# body-sha256: 3c175d5ec589d6d5f3f3b10a10d8feeca4cced0d30cfbc5f61a66e3f30e560cb
+# body-sha256: d51235b3b6d8e12b27ff5c4075e2a017dd610399dab287cd23c29aa7d4ee2d50
 import numpy as np
 
 VERSION = "0.1.0"
@@ -274,15 +274,14 @@ def integrate(x0, h, steps, stride=1, gauge=None, times=False, **parameters):
     carry = np.zeros_like(x)
     memory = [(carry, carry)] * len(FRACTIONS)
     rows = [x]
-    t, rest = np.zeros((2, len(x)))
-    stored = [t]
+    t, rest, stored = np.zeros(len(x)), np.zeros(len(x)), [np.zeros(len(x))]
     with np.errstate(all="ignore"):
         stages = _coefficients(values, x, h, gauge)
         for done in range(steps):
             following = x
             for k, stage in enumerate(stages):
                 start = following
-                following, carry, memory[k], status = _advance(stage, start, carry, memory[k])
+                following, carry, memory[k], status = _advance(stage, following, carry, memory[k])
                 elapsed = _time_of(stage, start, memory[k][0])
                 status[(status == "") & np.isnan(elapsed)] = "NOT_FINITE"
                 t, rest = _sum(t, rest, elapsed)

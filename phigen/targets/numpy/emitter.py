@@ -43,6 +43,15 @@ _NOISE_ARGUMENTS = """ The random
     numbers are a function of seed, member (that of the first, or one for each) and the number of the step, from step0
     on; increments (steps, increments) for all members, or (steps, members, increments), take their place."""
 
+#: What is said of what a trajectory holds fixed, and of steps in tau.
+_OF_GAUGE = """gauge (one value for each Casimir in GAUGE)
+    overrides the choice of the solver: the step is an exact Poisson map for each fixed gauge."""
+_OF_LEVEL = """gauge overrides e = -H(x0): the step
+    is an exact Poisson map for each fixed e."""
+_OF_TAU = """
+
+    The steps are of size h in tau; with times the result is a pair of the states and their times t: (rows, ...)."""
+
 PATH_SYNTAX = Syntax(
     printer=LANGUAGE.printer,
     covector="p[:, {i}]",
@@ -87,8 +96,7 @@ def _body(program: Program) -> str:
     coefficients = ["coefficients_in_time.py" if program.time else "coefficients.py"]
     if program.noise:
         coefficients = ["noise.py", "philox.py", "drawing.py", "renewed.py"]
-    integrate = "integrate_monitored.py" if program.monitor else "integrate.py"
-    parts = (*coefficients, "single.py", "checked.py", integrate)
+    parts = (*coefficients, "single.py", "checked.py", "integrate.py")
     pieces += [render("numpy", part, _values(program)) for part in parts]
     pieces += [_function(program, kernel) for kernel in (seen.energy, seen.casimirs, seen.vector_field)]
     pieces += [_function(program, program.noise.fields)] if program.noise else []
@@ -301,6 +309,8 @@ def _values(program: Program) -> dict[str, object]:
         "positive": _strings([p.name for p in program.parameters if p.positive]),
         "gauge": _strings(program.held),
         "monitored": program.monitor is not None,
+        "said_of_tau": _OF_TAU * bool(program.monitor),
+        "said_of_gauge": _OF_LEVEL if program.monitor else _OF_GAUGE,
         "path": isinstance(step, Path),
         "splitting": isinstance(step, Splitting),
         "prepare_arguments": "values, np.zeros((len(GAUGE), 1)), 1e-100" if program.held else "values, 1e-100",
