@@ -21,7 +21,7 @@
  *   4. The solver
  *   5. The flows
  *   6. What is seen at sites
- * body-sha256: ba1fee91edc6490825bb80769ad4f270073a288959906c8fcba7d2400df9ab63
+ * body-sha256: f2a8968647fdcc03a9724a75b4ea424349c8018f11134c4d12e9a89d133db4fb
  */
 #include "ablowitz_ladik.h"
 
@@ -148,8 +148,8 @@ typedef struct {
 /* The piece of that number. */
 static inline ablowitz_ladik_piece ablowitz_ladik_piece_of(const ablowitz_ladik_solver *s, size_t unit)
 {
-    const size_t pieces = ablowitz_ladik_pieces(s), index = pieces == 1 ? unit : unit / pieces, part = unit
-        - index * pieces;
+    const size_t pieces = ablowitz_ladik_pieces(s), index = pieces == 1 ? unit : unit / pieces,
+        part = unit - index * pieces;
     ablowitz_ladik_piece piece;
     ablowitz_ladik_locate(s, index, &piece.row);
     piece.from = (ptrdiff_t)part * ablowitz_ladik_PIECE;
@@ -367,8 +367,8 @@ static size_t ablowitz_ladik_shape(const size_t sizes[ablowitz_ladik_AXES], ptrd
     const size_t most = SIZE_MAX / 64 / ablowitz_ladik_RESERVED;
     size_t rows = 1;
     for (int a = 0; a < ablowitz_ladik_AXES; ++a) {
-        if (sizes[a] < ablowitz_ladik_least[a] || sizes[a] % ablowitz_ladik_periods[a] != 0 || sizes[a] > most
-            / 2) return 0;
+        if (sizes[a] < ablowitz_ladik_least[a] || sizes[a] % ablowitz_ladik_periods[a] != 0
+            || sizes[a] > most / 2) return 0;
         if (a < ablowitz_ladik_AXES - 1) {
             if (rows > most / sizes[a]) return 0;
             rows *= sizes[a];
@@ -445,8 +445,8 @@ ablowitz_ladik_status ablowitz_ladik_init(ablowitz_ladik_solver *s, const ablowi
     ptrdiff_t width;
     if (s == NULL || sizes == NULL || x0 == NULL || work == NULL) return ablowitz_ladik_BAD_ARGUMENT;
     const ablowitz_ladik_params own = params != NULL ? *params : ablowitz_ladik_default_params;
-    const size_t rows = ablowitz_ladik_shape(sizes, &width), length = sizes[ablowitz_ladik_AXES - 1], sites =
-        rows * length;
+    const size_t rows = ablowitz_ladik_shape(sizes, &width), length = sizes[ablowitz_ladik_AXES - 1],
+        sites = rows * length;
     if (rows == 0 || !ablowitz_ladik_finite(x0, ablowitz_ladik_DIM * sites) || !ablowitz_ladik_allowed(&own,
         sites)) return ablowitz_ladik_BAD_ARGUMENT;
     double coef[ablowitz_ladik_COEFFICIENTS];
@@ -525,8 +525,8 @@ static void ablowitz_ladik_flow(const ablowitz_ladik_solver *s, int flow)
 {
     const int joined = flow == ablowitz_ladik_FLOWS, row = joined ? ablowitz_ladik_JOINED
         : ablowitz_ladik_flow_rows[flow];
-    ablowitz_ladik_sweep_part(s, ablowitz_ladik_flow_parts[joined ? 0 : flow], s->coef + row
-        * ablowitz_ladik_ROW, s->far > 0);
+    ablowitz_ladik_sweep_part(s, ablowitz_ladik_flow_parts[joined ? 0 : flow],
+        s->coef + row * ablowitz_ladik_ROW, s->far > 0);
 }
 
 /* Some steps, joined, without the last flow; no steps are that flow alone. */
@@ -581,8 +581,10 @@ ablowitz_ladik_status ablowitz_ladik_integrate(ablowitz_ladik_solver *s, double 
     return status;
 }
 
-ablowitz_ladik_status ablowitz_ladik_step(ablowitz_ladik_solver *s,
-    double h) { return ablowitz_ladik_integrate(s, h, 1); }
+ablowitz_ladik_status ablowitz_ladik_step(ablowitz_ladik_solver *s, double h)
+{
+    return ablowitz_ladik_integrate(s, h, 1);
+}
 
 /* The sites of fields, without what is beside their rows. */
 static void ablowitz_ladik_take(const ablowitz_ladik_solver *s, double *const fields[ablowitz_ladik_DIM],
@@ -649,12 +651,18 @@ static void ablowitz_ladik_fill(const ablowitz_ladik_solver *s, ablowitz_ladik_k
     }
 }
 
-void ablowitz_ladik_density(const ablowitz_ladik_solver *s, double *out) { ablowitz_ladik_fill(s,
-    ablowitz_ladik_energy_row, out); }
-void ablowitz_ladik_casimirs(const ablowitz_ladik_solver *s, double *out) { ablowitz_ladik_fill(s,
-    ablowitz_ladik_casimirs_row, out); }
-void ablowitz_ladik_vector_field(const ablowitz_ladik_solver *s, double *out) { ablowitz_ladik_fill(s,
-    ablowitz_ladik_vector_field_row, out); }
+void ablowitz_ladik_density(const ablowitz_ladik_solver *s, double *out)
+{
+    ablowitz_ladik_fill(s, ablowitz_ladik_energy_row, out);
+}
+void ablowitz_ladik_casimirs(const ablowitz_ladik_solver *s, double *out)
+{
+    ablowitz_ladik_fill(s, ablowitz_ladik_casimirs_row, out);
+}
+void ablowitz_ladik_vector_field(const ablowitz_ladik_solver *s, double *out)
+{
+    ablowitz_ladik_fill(s, ablowitz_ladik_vector_field_row, out);
+}
 
 const char *ablowitz_ladik_status_string(ablowitz_ladik_status status)
 {

@@ -22,7 +22,7 @@
  *   5. Between steps
  *   6. The solver
  *   7. Ensembles
- * body-sha256: 284c1606efd411ceac03b3f359842494cd211796575eea0bbdcbf644b0d2c17e
+ * body-sha256: e7bca2aaace8da0c776bf2d67fbb431ac616ddbccb01cace0633c45c2f7e905f
  */
 #include "ablowitz_ladik3.h"
 
@@ -143,6 +143,13 @@ void ablowitz_ladik3_vector_field(const ablowitz_ladik3_params *params, const do
 }
 
 /* ---- Compensated sums, linear equations ---- */
+static int ablowitz_ladik3_finite(const double *values, int count)
+{
+    for (int k = 0; k < count; ++k)
+        if (!isfinite(values[k])) return 0;
+    return 1;
+}
+
 /* x + change + small in compensated arithmetic, where small is the carry and what is as small: were that
    rounded with the change, corrections of one sign would add up to a drift. 0, and x as before, if the sum is
    not finite. */
@@ -258,8 +265,8 @@ static int ablowitz_ladik3_plausible(const ablowitz_ladik3_solver *s, int stage,
         size += fabs(ablowitz_ladik3_fractions[stage] * s->h * field[i]);
     if (moved <= ablowitz_ladik3_PLAUSIBLE * size) return 1;
     const double before = ablowitz_ladik3_hamiltonian(&s->params, s->x);
-    const double after = ablowitz_ladik3_hamiltonian(&s->params, end), between =
-        ablowitz_ladik3_hamiltonian(&s->params, middle);
+    const double after = ablowitz_ladik3_hamiltonian(&s->params, end),
+        between = ablowitz_ladik3_hamiltonian(&s->params, middle);
     return fabs(after - before) <= ablowitz_ladik3_LOST * (fabs(before) + fabs(between) + fabs(after));
 }
 
@@ -514,8 +521,8 @@ static ablowitz_ladik3_status ablowitz_ladik3_attempt(ablowitz_ladik3_solver *s,
         change[ablowitz_ladik3_DIM], jacobian[ablowitz_ladik3_DIM * ablowitz_ladik3_DIM], previous = HUGE_VAL;
     if (!ablowitz_ladik3_predict(&s->history[stage], y)) memcpy(y, s->x, sizeof y);
     ablowitz_ladik3_generate(coef, y, p, jacobian);
-    for (int iteration = 0, made = 0; iteration < ablowitz_ladik3_MAX_ITERATIONS && made <=
-        ablowitz_ladik3_MOST_PIECES; ++iteration) {
+    for (int iteration = 0, made = 0; iteration < ablowitz_ladik3_MAX_ITERATIONS
+        && made <= ablowitz_ladik3_MOST_PIECES; ++iteration) {
         if (!ablowitz_ladik3_residual(s, coef, p, y, residual, change, jacobian, &made))
             return ablowitz_ladik3_NO_CONVERGENCE;
         double size = 0.0, norm = DBL_MIN;
@@ -548,14 +555,13 @@ static ablowitz_ladik3_status ablowitz_ladik3_attempt(ablowitz_ladik3_solver *s,
 /* how far the state may be moved, in its own size, for guesses to move with it */
 #define ablowitz_ladik3_NEAR_BY 0.125
 
-/* Guesses move with the state, by as many past values as extrapolation needs; recurrences are of the motion
-   as it was. From far away all begins anew, with the next step. */
-static void ablowitz_ladik3_move_guesses(ablowitz_ladik3_solver *s, const double to[ablowitz_ladik3_DIM])
+/* Guesses move with the state. From far away all begins anew, with the next step. */
+static void ablowitz_ladik3_move_guesses(ablowitz_ladik3_solver *s, const double from[ablowitz_ladik3_DIM])
 {
     double distance = 0.0, size = 0.0;
     for (int i = 0; i < ablowitz_ladik3_DIM; ++i) {
-        distance += fabs(to[i] - s->x[i]);
-        size += fabs(s->x[i]);
+        distance += fabs(s->x[i] - from[i]);
+        size += fabs(from[i]);
     }
     if (!(distance <= ablowitz_ladik3_NEAR_BY * size)) {
         s->h = (double)NAN;
@@ -563,43 +569,32 @@ static void ablowitz_ladik3_move_guesses(ablowitz_ladik3_solver *s, const double
     }
     for (int stage = 0; stage < ablowitz_ladik3_STAGES; ++stage) {
         ablowitz_ladik3_history *history = &s->history[stage];
-        for (int i = 0; i < ablowitz_ladik3_DIM; ++i) history->difference[0][i] += to[i] - s->x[i];
+        for (int i = 0; i < ablowitz_ladik3_DIM; ++i) history->difference[0][i] += s->x[i] - from[i];
     }
-}
-
-/* Stand at x + carry from now on. */
-static ablowitz_ladik3_status ablowitz_ladik3_place(ablowitz_ladik3_solver *s,
-    const double x[ablowitz_ladik3_DIM], const double carry[ablowitz_ladik3_DIM])
-{
-    for (int i = 0; i < ablowitz_ladik3_DIM; ++i)
-        if (!isfinite(x[i])) return ablowitz_ladik3_BAD_ARGUMENT;
-    ablowitz_ladik3_move_guesses(s, x);
-    memcpy(s->x, x, sizeof s->x);
-    memcpy(s->carry, carry, sizeof s->carry);
-    return ablowitz_ladik3_OK;
 }
 
 ablowitz_ladik3_status ablowitz_ladik3_set_state(ablowitz_ladik3_solver *s,
     const double x[ablowitz_ladik3_DIM])
 {
-    double to[ablowitz_ladik3_DIM], carry[ablowitz_ladik3_DIM] = { 0.0 };
-    if (s == NULL || x == NULL) return ablowitz_ladik3_BAD_ARGUMENT;
-    memcpy(to, x, sizeof to); /* which may be a part of *s */
-    return ablowitz_ladik3_place(s, to, carry);
+    if (s == NULL || x == NULL || !ablowitz_ladik3_finite(x, ablowitz_ladik3_DIM))
+        return ablowitz_ladik3_BAD_ARGUMENT;
+    double from[ablowitz_ladik3_DIM];
+    memcpy(from, s->x, sizeof from);
+    memmove(s->x, x, sizeof s->x); /* x may be a part of *s */
+    memset(s->carry, 0, sizeof s->carry);
+    ablowitz_ladik3_move_guesses(s, from);
+    return ablowitz_ladik3_OK;
 }
 
 ablowitz_ladik3_status ablowitz_ladik3_kick(ablowitz_ladik3_solver *s,
     const double change[ablowitz_ladik3_DIM])
 {
-    double to[ablowitz_ladik3_DIM], carry[ablowitz_ladik3_DIM];
     if (s == NULL || change == NULL) return ablowitz_ladik3_BAD_ARGUMENT;
-    for (int i = 0; i < ablowitz_ladik3_DIM; ++i) {
-        const double sum = s->x[i] + change[i], added = sum - s->x[i];
-        const double lost = ((s->x[i] - (sum - added)) + (change[i] - added)) + s->carry[i];
-        to[i] = sum + lost;
-        carry[i] = lost - (to[i] - sum);
-    }
-    return ablowitz_ladik3_place(s, to, carry);
+    double from[ablowitz_ladik3_DIM];
+    memcpy(from, s->x, sizeof from);
+    if (!ablowitz_ladik3_advance(s, change, s->carry)) return ablowitz_ladik3_BAD_ARGUMENT;
+    ablowitz_ladik3_move_guesses(s, from);
+    return ablowitz_ladik3_OK;
 }
 
 /* ---- The solver ---- */
@@ -611,8 +606,7 @@ ablowitz_ladik3_status ablowitz_ladik3_init(ablowitz_ladik3_solver *s, const abl
     ablowitz_ladik3_solver fresh = { .h = (double)NAN };
     fresh.params = params != NULL ? *params : ablowitz_ladik3_default_params;
     memcpy(fresh.x, x0, sizeof fresh.x);
-    for (int i = 0; i < ablowitz_ladik3_DIM; ++i)
-        if (!isfinite(fresh.x[i])) return ablowitz_ladik3_BAD_ARGUMENT;
+    if (!ablowitz_ladik3_finite(fresh.x, ablowitz_ladik3_DIM)) return ablowitz_ladik3_BAD_ARGUMENT;
     *s = fresh;
     return ablowitz_ladik3_OK;
 }
@@ -668,8 +662,10 @@ ablowitz_ladik3_status ablowitz_ladik3_integrate(ablowitz_ladik3_solver *s, doub
     return status;
 }
 
-ablowitz_ladik3_status ablowitz_ladik3_step(ablowitz_ladik3_solver *s,
-    double h) { return ablowitz_ladik3_integrate(s, h, 1); }
+ablowitz_ladik3_status ablowitz_ladik3_step(ablowitz_ladik3_solver *s, double h)
+{
+    return ablowitz_ladik3_integrate(s, h, 1);
+}
 
 const char *ablowitz_ladik3_status_string(ablowitz_ladik3_status status)
 {

@@ -21,7 +21,7 @@
  *   5. Between steps
  *   6. The solver
  *   7. Ensembles
- * body-sha256: 25fa5eec85258738f35cc7f1198e62e3e7e1de735081b8fcf63ca8546546b0df
+ * body-sha256: 07f7c85bda90114177626780729b13208b562a9be72c3956b83809cea722044c
  */
 #include "charged_particle.h"
 
@@ -151,6 +151,13 @@ void charged_particle_vector_field(const charged_particle_params *params, const 
 }
 
 /* ---- Compensated sums, linear equations ---- */
+static int charged_particle_finite(const double *values, int count)
+{
+    for (int k = 0; k < count; ++k)
+        if (!isfinite(values[k])) return 0;
+    return 1;
+}
+
 /* x + change + small in compensated arithmetic, where small is the carry and what is as small: were that
    rounded with the change, corrections of one sign would add up to a drift. 0, and x as before, if the sum is
    not finite. */
@@ -267,8 +274,8 @@ static int charged_particle_plausible(const charged_particle_solver *s,
     for (int i = 0; i < charged_particle_DIM; ++i) size += fabs(s->h * field[i]);
     if (moved <= charged_particle_PLAUSIBLE * size) return 1;
     const double before = charged_particle_hamiltonian(&s->params, s->x);
-    const double after = charged_particle_hamiltonian(&s->params, end), between =
-        charged_particle_hamiltonian(&s->params, middle);
+    const double after = charged_particle_hamiltonian(&s->params, end),
+        between = charged_particle_hamiltonian(&s->params, middle);
     return fabs(after - before) <= charged_particle_LOST * (fabs(before) + fabs(between) + fabs(after));
 }
 
@@ -499,12 +506,12 @@ static charged_particle_status charged_particle_attempt(charged_particle_solver 
 {
     const double *coef = s->coef;
     double p[charged_particle_DIM], y[charged_particle_DIM], residual[charged_particle_DIM],
-        change[charged_particle_DIM], jacobian[charged_particle_DIM * charged_particle_DIM], previous =
-        HUGE_VAL;
+        change[charged_particle_DIM], jacobian[charged_particle_DIM * charged_particle_DIM],
+        previous = HUGE_VAL;
     if (!charged_particle_predict(&s->history, y)) memcpy(y, s->x, sizeof y);
     charged_particle_generate(coef, y, p, jacobian);
-    for (int iteration = 0, made = 0; iteration < charged_particle_MAX_ITERATIONS && made <=
-        charged_particle_MOST_PIECES; ++iteration) {
+    for (int iteration = 0, made = 0; iteration < charged_particle_MAX_ITERATIONS
+        && made <= charged_particle_MOST_PIECES; ++iteration) {
         if (!charged_particle_residual(s, coef, p, y, residual, change, jacobian, &made))
             return charged_particle_NO_CONVERGENCE;
         double size = 0.0, norm = DBL_MIN;
@@ -537,56 +544,44 @@ static charged_particle_status charged_particle_attempt(charged_particle_solver 
 /* how far the state may be moved, in its own size, for guesses to move with it */
 #define charged_particle_NEAR_BY 0.125
 
-/* Guesses move with the state, by as many past values as extrapolation needs; recurrences are of the motion
-   as it was. From far away all begins anew, with the next step. */
-static void charged_particle_move_guesses(charged_particle_solver *s, const double to[charged_particle_DIM])
+/* Guesses move with the state. From far away all begins anew, with the next step. */
+static void charged_particle_move_guesses(charged_particle_solver *s, const double from[charged_particle_DIM])
 {
     double distance = 0.0, size = 0.0;
     for (int i = 0; i < charged_particle_DIM; ++i) {
-        distance += fabs(to[i] - s->x[i]);
-        size += fabs(s->x[i]);
+        distance += fabs(s->x[i] - from[i]);
+        size += fabs(from[i]);
     }
     if (!(distance <= charged_particle_NEAR_BY * size)) {
         s->h = (double)NAN;
         return;
     }
     charged_particle_history *history = &s->history;
-    for (int i = 0; i < charged_particle_DIM; ++i) history->difference[0][i] += to[i] - s->x[i];
-}
-
-/* Stand at x + carry from now on. */
-static charged_particle_status charged_particle_place(charged_particle_solver *s,
-    const double x[charged_particle_DIM], const double carry[charged_particle_DIM])
-{
-    for (int i = 0; i < charged_particle_DIM; ++i)
-        if (!isfinite(x[i])) return charged_particle_BAD_ARGUMENT;
-    charged_particle_move_guesses(s, x);
-    memcpy(s->x, x, sizeof s->x);
-    memcpy(s->carry, carry, sizeof s->carry);
-    return charged_particle_OK;
+    for (int i = 0; i < charged_particle_DIM; ++i) history->difference[0][i] += s->x[i] - from[i];
 }
 
 charged_particle_status charged_particle_set_state(charged_particle_solver *s,
     const double x[charged_particle_DIM])
 {
-    double to[charged_particle_DIM], carry[charged_particle_DIM] = { 0.0 };
-    if (s == NULL || x == NULL) return charged_particle_BAD_ARGUMENT;
-    memcpy(to, x, sizeof to); /* which may be a part of *s */
-    return charged_particle_place(s, to, carry);
+    if (s == NULL || x == NULL || !charged_particle_finite(x, charged_particle_DIM))
+        return charged_particle_BAD_ARGUMENT;
+    double from[charged_particle_DIM];
+    memcpy(from, s->x, sizeof from);
+    memmove(s->x, x, sizeof s->x); /* x may be a part of *s */
+    memset(s->carry, 0, sizeof s->carry);
+    charged_particle_move_guesses(s, from);
+    return charged_particle_OK;
 }
 
 charged_particle_status charged_particle_kick(charged_particle_solver *s,
     const double change[charged_particle_DIM])
 {
-    double to[charged_particle_DIM], carry[charged_particle_DIM];
     if (s == NULL || change == NULL) return charged_particle_BAD_ARGUMENT;
-    for (int i = 0; i < charged_particle_DIM; ++i) {
-        const double sum = s->x[i] + change[i], added = sum - s->x[i];
-        const double lost = ((s->x[i] - (sum - added)) + (change[i] - added)) + s->carry[i];
-        to[i] = sum + lost;
-        carry[i] = lost - (to[i] - sum);
-    }
-    return charged_particle_place(s, to, carry);
+    double from[charged_particle_DIM];
+    memcpy(from, s->x, sizeof from);
+    if (!charged_particle_advance(s, change, s->carry)) return charged_particle_BAD_ARGUMENT;
+    charged_particle_move_guesses(s, from);
+    return charged_particle_OK;
 }
 
 /* ---- The solver ---- */
@@ -598,8 +593,7 @@ charged_particle_status charged_particle_init(charged_particle_solver *s,
     charged_particle_solver fresh = { .h = (double)NAN };
     fresh.params = params != NULL ? *params : charged_particle_default_params;
     memcpy(fresh.x, x0, sizeof fresh.x);
-    for (int i = 0; i < charged_particle_DIM; ++i)
-        if (!isfinite(fresh.x[i])) return charged_particle_BAD_ARGUMENT;
+    if (!charged_particle_finite(fresh.x, charged_particle_DIM)) return charged_particle_BAD_ARGUMENT;
     *s = fresh;
     return charged_particle_OK;
 }
@@ -638,8 +632,10 @@ charged_particle_status charged_particle_integrate(charged_particle_solver *s, d
     return status;
 }
 
-charged_particle_status charged_particle_step(charged_particle_solver *s,
-    double h) { return charged_particle_integrate(s, h, 1); }
+charged_particle_status charged_particle_step(charged_particle_solver *s, double h)
+{
+    return charged_particle_integrate(s, h, 1);
+}
 
 const char *charged_particle_status_string(charged_particle_status status)
 {

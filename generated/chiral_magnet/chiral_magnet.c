@@ -22,7 +22,7 @@
  *   5. The solver
  *   6. The flows
  *   7. What is seen at sites
- * body-sha256: fc11bf8708e00ecd355ea7f3cf9ee541d40a83f0a97ade7bae4f7b37e10af6ec
+ * body-sha256: 1589519fd70d0aa52315c64ef36c2c99e6035e9f002aa6a8edf08d79518b8d44
  */
 #include "chiral_magnet.h"
 
@@ -159,8 +159,8 @@ typedef struct {
 /* The piece of that number. */
 static inline chiral_magnet_piece chiral_magnet_piece_of(const chiral_magnet_solver *s, size_t unit)
 {
-    const size_t pieces = chiral_magnet_pieces(s), index = pieces == 1 ? unit : unit / pieces, part = unit
-        - index * pieces;
+    const size_t pieces = chiral_magnet_pieces(s), index = pieces == 1 ? unit : unit / pieces,
+        part = unit - index * pieces;
     chiral_magnet_piece piece;
     chiral_magnet_locate(s, index, &piece.row);
     piece.from = (ptrdiff_t)part * chiral_magnet_PIECE;
@@ -175,8 +175,8 @@ static inline chiral_magnet_piece chiral_magnet_piece_of(const chiral_magnet_sol
    beyond |u| = 10^6. */
 static inline double chiral_magnet_turned_sin(double u, double offset)
 {
-    const double shifted = (u * 0.3183098861837907 + offset) + chiral_magnet_ROUNDER, k =
-        (shifted - chiral_magnet_ROUNDER) - offset;
+    const double shifted = (u * 0.3183098861837907 + offset) + chiral_magnet_ROUNDER,
+        k = (shifted - chiral_magnet_ROUNDER) - offset;
     const double near = (u - k * 3.141592651605606) - k * 1.9841871479187034e-09;
     const double r = near - k * 1.1442377452219664e-17, q = r * r, qq = q * q;
     uint64_t parity, bits; /* the last bit of shifted is the parity of k + offset */
@@ -565,8 +565,8 @@ static inline void chiral_magnet_bond_forces_a(const chiral_magnet_params *param
         double sum0 = 0.0, sum1 = 0.0, sum2 = 0.0;
         for (ptrdiff_t k = row->bonds[i]; k < row->middle[i]; ++k) {
             const ptrdiff_t j = row->other[k];
-            const double x_b_ = x_row[j], y_b_ = y_row[j], z_b_ = z_row[j], Dx = row->at_bonds[0][k], Dy =
-                row->at_bonds[1][k];
+            const double x_b_ = x_row[j], y_b_ = y_row[j], z_b_ = z_row[j], Dx = row->at_bonds[0][k],
+                Dy = row->at_bonds[1][k];
             const double t1 = D * Dy;
             const double t2 = D * Dx;
             sum0 += -(J * x_b_ + z_b_ * t1);
@@ -591,8 +591,8 @@ static inline void chiral_magnet_bond_forces_b(const chiral_magnet_params *param
         double sum0 = 0.0, sum1 = 0.0, sum2 = 0.0;
         for (ptrdiff_t k = row->middle[i]; k < row->bonds[i + 1]; ++k) {
             const ptrdiff_t j = row->other[k];
-            const double x_b_ = x_row[j], y_b_ = y_row[j], z_b_ = z_row[j], Dx = row->at_bonds[0][k], Dy =
-                row->at_bonds[1][k];
+            const double x_b_ = x_row[j], y_b_ = y_row[j], z_b_ = z_row[j], Dx = row->at_bonds[0][k],
+                Dy = row->at_bonds[1][k];
             const double t1 = D * Dy;
             const double t2 = D * Dx;
             sum0 += z_b_ * t1 - J * x_b_;
@@ -618,10 +618,10 @@ static inline void chiral_magnet_bond_energy_a(const chiral_magnet_params *param
         double sum0 = 0.0;
         for (ptrdiff_t k = row->bonds[i]; k < row->middle[i]; ++k) {
             const ptrdiff_t j = row->other[k];
-            const double x_b_ = x_row[j], y_b_ = y_row[j], z_b_ = z_row[j], Dx = row->at_bonds[0][k], Dy =
-                row->at_bonds[1][k];
-            const double t1 = D * (Dx * (y_a_ * z_b_ - y_b_ * z_a_) + Dy * (x_b_ * z_a_ - x_a_ * z_b_)) - J
-                * (z_a_ * z_b_ + (x_a_ * x_b_ + y_a_ * y_b_));
+            const double x_b_ = x_row[j], y_b_ = y_row[j], z_b_ = z_row[j], Dx = row->at_bonds[0][k],
+                Dy = row->at_bonds[1][k];
+            const double t1 = D * (Dx * (y_a_ * z_b_ - y_b_ * z_a_) + Dy * (x_b_ * z_a_ - x_a_ * z_b_))
+                - J * (z_a_ * z_b_ + (x_a_ * x_b_ + y_a_ * y_b_));
             sum0 += t1;
         }
         row->gathered[0][i] = sum0;
@@ -641,10 +641,10 @@ static inline void chiral_magnet_bond_energy_b(const chiral_magnet_params *param
         double sum0 = 0.0;
         for (ptrdiff_t k = row->middle[i]; k < row->bonds[i + 1]; ++k) {
             const ptrdiff_t j = row->other[k];
-            const double x_b_ = x_row[j], y_b_ = y_row[j], z_b_ = z_row[j], Dx = row->at_bonds[0][k], Dy =
-                row->at_bonds[1][k];
-            const double t1 = D * (Dx * (y_b_ * z_a_ - y_a_ * z_b_) + Dy * (x_a_ * z_b_ - x_b_ * z_a_)) - J
-                * (z_a_ * z_b_ + (x_a_ * x_b_ + y_a_ * y_b_));
+            const double x_b_ = x_row[j], y_b_ = y_row[j], z_b_ = z_row[j], Dx = row->at_bonds[0][k],
+                Dy = row->at_bonds[1][k];
+            const double t1 = D * (Dx * (y_b_ * z_a_ - y_a_ * z_b_) + Dy * (x_a_ * z_b_ - x_b_ * z_a_))
+                - J * (z_a_ * z_b_ + (x_a_ * x_b_ + y_a_ * y_b_));
             sum0 += t1;
         }
         row->gathered[0][i] += sum0;
@@ -717,8 +717,10 @@ static void chiral_magnet_put_at_bonds(chiral_magnet_solver *s, const chiral_mag
 
 /* ---- Bonds ---- */
 /* Whether sites and bonds can be numbered. */
-static int chiral_magnet_few(size_t sites, size_t bonds) { return sites > 0 && sites < INT_MAX && bonds
-    < INT_MAX / 2; }
+static int chiral_magnet_few(size_t sites, size_t bonds)
+{
+    return sites > 0 && sites < INT_MAX && bonds < INT_MAX / 2;
+}
 
 /* The bytes for them, after the rows. */
 static size_t chiral_magnet_graph_size(size_t sites, size_t bonds)
@@ -819,8 +821,8 @@ static size_t chiral_magnet_shape(const size_t sizes[chiral_magnet_AXES], ptrdif
     const size_t most = SIZE_MAX / 64 / chiral_magnet_RESERVED;
     size_t rows = 1;
     for (int a = 0; a < chiral_magnet_AXES; ++a) {
-        if (sizes[a] < chiral_magnet_least[a] || sizes[a] % chiral_magnet_periods[a] != 0 || sizes[a] > most
-            / 2) return 0;
+        if (sizes[a] < chiral_magnet_least[a] || sizes[a] % chiral_magnet_periods[a] != 0
+            || sizes[a] > most / 2) return 0;
         if (a < chiral_magnet_AXES - 1) {
             if (rows > most / sizes[a]) return 0;
             rows *= sizes[a];
@@ -898,8 +900,8 @@ chiral_magnet_status chiral_magnet_init(chiral_magnet_solver *s, const chiral_ma
     ptrdiff_t width;
     if (s == NULL || sizes == NULL || x0 == NULL || work == NULL) return chiral_magnet_BAD_ARGUMENT;
     const chiral_magnet_params own = params != NULL ? *params : chiral_magnet_default_params;
-    const size_t rows = chiral_magnet_shape(sizes, &width), length = sizes[chiral_magnet_AXES - 1], sites =
-        rows * length;
+    const size_t rows = chiral_magnet_shape(sizes, &width), length = sizes[chiral_magnet_AXES - 1],
+        sites = rows * length;
     const size_t count = bonds != NULL ? bonds->count : 0;
     if (!chiral_magnet_few(sites, count) || !chiral_magnet_connected(bonds, sites)
         || !chiral_magnet_finite(x0, chiral_magnet_DIM * sites) || !chiral_magnet_allowed(&own, sites, count))
@@ -996,8 +998,8 @@ static void chiral_magnet_flow(const chiral_magnet_solver *s, int flow)
 {
     const int joined = flow == chiral_magnet_FLOWS, row = joined ? chiral_magnet_JOINED
         : chiral_magnet_flow_rows[flow];
-    chiral_magnet_sweep_part(s, chiral_magnet_flow_parts[joined ? 0 : flow], s->coef + row
-        * chiral_magnet_ROW, s->far > 0);
+    chiral_magnet_sweep_part(s, chiral_magnet_flow_parts[joined ? 0 : flow],
+        s->coef + row * chiral_magnet_ROW, s->far > 0);
 }
 
 /* Some steps, joined, without the last flow; no steps are that flow alone. */
@@ -1051,8 +1053,10 @@ chiral_magnet_status chiral_magnet_integrate(chiral_magnet_solver *s, double h, 
     return status;
 }
 
-chiral_magnet_status chiral_magnet_step(chiral_magnet_solver *s, double h) { return chiral_magnet_integrate(s,
-    h, 1); }
+chiral_magnet_status chiral_magnet_step(chiral_magnet_solver *s, double h)
+{
+    return chiral_magnet_integrate(s, h, 1);
+}
 
 /* The sites of fields, without what is beside their rows. */
 static void chiral_magnet_take(const chiral_magnet_solver *s, double *const fields[chiral_magnet_DIM],
@@ -1119,12 +1123,18 @@ static void chiral_magnet_fill(const chiral_magnet_solver *s, chiral_magnet_kern
     }
 }
 
-void chiral_magnet_density(const chiral_magnet_solver *s, double *out) { chiral_magnet_fill(s,
-    chiral_magnet_energy_row, out); }
-void chiral_magnet_casimirs(const chiral_magnet_solver *s, double *out) { chiral_magnet_fill(s,
-    chiral_magnet_casimirs_row, out); }
-void chiral_magnet_vector_field(const chiral_magnet_solver *s, double *out) { chiral_magnet_fill(s,
-    chiral_magnet_vector_field_row, out); }
+void chiral_magnet_density(const chiral_magnet_solver *s, double *out)
+{
+    chiral_magnet_fill(s, chiral_magnet_energy_row, out);
+}
+void chiral_magnet_casimirs(const chiral_magnet_solver *s, double *out)
+{
+    chiral_magnet_fill(s, chiral_magnet_casimirs_row, out);
+}
+void chiral_magnet_vector_field(const chiral_magnet_solver *s, double *out)
+{
+    chiral_magnet_fill(s, chiral_magnet_vector_field_row, out);
+}
 
 const char *chiral_magnet_status_string(chiral_magnet_status status)
 {

@@ -21,7 +21,7 @@
  *   5. Between steps
  *   6. The solver
  *   7. Ensembles
- * body-sha256: c71e9be76684f97fde70bfd5fe3b13e2f84bad091e85883db2f06c768188f570
+ * body-sha256: 71116063b798a10981c1d3d4f04722c486730bddf4f3a36a77f68ea287d01619
  */
 #include "cyclotron.h"
 
@@ -109,6 +109,13 @@ void cyclotron_vector_field(const cyclotron_params *params, const double x[3], d
 }
 
 /* ---- Compensated sums, linear equations ---- */
+static int cyclotron_finite(const double *values, int count)
+{
+    for (int k = 0; k < count; ++k)
+        if (!isfinite(values[k])) return 0;
+    return 1;
+}
+
 /* x + change + small in compensated arithmetic, where small is the carry and what is as small: were that
    rounded with the change, corrections of one sign would add up to a drift. 0, and x as before, if the sum is
    not finite. */
@@ -283,54 +290,41 @@ static cyclotron_status cyclotron_attempt(cyclotron_solver *s)
 /* how far the state may be moved, in its own size, for guesses to move with it */
 #define cyclotron_NEAR_BY 0.125
 
-/* Guesses move with the state, by as many past values as extrapolation needs; recurrences are of the motion
-   as it was. From far away all begins anew, with the next step. */
-static void cyclotron_move_guesses(cyclotron_solver *s, const double to[cyclotron_DIM])
+/* Guesses move with the state. From far away all begins anew, with the next step. */
+static void cyclotron_move_guesses(cyclotron_solver *s, const double from[cyclotron_DIM])
 {
     double distance = 0.0, size = 0.0;
     for (int i = 0; i < cyclotron_DIM; ++i) {
-        distance += fabs(to[i] - s->x[i]);
-        size += fabs(s->x[i]);
+        distance += fabs(s->x[i] - from[i]);
+        size += fabs(from[i]);
     }
     if (!(distance <= cyclotron_NEAR_BY * size)) {
         s->h = (double)NAN;
         return;
     }
     cyclotron_history *history = &s->history;
-    for (int i = 0; i < cyclotron_DIM; ++i) history->difference[0][i] += to[i] - s->x[i];
-}
-
-/* Stand at x + carry from now on. */
-static cyclotron_status cyclotron_place(cyclotron_solver *s, const double x[cyclotron_DIM],
-    const double carry[cyclotron_DIM])
-{
-    for (int i = 0; i < cyclotron_DIM; ++i)
-        if (!isfinite(x[i])) return cyclotron_BAD_ARGUMENT;
-    cyclotron_move_guesses(s, x);
-    memcpy(s->x, x, sizeof s->x);
-    memcpy(s->carry, carry, sizeof s->carry);
-    return cyclotron_OK;
+    for (int i = 0; i < cyclotron_DIM; ++i) history->difference[0][i] += s->x[i] - from[i];
 }
 
 cyclotron_status cyclotron_set_state(cyclotron_solver *s, const double x[cyclotron_DIM])
 {
-    double to[cyclotron_DIM], carry[cyclotron_DIM] = { 0.0 };
-    if (s == NULL || x == NULL) return cyclotron_BAD_ARGUMENT;
-    memcpy(to, x, sizeof to); /* which may be a part of *s */
-    return cyclotron_place(s, to, carry);
+    if (s == NULL || x == NULL || !cyclotron_finite(x, cyclotron_DIM)) return cyclotron_BAD_ARGUMENT;
+    double from[cyclotron_DIM];
+    memcpy(from, s->x, sizeof from);
+    memmove(s->x, x, sizeof s->x); /* x may be a part of *s */
+    memset(s->carry, 0, sizeof s->carry);
+    cyclotron_move_guesses(s, from);
+    return cyclotron_OK;
 }
 
 cyclotron_status cyclotron_kick(cyclotron_solver *s, const double change[cyclotron_DIM])
 {
-    double to[cyclotron_DIM], carry[cyclotron_DIM];
     if (s == NULL || change == NULL) return cyclotron_BAD_ARGUMENT;
-    for (int i = 0; i < cyclotron_DIM; ++i) {
-        const double sum = s->x[i] + change[i], added = sum - s->x[i];
-        const double lost = ((s->x[i] - (sum - added)) + (change[i] - added)) + s->carry[i];
-        to[i] = sum + lost;
-        carry[i] = lost - (to[i] - sum);
-    }
-    return cyclotron_place(s, to, carry);
+    double from[cyclotron_DIM];
+    memcpy(from, s->x, sizeof from);
+    if (!cyclotron_advance(s, change, s->carry)) return cyclotron_BAD_ARGUMENT;
+    cyclotron_move_guesses(s, from);
+    return cyclotron_OK;
 }
 
 /* ---- The solver ---- */
@@ -342,8 +336,7 @@ cyclotron_status cyclotron_init(cyclotron_solver *s, const cyclotron_params *par
     cyclotron_solver fresh = { .h = (double)NAN };
     fresh.params = params != NULL ? *params : cyclotron_default_params;
     memcpy(fresh.x, x0, sizeof fresh.x);
-    for (int i = 0; i < cyclotron_DIM; ++i)
-        if (!isfinite(fresh.x[i])) return cyclotron_BAD_ARGUMENT;
+    if (!cyclotron_finite(fresh.x, cyclotron_DIM)) return cyclotron_BAD_ARGUMENT;
     *s = fresh;
     return cyclotron_OK;
 }

@@ -21,7 +21,7 @@
  *   4. The solver
  *   5. The flows
  *   6. What is seen at sites
- * body-sha256: 75550e0f635cdf6a21faf55c309b06fcb6220849a33ab5e8ec96072449ac5574
+ * body-sha256: fe34dea364a5ba363e881d328b719209ff3d758b5f77f389ae77cf7e5dc456ee
  */
 #include "dnls.h"
 
@@ -141,8 +141,8 @@ typedef struct {
 /* The piece of that number. */
 static inline dnls_piece dnls_piece_of(const dnls_solver *s, size_t unit)
 {
-    const size_t pieces = dnls_pieces(s), index = pieces == 1 ? unit : unit / pieces, part = unit - index
-        * pieces;
+    const size_t pieces = dnls_pieces(s), index = pieces == 1 ? unit : unit / pieces,
+        part = unit - index * pieces;
     dnls_piece piece;
     dnls_locate(s, index, &piece.row);
     piece.from = (ptrdiff_t)part * dnls_PIECE;

@@ -21,7 +21,7 @@
  *   4. The solver
  *   5. The flows
  *   6. What is seen at sites
- * body-sha256: 80cba4bb1ddbc78caad0a0715eca7ca17b3e089682536abedb8d13e0e70eedbd
+ * body-sha256: 5136102054927e3be7b0accee43f4318de1a968e918116e6640c5fddbd2ac6b3
  */
 #include "dnls_disorder.h"
 
@@ -167,8 +167,8 @@ typedef struct {
 /* The piece of that number. */
 static inline dnls_disorder_piece dnls_disorder_piece_of(const dnls_disorder_solver *s, size_t unit)
 {
-    const size_t pieces = dnls_disorder_pieces(s), index = pieces == 1 ? unit : unit / pieces, part = unit
-        - index * pieces;
+    const size_t pieces = dnls_disorder_pieces(s), index = pieces == 1 ? unit : unit / pieces,
+        part = unit - index * pieces;
     dnls_disorder_piece piece;
     dnls_disorder_locate(s, index, &piece.row);
     piece.from = (ptrdiff_t)part * dnls_disorder_PIECE;
@@ -183,8 +183,8 @@ static inline dnls_disorder_piece dnls_disorder_piece_of(const dnls_disorder_sol
    beyond |u| = 10^6. */
 static inline double dnls_disorder_turned_sin(double u, double offset)
 {
-    const double shifted = (u * 0.3183098861837907 + offset) + dnls_disorder_ROUNDER, k =
-        (shifted - dnls_disorder_ROUNDER) - offset;
+    const double shifted = (u * 0.3183098861837907 + offset) + dnls_disorder_ROUNDER,
+        k = (shifted - dnls_disorder_ROUNDER) - offset;
     const double near = (u - k * 3.141592651605606) - k * 1.9841871479187034e-09;
     const double r = near - k * 1.1442377452219664e-17, q = r * r, qq = q * q;
     uint64_t parity, bits; /* the last bit of shifted is the parity of k + offset */
@@ -305,8 +305,8 @@ static void dnls_disorder_energy_row(const dnls_disorder_params *params, const d
         const double e = e_row[i], p = p_row[i], q = q_row[i];
         const double w0 = i + 1 < row->length ? row->present[0] : 0.0;
         const double t1 = p * p + q * q;
-        out[i - from] = 0.5 * (e * t1) + 0.125 * (beta * (t1 * t1)) - (w0 * (p * p_row[i + 1]) + w0
-            * (q * q_row[i + 1]));
+        out[i - from] = 0.5 * (e * t1) + 0.125 * (beta * (t1 * t1)) - (w0 * (p * p_row[i + 1])
+            + w0 * (q * q_row[i + 1]));
     }
 }
 
@@ -370,8 +370,8 @@ static size_t dnls_disorder_shape(const size_t sizes[dnls_disorder_AXES], ptrdif
     const size_t most = SIZE_MAX / 64 / dnls_disorder_RESERVED;
     size_t rows = 1;
     for (int a = 0; a < dnls_disorder_AXES; ++a) {
-        if (sizes[a] < dnls_disorder_least[a] || sizes[a] % dnls_disorder_periods[a] != 0 || sizes[a] > most
-            / 2) return 0;
+        if (sizes[a] < dnls_disorder_least[a] || sizes[a] % dnls_disorder_periods[a] != 0
+            || sizes[a] > most / 2) return 0;
         if (a < dnls_disorder_AXES - 1) {
             if (rows > most / sizes[a]) return 0;
             rows *= sizes[a];
@@ -460,8 +460,8 @@ dnls_disorder_status dnls_disorder_init(dnls_disorder_solver *s, const dnls_diso
     ptrdiff_t width;
     if (s == NULL || sizes == NULL || x0 == NULL || work == NULL) return dnls_disorder_BAD_ARGUMENT;
     const dnls_disorder_params own = params != NULL ? *params : dnls_disorder_default_params;
-    const size_t rows = dnls_disorder_shape(sizes, &width), length = sizes[dnls_disorder_AXES - 1], sites =
-        rows * length;
+    const size_t rows = dnls_disorder_shape(sizes, &width), length = sizes[dnls_disorder_AXES - 1],
+        sites = rows * length;
     if (rows == 0 || !dnls_disorder_finite(x0, dnls_disorder_DIM * sites) || !dnls_disorder_allowed(&own,
         sites)) return dnls_disorder_BAD_ARGUMENT;
     double coef[dnls_disorder_COEFFICIENTS];
@@ -541,8 +541,8 @@ static void dnls_disorder_flow(const dnls_disorder_solver *s, int flow)
 {
     const int joined = flow == dnls_disorder_FLOWS, row = joined ? dnls_disorder_JOINED
         : dnls_disorder_flow_rows[flow];
-    dnls_disorder_sweep_part(s, dnls_disorder_flow_parts[joined ? 0 : flow], s->coef + row
-        * dnls_disorder_ROW, s->far > 0);
+    dnls_disorder_sweep_part(s, dnls_disorder_flow_parts[joined ? 0 : flow],
+        s->coef + row * dnls_disorder_ROW, s->far > 0);
 }
 
 /* Some steps, joined, without the last flow; no steps are that flow alone. */
@@ -596,8 +596,10 @@ dnls_disorder_status dnls_disorder_integrate(dnls_disorder_solver *s, double h, 
     return status;
 }
 
-dnls_disorder_status dnls_disorder_step(dnls_disorder_solver *s, double h) { return dnls_disorder_integrate(s,
-    h, 1); }
+dnls_disorder_status dnls_disorder_step(dnls_disorder_solver *s, double h)
+{
+    return dnls_disorder_integrate(s, h, 1);
+}
 
 /* The sites of fields, without what is beside their rows. */
 static void dnls_disorder_take(const dnls_disorder_solver *s, double *const fields[dnls_disorder_DIM],
@@ -664,12 +666,18 @@ static void dnls_disorder_fill(const dnls_disorder_solver *s, dnls_disorder_kern
     }
 }
 
-void dnls_disorder_density(const dnls_disorder_solver *s, double *out) { dnls_disorder_fill(s,
-    dnls_disorder_energy_row, out); }
-void dnls_disorder_casimirs(const dnls_disorder_solver *s, double *out) { dnls_disorder_fill(s,
-    dnls_disorder_casimirs_row, out); }
-void dnls_disorder_vector_field(const dnls_disorder_solver *s, double *out) { dnls_disorder_fill(s,
-    dnls_disorder_vector_field_row, out); }
+void dnls_disorder_density(const dnls_disorder_solver *s, double *out)
+{
+    dnls_disorder_fill(s, dnls_disorder_energy_row, out);
+}
+void dnls_disorder_casimirs(const dnls_disorder_solver *s, double *out)
+{
+    dnls_disorder_fill(s, dnls_disorder_casimirs_row, out);
+}
+void dnls_disorder_vector_field(const dnls_disorder_solver *s, double *out)
+{
+    dnls_disorder_fill(s, dnls_disorder_vector_field_row, out);
+}
 
 const char *dnls_disorder_status_string(dnls_disorder_status status)
 {

@@ -25,7 +25,7 @@
  *   5. Noise
  *   6. The solver
  *   7. Ensembles
- * body-sha256: fb5c09ff730b51cb847d944d265720431a7afc5868d9c20d1c9d0a453309fb71
+ * body-sha256: 2d782f435825ad40ad21688083ba05e212cc4d94154f6dcc8e75f892f0d492ee
  */
 #include "double_well.h"
 
@@ -130,6 +130,13 @@ void double_well_noise_fields(const double_well_params *params, const double x[2
 }
 
 /* ---- Compensated sums, linear equations ---- */
+static int double_well_finite(const double *values, int count)
+{
+    for (int k = 0; k < count; ++k)
+        if (!isfinite(values[k])) return 0;
+    return 1;
+}
+
 /* x + change + small in compensated arithmetic, where small is the carry and what is as small: were that
    rounded with the change, corrections of one sign would add up to a drift. 0, and x as before, if the sum is
    not finite. */
@@ -202,8 +209,8 @@ static int double_well_plausible(const double_well_solver *s, const double incre
         size += fabs(s->dw[k / double_well_DIM] * fields[k]);
     if (moved <= double_well_PLAUSIBLE * size) return 1;
     const double before = double_well_hamiltonian(&s->params, s->x);
-    const double after = double_well_hamiltonian(&s->params, end), between =
-        double_well_hamiltonian(&s->params, middle);
+    const double after = double_well_hamiltonian(&s->params, end),
+        between = double_well_hamiltonian(&s->params, middle);
     return fabs(after - before) <= double_well_LOST * (fabs(before) + fabs(between) + fabs(after));
 }
 
@@ -265,36 +272,19 @@ static double_well_status double_well_attempt(double_well_solver *s)
 }
 
 /* ---- Between steps ---- */
-/* Stand at x + carry from now on. */
-static double_well_status double_well_place(double_well_solver *s, const double x[double_well_DIM],
-    const double carry[double_well_DIM])
-{
-    for (int i = 0; i < double_well_DIM; ++i)
-        if (!isfinite(x[i])) return double_well_BAD_ARGUMENT;
-    memcpy(s->x, x, sizeof s->x);
-    memcpy(s->carry, carry, sizeof s->carry);
-    return double_well_OK;
-}
-
 double_well_status double_well_set_state(double_well_solver *s, const double x[double_well_DIM])
 {
-    double to[double_well_DIM], carry[double_well_DIM] = { 0.0 };
-    if (s == NULL || x == NULL) return double_well_BAD_ARGUMENT;
-    memcpy(to, x, sizeof to); /* which may be a part of *s */
-    return double_well_place(s, to, carry);
+    if (s == NULL || x == NULL || !double_well_finite(x, double_well_DIM)) return double_well_BAD_ARGUMENT;
+    memmove(s->x, x, sizeof s->x); /* x may be a part of *s */
+    memset(s->carry, 0, sizeof s->carry);
+    return double_well_OK;
 }
 
 double_well_status double_well_kick(double_well_solver *s, const double change[double_well_DIM])
 {
-    double to[double_well_DIM], carry[double_well_DIM];
     if (s == NULL || change == NULL) return double_well_BAD_ARGUMENT;
-    for (int i = 0; i < double_well_DIM; ++i) {
-        const double sum = s->x[i] + change[i], added = sum - s->x[i];
-        const double lost = ((s->x[i] - (sum - added)) + (change[i] - added)) + s->carry[i];
-        to[i] = sum + lost;
-        carry[i] = lost - (to[i] - sum);
-    }
-    return double_well_place(s, to, carry);
+    if (!double_well_advance(s, change, s->carry)) return double_well_BAD_ARGUMENT;
+    return double_well_OK;
 }
 
 /* ---- Noise ---- */
@@ -315,8 +305,10 @@ static void double_well_philox(uint32_t counter[4], uint32_t key0, uint32_t key1
 }
 
 /* 53 of the bits of two words, as a number from 0 up to, but not including, 2^53. */
-static double double_well_bits(uint32_t high, uint32_t low) { return (double)(high >> 5) * 67108864.0
-    + (double)(low >> 6); }
+static double double_well_bits(uint32_t high, uint32_t low)
+{
+    return (double)(high >> 5) * 67108864.0 + (double)(low >> 6);
+}
 
 /* Independent normal variates of variance 1, in pairs by Box and Muller, cut off at double_well_BOUND. */
 static void double_well_normals(uint64_t seed, uint32_t member, uint64_t step,
@@ -369,12 +361,10 @@ double_well_status double_well_init(double_well_solver *s, const double_well_par
     double_well_solver fresh = { .h = (double)NAN };
     fresh.params = params != NULL ? *params : double_well_default_params;
     memcpy(fresh.x, x0, sizeof fresh.x);
-    for (int i = 0; i < double_well_DIM; ++i)
-        if (!isfinite(fresh.x[i])) return double_well_BAD_ARGUMENT;
-    if (!double_well_allowed(&fresh.params)) return double_well_BAD_ARGUMENT;
+    if (!double_well_finite(fresh.x, double_well_DIM) || !double_well_allowed(&fresh.params))
+        return double_well_BAD_ARGUMENT;
     double_well_prepare(&fresh.params, double_well_SHORT_STEP, fresh.coef);
-    for (int k = 0; k < double_well_COEFFICIENTS; ++k)
-        if (!isfinite(fresh.coef[k])) return double_well_BAD_ARGUMENT;
+    if (!double_well_finite(fresh.coef, double_well_COEFFICIENTS)) return double_well_BAD_ARGUMENT;
     *s = fresh;
     return double_well_OK;
 }
@@ -416,11 +406,15 @@ double_well_status double_well_integrate_along(double_well_solver *s, double h, 
     return status;
 }
 
-double_well_status double_well_integrate(double_well_solver *s, double h,
-    size_t steps) { return double_well_integrate_along(s, h, steps, NULL); }
+double_well_status double_well_integrate(double_well_solver *s, double h, size_t steps)
+{
+    return double_well_integrate_along(s, h, steps, NULL);
+}
 
-double_well_status double_well_step(double_well_solver *s, double h) { return double_well_integrate(s, h, 1);
-    }
+double_well_status double_well_step(double_well_solver *s, double h)
+{
+    return double_well_integrate(s, h, 1);
+}
 
 const char *double_well_status_string(double_well_status status)
 {

@@ -21,7 +21,7 @@
  *   5. Between steps
  *   6. The solver
  *   7. Ensembles
- * body-sha256: 92c4f2885a518a4cdbf13be52fc7a8bec5cb5d573fd60012e7451cc47f7a2442
+ * body-sha256: 872b8eba13dbe4553db7facee9cd3ff11441ea07557845729ccad7e989fabf2d
  */
 #include "duffing.h"
 
@@ -86,8 +86,8 @@ static void duffing_prepare(const duffing_params *params, double h, double coef[
     coef[12] = 2.0 / 5.0 * t5;
     coef[13] = 3.0 / 80.0 * t5;
     coef[14] = params->omega;
-    coef[15] = params->A * h * (-1.0 + t1 * (1.0 / 12.0 - 1.0 / 120.0 * t1 + t8 * (1.0 / 24.0 + t1
-        * (-1.0 / 480.0 - 1.0 / 1920.0 * t8))));
+    coef[15] = params->A * h * (-1.0 + t1 * (1.0 / 12.0 - 1.0 / 120.0 * t1 + t8 * (1.0 / 24.0
+        + t1 * (-1.0 / 480.0 - 1.0 / 1920.0 * t8))));
     coef[16] = params->A * t5;
     coef[17] = params->A * params->A * t5;
     coef[18] = h * (-0.5 + t1 * (1.0 / 24.0 - t7));
@@ -106,8 +106,8 @@ static void duffing_linearise(const double coef[33], const double y[2], double d
     const double t1 = q * q, t2 = p * p, t3 = coef[4] * t1, t4 = q * (coef[29] + q * (coef[0] + t3));
     const double p_p = coef[28] + coef[30] * t1 + p * (coef[5] + coef[6] * t2 + t4);
     const double t5 = coef[24] + p * (coef[25] + coef[0] * p);
-    const double p_q = coef[22] + coef[23] * t2 + q * (t5 + q * (coef[26] + q * (coef[1] + coef[2] * t2 + q
-        * (coef[27] + q * (coef[3] + t3)))));
+    const double p_q = coef[22] + coef[23] * t2 + q * (t5 + q * (coef[26] + q * (coef[1] + coef[2] * t2
+        + q * (coef[27] + q * (coef[3] + t3)))));
     /* displacement */
     displacement[0] = (-0.5) * p_p;
     displacement[1] = 0.5 * p_q;
@@ -117,8 +117,8 @@ static void duffing_linearise(const double coef[33], const double y[2], double d
     /* jacobian */
     const double t6 = coef[29] * p + q * (coef[25] + p * (coef[11] + coef[12] * t1)), t7 = 0.5 * t6;
     const double t8 = coef[5] + coef[13] * t2 + t4;
-    const double t9 = t5 + q * (coef[31] + q * (coef[7] + coef[8] * t2 + q * (coef[32] + q
-        * (coef[9] + coef[10] * t1))));
+    const double t9 = t5 + q * (coef[31] + q * (coef[7] + coef[8] * t2
+        + q * (coef[32] + q * (coef[9] + coef[10] * t1))));
     jacobian[0] = 1.0 - t7;
     jacobian[1] = (-0.5) * t8;
     jacobian[2] = 0.5 * t9;
@@ -152,6 +152,13 @@ void duffing_vector_field(const duffing_params *params, double t, const double x
 }
 
 /* ---- Compensated sums, linear equations ---- */
+static int duffing_finite(const double *values, int count)
+{
+    for (int k = 0; k < count; ++k)
+        if (!isfinite(values[k])) return 0;
+    return 1;
+}
+
 /* x + change + small in compensated arithmetic, where small is the carry and what is as small: were that
    rounded with the change, corrections of one sign would add up to a drift. 0, and x as before, if the sum is
    not finite. */
@@ -326,54 +333,41 @@ static duffing_status duffing_attempt(duffing_solver *s)
 /* how far the state may be moved, in its own size, for guesses to move with it */
 #define duffing_NEAR_BY 0.125
 
-/* Guesses move with the state, by as many past values as extrapolation needs; recurrences are of the motion
-   as it was. From far away all begins anew, with the next step. */
-static void duffing_move_guesses(duffing_solver *s, const double to[duffing_DIM])
+/* Guesses move with the state. From far away all begins anew, with the next step. */
+static void duffing_move_guesses(duffing_solver *s, const double from[duffing_DIM])
 {
     double distance = 0.0, size = 0.0;
     for (int i = 0; i < duffing_DIM; ++i) {
-        distance += fabs(to[i] - s->x[i]);
-        size += fabs(s->x[i]);
+        distance += fabs(s->x[i] - from[i]);
+        size += fabs(from[i]);
     }
     if (!(distance <= duffing_NEAR_BY * size)) {
         s->h = (double)NAN;
         return;
     }
     duffing_history *history = &s->history;
-    for (int i = 0; i < duffing_DIM; ++i) history->difference[0][i] += to[i] - s->x[i];
-}
-
-/* Stand at x + carry from now on. */
-static duffing_status duffing_place(duffing_solver *s, const double x[duffing_DIM],
-    const double carry[duffing_DIM])
-{
-    for (int i = 0; i < duffing_DIM; ++i)
-        if (!isfinite(x[i])) return duffing_BAD_ARGUMENT;
-    duffing_move_guesses(s, x);
-    memcpy(s->x, x, sizeof s->x);
-    memcpy(s->carry, carry, sizeof s->carry);
-    return duffing_OK;
+    for (int i = 0; i < duffing_DIM; ++i) history->difference[0][i] += s->x[i] - from[i];
 }
 
 duffing_status duffing_set_state(duffing_solver *s, const double x[duffing_DIM])
 {
-    double to[duffing_DIM], carry[duffing_DIM] = { 0.0 };
-    if (s == NULL || x == NULL) return duffing_BAD_ARGUMENT;
-    memcpy(to, x, sizeof to); /* which may be a part of *s */
-    return duffing_place(s, to, carry);
+    if (s == NULL || x == NULL || !duffing_finite(x, duffing_DIM)) return duffing_BAD_ARGUMENT;
+    double from[duffing_DIM];
+    memcpy(from, s->x, sizeof from);
+    memmove(s->x, x, sizeof s->x); /* x may be a part of *s */
+    memset(s->carry, 0, sizeof s->carry);
+    duffing_move_guesses(s, from);
+    return duffing_OK;
 }
 
 duffing_status duffing_kick(duffing_solver *s, const double change[duffing_DIM])
 {
-    double to[duffing_DIM], carry[duffing_DIM];
     if (s == NULL || change == NULL) return duffing_BAD_ARGUMENT;
-    for (int i = 0; i < duffing_DIM; ++i) {
-        const double sum = s->x[i] + change[i], added = sum - s->x[i];
-        const double lost = ((s->x[i] - (sum - added)) + (change[i] - added)) + s->carry[i];
-        to[i] = sum + lost;
-        carry[i] = lost - (to[i] - sum);
-    }
-    return duffing_place(s, to, carry);
+    double from[duffing_DIM];
+    memcpy(from, s->x, sizeof from);
+    if (!duffing_advance(s, change, s->carry)) return duffing_BAD_ARGUMENT;
+    duffing_move_guesses(s, from);
+    return duffing_OK;
 }
 
 /* ---- The solver ---- */
@@ -388,12 +382,9 @@ duffing_status duffing_init_at(duffing_solver *s, const duffing_params *params, 
     fresh.params = params != NULL ? *params : duffing_default_params;
     memcpy(fresh.x, x0, sizeof fresh.x);
     fresh.t = t0;
-    for (int i = 0; i < duffing_DIM; ++i)
-        if (!isfinite(fresh.x[i])) return duffing_BAD_ARGUMENT;
-    if (!duffing_allowed(&fresh.params)) return duffing_BAD_ARGUMENT;
+    if (!duffing_finite(fresh.x, duffing_DIM) || !duffing_allowed(&fresh.params)) return duffing_BAD_ARGUMENT;
     duffing_prepare(&fresh.params, duffing_SHORT_STEP, fresh.coef);
-    for (int k = 0; k < duffing_COEFFICIENTS; ++k)
-        if (!isfinite(fresh.coef[k])) return duffing_BAD_ARGUMENT;
+    if (!duffing_finite(fresh.coef, duffing_COEFFICIENTS)) return duffing_BAD_ARGUMENT;
     *s = fresh;
     return duffing_OK;
 }

@@ -24,7 +24,7 @@
  *   7. Between steps
  *   8. The solver
  *   9. Ensembles
- * body-sha256: 366f320b33fb1ea18369d979d7c5bc0c832011eed4064e0cd112d8024df171c9
+ * body-sha256: f82719140cfcadeb4ee72a4f05676f67042520efa74daa552ec442f94134026e
  */
 #include "dzhanibekov.h"
 
@@ -112,11 +112,11 @@ static void dzhanibekov_prepare(const dzhanibekov_params *params, const double g
     const double t30 = (-1.0 / 180.0) * gauge[0], t31 = 1.0 / 240.0 * t8, t32 = t30 - t31;
     const double t33 = 1.0 / 180.0 * t21, t34 = 1.0 / 40.0 * gauge[0], t35 = t34 + 1.0 / 120.0 * t8;
     const double t36 = 1.0 / 240.0 * t1, t37 = 1.0 / 1440.0 * t8, t38 = 1.0 / 1440.0 * t4;
-    const double t39 = t8 * (t5 * (t27 - t28) + gauge[0] * (t29 + t32)) - t33 + t1
-        * (gauge[0] * (t35 + ((-1.0 / 24.0) * t5 - t36)) + (t8 * (t37 - t28 - t25)
+    const double t39 = t8 * (t5 * (t27 - t28) + gauge[0] * (t29 + t32)) - t33
+        + t1 * (gauge[0] * (t35 + ((-1.0 / 24.0) * t5 - t36)) + (t8 * (t37 - t28 - t25)
         + (t38 + t5 * (t36 + t24))));
-    const double t40 = t4 * (1.0 / 240.0 * (t15 * t1) + gauge[0] * (t18 - t19)) + t8
-        * (t1 * (t22 + t1 * (t5 * (t23 - t24 - t25) - t26)) + t8 * t39);
+    const double t40 = t4 * (1.0 / 240.0 * (t15 * t1) + gauge[0] * (t18 - t19))
+        + t8 * (t1 * (t22 + t1 * (t5 * (t23 - t24 - t25) - t26)) + t8 * t39);
     const double t41 = t14 * t40, t42 = 1.0 / 12.0 * t5;
     const double t43 = t3 * (t4 * (t9 - t7) + t5 * (t8 * (t6 - t10) + gauge[0] * (t11 - t42)));
     const double t44 = 1.0 / 90.0 * gauge[0], t45 = 17.0 / 360.0 * t1, t46 = 1.0 / 72.0 * t4;
@@ -136,33 +136,34 @@ static void dzhanibekov_prepare(const dzhanibekov_params *params, const double g
     const double t64 = t8 * t8, t65 = 1.0 / 72.0 * (t1 * t8), t66 = t23 - t61, t67 = 1.0 / 720.0 * t5;
     const double t68 = t51 - t17, t69 = 1.0 / 120.0 * t5, t70 = t34 - t9, t71 = 1.0 / 1440.0 * t5;
     const double t72 = t38 + t5 * (t71 - t25);
-    const double t73 = t5 * (t8 * (t67 - t31) + gauge[0] * (t68 - t28)) - t33 + t1
-        * (gauge[0] * (t69 - t36 + t70) + (t8 * (t36 + (t61 - t28)) + t72));
-    const double t74 = t4 * (1.0 / 240.0 * (t1 * t64) + gauge[0] * (t18 - t65)) + t5
-        * (t1 * (t22 + t1 * (t8 * (t66 - t25) - t26)) + t5 * t73);
+    const double t73 = t5 * (t8 * (t67 - t31) + gauge[0] * (t68 - t28)) - t33
+        + t1 * (gauge[0] * (t69 - t36 + t70) + (t8 * (t36 + (t61 - t28)) + t72));
+    const double t74 = t4 * (1.0 / 240.0 * (t1 * t64) + gauge[0] * (t18 - t65))
+        + t5 * (t1 * (t22 + t1 * (t8 * (t66 - t25) - t26)) + t5 * t73);
     const double t75 = t14 * t74, t76 = gauge[0] * t68, t77 = 1.0 / 72.0 * t58, t78 = t23 - t27;
     const double t79 = t29 - t17, t80 = 1.0 / 120.0 * t1, t81 = t34 - t31;
-    const double t82 = t1 * (t5 * (t25 - t28) + gauge[0] * (t79 - t36)) - t33 + t8
-        * (gauge[0] * (t80 - t6 + t81) + (t38 + t5 * (t24 - t36) + t8 * (t28 + t37 - t25)));
-    const double t83 = t64 * (1.0 / 240.0 * (t15 * t8) + gauge[0] * (t76 - t77)) + t1
-        * (t8 * (t22 + t8 * (t5 * (t78 - t24) - t26)) + t1 * t82);
+    const double t82 = t1 * (t5 * (t25 - t28) + gauge[0] * (t79 - t36)) - t33
+        + t8 * (gauge[0] * (t80 - t6 + t81) + (t38 + t5 * (t24 - t36) + t8 * (t28 + t37 - t25)));
+    const double t83 = t64 * (1.0 / 240.0 * (t15 * t8) + gauge[0] * (t76 - t77))
+        + t1 * (t8 * (t22 + t8 * (t5 * (t78 - t24) - t26)) + t1 * t82);
     const double t84 = t14 * t83, t85 = gauge[0] * t79;
     const double t86 = t5 * (gauge[0] * (t70 + (t80 - t28)) + (t8 * (t28 + t61 - t36) + t72))
         + (t1 * (t8 * (t25 - t31) + gauge[0] * (t68 - t36)) - t33);
-    const double t87 = t15 * (1.0 / 240.0 * (t5 * t64) + gauge[0] * (t85 - t77)) + t1
-        * (t5 * (t22 + t5 * (t8 * (t66 - t67) - t26)) + t1 * t86);
+    const double t87 = t15 * (1.0 / 240.0 * (t5 * t64) + gauge[0] * (t85 - t77))
+        + t1 * (t5 * (t22 + t5 * (t8 * (t66 - t67) - t26)) + t1 * t86);
     const double t88 = t14 * t87, t89 = 1.0 / 24.0 * t1;
     const double t90 = t3 * (t15 * (t89 - t7) + t8 * (t1 * (t9 - t42) + gauge[0] * (1.0 / 6.0 * t5 - t12)));
     const double t91 = 1.0 / 80.0 * t1, t92 = t37 - t67;
-    const double t93 = t8 * (t1 * (t27 - t36) + gauge[0] * (t16 + t32)) - t33 + t5
-        * (gauge[0] * (t35 + ((-1.0 / 240.0) * t5 - t89)) + (t8 * (t92 - t36) + (t59 + t5 * (t36 + t71))));
-    const double t94 = t15 * (1.0 / 240.0 * (t4 * t5) + gauge[0] * (t85 - t19)) + t8
-        * (t5 * (t22 + t5 * (t1 * (t23 - t67 - t91) - t26)) + t8 * t93);
+    const double t93 = t8 * (t1 * (t27 - t36) + gauge[0] * (t16 + t32)) - t33
+        + t5 * (gauge[0] * (t35 + ((-1.0 / 240.0) * t5 - t89)) + (t8 * (t92 - t36)
+        + (t59 + t5 * (t36 + t71))));
+    const double t94 = t15 * (1.0 / 240.0 * (t4 * t5) + gauge[0] * (t85 - t19))
+        + t8 * (t5 * (t22 + t5 * (t1 * (t23 - t67 - t91) - t26)) + t8 * t93);
     const double t95 = t14 * t94;
-    const double t96 = t5 * (t1 * (t67 - t36) + gauge[0] * (t16 + (t30 - t28))) - t33 + t8
-        * (gauge[0] * (t69 - t89 + t81) + (t8 * (t36 + t92) + (t59 + t5 * (t71 - t36))));
-    const double t97 = t64 * (1.0 / 240.0 * t56 + gauge[0] * (t76 - t65)) + t5
-        * (t8 * (t22 + t8 * (t1 * (t78 - t91) - t26)) + t5 * t96);
+    const double t96 = t5 * (t1 * (t67 - t36) + gauge[0] * (t16 + (t30 - t28))) - t33
+        + t8 * (gauge[0] * (t69 - t89 + t81) + (t8 * (t36 + t92) + (t59 + t5 * (t71 - t36))));
+    const double t97 = t64 * (1.0 / 240.0 * t56 + gauge[0] * (t76 - t65))
+        + t5 * (t8 * (t22 + t8 * (t1 * (t78 - t91) - t26)) + t5 * t96);
     const double t98 = t14 * t97;
     coef[0] = 2.0 * (h * (0.5 * t1 - gauge[0]));
     coef[1] = 2.0 * t13;
@@ -212,11 +213,11 @@ static void dzhanibekov_linearise(const double coef[35], const double y[3], doub
     const double t5 = coef[1] + coef[18] * t1, t6 = coef[9] + coef[16] * t2;
     const double p_x3 = x3 * (t1 * (t3 + coef[17] * t4 + t5) + (coef[14] + t2 * (coef[15] * t4 + t6)));
     const double t7 = coef[4] * t4, t8 = coef[5] * t2 + t7, t9 = coef[2] * t4;
-    const double p_x1 = x1 * (t2 * (coef[3] + coef[7] * t1 + t8) + (coef[0] + t4
-        * (t9 + (coef[1] + coef[6] * t1))));
+    const double p_x1 = x1 * (t2 * (coef[3] + coef[7] * t1 + t8)
+        + (coef[0] + t4 * (t9 + (coef[1] + coef[6] * t1))));
     const double t10 = coef[3] + coef[13] * t1, t11 = coef[10] * t4;
-    const double p_x2 = x2 * (t1 * (coef[12] * t2 + t7 + t10) + (coef[8] + t4 * (t11 + (coef[9] + coef[11]
-        * t2))));
+    const double p_x2 = x2 * (t1 * (coef[12] * t2 + t7 + t10)
+        + (coef[8] + t4 * (t11 + (coef[9] + coef[11] * t2))));
     /* displacement */
     const double t12 = x3 * p_x1, t13 = x1 * p_x3, t14 = t12 - t13, t15 = x1 * p_x2, t16 = x2 * p_x1;
     const double t17 = t15 - t16, t18 = p_x3 * t14 - p_x2 * t17, t19 = p_x3 * p_x3, t20 = p_x1 * p_x1;
@@ -234,8 +235,8 @@ static void dzhanibekov_linearise(const double coef[35], const double y[3], doub
     const double t30 = x1 * x3 * (coef[25] + coef[27] * t1 + (coef[26] * t4 + coef[22] * t2));
     const double t31 = dzhanibekov_phi1(t23), t32 = p_x3 * t31, t33 = 0.5 * x2;
     const double t34 = (t14 - t13) * t24 + 2.0 * (t18 * t32) - t33;
-    const double t35 = t2 * (coef[3] + coef[20] * t1 + t8) + (coef[0] + t4 * (t9 + (coef[1] + coef[19]
-        * t1)));
+    const double t35 = t2 * (coef[3] + coef[20] * t1 + t8)
+        + (coef[0] + t4 * (t9 + (coef[1] + coef[19] * t1)));
     const double t36 = x2 * p_x2, t37 = x3 * p_x3, t38 = p_x1 * t31;
     const double t39 = (t36 + t37) * t24 + 2.0 * (t18 * t38);
     const double t40 = x1 * x2 * (coef[21] + coef[24] * t1 + (coef[22] * t4 + coef[23] * t2));
@@ -288,13 +289,13 @@ static void dzhanibekov_turn(const double coef[35], const double y[3], double tu
 {
     const double x1 = y[0], x2 = y[1], x3 = y[2];
     const double t1 = x1 * x1, t2 = x2 * x2, t3 = x3 * x3;
-    const double t4 = x3 * (t1 * (coef[4] * t2 + coef[17] * t3 + (coef[1] + coef[18] * t1)) + (coef[14] + t2
-        * (coef[15] * t3 + (coef[9] + coef[16] * t2))));
+    const double t4 = x3 * (t1 * (coef[4] * t2 + coef[17] * t3 + (coef[1] + coef[18] * t1))
+        + (coef[14] + t2 * (coef[15] * t3 + (coef[9] + coef[16] * t2))));
     const double t5 = coef[4] * t3;
-    const double t6 = x1 * (t2 * (coef[3] + coef[7] * t1 + (coef[5] * t2 + t5)) + (coef[0] + t3
-        * (coef[2] * t3 + (coef[1] + coef[6] * t1))));
-    const double t7 = x2 * (t1 * (coef[12] * t2 + t5 + (coef[3] + coef[13] * t1)) + (coef[8] + t3
-        * (coef[10] * t3 + (coef[9] + coef[11] * t2))));
+    const double t6 = x1 * (t2 * (coef[3] + coef[7] * t1 + (coef[5] * t2 + t5))
+        + (coef[0] + t3 * (coef[2] * t3 + (coef[1] + coef[6] * t1))));
+    const double t7 = x2 * (t1 * (coef[12] * t2 + t5 + (coef[3] + coef[13] * t1))
+        + (coef[8] + t3 * (coef[10] * t3 + (coef[9] + coef[11] * t2))));
     const double t8 = t4 * t4 + (t6 * t6 + t7 * t7), t9 = 1.0 - 0.25 * (t8 * dzhanibekov_phi0(0.25 * t8));
     const double t10 = 1.0 / (0.0625 * t8 + t9 * t9);
     turn[0] = (-0.125) * (t8 * t10);
@@ -339,6 +340,13 @@ void dzhanibekov_vector_field(const dzhanibekov_params *params, const double x[3
 }
 
 /* ---- Compensated sums, linear equations ---- */
+static int dzhanibekov_finite(const double *values, int count)
+{
+    for (int k = 0; k < count; ++k)
+        if (!isfinite(values[k])) return 0;
+    return 1;
+}
+
 /* x + change + small in compensated arithmetic, where small is the carry and what is as small: were that
    rounded with the change, corrections of one sign would add up to a drift. 0, and x as before, if the sum is
    not finite. */
@@ -447,8 +455,8 @@ static int dzhanibekov_plausible(const dzhanibekov_solver *s, const double incre
     for (int i = 0; i < dzhanibekov_DIM; ++i) size += fabs(s->h * field[i]);
     if (moved <= dzhanibekov_PLAUSIBLE * size) return 1;
     const double before = dzhanibekov_hamiltonian(&s->params, s->x);
-    const double after = dzhanibekov_hamiltonian(&s->params, end), between =
-        dzhanibekov_hamiltonian(&s->params, middle);
+    const double after = dzhanibekov_hamiltonian(&s->params, end),
+        between = dzhanibekov_hamiltonian(&s->params, middle);
     return fabs(after - before) <= dzhanibekov_LOST * (fabs(before) + fabs(between) + fabs(after));
 }
 
@@ -500,8 +508,8 @@ static void dzhanibekov_turn_by(dzhanibekov_solver *s, const double factor[dzhan
     double change[dzhanibekov_ELEMENT];
     dzhanibekov_added(s->turned, factor, change);
     for (int i = 0; i < dzhanibekov_ELEMENT; ++i) {
-        const double moved = change[i] + s->turned_carry[i], sum = s->turned[i] + moved, added = sum
-            - s->turned[i];
+        const double moved = change[i] + s->turned_carry[i], sum = s->turned[i] + moved,
+            added = sum - s->turned[i];
         s->turned_carry[i] = (s->turned[i] - (sum - added)) + (moved - added);
         s->turned[i] = sum;
     }
@@ -642,55 +650,49 @@ static void dzhanibekov_choose_gauge(const dzhanibekov_params *params, const dou
 /* how far the state may be moved, in its own size, for guesses to move with it */
 #define dzhanibekov_NEAR_BY 0.125
 
-/* Guesses move with the state, by as many past values as extrapolation needs; recurrences are of the motion
-   as it was. From far away all begins anew, with the next step. */
-static void dzhanibekov_move_guesses(dzhanibekov_solver *s, const double to[dzhanibekov_DIM])
+/* Guesses move with the state. From far away all begins anew, with the next step. */
+static void dzhanibekov_move_guesses(dzhanibekov_solver *s, const double from[dzhanibekov_DIM])
 {
     double distance = 0.0, size = 0.0;
     for (int i = 0; i < dzhanibekov_DIM; ++i) {
-        distance += fabs(to[i] - s->x[i]);
-        size += fabs(s->x[i]);
+        distance += fabs(s->x[i] - from[i]);
+        size += fabs(from[i]);
     }
     if (!(distance <= dzhanibekov_NEAR_BY * size)) {
         s->h = (double)NAN;
         return;
     }
     dzhanibekov_history *history = &s->history;
-    for (int i = 0; i < dzhanibekov_DIM; ++i) history->difference[0][i] += to[i] - s->x[i];
+    for (int i = 0; i < dzhanibekov_DIM; ++i) history->difference[0][i] += s->x[i] - from[i];
 }
 
-/* Stand at x + carry from now on. */
-static dzhanibekov_status dzhanibekov_place(dzhanibekov_solver *s, const double x[dzhanibekov_DIM],
-    const double carry[dzhanibekov_DIM])
+/* The gauge turns the body at another rate from here on. */
+static void dzhanibekov_take_rate(dzhanibekov_solver *s)
 {
-    for (int i = 0; i < dzhanibekov_DIM; ++i)
-        if (!isfinite(x[i])) return dzhanibekov_BAD_ARGUMENT;
-    dzhanibekov_move_guesses(s, x);
-    memcpy(s->x, x, sizeof s->x);
-    memcpy(s->carry, carry, sizeof s->carry);
-    dzhanibekov_set_attitude(s, s->attitude); /* the gauge turns the body at another rate from here on */
-    return dzhanibekov_OK;
+    dzhanibekov_set_attitude(s, s->attitude);
 }
 
 dzhanibekov_status dzhanibekov_set_state(dzhanibekov_solver *s, const double x[dzhanibekov_DIM])
 {
-    double to[dzhanibekov_DIM], carry[dzhanibekov_DIM] = { 0.0 };
-    if (s == NULL || x == NULL) return dzhanibekov_BAD_ARGUMENT;
-    memcpy(to, x, sizeof to); /* which may be a part of *s */
-    return dzhanibekov_place(s, to, carry);
+    if (s == NULL || x == NULL || !dzhanibekov_finite(x, dzhanibekov_DIM)) return dzhanibekov_BAD_ARGUMENT;
+    double from[dzhanibekov_DIM];
+    memcpy(from, s->x, sizeof from);
+    memmove(s->x, x, sizeof s->x); /* x may be a part of *s */
+    memset(s->carry, 0, sizeof s->carry);
+    dzhanibekov_move_guesses(s, from);
+    dzhanibekov_take_rate(s);
+    return dzhanibekov_OK;
 }
 
 dzhanibekov_status dzhanibekov_kick(dzhanibekov_solver *s, const double change[dzhanibekov_DIM])
 {
-    double to[dzhanibekov_DIM], carry[dzhanibekov_DIM];
     if (s == NULL || change == NULL) return dzhanibekov_BAD_ARGUMENT;
-    for (int i = 0; i < dzhanibekov_DIM; ++i) {
-        const double sum = s->x[i] + change[i], added = sum - s->x[i];
-        const double lost = ((s->x[i] - (sum - added)) + (change[i] - added)) + s->carry[i];
-        to[i] = sum + lost;
-        carry[i] = lost - (to[i] - sum);
-    }
-    return dzhanibekov_place(s, to, carry);
+    double from[dzhanibekov_DIM];
+    memcpy(from, s->x, sizeof from);
+    if (!dzhanibekov_advance(s, change, s->carry)) return dzhanibekov_BAD_ARGUMENT;
+    dzhanibekov_move_guesses(s, from);
+    dzhanibekov_take_rate(s);
+    return dzhanibekov_OK;
 }
 
 /* ---- The solver ---- */
@@ -704,16 +706,13 @@ dzhanibekov_status dzhanibekov_init_gauge(dzhanibekov_solver *s, const dzhanibek
     dzhanibekov_solver fresh = { .h = (double)NAN };
     fresh.params = params != NULL ? *params : dzhanibekov_default_params;
     memcpy(fresh.x, x0, sizeof fresh.x);
-    for (int i = 0; i < dzhanibekov_DIM; ++i)
-        if (!isfinite(fresh.x[i])) return dzhanibekov_BAD_ARGUMENT;
-    if (!dzhanibekov_allowed(&fresh.params)) return dzhanibekov_BAD_ARGUMENT;
+    if (!dzhanibekov_finite(fresh.x, dzhanibekov_DIM) || !dzhanibekov_allowed(&fresh.params))
+        return dzhanibekov_BAD_ARGUMENT;
     dzhanibekov_prepare(&fresh.params, fresh.gauge, dzhanibekov_SHORT_STEP, fresh.coef);
-    for (int k = 0; k < dzhanibekov_COEFFICIENTS; ++k)
-        if (!isfinite(fresh.coef[k])) return dzhanibekov_BAD_ARGUMENT;
+    if (!dzhanibekov_finite(fresh.coef, dzhanibekov_COEFFICIENTS)) return dzhanibekov_BAD_ARGUMENT;
     if (gauge == NULL) dzhanibekov_choose_gauge(&fresh.params, fresh.x, fresh.gauge);
     else memcpy(fresh.gauge, gauge, sizeof fresh.gauge);
-    for (int c = 0; c < dzhanibekov_GAUGES; ++c)
-        if (!isfinite(fresh.gauge[c])) return dzhanibekov_BAD_ARGUMENT;
+    if (!dzhanibekov_finite(fresh.gauge, dzhanibekov_GAUGES)) return dzhanibekov_BAD_ARGUMENT;
     double identity[dzhanibekov_ELEMENT] = { 1.0 };
     dzhanibekov_begin_attitude(&fresh, identity);
     *s = fresh;
@@ -761,8 +760,10 @@ dzhanibekov_status dzhanibekov_integrate(dzhanibekov_solver *s, double h, size_t
     return status;
 }
 
-dzhanibekov_status dzhanibekov_step(dzhanibekov_solver *s, double h) { return dzhanibekov_integrate(s, h, 1);
-    }
+dzhanibekov_status dzhanibekov_step(dzhanibekov_solver *s, double h)
+{
+    return dzhanibekov_integrate(s, h, 1);
+}
 
 const char *dzhanibekov_status_string(dzhanibekov_status status)
 {

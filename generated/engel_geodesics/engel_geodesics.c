@@ -21,7 +21,7 @@
  *   5. Between steps
  *   6. The solver
  *   7. Ensembles
- * body-sha256: e9ab0d917b1a52cd3bf2b43f7d0c4ca55b7fefe212b20313e13cc3c9212a5d0b
+ * body-sha256: 57f7ba230086b1095125f6555df93c332c37c010a84a7513cdf405883b40b154
  */
 #include "engel_geodesics.h"
 
@@ -132,6 +132,13 @@ void engel_geodesics_vector_field(const engel_geodesics_params *params, const do
 }
 
 /* ---- Compensated sums, linear equations ---- */
+static int engel_geodesics_finite(const double *values, int count)
+{
+    for (int k = 0; k < count; ++k)
+        if (!isfinite(values[k])) return 0;
+    return 1;
+}
+
 /* x + change + small in compensated arithmetic, where small is the carry and what is as small: were that
    rounded with the change, corrections of one sign would add up to a drift. 0, and x as before, if the sum is
    not finite. */
@@ -246,8 +253,8 @@ static int engel_geodesics_plausible(const engel_geodesics_solver *s,
     for (int i = 0; i < engel_geodesics_DIM; ++i) size += fabs(s->h * field[i]);
     if (moved <= engel_geodesics_PLAUSIBLE * size) return 1;
     const double before = engel_geodesics_hamiltonian(&s->params, s->x);
-    const double after = engel_geodesics_hamiltonian(&s->params, end), between =
-        engel_geodesics_hamiltonian(&s->params, middle);
+    const double after = engel_geodesics_hamiltonian(&s->params, end),
+        between = engel_geodesics_hamiltonian(&s->params, middle);
     return fabs(after - before) <= engel_geodesics_LOST * (fabs(before) + fabs(between) + fabs(after));
 }
 
@@ -281,8 +288,8 @@ static engel_geodesics_status engel_geodesics_attempt(engel_geodesics_solver *s)
 {
     double y[engel_geodesics_DIM], delta[engel_geodesics_DIM], displacement[engel_geodesics_DIM],
         increment[engel_geodesics_DIM];
-    double jacobian[engel_geodesics_DIM * engel_geodesics_DIM], increment_jacobian[engel_geodesics_DIM
-        * engel_geodesics_DIM];
+    double jacobian[engel_geodesics_DIM * engel_geodesics_DIM],
+        increment_jacobian[engel_geodesics_DIM * engel_geodesics_DIM];
     double previous = HUGE_VAL;
     if (!engel_geodesics_predict(&s->history, y)) memcpy(y, s->x, sizeof y);
     for (int iteration = 1; iteration <= engel_geodesics_MAX_ITERATIONS; ++iteration) {
@@ -318,56 +325,44 @@ static engel_geodesics_status engel_geodesics_attempt(engel_geodesics_solver *s)
 /* how far the state may be moved, in its own size, for guesses to move with it */
 #define engel_geodesics_NEAR_BY 0.125
 
-/* Guesses move with the state, by as many past values as extrapolation needs; recurrences are of the motion
-   as it was. From far away all begins anew, with the next step. */
-static void engel_geodesics_move_guesses(engel_geodesics_solver *s, const double to[engel_geodesics_DIM])
+/* Guesses move with the state. From far away all begins anew, with the next step. */
+static void engel_geodesics_move_guesses(engel_geodesics_solver *s, const double from[engel_geodesics_DIM])
 {
     double distance = 0.0, size = 0.0;
     for (int i = 0; i < engel_geodesics_DIM; ++i) {
-        distance += fabs(to[i] - s->x[i]);
-        size += fabs(s->x[i]);
+        distance += fabs(s->x[i] - from[i]);
+        size += fabs(from[i]);
     }
     if (!(distance <= engel_geodesics_NEAR_BY * size)) {
         s->h = (double)NAN;
         return;
     }
     engel_geodesics_history *history = &s->history;
-    for (int i = 0; i < engel_geodesics_DIM; ++i) history->difference[0][i] += to[i] - s->x[i];
-}
-
-/* Stand at x + carry from now on. */
-static engel_geodesics_status engel_geodesics_place(engel_geodesics_solver *s,
-    const double x[engel_geodesics_DIM], const double carry[engel_geodesics_DIM])
-{
-    for (int i = 0; i < engel_geodesics_DIM; ++i)
-        if (!isfinite(x[i])) return engel_geodesics_BAD_ARGUMENT;
-    engel_geodesics_move_guesses(s, x);
-    memcpy(s->x, x, sizeof s->x);
-    memcpy(s->carry, carry, sizeof s->carry);
-    return engel_geodesics_OK;
+    for (int i = 0; i < engel_geodesics_DIM; ++i) history->difference[0][i] += s->x[i] - from[i];
 }
 
 engel_geodesics_status engel_geodesics_set_state(engel_geodesics_solver *s,
     const double x[engel_geodesics_DIM])
 {
-    double to[engel_geodesics_DIM], carry[engel_geodesics_DIM] = { 0.0 };
-    if (s == NULL || x == NULL) return engel_geodesics_BAD_ARGUMENT;
-    memcpy(to, x, sizeof to); /* which may be a part of *s */
-    return engel_geodesics_place(s, to, carry);
+    if (s == NULL || x == NULL || !engel_geodesics_finite(x, engel_geodesics_DIM))
+        return engel_geodesics_BAD_ARGUMENT;
+    double from[engel_geodesics_DIM];
+    memcpy(from, s->x, sizeof from);
+    memmove(s->x, x, sizeof s->x); /* x may be a part of *s */
+    memset(s->carry, 0, sizeof s->carry);
+    engel_geodesics_move_guesses(s, from);
+    return engel_geodesics_OK;
 }
 
 engel_geodesics_status engel_geodesics_kick(engel_geodesics_solver *s,
     const double change[engel_geodesics_DIM])
 {
-    double to[engel_geodesics_DIM], carry[engel_geodesics_DIM];
     if (s == NULL || change == NULL) return engel_geodesics_BAD_ARGUMENT;
-    for (int i = 0; i < engel_geodesics_DIM; ++i) {
-        const double sum = s->x[i] + change[i], added = sum - s->x[i];
-        const double lost = ((s->x[i] - (sum - added)) + (change[i] - added)) + s->carry[i];
-        to[i] = sum + lost;
-        carry[i] = lost - (to[i] - sum);
-    }
-    return engel_geodesics_place(s, to, carry);
+    double from[engel_geodesics_DIM];
+    memcpy(from, s->x, sizeof from);
+    if (!engel_geodesics_advance(s, change, s->carry)) return engel_geodesics_BAD_ARGUMENT;
+    engel_geodesics_move_guesses(s, from);
+    return engel_geodesics_OK;
 }
 
 /* ---- The solver ---- */
@@ -379,8 +374,7 @@ engel_geodesics_status engel_geodesics_init(engel_geodesics_solver *s, const eng
     engel_geodesics_solver fresh = { .h = (double)NAN };
     fresh.params = params != NULL ? *params : engel_geodesics_default_params;
     memcpy(fresh.x, x0, sizeof fresh.x);
-    for (int i = 0; i < engel_geodesics_DIM; ++i)
-        if (!isfinite(fresh.x[i])) return engel_geodesics_BAD_ARGUMENT;
+    if (!engel_geodesics_finite(fresh.x, engel_geodesics_DIM)) return engel_geodesics_BAD_ARGUMENT;
     *s = fresh;
     return engel_geodesics_OK;
 }
@@ -419,8 +413,10 @@ engel_geodesics_status engel_geodesics_integrate(engel_geodesics_solver *s, doub
     return status;
 }
 
-engel_geodesics_status engel_geodesics_step(engel_geodesics_solver *s,
-    double h) { return engel_geodesics_integrate(s, h, 1); }
+engel_geodesics_status engel_geodesics_step(engel_geodesics_solver *s, double h)
+{
+    return engel_geodesics_integrate(s, h, 1);
+}
 
 const char *engel_geodesics_status_string(engel_geodesics_status status)
 {

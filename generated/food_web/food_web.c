@@ -22,7 +22,7 @@
  *   5. The solver
  *   6. The flows
  *   7. What is seen at sites
- * body-sha256: 2ac96c1ec109dc1e2d62f0150308748e3da118cfad71d4b6dda143cc8c1a0a44
+ * body-sha256: 713fff0edeb55ef74c7ebeb9610e2621b210ec8a1a4381f46e8365ef85033546
  */
 #include "food_web.h"
 
@@ -160,8 +160,8 @@ typedef struct {
 /* The piece of that number. */
 static inline food_web_piece food_web_piece_of(const food_web_solver *s, size_t unit)
 {
-    const size_t pieces = food_web_pieces(s), index = pieces == 1 ? unit : unit / pieces, part = unit - index
-        * pieces;
+    const size_t pieces = food_web_pieces(s), index = pieces == 1 ? unit : unit / pieces,
+        part = unit - index * pieces;
     food_web_piece piece;
     food_web_locate(s, index, &piece.row);
     piece.from = (ptrdiff_t)part * food_web_PIECE;
@@ -398,8 +398,10 @@ static void food_web_put_at_bonds(food_web_solver *s, const food_web_params *par
 
 /* ---- Bonds ---- */
 /* Whether sites and bonds can be numbered. */
-static int food_web_few(size_t sites, size_t bonds) { return sites > 0 && sites < INT_MAX && bonds < INT_MAX
-    / 2; }
+static int food_web_few(size_t sites, size_t bonds)
+{
+    return sites > 0 && sites < INT_MAX && bonds < INT_MAX / 2;
+}
 
 /* The bytes for them, after the rows. */
 static size_t food_web_graph_size(size_t sites, size_t bonds)
@@ -588,11 +590,11 @@ food_web_status food_web_init(food_web_solver *s, const food_web_params *params,
     ptrdiff_t width;
     if (s == NULL || sizes == NULL || x0 == NULL || work == NULL) return food_web_BAD_ARGUMENT;
     const food_web_params own = params != NULL ? *params : food_web_default_params;
-    const size_t rows = food_web_shape(sizes, &width), length = sizes[food_web_AXES - 1], sites = rows
-        * length;
+    const size_t rows = food_web_shape(sizes, &width), length = sizes[food_web_AXES - 1],
+        sites = rows * length;
     const size_t count = bonds != NULL ? bonds->count : 0;
-    if (!food_web_few(sites, count) || !food_web_connected(bonds, sites) || !food_web_finite(x0, food_web_DIM
-        * sites) || !food_web_allowed(&own, sites, count))
+    if (!food_web_few(sites, count) || !food_web_connected(bonds, sites) || !food_web_finite(x0,
+        food_web_DIM * sites) || !food_web_allowed(&own, sites, count))
         return food_web_BAD_ARGUMENT;
     double coef[food_web_COEFFICIENTS];
     food_web_prepare_step(&own, 1e-100, coef);
@@ -802,10 +804,14 @@ static void food_web_fill(const food_web_solver *s, food_web_kernel *kernel, dou
 }
 
 void food_web_density(const food_web_solver *s, double *out) { food_web_fill(s, food_web_energy_row, out); }
-void food_web_casimirs(const food_web_solver *s, double *out) { food_web_fill(s, food_web_casimirs_row, out);
-    }
-void food_web_vector_field(const food_web_solver *s, double *out) { food_web_fill(s,
-    food_web_vector_field_row, out); }
+void food_web_casimirs(const food_web_solver *s, double *out)
+{
+    food_web_fill(s, food_web_casimirs_row, out);
+}
+void food_web_vector_field(const food_web_solver *s, double *out)
+{
+    food_web_fill(s, food_web_vector_field_row, out);
+}
 
 const char *food_web_status_string(food_web_status status)
 {

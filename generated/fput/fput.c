@@ -22,7 +22,7 @@
  *   5. The flows
  *   6. What is seen at sites
  *   7. Steps by hand
- * body-sha256: eb746526cadaed91196d35f3416494777e1073f6b13efc66f5821bd55eeae7d5
+ * body-sha256: 04b2b3ae87dea36308f3ce9697665800e3d6c855df3510e37e3832f58421159d
  */
 #include "fput.h"
 
@@ -144,8 +144,8 @@ typedef struct {
 /* The piece of that number. */
 static inline fput_piece fput_piece_of(const fput_solver *s, size_t unit)
 {
-    const size_t pieces = fput_pieces(s), index = pieces == 1 ? unit : unit / pieces, part = unit - index
-        * pieces;
+    const size_t pieces = fput_pieces(s), index = pieces == 1 ? unit : unit / pieces,
+        part = unit - index * pieces;
     fput_piece piece;
     fput_locate(s, index, &piece.row);
     piece.from = (ptrdiff_t)part * fput_PIECE;
@@ -224,8 +224,8 @@ static void fput_energy_row(const fput_params *params, const fput_row *row, ptrd
         const double p = p_row[i], q = q_row[i];
         const double t1 = q_row[i + 1] - q;
         const double t2 = t1 * t1;
-        out[i - from] = 0.5 * t2 + 1.0 / 3.0 * (alpha * (t1 * t2)) + (0.5 * (p * p) + 0.25
-            * (beta * (t2 * t2)));
+        out[i - from] = 0.5 * t2 + 1.0 / 3.0 * (alpha * (t1 * t2))
+            + (0.5 * (p * p) + 0.25 * (beta * (t2 * t2)));
     }
 }
 

@@ -21,7 +21,7 @@
  *   5. Between steps
  *   6. The solver
  *   7. Ensembles
- * body-sha256: b3242db8ffc0a6c2f93898bea4a97cd1788c8e18dca402d67042af093f597eb1
+ * body-sha256: ae0dccb64a23d2f10a76a3931a7de52898f757ef75591055f95e770b166c8ae3
  */
 #include "gaussian_moments.h"
 
@@ -201,6 +201,13 @@ void gaussian_moments_vector_field(const gaussian_moments_params *params, const 
 }
 
 /* ---- Compensated sums, linear equations ---- */
+static int gaussian_moments_finite(const double *values, int count)
+{
+    for (int k = 0; k < count; ++k)
+        if (!isfinite(values[k])) return 0;
+    return 1;
+}
+
 /* x + change + small in compensated arithmetic, where small is the carry and what is as small: were that
    rounded with the change, corrections of one sign would add up to a drift. 0, and x as before, if the sum is
    not finite. */
@@ -317,8 +324,8 @@ static int gaussian_moments_plausible(const gaussian_moments_solver *s,
     for (int i = 0; i < gaussian_moments_DIM; ++i) size += fabs(s->h * field[i]);
     if (moved <= gaussian_moments_PLAUSIBLE * size) return 1;
     const double before = gaussian_moments_hamiltonian(&s->params, s->x);
-    const double after = gaussian_moments_hamiltonian(&s->params, end), between =
-        gaussian_moments_hamiltonian(&s->params, middle);
+    const double after = gaussian_moments_hamiltonian(&s->params, end),
+        between = gaussian_moments_hamiltonian(&s->params, middle);
     return fabs(after - before) <= gaussian_moments_LOST * (fabs(before) + fabs(between) + fabs(after));
 }
 
@@ -352,8 +359,8 @@ static gaussian_moments_status gaussian_moments_attempt(gaussian_moments_solver 
 {
     double y[gaussian_moments_DIM], delta[gaussian_moments_DIM], displacement[gaussian_moments_DIM],
         increment[gaussian_moments_DIM];
-    double jacobian[gaussian_moments_DIM * gaussian_moments_DIM], increment_jacobian[gaussian_moments_DIM
-        * gaussian_moments_DIM];
+    double jacobian[gaussian_moments_DIM * gaussian_moments_DIM],
+        increment_jacobian[gaussian_moments_DIM * gaussian_moments_DIM];
     double previous = HUGE_VAL;
     if (!gaussian_moments_predict(&s->history, y)) memcpy(y, s->x, sizeof y);
     for (int iteration = 1; iteration <= gaussian_moments_MAX_ITERATIONS; ++iteration) {
@@ -389,56 +396,44 @@ static gaussian_moments_status gaussian_moments_attempt(gaussian_moments_solver 
 /* how far the state may be moved, in its own size, for guesses to move with it */
 #define gaussian_moments_NEAR_BY 0.125
 
-/* Guesses move with the state, by as many past values as extrapolation needs; recurrences are of the motion
-   as it was. From far away all begins anew, with the next step. */
-static void gaussian_moments_move_guesses(gaussian_moments_solver *s, const double to[gaussian_moments_DIM])
+/* Guesses move with the state. From far away all begins anew, with the next step. */
+static void gaussian_moments_move_guesses(gaussian_moments_solver *s, const double from[gaussian_moments_DIM])
 {
     double distance = 0.0, size = 0.0;
     for (int i = 0; i < gaussian_moments_DIM; ++i) {
-        distance += fabs(to[i] - s->x[i]);
-        size += fabs(s->x[i]);
+        distance += fabs(s->x[i] - from[i]);
+        size += fabs(from[i]);
     }
     if (!(distance <= gaussian_moments_NEAR_BY * size)) {
         s->h = (double)NAN;
         return;
     }
     gaussian_moments_history *history = &s->history;
-    for (int i = 0; i < gaussian_moments_DIM; ++i) history->difference[0][i] += to[i] - s->x[i];
-}
-
-/* Stand at x + carry from now on. */
-static gaussian_moments_status gaussian_moments_place(gaussian_moments_solver *s,
-    const double x[gaussian_moments_DIM], const double carry[gaussian_moments_DIM])
-{
-    for (int i = 0; i < gaussian_moments_DIM; ++i)
-        if (!isfinite(x[i])) return gaussian_moments_BAD_ARGUMENT;
-    gaussian_moments_move_guesses(s, x);
-    memcpy(s->x, x, sizeof s->x);
-    memcpy(s->carry, carry, sizeof s->carry);
-    return gaussian_moments_OK;
+    for (int i = 0; i < gaussian_moments_DIM; ++i) history->difference[0][i] += s->x[i] - from[i];
 }
 
 gaussian_moments_status gaussian_moments_set_state(gaussian_moments_solver *s,
     const double x[gaussian_moments_DIM])
 {
-    double to[gaussian_moments_DIM], carry[gaussian_moments_DIM] = { 0.0 };
-    if (s == NULL || x == NULL) return gaussian_moments_BAD_ARGUMENT;
-    memcpy(to, x, sizeof to); /* which may be a part of *s */
-    return gaussian_moments_place(s, to, carry);
+    if (s == NULL || x == NULL || !gaussian_moments_finite(x, gaussian_moments_DIM))
+        return gaussian_moments_BAD_ARGUMENT;
+    double from[gaussian_moments_DIM];
+    memcpy(from, s->x, sizeof from);
+    memmove(s->x, x, sizeof s->x); /* x may be a part of *s */
+    memset(s->carry, 0, sizeof s->carry);
+    gaussian_moments_move_guesses(s, from);
+    return gaussian_moments_OK;
 }
 
 gaussian_moments_status gaussian_moments_kick(gaussian_moments_solver *s,
     const double change[gaussian_moments_DIM])
 {
-    double to[gaussian_moments_DIM], carry[gaussian_moments_DIM];
     if (s == NULL || change == NULL) return gaussian_moments_BAD_ARGUMENT;
-    for (int i = 0; i < gaussian_moments_DIM; ++i) {
-        const double sum = s->x[i] + change[i], added = sum - s->x[i];
-        const double lost = ((s->x[i] - (sum - added)) + (change[i] - added)) + s->carry[i];
-        to[i] = sum + lost;
-        carry[i] = lost - (to[i] - sum);
-    }
-    return gaussian_moments_place(s, to, carry);
+    double from[gaussian_moments_DIM];
+    memcpy(from, s->x, sizeof from);
+    if (!gaussian_moments_advance(s, change, s->carry)) return gaussian_moments_BAD_ARGUMENT;
+    gaussian_moments_move_guesses(s, from);
+    return gaussian_moments_OK;
 }
 
 /* ---- The solver ---- */
@@ -453,12 +448,11 @@ gaussian_moments_status gaussian_moments_init(gaussian_moments_solver *s,
     gaussian_moments_solver fresh = { .h = (double)NAN };
     fresh.params = params != NULL ? *params : gaussian_moments_default_params;
     memcpy(fresh.x, x0, sizeof fresh.x);
-    for (int i = 0; i < gaussian_moments_DIM; ++i)
-        if (!isfinite(fresh.x[i])) return gaussian_moments_BAD_ARGUMENT;
-    if (!gaussian_moments_allowed(&fresh.params)) return gaussian_moments_BAD_ARGUMENT;
+    if (!gaussian_moments_finite(fresh.x, gaussian_moments_DIM) || !gaussian_moments_allowed(&fresh.params))
+        return gaussian_moments_BAD_ARGUMENT;
     gaussian_moments_prepare(&fresh.params, gaussian_moments_SHORT_STEP, fresh.coef);
-    for (int k = 0; k < gaussian_moments_COEFFICIENTS; ++k)
-        if (!isfinite(fresh.coef[k])) return gaussian_moments_BAD_ARGUMENT;
+    if (!gaussian_moments_finite(fresh.coef, gaussian_moments_COEFFICIENTS))
+        return gaussian_moments_BAD_ARGUMENT;
     *s = fresh;
     return gaussian_moments_OK;
 }
@@ -497,8 +491,10 @@ gaussian_moments_status gaussian_moments_integrate(gaussian_moments_solver *s, d
     return status;
 }
 
-gaussian_moments_status gaussian_moments_step(gaussian_moments_solver *s,
-    double h) { return gaussian_moments_integrate(s, h, 1); }
+gaussian_moments_status gaussian_moments_step(gaussian_moments_solver *s, double h)
+{
+    return gaussian_moments_integrate(s, h, 1);
+}
 
 const char *gaussian_moments_status_string(gaussian_moments_status status)
 {

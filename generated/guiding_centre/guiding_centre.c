@@ -22,7 +22,7 @@
  *   5. Between steps
  *   6. The solver
  *   7. Ensembles
- * body-sha256: eeda3e1593bf115e869976c14a2a26ed9f208cb5be55334406dccb097cd796d5
+ * body-sha256: 87c8bf8854c1740ebbddc879cbf25a7effdba8d7a470fba126d0c9cc4a7a7f40
  */
 #include "guiding_centre.h"
 
@@ -100,10 +100,10 @@ static void guiding_centre_generate(const double coef[5], const double y[4], dou
 double guiding_centre_hamiltonian(const guiding_centre_params *params, const double x[4])
 {
     if (params == NULL) params = &guiding_centre_default_params;
-    const double kappa = params->kappa, mu = params->mu, k = params->k, x_ = x[0], y = x[1], z = x[2], u =
-        x[3];
-    const double t1 = 0.5 * (k * (z * z)) + (0.5 * (u * u) + mu * sqrt(1.0 + kappa * kappa * (x_ * x_ + y
-        * y)));
+    const double kappa = params->kappa, mu = params->mu, k = params->k, x_ = x[0], y = x[1], z = x[2],
+        u = x[3];
+    const double t1 = 0.5 * (k * (z * z)) + (0.5 * (u * u) + mu * sqrt(1.0 + kappa * kappa * (x_ * x_
+        + y * y)));
     return t1;
 }
 
@@ -115,8 +115,8 @@ void guiding_centre_casimirs(const guiding_centre_params *params, const double x
 void guiding_centre_vector_field(const guiding_centre_params *params, const double x[4], double out[4])
 {
     if (params == NULL) params = &guiding_centre_default_params;
-    const double kappa = params->kappa, mu = params->mu, k = params->k, x_ = x[0], y = x[1], z = x[2], u =
-        x[3];
+    const double kappa = params->kappa, mu = params->mu, k = params->k, x_ = x[0], y = x[1], z = x[2],
+        u = x[3];
     const double t1 = k * z, t2 = kappa * x_, t3 = kappa * kappa, t4 = 1.0 + t3 * (x_ * x_ + y * y);
     const double t5 = sqrt(t4), t6 = kappa * u, t7 = t5 + 2.0 * (t6 / t4), t8 = 1.0 / (t5 * t7);
     const double t9 = t2 * t8, t10 = 1.0 / t5, t11 = t3 * (mu * t10), t12 = y * t11, t13 = kappa * y;
@@ -130,6 +130,13 @@ void guiding_centre_vector_field(const guiding_centre_params *params, const doub
 }
 
 /* ---- Compensated sums, linear equations ---- */
+static int guiding_centre_finite(const double *values, int count)
+{
+    for (int k = 0; k < count; ++k)
+        if (!isfinite(values[k])) return 0;
+    return 1;
+}
+
 /* x + change + small in compensated arithmetic, where small is the carry and what is as small: were that
    rounded with the change, corrections of one sign would add up to a drift. 0, and x as before, if the sum is
    not finite. */
@@ -244,8 +251,8 @@ static int guiding_centre_plausible(const guiding_centre_solver *s, int stage,
         size += fabs(guiding_centre_fractions[stage] * s->h * field[i]);
     if (moved <= guiding_centre_PLAUSIBLE * size) return 1;
     const double before = guiding_centre_hamiltonian(&s->params, s->x);
-    const double after = guiding_centre_hamiltonian(&s->params, end), between =
-        guiding_centre_hamiltonian(&s->params, middle);
+    const double after = guiding_centre_hamiltonian(&s->params, end),
+        between = guiding_centre_hamiltonian(&s->params, middle);
     return fabs(after - before) <= guiding_centre_LOST * (fabs(before) + fabs(between) + fabs(after));
 }
 
@@ -591,8 +598,8 @@ static guiding_centre_status guiding_centre_attempt(guiding_centre_solver *s, in
         change[guiding_centre_DIM], jacobian[guiding_centre_DIM * guiding_centre_DIM], previous = HUGE_VAL;
     if (!guiding_centre_predict(&s->history[stage], y)) memcpy(y, s->x, sizeof y);
     guiding_centre_generate(coef, y, p, jacobian);
-    for (int iteration = 0, made = 0; iteration < guiding_centre_MAX_ITERATIONS && made <=
-        guiding_centre_MOST_PIECES; ++iteration) {
+    for (int iteration = 0, made = 0; iteration < guiding_centre_MAX_ITERATIONS
+        && made <= guiding_centre_MOST_PIECES; ++iteration) {
         if (!guiding_centre_residual(s, coef, p, y, residual, change, jacobian, &made))
             return guiding_centre_NO_CONVERGENCE;
         double size = 0.0, norm = DBL_MIN;
@@ -624,14 +631,13 @@ static guiding_centre_status guiding_centre_attempt(guiding_centre_solver *s, in
 /* how far the state may be moved, in its own size, for guesses to move with it */
 #define guiding_centre_NEAR_BY 0.125
 
-/* Guesses move with the state, by as many past values as extrapolation needs; recurrences are of the motion
-   as it was. From far away all begins anew, with the next step. */
-static void guiding_centre_move_guesses(guiding_centre_solver *s, const double to[guiding_centre_DIM])
+/* Guesses move with the state. From far away all begins anew, with the next step. */
+static void guiding_centre_move_guesses(guiding_centre_solver *s, const double from[guiding_centre_DIM])
 {
     double distance = 0.0, size = 0.0;
     for (int i = 0; i < guiding_centre_DIM; ++i) {
-        distance += fabs(to[i] - s->x[i]);
-        size += fabs(s->x[i]);
+        distance += fabs(s->x[i] - from[i]);
+        size += fabs(from[i]);
     }
     if (!(distance <= guiding_centre_NEAR_BY * size)) {
         s->h = (double)NAN;
@@ -639,41 +645,30 @@ static void guiding_centre_move_guesses(guiding_centre_solver *s, const double t
     }
     for (int stage = 0; stage < guiding_centre_STAGES; ++stage) {
         guiding_centre_history *history = &s->history[stage];
-        for (int i = 0; i < guiding_centre_DIM; ++i) history->difference[0][i] += to[i] - s->x[i];
+        for (int i = 0; i < guiding_centre_DIM; ++i) history->difference[0][i] += s->x[i] - from[i];
     }
-}
-
-/* Stand at x + carry from now on. */
-static guiding_centre_status guiding_centre_place(guiding_centre_solver *s,
-    const double x[guiding_centre_DIM], const double carry[guiding_centre_DIM])
-{
-    for (int i = 0; i < guiding_centre_DIM; ++i)
-        if (!isfinite(x[i])) return guiding_centre_BAD_ARGUMENT;
-    guiding_centre_move_guesses(s, x);
-    memcpy(s->x, x, sizeof s->x);
-    memcpy(s->carry, carry, sizeof s->carry);
-    return guiding_centre_OK;
 }
 
 guiding_centre_status guiding_centre_set_state(guiding_centre_solver *s, const double x[guiding_centre_DIM])
 {
-    double to[guiding_centre_DIM], carry[guiding_centre_DIM] = { 0.0 };
-    if (s == NULL || x == NULL) return guiding_centre_BAD_ARGUMENT;
-    memcpy(to, x, sizeof to); /* which may be a part of *s */
-    return guiding_centre_place(s, to, carry);
+    if (s == NULL || x == NULL || !guiding_centre_finite(x, guiding_centre_DIM))
+        return guiding_centre_BAD_ARGUMENT;
+    double from[guiding_centre_DIM];
+    memcpy(from, s->x, sizeof from);
+    memmove(s->x, x, sizeof s->x); /* x may be a part of *s */
+    memset(s->carry, 0, sizeof s->carry);
+    guiding_centre_move_guesses(s, from);
+    return guiding_centre_OK;
 }
 
 guiding_centre_status guiding_centre_kick(guiding_centre_solver *s, const double change[guiding_centre_DIM])
 {
-    double to[guiding_centre_DIM], carry[guiding_centre_DIM];
     if (s == NULL || change == NULL) return guiding_centre_BAD_ARGUMENT;
-    for (int i = 0; i < guiding_centre_DIM; ++i) {
-        const double sum = s->x[i] + change[i], added = sum - s->x[i];
-        const double lost = ((s->x[i] - (sum - added)) + (change[i] - added)) + s->carry[i];
-        to[i] = sum + lost;
-        carry[i] = lost - (to[i] - sum);
-    }
-    return guiding_centre_place(s, to, carry);
+    double from[guiding_centre_DIM];
+    memcpy(from, s->x, sizeof from);
+    if (!guiding_centre_advance(s, change, s->carry)) return guiding_centre_BAD_ARGUMENT;
+    guiding_centre_move_guesses(s, from);
+    return guiding_centre_OK;
 }
 
 /* ---- The solver ---- */
@@ -687,12 +682,11 @@ guiding_centre_status guiding_centre_init(guiding_centre_solver *s, const guidin
     guiding_centre_solver fresh = { .h = (double)NAN };
     fresh.params = params != NULL ? *params : guiding_centre_default_params;
     memcpy(fresh.x, x0, sizeof fresh.x);
-    for (int i = 0; i < guiding_centre_DIM; ++i)
-        if (!isfinite(fresh.x[i])) return guiding_centre_BAD_ARGUMENT;
-    if (!guiding_centre_allowed(&fresh.params)) return guiding_centre_BAD_ARGUMENT;
+    if (!guiding_centre_finite(fresh.x, guiding_centre_DIM) || !guiding_centre_allowed(&fresh.params))
+        return guiding_centre_BAD_ARGUMENT;
     guiding_centre_prepare(&fresh.params, guiding_centre_SHORT_STEP, fresh.coef[0]);
-    for (int k = 0; k < guiding_centre_COEFFICIENTS; ++k)
-        if (!isfinite(fresh.coef[0][k])) return guiding_centre_BAD_ARGUMENT;
+    if (!guiding_centre_finite(fresh.coef[0], guiding_centre_COEFFICIENTS))
+        return guiding_centre_BAD_ARGUMENT;
     *s = fresh;
     return guiding_centre_OK;
 }
@@ -748,8 +742,10 @@ guiding_centre_status guiding_centre_integrate(guiding_centre_solver *s, double 
     return status;
 }
 
-guiding_centre_status guiding_centre_step(guiding_centre_solver *s,
-    double h) { return guiding_centre_integrate(s, h, 1); }
+guiding_centre_status guiding_centre_step(guiding_centre_solver *s, double h)
+{
+    return guiding_centre_integrate(s, h, 1);
+}
 
 const char *guiding_centre_status_string(guiding_centre_status status)
 {

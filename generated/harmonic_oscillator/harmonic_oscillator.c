@@ -21,7 +21,7 @@
  *   5. Between steps
  *   6. The solver
  *   7. Ensembles
- * body-sha256: c3533daaaf9c0cbad4f97708fa35072efd6307e4233627169f02359a68a9349d
+ * body-sha256: f0ba36e03cb903302b93fb7f65c401eea5ff968829c2cd1d6f5112a66a683d19
  */
 #include "harmonic_oscillator.h"
 
@@ -104,6 +104,13 @@ void harmonic_oscillator_vector_field(const harmonic_oscillator_params *params, 
 }
 
 /* ---- Compensated sums, linear equations ---- */
+static int harmonic_oscillator_finite(const double *values, int count)
+{
+    for (int k = 0; k < count; ++k)
+        if (!isfinite(values[k])) return 0;
+    return 1;
+}
+
 /* x + change + small in compensated arithmetic, where small is the carry and what is as small: were that
    rounded with the change, corrections of one sign would add up to a drift. 0, and x as before, if the sum is
    not finite. */
@@ -220,8 +227,8 @@ static int harmonic_oscillator_plausible(const harmonic_oscillator_solver *s,
     for (int i = 0; i < harmonic_oscillator_DIM; ++i) size += fabs(s->h * field[i]);
     if (moved <= harmonic_oscillator_PLAUSIBLE * size) return 1;
     const double before = harmonic_oscillator_hamiltonian(&s->params, s->x);
-    const double after = harmonic_oscillator_hamiltonian(&s->params, end), between =
-        harmonic_oscillator_hamiltonian(&s->params, middle);
+    const double after = harmonic_oscillator_hamiltonian(&s->params, end),
+        between = harmonic_oscillator_hamiltonian(&s->params, middle);
     return fabs(after - before) <= harmonic_oscillator_LOST * (fabs(before) + fabs(between) + fabs(after));
 }
 
@@ -270,8 +277,8 @@ static harmonic_oscillator_status harmonic_oscillator_attempt(harmonic_oscillato
         if (!regular) return harmonic_oscillator_SINGULAR;
         for (int i = 0; i < harmonic_oscillator_DIM; ++i) y[i] -= delta[i];
         const double remaining = size * size * (growth > 1.0 ? growth : 1.0);
-        const int stalled = previous < harmonic_oscillator_NEARLY_SOLVED && size
-            > harmonic_oscillator_SHRINKING * previous;
+        const int stalled = previous < harmonic_oscillator_NEARLY_SOLVED
+            && size > harmonic_oscillator_SHRINKING * previous;
         previous = size;
         if (!(remaining <= harmonic_oscillator_TOLERANCE || stalled)) continue;
         double small[harmonic_oscillator_DIM] = { 0.0 }; /* the correction of the increment, and the carry */
@@ -292,57 +299,45 @@ static harmonic_oscillator_status harmonic_oscillator_attempt(harmonic_oscillato
 /* how far the state may be moved, in its own size, for guesses to move with it */
 #define harmonic_oscillator_NEAR_BY 0.125
 
-/* Guesses move with the state, by as many past values as extrapolation needs; recurrences are of the motion
-   as it was. From far away all begins anew, with the next step. */
+/* Guesses move with the state. From far away all begins anew, with the next step. */
 static void harmonic_oscillator_move_guesses(harmonic_oscillator_solver *s,
-    const double to[harmonic_oscillator_DIM])
+    const double from[harmonic_oscillator_DIM])
 {
     double distance = 0.0, size = 0.0;
     for (int i = 0; i < harmonic_oscillator_DIM; ++i) {
-        distance += fabs(to[i] - s->x[i]);
-        size += fabs(s->x[i]);
+        distance += fabs(s->x[i] - from[i]);
+        size += fabs(from[i]);
     }
     if (!(distance <= harmonic_oscillator_NEAR_BY * size)) {
         s->h = (double)NAN;
         return;
     }
     harmonic_oscillator_history *history = &s->history;
-    for (int i = 0; i < harmonic_oscillator_DIM; ++i) history->difference[0][i] += to[i] - s->x[i];
-}
-
-/* Stand at x + carry from now on. */
-static harmonic_oscillator_status harmonic_oscillator_place(harmonic_oscillator_solver *s,
-    const double x[harmonic_oscillator_DIM], const double carry[harmonic_oscillator_DIM])
-{
-    for (int i = 0; i < harmonic_oscillator_DIM; ++i)
-        if (!isfinite(x[i])) return harmonic_oscillator_BAD_ARGUMENT;
-    harmonic_oscillator_move_guesses(s, x);
-    memcpy(s->x, x, sizeof s->x);
-    memcpy(s->carry, carry, sizeof s->carry);
-    return harmonic_oscillator_OK;
+    for (int i = 0; i < harmonic_oscillator_DIM; ++i) history->difference[0][i] += s->x[i] - from[i];
 }
 
 harmonic_oscillator_status harmonic_oscillator_set_state(harmonic_oscillator_solver *s,
     const double x[harmonic_oscillator_DIM])
 {
-    double to[harmonic_oscillator_DIM], carry[harmonic_oscillator_DIM] = { 0.0 };
-    if (s == NULL || x == NULL) return harmonic_oscillator_BAD_ARGUMENT;
-    memcpy(to, x, sizeof to); /* which may be a part of *s */
-    return harmonic_oscillator_place(s, to, carry);
+    if (s == NULL || x == NULL || !harmonic_oscillator_finite(x, harmonic_oscillator_DIM))
+        return harmonic_oscillator_BAD_ARGUMENT;
+    double from[harmonic_oscillator_DIM];
+    memcpy(from, s->x, sizeof from);
+    memmove(s->x, x, sizeof s->x); /* x may be a part of *s */
+    memset(s->carry, 0, sizeof s->carry);
+    harmonic_oscillator_move_guesses(s, from);
+    return harmonic_oscillator_OK;
 }
 
 harmonic_oscillator_status harmonic_oscillator_kick(harmonic_oscillator_solver *s,
     const double change[harmonic_oscillator_DIM])
 {
-    double to[harmonic_oscillator_DIM], carry[harmonic_oscillator_DIM];
     if (s == NULL || change == NULL) return harmonic_oscillator_BAD_ARGUMENT;
-    for (int i = 0; i < harmonic_oscillator_DIM; ++i) {
-        const double sum = s->x[i] + change[i], added = sum - s->x[i];
-        const double lost = ((s->x[i] - (sum - added)) + (change[i] - added)) + s->carry[i];
-        to[i] = sum + lost;
-        carry[i] = lost - (to[i] - sum);
-    }
-    return harmonic_oscillator_place(s, to, carry);
+    double from[harmonic_oscillator_DIM];
+    memcpy(from, s->x, sizeof from);
+    if (!harmonic_oscillator_advance(s, change, s->carry)) return harmonic_oscillator_BAD_ARGUMENT;
+    harmonic_oscillator_move_guesses(s, from);
+    return harmonic_oscillator_OK;
 }
 
 /* ---- The solver ---- */
@@ -357,12 +352,11 @@ harmonic_oscillator_status harmonic_oscillator_init(harmonic_oscillator_solver *
     harmonic_oscillator_solver fresh = { .h = (double)NAN };
     fresh.params = params != NULL ? *params : harmonic_oscillator_default_params;
     memcpy(fresh.x, x0, sizeof fresh.x);
-    for (int i = 0; i < harmonic_oscillator_DIM; ++i)
-        if (!isfinite(fresh.x[i])) return harmonic_oscillator_BAD_ARGUMENT;
-    if (!harmonic_oscillator_allowed(&fresh.params)) return harmonic_oscillator_BAD_ARGUMENT;
+    if (!harmonic_oscillator_finite(fresh.x, harmonic_oscillator_DIM)
+        || !harmonic_oscillator_allowed(&fresh.params)) return harmonic_oscillator_BAD_ARGUMENT;
     harmonic_oscillator_prepare(&fresh.params, harmonic_oscillator_SHORT_STEP, fresh.coef);
-    for (int k = 0; k < harmonic_oscillator_COEFFICIENTS; ++k)
-        if (!isfinite(fresh.coef[k])) return harmonic_oscillator_BAD_ARGUMENT;
+    if (!harmonic_oscillator_finite(fresh.coef, harmonic_oscillator_COEFFICIENTS))
+        return harmonic_oscillator_BAD_ARGUMENT;
     *s = fresh;
     return harmonic_oscillator_OK;
 }
@@ -402,8 +396,10 @@ harmonic_oscillator_status harmonic_oscillator_integrate(harmonic_oscillator_sol
     return status;
 }
 
-harmonic_oscillator_status harmonic_oscillator_step(harmonic_oscillator_solver *s,
-    double h) { return harmonic_oscillator_integrate(s, h, 1); }
+harmonic_oscillator_status harmonic_oscillator_step(harmonic_oscillator_solver *s, double h)
+{
+    return harmonic_oscillator_integrate(s, h, 1);
+}
 
 const char *harmonic_oscillator_status_string(harmonic_oscillator_status status)
 {

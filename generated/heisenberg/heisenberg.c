@@ -22,7 +22,7 @@
  *   5. The flows
  *   6. What is seen at sites
  *   7. Steps by hand
- * body-sha256: ad673d1ac62f688e9a804863753754e1dceceab7d7a3b4e6535d5c09e6c503ee
+ * body-sha256: 9236e9befe259827e52590c22c185a0e2124f01f7ee76f357d897916e7166b74
  */
 #include "heisenberg.h"
 
@@ -144,8 +144,8 @@ typedef struct {
 /* The piece of that number. */
 static inline heisenberg_piece heisenberg_piece_of(const heisenberg_solver *s, size_t unit)
 {
-    const size_t pieces = heisenberg_pieces(s), index = pieces == 1 ? unit : unit / pieces, part = unit
-        - index * pieces;
+    const size_t pieces = heisenberg_pieces(s), index = pieces == 1 ? unit : unit / pieces,
+        part = unit - index * pieces;
     heisenberg_piece piece;
     heisenberg_locate(s, index, &piece.row);
     piece.from = (ptrdiff_t)part * heisenberg_PIECE;
@@ -160,8 +160,8 @@ static inline heisenberg_piece heisenberg_piece_of(const heisenberg_solver *s, s
    beyond |u| = 10^6. */
 static inline double heisenberg_turned_sin(double u, double offset)
 {
-    const double shifted = (u * 0.3183098861837907 + offset) + heisenberg_ROUNDER, k =
-        (shifted - heisenberg_ROUNDER) - offset;
+    const double shifted = (u * 0.3183098861837907 + offset) + heisenberg_ROUNDER,
+        k = (shifted - heisenberg_ROUNDER) - offset;
     const double near = (u - k * 3.141592651605606) - k * 1.9841871479187034e-09;
     const double r = near - k * 1.1442377452219664e-17, q = r * r, qq = q * q;
     uint64_t parity, bits; /* the last bit of shifted is the parity of k + offset */
@@ -217,8 +217,8 @@ static inline void heisenberg_sweep1_near(const double *coef, const heisenberg_r
     heisenberg_EACH_SITE
     for (ptrdiff_t i = from; i < to; ++i) {
         const double y = y_row[i], z = z_row[i];
-        const double t1 = c0 * (x_row4[i] + x_row1[i] + (x_row3[i] + x_row2[i] + (x_row[i + 1]
-            + x_row[i - 1])));
+        const double t1 = c0 * (x_row4[i] + x_row1[i] + (x_row3[i] + x_row2[i]
+            + (x_row[i + 1] + x_row[i - 1])));
         const double t2 = heisenberg_versin_near(t1);
         const double t3 = heisenberg_sin_near(t1);
         const double change0 = -(y * t2 + z * t3);
@@ -243,8 +243,8 @@ static inline void heisenberg_sweep1_far(const double *coef, const heisenberg_ro
     heisenberg_EACH_SITE
     for (ptrdiff_t i = from; i < to; ++i) {
         const double y = y_row[i], z = z_row[i];
-        const double t1 = c0 * (x_row4[i] + x_row1[i] + (x_row3[i] + x_row2[i] + (x_row[i + 1]
-            + x_row[i - 1])));
+        const double t1 = c0 * (x_row4[i] + x_row1[i] + (x_row3[i] + x_row2[i]
+            + (x_row[i + 1] + x_row[i - 1])));
         const double t2 = (2.0 * heisenberg_sin_lane(0.5 * (t1)) * heisenberg_sin_lane(0.5 * (t1)));
         const double t3 = heisenberg_sin_lane(t1);
         const double change0 = -(y * t2 + z * t3);
@@ -269,8 +269,8 @@ static inline void heisenberg_sweep2_near(const double *coef, const heisenberg_r
     heisenberg_EACH_SITE
     for (ptrdiff_t i = from; i < to; ++i) {
         const double x = x_row[i], z = z_row[i];
-        const double t1 = c0 * (y_row4[i] + y_row1[i] + (y_row3[i] + y_row2[i] + (y_row[i + 1]
-            + y_row[i - 1])));
+        const double t1 = c0 * (y_row4[i] + y_row1[i] + (y_row3[i] + y_row2[i]
+            + (y_row[i + 1] + y_row[i - 1])));
         const double t2 = heisenberg_sin_near(t1);
         const double t3 = heisenberg_versin_near(t1);
         const double change0 = z * t2 - x * t3;
@@ -295,8 +295,8 @@ static inline void heisenberg_sweep2_far(const double *coef, const heisenberg_ro
     heisenberg_EACH_SITE
     for (ptrdiff_t i = from; i < to; ++i) {
         const double x = x_row[i], z = z_row[i];
-        const double t1 = c0 * (y_row4[i] + y_row1[i] + (y_row3[i] + y_row2[i] + (y_row[i + 1]
-            + y_row[i - 1])));
+        const double t1 = c0 * (y_row4[i] + y_row1[i] + (y_row3[i] + y_row2[i]
+            + (y_row[i + 1] + y_row[i - 1])));
         const double t2 = heisenberg_sin_lane(t1);
         const double t3 = (2.0 * heisenberg_sin_lane(0.5 * (t1)) * heisenberg_sin_lane(0.5 * (t1)));
         const double change0 = z * t2 - x * t3;
@@ -322,8 +322,8 @@ static inline void heisenberg_sweep3_near(const double *coef, const heisenberg_r
     heisenberg_EACH_SITE
     for (ptrdiff_t i = from; i < to; ++i) {
         const double B = B_row[i], x = x_row[i], y = y_row[i];
-        const double t1 = c2 * (c1 * (z_row1[i] + (z_row4[i] + z_row2[i])) + (B + c1 * z_row[i + 1] + c1
-            * (z_row3[i] + z_row[i - 1])));
+        const double t1 = c2 * (c1 * (z_row1[i] + (z_row4[i] + z_row2[i])) + (B + c1 * z_row[i + 1]
+            + c1 * (z_row3[i] + z_row[i - 1])));
         const double t2 = heisenberg_versin_near(t1);
         const double t3 = heisenberg_sin_near(t1);
         const double change0 = -(x * t2 + y * t3);
@@ -349,8 +349,8 @@ static inline void heisenberg_sweep3_far(const double *coef, const heisenberg_ro
     heisenberg_EACH_SITE
     for (ptrdiff_t i = from; i < to; ++i) {
         const double B = B_row[i], x = x_row[i], y = y_row[i];
-        const double t1 = c2 * (c1 * (z_row1[i] + (z_row4[i] + z_row2[i])) + (B + c1 * z_row[i + 1] + c1
-            * (z_row3[i] + z_row[i - 1])));
+        const double t1 = c2 * (c1 * (z_row1[i] + (z_row4[i] + z_row2[i])) + (B + c1 * z_row[i + 1]
+            + c1 * (z_row3[i] + z_row[i - 1])));
         const double t2 = (2.0 * heisenberg_sin_lane(0.5 * (t1)) * heisenberg_sin_lane(0.5 * (t1)));
         const double t3 = heisenberg_sin_lane(t1);
         const double change0 = -(x * t2 + y * t3);
@@ -414,9 +414,9 @@ static void heisenberg_energy_row(const heisenberg_params *params, const heisenb
     heisenberg_EACH_SITE
     for (ptrdiff_t i = from; i < to; ++i) {
         const double B = B_row[i], x = x_row[i], y = y_row[i], z = z_row[i];
-        const double t1 = J * (z * z_row4[i]) + J * (x * x_row3[i]) + (J * (y * y_row3[i]) + J
-            * (z * z_row3[i])) + (B * z + J * (z * z_row[i + 1]) + (J * (x * x_row[i + 1]) + J
-            * (y * y_row[i + 1])));
+        const double t1 = J * (z * z_row4[i]) + J * (x * x_row3[i]) + (J * (y * y_row3[i])
+            + J * (z * z_row3[i])) + (B * z + J * (z * z_row[i + 1]) + (J * (x * x_row[i + 1])
+            + J * (y * y_row[i + 1])));
         out[i - from] = -(J * (y * y_row4[i]) + J * (x * x_row4[i]) + t1);
     }
 }
@@ -591,8 +591,8 @@ heisenberg_status heisenberg_init(heisenberg_solver *s, const heisenberg_params 
     ptrdiff_t width;
     if (s == NULL || sizes == NULL || x0 == NULL || work == NULL) return heisenberg_BAD_ARGUMENT;
     const heisenberg_params own = params != NULL ? *params : heisenberg_default_params;
-    const size_t rows = heisenberg_shape(sizes, &width), length = sizes[heisenberg_AXES - 1], sites = rows
-        * length;
+    const size_t rows = heisenberg_shape(sizes, &width), length = sizes[heisenberg_AXES - 1],
+        sites = rows * length;
     if (rows == 0 || !heisenberg_finite(x0, heisenberg_DIM * sites) || !heisenberg_allowed(&own, sites))
         return heisenberg_BAD_ARGUMENT;
     double coef[heisenberg_COEFFICIENTS];
@@ -670,8 +670,8 @@ static void heisenberg_flow(const heisenberg_solver *s, int flow)
 {
     const int joined = flow == heisenberg_FLOWS, row = joined ? heisenberg_JOINED
         : heisenberg_flow_rows[flow];
-    heisenberg_sweep_part(s, heisenberg_flow_parts[joined ? 0 : flow], s->coef + row * heisenberg_ROW, s->far
-        > 0);
+    heisenberg_sweep_part(s, heisenberg_flow_parts[joined ? 0 : flow], s->coef + row * heisenberg_ROW,
+        s->far > 0);
 }
 
 /* Some steps, joined, without the last flow; no steps are that flow alone. */
@@ -806,12 +806,18 @@ static void heisenberg_fill(const heisenberg_solver *s, heisenberg_kernel *kerne
     }
 }
 
-void heisenberg_density(const heisenberg_solver *s, double *out) { heisenberg_fill(s, heisenberg_energy_row,
-    out); }
-void heisenberg_casimirs(const heisenberg_solver *s, double *out) { heisenberg_fill(s,
-    heisenberg_casimirs_row, out); }
-void heisenberg_vector_field(const heisenberg_solver *s, double *out) { heisenberg_fill(s,
-    heisenberg_vector_field_row, out); }
+void heisenberg_density(const heisenberg_solver *s, double *out)
+{
+    heisenberg_fill(s, heisenberg_energy_row, out);
+}
+void heisenberg_casimirs(const heisenberg_solver *s, double *out)
+{
+    heisenberg_fill(s, heisenberg_casimirs_row, out);
+}
+void heisenberg_vector_field(const heisenberg_solver *s, double *out)
+{
+    heisenberg_fill(s, heisenberg_vector_field_row, out);
+}
 
 /* ---- Steps by hand ---- */
 size_t heisenberg_stages(void) { return heisenberg_FLOWS; }
@@ -826,8 +832,10 @@ heisenberg_status heisenberg_describe(size_t number, heisenberg_stage *about)
 heisenberg_status heisenberg_begin(heisenberg_solver *s, double h) { return heisenberg_set_step(s, h); }
 
 /* The rows of a plane. */
-static size_t heisenberg_rows_of_plane(const heisenberg_solver *s) { return s->rows / (heisenberg_AXES > 1
-    ? s->sizes[0] : 1); }
+static size_t heisenberg_rows_of_plane(const heisenberg_solver *s)
+{
+    return s->rows / (heisenberg_AXES > 1 ? s->sizes[0] : 1);
+}
 
 heisenberg_status heisenberg_sweep(heisenberg_solver *s, size_t number, int far, size_t from, size_t to)
 {

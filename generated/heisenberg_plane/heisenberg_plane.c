@@ -21,7 +21,7 @@
  *   4. The solver
  *   5. The flows
  *   6. What is seen at sites
- * body-sha256: d1affdde0b24446d9a6e976227af436bbc6f40111835f2fee3923aa470b90d73
+ * body-sha256: bec6e28ef58abea85b5fa21b7f274ddb108fa19d337445ab31765c43a18c7f7e
  */
 #include "heisenberg_plane.h"
 
@@ -48,8 +48,8 @@ static const size_t heisenberg_plane_periods[heisenberg_plane_AXES] = { 1, 1 };
 static const int heisenberg_plane_open[heisenberg_plane_AXES] = { 1, 1 };
 
 /* The rows that kernels read, by their offsets along all axes but the last. */
-static const int heisenberg_plane_lines[heisenberg_plane_LINES][heisenberg_plane_AXES] =
-    { { 0, 0 }, { -1, 0 }, { 1, 0 } };
+static const int heisenberg_plane_lines[heisenberg_plane_LINES][heisenberg_plane_AXES] = { { 0, 0 },
+    { -1, 0 }, { 1, 0 } };
 
 /* The terms of H that open ends take away: the least and the largest offsets that they reach along each
    axis. */
@@ -167,8 +167,8 @@ typedef struct {
 /* The piece of that number. */
 static inline heisenberg_plane_piece heisenberg_plane_piece_of(const heisenberg_plane_solver *s, size_t unit)
 {
-    const size_t pieces = heisenberg_plane_pieces(s), index = pieces == 1 ? unit : unit / pieces, part = unit
-        - index * pieces;
+    const size_t pieces = heisenberg_plane_pieces(s), index = pieces == 1 ? unit : unit / pieces,
+        part = unit - index * pieces;
     heisenberg_plane_piece piece;
     heisenberg_plane_locate(s, index, &piece.row);
     piece.from = (ptrdiff_t)part * heisenberg_plane_PIECE;
@@ -183,8 +183,8 @@ static inline heisenberg_plane_piece heisenberg_plane_piece_of(const heisenberg_
    beyond |u| = 10^6. */
 static inline double heisenberg_plane_turned_sin(double u, double offset)
 {
-    const double shifted = (u * 0.3183098861837907 + offset) + heisenberg_plane_ROUNDER, k =
-        (shifted - heisenberg_plane_ROUNDER) - offset;
+    const double shifted = (u * 0.3183098861837907 + offset) + heisenberg_plane_ROUNDER,
+        k = (shifted - heisenberg_plane_ROUNDER) - offset;
     const double near = (u - k * 3.141592651605606) - k * 1.9841871479187034e-09;
     const double r = near - k * 1.1442377452219664e-17, q = r * r, qq = q * q;
     uint64_t parity, bits; /* the last bit of shifted is the parity of k + offset */
@@ -379,10 +379,10 @@ static void heisenberg_plane_vector_field_row(const heisenberg_plane_params *par
         const double w1 = i - 1 >= 0 ? row->present[1] : 0.0;
         const double t1 = w0 * (delta * (J * z_row[i + 1])) + w1 * (J * (delta * z_row[i - 1]))
             + (w3 * (J * (delta * z_row1[i])) + w2 * (delta * (J * z_row2[i])));
-        const double t2 = w3 * (J * y_row1[i]) + w2 * (J * y_row2[i]) + (w0 * (J * y_row[i + 1]) + w1
-            * (J * y_row[i - 1]));
-        const double t3 = w2 * (J * x_row2[i]) + w3 * (J * x_row1[i]) + (w0 * (J * x_row[i + 1]) + w1
-            * (J * x_row[i - 1]));
+        const double t2 = w3 * (J * y_row1[i]) + w2 * (J * y_row2[i]) + (w0 * (J * y_row[i + 1])
+            + w1 * (J * y_row[i - 1]));
+        const double t3 = w2 * (J * x_row2[i]) + w3 * (J * x_row1[i]) + (w0 * (J * x_row[i + 1])
+            + w1 * (J * x_row[i - 1]));
         out[i - from] = y * t1 - z * t2;
         out[(ptrdiff_t)apart + i - from] = z * t3 - x * t1;
         out[2 * (ptrdiff_t)apart + i - from] = x * t2 - y * t3;
@@ -408,8 +408,8 @@ static size_t heisenberg_plane_shape(const size_t sizes[heisenberg_plane_AXES], 
     const size_t most = SIZE_MAX / 64 / heisenberg_plane_RESERVED;
     size_t rows = 1;
     for (int a = 0; a < heisenberg_plane_AXES; ++a) {
-        if (sizes[a] < heisenberg_plane_least[a] || sizes[a] % heisenberg_plane_periods[a] != 0 || sizes[a]
-            > most / 2) return 0;
+        if (sizes[a] < heisenberg_plane_least[a] || sizes[a] % heisenberg_plane_periods[a] != 0
+            || sizes[a] > most / 2) return 0;
         if (a < heisenberg_plane_AXES - 1) {
             if (rows > most / sizes[a]) return 0;
             rows *= sizes[a];
@@ -570,8 +570,8 @@ static void heisenberg_plane_flow(const heisenberg_plane_solver *s, int flow)
 {
     const int joined = flow == heisenberg_plane_FLOWS, row = joined ? heisenberg_plane_JOINED
         : heisenberg_plane_flow_rows[flow];
-    heisenberg_plane_sweep_part(s, heisenberg_plane_flow_parts[joined ? 0 : flow], s->coef + row
-        * heisenberg_plane_ROW, s->far > 0);
+    heisenberg_plane_sweep_part(s, heisenberg_plane_flow_parts[joined ? 0 : flow],
+        s->coef + row * heisenberg_plane_ROW, s->far > 0);
 }
 
 /* Some steps, joined, without the last flow; no steps are that flow alone. */
@@ -627,8 +627,10 @@ heisenberg_plane_status heisenberg_plane_integrate(heisenberg_plane_solver *s, d
     return status;
 }
 
-heisenberg_plane_status heisenberg_plane_step(heisenberg_plane_solver *s,
-    double h) { return heisenberg_plane_integrate(s, h, 1); }
+heisenberg_plane_status heisenberg_plane_step(heisenberg_plane_solver *s, double h)
+{
+    return heisenberg_plane_integrate(s, h, 1);
+}
 
 /* The sites of fields, without what is beside their rows. */
 static void heisenberg_plane_take(const heisenberg_plane_solver *s,
@@ -640,8 +642,10 @@ static void heisenberg_plane_take(const heisenberg_plane_solver *s,
                 (size_t)s->length * sizeof *x);
 }
 
-void heisenberg_plane_state(const heisenberg_plane_solver *s, double *x) { heisenberg_plane_take(s, s->x, x);
-    }
+void heisenberg_plane_state(const heisenberg_plane_solver *s, double *x)
+{
+    heisenberg_plane_take(s, s->x, x);
+}
 
 int heisenberg_plane_saved(const heisenberg_plane_solver *s, double *x, size_t *far)
 {
@@ -698,12 +702,18 @@ static void heisenberg_plane_fill(const heisenberg_plane_solver *s, heisenberg_p
     }
 }
 
-void heisenberg_plane_density(const heisenberg_plane_solver *s, double *out) { heisenberg_plane_fill(s,
-    heisenberg_plane_energy_row, out); }
-void heisenberg_plane_casimirs(const heisenberg_plane_solver *s, double *out) { heisenberg_plane_fill(s,
-    heisenberg_plane_casimirs_row, out); }
-void heisenberg_plane_vector_field(const heisenberg_plane_solver *s, double *out) { heisenberg_plane_fill(s,
-    heisenberg_plane_vector_field_row, out); }
+void heisenberg_plane_density(const heisenberg_plane_solver *s, double *out)
+{
+    heisenberg_plane_fill(s, heisenberg_plane_energy_row, out);
+}
+void heisenberg_plane_casimirs(const heisenberg_plane_solver *s, double *out)
+{
+    heisenberg_plane_fill(s, heisenberg_plane_casimirs_row, out);
+}
+void heisenberg_plane_vector_field(const heisenberg_plane_solver *s, double *out)
+{
+    heisenberg_plane_fill(s, heisenberg_plane_vector_field_row, out);
+}
 
 const char *heisenberg_plane_status_string(heisenberg_plane_status status)
 {

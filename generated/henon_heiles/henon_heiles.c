@@ -21,7 +21,7 @@
  *   5. Between steps
  *   6. The solver
  *   7. Ensembles
- * body-sha256: 512900b523e70912e62981e1dabdca9d5b4d9869c2998864373d3547e6753c0d
+ * body-sha256: aa13f5230bb6e1dad20d629546a6567c3e8fadd155206a8c82b964f9af176d0f
  */
 #include "henon_heiles.h"
 
@@ -85,8 +85,8 @@ static void henon_heiles_linearise(const double coef[24], const double y[4], dou
     const double t14 = y_ * (coef[6] + coef[7] * y_);
     const double p_x = t8 * t2 + x * (t11 + (coef[2] + coef[8] * t3) + y_ * (t13 + t14));
     const double t15 = coef[1] * t8, t16 = coef[4] * t9 + coef[3] * t10 + (coef[2] + coef[6] * t3);
-    const double p_y = coef[10] * t9 + coef[11] * t10 + x * (t15 + x * (coef[14] + t6)) + y_
-        * (t16 + y_ * (coef[12] + coef[15] * t3 + y_ * (coef[8] + coef[13] * y_)));
+    const double p_y = coef[10] * t9 + coef[11] * t10 + x * (t15 + x * (coef[14] + t6))
+        + y_ * (t16 + y_ * (coef[12] + coef[15] * t3 + y_ * (coef[8] + coef[13] * y_)));
     /* displacement */
     displacement[0] = (-0.5) * p_px;
     displacement[1] = (-0.5) * p_py;
@@ -164,6 +164,13 @@ void henon_heiles_vector_field(const henon_heiles_params *params, const double x
 }
 
 /* ---- Compensated sums, linear equations ---- */
+static int henon_heiles_finite(const double *values, int count)
+{
+    for (int k = 0; k < count; ++k)
+        if (!isfinite(values[k])) return 0;
+    return 1;
+}
+
 /* x + change + small in compensated arithmetic, where small is the carry and what is as small: were that
    rounded with the change, corrections of one sign would add up to a drift. 0, and x as before, if the sum is
    not finite. */
@@ -273,8 +280,8 @@ static int henon_heiles_plausible(const henon_heiles_solver *s, const double inc
     for (int i = 0; i < henon_heiles_DIM; ++i) size += fabs(s->h * field[i]);
     if (moved <= henon_heiles_PLAUSIBLE * size) return 1;
     const double before = henon_heiles_hamiltonian(&s->params, s->x);
-    const double after = henon_heiles_hamiltonian(&s->params, end), between =
-        henon_heiles_hamiltonian(&s->params, middle);
+    const double after = henon_heiles_hamiltonian(&s->params, end),
+        between = henon_heiles_hamiltonian(&s->params, middle);
     return fabs(after - before) <= henon_heiles_LOST * (fabs(before) + fabs(between) + fabs(after));
 }
 
@@ -305,8 +312,8 @@ static henon_heiles_status henon_heiles_attempt(henon_heiles_solver *s)
 {
     double y[henon_heiles_DIM], delta[henon_heiles_DIM], displacement[henon_heiles_DIM],
         increment[henon_heiles_DIM];
-    double jacobian[henon_heiles_DIM * henon_heiles_DIM], increment_jacobian[henon_heiles_DIM
-        * henon_heiles_DIM];
+    double jacobian[henon_heiles_DIM * henon_heiles_DIM],
+        increment_jacobian[henon_heiles_DIM * henon_heiles_DIM];
     double previous = HUGE_VAL;
     if (!henon_heiles_predict(&s->history, y)) memcpy(y, s->x, sizeof y);
     for (int iteration = 1; iteration <= henon_heiles_MAX_ITERATIONS; ++iteration) {
@@ -341,54 +348,41 @@ static henon_heiles_status henon_heiles_attempt(henon_heiles_solver *s)
 /* how far the state may be moved, in its own size, for guesses to move with it */
 #define henon_heiles_NEAR_BY 0.125
 
-/* Guesses move with the state, by as many past values as extrapolation needs; recurrences are of the motion
-   as it was. From far away all begins anew, with the next step. */
-static void henon_heiles_move_guesses(henon_heiles_solver *s, const double to[henon_heiles_DIM])
+/* Guesses move with the state. From far away all begins anew, with the next step. */
+static void henon_heiles_move_guesses(henon_heiles_solver *s, const double from[henon_heiles_DIM])
 {
     double distance = 0.0, size = 0.0;
     for (int i = 0; i < henon_heiles_DIM; ++i) {
-        distance += fabs(to[i] - s->x[i]);
-        size += fabs(s->x[i]);
+        distance += fabs(s->x[i] - from[i]);
+        size += fabs(from[i]);
     }
     if (!(distance <= henon_heiles_NEAR_BY * size)) {
         s->h = (double)NAN;
         return;
     }
     henon_heiles_history *history = &s->history;
-    for (int i = 0; i < henon_heiles_DIM; ++i) history->difference[0][i] += to[i] - s->x[i];
-}
-
-/* Stand at x + carry from now on. */
-static henon_heiles_status henon_heiles_place(henon_heiles_solver *s, const double x[henon_heiles_DIM],
-    const double carry[henon_heiles_DIM])
-{
-    for (int i = 0; i < henon_heiles_DIM; ++i)
-        if (!isfinite(x[i])) return henon_heiles_BAD_ARGUMENT;
-    henon_heiles_move_guesses(s, x);
-    memcpy(s->x, x, sizeof s->x);
-    memcpy(s->carry, carry, sizeof s->carry);
-    return henon_heiles_OK;
+    for (int i = 0; i < henon_heiles_DIM; ++i) history->difference[0][i] += s->x[i] - from[i];
 }
 
 henon_heiles_status henon_heiles_set_state(henon_heiles_solver *s, const double x[henon_heiles_DIM])
 {
-    double to[henon_heiles_DIM], carry[henon_heiles_DIM] = { 0.0 };
-    if (s == NULL || x == NULL) return henon_heiles_BAD_ARGUMENT;
-    memcpy(to, x, sizeof to); /* which may be a part of *s */
-    return henon_heiles_place(s, to, carry);
+    if (s == NULL || x == NULL || !henon_heiles_finite(x, henon_heiles_DIM)) return henon_heiles_BAD_ARGUMENT;
+    double from[henon_heiles_DIM];
+    memcpy(from, s->x, sizeof from);
+    memmove(s->x, x, sizeof s->x); /* x may be a part of *s */
+    memset(s->carry, 0, sizeof s->carry);
+    henon_heiles_move_guesses(s, from);
+    return henon_heiles_OK;
 }
 
 henon_heiles_status henon_heiles_kick(henon_heiles_solver *s, const double change[henon_heiles_DIM])
 {
-    double to[henon_heiles_DIM], carry[henon_heiles_DIM];
     if (s == NULL || change == NULL) return henon_heiles_BAD_ARGUMENT;
-    for (int i = 0; i < henon_heiles_DIM; ++i) {
-        const double sum = s->x[i] + change[i], added = sum - s->x[i];
-        const double lost = ((s->x[i] - (sum - added)) + (change[i] - added)) + s->carry[i];
-        to[i] = sum + lost;
-        carry[i] = lost - (to[i] - sum);
-    }
-    return henon_heiles_place(s, to, carry);
+    double from[henon_heiles_DIM];
+    memcpy(from, s->x, sizeof from);
+    if (!henon_heiles_advance(s, change, s->carry)) return henon_heiles_BAD_ARGUMENT;
+    henon_heiles_move_guesses(s, from);
+    return henon_heiles_OK;
 }
 
 /* ---- The solver ---- */
@@ -400,8 +394,7 @@ henon_heiles_status henon_heiles_init(henon_heiles_solver *s, const henon_heiles
     henon_heiles_solver fresh = { .h = (double)NAN };
     fresh.params = params != NULL ? *params : henon_heiles_default_params;
     memcpy(fresh.x, x0, sizeof fresh.x);
-    for (int i = 0; i < henon_heiles_DIM; ++i)
-        if (!isfinite(fresh.x[i])) return henon_heiles_BAD_ARGUMENT;
+    if (!henon_heiles_finite(fresh.x, henon_heiles_DIM)) return henon_heiles_BAD_ARGUMENT;
     *s = fresh;
     return henon_heiles_OK;
 }
@@ -440,8 +433,10 @@ henon_heiles_status henon_heiles_integrate(henon_heiles_solver *s, double h, siz
     return status;
 }
 
-henon_heiles_status henon_heiles_step(henon_heiles_solver *s, double h) { return henon_heiles_integrate(s, h,
-    1); }
+henon_heiles_status henon_heiles_step(henon_heiles_solver *s, double h)
+{
+    return henon_heiles_integrate(s, h, 1);
+}
 
 const char *henon_heiles_status_string(henon_heiles_status status)
 {

@@ -23,7 +23,7 @@
  *   6. Elimination in a band
  *   7. Newton's method where sweeps fail
  *   8. What is seen at sites
- * body-sha256: 4e6a7f42040fde34ac60bf3aff6c63343b2d6b0c43eaa76d0be458efafd07fd3
+ * body-sha256: 0f5aed305e988a6839c769beb58dce2c700e5a2b22c3e9f7126a82e0d06a823e
  */
 #include "kdv.h"
 
@@ -143,8 +143,8 @@ typedef struct {
 /* The piece of that number. */
 static inline kdv_piece kdv_piece_of(const kdv_solver *s, size_t unit)
 {
-    const size_t pieces = kdv_pieces(s), index = pieces == 1 ? unit : unit / pieces, part = unit - index
-        * pieces;
+    const size_t pieces = kdv_pieces(s), index = pieces == 1 ? unit : unit / pieces,
+        part = unit - index * pieces;
     kdv_piece piece;
     kdv_locate(s, index, &piece.row);
     piece.from = (ptrdiff_t)part * kdv_PIECE;
@@ -202,8 +202,8 @@ static size_t kdv_matrix_of(size_t sites, double *memory, kdv_matrix *m)
 {
     const size_t few = sites <= kdv_FEW ? sites : kdv_open[0] ? 0 : kdv_REACH;
     const size_t border = few * kdv_DIM, inner = sites * kdv_DIM - border;
-    const size_t sizes[] = { kdv_TALL * inner, inner * border, inner * border, border * border, inner
-        + border };
+    const size_t sizes[] = { kdv_TALL * inner, inner * border, inner * border, border * border,
+        inner + border };
     double **const parts[] = { &m->a, &m->b, &m->c, &m->d, &m->side };
     size_t total = 0;
     for (int k = 0; k < 5; total += sizes[k++])
@@ -225,9 +225,9 @@ static inline void kdv_relax(const double *coef, const kdv_row *row, ptrdiff_t f
     for (ptrdiff_t i = from; i < to; ++i) {
         const double u = u_row[i];
         const double t1 = 0.5 * (c3 * (c2 * (c0 * (u_row[i + 1] - u) - c0 * (u_row[i + 2] - u_row[i + 1])
-            - 0.5 * (c1 * (u_row[i + 1] * u_row[i + 1]))))) - 0.5
-            * (c3 * (c2 * (c0 * (u_row[i - 1] - u_row[i - 2]) - c0 * (u - u_row[i - 1]) - 0.5
-            * (c1 * (u_row[i - 1] * u_row[i - 1])))));
+            - 0.5 * (c1 * (u_row[i + 1] * u_row[i + 1])))))
+            - 0.5 * (c3 * (c2 * (c0 * (u_row[i - 1] - u_row[i - 2]) - c0 * (u - u_row[i - 1])
+            - 0.5 * (c1 * (u_row[i - 1] * u_row[i - 1])))));
         out_u[i] = start_u[i] + 0.5 * t1;
     }
 }
@@ -258,9 +258,9 @@ static inline void kdv_increment(const double *coef, const kdv_row *row, ptrdiff
     for (ptrdiff_t i = from; i < to; ++i) {
         const double u = u_row[i];
         const double t1 = 0.5 * (c3 * (c2 * (c0 * (u_row[i + 1] - u) - c0 * (u_row[i + 2] - u_row[i + 1])
-            - 0.5 * (c1 * (u_row[i + 1] * u_row[i + 1]))))) - 0.5
-            * (c3 * (c2 * (c0 * (u_row[i - 1] - u_row[i - 2]) - c0 * (u - u_row[i - 1]) - 0.5
-            * (c1 * (u_row[i - 1] * u_row[i - 1])))));
+            - 0.5 * (c1 * (u_row[i + 1] * u_row[i + 1])))))
+            - 0.5 * (c3 * (c2 * (c0 * (u_row[i - 1] - u_row[i - 2]) - c0 * (u - u_row[i - 1])
+            - 0.5 * (c1 * (u_row[i - 1] * u_row[i - 1])))));
         out_u[i] += t1;
     }
 }
@@ -288,8 +288,8 @@ static inline void kdv_slope(const double *coef, const kdv_row *row, ptrdiff_t f
     const double *restrict u_row = row->x[0] + row->at[0];
     kdv_EACH_SITE
     for (ptrdiff_t i = from; i < to; ++i) {
-        const double t1 = varied_u_0[i + 1] * (c6 + (c6 - 0.25 * (c5 * u_row[i + 1]))) - 0.25
-            * (c4 * varied_u_0[i + 2]) + (0.25 * (c4 * varied_u_0[i - 2]) + varied_u_0[i - 1]
+        const double t1 = varied_u_0[i + 1] * (c6 + (c6 - 0.25 * (c5 * u_row[i + 1])))
+            - 0.25 * (c4 * varied_u_0[i + 2]) + (0.25 * (c4 * varied_u_0[i - 2]) + varied_u_0[i - 1]
             * (0.25 * (c5 * u_row[i - 1]) - c6 - c6));
         out_u[i] = t1;
     }
@@ -351,8 +351,8 @@ static void kdv_vector_field_row(const kdv_params *params, const kdv_row *row, p
         const double t1 = 1.0 / d;
         const double t2 = t1 * t1;
         const double t3 = t1 * (delta * delta);
-        const double t4 = 0.5 * (t2 * ((u_row[i + 1] - u) * t3 - (u_row[i + 2] - u_row[i + 1]) * t3 - 0.5
-            * (d * (u_row[i + 1] * u_row[i + 1])))) - 0.5 * (t2 * ((u_row[i - 1] - u_row[i - 2]) * t3
+        const double t4 = 0.5 * (t2 * ((u_row[i + 1] - u) * t3 - (u_row[i + 2] - u_row[i + 1]) * t3
+            - 0.5 * (d * (u_row[i + 1] * u_row[i + 1])))) - 0.5 * (t2 * ((u_row[i - 1] - u_row[i - 2]) * t3
             - (u - u_row[i - 1]) * t3 - 0.5 * (d * (u_row[i - 1] * u_row[i - 1]))));
         out[i - from] = t4;
     }
@@ -614,8 +614,8 @@ static void kdv_predict(const kdv_solver *s)
         size_t row, rows = kdv_share(s->rows, &row);
         for (int k = 0; k < kdv_DIM; ++k)
             for (size_t r = row; r < rows; ++r) {
-                const ptrdiff_t first = (ptrdiff_t)r * s->width - kdv_HALO, end = first + s->length + 2
-                    * kdv_HALO;
+                const ptrdiff_t first = (ptrdiff_t)r * s->width - kdv_HALO, end = first + s->length
+                    + 2 * kdv_HALO;
                 for (ptrdiff_t i = first; i < end; ++i) s->y[0][k][i] = s->x[k][i];
                 for (int d = 0; d < s->guess.order; ++d) {
                     const double *difference = s->guess.difference[d][k];
@@ -637,8 +637,8 @@ static void kdv_remember(kdv_solver *s, int now)
         double own[kdv_DIFFERENCES] = { 0.0 };
         for (int k = 0; k < kdv_DIM; ++k)
             for (size_t r = row; r < rows; ++r) {
-                const ptrdiff_t first = (ptrdiff_t)r * s->width - kdv_HALO, end = first + s->length + 2
-                    * kdv_HALO;
+                const ptrdiff_t first = (ptrdiff_t)r * s->width - kdv_HALO, end = first + s->length
+                    + 2 * kdv_HALO;
                 const double *restrict y = s->y[now][k], *restrict x = s->x[k];
                 for (ptrdiff_t i = first; i < end; ++i) {
                     double next = y[i] - x[i];

@@ -21,7 +21,7 @@
  *   5. Between steps
  *   6. The solver
  *   7. Ensembles
- * body-sha256: 261c575f1104625bd0f9339dabd8ce3b9fab2303cee37ed44bafcb8ded1dcc51
+ * body-sha256: 9c13c7eb8fce9f39979f4fab0c11794ed261c6418bf695d54a268eb8d16fe32b
  */
 #include "kepler.h"
 
@@ -215,15 +215,15 @@ kepler_APART static void kepler_linearise_part1(const double coef[118], const do
     const double t25 = work[9] * (t16 * t18 + x * (coef[25] * t19 + px * (t22 + x * (t23 + x * t24))));
     const double t26 = x * (coef[22] * work[3] + px * (coef[41] * t12 + x * (coef[43] * work[5] + t8))
         + work[9] * (coef[20] * t13 + coef[42] * t14 + t25));
-    const double t27 = coef[37] * px + work[33] * (coef[18] * work[26] + px * (t4 + (t5 + t6)) + work[9]
-        * (coef[38] * px + work[9] * (t7 * t10 + t26)));
+    const double t27 = coef[37] * px + work[33] * (coef[18] * work[26] + px * (t4 + (t5 + t6))
+        + work[9] * (coef[38] * px + work[9] * (t7 * t10 + t26)));
     const double p_px = coef[36] * px + work[32] * t27, t28 = px * t3, t29 = t5 + coef[18] * work[7];
     const double t30 = py * work[19], t31 = coef[22] * work[5], t32 = t31 + t9, t33 = coef[41] * work[6];
     const double t34 = t33 + t31;
-    const double t35 = t30 * t32 + y_ * (coef[43] * work[3] + px * (coef[22] * t12 + x * t34) + work[9]
-        * (coef[20] * t14 + coef[42] * t13 + t25));
-    const double p_py = coef[36] * py + work[32] * (coef[37] * py + work[33] * (coef[18] * t28 + py
-        * (t4 + t29) + work[9] * (coef[38] * py + work[9] * t35)));
+    const double t35 = t30 * t32 + y_ * (coef[43] * work[3] + px * (coef[22] * t12 + x * t34)
+        + work[9] * (coef[20] * t14 + coef[42] * t13 + t25));
+    const double p_py = coef[36] * py + work[32] * (coef[37] * py + work[33] * (coef[18] * t28
+        + py * (t4 + t29) + work[9] * (coef[38] * py + work[9] * t35)));
     const double t36 = coef[1] * work[6], t37 = coef[4] * work[5], t38 = t31 + t8;
     const double t39 = work[9] * (coef[20] + work[7] * (work[9] * t18)), t40 = coef[10] * work[7];
     const double t41 = coef[3] * work[6], t42 = coef[19] * work[26];
@@ -241,16 +241,16 @@ kepler_APART static void kepler_linearise_part1(const double coef[118], const do
     work[22] = coef[9] + work[19] * (t52 + work[5] * (coef[17] * work[5] + t53));
     work[23] = py * t14;
     const double t58 = coef[28] * work[5] + t56, t59 = work[5] * work[6];
-    const double t60 = t55 * t57 + x * (work[22] + y_ * (work[23] * t58 + y_ * (coef[35] * t59 + work[9]
-        * (coef[16] * work[6] + (coef[16] * work[5] + coef[34] * work[9])))));
+    const double t60 = t55 * t57 + x * (work[22] + y_ * (work[23] * t58 + y_ * (coef[35] * t59
+        + work[9] * (coef[16] * work[6] + (coef[16] * work[5] + coef[34] * work[9])))));
     const double t61 = work[9] * (work[7] * t54 + x * t60);
-    const double t62 = coef[30] + coef[12] * work[1] + px * (coef[14] * work[2] + x
-        * (t48 + px * (coef[24] * t12 + x * (coef[33] * work[5] + t49)))) + work[9] * (work[7] * t50 + x
-        * (t51 + x * (coef[32] * work[5] + coef[31] * work[6])) + t61);
-    const double t63 = t12 * (t38 + t39) + x * (work[6] * (t40 + t41) + px
-        * (t42 + px * (work[27] + (t43 + t44))) + work[9] * (t46 + t47 + work[9] * t62));
-    const double p_x = work[32] * (coef[0] * x + work[33] * (coef[18] * t12 + x * (t36 + t37) + work[9]
-        * (coef[29] * x + work[9] * t63)));
+    const double t62 = coef[30] + coef[12] * work[1] + px * (coef[14] * work[2]
+        + x * (t48 + px * (coef[24] * t12 + x * (coef[33] * work[5] + t49)))) + work[9] * (work[7] * t50
+        + x * (t51 + x * (coef[32] * work[5] + coef[31] * work[6])) + t61);
+    const double t63 = t12 * (t38 + t39) + x * (work[6] * (t40 + t41)
+        + px * (t42 + px * (work[27] + (t43 + t44))) + work[9] * (t46 + t47 + work[9] * t62));
+    const double p_x = work[32] * (coef[0] * x + work[33] * (coef[18] * t12 + x * (t36 + t37)
+        + work[9] * (coef[29] * x + work[9] * t63)));
     work[34] = coef[4] * work[6];
     work[35] = coef[1] * work[5];
     const double t64 = work[9] * (coef[20] + work[19] * (work[9] * t24));
@@ -260,11 +260,11 @@ kepler_APART static void kepler_linearise_part1(const double coef[118], const do
     const double t65 = coef[24] * work[3];
     work[20] = coef[14] * work[6] + coef[12] * work[5];
     work[21] = coef[13] * work[6] + coef[11] * work[5];
-    const double t66 = coef[30] + coef[33] * work[1] + px * (coef[12] * work[2] + x
-        * (t65 + px * (t23 + x * work[20]))) + work[9] * (work[7] * (coef[32] * work[6] + coef[31] * work[5])
-        + x * (t51 + x * work[21]) + t61);
-    const double t67 = work[23] * (t38 + t64) + y_ * (work[6] * (t40 + work[25]) + px
-        * (t42 + px * (work[27] + (t43 + work[28]))) + work[9] * (t46 + work[30] + work[9] * t66));
+    const double t66 = coef[30] + coef[33] * work[1] + px * (coef[12] * work[2]
+        + x * (t65 + px * (t23 + x * work[20]))) + work[9] * (work[7] * (coef[32] * work[6]
+        + coef[31] * work[5]) + x * (t51 + x * work[21]) + t61);
+    const double t67 = work[23] * (t38 + t64) + y_ * (work[6] * (t40 + work[25])
+        + px * (t42 + px * (work[27] + (t43 + work[28]))) + work[9] * (t46 + work[30] + work[9] * t66));
     const double p_y = work[32] * (coef[0] * y_ + work[33] * (coef[18] * work[23] + y_ * (work[34] + work[35])
         + work[9] * (coef[29] * y_ + work[9] * t67)));
     const double t68 = work[9] * (t2 * t2), t69 = coef[41] * work[5], t70 = coef[103] * work[6];
@@ -275,39 +275,39 @@ kepler_APART static void kepler_linearise_part1(const double coef[118], const do
         + x * (work[4] + x * t58))));
     const double t76 = t7 * (t72 + t73) + x * (t48 + px * (coef[107] * t12 + x * (t20 + coef[109] * work[5]))
         + work[9] * (t74 + coef[108] * t14 + t75));
-    const double t77 = t13 * (t69 + t8 + t39) + x * (t42 + px * (t70 + (coef[104] * work[5] + t71)) + work[9]
-        * (coef[102] * px + work[9] * t76));
+    const double t77 = t13 * (t69 + t8 + t39) + x * (t42 + px * (t70 + (coef[104] * work[5] + t71))
+        + work[9] * (coef[102] * px + work[9] * t76));
     const double t78 = t68 * (coef[18] * t13 + coef[101] * t14 + work[33] * t77), t79 = 0.5 * t78;
     const double t80 = coef[18] * (py * x) + coef[18] * t11, t81 = coef[114] * work[9];
     const double t82 = coef[19] * t28, t83 = coef[19] * work[7], t84 = coef[23] * work[5];
     const double t85 = t84 + t17;
     const double t86 = t30 * t85 + y_ * (t65 + px * (coef[113] * t12 + x * (coef[112] * work[5] + t72))
         + work[9] * (coef[111] * t14 + t74 + t75));
-    const double t87 = t11 * (t70 + t31 + work[9] * (coef[110] + work[7] * (work[9] * (t20 + t81)))) + x
-        * (t82 + py * (t8 + (t69 + t83)) + work[9] * (coef[20] * py + work[9] * t86));
+    const double t87 = t11 * (t70 + t31 + work[9] * (coef[110] + work[7] * (work[9] * (t20 + t81))))
+        + x * (t82 + py * (t8 + (t69 + t83)) + work[9] * (coef[20] * py + work[9] * t86));
     const double t88 = t68 * (t80 + work[33] * t87);
     const double t89 = work[9] * (t22 + x * (coef[112] * t12 + x * t85));
     const double t90 = work[9] * (coef[42] + t89);
-    const double t91 = t4 + (t6 + coef[115] * work[5]) + work[9] * (coef[38] + work[9] * (work[7] * t10 + x
-        * (coef[116] * t12 + x * (coef[116] * work[5] + t8 + t90))));
+    const double t91 = t4 + (t6 + coef[115] * work[5]) + work[9] * (coef[38] + work[9] * (work[7] * t10
+        + x * (coef[116] * t12 + x * (coef[116] * work[5] + t8 + t90))));
     const double t92 = coef[36] + work[32] * (coef[37] + work[33] * t91), t93 = px * py;
-    const double t94 = t93 * (coef[117] + coef[43] * (work[7] * work[33])) + x
-        * (coef[43] * (t14 * (py * work[33])) + y_ * (coef[18] + work[33] * (t69 + t33 + work[9]
-        * (coef[20] + t89))));
+    const double t94 = t93 * (coef[117] + coef[43] * (work[7] * work[33]))
+        + x * (coef[43] * (t14 * (py * work[33])) + y_ * (coef[18] + work[33] * (t69 + t33
+        + work[9] * (coef[20] + t89))));
     const double t95 = t68 * t94, t96 = (-0.5) * t95, t97 = t83 + coef[103] * work[5];
     const double t98 = coef[24] * work[5], t99 = coef[21] * t14;
-    const double t100 = t30 * (t84 + t81) + y_ * (coef[112] * work[3] + px * (coef[106] * t12 + x
-        * (coef[113] * work[6] + t98)) + work[9] * (t99 + coef[111] * t13 + t75));
-    const double t101 = t11 * (t34 + work[9] * (coef[20] + work[7] * (work[9] * t21))) + x
-        * (t82 + py * (t8 + t97) + work[9] * (coef[110] * py + work[9] * t100));
+    const double t100 = t30 * (t84 + t81) + y_ * (coef[112] * work[3] + px * (coef[106] * t12
+        + x * (coef[113] * work[6] + t98)) + work[9] * (t99 + coef[111] * t13 + t75));
+    const double t101 = t11 * (t34 + work[9] * (coef[20] + work[7] * (work[9] * t21)))
+        + x * (t82 + py * (t8 + t97) + work[9] * (coef[110] * py + work[9] * t100));
     const double t102 = t68 * (t80 + work[33] * t101);
-    const double t103 = t30 * (coef[106] * work[5] + t73) + y_ * (coef[109] * work[3] + px
-        * (t23 + x * (coef[107] * work[6] + t84)) + work[9] * (t99 + coef[108] * t13 + t75));
-    const double t104 = coef[101] * t13 + coef[18] * t14 + work[33] * (t14 * (t34 + t64) + y_
-        * (t82 + py * (coef[104] * work[6] + t97) + work[9] * (coef[102] * py + work[9] * t103)));
+    const double t103 = t30 * (coef[106] * work[5] + t73) + y_ * (coef[109] * work[3]
+        + px * (t23 + x * (coef[107] * work[6] + t84)) + work[9] * (t99 + coef[108] * t13 + t75));
+    const double t104 = coef[101] * t13 + coef[18] * t14 + work[33] * (t14 * (t34 + t64)
+        + y_ * (t82 + py * (coef[104] * work[6] + t97) + work[9] * (coef[102] * py + work[9] * t103)));
     const double t105 = t68 * t104, t106 = 0.5 * t105;
-    const double t107 = coef[115] * work[6] + t29 + work[9] * (coef[38] + work[9] * (work[19] * t32 + y_
-        * (coef[116] * work[23] + y_ * (coef[116] * work[6] + t31 + t90))));
+    const double t107 = coef[115] * work[6] + t29 + work[9] * (coef[38] + work[9] * (work[19] * t32
+        + y_ * (coef[116] * work[23] + y_ * (coef[116] * work[6] + t31 + t90))));
     const double t108 = coef[36] + work[32] * (coef[37] + work[33] * t107);
     work[29] = t43 + t40;
     work[24] = coef[68] * work[9];
@@ -324,34 +324,35 @@ kepler_APART static void kepler_linearise_part1(const double coef[118], const do
     const double t112 = coef[69] * work[9];
     work[11] = t55 * (coef[71] * work[6] + t112);
     work[12] = work[19] * (t110 + work[5] * (coef[59] * work[5] + t111));
-    work[13] = y_ * (work[23] * (coef[71] * work[5] + t112) + y_ * (coef[79] * t59 + work[9]
-        * (coef[58] * work[6] + (coef[58] * work[5] + coef[78] * work[9]))));
-    const double t113 = work[7] * (coef[55] * work[5] + coef[54] * work[6]) + x * (work[8] + x
-        * (coef[76] * work[5] + coef[75] * work[6])) + work[9] * (work[7] * (coef[52] + work[10]) + x
-        * (work[11] + x * (coef[74] + work[12] + work[13])));
-    const double t114 = work[6] * (coef[46] * work[6] + work[14]) + px * (work[15] + px
-        * (work[16] + (work[17] + coef[50] * work[5]))) + work[9] * (work[18] + (coef[45] * work[6] + coef[48]
-        * work[5]) + work[9] * (t109 + work[9] * t113));
-    const double t115 = coef[30] + work[7] * (work[6] * (coef[14] * work[5] + t49) + work[9] * (t50 + work[9]
-        * t54)) + x * (t12 * (coef[64] * work[6] + coef[66] * work[5] + work[9] * (coef[62] + work[7]
-        * (work[9] * (coef[70] * work[6] + work[24])))) + x * t114);
-    const double t116 = work[5] * (t44 + coef[47] * work[19]) + py * (coef[60] * t28 + py * (t41 + coef[6]
-        * work[5] + work[29])) + work[9] * (t45 + coef[72] * work[19] + t47 + work[9] * t115);
-    const double t117 = work[32] * (coef[0] + work[33] * (t36 + (coef[44] * work[19] + t37) + work[9]
-        * (coef[29] + work[9] * t116)));
+    work[13] = y_ * (work[23] * (coef[71] * work[5] + t112) + y_ * (coef[79] * t59
+        + work[9] * (coef[58] * work[6] + (coef[58] * work[5] + coef[78] * work[9]))));
+    const double t113 = work[7] * (coef[55] * work[5] + coef[54] * work[6])
+        + x * (work[8] + x * (coef[76] * work[5] + coef[75] * work[6]))
+        + work[9] * (work[7] * (coef[52] + work[10]) + x * (work[11] + x * (coef[74] + work[12] + work[13])));
+    const double t114 = work[6] * (coef[46] * work[6] + work[14])
+        + px * (work[15] + px * (work[16] + (work[17] + coef[50] * work[5]))) + work[9] * (work[18]
+        + (coef[45] * work[6] + coef[48] * work[5]) + work[9] * (t109 + work[9] * t113));
+    const double t115 = coef[30] + work[7] * (work[6] * (coef[14] * work[5] + t49)
+        + work[9] * (t50 + work[9] * t54)) + x * (t12 * (coef[64] * work[6] + coef[66] * work[5]
+        + work[9] * (coef[62] + work[7] * (work[9] * (coef[70] * work[6] + work[24])))) + x * t114);
+    const double t116 = work[5] * (t44 + coef[47] * work[19]) + py * (coef[60] * t28
+        + py * (t41 + coef[6] * work[5] + work[29])) + work[9] * (t45 + coef[72] * work[19] + t47
+        + work[9] * t115);
+    const double t117 = work[32] * (coef[0] + work[33] * (t36 + (coef[44] * work[19] + t37)
+        + work[9] * (coef[29] + work[9] * t116)));
     const double t118 = coef[88] + coef[91] * work[1] + px * (coef[93] * work[2] + x * (coef[95] * work[3]
         + px * (coef[96] * t12 + x * (coef[99] * work[6] + coef[100] * work[5]))));
-    const double t119 = work[7] * (coef[92] * work[5] + coef[90] * work[6]) + x * (coef[94] * t12 + x
-        * (coef[98] * work[5] + coef[97] * work[6])) + work[9] * (work[7] * (coef[89] + work[10]) + x
-        * (work[11] + x * (coef[89] + work[12] + work[13])));
+    const double t119 = work[7] * (coef[92] * work[5] + coef[90] * work[6]) + x * (coef[94] * t12
+        + x * (coef[98] * work[5] + coef[97] * work[6])) + work[9] * (work[7] * (coef[89] + work[10])
+        + x * (work[11] + x * (coef[89] + work[12] + work[13])));
     const double t120 = work[6] * (coef[82] * work[6] + work[14]) + px * (work[15] + px * (coef[85] * work[6]
         + (work[17] + coef[86] * work[5]))) + work[9] * (coef[84] * work[5] + coef[81] * work[6] + work[18]
         + work[9] * (t118 + work[9] * t119));
-    const double t121 = py * t7 * (coef[24] * work[6] + t84 + work[9] * (coef[21] + work[7]
-        * (work[9] * t57))) + x * (work[23] * (t20 + t98 + work[9] * (coef[21] + work[19] * (work[9] * t58)))
-        + y_ * t120);
-    const double t122 = coef[80] * (t3 * work[6]) + px * (coef[83] * t28 + py * (t38 + (t83 + t71))) + work[9]
-        * (coef[20] * t93 + coef[87] * t3 + work[9] * t121);
+    const double t121 = py * t7 * (coef[24] * work[6] + t84 + work[9] * (coef[21]
+        + work[7] * (work[9] * t57)))
+        + x * (work[23] * (t20 + t98 + work[9] * (coef[21] + work[19] * (work[9] * t58))) + y_ * t120);
+    const double t122 = coef[80] * (t3 * work[6]) + px * (coef[83] * t28 + py * (t38 + (t83 + t71)))
+        + work[9] * (coef[20] * t93 + coef[87] * t3 + work[9] * t121);
     const double t123 = t68 * (coef[18] * t93 + coef[44] * t3 + work[33] * t122);
     work[0] = 0.5 * t123;
     displacement[0] = (-0.5) * p_px;
@@ -401,22 +402,22 @@ kepler_APART static void kepler_linearise_part2(const double coef[118], const do
 {
     (void)displacement, (void)increment;
     const double x = y[0], y_ = y[1], px = y[2];
-    const double t1 = coef[73] + coef[77] * work[1] + px * (coef[35] * work[2] + x * (coef[67] * work[3] + px
-        * (work[4] + x * (coef[35] * work[5] + coef[56] * work[6]))));
-    const double t2 = work[7] * (coef[75] * work[5] + coef[76] * work[6]) + x * (work[8] + x
-        * (coef[55] * work[6] + coef[54] * work[5])) + work[9] * (work[7] * (coef[74] + work[10]) + x
-        * (work[11] + x * (coef[52] + work[12] + work[13])));
-    const double t3 = work[6] * (coef[50] * work[6] + work[14]) + px * (work[15] + px
-        * (work[16] + (work[17] + coef[46] * work[5]))) + work[9] * (coef[45] * work[5] + coef[48] * work[6]
-        + work[18] + work[9] * (t1 + work[9] * t2));
+    const double t1 = coef[73] + coef[77] * work[1] + px * (coef[35] * work[2] + x * (coef[67] * work[3]
+        + px * (work[4] + x * (coef[35] * work[5] + coef[56] * work[6]))));
+    const double t2 = work[7] * (coef[75] * work[5] + coef[76] * work[6])
+        + x * (work[8] + x * (coef[55] * work[6] + coef[54] * work[5]))
+        + work[9] * (work[7] * (coef[74] + work[10]) + x * (work[11] + x * (coef[52] + work[12] + work[13])));
+    const double t3 = work[6] * (coef[50] * work[6] + work[14])
+        + px * (work[15] + px * (work[16] + (work[17] + coef[46] * work[5]))) + work[9] * (coef[45] * work[5]
+        + coef[48] * work[6] + work[18] + work[9] * (t1 + work[9] * t2));
     const double t4 = coef[30] + work[19] * (work[5] * work[20] + work[9] * (work[21] + work[9] * work[22]))
-        + y_ * (work[23] * (coef[64] * work[5] + coef[66] * work[6] + work[9] * (coef[62] + work[19]
-        * (work[9] * (coef[70] * work[5] + work[24])))) + y_ * t3);
-    const double t5 = work[6] * (coef[47] * work[7] + work[25]) + px * (coef[60] * work[26] + px
-        * (work[27] + work[28] + work[29])) + work[9] * (work[30] + (work[31] + coef[72] * work[7]) + work[9]
-        * t4);
-    const double t6 = work[32] * (coef[0] + work[33] * (work[34] + (work[35] + coef[44] * work[7]) + work[9]
-        * (coef[29] + work[9] * t5)));
+        + y_ * (work[23] * (coef[64] * work[5] + coef[66] * work[6] + work[9] * (coef[62]
+        + work[19] * (work[9] * (coef[70] * work[5] + work[24])))) + y_ * t3);
+    const double t5 = work[6] * (coef[47] * work[7] + work[25]) + px * (coef[60] * work[26]
+        + px * (work[27] + work[28] + work[29])) + work[9] * (work[30] + (work[31] + coef[72] * work[7])
+        + work[9] * t4);
+    const double t6 = work[32] * (coef[0] + work[33] * (work[34] + (work[35] + coef[44] * work[7])
+        + work[9] * (coef[29] + work[9] * t5)));
     jacobian[12] = work[0];
     jacobian[13] = 0.5 * t6;
     increment_jacobian[13] = -t6;
@@ -456,6 +457,13 @@ void kepler_vector_field(const kepler_params *params, const double x[4], double 
 }
 
 /* ---- Compensated sums, linear equations ---- */
+static int kepler_finite(const double *values, int count)
+{
+    for (int k = 0; k < count; ++k)
+        if (!isfinite(values[k])) return 0;
+    return 1;
+}
+
 /* x + change + small in compensated arithmetic, where small is the carry and what is as small: were that
    rounded with the change, corrections of one sign would add up to a drift. 0, and x as before, if the sum is
    not finite. */
@@ -629,54 +637,41 @@ static kepler_status kepler_attempt(kepler_solver *s)
 /* how far the state may be moved, in its own size, for guesses to move with it */
 #define kepler_NEAR_BY 0.125
 
-/* Guesses move with the state, by as many past values as extrapolation needs; recurrences are of the motion
-   as it was. From far away all begins anew, with the next step. */
-static void kepler_move_guesses(kepler_solver *s, const double to[kepler_DIM])
+/* Guesses move with the state. From far away all begins anew, with the next step. */
+static void kepler_move_guesses(kepler_solver *s, const double from[kepler_DIM])
 {
     double distance = 0.0, size = 0.0;
     for (int i = 0; i < kepler_DIM; ++i) {
-        distance += fabs(to[i] - s->x[i]);
-        size += fabs(s->x[i]);
+        distance += fabs(s->x[i] - from[i]);
+        size += fabs(from[i]);
     }
     if (!(distance <= kepler_NEAR_BY * size)) {
         s->h = (double)NAN;
         return;
     }
     kepler_history *history = &s->history;
-    for (int i = 0; i < kepler_DIM; ++i) history->difference[0][i] += to[i] - s->x[i];
-}
-
-/* Stand at x + carry from now on. */
-static kepler_status kepler_place(kepler_solver *s, const double x[kepler_DIM],
-    const double carry[kepler_DIM])
-{
-    for (int i = 0; i < kepler_DIM; ++i)
-        if (!isfinite(x[i])) return kepler_BAD_ARGUMENT;
-    kepler_move_guesses(s, x);
-    memcpy(s->x, x, sizeof s->x);
-    memcpy(s->carry, carry, sizeof s->carry);
-    return kepler_OK;
+    for (int i = 0; i < kepler_DIM; ++i) history->difference[0][i] += s->x[i] - from[i];
 }
 
 kepler_status kepler_set_state(kepler_solver *s, const double x[kepler_DIM])
 {
-    double to[kepler_DIM], carry[kepler_DIM] = { 0.0 };
-    if (s == NULL || x == NULL) return kepler_BAD_ARGUMENT;
-    memcpy(to, x, sizeof to); /* which may be a part of *s */
-    return kepler_place(s, to, carry);
+    if (s == NULL || x == NULL || !kepler_finite(x, kepler_DIM)) return kepler_BAD_ARGUMENT;
+    double from[kepler_DIM];
+    memcpy(from, s->x, sizeof from);
+    memmove(s->x, x, sizeof s->x); /* x may be a part of *s */
+    memset(s->carry, 0, sizeof s->carry);
+    kepler_move_guesses(s, from);
+    return kepler_OK;
 }
 
 kepler_status kepler_kick(kepler_solver *s, const double change[kepler_DIM])
 {
-    double to[kepler_DIM], carry[kepler_DIM];
     if (s == NULL || change == NULL) return kepler_BAD_ARGUMENT;
-    for (int i = 0; i < kepler_DIM; ++i) {
-        const double sum = s->x[i] + change[i], added = sum - s->x[i];
-        const double lost = ((s->x[i] - (sum - added)) + (change[i] - added)) + s->carry[i];
-        to[i] = sum + lost;
-        carry[i] = lost - (to[i] - sum);
-    }
-    return kepler_place(s, to, carry);
+    double from[kepler_DIM];
+    memcpy(from, s->x, sizeof from);
+    if (!kepler_advance(s, change, s->carry)) return kepler_BAD_ARGUMENT;
+    kepler_move_guesses(s, from);
+    return kepler_OK;
 }
 
 /* ---- The solver ---- */
@@ -689,12 +684,9 @@ kepler_status kepler_init(kepler_solver *s, const kepler_params *params, const d
     kepler_solver fresh = { .h = (double)NAN };
     fresh.params = params != NULL ? *params : kepler_default_params;
     memcpy(fresh.x, x0, sizeof fresh.x);
-    for (int i = 0; i < kepler_DIM; ++i)
-        if (!isfinite(fresh.x[i])) return kepler_BAD_ARGUMENT;
-    if (!kepler_allowed(&fresh.params)) return kepler_BAD_ARGUMENT;
+    if (!kepler_finite(fresh.x, kepler_DIM) || !kepler_allowed(&fresh.params)) return kepler_BAD_ARGUMENT;
     kepler_prepare(&fresh.params, kepler_SHORT_STEP, fresh.coef);
-    for (int k = 0; k < kepler_COEFFICIENTS; ++k)
-        if (!isfinite(fresh.coef[k])) return kepler_BAD_ARGUMENT;
+    if (!kepler_finite(fresh.coef, kepler_COEFFICIENTS)) return kepler_BAD_ARGUMENT;
     *s = fresh;
     return kepler_OK;
 }

@@ -17,13 +17,13 @@
  * This file belongs to whoever generated it; phigen claims no rights in it.
  *
  *   1. The model
- *   2. Compensated sums, linear equations
+ *   2. Compensated sums
  *   3. The explicit step
  *   4. What a monitored trajectory holds fixed: e = -H(x0), so that K = monitor (H + e) is 0 along it
  *   5. Between steps
  *   6. The solver
  *   7. Ensembles
- * body-sha256: 728bf23a6afc8da7bb370ec492b7a61bc0cbe810cd10e4e6b317d6be00e2df39
+ * body-sha256: bd79f4b5b4f7efdb473a2df03a95a68b452c3e53c4a8f2e001d9573e60816563
  */
 #include "kepler_eccentric.h"
 
@@ -58,8 +58,8 @@ double kepler_eccentric_hamiltonian(const kepler_eccentric_params *params, const
     if (params == NULL) params = &kepler_eccentric_default_params;
     const double oblateness = params->oblateness, q1 = x[0], q2 = x[1], p1 = x[2], p2 = x[3];
     const double t1 = q2 * q2, t2 = t1 + q1 * q1, t3 = 1.0 / sqrt(t2);
-    const double t4 = 0.5 * (p1 * p1 + p2 * p2) - t3 - 0.5 * (oblateness * (t3 * (t3 * t3))
-        * (1.0 - 3.0 * (t1 / t2)));
+    const double t4 = 0.5 * (p1 * p1 + p2 * p2) - t3 - 0.5 * (oblateness * (t3 * (t3 * t3)) * (1.0
+        - 3.0 * (t1 / t2)));
     return t4;
 }
 
@@ -74,8 +74,8 @@ void kepler_eccentric_vector_field(const kepler_eccentric_params *params, const 
     const double oblateness = params->oblateness, q1 = x[0], q2 = x[1], p1 = x[2], p2 = x[3];
     const double t1 = q2 * q2, t2 = t1 + q1 * q1, t3 = 1.0 / sqrt(t2), t4 = t3 * t3, t5 = t3 * t4;
     const double t6 = 1.0 / t2, t7 = oblateness * t5;
-    const double t8 = 0.5 * t5 + (0.75 * (t3 * (t4 * t4) * (oblateness * (1.0 - 3.0 * (t1 * t6)))) - 1.5
-        * (t6 * t6 * (t1 * t7)));
+    const double t8 = 0.5 * t5 + (0.75 * (t3 * (t4 * t4) * (oblateness * (1.0 - 3.0 * (t1 * t6))))
+        - 1.5 * (t6 * t6 * (t1 * t7)));
     out[0] = p1;
     out[1] = p2;
     out[2] = (-2.0) * (q1 * t8);
@@ -90,7 +90,33 @@ double kepler_eccentric_monitor(const kepler_eccentric_params *params, const dou
     return 1.0 / (t3 + 0.5 * (oblateness * (t3 * (t3 * t3)) * (1.0 - 3.0 * (t1 / t2))));
 }
 
-/* ---- Compensated sums, linear equations ---- */
+/* ---- Compensated sums ---- */
+static int kepler_eccentric_finite(const double *values, int count)
+{
+    for (int k = 0; k < count; ++k)
+        if (!isfinite(values[k])) return 0;
+    return 1;
+}
+
+/* x + change + small in compensated arithmetic, where small is the carry and what is as small: were that
+   rounded with the change, corrections of one sign would add up to a drift. 0, and x as before, if the sum is
+   not finite. */
+static int kepler_eccentric_advance(kepler_eccentric_solver *s, const double change[kepler_eccentric_DIM],
+    const double small[kepler_eccentric_DIM])
+{
+    double x[kepler_eccentric_DIM], carry[kepler_eccentric_DIM];
+    for (int i = 0; i < kepler_eccentric_DIM; ++i) {
+        const double sum = s->x[i] + change[i], added = sum - s->x[i];
+        const double lost = ((s->x[i] - (sum - added)) + (change[i] - added)) + small[i];
+        x[i] = sum + lost;
+        carry[i] = lost - (x[i] - sum);
+        if (!isfinite(x[i])) return 0;
+    }
+    memcpy(s->x, x, sizeof x);
+    memcpy(s->carry, carry, sizeof carry);
+    return 1;
+}
+
 /* The time that has passed gains that of a stage. */
 static void kepler_eccentric_pass(kepler_eccentric_solver *s, double elapsed)
 {
@@ -197,8 +223,8 @@ static void kepler_eccentric_prepare(const kepler_eccentric_params *params,
     const double gauge[kepler_eccentric_GAUGES], double h, double *coef)
 {
     for (int k = 0; k < kepler_eccentric_ROWS_OF_FLOWS; ++k) {
-        kepler_eccentric_prepare_row(params, gauge, kepler_eccentric_times[k] * h, coef + k
-            * kepler_eccentric_ROW);
+        kepler_eccentric_prepare_row(params, gauge, kepler_eccentric_times[k] * h,
+            coef + k * kepler_eccentric_ROW);
     }
 }
 
@@ -215,8 +241,7 @@ static kepler_eccentric_status kepler_eccentric_stages(kepler_eccentric_solver *
     memcpy(moved, s->carry, sizeof s->carry);
     kepler_eccentric_flows(s->coef, x, moved, start);
     ++s->evaluations;
-    for (int i = 0; i < kepler_eccentric_ALONG; ++i)
-        if (!isfinite(x[i])) return kepler_eccentric_NOT_FINITE;
+    if (!kepler_eccentric_finite(x, kepler_eccentric_ALONG)) return kepler_eccentric_NOT_FINITE;
     if (!(moved[kepler_eccentric_TIME] * s->h > 0.0)) return kepler_eccentric_NOT_FINITE;
     kepler_eccentric_settle(s->x, s->carry, moved);
     kepler_eccentric_pass(s, moved[kepler_eccentric_TIME]);
@@ -231,45 +256,50 @@ static void kepler_eccentric_choose_gauge(const kepler_eccentric_params *params,
 }
 
 /* ---- Between steps ---- */
-/* Stand at x + carry from now on. */
-static kepler_eccentric_status kepler_eccentric_place(kepler_eccentric_solver *s,
-    const double x[kepler_eccentric_DIM], const double carry[kepler_eccentric_DIM])
+/* The level of s->x, which was moved from elsewhere; 0, and back there, where it has none. */
+static int kepler_eccentric_take_level(kepler_eccentric_solver *s, const double from[kepler_eccentric_DIM],
+    const double carry[kepler_eccentric_DIM])
 {
-    for (int i = 0; i < kepler_eccentric_DIM; ++i)
-        if (!isfinite(x[i])) return kepler_eccentric_BAD_ARGUMENT;
     double level[kepler_eccentric_GAUGES];
-    const double rate = kepler_eccentric_monitor(&s->params, x);
-    kepler_eccentric_choose_gauge(&s->params, x, level);
-    if (!isfinite(level[0]) || !isfinite(rate) || !(rate > 0.0)) return kepler_eccentric_BAD_ARGUMENT;
+    const double rate = kepler_eccentric_monitor(&s->params, s->x);
+    kepler_eccentric_choose_gauge(&s->params, s->x, level);
+    if (!isfinite(level[0]) || !isfinite(rate) || !(rate > 0.0)) {
+        memcpy(s->x, from, sizeof s->x);
+        memcpy(s->carry, carry, sizeof s->carry);
+        return 0;
+    }
     memcpy(s->gauge, level, sizeof level);
     /* where s->h is NaN the next step does it again */
         kepler_eccentric_prepare(&s->params, s->gauge, s->h, s->coef);
-    memcpy(s->x, x, sizeof s->x);
-    memcpy(s->carry, carry, sizeof s->carry);
-    return kepler_eccentric_OK;
+    return 1;
 }
 
 kepler_eccentric_status kepler_eccentric_set_state(kepler_eccentric_solver *s,
     const double x[kepler_eccentric_DIM])
 {
-    double to[kepler_eccentric_DIM], carry[kepler_eccentric_DIM] = { 0.0 };
-    if (s == NULL || x == NULL) return kepler_eccentric_BAD_ARGUMENT;
-    memcpy(to, x, sizeof to); /* which may be a part of *s */
-    return kepler_eccentric_place(s, to, carry);
+    if (s == NULL || x == NULL || !kepler_eccentric_finite(x, kepler_eccentric_DIM))
+        return kepler_eccentric_BAD_ARGUMENT;
+    double from[kepler_eccentric_DIM];
+    memcpy(from, s->x, sizeof from);
+    double carry[kepler_eccentric_DIM];
+    memcpy(carry, s->carry, sizeof carry);
+    memmove(s->x, x, sizeof s->x); /* x may be a part of *s */
+    memset(s->carry, 0, sizeof s->carry);
+    if (!kepler_eccentric_take_level(s, from, carry)) return kepler_eccentric_BAD_ARGUMENT;
+    return kepler_eccentric_OK;
 }
 
 kepler_eccentric_status kepler_eccentric_kick(kepler_eccentric_solver *s,
     const double change[kepler_eccentric_DIM])
 {
-    double to[kepler_eccentric_DIM], carry[kepler_eccentric_DIM];
     if (s == NULL || change == NULL) return kepler_eccentric_BAD_ARGUMENT;
-    for (int i = 0; i < kepler_eccentric_DIM; ++i) {
-        const double sum = s->x[i] + change[i], added = sum - s->x[i];
-        const double lost = ((s->x[i] - (sum - added)) + (change[i] - added)) + s->carry[i];
-        to[i] = sum + lost;
-        carry[i] = lost - (to[i] - sum);
-    }
-    return kepler_eccentric_place(s, to, carry);
+    double from[kepler_eccentric_DIM];
+    memcpy(from, s->x, sizeof from);
+    double carry[kepler_eccentric_DIM];
+    memcpy(carry, s->carry, sizeof carry);
+    if (!kepler_eccentric_advance(s, change, s->carry)) return kepler_eccentric_BAD_ARGUMENT;
+    if (!kepler_eccentric_take_level(s, from, carry)) return kepler_eccentric_BAD_ARGUMENT;
+    return kepler_eccentric_OK;
 }
 
 /* ---- The solver ---- */
@@ -285,16 +315,14 @@ kepler_eccentric_status kepler_eccentric_init_gauge(kepler_eccentric_solver *s,
     kepler_eccentric_solver fresh = { .h = (double)NAN };
     fresh.params = params != NULL ? *params : kepler_eccentric_default_params;
     memcpy(fresh.x, x0, sizeof fresh.x);
-    for (int i = 0; i < kepler_eccentric_DIM; ++i)
-        if (!isfinite(fresh.x[i])) return kepler_eccentric_BAD_ARGUMENT;
-    if (!kepler_eccentric_allowed(&fresh.params)) return kepler_eccentric_BAD_ARGUMENT;
+    if (!kepler_eccentric_finite(fresh.x, kepler_eccentric_DIM) || !kepler_eccentric_allowed(&fresh.params))
+        return kepler_eccentric_BAD_ARGUMENT;
     kepler_eccentric_prepare(&fresh.params, fresh.gauge, kepler_eccentric_SHORT_STEP, fresh.coef);
-    for (int k = 0; k < kepler_eccentric_COEFFICIENTS; ++k)
-        if (!isfinite(fresh.coef[k])) return kepler_eccentric_BAD_ARGUMENT;
+    if (!kepler_eccentric_finite(fresh.coef, kepler_eccentric_COEFFICIENTS))
+        return kepler_eccentric_BAD_ARGUMENT;
     if (gauge == NULL) kepler_eccentric_choose_gauge(&fresh.params, fresh.x, fresh.gauge);
     else memcpy(fresh.gauge, gauge, sizeof fresh.gauge);
-    for (int c = 0; c < kepler_eccentric_GAUGES; ++c)
-        if (!isfinite(fresh.gauge[c])) return kepler_eccentric_BAD_ARGUMENT;
+    if (!kepler_eccentric_finite(fresh.gauge, kepler_eccentric_GAUGES)) return kepler_eccentric_BAD_ARGUMENT;
     const double rate = kepler_eccentric_monitor(&fresh.params, fresh.x);
     if (!isfinite(rate) || !(rate > 0.0)) return kepler_eccentric_BAD_ARGUMENT;
     *s = fresh;
@@ -328,8 +356,10 @@ kepler_eccentric_status kepler_eccentric_integrate(kepler_eccentric_solver *s, d
     return status;
 }
 
-kepler_eccentric_status kepler_eccentric_step(kepler_eccentric_solver *s,
-    double h) { return kepler_eccentric_integrate(s, h, 1); }
+kepler_eccentric_status kepler_eccentric_step(kepler_eccentric_solver *s, double h)
+{
+    return kepler_eccentric_integrate(s, h, 1);
+}
 
 const char *kepler_eccentric_status_string(kepler_eccentric_status status)
 {

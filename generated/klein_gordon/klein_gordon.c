@@ -21,7 +21,7 @@
  *   4. The solver
  *   5. The flows
  *   6. What is seen at sites
- * body-sha256: 3e9a89d5d2592ad86c4b99e9343a9bc0624ed650bc18049407b791ede221d0c4
+ * body-sha256: 535cd2c84f2d242ced7533285d3a020f3a4b9c3d5e56c4e5dad9ce039740d323
  */
 #include "klein_gordon.h"
 
@@ -142,8 +142,8 @@ typedef struct {
 /* The piece of that number. */
 static inline klein_gordon_piece klein_gordon_piece_of(const klein_gordon_solver *s, size_t unit)
 {
-    const size_t pieces = klein_gordon_pieces(s), index = pieces == 1 ? unit : unit / pieces, part = unit
-        - index * pieces;
+    const size_t pieces = klein_gordon_pieces(s), index = pieces == 1 ? unit : unit / pieces,
+        part = unit - index * pieces;
     klein_gordon_piece piece;
     klein_gordon_locate(s, index, &piece.row);
     piece.from = (ptrdiff_t)part * klein_gordon_PIECE;
@@ -269,8 +269,8 @@ static size_t klein_gordon_shape(const size_t sizes[klein_gordon_AXES], ptrdiff_
     const size_t most = SIZE_MAX / 64 / klein_gordon_RESERVED;
     size_t rows = 1;
     for (int a = 0; a < klein_gordon_AXES; ++a) {
-        if (sizes[a] < klein_gordon_least[a] || sizes[a] % klein_gordon_periods[a] != 0 || sizes[a] > most
-            / 2) return 0;
+        if (sizes[a] < klein_gordon_least[a] || sizes[a] % klein_gordon_periods[a] != 0
+            || sizes[a] > most / 2) return 0;
         if (a < klein_gordon_AXES - 1) {
             if (rows > most / sizes[a]) return 0;
             rows *= sizes[a];
@@ -347,8 +347,8 @@ klein_gordon_status klein_gordon_init(klein_gordon_solver *s, const klein_gordon
     ptrdiff_t width;
     if (s == NULL || sizes == NULL || x0 == NULL || work == NULL) return klein_gordon_BAD_ARGUMENT;
     const klein_gordon_params own = params != NULL ? *params : klein_gordon_default_params;
-    const size_t rows = klein_gordon_shape(sizes, &width), length = sizes[klein_gordon_AXES - 1], sites = rows
-        * length;
+    const size_t rows = klein_gordon_shape(sizes, &width), length = sizes[klein_gordon_AXES - 1],
+        sites = rows * length;
     if (rows == 0 || !klein_gordon_finite(x0, klein_gordon_DIM * sites) || !klein_gordon_allowed(&own, sites))
         return klein_gordon_BAD_ARGUMENT;
     double coef[klein_gordon_COEFFICIENTS];
@@ -480,8 +480,10 @@ klein_gordon_status klein_gordon_integrate(klein_gordon_solver *s, double h, siz
     return status;
 }
 
-klein_gordon_status klein_gordon_step(klein_gordon_solver *s, double h) { return klein_gordon_integrate(s, h,
-    1); }
+klein_gordon_status klein_gordon_step(klein_gordon_solver *s, double h)
+{
+    return klein_gordon_integrate(s, h, 1);
+}
 
 /* The sites of fields, without what is beside their rows. */
 static void klein_gordon_take(const klein_gordon_solver *s, double *const fields[klein_gordon_DIM], double *x)
@@ -547,12 +549,18 @@ static void klein_gordon_fill(const klein_gordon_solver *s, klein_gordon_kernel 
     }
 }
 
-void klein_gordon_density(const klein_gordon_solver *s, double *out) { klein_gordon_fill(s,
-    klein_gordon_energy_row, out); }
-void klein_gordon_casimirs(const klein_gordon_solver *s, double *out) { klein_gordon_fill(s,
-    klein_gordon_casimirs_row, out); }
-void klein_gordon_vector_field(const klein_gordon_solver *s, double *out) { klein_gordon_fill(s,
-    klein_gordon_vector_field_row, out); }
+void klein_gordon_density(const klein_gordon_solver *s, double *out)
+{
+    klein_gordon_fill(s, klein_gordon_energy_row, out);
+}
+void klein_gordon_casimirs(const klein_gordon_solver *s, double *out)
+{
+    klein_gordon_fill(s, klein_gordon_casimirs_row, out);
+}
+void klein_gordon_vector_field(const klein_gordon_solver *s, double *out)
+{
+    klein_gordon_fill(s, klein_gordon_vector_field_row, out);
+}
 
 const char *klein_gordon_status_string(klein_gordon_status status)
 {

@@ -27,7 +27,7 @@
  *   11. Members of an ensemble
  *   12. Groups of members
  *   13. Ensembles
- * body-sha256: d30ab2c3025e423a19d9313fb2cedcfa2c0b345860d16f9691d956c919e4e04b
+ * body-sha256: 032d175952e68716f478f1e3cea6a3a38734823810db2dd1fc748215d7124a65
  */
 #include "kowalevski_top.h"
 
@@ -337,10 +337,10 @@ kowalevski_top_APART static void kowalevski_top_linearise_part1(const double coe
     work[139] = coef[80] * work[29];
     const double t4 = coef[76] * work[27], t5 = G1 * coef[55];
     work[140] = G1 * (coef[5] + t5) + (coef[53] * work[57] + (coef[24] + coef[54] * work[77]));
-    const double t6 = work[27] * (coef[72] * work[77] + coef[71] * work[57]) + work[135] + G1
-        * (work[133] + G1 * (coef[73] * work[27] + work[136])) + P2 * (coef[74] * work[137] + P2
-        * (work[29] * (work[138] + (work[115] + work[139])) + (work[27] * (t4 + (coef[12] + G1 * coef[75]))
-        + work[140])));
+    const double t6 = work[27] * (coef[72] * work[77] + coef[71] * work[57]) + work[135] + G1 * (work[133]
+        + G1 * (coef[73] * work[27] + work[136])) + P2 * (coef[74] * work[137]
+        + P2 * (work[29] * (work[138] + (work[115] + work[139]))
+        + (work[27] * (t4 + (coef[12] + G1 * coef[75])) + work[140])));
     work[26] = G3 * P3;
     work[129] = coef[81] + G1 * coef[82] + coef[83] * work[27];
     work[103] = G3 * (P2 * P3);
@@ -358,10 +358,10 @@ kowalevski_top_APART static void kowalevski_top_linearise_part1(const double coe
     const double t8 = coef[40] * work[26];
     work[144] = coef[78] + G1 * coef[87] + (work[141] + coef[80] * work[30]);
     const double t9 = work[29] * (work[116] + (work[71] + work[141]))
-        + (work[27] * (t4 + (coef[12] + G1 * coef[85])) + work[142]) + P1 * (work[143] + t8 + P1
-        * (work[115] + work[144]));
-    work[11] = G3 * (work[54] * (work[126] + work[97]) + P1 * (t3 + P1 * (work[131] + P1 * work[132]))) + P3
-        * (t6 + P1 * (work[87] + P1 * t9));
+        + (work[27] * (t4 + (coef[12] + G1 * coef[85])) + work[142]) + P1 * (work[143] + t8 + P1 * (work[115]
+        + work[144]));
+    work[11] = G3 * (work[54] * (work[126] + work[97]) + P1 * (t3 + P1 * (work[131] + P1 * work[132])))
+        + P3 * (t6 + P1 * (work[87] + P1 * t9));
     work[40] = coef[8] * work[57];
     const double t10 = work[40] + coef[9] * work[77];
     work[45] = coef[10] + G1 * coef[11];
@@ -374,9 +374,9 @@ kowalevski_top_APART static void kowalevski_top_linearise_part1(const double coe
     work[60] = G1 * work[39];
     work[61] = coef[21] + G1 * coef[23];
     work[62] = coef[32] * work[29];
-    const double t11 = work[54] * (t10 + G1 * (work[45] + work[42])) + P1 * (work[56] + work[57]
-        * (work[58] + (work[59] + coef[43] * work[30])) + G2 * (coef[41] * work[60] + G2
-        * (work[61] + (coef[44] * work[30] + work[62]))));
+    const double t11 = work[54] * (t10 + G1 * (work[45] + work[42])) + P1 * (work[56] + work[57] * (work[58]
+        + (work[59] + coef[43] * work[30])) + G2 * (coef[41] * work[60]
+        + G2 * (work[61] + (coef[44] * work[30] + work[62]))));
     work[32] = coef[30] * work[54];
     work[88] = G1 * coef[39];
     work[33] = coef[38] + work[88] + (coef[42] * work[29] + coef[46] * work[30]);
@@ -420,12 +420,12 @@ kowalevski_top_APART static void kowalevski_top_linearise_part1(const double coe
     work[113] = work[27] * (t14 + (coef[28] + G1 * coef[56])) + work[140];
     work[114] = coef[62] * work[26];
     work[70] = work[114] + t15;
-    const double t20 = work[77] * (t18 + work[111]) + (coef[19] + work[57] * (work[48] + work[112])) + G1
-        * (G1 * (work[109] + (work[110] + work[104])) + work[119]) + P3 * (work[124] + P3
-        * (work[29] * (coef[34] + t19 + t13) + work[113] + P1 * (work[70] + P1
-        * (work[115] + (work[116] + t16)))));
-    work[13] = G2 * (work[102] + P1 * (t10 + G1 * (work[105] + work[45]) + P3 * (work[106] + P3
-        * (work[47] + (work[82] + work[46]))))) + P2 * t20;
+    const double t20 = work[77] * (t18 + work[111]) + (coef[19] + work[57] * (work[48] + work[112]))
+        + G1 * (G1 * (work[109] + (work[110] + work[104])) + work[119]) + P3 * (work[124]
+        + P3 * (work[29] * (coef[34] + t19 + t13) + work[113]
+        + P1 * (work[70] + P1 * (work[115] + (work[116] + t16)))));
+    work[13] = G2 * (work[102] + P1 * (t10 + G1 * (work[105] + work[45]) + P3 * (work[106]
+        + P3 * (work[47] + (work[82] + work[46]))))) + P2 * t20;
     work[183] = coef[87] * work[29];
     work[182] = coef[49] + t19;
     const double t21 = G1 * coef[90];
@@ -437,11 +437,11 @@ kowalevski_top_APART static void kowalevski_top_linearise_part1(const double coe
     const double t22 = coef[16] * work[27];
     work[130] = t1 + (coef[117] * work[57] + t2);
     work[31] = work[29] * (work[127] + (t22 + work[128])) + (work[27] * t12 + work[130]);
-    const double t23 = work[26] * work[184] + P2 * (coef[53] * work[103] + G2
-        * (work[97] + (work[126] + work[98]))) + P1 * (work[31] + P1 * (coef[25] * work[26] + work[131] + P1
-        * (t22 + work[132])));
-    work[8] = G3 * (work[29] * (work[183] + work[182]) + (work[185] + (coef[115] * work[57] + work[186])) + P1
-        * (work[28] + P1 * work[187])) + P3 * t23;
+    const double t23 = work[26] * work[184] + P2 * (coef[53] * work[103]
+        + G2 * (work[97] + (work[126] + work[98]))) + P1 * (work[31] + P1 * (coef[25] * work[26] + work[131]
+        + P1 * (t22 + work[132])));
+    work[8] = G3 * (work[29] * (work[183] + work[182]) + (work[185] + (coef[115] * work[57] + work[186]))
+        + P1 * (work[28] + P1 * work[187])) + P3 * t23;
     work[173] = work[27] * (coef[111] * work[27] + (coef[67] + G1 * coef[69]));
     const double t24 = G1 * coef[91];
     work[174] = G1 * (coef[110] + t24);
@@ -454,9 +454,9 @@ kowalevski_top_APART static void kowalevski_top_linearise_part1(const double coe
     work[145] = work[105] + work[42];
     const double t25 = P1 * (work[40] + G2 * (work[41] + coef[32] * work[39]) + G1 * (work[45] + work[145])
         + P3 * (work[106] + P3 * (work[46] + (work[47] + (work[48] + work[82])))));
-    work[0] = G2 * (work[173] + (work[174] + (work[175] + (coef[107] + coef[109] * work[77]))) + P1
-        * (work[44] + P1 * (work[61] + (work[176] + work[49])))) + P2 * (work[102] + P2
-        * (coef[77] * work[103] + G2 * work[172]) + t25);
+    work[0] = G2 * (work[173] + (work[174] + (work[175] + (coef[107] + coef[109] * work[77])))
+        + P1 * (work[44] + P1 * (work[61] + (work[176] + work[49])))) + P2 * (work[102]
+        + P2 * (coef[77] * work[103] + G2 * work[172]) + t25);
     work[148] = G2 * P1;
     work[78] = coef[10] + G1 * coef[102];
     work[149] = work[110] + t18;
@@ -468,12 +468,13 @@ kowalevski_top_APART static void kowalevski_top_linearise_part1(const double coe
     work[147] = work[79] + (work[80] + coef[59] * work[30]);
     work[134] = G3 * (work[146] + P1 * work[147]);
     work[150] = coef[95] * work[27];
-    const double t27 = coef[93] * work[77] + coef[92] * work[57] + G1 * (work[150] + (coef[21] + G1
-        * coef[94])) + work[29] * (coef[98] + t5 + (coef[99] * work[27] + coef[100] * work[29]));
+    const double t27 = coef[93] * work[77] + coef[92] * work[57] + G1 * (work[150]
+        + (coef[21] + G1 * coef[94])) + work[29] * (coef[98] + t5 + (coef[99] * work[27]
+        + coef[100] * work[29]));
     work[81] = coef[13] * work[54] + coef[6] * work[26];
-    work[2] = work[77] * (coef[89] + t24 + coef[104] * work[30]) + (coef[66] + work[57]
-        * (coef[103] * work[30] + (coef[88] + t21))) + P2 * t26 + P3 * (work[134] + P3
-        * (t27 + P1 * (work[81] + P1 * (coef[105] * work[27] + (coef[28] + t7 + (coef[97] * work[29]
+    work[2] = work[77] * (coef[89] + t24 + coef[104] * work[30])
+        + (coef[66] + work[57] * (coef[103] * work[30] + (coef[88] + t21))) + P2 * t26 + P3 * (work[134]
+        + P3 * (t27 + P1 * (work[81] + P1 * (coef[105] * work[27] + (coef[28] + t7 + (coef[97] * work[29]
         + coef[106] * work[30]))))));
     work[95] = work[11] * work[11];
     work[96] = work[20] * work[20];
@@ -562,8 +563,8 @@ kowalevski_top_APART static void kowalevski_top_linearise_part2(const double coe
     work[272] = work[6] * work[3] + (work[20] * work[10] - work[11] * work[247]);
     work[273] = work[6] * work[17] + (work[13] * work[247] - work[20] * work[9]);
     const double t2 = coef[135] * work[26], t3 = coef[40] * work[27];
-    work[190] = G3 * (work[28] + P1 * (coef[141] + G1 * coef[142] + (coef[130] * work[29] + coef[143]
-        * work[30]))) + P3 * (work[31] + P1 * (t2 + work[32] + P1 * (t3 + work[33])));
+    work[190] = G3 * (work[28] + P1 * (coef[141] + G1 * coef[142] + (coef[130] * work[29]
+        + coef[143] * work[30]))) + P3 * (work[31] + P1 * (t2 + work[32] + P1 * (t3 + work[33])));
     const double t4 = work[24] - work[34];
     work[263] = t4 * work[14];
     work[265] = t4 * work[6];
@@ -579,9 +580,9 @@ kowalevski_top_APART static void kowalevski_top_linearise_part2(const double coe
         - work[249];
     const double t10 = coef[131] * work[39], t11 = work[40] + G2 * (work[41] + t10);
     const double t12 = coef[41] * work[30], t13 = t12 + work[42], t14 = coef[30] * work[43];
-    work[179] = G2 * (work[44] + P1 * (coef[67] + G1 * coef[140] + (coef[138] * work[30] + coef[136]
-        * work[27]))) + P2 * (t11 + G1 * (work[45] + t13) + P3
-        * (t14 + P3 * (work[46] + (work[47] + (work[48] + work[49])))));
+    work[179] = G2 * (work[44] + P1 * (coef[67] + G1 * coef[140] + (coef[138] * work[30]
+        + coef[136] * work[27]))) + P2 * (t11 + G1 * (work[45] + t13)
+        + P3 * (t14 + P3 * (work[46] + (work[47] + (work[48] + work[49])))));
     work[211] = 0.5 * G3;
     const double t15 = work[50] - work[51] - work[51];
     work[199] = work[23] - work[37];
@@ -595,10 +596,11 @@ kowalevski_top_APART static void kowalevski_top_linearise_part2(const double coe
         + (work[11] * work[248] - work[13] * work[202]))));
     const double t19 = coef[122] * work[29], t20 = coef[121] * work[26], t21 = coef[44] * work[54];
     const double t22 = t20 + t21, t23 = coef[126] * work[27], t24 = coef[127] * work[29];
-    const double t25 = G3 * (work[32] + P1 * (coef[89] + G1 * coef[120] + (t19 + coef[128] * work[30]))) + P3
-        * (work[55] + P1 * (t22 + P1 * (t23 + (coef[125] + G1 * coef[36] + (t24 + coef[129] * work[30])))));
-    work[239] = work[56] + work[57] * (work[58] + (work[59] + coef[123] * work[30])) + G2
-        * (coef[115] * work[60] + G2 * (work[61] + (coef[124] * work[30] + work[62]))) + P3 * t25;
+    const double t25 = G3 * (work[32] + P1 * (coef[89] + G1 * coef[120] + (t19 + coef[128] * work[30])))
+        + P3 * (work[55]
+        + P1 * (t22 + P1 * (t23 + (coef[125] + G1 * coef[36] + (t24 + coef[129] * work[30])))));
+    work[239] = work[56] + work[57] * (work[58] + (work[59] + coef[123] * work[30]))
+        + G2 * (coef[115] * work[60] + G2 * (work[61] + (coef[124] * work[30] + work[62]))) + P3 * t25;
     const double t26 = G3 * work[8], t27 = G2 * work[0], t28 = P3 * work[11], t29 = P2 * work[13];
     const double t30 = t26 + t27 + (t28 + t29);
     work[235] = work[20] * work[15];
@@ -615,13 +617,13 @@ kowalevski_top_APART static void kowalevski_top_linearise_part2(const double coe
     work[234] = work[0] * t31 - work[2] * work[208] + (work[13] * t30 - (work[20] * work[230] + work[18]));
     const double t35 = kowalevski_top_phi2(work[6]);
     work[231] = work[20] * t35;
-    const double t36 = work[15] * (t30 * work[6] + 2.0 * (work[20] * work[7]) + (work[8] * work[257] - work[0]
-        * work[232] + (work[11] * work[258] - work[13] * work[234]))) + 2.0 * (work[231] * t1);
+    const double t36 = work[15] * (t30 * work[6] + 2.0 * (work[20] * work[7]) + (work[8] * work[257]
+        - work[0] * work[232] + (work[11] * work[258] - work[13] * work[234]))) + 2.0 * (work[231] * t1);
     work[159] = t30 * work[14] + 2.0 * (work[235] * work[7]) - t36;
     const double t37 = coef[1] * work[29], t38 = coef[132] + G1 * coef[65], t39 = coef[133] * work[29];
-    const double t40 = G2 * (t14 + P3 * (work[47] + (work[49] + work[46]))) + P2
-        * (G3 * (work[68] + (coef[122] * work[30] + work[69])) + P3 * (work[70] + P1
-        * (work[71] + (t38 + (t39 + coef[133] * work[30])))));
+    const double t40 = G2 * (t14 + P3 * (work[47] + (work[49] + work[46])))
+        + P2 * (G3 * (work[68] + (coef[122] * work[30] + work[69]))
+        + P3 * (work[70] + P1 * (work[71] + (t38 + (t39 + coef[133] * work[30])))));
     work[238] = work[39] * (coef[130] * work[57] + coef[32] * work[72]) + G2 * (G1 * (work[45] + (t12 + t37))
         + (work[40] + G2 * (G2 * coef[9] + t10))) + P3 * t40;
     work[236] = 0.5 * P3;
@@ -641,9 +643,9 @@ kowalevski_top_APART static void kowalevski_top_linearise_part2(const double coe
     work[161] = work[236] + (2.0 * (work[227] * work[7]) - work[14] * t41 - t44);
     const double t45 = coef[39] * work[30], t46 = G1 * coef[53], t47 = coef[12] + t46;
     const double t48 = coef[35] * work[29];
-    work[158] = P1 * (coef[22] * work[57] + coef[23] * work[77]) + P2 * (coef[32] * work[60] + G2
-        * (work[78] + t13)) + P3 * (G3 * (work[79] + (work[80] + t45)) + P3 * (work[81] + P1
-        * (work[46] + (t47 + (t48 + work[82])))));
+    work[158] = P1 * (coef[22] * work[57] + coef[23] * work[77]) + P2 * (coef[32] * work[60]
+        + G2 * (work[78] + t13)) + P3 * (G3 * (work[79] + (work[80] + t45))
+        + P3 * (work[81] + P1 * (work[46] + (t47 + (t48 + work[82])))));
     work[266] = t31 * work[14];
     work[267] = t31 * work[6];
     work[209] = work[34] - work[63] - work[63];
@@ -654,8 +656,8 @@ kowalevski_top_APART static void kowalevski_top_linearise_part2(const double coe
     const double t52 = work[29] * (t38 + t50) + (work[27] * (t51 + (coef[49] + G1 * coef[84]))
         + (G1 * (coef[49] + t46) + (coef[135] * work[57] + (coef[134] + coef[136] * work[77]))));
     const double t53 = t39 + coef[45] * work[30];
-    work[237] = work[86] + P3 * (work[87] + P1 * (t52 + P1 * (t21 + coef[139] * work[26] + P1
-        * (t49 + (coef[132] + work[88] + t53)))));
+    work[237] = work[86] + P3 * (work[87] + P1 * (t52 + P1 * (t21 + coef[139] * work[26]
+        + P1 * (t49 + (coef[132] + work[88] + t53)))));
     const double t54 = work[21] - work[89] - work[90];
     work[221] = work[11] * work[15];
     work[219] = work[11] * t35;
@@ -667,8 +669,8 @@ kowalevski_top_APART static void kowalevski_top_linearise_part2(const double coe
     work[213] = work[91] + (work[92] + work[16]);
     work[217] = work[0] * t4 + work[2] * work[212] + (work[20] * work[213] + work[13] * t54);
     const double t55 = 2.0 * (work[219] * t1) + work[15] * (work[6] * t54 + 2.0 * work[93]
-        + (work[8] * work[253] - work[0] * work[216] + (work[12] + work[11] * work[254] - work[13]
-        * work[217])));
+        + (work[8] * work[253] - work[0] * work[216] + (work[12] + work[11] * work[254]
+        - work[13] * work[217])));
     work[259] = 0.5 * P2;
     work[165] = work[14] * t54 + 2.0 * (work[221] * work[7]) - t55 - work[259];
     work[152] = work[94] + work[95];
@@ -676,8 +678,8 @@ kowalevski_top_APART static void kowalevski_top_linearise_part2(const double coe
     work[166] = work[20] * work[153] + work[13] * work[152];
     work[151] = work[11] * work[20];
     work[167] = work[20] * work[151] + work[11] * work[152];
-    work[269] = work[152] * work[14] + work[15] * (work[13] * work[166] + work[11] * work[167] - work[152]
-        * work[6]);
+    work[269] = work[152] * work[14] + work[15] * (work[13] * work[166] + work[11] * work[167]
+        - work[152] * work[6]);
     work[196] = work[153] * work[14];
     work[197] = work[153] * work[6];
     work[168] = work[11] * work[13];
@@ -691,63 +693,63 @@ kowalevski_top_APART static void kowalevski_top_linearise_part2(const double coe
         - work[195];
     work[170] = coef[118] * work[43];
     const double t57 = coef[64] * work[30], t58 = G1 * coef[41];
-    work[189] = G2 * (work[170] + P3 * (work[97] + (t57 + work[98]))) + P2
-        * (G3 * (coef[153] + t58 + (work[99] + coef[130] * work[30])) + P3 * (work[100] + coef[147] * work[26]
-        + P1 * (coef[62] * work[27] + work[101])));
+    work[189] = G2 * (work[170] + P3 * (work[97] + (t57 + work[98])))
+        + P2 * (G3 * (coef[153] + t58 + (work[99] + coef[130] * work[30])) + P3 * (work[100]
+        + coef[147] * work[26] + P1 * (coef[62] * work[27] + work[101])));
     const double t59 = coef[36] * work[29];
     work[178] = work[102] + P2 * (coef[57] * work[103] + G2 * (coef[49] + G1 * coef[152]
-        + (coef[148] * work[27] + work[104]))) + P1 * (t11 + G1 * (work[45] + (work[105] + t37)) + P3
-        * (work[106] + P3 * (work[46] + (work[47] + (work[82] + t59)))));
-    const double t60 = G1 * (work[107] + G2 * (work[108] + coef[146] * work[39]) + G1
-        * (work[109] + (work[99] + work[110]))) + (work[77] * (work[48] + work[111]) + (coef[19] + work[57]
-        * (t59 + work[112])));
-    const double t61 = work[29] * (coef[125] + G1 * coef[145] + (coef[129] * work[29] + t23)) + work[113] + P1
-        * (work[114] + t21 + P1 * (work[115] + (work[116] + (t24 + work[117]))));
+        + (coef[148] * work[27] + work[104]))) + P1 * (t11 + G1 * (work[45] + (work[105] + t37))
+        + P3 * (work[106] + P3 * (work[46] + (work[47] + (work[82] + t59)))));
+    const double t60 = G1 * (work[107] + G2 * (work[108] + coef[146] * work[39]) + G1 * (work[109]
+        + (work[99] + work[110]))) + (work[77] * (work[48] + work[111])
+        + (coef[19] + work[57] * (t59 + work[112])));
+    const double t61 = work[29] * (coef[125] + G1 * coef[145] + (coef[129] * work[29] + t23)) + work[113]
+        + P1 * (work[114] + t21 + P1 * (work[115] + (work[116] + (t24 + work[117]))));
     work[240] = t60 + P3 * (G3 * (coef[144] * work[54] + P1 * (work[68] + (t19 + work[118]))) + P3 * t61);
     const double t62 = coef[47] * work[26], t63 = coef[13] * work[27], t64 = G1 * coef[149];
     const double t65 = coef[5] + t64, t66 = coef[50] * work[29];
-    const double t67 = work[119] + G1 * (coef[49] + work[120] + (coef[151] * work[29] + work[121])) + P3
-        * (coef[61] * work[43] + P3 * (coef[56] * work[27] + (t65 + (t66 + coef[35] * work[30]))));
+    const double t67 = work[119] + G1 * (coef[49] + work[120] + (coef[151] * work[29] + work[121]))
+        + P3 * (coef[61] * work[43] + P3 * (coef[56] * work[27] + (t65 + (t66 + coef[35] * work[30]))));
     work[160] = G2 * (t62 + P1 * (work[78] + (work[105] + t63))) + P2 * t67;
     const double t68 = coef[74] * work[27];
     const double t69 = work[29] * (coef[132] + t58 + t50) + (work[27] * (t51 + (coef[49] + G1 * coef[150]))
         + (G1 * (coef[3] + t64) + (coef[147] * work[57] + (coef[134] + coef[148] * work[77]))));
-    work[241] = G2 * (G3 * (t68 + work[97]) + P1 * (work[106] + P3 * (work[122] + (work[123] + t45)))) + P2
-        * (work[124] + P3 * (t69 + P1 * (t22 + P1 * (t49 + (t38 + t53)))));
+    work[241] = G2 * (G3 * (t68 + work[97]) + P1 * (work[106] + P3 * (work[122] + (work[123] + t45))))
+        + P2 * (work[124] + P3 * (t69 + P1 * (t22 + P1 * (t49 + (t38 + t53)))));
     work[245] = 0.5 * work[13];
     work[243] = work[151] * work[14];
     work[244] = work[151] * work[6];
     work[194] = work[13] * work[151];
     work[191] = work[194] - t56;
     work[192] = work[11] * work[151] + work[20] * work[125];
-    work[271] = work[245] + (work[243] - work[15] * (work[244] - (work[13] * work[191] + work[11]
-        * work[192])));
+    work[271] = work[245] + (work[243] - work[15] * (work[244] - (work[13] * work[191]
+        + work[11] * work[192])));
     const double t70 = coef[155] * work[27];
     work[171] = work[97] + (work[126] + t57);
     work[177] = G2 * (coef[113] * work[43] + P3 * (coef[164] + G1 * coef[109] + (t70 + coef[136] * work[30])))
-        + P2 * (G3 * work[171] + P3 * (coef[74] * work[26] + coef[148] * work[54] + P1
-        * (work[123] + (work[122] + (work[99] + t45)))));
+        + P2 * (G3 * work[171] + P3 * (coef[74] * work[26] + coef[148] * work[54] + P1 * (work[123]
+        + (work[122] + (work[99] + t45)))));
     work[188] = work[26] * (coef[52] * work[27] + (coef[153] + G1 * coef[165])) + P2 * (coef[147] * work[103]
         + G2 * (work[97] + (t68 + work[126]))) + P1 * (work[29] * (work[127] + (work[128] + t3))
         + (work[27] * work[129] + work[130]) + P1 * (work[131] + t2 + P1 * (t3 + work[132])));
     const double t71 = G1 * coef[162];
-    const double t72 = work[29] * (t65 + (coef[75] * work[27] + coef[79] * work[29])) + (work[133] + G1
-        * (coef[67] + t71 + coef[163] * work[27])) + P1 * (work[131] + coef[82] * work[26] + P1
-        * (coef[85] * work[27] + (t47 + (t48 + coef[87] * work[30]))));
+    const double t72 = work[29] * (t65 + (coef[75] * work[27] + coef[79] * work[29]))
+        + (work[133] + G1 * (coef[67] + t71 + coef[163] * work[27])) + P1 * (work[131] + coef[82] * work[26]
+        + P1 * (coef[85] * work[27] + (t47 + (t48 + coef[87] * work[30]))));
     work[164] = work[134] + P3 * t72;
     const double t73 = coef[158] * work[27];
-    const double t74 = work[27] * (coef[154] * work[77] + coef[97] * work[57]) + work[135] + G1
-        * (work[133] + G1 * (t70 + work[136])) + P2 * (coef[156] * work[137] + P2
-        * (work[29] * (work[138] + (t23 + work[139])) + (work[27] * (coef[34] + G1 * coef[157] + t73)
+    const double t74 = work[27] * (coef[154] * work[77] + coef[97] * work[57]) + work[135] + G1 * (work[133]
+        + G1 * (t70 + work[136])) + P2 * (coef[156] * work[137]
+        + P2 * (work[29] * (work[138] + (t23 + work[139])) + (work[27] * (coef[34] + G1 * coef[157] + t73)
         + work[140])));
     const double t75 = work[29] * (work[116] + (coef[124] * work[27] + work[141]))
-        + (work[27] * (coef[34] + G1 * coef[161] + t73) + work[142]) + P1 * (t20 + work[143] + P1
-        * (t23 + work[144]));
-    const double t76 = work[26] * (coef[88] + G1 * coef[159] + coef[92] * work[27]) + P2
-        * (coef[121] * work[103] + G2 * (work[122] + (work[99] + coef[160] * work[27]))) + P1 * t75;
+        + (work[27] * (coef[34] + G1 * coef[161] + t73) + work[142]) + P1 * (t20 + work[143]
+        + P1 * (t23 + work[144]));
+    const double t76 = work[26] * (coef[88] + G1 * coef[159] + coef[92] * work[27])
+        + P2 * (coef[121] * work[103] + G2 * (work[122] + (work[99] + coef[160] * work[27]))) + P1 * t75;
     work[242] = t74 + P1 * t76;
-    work[154] = G2 * (coef[110] + G1 * coef[166] + (coef[23] * work[30] + coef[69] * work[27])) + P2
-        * (coef[51] * work[54] + t62 + P1 * (t63 + (work[78] + work[145])));
+    work[154] = G2 * (coef[110] + G1 * coef[166] + (coef[23] * work[30] + coef[69] * work[27]))
+        + P2 * (coef[51] * work[54] + t62 + P1 * (t63 + (work[78] + work[145])));
     work[156] = G3 * (coef[38] + G1 * coef[167] + (coef[22] * work[30] + t66)) + P3 * (coef[68] * work[26]
         + work[146] + P1 * (coef[6] * work[27] + work[147]));
     work[162] = P2 * (coef[102] * work[148] + P2 * (coef[55] * work[27] + (coef[12] + work[120] + work[149])))
@@ -761,8 +763,8 @@ kowalevski_top_APART static void kowalevski_top_linearise_part2(const double coe
     displacement[5] = work[14] * work[17] - work[15] * work[273] - 0.5 * work[25];
     increment_jacobian[30] = G1 * work[238] - G2 * work[239];
     increment_jacobian[24] = G3 * work[239] - G1 * work[237];
-    jacobian[0] = 1.0 + (work[190] * work[157] + work[179] * work[155] + (work[239] * work[159] + work[238]
-        * work[161] + (work[158] * work[163] + work[237] * work[165])) - work[269]);
+    jacobian[0] = 1.0 + (work[190] * work[157] + work[179] * work[155] + (work[239] * work[159]
+        + work[238] * work[161] + (work[158] * work[163] + work[237] * work[165])) - work[269]);
     increment_jacobian[31] = G1 * work[240] - G2 * work[238];
     jacobian[1] = work[270] + (work[189] * work[157] + work[178] * work[155] + (work[238] * work[159]
         + work[240] * work[161] + (work[160] * work[163] + work[241] * work[165])));
@@ -788,35 +790,36 @@ kowalevski_top_APART static void kowalevski_top_linearise_part3(const double coe
     const double t6 = work[2] * work[151] + work[8] * work[152] + (work[20] * t5 + work[11] * t4);
     const double t7 = work[0] * work[20] + work[2] * work[13];
     const double t8 = work[2] * work[153] + work[0] * work[152] + (work[20] * t7 + work[13] * t4);
-    const double t9 = work[154] * work[155] + work[156] * work[157] + (work[158] * work[159] + work[160]
-        * work[161] + (work[162] * work[163] + work[164] * work[165])) - (t4 * work[14] + work[15]
-        * (work[0] * work[166] + work[8] * work[167] + (work[11] * t6 + work[13] * t8) - t4 * work[6]));
+    const double t9 = work[154] * work[155] + work[156] * work[157] + (work[158] * work[159]
+        + work[160] * work[161] + (work[162] * work[163] + work[164] * work[165]))
+        - (t4 * work[14] + work[15] * (work[0] * work[166] + work[8] * work[167]
+        + (work[11] * t6 + work[13] * t8) - t4 * work[6]));
     const double t10 = t7 * work[14], t11 = t7 * work[6], t12 = work[2] * work[168];
     const double t13 = work[8] * work[153], t14 = work[8] * work[13] + work[0] * work[11];
     const double t15 = work[20] * t14, t16 = work[11] * t7, t17 = t12 - t13 + (t15 - t16);
     const double t18 = work[2] * work[20], t19 = t18 + t1, t20 = t19 + t19;
     const double t21 = work[0] * work[153] + work[2] * work[169] + (work[13] * t7 + work[20] * t20);
     const double t22 = 0.5 * work[8];
-    const double t23 = G2 * (G3 * coef[169] + coef[113] * (P1 * P3)) + P2 * (work[170] + P3
-        * (work[98] + work[171]));
-    const double t24 = work[29] * work[172] + (work[173] + (work[174] + (work[175] + (coef[107] + coef[168]
-        * work[77])))) + P1 * (coef[167] * work[54] + work[44] + P1
-        * (work[176] + (work[61] + (work[49] + work[62]))));
+    const double t23 = G2 * (G3 * coef[169] + coef[113] * (P1 * P3)) + P2 * (work[170]
+        + P3 * (work[98] + work[171]));
+    const double t24 = work[29] * work[172]
+        + (work[173] + (work[174] + (work[175] + (coef[107] + coef[168] * work[77]))))
+        + P1 * (coef[167] * work[54] + work[44] + P1 * (work[176] + (work[61] + (work[49] + work[62]))));
     const double t25 = t10 - work[15] * (t11 + (work[8] * work[180] - work[0] * work[181] + (work[11] * t17
-        - work[13] * t21))) - t22 + (t23 * work[157] + t24 * work[155] + (work[179] * work[159] + work[178]
-        * work[161] + (work[154] * work[163] + work[177] * work[165])));
+        - work[13] * t21))) - t22 + (t23 * work[157] + t24 * work[155] + (work[179] * work[159]
+        + work[178] * work[161] + (work[154] * work[163] + work[177] * work[165])));
     const double t26 = 0.5 * work[0], t27 = t5 * work[14], t28 = t5 * work[6], t29 = work[0] * work[151];
     const double t30 = work[13] * t5, t31 = t29 - t12 + (t30 - t15), t32 = t18 + t2, t33 = t32 + t32;
     const double t34 = work[8] * work[151] + work[2] * work[125] + (work[11] * t5 + work[20] * t33);
     const double t35 = work[29] * (work[182] + (coef[53] * work[27] + work[183])) + (work[27] * work[184]
-        + (work[185] + (coef[170] * work[57] + work[186]))) + P1 * (coef[171] * work[26] + work[28] + P1
-        * (coef[25] * work[27] + work[187]));
+        + (work[185] + (coef[170] * work[57] + work[186]))) + P1 * (coef[171] * work[26] + work[28]
+        + P1 * (coef[25] * work[27] + work[187]));
     const double t36 = t26 + (t27 - work[15] * (t28 - (work[0] * work[191] + work[8] * work[192]
         + (work[13] * t31 + work[11] * t34)))) + (t35 * work[157] + t23 * work[155] + (work[190] * work[159]
         + work[189] * work[161] + (work[156] * work[163] + work[188] * work[165])));
     const double t37 = work[193] - work[194];
-    const double t38 = work[195] + (work[196] - work[15] * (work[197] - (work[11] * t37 + work[20]
-        * work[166])));
+    const double t38 = work[195] + (work[196] - work[15] * (work[197] - (work[11] * t37
+        + work[20] * work[166])));
     const double t39 = work[198] * work[14], t40 = work[198] * work[6], t41 = work[11] * work[198];
     const double t42 = work[13] * work[199], t43 = work[200] - work[201] + (t41 - t42);
     const double t44 = t39 - work[15] * (t40 + (work[20] * work[202] - work[11] * t43)), t45 = 0.5 * G1;
@@ -828,10 +831,11 @@ kowalevski_top_APART static void kowalevski_top_linearise_part3(const double coe
     const double t53 = t49 - work[15] * (t50 + (work[10] + (work[20] * work[210] - work[11] * t52)))
         - work[211];
     const double t54 = 0.5 * P1, t55 = work[3] - work[11] * work[212] - t46;
-    const double t56 = work[18] - work[11] * work[213] - work[13] * work[214] - (work[0] * work[203] + work[8]
-        * work[212]);
-    const double t57 = work[15] * (2.0 * work[215] - work[6] * work[213] + (work[2] * work[216] - work[8]
-        * t55 + (work[20] * work[217] - (work[218] + work[11] * t56)))) + 2.0 * (work[219] * work[220]);
+    const double t56 = work[18] - work[11] * work[213] - work[13] * work[214] - (work[0] * work[203]
+        + work[8] * work[212]);
+    const double t57 = work[15] * (2.0 * work[215] - work[6] * work[213] + (work[2] * work[216]
+        - work[8] * t55 + (work[20] * work[217] - (work[218] + work[11] * t56))))
+        + 2.0 * (work[219] * work[220]);
     const double t58 = t54 + (2.0 * (work[221] * work[18]) - work[14] * work[213] - t57);
     const double t59 = t41 - (t42 + work[17]);
     const double t60 = work[8] * work[198] - work[0] * work[199] + (work[11] * work[222]
@@ -840,14 +844,14 @@ kowalevski_top_APART static void kowalevski_top_linearise_part3(const double coe
         - work[8] * t59 + (work[20] * work[225] - work[11] * t60))) + 2.0 * (work[226] * work[220]);
     const double t62 = work[222] * work[14] + 2.0 * (work[227] * work[18]) - t61;
     const double t63 = work[13] * work[228] + t51;
-    const double t64 = work[8] * work[208] + work[0] * work[228] + (work[13] * work[229] + work[11]
-        * work[230]);
+    const double t64 = work[8] * work[208] + work[0] * work[228] + (work[13] * work[229]
+        + work[11] * work[230]);
     const double t65 = 2.0 * (work[231] * work[220]) + work[15] * (work[6] * work[230] + 2.0 * work[5]
         + (work[2] * work[232] - work[8] * t63 + (work[233] + work[20] * work[234] - work[11] * t64)));
     const double t66 = work[14] * work[230] + 2.0 * (work[235] * work[18]) - t65 - work[236];
     const double t67 = work[13] * work[168] + work[11] * work[169];
-    const double t68 = work[169] * work[14] + work[15] * (work[11] * t67 + work[20] * work[181] - work[169]
-        * work[6]);
+    const double t68 = work[169] * work[14] + work[15] * (work[11] * t67 + work[20] * work[181]
+        - work[169] * work[6]);
     const double t69 = work[168] * work[14], t70 = work[168] * work[6];
     const double t71 = work[11] * work[168] + work[13] * work[125], t72 = 0.5 * work[20];
     const double t73 = t69 - work[15] * (t70 + (work[20] * work[191] - work[11] * t71)) - t72;
@@ -873,18 +877,21 @@ kowalevski_top_APART static void kowalevski_top_linearise_part3(const double coe
     const double t89 = t87 - work[15] * (t88 + (work[247] + (work[13] * t43 - work[20] * work[248]))) - t45;
     const double t90 = work[249] + (work[209] * work[14] - work[15] * (work[6] * work[209]
         + (work[250] - work[251] + (work[13] * t52 - work[20] * work[252]))));
-    const double t91 = work[15] * (work[6] * work[214] + 2.0 * (work[11] * work[19]) + (work[0] * t55
-        - work[2] * work[253] + (work[13] * t56 - work[20] * work[254]))) + 2.0 * (work[219] * work[255]);
+    const double t91 = work[15] * (work[6] * work[214] + 2.0 * (work[11] * work[19])
+        + (work[0] * t55 - work[2] * work[253] + (work[13] * t56 - work[20] * work[254])))
+        + 2.0 * (work[219] * work[255]);
     const double t92 = work[214] * work[14] + 2.0 * (work[221] * work[19]) - t91;
-    const double t93 = work[15] * (2.0 * work[256] - work[6] * work[229] + (work[0] * t63 - work[2]
-        * work[257] + (work[13] * t64 - (work[12] + work[20] * work[258])))) + 2.0 * (work[231] * work[255]);
+    const double t93 = work[15] * (2.0 * work[256] - work[6] * work[229]
+        + (work[0] * t63 - work[2] * work[257] + (work[13] * t64 - (work[12] + work[20] * work[258]))))
+        + 2.0 * (work[231] * work[255]);
     const double t94 = work[259] + (2.0 * (work[235] * work[19]) - work[14] * work[229] - t93);
-    const double t95 = work[15] * (work[6] * work[223] + 2.0 * work[260] + (work[0] * t59 - work[2]
-        * work[261] + (work[218] + work[13] * t60 - work[20] * work[262]))) + 2.0 * (work[226] * work[255]);
+    const double t95 = work[15] * (work[6] * work[223] + 2.0 * work[260]
+        + (work[0] * t59 - work[2] * work[261] + (work[218] + work[13] * t60 - work[20] * work[262])))
+        + 2.0 * (work[226] * work[255]);
     const double t96 = work[14] * work[223] + 2.0 * (work[227] * work[19]) - t95 - t54;
     const double t97 = t72 + (t69 - work[15] * (t70 - (work[20] * work[180] + work[13] * t67)));
-    const double t98 = work[125] * work[14] + work[15] * (work[13] * t71 + work[20] * work[192] - work[125]
-        * work[6]);
+    const double t98 = work[125] * work[14] + work[15] * (work[13] * t71 + work[20] * work[192]
+        - work[125] * work[6]);
     const double t99 = t27 - work[15] * (t28 + (work[0] * t37 - work[2] * work[167] + (work[13] * t74
         - work[20] * t6))) - t26 + (work[156] * t86 + work[154] * t89 + (work[162] * t90 + work[164] * t92
         + (work[160] * t96 + work[158] * t94)));
@@ -894,30 +901,30 @@ kowalevski_top_APART static void kowalevski_top_linearise_part3(const double coe
     const double t101 = t35 * t86 + t23 * t89 + (work[156] * t90 + work[188] * t92 + (work[189] * t96
         + work[190] * t94)) - (t33 * work[14] + work[15] * (work[0] * t71 + work[2] * work[192]
         + (work[13] * t80 + work[20] * t34) - t33 * work[6]));
-    const double t102 = work[263] + 2.0 * (work[1] * work[221]) - (2.0 * (work[219] * work[264]) + work[15]
-        * (work[265] + 2.0 * work[250] + (work[9] + work[11] * work[253] - work[13] * work[216])));
+    const double t102 = work[263] + 2.0 * (work[1] * work[221]) - (2.0 * (work[219] * work[264])
+        + work[15] * (work[265] + 2.0 * work[250] + (work[9] + work[11] * work[253] - work[13] * work[216])));
     const double t103 = t102 - work[249];
-    const double t104 = work[266] + 2.0 * (work[1] * work[235]) - (work[15] * (work[267] + 2.0
-        * (work[20] * work[1]) + (work[11] * work[257] - work[13] * work[232])) + 2.0
-        * (work[231] * work[264]));
+    const double t104 = work[266] + 2.0 * (work[1] * work[235])
+        - (work[15] * (work[267] + 2.0 * (work[20] * work[1]) + (work[11] * work[257] - work[13] * work[232]))
+        + 2.0 * (work[231] * work[264]));
     const double t105 = 2.0 * (work[1] * work[227]) - work[268] * work[14] - (2.0 * (work[226] * work[264])
-        + work[15] * (2.0 * work[53] - work[268] * work[6] + (work[11] * work[261] - (work[10] + work[13]
-        * work[224]))));
+        + work[15] * (2.0 * work[53] - work[268] * work[6] + (work[11] * work[261]
+        - (work[10] + work[13] * work[224]))));
     const double t106 = work[211] + t105;
-    const double t107 = 2.0 * (work[3] * work[221]) - work[212] * work[14] - (work[15] * (2.0 * work[206]
-        - work[212] * work[6] + (work[20] * work[216] - (work[247] + work[11] * t55))) + 2.0
-        * (work[219] * work[272]));
+    const double t107 = 2.0 * (work[3] * work[221]) - work[212] * work[14]
+        - (work[15] * (2.0 * work[206] - work[212] * work[6] + (work[20] * work[216]
+        - (work[247] + work[11] * t55))) + 2.0 * (work[219] * work[272]));
     const double t108 = t45 + t107;
     const double t109 = t39 + 2.0 * (work[3] * work[227]) - (work[15] * (t40 + 2.0 * (work[13] * work[3])
         + (work[20] * work[224] - work[11] * t59)) + 2.0 * (work[226] * work[272]));
-    const double t110 = t49 + 2.0 * (work[3] * work[235]) - (2.0 * (work[231] * work[272]) + work[15]
-        * (t50 + 2.0 * work[52] + (work[10] + work[20] * work[232] - work[11] * t63)));
+    const double t110 = t49 + 2.0 * (work[3] * work[235]) - (2.0 * (work[231] * work[272]) + work[15] * (t50
+        + 2.0 * work[52] + (work[10] + work[20] * work[232] - work[11] * t63)));
     const double t111 = t110 - work[211];
     const double t112 = t84 + 2.0 * (work[17] * work[221]) - (work[15] * (t85 + 2.0 * (work[11] * work[17])
         + (work[13] * t55 - work[20] * work[253])) + 2.0 * (work[219] * work[273]));
     const double t113 = 2.0 * (work[17] * work[235]) - work[228] * work[14] - (2.0 * (work[231] * work[273])
-        + work[15] * (2.0 * work[251] - work[228] * work[6] + (work[13] * t63 - (work[9] + work[20]
-        * work[257]))));
+        + work[15] * (2.0 * work[251] - work[228] * work[6] + (work[13] * t63
+        - (work[9] + work[20] * work[257]))));
     const double t114 = work[249] + t113;
     const double t115 = t87 + 2.0 * (work[17] * work[227]) - (work[15] * (t88 + 2.0 * work[205]
         + (work[247] + work[13] * t59 - work[20] * work[261])) + 2.0 * (work[226] * work[273]));
@@ -1038,6 +1045,13 @@ void kowalevski_top_vector_field(const kowalevski_top_params *params, const doub
 }
 
 /* ---- Compensated sums, linear equations ---- */
+static int kowalevski_top_finite(const double *values, int count)
+{
+    for (int k = 0; k < count; ++k)
+        if (!isfinite(values[k])) return 0;
+    return 1;
+}
+
 /* x + change + small in compensated arithmetic, where small is the carry and what is as small: were that
    rounded with the change, corrections of one sign would add up to a drift. 0, and x as before, if the sum is
    not finite. */
@@ -1158,8 +1172,8 @@ static int kowalevski_top_train(kowalevski_top_history *history, int component)
     enum { AHEAD = kowalevski_top_AHEAD, WINDOW = kowalevski_top_WINDOW, ROWS = kowalevski_top_ROWS };
     /* eight columns in each part */
     double q[WINDOW / 8][ROWS + WINDOW][8], r[WINDOW / 8][WINDOW][8], inverse[WINDOW];
-    double right[ROWS + WINDOW][8], weight[WINDOW][8], value[kowalevski_top_REMEMBERED], largest = 0.0, left =
-        HUGE_VAL;
+    double right[ROWS + WINDOW][8], weight[WINDOW][8], value[kowalevski_top_REMEMBERED], largest = 0.0,
+        left = HUGE_VAL;
     int terms = 0;
     memset(q, 0, sizeof q);
     memset(right, 0, sizeof right);
@@ -1330,8 +1344,8 @@ static int kowalevski_top_plausible(const kowalevski_top_solver *s,
     for (int i = 0; i < kowalevski_top_DIM; ++i) size += fabs(s->h * field[i]);
     if (moved <= kowalevski_top_PLAUSIBLE * size) return 1;
     const double before = kowalevski_top_hamiltonian(&s->params, s->x);
-    const double after = kowalevski_top_hamiltonian(&s->params, end), between =
-        kowalevski_top_hamiltonian(&s->params, middle);
+    const double after = kowalevski_top_hamiltonian(&s->params, end),
+        between = kowalevski_top_hamiltonian(&s->params, middle);
     return fabs(after - before) <= kowalevski_top_LOST * (fabs(before) + fabs(between) + fabs(after));
 }
 
@@ -1362,8 +1376,8 @@ static kowalevski_top_status kowalevski_top_attempt(kowalevski_top_solver *s)
 {
     double y[kowalevski_top_DIM], delta[kowalevski_top_DIM], displacement[kowalevski_top_DIM],
         increment[kowalevski_top_DIM];
-    double jacobian[kowalevski_top_DIM * kowalevski_top_DIM], increment_jacobian[kowalevski_top_DIM
-        * kowalevski_top_DIM];
+    double jacobian[kowalevski_top_DIM * kowalevski_top_DIM],
+        increment_jacobian[kowalevski_top_DIM * kowalevski_top_DIM];
     double previous = HUGE_VAL;
     if (!kowalevski_top_predict(&s->history, y)) memcpy(y, s->x, sizeof y);
     for (int iteration = 1; iteration <= kowalevski_top_MAX_ITERATIONS; ++iteration) {
@@ -1401,12 +1415,12 @@ static kowalevski_top_status kowalevski_top_attempt(kowalevski_top_solver *s)
 
 /* Guesses move with the state, by as many past values as extrapolation needs; recurrences are of the motion
    as it was. From far away all begins anew, with the next step. */
-static void kowalevski_top_move_guesses(kowalevski_top_solver *s, const double to[kowalevski_top_DIM])
+static void kowalevski_top_move_guesses(kowalevski_top_solver *s, const double from[kowalevski_top_DIM])
 {
     double distance = 0.0, size = 0.0;
     for (int i = 0; i < kowalevski_top_DIM; ++i) {
-        distance += fabs(to[i] - s->x[i]);
-        size += fabs(s->x[i]);
+        distance += fabs(s->x[i] - from[i]);
+        size += fabs(from[i]);
     }
     if (!(distance <= kowalevski_top_NEAR_BY * size)) {
         s->h = (double)NAN;
@@ -1416,42 +1430,31 @@ static void kowalevski_top_move_guesses(kowalevski_top_solver *s, const double t
     const int count = history->count < kowalevski_top_HISTORY ? history->count : kowalevski_top_HISTORY;
     memmove(history->past, history->past + history->count - count, (size_t)count * sizeof history->past[0]);
     for (int k = 0; k < count; ++k)
-        for (int i = 0; i < kowalevski_top_DIM; ++i) history->past[k][i] += to[i] - s->x[i];
+        for (int i = 0; i < kowalevski_top_DIM; ++i) history->past[k][i] += s->x[i] - from[i];
     history->count = count;
     history->recurrence_terms = history->use_recurrence = history->slow_steps = 0;
 }
 
-/* Stand at x + carry from now on. */
-static kowalevski_top_status kowalevski_top_place(kowalevski_top_solver *s,
-    const double x[kowalevski_top_DIM], const double carry[kowalevski_top_DIM])
-{
-    for (int i = 0; i < kowalevski_top_DIM; ++i)
-        if (!isfinite(x[i])) return kowalevski_top_BAD_ARGUMENT;
-    kowalevski_top_move_guesses(s, x);
-    memcpy(s->x, x, sizeof s->x);
-    memcpy(s->carry, carry, sizeof s->carry);
-    return kowalevski_top_OK;
-}
-
 kowalevski_top_status kowalevski_top_set_state(kowalevski_top_solver *s, const double x[kowalevski_top_DIM])
 {
-    double to[kowalevski_top_DIM], carry[kowalevski_top_DIM] = { 0.0 };
-    if (s == NULL || x == NULL) return kowalevski_top_BAD_ARGUMENT;
-    memcpy(to, x, sizeof to); /* which may be a part of *s */
-    return kowalevski_top_place(s, to, carry);
+    if (s == NULL || x == NULL || !kowalevski_top_finite(x, kowalevski_top_DIM))
+        return kowalevski_top_BAD_ARGUMENT;
+    double from[kowalevski_top_DIM];
+    memcpy(from, s->x, sizeof from);
+    memmove(s->x, x, sizeof s->x); /* x may be a part of *s */
+    memset(s->carry, 0, sizeof s->carry);
+    kowalevski_top_move_guesses(s, from);
+    return kowalevski_top_OK;
 }
 
 kowalevski_top_status kowalevski_top_kick(kowalevski_top_solver *s, const double change[kowalevski_top_DIM])
 {
-    double to[kowalevski_top_DIM], carry[kowalevski_top_DIM];
     if (s == NULL || change == NULL) return kowalevski_top_BAD_ARGUMENT;
-    for (int i = 0; i < kowalevski_top_DIM; ++i) {
-        const double sum = s->x[i] + change[i], added = sum - s->x[i];
-        const double lost = ((s->x[i] - (sum - added)) + (change[i] - added)) + s->carry[i];
-        to[i] = sum + lost;
-        carry[i] = lost - (to[i] - sum);
-    }
-    return kowalevski_top_place(s, to, carry);
+    double from[kowalevski_top_DIM];
+    memcpy(from, s->x, sizeof from);
+    if (!kowalevski_top_advance(s, change, s->carry)) return kowalevski_top_BAD_ARGUMENT;
+    kowalevski_top_move_guesses(s, from);
+    return kowalevski_top_OK;
 }
 
 /* ---- Several steps or members at once ---- */
@@ -1486,8 +1489,7 @@ kowalevski_top_status kowalevski_top_init(kowalevski_top_solver *s, const kowale
     kowalevski_top_solver fresh = { .h = (double)NAN };
     fresh.params = params != NULL ? *params : kowalevski_top_default_params;
     memcpy(fresh.x, x0, sizeof fresh.x);
-    for (int i = 0; i < kowalevski_top_DIM; ++i)
-        if (!isfinite(fresh.x[i])) return kowalevski_top_BAD_ARGUMENT;
+    if (!kowalevski_top_finite(fresh.x, kowalevski_top_DIM)) return kowalevski_top_BAD_ARGUMENT;
     *s = fresh;
     return kowalevski_top_OK;
 }
@@ -1630,8 +1632,8 @@ kowalevski_top_APART static void kowalevski_top_linearise_lanes_part1(kowalevski
     (void)displacement, (void)jacobian, (void)increment_jacobian;
     kowalevski_top_EACH_LANE
     for (int lane = 0; lane < kowalevski_top_LANES; ++lane) {
-        const double P1 = y[0][lane], P2 = y[1][lane], P3 = y[2][lane], G1 = y[3][lane], G2 = y[4][lane], G3 =
-            y[5][lane];
+        const double P1 = y[0][lane], P2 = y[1][lane], P3 = y[2][lane], G1 = y[3][lane], G2 = y[4][lane],
+            G3 = y[5][lane];
         work[54][lane] = G2 * P2;
         work[29][lane] = P2 * P2;
         work[126][lane] = coef[77][lane] * work[29][lane];
@@ -1662,17 +1664,17 @@ kowalevski_top_APART static void kowalevski_top_linearise_lanes_part1(kowalevski
             + coef[54][lane] * work[77][lane]));
         const double t6 = work[27][lane] * (coef[72][lane] * work[77][lane] + coef[71][lane] * work[57][lane])
             + work[135][lane] + G1 * (work[133][lane] + G1 * (coef[73][lane] * work[27][lane]
-            + work[136][lane])) + P2 * (coef[74][lane] * work[137][lane] + P2 * (work[29][lane]
-            * (work[138][lane] + (work[115][lane] + work[139][lane])) + (work[27][lane]
-            * (t4 + (coef[12][lane] + G1 * coef[75][lane])) + work[140][lane])));
+            + work[136][lane])) + P2 * (coef[74][lane] * work[137][lane]
+            + P2 * (work[29][lane] * (work[138][lane] + (work[115][lane] + work[139][lane]))
+            + (work[27][lane] * (t4 + (coef[12][lane] + G1 * coef[75][lane])) + work[140][lane])));
         work[26][lane] = G3 * P3;
         work[129][lane] = coef[81][lane] + G1 * coef[82][lane] + coef[83][lane] * work[27][lane];
         work[103][lane] = G3 * (P2 * P3);
         work[122][lane] = coef[49][lane] + G1 * coef[64][lane];
         work[99][lane] = coef[39][lane] * work[29][lane];
         work[123][lane] = coef[84][lane] * work[27][lane];
-        work[87][lane] = work[26][lane] * work[129][lane] + P2 * (coef[40][lane] * work[103][lane] + G2
-            * (work[122][lane] + (work[99][lane] + work[123][lane])));
+        work[87][lane] = work[26][lane] * work[129][lane] + P2 * (coef[40][lane] * work[103][lane]
+            + G2 * (work[122][lane] + (work[99][lane] + work[123][lane])));
         work[120][lane] = G1 * coef[35][lane];
         work[116][lane] = coef[34][lane] + work[120][lane];
         work[71][lane] = coef[44][lane] * work[27][lane];
@@ -1685,11 +1687,11 @@ kowalevski_top_APART static void kowalevski_top_linearise_lanes_part1(kowalevski
         work[144][lane] = coef[78][lane] + G1 * coef[87][lane] + (work[141][lane] + coef[80][lane]
             * work[30][lane]);
         const double t9 = work[29][lane] * (work[116][lane] + (work[71][lane] + work[141][lane]))
-            + (work[27][lane] * (t4 + (coef[12][lane] + G1 * coef[85][lane])) + work[142][lane]) + P1
-            * (work[143][lane] + t8 + P1 * (work[115][lane] + work[144][lane]));
-        work[11][lane] = G3 * (work[54][lane] * (work[126][lane] + work[97][lane]) + P1
-            * (t3 + P1 * (work[131][lane] + P1 * work[132][lane]))) + P3 * (t6 + P1 * (work[87][lane] + P1
-            * t9));
+            + (work[27][lane] * (t4 + (coef[12][lane] + G1 * coef[85][lane])) + work[142][lane])
+            + P1 * (work[143][lane] + t8 + P1 * (work[115][lane] + work[144][lane]));
+        work[11][lane] = G3 * (work[54][lane] * (work[126][lane] + work[97][lane])
+            + P1 * (t3 + P1 * (work[131][lane] + P1 * work[132][lane])))
+            + P3 * (t6 + P1 * (work[87][lane] + P1 * t9));
         work[95][lane] = work[11][lane] * work[11][lane];
         work[40][lane] = coef[8][lane] * work[57][lane];
         const double t10 = work[40][lane] + coef[9][lane] * work[77][lane];
@@ -1703,8 +1705,8 @@ kowalevski_top_APART static void kowalevski_top_linearise_lanes_part1(kowalevski
         work[60][lane] = G1 * work[39][lane];
         work[61][lane] = coef[21][lane] + G1 * coef[23][lane];
         work[62][lane] = coef[32][lane] * work[29][lane];
-        const double t11 = work[54][lane] * (t10 + G1 * (work[45][lane] + work[42][lane])) + P1
-            * (work[56][lane] + work[57][lane] * (work[58][lane] + (work[59][lane] + coef[43][lane]
+        const double t11 = work[54][lane] * (t10 + G1 * (work[45][lane] + work[42][lane]))
+            + P1 * (work[56][lane] + work[57][lane] * (work[58][lane] + (work[59][lane] + coef[43][lane]
             * work[30][lane])) + G2 * (coef[41][lane] * work[60][lane] + G2 * (work[61][lane]
             + (coef[44][lane] * work[30][lane] + work[62][lane]))));
         work[32][lane] = coef[30][lane] * work[54][lane];
@@ -1717,15 +1719,15 @@ kowalevski_top_APART static void kowalevski_top_linearise_lanes_part1(kowalevski
         work[48][lane] = coef[17][lane] * work[29][lane];
         work[46][lane] = coef[14][lane] * work[27][lane];
         const double t13 = work[115][lane] + work[141][lane], t14 = coef[29][lane] * work[27][lane];
-        work[55][lane] = work[29][lane] * (work[116][lane] + t13) + (work[27][lane]
-            * (t14 + (coef[28][lane] + G1 * coef[14][lane])) + work[142][lane]);
+        work[55][lane] = work[29][lane] * (work[116][lane] + t13)
+            + (work[27][lane] * (t14 + (coef[28][lane] + G1 * coef[14][lane])) + work[142][lane]);
         const double t15 = coef[36][lane] * work[54][lane];
         work[85][lane] = coef[45][lane] * work[29][lane];
         work[117][lane] = coef[37][lane] * work[30][lane];
         const double t16 = work[85][lane] + work[117][lane];
-        const double t17 = work[26][lane] * t12 + P2 * (coef[16][lane] * work[103][lane] + G2
-            * (work[47][lane] + (work[48][lane] + work[46][lane]))) + P1 * (work[55][lane] + P1
-            * (t15 + t8 + P1 * (work[115][lane] + (coef[34][lane] + G1 * coef[17][lane] + t16))));
+        const double t17 = work[26][lane] * t12 + P2 * (coef[16][lane] * work[103][lane]
+            + G2 * (work[47][lane] + (work[48][lane] + work[46][lane]))) + P1 * (work[55][lane]
+            + P1 * (t15 + t8 + P1 * (work[115][lane] + (coef[34][lane] + G1 * coef[17][lane] + t16))));
         work[20][lane] = t11 + P3 * (work[86][lane] + P3 * t17);
         work[96][lane] = work[20][lane] * work[20][lane];
         work[98][lane] = coef[48][lane] * work[27][lane];
@@ -1755,12 +1757,12 @@ kowalevski_top_APART static void kowalevski_top_linearise_lanes_part1(kowalevski
         work[114][lane] = coef[62][lane] * work[26][lane];
         work[70][lane] = work[114][lane] + t15;
         const double t20 = work[77][lane] * (t18 + work[111][lane]) + (coef[19][lane] + work[57][lane]
-            * (work[48][lane] + work[112][lane])) + G1 * (G1 * (work[109][lane] + (work[110][lane]
-            + work[104][lane])) + work[119][lane]) + P3 * (work[124][lane] + P3 * (work[29][lane]
-            * (coef[34][lane] + t19 + t13) + work[113][lane] + P1 * (work[70][lane] + P1 * (work[115][lane]
-            + (work[116][lane] + t16)))));
-        work[13][lane] = G2 * (work[102][lane] + P1 * (t10 + G1 * (work[105][lane] + work[45][lane]) + P3
-            * (work[106][lane] + P3 * (work[47][lane] + (work[82][lane] + work[46][lane]))))) + P2 * t20;
+            * (work[48][lane] + work[112][lane]))
+            + G1 * (G1 * (work[109][lane] + (work[110][lane] + work[104][lane])) + work[119][lane])
+            + P3 * (work[124][lane] + P3 * (work[29][lane] * (coef[34][lane] + t19 + t13) + work[113][lane]
+            + P1 * (work[70][lane] + P1 * (work[115][lane] + (work[116][lane] + t16)))));
+        work[13][lane] = G2 * (work[102][lane] + P1 * (t10 + G1 * (work[105][lane] + work[45][lane])
+            + P3 * (work[106][lane] + P3 * (work[47][lane] + (work[82][lane] + work[46][lane]))))) + P2 * t20;
         work[94][lane] = work[13][lane] * work[13][lane];
         work[125][lane] = work[96][lane] + work[94][lane];
         work[6][lane] = work[95][lane] + work[125][lane];
@@ -1777,17 +1779,17 @@ kowalevski_top_APART static void kowalevski_top_linearise_lanes_part1(kowalevski
         work[130][lane] = t1 + (coef[117][lane] * work[57][lane] + t2);
         work[31][lane] = work[29][lane] * (work[127][lane] + (t22 + work[128][lane])) + (work[27][lane] * t12
             + work[130][lane]);
-        const double t23 = work[26][lane] * work[184][lane] + P2 * (coef[53][lane] * work[103][lane] + G2
-            * (work[97][lane] + (work[126][lane] + work[98][lane]))) + P1 * (work[31][lane] + P1
-            * (coef[25][lane] * work[26][lane] + work[131][lane] + P1 * (t22 + work[132][lane])));
+        const double t23 = work[26][lane] * work[184][lane] + P2 * (coef[53][lane] * work[103][lane]
+            + G2 * (work[97][lane] + (work[126][lane] + work[98][lane]))) + P1 * (work[31][lane]
+            + P1 * (coef[25][lane] * work[26][lane] + work[131][lane] + P1 * (t22 + work[132][lane])));
         work[8][lane] = G3 * (work[29][lane] * (work[183][lane] + work[182][lane]) + (work[185][lane]
-            + (coef[115][lane] * work[57][lane] + work[186][lane])) + P1 * (work[28][lane] + P1
-            * work[187][lane])) + P3 * t23;
+            + (coef[115][lane] * work[57][lane] + work[186][lane])) + P1 * (work[28][lane]
+            + P1 * work[187][lane])) + P3 * t23;
         work[63][lane] = G3 * work[20][lane];
         work[34][lane] = G1 * work[11][lane];
         work[24][lane] = work[63][lane] - work[34][lane];
-        work[173][lane] = work[27][lane] * (coef[111][lane] * work[27][lane] + (coef[67][lane] + G1
-            * coef[69][lane]));
+        work[173][lane] = work[27][lane] * (coef[111][lane] * work[27][lane] + (coef[67][lane]
+            + G1 * coef[69][lane]));
         const double t24 = G1 * coef[91][lane];
         work[174][lane] = G1 * (coef[110][lane] + t24);
         work[175][lane] = coef[108][lane] * work[57][lane];
@@ -1798,37 +1800,37 @@ kowalevski_top_APART static void kowalevski_top_linearise_lanes_part1(kowalevski
             + coef[54][lane] * work[27][lane]);
         work[41][lane] = G2 * coef[90][lane];
         work[145][lane] = work[105][lane] + work[42][lane];
-        const double t25 = P1 * (work[40][lane] + G2 * (work[41][lane] + coef[32][lane] * work[39][lane]) + G1
-            * (work[45][lane] + work[145][lane]) + P3 * (work[106][lane] + P3 * (work[46][lane]
+        const double t25 = P1 * (work[40][lane] + G2 * (work[41][lane] + coef[32][lane] * work[39][lane])
+            + G1 * (work[45][lane] + work[145][lane]) + P3 * (work[106][lane] + P3 * (work[46][lane]
             + (work[47][lane] + (work[48][lane] + work[82][lane])))));
         work[0][lane] = G2 * (work[173][lane] + (work[174][lane] + (work[175][lane] + (coef[107][lane]
             + coef[109][lane] * work[77][lane]))) + P1 * (work[44][lane] + P1 * (work[61][lane]
-            + (work[176][lane] + work[49][lane])))) + P2 * (work[102][lane] + P2 * (coef[77][lane]
-            * work[103][lane] + G2 * work[172][lane]) + t25);
+            + (work[176][lane] + work[49][lane])))) + P2 * (work[102][lane]
+            + P2 * (coef[77][lane] * work[103][lane] + G2 * work[172][lane]) + t25);
         work[51][lane] = G1 * work[13][lane];
         work[50][lane] = G2 * work[20][lane];
         work[25][lane] = work[51][lane] - work[50][lane];
         work[148][lane] = G2 * P1;
         work[78][lane] = coef[10][lane] + G1 * coef[102][lane];
         work[149][lane] = work[110][lane] + t18;
-        const double t26 = work[148][lane] * (work[105][lane] + work[78][lane]) + P2 * (coef[79][lane]
-            * work[57][lane] + G2 * (G2 * coef[96][lane] + coef[2][lane] * work[39][lane]) + G1
-            * (coef[12][lane] + G1 * coef[97][lane] + work[149][lane]));
+        const double t26 = work[148][lane] * (work[105][lane] + work[78][lane])
+            + P2 * (coef[79][lane] * work[57][lane] + G2 * (G2 * coef[96][lane] + coef[2][lane]
+            * work[39][lane]) + G1 * (coef[12][lane] + G1 * coef[97][lane] + work[149][lane]));
         work[146][lane] = coef[47][lane] * work[54][lane];
         work[79][lane] = coef[3][lane] + G1 * coef[101][lane];
         work[80][lane] = coef[15][lane] * work[29][lane];
         work[147][lane] = work[79][lane] + (work[80][lane] + coef[59][lane] * work[30][lane]);
         work[134][lane] = G3 * (work[146][lane] + P1 * work[147][lane]);
         work[150][lane] = coef[95][lane] * work[27][lane];
-        const double t27 = coef[93][lane] * work[77][lane] + coef[92][lane] * work[57][lane] + G1
-            * (work[150][lane] + (coef[21][lane] + G1 * coef[94][lane])) + work[29][lane] * (coef[98][lane]
-            + t5 + (coef[99][lane] * work[27][lane] + coef[100][lane] * work[29][lane]));
+        const double t27 = coef[93][lane] * work[77][lane] + coef[92][lane] * work[57][lane]
+            + G1 * (work[150][lane] + (coef[21][lane] + G1 * coef[94][lane])) + work[29][lane]
+            * (coef[98][lane] + t5 + (coef[99][lane] * work[27][lane] + coef[100][lane] * work[29][lane]));
         work[81][lane] = coef[13][lane] * work[54][lane] + coef[6][lane] * work[26][lane];
         work[2][lane] = work[77][lane] * (coef[89][lane] + t24 + coef[104][lane] * work[30][lane])
             + (coef[66][lane] + work[57][lane] * (coef[103][lane] * work[30][lane] + (coef[88][lane] + t21)))
-            + P2 * t26 + P3 * (work[134][lane] + P3 * (t27 + P1 * (work[81][lane] + P1 * (coef[105][lane]
-            * work[27][lane] + (coef[28][lane] + t7 + (coef[97][lane] * work[29][lane] + coef[106][lane]
-            * work[30][lane]))))));
+            + P2 * t26 + P3 * (work[134][lane]
+            + P3 * (t27 + P1 * (work[81][lane] + P1 * (coef[105][lane] * work[27][lane] + (coef[28][lane] + t7
+            + (coef[97][lane] * work[29][lane] + coef[106][lane] * work[30][lane]))))));
         work[64][lane] = G3 * work[2][lane];
         work[90][lane] = G1 * work[8][lane];
         work[65][lane] = P3 * work[20][lane];
@@ -1839,8 +1841,8 @@ kowalevski_top_APART static void kowalevski_top_linearise_lanes_part1(kowalevski
         work[74][lane] = P1 * work[13][lane];
         work[66][lane] = P2 * work[20][lane];
         work[22][lane] = work[73][lane] - work[67][lane] + (work[74][lane] - work[66][lane]);
-        work[7][lane] = work[8][lane] * work[24][lane] - work[0][lane] * work[25][lane] + (work[11][lane]
-            * work[21][lane] - work[13][lane] * work[22][lane]);
+        work[7][lane] = work[8][lane] * work[24][lane] - work[0][lane] * work[25][lane]
+            + (work[11][lane] * work[21][lane] - work[13][lane] * work[22][lane]);
         work[15][lane] = kowalevski_top_phi1_lane(work[6][lane]);
         work[38][lane] = G2 * work[11][lane];
         work[37][lane] = G3 * work[13][lane];
@@ -1865,15 +1867,15 @@ kowalevski_top_APART static void kowalevski_top_linearise_lanes_part1(kowalevski
         work[92][lane] = P2 * work[11][lane];
         work[75][lane] = P3 * work[13][lane];
         work[16][lane] = work[91][lane] - work[76][lane] + (work[92][lane] - work[75][lane]);
-        work[19][lane] = work[0][lane] * work[23][lane] - work[2][lane] * work[24][lane] + (work[13][lane]
-            * work[16][lane] - work[20][lane] * work[21][lane]);
+        work[19][lane] = work[0][lane] * work[23][lane] - work[2][lane] * work[24][lane]
+            + (work[13][lane] * work[16][lane] - work[20][lane] * work[21][lane]);
         work[256][lane] = work[20][lane] * work[19][lane];
         work[93][lane] = work[11][lane] * work[7][lane];
         work[12][lane] = work[2][lane] * work[17][lane] - work[8][lane] * work[1][lane] + (work[256][lane]
             - work[93][lane]);
         work[4][lane] = work[13][lane] * work[7][lane];
-        work[18][lane] = work[2][lane] * work[25][lane] - work[8][lane] * work[23][lane] + (work[20][lane]
-            * work[22][lane] - work[11][lane] * work[16][lane]);
+        work[18][lane] = work[2][lane] * work[25][lane] - work[8][lane] * work[23][lane]
+            + (work[20][lane] * work[22][lane] - work[11][lane] * work[16][lane]);
         work[5][lane] = work[20][lane] * work[18][lane];
         increment[4][lane] = work[24][lane];
         increment[5][lane] = work[25][lane];
@@ -1893,10 +1895,10 @@ kowalevski_top_APART static void kowalevski_top_linearise_lanes_part2(kowalevski
     (void)increment;
     kowalevski_top_EACH_LANE
     for (int lane = 0; lane < kowalevski_top_LANES; ++lane) {
-        const double P1 = y[0][lane], P2 = y[1][lane], P3 = y[2][lane], G1 = y[3][lane], G2 = y[4][lane], G3 =
-            y[5][lane];
-        work[233][lane] = work[0][lane] * work[1][lane] - work[2][lane] * work[3][lane] + (work[4][lane]
-            - work[5][lane]);
+        const double P1 = y[0][lane], P2 = y[1][lane], P3 = y[2][lane], G1 = y[3][lane], G2 = y[4][lane],
+            G3 = y[5][lane];
+        work[233][lane] = work[0][lane] * work[1][lane] - work[2][lane] * work[3][lane]
+            + (work[4][lane] - work[5][lane]);
         const double t1 = work[6][lane] * work[7][lane] + (work[8][lane] * work[9][lane] - work[0][lane]
             * work[10][lane] + (work[11][lane] * work[12][lane] - work[13][lane] * work[233][lane]));
         work[206][lane] = work[11][lane] * work[3][lane];
@@ -1931,16 +1933,17 @@ kowalevski_top_APART static void kowalevski_top_linearise_lanes_part2(kowalevski
         work[204][lane] = work[37][lane] - work[38][lane] - work[38][lane];
         work[207][lane] = t9 - work[20][lane] * work[204][lane];
         work[249][lane] = 0.5 * G2;
-        work[157][lane] = work[263][lane] - work[15][lane] * (work[265][lane] + (work[9][lane]
-            + (work[11][lane] * work[246][lane] - work[13][lane] * work[207][lane]))) - work[249][lane];
+        work[157][lane] = work[263][lane] - work[15][lane] * (work[265][lane]
+            + (work[9][lane] + (work[11][lane] * work[246][lane] - work[13][lane] * work[207][lane])))
+            - work[249][lane];
         const double t10 = coef[131][lane] * work[39][lane];
         const double t11 = work[40][lane] + G2 * (work[41][lane] + t10);
         const double t12 = coef[41][lane] * work[30][lane], t13 = t12 + work[42][lane];
         const double t14 = coef[30][lane] * work[43][lane];
         work[179][lane] = G2 * (work[44][lane] + P1 * (coef[67][lane] + G1 * coef[140][lane]
-            + (coef[138][lane] * work[30][lane] + coef[136][lane] * work[27][lane]))) + P2
-            * (t11 + G1 * (work[45][lane] + t13) + P3 * (t14 + P3 * (work[46][lane] + (work[47][lane]
-            + (work[48][lane] + work[49][lane])))));
+            + (coef[138][lane] * work[30][lane] + coef[136][lane] * work[27][lane])))
+            + P2 * (t11 + G1 * (work[45][lane] + t13)
+            + P3 * (t14 + P3 * (work[46][lane] + (work[47][lane] + (work[48][lane] + work[49][lane])))));
         work[211][lane] = 0.5 * G3;
         const double t15 = work[50][lane] - work[51][lane] - work[51][lane];
         work[199][lane] = work[23][lane] - work[37][lane];
@@ -1957,12 +1960,12 @@ kowalevski_top_APART static void kowalevski_top_linearise_lanes_part2(kowalevski
         const double t21 = coef[44][lane] * work[54][lane], t22 = t20 + t21;
         const double t23 = coef[126][lane] * work[27][lane], t24 = coef[127][lane] * work[29][lane];
         const double t25 = G3 * (work[32][lane] + P1 * (coef[89][lane] + G1 * coef[120][lane]
-            + (t19 + coef[128][lane] * work[30][lane]))) + P3 * (work[55][lane] + P1
-            * (t22 + P1 * (t23 + (coef[125][lane] + G1 * coef[36][lane] + (t24 + coef[129][lane]
-            * work[30][lane])))));
+            + (t19 + coef[128][lane] * work[30][lane]))) + P3 * (work[55][lane]
+            + P1 * (t22 + P1 * (t23 + (coef[125][lane] + G1 * coef[36][lane]
+            + (t24 + coef[129][lane] * work[30][lane])))));
         work[239][lane] = work[56][lane] + work[57][lane] * (work[58][lane] + (work[59][lane]
-            + coef[123][lane] * work[30][lane])) + G2 * (coef[115][lane] * work[60][lane] + G2
-            * (work[61][lane] + (coef[124][lane] * work[30][lane] + work[62][lane]))) + P3 * t25;
+            + coef[123][lane] * work[30][lane])) + G2 * (coef[115][lane] * work[60][lane]
+            + G2 * (work[61][lane] + (coef[124][lane] * work[30][lane] + work[62][lane]))) + P3 * t25;
         const double t26 = G3 * work[8][lane], t27 = G2 * work[0][lane], t28 = P3 * work[11][lane];
         const double t29 = P2 * work[13][lane], t30 = t26 + t27 + (t28 + t29);
         work[235][lane] = work[20][lane] * work[15][lane];
@@ -1982,17 +1985,19 @@ kowalevski_top_APART static void kowalevski_top_linearise_lanes_part2(kowalevski
         const double t35 = kowalevski_top_phi2_lane(work[6][lane]);
         work[231][lane] = work[20][lane] * t35;
         const double t36 = work[15][lane] * (t30 * work[6][lane] + 2.0 * (work[20][lane] * work[7][lane])
-            + (work[8][lane] * work[257][lane] - work[0][lane] * work[232][lane] + (work[11][lane]
-            * work[258][lane] - work[13][lane] * work[234][lane]))) + 2.0 * (work[231][lane] * t1);
+            + (work[8][lane] * work[257][lane] - work[0][lane] * work[232][lane]
+            + (work[11][lane] * work[258][lane] - work[13][lane] * work[234][lane])))
+            + 2.0 * (work[231][lane] * t1);
         work[159][lane] = t30 * work[14][lane] + 2.0 * (work[235][lane] * work[7][lane]) - t36;
         const double t37 = coef[1][lane] * work[29][lane], t38 = coef[132][lane] + G1 * coef[65][lane];
         const double t39 = coef[133][lane] * work[29][lane];
-        const double t40 = G2 * (t14 + P3 * (work[47][lane] + (work[49][lane] + work[46][lane]))) + P2
-            * (G3 * (work[68][lane] + (coef[122][lane] * work[30][lane] + work[69][lane])) + P3
-            * (work[70][lane] + P1 * (work[71][lane] + (t38 + (t39 + coef[133][lane] * work[30][lane])))));
+        const double t40 = G2 * (t14 + P3 * (work[47][lane] + (work[49][lane] + work[46][lane])))
+            + P2 * (G3 * (work[68][lane] + (coef[122][lane] * work[30][lane] + work[69][lane]))
+            + P3 * (work[70][lane] + P1 * (work[71][lane]
+            + (t38 + (t39 + coef[133][lane] * work[30][lane])))));
         work[238][lane] = work[39][lane] * (coef[130][lane] * work[57][lane] + coef[32][lane]
-            * work[72][lane]) + G2 * (G1 * (work[45][lane] + (t12 + t37)) + (work[40][lane] + G2
-            * (G2 * coef[9][lane] + t10))) + P3 * t40;
+            * work[72][lane]) + G2 * (G1 * (work[45][lane] + (t12 + t37)) + (work[40][lane]
+            + G2 * (G2 * coef[9][lane] + t10))) + P3 * t40;
         work[236][lane] = 0.5 * P3;
         work[227][lane] = work[13][lane] * work[15][lane];
         const double t41 = work[73][lane] + (work[74][lane] + work[22][lane]);
@@ -2000,39 +2005,41 @@ kowalevski_top_APART static void kowalevski_top_linearise_lanes_part2(kowalevski
         work[261][lane] = work[11][lane] * work[268][lane] + t16;
         work[224][lane] = work[1][lane] - work[13][lane] * work[268][lane] - t18;
         work[223][lane] = work[16][lane] - work[75][lane] - work[76][lane];
-        work[262][lane] = work[8][lane] * work[268][lane] + work[2][lane] * work[199][lane] + (work[20][lane]
-            * work[223][lane] + work[11][lane] * t41);
+        work[262][lane] = work[8][lane] * work[268][lane] + work[2][lane] * work[199][lane]
+            + (work[20][lane] * work[223][lane] + work[11][lane] * t41);
         const double t42 = G1 * work[2][lane], t43 = P1 * work[20][lane];
         work[222][lane] = t26 + t42 + (t43 + t28);
         work[225][lane] = work[7][lane] - work[13][lane] * t41 - work[20][lane] * work[222][lane]
             - (work[2][lane] * work[198][lane] + work[0][lane] * work[268][lane]);
         work[226][lane] = work[13][lane] * t35;
-        const double t44 = work[15][lane] * (2.0 * work[4][lane] - work[6][lane] * t41 + (work[8][lane]
-            * work[261][lane] - work[0][lane] * work[224][lane] + (work[11][lane] * work[262][lane]
-            - (work[233][lane] + work[13][lane] * work[225][lane])))) + 2.0 * (work[226][lane] * t1);
+        const double t44 = work[15][lane] * (2.0 * work[4][lane] - work[6][lane] * t41
+            + (work[8][lane] * work[261][lane] - work[0][lane] * work[224][lane]
+            + (work[11][lane] * work[262][lane] - (work[233][lane] + work[13][lane] * work[225][lane]))))
+            + 2.0 * (work[226][lane] * t1);
         work[161][lane] = work[236][lane] + (2.0 * (work[227][lane] * work[7][lane]) - work[14][lane] * t41
             - t44);
         const double t45 = coef[39][lane] * work[30][lane], t46 = G1 * coef[53][lane];
         const double t47 = coef[12][lane] + t46, t48 = coef[35][lane] * work[29][lane];
-        work[158][lane] = P1 * (coef[22][lane] * work[57][lane] + coef[23][lane] * work[77][lane]) + P2
-            * (coef[32][lane] * work[60][lane] + G2 * (work[78][lane] + t13)) + P3
-            * (G3 * (work[79][lane] + (work[80][lane] + t45)) + P3 * (work[81][lane] + P1 * (work[46][lane]
-            + (t47 + (t48 + work[82][lane])))));
+        work[158][lane] = P1 * (coef[22][lane] * work[57][lane] + coef[23][lane] * work[77][lane])
+            + P2 * (coef[32][lane] * work[60][lane] + G2 * (work[78][lane] + t13))
+            + P3 * (G3 * (work[79][lane] + (work[80][lane] + t45)) + P3 * (work[81][lane]
+            + P1 * (work[46][lane] + (t47 + (t48 + work[82][lane])))));
         work[266][lane] = t31 * work[14][lane];
         work[267][lane] = t31 * work[6][lane];
         work[209][lane] = work[34][lane] - work[63][lane] - work[63][lane];
         work[252][lane] = work[17][lane] + (work[20][lane] * work[209][lane] - t32);
         work[210][lane] = work[83][lane] - work[84][lane] + (t33 - t34);
-        work[163][lane] = work[266][lane] - work[15][lane] * (work[267][lane] + (work[11][lane]
-            * work[252][lane] - work[13][lane] * work[210][lane]));
+        work[163][lane] = work[266][lane] - work[15][lane] * (work[267][lane]
+            + (work[11][lane] * work[252][lane] - work[13][lane] * work[210][lane]));
         const double t49 = coef[138][lane] * work[27][lane], t50 = work[85][lane] + t49;
         const double t51 = coef[137][lane] * work[27][lane];
-        const double t52 = work[29][lane] * (t38 + t50) + (work[27][lane] * (t51 + (coef[49][lane] + G1
-            * coef[84][lane])) + (G1 * (coef[49][lane] + t46) + (coef[135][lane] * work[57][lane]
-            + (coef[134][lane] + coef[136][lane] * work[77][lane]))));
+        const double t52 = work[29][lane] * (t38 + t50)
+            + (work[27][lane] * (t51 + (coef[49][lane] + G1 * coef[84][lane])) + (G1 * (coef[49][lane] + t46)
+            + (coef[135][lane] * work[57][lane] + (coef[134][lane] + coef[136][lane] * work[77][lane]))));
         const double t53 = t39 + coef[45][lane] * work[30][lane];
-        work[237][lane] = work[86][lane] + P3 * (work[87][lane] + P1 * (t52 + P1 * (t21 + coef[139][lane]
-            * work[26][lane] + P1 * (t49 + (coef[132][lane] + work[88][lane] + t53)))));
+        work[237][lane] = work[86][lane] + P3 * (work[87][lane]
+            + P1 * (t52 + P1 * (t21 + coef[139][lane] * work[26][lane]
+            + P1 * (t49 + (coef[132][lane] + work[88][lane] + t53)))));
         const double t54 = work[21][lane] - work[89][lane] - work[90][lane];
         work[221][lane] = work[11][lane] * work[15][lane];
         work[219][lane] = work[11][lane] * t35;
@@ -2040,13 +2047,13 @@ kowalevski_top_APART static void kowalevski_top_linearise_lanes_part2(kowalevski
         work[212][lane] = work[38][lane] + work[23][lane];
         work[216][lane] = t9 + work[20][lane] * work[212][lane];
         work[214][lane] = t42 + t27 + (t43 + t29);
-        work[254][lane] = work[2][lane] * work[203][lane] - work[8][lane] * t4 + (work[20][lane]
-            * work[214][lane] - (work[11][lane] * t54 + work[7][lane]));
+        work[254][lane] = work[2][lane] * work[203][lane] - work[8][lane] * t4
+            + (work[20][lane] * work[214][lane] - (work[11][lane] * t54 + work[7][lane]));
         work[213][lane] = work[91][lane] + (work[92][lane] + work[16][lane]);
-        work[217][lane] = work[0][lane] * t4 + work[2][lane] * work[212][lane] + (work[20][lane]
-            * work[213][lane] + work[13][lane] * t54);
-        const double t55 = 2.0 * (work[219][lane] * t1) + work[15][lane] * (work[6][lane] * t54 + 2.0
-            * work[93][lane] + (work[8][lane] * work[253][lane] - work[0][lane] * work[216][lane]
+        work[217][lane] = work[0][lane] * t4 + work[2][lane] * work[212][lane]
+            + (work[20][lane] * work[213][lane] + work[13][lane] * t54);
+        const double t55 = 2.0 * (work[219][lane] * t1) + work[15][lane] * (work[6][lane] * t54
+            + 2.0 * work[93][lane] + (work[8][lane] * work[253][lane] - work[0][lane] * work[216][lane]
             + (work[12][lane] + work[11][lane] * work[254][lane] - work[13][lane] * work[217][lane])));
         work[259][lane] = 0.5 * P2;
         work[165][lane] = work[14][lane] * t54 + 2.0 * (work[221][lane] * work[7][lane]) - t55
@@ -2067,41 +2074,41 @@ kowalevski_top_APART static void kowalevski_top_linearise_lanes_part2(kowalevski
         work[169][lane] = work[96][lane] + work[95][lane];
         work[181][lane] = work[13][lane] * work[153][lane] + work[20][lane] * work[169][lane];
         work[195][lane] = 0.5 * work[11][lane];
-        work[270][lane] = work[196][lane] - work[15][lane] * (work[197][lane] + (work[11][lane]
-            * work[180][lane] - work[13][lane] * work[181][lane])) - work[195][lane];
+        work[270][lane] = work[196][lane] - work[15][lane] * (work[197][lane]
+            + (work[11][lane] * work[180][lane] - work[13][lane] * work[181][lane])) - work[195][lane];
         work[170][lane] = coef[118][lane] * work[43][lane];
         const double t57 = coef[64][lane] * work[30][lane], t58 = G1 * coef[41][lane];
-        work[189][lane] = G2 * (work[170][lane] + P3 * (work[97][lane] + (t57 + work[98][lane]))) + P2
-            * (G3 * (coef[153][lane] + t58 + (work[99][lane] + coef[130][lane] * work[30][lane])) + P3
-            * (work[100][lane] + coef[147][lane] * work[26][lane] + P1 * (coef[62][lane] * work[27][lane]
+        work[189][lane] = G2 * (work[170][lane] + P3 * (work[97][lane] + (t57 + work[98][lane])))
+            + P2 * (G3 * (coef[153][lane] + t58 + (work[99][lane] + coef[130][lane] * work[30][lane]))
+            + P3 * (work[100][lane] + coef[147][lane] * work[26][lane] + P1 * (coef[62][lane] * work[27][lane]
             + work[101][lane])));
         const double t59 = coef[36][lane] * work[29][lane];
-        work[178][lane] = work[102][lane] + P2 * (coef[57][lane] * work[103][lane] + G2 * (coef[49][lane] + G1
-            * coef[152][lane] + (coef[148][lane] * work[27][lane] + work[104][lane]))) + P1
-            * (t11 + G1 * (work[45][lane] + (work[105][lane] + t37)) + P3 * (work[106][lane] + P3
-            * (work[46][lane] + (work[47][lane] + (work[82][lane] + t59)))));
+        work[178][lane] = work[102][lane] + P2 * (coef[57][lane] * work[103][lane] + G2 * (coef[49][lane]
+            + G1 * coef[152][lane] + (coef[148][lane] * work[27][lane] + work[104][lane])))
+            + P1 * (t11 + G1 * (work[45][lane] + (work[105][lane] + t37)) + P3 * (work[106][lane]
+            + P3 * (work[46][lane] + (work[47][lane] + (work[82][lane] + t59)))));
         const double t60 = G1 * (work[107][lane] + G2 * (work[108][lane] + coef[146][lane] * work[39][lane])
             + G1 * (work[109][lane] + (work[99][lane] + work[110][lane]))) + (work[77][lane] * (work[48][lane]
             + work[111][lane]) + (coef[19][lane] + work[57][lane] * (t59 + work[112][lane])));
-        const double t61 = work[29][lane] * (coef[125][lane] + G1 * coef[145][lane] + (coef[129][lane]
-            * work[29][lane] + t23)) + work[113][lane] + P1 * (work[114][lane] + t21 + P1 * (work[115][lane]
-            + (work[116][lane] + (t24 + work[117][lane]))));
+        const double t61 = work[29][lane] * (coef[125][lane] + G1 * coef[145][lane]
+            + (coef[129][lane] * work[29][lane] + t23)) + work[113][lane] + P1 * (work[114][lane] + t21
+            + P1 * (work[115][lane] + (work[116][lane] + (t24 + work[117][lane]))));
         work[240][lane] = t60 + P3 * (G3 * (coef[144][lane] * work[54][lane] + P1 * (work[68][lane]
             + (t19 + work[118][lane]))) + P3 * t61);
         const double t62 = coef[47][lane] * work[26][lane], t63 = coef[13][lane] * work[27][lane];
         const double t64 = G1 * coef[149][lane], t65 = coef[5][lane] + t64;
         const double t66 = coef[50][lane] * work[29][lane];
-        const double t67 = work[119][lane] + G1 * (coef[49][lane] + work[120][lane] + (coef[151][lane]
-            * work[29][lane] + work[121][lane])) + P3 * (coef[61][lane] * work[43][lane] + P3
-            * (coef[56][lane] * work[27][lane] + (t65 + (t66 + coef[35][lane] * work[30][lane]))));
+        const double t67 = work[119][lane] + G1 * (coef[49][lane] + work[120][lane]
+            + (coef[151][lane] * work[29][lane] + work[121][lane])) + P3 * (coef[61][lane] * work[43][lane]
+            + P3 * (coef[56][lane] * work[27][lane] + (t65 + (t66 + coef[35][lane] * work[30][lane]))));
         work[160][lane] = G2 * (t62 + P1 * (work[78][lane] + (work[105][lane] + t63))) + P2 * t67;
         const double t68 = coef[74][lane] * work[27][lane];
-        const double t69 = work[29][lane] * (coef[132][lane] + t58 + t50) + (work[27][lane]
-            * (t51 + (coef[49][lane] + G1 * coef[150][lane])) + (G1 * (coef[3][lane] + t64) + (coef[147][lane]
-            * work[57][lane] + (coef[134][lane] + coef[148][lane] * work[77][lane]))));
+        const double t69 = work[29][lane] * (coef[132][lane] + t58 + t50)
+            + (work[27][lane] * (t51 + (coef[49][lane] + G1 * coef[150][lane])) + (G1 * (coef[3][lane] + t64)
+            + (coef[147][lane] * work[57][lane] + (coef[134][lane] + coef[148][lane] * work[77][lane]))));
         work[241][lane] = G2 * (G3 * (t68 + work[97][lane]) + P1 * (work[106][lane] + P3 * (work[122][lane]
-            + (work[123][lane] + t45)))) + P2 * (work[124][lane] + P3
-            * (t69 + P1 * (t22 + P1 * (t49 + (t38 + t53)))));
+            + (work[123][lane] + t45)))) + P2 * (work[124][lane]
+            + P3 * (t69 + P1 * (t22 + P1 * (t49 + (t38 + t53)))));
         work[245][lane] = 0.5 * work[13][lane];
         work[243][lane] = work[151][lane] * work[14][lane];
         work[244][lane] = work[151][lane] * work[6][lane];
@@ -2112,25 +2119,25 @@ kowalevski_top_APART static void kowalevski_top_linearise_lanes_part2(kowalevski
             - (work[13][lane] * work[191][lane] + work[11][lane] * work[192][lane])));
         const double t70 = coef[155][lane] * work[27][lane];
         work[171][lane] = work[97][lane] + (work[126][lane] + t57);
-        work[177][lane] = G2 * (coef[113][lane] * work[43][lane] + P3 * (coef[164][lane] + G1
-            * coef[109][lane] + (t70 + coef[136][lane] * work[30][lane]))) + P2 * (G3 * work[171][lane] + P3
-            * (coef[74][lane] * work[26][lane] + coef[148][lane] * work[54][lane] + P1 * (work[123][lane]
+        work[177][lane] = G2 * (coef[113][lane] * work[43][lane] + P3 * (coef[164][lane]
+            + G1 * coef[109][lane] + (t70 + coef[136][lane] * work[30][lane]))) + P2 * (G3 * work[171][lane]
+            + P3 * (coef[74][lane] * work[26][lane] + coef[148][lane] * work[54][lane] + P1 * (work[123][lane]
             + (work[122][lane] + (work[99][lane] + t45)))));
-        work[188][lane] = work[26][lane] * (coef[52][lane] * work[27][lane] + (coef[153][lane] + G1
-            * coef[165][lane])) + P2 * (coef[147][lane] * work[103][lane] + G2 * (work[97][lane]
+        work[188][lane] = work[26][lane] * (coef[52][lane] * work[27][lane] + (coef[153][lane]
+            + G1 * coef[165][lane])) + P2 * (coef[147][lane] * work[103][lane] + G2 * (work[97][lane]
             + (t68 + work[126][lane]))) + P1 * (work[29][lane] * (work[127][lane] + (work[128][lane] + t3))
-            + (work[27][lane] * work[129][lane] + work[130][lane]) + P1 * (work[131][lane] + t2 + P1
-            * (t3 + work[132][lane])));
+            + (work[27][lane] * work[129][lane] + work[130][lane]) + P1 * (work[131][lane] + t2
+            + P1 * (t3 + work[132][lane])));
         const double t71 = G1 * coef[162][lane];
         const double t72 = work[29][lane] * (t65 + (coef[75][lane] * work[27][lane] + coef[79][lane]
             * work[29][lane])) + (work[133][lane] + G1 * (coef[67][lane] + t71 + coef[163][lane]
-            * work[27][lane])) + P1 * (work[131][lane] + coef[82][lane] * work[26][lane] + P1
-            * (coef[85][lane] * work[27][lane] + (t47 + (t48 + coef[87][lane] * work[30][lane]))));
+            * work[27][lane])) + P1 * (work[131][lane] + coef[82][lane] * work[26][lane]
+            + P1 * (coef[85][lane] * work[27][lane] + (t47 + (t48 + coef[87][lane] * work[30][lane]))));
         work[164][lane] = work[134][lane] + P3 * t72;
         const double t73 = coef[158][lane] * work[27][lane];
         const double t74 = work[27][lane] * (coef[154][lane] * work[77][lane] + coef[97][lane]
-            * work[57][lane]) + work[135][lane] + G1 * (work[133][lane] + G1 * (t70 + work[136][lane])) + P2
-            * (coef[156][lane] * work[137][lane] + P2 * (work[29][lane] * (work[138][lane]
+            * work[57][lane]) + work[135][lane] + G1 * (work[133][lane] + G1 * (t70 + work[136][lane]))
+            + P2 * (coef[156][lane] * work[137][lane] + P2 * (work[29][lane] * (work[138][lane]
             + (t23 + work[139][lane])) + (work[27][lane] * (coef[34][lane] + G1 * coef[157][lane] + t73)
             + work[140][lane])));
         const double t75 = work[29][lane] * (work[116][lane] + (coef[124][lane] * work[27][lane]
@@ -2141,31 +2148,31 @@ kowalevski_top_APART static void kowalevski_top_linearise_lanes_part2(kowalevski
             + (work[99][lane] + coef[160][lane] * work[27][lane]))) + P1 * t75;
         work[242][lane] = t74 + P1 * t76;
         work[154][lane] = G2 * (coef[110][lane] + G1 * coef[166][lane] + (coef[23][lane] * work[30][lane]
-            + coef[69][lane] * work[27][lane])) + P2 * (coef[51][lane] * work[54][lane] + t62 + P1
-            * (t63 + (work[78][lane] + work[145][lane])));
+            + coef[69][lane] * work[27][lane])) + P2 * (coef[51][lane] * work[54][lane] + t62
+            + P1 * (t63 + (work[78][lane] + work[145][lane])));
         work[156][lane] = G3 * (coef[38][lane] + G1 * coef[167][lane] + (coef[22][lane] * work[30][lane]
-            + t66)) + P3 * (coef[68][lane] * work[26][lane] + work[146][lane] + P1 * (coef[6][lane]
-            * work[27][lane] + work[147][lane]));
+            + t66)) + P3 * (coef[68][lane] * work[26][lane] + work[146][lane]
+            + P1 * (coef[6][lane] * work[27][lane] + work[147][lane]));
         work[162][lane] = P2 * (coef[102][lane] * work[148][lane] + P2 * (coef[55][lane] * work[27][lane]
             + (coef[12][lane] + work[120][lane] + work[149][lane]))) + (coef[90][lane] * work[57][lane]
             + coef[91][lane] * work[77][lane] + P3 * (coef[101][lane] * work[43][lane] + P3 * (coef[21][lane]
             + t71 + (work[150][lane] + coef[27][lane] * work[30][lane]))));
         displacement[0][lane] = work[14][lane] * work[7][lane] - work[15][lane] * t1 - 0.5 * work[16][lane];
-        displacement[1][lane] = work[14][lane] * work[18][lane] - work[15][lane] * work[220][lane] - 0.5
-            * work[21][lane];
-        displacement[2][lane] = work[14][lane] * work[19][lane] - work[15][lane] * work[255][lane] - 0.5
-            * work[22][lane];
-        displacement[3][lane] = work[1][lane] * work[14][lane] - work[15][lane] * work[264][lane] - 0.5
-            * work[23][lane];
-        displacement[4][lane] = work[14][lane] * work[3][lane] - work[15][lane] * work[272][lane] - 0.5
-            * work[24][lane];
-        displacement[5][lane] = work[14][lane] * work[17][lane] - work[15][lane] * work[273][lane] - 0.5
-            * work[25][lane];
+        displacement[1][lane] = work[14][lane] * work[18][lane] - work[15][lane] * work[220][lane]
+            - 0.5 * work[21][lane];
+        displacement[2][lane] = work[14][lane] * work[19][lane] - work[15][lane] * work[255][lane]
+            - 0.5 * work[22][lane];
+        displacement[3][lane] = work[1][lane] * work[14][lane] - work[15][lane] * work[264][lane]
+            - 0.5 * work[23][lane];
+        displacement[4][lane] = work[14][lane] * work[3][lane] - work[15][lane] * work[272][lane]
+            - 0.5 * work[24][lane];
+        displacement[5][lane] = work[14][lane] * work[17][lane] - work[15][lane] * work[273][lane]
+            - 0.5 * work[25][lane];
         increment_jacobian[30][lane] = G1 * work[238][lane] - G2 * work[239][lane];
         increment_jacobian[24][lane] = G3 * work[239][lane] - G1 * work[237][lane];
         jacobian[0][lane] = 1.0 + (work[190][lane] * work[157][lane] + work[179][lane] * work[155][lane]
-            + (work[239][lane] * work[159][lane] + work[238][lane] * work[161][lane] + (work[158][lane]
-            * work[163][lane] + work[237][lane] * work[165][lane])) - work[269][lane]);
+            + (work[239][lane] * work[159][lane] + work[238][lane] * work[161][lane]
+            + (work[158][lane] * work[163][lane] + work[237][lane] * work[165][lane])) - work[269][lane]);
         increment_jacobian[31][lane] = G1 * work[240][lane] - G2 * work[238][lane];
         jacobian[1][lane] = work[270][lane] + (work[189][lane] * work[157][lane] + work[178][lane]
             * work[155][lane] + (work[238][lane] * work[159][lane] + work[240][lane] * work[161][lane]
@@ -2178,8 +2185,8 @@ kowalevski_top_APART static void kowalevski_top_linearise_lanes_part2(kowalevski
         increment_jacobian[26][lane] = G3 * work[237][lane] - G1 * work[242][lane];
         increment_jacobian[9][lane] = P3 * work[158][lane] + (G3 * work[162][lane] - P1 * work[164][lane])
             - G1 * work[156][lane] - work[8][lane];
-        increment_jacobian[15][lane] = work[0][lane] + (G1 * work[154][lane] + (P1 * work[160][lane] - P2
-            * work[158][lane] - G2 * work[162][lane]));
+        increment_jacobian[15][lane] = work[0][lane] + (G1 * work[154][lane] + (P1 * work[160][lane]
+            - P2 * work[158][lane] - G2 * work[162][lane]));
     }
 }
 
@@ -2192,34 +2199,34 @@ kowalevski_top_APART static void kowalevski_top_linearise_lanes_part3(kowalevski
     (void)displacement, (void)increment;
     kowalevski_top_EACH_LANE
     for (int lane = 0; lane < kowalevski_top_LANES; ++lane) {
-        const double P1 = y[0][lane], P2 = y[1][lane], P3 = y[2][lane], G1 = y[3][lane], G2 = y[4][lane], G3 =
-            y[5][lane];
+        const double P1 = y[0][lane], P2 = y[1][lane], P3 = y[2][lane], G1 = y[3][lane], G2 = y[4][lane],
+            G3 = y[5][lane];
         const double t1 = work[8][lane] * work[11][lane], t2 = work[0][lane] * work[13][lane], t3 = t1 + t2;
         const double t4 = t3 + t3, t5 = work[8][lane] * work[20][lane] + work[2][lane] * work[11][lane];
-        const double t6 = work[2][lane] * work[151][lane] + work[8][lane] * work[152][lane] + (work[20][lane]
-            * t5 + work[11][lane] * t4);
+        const double t6 = work[2][lane] * work[151][lane] + work[8][lane] * work[152][lane]
+            + (work[20][lane] * t5 + work[11][lane] * t4);
         const double t7 = work[0][lane] * work[20][lane] + work[2][lane] * work[13][lane];
-        const double t8 = work[2][lane] * work[153][lane] + work[0][lane] * work[152][lane] + (work[20][lane]
-            * t7 + work[13][lane] * t4);
+        const double t8 = work[2][lane] * work[153][lane] + work[0][lane] * work[152][lane]
+            + (work[20][lane] * t7 + work[13][lane] * t4);
         const double t9 = work[154][lane] * work[155][lane] + work[156][lane] * work[157][lane]
-            + (work[158][lane] * work[159][lane] + work[160][lane] * work[161][lane] + (work[162][lane]
-            * work[163][lane] + work[164][lane] * work[165][lane])) - (t4 * work[14][lane] + work[15][lane]
-            * (work[0][lane] * work[166][lane] + work[8][lane] * work[167][lane] + (work[11][lane] * t6
-            + work[13][lane] * t8) - t4 * work[6][lane]));
+            + (work[158][lane] * work[159][lane] + work[160][lane] * work[161][lane]
+            + (work[162][lane] * work[163][lane] + work[164][lane] * work[165][lane])) - (t4 * work[14][lane]
+            + work[15][lane] * (work[0][lane] * work[166][lane] + work[8][lane] * work[167][lane]
+            + (work[11][lane] * t6 + work[13][lane] * t8) - t4 * work[6][lane]));
         const double t10 = t7 * work[14][lane], t11 = t7 * work[6][lane];
         const double t12 = work[2][lane] * work[168][lane], t13 = work[8][lane] * work[153][lane];
         const double t14 = work[8][lane] * work[13][lane] + work[0][lane] * work[11][lane];
         const double t15 = work[20][lane] * t14, t16 = work[11][lane] * t7, t17 = t12 - t13 + (t15 - t16);
         const double t18 = work[2][lane] * work[20][lane], t19 = t18 + t1, t20 = t19 + t19;
-        const double t21 = work[0][lane] * work[153][lane] + work[2][lane] * work[169][lane] + (work[13][lane]
-            * t7 + work[20][lane] * t20);
+        const double t21 = work[0][lane] * work[153][lane] + work[2][lane] * work[169][lane]
+            + (work[13][lane] * t7 + work[20][lane] * t20);
         const double t22 = 0.5 * work[8][lane];
         const double t23 = G2 * (G3 * coef[169][lane] + coef[113][lane] * (P1 * P3)) + P2 * (work[170][lane]
             + P3 * (work[98][lane] + work[171][lane]));
         const double t24 = work[29][lane] * work[172][lane] + (work[173][lane] + (work[174][lane]
-            + (work[175][lane] + (coef[107][lane] + coef[168][lane] * work[77][lane])))) + P1
-            * (coef[167][lane] * work[54][lane] + work[44][lane] + P1 * (work[176][lane] + (work[61][lane]
-            + (work[49][lane] + work[62][lane]))));
+            + (work[175][lane] + (coef[107][lane] + coef[168][lane] * work[77][lane]))))
+            + P1 * (coef[167][lane] * work[54][lane] + work[44][lane] + P1 * (work[176][lane]
+            + (work[61][lane] + (work[49][lane] + work[62][lane]))));
         const double t25 = t10 - work[15][lane] * (t11 + (work[8][lane] * work[180][lane] - work[0][lane]
             * work[181][lane] + (work[11][lane] * t17 - work[13][lane] * t21))) - t22 + (t23 * work[157][lane]
             + t24 * work[155][lane] + (work[179][lane] * work[159][lane] + work[178][lane] * work[161][lane]
@@ -2227,12 +2234,12 @@ kowalevski_top_APART static void kowalevski_top_linearise_lanes_part3(kowalevski
         const double t26 = 0.5 * work[0][lane], t27 = t5 * work[14][lane], t28 = t5 * work[6][lane];
         const double t29 = work[0][lane] * work[151][lane], t30 = work[13][lane] * t5;
         const double t31 = t29 - t12 + (t30 - t15), t32 = t18 + t2, t33 = t32 + t32;
-        const double t34 = work[8][lane] * work[151][lane] + work[2][lane] * work[125][lane] + (work[11][lane]
-            * t5 + work[20][lane] * t33);
+        const double t34 = work[8][lane] * work[151][lane] + work[2][lane] * work[125][lane]
+            + (work[11][lane] * t5 + work[20][lane] * t33);
         const double t35 = work[29][lane] * (work[182][lane] + (coef[53][lane] * work[27][lane]
-            + work[183][lane])) + (work[27][lane] * work[184][lane] + (work[185][lane] + (coef[170][lane]
-            * work[57][lane] + work[186][lane]))) + P1 * (coef[171][lane] * work[26][lane] + work[28][lane]
-            + P1 * (coef[25][lane] * work[27][lane] + work[187][lane]));
+            + work[183][lane])) + (work[27][lane] * work[184][lane] + (work[185][lane]
+            + (coef[170][lane] * work[57][lane] + work[186][lane]))) + P1 * (coef[171][lane] * work[26][lane]
+            + work[28][lane] + P1 * (coef[25][lane] * work[27][lane] + work[187][lane]));
         const double t36 = t26 + (t27 - work[15][lane] * (t28 - (work[0][lane] * work[191][lane]
             + work[8][lane] * work[192][lane] + (work[13][lane] * t31 + work[11][lane] * t34))))
             + (t35 * work[157][lane] + t23 * work[155][lane] + (work[190][lane] * work[159][lane]
@@ -2264,18 +2271,20 @@ kowalevski_top_APART static void kowalevski_top_linearise_lanes_part3(kowalevski
         const double t58 = t54 + (2.0 * (work[221][lane] * work[18][lane]) - work[14][lane] * work[213][lane]
             - t57);
         const double t59 = t41 - (t42 + work[17][lane]);
-        const double t60 = work[8][lane] * work[198][lane] - work[0][lane] * work[199][lane] + (work[11][lane]
-            * work[222][lane] - (work[13][lane] * work[223][lane] + work[19][lane]));
-        const double t61 = work[15][lane] * (work[222][lane] * work[6][lane] + 2.0 * (work[13][lane]
-            * work[18][lane]) + (work[2][lane] * work[224][lane] - work[8][lane] * t59 + (work[20][lane]
-            * work[225][lane] - work[11][lane] * t60))) + 2.0 * (work[226][lane] * work[220][lane]);
+        const double t60 = work[8][lane] * work[198][lane] - work[0][lane] * work[199][lane]
+            + (work[11][lane] * work[222][lane] - (work[13][lane] * work[223][lane] + work[19][lane]));
+        const double t61 = work[15][lane] * (work[222][lane] * work[6][lane]
+            + 2.0 * (work[13][lane] * work[18][lane]) + (work[2][lane] * work[224][lane] - work[8][lane] * t59
+            + (work[20][lane] * work[225][lane] - work[11][lane] * t60)))
+            + 2.0 * (work[226][lane] * work[220][lane]);
         const double t62 = work[222][lane] * work[14][lane] + 2.0 * (work[227][lane] * work[18][lane]) - t61;
         const double t63 = work[13][lane] * work[228][lane] + t51;
-        const double t64 = work[8][lane] * work[208][lane] + work[0][lane] * work[228][lane] + (work[13][lane]
-            * work[229][lane] + work[11][lane] * work[230][lane]);
-        const double t65 = 2.0 * (work[231][lane] * work[220][lane]) + work[15][lane] * (work[6][lane]
-            * work[230][lane] + 2.0 * work[5][lane] + (work[2][lane] * work[232][lane] - work[8][lane] * t63
-            + (work[233][lane] + work[20][lane] * work[234][lane] - work[11][lane] * t64)));
+        const double t64 = work[8][lane] * work[208][lane] + work[0][lane] * work[228][lane]
+            + (work[13][lane] * work[229][lane] + work[11][lane] * work[230][lane]);
+        const double t65 = 2.0 * (work[231][lane] * work[220][lane]) + work[15][lane]
+            * (work[6][lane] * work[230][lane] + 2.0 * work[5][lane] + (work[2][lane] * work[232][lane]
+            - work[8][lane] * t63 + (work[233][lane] + work[20][lane] * work[234][lane] - work[11][lane]
+            * t64)));
         const double t66 = work[14][lane] * work[230][lane] + 2.0 * (work[235][lane] * work[18][lane]) - t65
             - work[236][lane];
         const double t67 = work[13][lane] * work[168][lane] + work[11][lane] * work[169][lane];
@@ -2291,15 +2300,15 @@ kowalevski_top_APART static void kowalevski_top_linearise_lanes_part3(kowalevski
             * work[166][lane] + (work[11][lane] * t74 + work[20][lane] * t8)))) + (work[154][lane] * t44
             + work[156][lane] * t48 + (work[160][lane] * t62 + work[158][lane] * t66 + (work[162][lane] * t53
             + work[164][lane] * t58)));
-        const double t76 = work[0][lane] * work[168][lane] + work[8][lane] * work[169][lane] + (work[13][lane]
-            * t14 + work[11][lane] * t20);
+        const double t76 = work[0][lane] * work[168][lane] + work[8][lane] * work[169][lane]
+            + (work[13][lane] * t14 + work[11][lane] * t20);
         const double t77 = t24 * t44 + t23 * t48 + (work[154][lane] * t53 + work[177][lane] * t58
             + (work[178][lane] * t62 + work[179][lane] * t66)) - (t20 * work[14][lane] + work[15][lane]
             * (work[8][lane] * t67 + work[2][lane] * work[181][lane] + (work[20][lane] * t21 + work[11][lane]
             * t76) - t20 * work[6][lane]));
         const double t78 = t14 * work[14][lane], t79 = t14 * work[6][lane];
-        const double t80 = work[8][lane] * work[168][lane] + work[0][lane] * work[125][lane] + (work[11][lane]
-            * t14 + work[13][lane] * t33);
+        const double t80 = work[8][lane] * work[168][lane] + work[0][lane] * work[125][lane]
+            + (work[11][lane] * t14 + work[13][lane] * t33);
         const double t81 = 0.5 * work[2][lane];
         const double t82 = t78 - work[15][lane] * (t79 + (work[2][lane] * work[191][lane] - work[8][lane]
             * t71 + (work[20][lane] * t31 - work[11][lane] * t80))) - t81 + (t23 * t44 + t35 * t48
@@ -2316,9 +2325,10 @@ kowalevski_top_APART static void kowalevski_top_linearise_lanes_part3(kowalevski
         const double t90 = work[249][lane] + (work[209][lane] * work[14][lane] - work[15][lane]
             * (work[6][lane] * work[209][lane] + (work[250][lane] - work[251][lane] + (work[13][lane] * t52
             - work[20][lane] * work[252][lane]))));
-        const double t91 = work[15][lane] * (work[6][lane] * work[214][lane] + 2.0 * (work[11][lane]
-            * work[19][lane]) + (work[0][lane] * t55 - work[2][lane] * work[253][lane] + (work[13][lane] * t56
-            - work[20][lane] * work[254][lane]))) + 2.0 * (work[219][lane] * work[255][lane]);
+        const double t91 = work[15][lane] * (work[6][lane] * work[214][lane]
+            + 2.0 * (work[11][lane] * work[19][lane]) + (work[0][lane] * t55 - work[2][lane] * work[253][lane]
+            + (work[13][lane] * t56 - work[20][lane] * work[254][lane])))
+            + 2.0 * (work[219][lane] * work[255][lane]);
         const double t92 = work[214][lane] * work[14][lane] + 2.0 * (work[221][lane] * work[19][lane]) - t91;
         const double t93 = work[15][lane] * (2.0 * work[256][lane] - work[6][lane] * work[229][lane]
             + (work[0][lane] * t63 - work[2][lane] * work[257][lane] + (work[13][lane] * t64 - (work[12][lane]
@@ -2347,41 +2357,43 @@ kowalevski_top_APART static void kowalevski_top_linearise_lanes_part3(kowalevski
             * (work[0][lane] * t71 + work[2][lane] * work[192][lane] + (work[13][lane] * t80 + work[20][lane]
             * t34) - t33 * work[6][lane]));
         const double t102 = work[263][lane] + 2.0 * (work[1][lane] * work[221][lane])
-            - (2.0 * (work[219][lane] * work[264][lane]) + work[15][lane] * (work[265][lane] + 2.0
-            * work[250][lane] + (work[9][lane] + work[11][lane] * work[253][lane] - work[13][lane]
+            - (2.0 * (work[219][lane] * work[264][lane]) + work[15][lane] * (work[265][lane]
+            + 2.0 * work[250][lane] + (work[9][lane] + work[11][lane] * work[253][lane] - work[13][lane]
             * work[216][lane])));
         const double t103 = t102 - work[249][lane];
-        const double t104 = work[266][lane] + 2.0 * (work[1][lane] * work[235][lane]) - (work[15][lane]
-            * (work[267][lane] + 2.0 * (work[20][lane] * work[1][lane]) + (work[11][lane] * work[257][lane]
-            - work[13][lane] * work[232][lane])) + 2.0 * (work[231][lane] * work[264][lane]));
+        const double t104 = work[266][lane] + 2.0 * (work[1][lane] * work[235][lane])
+            - (work[15][lane] * (work[267][lane] + 2.0 * (work[20][lane] * work[1][lane])
+            + (work[11][lane] * work[257][lane] - work[13][lane] * work[232][lane]))
+            + 2.0 * (work[231][lane] * work[264][lane]));
         const double t105 = 2.0 * (work[1][lane] * work[227][lane]) - work[268][lane] * work[14][lane]
             - (2.0 * (work[226][lane] * work[264][lane]) + work[15][lane] * (2.0 * work[53][lane]
             - work[268][lane] * work[6][lane] + (work[11][lane] * work[261][lane] - (work[10][lane]
             + work[13][lane] * work[224][lane]))));
         const double t106 = work[211][lane] + t105;
         const double t107 = 2.0 * (work[3][lane] * work[221][lane]) - work[212][lane] * work[14][lane]
-            - (work[15][lane] * (2.0 * work[206][lane] - work[212][lane] * work[6][lane] + (work[20][lane]
-            * work[216][lane] - (work[247][lane] + work[11][lane] * t55))) + 2.0 * (work[219][lane]
-            * work[272][lane]));
+            - (work[15][lane] * (2.0 * work[206][lane] - work[212][lane] * work[6][lane]
+            + (work[20][lane] * work[216][lane] - (work[247][lane] + work[11][lane] * t55)))
+            + 2.0 * (work[219][lane] * work[272][lane]));
         const double t108 = t45 + t107;
-        const double t109 = t39 + 2.0 * (work[3][lane] * work[227][lane]) - (work[15][lane]
-            * (t40 + 2.0 * (work[13][lane] * work[3][lane]) + (work[20][lane] * work[224][lane]
-            - work[11][lane] * t59)) + 2.0 * (work[226][lane] * work[272][lane]));
+        const double t109 = t39 + 2.0 * (work[3][lane] * work[227][lane])
+            - (work[15][lane] * (t40 + 2.0 * (work[13][lane] * work[3][lane])
+            + (work[20][lane] * work[224][lane] - work[11][lane] * t59))
+            + 2.0 * (work[226][lane] * work[272][lane]));
         const double t110 = t49 + 2.0 * (work[3][lane] * work[235][lane])
             - (2.0 * (work[231][lane] * work[272][lane]) + work[15][lane] * (t50 + 2.0 * work[52][lane]
             + (work[10][lane] + work[20][lane] * work[232][lane] - work[11][lane] * t63)));
         const double t111 = t110 - work[211][lane];
-        const double t112 = t84 + 2.0 * (work[17][lane] * work[221][lane]) - (work[15][lane]
-            * (t85 + 2.0 * (work[11][lane] * work[17][lane]) + (work[13][lane] * t55 - work[20][lane]
-            * work[253][lane])) + 2.0 * (work[219][lane] * work[273][lane]));
+        const double t112 = t84 + 2.0 * (work[17][lane] * work[221][lane])
+            - (work[15][lane] * (t85 + 2.0 * (work[11][lane] * work[17][lane]) + (work[13][lane] * t55
+            - work[20][lane] * work[253][lane])) + 2.0 * (work[219][lane] * work[273][lane]));
         const double t113 = 2.0 * (work[17][lane] * work[235][lane]) - work[228][lane] * work[14][lane]
             - (2.0 * (work[231][lane] * work[273][lane]) + work[15][lane] * (2.0 * work[251][lane]
             - work[228][lane] * work[6][lane] + (work[13][lane] * t63 - (work[9][lane] + work[20][lane]
             * work[257][lane]))));
         const double t114 = work[249][lane] + t113;
-        const double t115 = t87 + 2.0 * (work[17][lane] * work[227][lane]) - (work[15][lane]
-            * (t88 + 2.0 * work[205][lane] + (work[247][lane] + work[13][lane] * t59 - work[20][lane]
-            * work[261][lane])) + 2.0 * (work[226][lane] * work[273][lane]));
+        const double t115 = t87 + 2.0 * (work[17][lane] * work[227][lane])
+            - (work[15][lane] * (t88 + 2.0 * work[205][lane] + (work[247][lane] + work[13][lane] * t59
+            - work[20][lane] * work[261][lane])) + 2.0 * (work[226][lane] * work[273][lane]));
         const double t116 = t115 - t45, t117 = G2 * work[190][lane], t118 = G3 * work[179][lane];
         const double t119 = P2 * work[237][lane], t120 = P3 * work[238][lane], t121 = G3 * work[178][lane];
         const double t122 = G2 * work[188][lane], t123 = G2 * work[156][lane], t124 = G3 * work[154][lane];
@@ -2391,15 +2403,15 @@ kowalevski_top_APART static void kowalevski_top_linearise_lanes_part3(kowalevski
         const double t134 = G2 * work[164][lane], t135 = G2 * work[237][lane], t136 = G3 * work[238][lane];
         const double t137 = G1 * work[241][lane];
         jacobian[3][lane] = t9;
-        increment_jacobian[4][lane] = work[8][lane] + (G2 * t23 - G3 * t24 + (P2 * work[177][lane] - P3
-            * work[178][lane]));
-        increment_jacobian[16][lane] = G1 * t24 + (P1 * work[178][lane] - P2 * work[179][lane] - G2
-            * work[154][lane]) - work[2][lane];
+        increment_jacobian[4][lane] = work[8][lane] + (G2 * t23 - G3 * t24 + (P2 * work[177][lane]
+            - P3 * work[178][lane]));
+        increment_jacobian[16][lane] = G1 * t24 + (P1 * work[178][lane] - P2 * work[179][lane]
+            - G2 * work[154][lane]) - work[2][lane];
         jacobian[4][lane] = t25;
         increment_jacobian[5][lane] = G2 * t35 - G3 * t23 + (P2 * work[188][lane] - P3 * work[189][lane])
             - work[0][lane];
-        increment_jacobian[11][lane] = work[2][lane] + (P3 * work[190][lane] + (G3 * work[156][lane] - P1
-            * work[188][lane]) - G1 * t35);
+        increment_jacobian[11][lane] = work[2][lane] + (P3 * work[190][lane] + (G3 * work[156][lane]
+            - P1 * work[188][lane]) - G1 * t35);
         jacobian[5][lane] = t36;
         jacobian[6][lane] = t38 + (work[179][lane] * t44 + work[190][lane] * t48 + (work[158][lane] * t53
             + work[237][lane] * t58 + (work[238][lane] * t62 + work[239][lane] * t66)));
@@ -2450,25 +2462,25 @@ kowalevski_top_APART static void kowalevski_top_linearise_lanes_part3(kowalevski
         increment_jacobian[1][lane] = work[11][lane] + (G2 * work[189][lane] - t121 + (P2 * work[241][lane]
             - P3 * work[240][lane]));
         increment_jacobian[22][lane] = G2 * work[177][lane] - t121 + work[11][lane];
-        increment_jacobian[2][lane] = t122 - G3 * work[177][lane] + (P2 * work[242][lane] - P3
-            * work[241][lane]) - work[13][lane];
+        increment_jacobian[2][lane] = t122 - G3 * work[177][lane] + (P2 * work[242][lane]
+            - P3 * work[241][lane]) - work[13][lane];
         increment_jacobian[23][lane] = t122 - G3 * work[189][lane] - work[13][lane];
         increment_jacobian[3][lane] = t123 - t124 + (P2 * work[164][lane] - P3 * work[160][lane]);
-        increment_jacobian[6][lane] = P3 * work[239][lane] + (t125 - P1 * work[237][lane]) - G1
-            * work[190][lane] - work[11][lane];
+        increment_jacobian[6][lane] = P3 * work[239][lane] + (t125 - P1 * work[237][lane])
+            - G1 * work[190][lane] - work[11][lane];
         increment_jacobian[27][lane] = t125 - G1 * work[164][lane] - work[11][lane];
         increment_jacobian[7][lane] = t120 + (t126 - t127) - t128;
         increment_jacobian[35][lane] = t128 - t117;
-        increment_jacobian[8][lane] = work[20][lane] + (P3 * work[237][lane] + (G3 * work[164][lane] - P1
-            * work[242][lane]) - t129);
+        increment_jacobian[8][lane] = work[20][lane] + (P3 * work[237][lane] + (G3 * work[164][lane]
+            - P1 * work[242][lane]) - t129);
         increment_jacobian[29][lane] = G3 * work[190][lane] - t129 + work[20][lane];
         increment_jacobian[10][lane] = P3 * work[179][lane] + (t124 - P1 * work[177][lane]) - t130;
         increment_jacobian[17][lane] = t130 + (P1 * work[189][lane] - P2 * work[190][lane] - t123);
-        increment_jacobian[12][lane] = work[13][lane] + (G1 * work[179][lane] + (P1 * work[238][lane] - P2
-            * work[239][lane] - t131));
+        increment_jacobian[12][lane] = work[13][lane] + (G1 * work[179][lane] + (P1 * work[238][lane]
+            - P2 * work[239][lane] - t131));
         increment_jacobian[33][lane] = G1 * work[160][lane] - t131 + work[13][lane];
-        increment_jacobian[13][lane] = t132 + (P1 * work[240][lane] - P2 * work[238][lane] - G2
-            * work[160][lane]) - work[20][lane];
+        increment_jacobian[13][lane] = t132 + (P1 * work[240][lane] - P2 * work[238][lane]
+            - G2 * work[160][lane]) - work[20][lane];
         increment_jacobian[34][lane] = t132 - G2 * work[179][lane] - work[20][lane];
         increment_jacobian[28][lane] = t118 - t133;
         increment_jacobian[14][lane] = t133 + (t127 - t119 - t134);
@@ -2501,8 +2513,8 @@ static void kowalevski_top_evaluate_lanes(kowalevski_top_lanes coef[restrict 172
 {
     kowalevski_top_EACH_LANE
     for (int lane = 0; lane < kowalevski_top_LANES; ++lane) {
-        const double P1 = y[0][lane], P2 = y[1][lane], P3 = y[2][lane], G1 = y[3][lane], G2 = y[4][lane], G3 =
-            y[5][lane];
+        const double P1 = y[0][lane], P2 = y[1][lane], P3 = y[2][lane], G1 = y[3][lane], G2 = y[4][lane],
+            G3 = y[5][lane];
         const double t1 = G2 * P2, t2 = P2 * P2, t3 = coef[77][lane] * t2;
         const double t4 = coef[38][lane] + G1 * coef[47][lane], t5 = coef[10][lane] + G1 * coef[15][lane];
         const double t6 = coef[18][lane] * t2, t7 = G1 * (coef[3][lane] + G1 * coef[4][lane]), t8 = G3 * G3;
@@ -2513,17 +2525,17 @@ static void kowalevski_top_evaluate_lanes(kowalevski_top_lanes coef[restrict 172
             * t13);
         const double t15 = P3 * P3;
         const double t16 = t15 * (coef[72][lane] * t9 + coef[71][lane] * t8) + (coef[49][lane] * t8
-            + (coef[66][lane] + coef[67][lane] * t9)) + G1 * (coef[69][lane] * t9 + coef[68][lane] * t8 + G1
-            * (coef[73][lane] * t15 + (coef[21][lane] + G1 * coef[70][lane])));
+            + (coef[66][lane] + coef[67][lane] * t9)) + G1 * (coef[69][lane] * t9 + coef[68][lane] * t8
+            + G1 * (coef[73][lane] * t15 + (coef[21][lane] + G1 * coef[70][lane])));
         const double t17 = coef[36][lane] * t15, t18 = coef[76][lane] * t15, t19 = G1 * coef[55][lane];
         const double t20 = G1 * (coef[5][lane] + t19) + (coef[53][lane] * t8 + (coef[24][lane]
             + coef[54][lane] * t9));
-        const double t21 = coef[74][lane] * (G3 * (G2 * P3)) + P2 * (t2 * (coef[78][lane] + G1
-            * coef[79][lane] + (t17 + coef[80][lane] * t2))
+        const double t21 = coef[74][lane] * (G3 * (G2 * P3))
+            + P2 * (t2 * (coef[78][lane] + G1 * coef[79][lane] + (t17 + coef[80][lane] * t2))
             + (t15 * (t18 + (coef[12][lane] + G1 * coef[75][lane])) + t20));
         const double t22 = G3 * P3, t23 = G3 * (P2 * P3);
-        const double t24 = t22 * (coef[81][lane] + G1 * coef[82][lane] + coef[83][lane] * t15) + P2
-            * (coef[40][lane] * t23 + G2 * (coef[49][lane] + G1 * coef[64][lane] + (coef[39][lane] * t2
+        const double t24 = t22 * (coef[81][lane] + G1 * coef[82][lane] + coef[83][lane] * t15)
+            + P2 * (coef[40][lane] * t23 + G2 * (coef[49][lane] + G1 * coef[64][lane] + (coef[39][lane] * t2
             + coef[84][lane] * t15)));
         const double t25 = coef[34][lane] + G1 * coef[35][lane], t26 = coef[37][lane] * t2;
         const double t27 = G1 * coef[27][lane];
@@ -2539,9 +2551,9 @@ static void kowalevski_top_evaluate_lanes(kowalevski_top_lanes coef[restrict 172
         const double t33 = coef[10][lane] + G1 * coef[11][lane], t34 = coef[2][lane] * t2;
         const double t35 = coef[20][lane] + G1 * coef[22][lane], t36 = coef[31][lane] * t2, t37 = P1 * P2;
         const double t38 = coef[21][lane] + G1 * coef[23][lane];
-        const double t39 = coef[19][lane] + coef[33][lane] * (G1 * G1 * t2) + t8
-            * (t35 + (t36 + coef[43][lane] * t13)) + G2 * (coef[41][lane] * (G1 * t37) + G2
-            * (t38 + (coef[44][lane] * t13 + coef[32][lane] * t2)));
+        const double t39 = coef[19][lane] + coef[33][lane] * (G1 * G1 * t2)
+            + t8 * (t35 + (t36 + coef[43][lane] * t13)) + G2 * (coef[41][lane] * (G1 * t37)
+            + G2 * (t38 + (coef[44][lane] * t13 + coef[32][lane] * t2)));
         const double t40 = coef[5][lane] + G1 * coef[6][lane] + coef[7][lane] * t15;
         const double t41 = coef[12][lane] + G1 * coef[13][lane], t42 = coef[17][lane] * t2;
         const double t43 = coef[14][lane] * t15, t44 = t17 + t26, t45 = coef[29][lane] * t15;
@@ -2554,16 +2566,17 @@ static void kowalevski_top_evaluate_lanes(kowalevski_top_lanes coef[restrict 172
         const double p_P1 = t1 * (t32 + G1 * (t33 + t34)) + P1 * t39 + P3 * t49, t50 = coef[48][lane] * t15;
         const double t51 = t22 * (t4 + t50), t52 = coef[65][lane] * t13, t53 = coef[64][lane] * (G3 * P1);
         const double t54 = coef[17][lane] * t13, t55 = coef[58][lane] * t2, t56 = coef[33][lane] * t13;
-        const double t57 = t9 * (t55 + (coef[12][lane] + coef[32][lane] * t13)) + (coef[19][lane] + t8
-            * (t42 + (coef[49][lane] + coef[31][lane] * t13))) + G1 * (G1 * (coef[12][lane] + G1
-            * coef[52][lane] + (t56 + coef[59][lane] * t2)) + (coef[50][lane] * t8 + G2 * (G2 * coef[51][lane]
-            + coef[1][lane] * t37)));
+        const double t57 = t9 * (t55 + (coef[12][lane] + coef[32][lane] * t13)) + (coef[19][lane]
+            + t8 * (t42 + (coef[49][lane] + coef[31][lane] * t13)))
+            + G1 * (G1 * (coef[12][lane] + G1 * coef[52][lane] + (t56 + coef[59][lane] * t2))
+            + (coef[50][lane] * t8 + G2 * (G2 * coef[51][lane] + coef[1][lane] * t37)));
         const double t58 = G1 * coef[50][lane];
         const double t59 = t2 * (coef[34][lane] + t58 + t44)
             + (t15 * (t45 + (coef[28][lane] + G1 * coef[56][lane])) + t20) + P1 * (coef[62][lane] * t22 + t46
             + P1 * (t17 + (t25 + t47)));
-        const double t60 = P2 * (t57 + P3 * (G3 * (coef[57][lane] * t1 + P1 * (coef[60][lane] + G1
-            * coef[61][lane] + (coef[63][lane] * t13 + coef[63][lane] * t2))) + P3 * t59));
+        const double t60 =
+            P2 * (t57 + P3 * (G3 * (coef[57][lane] * t1 + P1 * (coef[60][lane] + G1 * coef[61][lane]
+            + (coef[63][lane] * t13 + coef[63][lane] * t2))) + P3 * t59));
         const double p_P2 = G2 * (t51 + P1 * (t32 + G1 * (t52 + t33) + P3 * (t53 + P3 * (t41 + (t54 + t43)))))
             + t60;
         const double t61 = p_P3 * p_P3 + (p_P1 * p_P1 + p_P2 * p_P2), t62 = kowalevski_top_phi0_lane(t61);
@@ -2572,10 +2585,10 @@ static void kowalevski_top_evaluate_lanes(kowalevski_top_lanes coef[restrict 172
             + (coef[115][lane] * t8 + (coef[114][lane] + coef[108][lane] * t9))) + P1 * (coef[118][lane] * t1
             + P1 * (t35 + (t36 + coef[119][lane] * t13)));
         const double t65 = coef[16][lane] * t15;
-        const double t66 = t2 * (t5 + (t65 + t6)) + (t15 * t40 + (t7 + (coef[117][lane] * t8 + t10))) + P1
-            * (coef[25][lane] * t22 + t12 + P1 * (t65 + t14));
-        const double t67 = P3 * (t22 * (coef[49][lane] + G1 * coef[68][lane] + coef[116][lane] * t15) + P2
-            * (coef[53][lane] * t23 + G2 * (t4 + (t3 + t50))) + P1 * t66);
+        const double t66 = t2 * (t5 + (t65 + t6)) + (t15 * t40 + (t7 + (coef[117][lane] * t8 + t10)))
+            + P1 * (coef[25][lane] * t22 + t12 + P1 * (t65 + t14));
+        const double t67 = P3 * (t22 * (coef[49][lane] + G1 * coef[68][lane] + coef[116][lane] * t15)
+            + P2 * (coef[53][lane] * t23 + G2 * (t4 + (t3 + t50))) + P1 * t66);
         const double p_G3 = G3 * t64 + t67, t68 = G3 * p_P1 - G1 * p_P3, t69 = G1 * coef[91][lane];
         const double t70 = t15 * (coef[111][lane] * t15 + (coef[67][lane] + G1 * coef[69][lane]))
             + (G1 * (coef[110][lane] + t69) + (coef[108][lane] * t8 + (coef[107][lane] + coef[109][lane]
@@ -2583,21 +2596,22 @@ static void kowalevski_top_evaluate_lanes(kowalevski_top_lanes coef[restrict 172
             * t13)));
         const double t71 = t31 + G2 * (G2 * coef[90][lane] + coef[32][lane] * t37) + G1 * (t33 + (t52 + t34))
             + P3 * (t53 + P3 * (t43 + (t41 + (t42 + t54))));
-        const double p_G2 = G2 * t70 + P2 * (t51 + P2 * (coef[77][lane] * t23 + G2 * (coef[12][lane] + G1
-            * coef[51][lane] + (coef[112][lane] * t2 + coef[54][lane] * t15))) + P1 * t71);
+        const double p_G2 = G2 * t70 + P2 * (t51 + P2 * (coef[77][lane] * t23 + G2 * (coef[12][lane]
+            + G1 * coef[51][lane] + (coef[112][lane] * t2 + coef[54][lane] * t15))) + P1 * t71);
         const double t72 = G1 * p_P2 - G2 * p_P1;
-        const double t73 = G2 * P1 * (t52 + (coef[10][lane] + G1 * coef[102][lane])) + P2 * (coef[79][lane]
-            * t8 + G2 * (G2 * coef[96][lane] + coef[2][lane] * t37) + G1 * (coef[12][lane] + G1
-            * coef[97][lane] + (t56 + t55)));
+        const double t73 = G2 * P1 * (t52 + (coef[10][lane] + G1 * coef[102][lane]))
+            + P2 * (coef[79][lane] * t8 + G2 * (G2 * coef[96][lane] + coef[2][lane] * t37)
+            + G1 * (coef[12][lane] + G1 * coef[97][lane] + (t56 + t55)));
         const double t74 = coef[93][lane] * t9 + coef[92][lane] * t8 + G1 * (coef[95][lane] * t15
             + (coef[21][lane] + G1 * coef[94][lane])) + t2 * (coef[98][lane] + t19 + (coef[99][lane] * t15
             + coef[100][lane] * t2));
-        const double t75 = P3 * (t74 + P1 * (coef[13][lane] * t1 + coef[6][lane] * t22 + P1 * (coef[105][lane]
-            * t15 + (coef[28][lane] + t27 + (coef[97][lane] * t2 + coef[106][lane] * t13)))));
-        const double p_G1 = t9 * (coef[89][lane] + t69 + coef[104][lane] * t13) + (coef[66][lane] + t8
-            * (coef[103][lane] * t13 + (coef[88][lane] + t63))) + P2 * t73 + P3 * (G3 * (coef[47][lane] * t1
-            + P1 * (coef[3][lane] + G1 * coef[101][lane] + (coef[15][lane] * t2 + coef[59][lane] * t13)))
-            + t75);
+        const double t75 = P3 * (t74 + P1 * (coef[13][lane] * t1 + coef[6][lane] * t22
+            + P1 * (coef[105][lane] * t15 + (coef[28][lane] + t27 + (coef[97][lane] * t2 + coef[106][lane]
+            * t13)))));
+        const double p_G1 = t9 * (coef[89][lane] + t69 + coef[104][lane] * t13) + (coef[66][lane]
+            + t8 * (coef[103][lane] * t13 + (coef[88][lane] + t63))) + P2 * t73
+            + P3 * (G3 * (coef[47][lane] * t1 + P1 * (coef[3][lane] + G1 * coef[101][lane]
+            + (coef[15][lane] * t2 + coef[59][lane] * t13))) + t75);
         const double t76 = G3 * p_G1 - G1 * p_G3 + (P3 * p_P1 - P1 * p_P3);
         const double t77 = G1 * p_G2 - G2 * p_G1 + (P1 * p_P2 - P2 * p_P1);
         const double t78 = p_G3 * t68 - p_G2 * t72 + (p_P3 * t76 - p_P2 * t77);
@@ -2610,12 +2624,12 @@ static void kowalevski_top_evaluate_lanes(kowalevski_top_lanes coef[restrict 172
         const double t89 = p_G1 * t72 - p_G3 * t80 + (p_P1 * t77 - p_P3 * t86);
         const double t90 = p_G2 * t82 - p_G1 * t84 + (p_P2 * t78 - p_P1 * t89), t91 = p_P3 * t84 - p_P2 * t81;
         const double t92 = p_G3 * t84 - p_G2 * t81 + (p_P3 * t89 - p_P2 * t87);
-        displacement[0][lane] = t62 * t78 - t79 * (t61 * t78 + (p_G3 * t83 - p_G2 * t85 + (p_P3 * t88 - p_P2
-            * t90))) - 0.5 * t86;
-        displacement[1][lane] = t62 * t89 - t79 * (t61 * t89 + (p_G1 * t85 - p_G3 * t91 + (p_P1 * t90 - p_P3
-            * t92))) - 0.5 * t76;
-        displacement[2][lane] = t62 * t87 - t79 * (t61 * t87 + (p_G2 * t91 - p_G1 * t83 + (p_P2 * t92 - p_P1
-            * t88))) - 0.5 * t77;
+        displacement[0][lane] = t62 * t78 - t79 * (t61 * t78 + (p_G3 * t83 - p_G2 * t85
+            + (p_P3 * t88 - p_P2 * t90))) - 0.5 * t86;
+        displacement[1][lane] = t62 * t89 - t79 * (t61 * t89 + (p_G1 * t85 - p_G3 * t91
+            + (p_P1 * t90 - p_P3 * t92))) - 0.5 * t76;
+        displacement[2][lane] = t62 * t87 - t79 * (t61 * t87 + (p_G2 * t91 - p_G1 * t83
+            + (p_P2 * t92 - p_P1 * t88))) - 0.5 * t77;
         displacement[3][lane] = t82 * t62 - t79 * (t61 * t82 + (p_P3 * t83 - p_P2 * t85)) - 0.5 * t80;
         displacement[4][lane] = t62 * t84 - t79 * (t61 * t84 + (p_P1 * t85 - p_P3 * t91)) - 0.5 * t68;
         displacement[5][lane] = t62 * t81 - t79 * (t61 * t81 + (p_P2 * t91 - p_P1 * t83)) - 0.5 * t72;
@@ -2637,8 +2651,8 @@ typedef struct {
     kowalevski_top_lanes y[kowalevski_top_DIM], displacement[kowalevski_top_DIM],
         increment[kowalevski_top_DIM], residual[kowalevski_top_DIM];
     /* a residual r of alpha(y) = x takes inverse r from y, and gain r from the increment */
-    kowalevski_top_lanes inverse[kowalevski_top_DIM * kowalevski_top_DIM], slope[kowalevski_top_DIM
-        * kowalevski_top_DIM], gain[kowalevski_top_DIM * kowalevski_top_DIM];
+    kowalevski_top_lanes inverse[kowalevski_top_DIM * kowalevski_top_DIM],
+        slope[kowalevski_top_DIM * kowalevski_top_DIM], gain[kowalevski_top_DIM * kowalevski_top_DIM];
 } kowalevski_top_model;
 
 /* kowalevski_top_size in all lanes, summed over the components. */
@@ -2721,8 +2735,8 @@ static void kowalevski_top_invert(kowalevski_top_lanes matrix[restrict kowalevsk
             for (int j = 0; j < kowalevski_top_DIM && i != k; ++j) {
                 kowalevski_top_EACH_LANE
                 for (int lane = 0; lane < kowalevski_top_LANES; ++lane)
-                    matrix[i * kowalevski_top_DIM + j][lane] -= factor[i][lane]
-                        * matrix[k * kowalevski_top_DIM + j][lane];
+                    matrix[i * kowalevski_top_DIM + j][lane] -=
+                        factor[i][lane] * matrix[k * kowalevski_top_DIM + j][lane];
             }
     }
 }
@@ -2885,8 +2899,8 @@ static void kowalevski_top_from_means(kowalevski_top_lanes coef[restrict], kowal
 static void kowalevski_top_march(const kowalevski_top_solver *s, kowalevski_top_table *table,
     kowalevski_top_models *models)
 {
-    static const double reach[4] = { 0.5, 0.5, 1.0, 0.0 }, weight[4] = { 1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0
-        / 6.0 };
+    static const double reach[4] = { 0.5, 0.5, 1.0, 0.0 }, weight[4] = { 1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0,
+        1.0 / 6.0 };
     double x[kowalevski_top_DIM], point[kowalevski_top_DIM], slope[kowalevski_top_DIM],
         mean[kowalevski_top_DIM];
     memcpy(x, s->x, sizeof x);
@@ -2942,8 +2956,8 @@ static double kowalevski_top_correct_stage(kowalevski_top_model *model)
 static int kowalevski_top_block(kowalevski_top_solver *s, kowalevski_top_table *table, int most)
 {
     kowalevski_top_models models;
-    double x[kowalevski_top_DIM], carry[kowalevski_top_DIM], previous = HUGE_VAL, bend = 0.0, bound =
-        HUGE_VAL;
+    double x[kowalevski_top_DIM], carry[kowalevski_top_DIM], previous = HUGE_VAL, bend = 0.0,
+        bound = HUGE_VAL;
     int passes = 0, solved = 0;
     if (!kowalevski_top_guess(s, table, &models)) return 0;
     while (!solved) {
@@ -2958,8 +2972,8 @@ static int kowalevski_top_block(kowalevski_top_solver *s, kowalevski_top_table *
         s->evaluations += kowalevski_top_LANES;
         bend = matrices ? 0.0 : bend + previous;
         bound = kowalevski_top_remaining(size, bend, bound);
-        solved = bound <= kowalevski_top_TOLERANCE || (previous < kowalevski_top_SMALL && size
-            < kowalevski_top_ROUNDING);
+        solved = bound <= kowalevski_top_TOLERANCE || (previous < kowalevski_top_SMALL
+            && size < kowalevski_top_ROUNDING);
         if ((++passes >= most || !(size < previous)) && !solved) return 0;
         previous = size;
     }
@@ -3029,8 +3043,8 @@ static void kowalevski_top_learn_from(kowalevski_top_solver *s, int passes)
     }
     if (!s->blocks.use_recurrences) {
         s->blocks.passes_without_recurrences = passes > 0 ? passes : INT_MAX;
-    } else if (passes > s->blocks.passes_without_recurrences || s->blocks.last_single_steps > 5
-        * kowalevski_top_LANES) {
+    } else if (passes > s->blocks.passes_without_recurrences || s->blocks.last_single_steps
+        > 5 * kowalevski_top_LANES) {
         kowalevski_top_give_up(s);
     }
 }
@@ -3057,8 +3071,8 @@ kowalevski_top_status kowalevski_top_integrate(kowalevski_top_solver *s, double 
             kowalevski_top_choose_guess(s, steps);
         if (steps >= kowalevski_top_LANES && s->blocks.single_steps == 0) {
             kowalevski_top_refresh(s, &table);
-            const int passes = kowalevski_top_block(s, &table, (int)((double)kowalevski_top_PASSES
-                * s->blocks.evaluations_per_stage + 0.5));
+            const int passes = kowalevski_top_block(s, &table,
+                (int)((double)kowalevski_top_PASSES * s->blocks.evaluations_per_stage + 0.5));
             kowalevski_top_learn_from(s, passes);
             if (passes > 0) steps -= kowalevski_top_LANES;
         } else {
@@ -3266,8 +3280,8 @@ static void kowalevski_top_group_fit(kowalevski_top_group *group)
     group->use_recurrences = found;
     ++group->fits;
     group->slow_steps = 0;
-    group->slow_steps_allowed = helped && group->slow_steps_allowed < kowalevski_top_LONG_WAIT / 2 ? 2
-        * group->slow_steps_allowed + kowalevski_top_REPAY : kowalevski_top_HOPELESS_WAIT;
+    group->slow_steps_allowed = helped && group->slow_steps_allowed < kowalevski_top_LONG_WAIT / 2
+        ? 2 * group->slow_steps_allowed + kowalevski_top_REPAY : kowalevski_top_HOPELESS_WAIT;
 }
 
 /* Replace guesses that are not near the last values, as kowalevski_top_near has it, by these; lane by
@@ -3360,8 +3374,8 @@ static void kowalevski_top_group_advance(kowalevski_top_lanes x[restrict kowalev
     for (int i = 0; i < kowalevski_top_DIM; ++i) {
         kowalevski_top_EACH_LANE
         for (int lane = 0; lane < kowalevski_top_LANES; ++lane) {
-            const double change = model->increment[i][lane], sum = x[i][lane] + change, added = sum
-                - x[i][lane];
+            const double change = model->increment[i][lane], sum = x[i][lane] + change,
+                added = sum - x[i][lane];
             const double lost = (x[i][lane] - (sum - added)) + (change - added);
             const double small = lost + carry[i][lane];
             x[i][lane] = sum + small;

@@ -21,7 +21,7 @@
  *   5. Between steps
  *   6. The solver
  *   7. Ensembles
- * body-sha256: b27b5a83063c9d67860252f00f681b094996c654de881bae9f9a6e4eb1974cac
+ * body-sha256: b22b06b99a18f8baf793a69e4c30e7cfde9c9183e632de852cee643587d0eace
  */
 #include "lagrange_top.h"
 
@@ -222,8 +222,8 @@ lagrange_top_APART static void lagrange_top_linearise_part1(const double coef[8]
     work[44] = work[11] * t45 - work[13] * work[35] + (work[3] * t42 - (work[10] * work[37] + work[46]));
     const double t49 = lagrange_top_phi2(work[22]);
     work[39] = work[10] * t49;
-    const double t50 = work[19] * (work[22] * t42 + 2.0 * (work[10] * t24) + (coef[5] * work[87] - work[11]
-        * work[42] + (work[12] * work[89] - work[3] * work[44]))) + 2.0 * (work[39] * t37);
+    const double t50 = work[19] * (work[22] * t42 + 2.0 * (work[10] * t24) + (coef[5] * work[87]
+        - work[11] * work[42] + (work[12] * work[89] - work[3] * work[44]))) + 2.0 * (work[39] * t37);
     work[8] = t42 * work[18] + 2.0 * (work[45] * t24) - t50;
     work[17] = P3 * coef[0];
     work[96] = t45 * work[18];
@@ -256,8 +256,8 @@ lagrange_top_APART static void lagrange_top_linearise_part1(const double coef[8]
     work[20] = work[10] * work[16] + work[12] * work[15];
     work[14] = work[3] * work[10];
     work[21] = work[10] * work[14] + work[3] * work[15];
-    work[102] = work[15] * work[18] + work[19] * (work[12] * work[20] + work[3] * work[21] - work[15]
-        * work[22]);
+    work[102] = work[15] * work[18] + work[19] * (work[12] * work[20] + work[3] * work[21]
+        - work[15] * work[22]);
     work[33] = work[14] * work[18];
     work[34] = work[14] * work[22];
     work[23] = work[3] * work[12];
@@ -341,8 +341,9 @@ lagrange_top_APART static void lagrange_top_linearise_part2(const double coef[8]
     const double t8 = work[13] * work[14] + work[11] * work[15] + (work[10] * t7 + work[3] * t6);
     const double t9 = coef[5] * work[10] + work[13] * work[12];
     const double t10 = work[13] * work[16] + coef[5] * work[15] + (work[10] * t9 + work[12] * t6);
-    const double t11 = work[17] * work[8] + (coef[4] * work[5] + t2 * work[6]) - (t6 * work[18] + work[19]
-        * (coef[5] * work[20] + work[11] * work[21] + (work[3] * t8 + work[12] * t10) - work[22] * t6));
+    const double t11 = work[17] * work[8] + (coef[4] * work[5] + t2 * work[6])
+        - (t6 * work[18] + work[19] * (coef[5] * work[20] + work[11] * work[21]
+        + (work[3] * t8 + work[12] * t10) - work[22] * t6));
     const double t12 = t7 * work[18], t13 = t7 * work[22], t14 = work[13] * work[23];
     const double t15 = coef[5] * work[14], t16 = coef[5] * work[3] + work[11] * work[12];
     const double t17 = work[10] * t16, t18 = work[12] * t7, t19 = t14 - t15 + (t17 - t18);
@@ -365,8 +366,8 @@ lagrange_top_APART static void lagrange_top_linearise_part2(const double coef[8]
     const double t44 = t41 - work[19] * (t42 + (work[49] + (work[10] * work[50] - work[12] * t43)))
         - work[51];
     const double t45 = 0.5 * P1, t46 = work[52] - work[12] * work[53] - work[3] * work[54];
-    const double t47 = work[46] - work[12] * work[55] - work[3] * work[56] - (work[11] * work[54] + coef[5]
-        * work[53]);
+    const double t47 = work[46] - work[12] * work[55] - work[3] * work[56] - (work[11] * work[54]
+        + coef[5] * work[53]);
     const double t48 = work[19] * (2.0 * work[57] - work[22] * work[55] + (work[13] * work[58] - coef[5] * t46
         + (work[10] * work[59] - (work[60] + work[12] * t47)))) + 2.0 * (work[61] * work[40]);
     const double t49 = t45 + (2.0 * (work[62] * work[46]) - work[18] * work[55] - t48);
@@ -380,8 +381,8 @@ lagrange_top_APART static void lagrange_top_linearise_part2(const double coef[8]
         - coef[5] * t56 + (work[10] * work[74] - work[12] * t57))) + 2.0 * (work[75] * work[40]);
     const double t59 = work[70] * work[18] + 2.0 * (work[76] * work[46]) - t58;
     const double t60 = work[3] * work[23] + work[12] * work[24];
-    const double t61 = work[24] * work[18] + work[19] * (work[10] * work[26] + work[12] * t60 - work[24]
-        * work[22]);
+    const double t61 = work[24] * work[18] + work[19] * (work[10] * work[26] + work[12] * t60
+        - work[24] * work[22]);
     const double t62 = work[23] * work[18], t63 = work[23] * work[22];
     const double t64 = work[12] * work[23] + work[3] * work[27], t65 = 0.5 * work[10];
     const double t66 = t62 - work[19] * (t63 + (work[10] * work[28] - work[12] * t64)) - t65;
@@ -389,8 +390,9 @@ lagrange_top_APART static void lagrange_top_linearise_part2(const double coef[8]
     const double t68 = coef[7] + (t12 - work[19] * (t13 - (coef[5] * t34 + work[13] * work[21]
         + (work[12] * t67 + work[10] * t8)))) + (work[17] * t40 + (coef[4] * t44 + t2 * t49));
     const double t69 = work[11] * work[23] + coef[5] * work[24] + (work[3] * t16 + work[12] * t22);
-    const double t70 = coef[4] * t55 + (work[17] * t59 + t1 * t49) - (t22 * work[18] + work[19]
-        * (work[13] * work[26] + coef[5] * t60 + (work[10] * t23 + work[12] * t69) - work[22] * t22));
+    const double t70 = coef[4] * t55 + (work[17] * t59 + t1 * t49) - (t22 * work[18]
+        + work[19] * (work[13] * work[26] + coef[5] * t60 + (work[10] * t23 + work[12] * t69)
+        - work[22] * t22));
     const double t71 = t16 * work[18], t72 = work[22] * t16;
     const double t73 = coef[5] * work[23] + work[11] * work[27] + (work[12] * t16 + work[3] * t29);
     const double t74 = 0.5 * work[13];
@@ -401,46 +403,49 @@ lagrange_top_APART static void lagrange_top_linearise_part2(const double coef[8]
     const double t78 = work[19] * (work[22] * work[56] + 2.0 * (work[12] * work[72]) + (work[11] * t46
         - work[13] * work[83] + (work[3] * t47 - work[10] * work[84]))) + 2.0 * (work[61] * work[85]);
     const double t79 = work[56] * work[18] + 2.0 * (work[62] * work[72]) - t78;
-    const double t80 = work[19] * (2.0 * work[86] - work[22] * work[38] + (work[11] * t37 - work[13]
-        * work[87] + (work[3] * t38 - (work[88] + work[10] * work[89])))) + 2.0 * (work[39] * work[85]);
+    const double t80 = work[19] * (2.0 * work[86] - work[22] * work[38] + (work[11] * t37
+        - work[13] * work[87] + (work[3] * t38 - (work[88] + work[10] * work[89]))))
+        + 2.0 * (work[39] * work[85]);
     const double t81 = work[90] + (2.0 * (work[45] * work[72]) - work[18] * work[38] - t80);
     const double t82 = t65 + (t62 - work[19] * (t63 - (work[10] * work[25] + work[3] * t60)));
     const double t83 = work[65] * work[18], t84 = work[22] * work[65], t85 = 0.5 * G1;
     const double t86 = t83 - work[19] * (t84 + (work[91] + (work[3] * t54 - work[10] * work[92]))) - t85;
-    const double t87 = work[19] * (work[22] * work[71] + 2.0 * work[93] + (work[11] * t56 - work[13]
-        * work[94] + (work[60] + work[3] * t57 - work[10] * work[95]))) + 2.0 * (work[75] * work[85]);
+    const double t87 = work[19] * (work[22] * work[71] + 2.0 * work[93] + (work[11] * t56
+        - work[13] * work[94] + (work[60] + work[3] * t57 - work[10] * work[95])))
+        + 2.0 * (work[75] * work[85]);
     const double t88 = work[18] * work[71] + 2.0 * (work[76] * work[72]) - t87 - t45;
-    const double t89 = work[27] * work[18] + work[19] * (work[3] * t64 + work[10] * work[29] - work[27]
-        * work[22]);
-    const double t90 = t26 - work[19] * (t27 + (work[11] * t34 - work[13] * work[20] + (work[3] * t67
-        - work[10] * t10))) - t25 + (coef[4] * t77 + t2 * t79 + work[17] * t81);
+    const double t89 = work[27] * work[18] + work[19] * (work[3] * t64 + work[10] * work[29]
+        - work[27] * work[22]);
+    const double t90 = t26 - work[19] * (t27 + (work[11] * t34 - work[13] * work[20]
+        + (work[3] * t67 - work[10] * t10))) - t25 + (coef[4] * t77 + t2 * t79 + work[17] * t81);
     const double t91 = t74 + (t71 - work[19] * (t72 - (work[13] * work[25] + work[11] * t60 + (work[10] * t19
         + work[3] * t69)))) + (coef[4] * t86 + (t1 * t79 + work[17] * t88));
-    const double t92 = work[96] + 2.0 * (work[45] * work[97]) - (work[19] * (work[98] + 2.0
-        * (work[10] * work[97]) + (work[12] * work[87] - work[3] * work[42])) + 2.0 * (work[39] * work[99]));
+    const double t92 = work[96] + 2.0 * (work[45] * work[97])
+        - (work[19] * (work[98] + 2.0 * (work[10] * work[97]) + (work[12] * work[87] - work[3] * work[42]))
+        + 2.0 * (work[39] * work[99]));
     const double t93 = work[100] * work[18] + 2.0 * (work[62] * work[97]) - (2.0 * (work[61] * work[99])
-        + work[19] * (work[22] * work[100] + 2.0 * work[80] + (work[101] + work[12] * work[83] - work[3]
-        * work[58])));
+        + work[19] * (work[22] * work[100] + 2.0 * work[80] + (work[101] + work[12] * work[83]
+        - work[3] * work[58])));
     const double t94 = t93 - t76;
     const double t95 = 2.0 * (work[76] * work[97]) - work[103] * work[18] - (2.0 * (work[75] * work[99])
-        + work[19] * (2.0 * work[104] - work[103] * work[22] + (work[12] * work[94] - (work[49] + work[3]
-        * work[73]))));
+        + work[19] * (2.0 * work[104] - work[103] * work[22] + (work[12] * work[94]
+        - (work[49] + work[3] * work[73]))));
     const double t96 = work[51] + t95;
-    const double t97 = 2.0 * (work[62] * work[52]) - work[53] * work[18] - (work[19] * (2.0 * work[106]
-        - work[22] * work[53] + (work[10] * work[58] - (work[91] + work[12] * t46))) + 2.0
-        * (work[61] * work[107]));
+    const double t97 = 2.0 * (work[62] * work[52]) - work[53] * work[18]
+        - (work[19] * (2.0 * work[106] - work[22] * work[53] + (work[10] * work[58]
+        - (work[91] + work[12] * t46))) + 2.0 * (work[61] * work[107]));
     const double t98 = t85 + t97;
-    const double t99 = t41 + 2.0 * (work[45] * work[52]) - (2.0 * (work[39] * work[107]) + work[19]
-        * (t42 + 2.0 * work[108] + (work[49] + work[10] * work[42] - work[12] * t37)));
+    const double t99 = t41 + 2.0 * (work[45] * work[52]) - (2.0 * (work[39] * work[107]) + work[19] * (t42
+        + 2.0 * work[108] + (work[49] + work[10] * work[42] - work[12] * t37)));
     const double t100 = t99 - work[51];
     const double t101 = t50 + 2.0 * (work[76] * work[52]) - (work[19] * (t51 + 2.0 * (work[3] * work[52])
         + (work[10] * work[73] - work[12] * t56)) + 2.0 * (work[75] * work[107]));
-    const double t102 = work[54] * work[18] + 2.0 * (work[62] * work[69]) - (work[19] * (work[54] * work[22]
-        + 2.0 * (work[12] * work[69]) + (work[3] * t46 - work[10] * work[83])) + 2.0
-        * (work[61] * work[109]));
+    const double t102 = work[54] * work[18] + 2.0 * (work[62] * work[69])
+        - (work[19] * (work[54] * work[22] + 2.0 * (work[12] * work[69])
+        + (work[3] * t46 - work[10] * work[83])) + 2.0 * (work[61] * work[109]));
     const double t103 = 2.0 * (work[45] * work[69]) - work[36] * work[18] - (2.0 * (work[39] * work[109])
-        + work[19] * (2.0 * work[81] - work[22] * work[36] + (work[3] * t37 - (work[101] + work[10]
-        * work[87]))));
+        + work[19] * (2.0 * work[81] - work[22] * work[36]
+        + (work[3] * t37 - (work[101] + work[10] * work[87]))));
     const double t104 = t76 + t103;
     const double t105 = t83 + 2.0 * (work[69] * work[76]) - (work[19] * (t84 + 2.0 * work[110]
         + (work[91] + work[3] * t56 - work[10] * work[94])) + 2.0 * (work[75] * work[109]));
@@ -451,8 +456,8 @@ lagrange_top_APART static void lagrange_top_linearise_part2(const double coef[8]
     jacobian[23] = work[0];
     increment_jacobian[2] = P2 * work[1] - P3 * work[2] - G3 * t1 - work[3];
     increment_jacobian[10] = -(P1 * t1);
-    jacobian[2] = work[0] + (t1 * work[4] + (t2 * work[5] + work[1] * work[6] + (work[7] * work[8] + work[2]
-        * work[9])));
+    jacobian[2] = work[0] + (t1 * work[4] + (t2 * work[5] + work[1] * work[6] + (work[7] * work[8]
+        + work[2] * work[9])));
     increment_jacobian[3] = P2 * t2;
     increment_jacobian[8] = work[10] + (P3 * work[7] + (G3 * t2 - P1 * work[1]));
     jacobian[3] = t11;
@@ -467,8 +472,8 @@ lagrange_top_APART static void lagrange_top_linearise_part2(const double coef[8]
     jacobian[10] = t70;
     jacobian[17] = -(t29 * work[18] + work[19] * (work[13] * work[29] + work[11] * t64 + (work[10] * t30
         + work[3] * t73) - t29 * work[22]));
-    jacobian[11] = t71 - work[19] * (t72 + (work[13] * work[28] - coef[5] * t64 + (work[10] * t33 - work[12]
-        * t73))) - t74;
+    jacobian[11] = t71 - work[19] * (t72 + (work[13] * work[28] - coef[5] * t64 + (work[10] * t33
+        - work[12] * t73))) - t74;
     jacobian[12] = t75 + (work[17] * t77 + work[7] * t79 + work[63] * t81);
     jacobian[13] = t82 + (work[17] * t86 + (work[2] * t79 + work[63] * t88));
     jacobian[14] = 1.0 + (t1 * t86 + (t2 * t77 + work[1] * t79 + (work[7] * t81 + work[2] * t88)) - t89);
@@ -525,8 +530,8 @@ static void lagrange_top_linearise(const double coef[8], const double y[6], doub
 double lagrange_top_hamiltonian(const lagrange_top_params *params, const double x[6])
 {
     if (params == NULL) params = &lagrange_top_default_params;
-    const double I1 = params->I1, I3 = params->I3, mgl = params->mgl, P1 = x[0], P2 = x[1], P3 = x[2], G3 =
-        x[5];
+    const double I1 = params->I1, I3 = params->I3, mgl = params->mgl, P1 = x[0], P2 = x[1], P3 = x[2],
+        G3 = x[5];
     return G3 * mgl + 0.5 * (P3 * P3 / I3 + (P1 * P1 + P2 * P2) / I1);
 }
 
@@ -541,8 +546,8 @@ void lagrange_top_casimirs(const lagrange_top_params *params, const double x[6],
 void lagrange_top_vector_field(const lagrange_top_params *params, const double x[6], double out[6])
 {
     if (params == NULL) params = &lagrange_top_default_params;
-    const double I1 = params->I1, I3 = params->I3, mgl = params->mgl, P1 = x[0], P2 = x[1], P3 = x[2], G1 =
-        x[3], G2 = x[4], G3 = x[5];
+    const double I1 = params->I1, I3 = params->I3, mgl = params->mgl, P1 = x[0], P2 = x[1], P3 = x[2],
+        G1 = x[3], G2 = x[4], G3 = x[5];
     const double t1 = P3 / I3, t2 = 1.0 / I1, t3 = P2 * t2, t4 = P1 * t2;
     out[0] = G2 * mgl + (P2 * t1 - P3 * t3);
     out[1] = P3 * t4 - P1 * t1 - G1 * mgl;
@@ -553,6 +558,13 @@ void lagrange_top_vector_field(const lagrange_top_params *params, const double x
 }
 
 /* ---- Compensated sums, linear equations ---- */
+static int lagrange_top_finite(const double *values, int count)
+{
+    for (int k = 0; k < count; ++k)
+        if (!isfinite(values[k])) return 0;
+    return 1;
+}
+
 /* x + change + small in compensated arithmetic, where small is the carry and what is as small: were that
    rounded with the change, corrections of one sign would add up to a drift. 0, and x as before, if the sum is
    not finite. */
@@ -662,8 +674,8 @@ static int lagrange_top_plausible(const lagrange_top_solver *s, const double inc
     for (int i = 0; i < lagrange_top_DIM; ++i) size += fabs(s->h * field[i]);
     if (moved <= lagrange_top_PLAUSIBLE * size) return 1;
     const double before = lagrange_top_hamiltonian(&s->params, s->x);
-    const double after = lagrange_top_hamiltonian(&s->params, end), between =
-        lagrange_top_hamiltonian(&s->params, middle);
+    const double after = lagrange_top_hamiltonian(&s->params, end),
+        between = lagrange_top_hamiltonian(&s->params, middle);
     return fabs(after - before) <= lagrange_top_LOST * (fabs(before) + fabs(between) + fabs(after));
 }
 
@@ -694,8 +706,8 @@ static lagrange_top_status lagrange_top_attempt(lagrange_top_solver *s)
 {
     double y[lagrange_top_DIM], delta[lagrange_top_DIM], displacement[lagrange_top_DIM],
         increment[lagrange_top_DIM];
-    double jacobian[lagrange_top_DIM * lagrange_top_DIM], increment_jacobian[lagrange_top_DIM
-        * lagrange_top_DIM];
+    double jacobian[lagrange_top_DIM * lagrange_top_DIM],
+        increment_jacobian[lagrange_top_DIM * lagrange_top_DIM];
     double previous = HUGE_VAL;
     if (!lagrange_top_predict(&s->history, y)) memcpy(y, s->x, sizeof y);
     for (int iteration = 1; iteration <= lagrange_top_MAX_ITERATIONS; ++iteration) {
@@ -730,54 +742,41 @@ static lagrange_top_status lagrange_top_attempt(lagrange_top_solver *s)
 /* how far the state may be moved, in its own size, for guesses to move with it */
 #define lagrange_top_NEAR_BY 0.125
 
-/* Guesses move with the state, by as many past values as extrapolation needs; recurrences are of the motion
-   as it was. From far away all begins anew, with the next step. */
-static void lagrange_top_move_guesses(lagrange_top_solver *s, const double to[lagrange_top_DIM])
+/* Guesses move with the state. From far away all begins anew, with the next step. */
+static void lagrange_top_move_guesses(lagrange_top_solver *s, const double from[lagrange_top_DIM])
 {
     double distance = 0.0, size = 0.0;
     for (int i = 0; i < lagrange_top_DIM; ++i) {
-        distance += fabs(to[i] - s->x[i]);
-        size += fabs(s->x[i]);
+        distance += fabs(s->x[i] - from[i]);
+        size += fabs(from[i]);
     }
     if (!(distance <= lagrange_top_NEAR_BY * size)) {
         s->h = (double)NAN;
         return;
     }
     lagrange_top_history *history = &s->history;
-    for (int i = 0; i < lagrange_top_DIM; ++i) history->difference[0][i] += to[i] - s->x[i];
-}
-
-/* Stand at x + carry from now on. */
-static lagrange_top_status lagrange_top_place(lagrange_top_solver *s, const double x[lagrange_top_DIM],
-    const double carry[lagrange_top_DIM])
-{
-    for (int i = 0; i < lagrange_top_DIM; ++i)
-        if (!isfinite(x[i])) return lagrange_top_BAD_ARGUMENT;
-    lagrange_top_move_guesses(s, x);
-    memcpy(s->x, x, sizeof s->x);
-    memcpy(s->carry, carry, sizeof s->carry);
-    return lagrange_top_OK;
+    for (int i = 0; i < lagrange_top_DIM; ++i) history->difference[0][i] += s->x[i] - from[i];
 }
 
 lagrange_top_status lagrange_top_set_state(lagrange_top_solver *s, const double x[lagrange_top_DIM])
 {
-    double to[lagrange_top_DIM], carry[lagrange_top_DIM] = { 0.0 };
-    if (s == NULL || x == NULL) return lagrange_top_BAD_ARGUMENT;
-    memcpy(to, x, sizeof to); /* which may be a part of *s */
-    return lagrange_top_place(s, to, carry);
+    if (s == NULL || x == NULL || !lagrange_top_finite(x, lagrange_top_DIM)) return lagrange_top_BAD_ARGUMENT;
+    double from[lagrange_top_DIM];
+    memcpy(from, s->x, sizeof from);
+    memmove(s->x, x, sizeof s->x); /* x may be a part of *s */
+    memset(s->carry, 0, sizeof s->carry);
+    lagrange_top_move_guesses(s, from);
+    return lagrange_top_OK;
 }
 
 lagrange_top_status lagrange_top_kick(lagrange_top_solver *s, const double change[lagrange_top_DIM])
 {
-    double to[lagrange_top_DIM], carry[lagrange_top_DIM];
     if (s == NULL || change == NULL) return lagrange_top_BAD_ARGUMENT;
-    for (int i = 0; i < lagrange_top_DIM; ++i) {
-        const double sum = s->x[i] + change[i], added = sum - s->x[i];
-        const double lost = ((s->x[i] - (sum - added)) + (change[i] - added)) + s->carry[i];
-        to[i] = sum + lost;
-        carry[i] = lost - (to[i] - sum);
-    }
-    return lagrange_top_place(s, to, carry);
+    double from[lagrange_top_DIM];
+    memcpy(from, s->x, sizeof from);
+    if (!lagrange_top_advance(s, change, s->carry)) return lagrange_top_BAD_ARGUMENT;
+    lagrange_top_move_guesses(s, from);
+    return lagrange_top_OK;
 }
 
 /* ---- The solver ---- */
@@ -791,12 +790,10 @@ lagrange_top_status lagrange_top_init(lagrange_top_solver *s, const lagrange_top
     lagrange_top_solver fresh = { .h = (double)NAN };
     fresh.params = params != NULL ? *params : lagrange_top_default_params;
     memcpy(fresh.x, x0, sizeof fresh.x);
-    for (int i = 0; i < lagrange_top_DIM; ++i)
-        if (!isfinite(fresh.x[i])) return lagrange_top_BAD_ARGUMENT;
-    if (!lagrange_top_allowed(&fresh.params)) return lagrange_top_BAD_ARGUMENT;
+    if (!lagrange_top_finite(fresh.x, lagrange_top_DIM) || !lagrange_top_allowed(&fresh.params))
+        return lagrange_top_BAD_ARGUMENT;
     lagrange_top_prepare(&fresh.params, lagrange_top_SHORT_STEP, fresh.coef);
-    for (int k = 0; k < lagrange_top_COEFFICIENTS; ++k)
-        if (!isfinite(fresh.coef[k])) return lagrange_top_BAD_ARGUMENT;
+    if (!lagrange_top_finite(fresh.coef, lagrange_top_COEFFICIENTS)) return lagrange_top_BAD_ARGUMENT;
     *s = fresh;
     return lagrange_top_OK;
 }
@@ -835,8 +832,10 @@ lagrange_top_status lagrange_top_integrate(lagrange_top_solver *s, double h, siz
     return status;
 }
 
-lagrange_top_status lagrange_top_step(lagrange_top_solver *s, double h) { return lagrange_top_integrate(s, h,
-    1); }
+lagrange_top_status lagrange_top_step(lagrange_top_solver *s, double h)
+{
+    return lagrange_top_integrate(s, h, 1);
+}
 
 const char *lagrange_top_status_string(lagrange_top_status status)
 {

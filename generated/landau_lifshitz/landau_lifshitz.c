@@ -24,7 +24,7 @@
  *   5. Between steps
  *   6. The solver
  *   7. Ensembles
- * body-sha256: 0c3fa9eb096a9ec3d449d457b30161bf2379e757437de8f0405a4e6e57ecefbe
+ * body-sha256: 23d4f577805e2ff65a9f50334865819b5f0807ad14fb262f0ffdaf4166da5571
  */
 #include "landau_lifshitz.h"
 
@@ -151,12 +151,12 @@ static void landau_lifshitz_linearise(const double coef[6], const double y[3],
         - (t36 + t37);
     jacobian[3] = t21 * t39 - (t26 + t27);
     jacobian[4] = 1.0 - ((t5 + t8) * t11 + t21 * t40);
-    jacobian[5] = t41 - t42 + (coef[1] * ((t4 - t3) * t11 + 2.0 * (t19 * t33) - t43) + (t34 * t40 - t35
-        * t39));
+    jacobian[5] = t41 - t42 + (coef[1] * ((t4 - t3) * t11 + 2.0 * (t19 * t33) - t43)
+        + (t34 * t40 - t35 * t39));
     jacobian[6] = t36 - t37 + t21 * t44;
     jacobian[7] = t42 + t41 - t21 * t45;
-    jacobian[8] = 1.0 + (coef[1] * ((t29 - t38) * t11 - 2.0 * (t20 * t33)) + (t34 * t45 - t35 * t44) - t9
-        * t11);
+    jacobian[8] = 1.0 + (coef[1] * ((t29 - t38) * t11 - 2.0 * (t20 * t33)) + (t34 * t45 - t35 * t44)
+        - t9 * t11);
     /* increment jacobian */
     const double t46 = z * t21;
     increment_jacobian[0] = t46;
@@ -187,8 +187,8 @@ void landau_lifshitz_casimirs(const landau_lifshitz_params *params, const double
 void landau_lifshitz_vector_field(const landau_lifshitz_params *params, const double x[3], double out[3])
 {
     if (params == NULL) params = &landau_lifshitz_default_params;
-    const double K = params->K, B = params->B, damping_rate = params->damping_rate, x_ = x[0], y = x[1], z =
-        x[2];
+    const double K = params->K, B = params->B, damping_rate = params->damping_rate, x_ = x[0], y = x[1],
+        z = x[2];
     const double t1 = B - K * z, t2 = x_ * t1, t3 = damping_rate * t2, t4 = y * t1;
     const double t5 = damping_rate * t4;
     out[0] = z * t3 - t4;
@@ -197,6 +197,13 @@ void landau_lifshitz_vector_field(const landau_lifshitz_params *params, const do
 }
 
 /* ---- Compensated sums, linear equations ---- */
+static int landau_lifshitz_finite(const double *values, int count)
+{
+    for (int k = 0; k < count; ++k)
+        if (!isfinite(values[k])) return 0;
+    return 1;
+}
+
 /* x + change + small in compensated arithmetic, where small is the carry and what is as small: were that
    rounded with the change, corrections of one sign would add up to a drift. 0, and x as before, if the sum is
    not finite. */
@@ -312,8 +319,8 @@ static int landau_lifshitz_plausible(const landau_lifshitz_solver *s, int stage,
         size += fabs(landau_lifshitz_fractions[stage] * s->h * field[i]);
     if (moved <= landau_lifshitz_PLAUSIBLE * size) return 1;
     const double before = landau_lifshitz_hamiltonian(&s->params, s->x);
-    const double after = landau_lifshitz_hamiltonian(&s->params, end), between =
-        landau_lifshitz_hamiltonian(&s->params, middle);
+    const double after = landau_lifshitz_hamiltonian(&s->params, end),
+        between = landau_lifshitz_hamiltonian(&s->params, middle);
     return fabs(after - before) <= landau_lifshitz_LOST * (fabs(before) + fabs(between) + fabs(after));
 }
 
@@ -347,8 +354,8 @@ static landau_lifshitz_status landau_lifshitz_attempt(landau_lifshitz_solver *s,
 {
     double y[landau_lifshitz_DIM], delta[landau_lifshitz_DIM], displacement[landau_lifshitz_DIM],
         increment[landau_lifshitz_DIM];
-    double jacobian[landau_lifshitz_DIM * landau_lifshitz_DIM], increment_jacobian[landau_lifshitz_DIM
-        * landau_lifshitz_DIM];
+    double jacobian[landau_lifshitz_DIM * landau_lifshitz_DIM],
+        increment_jacobian[landau_lifshitz_DIM * landau_lifshitz_DIM];
     double previous = HUGE_VAL;
     if (!landau_lifshitz_predict(&s->history[stage], y)) memcpy(y, s->x, sizeof y);
     for (int iteration = 1; iteration <= landau_lifshitz_MAX_ITERATIONS; ++iteration) {
@@ -384,14 +391,13 @@ static landau_lifshitz_status landau_lifshitz_attempt(landau_lifshitz_solver *s,
 /* how far the state may be moved, in its own size, for guesses to move with it */
 #define landau_lifshitz_NEAR_BY 0.125
 
-/* Guesses move with the state, by as many past values as extrapolation needs; recurrences are of the motion
-   as it was. From far away all begins anew, with the next step. */
-static void landau_lifshitz_move_guesses(landau_lifshitz_solver *s, const double to[landau_lifshitz_DIM])
+/* Guesses move with the state. From far away all begins anew, with the next step. */
+static void landau_lifshitz_move_guesses(landau_lifshitz_solver *s, const double from[landau_lifshitz_DIM])
 {
     double distance = 0.0, size = 0.0;
     for (int i = 0; i < landau_lifshitz_DIM; ++i) {
-        distance += fabs(to[i] - s->x[i]);
-        size += fabs(s->x[i]);
+        distance += fabs(s->x[i] - from[i]);
+        size += fabs(from[i]);
     }
     if (!(distance <= landau_lifshitz_NEAR_BY * size)) {
         s->h = (double)NAN;
@@ -399,43 +405,32 @@ static void landau_lifshitz_move_guesses(landau_lifshitz_solver *s, const double
     }
     for (int stage = 0; stage < landau_lifshitz_STAGES; ++stage) {
         landau_lifshitz_history *history = &s->history[stage];
-        for (int i = 0; i < landau_lifshitz_DIM; ++i) history->difference[0][i] += to[i] - s->x[i];
+        for (int i = 0; i < landau_lifshitz_DIM; ++i) history->difference[0][i] += s->x[i] - from[i];
     }
-}
-
-/* Stand at x + carry from now on. */
-static landau_lifshitz_status landau_lifshitz_place(landau_lifshitz_solver *s,
-    const double x[landau_lifshitz_DIM], const double carry[landau_lifshitz_DIM])
-{
-    for (int i = 0; i < landau_lifshitz_DIM; ++i)
-        if (!isfinite(x[i])) return landau_lifshitz_BAD_ARGUMENT;
-    landau_lifshitz_move_guesses(s, x);
-    memcpy(s->x, x, sizeof s->x);
-    memcpy(s->carry, carry, sizeof s->carry);
-    return landau_lifshitz_OK;
 }
 
 landau_lifshitz_status landau_lifshitz_set_state(landau_lifshitz_solver *s,
     const double x[landau_lifshitz_DIM])
 {
-    double to[landau_lifshitz_DIM], carry[landau_lifshitz_DIM] = { 0.0 };
-    if (s == NULL || x == NULL) return landau_lifshitz_BAD_ARGUMENT;
-    memcpy(to, x, sizeof to); /* which may be a part of *s */
-    return landau_lifshitz_place(s, to, carry);
+    if (s == NULL || x == NULL || !landau_lifshitz_finite(x, landau_lifshitz_DIM))
+        return landau_lifshitz_BAD_ARGUMENT;
+    double from[landau_lifshitz_DIM];
+    memcpy(from, s->x, sizeof from);
+    memmove(s->x, x, sizeof s->x); /* x may be a part of *s */
+    memset(s->carry, 0, sizeof s->carry);
+    landau_lifshitz_move_guesses(s, from);
+    return landau_lifshitz_OK;
 }
 
 landau_lifshitz_status landau_lifshitz_kick(landau_lifshitz_solver *s,
     const double change[landau_lifshitz_DIM])
 {
-    double to[landau_lifshitz_DIM], carry[landau_lifshitz_DIM];
     if (s == NULL || change == NULL) return landau_lifshitz_BAD_ARGUMENT;
-    for (int i = 0; i < landau_lifshitz_DIM; ++i) {
-        const double sum = s->x[i] + change[i], added = sum - s->x[i];
-        const double lost = ((s->x[i] - (sum - added)) + (change[i] - added)) + s->carry[i];
-        to[i] = sum + lost;
-        carry[i] = lost - (to[i] - sum);
-    }
-    return landau_lifshitz_place(s, to, carry);
+    double from[landau_lifshitz_DIM];
+    memcpy(from, s->x, sizeof from);
+    if (!landau_lifshitz_advance(s, change, s->carry)) return landau_lifshitz_BAD_ARGUMENT;
+    landau_lifshitz_move_guesses(s, from);
+    return landau_lifshitz_OK;
 }
 
 /* ---- The solver ---- */
@@ -450,12 +445,11 @@ landau_lifshitz_status landau_lifshitz_init(landau_lifshitz_solver *s, const lan
     landau_lifshitz_solver fresh = { .h = (double)NAN };
     fresh.params = params != NULL ? *params : landau_lifshitz_default_params;
     memcpy(fresh.x, x0, sizeof fresh.x);
-    for (int i = 0; i < landau_lifshitz_DIM; ++i)
-        if (!isfinite(fresh.x[i])) return landau_lifshitz_BAD_ARGUMENT;
-    if (!landau_lifshitz_allowed(&fresh.params)) return landau_lifshitz_BAD_ARGUMENT;
+    if (!landau_lifshitz_finite(fresh.x, landau_lifshitz_DIM) || !landau_lifshitz_allowed(&fresh.params))
+        return landau_lifshitz_BAD_ARGUMENT;
     landau_lifshitz_prepare(&fresh.params, landau_lifshitz_SHORT_STEP, fresh.coef[0]);
-    for (int k = 0; k < landau_lifshitz_COEFFICIENTS; ++k)
-        if (!isfinite(fresh.coef[0][k])) return landau_lifshitz_BAD_ARGUMENT;
+    if (!landau_lifshitz_finite(fresh.coef[0], landau_lifshitz_COEFFICIENTS))
+        return landau_lifshitz_BAD_ARGUMENT;
     *s = fresh;
     return landau_lifshitz_OK;
 }
@@ -511,8 +505,10 @@ landau_lifshitz_status landau_lifshitz_integrate(landau_lifshitz_solver *s, doub
     return status;
 }
 
-landau_lifshitz_status landau_lifshitz_step(landau_lifshitz_solver *s,
-    double h) { return landau_lifshitz_integrate(s, h, 1); }
+landau_lifshitz_status landau_lifshitz_step(landau_lifshitz_solver *s, double h)
+{
+    return landau_lifshitz_integrate(s, h, 1);
+}
 
 const char *landau_lifshitz_status_string(landau_lifshitz_status status)
 {

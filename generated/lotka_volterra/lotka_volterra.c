@@ -27,7 +27,7 @@
  *   11. Members of an ensemble
  *   12. Groups of members
  *   13. Ensembles
- * body-sha256: 60862d9d6a2c3acf5689c898fef1723695f25d5d1690ce7245191f7b5ed6193d
+ * body-sha256: 91dbc8b2c76c39ad92cec41d1c0c51c42265e6867a7ad28b4fdf5867389d043e
  */
 #include "lotka_volterra.h"
 
@@ -142,6 +142,13 @@ void lotka_volterra_vector_field(const lotka_volterra_params *params, const doub
 }
 
 /* ---- Compensated sums, linear equations ---- */
+static int lotka_volterra_finite(const double *values, int count)
+{
+    for (int k = 0; k < count; ++k)
+        if (!isfinite(values[k])) return 0;
+    return 1;
+}
+
 /* x + change + small in compensated arithmetic, where small is the carry and what is as small: were that
    rounded with the change, corrections of one sign would add up to a drift. 0, and x as before, if the sum is
    not finite. */
@@ -276,8 +283,8 @@ static int lotka_volterra_train(lotka_volterra_history *history, int component)
     enum { AHEAD = lotka_volterra_AHEAD, WINDOW = lotka_volterra_WINDOW, ROWS = lotka_volterra_ROWS };
     /* eight columns in each part */
     double q[WINDOW / 8][ROWS + WINDOW][8], r[WINDOW / 8][WINDOW][8], inverse[WINDOW];
-    double right[ROWS + WINDOW][8], weight[WINDOW][8], value[lotka_volterra_REMEMBERED], largest = 0.0, left =
-        HUGE_VAL;
+    double right[ROWS + WINDOW][8], weight[WINDOW][8], value[lotka_volterra_REMEMBERED], largest = 0.0,
+        left = HUGE_VAL;
     int terms = 0;
     memset(q, 0, sizeof q);
     memset(right, 0, sizeof right);
@@ -448,8 +455,8 @@ static int lotka_volterra_plausible(const lotka_volterra_solver *s,
     for (int i = 0; i < lotka_volterra_DIM; ++i) size += fabs(s->h * field[i]);
     if (moved <= lotka_volterra_PLAUSIBLE * size) return 1;
     const double before = lotka_volterra_hamiltonian(&s->params, s->x);
-    const double after = lotka_volterra_hamiltonian(&s->params, end), between =
-        lotka_volterra_hamiltonian(&s->params, middle);
+    const double after = lotka_volterra_hamiltonian(&s->params, end),
+        between = lotka_volterra_hamiltonian(&s->params, middle);
     return fabs(after - before) <= lotka_volterra_LOST * (fabs(before) + fabs(between) + fabs(after));
 }
 
@@ -478,8 +485,8 @@ static lotka_volterra_status lotka_volterra_attempt(lotka_volterra_solver *s)
 {
     double y[lotka_volterra_DIM], delta[lotka_volterra_DIM], displacement[lotka_volterra_DIM],
         increment[lotka_volterra_DIM];
-    double jacobian[lotka_volterra_DIM * lotka_volterra_DIM], increment_jacobian[lotka_volterra_DIM
-        * lotka_volterra_DIM];
+    double jacobian[lotka_volterra_DIM * lotka_volterra_DIM],
+        increment_jacobian[lotka_volterra_DIM * lotka_volterra_DIM];
     double previous = HUGE_VAL;
     if (!lotka_volterra_predict(&s->history, y)) memcpy(y, s->x, sizeof y);
     for (int iteration = 1; iteration <= lotka_volterra_MAX_ITERATIONS; ++iteration) {
@@ -517,11 +524,11 @@ static lotka_volterra_status lotka_volterra_attempt(lotka_volterra_solver *s)
 
 /* Guesses move with the state, by as many past values as extrapolation needs; recurrences are of the motion
    as it was. From far away all begins anew, with the next step. */
-static void lotka_volterra_move_guesses(lotka_volterra_solver *s, const double to[lotka_volterra_DIM])
+static void lotka_volterra_move_guesses(lotka_volterra_solver *s, const double from[lotka_volterra_DIM])
 {
     double distance = 0.0, size = 0.0;
     for (int i = 0; i < lotka_volterra_DIM; ++i) {
-        distance = fmax(distance, fabs(to[i] / s->x[i] - 1.0));
+        distance = fmax(distance, fabs(s->x[i] / from[i] - 1.0));
         size = 1.0;
     }
     if (!(distance <= lotka_volterra_NEAR_BY * size)) {
@@ -532,42 +539,31 @@ static void lotka_volterra_move_guesses(lotka_volterra_solver *s, const double t
     const int count = history->count < lotka_volterra_HISTORY ? history->count : lotka_volterra_HISTORY;
     memmove(history->past, history->past + history->count - count, (size_t)count * sizeof history->past[0]);
     for (int k = 0; k < count; ++k)
-        for (int i = 0; i < lotka_volterra_DIM; ++i) history->past[k][i] += to[i] - s->x[i];
+        for (int i = 0; i < lotka_volterra_DIM; ++i) history->past[k][i] += s->x[i] - from[i];
     history->count = count;
     history->recurrence_terms = history->use_recurrence = history->slow_steps = 0;
 }
 
-/* Stand at x + carry from now on. */
-static lotka_volterra_status lotka_volterra_place(lotka_volterra_solver *s,
-    const double x[lotka_volterra_DIM], const double carry[lotka_volterra_DIM])
-{
-    for (int i = 0; i < lotka_volterra_DIM; ++i)
-        if (!isfinite(x[i])) return lotka_volterra_BAD_ARGUMENT;
-    lotka_volterra_move_guesses(s, x);
-    memcpy(s->x, x, sizeof s->x);
-    memcpy(s->carry, carry, sizeof s->carry);
-    return lotka_volterra_OK;
-}
-
 lotka_volterra_status lotka_volterra_set_state(lotka_volterra_solver *s, const double x[lotka_volterra_DIM])
 {
-    double to[lotka_volterra_DIM], carry[lotka_volterra_DIM] = { 0.0 };
-    if (s == NULL || x == NULL) return lotka_volterra_BAD_ARGUMENT;
-    memcpy(to, x, sizeof to); /* which may be a part of *s */
-    return lotka_volterra_place(s, to, carry);
+    if (s == NULL || x == NULL || !lotka_volterra_finite(x, lotka_volterra_DIM))
+        return lotka_volterra_BAD_ARGUMENT;
+    double from[lotka_volterra_DIM];
+    memcpy(from, s->x, sizeof from);
+    memmove(s->x, x, sizeof s->x); /* x may be a part of *s */
+    memset(s->carry, 0, sizeof s->carry);
+    lotka_volterra_move_guesses(s, from);
+    return lotka_volterra_OK;
 }
 
 lotka_volterra_status lotka_volterra_kick(lotka_volterra_solver *s, const double change[lotka_volterra_DIM])
 {
-    double to[lotka_volterra_DIM], carry[lotka_volterra_DIM];
     if (s == NULL || change == NULL) return lotka_volterra_BAD_ARGUMENT;
-    for (int i = 0; i < lotka_volterra_DIM; ++i) {
-        const double sum = s->x[i] + change[i], added = sum - s->x[i];
-        const double lost = ((s->x[i] - (sum - added)) + (change[i] - added)) + s->carry[i];
-        to[i] = sum + lost;
-        carry[i] = lost - (to[i] - sum);
-    }
-    return lotka_volterra_place(s, to, carry);
+    double from[lotka_volterra_DIM];
+    memcpy(from, s->x, sizeof from);
+    if (!lotka_volterra_advance(s, change, s->carry)) return lotka_volterra_BAD_ARGUMENT;
+    lotka_volterra_move_guesses(s, from);
+    return lotka_volterra_OK;
 }
 
 /* ---- Several steps or members at once ---- */
@@ -599,8 +595,8 @@ typedef double lotka_volterra_lanes[lotka_volterra_LANES];
 /* exp(u) - 2^k, and 2^k, where u = k log 2 + r: no branches. */
 static inline double lotka_volterra_exp_parts(double u, double *power)
 {
-    const double shifted = u * 1.4426950408889634 + lotka_volterra_ROUNDER, k = shifted
-        - lotka_volterra_ROUNDER;
+    const double shifted = u * 1.4426950408889634 + lotka_volterra_ROUNDER,
+        k = shifted - lotka_volterra_ROUNDER;
     const double r = (u - k * 0.6931471803691238) - k * 1.9082149292705877e-10, rr = r * r;
     uint64_t bits; /* the last bits of shifted are k */
     double sum = 1.1470745597729725e-11, other = 1.6059043836821613e-10;
@@ -639,8 +635,7 @@ lotka_volterra_status lotka_volterra_init(lotka_volterra_solver *s, const lotka_
     lotka_volterra_solver fresh = { .h = (double)NAN };
     fresh.params = params != NULL ? *params : lotka_volterra_default_params;
     memcpy(fresh.x, x0, sizeof fresh.x);
-    for (int i = 0; i < lotka_volterra_DIM; ++i)
-        if (!isfinite(fresh.x[i])) return lotka_volterra_BAD_ARGUMENT;
+    if (!lotka_volterra_finite(fresh.x, lotka_volterra_DIM)) return lotka_volterra_BAD_ARGUMENT;
     *s = fresh;
     return lotka_volterra_OK;
 }
@@ -818,8 +813,8 @@ typedef struct {
     lotka_volterra_lanes y[lotka_volterra_DIM], displacement[lotka_volterra_DIM],
         increment[lotka_volterra_DIM], residual[lotka_volterra_DIM];
     /* a residual r of alpha(y) = x takes inverse r from y, and gain r from the increment */
-    lotka_volterra_lanes inverse[lotka_volterra_DIM * lotka_volterra_DIM], slope[lotka_volterra_DIM
-        * lotka_volterra_DIM], gain[lotka_volterra_DIM * lotka_volterra_DIM];
+    lotka_volterra_lanes inverse[lotka_volterra_DIM * lotka_volterra_DIM],
+        slope[lotka_volterra_DIM * lotka_volterra_DIM], gain[lotka_volterra_DIM * lotka_volterra_DIM];
 } lotka_volterra_model;
 
 /* lotka_volterra_size in all lanes, summed over the components. */
@@ -1030,8 +1025,8 @@ static void lotka_volterra_from_means(lotka_volterra_lanes coef[restrict], lotka
 static void lotka_volterra_march(const lotka_volterra_solver *s, lotka_volterra_table *table,
     lotka_volterra_models *models)
 {
-    static const double reach[4] = { 0.5, 0.5, 1.0, 0.0 }, weight[4] = { 1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0
-        / 6.0 };
+    static const double reach[4] = { 0.5, 0.5, 1.0, 0.0 }, weight[4] = { 1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0,
+        1.0 / 6.0 };
     double x[lotka_volterra_DIM], point[lotka_volterra_DIM], slope[lotka_volterra_DIM],
         mean[lotka_volterra_DIM];
     memcpy(x, s->x, sizeof x);
@@ -1087,8 +1082,8 @@ static double lotka_volterra_correct_stage(lotka_volterra_model *model)
 static int lotka_volterra_block(lotka_volterra_solver *s, lotka_volterra_table *table, int most)
 {
     lotka_volterra_models models;
-    double x[lotka_volterra_DIM], carry[lotka_volterra_DIM], previous = HUGE_VAL, bend = 0.0, bound =
-        HUGE_VAL;
+    double x[lotka_volterra_DIM], carry[lotka_volterra_DIM], previous = HUGE_VAL, bend = 0.0,
+        bound = HUGE_VAL;
     int passes = 0, solved = 0;
     if (!lotka_volterra_guess(s, table, &models)) return 0;
     while (!solved) {
@@ -1103,8 +1098,8 @@ static int lotka_volterra_block(lotka_volterra_solver *s, lotka_volterra_table *
         s->evaluations += lotka_volterra_LANES;
         bend = matrices ? 0.0 : bend + previous;
         bound = lotka_volterra_remaining(size, bend, bound);
-        solved = bound <= lotka_volterra_TOLERANCE || (previous < lotka_volterra_SMALL && size
-            < lotka_volterra_ROUNDING);
+        solved = bound <= lotka_volterra_TOLERANCE || (previous < lotka_volterra_SMALL
+            && size < lotka_volterra_ROUNDING);
         if ((++passes >= most || !(size < previous)) && !solved) return 0;
         previous = size;
     }
@@ -1174,8 +1169,8 @@ static void lotka_volterra_learn_from(lotka_volterra_solver *s, int passes)
     }
     if (!s->blocks.use_recurrences) {
         s->blocks.passes_without_recurrences = passes > 0 ? passes : INT_MAX;
-    } else if (passes > s->blocks.passes_without_recurrences || s->blocks.last_single_steps > 5
-        * lotka_volterra_LANES) {
+    } else if (passes > s->blocks.passes_without_recurrences || s->blocks.last_single_steps
+        > 5 * lotka_volterra_LANES) {
         lotka_volterra_give_up(s);
     }
 }
@@ -1202,8 +1197,8 @@ lotka_volterra_status lotka_volterra_integrate(lotka_volterra_solver *s, double 
             lotka_volterra_choose_guess(s, steps);
         if (steps >= lotka_volterra_LANES && s->blocks.single_steps == 0) {
             lotka_volterra_refresh(s, &table);
-            const int passes = lotka_volterra_block(s, &table, (int)((double)lotka_volterra_PASSES
-                * s->blocks.evaluations_per_stage + 0.5));
+            const int passes = lotka_volterra_block(s, &table,
+                (int)((double)lotka_volterra_PASSES * s->blocks.evaluations_per_stage + 0.5));
             lotka_volterra_learn_from(s, passes);
             if (passes > 0) steps -= lotka_volterra_LANES;
         } else {
@@ -1411,8 +1406,8 @@ static void lotka_volterra_group_fit(lotka_volterra_group *group)
     group->use_recurrences = found;
     ++group->fits;
     group->slow_steps = 0;
-    group->slow_steps_allowed = helped && group->slow_steps_allowed < lotka_volterra_LONG_WAIT / 2 ? 2
-        * group->slow_steps_allowed + lotka_volterra_REPAY : lotka_volterra_HOPELESS_WAIT;
+    group->slow_steps_allowed = helped && group->slow_steps_allowed < lotka_volterra_LONG_WAIT / 2
+        ? 2 * group->slow_steps_allowed + lotka_volterra_REPAY : lotka_volterra_HOPELESS_WAIT;
 }
 
 /* Replace guesses that are not near the last values, as lotka_volterra_near has it, by these; lane by
@@ -1505,8 +1500,8 @@ static void lotka_volterra_group_advance(lotka_volterra_lanes x[restrict lotka_v
     for (int i = 0; i < lotka_volterra_DIM; ++i) {
         lotka_volterra_EACH_LANE
         for (int lane = 0; lane < lotka_volterra_LANES; ++lane) {
-            const double change = model->increment[i][lane], sum = x[i][lane] + change, added = sum
-                - x[i][lane];
+            const double change = model->increment[i][lane], sum = x[i][lane] + change,
+                added = sum - x[i][lane];
             const double lost = (x[i][lane] - (sum - added)) + (change - added);
             const double small = lost + carry[i][lane];
             x[i][lane] = sum + small;

@@ -21,7 +21,7 @@
  *   5. Between steps
  *   6. The solver
  *   7. Ensembles
- * body-sha256: 140fbdcad02c45ff7a5e601d478e2b16dc2b7666b09cf3fa2ed428d2bcd2d5ae
+ * body-sha256: 503f514534b9d17fd7abfb62ebc110d0bd09b250fc504d02d1a5e9bba3fbae43
  */
 #include "maxwell_bloch.h"
 
@@ -112,6 +112,13 @@ void maxwell_bloch_vector_field(const maxwell_bloch_params *params, const double
 }
 
 /* ---- Compensated sums, linear equations ---- */
+static int maxwell_bloch_finite(const double *values, int count)
+{
+    for (int k = 0; k < count; ++k)
+        if (!isfinite(values[k])) return 0;
+    return 1;
+}
+
 /* x + change + small in compensated arithmetic, where small is the carry and what is as small: were that
    rounded with the change, corrections of one sign would add up to a drift. 0, and x as before, if the sum is
    not finite. */
@@ -224,8 +231,8 @@ static int maxwell_bloch_plausible(const maxwell_bloch_solver *s, const double i
     for (int i = 0; i < maxwell_bloch_DIM; ++i) size += fabs(s->h * field[i]);
     if (moved <= maxwell_bloch_PLAUSIBLE * size) return 1;
     const double before = maxwell_bloch_hamiltonian(&s->params, s->x);
-    const double after = maxwell_bloch_hamiltonian(&s->params, end), between =
-        maxwell_bloch_hamiltonian(&s->params, middle);
+    const double after = maxwell_bloch_hamiltonian(&s->params, end),
+        between = maxwell_bloch_hamiltonian(&s->params, middle);
     return fabs(after - before) <= maxwell_bloch_LOST * (fabs(before) + fabs(between) + fabs(after));
 }
 
@@ -256,8 +263,8 @@ static maxwell_bloch_status maxwell_bloch_attempt(maxwell_bloch_solver *s)
 {
     double y[maxwell_bloch_DIM], delta[maxwell_bloch_DIM], displacement[maxwell_bloch_DIM],
         increment[maxwell_bloch_DIM];
-    double jacobian[maxwell_bloch_DIM * maxwell_bloch_DIM], increment_jacobian[maxwell_bloch_DIM
-        * maxwell_bloch_DIM];
+    double jacobian[maxwell_bloch_DIM * maxwell_bloch_DIM],
+        increment_jacobian[maxwell_bloch_DIM * maxwell_bloch_DIM];
     double previous = HUGE_VAL;
     if (!maxwell_bloch_predict(&s->history, y)) memcpy(y, s->x, sizeof y);
     for (int iteration = 1; iteration <= maxwell_bloch_MAX_ITERATIONS; ++iteration) {
@@ -293,54 +300,42 @@ static maxwell_bloch_status maxwell_bloch_attempt(maxwell_bloch_solver *s)
 /* how far the state may be moved, in its own size, for guesses to move with it */
 #define maxwell_bloch_NEAR_BY 0.125
 
-/* Guesses move with the state, by as many past values as extrapolation needs; recurrences are of the motion
-   as it was. From far away all begins anew, with the next step. */
-static void maxwell_bloch_move_guesses(maxwell_bloch_solver *s, const double to[maxwell_bloch_DIM])
+/* Guesses move with the state. From far away all begins anew, with the next step. */
+static void maxwell_bloch_move_guesses(maxwell_bloch_solver *s, const double from[maxwell_bloch_DIM])
 {
     double distance = 0.0, size = 0.0;
     for (int i = 0; i < maxwell_bloch_DIM; ++i) {
-        distance += fabs(to[i] - s->x[i]);
-        size += fabs(s->x[i]);
+        distance += fabs(s->x[i] - from[i]);
+        size += fabs(from[i]);
     }
     if (!(distance <= maxwell_bloch_NEAR_BY * size)) {
         s->h = (double)NAN;
         return;
     }
     maxwell_bloch_history *history = &s->history;
-    for (int i = 0; i < maxwell_bloch_DIM; ++i) history->difference[0][i] += to[i] - s->x[i];
-}
-
-/* Stand at x + carry from now on. */
-static maxwell_bloch_status maxwell_bloch_place(maxwell_bloch_solver *s, const double x[maxwell_bloch_DIM],
-    const double carry[maxwell_bloch_DIM])
-{
-    for (int i = 0; i < maxwell_bloch_DIM; ++i)
-        if (!isfinite(x[i])) return maxwell_bloch_BAD_ARGUMENT;
-    maxwell_bloch_move_guesses(s, x);
-    memcpy(s->x, x, sizeof s->x);
-    memcpy(s->carry, carry, sizeof s->carry);
-    return maxwell_bloch_OK;
+    for (int i = 0; i < maxwell_bloch_DIM; ++i) history->difference[0][i] += s->x[i] - from[i];
 }
 
 maxwell_bloch_status maxwell_bloch_set_state(maxwell_bloch_solver *s, const double x[maxwell_bloch_DIM])
 {
-    double to[maxwell_bloch_DIM], carry[maxwell_bloch_DIM] = { 0.0 };
-    if (s == NULL || x == NULL) return maxwell_bloch_BAD_ARGUMENT;
-    memcpy(to, x, sizeof to); /* which may be a part of *s */
-    return maxwell_bloch_place(s, to, carry);
+    if (s == NULL || x == NULL || !maxwell_bloch_finite(x, maxwell_bloch_DIM))
+        return maxwell_bloch_BAD_ARGUMENT;
+    double from[maxwell_bloch_DIM];
+    memcpy(from, s->x, sizeof from);
+    memmove(s->x, x, sizeof s->x); /* x may be a part of *s */
+    memset(s->carry, 0, sizeof s->carry);
+    maxwell_bloch_move_guesses(s, from);
+    return maxwell_bloch_OK;
 }
 
 maxwell_bloch_status maxwell_bloch_kick(maxwell_bloch_solver *s, const double change[maxwell_bloch_DIM])
 {
-    double to[maxwell_bloch_DIM], carry[maxwell_bloch_DIM];
     if (s == NULL || change == NULL) return maxwell_bloch_BAD_ARGUMENT;
-    for (int i = 0; i < maxwell_bloch_DIM; ++i) {
-        const double sum = s->x[i] + change[i], added = sum - s->x[i];
-        const double lost = ((s->x[i] - (sum - added)) + (change[i] - added)) + s->carry[i];
-        to[i] = sum + lost;
-        carry[i] = lost - (to[i] - sum);
-    }
-    return maxwell_bloch_place(s, to, carry);
+    double from[maxwell_bloch_DIM];
+    memcpy(from, s->x, sizeof from);
+    if (!maxwell_bloch_advance(s, change, s->carry)) return maxwell_bloch_BAD_ARGUMENT;
+    maxwell_bloch_move_guesses(s, from);
+    return maxwell_bloch_OK;
 }
 
 /* ---- The solver ---- */
@@ -352,8 +347,7 @@ maxwell_bloch_status maxwell_bloch_init(maxwell_bloch_solver *s, const maxwell_b
     maxwell_bloch_solver fresh = { .h = (double)NAN };
     fresh.params = params != NULL ? *params : maxwell_bloch_default_params;
     memcpy(fresh.x, x0, sizeof fresh.x);
-    for (int i = 0; i < maxwell_bloch_DIM; ++i)
-        if (!isfinite(fresh.x[i])) return maxwell_bloch_BAD_ARGUMENT;
+    if (!maxwell_bloch_finite(fresh.x, maxwell_bloch_DIM)) return maxwell_bloch_BAD_ARGUMENT;
     *s = fresh;
     return maxwell_bloch_OK;
 }
@@ -392,8 +386,10 @@ maxwell_bloch_status maxwell_bloch_integrate(maxwell_bloch_solver *s, double h, 
     return status;
 }
 
-maxwell_bloch_status maxwell_bloch_step(maxwell_bloch_solver *s, double h) { return maxwell_bloch_integrate(s,
-    h, 1); }
+maxwell_bloch_status maxwell_bloch_step(maxwell_bloch_solver *s, double h)
+{
+    return maxwell_bloch_integrate(s, h, 1);
+}
 
 const char *maxwell_bloch_status_string(maxwell_bloch_status status)
 {

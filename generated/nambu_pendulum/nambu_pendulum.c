@@ -29,7 +29,7 @@
  *   13. Members of an ensemble
  *   14. Groups of members
  *   15. Ensembles
- * body-sha256: c0fdeca62f08646a59385b9c2e8a4d2a7e1014ce458d237f6e530bfbf82d9ce0
+ * body-sha256: 7fdfd72f106f31c51c6d49e305f3304d6b66198783edaeef4be7692f95fb2d48
  */
 #include "nambu_pendulum.h"
 
@@ -132,6 +132,13 @@ void nambu_pendulum_vector_field(const nambu_pendulum_params *params, const doub
 }
 
 /* ---- Compensated sums, linear equations ---- */
+static int nambu_pendulum_finite(const double *values, int count)
+{
+    for (int k = 0; k < count; ++k)
+        if (!isfinite(values[k])) return 0;
+    return 1;
+}
+
 /* x + change + small in compensated arithmetic, where small is the carry and what is as small: were that
    rounded with the change, corrections of one sign would add up to a drift. 0, and x as before, if the sum is
    not finite. */
@@ -266,8 +273,8 @@ static int nambu_pendulum_train(nambu_pendulum_history *history, int component)
     enum { AHEAD = nambu_pendulum_AHEAD, WINDOW = nambu_pendulum_WINDOW, ROWS = nambu_pendulum_ROWS };
     /* eight columns in each part */
     double q[WINDOW / 8][ROWS + WINDOW][8], r[WINDOW / 8][WINDOW][8], inverse[WINDOW];
-    double right[ROWS + WINDOW][8], weight[WINDOW][8], value[nambu_pendulum_REMEMBERED], largest = 0.0, left =
-        HUGE_VAL;
+    double right[ROWS + WINDOW][8], weight[WINDOW][8], value[nambu_pendulum_REMEMBERED], largest = 0.0,
+        left = HUGE_VAL;
     int terms = 0;
     memset(q, 0, sizeof q);
     memset(right, 0, sizeof right);
@@ -438,8 +445,8 @@ static int nambu_pendulum_plausible(const nambu_pendulum_solver *s,
     for (int i = 0; i < nambu_pendulum_DIM; ++i) size += fabs(s->h * field[i]);
     if (moved <= nambu_pendulum_PLAUSIBLE * size) return 1;
     const double before = nambu_pendulum_hamiltonian(&s->params, s->x);
-    const double after = nambu_pendulum_hamiltonian(&s->params, end), between =
-        nambu_pendulum_hamiltonian(&s->params, middle);
+    const double after = nambu_pendulum_hamiltonian(&s->params, end),
+        between = nambu_pendulum_hamiltonian(&s->params, middle);
     return fabs(after - before) <= nambu_pendulum_LOST * (fabs(before) + fabs(between) + fabs(after));
 }
 
@@ -649,8 +656,8 @@ static nambu_pendulum_status nambu_pendulum_attempt(nambu_pendulum_solver *s)
         change[nambu_pendulum_DIM], jacobian[nambu_pendulum_DIM * nambu_pendulum_DIM], previous = HUGE_VAL;
     if (!nambu_pendulum_predict(&s->history, y)) memcpy(y, s->x, sizeof y);
     nambu_pendulum_generate(coef, y, p, jacobian);
-    for (int iteration = 0, made = 0; iteration < nambu_pendulum_MAX_ITERATIONS && made <=
-        nambu_pendulum_MOST_PIECES; ++iteration) {
+    for (int iteration = 0, made = 0; iteration < nambu_pendulum_MAX_ITERATIONS
+        && made <= nambu_pendulum_MOST_PIECES; ++iteration) {
         if (!nambu_pendulum_residual(s, coef, p, y, residual, change, jacobian, &made))
             return nambu_pendulum_NO_CONVERGENCE;
         double size = 0.0, norm = DBL_MIN;
@@ -684,12 +691,12 @@ static nambu_pendulum_status nambu_pendulum_attempt(nambu_pendulum_solver *s)
 
 /* Guesses move with the state, by as many past values as extrapolation needs; recurrences are of the motion
    as it was. From far away all begins anew, with the next step. */
-static void nambu_pendulum_move_guesses(nambu_pendulum_solver *s, const double to[nambu_pendulum_DIM])
+static void nambu_pendulum_move_guesses(nambu_pendulum_solver *s, const double from[nambu_pendulum_DIM])
 {
     double distance = 0.0, size = 0.0;
     for (int i = 0; i < nambu_pendulum_DIM; ++i) {
-        distance += fabs(to[i] - s->x[i]);
-        size += fabs(s->x[i]);
+        distance += fabs(s->x[i] - from[i]);
+        size += fabs(from[i]);
     }
     if (!(distance <= nambu_pendulum_NEAR_BY * size)) {
         s->h = (double)NAN;
@@ -699,42 +706,31 @@ static void nambu_pendulum_move_guesses(nambu_pendulum_solver *s, const double t
     const int count = history->count < nambu_pendulum_HISTORY ? history->count : nambu_pendulum_HISTORY;
     memmove(history->past, history->past + history->count - count, (size_t)count * sizeof history->past[0]);
     for (int k = 0; k < count; ++k)
-        for (int i = 0; i < nambu_pendulum_DIM; ++i) history->past[k][i] += to[i] - s->x[i];
+        for (int i = 0; i < nambu_pendulum_DIM; ++i) history->past[k][i] += s->x[i] - from[i];
     history->count = count;
     history->recurrence_terms = history->use_recurrence = history->slow_steps = 0;
 }
 
-/* Stand at x + carry from now on. */
-static nambu_pendulum_status nambu_pendulum_place(nambu_pendulum_solver *s,
-    const double x[nambu_pendulum_DIM], const double carry[nambu_pendulum_DIM])
-{
-    for (int i = 0; i < nambu_pendulum_DIM; ++i)
-        if (!isfinite(x[i])) return nambu_pendulum_BAD_ARGUMENT;
-    nambu_pendulum_move_guesses(s, x);
-    memcpy(s->x, x, sizeof s->x);
-    memcpy(s->carry, carry, sizeof s->carry);
-    return nambu_pendulum_OK;
-}
-
 nambu_pendulum_status nambu_pendulum_set_state(nambu_pendulum_solver *s, const double x[nambu_pendulum_DIM])
 {
-    double to[nambu_pendulum_DIM], carry[nambu_pendulum_DIM] = { 0.0 };
-    if (s == NULL || x == NULL) return nambu_pendulum_BAD_ARGUMENT;
-    memcpy(to, x, sizeof to); /* which may be a part of *s */
-    return nambu_pendulum_place(s, to, carry);
+    if (s == NULL || x == NULL || !nambu_pendulum_finite(x, nambu_pendulum_DIM))
+        return nambu_pendulum_BAD_ARGUMENT;
+    double from[nambu_pendulum_DIM];
+    memcpy(from, s->x, sizeof from);
+    memmove(s->x, x, sizeof s->x); /* x may be a part of *s */
+    memset(s->carry, 0, sizeof s->carry);
+    nambu_pendulum_move_guesses(s, from);
+    return nambu_pendulum_OK;
 }
 
 nambu_pendulum_status nambu_pendulum_kick(nambu_pendulum_solver *s, const double change[nambu_pendulum_DIM])
 {
-    double to[nambu_pendulum_DIM], carry[nambu_pendulum_DIM];
     if (s == NULL || change == NULL) return nambu_pendulum_BAD_ARGUMENT;
-    for (int i = 0; i < nambu_pendulum_DIM; ++i) {
-        const double sum = s->x[i] + change[i], added = sum - s->x[i];
-        const double lost = ((s->x[i] - (sum - added)) + (change[i] - added)) + s->carry[i];
-        to[i] = sum + lost;
-        carry[i] = lost - (to[i] - sum);
-    }
-    return nambu_pendulum_place(s, to, carry);
+    double from[nambu_pendulum_DIM];
+    memcpy(from, s->x, sizeof from);
+    if (!nambu_pendulum_advance(s, change, s->carry)) return nambu_pendulum_BAD_ARGUMENT;
+    nambu_pendulum_move_guesses(s, from);
+    return nambu_pendulum_OK;
 }
 
 /* ---- Several steps or members at once ---- */
@@ -767,8 +763,8 @@ typedef double nambu_pendulum_lanes[nambu_pendulum_LANES];
    beyond |u| = 10^6. */
 static inline double nambu_pendulum_turned_sin(double u, double offset)
 {
-    const double shifted = (u * 0.3183098861837907 + offset) + nambu_pendulum_ROUNDER, k =
-        (shifted - nambu_pendulum_ROUNDER) - offset;
+    const double shifted = (u * 0.3183098861837907 + offset) + nambu_pendulum_ROUNDER,
+        k = (shifted - nambu_pendulum_ROUNDER) - offset;
     const double near = (u - k * 3.141592651605606) - k * 1.9841871479187034e-09;
     const double r = near - k * 1.1442377452219664e-17, q = r * r, qq = q * q;
     uint64_t parity, bits; /* the last bit of shifted is the parity of k + offset */
@@ -805,8 +801,7 @@ nambu_pendulum_status nambu_pendulum_init(nambu_pendulum_solver *s, const nambu_
     nambu_pendulum_solver fresh = { .h = (double)NAN };
     fresh.params = params != NULL ? *params : nambu_pendulum_default_params;
     memcpy(fresh.x, x0, sizeof fresh.x);
-    for (int i = 0; i < nambu_pendulum_DIM; ++i)
-        if (!isfinite(fresh.x[i])) return nambu_pendulum_BAD_ARGUMENT;
+    if (!nambu_pendulum_finite(fresh.x, nambu_pendulum_DIM)) return nambu_pendulum_BAD_ARGUMENT;
     *s = fresh;
     return nambu_pendulum_OK;
 }
@@ -1000,8 +995,8 @@ static void nambu_pendulum_along_mean_lanes(nambu_pendulum_lanes even[restrict 1
             + 2.0 * (hessian[0][lane] * odd[3][lane])) + (2.0 * (odd[2][lane] * t33)
             + (2.0 * (odd[1][lane] * t34) + 2.0 * (odd[0][lane] * t35)));
         const double t55 = 2.0 * (hessian[7][lane] * odd[5][lane]) + (2.0 * (hessian[1][lane] * odd[3][lane])
-            + 2.0 * (hessian[4][lane] * odd[4][lane])) + (2.0 * (odd[0][lane] * t39) + 2.0 * (odd[1][lane]
-            * t40) - 2.0 * (odd[2][lane] * t41));
+            + 2.0 * (hessian[4][lane] * odd[4][lane])) + (2.0 * (odd[0][lane] * t39)
+            + 2.0 * (odd[1][lane] * t40) - 2.0 * (odd[2][lane] * t41));
         const double t56 = 2.0 * (hessian[8][lane] * odd[5][lane]) + (2.0 * (hessian[2][lane] * odd[3][lane])
             + 2.0 * (hessian[5][lane] * odd[4][lane])) + (2.0 * (odd[2][lane] * t45)
             + (2.0 * (odd[1][lane] * t46) - 2.0 * (odd[0][lane] * t47)));
@@ -1032,24 +1027,24 @@ static void nambu_pendulum_along_mean_lanes(nambu_pendulum_lanes even[restrict 1
         alpha_y[6][lane] = t24 * t10 + (t25 * t13 - t26 * t15);
         alpha_y[7][lane] = t26 * t17 + t25 * t18 - t24 * t16;
         alpha_y[8][lane] = t24 * t9 - (t25 * t19 + t26 * t20);
-        increment_y[0][lane] = 2.0 * (odd[2][lane] * t10) + (2.0 * (odd[0][lane] * t13) - 2.0 * (odd[1][lane]
-            * t15));
-        increment_y[1][lane] = 2.0 * (odd[0][lane] * t18) + 2.0 * (odd[1][lane] * t17) - 2.0 * (odd[2][lane]
-            * t16);
-        increment_y[2][lane] = 2.0 * (odd[2][lane] * t9) + ((-2.0) * (odd[0][lane] * t19) - 2.0
-            * (odd[1][lane] * t20));
-        increment_y[3][lane] = 2.0 * (odd[8][lane] * t10) + (2.0 * (odd[6][lane] * t13) - 2.0 * (odd[7][lane]
-            * t15));
-        increment_y[4][lane] = 2.0 * (odd[6][lane] * t18) + 2.0 * (odd[7][lane] * t17) - 2.0 * (odd[8][lane]
-            * t16);
-        increment_y[5][lane] = 2.0 * (odd[8][lane] * t9) + ((-2.0) * (odd[6][lane] * t19) - 2.0
-            * (odd[7][lane] * t20));
-        increment_y[6][lane] = 2.0 * (odd[14][lane] * t10) + (2.0 * (odd[12][lane] * t13) - 2.0
-            * (odd[13][lane] * t15));
-        increment_y[7][lane] = 2.0 * (odd[12][lane] * t18) + 2.0 * (odd[13][lane] * t17) - 2.0
-            * (odd[14][lane] * t16);
-        increment_y[8][lane] = 2.0 * (odd[14][lane] * t9) + ((-2.0) * (odd[12][lane] * t19) - 2.0
-            * (odd[13][lane] * t20));
+        increment_y[0][lane] = 2.0 * (odd[2][lane] * t10) + (2.0 * (odd[0][lane] * t13)
+            - 2.0 * (odd[1][lane] * t15));
+        increment_y[1][lane] = 2.0 * (odd[0][lane] * t18) + 2.0 * (odd[1][lane] * t17)
+            - 2.0 * (odd[2][lane] * t16);
+        increment_y[2][lane] = 2.0 * (odd[2][lane] * t9) + ((-2.0) * (odd[0][lane] * t19)
+            - 2.0 * (odd[1][lane] * t20));
+        increment_y[3][lane] = 2.0 * (odd[8][lane] * t10) + (2.0 * (odd[6][lane] * t13)
+            - 2.0 * (odd[7][lane] * t15));
+        increment_y[4][lane] = 2.0 * (odd[6][lane] * t18) + 2.0 * (odd[7][lane] * t17)
+            - 2.0 * (odd[8][lane] * t16);
+        increment_y[5][lane] = 2.0 * (odd[8][lane] * t9) + ((-2.0) * (odd[6][lane] * t19)
+            - 2.0 * (odd[7][lane] * t20));
+        increment_y[6][lane] = 2.0 * (odd[14][lane] * t10) + (2.0 * (odd[12][lane] * t13)
+            - 2.0 * (odd[13][lane] * t15));
+        increment_y[7][lane] = 2.0 * (odd[12][lane] * t18) + 2.0 * (odd[13][lane] * t17)
+            - 2.0 * (odd[14][lane] * t16);
+        increment_y[8][lane] = 2.0 * (odd[14][lane] * t9) + ((-2.0) * (odd[12][lane] * t19)
+            - 2.0 * (odd[13][lane] * t20));
         jacobian[0][lane] = hessian[6][lane] * t27 + (hessian[3][lane] * t28 + hessian[0][lane] * t29)
             + (t1 * t33 + (t14 * t34 + t11 * t35));
         jacobian[1][lane] = hessian[7][lane] * t27 + (hessian[1][lane] * t29 + hessian[4][lane] * t28)
@@ -1131,12 +1126,12 @@ typedef struct {
     nambu_pendulum_lanes y[nambu_pendulum_DIM], displacement[nambu_pendulum_DIM],
         increment[nambu_pendulum_DIM], residual[nambu_pendulum_DIM];
     /* a residual r of alpha(y) = x takes inverse r from y, and gain r from the increment */
-    nambu_pendulum_lanes inverse[nambu_pendulum_DIM * nambu_pendulum_DIM], slope[nambu_pendulum_DIM
-        * nambu_pendulum_DIM], gain[nambu_pendulum_DIM * nambu_pendulum_DIM];
+    nambu_pendulum_lanes inverse[nambu_pendulum_DIM * nambu_pendulum_DIM],
+        slope[nambu_pendulum_DIM * nambu_pendulum_DIM], gain[nambu_pendulum_DIM * nambu_pendulum_DIM];
     nambu_pendulum_lanes middle[nambu_pendulum_DIM]; /* of the path, less y */
     /* of alpha and beta - alpha, with p held fixed */
-    nambu_pendulum_lanes alpha_y[nambu_pendulum_DIM * nambu_pendulum_DIM], increment_y[nambu_pendulum_DIM
-        * nambu_pendulum_DIM];
+    nambu_pendulum_lanes alpha_y[nambu_pendulum_DIM * nambu_pendulum_DIM],
+        increment_y[nambu_pendulum_DIM * nambu_pendulum_DIM];
 } nambu_pendulum_model;
 
 /* nambu_pendulum_size in all lanes, summed over the components. */
@@ -1213,8 +1208,9 @@ typedef struct {
     nambu_pendulum_lanes v[nambu_pendulum_SLOPE_TERMS + 1][2 * nambu_pendulum_DIM * nambu_pendulum_DIM];
     /* sums of terms, those of even order also as means over time */
     nambu_pendulum_lanes even[nambu_pendulum_DIM], odd[nambu_pendulum_DIM], mean[nambu_pendulum_DIM];
-    nambu_pendulum_lanes v_even[2 * nambu_pendulum_DIM * nambu_pendulum_DIM], v_odd[2 * nambu_pendulum_DIM
-        * nambu_pendulum_DIM], v_mean[2 * nambu_pendulum_DIM * nambu_pendulum_DIM];
+    nambu_pendulum_lanes v_even[2 * nambu_pendulum_DIM * nambu_pendulum_DIM],
+        v_odd[2 * nambu_pendulum_DIM * nambu_pendulum_DIM],
+        v_mean[2 * nambu_pendulum_DIM * nambu_pendulum_DIM];
     nambu_pendulum_lanes unit[nambu_pendulum_DIM]; /* what terms are multiplied by to be measured */
     int terms, varied; /* orders that are known, of the paths and of their derivatives */
 } nambu_pendulum_expansion;
@@ -1618,8 +1614,8 @@ static void nambu_pendulum_linearise_paths(nambu_pendulum_lanes coef[restrict], 
     nambu_pendulum_vary(coef, e, nambu_pendulum_SLOPE_ACCURACY);
     nambu_pendulum_along_mean_lanes(e->v_even, e->v_odd, e->v_mean, hessian, model->alpha_y,
         model->increment_y, jacobian, model->slope, reciprocal);
-    nambu_pendulum_invert_lanes(jacobian, model->slope, model->inverse, model->gain, reciprocal
-        + nambu_pendulum_DIM);
+    nambu_pendulum_invert_lanes(jacobian, model->slope, model->inverse, model->gain,
+        reciprocal + nambu_pendulum_DIM);
     for (int i = 0; i < 2 * nambu_pendulum_DIM; ++i) {
         nambu_pendulum_EACH_LANE
         for (int lane = 0; lane < nambu_pendulum_LANES; ++lane)
@@ -1774,8 +1770,8 @@ static void nambu_pendulum_from_means(nambu_pendulum_lanes coef[restrict], nambu
 static void nambu_pendulum_march(const nambu_pendulum_solver *s, nambu_pendulum_table *table,
     nambu_pendulum_models *models)
 {
-    static const double reach[4] = { 0.5, 0.5, 1.0, 0.0 }, weight[4] = { 1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0
-        / 6.0 };
+    static const double reach[4] = { 0.5, 0.5, 1.0, 0.0 }, weight[4] = { 1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0,
+        1.0 / 6.0 };
     double x[nambu_pendulum_DIM], point[nambu_pendulum_DIM], slope[nambu_pendulum_DIM],
         mean[nambu_pendulum_DIM];
     memcpy(x, s->x, sizeof x);
@@ -1831,8 +1827,8 @@ static double nambu_pendulum_correct_stage(nambu_pendulum_model *model)
 static int nambu_pendulum_block(nambu_pendulum_solver *s, nambu_pendulum_table *table, int most)
 {
     nambu_pendulum_models models;
-    double x[nambu_pendulum_DIM], carry[nambu_pendulum_DIM], previous = HUGE_VAL, bend = 0.0, bound =
-        HUGE_VAL;
+    double x[nambu_pendulum_DIM], carry[nambu_pendulum_DIM], previous = HUGE_VAL, bend = 0.0,
+        bound = HUGE_VAL;
     int passes = 0, solved = 0;
     if (!nambu_pendulum_guess(s, table, &models)) return 0;
     while (!solved) {
@@ -1847,8 +1843,8 @@ static int nambu_pendulum_block(nambu_pendulum_solver *s, nambu_pendulum_table *
         s->evaluations += nambu_pendulum_LANES;
         bend = matrices ? 0.0 : bend + previous;
         bound = nambu_pendulum_remaining(size, bend, bound);
-        solved = bound <= nambu_pendulum_TOLERANCE || (previous < nambu_pendulum_SMALL && size
-            < nambu_pendulum_ROUNDING);
+        solved = bound <= nambu_pendulum_TOLERANCE || (previous < nambu_pendulum_SMALL
+            && size < nambu_pendulum_ROUNDING);
         if ((++passes >= most || !(size < previous)) && !solved) return 0;
         previous = size;
     }
@@ -1918,8 +1914,8 @@ static void nambu_pendulum_learn_from(nambu_pendulum_solver *s, int passes)
     }
     if (!s->blocks.use_recurrences) {
         s->blocks.passes_without_recurrences = passes > 0 ? passes : INT_MAX;
-    } else if (passes > s->blocks.passes_without_recurrences || s->blocks.last_single_steps > 5
-        * nambu_pendulum_LANES) {
+    } else if (passes > s->blocks.passes_without_recurrences || s->blocks.last_single_steps
+        > 5 * nambu_pendulum_LANES) {
         nambu_pendulum_give_up(s);
     }
 }
@@ -1946,8 +1942,8 @@ nambu_pendulum_status nambu_pendulum_integrate(nambu_pendulum_solver *s, double 
             nambu_pendulum_choose_guess(s, steps);
         if (steps >= nambu_pendulum_LANES && s->blocks.single_steps == 0) {
             nambu_pendulum_refresh(s, &table);
-            const int passes = nambu_pendulum_block(s, &table, (int)((double)nambu_pendulum_PASSES
-                * s->blocks.evaluations_per_stage + 0.5));
+            const int passes = nambu_pendulum_block(s, &table,
+                (int)((double)nambu_pendulum_PASSES * s->blocks.evaluations_per_stage + 0.5));
             nambu_pendulum_learn_from(s, passes);
             if (passes > 0) steps -= nambu_pendulum_LANES;
         } else {
@@ -2155,8 +2151,8 @@ static void nambu_pendulum_group_fit(nambu_pendulum_group *group)
     group->use_recurrences = found;
     ++group->fits;
     group->slow_steps = 0;
-    group->slow_steps_allowed = helped && group->slow_steps_allowed < nambu_pendulum_LONG_WAIT / 2 ? 2
-        * group->slow_steps_allowed + nambu_pendulum_REPAY : nambu_pendulum_HOPELESS_WAIT;
+    group->slow_steps_allowed = helped && group->slow_steps_allowed < nambu_pendulum_LONG_WAIT / 2
+        ? 2 * group->slow_steps_allowed + nambu_pendulum_REPAY : nambu_pendulum_HOPELESS_WAIT;
 }
 
 /* Replace guesses that are not near the last values, as nambu_pendulum_near has it, by these; lane by
@@ -2249,8 +2245,8 @@ static void nambu_pendulum_group_advance(nambu_pendulum_lanes x[restrict nambu_p
     for (int i = 0; i < nambu_pendulum_DIM; ++i) {
         nambu_pendulum_EACH_LANE
         for (int lane = 0; lane < nambu_pendulum_LANES; ++lane) {
-            const double change = model->increment[i][lane], sum = x[i][lane] + change, added = sum
-                - x[i][lane];
+            const double change = model->increment[i][lane], sum = x[i][lane] + change,
+                added = sum - x[i][lane];
             const double lost = (x[i][lane] - (sum - added)) + (change - added);
             const double small = lost + carry[i][lane];
             x[i][lane] = sum + small;

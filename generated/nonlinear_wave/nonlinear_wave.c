@@ -21,7 +21,7 @@
  *   4. The solver
  *   5. The flows
  *   6. What is seen at sites
- * body-sha256: 22f37a29b9015c3aee34f8e1c64a54e6356169481b9e2aeebb251945da13e531
+ * body-sha256: 54e325eff1351ae1279afbafaf8f7133d99510eb5dbe304339f520bcb5408b58
  */
 #include "nonlinear_wave.h"
 
@@ -146,8 +146,8 @@ typedef struct {
 /* The piece of that number. */
 static inline nonlinear_wave_piece nonlinear_wave_piece_of(const nonlinear_wave_solver *s, size_t unit)
 {
-    const size_t pieces = nonlinear_wave_pieces(s), index = pieces == 1 ? unit : unit / pieces, part = unit
-        - index * pieces;
+    const size_t pieces = nonlinear_wave_pieces(s), index = pieces == 1 ? unit : unit / pieces,
+        part = unit - index * pieces;
     nonlinear_wave_piece piece;
     nonlinear_wave_locate(s, index, &piece.row);
     piece.from = (ptrdiff_t)part * nonlinear_wave_PIECE;
@@ -165,8 +165,8 @@ static inline void nonlinear_wave_sweep1(const double *coef, const nonlinear_wav
     nonlinear_wave_EACH_SITE
     for (ptrdiff_t i = from; i < to; ++i) {
         const double u = u_row[i];
-        v_row[i] += c2 * (c0 * u + c1 * (u * (u * u)) - (c0 * u_row[i - 1] + c1 * (u_row[i - 1]
-            * (u_row[i - 1] * u_row[i - 1]))));
+        v_row[i] += c2 * (c0 * u + c1 * (u * (u * u)) - (c0 * u_row[i - 1]
+            + c1 * (u_row[i - 1] * (u_row[i - 1] * u_row[i - 1]))));
     }
 }
 
@@ -252,8 +252,8 @@ static void nonlinear_wave_vector_field_row(const nonlinear_wave_params *params,
         const double t2 = t1 * t1;
         const double t3 = beta * d;
         out[i - from] = t2 * (d * v_row[i + 1]) - t2 * (d * v);
-        out[(ptrdiff_t)apart + i - from] = t2 * (d * u + t3 * (u * (u * u))) - t2 * (d * u_row[i - 1] + t3
-            * (u_row[i - 1] * (u_row[i - 1] * u_row[i - 1])));
+        out[(ptrdiff_t)apart + i - from] = t2 * (d * u + t3 * (u * (u * u))) - t2 * (d * u_row[i - 1]
+            + t3 * (u_row[i - 1] * (u_row[i - 1] * u_row[i - 1])));
     }
 }
 
@@ -276,8 +276,8 @@ static size_t nonlinear_wave_shape(const size_t sizes[nonlinear_wave_AXES], ptrd
     const size_t most = SIZE_MAX / 64 / nonlinear_wave_RESERVED;
     size_t rows = 1;
     for (int a = 0; a < nonlinear_wave_AXES; ++a) {
-        if (sizes[a] < nonlinear_wave_least[a] || sizes[a] % nonlinear_wave_periods[a] != 0 || sizes[a] > most
-            / 2) return 0;
+        if (sizes[a] < nonlinear_wave_least[a] || sizes[a] % nonlinear_wave_periods[a] != 0
+            || sizes[a] > most / 2) return 0;
         if (a < nonlinear_wave_AXES - 1) {
             if (rows > most / sizes[a]) return 0;
             rows *= sizes[a];
@@ -354,8 +354,8 @@ nonlinear_wave_status nonlinear_wave_init(nonlinear_wave_solver *s, const nonlin
     ptrdiff_t width;
     if (s == NULL || sizes == NULL || x0 == NULL || work == NULL) return nonlinear_wave_BAD_ARGUMENT;
     const nonlinear_wave_params own = params != NULL ? *params : nonlinear_wave_default_params;
-    const size_t rows = nonlinear_wave_shape(sizes, &width), length = sizes[nonlinear_wave_AXES - 1], sites =
-        rows * length;
+    const size_t rows = nonlinear_wave_shape(sizes, &width), length = sizes[nonlinear_wave_AXES - 1],
+        sites = rows * length;
     if (rows == 0 || !nonlinear_wave_finite(x0, nonlinear_wave_DIM * sites) || !nonlinear_wave_allowed(&own,
         sites)) return nonlinear_wave_BAD_ARGUMENT;
     double coef[nonlinear_wave_COEFFICIENTS];
@@ -434,8 +434,8 @@ static void nonlinear_wave_flow(const nonlinear_wave_solver *s, int flow)
 {
     const int joined = flow == nonlinear_wave_FLOWS, row = joined ? nonlinear_wave_JOINED
         : nonlinear_wave_flow_rows[flow];
-    nonlinear_wave_sweep_part(s, nonlinear_wave_flow_parts[joined ? 0 : flow], s->coef + row
-        * nonlinear_wave_ROW, s->far > 0);
+    nonlinear_wave_sweep_part(s, nonlinear_wave_flow_parts[joined ? 0 : flow],
+        s->coef + row * nonlinear_wave_ROW, s->far > 0);
 }
 
 /* Some steps, joined, without the last flow; no steps are that flow alone. */
@@ -490,8 +490,10 @@ nonlinear_wave_status nonlinear_wave_integrate(nonlinear_wave_solver *s, double 
     return status;
 }
 
-nonlinear_wave_status nonlinear_wave_step(nonlinear_wave_solver *s,
-    double h) { return nonlinear_wave_integrate(s, h, 1); }
+nonlinear_wave_status nonlinear_wave_step(nonlinear_wave_solver *s, double h)
+{
+    return nonlinear_wave_integrate(s, h, 1);
+}
 
 /* The sites of fields, without what is beside their rows. */
 static void nonlinear_wave_take(const nonlinear_wave_solver *s, double *const fields[nonlinear_wave_DIM],
@@ -558,12 +560,18 @@ static void nonlinear_wave_fill(const nonlinear_wave_solver *s, nonlinear_wave_k
     }
 }
 
-void nonlinear_wave_density(const nonlinear_wave_solver *s, double *out) { nonlinear_wave_fill(s,
-    nonlinear_wave_energy_row, out); }
-void nonlinear_wave_casimirs(const nonlinear_wave_solver *s, double *out) { nonlinear_wave_fill(s,
-    nonlinear_wave_casimirs_row, out); }
-void nonlinear_wave_vector_field(const nonlinear_wave_solver *s, double *out) { nonlinear_wave_fill(s,
-    nonlinear_wave_vector_field_row, out); }
+void nonlinear_wave_density(const nonlinear_wave_solver *s, double *out)
+{
+    nonlinear_wave_fill(s, nonlinear_wave_energy_row, out);
+}
+void nonlinear_wave_casimirs(const nonlinear_wave_solver *s, double *out)
+{
+    nonlinear_wave_fill(s, nonlinear_wave_casimirs_row, out);
+}
+void nonlinear_wave_vector_field(const nonlinear_wave_solver *s, double *out)
+{
+    nonlinear_wave_fill(s, nonlinear_wave_vector_field_row, out);
+}
 
 const char *nonlinear_wave_status_string(nonlinear_wave_status status)
 {

@@ -21,7 +21,7 @@
  *   4. The solver
  *   5. The flows
  *   6. What is seen at sites
- * body-sha256: 53ab905a6ff74cbd341c3ba51d27e228d55ff38072df8511e8f6dd87dc4f4e14
+ * body-sha256: 221cb59a82d1cae178661b40a3dc4ed35053525d14f88b0646a87cf8d98de09e
  */
 #include "outer_planets.h"
 
@@ -142,8 +142,8 @@ typedef struct {
 /* The piece of that number. */
 static inline outer_planets_piece outer_planets_piece_of(const outer_planets_solver *s, size_t unit)
 {
-    const size_t pieces = outer_planets_pieces(s), index = pieces == 1 ? unit : unit / pieces, part = unit
-        - index * pieces;
+    const size_t pieces = outer_planets_pieces(s), index = pieces == 1 ? unit : unit / pieces,
+        part = unit - index * pieces;
     outer_planets_piece piece;
     outer_planets_locate(s, index, &piece.row);
     piece.from = (ptrdiff_t)part * outer_planets_PIECE;
@@ -384,8 +384,8 @@ static size_t outer_planets_shape(const size_t sizes[outer_planets_AXES], ptrdif
     const size_t most = SIZE_MAX / 64 / outer_planets_RESERVED;
     size_t rows = 1;
     for (int a = 0; a < outer_planets_AXES; ++a) {
-        if (sizes[a] < outer_planets_least[a] || sizes[a] % outer_planets_periods[a] != 0 || sizes[a] > most
-            / 2) return 0;
+        if (sizes[a] < outer_planets_least[a] || sizes[a] % outer_planets_periods[a] != 0
+            || sizes[a] > most / 2) return 0;
         if (a < outer_planets_AXES - 1) {
             if (rows > most / sizes[a]) return 0;
             rows *= sizes[a];
@@ -474,8 +474,8 @@ outer_planets_status outer_planets_init(outer_planets_solver *s, const outer_pla
     ptrdiff_t width;
     if (s == NULL || sizes == NULL || x0 == NULL || work == NULL) return outer_planets_BAD_ARGUMENT;
     const outer_planets_params own = params != NULL ? *params : outer_planets_default_params;
-    const size_t rows = outer_planets_shape(sizes, &width), length = sizes[outer_planets_AXES - 1], sites =
-        rows * length;
+    const size_t rows = outer_planets_shape(sizes, &width), length = sizes[outer_planets_AXES - 1],
+        sites = rows * length;
     if (rows == 0 || !outer_planets_finite(x0, outer_planets_DIM * sites) || !outer_planets_allowed(&own,
         sites)) return outer_planets_BAD_ARGUMENT;
     double coef[outer_planets_COEFFICIENTS];
@@ -557,8 +557,8 @@ static void outer_planets_flow(const outer_planets_solver *s, int flow)
 {
     const int joined = flow == outer_planets_FLOWS, row = joined ? outer_planets_JOINED
         : outer_planets_flow_rows[flow];
-    outer_planets_sweep_part(s, outer_planets_flow_parts[joined ? 0 : flow], s->coef + row
-        * outer_planets_ROW, s->far > 0);
+    outer_planets_sweep_part(s, outer_planets_flow_parts[joined ? 0 : flow],
+        s->coef + row * outer_planets_ROW, s->far > 0);
 }
 
 /* Some steps, joined, without the last flow; no steps are that flow alone. */
@@ -612,8 +612,10 @@ outer_planets_status outer_planets_integrate(outer_planets_solver *s, double h, 
     return status;
 }
 
-outer_planets_status outer_planets_step(outer_planets_solver *s, double h) { return outer_planets_integrate(s,
-    h, 1); }
+outer_planets_status outer_planets_step(outer_planets_solver *s, double h)
+{
+    return outer_planets_integrate(s, h, 1);
+}
 
 /* The sites of fields, without what is beside their rows. */
 static void outer_planets_take(const outer_planets_solver *s, double *const fields[outer_planets_DIM],
@@ -680,12 +682,18 @@ static void outer_planets_fill(const outer_planets_solver *s, outer_planets_kern
     }
 }
 
-void outer_planets_density(const outer_planets_solver *s, double *out) { outer_planets_fill(s,
-    outer_planets_energy_row, out); }
-void outer_planets_casimirs(const outer_planets_solver *s, double *out) { outer_planets_fill(s,
-    outer_planets_casimirs_row, out); }
-void outer_planets_vector_field(const outer_planets_solver *s, double *out) { outer_planets_fill(s,
-    outer_planets_vector_field_row, out); }
+void outer_planets_density(const outer_planets_solver *s, double *out)
+{
+    outer_planets_fill(s, outer_planets_energy_row, out);
+}
+void outer_planets_casimirs(const outer_planets_solver *s, double *out)
+{
+    outer_planets_fill(s, outer_planets_casimirs_row, out);
+}
+void outer_planets_vector_field(const outer_planets_solver *s, double *out)
+{
+    outer_planets_fill(s, outer_planets_vector_field_row, out);
+}
 
 const char *outer_planets_status_string(outer_planets_status status)
 {

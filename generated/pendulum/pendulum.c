@@ -21,7 +21,7 @@
  *   5. Between steps
  *   6. The solver
  *   7. Ensembles
- * body-sha256: f252ea3b71218d972d6ac53a8d1245138d6644f3fae2d58857a06e86c5fa3d9f
+ * body-sha256: 27102583f8aa3d66ddb374b104f88a1216c02e506a9a7c0bda1f0aab18a18621
  */
 #include "pendulum.h"
 
@@ -121,6 +121,13 @@ void pendulum_vector_field(const pendulum_params *params, const double x[2], dou
 }
 
 /* ---- Compensated sums, linear equations ---- */
+static int pendulum_finite(const double *values, int count)
+{
+    for (int k = 0; k < count; ++k)
+        if (!isfinite(values[k])) return 0;
+    return 1;
+}
+
 /* x + change + small in compensated arithmetic, where small is the carry and what is as small: were that
    rounded with the change, corrections of one sign would add up to a drift. 0, and x as before, if the sum is
    not finite. */
@@ -295,54 +302,41 @@ static pendulum_status pendulum_attempt(pendulum_solver *s)
 /* how far the state may be moved, in its own size, for guesses to move with it */
 #define pendulum_NEAR_BY 0.125
 
-/* Guesses move with the state, by as many past values as extrapolation needs; recurrences are of the motion
-   as it was. From far away all begins anew, with the next step. */
-static void pendulum_move_guesses(pendulum_solver *s, const double to[pendulum_DIM])
+/* Guesses move with the state. From far away all begins anew, with the next step. */
+static void pendulum_move_guesses(pendulum_solver *s, const double from[pendulum_DIM])
 {
     double distance = 0.0, size = 0.0;
     for (int i = 0; i < pendulum_DIM; ++i) {
-        distance += fabs(to[i] - s->x[i]);
-        size += fabs(s->x[i]);
+        distance += fabs(s->x[i] - from[i]);
+        size += fabs(from[i]);
     }
     if (!(distance <= pendulum_NEAR_BY * size)) {
         s->h = (double)NAN;
         return;
     }
     pendulum_history *history = &s->history;
-    for (int i = 0; i < pendulum_DIM; ++i) history->difference[0][i] += to[i] - s->x[i];
-}
-
-/* Stand at x + carry from now on. */
-static pendulum_status pendulum_place(pendulum_solver *s, const double x[pendulum_DIM],
-    const double carry[pendulum_DIM])
-{
-    for (int i = 0; i < pendulum_DIM; ++i)
-        if (!isfinite(x[i])) return pendulum_BAD_ARGUMENT;
-    pendulum_move_guesses(s, x);
-    memcpy(s->x, x, sizeof s->x);
-    memcpy(s->carry, carry, sizeof s->carry);
-    return pendulum_OK;
+    for (int i = 0; i < pendulum_DIM; ++i) history->difference[0][i] += s->x[i] - from[i];
 }
 
 pendulum_status pendulum_set_state(pendulum_solver *s, const double x[pendulum_DIM])
 {
-    double to[pendulum_DIM], carry[pendulum_DIM] = { 0.0 };
-    if (s == NULL || x == NULL) return pendulum_BAD_ARGUMENT;
-    memcpy(to, x, sizeof to); /* which may be a part of *s */
-    return pendulum_place(s, to, carry);
+    if (s == NULL || x == NULL || !pendulum_finite(x, pendulum_DIM)) return pendulum_BAD_ARGUMENT;
+    double from[pendulum_DIM];
+    memcpy(from, s->x, sizeof from);
+    memmove(s->x, x, sizeof s->x); /* x may be a part of *s */
+    memset(s->carry, 0, sizeof s->carry);
+    pendulum_move_guesses(s, from);
+    return pendulum_OK;
 }
 
 pendulum_status pendulum_kick(pendulum_solver *s, const double change[pendulum_DIM])
 {
-    double to[pendulum_DIM], carry[pendulum_DIM];
     if (s == NULL || change == NULL) return pendulum_BAD_ARGUMENT;
-    for (int i = 0; i < pendulum_DIM; ++i) {
-        const double sum = s->x[i] + change[i], added = sum - s->x[i];
-        const double lost = ((s->x[i] - (sum - added)) + (change[i] - added)) + s->carry[i];
-        to[i] = sum + lost;
-        carry[i] = lost - (to[i] - sum);
-    }
-    return pendulum_place(s, to, carry);
+    double from[pendulum_DIM];
+    memcpy(from, s->x, sizeof from);
+    if (!pendulum_advance(s, change, s->carry)) return pendulum_BAD_ARGUMENT;
+    pendulum_move_guesses(s, from);
+    return pendulum_OK;
 }
 
 /* ---- The solver ---- */
@@ -356,12 +350,10 @@ pendulum_status pendulum_init(pendulum_solver *s, const pendulum_params *params,
     pendulum_solver fresh = { .h = (double)NAN };
     fresh.params = params != NULL ? *params : pendulum_default_params;
     memcpy(fresh.x, x0, sizeof fresh.x);
-    for (int i = 0; i < pendulum_DIM; ++i)
-        if (!isfinite(fresh.x[i])) return pendulum_BAD_ARGUMENT;
-    if (!pendulum_allowed(&fresh.params)) return pendulum_BAD_ARGUMENT;
+    if (!pendulum_finite(fresh.x, pendulum_DIM) || !pendulum_allowed(&fresh.params))
+        return pendulum_BAD_ARGUMENT;
     pendulum_prepare(&fresh.params, pendulum_SHORT_STEP, fresh.coef);
-    for (int k = 0; k < pendulum_COEFFICIENTS; ++k)
-        if (!isfinite(fresh.coef[k])) return pendulum_BAD_ARGUMENT;
+    if (!pendulum_finite(fresh.coef, pendulum_COEFFICIENTS)) return pendulum_BAD_ARGUMENT;
     *s = fresh;
     return pendulum_OK;
 }

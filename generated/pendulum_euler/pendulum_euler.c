@@ -15,12 +15,12 @@
  * This file belongs to whoever generated it; phigen claims no rights in it.
  *
  *   1. The model
- *   2. Compensated sums, linear equations
+ *   2. Compensated sums
  *   3. The explicit step
  *   4. Between steps
  *   5. The solver
  *   6. Ensembles
- * body-sha256: 7a2a011f0bc90bf58ba6fc2ac6d4b0aa862f5d7d8dc603125f11db910a36518a
+ * body-sha256: 533513d0dfd87178a8f3e9b3a5d6d6edf0c45276c8c01f3e3b002da3ce369ad8
  */
 #include "pendulum_euler.h"
 
@@ -72,7 +72,14 @@ void pendulum_euler_vector_field(const pendulum_euler_params *params, const doub
     out[1] = -(g * sin(q));
 }
 
-/* ---- Compensated sums, linear equations ---- */
+/* ---- Compensated sums ---- */
+static int pendulum_euler_finite(const double *values, int count)
+{
+    for (int k = 0; k < count; ++k)
+        if (!isfinite(values[k])) return 0;
+    return 1;
+}
+
 /* x + change + small in compensated arithmetic, where small is the carry and what is as small: were that
    rounded with the change, corrections of one sign would add up to a drift. 0, and x as before, if the sum is
    not finite. */
@@ -103,36 +110,20 @@ static pendulum_euler_status pendulum_euler_stage(pendulum_euler_solver *s)
 }
 
 /* ---- Between steps ---- */
-/* Stand at x + carry from now on. */
-static pendulum_euler_status pendulum_euler_place(pendulum_euler_solver *s,
-    const double x[pendulum_euler_DIM], const double carry[pendulum_euler_DIM])
-{
-    for (int i = 0; i < pendulum_euler_DIM; ++i)
-        if (!isfinite(x[i])) return pendulum_euler_BAD_ARGUMENT;
-    memcpy(s->x, x, sizeof s->x);
-    memcpy(s->carry, carry, sizeof s->carry);
-    return pendulum_euler_OK;
-}
-
 pendulum_euler_status pendulum_euler_set_state(pendulum_euler_solver *s, const double x[pendulum_euler_DIM])
 {
-    double to[pendulum_euler_DIM], carry[pendulum_euler_DIM] = { 0.0 };
-    if (s == NULL || x == NULL) return pendulum_euler_BAD_ARGUMENT;
-    memcpy(to, x, sizeof to); /* which may be a part of *s */
-    return pendulum_euler_place(s, to, carry);
+    if (s == NULL || x == NULL || !pendulum_euler_finite(x, pendulum_euler_DIM))
+        return pendulum_euler_BAD_ARGUMENT;
+    memmove(s->x, x, sizeof s->x); /* x may be a part of *s */
+    memset(s->carry, 0, sizeof s->carry);
+    return pendulum_euler_OK;
 }
 
 pendulum_euler_status pendulum_euler_kick(pendulum_euler_solver *s, const double change[pendulum_euler_DIM])
 {
-    double to[pendulum_euler_DIM], carry[pendulum_euler_DIM];
     if (s == NULL || change == NULL) return pendulum_euler_BAD_ARGUMENT;
-    for (int i = 0; i < pendulum_euler_DIM; ++i) {
-        const double sum = s->x[i] + change[i], added = sum - s->x[i];
-        const double lost = ((s->x[i] - (sum - added)) + (change[i] - added)) + s->carry[i];
-        to[i] = sum + lost;
-        carry[i] = lost - (to[i] - sum);
-    }
-    return pendulum_euler_place(s, to, carry);
+    if (!pendulum_euler_advance(s, change, s->carry)) return pendulum_euler_BAD_ARGUMENT;
+    return pendulum_euler_OK;
 }
 
 /* ---- The solver ---- */
@@ -146,12 +137,10 @@ pendulum_euler_status pendulum_euler_init(pendulum_euler_solver *s, const pendul
     pendulum_euler_solver fresh = { .h = (double)NAN };
     fresh.params = params != NULL ? *params : pendulum_euler_default_params;
     memcpy(fresh.x, x0, sizeof fresh.x);
-    for (int i = 0; i < pendulum_euler_DIM; ++i)
-        if (!isfinite(fresh.x[i])) return pendulum_euler_BAD_ARGUMENT;
-    if (!pendulum_euler_allowed(&fresh.params)) return pendulum_euler_BAD_ARGUMENT;
+    if (!pendulum_euler_finite(fresh.x, pendulum_euler_DIM) || !pendulum_euler_allowed(&fresh.params))
+        return pendulum_euler_BAD_ARGUMENT;
     pendulum_euler_prepare(&fresh.params, pendulum_euler_SHORT_STEP, fresh.coef);
-    for (int k = 0; k < pendulum_euler_COEFFICIENTS; ++k)
-        if (!isfinite(fresh.coef[k])) return pendulum_euler_BAD_ARGUMENT;
+    if (!pendulum_euler_finite(fresh.coef, pendulum_euler_COEFFICIENTS)) return pendulum_euler_BAD_ARGUMENT;
     *s = fresh;
     return pendulum_euler_OK;
 }
@@ -180,8 +169,10 @@ pendulum_euler_status pendulum_euler_integrate(pendulum_euler_solver *s, double 
     return status;
 }
 
-pendulum_euler_status pendulum_euler_step(pendulum_euler_solver *s,
-    double h) { return pendulum_euler_integrate(s, h, 1); }
+pendulum_euler_status pendulum_euler_step(pendulum_euler_solver *s, double h)
+{
+    return pendulum_euler_integrate(s, h, 1);
+}
 
 const char *pendulum_euler_status_string(pendulum_euler_status status)
 {

@@ -24,7 +24,7 @@
  *   6. Krylov spaces
  *   7. Newton's method where sweeps fail
  *   8. What is seen at sites
- * body-sha256: c66c48d16446f4c2840473a071a1d4cb7506311fa8a24770a0cc22e7f4664b97
+ * body-sha256: 856456f2f6d75ff1d27b7ee6ca825da019a2f04497cedd6a6df03f02c387b02f
  */
 #include "point_vortices.h"
 
@@ -138,8 +138,8 @@ typedef struct {
 /* The piece of that number. */
 static inline point_vortices_piece point_vortices_piece_of(const point_vortices_solver *s, size_t unit)
 {
-    const size_t pieces = point_vortices_pieces(s), index = pieces == 1 ? unit : unit / pieces, part = unit
-        - index * pieces;
+    const size_t pieces = point_vortices_pieces(s), index = pieces == 1 ? unit : unit / pieces,
+        part = unit - index * pieces;
     point_vortices_piece piece;
     point_vortices_locate(s, index, &piece.row);
     piece.from = (ptrdiff_t)part * point_vortices_PIECE;
@@ -273,12 +273,12 @@ static inline void point_vortices_pair_slopes(const point_vortices_params *param
     double *restrict g3 = row->gathered[3];
     for (ptrdiff_t i = from; i < to; ++i) g0[i] = g1[i] = g2[i] = g3[i] = 0.0;
     for (ptrdiff_t j = 0; j < row->length; ++j) {
-        const double G_b_ = G_row[j], x_b_ = x_row[j], y_b_ = y_row[j], v_x_b_ = varied_x_0[j], v_y_b_ =
-            varied_y_0[j];
+        const double G_b_ = G_row[j], x_b_ = x_row[j], y_b_ = y_row[j], v_x_b_ = varied_x_0[j],
+            v_y_b_ = varied_y_0[j];
         point_vortices_EACH_SITE
         for (ptrdiff_t i = from; i < to; ++i) {
-            const double G_a_ = G_row[i], x_a_ = x_row[i], y_a_ = y_row[i], v_x_a_ = varied_x_0[i], v_y_a_ =
-                varied_y_0[i];
+            const double G_a_ = G_row[i], x_a_ = x_row[i], y_a_ = y_row[i], v_x_a_ = varied_x_0[i],
+                v_y_a_ = varied_y_0[i];
             const double t1 = x_a_ - x_b_;
             const double t2 = G_a_ * G_b_ / 3.141592653589793;
             const double t3 = y_a_ - y_b_;
@@ -467,8 +467,10 @@ enum {
 };
 
 /* The doubles of each row for sums over its pieces. */
-static size_t point_vortices_row_sums(size_t length) { return (length / point_vortices_PIECE + 1)
-    * (point_vortices_DIRECTIONS + 1); }
+static size_t point_vortices_row_sums(size_t length)
+{
+    return (length / point_vortices_PIECE + 1) * (point_vortices_DIRECTIONS + 1);
+}
 
 /* Sizes as they have to be: the widths of rows and the number of rows, 0 if they are not allowed. */
 static size_t point_vortices_shape(const size_t sizes[point_vortices_AXES], ptrdiff_t *width)
@@ -476,8 +478,8 @@ static size_t point_vortices_shape(const size_t sizes[point_vortices_AXES], ptrd
     const size_t most = SIZE_MAX / 64 / point_vortices_RESERVED;
     size_t rows = 1;
     for (int a = 0; a < point_vortices_AXES; ++a) {
-        if (sizes[a] < point_vortices_least[a] || sizes[a] % point_vortices_periods[a] != 0 || sizes[a] > most
-            / 2) return 0;
+        if (sizes[a] < point_vortices_least[a] || sizes[a] % point_vortices_periods[a] != 0
+            || sizes[a] > most / 2) return 0;
         if (a < point_vortices_AXES - 1) {
             if (rows > most / sizes[a]) return 0;
             rows *= sizes[a];
@@ -582,8 +584,8 @@ point_vortices_status point_vortices_init(point_vortices_solver *s, const point_
     ptrdiff_t width;
     if (s == NULL || sizes == NULL || x0 == NULL || work == NULL) return point_vortices_BAD_ARGUMENT;
     const point_vortices_params own = params != NULL ? *params : point_vortices_default_params;
-    const size_t rows = point_vortices_shape(sizes, &width), length = sizes[point_vortices_AXES - 1], sites =
-        rows * length;
+    const size_t rows = point_vortices_shape(sizes, &width), length = sizes[point_vortices_AXES - 1],
+        sites = rows * length;
     if (rows == 0 || !point_vortices_finite(x0, point_vortices_DIM * sites) || !point_vortices_allowed(&own,
         sites)) return point_vortices_BAD_ARGUMENT;
     double coef[point_vortices_COEFFICIENTS];
@@ -1042,8 +1044,10 @@ point_vortices_status point_vortices_integrate(point_vortices_solver *s, double 
     return status;
 }
 
-point_vortices_status point_vortices_step(point_vortices_solver *s,
-    double h) { return point_vortices_integrate(s, h, 1); }
+point_vortices_status point_vortices_step(point_vortices_solver *s, double h)
+{
+    return point_vortices_integrate(s, h, 1);
+}
 
 /* The sites of fields, without what is beside their rows. */
 static void point_vortices_take(const point_vortices_solver *s, double *const fields[point_vortices_DIM],
@@ -1092,12 +1096,18 @@ static void point_vortices_fill(const point_vortices_solver *s, point_vortices_k
     }
 }
 
-void point_vortices_density(const point_vortices_solver *s, double *out) { point_vortices_fill(s,
-    point_vortices_energy_row, out); }
-void point_vortices_casimirs(const point_vortices_solver *s, double *out) { point_vortices_fill(s,
-    point_vortices_casimirs_row, out); }
-void point_vortices_vector_field(const point_vortices_solver *s, double *out) { point_vortices_fill(s,
-    point_vortices_vector_field_row, out); }
+void point_vortices_density(const point_vortices_solver *s, double *out)
+{
+    point_vortices_fill(s, point_vortices_energy_row, out);
+}
+void point_vortices_casimirs(const point_vortices_solver *s, double *out)
+{
+    point_vortices_fill(s, point_vortices_casimirs_row, out);
+}
+void point_vortices_vector_field(const point_vortices_solver *s, double *out)
+{
+    point_vortices_fill(s, point_vortices_vector_field_row, out);
+}
 
 const char *point_vortices_status_string(point_vortices_status status)
 {

@@ -21,7 +21,7 @@
  *   5. Between steps
  *   6. The solver
  *   7. Ensembles
- * body-sha256: 454de703ab012a4724818f0d880aae858402113d842c18cee85f981409e96b06
+ * body-sha256: 799417304f69a7ab6fe3bf525dffc023deb5ab9b31792fdb97d825efd259f63a
  */
 #include "poisson_not_hamiltonian.h"
 
@@ -136,8 +136,8 @@ static void poisson_not_hamiltonian_linearise(const double coef[2], const double
     increment_jacobian[5] = coef[1] * t114 + coef[0] * t113 + (0.5 + 0.5 * (t115 + t25 * (t81 - t82)) - t83);
     increment_jacobian[6] = t116;
     increment_jacobian[7] = coef[0] * t117 + coef[1] * t118 + (0.5 + 0.5 * (t25 * (t92 + t91) - t119) - t93);
-    increment_jacobian[8] = 0.5 + 0.5 * (t119 + t25 * (t101 - t10 + t100)) - t102 + (coef[1] * t117 + coef[0]
-        * t118);
+    increment_jacobian[8] = 0.5 + 0.5 * (t119 + t25 * (t101 - t10 + t100)) - t102 + (coef[1] * t117
+        + coef[0] * t118);
 }
 
 double poisson_not_hamiltonian_hamiltonian(const poisson_not_hamiltonian_params *params, const double x[3])
@@ -168,6 +168,13 @@ void poisson_not_hamiltonian_vector_field(const poisson_not_hamiltonian_params *
 }
 
 /* ---- Compensated sums, linear equations ---- */
+static int poisson_not_hamiltonian_finite(const double *values, int count)
+{
+    for (int k = 0; k < count; ++k)
+        if (!isfinite(values[k])) return 0;
+    return 1;
+}
+
 /* x + change + small in compensated arithmetic, where small is the carry and what is as small: were that
    rounded with the change, corrections of one sign would add up to a drift. 0, and x as before, if the sum is
    not finite. */
@@ -287,8 +294,8 @@ static int poisson_not_hamiltonian_plausible(const poisson_not_hamiltonian_solve
     for (int i = 0; i < poisson_not_hamiltonian_DIM; ++i) size += fabs(s->h * field[i]);
     if (moved <= poisson_not_hamiltonian_PLAUSIBLE * size) return 1;
     const double before = poisson_not_hamiltonian_hamiltonian(&s->params, s->x);
-    const double after = poisson_not_hamiltonian_hamiltonian(&s->params, end), between =
-        poisson_not_hamiltonian_hamiltonian(&s->params, middle);
+    const double after = poisson_not_hamiltonian_hamiltonian(&s->params, end),
+        between = poisson_not_hamiltonian_hamiltonian(&s->params, middle);
     return fabs(after - before) <= poisson_not_hamiltonian_LOST * (fabs(before) + fabs(between)
         + fabs(after));
 }
@@ -338,8 +345,8 @@ static poisson_not_hamiltonian_status poisson_not_hamiltonian_attempt(poisson_no
         if (!regular) return poisson_not_hamiltonian_SINGULAR;
         for (int i = 0; i < poisson_not_hamiltonian_DIM; ++i) y[i] -= delta[i];
         const double remaining = size * size * (growth > 1.0 ? growth : 1.0);
-        const int stalled = previous < poisson_not_hamiltonian_NEARLY_SOLVED && size
-            > poisson_not_hamiltonian_SHRINKING * previous;
+        const int stalled = previous < poisson_not_hamiltonian_NEARLY_SOLVED
+            && size > poisson_not_hamiltonian_SHRINKING * previous;
         previous = size;
         if (!(remaining <= poisson_not_hamiltonian_TOLERANCE || stalled)) continue;
         /* the correction of the increment, and the carry */
@@ -361,57 +368,45 @@ static poisson_not_hamiltonian_status poisson_not_hamiltonian_attempt(poisson_no
 /* how far the state may be moved, in its own size, for guesses to move with it */
 #define poisson_not_hamiltonian_NEAR_BY 0.125
 
-/* Guesses move with the state, by as many past values as extrapolation needs; recurrences are of the motion
-   as it was. From far away all begins anew, with the next step. */
+/* Guesses move with the state. From far away all begins anew, with the next step. */
 static void poisson_not_hamiltonian_move_guesses(poisson_not_hamiltonian_solver *s,
-    const double to[poisson_not_hamiltonian_DIM])
+    const double from[poisson_not_hamiltonian_DIM])
 {
     double distance = 0.0, size = 0.0;
     for (int i = 0; i < poisson_not_hamiltonian_DIM; ++i) {
-        distance += fabs(to[i] - s->x[i]);
-        size += fabs(s->x[i]);
+        distance += fabs(s->x[i] - from[i]);
+        size += fabs(from[i]);
     }
     if (!(distance <= poisson_not_hamiltonian_NEAR_BY * size)) {
         s->h = (double)NAN;
         return;
     }
     poisson_not_hamiltonian_history *history = &s->history;
-    for (int i = 0; i < poisson_not_hamiltonian_DIM; ++i) history->difference[0][i] += to[i] - s->x[i];
-}
-
-/* Stand at x + carry from now on. */
-static poisson_not_hamiltonian_status poisson_not_hamiltonian_place(poisson_not_hamiltonian_solver *s,
-    const double x[poisson_not_hamiltonian_DIM], const double carry[poisson_not_hamiltonian_DIM])
-{
-    for (int i = 0; i < poisson_not_hamiltonian_DIM; ++i)
-        if (!isfinite(x[i])) return poisson_not_hamiltonian_BAD_ARGUMENT;
-    poisson_not_hamiltonian_move_guesses(s, x);
-    memcpy(s->x, x, sizeof s->x);
-    memcpy(s->carry, carry, sizeof s->carry);
-    return poisson_not_hamiltonian_OK;
+    for (int i = 0; i < poisson_not_hamiltonian_DIM; ++i) history->difference[0][i] += s->x[i] - from[i];
 }
 
 poisson_not_hamiltonian_status poisson_not_hamiltonian_set_state(poisson_not_hamiltonian_solver *s,
     const double x[poisson_not_hamiltonian_DIM])
 {
-    double to[poisson_not_hamiltonian_DIM], carry[poisson_not_hamiltonian_DIM] = { 0.0 };
-    if (s == NULL || x == NULL) return poisson_not_hamiltonian_BAD_ARGUMENT;
-    memcpy(to, x, sizeof to); /* which may be a part of *s */
-    return poisson_not_hamiltonian_place(s, to, carry);
+    if (s == NULL || x == NULL || !poisson_not_hamiltonian_finite(x, poisson_not_hamiltonian_DIM))
+        return poisson_not_hamiltonian_BAD_ARGUMENT;
+    double from[poisson_not_hamiltonian_DIM];
+    memcpy(from, s->x, sizeof from);
+    memmove(s->x, x, sizeof s->x); /* x may be a part of *s */
+    memset(s->carry, 0, sizeof s->carry);
+    poisson_not_hamiltonian_move_guesses(s, from);
+    return poisson_not_hamiltonian_OK;
 }
 
 poisson_not_hamiltonian_status poisson_not_hamiltonian_kick(poisson_not_hamiltonian_solver *s,
     const double change[poisson_not_hamiltonian_DIM])
 {
-    double to[poisson_not_hamiltonian_DIM], carry[poisson_not_hamiltonian_DIM];
     if (s == NULL || change == NULL) return poisson_not_hamiltonian_BAD_ARGUMENT;
-    for (int i = 0; i < poisson_not_hamiltonian_DIM; ++i) {
-        const double sum = s->x[i] + change[i], added = sum - s->x[i];
-        const double lost = ((s->x[i] - (sum - added)) + (change[i] - added)) + s->carry[i];
-        to[i] = sum + lost;
-        carry[i] = lost - (to[i] - sum);
-    }
-    return poisson_not_hamiltonian_place(s, to, carry);
+    double from[poisson_not_hamiltonian_DIM];
+    memcpy(from, s->x, sizeof from);
+    if (!poisson_not_hamiltonian_advance(s, change, s->carry)) return poisson_not_hamiltonian_BAD_ARGUMENT;
+    poisson_not_hamiltonian_move_guesses(s, from);
+    return poisson_not_hamiltonian_OK;
 }
 
 /* ---- The solver ---- */
@@ -423,8 +418,8 @@ poisson_not_hamiltonian_status poisson_not_hamiltonian_init(poisson_not_hamilton
     poisson_not_hamiltonian_solver fresh = { .h = (double)NAN };
     fresh.params = params != NULL ? *params : poisson_not_hamiltonian_default_params;
     memcpy(fresh.x, x0, sizeof fresh.x);
-    for (int i = 0; i < poisson_not_hamiltonian_DIM; ++i)
-        if (!isfinite(fresh.x[i])) return poisson_not_hamiltonian_BAD_ARGUMENT;
+    if (!poisson_not_hamiltonian_finite(fresh.x, poisson_not_hamiltonian_DIM))
+        return poisson_not_hamiltonian_BAD_ARGUMENT;
     *s = fresh;
     return poisson_not_hamiltonian_OK;
 }
@@ -465,8 +460,10 @@ poisson_not_hamiltonian_status poisson_not_hamiltonian_integrate(poisson_not_ham
     return status;
 }
 
-poisson_not_hamiltonian_status poisson_not_hamiltonian_step(poisson_not_hamiltonian_solver *s,
-    double h) { return poisson_not_hamiltonian_integrate(s, h, 1); }
+poisson_not_hamiltonian_status poisson_not_hamiltonian_step(poisson_not_hamiltonian_solver *s, double h)
+{
+    return poisson_not_hamiltonian_integrate(s, h, 1);
+}
 
 const char *poisson_not_hamiltonian_status_string(poisson_not_hamiltonian_status status)
 {

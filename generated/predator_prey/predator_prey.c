@@ -21,7 +21,7 @@
  *   5. Between steps
  *   6. The solver
  *   7. Ensembles
- * body-sha256: 41a5be33e88467aeb073ef150362fefd2947d2948ff97ca10256fb2b5525cbe2
+ * body-sha256: 8afec942040e77abbe849e106694f2efa77a85f9730e464f4eab5803bc7ab13b
  */
 #include "predator_prey.h"
 
@@ -123,6 +123,13 @@ void predator_prey_vector_field(const predator_prey_params *params, const double
 }
 
 /* ---- Compensated sums, linear equations ---- */
+static int predator_prey_finite(const double *values, int count)
+{
+    for (int k = 0; k < count; ++k)
+        if (!isfinite(values[k])) return 0;
+    return 1;
+}
+
 /* x + change + small in compensated arithmetic, where small is the carry and what is as small: were that
    rounded with the change, corrections of one sign would add up to a drift. 0, and x as before, if the sum is
    not finite. */
@@ -235,8 +242,8 @@ static int predator_prey_plausible(const predator_prey_solver *s, const double i
     for (int i = 0; i < predator_prey_DIM; ++i) size += fabs(s->h * field[i]);
     if (moved <= predator_prey_PLAUSIBLE * size) return 1;
     const double before = predator_prey_hamiltonian(&s->params, s->x);
-    const double after = predator_prey_hamiltonian(&s->params, end), between =
-        predator_prey_hamiltonian(&s->params, middle);
+    const double after = predator_prey_hamiltonian(&s->params, end),
+        between = predator_prey_hamiltonian(&s->params, middle);
     return fabs(after - before) <= predator_prey_LOST * (fabs(before) + fabs(between) + fabs(after));
 }
 
@@ -265,8 +272,8 @@ static predator_prey_status predator_prey_attempt(predator_prey_solver *s)
 {
     double y[predator_prey_DIM], delta[predator_prey_DIM], displacement[predator_prey_DIM],
         increment[predator_prey_DIM];
-    double jacobian[predator_prey_DIM * predator_prey_DIM], increment_jacobian[predator_prey_DIM
-        * predator_prey_DIM];
+    double jacobian[predator_prey_DIM * predator_prey_DIM],
+        increment_jacobian[predator_prey_DIM * predator_prey_DIM];
     double previous = HUGE_VAL;
     if (!predator_prey_predict(&s->history, y)) memcpy(y, s->x, sizeof y);
     for (int iteration = 1; iteration <= predator_prey_MAX_ITERATIONS; ++iteration) {
@@ -302,13 +309,12 @@ static predator_prey_status predator_prey_attempt(predator_prey_solver *s)
 /* how far the state may be moved, in its own size, for guesses to move with it */
 #define predator_prey_NEAR_BY 0.125
 
-/* Guesses move with the state, by as many past values as extrapolation needs; recurrences are of the motion
-   as it was. From far away all begins anew, with the next step. */
-static void predator_prey_move_guesses(predator_prey_solver *s, const double to[predator_prey_DIM])
+/* Guesses move with the state. From far away all begins anew, with the next step. */
+static void predator_prey_move_guesses(predator_prey_solver *s, const double from[predator_prey_DIM])
 {
     double distance = 0.0, size = 0.0;
     for (int i = 0; i < predator_prey_DIM; ++i) {
-        distance = fmax(distance, fabs(to[i] / s->x[i] - 1.0));
+        distance = fmax(distance, fabs(s->x[i] / from[i] - 1.0));
         size = 1.0;
     }
     if (!(distance <= predator_prey_NEAR_BY * size)) {
@@ -316,40 +322,29 @@ static void predator_prey_move_guesses(predator_prey_solver *s, const double to[
         return;
     }
     predator_prey_history *history = &s->history;
-    for (int i = 0; i < predator_prey_DIM; ++i) history->difference[0][i] += to[i] - s->x[i];
-}
-
-/* Stand at x + carry from now on. */
-static predator_prey_status predator_prey_place(predator_prey_solver *s, const double x[predator_prey_DIM],
-    const double carry[predator_prey_DIM])
-{
-    for (int i = 0; i < predator_prey_DIM; ++i)
-        if (!isfinite(x[i])) return predator_prey_BAD_ARGUMENT;
-    predator_prey_move_guesses(s, x);
-    memcpy(s->x, x, sizeof s->x);
-    memcpy(s->carry, carry, sizeof s->carry);
-    return predator_prey_OK;
+    for (int i = 0; i < predator_prey_DIM; ++i) history->difference[0][i] += s->x[i] - from[i];
 }
 
 predator_prey_status predator_prey_set_state(predator_prey_solver *s, const double x[predator_prey_DIM])
 {
-    double to[predator_prey_DIM], carry[predator_prey_DIM] = { 0.0 };
-    if (s == NULL || x == NULL) return predator_prey_BAD_ARGUMENT;
-    memcpy(to, x, sizeof to); /* which may be a part of *s */
-    return predator_prey_place(s, to, carry);
+    if (s == NULL || x == NULL || !predator_prey_finite(x, predator_prey_DIM))
+        return predator_prey_BAD_ARGUMENT;
+    double from[predator_prey_DIM];
+    memcpy(from, s->x, sizeof from);
+    memmove(s->x, x, sizeof s->x); /* x may be a part of *s */
+    memset(s->carry, 0, sizeof s->carry);
+    predator_prey_move_guesses(s, from);
+    return predator_prey_OK;
 }
 
 predator_prey_status predator_prey_kick(predator_prey_solver *s, const double change[predator_prey_DIM])
 {
-    double to[predator_prey_DIM], carry[predator_prey_DIM];
     if (s == NULL || change == NULL) return predator_prey_BAD_ARGUMENT;
-    for (int i = 0; i < predator_prey_DIM; ++i) {
-        const double sum = s->x[i] + change[i], added = sum - s->x[i];
-        const double lost = ((s->x[i] - (sum - added)) + (change[i] - added)) + s->carry[i];
-        to[i] = sum + lost;
-        carry[i] = lost - (to[i] - sum);
-    }
-    return predator_prey_place(s, to, carry);
+    double from[predator_prey_DIM];
+    memcpy(from, s->x, sizeof from);
+    if (!predator_prey_advance(s, change, s->carry)) return predator_prey_BAD_ARGUMENT;
+    predator_prey_move_guesses(s, from);
+    return predator_prey_OK;
 }
 
 /* ---- The solver ---- */
@@ -363,12 +358,10 @@ predator_prey_status predator_prey_init(predator_prey_solver *s, const predator_
     predator_prey_solver fresh = { .h = (double)NAN };
     fresh.params = params != NULL ? *params : predator_prey_default_params;
     memcpy(fresh.x, x0, sizeof fresh.x);
-    for (int i = 0; i < predator_prey_DIM; ++i)
-        if (!isfinite(fresh.x[i])) return predator_prey_BAD_ARGUMENT;
-    if (!predator_prey_allowed(&fresh.params)) return predator_prey_BAD_ARGUMENT;
+    if (!predator_prey_finite(fresh.x, predator_prey_DIM) || !predator_prey_allowed(&fresh.params))
+        return predator_prey_BAD_ARGUMENT;
     predator_prey_prepare(&fresh.params, predator_prey_SHORT_STEP, fresh.coef);
-    for (int k = 0; k < predator_prey_COEFFICIENTS; ++k)
-        if (!isfinite(fresh.coef[k])) return predator_prey_BAD_ARGUMENT;
+    if (!predator_prey_finite(fresh.coef, predator_prey_COEFFICIENTS)) return predator_prey_BAD_ARGUMENT;
     *s = fresh;
     return predator_prey_OK;
 }
@@ -407,8 +400,10 @@ predator_prey_status predator_prey_integrate(predator_prey_solver *s, double h, 
     return status;
 }
 
-predator_prey_status predator_prey_step(predator_prey_solver *s, double h) { return predator_prey_integrate(s,
-    h, 1); }
+predator_prey_status predator_prey_step(predator_prey_solver *s, double h)
+{
+    return predator_prey_integrate(s, h, 1);
+}
 
 const char *predator_prey_status_string(predator_prey_status status)
 {

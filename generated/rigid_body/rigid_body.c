@@ -29,7 +29,7 @@
  *   12. Members of an ensemble
  *   13. Groups of members
  *   14. Ensembles
- * body-sha256: 5939f684257bcd0efaec3c22d2c96ef0cbbebbf1dcc7796d384d62ed0b45eb9a
+ * body-sha256: 6a65963519723232a9d91c471a6c85ffcc0d8cb9100cff412ad671d796f3d579
  */
 #include "rigid_body.h"
 
@@ -121,11 +121,11 @@ static void rigid_body_prepare(const rigid_body_params *params, const double gau
     const double t30 = (-1.0 / 180.0) * gauge[0], t31 = 1.0 / 240.0 * t8, t32 = t30 - t31;
     const double t33 = 1.0 / 180.0 * t21, t34 = 1.0 / 40.0 * gauge[0], t35 = t34 + 1.0 / 120.0 * t8;
     const double t36 = 1.0 / 240.0 * t1, t37 = 1.0 / 1440.0 * t8, t38 = 1.0 / 1440.0 * t4;
-    const double t39 = t8 * (t5 * (t27 - t28) + gauge[0] * (t29 + t32)) - t33 + t1
-        * (gauge[0] * (t35 + ((-1.0 / 24.0) * t5 - t36)) + (t8 * (t37 - t28 - t25)
+    const double t39 = t8 * (t5 * (t27 - t28) + gauge[0] * (t29 + t32)) - t33
+        + t1 * (gauge[0] * (t35 + ((-1.0 / 24.0) * t5 - t36)) + (t8 * (t37 - t28 - t25)
         + (t38 + t5 * (t36 + t24))));
-    const double t40 = t4 * (1.0 / 240.0 * (t15 * t1) + gauge[0] * (t18 - t19)) + t8
-        * (t1 * (t22 + t1 * (t5 * (t23 - t24 - t25) - t26)) + t8 * t39);
+    const double t40 = t4 * (1.0 / 240.0 * (t15 * t1) + gauge[0] * (t18 - t19))
+        + t8 * (t1 * (t22 + t1 * (t5 * (t23 - t24 - t25) - t26)) + t8 * t39);
     const double t41 = t14 * t40, t42 = 1.0 / 12.0 * t5;
     const double t43 = t3 * (t4 * (t9 - t7) + t5 * (t8 * (t6 - t10) + gauge[0] * (t11 - t42)));
     const double t44 = 1.0 / 90.0 * gauge[0], t45 = 17.0 / 360.0 * t1, t46 = 1.0 / 72.0 * t4;
@@ -145,33 +145,34 @@ static void rigid_body_prepare(const rigid_body_params *params, const double gau
     const double t64 = t8 * t8, t65 = 1.0 / 72.0 * (t1 * t8), t66 = t23 - t61, t67 = 1.0 / 720.0 * t5;
     const double t68 = t51 - t17, t69 = 1.0 / 120.0 * t5, t70 = t34 - t9, t71 = 1.0 / 1440.0 * t5;
     const double t72 = t38 + t5 * (t71 - t25);
-    const double t73 = t5 * (t8 * (t67 - t31) + gauge[0] * (t68 - t28)) - t33 + t1
-        * (gauge[0] * (t69 - t36 + t70) + (t8 * (t36 + (t61 - t28)) + t72));
-    const double t74 = t4 * (1.0 / 240.0 * (t1 * t64) + gauge[0] * (t18 - t65)) + t5
-        * (t1 * (t22 + t1 * (t8 * (t66 - t25) - t26)) + t5 * t73);
+    const double t73 = t5 * (t8 * (t67 - t31) + gauge[0] * (t68 - t28)) - t33
+        + t1 * (gauge[0] * (t69 - t36 + t70) + (t8 * (t36 + (t61 - t28)) + t72));
+    const double t74 = t4 * (1.0 / 240.0 * (t1 * t64) + gauge[0] * (t18 - t65))
+        + t5 * (t1 * (t22 + t1 * (t8 * (t66 - t25) - t26)) + t5 * t73);
     const double t75 = t14 * t74, t76 = gauge[0] * t68, t77 = 1.0 / 72.0 * t58, t78 = t23 - t27;
     const double t79 = t29 - t17, t80 = 1.0 / 120.0 * t1, t81 = t34 - t31;
-    const double t82 = t1 * (t5 * (t25 - t28) + gauge[0] * (t79 - t36)) - t33 + t8
-        * (gauge[0] * (t80 - t6 + t81) + (t38 + t5 * (t24 - t36) + t8 * (t28 + t37 - t25)));
-    const double t83 = t64 * (1.0 / 240.0 * (t15 * t8) + gauge[0] * (t76 - t77)) + t1
-        * (t8 * (t22 + t8 * (t5 * (t78 - t24) - t26)) + t1 * t82);
+    const double t82 = t1 * (t5 * (t25 - t28) + gauge[0] * (t79 - t36)) - t33
+        + t8 * (gauge[0] * (t80 - t6 + t81) + (t38 + t5 * (t24 - t36) + t8 * (t28 + t37 - t25)));
+    const double t83 = t64 * (1.0 / 240.0 * (t15 * t8) + gauge[0] * (t76 - t77))
+        + t1 * (t8 * (t22 + t8 * (t5 * (t78 - t24) - t26)) + t1 * t82);
     const double t84 = t14 * t83, t85 = gauge[0] * t79;
     const double t86 = t5 * (gauge[0] * (t70 + (t80 - t28)) + (t8 * (t28 + t61 - t36) + t72))
         + (t1 * (t8 * (t25 - t31) + gauge[0] * (t68 - t36)) - t33);
-    const double t87 = t15 * (1.0 / 240.0 * (t5 * t64) + gauge[0] * (t85 - t77)) + t1
-        * (t5 * (t22 + t5 * (t8 * (t66 - t67) - t26)) + t1 * t86);
+    const double t87 = t15 * (1.0 / 240.0 * (t5 * t64) + gauge[0] * (t85 - t77))
+        + t1 * (t5 * (t22 + t5 * (t8 * (t66 - t67) - t26)) + t1 * t86);
     const double t88 = t14 * t87, t89 = 1.0 / 24.0 * t1;
     const double t90 = t3 * (t15 * (t89 - t7) + t8 * (t1 * (t9 - t42) + gauge[0] * (1.0 / 6.0 * t5 - t12)));
     const double t91 = 1.0 / 80.0 * t1, t92 = t37 - t67;
-    const double t93 = t8 * (t1 * (t27 - t36) + gauge[0] * (t16 + t32)) - t33 + t5
-        * (gauge[0] * (t35 + ((-1.0 / 240.0) * t5 - t89)) + (t8 * (t92 - t36) + (t59 + t5 * (t36 + t71))));
-    const double t94 = t15 * (1.0 / 240.0 * (t4 * t5) + gauge[0] * (t85 - t19)) + t8
-        * (t5 * (t22 + t5 * (t1 * (t23 - t67 - t91) - t26)) + t8 * t93);
+    const double t93 = t8 * (t1 * (t27 - t36) + gauge[0] * (t16 + t32)) - t33
+        + t5 * (gauge[0] * (t35 + ((-1.0 / 240.0) * t5 - t89)) + (t8 * (t92 - t36)
+        + (t59 + t5 * (t36 + t71))));
+    const double t94 = t15 * (1.0 / 240.0 * (t4 * t5) + gauge[0] * (t85 - t19))
+        + t8 * (t5 * (t22 + t5 * (t1 * (t23 - t67 - t91) - t26)) + t8 * t93);
     const double t95 = t14 * t94;
-    const double t96 = t5 * (t1 * (t67 - t36) + gauge[0] * (t16 + (t30 - t28))) - t33 + t8
-        * (gauge[0] * (t69 - t89 + t81) + (t8 * (t36 + t92) + (t59 + t5 * (t71 - t36))));
-    const double t97 = t64 * (1.0 / 240.0 * t56 + gauge[0] * (t76 - t65)) + t5
-        * (t8 * (t22 + t8 * (t1 * (t78 - t91) - t26)) + t5 * t96);
+    const double t96 = t5 * (t1 * (t67 - t36) + gauge[0] * (t16 + (t30 - t28))) - t33
+        + t8 * (gauge[0] * (t69 - t89 + t81) + (t8 * (t36 + t92) + (t59 + t5 * (t71 - t36))));
+    const double t97 = t64 * (1.0 / 240.0 * t56 + gauge[0] * (t76 - t65))
+        + t5 * (t8 * (t22 + t8 * (t1 * (t78 - t91) - t26)) + t5 * t96);
     const double t98 = t14 * t97;
     coef[0] = 2.0 * (h * (0.5 * t1 - gauge[0]));
     coef[1] = 2.0 * t13;
@@ -221,11 +222,11 @@ static void rigid_body_linearise(const double coef[35], const double y[3], doubl
     const double t5 = coef[1] + coef[18] * t1, t6 = coef[9] + coef[16] * t2;
     const double p_x3 = x3 * (t1 * (t3 + coef[17] * t4 + t5) + (coef[14] + t2 * (coef[15] * t4 + t6)));
     const double t7 = coef[4] * t4, t8 = coef[5] * t2 + t7, t9 = coef[2] * t4;
-    const double p_x1 = x1 * (t2 * (coef[3] + coef[7] * t1 + t8) + (coef[0] + t4
-        * (t9 + (coef[1] + coef[6] * t1))));
+    const double p_x1 = x1 * (t2 * (coef[3] + coef[7] * t1 + t8)
+        + (coef[0] + t4 * (t9 + (coef[1] + coef[6] * t1))));
     const double t10 = coef[3] + coef[13] * t1, t11 = coef[10] * t4;
-    const double p_x2 = x2 * (t1 * (coef[12] * t2 + t7 + t10) + (coef[8] + t4 * (t11 + (coef[9] + coef[11]
-        * t2))));
+    const double p_x2 = x2 * (t1 * (coef[12] * t2 + t7 + t10)
+        + (coef[8] + t4 * (t11 + (coef[9] + coef[11] * t2))));
     /* displacement */
     const double t12 = x3 * p_x1, t13 = x1 * p_x3, t14 = t12 - t13, t15 = x1 * p_x2, t16 = x2 * p_x1;
     const double t17 = t15 - t16, t18 = p_x3 * t14 - p_x2 * t17, t19 = p_x3 * p_x3, t20 = p_x1 * p_x1;
@@ -243,8 +244,8 @@ static void rigid_body_linearise(const double coef[35], const double y[3], doubl
     const double t30 = x1 * x3 * (coef[25] + coef[27] * t1 + (coef[26] * t4 + coef[22] * t2));
     const double t31 = rigid_body_phi1(t23), t32 = p_x3 * t31, t33 = 0.5 * x2;
     const double t34 = (t14 - t13) * t24 + 2.0 * (t18 * t32) - t33;
-    const double t35 = t2 * (coef[3] + coef[20] * t1 + t8) + (coef[0] + t4 * (t9 + (coef[1] + coef[19]
-        * t1)));
+    const double t35 = t2 * (coef[3] + coef[20] * t1 + t8)
+        + (coef[0] + t4 * (t9 + (coef[1] + coef[19] * t1)));
     const double t36 = x2 * p_x2, t37 = x3 * p_x3, t38 = p_x1 * t31;
     const double t39 = (t36 + t37) * t24 + 2.0 * (t18 * t38);
     const double t40 = x1 * x2 * (coef[21] + coef[24] * t1 + (coef[22] * t4 + coef[23] * t2));
@@ -311,15 +312,15 @@ static void rigid_body_guide(const rigid_body_params *params, const double gauge
     const double t8 = 1.0 / 6.0 * gauge[0], t9 = t7 - t8, t10 = 1.0 / 6.0 * (t3 * (gauge[0] * t4));
     const double t11 = 1.0 / params->I3, t12 = 1.0 / 3.0 * t1, t13 = 1.0 / 6.0 * t11;
     const double t14 = 1.0 / 12.0 * t11, t15 = 1.0 / 6.0 * t1, t16 = 1.0 / 6.0 * t2, t17 = 1.0 / 3.0 * t2;
-    const double t18 = t1 * (t5 + t6 * (t1 * t9)) - t10 + t11 * (t6 * (gauge[0] * (t12 - t13) + t2
-        * (t14 - t15)) + t4 * (t1 * (t14 - t16) + gauge[0] * (t17 - t13)));
+    const double t18 = t1 * (t5 + t6 * (t1 * t9)) - t10 + t11 * (t6 * (gauge[0] * (t12 - t13)
+        + t2 * (t14 - t15)) + t4 * (t1 * (t14 - t16) + gauge[0] * (t17 - t13)));
     const double t19 = x3 * t18, t20 = x3 * x3, t21 = 1.0 / 12.0 * t1, t22 = 1.0 / 3.0 * t11;
-    const double t23 = t11 * (t5 + t20 * (t11 * t9)) - t10 + t1 * (t4 * (gauge[0] * (t17 - t15) + t11
-        * (t21 - t16)) + t20 * (t2 * (t21 - t13) + gauge[0] * (t22 - t15)));
+    const double t23 = t11 * (t5 + t20 * (t11 * t9)) - t10 + t1 * (t4 * (gauge[0] * (t17 - t15)
+        + t11 * (t21 - t16)) + t20 * (t2 * (t21 - t13) + gauge[0] * (t22 - t15)));
     const double t24 = x2 * t23, t25 = t1 * t1;
     const double t26 = t2 * (t6 * (gauge[0] * (t12 - t16) + t11 * (t7 - t15)) + t20 * (gauge[0] * (t22 - t16)
-        + t1 * (t7 - t13))) + (t11 * (1.0 / 12.0 * (t6 * t25) + t20 * (t11 * (t21 - t8))) - 1.0 / 6.0
-        * (t25 * (gauge[0] * t6)));
+        + t1 * (t7 - t13))) + (t11 * (1.0 / 12.0 * (t6 * t25) + t20 * (t11 * (t21 - t8)))
+        - 1.0 / 6.0 * (t25 * (gauge[0] * t6)));
     const double t27 = x1 * t26;
     error[0] = x2 * t19 - x3 * t24;
     error[1] = x3 * t27 - x1 * t19;
@@ -361,6 +362,13 @@ void rigid_body_vector_field(const rigid_body_params *params, const double x[3],
 }
 
 /* ---- Compensated sums, linear equations ---- */
+static int rigid_body_finite(const double *values, int count)
+{
+    for (int k = 0; k < count; ++k)
+        if (!isfinite(values[k])) return 0;
+    return 1;
+}
+
 /* x + change + small in compensated arithmetic, where small is the carry and what is as small: were that
    rounded with the change, corrections of one sign would add up to a drift. 0, and x as before, if the sum is
    not finite. */
@@ -492,8 +500,8 @@ static int rigid_body_train(rigid_body_history *history, int component)
     enum { AHEAD = rigid_body_AHEAD, WINDOW = rigid_body_WINDOW, ROWS = rigid_body_ROWS };
     /* eight columns in each part */
     double q[WINDOW / 8][ROWS + WINDOW][8], r[WINDOW / 8][WINDOW][8], inverse[WINDOW];
-    double right[ROWS + WINDOW][8], weight[WINDOW][8], value[rigid_body_REMEMBERED], largest = 0.0, left =
-        HUGE_VAL;
+    double right[ROWS + WINDOW][8], weight[WINDOW][8], value[rigid_body_REMEMBERED], largest = 0.0,
+        left = HUGE_VAL;
     int terms = 0;
     memset(q, 0, sizeof q);
     memset(right, 0, sizeof right);
@@ -574,8 +582,8 @@ static int rigid_body_predict(const rigid_body_history *history, double value[ri
 /* Choose the guess that would have been best for a value that took several iterations. */
 static void rigid_body_judge(rigid_body_history *history, const double value[rigid_body_DIM])
 {
-    double row[rigid_body_HISTORY + 1][rigid_body_DIM], guess[rigid_body_DIM], least = HUGE_VAL, fitted =
-        HUGE_VAL;
+    double row[rigid_body_HISTORY + 1][rigid_body_DIM], guess[rigid_body_DIM], least = HUGE_VAL,
+        fitted = HUGE_VAL;
     const int rows = history->count < rigid_body_HISTORY ? history->count : rigid_body_HISTORY;
     memcpy(row[0], value, sizeof row[0]);
     for (int k = 0; k < rows; ++k) memcpy(row[k + 1], history->past[history->count - 1 - k], sizeof row[0]);
@@ -602,8 +610,8 @@ static void rigid_body_judge(rigid_body_history *history, const double value[rig
 static void rigid_body_make_room(rigid_body_history *history, int values)
 {
     if (history->count + values <= rigid_body_KEPT) return;
-    memmove(history->past, history->past + history->count - rigid_body_REMEMBERED, rigid_body_REMEMBERED
-        * sizeof history->past[0]);
+    memmove(history->past, history->past + history->count - rigid_body_REMEMBERED,
+        rigid_body_REMEMBERED * sizeof history->past[0]);
     history->count = rigid_body_REMEMBERED;
 }
 
@@ -848,12 +856,12 @@ static void rigid_body_choose_gauge(const rigid_body_params *params, const doubl
 
 /* Guesses move with the state, by as many past values as extrapolation needs; recurrences are of the motion
    as it was. From far away all begins anew, with the next step. */
-static void rigid_body_move_guesses(rigid_body_solver *s, const double to[rigid_body_DIM])
+static void rigid_body_move_guesses(rigid_body_solver *s, const double from[rigid_body_DIM])
 {
     double distance = 0.0, size = 0.0;
     for (int i = 0; i < rigid_body_DIM; ++i) {
-        distance += fabs(to[i] - s->x[i]);
-        size += fabs(s->x[i]);
+        distance += fabs(s->x[i] - from[i]);
+        size += fabs(from[i]);
     }
     if (!(distance <= rigid_body_NEAR_BY * size)) {
         s->h = (double)NAN;
@@ -863,42 +871,30 @@ static void rigid_body_move_guesses(rigid_body_solver *s, const double to[rigid_
     const int count = history->count < rigid_body_HISTORY ? history->count : rigid_body_HISTORY;
     memmove(history->past, history->past + history->count - count, (size_t)count * sizeof history->past[0]);
     for (int k = 0; k < count; ++k)
-        for (int i = 0; i < rigid_body_DIM; ++i) history->past[k][i] += to[i] - s->x[i];
+        for (int i = 0; i < rigid_body_DIM; ++i) history->past[k][i] += s->x[i] - from[i];
     history->count = count;
     history->recurrence_terms = history->use_recurrence = history->slow_steps = 0;
 }
 
-/* Stand at x + carry from now on. */
-static rigid_body_status rigid_body_place(rigid_body_solver *s, const double x[rigid_body_DIM],
-    const double carry[rigid_body_DIM])
-{
-    for (int i = 0; i < rigid_body_DIM; ++i)
-        if (!isfinite(x[i])) return rigid_body_BAD_ARGUMENT;
-    rigid_body_move_guesses(s, x);
-    memcpy(s->x, x, sizeof s->x);
-    memcpy(s->carry, carry, sizeof s->carry);
-    return rigid_body_OK;
-}
-
 rigid_body_status rigid_body_set_state(rigid_body_solver *s, const double x[rigid_body_DIM])
 {
-    double to[rigid_body_DIM], carry[rigid_body_DIM] = { 0.0 };
-    if (s == NULL || x == NULL) return rigid_body_BAD_ARGUMENT;
-    memcpy(to, x, sizeof to); /* which may be a part of *s */
-    return rigid_body_place(s, to, carry);
+    if (s == NULL || x == NULL || !rigid_body_finite(x, rigid_body_DIM)) return rigid_body_BAD_ARGUMENT;
+    double from[rigid_body_DIM];
+    memcpy(from, s->x, sizeof from);
+    memmove(s->x, x, sizeof s->x); /* x may be a part of *s */
+    memset(s->carry, 0, sizeof s->carry);
+    rigid_body_move_guesses(s, from);
+    return rigid_body_OK;
 }
 
 rigid_body_status rigid_body_kick(rigid_body_solver *s, const double change[rigid_body_DIM])
 {
-    double to[rigid_body_DIM], carry[rigid_body_DIM];
     if (s == NULL || change == NULL) return rigid_body_BAD_ARGUMENT;
-    for (int i = 0; i < rigid_body_DIM; ++i) {
-        const double sum = s->x[i] + change[i], added = sum - s->x[i];
-        const double lost = ((s->x[i] - (sum - added)) + (change[i] - added)) + s->carry[i];
-        to[i] = sum + lost;
-        carry[i] = lost - (to[i] - sum);
-    }
-    return rigid_body_place(s, to, carry);
+    double from[rigid_body_DIM];
+    memcpy(from, s->x, sizeof from);
+    if (!rigid_body_advance(s, change, s->carry)) return rigid_body_BAD_ARGUMENT;
+    rigid_body_move_guesses(s, from);
+    return rigid_body_OK;
 }
 
 /* ---- Several steps or members at once ---- */
@@ -934,16 +930,13 @@ rigid_body_status rigid_body_init_gauge(rigid_body_solver *s, const rigid_body_p
     rigid_body_solver fresh = { .h = (double)NAN };
     fresh.params = params != NULL ? *params : rigid_body_default_params;
     memcpy(fresh.x, x0, sizeof fresh.x);
-    for (int i = 0; i < rigid_body_DIM; ++i)
-        if (!isfinite(fresh.x[i])) return rigid_body_BAD_ARGUMENT;
-    if (!rigid_body_allowed(&fresh.params)) return rigid_body_BAD_ARGUMENT;
+    if (!rigid_body_finite(fresh.x, rigid_body_DIM) || !rigid_body_allowed(&fresh.params))
+        return rigid_body_BAD_ARGUMENT;
     rigid_body_prepare(&fresh.params, fresh.gauge, rigid_body_SHORT_STEP, fresh.coef);
-    for (int k = 0; k < rigid_body_COEFFICIENTS; ++k)
-        if (!isfinite(fresh.coef[k])) return rigid_body_BAD_ARGUMENT;
+    if (!rigid_body_finite(fresh.coef, rigid_body_COEFFICIENTS)) return rigid_body_BAD_ARGUMENT;
     if (gauge == NULL) rigid_body_choose_gauge(&fresh.params, fresh.x, fresh.gauge);
     else memcpy(fresh.gauge, gauge, sizeof fresh.gauge);
-    for (int c = 0; c < rigid_body_GAUGES; ++c)
-        if (!isfinite(fresh.gauge[c])) return rigid_body_BAD_ARGUMENT;
+    if (!rigid_body_finite(fresh.gauge, rigid_body_GAUGES)) return rigid_body_BAD_ARGUMENT;
     *s = fresh;
     return rigid_body_OK;
 }
@@ -1069,15 +1062,15 @@ static void rigid_body_linearise_lanes(rigid_body_lanes coef[restrict 35], rigid
         const double x1 = y[0][lane], x2 = y[1][lane], x3 = y[2][lane];
         const double t1 = x1 * x1, t2 = x2 * x2, t3 = coef[4][lane] * t2, t4 = x3 * x3;
         const double t5 = coef[1][lane] + coef[18][lane] * t1, t6 = coef[9][lane] + coef[16][lane] * t2;
-        const double p_x3 = x3 * (t1 * (t3 + coef[17][lane] * t4 + t5) + (coef[14][lane] + t2
-            * (coef[15][lane] * t4 + t6)));
+        const double p_x3 = x3 * (t1 * (t3 + coef[17][lane] * t4 + t5) + (coef[14][lane]
+            + t2 * (coef[15][lane] * t4 + t6)));
         const double t7 = coef[4][lane] * t4, t8 = coef[5][lane] * t2 + t7, t9 = coef[2][lane] * t4;
-        const double p_x1 = x1 * (t2 * (coef[3][lane] + coef[7][lane] * t1 + t8) + (coef[0][lane] + t4
-            * (t9 + (coef[1][lane] + coef[6][lane] * t1))));
+        const double p_x1 = x1 * (t2 * (coef[3][lane] + coef[7][lane] * t1 + t8)
+            + (coef[0][lane] + t4 * (t9 + (coef[1][lane] + coef[6][lane] * t1))));
         const double t10 = x3 * p_x1, t11 = x1 * p_x3, t12 = t10 - t11;
         const double t13 = coef[3][lane] + coef[13][lane] * t1, t14 = coef[10][lane] * t4;
-        const double p_x2 = x2 * (t1 * (coef[12][lane] * t2 + t7 + t13) + (coef[8][lane] + t4
-            * (t14 + (coef[9][lane] + coef[11][lane] * t2))));
+        const double p_x2 = x2 * (t1 * (coef[12][lane] * t2 + t7 + t13)
+            + (coef[8][lane] + t4 * (t14 + (coef[9][lane] + coef[11][lane] * t2))));
         const double t15 = x1 * p_x2, t16 = x2 * p_x1, t17 = t15 - t16, t18 = p_x3 * t12 - p_x2 * t17;
         const double t19 = p_x3 * p_x3, t20 = p_x1 * p_x1, t21 = p_x2 * p_x2, t22 = t20 + t21;
         const double t23 = t19 + t22, t24 = rigid_body_phi0_lane(t23), t25 = x2 * p_x3, t26 = x3 * p_x2;
@@ -1086,8 +1079,8 @@ static void rigid_body_linearise_lanes(rigid_body_lanes coef[restrict 35], rigid
             + coef[22][lane] * t2));
         const double t31 = rigid_body_phi1_lane(t23), t32 = p_x3 * t31, t33 = 0.5 * x2;
         const double t34 = (t12 - t11) * t24 + 2.0 * (t18 * t32) - t33;
-        const double t35 = t2 * (coef[3][lane] + coef[20][lane] * t1 + t8) + (coef[0][lane] + t4
-            * (t9 + (coef[1][lane] + coef[19][lane] * t1)));
+        const double t35 = t2 * (coef[3][lane] + coef[20][lane] * t1 + t8)
+            + (coef[0][lane] + t4 * (t9 + (coef[1][lane] + coef[19][lane] * t1)));
         const double t36 = x2 * p_x2, t37 = x3 * p_x3, t38 = p_x1 * t31;
         const double t39 = (t36 + t37) * t24 + 2.0 * (t18 * t38);
         const double t40 = x1 * x2 * (coef[21][lane] + coef[24][lane] * t1 + (coef[22][lane] * t4
@@ -1096,8 +1089,8 @@ static void rigid_body_linearise_lanes(rigid_body_lanes coef[restrict 35], rigid
         const double t44 = p_x1 * p_x2 * t24, t45 = 0.5 * p_x3;
         const double t46 = x2 * x3 * (coef[31][lane] * t4 + coef[32][lane] * t2 + (coef[30][lane]
             + coef[22][lane] * t1));
-        const double t47 = t1 * (t13 + (t7 + coef[29][lane] * t2)) + (coef[8][lane] + t4
-            * (t14 + (coef[9][lane] + coef[28][lane] * t2)));
+        const double t47 = t1 * (t13 + (t7 + coef[29][lane] * t2))
+            + (coef[8][lane] + t4 * (t14 + (coef[9][lane] + coef[28][lane] * t2)));
         const double t48 = 0.5 * p_x2, t49 = p_x1 * p_x3 * t24;
         const double t50 = t1 * (t3 + coef[34][lane] * t4 + t5) + (coef[14][lane] + t2 * (coef[33][lane] * t4
             + t6));
@@ -1143,9 +1136,9 @@ static void rigid_body_evaluate_lanes(rigid_body_lanes coef[restrict 35], rigid_
     for (int lane = 0; lane < rigid_body_LANES; ++lane) {
         const double x1 = y[0][lane], x2 = y[1][lane], x3 = y[2][lane];
         const double t1 = x1 * x1, t2 = x2 * x2, t3 = x3 * x3;
-        const double p_x3 = x3 * (t1 * (coef[4][lane] * t2 + coef[17][lane] * t3 + (coef[1][lane]
-            + coef[18][lane] * t1)) + (coef[14][lane] + t2 * (coef[15][lane] * t3 + (coef[9][lane]
-            + coef[16][lane] * t2))));
+        const double p_x3 = x3 * (t1 * (coef[4][lane] * t2 + coef[17][lane] * t3
+            + (coef[1][lane] + coef[18][lane] * t1)) + (coef[14][lane] + t2 * (coef[15][lane] * t3
+            + (coef[9][lane] + coef[16][lane] * t2))));
         const double t4 = coef[4][lane] * t3;
         const double p_x1 = x1 * (t2 * (coef[3][lane] + coef[7][lane] * t1 + (coef[5][lane] * t2 + t4))
             + (coef[0][lane] + t3 * (coef[2][lane] * t3 + (coef[1][lane] + coef[6][lane] * t1))));
@@ -1224,8 +1217,8 @@ static void rigid_body_sizes(rigid_body_lanes y[restrict rigid_body_DIM],
     memset(size, 0, rigid_body_LANES * sizeof size[0]);
     for (int i = 0; i < rigid_body_DIM; ++i)
         for (int lane = 0; lane < rigid_body_LANES; ++lane)
-            norm[lane] = rigid_body_FLOOR_OF_LANES * fabs(y[i][lane]) > norm[lane] ? rigid_body_FLOOR_OF_LANES
-                * fabs(y[i][lane]) : norm[lane];
+            norm[lane] = rigid_body_FLOOR_OF_LANES * fabs(y[i][lane]) > norm[lane]
+                ? rigid_body_FLOOR_OF_LANES * fabs(y[i][lane]) : norm[lane];
     for (int i = 0; i < rigid_body_DIM; ++i) {
         rigid_body_EACH_LANE
         for (int lane = 0; lane < rigid_body_LANES; ++lane)
@@ -1418,8 +1411,8 @@ static void rigid_body_from_means(rigid_body_lanes coef[restrict], rigid_body_mo
    Runge-Kutta method, to leading order. */
 static void rigid_body_march(const rigid_body_solver *s, rigid_body_table *table, rigid_body_models *models)
 {
-    static const double reach[4] = { 0.5, 0.5, 1.0, 0.0 }, weight[4] = { 1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0
-        / 6.0 };
+    static const double reach[4] = { 0.5, 0.5, 1.0, 0.0 }, weight[4] = { 1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0,
+        1.0 / 6.0 };
     double x[rigid_body_DIM], point[rigid_body_DIM], slope[rigid_body_DIM], mean[rigid_body_DIM];
     memcpy(x, s->x, sizeof x);
     const double h = s->h;
@@ -1556,8 +1549,8 @@ static void rigid_body_learn_from(rigid_body_solver *s, int passes)
     }
     if (!s->blocks.use_recurrences) {
         s->blocks.passes_without_recurrences = passes > 0 ? passes : INT_MAX;
-    } else if (passes > s->blocks.passes_without_recurrences || s->blocks.last_single_steps > 5
-        * rigid_body_LANES) {
+    } else if (passes > s->blocks.passes_without_recurrences || s->blocks.last_single_steps
+        > 5 * rigid_body_LANES) {
         rigid_body_give_up(s);
     }
 }
@@ -1583,8 +1576,8 @@ rigid_body_status rigid_body_integrate(rigid_body_solver *s, double h, size_t st
         if (steps >= rigid_body_LANES && s->blocks.single_steps == 0) rigid_body_choose_guess(s, steps);
         if (steps >= rigid_body_LANES && s->blocks.single_steps == 0) {
             rigid_body_refresh(s, &table);
-            const int passes = rigid_body_block(s, &table, (int)((double)rigid_body_PASSES
-                * s->blocks.evaluations_per_stage + 0.5));
+            const int passes = rigid_body_block(s, &table,
+                (int)((double)rigid_body_PASSES * s->blocks.evaluations_per_stage + 0.5));
             rigid_body_learn_from(s, passes);
             if (passes > 0) steps -= rigid_body_LANES;
         } else {
@@ -1786,8 +1779,8 @@ static void rigid_body_group_fit(rigid_body_group *group)
     group->use_recurrences = found;
     ++group->fits;
     group->slow_steps = 0;
-    group->slow_steps_allowed = helped && group->slow_steps_allowed < rigid_body_LONG_WAIT / 2 ? 2
-        * group->slow_steps_allowed + rigid_body_REPAY : rigid_body_HOPELESS_WAIT;
+    group->slow_steps_allowed = helped && group->slow_steps_allowed < rigid_body_LONG_WAIT / 2
+        ? 2 * group->slow_steps_allowed + rigid_body_REPAY : rigid_body_HOPELESS_WAIT;
 }
 
 /* Replace guesses that are not near the last values, as rigid_body_near has it, by these; lane by lane. */
@@ -1878,8 +1871,8 @@ static void rigid_body_group_advance(rigid_body_lanes x[restrict rigid_body_DIM]
     for (int i = 0; i < rigid_body_DIM; ++i) {
         rigid_body_EACH_LANE
         for (int lane = 0; lane < rigid_body_LANES; ++lane) {
-            const double change = model->increment[i][lane], sum = x[i][lane] + change, added = sum
-                - x[i][lane];
+            const double change = model->increment[i][lane], sum = x[i][lane] + change,
+                added = sum - x[i][lane];
             const double lost = (x[i][lane] - (sum - added)) + (change - added);
             const double small = lost + carry[i][lane];
             x[i][lane] = sum + small;
@@ -2051,8 +2044,8 @@ rigid_body_status rigid_body_ensemble(const rigid_body_params *params, double *x
 rigid_body_status rigid_body_ensemble_each(const rigid_body_params *params, double *x, size_t members,
     const double *gauge, const double *h, size_t steps, size_t stride, double *frames, unsigned char *status)
 {
-    rigid_body_members all = { .x = x, .members = members, .steps = steps, .own = 1, .params = params, .h =
-        h };
+    rigid_body_members all = { .x = x, .members = members, .steps = steps, .own = 1, .params = params,
+        .h = h };
     if (members > 0 && (x == NULL || h == NULL)) return rigid_body_BAD_ARGUMENT;
     if (frames != NULL && stride == 0) return rigid_body_BAD_ARGUMENT;
     all.gauge = gauge;

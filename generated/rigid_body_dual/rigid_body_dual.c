@@ -23,7 +23,7 @@
  *   6. Between steps
  *   7. The solver
  *   8. Ensembles
- * body-sha256: f3d33b0cfaeea09ddb74b8cceeeacd01bde54d33ee293ddf7256447373b27c09
+ * body-sha256: 2b8a6f9199464bfe37b61efa37d3606464af9b6d0caa00be9e557f177cefdc29
  */
 #include "rigid_body_dual.h"
 
@@ -136,8 +136,8 @@ static void rigid_body_dual_linearise(const double coef[12], const double y[3],
     const double t7 = coef[9] * p_x3, t8 = coef[10] * p_x1, t9 = coef[11] * p_x3, t10 = x3 * t8 - x1 * t9;
     const double t11 = coef[10] * p_x2, t12 = coef[11] * p_x2, t13 = coef[9] * p_x1;
     const double t14 = x1 * t12 - x2 * t13, t15 = t7 * t10 - t11 * t14;
-    const double t16 = coef[11] * (coef[10] * (p_x2 * p_x2)) + coef[9] * (coef[10] * (p_x1 * p_x1) + coef[11]
-        * (p_x3 * p_x3));
+    const double t16 = coef[11] * (coef[10] * (p_x2 * p_x2)) + coef[9] * (coef[10] * (p_x1 * p_x1)
+        + coef[11] * (p_x3 * p_x3));
     const double t17 = rigid_body_dual_phi0(t16), t18 = coef[9] * x2, t19 = coef[10] * x3;
     const double t20 = t18 * p_x3 - t19 * p_x2, t21 = x2 * t7 - x3 * t11, t22 = t8 * t14 - t9 * t21;
     const double t23 = coef[11] * x1, t24 = t19 * p_x1 - t23 * p_x3, t25 = t12 * t21 - t13 * t10;
@@ -221,6 +221,13 @@ void rigid_body_dual_vector_field(const rigid_body_dual_params *params, const do
 }
 
 /* ---- Compensated sums, linear equations ---- */
+static int rigid_body_dual_finite(const double *values, int count)
+{
+    for (int k = 0; k < count; ++k)
+        if (!isfinite(values[k])) return 0;
+    return 1;
+}
+
 /* x + change + small in compensated arithmetic, where small is the carry and what is as small: were that
    rounded with the change, corrections of one sign would add up to a drift. 0, and x as before, if the sum is
    not finite. */
@@ -335,8 +342,8 @@ static int rigid_body_dual_plausible(const rigid_body_dual_solver *s,
     for (int i = 0; i < rigid_body_dual_DIM; ++i) size += fabs(s->h * field[i]);
     if (moved <= rigid_body_dual_PLAUSIBLE * size) return 1;
     const double before = rigid_body_dual_hamiltonian(&s->params, s->x);
-    const double after = rigid_body_dual_hamiltonian(&s->params, end), between =
-        rigid_body_dual_hamiltonian(&s->params, middle);
+    const double after = rigid_body_dual_hamiltonian(&s->params, end),
+        between = rigid_body_dual_hamiltonian(&s->params, middle);
     return fabs(after - before) <= rigid_body_dual_LOST * (fabs(before) + fabs(between) + fabs(after));
 }
 
@@ -370,8 +377,8 @@ static rigid_body_dual_status rigid_body_dual_attempt(rigid_body_dual_solver *s)
 {
     double y[rigid_body_dual_DIM], delta[rigid_body_dual_DIM], displacement[rigid_body_dual_DIM],
         increment[rigid_body_dual_DIM];
-    double jacobian[rigid_body_dual_DIM * rigid_body_dual_DIM], increment_jacobian[rigid_body_dual_DIM
-        * rigid_body_dual_DIM];
+    double jacobian[rigid_body_dual_DIM * rigid_body_dual_DIM],
+        increment_jacobian[rigid_body_dual_DIM * rigid_body_dual_DIM];
     double previous = HUGE_VAL;
     if (!rigid_body_dual_predict(&s->history, y)) memcpy(y, s->x, sizeof y);
     for (int iteration = 1; iteration <= rigid_body_dual_MAX_ITERATIONS; ++iteration) {
@@ -421,56 +428,44 @@ static void rigid_body_dual_choose_gauge(const rigid_body_dual_params *params,
 /* how far the state may be moved, in its own size, for guesses to move with it */
 #define rigid_body_dual_NEAR_BY 0.125
 
-/* Guesses move with the state, by as many past values as extrapolation needs; recurrences are of the motion
-   as it was. From far away all begins anew, with the next step. */
-static void rigid_body_dual_move_guesses(rigid_body_dual_solver *s, const double to[rigid_body_dual_DIM])
+/* Guesses move with the state. From far away all begins anew, with the next step. */
+static void rigid_body_dual_move_guesses(rigid_body_dual_solver *s, const double from[rigid_body_dual_DIM])
 {
     double distance = 0.0, size = 0.0;
     for (int i = 0; i < rigid_body_dual_DIM; ++i) {
-        distance += fabs(to[i] - s->x[i]);
-        size += fabs(s->x[i]);
+        distance += fabs(s->x[i] - from[i]);
+        size += fabs(from[i]);
     }
     if (!(distance <= rigid_body_dual_NEAR_BY * size)) {
         s->h = (double)NAN;
         return;
     }
     rigid_body_dual_history *history = &s->history;
-    for (int i = 0; i < rigid_body_dual_DIM; ++i) history->difference[0][i] += to[i] - s->x[i];
-}
-
-/* Stand at x + carry from now on. */
-static rigid_body_dual_status rigid_body_dual_place(rigid_body_dual_solver *s,
-    const double x[rigid_body_dual_DIM], const double carry[rigid_body_dual_DIM])
-{
-    for (int i = 0; i < rigid_body_dual_DIM; ++i)
-        if (!isfinite(x[i])) return rigid_body_dual_BAD_ARGUMENT;
-    rigid_body_dual_move_guesses(s, x);
-    memcpy(s->x, x, sizeof s->x);
-    memcpy(s->carry, carry, sizeof s->carry);
-    return rigid_body_dual_OK;
+    for (int i = 0; i < rigid_body_dual_DIM; ++i) history->difference[0][i] += s->x[i] - from[i];
 }
 
 rigid_body_dual_status rigid_body_dual_set_state(rigid_body_dual_solver *s,
     const double x[rigid_body_dual_DIM])
 {
-    double to[rigid_body_dual_DIM], carry[rigid_body_dual_DIM] = { 0.0 };
-    if (s == NULL || x == NULL) return rigid_body_dual_BAD_ARGUMENT;
-    memcpy(to, x, sizeof to); /* which may be a part of *s */
-    return rigid_body_dual_place(s, to, carry);
+    if (s == NULL || x == NULL || !rigid_body_dual_finite(x, rigid_body_dual_DIM))
+        return rigid_body_dual_BAD_ARGUMENT;
+    double from[rigid_body_dual_DIM];
+    memcpy(from, s->x, sizeof from);
+    memmove(s->x, x, sizeof s->x); /* x may be a part of *s */
+    memset(s->carry, 0, sizeof s->carry);
+    rigid_body_dual_move_guesses(s, from);
+    return rigid_body_dual_OK;
 }
 
 rigid_body_dual_status rigid_body_dual_kick(rigid_body_dual_solver *s,
     const double change[rigid_body_dual_DIM])
 {
-    double to[rigid_body_dual_DIM], carry[rigid_body_dual_DIM];
     if (s == NULL || change == NULL) return rigid_body_dual_BAD_ARGUMENT;
-    for (int i = 0; i < rigid_body_dual_DIM; ++i) {
-        const double sum = s->x[i] + change[i], added = sum - s->x[i];
-        const double lost = ((s->x[i] - (sum - added)) + (change[i] - added)) + s->carry[i];
-        to[i] = sum + lost;
-        carry[i] = lost - (to[i] - sum);
-    }
-    return rigid_body_dual_place(s, to, carry);
+    double from[rigid_body_dual_DIM];
+    memcpy(from, s->x, sizeof from);
+    if (!rigid_body_dual_advance(s, change, s->carry)) return rigid_body_dual_BAD_ARGUMENT;
+    rigid_body_dual_move_guesses(s, from);
+    return rigid_body_dual_OK;
 }
 
 /* ---- The solver ---- */
@@ -486,16 +481,14 @@ rigid_body_dual_status rigid_body_dual_init_gauge(rigid_body_dual_solver *s,
     rigid_body_dual_solver fresh = { .h = (double)NAN };
     fresh.params = params != NULL ? *params : rigid_body_dual_default_params;
     memcpy(fresh.x, x0, sizeof fresh.x);
-    for (int i = 0; i < rigid_body_dual_DIM; ++i)
-        if (!isfinite(fresh.x[i])) return rigid_body_dual_BAD_ARGUMENT;
-    if (!rigid_body_dual_allowed(&fresh.params)) return rigid_body_dual_BAD_ARGUMENT;
+    if (!rigid_body_dual_finite(fresh.x, rigid_body_dual_DIM) || !rigid_body_dual_allowed(&fresh.params))
+        return rigid_body_dual_BAD_ARGUMENT;
     rigid_body_dual_prepare(&fresh.params, fresh.gauge, rigid_body_dual_SHORT_STEP, fresh.coef);
-    for (int k = 0; k < rigid_body_dual_COEFFICIENTS; ++k)
-        if (!isfinite(fresh.coef[k])) return rigid_body_dual_BAD_ARGUMENT;
+    if (!rigid_body_dual_finite(fresh.coef, rigid_body_dual_COEFFICIENTS))
+        return rigid_body_dual_BAD_ARGUMENT;
     if (gauge == NULL) rigid_body_dual_choose_gauge(&fresh.params, fresh.x, fresh.gauge);
     else memcpy(fresh.gauge, gauge, sizeof fresh.gauge);
-    for (int c = 0; c < rigid_body_dual_GAUGES; ++c)
-        if (!isfinite(fresh.gauge[c])) return rigid_body_dual_BAD_ARGUMENT;
+    if (!rigid_body_dual_finite(fresh.gauge, rigid_body_dual_GAUGES)) return rigid_body_dual_BAD_ARGUMENT;
     *s = fresh;
     return rigid_body_dual_OK;
 }
@@ -540,8 +533,10 @@ rigid_body_dual_status rigid_body_dual_integrate(rigid_body_dual_solver *s, doub
     return status;
 }
 
-rigid_body_dual_status rigid_body_dual_step(rigid_body_dual_solver *s,
-    double h) { return rigid_body_dual_integrate(s, h, 1); }
+rigid_body_dual_status rigid_body_dual_step(rigid_body_dual_solver *s, double h)
+{
+    return rigid_body_dual_integrate(s, h, 1);
+}
 
 const char *rigid_body_dual_status_string(rigid_body_dual_status status)
 {

@@ -21,7 +21,7 @@
  *   5. Between steps
  *   6. The solver
  *   7. Ensembles
- * body-sha256: 7c3db12bdb95611b609af714057cf0a3515f3b67b0226abe8601d0e28f2a21bd
+ * body-sha256: c7cc94e7056d76f0b50bc3c3de490bfff0a2f3bc9cd5d164c222adbd283124a0
  */
 #include "rigid_body_paper.h"
 
@@ -175,6 +175,13 @@ void rigid_body_paper_vector_field(const rigid_body_paper_params *params, const 
 }
 
 /* ---- Compensated sums, linear equations ---- */
+static int rigid_body_paper_finite(const double *values, int count)
+{
+    for (int k = 0; k < count; ++k)
+        if (!isfinite(values[k])) return 0;
+    return 1;
+}
+
 /* x + change + small in compensated arithmetic, where small is the carry and what is as small: were that
    rounded with the change, corrections of one sign would add up to a drift. 0, and x as before, if the sum is
    not finite. */
@@ -291,8 +298,8 @@ static int rigid_body_paper_plausible(const rigid_body_paper_solver *s,
     for (int i = 0; i < rigid_body_paper_DIM; ++i) size += fabs(s->h * field[i]);
     if (moved <= rigid_body_paper_PLAUSIBLE * size) return 1;
     const double before = rigid_body_paper_hamiltonian(&s->params, s->x);
-    const double after = rigid_body_paper_hamiltonian(&s->params, end), between =
-        rigid_body_paper_hamiltonian(&s->params, middle);
+    const double after = rigid_body_paper_hamiltonian(&s->params, end),
+        between = rigid_body_paper_hamiltonian(&s->params, middle);
     return fabs(after - before) <= rigid_body_paper_LOST * (fabs(before) + fabs(between) + fabs(after));
 }
 
@@ -326,8 +333,8 @@ static rigid_body_paper_status rigid_body_paper_attempt(rigid_body_paper_solver 
 {
     double y[rigid_body_paper_DIM], delta[rigid_body_paper_DIM], displacement[rigid_body_paper_DIM],
         increment[rigid_body_paper_DIM];
-    double jacobian[rigid_body_paper_DIM * rigid_body_paper_DIM], increment_jacobian[rigid_body_paper_DIM
-        * rigid_body_paper_DIM];
+    double jacobian[rigid_body_paper_DIM * rigid_body_paper_DIM],
+        increment_jacobian[rigid_body_paper_DIM * rigid_body_paper_DIM];
     double previous = HUGE_VAL;
     if (!rigid_body_paper_predict(&s->history, y)) memcpy(y, s->x, sizeof y);
     for (int iteration = 1; iteration <= rigid_body_paper_MAX_ITERATIONS; ++iteration) {
@@ -363,56 +370,44 @@ static rigid_body_paper_status rigid_body_paper_attempt(rigid_body_paper_solver 
 /* how far the state may be moved, in its own size, for guesses to move with it */
 #define rigid_body_paper_NEAR_BY 0.125
 
-/* Guesses move with the state, by as many past values as extrapolation needs; recurrences are of the motion
-   as it was. From far away all begins anew, with the next step. */
-static void rigid_body_paper_move_guesses(rigid_body_paper_solver *s, const double to[rigid_body_paper_DIM])
+/* Guesses move with the state. From far away all begins anew, with the next step. */
+static void rigid_body_paper_move_guesses(rigid_body_paper_solver *s, const double from[rigid_body_paper_DIM])
 {
     double distance = 0.0, size = 0.0;
     for (int i = 0; i < rigid_body_paper_DIM; ++i) {
-        distance += fabs(to[i] - s->x[i]);
-        size += fabs(s->x[i]);
+        distance += fabs(s->x[i] - from[i]);
+        size += fabs(from[i]);
     }
     if (!(distance <= rigid_body_paper_NEAR_BY * size)) {
         s->h = (double)NAN;
         return;
     }
     rigid_body_paper_history *history = &s->history;
-    for (int i = 0; i < rigid_body_paper_DIM; ++i) history->difference[0][i] += to[i] - s->x[i];
-}
-
-/* Stand at x + carry from now on. */
-static rigid_body_paper_status rigid_body_paper_place(rigid_body_paper_solver *s,
-    const double x[rigid_body_paper_DIM], const double carry[rigid_body_paper_DIM])
-{
-    for (int i = 0; i < rigid_body_paper_DIM; ++i)
-        if (!isfinite(x[i])) return rigid_body_paper_BAD_ARGUMENT;
-    rigid_body_paper_move_guesses(s, x);
-    memcpy(s->x, x, sizeof s->x);
-    memcpy(s->carry, carry, sizeof s->carry);
-    return rigid_body_paper_OK;
+    for (int i = 0; i < rigid_body_paper_DIM; ++i) history->difference[0][i] += s->x[i] - from[i];
 }
 
 rigid_body_paper_status rigid_body_paper_set_state(rigid_body_paper_solver *s,
     const double x[rigid_body_paper_DIM])
 {
-    double to[rigid_body_paper_DIM], carry[rigid_body_paper_DIM] = { 0.0 };
-    if (s == NULL || x == NULL) return rigid_body_paper_BAD_ARGUMENT;
-    memcpy(to, x, sizeof to); /* which may be a part of *s */
-    return rigid_body_paper_place(s, to, carry);
+    if (s == NULL || x == NULL || !rigid_body_paper_finite(x, rigid_body_paper_DIM))
+        return rigid_body_paper_BAD_ARGUMENT;
+    double from[rigid_body_paper_DIM];
+    memcpy(from, s->x, sizeof from);
+    memmove(s->x, x, sizeof s->x); /* x may be a part of *s */
+    memset(s->carry, 0, sizeof s->carry);
+    rigid_body_paper_move_guesses(s, from);
+    return rigid_body_paper_OK;
 }
 
 rigid_body_paper_status rigid_body_paper_kick(rigid_body_paper_solver *s,
     const double change[rigid_body_paper_DIM])
 {
-    double to[rigid_body_paper_DIM], carry[rigid_body_paper_DIM];
     if (s == NULL || change == NULL) return rigid_body_paper_BAD_ARGUMENT;
-    for (int i = 0; i < rigid_body_paper_DIM; ++i) {
-        const double sum = s->x[i] + change[i], added = sum - s->x[i];
-        const double lost = ((s->x[i] - (sum - added)) + (change[i] - added)) + s->carry[i];
-        to[i] = sum + lost;
-        carry[i] = lost - (to[i] - sum);
-    }
-    return rigid_body_paper_place(s, to, carry);
+    double from[rigid_body_paper_DIM];
+    memcpy(from, s->x, sizeof from);
+    if (!rigid_body_paper_advance(s, change, s->carry)) return rigid_body_paper_BAD_ARGUMENT;
+    rigid_body_paper_move_guesses(s, from);
+    return rigid_body_paper_OK;
 }
 
 /* ---- The solver ---- */
@@ -427,12 +422,11 @@ rigid_body_paper_status rigid_body_paper_init(rigid_body_paper_solver *s,
     rigid_body_paper_solver fresh = { .h = (double)NAN };
     fresh.params = params != NULL ? *params : rigid_body_paper_default_params;
     memcpy(fresh.x, x0, sizeof fresh.x);
-    for (int i = 0; i < rigid_body_paper_DIM; ++i)
-        if (!isfinite(fresh.x[i])) return rigid_body_paper_BAD_ARGUMENT;
-    if (!rigid_body_paper_allowed(&fresh.params)) return rigid_body_paper_BAD_ARGUMENT;
+    if (!rigid_body_paper_finite(fresh.x, rigid_body_paper_DIM) || !rigid_body_paper_allowed(&fresh.params))
+        return rigid_body_paper_BAD_ARGUMENT;
     rigid_body_paper_prepare(&fresh.params, rigid_body_paper_SHORT_STEP, fresh.coef);
-    for (int k = 0; k < rigid_body_paper_COEFFICIENTS; ++k)
-        if (!isfinite(fresh.coef[k])) return rigid_body_paper_BAD_ARGUMENT;
+    if (!rigid_body_paper_finite(fresh.coef, rigid_body_paper_COEFFICIENTS))
+        return rigid_body_paper_BAD_ARGUMENT;
     *s = fresh;
     return rigid_body_paper_OK;
 }
@@ -471,8 +465,10 @@ rigid_body_paper_status rigid_body_paper_integrate(rigid_body_paper_solver *s, d
     return status;
 }
 
-rigid_body_paper_status rigid_body_paper_step(rigid_body_paper_solver *s,
-    double h) { return rigid_body_paper_integrate(s, h, 1); }
+rigid_body_paper_status rigid_body_paper_step(rigid_body_paper_solver *s, double h)
+{
+    return rigid_body_paper_integrate(s, h, 1);
+}
 
 const char *rigid_body_paper_status_string(rigid_body_paper_status status)
 {

@@ -23,7 +23,7 @@
  *   6. Between steps
  *   7. The solver
  *   8. Ensembles
- * body-sha256: 227ee777c43abcbe5fc12998ba7068ab79c26341550cc987868d71f6f1ca3881
+ * body-sha256: c0075554814bed3c69aa9af52b1dba646cb04dab8382c78ac90d87ba3c722109
  */
 #include "satellite.h"
 
@@ -148,8 +148,8 @@ satellite_APART static void satellite_linearise_part1(const double coef[7], cons
     double displacement[restrict 9], double increment[restrict 9], double jacobian[restrict 81],
     double increment_jacobian[restrict 81], double work[restrict 240])
 {
-    const double m1 = y[0], m2 = y[1], m3 = y[2], N1 = y[3], N2 = y[4], N3 = y[5], G1 = y[6], G2 = y[7], G3 =
-        y[8];
+    const double m1 = y[0], m2 = y[1], m3 = y[2], N1 = y[3], N2 = y[4], N3 = y[5], G1 = y[6], G2 = y[7],
+        G3 = y[8];
     const double t1 = N3 * coef[0];
     work[20] = coef[3] * m3 + t1;
     const double t2 = N1 * coef[0];
@@ -252,8 +252,8 @@ satellite_APART static void satellite_linearise_part1(const double coef[7], cons
     work[121] = work[18] * work[11];
     work[19] = work[2] * work[34] - work[12] * work[1] + (work[6] * work[30] - work[15] * work[5]
         + (work[67] - work[121]));
-    work[52] = work[10] * work[51] + (work[0] * work[25] - work[2] * work[13] + (work[4] * work[26] - work[6]
-        * work[16] + (work[20] * work[28] - work[27] * work[19])));
+    work[52] = work[10] * work[51] + (work[0] * work[25] - work[2] * work[13] + (work[4] * work[26]
+        - work[6] * work[16] + (work[20] * work[28] - work[27] * work[19])));
     work[180] = work[20] * work[1];
     work[179] = work[27] * work[3];
     work[14] = work[180] - work[179];
@@ -365,8 +365,8 @@ satellite_APART static void satellite_linearise_part2(const double coef[7], cons
     double increment_jacobian[restrict 81], double work[restrict 240])
 {
     (void)increment, (void)increment_jacobian;
-    const double m1 = y[0], m2 = y[1], m3 = y[2], N1 = y[3], N2 = y[4], N3 = y[5], G1 = y[6], G2 = y[7], G3 =
-        y[8];
+    const double m1 = y[0], m2 = y[1], m3 = y[2], N1 = y[3], N2 = y[4], N3 = y[5], G1 = y[6], G2 = y[7],
+        G3 = y[8];
     work[155] = work[0] * work[1] - work[2] * work[3] + (work[4] * work[5] - work[6] * work[7]
         + (work[8] - work[9]));
     work[127] = work[10] * work[11] + (work[12] * work[13] - work[0] * work[14] + (work[15] * work[16]
@@ -408,13 +408,13 @@ satellite_APART static void satellite_linearise_part2(const double coef[7], cons
     work[119] = work[29] - work[48] - work[49] - work[50];
     work[124] = work[2] * t16 - work[12] * work[116] + (work[6] * t3 - work[15] * work[114] + (work[27] * t13
         - (work[11] + work[18] * work[119])));
-    const double t20 = work[10] * t13 + 2.0 * (work[18] * work[51]) + (work[0] * work[186] - work[2]
-        * work[122] + (work[4] * work[187] - work[6] * work[123] + (work[20] * work[188] - work[27]
-        * work[124])));
+    const double t20 = work[10] * t13 + 2.0 * (work[18] * work[51]) + (work[0] * work[186]
+        - work[2] * work[122] + (work[4] * work[187] - work[6] * work[123] + (work[20] * work[188]
+        - work[27] * work[124])));
     const double t21 = satellite_phi2(work[10]);
     work[126] = work[18] * t21;
-    const double t22 = work[21] * t13 + 2.0 * (work[125] * work[51]) - (work[22] * t20 + 2.0
-        * (work[126] * work[52]));
+    const double t22 = work[21] * t13 + 2.0 * (work[125] * work[51]) - (work[22] * t20
+        + 2.0 * (work[126] * work[52]));
     const double t23 = work[53] + work[54];
     work[98] = work[20] * work[18];
     work[183] = work[18] * work[98] + work[20] * t23;
@@ -460,23 +460,24 @@ satellite_APART static void satellite_linearise_part2(const double coef[7], cons
         + (work[18] * work[138] + work[20] * t29));
     const double t31 = G1 * work[12], t32 = N1 * work[15], t33 = m1 * work[18];
     work[137] = t7 + t31 + (t9 + t32 + (t12 + t33));
-    work[141] = work[51] - work[27] * t29 - work[18] * work[137] - (work[15] * work[131] + work[6]
-        * work[217]) - (work[12] * work[135] + work[2] * work[227]);
+    work[141] = work[51] - work[27] * t29 - work[18] * work[137] - (work[15] * work[131]
+        + work[6] * work[217]) - (work[12] * work[135] + work[2] * work[227]);
     const double t34 = 2.0 * work[67] - work[10] * t29 + (work[0] * work[199] - work[2] * work[139]
-        + (work[4] * work[200] - work[6] * work[140] + (work[20] * work[201] - (work[19] + work[27]
-        * work[141]))));
+        + (work[4] * work[200] - work[6] * work[140] + (work[20] * work[201]
+        - (work[19] + work[27] * work[141]))));
     const double t35 = work[128] + (2.0 * (work[142] * work[51]) - work[21] * t29
         - (2.0 * (work[143] * work[52]) + work[22] * t34));
-    const double t36 = work[218] + (coef[0] * (work[130] + (t25 * work[21] - work[22] * (work[10] * t25
-        + (work[68] - work[69] + (work[20] * work[202] - work[27] * work[144]))))) + coef[2] * t35);
+    const double t36 = work[218]
+        + (coef[0] * (work[130] + (t25 * work[21] - work[22] * (work[10] * t25 + (work[68] - work[69]
+        + (work[20] * work[202] - work[27] * work[144]))))) + coef[2] * t35);
     work[184] = 0.5 * work[27];
     work[181] = work[98] * work[21];
     work[182] = work[98] * work[10];
     work[109] = work[27] * work[98];
     work[106] = work[109] - t24;
     work[107] = work[20] * work[98] + work[18] * work[70];
-    work[221] = work[184] + (work[181] - work[22] * (work[182] - (work[27] * work[106] + work[20]
-        * work[107])));
+    work[221] = work[184] + (work[181] - work[22] * (work[182] - (work[27] * work[106]
+        + work[20] * work[107])));
     const double t37 = work[32] - work[38];
     work[219] = t37 * work[21];
     work[220] = t37 * work[10];
@@ -508,8 +509,8 @@ satellite_APART static void satellite_linearise_part2(const double coef[7], cons
     work[154] = work[2] * work[100] + work[12] * work[148] + (work[15] * work[149] + work[6] * t37
         + (work[27] * t41 + work[18] * work[150]));
     const double t42 = work[10] * t41 + 2.0 * work[82] + (work[0] * work[204] - work[2] * work[152]
-        + (work[4] * work[205] - work[6] * work[153] + (work[28] + work[20] * work[206] - work[27]
-        * work[154])));
+        + (work[4] * work[205] - work[6] * work[153] + (work[28] + work[20] * work[206]
+        - work[27] * work[154])));
     work[189] = 0.5 * m2;
     const double t43 = work[21] * t41 + 2.0 * (work[156] * work[51]) - (2.0 * (work[157] * work[52])
         + work[22] * t42) - work[189];
@@ -562,15 +563,15 @@ satellite_APART static void satellite_linearise_part2(const double coef[7], cons
     displacement[6] = work[21] * work[34] - work[22] * work[226] - 0.5 * work[35];
     displacement[7] = work[21] * work[1] - work[22] * work[228] - 0.5 * work[36];
     displacement[8] = work[21] * work[3] - work[22] * work[231] - 0.5 * work[37];
-    jacobian[0] = 1.0 + (coef[0] * (work[213] - work[22] * (work[214] + (work[20] * work[198] - work[27]
-        * work[129]))) + coef[1] * t22 - work[216]);
+    jacobian[0] = 1.0 + (coef[0] * (work[213] - work[22] * (work[214] + (work[20] * work[198]
+        - work[27] * work[129]))) + coef[1] * t22 - work[216]);
     jacobian[60] = 1.0 - work[216];
     jacobian[61] = work[218];
     jacobian[1] = t36;
     jacobian[62] = work[221];
-    jacobian[2] = work[221] + (coef[0] * (work[219] - work[22]
-        * (work[220] + (work[26] + (work[20] * work[208] - work[27] * work[160]))) - work[195]) + coef[3]
-        * t43);
+    jacobian[2] = work[221]
+        + (coef[0] * (work[219] - work[22] * (work[220] + (work[26] + (work[20] * work[208]
+        - work[27] * work[160]))) - work[195]) + coef[3] * t43);
     jacobian[3] = coef[0] * t22 - (t47 * work[21] + work[22] * (work[4] * work[183] + work[6] * work[113]
         + (work[20] * work[193] + work[27] * work[168]) - t47 * work[10]));
     jacobian[4] = work[166] - work[22] * (work[167] + (work[4] * work[93] - work[6] * work[94]
@@ -594,9 +595,10 @@ satellite_APART static void satellite_linearise_part3(const double coef[7], cons
     const double t12 = work[2] * work[88] + work[12] * work[90] + (work[27] * work[86] + work[18] * t11);
     const double t13 = 0.5 * work[0], t14 = 0.5 * G3, t15 = work[44] - work[61] - work[61];
     const double t16 = work[91] - work[20] * t15, t17 = work[34] + (work[27] * t15 - work[92]);
-    const double t18 = t1 - work[22] * (t2 + (work[0] * work[93] - work[2] * work[94] + (work[20] * t8
-        - work[27] * t12))) - t13 + coef[5] * (t14 + (t15 * work[21] - work[22] * (work[10] * t15
-        + (work[95] - work[96] + (work[20] * t16 - work[27] * t17)))));
+    const double t18 = t1 - work[22] * (t2 + (work[0] * work[93] - work[2] * work[94]
+        + (work[20] * t8 - work[27] * t12))) - t13
+        + coef[5] * (t14 + (t15 * work[21] - work[22] * (work[10] * t15 + (work[95] - work[96]
+        + (work[20] * t16 - work[27] * t17)))));
     const double t19 = 0.5 * work[2], t20 = work[97] * work[21], t21 = work[97] * work[10];
     const double t22 = work[2] * work[98], t23 = work[27] * work[97], t24 = t22 - t3 + (t23 - t6);
     const double t25 = work[99] + t9, t26 = t25 + t25;
@@ -606,11 +608,11 @@ satellite_APART static void satellite_linearise_part3(const double coef[7], cons
     const double t31 = work[62] - work[78] - work[78], t32 = work[105] - work[18] * t31;
     work[232] = 0.5 * G2;
     const double t33 = t19 + (t20 - work[22] * (t21 - (work[2] * work[106] + work[0] * work[107]
-        + (work[27] * t24 + work[20] * t27)))) + coef[6] * (t28 - work[22]
-        * (t29 + (work[25] + (work[20] * t30 - work[27] * t32))) - work[232]);
+        + (work[27] * t24 + work[20] * t27))))
+        + coef[6] * (t28 - work[22] * (t29 + (work[25] + (work[20] * t30 - work[27] * t32))) - work[232]);
     const double t34 = work[108] - work[109];
-    const double t35 = work[110] + (work[111] - work[22] * (work[112] - (work[20] * t34 + work[18]
-        * work[113])));
+    const double t35 = work[110] + (work[111] - work[22] * (work[112] - (work[20] * t34
+        + work[18] * work[113])));
     const double t36 = work[114] * work[21], t37 = work[114] * work[10], t38 = work[20] * work[114];
     const double t39 = t38 - work[27] * work[115], t40 = work[20] * work[116];
     work[230] = work[27] * work[117] + t40;
@@ -628,13 +630,14 @@ satellite_APART static void satellite_linearise_part3(const double coef[7], cons
     const double t52 = t47 - (work[7] + t48);
     const double t53 = work[0] * work[135] - work[2] * work[136] + (work[4] * work[131] - work[6] * work[132]
         + (work[20] * work[137] - (work[24] + work[27] * work[138])));
-    const double t54 = work[10] * work[137] + 2.0 * (work[27] * work[11]) + (work[12] * work[139] - work[0]
-        * work[235] + (work[15] * work[140] - work[4] * t52 + (work[18] * work[141] - work[20] * t53)));
-    const double t55 = work[21] * work[137] + 2.0 * (work[142] * work[11]) - (work[22] * t54 + 2.0
-        * (work[143] * work[127]));
+    const double t54 = work[10] * work[137] + 2.0 * (work[27] * work[11]) + (work[12] * work[139]
+        - work[0] * work[235] + (work[15] * work[140] - work[4] * t52 + (work[18] * work[141]
+        - work[20] * t53)));
+    const double t55 = work[21] * work[137] + 2.0 * (work[142] * work[11]) - (work[22] * t54
+        + 2.0 * (work[143] * work[127]));
     const double t56 = work[27] * work[87] + work[20] * work[90];
-    const double t57 = work[90] * work[21] + work[22] * (work[18] * work[94] + work[20] * t56 - work[90]
-        * work[10]);
+    const double t57 = work[90] * work[21] + work[22] * (work[18] * work[94] + work[20] * t56
+        - work[90] * work[10]);
     const double t58 = work[87] * work[21], t59 = work[87] * work[10];
     const double t60 = work[20] * work[87] + work[27] * work[70], t61 = 0.5 * work[18];
     const double t62 = t58 - work[22] * (t59 + (work[18] * work[106] - work[20] * t60)) - t61;
@@ -642,31 +645,31 @@ satellite_APART static void satellite_linearise_part3(const double coef[7], cons
     const double t66 = 0.5 * m1, t67 = work[27] * work[147];
     work[239] = work[1] - work[20] * work[148] - t67;
     const double t68 = work[5] - work[20] * work[149] - t64;
-    const double t69 = work[11] - work[20] * work[150] - work[27] * work[151] - (work[6] * work[145] + work[4]
-        * work[149]) - (work[2] * work[147] + work[0] * work[148]);
+    const double t69 = work[11] - work[20] * work[150] - work[27] * work[151] - (work[6] * work[145]
+        + work[4] * work[149]) - (work[2] * work[147] + work[0] * work[148]);
     const double t70 = 2.0 * work[8] - work[10] * work[150] + (work[12] * work[152] - work[0] * work[239]
         + (work[15] * work[153] - work[4] * t68 + (work[18] * work[154] - (work[155] + work[20] * t69))));
-    const double t71 = t66 + (2.0 * (work[156] * work[11]) - work[21] * work[150] - (work[22] * t70 + 2.0
-        * (work[157] * work[127])));
+    const double t71 = t66 + (2.0 * (work[156] * work[11]) - work[21] * work[150] - (work[22] * t70
+        + 2.0 * (work[157] * work[127])));
     const double t72 = t62 + (coef[0] * (t63 + (work[146] * work[21] - work[22] * (work[10] * work[146]
         + (work[158] - work[159] + (work[18] * work[160] - work[20] * t65))))) + coef[3] * t71);
     const double t73 = work[161] - work[162] + (work[163] - work[164]);
-    const double t74 = work[6] * work[87] + work[4] * work[90] + (work[27] * work[169] + work[20]
-        * work[170]);
+    const double t74 = work[6] * work[87] + work[4] * work[90] + (work[27] * work[169]
+        + work[20] * work[170]);
     const double t75 = work[169] * work[21], t76 = work[169] * work[10];
-    const double t77 = work[4] * work[87] + work[6] * work[70] + (work[20] * work[169] + work[27]
-        * work[172]);
+    const double t77 = work[4] * work[87] + work[6] * work[70] + (work[20] * work[169]
+        + work[27] * work[172]);
     const double t78 = 0.5 * work[15], t79 = t4 - t22 + (t7 - t23), t80 = work[116] * work[21];
     const double t81 = work[10] * work[116], t82 = t40 - work[27] * work[174];
     const double t83 = t13 + (t1 - work[22] * (t2 - (work[0] * t34 + work[12] * work[113] + (work[20] * t79
-        + work[18] * work[175])))) + coef[4] * (t80 - work[22] * (t81 + (work[13] + (work[18] * work[176]
-        - work[20] * t82))) - t14);
+        + work[18] * work[175]))))
+        + coef[4] * (t80 - work[22] * (t81 + (work[13] + (work[18] * work[176] - work[20] * t82))) - t14);
     const double t84 = work[135] * work[21], t85 = work[135] * work[10];
     const double t86 = work[177] - work[178] + (t50 - t51);
     const double t87 = work[2] * work[87] + work[0] * work[90] + (work[27] * t5 + work[20] * t11);
     const double t88 = coef[5] * (t84 - work[22] * (t85 + (work[18] * t17 - work[20] * t86)))
-        - (t11 * work[21] + work[22] * (work[12] * work[94] + work[0] * t56 + (work[18] * t12 + work[20]
-        * t87) - t11 * work[10]));
+        - (t11 * work[21] + work[22] * (work[12] * work[94] + work[0] * t56 + (work[18] * t12
+        + work[20] * t87) - t11 * work[10]));
     const double t89 = t5 * work[21], t90 = t5 * work[10];
     const double t91 = work[0] * work[87] + work[2] * work[70] + (work[20] * t5 + work[27] * t26);
     const double t92 = 0.5 * work[12];
@@ -690,34 +693,37 @@ satellite_APART static void satellite_linearise_part3(const double coef[7], cons
     const double t103 = work[21] * work[138] + 2.0 * (work[142] * work[24]) - (2.0 * (work[143] * work[190])
         + work[22] * t102) - t66;
     const double t104 = work[145] * work[21], t105 = work[145] * work[10];
-    const double t106 = work[10] * work[151] + 2.0 * (work[20] * work[24]) + (work[2] * work[239] - work[12]
-        * work[204] + (work[6] * t68 - work[15] * work[205] + (work[27] * t69 - work[18] * work[206])));
-    const double t107 = work[21] * work[151] + 2.0 * (work[156] * work[24]) - (work[22] * t106 + 2.0
-        * (work[157] * work[190]));
-    const double t108 = work[70] * work[21] + work[22] * (work[18] * work[107] + work[27] * t60 - work[70]
-        * work[10]);
+    const double t106 = work[10] * work[151] + 2.0 * (work[20] * work[24]) + (work[2] * work[239]
+        - work[12] * work[204] + (work[6] * t68 - work[15] * work[205] + (work[27] * t69
+        - work[18] * work[206])));
+    const double t107 = work[21] * work[151] + 2.0 * (work[156] * work[24]) - (work[22] * t106
+        + 2.0 * (work[157] * work[190]));
+    const double t108 = work[70] * work[21] + work[22] * (work[18] * work[107] + work[27] * t60
+        - work[70] * work[10]);
     const double t109 = t20 - work[22] * (t21 + (work[2] * t34 - work[12] * work[183] + (work[27] * t79
-        - work[18] * work[209]))) - t19 + coef[4] * (work[232] + (work[174] * work[21] - work[22]
-        * (work[10] * work[174] + (work[210] - work[211] + (work[27] * t82 - work[18] * work[212])))));
+        - work[18] * work[209]))) - t19 + coef[4] * (work[232] + (work[174] * work[21]
+        - work[22] * (work[10] * work[174] + (work[210] - work[211] + (work[27] * t82
+        - work[18] * work[212])))));
     work[233] = work[136] * work[21];
     work[234] = work[10] * work[136];
-    const double t110 = t92 + (t89 - work[22] * (t90 - (work[12] * work[93] + work[2] * t56 + (work[18] * t8
-        + work[27] * t87)))) + coef[5] * (work[233] - work[22] * (work[234] + (work[14] + (work[27] * t86
-        - work[18] * t16))) - work[236]);
+    const double t110 = t92 + (t89 - work[22] * (t90 - (work[12] * work[93] + work[2] * t56
+        + (work[18] * t8 + work[27] * t87)))) + coef[5] * (work[233] - work[22] * (work[234]
+        + (work[14] + (work[27] * t86 - work[18] * t16))) - work[236]);
     work[237] = work[147] * work[21];
     work[238] = work[147] * work[10];
     const double t111 = coef[6] * (work[237] - work[22] * (work[238] + (work[27] * t93 - work[18] * t30)))
-        - (t26 * work[21] + work[22] * (work[2] * t60 + work[12] * work[107] + (work[27] * t91 + work[18]
-        * t27) - work[10] * t26));
-    const double t112 = work[213] + 2.0 * (work[30] * work[125]) - (work[22] * (work[214] + 2.0
-        * (work[18] * work[30]) + (work[20] * work[187] - work[27] * work[123])) + 2.0
-        * (work[126] * work[215]));
-    const double t113 = 2.0 * (work[30] * work[142]) - work[217] * work[21] - (work[22] * (2.0 * work[69]
-        - work[217] * work[10] + (work[20] * work[200] - (work[16] + work[27] * work[140]))) + 2.0
-        * (work[143] * work[215]));
+        - (t26 * work[21] + work[22] * (work[2] * t60 + work[12] * work[107] + (work[27] * t91
+        + work[18] * t27) - work[10] * t26));
+    const double t112 = work[213] + 2.0 * (work[30] * work[125])
+        - (work[22] * (work[214] + 2.0 * (work[18] * work[30]) + (work[20] * work[187]
+        - work[27] * work[123])) + 2.0 * (work[126] * work[215]));
+    const double t113 = 2.0 * (work[30] * work[142]) - work[217] * work[21]
+        - (work[22] * (2.0 * work[69] - work[217] * work[10] + (work[20] * work[200]
+        - (work[16] + work[27] * work[140]))) + 2.0 * (work[143] * work[215]));
     const double t114 = work[130] + t113;
-    const double t115 = work[219] + 2.0 * (work[30] * work[156]) - (2.0 * (work[157] * work[215]) + work[22]
-        * (work[220] + 2.0 * work[196] + (work[26] + work[20] * work[205] - work[27] * work[153])));
+    const double t115 = work[219] + 2.0 * (work[30] * work[156]) - (2.0 * (work[157] * work[215])
+        + work[22] * (work[220] + 2.0 * work[196] + (work[26] + work[20] * work[205]
+        - work[27] * work[153])));
     const double t116 = t115 - work[195];
     const double t117 = t36 + 2.0 * (work[5] * work[125]) - (work[22] * (t37 + 2.0 * work[68]
         + (work[16] + work[18] * work[123] - work[20] * t41)) + 2.0 * (work[126] * work[222]));
@@ -725,27 +731,27 @@ satellite_APART static void satellite_linearise_part3(const double coef[7], cons
     const double t119 = t45 + 2.0 * (work[5] * work[142]) - (work[22] * (t46 + 2.0 * (work[27] * work[5])
         + (work[18] * work[140] - work[20] * t52)) + 2.0 * (work[143] * work[222]));
     const double t120 = 2.0 * (work[5] * work[156]) - work[149] * work[21] - (2.0 * (work[157] * work[222])
-        + work[22] * (2.0 * work[159] - work[149] * work[10] + (work[18] * work[153] - (work[17] + work[20]
-        * t68))));
+        + work[22] * (2.0 * work[159] - work[149] * work[10] + (work[18] * work[153]
+        - (work[17] + work[20] * t68))));
     const double t121 = t63 + t120;
     const double t122 = 2.0 * (work[7] * work[125]) - work[118] * work[21] - (2.0 * (work[126] * work[223])
-        + work[22] * (2.0 * work[197] - work[118] * work[10] + (work[27] * t41 - (work[26] + work[18]
-        * work[187]))));
+        + work[22] * (2.0 * work[197] - work[118] * work[10] + (work[27] * t41
+        - (work[26] + work[18] * work[187]))));
     const double t123 = work[195] + t122;
-    const double t124 = t100 + 2.0 * (work[7] * work[142]) - (2.0 * (work[143] * work[223]) + work[22]
-        * (t101 + 2.0 * work[158] + (work[17] + work[27] * t52 - work[18] * work[200])));
+    const double t124 = t100 + 2.0 * (work[7] * work[142]) - (2.0 * (work[143] * work[223]) + work[22] * (t101
+        + 2.0 * work[158] + (work[17] + work[27] * t52 - work[18] * work[200])));
     const double t125 = t124 - t63;
     const double t126 = t104 + 2.0 * (work[7] * work[156]) - (work[22] * (t105 + 2.0 * (work[20] * work[7])
         + (work[27] * t68 - work[18] * work[205])) + 2.0 * (work[157] * work[223]));
-    const double t127 = work[224] + 2.0 * (work[34] * work[125]) - (work[22] * (work[225] + 2.0
-        * (work[18] * work[34]) + (work[20] * work[186] - work[27] * work[122])) + 2.0
-        * (work[126] * work[226]));
+    const double t127 = work[224] + 2.0 * (work[34] * work[125])
+        - (work[22] * (work[225] + 2.0 * (work[18] * work[34]) + (work[20] * work[186]
+        - work[27] * work[122])) + 2.0 * (work[126] * work[226]));
     const double t128 = 2.0 * (work[34] * work[142]) - work[227] * work[21] - (2.0 * (work[143] * work[226])
-        + work[22] * (2.0 * work[96] - work[10] * work[227] + (work[20] * work[199] - (work[13] + work[27]
-        * work[139]))));
+        + work[22] * (2.0 * work[96] - work[10] * work[227] + (work[20] * work[199]
+        - (work[13] + work[27] * work[139]))));
     const double t129 = t14 + t128;
-    const double t130 = t28 + 2.0 * (work[34] * work[156]) - (2.0 * (work[157] * work[226]) + work[22]
-        * (t29 + 2.0 * work[210] + (work[25] + work[20] * work[204] - work[27] * work[152])));
+    const double t130 = t28 + 2.0 * (work[34] * work[156]) - (2.0 * (work[157] * work[226]) + work[22] * (t29
+        + 2.0 * work[210] + (work[25] + work[20] * work[204] - work[27] * work[152])));
     const double t131 = t130 - work[232];
     const double t132 = t80 + 2.0 * (work[1] * work[125]) - (work[22] * (t81 + 2.0 * work[95]
         + (work[13] + work[18] * work[122] - work[20] * work[230])) + 2.0 * (work[126] * work[228]));
@@ -753,15 +759,16 @@ satellite_APART static void satellite_linearise_part3(const double coef[7], cons
     const double t134 = t84 + 2.0 * (work[1] * work[142]) - (work[22] * (t85 + 2.0 * (work[27] * work[1])
         + (work[18] * work[139] - work[20] * work[235])) + 2.0 * (work[143] * work[228]));
     const double t135 = 2.0 * (work[1] * work[156]) - work[148] * work[21] - (2.0 * (work[157] * work[228])
-        + work[22] * (2.0 * work[180] - work[148] * work[10] + (work[18] * work[152] - (work[14] + work[20]
-        * work[239]))));
+        + work[22] * (2.0 * work[180] - work[148] * work[10] + (work[18] * work[152]
+        - (work[14] + work[20] * work[239]))));
     work[229] = work[236] + t135;
     jacobian[6] = work[85];
     jacobian[7] = t18;
     jacobian[8] = t33;
     jacobian[69] = t35;
-    jacobian[9] = t35 + (coef[0] * (t36 - work[22] * (t37 + (work[16] + (work[18] * work[129] - work[20]
-        * t39))) - work[130]) + coef[1] * t44);
+    jacobian[9] = t35
+        + (coef[0] * (t36 - work[22] * (t37 + (work[16] + (work[18] * work[129] - work[20] * t39)))
+        - work[130]) + coef[1] * t44);
     jacobian[10] = 1.0 + (coef[0] * (t45 - work[22] * (t46 + (work[18] * work[144] - work[20] * t49)))
         + coef[2] * t55 - t57);
     jacobian[70] = 1.0 - t57;
@@ -781,8 +788,9 @@ satellite_APART static void satellite_linearise_part3(const double coef[7], cons
         - work[18] * work[193]))) - work[194] + coef[0] * t97;
     jacobian[18] = t98;
     jacobian[79] = t99;
-    jacobian[19] = t99 + (coef[0] * (t100 - work[22] * (t101 + (work[17] + (work[27] * t49 - work[18]
-        * work[202]))) - t63) + coef[2] * t103);
+    jacobian[19] = t99
+        + (coef[0] * (t100 - work[22] * (t101 + (work[17] + (work[27] * t49 - work[18] * work[202]))) - t63)
+        + coef[2] * t103);
     jacobian[22] = t78 + (t75 - work[22] * (t76 - (work[15] * work[93] + work[6] * t56 + (work[18] * work[203]
         + work[27] * t74)))) + coef[0] * t103;
     jacobian[23] = coef[0] * t107 - (work[172] * work[21] + work[22] * (work[15] * work[107] + work[6] * t60
@@ -831,16 +839,16 @@ satellite_APART static void satellite_linearise_part4(const double coef[7], cons
 {
     (void)displacement, (void)increment;
     const double G1 = y[6], G2 = y[7], G3 = y[8];
-    const double t1 = 2.0 * (work[3] * work[125]) - work[117] * work[21] - (work[22] * (2.0 * work[211]
-        - work[117] * work[10] + (work[27] * work[230] - (work[25] + work[18] * work[186]))) + 2.0
-        * (work[126] * work[231]));
+    const double t1 = 2.0 * (work[3] * work[125]) - work[117] * work[21]
+        - (work[22] * (2.0 * work[211] - work[117] * work[10] + (work[27] * work[230]
+        - (work[25] + work[18] * work[186]))) + 2.0 * (work[126] * work[231]));
     const double t2 = work[232] + t1;
     const double t3 = work[233] + 2.0 * (work[3] * work[142]) - (work[22] * (work[234] + 2.0 * work[179]
         + (work[14] + work[27] * work[235] - work[18] * work[199])) + 2.0 * (work[143] * work[231]));
     const double t4 = t3 - work[236];
-    const double t5 = work[237] + 2.0 * (work[3] * work[156]) - (work[22] * (work[238] + 2.0
-        * (work[20] * work[3]) + (work[27] * work[239] - work[18] * work[204])) + 2.0
-        * (work[157] * work[231]));
+    const double t5 = work[237] + 2.0 * (work[3] * work[156])
+        - (work[22] * (work[238] + 2.0 * (work[20] * work[3]) + (work[27] * work[239] - work[18] * work[204]))
+        + 2.0 * (work[157] * work[231]));
     const double t6 = G3 * coef[0], t7 = G2 * coef[0], t8 = G1 * coef[0];
     jacobian[65] = coef[3] * work[229];
     jacobian[68] = coef[0] * work[229];
@@ -886,10 +894,10 @@ static void satellite_turn(const double coef[7], const double y[9], double turn[
 double satellite_hamiltonian(const satellite_params *params, const double x[9])
 {
     if (params == NULL) params = &satellite_default_params;
-    const double I1 = params->I1, I2 = params->I2, I3 = params->I3, n = params->n, m1 = x[0], m2 = x[1], m3 =
-        x[2], N1 = x[3], N2 = x[4], N3 = x[5], G1 = x[6], G2 = x[7], G3 = x[8];
-    const double t1 = 0.5 * (m3 * m3 / I3 + (m1 * m1 / I1 + m2 * m2 / I2)) - n
-        * (N3 * m3 + (N1 * m1 + N2 * m2));
+    const double I1 = params->I1, I2 = params->I2, I3 = params->I3, n = params->n, m1 = x[0], m2 = x[1],
+        m3 = x[2], N1 = x[3], N2 = x[4], N3 = x[5], G1 = x[6], G2 = x[7], G3 = x[8];
+    const double t1 = 0.5 * (m3 * m3 / I3 + (m1 * m1 / I1 + m2 * m2 / I2))
+        - n * (N3 * m3 + (N1 * m1 + N2 * m2));
     return t1 + 1.5 * (n * n * (I3 * (G3 * G3) + (I2 * (G2 * G2) + I1 * (G1 * G1))));
 }
 
@@ -905,8 +913,8 @@ void satellite_casimirs(const satellite_params *params, const double x[9], doubl
 void satellite_vector_field(const satellite_params *params, const double x[9], double out[9])
 {
     if (params == NULL) params = &satellite_default_params;
-    const double I1 = params->I1, I2 = params->I2, I3 = params->I3, n = params->n, m1 = x[0], m2 = x[1], m3 =
-        x[2], N1 = x[3], N2 = x[4], N3 = x[5], G1 = x[6], G2 = x[7], G3 = x[8];
+    const double I1 = params->I1, I2 = params->I2, I3 = params->I3, n = params->n, m1 = x[0], m2 = x[1],
+        m3 = x[2], N1 = x[3], N2 = x[4], N3 = x[5], G1 = x[6], G2 = x[7], G3 = x[8];
     const double t1 = n * n, t2 = G3 * (I3 * t1), t3 = G2 * (I2 * t1), t4 = m2 * n, t5 = m3 * n;
     const double t6 = m3 / I3 - N3 * n, t7 = m2 / I2 - N2 * n, t8 = m1 * n, t9 = m1 / I1 - N1 * n;
     const double t10 = G1 * (I1 * t1);
@@ -922,6 +930,13 @@ void satellite_vector_field(const satellite_params *params, const double x[9], d
 }
 
 /* ---- Compensated sums, linear equations ---- */
+static int satellite_finite(const double *values, int count)
+{
+    for (int k = 0; k < count; ++k)
+        if (!isfinite(values[k])) return 0;
+    return 1;
+}
+
 /* x + change + small in compensated arithmetic, where small is the carry and what is as small: were that
    rounded with the change, corrections of one sign would add up to a drift. 0, and x as before, if the sum is
    not finite. */
@@ -1073,8 +1088,8 @@ static void satellite_turn_by(satellite_solver *s, const double factor[satellite
     double change[satellite_ELEMENT];
     satellite_added(s->turned, factor, change);
     for (int i = 0; i < satellite_ELEMENT; ++i) {
-        const double moved = change[i] + s->turned_carry[i], sum = s->turned[i] + moved, added = sum
-            - s->turned[i];
+        const double moved = change[i] + s->turned_carry[i], sum = s->turned[i] + moved,
+            added = sum - s->turned[i];
         s->turned_carry[i] = (s->turned[i] - (sum - added)) + (moved - added);
         s->turned[i] = sum;
     }
@@ -1195,14 +1210,13 @@ static satellite_status satellite_attempt(satellite_solver *s, int stage)
 /* how far the state may be moved, in its own size, for guesses to move with it */
 #define satellite_NEAR_BY 0.125
 
-/* Guesses move with the state, by as many past values as extrapolation needs; recurrences are of the motion
-   as it was. From far away all begins anew, with the next step. */
-static void satellite_move_guesses(satellite_solver *s, const double to[satellite_DIM])
+/* Guesses move with the state. From far away all begins anew, with the next step. */
+static void satellite_move_guesses(satellite_solver *s, const double from[satellite_DIM])
 {
     double distance = 0.0, size = 0.0;
     for (int i = 0; i < satellite_DIM; ++i) {
-        distance += fabs(to[i] - s->x[i]);
-        size += fabs(s->x[i]);
+        distance += fabs(s->x[i] - from[i]);
+        size += fabs(from[i]);
     }
     if (!(distance <= satellite_NEAR_BY * size)) {
         s->h = (double)NAN;
@@ -1210,41 +1224,29 @@ static void satellite_move_guesses(satellite_solver *s, const double to[satellit
     }
     for (int stage = 0; stage < satellite_STAGES; ++stage) {
         satellite_history *history = &s->history[stage];
-        for (int i = 0; i < satellite_DIM; ++i) history->difference[0][i] += to[i] - s->x[i];
+        for (int i = 0; i < satellite_DIM; ++i) history->difference[0][i] += s->x[i] - from[i];
     }
-}
-
-/* Stand at x + carry from now on. */
-static satellite_status satellite_place(satellite_solver *s, const double x[satellite_DIM],
-    const double carry[satellite_DIM])
-{
-    for (int i = 0; i < satellite_DIM; ++i)
-        if (!isfinite(x[i])) return satellite_BAD_ARGUMENT;
-    satellite_move_guesses(s, x);
-    memcpy(s->x, x, sizeof s->x);
-    memcpy(s->carry, carry, sizeof s->carry);
-    return satellite_OK;
 }
 
 satellite_status satellite_set_state(satellite_solver *s, const double x[satellite_DIM])
 {
-    double to[satellite_DIM], carry[satellite_DIM] = { 0.0 };
-    if (s == NULL || x == NULL) return satellite_BAD_ARGUMENT;
-    memcpy(to, x, sizeof to); /* which may be a part of *s */
-    return satellite_place(s, to, carry);
+    if (s == NULL || x == NULL || !satellite_finite(x, satellite_DIM)) return satellite_BAD_ARGUMENT;
+    double from[satellite_DIM];
+    memcpy(from, s->x, sizeof from);
+    memmove(s->x, x, sizeof s->x); /* x may be a part of *s */
+    memset(s->carry, 0, sizeof s->carry);
+    satellite_move_guesses(s, from);
+    return satellite_OK;
 }
 
 satellite_status satellite_kick(satellite_solver *s, const double change[satellite_DIM])
 {
-    double to[satellite_DIM], carry[satellite_DIM];
     if (s == NULL || change == NULL) return satellite_BAD_ARGUMENT;
-    for (int i = 0; i < satellite_DIM; ++i) {
-        const double sum = s->x[i] + change[i], added = sum - s->x[i];
-        const double lost = ((s->x[i] - (sum - added)) + (change[i] - added)) + s->carry[i];
-        to[i] = sum + lost;
-        carry[i] = lost - (to[i] - sum);
-    }
-    return satellite_place(s, to, carry);
+    double from[satellite_DIM];
+    memcpy(from, s->x, sizeof from);
+    if (!satellite_advance(s, change, s->carry)) return satellite_BAD_ARGUMENT;
+    satellite_move_guesses(s, from);
+    return satellite_OK;
 }
 
 /* ---- The solver ---- */
@@ -1258,12 +1260,10 @@ satellite_status satellite_init(satellite_solver *s, const satellite_params *par
     satellite_solver fresh = { .h = (double)NAN };
     fresh.params = params != NULL ? *params : satellite_default_params;
     memcpy(fresh.x, x0, sizeof fresh.x);
-    for (int i = 0; i < satellite_DIM; ++i)
-        if (!isfinite(fresh.x[i])) return satellite_BAD_ARGUMENT;
-    if (!satellite_allowed(&fresh.params)) return satellite_BAD_ARGUMENT;
+    if (!satellite_finite(fresh.x, satellite_DIM) || !satellite_allowed(&fresh.params))
+        return satellite_BAD_ARGUMENT;
     satellite_prepare(&fresh.params, satellite_SHORT_STEP, fresh.coef[0]);
-    for (int k = 0; k < satellite_COEFFICIENTS; ++k)
-        if (!isfinite(fresh.coef[0][k])) return satellite_BAD_ARGUMENT;
+    if (!satellite_finite(fresh.coef[0], satellite_COEFFICIENTS)) return satellite_BAD_ARGUMENT;
     double identity[satellite_ELEMENT] = { 1.0 };
     satellite_begin_attitude(&fresh, identity);
     *s = fresh;

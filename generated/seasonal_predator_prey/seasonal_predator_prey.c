@@ -21,7 +21,7 @@
  *   5. Between steps
  *   6. The solver
  *   7. Ensembles
- * body-sha256: c5a7526597a2a76c3262c5b6bca3eb7cf41dfa585f3fb7755f33a432128806ea
+ * body-sha256: c8ae3319839072ed61f6b744b74a0c13efd49f7f0467dcaaee70f0831749a22f
  */
 #include "seasonal_predator_prey.h"
 
@@ -80,10 +80,10 @@ static void seasonal_predator_prey_prepare(const seasonal_predator_prey_params *
     coef[10] = t3 * (params->epsilon * params->epsilon) * t7;
     coef[11] = (-1.0 / 12.0) * (t7 * (params->epsilon * t3));
     coef[12] = t3 * (params->delta * params->epsilon * (params->alpha * params->beta));
-    coef[13] = t3 * (params->beta * params->delta) * (1.0 / 12.0 * params->alpha + 1.0 / 12.0
-        * params->gamma);
-    coef[14] = h * (params->alpha * params->epsilon) * (1.0 - 1.0 / 24.0
-        * (t2 * (params->omega * params->omega)));
+    coef[13] = t3 * (params->beta * params->delta) * (1.0 / 12.0 * params->alpha
+        + 1.0 / 12.0 * params->gamma);
+    coef[14] = h * (params->alpha * params->epsilon) * (1.0
+        - 1.0 / 24.0 * (t2 * (params->omega * params->omega)));
     coef[15] = params->alpha * h;
 }
 
@@ -151,6 +151,13 @@ void seasonal_predator_prey_vector_field(const seasonal_predator_prey_params *pa
 }
 
 /* ---- Compensated sums, linear equations ---- */
+static int seasonal_predator_prey_finite(const double *values, int count)
+{
+    for (int k = 0; k < count; ++k)
+        if (!isfinite(values[k])) return 0;
+    return 1;
+}
+
 /* x + change + small in compensated arithmetic, where small is the carry and what is as small: were that
    rounded with the change, corrections of one sign would add up to a drift. 0, and x as before, if the sum is
    not finite. */
@@ -269,8 +276,8 @@ static int seasonal_predator_prey_plausible(const seasonal_predator_prey_solver 
     seasonal_predator_prey_vector_field(&s->params, s->t, s->x, field);
     for (int i = 0; i < seasonal_predator_prey_DIM; ++i) size += fabs(s->h * field[i]);
     if (moved <= seasonal_predator_prey_PLAUSIBLE * size) return 1;
-    const double before = seasonal_predator_prey_hamiltonian(&s->params, s->t, s->x), after =
-        seasonal_predator_prey_hamiltonian(&s->params, s->t, end);
+    const double before = seasonal_predator_prey_hamiltonian(&s->params, s->t, s->x),
+        after = seasonal_predator_prey_hamiltonian(&s->params, s->t, end);
     const double between = seasonal_predator_prey_hamiltonian(&s->params, s->t, middle);
     return fabs(after - before) <= seasonal_predator_prey_LOST * (fabs(before) + fabs(between) + fabs(after));
 }
@@ -317,8 +324,8 @@ static seasonal_predator_prey_status seasonal_predator_prey_attempt(seasonal_pre
         if (!regular) return seasonal_predator_prey_SINGULAR;
         for (int i = 0; i < seasonal_predator_prey_DIM; ++i) y[i] -= delta[i];
         const double remaining = size * size * (growth > 1.0 ? growth : 1.0);
-        const int stalled = previous < seasonal_predator_prey_NEARLY_SOLVED && size
-            > seasonal_predator_prey_SHRINKING * previous;
+        const int stalled = previous < seasonal_predator_prey_NEARLY_SOLVED
+            && size > seasonal_predator_prey_SHRINKING * previous;
         previous = size;
         if (!(remaining <= seasonal_predator_prey_TOLERANCE || stalled)) continue;
         /* the correction of the increment, and the carry */
@@ -340,14 +347,13 @@ static seasonal_predator_prey_status seasonal_predator_prey_attempt(seasonal_pre
 /* how far the state may be moved, in its own size, for guesses to move with it */
 #define seasonal_predator_prey_NEAR_BY 0.125
 
-/* Guesses move with the state, by as many past values as extrapolation needs; recurrences are of the motion
-   as it was. From far away all begins anew, with the next step. */
+/* Guesses move with the state. From far away all begins anew, with the next step. */
 static void seasonal_predator_prey_move_guesses(seasonal_predator_prey_solver *s,
-    const double to[seasonal_predator_prey_DIM])
+    const double from[seasonal_predator_prey_DIM])
 {
     double distance = 0.0, size = 0.0;
     for (int i = 0; i < seasonal_predator_prey_DIM; ++i) {
-        distance = fmax(distance, fabs(to[i] / s->x[i] - 1.0));
+        distance = fmax(distance, fabs(s->x[i] / from[i] - 1.0));
         size = 1.0;
     }
     if (!(distance <= seasonal_predator_prey_NEAR_BY * size)) {
@@ -355,42 +361,31 @@ static void seasonal_predator_prey_move_guesses(seasonal_predator_prey_solver *s
         return;
     }
     seasonal_predator_prey_history *history = &s->history;
-    for (int i = 0; i < seasonal_predator_prey_DIM; ++i) history->difference[0][i] += to[i] - s->x[i];
-}
-
-/* Stand at x + carry from now on. */
-static seasonal_predator_prey_status seasonal_predator_prey_place(seasonal_predator_prey_solver *s,
-    const double x[seasonal_predator_prey_DIM], const double carry[seasonal_predator_prey_DIM])
-{
-    for (int i = 0; i < seasonal_predator_prey_DIM; ++i)
-        if (!isfinite(x[i])) return seasonal_predator_prey_BAD_ARGUMENT;
-    seasonal_predator_prey_move_guesses(s, x);
-    memcpy(s->x, x, sizeof s->x);
-    memcpy(s->carry, carry, sizeof s->carry);
-    return seasonal_predator_prey_OK;
+    for (int i = 0; i < seasonal_predator_prey_DIM; ++i) history->difference[0][i] += s->x[i] - from[i];
 }
 
 seasonal_predator_prey_status seasonal_predator_prey_set_state(seasonal_predator_prey_solver *s,
     const double x[seasonal_predator_prey_DIM])
 {
-    double to[seasonal_predator_prey_DIM], carry[seasonal_predator_prey_DIM] = { 0.0 };
-    if (s == NULL || x == NULL) return seasonal_predator_prey_BAD_ARGUMENT;
-    memcpy(to, x, sizeof to); /* which may be a part of *s */
-    return seasonal_predator_prey_place(s, to, carry);
+    if (s == NULL || x == NULL || !seasonal_predator_prey_finite(x, seasonal_predator_prey_DIM))
+        return seasonal_predator_prey_BAD_ARGUMENT;
+    double from[seasonal_predator_prey_DIM];
+    memcpy(from, s->x, sizeof from);
+    memmove(s->x, x, sizeof s->x); /* x may be a part of *s */
+    memset(s->carry, 0, sizeof s->carry);
+    seasonal_predator_prey_move_guesses(s, from);
+    return seasonal_predator_prey_OK;
 }
 
 seasonal_predator_prey_status seasonal_predator_prey_kick(seasonal_predator_prey_solver *s,
     const double change[seasonal_predator_prey_DIM])
 {
-    double to[seasonal_predator_prey_DIM], carry[seasonal_predator_prey_DIM];
     if (s == NULL || change == NULL) return seasonal_predator_prey_BAD_ARGUMENT;
-    for (int i = 0; i < seasonal_predator_prey_DIM; ++i) {
-        const double sum = s->x[i] + change[i], added = sum - s->x[i];
-        const double lost = ((s->x[i] - (sum - added)) + (change[i] - added)) + s->carry[i];
-        to[i] = sum + lost;
-        carry[i] = lost - (to[i] - sum);
-    }
-    return seasonal_predator_prey_place(s, to, carry);
+    double from[seasonal_predator_prey_DIM];
+    memcpy(from, s->x, sizeof from);
+    if (!seasonal_predator_prey_advance(s, change, s->carry)) return seasonal_predator_prey_BAD_ARGUMENT;
+    seasonal_predator_prey_move_guesses(s, from);
+    return seasonal_predator_prey_OK;
 }
 
 /* ---- The solver ---- */
@@ -406,12 +401,11 @@ seasonal_predator_prey_status seasonal_predator_prey_init_at(seasonal_predator_p
     fresh.params = params != NULL ? *params : seasonal_predator_prey_default_params;
     memcpy(fresh.x, x0, sizeof fresh.x);
     fresh.t = t0;
-    for (int i = 0; i < seasonal_predator_prey_DIM; ++i)
-        if (!isfinite(fresh.x[i])) return seasonal_predator_prey_BAD_ARGUMENT;
-    if (!seasonal_predator_prey_allowed(&fresh.params)) return seasonal_predator_prey_BAD_ARGUMENT;
+    if (!seasonal_predator_prey_finite(fresh.x, seasonal_predator_prey_DIM)
+        || !seasonal_predator_prey_allowed(&fresh.params)) return seasonal_predator_prey_BAD_ARGUMENT;
     seasonal_predator_prey_prepare(&fresh.params, seasonal_predator_prey_SHORT_STEP, fresh.coef);
-    for (int k = 0; k < seasonal_predator_prey_COEFFICIENTS; ++k)
-        if (!isfinite(fresh.coef[k])) return seasonal_predator_prey_BAD_ARGUMENT;
+    if (!seasonal_predator_prey_finite(fresh.coef, seasonal_predator_prey_COEFFICIENTS))
+        return seasonal_predator_prey_BAD_ARGUMENT;
     *s = fresh;
     return seasonal_predator_prey_OK;
 }
@@ -439,8 +433,8 @@ static seasonal_predator_prey_status seasonal_predator_prey_set_step(seasonal_pr
 /* What depends on the time of the next step. */
 static void seasonal_predator_prey_renew(seasonal_predator_prey_solver *s)
 {
-    seasonal_predator_prey_at_time(s->coef, s->t + seasonal_predator_prey_middles * s->h, s->coef
-        + seasonal_predator_prey_PREPARED);
+    seasonal_predator_prey_at_time(s->coef, s->t + seasonal_predator_prey_middles * s->h,
+        s->coef + seasonal_predator_prey_PREPARED);
 }
 
 /* One stage. A guess from earlier steps may have misled it: then once more without. */
@@ -466,8 +460,10 @@ seasonal_predator_prey_status seasonal_predator_prey_integrate(seasonal_predator
     return status;
 }
 
-seasonal_predator_prey_status seasonal_predator_prey_step(seasonal_predator_prey_solver *s,
-    double h) { return seasonal_predator_prey_integrate(s, h, 1); }
+seasonal_predator_prey_status seasonal_predator_prey_step(seasonal_predator_prey_solver *s, double h)
+{
+    return seasonal_predator_prey_integrate(s, h, 1);
+}
 
 const char *seasonal_predator_prey_status_string(seasonal_predator_prey_status status)
 {

@@ -21,7 +21,7 @@
  *   4. The solver
  *   5. The flows
  *   6. What is seen at sites
- * body-sha256: c467cc170b13c256357cc796f319087a0894c72d4a53a800aa6dd93b31a1453e
+ * body-sha256: 77425deb72829c0640cf6c0da48f17caa3adc961820cfa034bc86b2f4f4bff9f
  */
 #include "sine_gordon.h"
 
@@ -143,8 +143,8 @@ typedef struct {
 /* The piece of that number. */
 static inline sine_gordon_piece sine_gordon_piece_of(const sine_gordon_solver *s, size_t unit)
 {
-    const size_t pieces = sine_gordon_pieces(s), index = pieces == 1 ? unit : unit / pieces, part = unit
-        - index * pieces;
+    const size_t pieces = sine_gordon_pieces(s), index = pieces == 1 ? unit : unit / pieces,
+        part = unit - index * pieces;
     sine_gordon_piece piece;
     sine_gordon_locate(s, index, &piece.row);
     piece.from = (ptrdiff_t)part * sine_gordon_PIECE;
@@ -159,8 +159,8 @@ static inline sine_gordon_piece sine_gordon_piece_of(const sine_gordon_solver *s
    beyond |u| = 10^6. */
 static inline double sine_gordon_turned_sin(double u, double offset)
 {
-    const double shifted = (u * 0.3183098861837907 + offset) + sine_gordon_ROUNDER, k =
-        (shifted - sine_gordon_ROUNDER) - offset;
+    const double shifted = (u * 0.3183098861837907 + offset) + sine_gordon_ROUNDER,
+        k = (shifted - sine_gordon_ROUNDER) - offset;
     const double near = (u - k * 3.141592651605606) - k * 1.9841871479187034e-09;
     const double r = near - k * 1.1442377452219664e-17, q = r * r, qq = q * q;
     uint64_t parity, bits; /* the last bit of shifted is the parity of k + offset */
@@ -382,8 +382,8 @@ sine_gordon_status sine_gordon_init(sine_gordon_solver *s, const sine_gordon_par
     ptrdiff_t width;
     if (s == NULL || sizes == NULL || x0 == NULL || work == NULL) return sine_gordon_BAD_ARGUMENT;
     const sine_gordon_params own = params != NULL ? *params : sine_gordon_default_params;
-    const size_t rows = sine_gordon_shape(sizes, &width), length = sizes[sine_gordon_AXES - 1], sites = rows
-        * length;
+    const size_t rows = sine_gordon_shape(sizes, &width), length = sizes[sine_gordon_AXES - 1],
+        sites = rows * length;
     if (rows == 0 || !sine_gordon_finite(x0, sine_gordon_DIM * sites) || !sine_gordon_allowed(&own, sites))
         return sine_gordon_BAD_ARGUMENT;
     double coef[sine_gordon_COEFFICIENTS];
@@ -515,8 +515,10 @@ sine_gordon_status sine_gordon_integrate(sine_gordon_solver *s, double h, size_t
     return status;
 }
 
-sine_gordon_status sine_gordon_step(sine_gordon_solver *s, double h) { return sine_gordon_integrate(s, h, 1);
-    }
+sine_gordon_status sine_gordon_step(sine_gordon_solver *s, double h)
+{
+    return sine_gordon_integrate(s, h, 1);
+}
 
 /* The sites of fields, without what is beside their rows. */
 static void sine_gordon_take(const sine_gordon_solver *s, double *const fields[sine_gordon_DIM], double *x)
@@ -582,12 +584,18 @@ static void sine_gordon_fill(const sine_gordon_solver *s, sine_gordon_kernel *ke
     }
 }
 
-void sine_gordon_density(const sine_gordon_solver *s, double *out) { sine_gordon_fill(s,
-    sine_gordon_energy_row, out); }
-void sine_gordon_casimirs(const sine_gordon_solver *s, double *out) { sine_gordon_fill(s,
-    sine_gordon_casimirs_row, out); }
-void sine_gordon_vector_field(const sine_gordon_solver *s, double *out) { sine_gordon_fill(s,
-    sine_gordon_vector_field_row, out); }
+void sine_gordon_density(const sine_gordon_solver *s, double *out)
+{
+    sine_gordon_fill(s, sine_gordon_energy_row, out);
+}
+void sine_gordon_casimirs(const sine_gordon_solver *s, double *out)
+{
+    sine_gordon_fill(s, sine_gordon_casimirs_row, out);
+}
+void sine_gordon_vector_field(const sine_gordon_solver *s, double *out)
+{
+    sine_gordon_fill(s, sine_gordon_vector_field_row, out);
+}
 
 const char *sine_gordon_status_string(sine_gordon_status status)
 {

@@ -21,7 +21,7 @@
  *   5. Between steps
  *   6. The solver
  *   7. Ensembles
- * body-sha256: b734dbfa0bcae94eb8de5ca4bab9890a75243b6f30656606cfd58b80192f5372
+ * body-sha256: c5b68fedc568a189e176faf35c84f23e2bfbfbd61c130dcf22e5218486f2dbf4
  */
 #include "sir_epidemic.h"
 
@@ -102,6 +102,13 @@ void sir_epidemic_vector_field(const sir_epidemic_params *params, const double x
 }
 
 /* ---- Compensated sums, linear equations ---- */
+static int sir_epidemic_finite(const double *values, int count)
+{
+    for (int k = 0; k < count; ++k)
+        if (!isfinite(values[k])) return 0;
+    return 1;
+}
+
 /* x + change + small in compensated arithmetic, where small is the carry and what is as small: were that
    rounded with the change, corrections of one sign would add up to a drift. 0, and x as before, if the sum is
    not finite. */
@@ -211,8 +218,8 @@ static int sir_epidemic_plausible(const sir_epidemic_solver *s, const double inc
     for (int i = 0; i < sir_epidemic_DIM; ++i) size += fabs(s->h * field[i]);
     if (moved <= sir_epidemic_PLAUSIBLE * size) return 1;
     const double before = sir_epidemic_hamiltonian(&s->params, s->x);
-    const double after = sir_epidemic_hamiltonian(&s->params, end), between =
-        sir_epidemic_hamiltonian(&s->params, middle);
+    const double after = sir_epidemic_hamiltonian(&s->params, end),
+        between = sir_epidemic_hamiltonian(&s->params, middle);
     return fabs(after - before) <= sir_epidemic_LOST * (fabs(before) + fabs(between) + fabs(after));
 }
 
@@ -415,8 +422,8 @@ static sir_epidemic_status sir_epidemic_attempt(sir_epidemic_solver *s)
         jacobian[sir_epidemic_DIM * sir_epidemic_DIM], previous = HUGE_VAL;
     if (!sir_epidemic_predict(&s->history, y)) memcpy(y, s->x, sizeof y);
     sir_epidemic_generate(coef, y, p, jacobian);
-    for (int iteration = 0, made = 0; iteration < sir_epidemic_MAX_ITERATIONS && made <=
-        sir_epidemic_MOST_PIECES; ++iteration) {
+    for (int iteration = 0, made = 0; iteration < sir_epidemic_MAX_ITERATIONS
+        && made <= sir_epidemic_MOST_PIECES; ++iteration) {
         if (!sir_epidemic_residual(s, coef, p, y, residual, change, jacobian, &made))
             return sir_epidemic_NO_CONVERGENCE;
         double size = 0.0, norm = DBL_MIN;
@@ -447,54 +454,41 @@ static sir_epidemic_status sir_epidemic_attempt(sir_epidemic_solver *s)
 /* how far the state may be moved, in its own size, for guesses to move with it */
 #define sir_epidemic_NEAR_BY 0.125
 
-/* Guesses move with the state, by as many past values as extrapolation needs; recurrences are of the motion
-   as it was. From far away all begins anew, with the next step. */
-static void sir_epidemic_move_guesses(sir_epidemic_solver *s, const double to[sir_epidemic_DIM])
+/* Guesses move with the state. From far away all begins anew, with the next step. */
+static void sir_epidemic_move_guesses(sir_epidemic_solver *s, const double from[sir_epidemic_DIM])
 {
     double distance = 0.0, size = 0.0;
     for (int i = 0; i < sir_epidemic_DIM; ++i) {
-        distance += fabs(to[i] - s->x[i]);
-        size += fabs(s->x[i]);
+        distance += fabs(s->x[i] - from[i]);
+        size += fabs(from[i]);
     }
     if (!(distance <= sir_epidemic_NEAR_BY * size)) {
         s->h = (double)NAN;
         return;
     }
     sir_epidemic_history *history = &s->history;
-    for (int i = 0; i < sir_epidemic_DIM; ++i) history->difference[0][i] += to[i] - s->x[i];
-}
-
-/* Stand at x + carry from now on. */
-static sir_epidemic_status sir_epidemic_place(sir_epidemic_solver *s, const double x[sir_epidemic_DIM],
-    const double carry[sir_epidemic_DIM])
-{
-    for (int i = 0; i < sir_epidemic_DIM; ++i)
-        if (!isfinite(x[i])) return sir_epidemic_BAD_ARGUMENT;
-    sir_epidemic_move_guesses(s, x);
-    memcpy(s->x, x, sizeof s->x);
-    memcpy(s->carry, carry, sizeof s->carry);
-    return sir_epidemic_OK;
+    for (int i = 0; i < sir_epidemic_DIM; ++i) history->difference[0][i] += s->x[i] - from[i];
 }
 
 sir_epidemic_status sir_epidemic_set_state(sir_epidemic_solver *s, const double x[sir_epidemic_DIM])
 {
-    double to[sir_epidemic_DIM], carry[sir_epidemic_DIM] = { 0.0 };
-    if (s == NULL || x == NULL) return sir_epidemic_BAD_ARGUMENT;
-    memcpy(to, x, sizeof to); /* which may be a part of *s */
-    return sir_epidemic_place(s, to, carry);
+    if (s == NULL || x == NULL || !sir_epidemic_finite(x, sir_epidemic_DIM)) return sir_epidemic_BAD_ARGUMENT;
+    double from[sir_epidemic_DIM];
+    memcpy(from, s->x, sizeof from);
+    memmove(s->x, x, sizeof s->x); /* x may be a part of *s */
+    memset(s->carry, 0, sizeof s->carry);
+    sir_epidemic_move_guesses(s, from);
+    return sir_epidemic_OK;
 }
 
 sir_epidemic_status sir_epidemic_kick(sir_epidemic_solver *s, const double change[sir_epidemic_DIM])
 {
-    double to[sir_epidemic_DIM], carry[sir_epidemic_DIM];
     if (s == NULL || change == NULL) return sir_epidemic_BAD_ARGUMENT;
-    for (int i = 0; i < sir_epidemic_DIM; ++i) {
-        const double sum = s->x[i] + change[i], added = sum - s->x[i];
-        const double lost = ((s->x[i] - (sum - added)) + (change[i] - added)) + s->carry[i];
-        to[i] = sum + lost;
-        carry[i] = lost - (to[i] - sum);
-    }
-    return sir_epidemic_place(s, to, carry);
+    double from[sir_epidemic_DIM];
+    memcpy(from, s->x, sizeof from);
+    if (!sir_epidemic_advance(s, change, s->carry)) return sir_epidemic_BAD_ARGUMENT;
+    sir_epidemic_move_guesses(s, from);
+    return sir_epidemic_OK;
 }
 
 /* ---- The solver ---- */
@@ -508,12 +502,10 @@ sir_epidemic_status sir_epidemic_init(sir_epidemic_solver *s, const sir_epidemic
     sir_epidemic_solver fresh = { .h = (double)NAN };
     fresh.params = params != NULL ? *params : sir_epidemic_default_params;
     memcpy(fresh.x, x0, sizeof fresh.x);
-    for (int i = 0; i < sir_epidemic_DIM; ++i)
-        if (!isfinite(fresh.x[i])) return sir_epidemic_BAD_ARGUMENT;
-    if (!sir_epidemic_allowed(&fresh.params)) return sir_epidemic_BAD_ARGUMENT;
+    if (!sir_epidemic_finite(fresh.x, sir_epidemic_DIM) || !sir_epidemic_allowed(&fresh.params))
+        return sir_epidemic_BAD_ARGUMENT;
     sir_epidemic_prepare(&fresh.params, sir_epidemic_SHORT_STEP, fresh.coef);
-    for (int k = 0; k < sir_epidemic_COEFFICIENTS; ++k)
-        if (!isfinite(fresh.coef[k])) return sir_epidemic_BAD_ARGUMENT;
+    if (!sir_epidemic_finite(fresh.coef, sir_epidemic_COEFFICIENTS)) return sir_epidemic_BAD_ARGUMENT;
     *s = fresh;
     return sir_epidemic_OK;
 }
@@ -552,8 +544,10 @@ sir_epidemic_status sir_epidemic_integrate(sir_epidemic_solver *s, double h, siz
     return status;
 }
 
-sir_epidemic_status sir_epidemic_step(sir_epidemic_solver *s, double h) { return sir_epidemic_integrate(s, h,
-    1); }
+sir_epidemic_status sir_epidemic_step(sir_epidemic_solver *s, double h)
+{
+    return sir_epidemic_integrate(s, h, 1);
+}
 
 const char *sir_epidemic_status_string(sir_epidemic_status status)
 {

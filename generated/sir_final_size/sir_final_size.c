@@ -20,7 +20,7 @@
  *   5. Between steps
  *   6. The solver
  *   7. Ensembles
- * body-sha256: 3c1ad9f2d145430f755088c9fdb2c7994f00def0eb542e911df6836af3029965
+ * body-sha256: 09e053bcb630940f6f2eabeddd4ea4b7567c183d16da1122b6addcfa56dc8d91
  */
 #include "sir_final_size.h"
 
@@ -97,6 +97,13 @@ void sir_final_size_vector_field(const sir_final_size_params *params, const doub
 }
 
 /* ---- Compensated sums, linear equations ---- */
+static int sir_final_size_finite(const double *values, int count)
+{
+    for (int k = 0; k < count; ++k)
+        if (!isfinite(values[k])) return 0;
+    return 1;
+}
+
 /* x + change + small in compensated arithmetic, where small is the carry and what is as small: were that
    rounded with the change, corrections of one sign would add up to a drift. 0, and x as before, if the sum is
    not finite. */
@@ -210,8 +217,8 @@ static int sir_final_size_plausible(const sir_final_size_solver *s,
     for (int i = 0; i < sir_final_size_DIM; ++i) size += fabs(s->h * field[i]);
     if (moved <= sir_final_size_PLAUSIBLE * size) return 1;
     const double before = sir_final_size_hamiltonian(&s->params, s->x);
-    const double after = sir_final_size_hamiltonian(&s->params, end), between =
-        sir_final_size_hamiltonian(&s->params, middle);
+    const double after = sir_final_size_hamiltonian(&s->params, end),
+        between = sir_final_size_hamiltonian(&s->params, middle);
     return fabs(after - before) <= sir_final_size_LOST * (fabs(before) + fabs(between) + fabs(after));
 }
 
@@ -427,8 +434,8 @@ static sir_final_size_status sir_final_size_attempt(sir_final_size_solver *s)
         change[sir_final_size_DIM], jacobian[sir_final_size_DIM * sir_final_size_DIM], previous = HUGE_VAL;
     if (!sir_final_size_predict(&s->history, y)) memcpy(y, s->x, sizeof y);
     sir_final_size_generate(coef, y, p, jacobian);
-    for (int iteration = 0, made = 0; iteration < sir_final_size_MAX_ITERATIONS && made <=
-        sir_final_size_MOST_PIECES; ++iteration) {
+    for (int iteration = 0, made = 0; iteration < sir_final_size_MAX_ITERATIONS
+        && made <= sir_final_size_MOST_PIECES; ++iteration) {
         if (!sir_final_size_residual(s, coef, p, y, residual, change, jacobian, &made))
             return sir_final_size_NO_CONVERGENCE;
         double size = 0.0, norm = DBL_MIN;
@@ -460,54 +467,42 @@ static sir_final_size_status sir_final_size_attempt(sir_final_size_solver *s)
 /* how far the state may be moved, in its own size, for guesses to move with it */
 #define sir_final_size_NEAR_BY 0.125
 
-/* Guesses move with the state, by as many past values as extrapolation needs; recurrences are of the motion
-   as it was. From far away all begins anew, with the next step. */
-static void sir_final_size_move_guesses(sir_final_size_solver *s, const double to[sir_final_size_DIM])
+/* Guesses move with the state. From far away all begins anew, with the next step. */
+static void sir_final_size_move_guesses(sir_final_size_solver *s, const double from[sir_final_size_DIM])
 {
     double distance = 0.0, size = 0.0;
     for (int i = 0; i < sir_final_size_DIM; ++i) {
-        distance += fabs(to[i] - s->x[i]);
-        size += fabs(s->x[i]);
+        distance += fabs(s->x[i] - from[i]);
+        size += fabs(from[i]);
     }
     if (!(distance <= sir_final_size_NEAR_BY * size)) {
         s->h = (double)NAN;
         return;
     }
     sir_final_size_history *history = &s->history;
-    for (int i = 0; i < sir_final_size_DIM; ++i) history->difference[0][i] += to[i] - s->x[i];
-}
-
-/* Stand at x + carry from now on. */
-static sir_final_size_status sir_final_size_place(sir_final_size_solver *s,
-    const double x[sir_final_size_DIM], const double carry[sir_final_size_DIM])
-{
-    for (int i = 0; i < sir_final_size_DIM; ++i)
-        if (!isfinite(x[i])) return sir_final_size_BAD_ARGUMENT;
-    sir_final_size_move_guesses(s, x);
-    memcpy(s->x, x, sizeof s->x);
-    memcpy(s->carry, carry, sizeof s->carry);
-    return sir_final_size_OK;
+    for (int i = 0; i < sir_final_size_DIM; ++i) history->difference[0][i] += s->x[i] - from[i];
 }
 
 sir_final_size_status sir_final_size_set_state(sir_final_size_solver *s, const double x[sir_final_size_DIM])
 {
-    double to[sir_final_size_DIM], carry[sir_final_size_DIM] = { 0.0 };
-    if (s == NULL || x == NULL) return sir_final_size_BAD_ARGUMENT;
-    memcpy(to, x, sizeof to); /* which may be a part of *s */
-    return sir_final_size_place(s, to, carry);
+    if (s == NULL || x == NULL || !sir_final_size_finite(x, sir_final_size_DIM))
+        return sir_final_size_BAD_ARGUMENT;
+    double from[sir_final_size_DIM];
+    memcpy(from, s->x, sizeof from);
+    memmove(s->x, x, sizeof s->x); /* x may be a part of *s */
+    memset(s->carry, 0, sizeof s->carry);
+    sir_final_size_move_guesses(s, from);
+    return sir_final_size_OK;
 }
 
 sir_final_size_status sir_final_size_kick(sir_final_size_solver *s, const double change[sir_final_size_DIM])
 {
-    double to[sir_final_size_DIM], carry[sir_final_size_DIM];
     if (s == NULL || change == NULL) return sir_final_size_BAD_ARGUMENT;
-    for (int i = 0; i < sir_final_size_DIM; ++i) {
-        const double sum = s->x[i] + change[i], added = sum - s->x[i];
-        const double lost = ((s->x[i] - (sum - added)) + (change[i] - added)) + s->carry[i];
-        to[i] = sum + lost;
-        carry[i] = lost - (to[i] - sum);
-    }
-    return sir_final_size_place(s, to, carry);
+    double from[sir_final_size_DIM];
+    memcpy(from, s->x, sizeof from);
+    if (!sir_final_size_advance(s, change, s->carry)) return sir_final_size_BAD_ARGUMENT;
+    sir_final_size_move_guesses(s, from);
+    return sir_final_size_OK;
 }
 
 /* ---- The solver ---- */
@@ -521,12 +516,10 @@ sir_final_size_status sir_final_size_init(sir_final_size_solver *s, const sir_fi
     sir_final_size_solver fresh = { .h = (double)NAN };
     fresh.params = params != NULL ? *params : sir_final_size_default_params;
     memcpy(fresh.x, x0, sizeof fresh.x);
-    for (int i = 0; i < sir_final_size_DIM; ++i)
-        if (!isfinite(fresh.x[i])) return sir_final_size_BAD_ARGUMENT;
-    if (!sir_final_size_allowed(&fresh.params)) return sir_final_size_BAD_ARGUMENT;
+    if (!sir_final_size_finite(fresh.x, sir_final_size_DIM) || !sir_final_size_allowed(&fresh.params))
+        return sir_final_size_BAD_ARGUMENT;
     sir_final_size_prepare(&fresh.params, sir_final_size_SHORT_STEP, fresh.coef);
-    for (int k = 0; k < sir_final_size_COEFFICIENTS; ++k)
-        if (!isfinite(fresh.coef[k])) return sir_final_size_BAD_ARGUMENT;
+    if (!sir_final_size_finite(fresh.coef, sir_final_size_COEFFICIENTS)) return sir_final_size_BAD_ARGUMENT;
     *s = fresh;
     return sir_final_size_OK;
 }
@@ -565,8 +558,10 @@ sir_final_size_status sir_final_size_integrate(sir_final_size_solver *s, double 
     return status;
 }
 
-sir_final_size_status sir_final_size_step(sir_final_size_solver *s,
-    double h) { return sir_final_size_integrate(s, h, 1); }
+sir_final_size_status sir_final_size_step(sir_final_size_solver *s, double h)
+{
+    return sir_final_size_integrate(s, h, 1);
+}
 
 const char *sir_final_size_status_string(sir_final_size_status status)
 {

@@ -23,7 +23,7 @@
  *   6. Between steps
  *   7. The solver
  *   8. Ensembles
- * body-sha256: 5fecd7b357404a223d27fcc820c7c399df9e31a2cf56fbe8a7ddbac780d0cb5d
+ * body-sha256: 9984ef7c3eaded44abb05b056aa95bc35008677344a9339836632d3228bd7a05
  */
 #include "sklyanin_gyrostat.h"
 
@@ -98,8 +98,8 @@ static void sklyanin_gyrostat_generate(const double coef[31], const double y[4],
     const double t7 = coef[1] * t1, t8 = coef[2] + coef[3] * t1, t9 = S2 * t8;
     const double t10 = S1 * (t3 + t6) + (coef[0] * t1 + S2 * (t7 + t9)), t11 = S0 * S0;
     const double t12 = coef[14] + t2;
-    const double t13 = coef[20] + t11 * (S1 * (coef[4] + S1 * coef[8]) + (coef[0] + S2 * (coef[1] + S2
-        * coef[3])));
+    const double t13 = coef[20] + t11 * (S1 * (coef[4] + S1 * coef[8])
+        + (coef[0] + S2 * (coef[1] + S2 * coef[3])));
     slope[0] = S0 * t10;
     slope[1] = coef[11] + S1 * coef[12] + t11 * (coef[13] * t1 + S2 * (coef[14] + S2 * coef[15]) + t6);
     slope[2] = coef[16] + S2 * coef[17] + t11 * (S1 * (t12 + S1 * (coef[19] + t4)) + (coef[18] * t1 + t9));
@@ -175,6 +175,13 @@ void sklyanin_gyrostat_vector_field(const sklyanin_gyrostat_params *params, cons
 }
 
 /* ---- Compensated sums, linear equations ---- */
+static int sklyanin_gyrostat_finite(const double *values, int count)
+{
+    for (int k = 0; k < count; ++k)
+        if (!isfinite(values[k])) return 0;
+    return 1;
+}
+
 /* x + change + small in compensated arithmetic, where small is the carry and what is as small: were that
    rounded with the change, corrections of one sign would add up to a drift. 0, and x as before, if the sum is
    not finite. */
@@ -291,8 +298,8 @@ static int sklyanin_gyrostat_plausible(const sklyanin_gyrostat_solver *s,
     for (int i = 0; i < sklyanin_gyrostat_DIM; ++i) size += fabs(s->h * field[i]);
     if (moved <= sklyanin_gyrostat_PLAUSIBLE * size) return 1;
     const double before = sklyanin_gyrostat_hamiltonian(&s->params, s->x);
-    const double after = sklyanin_gyrostat_hamiltonian(&s->params, end), between =
-        sklyanin_gyrostat_hamiltonian(&s->params, middle);
+    const double after = sklyanin_gyrostat_hamiltonian(&s->params, end),
+        between = sklyanin_gyrostat_hamiltonian(&s->params, middle);
     return fabs(after - before) <= sklyanin_gyrostat_LOST * (fabs(before) + fabs(between) + fabs(after));
 }
 
@@ -586,12 +593,12 @@ static sklyanin_gyrostat_status sklyanin_gyrostat_attempt(sklyanin_gyrostat_solv
 {
     const double *coef = s->coef;
     double p[sklyanin_gyrostat_DIM], y[sklyanin_gyrostat_DIM], residual[sklyanin_gyrostat_DIM],
-        change[sklyanin_gyrostat_DIM], jacobian[sklyanin_gyrostat_DIM * sklyanin_gyrostat_DIM], previous =
-        HUGE_VAL;
+        change[sklyanin_gyrostat_DIM], jacobian[sklyanin_gyrostat_DIM * sklyanin_gyrostat_DIM],
+        previous = HUGE_VAL;
     if (!sklyanin_gyrostat_predict(&s->history, y)) memcpy(y, s->x, sizeof y);
     sklyanin_gyrostat_generate(coef, y, p, jacobian);
-    for (int iteration = 0, made = 0; iteration < sklyanin_gyrostat_MAX_ITERATIONS && made <=
-        sklyanin_gyrostat_MOST_PIECES; ++iteration) {
+    for (int iteration = 0, made = 0; iteration < sklyanin_gyrostat_MAX_ITERATIONS
+        && made <= sklyanin_gyrostat_MOST_PIECES; ++iteration) {
         if (!sklyanin_gyrostat_residual(s, coef, p, y, residual, change, jacobian, &made))
             return sklyanin_gyrostat_NO_CONVERGENCE;
         double size = 0.0, norm = DBL_MIN;
@@ -638,57 +645,45 @@ static void sklyanin_gyrostat_choose_gauge(const sklyanin_gyrostat_params *param
 /* how far the state may be moved, in its own size, for guesses to move with it */
 #define sklyanin_gyrostat_NEAR_BY 0.125
 
-/* Guesses move with the state, by as many past values as extrapolation needs; recurrences are of the motion
-   as it was. From far away all begins anew, with the next step. */
+/* Guesses move with the state. From far away all begins anew, with the next step. */
 static void sklyanin_gyrostat_move_guesses(sklyanin_gyrostat_solver *s,
-    const double to[sklyanin_gyrostat_DIM])
+    const double from[sklyanin_gyrostat_DIM])
 {
     double distance = 0.0, size = 0.0;
     for (int i = 0; i < sklyanin_gyrostat_DIM; ++i) {
-        distance += fabs(to[i] - s->x[i]);
-        size += fabs(s->x[i]);
+        distance += fabs(s->x[i] - from[i]);
+        size += fabs(from[i]);
     }
     if (!(distance <= sklyanin_gyrostat_NEAR_BY * size)) {
         s->h = (double)NAN;
         return;
     }
     sklyanin_gyrostat_history *history = &s->history;
-    for (int i = 0; i < sklyanin_gyrostat_DIM; ++i) history->difference[0][i] += to[i] - s->x[i];
-}
-
-/* Stand at x + carry from now on. */
-static sklyanin_gyrostat_status sklyanin_gyrostat_place(sklyanin_gyrostat_solver *s,
-    const double x[sklyanin_gyrostat_DIM], const double carry[sklyanin_gyrostat_DIM])
-{
-    for (int i = 0; i < sklyanin_gyrostat_DIM; ++i)
-        if (!isfinite(x[i])) return sklyanin_gyrostat_BAD_ARGUMENT;
-    sklyanin_gyrostat_move_guesses(s, x);
-    memcpy(s->x, x, sizeof s->x);
-    memcpy(s->carry, carry, sizeof s->carry);
-    return sklyanin_gyrostat_OK;
+    for (int i = 0; i < sklyanin_gyrostat_DIM; ++i) history->difference[0][i] += s->x[i] - from[i];
 }
 
 sklyanin_gyrostat_status sklyanin_gyrostat_set_state(sklyanin_gyrostat_solver *s,
     const double x[sklyanin_gyrostat_DIM])
 {
-    double to[sklyanin_gyrostat_DIM], carry[sklyanin_gyrostat_DIM] = { 0.0 };
-    if (s == NULL || x == NULL) return sklyanin_gyrostat_BAD_ARGUMENT;
-    memcpy(to, x, sizeof to); /* which may be a part of *s */
-    return sklyanin_gyrostat_place(s, to, carry);
+    if (s == NULL || x == NULL || !sklyanin_gyrostat_finite(x, sklyanin_gyrostat_DIM))
+        return sklyanin_gyrostat_BAD_ARGUMENT;
+    double from[sklyanin_gyrostat_DIM];
+    memcpy(from, s->x, sizeof from);
+    memmove(s->x, x, sizeof s->x); /* x may be a part of *s */
+    memset(s->carry, 0, sizeof s->carry);
+    sklyanin_gyrostat_move_guesses(s, from);
+    return sklyanin_gyrostat_OK;
 }
 
 sklyanin_gyrostat_status sklyanin_gyrostat_kick(sklyanin_gyrostat_solver *s,
     const double change[sklyanin_gyrostat_DIM])
 {
-    double to[sklyanin_gyrostat_DIM], carry[sklyanin_gyrostat_DIM];
     if (s == NULL || change == NULL) return sklyanin_gyrostat_BAD_ARGUMENT;
-    for (int i = 0; i < sklyanin_gyrostat_DIM; ++i) {
-        const double sum = s->x[i] + change[i], added = sum - s->x[i];
-        const double lost = ((s->x[i] - (sum - added)) + (change[i] - added)) + s->carry[i];
-        to[i] = sum + lost;
-        carry[i] = lost - (to[i] - sum);
-    }
-    return sklyanin_gyrostat_place(s, to, carry);
+    double from[sklyanin_gyrostat_DIM];
+    memcpy(from, s->x, sizeof from);
+    if (!sklyanin_gyrostat_advance(s, change, s->carry)) return sklyanin_gyrostat_BAD_ARGUMENT;
+    sklyanin_gyrostat_move_guesses(s, from);
+    return sklyanin_gyrostat_OK;
 }
 
 /* ---- The solver ---- */
@@ -701,12 +696,11 @@ sklyanin_gyrostat_status sklyanin_gyrostat_init_gauge(sklyanin_gyrostat_solver *
     sklyanin_gyrostat_solver fresh = { .h = (double)NAN };
     fresh.params = params != NULL ? *params : sklyanin_gyrostat_default_params;
     memcpy(fresh.x, x0, sizeof fresh.x);
-    for (int i = 0; i < sklyanin_gyrostat_DIM; ++i)
-        if (!isfinite(fresh.x[i])) return sklyanin_gyrostat_BAD_ARGUMENT;
+    if (!sklyanin_gyrostat_finite(fresh.x, sklyanin_gyrostat_DIM)) return sklyanin_gyrostat_BAD_ARGUMENT;
     if (gauge == NULL) sklyanin_gyrostat_choose_gauge(&fresh.params, fresh.x, fresh.gauge);
     else memcpy(fresh.gauge, gauge, sizeof fresh.gauge);
-    for (int c = 0; c < sklyanin_gyrostat_GAUGES; ++c)
-        if (!isfinite(fresh.gauge[c])) return sklyanin_gyrostat_BAD_ARGUMENT;
+    if (!sklyanin_gyrostat_finite(fresh.gauge, sklyanin_gyrostat_GAUGES))
+        return sklyanin_gyrostat_BAD_ARGUMENT;
     *s = fresh;
     return sklyanin_gyrostat_OK;
 }
@@ -751,8 +745,10 @@ sklyanin_gyrostat_status sklyanin_gyrostat_integrate(sklyanin_gyrostat_solver *s
     return status;
 }
 
-sklyanin_gyrostat_status sklyanin_gyrostat_step(sklyanin_gyrostat_solver *s,
-    double h) { return sklyanin_gyrostat_integrate(s, h, 1); }
+sklyanin_gyrostat_status sklyanin_gyrostat_step(sklyanin_gyrostat_solver *s, double h)
+{
+    return sklyanin_gyrostat_integrate(s, h, 1);
+}
 
 const char *sklyanin_gyrostat_status_string(sklyanin_gyrostat_status status)
 {

@@ -23,7 +23,7 @@
  *   6. Between steps
  *   7. The solver
  *   8. Ensembles
- * body-sha256: 69983b33d5527d9d9d0e0e50c2812efae44735d639b51dda5b52e35d16b2d736
+ * body-sha256: 50078fcfd692cde864cb5fc8a866477ffd6f52ad47dc67fa17ca61f3038d67d5
  */
 #include "so4_manakov.h"
 
@@ -444,12 +444,12 @@ so4_manakov_APART static void so4_manakov_linearise_part2(const double coef[32],
     work[125] = x13 * work[112];
     work[126] = x24 * work[113];
     work[128] = x23 * work[114];
-    jacobian[0] = 1.0 + (work[6] + (work[7] * work[8] + work[9] * work[10] + (work[11] * work[12] + work[13]
-        * work[14] + (work[15] * work[16] + work[17] * t1))));
+    jacobian[0] = 1.0 + (work[6] + (work[7] * work[8] + work[9] * work[10] + (work[11] * work[12]
+        + work[13] * work[14] + (work[15] * work[16] + work[17] * t1))));
     jacobian[1] = t4 - t6 - work[26] + (work[114] * work[8] + work[27] * work[10] + (work[115] * t1
         + work[116] * work[16] + (work[13] * work[12] + work[28] * work[14])));
-    jacobian[2] = t14 - work[33] + (work[113] * work[8] + work[121] * work[10] + (work[34] * t1 + work[35]
-        * work[16] + (work[17] * work[12] + work[115] * work[14])));
+    jacobian[2] = t14 - work[33] + (work[113] * work[8] + work[121] * work[10]
+        + (work[34] * t1 + work[35] * work[16] + (work[17] * work[12] + work[115] * work[14])));
     jacobian[3] = work[38] + t16 + (work[112] * work[8] + work[120] * work[10] + (work[39] * work[16]
         + work[35] * t1 + (work[15] * work[12] + work[116] * work[14])));
     jacobian[4] = work[42] + (t4 + t6) + (work[123] * work[8] + work[43] * work[10] + (work[9] * work[12]
@@ -461,20 +461,20 @@ so4_manakov_APART static void so4_manakov_linearise_part2(const double coef[32],
         + (work[115] * t43 + work[116] * t40))));
     jacobian[8] = t61 - t63 - work[85] + (work[121] * t28 + work[113] * t32 + (work[34] * t43 + work[35] * t40
         + (work[115] * t49 + work[17] * t51)));
-    jacobian[9] = t64 - t63 - work[86] + (work[120] * t28 + work[112] * t32 + (work[116] * t49 + work[15]
-        * t51 + (work[39] * t40 + work[35] * t43)));
+    jacobian[9] = t64 - t63 - work[86] + (work[120] * t28 + work[112] * t32 + (work[116] * t49
+        + work[15] * t51 + (work[39] * t40 + work[35] * t43)));
     jacobian[10] = t65 + (work[43] * t28 + work[123] * t32 + (work[120] * t40 + work[121] * t43
         + (work[27] * t49 + work[9] * t51)));
-    jacobian[11] = work[42] + (t20 + t66) + (work[123] * t28 + work[46] * t32 + (work[114] * t49 + work[7]
-        * t51 + (work[113] * t43 + work[112] * t40)));
+    jacobian[11] = work[42] + (t20 + t66) + (work[123] * t28 + work[46] * t32 + (work[114] * t49
+        + work[7] * t51 + (work[113] * t43 + work[112] * t40)));
     jacobian[12] = work[33] + t68 + (work[9] * t74 + work[7] * t78 + (work[17] * t83 + work[15] * t86
         + (work[13] * t89 + work[11] * t92)));
     jacobian[17] = t16 - work[38] + (work[123] * t74 + work[46] * t78 + (work[112] * t86 + work[113] * t83
         + (work[114] * t89 + work[7] * t92)));
-    jacobian[13] = work[85] + (t94 + t61) + (work[114] * t78 + work[27] * t74 + (work[115] * t83 + work[116]
-        * t86 + (work[13] * t92 + work[28] * t89)));
-    jacobian[16] = t61 - t94 - work[86] + (work[43] * t74 + work[123] * t78 + (work[121] * t83 + work[120]
-        * t86 + (work[27] * t89 + work[9] * t92)));
+    jacobian[13] = work[85] + (t94 + t61) + (work[114] * t78 + work[27] * t74 + (work[115] * t83
+        + work[116] * t86 + (work[13] * t92 + work[28] * t89)));
+    jacobian[16] = t61 - t94 - work[86] + (work[43] * t74 + work[123] * t78 + (work[121] * t83
+        + work[120] * t86 + (work[27] * t89 + work[9] * t92)));
     jacobian[14] = 1.0 + (t98 + (work[113] * t78 + work[121] * t74 + (work[34] * t83 + work[35] * t86
         + (work[115] * t89 + work[17] * t92))));
     jacobian[15] = t100;
@@ -484,8 +484,8 @@ so4_manakov_APART static void so4_manakov_linearise_part2(const double coef[32],
         + work[115] * t108 + (work[13] * t111 + work[28] * t112)));
     jacobian[21] = 1.0 + (t98 + (work[112] * t106 + work[120] * t104 + (work[39] * t109 + work[35] * t108
         + (work[15] * t111 + work[116] * t112))));
-    jacobian[22] = t64 - t94 - work[85] + (work[43] * t104 + work[123] * t106 + (work[121] * t108 + work[120]
-        * t109 + (work[9] * t111 + work[27] * t112)));
+    jacobian[22] = t64 - t94 - work[85] + (work[43] * t104 + work[123] * t106 + (work[121] * t108
+        + work[120] * t109 + (work[9] * t111 + work[27] * t112)));
     jacobian[23] = work[33] + t14 + (work[46] * t106 + work[123] * t104 + (work[113] * t108 + work[112] * t109
         + (work[7] * t111 + work[114] * t112)));
     jacobian[20] = t114;
@@ -495,20 +495,20 @@ so4_manakov_APART static void so4_manakov_linearise_part2(const double coef[32],
         + (work[116] * t121 + work[115] * t122)));
     jacobian[26] = work[86] + (t63 + t61) + (work[121] * t116 + work[113] * t117 + (work[115] * t119
         + work[17] * t120 + (work[34] * t122 + work[35] * t121)));
-    jacobian[27] = work[85] + (t63 + t64) + (work[120] * t116 + work[112] * t117 + (work[35] * t122 + work[39]
-        * t121 + (work[116] * t119 + work[15] * t120)));
+    jacobian[27] = work[85] + (t63 + t64) + (work[120] * t116 + work[112] * t117 + (work[35] * t122
+        + work[39] * t121 + (work[116] * t119 + work[15] * t120)));
     jacobian[28] = 1.0 + (t58 + (work[43] * t116 + work[123] * t117 + (work[121] * t122 + work[120] * t121
         + (work[27] * t119 + work[9] * t120))));
-    jacobian[29] = t66 - t20 - work[26] + (work[123] * t116 + work[46] * t117 + (work[114] * t119 + work[7]
-        * t120 + (work[112] * t121 + work[113] * t122)));
-    jacobian[31] = t66 - t6 - work[42] + (work[114] * t124 + work[27] * t126 + (work[116] * t131 + work[115]
-        * t133 + (work[13] * t128 + work[28] * t129)));
-    jacobian[32] = work[38] + t102 + (work[113] * t124 + work[121] * t126 + (work[17] * t128 + work[115]
-        * t129 + (work[35] * t131 + work[34] * t133)));
+    jacobian[29] = t66 - t20 - work[26] + (work[123] * t116 + work[46] * t117 + (work[114] * t119
+        + work[7] * t120 + (work[112] * t121 + work[113] * t122)));
+    jacobian[31] = t66 - t6 - work[42] + (work[114] * t124 + work[27] * t126 + (work[116] * t131
+        + work[115] * t133 + (work[13] * t128 + work[28] * t129)));
+    jacobian[32] = work[38] + t102 + (work[113] * t124 + work[121] * t126 + (work[17] * t128
+        + work[115] * t129 + (work[35] * t131 + work[34] * t133)));
     jacobian[33] = t68 - work[33] + (work[112] * t124 + work[120] * t126 + (work[15] * t128 + work[116] * t129
         + (work[35] * t133 + work[39] * t131)));
-    jacobian[34] = work[26] + (t6 + t66) + (work[123] * t124 + work[43] * t126 + (work[121] * t133 + work[120]
-        * t131 + (work[9] * t128 + work[27] * t129)));
+    jacobian[34] = work[26] + (t6 + t66) + (work[123] * t124 + work[43] * t126 + (work[121] * t133
+        + work[120] * t131 + (work[9] * t128 + work[27] * t129)));
     jacobian[35] = 1.0 + (work[6] + (work[46] * t124 + work[123] * t126 + (work[7] * t128 + work[114] * t129
         + (work[113] * t133 + work[112] * t131))));
     jacobian[30] = t134;
@@ -585,10 +585,10 @@ static void so4_manakov_products(const so4_manakov_params *params, const double 
     const double x12 = x[0], x13 = x[1], x14 = x[2], x23 = x[3], x24 = x[4], x34 = x[5];
     const double t1 = x24 * x24, t2 = x34 * x34, t3 = x23 * x23, t4 = x14 * x14, t5 = x12 * x12;
     const double t6 = x13 * x13;
-    out[0] = 1.0 / 36.0 * t1 + 1.0 / 49.0 * t2 + (1.0 / 25.0 * t3 + 1.0 / 25.0 * t4 + (1.0 / 9.0 * t5 + 0.0625
-        * t6));
-    out[1] = 1.0 / 3.0 * t1 + 2.0 / 7.0 * t2 + (2.0 / 3.0 * t5 + 0.5 * t6 + (2.0 / 5.0 * t3 + 2.0 / 5.0
-        * t4));
+    out[0] = 1.0 / 36.0 * t1 + 1.0 / 49.0 * t2 + (1.0 / 25.0 * t3 + 1.0 / 25.0 * t4 + (1.0 / 9.0 * t5
+        + 0.0625 * t6));
+    out[1] = 1.0 / 3.0 * t1 + 2.0 / 7.0 * t2 + (2.0 / 3.0 * t5 + 0.5 * t6 + (2.0 / 5.0 * t3
+        + 2.0 / 5.0 * t4));
     out[2] = 4.0 * t1 + 4.0 * t2 + (4.0 * t5 + 4.0 * t6 + (4.0 * t3 + 4.0 * t4));
 }
 
@@ -625,6 +625,13 @@ void so4_manakov_vector_field(const so4_manakov_params *params, const double x[6
 }
 
 /* ---- Compensated sums, linear equations ---- */
+static int so4_manakov_finite(const double *values, int count)
+{
+    for (int k = 0; k < count; ++k)
+        if (!isfinite(values[k])) return 0;
+    return 1;
+}
+
 /* x + change + small in compensated arithmetic, where small is the carry and what is as small: were that
    rounded with the change, corrections of one sign would add up to a drift. 0, and x as before, if the sum is
    not finite. */
@@ -733,8 +740,8 @@ static int so4_manakov_plausible(const so4_manakov_solver *s, const double incre
     for (int i = 0; i < so4_manakov_DIM; ++i) size += fabs(s->h * field[i]);
     if (moved <= so4_manakov_PLAUSIBLE * size) return 1;
     const double before = so4_manakov_hamiltonian(&s->params, s->x);
-    const double after = so4_manakov_hamiltonian(&s->params, end), between =
-        so4_manakov_hamiltonian(&s->params, middle);
+    const double after = so4_manakov_hamiltonian(&s->params, end),
+        between = so4_manakov_hamiltonian(&s->params, middle);
     return fabs(after - before) <= so4_manakov_LOST * (fabs(before) + fabs(between) + fabs(after));
 }
 
@@ -814,54 +821,41 @@ static void so4_manakov_choose_gauge(const so4_manakov_params *params, const dou
 /* how far the state may be moved, in its own size, for guesses to move with it */
 #define so4_manakov_NEAR_BY 0.125
 
-/* Guesses move with the state, by as many past values as extrapolation needs; recurrences are of the motion
-   as it was. From far away all begins anew, with the next step. */
-static void so4_manakov_move_guesses(so4_manakov_solver *s, const double to[so4_manakov_DIM])
+/* Guesses move with the state. From far away all begins anew, with the next step. */
+static void so4_manakov_move_guesses(so4_manakov_solver *s, const double from[so4_manakov_DIM])
 {
     double distance = 0.0, size = 0.0;
     for (int i = 0; i < so4_manakov_DIM; ++i) {
-        distance += fabs(to[i] - s->x[i]);
-        size += fabs(s->x[i]);
+        distance += fabs(s->x[i] - from[i]);
+        size += fabs(from[i]);
     }
     if (!(distance <= so4_manakov_NEAR_BY * size)) {
         s->h = (double)NAN;
         return;
     }
     so4_manakov_history *history = &s->history;
-    for (int i = 0; i < so4_manakov_DIM; ++i) history->difference[0][i] += to[i] - s->x[i];
-}
-
-/* Stand at x + carry from now on. */
-static so4_manakov_status so4_manakov_place(so4_manakov_solver *s, const double x[so4_manakov_DIM],
-    const double carry[so4_manakov_DIM])
-{
-    for (int i = 0; i < so4_manakov_DIM; ++i)
-        if (!isfinite(x[i])) return so4_manakov_BAD_ARGUMENT;
-    so4_manakov_move_guesses(s, x);
-    memcpy(s->x, x, sizeof s->x);
-    memcpy(s->carry, carry, sizeof s->carry);
-    return so4_manakov_OK;
+    for (int i = 0; i < so4_manakov_DIM; ++i) history->difference[0][i] += s->x[i] - from[i];
 }
 
 so4_manakov_status so4_manakov_set_state(so4_manakov_solver *s, const double x[so4_manakov_DIM])
 {
-    double to[so4_manakov_DIM], carry[so4_manakov_DIM] = { 0.0 };
-    if (s == NULL || x == NULL) return so4_manakov_BAD_ARGUMENT;
-    memcpy(to, x, sizeof to); /* which may be a part of *s */
-    return so4_manakov_place(s, to, carry);
+    if (s == NULL || x == NULL || !so4_manakov_finite(x, so4_manakov_DIM)) return so4_manakov_BAD_ARGUMENT;
+    double from[so4_manakov_DIM];
+    memcpy(from, s->x, sizeof from);
+    memmove(s->x, x, sizeof s->x); /* x may be a part of *s */
+    memset(s->carry, 0, sizeof s->carry);
+    so4_manakov_move_guesses(s, from);
+    return so4_manakov_OK;
 }
 
 so4_manakov_status so4_manakov_kick(so4_manakov_solver *s, const double change[so4_manakov_DIM])
 {
-    double to[so4_manakov_DIM], carry[so4_manakov_DIM];
     if (s == NULL || change == NULL) return so4_manakov_BAD_ARGUMENT;
-    for (int i = 0; i < so4_manakov_DIM; ++i) {
-        const double sum = s->x[i] + change[i], added = sum - s->x[i];
-        const double lost = ((s->x[i] - (sum - added)) + (change[i] - added)) + s->carry[i];
-        to[i] = sum + lost;
-        carry[i] = lost - (to[i] - sum);
-    }
-    return so4_manakov_place(s, to, carry);
+    double from[so4_manakov_DIM];
+    memcpy(from, s->x, sizeof from);
+    if (!so4_manakov_advance(s, change, s->carry)) return so4_manakov_BAD_ARGUMENT;
+    so4_manakov_move_guesses(s, from);
+    return so4_manakov_OK;
 }
 
 /* ---- The solver ---- */
@@ -873,12 +867,10 @@ so4_manakov_status so4_manakov_init_gauge(so4_manakov_solver *s, const so4_manak
     so4_manakov_solver fresh = { .h = (double)NAN };
     fresh.params = params != NULL ? *params : so4_manakov_default_params;
     memcpy(fresh.x, x0, sizeof fresh.x);
-    for (int i = 0; i < so4_manakov_DIM; ++i)
-        if (!isfinite(fresh.x[i])) return so4_manakov_BAD_ARGUMENT;
+    if (!so4_manakov_finite(fresh.x, so4_manakov_DIM)) return so4_manakov_BAD_ARGUMENT;
     if (gauge == NULL) so4_manakov_choose_gauge(&fresh.params, fresh.x, fresh.gauge);
     else memcpy(fresh.gauge, gauge, sizeof fresh.gauge);
-    for (int c = 0; c < so4_manakov_GAUGES; ++c)
-        if (!isfinite(fresh.gauge[c])) return so4_manakov_BAD_ARGUMENT;
+    if (!so4_manakov_finite(fresh.gauge, so4_manakov_GAUGES)) return so4_manakov_BAD_ARGUMENT;
     *s = fresh;
     return so4_manakov_OK;
 }
@@ -923,8 +915,10 @@ so4_manakov_status so4_manakov_integrate(so4_manakov_solver *s, double h, size_t
     return status;
 }
 
-so4_manakov_status so4_manakov_step(so4_manakov_solver *s, double h) { return so4_manakov_integrate(s, h, 1);
-    }
+so4_manakov_status so4_manakov_step(so4_manakov_solver *s, double h)
+{
+    return so4_manakov_integrate(s, h, 1);
+}
 
 const char *so4_manakov_status_string(so4_manakov_status status)
 {

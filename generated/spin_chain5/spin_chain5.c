@@ -23,7 +23,7 @@
  *   6. Between steps
  *   7. The solver
  *   8. Ensembles
- * body-sha256: 0de253f69090354dbb6b7b73dc50f0a9a3da874fdfdfd83e69f17b5ca357e039
+ * body-sha256: a789b34d5a9bb46d69077cba7fb7a8a15f708e47c2edf6d861c7f7494c0a7d73
  */
 #include "spin_chain5.h"
 
@@ -155,8 +155,8 @@ spin_chain5_APART static void spin_chain5_linearise_part1(const double coef[33],
     double increment_jacobian[restrict 225], double work[restrict 505])
 {
     (void)displacement, (void)increment, (void)jacobian, (void)increment_jacobian;
-    const double x1 = y[0], y1 = y[1], z1 = y[2], x2 = y[3], y2 = y[4], z2 = y[5], x3 = y[6], y3 = y[7], z3 =
-        y[8], x4 = y[9], y4 = y[10], z4 = y[11], x5 = y[12], y5 = y[13], z5 = y[14];
+    const double x1 = y[0], y1 = y[1], z1 = y[2], x2 = y[3], y2 = y[4], z2 = y[5], x3 = y[6], y3 = y[7],
+        z3 = y[8], x4 = y[9], y4 = y[10], z4 = y[11], x5 = y[12], y5 = y[13], z5 = y[14];
     work[24] = coef[3] * x5;
     work[52] = coef[3] * x4;
     work[16] = work[24] + (coef[5] * x2 + work[52]);
@@ -199,8 +199,8 @@ spin_chain5_APART static void spin_chain5_linearise_part1(const double coef[33],
     work[157] = y5 * t12;
     work[75] = y4 * work[134];
     work[158] = work[73] + (work[74] + (work[157] + work[75]));
-    work[80] = x2 * work[114] + (y2 * work[118] + (x5 * work[145] + (work[33] + (coef[10] * z1 + t13) + y5
-        * work[158])));
+    work[80] = x2 * work[114] + (y2 * work[118] + (x5 * work[145] + (work[33] + (coef[10] * z1 + t13)
+        + y5 * work[158])));
     work[112] = coef[8] * y5 + coef[9] * y2;
     const double t14 = x1 * work[112];
     work[38] = x5 * y4;
@@ -309,8 +309,8 @@ spin_chain5_APART static void spin_chain5_linearise_part1(const double coef[33],
     work[247] = z3 * t34;
     work[248] = t36 + (t37 + (t24 + work[247]));
     work[83] = y1 * (y3 * work[241] + (t14 + (y1 * t32 + t17)))
-        + (z1 * (z3 * work[241] + (t2 + (z1 * t32 + t6))) + (y3 * work[243] + (work[45] + (work[69] + coef[17]
-        * x2) + z3 * work[248])));
+        + (z1 * (z3 * work[241] + (t2 + (z1 * t32 + t6))) + (y3 * work[243]
+        + (work[45] + (work[69] + coef[17] * x2) + z3 * work[248])));
     work[235] = work[14] + (coef[19] * y2 + work[54]);
     const double t38 = coef[20] * y5 + t8;
     work[6] = y1 * t28;
@@ -364,8 +364,8 @@ spin_chain5_APART static void spin_chain5_linearise_part2(const double coef[33],
     double increment_jacobian[restrict 225], double work[restrict 505])
 {
     (void)jacobian, (void)increment_jacobian;
-    const double x1 = y[0], y1 = y[1], z1 = y[2], x2 = y[3], y2 = y[4], z2 = y[5], x3 = y[6], y3 = y[7], z3 =
-        y[8], x4 = y[9], y4 = y[10], z4 = y[11], x5 = y[12], y5 = y[13], z5 = y[14];
+    const double x1 = y[0], y1 = y[1], z1 = y[2], x2 = y[3], y2 = y[4], z2 = y[5], x3 = y[6], y3 = y[7],
+        z3 = y[8], x4 = y[9], y4 = y[10], z4 = y[11], x5 = y[12], y5 = y[13], z5 = y[14];
     work[348] = y4 * work[0];
     const double t1 = coef[22] * x4;
     work[272] = coef[4] * x1;
@@ -453,8 +453,8 @@ spin_chain5_APART static void spin_chain5_linearise_part2(const double coef[33],
     const double t50 = work[360] + work[422];
     work[357] = coef[21] * y4;
     const double t51 = work[357] + work[420];
-    const double t52 = x4 * (t36 + (t39 + (t37 + z3 * t50))) + (coef[31] * z5 + (work[56] + work[57]) + y4
-        * (t44 + (t46 + (z3 * t51 + t45))));
+    const double t52 = x4 * (t36 + (t39 + (t37 + z3 * t50))) + (coef[31] * z5 + (work[56] + work[57])
+        + y4 * (t44 + (t46 + (z3 * t51 + t45))));
     work[95] = x1 * (z2 * t48 + (work[58] + (work[59] + (z5 * work[462] + work[60]))))
         + (y1 * (z2 * t49 + (work[61] + (work[62] + (z5 * work[457] + work[63])))) + t52);
     work[132] = coef[3] * z3;
@@ -467,8 +467,8 @@ spin_chain5_APART static void spin_chain5_linearise_part2(const double coef[33],
         + (y4 * (t42 + (x3 * t51 + t43)) + (coef[31] * x5 + (t3 + work[69]) + z4 * (t21 + (x3 * t54 + t24))));
     work[96] = y1 * (x2 * t49 + (work[70] + (work[71] + (x5 * work[457] + work[72])))) + t55;
     const double t56 = z1 * (y2 * t53 + (work[73] + (work[74] + (y5 * work[458] + work[75]))))
-        + (x4 * (t32 + (t33 + (t34 + y3 * t50))) + (coef[31] * y5 + (work[76] + t14) + z4
-        * (t25 + (y3 * t54 + t28))));
+        + (x4 * (t32 + (t33 + (t34 + y3 * t50))) + (coef[31] * y5 + (work[76] + t14)
+        + z4 * (t25 + (y3 * t54 + t28))));
     work[97] = x1 * (y2 * t48 + (work[77] + (work[78] + (work[79] + y5 * work[462])))) + t56;
     work[110] = work[80] * work[80];
     work[109] = work[81] * work[81];
@@ -568,8 +568,8 @@ spin_chain5_APART static void spin_chain5_linearise_part3(const double coef[33],
     double displacement[restrict 15], double increment[restrict 15], double jacobian[restrict 225],
     double increment_jacobian[restrict 225], double work[restrict 505])
 {
-    const double x1 = y[0], y1 = y[1], z1 = y[2], x2 = y[3], y2 = y[4], z2 = y[5], x3 = y[6], y3 = y[7], z3 =
-        y[8], x4 = y[9], y4 = y[10], z4 = y[11], x5 = y[12], y5 = y[13], z5 = y[14];
+    const double x1 = y[0], y1 = y[1], z1 = y[2], x2 = y[3], y2 = y[4], z2 = y[5], x3 = y[6], y3 = y[7],
+        z3 = y[8], x4 = y[9], y4 = y[10], z4 = y[11], x5 = y[12], y5 = y[13], z5 = y[14];
     work[428] = work[90] * work[91] - work[92] * work[89];
     work[431] = work[94] * work[89] - work[90] * work[93];
     work[459] = work[95] * work[95];
@@ -689,12 +689,12 @@ spin_chain5_APART static void spin_chain5_linearise_part3(const double coef[33],
     increment_jacobian[30] = x1 * work[178] - y1 * work[179] + work[81];
     jacobian[0] = 1.0 + (work[177] * work[153] + (work[179] * work[154] + work[178] * work[155])
         - (work[109] + work[110]) * work[103]);
-    jacobian[1] = work[176] - work[175] + (work[180] * work[153] + (work[178] * work[154] + work[181]
-        * work[155]));
+    jacobian[1] = work[176] - work[175] + (work[180] * work[153] + (work[178] * work[154]
+        + work[181] * work[155]));
     increment_jacobian[1] = y1 * work[180] - z1 * work[181] + work[80];
     increment_jacobian[31] = x1 * work[181] - y1 * work[178] - work[82];
-    jacobian[2] = work[217] + work[216] + (work[210] * work[153] + (work[177] * work[154] + work[180]
-        * work[155]));
+    jacobian[2] = work[217] + work[216] + (work[210] * work[153] + (work[177] * work[154]
+        + work[180] * work[155]));
     increment_jacobian[2] = y1 * work[210] - z1 * work[180] - work[81];
     increment_jacobian[17] = z1 * work[177] - x1 * work[210] + work[82];
     increment_jacobian[18] = z1 * work[185] - x1 * work[183];
@@ -769,8 +769,8 @@ spin_chain5_APART static void spin_chain5_linearise_part4(const double coef[33],
     double increment_jacobian[restrict 225], double work[restrict 505])
 {
     (void)displacement, (void)increment;
-    const double x1 = y[0], y1 = y[1], z1 = y[2], x2 = y[3], y2 = y[4], z2 = y[5], x3 = y[6], y3 = y[7], z3 =
-        y[8], x4 = y[9], y4 = y[10], z4 = y[11], x5 = y[12], y5 = y[13], z5 = y[14];
+    const double x1 = y[0], y1 = y[1], z1 = y[2], x2 = y[3], y2 = y[4], z2 = y[5], x3 = y[6], y3 = y[7],
+        z3 = y[8], x4 = y[9], y4 = y[10], z4 = y[11], x5 = y[12], y5 = y[13], z5 = y[14];
     work[443] = work[146] + (work[147] + (work[148] + work[149]));
     const double t1 = work[135] + (coef[12] * y1 + work[54]);
     work[446] = x2 * t1 + (work[151] + work[152]);
@@ -914,11 +914,11 @@ spin_chain5_APART static void spin_chain5_linearise_part4(const double coef[33],
         - (work[229] + work[230]) * work[220]);
     increment_jacobian[78] = x2 * work[293] - y2 * work[292] + work[85];
     increment_jacobian[79] = x2 * work[295] - y2 * work[293] - work[83];
-    jacobian[49] = work[291] - work[290] + (work[293] * work[267] + (work[295] * work[269] + work[296]
-        * work[271]));
+    jacobian[49] = work[291] - work[290] + (work[293] * work[267] + (work[295] * work[269]
+        + work[296] * work[271]));
     increment_jacobian[49] = y2 * work[296] - z2 * work[295] + work[84];
-    jacobian[50] = work[323] + work[322] + (work[294] * work[267] + (work[316] * work[271] + work[296]
-        * work[269]));
+    jacobian[50] = work[323] + work[322] + (work[294] * work[267] + (work[316] * work[271]
+        + work[296] * work[269]));
     increment_jacobian[50] = y2 * work[316] - z2 * work[296] - work[85];
     increment_jacobian[65] = z2 * work[294] - x2 * work[316] + work[83];
     increment_jacobian[81] = x2 * work[299] - y2 * work[298];
@@ -973,8 +973,8 @@ spin_chain5_APART static void spin_chain5_linearise_part5(const double coef[33],
     double increment_jacobian[restrict 225], double work[restrict 505])
 {
     (void)displacement, (void)increment;
-    const double x1 = y[0], y1 = y[1], z1 = y[2], x2 = y[3], y2 = y[4], z2 = y[5], x3 = y[6], y3 = y[7], z3 =
-        y[8], x4 = y[9], y4 = y[10], z4 = y[11], x5 = y[12], y5 = y[13], z5 = y[14];
+    const double x1 = y[0], y1 = y[1], z1 = y[2], x2 = y[3], y2 = y[4], z2 = y[5], x3 = y[6], y3 = y[7],
+        z3 = y[8], x4 = y[9], y4 = y[10], z4 = y[11], x5 = y[12], y5 = y[13], z5 = y[14];
     const double t1 = work[52] + work[272];
     work[451] = y3 * t1 + y1 * work[273];
     work[455] = y1 * work[265] + y3 * work[274];
@@ -1174,8 +1174,8 @@ spin_chain5_APART static void spin_chain5_linearise_part6(const double coef[33],
     double increment_jacobian[restrict 225], double work[restrict 505])
 {
     (void)displacement, (void)increment;
-    const double x1 = y[0], y1 = y[1], z1 = y[2], x3 = y[6], y3 = y[7], z3 = y[8], x4 = y[9], y4 = y[10], z4 =
-        y[11], x5 = y[12], y5 = y[13], z5 = y[14];
+    const double x1 = y[0], y1 = y[1], z1 = y[2], x3 = y[6], y3 = y[7], z3 = y[8], x4 = y[9], y4 = y[10],
+        z4 = y[11], x5 = y[12], y5 = y[13], z5 = y[14];
     const double t1 = work[86] * work[330] * work[328], t2 = 0.5 * work[331];
     const double t3 = (work[395] + work[396]) * work[328] + 2.0 * (work[397] * work[398]);
     const double t4 = (work[363] - work[399]) * work[328] + 2.0 * (work[397] * work[400]) - work[401];
@@ -1246,8 +1246,8 @@ spin_chain5_APART static void spin_chain5_linearise_part6(const double coef[33],
     work[468] = z1 * work[461] + z4 * t33;
     jacobian[109] = work[305] * work[365] + (work[302] * work[366] + work[299] * work[367]);
     jacobian[110] = work[306] * work[365] + (work[303] * work[366] + work[300] * work[367]);
-    jacobian[111] = work[368] + work[369] + (work[370] * work[365] + (work[371] * work[366] + work[372]
-        * work[367]));
+    jacobian[111] = work[368] + work[369] + (work[370] * work[365] + (work[371] * work[366]
+        + work[372] * work[367]));
     jacobian[112] = 1.0 + (work[373] * work[365] + (work[374] * work[366] + work[371] * work[367])
         - (work[375] + work[334]) * work[328]);
     jacobian[114] = work[376] * work[365] + (work[377] * work[366] + work[378] * work[367]);
@@ -1368,8 +1368,8 @@ spin_chain5_APART static void spin_chain5_linearise_part7(const double coef[33],
     double increment_jacobian[restrict 225], double work[restrict 505])
 {
     (void)displacement, (void)increment;
-    const double x1 = y[0], y1 = y[1], z1 = y[2], x2 = y[3], y2 = y[4], z2 = y[5], x3 = y[6], y3 = y[7], z3 =
-        y[8], x4 = y[9], y4 = y[10], z4 = y[11], x5 = y[12], y5 = y[13], z5 = y[14];
+    const double x1 = y[0], y1 = y[1], z1 = y[2], x2 = y[3], y2 = y[4], z2 = y[5], x3 = y[6], y3 = y[7],
+        z3 = y[8], x4 = y[9], y4 = y[10], z4 = y[11], x5 = y[12], y5 = y[13], z5 = y[14];
     const double t1 = x1 * work[462], t2 = x4 * work[463], t3 = t1 + (work[464] + (t2 + work[465]));
     const double t4 = 0.5 * work[97], t5 = work[95] * work[96] * work[438];
     const double t6 = t1 + (work[473] + (t2 + (coef[31] + work[474]))), t7 = 0.5 * x5;
@@ -1384,8 +1384,8 @@ spin_chain5_APART static void spin_chain5_linearise_part7(const double coef[33],
     const double t21 = z2 * work[293], t22 = x2 * work[296], t23 = y3 * work[370], t24 = z3 * work[371];
     const double t25 = x3 * work[373], t26 = y4 * work[502], t27 = z4 * work[503], t28 = x4 * work[504];
     const double t29 = y5 * work[475], t30 = z5 * work[470], t31 = x5 * work[468];
-    jacobian[193] = work[466] - work[467] + (work[468] * work[469] + (work[470] * work[471] + t3
-        * work[472]));
+    jacobian[193] = work[466] - work[467] + (work[468] * work[469] + (work[470] * work[471]
+        + t3 * work[472]));
     increment_jacobian[193] = y5 * work[468] - z5 * t3 + work[95];
     increment_jacobian[223] = x5 * t3 - y5 * work[470] - work[96];
     jacobian[194] = t4 + t5 + (t6 * work[469] + (work[475] * work[471] + work[468] * work[472]));
@@ -1458,8 +1458,8 @@ static void spin_chain5_linearise(const double coef[33], const double y[15], dou
 static void spin_chain5_products(const spin_chain5_params *params, const double x[15],
     double out[restrict 11])
 {
-    const double x1 = x[0], y1 = x[1], z1 = x[2], x2 = x[3], y2 = x[4], z2 = x[5], x3 = x[6], y3 = x[7], z3 =
-        x[8], x4 = x[9], y4 = x[10], z4 = x[11], x5 = x[12], y5 = x[13], z5 = x[14];
+    const double x1 = x[0], y1 = x[1], z1 = x[2], x2 = x[3], y2 = x[4], z2 = x[5], x3 = x[6], y3 = x[7],
+        z3 = x[8], x4 = x[9], y4 = x[10], z4 = x[11], x5 = x[12], y5 = x[13], z5 = x[14];
     const double t1 = params->J * z4, t2 = params->J * z1, t3 = t1 + t2, t4 = params->J * y1;
     const double t5 = params->J * y4, t6 = t4 + t5, t7 = params->J * x4, t8 = params->J * x1;
     const double t9 = t7 + t8, t10 = params->J * x5, t11 = params->J * x3, t12 = t10 + t11;
@@ -1490,16 +1490,16 @@ double spin_chain5_hamiltonian(const spin_chain5_params *params, const double x[
         y3 = x[7], z3 = x[8], x4 = x[9], y4 = x[10], z4 = x[11], x5 = x[12], y5 = x[13], z5 = x[14];
     const double t1 = y3 * y4
         + (x3 * x4 + (z2 * z3 + (y2 * y3 + (x2 * x3 + (z1 * z2 + (x1 * x2 + y1 * y2))))));
-    const double t2 = J
-        * (z1 * z5 + (y1 * y5 + (x1 * x5 + (z4 * z5 + (y4 * y5 + (x4 * x5 + (z3 * z4 + t1)))))));
+    const double t2 =
+        J * (z1 * z5 + (y1 * y5 + (x1 * x5 + (z4 * z5 + (y4 * y5 + (x4 * x5 + (z3 * z4 + t1)))))));
     return -t2;
 }
 
 void spin_chain5_casimirs(const spin_chain5_params *params, const double x[15], double out[])
 {
     (void)params;
-    const double x1 = x[0], y1 = x[1], z1 = x[2], x2 = x[3], y2 = x[4], z2 = x[5], x3 = x[6], y3 = x[7], z3 =
-        x[8], x4 = x[9], y4 = x[10], z4 = x[11], x5 = x[12], y5 = x[13], z5 = x[14];
+    const double x1 = x[0], y1 = x[1], z1 = x[2], x2 = x[3], y2 = x[4], z2 = x[5], x3 = x[6], y3 = x[7],
+        z3 = x[8], x4 = x[9], y4 = x[10], z4 = x[11], x5 = x[12], y5 = x[13], z5 = x[14];
     out[0] = z1 * z1 + (y1 * y1 + x1 * x1);
     out[1] = z2 * z2 + (x2 * x2 + y2 * y2);
     out[2] = z3 * z3 + (x3 * x3 + y3 * y3);
@@ -1536,6 +1536,13 @@ void spin_chain5_vector_field(const spin_chain5_params *params, const double x[1
 }
 
 /* ---- Compensated sums, linear equations ---- */
+static int spin_chain5_finite(const double *values, int count)
+{
+    for (int k = 0; k < count; ++k)
+        if (!isfinite(values[k])) return 0;
+    return 1;
+}
+
 /* x + change + small in compensated arithmetic, where small is the carry and what is as small: were that
    rounded with the change, corrections of one sign would add up to a drift. 0, and x as before, if the sum is
    not finite. */
@@ -1644,8 +1651,8 @@ static int spin_chain5_plausible(const spin_chain5_solver *s, const double incre
     for (int i = 0; i < spin_chain5_DIM; ++i) size += fabs(s->h * field[i]);
     if (moved <= spin_chain5_PLAUSIBLE * size) return 1;
     const double before = spin_chain5_hamiltonian(&s->params, s->x);
-    const double after = spin_chain5_hamiltonian(&s->params, end), between =
-        spin_chain5_hamiltonian(&s->params, middle);
+    const double after = spin_chain5_hamiltonian(&s->params, end),
+        between = spin_chain5_hamiltonian(&s->params, middle);
     return fabs(after - before) <= spin_chain5_LOST * (fabs(before) + fabs(between) + fabs(after));
 }
 
@@ -1725,54 +1732,41 @@ static void spin_chain5_choose_gauge(const spin_chain5_params *params, const dou
 /* how far the state may be moved, in its own size, for guesses to move with it */
 #define spin_chain5_NEAR_BY 0.125
 
-/* Guesses move with the state, by as many past values as extrapolation needs; recurrences are of the motion
-   as it was. From far away all begins anew, with the next step. */
-static void spin_chain5_move_guesses(spin_chain5_solver *s, const double to[spin_chain5_DIM])
+/* Guesses move with the state. From far away all begins anew, with the next step. */
+static void spin_chain5_move_guesses(spin_chain5_solver *s, const double from[spin_chain5_DIM])
 {
     double distance = 0.0, size = 0.0;
     for (int i = 0; i < spin_chain5_DIM; ++i) {
-        distance += fabs(to[i] - s->x[i]);
-        size += fabs(s->x[i]);
+        distance += fabs(s->x[i] - from[i]);
+        size += fabs(from[i]);
     }
     if (!(distance <= spin_chain5_NEAR_BY * size)) {
         s->h = (double)NAN;
         return;
     }
     spin_chain5_history *history = &s->history;
-    for (int i = 0; i < spin_chain5_DIM; ++i) history->difference[0][i] += to[i] - s->x[i];
-}
-
-/* Stand at x + carry from now on. */
-static spin_chain5_status spin_chain5_place(spin_chain5_solver *s, const double x[spin_chain5_DIM],
-    const double carry[spin_chain5_DIM])
-{
-    for (int i = 0; i < spin_chain5_DIM; ++i)
-        if (!isfinite(x[i])) return spin_chain5_BAD_ARGUMENT;
-    spin_chain5_move_guesses(s, x);
-    memcpy(s->x, x, sizeof s->x);
-    memcpy(s->carry, carry, sizeof s->carry);
-    return spin_chain5_OK;
+    for (int i = 0; i < spin_chain5_DIM; ++i) history->difference[0][i] += s->x[i] - from[i];
 }
 
 spin_chain5_status spin_chain5_set_state(spin_chain5_solver *s, const double x[spin_chain5_DIM])
 {
-    double to[spin_chain5_DIM], carry[spin_chain5_DIM] = { 0.0 };
-    if (s == NULL || x == NULL) return spin_chain5_BAD_ARGUMENT;
-    memcpy(to, x, sizeof to); /* which may be a part of *s */
-    return spin_chain5_place(s, to, carry);
+    if (s == NULL || x == NULL || !spin_chain5_finite(x, spin_chain5_DIM)) return spin_chain5_BAD_ARGUMENT;
+    double from[spin_chain5_DIM];
+    memcpy(from, s->x, sizeof from);
+    memmove(s->x, x, sizeof s->x); /* x may be a part of *s */
+    memset(s->carry, 0, sizeof s->carry);
+    spin_chain5_move_guesses(s, from);
+    return spin_chain5_OK;
 }
 
 spin_chain5_status spin_chain5_kick(spin_chain5_solver *s, const double change[spin_chain5_DIM])
 {
-    double to[spin_chain5_DIM], carry[spin_chain5_DIM];
     if (s == NULL || change == NULL) return spin_chain5_BAD_ARGUMENT;
-    for (int i = 0; i < spin_chain5_DIM; ++i) {
-        const double sum = s->x[i] + change[i], added = sum - s->x[i];
-        const double lost = ((s->x[i] - (sum - added)) + (change[i] - added)) + s->carry[i];
-        to[i] = sum + lost;
-        carry[i] = lost - (to[i] - sum);
-    }
-    return spin_chain5_place(s, to, carry);
+    double from[spin_chain5_DIM];
+    memcpy(from, s->x, sizeof from);
+    if (!spin_chain5_advance(s, change, s->carry)) return spin_chain5_BAD_ARGUMENT;
+    spin_chain5_move_guesses(s, from);
+    return spin_chain5_OK;
 }
 
 /* ---- The solver ---- */
@@ -1786,16 +1780,13 @@ spin_chain5_status spin_chain5_init_gauge(spin_chain5_solver *s, const spin_chai
     spin_chain5_solver fresh = { .h = (double)NAN };
     fresh.params = params != NULL ? *params : spin_chain5_default_params;
     memcpy(fresh.x, x0, sizeof fresh.x);
-    for (int i = 0; i < spin_chain5_DIM; ++i)
-        if (!isfinite(fresh.x[i])) return spin_chain5_BAD_ARGUMENT;
-    if (!spin_chain5_allowed(&fresh.params)) return spin_chain5_BAD_ARGUMENT;
+    if (!spin_chain5_finite(fresh.x, spin_chain5_DIM) || !spin_chain5_allowed(&fresh.params))
+        return spin_chain5_BAD_ARGUMENT;
     spin_chain5_prepare(&fresh.params, fresh.gauge, spin_chain5_SHORT_STEP, fresh.coef);
-    for (int k = 0; k < spin_chain5_COEFFICIENTS; ++k)
-        if (!isfinite(fresh.coef[k])) return spin_chain5_BAD_ARGUMENT;
+    if (!spin_chain5_finite(fresh.coef, spin_chain5_COEFFICIENTS)) return spin_chain5_BAD_ARGUMENT;
     if (gauge == NULL) spin_chain5_choose_gauge(&fresh.params, fresh.x, fresh.gauge);
     else memcpy(fresh.gauge, gauge, sizeof fresh.gauge);
-    for (int c = 0; c < spin_chain5_GAUGES; ++c)
-        if (!isfinite(fresh.gauge[c])) return spin_chain5_BAD_ARGUMENT;
+    if (!spin_chain5_finite(fresh.gauge, spin_chain5_GAUGES)) return spin_chain5_BAD_ARGUMENT;
     *s = fresh;
     return spin_chain5_OK;
 }
@@ -1840,8 +1831,10 @@ spin_chain5_status spin_chain5_integrate(spin_chain5_solver *s, double h, size_t
     return status;
 }
 
-spin_chain5_status spin_chain5_step(spin_chain5_solver *s, double h) { return spin_chain5_integrate(s, h, 1);
-    }
+spin_chain5_status spin_chain5_step(spin_chain5_solver *s, double h)
+{
+    return spin_chain5_integrate(s, h, 1);
+}
 
 const char *spin_chain5_status_string(spin_chain5_status status)
 {

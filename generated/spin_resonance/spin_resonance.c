@@ -21,7 +21,7 @@
  *   5. Between steps
  *   6. The solver
  *   7. Ensembles
- * body-sha256: 74b39dcf5b8e76ac859f4401095c2923f68de2b2c590847a1e52af83b4943886
+ * body-sha256: 4d5b3860ccbb600422d8c335783908ee7afb38a13e95820834c40732788dd2dc
  */
 #include "spin_resonance.h"
 
@@ -116,8 +116,8 @@ static void spin_resonance_prepare(const spin_resonance_params *params, double h
     const double t1 = h * h, t2 = h * t1, t3 = params->b * params->b;
     coef[0] = params->D * h;
     coef[1] = params->omega;
-    coef[2] = params->b * h * (-1.0 + params->omega * (t1 * (1.0 / 24.0 * params->omega + 1.0 / 12.0
-        * params->b0)));
+    coef[2] = params->b * h * (-1.0 + params->omega * (t1 * (1.0 / 24.0 * params->omega
+        + 1.0 / 12.0 * params->b0)));
     coef[3] = params->b * params->omega * (params->D * t2);
     coef[4] = t2 * (params->D * t3);
     coef[5] = t2 * (params->omega * t3);
@@ -211,6 +211,13 @@ void spin_resonance_vector_field(const spin_resonance_params *params, double t, 
 }
 
 /* ---- Compensated sums, linear equations ---- */
+static int spin_resonance_finite(const double *values, int count)
+{
+    for (int k = 0; k < count; ++k)
+        if (!isfinite(values[k])) return 0;
+    return 1;
+}
+
 /* x + change + small in compensated arithmetic, where small is the carry and what is as small: were that
    rounded with the change, corrections of one sign would add up to a drift. 0, and x as before, if the sum is
    not finite. */
@@ -323,8 +330,8 @@ static int spin_resonance_plausible(const spin_resonance_solver *s,
     spin_resonance_vector_field(&s->params, s->t, s->x, field);
     for (int i = 0; i < spin_resonance_DIM; ++i) size += fabs(s->h * field[i]);
     if (moved <= spin_resonance_PLAUSIBLE * size) return 1;
-    const double before = spin_resonance_hamiltonian(&s->params, s->t, s->x), after =
-        spin_resonance_hamiltonian(&s->params, s->t, end);
+    const double before = spin_resonance_hamiltonian(&s->params, s->t, s->x),
+        after = spin_resonance_hamiltonian(&s->params, s->t, end);
     const double between = spin_resonance_hamiltonian(&s->params, s->t, middle);
     return fabs(after - before) <= spin_resonance_LOST * (fabs(before) + fabs(between) + fabs(after));
 }
@@ -356,8 +363,8 @@ static spin_resonance_status spin_resonance_attempt(spin_resonance_solver *s)
 {
     double y[spin_resonance_DIM], delta[spin_resonance_DIM], displacement[spin_resonance_DIM],
         increment[spin_resonance_DIM];
-    double jacobian[spin_resonance_DIM * spin_resonance_DIM], increment_jacobian[spin_resonance_DIM
-        * spin_resonance_DIM];
+    double jacobian[spin_resonance_DIM * spin_resonance_DIM],
+        increment_jacobian[spin_resonance_DIM * spin_resonance_DIM];
     double previous = HUGE_VAL;
     if (!spin_resonance_predict(&s->history, y)) memcpy(y, s->x, sizeof y);
     for (int iteration = 1; iteration <= spin_resonance_MAX_ITERATIONS; ++iteration) {
@@ -393,54 +400,42 @@ static spin_resonance_status spin_resonance_attempt(spin_resonance_solver *s)
 /* how far the state may be moved, in its own size, for guesses to move with it */
 #define spin_resonance_NEAR_BY 0.125
 
-/* Guesses move with the state, by as many past values as extrapolation needs; recurrences are of the motion
-   as it was. From far away all begins anew, with the next step. */
-static void spin_resonance_move_guesses(spin_resonance_solver *s, const double to[spin_resonance_DIM])
+/* Guesses move with the state. From far away all begins anew, with the next step. */
+static void spin_resonance_move_guesses(spin_resonance_solver *s, const double from[spin_resonance_DIM])
 {
     double distance = 0.0, size = 0.0;
     for (int i = 0; i < spin_resonance_DIM; ++i) {
-        distance += fabs(to[i] - s->x[i]);
-        size += fabs(s->x[i]);
+        distance += fabs(s->x[i] - from[i]);
+        size += fabs(from[i]);
     }
     if (!(distance <= spin_resonance_NEAR_BY * size)) {
         s->h = (double)NAN;
         return;
     }
     spin_resonance_history *history = &s->history;
-    for (int i = 0; i < spin_resonance_DIM; ++i) history->difference[0][i] += to[i] - s->x[i];
-}
-
-/* Stand at x + carry from now on. */
-static spin_resonance_status spin_resonance_place(spin_resonance_solver *s,
-    const double x[spin_resonance_DIM], const double carry[spin_resonance_DIM])
-{
-    for (int i = 0; i < spin_resonance_DIM; ++i)
-        if (!isfinite(x[i])) return spin_resonance_BAD_ARGUMENT;
-    spin_resonance_move_guesses(s, x);
-    memcpy(s->x, x, sizeof s->x);
-    memcpy(s->carry, carry, sizeof s->carry);
-    return spin_resonance_OK;
+    for (int i = 0; i < spin_resonance_DIM; ++i) history->difference[0][i] += s->x[i] - from[i];
 }
 
 spin_resonance_status spin_resonance_set_state(spin_resonance_solver *s, const double x[spin_resonance_DIM])
 {
-    double to[spin_resonance_DIM], carry[spin_resonance_DIM] = { 0.0 };
-    if (s == NULL || x == NULL) return spin_resonance_BAD_ARGUMENT;
-    memcpy(to, x, sizeof to); /* which may be a part of *s */
-    return spin_resonance_place(s, to, carry);
+    if (s == NULL || x == NULL || !spin_resonance_finite(x, spin_resonance_DIM))
+        return spin_resonance_BAD_ARGUMENT;
+    double from[spin_resonance_DIM];
+    memcpy(from, s->x, sizeof from);
+    memmove(s->x, x, sizeof s->x); /* x may be a part of *s */
+    memset(s->carry, 0, sizeof s->carry);
+    spin_resonance_move_guesses(s, from);
+    return spin_resonance_OK;
 }
 
 spin_resonance_status spin_resonance_kick(spin_resonance_solver *s, const double change[spin_resonance_DIM])
 {
-    double to[spin_resonance_DIM], carry[spin_resonance_DIM];
     if (s == NULL || change == NULL) return spin_resonance_BAD_ARGUMENT;
-    for (int i = 0; i < spin_resonance_DIM; ++i) {
-        const double sum = s->x[i] + change[i], added = sum - s->x[i];
-        const double lost = ((s->x[i] - (sum - added)) + (change[i] - added)) + s->carry[i];
-        to[i] = sum + lost;
-        carry[i] = lost - (to[i] - sum);
-    }
-    return spin_resonance_place(s, to, carry);
+    double from[spin_resonance_DIM];
+    memcpy(from, s->x, sizeof from);
+    if (!spin_resonance_advance(s, change, s->carry)) return spin_resonance_BAD_ARGUMENT;
+    spin_resonance_move_guesses(s, from);
+    return spin_resonance_OK;
 }
 
 /* ---- The solver ---- */
@@ -455,12 +450,10 @@ spin_resonance_status spin_resonance_init_at(spin_resonance_solver *s, const spi
     fresh.params = params != NULL ? *params : spin_resonance_default_params;
     memcpy(fresh.x, x0, sizeof fresh.x);
     fresh.t = t0;
-    for (int i = 0; i < spin_resonance_DIM; ++i)
-        if (!isfinite(fresh.x[i])) return spin_resonance_BAD_ARGUMENT;
-    if (!spin_resonance_allowed(&fresh.params)) return spin_resonance_BAD_ARGUMENT;
+    if (!spin_resonance_finite(fresh.x, spin_resonance_DIM) || !spin_resonance_allowed(&fresh.params))
+        return spin_resonance_BAD_ARGUMENT;
     spin_resonance_prepare(&fresh.params, spin_resonance_SHORT_STEP, fresh.coef);
-    for (int k = 0; k < spin_resonance_COEFFICIENTS; ++k)
-        if (!isfinite(fresh.coef[k])) return spin_resonance_BAD_ARGUMENT;
+    if (!spin_resonance_finite(fresh.coef, spin_resonance_COEFFICIENTS)) return spin_resonance_BAD_ARGUMENT;
     *s = fresh;
     return spin_resonance_OK;
 }
@@ -512,8 +505,10 @@ spin_resonance_status spin_resonance_integrate(spin_resonance_solver *s, double 
     return status;
 }
 
-spin_resonance_status spin_resonance_step(spin_resonance_solver *s,
-    double h) { return spin_resonance_integrate(s, h, 1); }
+spin_resonance_status spin_resonance_step(spin_resonance_solver *s, double h)
+{
+    return spin_resonance_integrate(s, h, 1);
+}
 
 const char *spin_resonance_status_string(spin_resonance_status status)
 {

@@ -27,7 +27,7 @@
  *   5. Noise
  *   6. The solver
  *   7. Ensembles
- * body-sha256: fa21895eb753d7f12d6285c0eea7a0d68e770c23fdb77e2e8d7361a5649d1117
+ * body-sha256: 60ce49085d996c5e8d9c129e4a3238cb0c0b79b872a8f802942abed634bd5bd8
  */
 #include "thermal_chain.h"
 
@@ -143,8 +143,8 @@ thermal_chain_APART static void thermal_chain_linearise_part1(const double coef[
     double displacement[restrict 12], double increment[restrict 12], double jacobian[restrict 144],
     double increment_jacobian[restrict 144], double work[restrict 136])
 {
-    const double x1 = y[0], y1 = y[1], z1 = y[2], x2 = y[3], y2 = y[4], z2 = y[5], x3 = y[6], y3 = y[7], z3 =
-        y[8], x4 = y[9], y4 = y[10], z4 = y[11];
+    const double x1 = y[0], y1 = y[1], z1 = y[2], x2 = y[3], y2 = y[4], z2 = y[5], x3 = y[6], y3 = y[7],
+        z3 = y[8], x4 = y[9], y4 = y[10], z4 = y[11];
     work[123] = coef[0] * z2;
     work[8] = coef[1] * y2;
     work[22] = coef[1] * x2;
@@ -353,8 +353,8 @@ thermal_chain_APART static void thermal_chain_linearise_part2(const double coef[
     double displacement[restrict 12], double increment[restrict 12], double jacobian[restrict 144],
     double increment_jacobian[restrict 144], double work[restrict 136])
 {
-    const double x1 = y[0], y1 = y[1], z1 = y[2], x2 = y[3], y2 = y[4], z2 = y[5], x3 = y[6], y3 = y[7], z3 =
-        y[8], x4 = y[9], y4 = y[10], z4 = y[11];
+    const double x1 = y[0], y1 = y[1], z1 = y[2], x2 = y[3], y2 = y[4], z2 = y[5], x3 = y[6], y3 = y[7],
+        z3 = y[8], x4 = y[9], y4 = y[10], z4 = y[11];
     work[73] = work[0] * work[0];
     work[91] = work[1] + work[73];
     const double t1 = work[2] + work[91];
@@ -544,8 +544,8 @@ thermal_chain_APART static void thermal_chain_linearise_part3(const double coef[
     double increment_jacobian[restrict 144], double work[restrict 136])
 {
     (void)displacement, (void)increment;
-    const double x1 = y[0], y1 = y[1], z1 = y[2], x2 = y[3], y2 = y[4], z2 = y[5], x3 = y[6], y3 = y[7], z3 =
-        y[8], x4 = y[9], y4 = y[10], z4 = y[11];
+    const double x1 = y[0], y1 = y[1], z1 = y[2], x2 = y[3], y2 = y[4], z2 = y[5], x3 = y[6], y3 = y[7],
+        z3 = y[8], x4 = y[9], y4 = y[10], z4 = y[11];
     const double t1 = work[65] * work[66] + (coef[0] * work[67] - work[68] * work[69]);
     const double t2 = coef[0] * work[66] + (work[70] * work[69] - work[65] * work[67]);
     const double t3 = coef[3] * (coef[2] * work[71]), t4 = coef[3] * (coef[2] * work[72]);
@@ -747,8 +747,8 @@ double thermal_chain_hamiltonian(const thermal_chain_params *params, const doubl
 void thermal_chain_casimirs(const thermal_chain_params *params, const double x[12], double out[])
 {
     (void)params;
-    const double x1 = x[0], y1 = x[1], z1 = x[2], x2 = x[3], y2 = x[4], z2 = x[5], x3 = x[6], y3 = x[7], z3 =
-        x[8], x4 = x[9], y4 = x[10], z4 = x[11];
+    const double x1 = x[0], y1 = x[1], z1 = x[2], x2 = x[3], y2 = x[4], z2 = x[5], x3 = x[6], y3 = x[7],
+        z3 = x[8], x4 = x[9], y4 = x[10], z4 = x[11];
     out[0] = z1 * z1 + (y1 * y1 + x1 * x1);
     out[1] = z2 * z2 + (x2 * x2 + y2 * y2);
     out[2] = z3 * z3 + (x3 * x3 + y3 * y3);
@@ -758,8 +758,8 @@ void thermal_chain_casimirs(const thermal_chain_params *params, const double x[1
 void thermal_chain_vector_field(const thermal_chain_params *params, const double x[12], double out[12])
 {
     if (params == NULL) params = &thermal_chain_default_params;
-    const double J = params->J, damping_rate = params->damping_rate, x1 = x[0], y1 = x[1], z1 = x[2], x2 =
-        x[3], y2 = x[4], z2 = x[5], x3 = x[6], y3 = x[7], z3 = x[8], x4 = x[9], y4 = x[10], z4 = x[11];
+    const double J = params->J, damping_rate = params->damping_rate, x1 = x[0], y1 = x[1], z1 = x[2],
+        x2 = x[3], y2 = x[4], z2 = x[5], x3 = x[6], y3 = x[7], z3 = x[8], x4 = x[9], y4 = x[10], z4 = x[11];
     const double t1 = J * x2, t2 = J * z2, t3 = J * y2, t4 = damping_rate * (z1 * t1 - x1 * t2) - t3;
     const double t5 = damping_rate * (x1 * t3 - y1 * t1) - t2;
     const double t6 = damping_rate * (y1 * t2 - z1 * t3) - t1, t7 = J * x3, t8 = t7 + J * x1, t9 = J * z3;
@@ -790,8 +790,8 @@ void thermal_chain_vector_field(const thermal_chain_params *params, const double
 void thermal_chain_noise_fields(const thermal_chain_params *params, const double x[12], double out[144])
 {
     if (params == NULL) params = &thermal_chain_default_params;
-    const double T = params->T, damping_rate = params->damping_rate, x1 = x[0], y1 = x[1], z1 = x[2], x2 =
-        x[3], y2 = x[4], z2 = x[5], x3 = x[6], y3 = x[7], z3 = x[8], x4 = x[9], y4 = x[10], z4 = x[11];
+    const double T = params->T, damping_rate = params->damping_rate, x1 = x[0], y1 = x[1], z1 = x[2],
+        x2 = x[3], y2 = x[4], z2 = x[5], x3 = x[6], y3 = x[7], z3 = x[8], x4 = x[9], y4 = x[10], z4 = x[11];
     const double t1 = sqrt(2.0 * (T * damping_rate)), t2 = z1 * t1, t3 = y1 * t1, t4 = x1 * t1;
     const double t5 = z2 * t1, t6 = y2 * t1, t7 = x2 * t1, t8 = z3 * t1, t9 = y3 * t1, t10 = x3 * t1;
     const double t11 = z4 * t1, t12 = y4 * t1, t13 = x4 * t1;
@@ -942,6 +942,13 @@ void thermal_chain_noise_fields(const thermal_chain_params *params, const double
 }
 
 /* ---- Compensated sums, linear equations ---- */
+static int thermal_chain_finite(const double *values, int count)
+{
+    for (int k = 0; k < count; ++k)
+        if (!isfinite(values[k])) return 0;
+    return 1;
+}
+
 /* x + change + small in compensated arithmetic, where small is the carry and what is as small: were that
    rounded with the change, corrections of one sign would add up to a drift. 0, and x as before, if the sum is
    not finite. */
@@ -1018,8 +1025,8 @@ static int thermal_chain_plausible(const thermal_chain_solver *s, const double i
         size += fabs(s->dw[k / thermal_chain_DIM] * fields[k]);
     if (moved <= thermal_chain_PLAUSIBLE * size) return 1;
     const double before = thermal_chain_hamiltonian(&s->params, s->x);
-    const double after = thermal_chain_hamiltonian(&s->params, end), between =
-        thermal_chain_hamiltonian(&s->params, middle);
+    const double after = thermal_chain_hamiltonian(&s->params, end),
+        between = thermal_chain_hamiltonian(&s->params, middle);
     return fabs(after - before) <= thermal_chain_LOST * (fabs(before) + fabs(between) + fabs(after));
 }
 
@@ -1050,8 +1057,8 @@ static thermal_chain_status thermal_chain_attempt(thermal_chain_solver *s)
 {
     double y[thermal_chain_DIM], delta[thermal_chain_DIM], displacement[thermal_chain_DIM],
         increment[thermal_chain_DIM];
-    double jacobian[thermal_chain_DIM * thermal_chain_DIM], increment_jacobian[thermal_chain_DIM
-        * thermal_chain_DIM];
+    double jacobian[thermal_chain_DIM * thermal_chain_DIM],
+        increment_jacobian[thermal_chain_DIM * thermal_chain_DIM];
     double previous = HUGE_VAL;
     memcpy(y, s->x, sizeof y);
     for (int iteration = 1; iteration <= thermal_chain_MAX_ITERATIONS; ++iteration) {
@@ -1083,36 +1090,20 @@ static thermal_chain_status thermal_chain_attempt(thermal_chain_solver *s)
 }
 
 /* ---- Between steps ---- */
-/* Stand at x + carry from now on. */
-static thermal_chain_status thermal_chain_place(thermal_chain_solver *s, const double x[thermal_chain_DIM],
-    const double carry[thermal_chain_DIM])
-{
-    for (int i = 0; i < thermal_chain_DIM; ++i)
-        if (!isfinite(x[i])) return thermal_chain_BAD_ARGUMENT;
-    memcpy(s->x, x, sizeof s->x);
-    memcpy(s->carry, carry, sizeof s->carry);
-    return thermal_chain_OK;
-}
-
 thermal_chain_status thermal_chain_set_state(thermal_chain_solver *s, const double x[thermal_chain_DIM])
 {
-    double to[thermal_chain_DIM], carry[thermal_chain_DIM] = { 0.0 };
-    if (s == NULL || x == NULL) return thermal_chain_BAD_ARGUMENT;
-    memcpy(to, x, sizeof to); /* which may be a part of *s */
-    return thermal_chain_place(s, to, carry);
+    if (s == NULL || x == NULL || !thermal_chain_finite(x, thermal_chain_DIM))
+        return thermal_chain_BAD_ARGUMENT;
+    memmove(s->x, x, sizeof s->x); /* x may be a part of *s */
+    memset(s->carry, 0, sizeof s->carry);
+    return thermal_chain_OK;
 }
 
 thermal_chain_status thermal_chain_kick(thermal_chain_solver *s, const double change[thermal_chain_DIM])
 {
-    double to[thermal_chain_DIM], carry[thermal_chain_DIM];
     if (s == NULL || change == NULL) return thermal_chain_BAD_ARGUMENT;
-    for (int i = 0; i < thermal_chain_DIM; ++i) {
-        const double sum = s->x[i] + change[i], added = sum - s->x[i];
-        const double lost = ((s->x[i] - (sum - added)) + (change[i] - added)) + s->carry[i];
-        to[i] = sum + lost;
-        carry[i] = lost - (to[i] - sum);
-    }
-    return thermal_chain_place(s, to, carry);
+    if (!thermal_chain_advance(s, change, s->carry)) return thermal_chain_BAD_ARGUMENT;
+    return thermal_chain_OK;
 }
 
 /* ---- Noise ---- */
@@ -1133,8 +1124,10 @@ static void thermal_chain_philox(uint32_t counter[4], uint32_t key0, uint32_t ke
 }
 
 /* 53 of the bits of two words, as a number from 0 up to, but not including, 2^53. */
-static double thermal_chain_bits(uint32_t high, uint32_t low) { return (double)(high >> 5) * 67108864.0
-    + (double)(low >> 6); }
+static double thermal_chain_bits(uint32_t high, uint32_t low)
+{
+    return (double)(high >> 5) * 67108864.0 + (double)(low >> 6);
+}
 
 /* Independent normal variates of variance 1, in pairs by Box and Muller, cut off at thermal_chain_BOUND. */
 static void thermal_chain_normals(uint64_t seed, uint32_t member, uint64_t step,
@@ -1188,12 +1181,10 @@ thermal_chain_status thermal_chain_init(thermal_chain_solver *s, const thermal_c
     thermal_chain_solver fresh = { .h = (double)NAN };
     fresh.params = params != NULL ? *params : thermal_chain_default_params;
     memcpy(fresh.x, x0, sizeof fresh.x);
-    for (int i = 0; i < thermal_chain_DIM; ++i)
-        if (!isfinite(fresh.x[i])) return thermal_chain_BAD_ARGUMENT;
-    if (!thermal_chain_allowed(&fresh.params)) return thermal_chain_BAD_ARGUMENT;
+    if (!thermal_chain_finite(fresh.x, thermal_chain_DIM) || !thermal_chain_allowed(&fresh.params))
+        return thermal_chain_BAD_ARGUMENT;
     thermal_chain_prepare(&fresh.params, thermal_chain_SHORT_STEP, fresh.coef);
-    for (int k = 0; k < thermal_chain_COEFFICIENTS; ++k)
-        if (!isfinite(fresh.coef[k])) return thermal_chain_BAD_ARGUMENT;
+    if (!thermal_chain_finite(fresh.coef, thermal_chain_COEFFICIENTS)) return thermal_chain_BAD_ARGUMENT;
     *s = fresh;
     return thermal_chain_OK;
 }
@@ -1235,11 +1226,15 @@ thermal_chain_status thermal_chain_integrate_along(thermal_chain_solver *s, doub
     return status;
 }
 
-thermal_chain_status thermal_chain_integrate(thermal_chain_solver *s, double h,
-    size_t steps) { return thermal_chain_integrate_along(s, h, steps, NULL); }
+thermal_chain_status thermal_chain_integrate(thermal_chain_solver *s, double h, size_t steps)
+{
+    return thermal_chain_integrate_along(s, h, steps, NULL);
+}
 
-thermal_chain_status thermal_chain_step(thermal_chain_solver *s, double h) { return thermal_chain_integrate(s,
-    h, 1); }
+thermal_chain_status thermal_chain_step(thermal_chain_solver *s, double h)
+{
+    return thermal_chain_integrate(s, h, 1);
+}
 
 const char *thermal_chain_status_string(thermal_chain_status status)
 {

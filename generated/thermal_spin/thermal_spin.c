@@ -26,7 +26,7 @@
  *   5. Noise
  *   6. The solver
  *   7. Ensembles
- * body-sha256: fd58d97c1891cca6a6035deb3ab9768478197f874c9a37bdc52d306b34471cca
+ * body-sha256: c4b7b6a22b07f0fdfe93dc59ebb15c15f141f684721631bec011dbf70303b0e2
  */
 #include "thermal_spin.h"
 
@@ -215,6 +215,13 @@ void thermal_spin_noise_fields(const thermal_spin_params *params, const double x
 }
 
 /* ---- Compensated sums, linear equations ---- */
+static int thermal_spin_finite(const double *values, int count)
+{
+    for (int k = 0; k < count; ++k)
+        if (!isfinite(values[k])) return 0;
+    return 1;
+}
+
 /* x + change + small in compensated arithmetic, where small is the carry and what is as small: were that
    rounded with the change, corrections of one sign would add up to a drift. 0, and x as before, if the sum is
    not finite. */
@@ -288,8 +295,8 @@ static int thermal_spin_plausible(const thermal_spin_solver *s, const double inc
         size += fabs(s->dw[k / thermal_spin_DIM] * fields[k]);
     if (moved <= thermal_spin_PLAUSIBLE * size) return 1;
     const double before = thermal_spin_hamiltonian(&s->params, s->x);
-    const double after = thermal_spin_hamiltonian(&s->params, end), between =
-        thermal_spin_hamiltonian(&s->params, middle);
+    const double after = thermal_spin_hamiltonian(&s->params, end),
+        between = thermal_spin_hamiltonian(&s->params, middle);
     return fabs(after - before) <= thermal_spin_LOST * (fabs(before) + fabs(between) + fabs(after));
 }
 
@@ -320,8 +327,8 @@ static thermal_spin_status thermal_spin_attempt(thermal_spin_solver *s)
 {
     double y[thermal_spin_DIM], delta[thermal_spin_DIM], displacement[thermal_spin_DIM],
         increment[thermal_spin_DIM];
-    double jacobian[thermal_spin_DIM * thermal_spin_DIM], increment_jacobian[thermal_spin_DIM
-        * thermal_spin_DIM];
+    double jacobian[thermal_spin_DIM * thermal_spin_DIM],
+        increment_jacobian[thermal_spin_DIM * thermal_spin_DIM];
     double previous = HUGE_VAL;
     memcpy(y, s->x, sizeof y);
     for (int iteration = 1; iteration <= thermal_spin_MAX_ITERATIONS; ++iteration) {
@@ -352,36 +359,19 @@ static thermal_spin_status thermal_spin_attempt(thermal_spin_solver *s)
 }
 
 /* ---- Between steps ---- */
-/* Stand at x + carry from now on. */
-static thermal_spin_status thermal_spin_place(thermal_spin_solver *s, const double x[thermal_spin_DIM],
-    const double carry[thermal_spin_DIM])
-{
-    for (int i = 0; i < thermal_spin_DIM; ++i)
-        if (!isfinite(x[i])) return thermal_spin_BAD_ARGUMENT;
-    memcpy(s->x, x, sizeof s->x);
-    memcpy(s->carry, carry, sizeof s->carry);
-    return thermal_spin_OK;
-}
-
 thermal_spin_status thermal_spin_set_state(thermal_spin_solver *s, const double x[thermal_spin_DIM])
 {
-    double to[thermal_spin_DIM], carry[thermal_spin_DIM] = { 0.0 };
-    if (s == NULL || x == NULL) return thermal_spin_BAD_ARGUMENT;
-    memcpy(to, x, sizeof to); /* which may be a part of *s */
-    return thermal_spin_place(s, to, carry);
+    if (s == NULL || x == NULL || !thermal_spin_finite(x, thermal_spin_DIM)) return thermal_spin_BAD_ARGUMENT;
+    memmove(s->x, x, sizeof s->x); /* x may be a part of *s */
+    memset(s->carry, 0, sizeof s->carry);
+    return thermal_spin_OK;
 }
 
 thermal_spin_status thermal_spin_kick(thermal_spin_solver *s, const double change[thermal_spin_DIM])
 {
-    double to[thermal_spin_DIM], carry[thermal_spin_DIM];
     if (s == NULL || change == NULL) return thermal_spin_BAD_ARGUMENT;
-    for (int i = 0; i < thermal_spin_DIM; ++i) {
-        const double sum = s->x[i] + change[i], added = sum - s->x[i];
-        const double lost = ((s->x[i] - (sum - added)) + (change[i] - added)) + s->carry[i];
-        to[i] = sum + lost;
-        carry[i] = lost - (to[i] - sum);
-    }
-    return thermal_spin_place(s, to, carry);
+    if (!thermal_spin_advance(s, change, s->carry)) return thermal_spin_BAD_ARGUMENT;
+    return thermal_spin_OK;
 }
 
 /* ---- Noise ---- */
@@ -402,8 +392,10 @@ static void thermal_spin_philox(uint32_t counter[4], uint32_t key0, uint32_t key
 }
 
 /* 53 of the bits of two words, as a number from 0 up to, but not including, 2^53. */
-static double thermal_spin_bits(uint32_t high, uint32_t low) { return (double)(high >> 5) * 67108864.0
-    + (double)(low >> 6); }
+static double thermal_spin_bits(uint32_t high, uint32_t low)
+{
+    return (double)(high >> 5) * 67108864.0 + (double)(low >> 6);
+}
 
 /* Independent normal variates of variance 1, in pairs by Box and Muller, cut off at thermal_spin_BOUND. */
 static void thermal_spin_normals(uint64_t seed, uint32_t member, uint64_t step,
@@ -457,12 +449,10 @@ thermal_spin_status thermal_spin_init(thermal_spin_solver *s, const thermal_spin
     thermal_spin_solver fresh = { .h = (double)NAN };
     fresh.params = params != NULL ? *params : thermal_spin_default_params;
     memcpy(fresh.x, x0, sizeof fresh.x);
-    for (int i = 0; i < thermal_spin_DIM; ++i)
-        if (!isfinite(fresh.x[i])) return thermal_spin_BAD_ARGUMENT;
-    if (!thermal_spin_allowed(&fresh.params)) return thermal_spin_BAD_ARGUMENT;
+    if (!thermal_spin_finite(fresh.x, thermal_spin_DIM) || !thermal_spin_allowed(&fresh.params))
+        return thermal_spin_BAD_ARGUMENT;
     thermal_spin_prepare(&fresh.params, thermal_spin_SHORT_STEP, fresh.coef);
-    for (int k = 0; k < thermal_spin_COEFFICIENTS; ++k)
-        if (!isfinite(fresh.coef[k])) return thermal_spin_BAD_ARGUMENT;
+    if (!thermal_spin_finite(fresh.coef, thermal_spin_COEFFICIENTS)) return thermal_spin_BAD_ARGUMENT;
     *s = fresh;
     return thermal_spin_OK;
 }
@@ -504,11 +494,15 @@ thermal_spin_status thermal_spin_integrate_along(thermal_spin_solver *s, double 
     return status;
 }
 
-thermal_spin_status thermal_spin_integrate(thermal_spin_solver *s, double h,
-    size_t steps) { return thermal_spin_integrate_along(s, h, steps, NULL); }
+thermal_spin_status thermal_spin_integrate(thermal_spin_solver *s, double h, size_t steps)
+{
+    return thermal_spin_integrate_along(s, h, steps, NULL);
+}
 
-thermal_spin_status thermal_spin_step(thermal_spin_solver *s, double h) { return thermal_spin_integrate(s, h,
-    1); }
+thermal_spin_status thermal_spin_step(thermal_spin_solver *s, double h)
+{
+    return thermal_spin_integrate(s, h, 1);
+}
 
 const char *thermal_spin_status_string(thermal_spin_status status)
 {

@@ -24,7 +24,7 @@
  *   5. Between steps
  *   6. The solver
  *   7. Ensembles
- * body-sha256: 4416f0788e5b9951d1150af9fa1ec699f715c8ddc60979741446e5df9297a2e0
+ * body-sha256: 0fc71e8945b4ae1478a91bd9da8412fc3b8df7774852a4c2e93fb5e4acd8db80
  */
 #include "thruster_body.h"
 
@@ -180,8 +180,8 @@ void thruster_body_casimirs(const thruster_body_params *params, const double x[3
 void thruster_body_vector_field(const thruster_body_params *params, const double x[3], double out[3])
 {
     if (params == NULL) params = &thruster_body_default_params;
-    const double I1 = params->I1, I2 = params->I2, I3 = params->I3, torque = params->torque, drag =
-        params->drag, m1 = x[0], m2 = x[1], m3 = x[2];
+    const double I1 = params->I1, I2 = params->I2, I3 = params->I3, torque = params->torque,
+        drag = params->drag, m1 = x[0], m2 = x[1], m3 = x[2];
     const double t1 = m3 / I3, t2 = m2 / I2, t3 = m1 / I1;
     out[0] = m2 * t1 - m3 * t2 - drag * m1;
     out[1] = m3 * t3 - m1 * t1 - drag * m2;
@@ -189,6 +189,13 @@ void thruster_body_vector_field(const thruster_body_params *params, const double
 }
 
 /* ---- Compensated sums, linear equations ---- */
+static int thruster_body_finite(const double *values, int count)
+{
+    for (int k = 0; k < count; ++k)
+        if (!isfinite(values[k])) return 0;
+    return 1;
+}
+
 /* x + change + small in compensated arithmetic, where small is the carry and what is as small: were that
    rounded with the change, corrections of one sign would add up to a drift. 0, and x as before, if the sum is
    not finite. */
@@ -303,8 +310,8 @@ static int thruster_body_plausible(const thruster_body_solver *s, int stage,
         size += fabs(thruster_body_fractions[stage] * s->h * field[i]);
     if (moved <= thruster_body_PLAUSIBLE * size) return 1;
     const double before = thruster_body_hamiltonian(&s->params, s->x);
-    const double after = thruster_body_hamiltonian(&s->params, end), between =
-        thruster_body_hamiltonian(&s->params, middle);
+    const double after = thruster_body_hamiltonian(&s->params, end),
+        between = thruster_body_hamiltonian(&s->params, middle);
     return fabs(after - before) <= thruster_body_LOST * (fabs(before) + fabs(between) + fabs(after));
 }
 
@@ -335,8 +342,8 @@ static thruster_body_status thruster_body_attempt(thruster_body_solver *s, int s
 {
     double y[thruster_body_DIM], delta[thruster_body_DIM], displacement[thruster_body_DIM],
         increment[thruster_body_DIM];
-    double jacobian[thruster_body_DIM * thruster_body_DIM], increment_jacobian[thruster_body_DIM
-        * thruster_body_DIM];
+    double jacobian[thruster_body_DIM * thruster_body_DIM],
+        increment_jacobian[thruster_body_DIM * thruster_body_DIM];
     double previous = HUGE_VAL;
     if (!thruster_body_predict(&s->history[stage], y)) memcpy(y, s->x, sizeof y);
     for (int iteration = 1; iteration <= thruster_body_MAX_ITERATIONS; ++iteration) {
@@ -372,14 +379,13 @@ static thruster_body_status thruster_body_attempt(thruster_body_solver *s, int s
 /* how far the state may be moved, in its own size, for guesses to move with it */
 #define thruster_body_NEAR_BY 0.125
 
-/* Guesses move with the state, by as many past values as extrapolation needs; recurrences are of the motion
-   as it was. From far away all begins anew, with the next step. */
-static void thruster_body_move_guesses(thruster_body_solver *s, const double to[thruster_body_DIM])
+/* Guesses move with the state. From far away all begins anew, with the next step. */
+static void thruster_body_move_guesses(thruster_body_solver *s, const double from[thruster_body_DIM])
 {
     double distance = 0.0, size = 0.0;
     for (int i = 0; i < thruster_body_DIM; ++i) {
-        distance += fabs(to[i] - s->x[i]);
-        size += fabs(s->x[i]);
+        distance += fabs(s->x[i] - from[i]);
+        size += fabs(from[i]);
     }
     if (!(distance <= thruster_body_NEAR_BY * size)) {
         s->h = (double)NAN;
@@ -387,41 +393,30 @@ static void thruster_body_move_guesses(thruster_body_solver *s, const double to[
     }
     for (int stage = 0; stage < thruster_body_STAGES; ++stage) {
         thruster_body_history *history = &s->history[stage];
-        for (int i = 0; i < thruster_body_DIM; ++i) history->difference[0][i] += to[i] - s->x[i];
+        for (int i = 0; i < thruster_body_DIM; ++i) history->difference[0][i] += s->x[i] - from[i];
     }
-}
-
-/* Stand at x + carry from now on. */
-static thruster_body_status thruster_body_place(thruster_body_solver *s, const double x[thruster_body_DIM],
-    const double carry[thruster_body_DIM])
-{
-    for (int i = 0; i < thruster_body_DIM; ++i)
-        if (!isfinite(x[i])) return thruster_body_BAD_ARGUMENT;
-    thruster_body_move_guesses(s, x);
-    memcpy(s->x, x, sizeof s->x);
-    memcpy(s->carry, carry, sizeof s->carry);
-    return thruster_body_OK;
 }
 
 thruster_body_status thruster_body_set_state(thruster_body_solver *s, const double x[thruster_body_DIM])
 {
-    double to[thruster_body_DIM], carry[thruster_body_DIM] = { 0.0 };
-    if (s == NULL || x == NULL) return thruster_body_BAD_ARGUMENT;
-    memcpy(to, x, sizeof to); /* which may be a part of *s */
-    return thruster_body_place(s, to, carry);
+    if (s == NULL || x == NULL || !thruster_body_finite(x, thruster_body_DIM))
+        return thruster_body_BAD_ARGUMENT;
+    double from[thruster_body_DIM];
+    memcpy(from, s->x, sizeof from);
+    memmove(s->x, x, sizeof s->x); /* x may be a part of *s */
+    memset(s->carry, 0, sizeof s->carry);
+    thruster_body_move_guesses(s, from);
+    return thruster_body_OK;
 }
 
 thruster_body_status thruster_body_kick(thruster_body_solver *s, const double change[thruster_body_DIM])
 {
-    double to[thruster_body_DIM], carry[thruster_body_DIM];
     if (s == NULL || change == NULL) return thruster_body_BAD_ARGUMENT;
-    for (int i = 0; i < thruster_body_DIM; ++i) {
-        const double sum = s->x[i] + change[i], added = sum - s->x[i];
-        const double lost = ((s->x[i] - (sum - added)) + (change[i] - added)) + s->carry[i];
-        to[i] = sum + lost;
-        carry[i] = lost - (to[i] - sum);
-    }
-    return thruster_body_place(s, to, carry);
+    double from[thruster_body_DIM];
+    memcpy(from, s->x, sizeof from);
+    if (!thruster_body_advance(s, change, s->carry)) return thruster_body_BAD_ARGUMENT;
+    thruster_body_move_guesses(s, from);
+    return thruster_body_OK;
 }
 
 /* ---- The solver ---- */
@@ -435,12 +430,10 @@ thruster_body_status thruster_body_init(thruster_body_solver *s, const thruster_
     thruster_body_solver fresh = { .h = (double)NAN };
     fresh.params = params != NULL ? *params : thruster_body_default_params;
     memcpy(fresh.x, x0, sizeof fresh.x);
-    for (int i = 0; i < thruster_body_DIM; ++i)
-        if (!isfinite(fresh.x[i])) return thruster_body_BAD_ARGUMENT;
-    if (!thruster_body_allowed(&fresh.params)) return thruster_body_BAD_ARGUMENT;
+    if (!thruster_body_finite(fresh.x, thruster_body_DIM) || !thruster_body_allowed(&fresh.params))
+        return thruster_body_BAD_ARGUMENT;
     thruster_body_prepare(&fresh.params, thruster_body_SHORT_STEP, fresh.coef[0]);
-    for (int k = 0; k < thruster_body_COEFFICIENTS; ++k)
-        if (!isfinite(fresh.coef[0][k])) return thruster_body_BAD_ARGUMENT;
+    if (!thruster_body_finite(fresh.coef[0], thruster_body_COEFFICIENTS)) return thruster_body_BAD_ARGUMENT;
     *s = fresh;
     return thruster_body_OK;
 }
@@ -496,8 +489,10 @@ thruster_body_status thruster_body_integrate(thruster_body_solver *s, double h, 
     return status;
 }
 
-thruster_body_status thruster_body_step(thruster_body_solver *s, double h) { return thruster_body_integrate(s,
-    h, 1); }
+thruster_body_status thruster_body_step(thruster_body_solver *s, double h)
+{
+    return thruster_body_integrate(s, h, 1);
+}
 
 const char *thruster_body_status_string(thruster_body_status status)
 {

@@ -21,7 +21,7 @@
  *   4. The solver
  *   5. The flows
  *   6. What is seen at sites
- * body-sha256: 475211cd0b577a91b797a8d75fffc336724d52d1af82e7ee0646e1334f0f39cf
+ * body-sha256: a0aa3a452d2c86b2b8efe91040a698405bea437402b367fb740798776f43e616
  */
 #include "toda.h"
 
@@ -137,8 +137,8 @@ typedef struct {
 /* The piece of that number. */
 static inline toda_piece toda_piece_of(const toda_solver *s, size_t unit)
 {
-    const size_t pieces = toda_pieces(s), index = pieces == 1 ? unit : unit / pieces, part = unit - index
-        * pieces;
+    const size_t pieces = toda_pieces(s), index = pieces == 1 ? unit : unit / pieces,
+        part = unit - index * pieces;
     toda_piece piece;
     toda_locate(s, index, &piece.row);
     piece.from = (ptrdiff_t)part * toda_PIECE;

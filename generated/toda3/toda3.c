@@ -21,7 +21,7 @@
  *   5. Between steps
  *   6. The solver
  *   7. Ensembles
- * body-sha256: 213958a755056d86235a49094a8f356a2d7f0ae6a297c86d8362320a3586bd4b
+ * body-sha256: 514f13d3ead5d52d70a8b5c9fecc4eda72b605ea37520b59b7da1bad1ccf809a
  */
 #include "toda3.h"
 
@@ -235,6 +235,13 @@ void toda3_vector_field(const toda3_params *params, const double x[5], double ou
 }
 
 /* ---- Compensated sums, linear equations ---- */
+static int toda3_finite(const double *values, int count)
+{
+    for (int k = 0; k < count; ++k)
+        if (!isfinite(values[k])) return 0;
+    return 1;
+}
+
 /* x + change + small in compensated arithmetic, where small is the carry and what is as small: were that
    rounded with the change, corrections of one sign would add up to a drift. 0, and x as before, if the sum is
    not finite. */
@@ -405,53 +412,41 @@ static toda3_status toda3_attempt(toda3_solver *s)
 /* ---- Between steps ---- */
 #define toda3_NEAR_BY 0.125 /* how far the state may be moved, in its own size, for guesses to move with it */
 
-/* Guesses move with the state, by as many past values as extrapolation needs; recurrences are of the motion
-   as it was. From far away all begins anew, with the next step. */
-static void toda3_move_guesses(toda3_solver *s, const double to[toda3_DIM])
+/* Guesses move with the state. From far away all begins anew, with the next step. */
+static void toda3_move_guesses(toda3_solver *s, const double from[toda3_DIM])
 {
     double distance = 0.0, size = 0.0;
     for (int i = 0; i < toda3_DIM; ++i) {
-        distance += fabs(to[i] - s->x[i]);
-        size += fabs(s->x[i]);
+        distance += fabs(s->x[i] - from[i]);
+        size += fabs(from[i]);
     }
     if (!(distance <= toda3_NEAR_BY * size)) {
         s->h = (double)NAN;
         return;
     }
     toda3_history *history = &s->history;
-    for (int i = 0; i < toda3_DIM; ++i) history->difference[0][i] += to[i] - s->x[i];
-}
-
-/* Stand at x + carry from now on. */
-static toda3_status toda3_place(toda3_solver *s, const double x[toda3_DIM], const double carry[toda3_DIM])
-{
-    for (int i = 0; i < toda3_DIM; ++i)
-        if (!isfinite(x[i])) return toda3_BAD_ARGUMENT;
-    toda3_move_guesses(s, x);
-    memcpy(s->x, x, sizeof s->x);
-    memcpy(s->carry, carry, sizeof s->carry);
-    return toda3_OK;
+    for (int i = 0; i < toda3_DIM; ++i) history->difference[0][i] += s->x[i] - from[i];
 }
 
 toda3_status toda3_set_state(toda3_solver *s, const double x[toda3_DIM])
 {
-    double to[toda3_DIM], carry[toda3_DIM] = { 0.0 };
-    if (s == NULL || x == NULL) return toda3_BAD_ARGUMENT;
-    memcpy(to, x, sizeof to); /* which may be a part of *s */
-    return toda3_place(s, to, carry);
+    if (s == NULL || x == NULL || !toda3_finite(x, toda3_DIM)) return toda3_BAD_ARGUMENT;
+    double from[toda3_DIM];
+    memcpy(from, s->x, sizeof from);
+    memmove(s->x, x, sizeof s->x); /* x may be a part of *s */
+    memset(s->carry, 0, sizeof s->carry);
+    toda3_move_guesses(s, from);
+    return toda3_OK;
 }
 
 toda3_status toda3_kick(toda3_solver *s, const double change[toda3_DIM])
 {
-    double to[toda3_DIM], carry[toda3_DIM];
     if (s == NULL || change == NULL) return toda3_BAD_ARGUMENT;
-    for (int i = 0; i < toda3_DIM; ++i) {
-        const double sum = s->x[i] + change[i], added = sum - s->x[i];
-        const double lost = ((s->x[i] - (sum - added)) + (change[i] - added)) + s->carry[i];
-        to[i] = sum + lost;
-        carry[i] = lost - (to[i] - sum);
-    }
-    return toda3_place(s, to, carry);
+    double from[toda3_DIM];
+    memcpy(from, s->x, sizeof from);
+    if (!toda3_advance(s, change, s->carry)) return toda3_BAD_ARGUMENT;
+    toda3_move_guesses(s, from);
+    return toda3_OK;
 }
 
 /* ---- The solver ---- */
@@ -462,8 +457,7 @@ toda3_status toda3_init(toda3_solver *s, const toda3_params *params, const doubl
     toda3_solver fresh = { .h = (double)NAN };
     fresh.params = params != NULL ? *params : toda3_default_params;
     memcpy(fresh.x, x0, sizeof fresh.x);
-    for (int i = 0; i < toda3_DIM; ++i)
-        if (!isfinite(fresh.x[i])) return toda3_BAD_ARGUMENT;
+    if (!toda3_finite(fresh.x, toda3_DIM)) return toda3_BAD_ARGUMENT;
     *s = fresh;
     return toda3_OK;
 }

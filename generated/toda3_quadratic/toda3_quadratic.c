@@ -22,7 +22,7 @@
  *   7. The solver
  *   8. Members of an ensemble
  *   9. Ensembles
- * body-sha256: 68e283b0a56a50e58280deb8e57acebed5201d8102af39009e2fee67c76045c8
+ * body-sha256: 47d84e30c588fb478d12a4114390bddd3ae9289008dd9a269d42a7b5a0198bf2
  */
 #include "toda3_quadratic.h"
 
@@ -113,6 +113,13 @@ void toda3_quadratic_vector_field(const toda3_quadratic_params *params, const do
 }
 
 /* ---- Compensated sums, linear equations ---- */
+static int toda3_quadratic_finite(const double *values, int count)
+{
+    for (int k = 0; k < count; ++k)
+        if (!isfinite(values[k])) return 0;
+    return 1;
+}
+
 /* x + change + small in compensated arithmetic, where small is the carry and what is as small: were that
    rounded with the change, corrections of one sign would add up to a drift. 0, and x as before, if the sum is
    not finite. */
@@ -313,8 +320,8 @@ static int toda3_quadratic_predict(const toda3_quadratic_history *history, doubl
 /* Choose the guess that would have been best for a value that took several iterations. */
 static void toda3_quadratic_judge(toda3_quadratic_history *history, const double value[toda3_quadratic_DIM])
 {
-    double row[toda3_quadratic_HISTORY + 1][toda3_quadratic_DIM], guess[toda3_quadratic_DIM], least =
-        HUGE_VAL, fitted = HUGE_VAL;
+    double row[toda3_quadratic_HISTORY + 1][toda3_quadratic_DIM], guess[toda3_quadratic_DIM],
+        least = HUGE_VAL, fitted = HUGE_VAL;
     const int rows = history->count < toda3_quadratic_HISTORY ? history->count : toda3_quadratic_HISTORY;
     memcpy(row[0], value, sizeof row[0]);
     for (int k = 0; k < rows; ++k) memcpy(row[k + 1], history->past[history->count - 1 - k], sizeof row[0]);
@@ -403,8 +410,8 @@ static int toda3_quadratic_plausible(const toda3_quadratic_solver *s,
     for (int i = 0; i < toda3_quadratic_DIM; ++i) size += fabs(s->h * field[i]);
     if (moved <= toda3_quadratic_PLAUSIBLE * size) return 1;
     const double before = toda3_quadratic_hamiltonian(&s->params, s->x);
-    const double after = toda3_quadratic_hamiltonian(&s->params, end), between =
-        toda3_quadratic_hamiltonian(&s->params, middle);
+    const double after = toda3_quadratic_hamiltonian(&s->params, end),
+        between = toda3_quadratic_hamiltonian(&s->params, middle);
     return fabs(after - before) <= toda3_quadratic_LOST * (fabs(before) + fabs(between) + fabs(after));
 }
 
@@ -702,8 +709,8 @@ static toda3_quadratic_status toda3_quadratic_attempt(toda3_quadratic_solver *s)
         change[toda3_quadratic_DIM], jacobian[toda3_quadratic_DIM * toda3_quadratic_DIM], previous = HUGE_VAL;
     if (!toda3_quadratic_predict(&s->history, y)) memcpy(y, s->x, sizeof y);
     toda3_quadratic_generate(coef, y, p, jacobian);
-    for (int iteration = 0, made = 0; iteration < toda3_quadratic_MAX_ITERATIONS && made <=
-        toda3_quadratic_MOST_PIECES; ++iteration) {
+    for (int iteration = 0, made = 0; iteration < toda3_quadratic_MAX_ITERATIONS
+        && made <= toda3_quadratic_MOST_PIECES; ++iteration) {
         if (!toda3_quadratic_residual(s, coef, p, y, residual, change, jacobian, &made))
             return toda3_quadratic_NO_CONVERGENCE;
         double size = 0.0, norm = DBL_MIN;
@@ -738,12 +745,12 @@ static toda3_quadratic_status toda3_quadratic_attempt(toda3_quadratic_solver *s)
 
 /* Guesses move with the state, by as many past values as extrapolation needs; recurrences are of the motion
    as it was. From far away all begins anew, with the next step. */
-static void toda3_quadratic_move_guesses(toda3_quadratic_solver *s, const double to[toda3_quadratic_DIM])
+static void toda3_quadratic_move_guesses(toda3_quadratic_solver *s, const double from[toda3_quadratic_DIM])
 {
     double distance = 0.0, size = 0.0;
     for (int i = 0; i < toda3_quadratic_DIM; ++i) {
-        distance += fabs(to[i] - s->x[i]);
-        size += fabs(s->x[i]);
+        distance += fabs(s->x[i] - from[i]);
+        size += fabs(from[i]);
     }
     if (!(distance <= toda3_quadratic_NEAR_BY * size)) {
         s->h = (double)NAN;
@@ -753,44 +760,33 @@ static void toda3_quadratic_move_guesses(toda3_quadratic_solver *s, const double
     const int count = history->count < toda3_quadratic_HISTORY ? history->count : toda3_quadratic_HISTORY;
     memmove(history->past, history->past + history->count - count, (size_t)count * sizeof history->past[0]);
     for (int k = 0; k < count; ++k)
-        for (int i = 0; i < toda3_quadratic_DIM; ++i) history->past[k][i] += to[i] - s->x[i];
+        for (int i = 0; i < toda3_quadratic_DIM; ++i) history->past[k][i] += s->x[i] - from[i];
     history->count = count;
     history->recurrence_terms = history->use_recurrence = history->slow_steps = 0;
-}
-
-/* Stand at x + carry from now on. */
-static toda3_quadratic_status toda3_quadratic_place(toda3_quadratic_solver *s,
-    const double x[toda3_quadratic_DIM], const double carry[toda3_quadratic_DIM])
-{
-    for (int i = 0; i < toda3_quadratic_DIM; ++i)
-        if (!isfinite(x[i])) return toda3_quadratic_BAD_ARGUMENT;
-    toda3_quadratic_move_guesses(s, x);
-    memcpy(s->x, x, sizeof s->x);
-    memcpy(s->carry, carry, sizeof s->carry);
-    return toda3_quadratic_OK;
 }
 
 toda3_quadratic_status toda3_quadratic_set_state(toda3_quadratic_solver *s,
     const double x[toda3_quadratic_DIM])
 {
-    double to[toda3_quadratic_DIM], carry[toda3_quadratic_DIM] = { 0.0 };
-    if (s == NULL || x == NULL) return toda3_quadratic_BAD_ARGUMENT;
-    memcpy(to, x, sizeof to); /* which may be a part of *s */
-    return toda3_quadratic_place(s, to, carry);
+    if (s == NULL || x == NULL || !toda3_quadratic_finite(x, toda3_quadratic_DIM))
+        return toda3_quadratic_BAD_ARGUMENT;
+    double from[toda3_quadratic_DIM];
+    memcpy(from, s->x, sizeof from);
+    memmove(s->x, x, sizeof s->x); /* x may be a part of *s */
+    memset(s->carry, 0, sizeof s->carry);
+    toda3_quadratic_move_guesses(s, from);
+    return toda3_quadratic_OK;
 }
 
 toda3_quadratic_status toda3_quadratic_kick(toda3_quadratic_solver *s,
     const double change[toda3_quadratic_DIM])
 {
-    double to[toda3_quadratic_DIM], carry[toda3_quadratic_DIM];
     if (s == NULL || change == NULL) return toda3_quadratic_BAD_ARGUMENT;
-    for (int i = 0; i < toda3_quadratic_DIM; ++i) {
-        const double sum = s->x[i] + change[i], added = sum - s->x[i];
-        const double lost = ((s->x[i] - (sum - added)) + (change[i] - added)) + s->carry[i];
-        to[i] = sum + lost;
-        carry[i] = lost - (to[i] - sum);
-    }
-    return toda3_quadratic_place(s, to, carry);
+    double from[toda3_quadratic_DIM];
+    memcpy(from, s->x, sizeof from);
+    if (!toda3_quadratic_advance(s, change, s->carry)) return toda3_quadratic_BAD_ARGUMENT;
+    toda3_quadratic_move_guesses(s, from);
+    return toda3_quadratic_OK;
 }
 
 /* ---- The solver ---- */
@@ -802,8 +798,7 @@ toda3_quadratic_status toda3_quadratic_init(toda3_quadratic_solver *s, const tod
     toda3_quadratic_solver fresh = { .h = (double)NAN };
     fresh.params = params != NULL ? *params : toda3_quadratic_default_params;
     memcpy(fresh.x, x0, sizeof fresh.x);
-    for (int i = 0; i < toda3_quadratic_DIM; ++i)
-        if (!isfinite(fresh.x[i])) return toda3_quadratic_BAD_ARGUMENT;
+    if (!toda3_quadratic_finite(fresh.x, toda3_quadratic_DIM)) return toda3_quadratic_BAD_ARGUMENT;
     *s = fresh;
     return toda3_quadratic_OK;
 }
@@ -843,8 +838,10 @@ toda3_quadratic_status toda3_quadratic_integrate(toda3_quadratic_solver *s, doub
     return status;
 }
 
-toda3_quadratic_status toda3_quadratic_step(toda3_quadratic_solver *s,
-    double h) { return toda3_quadratic_integrate(s, h, 1); }
+toda3_quadratic_status toda3_quadratic_step(toda3_quadratic_solver *s, double h)
+{
+    return toda3_quadratic_integrate(s, h, 1);
+}
 
 const char *toda3_quadratic_status_string(toda3_quadratic_status status)
 {

@@ -21,7 +21,7 @@
  *   4. The solver
  *   5. The flows
  *   6. What is seen at sites
- * body-sha256: 501ffa9bc4861bc8fd61a0f021ca8359e64de126873af354a8321d234bbafd39
+ * body-sha256: 8342549be2a5afd54269f5a2afd8e541c3d1fe13291282518669d35ecc0d7c4f
  */
 #include "volterra.h"
 
@@ -156,8 +156,8 @@ typedef struct {
 /* The piece of that number. */
 static inline volterra_piece volterra_piece_of(const volterra_solver *s, size_t unit)
 {
-    const size_t pieces = volterra_pieces(s), index = pieces == 1 ? unit : unit / pieces, part = unit - index
-        * pieces;
+    const size_t pieces = volterra_pieces(s), index = pieces == 1 ? unit : unit / pieces,
+        part = unit - index * pieces;
     volterra_piece piece;
     volterra_locate(s, index, &piece.row);
     piece.from = (ptrdiff_t)part * volterra_PIECE;
@@ -383,8 +383,8 @@ volterra_status volterra_init(volterra_solver *s, const volterra_params *params,
     ptrdiff_t width;
     if (s == NULL || sizes == NULL || x0 == NULL || work == NULL) return volterra_BAD_ARGUMENT;
     const volterra_params own = params != NULL ? *params : volterra_default_params;
-    const size_t rows = volterra_shape(sizes, &width), length = sizes[volterra_AXES - 1], sites = rows
-        * length;
+    const size_t rows = volterra_shape(sizes, &width), length = sizes[volterra_AXES - 1],
+        sites = rows * length;
     if (rows == 0 || !volterra_finite(x0, volterra_DIM * sites) || !volterra_allowed(&own, sites))
         return volterra_BAD_ARGUMENT;
     double coef[volterra_COEFFICIENTS];
@@ -578,10 +578,14 @@ static void volterra_fill(const volterra_solver *s, volterra_kernel *kernel, dou
 }
 
 void volterra_density(const volterra_solver *s, double *out) { volterra_fill(s, volterra_energy_row, out); }
-void volterra_casimirs(const volterra_solver *s, double *out) { volterra_fill(s, volterra_casimirs_row, out);
-    }
-void volterra_vector_field(const volterra_solver *s, double *out) { volterra_fill(s,
-    volterra_vector_field_row, out); }
+void volterra_casimirs(const volterra_solver *s, double *out)
+{
+    volterra_fill(s, volterra_casimirs_row, out);
+}
+void volterra_vector_field(const volterra_solver *s, double *out)
+{
+    volterra_fill(s, volterra_vector_field_row, out);
+}
 
 const char *volterra_status_string(volterra_status status)
 {

@@ -21,7 +21,7 @@
  *   5. Between steps
  *   6. The solver
  *   7. Ensembles
- * body-sha256: 097407699441601eb654717ee617129b572913e095ef16a25a2bd74f0de937e6
+ * body-sha256: 0fabeb50a67816648843c4eaa17e8f2372bc3b14ad51d6a85b7e2f138e094c80
  */
 #include "volterra5.h"
 
@@ -140,25 +140,25 @@ static void volterra5_linearise(const double coef[4], const double y[5], double 
     increment_jacobian[8] = -(t72 * t97 + t7 * t96);
     increment_jacobian[9] = -(t52 * t96 + t1 * t97);
     increment_jacobian[10] = -(t55 * t99 + t7 * t100);
-    increment_jacobian[11] = -(v3 * (0.5 * (t77 * t42) - 0.5 * (t29 * (t77 * t98))) + (t6 * t100 + t58
-        * t99));
+    increment_jacobian[11] = -(v3 * (0.5 * (t77 * t42) - 0.5 * (t29 * (t77 * t98)))
+        + (t6 * t100 + t58 * t99));
     increment_jacobian[12] = -(t43 + (t60 * t99 + t72 * t100));
-    increment_jacobian[13] = -(v3 * (0.5 * (t29 * (t98 * t79)) - 0.5 * (t79 * t42)) + (t78 * t100 + t6
-        * t99));
+    increment_jacobian[13] = -(v3 * (0.5 * (t29 * (t98 * t79)) - 0.5 * (t79 * t42))
+        + (t78 * t100 + t6 * t99));
     increment_jacobian[14] = -(t61 * t100 + t18 * t99);
     increment_jacobian[15] = -(t52 * t102 + t4 * t103);
     increment_jacobian[16] = -(t60 * t103 + t18 * t102);
-    increment_jacobian[17] = -(v4 * (0.5 * (t84 * t46) - 0.5 * (t30 * (t84 * t101))) + (t70 * t103 + t1
-        * t102));
+    increment_jacobian[17] = -(v4 * (0.5 * (t84 * t46) - 0.5 * (t30 * (t84 * t101)))
+        + (t70 * t103 + t1 * t102));
     increment_jacobian[18] = -(t47 + (t61 * t102 + t72 * t103));
-    increment_jacobian[19] = -(v4 * (0.5 * (t30 * (t85 * t101)) - 0.5 * (t85 * t46)) + (t1 * t103 + t63
-        * t102));
-    increment_jacobian[20] = -(v5 * (0.5 * (t31 * (t104 * t90)) - 0.5 * (t90 * t50)) + (t65 * t105 + t7
-        * t106));
+    increment_jacobian[19] = -(v4 * (0.5 * (t30 * (t85 * t101)) - 0.5 * (t85 * t46))
+        + (t1 * t103 + t63 * t102));
+    increment_jacobian[20] = -(v5 * (0.5 * (t31 * (t104 * t90)) - 0.5 * (t90 * t50))
+        + (t65 * t105 + t7 * t106));
     increment_jacobian[21] = -(t55 * t105 + t6 * t106);
     increment_jacobian[22] = -(t72 * t106 + t4 * t105);
-    increment_jacobian[23] = -(v5 * (0.5 * (t91 * t50) - 0.5 * (t31 * (t104 * t91))) + (t78 * t106 + t7
-        * t105));
+    increment_jacobian[23] = -(v5 * (0.5 * (t91 * t50) - 0.5 * (t31 * (t104 * t91)))
+        + (t78 * t106 + t7 * t105));
     increment_jacobian[24] = -(t51 + (t52 * t105 + t61 * t106));
 }
 
@@ -189,6 +189,13 @@ void volterra5_vector_field(const volterra5_params *params, const double x[5], d
 }
 
 /* ---- Compensated sums, linear equations ---- */
+static int volterra5_finite(const double *values, int count)
+{
+    for (int k = 0; k < count; ++k)
+        if (!isfinite(values[k])) return 0;
+    return 1;
+}
+
 /* x + change + small in compensated arithmetic, where small is the carry and what is as small: were that
    rounded with the change, corrections of one sign would add up to a drift. 0, and x as before, if the sum is
    not finite. */
@@ -361,13 +368,12 @@ static volterra5_status volterra5_attempt(volterra5_solver *s)
 /* how far the state may be moved, in its own size, for guesses to move with it */
 #define volterra5_NEAR_BY 0.125
 
-/* Guesses move with the state, by as many past values as extrapolation needs; recurrences are of the motion
-   as it was. From far away all begins anew, with the next step. */
-static void volterra5_move_guesses(volterra5_solver *s, const double to[volterra5_DIM])
+/* Guesses move with the state. From far away all begins anew, with the next step. */
+static void volterra5_move_guesses(volterra5_solver *s, const double from[volterra5_DIM])
 {
     double distance = 0.0, size = 0.0;
     for (int i = 0; i < volterra5_DIM; ++i) {
-        distance = fmax(distance, fabs(to[i] / s->x[i] - 1.0));
+        distance = fmax(distance, fabs(s->x[i] / from[i] - 1.0));
         size = 1.0;
     }
     if (!(distance <= volterra5_NEAR_BY * size)) {
@@ -375,40 +381,28 @@ static void volterra5_move_guesses(volterra5_solver *s, const double to[volterra
         return;
     }
     volterra5_history *history = &s->history;
-    for (int i = 0; i < volterra5_DIM; ++i) history->difference[0][i] += to[i] - s->x[i];
-}
-
-/* Stand at x + carry from now on. */
-static volterra5_status volterra5_place(volterra5_solver *s, const double x[volterra5_DIM],
-    const double carry[volterra5_DIM])
-{
-    for (int i = 0; i < volterra5_DIM; ++i)
-        if (!isfinite(x[i])) return volterra5_BAD_ARGUMENT;
-    volterra5_move_guesses(s, x);
-    memcpy(s->x, x, sizeof s->x);
-    memcpy(s->carry, carry, sizeof s->carry);
-    return volterra5_OK;
+    for (int i = 0; i < volterra5_DIM; ++i) history->difference[0][i] += s->x[i] - from[i];
 }
 
 volterra5_status volterra5_set_state(volterra5_solver *s, const double x[volterra5_DIM])
 {
-    double to[volterra5_DIM], carry[volterra5_DIM] = { 0.0 };
-    if (s == NULL || x == NULL) return volterra5_BAD_ARGUMENT;
-    memcpy(to, x, sizeof to); /* which may be a part of *s */
-    return volterra5_place(s, to, carry);
+    if (s == NULL || x == NULL || !volterra5_finite(x, volterra5_DIM)) return volterra5_BAD_ARGUMENT;
+    double from[volterra5_DIM];
+    memcpy(from, s->x, sizeof from);
+    memmove(s->x, x, sizeof s->x); /* x may be a part of *s */
+    memset(s->carry, 0, sizeof s->carry);
+    volterra5_move_guesses(s, from);
+    return volterra5_OK;
 }
 
 volterra5_status volterra5_kick(volterra5_solver *s, const double change[volterra5_DIM])
 {
-    double to[volterra5_DIM], carry[volterra5_DIM];
     if (s == NULL || change == NULL) return volterra5_BAD_ARGUMENT;
-    for (int i = 0; i < volterra5_DIM; ++i) {
-        const double sum = s->x[i] + change[i], added = sum - s->x[i];
-        const double lost = ((s->x[i] - (sum - added)) + (change[i] - added)) + s->carry[i];
-        to[i] = sum + lost;
-        carry[i] = lost - (to[i] - sum);
-    }
-    return volterra5_place(s, to, carry);
+    double from[volterra5_DIM];
+    memcpy(from, s->x, sizeof from);
+    if (!volterra5_advance(s, change, s->carry)) return volterra5_BAD_ARGUMENT;
+    volterra5_move_guesses(s, from);
+    return volterra5_OK;
 }
 
 /* ---- The solver ---- */
@@ -420,8 +414,7 @@ volterra5_status volterra5_init(volterra5_solver *s, const volterra5_params *par
     volterra5_solver fresh = { .h = (double)NAN };
     fresh.params = params != NULL ? *params : volterra5_default_params;
     memcpy(fresh.x, x0, sizeof fresh.x);
-    for (int i = 0; i < volterra5_DIM; ++i)
-        if (!isfinite(fresh.x[i])) return volterra5_BAD_ARGUMENT;
+    if (!volterra5_finite(fresh.x, volterra5_DIM)) return volterra5_BAD_ARGUMENT;
     *s = fresh;
     return volterra5_OK;
 }

@@ -21,7 +21,7 @@
  *   5. Between steps
  *   6. The solver
  *   7. Ensembles
- * body-sha256: 072d3c2ff298b071b134f7d825ce5293ca46e89246dcfec5844581627d16c4dd
+ * body-sha256: 2e358aa57c69901c3f75bdd161b77971037edf3fa325ff3b6424325165f921b0
  */
 #include "vortices3.h"
 
@@ -126,9 +126,9 @@ vortices3_APART static void vortices3_linearise_part1(const double coef[3], cons
     work[5] = work[23] * work[23];
     const double t27 = t23 + t22;
     work[50] = work[111] - t27;
-    work[38] = (-1.0 / 48.0) * (work[25] * work[21]) - 1.0 / 48.0 * (work[26] * work[24]) + (1.0 / 24.0
-        * (coef[1] * (work[27] * work[27] + work[22] * work[22])) + coef[0] * (work[4] * work[36] + 0.25
-        * (work[6] * work[50])));
+    work[38] = (-1.0 / 48.0) * (work[25] * work[21]) - 1.0 / 48.0 * (work[26] * work[24])
+        + (1.0 / 24.0 * (coef[1] * (work[27] * work[27] + work[22] * work[22]))
+        + coef[0] * (work[4] * work[36] + 0.25 * (work[6] * work[50])));
     work[35] = 0.125 * (coef[2] * work[23]) - work[5] * work[38];
     const double t28 = 2.0 * (work[22] * work[39]) + work[9] * work[36] + 2.0 * (work[4] * work[35]);
     const double p_y1 = t25 + t28;
@@ -138,15 +138,15 @@ vortices3_APART static void vortices3_linearise_part1(const double coef[3], cons
     work[75] = t26 + t16;
     work[46] = work[19] * work[19];
     work[86] = work[112] - t27;
-    work[85] = (-1.0 / 24.0) * (work[42] * work[41]) - 1.0 / 24.0 * (work[43] * work[40]) + (1.0 / 12.0
-        * (coef[1] * (work[45] * work[45] + work[44] * work[44])) + coef[0] * (0.5 * (work[17] * work[75])
-        + 0.5 * (work[18] * work[86])));
+    work[85] = (-1.0 / 24.0) * (work[42] * work[41]) - 1.0 / 24.0 * (work[43] * work[40])
+        + (1.0 / 12.0 * (coef[1] * (work[45] * work[45] + work[44] * work[44]))
+        + coef[0] * (0.5 * (work[17] * work[75]) + 0.5 * (work[18] * work[86])));
     work[130] = 0.25 * (coef[2] * work[19]) - work[46] * work[85];
-    const double t31 = 2.0 * (work[44] * work[47]) + 0.5 * (work[48] * work[75]) + 2.0
-        * (work[17] * work[130]);
+    const double t31 = 2.0 * (work[44] * work[47]) + 0.5 * (work[48] * work[75])
+        + 2.0 * (work[17] * work[130]);
     const double p_y2 = t31 - t25;
-    const double t32 = 2.0 * (work[45] * work[47]) + 0.5 * (work[48] * work[86]) + 2.0
-        * (work[18] * work[130]);
+    const double t32 = 2.0 * (work[45] * work[47]) + 0.5 * (work[48] * work[86])
+        + 2.0 * (work[18] * work[130]);
     const double p_x2 = t32 - t29, t33 = t28 + t31, p_y3 = -t33, t34 = t32 + t30, t35 = 0.25 * work[9];
     const double t36 = work[6] * work[5];
     work[56] = coef[0] * t36;
@@ -191,14 +191,14 @@ vortices3_APART static void vortices3_linearise_part1(const double coef[3], cons
     work[159] = t36 * work[26];
     const double t53 = 1.0 / 24.0 * work[159] - 1.0 / 48.0 * (work[23] * t50);
     work[58] = work[23] * t52 + (work[161] + coef[1] * (work[160] + work[23] * t53));
-    const double t54 = work[32] - work[162] + (1.0 / 12.0 * (work[28] * work[57]) + 2.0
-        * (work[6] * work[58]));
+    const double t54 = work[32] - work[162] + (1.0 / 12.0 * (work[28] * work[57])
+        + 2.0 * (work[6] * work[58]));
     const double t55 = coef[1] * t38;
     work[84] = t55 * work[7];
     const double t56 = 0.5 * work[77], t57 = t56 + t43;
     work[31] = 2.0 * work[34];
-    const double t58 = 2.0 / 3.0 * work[84] + 1.0 / 3.0 * (work[16] * t57) + (work[31] + 2.0
-        * (work[3] * work[52]));
+    const double t58 = 2.0 / 3.0 * work[84] + 1.0 / 3.0 * (work[16] * t57)
+        + (work[31] + 2.0 * (work[3] * work[52]));
     const double t59 = 0.5 * t58;
     work[69] = t56 - work[149];
     work[70] = work[156] + t41;
@@ -220,12 +220,13 @@ vortices3_APART static void vortices3_linearise_part1(const double coef[3], cons
     const double t65 = 1.0 / 12.0 * (work[28] * t49) + (2.0 * (work[4] * work[58]) - work[164]);
     const double t66 = 0.5 * (t64 + t65);
     work[54] = work[61] - t66;
-    const double t67 = coef[2] * (x2 - x1) + coef[1] * (1.0 / 3.0 * (work[7] * t57) + 1.0 / 3.0
-        * (work[10] * t62)) + (1.0 / 12.0 * (work[15] * t44) + work[11] * t47) + (1.0 / 12.0
-        * (work[14] * t45) + work[13] * t46 + coef[0] * (work[0] * t61 + (work[49] + work[3] * work[54])));
+    const double t67 = coef[2] * (x2 - x1) + coef[1] * (1.0 / 3.0 * (work[7] * t57)
+        + 1.0 / 3.0 * (work[10] * t62)) + (1.0 / 12.0 * (work[15] * t44) + work[11] * t47)
+        + (1.0 / 12.0 * (work[14] * t45) + work[13] * t46 + coef[0] * (work[0] * t61
+        + (work[49] + work[3] * work[54])));
     work[55] = 4.0 * work[113] - work[1] * t67;
-    work[72] = 2.0 * (t42 * work[34]) - work[118] + (2.0 * (work[10] * work[52]) + work[8] * t61) + 2.0
-        * (work[0] * work[55]);
+    work[72] = 2.0 * (t42 * work[34]) - work[118] + (2.0 * (work[10] * work[52]) + work[8] * t61)
+        + 2.0 * (work[0] * work[55]);
     work[168] = 2.0 * (work[56] * work[36]);
     work[63] = t60 + t54;
     const double t68 = 0.25 * work[63] + 0.25 * ((-0.5) * t54 - t59);
@@ -239,8 +240,8 @@ vortices3_APART static void vortices3_linearise_part1(const double coef[3], cons
         + work[26] * t52 + coef[0] * (work[4] * t68 + (work[165] + 0.25 * (work[6] * work[59])));
     work[60] = 4.0 * work[166] - work[5] * (0.25 * work[167] - 1.0 / 48.0 * (t50 * work[24]) + (work[21] * t53
         - 1.0 / 48.0 * (work[25] * t51)) + t69);
-    work[73] = 2.0 * (t49 * work[39]) - work[168] + (2.0 * (work[22] * work[58]) + work[9] * t68) + 2.0
-        * (work[4] * work[60]);
+    work[73] = 2.0 * (t49 * work[39]) - work[168] + (2.0 * (work[22] * work[58]) + work[9] * t68)
+        + 2.0 * (work[4] * work[60]);
     const double t70 = work[72] + work[73], t71 = 0.5 * t70;
     work[33] = 2.0 * t24;
     displacement[0] = (-0.5) * p_y1;
@@ -318,15 +319,16 @@ vortices3_APART static void vortices3_linearise_part2(const double coef[3], cons
     work[135] = work[29] * (work[0] * work[30]);
     const double t43 = (-0.5) * t7 - t3, t44 = 1.0 / 6.0 * (work[20] * t24) + 2.0 * (work[17] * t29);
     work[133] = t10 * work[10];
-    const double t45 = 2.0 / 3.0 * work[133] + 1.0 / 3.0 * (work[16] * t43) + (work[31] + 2.0
-        * (work[0] * t21));
+    const double t45 = 2.0 / 3.0 * work[133] + 1.0 / 3.0 * (work[16] * t43)
+        + (work[31] + 2.0 * (work[0] * t21));
     const double t46 = 0.25 * (t44 - t45);
     work[177] = 1.0 / 6.0 * (t39 * work[22]);
     const double t47 = work[32] - work[177] + (1.0 / 12.0 * (work[28] * t33) + 2.0 * (work[4] * t38));
     const double t48 = 0.5 * (t47 + t45), t49 = t46 - t48;
-    const double t50 = coef[2] * (y2 - y1) + coef[1] * (1.0 / 3.0 * (work[10] * t43) + 1.0 / 3.0
-        * (work[7] * t15)) + (1.0 / 12.0 * (work[15] * t17) + work[11] * t20) + (1.0 / 12.0 * (work[14] * t18)
-        + work[13] * t19 + coef[0] * (work[2] + work[0] * t42 + work[3] * t49));
+    const double t50 = coef[2] * (y2 - y1) + coef[1] * (1.0 / 3.0 * (work[10] * t43)
+        + 1.0 / 3.0 * (work[7] * t15)) + (1.0 / 12.0 * (work[15] * t17) + work[11] * t20)
+        + (1.0 / 12.0 * (work[14] * t18) + work[13] * t19 + coef[0] * (work[2] + work[0] * t42
+        + work[3] * t49));
     const double t51 = 4.0 * work[135] - work[1] * t50;
     const double t52 = work[33] - work[134] + (2.0 * (t9 * work[34]) + work[8] * t42)
         + (2.0 * (work[10] * t21) + 2.0 * (work[0] * t51));
@@ -336,27 +338,28 @@ vortices3_APART static void vortices3_linearise_part2(const double coef[3], cons
     work[204] = work[37] * (work[4] * work[38]);
     work[196] = 0.25 * (coef[2] * work[4]);
     const double t55 = t44 + t47, t56 = t48 - t55;
-    const double t57 = coef[1] * (1.0 / 12.0 * (work[22] * t33) + 1.0 / 12.0 * (work[27] * t32)) + work[26]
-        * t36 + coef[0] * (0.25 * (work[6] * t56) + (work[36] + work[4] * t54));
+    const double t57 = coef[1] * (1.0 / 12.0 * (work[22] * t33) + 1.0 / 12.0 * (work[27] * t32))
+        + work[26] * t36 + coef[0] * (0.25 * (work[6] * t56) + (work[36] + work[4] * t54));
     const double t58 = 4.0 * work[204] - work[5] * (work[196] - 1.0 / 48.0 * (work[24] * t34)
         + (work[21] * t37 - 1.0 / 48.0 * (work[25] * t35)) + t57);
     const double t59 = 2.0 * (t33 * work[39]) + 2.0 * (work[22] * t38) + (work[202] - work[201])
         + (work[9] * t54 + 2.0 * (work[4] * t58));
     const double t60 = t52 + t59, t61 = t46 - t55, t62 = t53 + t31;
-    const double t63 = (-1.0 / 24.0) * (t25 * work[40]) - 1.0 / 24.0 * (work[41] * t26) + ((-1.0 / 24.0)
-        * (work[42] * t27) - 1.0 / 24.0 * (work[43] * t28)) + (coef[1] * (1.0 / 6.0 * (t24 * work[44]) + 1.0
-        / 6.0 * (work[45] * t23)) + coef[0] * (0.5 * (work[17] * t62) + 0.5 * (work[18] * t61)));
+    const double t63 = (-1.0 / 24.0) * (t25 * work[40]) - 1.0 / 24.0 * (work[41] * t26)
+        + ((-1.0 / 24.0) * (work[42] * t27) - 1.0 / 24.0 * (work[43] * t28))
+        + (coef[1] * (1.0 / 6.0 * (t24 * work[44]) + 1.0 / 6.0 * (work[45] * t23))
+        + coef[0] * (0.5 * (work[17] * t62) + 0.5 * (work[18] * t61)));
     const double t64 = work[46] * t63;
-    const double t65 = 2.0 * (t23 * work[47]) + 2.0 * (work[45] * t29) + (0.5 * (work[48] * t61) - 2.0
-        * (work[18] * t64));
+    const double t65 = 2.0 * (t23 * work[47]) + 2.0 * (work[45] * t29) + (0.5 * (work[48] * t61)
+        - 2.0 * (work[18] * t64));
     const double t66 = t65 - (2.0 * (t16 * work[34]) - 2.0 * (t2 * work[49]) + (2.0 * (work[7] * t21)
         + work[8] * t49) + 2.0 * (work[3] * t51));
     const double t67 = (-0.5) * t66;
-    const double t68 = 2.0 * (t24 * work[47]) + 2.0 * (work[44] * t29) + (0.5 * (work[48] * t62) - 2.0
-        * (work[17] * t64));
+    const double t68 = 2.0 * (t24 * work[47]) + 2.0 * (work[44] * t29) + (0.5 * (work[48] * t62)
+        - 2.0 * (work[17] * t64));
     const double t69 = t68 - t52;
-    const double t70 = 2.0 * (t32 * work[39]) - 0.5 * (t5 * work[50]) + (2.0 * (work[27] * t38) + 0.25
-        * (work[9] * t56)) + 2.0 * (work[6] * t58) + t65;
+    const double t70 = 2.0 * (t32 * work[39]) - 0.5 * (t5 * work[50]) + (2.0 * (work[27] * t38)
+        + 0.25 * (work[9] * t56)) + 2.0 * (work[6] * t58) + t65;
     const double t71 = t68 + t59;
     work[138] = 2.0 * (work[51] * work[49]);
     const double t72 = 2.0 * (work[7] * work[52]) - work[138] + (2.0 * (work[53] * work[34]) + work[33])
@@ -367,8 +370,8 @@ vortices3_APART static void vortices3_linearise_part2(const double coef[3], cons
     const double t74 = t72 + t73, t75 = work[61] - work[62], t76 = work[63] + work[64];
     const double t77 = (-1.0 / 24.0) * (work[65] * work[40]) - 1.0 / 24.0 * (work[41] * work[66])
         + ((-1.0 / 24.0) * (work[42] * work[67]) - 1.0 / 24.0 * (work[43] * work[68]))
-        + (coef[1] * (1.0 / 6.0 * (work[69] * work[45]) + 1.0 / 6.0 * (work[44] * work[70])) + coef[0]
-        * (0.5 * (work[18] * t75) + 0.5 * (work[17] * t76)));
+        + (coef[1] * (1.0 / 6.0 * (work[69] * work[45]) + 1.0 / 6.0 * (work[44] * work[70]))
+        + coef[0] * (0.5 * (work[18] * t75) + 0.5 * (work[17] * t76)));
     const double t78 = work[46] * t77;
     const double t79 = 2.0 * (work[69] * work[47]) + 2.0 * (work[45] * work[71]) + (0.5 * (work[48] * t75)
         - 2.0 * (work[18] * t78));
@@ -409,8 +412,8 @@ vortices3_APART static void vortices3_linearise_part2(const double coef[3], cons
     work[87] = coef[1] * t86;
     work[163] = 1.0 / 3.0 * (work[87] * work[45]);
     work[132] = 2.0 * work[47];
-    const double t88 = 1.0 / 6.0 * (work[20] * work[97]) - work[163] + (work[132] + 2.0
-        * (work[18] * work[89]));
+    const double t88 = 1.0 / 6.0 * (work[20] * work[97]) - work[163]
+        + (work[132] + 2.0 * (work[18] * work[89]));
     work[139] = work[107] + t88;
     const double t89 = work[76] - work[148];
     work[109] = (-0.25) * t89 - work[77];
@@ -421,8 +424,8 @@ vortices3_APART static void vortices3_linearise_part2(const double coef[3], cons
     work[110] = work[80] + 1.0 / 12.0 * (work[12] * work[115]);
     work[116] = work[81] + 1.0 / 12.0 * (work[12] * work[114]);
     work[92] = work[12] * work[110] + (work[82] + coef[1] * (work[83] + work[12] * work[116]));
-    work[106] = (-2.0 / 3.0) * work[84] - work[31] + (1.0 / 3.0 * (work[16] * work[109]) + 2.0
-        * (work[3] * work[92]));
+    work[106] = (-2.0 / 3.0) * work[84] - work[31] + (1.0 / 3.0 * (work[16] * work[109])
+        + 2.0 * (work[3] * work[92]));
     work[108] = 0.25 * work[106] - 0.25 * t88;
     work[102] = work[139] + work[108];
     work[131] = work[19] * work[46];
@@ -481,17 +484,17 @@ vortices3_APART static void vortices3_linearise_part3(const double coef[3], cons
     const double t5 = 0.25 * (t2 - t4);
     const double t6 = 1.0 / 12.0 * (work[28] * work[94]) + 2.0 * (work[4] * work[95]), t7 = t6 + t2;
     const double t8 = t5 - t7;
-    const double t9 = work[96] + coef[1] * (1.0 / 6.0 * (work[45] * work[97]) + 1.0 / 6.0
-        * (work[44] * work[88])) + (work[41] * work[98] - 1.0 / 24.0 * (work[40] * work[99]))
-        + (work[43] * work[100] - 1.0 / 24.0 * (work[42] * work[101]) + coef[0]
-        * (0.5 * (work[17] * work[102]) + (work[103] + 0.5 * (work[18] * t8))));
+    const double t9 = work[96] + coef[1] * (1.0 / 6.0 * (work[45] * work[97])
+        + 1.0 / 6.0 * (work[44] * work[88])) + (work[41] * work[98] - 1.0 / 24.0 * (work[40] * work[99]))
+        + (work[43] * work[100] - 1.0 / 24.0 * (work[42] * work[101])
+        + coef[0] * (0.5 * (work[17] * work[102]) + (work[103] + 0.5 * (work[18] * t8))));
     const double t10 = 4.0 * work[104] - work[46] * t9;
-    const double t11 = 2.0 * (work[88] * work[47]) - work[105] + (2.0 * (work[44] * work[89]) + 0.5
-        * (work[48] * work[102])) + 2.0 * (work[17] * t10);
+    const double t11 = 2.0 * (work[88] * work[47]) - work[105] + (2.0 * (work[44] * work[89])
+        + 0.5 * (work[48] * work[102])) + 2.0 * (work[17] * t10);
     const double t12 = 0.5 * work[106], t13 = 0.5 * work[107] + t12 + work[108], t14 = 0.5 * (t6 + t4);
     const double t15 = t5 - t14;
-    const double t16 = coef[1] * (1.0 / 3.0 * (work[7] * work[109]) + 1.0 / 3.0 * (work[10] * t3)) + work[13]
-        * work[110] + coef[0] * (work[0] * t13 + (work[111] - work[112] + work[3] * t15));
+    const double t16 = coef[1] * (1.0 / 3.0 * (work[7] * work[109]) + 1.0 / 3.0 * (work[10] * t3))
+        + work[13] * work[110] + coef[0] * (work[0] * t13 + (work[111] - work[112] + work[3] * t15));
     const double t17 = (-4.0) * work[113] - work[1] * (coef[2] * work[3] + 1.0 / 12.0 * (work[114] * work[15])
         + (1.0 / 12.0 * (work[14] * work[115]) + work[11] * work[116]) + t16);
     const double t18 = t11 - (2.0 * (work[117] * work[34]) + work[118] + (2.0 * (work[10] * work[92])
@@ -526,32 +529,35 @@ vortices3_APART static void vortices3_linearise_part3(const double coef[3], cons
     const double t63 = 1.0 / 3.0 * (t38 * work[44]);
     const double t64 = 1.0 / 6.0 * (work[20] * t25) - t63 + (work[132] + 2.0 * (work[17] * t49));
     const double t65 = work[122] + t24;
-    const double t66 = (-2.0 / 3.0) * work[133] - work[31] + (1.0 / 3.0 * (work[16] * t65) + 2.0
-        * (work[0] * t59));
+    const double t66 = (-2.0 / 3.0) * work[133] - work[31] + (1.0 / 3.0 * (work[16] * t65)
+        + 2.0 * (work[0] * t59));
     const double t67 = 0.25 * (t64 - t66), t68 = 1.0 / 12.0 * (work[28] * t29) + 2.0 * (work[4] * t34);
     const double t69 = t68 + t64, t70 = t67 - t69;
-    const double t71 = 0.5 * work[187] + coef[1] * (1.0 / 6.0 * (work[44] * t25) + 1.0 / 6.0
-        * (work[45] * t37)) + (work[41] * t48 - 1.0 / 24.0 * (work[40] * t42)) + (work[43] * t44 - 1.0 / 24.0
-        * (work[42] * t43) + coef[0] * (work[185] + 0.5 * (work[17] * t62) + 0.5 * (work[18] * t70)));
+    const double t71 = 0.5 * work[187] + coef[1] * (1.0 / 6.0 * (work[44] * t25)
+        + 1.0 / 6.0 * (work[45] * t37)) + (work[41] * t48 - 1.0 / 24.0 * (work[40] * t42)) + (work[43] * t44
+        - 1.0 / 24.0 * (work[42] * t43) + coef[0] * (work[185] + 0.5 * (work[17] * t62)
+        + 0.5 * (work[18] * t70)));
     const double t72 = 4.0 * work[186] - work[46] * t71;
     const double t73 = 2.0 * (t25 * work[47]) + 0.5 * (work[48] * t62) + (work[207] - work[206])
         + (2.0 * (work[44] * t49) + 2.0 * (work[17] * t72));
     const double t74 = 0.5 * t35, t75 = t74 + 0.5 * t60 + t61, t76 = 0.5 * (t68 + t66);
-    const double t77 = coef[2] * work[0] + coef[1] * (1.0 / 3.0 * (work[10] * t65) + 1.0 / 3.0
-        * (work[7] * t53)) + (1.0 / 12.0 * (work[15] * t55) + work[11] * t58) + (1.0 / 12.0 * (work[14] * t56)
-        + work[13] * t57 + coef[0] * (work[3] * (t67 - t76) + (work[0] * t75 - work[2])));
+    const double t77 = coef[2] * work[0] + coef[1] * (1.0 / 3.0 * (work[10] * t65)
+        + 1.0 / 3.0 * (work[7] * t53)) + (1.0 / 12.0 * (work[15] * t55) + work[11] * t58)
+        + (1.0 / 12.0 * (work[14] * t56) + work[13] * t57 + coef[0] * (work[3] * (t67 - t76)
+        + (work[0] * t75 - work[2])));
     const double t78 = 2.0 * (t54 * work[34]) + 2.0 * (work[10] * t59) + (work[134] - work[33])
         + (work[8] * t75 + 2.0 * (work[0] * ((-4.0) * work[135] - work[1] * t77)));
     const double t79 = t73 - t78, t80 = t76 - t69, t81 = 0.25 * t51 + 0.25 * ((-0.5) * t60 - t74);
-    const double t82 = (-1.0 / 48.0) * (t30 * work[24]) - 1.0 / 48.0 * (work[21] * t31) + ((-1.0 / 48.0)
-        * (work[25] * t32) - 1.0 / 48.0 * (work[26] * t33)) + (coef[1] * (1.0 / 12.0 * (t29 * work[22]) + 1.0
-        / 12.0 * (work[27] * t28)) + coef[0] * (work[4] * t81 + 0.25 * (work[6] * t80)));
+    const double t82 = (-1.0 / 48.0) * (t30 * work[24]) - 1.0 / 48.0 * (work[21] * t31)
+        + ((-1.0 / 48.0) * (work[25] * t32) - 1.0 / 48.0 * (work[26] * t33))
+        + (coef[1] * (1.0 / 12.0 * (t29 * work[22]) + 1.0 / 12.0 * (work[27] * t28))
+        + coef[0] * (work[4] * t81 + 0.25 * (work[6] * t80)));
     const double t83 = work[5] * t82;
-    const double t84 = 2.0 * (t28 * work[39]) + 2.0 * (work[27] * t34) + (0.25 * (work[9] * t80) - 2.0
-        * (work[6] * t83)) + (2.0 * (t37 * work[47]) - t21 * work[86] + (2.0 * (work[45] * t49) + 0.5
-        * (work[48] * t70)) + 2.0 * (work[18] * t72));
-    const double t85 = 2.0 * (t29 * work[39]) + 2.0 * (work[22] * t34) + (work[9] * t81 - 2.0
-        * (work[4] * t83)) + t73;
+    const double t84 = 2.0 * (t28 * work[39]) + 2.0 * (work[27] * t34) + (0.25 * (work[9] * t80)
+        - 2.0 * (work[6] * t83)) + (2.0 * (t37 * work[47]) - t21 * work[86] + (2.0 * (work[45] * t49)
+        + 0.5 * (work[48] * t70)) + 2.0 * (work[18] * t72));
+    const double t85 = 2.0 * (t29 * work[39]) + 2.0 * (work[22] * t34)
+        + (work[9] * t81 - 2.0 * (work[4] * t83)) + t73;
     work[213] = work[136] * work[86];
     const double t86 = 2.0 * (work[45] * work[89]) - work[213] + (2.0 * (work[97] * work[47]) + work[207])
         + (0.5 * (work[48] * t8) + 2.0 * (work[18] * t10));
@@ -560,13 +566,13 @@ vortices3_APART static void vortices3_linearise_part3(const double coef[3], cons
     const double t88 = t14 - t7, t89 = 0.25 * work[139] + 0.25 * ((-0.5) * work[107] - t12);
     const double t90 = (-1.0 / 48.0) * (work[140] * work[24]) - 1.0 / 48.0 * (work[21] * work[141])
         + ((-1.0 / 48.0) * (work[25] * work[142]) - 1.0 / 48.0 * (work[26] * work[143]))
-        + (coef[1] * (1.0 / 12.0 * (work[144] * work[27]) + 1.0 / 12.0 * (work[22] * work[94])) + coef[0]
-        * (0.25 * (work[6] * t88) + work[4] * t89));
+        + (coef[1] * (1.0 / 12.0 * (work[144] * work[27]) + 1.0 / 12.0 * (work[22] * work[94]))
+        + coef[0] * (0.25 * (work[6] * t88) + work[4] * t89));
     const double t91 = work[5] * t90;
     const double t92 = 2.0 * (work[144] * work[39]) + 2.0 * (work[27] * work[95]) + (0.25 * (work[9] * t88)
         - 2.0 * (work[6] * t91)) + t86;
-    const double t93 = 2.0 * (work[94] * work[39]) + 2.0 * (work[22] * work[95]) + (work[9] * t89 - 2.0
-        * (work[4] * t91)) + t11;
+    const double t93 = 2.0 * (work[94] * work[39]) + 2.0 * (work[22] * work[95])
+        + (work[9] * t89 - 2.0 * (work[4] * t91)) + t11;
     const double t94 = 0.25 * work[145], t95 = work[146] + work[147], t96 = t94 + t95;
     const double t97 = work[148] + work[149], t98 = 0.25 * work[148];
     work[215] = t97 - t98;
@@ -582,14 +588,14 @@ vortices3_APART static void vortices3_linearise_part3(const double coef[3], cons
     const double t108 = coef[1] * t107, t109 = (-1.0 / 24.0) * work[158] - 1.0 / 48.0 * (work[23] * t108);
     const double t110 = (-1.0 / 24.0) * work[159] - 1.0 / 48.0 * (work[23] * t107);
     work[209] = work[23] * t109 + (coef[1] * (work[23] * t110 - work[160]) - work[161]);
-    const double t111 = work[162] - work[32] + (1.0 / 12.0 * (work[28] * work[208]) + 2.0
-        * (work[6] * work[209]));
+    const double t111 = work[162] - work[32] + (1.0 / 12.0 * (work[28] * work[208])
+        + 2.0 * (work[6] * work[209]));
     const double t112 = 1.0 / 6.0 * (work[20] * work[215]) + work[163] + (2.0 * (work[18] * work[214])
         - work[132]);
     const double t113 = t111 + t112;
     const double t114 = 2.0 * (work[3] * (t98 - t104)) + 2.0 * (work[0] * (t105 - t94));
-    const double t115 = 1.0 / 12.0 * (work[12] * (work[12] * (coef[1] * t114))) + 1.0 / 12.0
-        * (coef[1] * (work[12] * (work[12] * t114)));
+    const double t115 = 1.0 / 12.0 * (work[12] * (work[12] * (coef[1] * t114)))
+        + 1.0 / 12.0 * (coef[1] * (work[12] * (work[12] * t114)));
     const double t116 = 1.0 / 3.0 * (work[16] * (t104 - t98)) + 2.0 * (work[3] * t115);
     const double t117 = t113 + (0.25 * t116 - 0.25 * t112);
     const double t118 = t1 + 1.0 / 6.0 * (work[20] * t96) + 2.0 * (work[17] * work[214]);
@@ -598,8 +604,9 @@ vortices3_APART static void vortices3_linearise_part3(const double coef[3], cons
     const double t121 = t118 + t120;
     work[216] = 0.25 * (t118 - t119) - t121;
     const double t122 = coef[1] * (1.0 / 6.0 * (work[45] * work[215]) + 1.0 / 6.0 * (work[44] * t96))
-        - work[96] + (1.0 / 24.0 * (work[40] * t102) + work[41] * t103) + (work[43] * t101 - 1.0 / 24.0
-        * (work[42] * t100) + coef[0] * (0.5 * (work[18] * work[216]) - work[103] + 0.5 * (work[17] * t117)));
+        - work[96] + (1.0 / 24.0 * (work[40] * t102) + work[41] * t103) + (work[43] * t101
+        - 1.0 / 24.0 * (work[42] * t100) + coef[0] * (0.5 * (work[18] * work[216]) - work[103]
+        + 0.5 * (work[17] * t117)));
     work[217] = (-4.0) * work[104] - work[46] * t122;
     const double t123 = 0.25 * t113 + 0.25 * ((-0.5) * t111 - 0.5 * t116);
     work[211] = 0.5 * (t119 + t120) - t121;
@@ -607,8 +614,8 @@ vortices3_APART static void vortices3_linearise_part3(const double coef[3], cons
         + work[26] * t109 + coef[0] * (work[4] * t123 + (0.25 * (work[6] * work[211]) - work[165]));
     work[212] = (-4.0) * work[166] - work[5] * ((-0.25) * work[167] - 1.0 / 48.0 * (t107 * work[24])
         + (work[21] * t110 - 1.0 / 48.0 * (work[25] * t108)) + t124);
-    const double t125 = 2.0 * (t96 * work[47]) + work[105] + (2.0 * (work[44] * work[214]) + 0.5
-        * (work[48] * t117)) + 2.0 * (work[17] * work[217]) + (2.0 * (t106 * work[39]) + work[168]
+    const double t125 = 2.0 * (t96 * work[47]) + work[105] + (2.0 * (work[44] * work[214])
+        + 0.5 * (work[48] * t117)) + 2.0 * (work[17] * work[217]) + (2.0 * (t106 * work[39]) + work[168]
         + (2.0 * (work[22] * work[209]) + work[9] * t123) + 2.0 * (work[4] * work[212]));
     const double t126 = 0.25 * t22, t127 = (-0.5) * work[169] - t22;
     work[180] = t126 + t127;
@@ -634,8 +641,8 @@ vortices3_APART static void vortices3_linearise_part3(const double coef[3], cons
     work[191] = t131 + work[193];
     const double t135 = 0.25 * t128;
     const double t136 = 2.0 * (work[0] * (t133 - t126)) + 2.0 * (work[3] * (t135 - t132));
-    const double t137 = 1.0 / 12.0 * (coef[1] * (work[12] * (work[12] * t136))) + 1.0 / 12.0
-        * (work[12] * (work[12] * (coef[1] * t136)));
+    const double t137 = 1.0 / 12.0 * (coef[1] * (work[12] * (work[12] * t136)))
+        + 1.0 / 12.0 * (work[12] * (work[12] * (coef[1] * t136)));
     work[192] = 1.0 / 3.0 * (work[16] * (t132 - t135)) + 2.0 * (work[3] * t137);
     work[184] = work[191] + (0.25 * work[192] - 0.25 * t131);
     work[178] = t63 - work[132] + (1.0 / 6.0 * (work[20] * work[180]) + 2.0 * (work[17] * work[205]));
@@ -682,21 +689,22 @@ vortices3_APART static void vortices3_linearise_part4(const double coef[3], cons
     const double t2 = coef[1] * (1.0 / 6.0 * (work[180] * work[44]) + 1.0 / 6.0 * (work[45] * work[181]))
         + work[43] * work[182] + coef[0] * (0.5 * (work[18] * (0.25 * (work[178] - work[183]) - t1))
         + (0.5 * (work[17] * work[184]) - work[185]));
-    const double t3 = 2.0 * (work[17] * ((-4.0) * work[186] - work[46] * ((-0.5) * work[187] - 1.0 / 24.0
-        * (work[188] * work[40]) + (work[41] * work[189] - 1.0 / 24.0 * (work[42] * work[190])) + t2)));
+    const double t3 = 2.0 * (work[17] * ((-4.0) * work[186] - work[46] * ((-0.5) * work[187]
+        - 1.0 / 24.0 * (work[188] * work[40]) + (work[41] * work[189] - 1.0 / 24.0 * (work[42] * work[190]))
+        + t2)));
     const double t4 = 0.25 * work[191] + 0.25 * ((-0.5) * work[192] - 0.5 * work[193]);
     const double t5 = coef[1] * (1.0 / 12.0 * (work[194] * work[22]) + 1.0 / 12.0 * (work[27] * work[195]))
         - work[196] + (1.0 / 48.0 * (work[24] * work[197]) + work[21] * work[198]) + (work[26] * work[199]
-        - 1.0 / 48.0 * (work[25] * work[200]) + coef[0] * (work[4] * t4 - work[36] + 0.25
-        * (work[6] * (0.5 * (work[183] + work[179]) - t1))));
+        - 1.0 / 48.0 * (work[25] * work[200]) + coef[0] * (work[4] * t4 - work[36]
+        + 0.25 * (work[6] * (0.5 * (work[183] + work[179]) - t1))));
     const double t6 = 2.0 * (work[194] * work[39]) + work[9] * t4 + (work[201] - work[202])
         + (2.0 * (work[22] * work[203]) + 2.0 * (work[4] * ((-4.0) * work[204] - work[5] * t5)));
     const double t7 = 2.0 * (work[180] * work[47]) + 2.0 * (work[44] * work[205]) + (work[206] - work[207])
         + (0.5 * (work[48] * work[184]) + t3) + t6;
     const double t8 = 2.0 * (work[208] * work[39]) + 2.0 * (work[27] * work[209]) + (work[210] - work[202])
-        + (0.25 * (work[9] * work[211]) + 2.0 * (work[6] * work[212])) + (work[213] + 2.0
-        * (work[45] * work[214]) + (2.0 * (work[215] * work[47]) - work[207]) + (0.5 * (work[48] * work[216])
-        + 2.0 * (work[18] * work[217])));
+        + (0.25 * (work[9] * work[211]) + 2.0 * (work[6] * work[212]))
+        + (work[213] + 2.0 * (work[45] * work[214]) + (2.0 * (work[215] * work[47]) - work[207])
+        + (0.5 * (work[48] * work[216]) + 2.0 * (work[18] * work[217])));
     jacobian[29] = -t7;
     increment_jacobian[29] = 2.0 * t7;
     jacobian[34] = t8;
@@ -746,6 +754,13 @@ void vortices3_vector_field(const vortices3_params *params, const double x[6], d
 }
 
 /* ---- Compensated sums, linear equations ---- */
+static int vortices3_finite(const double *values, int count)
+{
+    for (int k = 0; k < count; ++k)
+        if (!isfinite(values[k])) return 0;
+    return 1;
+}
+
 /* x + change + small in compensated arithmetic, where small is the carry and what is as small: were that
    rounded with the change, corrections of one sign would add up to a drift. 0, and x as before, if the sum is
    not finite. */
@@ -920,54 +935,41 @@ static vortices3_status vortices3_attempt(vortices3_solver *s)
 /* how far the state may be moved, in its own size, for guesses to move with it */
 #define vortices3_NEAR_BY 0.125
 
-/* Guesses move with the state, by as many past values as extrapolation needs; recurrences are of the motion
-   as it was. From far away all begins anew, with the next step. */
-static void vortices3_move_guesses(vortices3_solver *s, const double to[vortices3_DIM])
+/* Guesses move with the state. From far away all begins anew, with the next step. */
+static void vortices3_move_guesses(vortices3_solver *s, const double from[vortices3_DIM])
 {
     double distance = 0.0, size = 0.0;
     for (int i = 0; i < vortices3_DIM; ++i) {
-        distance += fabs(to[i] - s->x[i]);
-        size += fabs(s->x[i]);
+        distance += fabs(s->x[i] - from[i]);
+        size += fabs(from[i]);
     }
     if (!(distance <= vortices3_NEAR_BY * size)) {
         s->h = (double)NAN;
         return;
     }
     vortices3_history *history = &s->history;
-    for (int i = 0; i < vortices3_DIM; ++i) history->difference[0][i] += to[i] - s->x[i];
-}
-
-/* Stand at x + carry from now on. */
-static vortices3_status vortices3_place(vortices3_solver *s, const double x[vortices3_DIM],
-    const double carry[vortices3_DIM])
-{
-    for (int i = 0; i < vortices3_DIM; ++i)
-        if (!isfinite(x[i])) return vortices3_BAD_ARGUMENT;
-    vortices3_move_guesses(s, x);
-    memcpy(s->x, x, sizeof s->x);
-    memcpy(s->carry, carry, sizeof s->carry);
-    return vortices3_OK;
+    for (int i = 0; i < vortices3_DIM; ++i) history->difference[0][i] += s->x[i] - from[i];
 }
 
 vortices3_status vortices3_set_state(vortices3_solver *s, const double x[vortices3_DIM])
 {
-    double to[vortices3_DIM], carry[vortices3_DIM] = { 0.0 };
-    if (s == NULL || x == NULL) return vortices3_BAD_ARGUMENT;
-    memcpy(to, x, sizeof to); /* which may be a part of *s */
-    return vortices3_place(s, to, carry);
+    if (s == NULL || x == NULL || !vortices3_finite(x, vortices3_DIM)) return vortices3_BAD_ARGUMENT;
+    double from[vortices3_DIM];
+    memcpy(from, s->x, sizeof from);
+    memmove(s->x, x, sizeof s->x); /* x may be a part of *s */
+    memset(s->carry, 0, sizeof s->carry);
+    vortices3_move_guesses(s, from);
+    return vortices3_OK;
 }
 
 vortices3_status vortices3_kick(vortices3_solver *s, const double change[vortices3_DIM])
 {
-    double to[vortices3_DIM], carry[vortices3_DIM];
     if (s == NULL || change == NULL) return vortices3_BAD_ARGUMENT;
-    for (int i = 0; i < vortices3_DIM; ++i) {
-        const double sum = s->x[i] + change[i], added = sum - s->x[i];
-        const double lost = ((s->x[i] - (sum - added)) + (change[i] - added)) + s->carry[i];
-        to[i] = sum + lost;
-        carry[i] = lost - (to[i] - sum);
-    }
-    return vortices3_place(s, to, carry);
+    double from[vortices3_DIM];
+    memcpy(from, s->x, sizeof from);
+    if (!vortices3_advance(s, change, s->carry)) return vortices3_BAD_ARGUMENT;
+    vortices3_move_guesses(s, from);
+    return vortices3_OK;
 }
 
 /* ---- The solver ---- */
@@ -979,8 +981,7 @@ vortices3_status vortices3_init(vortices3_solver *s, const vortices3_params *par
     vortices3_solver fresh = { .h = (double)NAN };
     fresh.params = params != NULL ? *params : vortices3_default_params;
     memcpy(fresh.x, x0, sizeof fresh.x);
-    for (int i = 0; i < vortices3_DIM; ++i)
-        if (!isfinite(fresh.x[i])) return vortices3_BAD_ARGUMENT;
+    if (!vortices3_finite(fresh.x, vortices3_DIM)) return vortices3_BAD_ARGUMENT;
     *s = fresh;
     return vortices3_OK;
 }

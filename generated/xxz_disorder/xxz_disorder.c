@@ -21,7 +21,7 @@
  *   4. The solver
  *   5. The flows
  *   6. What is seen at sites
- * body-sha256: 7a6d9d8d957278dc81463622ba7a4d5872821b92c46a07a188c7d0c85edd4570
+ * body-sha256: fc44296ed90ccf5ab54d23a32b73c35f0ac6852b026addd4df6168c7aaffb700
  */
 #include "xxz_disorder.h"
 
@@ -146,8 +146,8 @@ typedef struct {
 /* The piece of that number. */
 static inline xxz_disorder_piece xxz_disorder_piece_of(const xxz_disorder_solver *s, size_t unit)
 {
-    const size_t pieces = xxz_disorder_pieces(s), index = pieces == 1 ? unit : unit / pieces, part = unit
-        - index * pieces;
+    const size_t pieces = xxz_disorder_pieces(s), index = pieces == 1 ? unit : unit / pieces,
+        part = unit - index * pieces;
     xxz_disorder_piece piece;
     xxz_disorder_locate(s, index, &piece.row);
     piece.from = (ptrdiff_t)part * xxz_disorder_PIECE;
@@ -162,8 +162,8 @@ static inline xxz_disorder_piece xxz_disorder_piece_of(const xxz_disorder_solver
    beyond |u| = 10^6. */
 static inline double xxz_disorder_turned_sin(double u, double offset)
 {
-    const double shifted = (u * 0.3183098861837907 + offset) + xxz_disorder_ROUNDER, k =
-        (shifted - xxz_disorder_ROUNDER) - offset;
+    const double shifted = (u * 0.3183098861837907 + offset) + xxz_disorder_ROUNDER,
+        k = (shifted - xxz_disorder_ROUNDER) - offset;
     const double near = (u - k * 3.141592651605606) - k * 1.9841871479187034e-09;
     const double r = near - k * 1.1442377452219664e-17, q = r * r, qq = q * q;
     uint64_t parity, bits; /* the last bit of shifted is the parity of k + offset */
@@ -298,8 +298,8 @@ static void xxz_disorder_energy_row(const xxz_disorder_params *params, const xxz
     xxz_disorder_EACH_SITE
     for (ptrdiff_t i = from; i < to; ++i) {
         const double B = B_row[i], x = x_row[i], y = y_row[i], z = z_row[i];
-        out[i - from] = J * (y * y_row[i + 1]) + J * (x * x_row[i + 1]) + (B * z + J * (z_row[i + 1]
-            * (delta * z)));
+        out[i - from] = J * (y * y_row[i + 1]) + J * (x * x_row[i + 1])
+            + (B * z + J * (z_row[i + 1] * (delta * z)));
     }
 }
 
@@ -368,8 +368,8 @@ static size_t xxz_disorder_shape(const size_t sizes[xxz_disorder_AXES], ptrdiff_
     const size_t most = SIZE_MAX / 64 / xxz_disorder_RESERVED;
     size_t rows = 1;
     for (int a = 0; a < xxz_disorder_AXES; ++a) {
-        if (sizes[a] < xxz_disorder_least[a] || sizes[a] % xxz_disorder_periods[a] != 0 || sizes[a] > most
-            / 2) return 0;
+        if (sizes[a] < xxz_disorder_least[a] || sizes[a] % xxz_disorder_periods[a] != 0
+            || sizes[a] > most / 2) return 0;
         if (a < xxz_disorder_AXES - 1) {
             if (rows > most / sizes[a]) return 0;
             rows *= sizes[a];
@@ -458,8 +458,8 @@ xxz_disorder_status xxz_disorder_init(xxz_disorder_solver *s, const xxz_disorder
     ptrdiff_t width;
     if (s == NULL || sizes == NULL || x0 == NULL || work == NULL) return xxz_disorder_BAD_ARGUMENT;
     const xxz_disorder_params own = params != NULL ? *params : xxz_disorder_default_params;
-    const size_t rows = xxz_disorder_shape(sizes, &width), length = sizes[xxz_disorder_AXES - 1], sites = rows
-        * length;
+    const size_t rows = xxz_disorder_shape(sizes, &width), length = sizes[xxz_disorder_AXES - 1],
+        sites = rows * length;
     if (rows == 0 || !xxz_disorder_finite(x0, xxz_disorder_DIM * sites) || !xxz_disorder_allowed(&own, sites))
         return xxz_disorder_BAD_ARGUMENT;
     double coef[xxz_disorder_COEFFICIENTS];
@@ -592,8 +592,10 @@ xxz_disorder_status xxz_disorder_integrate(xxz_disorder_solver *s, double h, siz
     return status;
 }
 
-xxz_disorder_status xxz_disorder_step(xxz_disorder_solver *s, double h) { return xxz_disorder_integrate(s, h,
-    1); }
+xxz_disorder_status xxz_disorder_step(xxz_disorder_solver *s, double h)
+{
+    return xxz_disorder_integrate(s, h, 1);
+}
 
 /* The sites of fields, without what is beside their rows. */
 static void xxz_disorder_take(const xxz_disorder_solver *s, double *const fields[xxz_disorder_DIM], double *x)
@@ -659,12 +661,18 @@ static void xxz_disorder_fill(const xxz_disorder_solver *s, xxz_disorder_kernel 
     }
 }
 
-void xxz_disorder_density(const xxz_disorder_solver *s, double *out) { xxz_disorder_fill(s,
-    xxz_disorder_energy_row, out); }
-void xxz_disorder_casimirs(const xxz_disorder_solver *s, double *out) { xxz_disorder_fill(s,
-    xxz_disorder_casimirs_row, out); }
-void xxz_disorder_vector_field(const xxz_disorder_solver *s, double *out) { xxz_disorder_fill(s,
-    xxz_disorder_vector_field_row, out); }
+void xxz_disorder_density(const xxz_disorder_solver *s, double *out)
+{
+    xxz_disorder_fill(s, xxz_disorder_energy_row, out);
+}
+void xxz_disorder_casimirs(const xxz_disorder_solver *s, double *out)
+{
+    xxz_disorder_fill(s, xxz_disorder_casimirs_row, out);
+}
+void xxz_disorder_vector_field(const xxz_disorder_solver *s, double *out)
+{
+    xxz_disorder_fill(s, xxz_disorder_vector_field_row, out);
+}
 
 const char *xxz_disorder_status_string(xxz_disorder_status status)
 {

@@ -151,3 +151,21 @@ def test_long_lines_are_broken_where_a_reader_would():
     assert lines[2].startswith("        + (first")
     assert max(map(len, lines)) <= WIDTH
     assert " ".join(line.strip() for line in lines[1:]) == long.strip().removesuffix(" /* said */")
+
+
+def test_lines_are_broken_before_what_binds_least():
+    first, second = "a" * 60, "d" * 40
+    assert fitted(f"    const double value = {first} * b + c * {second};").split("\n") == [
+        f"    const double value = {first} * b",
+        f"        + c * {second};",
+    ]
+
+
+def test_a_function_on_a_line_that_is_too_long_gets_lines_of_its_own():
+    head = f"static int {'f' * 60}(const double *{'x' * 20})"
+    assert fitted(f"{head} {{ return *{'x' * 20} > 0.0; }}").split("\n") == [
+        head,
+        "{",
+        f"    return *{'x' * 20} > 0.0;",
+        "}",
+    ]

@@ -65,7 +65,7 @@ FEATURES = (
     Feature("TANGENT", lambda p: p.extras.tangent),
     Feature("ADJOINT", lambda p: p.step.adjoint),
     Feature("MODIFIED", lambda p: p.modified),
-    Feature("ADVANCE", lambda p: not isinstance(p.step, Splitting) or p.extras.tangent),
+    Feature("ADVANCE", lambda p: not isinstance(p.step, Splitting) or p.extras.tangent or p.offers("kicks")),
     Feature("UNROLLED", lambda p: isinstance(p.step, Implicit) and _fast(p) and p.step.eliminate),
     Feature("KICKED", part="kicks"),
     Feature("ENSEMBLE", part="ensemble"),

@@ -13,7 +13,10 @@ _BEHIND = re.compile(r"( *[^ /].*?[;,0-9A-Z]) +(/\*.*\*/)")
 _STRING = re.compile(r'"[^"]*"')
 
 #: What a level of parentheses costs a place to break at, in columns: outer places are preferred.
-_DEPTH = 14
+_DEPTH = 18
+
+#: The same for operators that bind: where one of them is broken at, what it holds together falls apart.
+_BOUND = dict.fromkeys("*/", 30) | dict.fromkeys("+-", 16) | dict.fromkeys(("<", ">", "<=", ">=", "==", "!="), 13)
 
 
 def fitted(text: str) -> str:
@@ -81,7 +84,14 @@ def _indent(line: str) -> str:
     return line[: len(line) - len(line.lstrip())]
 
 
+#: A function of one statement on one line.
+_FUNCTION = re.compile(r"(\S.*\)) \{ (.*;) \}")
+
+
 def _code(line: str) -> Iterator[str]:
+    if function := _FUNCTION.fullmatch(line):
+        yield from (*_code(function[1]), "{", *_code(f"    {function[2]}"), "}")
+        return
     found = re.match(r"(.*?\S)\s+(/\*.*\*/)$", line)
     if found:
         yield from comment(found[2], _indent(line))
@@ -107,7 +117,8 @@ def _places(line: str, least: int) -> Iterator[tuple[int, int]]:
         if c != " " or k <= least:
             continue
         after_loop = head is not None and depth == 0 and line[k - 1] == ")"
-        operator = re.match(r" (?:[-+*/?:<>]|&&|\|\||[<>=!]=) ", line[k:])
+        operator = re.match(r" ([-+*/?:<>]|&&|\|\||[<>=!]=) ", line[k:])
         label = line[k - 1] == ":" and line.lstrip().startswith("case ")
         if line[k - 1] in ",;=" or operator or after_loop or label:
-            yield k - _DEPTH * depth + (WIDTH if after_loop else 0), k
+            bound = _BOUND.get(operator[1], 0) if operator else 12 * (line[k - 1] == "=")
+            yield k - _DEPTH * depth - bound + (WIDTH if after_loop else 0), k

@@ -5,7 +5,18 @@
 
 #include "model.h"
 
+#if PHI_IMPLICIT
 /* ---- Compensated sums, linear equations ---- */
+#else
+/* ---- Compensated sums ---- */
+#endif
+static int phi_finite(const double *values, int count)
+{
+    for (int k = 0; k < count; ++k)
+        if (!isfinite(values[k])) return 0;
+    return 1;
+}
+
 #if PHI_ADVANCE
 /* x + change + small in compensated arithmetic, where small is the carry and what is as small: were that rounded with
    the change, corrections of one sign would add up to a drift. 0, and x as before, if the sum is not finite. */

@@ -60,8 +60,7 @@ static phi_status phi_stages(phi_solver *s)
     phi_flows(s->coef[0], x, moved, start);
 #endif
     ++s->evaluations;
-    for (int i = 0; i < PHI_ALONG; ++i)
-        if (!isfinite(x[i])) return PHI_NOT_FINITE;
+    if (!phi_finite(x, PHI_ALONG)) return PHI_NOT_FINITE;
     if (!(moved[PHI_TIME] * s->h > 0.0)) return PHI_NOT_FINITE;
     phi_settle(s->x, s->carry, moved);
     phi_pass(s, moved[PHI_TIME]);
@@ -85,8 +84,7 @@ static phi_status phi_stages(phi_solver *s)
     phi_flows(s->coef[0], x, moved, s->x);
 #endif
     ++s->evaluations;
-    for (int i = 0; i < PHI_DIM; ++i)
-        if (!isfinite(x[i])) return PHI_NOT_FINITE;
+    if (!phi_finite(x, PHI_DIM)) return PHI_NOT_FINITE;
     phi_settle(s->x, s->carry, moved);
 #if PHI_ATTITUDE
     phi_turn_by(s, element);

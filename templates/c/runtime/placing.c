@@ -3,6 +3,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "algebra.c"
 #include "model.h"
 #if PHI_GUESSED
 #include "implicit.c"
@@ -17,18 +18,43 @@
 #if PHI_GUESSED
 #define PHI_NEAR_BY 0.125 /* how far the state may be moved, in its own size, for guesses to move with it */
 
+#endif
+#if PHI_MONITOR
+/* The level of s->x, which was moved from elsewhere; 0, and back there, where it has none. */
+static int phi_take_level(phi_solver *s, const double from[PHI_DIM], const double carry[PHI_DIM])
+{
+    double level[PHI_GAUGES];
+    const double rate = phi_monitor(&s->params, s->x);
+    phi_choose_gauge(&s->params, s->x, level);
+    if (!isfinite(level[0]) || !isfinite(rate) || !(rate > 0.0)) {
+        memcpy(s->x, from, sizeof s->x);
+        memcpy(s->carry, carry, sizeof s->carry);
+        return 0;
+    }
+    memcpy(s->gauge, level, sizeof level);
+    for (int stage = 0; stage < PHI_STAGES; ++stage) /* where s->h is NaN the next step does it again */
+        phi_prepare(&s->params, s->gauge, phi_fractions[stage] * s->h, s->coef[stage]);
+    return 1;
+}
+
+#endif
+#if PHI_GUESSED
+#if PHI_RECURRENCES
 /* Guesses move with the state, by as many past values as extrapolation needs; recurrences are of the motion as it was. From
    far away all begins anew, with the next step. */
-static void phi_move_guesses(phi_solver *s, const double to[PHI_DIM])
+#else
+/* Guesses move with the state. From far away all begins anew, with the next step. */
+#endif
+static void phi_move_guesses(phi_solver *s, const double from[PHI_DIM])
 {
     double distance = 0.0, size = 0.0;
     for (int i = 0; i < PHI_DIM; ++i) {
 #if PHI_RELATIVE
-        distance = fmax(distance, fabs(to[i] / s->x[i] - 1.0));
+        distance = fmax(distance, fabs(s->x[i] / from[i] - 1.0));
         size = 1.0;
 #else
-        distance += fabs(to[i] - s->x[i]);
-        size += fabs(s->x[i]);
+        distance += fabs(s->x[i] - from[i]);
+        size += fabs(from[i]);
 #endif
     }
     if (!(distance <= PHI_NEAR_BY * size)) {
@@ -41,63 +67,74 @@ static void phi_move_guesses(phi_solver *s, const double to[PHI_DIM])
         const int count = history->count < PHI_HISTORY ? history->count : PHI_HISTORY;
         memmove(history->past, history->past + history->count - count, (size_t)count * sizeof history->past[0]);
         for (int k = 0; k < count; ++k)
-            for (int i = 0; i < PHI_DIM; ++i) history->past[k][i] += to[i] - s->x[i];
+            for (int i = 0; i < PHI_DIM; ++i) history->past[k][i] += s->x[i] - from[i];
         history->count = count;
         history->recurrence_terms = history->use_recurrence = history->slow_steps = 0;
 #else
-        for (int i = 0; i < PHI_DIM; ++i) history->difference[0][i] += to[i] - s->x[i];
+        for (int i = 0; i < PHI_DIM; ++i) history->difference[0][i] += s->x[i] - from[i];
 #endif
     }
 }
 
 #endif
-/* Stand at x + carry from now on. */
-static phi_status phi_place(phi_solver *s, const double x[PHI_DIM], const double carry[PHI_DIM])
+#if PHI_RATE_OF_GAUGE
+/* The gauge turns the body at another rate from here on. */
+static void phi_take_rate(phi_solver *s)
 {
-    for (int i = 0; i < PHI_DIM; ++i)
-        if (!isfinite(x[i])) return PHI_BAD_ARGUMENT;
+#if PHI_POSITION
+    phi_set_attitude(s, s->attitude, s->position);
+#else
+    phi_set_attitude(s, s->attitude);
+#endif
+}
+
+#endif
+phi_status phi_set_state(phi_solver *s, const double x[PHI_DIM])
+{
+    if (s == NULL || x == NULL || !phi_finite(x, PHI_DIM)) return PHI_BAD_ARGUMENT;
+#if PHI_GUESSED || PHI_MONITOR
+    double from[PHI_DIM];
+    memcpy(from, s->x, sizeof from);
+#endif
 #if PHI_MONITOR
-    double level[PHI_GAUGES];
-    const double rate = phi_monitor(&s->params, x);
-    phi_choose_gauge(&s->params, x, level);
-    if (!isfinite(level[0]) || !isfinite(rate) || !(rate > 0.0)) return PHI_BAD_ARGUMENT;
-    memcpy(s->gauge, level, sizeof level);
-    for (int stage = 0; stage < PHI_STAGES; ++stage) /* where s->h is NaN the next step does it again */
-        phi_prepare(&s->params, s->gauge, phi_fractions[stage] * s->h, s->coef[stage]);
+    double carry[PHI_DIM];
+    memcpy(carry, s->carry, sizeof carry);
+#endif
+    memmove(s->x, x, sizeof s->x); /* x may be a part of *s */
+    memset(s->carry, 0, sizeof s->carry);
+#if PHI_MONITOR
+    if (!phi_take_level(s, from, carry)) return PHI_BAD_ARGUMENT;
 #endif
 #if PHI_GUESSED
-    phi_move_guesses(s, x);
+    phi_move_guesses(s, from);
 #endif
-    memcpy(s->x, x, sizeof s->x);
-    memcpy(s->carry, carry, sizeof s->carry);
 #if PHI_RATE_OF_GAUGE
-#if PHI_POSITION
-    phi_set_attitude(s, s->attitude, s->position); /* the gauge turns the body at another rate from here on */
-#else
-    phi_set_attitude(s, s->attitude); /* the gauge turns the body at another rate from here on */
-#endif
+    phi_take_rate(s);
 #endif
     return PHI_OK;
 }
 
-phi_status phi_set_state(phi_solver *s, const double x[PHI_DIM])
-{
-    double to[PHI_DIM], carry[PHI_DIM] = { 0.0 };
-    if (s == NULL || x == NULL) return PHI_BAD_ARGUMENT;
-    memcpy(to, x, sizeof to); /* which may be a part of *s */
-    return phi_place(s, to, carry);
-}
-
 phi_status phi_kick(phi_solver *s, const double change[PHI_DIM])
 {
-    double to[PHI_DIM], carry[PHI_DIM];
     if (s == NULL || change == NULL) return PHI_BAD_ARGUMENT;
-    for (int i = 0; i < PHI_DIM; ++i) {
-        const double sum = s->x[i] + change[i], added = sum - s->x[i];
-        const double lost = ((s->x[i] - (sum - added)) + (change[i] - added)) + s->carry[i];
-        to[i] = sum + lost;
-        carry[i] = lost - (to[i] - sum);
-    }
-    return phi_place(s, to, carry);
+#if PHI_GUESSED || PHI_MONITOR
+    double from[PHI_DIM];
+    memcpy(from, s->x, sizeof from);
+#endif
+#if PHI_MONITOR
+    double carry[PHI_DIM];
+    memcpy(carry, s->carry, sizeof carry);
+#endif
+    if (!phi_advance(s, change, s->carry)) return PHI_BAD_ARGUMENT;
+#if PHI_MONITOR
+    if (!phi_take_level(s, from, carry)) return PHI_BAD_ARGUMENT;
+#endif
+#if PHI_GUESSED
+    phi_move_guesses(s, from);
+#endif
+#if PHI_RATE_OF_GAUGE
+    phi_take_rate(s);
+#endif
+    return PHI_OK;
 }
 #endif

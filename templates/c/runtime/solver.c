@@ -58,23 +58,21 @@ phi_status phi_init(phi_solver *s, const phi_params *params, const double x0[PHI
 #if PHI_TIMED
     fresh.t = t0;
 #endif
-    for (int i = 0; i < PHI_DIM; ++i)
-        if (!isfinite(fresh.x[i])) return PHI_BAD_ARGUMENT;
 #if PHI_PARAMETERS
-    if (!phi_allowed(&fresh.params)) return PHI_BAD_ARGUMENT;
+    if (!phi_finite(fresh.x, PHI_DIM) || !phi_allowed(&fresh.params)) return PHI_BAD_ARGUMENT;
 #if PHI_GAUGE
     phi_prepare(&fresh.params, fresh.gauge, PHI_SHORT_STEP, fresh.coef[0]);
 #else
     phi_prepare(&fresh.params, PHI_SHORT_STEP, fresh.coef[0]);
 #endif
-    for (int k = 0; k < PHI_COEFFICIENTS; ++k)
-        if (!isfinite(fresh.coef[0][k])) return PHI_BAD_ARGUMENT;
+    if (!phi_finite(fresh.coef[0], PHI_COEFFICIENTS)) return PHI_BAD_ARGUMENT;
+#else
+    if (!phi_finite(fresh.x, PHI_DIM)) return PHI_BAD_ARGUMENT;
 #endif
 #if PHI_GAUGE
     if (gauge == NULL) phi_choose_gauge(&fresh.params, fresh.x, fresh.gauge);
     else memcpy(fresh.gauge, gauge, sizeof fresh.gauge);
-    for (int c = 0; c < PHI_GAUGES; ++c)
-        if (!isfinite(fresh.gauge[c])) return PHI_BAD_ARGUMENT;
+    if (!phi_finite(fresh.gauge, PHI_GAUGES)) return PHI_BAD_ARGUMENT;
 #endif
 #if PHI_MONITOR
     const double rate = phi_monitor(&fresh.params, fresh.x);
