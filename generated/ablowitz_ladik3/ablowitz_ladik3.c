@@ -22,7 +22,7 @@
  *   5. Between steps
  *   6. The solver
  *   7. Ensembles
- * body-sha256: e7bca2aaace8da0c776bf2d67fbb431ac616ddbccb01cace0633c45c2f7e905f
+ * body-sha256: d4d94c2ad36a7ae995670f878990df91d9fba0a6c211ad4e5e723197b2131c96
  */
 #include "ablowitz_ladik3.h"
 
@@ -145,9 +145,8 @@ void ablowitz_ladik3_vector_field(const ablowitz_ladik3_params *params, const do
 /* ---- Compensated sums, linear equations ---- */
 static int ablowitz_ladik3_finite(const double *values, int count)
 {
-    for (int k = 0; k < count; ++k)
-        if (!isfinite(values[k])) return 0;
-    return 1;
+    while (count > 0 && isfinite(values[count - 1])) --count;
+    return count == 0;
 }
 
 /* x + change + small in compensated arithmetic, where small is the carry and what is as small: were that
@@ -687,13 +686,12 @@ ablowitz_ladik3_status ablowitz_ladik3_ensemble(const ablowitz_ladik3_params *pa
     size_t members, double h, size_t steps, unsigned char *status)
 {
     ablowitz_ladik3_status worst = isfinite(h) ? ablowitz_ladik3_OK : ablowitz_ladik3_BAD_ARGUMENT;
-    const ablowitz_ladik3_params own = params != NULL ? *params : ablowitz_ladik3_default_params;
     if (x == NULL && members > 0) return ablowitz_ladik3_BAD_ARGUMENT;
     for (size_t m = 0; m < members; ++m) {
         ablowitz_ladik3_solver s;
         double x0[ablowitz_ladik3_DIM];
         for (size_t i = 0; i < ablowitz_ladik3_DIM; ++i) x0[i] = x[i * members + m];
-        ablowitz_ladik3_status member = ablowitz_ladik3_init(&s, &own, x0);
+        ablowitz_ladik3_status member = ablowitz_ladik3_init(&s, params, x0);
         if (member == ablowitz_ladik3_OK) {
             member = ablowitz_ladik3_integrate(&s, h, steps);
             for (size_t i = 0; i < ablowitz_ladik3_DIM; ++i) x[i * members + m] = s.x[i];

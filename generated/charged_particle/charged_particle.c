@@ -21,7 +21,7 @@
  *   5. Between steps
  *   6. The solver
  *   7. Ensembles
- * body-sha256: 07f7c85bda90114177626780729b13208b562a9be72c3956b83809cea722044c
+ * body-sha256: a236a9eec60369b6477e82a7e65655a3c99cde016eaa99e8ebf69383ca7d1402
  */
 #include "charged_particle.h"
 
@@ -153,9 +153,8 @@ void charged_particle_vector_field(const charged_particle_params *params, const 
 /* ---- Compensated sums, linear equations ---- */
 static int charged_particle_finite(const double *values, int count)
 {
-    for (int k = 0; k < count; ++k)
-        if (!isfinite(values[k])) return 0;
-    return 1;
+    while (count > 0 && isfinite(values[count - 1])) --count;
+    return count == 0;
 }
 
 /* x + change + small in compensated arithmetic, where small is the carry and what is as small: were that
@@ -657,13 +656,12 @@ charged_particle_status charged_particle_ensemble(const charged_particle_params 
     size_t members, double h, size_t steps, unsigned char *status)
 {
     charged_particle_status worst = isfinite(h) ? charged_particle_OK : charged_particle_BAD_ARGUMENT;
-    const charged_particle_params own = params != NULL ? *params : charged_particle_default_params;
     if (x == NULL && members > 0) return charged_particle_BAD_ARGUMENT;
     for (size_t m = 0; m < members; ++m) {
         charged_particle_solver s;
         double x0[charged_particle_DIM];
         for (size_t i = 0; i < charged_particle_DIM; ++i) x0[i] = x[i * members + m];
-        charged_particle_status member = charged_particle_init(&s, &own, x0);
+        charged_particle_status member = charged_particle_init(&s, params, x0);
         if (member == charged_particle_OK) {
             member = charged_particle_integrate(&s, h, steps);
             for (size_t i = 0; i < charged_particle_DIM; ++i) x[i * members + m] = s.x[i];

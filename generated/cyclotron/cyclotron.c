@@ -21,7 +21,7 @@
  *   5. Between steps
  *   6. The solver
  *   7. Ensembles
- * body-sha256: 71116063b798a10981c1d3d4f04722c486730bddf4f3a36a77f68ea287d01619
+ * body-sha256: 187d5aa82f100107313b942dcc559ee27040ae51798884823d0f0295ad9eb371
  */
 #include "cyclotron.h"
 
@@ -111,9 +111,8 @@ void cyclotron_vector_field(const cyclotron_params *params, const double x[3], d
 /* ---- Compensated sums, linear equations ---- */
 static int cyclotron_finite(const double *values, int count)
 {
-    for (int k = 0; k < count; ++k)
-        if (!isfinite(values[k])) return 0;
-    return 1;
+    while (count > 0 && isfinite(values[count - 1])) --count;
+    return count == 0;
 }
 
 /* x + change + small in compensated arithmetic, where small is the carry and what is as small: were that
@@ -397,13 +396,12 @@ cyclotron_status cyclotron_ensemble(const cyclotron_params *params, double *x, s
     size_t steps, unsigned char *status)
 {
     cyclotron_status worst = isfinite(h) ? cyclotron_OK : cyclotron_BAD_ARGUMENT;
-    const cyclotron_params own = params != NULL ? *params : cyclotron_default_params;
     if (x == NULL && members > 0) return cyclotron_BAD_ARGUMENT;
     for (size_t m = 0; m < members; ++m) {
         cyclotron_solver s;
         double x0[cyclotron_DIM];
         for (size_t i = 0; i < cyclotron_DIM; ++i) x0[i] = x[i * members + m];
-        cyclotron_status member = cyclotron_init(&s, &own, x0);
+        cyclotron_status member = cyclotron_init(&s, params, x0);
         if (member == cyclotron_OK) {
             member = cyclotron_integrate(&s, h, steps);
             for (size_t i = 0; i < cyclotron_DIM; ++i) x[i * members + m] = s.x[i];

@@ -25,7 +25,7 @@
  *   5. Noise
  *   6. The solver
  *   7. Ensembles
- * body-sha256: 2d782f435825ad40ad21688083ba05e212cc4d94154f6dcc8e75f892f0d492ee
+ * body-sha256: 0e9f742280793e15ccd7a7071e4e9401d27896f9a055ce9ecb07522e1502d92b
  */
 #include "double_well.h"
 
@@ -132,9 +132,8 @@ void double_well_noise_fields(const double_well_params *params, const double x[2
 /* ---- Compensated sums, linear equations ---- */
 static int double_well_finite(const double *values, int count)
 {
-    for (int k = 0; k < count; ++k)
-        if (!isfinite(values[k])) return 0;
-    return 1;
+    while (count > 0 && isfinite(values[count - 1])) --count;
+    return count == 0;
 }
 
 /* x + change + small in compensated arithmetic, where small is the carry and what is as small: were that
@@ -351,8 +350,6 @@ double_well_status double_well_set_noise(double_well_solver *s, uint64_t seed, u
 }
 
 /* ---- The solver ---- */
-#define double_well_SHORT_STEP 1e-100 /* so short that it has no part in whether coefficients are finite */
-
 /* The arguments may be parts of *s, which is therefore written last. */
 double_well_status double_well_init(double_well_solver *s, const double_well_params *params,
     const double x0[double_well_DIM])
@@ -363,7 +360,7 @@ double_well_status double_well_init(double_well_solver *s, const double_well_par
     memcpy(fresh.x, x0, sizeof fresh.x);
     if (!double_well_finite(fresh.x, double_well_DIM) || !double_well_allowed(&fresh.params))
         return double_well_BAD_ARGUMENT;
-    double_well_prepare(&fresh.params, double_well_SHORT_STEP, fresh.coef);
+    double_well_prepare(&fresh.params, 1e-100, fresh.coef); /* so short a step does not matter */
     if (!double_well_finite(fresh.coef, double_well_COEFFICIENTS)) return double_well_BAD_ARGUMENT;
     *s = fresh;
     return double_well_OK;
@@ -436,7 +433,6 @@ double_well_status double_well_ensemble_of(const double_well_params *params, dou
     double h, size_t steps, uint64_t seed, uint32_t first_member, uint64_t first_step, unsigned char *status)
 {
     double_well_status worst = isfinite(h) ? double_well_OK : double_well_BAD_ARGUMENT;
-    const double_well_params own = params != NULL ? *params : double_well_default_params;
     size_t earliest = members;
     if (x == NULL && members > 0) return double_well_BAD_ARGUMENT;
 #ifdef _OPENMP
@@ -446,7 +442,7 @@ double_well_status double_well_ensemble_of(const double_well_params *params, dou
         double_well_solver s;
         double x0[double_well_DIM];
         for (size_t i = 0; i < double_well_DIM; ++i) x0[i] = x[i * members + m];
-        double_well_status member = double_well_init(&s, &own, x0);
+        double_well_status member = double_well_init(&s, params, x0);
         if (member == double_well_OK) {
             double_well_set_noise(&s, seed, first_member + (uint32_t)m, first_step);
             member = double_well_integrate(&s, h, steps);

@@ -21,7 +21,7 @@
  *   5. Between steps
  *   6. The solver
  *   7. Ensembles
- * body-sha256: 872b8eba13dbe4553db7facee9cd3ff11441ea07557845729ccad7e989fabf2d
+ * body-sha256: 6ad3648340fc1631ec526ea1a947463c51891362da0d9a6b79f653d31e3f678b
  */
 #include "duffing.h"
 
@@ -154,9 +154,8 @@ void duffing_vector_field(const duffing_params *params, double t, const double x
 /* ---- Compensated sums, linear equations ---- */
 static int duffing_finite(const double *values, int count)
 {
-    for (int k = 0; k < count; ++k)
-        if (!isfinite(values[k])) return 0;
-    return 1;
+    while (count > 0 && isfinite(values[count - 1])) --count;
+    return count == 0;
 }
 
 /* x + change + small in compensated arithmetic, where small is the carry and what is as small: were that
@@ -371,8 +370,6 @@ duffing_status duffing_kick(duffing_solver *s, const double change[duffing_DIM])
 }
 
 /* ---- The solver ---- */
-#define duffing_SHORT_STEP 1e-100 /* so short that it has no part in whether coefficients are finite */
-
 /* The arguments may be parts of *s, which is therefore written last. */
 duffing_status duffing_init_at(duffing_solver *s, const duffing_params *params, const double x0[duffing_DIM],
     double t0)
@@ -383,7 +380,7 @@ duffing_status duffing_init_at(duffing_solver *s, const duffing_params *params, 
     memcpy(fresh.x, x0, sizeof fresh.x);
     fresh.t = t0;
     if (!duffing_finite(fresh.x, duffing_DIM) || !duffing_allowed(&fresh.params)) return duffing_BAD_ARGUMENT;
-    duffing_prepare(&fresh.params, duffing_SHORT_STEP, fresh.coef);
+    duffing_prepare(&fresh.params, 1e-100, fresh.coef); /* so short a step does not matter */
     if (!duffing_finite(fresh.coef, duffing_COEFFICIENTS)) return duffing_BAD_ARGUMENT;
     *s = fresh;
     return duffing_OK;
@@ -457,13 +454,12 @@ duffing_status duffing_ensemble_at(const duffing_params *params, double *x, size
     double h, size_t steps, unsigned char *status)
 {
     duffing_status worst = isfinite(h) ? duffing_OK : duffing_BAD_ARGUMENT;
-    const duffing_params own = params != NULL ? *params : duffing_default_params;
     if (x == NULL && members > 0) return duffing_BAD_ARGUMENT;
     for (size_t m = 0; m < members; ++m) {
         duffing_solver s;
         double x0[duffing_DIM];
         for (size_t i = 0; i < duffing_DIM; ++i) x0[i] = x[i * members + m];
-        duffing_status member = duffing_init_at(&s, &own, x0, t0);
+        duffing_status member = duffing_init_at(&s, params, x0, t0);
         if (member == duffing_OK) {
             member = duffing_integrate(&s, h, steps);
             for (size_t i = 0; i < duffing_DIM; ++i) x[i * members + m] = s.x[i];

@@ -24,7 +24,7 @@
  *   7. Between steps
  *   8. The solver
  *   9. Ensembles
- * body-sha256: f82719140cfcadeb4ee72a4f05676f67042520efa74daa552ec442f94134026e
+ * body-sha256: bf92e8594e2885785a6892e4654bb1b4b17fb85e9373c6c09e7f0fa6e70591bc
  */
 #include "dzhanibekov.h"
 
@@ -342,9 +342,8 @@ void dzhanibekov_vector_field(const dzhanibekov_params *params, const double x[3
 /* ---- Compensated sums, linear equations ---- */
 static int dzhanibekov_finite(const double *values, int count)
 {
-    for (int k = 0; k < count; ++k)
-        if (!isfinite(values[k])) return 0;
-    return 1;
+    while (count > 0 && isfinite(values[count - 1])) --count;
+    return count == 0;
 }
 
 /* x + change + small in compensated arithmetic, where small is the carry and what is as small: were that
@@ -696,8 +695,6 @@ dzhanibekov_status dzhanibekov_kick(dzhanibekov_solver *s, const double change[d
 }
 
 /* ---- The solver ---- */
-#define dzhanibekov_SHORT_STEP 1e-100 /* so short that it has no part in whether coefficients are finite */
-
 /* The arguments may be parts of *s, which is therefore written last. */
 dzhanibekov_status dzhanibekov_init_gauge(dzhanibekov_solver *s, const dzhanibekov_params *params,
     const double x0[dzhanibekov_DIM], const double gauge[dzhanibekov_GAUGES])
@@ -708,7 +705,7 @@ dzhanibekov_status dzhanibekov_init_gauge(dzhanibekov_solver *s, const dzhanibek
     memcpy(fresh.x, x0, sizeof fresh.x);
     if (!dzhanibekov_finite(fresh.x, dzhanibekov_DIM) || !dzhanibekov_allowed(&fresh.params))
         return dzhanibekov_BAD_ARGUMENT;
-    dzhanibekov_prepare(&fresh.params, fresh.gauge, dzhanibekov_SHORT_STEP, fresh.coef);
+    dzhanibekov_prepare(&fresh.params, fresh.gauge, 1e-100, fresh.coef); /* so short a step does not matter */
     if (!dzhanibekov_finite(fresh.coef, dzhanibekov_COEFFICIENTS)) return dzhanibekov_BAD_ARGUMENT;
     if (gauge == NULL) dzhanibekov_choose_gauge(&fresh.params, fresh.x, fresh.gauge);
     else memcpy(fresh.gauge, gauge, sizeof fresh.gauge);
@@ -785,13 +782,12 @@ dzhanibekov_status dzhanibekov_ensemble(const dzhanibekov_params *params, double
     size_t steps, unsigned char *status)
 {
     dzhanibekov_status worst = isfinite(h) ? dzhanibekov_OK : dzhanibekov_BAD_ARGUMENT;
-    const dzhanibekov_params own = params != NULL ? *params : dzhanibekov_default_params;
     if (x == NULL && members > 0) return dzhanibekov_BAD_ARGUMENT;
     for (size_t m = 0; m < members; ++m) {
         dzhanibekov_solver s;
         double x0[dzhanibekov_DIM];
         for (size_t i = 0; i < dzhanibekov_DIM; ++i) x0[i] = x[i * members + m];
-        dzhanibekov_status member = dzhanibekov_init(&s, &own, x0);
+        dzhanibekov_status member = dzhanibekov_init(&s, params, x0);
         if (member == dzhanibekov_OK) {
             member = dzhanibekov_integrate(&s, h, steps);
             for (size_t i = 0; i < dzhanibekov_DIM; ++i) x[i * members + m] = s.x[i];

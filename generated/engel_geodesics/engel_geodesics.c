@@ -21,7 +21,7 @@
  *   5. Between steps
  *   6. The solver
  *   7. Ensembles
- * body-sha256: 57f7ba230086b1095125f6555df93c332c37c010a84a7513cdf405883b40b154
+ * body-sha256: bf014adef24240fc74fdb723d1207bea33a8c4bf1117f763f03bee58167fd16a
  */
 #include "engel_geodesics.h"
 
@@ -134,9 +134,8 @@ void engel_geodesics_vector_field(const engel_geodesics_params *params, const do
 /* ---- Compensated sums, linear equations ---- */
 static int engel_geodesics_finite(const double *values, int count)
 {
-    for (int k = 0; k < count; ++k)
-        if (!isfinite(values[k])) return 0;
-    return 1;
+    while (count > 0 && isfinite(values[count - 1])) --count;
+    return count == 0;
 }
 
 /* x + change + small in compensated arithmetic, where small is the carry and what is as small: were that
@@ -438,13 +437,12 @@ engel_geodesics_status engel_geodesics_ensemble(const engel_geodesics_params *pa
     size_t members, double h, size_t steps, unsigned char *status)
 {
     engel_geodesics_status worst = isfinite(h) ? engel_geodesics_OK : engel_geodesics_BAD_ARGUMENT;
-    const engel_geodesics_params own = params != NULL ? *params : engel_geodesics_default_params;
     if (x == NULL && members > 0) return engel_geodesics_BAD_ARGUMENT;
     for (size_t m = 0; m < members; ++m) {
         engel_geodesics_solver s;
         double x0[engel_geodesics_DIM];
         for (size_t i = 0; i < engel_geodesics_DIM; ++i) x0[i] = x[i * members + m];
-        engel_geodesics_status member = engel_geodesics_init(&s, &own, x0);
+        engel_geodesics_status member = engel_geodesics_init(&s, params, x0);
         if (member == engel_geodesics_OK) {
             member = engel_geodesics_integrate(&s, h, steps);
             for (size_t i = 0; i < engel_geodesics_DIM; ++i) x[i * members + m] = s.x[i];

@@ -21,7 +21,7 @@
  *   5. Between steps
  *   6. The solver
  *   7. Ensembles
- * body-sha256: ae0dccb64a23d2f10a76a3931a7de52898f757ef75591055f95e770b166c8ae3
+ * body-sha256: 272265976d46ac7471970fb123526598194f29a4f01bd9af81f3686ef993d707
  */
 #include "gaussian_moments.h"
 
@@ -203,9 +203,8 @@ void gaussian_moments_vector_field(const gaussian_moments_params *params, const 
 /* ---- Compensated sums, linear equations ---- */
 static int gaussian_moments_finite(const double *values, int count)
 {
-    for (int k = 0; k < count; ++k)
-        if (!isfinite(values[k])) return 0;
-    return 1;
+    while (count > 0 && isfinite(values[count - 1])) --count;
+    return count == 0;
 }
 
 /* x + change + small in compensated arithmetic, where small is the carry and what is as small: were that
@@ -437,9 +436,6 @@ gaussian_moments_status gaussian_moments_kick(gaussian_moments_solver *s,
 }
 
 /* ---- The solver ---- */
-/* so short that it has no part in whether coefficients are finite */
-#define gaussian_moments_SHORT_STEP 1e-100
-
 /* The arguments may be parts of *s, which is therefore written last. */
 gaussian_moments_status gaussian_moments_init(gaussian_moments_solver *s,
     const gaussian_moments_params *params, const double x0[gaussian_moments_DIM])
@@ -450,7 +446,7 @@ gaussian_moments_status gaussian_moments_init(gaussian_moments_solver *s,
     memcpy(fresh.x, x0, sizeof fresh.x);
     if (!gaussian_moments_finite(fresh.x, gaussian_moments_DIM) || !gaussian_moments_allowed(&fresh.params))
         return gaussian_moments_BAD_ARGUMENT;
-    gaussian_moments_prepare(&fresh.params, gaussian_moments_SHORT_STEP, fresh.coef);
+    gaussian_moments_prepare(&fresh.params, 1e-100, fresh.coef); /* so short a step does not matter */
     if (!gaussian_moments_finite(fresh.coef, gaussian_moments_COEFFICIENTS))
         return gaussian_moments_BAD_ARGUMENT;
     *s = fresh;
@@ -516,13 +512,12 @@ gaussian_moments_status gaussian_moments_ensemble(const gaussian_moments_params 
     size_t members, double h, size_t steps, unsigned char *status)
 {
     gaussian_moments_status worst = isfinite(h) ? gaussian_moments_OK : gaussian_moments_BAD_ARGUMENT;
-    const gaussian_moments_params own = params != NULL ? *params : gaussian_moments_default_params;
     if (x == NULL && members > 0) return gaussian_moments_BAD_ARGUMENT;
     for (size_t m = 0; m < members; ++m) {
         gaussian_moments_solver s;
         double x0[gaussian_moments_DIM];
         for (size_t i = 0; i < gaussian_moments_DIM; ++i) x0[i] = x[i * members + m];
-        gaussian_moments_status member = gaussian_moments_init(&s, &own, x0);
+        gaussian_moments_status member = gaussian_moments_init(&s, params, x0);
         if (member == gaussian_moments_OK) {
             member = gaussian_moments_integrate(&s, h, steps);
             for (size_t i = 0; i < gaussian_moments_DIM; ++i) x[i * members + m] = s.x[i];

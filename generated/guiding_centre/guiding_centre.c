@@ -22,7 +22,7 @@
  *   5. Between steps
  *   6. The solver
  *   7. Ensembles
- * body-sha256: 87c8bf8854c1740ebbddc879cbf25a7effdba8d7a470fba126d0c9cc4a7a7f40
+ * body-sha256: 35a91d5cc2e2855c7903fdc6b37bb588dd953f1142f6d0b48d2c572b31976665
  */
 #include "guiding_centre.h"
 
@@ -132,9 +132,8 @@ void guiding_centre_vector_field(const guiding_centre_params *params, const doub
 /* ---- Compensated sums, linear equations ---- */
 static int guiding_centre_finite(const double *values, int count)
 {
-    for (int k = 0; k < count; ++k)
-        if (!isfinite(values[k])) return 0;
-    return 1;
+    while (count > 0 && isfinite(values[count - 1])) --count;
+    return count == 0;
 }
 
 /* x + change + small in compensated arithmetic, where small is the carry and what is as small: were that
@@ -672,8 +671,6 @@ guiding_centre_status guiding_centre_kick(guiding_centre_solver *s, const double
 }
 
 /* ---- The solver ---- */
-#define guiding_centre_SHORT_STEP 1e-100 /* so short that it has no part in whether coefficients are finite */
-
 /* The arguments may be parts of *s, which is therefore written last. */
 guiding_centre_status guiding_centre_init(guiding_centre_solver *s, const guiding_centre_params *params,
     const double x0[guiding_centre_DIM])
@@ -684,7 +681,7 @@ guiding_centre_status guiding_centre_init(guiding_centre_solver *s, const guidin
     memcpy(fresh.x, x0, sizeof fresh.x);
     if (!guiding_centre_finite(fresh.x, guiding_centre_DIM) || !guiding_centre_allowed(&fresh.params))
         return guiding_centre_BAD_ARGUMENT;
-    guiding_centre_prepare(&fresh.params, guiding_centre_SHORT_STEP, fresh.coef[0]);
+    guiding_centre_prepare(&fresh.params, 1e-100, fresh.coef[0]); /* so short a step does not matter */
     if (!guiding_centre_finite(fresh.coef[0], guiding_centre_COEFFICIENTS))
         return guiding_centre_BAD_ARGUMENT;
     *s = fresh;
@@ -767,13 +764,12 @@ guiding_centre_status guiding_centre_ensemble(const guiding_centre_params *param
     double h, size_t steps, unsigned char *status)
 {
     guiding_centre_status worst = isfinite(h) ? guiding_centre_OK : guiding_centre_BAD_ARGUMENT;
-    const guiding_centre_params own = params != NULL ? *params : guiding_centre_default_params;
     if (x == NULL && members > 0) return guiding_centre_BAD_ARGUMENT;
     for (size_t m = 0; m < members; ++m) {
         guiding_centre_solver s;
         double x0[guiding_centre_DIM];
         for (size_t i = 0; i < guiding_centre_DIM; ++i) x0[i] = x[i * members + m];
-        guiding_centre_status member = guiding_centre_init(&s, &own, x0);
+        guiding_centre_status member = guiding_centre_init(&s, params, x0);
         if (member == guiding_centre_OK) {
             member = guiding_centre_integrate(&s, h, steps);
             for (size_t i = 0; i < guiding_centre_DIM; ++i) x[i * members + m] = s.x[i];

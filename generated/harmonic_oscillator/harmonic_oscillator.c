@@ -21,7 +21,7 @@
  *   5. Between steps
  *   6. The solver
  *   7. Ensembles
- * body-sha256: f0ba36e03cb903302b93fb7f65c401eea5ff968829c2cd1d6f5112a66a683d19
+ * body-sha256: 909bc6fa7412dc71d0d314384213c0e101454cb6a29a64f223c9216688340382
  */
 #include "harmonic_oscillator.h"
 
@@ -106,9 +106,8 @@ void harmonic_oscillator_vector_field(const harmonic_oscillator_params *params, 
 /* ---- Compensated sums, linear equations ---- */
 static int harmonic_oscillator_finite(const double *values, int count)
 {
-    for (int k = 0; k < count; ++k)
-        if (!isfinite(values[k])) return 0;
-    return 1;
+    while (count > 0 && isfinite(values[count - 1])) --count;
+    return count == 0;
 }
 
 /* x + change + small in compensated arithmetic, where small is the carry and what is as small: were that
@@ -341,9 +340,6 @@ harmonic_oscillator_status harmonic_oscillator_kick(harmonic_oscillator_solver *
 }
 
 /* ---- The solver ---- */
-/* so short that it has no part in whether coefficients are finite */
-#define harmonic_oscillator_SHORT_STEP 1e-100
-
 /* The arguments may be parts of *s, which is therefore written last. */
 harmonic_oscillator_status harmonic_oscillator_init(harmonic_oscillator_solver *s,
     const harmonic_oscillator_params *params, const double x0[harmonic_oscillator_DIM])
@@ -354,7 +350,7 @@ harmonic_oscillator_status harmonic_oscillator_init(harmonic_oscillator_solver *
     memcpy(fresh.x, x0, sizeof fresh.x);
     if (!harmonic_oscillator_finite(fresh.x, harmonic_oscillator_DIM)
         || !harmonic_oscillator_allowed(&fresh.params)) return harmonic_oscillator_BAD_ARGUMENT;
-    harmonic_oscillator_prepare(&fresh.params, harmonic_oscillator_SHORT_STEP, fresh.coef);
+    harmonic_oscillator_prepare(&fresh.params, 1e-100, fresh.coef); /* so short a step does not matter */
     if (!harmonic_oscillator_finite(fresh.coef, harmonic_oscillator_COEFFICIENTS))
         return harmonic_oscillator_BAD_ARGUMENT;
     *s = fresh;
@@ -423,13 +419,12 @@ harmonic_oscillator_status harmonic_oscillator_ensemble(const harmonic_oscillato
 {
     harmonic_oscillator_status worst = isfinite(h) ? harmonic_oscillator_OK
         : harmonic_oscillator_BAD_ARGUMENT;
-    const harmonic_oscillator_params own = params != NULL ? *params : harmonic_oscillator_default_params;
     if (x == NULL && members > 0) return harmonic_oscillator_BAD_ARGUMENT;
     for (size_t m = 0; m < members; ++m) {
         harmonic_oscillator_solver s;
         double x0[harmonic_oscillator_DIM];
         for (size_t i = 0; i < harmonic_oscillator_DIM; ++i) x0[i] = x[i * members + m];
-        harmonic_oscillator_status member = harmonic_oscillator_init(&s, &own, x0);
+        harmonic_oscillator_status member = harmonic_oscillator_init(&s, params, x0);
         if (member == harmonic_oscillator_OK) {
             member = harmonic_oscillator_integrate(&s, h, steps);
             for (size_t i = 0; i < harmonic_oscillator_DIM; ++i) x[i * members + m] = s.x[i];

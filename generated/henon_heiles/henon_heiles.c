@@ -21,7 +21,7 @@
  *   5. Between steps
  *   6. The solver
  *   7. Ensembles
- * body-sha256: aa13f5230bb6e1dad20d629546a6567c3e8fadd155206a8c82b964f9af176d0f
+ * body-sha256: 5d73f5bf0dc642fcecb9368683b1a1338ce16ac03087fe3c3b738dc9df6b73b0
  */
 #include "henon_heiles.h"
 
@@ -166,9 +166,8 @@ void henon_heiles_vector_field(const henon_heiles_params *params, const double x
 /* ---- Compensated sums, linear equations ---- */
 static int henon_heiles_finite(const double *values, int count)
 {
-    for (int k = 0; k < count; ++k)
-        if (!isfinite(values[k])) return 0;
-    return 1;
+    while (count > 0 && isfinite(values[count - 1])) --count;
+    return count == 0;
 }
 
 /* x + change + small in compensated arithmetic, where small is the carry and what is as small: were that
@@ -458,13 +457,12 @@ henon_heiles_status henon_heiles_ensemble(const henon_heiles_params *params, dou
     double h, size_t steps, unsigned char *status)
 {
     henon_heiles_status worst = isfinite(h) ? henon_heiles_OK : henon_heiles_BAD_ARGUMENT;
-    const henon_heiles_params own = params != NULL ? *params : henon_heiles_default_params;
     if (x == NULL && members > 0) return henon_heiles_BAD_ARGUMENT;
     for (size_t m = 0; m < members; ++m) {
         henon_heiles_solver s;
         double x0[henon_heiles_DIM];
         for (size_t i = 0; i < henon_heiles_DIM; ++i) x0[i] = x[i * members + m];
-        henon_heiles_status member = henon_heiles_init(&s, &own, x0);
+        henon_heiles_status member = henon_heiles_init(&s, params, x0);
         if (member == henon_heiles_OK) {
             member = henon_heiles_integrate(&s, h, steps);
             for (size_t i = 0; i < henon_heiles_DIM; ++i) x[i * members + m] = s.x[i];

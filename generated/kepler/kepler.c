@@ -21,7 +21,7 @@
  *   5. Between steps
  *   6. The solver
  *   7. Ensembles
- * body-sha256: 9c13c7eb8fce9f39979f4fab0c11794ed261c6418bf695d54a268eb8d16fe32b
+ * body-sha256: 6c7e6167c234c1435d99ffb4e7603eb66b199114045d14cf44bb1c5a22c5cf96
  */
 #include "kepler.h"
 
@@ -459,9 +459,8 @@ void kepler_vector_field(const kepler_params *params, const double x[4], double 
 /* ---- Compensated sums, linear equations ---- */
 static int kepler_finite(const double *values, int count)
 {
-    for (int k = 0; k < count; ++k)
-        if (!isfinite(values[k])) return 0;
-    return 1;
+    while (count > 0 && isfinite(values[count - 1])) --count;
+    return count == 0;
 }
 
 /* x + change + small in compensated arithmetic, where small is the carry and what is as small: were that
@@ -675,8 +674,6 @@ kepler_status kepler_kick(kepler_solver *s, const double change[kepler_DIM])
 }
 
 /* ---- The solver ---- */
-#define kepler_SHORT_STEP 1e-100 /* so short that it has no part in whether coefficients are finite */
-
 /* The arguments may be parts of *s, which is therefore written last. */
 kepler_status kepler_init(kepler_solver *s, const kepler_params *params, const double x0[kepler_DIM])
 {
@@ -685,7 +682,7 @@ kepler_status kepler_init(kepler_solver *s, const kepler_params *params, const d
     fresh.params = params != NULL ? *params : kepler_default_params;
     memcpy(fresh.x, x0, sizeof fresh.x);
     if (!kepler_finite(fresh.x, kepler_DIM) || !kepler_allowed(&fresh.params)) return kepler_BAD_ARGUMENT;
-    kepler_prepare(&fresh.params, kepler_SHORT_STEP, fresh.coef);
+    kepler_prepare(&fresh.params, 1e-100, fresh.coef); /* so short a step does not matter */
     if (!kepler_finite(fresh.coef, kepler_COEFFICIENTS)) return kepler_BAD_ARGUMENT;
     *s = fresh;
     return kepler_OK;
@@ -747,13 +744,12 @@ kepler_status kepler_ensemble(const kepler_params *params, double *x, size_t mem
     unsigned char *status)
 {
     kepler_status worst = isfinite(h) ? kepler_OK : kepler_BAD_ARGUMENT;
-    const kepler_params own = params != NULL ? *params : kepler_default_params;
     if (x == NULL && members > 0) return kepler_BAD_ARGUMENT;
     for (size_t m = 0; m < members; ++m) {
         kepler_solver s;
         double x0[kepler_DIM];
         for (size_t i = 0; i < kepler_DIM; ++i) x0[i] = x[i * members + m];
-        kepler_status member = kepler_init(&s, &own, x0);
+        kepler_status member = kepler_init(&s, params, x0);
         if (member == kepler_OK) {
             member = kepler_integrate(&s, h, steps);
             for (size_t i = 0; i < kepler_DIM; ++i) x[i * members + m] = s.x[i];

@@ -23,7 +23,7 @@
  *   5. Between steps
  *   6. The solver
  *   7. Ensembles
- * body-sha256: bd79f4b5b4f7efdb473a2df03a95a68b452c3e53c4a8f2e001d9573e60816563
+ * body-sha256: c9d0de00477ac4e3f2fbbae7c1aa225de6ee52eaa6de00cdd6489c9f4f5213f1
  */
 #include "kepler_eccentric.h"
 
@@ -93,9 +93,8 @@ double kepler_eccentric_monitor(const kepler_eccentric_params *params, const dou
 /* ---- Compensated sums ---- */
 static int kepler_eccentric_finite(const double *values, int count)
 {
-    for (int k = 0; k < count; ++k)
-        if (!isfinite(values[k])) return 0;
-    return 1;
+    while (count > 0 && isfinite(values[count - 1])) --count;
+    return count == 0;
 }
 
 /* x + change + small in compensated arithmetic, where small is the carry and what is as small: were that
@@ -303,9 +302,6 @@ kepler_eccentric_status kepler_eccentric_kick(kepler_eccentric_solver *s,
 }
 
 /* ---- The solver ---- */
-/* so short that it has no part in whether coefficients are finite */
-#define kepler_eccentric_SHORT_STEP 1e-100
-
 /* The arguments may be parts of *s, which is therefore written last. */
 kepler_eccentric_status kepler_eccentric_init_gauge(kepler_eccentric_solver *s,
     const kepler_eccentric_params *params, const double x0[kepler_eccentric_DIM],
@@ -317,7 +313,8 @@ kepler_eccentric_status kepler_eccentric_init_gauge(kepler_eccentric_solver *s,
     memcpy(fresh.x, x0, sizeof fresh.x);
     if (!kepler_eccentric_finite(fresh.x, kepler_eccentric_DIM) || !kepler_eccentric_allowed(&fresh.params))
         return kepler_eccentric_BAD_ARGUMENT;
-    kepler_eccentric_prepare(&fresh.params, fresh.gauge, kepler_eccentric_SHORT_STEP, fresh.coef);
+    /* so short a step does not matter */
+    kepler_eccentric_prepare(&fresh.params, fresh.gauge, 1e-100, fresh.coef);
     if (!kepler_eccentric_finite(fresh.coef, kepler_eccentric_COEFFICIENTS))
         return kepler_eccentric_BAD_ARGUMENT;
     if (gauge == NULL) kepler_eccentric_choose_gauge(&fresh.params, fresh.x, fresh.gauge);
@@ -382,13 +379,12 @@ kepler_eccentric_status kepler_eccentric_ensemble(const kepler_eccentric_params 
     size_t members, double h, size_t steps, unsigned char *status)
 {
     kepler_eccentric_status worst = isfinite(h) ? kepler_eccentric_OK : kepler_eccentric_BAD_ARGUMENT;
-    const kepler_eccentric_params own = params != NULL ? *params : kepler_eccentric_default_params;
     if (x == NULL && members > 0) return kepler_eccentric_BAD_ARGUMENT;
     for (size_t m = 0; m < members; ++m) {
         kepler_eccentric_solver s;
         double x0[kepler_eccentric_DIM];
         for (size_t i = 0; i < kepler_eccentric_DIM; ++i) x0[i] = x[i * members + m];
-        kepler_eccentric_status member = kepler_eccentric_init(&s, &own, x0);
+        kepler_eccentric_status member = kepler_eccentric_init(&s, params, x0);
         if (member == kepler_eccentric_OK) {
             member = kepler_eccentric_integrate(&s, h, steps);
             for (size_t i = 0; i < kepler_eccentric_DIM; ++i) x[i * members + m] = s.x[i];

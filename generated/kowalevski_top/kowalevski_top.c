@@ -27,7 +27,7 @@
  *   11. Members of an ensemble
  *   12. Groups of members
  *   13. Ensembles
- * body-sha256: 032d175952e68716f478f1e3cea6a3a38734823810db2dd1fc748215d7124a65
+ * body-sha256: 408c0df8bbd3a3ed37d7250fdca559cbb42d95090673359f5943c0d7d89e791e
  */
 #include "kowalevski_top.h"
 
@@ -1047,9 +1047,8 @@ void kowalevski_top_vector_field(const kowalevski_top_params *params, const doub
 /* ---- Compensated sums, linear equations ---- */
 static int kowalevski_top_finite(const double *values, int count)
 {
-    for (int k = 0; k < count; ++k)
-        if (!isfinite(values[k])) return 0;
-    return 1;
+    while (count > 0 && isfinite(values[count - 1])) --count;
+    return count == 0;
 }
 
 /* x + change + small in compensated arithmetic, where small is the carry and what is as small: were that

@@ -21,7 +21,7 @@
  *   5. Between steps
  *   6. The solver
  *   7. Ensembles
- * body-sha256: b22b06b99a18f8baf793a69e4c30e7cfde9c9183e632de852cee643587d0eace
+ * body-sha256: 59c3916a1937d8ce7b7d5c56afc2ad5d557922818c323d8d991c78c765becbd7
  */
 #include "lagrange_top.h"
 
@@ -560,9 +560,8 @@ void lagrange_top_vector_field(const lagrange_top_params *params, const double x
 /* ---- Compensated sums, linear equations ---- */
 static int lagrange_top_finite(const double *values, int count)
 {
-    for (int k = 0; k < count; ++k)
-        if (!isfinite(values[k])) return 0;
-    return 1;
+    while (count > 0 && isfinite(values[count - 1])) --count;
+    return count == 0;
 }
 
 /* x + change + small in compensated arithmetic, where small is the carry and what is as small: were that
@@ -780,8 +779,6 @@ lagrange_top_status lagrange_top_kick(lagrange_top_solver *s, const double chang
 }
 
 /* ---- The solver ---- */
-#define lagrange_top_SHORT_STEP 1e-100 /* so short that it has no part in whether coefficients are finite */
-
 /* The arguments may be parts of *s, which is therefore written last. */
 lagrange_top_status lagrange_top_init(lagrange_top_solver *s, const lagrange_top_params *params,
     const double x0[lagrange_top_DIM])
@@ -792,7 +789,7 @@ lagrange_top_status lagrange_top_init(lagrange_top_solver *s, const lagrange_top
     memcpy(fresh.x, x0, sizeof fresh.x);
     if (!lagrange_top_finite(fresh.x, lagrange_top_DIM) || !lagrange_top_allowed(&fresh.params))
         return lagrange_top_BAD_ARGUMENT;
-    lagrange_top_prepare(&fresh.params, lagrange_top_SHORT_STEP, fresh.coef);
+    lagrange_top_prepare(&fresh.params, 1e-100, fresh.coef); /* so short a step does not matter */
     if (!lagrange_top_finite(fresh.coef, lagrange_top_COEFFICIENTS)) return lagrange_top_BAD_ARGUMENT;
     *s = fresh;
     return lagrange_top_OK;
@@ -857,13 +854,12 @@ lagrange_top_status lagrange_top_ensemble(const lagrange_top_params *params, dou
     double h, size_t steps, unsigned char *status)
 {
     lagrange_top_status worst = isfinite(h) ? lagrange_top_OK : lagrange_top_BAD_ARGUMENT;
-    const lagrange_top_params own = params != NULL ? *params : lagrange_top_default_params;
     if (x == NULL && members > 0) return lagrange_top_BAD_ARGUMENT;
     for (size_t m = 0; m < members; ++m) {
         lagrange_top_solver s;
         double x0[lagrange_top_DIM];
         for (size_t i = 0; i < lagrange_top_DIM; ++i) x0[i] = x[i * members + m];
-        lagrange_top_status member = lagrange_top_init(&s, &own, x0);
+        lagrange_top_status member = lagrange_top_init(&s, params, x0);
         if (member == lagrange_top_OK) {
             member = lagrange_top_integrate(&s, h, steps);
             for (size_t i = 0; i < lagrange_top_DIM; ++i) x[i * members + m] = s.x[i];

@@ -24,7 +24,7 @@
  *   5. Between steps
  *   6. The solver
  *   7. Ensembles
- * body-sha256: 23d4f577805e2ff65a9f50334865819b5f0807ad14fb262f0ffdaf4166da5571
+ * body-sha256: f45985599aeab3371137b296e48a5c4b1ba88bad307077c70fe99bd926316753
  */
 #include "landau_lifshitz.h"
 
@@ -199,9 +199,8 @@ void landau_lifshitz_vector_field(const landau_lifshitz_params *params, const do
 /* ---- Compensated sums, linear equations ---- */
 static int landau_lifshitz_finite(const double *values, int count)
 {
-    for (int k = 0; k < count; ++k)
-        if (!isfinite(values[k])) return 0;
-    return 1;
+    while (count > 0 && isfinite(values[count - 1])) --count;
+    return count == 0;
 }
 
 /* x + change + small in compensated arithmetic, where small is the carry and what is as small: were that
@@ -434,9 +433,6 @@ landau_lifshitz_status landau_lifshitz_kick(landau_lifshitz_solver *s,
 }
 
 /* ---- The solver ---- */
-/* so short that it has no part in whether coefficients are finite */
-#define landau_lifshitz_SHORT_STEP 1e-100
-
 /* The arguments may be parts of *s, which is therefore written last. */
 landau_lifshitz_status landau_lifshitz_init(landau_lifshitz_solver *s, const landau_lifshitz_params *params,
     const double x0[landau_lifshitz_DIM])
@@ -447,7 +443,7 @@ landau_lifshitz_status landau_lifshitz_init(landau_lifshitz_solver *s, const lan
     memcpy(fresh.x, x0, sizeof fresh.x);
     if (!landau_lifshitz_finite(fresh.x, landau_lifshitz_DIM) || !landau_lifshitz_allowed(&fresh.params))
         return landau_lifshitz_BAD_ARGUMENT;
-    landau_lifshitz_prepare(&fresh.params, landau_lifshitz_SHORT_STEP, fresh.coef[0]);
+    landau_lifshitz_prepare(&fresh.params, 1e-100, fresh.coef[0]); /* so short a step does not matter */
     if (!landau_lifshitz_finite(fresh.coef[0], landau_lifshitz_COEFFICIENTS))
         return landau_lifshitz_BAD_ARGUMENT;
     *s = fresh;
@@ -530,13 +526,12 @@ landau_lifshitz_status landau_lifshitz_ensemble(const landau_lifshitz_params *pa
     size_t members, double h, size_t steps, unsigned char *status)
 {
     landau_lifshitz_status worst = isfinite(h) ? landau_lifshitz_OK : landau_lifshitz_BAD_ARGUMENT;
-    const landau_lifshitz_params own = params != NULL ? *params : landau_lifshitz_default_params;
     if (x == NULL && members > 0) return landau_lifshitz_BAD_ARGUMENT;
     for (size_t m = 0; m < members; ++m) {
         landau_lifshitz_solver s;
         double x0[landau_lifshitz_DIM];
         for (size_t i = 0; i < landau_lifshitz_DIM; ++i) x0[i] = x[i * members + m];
-        landau_lifshitz_status member = landau_lifshitz_init(&s, &own, x0);
+        landau_lifshitz_status member = landau_lifshitz_init(&s, params, x0);
         if (member == landau_lifshitz_OK) {
             member = landau_lifshitz_integrate(&s, h, steps);
             for (size_t i = 0; i < landau_lifshitz_DIM; ++i) x[i * members + m] = s.x[i];

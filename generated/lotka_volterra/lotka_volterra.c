@@ -27,7 +27,7 @@
  *   11. Members of an ensemble
  *   12. Groups of members
  *   13. Ensembles
- * body-sha256: 91dbc8b2c76c39ad92cec41d1c0c51c42265e6867a7ad28b4fdf5867389d043e
+ * body-sha256: a74b51b66943fef72c15e0e03421c6f47a54cf15b3b9045bad22afb95cd697bd
  */
 #include "lotka_volterra.h"
 
@@ -144,9 +144,8 @@ void lotka_volterra_vector_field(const lotka_volterra_params *params, const doub
 /* ---- Compensated sums, linear equations ---- */
 static int lotka_volterra_finite(const double *values, int count)
 {
-    for (int k = 0; k < count; ++k)
-        if (!isfinite(values[k])) return 0;
-    return 1;
+    while (count > 0 && isfinite(values[count - 1])) --count;
+    return count == 0;
 }
 
 /* x + change + small in compensated arithmetic, where small is the carry and what is as small: were that

@@ -21,7 +21,7 @@
  *   5. Between steps
  *   6. The solver
  *   7. Ensembles
- * body-sha256: 503f514534b9d17fd7abfb62ebc110d0bd09b250fc504d02d1a5e9bba3fbae43
+ * body-sha256: dab3b5d865a21c276998c915958adaf7e0ebf9a381284eaa835e1cdcd2ebd562
  */
 #include "maxwell_bloch.h"
 
@@ -114,9 +114,8 @@ void maxwell_bloch_vector_field(const maxwell_bloch_params *params, const double
 /* ---- Compensated sums, linear equations ---- */
 static int maxwell_bloch_finite(const double *values, int count)
 {
-    for (int k = 0; k < count; ++k)
-        if (!isfinite(values[k])) return 0;
-    return 1;
+    while (count > 0 && isfinite(values[count - 1])) --count;
+    return count == 0;
 }
 
 /* x + change + small in compensated arithmetic, where small is the carry and what is as small: were that
@@ -411,13 +410,12 @@ maxwell_bloch_status maxwell_bloch_ensemble(const maxwell_bloch_params *params, 
     double h, size_t steps, unsigned char *status)
 {
     maxwell_bloch_status worst = isfinite(h) ? maxwell_bloch_OK : maxwell_bloch_BAD_ARGUMENT;
-    const maxwell_bloch_params own = params != NULL ? *params : maxwell_bloch_default_params;
     if (x == NULL && members > 0) return maxwell_bloch_BAD_ARGUMENT;
     for (size_t m = 0; m < members; ++m) {
         maxwell_bloch_solver s;
         double x0[maxwell_bloch_DIM];
         for (size_t i = 0; i < maxwell_bloch_DIM; ++i) x0[i] = x[i * members + m];
-        maxwell_bloch_status member = maxwell_bloch_init(&s, &own, x0);
+        maxwell_bloch_status member = maxwell_bloch_init(&s, params, x0);
         if (member == maxwell_bloch_OK) {
             member = maxwell_bloch_integrate(&s, h, steps);
             for (size_t i = 0; i < maxwell_bloch_DIM; ++i) x[i * members + m] = s.x[i];

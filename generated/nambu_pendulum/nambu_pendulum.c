@@ -29,7 +29,7 @@
  *   13. Members of an ensemble
  *   14. Groups of members
  *   15. Ensembles
- * body-sha256: 7fdfd72f106f31c51c6d49e305f3304d6b66198783edaeef4be7692f95fb2d48
+ * body-sha256: 194b57db14022aa9c8a9f5d05ee3fe61ea55c9e75fae3cf72baf23d6bd6a66ec
  */
 #include "nambu_pendulum.h"
 
@@ -134,9 +134,8 @@ void nambu_pendulum_vector_field(const nambu_pendulum_params *params, const doub
 /* ---- Compensated sums, linear equations ---- */
 static int nambu_pendulum_finite(const double *values, int count)
 {
-    for (int k = 0; k < count; ++k)
-        if (!isfinite(values[k])) return 0;
-    return 1;
+    while (count > 0 && isfinite(values[count - 1])) --count;
+    return count == 0;
 }
 
 /* x + change + small in compensated arithmetic, where small is the carry and what is as small: were that

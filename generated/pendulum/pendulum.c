@@ -21,7 +21,7 @@
  *   5. Between steps
  *   6. The solver
  *   7. Ensembles
- * body-sha256: 27102583f8aa3d66ddb374b104f88a1216c02e506a9a7c0bda1f0aab18a18621
+ * body-sha256: 6e36a1388bde155bddb68926fbe2168ff72361ed8f8204ab204db72ca4f889d7
  */
 #include "pendulum.h"
 
@@ -123,9 +123,8 @@ void pendulum_vector_field(const pendulum_params *params, const double x[2], dou
 /* ---- Compensated sums, linear equations ---- */
 static int pendulum_finite(const double *values, int count)
 {
-    for (int k = 0; k < count; ++k)
-        if (!isfinite(values[k])) return 0;
-    return 1;
+    while (count > 0 && isfinite(values[count - 1])) --count;
+    return count == 0;
 }
 
 /* x + change + small in compensated arithmetic, where small is the carry and what is as small: were that
@@ -340,8 +339,6 @@ pendulum_status pendulum_kick(pendulum_solver *s, const double change[pendulum_D
 }
 
 /* ---- The solver ---- */
-#define pendulum_SHORT_STEP 1e-100 /* so short that it has no part in whether coefficients are finite */
-
 /* The arguments may be parts of *s, which is therefore written last. */
 pendulum_status pendulum_init(pendulum_solver *s, const pendulum_params *params,
     const double x0[pendulum_DIM])
@@ -352,7 +349,7 @@ pendulum_status pendulum_init(pendulum_solver *s, const pendulum_params *params,
     memcpy(fresh.x, x0, sizeof fresh.x);
     if (!pendulum_finite(fresh.x, pendulum_DIM) || !pendulum_allowed(&fresh.params))
         return pendulum_BAD_ARGUMENT;
-    pendulum_prepare(&fresh.params, pendulum_SHORT_STEP, fresh.coef);
+    pendulum_prepare(&fresh.params, 1e-100, fresh.coef); /* so short a step does not matter */
     if (!pendulum_finite(fresh.coef, pendulum_COEFFICIENTS)) return pendulum_BAD_ARGUMENT;
     *s = fresh;
     return pendulum_OK;
@@ -414,13 +411,12 @@ pendulum_status pendulum_ensemble(const pendulum_params *params, double *x, size
     size_t steps, unsigned char *status)
 {
     pendulum_status worst = isfinite(h) ? pendulum_OK : pendulum_BAD_ARGUMENT;
-    const pendulum_params own = params != NULL ? *params : pendulum_default_params;
     if (x == NULL && members > 0) return pendulum_BAD_ARGUMENT;
     for (size_t m = 0; m < members; ++m) {
         pendulum_solver s;
         double x0[pendulum_DIM];
         for (size_t i = 0; i < pendulum_DIM; ++i) x0[i] = x[i * members + m];
-        pendulum_status member = pendulum_init(&s, &own, x0);
+        pendulum_status member = pendulum_init(&s, params, x0);
         if (member == pendulum_OK) {
             member = pendulum_integrate(&s, h, steps);
             for (size_t i = 0; i < pendulum_DIM; ++i) x[i * members + m] = s.x[i];

@@ -20,7 +20,7 @@
  *   4. Between steps
  *   5. The solver
  *   6. Ensembles
- * body-sha256: 533513d0dfd87178a8f3e9b3a5d6d6edf0c45276c8c01f3e3b002da3ce369ad8
+ * body-sha256: 408b90f63cc7df8a7faf0428ea13ddf90be536392c9c44007eacd5091a6627e8
  */
 #include "pendulum_euler.h"
 
@@ -75,9 +75,8 @@ void pendulum_euler_vector_field(const pendulum_euler_params *params, const doub
 /* ---- Compensated sums ---- */
 static int pendulum_euler_finite(const double *values, int count)
 {
-    for (int k = 0; k < count; ++k)
-        if (!isfinite(values[k])) return 0;
-    return 1;
+    while (count > 0 && isfinite(values[count - 1])) --count;
+    return count == 0;
 }
 
 /* x + change + small in compensated arithmetic, where small is the carry and what is as small: were that
@@ -127,8 +126,6 @@ pendulum_euler_status pendulum_euler_kick(pendulum_euler_solver *s, const double
 }
 
 /* ---- The solver ---- */
-#define pendulum_euler_SHORT_STEP 1e-100 /* so short that it has no part in whether coefficients are finite */
-
 /* The arguments may be parts of *s, which is therefore written last. */
 pendulum_euler_status pendulum_euler_init(pendulum_euler_solver *s, const pendulum_euler_params *params,
     const double x0[pendulum_euler_DIM])
@@ -139,7 +136,7 @@ pendulum_euler_status pendulum_euler_init(pendulum_euler_solver *s, const pendul
     memcpy(fresh.x, x0, sizeof fresh.x);
     if (!pendulum_euler_finite(fresh.x, pendulum_euler_DIM) || !pendulum_euler_allowed(&fresh.params))
         return pendulum_euler_BAD_ARGUMENT;
-    pendulum_euler_prepare(&fresh.params, pendulum_euler_SHORT_STEP, fresh.coef);
+    pendulum_euler_prepare(&fresh.params, 1e-100, fresh.coef); /* so short a step does not matter */
     if (!pendulum_euler_finite(fresh.coef, pendulum_euler_COEFFICIENTS)) return pendulum_euler_BAD_ARGUMENT;
     *s = fresh;
     return pendulum_euler_OK;
@@ -194,13 +191,12 @@ pendulum_euler_status pendulum_euler_ensemble(const pendulum_euler_params *param
     double h, size_t steps, unsigned char *status)
 {
     pendulum_euler_status worst = isfinite(h) ? pendulum_euler_OK : pendulum_euler_BAD_ARGUMENT;
-    const pendulum_euler_params own = params != NULL ? *params : pendulum_euler_default_params;
     if (x == NULL && members > 0) return pendulum_euler_BAD_ARGUMENT;
     for (size_t m = 0; m < members; ++m) {
         pendulum_euler_solver s;
         double x0[pendulum_euler_DIM];
         for (size_t i = 0; i < pendulum_euler_DIM; ++i) x0[i] = x[i * members + m];
-        pendulum_euler_status member = pendulum_euler_init(&s, &own, x0);
+        pendulum_euler_status member = pendulum_euler_init(&s, params, x0);
         if (member == pendulum_euler_OK) {
             member = pendulum_euler_integrate(&s, h, steps);
             for (size_t i = 0; i < pendulum_euler_DIM; ++i) x[i * members + m] = s.x[i];

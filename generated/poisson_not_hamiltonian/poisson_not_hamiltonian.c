@@ -21,7 +21,7 @@
  *   5. Between steps
  *   6. The solver
  *   7. Ensembles
- * body-sha256: 799417304f69a7ab6fe3bf525dffc023deb5ab9b31792fdb97d825efd259f63a
+ * body-sha256: a65b04b14165fd935154390e131383c8f5f85b9e196f353e9e77dac3ba90eeaa
  */
 #include "poisson_not_hamiltonian.h"
 
@@ -170,9 +170,8 @@ void poisson_not_hamiltonian_vector_field(const poisson_not_hamiltonian_params *
 /* ---- Compensated sums, linear equations ---- */
 static int poisson_not_hamiltonian_finite(const double *values, int count)
 {
-    for (int k = 0; k < count; ++k)
-        if (!isfinite(values[k])) return 0;
-    return 1;
+    while (count > 0 && isfinite(values[count - 1])) --count;
+    return count == 0;
 }
 
 /* x + change + small in compensated arithmetic, where small is the carry and what is as small: were that
@@ -487,14 +486,12 @@ poisson_not_hamiltonian_status poisson_not_hamiltonian_ensemble(const poisson_no
 {
     poisson_not_hamiltonian_status worst = isfinite(h) ? poisson_not_hamiltonian_OK
         : poisson_not_hamiltonian_BAD_ARGUMENT;
-    const poisson_not_hamiltonian_params own = params != NULL ? *params
-        : poisson_not_hamiltonian_default_params;
     if (x == NULL && members > 0) return poisson_not_hamiltonian_BAD_ARGUMENT;
     for (size_t m = 0; m < members; ++m) {
         poisson_not_hamiltonian_solver s;
         double x0[poisson_not_hamiltonian_DIM];
         for (size_t i = 0; i < poisson_not_hamiltonian_DIM; ++i) x0[i] = x[i * members + m];
-        poisson_not_hamiltonian_status member = poisson_not_hamiltonian_init(&s, &own, x0);
+        poisson_not_hamiltonian_status member = poisson_not_hamiltonian_init(&s, params, x0);
         if (member == poisson_not_hamiltonian_OK) {
             member = poisson_not_hamiltonian_integrate(&s, h, steps);
             for (size_t i = 0; i < poisson_not_hamiltonian_DIM; ++i) x[i * members + m] = s.x[i];

@@ -21,7 +21,7 @@
  *   5. Between steps
  *   6. The solver
  *   7. Ensembles
- * body-sha256: 8afec942040e77abbe849e106694f2efa77a85f9730e464f4eab5803bc7ab13b
+ * body-sha256: 44d28eec788b4934806fcca4b4613a7d5d3ddeb7d1250a4cfb89caa0a3293f22
  */
 #include "predator_prey.h"
 
@@ -125,9 +125,8 @@ void predator_prey_vector_field(const predator_prey_params *params, const double
 /* ---- Compensated sums, linear equations ---- */
 static int predator_prey_finite(const double *values, int count)
 {
-    for (int k = 0; k < count; ++k)
-        if (!isfinite(values[k])) return 0;
-    return 1;
+    while (count > 0 && isfinite(values[count - 1])) --count;
+    return count == 0;
 }
 
 /* x + change + small in compensated arithmetic, where small is the carry and what is as small: were that
@@ -348,8 +347,6 @@ predator_prey_status predator_prey_kick(predator_prey_solver *s, const double ch
 }
 
 /* ---- The solver ---- */
-#define predator_prey_SHORT_STEP 1e-100 /* so short that it has no part in whether coefficients are finite */
-
 /* The arguments may be parts of *s, which is therefore written last. */
 predator_prey_status predator_prey_init(predator_prey_solver *s, const predator_prey_params *params,
     const double x0[predator_prey_DIM])
@@ -360,7 +357,7 @@ predator_prey_status predator_prey_init(predator_prey_solver *s, const predator_
     memcpy(fresh.x, x0, sizeof fresh.x);
     if (!predator_prey_finite(fresh.x, predator_prey_DIM) || !predator_prey_allowed(&fresh.params))
         return predator_prey_BAD_ARGUMENT;
-    predator_prey_prepare(&fresh.params, predator_prey_SHORT_STEP, fresh.coef);
+    predator_prey_prepare(&fresh.params, 1e-100, fresh.coef); /* so short a step does not matter */
     if (!predator_prey_finite(fresh.coef, predator_prey_COEFFICIENTS)) return predator_prey_BAD_ARGUMENT;
     *s = fresh;
     return predator_prey_OK;
@@ -425,13 +422,12 @@ predator_prey_status predator_prey_ensemble(const predator_prey_params *params, 
     double h, size_t steps, unsigned char *status)
 {
     predator_prey_status worst = isfinite(h) ? predator_prey_OK : predator_prey_BAD_ARGUMENT;
-    const predator_prey_params own = params != NULL ? *params : predator_prey_default_params;
     if (x == NULL && members > 0) return predator_prey_BAD_ARGUMENT;
     for (size_t m = 0; m < members; ++m) {
         predator_prey_solver s;
         double x0[predator_prey_DIM];
         for (size_t i = 0; i < predator_prey_DIM; ++i) x0[i] = x[i * members + m];
-        predator_prey_status member = predator_prey_init(&s, &own, x0);
+        predator_prey_status member = predator_prey_init(&s, params, x0);
         if (member == predator_prey_OK) {
             member = predator_prey_integrate(&s, h, steps);
             for (size_t i = 0; i < predator_prey_DIM; ++i) x[i * members + m] = s.x[i];

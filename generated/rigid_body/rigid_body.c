@@ -29,7 +29,7 @@
  *   12. Members of an ensemble
  *   13. Groups of members
  *   14. Ensembles
- * body-sha256: 6a65963519723232a9d91c471a6c85ffcc0d8cb9100cff412ad671d796f3d579
+ * body-sha256: c4dfd33f75228de18119599920464d70778220fef0c5ddda2ffc044ff4c3e3da
  */
 #include "rigid_body.h"
 
@@ -364,9 +364,8 @@ void rigid_body_vector_field(const rigid_body_params *params, const double x[3],
 /* ---- Compensated sums, linear equations ---- */
 static int rigid_body_finite(const double *values, int count)
 {
-    for (int k = 0; k < count; ++k)
-        if (!isfinite(values[k])) return 0;
-    return 1;
+    while (count > 0 && isfinite(values[count - 1])) --count;
+    return count == 0;
 }
 
 /* x + change + small in compensated arithmetic, where small is the carry and what is as small: were that
@@ -920,8 +919,6 @@ typedef double rigid_body_lanes[rigid_body_LANES];
 #endif
 
 /* ---- The solver ---- */
-#define rigid_body_SHORT_STEP 1e-100 /* so short that it has no part in whether coefficients are finite */
-
 /* The arguments may be parts of *s, which is therefore written last. */
 rigid_body_status rigid_body_init_gauge(rigid_body_solver *s, const rigid_body_params *params,
     const double x0[rigid_body_DIM], const double gauge[rigid_body_GAUGES])
@@ -932,7 +929,7 @@ rigid_body_status rigid_body_init_gauge(rigid_body_solver *s, const rigid_body_p
     memcpy(fresh.x, x0, sizeof fresh.x);
     if (!rigid_body_finite(fresh.x, rigid_body_DIM) || !rigid_body_allowed(&fresh.params))
         return rigid_body_BAD_ARGUMENT;
-    rigid_body_prepare(&fresh.params, fresh.gauge, rigid_body_SHORT_STEP, fresh.coef);
+    rigid_body_prepare(&fresh.params, fresh.gauge, 1e-100, fresh.coef); /* so short a step does not matter */
     if (!rigid_body_finite(fresh.coef, rigid_body_COEFFICIENTS)) return rigid_body_BAD_ARGUMENT;
     if (gauge == NULL) rigid_body_choose_gauge(&fresh.params, fresh.x, fresh.gauge);
     else memcpy(fresh.gauge, gauge, sizeof fresh.gauge);

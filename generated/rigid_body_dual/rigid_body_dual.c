@@ -23,7 +23,7 @@
  *   6. Between steps
  *   7. The solver
  *   8. Ensembles
- * body-sha256: 2b8a6f9199464bfe37b61efa37d3606464af9b6d0caa00be9e557f177cefdc29
+ * body-sha256: 98fab96545df9c856b5fb83fc23b0f388a92459429a82e0d9885eb3a16e7c2ff
  */
 #include "rigid_body_dual.h"
 
@@ -223,9 +223,8 @@ void rigid_body_dual_vector_field(const rigid_body_dual_params *params, const do
 /* ---- Compensated sums, linear equations ---- */
 static int rigid_body_dual_finite(const double *values, int count)
 {
-    for (int k = 0; k < count; ++k)
-        if (!isfinite(values[k])) return 0;
-    return 1;
+    while (count > 0 && isfinite(values[count - 1])) --count;
+    return count == 0;
 }
 
 /* x + change + small in compensated arithmetic, where small is the carry and what is as small: were that
@@ -469,9 +468,6 @@ rigid_body_dual_status rigid_body_dual_kick(rigid_body_dual_solver *s,
 }
 
 /* ---- The solver ---- */
-/* so short that it has no part in whether coefficients are finite */
-#define rigid_body_dual_SHORT_STEP 1e-100
-
 /* The arguments may be parts of *s, which is therefore written last. */
 rigid_body_dual_status rigid_body_dual_init_gauge(rigid_body_dual_solver *s,
     const rigid_body_dual_params *params, const double x0[rigid_body_dual_DIM],
@@ -483,7 +479,8 @@ rigid_body_dual_status rigid_body_dual_init_gauge(rigid_body_dual_solver *s,
     memcpy(fresh.x, x0, sizeof fresh.x);
     if (!rigid_body_dual_finite(fresh.x, rigid_body_dual_DIM) || !rigid_body_dual_allowed(&fresh.params))
         return rigid_body_dual_BAD_ARGUMENT;
-    rigid_body_dual_prepare(&fresh.params, fresh.gauge, rigid_body_dual_SHORT_STEP, fresh.coef);
+    /* so short a step does not matter */
+    rigid_body_dual_prepare(&fresh.params, fresh.gauge, 1e-100, fresh.coef);
     if (!rigid_body_dual_finite(fresh.coef, rigid_body_dual_COEFFICIENTS))
         return rigid_body_dual_BAD_ARGUMENT;
     if (gauge == NULL) rigid_body_dual_choose_gauge(&fresh.params, fresh.x, fresh.gauge);
@@ -558,13 +555,12 @@ rigid_body_dual_status rigid_body_dual_ensemble(const rigid_body_dual_params *pa
     size_t members, double h, size_t steps, unsigned char *status)
 {
     rigid_body_dual_status worst = isfinite(h) ? rigid_body_dual_OK : rigid_body_dual_BAD_ARGUMENT;
-    const rigid_body_dual_params own = params != NULL ? *params : rigid_body_dual_default_params;
     if (x == NULL && members > 0) return rigid_body_dual_BAD_ARGUMENT;
     for (size_t m = 0; m < members; ++m) {
         rigid_body_dual_solver s;
         double x0[rigid_body_dual_DIM];
         for (size_t i = 0; i < rigid_body_dual_DIM; ++i) x0[i] = x[i * members + m];
-        rigid_body_dual_status member = rigid_body_dual_init(&s, &own, x0);
+        rigid_body_dual_status member = rigid_body_dual_init(&s, params, x0);
         if (member == rigid_body_dual_OK) {
             member = rigid_body_dual_integrate(&s, h, steps);
             for (size_t i = 0; i < rigid_body_dual_DIM; ++i) x[i * members + m] = s.x[i];

@@ -21,7 +21,7 @@
  *   5. Between steps
  *   6. The solver
  *   7. Ensembles
- * body-sha256: c7cc94e7056d76f0b50bc3c3de490bfff0a2f3bc9cd5d164c222adbd283124a0
+ * body-sha256: 30ceb753558d0e2e38535e7e0243b174a6c8498044d3071cd5bd96b4823c1cb0
  */
 #include "rigid_body_paper.h"
 
@@ -177,9 +177,8 @@ void rigid_body_paper_vector_field(const rigid_body_paper_params *params, const 
 /* ---- Compensated sums, linear equations ---- */
 static int rigid_body_paper_finite(const double *values, int count)
 {
-    for (int k = 0; k < count; ++k)
-        if (!isfinite(values[k])) return 0;
-    return 1;
+    while (count > 0 && isfinite(values[count - 1])) --count;
+    return count == 0;
 }
 
 /* x + change + small in compensated arithmetic, where small is the carry and what is as small: were that
@@ -411,9 +410,6 @@ rigid_body_paper_status rigid_body_paper_kick(rigid_body_paper_solver *s,
 }
 
 /* ---- The solver ---- */
-/* so short that it has no part in whether coefficients are finite */
-#define rigid_body_paper_SHORT_STEP 1e-100
-
 /* The arguments may be parts of *s, which is therefore written last. */
 rigid_body_paper_status rigid_body_paper_init(rigid_body_paper_solver *s,
     const rigid_body_paper_params *params, const double x0[rigid_body_paper_DIM])
@@ -424,7 +420,7 @@ rigid_body_paper_status rigid_body_paper_init(rigid_body_paper_solver *s,
     memcpy(fresh.x, x0, sizeof fresh.x);
     if (!rigid_body_paper_finite(fresh.x, rigid_body_paper_DIM) || !rigid_body_paper_allowed(&fresh.params))
         return rigid_body_paper_BAD_ARGUMENT;
-    rigid_body_paper_prepare(&fresh.params, rigid_body_paper_SHORT_STEP, fresh.coef);
+    rigid_body_paper_prepare(&fresh.params, 1e-100, fresh.coef); /* so short a step does not matter */
     if (!rigid_body_paper_finite(fresh.coef, rigid_body_paper_COEFFICIENTS))
         return rigid_body_paper_BAD_ARGUMENT;
     *s = fresh;
@@ -490,13 +486,12 @@ rigid_body_paper_status rigid_body_paper_ensemble(const rigid_body_paper_params 
     size_t members, double h, size_t steps, unsigned char *status)
 {
     rigid_body_paper_status worst = isfinite(h) ? rigid_body_paper_OK : rigid_body_paper_BAD_ARGUMENT;
-    const rigid_body_paper_params own = params != NULL ? *params : rigid_body_paper_default_params;
     if (x == NULL && members > 0) return rigid_body_paper_BAD_ARGUMENT;
     for (size_t m = 0; m < members; ++m) {
         rigid_body_paper_solver s;
         double x0[rigid_body_paper_DIM];
         for (size_t i = 0; i < rigid_body_paper_DIM; ++i) x0[i] = x[i * members + m];
-        rigid_body_paper_status member = rigid_body_paper_init(&s, &own, x0);
+        rigid_body_paper_status member = rigid_body_paper_init(&s, params, x0);
         if (member == rigid_body_paper_OK) {
             member = rigid_body_paper_integrate(&s, h, steps);
             for (size_t i = 0; i < rigid_body_paper_DIM; ++i) x[i * members + m] = s.x[i];

@@ -23,7 +23,7 @@
  *   6. Between steps
  *   7. The solver
  *   8. Ensembles
- * body-sha256: c0075554814bed3c69aa9af52b1dba646cb04dab8382c78ac90d87ba3c722109
+ * body-sha256: 73a7bc48af13c664e881608c194f219ffe2f9ed7bddf2daffb345be2b9d79f74
  */
 #include "satellite.h"
 
@@ -932,9 +932,8 @@ void satellite_vector_field(const satellite_params *params, const double x[9], d
 /* ---- Compensated sums, linear equations ---- */
 static int satellite_finite(const double *values, int count)
 {
-    for (int k = 0; k < count; ++k)
-        if (!isfinite(values[k])) return 0;
-    return 1;
+    while (count > 0 && isfinite(values[count - 1])) --count;
+    return count == 0;
 }
 
 /* x + change + small in compensated arithmetic, where small is the carry and what is as small: were that
@@ -1250,8 +1249,6 @@ satellite_status satellite_kick(satellite_solver *s, const double change[satelli
 }
 
 /* ---- The solver ---- */
-#define satellite_SHORT_STEP 1e-100 /* so short that it has no part in whether coefficients are finite */
-
 /* The arguments may be parts of *s, which is therefore written last. */
 satellite_status satellite_init(satellite_solver *s, const satellite_params *params,
     const double x0[satellite_DIM])
@@ -1262,7 +1259,7 @@ satellite_status satellite_init(satellite_solver *s, const satellite_params *par
     memcpy(fresh.x, x0, sizeof fresh.x);
     if (!satellite_finite(fresh.x, satellite_DIM) || !satellite_allowed(&fresh.params))
         return satellite_BAD_ARGUMENT;
-    satellite_prepare(&fresh.params, satellite_SHORT_STEP, fresh.coef[0]);
+    satellite_prepare(&fresh.params, 1e-100, fresh.coef[0]); /* so short a step does not matter */
     if (!satellite_finite(fresh.coef[0], satellite_COEFFICIENTS)) return satellite_BAD_ARGUMENT;
     double identity[satellite_ELEMENT] = { 1.0 };
     satellite_begin_attitude(&fresh, identity);
@@ -1349,13 +1346,12 @@ satellite_status satellite_ensemble(const satellite_params *params, double *x, s
     size_t steps, unsigned char *status)
 {
     satellite_status worst = isfinite(h) ? satellite_OK : satellite_BAD_ARGUMENT;
-    const satellite_params own = params != NULL ? *params : satellite_default_params;
     if (x == NULL && members > 0) return satellite_BAD_ARGUMENT;
     for (size_t m = 0; m < members; ++m) {
         satellite_solver s;
         double x0[satellite_DIM];
         for (size_t i = 0; i < satellite_DIM; ++i) x0[i] = x[i * members + m];
-        satellite_status member = satellite_init(&s, &own, x0);
+        satellite_status member = satellite_init(&s, params, x0);
         if (member == satellite_OK) {
             member = satellite_integrate(&s, h, steps);
             for (size_t i = 0; i < satellite_DIM; ++i) x[i * members + m] = s.x[i];

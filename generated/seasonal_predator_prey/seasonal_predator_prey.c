@@ -21,7 +21,7 @@
  *   5. Between steps
  *   6. The solver
  *   7. Ensembles
- * body-sha256: c8ae3319839072ed61f6b744b74a0c13efd49f7f0467dcaaee70f0831749a22f
+ * body-sha256: e6cc88e64d4a6c4ea5c3fa7904a0e59637a40cdb8e60b211b56566ea4b2f30da
  */
 #include "seasonal_predator_prey.h"
 
@@ -153,9 +153,8 @@ void seasonal_predator_prey_vector_field(const seasonal_predator_prey_params *pa
 /* ---- Compensated sums, linear equations ---- */
 static int seasonal_predator_prey_finite(const double *values, int count)
 {
-    for (int k = 0; k < count; ++k)
-        if (!isfinite(values[k])) return 0;
-    return 1;
+    while (count > 0 && isfinite(values[count - 1])) --count;
+    return count == 0;
 }
 
 /* x + change + small in compensated arithmetic, where small is the carry and what is as small: were that
@@ -389,9 +388,6 @@ seasonal_predator_prey_status seasonal_predator_prey_kick(seasonal_predator_prey
 }
 
 /* ---- The solver ---- */
-/* so short that it has no part in whether coefficients are finite */
-#define seasonal_predator_prey_SHORT_STEP 1e-100
-
 /* The arguments may be parts of *s, which is therefore written last. */
 seasonal_predator_prey_status seasonal_predator_prey_init_at(seasonal_predator_prey_solver *s,
     const seasonal_predator_prey_params *params, const double x0[seasonal_predator_prey_DIM], double t0)
@@ -403,7 +399,7 @@ seasonal_predator_prey_status seasonal_predator_prey_init_at(seasonal_predator_p
     fresh.t = t0;
     if (!seasonal_predator_prey_finite(fresh.x, seasonal_predator_prey_DIM)
         || !seasonal_predator_prey_allowed(&fresh.params)) return seasonal_predator_prey_BAD_ARGUMENT;
-    seasonal_predator_prey_prepare(&fresh.params, seasonal_predator_prey_SHORT_STEP, fresh.coef);
+    seasonal_predator_prey_prepare(&fresh.params, 1e-100, fresh.coef); /* so short a step does not matter */
     if (!seasonal_predator_prey_finite(fresh.coef, seasonal_predator_prey_COEFFICIENTS))
         return seasonal_predator_prey_BAD_ARGUMENT;
     *s = fresh;
@@ -487,14 +483,12 @@ seasonal_predator_prey_status seasonal_predator_prey_ensemble_at(const seasonal_
 {
     seasonal_predator_prey_status worst = isfinite(h) ? seasonal_predator_prey_OK
         : seasonal_predator_prey_BAD_ARGUMENT;
-    const seasonal_predator_prey_params own = params != NULL ? *params
-        : seasonal_predator_prey_default_params;
     if (x == NULL && members > 0) return seasonal_predator_prey_BAD_ARGUMENT;
     for (size_t m = 0; m < members; ++m) {
         seasonal_predator_prey_solver s;
         double x0[seasonal_predator_prey_DIM];
         for (size_t i = 0; i < seasonal_predator_prey_DIM; ++i) x0[i] = x[i * members + m];
-        seasonal_predator_prey_status member = seasonal_predator_prey_init_at(&s, &own, x0, t0);
+        seasonal_predator_prey_status member = seasonal_predator_prey_init_at(&s, params, x0, t0);
         if (member == seasonal_predator_prey_OK) {
             member = seasonal_predator_prey_integrate(&s, h, steps);
             for (size_t i = 0; i < seasonal_predator_prey_DIM; ++i) x[i * members + m] = s.x[i];

@@ -21,7 +21,7 @@
  *   5. Between steps
  *   6. The solver
  *   7. Ensembles
- * body-sha256: c5b68fedc568a189e176faf35c84f23e2bfbfbd61c130dcf22e5218486f2dbf4
+ * body-sha256: 0bd65948f56f01f83764cacdccb6681e111c534439e5770617cd0368e9ed2686
  */
 #include "sir_epidemic.h"
 
@@ -104,9 +104,8 @@ void sir_epidemic_vector_field(const sir_epidemic_params *params, const double x
 /* ---- Compensated sums, linear equations ---- */
 static int sir_epidemic_finite(const double *values, int count)
 {
-    for (int k = 0; k < count; ++k)
-        if (!isfinite(values[k])) return 0;
-    return 1;
+    while (count > 0 && isfinite(values[count - 1])) --count;
+    return count == 0;
 }
 
 /* x + change + small in compensated arithmetic, where small is the carry and what is as small: were that
@@ -492,8 +491,6 @@ sir_epidemic_status sir_epidemic_kick(sir_epidemic_solver *s, const double chang
 }
 
 /* ---- The solver ---- */
-#define sir_epidemic_SHORT_STEP 1e-100 /* so short that it has no part in whether coefficients are finite */
-
 /* The arguments may be parts of *s, which is therefore written last. */
 sir_epidemic_status sir_epidemic_init(sir_epidemic_solver *s, const sir_epidemic_params *params,
     const double x0[sir_epidemic_DIM])
@@ -504,7 +501,7 @@ sir_epidemic_status sir_epidemic_init(sir_epidemic_solver *s, const sir_epidemic
     memcpy(fresh.x, x0, sizeof fresh.x);
     if (!sir_epidemic_finite(fresh.x, sir_epidemic_DIM) || !sir_epidemic_allowed(&fresh.params))
         return sir_epidemic_BAD_ARGUMENT;
-    sir_epidemic_prepare(&fresh.params, sir_epidemic_SHORT_STEP, fresh.coef);
+    sir_epidemic_prepare(&fresh.params, 1e-100, fresh.coef); /* so short a step does not matter */
     if (!sir_epidemic_finite(fresh.coef, sir_epidemic_COEFFICIENTS)) return sir_epidemic_BAD_ARGUMENT;
     *s = fresh;
     return sir_epidemic_OK;
@@ -569,13 +566,12 @@ sir_epidemic_status sir_epidemic_ensemble(const sir_epidemic_params *params, dou
     double h, size_t steps, unsigned char *status)
 {
     sir_epidemic_status worst = isfinite(h) ? sir_epidemic_OK : sir_epidemic_BAD_ARGUMENT;
-    const sir_epidemic_params own = params != NULL ? *params : sir_epidemic_default_params;
     if (x == NULL && members > 0) return sir_epidemic_BAD_ARGUMENT;
     for (size_t m = 0; m < members; ++m) {
         sir_epidemic_solver s;
         double x0[sir_epidemic_DIM];
         for (size_t i = 0; i < sir_epidemic_DIM; ++i) x0[i] = x[i * members + m];
-        sir_epidemic_status member = sir_epidemic_init(&s, &own, x0);
+        sir_epidemic_status member = sir_epidemic_init(&s, params, x0);
         if (member == sir_epidemic_OK) {
             member = sir_epidemic_integrate(&s, h, steps);
             for (size_t i = 0; i < sir_epidemic_DIM; ++i) x[i * members + m] = s.x[i];

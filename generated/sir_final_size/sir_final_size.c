@@ -20,7 +20,7 @@
  *   5. Between steps
  *   6. The solver
  *   7. Ensembles
- * body-sha256: 09e053bcb630940f6f2eabeddd4ea4b7567c183d16da1122b6addcfa56dc8d91
+ * body-sha256: 6879707149f65c7d5ffaeea86c4eb76a5b986c5b9c903990ba81760166982681
  */
 #include "sir_final_size.h"
 
@@ -99,9 +99,8 @@ void sir_final_size_vector_field(const sir_final_size_params *params, const doub
 /* ---- Compensated sums, linear equations ---- */
 static int sir_final_size_finite(const double *values, int count)
 {
-    for (int k = 0; k < count; ++k)
-        if (!isfinite(values[k])) return 0;
-    return 1;
+    while (count > 0 && isfinite(values[count - 1])) --count;
+    return count == 0;
 }
 
 /* x + change + small in compensated arithmetic, where small is the carry and what is as small: were that
@@ -506,8 +505,6 @@ sir_final_size_status sir_final_size_kick(sir_final_size_solver *s, const double
 }
 
 /* ---- The solver ---- */
-#define sir_final_size_SHORT_STEP 1e-100 /* so short that it has no part in whether coefficients are finite */
-
 /* The arguments may be parts of *s, which is therefore written last. */
 sir_final_size_status sir_final_size_init(sir_final_size_solver *s, const sir_final_size_params *params,
     const double x0[sir_final_size_DIM])
@@ -518,7 +515,7 @@ sir_final_size_status sir_final_size_init(sir_final_size_solver *s, const sir_fi
     memcpy(fresh.x, x0, sizeof fresh.x);
     if (!sir_final_size_finite(fresh.x, sir_final_size_DIM) || !sir_final_size_allowed(&fresh.params))
         return sir_final_size_BAD_ARGUMENT;
-    sir_final_size_prepare(&fresh.params, sir_final_size_SHORT_STEP, fresh.coef);
+    sir_final_size_prepare(&fresh.params, 1e-100, fresh.coef); /* so short a step does not matter */
     if (!sir_final_size_finite(fresh.coef, sir_final_size_COEFFICIENTS)) return sir_final_size_BAD_ARGUMENT;
     *s = fresh;
     return sir_final_size_OK;
@@ -583,13 +580,12 @@ sir_final_size_status sir_final_size_ensemble(const sir_final_size_params *param
     double h, size_t steps, unsigned char *status)
 {
     sir_final_size_status worst = isfinite(h) ? sir_final_size_OK : sir_final_size_BAD_ARGUMENT;
-    const sir_final_size_params own = params != NULL ? *params : sir_final_size_default_params;
     if (x == NULL && members > 0) return sir_final_size_BAD_ARGUMENT;
     for (size_t m = 0; m < members; ++m) {
         sir_final_size_solver s;
         double x0[sir_final_size_DIM];
         for (size_t i = 0; i < sir_final_size_DIM; ++i) x0[i] = x[i * members + m];
-        sir_final_size_status member = sir_final_size_init(&s, &own, x0);
+        sir_final_size_status member = sir_final_size_init(&s, params, x0);
         if (member == sir_final_size_OK) {
             member = sir_final_size_integrate(&s, h, steps);
             for (size_t i = 0; i < sir_final_size_DIM; ++i) x[i * members + m] = s.x[i];

@@ -23,7 +23,7 @@
  *   6. Between steps
  *   7. The solver
  *   8. Ensembles
- * body-sha256: 9984ef7c3eaded44abb05b056aa95bc35008677344a9339836632d3228bd7a05
+ * body-sha256: 9d483b13d796bc992a803785ac1c7d833508ce8fd519f430331348b4489afaf7
  */
 #include "sklyanin_gyrostat.h"
 
@@ -177,9 +177,8 @@ void sklyanin_gyrostat_vector_field(const sklyanin_gyrostat_params *params, cons
 /* ---- Compensated sums, linear equations ---- */
 static int sklyanin_gyrostat_finite(const double *values, int count)
 {
-    for (int k = 0; k < count; ++k)
-        if (!isfinite(values[k])) return 0;
-    return 1;
+    while (count > 0 && isfinite(values[count - 1])) --count;
+    return count == 0;
 }
 
 /* x + change + small in compensated arithmetic, where small is the carry and what is as small: were that
@@ -771,13 +770,12 @@ sklyanin_gyrostat_status sklyanin_gyrostat_ensemble(const sklyanin_gyrostat_para
     size_t members, double h, size_t steps, unsigned char *status)
 {
     sklyanin_gyrostat_status worst = isfinite(h) ? sklyanin_gyrostat_OK : sklyanin_gyrostat_BAD_ARGUMENT;
-    const sklyanin_gyrostat_params own = params != NULL ? *params : sklyanin_gyrostat_default_params;
     if (x == NULL && members > 0) return sklyanin_gyrostat_BAD_ARGUMENT;
     for (size_t m = 0; m < members; ++m) {
         sklyanin_gyrostat_solver s;
         double x0[sklyanin_gyrostat_DIM];
         for (size_t i = 0; i < sklyanin_gyrostat_DIM; ++i) x0[i] = x[i * members + m];
-        sklyanin_gyrostat_status member = sklyanin_gyrostat_init(&s, &own, x0);
+        sklyanin_gyrostat_status member = sklyanin_gyrostat_init(&s, params, x0);
         if (member == sklyanin_gyrostat_OK) {
             member = sklyanin_gyrostat_integrate(&s, h, steps);
             for (size_t i = 0; i < sklyanin_gyrostat_DIM; ++i) x[i * members + m] = s.x[i];

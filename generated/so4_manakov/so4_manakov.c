@@ -23,7 +23,7 @@
  *   6. Between steps
  *   7. The solver
  *   8. Ensembles
- * body-sha256: 50078fcfd692cde864cb5fc8a866477ffd6f52ad47dc67fa17ca61f3038d67d5
+ * body-sha256: a3e10ec18f62bde4e7e5a9556a9269df96c28084609476cc307a28e3c07720d7
  */
 #include "so4_manakov.h"
 
@@ -627,9 +627,8 @@ void so4_manakov_vector_field(const so4_manakov_params *params, const double x[6
 /* ---- Compensated sums, linear equations ---- */
 static int so4_manakov_finite(const double *values, int count)
 {
-    for (int k = 0; k < count; ++k)
-        if (!isfinite(values[k])) return 0;
-    return 1;
+    while (count > 0 && isfinite(values[count - 1])) --count;
+    return count == 0;
 }
 
 /* x + change + small in compensated arithmetic, where small is the carry and what is as small: were that
@@ -940,13 +939,12 @@ so4_manakov_status so4_manakov_ensemble(const so4_manakov_params *params, double
     size_t steps, unsigned char *status)
 {
     so4_manakov_status worst = isfinite(h) ? so4_manakov_OK : so4_manakov_BAD_ARGUMENT;
-    const so4_manakov_params own = params != NULL ? *params : so4_manakov_default_params;
     if (x == NULL && members > 0) return so4_manakov_BAD_ARGUMENT;
     for (size_t m = 0; m < members; ++m) {
         so4_manakov_solver s;
         double x0[so4_manakov_DIM];
         for (size_t i = 0; i < so4_manakov_DIM; ++i) x0[i] = x[i * members + m];
-        so4_manakov_status member = so4_manakov_init(&s, &own, x0);
+        so4_manakov_status member = so4_manakov_init(&s, params, x0);
         if (member == so4_manakov_OK) {
             member = so4_manakov_integrate(&s, h, steps);
             for (size_t i = 0; i < so4_manakov_DIM; ++i) x[i * members + m] = s.x[i];

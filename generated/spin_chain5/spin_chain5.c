@@ -23,7 +23,7 @@
  *   6. Between steps
  *   7. The solver
  *   8. Ensembles
- * body-sha256: a789b34d5a9bb46d69077cba7fb7a8a15f708e47c2edf6d861c7f7494c0a7d73
+ * body-sha256: efcb8fdde2bdd676118cb1acedc74b593bb2a7ada2e6ddbdd494797ce2ef4d79
  */
 #include "spin_chain5.h"
 
@@ -1538,9 +1538,8 @@ void spin_chain5_vector_field(const spin_chain5_params *params, const double x[1
 /* ---- Compensated sums, linear equations ---- */
 static int spin_chain5_finite(const double *values, int count)
 {
-    for (int k = 0; k < count; ++k)
-        if (!isfinite(values[k])) return 0;
-    return 1;
+    while (count > 0 && isfinite(values[count - 1])) --count;
+    return count == 0;
 }
 
 /* x + change + small in compensated arithmetic, where small is the carry and what is as small: were that
@@ -1770,8 +1769,6 @@ spin_chain5_status spin_chain5_kick(spin_chain5_solver *s, const double change[s
 }
 
 /* ---- The solver ---- */
-#define spin_chain5_SHORT_STEP 1e-100 /* so short that it has no part in whether coefficients are finite */
-
 /* The arguments may be parts of *s, which is therefore written last. */
 spin_chain5_status spin_chain5_init_gauge(spin_chain5_solver *s, const spin_chain5_params *params,
     const double x0[spin_chain5_DIM], const double gauge[spin_chain5_GAUGES])
@@ -1782,7 +1779,7 @@ spin_chain5_status spin_chain5_init_gauge(spin_chain5_solver *s, const spin_chai
     memcpy(fresh.x, x0, sizeof fresh.x);
     if (!spin_chain5_finite(fresh.x, spin_chain5_DIM) || !spin_chain5_allowed(&fresh.params))
         return spin_chain5_BAD_ARGUMENT;
-    spin_chain5_prepare(&fresh.params, fresh.gauge, spin_chain5_SHORT_STEP, fresh.coef);
+    spin_chain5_prepare(&fresh.params, fresh.gauge, 1e-100, fresh.coef); /* so short a step does not matter */
     if (!spin_chain5_finite(fresh.coef, spin_chain5_COEFFICIENTS)) return spin_chain5_BAD_ARGUMENT;
     if (gauge == NULL) spin_chain5_choose_gauge(&fresh.params, fresh.x, fresh.gauge);
     else memcpy(fresh.gauge, gauge, sizeof fresh.gauge);
@@ -1856,13 +1853,12 @@ spin_chain5_status spin_chain5_ensemble(const spin_chain5_params *params, double
     size_t steps, unsigned char *status)
 {
     spin_chain5_status worst = isfinite(h) ? spin_chain5_OK : spin_chain5_BAD_ARGUMENT;
-    const spin_chain5_params own = params != NULL ? *params : spin_chain5_default_params;
     if (x == NULL && members > 0) return spin_chain5_BAD_ARGUMENT;
     for (size_t m = 0; m < members; ++m) {
         spin_chain5_solver s;
         double x0[spin_chain5_DIM];
         for (size_t i = 0; i < spin_chain5_DIM; ++i) x0[i] = x[i * members + m];
-        spin_chain5_status member = spin_chain5_init(&s, &own, x0);
+        spin_chain5_status member = spin_chain5_init(&s, params, x0);
         if (member == spin_chain5_OK) {
             member = spin_chain5_integrate(&s, h, steps);
             for (size_t i = 0; i < spin_chain5_DIM; ++i) x[i * members + m] = s.x[i];

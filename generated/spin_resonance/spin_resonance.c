@@ -21,7 +21,7 @@
  *   5. Between steps
  *   6. The solver
  *   7. Ensembles
- * body-sha256: 4d5b3860ccbb600422d8c335783908ee7afb38a13e95820834c40732788dd2dc
+ * body-sha256: a2f8acbb8303d68868133b592af0027c0fbd863b286bf70ede41f03013116329
  */
 #include "spin_resonance.h"
 
@@ -213,9 +213,8 @@ void spin_resonance_vector_field(const spin_resonance_params *params, double t, 
 /* ---- Compensated sums, linear equations ---- */
 static int spin_resonance_finite(const double *values, int count)
 {
-    for (int k = 0; k < count; ++k)
-        if (!isfinite(values[k])) return 0;
-    return 1;
+    while (count > 0 && isfinite(values[count - 1])) --count;
+    return count == 0;
 }
 
 /* x + change + small in compensated arithmetic, where small is the carry and what is as small: were that
@@ -439,8 +438,6 @@ spin_resonance_status spin_resonance_kick(spin_resonance_solver *s, const double
 }
 
 /* ---- The solver ---- */
-#define spin_resonance_SHORT_STEP 1e-100 /* so short that it has no part in whether coefficients are finite */
-
 /* The arguments may be parts of *s, which is therefore written last. */
 spin_resonance_status spin_resonance_init_at(spin_resonance_solver *s, const spin_resonance_params *params,
     const double x0[spin_resonance_DIM], double t0)
@@ -452,7 +449,7 @@ spin_resonance_status spin_resonance_init_at(spin_resonance_solver *s, const spi
     fresh.t = t0;
     if (!spin_resonance_finite(fresh.x, spin_resonance_DIM) || !spin_resonance_allowed(&fresh.params))
         return spin_resonance_BAD_ARGUMENT;
-    spin_resonance_prepare(&fresh.params, spin_resonance_SHORT_STEP, fresh.coef);
+    spin_resonance_prepare(&fresh.params, 1e-100, fresh.coef); /* so short a step does not matter */
     if (!spin_resonance_finite(fresh.coef, spin_resonance_COEFFICIENTS)) return spin_resonance_BAD_ARGUMENT;
     *s = fresh;
     return spin_resonance_OK;
@@ -530,13 +527,12 @@ spin_resonance_status spin_resonance_ensemble_at(const spin_resonance_params *pa
     size_t members, double t0, double h, size_t steps, unsigned char *status)
 {
     spin_resonance_status worst = isfinite(h) ? spin_resonance_OK : spin_resonance_BAD_ARGUMENT;
-    const spin_resonance_params own = params != NULL ? *params : spin_resonance_default_params;
     if (x == NULL && members > 0) return spin_resonance_BAD_ARGUMENT;
     for (size_t m = 0; m < members; ++m) {
         spin_resonance_solver s;
         double x0[spin_resonance_DIM];
         for (size_t i = 0; i < spin_resonance_DIM; ++i) x0[i] = x[i * members + m];
-        spin_resonance_status member = spin_resonance_init_at(&s, &own, x0, t0);
+        spin_resonance_status member = spin_resonance_init_at(&s, params, x0, t0);
         if (member == spin_resonance_OK) {
             member = spin_resonance_integrate(&s, h, steps);
             for (size_t i = 0; i < spin_resonance_DIM; ++i) x[i * members + m] = s.x[i];

@@ -27,7 +27,7 @@
  *   5. Noise
  *   6. The solver
  *   7. Ensembles
- * body-sha256: 60ce49085d996c5e8d9c129e4a3238cb0c0b79b872a8f802942abed634bd5bd8
+ * body-sha256: fd0011f8c574999f40320071b68a679caa0ec711ba671f5f3d4ab007d467a10f
  */
 #include "thermal_chain.h"
 
@@ -944,9 +944,8 @@ void thermal_chain_noise_fields(const thermal_chain_params *params, const double
 /* ---- Compensated sums, linear equations ---- */
 static int thermal_chain_finite(const double *values, int count)
 {
-    for (int k = 0; k < count; ++k)
-        if (!isfinite(values[k])) return 0;
-    return 1;
+    while (count > 0 && isfinite(values[count - 1])) --count;
+    return count == 0;
 }
 
 /* x + change + small in compensated arithmetic, where small is the carry and what is as small: were that
@@ -1171,8 +1170,6 @@ thermal_chain_status thermal_chain_set_noise(thermal_chain_solver *s, uint64_t s
 }
 
 /* ---- The solver ---- */
-#define thermal_chain_SHORT_STEP 1e-100 /* so short that it has no part in whether coefficients are finite */
-
 /* The arguments may be parts of *s, which is therefore written last. */
 thermal_chain_status thermal_chain_init(thermal_chain_solver *s, const thermal_chain_params *params,
     const double x0[thermal_chain_DIM])
@@ -1183,7 +1180,7 @@ thermal_chain_status thermal_chain_init(thermal_chain_solver *s, const thermal_c
     memcpy(fresh.x, x0, sizeof fresh.x);
     if (!thermal_chain_finite(fresh.x, thermal_chain_DIM) || !thermal_chain_allowed(&fresh.params))
         return thermal_chain_BAD_ARGUMENT;
-    thermal_chain_prepare(&fresh.params, thermal_chain_SHORT_STEP, fresh.coef);
+    thermal_chain_prepare(&fresh.params, 1e-100, fresh.coef); /* so short a step does not matter */
     if (!thermal_chain_finite(fresh.coef, thermal_chain_COEFFICIENTS)) return thermal_chain_BAD_ARGUMENT;
     *s = fresh;
     return thermal_chain_OK;
@@ -1256,7 +1253,6 @@ thermal_chain_status thermal_chain_ensemble_of(const thermal_chain_params *param
     double h, size_t steps, uint64_t seed, uint32_t first_member, uint64_t first_step, unsigned char *status)
 {
     thermal_chain_status worst = isfinite(h) ? thermal_chain_OK : thermal_chain_BAD_ARGUMENT;
-    const thermal_chain_params own = params != NULL ? *params : thermal_chain_default_params;
     size_t earliest = members;
     if (x == NULL && members > 0) return thermal_chain_BAD_ARGUMENT;
 #ifdef _OPENMP
@@ -1266,7 +1262,7 @@ thermal_chain_status thermal_chain_ensemble_of(const thermal_chain_params *param
         thermal_chain_solver s;
         double x0[thermal_chain_DIM];
         for (size_t i = 0; i < thermal_chain_DIM; ++i) x0[i] = x[i * members + m];
-        thermal_chain_status member = thermal_chain_init(&s, &own, x0);
+        thermal_chain_status member = thermal_chain_init(&s, params, x0);
         if (member == thermal_chain_OK) {
             thermal_chain_set_noise(&s, seed, first_member + (uint32_t)m, first_step);
             member = thermal_chain_integrate(&s, h, steps);

@@ -26,7 +26,7 @@
  *   5. Noise
  *   6. The solver
  *   7. Ensembles
- * body-sha256: c4b7b6a22b07f0fdfe93dc59ebb15c15f141f684721631bec011dbf70303b0e2
+ * body-sha256: 926b4a1e8f746e180374f9773512e229eaaa1d1bd78ea306e57a3ff08cb4a08d
  */
 #include "thermal_spin.h"
 
@@ -217,9 +217,8 @@ void thermal_spin_noise_fields(const thermal_spin_params *params, const double x
 /* ---- Compensated sums, linear equations ---- */
 static int thermal_spin_finite(const double *values, int count)
 {
-    for (int k = 0; k < count; ++k)
-        if (!isfinite(values[k])) return 0;
-    return 1;
+    while (count > 0 && isfinite(values[count - 1])) --count;
+    return count == 0;
 }
 
 /* x + change + small in compensated arithmetic, where small is the carry and what is as small: were that
@@ -439,8 +438,6 @@ thermal_spin_status thermal_spin_set_noise(thermal_spin_solver *s, uint64_t seed
 }
 
 /* ---- The solver ---- */
-#define thermal_spin_SHORT_STEP 1e-100 /* so short that it has no part in whether coefficients are finite */
-
 /* The arguments may be parts of *s, which is therefore written last. */
 thermal_spin_status thermal_spin_init(thermal_spin_solver *s, const thermal_spin_params *params,
     const double x0[thermal_spin_DIM])
@@ -451,7 +448,7 @@ thermal_spin_status thermal_spin_init(thermal_spin_solver *s, const thermal_spin
     memcpy(fresh.x, x0, sizeof fresh.x);
     if (!thermal_spin_finite(fresh.x, thermal_spin_DIM) || !thermal_spin_allowed(&fresh.params))
         return thermal_spin_BAD_ARGUMENT;
-    thermal_spin_prepare(&fresh.params, thermal_spin_SHORT_STEP, fresh.coef);
+    thermal_spin_prepare(&fresh.params, 1e-100, fresh.coef); /* so short a step does not matter */
     if (!thermal_spin_finite(fresh.coef, thermal_spin_COEFFICIENTS)) return thermal_spin_BAD_ARGUMENT;
     *s = fresh;
     return thermal_spin_OK;
@@ -524,7 +521,6 @@ thermal_spin_status thermal_spin_ensemble_of(const thermal_spin_params *params, 
     double h, size_t steps, uint64_t seed, uint32_t first_member, uint64_t first_step, unsigned char *status)
 {
     thermal_spin_status worst = isfinite(h) ? thermal_spin_OK : thermal_spin_BAD_ARGUMENT;
-    const thermal_spin_params own = params != NULL ? *params : thermal_spin_default_params;
     size_t earliest = members;
     if (x == NULL && members > 0) return thermal_spin_BAD_ARGUMENT;
 #ifdef _OPENMP
@@ -534,7 +530,7 @@ thermal_spin_status thermal_spin_ensemble_of(const thermal_spin_params *params, 
         thermal_spin_solver s;
         double x0[thermal_spin_DIM];
         for (size_t i = 0; i < thermal_spin_DIM; ++i) x0[i] = x[i * members + m];
-        thermal_spin_status member = thermal_spin_init(&s, &own, x0);
+        thermal_spin_status member = thermal_spin_init(&s, params, x0);
         if (member == thermal_spin_OK) {
             thermal_spin_set_noise(&s, seed, first_member + (uint32_t)m, first_step);
             member = thermal_spin_integrate(&s, h, steps);

@@ -24,7 +24,7 @@
  *   5. Between steps
  *   6. The solver
  *   7. Ensembles
- * body-sha256: 0fc71e8945b4ae1478a91bd9da8412fc3b8df7774852a4c2e93fb5e4acd8db80
+ * body-sha256: fb9f104e0a76e88ecd6fee26fc539684b7e62f2260185d79892772c2fb056187
  */
 #include "thruster_body.h"
 
@@ -191,9 +191,8 @@ void thruster_body_vector_field(const thruster_body_params *params, const double
 /* ---- Compensated sums, linear equations ---- */
 static int thruster_body_finite(const double *values, int count)
 {
-    for (int k = 0; k < count; ++k)
-        if (!isfinite(values[k])) return 0;
-    return 1;
+    while (count > 0 && isfinite(values[count - 1])) --count;
+    return count == 0;
 }
 
 /* x + change + small in compensated arithmetic, where small is the carry and what is as small: were that
@@ -420,8 +419,6 @@ thruster_body_status thruster_body_kick(thruster_body_solver *s, const double ch
 }
 
 /* ---- The solver ---- */
-#define thruster_body_SHORT_STEP 1e-100 /* so short that it has no part in whether coefficients are finite */
-
 /* The arguments may be parts of *s, which is therefore written last. */
 thruster_body_status thruster_body_init(thruster_body_solver *s, const thruster_body_params *params,
     const double x0[thruster_body_DIM])
@@ -432,7 +429,7 @@ thruster_body_status thruster_body_init(thruster_body_solver *s, const thruster_
     memcpy(fresh.x, x0, sizeof fresh.x);
     if (!thruster_body_finite(fresh.x, thruster_body_DIM) || !thruster_body_allowed(&fresh.params))
         return thruster_body_BAD_ARGUMENT;
-    thruster_body_prepare(&fresh.params, thruster_body_SHORT_STEP, fresh.coef[0]);
+    thruster_body_prepare(&fresh.params, 1e-100, fresh.coef[0]); /* so short a step does not matter */
     if (!thruster_body_finite(fresh.coef[0], thruster_body_COEFFICIENTS)) return thruster_body_BAD_ARGUMENT;
     *s = fresh;
     return thruster_body_OK;
@@ -514,13 +511,12 @@ thruster_body_status thruster_body_ensemble(const thruster_body_params *params, 
     double h, size_t steps, unsigned char *status)
 {
     thruster_body_status worst = isfinite(h) ? thruster_body_OK : thruster_body_BAD_ARGUMENT;
-    const thruster_body_params own = params != NULL ? *params : thruster_body_default_params;
     if (x == NULL && members > 0) return thruster_body_BAD_ARGUMENT;
     for (size_t m = 0; m < members; ++m) {
         thruster_body_solver s;
         double x0[thruster_body_DIM];
         for (size_t i = 0; i < thruster_body_DIM; ++i) x0[i] = x[i * members + m];
-        thruster_body_status member = thruster_body_init(&s, &own, x0);
+        thruster_body_status member = thruster_body_init(&s, params, x0);
         if (member == thruster_body_OK) {
             member = thruster_body_integrate(&s, h, steps);
             for (size_t i = 0; i < thruster_body_DIM; ++i) x[i * members + m] = s.x[i];

@@ -21,7 +21,7 @@
  *   5. Between steps
  *   6. The solver
  *   7. Ensembles
- * body-sha256: 514f13d3ead5d52d70a8b5c9fecc4eda72b605ea37520b59b7da1bad1ccf809a
+ * body-sha256: fe168747454693f402a21e179a3a19645e94adc93012f755a7c0d164bc938f28
  */
 #include "toda3.h"
 
@@ -237,9 +237,8 @@ void toda3_vector_field(const toda3_params *params, const double x[5], double ou
 /* ---- Compensated sums, linear equations ---- */
 static int toda3_finite(const double *values, int count)
 {
-    for (int k = 0; k < count; ++k)
-        if (!isfinite(values[k])) return 0;
-    return 1;
+    while (count > 0 && isfinite(values[count - 1])) --count;
+    return count == 0;
 }
 
 /* x + change + small in compensated arithmetic, where small is the carry and what is as small: were that
@@ -518,13 +517,12 @@ toda3_status toda3_ensemble(const toda3_params *params, double *x, size_t member
     unsigned char *status)
 {
     toda3_status worst = isfinite(h) ? toda3_OK : toda3_BAD_ARGUMENT;
-    const toda3_params own = params != NULL ? *params : toda3_default_params;
     if (x == NULL && members > 0) return toda3_BAD_ARGUMENT;
     for (size_t m = 0; m < members; ++m) {
         toda3_solver s;
         double x0[toda3_DIM];
         for (size_t i = 0; i < toda3_DIM; ++i) x0[i] = x[i * members + m];
-        toda3_status member = toda3_init(&s, &own, x0);
+        toda3_status member = toda3_init(&s, params, x0);
         if (member == toda3_OK) {
             member = toda3_integrate(&s, h, steps);
             for (size_t i = 0; i < toda3_DIM; ++i) x[i * members + m] = s.x[i];

@@ -22,7 +22,7 @@
  *   7. The solver
  *   8. Members of an ensemble
  *   9. Ensembles
- * body-sha256: 47d84e30c588fb478d12a4114390bddd3ae9289008dd9a269d42a7b5a0198bf2
+ * body-sha256: a744335c3858ff7e41fe38894d6a2fe35363f8eacfac7007b08e6fd6ac6da5f2
  */
 #include "toda3_quadratic.h"
 
@@ -115,9 +115,8 @@ void toda3_quadratic_vector_field(const toda3_quadratic_params *params, const do
 /* ---- Compensated sums, linear equations ---- */
 static int toda3_quadratic_finite(const double *values, int count)
 {
-    for (int k = 0; k < count; ++k)
-        if (!isfinite(values[k])) return 0;
-    return 1;
+    while (count > 0 && isfinite(values[count - 1])) --count;
+    return count == 0;
 }
 
 /* x + change + small in compensated arithmetic, where small is the carry and what is as small: were that

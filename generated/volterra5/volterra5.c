@@ -21,7 +21,7 @@
  *   5. Between steps
  *   6. The solver
  *   7. Ensembles
- * body-sha256: 0fabeb50a67816648843c4eaa17e8f2372bc3b14ad51d6a85b7e2f138e094c80
+ * body-sha256: 10fe86decb7bdd15c67884823b06c91d54007f4f96d50c33e034093b9981b720
  */
 #include "volterra5.h"
 
@@ -191,9 +191,8 @@ void volterra5_vector_field(const volterra5_params *params, const double x[5], d
 /* ---- Compensated sums, linear equations ---- */
 static int volterra5_finite(const double *values, int count)
 {
-    for (int k = 0; k < count; ++k)
-        if (!isfinite(values[k])) return 0;
-    return 1;
+    while (count > 0 && isfinite(values[count - 1])) --count;
+    return count == 0;
 }
 
 /* x + change + small in compensated arithmetic, where small is the carry and what is as small: were that
@@ -475,13 +474,12 @@ volterra5_status volterra5_ensemble(const volterra5_params *params, double *x, s
     size_t steps, unsigned char *status)
 {
     volterra5_status worst = isfinite(h) ? volterra5_OK : volterra5_BAD_ARGUMENT;
-    const volterra5_params own = params != NULL ? *params : volterra5_default_params;
     if (x == NULL && members > 0) return volterra5_BAD_ARGUMENT;
     for (size_t m = 0; m < members; ++m) {
         volterra5_solver s;
         double x0[volterra5_DIM];
         for (size_t i = 0; i < volterra5_DIM; ++i) x0[i] = x[i * members + m];
-        volterra5_status member = volterra5_init(&s, &own, x0);
+        volterra5_status member = volterra5_init(&s, params, x0);
         if (member == volterra5_OK) {
             member = volterra5_integrate(&s, h, steps);
             for (size_t i = 0; i < volterra5_DIM; ++i) x[i * members + m] = s.x[i];

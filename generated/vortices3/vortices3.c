@@ -21,7 +21,7 @@
  *   5. Between steps
  *   6. The solver
  *   7. Ensembles
- * body-sha256: 2e358aa57c69901c3f75bdd161b77971037edf3fa325ff3b6424325165f921b0
+ * body-sha256: fdaac42ab0e1dfd1fae78a23bf4b5977c0db271891d7178e0207414a49cc31b1
  */
 #include "vortices3.h"
 
@@ -756,9 +756,8 @@ void vortices3_vector_field(const vortices3_params *params, const double x[6], d
 /* ---- Compensated sums, linear equations ---- */
 static int vortices3_finite(const double *values, int count)
 {
-    for (int k = 0; k < count; ++k)
-        if (!isfinite(values[k])) return 0;
-    return 1;
+    while (count > 0 && isfinite(values[count - 1])) --count;
+    return count == 0;
 }
 
 /* x + change + small in compensated arithmetic, where small is the carry and what is as small: were that
@@ -1042,13 +1041,12 @@ vortices3_status vortices3_ensemble(const vortices3_params *params, double *x, s
     size_t steps, unsigned char *status)
 {
     vortices3_status worst = isfinite(h) ? vortices3_OK : vortices3_BAD_ARGUMENT;
-    const vortices3_params own = params != NULL ? *params : vortices3_default_params;
     if (x == NULL && members > 0) return vortices3_BAD_ARGUMENT;
     for (size_t m = 0; m < members; ++m) {
         vortices3_solver s;
         double x0[vortices3_DIM];
         for (size_t i = 0; i < vortices3_DIM; ++i) x0[i] = x[i * members + m];
-        vortices3_status member = vortices3_init(&s, &own, x0);
+        vortices3_status member = vortices3_init(&s, params, x0);
         if (member == vortices3_OK) {
             member = vortices3_integrate(&s, h, steps);
             for (size_t i = 0; i < vortices3_DIM; ++i) x[i * members + m] = s.x[i];

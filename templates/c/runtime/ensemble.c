@@ -95,7 +95,6 @@ phi_status phi_ensemble(const phi_params *params, double *x, size_t members, dou
 #endif
 {
     phi_status worst = isfinite(h) ? PHI_OK : PHI_BAD_ARGUMENT;
-    const phi_params own = params != NULL ? *params : phi_default_params;
 #if PHI_NOISE
     size_t earliest = members;
 #endif
@@ -110,9 +109,9 @@ phi_status phi_ensemble(const phi_params *params, double *x, size_t members, dou
         double x0[PHI_DIM];
         for (size_t i = 0; i < PHI_DIM; ++i) x0[i] = x[i * members + m];
 #if PHI_TIMED
-        phi_status member = phi_init_at(&s, &own, x0, t0);
+        phi_status member = phi_init_at(&s, params, x0, t0);
 #else
-        phi_status member = phi_init(&s, &own, x0);
+        phi_status member = phi_init(&s, params, x0);
 #endif
         if (member == PHI_OK) {
 #if PHI_NOISE

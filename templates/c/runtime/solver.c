@@ -33,10 +33,6 @@
 #endif
 
 /* ---- The solver ---- */
-#if PHI_PARAMETERS
-#define PHI_SHORT_STEP 1e-100 /* so short that it has no part in whether coefficients are finite */
-
-#endif
 /* The arguments may be parts of *s, which is therefore written last. */
 #if PHI_GAUGE
 phi_status phi_init_gauge(phi_solver *s, const phi_params *params, const double x0[PHI_DIM],
@@ -61,9 +57,9 @@ phi_status phi_init(phi_solver *s, const phi_params *params, const double x0[PHI
 #if PHI_PARAMETERS
     if (!phi_finite(fresh.x, PHI_DIM) || !phi_allowed(&fresh.params)) return PHI_BAD_ARGUMENT;
 #if PHI_GAUGE
-    phi_prepare(&fresh.params, fresh.gauge, PHI_SHORT_STEP, fresh.coef[0]);
+    phi_prepare(&fresh.params, fresh.gauge, 1e-100, fresh.coef[0]); /* so short a step does not matter */
 #else
-    phi_prepare(&fresh.params, PHI_SHORT_STEP, fresh.coef[0]);
+    phi_prepare(&fresh.params, 1e-100, fresh.coef[0]); /* so short a step does not matter */
 #endif
     if (!phi_finite(fresh.coef[0], PHI_COEFFICIENTS)) return PHI_BAD_ARGUMENT;
 #else
