@@ -49,8 +49,8 @@ The bundled specs, one run of each: the longest. The figures show how it begins,
 if there is a Casimir of three coordinates. The tables have the largest errors over the whole run, relative to the
 value at the start unless that is nearly 0, of phigen's solver and of the classical method that the spec names, with
 the same step. `cp "$(phigen list --path kepler)" .` takes a spec as a start for your own; `phigen show` prints its
-formulas. How errors grow or do not grow is on the page that `phigen report` makes of any spec; the system runs there,
-in the browser, beside RK4.
+formulas. How errors grow or do not grow is on the page that `phigen report` makes of any spec. There, and here where
+`make docs` has made the site, the system runs in the browser, beside RK4.
 
 This page is made by `python docs/make_gallery.py`.
 """

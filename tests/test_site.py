@@ -24,7 +24,8 @@ def site(tmp_path_factory):
         pytest.skip("mkdocs is not installed")
     folder = tmp_path_factory.mktemp("site")
     command = [sys.executable, "-m", "mkdocs", "build", "--strict", "--quiet", "--site-dir", folder]
-    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+    panels = {"PHIGEN_PANELS": "pendulum_euler toda thermal_spin"}
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False, env={**os.environ, **panels})
     assert done.returncode == 0, done.stderr
     return folder
 
@@ -40,29 +41,55 @@ def test_every_public_name_is_documented(site):
     assert [name for name in phigen.__all__ if f'id="phigen.{name}"' not in text] == ["__version__"]
 
 
+def test_the_gallery_offers_a_panel_of_each_system_that_has_one(site):
+    offered = re.findall(r'<details data-live="?live/(\w+).html', (site / "gallery.html").read_text(encoding="utf-8"))
+    assert offered == ["pendulum_euler", "toda"]  # with noise there is none
+    assert sorted(path.stem for path in site.glob("live/*.html")) == offered
+
+
 def test_nothing_is_loaded_from_elsewhere(site):
-    for page in site.glob("*.html"):
+    for page in site.rglob("*.html"):
         text = page.read_text(encoding="utf-8")
         loaded = re.findall(r'<(?:script|img|iframe)[^>]*src="?(https?:[^"\s>]*)', text)
         loaded += re.findall(r'<link[^>]*rel="?(?:stylesheet|preload|icon)"?[^>]*href="?(https?:[^"\s>]*)', text)
         assert loaded == [], page.name
 
 
-def test_the_search_works_where_the_site_is_opened_from_a_file(site, tmp_path):
-    browser = Browser(tool("chromium"), tmp_path)
-    try:
-        browser.load(site / "index.html")
-        browser.value("document.querySelector('[data-md-component=search-query]').focus()")
-        browser.value(
-            "const box = document.querySelector('[data-md-component=search-query]'); box.value = 'Casimir';"
-            "box.dispatchEvent(new Event('keyup', {bubbles: true})); box.dispatchEvent(new Event('input'))"
-        )
-        found = browser.value(
-            "new Promise(done => { const begun = Date.now(); const look = () => {"
-            "const links = document.querySelectorAll('.md-search-result__link');"
-            "if (links.length || Date.now() - begun > 20000) done(links.length); else setTimeout(look, 50) }; look() })"
-        )
-        assert found > 3
-        assert browser.complaints == []
-    finally:
-        browser.close()
+@pytest.fixture(scope="module")
+def browser(tmp_path_factory):
+    found = Browser(tool("chromium"), tmp_path_factory.mktemp("profile"))
+    yield found
+    found.close()
+
+
+def test_a_system_of_the_gallery_runs_once_its_panel_is_opened(site, browser):
+    browser.load(site / "gallery.html")
+    panel = "document.querySelector('details[data-live=\"live/toda.html\"]')"
+    frames = "document.querySelectorAll('details iframe').length"
+    assert browser.value(frames) == 0
+    browser.value(f"{panel}.open = true; {panel}.scrollIntoView()")  # out of sight it would rest
+    told = f"{panel}.querySelector('iframe')?.style.height"  # by the panel itself, once it has begun
+    wait = f"new Promise(done => {{ const look = () => {told} ? done({told}) : setTimeout(look, 50); look(); }})"
+    assert float(browser.value(wait).removesuffix("px")) > 400
+    browser.value(f"{panel}.open = false")
+    assert (
+        browser.value("new Promise(d => setTimeout(() => d(document.querySelectorAll('details iframe').length), 100))")
+        == 0
+    )
+    assert browser.complaints == []
+
+
+def test_the_search_works_where_the_site_is_opened_from_a_file(site, browser):
+    browser.load(site / "index.html")
+    browser.value("document.querySelector('[data-md-component=search-query]').focus()")
+    browser.value(
+        "const box = document.querySelector('[data-md-component=search-query]'); box.value = 'Casimir';"
+        "box.dispatchEvent(new Event('keyup', {bubbles: true})); box.dispatchEvent(new Event('input'))"
+    )
+    found = browser.value(
+        "new Promise(done => { const begun = Date.now(); const look = () => {"
+        "const links = document.querySelectorAll('.md-search-result__link');"
+        "if (links.length || Date.now() - begun > 20000) done(links.length); else setTimeout(look, 50) }; look() })"
+    )
+    assert found > 3
+    assert browser.complaints == []

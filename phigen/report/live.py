@@ -14,7 +14,7 @@ from phigen.drawing.groups import Group, groups
 from phigen.errors import PhigenError
 from phigen.geometry.system import System
 from phigen.report import page
-from phigen.spec.model import Extras, Parameter, Run
+from phigen.spec.model import NO_EXTRAS, Extras, Parameter, Run
 from phigen.study.conservation import ENERGY, moving
 from phigen.symbolic.expression import symbols_of
 from phigen.targets.js.emitter import emit
@@ -56,23 +56,32 @@ class Slider:
     high: int = 100
 
 
-def gathered(compilation: Compilation, scheme: str | None, run: Run, parameters: Mapping[str, float]) -> Live:
-    """The panel for a run: the solver in JavaScript, of the order of the page and of lower ones."""
+def gathered(
+    compilation: Compilation,
+    scheme: str | None,
+    run: Run,
+    parameters: Mapping[str, float],
+    orders: Sequence[int] = ORDERS,
+) -> Live:
+    """The panel for a run: the solver in JavaScript, of the order of the page and of those of ``orders`` below it."""
     if compilation.system.noise:
         return Live({}, why_not="RK4, which it has beside the solver, takes no noise")
-    found, why_not = solvers(compilation, scheme)
+    found, why_not = solvers(compilation, scheme, orders)
     return Live(found, run, parameters, why_not)
 
 
-def solvers(compilation: Compilation, scheme: str | None) -> tuple[dict[int, str], str]:
-    """JavaScript by order: of the order of the page and of lower ones, of lattices 2 and 4; or why there is none."""
+def solvers(compilation: Compilation, scheme: str | None, orders: Sequence[int]) -> tuple[dict[int, str], str]:
+    """JavaScript by order: of the order of the page and those of ``orders`` below it, of lattices any; or why not."""
     own = compilation.order.order
     spec = replace(compilation.spec, reconstruct="")
     system = None if spec.lattice else compilation.system
     found: dict[int, str] = {}
-    for order in (own, *(o for o in ORDERS if o < own or (spec.lattice and o > own))):
+    for order in (own, *(o for o in orders if o < own or (spec.lattice and o > own))):
         try:
-            made = compile_spec(spec, order=order, scheme=scheme, system=system, extras=_PRIVATE)
+            if order == own and emits(compilation):
+                made = compilation
+            else:
+                made = compile_spec(spec, order=order, scheme=scheme, system=system, extras=_PRIVATE)
             (text,) = emit(made.program, "").values()
         except PhigenError as error:
             if order == own:
@@ -83,6 +92,11 @@ def solvers(compilation: Compilation, scheme: str | None) -> tuple[dict[int, str
             del found[order]
     why_not = "" if found else f"its JavaScript would take more than {MOST // 1000} kB of this page"
     return dict(sorted(found.items())), why_not
+
+
+def emits(compilation: Compilation) -> bool:
+    """Whether the program of the page is as it is what a panel runs."""
+    return not compilation.spec.reconstruct and compilation.program.extras in (NO_EXTRAS, _PRIVATE)
 
 
 def enclosed(module: str) -> str:

@@ -15,7 +15,7 @@ from phigen.compilation import Compilation
 from phigen.lattice.cell import PAIRS
 from phigen.lattice.states import Start
 from phigen.report import page
-from phigen.report.live import FEW, Live, Slider, general, script, sides, slid, slider_of, solvers
+from phigen.report.live import FEW, ORDERS, Live, Slider, general, script, sides, slid, slider_of, solvers
 from phigen.scheme.kernel import Kernel, Output
 from phigen.spec.model import LieAlgebraForm, Parameter, Run, Spec, Values
 from phigen.symbolic.expression import Expression, symbols_of
@@ -45,11 +45,13 @@ class LatticeLive(Live):
     formulas: str = ""
 
 
-def gathered_lattice(compilation: Compilation, scheme: str | None, run: Run, start: Start) -> LatticeLive:
+def gathered_lattice(
+    compilation: Compilation, scheme: str | None, run: Run, start: Start, orders: Sequence[int] = ORDERS
+) -> LatticeLive:
     """The panel for a run of a lattice."""
     if _numbers(compilation.spec, run, start) > MOST_NUMBERS:
         return LatticeLive({}, why_not="the lists of its start are too long for a page")
-    found, why_not = solvers(compilation, scheme)
+    found, why_not = solvers(compilation, scheme, orders)
     return LatticeLive(found, run, None, why_not, start, _formulas(compilation.spec, run))
 
 

@@ -118,7 +118,14 @@ def page(
 
 def alone(title: str, body: Markup, solvers: str, panel: Sequence[str]) -> str:
     """A page with a live panel and nothing else."""
-    return _complete("alone", [_asset("space.js"), solvers, *map(_asset, panel)], title=title, body=body)
+    scripts = [_asset("space.js"), solvers, *map(_asset, (*panel, "alone.js"))]
+    return _complete("alone", [_short(script) for script in scripts], title=title, body=body)
+
+
+def _short(script: str) -> str:
+    """A script without comments on lines of their own, and without indentation."""
+    lines = (line.strip() for line in script.splitlines())
+    return "\n".join(line for line in lines if line and not line.startswith("//"))
 
 
 def _complete(template: str, scripts: Sequence[str], **values: object) -> str:

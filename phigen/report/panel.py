@@ -11,13 +11,16 @@ from phigen.spec.model import Run
 
 
 def panel_page(compilation: Compilation, run: Run) -> str | None:
-    """The HTML of the panel of a run; None where there is none. Raises `SpecError` for a start that cannot be read."""
+    """The HTML of the panel of a run, of the order of the spec; None where there is none.
+
+    Raises `SpecError` for a start that cannot be read.
+    """
     spec = compilation.spec
     if spec.lattice:
-        fields = gathered_lattice(compilation, None, run, start_of(spec, run))
+        fields = gathered_lattice(compilation, None, run, start_of(spec, run), ())
         body, code, panel = lattice_live_section(compilation, fields), lattice_script(fields), page.FIELDS
         made = bool(fields.solvers)
     else:
-        live = gathered(compilation, None, run, spec.parameters_of(run))
+        live = gathered(compilation, None, run, spec.parameters_of(run), ())
         body, code, panel, made = live_section(compilation, live), script(live), page.CURVES, bool(live.solvers)
     return page.alone(spec.title or spec.name, body, code, panel) if made else None

@@ -12,13 +12,14 @@ import pytest
 from html_check import Page
 from support import compiled
 
-from phigen import resources
+from phigen import resources, spec
 from phigen.compiler import compile_spec
 from phigen.drawing.palette import PALETTE
 from phigen.proofs.examination import Examination
 from phigen.report import document as pages
 from phigen.report import live, page, pictures
 from phigen.report.material import Material
+from phigen.report.panel import panel_page
 from phigen.report.svg import inlined
 from phigen.report.viewer import MOST_NUMBERS, viewer
 from phigen.runtime.trajectory import Trajectory
@@ -290,6 +291,14 @@ def test_page_says_why_it_has_no_panel(monkeypatch):
     compilation, panel = panel_of("pendulum")
     assert "There is no live panel: its JavaScript would take more than" in live.live_section(compilation, panel)
     assert live.script(panel) not in bare(compilation, live=panel)
+
+
+def test_every_lattice_of_the_corpus_has_a_panel():
+    folder = resources.bundled_specs() / "lattices"
+    pages = {path.stem: compile_spec(spec.load(path)) for path in sorted(folder.glob("*.yaml"))}
+    made = {name: panel_page(c, next(iter(c.spec.runs.values()))) for name, c in pages.items()}
+    assert [name for name, html in made.items() if not html] == []
+    assert max(map(len, made.values())) < 120_000
 
 
 def test_modules_become_functions_that_cannot_leave_their_element():

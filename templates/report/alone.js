@@ -1,0 +1,12 @@
+// A panel inside another page: it says how high it is, and follows the theme of that page.
+if (parent !== window) {
+  document.documentElement.style.overflow = "hidden";
+  new ResizeObserver(() => {
+    parent.postMessage({ phigenPanel: document.documentElement.getBoundingClientRect().height }, "*");
+  }).observe(document.body);
+  addEventListener("message", ({ data }) => {
+    if (!["light", "dark"].includes(data?.phigenTheme)) return;
+    document.documentElement.dataset.theme = data.phigenTheme;
+    document.documentElement.dispatchEvent(new Event("themechange"));
+  });
+}
